@@ -1,0 +1,1 @@
+//! Point clouds: field access for any layout, per-point time, deskew.

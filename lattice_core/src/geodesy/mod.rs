@@ -1,0 +1,1 @@
+//! WGS84, ECEF, ENU, GPS time and headings.

@@ -1,0 +1,1 @@
+//! Lattices: generators, exact quantizers, neighbours, Voronoi cells and keys.

@@ -1,0 +1,11 @@
+//! Lattice occupied voxel lists: quantizers, voxel lists, geodesy, poses and clouds.
+//!
+//! A pure library: no ROS, no sockets, no clocks.
+#![deny(unsafe_code)]
+
+pub mod cloud;
+pub mod geodesy;
+pub mod lattice;
+pub mod pose;
+pub mod simulate;
+pub mod voxels;

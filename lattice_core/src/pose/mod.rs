@@ -1,0 +1,1 @@
+//! Poses on SE(3): buffers that interpolate and never extrapolate.

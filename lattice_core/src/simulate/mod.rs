@@ -1,0 +1,1 @@
+//! Simulated machines and sites with a noise-free truth.

@@ -1,0 +1,1 @@
+//! The occupied voxel list.

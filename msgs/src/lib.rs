@@ -1,0 +1,2 @@
+//! ROS 2 messages.
+#![forbid(unsafe_code)]

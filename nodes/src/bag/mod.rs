@@ -1,0 +1,1 @@
+//! rosbag2 directories: reading, writing and playing.

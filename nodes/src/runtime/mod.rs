@@ -1,0 +1,1 @@
+//! What rcl does and ros2-client does not.
