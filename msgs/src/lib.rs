@@ -1,2 +1,28 @@
-//! ROS 2 messages.
+//! ROS 2 messages as serde structs.
+//!
+//! One module per ROS package, with the names of ROS; a field named `type` is `type_` here.
+//! The layout is that of Jazzy. [`RosMessage`] knows each message's type name and schema text,
+//! [`cdr`] reads and writes the bytes that are on the wire and in bags.
 #![forbid(unsafe_code)]
+
+pub mod builtin_interfaces;
+pub mod cdr;
+pub mod diagnostic_msgs;
+pub mod geographic_msgs;
+pub mod geometry_msgs;
+mod interface;
+pub mod lattice;
+pub mod nav_msgs;
+pub mod novatel_oem7_msgs;
+pub mod rcl_interfaces;
+mod registry;
+pub mod rosgraph_msgs;
+pub mod sensor_msgs;
+pub mod std_msgs;
+pub mod std_srvs;
+pub mod tf2_msgs;
+mod time;
+pub mod visualization_msgs;
+
+pub use interface::{RosMessage, RosService, Schema, dds_type_name};
+pub use registry::{MessageVisitor, definition_of, visit_messages};

@@ -1,0 +1,221 @@
+//! What ROS knows of a message besides its fields: type name, schema text, dependencies.
+
+use std::fmt::Debug;
+
+use serde::{Serialize, de::DeserializeOwned};
+
+/// Line between the schemas in a concatenated definition.
+const SEPARATOR: &str =
+    "================================================================================";
+
+/// Schema of one message: its own text, and the schemas of the messages it holds.
+#[derive(Debug)]
+pub struct Schema {
+    /// Type name, such as `sensor_msgs/msg/PointCloud2`.
+    pub type_name: &'static str,
+    /// Text of the `.msg` file, or of one half of the `.srv` file.
+    pub text: &'static str,
+    /// Messages that the fields refer to.
+    pub dependencies: &'static [&'static Schema],
+}
+
+impl Schema {
+    /// The text followed by those of all dependencies, each once (encoding `ros2msg` of MCAP).
+    pub fn definition(&'static self) -> String {
+        let mut seen = vec![self];
+        let mut text = self.text.to_owned();
+        let mut next = 0;
+        while let Some(schema) = seen.get(next).copied() {
+            for &dependency in schema.dependencies {
+                if !seen.iter().any(|s| s.type_name == dependency.type_name) {
+                    seen.push(dependency);
+                    let name = dependency.type_name.replacen("/msg/", "/", 1);
+                    text += &format!("{SEPARATOR}\nMSG: {name}\n{}", dependency.text);
+                }
+            }
+            next += 1;
+        }
+        text
+    }
+}
+
+/// A message, or one half of a service.
+pub trait RosMessage:
+    Clone + Debug + Default + PartialEq + Serialize + DeserializeOwned + Send + Sync + 'static
+{
+    /// Schema of this message.
+    const SCHEMA: &'static Schema;
+
+    /// Type name, such as `sensor_msgs/msg/PointCloud2`.
+    const TYPE: &'static str = Self::SCHEMA.type_name;
+
+    /// Schema text with all dependencies, as bags store it (MCAP schema encoding `ros2msg`).
+    fn definition() -> String {
+        Self::SCHEMA.definition()
+    }
+}
+
+/// A service.
+pub trait RosService {
+    /// Type name, such as `std_srvs/srv/Trigger`.
+    const TYPE: &'static str;
+    /// What the client sends.
+    type Request: RosMessage;
+    /// What the server answers.
+    type Response: RosMessage;
+}
+
+/// Name of a ROS type on DDS: `sensor_msgs/msg/PointCloud2` is `sensor_msgs::msg::dds_::PointCloud2_`.
+///
+/// `None` unless the name has the three parts of a full type name.
+pub fn dds_type_name(type_name: &str) -> Option<String> {
+    let mut parts = type_name.split('/');
+    let (package, kind, name) = (parts.next()?, parts.next()?, parts.next()?);
+    let whole = parts.next().is_none() && !package.is_empty() && !name.is_empty();
+    (whole && matches!(kind, "msg" | "srv" | "action"))
+        .then(|| format!("{package}::{kind}::dds_::{name}_"))
+}
+
+/// Start of the line `---` in the text of a service.
+const fn divider(text: &str) -> usize {
+    let bytes = text.as_bytes();
+    let mut i = 0;
+    while i + 3 < bytes.len() {
+        let line_start = i == 0 || bytes[i - 1] == b'\n';
+        if line_start && bytes[i] == b'-' && bytes[i + 1] == b'-' && bytes[i + 2] == b'-' {
+            return i;
+        }
+        i += 1;
+    }
+    panic!("a service definition has a line of three dashes")
+}
+
+/// First half of the text of a service. Fails to compile where there is no divider.
+pub(crate) const fn request_text(text: &'static str) -> &'static str {
+    text.split_at(divider(text)).0
+}
+
+/// Second half of the text of a service. Fails to compile where there is no divider.
+pub(crate) const fn response_text(text: &'static str) -> &'static str {
+    text.split_at(divider(text) + "---\n".len()).1
+}
+
+/// States the messages of a package: for each the name and the messages its fields refer to.
+macro_rules! messages {
+    ($package:literal in $dir:literal; $($name:ident [$($dependency:ident),*];)*) => {
+        $(impl $crate::RosMessage for $name {
+            const SCHEMA: &'static $crate::Schema = &$crate::Schema {
+                type_name: concat!($package, "/msg/", stringify!($name)),
+                text: include_str!(concat!($dir, stringify!($name), ".msg")),
+                dependencies: &[$(<$dependency as $crate::RosMessage>::SCHEMA),*],
+            };
+        })*
+
+        pub(crate) fn visit_messages(visitor: &mut impl $crate::MessageVisitor) {
+            $(visitor.visit::<$name>();)*
+        }
+    };
+}
+
+/// States the services of a package, each half like a message in `messages!`.
+macro_rules! services {
+    ($package:literal in $dir:literal; $($name:ident:
+        $request:ident [$($request_dependency:ident),*],
+        $response:ident [$($response_dependency:ident),*];)*) => {
+        $(impl $crate::RosService for $name {
+            const TYPE: &'static str = concat!($package, "/srv/", stringify!($name));
+            type Request = $request;
+            type Response = $response;
+        }
+
+        impl $crate::RosMessage for $request {
+            const SCHEMA: &'static $crate::Schema = &$crate::Schema {
+                type_name: concat!($package, "/srv/", stringify!($name), "_Request"),
+                text: $crate::interface::request_text(
+                    include_str!(concat!($dir, stringify!($name), ".srv"))),
+                dependencies: &[$(<$request_dependency as $crate::RosMessage>::SCHEMA),*],
+            };
+        }
+
+        impl $crate::RosMessage for $response {
+            const SCHEMA: &'static $crate::Schema = &$crate::Schema {
+                type_name: concat!($package, "/srv/", stringify!($name), "_Response"),
+                text: $crate::interface::response_text(
+                    include_str!(concat!($dir, stringify!($name), ".srv"))),
+                dependencies: &[$(<$response_dependency as $crate::RosMessage>::SCHEMA),*],
+            };
+        })*
+
+        pub(crate) fn visit_services(visitor: &mut impl $crate::MessageVisitor) {
+            $(
+                visitor.visit::<$request>();
+                visitor.visit::<$response>();
+            )*
+        }
+    };
+}
+
+pub(crate) use {messages, services};
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::sensor_msgs::PointCloud2;
+    use crate::std_srvs::{TriggerRequest, TriggerResponse};
+    use crate::visualization_msgs::MarkerArray;
+
+    #[test]
+    fn definition_holds_each_dependency_once() {
+        let text = PointCloud2::definition();
+        let parts: Vec<&str> = text.split(&format!("{SEPARATOR}\n")).collect();
+        let names: Vec<_> = parts
+            .iter()
+            .skip(1)
+            .filter_map(|p| p.lines().next())
+            .collect();
+        assert_eq!(
+            names,
+            [
+                "MSG: std_msgs/Header",
+                "MSG: sensor_msgs/PointField",
+                "MSG: builtin_interfaces/Time"
+            ]
+        );
+        assert_eq!(parts[0], PointCloud2::SCHEMA.text);
+        assert_eq!(
+            MarkerArray::definition()
+                .matches("MSG: std_msgs/Header\n")
+                .count(),
+            1
+        );
+    }
+
+    #[test]
+    fn halves_of_a_service_are_apart() {
+        assert_eq!(TriggerRequest::TYPE, "std_srvs/srv/Trigger_Request");
+        assert!(!TriggerRequest::SCHEMA.text.contains("success"));
+        assert!(TriggerResponse::SCHEMA.text.starts_with("bool success"));
+    }
+
+    #[test]
+    fn dds_names() {
+        let dds = dds_type_name(PointCloud2::TYPE);
+        assert_eq!(dds.as_deref(), Some("sensor_msgs::msg::dds_::PointCloud2_"));
+        let dds = dds_type_name("std_srvs/srv/Trigger_Request");
+        assert_eq!(
+            dds.as_deref(),
+            Some("std_srvs::srv::dds_::Trigger_Request_")
+        );
+        for wrong in [
+            "",
+            "PointCloud2",
+            "sensor_msgs/PointCloud2",
+            "a/b/C",
+            "a/msg/C/D",
+            "/msg/C",
+            "a/msg/",
+        ] {
+            assert_eq!(dds_type_name(wrong), None, "{wrong}");
+        }
+    }
+}

@@ -1,0 +1,115 @@
+//! Messages of Lattice.
+
+use serde::{Deserialize, Serialize};
+use serde_bytes::ByteBuf;
+
+use crate::geographic_msgs::GeoPoint;
+use crate::geometry_msgs::Pose;
+use crate::interface::messages;
+use crate::std_msgs::Header;
+
+messages! {
+    "lattice_msgs" in "../msg/";
+    LatticeInfo [Pose, GeoPoint];
+    LatticeMap [Header, LatticeInfo];
+    LatticeMapUpdate [Header, LatticeInfo];
+}
+
+/// Which lattice a map is kept on, and where it lies.
+#[derive(Clone, Debug, Default, PartialEq, Serialize, Deserialize)]
+pub struct LatticeInfo {
+    /// Cubic, bcc, fcc, mcc or hex.
+    pub lattice: String,
+    /// Volume of one cell, m³.
+    pub cell_volume_m3: f64,
+    /// Row-major 3x3, m; its columns are the basis vectors of the lattice.
+    pub generator: [f64; 9],
+    /// Position is the datum of the keys (m), in the frame of the map.
+    pub map_from_lattice: Pose,
+    /// Where the map frame (east-north-up) touches the earth.
+    pub origin: GeoPoint,
+    /// False: origin is not known.
+    pub has_origin: bool,
+    /// Changes when the map is reset; sequences count within one epoch.
+    pub epoch: u64,
+}
+
+/// A whole voxel map at one sequence number, or one chunk of it.
+#[derive(Clone, Debug, Default, PartialEq, Serialize, Deserialize)]
+pub struct LatticeMap {
+    /// Time of the last point, and frame of the map.
+    pub header: Header,
+    /// The lattice.
+    pub info: LatticeInfo,
+    /// State of the map that all chunks belong to.
+    pub sequence: u64,
+    /// Number of this chunk, from 0.
+    pub chunk: u32,
+    /// Chunks of this state.
+    pub chunks: u32,
+    /// Voxels in all chunks.
+    pub voxels_total: u64,
+    /// How keys are written, KEY_ENCODING_*.
+    pub key_encoding: String,
+    /// Voxels in this chunk.
+    pub voxels: u32,
+    /// Their lattice indices: Morton keys, ascending, as LEB128 differences, the first absolute.
+    pub keys: ByteBuf,
+    /// Points in each voxel; empty: not kept.
+    pub counts: Vec<u32>,
+    /// Unit of mean_offsets, m.
+    pub offset_unit_m: f64,
+    /// X, y, z of (mean point - cell centre) of each voxel, in offset_unit_m; empty: not kept.
+    pub mean_offsets: Vec<i16>,
+    /// Most frequent label of each voxel; empty: not kept.
+    pub labels: Vec<u16>,
+    /// Points with that label in each voxel; empty: not kept.
+    pub label_counts: Vec<u32>,
+}
+
+impl LatticeMap {
+    /// The only encoding so far.
+    pub const KEY_ENCODING_MORTON21: &'static str = "morton21_delta_leb128";
+}
+
+/// The voxels that differ between two states of a map, or one chunk of them.
+#[derive(Clone, Debug, Default, PartialEq, Serialize, Deserialize)]
+pub struct LatticeMapUpdate {
+    /// Time of the last point, and frame of the map.
+    pub header: Header,
+    /// The lattice.
+    pub info: LatticeInfo,
+    /// State to apply this to.
+    pub previous_sequence: u64,
+    /// State after all chunks are applied.
+    pub sequence: u64,
+    /// Number of this chunk, from 0.
+    pub chunk: u32,
+    /// Chunks of this update.
+    pub chunks: u32,
+    /// How keys are written, KEY_ENCODING_*.
+    pub key_encoding: String,
+    /// Voxels in this chunk.
+    pub voxels: u32,
+    /// Their lattice indices: Morton keys, ascending, as LEB128 differences, the first absolute.
+    pub keys: ByteBuf,
+    /// Points in each voxel; empty: not kept.
+    pub counts: Vec<u32>,
+    /// Unit of mean_offsets, m.
+    pub offset_unit_m: f64,
+    /// X, y, z of (mean point - cell centre) of each voxel, in offset_unit_m; empty: not kept.
+    pub mean_offsets: Vec<i16>,
+    /// Most frequent label of each voxel; empty: not kept.
+    pub labels: Vec<u16>,
+    /// Points with that label in each voxel; empty: not kept.
+    pub label_counts: Vec<u32>,
+    /// Voxels that are gone.
+    pub removed: u32,
+    /// Their keys, written as in keys.
+    pub removed_keys: ByteBuf,
+}
+
+impl LatticeMapUpdate {
+    /// The only encoding so far.
+    pub const KEY_ENCODING_MORTON21: &'static str = "morton21_delta_leb128";
+}

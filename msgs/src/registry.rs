@@ -1,0 +1,108 @@
+//! All messages of this crate, by type and by name.
+
+use crate::interface::RosMessage;
+use crate::{
+    builtin_interfaces, diagnostic_msgs, geographic_msgs, geometry_msgs, lattice, nav_msgs,
+    novatel_oem7_msgs, rcl_interfaces, rosgraph_msgs, sensor_msgs, std_msgs, std_srvs, tf2_msgs,
+    visualization_msgs,
+};
+
+/// Something to do with every message type; see [`visit_messages`].
+pub trait MessageVisitor {
+    /// Called once for each type.
+    fn visit<M: RosMessage>(&mut self);
+}
+
+/// Shows the visitor every message, request and response that this crate knows.
+pub fn visit_messages(visitor: &mut impl MessageVisitor) {
+    builtin_interfaces::visit_messages(visitor);
+    diagnostic_msgs::visit_messages(visitor);
+    geographic_msgs::visit_messages(visitor);
+    geometry_msgs::visit_messages(visitor);
+    lattice::visit_messages(visitor);
+    nav_msgs::visit_messages(visitor);
+    novatel_oem7_msgs::visit_messages(visitor);
+    rcl_interfaces::visit_messages(visitor);
+    rcl_interfaces::visit_services(visitor);
+    rosgraph_msgs::visit_messages(visitor);
+    sensor_msgs::visit_messages(visitor);
+    std_msgs::visit_messages(visitor);
+    std_srvs::visit_services(visitor);
+    tf2_msgs::visit_messages(visitor);
+    visualization_msgs::visit_messages(visitor);
+}
+
+/// Schema text of a type by its full name, such as `sensor_msgs/msg/PointCloud2`, with all
+/// dependencies (MCAP schema encoding `ros2msg`); `None` for a type this crate does not know.
+pub fn definition_of(type_name: &str) -> Option<String> {
+    let mut find = Find {
+        type_name,
+        definition: None,
+    };
+    visit_messages(&mut find);
+    find.definition
+}
+
+struct Find<'a> {
+    type_name: &'a str,
+    definition: Option<String>,
+}
+
+impl MessageVisitor for Find<'_> {
+    fn visit<M: RosMessage>(&mut self) {
+        if M::TYPE == self.type_name {
+            self.definition = Some(M::definition());
+        }
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use std::collections::BTreeSet;
+
+    use super::*;
+
+    #[derive(Default)]
+    struct Names(Vec<&'static str>);
+
+    impl MessageVisitor for Names {
+        fn visit<M: RosMessage>(&mut self) {
+            self.0.push(M::TYPE);
+        }
+    }
+
+    #[test]
+    fn every_message_is_found_by_its_name_and_only_once() {
+        let mut names = Names::default();
+        visit_messages(&mut names);
+        let unique: BTreeSet<_> = names.0.iter().collect();
+        assert_eq!(unique.len(), names.0.len());
+        for name in names.0 {
+            assert!(definition_of(name).is_some(), "{name}");
+        }
+        assert_eq!(definition_of("sensor_msgs/PointCloud2"), None);
+    }
+
+    #[test]
+    fn every_definition_file_belongs_to_a_message() {
+        let mut names = Names::default();
+        visit_messages(&mut names);
+        let root = env!("CARGO_MANIFEST_DIR");
+        let mut folders = vec![(format!("{root}/msg"), "lattice_msgs".to_owned())];
+        for folder in std::fs::read_dir(format!("{root}/definitions")).unwrap() {
+            let folder = folder.unwrap();
+            let package = folder.file_name().into_string().unwrap();
+            folders.push((folder.path().display().to_string(), package));
+        }
+        for (folder, package) in folders {
+            for file in std::fs::read_dir(folder).unwrap() {
+                let file = file.unwrap().file_name().into_string().unwrap();
+                let type_name = match file.split_once('.').unwrap() {
+                    (name, "msg") => format!("{package}/msg/{name}"),
+                    (name, _) => format!("{package}/srv/{name}_Request"),
+                };
+                assert!(names.0.contains(&type_name.as_str()), "{type_name}");
+            }
+        }
+    }
+}

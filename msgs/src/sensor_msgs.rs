@@ -1,0 +1,174 @@
+//! Point clouds, inertial and satellite measurements.
+
+use serde::{Deserialize, Serialize};
+use serde_bytes::ByteBuf;
+
+use crate::geometry_msgs::{Quaternion, Vector3};
+use crate::interface::messages;
+use crate::std_msgs::Header;
+
+messages! {
+    "sensor_msgs" in "../definitions/sensor_msgs/";
+    PointField [];
+    PointCloud2 [Header, PointField];
+    CompressedImage [Header];
+    Imu [Header, Quaternion, Vector3];
+    NavSatStatus [];
+    NavSatFix [Header, NavSatStatus];
+}
+
+/// One field of the points of a PointCloud2.
+#[derive(Clone, Debug, Default, PartialEq, Serialize, Deserialize)]
+pub struct PointField {
+    /// Such as x, intensity, t.
+    pub name: String,
+    /// Bytes from the start of the point.
+    pub offset: u32,
+    /// One of the constants.
+    pub datatype: u8,
+    /// Elements in the field.
+    pub count: u32,
+}
+
+impl PointField {
+    /// Signed, 1 byte.
+    pub const INT8: u8 = 1;
+    /// Unsigned, 1 byte.
+    pub const UINT8: u8 = 2;
+    /// Signed, 2 bytes.
+    pub const INT16: u8 = 3;
+    /// Unsigned, 2 bytes.
+    pub const UINT16: u8 = 4;
+    /// Signed, 4 bytes.
+    pub const INT32: u8 = 5;
+    /// Unsigned, 4 bytes.
+    pub const UINT32: u8 = 6;
+    /// IEEE 754, 4 bytes.
+    pub const FLOAT32: u8 = 7;
+    /// IEEE 754, 8 bytes.
+    pub const FLOAT64: u8 = 8;
+}
+
+/// Points as packed binary records.
+#[derive(Clone, Debug, Default, PartialEq, Serialize, Deserialize)]
+pub struct PointCloud2 {
+    /// Time of acquisition, and frame of the coordinates.
+    pub header: Header,
+    /// Rows; 1 when unordered.
+    pub height: u32,
+    /// Points in a row.
+    pub width: u32,
+    /// Layout of a point.
+    pub fields: Vec<PointField>,
+    /// Byte order of the numbers.
+    pub is_bigendian: bool,
+    /// Bytes from point to point.
+    pub point_step: u32,
+    /// Bytes from row to row.
+    pub row_step: u32,
+    /// The points, row_step * height bytes.
+    pub data: ByteBuf,
+    /// True: no point has an invalid (NaN) coordinate.
+    pub is_dense: bool,
+}
+
+/// An image in a compressed format.
+#[derive(Clone, Debug, Default, PartialEq, Serialize, Deserialize)]
+pub struct CompressedImage {
+    /// Time of acquisition, and frame of the camera.
+    pub header: Header,
+    /// Such as png or jpeg.
+    pub format: String,
+    /// The file as bytes.
+    pub data: ByteBuf,
+}
+
+/// Inertial measurement. Covariances are 3x3 row-major about x, y, z; all zero is unknown, -1 first: no such measurement.
+#[derive(Clone, Debug, Default, PartialEq, Serialize, Deserialize)]
+pub struct Imu {
+    /// Time, and frame of the sensor.
+    pub header: Header,
+    /// Sensor in a fixed frame (REP 145: east-north-up).
+    pub orientation: Quaternion,
+    /// In rad².
+    pub orientation_covariance: [f64; 9],
+    /// In rad/s.
+    pub angular_velocity: Vector3,
+    /// In (rad/s)².
+    pub angular_velocity_covariance: [f64; 9],
+    /// In m/s², gravity included.
+    pub linear_acceleration: Vector3,
+    /// In (m/s²)².
+    pub linear_acceleration_covariance: [f64; 9],
+}
+
+/// State of a satellite navigation receiver.
+#[derive(Clone, Copy, Debug, PartialEq, Serialize, Deserialize)]
+pub struct NavSatStatus {
+    /// One of STATUS_*.
+    pub status: i8,
+    /// The systems in use, bits SERVICE_*.
+    pub service: u16,
+}
+
+impl Default for NavSatStatus {
+    fn default() -> Self {
+        Self {
+            status: -2,
+            service: 0,
+        }
+    }
+}
+
+impl NavSatStatus {
+    /// Not set.
+    pub const STATUS_UNKNOWN: i8 = -2;
+    /// No position.
+    pub const STATUS_NO_FIX: i8 = -1;
+    /// Position without augmentation.
+    pub const STATUS_FIX: i8 = 0;
+    /// Augmented from satellites.
+    pub const STATUS_SBAS_FIX: i8 = 1;
+    /// Augmented from the ground.
+    pub const STATUS_GBAS_FIX: i8 = 2;
+    /// No system named; compare, do not mask.
+    pub const SERVICE_UNKNOWN: u16 = 0;
+    /// GPS bit.
+    pub const SERVICE_GPS: u16 = 1;
+    /// GLONASS bit.
+    pub const SERVICE_GLONASS: u16 = 2;
+    /// BeiDou bit.
+    pub const SERVICE_COMPASS: u16 = 4;
+    /// Galileo bit.
+    pub const SERVICE_GALILEO: u16 = 8;
+}
+
+/// Position from satellites, WGS 84.
+#[derive(Clone, Debug, Default, PartialEq, Serialize, Deserialize)]
+pub struct NavSatFix {
+    /// Time, and frame of the antenna.
+    pub header: Header,
+    /// Fix and systems.
+    pub status: NavSatStatus,
+    /// In deg, north positive.
+    pub latitude: f64,
+    /// In deg, east positive.
+    pub longitude: f64,
+    /// In m above the WGS 84 ellipsoid, NaN where unknown.
+    pub altitude: f64,
+    /// In m², 3x3 row-major, east north up.
+    pub position_covariance: [f64; 9],
+    /// One of COVARIANCE_TYPE_*.
+    pub position_covariance_type: u8,
+}
+
+impl NavSatFix {
+    /// Nothing known.
+    pub const COVARIANCE_TYPE_UNKNOWN: u8 = 0;
+    /// Estimated from dilution of precision.
+    pub const COVARIANCE_TYPE_APPROXIMATED: u8 = 1;
+    /// Variances known.
+    pub const COVARIANCE_TYPE_DIAGONAL_KNOWN: u8 = 2;
+    /// All known.
+    pub const COVARIANCE_TYPE_KNOWN: u8 = 3;
+}

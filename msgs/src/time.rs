@@ -1,0 +1,118 @@
+//! Conversions between nanoseconds and the two-part times of ROS.
+
+use crate::builtin_interfaces::{Duration, Time};
+
+const NS_PER_S: i64 = 1_000_000_000;
+
+/// Whole seconds and the rest in [0, 1e9); out of the range of `i32` the nearest that fits.
+fn split(ns: i64) -> (i32, u32) {
+    match i32::try_from(ns.div_euclid(NS_PER_S)) {
+        // The remainder is in [0, 1e9), so the cast is exact.
+        Ok(sec) => (sec, ns.rem_euclid(NS_PER_S) as u32),
+        Err(_) if ns < 0 => (i32::MIN, 0),
+        Err(_) => (i32::MAX, (NS_PER_S - 1) as u32),
+    }
+}
+
+/// Cannot overflow: |sec| <= 2^31 and nanosec < 2^32 give less than 2.2e18.
+fn join(sec: i32, nanosec: u32) -> i64 {
+    i64::from(sec) * NS_PER_S + i64::from(nanosec)
+}
+
+impl Time {
+    /// From nanoseconds since the epoch; saturates at the ends of `sec` (1901 and 2038).
+    pub fn from_ns(ns: i64) -> Self {
+        let (sec, nanosec) = split(ns);
+        Self { sec, nanosec }
+    }
+
+    /// Nanoseconds since the epoch; `nanosec` of 1e9 and more counts as it stands.
+    pub fn to_ns(self) -> i64 {
+        join(self.sec, self.nanosec)
+    }
+}
+
+impl Duration {
+    /// From nanoseconds; saturates at the ends of `sec` (68 years).
+    pub fn from_ns(ns: i64) -> Self {
+        let (sec, nanosec) = split(ns);
+        Self { sec, nanosec }
+    }
+
+    /// Nanoseconds; `nanosec` of 1e9 and more counts as it stands.
+    pub fn to_ns(self) -> i64 {
+        join(self.sec, self.nanosec)
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn negative_times_keep_a_positive_nanosec() {
+        assert_eq!(
+            Time::from_ns(-1),
+            Time {
+                sec: -1,
+                nanosec: 999_999_999
+            }
+        );
+        assert_eq!(
+            Duration::from_ns(-1_500_000_000),
+            Duration {
+                sec: -2,
+                nanosec: 500_000_000
+            }
+        );
+    }
+
+    #[test]
+    fn round_trip_within_range() {
+        for ns in [
+            0,
+            1,
+            -1,
+            1_700_000_000_123_456_789,
+            join(i32::MIN, 0),
+            join(i32::MAX, 999_999_999),
+        ] {
+            assert_eq!(Time::from_ns(ns).to_ns(), ns);
+            assert_eq!(Duration::from_ns(ns).to_ns(), ns);
+        }
+    }
+
+    #[test]
+    fn saturates() {
+        assert_eq!(
+            Time::from_ns(i64::MAX),
+            Time {
+                sec: i32::MAX,
+                nanosec: 999_999_999
+            }
+        );
+        assert_eq!(
+            Time::from_ns(i64::MIN),
+            Time {
+                sec: i32::MIN,
+                nanosec: 0
+            }
+        );
+        assert_eq!(
+            Time {
+                sec: i32::MAX,
+                nanosec: u32::MAX
+            }
+            .to_ns(),
+            2_147_483_651_294_967_295
+        );
+        assert_eq!(
+            Time {
+                sec: i32::MIN,
+                nanosec: 0
+            }
+            .to_ns(),
+            -2_147_483_648_000_000_000
+        );
+    }
+}
