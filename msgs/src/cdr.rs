@@ -110,3 +110,104 @@ pub fn from_slice<T: DeserializeOwned>(bytes: &[u8]) -> Result<T, CdrError> {
         }),
     }
 }
+
+#[cfg(test)]
+mod tests {
+    use serde_bytes::ByteBuf;
+
+    use super::*;
+    use crate::builtin_interfaces::Time;
+    use crate::sensor_msgs::PointCloud2;
+    use crate::std_msgs::Header;
+
+    fn header() -> Header {
+        Header {
+            stamp: Time { sec: 1, nanosec: 2 },
+            frame_id: "map".to_owned(),
+        }
+    }
+
+    /// Header of this crate's [`header`] as a big-endian sender writes it.
+    const BIG: &[u8] = b"\0\0\0\0\0\0\0\x01\0\0\0\x02\0\0\0\x04map\0";
+
+    #[test]
+    fn both_byte_orders() {
+        let little = to_vec(&header()).unwrap();
+        assert_eq!(little, b"\0\x01\0\0\x01\0\0\0\x02\0\0\0\x04\0\0\0map\0");
+        assert_eq!(from_slice::<Header>(&little).unwrap(), header());
+        assert_eq!(from_slice::<Header>(BIG).unwrap(), header());
+    }
+
+    #[test]
+    fn padding_is_allowed_and_more_is_not() {
+        let mut bytes = to_vec(&header()).unwrap();
+        for _ in 0..MAX_PADDING {
+            bytes.push(0);
+            assert_eq!(from_slice::<Header>(&bytes).unwrap(), header());
+        }
+        bytes.push(0);
+        let error = from_slice::<Header>(&bytes).unwrap_err();
+        assert!(
+            matches!(
+                error,
+                CdrError::Trailing {
+                    left: 4,
+                    length: 24,
+                    ..
+                }
+            ),
+            "{error}"
+        );
+    }
+
+    #[test]
+    fn headers_that_are_none() {
+        for length in 0..4 {
+            let error = from_slice::<Header>(&BIG[..length]).unwrap_err();
+            assert!(
+                matches!(error, CdrError::NoHeader { length: l } if l == length),
+                "{error}"
+            );
+        }
+        for kind in [[0, 2], [0, 3], [0, 6], [0, 7], [1, 1], [0xff, 0xff]] {
+            let mut bytes = to_vec(&header()).unwrap();
+            bytes[..2].copy_from_slice(&kind);
+            let error = from_slice::<Header>(&bytes).unwrap_err();
+            assert!(
+                matches!(error, CdrError::Encapsulation { kind: k } if k == kind),
+                "{error}"
+            );
+        }
+    }
+
+    #[test]
+    fn every_truncation_fails() {
+        for length in 4..BIG.len() {
+            let error = from_slice::<Header>(&BIG[..length]).unwrap_err();
+            assert!(
+                matches!(error, CdrError::Decode { .. }),
+                "{length}: {error}"
+            );
+        }
+    }
+
+    #[test]
+    fn alignment_starts_after_the_header() {
+        // One byte, then a number at a multiple of 8 from the end of the header.
+        let bytes = to_vec(&(7_u8, 1.0_f64)).unwrap();
+        assert_eq!(bytes.len(), 4 + 8 + 8);
+        assert_eq!(from_slice::<(u8, f64)>(&bytes).unwrap(), (7, 1.0));
+    }
+
+    #[test]
+    fn point_data_is_one_block() {
+        let data: Vec<u8> = (0..=255).collect();
+        let cloud = PointCloud2 {
+            data: ByteBuf::from(data.clone()),
+            ..Default::default()
+        };
+        let bytes = to_vec(&cloud).unwrap();
+        assert!(bytes.windows(data.len()).any(|window| window == data));
+        assert_eq!(from_slice::<PointCloud2>(&bytes).unwrap(), cloud);
+    }
+}

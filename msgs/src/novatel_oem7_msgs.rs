@@ -16,6 +16,8 @@ messages! {
 }
 
 /// Header of a NovAtel OEM7 log; carries the GPS time of the data.
+///
+/// Layout of the driver for Humble and Jazzy; older drivers end with a uint8 idle_time instead.
 #[derive(Clone, Debug, Default, PartialEq, Serialize, Deserialize)]
 pub struct Oem7Header {
     /// Such as INSPVA.
@@ -32,8 +34,10 @@ pub struct Oem7Header {
     pub gps_week_number: u16,
     /// In ms since the start of the week.
     pub gps_week_milliseconds: u32,
-    /// Idle time of the receiver's processor, 0.5 %.
-    pub idle_time: u8,
+    /// Bits, as the receiver manual numbers them.
+    pub receiver_status: u32,
+    /// Idle time of the receiver's processor, %; 255: not known.
+    pub idle_time: f32,
 }
 
 impl Oem7Header {
@@ -249,9 +253,9 @@ pub struct INSPVA {
     pub header: Header,
     /// GPS time of the solution.
     pub nov_header: Oem7Header,
-    /// In deg, WGS 84.
+    /// In deg, datum of the receiver, by default WGS 84.
     pub latitude: f64,
-    /// In deg, WGS 84.
+    /// In deg, datum of the receiver, by default WGS 84.
     pub longitude: f64,
     /// In m above the ellipsoid.
     pub height: f64,
@@ -282,9 +286,9 @@ pub struct INSPVAX {
     pub ins_status: InertialSolutionStatus,
     /// How the position was found.
     pub pos_type: PositionOrVelocityType,
-    /// In deg, WGS 84.
+    /// In deg, datum of the receiver, by default WGS 84.
     pub latitude: f64,
-    /// In deg, WGS 84.
+    /// In deg, datum of the receiver, by default WGS 84.
     pub longitude: f64,
     /// In m above mean sea level, so ellipsoidal height is height + undulation.
     pub height: f64,
