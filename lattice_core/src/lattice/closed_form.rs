@@ -1,0 +1,258 @@
+//! Exact nearest lattice points in closed form.
+//!
+//! Each form works in coordinates `u` in which the lattice is an integer lattice, a centred one, or
+//! the even-sum lattice D3, and returns the index in the paper's basis. They use only +, -, *,
+//! comparisons and rounding half to even, so that every machine gives the same bits. On a cell
+//! border: half to even, the uncentred coset, the lowest axis.
+
+use nalgebra::Matrix3;
+
+use super::LatticeKind;
+
+/// Adding this leaves a double rounded half to even with the integer in its low bits.
+const ROUND: f64 = 1.5 * (1_u64 << 52) as f64;
+
+/// Largest coordinate that a form answers for; far beyond any index that fits a key.
+const REACH: f64 = (1_u64 << 48) as f64;
+
+/// A coordinate split into its nearest integer and the rest, in [-1/2, 1/2].
+#[derive(Clone, Copy)]
+struct Split {
+    near: i64,
+    rest: f64,
+}
+
+#[inline(always)]
+fn split(u: f64) -> Split {
+    let shifted = u + ROUND;
+    Split {
+        near: (shifted.to_bits() as i64).wrapping_sub(ROUND.to_bits() as i64),
+        rest: u - (shifted - ROUND),
+    }
+}
+
+impl Split {
+    /// The direction of the rest; + for none.
+    #[inline(always)]
+    fn sign(self) -> i64 {
+        if self.rest < 0.0 { -1 } else { 1 }
+    }
+}
+
+/// False for NaN and beyond `REACH`.
+#[inline(always)]
+fn within_reach(u: [f64; 3]) -> bool {
+    (u[0].abs() < REACH) & (u[1].abs() < REACH) & (u[2].abs() < REACH)
+}
+
+/// A nearest-point function, chosen once per batch.
+pub(super) trait ClosedForm: Copy {
+    /// Index of the lattice point nearest to `p` (metres), `None` if not finite or out of reach.
+    fn nearest(self, p: [f64; 3]) -> Option<[i64; 3]>;
+}
+
+/// Z^3.
+#[derive(Clone, Copy, Debug)]
+pub(super) struct Cubic {
+    per_metre: f64,
+}
+
+impl ClosedForm for Cubic {
+    #[inline(always)]
+    fn nearest(self, p: [f64; 3]) -> Option<[i64; 3]> {
+        let u = p.map(|x| x * self.per_metre);
+        within_reach(u).then(|| u.map(|u| split(u).near))
+    }
+}
+
+/// Doubled coordinates (all even or all odd) of the nearest point of Z^3 or Z^3 + 1/2, where axis i
+/// weighs `weights[i]`: the centred point is nearer if the weighted rests exceed a quarter of the
+/// weights, since going to it changes the squared distance by sum weight (1/4 - |rest|).
+#[inline(always)]
+fn centred(u: [f64; 3], z_weight: f64) -> [i64; 3] {
+    let [x, y, z] = u.map(split);
+    let rests = x.rest.abs() + y.rest.abs() + z_weight * z.rest.abs();
+    let odd = i64::from(rests > 0.25 * (2.0 + z_weight));
+    [x, y, z].map(|s| 2 * s.near + odd * s.sign())
+}
+
+/// The body centred cubic lattice in the axes of the paper.
+#[derive(Clone, Copy, Debug)]
+pub(super) struct Bcc {
+    per_metre: f64,
+}
+
+impl ClosedForm for Bcc {
+    #[inline(always)]
+    fn nearest(self, p: [f64; 3]) -> Option<[i64; 3]> {
+        let u = p.map(|x| x * self.per_metre);
+        within_reach(u).then(|| {
+            let [x, y, z] = centred(u, 1.0);
+            [(x - z) >> 1, (y - z) >> 1, z]
+        })
+    }
+}
+
+/// The mean centred lattice: centred tetragonal with c/a = 2^(1/4), in axes that `turn` leads to.
+#[derive(Clone, Copy, Debug)]
+pub(super) struct Mcc {
+    turn: [[f64; 3]; 3],
+}
+
+impl ClosedForm for Mcc {
+    #[inline(always)]
+    fn nearest(self, p: [f64; 3]) -> Option<[i64; 3]> {
+        let u = self
+            .turn
+            .map(|row| row[0] * p[0] + row[1] * p[1] + row[2] * p[2]);
+        within_reach(u).then(|| {
+            let [x, y, z] = centred(u, std::f64::consts::SQRT_2);
+            [(x + z) >> 1, (x + y) >> 1, (y + z) >> 1]
+        })
+    }
+}
+
+/// The face centred cubic lattice as D3, the integer points of even sum.
+#[derive(Clone, Copy, Debug)]
+pub(super) struct Fcc {
+    per_metre: f64,
+}
+
+impl ClosedForm for Fcc {
+    #[inline(always)]
+    fn nearest(self, p: [f64; 3]) -> Option<[i64; 3]> {
+        let u = p.map(|x| x * self.per_metre);
+        within_reach(u).then(|| {
+            let [x, y, z] = u.map(split);
+            let odd = (x.near + y.near + z.near) & 1;
+            let (ax, ay, az) = (x.rest.abs(), y.rest.abs(), z.rest.abs());
+            let move_x = i64::from((ax >= ay) & (ax >= az));
+            let move_y = i64::from((ay > ax) & (ay >= az));
+            let move_z = 1 - move_x - move_y;
+            let kx = x.near + odd * move_x * x.sign();
+            let ky = y.near + odd * move_y * y.sign();
+            let kz = z.near + odd * move_z * z.sign();
+            let w1 = -kz - ky;
+            [(kx - w1) >> 1, w1, -kz]
+        })
+    }
+}
+
+/// Hexagonal prisms: a plane lattice with sides 1 : sqrt 3, centred, times the heights.
+#[derive(Clone, Copy, Debug)]
+pub(super) struct Hex {
+    per_metre: [f64; 3],
+}
+
+impl ClosedForm for Hex {
+    #[inline(always)]
+    fn nearest(self, p: [f64; 3]) -> Option<[i64; 3]> {
+        let [sx, sy, sz] = self.per_metre;
+        let u = [p[0] * sx, p[1] * sy, p[2] * sz];
+        within_reach(u).then(|| {
+            let [x, y, z] = u.map(split);
+            let odd = i64::from(x.rest.abs() + 3.0 * y.rest.abs() > 1.0);
+            let (kx, ky) = (2 * x.near + odd * x.sign(), 2 * y.near + odd * y.sign());
+            [(kx + ky) >> 1, ky, z.near]
+        })
+    }
+}
+
+/// The form of a lattice.
+#[derive(Clone, Copy, Debug)]
+pub(super) enum Quantizer {
+    Cubic(Cubic),
+    Bcc(Bcc),
+    Fcc(Fcc),
+    Mcc(Mcc),
+    Hex(Hex),
+}
+
+/// Runs the same code for whichever form it is, with the choice made outside.
+macro_rules! with_form {
+    ($quantizer:expr, $form:ident => $body:expr) => {
+        match $quantizer {
+            Quantizer::Cubic($form) => $body,
+            Quantizer::Bcc($form) => $body,
+            Quantizer::Fcc($form) => $body,
+            Quantizer::Mcc($form) => $body,
+            Quantizer::Hex($form) => $body,
+        }
+    };
+}
+pub(super) use with_form;
+
+impl Quantizer {
+    /// The form for a generator in metres, oriented as the paper prints it.
+    pub(super) fn new(kind: LatticeKind, g: &Matrix3<f64>) -> Quantizer {
+        match kind {
+            LatticeKind::Cubic => Self::Cubic(Cubic {
+                per_metre: 1.0 / g.m11,
+            }),
+            LatticeKind::Bcc => Self::Bcc(Bcc {
+                per_metre: 1.0 / g.m11,
+            }),
+            LatticeKind::Fcc => Self::Fcc(Fcc {
+                per_metre: 1.0 / g.m12,
+            }),
+            LatticeKind::Mcc => Self::Mcc(Mcc {
+                turn: cuboid_axes(g),
+            }),
+            LatticeKind::Hex => Self::Hex(Hex {
+                per_metre: [1.0 / g.m11, 0.5 / g.m22, 1.0 / g.m33],
+            }),
+        }
+    }
+}
+
+/// Rows that take a point to units of the sides of the MCC cuboid: S G^-1 / 2, where S (rows
+/// 1,1,-1; -1,1,1; 1,-1,1) writes the paper's basis as half diagonals. S G^-1 is a rotation but for
+/// the sides, so the distances hold.
+fn cuboid_axes(g: &Matrix3<f64>) -> [[f64; 3]; 3] {
+    // Inverse of an upper triangular matrix.
+    let (i11, i22, i33) = (1.0 / g.m11, 1.0 / g.m22, 1.0 / g.m33);
+    let (i12, i23) = (-g.m12 * i11 * i22, -g.m23 * i22 * i33);
+    let i13 = (g.m12 * g.m23 * i22 - g.m13) * i11 * i33;
+    [
+        [0.5 * i11, 0.5 * (i12 + i22), 0.5 * (i13 + i23 - i33)],
+        [-0.5 * i11, 0.5 * (i22 - i12), 0.5 * (i23 - i13 + i33)],
+        [0.5 * i11, 0.5 * (i12 - i22), 0.5 * (i13 - i23 + i33)],
+    ]
+}
+
+#[cfg(test)]
+mod tests {
+    use nalgebra::Vector3;
+
+    use super::*;
+    use crate::lattice::generator::unit_generator;
+
+    #[test]
+    fn split_rounds_half_to_even() {
+        for (u, near, rest) in [
+            (0.5, 0, 0.5),
+            (1.5, 2, -0.5),
+            (-0.5, 0, -0.5),
+            (-1.5, -2, 0.5),
+            (0.499_999_999_999_999_94, 0, 0.499_999_999_999_999_94),
+            (-123_456_789.25, -123_456_789, -0.25),
+        ] {
+            let s = split(u);
+            assert_eq!((s.near, s.rest), (near, rest), "{u}");
+        }
+    }
+
+    #[test]
+    fn the_mcc_axes_are_a_rotation_with_the_sides_of_the_cuboid() {
+        let rows = cuboid_axes(&unit_generator(LatticeKind::Mcc)).map(Vector3::from);
+        let sides = [2.0_f64.powf(0.25), 2.0_f64.powf(0.25), 2.0_f64.sqrt()];
+        let axes = [rows[0] * sides[0], rows[1] * sides[1], rows[2] * sides[2]];
+        for i in 0..3 {
+            for j in 0..3 {
+                let expected = if i == j { 1.0 } else { 0.0 };
+                assert!((axes[i].dot(&axes[j]) - expected).abs() < 1e-14);
+            }
+        }
+        assert!(axes[0].cross(&axes[1]).dot(&axes[2]) > 0.0);
+    }
+}

@@ -1,0 +1,200 @@
+//! Neighbouring cells as lattice index differences.
+//!
+//! Ryde & Brünig eq. (3)-(7), corrected: eq. (7) lacks the pair ±(1,1,1), and the FCC cell touches
+//! six more cells in a vertex than eq. (4) lists, so that 12 are its face neighbours only.
+
+use super::{LatticeIndex, LatticeKind};
+
+/// Expands one vector of each pair to both.
+const fn pairs<const N: usize, const M: usize>(half: [LatticeIndex; N]) -> [LatticeIndex; M] {
+    assert!(2 * N == M);
+    let mut all = [[0; 3]; M];
+    let mut i = 0;
+    while i < N {
+        let [a, b, c] = half[i];
+        all[2 * i] = [a, b, c];
+        all[2 * i + 1] = [-a, -b, -c];
+        i += 1;
+    }
+    all
+}
+
+// Face neighbours first, then those that share only an edge or a vertex.
+
+static CUBIC: [LatticeIndex; 26] = pairs([
+    [1, 0, 0],
+    [0, 1, 0],
+    [0, 0, 1],
+    [1, 1, 0],
+    [1, -1, 0],
+    [1, 0, 1],
+    [1, 0, -1],
+    [0, 1, 1],
+    [0, 1, -1],
+    [1, 1, 1],
+    [1, 1, -1],
+    [1, -1, 1],
+    [1, -1, -1],
+]);
+
+static BCC: [LatticeIndex; 14] = pairs([
+    [0, 0, 1],
+    [1, 0, -1],
+    [0, 1, -1],
+    [1, 1, -1],
+    [1, 0, 0],
+    [0, 1, 0],
+    [1, 1, -2],
+]);
+
+static FCC: [LatticeIndex; 18] = pairs([
+    [0, 1, 0],
+    [0, 0, 1],
+    [0, 1, 1],
+    [1, -1, 0],
+    [1, -1, -1],
+    [1, -2, -1],
+    [1, 0, 0],
+    [1, -2, 0],
+    [1, -2, -2],
+]);
+
+static MCC: [LatticeIndex; 14] = pairs([
+    [1, 0, 0],
+    [0, 1, 0],
+    [0, 0, 1],
+    [1, 1, 1],
+    [1, 1, 0],
+    [0, 1, 1],
+    [1, 0, 1],
+]);
+
+static HEX: [LatticeIndex; 20] = pairs([
+    [0, 0, 1],
+    [1, 0, 0],
+    [0, 1, 0],
+    [1, 1, 0],
+    [1, 0, 1],
+    [1, 0, -1],
+    [0, 1, 1],
+    [0, 1, -1],
+    [1, 1, 1],
+    [1, 1, -1],
+]);
+
+/// Every cell that shares at least a vertex, face neighbours first.
+pub(super) fn touching(kind: LatticeKind) -> &'static [LatticeIndex] {
+    match kind {
+        LatticeKind::Cubic => &CUBIC,
+        LatticeKind::Bcc => &BCC,
+        LatticeKind::Fcc => &FCC,
+        LatticeKind::Mcc => &MCC,
+        LatticeKind::Hex => &HEX,
+    }
+}
+
+/// The cells that share a face: the Voronoi-relevant vectors.
+pub(super) fn faces(kind: LatticeKind) -> &'static [LatticeIndex] {
+    match kind {
+        LatticeKind::Cubic => &CUBIC[..6],
+        LatticeKind::Bcc => &BCC,
+        LatticeKind::Fcc => &FCC[..12],
+        LatticeKind::Mcc => &MCC,
+        LatticeKind::Hex => &HEX[..8],
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use std::collections::{BTreeMap, BTreeSet};
+
+    use nalgebra::Vector3;
+
+    use super::*;
+    use crate::lattice::generator::unit_generator;
+
+    /// All lattice vectors that are shortest in their class modulo 2 L, by that class.
+    fn shortest_of_each_class(kind: LatticeKind) -> Vec<Vec<LatticeIndex>> {
+        let g = unit_generator(kind);
+        let mut classes: BTreeMap<[i32; 3], Vec<(f64, LatticeIndex)>> = BTreeMap::new();
+        for code in 0..11 * 11 * 11 {
+            let w = [code % 11 - 5, code / 11 % 11 - 5, code / 121 - 5];
+            let length = (g * Vector3::from(w.map(f64::from))).norm();
+            classes
+                .entry(w.map(|i: i32| i.rem_euclid(2)))
+                .or_default()
+                .push((length, w));
+        }
+        assert!(classes.remove(&[0; 3]).is_some());
+        let shortest = |members: &Vec<(f64, LatticeIndex)>| {
+            let least = members.iter().map(|m| m.0).fold(f64::MAX, f64::min);
+            members
+                .iter()
+                .filter(|m| m.0 < least + 1e-9)
+                .map(|m| m.1)
+                .collect()
+        };
+        classes.values().map(shortest).collect()
+    }
+
+    #[test]
+    fn tables_are_the_vectors_of_voronoi_theory() {
+        for (kind, faces_expected, touching_expected) in [
+            (LatticeKind::Cubic, 6, 26),
+            (LatticeKind::Bcc, 14, 14),
+            (LatticeKind::Fcc, 12, 18),
+            (LatticeKind::Mcc, 14, 14),
+            (LatticeKind::Hex, 8, 20),
+        ] {
+            let classes = shortest_of_each_class(kind);
+            let relevant: BTreeSet<_> = classes
+                .iter()
+                .filter(|c| c.len() == 2)
+                .flatten()
+                .copied()
+                .collect();
+            let all: BTreeSet<_> = classes.iter().flatten().copied().collect();
+            assert_eq!(
+                faces(kind).iter().copied().collect::<BTreeSet<_>>(),
+                relevant,
+                "{kind}"
+            );
+            assert_eq!(
+                touching(kind).iter().copied().collect::<BTreeSet<_>>(),
+                all,
+                "{kind}"
+            );
+            assert_eq!(
+                (faces(kind).len(), touching(kind).len()),
+                (faces_expected, touching_expected)
+            );
+            assert!(touching(kind).starts_with(faces(kind)));
+        }
+    }
+
+    #[test]
+    fn distances_are_those_of_the_theory() {
+        let counted = |kind| {
+            let mut counts: BTreeMap<u64, usize> = BTreeMap::new();
+            for w in touching(kind) {
+                let length = (unit_generator(kind) * Vector3::from(w.map(f64::from))).norm();
+                *counts.entry((length * 1e5).round() as u64).or_default() += 1;
+            }
+            counts.into_iter().collect::<Vec<_>>()
+        };
+        assert_eq!(
+            counted(LatticeKind::Cubic),
+            [(100_000, 6), (141_421, 12), (173_205, 8)]
+        );
+        assert_eq!(counted(LatticeKind::Bcc), [(109_112, 8), (125_992, 6)]);
+        assert_eq!(counted(LatticeKind::Fcc), [(112_246, 12), (158_740, 6)]);
+        assert_eq!(
+            counted(LatticeKind::Mcc),
+            [(109_868, 8), (118_921, 4), (141_421, 2)]
+        );
+        assert_eq!(
+            counted(LatticeKind::Hex),
+            [(83_268, 2), (117_759, 6), (144_225, 12)]
+        );
+    }
+}
