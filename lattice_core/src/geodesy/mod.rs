@@ -1,1 +1,16 @@
 //! WGS84, ECEF, ENU, GPS time and headings.
+//!
+//! Geodetic heights are ellipsoidal. A map is the ENU frame at a fixed origin, never a
+//! projection: it has no zones, no scale factor and no grid convergence.
+
+mod enu;
+mod error;
+mod gps_time;
+mod ins;
+mod wgs84;
+
+pub use enu::EnuFrame;
+pub use error::GeodesyError;
+pub use gps_time::{GPS_EPOCH_UNIX_S, utc_ns_from_gps};
+pub use ins::{InsMount, base_position_m, enu_from_flu, yaw_rad_from_azimuth_deg};
+pub use wgs84::{FLATTENING, Geodetic, SEMI_MAJOR_AXIS_M, ecef_from_geodetic, geodetic_from_ecef};

@@ -1,0 +1,129 @@
+//! The local east-north-up frame at a fixed origin.
+
+use nalgebra::{Isometry3, Matrix3, Rotation3, Translation3, UnitQuaternion, Vector3};
+
+use super::{GeodesyError, Geodetic, ecef_from_geodetic, geodetic_from_ecef};
+
+/// East-north-up frame tangent to the ellipsoid at its origin, metres.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct EnuFrame {
+    origin: Geodetic,
+    origin_ecef_m: Vector3<f64>,
+    ecef_from_enu: Matrix3<f64>,
+}
+
+impl EnuFrame {
+    /// Frame at `origin`.
+    pub fn new(origin: Geodetic) -> EnuFrame {
+        EnuFrame {
+            origin,
+            origin_ecef_m: ecef_from_geodetic(&origin),
+            ecef_from_enu: ecef_from_local_level(&origin),
+        }
+    }
+
+    /// Where the frame is.
+    pub fn origin(&self) -> &Geodetic {
+        &self.origin
+    }
+
+    /// Position of a place in this frame, metres east, north and up.
+    pub fn enu_from_geodetic(&self, place: &Geodetic) -> Vector3<f64> {
+        self.ecef_from_enu
+            .tr_mul(&(ecef_from_geodetic(place) - self.origin_ecef_m))
+    }
+
+    /// Place of a position in this frame, metres; refused as by [`geodetic_from_ecef`].
+    pub fn geodetic_from_enu(&self, enu_m: &Vector3<f64>) -> Result<Geodetic, GeodesyError> {
+        geodetic_from_ecef(&(self.origin_ecef_m + self.ecef_from_enu * enu_m))
+    }
+
+    /// Transform from this frame to ECEF, metres: `earth` from `map` of REP-105.
+    pub fn ecef_from_enu(&self) -> Isometry3<f64> {
+        Isometry3::from_parts(
+            Translation3::from(self.origin_ecef_m),
+            quaternion(self.ecef_from_enu),
+        )
+    }
+
+    /// Rotation from the east, north and up axes at `place`, in which an INS gives its
+    /// attitude, to the axes of this frame: about 9 mrad for 57 km.
+    pub fn enu_from_local_level(&self, place: &Geodetic) -> UnitQuaternion<f64> {
+        quaternion(self.ecef_from_enu.tr_mul(&ecef_from_local_level(place)))
+    }
+}
+
+/// Rotation from the local level axes (columns east, north, up) to ECEF.
+fn ecef_from_local_level(place: &Geodetic) -> Matrix3<f64> {
+    let (sin_lat, cos_lat) = place.latitude_rad.sin_cos();
+    let (sin_lon, cos_lon) = place.longitude_rad.sin_cos();
+    Matrix3::new(
+        -sin_lon,
+        -sin_lat * cos_lon,
+        cos_lat * cos_lon,
+        cos_lon,
+        -sin_lat * sin_lon,
+        cos_lat * sin_lon,
+        0.0,
+        cos_lat,
+        sin_lat,
+    )
+}
+
+fn quaternion(rotation: Matrix3<f64>) -> UnitQuaternion<f64> {
+    UnitQuaternion::from_rotation_matrix(&Rotation3::from_matrix_unchecked(rotation))
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    fn karlsruhe() -> Geodetic {
+        Geodetic::from_degrees(49.011, 8.416, 115.0).unwrap()
+    }
+
+    #[test]
+    fn north_east_and_up_of_the_origin() {
+        let frame = EnuFrame::new(karlsruhe());
+        assert_eq!(frame.enu_from_geodetic(frame.origin()), Vector3::zeros());
+        let mut north = karlsruhe();
+        north.latitude_rad += 1.0e-6;
+        let mut east = karlsruhe();
+        east.longitude_rad += 1.0e-6;
+        let mut up = karlsruhe();
+        up.height_m += 1.0;
+        let north_m = frame.enu_from_geodetic(&north);
+        let east_m = frame.enu_from_geodetic(&east);
+        let up_m = frame.enu_from_geodetic(&up);
+        assert!(north_m.y > 6.3 && north_m.x.abs() < 1.0e-4 && north_m.z.abs() < 1.0e-4);
+        assert!(east_m.x > 4.1 && east_m.y.abs() < 1.0e-4 && east_m.z.abs() < 1.0e-4);
+        assert!((up_m - Vector3::z()).norm() < 1.0e-8);
+    }
+
+    #[test]
+    fn the_isometry_agrees_with_the_coordinates() {
+        let frame = EnuFrame::new(karlsruhe());
+        let place = Geodetic::from_degrees(49.2, 8.1, 300.0).unwrap();
+        let enu = frame.enu_from_geodetic(&place);
+        let ecef = frame.ecef_from_enu() * nalgebra::Point3::from(enu);
+        assert!((ecef.coords - ecef_from_geodetic(&place)).norm() < 1.0e-7);
+    }
+
+    #[test]
+    fn local_level_at_the_origin_is_the_frame() {
+        let frame = EnuFrame::new(karlsruhe());
+        assert!(frame.enu_from_local_level(frame.origin()).angle() < 1.0e-15);
+    }
+
+    #[test]
+    fn local_up_leans_away_from_the_origin() {
+        let frame = EnuFrame::new(karlsruhe());
+        let east = frame
+            .geodetic_from_enu(&Vector3::new(50_000.0, 0.0, 0.0))
+            .unwrap();
+        let up = frame.enu_from_local_level(&east) * Vector3::z();
+        // 50 km over the radius of curvature of the prime vertical at 49 degrees.
+        assert!((up.x - 50_000.0 / 6_390_000.0).abs() < 1.0e-5, "{up}");
+        assert!(up.y.abs() < 1.0e-4, "{up}");
+    }
+}

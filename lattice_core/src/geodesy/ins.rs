@@ -1,0 +1,147 @@
+//! From what an INS reports to the pose of the machine.
+
+use nalgebra::{Isometry3, Translation3, UnitQuaternion, Vector3};
+use std::f64::consts::TAU;
+
+/// Yaw, radians counter-clockwise from east within -pi..=pi, of an azimuth in degrees
+/// clockwise from north: 90 degrees is yaw 0.
+pub fn yaw_rad_from_azimuth_deg(azimuth_deg: f64) -> f64 {
+    let yaw_rad = (90.0 - azimuth_deg % 360.0).to_radians();
+    yaw_rad - TAU * (yaw_rad / TAU).round()
+}
+
+/// Rotation from body axes (x forward, y left, z up) to local east-north-up axes of a
+/// NovAtel attitude in degrees.
+///
+/// NovAtel turns a frame of x right, y forward, z up, first about z by the azimuth
+/// (left-handed, from north), then about x by the pitch, then about y by the roll: in our
+/// axes `Rz(yaw) Ry(-pitch) Rx(roll)`. Positive pitch lifts the nose, positive roll
+/// lowers the right side.
+pub fn enu_from_flu(roll_deg: f64, pitch_deg: f64, azimuth_deg: f64) -> UnitQuaternion<f64> {
+    UnitQuaternion::from_euler_angles(
+        roll_deg.to_radians(),
+        -pitch_deg.to_radians(),
+        yaw_rad_from_azimuth_deg(azimuth_deg),
+    )
+}
+
+/// Position of `base_link` in the map, metres, of a sensor (IMU or antenna) seen at
+/// `sensor_position_m` in the map and mounted at `lever_arm_m` in base_link (FLU).
+pub fn base_position_m(
+    sensor_position_m: &Vector3<f64>,
+    map_from_base: &UnitQuaternion<f64>,
+    lever_arm_m: &Vector3<f64>,
+) -> Vector3<f64> {
+    sensor_position_m - map_from_base * lever_arm_m
+}
+
+/// Where an INS sits on the machine.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct InsMount {
+    /// Reference point of the INS position in base_link (FLU), metres.
+    pub lever_arm_m: Vector3<f64>,
+    /// Boresight: rotation from the axes of the INS to those of base_link.
+    pub base_from_ins: UnitQuaternion<f64>,
+}
+
+impl InsMount {
+    /// Mount from a lever arm in metres and fixed-axis roll, pitch, yaw in radians of the
+    /// INS in base_link.
+    pub fn new(lever_arm_m: Vector3<f64>, boresight_rpy_rad: [f64; 3]) -> InsMount {
+        let [roll, pitch, yaw] = boresight_rpy_rad;
+        InsMount {
+            lever_arm_m,
+            base_from_ins: UnitQuaternion::from_euler_angles(roll, pitch, yaw),
+        }
+    }
+
+    /// Pose of base_link in the map of what the INS reports in the map.
+    pub fn map_from_base(
+        &self,
+        ins_position_m: &Vector3<f64>,
+        map_from_ins: &UnitQuaternion<f64>,
+    ) -> Isometry3<f64> {
+        let rotation = map_from_ins * self.base_from_ins.inverse();
+        let position_m = base_position_m(ins_position_m, &rotation, &self.lever_arm_m);
+        Isometry3::from_parts(Translation3::from(position_m), rotation)
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use std::f64::consts::{FRAC_PI_2, PI};
+
+    const TINY: f64 = 1.0e-12;
+
+    fn close(a: Vector3<f64>, b: Vector3<f64>) {
+        assert!((a - b).norm() < TINY, "{a} is not {b}");
+    }
+
+    #[test]
+    fn compass_to_yaw() {
+        assert_eq!(yaw_rad_from_azimuth_deg(90.0), 0.0);
+        assert!((yaw_rad_from_azimuth_deg(0.0) - FRAC_PI_2).abs() < TINY);
+        assert!((yaw_rad_from_azimuth_deg(180.0) + FRAC_PI_2).abs() < TINY);
+        assert!((yaw_rad_from_azimuth_deg(360.0) - FRAC_PI_2).abs() < TINY);
+        assert!((yaw_rad_from_azimuth_deg(270.0).abs() - PI).abs() < TINY);
+        assert!((yaw_rad_from_azimuth_deg(-90.0).abs() - PI).abs() < TINY);
+    }
+
+    #[test]
+    fn a_level_machine_faces_its_azimuth() {
+        close(enu_from_flu(0.0, 0.0, 0.0) * Vector3::x(), Vector3::y());
+        close(enu_from_flu(0.0, 0.0, 90.0) * Vector3::x(), Vector3::x());
+        close(enu_from_flu(0.0, 0.0, 180.0) * Vector3::x(), -Vector3::y());
+        close(enu_from_flu(0.0, 0.0, 270.0) * Vector3::x(), -Vector3::x());
+        close(enu_from_flu(0.0, 0.0, 33.0) * Vector3::z(), Vector3::z());
+    }
+
+    #[test]
+    fn positive_pitch_lifts_the_nose_and_positive_roll_lowers_the_right() {
+        let (sin10, cos10) = 10.0_f64.to_radians().sin_cos();
+        let nose = enu_from_flu(0.0, 10.0, 0.0) * Vector3::x();
+        close(nose, Vector3::new(0.0, cos10, sin10));
+        let right = enu_from_flu(10.0, 0.0, 0.0) * -Vector3::y();
+        close(right, Vector3::new(cos10, 0.0, -sin10));
+    }
+
+    /// The same attitude, composed in the vendor's own axes and turned into ours.
+    #[test]
+    fn equals_the_composition_in_the_frame_of_the_vendor() {
+        let turn = |axis: Vector3<f64>, deg: f64| UnitQuaternion::new(axis * deg.to_radians());
+        let rfu_from_flu = turn(Vector3::z(), 90.0);
+        for (roll, pitch, azimuth) in [(3.0, -7.0, 200.0), (-25.0, 40.0, 15.0)] {
+            let enu_from_rfu =
+                turn(Vector3::z(), -azimuth) * turn(Vector3::x(), pitch) * turn(Vector3::y(), roll);
+            let expected = enu_from_rfu * rfu_from_flu;
+            assert!(enu_from_flu(roll, pitch, azimuth).angle_to(&expected) < 1.0e-7);
+            let error = (enu_from_flu(roll, pitch, azimuth)
+                .to_rotation_matrix()
+                .matrix()
+                - expected.to_rotation_matrix().matrix())
+            .norm();
+            assert!(error < TINY, "{error}");
+        }
+    }
+
+    #[test]
+    fn the_lever_arm_points_from_base_to_the_sensor() {
+        // Antenna 1 m behind and 2 m above base_link of a machine that faces north.
+        let attitude = enu_from_flu(0.0, 0.0, 0.0);
+        let antenna = Vector3::new(100.0, 199.0, 12.0);
+        let base = base_position_m(&antenna, &attitude, &Vector3::new(-1.0, 0.0, 2.0));
+        close(base, Vector3::new(100.0, 200.0, 10.0));
+    }
+
+    #[test]
+    fn the_boresight_is_taken_out() {
+        let base_in_map = Isometry3::new(Vector3::new(5.0, -3.0, 1.0), Vector3::new(0.1, 0.2, 2.0));
+        let mount = InsMount::new(Vector3::new(0.3, -0.2, 1.1), [0.02, -0.03, FRAC_PI_2]);
+        let ins_position = base_in_map * nalgebra::Point3::from(mount.lever_arm_m);
+        let map_from_ins = base_in_map.rotation * mount.base_from_ins;
+        let found = mount.map_from_base(&ins_position.coords, &map_from_ins);
+        close(found.translation.vector, base_in_map.translation.vector);
+        assert!((found.rotation.coords - base_in_map.rotation.coords).norm() < TINY);
+    }
+}

@@ -1,0 +1,235 @@
+//! The WGS84 ellipsoid: geodetic coordinates to ECEF and back.
+
+use nalgebra::Vector3;
+use serde::{Deserialize, Serialize};
+
+use super::GeodesyError;
+
+/// Semi-major axis of WGS84, metres.
+pub const SEMI_MAJOR_AXIS_M: f64 = 6_378_137.0;
+/// Flattening of WGS84.
+pub const FLATTENING: f64 = 1.0 / 298.257_223_563;
+
+const SEMI_MINOR_AXIS_M: f64 = SEMI_MAJOR_AXIS_M * (1.0 - FLATTENING);
+/// First eccentricity squared.
+const E2: f64 = FLATTENING * (2.0 - FLATTENING);
+/// Second eccentricity squared.
+const EP2: f64 = E2 / (1.0 - E2);
+
+/// Heights taken: what is below or above is a wrong unit, not a place.
+const MIN_HEIGHT_M: f64 = -1.0e5;
+const MAX_HEIGHT_M: f64 = 1.0e7;
+/// The same bounds as distances from the geocentre, wide enough at poles and equator.
+const MIN_RADIUS_M: f64 = 6.2e6;
+const MAX_RADIUS_M: f64 = 1.7e7;
+/// Bowring's step is quartic or better near the ellipsoid; three reach the last bit
+/// everywhere within the bounds above.
+const BOWRING_STEPS: usize = 3;
+
+/// A place on WGS84: geodetic latitude, longitude east, height above the ellipsoid.
+#[derive(Clone, Copy, Debug, PartialEq, Serialize, Deserialize)]
+pub struct Geodetic {
+    /// Latitude, radians, north positive.
+    pub latitude_rad: f64,
+    /// Longitude, radians, east positive.
+    pub longitude_rad: f64,
+    /// Height above the ellipsoid, metres (not above the geoid).
+    pub height_m: f64,
+}
+
+impl Geodetic {
+    /// A place from degrees and metres above the ellipsoid; longitudes of -360..=360 are
+    /// brought to -180..=180.
+    pub fn from_degrees(
+        latitude_deg: f64,
+        longitude_deg: f64,
+        height_m: f64,
+    ) -> Result<Geodetic, GeodesyError> {
+        finite("latitude in degrees", latitude_deg)?;
+        finite("longitude in degrees", longitude_deg)?;
+        finite("height in metres", height_m)?;
+        if latitude_deg.abs() > 90.0 {
+            return Err(GeodesyError::Latitude {
+                degrees: latitude_deg,
+            });
+        }
+        if longitude_deg.abs() > 360.0 {
+            return Err(GeodesyError::Longitude {
+                degrees: longitude_deg,
+            });
+        }
+        check_height(height_m)?;
+        let turned_deg = if longitude_deg > 180.0 {
+            longitude_deg - 360.0
+        } else if longitude_deg < -180.0 {
+            longitude_deg + 360.0
+        } else {
+            longitude_deg
+        };
+        Ok(Geodetic {
+            latitude_rad: latitude_deg.to_radians(),
+            longitude_rad: turned_deg.to_radians(),
+            height_m,
+        })
+    }
+
+    /// Latitude in degrees, north positive.
+    pub fn latitude_deg(&self) -> f64 {
+        self.latitude_rad.to_degrees()
+    }
+
+    /// Longitude in degrees, east positive.
+    pub fn longitude_deg(&self) -> f64 {
+        self.longitude_rad.to_degrees()
+    }
+}
+
+/// ECEF position of a place, metres; exact up to rounding.
+pub fn ecef_from_geodetic(place: &Geodetic) -> Vector3<f64> {
+    let (sin_lat, cos_lat) = place.latitude_rad.sin_cos();
+    let (sin_lon, cos_lon) = place.longitude_rad.sin_cos();
+    let normal_m = SEMI_MAJOR_AXIS_M / (1.0 - E2 * sin_lat * sin_lat).sqrt();
+    let horizontal_m = (normal_m + place.height_m) * cos_lat;
+    Vector3::new(
+        horizontal_m * cos_lon,
+        horizontal_m * sin_lon,
+        (normal_m * (1.0 - E2) + place.height_m) * sin_lat,
+    )
+}
+
+/// Place of an ECEF position in metres, by Bowring's (1976) formula iterated on the
+/// parametric latitude. At the poles the longitude is that of `atan2`, zero on the axis.
+///
+/// Refuses what is not finite, or further than 100 km below or 10 000 km above the
+/// ellipsoid, the geocentre with it.
+pub fn geodetic_from_ecef(ecef_m: &Vector3<f64>) -> Result<Geodetic, GeodesyError> {
+    finite("ECEF x in metres", ecef_m.x)?;
+    finite("ECEF y in metres", ecef_m.y)?;
+    finite("ECEF z in metres", ecef_m.z)?;
+    let axis_distance_m = ecef_m.x.hypot(ecef_m.y);
+    let radius_m = axis_distance_m.hypot(ecef_m.z);
+    if !(MIN_RADIUS_M..=MAX_RADIUS_M).contains(&radius_m) {
+        return Err(GeodesyError::Radius {
+            radius_m,
+            min_m: MIN_RADIUS_M,
+            max_m: MAX_RADIUS_M,
+        });
+    }
+    let mut parametric_rad = ecef_m.z.atan2((1.0 - FLATTENING) * axis_distance_m);
+    let mut latitude_rad = parametric_rad;
+    for _ in 0..BOWRING_STEPS {
+        let (sin_b, cos_b) = parametric_rad.sin_cos();
+        latitude_rad = (ecef_m.z + EP2 * SEMI_MINOR_AXIS_M * sin_b.powi(3))
+            .atan2(axis_distance_m - E2 * SEMI_MAJOR_AXIS_M * cos_b.powi(3));
+        let (sin_lat, cos_lat) = latitude_rad.sin_cos();
+        parametric_rad = ((1.0 - FLATTENING) * sin_lat).atan2(cos_lat);
+    }
+    let (sin_lat, cos_lat) = latitude_rad.sin_cos();
+    // Second order in the error of the latitude, and regular at poles and equator.
+    let height_m = axis_distance_m * cos_lat + ecef_m.z * sin_lat
+        - SEMI_MAJOR_AXIS_M * (1.0 - E2 * sin_lat * sin_lat).sqrt();
+    check_height(height_m)?;
+    Ok(Geodetic {
+        latitude_rad,
+        longitude_rad: ecef_m.y.atan2(ecef_m.x),
+        height_m,
+    })
+}
+
+fn finite(name: &'static str, value: f64) -> Result<(), GeodesyError> {
+    if value.is_finite() {
+        Ok(())
+    } else {
+        Err(GeodesyError::NotFinite { name, value })
+    }
+}
+
+fn check_height(height_m: f64) -> Result<(), GeodesyError> {
+    if (MIN_HEIGHT_M..=MAX_HEIGHT_M).contains(&height_m) {
+        Ok(())
+    } else {
+        Err(GeodesyError::Height {
+            height_m,
+            min_m: MIN_HEIGHT_M,
+            max_m: MAX_HEIGHT_M,
+        })
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use std::f64::consts::FRAC_PI_2;
+
+    fn place(latitude_deg: f64, longitude_deg: f64, height_m: f64) -> Geodetic {
+        Geodetic::from_degrees(latitude_deg, longitude_deg, height_m).unwrap()
+    }
+
+    #[test]
+    fn axes_of_ecef() {
+        let a = ecef_from_geodetic(&place(0.0, 0.0, 10.0));
+        assert!((a - Vector3::new(SEMI_MAJOR_AXIS_M + 10.0, 0.0, 0.0)).norm() < 1.0e-9);
+        let b = ecef_from_geodetic(&place(0.0, 90.0, 0.0));
+        assert!((b - Vector3::new(0.0, SEMI_MAJOR_AXIS_M, 0.0)).norm() < 1.0e-9);
+        let pole = ecef_from_geodetic(&place(90.0, 0.0, 0.0));
+        assert!((pole - Vector3::new(0.0, 0.0, 6_356_752.314_245)).norm() < 1.0e-6);
+    }
+
+    #[test]
+    fn the_poles_are_exact() {
+        for sign in [1.0, -1.0] {
+            let ecef = Vector3::new(0.0, 0.0, sign * (SEMI_MINOR_AXIS_M + 100.0));
+            let found = geodetic_from_ecef(&ecef).unwrap();
+            assert_eq!(found.latitude_rad, sign * FRAC_PI_2);
+            assert_eq!(found.longitude_rad, 0.0);
+            assert!((found.height_m - 100.0).abs() < 1.0e-8);
+        }
+    }
+
+    #[test]
+    fn the_geocentre_and_space_are_refused() {
+        for ecef in [
+            Vector3::zeros(),
+            Vector3::new(0.0, 0.0, 1.0e-300),
+            Vector3::new(43_000.0, 0.0, 0.0),
+            Vector3::new(6.0e6, 0.0, 0.0),
+            Vector3::new(f64::MAX, f64::MAX, f64::MAX),
+        ] {
+            assert!(matches!(
+                geodetic_from_ecef(&ecef),
+                Err(GeodesyError::Radius { .. })
+            ));
+        }
+        let too_deep = Vector3::new(SEMI_MAJOR_AXIS_M - 1.1e5, 0.0, 0.0);
+        assert!(matches!(
+            geodetic_from_ecef(&too_deep),
+            Err(GeodesyError::Height { .. })
+        ));
+        assert!(matches!(
+            geodetic_from_ecef(&Vector3::new(f64::NAN, 0.0, 0.0)),
+            Err(GeodesyError::NotFinite { .. })
+        ));
+    }
+
+    #[test]
+    fn degrees_are_checked() {
+        assert!(matches!(
+            Geodetic::from_degrees(90.1, 0.0, 0.0),
+            Err(GeodesyError::Latitude { .. })
+        ));
+        assert!(matches!(
+            Geodetic::from_degrees(0.0, 361.0, 0.0),
+            Err(GeodesyError::Longitude { .. })
+        ));
+        assert!(matches!(
+            Geodetic::from_degrees(0.0, 0.0, 1.0e9),
+            Err(GeodesyError::Height { .. })
+        ));
+        assert!(matches!(
+            Geodetic::from_degrees(0.0, f64::INFINITY, 0.0),
+            Err(GeodesyError::NotFinite { .. })
+        ));
+        assert_eq!(place(0.0, 350.0, 0.0).longitude_deg(), -10.0);
+        assert_eq!(place(0.0, -190.0, 0.0).longitude_deg(), 170.0);
+    }
+}
