@@ -1,1 +1,38 @@
 //! Simulated machines and sites with a noise-free truth.
+//!
+//! [`Bobcat`] is the skid-steer loader of Ryde & Brünig 2011, section III.B: three SICK LMS200, one of
+//! them on a turntable, and a SPAN-CPT-like INS, on an earth-moving [`Site`]. Everything is a pure function
+//! of a seed and a time, so that any number of threads gives the same bytes.
+//!
+//! Times are nanoseconds since the start of the log. The map frame is east, north, up (metres) about the
+//! middle of the site; `base_link` is forward, left, up on the ground in the middle of the wheels.
+
+mod bobcat;
+mod ground;
+mod height_field;
+mod ins;
+mod lms200;
+mod loader;
+mod mission;
+mod obstacles;
+mod profile;
+mod random;
+mod site;
+mod spline;
+#[cfg(test)]
+mod tests;
+
+pub use bobcat::{
+    BASE_FROM_IMU_M, BASE_FROM_TURNTABLE_M, Bobcat, INS_PERIOD_NS, Laser, MAX_DURATION_S,
+    SimulationError, TURNTABLE_PERIOD_NS, base_from_imu,
+};
+pub use ground::ground_height_m;
+pub use height_field::HeightField;
+pub use ins::{INS_POSITION_RMS_M, InsSample, InsSamples};
+pub use lms200::{
+    BEAMS, Lms200Return, Lms200Scan, MAX_RANGE_M, MIN_RANGE_M, RANGE_NOISE_M, SCAN_RATE_HZ,
+    SCAN_SPAN_NS,
+};
+pub use loader::Loader;
+pub use obstacles::{Block, Obstacle, Post};
+pub use site::{Hit, Site};

@@ -1,0 +1,229 @@
+//! The machine: mounts, timing and the simulation itself.
+
+use std::f64::consts::{FRAC_PI_2, TAU};
+
+use nalgebra::{Isometry3, Translation3, UnitQuaternion, Vector3};
+use rayon::prelude::*;
+use thiserror::Error;
+
+use super::ins::InsSamples;
+use super::lms200::{self, Lms200Scan, SCAN_RATE_HZ, SCAN_SPAN_NS};
+use super::loader::Loader;
+use super::obstacles::Block;
+use super::random::{Purpose, Stream};
+use super::site::Site;
+
+/// From `base_link` to the IMU, in `base_link`'s axes (the lever arm), m. The IMU's axes are those of `base_link`.
+pub const BASE_FROM_IMU_M: [f64; 3] = [-0.35, 0.12, 1.25];
+/// From `base_link` to the turntable's origin, m; the turntable turns counter-clockwise about `base_link`'s z.
+pub const BASE_FROM_TURNTABLE_M: [f64; 3] = [-0.20, 0.0, 2.45];
+/// One turn of the turntable (0.5 Hz), ns.
+pub const TURNTABLE_PERIOD_NS: i64 = 2_000_000_000;
+/// Time between INS epochs (100 Hz), ns.
+pub const INS_PERIOD_NS: i64 = 10_000_000;
+/// Longest log, s.
+pub const MAX_DURATION_S: f64 = 86_400.0;
+/// Shortest log: two INS epochs about every scanner's first scan, s.
+const MIN_DURATION_S: f64 = 0.1;
+
+/// The three scanners.
+#[derive(Clone, Copy, Debug, PartialEq, Eq, Hash)]
+pub enum Laser {
+    /// On the left side, scanning an upright leaning plane ahead and to the left.
+    Left,
+    /// On the right side, mirrored.
+    Right,
+    /// On the turntable, scanning a leaning plane.
+    Top,
+}
+
+impl Laser {
+    /// All of them.
+    pub const ALL: [Self; 3] = [Self::Left, Self::Right, Self::Top];
+
+    /// Frame of the returns.
+    pub fn frame(self) -> &'static str {
+        match self {
+            Self::Left => "left_laser",
+            Self::Right => "right_laser",
+            Self::Top => "top_laser",
+        }
+    }
+
+    /// The fixed mount: `base_from_laser` at the sides, `turntable_from_laser` for the top.
+    pub fn mount(self) -> Isometry3<f64> {
+        let about = |axis, angle: f64| UnitQuaternion::from_axis_angle(&axis, angle);
+        let (x, y, z) = (Vector3::x_axis(), Vector3::y_axis(), Vector3::z_axis());
+        let side = |sign: f64| {
+            let azimuth = about(z, sign * 70f64.to_radians());
+            let plane = about(x, FRAC_PI_2 - sign * 20f64.to_radians());
+            Isometry3::from_parts(Translation3::new(0.30, sign * 0.95, 1.50), azimuth * plane)
+        };
+        match self {
+            Self::Left => side(1.0),
+            Self::Right => side(-1.0),
+            Self::Top => Isometry3::from_parts(
+                Translation3::new(0.10, 0.0, 0.15),
+                about(y, 20f64.to_radians()) * about(x, 40f64.to_radians()),
+            ),
+        }
+    }
+
+    /// Start of the first scan, ns: the scanners are not synchronised.
+    fn first_scan_ns(self) -> i64 {
+        match self {
+            Self::Left => 20_000_000,
+            Self::Right => 24_300_000,
+            Self::Top => 28_900_000,
+        }
+    }
+}
+
+/// The lever arm and (identity) boresight of the IMU: `base_from_imu`.
+pub fn base_from_imu() -> Isometry3<f64> {
+    Isometry3::from_parts(
+        Translation3::from(Vector3::from(BASE_FROM_IMU_M)),
+        UnitQuaternion::identity(),
+    )
+}
+
+/// Why a simulation was refused.
+#[derive(Clone, Copy, Debug, PartialEq, Error)]
+pub enum SimulationError {
+    /// The duration is out of bounds or not a number.
+    #[error(
+        "cannot simulate {duration_s} s; give a duration between {MIN_DURATION_S} s and {MAX_DURATION_S} s"
+    )]
+    Duration {
+        /// What was asked for, s.
+        duration_s: f64,
+    },
+}
+
+/// The simulated loader with its sensors on its site.
+#[derive(Clone, Debug)]
+pub struct Bobcat {
+    seed: u64,
+    duration_ns: i64,
+    site: Site,
+    loader: Loader,
+    body: [Block; 2],
+}
+
+impl Bobcat {
+    /// A log of `duration_s`; the seed sets all noise and the vibration, but neither site nor tour.
+    pub fn new(seed: u64, duration_s: f64) -> Result<Self, SimulationError> {
+        if !(MIN_DURATION_S..=MAX_DURATION_S).contains(&duration_s) {
+            return Err(SimulationError::Duration { duration_s });
+        }
+        let block = |x: f64, z: [f64; 2], length: f64, width: f64| {
+            let center = Vector3::new(x, 0.0, 0.5 * (z[0] + z[1]));
+            Block::new(center, Vector3::new(length, width, z[1] - z[0]), 0.0)
+        };
+        Ok(Self {
+            seed,
+            duration_ns: (duration_s * 1e9).round() as i64,
+            site: Site::earth_moving(),
+            loader: Loader::new(seed),
+            body: [
+                block(0.0, [0.2, 1.2], 2.3, 1.6),
+                block(-0.1, [1.2, 2.05], 1.2, 1.0),
+            ],
+        })
+    }
+
+    /// Seed of the noise.
+    pub fn seed(&self) -> u64 {
+        self.seed
+    }
+
+    /// Duration of the log, ns.
+    pub fn duration_ns(&self) -> i64 {
+        self.duration_ns
+    }
+
+    /// Where the loader works.
+    pub fn site(&self) -> &Site {
+        &self.site
+    }
+
+    /// The loader's motion.
+    pub fn loader(&self) -> &Loader {
+        &self.loader
+    }
+
+    /// True pose of the loader.
+    pub fn map_from_base(&self, time_ns: i64) -> Isometry3<f64> {
+        self.loader.map_from_base(time_ns as f64 * 1e-9)
+    }
+
+    /// Pose of the turntable, exact at any time.
+    pub fn base_from_turntable(&self, time_ns: i64) -> Isometry3<f64> {
+        let angle_rad =
+            TAU * (time_ns.rem_euclid(TURNTABLE_PERIOD_NS) as f64 / TURNTABLE_PERIOD_NS as f64);
+        Isometry3::from_parts(
+            Translation3::from(Vector3::from(BASE_FROM_TURNTABLE_M)),
+            UnitQuaternion::from_axis_angle(&Vector3::z_axis(), angle_rad),
+        )
+    }
+
+    /// Pose of a scanner on the machine.
+    pub fn base_from_laser(&self, laser: Laser, time_ns: i64) -> Isometry3<f64> {
+        match laser {
+            Laser::Left | Laser::Right => laser.mount(),
+            Laser::Top => self.base_from_turntable(time_ns) * laser.mount(),
+        }
+    }
+
+    /// Start of a scan, ns since the start of the log.
+    pub fn scan_start_ns(&self, laser: Laser, index: u64) -> i64 {
+        let rate = i128::from(SCAN_RATE_HZ);
+        let since_first = (i128::from(index) * 1_000_000_000 + rate / 2) / rate;
+        laser
+            .first_scan_ns()
+            .saturating_add(i64::try_from(since_first).unwrap_or(i64::MAX))
+    }
+
+    /// Number of scans that end before the last INS epoch.
+    pub fn scan_count(&self, laser: Laser) -> u64 {
+        let last_epoch_ns = self.duration_ns / INS_PERIOD_NS * INS_PERIOD_NS;
+        let room_ns = last_epoch_ns - laser.first_scan_ns() - SCAN_SPAN_NS - 1;
+        u64::try_from(i128::from(room_ns) * i128::from(SCAN_RATE_HZ) / 1_000_000_000)
+            .map_or(0, |n| n + 1)
+    }
+
+    /// One scan: a function of the seed, the scanner and the index alone.
+    pub fn scan(&self, laser: Laser, index: u64) -> Lms200Scan {
+        let mut noise = Stream::new(self.seed, Purpose::LaserRange, laser as u64, index);
+        let own_body_m = |time_ns: i64, in_laser: &Vector3<f64>| {
+            let mount = self.base_from_laser(laser, time_ns);
+            let (origin, direction) = (mount.translation.vector, mount.rotation * in_laser);
+            let distances = self.body.iter().filter_map(|b| b.cast(&origin, &direction));
+            distances
+                .map(|(distance_m, _)| distance_m)
+                .min_by(f64::total_cmp)
+        };
+        let map_from_laser =
+            |time_ns: i64| self.map_from_base(time_ns) * self.base_from_laser(laser, time_ns);
+        lms200::scan(
+            &self.site,
+            self.scan_start_ns(laser, index),
+            &mut noise,
+            map_from_laser,
+            own_body_m,
+        )
+    }
+
+    /// Scans `range` of a scanner, in order, computed in parallel.
+    pub fn scans(&self, laser: Laser, range: std::ops::Range<u64>) -> Vec<Lms200Scan> {
+        range
+            .into_par_iter()
+            .map(|index| self.scan(laser, index))
+            .collect()
+    }
+
+    /// The INS epochs from the start of the log to its end.
+    pub fn ins(&self) -> InsSamples<'_> {
+        InsSamples::new(self)
+    }
+}

@@ -1,0 +1,212 @@
+//! Errors of a SPAN-CPT-like INS with RTK: slowly wandering (first-order Gauss-Markov) plus white.
+
+use nalgebra::{Isometry3, Translation3, UnitQuaternion, Vector3};
+
+use super::bobcat::{Bobcat, INS_PERIOD_NS, base_from_imu};
+use super::random::{Purpose, Stream};
+
+/// Root mean square of the position error in three dimensions, m (Ryde & Brünig 2011, III.B).
+pub const INS_POSITION_RMS_M: f64 = 0.03;
+
+/// Share of each error's variance that is white.
+const WHITE_SHARE: f64 = 0.04;
+/// Correlation times of position and attitude errors, s.
+const POSITION_TIME_S: f64 = 30.0;
+const ATTITUDE_TIME_S: f64 = 90.0;
+/// White velocity error, m/s per axis.
+const VELOCITY_SIGMA_MPS: f64 = 0.02;
+/// Half the step of the numerical derivatives, s.
+const DERIVATIVE_STEP_S: f64 = 5e-4;
+
+/// One INS epoch. Errors are in the pose and velocity of the IMU; the base's pose follows through the mount.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct InsSample {
+    /// Time of validity, ns since the start of the log.
+    pub time_ns: i64,
+    /// Pose of the IMU as measured.
+    pub map_from_imu: Isometry3<f64>,
+    /// Pose of `base_link` as it follows from the measured one.
+    pub map_from_base: Isometry3<f64>,
+    /// Pose of `base_link` without error.
+    pub true_map_from_base: Isometry3<f64>,
+    /// Velocity of the IMU in the map, measured, m/s.
+    pub velocity_mps: Vector3<f64>,
+    /// Velocity of `base_link` along its own axes, without error, m/s.
+    pub base_velocity_mps: Vector3<f64>,
+    /// Turn rate of `base_link` about its own axes, without error, rad/s.
+    pub base_turn_rate_radps: Vector3<f64>,
+}
+
+impl InsSample {
+    /// Standard deviations of the IMU's east, north and up, m: two to three between level and height.
+    pub const POSITION_SIGMA_M: [f64; 3] = [0.015, 0.015, 0.0212];
+    /// Standard deviations of the attitude error about east, north and up, degrees.
+    pub const ATTITUDE_SIGMA_DEG: [f64; 3] = [0.02, 0.02, 0.06];
+    /// Standard deviation of the velocity, m/s per axis.
+    pub const VELOCITY_SIGMA_MPS: f64 = VELOCITY_SIGMA_MPS;
+}
+
+/// The epochs of a log in order.
+#[derive(Debug)]
+pub struct InsSamples<'a> {
+    bobcat: &'a Bobcat,
+    errors: Errors,
+    next: i64,
+}
+
+impl<'a> InsSamples<'a> {
+    pub(super) fn new(bobcat: &'a Bobcat) -> Self {
+        Self {
+            bobcat,
+            errors: Errors::new(bobcat.seed()),
+            next: 0,
+        }
+    }
+
+    fn sample(&mut self, time_ns: i64) -> InsSample {
+        let [position_m, attitude_rad, velocity_mps] = self.errors.step();
+        let time_s = time_ns as f64 * 1e-9;
+        let mount = base_from_imu();
+        let truth = self.bobcat.map_from_base(time_ns);
+        let true_imu = truth * mount;
+        let before = self
+            .bobcat
+            .loader()
+            .map_from_base(time_s - DERIVATIVE_STEP_S);
+        let after = self
+            .bobcat
+            .loader()
+            .map_from_base(time_s + DERIVATIVE_STEP_S);
+        let per_s = 0.5 / DERIVATIVE_STEP_S;
+        let imu_velocity =
+            ((after * mount).translation.vector - (before * mount).translation.vector) * per_s;
+        let base_velocity = (after.translation.vector - before.translation.vector) * per_s;
+        let map_from_imu = Isometry3::from_parts(
+            Translation3::from(true_imu.translation.vector + position_m),
+            UnitQuaternion::from_scaled_axis(attitude_rad) * true_imu.rotation,
+        );
+        InsSample {
+            time_ns,
+            map_from_imu,
+            map_from_base: map_from_imu * mount.inverse(),
+            true_map_from_base: truth,
+            velocity_mps: imu_velocity + velocity_mps,
+            base_velocity_mps: truth.rotation.inverse() * base_velocity,
+            base_turn_rate_radps: (before.rotation.inverse() * after.rotation).scaled_axis()
+                * per_s,
+        }
+    }
+}
+
+impl Iterator for InsSamples<'_> {
+    type Item = InsSample;
+
+    fn next(&mut self) -> Option<InsSample> {
+        let time_ns = self.next.checked_mul(INS_PERIOD_NS)?;
+        if time_ns > self.bobcat.duration_ns() {
+            return None;
+        }
+        self.next += 1;
+        Some(self.sample(time_ns))
+    }
+}
+
+/// State of the error process.
+struct Errors {
+    stream: Stream,
+    wander: Option<[Vector3<f64>; 2]>,
+}
+
+impl std::fmt::Debug for Errors {
+    fn fmt(&self, f: &mut std::fmt::Formatter<'_>) -> std::fmt::Result {
+        f.debug_struct("Errors")
+            .field("wander", &self.wander)
+            .finish_non_exhaustive()
+    }
+}
+
+impl Errors {
+    fn new(seed: u64) -> Self {
+        Self {
+            stream: Stream::new(seed, Purpose::Ins, 0, 0),
+            wander: None,
+        }
+    }
+
+    /// Errors of position (m), attitude (rad) and velocity (m/s) at the next epoch.
+    fn step(&mut self) -> [Vector3<f64>; 3] {
+        let sigmas = [
+            Vector3::from(InsSample::POSITION_SIGMA_M),
+            Vector3::from(InsSample::ATTITUDE_SIGMA_DEG.map(f64::to_radians)),
+        ];
+        let mut normals = || {
+            let stream = &mut self.stream;
+            [(); 2].map(|()| Vector3::from_fn(|_, _| stream.normal()))
+        };
+        let (slow, white) = (normals(), normals());
+        let wander = match self.wander {
+            None => slow,
+            Some(before) => {
+                let mut now = before;
+                for (i, time_s) in [POSITION_TIME_S, ATTITUDE_TIME_S].into_iter().enumerate() {
+                    let keep = (-INS_PERIOD_NS as f64 * 1e-9 / time_s).exp();
+                    now[i] = before[i] * keep + slow[i] * (1.0 - keep * keep).sqrt();
+                }
+                now
+            }
+        };
+        self.wander = Some(wander);
+        let error = |i: usize| {
+            let unit: Vector3<f64> =
+                wander[i] * (1.0 - WHITE_SHARE).sqrt() + white[i] * WHITE_SHARE.sqrt();
+            unit.component_mul(&sigmas[i])
+        };
+        let (position, attitude) = (error(0), error(1));
+        let velocity = Vector3::from_fn(|_, _| VELOCITY_SIGMA_MPS * self.stream.normal());
+        [position, attitude, velocity]
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn position_errors_have_the_stated_root_mean_square() {
+        let n = 3000;
+        let squares: f64 = (0..n)
+            .map(|seed| Errors::new(seed).step()[0].norm_squared())
+            .sum();
+        let rms_m = (squares / n as f64).sqrt();
+        assert!((rms_m / INS_POSITION_RMS_M - 1.0).abs() < 0.03, "{rms_m}");
+    }
+
+    #[test]
+    fn position_errors_keep_their_size_and_wander_slowly() {
+        let (mut late, mut steps) = (0.0, 0.0);
+        let n = 400;
+        for seed in 0..n {
+            let mut errors = Errors::new(seed);
+            let first = errors.step()[0];
+            steps += (errors.step()[0] - first).norm_squared();
+            let last = (0..3000).map(|_| errors.step()[0]).last().unwrap();
+            late += last.norm_squared();
+        }
+        let rms = |sum: f64| (sum / n as f64).sqrt();
+        assert!(
+            (rms(late) / INS_POSITION_RMS_M - 1.0).abs() < 0.1,
+            "after 30 s {}",
+            rms(late)
+        );
+        assert!(
+            rms(steps) < 0.4 * INS_POSITION_RMS_M,
+            "between epochs {}",
+            rms(steps)
+        );
+        assert!(
+            rms(steps) > 0.2 * INS_POSITION_RMS_M,
+            "no white part: {}",
+            rms(steps)
+        );
+    }
+}

@@ -1,0 +1,426 @@
+//! The earth-moving site: ground, obstacles and an index over both.
+
+use nalgebra::{Vector2, Vector3};
+
+use super::ground::ground_height_m;
+use super::height_field::HeightField;
+use super::obstacles::{Block, Obstacle, Post};
+
+/// Extent of the site along east and north, m; the map's origin is its middle.
+const EXTENT_M: [f64; 2] = [140.0, 170.0];
+/// Side of the triangulated ground's squares, m.
+const SPACING_M: f64 = 0.25;
+/// Squares of ground along the side of one cell of the index.
+const SQUARES_PER_CELL: usize = 16;
+/// Greatest deviation of the rough ground from the smooth one, m.
+const ROUGHNESS_M: f64 = 0.025;
+const SOIL_REFLECTIVITY: f64 = 0.3;
+
+/// Where a ray meets the site.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct Hit {
+    /// Distance along the ray, m.
+    pub range_m: f64,
+    /// Cosine of the angle between ray and surface normal, 0..1.
+    pub cos_incidence: f64,
+    /// Diffuse reflectivity of the surface, 0..1.
+    pub reflectivity: f64,
+}
+
+/// Ground and obstacles of one place, always the same.
+#[derive(Clone, Debug)]
+pub struct Site {
+    ground: HeightField,
+    obstacles: Vec<Obstacle>,
+    cells: Vec<Cell>,
+    cell_columns: usize,
+    cell_rows: usize,
+}
+
+/// One column of the index.
+#[derive(Clone, Debug, Default)]
+struct Cell {
+    highest_ground_m: f64,
+    highest_m: f64,
+    obstacles: Vec<u32>,
+}
+
+impl Site {
+    /// About 140 m x 170 m: undulating ground, spoil piles, a pit with a ramp, berms, a building, fences,
+    /// containers, barriers and posts. It does not depend on a seed, so that logs of it can be compared.
+    pub fn earth_moving() -> Self {
+        let origin = Vector2::new(-0.5 * EXTENT_M[0], -0.5 * EXTENT_M[1]);
+        let squares = EXTENT_M.map(|extent| (extent / SPACING_M) as usize);
+        let ground = HeightField::from_fn(origin, SPACING_M, squares, |column, row, p| {
+            ground_height_m(p.x, p.y) + ROUGHNESS_M * roughness(column, row)
+        });
+        Self::new(ground, layout())
+    }
+
+    fn new(ground: HeightField, obstacles: Vec<Obstacle>) -> Self {
+        let [cell_columns, cell_rows] = ground.squares().map(|n| n.div_ceil(SQUARES_PER_CELL));
+        let mut cells = vec![Cell::default(); cell_columns * cell_rows];
+        for (i, cell) in cells.iter_mut().enumerate() {
+            let from = [
+                i % cell_columns * SQUARES_PER_CELL,
+                i / cell_columns * SQUARES_PER_CELL,
+            ];
+            cell.highest_ground_m = ground.max_height_m(from, from.map(|n| n + SQUARES_PER_CELL));
+            cell.highest_m = cell.highest_ground_m;
+        }
+        let mut site = Self {
+            ground,
+            obstacles,
+            cells,
+            cell_columns,
+            cell_rows,
+        };
+        site.index_obstacles();
+        site
+    }
+
+    fn index_obstacles(&mut self) {
+        let size_m = self.cell_size_m();
+        for (id, obstacle) in (0u32..).zip(&self.obstacles) {
+            let [low, high] = obstacle.bounds_m();
+            let cell_of = |v: f64, origin: f64, n: usize| {
+                (((v - origin) / size_m).max(0.0) as usize).min(n - 1)
+            };
+            let columns = [low.x - 1e-6, high.x + 1e-6]
+                .map(|x| cell_of(x, self.ground.origin_m().x, self.cell_columns));
+            let rows = [low.y - 1e-6, high.y + 1e-6]
+                .map(|y| cell_of(y, self.ground.origin_m().y, self.cell_rows));
+            for row in rows[0]..=rows[1] {
+                for column in columns[0]..=columns[1] {
+                    if let Some(cell) = self.cells.get_mut(row * self.cell_columns + column) {
+                        cell.obstacles.push(id);
+                        cell.highest_m = cell.highest_m.max(high.z);
+                    }
+                }
+            }
+        }
+    }
+
+    /// The triangulated ground.
+    pub fn ground(&self) -> &HeightField {
+        &self.ground
+    }
+
+    /// What stands on the ground.
+    pub fn obstacles(&self) -> &[Obstacle] {
+        &self.obstacles
+    }
+
+    /// First surface along a ray (unit `direction`) within `max_range_m`; nothing lies outside the site.
+    pub fn cast(
+        &self,
+        origin: &Vector3<f64>,
+        direction: &Vector3<f64>,
+        max_range_m: f64,
+    ) -> Option<Hit> {
+        let size_m = self.cell_size_m();
+        let start = (origin.xy() - self.ground.origin_m()) / size_m;
+        let step = direction.xy() / size_m;
+        let (mut column, mut row) = (start.x.floor(), start.y.floor());
+        let mut at_m = 0.0;
+        while column >= 0.0
+            && row >= 0.0
+            && column < self.cell_columns as f64
+            && row < self.cell_rows as f64
+        {
+            let leave = [leave(start.x, step.x, column), leave(start.y, step.y, row)];
+            let leave_m = leave[0].min(leave[1]).min(max_range_m).max(at_m);
+            let cell = self
+                .cells
+                .get(row as usize * self.cell_columns + column as usize)?;
+            if let Some(hit) = self.cast_in_cell(cell, origin, direction, [at_m, leave_m]) {
+                return Some(hit);
+            }
+            if leave_m >= max_range_m {
+                return None;
+            }
+            if leave[0] <= leave[1] {
+                column += step.x.signum();
+            } else {
+                row += step.y.signum();
+            }
+            at_m = leave_m;
+        }
+        None
+    }
+
+    fn cast_in_cell(
+        &self,
+        cell: &Cell,
+        origin: &Vector3<f64>,
+        direction: &Vector3<f64>,
+        [from_m, to_m]: [f64; 2],
+    ) -> Option<Hit> {
+        let lowest_m = origin.z + (direction.z * from_m).min(direction.z * to_m);
+        if lowest_m > cell.highest_m {
+            return None;
+        }
+        let mut nearest: Option<Hit> = None;
+        // A face on the border belongs to both cells: a hit a hair beyond this one is as good here.
+        let mut limit_m = to_m + 1e-9;
+        for &id in &cell.obstacles {
+            let hit = self
+                .obstacles
+                .get(id as usize)
+                .and_then(|o| o.cast(origin, direction));
+            if let Some((range_m, normal, reflectivity)) = hit
+                && range_m <= limit_m
+            {
+                limit_m = range_m;
+                nearest = Some(Hit {
+                    range_m,
+                    cos_incidence: -normal.dot(direction),
+                    reflectivity,
+                });
+            }
+        }
+        if lowest_m <= cell.highest_ground_m
+            && let Some(range_m) = self
+                .ground
+                .cast(origin, direction, from_m, limit_m.min(to_m))
+        {
+            let point = origin + direction * range_m;
+            let normal = self
+                .ground
+                .normal(point.x, point.y)
+                .unwrap_or_else(Vector3::z);
+            let cos_incidence = (-normal.dot(direction)).max(0.0);
+            nearest = Some(Hit {
+                range_m,
+                cos_incidence,
+                reflectivity: SOIL_REFLECTIVITY,
+            });
+        }
+        nearest
+    }
+
+    /// Distance from a point to the nearest surface (ground: vertically), m.
+    pub fn surface_distance_m(&self, point: &Vector3<f64>) -> f64 {
+        let ground = self
+            .ground
+            .height_m(point.x, point.y)
+            .map_or(f64::INFINITY, |h| (point.z - h).abs());
+        self.obstacles
+            .iter()
+            .map(|o| o.surface_distance_m(point))
+            .fold(ground, f64::min)
+    }
+
+    fn cell_size_m(&self) -> f64 {
+        self.ground.spacing_m() * SQUARES_PER_CELL as f64
+    }
+}
+
+/// Ray parameter at which a coordinate leaves the unit interval that begins at `cell`.
+fn leave(start: f64, step: f64, cell: f64) -> f64 {
+    if step == 0.0 {
+        return f64::INFINITY;
+    }
+    (cell + if step > 0.0 { 1.0 } else { 0.0 } - start) / step
+}
+
+/// A fixed value in -1..1 for a node of the ground's grid (a mix of its indices).
+fn roughness(column: usize, row: usize) -> f64 {
+    let mut bits = (column as u64).wrapping_mul(0x9e37_79b9_7f4a_7c15)
+        ^ (row as u64).wrapping_mul(0xc2b2_ae3d_27d4_eb4f);
+    bits ^= bits >> 29;
+    bits = bits.wrapping_mul(0xbf58_476d_1ce4_e5b9);
+    bits ^= bits >> 32;
+    (bits & 0xffff) as f64 / 32_767.5 - 1.0
+}
+
+/// What stands on the site.
+fn layout() -> Vec<Obstacle> {
+    let mut obstacles = Vec::new();
+    // Building and lean-to, containers (two stacked), barriers, a water tank, pallets: x, y, yaw (deg), length, width,
+    // height, height of the foot above ground, reflectivity.
+    let blocks = [
+        (40.0, 46.0, 12.0, 24.0, 14.0, 7.0, 0.0, 0.5),
+        (24.8, 42.8, 12.0, 6.0, 9.0, 3.4, 0.0, 0.4),
+        (-20.0, -8.0, 35.0, 6.06, 2.44, 2.59, 0.0, 0.35),
+        (-14.5, -4.2, 35.0, 6.06, 2.44, 2.59, 0.0, 0.25),
+        (-14.5, -4.2, 35.0, 6.06, 2.44, 2.59, 2.59, 0.45),
+        (20.0, 20.0, -70.0, 12.19, 2.44, 2.59, 0.0, 0.35),
+        (50.0, -40.0, 90.0, 6.06, 2.44, 2.59, 0.0, 0.3),
+        (46.5, -40.0, 90.0, 6.06, 2.44, 2.59, 0.0, 0.4),
+        (-4.0, 30.0, 80.0, 3.0, 0.6, 0.9, 0.0, 0.55),
+        (-3.4, 33.4, 80.0, 3.0, 0.6, 0.9, 0.0, 0.55),
+        (-2.8, 36.8, 80.0, 3.0, 0.6, 0.9, 0.0, 0.55),
+        (2.0, -12.0, 20.0, 2.4, 1.8, 1.9, 0.0, 0.3),
+        (-35.0, -32.0, 0.0, 1.2, 1.0, 1.1, 0.0, 0.3),
+        (-33.0, -33.5, 25.0, 1.2, 1.0, 0.6, 0.0, 0.3),
+        (14.0, -52.0, -15.0, 7.5, 2.5, 3.1, 0.0, 0.35),
+    ];
+    for (x, y, yaw_deg, length, width, height, foot, reflectivity) in blocks {
+        let yaw: f64 = yaw_deg;
+        obstacles.push(standing(
+            x,
+            y,
+            yaw.to_radians(),
+            [length, width, height],
+            foot,
+            reflectivity,
+        ));
+    }
+    fence(&mut obstacles);
+    // Lamp posts and survey stakes.
+    for (x, y) in [
+        (-62.0, -20.0),
+        (-62.0, 40.0),
+        (0.0, 76.0),
+        (60.0, 20.0),
+        (60.0, -30.0),
+        (0.0, -60.0),
+        (-2.5, 20.0),
+    ] {
+        obstacles.push(post(x, y, 0.11, 6.5, 0.4));
+    }
+    for (x, y) in [
+        (-37.5, 9.0),
+        (-37.5, 31.0),
+        (-11.5, 31.5),
+        (0.5, -4.5),
+        (15.5, -4.0),
+        (18.0, 9.5),
+        (-31.0, 33.0),
+        (3.0, 14.0),
+    ] {
+        obstacles.push(post(x, y, 0.03, 1.5, 0.6));
+    }
+    obstacles
+}
+
+/// A hoarding of 10 m panels around the site, two of them open as a gate, and a post at every joint.
+fn fence(obstacles: &mut Vec<Obstacle>) {
+    let (east, north) = (66.0_f64, 80.0_f64);
+    let corners = [
+        (-east, -north),
+        (east, -north),
+        (east, north),
+        (-east, north),
+    ];
+    for (side, (&(x0, y0), &(x1, y1))) in corners
+        .iter()
+        .zip(corners.iter().cycle().skip(1))
+        .enumerate()
+    {
+        let (from, along) = (Vector2::new(x0, y0), Vector2::new(x1 - x0, y1 - y0));
+        let panels = (along.norm() / 10.0).round();
+        let yaw = along.y.atan2(along.x);
+        for i in 0..panels as usize {
+            let joint = from + along * (i as f64 / panels);
+            obstacles.push(post(joint.x, joint.y, 0.05, 2.3, 0.4));
+            let middle = from + along * ((i as f64 + 0.5) / panels);
+            let gate = side == 0 && (i == 6 || i == 7);
+            if !gate {
+                let size = [along.norm() / panels - 0.12, 0.04, 2.0];
+                obstacles.push(standing(middle.x, middle.y, yaw, size, 0.0, 0.45));
+            }
+        }
+    }
+}
+
+/// A box that reaches half a metre into the ground at its middle, `foot_m` lifting it.
+fn standing(
+    x: f64,
+    y: f64,
+    yaw_rad: f64,
+    [length, width, height]: [f64; 3],
+    foot_m: f64,
+    reflectivity: f64,
+) -> Obstacle {
+    let bury_m = if foot_m > 0.0 { 0.0 } else { 0.8 };
+    let foot = ground_height_m(x, y) + foot_m - bury_m;
+    let tall = height + bury_m;
+    let center = Vector3::new(x, y, foot + 0.5 * tall);
+    Obstacle::Block(
+        Block::new(center, Vector3::new(length, width, tall), yaw_rad),
+        reflectivity,
+    )
+}
+
+fn post(x: f64, y: f64, radius_m: f64, height_m: f64, reflectivity: f64) -> Obstacle {
+    let ground = ground_height_m(x, y);
+    let post = Post {
+        center_m: Vector2::new(x, y),
+        radius_m,
+        span_m: [ground - 0.5, ground + height_m],
+    };
+    Obstacle::Post(post, reflectivity)
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use proptest::prelude::*;
+    use std::sync::LazyLock;
+
+    static SITE: LazyLock<Site> = LazyLock::new(Site::earth_moving);
+
+    /// The nearest of all surfaces, without the index.
+    fn cast_all(
+        site: &Site,
+        origin: &Vector3<f64>,
+        direction: &Vector3<f64>,
+        max_range_m: f64,
+    ) -> Option<f64> {
+        let ground = site.ground.cast(origin, direction, 0.0, max_range_m);
+        let others = site
+            .obstacles
+            .iter()
+            .filter_map(|o| o.cast(origin, direction))
+            .map(|(range_m, ..)| range_m);
+        others
+            .chain(ground)
+            .filter(|&range_m| range_m <= max_range_m)
+            .min_by(f64::total_cmp)
+    }
+
+    proptest! {
+        #![proptest_config(ProptestConfig::with_cases(2000))]
+        #[test]
+        fn the_index_changes_no_hit(
+            x in -64.0f64..64.0, y in -78.0f64..78.0, up in 0.3f64..4.0, azimuth in 0.0f64..6.3, elevation in -1.5f64..0.7
+        ) {
+            let origin = Vector3::new(x, y, SITE.ground.height_m(x, y).unwrap() + up);
+            let direction = Vector3::new(
+                elevation.cos() * azimuth.cos(), elevation.cos() * azimuth.sin(), elevation.sin());
+            let hit = SITE.cast(&origin, &direction, 80.0);
+            match (hit, cast_all(&SITE, &origin, &direction, 80.0)) {
+                (Some(hit), Some(expected)) => {
+                    prop_assert!((hit.range_m - expected).abs() < 1e-6, "{} against {expected}", hit.range_m);
+                    prop_assert!(SITE.surface_distance_m(&(origin + direction * hit.range_m)) < 1e-6);
+                    prop_assert!((0.0..=1.0 + 1e-9).contains(&hit.cos_incidence));
+                }
+                (None, None) => {}
+                (hit, expected) => prop_assert!(false, "{hit:?} against {expected:?}"),
+            }
+        }
+    }
+
+    #[test]
+    fn rays_see_ground_below_and_nothing_in_the_sky() {
+        let origin = Vector3::new(0.0, 0.0, 10.0);
+        assert!(SITE.cast(&origin, &-Vector3::z(), 80.0).is_some());
+        assert_eq!(SITE.cast(&origin, &Vector3::z(), 80.0), None);
+        assert_eq!(
+            SITE.cast(&Vector3::new(500.0, 0.0, 1.0), &-Vector3::x(), 80.0),
+            None
+        );
+    }
+
+    #[test]
+    fn the_fence_stops_a_level_ray() {
+        let y = 75.0;
+        let z = SITE.ground.height_m(65.0, y).unwrap() + 1.0;
+        let hit = SITE
+            .cast(&Vector3::new(60.0, y, z), &Vector3::x(), 80.0)
+            .unwrap();
+        assert!((hit.range_m - 5.98).abs() < 0.05, "{}", hit.range_m);
+    }
+}
