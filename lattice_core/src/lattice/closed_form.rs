@@ -22,12 +22,17 @@ struct Split {
     rest: f64,
 }
 
+/// The nearest integer, half to even, for |u| < 2^51.
+#[inline(always)]
+pub(crate) fn nearest_integer(u: f64) -> i64 {
+    ((u + ROUND).to_bits() as i64).wrapping_sub(ROUND.to_bits() as i64)
+}
+
 #[inline(always)]
 fn split(u: f64) -> Split {
-    let shifted = u + ROUND;
     Split {
-        near: (shifted.to_bits() as i64).wrapping_sub(ROUND.to_bits() as i64),
-        rest: u - (shifted - ROUND),
+        near: nearest_integer(u),
+        rest: u - ((u + ROUND) - ROUND),
     }
 }
 

@@ -18,6 +18,7 @@ use thiserror::Error;
 
 use closed_form::{ClosedForm, Quantizer, with_form};
 
+pub(crate) use closed_form::nearest_integer;
 pub use key::Key;
 pub use kind::LatticeKind;
 pub use voronoi::{CellFace, VoronoiCell};

@@ -1,1 +1,24 @@
-//! The occupied voxel list.
+//! The occupied voxel list: which cells of a lattice hold points, how many, and where in the cell.
+//!
+//! Everything that is summed is an integer, so that neither the order of the points nor the number
+//! of threads can change a bit, and lists merge exactly.
+
+pub mod codec;
+pub mod file;
+
+mod changes;
+mod distortion;
+mod insert;
+mod list;
+mod merge;
+mod voxel;
+
+pub use changes::Changes;
+pub use distortion::Distortion;
+pub use insert::InsertReport;
+pub use list::{DatumError, VoxelList};
+pub use merge::MergeError;
+pub use voxel::{OFFSET_UNIT_M, Voxel};
+
+#[cfg(test)]
+mod tests;

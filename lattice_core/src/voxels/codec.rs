@@ -1,0 +1,216 @@
+//! Sorted keys as bytes: LEB128 varints of the differences, the first key absolute.
+//!
+//! A varint holds seven bits a byte, lowest first; the top bit says that more follow. Only the
+//! shortest form is accepted, so that a list of keys has one encoding.
+
+use thiserror::Error;
+
+use crate::lattice::Key;
+
+/// What is wrong with encoded keys; positions are bytes from the start of the keys.
+#[derive(Clone, Copy, PartialEq, Eq, Debug, Error)]
+pub enum CodecError {
+    /// The bytes end within a varint.
+    #[error("the keys end at byte {position} within a number: the message or file is cut short")]
+    Truncated {
+        /// Length of the input.
+        position: usize,
+    },
+    /// A varint is longer than it must be or does not fit 64 bits.
+    #[error("the number that ends at byte {position} is not a shortest 64-bit varint")]
+    Varint {
+        /// The offending byte.
+        position: usize,
+    },
+    /// A key repeats or reaches 2^63.
+    #[error("key {index}, before byte {position}, does not ascend or is not below 2^63")]
+    Key {
+        /// Which key, from 0.
+        index: usize,
+        /// The byte after it.
+        position: usize,
+    },
+    /// More keys than allowed.
+    #[error("more than {max} keys")]
+    TooMany {
+        /// What the caller allows.
+        max: usize,
+    },
+}
+
+/// Encodes keys, which must ascend strictly; others do not decode.
+pub fn encode_keys(sorted: &[Key]) -> Vec<u8> {
+    let mut bytes = Vec::with_capacity(sorted.len().saturating_mul(2));
+    let mut before = 0;
+    for key in sorted {
+        push_varint(&mut bytes, key.raw().wrapping_sub(before));
+        before = key.raw();
+    }
+    bytes
+}
+
+/// Decodes at most `max` keys; they ascend strictly. Allocates no more than the input justifies.
+pub fn decode_keys(bytes: &[u8], max: usize) -> Result<Vec<Key>, CodecError> {
+    let mut keys = Vec::with_capacity(bytes.len().min(max));
+    let mut varint = Varint::default();
+    let mut before = None;
+    for (position, &byte) in bytes.iter().enumerate() {
+        let Some(step) = varint
+            .push(byte)
+            .map_err(|_| CodecError::Varint { position })?
+        else {
+            continue;
+        };
+        if keys.len() == max {
+            return Err(CodecError::TooMany { max });
+        }
+        let index = keys.len();
+        let key = next_key(before, step).ok_or(CodecError::Key {
+            index,
+            position: position + 1,
+        })?;
+        before = Some(key);
+        keys.push(key);
+    }
+    if varint.is_open() {
+        Err(CodecError::Truncated {
+            position: bytes.len(),
+        })
+    } else {
+        Ok(keys)
+    }
+}
+
+/// The key `step` after `before`.
+pub(super) fn next_key(before: Option<Key>, step: u64) -> Option<Key> {
+    match before {
+        Some(_) if step == 0 => None,
+        Some(before) => before.raw().checked_add(step).and_then(Key::from_raw),
+        None => Key::from_raw(step),
+    }
+}
+
+/// Appends a varint.
+pub(super) fn push_varint(bytes: &mut Vec<u8>, mut value: u64) {
+    while value >= 0x80 {
+        bytes.push(value as u8 | 0x80);
+        value >>= 7;
+    }
+    bytes.push(value as u8);
+}
+
+/// A varint is too long.
+#[derive(Clone, Copy, PartialEq, Eq, Debug)]
+pub(super) struct NotShortest;
+
+/// Puts varints together from bytes.
+#[derive(Default)]
+pub(super) struct Varint {
+    value: u64,
+    shift: u32,
+}
+
+impl Varint {
+    /// Takes a byte; gives the number when it was the last.
+    #[inline]
+    pub(super) fn push(&mut self, byte: u8) -> Result<Option<u64>, NotShortest> {
+        let bits = u64::from(byte & 0x7f);
+        if (self.shift == 63 && byte > 1) || (self.shift > 0 && byte == 0) {
+            return Err(NotShortest);
+        }
+        self.value |= bits << self.shift;
+        if byte >= 0x80 {
+            self.shift += 7;
+            return Ok(None);
+        }
+        let value = self.value;
+        *self = Varint::default();
+        Ok(Some(value))
+    }
+
+    /// True within a number.
+    pub(super) fn is_open(&self) -> bool {
+        self.shift > 0
+    }
+}
+
+/// Signed as unsigned, small magnitudes first: 0, -1, 1, -2, ...
+pub(super) fn zigzag(value: i64) -> u64 {
+    (value.wrapping_shl(1) ^ (value >> 63)) as u64
+}
+
+/// The inverse of `zigzag`.
+pub(super) fn unzigzag(value: u64) -> i64 {
+    (value >> 1) as i64 ^ -((value & 1) as i64)
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use proptest::prelude::*;
+
+    fn key(raw: u64) -> Key {
+        Key::from_raw(raw).unwrap()
+    }
+
+    #[test]
+    fn the_bytes_are_those_of_the_format() {
+        let keys = [key(300), key(301), key(301 + 128)];
+        assert_eq!(encode_keys(&keys), [0xac, 0x02, 0x01, 0x80, 0x01]);
+        assert_eq!(decode_keys(&[], 0), Ok(vec![]));
+        assert_eq!(decode_keys(&[0], 1), Ok(vec![key(0)]));
+    }
+
+    #[test]
+    fn faults_are_named_with_their_place() {
+        let decode = |bytes: &[u8]| decode_keys(bytes, 4).unwrap_err();
+        assert_eq!(decode(&[1, 0x80]), CodecError::Truncated { position: 2 });
+        assert_eq!(decode(&[1, 0x80, 0x00]), CodecError::Varint { position: 2 });
+        assert_eq!(decode(&[0xff; 12]), CodecError::Varint { position: 9 });
+        assert_eq!(
+            decode(&[1, 1, 0]),
+            CodecError::Key {
+                index: 2,
+                position: 3
+            }
+        );
+        assert_eq!(decode(&[1; 5]), CodecError::TooMany { max: 4 });
+        let mut far = encode_keys(&[key((1 << 63) - 1)]);
+        far.push(1);
+        assert_eq!(
+            decode(&far),
+            CodecError::Key {
+                index: 1,
+                position: 10
+            }
+        );
+    }
+
+    #[test]
+    fn keys_out_of_order_do_not_decode() {
+        assert!(decode_keys(&encode_keys(&[key(5), key(4)]), 9).is_err());
+        assert!(decode_keys(&encode_keys(&[key(5), key(5)]), 9).is_err());
+    }
+
+    proptest! {
+        #[test]
+        fn round_trip(mut raws in prop::collection::btree_set(0_u64..1 << 63, 0..100)) {
+            raws.insert((1 << 63) - 1);
+            let keys: Vec<Key> = raws.into_iter().map(key).collect();
+            prop_assert_eq!(decode_keys(&encode_keys(&keys), keys.len()), Ok(keys));
+        }
+
+        #[test]
+        fn any_bytes_decode_to_what_encodes_to_them(bytes in prop::collection::vec(any::<u8>(), 0..60)) {
+            if let Ok(keys) = decode_keys(&bytes, 60) {
+                prop_assert_eq!(encode_keys(&keys), bytes);
+            }
+        }
+
+        #[test]
+        fn zigzag_round_trip(value in any::<i64>()) {
+            prop_assert_eq!(unzigzag(zigzag(value)), value);
+            prop_assert_eq!(zigzag(value) >> 1, value.unsigned_abs() - u64::from(value < 0));
+        }
+    }
+}

@@ -1,0 +1,70 @@
+//! Merging lists.
+
+use thiserror::Error;
+
+use super::VoxelList;
+
+/// Why two lists do not merge. The receiving list is as before.
+#[derive(Clone, PartialEq, Debug, Error)]
+pub enum MergeError {
+    /// The cells are different.
+    #[error("cannot merge {theirs} into {ours}: make both maps with one lattice and cell volume")]
+    Lattice {
+        /// The lattice of the receiving list.
+        ours: String,
+        /// The lattice of the other list.
+        theirs: String,
+    },
+    /// The same lattice, counted from different points.
+    #[error(
+        "cannot merge a map with datum {theirs:?} m into one with datum {ours:?} m: give both the same datum"
+    )]
+    Datum {
+        /// Datum of the receiving list, map frame, metres.
+        ours: [f64; 3],
+        /// Datum of the other list, map frame, metres.
+        theirs: [f64; 3],
+    },
+    /// The union has too many voxels.
+    #[error(
+        "the merged map has {voxels} voxels, but at most {max_voxels} are allowed: raise max_voxels"
+    )]
+    Full {
+        /// Voxels in the union.
+        voxels: usize,
+        /// What the receiving list allows.
+        max_voxels: usize,
+    },
+}
+
+impl VoxelList {
+    /// Adds all voxels and statistics of `other`, exactly; order and grouping of merges do not
+    /// matter. Fails, changing nothing, for another lattice or datum or if the union is too large.
+    pub fn merge(&mut self, other: &VoxelList) -> Result<(), MergeError> {
+        if self.lattice != other.lattice {
+            let describe = |list: &VoxelList| format!("{:?}", list.lattice);
+            return Err(MergeError::Lattice {
+                ours: describe(self),
+                theirs: describe(other),
+            });
+        }
+        if self.datum_index != other.datum_index {
+            let (ours, theirs) = (self.datum_m.into(), other.datum_m.into());
+            return Err(MergeError::Datum { ours, theirs });
+        }
+        let new = other
+            .slots
+            .keys()
+            .filter(|key| !self.contains(**key))
+            .count();
+        let (voxels, max_voxels) = (self.len().saturating_add(new), self.max_voxels);
+        if voxels > max_voxels {
+            return Err(MergeError::Full { voxels, max_voxels });
+        }
+        for (&key, slot) in &other.slots {
+            self.add(key, &slot.voxel());
+        }
+        self.sums.add(&other.sums);
+        Ok(())
+    }
+}

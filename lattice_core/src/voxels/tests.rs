@@ -1,0 +1,310 @@
+//! Tests of the list; those over threads and files of any size are in the test crate.
+
+use nalgebra::Vector3;
+
+use super::file::{FileError, read_map, write_map};
+use super::*;
+use crate::cloud::Cloud;
+use crate::lattice::{Key, Lattice, LatticeKind};
+
+fn list(kind: LatticeKind, datum: [f64; 3], max_voxels: usize) -> VoxelList {
+    VoxelList::new(Lattice::new(kind, 0.125).unwrap(), datum.into(), max_voxels).unwrap()
+}
+
+fn cloud(datum: [f64; 3], offsets_m: &[[f32; 3]]) -> Cloud {
+    Cloud {
+        stamp_ns: 0,
+        datum_m: datum.into(),
+        offsets_m: offsets_m.to_vec(),
+    }
+}
+
+fn key(w: [i32; 3]) -> Key {
+    Key::pack(w).unwrap()
+}
+
+fn bytes(list: &VoxelList) -> Vec<u8> {
+    let mut bytes = Vec::new();
+    write_map(list, &mut bytes).unwrap();
+    bytes
+}
+
+#[test]
+fn a_cloud_becomes_voxels_with_counts_and_mean_offsets() {
+    let mut map = list(LatticeKind::Cubic, [0.0; 3], 10);
+    let report = map.insert(&cloud(
+        [0.0; 3],
+        &[[0.125, 0.0, 0.0], [-0.0625, 0.25, 0.0], [0.5, 0.5, 0.5]],
+    ));
+    let expected = InsertReport {
+        points: 3,
+        inserted: 3,
+        new_voxels: 2,
+        ..Default::default()
+    };
+    assert_eq!(report, expected);
+    let voxel = map.get(key([0; 3])).unwrap();
+    assert_eq!(
+        (voxel.count, voxel.mean_offset_m()),
+        (2, [0.03125, 0.125, 0.0])
+    );
+    assert_eq!(
+        map.get(key([1; 3])),
+        Some(Voxel {
+            count: 1,
+            sum: [0; 3]
+        })
+    );
+    assert_eq!(map.get(key([2; 3])), None);
+    assert_eq!(map.center_m(key([1, 2, 3])), Vector3::new(0.5, 1.0, 1.5));
+    map.validate().unwrap();
+}
+
+#[test]
+fn points_are_counted_by_reason() {
+    let far = (1 << 20) as f32;
+    let mut map = list(LatticeKind::Bcc, [0.0; 3], 1);
+    let report = map.insert(&cloud(
+        [0.0; 3],
+        &[
+            [0.0; 3],
+            [f32::NAN, 0.0, 0.0],
+            [0.0, f32::NEG_INFINITY, 0.0],
+            [0.0, 0.0, far],
+            [5.0; 3],
+            [0.01; 3],
+        ],
+    ));
+    let expected = InsertReport {
+        points: 6,
+        inserted: 2,
+        not_finite: 2,
+        out_of_range: 1,
+        list_full: 1,
+        new_voxels: 1,
+    };
+    assert_eq!(report, expected);
+    assert_eq!(map.distortion().points, 2);
+    let report = map.insert(&cloud([f64::NAN, 0.0, 0.0], &[[0.0; 3]]));
+    assert_eq!((report.not_finite, report.inserted), (1, 0));
+    map.validate().unwrap();
+}
+
+#[test]
+fn a_list_for_no_voxels_takes_none() {
+    let mut map = list(LatticeKind::Fcc, [0.0; 3], 0);
+    assert_eq!(map.insert(&cloud([0.0; 3], &[[0.0; 3]])).list_full, 1);
+    assert!(map.is_empty());
+    map.validate().unwrap();
+}
+
+#[test]
+fn a_datum_beyond_reach_is_refused() {
+    let lattice = Lattice::new(LatticeKind::Hex, 1.0).unwrap();
+    for bad in [f64::NAN, f64::INFINITY, 1e300] {
+        let error = VoxelList::new(lattice.clone(), Vector3::new(0.0, bad, 0.0), 1).unwrap_err();
+        assert!(error.to_string().contains("datum"));
+    }
+}
+
+#[test]
+fn a_far_datum_keeps_the_offsets_exact() {
+    for kind in LatticeKind::ALL {
+        for far in [1e5, 1e7, -1e7] {
+            let mut map = list(kind, [far, -0.7 * far, 300.0], 100);
+            let near = Vector3::new(far, -0.7 * far, 300.0);
+            assert!((map.datum_m() - near).norm() <= map.lattice().covering_radius_m() + 1e-8);
+            // A cloud at the datum: its offsets are the local coordinates, without rounding.
+            let offsets = [[0.1, -0.2, 0.05], [3.3, 2.25, -1.0]];
+            let report = map.insert(&cloud(map.datum_m().into(), &offsets));
+            assert_eq!(report.inserted, 2);
+            for offset in offsets {
+                let local = Vector3::from(offset.map(f64::from));
+                let w = map.lattice().quantize(&local).unwrap();
+                let mean = Vector3::from(map.get(key(w)).unwrap().mean_offset_m());
+                assert!(
+                    (mean + map.lattice().center(w) - local).amax() <= 0.5 * OFFSET_UNIT_M,
+                    "{kind}"
+                );
+            }
+            map.validate().unwrap();
+        }
+    }
+}
+
+#[test]
+fn the_datum_is_part_of_the_lattice_of_the_map_frame() {
+    // Two lists with other datums see the same cells in the map frame.
+    for kind in LatticeKind::ALL {
+        let mut here = list(kind, [0.0; 3], 100);
+        let mut there = list(kind, [700.0, -300.0, 20.0], 100);
+        let points = cloud([5.0, 6.0, 7.0], &[[0.1, 0.2, 0.3], [-2.0, 0.4, 0.9]]);
+        here.insert(&points);
+        there.insert(&points);
+        let shift = there.datum_index().map(|i| i as i32);
+        let moved: std::collections::BTreeSet<_> = there
+            .sorted()
+            .iter()
+            .map(|(k, v)| {
+                let w = k.unpack();
+                ([w[0] + shift[0], w[1] + shift[1], w[2] + shift[2]], v.count)
+            })
+            .collect();
+        assert_eq!(
+            moved,
+            here.sorted()
+                .iter()
+                .map(|(k, v)| (k.unpack(), v.count))
+                .collect()
+        );
+    }
+}
+
+#[test]
+fn changes_are_told_once() {
+    let mut map = list(LatticeKind::Cubic, [0.0; 3], 10);
+    map.insert(&cloud([0.0; 3], &[[0.5, 0.0, 0.0], [0.0; 3], [0.0; 3]]));
+    let both = vec![key([0; 3]), key([1, 0, 0])];
+    assert_eq!(
+        map.take_changes(),
+        Changes {
+            changed: both,
+            removed: vec![]
+        }
+    );
+    assert_eq!(map.take_changes(), Changes::default());
+    map.insert(&cloud([0.0; 3], &[[0.5, 0.0, 0.0]]));
+    assert_eq!(
+        map.take_changes(),
+        Changes {
+            changed: vec![key([1, 0, 0])],
+            removed: vec![]
+        }
+    );
+    map.validate().unwrap();
+}
+
+#[test]
+fn clearing_removes_what_was_told_and_only_that() {
+    let mut map = list(LatticeKind::Cubic, [0.0; 3], 10);
+    map.insert(&cloud([0.0; 3], &[[0.5, 0.0, 0.0], [0.0; 3]]));
+    map.take_changes();
+    map.insert(&cloud([0.0; 3], &[[1.0, 0.0, 0.0]]));
+    map.clear();
+    assert_eq!((map.len(), map.distortion().points), (0, 0));
+    // One of the two comes back before anybody asks, and goes and comes again.
+    map.insert(&cloud([0.0; 3], &[[0.0; 3]]));
+    map.clear();
+    map.insert(&cloud([0.0; 3], &[[0.0; 3]]));
+    map.validate().unwrap();
+    let expected = Changes {
+        changed: vec![key([0; 3])],
+        removed: vec![key([1, 0, 0])],
+    };
+    assert_eq!(map.take_changes(), expected);
+    map.clear();
+    assert_eq!(
+        map.take_changes(),
+        Changes {
+            changed: vec![],
+            removed: vec![key([0; 3])]
+        }
+    );
+}
+
+#[test]
+fn lists_of_different_cells_do_not_merge() {
+    let mut map = list(LatticeKind::Cubic, [0.0; 3], 1);
+    map.insert(&cloud([0.0; 3], &[[0.0; 3]]));
+    let before = bytes(&map);
+    let error = map.merge(&list(LatticeKind::Bcc, [0.0; 3], 1)).unwrap_err();
+    assert!(matches!(error, MergeError::Lattice { .. }));
+    let error = map
+        .merge(&list(LatticeKind::Cubic, [1.0, 0.0, 0.0], 1))
+        .unwrap_err();
+    assert!(matches!(error, MergeError::Datum { .. }), "{error}");
+    let mut other = list(LatticeKind::Cubic, [0.0; 3], 1);
+    other.insert(&cloud([0.0; 3], &[[1.0; 3]]));
+    assert_eq!(
+        map.merge(&other),
+        Err(MergeError::Full {
+            voxels: 2,
+            max_voxels: 1
+        })
+    );
+    assert_eq!(bytes(&map), before);
+}
+
+#[test]
+fn the_file_has_the_bytes_of_its_description() {
+    let mut map = list(LatticeKind::Cubic, [-0.5, 0.0, 1.0], 10);
+    map.insert(&cloud(
+        [-0.5, 0.0, 1.0],
+        &[[0.125, 0.0, -0.125], [0.0, 0.5, 0.0]],
+    ));
+    let mut expected = b"LATTICE1cubic\0\0\0".to_vec();
+    expected.extend(0.125_f64.to_le_bytes());
+    [-1_i64, 0, 2]
+        .iter()
+        .for_each(|i| expected.extend(i.to_le_bytes()));
+    expected.extend(2_u64.to_le_bytes());
+    expected.extend((1_u128 << 35).to_le_bytes());
+    let distance = (2.0_f64.sqrt() * 2.0_f64.powi(29)).round();
+    expected.extend((distance as u128).to_le_bytes());
+    expected.extend((1_u64 << 35).to_le_bytes());
+    expected.extend(2_u64.to_le_bytes());
+    // Key of (0, 0, 0): the three top bits, 7 << 60, nine groups of seven bits.
+    expected.extend([0x80, 0x80, 0x80, 0x80, 0x80, 0x80, 0x80, 0x80, 0x70, 1]);
+    expected.extend([0x80, 0x80, 0x10, 0, 0xff, 0xff, 0x0f]);
+    expected.extend([2, 1, 0, 0, 0]);
+    let crc = crc32fast::hash(&expected);
+    expected.extend(crc.to_le_bytes());
+    assert_eq!(bytes(&map), expected);
+}
+
+#[test]
+fn damaged_files_are_refused_with_a_reason() {
+    let mut map = list(LatticeKind::Mcc, [0.0; 3], 10);
+    map.insert(&cloud([0.0; 3], &[[0.1; 3], [1.0; 3]]));
+    let good = bytes(&map);
+    assert_eq!(bytes(&read_map(&good[..], 2).unwrap()), good);
+    let read = |bytes: &[u8]| read_map(bytes, 2).unwrap_err();
+    for end in 0..good.len() {
+        let FileError::Truncated { position } = read(&good[..end]) else {
+            panic!("cut at {end}")
+        };
+        assert_eq!(position, end as u64);
+    }
+    assert!(matches!(
+        read_map(&good[..], 1),
+        Err(FileError::TooManyVoxels { voxels: 2, .. })
+    ));
+    let mut longer = good.clone();
+    longer.push(0);
+    assert!(
+        matches!(read(&longer), FileError::TrailingBytes { position } if position == good.len() as u64)
+    );
+    let with = |at: usize, byte: u8| {
+        let mut bytes = good.clone();
+        bytes[at] = byte;
+        read(&bytes)
+    };
+    assert!(matches!(with(3, b'x'), FileError::Magic { .. }));
+    assert!(matches!(
+        with(8, b'x'),
+        FileError::Corrupt { position: 16, .. }
+    ));
+    assert!(matches!(
+        with(23, 0xff),
+        FileError::Corrupt { position: 24, .. }
+    ));
+    assert!(matches!(
+        with(47, 0x7f),
+        FileError::Corrupt { position: 48, .. }
+    ));
+    assert!(matches!(with(48, 9), FileError::Corrupt { .. }));
+    assert!(matches!(
+        with(good.len() - 1, good[good.len() - 1] ^ 1),
+        FileError::Checksum { .. }
+    ));
+}
