@@ -1,5 +1,25 @@
 //! Point clouds: field access for any layout, per-point time, deskew.
+//!
+//! A [`CloudLayout`] says how a sensor packs its points; [`CloudLayout::view`] checks every
+//! one of its numbers against the data once, after which a [`CloudView`] reads points
+//! without trusting anything. [`transform_points`] brings them into the map, each with the
+//! pose of its own time.
 
+mod error;
+mod layout;
 mod points;
+mod time;
+mod time_options;
+mod transform;
+mod view;
 
+pub use error::CloudError;
+pub use layout::{CloudLayout, CloudLimits, Datatype, PointField};
 pub use points::Cloud;
+pub use time::{NO_TIME_NS, TimeDecision};
+pub use time_options::{TimeOptions, TimeReference, TimeUnit, UnknownTimeName};
+pub use transform::{RangeLimits, Transformed, transform_points};
+pub use view::CloudView;
+
+#[cfg(test)]
+mod tests;

@@ -1,0 +1,266 @@
+//! How a sensor packs its points, and the checks that make it safe to read.
+
+use super::view::Coordinates;
+use super::{CloudError, CloudView};
+
+/// More fields than any sensor declares.
+const MAX_FIELDS: usize = 256;
+/// Longest part of a foreign name, and most names, repeated in an error.
+const SHOWN_CHARS: usize = 48;
+const SHOWN_FIELDS: usize = 24;
+
+/// One field of a point, as `sensor_msgs/PointField`.
+#[derive(Clone, Debug, PartialEq, Eq)]
+pub struct PointField {
+    /// Name.
+    pub name: String,
+    /// First byte of the field in its point.
+    pub offset: u32,
+    /// Code of the type, 1 to 8.
+    pub datatype: u8,
+    /// Elements.
+    pub count: u32,
+}
+
+/// Packing of a cloud, as `sensor_msgs/PointCloud2`.
+#[derive(Clone, Debug, PartialEq, Eq)]
+pub struct CloudLayout {
+    /// Points of a row.
+    pub width: u32,
+    /// Rows.
+    pub height: u32,
+    /// Bytes from point to point.
+    pub point_step: u32,
+    /// Bytes from row to row.
+    pub row_step: u32,
+    /// True if the most significant byte comes first.
+    pub is_bigendian: bool,
+    /// Fields of a point.
+    pub fields: Vec<PointField>,
+}
+
+/// What is taken at most.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub struct CloudLimits {
+    /// Points of one cloud.
+    pub max_points: usize,
+}
+
+impl Default for CloudLimits {
+    fn default() -> CloudLimits {
+        CloudLimits {
+            max_points: 4_000_000,
+        }
+    }
+}
+
+/// Types of `sensor_msgs/PointField`.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+#[repr(u8)]
+#[allow(missing_docs)]
+pub enum Datatype {
+    Int8 = 1,
+    Uint8 = 2,
+    Int16 = 3,
+    Uint16 = 4,
+    Int32 = 5,
+    Uint32 = 6,
+    Float32 = 7,
+    Float64 = 8,
+}
+
+impl Datatype {
+    /// Type of a code; `None` if there is none.
+    pub fn from_code(code: u8) -> Option<Datatype> {
+        Some(match code {
+            1 => Datatype::Int8,
+            2 => Datatype::Uint8,
+            3 => Datatype::Int16,
+            4 => Datatype::Uint16,
+            5 => Datatype::Int32,
+            6 => Datatype::Uint32,
+            7 => Datatype::Float32,
+            8 => Datatype::Float64,
+            _ => return None,
+        })
+    }
+
+    /// Bytes of an element.
+    pub fn bytes(self) -> u32 {
+        match self {
+            Datatype::Int8 | Datatype::Uint8 => 1,
+            Datatype::Int16 | Datatype::Uint16 => 2,
+            Datatype::Int32 | Datatype::Uint32 | Datatype::Float32 => 4,
+            Datatype::Float64 => 8,
+        }
+    }
+
+    /// Name as in `sensor_msgs/PointField`.
+    pub fn name(self) -> &'static str {
+        match self {
+            Datatype::Int8 => "INT8",
+            Datatype::Uint8 => "UINT8",
+            Datatype::Int16 => "INT16",
+            Datatype::Uint16 => "UINT16",
+            Datatype::Int32 => "INT32",
+            Datatype::Uint32 => "UINT32",
+            Datatype::Float32 => "FLOAT32",
+            Datatype::Float64 => "FLOAT64",
+        }
+    }
+}
+
+impl CloudLayout {
+    /// Checks the whole layout against `data`, then gives access to the points.
+    ///
+    /// Bytes after the last row are ignored. A cloud of no points is taken with whatever
+    /// fields, since drivers send it bare.
+    pub fn view<'a>(
+        &'a self,
+        data: &'a [u8],
+        limits: &CloudLimits,
+    ) -> Result<CloudView<'a>, CloudError> {
+        let points = u64::from(self.width) * u64::from(self.height);
+        if points == 0 {
+            return Ok(CloudView::empty());
+        }
+        let points = usize::try_from(points)
+            .ok()
+            .filter(|&n| n <= limits.max_points)
+            .ok_or(CloudError::TooManyPoints {
+                points,
+                max_points: limits.max_points,
+            })?;
+        self.check_extent(data.len())?;
+        self.check_fields()?;
+        Ok(CloudView::new(self, data, points, self.coordinates()?))
+    }
+
+    fn check_extent(&self, bytes: usize) -> Result<(), CloudError> {
+        if self.point_step == 0 {
+            return Err(CloudError::PointStep {
+                points: u64::from(self.width) * u64::from(self.height),
+            });
+        }
+        let row_needs = u64::from(self.width) * u64::from(self.point_step);
+        if u64::from(self.row_step) < row_needs {
+            return Err(CloudError::RowStep {
+                row_step: self.row_step,
+                width: self.width,
+                point_step: self.point_step,
+                needed: row_needs,
+            });
+        }
+        let needed = u64::from(self.height) * u64::from(self.row_step);
+        if (bytes as u64) < needed {
+            return Err(CloudError::ShortData {
+                bytes,
+                height: self.height,
+                row_step: self.row_step,
+                needed,
+            });
+        }
+        Ok(())
+    }
+
+    fn check_fields(&self) -> Result<(), CloudError> {
+        if self.fields.len() > MAX_FIELDS {
+            return Err(CloudError::TooManyFields {
+                fields: self.fields.len(),
+                max_fields: MAX_FIELDS,
+            });
+        }
+        for (i, field) in self.fields.iter().enumerate() {
+            let datatype =
+                Datatype::from_code(field.datatype).ok_or_else(|| CloudError::UnknownDatatype {
+                    field: shown(&field.name),
+                    datatype: field.datatype,
+                })?;
+            if field.count == 0 {
+                return Err(CloudError::CountZero {
+                    field: shown(&field.name),
+                });
+            }
+            let end =
+                u64::from(field.offset) + u64::from(field.count) * u64::from(datatype.bytes());
+            if end > u64::from(self.point_step) {
+                return Err(CloudError::BeyondPoint {
+                    field: shown(&field.name),
+                    end,
+                    point_step: self.point_step,
+                });
+            }
+            if self.fields.iter().take(i).any(|f| f.name == field.name) {
+                return Err(CloudError::Duplicate {
+                    field: shown(&field.name),
+                });
+            }
+        }
+        Ok(())
+    }
+
+    fn coordinates(&self) -> Result<Coordinates, CloudError> {
+        let [x, y, z] = [
+            self.coordinate("x")?,
+            self.coordinate("y")?,
+            self.coordinate("z")?,
+        ];
+        let wide = match (x.1, y.1, z.1) {
+            (Datatype::Float32, Datatype::Float32, Datatype::Float32) => false,
+            (Datatype::Float64, Datatype::Float64, Datatype::Float64) => true,
+            _ => {
+                return Err(CloudError::CoordinateTypes {
+                    x: x.1.name(),
+                    y: y.1.name(),
+                    z: z.1.name(),
+                });
+            }
+        };
+        Ok(Coordinates {
+            offsets: [x.0, y.0, z.0],
+            wide,
+        })
+    }
+
+    fn coordinate(&self, name: &'static str) -> Result<(usize, Datatype), CloudError> {
+        let field = self.fields.iter().find(|f| f.name == name).ok_or_else(|| {
+            CloudError::MissingField {
+                field: name,
+                present: names(&self.fields),
+            }
+        })?;
+        if field.count != 1 {
+            return Err(CloudError::CoordinateCount {
+                field: name,
+                count: field.count,
+            });
+        }
+        let datatype =
+            Datatype::from_code(field.datatype).ok_or_else(|| CloudError::UnknownDatatype {
+                field: name.to_owned(),
+                datatype: field.datatype,
+            })?;
+        Ok((field.offset as usize, datatype))
+    }
+}
+
+/// A foreign name, cut to a length fit for a log.
+pub(super) fn shown(name: &str) -> String {
+    name.chars().take(SHOWN_CHARS).collect()
+}
+
+/// Names of the fields, fit for a log.
+pub(super) fn names(fields: &[PointField]) -> String {
+    let mut names: Vec<String> = fields
+        .iter()
+        .take(SHOWN_FIELDS)
+        .map(|f| shown(&f.name))
+        .collect();
+    if fields.len() > SHOWN_FIELDS {
+        names.push(format!("and {} more", fields.len() - SHOWN_FIELDS));
+    }
+    if names.is_empty() {
+        return "none".to_owned();
+    }
+    names.join(", ")
+}

@@ -1,0 +1,281 @@
+use super::{F32, F64, field};
+use crate::cloud::{CloudError, CloudLayout, CloudLimits, CloudView, PointField};
+
+const LIMITS: CloudLimits = CloudLimits { max_points: 1000 };
+
+/// Two rows of two f32 points, 16 bytes each.
+fn layout() -> CloudLayout {
+    CloudLayout {
+        width: 2,
+        height: 2,
+        point_step: 16,
+        row_step: 32,
+        is_bigendian: false,
+        fields: vec![field("x", 0, F32), field("y", 4, F32), field("z", 8, F32)],
+    }
+}
+
+fn refused(change: impl FnOnce(&mut CloudLayout), bytes: usize) -> CloudError {
+    let mut changed = layout();
+    change(&mut changed);
+    changed
+        .view(&vec![0; bytes], &LIMITS)
+        .map(|view| view.len())
+        .unwrap_err()
+}
+
+fn coordinates(view: &CloudView<'_>) -> Vec<[f64; 3]> {
+    (0..view.len()).map(|i| view.xyz(i).into()).collect()
+}
+
+#[test]
+fn rows_may_be_padded_and_fields_unaligned() {
+    let mut padded = layout();
+    padded.point_step = 15;
+    padded.row_step = 37;
+    padded.fields = vec![field("z", 11, F32), field("x", 1, F32), field("y", 5, F32)];
+    let mut data = vec![0xAA; 80];
+    for (i, start) in [0, 15, 37, 52].into_iter().enumerate() {
+        let base = i as f32 * 10.0;
+        data[start + 1..start + 5].copy_from_slice(&(base + 1.0).to_le_bytes());
+        data[start + 5..start + 9].copy_from_slice(&(base + 2.0).to_le_bytes());
+        data[start + 11..start + 15].copy_from_slice(&(base + 3.0).to_le_bytes());
+    }
+    let view = padded.view(&data, &LIMITS).unwrap();
+    assert_eq!(
+        coordinates(&view),
+        [
+            [1.0, 2.0, 3.0],
+            [11.0, 12.0, 13.0],
+            [21.0, 22.0, 23.0],
+            [31.0, 32.0, 33.0]
+        ]
+    );
+    assert!(view.xyz(4).x.is_nan());
+    assert!(view.xyz(usize::MAX).z.is_nan());
+}
+
+#[test]
+fn f64_and_big_endian() {
+    let mut wide = layout();
+    wide.width = 1;
+    wide.height = 1;
+    wide.point_step = 24;
+    wide.row_step = 24;
+    wide.is_bigendian = true;
+    wide.fields = vec![field("x", 0, F64), field("y", 8, F64), field("z", 16, F64)];
+    let data: Vec<u8> = [4.0e6_f64, -0.1, f64::NAN]
+        .iter()
+        .flat_map(|v| v.to_be_bytes())
+        .collect();
+    let view = wide.view(&data, &LIMITS).unwrap();
+    assert_eq!(view.xyz(0).x, 4.0e6);
+    assert_eq!(view.xyz(0).y, -0.1);
+    assert!(view.xyz(0).z.is_nan());
+}
+
+#[test]
+fn every_scalar_type_is_read_in_both_byte_orders() {
+    for big in [false, true] {
+        let order = |mut bytes: Vec<u8>| {
+            if big {
+                bytes.reverse();
+            }
+            bytes
+        };
+        let cases: [(u8, Vec<u8>, f64); 8] = [
+            (1, (-5_i8).to_le_bytes().to_vec(), -5.0),
+            (2, 250_u8.to_le_bytes().to_vec(), 250.0),
+            (3, (-300_i16).to_le_bytes().to_vec(), -300.0),
+            (4, 60_000_u16.to_le_bytes().to_vec(), 60_000.0),
+            (5, (-70_000_i32).to_le_bytes().to_vec(), -70_000.0),
+            (6, 4_000_000_000_u32.to_le_bytes().to_vec(), 4.0e9),
+            (7, 0.5_f32.to_le_bytes().to_vec(), 0.5),
+            (8, 0.1_f64.to_le_bytes().to_vec(), 0.1),
+        ];
+        for (datatype, bytes, expected) in cases {
+            let mut one = layout();
+            one.width = 1;
+            one.height = 1;
+            one.point_step = 24;
+            one.row_step = 24;
+            one.is_bigendian = big;
+            one.fields.push(field("value", 13, datatype));
+            let mut data = vec![0; 24];
+            let bytes = order(bytes);
+            data[13..13 + bytes.len()].copy_from_slice(&bytes);
+            let view = one.view(&data, &LIMITS).unwrap();
+            assert_eq!(view.scalar(&view.fields()[3], 0), expected);
+        }
+    }
+}
+
+#[test]
+fn empty_clouds_are_taken_bare() {
+    for (width, height) in [(0, 1), (1, 0), (0, 0), (u32::MAX, 0)] {
+        let bare = CloudLayout {
+            width,
+            height,
+            point_step: 0,
+            row_step: 0,
+            is_bigendian: false,
+            fields: Vec::new(),
+        };
+        let view = bare.view(&[], &LIMITS).unwrap();
+        assert!(view.is_empty());
+        assert!(view.xyz(0).x.is_nan());
+        assert_eq!(view.point_times(0, &Default::default()), Ok(None));
+    }
+}
+
+#[test]
+fn lies_about_the_extent_are_refused() {
+    assert_eq!(
+        refused(|l| l.row_step = 31, 64),
+        CloudError::RowStep {
+            row_step: 31,
+            width: 2,
+            point_step: 16,
+            needed: 32
+        }
+    );
+    assert_eq!(
+        refused(|_| (), 63),
+        CloudError::ShortData {
+            bytes: 63,
+            height: 2,
+            row_step: 32,
+            needed: 64
+        }
+    );
+    assert_eq!(
+        refused(|l| l.point_step = 0, 64),
+        CloudError::PointStep { points: 4 }
+    );
+    assert_eq!(
+        refused(
+            |l| {
+                l.width = u32::MAX;
+                l.height = u32::MAX;
+            },
+            64
+        ),
+        CloudError::TooManyPoints {
+            points: u64::from(u32::MAX) * u64::from(u32::MAX),
+            max_points: 1000
+        }
+    );
+    // width * point_step and height * row_step overflow 32 bits.
+    assert!(matches!(
+        refused(
+            |l| {
+                l.width = 1000;
+                l.height = 1;
+                l.point_step = u32::MAX;
+            },
+            64
+        ),
+        CloudError::RowStep {
+            needed: 4_294_967_295_000,
+            ..
+        }
+    ));
+    assert!(matches!(
+        refused(|l| l.row_step = u32::MAX, 64),
+        CloudError::ShortData {
+            needed: 8_589_934_590,
+            ..
+        }
+    ));
+}
+
+#[test]
+fn lies_about_the_fields_are_refused() {
+    let with = |field: PointField| move |l: &mut CloudLayout| l.fields.push(field);
+    for datatype in [0, 9, 255] {
+        assert!(matches!(
+            refused(with(field("a", 0, datatype)), 64),
+            CloudError::UnknownDatatype { datatype: d, .. } if d == datatype
+        ));
+    }
+    assert!(matches!(
+        refused(
+            with(PointField {
+                count: 0,
+                ..field("a", 0, F32)
+            }),
+            64
+        ),
+        CloudError::CountZero { .. }
+    ));
+    assert!(matches!(
+        refused(with(field("a", 13, F32)), 64),
+        CloudError::BeyondPoint {
+            end: 17,
+            point_step: 16,
+            ..
+        }
+    ));
+    assert!(matches!(
+        refused(
+            with(PointField {
+                count: u32::MAX,
+                ..field("a", u32::MAX, F64)
+            }),
+            64
+        ),
+        CloudError::BeyondPoint { .. }
+    ));
+    assert!(matches!(
+        refused(with(field("y", 12, F32)), 64),
+        CloudError::Duplicate { .. }
+    ));
+    assert!(matches!(
+        refused(
+            |l| l.fields = (0..300).map(|i| field(&i.to_string(), 0, F32)).collect(),
+            64
+        ),
+        CloudError::TooManyFields { fields: 300, .. }
+    ));
+}
+
+#[test]
+fn coordinates_must_be_alike_and_real() {
+    let missing = refused(|l| drop(l.fields.remove(1)), 64);
+    assert_eq!(
+        missing.to_string(),
+        "cloud has no field 'y'; its fields are x, z"
+    );
+    assert!(matches!(
+        refused(
+            |l| l.fields = vec![field("x", 0, F32), field("y", 4, F32), field("z", 8, F64)],
+            64
+        ),
+        CloudError::CoordinateTypes {
+            x: "FLOAT32",
+            z: "FLOAT64",
+            ..
+        }
+    ));
+    assert!(matches!(
+        refused(|l| l.fields.iter_mut().for_each(|f| f.datatype = 5), 64),
+        CloudError::CoordinateTypes { x: "INT32", .. }
+    ));
+    assert!(matches!(
+        refused(|l| l.fields[2].count = 2, 64),
+        CloudError::CoordinateCount {
+            field: "z",
+            count: 2
+        }
+    ));
+}
+
+#[test]
+fn foreign_names_are_cut_in_errors() {
+    let long = "n".repeat(100_000);
+    let error = refused(
+        move |l| l.fields = vec![field(&long, 0, F32), field("y", 0, F32)],
+        64,
+    );
+    assert!(error.to_string().len() < 200, "{error}");
+}

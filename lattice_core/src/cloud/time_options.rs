@@ -1,0 +1,142 @@
+//! What a user may say about per-point time.
+
+use std::fmt;
+use std::str::FromStr;
+use thiserror::Error;
+
+/// Unit of a time field.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub enum TimeUnit {
+    /// Seconds, `s`.
+    Seconds,
+    /// Milliseconds, `ms`.
+    Milliseconds,
+    /// Microseconds, `us`.
+    Microseconds,
+    /// Nanoseconds, `ns`.
+    Nanoseconds,
+}
+
+impl TimeUnit {
+    /// Short name: `s`, `ms`, `us`, `ns`.
+    pub fn name(self) -> &'static str {
+        match self {
+            TimeUnit::Seconds => "s",
+            TimeUnit::Milliseconds => "ms",
+            TimeUnit::Microseconds => "us",
+            TimeUnit::Nanoseconds => "ns",
+        }
+    }
+
+    /// Nanoseconds of one unit.
+    pub(super) fn scale_ns(self) -> i64 {
+        match self {
+            TimeUnit::Seconds => 1_000_000_000,
+            TimeUnit::Milliseconds => 1_000_000,
+            TimeUnit::Microseconds => 1_000,
+            TimeUnit::Nanoseconds => 1,
+        }
+    }
+}
+
+/// What a time field counts from.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub enum TimeReference {
+    /// `stamp_start`: from the stamp of the cloud, negative before it. Times of a free
+    /// running clock count from the earliest point, which then has the stamp.
+    StampStart,
+    /// `stamp_end`: the latest point has the stamp of the cloud.
+    StampEnd,
+    /// `absolute`: from the Unix epoch, whatever the stamp.
+    Absolute,
+}
+
+impl TimeReference {
+    /// Name in parameters.
+    pub fn name(self) -> &'static str {
+        match self {
+            TimeReference::StampStart => "stamp_start",
+            TimeReference::StampEnd => "stamp_end",
+            TimeReference::Absolute => "absolute",
+        }
+    }
+}
+
+/// A name that is no unit or no reference.
+#[derive(Clone, Debug, PartialEq, Eq, Error)]
+#[error("'{found}' is not one of {expected}")]
+pub struct UnknownTimeName {
+    /// What was given.
+    pub found: String,
+    /// What there is.
+    pub expected: &'static str,
+}
+
+impl FromStr for TimeUnit {
+    type Err = UnknownTimeName;
+
+    fn from_str(name: &str) -> Result<TimeUnit, UnknownTimeName> {
+        match name {
+            "s" => Ok(TimeUnit::Seconds),
+            "ms" => Ok(TimeUnit::Milliseconds),
+            "us" => Ok(TimeUnit::Microseconds),
+            "ns" => Ok(TimeUnit::Nanoseconds),
+            _ => Err(UnknownTimeName {
+                found: name.to_owned(),
+                expected: "s, ms, us, ns",
+            }),
+        }
+    }
+}
+
+impl FromStr for TimeReference {
+    type Err = UnknownTimeName;
+
+    fn from_str(name: &str) -> Result<TimeReference, UnknownTimeName> {
+        match name {
+            "stamp_start" => Ok(TimeReference::StampStart),
+            "stamp_end" => Ok(TimeReference::StampEnd),
+            "absolute" => Ok(TimeReference::Absolute),
+            _ => Err(UnknownTimeName {
+                found: name.to_owned(),
+                expected: "stamp_start, stamp_end, absolute",
+            }),
+        }
+    }
+}
+
+impl fmt::Display for TimeUnit {
+    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
+        f.write_str(self.name())
+    }
+}
+
+impl fmt::Display for TimeReference {
+    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
+        f.write_str(self.name())
+    }
+}
+
+/// Overrides of the detector; the default guesses all by name and type.
+#[derive(Clone, Debug, PartialEq)]
+pub struct TimeOptions {
+    /// Name of the time field; empty to have no per-point time.
+    pub field: Option<String>,
+    /// Its unit.
+    pub unit: Option<TimeUnit>,
+    /// What it counts from.
+    pub reference: Option<TimeReference>,
+    /// The times of a cloud span less than this, seconds.
+    pub max_span_s: f64,
+}
+
+impl Default for TimeOptions {
+    fn default() -> TimeOptions {
+        TimeOptions {
+            field: None,
+            unit: None,
+            reference: None,
+            max_span_s: 1.0,
+        }
+    }
+}
