@@ -1,0 +1,29 @@
+//! The Python of the tests that have a foreign peer.
+
+use std::io::Write;
+use std::path::{Path, PathBuf};
+
+/// The interpreter that `LATTICE_PYTHON` names, one with `test/python/requirements.txt` installed.
+///
+/// Where the variable is not set this says so on standard error, and the caller returns: such a
+/// test needs packages that cargo does not bring.
+pub fn python() -> Option<PathBuf> {
+    let Some(python) = std::env::var_os("LATTICE_PYTHON") else {
+        let test = std::thread::current().name().unwrap_or_default().to_owned();
+        // Not eprintln: the test harness would keep it to itself.
+        let _ = writeln!(
+            std::io::stderr(),
+            "SKIPPED {test}: LATTICE_PYTHON is not set; have it name a python with {} installed",
+            script("requirements.txt").display()
+        );
+        return None;
+    };
+    Some(python.into())
+}
+
+/// Path of a file in `test/python/`.
+pub fn script(name: &str) -> PathBuf {
+    Path::new(env!("CARGO_MANIFEST_DIR"))
+        .join("python")
+        .join(name)
+}

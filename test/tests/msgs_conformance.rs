@@ -1,0 +1,116 @@
+//! Every message has the same bytes here as in the rosbags library for Python.
+
+#![allow(clippy::unwrap_used)]
+
+use std::fmt::Write as _;
+use std::io::Write as _;
+use std::process::{Command, Stdio};
+
+use lattice_msgs::{MessageVisitor, RosMessage, cdr, visit_messages};
+use lattice_test::python::{python, script};
+use serde_json::{Value, json};
+
+fn to_hex(bytes: &[u8]) -> String {
+    bytes.iter().fold(String::new(), |mut text, byte| {
+        write!(text, "{byte:02x}").unwrap();
+        text
+    })
+}
+
+fn from_hex(text: &Value) -> Vec<u8> {
+    let text = text.as_str().unwrap();
+    (0..text.len())
+        .step_by(2)
+        .map(|i| u8::from_str_radix(&text[i..i + 2], 16).unwrap())
+        .collect()
+}
+
+/// One line for each type: what the peer is to know of it.
+#[derive(Default)]
+struct Questions(String);
+
+impl MessageVisitor for Questions {
+    fn visit<M: RosMessage>(&mut self) {
+        let default = to_hex(&cdr::to_vec(&M::default()).unwrap());
+        let question = json!({"type": M::TYPE, "definition": M::definition(), "default": default});
+        writeln!(self.0, "{question}").unwrap();
+    }
+}
+
+/// Compares the peer's answers, which come in the order of the visit.
+struct Compare<I> {
+    answers: I,
+    in_jazzy: usize,
+}
+
+impl<I: Iterator<Item = Value>> MessageVisitor for Compare<I> {
+    fn visit<M: RosMessage>(&mut self) {
+        let answer = self
+            .answers
+            .next()
+            .unwrap_or_else(|| panic!("no answer on {}", M::TYPE));
+        assert_eq!(answer["type"], M::TYPE);
+        assert_eq!(answer["jazzy"], Value::Null, "{}", M::TYPE);
+        self.in_jazzy += usize::from(answer["in_jazzy"] == true);
+
+        // From here to there and back.
+        let default = cdr::to_vec(&M::default()).unwrap();
+        assert_eq!(from_hex(&answer["default"]), default, "{}", M::TYPE);
+
+        // From there to here and back, empty and filled.
+        let samples = answer["samples"].as_array().unwrap();
+        assert_eq!(samples.len(), 4);
+        for sample in samples {
+            let theirs = from_hex(&sample["bytes"]);
+            let message: M = cdr::from_slice(&theirs).unwrap();
+            assert_eq!(
+                serde_json::to_value(&message).unwrap(),
+                sample["value"],
+                "{}",
+                M::TYPE
+            );
+            let ours = cdr::to_vec(&message).unwrap();
+            assert_eq!(ours, theirs, "{}", M::TYPE);
+        }
+    }
+}
+
+#[test]
+fn bytes_and_values_agree_with_rosbags() {
+    let Some(python) = python() else { return };
+    let mut questions = Questions::default();
+    visit_messages(&mut questions);
+
+    let mut peer = Command::new(python)
+        .arg(script("msgs_peer.py"))
+        .stdin(Stdio::piped())
+        .stdout(Stdio::piped())
+        .spawn()
+        .unwrap();
+    let mut stdin = peer.stdin.take().unwrap();
+    let text = questions.0;
+    let writer = std::thread::spawn(move || stdin.write_all(text.as_bytes()));
+    let output = peer.wait_with_output().unwrap();
+    assert!(
+        output.status.success(),
+        "the peer failed: {}",
+        output.status
+    );
+    writer.join().unwrap().unwrap();
+
+    let lines = String::from_utf8(output.stdout).unwrap();
+    let answers = lines
+        .lines()
+        .map(|line| serde_json::from_str(line).unwrap());
+    let mut compare = Compare {
+        answers,
+        in_jazzy: 0,
+    };
+    visit_messages(&mut compare);
+    assert!(compare.answers.next().is_none());
+    assert!(
+        compare.in_jazzy > 40,
+        "only {} types are in Jazzy",
+        compare.in_jazzy
+    );
+}
