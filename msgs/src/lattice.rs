@@ -1,4 +1,4 @@
-//! Messages of Lattice.
+//! Messages of Lattice; `msg/LatticeMap.msg` says how keys are written.
 
 use serde::{Deserialize, Serialize};
 use serde_bytes::ByteBuf;
@@ -73,6 +73,8 @@ impl LatticeMap {
 }
 
 /// The voxels that differ between two states of a map, or one chunk of them.
+///
+/// A voxel that is listed replaces the one the map has.
 #[derive(Clone, Debug, Default, PartialEq, Serialize, Deserialize)]
 pub struct LatticeMapUpdate {
     /// Time of the last point, and frame of the map.
