@@ -1,0 +1,311 @@
+//! Where the machine was.
+
+use nalgebra::Isometry3;
+use thiserror::Error;
+
+use super::interpolate::is_rigid;
+use super::track::{Track, duration_ns};
+
+/// Pose of base_link in the map at a time.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct StampedPose {
+    /// Nanoseconds since the Unix epoch.
+    pub stamp_ns: i64,
+    /// Transform to the map frame from base_link, metres.
+    pub map_from_base: Isometry3<f64>,
+}
+
+/// Bounds of a [`PoseBuffer`].
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct PoseBufferOptions {
+    /// Age against the newest pose up to which poses are kept, seconds.
+    pub span_s: f64,
+    /// Longest time between two poses that is interpolated over, seconds.
+    pub max_gap_s: f64,
+    /// Most poses kept, at least 2.
+    pub max_poses: usize,
+    /// A pose older than the newest by more than this means that time was set back, seconds.
+    pub jump_back_s: f64,
+}
+
+impl Default for PoseBufferOptions {
+    fn default() -> PoseBufferOptions {
+        PoseBufferOptions {
+            span_s: 10.0,
+            max_gap_s: 0.2,
+            max_poses: 10_000,
+            jump_back_s: 1.0,
+        }
+    }
+}
+
+/// What became of a pose.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub enum PushOutcome {
+    /// Kept.
+    Accepted,
+    /// Time was set back: all poses before it were forgotten, this one is kept.
+    JumpedBack,
+    /// Refused: not newer than what is there.
+    OutOfOrder,
+    /// Refused: a number is NaN or infinite, or the rotation is none.
+    NotFinite,
+}
+
+/// Why there is no pose.
+#[derive(Clone, Copy, Debug, PartialEq, Eq, Error)]
+pub enum PoseMiss {
+    /// No pose came yet.
+    #[error("no pose came yet")]
+    Empty,
+    /// The time is before the oldest pose kept.
+    #[error("time is {:.6} s before the oldest pose kept", seconds(by_ns))]
+    BeforeStart {
+        /// Nanoseconds before it.
+        by_ns: i64,
+    },
+    /// The time is after the newest pose: it may still be covered.
+    #[error("time is {:.6} s after the newest pose", seconds(by_ns))]
+    AfterEnd {
+        /// Nanoseconds after it.
+        by_ns: i64,
+    },
+    /// The poses around the time are too far apart.
+    #[error(
+        "poses around the time are {:.6} s apart, over {:.6} s",
+        seconds(gap_ns),
+        seconds(max_gap_ns)
+    )]
+    Gap {
+        /// Nanoseconds between the poses.
+        gap_ns: i64,
+        /// The limit, nanoseconds.
+        max_gap_ns: i64,
+    },
+}
+
+pub(super) fn seconds(ns: &i64) -> f64 {
+    *ns as f64 * 1.0e-9
+}
+
+/// The last poses of a machine, by time.
+#[derive(Clone, Debug)]
+pub struct PoseBuffer {
+    track: Track,
+    span_ns: i64,
+    max_gap_ns: i64,
+    max_poses: usize,
+    jump_back_ns: i64,
+}
+
+impl PoseBuffer {
+    /// Empty buffer; negative or NaN durations count as zero.
+    pub fn new(options: PoseBufferOptions) -> PoseBuffer {
+        PoseBuffer {
+            track: Track::default(),
+            span_ns: duration_ns(options.span_s),
+            max_gap_ns: duration_ns(options.max_gap_s),
+            max_poses: options.max_poses.max(2),
+            jump_back_ns: duration_ns(options.jump_back_s),
+        }
+    }
+
+    /// Takes the next pose and forgets what is out of bounds.
+    pub fn push(&mut self, pose: StampedPose) -> PushOutcome {
+        if !is_rigid(&pose.map_from_base) {
+            return PushOutcome::NotFinite;
+        }
+        let outcome = match self.track.newest_ns() {
+            Some(newest_ns) if pose.stamp_ns <= newest_ns => {
+                if newest_ns.saturating_sub(pose.stamp_ns) <= self.jump_back_ns {
+                    return PushOutcome::OutOfOrder;
+                }
+                self.track.clear();
+                PushOutcome::JumpedBack
+            }
+            _ => PushOutcome::Accepted,
+        };
+        self.track.insert(pose.stamp_ns, pose.map_from_base);
+        self.track.trim(self.span_ns, self.max_poses);
+        outcome
+    }
+
+    /// map_from_base at a time: exact at a pose, else linear and slerp between two; never
+    /// outside of the poses, nor over a gap.
+    pub fn at(&self, stamp_ns: i64) -> Result<Isometry3<f64>, PoseMiss> {
+        self.track.at(stamp_ns, self.max_gap_ns)
+    }
+
+    /// Time of the newest pose, nanoseconds.
+    pub fn newest_ns(&self) -> Option<i64> {
+        self.track.newest_ns()
+    }
+
+    /// Time of the oldest pose kept, nanoseconds.
+    pub fn oldest_ns(&self) -> Option<i64> {
+        self.track.oldest_ns()
+    }
+
+    /// Poses kept.
+    pub fn len(&self) -> usize {
+        self.track.len()
+    }
+
+    /// True if no pose is kept.
+    pub fn is_empty(&self) -> bool {
+        self.track.len() == 0
+    }
+
+    /// Forgets all poses.
+    pub fn clear(&mut self) {
+        self.track.clear();
+    }
+
+    /// Checks the order, the bounds and the poses; for tests.
+    pub fn validate(&self) -> Result<(), String> {
+        if let (Some(oldest), Some(newest)) = (self.oldest_ns(), self.newest_ns())
+            && newest.saturating_sub(oldest) > self.span_ns
+        {
+            return Err(format!(
+                "poses from {oldest} to {newest} ns exceed the span"
+            ));
+        }
+        self.track.validate(self.max_poses)
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use nalgebra::{Quaternion, Unit, Vector3};
+
+    const SECOND: i64 = 1_000_000_000;
+
+    fn at_x(stamp_ns: i64, x: f64) -> StampedPose {
+        StampedPose {
+            stamp_ns,
+            map_from_base: Isometry3::translation(x, 0.0, 0.0),
+        }
+    }
+
+    fn filled(stamps_ns: &[i64]) -> PoseBuffer {
+        let mut buffer = PoseBuffer::new(PoseBufferOptions::default());
+        for &stamp_ns in stamps_ns {
+            let outcome = buffer.push(at_x(stamp_ns, stamp_ns as f64));
+            assert_eq!(outcome, PushOutcome::Accepted);
+        }
+        buffer
+    }
+
+    #[test]
+    fn exact_at_poses_linear_between_nothing_outside() {
+        let buffer = filled(&[100, 200, 400]);
+        assert_eq!(buffer.at(200).unwrap().translation.x, 200.0);
+        assert_eq!(buffer.at(100).unwrap().translation.x, 100.0);
+        assert_eq!(buffer.at(400).unwrap().translation.x, 400.0);
+        assert_eq!(buffer.at(250).unwrap().translation.x, 250.0);
+        assert_eq!(buffer.at(97), Err(PoseMiss::BeforeStart { by_ns: 3 }));
+        assert_eq!(buffer.at(401), Err(PoseMiss::AfterEnd { by_ns: 1 }));
+        let empty = PoseBuffer::new(PoseBufferOptions::default());
+        assert_eq!(empty.at(0), Err(PoseMiss::Empty));
+    }
+
+    #[test]
+    fn a_gap_is_not_bridged_but_its_ends_are_there() {
+        let buffer = filled(&[0, 5 * SECOND]);
+        assert_eq!(
+            buffer.at(SECOND),
+            Err(PoseMiss::Gap {
+                gap_ns: 5 * SECOND,
+                max_gap_ns: SECOND / 5
+            })
+        );
+        assert_eq!(
+            buffer.at(SECOND).unwrap_err().to_string(),
+            "poses around the time are 5.000000 s apart, over 0.200000 s"
+        );
+        assert!(buffer.at(0).is_ok());
+        assert!(buffer.at(5 * SECOND).is_ok());
+    }
+
+    #[test]
+    fn late_poses_change_nothing() {
+        let mut buffer = filled(&[100, 200, 300]);
+        assert_eq!(buffer.push(at_x(300, 9.0)), PushOutcome::OutOfOrder);
+        assert_eq!(buffer.push(at_x(250, 9.0)), PushOutcome::OutOfOrder);
+        assert_eq!(buffer.len(), 3);
+        assert_eq!(buffer.at(300).unwrap().translation.x, 300.0);
+    }
+
+    #[test]
+    fn time_set_back_starts_anew() {
+        let mut buffer = filled(&[10 * SECOND, 11 * SECOND]);
+        assert_eq!(buffer.push(at_x(10 * SECOND, 0.0)), PushOutcome::OutOfOrder);
+        assert_eq!(
+            buffer.push(at_x(10 * SECOND - 1, 7.0)),
+            PushOutcome::JumpedBack
+        );
+        assert_eq!(buffer.len(), 1);
+        assert_eq!(buffer.at(10 * SECOND - 1).unwrap().translation.x, 7.0);
+        assert_eq!(
+            buffer.at(11 * SECOND),
+            Err(PoseMiss::AfterEnd { by_ns: SECOND + 1 })
+        );
+    }
+
+    #[test]
+    fn memory_is_bounded_by_age_and_number() {
+        let mut buffer = filled(&[0, SECOND, 9 * SECOND, 10 * SECOND]);
+        buffer.push(at_x(11 * SECOND, 0.0));
+        assert_eq!(buffer.oldest_ns(), Some(SECOND));
+        let mut few = PoseBuffer::new(PoseBufferOptions {
+            max_poses: 3,
+            ..PoseBufferOptions::default()
+        });
+        for i in 0..100 {
+            few.push(at_x(i, 0.0));
+        }
+        assert_eq!((few.len(), few.oldest_ns()), (3, Some(97)));
+    }
+
+    #[test]
+    fn broken_poses_are_refused() {
+        let mut buffer = filled(&[0]);
+        let mut bad = at_x(1, f64::NAN);
+        assert_eq!(buffer.push(bad), PushOutcome::NotFinite);
+        bad = at_x(1, 0.0);
+        for quaternion in [
+            Quaternion::new(0.0, 0.0, 0.0, 0.0),
+            Quaternion::new(f64::NAN, 0.0, 0.0, 0.0),
+        ] {
+            bad.map_from_base.rotation = Unit::new_unchecked(quaternion);
+            assert_eq!(buffer.push(bad), PushOutcome::NotFinite);
+        }
+        assert_eq!(buffer.len(), 1);
+    }
+
+    #[test]
+    fn extreme_stamps_and_options() {
+        let mut buffer = PoseBuffer::new(PoseBufferOptions {
+            span_s: f64::INFINITY,
+            max_gap_s: f64::NAN,
+            max_poses: 0,
+            jump_back_s: -1.0,
+        });
+        assert_eq!(buffer.push(at_x(i64::MIN, 0.0)), PushOutcome::Accepted);
+        assert_eq!(buffer.push(at_x(-2, 0.0)), PushOutcome::Accepted);
+        assert!(matches!(buffer.at(-3), Err(PoseMiss::Gap { .. })));
+        assert_eq!(buffer.push(at_x(i64::MAX, 1.0)), PushOutcome::Accepted);
+        assert_eq!(
+            buffer.at(i64::MIN),
+            Err(PoseMiss::BeforeStart { by_ns: i64::MAX })
+        );
+        assert_eq!(buffer.push(at_x(0, 1.0)), PushOutcome::JumpedBack);
+        assert_eq!(buffer.validate(), Ok(()));
+        let turned = StampedPose {
+            stamp_ns: 1,
+            map_from_base: Isometry3::new(Vector3::zeros(), Vector3::new(1.0, 0.0, 0.0)),
+        };
+        assert_eq!(buffer.push(turned), PushOutcome::Accepted);
+    }
+}

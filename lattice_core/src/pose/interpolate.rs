@@ -1,0 +1,90 @@
+//! Between two poses.
+
+use nalgebra::{Isometry3, Quaternion, Translation3, Unit, UnitQuaternion};
+
+/// Above this cosine of the half angle, slerp and the straight line agree to the last bit.
+const NEARLY_EQUAL: f64 = 1.0 - 1.0e-14;
+
+/// Pose at `fraction` of the way from `a` (0) to `b` (1): translation on the straight line,
+/// rotation by slerp on the shorter arc.
+pub fn interpolate(a: &Isometry3<f64>, b: &Isometry3<f64>, fraction: f64) -> Isometry3<f64> {
+    let translation = a.translation.vector.lerp(&b.translation.vector, fraction);
+    Isometry3::from_parts(
+        Translation3::from(translation),
+        slerp(&a.rotation, &b.rotation, fraction),
+    )
+}
+
+fn slerp(a: &UnitQuaternion<f64>, b: &UnitQuaternion<f64>, fraction: f64) -> UnitQuaternion<f64> {
+    let dot = a.coords.dot(&b.coords);
+    // q and -q are one rotation: take the sign that is nearer.
+    let sign = if dot < 0.0 { -1.0 } else { 1.0 };
+    let cosine = dot.abs();
+    let (weight_a, weight_b) = if cosine > NEARLY_EQUAL {
+        (1.0 - fraction, fraction)
+    } else {
+        let half_angle = cosine.acos();
+        let sine = half_angle.sin();
+        (
+            ((1.0 - fraction) * half_angle).sin() / sine,
+            (fraction * half_angle).sin() / sine,
+        )
+    };
+    let coords = a.coords * weight_a + b.coords * (weight_b * sign);
+    Unit::new_normalize(Quaternion::from(coords))
+}
+
+/// True if all numbers are finite and the rotation is one.
+pub(super) fn is_rigid(pose: &Isometry3<f64>) -> bool {
+    pose.translation.vector.iter().all(|v| v.is_finite())
+        && (pose.rotation.coords.norm() - 1.0).abs() < 1.0e-3
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use nalgebra::Vector3;
+    use std::f64::consts::PI;
+
+    #[test]
+    fn half_way_of_a_turn() {
+        let a = Isometry3::identity();
+        let b = Isometry3::new(Vector3::new(2.0, 4.0, -6.0), Vector3::new(0.0, 0.0, 3.0));
+        let half = interpolate(&a, &b, 0.5);
+        assert_eq!(half.translation.vector, Vector3::new(1.0, 2.0, -3.0));
+        assert!((half.rotation.scaled_axis() - Vector3::new(0.0, 0.0, 1.5)).norm() < 1.0e-12);
+    }
+
+    #[test]
+    fn the_sign_of_a_quaternion_does_not_matter() {
+        let a = UnitQuaternion::new(Vector3::new(0.1, 0.2, 0.3));
+        let b = UnitQuaternion::new(Vector3::new(0.3, -0.2, 0.5));
+        let minus_b = Unit::new_unchecked(-b.into_inner());
+        let direct = slerp(&a, &b, 0.3);
+        let flipped = slerp(&a, &minus_b, 0.3);
+        assert!(direct.angle_to(&flipped) < 1.0e-7);
+        assert!((direct.coords - flipped.coords).norm() < 1.0e-15);
+    }
+
+    #[test]
+    fn half_a_turn_is_still_a_rotation() {
+        let a = UnitQuaternion::identity();
+        let b = UnitQuaternion::new(Vector3::x() * PI);
+        let half = slerp(&a, &b, 0.5);
+        assert!((half.norm() - 1.0).abs() < 1.0e-15);
+        assert!((half.angle() - PI / 2.0).abs() < 1.0e-12);
+    }
+
+    #[test]
+    fn tiny_turns_are_smooth() {
+        for angle in [1.0e-12, 1.0e-9, 1.0e-7, 3.0e-7, 1.0e-6, 1.0e-3] {
+            let b = UnitQuaternion::new(Vector3::z() * angle);
+            let quarter = slerp(&UnitQuaternion::identity(), &b, 0.25);
+            let found = 2.0 * quarter.coords.z.asin();
+            assert!(
+                (found - 0.25 * angle).abs() < 1.0e-9 * angle,
+                "{angle} {found}"
+            );
+        }
+    }
+}

@@ -1,0 +1,146 @@
+//! What the tree of frames refuses, and what it cannot answer.
+
+use thiserror::Error;
+
+use super::buffer::seconds;
+
+/// A transform that would break the tree of frames.
+#[derive(Clone, Debug, PartialEq, Eq, Error)]
+pub enum TfInsertError {
+    /// A frame has no name.
+    #[error("transform from '{child}' to '{parent}' has a frame without a name")]
+    NoName {
+        /// Parent frame.
+        parent: String,
+        /// Child frame.
+        child: String,
+    },
+    /// A name is too long to be one.
+    #[error("frame name has {bytes} bytes, over {max_bytes}")]
+    LongName {
+        /// Bytes of the name.
+        bytes: usize,
+        /// The limit.
+        max_bytes: usize,
+    },
+    /// A number is NaN or infinite, or the rotation is none.
+    #[error(
+        "transform of '{child}' in '{parent}' is not finite, or its quaternion not of length 1"
+    )]
+    NotFinite {
+        /// Parent frame.
+        parent: String,
+        /// Child frame.
+        child: String,
+    },
+    /// More frames than the limit.
+    #[error(
+        "transform of '{child}' in '{parent}' would exceed {max_frames} frames; raise the limit or find who publishes so many"
+    )]
+    TooManyFrames {
+        /// Parent frame.
+        parent: String,
+        /// Child frame.
+        child: String,
+        /// The limit.
+        max_frames: usize,
+    },
+    /// The child would become its own ancestor.
+    #[error(
+        "transform of '{child}' in '{parent}' closes a cycle: '{child}' is above '{parent}' already"
+    )]
+    Cycle {
+        /// Parent frame.
+        parent: String,
+        /// Child frame.
+        child: String,
+    },
+    /// The child has another parent.
+    #[error(
+        "'{child}' is a child of '{parent}', refused as a child of '{refused}': two publishers disagree"
+    )]
+    Reparented {
+        /// Child frame.
+        child: String,
+        /// Its parent.
+        parent: String,
+        /// The parent refused.
+        refused: String,
+    },
+    /// A static frame would move, or a moving one stand still.
+    #[error(
+        "'{child}' is a {known} frame, refused as a {refused} one: it is published on both tf and tf_static"
+    )]
+    KindChanged {
+        /// Child frame.
+        child: String,
+        /// `static` or `moving`, as known.
+        known: &'static str,
+        /// `static` or `moving`, as refused.
+        refused: &'static str,
+    },
+}
+
+/// Why there is no transform.
+#[derive(Clone, Debug, PartialEq, Eq, Error)]
+pub enum TfMiss {
+    /// No transform ever named the frame.
+    #[error("frame '{frame}' is not known: nobody published it on tf or tf_static")]
+    UnknownFrame {
+        /// The frame.
+        frame: String,
+    },
+    /// The frames are in two trees.
+    #[error(
+        "no path from frame '{from}' to '{to}': a transform between their trees is not published"
+    )]
+    Disconnected {
+        /// Source frame.
+        from: String,
+        /// Target frame.
+        to: String,
+    },
+    /// The time is before what is kept of a frame on the path.
+    #[error(
+        "time is {:.6} s before what is kept of frame '{frame}'",
+        seconds(by_ns)
+    )]
+    TooOld {
+        /// The moving frame.
+        frame: String,
+        /// Nanoseconds before its oldest transform.
+        by_ns: i64,
+    },
+    /// The time is after what came of a frame on the path: it may still come.
+    #[error(
+        "time is {:.6} s after the newest transform of frame '{frame}'",
+        seconds(by_ns)
+    )]
+    TooNew {
+        /// The moving frame.
+        frame: String,
+        /// Nanoseconds after its newest transform.
+        by_ns: i64,
+    },
+    /// The transforms around the time are too far apart.
+    #[error(
+        "transforms of frame '{frame}' are {:.6} s apart, over {:.6} s",
+        seconds(gap_ns),
+        seconds(max_gap_ns)
+    )]
+    Gap {
+        /// The moving frame.
+        frame: String,
+        /// Nanoseconds between its transforms.
+        gap_ns: i64,
+        /// The limit, nanoseconds.
+        max_gap_ns: i64,
+    },
+}
+
+impl TfMiss {
+    /// True if waiting for the next transforms may help: the time is only too new.
+    pub fn may_still_come(&self) -> bool {
+        matches!(self, TfMiss::TooNew { .. })
+    }
+}
