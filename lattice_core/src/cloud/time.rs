@@ -1,5 +1,6 @@
 //! Per-point time: which field, which unit, counted from what.
 
+use rayon::prelude::*;
 use std::fmt;
 
 use super::layout::{names, shown};
@@ -10,6 +11,8 @@ pub const NO_TIME_NS: i64 = i64::MIN;
 
 /// Names that sensors give their time, the first one present wins.
 const NAMES: [&str; 5] = ["time", "t", "time_stamp", "timestamp", "offset_time"];
+/// Points of one task, at least.
+const MIN_TASK: usize = 8192;
 /// An absolute time further from the stamp is of another clock.
 const MAX_CLOCK_DISTANCE_S: f64 = 10.0;
 /// Least f64 values taken as absolute: 1973 in seconds, milli-, micro- and nanoseconds.
@@ -79,6 +82,8 @@ impl CloudView<'_> {
         let (earliest_ns, latest_ns) = clock.range_ns;
         let unit = clock.decision.unit;
         let times = (0..self.len())
+            .into_par_iter()
+            .with_min_len(MIN_TASK)
             .map(|i| match to_ns(self.scalar(clock.field, i), unit) {
                 Some(ns) if (earliest_ns..=latest_ns).contains(&ns) => {
                     clock.zero_ns.saturating_add(ns)
@@ -210,16 +215,14 @@ impl CloudView<'_> {
 
     /// Least and greatest value of `field` over the returns; `None` if there are none.
     fn value_range(&self, field: &PointField) -> Option<(f64, f64)> {
-        let mut range = None;
-        for i in 0..self.len() {
-            let value = self.scalar(field, i);
-            if !value.is_finite() || !is_return(&self.xyz(i)) {
-                continue;
-            }
-            let (least, greatest) = range.unwrap_or((value, value));
-            range = Some((value.min(least), value.max(greatest)));
-        }
-        range
+        (0..self.len())
+            .into_par_iter()
+            .with_min_len(MIN_TASK)
+            .filter_map(|i| {
+                let value = self.scalar(field, i);
+                (value.is_finite() && is_return(&self.xyz(i))).then_some((value, value))
+            })
+            .reduce_with(|a, b| (a.0.min(b.0), a.1.max(b.1)))
     }
 }
 

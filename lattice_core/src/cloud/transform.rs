@@ -5,11 +5,12 @@ use rayon::prelude::*;
 
 use super::{CloudView, NO_TIME_NS};
 
-/// Points of one task: large enough for its cache of poses to pay, small enough to share.
+/// Points of one task, at least, and tasks of one thread: enough to share the work evenly.
 const MIN_CHUNK: usize = 2048;
 const CHUNKS_PER_THREAD: usize = 4;
-/// Poses remembered per task, a power of two: more than the columns of a spinning laser.
-const CACHE_SLOTS: usize = 4096;
+/// Times remembered while looking for equal ones, as a power of two: many more than the
+/// columns of a spinning laser.
+const MEMO_BITS: u32 = 15;
 
 /// Distances kept, in the sensor frame: `min_range_m < distance <= max_range_m`, so that
 /// the sensor's origin, which many drivers send for no return, is never kept.
@@ -44,12 +45,12 @@ pub struct Transformed {
 }
 
 /// Brings the points of `view` into the map: point `i` by `map_from_sensor(times[i])`, or
-/// all by `map_from_sensor(stamp_ns)` where `times` is `None`.
+/// all by `map_from_sensor(stamp_ns)` where `times` is `None`. Points without a time there
+/// are left out and counted.
 ///
 /// Runs on rayon; the order and the bits of the result do not depend on the number of
-/// threads. A pose is asked for only where a point is kept, and at most once per run of
-/// equal times. Fails as a whole with the error of the first point, in order, whose pose is
-/// missing.
+/// threads. Poses of times that come again are looked up once. Fails as a whole with the
+/// error of the first point kept, in order, whose pose is missing.
 pub fn transform_points<E: Send>(
     view: &CloudView<'_>,
     stamp_ns: i64,
@@ -57,16 +58,41 @@ pub fn transform_points<E: Send>(
     range: &RangeLimits,
     map_from_sensor: impl Fn(i64) -> Result<Isometry3<f64>, E> + Sync,
 ) -> Result<Transformed, E> {
+    if view.is_empty() {
+        return Ok(Transformed::default());
+    }
+    let Some(times) = times else {
+        let shared = map_from_sensor(stamp_ns).ok();
+        return transform(view, range, |_| {
+            Some(shared.map_or_else(|| map_from_sensor(stamp_ns), Ok))
+        });
+    };
+    let time_of = |i| times.get(i).copied().filter(|at| *at != NO_TIME_NS);
+    match Memo::new(times, &map_from_sensor) {
+        Some(memo) => transform(view, range, |i| {
+            let at_ns = time_of(i)?;
+            Some(memo.pose(i).map_or_else(|| map_from_sensor(at_ns), Ok))
+        }),
+        None => transform(view, range, |i| Some(map_from_sensor(time_of(i)?))),
+    }
+}
+
+/// Transforms in parallel by `pose_of` a point, which is `None` where it has no time.
+fn transform<E: Send>(
+    view: &CloudView<'_>,
+    range: &RangeLimits,
+    pose_of: impl Fn(usize) -> Option<Result<Isometry3<f64>, E>> + Sync,
+) -> Result<Transformed, E> {
     let chunk = view
         .len()
         .div_ceil(rayon::current_num_threads() * CHUNKS_PER_THREAD)
         .max(MIN_CHUNK);
+    // Collected before the first error is taken, so that it is the first in order.
     let parts: Vec<Result<Transformed, E>> = (0..view.len().div_ceil(chunk))
         .into_par_iter()
         .map(|part| {
             let first = part * chunk;
-            let last = view.len().min(first + chunk);
-            transform_part(view, first..last, stamp_ns, times, range, &map_from_sensor)
+            transform_part(view, first..view.len().min(first + chunk), range, &pose_of)
         })
         .collect();
     let parts = parts.into_iter().collect::<Result<Vec<_>, E>>()?;
@@ -86,73 +112,71 @@ pub fn transform_points<E: Send>(
 fn transform_part<E>(
     view: &CloudView<'_>,
     indices: std::ops::Range<usize>,
-    stamp_ns: i64,
-    times: Option<&[i64]>,
     range: &RangeLimits,
-    map_from_sensor: &impl Fn(i64) -> Result<Isometry3<f64>, E>,
+    pose_of: &impl Fn(usize) -> Option<Result<Isometry3<f64>, E>>,
 ) -> Result<Transformed, E> {
     let mut out = Transformed {
         points_m: Vec::with_capacity(indices.len()),
         ..Transformed::default()
     };
-    let mut poses = PoseCache::new(if times.is_some() { indices.len() } else { 1 });
     for i in indices {
         let p = view.xyz(i);
         let distance_m = p.norm();
         if !distance_m.is_finite() {
             out.not_finite += 1;
-            continue;
-        }
-        if !(distance_m > range.min_range_m && distance_m <= range.max_range_m) {
+        } else if !(distance_m > range.min_range_m && distance_m <= range.max_range_m) {
             out.out_of_range += 1;
-            continue;
-        }
-        let time_ns = match times {
-            None => stamp_ns,
-            Some(times) => times.get(i).copied().unwrap_or(NO_TIME_NS),
-        };
-        if times.is_some() && time_ns == NO_TIME_NS {
+        } else if let Some(pose) = pose_of(i) {
+            out.points_m.push((pose? * Point3::from(p)).coords);
+        } else {
             out.no_time += 1;
-            continue;
         }
-        let pose = poses.at(time_ns, map_from_sensor)?;
-        out.points_m.push((pose * Point3::from(p)).coords);
     }
     Ok(out)
 }
 
-/// Poses by time, direct mapped: it serves runs of equal times as well as row-major clouds,
-/// where the times of a row come again in the next.
-struct PoseCache {
-    slots: Vec<Option<(i64, Isometry3<f64>)>>,
-    shift: u32,
+/// Poses of the times that a cloud repeats: column by column, or row by row where the times
+/// of a row come again in the next.
+struct Memo {
+    /// Which pose a point has.
+    slots: Vec<u32>,
+    /// Poses found; the misses are asked for again, to have their errors.
+    poses: Vec<Option<Isometry3<f64>>>,
 }
 
-impl PoseCache {
-    fn new(points: usize) -> PoseCache {
-        let slots = points.next_power_of_two().clamp(1, CACHE_SLOTS);
-        PoseCache {
-            slots: vec![None; slots],
-            shift: u64::BITS - slots.trailing_zeros(),
+impl Memo {
+    /// `None` if the times hardly repeat.
+    fn new<E: Send>(
+        times: &[i64],
+        map_from_sensor: &(impl Fn(i64) -> Result<Isometry3<f64>, E> + Sync),
+    ) -> Option<Memo> {
+        let mut distinct_ns: Vec<i64> = Vec::new();
+        let mut slots = Vec::with_capacity(times.len());
+        // Direct mapped: two times of one place displace each other and are merely asked
+        // for again, so that no choice of times makes it slow.
+        let mut seen = vec![(NO_TIME_NS, 0_u32); 1 << MEMO_BITS];
+        for &at_ns in times {
+            // Fibonacci hashing: the high bits of the product mix all bits of the time.
+            let hash = (at_ns as u64).wrapping_mul(0x9E37_79B9_7F4A_7C15);
+            let place = seen.get_mut((hash >> (u64::BITS - MEMO_BITS)) as usize)?;
+            if place.0 != at_ns {
+                if distinct_ns.len() > times.len() / 4 {
+                    return None;
+                }
+                *place = (at_ns, u32::try_from(distinct_ns.len()).ok()?);
+                distinct_ns.push(at_ns);
+            }
+            slots.push(place.1);
         }
+        let poses = distinct_ns
+            .par_iter()
+            .with_min_len(64)
+            .map(|at_ns| map_from_sensor(*at_ns).ok())
+            .collect();
+        Some(Memo { slots, poses })
     }
 
-    fn at<E>(
-        &mut self,
-        time_ns: i64,
-        map_from_sensor: &impl Fn(i64) -> Result<Isometry3<f64>, E>,
-    ) -> Result<Isometry3<f64>, E> {
-        // Fibonacci hashing: the high bits of the product mix all bits of the time.
-        let hash = (time_ns as u64).wrapping_mul(0x9E37_79B9_7F4A_7C15);
-        let slot = hash.checked_shr(self.shift).unwrap_or(0) as usize;
-        match self.slots.get_mut(slot) {
-            Some(Some((at_ns, pose))) if *at_ns == time_ns => Ok(*pose),
-            Some(entry) => {
-                let pose = map_from_sensor(time_ns)?;
-                *entry = Some((time_ns, pose));
-                Ok(pose)
-            }
-            None => map_from_sensor(time_ns),
-        }
+    fn pose(&self, i: usize) -> Option<Isometry3<f64>> {
+        *self.poses.get(*self.slots.get(i)? as usize)?
     }
 }

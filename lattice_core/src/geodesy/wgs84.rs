@@ -22,8 +22,7 @@ const MAX_HEIGHT_M: f64 = 1.0e7;
 /// The same bounds as distances from the geocentre, wide enough at poles and equator.
 const MIN_RADIUS_M: f64 = 6.2e6;
 const MAX_RADIUS_M: f64 = 1.7e7;
-/// Bowring's step is quartic or better near the ellipsoid; three reach the last bit
-/// everywhere within the bounds above.
+/// Three of Bowring's steps reach rounding everywhere within the bounds above.
 const BOWRING_STEPS: usize = 3;
 
 /// A place on WGS84: geodetic latitude, longitude east, height above the ellipsoid.

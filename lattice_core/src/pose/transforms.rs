@@ -1,7 +1,7 @@
 //! The tree of frames.
 
 use nalgebra::Isometry3;
-use std::collections::HashMap;
+use rustc_hash::FxHashMap;
 
 use super::interpolate::is_rigid;
 use super::track::{Track, duration_ns};
@@ -65,7 +65,7 @@ impl Link {
 #[derive(Clone, Debug)]
 pub struct TransformBuffer {
     frames: Vec<Frame>,
-    index: HashMap<String, usize>,
+    index: FxHashMap<String, usize>,
     history_ns: i64,
     max_gap_ns: i64,
     jump_back_ns: i64,
@@ -78,7 +78,7 @@ impl TransformBuffer {
     pub fn new(options: TransformBufferOptions) -> TransformBuffer {
         TransformBuffer {
             frames: Vec::new(),
-            index: HashMap::new(),
+            index: FxHashMap::default(),
             history_ns: duration_ns(options.history_s),
             max_gap_ns: duration_ns(options.max_gap_s),
             jump_back_ns: duration_ns(options.jump_back_s),

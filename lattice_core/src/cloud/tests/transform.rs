@@ -53,7 +53,7 @@ fn each_point_has_the_pose_of_its_time() {
         let expected = pose(times[i]) * Point3::from(view.xyz(i));
         assert_eq!(*p, expected.coords);
     }
-    assert!(asked.into_inner() < view.len());
+    assert!(asked.into_inner() < 2 * 1024, "times of a row come again");
 }
 
 #[test]
