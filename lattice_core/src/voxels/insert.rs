@@ -12,7 +12,7 @@ use crate::lattice::{Key, Lattice, nearest_integer};
 /// Points that one task quantizes.
 const CHUNK: usize = 4096;
 /// Points between two merges; bounds the memory for what is not yet merged.
-const WAVE: usize = 64 * CHUNK;
+const WAVE: usize = 16 * CHUNK;
 
 /// What became of the points of a cloud; the reasons add up to `points`.
 #[derive(Clone, Copy, PartialEq, Eq, Debug, Default)]
@@ -38,6 +38,9 @@ struct Tally {
     sums: DistortionSums,
 }
 
+/// Where in `Partial::tallies` the cells are.
+type Places = FxHashMap<Key, usize>;
+
 /// The cells of one chunk in the order of their first points.
 #[derive(Default)]
 struct Partial {
@@ -60,12 +63,12 @@ impl VoxelList {
         let base_m = cloud.datum_m - self.datum_m;
         for wave in cloud.offsets_m.chunks(WAVE) {
             let lattice = &self.lattice;
+            let quantize = |places: &mut Places, chunk| tally(lattice, base_m, chunk, places);
             let partials: Vec<Partial> = if wave.len() <= CHUNK {
-                vec![tally(lattice, base_m, wave)]
+                vec![quantize(&mut Places::default(), wave)]
             } else {
-                wave.par_chunks(CHUNK)
-                    .map(|chunk| tally(lattice, base_m, chunk))
-                    .collect()
+                let chunks = wave.par_chunks(CHUNK);
+                chunks.map_init(Places::default, quantize).collect()
             };
             partials
                 .iter()
@@ -90,9 +93,14 @@ impl VoxelList {
 }
 
 /// Quantizes points at `base_m + offset` from the datum and gathers them by cell.
-fn tally(lattice: &Lattice, base_m: Vector3<f64>, offsets_m: &[[f32; 3]]) -> Partial {
+fn tally(
+    lattice: &Lattice,
+    base_m: Vector3<f64>,
+    offsets_m: &[[f32; 3]],
+    places: &mut Places,
+) -> Partial {
     let mut partial = Partial::default();
-    let mut places: FxHashMap<Key, usize> = FxHashMap::default();
+    places.clear();
     let [bx, by, bz] = base_m.into();
     let points = offsets_m
         .iter()
