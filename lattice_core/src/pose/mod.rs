@@ -5,6 +5,7 @@
 //! and with the reason where they cannot answer. Both are bounded in memory.
 
 mod buffer;
+mod frame_name;
 mod interpolate;
 mod tf_error;
 mod track;

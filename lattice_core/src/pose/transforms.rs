@@ -3,13 +3,10 @@
 use nalgebra::Isometry3;
 use rustc_hash::FxHashMap;
 
+use super::frame_name::{bare, check_names, shown};
 use super::interpolate::is_rigid;
 use super::track::{Track, duration_ns};
 use super::{PoseMiss, PushOutcome, TfInsertError, TfMiss};
-
-const MAX_NAME_BYTES: usize = 256;
-/// Longest part of a foreign name repeated in an error.
-const SHOWN_CHARS: usize = 64;
 
 /// Bounds of a [`TransformBuffer`].
 #[derive(Clone, Copy, Debug, PartialEq)]
@@ -380,33 +377,6 @@ fn tf_miss(frame: &str, cause: PoseMiss) -> TfMiss {
             max_gap_ns,
         },
     }
-}
-
-/// The name without leading slashes, which tf wrote once.
-fn bare(name: &str) -> &str {
-    name.trim_start_matches('/')
-}
-
-fn shown(name: &str) -> String {
-    bare(name).chars().take(SHOWN_CHARS).collect()
-}
-
-fn check_names(parent: &str, child: &str) -> Result<(), TfInsertError> {
-    for name in [parent, child] {
-        if name.len() > MAX_NAME_BYTES {
-            return Err(TfInsertError::LongName {
-                bytes: name.len(),
-                max_bytes: MAX_NAME_BYTES,
-            });
-        }
-    }
-    if parent.is_empty() || child.is_empty() {
-        return Err(TfInsertError::NoName {
-            parent: parent.to_owned(),
-            child: child.to_owned(),
-        });
-    }
-    Ok(())
 }
 
 #[cfg(test)]
