@@ -15,6 +15,10 @@ const POSITION_TIME_S: f64 = 30.0;
 const ATTITUDE_TIME_S: f64 = 90.0;
 /// White velocity error, m/s per axis.
 const VELOCITY_SIGMA_MPS: f64 = 0.02;
+/// Delay of the INS messages, ns.
+const MIN_DELAY_NS: f64 = 2e6;
+const MEAN_MORE_DELAY_NS: f64 = 1.5e6;
+const MAX_DELAY_NS: f64 = 9.5e6;
 /// Half the step of the numerical derivatives, s.
 const DERIVATIVE_STEP_S: f64 = 5e-4;
 
@@ -31,10 +35,12 @@ pub struct InsSample {
     pub true_map_from_base: Isometry3<f64>,
     /// Velocity of the IMU in the map, measured, m/s.
     pub velocity_mps: Vector3<f64>,
-    /// Velocity of `base_link` along its own axes, without error, m/s.
+    /// Velocity of `base_link` along its own axes as it follows from the measured one, m/s.
     pub base_velocity_mps: Vector3<f64>,
     /// Turn rate of `base_link` about its own axes, without error, rad/s.
     pub base_turn_rate_radps: Vector3<f64>,
+    /// From validity to arrival at the driver, ns: some milliseconds, and less than an epoch.
+    pub delay_ns: i64,
 }
 
 impl InsSample {
@@ -64,7 +70,8 @@ impl<'a> InsSamples<'a> {
     }
 
     fn sample(&mut self, time_ns: i64) -> InsSample {
-        let [position_m, attitude_rad, velocity_mps] = self.errors.step();
+        let [position_m, attitude_rad, velocity_error_mps] = self.errors.step();
+        let delay_ns = self.errors.delay_ns();
         let time_s = time_ns as f64 * 1e-9;
         let mount = base_from_imu();
         let truth = self.bobcat.map_from_base(time_ns);
@@ -80,20 +87,22 @@ impl<'a> InsSamples<'a> {
         let per_s = 0.5 / DERIVATIVE_STEP_S;
         let imu_velocity =
             ((after * mount).translation.vector - (before * mount).translation.vector) * per_s;
-        let base_velocity = (after.translation.vector - before.translation.vector) * per_s;
         let map_from_imu = Isometry3::from_parts(
             Translation3::from(true_imu.translation.vector + position_m),
             UnitQuaternion::from_scaled_axis(attitude_rad) * true_imu.rotation,
         );
+        let velocity_mps = imu_velocity + velocity_error_mps;
+        let turn_rate_radps = (before.rotation.inverse() * after.rotation).scaled_axis() * per_s;
+        let lever_mps = turn_rate_radps.cross(&mount.translation.vector);
         InsSample {
             time_ns,
             map_from_imu,
             map_from_base: map_from_imu * mount.inverse(),
             true_map_from_base: truth,
-            velocity_mps: imu_velocity + velocity_mps,
-            base_velocity_mps: truth.rotation.inverse() * base_velocity,
-            base_turn_rate_radps: (before.rotation.inverse() * after.rotation).scaled_axis()
-                * per_s,
+            velocity_mps,
+            base_velocity_mps: truth.rotation.inverse() * velocity_mps - lever_mps,
+            base_turn_rate_radps: turn_rate_radps,
+            delay_ns,
         }
     }
 }
@@ -164,6 +173,12 @@ impl Errors {
         let (position, attitude) = (error(0), error(1));
         let velocity = Vector3::from_fn(|_, _| VELOCITY_SIGMA_MPS * self.stream.normal());
         [position, attitude, velocity]
+    }
+
+    /// The least delay plus an exponential one, cut.
+    fn delay_ns(&mut self) -> i64 {
+        let more_ns = -MEAN_MORE_DELAY_NS * (1.0 - self.stream.uniform()).ln();
+        (MIN_DELAY_NS + more_ns).min(MAX_DELAY_NS) as i64
     }
 }
 
