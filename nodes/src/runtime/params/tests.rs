@@ -1,0 +1,127 @@
+use super::*;
+use std::io::Write;
+
+fn load(yaml: &[&str], rules: &[&str]) -> Result<Params, ParamError> {
+    let mut args = RosArgs::default();
+    let files: Vec<_> = yaml
+        .iter()
+        .map(|text| {
+            let mut file = tempfile::NamedTempFile::new().unwrap();
+            file.write_all(text.as_bytes()).unwrap();
+            file
+        })
+        .collect();
+    args.params_files = files.iter().map(|file| file.path().to_owned()).collect();
+    args.param_overrides = rules.iter().map(|rule| rule.parse().unwrap()).collect();
+    Params::load(&args, "/robot/mapper")
+}
+
+#[test]
+fn later_sources_win() {
+    let first = "/**: {ros__parameters: {a: 1, b: 1, c: 1, d: 1}}\n/robot/mapper: {ros__parameters: {b: 2}}";
+    let second = "/**: {ros__parameters: {c: 3, d: 3}}";
+    let params = load(&[first, second], &["d:=4", "mapper:d:=5", "other:d:=6"]).unwrap();
+    for (name, value) in [("a", 1), ("b", 2), ("c", 3), ("d", 5), ("e", -1)] {
+        assert_eq!(params.i64(name, -1).unwrap(), value, "{name}");
+    }
+}
+
+#[test]
+fn other_nodes_parameters_are_not_ours() {
+    let params = load(&["/mapper: {ros__parameters: {a: 1}}"], &["markers:b:=2"]).unwrap();
+    assert!(!params.is_given("a") && !params.is_given("b"));
+    assert!(params.unused().is_empty());
+}
+
+#[test]
+fn readers_convert_as_rcl_does() {
+    let yaml = "/**: {ros__parameters: {on: yes, mask: 010, rate: 5, speeds: [1, 2], empty: [], names: [a], ids: [0x10]}}";
+    let params = load(&[yaml], &[]).unwrap();
+    assert!(params.bool("on", false).unwrap());
+    assert_eq!(params.i64("mask", 0).unwrap(), 8);
+    assert_eq!(params.f64("rate", 0.0).unwrap(), 5.0);
+    assert_eq!(params.f64_array("speeds", &[]).unwrap(), [1.0, 2.0]);
+    assert_eq!(params.f64_array("empty", &[1.0]).unwrap(), [0.0; 0]);
+    assert_eq!(params.string_array("names", &[]).unwrap(), ["a"]);
+    assert_eq!(params.i64_array("ids", &[]).unwrap(), [16]);
+    assert_eq!(params.string("frame", "map").unwrap(), "map");
+}
+
+#[test]
+fn wrong_types_name_the_place() {
+    let params = load(
+        &["/**: {ros__parameters: {grid: {cell: 1.5, name: 7}}}"],
+        &["x:=.nan"],
+    )
+    .unwrap();
+    let error = params.i64("grid.cell", 0).unwrap_err().to_string();
+    for part in [
+        "`grid.cell` of /robot/mapper",
+        "an integer",
+        "a float 1.5",
+        "/**.ros__parameters.grid.cell",
+    ] {
+        assert!(error.contains(part), "{part}: {error}");
+    }
+    let error = params.string("grid.name", "").unwrap_err().to_string();
+    assert!(error.contains("quotes"), "{error}");
+    let error = params.f64("x", 0.0).unwrap_err().to_string();
+    assert!(error.contains("command line"), "{error}");
+    assert!(params.bool("grid.cell", true).is_err());
+    assert!(params.f64_array("grid.cell", &[]).is_err());
+    assert!(params.string_array("grid.name", &[]).is_err());
+    assert!(
+        params.declared().is_empty(),
+        "a refused parameter is not declared"
+    );
+}
+
+#[test]
+fn what_is_read_is_declared_and_the_rest_is_unused() {
+    let params = load(&[], &["rate:=2.0", "tpyo:=1"]).unwrap();
+    assert_eq!(
+        params
+            .about("frames per second, Hz")
+            .f64("rate", 1.0)
+            .unwrap(),
+        2.0
+    );
+    assert_eq!(params.f64("rate", 1.0).unwrap(), 2.0);
+    assert!(!params.bool("use_sim_time", false).unwrap());
+    assert_eq!(params.unused(), ["tpyo"]);
+    let declared = params.declared();
+    assert_eq!(declared.len(), 2);
+    assert_eq!(declared[0].name, "rate");
+    assert_eq!(declared[0].value, ParamValue::F64(2.0));
+    assert_eq!(declared[0].description, "frames per second, Hz");
+    assert_eq!(declared[1].value, ParamValue::Bool(false));
+}
+
+#[test]
+fn invalid_values_say_where_they_come_from() {
+    let params = Params::from_values("/mapper", [("cell_volume_m3", ParamValue::F64(-1.0))]);
+    let _ = params.f64("cell_volume_m3", 0.1).unwrap();
+    let error = params
+        .invalid("cell_volume_m3", "expected more than 0")
+        .to_string();
+    assert_eq!(
+        error,
+        "parameter `cell_volume_m3` of /mapper = -1.0 (from the command line): expected more than 0"
+    );
+    let _ = params.f64("span_s", 2.0).unwrap();
+    let error = params.invalid("span_s", "too short").to_string();
+    assert!(
+        error.contains("span_s` of /mapper = 2.0 (the default)"),
+        "{error}"
+    );
+}
+
+#[test]
+fn a_missing_file_is_an_error_with_its_name() {
+    let args = RosArgs {
+        params_files: vec!["/nowhere/bobcat.yaml".into()],
+        ..RosArgs::default()
+    };
+    let error = Params::load(&args, "/mapper").unwrap_err().to_string();
+    assert!(error.contains("/nowhere/bobcat.yaml"), "{error}");
+}
