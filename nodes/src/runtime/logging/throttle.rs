@@ -1,0 +1,113 @@
+use std::{
+    sync::{
+        LazyLock,
+        atomic::{AtomicU64, Ordering},
+    },
+    time::{Duration, Instant},
+};
+
+static START: LazyLock<Instant> = LazyLock::new(Instant::now);
+
+/// Lets a message through at most once per period, and counts the others.
+///
+/// Meant as a `static` beside the message; see [`crate::log_throttled`].
+#[derive(Debug)]
+pub struct Throttle {
+    period_ns: u64,
+    next_ns: AtomicU64,
+    suppressed: AtomicU64,
+}
+
+impl Throttle {
+    /// A throttle that lets its first message through.
+    pub const fn new(period: Duration) -> Throttle {
+        let period_ns = period.as_secs().saturating_mul(1_000_000_000);
+        let period_ns = period_ns.saturating_add(period.subsec_nanos() as u64);
+        Throttle {
+            period_ns,
+            next_ns: AtomicU64::new(0),
+            suppressed: AtomicU64::new(0),
+        }
+    }
+
+    /// Whether to log now: the messages suppressed since the last one, or `None`.
+    pub fn check(&self) -> Option<u64> {
+        self.check_at(u64::try_from(START.elapsed().as_nanos()).unwrap_or(u64::MAX))
+    }
+
+    /// The same at a time of the caller's clock, ns.
+    pub fn check_at(&self, now_ns: u64) -> Option<u64> {
+        let next_ns = self.next_ns.load(Ordering::Relaxed);
+        let after_ns = now_ns.saturating_add(self.period_ns);
+        let ours = now_ns >= next_ns
+            && self
+                .next_ns
+                .compare_exchange(next_ns, after_ns, Ordering::Relaxed, Ordering::Relaxed)
+                .is_ok();
+        if ours {
+            return Some(self.suppressed.swap(0, Ordering::Relaxed));
+        }
+        let _ = self.suppressed.fetch_add(1, Ordering::Relaxed);
+        None
+    }
+}
+
+/// Logs at most once per period at this place, with the number of messages left out.
+///
+/// `log_throttled!(log::Level::Warn, Duration::from_secs(5), "no pose for {stamp_ns}")`
+#[macro_export]
+macro_rules! log_throttled {
+    ($level:expr, $period:expr, $($message:tt)+) => {{
+        static THROTTLE: $crate::runtime::logging::Throttle =
+            $crate::runtime::logging::Throttle::new($period);
+        match THROTTLE.check() {
+            Some(0) => log::log!($level, $($message)+),
+            Some(more) => {
+                log::log!($level, "{} ({more} more like this)", format_args!($($message)+))
+            }
+            None => {}
+        }
+    }};
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn one_message_per_period_and_a_count_of_the_rest() {
+        let throttle = Throttle::new(Duration::from_millis(1));
+        assert_eq!(throttle.check_at(5), Some(0));
+        assert_eq!(throttle.check_at(5), None);
+        assert_eq!(throttle.check_at(1_000_004), None);
+        assert_eq!(throttle.check_at(1_000_005), Some(2));
+        assert_eq!(throttle.check_at(2_000_005), Some(0));
+    }
+
+    #[test]
+    fn threads_share_the_count() {
+        let throttle = Throttle::new(Duration::MAX);
+        let passed: usize = std::thread::scope(|scope| {
+            let threads: Vec<_> = (0..4)
+                .map(|_| scope.spawn(|| (0..1000).filter(|_| throttle.check().is_some()).count()))
+                .collect();
+            threads
+                .into_iter()
+                .map(|thread| thread.join().unwrap())
+                .sum()
+        });
+        assert_eq!(passed, 1);
+        assert_eq!(throttle.suppressed.load(Ordering::Relaxed), 3999);
+    }
+
+    #[test]
+    fn the_macro_formats_and_throttles() {
+        for attempt in 0..3 {
+            log_throttled!(
+                log::Level::Debug,
+                Duration::from_secs(3600),
+                "attempt {attempt}"
+            );
+        }
+    }
+}
