@@ -8,6 +8,7 @@ pub mod file;
 
 mod changes;
 mod distortion;
+mod exposed;
 mod insert;
 mod list;
 mod merge;
