@@ -3,4 +3,5 @@
 
 pub mod bag;
 pub mod convert;
+pub mod files;
 pub mod runtime;

@@ -1,0 +1,50 @@
+//! Why a map was not exported.
+
+use std::io;
+
+use thiserror::Error;
+
+/// Why a map was not exported.
+#[derive(Debug, Error)]
+pub enum ExportError {
+    /// The system could not write.
+    #[error("writing failed: {0}")]
+    Io(#[from] io::Error),
+    /// PLY counts vertices in 32 bits with sign.
+    #[error(
+        "the mesh has more than {} vertices: export the centres, or take larger cells",
+        i32::MAX
+    )]
+    TooManyVertices,
+    /// The picture cannot have this size.
+    #[error(
+        "a picture of {width} x {height} pixels: each side must be 1 to {max_side}, and their \
+         product at most {max_pixels}"
+    )]
+    PictureSize {
+        /// Pixels.
+        width: u32,
+        /// Pixels.
+        height: u32,
+        /// Longest side, pixels.
+        max_side: u32,
+        /// Largest product of the sides.
+        max_pixels: u64,
+    },
+    /// The camera cannot stand like this.
+    #[error(
+        "a camera at azimuth {azimuth_deg} and elevation {elevation_deg} degrees with zoom {zoom}: the \
+         azimuth must be finite, the elevation -90 to 90, the zoom 0.01 to 1000"
+    )]
+    Camera {
+        /// Degrees.
+        azimuth_deg: f64,
+        /// Degrees.
+        elevation_deg: f64,
+        /// 1 for the whole map.
+        zoom: f64,
+    },
+    /// The PNG encoder failed.
+    #[error("writing the PNG failed: {0}")]
+    Png(#[from] png::EncodingError),
+}

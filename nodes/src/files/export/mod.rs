@@ -1,0 +1,27 @@
+//! Maps for other programs and for people: PLY of centres, PLY mesh of cells, and pictures.
+
+mod centers;
+mod error;
+mod mesh;
+mod palette;
+mod render;
+mod vertices;
+
+pub use centers::write_centers_ply;
+pub use error::ExportError;
+pub use mesh::write_mesh_ply;
+pub use palette::{HeightRange, color_at};
+pub use render::{RenderOptions, render_png};
+pub use vertices::SharedVertices;
+
+use lattice_core::voxels::VoxelList;
+
+/// The line of a PLY header that says what the map is.
+fn ply_comment(list: &VoxelList) -> String {
+    let lattice = list.lattice();
+    format!(
+        "comment {} lattice, cell volume {} m^3, metres, map frame: x east, y north, z up\n",
+        lattice.kind(),
+        lattice.cell_volume_m3()
+    )
+}

@@ -1,0 +1,95 @@
+//! Which corners of neighbouring cells are one point, found once for a lattice and then exact.
+
+use lattice_core::lattice::{Lattice, LatticeIndex};
+use nalgebra::Vector3;
+
+/// Corners nearer than this, relative to the covering radius, are one.
+const SAME: f64 = 1e-6;
+
+/// A name for every point where cells meet, the same from whichever of the cells it is asked.
+#[derive(Clone, Debug)]
+pub struct SharedVertices {
+    /// For each corner of the cell at 0: among all cells that have it, the one of lowest index, and
+    /// the number of the corner there.
+    owners: Vec<(LatticeIndex, u16)>,
+}
+
+impl SharedVertices {
+    /// Compares the corners of a cell with those of all cells that it touches.
+    pub fn new(lattice: &Lattice) -> SharedVertices {
+        let corners = &lattice.cell().vertices;
+        let limit_m = SAME * lattice.covering_radius_m();
+        let cells = || std::iter::once([0; 3]).chain(lattice.touching_neighbors().iter().copied());
+        let owner = |corner: &Vector3<f64>| {
+            cells()
+                .flat_map(|w| {
+                    (0..)
+                        .zip(corners)
+                        .map(move |(number, other)| (w, number, other))
+                })
+                .filter(|&(w, _, other)| (lattice.center(w) + other - corner).norm() <= limit_m)
+                .map(|(w, number, _)| (w, number))
+                .min()
+                .unwrap_or_default()
+        };
+        SharedVertices {
+            owners: corners.iter().map(owner).collect(),
+        }
+    }
+
+    /// The name of a corner of the cell `w`: a cell and the number of the corner there.
+    ///
+    /// `None` if there is no such corner.
+    pub fn name(&self, [x, y, z]: LatticeIndex, corner: u16) -> Option<(LatticeIndex, u16)> {
+        let &([dx, dy, dz], number) = self.owners.get(usize::from(corner))?;
+        let w = [x.checked_add(dx)?, y.checked_add(dy)?, z.checked_add(dz)?];
+        Some((w, number))
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use std::collections::HashMap;
+
+    use lattice_core::lattice::LatticeKind;
+
+    use super::*;
+
+    #[test]
+    fn names_agree_where_positions_do_and_only_there() {
+        for kind in LatticeKind::ALL {
+            let lattice = Lattice::new(kind, 0.3).unwrap();
+            let shared = SharedVertices::new(&lattice);
+            let mut names = HashMap::new();
+            let mut positions = HashMap::new();
+            for w in (0..64).map(|i| [i % 4 - 2, i / 4 % 4, i / 16 + 5]) {
+                for (number, corner) in (0..).zip(&lattice.cell().vertices) {
+                    let p = lattice.center(w) + corner;
+                    let p = [p.x, p.y, p.z].map(|c| (c * 1e7).round() as i64 / 10);
+                    let name = shared.name(w, number).unwrap();
+                    assert_eq!(*names.entry(p).or_insert(name), name, "{kind}");
+                    assert_eq!(*positions.entry(name).or_insert(p), p, "{kind}");
+                }
+            }
+        }
+    }
+
+    #[test]
+    fn a_corner_is_shared_by_as_many_cells_as_the_theory_says() {
+        for (kind, per_cell) in [
+            (LatticeKind::Cubic, 1),
+            (LatticeKind::Bcc, 6),
+            (LatticeKind::Fcc, 3),
+            (LatticeKind::Mcc, 6),
+            (LatticeKind::Hex, 2),
+        ] {
+            let lattice = Lattice::new(kind, 1.0).unwrap();
+            let shared = SharedVertices::new(&lattice);
+            // Corners that a cell owns: all corners of space by the number of cells.
+            let corners = 0..lattice.cell().vertices.len() as u16;
+            let own = corners.filter(|&c| shared.name([7; 3], c) == Some(([7; 3], c)));
+            assert_eq!(own.count(), per_cell, "{kind}");
+            assert_eq!(shared.name([0; 3], u16::MAX), None);
+        }
+    }
+}

@@ -1,0 +1,67 @@
+//! Why a point file could not be read.
+
+use std::io;
+
+use thiserror::Error;
+
+use super::PointFormat;
+
+/// Why a point file could not be read. Bytes count from 0, lines from 1, both after unpacking.
+#[derive(Debug, Error)]
+pub enum PointFileError {
+    /// The system could not open or read the file, or its bzip2 data is damaged.
+    #[error("reading failed after byte {byte}: {source}")]
+    Io {
+        /// Bytes read before.
+        byte: u64,
+        /// What the system said.
+        source: io::Error,
+    },
+    /// Neither the content nor the name tells what it is.
+    #[error(
+        "cannot tell the format from the content or the extension {extension:?}: \
+         name the file .ply, .pcd, .xyz, .txt, .csv or .bin, followed by .bz2 if packed"
+    )]
+    UnknownFormat {
+        /// The extension, without .bz2.
+        extension: String,
+    },
+    /// A line of a header or of text data is wrong.
+    #[error("{format} file, line {line}: {reason}")]
+    Line {
+        /// What the file was read as.
+        format: PointFormat,
+        /// Line of the fault.
+        line: u64,
+        /// What is wrong, and what was expected.
+        reason: String,
+    },
+    /// Binary data is wrong.
+    #[error("{format} file, at byte {byte}: {reason}")]
+    Data {
+        /// What the file was read as.
+        format: PointFormat,
+        /// Where the fault was noticed.
+        byte: u64,
+        /// What is wrong, and what was expected.
+        reason: String,
+    },
+    /// The end comes too early.
+    #[error("the file is cut short: it ends at byte {byte}, in {part}")]
+    Truncated {
+        /// Length of the file.
+        byte: u64,
+        /// What was being read.
+        part: String,
+    },
+    /// More points than the caller allows.
+    #[error(
+        "the file has {points} points or more, but at most {max_points} are allowed: raise the limit or thin the file"
+    )]
+    TooManyPoints {
+        /// Points promised by a header, or found so far.
+        points: u64,
+        /// What the caller allows.
+        max_points: usize,
+    },
+}

@@ -1,0 +1,99 @@
+//! Points from files: PLY, PCD, text and KITTI scans, any of them packed with bzip2.
+//!
+//! Files are read as a stream, so that memory is bounded by the points kept and not by what a
+//! header promises. Coordinates are taken as they stand, in metres: the viewpoint of a PCD file and
+//! the like are not applied.
+
+mod collect;
+mod error;
+mod format;
+mod kitti;
+mod pcd;
+mod ply;
+mod scalar;
+mod source;
+mod text;
+
+use std::fs::File;
+use std::io::{BufRead, BufReader};
+use std::path::Path;
+
+use bzip2::bufread::MultiBzDecoder;
+
+pub use error::PointFileError;
+pub use format::PointFormat;
+
+use collect::Collector;
+use source::Source;
+
+/// Bytes read from the disk at once.
+const BUFFER: usize = 1 << 16;
+
+/// What a point file may ask for.
+#[derive(Clone, Copy, PartialEq, Eq, Debug)]
+pub struct PointFileLimits {
+    /// Most points that are taken.
+    pub max_points: usize,
+}
+
+impl Default for PointFileLimits {
+    /// A hundred million points, 2.4 GB.
+    fn default() -> PointFileLimits {
+        PointFileLimits {
+            max_points: 100_000_000,
+        }
+    }
+}
+
+/// The points of a file.
+#[derive(Clone, PartialEq, Debug)]
+pub struct PointFile {
+    /// Finite points in the order of the file, metres, in the frame of the file.
+    pub points_m: Vec<[f64; 3]>,
+    /// What kind of file it was.
+    pub format: PointFormat,
+    /// Points left out because a coordinate was NaN or infinite.
+    pub skipped_not_finite: usize,
+}
+
+/// Reads the points of a file.
+///
+/// The content decides on the format where it has a signature, otherwise the extension does.
+/// Errors do not name the file.
+pub fn read_points(path: &Path, limits: &PointFileLimits) -> Result<PointFile, PointFileError> {
+    let io = |source| PointFileError::Io { byte: 0, source };
+    let mut packed = BufReader::with_capacity(BUFFER, File::open(path).map_err(io)?);
+    if !format::is_bzip2(packed.fill_buf().map_err(io)?) {
+        return read_stream(Box::new(packed), path, limits);
+    }
+    let inner = path.with_extension("");
+    let name = match path.extension() {
+        Some(extension) if extension.eq_ignore_ascii_case("bz2") => &inner,
+        _ => path,
+    };
+    let unpacked = BufReader::with_capacity(BUFFER, MultiBzDecoder::new(packed));
+    read_stream(Box::new(unpacked), name, limits)
+}
+
+fn read_stream(
+    reader: Box<dyn BufRead>,
+    name: &Path,
+    limits: &PointFileLimits,
+) -> Result<PointFile, PointFileError> {
+    let mut source = Source::new(reader);
+    let mut points = Collector::new(limits.max_points);
+    let format = match format::detect(source.peek()?, name)? {
+        format::Family::Ply => ply::read(&mut source, &mut points)?,
+        format::Family::Pcd => pcd::read(&mut source, &mut points)?,
+        format::Family::Text => text::read(&mut source, &mut points)?,
+        format::Family::Kitti => kitti::read(&mut source, &mut points)?,
+    };
+    Ok(PointFile {
+        skipped_not_finite: points.skipped_not_finite(),
+        points_m: points.into_points(),
+        format,
+    })
+}
+
+#[cfg(test)]
+mod tests;

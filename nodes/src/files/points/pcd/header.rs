@@ -1,0 +1,207 @@
+//! The header of a PCD file.
+
+use crate::files::points::scalar::Scalar;
+use crate::files::points::source::Source;
+use crate::files::points::{PointFileError, PointFormat};
+
+/// Most lines of a header.
+const MAX_LINES: u64 = 1000;
+/// Most bytes of a point.
+const MAX_POINT_BYTES: u64 = 1 << 20;
+
+/// Where x, y and z are in the data.
+#[derive(Debug)]
+pub(super) struct Header {
+    /// One of the PCD formats.
+    pub(super) format: PointFormat,
+    /// Number of points.
+    pub(super) points: u64,
+    /// Bytes of a point.
+    pub(super) point_bytes: u64,
+    /// Numbers of a point.
+    pub(super) columns: u64,
+    /// x, y and z.
+    pub(super) axes: [Axis; 3],
+}
+
+/// Where one coordinate is.
+#[derive(Clone, Copy, Debug)]
+pub(super) struct Axis {
+    pub(super) scalar: Scalar,
+    /// Bytes of a point before it.
+    pub(super) offset: u64,
+    /// Numbers of a point before it.
+    pub(super) column: u64,
+}
+
+/// The lines as they stand.
+#[derive(Default)]
+struct Lines {
+    fields: Vec<String>,
+    size: Vec<u64>,
+    kind: Vec<String>,
+    count: Option<Vec<u64>>,
+    width: Option<u64>,
+    height: Option<u64>,
+    points: Option<u64>,
+}
+
+impl Header {
+    pub(super) fn read(source: &mut Source) -> Result<Header, PointFileError> {
+        let mut lines = Lines::default();
+        for number in 1..MAX_LINES {
+            let line = source.expect_line("the header, before DATA")?;
+            let parsed = lines.take(&line).and_then(|data| match data {
+                Some(format) => lines.header(format).map(Some),
+                None => Ok(None),
+            });
+            match parsed {
+                Ok(None) => {}
+                Ok(Some(header)) => return Ok(header),
+                Err(reason) => return Err(fault(number, reason)),
+            }
+        }
+        let reason = format!("not a PCD file: no DATA in its first {MAX_LINES} lines");
+        Err(fault(MAX_LINES, reason))
+    }
+}
+
+/// The format is not known before the last line.
+fn fault(line: u64, reason: String) -> PointFileError {
+    PointFileError::Line {
+        format: PointFormat::PcdAscii,
+        line,
+        reason,
+    }
+}
+
+impl Lines {
+    /// Keeps a line; gives the format when it is the last one.
+    fn take(&mut self, line: &str) -> Result<Option<PointFormat>, String> {
+        let mut words = line.split_whitespace();
+        let keyword = words.next().unwrap_or_default();
+        let words: Vec<&str> = words.collect();
+        match (keyword, words.as_slice()) {
+            ("VERSION", ["0.7" | ".7"]) | ("", _) | ("VIEWPOINT", _) => {}
+            _ if keyword.starts_with('#') => {}
+            ("FIELDS", names) => self.fields = names.iter().map(|&name| name.to_owned()).collect(),
+            ("SIZE", sizes) => {
+                self.size = sizes
+                    .iter()
+                    .copied()
+                    .map(integer)
+                    .collect::<Result<_, _>>()?
+            }
+            ("TYPE", types) => self.kind = types.iter().map(|&of| of.to_owned()).collect(),
+            ("COUNT", counts) => {
+                self.count = Some(
+                    counts
+                        .iter()
+                        .copied()
+                        .map(integer)
+                        .collect::<Result<_, _>>()?,
+                );
+            }
+            ("WIDTH", [width]) => self.width = Some(integer(width)?),
+            ("HEIGHT", [height]) => self.height = Some(integer(height)?),
+            ("POINTS", [points]) => self.points = Some(integer(points)?),
+            ("DATA", ["ascii"]) => return Ok(Some(PointFormat::PcdAscii)),
+            ("DATA", ["binary"]) => return Ok(Some(PointFormat::PcdBinary)),
+            ("DATA", ["binary_compressed"]) => return Ok(Some(PointFormat::PcdBinaryCompressed)),
+            _ => {
+                let line: String = line.chars().take(60).collect();
+                return Err(format!("{line:?} is no line of a PCD 0.7 header"));
+            }
+        }
+        Ok(None)
+    }
+
+    /// What the lines mean together.
+    fn header(&self, format: PointFormat) -> Result<Header, String> {
+        let fields = self.fields.len();
+        let ones = vec![1; fields];
+        let count = self.count.as_ref().unwrap_or(&ones);
+        if [self.size.len(), self.kind.len(), count.len()] != [fields; 3] {
+            return Err(format!(
+                "FIELDS, SIZE, TYPE and COUNT have {fields}, {}, {} and {} entries, which must agree",
+                self.size.len(),
+                self.kind.len(),
+                count.len()
+            ));
+        }
+        let (mut offset, mut column) = (0_u64, 0_u64);
+        let mut axes = [None; 3];
+        for (((name, &size), kind), &count) in self
+            .fields
+            .iter()
+            .zip(&self.size)
+            .zip(&self.kind)
+            .zip(count)
+        {
+            if let Some(axis) = ["x", "y", "z"].iter().position(|axis| axis == name) {
+                let scalar = coordinate(name, kind, size, count)?;
+                if let Some(axis) = axes.get_mut(axis) {
+                    *axis = Some(Axis {
+                        scalar,
+                        offset,
+                        column,
+                    });
+                }
+            }
+            column = column.saturating_add(count);
+            offset = offset.saturating_add(size.saturating_mul(count));
+        }
+        let [Some(x), Some(y), Some(z)] = axes else {
+            return Err(format!(
+                "FIELDS are {:?}, without all of x, y and z",
+                self.fields
+            ));
+        };
+        if offset > MAX_POINT_BYTES || column > MAX_POINT_BYTES {
+            return Err(format!(
+                "a point has {offset} bytes, more than {MAX_POINT_BYTES}"
+            ));
+        }
+        Ok(Header {
+            format,
+            points: self.points()?,
+            point_bytes: offset,
+            columns: column,
+            axes: [x, y, z],
+        })
+    }
+
+    fn points(&self) -> Result<u64, String> {
+        let product = match (self.width, self.height) {
+            (Some(width), Some(height)) => Some(width.saturating_mul(height)),
+            _ => None,
+        };
+        match (self.points, product) {
+            (Some(points), Some(product)) if points != product => Err(format!(
+                "POINTS is {points}, but WIDTH times HEIGHT is {product}"
+            )),
+            (Some(points), _) | (None, Some(points)) => Ok(points),
+            (None, None) => Err("neither POINTS nor WIDTH and HEIGHT are given".to_owned()),
+        }
+    }
+}
+
+fn integer(word: &str) -> Result<u64, String> {
+    word.parse().map_err(|_| {
+        let word: String = word.chars().take(40).collect();
+        format!("{word:?} is not a number without sign")
+    })
+}
+
+fn coordinate(name: &str, kind: &str, size: u64, count: u64) -> Result<Scalar, String> {
+    match (kind, size, count) {
+        ("F", 4, 1) => Ok(Scalar::F32),
+        ("F", 8, 1) => Ok(Scalar::F64),
+        _ => {
+            let kind: String = kind.chars().take(40).collect();
+            Err(format!(
+                "{name} is TYPE {kind}, SIZE {size}, COUNT {count}, but must be one F of 4 or 8 bytes"
+            ))
+        }
+    }
+}

@@ -1,0 +1,131 @@
+//! The header of a PLY file.
+
+use crate::files::points::scalar::Scalar;
+use crate::files::points::source::Source;
+use crate::files::points::{PointFileError, PointFormat};
+
+/// Most lines of a header.
+const MAX_LINES: u64 = 10_000;
+
+/// What follows the header.
+#[derive(Debug)]
+pub(super) struct Header {
+    /// One of the PLY formats.
+    pub(super) format: PointFormat,
+    /// In the order of the data.
+    pub(super) elements: Vec<Element>,
+    /// Lines of the header.
+    pub(super) lines: u64,
+}
+
+#[derive(Debug)]
+pub(super) struct Element {
+    pub(super) name: String,
+    pub(super) count: u64,
+    pub(super) properties: Vec<Property>,
+}
+
+#[derive(Debug)]
+pub(super) enum Property {
+    Scalar { name: String, scalar: Scalar },
+    List { count: Scalar, item: Scalar },
+}
+
+impl Header {
+    pub(super) fn read(source: &mut Source) -> Result<Header, PointFileError> {
+        let mut header = Header {
+            format: PointFormat::PlyAscii,
+            elements: Vec::new(),
+            lines: 0,
+        };
+        let mut has_format = false;
+        loop {
+            let line = source.expect_line("the header, before end_header")?;
+            header.lines += 1;
+            let mut words = line.split_whitespace();
+            let keyword = words.next().unwrap_or_default();
+            let rest: Vec<&str> = words.collect();
+            let parsed = match (header.lines, keyword, rest.as_slice()) {
+                (1, "ply", []) => Ok(()),
+                (1, ..) => Err("not a PLY file, which starts with \"ply\"".to_owned()),
+                (MAX_LINES.., ..) => Err(format!("the header has {MAX_LINES} lines or more")),
+                (_, "end_header", []) if !has_format => Err("no line gives the format".to_owned()),
+                (_, "end_header", []) => return Ok(header),
+                (_, "comment" | "obj_info", _) | (_, "", []) => Ok(()),
+                (_, "format", [name, "1.0"]) => {
+                    has_format = true;
+                    format(name).map(|format| header.format = format)
+                }
+                (_, "element", [name, count]) => {
+                    element(name, count).map(|element| header.elements.push(element))
+                }
+                (_, "property", words) => match header.elements.last_mut() {
+                    Some(element) => property(words).map(|p| element.properties.push(p)),
+                    None => Err("a property before the first element".to_owned()),
+                },
+                _ => Err(format!(
+                    "{:?} is no line of a PLY 1.0 header",
+                    shorten(&line)
+                )),
+            };
+            parsed.map_err(|reason| PointFileError::Line {
+                format: header.format,
+                line: header.lines,
+                reason,
+            })?;
+        }
+    }
+}
+
+fn shorten(line: &str) -> String {
+    line.chars().take(60).collect()
+}
+
+fn format(name: &str) -> Result<PointFormat, String> {
+    match name {
+        "ascii" => Ok(PointFormat::PlyAscii),
+        "binary_little_endian" => Ok(PointFormat::PlyBinaryLittleEndian),
+        "binary_big_endian" => Ok(PointFormat::PlyBinaryBigEndian),
+        _ => Err(format!("unknown format {:?}", shorten(name))),
+    }
+}
+
+fn element(name: &str, count: &str) -> Result<Element, String> {
+    let fault = || format!("{:?} is not a number of elements", shorten(count));
+    Ok(Element {
+        name: name.to_owned(),
+        count: count.parse().map_err(|_| fault())?,
+        properties: Vec::new(),
+    })
+}
+
+fn property(words: &[&str]) -> Result<Property, String> {
+    match words {
+        ["list", count, item, _] => {
+            let (count, item) = (scalar(count)?, scalar(item)?);
+            if count.is_float() {
+                return Err("the length of a list must be an integer".to_owned());
+            }
+            Ok(Property::List { count, item })
+        }
+        [of, name] => Ok(Property::Scalar {
+            name: (*name).to_owned(),
+            scalar: scalar(of)?,
+        }),
+        _ => Err("a property is a type and a name, or list, two types and a name".to_owned()),
+    }
+}
+
+fn scalar(name: &str) -> Result<Scalar, String> {
+    Ok(match name {
+        "char" | "int8" => Scalar::I8,
+        "uchar" | "uint8" => Scalar::U8,
+        "short" | "int16" => Scalar::I16,
+        "ushort" | "uint16" => Scalar::U16,
+        "int" | "int32" => Scalar::I32,
+        "uint" | "uint32" => Scalar::U32,
+        "float" | "float32" => Scalar::F32,
+        "double" | "float64" => Scalar::F64,
+        _ => return Err(format!("unknown type {:?}", shorten(name))),
+    })
+}

@@ -1,0 +1,182 @@
+//! A stream that knows where it is.
+
+use std::borrow::Cow;
+use std::fmt::Display;
+use std::io::{self, BufRead, Read};
+
+use super::PointFileError;
+
+/// Longest line that is read, bytes.
+const MAX_LINE: u64 = 1 << 20;
+
+/// Bytes of a file in order, with the position for messages.
+pub(super) struct Source {
+    reader: Box<dyn BufRead>,
+    byte: u64,
+    line: u64,
+    buffer: Vec<u8>,
+}
+
+impl Source {
+    pub(super) fn new(reader: Box<dyn BufRead>) -> Source {
+        Source {
+            reader,
+            byte: 0,
+            line: 0,
+            buffer: Vec::new(),
+        }
+    }
+
+    /// Bytes read so far.
+    pub(super) fn byte(&self) -> u64 {
+        self.byte
+    }
+
+    /// Number of the line read last, from 1.
+    pub(super) fn line_number(&self) -> u64 {
+        self.line
+    }
+
+    fn io(&self, source: io::Error) -> PointFileError {
+        let byte = self.byte;
+        PointFileError::Io { byte, source }
+    }
+
+    /// Some of the bytes to come; none at the end of the file only.
+    pub(super) fn peek(&mut self) -> Result<&[u8], PointFileError> {
+        let byte = self.byte;
+        self.reader
+            .fill_buf()
+            .map_err(|source| PointFileError::Io { byte, source })
+    }
+
+    /// The next line without its end, `None` at the end of the file.
+    pub(super) fn line(&mut self) -> Result<Option<Cow<'_, str>>, PointFileError> {
+        self.buffer.clear();
+        let mut limited = (&mut self.reader).take(MAX_LINE);
+        let read = limited
+            .read_until(b'\n', &mut self.buffer)
+            .map_err(|source| self.io(source))?;
+        if read == 0 {
+            return Ok(None);
+        }
+        self.byte += read as u64;
+        self.line += 1;
+        if self.buffer.pop_if(|last| *last == b'\n').is_none() && read as u64 == MAX_LINE {
+            let reason = format!("line {} is longer than {MAX_LINE} bytes", self.line);
+            return Err(self.io(io::Error::new(io::ErrorKind::InvalidData, reason)));
+        }
+        self.buffer.pop_if(|last| *last == b'\r');
+        Ok(Some(String::from_utf8_lossy(&self.buffer)))
+    }
+
+    /// The next line, which must be there for `part` to be whole.
+    pub(super) fn expect_line(
+        &mut self,
+        part: impl Display,
+    ) -> Result<Cow<'_, str>, PointFileError> {
+        let byte = self.byte;
+        self.line()?.ok_or_else(|| truncated(byte, part))
+    }
+
+    /// Fills `bytes`, which are needed for `part`.
+    pub(super) fn exact(
+        &mut self,
+        bytes: &mut [u8],
+        part: impl Display,
+    ) -> Result<(), PointFileError> {
+        let mut rest = bytes;
+        while !rest.is_empty() {
+            match self.reader.read(rest) {
+                Ok(0) => return Err(truncated(self.byte, part)),
+                Ok(read) => {
+                    self.byte += read as u64;
+                    rest = rest.get_mut(read..).unwrap_or_default();
+                }
+                Err(error) if error.kind() == io::ErrorKind::Interrupted => {}
+                Err(error) => return Err(self.io(error)),
+            }
+        }
+        Ok(())
+    }
+
+    /// The next `length` bytes, which are needed for `part`; takes no more memory than there is data.
+    pub(super) fn take(
+        &mut self,
+        length: u64,
+        part: impl Display,
+    ) -> Result<Vec<u8>, PointFileError> {
+        let mut bytes = Vec::new();
+        let read = (&mut self.reader).take(length).read_to_end(&mut bytes);
+        self.advance(read.map(|read| read as u64), length, part)?;
+        Ok(bytes)
+    }
+
+    /// Passes over `length` bytes of `part`.
+    pub(super) fn skip(&mut self, length: u64, part: impl Display) -> Result<(), PointFileError> {
+        let read = io::copy(&mut (&mut self.reader).take(length), &mut io::sink());
+        self.advance(read, length, part)
+    }
+
+    fn advance(
+        &mut self,
+        read: io::Result<u64>,
+        length: u64,
+        part: impl Display,
+    ) -> Result<(), PointFileError> {
+        let read = read.map_err(|source| self.io(source))?;
+        self.byte += read;
+        if read < length {
+            return Err(truncated(self.byte, part));
+        }
+        Ok(())
+    }
+}
+
+fn truncated(byte: u64, part: impl Display) -> PointFileError {
+    let part = part.to_string();
+    PointFileError::Truncated { byte, part }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    fn source(text: &'static [u8]) -> Source {
+        Source::new(Box::new(text))
+    }
+
+    #[test]
+    fn lines_end_in_any_usual_way() {
+        let mut source = source(b"a\r\nb\n\nc");
+        let mut lines = Vec::new();
+        while let Some(line) = source.line().unwrap() {
+            lines.push(line.into_owned());
+        }
+        assert_eq!(lines, ["a", "b", "", "c"]);
+        assert_eq!((source.byte(), source.line_number()), (7, 4));
+    }
+
+    #[test]
+    fn a_line_without_end_is_refused() {
+        let long: &'static [u8] = vec![b'7'; MAX_LINE as usize + 1].leak();
+        assert!(matches!(
+            source(long).line(),
+            Err(PointFileError::Io { byte: MAX_LINE, .. })
+        ));
+        assert!(source(&long[2..]).line().is_ok());
+    }
+
+    #[test]
+    fn the_end_of_the_file_is_told_with_its_place() {
+        let text = "the file is cut short: it ends at byte 3, in point 2";
+        let ends = [
+            source(b"abc").exact(&mut [0; 4], "point 2"),
+            source(b"abc").skip(u64::MAX, "point 2"),
+            source(b"abc").take(4, "point 2").map(|_| ()),
+        ];
+        for end in ends {
+            assert_eq!(end.unwrap_err().to_string(), text);
+        }
+    }
+}

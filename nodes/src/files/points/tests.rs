@@ -1,0 +1,268 @@
+//! Whole files, good ones and damaged ones.
+
+use std::io::Write;
+
+use bzip2::Compression;
+use bzip2::write::BzEncoder;
+use proptest::prelude::*;
+use tempfile::TempDir;
+
+use super::*;
+
+const LIMITS: PointFileLimits = PointFileLimits { max_points: 50 };
+
+fn points() -> Vec<[f64; 3]> {
+    (0..20)
+        .map(|i| [f64::from(i) * 0.5, -2.0, f64::from(i * i)])
+        .collect()
+}
+
+fn rows(suffix: &str) -> String {
+    let row = |[x, y, z]: &[f64; 3]| format!("{x} {y} {z}{suffix}\n");
+    points().iter().map(row).collect()
+}
+
+fn floats(order: fn(f32) -> [u8; 4], more: &[f32]) -> Vec<u8> {
+    let of = |p: [f64; 3]| p.map(|c| c as f32).into_iter().chain(more.iter().copied());
+    points().into_iter().flat_map(of).flat_map(order).collect()
+}
+
+fn ply(format: &str, data: &[u8]) -> Vec<u8> {
+    let header = format!(
+        "ply\nformat {format} 1.0\nelement vertex 20\nproperty float x\nproperty float y\n\
+         property float z\nend_header\n"
+    );
+    [header.as_bytes(), data].concat()
+}
+
+fn pcd(data: &str, bytes: &[u8]) -> Vec<u8> {
+    let header = format!(
+        "# .PCD v0.7 - Point Cloud Data file format\nVERSION 0.7\nFIELDS x y z\nSIZE 4 4 4\n\
+         TYPE F F F\nCOUNT 1 1 1\nWIDTH 20\nHEIGHT 1\nVIEWPOINT 0 0 0 1 0 0 0\nPOINTS 20\nDATA {data}\n"
+    );
+    [header.as_bytes(), bytes].concat()
+}
+
+fn compressed() -> Vec<u8> {
+    let by_axis: Vec<u8> = (0..3)
+        .flat_map(|axis| {
+            points()
+                .into_iter()
+                .flat_map(move |p| (p[axis] as f32).to_le_bytes())
+        })
+        .collect();
+    let mut packed = Vec::new();
+    for literal in by_axis.chunks(32) {
+        packed.push(literal.len() as u8 - 1);
+        packed.extend(literal);
+    }
+    let lengths = [packed.len() as u32, by_axis.len() as u32].map(u32::to_le_bytes);
+    [lengths.concat(), packed].concat()
+}
+
+/// A file of each format with `points`, and whether its length is fixed by its header.
+fn files() -> Vec<(&'static str, Vec<u8>, PointFormat, bool)> {
+    let little = floats(f32::to_le_bytes, &[]);
+    let big = floats(f32::to_be_bytes, &[]);
+    let ascii = rows("");
+    vec![
+        (
+            "a.ply",
+            ply("ascii", ascii.as_bytes()),
+            PointFormat::PlyAscii,
+            false,
+        ),
+        (
+            "a.ply",
+            ply("binary_little_endian", &little),
+            PointFormat::PlyBinaryLittleEndian,
+            true,
+        ),
+        (
+            "a.ply",
+            ply("binary_big_endian", &big),
+            PointFormat::PlyBinaryBigEndian,
+            true,
+        ),
+        (
+            "a.pcd",
+            pcd("ascii", ascii.as_bytes()),
+            PointFormat::PcdAscii,
+            false,
+        ),
+        (
+            "a.pcd",
+            pcd("binary", &little),
+            PointFormat::PcdBinary,
+            true,
+        ),
+        (
+            "a.pcd",
+            pcd("binary_compressed", &compressed()),
+            PointFormat::PcdBinaryCompressed,
+            true,
+        ),
+        (
+            "a.xyz",
+            rows(" 7 7 # c").into_bytes(),
+            PointFormat::Text,
+            false,
+        ),
+        (
+            "a.bin",
+            floats(f32::to_le_bytes, &[0.25]),
+            PointFormat::KittiBin,
+            false,
+        ),
+    ]
+}
+
+fn read_bytes(name: &str, bytes: &[u8]) -> Result<PointFile, PointFileError> {
+    let folder = TempDir::new().unwrap();
+    let path = folder.path().join(name);
+    std::fs::write(&path, bytes).unwrap();
+    read_points(&path, &LIMITS)
+}
+
+fn pack(bytes: &[u8]) -> Vec<u8> {
+    let mut encoder = BzEncoder::new(Vec::new(), Compression::fast());
+    encoder.write_all(bytes).unwrap();
+    encoder.finish().unwrap()
+}
+
+#[test]
+fn every_format_gives_the_same_points_packed_or_not() {
+    for (name, bytes, format, _) in files() {
+        let expected = PointFile {
+            points_m: points(),
+            format,
+            skipped_not_finite: 0,
+        };
+        assert_eq!(read_bytes(name, &bytes).unwrap(), expected, "{format}");
+        let packed = format!("{name}.bz2");
+        assert_eq!(
+            read_bytes(&packed, &pack(&bytes)).unwrap(),
+            expected,
+            "{format}"
+        );
+    }
+}
+
+#[test]
+fn points_that_are_not_finite_are_counted() {
+    let file = read_bytes("a.xyz", b"1 2 3\nnan 2 3\n1 2 inf\n").unwrap();
+    assert_eq!(
+        (file.points_m, file.skipped_not_finite),
+        (vec![[1.0, 2.0, 3.0]], 2)
+    );
+}
+
+#[test]
+fn the_limit_holds_with_and_without_a_header() {
+    let text = "1 2 nan\n".repeat(51);
+    let kitti = [0; 16 * 51];
+    for (name, bytes) in [("a.xyz", text.as_bytes()), ("a.bin", &kitti)] {
+        let error = read_bytes(name, bytes).unwrap_err();
+        assert!(matches!(
+            error,
+            PointFileError::TooManyPoints {
+                points: 51,
+                max_points: 50
+            }
+        ));
+    }
+    for (name, bytes, ..) in files().into_iter().take(6) {
+        let text = String::from_utf8_lossy(&bytes[..160]).into_owned();
+        assert!(text.contains("20"), "{name}");
+        let path = TempDir::new().unwrap();
+        let path = path.path().join(name);
+        std::fs::create_dir_all(path.parent().unwrap()).unwrap();
+        std::fs::write(&path, &bytes).unwrap();
+        let few = PointFileLimits { max_points: 19 };
+        let error = read_points(&path, &few).unwrap_err().to_string();
+        assert!(
+            error.contains("has 20 points or more, but at most 19"),
+            "{error}"
+        );
+    }
+}
+
+#[test]
+fn files_that_are_not_there_or_of_no_known_kind_are_told() {
+    let missing = read_points(Path::new("/no/such/file.ply"), &LIMITS);
+    assert!(matches!(missing, Err(PointFileError::Io { byte: 0, .. })));
+    let las = read_bytes("a.las", b"LASF").unwrap_err().to_string();
+    assert!(las.contains("extension \"las\""), "{las}");
+    let cut = pack(rows("").as_bytes());
+    assert!(matches!(
+        read_bytes("a.xyz.bz2", &cut[..cut.len() / 2]),
+        Err(PointFileError::Io { .. })
+    ));
+}
+
+#[test]
+fn a_cut_file_with_a_header_is_an_error_at_every_length() {
+    for (name, bytes, format, _) in files().into_iter().filter(|(.., fixed)| *fixed) {
+        for length in 0..bytes.len() {
+            assert!(
+                read_bytes(name, &bytes[..length]).is_err(),
+                "{format}, {length} bytes"
+            );
+        }
+    }
+}
+
+proptest! {
+    /// Nothing panics, and what is read is within the limit and finite.
+    #[test]
+    fn damaged_files_are_errors_or_points(
+        file in 0..files().len(),
+        cut in any::<prop::sample::Index>(),
+        keep_all in any::<bool>(),
+        damage in prop::collection::vec((any::<prop::sample::Index>(), any::<u8>()), 0..6),
+        extra in prop::collection::vec(any::<u8>(), 0..40),
+    ) {
+        let (name, mut bytes, ..) = files().swap_remove(file);
+        for (at, value) in damage {
+            let at = at.index(bytes.len());
+            bytes[at] = value;
+        }
+        if !keep_all {
+            bytes.truncate(cut.index(bytes.len()));
+        }
+        bytes.extend(extra);
+        if let Ok(file) = read_bytes(name, &bytes) {
+            prop_assert!(file.points_m.len() + file.skipped_not_finite <= LIMITS.max_points);
+            prop_assert!(file.points_m.iter().flatten().all(|c| c.is_finite()));
+        }
+    }
+
+    /// Damage to the numbers of a header, where the lies are.
+    #[test]
+    fn lies_in_a_header_are_errors_or_points(
+        file in 0..6_usize,
+        which in any::<prop::sample::Index>(),
+        lie in prop::sample::select(&[
+            "0", "1", "3", "21", "-1", "255", "65536", "4294967295", "4294967296",
+            "9223372036854775807", "18446744073709551615", "99999999999999999999", "1e9", "x", "",
+        ][..]),
+    ) {
+        let (name, bytes, ..) = files().swap_remove(file);
+        let end = bytes.windows(5).position(|w| w == b"DATA " || w == b"end_h").unwrap();
+        let header = String::from_utf8(bytes[..end].to_vec()).unwrap();
+        let words: Vec<&str> = header.split_inclusive([' ', '\n']).collect();
+        let numbers: Vec<usize> = (0..words.len())
+            .filter(|&i| words[i].trim().parse::<u32>().is_ok())
+            .collect();
+        let number = numbers[which.index(numbers.len())];
+        let lied: String = (0..words.len())
+            .map(|i| match i == number {
+                true => words[i].replace(words[i].trim(), lie),
+                false => words[i].to_owned(),
+            })
+            .collect();
+        if let Ok(file) = read_bytes(name, &[lied.as_bytes(), &bytes[end..]].concat()) {
+            prop_assert!(file.points_m.len() <= LIMITS.max_points);
+        }
+    }
+}
