@@ -1,9 +1,9 @@
 //! Colour by height.
 
 /// OKLab lightness of the lowest and the highest colour.
-const LIGHTNESS: [f64; 2] = [0.36, 0.90];
+const LIGHTNESS: [f64; 2] = [0.46, 0.91];
 /// OKLab hue of the lowest and the highest colour, degrees: blue to yellow.
-const HUE_DEG: [f64; 2] = [278.0, 98.0];
+const HUE_DEG: [f64; 2] = [272.0, 95.0];
 /// OKLab chroma where the screen has it.
 const CHROMA: f64 = 0.135;
 

@@ -36,7 +36,7 @@ pub struct RenderOptions {
     pub elevation_deg: f64,
     /// sRGB colour and opacity where there is no map.
     pub background: [u8; 4],
-    /// 1 shows the whole map; 2 shows the middle half of its width.
+    /// 1 shows the whole map, 2 half of its width and height around where most cells are.
     pub zoom: f64,
 }
 

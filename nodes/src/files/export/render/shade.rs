@@ -12,7 +12,7 @@ use crate::files::export::palette::{linear, linear_at, srgb};
 /// Linear light of the sun, a little warm.
 const SUN: [f64; 3] = [1.02, 0.98, 0.90];
 /// Linear light of the open sky from above, a little blue.
-const SKY: [f64; 3] = [0.40, 0.43, 0.48];
+const SKY: [f64; 3] = [0.50, 0.54, 0.60];
 /// Part of the skylight that comes from below.
 const FROM_BELOW: f64 = 0.45;
 /// How much darker edges are.

@@ -98,7 +98,7 @@ fn the_camera_stands_where_the_azimuth_says() {
 }
 
 #[test]
-fn the_near_cell_hides_the_far_one_and_shades_it() {
+fn the_near_cell_hides_the_far_one() {
     let low = list(LatticeKind::Cubic, &[[0.0; 3]]);
     let both = list(LatticeKind::Cubic, &[[0.0; 3], [0.0, 0.0, 9.0]]);
     let above = RenderOptions {
@@ -108,6 +108,53 @@ fn the_near_cell_hides_the_far_one_and_shades_it() {
     let (low, both) = (render(&low, &above)[24][32], render(&both, &above)[24][32]);
     // Alone a cell has the colour of the middle, over another one that of the top.
     assert!(both[0] > low[0], "{low:?} {both:?}");
+}
+
+#[test]
+fn a_tower_throws_its_shadow_away_from_the_sun() {
+    let ground = (0..121).map(|i| [f64::from(i % 11 - 5), f64::from(i / 11 - 5), 0.0]);
+    let tower = (1..4).map(|z| [0.0, 0.0, f64::from(z)]);
+    let cells: Vec<_> = ground.chain(tower).collect();
+    // From above, north is up; the sun is in the west-south-west.
+    let options = RenderOptions {
+        width: 110,
+        height: 110,
+        azimuth_deg: 180.0,
+        elevation_deg: 90.0,
+        ..options()
+    };
+    let picture = render(&list(LatticeKind::Cubic, &cells), &options);
+    let brightness = |[r, g, b, _]: [u8; 4]| u32::from(r) + u32::from(g) + u32::from(b);
+    let shaded = brightness(picture[49][67]);
+    let lit = brightness(picture[61][43]);
+    assert!(4 * shaded < 3 * lit, "{shaded} {lit}");
+}
+
+#[test]
+fn zoom_enlarges_the_middle() {
+    let cells: Vec<_> = (-9..10).map(|x| [f64::from(x), 0.0, 0.0]).collect();
+    let list = list(LatticeKind::Cubic, &cells);
+    let rows = |zoom| {
+        let picture = render(
+            &list,
+            &RenderOptions {
+                zoom,
+                elevation_deg: 90.0,
+                azimuth_deg: 0.0,
+                ..options()
+            },
+        );
+        picture
+            .iter()
+            .filter(|row| row[32] != options().background)
+            .count()
+    };
+    assert!(
+        (6..9).contains(&rows(2.0)) && (3..5).contains(&rows(1.0)),
+        "{} {}",
+        rows(1.0),
+        rows(2.0)
+    );
 }
 
 #[test]

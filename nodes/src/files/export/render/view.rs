@@ -41,26 +41,30 @@ impl View {
         }
     }
 
-    /// Moves and scales so that the whole scene is seen, or a part of it if `zoom` is above 1.
+    /// Moves and scales so that the whole scene is seen.
+    ///
+    /// With a `zoom` above 1 a part of it, which never leaves the bounds of the scene and closes in
+    /// on the median of its cells.
     pub(super) fn fit(mut self, scene: &Scene, zoom: f64) -> View {
-        let (mut low, mut high) = ([f64::MAX; 3], [f64::MIN; 3]);
-        for center in scene.centers() {
-            let along = self.along(&center);
-            for ((low, high), c) in low.iter_mut().zip(&mut high).zip(along) {
-                *low = low.min(c);
-                *high = high.max(c);
-            }
-        }
-        if low[0] > high[0] {
-            return self;
-        }
+        let centers: Vec<[f64; 3]> = scene.centers().map(|c| self.along(&c)).collect();
+        let axes = [(0, self.size[0]), (1, self.size[1]), (2, usize::MAX)];
         let mut scale = f64::MAX;
-        for (((low, high), middle), side) in low.iter().zip(high).zip(&mut self.middle_m).zip([
-            self.size[0],
-            self.size[1],
-            usize::MAX,
-        ]) {
-            *middle = 0.5 * (low + high);
+        for ((axis, side), middle) in axes.into_iter().zip(&mut self.middle_m) {
+            let mut along: Vec<f64> = centers
+                .iter()
+                .filter_map(|c| c.get(axis).copied())
+                .collect();
+            let half = along.len() / 2;
+            let (Some(low), Some(high), true) = (
+                along.iter().copied().reduce(f64::min),
+                along.iter().copied().reduce(f64::max),
+                half < along.len(),
+            ) else {
+                return self;
+            };
+            let median = *along.select_nth_unstable_by(half, f64::total_cmp).1;
+            let center = 0.5 * (low + high);
+            *middle = center + (median - center) * (1.0 - 1.0 / zoom).max(0.0);
             let extent = high - low + 2.0 * scene.radius_m;
             scale = scale.min(side as f64 * (1.0 - 2.0 * MARGIN) / extent);
         }
@@ -91,5 +95,35 @@ impl View {
         self.right * ((x - 0.5 * width) / self.scale + mid_x)
             + self.up * (mid_y - (y - 0.5 * height) / self.scale)
             + self.toward * (z + mid_z)
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn the_axes_are_those_of_a_map_on_a_table() {
+        let south = View::new(180.0, 0.0, [1, 1]);
+        let near = |a: Vector3<f64>, b: Vector3<f64>| (a - b).norm() < 1e-12;
+        assert!(near(south.toward, -Vector3::y()));
+        assert!(near(south.right, Vector3::x()));
+        assert!(near(south.up, Vector3::z()));
+        let above = View::new(180.0, 90.0, [1, 1]);
+        assert!(near(above.toward, Vector3::z()));
+        assert!(near(above.up, Vector3::y()));
+        let east = View::new(90.0, 0.0, [1, 1]);
+        assert!(near(east.toward, Vector3::x()));
+        assert!(near(east.right, Vector3::y()));
+    }
+
+    #[test]
+    fn unproject_is_the_inverse_of_project() {
+        let mut view = View::new(215.0, 35.0, [400, 300]);
+        view.scale = 7.5;
+        view.middle_m = [3.0, -2.0, 11.0];
+        for p in [Vector3::new(1.0, 2.0, 3.0), Vector3::new(-40.0, 0.5, 6.0)] {
+            assert!((view.unproject(view.project(&p)) - p).norm() < 1e-12);
+        }
     }
 }
