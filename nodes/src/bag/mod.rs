@@ -1,1 +1,21 @@
 //! rosbag2 directories: reading, writing and playing.
+mod error;
+mod mcap_storage;
+mod messages;
+mod metadata;
+mod qos;
+mod reader;
+mod sniff;
+mod split;
+mod sqlite_storage;
+mod storage;
+mod topic;
+mod writer;
+mod zstd_files;
+
+pub use error::BagError;
+pub use messages::Messages;
+pub use qos::{BagDurability, BagDuration, BagHistory, BagLiveliness, BagQos, BagReliability};
+pub use reader::{BagReader, ReadOptions};
+pub use topic::{BagMessage, BagSummary, FileSummary, MAX_MESSAGE_BYTES, Storage, TopicInfo};
+pub use writer::{BagWriter, Compression, TopicSpec, WriterOptions};

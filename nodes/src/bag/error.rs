@@ -1,0 +1,171 @@
+//! What can go wrong with a bag: every variant names the file, the place, the reason and the remedy.
+
+use std::{io, path::Path, path::PathBuf, sync::Arc};
+
+use thiserror::Error;
+
+/// An error of reading, writing or playing a bag.
+#[derive(Clone, Debug, Error)]
+pub enum BagError {
+    /// The operating system refused.
+    #[error("{}: cannot {doing}: {source}; check that the path exists, its permissions and the free space", path.display())]
+    Io {
+        /// The file or folder.
+        path: PathBuf,
+        /// What was tried, such as "open".
+        doing: &'static str,
+        /// The cause.
+        #[source]
+        source: Arc<io::Error>,
+    },
+    /// The file is none that a rosbag2 bag holds.
+    #[error("{}: not a ROS 2 bag file: it is {found}; {remedy}", path.display())]
+    Foreign {
+        /// The file.
+        path: PathBuf,
+        /// What the file is.
+        found: String,
+        /// What to do.
+        remedy: &'static str,
+    },
+    /// The file ends early, as after a crash of the recorder.
+    #[error(
+        "{}: truncated: the file ends at byte {size_bytes} inside {inside}; \
+         {readable_messages} messages before it can be read; \
+         rewrite the file with `ros2 bag reindex`, `mcap recover` or sqlite3's `.recover`",
+        path.display()
+    )]
+    Truncated {
+        /// The file.
+        path: PathBuf,
+        /// Where the file ends, bytes.
+        size_bytes: u64,
+        /// What was cut, with its own offset.
+        inside: String,
+        /// How many whole messages precede the cut.
+        readable_messages: u64,
+    },
+    /// The bytes contradict the format.
+    #[error("{}: damaged at {position}: {reason}; {remedy}", path.display())]
+    Corrupt {
+        /// The file.
+        path: PathBuf,
+        /// The byte offset, row or message.
+        position: String,
+        /// What is wrong there, with the numbers.
+        reason: String,
+        /// What to do.
+        remedy: &'static str,
+    },
+    /// `metadata.yaml` cannot be used.
+    #[error("{}: {reason}; move the file away to have it rebuilt from the storage files", path.display())]
+    Metadata {
+        /// The metadata file.
+        path: PathBuf,
+        /// What is wrong, with line and column where known.
+        reason: String,
+    },
+    /// `metadata.yaml` points outside the bag.
+    #[error("{}: relative_file_paths names {entry:?}, which leaves the bag folder; such a bag is refused, correct the entry", path.display())]
+    PathTraversal {
+        /// The metadata file.
+        path: PathBuf,
+        /// The refused entry.
+        entry: String,
+    },
+    /// Something is larger than the limits allow.
+    #[error("{}: {what} at {position} takes {size_bytes} bytes, more than the limit of {limit_bytes}; {remedy}", path.display())]
+    TooLarge {
+        /// The file.
+        path: PathBuf,
+        /// What is too large.
+        what: &'static str,
+        /// The byte offset, row or message.
+        position: String,
+        /// Its size, bytes.
+        size_bytes: u64,
+        /// The limit, bytes.
+        limit_bytes: u64,
+        /// What to do.
+        remedy: &'static str,
+    },
+    /// The bag uses something that is not implemented.
+    #[error("{}: {what} is not supported; {remedy}", path.display())]
+    Unsupported {
+        /// The file.
+        path: PathBuf,
+        /// What is used.
+        what: String,
+        /// What to do.
+        remedy: &'static str,
+    },
+    /// The target of a writer is taken.
+    #[error("{}: exists already{why}; choose another path{or_overwrite}", path.display())]
+    Exists {
+        /// The target.
+        path: PathBuf,
+        /// Why it is not replaced, after a separator, or nothing.
+        why: String,
+        /// The other remedy, or nothing.
+        or_overwrite: &'static str,
+    },
+    /// An argument of the caller is out of range.
+    #[error("{name}: {reason}")]
+    Invalid {
+        /// The argument.
+        name: &'static str,
+        /// The value, and what is accepted.
+        reason: String,
+    },
+}
+
+impl BagError {
+    /// The same, told of `file`: errors in a decompressed copy are of the compressed file.
+    pub(crate) fn in_file(mut self, file: &Path) -> BagError {
+        if let BagError::Io { path, .. }
+        | BagError::Foreign { path, .. }
+        | BagError::Truncated { path, .. }
+        | BagError::Corrupt { path, .. }
+        | BagError::TooLarge { path, .. }
+        | BagError::Unsupported { path, .. } = &mut self
+        {
+            *path = file.to_path_buf();
+        }
+        self
+    }
+
+    pub(crate) fn io(path: &Path, doing: &'static str) -> impl FnOnce(io::Error) -> BagError {
+        move |source| BagError::Io {
+            path: path.to_path_buf(),
+            doing,
+            source: Arc::new(source),
+        }
+    }
+
+    pub(crate) fn corrupt(
+        path: &Path,
+        position: impl ToString,
+        reason: impl ToString,
+        remedy: &'static str,
+    ) -> BagError {
+        BagError::Corrupt {
+            path: path.to_path_buf(),
+            position: position.to_string(),
+            reason: reason.to_string(),
+            remedy,
+        }
+    }
+
+    pub(crate) fn sqlite(
+        path: &Path,
+        position: impl ToString,
+        source: rusqlite::Error,
+    ) -> BagError {
+        Self::corrupt(
+            path,
+            position,
+            source,
+            "recover the rows with `sqlite3 FILE .recover` or take another copy",
+        )
+    }
+}

@@ -1,0 +1,128 @@
+//! MCAP storage files: summary where there is one, a scan of the whole file where not.
+
+mod chunk;
+mod contents;
+mod scan;
+mod stream;
+mod summary;
+mod walk;
+
+use std::{
+    collections::BTreeMap,
+    fs::File,
+    io::{BufReader, Seek, SeekFrom},
+    path::{Path, PathBuf},
+    sync::Arc,
+};
+
+use mcap::records::{Record, op};
+use tempfile::TempPath;
+
+use super::{
+    BagError,
+    sniff::MCAP_MAGIC,
+    storage::{Filter, StorageInfo, StorageStream},
+};
+use contents::Block;
+use stream::McapStream;
+
+/// An MCAP file whose contents are known.
+pub(crate) struct McapFile {
+    path: PathBuf,
+    temporary: Option<Arc<TempPath>>,
+    blocks: Vec<Block>,
+    topic_of: Arc<BTreeMap<u16, usize>>,
+    pub(crate) info: StorageInfo,
+}
+
+impl McapFile {
+    /// Opens `path`, which may be a temporary copy that is deleted with the last reader.
+    pub(crate) fn open(
+        path: &Path,
+        temporary: Option<Arc<TempPath>>,
+    ) -> Result<McapFile, BagError> {
+        let file = File::open(path).map_err(BagError::io(path, "open"))?;
+        let size = file
+            .metadata()
+            .map_err(BagError::io(path, "examine"))?
+            .len();
+        let mut file = BufReader::with_capacity(1 << 16, file);
+        let profile = read_profile(&mut file, path, size)?;
+        let mut contents = summary::read_summary(&mut file, size).unwrap_or_else(|reason| {
+            log::info!(
+                "{}: {reason}; reading the whole file once to index it",
+                path.display()
+            );
+            scan::scan(&mut file, path, size)
+        });
+        let (mut info, topic_of) = contents.topics(path, &profile)?;
+        if let Some((first, last)) = contents.range_ns {
+            let signed = |ns: u64| {
+                i64::try_from(ns).map_err(|_| {
+                    let reason = format!("log time {ns} ns is beyond the year 2262");
+                    BagError::corrupt(path, "its index", reason, "check the clock of the recorder")
+                })
+            };
+            info.range_ns = Some((signed(first)?, signed(last)?));
+        }
+        Ok(McapFile {
+            path: path.to_path_buf(),
+            temporary,
+            blocks: contents.blocks,
+            topic_of: Arc::new(topic_of),
+            info,
+        })
+    }
+
+    /// The wanted messages in order of log time.
+    pub(crate) fn stream(&self, filter: Filter) -> Result<StorageStream, BagError> {
+        let stream = McapStream::new(
+            self.path.clone(),
+            self.temporary.clone(),
+            &self.blocks,
+            self.topic_of.clone(),
+            filter,
+            self.info.damage.clone(),
+        )?;
+        Ok(Box::new(stream))
+    }
+}
+
+/// Reads the header record, which must come first.
+fn read_profile(file: &mut BufReader<File>, path: &Path, size: u64) -> Result<String, BagError> {
+    let at = MCAP_MAGIC.len() as u64;
+    file.seek(SeekFrom::Start(at))
+        .map_err(BagError::io(path, "read"))?;
+    let cut = || BagError::Truncated {
+        path: path.to_path_buf(),
+        size_bytes: size,
+        inside: format!("the header record at byte {at}"),
+        readable_messages: 0,
+    };
+    let bad = |reason: String| {
+        BagError::corrupt(
+            path,
+            format!("byte {at}"),
+            reason,
+            "take another copy of the file",
+        )
+    };
+    let (opcode, len) = walk::record_header(file).map_err(|_| cut())?;
+    if opcode != op::HEADER {
+        return Err(bad(format!(
+            "opcode {opcode} where the header record is due"
+        )));
+    }
+    if len > size {
+        return Err(cut());
+    }
+    let body = walk::read_body(file, len).map_err(|e| match e {
+        Some(_) => cut(),
+        None => bad(format!("a header record of {len} bytes")),
+    })?;
+    match mcap::parse_record(opcode, &body) {
+        Ok(Record::Header(header)) => Ok(header.profile),
+        Ok(_) => Err(bad("no header record".into())),
+        Err(error) => Err(bad(format!("a header record: {error}"))),
+    }
+}

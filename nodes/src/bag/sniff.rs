@@ -1,0 +1,153 @@
+//! Tells by its first bytes what a file is.
+
+use std::{fs::File, io::Read, path::Path};
+
+use super::BagError;
+
+/// The magic at both ends of an MCAP file.
+pub(crate) const MCAP_MAGIC: &[u8] = mcap::MAGIC;
+/// The magic of a zstd frame.
+pub(crate) const ZSTD_MAGIC: &[u8] = &[0x28, 0xb5, 0x2f, 0xfd];
+const SQLITE_MAGIC: &[u8] = b"SQLite format 3\0";
+
+/// The kinds of file that a bag may hold.
+#[derive(Clone, Copy, PartialEq, Eq, Debug)]
+pub(crate) enum FileKind {
+    Mcap,
+    Sqlite3,
+    Zstd,
+}
+
+const NO_BAG: &str = "give a rosbag2 folder, or an .mcap or .db3 file of one";
+
+/// What others leave where a bag is expected: first bytes, name, what to do.
+const FOREIGN: &[(&[u8], &str, &str)] = &[
+    (
+        b"#ROSBAG V",
+        "a ROS 1 bag",
+        "convert it with `rosbags-convert --src FILE --dst FOLDER`",
+    ),
+    (b"\x89PNG", "a PNG image", NO_BAG),
+    (b"\xff\xd8\xff", "a JPEG image", NO_BAG),
+    (b"%PDF", "a PDF document", NO_BAG),
+    (
+        b"\x04\x22\x4d\x18",
+        "an lz4 archive",
+        "unpack it with `lz4 -d`",
+    ),
+    (b"\x1f\x8b", "a gzip archive", "unpack it with `gunzip`"),
+    (b"BZh", "a bzip2 archive", "unpack it with `bunzip2`"),
+    (b"\xfd7zXZ\0", "an xz archive", "unpack it with `unxz`"),
+    (b"PK\x03\x04", "a zip archive", "unpack it"),
+    (b"\x7fELF", "a program", NO_BAG),
+    (
+        b"\xd4\xc3\xb2\xa1",
+        "a packet capture (pcap)",
+        "replay it through the sensor's ROS 2 driver and record that",
+    ),
+    (
+        b"\x0a\x0d\x0d\x0a",
+        "a packet capture (pcapng)",
+        "replay it through the sensor's ROS 2 driver and record that",
+    ),
+    (b"\x89HDF", "an HDF5 file", NO_BAG),
+    (
+        b"rosbag2_bagfile_information",
+        "the metadata of a bag",
+        "give the folder that holds it",
+    ),
+    (b"# .PCD", "a PCD point cloud", NO_BAG),
+    (b"ply\n", "a PLY file", NO_BAG),
+];
+
+/// Identifies the file at `path`, or says what else it is.
+pub(crate) fn identify(path: &Path) -> Result<FileKind, BagError> {
+    let mut head = Vec::new();
+    let file = File::open(path).map_err(BagError::io(path, "open"))?;
+    file.take(64)
+        .read_to_end(&mut head)
+        .map_err(BagError::io(path, "read"))?;
+    identify_bytes(&head).map_err(|(found, remedy)| match found.as_str() {
+        "cut" => BagError::Truncated {
+            path: path.to_path_buf(),
+            size_bytes: head.len() as u64,
+            inside: "the file's magic at byte 0".into(),
+            readable_messages: 0,
+        },
+        _ => BagError::Foreign {
+            path: path.to_path_buf(),
+            found,
+            remedy,
+        },
+    })
+}
+
+fn identify_bytes(head: &[u8]) -> Result<FileKind, (String, &'static str)> {
+    let kinds = [
+        (MCAP_MAGIC, FileKind::Mcap),
+        (SQLITE_MAGIC, FileKind::Sqlite3),
+        (ZSTD_MAGIC, FileKind::Zstd),
+    ];
+    if let Some((_, kind)) = kinds.iter().find(|(magic, _)| head.starts_with(magic)) {
+        return Ok(*kind);
+    }
+    if head.is_empty() {
+        return Err((
+            "empty (0 bytes)".into(),
+            "the recorder wrote nothing; record again",
+        ));
+    }
+    if kinds.iter().any(|(magic, _)| magic.starts_with(head)) {
+        return Err(("cut".into(), ""));
+    }
+    if let Some((_, found, remedy)) = FOREIGN.iter().find(|(magic, _, _)| head.starts_with(magic)) {
+        return Err(((*found).into(), remedy));
+    }
+    if head.iter().all(|&b| b == 0) {
+        return Err((
+            "filled with zeros".into(),
+            "the recorder's machine crashed; take another copy",
+        ));
+    }
+    let shown: Vec<String> = head.iter().take(8).map(|b| format!("{b:02x}")).collect();
+    let text = head
+        .iter()
+        .all(|b| b.is_ascii_graphic() || b.is_ascii_whitespace());
+    let kind = if text {
+        "a text file"
+    } else {
+        "of unknown kind"
+    };
+    Err((format!("{kind} (first bytes {})", shown.join(" ")), NO_BAG))
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn storage_files_are_known() {
+        assert_eq!(identify_bytes(b"\x89MCAP0\r\n\x01"), Ok(FileKind::Mcap));
+        assert_eq!(
+            identify_bytes(b"SQLite format 3\0\x10\0"),
+            Ok(FileKind::Sqlite3)
+        );
+        assert_eq!(identify_bytes(b"\x28\xb5\x2f\xfd\x04"), Ok(FileKind::Zstd));
+    }
+
+    #[test]
+    fn foreign_files_are_named() {
+        for (bytes, expected) in [
+            (&b"#ROSBAG V2.0\n"[..], "a ROS 1 bag"),
+            (b"\x89PNG\r\n\x1a\n", "a PNG image"),
+            (b"", "empty"),
+            (b"hello world\n", "a text file"),
+            (b"\0\0\0\0\0", "zeros"),
+            (b"\x89MC", "cut"),
+            (b"\x01\x02\x03", "first bytes 01 02 03"),
+        ] {
+            let (found, _) = identify_bytes(bytes).unwrap_err();
+            assert!(found.contains(expected), "{found}");
+        }
+    }
+}

@@ -1,0 +1,143 @@
+//! One storage file of a bag, opened at once or, where compressed, when its time comes.
+
+use std::path::{Path, PathBuf};
+
+use super::{
+    BagError, Storage, TopicInfo,
+    mcap_storage::McapFile,
+    sniff::{FileKind, identify},
+    sqlite_storage::SqliteFile,
+    storage::{Filter, StorageInfo, StorageStream},
+    zstd_files::decompress_file,
+};
+
+/// A storage file whose contents are known.
+pub(crate) enum OpenFile {
+    Mcap(McapFile),
+    Sqlite(SqliteFile),
+}
+
+impl OpenFile {
+    /// Opens `path` by what it is, whatever its name.
+    pub(crate) fn open(path: &Path) -> Result<OpenFile, BagError> {
+        match identify(path)? {
+            FileKind::Mcap => McapFile::open(path, None).map(OpenFile::Mcap),
+            FileKind::Sqlite3 => SqliteFile::open(path, None).map(OpenFile::Sqlite),
+            FileKind::Zstd => Self::open_compressed(path).map_err(|e| e.in_file(path)),
+        }
+    }
+
+    fn open_compressed(path: &Path) -> Result<OpenFile, BagError> {
+        let copy = decompress_file(path)?;
+        match identify(&copy)? {
+            FileKind::Mcap => McapFile::open(&copy, Some(copy.clone())).map(OpenFile::Mcap),
+            FileKind::Sqlite3 => SqliteFile::open(&copy, Some(copy.clone())).map(OpenFile::Sqlite),
+            FileKind::Zstd => Err(BagError::Unsupported {
+                path: path.to_path_buf(),
+                what: "a storage file compressed twice".into(),
+                remedy: "decompress it with `zstd -d`",
+            }),
+        }
+    }
+
+    pub(crate) fn storage(&self) -> Storage {
+        match self {
+            OpenFile::Mcap(_) => Storage::Mcap,
+            OpenFile::Sqlite(_) => Storage::Sqlite3,
+        }
+    }
+
+    pub(crate) fn info(&self) -> &StorageInfo {
+        match self {
+            OpenFile::Mcap(file) => &file.info,
+            OpenFile::Sqlite(file) => &file.info,
+        }
+    }
+
+    fn stream(&self, filter: Filter) -> Result<StorageStream, BagError> {
+        match self {
+            OpenFile::Mcap(file) => file.stream(filter),
+            OpenFile::Sqlite(file) => file.stream(filter),
+        }
+    }
+
+    /// The wanted messages, and the bag's topic of each of the file's topics.
+    pub(crate) fn wanted(
+        &self,
+        path: &Path,
+        topics: &[TopicInfo],
+        wanted: &[bool],
+        start_ns: i64,
+        end_ns: Option<i64>,
+    ) -> Result<(StorageStream, Vec<usize>), BagError> {
+        let find = |name: &str, type_name: &str| {
+            topics
+                .iter()
+                .position(|t| t.is_same(name, type_name))
+                .ok_or_else(|| {
+                    BagError::corrupt(
+                        path,
+                        "its list of topics",
+                        format!("topic {name} of type {type_name} is not in metadata.yaml"),
+                        "move metadata.yaml away to have it rebuilt",
+                    )
+                })
+        };
+        let mapped: Result<Vec<usize>, _> = self
+            .info()
+            .topics
+            .iter()
+            .map(|t| find(&t.name, &t.type_name))
+            .collect();
+        let mapped = mapped?;
+        let by_file = mapped
+            .iter()
+            .map(|index| wanted.get(*index).copied().unwrap_or(false))
+            .collect();
+        let stream = self.stream(Filter {
+            topics: by_file,
+            start_ns,
+            end_ns,
+        })?;
+        Ok((stream, mapped))
+    }
+}
+
+/// A storage file in the order of the bag.
+pub(crate) struct Split {
+    pub(crate) path: PathBuf,
+    /// Where compressed and not yet needed: nothing.
+    pub(crate) open: Option<OpenFile>,
+    /// First and last log time, where known.
+    pub(crate) range_ns: Option<(i64, i64)>,
+    pub(crate) message_count: Option<u64>,
+}
+
+impl Split {
+    /// What is wrong with the file; what precedes the damage can be read.
+    pub(crate) fn damage(&self) -> Option<BagError> {
+        let damage = self.open.as_ref()?.info().damage.clone()?;
+        Some(damage.in_file(&self.path))
+    }
+
+    /// Opens the file, unless it is compressed and `lazy`.
+    pub(crate) fn new(path: PathBuf, lazy: bool) -> Result<Split, BagError> {
+        if lazy && identify(&path)? == FileKind::Zstd {
+            return Ok(Split {
+                path,
+                open: None,
+                range_ns: None,
+                message_count: None,
+            });
+        }
+        let open = OpenFile::open(&path)?;
+        let info = open.info();
+        let (range_ns, message_count) = (info.range_ns, Some(info.message_count));
+        Ok(Split {
+            path,
+            range_ns,
+            message_count,
+            open: Some(open),
+        })
+    }
+}

@@ -1,0 +1,125 @@
+//! What the readers of the storage files have in common.
+
+use super::{BagError, BagQos, TopicInfo, metadata::Metadata};
+
+/// What is known of a storage file after opening it.
+#[derive(Clone, Debug, Default)]
+pub(crate) struct StorageInfo {
+    pub topics: Vec<TopicInfo>,
+    pub message_count: u64,
+    /// First and last log time.
+    pub range_ns: Option<(i64, i64)>,
+    pub damage: Option<BagError>,
+    /// The bag's metadata, where the file embeds it.
+    pub metadata: Option<Metadata>,
+}
+
+/// A message of one storage file.
+pub(crate) struct StorageMessage {
+    /// Index into the file's topics.
+    pub topic: usize,
+    pub log_time_ns: i64,
+    pub data: Vec<u8>,
+}
+
+/// Messages in order of log time; ends after the first error.
+pub(crate) type StorageStream = Box<dyn Iterator<Item = Result<StorageMessage, BagError>> + Send>;
+
+/// Which messages are wanted.
+#[derive(Clone, Debug)]
+pub(crate) struct Filter {
+    /// By index of the file's topics.
+    pub topics: Vec<bool>,
+    /// The first log time wanted.
+    pub start_ns: i64,
+    /// The first log time no longer wanted.
+    pub end_ns: Option<i64>,
+}
+
+impl Filter {
+    pub(crate) fn wants(&self, topic: usize, log_time_ns: i64) -> bool {
+        self.wants_topic(topic)
+            && log_time_ns >= self.start_ns
+            && self.end_ns.is_none_or(|end_ns| log_time_ns < end_ns)
+    }
+
+    pub(crate) fn wants_topic(&self, topic: usize) -> bool {
+        self.topics.get(topic).copied().unwrap_or(false)
+    }
+
+    /// Whether any time of the closed range is wanted.
+    pub(crate) fn overlaps(&self, (first_ns, last_ns): (i64, i64)) -> bool {
+        last_ns >= self.start_ns && self.end_ns.is_none_or(|end_ns| first_ns < end_ns)
+    }
+}
+
+/// Offered profiles embedded in a storage file; unusable text counts as unknown.
+pub(crate) fn lenient_qos(topic: &str, text: &str) -> Vec<BagQos> {
+    BagQos::parse_list(text).unwrap_or_else(|error| {
+        log::warn!("{topic}: offered_qos_profiles cannot be read ({error}); taken as unknown");
+        Vec::new()
+    })
+}
+
+/// `pkg/Type`, as some writers have it, becomes `pkg/msg/Type`.
+pub(crate) fn full_type_name(name: &str) -> String {
+    match name.split_once('/') {
+        Some((package, rest)) if !rest.contains('/') => format!("{package}/msg/{rest}"),
+        _ => name.to_owned(),
+    }
+}
+
+/// How storage files name the language of a message definition.
+pub(crate) fn definition_encoding(text: &str) -> &'static str {
+    match text {
+        "" => "",
+        _ if text.starts_with("=") && text.trim_start_matches('=').starts_with("\nIDL: ") => {
+            "ros2idl"
+        }
+        _ => "ros2msg",
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn type_names_are_completed() {
+        assert_eq!(full_type_name("std_msgs/String"), "std_msgs/msg/String");
+        assert_eq!(full_type_name("std_msgs/msg/String"), "std_msgs/msg/String");
+        assert_eq!(full_type_name("plain"), "plain");
+    }
+
+    #[test]
+    fn definitions_tell_their_language() {
+        assert_eq!(definition_encoding("int32 x\n"), "ros2msg");
+        assert_eq!(
+            definition_encoding(&format!("{}\nIDL: a/msg/B\n", "=".repeat(80))),
+            "ros2idl"
+        );
+        assert_eq!(
+            definition_encoding(&format!("{}\nMSG: a/msg/B\n", "=".repeat(80))),
+            "ros2msg"
+        );
+        assert_eq!(definition_encoding(""), "");
+    }
+
+    #[test]
+    fn the_end_is_excluded_and_the_start_included() {
+        let filter = Filter {
+            topics: vec![true, false],
+            start_ns: 10,
+            end_ns: Some(20),
+        };
+        assert!(filter.wants(0, 10) && filter.wants(0, 19));
+        assert!(
+            !filter.wants(0, 9)
+                && !filter.wants(0, 20)
+                && !filter.wants(1, 15)
+                && !filter.wants(2, 15)
+        );
+        assert!(filter.overlaps((0, 10)) && filter.overlaps((19, 30)));
+        assert!(!filter.overlaps((0, 9)) && !filter.overlaps((20, 30)));
+    }
+}

@@ -1,0 +1,373 @@
+//! Writes rosbag2 directories of metadata version 9 with message definitions embedded.
+
+mod mcap_sink;
+mod sqlite_sink;
+
+use std::{
+    collections::BTreeMap,
+    fs,
+    path::{Path, PathBuf},
+};
+
+use super::{
+    BagError, BagQos, BagSummary, FileSummary, MAX_MESSAGE_BYTES, Storage, TopicInfo,
+    metadata::{
+        CountedTopic, FileInformation, METADATA_VERSION, Metadata, Nanoseconds, StartingTime,
+        TopicMetadata,
+    },
+    zstd_files::compress_file,
+};
+use mcap_sink::McapSink;
+use sqlite_sink::SqliteSink;
+
+/// What is told as the distribution that recorded the bag.
+const ROS_DISTRO: &str = "lattice";
+/// Bytes of the CDR encapsulation header.
+const ENCAPSULATION_BYTES: usize = 4;
+
+/// How a bag is compressed, always with zstd.
+#[derive(Clone, Copy, PartialEq, Eq, Hash, Debug, Default)]
+pub enum Compression {
+    /// Not at all.
+    #[default]
+    None,
+    /// Each chunk; MCAP only.
+    ZstdChunk,
+    /// Each message.
+    ZstdMessage,
+    /// The storage file, when it is finished.
+    ZstdFile,
+}
+
+/// How to write a bag.
+#[derive(Clone, Copy, Debug, Default)]
+pub struct WriterOptions {
+    /// How it is compressed.
+    pub compression: Compression,
+    /// Whether a bag at the same path is replaced.
+    pub overwrite: bool,
+}
+
+/// A topic to write.
+#[derive(Clone, Debug, Default)]
+pub struct TopicSpec {
+    /// The topic's full name, such as "/tf".
+    pub name: String,
+    /// The type, such as "tf2_msgs/msg/TFMessage".
+    pub type_name: String,
+    /// The message definition with all it depends on (ros2msg or ros2idl text).
+    pub definition: Option<String>,
+    /// What the publishers offer.
+    pub offered_qos: Vec<BagQos>,
+}
+
+enum Sink {
+    Mcap(Box<McapSink>),
+    Sqlite(SqliteSink),
+}
+
+/// A bag being written. Without [`BagWriter::finish`] it lacks `metadata.yaml`.
+pub struct BagWriter {
+    folder: PathBuf,
+    file: PathBuf,
+    storage: Storage,
+    compression: Compression,
+    sink: Sink,
+    topics: Vec<TopicInfo>,
+    custom_data: BTreeMap<String, String>,
+    message_count: u64,
+    range_ns: Option<(i64, i64)>,
+}
+
+impl BagWriter {
+    /// Makes the folder `path` and the storage file in it.
+    pub fn create(
+        path: &Path,
+        storage: Storage,
+        options: WriterOptions,
+    ) -> Result<BagWriter, BagError> {
+        let compression = options.compression;
+        if storage == Storage::Sqlite3 && compression == Compression::ZstdChunk {
+            return Err(BagError::Invalid {
+                name: "compression",
+                reason: "sqlite3 has no chunks; choose per message or per file, or mcap storage"
+                    .into(),
+            });
+        }
+        let name = path.file_name().ok_or_else(|| BagError::Invalid {
+            name: "path",
+            reason: format!("{} does not end in the name of a folder", path.display()),
+        })?;
+        make_way(path, options.overwrite)?;
+        fs::create_dir_all(path).map_err(BagError::io(path, "create"))?;
+        let file = path.join(format!(
+            "{}_0.{}",
+            name.to_string_lossy(),
+            storage.extension()
+        ));
+        let sink = match storage {
+            Storage::Mcap => {
+                let in_chunks = compression == Compression::ZstdChunk;
+                Sink::Mcap(Box::new(McapSink::create(&file, in_chunks)?))
+            }
+            Storage::Sqlite3 => Sink::Sqlite(SqliteSink::create(&file, ROS_DISTRO)?),
+        };
+        Ok(BagWriter {
+            folder: path.to_path_buf(),
+            file,
+            storage,
+            compression,
+            sink,
+            topics: Vec::new(),
+            custom_data: BTreeMap::new(),
+            message_count: 0,
+            range_ns: None,
+        })
+    }
+
+    /// Notes a free key-value pair in the metadata.
+    pub fn set_custom_data(&mut self, key: &str, value: &str) {
+        self.custom_data.insert(key.to_owned(), value.to_owned());
+    }
+
+    /// Announces a topic; the result is what [`BagWriter::write`] takes.
+    pub fn add_topic(&mut self, topic: TopicSpec) -> Result<usize, BagError> {
+        let wrong = |reason: String| {
+            Err(BagError::Invalid {
+                name: "topic",
+                reason,
+            })
+        };
+        if !topic.name.starts_with('/') || topic.name.len() < 2 {
+            return wrong(format!(
+                "{:?} is not a full topic name; it starts with '/'",
+                topic.name
+            ));
+        }
+        let parts: Vec<&str> = topic.type_name.split('/').collect();
+        if parts.len() != 3 || parts.iter().any(|part| part.is_empty()) {
+            return wrong(format!(
+                "{:?} is not a type like std_msgs/msg/String",
+                topic.type_name
+            ));
+        }
+        if self.topics.iter().any(|known| known.name == topic.name) {
+            return wrong(format!("{} was added before", topic.name));
+        }
+        let info = TopicInfo {
+            name: topic.name,
+            type_name: topic.type_name,
+            serialization_format: "cdr".into(),
+            offered_qos: topic.offered_qos,
+            type_hash: None,
+            definition: topic.definition,
+            message_count: 0,
+        };
+        let qos = BagQos::to_text(&info.offered_qos).map_err(|e| BagError::Invalid {
+            name: "offered_qos",
+            reason: e.to_string(),
+        })?;
+        match &mut self.sink {
+            Sink::Mcap(sink) => sink.add_topic(&info, &qos)?,
+            Sink::Sqlite(sink) => sink.add_topic(&info, &qos)?,
+        }
+        self.topics.push(info);
+        Ok(self.topics.len() - 1)
+    }
+
+    /// Writes a message: CDR with encapsulation header. Times need not be in order.
+    pub fn write(&mut self, topic: usize, log_time_ns: i64, cdr: &[u8]) -> Result<(), BagError> {
+        let wrong = |name, reason: String| Err(BagError::Invalid { name, reason });
+        let Some(info) = self.topics.get_mut(topic) else {
+            return wrong(
+                "topic",
+                format!("{topic} was not added; {} topics were", self.topics.len()),
+            );
+        };
+        if log_time_ns < 0 {
+            return wrong(
+                "log_time_ns",
+                format!("{log_time_ns} is before 1970, which bags cannot hold"),
+            );
+        }
+        let size = cdr.len();
+        if size < ENCAPSULATION_BYTES || size as u64 > MAX_MESSAGE_BYTES {
+            return wrong(
+                "message",
+                format!(
+                    "{size} bytes on {}; 4 to {MAX_MESSAGE_BYTES} are accepted",
+                    info.name
+                ),
+            );
+        }
+        let compressed = match self.compression {
+            Compression::ZstdMessage => Some(
+                zstd::bulk::compress(cdr, 0)
+                    .map_err(BagError::io(&self.file, "compress a message of"))?,
+            ),
+            _ => None,
+        };
+        let data = compressed.as_deref().unwrap_or(cdr);
+        match &mut self.sink {
+            Sink::Mcap(sink) => sink.write(topic, log_time_ns, data)?,
+            Sink::Sqlite(sink) => sink.write(topic, log_time_ns, data)?,
+        }
+        info.message_count += 1;
+        self.message_count += 1;
+        let (first_ns, last_ns) = self.range_ns.unwrap_or((log_time_ns, log_time_ns));
+        self.range_ns = Some((first_ns.min(log_time_ns), last_ns.max(log_time_ns)));
+        Ok(())
+    }
+
+    /// Completes the storage file and writes `metadata.yaml`.
+    pub fn finish(self) -> Result<BagSummary, BagError> {
+        let packed = PathBuf::from(format!("{}.zstd", self.file.display()));
+        let is_packed = self.compression == Compression::ZstdFile;
+        let listed = if is_packed {
+            packed.clone()
+        } else {
+            self.file.clone()
+        };
+        let metadata = self.metadata(&listed);
+        let unfit = |e: serde_yaml::Error| BagError::Invalid {
+            name: "metadata",
+            reason: e.to_string(),
+        };
+        let embedded = metadata.to_embedded_text().map_err(unfit)?;
+        let text = metadata.to_text().map_err(unfit)?;
+        match self.sink {
+            Sink::Mcap(sink) => sink.finish(&embedded)?,
+            Sink::Sqlite(sink) => sink.finish(METADATA_VERSION, &embedded)?,
+        }
+        if is_packed {
+            compress_file(&self.file, &packed)?;
+            fs::remove_file(&self.file).map_err(BagError::io(&self.file, "remove"))?;
+        }
+        // Renamed into place, so that a crash leaves no half metadata.
+        let (path, unfinished) = (
+            self.folder.join("metadata.yaml"),
+            self.folder.join("metadata.yaml.tmp"),
+        );
+        fs::write(&unfinished, text).map_err(BagError::io(&unfinished, "write"))?;
+        fs::rename(&unfinished, &path).map_err(BagError::io(&path, "rename to"))?;
+        Ok(BagSummary {
+            path: self.folder,
+            storage: self.storage,
+            metadata_version: Some(METADATA_VERSION),
+            ros_distro: ROS_DISTRO.into(),
+            custom_data: self.custom_data,
+            files: vec![FileSummary {
+                path: listed,
+                range_ns: self.range_ns,
+                message_count: Some(self.message_count),
+            }],
+            topics: self.topics,
+            message_count: self.message_count,
+            range_ns: self.range_ns,
+            damage: None,
+        })
+    }
+
+    fn metadata(&self, listed: &Path) -> Metadata {
+        let name = listed
+            .file_name()
+            .unwrap_or_default()
+            .to_string_lossy()
+            .into_owned();
+        let starting_time = self
+            .range_ns
+            .map_or_else(StartingTime::default, |(first_ns, _)| StartingTime {
+                nanoseconds_since_epoch: first_ns,
+            });
+        let duration = Nanoseconds {
+            nanoseconds: self
+                .range_ns
+                .map_or(0, |(first_ns, last_ns)| last_ns.saturating_sub(first_ns)),
+        };
+        let counted = |topic: &TopicInfo| CountedTopic {
+            topic_metadata: TopicMetadata {
+                name: topic.name.clone(),
+                type_name: topic.type_name.clone(),
+                serialization_format: topic.serialization_format.clone(),
+                offered_qos_profiles: topic.offered_qos.clone(),
+                type_description_hash: String::new(),
+            },
+            message_count: topic.message_count,
+        };
+        let (mode, format) = match self.compression {
+            // Chunks are the storage's own matter, which the metadata does not tell.
+            Compression::None | Compression::ZstdChunk => ("", ""),
+            Compression::ZstdMessage => ("message", "zstd"),
+            Compression::ZstdFile => ("file", "zstd"),
+        };
+        Metadata {
+            version: METADATA_VERSION,
+            storage_identifier: self.storage.identifier().into(),
+            duration,
+            starting_time,
+            message_count: self.message_count,
+            topics_with_message_count: self.topics.iter().map(counted).collect(),
+            compression_format: format.into(),
+            compression_mode: mode.into(),
+            relative_file_paths: vec![name.clone()],
+            files: vec![FileInformation {
+                path: name,
+                starting_time,
+                duration,
+                message_count: self.message_count,
+            }],
+            custom_data: (!self.custom_data.is_empty()).then(|| self.custom_data.clone()),
+            ros_distro: ROS_DISTRO.into(),
+        }
+    }
+}
+
+/// Removes a bag at `path` if that is wanted; anything else there is kept and refused.
+fn make_way(path: &Path, overwrite: bool) -> Result<(), BagError> {
+    let refuse = |why: String, or_overwrite| {
+        Err(BagError::Exists {
+            path: path.to_path_buf(),
+            why,
+            or_overwrite,
+        })
+    };
+    if !path.exists() {
+        return Ok(());
+    }
+    if !path.is_dir() {
+        return refuse(" and is not a folder".into(), "");
+    }
+    let mut files = Vec::new();
+    for entry in fs::read_dir(path).map_err(BagError::io(path, "list"))? {
+        let file = entry.map_err(BagError::io(path, "list"))?.path();
+        let name = file
+            .file_name()
+            .unwrap_or_default()
+            .to_string_lossy()
+            .into_owned();
+        let endings = [
+            ".mcap",
+            ".db3",
+            ".mcap.zstd",
+            ".db3.zstd",
+            ".db3-wal",
+            ".db3-shm",
+            ".db3-journal",
+        ];
+        let is_ours =
+            name == "metadata.yaml" || endings.iter().any(|ending| name.ends_with(ending));
+        if !is_ours || file.is_dir() {
+            return refuse(
+                format!(" and holds {name:?}, which is no part of a bag"),
+                "",
+            );
+        }
+        files.push(file);
+    }
+    if !files.is_empty() && !overwrite {
+        return refuse(String::new(), " or allow to overwrite");
+    }
+    files
+        .iter()
+        .try_for_each(|file| fs::remove_file(file).map_err(BagError::io(file, "remove")))
+}
