@@ -23,12 +23,9 @@ START_NS = 1_700_000_000_000_000_000
 FOREVER = QosTime(9223372036, 854775807)
 
 
-def fnv(data):
-    """FNV-1a, which the Rust side computes too."""
-    value = 0xCBF29CE484222325
-    for byte in bytes(data):
-        value = ((value ^ byte) * 0x100000001B3) & 0xFFFFFFFFFFFFFFFF
-    return f"{value:016x}"
+def number(data):
+    """The number that the bytes spell, modulo 2^61 - 1; the Rust side computes it too."""
+    return int.from_bytes(b"\x01" + bytes(data), "big") % (2**61 - 1)
 
 
 def qos(depth, durability):
@@ -86,12 +83,12 @@ def read(folder):
                     for q in c.ext.offered_qos_profiles
                 ],
                 "depths": [q.depth for q in c.ext.offered_qos_profiles],
-                "definition": fnv(c.msgdef.data.encode()),
+                "definition": number(c.msgdef.data.encode()),
             }
             for c in reader.connections
         ]
         messages = [
-            [c.topic, time_ns, len(data), fnv(data)] for c, time_ns, data in reader.messages()
+            [c.topic, time_ns, len(data), number(data)] for c, time_ns, data in reader.messages()
         ]
         return {
             "topics": topics,
