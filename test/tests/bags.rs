@@ -9,15 +9,13 @@ use lattice_nodes::bag::{
     BagDurability, BagMessage, BagQos, BagReader, BagReliability, BagWriter, Compression,
     ReadOptions, Storage, TopicSpec, WriterOptions,
 };
+use lattice_test::python::{python, script};
 use serde_json::{Value, json};
 
 /// What `bag_peer.py` tells, or nothing without a Python to run it.
 fn run_peer(arguments: &[&str]) -> Option<Value> {
-    let Some(python) = lattice_test::python::python() else {
-        println!("skipped: LATTICE_PYTHON does not name a Python with the package rosbags");
-        return None;
-    };
-    let script = Path::new(env!("CARGO_MANIFEST_DIR")).join("python/bag_peer.py");
+    let python = python()?;
+    let script = script("bag_peer.py");
     let output = Command::new(python)
         .arg(script)
         .args(arguments)
