@@ -5,3 +5,4 @@ pub mod bag;
 pub mod convert;
 pub mod files;
 pub mod runtime;
+pub mod simulate;
