@@ -11,6 +11,7 @@ mod bobcat;
 mod ground;
 mod height_field;
 mod ins;
+mod layout;
 mod lms200;
 mod loader;
 mod mission;
