@@ -1,4 +1,5 @@
 //! The simulated log as its readers see it.
+#![allow(clippy::unwrap_used)]
 
 use std::collections::BTreeMap;
 use std::fs;
