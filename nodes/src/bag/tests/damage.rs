@@ -141,3 +141,41 @@ fn lengths_that_lie_are_refused_before_memory_is_taken() {
         );
     }
 }
+
+#[test]
+fn a_cut_database_yields_the_rows_before_the_cut() {
+    let folder = tempfile::tempdir().unwrap();
+    // Of many small rows the tree itself reaches further into the file than a large cut leaves.
+    let cuts: [(i64, &[usize]); 2] = [(100, &[80, 99]), (20_000, &[20, 50, 80, 99])];
+    for (len, percents) in cuts {
+        let bag = folder.path().join("bag");
+        let options = WriterOptions {
+            overwrite: true,
+            ..WriterOptions::default()
+        };
+        let mut writer = BagWriter::create(&bag, Storage::Sqlite3, options).unwrap();
+        writer.add_topic(spec("/a", false)).unwrap();
+        let mut written = Vec::new();
+        for i in 0..3_000_000 / len {
+            let (log_time_ns, data) = (T0_NS + i, cdr(i, usize::try_from(len).unwrap()));
+            writer.write(0, log_time_ns, &data).unwrap();
+            written.push(BagMessage {
+                topic: 0,
+                log_time_ns,
+                data,
+            });
+        }
+        writer.finish().unwrap();
+        let file = storage_file(&bag);
+        let whole = fs::read(&file).unwrap();
+        for percent in percents {
+            check_cut(&file, &whole, whole.len() * percent / 100, &written);
+            let readable = read_some(&file).0.len();
+            let least = written.len() * percent / 200;
+            assert!(
+                readable > least,
+                "{percent} % of {len} byte messages: {readable}"
+            );
+        }
+    }
+}
