@@ -1,4 +1,5 @@
 //! rosbag2 directories against the independent `rosbags` package and on real data.
+#![allow(clippy::unwrap_used)]
 
 use std::{
     path::{Path, PathBuf},
