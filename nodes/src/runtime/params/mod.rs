@@ -136,6 +136,12 @@ impl Params {
         self.about("").i64(name, default)
     }
 
+    /// A count: an integer from 0 on.
+    pub fn usize(&self, name: &str, default: usize) -> Result<usize, ParamError> {
+        let value = self.i64(name, i64::try_from(default).unwrap_or(i64::MAX))?;
+        usize::try_from(value).map_err(|_| self.invalid(name, "expected 0 or more"))
+    }
+
     /// A float, never NaN; an integer counts, with a line in the log.
     pub fn f64(&self, name: &str, default: f64) -> Result<f64, ParamError> {
         self.about("").f64(name, default)
