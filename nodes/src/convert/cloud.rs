@@ -1,0 +1,166 @@
+//! PointCloud2 and the core's clouds.
+
+use lattice_core::cloud::{Cloud, CloudError, CloudLayout, CloudLimits, PointField};
+use lattice_msgs::sensor_msgs::{self, PointCloud2};
+use lattice_msgs::std_msgs::Header;
+use nalgebra::Vector3;
+use serde_bytes::ByteBuf;
+
+/// Datums of clouds that carry f64 coordinates are multiples of this.
+const DATUM_TILE_M: f64 = 1024.0;
+
+/// How the coordinates of `points_enu` are written.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub enum Precision {
+    /// 12 bytes a point; 4 um at 64 m from the map origin, 4 mm at 64 km.
+    Float32,
+    /// 24 bytes a point; exact anywhere, but RViz does not draw it.
+    Float64,
+}
+
+/// The layout that a message declares. Nothing is believed until [`CloudLayout::view`].
+pub fn layout_of(cloud: &PointCloud2) -> CloudLayout {
+    CloudLayout {
+        width: cloud.width,
+        height: cloud.height,
+        point_step: cloud.point_step,
+        row_step: cloud.row_step,
+        is_bigendian: cloud.is_bigendian,
+        fields: cloud
+            .fields
+            .iter()
+            .map(|field| PointField {
+                name: field.name.clone(),
+                offset: field.offset,
+                datatype: field.datatype,
+                count: field.count,
+            })
+            .collect(),
+    }
+}
+
+/// Points in the frame of `header` as an unordered, dense PointCloud2 with `x`, `y`, `z`.
+pub fn message_from_points(
+    header: Header,
+    points_m: &[Vector3<f64>],
+    precision: Precision,
+) -> PointCloud2 {
+    let (size, datatype) = match precision {
+        Precision::Float32 => (4_u32, sensor_msgs::PointField::FLOAT32),
+        Precision::Float64 => (8, sensor_msgs::PointField::FLOAT64),
+    };
+    let mut data = Vec::with_capacity(points_m.len() * 3 * size as usize);
+    for p in points_m {
+        for v in [p.x, p.y, p.z] {
+            match precision {
+                Precision::Float32 => data.extend_from_slice(&(v as f32).to_le_bytes()),
+                Precision::Float64 => data.extend_from_slice(&v.to_le_bytes()),
+            }
+        }
+    }
+    dense_cloud(
+        header,
+        xyz_fields(datatype, size),
+        3 * size,
+        points_m.len(),
+        data,
+    )
+}
+
+/// An unordered cloud of `points` rows of `point_step` bytes, little endian.
+pub fn dense_cloud(
+    header: Header,
+    fields: Vec<sensor_msgs::PointField>,
+    point_step: u32,
+    points: usize,
+    data: Vec<u8>,
+) -> PointCloud2 {
+    let width = u32::try_from(points).unwrap_or(u32::MAX);
+    PointCloud2 {
+        header,
+        height: 1,
+        width,
+        fields,
+        is_bigendian: false,
+        point_step,
+        row_step: point_step.saturating_mul(width),
+        data: ByteBuf::from(data),
+        is_dense: true,
+    }
+}
+
+/// Fields `x`, `y`, `z` one behind the other.
+pub fn xyz_fields(datatype: u8, size: u32) -> Vec<sensor_msgs::PointField> {
+    ["x", "y", "z"]
+        .into_iter()
+        .zip(0..)
+        .map(|(name, i)| sensor_msgs::PointField {
+            name: name.to_owned(),
+            offset: i * size,
+            datatype,
+            count: 1,
+        })
+        .collect()
+}
+
+/// A cloud that is already in the map frame, with an f64 datum near its first finite point.
+///
+/// Clouds within a tile of the origin get the datum zero, so f32 coordinates pass unchanged.
+pub fn cloud_from_message(cloud: &PointCloud2, limits: &CloudLimits) -> Result<Cloud, CloudError> {
+    let layout = layout_of(cloud);
+    let view = layout.view(&cloud.data, limits)?;
+    let points = (0..view.len()).map(|i| view.xyz(i));
+    let datum_m = points
+        .clone()
+        .find(|p| p.iter().all(|v| v.is_finite()))
+        .map_or_else(Vector3::zeros, |p| {
+            p.map(|v| (v / DATUM_TILE_M).round() * DATUM_TILE_M)
+        });
+    let offsets_m = points
+        .map(|p| {
+            let offset = p - datum_m;
+            [offset.x as f32, offset.y as f32, offset.z as f32]
+        })
+        .collect();
+    Ok(Cloud {
+        stamp_ns: cloud.header.stamp.to_ns(),
+        datum_m,
+        offsets_m,
+    })
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::convert::geometry::header;
+
+    #[test]
+    fn f32_points_near_the_origin_pass_unchanged() {
+        let points = [Vector3::new(1.1, -2.2, 3.3), Vector3::new(400.0, 5e-8, 7.0)];
+        let message = message_from_points(header("map", 7), &points, Precision::Float32);
+        assert_eq!(message.data.len(), 24);
+        let cloud = cloud_from_message(&message, &CloudLimits { max_points: 10 }).unwrap();
+        assert_eq!(cloud.datum_m, Vector3::zeros());
+        assert_eq!(cloud.stamp_ns, 7);
+        for (point, offset) in points.iter().zip(&cloud.offsets_m) {
+            assert_eq!(*offset, [point.x as f32, point.y as f32, point.z as f32]);
+        }
+    }
+
+    #[test]
+    fn f64_points_keep_their_place_far_from_the_origin() {
+        let points = [Vector3::new(4_000_000.123_456, -3.25, 1e5 + 1.0 / 3.0)];
+        let message = message_from_points(header("map", 0), &points, Precision::Float64);
+        let cloud = cloud_from_message(&message, &CloudLimits { max_points: 10 }).unwrap();
+        assert!((cloud.point_m(0) - points[0]).norm() < 5e-5);
+    }
+
+    #[test]
+    fn a_nan_does_not_choose_the_datum() {
+        let points = [Vector3::repeat(f64::NAN), Vector3::new(5000.0, 0.0, 0.0)];
+        let message = message_from_points(header("map", 0), &points, Precision::Float64);
+        let cloud = cloud_from_message(&message, &CloudLimits { max_points: 10 }).unwrap();
+        assert_eq!(cloud.datum_m.x, 5120.0);
+        assert!(cloud.offsets_m[0][0].is_nan());
+    }
+}

@@ -1,0 +1,308 @@
+//! Voxel lists as `LatticeMap` keyframes and `LatticeMapUpdate` deltas of bounded size.
+
+use lattice_core::lattice::{Key, Lattice, LatticeKind};
+use lattice_core::voxels::codec;
+use lattice_core::voxels::{Voxel, VoxelList};
+use lattice_msgs::geographic_msgs::GeoPoint;
+use lattice_msgs::lattice::{LatticeInfo, LatticeMap, LatticeMapUpdate};
+use lattice_msgs::std_msgs::Header;
+use nalgebra::{Isometry3, Translation3, UnitQuaternion, Vector3};
+use serde_bytes::ByteBuf;
+use thiserror::Error;
+
+use super::geometry;
+
+/// The one encoding of voxel keys: Morton-sorted 21-bit indices, LEB128 varints of differences.
+pub const KEY_ENCODING: &str = "morton21_delta_leb128";
+
+/// Bytes of a chunk that are not voxels: header, info, lengths. Generous.
+const CHUNK_OVERHEAD_BYTES: usize = 1024;
+/// Count and mean offset of one voxel.
+const PAYLOAD_BYTES: usize = 4 + 3 * 2;
+
+/// Why a `LatticeMap` or `LatticeMapUpdate` cannot be used.
+#[derive(Debug, Error)]
+pub enum MapMessageError {
+    /// The lattice or its cell volume means nothing here.
+    #[error("lattice '{lattice}' with cell volume {cell_volume_m3} m^3: {reason}")]
+    Lattice {
+        /// Name as sent.
+        lattice: String,
+        /// Cell volume as sent.
+        cell_volume_m3: f64,
+        /// What is wrong.
+        reason: String,
+    },
+    /// Keys in an encoding that this version does not read.
+    #[error("key encoding '{0}' is unknown, expected '{KEY_ENCODING}'")]
+    Encoding(String),
+    /// Keys that do not decode.
+    #[error("voxel keys: {0}")]
+    Keys(#[from] codec::CodecError),
+    /// Columns of different length.
+    #[error("{column} has {found} entries for {voxels} voxels, expected {expected}")]
+    Length {
+        /// Which column.
+        column: &'static str,
+        /// Number of voxels that the keys give.
+        voxels: usize,
+        /// Entries there should be.
+        expected: usize,
+        /// Entries there are.
+        found: usize,
+    },
+    /// Chunk number outside of the number of chunks.
+    #[error("chunk {chunk} of {chunks}")]
+    Chunk {
+        /// As sent, counted from zero.
+        chunk: u32,
+        /// As sent.
+        chunks: u32,
+    },
+    /// The frame of the lattice in the map is not a pose.
+    #[error("map_from_lattice is not a pose: a number is not finite or the rotation is zero")]
+    Frame,
+}
+
+/// What all messages of one map state share.
+pub struct MapStamp<'a> {
+    /// Frame and time.
+    pub header: Header,
+    /// Changes when the map is reset.
+    pub epoch: u64,
+    /// State that the message describes.
+    pub sequence: u64,
+    /// Geodetic origin of the map frame, where known.
+    pub origin: Option<&'a GeoPoint>,
+    /// Largest serialised chunk.
+    pub chunk_bytes: usize,
+}
+
+/// One voxel as a consumer sees it.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct VoxelState {
+    /// Points that fell into the cell.
+    pub count: u32,
+    /// Mean of the points from the cell centre, in units of the message.
+    pub mean_offset: [i16; 3],
+}
+
+/// The lattice, its place in the map frame and the epoch, as a message.
+pub fn info_of(list: &VoxelList, epoch: u64, origin: Option<&GeoPoint>) -> LatticeInfo {
+    let lattice = list.lattice();
+    let g = lattice.generator().transpose();
+    let mut generator = [0.0; 9];
+    generator.copy_from_slice(g.as_slice());
+    let datum = Isometry3::from_parts(
+        Translation3::from(list.datum_m()),
+        UnitQuaternion::identity(),
+    );
+    LatticeInfo {
+        lattice: lattice.kind().name().to_owned(),
+        cell_volume_m3: lattice.cell_volume_m3(),
+        generator,
+        map_from_lattice: geometry::pose_from(&datum),
+        origin: origin.copied().unwrap_or_default(),
+        has_origin: origin.is_some(),
+        epoch,
+    }
+}
+
+/// The lattice that a message names, and its datum in the map frame.
+pub fn lattice_from(info: &LatticeInfo) -> Result<(Lattice, Vector3<f64>), MapMessageError> {
+    let refuse = |reason: String| MapMessageError::Lattice {
+        lattice: info.lattice.chars().take(32).collect(),
+        cell_volume_m3: info.cell_volume_m3,
+        reason,
+    };
+    let kind: LatticeKind = info.lattice.parse().map_err(|e| refuse(format!("{e}")))?;
+    let lattice = Lattice::new(kind, info.cell_volume_m3).map_err(|e| refuse(format!("{e}")))?;
+    let place =
+        geometry::isometry_from_pose(&info.map_from_lattice).ok_or(MapMessageError::Frame)?;
+    if place.rotation.angle() > 1e-9 {
+        return Err(refuse("a rotated lattice frame is not supported".into()));
+    }
+    Ok((lattice, place.translation.vector))
+}
+
+/// The whole list as self-contained chunks; an empty list is one chunk without voxels.
+pub fn keyframe(list: &VoxelList, stamp: &MapStamp) -> Vec<LatticeMap> {
+    let voxels = list.sorted();
+    let info = info_of(list, stamp.epoch, stamp.origin);
+    let unit_m = offset_unit_m(list.lattice());
+    let keys: Vec<Key> = voxels.iter().map(|(key, _)| *key).collect();
+    let parts = split(&keys, PAYLOAD_BYTES, stamp.chunk_bytes);
+    let chunks = parts.len() as u32;
+    let mut rest = voxels.as_slice();
+    let mut out = Vec::with_capacity(parts.len());
+    for (chunk, keys) in (0..).zip(parts) {
+        let (voxels, tail) = rest.split_at(keys.len().min(rest.len()));
+        rest = tail;
+        out.push(LatticeMap {
+            header: stamp.header.clone(),
+            info: info.clone(),
+            sequence: stamp.sequence,
+            chunk,
+            chunks,
+            voxels_total: list.len() as u64,
+            key_encoding: KEY_ENCODING.to_owned(),
+            voxels: keys.len() as u32,
+            keys: ByteBuf::from(codec::encode_keys(keys)),
+            counts: voxels.iter().map(|(_, voxel)| voxel.count).collect(),
+            offset_unit_m: unit_m,
+            mean_offsets: mean_offsets(voxels.iter().map(|(_, voxel)| voxel), unit_m),
+            ..LatticeMap::default()
+        });
+    }
+    out
+}
+
+/// What changed since `previous_sequence`, with the state of each changed voxel, in chunks.
+pub fn update(
+    list: &VoxelList,
+    changed: &[Key],
+    removed: &[Key],
+    previous_sequence: u64,
+    stamp: &MapStamp,
+) -> Vec<LatticeMapUpdate> {
+    let info = info_of(list, stamp.epoch, stamp.origin);
+    let unit_m = offset_unit_m(list.lattice());
+    let template = LatticeMapUpdate {
+        header: stamp.header.clone(),
+        info,
+        previous_sequence,
+        sequence: stamp.sequence,
+        key_encoding: KEY_ENCODING.to_owned(),
+        offset_unit_m: unit_m,
+        ..LatticeMapUpdate::default()
+    };
+    let mut out = Vec::new();
+    if !changed.is_empty() {
+        for keys in split(changed, PAYLOAD_BYTES, stamp.chunk_bytes) {
+            let voxels: Vec<Voxel> = keys
+                .iter()
+                .map(|key| list.get(*key).unwrap_or_default())
+                .collect();
+            out.push(LatticeMapUpdate {
+                voxels: keys.len() as u32,
+                keys: ByteBuf::from(codec::encode_keys(keys)),
+                counts: voxels.iter().map(|voxel| voxel.count).collect(),
+                mean_offsets: mean_offsets(voxels.iter(), unit_m),
+                ..template.clone()
+            });
+        }
+    }
+    if !removed.is_empty() {
+        for keys in split(removed, 0, stamp.chunk_bytes) {
+            out.push(LatticeMapUpdate {
+                removed: keys.len() as u32,
+                removed_keys: ByteBuf::from(codec::encode_keys(keys)),
+                ..template.clone()
+            });
+        }
+    }
+    let chunks = out.len() as u32;
+    for (chunk, message) in (0..).zip(&mut out) {
+        message.chunk = chunk;
+        message.chunks = chunks;
+    }
+    out
+}
+
+/// Voxels of a keyframe chunk or of the changed part of an update.
+pub fn voxels_from(
+    key_encoding: &str,
+    keys: &[u8],
+    counts: &[u32],
+    offsets: &[i16],
+    max_voxels: usize,
+) -> Result<Vec<(Key, VoxelState)>, MapMessageError> {
+    let keys = keys_from(key_encoding, keys, max_voxels)?;
+    let check = |column, expected, found| {
+        if expected == found {
+            Ok(())
+        } else {
+            Err(MapMessageError::Length {
+                column,
+                voxels: keys.len(),
+                expected,
+                found,
+            })
+        }
+    };
+    check("counts", keys.len(), counts.len())?;
+    check("mean_offsets", keys.len() * 3, offsets.len())?;
+    Ok(keys
+        .into_iter()
+        .zip(counts)
+        .zip(offsets.chunks_exact(3))
+        .map(|((key, count), offset)| {
+            let mut mean_offset = [0; 3];
+            mean_offset.copy_from_slice(offset);
+            let state = VoxelState {
+                count: *count,
+                mean_offset,
+            };
+            (key, state)
+        })
+        .collect())
+}
+
+/// Keys of a message.
+pub fn keys_from(
+    key_encoding: &str,
+    keys: &[u8],
+    max_voxels: usize,
+) -> Result<Vec<Key>, MapMessageError> {
+    if key_encoding != KEY_ENCODING {
+        return Err(MapMessageError::Encoding(
+            key_encoding.chars().take(32).collect(),
+        ));
+    }
+    Ok(codec::decode_keys(keys, max_voxels)?)
+}
+
+/// Unit of mean offsets: the farthest a point can be from its cell centre fits 16 bits.
+fn offset_unit_m(lattice: &Lattice) -> f64 {
+    lattice.covering_radius_m() / f64::from(i16::MAX)
+}
+
+fn mean_offsets<'a>(voxels: impl Iterator<Item = &'a Voxel>, unit_m: f64) -> Vec<i16> {
+    voxels
+        .flat_map(Voxel::mean_offset_m)
+        .map(|offset_m| (offset_m / unit_m).round() as i16)
+        .collect()
+}
+
+/// Cuts sorted keys so that each part fits `chunk_bytes`; at least one part, of at least one key.
+fn split(keys: &[Key], payload_bytes: usize, chunk_bytes: usize) -> Vec<&[Key]> {
+    let room = chunk_bytes
+        .saturating_sub(CHUNK_OVERHEAD_BYTES)
+        .max(CHUNK_OVERHEAD_BYTES);
+    let mut parts = Vec::new();
+    let mut start = 0;
+    let mut used = 0;
+    let mut previous = 0;
+    for (i, key) in keys.iter().enumerate() {
+        let difference = if i == start {
+            key.raw()
+        } else {
+            key.raw() - previous
+        };
+        let bytes = varint_len(difference) + payload_bytes;
+        if i > start && used + bytes > room {
+            parts.push(&keys[start..i]);
+            start = i;
+            used = varint_len(key.raw()) + payload_bytes;
+        } else {
+            used += bytes;
+        }
+        previous = key.raw();
+    }
+    parts.push(&keys[start..]);
+    parts
+}
+
+fn varint_len(value: u64) -> usize {
+    (64 - (value | 1).leading_zeros()).div_ceil(7) as usize
+}
