@@ -3,6 +3,12 @@
 
 pub mod bag;
 pub mod convert;
+pub mod enu_transformer;
 pub mod files;
+pub mod lattice_mapper;
+pub mod map_follower;
+pub mod replay;
+pub mod report;
 pub mod runtime;
 pub mod simulate;
+pub mod voxel_marker_publisher;

@@ -1,3 +1,5 @@
 //! Helpers of the tests.
 
+pub mod clouds;
+pub mod data;
 pub mod python;

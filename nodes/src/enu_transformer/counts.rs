@@ -1,0 +1,69 @@
+//! What the transformer took in and refused.
+
+use serde::{Deserialize, Serialize};
+
+/// Counters of one transformer. Every cloud ends in exactly one of the `clouds_` counters
+/// other than `clouds_in`, or still waits.
+#[derive(Clone, Debug, Default, PartialEq, Eq, Serialize, Deserialize)]
+pub struct TransformerCounts {
+    /// Clouds received.
+    pub clouds_in: u64,
+    /// Clouds transformed and published.
+    pub clouds_out: u64,
+    /// Dropped: the bytes are not what the header says, or no usable per-point time.
+    pub clouds_malformed: u64,
+    /// Dropped: older than every pose at hand.
+    pub clouds_before_poses: u64,
+    /// Dropped: in a gap of the poses longer than `max_pose_gap_s`.
+    pub clouds_pose_gap: u64,
+    /// Dropped: the pose that covers them did not come within `max_wait_s`.
+    pub clouds_pose_late: u64,
+    /// Dropped: the mount of their frame is unknown or its transforms do not cover them.
+    pub clouds_no_mount: u64,
+    /// Dropped: the waiting queue was full; the oldest goes.
+    pub clouds_queue_full: u64,
+    /// Dropped: they waited when time jumped back.
+    pub clouds_time_jump: u64,
+    /// Points of the clouds published or published in part.
+    pub points_in: u64,
+    /// Points published.
+    pub points_out: u64,
+    /// Points left out: NaN or infinite.
+    pub points_not_finite: u64,
+    /// Points left out: nearer than `min_range_m` or farther than `max_range_m`.
+    pub points_out_of_range: u64,
+    /// Points left out: without a time, though the cloud has times.
+    pub points_no_time: u64,
+    /// Poses taken.
+    pub poses_in: u64,
+    /// Poses refused: not finite or not a rotation.
+    pub poses_invalid: u64,
+    /// Poses refused: the INS says that its solution is not good.
+    pub poses_not_good: u64,
+    /// Poses refused: not newer than the pose before.
+    pub poses_out_of_order: u64,
+    /// Times that the stamps of the poses jumped back (a log that loops).
+    pub time_jumps: u64,
+    /// Transforms of `/tf` and `/tf_static` refused.
+    pub transforms_refused: u64,
+}
+
+impl TransformerCounts {
+    /// Clouds dropped for any reason.
+    pub fn clouds_dropped(&self) -> u64 {
+        self.reasons().iter().map(|(_, count)| count).sum()
+    }
+
+    /// Dropped clouds by reason.
+    pub fn reasons(&self) -> [(&'static str, u64); 7] {
+        [
+            ("malformed", self.clouds_malformed),
+            ("before_poses", self.clouds_before_poses),
+            ("pose_gap", self.clouds_pose_gap),
+            ("pose_late", self.clouds_pose_late),
+            ("no_mount", self.clouds_no_mount),
+            ("queue_full", self.clouds_queue_full),
+            ("time_jump", self.clouds_time_jump),
+        ]
+    }
+}

@@ -1,0 +1,409 @@
+//! From sensor clouds and an INS to clouds in the map frame (east, north, up).
+//!
+//! [`EnuTransformer`] is a state machine without I/O.
+
+mod counts;
+pub mod ins;
+mod options;
+mod waiting;
+
+pub use counts::TransformerCounts;
+pub use options::TransformerOptions;
+
+use std::sync::Arc;
+
+use lattice_core::cloud::{CloudLimits, RangeLimits, transform_points};
+use lattice_core::pose::{
+    PoseBuffer, PoseBufferOptions, PoseMiss, PushOutcome, StampedPose, TfMiss, TransformBuffer,
+    TransformBufferOptions,
+};
+use lattice_msgs::builtin_interfaces::Time;
+use lattice_msgs::geographic_msgs::{GeoPoint, GeoPointStamped};
+use lattice_msgs::geometry_msgs::TransformStamped;
+use lattice_msgs::sensor_msgs::PointCloud2;
+use lattice_msgs::tf2_msgs::TFMessage;
+use nalgebra::Isometry3;
+
+use self::ins::{InsDecoder, InsMessage, InsRefusal};
+use self::waiting::{Waiting, WaitingCloud};
+use crate::convert::{cloud, geometry};
+
+/// A step back of the receiving clock by more than this is a log that loops.
+const CLOCK_JUMP_NS: i64 = 1_000_000_000;
+
+/// What the transformer has to say.
+#[derive(Clone, Debug)]
+pub enum EnuOutput {
+    /// For `points_enu`.
+    Points(Arc<PointCloud2>),
+    /// For `/tf`.
+    Transform(TransformStamped),
+    /// For `/tf_static`: `earth` -> `map`.
+    StaticTransform(TransformStamped),
+    /// For `map_origin`.
+    Origin(GeoPointStamped),
+}
+
+/// Why a cloud was dropped.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+enum Drop {
+    Malformed,
+    BeforePoses,
+    PoseGap,
+    PoseLate,
+    NoMount,
+    TimeJump,
+}
+
+/// What is to be done with a cloud now.
+enum Verdict {
+    Transform,
+    Wait,
+    Drop(Drop),
+}
+
+/// Moves clouds of any number of sensors into the map frame, each point at its own time.
+///
+/// Clouds wait in a bounded queue until poses and mounts cover all of their points; nothing is
+/// extrapolated. Every input comes with the time at which it was received (`now_ns`): the clock
+/// of the node, or the log's own time.
+pub struct EnuTransformer {
+    options: TransformerOptions,
+    ins: InsDecoder,
+    poses: PoseBuffer,
+    mounts: TransformBuffer,
+    waiting: Waiting,
+    announced: bool,
+    last_now_ns: Option<i64>,
+    counts: TransformerCounts,
+}
+
+impl EnuTransformer {
+    /// A transformer that has seen nothing.
+    pub fn new(options: TransformerOptions) -> Self {
+        let poses = PoseBuffer::new(PoseBufferOptions {
+            span_s: options.pose_span_s,
+            max_gap_s: options.max_pose_gap_s,
+            ..PoseBufferOptions::default()
+        });
+        Self {
+            ins: InsDecoder::new(options.ins.clone()),
+            poses,
+            mounts: TransformBuffer::new(TransformBufferOptions {
+                history_s: options.pose_span_s,
+                ..TransformBufferOptions::default()
+            }),
+            waiting: Waiting::new(options.max_waiting_clouds, options.max_waiting_bytes),
+            announced: false,
+            last_now_ns: None,
+            counts: TransformerCounts::default(),
+            options,
+        }
+    }
+
+    /// Takes a message of the INS.
+    pub fn on_ins(&mut self, message: InsMessage, now_ns: i64) -> Vec<EnuOutput> {
+        let mut out = Vec::new();
+        self.advance(now_ns);
+        match self.ins.decode(message) {
+            Ok(poses) => {
+                for pose in poses {
+                    self.on_pose(pose, &mut out);
+                }
+            }
+            Err(InsRefusal::NotGood) => self.counts.poses_not_good += 1,
+            Err(InsRefusal::Invalid) => self.counts.poses_invalid += 1,
+        }
+        self.announce(&mut out);
+        self.serve(now_ns, &mut out);
+        out
+    }
+
+    /// Takes transforms of the mounts, or of `odom_frame` -> `base_frame`.
+    pub fn on_tf(&mut self, message: &TFMessage, is_static: bool, now_ns: i64) -> Vec<EnuOutput> {
+        let mut out = Vec::new();
+        self.advance(now_ns);
+        for transform in &message.transforms {
+            if self.is_own(transform) {
+                continue;
+            }
+            let inserted = geometry::isometry_from_transform(&transform.transform).is_some_and(
+                |parent_from_child| {
+                    let parent = &transform.header.frame_id;
+                    let child = &transform.child_frame_id;
+                    let stamp_ns = transform.header.stamp.to_ns();
+                    self.mounts
+                        .insert(parent, child, stamp_ns, parent_from_child, is_static)
+                        .is_ok()
+                },
+            );
+            if !inserted {
+                self.counts.transforms_refused += 1;
+            }
+        }
+        self.serve(now_ns, &mut out);
+        out
+    }
+
+    /// Takes a cloud of a sensor; it comes out at once or when its poses have come.
+    pub fn on_cloud(&mut self, message: Arc<PointCloud2>, now_ns: i64) -> Vec<EnuOutput> {
+        let mut out = Vec::new();
+        self.advance(now_ns);
+        self.counts.clouds_in += 1;
+        match WaitingCloud::new(message, now_ns, &self.options) {
+            Ok(cloud) => {
+                self.counts.clouds_queue_full += self.waiting.push(cloud);
+                self.serve(now_ns, &mut out);
+            }
+            Err(error) => {
+                log::debug!("cloud dropped: {error}");
+                self.drop_cloud(Drop::Malformed);
+            }
+        }
+        out
+    }
+
+    /// Lets clouds that have waited too long go. To be called now and then.
+    pub fn tick(&mut self, now_ns: i64) -> Vec<EnuOutput> {
+        let mut out = Vec::new();
+        self.advance(now_ns);
+        self.serve(now_ns, &mut out);
+        out
+    }
+
+    /// Ends the input: what still waits is counted as having come too early.
+    pub fn finish(&mut self) {
+        while self.waiting.take(0).is_some() {
+            self.drop_cloud(Drop::PoseLate);
+        }
+    }
+
+    /// What came in and what was dropped, by reason.
+    pub fn counts(&self) -> &TransformerCounts {
+        &self.counts
+    }
+
+    /// Clouds that wait for their poses.
+    pub fn waiting(&self) -> usize {
+        self.waiting.len()
+    }
+
+    /// Newest pose of the machine in the map.
+    pub fn newest_pose(&self) -> Option<StampedPose> {
+        let stamp_ns = self.poses.newest_ns()?;
+        let map_from_base = self.poses.at(stamp_ns).ok()?;
+        Some(StampedPose {
+            stamp_ns,
+            map_from_base,
+        })
+    }
+
+    fn on_pose(&mut self, pose: StampedPose, out: &mut Vec<EnuOutput>) {
+        match self.poses.push(pose) {
+            PushOutcome::Accepted => self.counts.poses_in += 1,
+            PushOutcome::JumpedBack => {
+                self.counts.poses_in += 1;
+                self.on_time_jump(pose.stamp_ns);
+            }
+            PushOutcome::OutOfOrder => {
+                self.counts.poses_out_of_order += 1;
+                return;
+            }
+            PushOutcome::NotFinite => {
+                self.counts.poses_invalid += 1;
+                return;
+            }
+        }
+        if self.options.publish_tf {
+            out.extend(self.transform_of(&pose).map(EnuOutput::Transform));
+        }
+    }
+
+    /// `map` -> `base_frame`, or `map` -> `odom_frame` where one is set and known.
+    fn transform_of(&self, pose: &StampedPose) -> Option<TransformStamped> {
+        let map = &self.options.map_frame;
+        let base = &self.options.base_frame;
+        let (child, map_from_child) = match &self.options.odom_frame {
+            None => (base, pose.map_from_base),
+            Some(odom) => {
+                let base_from_odom = self.mounts.lookup(base, odom, pose.stamp_ns).ok()?;
+                (odom, pose.map_from_base * base_from_odom)
+            }
+        };
+        Some(geometry::transform_stamped(
+            map,
+            child,
+            pose.stamp_ns,
+            &map_from_child,
+        ))
+    }
+
+    /// Says once where the map frame lies on the earth.
+    fn announce(&mut self, out: &mut Vec<EnuOutput>) {
+        let (false, Some(frame)) = (self.announced, self.ins.frame()) else {
+            return;
+        };
+        self.announced = true;
+        let stamp_ns = self.poses.newest_ns().unwrap_or(0);
+        let origin = frame.origin();
+        let position = GeoPoint {
+            latitude: origin.latitude_deg(),
+            longitude: origin.longitude_deg(),
+            altitude: origin.height_m,
+        };
+        out.push(EnuOutput::Origin(GeoPointStamped {
+            header: geometry::header(&self.options.map_frame, stamp_ns),
+            position,
+        }));
+        if self.options.publish_tf {
+            out.push(EnuOutput::StaticTransform(geometry::transform_stamped(
+                &self.options.earth_frame,
+                &self.options.map_frame,
+                stamp_ns,
+                &frame.ecef_from_enu(),
+            )));
+        }
+    }
+
+    /// Whether a transform is one that this node publishes itself.
+    fn is_own(&self, transform: &TransformStamped) -> bool {
+        let parent = transform.header.frame_id.trim_start_matches('/');
+        parent == self.options.map_frame || parent == self.options.earth_frame
+    }
+
+    /// Notices a receiving clock that jumped back.
+    fn advance(&mut self, now_ns: i64) {
+        let last_ns = self.last_now_ns.replace(now_ns).unwrap_or(now_ns);
+        if now_ns < last_ns.saturating_sub(CLOCK_JUMP_NS) {
+            while self.waiting.take(0).is_some() {
+                self.drop_cloud(Drop::TimeJump);
+            }
+        }
+    }
+
+    /// The poses begin anew at `stamp_ns`: clouds that belong to the time before go.
+    fn on_time_jump(&mut self, stamp_ns: i64) {
+        self.counts.time_jumps += 1;
+        self.mounts.clear_moving();
+        let after = (stamp_ns as f64 + self.options.max_wait_s * 1e9) as i64;
+        let mut i = 0;
+        while let Some(cloud) = self.waiting.get(i) {
+            if cloud.last_ns > after {
+                self.waiting.take(i);
+                self.drop_cloud(Drop::TimeJump);
+            } else {
+                i += 1;
+            }
+        }
+    }
+
+    /// Transforms what can be transformed by now, in the order of arrival.
+    fn serve(&mut self, now_ns: i64, out: &mut Vec<EnuOutput>) {
+        let mut i = 0;
+        while let Some(cloud) = self.waiting.get(i) {
+            match self.verdict(cloud, now_ns) {
+                Verdict::Wait => i += 1,
+                Verdict::Drop(reason) => {
+                    self.waiting.take(i);
+                    self.drop_cloud(reason);
+                }
+                Verdict::Transform => {
+                    if let Some(cloud) = self.waiting.take(i) {
+                        match self.transform(&cloud) {
+                            Ok(points) => {
+                                self.counts.clouds_out += 1;
+                                out.push(EnuOutput::Points(Arc::new(points)));
+                            }
+                            Err(reason) => self.drop_cloud(reason),
+                        }
+                    }
+                }
+            }
+        }
+    }
+
+    fn verdict(&self, cloud: &WaitingCloud, now_ns: i64) -> Verdict {
+        let wait = |reason| {
+            let waited_s = now_ns.saturating_sub(cloud.arrived_ns) as f64 * 1e-9;
+            if waited_s > self.options.max_wait_s {
+                Verdict::Drop(reason)
+            } else {
+                Verdict::Wait
+            }
+        };
+        for stamp_ns in [cloud.first_ns, cloud.last_ns] {
+            match self.poses.at(stamp_ns) {
+                Ok(_) => {}
+                Err(PoseMiss::Empty | PoseMiss::AfterEnd { .. }) => return wait(Drop::PoseLate),
+                Err(PoseMiss::BeforeStart { .. }) => return Verdict::Drop(Drop::BeforePoses),
+                Err(PoseMiss::Gap { .. }) => return Verdict::Drop(Drop::PoseGap),
+            }
+            match self.mount(&cloud.frame, stamp_ns) {
+                Ok(_) => {}
+                Err(TfMiss::TooOld { .. } | TfMiss::Gap { .. }) => {
+                    return Verdict::Drop(Drop::NoMount);
+                }
+                Err(_) => return wait(Drop::NoMount),
+            }
+        }
+        Verdict::Transform
+    }
+
+    /// `base_from_sensor` at a stamp.
+    fn mount(&self, frame: &str, stamp_ns: i64) -> Result<Isometry3<f64>, TfMiss> {
+        if frame == self.options.base_frame {
+            return Ok(Isometry3::identity());
+        }
+        self.mounts
+            .lookup(&self.options.base_frame, frame, stamp_ns)
+    }
+
+    fn transform(&mut self, waiting: &WaitingCloud) -> Result<PointCloud2, Drop> {
+        let message = &waiting.message;
+        let layout = cloud::layout_of(message);
+        let limits = CloudLimits {
+            max_points: self.options.max_cloud_points,
+        };
+        let view = layout
+            .view(&message.data, &limits)
+            .map_err(|_| Drop::Malformed)?;
+        let map_from_sensor = |stamp_ns: i64| {
+            let map_from_base = self.poses.at(stamp_ns).map_err(|_| Drop::PoseGap)?;
+            let base_from_sensor = self
+                .mount(&waiting.frame, stamp_ns)
+                .map_err(|_| Drop::NoMount)?;
+            Ok(map_from_base * base_from_sensor)
+        };
+        let range = RangeLimits {
+            min_range_m: self.options.min_range_m,
+            max_range_m: self.options.max_range_m,
+        };
+        let times = waiting.times.as_deref();
+        let moved = transform_points(&view, waiting.stamp_ns, times, &range, map_from_sensor)?;
+        self.counts.points_in += view.len() as u64;
+        self.counts.points_out += moved.points_m.len() as u64;
+        self.counts.points_not_finite += moved.not_finite as u64;
+        self.counts.points_out_of_range += moved.out_of_range as u64;
+        self.counts.points_no_time += moved.no_time as u64;
+        let mut header = message.header.clone();
+        header.stamp = Time::from_ns(waiting.stamp_ns);
+        header.frame_id.clone_from(&self.options.map_frame);
+        Ok(cloud::message_from_points(
+            header,
+            &moved.points_m,
+            self.options.precision,
+        ))
+    }
+
+    fn drop_cloud(&mut self, reason: Drop) {
+        let counter = match reason {
+            Drop::Malformed => &mut self.counts.clouds_malformed,
+            Drop::BeforePoses => &mut self.counts.clouds_before_poses,
+            Drop::PoseGap => &mut self.counts.clouds_pose_gap,
+            Drop::PoseLate => &mut self.counts.clouds_pose_late,
+            Drop::NoMount => &mut self.counts.clouds_no_mount,
+            Drop::TimeJump => &mut self.counts.clouds_time_jump,
+        };
+        *counter += 1;
+    }
+}

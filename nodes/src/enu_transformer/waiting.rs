@@ -1,0 +1,114 @@
+//! Clouds that wait for the poses that cover them.
+
+use std::collections::VecDeque;
+use std::sync::Arc;
+
+use lattice_core::cloud::{CloudError, CloudLimits, NO_TIME_NS};
+use lattice_msgs::sensor_msgs::PointCloud2;
+
+use super::TransformerOptions;
+use crate::convert::cloud;
+
+/// A cloud whose layout has been checked, with the time of each point.
+pub struct WaitingCloud {
+    pub message: Arc<PointCloud2>,
+    /// Frame without a leading slash.
+    pub frame: String,
+    pub stamp_ns: i64,
+    /// Time of each point; `None`: all at the stamp.
+    pub times: Option<Vec<i64>>,
+    /// Times of the earliest and latest point.
+    pub first_ns: i64,
+    pub last_ns: i64,
+    /// When it was received.
+    pub arrived_ns: i64,
+}
+
+impl WaitingCloud {
+    pub fn new(
+        message: Arc<PointCloud2>,
+        arrived_ns: i64,
+        options: &TransformerOptions,
+    ) -> Result<Self, CloudError> {
+        let limits = CloudLimits {
+            max_points: options.max_cloud_points,
+        };
+        let stamp_ns = message.header.stamp.to_ns();
+        let layout = cloud::layout_of(&message);
+        let view = layout.view(&message.data, &limits)?;
+        let times = if options.deskew {
+            view.point_times(stamp_ns, &options.time)?
+        } else {
+            None
+        };
+        let (first_ns, last_ns) = times
+            .iter()
+            .flatten()
+            .filter(|t| **t != NO_TIME_NS)
+            .fold(None, |span, &t| match span {
+                None => Some((t, t)),
+                Some((first, last)) => Some((t.min(first), t.max(last))),
+            })
+            .unwrap_or((stamp_ns, stamp_ns));
+        Ok(Self {
+            frame: message.header.frame_id.trim_start_matches('/').to_owned(),
+            stamp_ns,
+            times,
+            first_ns,
+            last_ns,
+            arrived_ns,
+            message,
+        })
+    }
+
+    fn bytes(&self) -> usize {
+        self.message.data.len() + self.times.as_ref().map_or(0, |times| times.len() * 8)
+    }
+}
+
+/// A queue bounded in clouds and bytes; the oldest goes when it is full.
+pub struct Waiting {
+    clouds: VecDeque<WaitingCloud>,
+    bytes: usize,
+    max_clouds: usize,
+    max_bytes: usize,
+}
+
+impl Waiting {
+    pub fn new(max_clouds: usize, max_bytes: usize) -> Self {
+        Self {
+            clouds: VecDeque::new(),
+            bytes: 0,
+            max_clouds: max_clouds.max(1),
+            max_bytes,
+        }
+    }
+
+    /// Adds a cloud and says how many older ones had to go for it.
+    pub fn push(&mut self, cloud: WaitingCloud) -> u64 {
+        self.bytes += cloud.bytes();
+        self.clouds.push_back(cloud);
+        let mut dropped = 0;
+        while self.clouds.len() > self.max_clouds
+            || (self.bytes > self.max_bytes && self.clouds.len() > 1)
+        {
+            self.take(0);
+            dropped += 1;
+        }
+        dropped
+    }
+
+    pub fn get(&self, i: usize) -> Option<&WaitingCloud> {
+        self.clouds.get(i)
+    }
+
+    pub fn take(&mut self, i: usize) -> Option<WaitingCloud> {
+        let cloud = self.clouds.remove(i)?;
+        self.bytes -= cloud.bytes();
+        Some(cloud)
+    }
+
+    pub fn len(&self) -> usize {
+        self.clouds.len()
+    }
+}

@@ -1,0 +1,179 @@
+//! The map: clouds in the map frame become an occupied voxel list on a lattice.
+//!
+//! [`LatticeMapper`] is a state machine without I/O.
+
+mod counts;
+mod options;
+
+pub use counts::MapperCounts;
+pub use options::MapperOptions;
+
+use lattice_core::cloud::CloudLimits;
+use lattice_core::voxels::{DatumError, Distortion, VoxelList};
+use lattice_msgs::geographic_msgs::{GeoPoint, GeoPointStamped};
+use lattice_msgs::lattice::{LatticeMap, LatticeMapUpdate};
+use lattice_msgs::sensor_msgs::{PointCloud2, PointField};
+use thiserror::Error;
+
+use crate::convert::{cloud, geometry, map};
+
+/// Why a cloud was not mapped. The map is as it was before.
+#[derive(Debug, Error)]
+pub enum CloudRefusal {
+    /// In another frame than the map's.
+    #[error(
+        "cloud in frame '{found}', expected '{expected}': is enu_transformer between the sensor and the mapper?"
+    )]
+    Frame {
+        /// As sent.
+        found: String,
+        /// The mapper's `map_frame`.
+        expected: String,
+    },
+    /// The bytes are not what the header says.
+    #[error("malformed cloud: {0}")]
+    Malformed(#[from] lattice_core::cloud::CloudError),
+}
+
+/// Builds one occupied voxel list and tells what changed.
+pub struct LatticeMapper {
+    options: MapperOptions,
+    list: VoxelList,
+    epoch: u64,
+    sequence: u64,
+    origin: Option<GeoPoint>,
+    newest_stamp_ns: i64,
+    counts: MapperCounts,
+}
+
+impl LatticeMapper {
+    /// An empty map. `epoch` tells this map from earlier ones on the same topic.
+    ///
+    /// Refused when the datum is not a place that the lattice reaches.
+    pub fn new(options: MapperOptions, epoch: u64) -> Result<Self, DatumError> {
+        let lattice = options.lattice.clone();
+        let list = VoxelList::new(lattice, options.datum_near_m, options.max_voxels)?;
+        Ok(Self {
+            options,
+            list,
+            epoch,
+            sequence: 0,
+            origin: None,
+            newest_stamp_ns: 0,
+            counts: MapperCounts::default(),
+        })
+    }
+
+    /// Takes the geodetic origin of the map frame, which the map carries along.
+    pub fn on_origin(&mut self, origin: &GeoPointStamped) {
+        self.origin = Some(origin.position);
+    }
+
+    /// Quantizes a cloud of the map frame into the list.
+    pub fn on_cloud(&mut self, message: &PointCloud2) -> Result<(), CloudRefusal> {
+        self.counts.clouds_in += 1;
+        let frame = message.header.frame_id.trim_start_matches('/');
+        if frame != self.options.map_frame {
+            self.counts.clouds_wrong_frame += 1;
+            return Err(CloudRefusal::Frame {
+                found: frame.chars().take(64).collect(),
+                expected: self.options.map_frame.clone(),
+            });
+        }
+        let limits = CloudLimits {
+            max_points: self.options.max_cloud_points,
+        };
+        let cloud = cloud::cloud_from_message(message, &limits)
+            .inspect_err(|_| self.counts.clouds_malformed += 1)?;
+        let report = self.list.insert(&cloud);
+        self.counts.add(&report);
+        self.newest_stamp_ns = self.newest_stamp_ns.max(cloud.stamp_ns);
+        Ok(())
+    }
+
+    /// Forgets all voxels and begins a new epoch.
+    pub fn reset(&mut self, epoch: u64) {
+        self.list.clear();
+        // Followers learn of the removal by the epoch.
+        self.list.take_changes();
+        self.epoch = epoch;
+        self.sequence = 0;
+    }
+
+    /// The changes since the update before, as one step of the sequence; empty when there are none.
+    pub fn take_update(&mut self) -> Vec<LatticeMapUpdate> {
+        let changes = self.list.take_changes();
+        if changes.changed.is_empty() && changes.removed.is_empty() {
+            return Vec::new();
+        }
+        let previous = self.sequence;
+        self.sequence += 1;
+        let messages = map::update(
+            &self.list,
+            &changes.changed,
+            &changes.removed,
+            previous,
+            &self.stamp(),
+        );
+        self.counts.updates += 1;
+        messages
+    }
+
+    /// The whole map in self-contained chunks.
+    ///
+    /// It may hold changes that the next update brings again: updates carry states, not
+    /// differences, so taking both is harmless.
+    pub fn keyframe(&mut self) -> Vec<LatticeMap> {
+        self.counts.keyframes += 1;
+        map::keyframe(&self.list, &self.stamp())
+    }
+
+    /// Cell centres in the map frame, with the number of points as `intensity`.
+    pub fn centers(&self) -> PointCloud2 {
+        let voxels = self.list.sorted();
+        let mut fields = cloud::xyz_fields(PointField::FLOAT32, 4);
+        fields.push(PointField {
+            name: "intensity".into(),
+            offset: 12,
+            datatype: PointField::FLOAT32,
+            count: 1,
+        });
+        let mut data = Vec::with_capacity(voxels.len() * 16);
+        for (key, voxel) in &voxels {
+            let center = self.list.center_m(*key);
+            for v in [center.x, center.y, center.z, f64::from(voxel.count)] {
+                data.extend_from_slice(&(v as f32).to_le_bytes());
+            }
+        }
+        cloud::dense_cloud(self.header(), fields, 16, voxels.len(), data)
+    }
+
+    /// Mean squared error per dimension, mean distance and RMS of all points so far.
+    pub fn distortion(&self) -> Distortion {
+        self.list.distortion()
+    }
+
+    /// What came in and what was refused, by reason.
+    pub fn counts(&self) -> &MapperCounts {
+        &self.counts
+    }
+
+    /// The list itself.
+    pub fn list(&self) -> &VoxelList {
+        &self.list
+    }
+
+    fn header(&self) -> lattice_msgs::std_msgs::Header {
+        geometry::header(&self.options.map_frame, self.newest_stamp_ns)
+    }
+
+    fn stamp(&self) -> map::MapStamp<'_> {
+        map::MapStamp {
+            header: self.header(),
+            epoch: self.epoch,
+            sequence: self.sequence,
+            origin: self.origin.as_ref(),
+            chunk_bytes: self.options.chunk_bytes,
+        }
+    }
+}

@@ -1,0 +1,231 @@
+//! Direct replay: a log through the state machines of the nodes, in one process, without DDS.
+//!
+//! Messages pass in the order of the log, so the map depends on nothing else.
+
+mod topics;
+
+pub use topics::{Role, TopicError, TopicPlan, TopicWishes, plan};
+
+use std::sync::Arc;
+use std::time::Instant;
+
+use lattice_core::pose::StampedPose;
+use lattice_core::voxels::DatumError;
+use lattice_msgs::RosMessage;
+use lattice_msgs::cdr::{self, CdrError};
+use lattice_msgs::geometry_msgs::PoseStamped;
+use lattice_msgs::nav_msgs::Odometry;
+use lattice_msgs::novatel_oem7_msgs::{INSPVA, INSPVAX};
+use lattice_msgs::sensor_msgs::{Imu, NavSatFix, PointCloud2};
+use lattice_msgs::tf2_msgs::TFMessage;
+use serde::de::DeserializeOwned;
+
+use crate::bag::{BagMessage, BagReader, ReadOptions};
+use crate::enu_transformer::ins::InsMessage;
+use crate::enu_transformer::{EnuOutput, EnuTransformer, TransformerOptions};
+use crate::lattice_mapper::{LatticeMapper, MapperOptions};
+use crate::report::{LatticeReport, MapperReport, MarkerReport, RunReport, TransformerReport};
+use crate::voxel_marker_publisher::{MarkerOptions, VoxelMarkers};
+
+/// Epoch of maps that come from a replay: the same log gives the same bytes.
+const EPOCH: u64 = 1;
+/// Time between two updates of the map to its followers, in log time.
+const UPDATE_PERIOD_NS: i64 = 1_000_000_000;
+
+/// The machines of a replay: one transformer, any number of maps with their markers.
+pub struct Pipeline {
+    transformer: EnuTransformer,
+    branches: Vec<Branch>,
+    undecodable: u64,
+    next_update_ns: Option<i64>,
+}
+
+struct Branch {
+    mapper: LatticeMapper,
+    markers: VoxelMarkers,
+    report: MarkerReport,
+}
+
+impl Pipeline {
+    /// Machines that have seen nothing.
+    pub fn new(
+        transformer: TransformerOptions,
+        maps: impl IntoIterator<Item = MapperOptions>,
+        markers: &MarkerOptions,
+    ) -> Result<Self, DatumError> {
+        let branch = |options| {
+            Ok(Branch {
+                mapper: LatticeMapper::new(options, EPOCH)?,
+                markers: VoxelMarkers::new(markers.clone()),
+                report: MarkerReport::default(),
+            })
+        };
+        Ok(Self {
+            transformer: EnuTransformer::new(transformer),
+            branches: maps.into_iter().map(branch).collect::<Result<_, _>>()?,
+            undecodable: 0,
+            next_update_ns: None,
+        })
+    }
+
+    /// Passes one message of the log through all machines.
+    pub fn on_message(&mut self, role: Role, message: &BagMessage) {
+        match self.transform(role, message) {
+            Ok(outputs) => self.map(outputs),
+            Err(error) => {
+                self.undecodable += 1;
+                log::debug!("message at {} ns: {error}", message.log_time_ns);
+            }
+        }
+        let now_ns = message.log_time_ns;
+        let due_ns = *self.next_update_ns.get_or_insert(now_ns);
+        if now_ns >= due_ns || now_ns < due_ns.saturating_sub(UPDATE_PERIOD_NS) {
+            self.next_update_ns = Some(now_ns.saturating_add(UPDATE_PERIOD_NS));
+            self.update();
+        }
+    }
+
+    /// Ends the input and sums up.
+    pub fn finish(&mut self, source: &str, wall_s: f64) -> RunReport {
+        self.transformer.finish();
+        self.update();
+        let lattices = self.branches.iter_mut().map(Branch::finish).collect();
+        RunReport {
+            source: source.to_owned(),
+            transformer: TransformerReport {
+                counts: self.transformer.counts().clone(),
+                undecodable: self.undecodable,
+                ..TransformerReport::default()
+            },
+            lattices,
+            wall_s,
+        }
+    }
+
+    /// The maps, in the order in which their options were given.
+    pub fn mappers(&self) -> impl Iterator<Item = &LatticeMapper> {
+        self.branches.iter().map(|branch| &branch.mapper)
+    }
+
+    /// Newest pose of the machine in the map.
+    pub fn newest_pose(&self) -> Option<StampedPose> {
+        self.transformer.newest_pose()
+    }
+
+    fn transform(&mut self, role: Role, message: &BagMessage) -> Result<Vec<EnuOutput>, CdrError> {
+        let now_ns = message.log_time_ns;
+        let data = &message.data;
+        let machine = &mut self.transformer;
+        Ok(match role {
+            Role::Cloud => machine.on_cloud(Arc::new(decode::<PointCloud2>(data)?), now_ns),
+            Role::Transforms(is_static) => {
+                machine.on_tf(&decode::<TFMessage>(data)?, is_static, now_ns)
+            }
+            Role::Ins(INSPVA::TYPE) => machine.on_ins(InsMessage::Inspva(&decode(data)?), now_ns),
+            Role::Ins(INSPVAX::TYPE) => machine.on_ins(InsMessage::Inspvax(&decode(data)?), now_ns),
+            Role::Ins(NavSatFix::TYPE) => machine.on_ins(InsMessage::Fix(&decode(data)?), now_ns),
+            Role::Ins(Imu::TYPE) => machine.on_ins(InsMessage::Imu(&decode(data)?), now_ns),
+            Role::Ins(PoseStamped::TYPE) => {
+                machine.on_ins(InsMessage::Pose(&decode(data)?), now_ns)
+            }
+            Role::Ins(Odometry::TYPE) => {
+                machine.on_ins(InsMessage::Odometry(&decode(data)?), now_ns)
+            }
+            Role::Ins(_) => Vec::new(),
+        })
+    }
+
+    fn map(&mut self, outputs: Vec<EnuOutput>) {
+        for output in outputs {
+            for branch in &mut self.branches {
+                match &output {
+                    EnuOutput::Points(points) => {
+                        if let Err(refusal) = branch.mapper.on_cloud(points) {
+                            log::warn!("{refusal}");
+                        }
+                    }
+                    EnuOutput::Origin(origin) => branch.mapper.on_origin(origin),
+                    EnuOutput::Transform(_) | EnuOutput::StaticTransform(_) => {}
+                }
+            }
+        }
+    }
+
+    fn update(&mut self) {
+        for branch in &mut self.branches {
+            branch.update();
+        }
+    }
+}
+
+impl Branch {
+    /// Gives the markers what changed, as the nodes do by topics.
+    fn update(&mut self) {
+        if self.markers.voxels() == 0 {
+            for chunk in self.mapper.keyframe() {
+                if let Err(error) = self.markers.on_map(&chunk) {
+                    log::warn!("{error}");
+                }
+            }
+        }
+        for chunk in self.mapper.take_update() {
+            if let Err(error) = self.markers.on_update(&chunk) {
+                log::warn!("{error}");
+            }
+        }
+        self.report.published_bytes += bytes_of(&mut self.markers) as u64;
+    }
+
+    fn finish(&mut self) -> LatticeReport {
+        self.report.counts = self.markers.counts().clone();
+        self.report.voxels = self.markers.voxels();
+        self.markers.redraw();
+        self.report.marker_bytes = bytes_of(&mut self.markers);
+        LatticeReport {
+            map: MapperReport::of(&mut self.mapper),
+            markers: self.report.clone(),
+        }
+    }
+}
+
+/// Bytes as CDR of all arrays that are due.
+pub fn bytes_of(markers: &mut VoxelMarkers) -> usize {
+    let mut bytes = 0;
+    while markers.is_dirty() {
+        for array in markers.take_arrays(1 << 20) {
+            bytes += cdr::to_vec(&array).map_or(0, |cdr| cdr.len());
+        }
+    }
+    bytes
+}
+
+fn decode<T: DeserializeOwned>(data: &[u8]) -> Result<T, CdrError> {
+    cdr::from_slice(data)
+}
+
+/// Replays a whole log; `progress` is told how much of it has passed, from 0 to 1.
+pub fn run(
+    bag: &BagReader,
+    plan: &TopicPlan,
+    pipeline: &mut Pipeline,
+    source: &str,
+    progress: &mut dyn FnMut(f64),
+) -> Result<RunReport, TopicError> {
+    let begin = Instant::now();
+    let wanted = plan.roles.keys();
+    let topics = wanted.filter_map(|i| Some(bag.topics().get(*i)?.name.clone()));
+    let options = ReadOptions {
+        topics: Some(topics.collect()),
+        ..ReadOptions::default()
+    };
+    let start_ns = bag.start_ns().unwrap_or(0);
+    let span_ns = bag.end_ns().unwrap_or(0).saturating_sub(start_ns).max(1) as f64;
+    for message in bag.messages(&options)? {
+        let message = message?;
+        if let Some(role) = plan.roles.get(&message.topic) {
+            pipeline.on_message(*role, &message);
+        }
+        progress(message.log_time_ns.saturating_sub(start_ns) as f64 / span_ns);
+    }
+    Ok(pipeline.finish(source, begin.elapsed().as_secs_f64()))
+}

@@ -1,0 +1,128 @@
+//! Voxels by block, and the marker ids of each block.
+
+use std::collections::{BTreeMap, BTreeSet};
+
+use lattice_core::lattice::{Key, LatticeIndex};
+
+/// A cube of lattice indices: the leading bits of its voxels' keys.
+pub type BlockId = u64;
+
+/// Marker ids of a block after a change of their number.
+pub struct Ids {
+    pub current: Vec<i32>,
+    pub stale: Vec<i32>,
+}
+
+#[derive(Default)]
+struct Block {
+    keys: BTreeSet<Key>,
+    ids: Vec<i32>,
+}
+
+/// The occupied voxels by block.
+pub struct Blocks {
+    shift: u32,
+    blocks: BTreeMap<BlockId, Block>,
+    next_id: i32,
+    free_ids: Vec<i32>,
+}
+
+impl Blocks {
+    /// Blocks of `2^bits` indices a side.
+    pub fn new(bits: u32) -> Self {
+        Self {
+            shift: 3 * bits.min(20),
+            blocks: BTreeMap::new(),
+            next_id: 0,
+            free_ids: Vec::new(),
+        }
+    }
+
+    /// The block of a voxel.
+    pub fn id_of(&self, key: Key) -> BlockId {
+        key.raw() >> self.shift
+    }
+
+    /// All blocks that hold voxels or still have markers.
+    pub fn ids(&self) -> impl Iterator<Item = BlockId> + '_ {
+        self.blocks.keys().copied()
+    }
+
+    /// Voxels of a block, in order.
+    pub fn keys(&self, block: BlockId) -> impl Iterator<Item = Key> + '_ {
+        let block = self.blocks.get(&block);
+        block
+            .into_iter()
+            .flat_map(|block| block.keys.iter().copied())
+    }
+
+    /// Whether a voxel is occupied.
+    pub fn contains(&self, key: Key) -> bool {
+        let block = self.blocks.get(&self.id_of(key));
+        block.is_some_and(|block| block.keys.contains(&key))
+    }
+
+    /// Makes a voxel occupied or free; where that is news, the blocks whose faces it changes are
+    /// added to `dirty`.
+    pub fn set(
+        &mut self,
+        key: Key,
+        occupied: bool,
+        neighbors: &[LatticeIndex],
+        dirty: &mut BTreeSet<BlockId>,
+    ) {
+        let id = self.id_of(key);
+        let block = self.blocks.entry(id).or_default();
+        let changed = if occupied {
+            block.keys.insert(key)
+        } else {
+            block.keys.remove(&key)
+        };
+        if !changed {
+            return;
+        }
+        dirty.insert(id);
+        for neighbor in neighbors {
+            if let Some(near) = offset(key, neighbor) {
+                let other = self.id_of(near);
+                if other != id && self.contains(near) {
+                    dirty.insert(other);
+                }
+            }
+        }
+    }
+
+    /// Gives a block as many ids as it has markers; keeps the ones it had.
+    pub fn assign_ids(&mut self, id: BlockId, markers: usize) -> Ids {
+        let Some(block) = self.blocks.get_mut(&id) else {
+            return Ids {
+                current: Vec::new(),
+                stale: Vec::new(),
+            };
+        };
+        let stale = block.ids.split_off(markers.min(block.ids.len()));
+        while block.ids.len() < markers {
+            let id = self.free_ids.pop().unwrap_or_else(|| {
+                self.next_id += 1;
+                self.next_id
+            });
+            block.ids.push(id);
+        }
+        let current = block.ids.clone();
+        if block.keys.is_empty() {
+            self.blocks.remove(&id);
+        }
+        self.free_ids.extend(&stale);
+        Ids { current, stale }
+    }
+}
+
+/// The key at a difference of lattice indices; `None` beyond the range of keys.
+pub fn offset(key: Key, difference: &LatticeIndex) -> Option<Key> {
+    let w = key.unpack();
+    Key::pack([
+        w[0] + difference[0],
+        w[1] + difference[1],
+        w[2] + difference[2],
+    ])
+}

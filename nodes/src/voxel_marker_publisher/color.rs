@@ -1,0 +1,35 @@
+//! Colours by height.
+
+use lattice_msgs::std_msgs::ColorRGBA;
+
+/// Colour of a height: hues run through once every `period_m`.
+pub fn of_height(z_m: f64, period_m: f64, alpha: f32) -> ColorRGBA {
+    let turn = (z_m / period_m).rem_euclid(1.0);
+    let hue = 6.0 * if turn.is_finite() { turn } else { 0.0 };
+    let channel = |shift: f64| {
+        let k = (hue + shift).rem_euclid(6.0);
+        let ramp = (k - 3.0).abs() - 1.0;
+        (0.15 + 0.8 * ramp.clamp(0.0, 1.0)) as f32
+    };
+    ColorRGBA {
+        r: channel(0.0),
+        g: channel(4.0),
+        b: channel(2.0),
+        a: alpha,
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn hues_run_through_once_a_period() {
+        let at = |z_m| of_height(z_m, 12.0, 1.0);
+        assert_eq!(at(0.0), at(12.0));
+        assert_ne!(at(0.0), at(4.0));
+        assert!(at(0.0).r > 0.9 && at(0.0).g < 0.2);
+        assert!(at(4.0).g > 0.9 && at(8.0).b > 0.9);
+        assert!(at(f64::NAN).r.is_finite());
+    }
+}

@@ -1,0 +1,241 @@
+//! Markers of the map for viewers: exposed cell faces in blocks, only what changed.
+//!
+//! [`VoxelMarkers`] is a state machine without I/O.
+
+mod blocks;
+mod color;
+mod options;
+mod shape;
+
+pub use options::{ColorBy, MarkerOptions, MarkerStyle};
+
+use std::collections::BTreeSet;
+
+use lattice_msgs::geometry_msgs::Pose;
+use lattice_msgs::lattice::{LatticeMap, LatticeMapUpdate};
+use lattice_msgs::std_msgs::Header;
+use lattice_msgs::visualization_msgs::{Marker, MarkerArray};
+use serde::{Deserialize, Serialize};
+
+use self::blocks::{BlockId, Blocks};
+use crate::map_follower::{FollowError, Followed, MapFollower};
+
+/// Namespace of all markers.
+const NAMESPACE: &str = "voxels";
+/// Serialised bytes of a marker beside its points and colours, and of an array beside its markers.
+const OVERHEAD_BYTES: usize = 256;
+
+/// What the publisher took in and gave out.
+#[derive(Clone, Debug, Default, PartialEq, Eq, Serialize, Deserialize)]
+pub struct MarkerCounts {
+    /// Chunks of `map` and `map_updates` received.
+    pub messages_in: u64,
+    /// Chunks refused as malformed or too large.
+    pub messages_refused: u64,
+    /// Times that a keyframe was found to be needed.
+    pub gaps: u64,
+    /// Arrays given out.
+    pub arrays_out: u64,
+    /// Markers added or replaced.
+    pub markers_added: u64,
+    /// Markers deleted.
+    pub markers_deleted: u64,
+}
+
+/// Follows a map and keeps the markers of its blocks up to date.
+pub struct VoxelMarkers {
+    options: MarkerOptions,
+    follower: MapFollower,
+    blocks: Blocks,
+    dirty: BTreeSet<BlockId>,
+    wipe: bool,
+    style: MarkerStyle,
+    counts: MarkerCounts,
+}
+
+impl VoxelMarkers {
+    /// Markers of no map yet.
+    pub fn new(options: MarkerOptions) -> Self {
+        Self {
+            follower: MapFollower::new(options.max_voxels),
+            blocks: Blocks::new(options.block_bits),
+            dirty: BTreeSet::new(),
+            wipe: true,
+            style: options.style,
+            counts: MarkerCounts::default(),
+            options,
+        }
+    }
+
+    /// Takes a chunk of a keyframe.
+    pub fn on_map(&mut self, message: &LatticeMap) -> Result<Followed, FollowError> {
+        let result = self.follower.on_map(message);
+        self.after(result)
+    }
+
+    /// Takes a chunk of an update.
+    pub fn on_update(&mut self, message: &LatticeMapUpdate) -> Result<Followed, FollowError> {
+        let result = self.follower.on_update(message);
+        self.after(result)
+    }
+
+    /// Draws everything again, for a viewer that has just come.
+    pub fn redraw(&mut self) {
+        self.wipe = true;
+        self.dirty = self.blocks.ids().collect();
+    }
+
+    /// Whether there is something to publish.
+    pub fn is_dirty(&self) -> bool {
+        self.follower.map().is_some() && (self.wipe || !self.dirty.is_empty())
+    }
+
+    /// Arrays of the blocks that changed, of at most `budget_bytes` together (but at least one
+    /// block); the rest stays for the next call.
+    pub fn take_arrays(&mut self, budget_bytes: usize) -> Vec<MarkerArray> {
+        let mut arrays = Vec::new();
+        let Some(map) = self.follower.map() else {
+            return arrays;
+        };
+        let header = Header {
+            frame_id: map.frame_id.clone(),
+            ..Header::default()
+        };
+        let mut packer = Packer::new(self.options.chunk_bytes);
+        if self.wipe {
+            self.wipe = false;
+            packer.push(bare(&header, 0, Marker::DELETEALL), &mut arrays);
+        }
+        while packer.total_bytes < budget_bytes {
+            let Some(block) = self.dirty.pop_first() else {
+                break;
+            };
+            let shapes = shape::of_block(map, &self.blocks, block, self.style, &self.options);
+            let ids = self.blocks.assign_ids(block, shapes.len());
+            for id in ids.stale {
+                self.counts.markers_deleted += 1;
+                packer.push(bare(&header, id, Marker::DELETE), &mut arrays);
+            }
+            for (id, mut marker) in ids.current.into_iter().zip(shapes) {
+                self.counts.markers_added += 1;
+                marker.id = id;
+                marker.ns = NAMESPACE.to_owned();
+                marker.header = header.clone();
+                // RViz keeps the old cubes of a list unless it is deleted first.
+                if marker.type_ == Marker::CUBE_LIST {
+                    packer.push(bare(&header, id, Marker::DELETE), &mut arrays);
+                }
+                packer.push(marker, &mut arrays);
+            }
+        }
+        packer.finish(&mut arrays);
+        self.counts.arrays_out += arrays.len() as u64;
+        arrays
+    }
+
+    /// What came in and went out.
+    pub fn counts(&self) -> &MarkerCounts {
+        &self.counts
+    }
+
+    /// Voxels of the map at hand.
+    pub fn voxels(&self) -> usize {
+        self.follower.map().map_or(0, |map| map.voxels().len())
+    }
+
+    /// The style drawn now: the cheap one when the map is larger than `max_marker_voxels`.
+    pub fn style(&self) -> MarkerStyle {
+        self.style
+    }
+
+    fn after(&mut self, result: Result<Followed, FollowError>) -> Result<Followed, FollowError> {
+        self.counts.messages_in += 1;
+        match &result {
+            Err(_) => self.counts.messages_refused += 1,
+            Ok(Followed::NeedKeyframe) => self.counts.gaps += 1,
+            Ok(_) => {}
+        }
+        let (touched, replaced) = self.follower.take_touched();
+        let Some(map) = self.follower.map() else {
+            return result;
+        };
+        if replaced {
+            self.blocks = Blocks::new(self.options.block_bits);
+            self.dirty.clear();
+            self.wipe = true;
+        }
+        let neighbors = map.lattice.face_neighbors();
+        for key in touched {
+            let occupied = map.voxels().contains_key(&key);
+            self.blocks.set(key, occupied, neighbors, &mut self.dirty);
+        }
+        let wanted = if map.voxels().len() > self.options.max_marker_voxels {
+            MarkerStyle::Points
+        } else {
+            self.options.style
+        };
+        if wanted != self.style {
+            self.style = wanted;
+            self.redraw();
+        }
+        result
+    }
+}
+
+/// A marker without points that deletes.
+fn bare(header: &Header, id: i32, action: i32) -> Marker {
+    let mut pose = Pose::default();
+    pose.orientation.w = 1.0;
+    Marker {
+        header: header.clone(),
+        ns: NAMESPACE.to_owned(),
+        id,
+        action,
+        pose,
+        ..Marker::default()
+    }
+}
+
+/// Bytes of a marker on the wire, rounded up.
+fn marker_bytes(marker: &Marker) -> usize {
+    OVERHEAD_BYTES
+        + marker.header.frame_id.len()
+        + marker.points.len() * 24
+        + marker.colors.len() * 16
+}
+
+/// Fills arrays up to a size.
+struct Packer {
+    chunk_bytes: usize,
+    open: MarkerArray,
+    open_bytes: usize,
+    total_bytes: usize,
+}
+
+impl Packer {
+    fn new(chunk_bytes: usize) -> Self {
+        Self {
+            chunk_bytes,
+            open: MarkerArray::default(),
+            open_bytes: 0,
+            total_bytes: 0,
+        }
+    }
+
+    fn push(&mut self, marker: Marker, arrays: &mut Vec<MarkerArray>) {
+        let bytes = marker_bytes(&marker);
+        if self.open_bytes + bytes > self.chunk_bytes {
+            self.finish(arrays);
+        }
+        self.open_bytes += bytes;
+        self.total_bytes += bytes;
+        self.open.markers.push(marker);
+    }
+
+    fn finish(&mut self, arrays: &mut Vec<MarkerArray>) {
+        if !self.open.markers.is_empty() {
+            arrays.push(std::mem::take(&mut self.open));
+        }
+        self.open_bytes = 0;
+    }
+}

@@ -1,0 +1,155 @@
+//! The markers of one block: true cells, cubes or points.
+
+use lattice_msgs::geometry_msgs::{Point, Pose, Vector3 as ScaleVector};
+use lattice_msgs::std_msgs::ColorRGBA;
+use lattice_msgs::visualization_msgs::Marker;
+use nalgebra::Vector3;
+
+use super::blocks::{BlockId, Blocks, offset};
+use super::options::{ColorBy, MarkerOptions, MarkerStyle};
+use super::{OVERHEAD_BYTES, color};
+use crate::map_follower::FollowedMap;
+
+/// Markers of a block, without header and ids; none when nothing of it is exposed.
+pub fn of_block(
+    map: &FollowedMap,
+    blocks: &Blocks,
+    block: BlockId,
+    style: MarkerStyle,
+    options: &MarkerOptions,
+) -> Vec<Marker> {
+    let Some(first) = blocks.keys(block).next() else {
+        return Vec::new();
+    };
+    let mut builder = Builder::new(style, options, map.lattice.cell_volume_m3().cbrt());
+    builder.origin_m = map.center_m(first);
+    let cell = map.lattice.cell();
+    for key in blocks.keys(block) {
+        let center_m = map.center_m(key);
+        let mut exposed = cell.faces.iter().filter(|face| {
+            offset(key, &face.neighbor).is_none_or(|neighbor| !blocks.contains(neighbor))
+        });
+        if style == MarkerStyle::Cells {
+            for face in exposed {
+                let corners: Vec<Vector3<f64>> = face
+                    .vertices
+                    .iter()
+                    .filter_map(|&i| cell.vertices.get(usize::from(i)))
+                    .map(|corner| center_m + corner)
+                    .collect();
+                builder.polygon(&corners);
+            }
+        } else if exposed.next().is_some() {
+            builder.point(&center_m);
+        }
+    }
+    builder.finish()
+}
+
+/// Collects points into markers of bounded size.
+struct Builder<'a> {
+    style: MarkerStyle,
+    options: &'a MarkerOptions,
+    side_m: f64,
+    origin_m: Vector3<f64>,
+    max_points: usize,
+    points: Vec<Point>,
+    colors: Vec<ColorRGBA>,
+    markers: Vec<Marker>,
+}
+
+impl<'a> Builder<'a> {
+    fn new(style: MarkerStyle, options: &'a MarkerOptions, side_m: f64) -> Self {
+        let point_bytes = match options.color_by {
+            ColorBy::Height => 24 + 16,
+            ColorBy::Flat => 24,
+        };
+        let room = options.chunk_bytes.saturating_sub(2 * OVERHEAD_BYTES);
+        Self {
+            style,
+            options,
+            side_m,
+            origin_m: Vector3::zeros(),
+            // Whole polygons must fit: those of six corners have four triangles.
+            max_points: (room / point_bytes).max(12),
+            points: Vec::new(),
+            colors: Vec::new(),
+            markers: Vec::new(),
+        }
+    }
+
+    /// Adds a convex polygon as a fan of triangles.
+    fn polygon(&mut self, corners: &[Vector3<f64>]) {
+        let [apex, rest @ ..] = corners else { return };
+        self.make_room(3 * rest.len().saturating_sub(1));
+        for edge in rest.windows(2) {
+            for corner in std::iter::once(apex).chain(edge) {
+                self.push(corner);
+            }
+        }
+    }
+
+    fn point(&mut self, at_m: &Vector3<f64>) {
+        self.make_room(1);
+        self.push(at_m);
+    }
+
+    fn make_room(&mut self, points: usize) {
+        if self.points.len() + points > self.max_points {
+            self.close();
+        }
+    }
+
+    fn push(&mut self, at_m: &Vector3<f64>) {
+        let p = at_m - self.origin_m;
+        self.points.push(Point {
+            x: p.x,
+            y: p.y,
+            z: p.z,
+        });
+        if self.options.color_by == ColorBy::Height {
+            let period_m = self.options.height_period_m;
+            let color = color::of_height(at_m.z, period_m, self.options.alpha);
+            self.colors.push(color);
+        }
+    }
+
+    fn close(&mut self) {
+        if self.points.is_empty() {
+            return;
+        }
+        let (type_, scale) = match self.style {
+            MarkerStyle::Cells => (Marker::TRIANGLE_LIST, 1.0),
+            MarkerStyle::Cubes => (Marker::CUBE_LIST, self.side_m),
+            MarkerStyle::Points => (Marker::POINTS, 0.5 * self.side_m),
+        };
+        let mut pose = Pose::default();
+        pose.position.x = self.origin_m.x;
+        pose.position.y = self.origin_m.y;
+        pose.position.z = self.origin_m.z;
+        pose.orientation.w = 1.0;
+        self.markers.push(Marker {
+            type_,
+            action: Marker::ADD,
+            pose,
+            scale: ScaleVector {
+                x: scale,
+                y: scale,
+                z: scale,
+            },
+            color: color::of_height(
+                self.origin_m.z,
+                self.options.height_period_m,
+                self.options.alpha,
+            ),
+            points: std::mem::take(&mut self.points),
+            colors: std::mem::take(&mut self.colors),
+            ..Marker::default()
+        });
+    }
+
+    fn finish(mut self) -> Vec<Marker> {
+        self.close();
+        self.markers
+    }
+}

@@ -1,0 +1,14 @@
+//! Real data beside the checkout; not part of the repository.
+
+use std::path::PathBuf;
+
+/// `../shared/data/NAME` beside the repository, or `None` with a printed line when it is absent.
+pub fn shared(name: &str) -> Option<PathBuf> {
+    let root = PathBuf::from(env!("CARGO_MANIFEST_DIR"));
+    let path = root.parent()?.parent()?.join("shared/data").join(name);
+    if path.exists() {
+        return Some(path);
+    }
+    eprintln!("SKIPPED: no {} beside the repository", path.display());
+    None
+}

@@ -1,0 +1,250 @@
+//! The marker publisher's logic: cell shapes, exposed faces, chunks, ADD and DELETE.
+
+use std::collections::BTreeMap;
+
+use lattice_core::lattice::{Lattice, LatticeKind};
+use lattice_msgs::cdr;
+use lattice_msgs::visualization_msgs::{Marker, MarkerArray};
+use lattice_nodes::lattice_mapper::{LatticeMapper, MapperOptions};
+use lattice_nodes::voxel_marker_publisher::{MarkerOptions, MarkerStyle, VoxelMarkers};
+use lattice_test::clouds::cloud;
+use nalgebra::Vector3;
+
+/// A mapper, its markers, and a viewer that obeys the markers.
+struct Bench {
+    mapper: LatticeMapper,
+    markers: VoxelMarkers,
+    shown: BTreeMap<(String, i32), Marker>,
+}
+
+impl Bench {
+    fn new(kind: LatticeKind, options: MarkerOptions) -> Self {
+        let lattice = Lattice::new(kind, 0.125).unwrap();
+        let mut mapper = LatticeMapper::new(MapperOptions::new(lattice), 1).unwrap();
+        let mut markers = VoxelMarkers::new(options);
+        for chunk in mapper.keyframe() {
+            markers.on_map(&chunk).unwrap();
+        }
+        Self {
+            mapper,
+            markers,
+            shown: BTreeMap::new(),
+        }
+    }
+
+    fn insert(&mut self, points: &[[f32; 3]]) -> Vec<MarkerArray> {
+        self.mapper.on_cloud(&cloud("map", 1, points)).unwrap();
+        for chunk in self.mapper.take_update() {
+            self.markers.on_update(&chunk).unwrap();
+        }
+        self.draw()
+    }
+
+    fn draw(&mut self) -> Vec<MarkerArray> {
+        let mut all = Vec::new();
+        while self.markers.is_dirty() {
+            all.extend(self.markers.take_arrays(1 << 20));
+        }
+        for marker in all.iter().flat_map(|array| &array.markers) {
+            let identity = (marker.ns.clone(), marker.id);
+            match marker.action {
+                Marker::ADD => {
+                    assert_ne!(marker.scale.x, 0.0);
+                    assert_eq!(marker.pose.orientation.w, 1.0);
+                    assert!(
+                        !marker.points.is_empty(),
+                        "an empty ADD is an error in Foxglove"
+                    );
+                    assert!(marker.colors.is_empty() || marker.colors.len() == marker.points.len());
+                    self.shown.insert(identity, marker.clone());
+                }
+                Marker::DELETE => {
+                    self.shown.remove(&identity);
+                }
+                Marker::DELETEALL => self.shown.clear(),
+                other => panic!("action {other}"),
+            }
+        }
+        all
+    }
+
+    fn shown_points(&self) -> usize {
+        self.shown.values().map(|marker| marker.points.len()).sum()
+    }
+
+    /// Triangles of all shown markers, in the map frame.
+    fn triangles(&self) -> Vec<[Vector3<f64>; 3]> {
+        let mut triangles = Vec::new();
+        for marker in self.shown.values() {
+            assert_eq!(marker.type_, Marker::TRIANGLE_LIST);
+            let p = &marker.pose.position;
+            let origin = Vector3::new(p.x, p.y, p.z);
+            let points: Vec<_> = marker
+                .points
+                .iter()
+                .map(|p| origin + Vector3::new(p.x, p.y, p.z))
+                .collect();
+            triangles.extend(points.chunks_exact(3).map(|t| [t[0], t[1], t[2]]));
+        }
+        triangles
+    }
+}
+
+/// Volume inside a closed surface of outward triangles.
+fn volume(triangles: &[[Vector3<f64>; 3]]) -> f64 {
+    let volume = |t: &[Vector3<f64>; 3]| t[0].dot(&t[1].cross(&t[2])) / 6.0;
+    triangles.iter().map(volume).sum()
+}
+
+fn line(n: usize, step: f32) -> Vec<[f32; 3]> {
+    (0..n).map(|i| [i as f32 * step, 0.1, 0.2]).collect()
+}
+
+#[test]
+fn one_voxel_is_its_whole_cell() {
+    // 6 squares; 6 squares and 8 hexagons; 12 rhombs; 14 faces like BCC; a hexagonal prism.
+    for (kind, triangles) in LatticeKind::ALL.into_iter().zip([12, 44, 24, 44, 20]) {
+        let mut bench = Bench::new(kind, MarkerOptions::default());
+        bench.insert(&[[3.0, 4.0, 5.0]]);
+        assert_eq!(bench.triangles().len(), triangles, "{kind}");
+        assert!((volume(&bench.triangles()) - 0.125).abs() < 1e-12, "{kind}");
+    }
+}
+
+#[test]
+fn only_exposed_faces_are_drawn_across_blocks_too() {
+    for kind in LatticeKind::ALL {
+        for block_bits in [1, 3, 6] {
+            let options = MarkerOptions {
+                block_bits,
+                ..MarkerOptions::default()
+            };
+            let mut bench = Bench::new(kind, options);
+            bench.insert(&line(40, 0.2));
+            let voxels = bench.mapper.list().len();
+            let triangles = bench.triangles();
+            // Closed, so its volume is that of the voxels, and no face is there from both sides.
+            assert!(
+                (volume(&triangles) - 0.125 * voxels as f64).abs() < 1e-9,
+                "{kind}"
+            );
+            let mut centers: Vec<_> = triangles
+                .iter()
+                .map(|t| ((t[0] + t[1] + t[2]) * 1e6).map(|v| v.round() as i64))
+                .map(|c| [c.x, c.y, c.z])
+                .collect();
+            centers.sort_unstable();
+            assert!(centers.windows(2).all(|pair| pair[0] != pair[1]), "{kind}");
+        }
+    }
+}
+
+#[test]
+fn growing_by_parts_ends_as_all_at_once() {
+    let points = line(200, 0.13);
+    let mut parts = Bench::new(LatticeKind::Fcc, MarkerOptions::default());
+    for part in points.chunks(7) {
+        parts.insert(part);
+    }
+    let mut whole = Bench::new(LatticeKind::Fcc, MarkerOptions::default());
+    whole.insert(&points);
+    assert_eq!(parts.shown_points(), whole.shown_points());
+    let difference = volume(&parts.triangles()) - volume(&whole.triangles());
+    assert!(difference.abs() < 1e-9);
+}
+
+#[test]
+fn only_what_changed_is_published_again() {
+    let mut bench = Bench::new(LatticeKind::Fcc, MarkerOptions::default());
+    bench.insert(&line(400, 0.2));
+    let markers = bench.shown.len();
+    assert!(markers > 10);
+    let again = bench.insert(&line(400, 0.2));
+    assert!(
+        again.is_empty(),
+        "more points in the same voxels change no face"
+    );
+    let far = bench.insert(&[[40.0, 0.1, 6.0]]);
+    let touched: usize = far.iter().map(|array| array.markers.len()).sum();
+    assert!(touched <= 2, "{touched} of {markers} markers for one voxel");
+}
+
+#[test]
+fn arrays_are_small_enough_not_to_be_fragmented() {
+    for style in [MarkerStyle::Cells, MarkerStyle::Cubes, MarkerStyle::Points] {
+        let options = MarkerOptions {
+            style,
+            block_bits: 6,
+            ..MarkerOptions::default()
+        };
+        let mut bench = Bench::new(LatticeKind::Bcc, options);
+        let points: Vec<_> = (0..10_000)
+            .map(|i| [(i % 100) as f32 * 0.3, (i / 100) as f32 * 0.3, 0.0])
+            .collect();
+        for array in bench.insert(&points) {
+            let bytes = cdr::to_vec(&array).unwrap().len();
+            assert!(bytes <= 60_000, "{style:?}: {bytes}");
+        }
+        assert!(bench.shown_points() > 0);
+    }
+}
+
+#[test]
+fn cubes_are_deleted_before_they_are_replaced() {
+    let options = MarkerOptions {
+        style: MarkerStyle::Cubes,
+        ..MarkerOptions::default()
+    };
+    let mut bench = Bench::new(LatticeKind::Mcc, options);
+    bench.insert(&line(3, 1.0));
+    let again = bench.insert(&line(4, 1.0));
+    let actions: Vec<i32> = again[0]
+        .markers
+        .iter()
+        .map(|marker| marker.action)
+        .collect();
+    assert_eq!(&actions[..2], [Marker::DELETE, Marker::ADD]);
+    assert_eq!(bench.shown_points(), 4);
+    let side = bench.shown.values().next().unwrap().scale.x;
+    assert!((side - 0.5).abs() < 1e-12);
+}
+
+#[test]
+fn a_reset_map_takes_all_markers_away() {
+    let mut bench = Bench::new(LatticeKind::Fcc, MarkerOptions::default());
+    bench.insert(&line(100, 0.5));
+    bench.mapper.reset(2);
+    for chunk in bench.mapper.keyframe() {
+        bench.markers.on_map(&chunk).unwrap();
+    }
+    bench.draw();
+    assert!(bench.shown.is_empty());
+    bench.insert(&line(1, 1.0));
+    assert_eq!(bench.triangles().len(), 24);
+}
+
+#[test]
+fn a_viewer_that_joins_late_gets_everything() {
+    let mut bench = Bench::new(LatticeKind::Fcc, MarkerOptions::default());
+    bench.insert(&line(100, 0.5));
+    let before = std::mem::take(&mut bench.shown);
+    bench.markers.redraw();
+    bench.draw();
+    let points =
+        |shown: &BTreeMap<_, Marker>| shown.values().map(|m| m.points.len()).sum::<usize>();
+    assert_eq!(points(&bench.shown), points(&before));
+}
+
+#[test]
+fn a_map_too_large_for_cells_is_drawn_as_points() {
+    let options = MarkerOptions {
+        max_marker_voxels: 50,
+        ..MarkerOptions::default()
+    };
+    let mut bench = Bench::new(LatticeKind::Fcc, options);
+    bench.insert(&line(20, 1.0));
+    assert_eq!(bench.markers.style(), MarkerStyle::Cells);
+    bench.insert(&line(100, 1.0));
+    assert_eq!(bench.markers.style(), MarkerStyle::Points);
+    assert_eq!(bench.shown_points(), 100);
+}
