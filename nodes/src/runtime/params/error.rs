@@ -61,20 +61,18 @@ pub enum ParamError {
         source: ValueError,
     },
     /// The value has another type than the node asks for.
-    #[error("parameter `{name}` of {node}: expected {expected}, found {found} ({origin}){hint}")]
+    #[error("parameter `{name}` of {node}: expected {expected}, found {found} ({origin})")]
     Type {
         /// The node's full name.
         node: String,
         /// The parameter.
         name: String,
-        /// The type the node asks for.
+        /// The type the node asks for, and how to write it.
         expected: &'static str,
         /// Type and value that were given.
         found: String,
         /// Where it was given.
         origin: String,
-        /// How to write it instead.
-        hint: &'static str,
     },
     /// The value has the right type and cannot be used.
     #[error("parameter `{name}` of {node} = {value} ({origin}): {problem}")]

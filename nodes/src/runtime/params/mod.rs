@@ -185,13 +185,13 @@ impl Params {
         let value = self
             .declared_lock()
             .get(name)
-            .map(|declared| declared.value.to_string());
+            .map(|declared| brief(&declared.value));
         let given = self.given.get(name);
         ParamError::Invalid {
             node: self.node.clone(),
             name: name.to_owned(),
             value: value
-                .or_else(|| given.map(|given| given.value.to_string()))
+                .or_else(|| given.map(|given| brief(&given.value)))
                 .unwrap_or_default(),
             origin: given
                 .map_or(&Origin::Default, |given| &given.origin)
@@ -230,11 +230,10 @@ pub struct Described<'a> {
 impl Described<'_> {
     /// See [`Params::bool`].
     pub fn bool(&self, name: &str, default: bool) -> Result<bool, ParamError> {
-        let hint = "; write true or false";
         self.read(
             name,
             default,
-            ("a bool", hint),
+            "a bool (true or false)",
             ParamValue::as_bool,
             ParamValue::Bool,
         )
@@ -242,11 +241,10 @@ impl Described<'_> {
 
     /// See [`Params::i64`].
     pub fn i64(&self, name: &str, default: i64) -> Result<i64, ParamError> {
-        let hint = "; write it without point, exponent and quotes";
         self.read(
             name,
             default,
-            ("an integer", hint),
+            "an integer (no point, no exponent, no quotes)",
             ParamValue::as_i64,
             ParamValue::I64,
         )
@@ -254,11 +252,10 @@ impl Described<'_> {
 
     /// See [`Params::f64`].
     pub fn f64(&self, name: &str, default: f64) -> Result<f64, ParamError> {
-        let hint = "; write it with a point and without quotes";
         self.read(
             name,
             default,
-            ("a float", hint),
+            "a float (with a point, no quotes)",
             |value| self.float(name, value),
             ParamValue::F64,
         )
@@ -266,12 +263,11 @@ impl Described<'_> {
 
     /// See [`Params::string`].
     pub fn string(&self, name: &str, default: &str) -> Result<String, ParamError> {
-        let hint = "; put it in quotes";
         let text = |value: &ParamValue| value.as_str().map(str::to_owned);
         self.read(
             name,
             default.to_owned(),
-            ("a text", hint),
+            "a text (in quotes)",
             text,
             ParamValue::String,
         )
@@ -279,21 +275,21 @@ impl Described<'_> {
 
     /// See [`Params::i64_array`].
     pub fn i64_array(&self, name: &str, default: &[i64]) -> Result<Vec<i64>, ParamError> {
-        let expected = ("a list of integers", "; write [1, 2]");
+        let expected = "a list of integers ([1, 2])";
         let list = |value: &ParamValue| list(value, ParamValue::as_i64);
         self.read(name, default.to_vec(), expected, list, ParamValue::I64Array)
     }
 
     /// See [`Params::f64_array`].
     pub fn f64_array(&self, name: &str, default: &[f64]) -> Result<Vec<f64>, ParamError> {
-        let expected = ("a list of floats", "; write [1.0, 2.0]");
+        let expected = "a list of floats ([1.0, 2.0])";
         let list = |value: &ParamValue| list(value, |item| self.float(name, item));
         self.read(name, default.to_vec(), expected, list, ParamValue::F64Array)
     }
 
     /// See [`Params::string_array`].
     pub fn string_array(&self, name: &str, default: &[&str]) -> Result<Vec<String>, ParamError> {
-        let expected = ("a list of texts", "; write [\"a\", \"b\"]");
+        let expected = "a list of texts ([\"a\", \"b\"])";
         let list = |value: &ParamValue| list(value, |item| item.as_str().map(str::to_owned));
         let default = default.iter().map(|text| (*text).to_owned()).collect();
         self.read(name, default, expected, list, ParamValue::StringArray)
@@ -311,7 +307,7 @@ impl Described<'_> {
         &self,
         name: &str,
         default: T,
-        (expected, hint): (&'static str, &'static str),
+        expected: &'static str,
         convert: impl Fn(&ParamValue) -> Option<T>,
         wrap: impl Fn(T) -> ParamValue,
     ) -> Result<T, ParamError> {
@@ -321,9 +317,8 @@ impl Described<'_> {
                 node: self.params.node.clone(),
                 name: name.to_owned(),
                 expected,
-                found: format!("{} {value}", value.type_name()),
+                found: format!("{} {}", value.type_name(), brief(value)),
                 origin: origin.to_string(),
-                hint,
             })?,
         };
         let mut declared = self.params.declared_lock();
@@ -337,6 +332,11 @@ impl Described<'_> {
         }
         Ok(value)
     }
+}
+
+/// A value for a message, not longer than a line or two.
+fn brief(value: &ParamValue) -> String {
+    value.to_string().chars().take(160).collect()
 }
 
 fn list<T>(value: &ParamValue, item: impl Fn(&ParamValue) -> Option<T>) -> Option<Vec<T>> {
