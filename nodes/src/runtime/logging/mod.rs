@@ -125,6 +125,7 @@ fn line(record: &Record<'_>, now_ns: u128, source: &str) -> String {
 mod tests {
     use super::*;
     use log::Level;
+    use std::sync::Mutex;
 
     #[test]
     fn lines_look_like_those_of_rcutils() {
@@ -146,5 +147,43 @@ mod tests {
         assert_eq!(source("lattice_nodes", "front"), "front");
         assert_eq!(source("rustdds::network", "front"), "front");
         assert_eq!(source("lattice_mapper", "front"), "lattice_mapper");
+    }
+
+    #[test]
+    fn the_sink_gets_what_passes_and_not_its_own_messages() {
+        static TEE: OnceLock<Tee> = OnceLock::new();
+        static HEARD: Mutex<Vec<String>> = Mutex::new(Vec::new());
+        let console = Builder::new().filter_level(log::LevelFilter::Info).build();
+        let node_name = "front".to_owned();
+        let log = TEE.get_or_init(|| Tee {
+            console,
+            to_console: false,
+            node_name,
+        });
+        let heard = |record: &Record<'_>, node: &str| {
+            HEARD
+                .lock()
+                .unwrap()
+                .push(format!("{node}: {}", record.args()));
+            let _ = TEE
+                .get()
+                .map(|log| send(log, Level::Error, format_args!("from the sink")));
+        };
+        assert!(tee(Box::new(heard)));
+        assert!(!tee(Box::new(|_, _| {})), "there is one already");
+        send(log, Level::Info, format_args!("one"));
+        send(log, Level::Debug, format_args!("two"));
+        send(log, Level::Warn, format_args!("three"));
+        assert_eq!(*HEARD.lock().unwrap(), ["front: one", "front: three"]);
+    }
+
+    fn send(log: &Tee, level: Level, text: std::fmt::Arguments<'_>) {
+        log.log(
+            &Record::builder()
+                .level(level)
+                .target("lattice_nodes")
+                .args(text)
+                .build(),
+        );
     }
 }

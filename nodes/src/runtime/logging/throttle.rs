@@ -73,6 +73,7 @@ macro_rules! log_throttled {
 #[cfg(test)]
 mod tests {
     use super::*;
+    use std::sync::Mutex;
 
     #[test]
     fn one_message_per_period_and_a_count_of_the_rest() {
@@ -100,14 +101,34 @@ mod tests {
         assert_eq!(throttle.suppressed.load(Ordering::Relaxed), 3999);
     }
 
-    #[test]
-    fn the_macro_formats_and_throttles() {
-        for attempt in 0..3 {
-            log_throttled!(
-                log::Level::Debug,
-                Duration::from_secs(3600),
-                "attempt {attempt}"
-            );
+    /// Keeps what is logged from this module.
+    struct Memory(Mutex<Vec<String>>);
+
+    impl log::Log for Memory {
+        fn enabled(&self, _: &log::Metadata<'_>) -> bool {
+            true
         }
+
+        fn log(&self, record: &log::Record<'_>) {
+            if record.target() == module_path!() {
+                self.0.lock().unwrap().push(record.args().to_string());
+            }
+        }
+
+        fn flush(&self) {}
+    }
+
+    #[test]
+    fn the_macro_logs_once_per_period() {
+        static MEMORY: Memory = Memory(Mutex::new(Vec::new()));
+        log::set_logger(&MEMORY).unwrap();
+        log::set_max_level(log::LevelFilter::Trace);
+        for attempt in 0..3 {
+            log_throttled!(log::Level::Warn, Duration::MAX, "one {attempt}");
+        }
+        for attempt in 0..2 {
+            log_throttled!(log::Level::Warn, Duration::ZERO, "two {attempt}");
+        }
+        assert_eq!(*MEMORY.0.lock().unwrap(), ["one 0", "two 0", "two 1"]);
     }
 }
