@@ -2,4 +2,5 @@
 
 pub mod clouds;
 pub mod data;
+pub mod domain;
 pub mod python;

@@ -1,0 +1,322 @@
+//! What the nodes of a process share: the participant, the threads, the local bus.
+
+use std::sync::{Arc, Mutex, Weak};
+use std::thread::JoinHandle;
+use std::time::{Duration, Instant};
+
+use lattice_msgs::RosMessage;
+use rustdds::RTPSEntity;
+use smol::Task;
+use smol::channel::{Sender, bounded};
+
+use super::clock::SimTime;
+use super::dds::events::Endpoints;
+use super::dds::participant::Dds;
+use super::dds::reader::DdsReader;
+use super::dds::writer::{DdsWriter, WhenFull};
+use super::diagnostics::Tasks;
+use super::error::RuntimeError;
+use super::graph::{self, EndpointKind, Graph, NodeId};
+use super::local_bus::{LocalBus, Membership};
+use super::names;
+use super::peers::Peers;
+use super::publisher;
+use super::qos::{Durability, Qos, Reliability};
+use super::service::Server;
+use super::shutdown::Shutdown;
+use super::subscription::{Load, Running, Source, Stats, Subscription, spawn_reader};
+use super::sync::lock;
+use super::transport_status::ReceiveBuffer;
+use super::worker::Worker;
+
+/// Messages that wait in the queue of one publisher, at most.
+const QUEUE_MESSAGES: usize = 1024;
+
+/// Bytes that wait in the queue of one publisher, at most.
+const QUEUE_BYTES: usize = 128 << 20;
+
+/// Messages of a reliable publisher in this process that wait for a subscription, at least.
+const RELIABLE_LOCAL_MESSAGES: usize = 1024;
+
+/// Time to send what is queued when shutting down.
+const DRAIN_TIME: Duration = Duration::from_secs(2);
+
+/// Length of a message that is accepted unless a parameter says otherwise.
+pub(crate) const DEFAULT_MAX_MESSAGE_BYTES: usize = 64 << 20;
+
+pub(crate) struct Core {
+    pub bus: LocalBus,
+    pub shutdown: Shutdown,
+    pub io: Worker,
+    pub tasks: Arc<Tasks>,
+    pub receive_buffer: ReceiveBuffer,
+    pub sim_time: Mutex<Option<SimTime>>,
+    publishing: Worker,
+    pub endpoints: Arc<Endpoints>,
+    pub graph: Arc<Graph>,
+    open: Mutex<Option<Open>>,
+}
+
+/// Gone after shutdown.
+struct Open {
+    dds: Dds,
+    _watch: Option<Task<()>>,
+    publishers: Vec<Weak<publisher::Core>>,
+    subscriptions: Vec<Weak<Stats>>,
+    readers: Vec<(Sender<()>, JoinHandle<()>)>,
+    servers: Vec<Server>,
+    graph: Option<Task<()>>,
+}
+
+impl Core {
+    pub(crate) fn start(domain: u16, localhost_only: bool) -> Result<Arc<Self>, RuntimeError> {
+        let shutdown = Shutdown::default();
+        let io = Worker::start("io", shutdown.clone())?;
+        let publishing = Worker::start("publisher", shutdown.clone())?;
+        let dds = Dds::join(domain, localhost_only)?;
+        let endpoints = Arc::new(Endpoints::default());
+        let watch = io.spawn(Arc::clone(&endpoints).watch(dds.participant().clone()));
+        let core = Arc::new(Self {
+            bus: LocalBus::default(),
+            shutdown,
+            io,
+            tasks: Arc::default(),
+            receive_buffer: ReceiveBuffer::probe(),
+            sim_time: Mutex::default(),
+            publishing,
+            endpoints,
+            graph: Graph::new(),
+            open: Mutex::new(Some(Open {
+                dds,
+                _watch: watch,
+                publishers: Vec::new(),
+                subscriptions: Vec::new(),
+                readers: Vec::new(),
+                servers: Vec::new(),
+                graph: None,
+            })),
+        });
+        core.publish_graph()?;
+        Ok(core)
+    }
+
+    fn publish_graph(&self) -> Result<(), RuntimeError> {
+        let (topic, qos) = (graph::TOPIC.to_owned(), Qos::latched(1));
+        let writer = self.dds_writer(graph::TOPIC, topic, graph::TYPE, &qos, WhenFull::Wait)?;
+        if let Some(open) = lock(&self.open).as_mut() {
+            let participant = open.dds.participant().guid();
+            open.graph = self.io.spawn(Arc::clone(&self.graph).publish(participant, writer));
+        }
+        Ok(())
+    }
+
+    /// Keeps servers until shutdown.
+    pub(crate) fn keep(&self, servers: Vec<Server>) {
+        if let Some(open) = lock(&self.open).as_mut() {
+            open.servers.extend(servers);
+        }
+    }
+
+    pub(crate) fn publisher<M: RosMessage>(
+        &self,
+        node: NodeId,
+        topic: &str,
+        qos: &Qos,
+    ) -> Result<publisher::Publisher<M>, RuntimeError> {
+        let core = self.publisher_core(node, topic, M::TYPE, qos, WhenFull::Drop, |peers| {
+            let topic = self.bus.topic(topic);
+            topic.join_publisher::<M>(peers, latch_depth(qos))
+        })?;
+        Ok(publisher::Publisher::new(core))
+    }
+
+    pub(crate) fn raw_publisher(
+        &self,
+        node: NodeId,
+        topic: &str,
+        type_name: &str,
+        qos: &Qos,
+    ) -> Result<publisher::RawPublisher, RuntimeError> {
+        let core = self.publisher_core(node, topic, type_name, qos, WhenFull::Wait, |peers| {
+            let topic = self.bus.topic(topic);
+            topic.join_raw_publisher(type_name, peers, latch_depth(qos))
+        })?;
+        Ok(publisher::RawPublisher::new(core))
+    }
+
+    fn publisher_core(
+        &self,
+        node: NodeId,
+        topic: &str,
+        type_name: &str,
+        qos: &Qos,
+        when_full: WhenFull,
+        join: impl FnOnce(&Arc<Peers>) -> Result<Membership, RuntimeError>,
+    ) -> Result<Arc<publisher::Core>, RuntimeError> {
+        let peers = Arc::new(Peers::of_publisher(topic));
+        let local = join(&peers)?;
+        let writer = self.dds_writer(topic, names::dds_topic(topic), type_name, qos, when_full)?;
+        let guid = writer.guid();
+        let core = Arc::new(publisher::Core {
+            writer,
+            peers: Arc::clone(&peers),
+            local,
+            latched: qos.durability == Durability::TransientLocal,
+            _graph: self.graph.join(node, EndpointKind::Writer, guid),
+        });
+        if let Some(open) = lock(&self.open).as_mut() {
+            open.publishers.retain(|p| p.strong_count() > 0);
+            open.publishers.push(Arc::downgrade(&core));
+        }
+        self.endpoints.register(guid, &peers);
+        Ok(core)
+    }
+
+    /// A writer whose queue the publisher thread serves, until the last handle of it goes.
+    pub(crate) fn dds_writer(
+        &self,
+        name: &str,
+        dds_topic: String,
+        type_name: &str,
+        qos: &Qos,
+        when_full: WhenFull,
+    ) -> Result<DdsWriter, RuntimeError> {
+        let mut guard = lock(&self.open);
+        let open = guard.as_mut().ok_or_else(|| closed(name))?;
+        let writer = open.dds.writer(name, dds_topic, type_name, qos)?;
+        let (writer, task) = DdsWriter::new(name, writer, when_full, QUEUE_MESSAGES, QUEUE_BYTES);
+        self.publishing
+            .spawn(task)
+            .ok_or_else(|| closed(name))?
+            .detach();
+        Ok(writer)
+    }
+
+    /// A reader of samples up to `max_bytes`.
+    pub(crate) fn dds_reader(
+        &self,
+        name: &str,
+        dds_topic: String,
+        type_name: &str,
+        qos: &Qos,
+        max_bytes: usize,
+    ) -> Result<DdsReader, RuntimeError> {
+        let mut guard = lock(&self.open);
+        let open = guard.as_mut().ok_or_else(|| closed(name))?;
+        let reader = open.dds.reader(name, dds_topic, type_name, qos)?;
+        Ok(DdsReader::new(reader, max_bytes))
+    }
+
+    pub(crate) fn subscribe<M: RosMessage>(
+        &self,
+        node: NodeId,
+        topic: &str,
+        qos: &Qos,
+        load: Load,
+        max_bytes: usize,
+        handler: impl FnMut(Arc<M>) + Send + 'static,
+    ) -> Result<Subscription, RuntimeError> {
+        let peers = Arc::new(Peers::of_subscription(topic));
+        let stats = Arc::new(Stats::new(Arc::clone(&peers)));
+        let queue = match qos.reliability {
+            Reliability::Reliable => qos.depth.max(RELIABLE_LOCAL_MESSAGES),
+            Reliability::BestEffort => qos.depth.max(1),
+        };
+        let (sender, local) = bounded(queue);
+        let latched = qos.durability == Durability::TransientLocal;
+        let membership = self
+            .bus
+            .topic(topic)
+            .join_subscriber::<M>(&peers, sender, latched)?;
+        let reader = self.dds_reader(topic, names::dds_topic(topic), M::TYPE, qos, max_bytes)?;
+        let guid = reader.guid();
+        let source = Source {
+            reader,
+            local,
+            _membership: membership,
+            stats: Arc::clone(&stats),
+        };
+        let task = source.run(handler);
+        let running = match load {
+            Load::Small => Running::OnIoThread {
+                _task: self.io.spawn(task).ok_or_else(|| closed(topic))?,
+            },
+            Load::Large => {
+                let (stop, thread) = spawn_reader(&self.shutdown, task)?;
+                if let Some(open) = lock(&self.open).as_mut() {
+                    open.readers.retain(|(_, thread)| !thread.is_finished());
+                    open.readers.push((stop.clone(), thread));
+                }
+                Running::OnOwnThread { _stop: stop }
+            }
+        };
+        if let Some(open) = lock(&self.open).as_mut() {
+            open.subscriptions.retain(|s| s.strong_count() > 0);
+            open.subscriptions.push(Arc::downgrade(&stats));
+        }
+        self.endpoints.register(guid, &peers);
+        let graph = self.graph.join(node, EndpointKind::Reader, guid);
+        Ok(Subscription::new(stats, running, graph))
+    }
+
+    /// Publishers that are in use.
+    pub(crate) fn publishers(&self) -> Vec<Arc<publisher::Core>> {
+        let open = lock(&self.open);
+        let all = open.iter().flat_map(|open| &open.publishers);
+        all.filter_map(Weak::upgrade).collect()
+    }
+
+    /// Subscriptions that are in use.
+    pub(crate) fn subscriptions(&self) -> Vec<Arc<Stats>> {
+        let open = lock(&self.open);
+        let all = open.iter().flat_map(|open| &open.subscriptions);
+        all.filter_map(Weak::upgrade).collect()
+    }
+
+    /// Ends everything: timers and readers first, then what is queued goes out, then we leave.
+    ///
+    /// Not from a thread of the runtime.
+    pub(crate) fn close(&self) {
+        self.shutdown.request();
+        let Some(open) = lock(&self.open).take() else {
+            return;
+        };
+        self.io.stop();
+        for (stop, thread) in open.readers {
+            stop.close();
+            // Its panic has been reported by the thread itself.
+            let _ = thread.join();
+        }
+        let start = Instant::now();
+        let publishers: Vec<_> = open.publishers.iter().filter_map(Weak::upgrade).collect();
+        for publisher in &publishers {
+            let left = DRAIN_TIME.saturating_sub(start.elapsed());
+            if !publisher.writer.flush(left) {
+                log::warn!("{}: not everything was delivered", publisher.writer.topic());
+            }
+            publisher.writer.close();
+        }
+        self.publishing.stop();
+        drop(open.servers);
+        drop(open.dds);
+    }
+}
+
+impl Drop for Core {
+    fn drop(&mut self) {
+        self.close();
+    }
+}
+
+fn closed(topic: &str) -> RuntimeError {
+    RuntimeError::Closed {
+        topic: topic.to_owned(),
+    }
+}
+
+fn latch_depth(qos: &Qos) -> usize {
+    match qos.durability {
+        Durability::TransientLocal => qos.depth.max(1),
+        Durability::Volatile => 0,
+    }
+}

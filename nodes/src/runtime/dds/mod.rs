@@ -1,0 +1,8 @@
+//! The DDS side of the runtime: everything that names a RustDDS type.
+
+pub(crate) mod events;
+pub(crate) mod participant;
+pub(crate) mod payload;
+pub(crate) mod queue;
+pub(crate) mod reader;
+pub(crate) mod writer;

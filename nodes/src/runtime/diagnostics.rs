@@ -1,0 +1,125 @@
+//! States of the nodes' tasks, on `/diagnostics` once a second.
+
+use std::collections::BTreeMap;
+use std::fmt::Display;
+use std::sync::{Arc, Mutex};
+
+use lattice_msgs::builtin_interfaces::Time;
+use lattice_msgs::diagnostic_msgs::{DiagnosticArray, DiagnosticStatus, KeyValue};
+use lattice_msgs::std_msgs::Header;
+
+use super::sync::lock;
+
+/// Tasks of all nodes of a process, at most.
+const MAX_TASKS: usize = 1000;
+
+/// How a task is.
+#[derive(Clone, Copy, Debug, PartialEq, Eq, PartialOrd, Ord)]
+pub enum Level {
+    /// As it should be.
+    Ok,
+    /// Works, look at it.
+    Warn,
+    /// Does not work.
+    Error,
+    /// Not heard of for too long.
+    Stale,
+}
+
+/// Where a node states how its tasks are.
+#[derive(Clone)]
+pub struct Diagnostics {
+    node: String,
+    tasks: Arc<Tasks>,
+}
+
+/// The tasks of all nodes of a process, by node and task.
+#[derive(Default)]
+pub(crate) struct Tasks {
+    states: Mutex<BTreeMap<(String, String), DiagnosticStatus>>,
+}
+
+impl Diagnostics {
+    pub(crate) fn new(node: &str, tasks: &Arc<Tasks>) -> Self {
+        Self {
+            node: node.to_owned(),
+            tasks: Arc::clone(tasks),
+        }
+    }
+
+    /// States how `task` is, with figures; repeated once a second until stated anew.
+    pub fn set<K: Display, V: Display>(
+        &self,
+        task: &str,
+        level: Level,
+        message: impl Into<String>,
+        values: impl IntoIterator<Item = (K, V)>,
+    ) {
+        let status = status(&self.node, task, level, message, values);
+        let mut states = lock(&self.tasks.states);
+        let key = (self.node.clone(), task.to_owned());
+        if states.len() < MAX_TASKS || states.contains_key(&key) {
+            states.insert(key, status);
+        }
+    }
+}
+
+/// One state under the name that the tools expect, `node: task`.
+pub(crate) fn status<K: Display, V: Display>(
+    node: &str,
+    task: &str,
+    level: Level,
+    message: impl Into<String>,
+    values: impl IntoIterator<Item = (K, V)>,
+) -> DiagnosticStatus {
+    let values = values.into_iter().map(|(key, value)| KeyValue {
+        key: key.to_string(),
+        value: value.to_string(),
+    });
+    DiagnosticStatus {
+        level: match level {
+            Level::Ok => DiagnosticStatus::OK,
+            Level::Warn => DiagnosticStatus::WARN,
+            Level::Error => DiagnosticStatus::ERROR,
+            Level::Stale => DiagnosticStatus::STALE,
+        },
+        name: format!("{}: {task}", node.trim_start_matches('/')),
+        message: message.into(),
+        hardware_id: "lattice".to_owned(),
+        values: values.collect(),
+    }
+}
+
+impl Tasks {
+    /// All states, `extra` first.
+    pub(crate) fn message(&self, stamp_ns: i64, extra: DiagnosticStatus) -> DiagnosticArray {
+        let states = lock(&self.states);
+        DiagnosticArray {
+            header: Header {
+                stamp: Time::from_ns(stamp_ns),
+                ..Header::default()
+            },
+            status: std::iter::once(extra).chain(states.values().cloned()).collect(),
+        }
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn the_last_state_of_a_task_counts() {
+        let tasks = Arc::new(Tasks::default());
+        let diagnostics = Diagnostics::new("/robot/mapper", &tasks);
+        diagnostics.set("map", Level::Error, "no clouds", [("clouds", 0)]);
+        diagnostics.set("map", Level::Ok, "running", [("clouds", 7)]);
+        let transport = status("/robot/mapper", "transport", Level::Warn, "x", [("a", "b")]);
+        let message = tasks.message(1_500_000_000, transport);
+        assert_eq!(message.header.stamp.to_ns(), 1_500_000_000);
+        let names: Vec<_> = message.status.iter().map(|s| s.name.as_str()).collect();
+        assert_eq!(names, ["robot/mapper: transport", "robot/mapper: map"]);
+        let map = &message.status[1];
+        assert_eq!((map.level, map.values[0].value.as_str()), (DiagnosticStatus::OK, "7"));
+    }
+}

@@ -1,0 +1,362 @@
+//! Messages between the nodes of one process: the same `Arc`, by topic name.
+//!
+//! RustDDS does not deliver inside a participant, and a copy through sockets would be a waste.
+
+use std::any::{Any, TypeId};
+use std::collections::{BTreeMap, VecDeque};
+use std::sync::{Arc, Mutex};
+
+use lattice_msgs::cdr::{self, CdrError};
+use lattice_msgs::RosMessage;
+use rustdds::bytes::Bytes;
+use smol::channel::Sender;
+
+use super::error::RuntimeError;
+use super::peers::Peers;
+use super::sync::lock;
+
+/// A message of any type.
+pub(crate) type AnyMessage = Arc<dyn Any + Send + Sync>;
+
+/// All topics of a runtime.
+#[derive(Default)]
+pub(crate) struct LocalBus {
+    topics: Mutex<BTreeMap<String, Arc<Topic>>>,
+}
+
+impl LocalBus {
+    /// The topic of a resolved name.
+    pub(crate) fn topic(&self, name: &str) -> Arc<Topic> {
+        let mut topics = lock(&self.topics);
+        let topic = topics.entry(name.to_owned()).or_insert_with(|| {
+            Arc::new(Topic {
+                name: name.to_owned(),
+                inner: Mutex::default(),
+            })
+        });
+        Arc::clone(topic)
+    }
+}
+
+/// One topic inside the process.
+pub(crate) struct Topic {
+    name: String,
+    inner: Mutex<Inner>,
+}
+
+#[derive(Default)]
+struct Inner {
+    next_id: u64,
+    type_name: Option<String>,
+    rust_type: Option<(TypeId, Decode)>,
+    publishers: Vec<PublisherEntry>,
+    subscribers: Vec<SubscriberEntry>,
+}
+
+type Decode = fn(&[u8]) -> Result<AnyMessage, CdrError>;
+
+struct PublisherEntry {
+    id: u64,
+    peers: Arc<Peers>,
+    latched: VecDeque<Latched>,
+    latch_depth: usize,
+}
+
+#[derive(Clone)]
+enum Latched {
+    Message(AnyMessage),
+    Cdr(Bytes),
+}
+
+struct SubscriberEntry {
+    id: u64,
+    peers: Arc<Peers>,
+    sender: Sender<AnyMessage>,
+}
+
+/// A place on a topic; dropping it leaves the topic.
+pub(crate) struct Membership {
+    topic: Arc<Topic>,
+    id: u64,
+}
+
+impl Topic {
+    /// Joins as a publisher of `M` that keeps its last `latch_depth` messages for late joiners.
+    pub(crate) fn join_publisher<M: RosMessage>(
+        self: &Arc<Self>,
+        peers: &Arc<Peers>,
+        latch_depth: usize,
+    ) -> Result<Membership, RuntimeError> {
+        self.join(
+            |inner| {
+                inner.claim_type(&self.name, M::TYPE)?;
+                inner.claim_rust_type::<M>(&self.name)
+            },
+            |inner, id| inner.add_publisher(id, peers, latch_depth),
+        )
+    }
+
+    /// Joins as a publisher of CDR bytes of the type.
+    pub(crate) fn join_raw_publisher(
+        self: &Arc<Self>,
+        type_name: &str,
+        peers: &Arc<Peers>,
+        latch_depth: usize,
+    ) -> Result<Membership, RuntimeError> {
+        self.join(
+            |inner| inner.claim_type(&self.name, type_name),
+            |inner, id| inner.add_publisher(id, peers, latch_depth),
+        )
+    }
+
+    /// Joins as a subscriber; `latched`: hear what publishers have kept.
+    pub(crate) fn join_subscriber<M: RosMessage>(
+        self: &Arc<Self>,
+        peers: &Arc<Peers>,
+        sender: Sender<AnyMessage>,
+        latched: bool,
+    ) -> Result<Membership, RuntimeError> {
+        self.join(
+            |inner| {
+                inner.claim_type(&self.name, M::TYPE)?;
+                inner.claim_rust_type::<M>(&self.name)
+            },
+            |inner, id| {
+                if latched {
+                    for message in inner.latched() {
+                        // A full queue has newer messages than this one.
+                        let _ = sender.force_send(message);
+                    }
+                }
+                inner.subscribers.push(SubscriberEntry {
+                    id,
+                    peers: Arc::clone(peers),
+                    sender,
+                });
+            },
+        )
+    }
+
+    fn join(
+        self: &Arc<Self>,
+        claim: impl FnOnce(&mut Inner) -> Result<(), RuntimeError>,
+        add: impl FnOnce(&mut Inner, u64),
+    ) -> Result<Membership, RuntimeError> {
+        let id = {
+            let mut inner = lock(&self.inner);
+            claim(&mut inner)?;
+            let id = inner.next_id;
+            inner.next_id = id.wrapping_add(1);
+            add(&mut inner, id);
+            id
+        };
+        self.tell_counts();
+        Ok(Membership {
+            topic: Arc::clone(self),
+            id,
+        })
+    }
+
+    /// Callbacks run outside the lock.
+    fn tell_counts(&self) {
+        let (publishers, subscribers) = {
+            let inner = lock(&self.inner);
+            let publishers: Vec<_> = inner.publishers.iter().map(|p| Arc::clone(&p.peers)).collect();
+            let subscribers: Vec<_> =
+                inner.subscribers.iter().map(|s| Arc::clone(&s.peers)).collect();
+            (publishers, subscribers)
+        };
+        for peers in &publishers {
+            peers.set_local(subscribers.len());
+        }
+        for peers in &subscribers {
+            peers.set_local(publishers.len());
+        }
+    }
+}
+
+impl Membership {
+    /// Hands a message to all subscribers. Answers how many older messages had to give way.
+    pub(crate) fn publish(&self, message: AnyMessage) -> usize {
+        let mut inner = lock(&self.topic.inner);
+        inner.latch(self.id, || Latched::Message(Arc::clone(&message)));
+        inner.deliver(&message)
+    }
+
+    /// Hands CDR bytes, header included, to all subscribers, decoded once.
+    pub(crate) fn publish_cdr(&self, cdr: &Bytes) -> Result<usize, CdrError> {
+        let mut inner = lock(&self.topic.inner);
+        inner.latch(self.id, || Latched::Cdr(cdr.clone()));
+        match inner.rust_type {
+            Some((_, decode)) if !inner.subscribers.is_empty() => {
+                decode(cdr).map(|message| inner.deliver(&message))
+            }
+            _ => Ok(0),
+        }
+    }
+}
+
+impl Drop for Membership {
+    fn drop(&mut self) {
+        {
+            let mut inner = lock(&self.topic.inner);
+            inner.publishers.retain(|p| p.id != self.id);
+            inner.subscribers.retain(|s| s.id != self.id);
+            if inner.publishers.is_empty() && inner.subscribers.is_empty() {
+                inner.type_name = None;
+                inner.rust_type = None;
+            }
+        }
+        self.topic.tell_counts();
+    }
+}
+
+impl Inner {
+    fn claim_type(&mut self, topic: &str, want: &str) -> Result<(), RuntimeError> {
+        match &self.type_name {
+            Some(have) if have != want => Err(RuntimeError::TypeMismatch {
+                topic: topic.to_owned(),
+                have: have.clone(),
+                want: want.to_owned(),
+            }),
+            _ => {
+                self.type_name = Some(want.to_owned());
+                Ok(())
+            }
+        }
+    }
+
+    fn claim_rust_type<M: RosMessage>(&mut self, topic: &str) -> Result<(), RuntimeError> {
+        match self.rust_type {
+            Some((have, _)) if have != TypeId::of::<M>() => Err(RuntimeError::TypeMismatch {
+                topic: topic.to_owned(),
+                have: format!("another Rust type of {}", M::TYPE),
+                want: std::any::type_name::<M>().to_owned(),
+            }),
+            _ => {
+                self.rust_type = Some((TypeId::of::<M>(), |bytes| {
+                    let message: AnyMessage = Arc::new(cdr::from_slice::<M>(bytes)?);
+                    Ok(message)
+                }));
+                Ok(())
+            }
+        }
+    }
+
+    fn add_publisher(&mut self, id: u64, peers: &Arc<Peers>, latch_depth: usize) {
+        self.publishers.push(PublisherEntry {
+            id,
+            peers: Arc::clone(peers),
+            latched: VecDeque::new(),
+            latch_depth,
+        });
+    }
+
+    fn latch(&mut self, id: u64, message: impl FnOnce() -> Latched) {
+        let publisher = self.publishers.iter_mut().find(|p| p.id == id);
+        if let Some(publisher) = publisher.filter(|p| p.latch_depth > 0) {
+            while publisher.latched.len() >= publisher.latch_depth {
+                publisher.latched.pop_front();
+            }
+            publisher.latched.push_back(message());
+        }
+    }
+
+    fn latched(&self) -> Vec<AnyMessage> {
+        let kept = self.publishers.iter().flat_map(|p| &p.latched);
+        kept.filter_map(|latched| match latched {
+            Latched::Message(message) => Some(Arc::clone(message)),
+            Latched::Cdr(bytes) => {
+                let (_, decode) = self.rust_type?;
+                decode(bytes)
+                    .inspect_err(|error| log::warn!("latched message not readable: {error}"))
+                    .ok()
+            }
+        })
+        .collect()
+    }
+
+    fn deliver(&self, message: &AnyMessage) -> usize {
+        let displaced = self
+            .subscribers
+            .iter()
+            .filter(|s| matches!(s.sender.force_send(Arc::clone(message)), Ok(Some(_))));
+        displaced.count()
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use lattice_msgs::std_msgs::{Header, String as RosString};
+    use smol::channel::bounded;
+
+    use super::*;
+
+    fn text(s: &str) -> Arc<RosString> {
+        Arc::new(RosString { data: s.to_owned() })
+    }
+
+    fn publisher(bus: &LocalBus, latch: usize) -> (Membership, Arc<Peers>) {
+        let peers = Arc::new(Peers::of_publisher("/a"));
+        let joined = bus.topic("/a").join_publisher::<RosString>(&peers, latch);
+        (joined.unwrap(), peers)
+    }
+
+    fn next(queue: &smol::channel::Receiver<AnyMessage>) -> Option<Arc<RosString>> {
+        queue.try_recv().ok()?.downcast::<RosString>().ok()
+    }
+
+    #[test]
+    fn the_same_message_arrives_and_counts_follow() {
+        let bus = LocalBus::default();
+        let (publisher, peers) = publisher(&bus, 0);
+        let (sender, queue) = bounded(2);
+        let theirs = Arc::new(Peers::of_subscription("/a"));
+        let subscriber = bus
+            .topic("/a")
+            .join_subscriber::<RosString>(&theirs, sender, true)
+            .unwrap();
+        assert_eq!((peers.count(), theirs.count()), (1, 1));
+        let message = text("x");
+        assert_eq!(publisher.publish(message.clone()), 0);
+        assert!(Arc::ptr_eq(&next(&queue).unwrap(), &message));
+        for s in ["1", "2", "3"] {
+            publisher.publish(text(s));
+        }
+        assert_eq!(next(&queue).unwrap().data, "2", "the oldest gives way");
+        drop(subscriber);
+        assert_eq!(peers.count(), 0);
+    }
+
+    #[test]
+    fn late_joiners_hear_what_was_latched() {
+        let bus = LocalBus::default();
+        let (publisher, _peers) = publisher(&bus, 2);
+        for s in ["1", "2", "3"] {
+            publisher.publish(text(s));
+        }
+        let raw_peers = Arc::new(Peers::of_publisher("/a"));
+        let raw = bus
+            .topic("/a")
+            .join_raw_publisher(RosString::TYPE, &raw_peers, 1)
+            .unwrap();
+        raw.publish_cdr(&cdr::to_vec(&*text("raw")).unwrap().into()).unwrap();
+        let (sender, queue) = bounded(5);
+        let theirs = Arc::new(Peers::of_subscription("/a"));
+        let _subscriber = bus
+            .topic("/a")
+            .join_subscriber::<RosString>(&theirs, sender, true);
+        let heard: Vec<_> = std::iter::from_fn(|| next(&queue)).map(|m| m.data.clone()).collect();
+        assert_eq!(heard, ["2", "3", "raw"]);
+    }
+
+    #[test]
+    fn two_types_on_one_topic_are_refused() {
+        let bus = LocalBus::default();
+        let (publisher, peers) = publisher(&bus, 0);
+        let refused = bus.topic("/a").join_publisher::<Header>(&peers, 0);
+        assert!(matches!(refused, Err(RuntimeError::TypeMismatch { .. })));
+        drop(publisher);
+        assert!(bus.topic("/a").join_publisher::<Header>(&peers, 0).is_ok());
+    }
+}

@@ -1,0 +1,215 @@
+//! The parameter services of a node, for `ros2 param` and its like. Parameters cannot change while a
+//! node runs; who tries is told so.
+
+use std::collections::BTreeSet;
+use std::sync::Arc;
+
+use lattice_msgs::rcl_interfaces::{
+    DescribeParameters, DescribeParametersRequest, DescribeParametersResponse,
+    GetParameterTypes, GetParameterTypesRequest, GetParameterTypesResponse, GetParameters,
+    GetParametersRequest, GetParametersResponse, ListParameters, ListParametersRequest,
+    ListParametersResponse, ListParametersResult, ParameterDescriptor, ParameterType,
+    ParameterValue, SetParameters, SetParametersAtomically,
+    SetParametersAtomicallyResponse, SetParametersRequest, SetParametersResponse,
+    SetParametersResult,
+};
+
+use super::error::RuntimeError;
+use super::node::Node;
+use super::params::{Declared, ParamValue, Params};
+use super::service::Server;
+
+/// Serves the six parameter services of `node` for as long as the servers live.
+pub(crate) fn serve(node: &Node, params: &Arc<Params>) -> Result<Vec<Server>, RuntimeError> {
+    let with = || Arc::clone(params);
+    let (get, types, list, describe) = (with(), with(), with(), with());
+    Ok(vec![
+        node.service::<GetParameters>("~/get_parameters", move |request| get_values(&get, &request))?,
+        node.service::<GetParameterTypes>("~/get_parameter_types", move |request| {
+            get_types(&types, &request)
+        })?,
+        node.service::<ListParameters>("~/list_parameters", move |request| {
+            list_names(&list, &request)
+        })?,
+        node.service::<DescribeParameters>("~/describe_parameters", move |request| {
+            describe_all(&describe, &request)
+        })?,
+        node.service::<SetParameters>("~/set_parameters", |request| refuse_each(&request))?,
+        node.service::<SetParametersAtomically>("~/set_parameters_atomically", |_| refuse_all())?,
+    ])
+}
+
+fn find<'a>(declared: &'a [Declared], name: &str) -> Option<&'a Declared> {
+    declared.iter().find(|d| d.name == name)
+}
+
+fn get_values(params: &Params, request: &GetParametersRequest) -> GetParametersResponse {
+    let declared = params.declared();
+    let value = |name: &String| find(&declared, name).map(|d| message(&d.value)).unwrap_or_default();
+    GetParametersResponse {
+        values: request.names.iter().map(value).collect(),
+    }
+}
+
+fn get_types(params: &Params, request: &GetParameterTypesRequest) -> GetParameterTypesResponse {
+    let declared = params.declared();
+    let names = request.names.iter();
+    let types: Vec<u8> = names.map(|name| type_of(find(&declared, name))).collect();
+    GetParameterTypesResponse {
+        types: types.into(),
+    }
+}
+
+fn describe_all(params: &Params, request: &DescribeParametersRequest) -> DescribeParametersResponse {
+    let declared = params.declared();
+    let describe = |name: &String| {
+        let found = find(&declared, name);
+        ParameterDescriptor {
+            name: name.clone(),
+            type_: type_of(found),
+            description: found.map(|d| d.description.clone()).unwrap_or_default(),
+            read_only: true,
+            ..ParameterDescriptor::default()
+        }
+    };
+    DescribeParametersResponse {
+        descriptors: request.names.iter().map(describe).collect(),
+    }
+}
+
+fn list_names(params: &Params, request: &ListParametersRequest) -> ListParametersResponse {
+    let levels_allow = |rest: &str| {
+        let levels = u64::try_from(rest.matches('.').count()).unwrap_or(u64::MAX);
+        request.depth == ListParametersRequest::DEPTH_RECURSIVE || levels < request.depth
+    };
+    let wanted = |name: &str| {
+        let below = |prefix: &String| match name.strip_prefix(prefix.as_str()) {
+            Some("") => true,
+            Some(rest) => rest.strip_prefix('.').is_some_and(levels_allow),
+            None => false,
+        };
+        if request.prefixes.is_empty() {
+            levels_allow(name)
+        } else {
+            request.prefixes.iter().any(below)
+        }
+    };
+    let names: Vec<String> = params
+        .declared()
+        .into_iter()
+        .map(|d| d.name)
+        .filter(|name| wanted(name))
+        .collect();
+    let prefixes: BTreeSet<String> = names
+        .iter()
+        .filter_map(|name| Some(name.rsplit_once('.')?.0.to_owned()))
+        .collect();
+    ListParametersResponse {
+        result: ListParametersResult {
+            names,
+            prefixes: prefixes.into_iter().collect(),
+        },
+    }
+}
+
+fn refusal() -> SetParametersResult {
+    SetParametersResult {
+        successful: false,
+        reason: "parameters of this node cannot change while it runs; start it again with \
+                 --ros-args -p name:=value"
+            .to_owned(),
+    }
+}
+
+fn refuse_each(request: &SetParametersRequest) -> SetParametersResponse {
+    SetParametersResponse {
+        results: request.parameters.iter().map(|_| refusal()).collect(),
+    }
+}
+
+fn refuse_all() -> SetParametersAtomicallyResponse {
+    SetParametersAtomicallyResponse { result: refusal() }
+}
+
+fn type_of(declared: Option<&Declared>) -> u8 {
+    declared.map_or(ParameterType::PARAMETER_NOT_SET, |d| d.value.type_code())
+}
+
+fn message(value: &ParamValue) -> ParameterValue {
+    let mut message = ParameterValue {
+        type_: value.type_code(),
+        ..ParameterValue::default()
+    };
+    match value.clone() {
+        ParamValue::Bool(value) => message.bool_value = value,
+        ParamValue::I64(value) => message.integer_value = value,
+        ParamValue::F64(value) => message.double_value = value,
+        ParamValue::String(value) => message.string_value = value,
+        ParamValue::BoolArray(value) => message.bool_array_value = value,
+        ParamValue::I64Array(value) => message.integer_array_value = value,
+        ParamValue::F64Array(value) => message.double_array_value = value,
+        ParamValue::StringArray(value) => message.string_array_value = value,
+    }
+    message
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    fn params() -> Params {
+        let params = Params::from_values("/n", [("lattice", ParamValue::String("fcc".to_owned()))]);
+        params.about("name of the lattice").string("lattice", "bcc").unwrap();
+        params.f64("cell_volume_m3", 0.125).unwrap();
+        params.i64("qos.map.depth", 500).unwrap();
+        params
+    }
+
+    fn list(prefixes: &[&str], depth: u64) -> ListParametersResult {
+        let request = ListParametersRequest {
+            prefixes: prefixes.iter().map(|&p| p.to_owned()).collect(),
+            depth,
+        };
+        list_names(&params(), &request).result
+    }
+
+    #[test]
+    fn values_types_and_descriptions_are_told() {
+        let names: Vec<String> = ["lattice", "cell_volume_m3", "none"].map(str::to_owned).into();
+        let request = GetParametersRequest {
+            names: names.clone(),
+        };
+        let values = get_values(&params(), &request).values;
+        assert_eq!(values[0].string_value, "fcc");
+        assert_eq!(values[1].double_value, 0.125);
+        assert_eq!(values[2], ParameterValue::default());
+        let request = GetParameterTypesRequest {
+            names: names.clone(),
+        };
+        assert_eq!(get_types(&params(), &request).types.as_slice(), [4, 3, 0]);
+        let told = describe_all(&params(), &DescribeParametersRequest { names }).descriptors;
+        assert_eq!(told[0].description, "name of the lattice");
+        assert!(told[0].read_only && told[2].type_ == 0);
+    }
+
+    #[test]
+    fn lists_follow_prefix_and_depth() {
+        assert_eq!(list(&[], 0).names, ["cell_volume_m3", "lattice", "qos.map.depth"]);
+        assert_eq!(list(&[], 0).prefixes, ["qos.map"]);
+        assert_eq!(list(&[], 1).names, ["cell_volume_m3", "lattice"]);
+        assert_eq!(list(&["qos"], 0).names, ["qos.map.depth"]);
+        assert_eq!(list(&["qos"], 1).names, [""; 0]);
+        assert_eq!(list(&["qos.map", "lattice"], 1).names, ["lattice", "qos.map.depth"]);
+        assert_eq!(list(&["latt"], 0).names, [""; 0]);
+    }
+
+    #[test]
+    fn nothing_is_set() {
+        let request = SetParametersRequest {
+            parameters: vec![Default::default(); 2],
+        };
+        let results = refuse_each(&request).results;
+        assert!(results.len() == 2 && results.iter().all(|r| !r.successful));
+        assert!(!refuse_all().result.successful);
+    }
+}

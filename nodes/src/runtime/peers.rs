@@ -1,0 +1,213 @@
+//! The other ends of one publisher or subscription, in this process and outside.
+
+use std::collections::BTreeSet;
+use std::sync::Mutex;
+
+use rustdds::GUID;
+
+use super::sync::lock;
+
+/// Peers of one endpoint that are told apart, at most.
+const MAX_PEERS: usize = 4096;
+
+/// Called when a peer joins; must return at once.
+pub(crate) type OnJoined = Box<dyn FnMut() + Send>;
+
+/// Who is at the other end of a publisher or subscription.
+pub(crate) struct Peers {
+    topic: String,
+    peer_kind: &'static str,
+    joins: log::Level,
+    state: Mutex<State>,
+    on_joined: Mutex<Vec<OnJoined>>,
+}
+
+#[derive(Default)]
+struct State {
+    remote: BTreeSet<GUID>,
+    local: usize,
+    incompatible: BTreeSet<GUID>,
+    warned: BTreeSet<&'static str>,
+}
+
+impl Peers {
+    /// Of a publisher, whose peers are subscribers.
+    pub(crate) fn of_publisher(topic: &str) -> Self {
+        Self::new(topic, "subscriber", log::Level::Info)
+    }
+
+    /// Of a subscription, whose peers are publishers.
+    pub(crate) fn of_subscription(topic: &str) -> Self {
+        Self::new(topic, "publisher", log::Level::Info)
+    }
+
+    /// Of the requests of a server, whose peers are clients.
+    pub(crate) fn of_server(service: &str) -> Self {
+        Self::new(service, "client", log::Level::Debug)
+    }
+
+    /// Of the replies of a server, whose peers are the other ends of clients.
+    pub(crate) fn of_replies(service: &str) -> Self {
+        Self::new(service, "reply reader", log::Level::Debug)
+    }
+
+    fn new(topic: &str, peer_kind: &'static str, joins: log::Level) -> Self {
+        Self {
+            topic: topic.to_owned(),
+            peer_kind,
+            joins,
+            state: Mutex::default(),
+            on_joined: Mutex::default(),
+        }
+    }
+
+    pub(crate) fn topic(&self) -> &str {
+        &self.topic
+    }
+
+    /// Peers in other processes.
+    pub(crate) fn remote(&self) -> usize {
+        lock(&self.state).remote.len()
+    }
+
+    /// True if there is such a peer in another process.
+    pub(crate) fn any_remote(&self, wanted: impl FnMut(&GUID) -> bool) -> bool {
+        lock(&self.state).remote.iter().any(wanted)
+    }
+
+    /// Peers here and elsewhere.
+    pub(crate) fn count(&self) -> usize {
+        let state = lock(&self.state);
+        state.remote.len().saturating_add(state.local)
+    }
+
+    /// Peers whose QoS does not match ours.
+    pub(crate) fn incompatible_count(&self) -> usize {
+        lock(&self.state).incompatible.len()
+    }
+
+    /// Calls `callback` for every peer that joins, and now if there is one already.
+    pub(crate) fn on_joined(&self, mut callback: OnJoined) {
+        if self.count() > 0 {
+            callback();
+        }
+        lock(&self.on_joined).push(callback);
+    }
+
+    /// A peer in another process has matched.
+    pub(crate) fn add(&self, peer: GUID) {
+        let mut state = lock(&self.state);
+        state.incompatible.remove(&peer);
+        if state.remote.len() >= MAX_PEERS || !state.remote.insert(peer) {
+            return;
+        }
+        let count = state.remote.len().saturating_add(state.local);
+        drop(state);
+        self.joined(count);
+    }
+
+    /// Peers in other processes have gone.
+    pub(crate) fn remove(&self, gone: impl Fn(&GUID) -> bool) {
+        let mut state = lock(&self.state);
+        let before = state.remote.len();
+        state.remote.retain(|peer| !gone(peer));
+        state.incompatible.retain(|peer| !gone(peer));
+        if state.remote.len() < before {
+            let count = state.remote.len().saturating_add(state.local);
+            drop(state);
+            log::debug!("{}: {} gone ({count} left)", self.topic, self.peer_kind);
+        }
+    }
+
+    /// The number of peers in this process has changed.
+    pub(crate) fn set_local(&self, local: usize) {
+        let mut state = lock(&self.state);
+        let grown = local > state.local;
+        state.local = local;
+        let count = state.remote.len().saturating_add(local);
+        drop(state);
+        if grown {
+            self.joined(count);
+        }
+    }
+
+    /// A peer asks for, or offers, a QoS that does not go with ours.
+    pub(crate) fn incompatible(&self, peer: GUID, policy: &'static str) {
+        let mut state = lock(&self.state);
+        if state.incompatible.len() < MAX_PEERS {
+            state.incompatible.insert(peer);
+        }
+        if state.warned.insert(policy) {
+            drop(state);
+            log::warn!(
+                "{}: a {} is not heard because of its QoS: {policy}; set qos.{}.* or the other side's QoS",
+                self.topic,
+                self.peer_kind,
+                self.topic,
+            );
+        }
+    }
+
+    fn joined(&self, count: usize) {
+        log::log!(self.joins, "{}: {} matched ({count})", self.topic, self.peer_kind);
+        // A callback may register another: not called under the lock.
+        let mut callbacks = std::mem::take(&mut *lock(&self.on_joined));
+        for callback in &mut callbacks {
+            callback();
+        }
+        let mut all = lock(&self.on_joined);
+        callbacks.append(&mut all);
+        *all = callbacks;
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use std::sync::Arc;
+    use std::sync::atomic::{AtomicUsize, Ordering};
+
+    use super::*;
+
+    fn peer(byte: u8) -> GUID {
+        GUID::from_bytes([byte; 16])
+    }
+
+    #[test]
+    fn joins_are_counted_and_called_once() {
+        let peers = Peers::of_publisher("/map");
+        let calls = Arc::new(AtomicUsize::new(0));
+        peers.add(peer(1));
+        let seen = Arc::clone(&calls);
+        peers.on_joined(Box::new(move || {
+            seen.fetch_add(1, Ordering::Relaxed);
+        }));
+        assert_eq!(calls.load(Ordering::Relaxed), 1, "one was there already");
+        peers.add(peer(1));
+        peers.add(peer(2));
+        peers.set_local(1);
+        peers.set_local(0);
+        assert_eq!(calls.load(Ordering::Relaxed), 3);
+        assert_eq!((peers.remote(), peers.count()), (2, 2));
+        peers.remove(|p| *p == peer(1));
+        assert_eq!(peers.count(), 1);
+    }
+
+    #[test]
+    fn a_callback_may_register_another() {
+        let peers = Arc::new(Peers::of_publisher("/map"));
+        let again = Arc::clone(&peers);
+        peers.on_joined(Box::new(move || again.on_joined(Box::new(|| {}))));
+        peers.add(peer(1));
+        assert_eq!(peers.count(), 1);
+    }
+
+    #[test]
+    fn incompatible_peers_are_counted_until_they_go() {
+        let peers = Peers::of_subscription("/points");
+        peers.incompatible(peer(1), "reliability");
+        peers.incompatible(peer(1), "reliability");
+        assert_eq!(peers.incompatible_count(), 1);
+        peers.remove(|p| p.prefix == peer(1).prefix);
+        assert_eq!(peers.incompatible_count(), 0);
+    }
+}

@@ -1,0 +1,119 @@
+//! The log of the process on `/rosout`.
+
+use std::sync::{Mutex, Weak};
+use std::time::{SystemTime, UNIX_EPOCH};
+
+use lattice_msgs::builtin_interfaces::Time;
+use lattice_msgs::rcl_interfaces::Log;
+use log::{Level, Record};
+use smol::channel::{Receiver, Sender, bounded};
+
+use super::logging;
+use super::publisher::Publisher;
+use super::sync::lock;
+
+/// Records that wait to be published; the oldest give way.
+const QUEUE_RECORDS: usize = 512;
+
+/// Longest text that is published, in bytes.
+const MAX_TEXT_BYTES: usize = 16 << 10;
+
+/// The runtimes of this process that hear the log.
+static LISTENERS: Mutex<Vec<Weak<Listener>>> = Mutex::new(Vec::new());
+
+/// Hears the log while it lives.
+pub(crate) struct Listener {
+    sender: Sender<Log>,
+}
+
+/// Starts to hear the log. What is heard is for [`publish`].
+pub(crate) fn listen() -> (std::sync::Arc<Listener>, Receiver<Log>) {
+    let (sender, receiver) = bounded(QUEUE_RECORDS);
+    let listener = std::sync::Arc::new(Listener { sender });
+    lock(&LISTENERS).push(std::sync::Arc::downgrade(&listener));
+    // False for all but the first runtime of the process: one sink serves them all.
+    logging::tee(Box::new(hear));
+    (listener, receiver)
+}
+
+/// Publishes what is heard until the task is dropped.
+///
+/// Records may come from any thread, under any lock: only here do they meet publishers.
+pub(crate) async fn publish(records: Receiver<Log>, publisher: Publisher<Log>) {
+    while let Ok(record) = records.recv().await {
+        // A message about a message that was not published would not end.
+        let _ = publisher.publish(record);
+    }
+}
+
+fn hear(record: &Record<'_>, node: &str) {
+    let mut listeners = lock(&LISTENERS);
+    listeners.retain(|listener| listener.strong_count() > 0);
+    if listeners.is_empty() {
+        return;
+    }
+    let message = message(record, node);
+    for listener in listeners.iter().filter_map(Weak::upgrade) {
+        let _ = listener.sender.force_send(message.clone());
+    }
+}
+
+fn message(record: &Record<'_>, node: &str) -> Log {
+    let elapsed = SystemTime::now().duration_since(UNIX_EPOCH).unwrap_or_default();
+    let mut msg = record.args().to_string();
+    if let Some((end, _)) = msg.char_indices().find(|(i, c)| i + c.len_utf8() > MAX_TEXT_BYTES) {
+        msg.truncate(end);
+    }
+    Log {
+        stamp: Time::from_ns(i64::try_from(elapsed.as_nanos()).unwrap_or(i64::MAX)),
+        level: match record.level() {
+            Level::Error => Log::ERROR,
+            Level::Warn => Log::WARN,
+            Level::Info => Log::INFO,
+            Level::Debug | Level::Trace => Log::DEBUG,
+        },
+        name: node.to_owned(),
+        msg,
+        file: record.file().unwrap_or_default().to_owned(),
+        function: record.module_path().unwrap_or_default().to_owned(),
+        line: record.line().unwrap_or(0),
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn records_become_messages_and_long_ones_are_cut() {
+        let long = "ä".repeat(MAX_TEXT_BYTES);
+        let heard = message(
+            &Record::builder()
+                .level(Level::Warn)
+                .args(format_args!("{long}"))
+                .line(Some(7))
+                .build(),
+            "mapper",
+        );
+        assert_eq!((heard.level, heard.line, heard.name.as_str()), (Log::WARN, 7, "mapper"));
+        assert_eq!(heard.msg.len(), MAX_TEXT_BYTES);
+        assert!(heard.stamp.to_ns() > 0);
+    }
+
+    #[test]
+    fn the_oldest_record_gives_way_and_a_listener_that_went_is_forgotten() {
+        let (listener, receiver) = listen();
+        for i in 0..=QUEUE_RECORDS {
+            hear(&Record::builder().args(format_args!("{i}")).build(), "a test of rosout");
+        }
+        let texts: Vec<_> = std::iter::from_fn(|| receiver.try_recv().ok())
+            .filter(|log| log.name == "a test of rosout")
+            .map(|log| log.msg)
+            .collect();
+        assert_eq!(texts.last(), Some(&QUEUE_RECORDS.to_string()));
+        assert!(!texts.contains(&"0".to_owned()));
+        drop(listener);
+        hear(&Record::builder().args(format_args!("nobody")).build(), "a test of rosout");
+        assert!(receiver.is_closed());
+    }
+}

@@ -1,0 +1,175 @@
+//! Servers of services, for clients of either rmw.
+
+use std::sync::Arc;
+use std::time::Duration;
+
+use lattice_msgs::std_srvs::{Trigger, TriggerRequest, TriggerResponse};
+use lattice_msgs::{RosMessage, RosService};
+use rustdds::GUID;
+use smol::channel::{Receiver, bounded};
+use smol::{Task, Timer};
+
+use super::core::Core;
+use super::dds::reader::{DdsReader, SampleOrigin};
+use super::dds::writer::{DdsWriter, WhenFull};
+use super::error::RuntimeError;
+use super::graph::{EndpointKind, Membership, NodeId};
+use super::logging::Throttle;
+use super::names;
+use super::node::Node;
+use super::peers::Peers;
+use super::qos::Qos;
+use super::service_wire::{read_request, write_reply};
+
+/// Requests are short.
+const MAX_REQUEST_BYTES: usize = 4 << 20;
+
+/// A client may ask before its reply reader is known here; a reply sent then would be lost.
+const WAIT_FOR_CLIENT: Duration = Duration::from_secs(1);
+
+/// Between two warnings of unreadable requests.
+const WARNING_PERIOD: Duration = Duration::from_secs(5);
+
+/// A server of a service; dropping it ends it.
+#[must_use = "dropping a server ends it"]
+pub struct Server {
+    name: String,
+    clients: Arc<Peers>,
+    _task: Task<()>,
+    _graph: [Membership; 2],
+}
+
+impl Server {
+    /// Full name of the service.
+    pub fn name(&self) -> &str {
+        &self.name
+    }
+
+    /// Clients that could send a request now.
+    pub fn client_count(&self) -> usize {
+        self.clients.count()
+    }
+}
+
+impl Node {
+    /// Serves `S`; the handler runs on the io thread and must return at once.
+    pub fn service<S: RosService + 'static>(
+        &self,
+        name: &str,
+        handler: impl FnMut(S::Request) -> S::Response + Send + 'static,
+    ) -> Result<Server, RuntimeError> {
+        let name = self.resolve_service(name)?;
+        self.core().serve::<S>(self.id(), &name, handler)
+    }
+
+    /// Serves `std_srvs/srv/Trigger`; the handler answers success and what came of it.
+    pub fn service_trigger(
+        &self,
+        name: &str,
+        mut handler: impl FnMut() -> (bool, String) + Send + 'static,
+    ) -> Result<Server, RuntimeError> {
+        self.service::<Trigger>(name, move |_: TriggerRequest| {
+            let (success, message) = handler();
+            TriggerResponse { success, message }
+        })
+    }
+}
+
+impl Core {
+    pub(crate) fn serve<S: RosService + 'static>(
+        &self,
+        node: NodeId,
+        name: &str,
+        handler: impl FnMut(S::Request) -> S::Response + Send + 'static,
+    ) -> Result<Server, RuntimeError> {
+        let clients = Arc::new(Peers::of_server(name));
+        let topic = names::dds_request(name);
+        let requests =
+            self.dds_reader(name, topic, S::Request::TYPE, &Qos::SERVICES, MAX_REQUEST_BYTES)?;
+        let readers = Arc::new(Peers::of_replies(name));
+        let (joined, reader_joined) = bounded(1);
+        readers.on_joined(Box::new(move || {
+            // One note that something has changed is enough.
+            let _ = joined.try_send(());
+        }));
+        let topic = names::dds_reply(name);
+        let replies =
+            self.dds_writer(name, topic, S::Response::TYPE, &Qos::SERVICES, WhenFull::Drop)?;
+        let graph = [
+            self.graph.join(node, EndpointKind::Reader, requests.guid()),
+            self.graph.join(node, EndpointKind::Writer, replies.guid()),
+        ];
+        self.endpoints.register(requests.guid(), &clients);
+        self.endpoints.register(replies.guid(), &readers);
+        let serving = Serving {
+            name: name.to_owned(),
+            requests,
+            replies,
+            readers,
+            reader_joined,
+            warning: Throttle::new(WARNING_PERIOD),
+        };
+        let task = self
+            .io
+            .spawn(serving.run::<S>(handler))
+            .ok_or_else(|| RuntimeError::Closed {
+                topic: name.to_owned(),
+            })?;
+        Ok(Server {
+            name: name.to_owned(),
+            clients,
+            _task: task,
+            _graph: graph,
+        })
+    }
+}
+
+struct Serving {
+    name: String,
+    requests: DdsReader,
+    replies: DdsWriter,
+    readers: Arc<Peers>,
+    reader_joined: Receiver<()>,
+    warning: Throttle,
+}
+
+impl Serving {
+    async fn run<S: RosService>(self, mut handler: impl FnMut(S::Request) -> S::Response) {
+        loop {
+            let sample = self.requests.next().await;
+            if let Err(why) = self.answer::<S>(sample, &mut handler).await
+                && self.warning.check().is_some()
+            {
+                log::warn!("{}: request not answered: {why}", self.name);
+            }
+            smol::future::yield_now().await;
+        }
+    }
+
+    async fn answer<S: RosService>(
+        &self,
+        sample: Result<SampleOrigin, String>,
+        handler: &mut impl FnMut(S::Request) -> S::Response,
+    ) -> Result<(), String> {
+        let origin = sample?;
+        let (request, reply_to) =
+            read_request::<S::Request>(&self.requests.bytes(), &origin).map_err(|e| e.to_string())?;
+        let reply = handler(request);
+        let (body, related) = write_reply(&reply, &reply_to).map_err(|e| e.to_string())?;
+        self.wait_for_reader(&origin.writer).await;
+        self.replies
+            .send_body(body, related)
+            .map_err(|e| e.to_string())
+    }
+
+    async fn wait_for_reader(&self, client: &GUID) {
+        let known = || self.readers.any_remote(|reader| reader.prefix == client.prefix);
+        let wait = async {
+            while !known() && self.reader_joined.recv().await.is_ok() {}
+        };
+        let timeout = async {
+            Timer::after(WAIT_FOR_CLIENT).await;
+        };
+        smol::future::or(wait, timeout).await;
+    }
+}

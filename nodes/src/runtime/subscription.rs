@@ -1,0 +1,202 @@
+//! Subscriptions: from DDS and from this process to one handler.
+
+use std::pin::pin;
+use std::sync::Arc;
+use std::sync::atomic::{AtomicU64, Ordering::Relaxed};
+use std::thread::JoinHandle;
+use std::time::Duration;
+
+use futures::future::{Either, select};
+use lattice_msgs::{RosMessage, cdr};
+use smol::Task;
+use smol::channel::{Receiver, Sender, bounded};
+
+use super::dds::reader::{DdsReader, SampleOrigin};
+use super::error::RuntimeError;
+use super::graph;
+use super::logging::Throttle;
+use super::local_bus::{AnyMessage, Membership};
+use super::peers::Peers;
+use super::shutdown::Shutdown;
+use super::worker::guarded;
+
+/// After so many messages in a row, a task lets the others of its thread have a turn.
+const MESSAGES_PER_TURN: u32 = 16;
+
+/// Between two warnings of undecodable samples.
+const WARNING_PERIOD: Duration = Duration::from_secs(5);
+
+/// How much work the messages of a subscription are.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub enum Load {
+    /// Poses, transforms, clocks: taken on the io thread.
+    Small,
+    /// Clouds, images, maps: taken on a thread of their own.
+    Large,
+}
+
+/// A subscription; dropping it ends it.
+#[must_use = "dropping a subscription ends it"]
+pub struct Subscription {
+    stats: Arc<Stats>,
+    _running: Running,
+    _graph: graph::Membership,
+}
+
+pub(crate) enum Running {
+    /// Ends when dropped.
+    OnIoThread { _task: Task<()> },
+    /// Ends when the sender is dropped.
+    OnOwnThread { _stop: Sender<()> },
+}
+
+/// What is counted of a subscription.
+pub(crate) struct Stats {
+    peers: Arc<Peers>,
+    received: AtomicU64,
+    undecodable: AtomicU64,
+    warning: Throttle,
+}
+
+impl Subscription {
+    pub(crate) fn new(stats: Arc<Stats>, running: Running, graph: graph::Membership) -> Self {
+        Self {
+            stats,
+            _running: running,
+            _graph: graph,
+        }
+    }
+
+    /// Resolved topic.
+    pub fn topic(&self) -> &str {
+        self.stats.peers.topic()
+    }
+
+    /// Matched publishers, here and in other processes.
+    pub fn publisher_count(&self) -> usize {
+        self.stats.peers.count()
+    }
+
+    /// Messages given to the handler.
+    pub fn received(&self) -> u64 {
+        self.stats.received.load(Relaxed)
+    }
+
+    /// Samples that were no message of this type, or too long, and were left out.
+    pub fn undecodable(&self) -> u64 {
+        self.stats.undecodable.load(Relaxed)
+    }
+}
+
+impl Stats {
+    pub(crate) fn new(peers: Arc<Peers>) -> Self {
+        Self {
+            peers,
+            received: AtomicU64::new(0),
+            undecodable: AtomicU64::new(0),
+            warning: Throttle::new(WARNING_PERIOD),
+        }
+    }
+
+    pub(crate) fn peers(&self) -> &Peers {
+        &self.peers
+    }
+
+    pub(crate) fn undecodable(&self) -> u64 {
+        self.undecodable.load(Relaxed)
+    }
+
+    fn not_decodable(&self, why: &str) {
+        let count = self.undecodable.fetch_add(1, Relaxed).saturating_add(1);
+        if self.warning.check().is_some() {
+            log::warn!("{}: undecodable sample ({count} so far): {why}", self.peers.topic());
+        }
+    }
+}
+
+/// Everything one subscription hears.
+pub(crate) struct Source {
+    pub reader: DdsReader,
+    pub local: Receiver<AnyMessage>,
+    pub _membership: Membership,
+    pub stats: Arc<Stats>,
+}
+
+impl Source {
+    /// Gives messages to the handler until the task is dropped.
+    pub(crate) async fn run<M: RosMessage>(self, mut handler: impl FnMut(Arc<M>)) {
+        let mut turn: u32 = 0;
+        loop {
+            turn = turn.wrapping_add(1);
+            if turn.is_multiple_of(MESSAGES_PER_TURN) {
+                smol::future::yield_now().await;
+            }
+            let message = match self.next(turn.is_multiple_of(2)).await {
+                Heard::Local(message) => message.downcast::<M>().ok(),
+                Heard::Remote(sample) => self.decode::<M>(sample),
+                Heard::End => return,
+            };
+            if let Some(message) = message {
+                self.stats.received.fetch_add(1, Relaxed);
+                handler(message);
+            }
+        }
+    }
+
+    /// Both sides get their turn, whichever has more to say.
+    async fn next(&self, local_first: bool) -> Heard {
+        let local = pin!(async {
+            match self.local.recv().await {
+                Ok(message) => Heard::Local(message),
+                Err(_) => Heard::End,
+            }
+        });
+        let remote = pin!(async { Heard::Remote(self.reader.next().await) });
+        if local_first {
+            either(select(local, remote).await)
+        } else {
+            either(select(remote, local).await)
+        }
+    }
+
+    fn decode<M: RosMessage>(&self, sample: Result<SampleOrigin, String>) -> Option<Arc<M>> {
+        let decoded = sample
+            .and_then(|_| cdr::from_slice::<M>(&self.reader.bytes()).map_err(|e| e.to_string()));
+        decoded
+            .inspect_err(|why| self.stats.not_decodable(why))
+            .ok()
+            .map(Arc::new)
+    }
+}
+
+enum Heard {
+    Local(AnyMessage),
+    Remote(Result<SampleOrigin, String>),
+    End,
+}
+
+fn either<A, B>(result: Either<(Heard, A), (Heard, B)>) -> Heard {
+    match result {
+        Either::Left((heard, _)) | Either::Right((heard, _)) => heard,
+    }
+}
+
+/// Runs a subscription on a thread of its own until the sender is dropped.
+pub(crate) fn spawn_reader(
+    shutdown: &Shutdown,
+    task: impl Future<Output = ()> + Send + 'static,
+) -> Result<(Sender<()>, JoinHandle<()>), RuntimeError> {
+    let (stop, stopped) = bounded::<()>(1);
+    let shutdown = shutdown.clone();
+    let thread = std::thread::Builder::new()
+        .name("reader".to_owned())
+        .spawn(move || {
+            guarded("reader", &shutdown, || {
+                smol::future::block_on(smol::future::or(task, async {
+                    // Ends when the sender closes.
+                    let _ = stopped.recv().await;
+                }));
+            });
+        })?;
+    Ok((stop, thread))
+}
