@@ -27,7 +27,11 @@ impl TestDomain {
             .map(|domain| (domain + start) % 101 + 1)
             .find_map(|id| {
                 let path = directory.join(format!("{id}.lock"));
-                let file = OpenOptions::new().create(true).append(true).open(path).ok()?;
+                let file = OpenOptions::new()
+                    .create(true)
+                    .append(true)
+                    .open(path)
+                    .ok()?;
                 file.try_lock().ok()?;
                 Some(Self { id, _lock: file })
             })

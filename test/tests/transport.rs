@@ -160,12 +160,17 @@ fn one_process_shares_the_message_itself() {
     let domain = TestDomain::take();
     let runtime = runtime(&domain, "a");
     let (from, to) = (runtime.node("a").unwrap(), runtime.node("b").unwrap());
-    let publisher = from.publisher::<PointCloud2>("points", Qos::SENSOR).unwrap();
+    let publisher = from
+        .publisher::<PointCloud2>("points", Qos::SENSOR)
+        .unwrap();
     let (_subscription, heard) = hear::<PointCloud2>(&to, "/points", Qos::SENSOR, Load::Large);
     assert_eq!(publisher.subscriber_count(), 1);
     let message = Arc::new(cloud(1600));
     publisher.publish(Arc::clone(&message)).unwrap();
-    assert!(Arc::ptr_eq(&heard.recv_timeout(PATIENCE).unwrap(), &message));
+    assert!(Arc::ptr_eq(
+        &heard.recv_timeout(PATIENCE).unwrap(),
+        &message
+    ));
     assert_eq!(publisher.sent(), 0, "nobody outside listens");
     let refused = to.publisher::<RosString>("points", Qos::DEFAULT);
     assert!(matches!(refused, Err(RuntimeError::TypeMismatch { .. })));
@@ -220,7 +225,9 @@ fn raw_messages_arrive_as_they_are() {
     let (a, b) = (runtime(&domain, "a"), runtime(&domain, "b"));
     let (from, to) = (a.node("a").unwrap(), b.node("b").unwrap());
     let qos = Qos::reliable(2);
-    let publisher = from.raw_publisher("/chatter", RosString::TYPE, qos).unwrap();
+    let publisher = from
+        .raw_publisher("/chatter", RosString::TYPE, qos)
+        .unwrap();
     let (_here, heard_here) = hear::<RosString>(&from, "chatter", qos, Load::Small);
     let (_there, heard_there) = hear::<RosString>(&to, "chatter", qos, Load::Small);
     // One joined here at once, the other comes by discovery.
@@ -241,9 +248,17 @@ fn raw_messages_arrive_as_they_are() {
             assert_eq!(heard.recv_timeout(PATIENCE).unwrap().data, i.to_string());
         }
     }
-    for bad in [vec![], vec![0, 1, 0], vec![0, 0, 0, 0, 1], vec![0, 7, 0, 0, 1]] {
+    for bad in [
+        vec![],
+        vec![0, 1, 0],
+        vec![0, 0, 0, 0, 1],
+        vec![0, 7, 0, 0, 1],
+    ] {
         let refused = publisher.publish_blocking(bad);
-        assert!(matches!(refused, Err(PublishError::NotLittleEndianCdr { .. })));
+        assert!(matches!(
+            refused,
+            Err(PublishError::NotLittleEndianCdr { .. })
+        ));
     }
     let refused = from.raw_publisher("/x", "std_msgs/String/x/y", qos);
     assert!(matches!(refused, Err(RuntimeError::TypeName { .. })));
@@ -271,8 +286,16 @@ fn undecodable_and_long_samples_are_counted_and_the_next_arrives() {
         for bytes in [length_lies, not_utf8, too_long, good] {
             publisher.publish_blocking(bytes).unwrap();
         }
-        assert_eq!(heard.recv_timeout(PATIENCE).unwrap().data, "good", "{topic}");
-        assert_eq!((subscription.undecodable(), subscription.received()), (3, 1), "{topic}");
+        assert_eq!(
+            heard.recv_timeout(PATIENCE).unwrap().data,
+            "good",
+            "{topic}"
+        );
+        assert_eq!(
+            (subscription.undecodable(), subscription.received()),
+            (3, 1),
+            "{topic}"
+        );
     }
 }
 
@@ -309,7 +332,11 @@ fn qos_parameters_override_the_code() {
     let domain = TestDomain::take();
     let a = runtime(&domain, "a");
     let b = with_args(&domain, "b", &["-p", "qos.imu.reliability:=best_effort"]);
-    let publisher = a.node("a").unwrap().publisher::<Imu>("imu", Qos::INS).unwrap();
+    let publisher = a
+        .node("a")
+        .unwrap()
+        .publisher::<Imu>("imu", Qos::INS)
+        .unwrap();
     let to = b.node("b").unwrap();
     let (_subscription, heard) = hear::<Imu>(&to, "imu", Qos::reliable(200), Load::Small);
     wait_for_subscriber!(publisher);
@@ -384,7 +411,10 @@ fn shutdown_stops_timers_sends_what_is_queued_and_leaves_at_once() {
         assert_eq!(heard.recv_timeout(PATIENCE).unwrap().data, i.to_string());
     }
     wait_until(&b, move || subscription.publisher_count() == 0);
-    assert!(matches!(publisher.publish(text("late")), Ok(()) | Err(PublishError::Closed { .. })));
+    assert!(matches!(
+        publisher.publish(text("late")),
+        Ok(()) | Err(PublishError::Closed { .. })
+    ));
     let late = from.publisher::<RosString>("late", Qos::DEFAULT);
     assert!(matches!(late, Err(RuntimeError::Closed { .. })));
 }

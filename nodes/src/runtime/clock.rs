@@ -35,7 +35,9 @@ impl Clock {
 }
 
 fn system_ns() -> i64 {
-    let elapsed = SystemTime::now().duration_since(UNIX_EPOCH).unwrap_or_default();
+    let elapsed = SystemTime::now()
+        .duration_since(UNIX_EPOCH)
+        .unwrap_or_default();
     i64::try_from(elapsed.as_nanos()).unwrap_or(i64::MAX)
 }
 
@@ -60,7 +62,8 @@ impl Core {
         let handler = move |message: Arc<rosgraph_msgs::Clock>| {
             now_ns.store(message.clock.to_ns(), Relaxed);
         };
-        let subscription = self.subscribe(node, topic, &Qos::CLOCK, Load::Small, 1 << 10, handler)?;
+        let subscription =
+            self.subscribe(node, topic, &Qos::CLOCK, Load::Small, 1 << 10, handler)?;
         *sim = Some(SimTime {
             clock: clock.clone(),
             _subscription: subscription,

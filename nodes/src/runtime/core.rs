@@ -105,7 +105,9 @@ impl Core {
         let writer = self.dds_writer(graph::TOPIC, topic, graph::TYPE, &qos, WhenFull::Wait)?;
         if let Some(open) = lock(&self.open).as_mut() {
             let participant = open.dds.participant().guid();
-            open.graph = self.io.spawn(Arc::clone(&self.graph).publish(participant, writer));
+            open.graph = self
+                .io
+                .spawn(Arc::clone(&self.graph).publish(participant, writer));
         }
         Ok(())
     }

@@ -99,7 +99,9 @@ impl Tasks {
                 stamp: Time::from_ns(stamp_ns),
                 ..Header::default()
             },
-            status: std::iter::once(extra).chain(states.values().cloned()).collect(),
+            status: std::iter::once(extra)
+                .chain(states.values().cloned())
+                .collect(),
         }
     }
 }
@@ -120,6 +122,9 @@ mod tests {
         let names: Vec<_> = message.status.iter().map(|s| s.name.as_str()).collect();
         assert_eq!(names, ["robot/mapper: transport", "robot/mapper: map"]);
         let map = &message.status[1];
-        assert_eq!((map.level, map.values[0].value.as_str()), (DiagnosticStatus::OK, "7"));
+        assert_eq!(
+            (map.level, map.values[0].value.as_str()),
+            (DiagnosticStatus::OK, "7")
+        );
     }
 }

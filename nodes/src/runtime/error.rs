@@ -10,7 +10,9 @@ use super::params::ParamError;
 #[derive(Debug, Error)]
 pub enum RuntimeError {
     /// No DDS participant.
-    #[error("cannot join DDS domain {domain}: {reason}; check ROS_DOMAIN_ID (0..=232) and the network interfaces")]
+    #[error(
+        "cannot join DDS domain {domain}: {reason}; check ROS_DOMAIN_ID (0..=232) and the network interfaces"
+    )]
     Participant {
         /// The domain.
         domain: u16,
@@ -36,7 +38,9 @@ pub enum RuntimeError {
         type_name: String,
     },
     /// Two types on one topic.
-    #[error("{topic}: is used as {have} in this process and cannot be {want} too; remap one of them")]
+    #[error(
+        "{topic}: is used as {have} in this process and cannot be {want} too; remap one of them"
+    )]
     TypeMismatch {
         /// Resolved topic.
         topic: String,

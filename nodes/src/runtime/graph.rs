@@ -68,7 +68,11 @@ impl Graph {
     /// Adds a node; it stays until the process ends.
     pub(crate) fn add_node(&self, namespace: &str, name: &str) -> NodeId {
         let mut nodes = lock(&self.nodes);
-        let id = NodeId(nodes.last_key_value().map_or(0, |(id, _)| id.0.wrapping_add(1)));
+        let id = NodeId(
+            nodes
+                .last_key_value()
+                .map_or(0, |(id, _)| id.0.wrapping_add(1)),
+        );
         nodes.insert(
             id,
             Entry {
@@ -223,13 +227,18 @@ mod tests {
         };
         let mut expected = vec![0, 1, 0, 0];
         expected.extend([1; 16]);
-        expected.extend([1, 0, 0, 0, 2, 0, 0, 0, b'/', 0, 0, 0, 2, 0, 0, 0, b'n', 0, 0, 0]);
+        expected.extend([
+            1, 0, 0, 0, 2, 0, 0, 0, b'/', 0, 0, 0, 2, 0, 0, 0, b'n', 0, 0, 0,
+        ]);
         expected.extend([1, 0, 0, 0]);
         expected.extend([2; 16]);
         expected.extend([1, 0, 0, 0]);
         expected.extend([3; 16]);
         assert_eq!(cdr::to_vec(&message(16)).unwrap(), expected);
-        assert_eq!(cdr::to_vec(&message(24)).unwrap().len(), expected.len() + 3 * 8);
+        assert_eq!(
+            cdr::to_vec(&message(24)).unwrap().len(),
+            expected.len() + 3 * 8
+        );
         drop((reader, writer));
         let entry = &lock(&graph.nodes)[&node];
         assert!(entry.readers.is_empty() && entry.writers.is_empty());
@@ -237,7 +246,12 @@ mod tests {
 
     #[test]
     fn humble_has_longer_gids() {
-        let cases = [(None, 16), (Some("humble"), 24), (Some("iron"), 16), (Some("jazzy"), 16)];
+        let cases = [
+            (None, 16),
+            (Some("humble"), 24),
+            (Some("iron"), 16),
+            (Some("jazzy"), 16),
+        ];
         for (distro, bytes) in cases {
             assert_eq!(gid_bytes(distro), bytes, "{distro:?}");
         }

@@ -6,8 +6,8 @@ use std::any::{Any, TypeId};
 use std::collections::{BTreeMap, VecDeque};
 use std::sync::{Arc, Mutex};
 
-use lattice_msgs::cdr::{self, CdrError};
 use lattice_msgs::RosMessage;
+use lattice_msgs::cdr::{self, CdrError};
 use rustdds::bytes::Bytes;
 use smol::channel::Sender;
 
@@ -161,9 +161,16 @@ impl Topic {
     fn tell_counts(&self) {
         let (publishers, subscribers) = {
             let inner = lock(&self.inner);
-            let publishers: Vec<_> = inner.publishers.iter().map(|p| Arc::clone(&p.peers)).collect();
-            let subscribers: Vec<_> =
-                inner.subscribers.iter().map(|s| Arc::clone(&s.peers)).collect();
+            let publishers: Vec<_> = inner
+                .publishers
+                .iter()
+                .map(|p| Arc::clone(&p.peers))
+                .collect();
+            let subscribers: Vec<_> = inner
+                .subscribers
+                .iter()
+                .map(|s| Arc::clone(&s.peers))
+                .collect();
             (publishers, subscribers)
         };
         for peers in &publishers {
@@ -340,13 +347,16 @@ mod tests {
             .topic("/a")
             .join_raw_publisher(RosString::TYPE, &raw_peers, 1)
             .unwrap();
-        raw.publish_cdr(&cdr::to_vec(&*text("raw")).unwrap().into()).unwrap();
+        raw.publish_cdr(&cdr::to_vec(&*text("raw")).unwrap().into())
+            .unwrap();
         let (sender, queue) = bounded(5);
         let theirs = Arc::new(Peers::of_subscription("/a"));
         let _subscriber = bus
             .topic("/a")
             .join_subscriber::<RosString>(&theirs, sender, true);
-        let heard: Vec<_> = std::iter::from_fn(|| next(&queue)).map(|m| m.data.clone()).collect();
+        let heard: Vec<_> = std::iter::from_fn(|| next(&queue))
+            .map(|m| m.data.clone())
+            .collect();
         assert_eq!(heard, ["2", "3", "raw"]);
     }
 

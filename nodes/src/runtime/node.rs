@@ -112,14 +112,24 @@ impl Node {
     pub fn resolve(&self, topic: &str) -> Result<String, RuntimeError> {
         let inner = &self.inner;
         let remaps = &inner.args.remaps;
-        Ok(names::resolve_topic(topic, &inner.name, &inner.namespace, remaps)?)
+        Ok(names::resolve_topic(
+            topic,
+            &inner.name,
+            &inner.namespace,
+            remaps,
+        )?)
     }
 
     /// Full name of a service, remapped.
     pub fn resolve_service(&self, service: &str) -> Result<String, RuntimeError> {
         let inner = &self.inner;
         let remaps = &inner.args.remaps;
-        Ok(names::resolve_service(service, &inner.name, &inner.namespace, remaps)?)
+        Ok(names::resolve_service(
+            service,
+            &inner.name,
+            &inner.namespace,
+            remaps,
+        )?)
     }
 
     /// The clock this node goes by.
@@ -151,7 +161,9 @@ impl Node {
         qos: Qos,
     ) -> Result<RawPublisher, RuntimeError> {
         names::validate_full_name(resolved_topic)?;
-        self.inner.core.raw_publisher(self.id(), resolved_topic, type_name, &qos)
+        self.inner
+            .core
+            .raw_publisher(self.id(), resolved_topic, type_name, &qos)
     }
 
     /// Gives every message on a topic to `handler`; `qos.<topic>.*` override the QoS.
@@ -168,6 +180,8 @@ impl Node {
         let resolved = self.resolve(topic)?;
         let qos = qos.with_overrides(&self.inner.params, &resolved, topic)?;
         let max = self.inner.max_message_bytes;
-        self.inner.core.subscribe(self.id(), &resolved, &qos, load, max, handler)
+        self.inner
+            .core
+            .subscribe(self.id(), &resolved, &qos, load, max, handler)
     }
 }

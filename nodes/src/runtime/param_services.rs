@@ -5,13 +5,12 @@ use std::collections::BTreeSet;
 use std::sync::Arc;
 
 use lattice_msgs::rcl_interfaces::{
-    DescribeParameters, DescribeParametersRequest, DescribeParametersResponse,
-    GetParameterTypes, GetParameterTypesRequest, GetParameterTypesResponse, GetParameters,
-    GetParametersRequest, GetParametersResponse, ListParameters, ListParametersRequest,
-    ListParametersResponse, ListParametersResult, ParameterDescriptor, ParameterType,
-    ParameterValue, SetParameters, SetParametersAtomically,
-    SetParametersAtomicallyResponse, SetParametersRequest, SetParametersResponse,
-    SetParametersResult,
+    DescribeParameters, DescribeParametersRequest, DescribeParametersResponse, GetParameterTypes,
+    GetParameterTypesRequest, GetParameterTypesResponse, GetParameters, GetParametersRequest,
+    GetParametersResponse, ListParameters, ListParametersRequest, ListParametersResponse,
+    ListParametersResult, ParameterDescriptor, ParameterType, ParameterValue, SetParameters,
+    SetParametersAtomically, SetParametersAtomicallyResponse, SetParametersRequest,
+    SetParametersResponse, SetParametersResult,
 };
 
 use super::error::RuntimeError;
@@ -24,7 +23,9 @@ pub(crate) fn serve(node: &Node, params: &Arc<Params>) -> Result<Vec<Server>, Ru
     let with = || Arc::clone(params);
     let (get, types, list, describe) = (with(), with(), with(), with());
     Ok(vec![
-        node.service::<GetParameters>("~/get_parameters", move |request| get_values(&get, &request))?,
+        node.service::<GetParameters>("~/get_parameters", move |request| {
+            get_values(&get, &request)
+        })?,
         node.service::<GetParameterTypes>("~/get_parameter_types", move |request| {
             get_types(&types, &request)
         })?,
@@ -45,7 +46,11 @@ fn find<'a>(declared: &'a [Declared], name: &str) -> Option<&'a Declared> {
 
 fn get_values(params: &Params, request: &GetParametersRequest) -> GetParametersResponse {
     let declared = params.declared();
-    let value = |name: &String| find(&declared, name).map(|d| message(&d.value)).unwrap_or_default();
+    let value = |name: &String| {
+        find(&declared, name)
+            .map(|d| message(&d.value))
+            .unwrap_or_default()
+    };
     GetParametersResponse {
         values: request.names.iter().map(value).collect(),
     }
@@ -60,7 +65,10 @@ fn get_types(params: &Params, request: &GetParameterTypesRequest) -> GetParamete
     }
 }
 
-fn describe_all(params: &Params, request: &DescribeParametersRequest) -> DescribeParametersResponse {
+fn describe_all(
+    params: &Params,
+    request: &DescribeParametersRequest,
+) -> DescribeParametersResponse {
     let declared = params.declared();
     let describe = |name: &String| {
         let found = find(&declared, name);
@@ -159,7 +167,10 @@ mod tests {
 
     fn params() -> Params {
         let params = Params::from_values("/n", [("lattice", ParamValue::String("fcc".to_owned()))]);
-        params.about("name of the lattice").string("lattice", "bcc").unwrap();
+        params
+            .about("name of the lattice")
+            .string("lattice", "bcc")
+            .unwrap();
         params.f64("cell_volume_m3", 0.125).unwrap();
         params.i64("qos.map.depth", 500).unwrap();
         params
@@ -175,7 +186,9 @@ mod tests {
 
     #[test]
     fn values_types_and_descriptions_are_told() {
-        let names: Vec<String> = ["lattice", "cell_volume_m3", "none"].map(str::to_owned).into();
+        let names: Vec<String> = ["lattice", "cell_volume_m3", "none"]
+            .map(str::to_owned)
+            .into();
         let request = GetParametersRequest {
             names: names.clone(),
         };
@@ -194,12 +207,18 @@ mod tests {
 
     #[test]
     fn lists_follow_prefix_and_depth() {
-        assert_eq!(list(&[], 0).names, ["cell_volume_m3", "lattice", "qos.map.depth"]);
+        assert_eq!(
+            list(&[], 0).names,
+            ["cell_volume_m3", "lattice", "qos.map.depth"]
+        );
         assert_eq!(list(&[], 0).prefixes, ["qos.map"]);
         assert_eq!(list(&[], 1).names, ["cell_volume_m3", "lattice"]);
         assert_eq!(list(&["qos"], 0).names, ["qos.map.depth"]);
         assert_eq!(list(&["qos"], 1).names, [""; 0]);
-        assert_eq!(list(&["qos.map", "lattice"], 1).names, ["lattice", "qos.map.depth"]);
+        assert_eq!(
+            list(&["qos.map", "lattice"], 1).names,
+            ["lattice", "qos.map.depth"]
+        );
         assert_eq!(list(&["latt"], 0).names, [""; 0]);
     }
 

@@ -149,7 +149,12 @@ impl Peers {
     }
 
     fn joined(&self, count: usize) {
-        log::log!(self.joins, "{}: {} matched ({count})", self.topic, self.peer_kind);
+        log::log!(
+            self.joins,
+            "{}: {} matched ({count})",
+            self.topic,
+            self.peer_kind
+        );
         // A callback may register another: not called under the lock.
         let mut callbacks = std::mem::take(&mut *lock(&self.on_joined));
         for callback in &mut callbacks {

@@ -95,7 +95,10 @@ impl RawPublisher {
             });
         }
         if let Err(error) = self.core.local.publish_cdr(&body) {
-            log::warn!("{}: message not given to this process: {error}", self.topic());
+            log::warn!(
+                "{}: message not given to this process: {error}",
+                self.topic()
+            );
         }
         if !self.core.wants_dds() {
             return Ok(());

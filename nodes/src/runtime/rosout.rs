@@ -59,9 +59,14 @@ fn hear(record: &Record<'_>, node: &str) {
 }
 
 fn message(record: &Record<'_>, node: &str) -> Log {
-    let elapsed = SystemTime::now().duration_since(UNIX_EPOCH).unwrap_or_default();
+    let elapsed = SystemTime::now()
+        .duration_since(UNIX_EPOCH)
+        .unwrap_or_default();
     let mut msg = record.args().to_string();
-    if let Some((end, _)) = msg.char_indices().find(|(i, c)| i + c.len_utf8() > MAX_TEXT_BYTES) {
+    if let Some((end, _)) = msg
+        .char_indices()
+        .find(|(i, c)| i + c.len_utf8() > MAX_TEXT_BYTES)
+    {
         msg.truncate(end);
     }
     Log {
@@ -95,7 +100,10 @@ mod tests {
                 .build(),
             "mapper",
         );
-        assert_eq!((heard.level, heard.line, heard.name.as_str()), (Log::WARN, 7, "mapper"));
+        assert_eq!(
+            (heard.level, heard.line, heard.name.as_str()),
+            (Log::WARN, 7, "mapper")
+        );
         assert_eq!(heard.msg.len(), MAX_TEXT_BYTES);
         assert!(heard.stamp.to_ns() > 0);
     }
@@ -104,7 +112,10 @@ mod tests {
     fn the_oldest_record_gives_way_and_a_listener_that_went_is_forgotten() {
         let (listener, receiver) = listen();
         for i in 0..=QUEUE_RECORDS {
-            hear(&Record::builder().args(format_args!("{i}")).build(), "a test of rosout");
+            hear(
+                &Record::builder().args(format_args!("{i}")).build(),
+                "a test of rosout",
+            );
         }
         let texts: Vec<_> = std::iter::from_fn(|| receiver.try_recv().ok())
             .filter(|log| log.name == "a test of rosout")
@@ -113,7 +124,10 @@ mod tests {
         assert_eq!(texts.last(), Some(&QUEUE_RECORDS.to_string()));
         assert!(!texts.contains(&"0".to_owned()));
         drop(listener);
-        hear(&Record::builder().args(format_args!("nobody")).build(), "a test of rosout");
+        hear(
+            &Record::builder().args(format_args!("nobody")).build(),
+            "a test of rosout",
+        );
         assert!(receiver.is_closed());
     }
 }

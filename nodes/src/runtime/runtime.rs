@@ -121,7 +121,9 @@ impl Runtime {
 
     fn publish_diagnostics(&self) -> Result<(), RuntimeError> {
         let topic = self.main.resolve("/diagnostics")?;
-        let publisher = self.core.publisher::<DiagnosticArray>(self.main.id(), &topic, &Qos::DIAGNOSTICS)?;
+        let publisher =
+            self.core
+                .publisher::<DiagnosticArray>(self.main.id(), &topic, &Qos::DIAGNOSTICS)?;
         let core = Arc::downgrade(&self.core);
         let (clock, fqn) = (self.main.clock(), self.main.fqn().to_owned());
         self.timer(DIAGNOSTICS_PERIOD, move || {

@@ -84,8 +84,13 @@ impl Core {
     ) -> Result<Server, RuntimeError> {
         let clients = Arc::new(Peers::of_server(name));
         let topic = names::dds_request(name);
-        let requests =
-            self.dds_reader(name, topic, S::Request::TYPE, &Qos::SERVICES, MAX_REQUEST_BYTES)?;
+        let requests = self.dds_reader(
+            name,
+            topic,
+            S::Request::TYPE,
+            &Qos::SERVICES,
+            MAX_REQUEST_BYTES,
+        )?;
         let readers = Arc::new(Peers::of_replies(name));
         let (joined, reader_joined) = bounded(1);
         readers.on_joined(Box::new(move || {
@@ -93,8 +98,13 @@ impl Core {
             let _ = joined.try_send(());
         }));
         let topic = names::dds_reply(name);
-        let replies =
-            self.dds_writer(name, topic, S::Response::TYPE, &Qos::SERVICES, WhenFull::Drop)?;
+        let replies = self.dds_writer(
+            name,
+            topic,
+            S::Response::TYPE,
+            &Qos::SERVICES,
+            WhenFull::Drop,
+        )?;
         let graph = [
             self.graph.join(node, EndpointKind::Reader, requests.guid()),
             self.graph.join(node, EndpointKind::Writer, replies.guid()),
@@ -109,12 +119,12 @@ impl Core {
             reader_joined,
             warning: Throttle::new(WARNING_PERIOD),
         };
-        let task = self
-            .io
-            .spawn(serving.run::<S>(handler))
-            .ok_or_else(|| RuntimeError::Closed {
-                topic: name.to_owned(),
-            })?;
+        let task =
+            self.io
+                .spawn(serving.run::<S>(handler))
+                .ok_or_else(|| RuntimeError::Closed {
+                    topic: name.to_owned(),
+                })?;
         Ok(Server {
             name: name.to_owned(),
             clients,
@@ -152,8 +162,8 @@ impl Serving {
         handler: &mut impl FnMut(S::Request) -> S::Response,
     ) -> Result<(), String> {
         let origin = sample?;
-        let (request, reply_to) =
-            read_request::<S::Request>(&self.requests.bytes(), &origin).map_err(|e| e.to_string())?;
+        let (request, reply_to) = read_request::<S::Request>(&self.requests.bytes(), &origin)
+            .map_err(|e| e.to_string())?;
         let reply = handler(request);
         let (body, related) = write_reply(&reply, &reply_to).map_err(|e| e.to_string())?;
         self.wait_for_reader(&origin.writer).await;
@@ -163,10 +173,11 @@ impl Serving {
     }
 
     async fn wait_for_reader(&self, client: &GUID) {
-        let known = || self.readers.any_remote(|reader| reader.prefix == client.prefix);
-        let wait = async {
-            while !known() && self.reader_joined.recv().await.is_ok() {}
+        let known = || {
+            self.readers
+                .any_remote(|reader| reader.prefix == client.prefix)
         };
+        let wait = async { while !known() && self.reader_joined.recv().await.is_ok() {} };
         let timeout = async {
             Timer::after(WAIT_FOR_CLIENT).await;
         };

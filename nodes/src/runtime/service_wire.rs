@@ -3,11 +3,11 @@
 //! rmw_fastrtps sends the bare message and names the request in the inline QoS (the "Enhanced" mapping
 //! of DDS-RPC 1.0); rmw_cyclonedds puts a header of 16 bytes in front of it.
 
-use lattice_msgs::cdr::{self, CdrError};
 use lattice_msgs::RosMessage;
+use lattice_msgs::cdr::{self, CdrError};
+use rustdds::SequenceNumber;
 use rustdds::bytes::Bytes;
 use rustdds::rpc::SampleIdentity;
-use rustdds::SequenceNumber;
 
 use super::dds::payload::ENCAPSULATION_BYTES;
 use super::dds::reader::SampleOrigin;
@@ -76,7 +76,9 @@ fn read_as<Q: RosMessage>(
     match mapping {
         Mapping::Enhanced => Ok((cdr::from_slice(bytes)?, ReplyTo::Enhanced(identity(origin)))),
         Mapping::Cyclone => {
-            let no_header = || CdrError::NoHeader { length: bytes.len() };
+            let no_header = || CdrError::NoHeader {
+                length: bytes.len(),
+            };
             let (encapsulation, rest) = bytes
                 .split_first_chunk::<ENCAPSULATION_BYTES>()
                 .ok_or_else(no_header)?;
@@ -179,7 +181,11 @@ mod tests {
         let unknown_vendor = origin([0x77, 0x77], None);
         let (_, to) = read_request::<SetBoolRequest>(&cyclone, &unknown_vendor).unwrap();
         assert_eq!(to, ReplyTo::Cyclone(header));
-        for bytes in [&[][..], &[0, 1, 0, 0], &[0, 1, 0, 0, 5, 5, 5, 5, 5, 5, 5, 5, 5]] {
+        for bytes in [
+            &[][..],
+            &[0, 1, 0, 0],
+            &[0, 1, 0, 0, 5, 5, 5, 5, 5, 5, 5, 5, 5],
+        ] {
             assert!(read_request::<SetBoolRequest>(bytes, &unknown_vendor).is_err());
         }
     }

@@ -14,8 +14,8 @@ use smol::channel::{Receiver, Sender, bounded};
 use super::dds::reader::{DdsReader, SampleOrigin};
 use super::error::RuntimeError;
 use super::graph;
-use super::logging::Throttle;
 use super::local_bus::{AnyMessage, Membership};
+use super::logging::Throttle;
 use super::peers::Peers;
 use super::shutdown::Shutdown;
 use super::worker::guarded;
@@ -109,7 +109,10 @@ impl Stats {
     fn not_decodable(&self, why: &str) {
         let count = self.undecodable.fetch_add(1, Relaxed).saturating_add(1);
         if self.warning.check().is_some() {
-            log::warn!("{}: undecodable sample ({count} so far): {why}", self.peers.topic());
+            log::warn!(
+                "{}: undecodable sample ({count} so far): {why}",
+                self.peers.topic()
+            );
         }
     }
 }

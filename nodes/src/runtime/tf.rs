@@ -54,7 +54,11 @@ impl StaticTfBroadcaster {
         transforms: impl IntoIterator<Item = TransformStamped>,
     ) -> Result<(), PublishError> {
         let mut all = lock(&self.all);
-        all.extend(transforms.into_iter().map(|t| (t.child_frame_id.clone(), t)));
+        all.extend(
+            transforms
+                .into_iter()
+                .map(|t| (t.child_frame_id.clone(), t)),
+        );
         let transforms = all.values().cloned().collect();
         self.publisher.publish(TFMessage { transforms })
     }

@@ -61,15 +61,35 @@ impl Core {
         };
         for publisher in self.publishers() {
             let topic = publisher.peers.topic();
-            add("dropped", "messages dropped", topic, publisher.writer.dropped());
+            add(
+                "dropped",
+                "messages dropped",
+                topic,
+                publisher.writer.dropped(),
+            );
             let incompatible = publisher.peers.incompatible_count();
-            add("incompatible_subscribers", "QoS does not match", topic, incompatible as u64);
+            add(
+                "incompatible_subscribers",
+                "QoS does not match",
+                topic,
+                incompatible as u64,
+            );
         }
         for subscription in self.subscriptions() {
             let topic = subscription.peers().topic();
-            add("undecodable", "undecodable samples", topic, subscription.undecodable());
+            add(
+                "undecodable",
+                "undecodable samples",
+                topic,
+                subscription.undecodable(),
+            );
             let incompatible = subscription.peers().incompatible_count();
-            add("incompatible_publishers", "QoS does not match", topic, incompatible as u64);
+            add(
+                "incompatible_publishers",
+                "QoS does not match",
+                topic,
+                incompatible as u64,
+            );
         }
         let (level, message) = if problems.is_empty() {
             (Level::Ok, "running".to_owned())

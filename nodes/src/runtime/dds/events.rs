@@ -48,7 +48,9 @@ impl Endpoints {
                 .into_iter()
                 .partition(|(guid, _)| *guid == endpoint);
             inner.early = others;
-            VecDeque::into_iter(mine).map(|(_, change)| change).collect()
+            VecDeque::into_iter(mine)
+                .map(|(_, change)| change)
+                .collect()
         };
         for change in early {
             apply(peers, change);
@@ -144,7 +146,8 @@ fn apply(peers: &Peers, change: Change) {
 
 /// First policy in which an offer is less than what is requested, in words for the operator.
 fn incompatible_policy(offered: &QosPolicies, requested: &QosPolicies) -> &'static str {
-    let reliable = |qos: &QosPolicies| matches!(qos.reliability(), Some(Reliability::Reliable { .. }));
+    let reliable =
+        |qos: &QosPolicies| matches!(qos.reliability(), Some(Reliability::Reliable { .. }));
     let rank = |qos: &QosPolicies| qos.durability().unwrap_or(Durability::Volatile);
     if reliable(requested) && !reliable(offered) {
         "reliability (the subscription asks for reliable, the publisher offers best_effort)"

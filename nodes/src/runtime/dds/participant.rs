@@ -39,8 +39,8 @@ impl Dds {
             domain,
             reason: format!("{reason:?}"),
         };
-        let mut builder = DomainParticipantBuilder::new(domain)
-            .socket_receive_buffer_size(RECEIVE_BUFFER_BYTES);
+        let mut builder =
+            DomainParticipantBuilder::new(domain).socket_receive_buffer_size(RECEIVE_BUFFER_BYTES);
         if localhost_only {
             builder = builder.with_only_networks([Ipv4Addr::LOCALHOST]);
         }
@@ -48,8 +48,12 @@ impl Dds {
         let context =
             Context::from_domain_participant(participant.clone()).map_err(|e| failed(&e))?;
         let none = QosPolicies::qos_none();
-        let publisher = participant.create_publisher(&none).map_err(|e| failed(&e))?;
-        let subscriber = participant.create_subscriber(&none).map_err(|e| failed(&e))?;
+        let publisher = participant
+            .create_publisher(&none)
+            .map_err(|e| failed(&e))?;
+        let subscriber = participant
+            .create_subscriber(&none)
+            .map_err(|e| failed(&e))?;
         Ok(Self {
             _context: context,
             participant,

@@ -3,8 +3,8 @@
 //! Serialization, page faults and the wait for a full send window happen there, never at the caller;
 //! a writer that waits holds up nobody but its own queue.
 
-use std::sync::{Arc, Mutex};
 use std::sync::atomic::{AtomicBool, AtomicU64, AtomicUsize, Ordering::Relaxed};
+use std::sync::{Arc, Mutex};
 use std::time::{Duration, Instant};
 
 use futures::future::{Either, select};
@@ -263,9 +263,8 @@ impl Shared {
                 WhenFull::Drop if self.stuck.load(Relaxed) => Some(PATIENCE_WITH_STUCK_PEER),
                 WhenFull::Drop => Some(PATIENCE),
             };
-            let write = std::pin::pin!(
-                writer.async_write_with_options(Payload(body.clone()), options)
-            );
+            let write =
+                std::pin::pin!(writer.async_write_with_options(Payload(body.clone()), options));
             let result = match patience {
                 None => write.await,
                 Some(patience) => {
