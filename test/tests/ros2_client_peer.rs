@@ -1,4 +1,5 @@
 //! The runtime against ros2-client as a peer: services by both rmw mappings, parameters, the graph.
+#![expect(clippy::unwrap_used, reason = "a test that cannot go on ends")]
 
 use std::time::Duration;
 
@@ -90,12 +91,13 @@ fn a_trigger_answers_clients_of_both_rmw() {
         })
         .unwrap();
     assert_eq!(server.name(), "/mapper/reset");
-    let mut peer = peer(&domain);
     let type_name = ServiceTypeName::new("std_srvs", "Trigger");
     for (i, mapping) in [ServiceMapping::Enhanced, ServiceMapping::Cyclone]
         .into_iter()
         .enumerate()
     {
+        // Two clients of one participant would see each other's replies.
+        let mut peer = peer(&domain);
         let request = Foreign(TriggerRequest::default());
         let reply: Foreign<TriggerResponse> =
             call(&mut peer, mapping, "/mapper/reset", &type_name, request);
@@ -111,9 +113,9 @@ fn a_trigger_answers_clients_of_both_rmw() {
 fn parameters_are_served_to_clients_of_both_rmw() {
     let domain = TestDomain::take();
     let runtime = runtime(&domain, &["--ros-args", "-p", "max_message_bytes:=5000"]);
-    let mut peer = peer(&domain);
     let type_name = ServiceTypeName::new("rcl_interfaces", "GetParameters");
     for mapping in [ServiceMapping::Enhanced, ServiceMapping::Cyclone] {
+        let mut peer = peer(&domain);
         let request = Foreign(GetParametersRequest {
             names: vec!["max_message_bytes".to_owned(), "none".to_owned()],
         });

@@ -1,4 +1,9 @@
 //! The transport between two participants, in one process and over loopback.
+#![expect(
+    clippy::unwrap_used,
+    clippy::expect_used,
+    reason = "a test that cannot go on ends"
+)]
 
 use std::sync::Arc;
 use std::sync::mpsc::{Receiver, channel};
@@ -6,10 +11,12 @@ use std::time::Duration;
 
 use lattice_msgs::builtin_interfaces::Time;
 use lattice_msgs::diagnostic_msgs::{DiagnosticArray, DiagnosticStatus};
+use lattice_msgs::geometry_msgs::TransformStamped;
 use lattice_msgs::rcl_interfaces::Log;
 use lattice_msgs::rosgraph_msgs::Clock;
 use lattice_msgs::sensor_msgs::{Imu, PointCloud2, PointField};
 use lattice_msgs::std_msgs::String as RosString;
+use lattice_msgs::tf2_msgs::TFMessage;
 use lattice_msgs::{RosMessage, cdr};
 use lattice_nodes::runtime::qos::Qos;
 use lattice_nodes::runtime::ros_args::RosArgs;
@@ -85,6 +92,18 @@ macro_rules! wait_for_subscriber {
     }};
 }
 
+/// Completes when both sides know each other: only then does nothing best-effort go amiss.
+macro_rules! wait_for_match {
+    ($publisher:expr, $subscription:expr) => {{
+        wait_for_subscriber!($publisher);
+        let (sender, joined) = channel();
+        $subscription.on_publisher_joined(move || {
+            let _ = sender.send(());
+        });
+        joined.recv_timeout(PATIENCE).expect("a publisher");
+    }};
+}
+
 /// Completes when `reached` is true, asked on a timer of the runtime.
 fn wait_until(runtime: &Runtime, mut reached: impl FnMut() -> bool + Send + 'static) {
     let (sender, done) = channel();
@@ -126,12 +145,13 @@ fn clouds_of_two_megabytes_arrive_equal_by_either_qos() {
     let message = Arc::new(cloud(2_000_000));
     for (topic, qos) in [("reliable", Qos::reliable(5)), ("best_effort", Qos::SENSOR)] {
         let publisher = from.publisher::<PointCloud2>(topic, qos).unwrap();
-        let (_subscription, heard) = hear::<PointCloud2>(&to, topic, qos, Load::Large);
-        wait_for_subscriber!(publisher);
+        let (subscription, heard) = hear::<PointCloud2>(&to, topic, qos, Load::Large);
+        wait_for_match!(publisher, subscription);
         for _ in 0..3 {
             publisher.publish(Arc::clone(&message)).unwrap();
             assert_eq!(heard.recv_timeout(PATIENCE).unwrap(), message, "{topic}");
         }
+        assert_eq!(subscription.lost(), 0);
     }
 }
 
@@ -140,9 +160,11 @@ fn a_burst_longer_than_the_depth_waits_for_its_reader() {
     let domain = TestDomain::take();
     let (a, b) = (runtime(&domain, "a"), runtime(&domain, "b"));
     let (from, to) = (a.node("a").unwrap(), b.node("b").unwrap());
-    let qos = Qos::reliable(5);
-    let publisher = from.publisher::<PointCloud2>("chunks", qos).unwrap();
-    let (_subscription, heard) = hear::<PointCloud2>(&to, "chunks", qos, Load::Large);
+    let publisher = from
+        .publisher::<PointCloud2>("chunks", Qos::reliable(5))
+        .unwrap();
+    let (_subscription, heard) =
+        hear::<PointCloud2>(&to, "chunks", Qos::reliable(200), Load::Large);
     wait_for_subscriber!(publisher);
     let chunk = Arc::new(cloud(50_000));
     for _ in 0..200 {
@@ -192,25 +214,45 @@ fn a_late_joiner_hears_what_was_latched() {
 }
 
 #[test]
+fn a_second_subscription_hears_only_what_comes_after_it() {
+    let domain = TestDomain::take();
+    let (a, b) = (runtime(&domain, "a"), runtime(&domain, "b"));
+    let (from, to) = (a.node("a").unwrap(), b.node("b").unwrap());
+    let publisher = from
+        .publisher::<RosString>("chatter", Qos::DEFAULT)
+        .unwrap();
+    let (_first, heard_first) = hear::<RosString>(&to, "chatter", Qos::DEFAULT, Load::Small);
+    wait_for_subscriber!(publisher);
+    publisher.publish(text("before")).unwrap();
+    assert_eq!(heard_first.recv_timeout(PATIENCE).unwrap().data, "before");
+    let (_second, heard_second) = hear::<RosString>(&to, "chatter", Qos::DEFAULT, Load::Small);
+    let counted = publisher.clone();
+    wait_until(&a, move || counted.subscriber_count() == 2);
+    publisher.publish(text("after")).unwrap();
+    for heard in [heard_first, heard_second] {
+        assert_eq!(heard.recv_timeout(PATIENCE).unwrap().data, "after");
+    }
+}
+
+#[test]
 fn static_transforms_go_in_one_message() {
     let domain = TestDomain::take();
     let (a, b) = (runtime(&domain, "a"), runtime(&domain, "b"));
     let broadcaster = StaticTfBroadcaster::new(&a.node("a").unwrap()).unwrap();
     for (child, x) in [("laser", 1.0), ("ins", 2.0), ("laser", 3.0)] {
-        let mut transform = lattice_msgs::geometry_msgs::TransformStamped::default();
-        transform.child_frame_id = child.to_owned();
+        let mut transform = TransformStamped {
+            child_frame_id: child.to_owned(),
+            ..TransformStamped::default()
+        };
         transform.transform.translation.x = x;
         broadcaster.send([transform]).unwrap();
     }
     let node = b.node("b").unwrap();
     let qos = Qos::TF_STATIC_LISTENER;
-    let (_subscription, heard) =
-        hear::<lattice_msgs::tf2_msgs::TFMessage>(&node, "/tf_static", qos, Load::Small);
+    let (_subscription, heard) = hear::<TFMessage>(&node, "/tf_static", qos, Load::Small);
     let frames = loop {
         let message = heard.recv_timeout(PATIENCE).unwrap();
-        let frame = |t: &lattice_msgs::geometry_msgs::TransformStamped| {
-            (t.child_frame_id.clone(), t.transform.translation.x)
-        };
+        let frame = |t: &TransformStamped| (t.child_frame_id.clone(), t.transform.translation.x);
         let frames: Vec<_> = message.transforms.iter().map(frame).collect();
         if frames.iter().any(|(_, x)| *x == 3.0) {
             break frames;
@@ -278,7 +320,7 @@ fn undecodable_and_long_samples_are_counted_and_the_next_arrives() {
             .raw_publisher(&format!("/{topic}"), RosString::TYPE, qos)
             .unwrap();
         let (subscription, heard) = hear::<RosString>(&to, topic, qos, load);
-        wait_for_subscriber!(publisher);
+        wait_for_match!(publisher, subscription);
         let length_lies = vec![0, 1, 0, 0, 255, 255, 255, 255, b'x', 0];
         let not_utf8 = vec![0, 1, 0, 0, 3, 0, 0, 0, 0xff, 0xfe, 0];
         let too_long = cdr::to_vec(&text(&"x".repeat(1000))).unwrap();
@@ -297,6 +339,41 @@ fn undecodable_and_long_samples_are_counted_and_the_next_arrives() {
             "{topic}"
         );
     }
+}
+
+#[test]
+fn what_a_slow_subscriber_misses_is_counted() {
+    let domain = TestDomain::take();
+    let (a, b) = (runtime(&domain, "a"), runtime(&domain, "b"));
+    let (from, to) = (a.node("a").unwrap(), b.node("b").unwrap());
+    let publisher = from
+        .publisher::<PointCloud2>("points", Qos::reliable(100))
+        .unwrap();
+    let (gate, opened) = channel();
+    let (sender, heard) = channel();
+    let subscription = to
+        .subscribe::<PointCloud2>("points", Qos::SENSOR, Load::Large, move |cloud| {
+            let _ = sender.send(cloud.header.stamp.to_ns());
+            let _ = opened.recv();
+        })
+        .unwrap();
+    wait_for_match!(publisher, subscription);
+    // One is taken, the cache keeps the last of the others.
+    let count = 30;
+    for i in 0..count {
+        let mut cloud = cloud(100_000);
+        cloud.header.stamp = Time::from_ns(i);
+        publisher.publish(cloud).unwrap();
+    }
+    assert!(publisher.flush(PATIENCE));
+    let mut last = -1;
+    while last < count - 1 {
+        gate.send(()).unwrap();
+        last = heard.recv_timeout(PATIENCE).unwrap();
+    }
+    assert!(subscription.lost() > 0);
+    let expected = u64::try_from(count).unwrap();
+    assert!(subscription.lost() + subscription.received() <= expected);
 }
 
 #[test]
@@ -338,8 +415,8 @@ fn qos_parameters_override_the_code() {
         .publisher::<Imu>("imu", Qos::INS)
         .unwrap();
     let to = b.node("b").unwrap();
-    let (_subscription, heard) = hear::<Imu>(&to, "imu", Qos::reliable(200), Load::Small);
-    wait_for_subscriber!(publisher);
+    let (subscription, heard) = hear::<Imu>(&to, "imu", Qos::reliable(200), Load::Small);
+    wait_for_match!(publisher, subscription);
     publisher.publish(Imu::default()).unwrap();
     heard.recv_timeout(PATIENCE).unwrap();
 }
@@ -357,13 +434,12 @@ fn simulated_time_follows_the_clock() {
     let clock = b.node("b").unwrap().clock();
     assert!(clock.is_sim());
     assert_eq!(clock.now_ns(), 0);
-    wait_for_subscriber!(publisher);
     let stamp_ns = 1_234_567_890_123;
-    publisher
-        .publish(Clock {
-            clock: Time::from_ns(stamp_ns),
-        })
-        .unwrap();
+    // Best effort: what is sent before both sides know each other is lost.
+    a.timer(Duration::from_millis(5), move || {
+        let clock = Time::from_ns(stamp_ns);
+        let _ = publisher.publish(Clock { clock });
+    });
     wait_until(&b, move || clock.now_ns() == stamp_ns);
 }
 

@@ -206,7 +206,11 @@ impl Core {
         let mut guard = lock(&self.open);
         let open = guard.as_mut().ok_or_else(|| closed(name))?;
         let reader = open.dds.reader(name, dds_topic, type_name, qos)?;
-        Ok(DdsReader::new(reader, max_bytes))
+        let reader = DdsReader::new(reader, max_bytes);
+        if qos.durability == Durability::Volatile {
+            reader.skip_old();
+        }
+        Ok(reader)
     }
 
     pub(crate) fn subscribe<M: RosMessage>(
@@ -226,10 +230,12 @@ impl Core {
         };
         let (sender, local) = bounded(queue);
         let latched = qos.durability == Durability::TransientLocal;
-        let membership = self
-            .bus
-            .topic(topic)
-            .join_subscriber::<M>(&peers, sender, latched)?;
+        let membership = self.bus.topic(topic).join_subscriber::<M>(
+            &peers,
+            sender,
+            stats.lost_counter(),
+            latched,
+        )?;
         let reader = self.dds_reader(topic, names::dds_topic(topic), M::TYPE, qos, max_bytes)?;
         let guid = reader.guid();
         let source = Source {

@@ -4,6 +4,7 @@
 
 use std::any::{Any, TypeId};
 use std::collections::{BTreeMap, VecDeque};
+use std::sync::atomic::{AtomicU64, Ordering::Relaxed};
 use std::sync::{Arc, Mutex};
 
 use lattice_msgs::RosMessage;
@@ -72,6 +73,7 @@ struct SubscriberEntry {
     id: u64,
     peers: Arc<Peers>,
     sender: Sender<AnyMessage>,
+    lost: Arc<AtomicU64>,
 }
 
 /// A place on a topic; dropping it leaves the topic.
@@ -109,11 +111,13 @@ impl Topic {
         )
     }
 
-    /// Joins as a subscriber; `latched`: hear what publishers have kept.
+    /// Joins as a subscriber; `latched`: hear what publishers have kept. `lost` counts messages that
+    /// gave way to newer ones in a full queue.
     pub(crate) fn join_subscriber<M: RosMessage>(
         self: &Arc<Self>,
         peers: &Arc<Peers>,
         sender: Sender<AnyMessage>,
+        lost: Arc<AtomicU64>,
         latched: bool,
     ) -> Result<Membership, RuntimeError> {
         self.join(
@@ -132,6 +136,7 @@ impl Topic {
                     id,
                     peers: Arc::clone(peers),
                     sender,
+                    lost,
                 });
             },
         )
@@ -183,22 +188,23 @@ impl Topic {
 }
 
 impl Membership {
-    /// Hands a message to all subscribers. Answers how many older messages had to give way.
-    pub(crate) fn publish(&self, message: AnyMessage) -> usize {
+    /// Hands a message to all subscribers.
+    pub(crate) fn publish(&self, message: &AnyMessage) {
         let mut inner = lock(&self.topic.inner);
-        inner.latch(self.id, || Latched::Message(Arc::clone(&message)));
-        inner.deliver(&message)
+        inner.latch(self.id, || Latched::Message(Arc::clone(message)));
+        inner.deliver(message);
     }
 
     /// Hands CDR bytes, header included, to all subscribers, decoded once.
-    pub(crate) fn publish_cdr(&self, cdr: &Bytes) -> Result<usize, CdrError> {
+    pub(crate) fn publish_cdr(&self, cdr: &Bytes) -> Result<(), CdrError> {
         let mut inner = lock(&self.topic.inner);
         inner.latch(self.id, || Latched::Cdr(cdr.clone()));
         match inner.rust_type {
             Some((_, decode)) if !inner.subscribers.is_empty() => {
-                decode(cdr).map(|message| inner.deliver(&message))
+                inner.deliver(&decode(cdr)?);
+                Ok(())
             }
-            _ => Ok(0),
+            _ => Ok(()),
         }
     }
 }
@@ -283,12 +289,12 @@ impl Inner {
         .collect()
     }
 
-    fn deliver(&self, message: &AnyMessage) -> usize {
-        let displaced = self
-            .subscribers
-            .iter()
-            .filter(|s| matches!(s.sender.force_send(Arc::clone(message)), Ok(Some(_))));
-        displaced.count()
+    fn deliver(&self, message: &AnyMessage) {
+        for subscriber in &self.subscribers {
+            if let Ok(Some(_)) = subscriber.sender.force_send(Arc::clone(message)) {
+                subscriber.lost.fetch_add(1, Relaxed);
+            }
+        }
     }
 }
 
@@ -318,19 +324,21 @@ mod tests {
         let bus = LocalBus::default();
         let (publisher, peers) = publisher(&bus, 0);
         let (sender, queue) = bounded(2);
+        let lost = Arc::new(AtomicU64::new(0));
         let theirs = Arc::new(Peers::of_subscription("/a"));
         let subscriber = bus
             .topic("/a")
-            .join_subscriber::<RosString>(&theirs, sender, true)
+            .join_subscriber::<RosString>(&theirs, sender, lost.clone(), true)
             .unwrap();
         assert_eq!((peers.count(), theirs.count()), (1, 1));
         let message = text("x");
-        assert_eq!(publisher.publish(message.clone()), 0);
+        publisher.publish(&(message.clone() as _));
         assert!(Arc::ptr_eq(&next(&queue).unwrap(), &message));
         for s in ["1", "2", "3"] {
-            publisher.publish(text(s));
+            publisher.publish(&(text(s) as _));
         }
         assert_eq!(next(&queue).unwrap().data, "2", "the oldest gives way");
+        assert_eq!(lost.load(Relaxed), 1);
         drop(subscriber);
         assert_eq!(peers.count(), 0);
     }
@@ -340,7 +348,7 @@ mod tests {
         let bus = LocalBus::default();
         let (publisher, _peers) = publisher(&bus, 2);
         for s in ["1", "2", "3"] {
-            publisher.publish(text(s));
+            publisher.publish(&(text(s) as _));
         }
         let raw_peers = Arc::new(Peers::of_publisher("/a"));
         let raw = bus
@@ -350,10 +358,11 @@ mod tests {
         raw.publish_cdr(&cdr::to_vec(&*text("raw")).unwrap().into())
             .unwrap();
         let (sender, queue) = bounded(5);
+        let lost = Arc::new(AtomicU64::new(0));
         let theirs = Arc::new(Peers::of_subscription("/a"));
-        let _subscriber = bus
-            .topic("/a")
-            .join_subscriber::<RosString>(&theirs, sender, true);
+        let _subscriber =
+            bus.topic("/a")
+                .join_subscriber::<RosString>(&theirs, sender, lost.clone(), true);
         let heard: Vec<_> = std::iter::from_fn(|| next(&queue))
             .map(|m| m.data.clone())
             .collect();

@@ -60,7 +60,7 @@ impl<M: RosMessage> Publisher<M> {
     /// on the publisher thread; a full queue is an error, and counted.
     pub fn publish(&self, message: impl Into<Arc<M>>) -> Result<(), PublishError> {
         let message: Arc<M> = message.into();
-        self.core.local.publish(Arc::clone(&message) as _);
+        self.core.local.publish(&(Arc::clone(&message) as _));
         if !self.core.wants_dds() {
             return Ok(());
         }

@@ -1,5 +1,6 @@
 //! Subscriptions: from DDS and from this process to one handler.
 
+use std::collections::BTreeMap;
 use std::pin::pin;
 use std::sync::Arc;
 use std::sync::atomic::{AtomicU64, Ordering::Relaxed};
@@ -8,6 +9,7 @@ use std::time::Duration;
 
 use futures::future::{Either, select};
 use lattice_msgs::{RosMessage, cdr};
+use rustdds::GUID;
 use smol::Task;
 use smol::channel::{Receiver, Sender, bounded};
 
@@ -25,6 +27,9 @@ const MESSAGES_PER_TURN: u32 = 16;
 
 /// Between two warnings of undecodable samples.
 const WARNING_PERIOD: Duration = Duration::from_secs(5);
+
+/// Writers whose last sample is remembered.
+const MAX_WRITERS: usize = 1024;
 
 /// How much work the messages of a subscription are.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
@@ -55,6 +60,7 @@ pub(crate) struct Stats {
     peers: Arc<Peers>,
     received: AtomicU64,
     undecodable: AtomicU64,
+    lost: Arc<AtomicU64>,
     warning: Throttle,
 }
 
@@ -82,6 +88,18 @@ impl Subscription {
         self.stats.received.load(Relaxed)
     }
 
+    /// Calls `callback` for every publisher that joins, and now if there is one already.
+    ///
+    /// It runs on a thread of the runtime and must return at once.
+    pub fn on_publisher_joined(&self, callback: impl FnMut() + Send + 'static) {
+        self.stats.peers.on_joined(Box::new(callback));
+    }
+
+    /// Messages that were sent and did not get here: gaps in the numbers of a publisher.
+    pub fn lost(&self) -> u64 {
+        self.stats.lost()
+    }
+
     /// Samples that were no message of this type, or too long, and were left out.
     pub fn undecodable(&self) -> u64 {
         self.stats.undecodable.load(Relaxed)
@@ -94,6 +112,7 @@ impl Stats {
             peers,
             received: AtomicU64::new(0),
             undecodable: AtomicU64::new(0),
+            lost: Arc::default(),
             warning: Throttle::new(WARNING_PERIOD),
         }
     }
@@ -104,6 +123,15 @@ impl Stats {
 
     pub(crate) fn undecodable(&self) -> u64 {
         self.undecodable.load(Relaxed)
+    }
+
+    pub(crate) fn lost(&self) -> u64 {
+        self.lost.load(Relaxed)
+    }
+
+    /// The counter behind [`Stats::lost`].
+    pub(crate) fn lost_counter(&self) -> Arc<AtomicU64> {
+        Arc::clone(&self.lost)
     }
 
     fn not_decodable(&self, why: &str) {
@@ -129,6 +157,7 @@ impl Source {
     /// Gives messages to the handler until the task is dropped.
     pub(crate) async fn run<M: RosMessage>(self, mut handler: impl FnMut(Arc<M>)) {
         let mut turn: u32 = 0;
+        let mut gaps = Gaps::default();
         loop {
             turn = turn.wrapping_add(1);
             if turn.is_multiple_of(MESSAGES_PER_TURN) {
@@ -136,7 +165,13 @@ impl Source {
             }
             let message = match self.next(turn.is_multiple_of(2)).await {
                 Heard::Local(message) => message.downcast::<M>().ok(),
-                Heard::Remote(sample) => self.decode::<M>(sample),
+                Heard::Remote(sample) => {
+                    if let Ok(origin) = &sample {
+                        let gap = gaps.before(origin.writer, origin.sequence_number.into());
+                        self.stats.lost.fetch_add(gap, Relaxed);
+                    }
+                    self.decode::<M>(sample)
+                }
                 Heard::End => return,
             };
             if let Some(message) = message {
@@ -172,6 +207,25 @@ impl Source {
     }
 }
 
+/// Finds the samples that a writer numbered and we never saw.
+#[derive(Default)]
+struct Gaps {
+    last: BTreeMap<GUID, i64>,
+}
+
+impl Gaps {
+    /// Samples missing between the one before and this one of the same writer.
+    fn before(&mut self, writer: GUID, number: i64) -> u64 {
+        if self.last.len() >= MAX_WRITERS && !self.last.contains_key(&writer) {
+            self.last.clear();
+        }
+        let last = self.last.entry(writer).or_insert(number.saturating_sub(1));
+        let gap = number.saturating_sub(*last).saturating_sub(1);
+        *last = number.max(*last);
+        u64::try_from(gap).unwrap_or(0)
+    }
+}
+
 enum Heard {
     Local(AnyMessage),
     Remote(Result<SampleOrigin, String>),
@@ -202,4 +256,29 @@ pub(crate) fn spawn_reader(
             });
         })?;
     Ok((stop, thread))
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn gaps_are_counted_for_each_writer() {
+        let (a, b) = (GUID::from_bytes([1; 16]), GUID::from_bytes([2; 16]));
+        let mut gaps = Gaps::default();
+        let steps = [
+            (a, 7, 0),
+            (b, 1, 0),
+            (a, 8, 0),
+            (b, 5, 3),
+            (a, 8, 0),
+            (a, 7, 0),
+            (a, 10, 1),
+        ];
+        for (writer, number, gap) in steps {
+            assert_eq!(gaps.before(writer, number), gap, "{number}");
+        }
+        assert_eq!(gaps.before(a, i64::MAX), (i64::MAX - 11) as u64);
+        assert_eq!(gaps.before(a, i64::MIN), 0);
+    }
 }

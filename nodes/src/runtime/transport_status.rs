@@ -83,6 +83,7 @@ impl Core {
                 topic,
                 subscription.undecodable(),
             );
+            add("lost", "messages lost", topic, subscription.lost());
             let incompatible = subscription.peers().incompatible_count();
             add(
                 "incompatible_publishers",

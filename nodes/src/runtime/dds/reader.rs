@@ -42,6 +42,18 @@ impl DdsReader {
         }
     }
 
+    /// Steps over what is there already.
+    ///
+    /// The readers of a participant share one cache for each topic, so a new reader finds the samples
+    /// of those before it, which a volatile reader must not see.
+    pub(crate) fn skip_old(&self) {
+        let look = CopyInto {
+            buffer: &self.buffer,
+            max_bytes: 0,
+        };
+        while !matches!(self.reader.try_take_one_with(look.clone()), Ok(None)) {}
+    }
+
     pub(crate) fn guid(&self) -> GUID {
         self.reader.guid()
     }
