@@ -2,13 +2,17 @@
 #![forbid(unsafe_code)]
 
 pub mod bag;
+pub mod bag_player;
+pub mod cli;
 pub mod convert;
 pub mod enu_transformer;
 pub mod files;
 pub mod lattice_mapper;
 pub mod map_follower;
+pub mod node;
 pub mod replay;
 pub mod report;
 pub mod runtime;
 pub mod simulate;
 pub mod voxel_marker_publisher;
+pub mod worker;

@@ -1,2 +1,7 @@
-//! The lattice command.
-fn main() {}
+//! The `lattice` command: see `lattice --help`.
+
+use std::process::ExitCode;
+
+fn main() -> ExitCode {
+    lattice_nodes::cli::main()
+}

@@ -1,9 +1,10 @@
 //! From sensor clouds and an INS to clouds in the map frame (east, north, up).
 //!
-//! [`EnuTransformer`] is a state machine without I/O.
+//! [`EnuTransformer`] is a state machine without I/O; [`node`] runs it behind DDS.
 
 mod counts;
 pub mod ins;
+pub mod node;
 mod options;
 mod waiting;
 

@@ -1,8 +1,9 @@
 //! The map: clouds in the map frame become an occupied voxel list on a lattice.
 //!
-//! [`LatticeMapper`] is a state machine without I/O.
+//! [`LatticeMapper`] is a state machine without I/O; [`node`] runs it behind DDS.
 
 mod counts;
+pub mod node;
 mod options;
 
 pub use counts::MapperCounts;

@@ -2,6 +2,7 @@
 //!
 //! Messages pass in the order of the log, so the map depends on nothing else.
 
+pub mod processes;
 mod topics;
 
 pub use topics::{Role, TopicError, TopicPlan, TopicWishes, plan};

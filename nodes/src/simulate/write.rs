@@ -1,5 +1,6 @@
 //! Writes a simulated log.
 
+use std::fmt;
 use std::collections::HashMap;
 use std::fs;
 use std::io;
@@ -13,6 +14,7 @@ use lattice_msgs::nav_msgs::Odometry;
 use lattice_msgs::novatel_oem7_msgs::INSPVAX;
 use lattice_msgs::sensor_msgs::PointCloud2;
 use lattice_msgs::tf2_msgs::TFMessage;
+use serde::Serialize;
 use thiserror::Error;
 
 use super::facts::{INSPVAX_TOPIC, ODOMETRY_TOPIC, TF_STATIC_TOPIC, TF_TOPIC, points_topic};
@@ -36,7 +38,7 @@ pub struct BobcatOptions {
 }
 
 /// What was written.
-#[derive(Clone, Debug, PartialEq)]
+#[derive(Clone, Debug, PartialEq, Serialize)]
 pub struct BobcatSummary {
     /// Directory of the bag.
     pub out: PathBuf,
@@ -50,6 +52,21 @@ pub struct BobcatSummary {
     pub points: u64,
     /// INS epochs, each of which is an INSPVAX and an Odometry.
     pub ins_epochs: u64,
+}
+
+impl fmt::Display for BobcatSummary {
+    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
+        write!(
+            f,
+            "{}: {:.1} s, {} messages, {} clouds with {} points, {} poses",
+            self.out.display(),
+            self.duration_s,
+            self.messages,
+            self.clouds,
+            self.points,
+            self.ins_epochs
+        )
+    }
 }
 
 /// Why a log was not written.

@@ -1,9 +1,10 @@
 //! Markers of the map for viewers: exposed cell faces in blocks, only what changed.
 //!
-//! [`VoxelMarkers`] is a state machine without I/O.
+//! [`VoxelMarkers`] is a state machine without I/O; [`node`] runs it behind DDS.
 
 mod blocks;
 mod color;
+pub mod node;
 mod options;
 mod shape;
 

@@ -4,7 +4,9 @@ use log::LevelFilter;
 
 /// Our own crates; their targets begin with it.
 const OURS: &str = "lattice_";
-/// Libraries whose chatter would hide ours: warnings only, unless named by `--log-level`.
+/// Libraries whose chatter would hide ours: silent unless named by `--log-level` or `RUST_LOG`, and
+/// warnings only with `--log-level debug`. RustDDS warns of every datagram on loopback; what
+/// matters of it is in our own log and diagnostics.
 const CHATTY: [&str; 7] = [
     "rustdds",
     "ros2_client",
@@ -33,14 +35,16 @@ impl Plan {
         lookup: impl Fn(&str) -> Option<String>,
     ) -> Plan {
         let mut filters = vec![(None, LevelFilter::Info)];
-        filters.extend(CHATTY.map(|name| (Some(name.to_owned()), LevelFilter::Warn)));
+        filters.extend(CHATTY.map(|name| (Some(name.to_owned()), LevelFilter::Off)));
         for rule in &args.log_levels {
             let level = filter(rule.level);
             match rule.logger.as_deref() {
                 None => {
                     filters.push((None, level));
-                    // Quieter than a warning is meant for the libraries, too.
-                    let chatty = level.min(LevelFilter::Warn);
+                    let chatty = match level {
+                        LevelFilter::Debug | LevelFilter::Trace => LevelFilter::Warn,
+                        _ => LevelFilter::Off,
+                    };
                     filters.extend(CHATTY.map(|name| (Some(name.to_owned()), chatty)));
                 }
                 Some(logger) => {
@@ -106,11 +110,12 @@ mod tests {
     }
 
     #[test]
-    fn info_is_the_default_and_libraries_only_warn() {
+    fn info_is_the_default_and_libraries_are_silent() {
         assert!(shows(&[], None, Level::Info, "lattice_nodes::runtime"));
         assert!(!shows(&[], None, Level::Debug, "lattice_nodes::runtime"));
         assert!(!shows(&[], None, Level::Info, "rustdds::network"));
-        assert!(shows(&[], None, Level::Warn, "rustdds::network"));
+        assert!(!shows(&[], None, Level::Error, "rustdds::network"));
+        assert!(shows(&["debug"], None, Level::Warn, "rustdds::network"));
     }
 
     #[test]

@@ -1,0 +1,234 @@
+//! `bag_player`: a rosbag2 log on the topics that it was recorded from.
+
+use std::path::PathBuf;
+use std::sync::mpsc;
+use std::time::{Duration, Instant};
+
+use lattice_msgs::builtin_interfaces::Time;
+use lattice_msgs::rosgraph_msgs::Clock;
+use serde::Serialize;
+
+use crate::bag::{BagDurability, BagQos, BagReader, BagReliability, Player, PlayerOptions, Step};
+use crate::node::{NodeError, start_runtime, warn_unused};
+use crate::report;
+use crate::runtime::params::Params;
+use crate::runtime::qos::{Durability, Qos, Reliability};
+use crate::runtime::ros_args::RosArgs;
+use crate::runtime::{Node, Publisher, RawPublisher, Shutdown};
+
+/// Name of the executable and of the node unless it is remapped.
+pub const NAME: &str = "bag_player";
+
+/// Time that what is queued at the end has to reach its readers.
+const FLUSH_TIME: Duration = Duration::from_secs(20);
+/// Longest sleep between two looks at the shutdown flag.
+const NAP: Duration = Duration::from_millis(100);
+/// Largest depth of a publisher whose recorder kept all samples.
+const MAX_DEPTH: u64 = 1000;
+
+/// The end of a player.
+#[derive(Clone, Debug, Default, PartialEq, Eq, Serialize)]
+pub struct PlayerReport {
+    /// Messages given to the publishers.
+    pub messages: u64,
+    /// Messages that a publisher did not take.
+    pub failed: u64,
+    /// Latest that a message was after its time, in ms.
+    pub latest_ms: u64,
+    /// Whether all reliable readers acknowledged everything in time.
+    pub acknowledged: bool,
+}
+
+/// Plays the log that the parameters name and returns at its end or when told to stop.
+pub fn run(arguments: impl IntoIterator<Item = String>) -> Result<(), NodeError> {
+    let args = RosArgs::parse(arguments)?;
+    let name = args.node_name(NAME);
+    let runtime = start_runtime(&name, args)?;
+    let node = runtime.node(&name)?;
+    let params = node.params();
+    let bag = params.string("bag", "")?;
+    if bag.is_empty() {
+        return Err("which log? Give it as `--ros-args -p bag:=DIRECTORY`".into());
+    }
+    let reader = BagReader::open(&PathBuf::from(&bag))?;
+    let span_ns = (reader.start_ns().unwrap_or(0), reader.end_ns().unwrap_or(0));
+    let player = Player::new(reader, options(params)?)?;
+    for topic in player.skipped() {
+        log::warn!("{} ({}) is left out: not CDR of a known type", topic.name, topic.type_name);
+    }
+    let waited = params.string_array("wait_for_subscribers", &[])?;
+    let wait_s = params.f64("wait_timeout_s", 30.0)?;
+    let report_file = params.string("report_file", "")?;
+    let mut shell = Shell {
+        topics: open_topics(&node, &player)?,
+        clock: match params.f64("clock_hz", 0.0)? > 0.0 {
+            true => Some(node.publisher("/clock", Qos::CLOCK_PLAYER)?),
+            false => None,
+        },
+        player,
+        span_ns,
+        shutdown: runtime.shutdown_handle(),
+        report: PlayerReport::default(),
+    };
+    warn_unused(params);
+    shell.wait_for(&waited, Duration::try_from_secs_f64(wait_s)?);
+    log::info!("playing {bag}");
+    let result = shell.play();
+    shell.flush();
+    report::write(&report_file, &shell.report)?;
+    result
+}
+
+fn options(params: &Params) -> Result<PlayerOptions, NodeError> {
+    let duration_s = params.f64("duration_s", 0.0)?;
+    let include = params.string_array("topics", &[])?;
+    let clock_hz = params.f64("clock_hz", 0.0)?;
+    Ok(PlayerOptions {
+        rate: params.f64("rate", 1.0)?,
+        start_offset_s: params.f64("start_offset_s", 0.0)?,
+        duration_s: (duration_s > 0.0).then_some(duration_s),
+        loop_: params.bool("loop", false)?,
+        include: (!include.is_empty()).then_some(include),
+        exclude: params.string_array("exclude_topics", &[])?,
+        clock_hz: (clock_hz > 0.0).then_some(clock_hz),
+        ..PlayerOptions::default()
+    })
+}
+
+/// A publisher for each topic, with the QoS that was recorded unless a parameter says otherwise.
+fn open_topics(node: &Node, player: &Player) -> Result<Vec<RawPublisher>, NodeError> {
+    let mut publishers = Vec::new();
+    for topic in player.topics() {
+        let resolved = node.resolve(&topic.name)?;
+        let offered = offered(&topic.info.offered_qos);
+        let qos = offered.with_overrides(node.params(), &resolved, &topic.name)?;
+        publishers.push(node.raw_publisher(&resolved, &topic.info.type_name, qos)?);
+    }
+    Ok(publishers)
+}
+
+/// What all recorded publishers of a topic offered: the weakest of each policy.
+fn offered(recorded: &[BagQos]) -> Qos {
+    let reliable = |qos: &BagQos| qos.reliability != BagReliability::BestEffort;
+    let latched = |qos: &BagQos| qos.durability == BagDurability::TransientLocal;
+    let depth = recorded.iter().map(|qos| qos.depth).max().unwrap_or(10);
+    Qos {
+        reliability: match recorded.iter().all(reliable) {
+            true => Reliability::Reliable,
+            false => Reliability::BestEffort,
+        },
+        durability: match !recorded.is_empty() && recorded.iter().all(latched) {
+            true => Durability::TransientLocal,
+            false => Durability::Volatile,
+        },
+        depth: depth.clamp(1, MAX_DEPTH) as usize,
+    }
+}
+
+struct Shell {
+    player: Player,
+    /// First and last time of the log.
+    span_ns: (i64, i64),
+    topics: Vec<RawPublisher>,
+    clock: Option<Publisher<Clock>>,
+    shutdown: Shutdown,
+    report: PlayerReport,
+}
+
+impl Shell {
+    /// Waits until each of these topics has a subscriber, or goes on without after the time.
+    fn wait_for(&self, names: &[String], timeout: Duration) {
+        let deadline = Instant::now() + timeout;
+        for (publisher, topic) in self.topics.iter().zip(self.player.topics()) {
+            if !names.contains(&topic.name) {
+                continue;
+            }
+            let (joined, join) = mpsc::channel();
+            publisher.on_subscriber_joined(move || {
+                let _ = joined.send(());
+            });
+            while publisher.subscriber_count() == 0 && !self.shutdown.is_requested() {
+                let left = deadline.saturating_duration_since(Instant::now());
+                if left.is_zero() {
+                    log::warn!("{}: nobody listens, playing all the same", topic.name);
+                    break;
+                }
+                let _ = join.recv_timeout(left.min(NAP));
+            }
+        }
+    }
+
+    fn play(&mut self) -> Result<(), NodeError> {
+        let begin = Instant::now();
+        let (first_ns, last_ns) = self.span_ns;
+        let span_ns = last_ns.saturating_sub(first_ns).max(1);
+        let mut percent = 0;
+        while !self.shutdown.is_requested() {
+            let Some(due_ns) = self.player.due_ns() else {
+                break;
+            };
+            let due = begin + Duration::from_nanos(u64::try_from(due_ns).unwrap_or(0));
+            let now = Instant::now();
+            if due > now {
+                std::thread::sleep((due - now).min(NAP));
+                continue;
+            }
+            match self.player.next()? {
+                Step::Publish { topic, data, .. } => {
+                    let late_ms = (now - due).as_millis() as u64;
+                    self.report.latest_ms = self.report.latest_ms.max(late_ms);
+                    self.publish(topic, data);
+                }
+                Step::Clock(now_ns) => {
+                    if let Some(clock) = &self.clock {
+                        let clock_message = Clock {
+                            clock: Time::from_ns(now_ns),
+                        };
+                        if let Err(error) = clock.publish(clock_message) {
+                            log::debug!("/clock: {error}");
+                        }
+                    }
+                }
+                Step::Looped => log::info!("the log starts again"),
+                Step::End => break,
+            }
+            let now_ns = i64::try_from(begin.elapsed().as_nanos()).unwrap_or(i64::MAX);
+            let played_ns = self.player.bag_time_ns(now_ns).saturating_sub(first_ns);
+            let share = (100.0 * played_ns as f64 / span_ns as f64) as i64;
+            if share > percent && share <= 100 {
+                percent = share;
+                log::info!("played {percent} %");
+            }
+        }
+        Ok(())
+    }
+
+    fn publish(&mut self, topic: usize, data: Vec<u8>) {
+        let Some(publisher) = self.topics.get(topic) else {
+            return;
+        };
+        self.report.messages += 1;
+        if let Err(error) = publisher.publish_blocking(data) {
+            self.report.failed += 1;
+            log::warn!("{}: {error}", publisher.topic());
+        }
+    }
+
+    /// Gives readers time to have everything.
+    fn flush(&mut self) {
+        let deadline = Instant::now() + FLUSH_TIME;
+        self.report.acknowledged = true;
+        for publisher in &self.topics {
+            let left = deadline.saturating_duration_since(Instant::now());
+            if !publisher.flush(left) {
+                self.report.acknowledged = false;
+                log::warn!("{}: not everything was acknowledged", publisher.topic());
+            }
+        }
+        log::info!(
+            "{} messages played, at most {} ms late",
+            self.report.messages,
+            self.report.latest_ms
+        );
+    }
+}

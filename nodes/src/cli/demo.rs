@@ -1,0 +1,90 @@
+//! `lattice demo`: from a simulated log to maps of all lattices, through real nodes.
+
+use std::fs;
+use std::path::PathBuf;
+
+use clap::Args;
+
+use super::replay::Replay;
+use super::{CliResult, Lattices, init_logging, simulate};
+use crate::bag::Storage;
+use crate::simulate::BobcatOptions;
+use lattice_core::lattice::LatticeKind;
+
+/// Parameters of the simulated machine, for users to copy.
+const BOBCAT_PARAMS: &str = include_str!("../../../params/bobcat.yaml");
+
+/// Simulate, play, map
+#[derive(Args)]
+pub struct Demo {
+    /// Directory for the log and the maps
+    #[arg(long, default_value = "target/lattice_demo")]
+    out: PathBuf,
+    /// Seed of the simulation
+    #[arg(long, default_value_t = 1)]
+    seed: u64,
+    /// Length of the log in s
+    #[arg(long, default_value_t = 20.0)]
+    duration: f64,
+    /// Speed of the log, 1 is real time
+    #[arg(long, default_value_t = 1.0)]
+    rate: f64,
+    /// cubic, bcc, fcc, mcc, hex, several with commas, or all
+    #[arg(long, default_value = "all")]
+    lattice: Lattices,
+    /// Print the report as JSON
+    #[arg(long)]
+    json: bool,
+}
+
+impl Demo {
+    /// Runs the command.
+    pub fn run(self) -> CliResult {
+        init_logging();
+        let bag = self.out.join("log");
+        let params = self.out.join("bobcat.yaml");
+        fs::create_dir_all(&self.out).map_err(|e| format!("{}: {e}", self.out.display()))?;
+        fs::write(&params, BOBCAT_PARAMS).map_err(|e| format!("{}: {e}", params.display()))?;
+        let summary = simulate::bobcat(&BobcatOptions {
+            seed: self.seed,
+            duration_s: self.duration,
+            storage: Storage::Mcap,
+            out: bag.clone(),
+            overwrite: true,
+        })?;
+        eprintln!("{summary}");
+        let replay = Replay {
+            bag,
+            direct: false,
+            lattice: Some(self.lattice.clone()),
+            cell_volume: None,
+            params: vec![params],
+            param: Vec::new(),
+            points: Vec::new(),
+            ins: None,
+            ins_topic: None,
+            threads: 0,
+            rate: self.rate,
+            map_out: None,
+            json: self.json,
+        };
+        let report = replay.replay()?;
+        // The same log without DDS: the map that the nodes should have made, and its picture.
+        let picture = self.out.join("map.png");
+        let direct = Replay {
+            direct: true,
+            lattice: Some(Lattices(vec![LatticeKind::Fcc])),
+            map_out: Some(self.out.join("map.lattice")),
+            ..replay
+        };
+        direct.replay()?;
+        super::map::picture(&self.out.join("map.lattice"), &picture)?;
+        if self.json {
+            println!("{}", serde_json::to_string_pretty(&report)?);
+        } else {
+            println!("{report}");
+            println!("log {}, picture {}", self.out.join("log").display(), picture.display());
+        }
+        Ok(())
+    }
+}

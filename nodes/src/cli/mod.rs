@@ -1,0 +1,95 @@
+//! The `lattice` command.
+
+mod demo;
+mod map;
+mod node;
+mod progress;
+mod quantize;
+mod replay;
+mod run;
+mod simulate;
+
+use std::error::Error;
+use std::process::ExitCode;
+
+use clap::{Parser, Subcommand};
+use lattice_core::lattice::LatticeKind;
+
+/// Any error on its way to the user.
+pub type CliResult = Result<(), Box<dyn Error + Send + Sync>>;
+
+/// Lattice voxel maps from logs and live robots.
+#[derive(Parser)]
+#[command(name = "lattice", version, about, arg_required_else_help = true)]
+struct Cli {
+    #[command(subcommand)]
+    command: Command,
+}
+
+#[derive(Subcommand)]
+enum Command {
+    /// Simulate a loader at work, play its log through the nodes, show the maps of all lattices
+    Demo(demo::Demo),
+    /// Run several nodes in one process, as parameter files say
+    Run(run::Run),
+    /// Run one node, as its own executable does
+    Node(node::NodeCommand),
+    /// Map a rosbag2 log: directly, or played through separate node processes
+    Replay(replay::Replay),
+    /// Write the log of a simulated machine
+    #[command(subcommand)]
+    Simulate(simulate::Simulate),
+    /// Quantize a point file (ply, pcd, xyz, KITTI bin) and show what each lattice makes of it
+    Quantize(quantize::Quantize),
+    /// Look into map files and export them
+    #[command(subcommand)]
+    Map(map::Map),
+}
+
+/// Runs the command line; errors are one line on standard error and a non-zero status.
+pub fn main() -> ExitCode {
+    let result = match Cli::parse().command {
+        Command::Demo(command) => command.run(),
+        Command::Run(command) => command.run(),
+        Command::Node(command) => command.run(),
+        Command::Replay(command) => command.run(),
+        Command::Simulate(command) => command.run(),
+        Command::Quantize(command) => command.run(),
+        Command::Map(command) => command.run(),
+    };
+    match result {
+        Ok(()) => ExitCode::SUCCESS,
+        Err(error) => {
+            eprintln!("lattice: {error}");
+            ExitCode::FAILURE
+        }
+    }
+}
+
+/// One lattice by name, or all of them.
+#[derive(Clone, Debug)]
+pub struct Lattices(pub Vec<LatticeKind>);
+
+impl std::str::FromStr for Lattices {
+    type Err = String;
+
+    fn from_str(text: &str) -> Result<Self, String> {
+        if text == "all" {
+            return Ok(Self(LatticeKind::ALL.to_vec()));
+        }
+        let kinds = text.split(',').map(|name| {
+            let kind = name.trim().parse::<LatticeKind>();
+            kind.map_err(|e| format!("{e}; or 'all'"))
+        });
+        kinds.collect::<Result<_, _>>().map(Self)
+    }
+}
+
+/// Log lines of the tools themselves; nodes have their own.
+fn init_logging() {
+    let env = env_logger::Env::default().default_filter_or("warn");
+    // A second command in one process (tests) keeps the first logger.
+    let _ = env_logger::Builder::from_env(env)
+        .format_timestamp(None)
+        .try_init();
+}

@@ -1,0 +1,253 @@
+//! The transformer as a ROS node: a thin shell around [`EnuTransformer`].
+
+use std::sync::Arc;
+use std::sync::atomic::{AtomicU64, Ordering};
+use std::time::Duration;
+
+use lattice_msgs::geographic_msgs::GeoPointStamped;
+use lattice_msgs::geometry_msgs::PoseStamped;
+use lattice_msgs::nav_msgs::Odometry;
+use lattice_msgs::novatel_oem7_msgs::{INSPVA, INSPVAX};
+use lattice_msgs::sensor_msgs::{Imu, NavSatFix, PointCloud2};
+use lattice_msgs::tf2_msgs::TFMessage;
+use lattice_msgs::RosMessage;
+
+use super::ins::{InsMessage, InsSource};
+use super::{EnuOutput, EnuTransformer, TransformerOptions};
+use crate::node::{Finish, NodeError, warn_unused};
+use crate::report::{self, TransformerReport};
+use crate::runtime::qos::Qos;
+use crate::runtime::{Clock, Diagnostics, Level, Load, Node, Publisher, Runtime, Subscription};
+use crate::worker::{Inbox, Worker, WorkerLimits};
+
+/// What the compute thread is told.
+enum Event {
+    Cloud(Arc<PointCloud2>),
+    Transforms(Arc<TFMessage>, bool),
+    Inspva(Arc<INSPVA>),
+    Inspvax(Arc<INSPVAX>),
+    Fix(Arc<NavSatFix>),
+    Imu(Arc<Imu>),
+    Odometry(Arc<Odometry>),
+    Pose(Arc<PoseStamped>),
+    Tick,
+    /// Ends, with the number of samples that did not decode.
+    Finish(u64),
+}
+
+/// Bytes that a small message stands for in the inbox.
+const SMALL: usize = 1024;
+
+/// Starts the node.
+pub fn start(runtime: &Runtime, name: &str) -> Result<Finish, NodeError> {
+    let node = runtime.node(name)?;
+    let params = node.params();
+    let options = TransformerOptions::from_params(params)?;
+    let source = options.ins.source;
+    let limits = WorkerLimits {
+        events: params.usize("inbox_events", 8192)?,
+        bytes: options.max_waiting_bytes,
+        threads: params.usize("threads", 0)?,
+    };
+    let lost = Arc::new(AtomicU64::new(0));
+    let mut shell = Shell {
+        machine: EnuTransformer::new(options),
+        outputs: Outputs::open(&node)?,
+        clock: node.clock(),
+        diagnostics: node.diagnostics(),
+        lost: Arc::clone(&lost),
+        not_published: 0,
+        report_file: params.string("report_file", "")?,
+    };
+    let worker = Worker::spawn(name, limits, move |event| shell.on(event))?;
+    let inbox = worker.inbox();
+    let mut inputs = subscribe_ins(&node, source, &inbox)?;
+    for topic in params.string_array("points_topics", &["points"])? {
+        let (inbox, lost) = (inbox.clone(), Arc::clone(&lost));
+        let hand_over = move |cloud: Arc<PointCloud2>| {
+            let bytes = cloud.data.len();
+            if !inbox.send(Event::Cloud(cloud), bytes) {
+                lost.fetch_add(1, Ordering::Relaxed);
+            }
+        };
+        inputs.push(node.subscribe(&topic, Qos::SENSOR, Load::Large, hand_over)?);
+    }
+    let transforms = |m| Event::Transforms(m, false);
+    inputs.push(subscribe(&node, "/tf", Qos::TF, &inbox, transforms)?);
+    let (latched, transforms) = (Qos::TF_STATIC_LISTENER, |m| Event::Transforms(m, true));
+    inputs.push(subscribe(&node, "/tf_static", latched, &inbox, transforms)?);
+    runtime.timer(Duration::from_millis(200), move || {
+        // A full inbox is busy enough to look at its queue anyway.
+        let _ = inbox.send(Event::Tick, 0);
+    });
+    log::info!("INS source {source}; azimuth 90 deg is yaw 0 (east)");
+    warn_unused(params);
+    Ok(Box::new(move || {
+        let undecodable = inputs.iter().map(Subscription::undecodable).sum();
+        drop(inputs);
+        worker.finish_with(Event::Finish(undecodable));
+    }))
+}
+
+fn subscribe_ins(
+    node: &Node,
+    source: InsSource,
+    inbox: &Inbox<Event>,
+) -> Result<Vec<Subscription>, NodeError> {
+    let params = node.params();
+    let topic = params.string("ins.topic", "ins")?;
+    let ins = match source {
+        InsSource::Inspva => subscribe(node, &topic, Qos::INS, inbox, Event::Inspva),
+        InsSource::Inspvax => subscribe(node, &topic, Qos::INS, inbox, Event::Inspvax),
+        InsSource::Odometry => subscribe(node, &topic, Qos::INS, inbox, Event::Odometry),
+        InsSource::Pose => subscribe(node, &topic, Qos::INS, inbox, Event::Pose),
+        InsSource::NavsatfixImu => {
+            let imu = params.string("ins.imu_topic", "imu")?;
+            let fix = subscribe(node, &topic, Qos::INS, inbox, Event::Fix)?;
+            return Ok(vec![fix, subscribe(node, &imu, Qos::INS, inbox, Event::Imu)?]);
+        }
+    };
+    Ok(vec![ins?])
+}
+
+fn subscribe<M: RosMessage>(
+    node: &Node,
+    topic: &str,
+    qos: Qos,
+    inbox: &Inbox<Event>,
+    event: impl Fn(Arc<M>) -> Event + Send + 'static,
+) -> Result<Subscription, NodeError> {
+    let inbox = inbox.clone();
+    let subscription = node.subscribe(topic, qos, Load::Small, move |message: Arc<M>| {
+        if !inbox.send(event(message), SMALL) {
+            log::warn!("the inbox is full: a pose or transform is lost");
+        }
+    })?;
+    Ok(subscription)
+}
+
+/// The topics that the node speaks on.
+struct Outputs {
+    points: Publisher<PointCloud2>,
+    tf: Publisher<TFMessage>,
+    tf_static: Publisher<TFMessage>,
+    origin: Publisher<GeoPointStamped>,
+}
+
+impl Outputs {
+    fn open(node: &Node) -> Result<Self, NodeError> {
+        Ok(Self {
+            points: node.publisher("points_enu", Qos::SENSOR)?,
+            tf: node.publisher("/tf", Qos::TF)?,
+            tf_static: node.publisher("/tf_static", Qos::TF_STATIC)?,
+            origin: node.publisher("map_origin", Qos::LATCHED)?,
+        })
+    }
+}
+
+/// State of the compute thread.
+struct Shell {
+    machine: EnuTransformer,
+    outputs: Outputs,
+    clock: Clock,
+    diagnostics: Diagnostics,
+    lost: Arc<AtomicU64>,
+    not_published: u64,
+    report_file: String,
+}
+
+impl Shell {
+    fn on(&mut self, event: Event) {
+        let now_ns = self.clock.now_ns();
+        let machine = &mut self.machine;
+        let outputs = match event {
+            Event::Cloud(cloud) => machine.on_cloud(cloud, now_ns),
+            Event::Transforms(m, is_static) => machine.on_tf(&m, is_static, now_ns),
+            Event::Inspva(m) => machine.on_ins(InsMessage::Inspva(&m), now_ns),
+            Event::Inspvax(m) => machine.on_ins(InsMessage::Inspvax(&m), now_ns),
+            Event::Fix(m) => machine.on_ins(InsMessage::Fix(&m), now_ns),
+            Event::Imu(m) => machine.on_ins(InsMessage::Imu(&m), now_ns),
+            Event::Odometry(m) => machine.on_ins(InsMessage::Odometry(&m), now_ns),
+            Event::Pose(m) => machine.on_ins(InsMessage::Pose(&m), now_ns),
+            Event::Tick => {
+                let outputs = machine.tick(now_ns);
+                self.diagnose();
+                outputs
+            }
+            Event::Finish(undecodable) => {
+                self.finish(undecodable);
+                return;
+            }
+        };
+        for output in outputs {
+            self.publish(output);
+        }
+    }
+
+    fn publish(&mut self, output: EnuOutput) {
+        let published = match output {
+            EnuOutput::Points(points) => {
+                let published = self.outputs.points.publish(points);
+                self.not_published += u64::from(published.is_err());
+                published
+            }
+            EnuOutput::Transform(transform) => self.outputs.tf.publish(Arc::new(TFMessage {
+                transforms: vec![transform],
+            })),
+            EnuOutput::StaticTransform(transform) => {
+                self.outputs.tf_static.publish(Arc::new(TFMessage {
+                    transforms: vec![transform],
+                }))
+            }
+            EnuOutput::Origin(origin) => self.outputs.origin.publish(Arc::new(origin)),
+        };
+        if let Err(error) = published {
+            log::debug!("not published: {error}");
+        }
+    }
+
+    fn report(&self) -> TransformerReport {
+        TransformerReport {
+            counts: self.machine.counts().clone(),
+            clouds_inbox_full: self.lost.load(Ordering::Relaxed),
+            undecodable: 0,
+            clouds_not_published: self.not_published,
+        }
+    }
+
+    fn diagnose(&self) {
+        let report = self.report();
+        let counts = &report.counts;
+        let dropped = report.dropped();
+        let (level, message) = if counts.poses_in == 0 {
+            (Level::Warn, "no pose yet".to_owned())
+        } else if dropped.is_empty() {
+            (Level::Ok, "transforming".to_owned())
+        } else {
+            let reasons: Vec<String> = dropped.iter().map(|(r, n)| format!("{n} {r}")).collect();
+            (Level::Warn, format!("clouds dropped: {}", reasons.join(", ")))
+        };
+        let mut values = report::key_values(&report);
+        values.push(("clouds_waiting".into(), self.machine.waiting().to_string()));
+        self.diagnostics.set("clouds", level, message, values);
+    }
+
+    fn finish(&mut self, undecodable: u64) {
+        self.machine.finish();
+        let report = TransformerReport {
+            undecodable,
+            ..self.report()
+        };
+        let counts = &report.counts;
+        log::info!(
+            "{} clouds in, {} out, dropped: {:?}",
+            counts.clouds_in,
+            counts.clouds_out,
+            report.dropped()
+        );
+        self.outputs.points.flush(Duration::from_secs(2));
+        if let Err(error) = report::write(&self.report_file, &report) {
+            log::error!("{}: {error}", self.report_file);
+        }
+    }
+}

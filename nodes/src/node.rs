@@ -1,0 +1,81 @@
+//! What the executables share: a runtime, one or several nodes on it, an orderly end.
+
+use std::error::Error;
+use std::process::ExitCode;
+
+use crate::runtime::Runtime;
+use crate::runtime::logging;
+use crate::runtime::params::Params;
+use crate::runtime::ros_args::RosArgs;
+use crate::{enu_transformer, lattice_mapper, voxel_marker_publisher};
+
+/// Any error that keeps a node from starting.
+pub type NodeError = Box<dyn Error + Send + Sync>;
+
+/// A node that is at work; calling it ends the node after it has worked off its inbox.
+pub type Finish = Box<dyn FnOnce()>;
+
+/// Starts a node on a runtime under its name.
+pub type Start = fn(&Runtime, &str) -> Result<Finish, NodeError>;
+
+/// Every node that can share a process, in the order in which data flows.
+pub const NODES: [(&str, Start); 3] = [
+    ("enu_transformer", enu_transformer::node::start),
+    ("lattice_mapper", lattice_mapper::node::start),
+    ("voxel_marker_publisher", voxel_marker_publisher::node::start),
+];
+
+/// Finds the node of an executable name.
+pub fn find(name: &str) -> Option<Start> {
+    let found = NODES.iter().find(|(node, _)| *node == name);
+    found.map(|(_, start)| *start)
+}
+
+/// Runs one node until it is told to stop. `arguments` are those of the command line.
+pub fn run(
+    name: &str,
+    start: Start,
+    arguments: impl IntoIterator<Item = String>,
+) -> Result<(), NodeError> {
+    let args = RosArgs::parse(arguments)?;
+    let name = args.node_name(name);
+    let runtime = start_runtime(&name, args)?;
+    let finish = start(&runtime, &name)?;
+    run_until_told(&runtime, vec![finish])
+}
+
+/// Log lines as ROS users know them, and a runtime.
+pub fn start_runtime(name: &str, args: RosArgs) -> Result<Runtime, NodeError> {
+    if let Err(error) = logging::init(&args, name) {
+        eprintln!("{name}: another logger is in place: {error}");
+    }
+    Ok(Runtime::start(name, args)?)
+}
+
+/// Waits until told to end, lets each node work off its inbox and publish the rest, and leaves.
+pub fn run_until_told(runtime: &Runtime, running: Vec<Finish>) -> Result<(), NodeError> {
+    runtime.shutdown_handle().wait();
+    // In the order in which data flows, so that each still hears the one before.
+    for finish in running {
+        finish();
+    }
+    Ok(runtime.spin()?)
+}
+
+/// The whole `main` of an executable that is one node.
+pub fn main(name: &str, start: Start) -> ExitCode {
+    match run(name, start, std::env::args().skip(1)) {
+        Ok(()) => ExitCode::SUCCESS,
+        Err(error) => {
+            eprintln!("{name}: {error}");
+            ExitCode::FAILURE
+        }
+    }
+}
+
+/// Says which given parameters no part of a node has asked for.
+pub fn warn_unused(params: &Params) {
+    for name in params.unused() {
+        log::warn!("parameter '{name}' is not known here: is it misspelt?");
+    }
+}

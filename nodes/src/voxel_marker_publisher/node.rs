@@ -1,0 +1,180 @@
+//! The marker publisher as a ROS node: a thin shell around [`VoxelMarkers`].
+
+use std::sync::Arc;
+use std::time::Duration;
+
+use lattice_msgs::cdr;
+use lattice_msgs::lattice::{LatticeMap, LatticeMapUpdate};
+use lattice_msgs::visualization_msgs::MarkerArray;
+
+use super::{MarkerOptions, VoxelMarkers};
+use crate::map_follower::{FollowError, Followed};
+use crate::node::{Finish, NodeError, warn_unused};
+use crate::replay::bytes_of;
+use crate::report::{self, MarkerReport};
+use crate::runtime::logging::Throttle;
+use crate::runtime::qos::Qos;
+use crate::runtime::{Diagnostics, Level, Load, Publisher, Runtime, TriggerClient};
+use crate::worker::{Worker, WorkerLimits};
+
+/// What the compute thread is told.
+enum Event {
+    Map(Arc<LatticeMap>),
+    Update(Arc<LatticeMapUpdate>),
+    Redraw,
+    Draw,
+    Finish,
+}
+
+/// Starts the node.
+pub fn start(runtime: &Runtime, name: &str) -> Result<Finish, NodeError> {
+    let node = runtime.node(name)?;
+    let params = node.params();
+    let options = MarkerOptions::from_params(params)?;
+    let limits = WorkerLimits {
+        events: params.usize("inbox_events", 4096)?,
+        bytes: params.usize("inbox_bytes", 64 << 20)?,
+        threads: params.usize("threads", 1)?,
+    };
+    let rate_hz = params.f64("rate_hz", 5.0)?;
+    if !(0.1..=100.0).contains(&rate_hz) {
+        let reason = format!("{rate_hz}, expected 0.1 to 100");
+        return Err(params.invalid("rate_hz", reason).into());
+    }
+    let bytes_per_s = params.usize("max_bytes_per_s", 20_000_000)?;
+    let mapper = params.string("mapper", "lattice_mapper")?;
+    let markers = node.publisher("voxel_markers", Qos::MARKERS)?;
+    let mut shell = Shell {
+        machine: VoxelMarkers::new(options),
+        markers: markers.clone(),
+        request: node.trigger_client(&format!("{mapper}/request_keyframe"))?,
+        diagnostics: node.diagnostics(),
+        refusals: Throttle::new(Duration::from_secs(5)),
+        requests: Throttle::new(Duration::from_secs(1)),
+        budget_bytes: (bytes_per_s as f64 / rate_hz) as usize,
+        published_bytes: 0,
+        not_published: 0,
+        report_file: params.string("report_file", "")?,
+    };
+    let worker = Worker::spawn(name, limits, move |event| shell.on(event))?;
+    let inbox = worker.inbox();
+    let maps = inbox.clone();
+    let maps = node.subscribe("map", Qos::MAP, Load::Small, move |map: Arc<LatticeMap>| {
+        let bytes = map.keys.len() + map.counts.len() * 10;
+        if !maps.send(Event::Map(map), bytes) {
+            log::warn!("a map chunk is lost: the inbox is full");
+        }
+    })?;
+    let updates = inbox.clone();
+    let updates = node.subscribe("map_updates", Qos::DELTAS, Load::Small, move |update: Arc<LatticeMapUpdate>| {
+        let bytes = update.keys.len() + update.counts.len() * 10;
+        if !updates.send(Event::Update(update), bytes) {
+            log::warn!("a map update is lost: the inbox is full");
+        }
+    })?;
+    let joined = inbox.clone();
+    markers.on_subscriber_joined(move || {
+        let _ = joined.send(Event::Redraw, 0);
+    });
+    runtime.timer(Duration::from_secs_f64(1.0 / rate_hz), move || {
+        let _ = inbox.send(Event::Draw, 0);
+    });
+    warn_unused(params);
+    Ok(Box::new(move || {
+        drop((maps, updates));
+        worker.finish_with(Event::Finish);
+    }))
+}
+
+/// State of the compute thread.
+struct Shell {
+    machine: VoxelMarkers,
+    markers: Publisher<MarkerArray>,
+    request: TriggerClient,
+    diagnostics: Diagnostics,
+    refusals: Throttle,
+    requests: Throttle,
+    budget_bytes: usize,
+    published_bytes: u64,
+    not_published: u64,
+    report_file: String,
+}
+
+impl Shell {
+    fn on(&mut self, event: Event) {
+        match event {
+            Event::Map(chunk) => {
+                let result = self.machine.on_map(&chunk);
+                self.followed(result);
+            }
+            Event::Update(chunk) => {
+                let result = self.machine.on_update(&chunk);
+                self.followed(result);
+            }
+            Event::Redraw => self.machine.redraw(),
+            Event::Draw => {
+                self.draw();
+                self.diagnose();
+            }
+            Event::Finish => self.finish(),
+        }
+    }
+
+    fn followed(&mut self, result: Result<Followed, FollowError>) {
+        match result {
+            Ok(Followed::NeedKeyframe) => {
+                if self.requests.check().is_some() {
+                    self.request.call();
+                }
+            }
+            Ok(Followed::Applied | Followed::Old) => {}
+            Err(error) => {
+                if let Some(more) = self.refusals.check() {
+                    log::warn!("{error} ({more} more like it)");
+                }
+            }
+        }
+    }
+
+    fn draw(&mut self) {
+        if !self.machine.is_dirty() {
+            return;
+        }
+        for array in self.machine.take_arrays(self.budget_bytes) {
+            self.published_bytes += cdr::to_vec(&array).map_or(0, |bytes| bytes.len() as u64);
+            if self.markers.publish(Arc::new(array)).is_err() {
+                self.not_published += 1;
+                self.machine.redraw();
+            }
+        }
+    }
+
+    fn diagnose(&self) {
+        let counts = self.machine.counts();
+        let (level, message) = match (counts.messages_in, counts.messages_refused) {
+            (0, _) => (Level::Warn, "no map yet".to_owned()),
+            (_, 0) => (Level::Ok, format!("{:?}", self.machine.style())),
+            (_, refused) => (Level::Warn, format!("{refused} messages refused")),
+        };
+        let mut values = report::key_values(counts);
+        values.push(("voxels".into(), self.machine.voxels().to_string()));
+        self.diagnostics.set("markers", level, message, values);
+    }
+
+    fn finish(&mut self) {
+        self.draw();
+        self.markers.flush(Duration::from_secs(2));
+        let counts = self.machine.counts().clone();
+        self.machine.redraw();
+        let report = MarkerReport {
+            counts,
+            voxels: self.machine.voxels(),
+            marker_bytes: bytes_of(&mut self.machine),
+            published_bytes: self.published_bytes,
+            arrays_not_published: self.not_published,
+        };
+        if let Err(error) = report::write(&self.report_file, &report) {
+            log::error!("{}: {error}", self.report_file);
+        }
+    }
+}

@@ -1,0 +1,167 @@
+//! One compute thread with a bounded inbox and a private rayon pool.
+//!
+//! Readers hand over and return: a full inbox refuses the newest event, which the caller counts.
+
+use std::io;
+use std::sync::Arc;
+use std::sync::atomic::{AtomicUsize, Ordering};
+use std::thread::{self, JoinHandle};
+
+use crossbeam_channel::{Sender, bounded};
+
+/// Bounds of a worker.
+#[derive(Clone, Copy, Debug)]
+pub struct WorkerLimits {
+    /// Most events in the inbox.
+    pub events: usize,
+    /// Most bytes that the events in the inbox may say they have.
+    pub bytes: usize,
+    /// Threads of the pool; 0: one less than the machine has, at least one.
+    pub threads: usize,
+}
+
+/// An event with its bytes; `None` ends the work.
+type Item<E> = Option<(E, usize)>;
+
+/// Runs a handler on its own thread until it is finished.
+pub struct Worker<E> {
+    inbox: Inbox<E>,
+    thread: JoinHandle<()>,
+}
+
+/// The entrance to a worker.
+pub struct Inbox<E> {
+    sender: Sender<Item<E>>,
+    bytes: Arc<AtomicUsize>,
+    max_bytes: usize,
+}
+
+impl<E> Clone for Inbox<E> {
+    fn clone(&self) -> Self {
+        Self {
+            sender: self.sender.clone(),
+            bytes: Arc::clone(&self.bytes),
+            max_bytes: self.max_bytes,
+        }
+    }
+}
+
+impl<E: Send + 'static> Worker<E> {
+    /// Starts the thread. The handler runs inside the pool, one event at a time, in order.
+    pub fn spawn(
+        name: &str,
+        limits: WorkerLimits,
+        mut handler: impl FnMut(E) + Send + 'static,
+    ) -> io::Result<Self> {
+        let cores = thread::available_parallelism().map_or(1, usize::from);
+        let threads = match limits.threads {
+            0 => cores.saturating_sub(1).max(1),
+            threads => threads,
+        };
+        let prefix = name.to_owned();
+        let pool = rayon::ThreadPoolBuilder::new()
+            .num_threads(threads)
+            .thread_name(move |i| format!("{prefix} pool {i}"))
+            .build()
+            .map_err(io::Error::other)?;
+        let (sender, receiver) = bounded::<Item<E>>(limits.events.max(1));
+        let bytes = Arc::new(AtomicUsize::new(0));
+        let in_flight = Arc::clone(&bytes);
+        let thread = thread::Builder::new()
+            .name(format!("{name} compute"))
+            .spawn(move || {
+                while let Ok(Some((event, size))) = receiver.recv() {
+                    pool.install(|| handler(event));
+                    in_flight.fetch_sub(size, Ordering::Relaxed);
+                }
+            })?;
+        Ok(Self {
+            inbox: Inbox {
+                sender,
+                bytes,
+                max_bytes: limits.bytes,
+            },
+            thread,
+        })
+    }
+
+    /// The entrance; clones share it.
+    pub fn inbox(&self) -> Inbox<E> {
+        self.inbox.clone()
+    }
+
+    /// Lets the handler work off what is in the inbox and a last event, then ends the thread.
+    pub fn finish_with(self, last: E) {
+        // Waits for room where readers could not: nobody reads any more.
+        let sender = &self.inbox.sender;
+        let told = sender.send(Some((last, 0))).and_then(|()| sender.send(None));
+        if told.is_err() | self.thread.join().is_err() {
+            log::error!("a compute thread panicked; its last results are lost");
+        }
+    }
+}
+
+impl<E> Inbox<E> {
+    /// Hands over an event of `bytes`; `false`: the inbox is full, or its worker has ended.
+    #[must_use]
+    pub fn send(&self, event: E, bytes: usize) -> bool {
+        let before = self.bytes.fetch_add(bytes, Ordering::Relaxed);
+        // One event always fits, however large.
+        let fits = before == 0 || before.saturating_add(bytes) <= self.max_bytes;
+        if fits && self.sender.try_send(Some((event, bytes))).is_ok() {
+            return true;
+        }
+        self.bytes.fetch_sub(bytes, Ordering::Relaxed);
+        false
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crossbeam_channel::unbounded;
+
+    const LIMITS: WorkerLimits = WorkerLimits {
+        events: 2,
+        bytes: 100,
+        threads: 1,
+    };
+
+    #[test]
+    fn works_off_in_order_before_it_ends() {
+        let (done, results) = unbounded();
+        let worker = Worker::spawn("test", LIMITS, move |i: u32| {
+            done.send(i).unwrap();
+        })
+        .unwrap();
+        let inbox = worker.inbox();
+        let mut sent = Vec::new();
+        for i in 0..100 {
+            if inbox.send(i, 1) {
+                sent.push(i);
+            }
+        }
+        worker.finish_with(100);
+        sent.push(100);
+        assert_eq!(results.into_iter().collect::<Vec<_>>(), sent);
+        assert!(!inbox.send(7, 1), "an ended worker takes nothing");
+    }
+
+    #[test]
+    fn a_full_inbox_refuses() {
+        let (enter, entered) = unbounded();
+        let (go, wait) = unbounded::<()>();
+        let worker = Worker::spawn("test", LIMITS, move |_: u32| {
+            enter.send(()).unwrap();
+            let _ = wait.recv();
+        })
+        .unwrap();
+        let inbox = worker.inbox();
+        assert!(inbox.send(0, 200), "alone, any size fits");
+        entered.recv().unwrap();
+        assert!(!inbox.send(1, 1), "bytes in work count");
+        go.send(()).unwrap();
+        drop(go);
+        worker.finish_with(2);
+    }
+}
