@@ -54,7 +54,11 @@ pub fn run(arguments: impl IntoIterator<Item = String>) -> Result<(), NodeError>
     let span_ns = (reader.start_ns().unwrap_or(0), reader.end_ns().unwrap_or(0));
     let player = Player::new(reader, options(params)?)?;
     for topic in player.skipped() {
-        log::warn!("{} ({}) is left out: not CDR of a known type", topic.name, topic.type_name);
+        log::warn!(
+            "{} ({}) is left out: not CDR of a known type",
+            topic.name,
+            topic.type_name
+        );
     }
     let waited = params.string_array("wait_for_subscribers", &[])?;
     let wait_s = params.f64("wait_timeout_s", 30.0)?;

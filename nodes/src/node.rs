@@ -22,7 +22,10 @@ pub type Start = fn(&Runtime, &str) -> Result<Finish, NodeError>;
 pub const NODES: [(&str, Start); 3] = [
     ("enu_transformer", enu_transformer::node::start),
     ("lattice_mapper", lattice_mapper::node::start),
-    ("voxel_marker_publisher", voxel_marker_publisher::node::start),
+    (
+        "voxel_marker_publisher",
+        voxel_marker_publisher::node::start,
+    ),
 ];
 
 /// Finds the node of an executable name.

@@ -145,6 +145,8 @@ pub struct LatticeReport {
 pub struct RunReport {
     /// Where the clouds came from.
     pub source: String,
+    /// Clouds on the topics that were replayed.
+    pub clouds_in_log: u64,
     /// From clouds of sensors to clouds in the map.
     pub transformer: TransformerReport,
     /// One for each lattice.
@@ -158,6 +160,16 @@ impl RunReport {
     pub fn losses(&self) -> Vec<String> {
         let mut lines = Vec::new();
         let counts = &self.transformer.counts;
+        let refused = self.transformer.clouds_inbox_full + self.transformer.undecodable;
+        let missing = self
+            .clouds_in_log
+            .saturating_sub(counts.clouds_in + refused);
+        if missing > 0 {
+            lines.push(format!(
+                "{missing} of {} clouds of the log did not reach the transformer",
+                self.clouds_in_log
+            ));
+        }
         for (reason, count) in self.transformer.dropped() {
             lines.push(format!("{count} of {} clouds: {reason}", counts.clouds_in));
         }
@@ -180,8 +192,8 @@ impl fmt::Display for RunReport {
         let counts = &self.transformer.counts;
         writeln!(
             f,
-            "{}: {} clouds in, {} mapped, {} poses, {:.1} s",
-            self.source, counts.clouds_in, counts.clouds_out, counts.poses_in, self.wall_s
+            "{}: {} clouds, {} transformed, {} poses, {:.1} s",
+            self.source, self.clouds_in_log, counts.clouds_out, counts.poses_in, self.wall_s
         )?;
         writeln!(
             f,

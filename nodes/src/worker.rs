@@ -94,7 +94,9 @@ impl<E: Send + 'static> Worker<E> {
     pub fn finish_with(self, last: E) {
         // Waits for room where readers could not: nobody reads any more.
         let sender = &self.inbox.sender;
-        let told = sender.send(Some((last, 0))).and_then(|()| sender.send(None));
+        let told = sender
+            .send(Some((last, 0)))
+            .and_then(|()| sender.send(None));
         if told.is_err() | self.thread.join().is_err() {
             log::error!("a compute thread panicked; its last results are lost");
         }

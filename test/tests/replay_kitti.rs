@@ -137,7 +137,7 @@ fn the_sqlite3_log_is_the_first_three_scans() {
         }
         first.on_message(*role, &message);
     }
-    first.finish("first three", 0.0);
+    first.finish();
     for (one, two) in pipeline.mappers().zip(first.mappers()) {
         assert_eq!(one.list().sorted(), two.list().sorted());
         assert_eq!(one.distortion(), two.distortion());

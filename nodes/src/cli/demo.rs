@@ -83,7 +83,11 @@ impl Demo {
             println!("{}", serde_json::to_string_pretty(&report)?);
         } else {
             println!("{report}");
-            println!("log {}, picture {}", self.out.join("log").display(), picture.display());
+            println!(
+                "log {}, picture {}",
+                self.out.join("log").display(),
+                picture.display()
+            );
         }
         Ok(())
     }

@@ -108,7 +108,11 @@ fn read(path: &Path) -> Result<(VoxelList, u64), Box<dyn std::error::Error + Sen
 pub fn picture(map: &Path, out: &Path) -> CliResult {
     let (list, _) = read(map)?;
     let file = File::create(out).map_err(|e| format!("{}: {e}", out.display()))?;
-    Ok(render_png(&list, &RenderOptions::default(), BufWriter::new(file))?)
+    Ok(render_png(
+        &list,
+        &RenderOptions::default(),
+        BufWriter::new(file),
+    )?)
 }
 
 impl Info {
@@ -143,7 +147,10 @@ impl Info {
             println!("{}", serde_json::to_string_pretty(&summary)?);
             return Ok(());
         }
-        println!("lattice        {}, cells of {} m^3", summary.lattice, summary.cell_volume_m3);
+        println!(
+            "lattice        {}, cells of {} m^3",
+            summary.lattice, summary.cell_volume_m3
+        );
         println!("voxels         {}", summary.voxels);
         println!("points         {}", summary.points);
         if let (Some(min), Some(max)) = (summary.min_m, summary.max_m) {

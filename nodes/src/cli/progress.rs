@@ -13,7 +13,9 @@ impl Progress {
     /// A bar with a name in front.
     pub fn new(name: &str) -> Self {
         let bar = ProgressBar::new(STEPS);
-        if let Ok(style) = ProgressStyle::with_template("{prefix:<12} {bar:40} {percent:>3} % {msg}") {
+        if let Ok(style) =
+            ProgressStyle::with_template("{prefix:<12} {bar:40} {percent:>3} % {msg}")
+        {
             bar.set_style(style);
         }
         bar.set_prefix(name.to_owned());
@@ -23,7 +25,8 @@ impl Progress {
 
     /// How much is done.
     pub fn set(&self, done: f64) {
-        self.0.set_position((done.clamp(0.0, 1.0) * STEPS as f64) as u64);
+        self.0
+            .set_position((done.clamp(0.0, 1.0) * STEPS as f64) as u64);
     }
 
     /// A word about what happens now.

@@ -7,8 +7,8 @@ use std::path::PathBuf;
 use clap::Args;
 use lattice_core::cloud::Cloud;
 use lattice_core::lattice::Lattice;
-use lattice_core::voxels::file::write_map;
 use lattice_core::voxels::VoxelList;
+use lattice_core::voxels::file::write_map;
 use nalgebra::Vector3;
 use serde::Serialize;
 
@@ -62,11 +62,14 @@ impl Quantize {
         let limits = PointFileLimits {
             max_points: self.max_points,
         };
-        let file = read_points(&self.file, &limits)?;
+        let file = read_points(&self.file, &limits)
+            .map_err(|e| format!("{}: {e}", self.file.display()))?;
         let skipped = file.skipped_not_finite as u64;
         let points: Vec<Vector3<f64>> = file.points_m.into_iter().map(Vector3::from).collect();
         // Offsets from the first point keep the digits of far-away coordinates.
-        let datum_m = points.first().map_or_else(Vector3::zeros, |p| p.map(f64::round));
+        let datum_m = points
+            .first()
+            .map_or_else(Vector3::zeros, |p| p.map(f64::round));
         let cloud = Cloud::from_points(0, datum_m, &points);
         drop(points);
         let mut rows = Vec::new();

@@ -29,7 +29,11 @@ impl Run {
         let mut arguments = vec!["--ros-args".to_owned()];
         let mut named = Vec::new();
         for file in &self.params {
-            named.extend(params_file::read(file)?.into_iter().map(|param| param.nodes));
+            named.extend(
+                params_file::read(file)?
+                    .into_iter()
+                    .map(|param| param.nodes),
+            );
             arguments.extend(["--params-file".to_owned(), file.display().to_string()]);
         }
         arguments.push("--".to_owned());
@@ -38,7 +42,10 @@ impl Run {
             let named = named.iter().any(|pattern| pattern.names(name));
             named && (self.only.is_empty() || self.only.iter().any(|only| only == name))
         };
-        let nodes: Vec<_> = node::NODES.iter().filter(|(name, _)| wanted(name)).collect();
+        let nodes: Vec<_> = node::NODES
+            .iter()
+            .filter(|(name, _)| wanted(name))
+            .collect();
         if nodes.is_empty() {
             let known: Vec<&str> = node::NODES.iter().map(|(name, _)| *name).collect();
             return Err(format!(

@@ -4,13 +4,13 @@ use std::sync::Arc;
 use std::sync::atomic::{AtomicU64, Ordering};
 use std::time::Duration;
 
+use lattice_msgs::RosMessage;
 use lattice_msgs::geographic_msgs::GeoPointStamped;
 use lattice_msgs::geometry_msgs::PoseStamped;
 use lattice_msgs::nav_msgs::Odometry;
 use lattice_msgs::novatel_oem7_msgs::{INSPVA, INSPVAX};
 use lattice_msgs::sensor_msgs::{Imu, NavSatFix, PointCloud2};
 use lattice_msgs::tf2_msgs::TFMessage;
-use lattice_msgs::RosMessage;
 
 use super::ins::{InsMessage, InsSource};
 use super::{EnuOutput, EnuTransformer, TransformerOptions};
@@ -104,7 +104,10 @@ fn subscribe_ins(
         InsSource::NavsatfixImu => {
             let imu = params.string("ins.imu_topic", "imu")?;
             let fix = subscribe(node, &topic, Qos::INS, inbox, Event::Fix)?;
-            return Ok(vec![fix, subscribe(node, &imu, Qos::INS, inbox, Event::Imu)?]);
+            return Ok(vec![
+                fix,
+                subscribe(node, &imu, Qos::INS, inbox, Event::Imu)?,
+            ]);
         }
     };
     Ok(vec![ins?])
@@ -225,7 +228,10 @@ impl Shell {
             (Level::Ok, "transforming".to_owned())
         } else {
             let reasons: Vec<String> = dropped.iter().map(|(r, n)| format!("{n} {r}")).collect();
-            (Level::Warn, format!("clouds dropped: {}", reasons.join(", ")))
+            (
+                Level::Warn,
+                format!("clouds dropped: {}", reasons.join(", ")),
+            )
         };
         let mut values = report::key_values(&report);
         values.push(("clouds_waiting".into(), self.machine.waiting().to_string()));

@@ -71,12 +71,28 @@ pub fn start(runtime: &Runtime, name: &str) -> Result<Finish, NodeError> {
     let services = inbox.clone();
     let request_keyframe = node.service_trigger("~/request_keyframe", move || {
         let sent = services.send(Event::Keyframe, 0);
-        (sent, if sent { "keyframe follows" } else { "busy, ask again" }.into())
+        (
+            sent,
+            if sent {
+                "keyframe follows"
+            } else {
+                "busy, ask again"
+            }
+            .into(),
+        )
     })?;
     let services = inbox.clone();
     let reset = node.service_trigger("~/reset", move || {
         let sent = services.send(Event::Reset, 0);
-        (sent, if sent { "map emptied" } else { "busy, ask again" }.into())
+        (
+            sent,
+            if sent {
+                "map emptied"
+            } else {
+                "busy, ask again"
+            }
+            .into(),
+        )
     })?;
     let updates = inbox.clone();
     runtime.timer(update_period, move || tell(&updates, Event::Update));
@@ -108,7 +124,11 @@ fn period(node: &Node, name: &str, default_s: f64) -> Result<Duration, NodeError
     Duration::try_from_secs_f64(seconds)
         .ok()
         .filter(|period| *period >= Duration::from_millis(10))
-        .ok_or_else(|| params.invalid(name, format!("{seconds}, expected 0.01 or more")).into())
+        .ok_or_else(|| {
+            params
+                .invalid(name, format!("{seconds}, expected 0.01 or more"))
+                .into()
+        })
 }
 
 /// The topics that the node speaks on.
@@ -188,7 +208,11 @@ impl Shell {
             return;
         }
         self.centers_of = clouds;
-        if let Err(error) = self.outputs.centers.publish(Arc::new(self.machine.centers())) {
+        if let Err(error) = self
+            .outputs
+            .centers
+            .publish(Arc::new(self.machine.centers()))
+        {
             log::debug!("centres not published: {error}");
         }
     }
@@ -209,7 +233,10 @@ impl Shell {
         } else if counts.points_list_full > 0 {
             (Level::Warn, "the list is full (`max_voxels`)".to_owned())
         } else if refused + lost > 0 {
-            (Level::Warn, format!("{refused} clouds refused, {lost} lost"))
+            (
+                Level::Warn,
+                format!("{refused} clouds refused, {lost} lost"),
+            )
         } else {
             (Level::Ok, "mapping".to_owned())
         };

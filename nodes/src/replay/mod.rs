@@ -87,19 +87,20 @@ impl Pipeline {
     }
 
     /// Ends the input and sums up.
-    pub fn finish(&mut self, source: &str, wall_s: f64) -> RunReport {
+    pub fn finish(&mut self) -> RunReport {
         self.transformer.finish();
         self.update();
         let lattices = self.branches.iter_mut().map(Branch::finish).collect();
         RunReport {
-            source: source.to_owned(),
+            source: String::new(),
+            clouds_in_log: self.transformer.counts().clouds_in,
             transformer: TransformerReport {
                 counts: self.transformer.counts().clone(),
                 undecodable: self.undecodable,
                 ..TransformerReport::default()
             },
             lattices,
-            wall_s,
+            wall_s: 0.0,
         }
     }
 
@@ -228,5 +229,10 @@ pub fn run(
         }
         progress(message.log_time_ns.saturating_sub(start_ns) as f64 / span_ns);
     }
-    Ok(pipeline.finish(source, begin.elapsed().as_secs_f64()))
+    Ok(RunReport {
+        source: source.to_owned(),
+        clouds_in_log: plan.clouds(bag),
+        wall_s: begin.elapsed().as_secs_f64(),
+        ..pipeline.finish()
+    })
 }

@@ -108,7 +108,10 @@ pub fn run(
     for branch in &mut branches {
         branch.matched()?;
     }
-    transformer.expect(&format!("/points_enu: subscriber matched ({})", branches.len()))?;
+    transformer.expect(&format!(
+        "/points_enu: subscriber matched ({})",
+        branches.len()
+    ))?;
     let player = NodeProcess::start(
         "bag_player",
         &replay.player_arguments(),
@@ -121,6 +124,7 @@ pub fn run(
     let lattices = branches.into_iter().map(Branch::end);
     Ok(RunReport {
         source: replay.bag.display().to_string(),
+        clouds_in_log: replay.plan.clouds(replay.reader),
         transformer,
         lattices: lattices.collect::<Result<_, _>>()?,
         wall_s: begin.elapsed().as_secs_f64(),
@@ -147,7 +151,10 @@ impl DdsReplay<'_> {
             param("qos./points_enu.reliability", "reliable"),
             param("qos./points_enu.depth", "512"),
         ];
-        for (name, type_name) in ["ins.topic", "ins.imu_topic"].iter().zip(source.type_names()) {
+        for (name, type_name) in ["ins.topic", "ins.imu_topic"]
+            .iter()
+            .zip(source.type_names())
+        {
             for topic in self.topic(|role| *role == Role::Ins(type_name)) {
                 arguments.push(param(name, topic));
             }
@@ -393,7 +400,11 @@ impl Drop for NodeProcess {
 }
 
 /// Passes the log of a node on, warnings to our own log.
-fn forward(stderr: impl io::Read + Send + 'static, name: String, lines: Sender<String>) -> JoinHandle<()> {
+fn forward(
+    stderr: impl io::Read + Send + 'static,
+    name: String,
+    lines: Sender<String>,
+) -> JoinHandle<()> {
     thread::spawn(move || {
         for line in BufReader::new(stderr).lines().map_while(Result::ok) {
             if line.contains("[WARN]") || line.contains("[ERROR]") {
@@ -411,5 +422,8 @@ fn forward(stderr: impl io::Read + Send + 'static, name: String, lines: Sender<S
 /// The signal of Ctrl-C.
 fn interrupt(child: &Child) -> io::Result<()> {
     let pid = rustix::process::Pid::from_child(child);
-    Ok(rustix::process::kill_process(pid, rustix::process::Signal::INT)?)
+    Ok(rustix::process::kill_process(
+        pid,
+        rustix::process::Signal::INT,
+    )?)
 }

@@ -84,6 +84,15 @@ const PREFERRED: [InsSource; 5] = [
     InsSource::Pose,
 ];
 
+impl TopicPlan {
+    /// Clouds of the log that the replay is about.
+    pub fn clouds(&self, bag: &BagReader) -> u64 {
+        let clouds = self.roles.iter().filter(|(_, role)| **role == Role::Cloud);
+        let topics = clouds.filter_map(|(i, _)| bag.topics().get(*i));
+        topics.map(|topic| topic.message_count).sum()
+    }
+}
+
 /// Gives every topic that is of use its role.
 pub fn plan(bag: &BagReader, wishes: &TopicWishes) -> Result<TopicPlan, TopicError> {
     let mut roles = BTreeMap::new();

@@ -8,5 +8,7 @@ impl TriggerClient {
 }
 impl Node {
     /// x
-    pub fn trigger_client(&self, _name: &str) -> Result<TriggerClient, RuntimeError> { Ok(TriggerClient) }
+    pub fn trigger_client(&self, _name: &str) -> Result<TriggerClient, RuntimeError> {
+        Ok(TriggerClient)
+    }
 }

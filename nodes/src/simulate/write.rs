@@ -1,7 +1,7 @@
 //! Writes a simulated log.
 
-use std::fmt;
 use std::collections::HashMap;
+use std::fmt;
 use std::fs;
 use std::io;
 use std::path::{Path, PathBuf};

@@ -66,12 +66,17 @@ pub fn start(runtime: &Runtime, name: &str) -> Result<Finish, NodeError> {
         }
     })?;
     let updates = inbox.clone();
-    let updates = node.subscribe("map_updates", Qos::DELTAS, Load::Small, move |update: Arc<LatticeMapUpdate>| {
-        let bytes = update.keys.len() + update.counts.len() * 10;
-        if !updates.send(Event::Update(update), bytes) {
-            log::warn!("a map update is lost: the inbox is full");
-        }
-    })?;
+    let updates = node.subscribe(
+        "map_updates",
+        Qos::DELTAS,
+        Load::Small,
+        move |update: Arc<LatticeMapUpdate>| {
+            let bytes = update.keys.len() + update.counts.len() * 10;
+            if !updates.send(Event::Update(update), bytes) {
+                log::warn!("a map update is lost: the inbox is full");
+            }
+        },
+    )?;
     let joined = inbox.clone();
     markers.on_subscriber_joined(move || {
         let _ = joined.send(Event::Redraw, 0);
