@@ -1,4 +1,5 @@
 //! The `lattice` command as a user runs it.
+#![allow(clippy::unwrap_used)]
 
 use std::path::Path;
 use std::process::{Command, Output};

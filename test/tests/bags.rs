@@ -1,5 +1,4 @@
 //! rosbag2 directories against the independent `rosbags` package and on real data.
-#![allow(clippy::unwrap_used)]
 
 use std::{
     path::{Path, PathBuf},

@@ -1,5 +1,4 @@
 //! The closed-form quantizers against exhaustive search and against lattice theory.
-#![allow(clippy::unwrap_used, clippy::expect_used)]
 
 use lattice_core::lattice::{Key, Lattice, LatticeIndex, LatticeKind};
 use nalgebra::Vector3;

@@ -1,5 +1,4 @@
 //! The simulated log as its readers see it.
-#![allow(clippy::unwrap_used)]
 
 use std::collections::BTreeMap;
 use std::fs;

@@ -1,5 +1,4 @@
 //! The voxel list: the same bytes for any order, threads and grouping, and files that hold.
-#![allow(clippy::unwrap_used, clippy::expect_used)]
 
 use std::collections::BTreeSet;
 
