@@ -1,6 +1,5 @@
 //! Every message has the same bytes here as in the rosbags library for Python.
 
-
 use std::fmt::Write as _;
 use std::io::Write as _;
 use std::process::{Command, Stdio};

@@ -7,6 +7,7 @@ use std::time::{Duration, SystemTime, UNIX_EPOCH};
 use lattice_msgs::geographic_msgs::GeoPointStamped;
 use lattice_msgs::lattice::{LatticeMap, LatticeMapUpdate};
 use lattice_msgs::sensor_msgs::PointCloud2;
+use lattice_msgs::std_msgs::Empty;
 
 use super::{LatticeMapper, MapperOptions};
 use crate::node::{Finish, NodeError, warn_unused};
@@ -68,6 +69,10 @@ pub fn start(runtime: &Runtime, name: &str) -> Result<Finish, NodeError> {
     })?;
     let joined = inbox.clone();
     map.on_subscriber_joined(move || tell(&joined, Event::Keyframe));
+    // By topic too: our own followers need no answer, and the topic passes inside a process.
+    let requests = inbox.clone();
+    let ask = move |_: Arc<Empty>| tell(&requests, Event::Keyframe);
+    let asked = node.subscribe("~/request_keyframe", Qos::DEFAULT, Load::Small, ask)?;
     let services = inbox.clone();
     let request_keyframe = node.service_trigger("~/request_keyframe", move || {
         let sent = services.send(Event::Keyframe, 0);
@@ -100,7 +105,7 @@ pub fn start(runtime: &Runtime, name: &str) -> Result<Finish, NodeError> {
     warn_unused(params);
     Ok(Box::new(move || {
         let undecodable = points.undecodable() + origins.undecodable();
-        drop((points, origins, request_keyframe, reset));
+        drop((points, origins, asked, request_keyframe, reset));
         worker.finish_with(Event::Finish(undecodable));
     }))
 }

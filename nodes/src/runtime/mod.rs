@@ -1,6 +1,5 @@
 //! What rcl does and ros2-client does not: arguments, names, parameters, and the transport.
 
-mod client;
 mod clock;
 mod core;
 mod dds;
@@ -31,7 +30,6 @@ mod tf;
 mod transport_status;
 mod worker;
 
-pub use client::TriggerClient;
 pub use clock::Clock;
 pub use diagnostics::{Diagnostics, Level};
 pub use error::{PublishError, RuntimeError};

@@ -5,6 +5,7 @@ use std::time::Duration;
 
 use lattice_msgs::cdr;
 use lattice_msgs::lattice::{LatticeMap, LatticeMapUpdate};
+use lattice_msgs::std_msgs::Empty;
 use lattice_msgs::visualization_msgs::MarkerArray;
 
 use super::{MarkerOptions, VoxelMarkers};
@@ -14,7 +15,7 @@ use crate::replay::bytes_of;
 use crate::report::{self, MarkerReport};
 use crate::runtime::logging::Throttle;
 use crate::runtime::qos::Qos;
-use crate::runtime::{Diagnostics, Level, Load, Publisher, Runtime, TriggerClient};
+use crate::runtime::{Diagnostics, Level, Load, Publisher, Runtime};
 use crate::worker::{Worker, WorkerLimits};
 
 /// What the compute thread is told.
@@ -47,7 +48,7 @@ pub fn start(runtime: &Runtime, name: &str) -> Result<Finish, NodeError> {
     let mut shell = Shell {
         machine: VoxelMarkers::new(options),
         markers: markers.clone(),
-        request: node.trigger_client(&format!("{mapper}/request_keyframe"))?,
+        request: node.publisher(&format!("{mapper}/request_keyframe"), Qos::DEFAULT)?,
         diagnostics: node.diagnostics(),
         refusals: Throttle::new(Duration::from_secs(5)),
         requests: Throttle::new(Duration::from_secs(1)),
@@ -95,7 +96,7 @@ pub fn start(runtime: &Runtime, name: &str) -> Result<Finish, NodeError> {
 struct Shell {
     machine: VoxelMarkers,
     markers: Publisher<MarkerArray>,
-    request: TriggerClient,
+    request: Publisher<Empty>,
     diagnostics: Diagnostics,
     refusals: Throttle,
     requests: Throttle,
@@ -128,8 +129,10 @@ impl Shell {
     fn followed(&mut self, result: Result<Followed, FollowError>) {
         match result {
             Ok(Followed::NeedKeyframe) => {
-                if self.requests.check().is_some() {
-                    self.request.call();
+                if self.requests.check().is_some()
+                    && let Err(error) = self.request.publish(Empty::default())
+                {
+                    log::debug!("keyframe not requested: {error}");
                 }
             }
             Ok(Followed::Applied | Followed::Old) => {}
