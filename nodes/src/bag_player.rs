@@ -9,7 +9,7 @@ use lattice_msgs::rosgraph_msgs::Clock;
 use serde::Serialize;
 
 use crate::bag::{BagDurability, BagQos, BagReader, BagReliability, Player, PlayerOptions, Step};
-use crate::node::{NodeError, start_runtime, warn_unused};
+use crate::node::{NodeError, answers_help, start_runtime, warn_unused};
 use crate::report;
 use crate::runtime::params::Params;
 use crate::runtime::qos::{Durability, Qos, Reliability};
@@ -42,6 +42,9 @@ pub struct PlayerReport {
 /// Plays the log that the parameters name and returns at its end or when told to stop.
 pub fn run(arguments: impl IntoIterator<Item = String>) -> Result<(), NodeError> {
     let args = RosArgs::parse(arguments)?;
+    if answers_help(NAME, &args) {
+        return Ok(());
+    }
     let name = args.node_name(NAME);
     let runtime = start_runtime(&name, args)?;
     let node = runtime.node(&name)?;

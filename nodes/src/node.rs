@@ -41,16 +41,41 @@ pub fn run(
     arguments: impl IntoIterator<Item = String>,
 ) -> Result<(), NodeError> {
     let args = RosArgs::parse(arguments)?;
+    if answers_help(name, &args) {
+        return Ok(());
+    }
     let name = args.node_name(name);
     let runtime = start_runtime(&name, args)?;
     let finish = start(&runtime, &name)?;
     run_until_told(&runtime, vec![finish])
 }
 
+/// Prints how an executable is used if its arguments ask for it.
+pub fn answers_help(name: &str, args: &RosArgs) -> bool {
+    let asked = args
+        .user_args
+        .iter()
+        .any(|arg| arg == "--help" || arg == "-h");
+    if asked {
+        println!(
+            "Usage: {name} [--ros-args [-r FROM:=TO] [-p NAME:=VALUE] [--params-file FILE] \
+             [--log-level LEVEL] ...]\n\n\
+             Topics, services and parameters are in README.md; every parameter, with its unit and\n\
+             meaning, is in params/bobcat.yaml.\n\n\
+             Environment: ROS_DOMAIN_ID, ROS_AUTOMATIC_DISCOVERY_RANGE (LOCALHOST or SUBNET), RUST_LOG."
+        );
+    }
+    asked
+}
+
 /// Log lines as ROS users know them, and a runtime.
 pub fn start_runtime(name: &str, args: RosArgs) -> Result<Runtime, NodeError> {
     if let Err(error) = logging::init(&args, name) {
         eprintln!("{name}: another logger is in place: {error}");
+    }
+    // The first is the program where a caller passes it along.
+    for unknown in args.user_args.iter().filter(|arg| arg.starts_with('-')) {
+        log::warn!("argument '{unknown}' has no meaning here; ROS arguments follow --ros-args");
     }
     Ok(Runtime::start(name, args)?)
 }

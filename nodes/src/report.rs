@@ -19,7 +19,7 @@ use lattice_msgs::cdr;
 pub struct TransformerReport {
     /// Everything counted by the state machine.
     pub counts: TransformerCounts,
-    /// Clouds that the reader had to refuse: the inbox was full.
+    /// Clouds that were sent and lost on the way, or that found the inbox full.
     pub clouds_inbox_full: u64,
     /// Samples that did not decode.
     pub undecodable: u64,
@@ -52,7 +52,7 @@ pub struct MapperReport {
     pub cell_volume_m3: f64,
     /// Everything counted by the state machine.
     pub counts: MapperCounts,
-    /// Clouds that the reader had to refuse: the inbox was full.
+    /// Clouds that were sent and lost on the way, or that found the inbox full.
     pub clouds_inbox_full: u64,
     /// Samples that did not decode.
     pub undecodable: u64,

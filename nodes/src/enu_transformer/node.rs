@@ -31,10 +31,16 @@ enum Event {
     Odometry(Arc<Odometry>),
     Pose(Arc<PoseStamped>),
     Tick,
-    /// Ends, with the number of samples that did not decode.
-    Finish(u64),
+    /// Ends, with the samples that did not decode and the clouds that were lost before the inbox.
+    Finish {
+        undecodable: u64,
+        lost: u64,
+    },
 }
 
+/// Clouds in and out. Line scanners send hundreds of small ones a second, in bursts when they waited
+/// for a pose.
+pub const SCANS: Qos = Qos::best_effort(20);
 /// Bytes that a small message stands for in the inbox.
 const SMALL: usize = 1024;
 
@@ -61,6 +67,7 @@ pub fn start(runtime: &Runtime, name: &str) -> Result<Finish, NodeError> {
     };
     let worker = Worker::spawn(name, limits, move |event| shell.on(event))?;
     let inbox = worker.inbox();
+    let mut clouds = Vec::new();
     let mut inputs = subscribe_ins(&node, source, &inbox)?;
     for topic in params.string_array("points_topics", &["points"])? {
         let (inbox, lost) = (inbox.clone(), Arc::clone(&lost));
@@ -70,7 +77,7 @@ pub fn start(runtime: &Runtime, name: &str) -> Result<Finish, NodeError> {
                 lost.fetch_add(1, Ordering::Relaxed);
             }
         };
-        inputs.push(node.subscribe(&topic, Qos::SENSOR, Load::Large, hand_over)?);
+        clouds.push(node.subscribe(&topic, SCANS, Load::Large, hand_over)?);
     }
     let transforms = |m| Event::Transforms(m, false);
     inputs.push(subscribe(&node, "/tf", Qos::TF, &inbox, transforms)?);
@@ -83,9 +90,11 @@ pub fn start(runtime: &Runtime, name: &str) -> Result<Finish, NodeError> {
     log::info!("INS source {source}; azimuth 90 deg is yaw 0 (east)");
     warn_unused(params);
     Ok(Box::new(move || {
-        let undecodable = inputs.iter().map(Subscription::undecodable).sum();
-        drop(inputs);
-        worker.finish_with(Event::Finish(undecodable));
+        let undecodable = inputs.iter().chain(&clouds).map(Subscription::undecodable);
+        let undecodable = undecodable.sum();
+        let lost = clouds.iter().map(Subscription::lost).sum();
+        drop((inputs, clouds));
+        worker.finish_with(Event::Finish { undecodable, lost });
     }))
 }
 
@@ -140,7 +149,7 @@ struct Outputs {
 impl Outputs {
     fn open(node: &Node) -> Result<Self, NodeError> {
         Ok(Self {
-            points: node.publisher("points_enu", Qos::SENSOR)?,
+            points: node.publisher("points_enu", SCANS)?,
             tf: node.publisher("/tf", Qos::TF)?,
             tf_static: node.publisher("/tf_static", Qos::TF_STATIC)?,
             origin: node.publisher("map_origin", Qos::LATCHED)?,
@@ -177,8 +186,8 @@ impl Shell {
                 self.diagnose();
                 outputs
             }
-            Event::Finish(undecodable) => {
-                self.finish(undecodable);
+            Event::Finish { undecodable, lost } => {
+                self.finish(undecodable, lost);
                 return;
             }
         };
@@ -238,7 +247,8 @@ impl Shell {
         self.diagnostics.set("clouds", level, message, values);
     }
 
-    fn finish(&mut self, undecodable: u64) {
+    fn finish(&mut self, undecodable: u64, lost: u64) {
+        self.lost.fetch_add(lost, Ordering::Relaxed);
         self.machine.finish();
         let report = TransformerReport {
             undecodable,

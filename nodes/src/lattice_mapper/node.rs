@@ -10,6 +10,7 @@ use lattice_msgs::sensor_msgs::PointCloud2;
 use lattice_msgs::std_msgs::Empty;
 
 use super::{LatticeMapper, MapperOptions};
+use crate::enu_transformer::node::SCANS;
 use crate::node::{Finish, NodeError, warn_unused};
 use crate::report::{self, MapperReport};
 use crate::runtime::logging::Throttle;
@@ -25,8 +26,11 @@ enum Event {
     Centers,
     Keyframe,
     Reset,
-    /// Ends, with the number of samples that did not decode.
-    Finish(u64),
+    /// Ends, with the samples that did not decode and the clouds that were lost before the inbox.
+    Finish {
+        undecodable: u64,
+        lost: u64,
+    },
 }
 
 /// Starts the node.
@@ -62,7 +66,7 @@ pub fn start(runtime: &Runtime, name: &str) -> Result<Finish, NodeError> {
             lost.fetch_add(1, Ordering::Relaxed);
         }
     };
-    let points = node.subscribe("points_enu", Qos::SENSOR, Load::Large, hand_over)?;
+    let points = node.subscribe("points_enu", SCANS, Load::Large, hand_over)?;
     let origins = inbox.clone();
     let origins = node.subscribe("map_origin", Qos::LATCHED, Load::Small, move |origin| {
         tell(&origins, Event::Origin(origin));
@@ -105,8 +109,9 @@ pub fn start(runtime: &Runtime, name: &str) -> Result<Finish, NodeError> {
     warn_unused(params);
     Ok(Box::new(move || {
         let undecodable = points.undecodable() + origins.undecodable();
+        let lost = points.lost();
         drop((points, origins, asked, request_keyframe, reset));
-        worker.finish_with(Event::Finish(undecodable));
+        worker.finish_with(Event::Finish { undecodable, lost });
     }))
 }
 
@@ -184,7 +189,7 @@ impl Shell {
                 self.machine.reset(epoch());
                 self.keyframe_due = true;
             }
-            Event::Finish(undecodable) => self.finish(undecodable),
+            Event::Finish { undecodable, lost } => self.finish(undecodable, lost),
         }
     }
 
@@ -255,7 +260,8 @@ impl Shell {
         self.diagnostics.set("map", level, message, values);
     }
 
-    fn finish(&mut self, undecodable: u64) {
+    fn finish(&mut self, undecodable: u64, lost: u64) {
+        self.lost.fetch_add(lost, Ordering::Relaxed);
         self.update();
         self.centers();
         let report = MapperReport {

@@ -1,8 +1,10 @@
 //! Replay over DDS: the player and one process for each node, on a loopback domain of their own.
 
+use std::collections::BTreeSet;
 use std::io::{self, BufRead, BufReader};
 use std::path::{Path, PathBuf};
 use std::process::{Child, Command, ExitStatus, Stdio};
+use std::sync::{Mutex, PoisonError};
 use std::thread::{self, JoinHandle};
 use std::time::{Duration, Instant};
 
@@ -16,6 +18,8 @@ use crate::report::{self, LatticeReport, RunReport};
 
 /// Domain of the processes unless `ROS_DOMAIN_ID` is set: apart from a robot on domain 0.
 const DOMAIN: &str = "87";
+/// Texts of warnings that are remembered.
+const MAX_TEXTS: usize = 1000;
 /// Time for all nodes to find each other.
 const MATCH_TIME: Duration = Duration::from_secs(30);
 /// Time for a node to work off its inbox when told to end.
@@ -407,8 +411,11 @@ fn forward(
 ) -> JoinHandle<()> {
     thread::spawn(move || {
         for line in BufReader::new(stderr).lines().map_while(Result::ok) {
-            if line.contains("[WARN]") || line.contains("[ERROR]") {
-                log::warn!("{name}: {line}");
+            // Twelve processes say the same of one machine: it is shown once.
+            let text = line.rsplit_once("]: ").map_or(&*line, |(_, text)| text);
+            let warning = line.contains("[WARN]") || line.contains("[ERROR]");
+            if warning && first_time(text) {
+                log::warn!("{name}: {text}");
             } else {
                 log::debug!("{name}: {line}");
             }
@@ -417,6 +424,13 @@ fn forward(
             }
         }
     })
+}
+
+/// Whether no process has logged this text before.
+fn first_time(text: &str) -> bool {
+    static SEEN: Mutex<BTreeSet<String>> = Mutex::new(BTreeSet::new());
+    let mut seen = SEEN.lock().unwrap_or_else(PoisonError::into_inner);
+    seen.len() >= MAX_TEXTS || seen.insert(text.to_owned())
 }
 
 /// The signal of Ctrl-C.

@@ -21,7 +21,7 @@ use super::local_bus::{LocalBus, Membership};
 use super::names;
 use super::peers::Peers;
 use super::publisher;
-use super::qos::{Durability, Qos, Reliability};
+use super::qos::{Durability, Qos};
 use super::service::Server;
 use super::shutdown::Shutdown;
 use super::subscription::{Load, Running, Source, Stats, Subscription, spawn_reader};
@@ -35,8 +35,9 @@ const QUEUE_MESSAGES: usize = 1024;
 /// Bytes that wait in the queue of one publisher, at most.
 const QUEUE_BYTES: usize = 128 << 20;
 
-/// Messages of a reliable publisher in this process that wait for a subscription, at least.
-const RELIABLE_LOCAL_MESSAGES: usize = 1024;
+/// Messages of a publisher in this process that wait for a subscription, at least. They are shared,
+/// not copied, and the handler that they wait for returns at once: there is no reason to lose one.
+const LOCAL_MESSAGES: usize = 1024;
 
 /// Time to send what is queued when shutting down.
 const DRAIN_TIME: Duration = Duration::from_secs(2);
@@ -224,11 +225,7 @@ impl Core {
     ) -> Result<Subscription, RuntimeError> {
         let peers = Arc::new(Peers::of_subscription(topic));
         let stats = Arc::new(Stats::new(Arc::clone(&peers)));
-        let queue = match qos.reliability {
-            Reliability::Reliable => qos.depth.max(RELIABLE_LOCAL_MESSAGES),
-            Reliability::BestEffort => qos.depth.max(1),
-        };
-        let (sender, local) = bounded(queue);
+        let (sender, local) = bounded(qos.depth.max(LOCAL_MESSAGES));
         let latched = qos.durability == Durability::TransientLocal;
         let membership = self.bus.topic(topic).join_subscriber::<M>(
             &peers,
