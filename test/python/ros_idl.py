@@ -1,0 +1,138 @@
+"""The ROS messages that dds_peer.py speaks, as IDL types of the cyclonedds package."""
+
+from cyclonedds.idl import annotations, make_idl_struct
+from cyclonedds.idl.types import array, float32, float64, int16, int32, int64
+from cyclonedds.idl.types import sequence, uint8, uint16, uint32, uint64
+
+
+def ros(name, /, **fields):
+    """A final struct under the name that ROS gives the type on DDS."""
+    package, kind, last = name.split("/")
+    made = make_idl_struct(last, f"{package}::{kind}::dds_::{last}_", fields)
+    return annotations.final(made)
+
+
+Time = ros("builtin_interfaces/msg/Time", sec=int32, nanosec=uint32)
+Duration = ros("builtin_interfaces/msg/Duration", sec=int32, nanosec=uint32)
+Header = ros("std_msgs/msg/Header", stamp=Time, frame_id=str)
+ColorRGBA = ros("std_msgs/msg/ColorRGBA", r=float32, g=float32, b=float32, a=float32)
+
+XYZ = {"x": float64, "y": float64, "z": float64}
+Point = ros("geometry_msgs/msg/Point", **XYZ)
+Vector3 = ros("geometry_msgs/msg/Vector3", **XYZ)
+Quaternion = ros("geometry_msgs/msg/Quaternion", **XYZ, w=float64)
+Pose = ros("geometry_msgs/msg/Pose", position=Point, orientation=Quaternion)
+Twist = ros("geometry_msgs/msg/Twist", linear=Vector3, angular=Vector3)
+PoseWithCovariance = ros(
+    "geometry_msgs/msg/PoseWithCovariance", pose=Pose, covariance=array[float64, 36]
+)
+TwistWithCovariance = ros(
+    "geometry_msgs/msg/TwistWithCovariance", twist=Twist, covariance=array[float64, 36]
+)
+Odometry = ros(
+    "nav_msgs/msg/Odometry",
+    header=Header,
+    child_frame_id=str,
+    pose=PoseWithCovariance,
+    twist=TwistWithCovariance,
+)
+Transform = ros("geometry_msgs/msg/Transform", translation=Vector3, rotation=Quaternion)
+TransformStamped = ros(
+    "geometry_msgs/msg/TransformStamped", header=Header, child_frame_id=str, transform=Transform
+)
+TFMessage = ros("tf2_msgs/msg/TFMessage", transforms=sequence[TransformStamped])
+
+PointField = ros(
+    "sensor_msgs/msg/PointField", name=str, offset=uint32, datatype=uint8, count=uint32
+)
+PointCloud2 = ros(
+    "sensor_msgs/msg/PointCloud2",
+    header=Header,
+    height=uint32,
+    width=uint32,
+    fields=sequence[PointField],
+    is_bigendian=bool,
+    point_step=uint32,
+    row_step=uint32,
+    data=sequence[uint8],
+    is_dense=bool,
+)
+
+CompressedImage = ros(
+    "sensor_msgs/msg/CompressedImage", header=Header, format=str, data=sequence[uint8]
+)
+UVCoordinate = ros("visualization_msgs/msg/UVCoordinate", u=float32, v=float32)
+MeshFile = ros("visualization_msgs/msg/MeshFile", filename=str, data=sequence[uint8])
+Marker = ros(
+    "visualization_msgs/msg/Marker",
+    header=Header,
+    ns=str,
+    id=int32,
+    type=int32,
+    action=int32,
+    pose=Pose,
+    scale=Vector3,
+    color=ColorRGBA,
+    lifetime=Duration,
+    frame_locked=bool,
+    points=sequence[Point],
+    colors=sequence[ColorRGBA],
+    texture_resource=str,
+    texture=CompressedImage,
+    uv_coordinates=sequence[UVCoordinate],
+    text=str,
+    mesh_resource=str,
+    mesh_file=MeshFile,
+    mesh_use_embedded_materials=bool,
+)
+MarkerArray = ros("visualization_msgs/msg/MarkerArray", markers=sequence[Marker])
+
+KeyValue = ros("diagnostic_msgs/msg/KeyValue", key=str, value=str)
+DiagnosticStatus = ros(
+    "diagnostic_msgs/msg/DiagnosticStatus",
+    # An octet: signed or not is the same on the wire.
+    level=uint8,
+    name=str,
+    message=str,
+    hardware_id=str,
+    values=sequence[KeyValue],
+)
+DiagnosticArray = ros(
+    "diagnostic_msgs/msg/DiagnosticArray", header=Header, status=sequence[DiagnosticStatus]
+)
+
+GeoPoint = ros(
+    "geographic_msgs/msg/GeoPoint", latitude=float64, longitude=float64, altitude=float64
+)
+LatticeInfo = ros(
+    "lattice_msgs/msg/LatticeInfo",
+    lattice=str,
+    cell_volume_m3=float64,
+    generator=array[float64, 9],
+    map_from_lattice=Pose,
+    origin=GeoPoint,
+    has_origin=bool,
+    epoch=uint64,
+)
+LatticeMap = ros(
+    "lattice_msgs/msg/LatticeMap",
+    header=Header,
+    info=LatticeInfo,
+    sequence=uint64,
+    chunk=uint32,
+    chunks=uint32,
+    voxels_total=uint64,
+    key_encoding=str,
+    voxels=uint32,
+    keys=sequence[uint8],
+    counts=sequence[uint32],
+    offset_unit_m=float64,
+    mean_offsets=sequence[int16],
+    labels=sequence[uint16],
+    label_counts=sequence[uint32],
+)
+
+# rmw_cyclonedds puts who asks and the number of the request in front of both.
+ASKED = {"client": uint64, "number": int64}
+TriggerRequest = ros("std_srvs/srv/Trigger_Request", **ASKED, structure_needs_at_least_one_member=uint8)
+TriggerResponse = ros("std_srvs/srv/Trigger_Response", **ASKED, success=bool, message=str)
