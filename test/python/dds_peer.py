@@ -70,9 +70,11 @@ class Peer:
         """Takes everything that is there; what was looked at no longer wakes the waitset."""
         for topic, (reader, handler) in self.readers.items():
             self.matched[topic] = reader.get_subscription_matched_status().current_count
-            for sample in reader.take(N=50):
-                if sample.sample_info.valid_data:
-                    handler(sample)
+            # Taking resets the status even where it leaves samples.
+            while samples := reader.take(N=50):
+                for sample in samples:
+                    if sample.sample_info.valid_data:
+                        handler(sample)
         for topic, writer in self.writers.items():
             self.matched[topic] = writer.get_publication_matched_status().current_count
 
