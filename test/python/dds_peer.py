@@ -197,15 +197,15 @@ class Map:
     """Chunks of `map`, by the state that they belong to."""
 
     def __init__(self):
-        self.states, self.infos = {}, {}
+        self.states, self.newest_ns = {}, 0
 
     def __call__(self, message):
+        self.newest_ns = max(self.newest_ns, message.sample_info.source_timestamp)
         assert message.key_encoding == "morton21_delta_leb128"
         assert len(message.counts) == message.voxels
         assert len(message.mean_offsets) == 3 * message.voxels
         state = (message.info.epoch, message.sequence)
         self.states.setdefault(state, {})[message.chunk] = message
-        self.infos[state] = message.info
 
     def whole(self):
         """Chunks of the newest state that is complete, in order."""
@@ -332,10 +332,12 @@ def run_graph(scenario, _directory):
     )
     # The keyframe for the new reader of `map`, then the one asked for.
     peer.until(lambda: whole.whole(), lambda: "no map for a new reader")
-    whole.states.clear()
-    client, number = 0x0123_4567_89AB_CDEF, 42
+    client, number, asked_ns = 0x0123_4567_89AB_CDEF, 42, time.time_ns()
     request.write(ros.TriggerRequest(client, number, 0))
-    peer.until(lambda: replies and whole.whole(), lambda: f"replies {replies}, {whole.states}")
+    peer.until(
+        lambda: replies and whole.newest_ns >= asked_ns,
+        lambda: f"replies {replies}, last keyframe {whole.newest_ns - asked_ns} ns after the request",
+    )
     wrong = 0.0
     for row in poses_sent:
         frames, found = heard[row[0]]
