@@ -1,6 +1,7 @@
 //! The runtime against ros2-client as a peer: services by both rmw mappings, parameters, the graph.
 #![expect(clippy::unwrap_used, reason = "a test that cannot go on ends")]
 
+use std::sync::mpsc::channel;
 use std::time::Duration;
 
 use futures::StreamExt;
@@ -137,29 +138,22 @@ fn the_graph_names_every_node_with_its_endpoints() {
     let domain = TestDomain::take();
     let peer = peer(&domain);
     let mut events = Box::pin(peer.status_receiver().unwrap());
+    let (sender, announced) = channel();
+    // Its queue is short: what is not taken at once is lost.
+    let listener = smol::spawn(async move {
+        while let Some(event) = events.next().await {
+            if let NodeEvent::ParticipantEntities(info) = event {
+                let nodes = info.nodes().iter();
+                let mut names: Vec<_> = nodes.map(|n| n.fully_qualified_name()).collect();
+                names.sort();
+                let _ = sender.send(names);
+            }
+        }
+    });
     let runtime = runtime(&domain, &["--ros-args", "-r", "__ns:=/robot"]);
     let markers = runtime.node("markers").unwrap();
     let expected = ["/robot/mapper", "/robot/markers"];
-    let found = async {
-        loop {
-            let NodeEvent::ParticipantEntities(info) = events.next().await.unwrap() else {
-                continue;
-            };
-            let mut names: Vec<_> = info
-                .nodes()
-                .iter()
-                .map(|node| node.fully_qualified_name())
-                .collect();
-            names.sort();
-            if names == expected {
-                break;
-            }
-        }
-    };
-    let timeout = async {
-        smol::Timer::after(PATIENCE).await;
-        panic!("nodes {expected:?} were not announced");
-    };
-    smol::block_on(smol::future::or(found, timeout));
+    while announced.recv_timeout(PATIENCE).unwrap() != expected {}
+    drop(listener);
     drop(markers);
 }
