@@ -1,8 +1,10 @@
 //! The runtime against ros2-client as a peer: services by both rmw mappings, parameters, the graph.
 #![expect(clippy::unwrap_used, reason = "a test that cannot go on ends")]
 
+use std::sync::mpsc::channel;
 use std::time::Duration;
 
+use futures::StreamExt;
 use lattice_msgs::rcl_interfaces::{GetParametersRequest, GetParametersResponse};
 use lattice_msgs::std_srvs::{TriggerRequest, TriggerResponse};
 use lattice_nodes::runtime::Runtime;
@@ -10,7 +12,7 @@ use lattice_nodes::runtime::ros_args::RosArgs;
 use lattice_test::domain::TestDomain;
 use ros2_client::qos::WhenFull;
 use ros2_client::{
-    Context, Message, Name, Node, NodeName, NodeOptions, QosProfile, ServiceMapping,
+    Context, Message, Name, Node, NodeEvent, NodeName, NodeOptions, QosProfile, ServiceMapping,
     ServiceTypeName,
 };
 use rustdds::DomainParticipantBuilder;
@@ -129,4 +131,29 @@ fn parameters_are_served_to_clients_of_both_rmw() {
         assert_eq!(values, [5000, 0], "{mapping:?}");
     }
     drop(runtime);
+}
+
+#[test]
+fn the_graph_names_every_node_with_its_endpoints() {
+    let domain = TestDomain::take();
+    let peer = peer(&domain);
+    let mut events = Box::pin(peer.status_receiver().unwrap());
+    let (sender, announced) = channel();
+    // Its queue is short: what is not taken at once is lost.
+    let listener = smol::spawn(async move {
+        while let Some(event) = events.next().await {
+            if let NodeEvent::ParticipantEntities(info) = event {
+                let nodes = info.nodes().iter();
+                let mut names: Vec<_> = nodes.map(|n| n.fully_qualified_name()).collect();
+                names.sort();
+                let _ = sender.send(names);
+            }
+        }
+    });
+    let runtime = runtime(&domain, &["--ros-args", "-r", "__ns:=/robot"]);
+    let markers = runtime.node("markers").unwrap();
+    let expected = ["/robot/mapper", "/robot/markers"];
+    while announced.recv_timeout(PATIENCE).unwrap() != expected {}
+    drop(listener);
+    drop(markers);
 }

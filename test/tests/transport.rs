@@ -199,6 +199,58 @@ fn one_process_shares_the_message_itself() {
 }
 
 #[test]
+fn a_subscriber_in_the_process_does_not_hold_up_those_outside() {
+    let domain = TestDomain::take();
+    let (a, b) = (runtime(&domain, "a"), runtime(&domain, "b"));
+    let (from, to) = (a.node("a").unwrap(), b.node("b").unwrap());
+    let qos = Qos::reliable(5);
+    for (topic, load, subscribe_first) in [
+        ("first_small", Load::Small, true),
+        ("first_large", Load::Large, true),
+        ("second_small", Load::Small, false),
+        ("second_large", Load::Large, false),
+    ] {
+        let before = subscribe_first.then(|| hear::<RosString>(&from, topic, qos, load));
+        let publisher = from.publisher::<RosString>(topic, qos).unwrap();
+        let (_here, heard_here) =
+            before.unwrap_or_else(|| hear::<RosString>(&from, topic, qos, load));
+        let (there, heard_there) = hear::<RosString>(&to, topic, Qos::reliable(100), load);
+        let counted = publisher.clone();
+        wait_until(&a, move || counted.subscriber_count() == 2);
+        for i in 0..100 {
+            publisher.publish(text(&i.to_string())).unwrap();
+        }
+        assert!(publisher.flush(PATIENCE), "{topic}");
+        for i in 0..100 {
+            for heard in [&heard_here, &heard_there] {
+                let message = heard.recv_timeout(PATIENCE).unwrap();
+                assert_eq!(message.data, i.to_string(), "{topic}");
+            }
+        }
+        assert_eq!((publisher.dropped(), there.lost()), (0, 0), "{topic}");
+        assert_eq!(publisher.subscriber_count(), 2, "{topic}");
+    }
+}
+
+#[test]
+fn a_subscription_hears_this_process_and_others() {
+    let domain = TestDomain::take();
+    let (a, b) = (runtime(&domain, "a"), runtime(&domain, "b"));
+    let (from, to) = (a.node("a").unwrap(), b.node("b").unwrap());
+    let (here, heard) = hear::<RosString>(&to, "chatter", Qos::DEFAULT, Load::Small);
+    let inside = to.publisher::<RosString>("chatter", Qos::DEFAULT).unwrap();
+    let outside = from
+        .publisher::<RosString>("chatter", Qos::DEFAULT)
+        .unwrap();
+    wait_until(&b, move || here.publisher_count() == 2);
+    wait_for_subscriber!(outside);
+    for publisher in [inside, outside] {
+        publisher.publish(text("once")).unwrap();
+        assert_eq!(heard.recv_timeout(PATIENCE).unwrap().data, "once");
+    }
+}
+
+#[test]
 fn a_late_joiner_hears_what_was_latched() {
     let domain = TestDomain::take();
     let (a, b) = (runtime(&domain, "a"), runtime(&domain, "b"));

@@ -49,7 +49,11 @@ pub(crate) struct SimTime {
 
 impl Core {
     /// The clock on `topic`, subscribed to at the first call.
-    pub(crate) fn sim_clock(&self, node: NodeId, topic: &str) -> Result<Clock, RuntimeError> {
+    pub(crate) fn sim_clock(
+        self: &Arc<Self>,
+        node: NodeId,
+        topic: &str,
+    ) -> Result<Clock, RuntimeError> {
         let mut sim = lock(&self.sim_time);
         if let Some(sim) = sim.as_ref() {
             return Ok(sim.clock.clone());

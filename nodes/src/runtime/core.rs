@@ -1,5 +1,6 @@
 //! What the nodes of a process share: the participant, the threads, the local bus.
 
+use std::sync::atomic::{AtomicBool, AtomicU64};
 use std::sync::{Arc, Mutex, Weak};
 use std::thread::JoinHandle;
 use std::time::{Duration, Instant};
@@ -7,9 +8,10 @@ use std::time::{Duration, Instant};
 use lattice_msgs::RosMessage;
 use rustdds::RTPSEntity;
 use smol::Task;
-use smol::channel::{Sender, bounded};
+use smol::channel::{Sender, bounded, unbounded};
 
 use super::clock::SimTime;
+use super::dds::barrier::{Barrier, Wait};
 use super::dds::events::Endpoints;
 use super::dds::participant::Dds;
 use super::dds::reader::DdsReader;
@@ -22,6 +24,7 @@ use super::names;
 use super::peers::Peers;
 use super::publisher;
 use super::qos::{Durability, Qos};
+use super::reader_port::ReaderPort;
 use super::service::Server;
 use super::shutdown::Shutdown;
 use super::subscription::{Load, Running, Source, Stats, Subscription, spawn_reader};
@@ -55,6 +58,9 @@ pub(crate) struct Core {
     publishing: Worker,
     pub endpoints: Arc<Endpoints>,
     pub graph: Arc<Graph>,
+    /// Held while a writer is made, or a reader that a writer must not meet.
+    pub writer_order: Mutex<()>,
+    pub writers_made: AtomicU64,
     open: Mutex<Option<Open>>,
 }
 
@@ -63,7 +69,8 @@ struct Open {
     dds: Dds,
     _watch: Option<Task<()>>,
     publishers: Vec<Weak<publisher::Core>>,
-    subscriptions: Vec<Weak<Stats>>,
+    ports: Vec<Weak<ReaderPort>>,
+    barrier: Barrier,
     readers: Vec<(Sender<()>, JoinHandle<()>)>,
     servers: Vec<Server>,
     graph: Option<Task<()>>,
@@ -75,7 +82,8 @@ impl Core {
         let io = Worker::start("io", shutdown.clone())?;
         let publishing = Worker::start("publisher", shutdown.clone())?;
         let dds = Dds::join(domain, localhost_only)?;
-        let endpoints = Arc::new(Endpoints::default());
+        let barrier = Barrier::new(&dds)?;
+        let endpoints = Arc::new(Endpoints::new(dds.participant()));
         let watch = io.spawn(Arc::clone(&endpoints).watch(dds.participant().clone()));
         let core = Arc::new(Self {
             bus: LocalBus::default(),
@@ -87,11 +95,14 @@ impl Core {
             publishing,
             endpoints,
             graph: Graph::new(),
+            writer_order: Mutex::default(),
+            writers_made: AtomicU64::new(0),
             open: Mutex::new(Some(Open {
                 dds,
                 _watch: watch,
                 publishers: Vec::new(),
-                subscriptions: Vec::new(),
+                ports: Vec::new(),
+                barrier,
                 readers: Vec::new(),
                 servers: Vec::new(),
                 graph: None,
@@ -121,7 +132,7 @@ impl Core {
     }
 
     pub(crate) fn publisher<M: RosMessage>(
-        &self,
+        self: &Arc<Self>,
         node: NodeId,
         topic: &str,
         qos: &Qos,
@@ -134,7 +145,7 @@ impl Core {
     }
 
     pub(crate) fn raw_publisher(
-        &self,
+        self: &Arc<Self>,
         node: NodeId,
         topic: &str,
         type_name: &str,
@@ -148,7 +159,7 @@ impl Core {
     }
 
     fn publisher_core(
-        &self,
+        self: &Arc<Self>,
         node: NodeId,
         topic: &str,
         type_name: &str,
@@ -158,7 +169,9 @@ impl Core {
     ) -> Result<Arc<publisher::Core>, RuntimeError> {
         let peers = Arc::new(Peers::of_publisher(topic));
         let local = join(&peers)?;
-        let writer = self.dds_writer(topic, names::dds_topic(topic), type_name, qos, when_full)?;
+        let writer = self.with_readers_closed(topic, || {
+            self.dds_writer(topic, names::dds_topic(topic), type_name, qos, when_full)
+        })?;
         let guid = writer.guid();
         let core = Arc::new(publisher::Core {
             writer,
@@ -215,7 +228,7 @@ impl Core {
     }
 
     pub(crate) fn subscribe<M: RosMessage>(
-        &self,
+        self: &Arc<Self>,
         node: NodeId,
         topic: &str,
         qos: &Qos,
@@ -233,13 +246,24 @@ impl Core {
             stats.lost_counter(),
             latched,
         )?;
-        let reader = self.dds_reader(topic, names::dds_topic(topic), M::TYPE, qos, max_bytes)?;
-        let guid = reader.guid();
+        let (commands, told) = unbounded();
+        let port = Arc::new(ReaderPort {
+            node,
+            topic: topic.to_owned(),
+            type_name: M::TYPE,
+            qos: *qos,
+            max_bytes,
+            peers,
+            stats: Arc::clone(&stats),
+            commands,
+            is_open: AtomicBool::new(false),
+            graph: Mutex::default(),
+        });
         let source = Source {
-            reader,
+            commands: told,
             local,
             _membership: membership,
-            stats: Arc::clone(&stats),
+            stats,
         };
         let task = source.run(handler);
         let running = match load {
@@ -256,12 +280,11 @@ impl Core {
             }
         };
         if let Some(open) = lock(&self.open).as_mut() {
-            open.subscriptions.retain(|s| s.strong_count() > 0);
-            open.subscriptions.push(Arc::downgrade(&stats));
+            open.ports.retain(|port| port.strong_count() > 0);
+            open.ports.push(Arc::downgrade(&port));
         }
-        self.endpoints.register(guid, &peers);
-        let graph = self.graph.join(node, EndpointKind::Reader, guid);
-        Ok(Subscription::new(stats, running, graph))
+        self.open_port(&port)?;
+        Ok(Subscription::new(port, running))
     }
 
     /// Publishers that are in use.
@@ -272,10 +295,17 @@ impl Core {
     }
 
     /// Subscriptions that are in use.
-    pub(crate) fn subscriptions(&self) -> Vec<Arc<Stats>> {
+    pub(crate) fn ports(&self) -> Vec<Arc<ReaderPort>> {
         let open = lock(&self.open);
-        let all = open.iter().flat_map(|open| &open.subscriptions);
+        let all = open.iter().flat_map(|open| &open.ports);
         all.filter_map(Weak::upgrade).collect()
+    }
+
+    /// Begins to wait until discovery knows the writers made so far. `None` after shutdown.
+    pub(crate) fn begin_wait(&self) -> Option<Wait> {
+        let open = lock(&self.open);
+        let open = open.as_ref()?;
+        open.barrier.begin(&open.dds, &self.endpoints).ok()
     }
 
     /// Ends everything: timers and readers first, then what is queued goes out, then we leave.

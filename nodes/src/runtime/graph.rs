@@ -6,10 +6,12 @@
 
 use std::collections::{BTreeMap, BTreeSet};
 use std::sync::{Arc, Mutex};
+use std::time::Duration;
 
 use lattice_msgs::cdr;
 use rustdds::GUID;
 use serde::ser::{Serialize, SerializeTuple, Serializer};
+use smol::Timer;
 use smol::channel::{Receiver, Sender, bounded};
 
 use super::dds::writer::DdsWriter;
@@ -20,6 +22,9 @@ pub(crate) const TOPIC: &str = "ros_discovery_info";
 
 /// Its type.
 pub(crate) const TYPE: &str = "rmw_dds_common/msg/ParticipantEntitiesInfo";
+
+/// From a change to its telling.
+const SETTLE_TIME: Duration = Duration::from_millis(50);
 
 /// A node of this process.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, PartialOrd, Ord)]
@@ -124,6 +129,9 @@ impl Graph {
     pub(crate) async fn publish(self: Arc<Self>, participant: GUID, writer: DdsWriter) {
         let gid_bytes = gid_bytes(std::env::var("ROS_DISTRO").ok().as_deref());
         while self.changes.recv().await.is_ok() {
+            // Endpoints come in bursts, and each telling stays in the history for late joiners.
+            Timer::after(SETTLE_TIME).await;
+            let _ = self.changes.try_recv();
             let message = ParticipantEntitiesInfo {
                 gid: Gid::new(participant, gid_bytes),
                 nodes: lock(&self.nodes)
@@ -134,7 +142,7 @@ impl Graph {
             if let Err(error) = writer.send(Box::new(move || cdr::to_vec(&message))) {
                 log::debug!("{error}");
             }
-            // Endpoints come in bursts: what changes while this goes out is told in one.
+            // What changes while this goes out is told in one.
             writer.flushed().await;
         }
     }

@@ -17,6 +17,7 @@ pub mod params_file;
 mod peers;
 mod publisher;
 pub mod qos;
+mod reader_port;
 pub mod ros_args;
 mod rosout;
 #[allow(clippy::module_inception)]

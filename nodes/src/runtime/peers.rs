@@ -18,6 +18,7 @@ pub(crate) struct Peers {
     topic: String,
     peer_kind: &'static str,
     joins: log::Level,
+    hears_own: bool,
     state: Mutex<State>,
     on_joined: Mutex<Vec<OnJoined>>,
 }
@@ -51,11 +52,25 @@ impl Peers {
         Self::new(service, "reply reader", log::Level::Debug)
     }
 
+    /// Of a probe, whose peer is in its own participant.
+    pub(crate) fn of_probe(topic: &str) -> Self {
+        Self {
+            hears_own: true,
+            ..Self::new(topic, "probe", log::Level::Trace)
+        }
+    }
+
+    /// False where endpoints of the own participant do not count: nothing is delivered between them.
+    pub(crate) fn hears_own(&self) -> bool {
+        self.hears_own
+    }
+
     fn new(topic: &str, peer_kind: &'static str, joins: log::Level) -> Self {
         Self {
             topic: topic.to_owned(),
             peer_kind,
             joins,
+            hears_own: false,
             state: Mutex::default(),
             on_joined: Mutex::default(),
         }

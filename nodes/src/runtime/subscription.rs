@@ -1,24 +1,23 @@
 //! Subscriptions: from DDS and from this process to one handler.
 
 use std::collections::BTreeMap;
-use std::pin::pin;
 use std::sync::Arc;
 use std::sync::atomic::{AtomicU64, Ordering::Relaxed};
 use std::thread::JoinHandle;
 use std::time::Duration;
 
-use futures::future::{Either, select};
 use lattice_msgs::{RosMessage, cdr};
 use rustdds::GUID;
 use smol::Task;
 use smol::channel::{Receiver, Sender, bounded};
+use smol::future::{or, pending};
 
 use super::dds::reader::{DdsReader, SampleOrigin};
 use super::error::RuntimeError;
-use super::graph;
 use super::local_bus::{AnyMessage, Membership};
 use super::logging::Throttle;
 use super::peers::Peers;
+use super::reader_port::{Command, ReaderPort};
 use super::shutdown::Shutdown;
 use super::worker::guarded;
 
@@ -43,9 +42,8 @@ pub enum Load {
 /// A subscription; dropping it ends it.
 #[must_use = "dropping a subscription ends it"]
 pub struct Subscription {
-    stats: Arc<Stats>,
+    port: Arc<ReaderPort>,
     _running: Running,
-    _graph: graph::Membership,
 }
 
 pub(crate) enum Running {
@@ -65,44 +63,47 @@ pub(crate) struct Stats {
 }
 
 impl Subscription {
-    pub(crate) fn new(stats: Arc<Stats>, running: Running, graph: graph::Membership) -> Self {
+    pub(crate) fn new(port: Arc<ReaderPort>, running: Running) -> Self {
         Self {
-            stats,
+            port,
             _running: running,
-            _graph: graph,
         }
+    }
+
+    fn stats(&self) -> &Stats {
+        &self.port.stats
     }
 
     /// Resolved topic.
     pub fn topic(&self) -> &str {
-        self.stats.peers.topic()
+        self.stats().peers.topic()
     }
 
     /// Matched publishers, here and in other processes.
     pub fn publisher_count(&self) -> usize {
-        self.stats.peers.count()
+        self.stats().peers.count()
     }
 
     /// Messages given to the handler.
     pub fn received(&self) -> u64 {
-        self.stats.received.load(Relaxed)
+        self.stats().received.load(Relaxed)
     }
 
     /// Calls `callback` for every publisher that joins, and now if there is one already.
     ///
     /// It runs on a thread of the runtime and must return at once.
     pub fn on_publisher_joined(&self, callback: impl FnMut() + Send + 'static) {
-        self.stats.peers.on_joined(Box::new(callback));
+        self.stats().peers.on_joined(Box::new(callback));
     }
 
     /// Messages that were sent and did not get here: gaps in the numbers of a publisher.
     pub fn lost(&self) -> u64 {
-        self.stats.lost()
+        self.stats().lost()
     }
 
     /// Samples that were no message of this type, or too long, and were left out.
     pub fn undecodable(&self) -> u64 {
-        self.stats.undecodable.load(Relaxed)
+        self.stats().undecodable.load(Relaxed)
     }
 }
 
@@ -147,7 +148,7 @@ impl Stats {
 
 /// Everything one subscription hears.
 pub(crate) struct Source {
-    pub reader: DdsReader,
+    pub commands: Receiver<Command>,
     pub local: Receiver<AnyMessage>,
     pub _membership: Membership,
     pub stats: Arc<Stats>,
@@ -158,19 +159,32 @@ impl Source {
     pub(crate) async fn run<M: RosMessage>(self, mut handler: impl FnMut(Arc<M>)) {
         let mut turn: u32 = 0;
         let mut gaps = Gaps::default();
+        let mut reader = None;
         loop {
             turn = turn.wrapping_add(1);
             if turn.is_multiple_of(MESSAGES_PER_TURN) {
                 smol::future::yield_now().await;
             }
-            let message = match self.next(turn.is_multiple_of(2)).await {
+            let message = match self.next(reader.as_ref(), turn.is_multiple_of(2)).await {
                 Heard::Local(message) => message.downcast::<M>().ok(),
                 Heard::Remote(sample) => {
                     if let Ok(origin) = &sample {
                         let gap = gaps.before(origin.writer, origin.sequence_number.into());
                         self.stats.lost.fetch_add(gap, Relaxed);
                     }
-                    self.decode::<M>(sample)
+                    reader
+                        .as_ref()
+                        .and_then(|reader| self.decode::<M>(reader, sample))
+                }
+                Heard::Command(Command::Use(new)) => {
+                    reader = Some(new);
+                    None
+                }
+                Heard::Command(Command::Close(done)) => {
+                    reader = None;
+                    // Nobody may be waiting any more.
+                    let _ = done.try_send(());
+                    None
                 }
                 Heard::End => return,
             };
@@ -182,29 +196,46 @@ impl Source {
     }
 
     /// Both sides get their turn, whichever has more to say.
-    async fn next(&self, local_first: bool) -> Heard {
-        let local = pin!(async {
-            match self.local.recv().await {
-                Ok(message) => Heard::Local(message),
-                Err(_) => Heard::End,
+    async fn next(&self, reader: Option<&DdsReader>, local_first: bool) -> Heard {
+        let command = async {
+            self.commands
+                .recv()
+                .await
+                .map_or(Heard::End, Heard::Command)
+        };
+        let local = async { self.local.recv().await.map_or(Heard::End, Heard::Local) };
+        let remote = async {
+            match reader {
+                Some(reader) => Heard::Remote(reader.next().await),
+                None => pending().await,
             }
-        });
-        let remote = pin!(async { Heard::Remote(self.reader.next().await) });
+        };
         if local_first {
-            either(select(local, remote).await)
+            or(command, or(local, remote)).await
         } else {
-            either(select(remote, local).await)
+            or(command, or(remote, local)).await
         }
     }
 
-    fn decode<M: RosMessage>(&self, sample: Result<SampleOrigin, String>) -> Option<Arc<M>> {
-        let decoded = sample
-            .and_then(|_| cdr::from_slice::<M>(&self.reader.bytes()).map_err(|e| e.to_string()));
+    fn decode<M: RosMessage>(
+        &self,
+        reader: &DdsReader,
+        sample: Result<SampleOrigin, String>,
+    ) -> Option<Arc<M>> {
+        let decoded =
+            sample.and_then(|_| cdr::from_slice::<M>(&reader.bytes()).map_err(|e| e.to_string()));
         decoded
             .inspect_err(|why| self.stats.not_decodable(why))
             .ok()
             .map(Arc::new)
     }
+}
+
+enum Heard {
+    Command(Command),
+    Local(AnyMessage),
+    Remote(Result<SampleOrigin, String>),
+    End,
 }
 
 /// Finds the samples that a writer numbered and we never saw.
@@ -223,18 +254,6 @@ impl Gaps {
         let gap = number.saturating_sub(*last).saturating_sub(1);
         *last = number.max(*last);
         u64::try_from(gap).unwrap_or(0)
-    }
-}
-
-enum Heard {
-    Local(AnyMessage),
-    Remote(Result<SampleOrigin, String>),
-    End,
-}
-
-fn either<A, B>(result: Either<(Heard, A), (Heard, B)>) -> Heard {
-    match result {
-        Either::Left((heard, _)) | Either::Right((heard, _)) => heard,
     }
 }
 

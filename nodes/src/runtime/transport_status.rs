@@ -75,7 +75,8 @@ impl Core {
                 incompatible as u64,
             );
         }
-        for subscription in self.subscriptions() {
+        for port in self.ports() {
+            let subscription = &port.stats;
             let topic = subscription.peers().topic();
             add(
                 "undecodable",

@@ -20,8 +20,8 @@ use crate::runtime::sync::lock;
 const MAX_EARLY_EVENTS: usize = 1024;
 
 /// Our endpoints by their DDS identity.
-#[derive(Default)]
 pub(crate) struct Endpoints {
+    own: GUID,
     inner: Mutex<Inner>,
 }
 
@@ -38,6 +38,13 @@ enum Change {
 }
 
 impl Endpoints {
+    pub(crate) fn new(participant: &DomainParticipant) -> Self {
+        Self {
+            own: participant.guid(),
+            inner: Mutex::default(),
+        }
+    }
+
     /// From now on `peers` hears of everything that happens to the endpoint, and of what did.
     pub(crate) fn register(&self, endpoint: GUID, peers: &Arc<Peers>) {
         let early: Vec<Change> = {
@@ -53,13 +60,12 @@ impl Endpoints {
                 .collect()
         };
         for change in early {
-            apply(peers, change);
+            self.apply(peers, change);
         }
     }
 
     /// Hands events on until the task is dropped.
     pub(crate) async fn watch(self: Arc<Self>, participant: DomainParticipant) {
-        let own = participant.guid().prefix;
         let listener = participant.status_listener();
         drop(participant);
         let mut events = listener.as_async_status_stream();
@@ -94,7 +100,7 @@ impl Endpoints {
                 Event::ReaderLost { guid, .. } | Event::WriterLost { guid, .. } => {
                     self.lost(|peer| *peer == guid);
                 }
-                Event::ParticipantLost { id, .. } if id != own => {
+                Event::ParticipantLost { id, .. } if id != self.own.prefix => {
                     self.lost(|peer| peer.prefix == id);
                 }
                 _ => {}
@@ -119,7 +125,7 @@ impl Endpoints {
             }
         };
         if let Some(peers) = peers {
-            apply(&peers, change);
+            self.apply(&peers, change);
         }
     }
 
@@ -135,12 +141,16 @@ impl Endpoints {
             peers.remove(&gone);
         }
     }
-}
 
-fn apply(peers: &Peers, change: Change) {
-    match change {
-        Change::Matched(peer) => peers.add(peer),
-        Change::Incompatible(peer, policy) => peers.incompatible(peer, policy),
+    fn apply(&self, peers: &Peers, change: Change) {
+        match change {
+            Change::Matched(peer) if peer.prefix == self.own.prefix && !peers.hears_own() => {
+                log::debug!("{}: matched inside the participant", peers.topic());
+            }
+            Change::Matched(peer) => peers.add(peer),
+            Change::Incompatible(peer, _) if peer.prefix == self.own.prefix => {}
+            Change::Incompatible(peer, policy) => peers.incompatible(peer, policy),
+        }
     }
 }
 

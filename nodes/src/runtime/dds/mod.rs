@@ -1,5 +1,6 @@
 //! The DDS side of the runtime: everything that names a RustDDS type.
 
+pub(crate) mod barrier;
 pub(crate) mod events;
 pub(crate) mod participant;
 pub(crate) mod payload;
