@@ -27,7 +27,7 @@ const PATIENCE: Duration = Duration::from_secs(1);
 /// What the task of a subscription is told.
 pub(crate) enum Command {
     /// Take samples from this reader.
-    Use(DdsReader),
+    Use(Box<DdsReader>),
     /// Close the reader, then answer.
     Close(Sender<()>),
 }
@@ -60,7 +60,7 @@ impl ReaderPort {
         let guid = reader.guid();
         self.is_open.store(true, Relaxed);
         // Fails only if the subscription has ended.
-        let _ = self.commands.try_send(Command::Use(reader));
+        let _ = self.commands.try_send(Command::Use(Box::new(reader)));
         core.endpoints.register(guid, &self.peers);
         let membership = core.graph.join(self.node, EndpointKind::Reader, guid);
         lock(&self.graph).replace(membership);

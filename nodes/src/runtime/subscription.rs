@@ -159,13 +159,13 @@ impl Source {
     pub(crate) async fn run<M: RosMessage>(self, mut handler: impl FnMut(Arc<M>)) {
         let mut turn: u32 = 0;
         let mut gaps = Gaps::default();
-        let mut reader = None;
+        let mut reader: Option<Box<DdsReader>> = None;
         loop {
             turn = turn.wrapping_add(1);
             if turn.is_multiple_of(MESSAGES_PER_TURN) {
                 smol::future::yield_now().await;
             }
-            let message = match self.next(reader.as_ref(), turn.is_multiple_of(2)).await {
+            let message = match self.next(reader.as_deref(), turn.is_multiple_of(2)).await {
                 Heard::Local(message) => message.downcast::<M>().ok(),
                 Heard::Remote(sample) => {
                     if let Ok(origin) = &sample {
