@@ -1,8 +1,10 @@
 //! One request to end, from a signal, a failure or the program itself.
 
-use std::sync::{Arc, Condvar, Mutex, PoisonError};
+use std::sync::atomic::{AtomicBool, Ordering};
+use std::sync::{Arc, Condvar, LazyLock, Mutex, PoisonError};
 
 use signal_hook::consts::{SIGINT, SIGTERM};
+use signal_hook::flag::register_conditional_default;
 use signal_hook::iterator::{Handle, Signals};
 
 use super::sync::lock;
@@ -61,7 +63,28 @@ impl Shutdown {
     }
 }
 
-/// Turns SIGINT and SIGTERM into a request while it lives; a second signal ends the process at once.
+/// Watches of this process; signals keep their default meaning while there is none.
+static WATCHES: Mutex<usize> = Mutex::new(0);
+
+/// True where a signal ends the process at once. `None`: the handler could not be registered.
+static AT_ONCE: LazyLock<Option<Arc<AtomicBool>>> = LazyLock::new(|| {
+    let at_once = Arc::new(AtomicBool::new(true));
+    let registered = SIGNALS
+        .iter()
+        .all(|signal| register_conditional_default(*signal, Arc::clone(&at_once)).is_ok());
+    registered.then_some(at_once)
+});
+
+const SIGNALS: [i32; 2] = [SIGINT, SIGTERM];
+
+fn set_at_once(value: bool) {
+    if let Some(at_once) = AT_ONCE.as_ref() {
+        at_once.store(value, Ordering::Relaxed);
+    }
+}
+
+/// Turns SIGINT and SIGTERM into a request while it lives; a second signal ends the process at once,
+/// for who does not want to wait until queues have drained.
 pub(crate) struct SignalWatch {
     handle: Handle,
     thread: Option<std::thread::JoinHandle<()>>,
@@ -69,20 +92,20 @@ pub(crate) struct SignalWatch {
 
 impl SignalWatch {
     pub(crate) fn start(shutdown: Shutdown) -> std::io::Result<Self> {
-        let mut signals = Signals::new([SIGINT, SIGTERM])?;
+        let mut watches = lock(&WATCHES);
+        set_at_once(false);
+        let mut signals = Signals::new(SIGNALS)?;
         let handle = signals.handle();
         let thread = std::thread::Builder::new()
             .name("signals".to_owned())
             .spawn(move || {
                 for signal in signals.forever() {
-                    if shutdown.is_requested() {
-                        // Whoever signals twice does not want to wait for queues to drain.
-                        let _ = signal_hook::low_level::emulate_default_handler(signal);
-                    }
                     log::info!("signal {signal}: shutting down");
+                    set_at_once(true);
                     shutdown.request();
                 }
             })?;
+        *watches = watches.saturating_add(1);
         Ok(Self {
             handle,
             thread: Some(thread),
@@ -94,7 +117,13 @@ impl Drop for SignalWatch {
     fn drop(&mut self) {
         self.handle.close();
         if let Some(thread) = self.thread.take() {
+            // Its panic, if any, has been printed.
             let _ = thread.join();
+        }
+        let mut watches = lock(&WATCHES);
+        *watches = watches.saturating_sub(1);
+        if *watches == 0 {
+            set_at_once(true);
         }
     }
 }
@@ -118,8 +147,19 @@ mod tests {
     #[test]
     fn a_signal_is_a_request() {
         let shutdown = Shutdown::default();
-        let _watch = SignalWatch::start(shutdown.clone()).unwrap();
+        let watch = SignalWatch::start(shutdown.clone()).unwrap();
         signal_hook::low_level::raise(SIGTERM).unwrap();
         shutdown.wait();
+        let at_once = AT_ONCE.as_ref().unwrap();
+        assert!(
+            at_once.load(Ordering::Relaxed),
+            "a second one ends the process"
+        );
+        drop(watch);
+        let _again = SignalWatch::start(Shutdown::default()).unwrap();
+        assert!(
+            !at_once.load(Ordering::Relaxed),
+            "until someone else watches"
+        );
     }
 }
