@@ -273,7 +273,7 @@ pub fn write(path: &str, report: &impl Serialize) -> io::Result<()> {
     fs::rename(partial, path)
 }
 
-/// Reads a report that [`write`] wrote.
+/// Reads a report that [`write()`] wrote.
 pub fn read<T: for<'de> Deserialize<'de>>(path: &Path) -> io::Result<T> {
     let text = fs::read_to_string(path)?;
     serde_json::from_str(&text).map_err(io::Error::other)
