@@ -55,6 +55,8 @@ pub fn start(runtime: &Runtime, name: &str) -> Result<Finish, NodeError> {
         budget_bytes: (bytes_per_s as f64 / rate_hz) as usize,
         published_bytes: 0,
         not_published: 0,
+        incomplete: false,
+        repairs: Throttle::new(Duration::from_secs(5)),
         report_file: params.string("report_file", "")?,
     };
     let worker = Worker::spawn(name, limits, move |event| shell.on(event))?;
@@ -103,6 +105,8 @@ struct Shell {
     budget_bytes: usize,
     published_bytes: u64,
     not_published: u64,
+    incomplete: bool,
+    repairs: Throttle,
     report_file: String,
 }
 
@@ -119,6 +123,7 @@ impl Shell {
             }
             Event::Redraw => self.machine.redraw(),
             Event::Draw => {
+                self.repair();
                 self.draw();
                 self.diagnose();
             }
@@ -152,8 +157,16 @@ impl Shell {
             self.published_bytes += cdr::to_vec(&array).map_or(0, |bytes| bytes.len() as u64);
             if self.markers.publish(Arc::new(array)).is_err() {
                 self.not_published += 1;
-                self.machine.redraw();
+                self.incomplete = true;
             }
+        }
+    }
+
+    /// What could not be published is drawn again, but not as fast as it could not be published.
+    fn repair(&mut self) {
+        if self.incomplete && self.repairs.check().is_some() {
+            self.incomplete = false;
+            self.machine.redraw();
         }
     }
 
