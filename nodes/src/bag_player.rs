@@ -8,7 +8,9 @@ use lattice_msgs::builtin_interfaces::Time;
 use lattice_msgs::rosgraph_msgs::Clock;
 use serde::Serialize;
 
-use crate::bag::{BagDurability, BagQos, BagReader, BagReliability, Player, PlayerOptions, Step};
+use crate::bag::{
+    BagHistory, BagQos, BagReader, BagReliability, Player, PlayerOptions, Step, TopicInfo,
+};
 use crate::node::{NodeError, answers_help, start_runtime, warn_unused};
 use crate::report;
 use crate::runtime::params::Params;
@@ -21,6 +23,8 @@ pub const NAME: &str = "bag_player";
 
 /// Time that what is queued at the end has to reach its readers.
 const FLUSH_TIME: Duration = Duration::from_secs(20);
+/// The same when told to end.
+const HURRIED_FLUSH_TIME: Duration = Duration::from_secs(2);
 /// Longest sleep between two looks at the shutdown flag.
 const NAP: Duration = Duration::from_millis(100);
 /// Largest depth of a publisher whose recorder kept all samples.
@@ -56,15 +60,9 @@ pub fn run(arguments: impl IntoIterator<Item = String>) -> Result<(), NodeError>
     let reader = BagReader::open(&PathBuf::from(&bag))?;
     let span_ns = (reader.start_ns().unwrap_or(0), reader.end_ns().unwrap_or(0));
     let player = Player::new(reader, options(params)?)?;
-    for topic in player.skipped() {
-        log::warn!(
-            "{} ({}) is left out: not CDR of a known type",
-            topic.name,
-            topic.type_name
-        );
-    }
     let waited = params.string_array("wait_for_subscribers", &[])?;
-    let wait_s = params.f64("wait_timeout_s", 30.0)?;
+    let wait = seconds(params, "wait_timeout_s", 30.0)?;
+    let settle = seconds(params, "settle_s", 0.5)?;
     let report_file = params.string("report_file", "")?;
     let mut shell = Shell {
         topics: open_topics(&node, &player)?,
@@ -78,12 +76,27 @@ pub fn run(arguments: impl IntoIterator<Item = String>) -> Result<(), NodeError>
         report: PlayerReport::default(),
     };
     warn_unused(params);
-    shell.wait_for(&waited, Duration::try_from_secs_f64(wait_s)?);
+    shell.wait_for(&waited, wait);
+    if !waited.is_empty() {
+        // We know them; they may need a moment to know us.
+        shell.shutdown.wait_timeout(settle);
+    }
     log::info!("playing {bag}");
     let result = shell.play();
     shell.flush();
     report::write(&report_file, &shell.report)?;
     result
+}
+
+/// A time of up to a day.
+fn seconds(params: &Params, name: &str, default: f64) -> Result<Duration, NodeError> {
+    let seconds = params.f64(name, default)?;
+    if (0.0..=86_400.0).contains(&seconds) {
+        Ok(Duration::from_secs_f64(seconds))
+    } else {
+        let problem = format!("{seconds}, expected 0 to 86400 s");
+        Err(params.invalid(name, problem).into())
+    }
 }
 
 fn options(params: &Params) -> Result<PlayerOptions, NodeError> {
@@ -107,24 +120,39 @@ fn open_topics(node: &Node, player: &Player) -> Result<Vec<RawPublisher>, NodeEr
     let mut publishers = Vec::new();
     for topic in player.topics() {
         let resolved = node.resolve(&topic.name)?;
-        let offered = offered(&topic.info.offered_qos);
+        let offered = offered(&topic.info);
         let qos = offered.with_overrides(node.params(), &resolved, &topic.name)?;
         publishers.push(node.raw_publisher(&resolved, &topic.info.type_name, qos)?);
     }
     Ok(publishers)
 }
 
-/// What all recorded publishers of a topic offered: the weakest of each policy.
-fn offered(recorded: &[BagQos]) -> Qos {
+/// One publisher in place of all that were recorded: the weakest of each policy, so that every
+/// reader of then finds it, and room for the last samples of all of them.
+fn offered(topic: &TopicInfo) -> Qos {
+    let recorded = topic.offered_qos.as_slice();
     let reliable = |qos: &BagQos| qos.reliability != BagReliability::BestEffort;
-    let latched = |qos: &BagQos| qos.durability == BagDurability::TransientLocal;
-    let depth = recorded.iter().map(|qos| qos.depth).max().unwrap_or(10);
+    let depth = |qos: &BagQos| match qos.history {
+        BagHistory::KeepAll => MAX_DEPTH,
+        _ => qos.depth.max(1),
+    };
+    let latched = match recorded {
+        [] => topic.is_latched(),
+        recorded => recorded.iter().all(BagQos::is_latched),
+    };
+    let depths = recorded.iter().map(depth);
+    let depth = match (recorded, latched) {
+        ([], true) => 100,
+        ([], false) => 10,
+        (_, true) => depths.fold(0, u64::saturating_add),
+        (_, false) => depths.max().unwrap_or(10),
+    };
     Qos {
         reliability: match recorded.iter().all(reliable) {
             true => Reliability::Reliable,
             false => Reliability::BestEffort,
         },
-        durability: match !recorded.is_empty() && recorded.iter().all(latched) {
+        durability: match latched {
             true => Durability::TransientLocal,
             false => Durability::Volatile,
         },
@@ -223,7 +251,11 @@ impl Shell {
 
     /// Gives readers time to have everything.
     fn flush(&mut self) {
-        let deadline = Instant::now() + FLUSH_TIME;
+        let patience = match self.shutdown.is_requested() {
+            true => HURRIED_FLUSH_TIME,
+            false => FLUSH_TIME,
+        };
+        let deadline = Instant::now() + patience;
         self.report.acknowledged = true;
         for publisher in &self.topics {
             let left = deadline.saturating_duration_since(Instant::now());

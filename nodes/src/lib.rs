@@ -4,6 +4,7 @@
 pub mod bag;
 pub mod bag_player;
 pub mod cli;
+pub mod compute;
 pub mod convert;
 pub mod enu_transformer;
 pub mod files;
@@ -15,4 +16,3 @@ pub mod report;
 pub mod runtime;
 pub mod simulate;
 pub mod voxel_marker_publisher;
-pub mod worker;

@@ -12,6 +12,8 @@ use crate::convert::map::{self, MapMessageError, VoxelState};
 
 /// Most chunks that one keyframe or update may have.
 const MAX_CHUNKS: u32 = 1 << 16;
+/// Updates after which the rest of a keyframe is taken for lost.
+const MAX_STAGING_UPDATES: u64 = 10;
 /// Most updates remembered while a keyframe comes in.
 const MAX_WAITING_UPDATES: usize = 4096;
 
@@ -181,6 +183,10 @@ impl MapFollower {
             .as_ref()
             .is_none_or(|staging| staging.sequence != message.sequence);
         if newer {
+            if self.staging.is_none() {
+                // Updates that wait for a lost one are not in `later`: they must come again.
+                self.open_updates.clear();
+            }
             let (later, later_voxels) = self
                 .staging
                 .take()
@@ -232,6 +238,14 @@ impl MapFollower {
             });
         open.chunks.received.insert(message.chunk);
         self.advance();
+        // A keyframe that the updates have overtaken is of no more use.
+        if let Some(staging) = &self.staging {
+            if staging.sequence < self.sequence {
+                self.staging = None;
+            } else if message.sequence.saturating_sub(staging.sequence) > MAX_STAGING_UPDATES {
+                return Ok(Followed::NeedKeyframe);
+            }
+        }
         if self.open_updates.len() > MAX_WAITING_UPDATES {
             self.open_updates.clear();
             return Ok(Followed::NeedKeyframe);
@@ -338,7 +352,8 @@ impl MapFollower {
                 .map(|(key, _)| *key),
         );
         self.sequence = self.sequence.max(done.sequence);
-        for update in &done.later {
+        let later = done.later.iter();
+        for update in later.filter(|update| update.sequence > done.sequence) {
             self.apply(update)?;
         }
         self.advance();

@@ -60,8 +60,8 @@ pub fn answers_help(name: &str, args: &RosArgs) -> bool {
         println!(
             "Usage: {name} [--ros-args [-r FROM:=TO] [-p NAME:=VALUE] [--params-file FILE] \
              [--log-level LEVEL] ...]\n\n\
-             Topics, services and parameters are in README.md; every parameter, with its unit and\n\
-             meaning, is in params/bobcat.yaml.\n\n\
+             Topics and services are in README.md; every parameter, with its unit and meaning, is in\n\
+             params/bobcat.yaml.\n\n\
              Environment: ROS_DOMAIN_ID, ROS_AUTOMATIC_DISCOVERY_RANGE (LOCALHOST or SUBNET), RUST_LOG."
         );
     }

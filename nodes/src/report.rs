@@ -56,6 +56,8 @@ pub struct MapperReport {
     pub clouds_inbox_full: u64,
     /// Samples that did not decode.
     pub undecodable: u64,
+    /// Updates that could not be given to the publisher; a keyframe followed.
+    pub updates_not_published: u64,
     /// Voxels in the map.
     pub voxels: usize,
     /// Points that the statistics are of.
@@ -104,6 +106,7 @@ impl MapperReport {
             counts,
             clouds_inbox_full: 0,
             undecodable: 0,
+            updates_not_published: 0,
             voxels: mapper.list().len(),
             points,
             mse_per_dimension_m2,
@@ -182,6 +185,37 @@ impl RunReport {
                     counts.clouds_out, map.lattice
                 ));
             }
+            let lost = [
+                (
+                    "clouds",
+                    "not in the map frame",
+                    map.counts.clouds_wrong_frame,
+                ),
+                ("clouds", "malformed", map.counts.clouds_malformed),
+                (
+                    "clouds",
+                    "lost on the way or inbox full",
+                    map.clouds_inbox_full,
+                ),
+                ("samples", "undecodable", map.undecodable),
+                ("points", "not finite", map.counts.points_not_finite),
+                (
+                    "points",
+                    "beyond the reach of keys",
+                    map.counts.points_out_of_range,
+                ),
+                (
+                    "points",
+                    "more voxels than max_voxels",
+                    map.counts.points_list_full,
+                ),
+            ];
+            for (what, reason, count) in lost.into_iter().filter(|(_, _, count)| *count > 0) {
+                lines.push(format!(
+                    "{count} {what} of the {} map: {reason}",
+                    map.lattice
+                ));
+            }
         }
         lines
     }
@@ -197,11 +231,12 @@ impl fmt::Display for RunReport {
         )?;
         writeln!(
             f,
-            "points: {} in, {} transformed, left out: {} not finite, {} out of range",
+            "points: {} in, {} transformed, left out: {} not finite, {} out of range, {} without time",
             counts.points_in,
             counts.points_out,
             counts.points_not_finite,
-            counts.points_out_of_range
+            counts.points_out_of_range,
+            counts.points_no_time
         )?;
         let losses = self.losses();
         if losses.is_empty() {
@@ -277,4 +312,64 @@ pub fn write(path: &str, report: &impl Serialize) -> io::Result<()> {
 pub fn read<T: for<'de> Deserialize<'de>>(path: &Path) -> io::Result<T> {
     let text = fs::read_to_string(path)?;
     serde_json::from_str(&text).map_err(io::Error::other)
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::lattice_mapper::MapperOptions;
+    use lattice_core::lattice::{Lattice, LatticeKind};
+
+    fn report() -> RunReport {
+        let lattice = Lattice::new(LatticeKind::Fcc, 0.125).unwrap();
+        let mut mapper = LatticeMapper::new(MapperOptions::new(lattice), 1).unwrap();
+        let mut report = RunReport {
+            source: "log".into(),
+            clouds_in_log: 10,
+            transformer: TransformerReport::default(),
+            lattices: vec![LatticeReport {
+                map: MapperReport::of(&mut mapper),
+                markers: MarkerReport::default(),
+            }],
+            wall_s: 1.0,
+        };
+        let counts = &mut report.transformer.counts;
+        (counts.clouds_in, counts.clouds_out) = (10, 10);
+        report.lattices[0].map.counts.clouds_in = 10;
+        report
+    }
+
+    #[test]
+    fn every_kind_of_loss_is_shown() {
+        assert!(report().losses().is_empty());
+        assert!(report().to_string().contains("dropped: none"));
+        let changes: [(&str, &dyn Fn(&mut RunReport)); 9] = [
+            ("reach the transformer", &|r| {
+                r.transformer.counts.clouds_in = 9
+            }),
+            ("pose_gap", &|r| r.transformer.counts.clouds_pose_gap = 1),
+            ("inbox_full", &|r| r.transformer.clouds_inbox_full = 1),
+            ("undecodable", &|r| r.transformer.undecodable = 1),
+            ("reach the fcc map", &|r| {
+                r.lattices[0].map.counts.clouds_in = 9
+            }),
+            ("malformed", &|r| {
+                r.lattices[0].map.counts.clouds_malformed = 1
+            }),
+            ("inbox full", &|r| r.lattices[0].map.clouds_inbox_full = 1),
+            ("max_voxels", &|r| {
+                r.lattices[0].map.counts.points_list_full = 1
+            }),
+            ("reach of keys", &|r| {
+                r.lattices[0].map.counts.points_out_of_range = 1
+            }),
+        ];
+        for (words, change) in changes {
+            let mut report = report();
+            change(&mut report);
+            let shown = report.to_string();
+            assert!(shown.contains(words), "{words}: {shown}");
+            assert!(!shown.contains("dropped: none"), "{words}");
+        }
+    }
 }

@@ -438,7 +438,9 @@ fn an_imu_without_orientation_and_a_receiver_without_fix_give_no_pose() {
     imu.orientation_covariance[0] = -1.0;
     bench.machine.on_ins(InsMessage::Imu(&imu), 0);
     let mut fix = NavSatFix::default();
-    fix.status.status = -1;
-    bench.machine.on_ins(InsMessage::Fix(&fix), 0);
-    assert_eq!(bench.machine.counts().poses_not_good, 2);
+    for status in [-1, -2] {
+        fix.status.status = status;
+        bench.machine.on_ins(InsMessage::Fix(&fix), 0);
+    }
+    assert_eq!(bench.machine.counts().poses_not_good, 3);
 }

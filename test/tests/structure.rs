@@ -60,18 +60,41 @@ fn parameter_files_name_only_what_nodes_read() {
     for namespace in ["", "/robot"] {
         let params = params("bobcat.yaml", &format!("{namespace}/enu_transformer"));
         TransformerOptions::from_params(&params).unwrap();
-        let shell = ["ins.imu_topic", "ins.topic", "points_topics", "threads"];
+        let shell = [
+            "inbox_events",
+            "ins.imu_topic",
+            "ins.topic",
+            "points_topics",
+            "report_file",
+            "threads",
+        ];
         assert_eq!(params.unused(), shell);
         let params = self::params("bobcat.yaml", &format!("{namespace}/lattice_mapper"));
         MapperOptions::from_params(&params).unwrap();
-        let shell = ["centers_period_s", "threads", "update_period_s"];
+        let shell = [
+            "centers_period_s",
+            "inbox_bytes",
+            "inbox_events",
+            "report_file",
+            "threads",
+            "update_period_s",
+        ];
         assert_eq!(params.unused(), shell);
         let params = self::params(
             "bobcat.yaml",
             &format!("{namespace}/voxel_marker_publisher"),
         );
         MarkerOptions::from_params(&params).unwrap();
-        assert_eq!(params.unused(), ["mapper", "max_bytes_per_s", "rate_hz"]);
+        let shell = [
+            "inbox_bytes",
+            "inbox_events",
+            "mapper",
+            "max_bytes_per_s",
+            "rate_hz",
+            "report_file",
+            "threads",
+        ];
+        assert_eq!(params.unused(), shell);
     }
 }
 

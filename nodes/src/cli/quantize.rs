@@ -66,16 +66,14 @@ impl Quantize {
             .map_err(|e| format!("{}: {e}", self.file.display()))?;
         let skipped = file.skipped_not_finite as u64;
         let points: Vec<Vector3<f64>> = file.points_m.into_iter().map(Vector3::from).collect();
-        // Offsets from the first point keep the digits of far-away coordinates.
-        let datum_m = points
-            .first()
-            .map_or_else(Vector3::zeros, |p| p.map(f64::round));
+        // Offsets from the middle keep the digits of far-away coordinates, whatever strays.
+        let datum_m = middle_m(&points);
         let cloud = Cloud::from_points(0, datum_m, &points);
         drop(points);
         let mut rows = Vec::new();
         for (i, kind) in self.lattice.0.iter().enumerate() {
             let lattice = Lattice::new(*kind, self.cell_volume)?;
-            let mut list = VoxelList::new(lattice, Vector3::zeros(), self.max_voxels)?;
+            let mut list = VoxelList::new(lattice, datum_m, self.max_voxels)?;
             let report = list.insert(&cloud);
             let distortion = list.distortion();
             rows.push(Row {
@@ -103,6 +101,19 @@ impl Quantize {
         }
         Ok(())
     }
+}
+
+/// Median of each coordinate in whole kilometres, so that files about their origin keep it.
+fn middle_m(points: &[Vector3<f64>]) -> Vector3<f64> {
+    if points.is_empty() {
+        return Vector3::zeros();
+    }
+    Vector3::from_fn(|axis, _| {
+        let mut values: Vec<f64> = points.iter().map(|p| p[axis]).collect();
+        let middle = values.len() / 2;
+        let (_, median, _) = values.select_nth_unstable_by(middle, f64::total_cmp);
+        (*median / 1000.0).round() * 1000.0
+    })
 }
 
 fn print(rows: &[Row]) {

@@ -103,19 +103,36 @@ pub fn xyz_fields(datatype: u8, size: u32) -> Vec<sensor_msgs::PointField> {
         .collect()
 }
 
-/// A cloud that is already in the map frame, with an f64 datum near its first finite point.
+/// A cloud that is already in the map frame, as f32 offsets from a datum.
 ///
-/// Clouds within a tile of the origin get the datum zero, so f32 coordinates pass unchanged.
-pub fn cloud_from_message(cloud: &PointCloud2, limits: &CloudLimits) -> Result<Cloud, CloudError> {
+/// f32 coordinates pass unchanged, with the datum zero. For f64 coordinates the datum is near the
+/// point that is nearest to `near_m` (the datum of the map), so that no stray point can cost the
+/// others their digits.
+pub fn cloud_from_message(
+    cloud: &PointCloud2,
+    limits: &CloudLimits,
+    near_m: &Vector3<f64>,
+) -> Result<Cloud, CloudError> {
     let layout = layout_of(cloud);
     let view = layout.view(&cloud.data, limits)?;
     let points = (0..view.len()).map(|i| view.xyz(i));
-    let datum_m = points
-        .clone()
-        .find(|p| p.iter().all(|v| v.is_finite()))
-        .map_or_else(Vector3::zeros, |p| {
-            p.map(|v| (v / DATUM_TILE_M).round() * DATUM_TILE_M)
-        });
+    let wide = cloud
+        .fields
+        .iter()
+        .any(|field| field.name == "x" && field.datatype == sensor_msgs::PointField::FLOAT64);
+    let datum_m = match wide {
+        true => points
+            .clone()
+            .filter(|p| p.iter().all(|v| v.is_finite()))
+            .min_by(|a, b| {
+                let distances = [a, b].map(|p| (p - near_m).norm_squared());
+                distances[0].total_cmp(&distances[1])
+            })
+            .map_or_else(Vector3::zeros, |p| {
+                p.map(|v| (v / DATUM_TILE_M).round() * DATUM_TILE_M)
+            }),
+        false => Vector3::zeros(),
+    };
     let offsets_m = points
         .map(|p| {
             let offset = p - datum_m;
@@ -134,12 +151,15 @@ mod tests {
     use super::*;
     use crate::convert::geometry::header;
 
+    const LIMITS: CloudLimits = CloudLimits { max_points: 10 };
+    const NEAR: Vector3<f64> = Vector3::new(0.0, 0.0, 0.0);
+
     #[test]
     fn f32_points_near_the_origin_pass_unchanged() {
         let points = [Vector3::new(1.1, -2.2, 3.3), Vector3::new(400.0, 5e-8, 7.0)];
         let message = message_from_points(header("map", 7), &points, Precision::Float32);
         assert_eq!(message.data.len(), 24);
-        let cloud = cloud_from_message(&message, &CloudLimits { max_points: 10 }).unwrap();
+        let cloud = cloud_from_message(&message, &LIMITS, &NEAR).unwrap();
         assert_eq!(cloud.datum_m, Vector3::zeros());
         assert_eq!(cloud.stamp_ns, 7);
         for (point, offset) in points.iter().zip(&cloud.offsets_m) {
@@ -151,16 +171,20 @@ mod tests {
     fn f64_points_keep_their_place_far_from_the_origin() {
         let points = [Vector3::new(4_000_000.123_456, -3.25, 1e5 + 1.0 / 3.0)];
         let message = message_from_points(header("map", 0), &points, Precision::Float64);
-        let cloud = cloud_from_message(&message, &CloudLimits { max_points: 10 }).unwrap();
+        let cloud = cloud_from_message(&message, &LIMITS, &NEAR).unwrap();
         assert!((cloud.point_m(0) - points[0]).norm() < 5e-5);
     }
 
     #[test]
-    fn a_nan_does_not_choose_the_datum() {
-        let points = [Vector3::repeat(f64::NAN), Vector3::new(5000.0, 0.0, 0.0)];
-        let message = message_from_points(header("map", 0), &points, Precision::Float64);
-        let cloud = cloud_from_message(&message, &CloudLimits { max_points: 10 }).unwrap();
-        assert_eq!(cloud.datum_m.x, 5120.0);
-        assert!(cloud.offsets_m[0][0].is_nan());
+    fn stray_points_do_not_choose_the_datum() {
+        let stray = [Vector3::repeat(f64::NAN), Vector3::new(1e12, 0.0, 0.0)];
+        let good = Vector3::new(5000.0, 0.1, 0.2);
+        let points = [stray[0], stray[1], good];
+        for precision in [Precision::Float32, Precision::Float64] {
+            let message = message_from_points(header("map", 0), &points, precision);
+            let cloud = cloud_from_message(&message, &LIMITS, &NEAR).unwrap();
+            assert!((cloud.point_m(2) - good).norm() < 1e-4, "{precision:?}");
+            assert!(cloud.offsets_m[0][0].is_nan());
+        }
     }
 }

@@ -108,6 +108,8 @@ pub struct InsOptions {
     pub inspvax_height: HeightDatum,
     /// Where the INS sits on the machine.
     pub mount: InsMount,
+    /// Frame of the machine: odometry of this frame needs no lever arm.
+    pub base_frame: String,
     /// Origin of the map; `None`: the first good fix.
     pub origin: Option<Geodetic>,
     /// Longest gap between two attitudes that a fix may fall into, in s.
@@ -194,6 +196,16 @@ impl InsDecoder {
             }
             InsMessage::Fix(m) => self.on_fix(m),
             InsMessage::Imu(m) => self.on_imu(m),
+            InsMessage::Odometry(m)
+                if m.child_frame_id.trim_start_matches('/') == self.options.base_frame =>
+            {
+                let map_from_base =
+                    geometry::isometry_from_pose(&m.pose.pose).ok_or(InsRefusal::Invalid)?;
+                Ok(vec![StampedPose {
+                    stamp_ns: m.header.stamp.to_ns(),
+                    map_from_base,
+                }])
+            }
             InsMessage::Odometry(m) => self.pose_in_map(&m.header, &m.pose.pose),
             InsMessage::Pose(m) => self.pose_in_map(&m.header, &m.pose),
         }
@@ -247,7 +259,7 @@ impl InsDecoder {
     }
 
     fn on_fix(&mut self, fix: &NavSatFix) -> Result<Vec<StampedPose>, InsRefusal> {
-        if fix.status.status == NavSatStatus::STATUS_NO_FIX {
+        if fix.status.status < NavSatStatus::STATUS_FIX {
             return Err(InsRefusal::NotGood);
         }
         let place = geodetic(fix.latitude, fix.longitude, fix.altitude)?;

@@ -14,11 +14,11 @@ use lattice_msgs::tf2_msgs::TFMessage;
 
 use super::ins::{InsMessage, InsSource};
 use super::{EnuOutput, EnuTransformer, TransformerOptions};
+use crate::compute::{Compute, ComputeLimits, Inbox};
 use crate::node::{Finish, NodeError, warn_unused};
 use crate::report::{self, TransformerReport};
 use crate::runtime::qos::Qos;
 use crate::runtime::{Clock, Diagnostics, Level, Load, Node, Publisher, Runtime, Subscription};
-use crate::worker::{Inbox, Worker, WorkerLimits};
 
 /// What the compute thread is told.
 enum Event {
@@ -50,7 +50,7 @@ pub fn start(runtime: &Runtime, name: &str) -> Result<Finish, NodeError> {
     let params = node.params();
     let options = TransformerOptions::from_params(params)?;
     let source = options.ins.source;
-    let limits = WorkerLimits {
+    let limits = ComputeLimits {
         events: params.usize("inbox_events", 8192)?,
         bytes: options.max_waiting_bytes,
         threads: params.usize("threads", 0)?,
@@ -65,8 +65,10 @@ pub fn start(runtime: &Runtime, name: &str) -> Result<Finish, NodeError> {
         not_published: 0,
         report_file: params.string("report_file", "")?,
     };
-    let worker = Worker::spawn(name, limits, move |event| shell.on(event))?;
-    let inbox = worker.inbox();
+    let compute = Compute::spawn(name, limits, runtime.shutdown_handle(), move |event| {
+        shell.on(event)
+    })?;
+    let inbox = compute.inbox();
     let mut clouds = Vec::new();
     let mut inputs = subscribe_ins(&node, source, &inbox)?;
     for topic in params.string_array("points_topics", &["points"])? {
@@ -94,7 +96,7 @@ pub fn start(runtime: &Runtime, name: &str) -> Result<Finish, NodeError> {
         let undecodable = undecodable.sum();
         let lost = clouds.iter().map(Subscription::lost).sum();
         drop((inputs, clouds));
-        worker.finish_with(Event::Finish { undecodable, lost });
+        compute.finish_with(Event::Finish { undecodable, lost });
     }))
 }
 

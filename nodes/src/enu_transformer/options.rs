@@ -58,6 +58,7 @@ impl TransformerOptions {
                 inspvax_height: HeightDatum::Geoid,
                 mount: InsMount::new(Vector3::zeros(), [0.0; 3]),
                 origin: None,
+                base_frame: "base_link".into(),
                 max_imu_gap_s: 0.1,
             },
             map_frame: "map".into(),
@@ -86,6 +87,7 @@ impl TransformerOptions {
         options.ins = ins_options(params, options.ins)?;
         options.map_frame = frame(params, "map_frame", &options.map_frame)?;
         options.base_frame = frame(params, "base_frame", &options.base_frame)?;
+        options.ins.base_frame.clone_from(&options.base_frame);
         options.earth_frame = frame(params, "earth_frame", &options.earth_frame)?;
         options.odom_frame = Some(frame(params, "odom_frame", "")?).filter(|f| !f.is_empty());
         options.publish_tf = params.bool("publish_tf", options.publish_tf)?;

@@ -43,7 +43,7 @@ pub struct LatticeMapper {
     epoch: u64,
     sequence: u64,
     origin: Option<GeoPoint>,
-    newest_stamp_ns: i64,
+    last_stamp_ns: i64,
     counts: MapperCounts,
 }
 
@@ -60,7 +60,7 @@ impl LatticeMapper {
             epoch,
             sequence: 0,
             origin: None,
-            newest_stamp_ns: 0,
+            last_stamp_ns: 0,
             counts: MapperCounts::default(),
         })
     }
@@ -84,11 +84,11 @@ impl LatticeMapper {
         let limits = CloudLimits {
             max_points: self.options.max_cloud_points,
         };
-        let cloud = cloud::cloud_from_message(message, &limits)
+        let cloud = cloud::cloud_from_message(message, &limits, &self.list.datum_m())
             .inspect_err(|_| self.counts.clouds_malformed += 1)?;
         let report = self.list.insert(&cloud);
         self.counts.add(&report);
-        self.newest_stamp_ns = self.newest_stamp_ns.max(cloud.stamp_ns);
+        self.last_stamp_ns = cloud.stamp_ns;
         Ok(())
     }
 
@@ -99,6 +99,12 @@ impl LatticeMapper {
         self.list.take_changes();
         self.epoch = epoch;
         self.sequence = 0;
+        self.last_stamp_ns = 0;
+    }
+
+    /// What a copy of the map is of: changes with every cloud and every reset.
+    pub fn state(&self) -> (u64, u64) {
+        (self.epoch, self.counts.clouds_in)
     }
 
     /// The changes since the update before, as one step of the sequence; empty when there are none.
@@ -165,7 +171,7 @@ impl LatticeMapper {
     }
 
     fn header(&self) -> lattice_msgs::std_msgs::Header {
-        geometry::header(&self.options.map_frame, self.newest_stamp_ns)
+        geometry::header(&self.options.map_frame, self.last_stamp_ns)
     }
 
     fn stamp(&self) -> map::MapStamp<'_> {

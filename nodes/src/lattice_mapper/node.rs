@@ -1,7 +1,8 @@
 //! The mapper as a ROS node: a thin shell around [`LatticeMapper`].
 
-use std::sync::Arc;
-use std::sync::atomic::{AtomicU64, Ordering};
+use std::collections::VecDeque;
+use std::sync::atomic::{AtomicBool, AtomicU64, Ordering};
+use std::sync::{Arc, Mutex, MutexGuard, PoisonError};
 use std::time::{Duration, SystemTime, UNIX_EPOCH};
 
 use lattice_msgs::geographic_msgs::GeoPointStamped;
@@ -10,21 +11,22 @@ use lattice_msgs::sensor_msgs::PointCloud2;
 use lattice_msgs::std_msgs::Empty;
 
 use super::{LatticeMapper, MapperOptions};
+use crate::compute::{Compute, ComputeLimits, Inbox};
 use crate::enu_transformer::node::SCANS;
 use crate::node::{Finish, NodeError, warn_unused};
 use crate::report::{self, MapperReport};
 use crate::runtime::logging::Throttle;
 use crate::runtime::qos::Qos;
 use crate::runtime::{Diagnostics, Level, Load, Node, Publisher, Runtime};
-use crate::worker::{Inbox, Worker, WorkerLimits};
+
+/// Chunks of a keyframe published in one update period: 3 MB.
+const CHUNKS_PER_ROUND: usize = 50;
 
 /// What the compute thread is told.
 enum Event {
     Cloud(Arc<PointCloud2>),
-    Origin(Arc<GeoPointStamped>),
     Update,
     Centers,
-    Keyframe,
     Reset,
     /// Ends, with the samples that did not decode and the clouds that were lost before the inbox.
     Finish {
@@ -38,7 +40,7 @@ pub fn start(runtime: &Runtime, name: &str) -> Result<Finish, NodeError> {
     let node = runtime.node(name)?;
     let params = node.params();
     let options = MapperOptions::from_params(params)?;
-    let limits = WorkerLimits {
+    let limits = ComputeLimits {
         events: params.usize("inbox_events", 4096)?,
         bytes: params.usize("inbox_bytes", 256 << 20)?,
         threads: params.usize("threads", 0)?,
@@ -46,19 +48,24 @@ pub fn start(runtime: &Runtime, name: &str) -> Result<Finish, NodeError> {
     let update_period = period(&node, "update_period_s", 0.2)?;
     let centers_period = period(&node, "centers_period_s", 1.0)?;
     let lost = Arc::new(AtomicU64::new(0));
+    let wishes = Arc::new(Wishes::default());
     let mut shell = Shell {
         machine: LatticeMapper::new(options, epoch())?,
         outputs: Outputs::open(&node)?,
         diagnostics: node.diagnostics(),
         lost: Arc::clone(&lost),
         refusals: Throttle::new(Duration::from_secs(5)),
-        keyframe_due: false,
-        centers_of: 0,
+        wishes: Arc::clone(&wishes),
+        pending: VecDeque::new(),
+        not_published: 0,
+        centers_of: None,
         report_file: params.string("report_file", "")?,
     };
-    let map = shell.outputs.map.clone();
-    let worker = Worker::spawn(name, limits, move |event| shell.on(event))?;
-    let inbox = worker.inbox();
+    let (map, centers) = (shell.outputs.map.clone(), shell.outputs.centers.clone());
+    let compute = Compute::spawn(name, limits, runtime.shutdown_handle(), move |event| {
+        shell.on(event)
+    })?;
+    let inbox = compute.inbox();
     let clouds = inbox.clone();
     let hand_over = move |cloud: Arc<PointCloud2>| {
         let bytes = cloud.data.len();
@@ -67,28 +74,20 @@ pub fn start(runtime: &Runtime, name: &str) -> Result<Finish, NodeError> {
         }
     };
     let points = node.subscribe("points_enu", SCANS, Load::Large, hand_over)?;
-    let origins = inbox.clone();
-    let origins = node.subscribe("map_origin", Qos::LATCHED, Load::Small, move |origin| {
-        tell(&origins, Event::Origin(origin));
-    })?;
-    let joined = inbox.clone();
-    map.on_subscriber_joined(move || tell(&joined, Event::Keyframe));
+    let origins = Arc::clone(&wishes);
+    let take = move |origin| *lock(&origins.origin) = Some(origin);
+    let origins = node.subscribe("map_origin", Qos::LATCHED, Load::Small, take)?;
+    let joined = Arc::clone(&wishes);
+    map.on_subscriber_joined(move || joined.keyframe.store(true, Ordering::Relaxed));
+    let joined = Arc::clone(&wishes);
+    centers.on_subscriber_joined(move || joined.centers.store(true, Ordering::Relaxed));
     // By topic too: our own followers need no answer, and the topic passes inside a process.
-    let requests = inbox.clone();
-    let ask = move |_: Arc<Empty>| tell(&requests, Event::Keyframe);
+    let requests = Arc::clone(&wishes);
+    let ask = move |_: Arc<Empty>| requests.keyframe.store(true, Ordering::Relaxed);
     let asked = node.subscribe("~/request_keyframe", Qos::DEFAULT, Load::Small, ask)?;
-    let services = inbox.clone();
     let request_keyframe = node.service_trigger("~/request_keyframe", move || {
-        let sent = services.send(Event::Keyframe, 0);
-        (
-            sent,
-            if sent {
-                "keyframe follows"
-            } else {
-                "busy, ask again"
-            }
-            .into(),
-        )
+        wishes.keyframe.store(true, Ordering::Relaxed);
+        (true, "keyframe follows".into())
     })?;
     let services = inbox.clone();
     let reset = node.service_trigger("~/reset", move || {
@@ -111,11 +110,23 @@ pub fn start(runtime: &Runtime, name: &str) -> Result<Finish, NodeError> {
         let undecodable = points.undecodable() + origins.undecodable();
         let lost = points.lost();
         drop((points, origins, asked, request_keyframe, reset));
-        worker.finish_with(Event::Finish { undecodable, lost });
+        compute.finish_with(Event::Finish { undecodable, lost });
     }))
 }
 
-/// Hands over a small event; one that finds no room comes again with the next timer.
+/// What others want of the map, kept until the next update whatever waits in the inbox.
+#[derive(Default)]
+struct Wishes {
+    keyframe: AtomicBool,
+    centers: AtomicBool,
+    origin: Mutex<Option<Arc<GeoPointStamped>>>,
+}
+
+fn lock<T>(mutex: &Mutex<T>) -> MutexGuard<'_, T> {
+    mutex.lock().unwrap_or_else(PoisonError::into_inner)
+}
+
+/// Hands over a timer's event; one that finds no room comes again with the next.
 fn tell(inbox: &Inbox<Event>, event: Event) {
     if !inbox.send(event, 0) {
         log::debug!("the inbox is full");
@@ -165,9 +176,12 @@ struct Shell {
     diagnostics: Diagnostics,
     lost: Arc<AtomicU64>,
     refusals: Throttle,
-    keyframe_due: bool,
-    /// Clouds that the last centres were made of.
-    centers_of: u64,
+    wishes: Arc<Wishes>,
+    /// Chunks of a keyframe that are still to be published.
+    pending: VecDeque<Arc<LatticeMap>>,
+    not_published: u64,
+    /// State of the map that the last centres are of.
+    centers_of: Option<(u64, u64)>,
     report_file: String,
 }
 
@@ -181,13 +195,12 @@ impl Shell {
                     log::warn!("{refusal} ({more} more like it)");
                 }
             }
-            Event::Origin(origin) => self.machine.on_origin(&origin),
             Event::Update => self.update(),
             Event::Centers => self.centers(),
-            Event::Keyframe => self.keyframe_due = true,
             Event::Reset => {
                 self.machine.reset(epoch());
-                self.keyframe_due = true;
+                self.pending.clear();
+                self.wishes.keyframe.store(true, Ordering::Relaxed);
             }
             Event::Finish { undecodable, lost } => self.finish(undecodable, lost),
         }
@@ -195,41 +208,48 @@ impl Shell {
 
     /// Publishes what changed, and a keyframe where one was asked for or an update was lost.
     fn update(&mut self) {
+        if let Some(origin) = lock(&self.wishes.origin).take() {
+            self.machine.on_origin(&origin);
+        }
         for chunk in self.machine.take_update() {
             if self.outputs.updates.publish(Arc::new(chunk)).is_err() {
-                self.keyframe_due = true;
+                self.not_published += 1;
+                self.wishes.keyframe.store(true, Ordering::Relaxed);
             }
         }
-        if std::mem::take(&mut self.keyframe_due) {
-            for chunk in self.machine.keyframe() {
-                if let Err(error) = self.outputs.map.publish(Arc::new(chunk)) {
-                    log::debug!("keyframe cut short: {error}");
-                    self.keyframe_due = true;
-                    break;
-                }
+        if self.pending.is_empty() && self.wishes.keyframe.swap(false, Ordering::Relaxed) {
+            self.pending = self.machine.keyframe().into_iter().map(Arc::new).collect();
+        }
+        // A large map takes several rounds: readers and queues are not flooded.
+        for _ in 0..CHUNKS_PER_ROUND {
+            let Some(chunk) = self.pending.front() else {
+                break;
+            };
+            if self.outputs.map.publish(Arc::clone(chunk)).is_err() {
+                break;
             }
+            self.pending.pop_front();
         }
         self.diagnose();
     }
 
     fn centers(&mut self) {
-        let clouds = self.machine.counts().clouds_in;
-        if clouds == self.centers_of || self.outputs.centers.subscriber_count() == 0 {
+        let state = self.machine.state();
+        let asked = self.wishes.centers.swap(false, Ordering::Relaxed);
+        let listened = self.outputs.centers.subscriber_count() > 0;
+        if !listened || (!asked && self.centers_of == Some(state)) {
             return;
         }
-        self.centers_of = clouds;
-        if let Err(error) = self
-            .outputs
-            .centers
-            .publish(Arc::new(self.machine.centers()))
-        {
-            log::debug!("centres not published: {error}");
+        match self.outputs.centers.publish(self.machine.centers()) {
+            Ok(()) => self.centers_of = Some(state),
+            Err(error) => log::debug!("centres not published: {error}"),
         }
     }
 
     fn report(&mut self) -> MapperReport {
         MapperReport {
             clouds_inbox_full: self.lost.load(Ordering::Relaxed),
+            updates_not_published: self.not_published,
             ..MapperReport::of(&mut self.machine)
         }
     }
@@ -263,6 +283,11 @@ impl Shell {
     fn finish(&mut self, undecodable: u64, lost: u64) {
         self.lost.fetch_add(lost, Ordering::Relaxed);
         self.update();
+        let mut left = usize::MAX;
+        while !self.pending.is_empty() && self.pending.len() < left {
+            left = self.pending.len();
+            self.update();
+        }
         self.centers();
         let report = MapperReport {
             undecodable,

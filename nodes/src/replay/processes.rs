@@ -174,7 +174,7 @@ impl DdsReplay<'_> {
         let wanted = self.topic(|_| true);
         let waited = self.topic(|role| !matches!(role, Role::Transforms(_)));
         let mut arguments = vec![
-            param("bag", &format!("'{}'", self.bag.display())),
+            param("bag", &yaml_text(self.bag)),
             param("rate", &format!("{:?}", self.rate)),
             param("topics", &quoted(&wanted)),
             param("wait_for_subscribers", &quoted(&waited)),
@@ -188,6 +188,11 @@ impl DdsReplay<'_> {
 
 fn param(name: &str, value: &str) -> String {
     format!("{name}:={value}")
+}
+
+/// A path as YAML text.
+fn yaml_text(path: &Path) -> String {
+    format!("'{}'", path.display().to_string().replace('\'', "''"))
 }
 
 fn quoted(names: &[&str]) -> String {
@@ -282,7 +287,7 @@ impl NodeProcess {
                 command.args(["-r", &format!("{shared}:=/{shared}")]);
             }
         }
-        let report_file = param("report_file", &format!("'{}'", report.display()));
+        let report_file = param("report_file", &yaml_text(report));
         for param in replay.params.iter().chain(params).chain([&report_file]) {
             command.args(["-p", param]);
         }

@@ -29,7 +29,7 @@ mod subscription;
 mod sync;
 mod tf;
 mod transport_status;
-mod worker;
+pub(crate) mod worker;
 
 pub use clock::Clock;
 pub use diagnostics::{Diagnostics, Level};

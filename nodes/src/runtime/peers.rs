@@ -1,7 +1,7 @@
 //! The other ends of one publisher or subscription, in this process and outside.
 
 use std::collections::BTreeSet;
-use std::sync::Mutex;
+use std::sync::{Arc, Mutex};
 
 use rustdds::GUID;
 
@@ -20,7 +20,7 @@ pub(crate) struct Peers {
     joins: log::Level,
     hears_own: bool,
     state: Mutex<State>,
-    on_joined: Mutex<Vec<OnJoined>>,
+    on_joined: Mutex<Vec<Arc<Mutex<OnJoined>>>>,
 }
 
 #[derive(Default)]
@@ -102,11 +102,13 @@ impl Peers {
     }
 
     /// Calls `callback` for every peer that joins, and now if there is one already.
-    pub(crate) fn on_joined(&self, mut callback: OnJoined) {
+    pub(crate) fn on_joined(&self, callback: OnJoined) {
+        let callback = Arc::new(Mutex::new(callback));
+        // First known, then asked: a peer that joins meanwhile is told twice rather than never.
+        lock(&self.on_joined).push(Arc::clone(&callback));
         if self.count() > 0 {
-            callback();
+            lock(&callback)();
         }
-        lock(&self.on_joined).push(callback);
     }
 
     /// A peer in another process has matched.
@@ -171,13 +173,10 @@ impl Peers {
             self.peer_kind
         );
         // A callback may register another: not called under the lock.
-        let mut callbacks = std::mem::take(&mut *lock(&self.on_joined));
-        for callback in &mut callbacks {
-            callback();
+        let callbacks = lock(&self.on_joined).clone();
+        for callback in &callbacks {
+            lock(callback)();
         }
-        let mut all = lock(&self.on_joined);
-        callbacks.append(&mut all);
-        *all = callbacks;
     }
 }
 

@@ -2,6 +2,7 @@
 
 use std::sync::atomic::{AtomicBool, Ordering};
 use std::sync::{Arc, Condvar, LazyLock, Mutex, PoisonError};
+use std::time::Duration;
 
 use signal_hook::consts::{SIGINT, SIGTERM};
 use signal_hook::flag::register_conditional_default;
@@ -49,6 +50,13 @@ impl Shutdown {
                 .wait(state)
                 .unwrap_or_else(PoisonError::into_inner);
         }
+    }
+
+    /// Blocks until asked, or for this long.
+    pub fn wait_timeout(&self, timeout: Duration) {
+        let state = lock(&self.inner.state);
+        let asked = |state: &mut State| !state.requested;
+        drop(self.inner.changed.wait_timeout_while(state, timeout, asked));
     }
 
     /// Asks to end because a thread cannot go on.

@@ -107,10 +107,12 @@ impl VoxelMarkers {
             self.wipe = false;
             packer.push(bare(&header, 0, Marker::DELETEALL), &mut arrays);
         }
-        while packer.total_bytes < budget_bytes {
+        let mut blocks = 0;
+        while blocks == 0 || packer.total_bytes < budget_bytes {
             let Some(block) = self.dirty.pop_first() else {
                 break;
             };
+            blocks += 1;
             let shapes = shape::of_block(map, &self.blocks, block, self.style, &self.options);
             let ids = self.blocks.assign_ids(block, shapes.len());
             for id in ids.stale {

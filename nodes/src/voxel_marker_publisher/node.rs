@@ -1,6 +1,7 @@
 //! The marker publisher as a ROS node: a thin shell around [`VoxelMarkers`].
 
 use std::sync::Arc;
+use std::sync::atomic::{AtomicBool, Ordering};
 use std::time::Duration;
 
 use lattice_msgs::cdr;
@@ -9,6 +10,7 @@ use lattice_msgs::std_msgs::Empty;
 use lattice_msgs::visualization_msgs::MarkerArray;
 
 use super::{MarkerOptions, VoxelMarkers};
+use crate::compute::{Compute, ComputeLimits};
 use crate::map_follower::{FollowError, Followed};
 use crate::node::{Finish, NodeError, warn_unused};
 use crate::replay::bytes_of;
@@ -16,7 +18,6 @@ use crate::report::{self, MarkerReport};
 use crate::runtime::logging::Throttle;
 use crate::runtime::qos::Qos;
 use crate::runtime::{Diagnostics, Level, Load, Publisher, Runtime};
-use crate::worker::{Worker, WorkerLimits};
 
 /// What the compute thread is told.
 enum Event {
@@ -32,7 +33,7 @@ pub fn start(runtime: &Runtime, name: &str) -> Result<Finish, NodeError> {
     let node = runtime.node(name)?;
     let params = node.params();
     let options = MarkerOptions::from_params(params)?;
-    let limits = WorkerLimits {
+    let limits = ComputeLimits {
         events: params.usize("inbox_events", 4096)?,
         bytes: params.usize("inbox_bytes", 64 << 20)?,
         threads: params.usize("threads", 1)?,
@@ -45,7 +46,9 @@ pub fn start(runtime: &Runtime, name: &str) -> Result<Finish, NodeError> {
     let bytes_per_s = params.usize("max_bytes_per_s", 20_000_000)?;
     let mapper = params.string("mapper", "lattice_mapper")?;
     let markers = node.publisher("voxel_markers", Qos::MARKERS)?;
+    let lost = Arc::new(AtomicBool::new(false));
     let mut shell = Shell {
+        lost: Arc::clone(&lost),
         machine: VoxelMarkers::new(options),
         markers: markers.clone(),
         request: node.publisher(&format!("{mapper}/request_keyframe"), Qos::DEFAULT)?,
@@ -59,13 +62,17 @@ pub fn start(runtime: &Runtime, name: &str) -> Result<Finish, NodeError> {
         repairs: Throttle::new(Duration::from_secs(5)),
         report_file: params.string("report_file", "")?,
     };
-    let worker = Worker::spawn(name, limits, move |event| shell.on(event))?;
-    let inbox = worker.inbox();
+    let compute = Compute::spawn(name, limits, runtime.shutdown_handle(), move |event| {
+        shell.on(event)
+    })?;
+    let inbox = compute.inbox();
+    let lost_map = Arc::clone(&lost);
+    let lost_update = Arc::clone(&lost);
     let maps = inbox.clone();
     let maps = node.subscribe("map", Qos::MAP, Load::Small, move |map: Arc<LatticeMap>| {
         let bytes = map.keys.len() + map.counts.len() * 10;
         if !maps.send(Event::Map(map), bytes) {
-            log::warn!("a map chunk is lost: the inbox is full");
+            lost_map.store(true, Ordering::Relaxed);
         }
     })?;
     let updates = inbox.clone();
@@ -76,7 +83,7 @@ pub fn start(runtime: &Runtime, name: &str) -> Result<Finish, NodeError> {
         move |update: Arc<LatticeMapUpdate>| {
             let bytes = update.keys.len() + update.counts.len() * 10;
             if !updates.send(Event::Update(update), bytes) {
-                log::warn!("a map update is lost: the inbox is full");
+                lost_update.store(true, Ordering::Relaxed);
             }
         },
     )?;
@@ -90,12 +97,14 @@ pub fn start(runtime: &Runtime, name: &str) -> Result<Finish, NodeError> {
     warn_unused(params);
     Ok(Box::new(move || {
         drop((maps, updates));
-        worker.finish_with(Event::Finish);
+        compute.finish_with(Event::Finish);
     }))
 }
 
 /// State of the compute thread.
 struct Shell {
+    /// A part of the map found the inbox full.
+    lost: Arc<AtomicBool>,
     machine: VoxelMarkers,
     markers: Publisher<MarkerArray>,
     request: Publisher<Empty>,
@@ -123,6 +132,9 @@ impl Shell {
             }
             Event::Redraw => self.machine.redraw(),
             Event::Draw => {
+                if self.lost.swap(false, Ordering::Relaxed) {
+                    self.ask_for_keyframe();
+                }
                 self.repair();
                 self.draw();
                 self.diagnose();
@@ -133,19 +145,21 @@ impl Shell {
 
     fn followed(&mut self, result: Result<Followed, FollowError>) {
         match result {
-            Ok(Followed::NeedKeyframe) => {
-                if self.requests.check().is_some()
-                    && let Err(error) = self.request.publish(Empty::default())
-                {
-                    log::debug!("keyframe not requested: {error}");
-                }
-            }
+            Ok(Followed::NeedKeyframe) => self.ask_for_keyframe(),
             Ok(Followed::Applied | Followed::Old) => {}
             Err(error) => {
                 if let Some(more) = self.refusals.check() {
                     log::warn!("{error} ({more} more like it)");
                 }
             }
+        }
+    }
+
+    fn ask_for_keyframe(&mut self) {
+        if self.requests.check().is_some()
+            && let Err(error) = self.request.publish(Empty::default())
+        {
+            log::debug!("keyframe not requested: {error}");
         }
     }
 

@@ -9,9 +9,12 @@ use std::thread::{self, JoinHandle};
 
 use crossbeam_channel::{Sender, bounded};
 
-/// Bounds of a worker.
+use crate::runtime::Shutdown;
+use crate::runtime::worker::guarded;
+
+/// Bounds of a compute thread.
 #[derive(Clone, Copy, Debug)]
-pub struct WorkerLimits {
+pub struct ComputeLimits {
     /// Most events in the inbox.
     pub events: usize,
     /// Most bytes that the events in the inbox may say they have.
@@ -24,12 +27,12 @@ pub struct WorkerLimits {
 type Item<E> = Option<(E, usize)>;
 
 /// Runs a handler on its own thread until it is finished.
-pub struct Worker<E> {
+pub struct Compute<E> {
     inbox: Inbox<E>,
     thread: JoinHandle<()>,
 }
 
-/// The entrance to a worker.
+/// The entrance to a compute thread.
 pub struct Inbox<E> {
     sender: Sender<Item<E>>,
     bytes: Arc<AtomicUsize>,
@@ -46,11 +49,13 @@ impl<E> Clone for Inbox<E> {
     }
 }
 
-impl<E: Send + 'static> Worker<E> {
-    /// Starts the thread. The handler runs inside the pool, one event at a time, in order.
+impl<E: Send + 'static> Compute<E> {
+    /// Starts the thread. The handler runs inside the pool, one event at a time, in order; if it
+    /// panics the process is asked to shut down.
     pub fn spawn(
         name: &str,
-        limits: WorkerLimits,
+        limits: ComputeLimits,
+        shutdown: Shutdown,
         mut handler: impl FnMut(E) + Send + 'static,
     ) -> io::Result<Self> {
         let cores = thread::available_parallelism().map_or(1, usize::from);
@@ -70,10 +75,12 @@ impl<E: Send + 'static> Worker<E> {
         let thread = thread::Builder::new()
             .name(format!("{name} compute"))
             .spawn(move || {
-                while let Ok(Some((event, size))) = receiver.recv() {
-                    pool.install(|| handler(event));
-                    in_flight.fetch_sub(size, Ordering::Relaxed);
-                }
+                guarded("compute", &shutdown, || {
+                    while let Ok(Some((event, size))) = receiver.recv() {
+                        pool.install(|| handler(event));
+                        in_flight.fetch_sub(size, Ordering::Relaxed);
+                    }
+                });
             })?;
         Ok(Self {
             inbox: Inbox {
@@ -108,8 +115,8 @@ impl<E> Inbox<E> {
     #[must_use]
     pub fn send(&self, event: E, bytes: usize) -> bool {
         let before = self.bytes.fetch_add(bytes, Ordering::Relaxed);
-        // One event always fits, however large.
-        let fits = before == 0 || before.saturating_add(bytes) <= self.max_bytes;
+        // One event always fits, however large, and those without bytes need no room.
+        let fits = bytes == 0 || before == 0 || before.saturating_add(bytes) <= self.max_bytes;
         if fits && self.sender.try_send(Some((event, bytes))).is_ok() {
             return true;
         }
@@ -123,7 +130,7 @@ mod tests {
     use super::*;
     use crossbeam_channel::unbounded;
 
-    const LIMITS: WorkerLimits = WorkerLimits {
+    const LIMITS: ComputeLimits = ComputeLimits {
         events: 2,
         bytes: 100,
         threads: 1,
@@ -132,7 +139,7 @@ mod tests {
     #[test]
     fn works_off_in_order_before_it_ends() {
         let (done, results) = unbounded();
-        let worker = Worker::spawn("test", LIMITS, move |i: u32| {
+        let worker = Compute::spawn("test", LIMITS, Shutdown::default(), move |i: u32| {
             done.send(i).unwrap();
         })
         .unwrap();
@@ -150,10 +157,22 @@ mod tests {
     }
 
     #[test]
+    fn a_panic_ends_the_process_in_good_order() {
+        let shutdown = Shutdown::default();
+        let compute = Compute::spawn("test", LIMITS, shutdown.clone(), |_: u32| {
+            panic!("on purpose");
+        })
+        .unwrap();
+        assert!(compute.inbox().send(1, 1));
+        shutdown.wait();
+        compute.finish_with(2);
+    }
+
+    #[test]
     fn a_full_inbox_refuses() {
         let (enter, entered) = unbounded();
         let (go, wait) = unbounded::<()>();
-        let worker = Worker::spawn("test", LIMITS, move |_: u32| {
+        let worker = Compute::spawn("test", LIMITS, Shutdown::default(), move |_: u32| {
             enter.send(()).unwrap();
             let _ = wait.recv();
         })
