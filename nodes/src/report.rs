@@ -343,7 +343,8 @@ mod tests {
     fn every_kind_of_loss_is_shown() {
         assert!(report().losses().is_empty());
         assert!(report().to_string().contains("dropped: none"));
-        let changes: [(&str, &dyn Fn(&mut RunReport)); 9] = [
+        type Change<'a> = (&'a str, &'a dyn Fn(&mut RunReport));
+        let changes: [Change; 9] = [
             ("reach the transformer", &|r| {
                 r.transformer.counts.clouds_in = 9
             }),
