@@ -32,7 +32,7 @@ pub enum BagError {
     #[error(
         "{}: truncated: the file ends at byte {size_bytes} inside {inside}; \
          {readable_messages} messages before it can be read; \
-         keep those with `mcap recover` (.mcap) or sqlite3's `.recover` (.db3), or take another copy",
+         rewrite the file with `ros2 bag reindex`, `mcap recover` or sqlite3's `.recover`",
         path.display()
     )]
     Truncated {

@@ -42,7 +42,7 @@ impl SqliteFile {
         temporary: Option<Arc<TempPath>>,
     ) -> Result<SqliteFile, BagError> {
         let missing_pages = missing_pages(path)?;
-        let connection = connect(path, missing_pages.is_some())?;
+        let connection = connect(path)?;
         let mut file = SqliteFile {
             path: path.to_path_buf(),
             temporary,
@@ -65,7 +65,7 @@ impl SqliteFile {
     /// The wanted messages in order of log time.
     pub(crate) fn stream(&self, filter: Filter) -> Result<StorageStream, BagError> {
         Ok(Box::new(SqliteStream::new(
-            connect(&self.path, self.info.damage.is_some())?,
+            connect(&self.path)?,
             self.path.clone(),
             self.temporary.clone(),
             self.topic_of.clone(),
@@ -232,8 +232,7 @@ impl SqliteFile {
 
 /// Opens read-only. `immutable` keeps SQLite from creating files beside the database, so that a
 /// read-only folder works; it would hide rows still in a write-ahead log, so not where one exists.
-/// `damaged` lets SQLite read a file that is shorter than its header tells.
-fn connect(path: &Path, damaged: bool) -> Result<Connection, BagError> {
+fn connect(path: &Path) -> Result<Connection, BagError> {
     let path = &std::path::absolute(path).map_err(BagError::io(path, "locate"))?;
     let has_wal = wal_path(path).metadata().is_ok_and(|wal| wal.len() > 0);
     let parameters = if has_wal {
@@ -255,7 +254,7 @@ fn connect(path: &Path, damaged: bool) -> Result<Connection, BagError> {
     };
     let connection = Connection::open_with_flags(uri, flags).map_err(wrong)?;
     connection
-        .set_db_config(DbConfig::SQLITE_DBCONFIG_DEFENSIVE, !damaged)
+        .set_db_config(DbConfig::SQLITE_DBCONFIG_DEFENSIVE, true)
         .map_err(wrong)?;
     connection
         .set_db_config(DbConfig::SQLITE_DBCONFIG_TRUSTED_SCHEMA, false)
@@ -269,12 +268,6 @@ fn connect(path: &Path, damaged: bool) -> Result<Connection, BagError> {
     connection
         .execute_batch("PRAGMA cell_size_check = ON; PRAGMA mmap_size = 0;")
         .map_err(wrong)?;
-    if damaged {
-        // Only with this does SQLite go on; the file is read-only all the same.
-        connection
-            .execute_batch("PRAGMA writable_schema = ON")
-            .map_err(wrong)?;
-    }
     Ok(connection)
 }
 
@@ -299,7 +292,7 @@ fn percent_encode(path: &Path) -> String {
     encoded
 }
 
-/// Compares the size in the database header with the file's (<https://www.sqlite.org/fileformat.html>, 1.3).
+/// Compares the size in the database header with the file's (https://www.sqlite.org/fileformat.html, 1.3).
 fn missing_pages(path: &Path) -> Result<Option<BagError>, BagError> {
     let mut file = File::open(path).map_err(BagError::io(path, "open"))?;
     let size_bytes = file

@@ -39,9 +39,9 @@ fn key(row: &rusqlite::Row<'_>) -> Result<Key, rusqlite::Error> {
     })
 }
 
-/// The keys of all rows before the first one that cannot be read whole.
+/// The keys of all rows before the first one that cannot be read.
 pub(super) fn readable_keys(connection: &Connection) -> Vec<Key> {
-    let select = format!("{KEY_COLUMNS}, data FROM messages NOT INDEXED ORDER BY id");
+    let select = format!("{KEY_COLUMNS} FROM messages NOT INDEXED ORDER BY id");
     let Ok(mut statement) = connection.prepare(&select) else {
         return Vec::new();
     };
