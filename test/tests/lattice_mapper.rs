@@ -143,6 +143,104 @@ fn a_lost_update_is_noticed_and_a_keyframe_heals_it() {
     assert_same(&follower, &mapper);
 }
 
+/// A mapper with a map of several chunks, and a follower that has all of it.
+fn followed() -> (LatticeMapper, MapFollower) {
+    let mut mapper = mapper(LatticeKind::Fcc);
+    insert(&mut mapper, &scatter(1, 20_000, [0.0; 3], 100.0));
+    mapper.take_update();
+    let mut follower = MapFollower::new(MAX_VOXELS);
+    follow_keyframe(&mut follower, &mapper.keyframe());
+    assert_same(&follower, &mapper);
+    (mapper, follower)
+}
+
+fn grown(mapper: &mut LatticeMapper, seed: u64) -> Vec<LatticeMapUpdate> {
+    insert(
+        mapper,
+        &scatter(seed, 50, [200.0 + seed as f32, 0.0, 0.0], 5.0),
+    );
+    mapper.take_update()
+}
+
+#[test]
+fn a_keyframe_that_updates_overtake_does_not_hide_later_losses() {
+    let (mut mapper, mut follower) = followed();
+    let keyframe = mapper.keyframe();
+    assert!(keyframe.len() > 1);
+    follow_keyframe(&mut follower, &keyframe[..1]);
+    for chunk in grown(&mut mapper, 2) {
+        assert_eq!(follower.on_update(&chunk).unwrap(), Followed::Applied);
+    }
+    for chunk in &keyframe[1..] {
+        assert_eq!(follower.on_map(chunk).unwrap(), Followed::Old);
+    }
+    assert_same(&follower, &mapper);
+    grown(&mut mapper, 3);
+    let after_a_loss = grown(&mut mapper, 4);
+    assert_eq!(
+        follower.on_update(&after_a_loss[0]).unwrap(),
+        Followed::NeedKeyframe
+    );
+}
+
+#[test]
+fn an_update_before_the_keyframe_that_heals_is_not_taken_for_done() {
+    let (mut mapper, mut follower) = followed();
+    grown(&mut mapper, 2);
+    let keyframe = mapper.keyframe();
+    let early = grown(&mut mapper, 3);
+    assert_eq!(
+        follower.on_update(&early[0]).unwrap(),
+        Followed::NeedKeyframe
+    );
+    follow_keyframe(&mut follower, &keyframe);
+    // The update came before the keyframe was begun, so it must come again.
+    let after = grown(&mut mapper, 4);
+    let followed = follower.on_update(&after[0]).unwrap();
+    assert_eq!(followed, Followed::NeedKeyframe);
+    follow_keyframe(&mut follower, &mapper.keyframe());
+    assert_same(&follower, &mapper);
+}
+
+#[test]
+fn a_keyframe_of_which_a_chunk_was_lost_is_asked_for_again() {
+    let mut mapper = mapper(LatticeKind::Fcc);
+    insert(&mut mapper, &scatter(1, 20_000, [0.0; 3], 100.0));
+    mapper.take_update();
+    let mut follower = MapFollower::new(MAX_VOXELS);
+    follow_keyframe(&mut follower, &mapper.keyframe()[1..]);
+    let mut asked = false;
+    for seed in 2..20 {
+        for chunk in grown(&mut mapper, seed) {
+            asked |= follower.on_update(&chunk).unwrap() == Followed::NeedKeyframe;
+        }
+    }
+    assert!(asked);
+    follow_keyframe(&mut follower, &mapper.keyframe());
+    assert_same(&follower, &mapper);
+}
+
+#[test]
+fn one_stray_point_does_not_move_the_others() {
+    let points = scatter(1, 5000, [0.0; 3], 50.0);
+    let mut clean = mapper(LatticeKind::Mcc);
+    insert(&mut clean, &points);
+    for stray in [1e5, 1e7, 1e30_f32] {
+        let mut with_stray = mapper(LatticeKind::Mcc);
+        insert(
+            &mut with_stray,
+            &[&[[stray, 0.0, 0.0]], &points[..]].concat(),
+        );
+        let near = |list: &lattice_core::voxels::VoxelList| {
+            let voxels = list.sorted().into_iter();
+            voxels
+                .filter(|(key, _)| list.center_m(*key).norm() < 1000.0)
+                .collect::<Vec<_>>()
+        };
+        assert_eq!(near(with_stray.list()), near(clean.list()), "{stray}");
+    }
+}
+
 #[test]
 fn a_reset_map_replaces_the_old_one() {
     let mut mapper = mapper(LatticeKind::Hex);

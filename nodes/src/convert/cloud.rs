@@ -39,6 +39,15 @@ pub fn layout_of(cloud: &PointCloud2) -> CloudLayout {
     }
 }
 
+/// Bytes that a cloud takes in memory, its fields included.
+pub fn bytes_of(cloud: &PointCloud2) -> usize {
+    let fields = cloud.fields.iter();
+    let names: usize = fields
+        .map(|field| size_of_val(field) + field.name.len())
+        .sum();
+    size_of_val(cloud) + cloud.header.frame_id.len() + names + cloud.data.len()
+}
+
 /// Points in the frame of `header` as an unordered, dense PointCloud2 with `x`, `y`, `z`.
 pub fn message_from_points(
     header: Header,

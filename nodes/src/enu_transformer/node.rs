@@ -15,10 +15,15 @@ use lattice_msgs::tf2_msgs::TFMessage;
 use super::ins::{InsMessage, InsSource};
 use super::{EnuOutput, EnuTransformer, TransformerOptions};
 use crate::compute::{Compute, ComputeLimits, Inbox};
+use crate::convert::cloud;
 use crate::node::{Finish, NodeError, warn_unused};
 use crate::report::{self, TransformerReport};
+use crate::runtime::logging::Throttle;
 use crate::runtime::qos::Qos;
-use crate::runtime::{Clock, Diagnostics, Level, Load, Node, Publisher, Runtime, Subscription};
+use crate::runtime::{
+    Clock, Diagnostics, Level, Load, Node, Publisher, Runtime, StaticTfBroadcaster, Subscription,
+    TfBroadcaster,
+};
 
 /// What the compute thread is told.
 enum Event {
@@ -41,9 +46,6 @@ enum Event {
 /// Clouds in and out. Line scanners send hundreds of small ones a second, in bursts when they waited
 /// for a pose.
 pub const SCANS: Qos = Qos::best_effort(20);
-/// Bytes that a small message stands for in the inbox.
-const SMALL: usize = 1024;
-
 /// Starts the node.
 pub fn start(runtime: &Runtime, name: &str) -> Result<Finish, NodeError> {
     let node = runtime.node(name)?;
@@ -74,7 +76,7 @@ pub fn start(runtime: &Runtime, name: &str) -> Result<Finish, NodeError> {
     for topic in params.string_array("points_topics", &["points"])? {
         let (inbox, lost) = (inbox.clone(), Arc::clone(&lost));
         let hand_over = move |cloud: Arc<PointCloud2>| {
-            let bytes = cloud.data.len();
+            let bytes = cloud::bytes_of(&cloud);
             if !inbox.send(Event::Cloud(cloud), bytes) {
                 lost.fetch_add(1, Ordering::Relaxed);
             }
@@ -132,9 +134,13 @@ fn subscribe<M: RosMessage>(
     event: impl Fn(Arc<M>) -> Event + Send + 'static,
 ) -> Result<Subscription, NodeError> {
     let inbox = inbox.clone();
+    let warnings = Throttle::new(Duration::from_secs(5));
     let subscription = node.subscribe(topic, qos, Load::Small, move |message: Arc<M>| {
-        if !inbox.send(event(message), SMALL) {
-            log::warn!("the inbox is full: a pose or transform is lost");
+        // Poses count no bytes: clouds must not keep them out.
+        if !inbox.send(event(message), 0)
+            && let Some(more) = warnings.check()
+        {
+            log::warn!("the inbox is full: a pose or transform is lost ({more} more like it)");
         }
     })?;
     Ok(subscription)
@@ -143,8 +149,8 @@ fn subscribe<M: RosMessage>(
 /// The topics that the node speaks on.
 struct Outputs {
     points: Publisher<PointCloud2>,
-    tf: Publisher<TFMessage>,
-    tf_static: Publisher<TFMessage>,
+    tf: TfBroadcaster,
+    tf_static: StaticTfBroadcaster,
     origin: Publisher<GeoPointStamped>,
 }
 
@@ -152,8 +158,8 @@ impl Outputs {
     fn open(node: &Node) -> Result<Self, NodeError> {
         Ok(Self {
             points: node.publisher("points_enu", SCANS)?,
-            tf: node.publisher("/tf", Qos::TF)?,
-            tf_static: node.publisher("/tf_static", Qos::TF_STATIC)?,
+            tf: TfBroadcaster::new(node)?,
+            tf_static: StaticTfBroadcaster::new(node)?,
             origin: node.publisher("map_origin", Qos::LATCHED)?,
         })
     }
@@ -205,14 +211,8 @@ impl Shell {
                 self.not_published += u64::from(published.is_err());
                 published
             }
-            EnuOutput::Transform(transform) => self.outputs.tf.publish(Arc::new(TFMessage {
-                transforms: vec![transform],
-            })),
-            EnuOutput::StaticTransform(transform) => {
-                self.outputs.tf_static.publish(Arc::new(TFMessage {
-                    transforms: vec![transform],
-                }))
-            }
+            EnuOutput::Transform(transform) => self.outputs.tf.send(vec![transform]),
+            EnuOutput::StaticTransform(transform) => self.outputs.tf_static.send([transform]),
             EnuOutput::Origin(origin) => self.outputs.origin.publish(Arc::new(origin)),
         };
         if let Err(error) = published {

@@ -62,7 +62,7 @@ impl WaitingCloud {
     }
 
     fn bytes(&self) -> usize {
-        self.message.data.len() + self.times.as_ref().map_or(0, |times| times.len() * 8)
+        cloud::bytes_of(&self.message) + self.times.as_ref().map_or(0, |times| times.len() * 8)
     }
 }
 

@@ -12,6 +12,7 @@ use lattice_msgs::std_msgs::Empty;
 
 use super::{LatticeMapper, MapperOptions};
 use crate::compute::{Compute, ComputeLimits, Inbox};
+use crate::convert::cloud;
 use crate::enu_transformer::node::SCANS;
 use crate::node::{Finish, NodeError, warn_unused};
 use crate::report::{self, MapperReport};
@@ -68,7 +69,7 @@ pub fn start(runtime: &Runtime, name: &str) -> Result<Finish, NodeError> {
     let inbox = compute.inbox();
     let clouds = inbox.clone();
     let hand_over = move |cloud: Arc<PointCloud2>| {
-        let bytes = cloud.data.len();
+        let bytes = cloud::bytes_of(&cloud);
         if !clouds.send(Event::Cloud(cloud), bytes) {
             lost.fetch_add(1, Ordering::Relaxed);
         }

@@ -38,9 +38,12 @@ const QUEUE_MESSAGES: usize = 1024;
 /// Bytes that wait in the queue of one publisher, at most.
 const QUEUE_BYTES: usize = 128 << 20;
 
-/// Messages of a publisher in this process that wait for a subscription, at least. They are shared,
-/// not copied, and the handler that they wait for returns at once: there is no reason to lose one.
-const LOCAL_MESSAGES: usize = 1024;
+/// Small messages of a publisher in this process that wait for a subscription, at least. They are
+/// shared, not copied, and the handler that they wait for returns at once.
+const LOCAL_SMALL_MESSAGES: usize = 1024;
+
+/// The same for large ones: several bursts of line scans, and not too much of 4 MB clouds.
+const LOCAL_LARGE_MESSAGES: usize = 128;
 
 /// Time to send what is queued when shutting down.
 const DRAIN_TIME: Duration = Duration::from_secs(2);
@@ -238,7 +241,10 @@ impl Core {
     ) -> Result<Subscription, RuntimeError> {
         let peers = Arc::new(Peers::of_subscription(topic));
         let stats = Arc::new(Stats::new(Arc::clone(&peers)));
-        let (sender, local) = bounded(qos.depth.max(LOCAL_MESSAGES));
+        let (sender, local) = bounded(qos.depth.max(match load {
+            Load::Small => LOCAL_SMALL_MESSAGES,
+            Load::Large => LOCAL_LARGE_MESSAGES,
+        }));
         let latched = qos.durability == Durability::TransientLocal;
         let membership = self.bus.topic(topic).join_subscriber::<M>(
             &peers,

@@ -47,13 +47,17 @@ pub(crate) async fn publish(records: Receiver<Log>, publisher: Publisher<Log>) {
 }
 
 fn hear(record: &Record<'_>, node: &str) {
-    let mut listeners = lock(&LISTENERS);
-    listeners.retain(|listener| listener.strong_count() > 0);
+    // What is logged while its text is made must find the lock free.
+    let listeners: Vec<_> = {
+        let mut listeners = lock(&LISTENERS);
+        listeners.retain(|listener| listener.strong_count() > 0);
+        listeners.iter().filter_map(Weak::upgrade).collect()
+    };
     if listeners.is_empty() {
         return;
     }
     let message = message(record, node);
-    for listener in listeners.iter().filter_map(Weak::upgrade) {
+    for listener in listeners {
         let _ = listener.sender.force_send(message.clone());
     }
 }

@@ -1,9 +1,8 @@
 //! The runtime of a process: one participant, its threads, and the nodes on it.
 
 use std::sync::Arc;
-use std::time::Duration;
+use std::time::{Duration, Instant};
 
-use futures::StreamExt;
 use lattice_msgs::diagnostic_msgs::DiagnosticArray;
 use smol::Timer;
 
@@ -81,10 +80,14 @@ impl Runtime {
     ///
     /// It runs on the io thread and must return at once. Periods that were missed are left out.
     pub fn timer(&self, period: Duration, mut callback: impl FnMut() + Send + 'static) {
-        let mut ticks = Timer::interval(period.max(MIN_TIMER_PERIOD));
+        let period = period.max(MIN_TIMER_PERIOD);
         let task = self.core.io.spawn(async move {
-            while ticks.next().await.is_some() {
+            let mut due = Instant::now().checked_add(period);
+            while let Some(at) = due {
+                let _ = Timer::at(at).await;
                 callback();
+                let now = Instant::now();
+                due = at.checked_add(period).map(|next| next.max(now));
             }
         });
         if let Some(task) = task {
