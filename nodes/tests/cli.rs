@@ -10,6 +10,8 @@ use serde_json::Value;
 fn lattice(arguments: &[&str]) -> Output {
     Command::new(env!("CARGO_BIN_EXE_lattice"))
         .args(arguments)
+        // Each replay takes a domain of its own.
+        .env_remove("ROS_DOMAIN_ID")
         .output()
         .unwrap()
 }

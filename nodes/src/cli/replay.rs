@@ -15,7 +15,7 @@ use crate::enu_transformer::TransformerOptions;
 use crate::enu_transformer::ins::InsSource;
 use crate::lattice_mapper::MapperOptions;
 use crate::replay::processes::{self, DdsReplay};
-use crate::replay::{self, Pipeline, TopicWishes};
+use crate::replay::{self, LoopbackDomain, Pipeline, TopicWishes};
 use crate::report::RunReport;
 use crate::runtime::params::Params;
 use crate::runtime::ros_args::RosArgs;
@@ -99,6 +99,11 @@ impl Replay {
                 params_files: &self.params,
                 params: &self.param,
                 rate: self.rate,
+                // Apart from a robot on domain 0, and from other replays.
+                domain: match std::env::var_os("ROS_DOMAIN_ID") {
+                    Some(_) => None,
+                    None => Some(LoopbackDomain::take()?),
+                },
             },
             &mut |done, what| {
                 progress.set(done);

@@ -2,9 +2,11 @@
 //!
 //! Messages pass in the order of the log, so the map depends on nothing else.
 
+mod domain;
 pub mod processes;
 mod topics;
 
+pub use domain::LoopbackDomain;
 pub use topics::{Role, TopicError, TopicPlan, TopicWishes, plan};
 
 use std::sync::Arc;

@@ -12,12 +12,10 @@ use crossbeam_channel::{Receiver, Sender, unbounded};
 use lattice_core::lattice::Lattice;
 use thiserror::Error;
 
-use super::{Role, TopicPlan};
+use super::{LoopbackDomain, Role, TopicPlan};
 use crate::bag::BagReader;
 use crate::report::{self, LatticeReport, RunReport};
 
-/// Domain of the processes unless `ROS_DOMAIN_ID` is set: apart from a robot on domain 0.
-const DOMAIN: &str = "87";
 /// Texts of warnings that are remembered.
 const MAX_TEXTS: usize = 1000;
 /// Time for all nodes to find each other.
@@ -47,7 +45,7 @@ pub enum ProcessError {
         words: String,
     },
     /// The nodes did not find each other.
-    #[error("{what} did not log '{waited}' within {} s: is the loopback interface up, and domain {DOMAIN} free?", MATCH_TIME.as_secs())]
+    #[error("{what} did not log '{waited}' within {} s: is the loopback interface up, and its domain used by nothing else?", MATCH_TIME.as_secs())]
     NotMatched {
         /// Node.
         what: String,
@@ -89,6 +87,8 @@ pub struct DdsReplay<'a> {
     pub params: &'a [String],
     /// Speed, 1 is real time.
     pub rate: f64,
+    /// Domain of the processes; `None`: that of `ROS_DOMAIN_ID`.
+    pub domain: Option<LoopbackDomain>,
 }
 
 /// Plays the log through separate processes and collects what they report.
@@ -291,11 +291,12 @@ impl NodeProcess {
         for param in replay.params.iter().chain(params).chain([&report_file]) {
             command.args(["-p", param]);
         }
-        if std::env::var_os("ROS_DOMAIN_ID").is_none() {
-            command.env("ROS_DOMAIN_ID", DOMAIN);
+        if let Some(domain) = &replay.domain {
+            command.env("ROS_DOMAIN_ID", domain.id().to_string());
         }
         command
-            .env("ROS_LOCALHOST_ONLY", "1")
+            .env_remove("ROS_LOCALHOST_ONLY")
+            .env("ROS_AUTOMATIC_DISCOVERY_RANGE", "LOCALHOST")
             .stdin(Stdio::null())
             .stdout(Stdio::null())
             .stderr(Stdio::piped());
