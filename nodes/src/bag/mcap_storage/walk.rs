@@ -1,4 +1,4 @@
-//! Walks the records of an MCAP data section or chunk (https://mcap.dev/spec), without trust.
+//! Walks the records of an MCAP data section or chunk (<https://mcap.dev/spec>), without trust.
 
 use std::io::{self, Read};
 
