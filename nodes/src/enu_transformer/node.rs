@@ -109,13 +109,13 @@ fn subscribe_ins(
 ) -> Result<Vec<Subscription>, NodeError> {
     let params = node.params();
     let topic = params.string("ins.topic", "ins")?;
+    let imu = params.string("ins.imu_topic", "imu")?;
     let ins = match source {
         InsSource::Inspva => subscribe(node, &topic, Qos::INS, inbox, Event::Inspva),
         InsSource::Inspvax => subscribe(node, &topic, Qos::INS, inbox, Event::Inspvax),
         InsSource::Odometry => subscribe(node, &topic, Qos::INS, inbox, Event::Odometry),
         InsSource::Pose => subscribe(node, &topic, Qos::INS, inbox, Event::Pose),
         InsSource::NavsatfixImu => {
-            let imu = params.string("ins.imu_topic", "imu")?;
             let fix = subscribe(node, &topic, Qos::INS, inbox, Event::Fix)?;
             return Ok(vec![
                 fix,
