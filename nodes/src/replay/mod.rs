@@ -3,6 +3,7 @@
 //! Messages pass in the order of the log, so the map depends on nothing else.
 
 mod domain;
+mod node_process;
 pub mod processes;
 mod topics;
 
