@@ -8,7 +8,8 @@ use rustc_hash::{FxHashMap, FxHashSet};
 use thiserror::Error;
 
 use super::distortion::{Distortion, DistortionSums};
-use super::{OFFSET_UNIT_M, Voxel};
+use super::{InsertReport, OFFSET_UNIT_M, Voxel, VoxelStore};
+use crate::cloud::Cloud;
 use crate::lattice::{Key, Lattice};
 
 /// The datum is not finite or too many cells from the origin of the map frame.
@@ -188,14 +189,62 @@ impl VoxelList {
             return Err(fault);
         }
         let counted: u64 = self.slots.values().map(|slot| u64::from(slot.count)).sum();
-        let saturated = self.slots.values().any(|slot| slot.count == u32::MAX);
-        if counted > self.sums.points || (counted < self.sums.points && !saturated) {
+        if counted > self.sums.points {
             return Err(format!(
                 "voxels hold {counted} points, statistics {}",
                 self.sums.points
             ));
         }
         self.validate_changes()
+    }
+}
+
+impl VoxelStore for VoxelList {
+    fn lattice(&self) -> &Lattice {
+        &self.lattice
+    }
+
+    fn datum_index(&self) -> [i64; 3] {
+        self.datum_index
+    }
+
+    fn datum_m(&self) -> Vector3<f64> {
+        self.datum_m
+    }
+
+    fn len(&self) -> usize {
+        self.slots.len()
+    }
+
+    fn contains(&self, key: Key) -> bool {
+        self.slots.contains_key(&key)
+    }
+
+    fn sorted_keys(&self) -> Vec<Key> {
+        let mut keys: Vec<Key> = self.slots.keys().copied().collect();
+        keys.par_sort_unstable();
+        keys
+    }
+
+    fn insert(&mut self, cloud: &Cloud) -> InsertReport {
+        VoxelList::insert(self, cloud)
+    }
+
+    fn remove(&mut self, key: Key) -> bool {
+        let Some(slot) = self.slots.remove(&key) else {
+            return false;
+        };
+        if slot.changed {
+            self.changed.retain(|k| *k != key);
+        }
+        if slot.announced {
+            self.removed.insert(key);
+        }
+        true
+    }
+
+    fn bytes(&self) -> usize {
+        self.slots.capacity() * (size_of::<(Key, Slot)>() + 1)
     }
 }
 

@@ -12,6 +12,7 @@ mod exposed;
 mod insert;
 mod list;
 mod merge;
+mod store;
 mod voxel;
 
 pub use changes::Changes;
@@ -19,6 +20,7 @@ pub use distortion::Distortion;
 pub use insert::InsertReport;
 pub use list::{DatumError, VoxelList};
 pub use merge::MergeError;
+pub use store::VoxelStore;
 pub use voxel::{OFFSET_UNIT_M, Voxel};
 
 #[cfg(test)]
