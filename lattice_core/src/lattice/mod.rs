@@ -3,7 +3,9 @@
 //! A lattice is all `G w` for integer `w`, with the generator matrix `G` of Ryde & Brünig 2011,
 //! eq. (8)-(12), scaled to a cell volume. [`Lattice::quantize`] finds the cell of a point.
 
+mod batch;
 mod closed_form;
+mod code;
 mod generator;
 mod key;
 mod kind;
@@ -18,7 +20,9 @@ use thiserror::Error;
 
 use closed_form::{ClosedForm, Quantizer, with_form};
 
+pub use batch::{BatchQuantizer, BatchSums, Simd};
 pub(crate) use closed_form::nearest_integer;
+pub use code::CellCode;
 pub use key::Key;
 pub use kind::LatticeKind;
 pub use voronoi::{CellFace, VoronoiCell};

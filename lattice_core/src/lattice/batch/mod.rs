@@ -1,0 +1,320 @@
+//! Many points at once: the fast way to the answer of [`Lattice::quantize`].
+//!
+//! Points go through a single precision kernel that knows which of its answers are certain
+//! (`kernel`); the others, some in a thousand, go through the double precision closed form. So the
+//! batch gives what single points give, to the bit, on every machine and instruction set.
+
+mod form;
+mod kernel;
+mod simd;
+
+use nalgebra::{Isometry3, Matrix3, Vector3};
+
+use super::{CellCode, Lattice, LatticeKind};
+use form::{Bcc, Cubic, Fcc, Form, Hex, Mcc};
+use kernel::{BLOCK, Constants, Lane, LaneSums, Lanes, STEPS};
+pub use simd::Simd;
+
+/// Half of one unit in the last place of 1.
+const EPSILON: f64 = 1.0 / (1_u64 << 24) as f64;
+/// The kernel answers for points less than this many cuboid sides from the phase's lattice point,
+const KERNEL_REACH: f64 = (1 << 17) as f64;
+/// which has indices smaller than this.
+const BASE_LIMIT: u64 = 1 << 18;
+
+/// Quantizes batches of points that share a rigid transform to the lattice.
+#[derive(Clone, Debug)]
+pub struct BatchQuantizer {
+    lattice: Lattice,
+    lattice_from_points: Isometry3<f64>,
+    rotation: Option<Matrix3<f64>>,
+    kernel: Option<Kernel>,
+    side_m: f64,
+}
+
+#[derive(Clone, Debug)]
+struct Kernel {
+    run: simd::Run,
+    run_with_statistics: simd::Run,
+    one: fn(&Constants, [f32; 3]) -> Lane,
+    constants: Constants,
+}
+
+/// Sums over the points of a batch, in 1/2^20 of a cell side (cube root of the cell volume).
+#[derive(Clone, Copy, PartialEq, Eq, Debug, Default)]
+pub struct BatchSums {
+    /// Number of points.
+    pub points: u64,
+    /// Of distances from the lattice points.
+    pub distances: u64,
+    /// Of squared distances.
+    pub squares: u64,
+    /// The largest squared distance.
+    pub largest_square: u64,
+}
+
+impl BatchSums {
+    /// Adds other points.
+    pub fn add(&mut self, other: &BatchSums) {
+        self.points += other.points;
+        self.distances += other.distances;
+        self.squares += other.squares;
+        self.largest_square = self.largest_square.max(other.largest_square);
+    }
+}
+
+impl BatchQuantizer {
+    /// For points whose coordinates in the lattice are `lattice_from_points * p`, metres.
+    pub fn new(lattice: &Lattice, lattice_from_points: Isometry3<f64>) -> BatchQuantizer {
+        Self::with_simd(lattice, lattice_from_points, Simd::detect())
+    }
+
+    /// [`BatchQuantizer::new`] with a choice of instructions, which never changes an answer.
+    pub fn with_simd(
+        lattice: &Lattice,
+        lattice_from_points: Isometry3<f64>,
+        simd: Simd,
+    ) -> BatchQuantizer {
+        let rotates = lattice_from_points.rotation != nalgebra::UnitQuaternion::identity();
+        let rotation = rotates.then(|| *lattice_from_points.rotation.to_rotation_matrix().matrix());
+        BatchQuantizer {
+            lattice: lattice.clone(),
+            lattice_from_points,
+            rotation,
+            kernel: Kernel::new(lattice, &lattice_from_points, simd),
+            side_m: super::generator::cube_root(lattice.cell_volume_m3()),
+        }
+    }
+
+    /// The point in the lattice, metres: rotated, then moved, each in double precision.
+    #[inline]
+    pub fn transform(&self, p: [f32; 3]) -> Vector3<f64> {
+        let p = Vector3::from(p.map(f64::from));
+        let turned = match &self.rotation {
+            Some(rotation) => rotation * p,
+            None => p,
+        };
+        self.lattice_from_points.translation.vector + turned
+    }
+
+    /// Appends the cell of each point, [`CellCode::NONE`] where [`Lattice::quantize`] of the
+    /// transformed point gives none.
+    pub fn codes(&self, points: &[[f32; 3]], codes: &mut Vec<CellCode>) {
+        codes.reserve(points.len());
+        self.for_blocks(points, |block| codes.extend_from_slice(block));
+    }
+
+    /// Visits the cells of up to [`BatchQuantizer::BLOCK`] points at a time, in order.
+    #[inline]
+    pub fn for_blocks(&self, points: &[[f32; 3]], mut visit: impl FnMut(&[CellCode])) {
+        self.blocks::<false>(points, |codes, _| visit(codes));
+    }
+
+    /// [`BatchQuantizer::for_blocks`] with the quantization error of the points that have a cell.
+    #[inline]
+    pub fn for_blocks_with_sums(
+        &self,
+        points: &[[f32; 3]],
+        visit: impl FnMut(&[CellCode], &BatchSums),
+    ) {
+        self.blocks::<true>(points, visit);
+    }
+
+    /// Most points in a block.
+    pub const BLOCK: usize = BLOCK;
+
+    #[inline]
+    fn blocks<const STATISTICS: bool>(
+        &self,
+        points: &[[f32; 3]],
+        mut visit: impl FnMut(&[CellCode], &BatchSums),
+    ) {
+        let mut lanes = Lanes::default();
+        let (blocks, rest) = points.as_chunks::<BLOCK>();
+        for block in blocks {
+            let sums = self.block::<STATISTICS>(block, BLOCK, &mut lanes);
+            visit(&lanes.codes, &sums);
+        }
+        if !rest.is_empty() {
+            let mut block = [[f32::NAN; 3]; BLOCK];
+            block
+                .iter_mut()
+                .zip(rest)
+                .for_each(|(to, from)| *to = *from);
+            let sums = self.block::<STATISTICS>(&block, rest.len(), &mut lanes);
+            visit(lanes.codes.get(..rest.len()).unwrap_or_default(), &sums);
+        }
+    }
+
+    /// Fills the codes of the first `used` points.
+    #[inline]
+    fn block<const STATISTICS: bool>(
+        &self,
+        points: &[[f32; 3]; BLOCK],
+        used: usize,
+        lanes: &mut Lanes,
+    ) -> BatchSums {
+        let sums = match &self.kernel {
+            Some(kernel) if STATISTICS => {
+                (kernel.run_with_statistics)(&kernel.constants, points, lanes)
+            }
+            Some(kernel) => (kernel.run)(&kernel.constants, points, lanes),
+            None => {
+                lanes.decided.fill(0);
+                LaneSums::default()
+            }
+        };
+        let mut sums = BatchSums {
+            points: used as u64,
+            distances: sums.distances as u64,
+            squares: sums.squares as u64,
+            largest_square: sums.largest_square as u64,
+        };
+        // One bit for each eight points that are not all decided.
+        let groups = lanes.decided.as_chunks::<8>().0.iter();
+        let mut open = groups.rev().fold(0_u32, |open, marks| {
+            open << 1 | u32::from(marks.iter().fold(-1, |all, mark| all & mark) == 0)
+        });
+        while open != 0 {
+            let first = 8 * open.trailing_zeros() as usize;
+            self.settle(points, first..(first + 8).min(used), lanes, &mut sums);
+            open &= open - 1;
+        }
+        sums
+    }
+
+    /// Decides what the kernel could not.
+    #[cold]
+    fn settle(
+        &self,
+        points: &[[f32; 3]; BLOCK],
+        places: std::ops::Range<usize>,
+        lanes: &mut Lanes,
+        sums: &mut BatchSums,
+    ) {
+        for i in places {
+            let (Some(&p), Some(code), Some(&decided)) =
+                (points.get(i), lanes.codes.get_mut(i), lanes.decided.get(i))
+            else {
+                continue;
+            };
+            if decided != 0 {
+                continue;
+            }
+            let (exact, own) = self.exactly(p);
+            *code = exact;
+            if exact == CellCode::NONE {
+                sums.points -= 1;
+            } else {
+                sums.distances += own.distances;
+                sums.squares += own.squares;
+                sums.largest_square = sums.largest_square.max(own.largest_square);
+            }
+        }
+    }
+
+    /// Code and quantization error of one point in double precision.
+    fn exactly(&self, p: [f32; 3]) -> (CellCode, BatchSums) {
+        let p = self.transform(p);
+        let found = self.lattice.quantize(&p);
+        let Some((w, code)) = found.and_then(|w| Some((w, CellCode::pack(w)?))) else {
+            return (CellCode::NONE, BatchSums::default());
+        };
+        let off = (p - self.lattice.center(w)) / self.side_m;
+        let square = (off.x * off.x + off.y * off.y + off.z * off.z) as f32;
+        let square_steps = kernel::to_int(square * STEPS) as u64;
+        let sums = BatchSums {
+            points: 1,
+            distances: kernel::to_int(square.sqrt() * STEPS) as u64,
+            squares: square_steps,
+            largest_square: square_steps,
+        };
+        (code, sums)
+    }
+
+    /// What one point adds to the sums of [`BatchQuantizer::for_blocks_with_sums`].
+    pub fn sums_of(&self, p: [f32; 3]) -> BatchSums {
+        if let Some(kernel) = &self.kernel {
+            let lane = (kernel.one)(&kernel.constants, p);
+            if lane.decided != 0 {
+                return BatchSums {
+                    points: 1,
+                    distances: lane.distance as u64,
+                    squares: lane.square as u64,
+                    largest_square: lane.square as u64,
+                };
+            }
+        }
+        self.exactly(p).1
+    }
+}
+
+impl Kernel {
+    fn new(lattice: &Lattice, lattice_from_points: &Isometry3<f64>, simd: Simd) -> Option<Kernel> {
+        let generator = lattice.generator();
+        let (axes, squares) = form::axes(lattice.kind(), &generator)?;
+        let side_m = super::generator::cube_root(lattice.cell_volume_m3());
+        let u_from_lattice = axes * generator.try_inverse()?;
+        let m = u_from_lattice * lattice_from_points.rotation.to_rotation_matrix();
+        let translation = lattice_from_points.translation.vector;
+        let base = lattice.quantize_wide(&translation)?;
+        if base.iter().any(|i| i.unsigned_abs() >= BASE_LIMIT) {
+            return None;
+        }
+        let phase = u_from_lattice * (translation - lattice.center_wide(base));
+        let largest = m.amax();
+        // Of the products and sums of the closed form, were the point at the far end of the keys.
+        let far = u_from_lattice.amax() * translation.lp_norm(1);
+        let diagonal = m == Matrix3::from_diagonal(&m.diagonal());
+        // Products of two rounded numbers, their sum, and the phase added.
+        let roundings = if diagonal { 3.0 } else { 5.0 };
+        let weights = squares.map(|s| (s / squares[0]) as f32);
+        let centred_weight: f32 = weights.iter().sum();
+        let constants = Constants {
+            rows: [0, 1, 2].map(|i| [0, 1, 2].map(|j| m[(i, j)] as f32)),
+            phase: [phase.x as f32, phase.y as f32, phase.z as f32],
+            base: base.map(|i| i as i32 + (1 << 20)),
+            weights,
+            threshold: 0.0,
+            excess_per_error: 1.25 * centred_weight,
+            squared_sides: squares.map(|s| (s / (side_m * side_m)) as f32),
+            error_per_metre: (1.01 * roundings * EPSILON * largest) as f32,
+            error: (8.0 * EPSILON + 1e-14 * far) as f32,
+            reach_m: (KERNEL_REACH / largest) as f32,
+        };
+        Some(match lattice.kind() {
+            LatticeKind::Cubic => Self::of::<Cubic>(constants, diagonal, simd),
+            LatticeKind::Bcc => Self::of::<Bcc>(constants, diagonal, simd),
+            LatticeKind::Fcc => Self::of::<Fcc>(constants, diagonal, simd),
+            LatticeKind::Mcc => Self::of::<Mcc>(constants, diagonal, simd),
+            LatticeKind::Hex => Self::of::<Hex>(constants, diagonal, simd),
+        })
+    }
+
+    fn of<F: Form>(mut constants: Constants, diagonal: bool, simd: Simd) -> Kernel {
+        constants.threshold = F::threshold(constants.weights);
+        let (run, run_with_statistics, one): (_, _, fn(&Constants, [f32; 3]) -> Lane) = if diagonal
+        {
+            (
+                simd.run::<F, true, false>(),
+                simd.run::<F, true, true>(),
+                kernel::lane::<F, true>,
+            )
+        } else {
+            (
+                simd.run::<F, false, false>(),
+                simd.run::<F, false, true>(),
+                kernel::lane::<F, false>,
+            )
+        };
+        Kernel {
+            run,
+            run_with_statistics,
+            one,
+            constants,
+        }
+    }
+}
+
+#[cfg(test)]
+mod tests;
