@@ -7,7 +7,7 @@ use rustc_hash::FxHashMap;
 use super::distortion::DistortionSums;
 use super::{OFFSET_UNIT_M, Voxel, VoxelList};
 use crate::cloud::Cloud;
-use crate::lattice::{Key, Lattice, nearest_integer};
+use crate::lattice::{BatchQuantizer, BatchSums, CellCode, Key, Lattice, nearest_integer};
 
 /// Points that one task quantizes.
 const CHUNK: usize = 4096;
@@ -29,6 +29,51 @@ pub struct InsertReport {
     pub list_full: u64,
     /// Voxels that were not in the list before.
     pub new_voxels: u64,
+}
+
+impl InsertReport {
+    /// Counts the points of a batch that have no cell, by reason.
+    #[inline]
+    pub(super) fn count_rejects(
+        &mut self,
+        quantizer: &BatchQuantizer,
+        points: &[[f32; 3]],
+        codes: &[CellCode],
+        sums: &BatchSums,
+    ) {
+        if sums.points < codes.len() as u64 {
+            self.count_each_reject(quantizer, points, codes);
+        }
+    }
+
+    #[cold]
+    fn count_each_reject(
+        &mut self,
+        quantizer: &BatchQuantizer,
+        points: &[[f32; 3]],
+        codes: &[CellCode],
+    ) {
+        for (point, code) in points.iter().zip(codes) {
+            if *code == CellCode::NONE {
+                let finite = quantizer.transform(*point).iter().all(|x| x.is_finite());
+                *(if finite {
+                    &mut self.out_of_range
+                } else {
+                    &mut self.not_finite
+                }) += 1;
+            }
+        }
+    }
+
+    /// Adds what became of other points.
+    pub(super) fn add(&mut self, other: &InsertReport) {
+        self.points += other.points;
+        self.inserted += other.inserted;
+        self.not_finite += other.not_finite;
+        self.out_of_range += other.out_of_range;
+        self.list_full += other.list_full;
+        self.new_voxels += other.new_voxels;
+    }
 }
 
 /// The points of one chunk in one cell.

@@ -9,9 +9,14 @@ pub mod file;
 mod changes;
 mod distortion;
 mod exposed;
+mod grow;
+mod index;
 mod insert;
 mod list;
 mod merge;
+mod morton;
+mod occupancy;
+mod recent;
 mod store;
 mod voxel;
 
@@ -20,6 +25,7 @@ pub use distortion::Distortion;
 pub use insert::InsertReport;
 pub use list::{DatumError, VoxelList};
 pub use merge::MergeError;
+pub use occupancy::OccupancyList;
 pub use store::VoxelStore;
 pub use voxel::{OFFSET_UNIT_M, Voxel};
 

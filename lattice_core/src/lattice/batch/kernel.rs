@@ -85,11 +85,12 @@ pub(super) fn lane<F: Form, const DIAGONAL: bool>(c: &Constants, [x, y, z]: [f32
     let (ax, ay, az) = (rest_x.abs(), rest_y.abs(), rest_z.abs());
     let size = x.abs() + y.abs() + z.abs();
     let error = size * c.error_per_metre + c.error;
-    let inside = 0.5 - error;
-    // False for NaN, wherever it came from.
-    let mut decided = (size < c.reach_m) & (ax < inside) & (ay < inside) & (az < inside);
     let mut doubled = [near_x, near_y, near_z].map(|near| Wrapping(near) << 1);
+    // Distances along the axes from the point that was chosen. Near a half, the next one along the
+    // axis is as near.
     let (mut dx, mut dy, mut dz) = (ax, ay, az);
+    // False for NaN, wherever it came from.
+    let mut decided = size < c.reach_m;
     if F::CENTRED {
         let mut excess = c.weights[0] * ax + c.weights[1] * ay;
         if F::CENTRED_Z {
@@ -103,12 +104,14 @@ pub(super) fn lane<F: Form, const DIAGONAL: bool>(c: &Constants, [x, y, z]: [f32
         let towards = |rest: f32| Wrapping(((rest.to_bits() as i32 >> 31) | 1) & mask);
         doubled[0] += towards(rest_x);
         doubled[1] += towards(rest_y);
-        (dx, dy) = (ax - half, ay - half);
+        (dx, dy) = ((ax - half).abs(), (ay - half).abs());
         if F::CENTRED_Z {
             doubled[2] += towards(rest_z);
-            dz = az - half;
+            dz = (az - half).abs();
         }
     }
+    let inside = 0.5 - error;
+    decided &= (dx < inside) & (dy < inside) & (dz < inside);
     let w = F::index(doubled);
     let offset = [0, 1, 2].map(|i| w[i].0.wrapping_add(c.base[i]) as u32);
     let s = &c.squared_sides;

@@ -101,13 +101,14 @@ impl BatchQuantizer {
     /// transformed point gives none.
     pub fn codes(&self, points: &[[f32; 3]], codes: &mut Vec<CellCode>) {
         codes.reserve(points.len());
-        self.for_blocks(points, |block| codes.extend_from_slice(block));
+        self.for_blocks(points, |block, _| codes.extend_from_slice(block));
     }
 
-    /// Visits the cells of up to [`BatchQuantizer::BLOCK`] points at a time, in order.
+    /// Visits the cells of up to [`BatchQuantizer::BLOCK`] points at a time, in order. Of the sums
+    /// only the number of points with a cell is kept.
     #[inline]
-    pub fn for_blocks(&self, points: &[[f32; 3]], mut visit: impl FnMut(&[CellCode])) {
-        self.blocks::<false>(points, |codes, _| visit(codes));
+    pub fn for_blocks(&self, points: &[[f32; 3]], visit: impl FnMut(&[CellCode], &BatchSums)) {
+        self.blocks::<false>(points, visit);
     }
 
     /// [`BatchQuantizer::for_blocks`] with the quantization error of the points that have a cell.

@@ -15,15 +15,17 @@ fn single(lattice: &Lattice, p: &Vector3<f64>) -> CellCode {
     w.and_then(CellCode::pack).unwrap_or(CellCode::NONE)
 }
 
-/// Points in units of the cell side, many of them on borders of cells.
+/// Points in units of the basis vectors, many of them near borders of cells.
 fn points() -> impl Strategy<Value = Vec<[f32; 3]>> {
-    let any = prop_oneof![
-        (-300..300_i32).prop_map(|i| i as f32 * 0.25),
-        -1e3..1e3_f32,
-        -1e6..1e6_f32,
-        any::<f32>(),
-    ];
-    prop::collection::vec(prop::array::uniform3(any), 0..300)
+    let quarters = prop::array::uniform3(-300..300_i32);
+    let near_borders =
+        (quarters, prop::array::uniform3(-9..9_i32), 0..2_u8).prop_map(|(quarters, off, all)| {
+            // In a direction of the lattice, or off in all of them.
+            let off = if all == 0 { [off[0], 0, 0] } else { off };
+            [0, 1, 2].map(|i| quarters[i] as f32 * 0.25 + off[i] as f32 * 3e-6)
+        });
+    let any = prop::array::uniform3(prop_oneof![-1e3..1e3_f32, -1e6..1e6_f32, any::<f32>()]);
+    prop::collection::vec(prop_oneof![3 => near_borders, 1 => any], 0..600)
 }
 
 fn transforms() -> impl Strategy<Value = Isometry3<f64>> {
@@ -40,7 +42,8 @@ proptest! {
     #[test]
     fn a_batch_gives_what_single_points_give(lattice in lattices(), points in points(), transform in transforms()) {
         let side = lattice.cell_volume_m3().cbrt();
-        let points: Vec<[f32; 3]> = points.iter().map(|p| p.map(|x| x * side as f32)).collect();
+        let basis = lattice.generator().cast::<f32>();
+        let points: Vec<[f32; 3]> = points.iter().map(|p| (basis * Vector3::from(*p)).into()).collect();
         let mut transform = transform;
         transform.translation.vector *= side;
         let mut answers = Vec::new();

@@ -1,0 +1,253 @@
+//! From 63-bit codes to dense numbers 0, 1, 2, ...
+
+use std::hash::{BuildHasher, RandomState};
+use std::sync::LazyLock;
+
+use super::grow;
+
+/// Slots at the start.
+const FIRST_SLOTS: usize = 64;
+/// Slots are doubled beyond this share in use: n / d.
+const FULL: (usize, usize) = (3, 4);
+/// A slot that holds nothing.
+const FREE: u64 = 0;
+/// The half of a slot that is of the hash; the other is the number plus 1.
+const TAG: u64 = 0xffff_ffff_0000_0000;
+const MIX: u64 = 0x9e37_79b9_7f4a_7c15;
+
+#[inline(always)]
+fn number_in(slot: u64) -> u32 {
+    (slot as u32).wrapping_sub(1)
+}
+
+/// A hash table without values: codes get numbers in the order of their arrival.
+///
+/// Whatever belongs to a code lives in vectors with that number, so that codes that came together
+/// lie together. A slot holds the number plus 1 and half of the hash: most probes touch one line of
+/// memory. The hash is seeded for each process against inputs made to collide.
+#[derive(Clone)]
+pub(super) struct CodeIndex {
+    slots: Vec<u64>,
+    codes: Vec<u64>,
+    shift: u32,
+    seed: u64,
+}
+
+/// Where a code is.
+#[derive(Clone, Copy, PartialEq, Eq, Debug)]
+pub(super) enum Place {
+    /// It was there.
+    Known(u32),
+    /// It has just been added, with the next number.
+    New(u32),
+}
+
+impl CodeIndex {
+    pub(super) fn new() -> CodeIndex {
+        static SEED: LazyLock<u64> = LazyLock::new(|| RandomState::new().hash_one(0) | 1);
+        CodeIndex {
+            slots: vec![FREE; FIRST_SLOTS],
+            codes: Vec::new(),
+            shift: 64 - FIRST_SLOTS.trailing_zeros(),
+            seed: *SEED,
+        }
+    }
+
+    /// Number of codes.
+    pub(super) fn len(&self) -> usize {
+        self.codes.len()
+    }
+
+    /// All codes in the order of their numbers.
+    pub(super) fn codes(&self) -> &[u64] {
+        &self.codes
+    }
+
+    pub(super) fn bytes(&self) -> usize {
+        8 * (self.slots.capacity() + self.codes.capacity())
+    }
+
+    /// Where the search for a code begins, and the tag of its slot.
+    #[inline(always)]
+    fn home(&self, code: u64) -> (usize, u64) {
+        let product = code.wrapping_mul(self.seed);
+        let hash = (product ^ (product >> 32)).wrapping_mul(MIX);
+        ((hash >> self.shift) as usize, hash << 32)
+    }
+
+    #[inline(always)]
+    fn slot(&self, at: usize) -> u64 {
+        self.slots.get(at).copied().unwrap_or(FREE)
+    }
+
+    #[inline(always)]
+    fn code(&self, number: u32) -> u64 {
+        self.codes.get(number as usize).copied().unwrap_or(u64::MAX)
+    }
+
+    fn put(&mut self, at: usize, slot: u64) {
+        if let Some(to) = self.slots.get_mut(at) {
+            *to = slot;
+        }
+    }
+
+    /// The first slot from the home of a code that is free or holds what `wanted` says.
+    #[inline(always)]
+    fn search(&self, code: u64, wanted: impl Fn(u64, u64) -> bool) -> (usize, u64) {
+        let (mut at, tag) = self.home(code);
+        let mask = self.slots.len().wrapping_sub(1);
+        loop {
+            let slot = self.slot(at & mask);
+            if slot == FREE || wanted(slot, tag) {
+                return (at & mask, slot);
+            }
+            at = at.wrapping_add(1);
+        }
+    }
+
+    /// The slot that holds a code, or the free one where it belongs.
+    #[inline(always)]
+    fn slot_of(&self, code: u64) -> (usize, u64) {
+        self.search(code, |slot, tag| {
+            slot & TAG == tag && self.code(number_in(slot)) == code
+        })
+    }
+
+    /// The number of a code.
+    #[inline(always)]
+    pub(super) fn find(&self, code: u64) -> Option<u32> {
+        let (_, slot) = self.slot_of(code);
+        (slot != FREE).then(|| number_in(slot))
+    }
+
+    /// The number of a code, which is added if it is new and fewer than `limit` are there.
+    #[inline(always)]
+    pub(super) fn find_or_add(&mut self, code: u64, limit: usize) -> Option<Place> {
+        let (at, slot) = self.slot_of(code);
+        if slot == FREE {
+            self.add(at, code, limit).map(Place::New)
+        } else {
+            Some(Place::Known(number_in(slot)))
+        }
+    }
+
+    #[inline(never)]
+    fn add(&mut self, at: usize, code: u64, limit: usize) -> Option<u32> {
+        let number = self.codes.len();
+        if number >= limit.min(u32::MAX as usize - 1) {
+            return None;
+        }
+        self.put(at, self.home(code).1 | (number as u64 + 1));
+        grow::push(&mut self.codes, code);
+        if self.codes.len() * FULL.1 > self.slots.len() * FULL.0 {
+            self.rebuild(self.slots.len() * 2);
+        }
+        Some(number as u32)
+    }
+
+    /// Makes the slots anew from the codes.
+    fn rebuild(&mut self, slots: usize) {
+        self.slots = vec![FREE; slots];
+        self.shift = 64 - slots.trailing_zeros();
+        for number in 0..self.codes.len() {
+            let code = self.code(number as u32);
+            let (at, _) = self.search(code, |_, _| false);
+            self.put(at, self.home(code).1 | (number as u64 + 1));
+        }
+    }
+
+    /// Removes a code; the last code takes its number, which is given.
+    pub(super) fn remove(&mut self, code: u64) -> Option<u32> {
+        let (at, slot) = self.slot_of(code);
+        if slot == FREE {
+            return None;
+        }
+        let number = number_in(slot);
+        let last = self.codes.len() as u32 - 1;
+        if number != last {
+            let (moved, tagged) = self.slot_of(self.code(last));
+            self.put(moved, (tagged & TAG) | (u64::from(number) + 1));
+        }
+        self.codes.swap_remove(number as usize);
+        self.free(at);
+        Some(number)
+    }
+
+    /// Empties a slot and moves later ones of the run back, so that no search ends too early.
+    fn free(&mut self, mut hole: usize) {
+        let mask = self.slots.len() - 1;
+        let mut at = hole;
+        loop {
+            at = (at + 1) & mask;
+            let slot = self.slot(at);
+            if slot == FREE {
+                break;
+            }
+            let home = self.home(self.code(number_in(slot))).0;
+            // Whether the hole is on the way from its home.
+            if at.wrapping_sub(home) & mask >= at.wrapping_sub(hole) & mask {
+                self.put(hole, slot);
+                hole = at;
+            }
+        }
+        self.put(hole, FREE);
+    }
+
+    pub(super) fn clear(&mut self) {
+        *self = CodeIndex::new();
+    }
+
+    /// Checks that every code is found under its number and nothing else is in the slots.
+    pub(super) fn validate(&self) -> Result<(), String> {
+        for (number, &code) in self.codes.iter().enumerate() {
+            if self.find(code) != Some(number as u32) {
+                return Err(format!("code {code:#x} is not found under number {number}"));
+            }
+        }
+        let used = self.slots.iter().filter(|slot| **slot != FREE).count();
+        if used == self.codes.len() {
+            Ok(())
+        } else {
+            Err(format!("{used} slots for {} codes", self.codes.len()))
+        }
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use std::collections::HashMap;
+
+    use proptest::prelude::*;
+
+    use super::*;
+
+    proptest! {
+        #[test]
+        fn it_is_a_map_to_dense_numbers(steps in prop::collection::vec((0_u64..90, 0..4_u8), 0..400), scale in 0..50_u32) {
+            let mut index = CodeIndex::new();
+            let mut model: HashMap<u64, u32> = HashMap::new();
+            for (code, step) in steps {
+                let code = code << scale;
+                let len = model.len() as u32;
+                if step == 0 {
+                    let removed = index.remove(code);
+                    prop_assert_eq!(removed, model.remove(&code));
+                    if let Some(number) = removed {
+                        model.values_mut().filter(|n| **n == len - 1).for_each(|n| *n = number);
+                    }
+                } else {
+                    let known = model.get(&code).copied();
+                    let expected = known.map_or(Place::New(len), Place::Known);
+                    let expected = (known.is_some() || len < 60).then_some(expected);
+                    prop_assert_eq!(index.find_or_add(code, 60), expected);
+                    if expected == Some(Place::New(len)) {
+                        model.insert(code, len);
+                    }
+                }
+                prop_assert_eq!(index.find(code), model.get(&code).copied());
+            }
+            prop_assert_eq!(index.len(), model.len());
+            prop_assert_eq!(index.validate(), Ok(()));
+        }
+    }
+}

@@ -1,0 +1,60 @@
+//! Cells of blocks in the order of their keys.
+
+use rayon::slice::ParallelSliceMut;
+
+use super::occupancy::Leaf;
+use crate::lattice::{CellCode, Key};
+
+/// The low nine bits of the key of each place in a block.
+static MORTON_OF_PLACE: [u16; CellCode::BLOCK_CELLS] = {
+    let mut table = [0; CellCode::BLOCK_CELLS];
+    let mut place = 0;
+    while place < table.len() {
+        let (mut bit, mut morton) = (0, 0);
+        while bit < 3 {
+            morton |= (place >> (6 + bit) & 1) << (3 * bit);
+            morton |= (place >> (3 + bit) & 1) << (3 * bit + 1);
+            morton |= (place >> bit & 1) << (3 * bit + 2);
+            bit += 1;
+        }
+        table[place] = morton as u16;
+        place += 1;
+    }
+    table
+};
+
+/// Positions of the bits that are set.
+#[inline]
+pub(super) fn places(leaf: &Leaf) -> impl Iterator<Item = usize> + '_ {
+    leaf.iter().enumerate().flat_map(|(word, &bits)| {
+        let mut bits = bits;
+        std::iter::from_fn(move || {
+            let bit = (bits != 0).then(|| bits.trailing_zeros() as usize)?;
+            bits &= bits - 1;
+            Some(64 * word + bit)
+        })
+    })
+}
+
+/// All `len` cells of the blocks as ascending keys: blocks are sorted, not cells.
+pub(super) fn sorted_keys(blocks: &[u64], leaves: &[Leaf], len: usize) -> Vec<Key> {
+    let first_key = |block: u64| CellCode::from_raw(block << 9).and_then(CellCode::key);
+    let mut order: Vec<(u64, &Leaf)> = blocks
+        .iter()
+        .zip(leaves)
+        .filter_map(|(&block, leaf)| Some((first_key(block)?.raw(), leaf)))
+        .collect();
+    order.par_sort_unstable_by_key(|&(key, _)| key);
+    let mut keys = Vec::with_capacity(len);
+    for (first, leaf) in order {
+        let mut turned: Leaf = [0; 8];
+        for place in places(leaf) {
+            let morton = usize::from(MORTON_OF_PLACE.get(place).copied().unwrap_or(0));
+            if let Some(word) = turned.get_mut(morton >> 6) {
+                *word |= 1 << (morton & 63);
+            }
+        }
+        keys.extend(places(&turned).filter_map(|low| Key::from_raw(first | low as u64)));
+    }
+    keys
+}

@@ -1,0 +1,342 @@
+//! The store that keeps one bit for a voxel.
+
+use std::fmt;
+
+use nalgebra::Vector3;
+use rayon::prelude::*;
+
+use super::grow;
+use super::index::{CodeIndex, Place};
+use super::recent::Recent;
+use super::{DatumError, InsertReport, VoxelStore};
+use crate::cloud::Cloud;
+use crate::lattice::{BatchQuantizer, CellCode, Key, Lattice};
+
+/// Points that one task quantizes.
+const CHUNK: usize = 1 << 13;
+/// Points between two merges into the list; bounds the memory for what is not yet merged.
+const WAVE: usize = 32 * CHUNK;
+/// Memory for a block, growth of the vectors and of the table included.
+const BLOCK_BYTES: usize = 112;
+
+/// The cells of a block, one bit each, by their place.
+pub(super) type Leaf = [u64; 8];
+
+/// Occupied voxels without payload: blocks of 8 x 8 x 8 indices with one bit for each cell.
+///
+/// The fastest store and the smallest, 3 to 8 bytes a voxel on surfaces. When `max_bytes` is
+/// reached, points in new blocks are refused and counted; blocks that exist go on to take points.
+#[derive(Clone)]
+pub struct OccupancyList {
+    lattice: Lattice,
+    datum_index: [i64; 3],
+    datum_m: Vector3<f64>,
+    max_blocks: usize,
+    pub(super) blocks: CodeIndex,
+    pub(super) leaves: Vec<Leaf>,
+    len: usize,
+    recent: Recent,
+}
+
+impl OccupancyList {
+    /// An empty list that holds at most `max_bytes`, with the datum at the lattice point nearest to
+    /// `datum_near_m` (map frame, metres).
+    pub fn new(
+        lattice: Lattice,
+        datum_near_m: Vector3<f64>,
+        max_bytes: usize,
+    ) -> Result<OccupancyList, DatumError> {
+        let index = lattice.quantize_wide(&datum_near_m);
+        let [x, y, z] = datum_near_m.into();
+        let datum_index = index.ok_or(DatumError { x, y, z })?;
+        Ok(Self::at_datum(lattice, datum_index, max_bytes))
+    }
+
+    /// An empty list that holds at most `max_bytes`, with its datum at a lattice point.
+    pub fn at_datum(lattice: Lattice, datum_index: [i64; 3], max_bytes: usize) -> OccupancyList {
+        OccupancyList {
+            datum_m: lattice.center_wide(datum_index),
+            lattice,
+            datum_index,
+            max_blocks: max_bytes / BLOCK_BYTES,
+            blocks: CodeIndex::new(),
+            leaves: Vec::new(),
+            len: 0,
+            recent: Recent::new(),
+        }
+    }
+
+    /// The cells with these keys, so far as they fit into `max_bytes`.
+    pub fn from_keys(
+        lattice: Lattice,
+        datum_index: [i64; 3],
+        keys: impl IntoIterator<Item = Key>,
+        max_bytes: usize,
+    ) -> OccupancyList {
+        let mut list = Self::at_datum(lattice, datum_index, max_bytes);
+        for key in keys {
+            list.add(key);
+        }
+        list
+    }
+
+    /// Most bytes that the list takes.
+    pub fn max_bytes(&self) -> usize {
+        self.max_blocks.saturating_mul(BLOCK_BYTES)
+    }
+
+    /// Makes a cell occupied; false if the list is full.
+    pub fn add(&mut self, key: Key) -> bool {
+        self.set(CellCode::from(key), &mut Last::default())
+    }
+
+    /// Removes all voxels; keeps lattice, datum and limit.
+    pub fn clear(&mut self) {
+        self.blocks.clear();
+        self.leaves = Vec::new();
+        self.len = 0;
+        self.recent.forget_all();
+    }
+
+    /// Sets the bit of a cell; false if its block is new and the list is full.
+    #[inline(always)]
+    fn set(&mut self, code: CellCode, last: &mut Last) -> bool {
+        let block = code.block();
+        let number = if block == last.block {
+            last.number
+        } else {
+            match self.blocks.find_or_add(block, self.max_blocks) {
+                Some(Place::Known(number)) => number,
+                Some(Place::New(number)) => {
+                    grow::push(&mut self.leaves, [0; 8]);
+                    number
+                }
+                None => return false,
+            }
+        };
+        *last = Last { block, number };
+        let word = self
+            .leaves
+            .get_mut(number as usize)
+            .and_then(|leaf| leaf.get_mut(code.place() >> 6));
+        if let Some(word) = word {
+            let bit = 1 << (code.place() & 63);
+            self.len += usize::from(*word & bit == 0);
+            *word |= bit;
+        }
+        true
+    }
+
+    fn quantizer(&self, cloud: &Cloud) -> BatchQuantizer {
+        let shift = nalgebra::Translation3::from(cloud.datum_m - self.datum_m);
+        BatchQuantizer::new(&self.lattice, shift.into())
+    }
+
+    fn insert_serially(
+        &mut self,
+        quantizer: &BatchQuantizer,
+        points: &[[f32; 3]],
+        report: &mut InsertReport,
+    ) {
+        let mut recent = std::mem::take(&mut self.recent);
+        let mut last = Last::default();
+        let mut place = 0;
+        quantizer.for_blocks(points, |codes, sums| {
+            let here = points.get(place..).unwrap_or_default();
+            place += codes.len();
+            report.count_rejects(quantizer, here, codes, sums);
+            let mut fresh = [CellCode::NONE; BatchQuantizer::BLOCK];
+            let count = recent.sift(codes, &mut fresh);
+            let mut refused = false;
+            for &code in fresh.iter().take(count) {
+                if code != CellCode::NONE && !self.set(code, &mut last) {
+                    recent.forget(code);
+                    refused = true;
+                }
+            }
+            if refused {
+                let outside = |code: &&CellCode| **code != CellCode::NONE && !self.has(**code);
+                report.list_full += codes.iter().filter(outside).count() as u64;
+            }
+        });
+        self.recent = recent;
+    }
+
+    fn insert_wave(
+        &mut self,
+        quantizer: &BatchQuantizer,
+        wave: &[[f32; 3]],
+        report: &mut InsertReport,
+    ) {
+        let sift = |recent: &mut Recent, points: &[[f32; 3]]| {
+            let mut rejects = InsertReport::default();
+            let mut kept = Vec::with_capacity(points.len() / 4);
+            let mut place = 0;
+            recent.forget_all();
+            quantizer.for_blocks(points, |codes, sums| {
+                let here = points.get(place..).unwrap_or_default();
+                place += codes.len();
+                rejects.count_rejects(quantizer, here, codes, sums);
+                let mut fresh = [CellCode::NONE; BatchQuantizer::BLOCK];
+                let count = recent.sift(codes, &mut fresh);
+                kept.extend_from_slice(fresh.get(..count).unwrap_or_default());
+            });
+            (kept, rejects)
+        };
+        let chunks = wave.par_chunks(CHUNK);
+        let sifted: Vec<_> = chunks.map_init(Recent::new, sift).collect();
+        let mut last = Last::default();
+        for (codes, rejects) in &sifted {
+            report.add(rejects);
+            for &code in codes {
+                if code != CellCode::NONE {
+                    self.set(code, &mut last);
+                }
+            }
+        }
+    }
+
+    /// Checks everything that must hold between calls; says what does not.
+    pub fn validate(&self) -> Result<(), String> {
+        self.blocks.validate()?;
+        let bits = |leaf: &Leaf| {
+            leaf.iter()
+                .map(|word| word.count_ones() as usize)
+                .sum::<usize>()
+        };
+        if self.leaves.len() != self.blocks.len() || self.leaves.iter().any(|l| bits(l) == 0) {
+            return Err("a block is empty or has no cells".to_owned());
+        }
+        let counted: usize = self.leaves.iter().map(bits).sum();
+        if counted != self.len {
+            return Err(format!("{counted} cells are set, {} counted", self.len));
+        }
+        if self.blocks.len() > self.max_blocks {
+            return Err(format!(
+                "{} blocks, {} allowed",
+                self.blocks.len(),
+                self.max_blocks
+            ));
+        }
+        self.recent.validate(|code| self.has(code))
+    }
+
+    pub(super) fn has(&self, code: CellCode) -> bool {
+        let leaf = self.blocks.find(code.block());
+        let leaf = leaf.and_then(|number| self.leaves.get(number as usize));
+        leaf.is_some_and(|leaf| is_set(leaf, code.place()))
+    }
+}
+
+/// The block that was found before.
+#[derive(Clone, Copy)]
+struct Last {
+    block: u64,
+    number: u32,
+}
+
+impl Default for Last {
+    fn default() -> Last {
+        Last {
+            block: u64::MAX,
+            number: 0,
+        }
+    }
+}
+
+#[inline(always)]
+pub(super) fn is_set(leaf: &Leaf, place: usize) -> bool {
+    leaf.get(place >> 6)
+        .is_some_and(|word| word >> (place & 63) & 1 != 0)
+}
+
+impl VoxelStore for OccupancyList {
+    fn lattice(&self) -> &Lattice {
+        &self.lattice
+    }
+
+    fn datum_index(&self) -> [i64; 3] {
+        self.datum_index
+    }
+
+    fn datum_m(&self) -> Vector3<f64> {
+        self.datum_m
+    }
+
+    fn len(&self) -> usize {
+        self.len
+    }
+
+    fn contains(&self, key: Key) -> bool {
+        self.has(CellCode::from(key))
+    }
+
+    fn sorted_keys(&self) -> Vec<Key> {
+        super::morton::sorted_keys(self.blocks.codes(), &self.leaves, self.len)
+    }
+
+    /// The outcome does not depend on the number of threads of the current rayon pool.
+    fn insert(&mut self, cloud: &Cloud) -> InsertReport {
+        let points = &cloud.offsets_m[..];
+        let mut report = InsertReport {
+            points: points.len() as u64,
+            ..InsertReport::default()
+        };
+        let before = self.len;
+        let quantizer = self.quantizer(cloud);
+        let threads = rayon::current_num_threads();
+        for wave in points.chunks(WAVE) {
+            let may_fill = self.blocks.len().saturating_add(wave.len()) > self.max_blocks;
+            if threads == 1 || wave.len() <= CHUNK || may_fill {
+                self.insert_serially(&quantizer, wave, &mut report);
+            } else {
+                self.insert_wave(&quantizer, wave, &mut report);
+            }
+        }
+        report.inserted =
+            report.points - report.not_finite - report.out_of_range - report.list_full;
+        report.new_voxels = (self.len - before) as u64;
+        report
+    }
+
+    fn remove(&mut self, key: Key) -> bool {
+        let code = CellCode::from(key);
+        let Some(number) = self.blocks.find(code.block()) else {
+            return false;
+        };
+        let Some(leaf) = self.leaves.get_mut(number as usize) else {
+            return false;
+        };
+        if !is_set(leaf, code.place()) {
+            return false;
+        }
+        if let Some(word) = leaf.get_mut(code.place() >> 6) {
+            *word &= !(1 << (code.place() & 63));
+        }
+        if leaf.iter().all(|word| *word == 0) {
+            self.blocks.remove(code.block());
+            self.leaves.swap_remove(number as usize);
+        }
+        self.recent.forget(code);
+        self.len -= 1;
+        true
+    }
+
+    fn bytes(&self) -> usize {
+        self.blocks.bytes() + self.leaves.capacity() * size_of::<Leaf>() + Recent::BYTES
+    }
+}
+
+impl fmt::Debug for OccupancyList {
+    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
+        let datum: [f64; 3] = self.datum_m.into();
+        write!(
+            f,
+            "OccupancyList({:?}, datum {datum:?} m, {} voxels)",
+            self.lattice, self.len
+        )
+    }
+}
+
+#[cfg(test)]
+mod tests;
