@@ -105,6 +105,11 @@ impl Lattice {
         self.shape.cell_volume_m3
     }
 
+    /// Side of a cube of the cell's volume, metres.
+    pub fn cell_side_m(&self) -> f64 {
+        generator::cube_root(self.cell_volume_m3())
+    }
+
     /// The generator `G`: columns are the basis vectors, metres.
     pub fn generator(&self) -> Matrix3<f64> {
         self.generator

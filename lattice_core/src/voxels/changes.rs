@@ -1,82 +1,58 @@
-//! What became different since it was last asked.
+//! What became different since some state of the list.
 
-use rustc_hash::FxHashSet;
+use super::VoxelList;
+use super::shard::Life;
+use crate::lattice::{CellCode, Key};
 
-use super::list::Slot;
-use super::{Voxel, VoxelList};
-use crate::lattice::Key;
-
-/// Keys that differ from the call before, sorted.
+/// Keys that differ from an earlier state, sorted.
 #[derive(Clone, PartialEq, Eq, Debug, Default)]
 pub struct Changes {
     /// Voxels that are new or have more points.
     pub changed: Vec<Key>,
-    /// Voxels of earlier calls that are no longer there.
+    /// Voxels of the earlier state that are no longer there.
     pub removed: Vec<Key>,
 }
 
 impl VoxelList {
-    /// What changed since the call before (since the beginning for the first).
+    /// Number of the state: every call that may change voxels makes the next one.
+    pub fn sequence(&self) -> u32 {
+        self.sequence
+    }
+
+    /// What changed after state `sequence`, for a consumer that knows that state.
     ///
-    /// The memory for this is bounded by the number of voxels, however rarely it is called.
-    pub fn take_changes(&mut self) -> Changes {
-        let mut changed = std::mem::take(&mut self.changed);
-        let mut removed: Vec<Key> = self.removed.drain().collect();
+    /// Removed voxels are remembered until [`VoxelList::forget_changes_until`].
+    pub fn changes_since(&self, sequence: u32) -> Changes {
+        let shards = || self.shards.iter();
+        let changed = shards().flat_map(|shard| shard.iter());
+        let changed = changed.filter(|(_, entry)| entry.life.touched > sequence);
+        let mut changed: Vec<Key> = changed.filter_map(|(code, _)| code.key()).collect();
+        let known = |life: &Life| life.born <= sequence && life.touched > sequence;
+        let removed = shards().flat_map(|shard| shard.removed.iter());
+        let mut removed: Vec<Key> = removed
+            .filter(|(_, life)| known(life))
+            .filter_map(|(code, _)| CellCode::from_raw(*code)?.key())
+            .collect();
         changed.sort_unstable();
         removed.sort_unstable();
-        for key in &changed {
-            if let Some(slot) = self.slots.get_mut(key) {
-                (slot.changed, slot.announced) = (false, true);
-            }
-        }
         Changes { changed, removed }
     }
 
-    /// Adds points to a cell; false if the cell is new and the list is full.
-    pub(super) fn add(&mut self, key: Key, points: &Voxel) -> bool {
-        let full = self.slots.len() >= self.max_voxels;
-        let slot = match self.slots.entry(key) {
-            std::collections::hash_map::Entry::Occupied(slot) => slot.into_mut(),
-            std::collections::hash_map::Entry::Vacant(_) if full => return false,
-            std::collections::hash_map::Entry::Vacant(slot) => {
-                let announced = !self.removed.is_empty() && self.removed.remove(&key);
-                slot.insert(Slot {
-                    sum: [0; 3],
-                    count: 0,
-                    changed: false,
-                    announced,
-                })
-            }
-        };
-        let mut voxel = slot.voxel();
-        voxel.add(points);
-        (slot.count, slot.sum) = (voxel.count, voxel.sum);
-        if !slot.changed {
-            slot.changed = true;
-            self.changed.push(key);
+    /// Forgets the voxels that were removed up to state `sequence`: nobody asks for changes since
+    /// an earlier one any more.
+    pub fn forget_changes_until(&mut self, sequence: u32) {
+        for shard in &mut self.shards {
+            shard.removed.retain(|_, life| life.touched > sequence);
         }
-        true
     }
 
-    pub(super) fn validate_changes(&self) -> Result<(), String> {
-        let waiting: FxHashSet<Key> = self.changed.iter().copied().collect();
-        if waiting.len() != self.changed.len() {
-            return Err("a changed voxel is listed twice".to_owned());
-        }
-        for (key, slot) in &self.slots {
-            if slot.changed != waiting.contains(key) || !(slot.changed || slot.announced) {
-                return Err(format!("the changes do not match voxel {:?}", key.unpack()));
-            }
-        }
-        match self.changed.iter().find(|key| !self.contains(**key)) {
-            Some(key) => Err(format!(
-                "changed voxel {:?} is not in the list",
-                key.unpack()
-            )),
-            None if self.removed.iter().any(|key| self.contains(*key)) => {
-                Err("a removed voxel is in the list".to_owned())
-            }
-            None => Ok(()),
-        }
+    /// What changed since the call before (since the beginning for the first).
+    ///
+    /// The memory for this is bounded by the number of voxels that were there at that call.
+    pub fn take_changes(&mut self) -> Changes {
+        let changes = self.changes_since(self.taken);
+        self.taken = self.sequence;
+        self.forget_changes_until(self.taken);
+        changes
     }
 }

@@ -1,10 +1,12 @@
 //! How far the points are from their lattice points.
 
-use super::OFFSET_UNIT_M;
-use crate::lattice::nearest_integer;
+use crate::lattice::{BatchSums, Lattice};
 
-/// Distances are summed in this fraction of `OFFSET_UNIT_M`.
-const DISTANCE_STEPS: f64 = 4096.0;
+/// Distances are summed in this fraction of a cell side, their squares in this fraction of its
+/// square.
+const STEPS: f64 = (1_u64 << 20) as f64;
+/// How much a squared distance may exceed the largest in a cell, relative.
+const SLACK: f64 = 0.02;
 
 /// Quantization error over all inserted points.
 #[derive(Clone, Copy, PartialEq, Debug)]
@@ -25,26 +27,24 @@ pub struct Distortion {
 #[derive(Clone, Copy, PartialEq, Eq, Debug, Default)]
 pub(super) struct DistortionSums {
     pub(super) points: u64,
-    /// Of squared distances, in `OFFSET_UNIT_M`^2.
+    /// Of squared distances, in cell sides^2 / 2^20.
     pub(super) squares: u128,
-    /// Of distances, in `OFFSET_UNIT_M` / 4096.
+    /// Of distances, in cell sides / 2^20.
     pub(super) distances: u128,
-    /// The largest squared distance, in `OFFSET_UNIT_M`^2.
+    /// The largest squared distance, in cell sides^2 / 2^20.
     pub(super) largest_square: u64,
 }
 
 impl DistortionSums {
-    /// Adds a point at an offset from its lattice point, in `OFFSET_UNIT_M`, each below 2^31.
-    #[inline(always)]
-    pub(super) fn add_point(&mut self, offset: [i64; 3]) {
-        let square = offset
-            .iter()
-            .map(|o| o.wrapping_mul(*o) as u64)
-            .fold(0, u64::wrapping_add);
-        self.points += 1;
-        self.squares += u128::from(square);
-        self.distances += nearest_integer((square as f64).sqrt() * DISTANCE_STEPS) as u128;
-        self.largest_square = self.largest_square.max(square);
+    /// Adds the points of a batch.
+    #[inline]
+    pub(super) fn add_batch(&mut self, batch: &BatchSums) {
+        self.add(&DistortionSums {
+            points: batch.points,
+            squares: batch.squares.into(),
+            distances: batch.distances.into(),
+            largest_square: batch.largest_square,
+        });
     }
 
     /// Adds other points.
@@ -55,17 +55,20 @@ impl DistortionSums {
         self.largest_square = self.largest_square.max(other.largest_square);
     }
 
-    /// What cannot be true if no point is more than `reach` units from its lattice point.
-    pub(super) fn fault(&self, reach: u64) -> Option<String> {
+    /// What cannot be true of points in cells of the lattice.
+    pub(super) fn fault(&self, lattice: &Lattice) -> Option<String> {
         let points = u128::from(self.points);
-        let largest = (self.largest_square as f64).sqrt();
-        let distance_limit = points.saturating_mul((largest * DISTANCE_STEPS) as u128 + 1);
-        if self.largest_square > reach.saturating_mul(reach) {
+        let reach = lattice.covering_radius_m() / lattice.cell_side_m();
+        // A point on the border may have been taken for one just outside of its cell.
+        let reach_square = reach * reach * (1.0 + SLACK) * STEPS + 1.0;
+        let largest = self.largest_square as f64;
+        if largest > reach_square {
+            let largest_m = (largest / STEPS).sqrt() * lattice.cell_side_m();
             return Some(format!(
-                "the largest distance, {} m, leaves the cell",
-                largest * OFFSET_UNIT_M
+                "the largest distance, {largest_m} m, leaves the cell"
             ));
         }
+        let distance_limit = points.saturating_mul((largest * STEPS).sqrt() as u128 + 2);
         if self.squares > points.saturating_mul(u128::from(self.largest_square))
             || self.squares < u128::from(self.largest_square)
             || self.distances > distance_limit
@@ -75,15 +78,16 @@ impl DistortionSums {
         None
     }
 
-    pub(super) fn summary(&self) -> Distortion {
+    pub(super) fn summary(&self, lattice: &Lattice) -> Distortion {
         let points = self.points.max(1) as f64;
-        let mean_square_m2 = self.squares as f64 / points * (OFFSET_UNIT_M * OFFSET_UNIT_M);
+        let side_m = lattice.cell_side_m();
+        let mean_square_m2 = self.squares as f64 / points / STEPS * (side_m * side_m);
         Distortion {
             points: self.points,
             mse_per_dimension_m2: mean_square_m2 / 3.0,
-            mean_distance_m: self.distances as f64 / points * (OFFSET_UNIT_M / DISTANCE_STEPS),
+            mean_distance_m: self.distances as f64 / points / STEPS * side_m,
             rms_m: mean_square_m2.sqrt(),
-            max_distance_m: (self.largest_square as f64).sqrt() * OFFSET_UNIT_M,
+            max_distance_m: (self.largest_square as f64 / STEPS).sqrt() * side_m,
         }
     }
 }
@@ -91,27 +95,35 @@ impl DistortionSums {
 #[cfg(test)]
 mod tests {
     use super::*;
+    use crate::lattice::LatticeKind;
+
+    fn lattice() -> Lattice {
+        Lattice::new(LatticeKind::Fcc, 8.0).unwrap()
+    }
 
     #[test]
     fn statistics_of_two_points() {
-        let mut sums = DistortionSums::default();
-        sums.add_point([3 << 20, 0, 4 << 20]);
-        sums.add_point([0, -(1 << 20), 0]);
-        let d = sums.summary();
+        let sums = DistortionSums {
+            points: 2,
+            squares: (1 << 18) + (1 << 16),
+            distances: (1 << 19) + (1 << 18),
+            largest_square: 1 << 18,
+        };
+        let d = sums.summary(&lattice());
         assert_eq!(
             (d.points, d.mean_distance_m, d.max_distance_m),
-            (2, 3.0, 5.0)
+            (2, 0.75, 1.0)
         );
         assert_eq!(
             (d.mse_per_dimension_m2, d.rms_m),
-            (13.0 / 3.0, 13.0_f64.sqrt())
+            (0.625 / 3.0, 0.625_f64.sqrt())
         );
-        assert_eq!(sums.fault(5 << 20), None);
+        assert_eq!(sums.fault(&lattice()), None);
     }
 
     #[test]
     fn no_points_have_no_distortion() {
-        let d = DistortionSums::default().summary();
+        let d = DistortionSums::default().summary(&lattice());
         assert_eq!(
             (d.points, d.mean_distance_m, d.rms_m, d.max_distance_m),
             (0, 0.0, 0.0, 0.0)
@@ -122,37 +134,30 @@ mod tests {
     fn sums_that_no_points_have_are_found() {
         let good = DistortionSums {
             points: 2,
-            squares: 10,
-            distances: 4 * 4096,
-            largest_square: 9,
+            squares: 10 << 10,
+            distances: 4 << 10,
+            largest_square: 9 << 10,
         };
-        assert_eq!(good.fault(3), None);
-        assert!(good.fault(2).is_some());
-        assert!(
-            DistortionSums {
-                squares: 19,
-                ..good
-            }
-            .fault(3)
-            .is_some()
-        );
-        assert!(DistortionSums { squares: 8, ..good }.fault(3).is_some());
-        assert!(DistortionSums { points: 0, ..good }.fault(3).is_some());
-        assert!(
-            DistortionSums {
-                distances: 7 * 4096,
-                ..good
-            }
-            .fault(3)
-            .is_some()
-        );
-        assert!(
-            DistortionSums {
-                largest_square: u64::MAX,
-                ..good
-            }
-            .fault(3)
-            .is_some()
-        );
+        let fault = |sums: DistortionSums| sums.fault(&lattice()).is_some();
+        assert!(!fault(good));
+        assert!(fault(DistortionSums {
+            squares: 19 << 10,
+            ..good
+        }));
+        assert!(fault(DistortionSums {
+            squares: 8 << 10,
+            ..good
+        }));
+        assert!(fault(DistortionSums { points: 0, ..good }));
+        assert!(fault(DistortionSums {
+            distances: 1 << 20,
+            ..good
+        }));
+        let far = 1 << 20;
+        assert!(fault(DistortionSums {
+            largest_square: far,
+            squares: far.into(),
+            ..good
+        }));
     }
 }

@@ -2,15 +2,17 @@
 
 use std::fmt;
 
-use nalgebra::Vector3;
-use rayon::slice::ParallelSliceMut;
-use rustc_hash::{FxHashMap, FxHashSet};
+use nalgebra::{Matrix3, Vector3};
+use rayon::prelude::*;
 use thiserror::Error;
 
+use super::columns::{Columns, Details, LabelCount, Payload, Stamps};
 use super::distortion::{Distortion, DistortionSums};
+use super::fixed::{moment_unit_m, voxel_of};
+use super::shard::{Entry, SHARDS, Shard, shard_of};
 use super::{InsertReport, OFFSET_UNIT_M, Voxel, VoxelStore};
 use crate::cloud::Cloud;
-use crate::lattice::{Key, Lattice};
+use crate::lattice::{CellCode, Key, Lattice};
 
 /// The datum is not finite or too many cells from the origin of the map frame.
 #[derive(Clone, Copy, PartialEq, Debug, Error)]
@@ -24,26 +26,6 @@ pub struct DatumError {
     pub z: f64,
 }
 
-/// A voxel and what the consumer of changes knows of it.
-#[derive(Clone, Copy, Debug)]
-pub(super) struct Slot {
-    pub(super) sum: [i64; 3],
-    pub(super) count: u32,
-    /// The key waits in `VoxelList::changed`.
-    pub(super) changed: bool,
-    /// The key was in an earlier `take_changes`.
-    pub(super) announced: bool,
-}
-
-impl Slot {
-    pub(super) fn voxel(&self) -> Voxel {
-        Voxel {
-            count: self.count,
-            sum: self.sum,
-        }
-    }
-}
-
 /// Occupied voxels of a lattice whose indices count from a datum in the map frame.
 ///
 /// The datum is a lattice point of the map frame, so that lists with one lattice and datum speak of
@@ -54,10 +36,13 @@ pub struct VoxelList {
     pub(super) datum_index: [i64; 3],
     pub(super) datum_m: Vector3<f64>,
     pub(super) max_voxels: usize,
-    pub(super) slots: FxHashMap<Key, Slot>,
+    pub(super) payload: Payload,
+    pub(super) shards: Vec<Shard>,
     pub(super) sums: DistortionSums,
-    pub(super) changed: Vec<Key>,
-    pub(super) removed: FxHashSet<Key>,
+    /// Number of the state.
+    pub(super) sequence: u32,
+    /// State at the last `take_changes`.
+    pub(super) taken: u32,
 }
 
 impl VoxelList {
@@ -84,11 +69,69 @@ impl VoxelList {
             lattice,
             datum_index,
             max_voxels,
-            slots: FxHashMap::default(),
+            payload: Payload::default(),
+            shards: vec![Shard::new(Columns::new(Payload::default())); SHARDS],
             sums: DistortionSums::default(),
-            changed: Vec::new(),
-            removed: FxHashSet::default(),
+            sequence: 0,
+            taken: 0,
         }
+    }
+
+    /// The same list with further columns, empty.
+    pub fn with_payload(self, payload: Payload) -> VoxelList {
+        let mut list = VoxelList::at_datum(self.lattice, self.datum_index, self.max_voxels);
+        list.payload = payload;
+        list.shards = vec![Shard::new(Columns::new(payload)); SHARDS];
+        list
+    }
+
+    /// Which further columns are kept.
+    pub fn payload(&self) -> Payload {
+        self.payload
+    }
+
+    /// How many voxels of a payload fit into `max_bytes`, tables and room to grow included; the
+    /// number to bound a list by.
+    pub fn voxels_within(max_bytes: usize, payload: Payload) -> usize {
+        let columns = |kept: bool, bytes: usize| if kept { bytes } else { 0 };
+        let row = size_of::<Entry>();
+        let row = row
+            + columns(payload.moments, 48)
+            + columns(payload.stamps, 16)
+            // A handful of labels.
+            + columns(payload.labels, 24 + 8 * 8);
+        // Vectors grow by a quarter; the table is at least 3/8 full.
+        max_bytes / (row + row / 4 + 22)
+    }
+
+    /// Makes the next state and gives its number.
+    pub(super) fn advance(&mut self) -> u32 {
+        if self.sequence == u32::MAX {
+            self.renumber();
+        }
+        self.sequence += 1;
+        self.sequence
+    }
+
+    /// Starts counting states anew; what `take_changes` has told stays told.
+    fn renumber(&mut self) {
+        let taken = self.taken;
+        let new = |state: u32| u32::from(state > taken);
+        for shard in &mut self.shards {
+            let lives = shard
+                .voxels
+                .rows_mut()
+                .iter_mut()
+                .map(|entry| &mut entry.life);
+            for life in lives.chain(shard.removed.values_mut()) {
+                (life.born, life.touched) = (new(life.born), new(life.touched));
+            }
+        }
+        (self.taken, self.sequence) = (0, 1);
+    }
+
+    pub(super) fn shard(&self, code: CellCode) -> Option<&Shard> {
+        self.shards.get(shard_of(code))
     }
 
     /// The lattice.
@@ -113,22 +156,65 @@ impl VoxelList {
 
     /// Number of occupied voxels.
     pub fn len(&self) -> usize {
-        self.slots.len()
+        self.shards.iter().map(Shard::len).sum()
     }
 
     /// True if no voxel is occupied.
     pub fn is_empty(&self) -> bool {
-        self.slots.is_empty()
+        self.len() == 0
     }
 
     /// The voxel of a cell, if occupied.
     pub fn get(&self, key: Key) -> Option<Voxel> {
-        self.slots.get(&key).map(Slot::voxel)
+        let code = CellCode::from(key);
+        let (_, entry) = self.shard(code)?.get(code)?;
+        Some(voxel_of(&self.lattice, code, &entry.points))
     }
 
     /// True if the cell is occupied.
     pub fn contains(&self, key: Key) -> bool {
-        self.slots.contains_key(&key)
+        let code = CellCode::from(key);
+        self.shard(code)
+            .is_some_and(|shard| shard.get(code).is_some())
+    }
+
+    fn details(&self, key: Key) -> Option<Details> {
+        let code = CellCode::from(key);
+        let shard = self.shard(code)?;
+        let (number, _) = shard.get(code)?;
+        Some(shard.columns.get(number as usize))
+    }
+
+    /// Stamps of the first and last point in a cell; none if not kept.
+    pub fn stamps(&self, key: Key) -> Option<Stamps> {
+        self.details(key)?.stamps
+    }
+
+    /// Labels of the points in a cell with their counts, by label; empty if not kept.
+    pub fn labels(&self, key: Key) -> Vec<LabelCount> {
+        self.details(key)
+            .map(|details| details.labels)
+            .unwrap_or_default()
+    }
+
+    /// The most frequent label of a cell, the smallest of equals.
+    pub fn label(&self, key: Key) -> Option<LabelCount> {
+        let labels = self.labels(key).into_iter();
+        labels.min_by_key(|counted| (std::cmp::Reverse(counted.count), counted.label))
+    }
+
+    /// Covariance of the points in a cell, m^2; none if not kept or for fewer than two points.
+    pub fn covariance_m2(&self, key: Key) -> Option<Matrix3<f64>> {
+        if !self.payload.moments {
+            return None;
+        }
+        let voxel = self.get(key).filter(|voxel| voxel.count > 1)?;
+        let [xx, xy, xz, yy, yz, zz] = self.details(key)?.moments.map(|m| m as f64);
+        let unit_m = moment_unit_m(&self.lattice);
+        let count = f64::from(voxel.count);
+        let mean = Vector3::from(voxel.mean_offset_m());
+        let raw = Matrix3::new(xx, xy, xz, xy, yy, yz, xz, yz, zz) * (unit_m * unit_m / count);
+        Some((raw - mean * mean.transpose()) * (count / (count - 1.0)))
     }
 
     /// Centre of a cell, map frame, metres.
@@ -139,30 +225,40 @@ impl VoxelList {
     /// All voxels in Morton order.
     pub fn sorted(&self) -> Vec<(Key, Voxel)> {
         let mut voxels: Vec<_> = self
-            .slots
-            .iter()
-            .map(|(&key, slot)| (key, slot.voxel()))
+            .shards
+            .par_iter()
+            .flat_map_iter(Shard::iter)
+            .filter_map(|(code, entry)| {
+                Some((code.key()?, voxel_of(&self.lattice, code, &entry.points)))
+            })
             .collect();
         voxels.par_sort_unstable_by_key(|&(key, _)| key);
         voxels
     }
 
-    /// Quantization error over all inserted points.
+    /// Quantization error over all points that were inserted, also of voxels removed since.
     pub fn distortion(&self) -> Distortion {
-        self.sums.summary()
+        self.sums.summary(&self.lattice)
     }
 
     /// Empties the list and its statistics; keeps lattice, datum and bound.
     pub fn clear(&mut self) {
-        let announced = self
-            .slots
-            .iter()
-            .filter(|(_, slot)| slot.announced)
-            .map(|(&key, _)| key);
-        self.removed.extend(announced);
-        self.slots.clear();
-        self.changed.clear();
+        let now = self.advance();
+        self.shards.iter_mut().for_each(|shard| shard.clear(now));
         self.sums = DistortionSums::default();
+        self.bound_removed();
+    }
+
+    /// Bounds the memory for removed voxels: of more than `max_voxels` only those are remembered
+    /// that the last `take_changes` told of.
+    pub(super) fn bound_removed(&mut self) {
+        let remembered: usize = self.shards.iter().map(|shard| shard.removed.len()).sum();
+        if remembered > self.max_voxels {
+            let taken = self.taken;
+            for shard in &mut self.shards {
+                shard.removed.retain(|_, life| life.born <= taken);
+            }
+        }
     }
 
     /// No point is farther from its lattice point than this, in `OFFSET_UNIT_M`, roundings included.
@@ -180,22 +276,30 @@ impl VoxelList {
                 self.max_voxels
             ));
         }
-        for (key, slot) in &self.slots {
-            if let Some(fault) = slot.voxel().fault(reach) {
-                return Err(format!("voxel {:?}: {fault}", key.unpack()));
+        let mut counted = 0_u64;
+        for shard in &self.shards {
+            shard.validate()?;
+            for (code, entry) in shard.iter() {
+                let voxel = voxel_of(&self.lattice, code, &entry.points);
+                if let Some(fault) = voxel.fault(reach) {
+                    return Err(format!("voxel {:?}: {fault}", code.unpack()));
+                }
+                if entry.life.touched > self.sequence {
+                    return Err(format!("voxel {:?} is of a later state", code.unpack()));
+                }
+                counted = counted.saturating_add(voxel.count.into());
             }
         }
-        if let Some(fault) = self.sums.fault(reach) {
+        if let Some(fault) = self.sums.fault(&self.lattice) {
             return Err(fault);
         }
-        let counted: u64 = self.slots.values().map(|slot| u64::from(slot.count)).sum();
         if counted > self.sums.points {
             return Err(format!(
                 "voxels hold {counted} points, statistics {}",
                 self.sums.points
             ));
         }
-        self.validate_changes()
+        Ok(())
     }
 }
 
@@ -213,15 +317,16 @@ impl VoxelStore for VoxelList {
     }
 
     fn len(&self) -> usize {
-        self.slots.len()
+        VoxelList::len(self)
     }
 
     fn contains(&self, key: Key) -> bool {
-        self.slots.contains_key(&key)
+        VoxelList::contains(self, key)
     }
 
     fn sorted_keys(&self) -> Vec<Key> {
-        let mut keys: Vec<Key> = self.slots.keys().copied().collect();
+        let cells = self.shards.iter().flat_map(Shard::iter);
+        let mut keys: Vec<Key> = cells.filter_map(|(code, _)| code.key()).collect();
         keys.par_sort_unstable();
         keys
     }
@@ -231,20 +336,16 @@ impl VoxelStore for VoxelList {
     }
 
     fn remove(&mut self, key: Key) -> bool {
-        let Some(slot) = self.slots.remove(&key) else {
-            return false;
-        };
-        if slot.changed {
-            self.changed.retain(|k| *k != key);
-        }
-        if slot.announced {
-            self.removed.insert(key);
-        }
-        true
+        let now = self.advance();
+        let code = CellCode::from(key);
+        let shard = self.shards.get_mut(shard_of(code));
+        let removed = shard.is_some_and(|shard| shard.remove(code.raw(), now));
+        self.bound_removed();
+        removed
     }
 
     fn bytes(&self) -> usize {
-        self.slots.capacity() * (size_of::<(Key, Slot)>() + 1)
+        self.shards.iter().map(Shard::bytes).sum()
     }
 }
 

@@ -2,7 +2,10 @@
 
 use thiserror::Error;
 
-use super::VoxelList;
+use super::fixed::points_of;
+use super::shard::shard_of;
+use super::{Voxel, VoxelList};
+use crate::lattice::{CellCode, Key};
 
 /// Why two lists do not merge. The receiving list is as before.
 #[derive(Clone, PartialEq, Debug, Error)]
@@ -53,18 +56,51 @@ impl VoxelList {
             return Err(MergeError::Datum { ours, theirs });
         }
         let new = other
-            .slots
-            .keys()
-            .filter(|key| !self.contains(**key))
-            .count();
+            .shards
+            .iter()
+            .zip(&self.shards)
+            .map(|(theirs, ours)| {
+                theirs
+                    .iter()
+                    .filter(|(code, _)| ours.get(*code).is_none())
+                    .count()
+            })
+            .sum();
         let (voxels, max_voxels) = (self.len().saturating_add(new), self.max_voxels);
         if voxels > max_voxels {
             return Err(MergeError::Full { voxels, max_voxels });
         }
-        for (&key, slot) in &other.slots {
-            self.add(key, &slot.voxel());
+        let now = self.advance();
+        for (ours, theirs) in self.shards.iter_mut().zip(&other.shards) {
+            for (their_number, entry) in theirs.voxels.rows().iter().enumerate() {
+                if let Some(number) = ours.find_or_add(entry.code, usize::MAX, now) {
+                    ours.add(number, &entry.points, now);
+                    if !self.payload.is_plain() {
+                        ours.columns
+                            .add(number as usize, &theirs.columns.get(their_number));
+                    }
+                }
+            }
         }
         self.sums.add(&other.sums);
         Ok(())
+    }
+
+    /// Adds points to a cell; false if the cell is new and the list is full.
+    pub(super) fn add(&mut self, key: Key, voxel: &Voxel) -> bool {
+        let code = CellCode::from(key);
+        let points = points_of(&self.lattice, code, voxel);
+        let room = self.max_voxels.saturating_sub(self.len());
+        let now = self.sequence.max(1);
+        self.sequence = now;
+        let Some(shard) = self.shards.get_mut(shard_of(code)) else {
+            return false;
+        };
+        let limit = shard.len().saturating_add(room);
+        let Some(number) = shard.find_or_add(code.raw(), limit, now) else {
+            return false;
+        };
+        shard.add(number, &points, now);
+        true
     }
 }

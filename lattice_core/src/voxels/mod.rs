@@ -7,20 +7,24 @@ pub mod codec;
 pub mod file;
 
 mod changes;
+mod columns;
 mod distortion;
 mod exposed;
+mod fixed;
 mod grow;
-mod index;
 mod insert;
 mod list;
 mod merge;
 mod morton;
 mod occupancy;
 mod recent;
+mod shard;
 mod store;
+mod table;
 mod voxel;
 
 pub use changes::Changes;
+pub use columns::{LabelCount, Payload, Stamps};
 pub use distortion::Distortion;
 pub use insert::InsertReport;
 pub use list::{DatumError, VoxelList};

@@ -2,7 +2,7 @@
 
 use rayon::slice::ParallelSliceMut;
 
-use super::occupancy::Leaf;
+use super::occupancy::{Block, Leaf};
 use crate::lattice::{CellCode, Key};
 
 /// The low nine bits of the key of each place in a block.
@@ -37,12 +37,11 @@ pub(super) fn places(leaf: &Leaf) -> impl Iterator<Item = usize> + '_ {
 }
 
 /// All `len` cells of the blocks as ascending keys: blocks are sorted, not cells.
-pub(super) fn sorted_keys(blocks: &[u64], leaves: &[Leaf], len: usize) -> Vec<Key> {
+pub(super) fn sorted_keys(blocks: &[Block], len: usize) -> Vec<Key> {
     let first_key = |block: u64| CellCode::from_raw(block << 9).and_then(CellCode::key);
     let mut order: Vec<(u64, &Leaf)> = blocks
         .iter()
-        .zip(leaves)
-        .filter_map(|(&block, leaf)| Some((first_key(block)?.raw(), leaf)))
+        .filter_map(|block| Some((first_key(block.code)?.raw(), &block.leaf)))
         .collect();
     order.par_sort_unstable_by_key(|&(key, _)| key);
     let mut keys = Vec::with_capacity(len);

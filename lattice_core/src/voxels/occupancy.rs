@@ -5,9 +5,8 @@ use std::fmt;
 use nalgebra::Vector3;
 use rayon::prelude::*;
 
-use super::grow;
-use super::index::{CodeIndex, Place};
 use super::recent::Recent;
+use super::table::{Place, Row, Table};
 use super::{DatumError, InsertReport, VoxelStore};
 use crate::cloud::Cloud;
 use crate::lattice::{BatchQuantizer, CellCode, Key, Lattice};
@@ -22,6 +21,22 @@ const BLOCK_BYTES: usize = 112;
 /// The cells of a block, one bit each, by their place.
 pub(super) type Leaf = [u64; 8];
 
+/// A block with occupied cells.
+#[derive(Clone)]
+pub(super) struct Block {
+    pub(super) code: u64,
+    pub(super) leaf: Leaf,
+}
+
+impl Row for Block {
+    const NEAR_BITS: u32 = 0;
+
+    #[inline(always)]
+    fn code(&self) -> u64 {
+        self.code
+    }
+}
+
 /// Occupied voxels without payload: blocks of 8 x 8 x 8 indices with one bit for each cell.
 ///
 /// The fastest store and the smallest, 3 to 8 bytes a voxel on surfaces. When `max_bytes` is
@@ -32,8 +47,7 @@ pub struct OccupancyList {
     datum_index: [i64; 3],
     datum_m: Vector3<f64>,
     max_blocks: usize,
-    pub(super) blocks: CodeIndex,
-    pub(super) leaves: Vec<Leaf>,
+    pub(super) blocks: Table<Block>,
     len: usize,
     recent: Recent,
 }
@@ -59,8 +73,7 @@ impl OccupancyList {
             lattice,
             datum_index,
             max_blocks: max_bytes / BLOCK_BYTES,
-            blocks: CodeIndex::new(),
-            leaves: Vec::new(),
+            blocks: Table::new(),
             len: 0,
             recent: Recent::new(),
         }
@@ -93,7 +106,6 @@ impl OccupancyList {
     /// Removes all voxels; keeps lattice, datum and limit.
     pub fn clear(&mut self) {
         self.blocks.clear();
-        self.leaves = Vec::new();
         self.len = 0;
         self.recent.forget_all();
     }
@@ -105,21 +117,18 @@ impl OccupancyList {
         let number = if block == last.block {
             last.number
         } else {
-            match self.blocks.find_or_add(block, self.max_blocks) {
-                Some(Place::Known(number)) => number,
-                Some(Place::New(number)) => {
-                    grow::push(&mut self.leaves, [0; 8]);
-                    number
-                }
+            let empty = || Block {
+                code: block,
+                leaf: [0; 8],
+            };
+            match self.blocks.find_or_add(block, self.max_blocks, empty) {
+                Some(Place::Known(number) | Place::New(number)) => number,
                 None => return false,
             }
         };
         *last = Last { block, number };
-        let word = self
-            .leaves
-            .get_mut(number as usize)
-            .and_then(|leaf| leaf.get_mut(code.place() >> 6));
-        if let Some(word) = word {
+        let row = self.blocks.row_mut(number);
+        if let Some(word) = row.and_then(|row| row.leaf.get_mut(code.place() >> 6)) {
             let bit = 1 << (code.place() & 63);
             self.len += usize::from(*word & bit == 0);
             *word |= bit;
@@ -199,15 +208,17 @@ impl OccupancyList {
     /// Checks everything that must hold between calls; says what does not.
     pub fn validate(&self) -> Result<(), String> {
         self.blocks.validate()?;
-        let bits = |leaf: &Leaf| {
-            leaf.iter()
-                .map(|word| word.count_ones() as usize)
+        let bits = |block: &Block| {
+            block
+                .leaf
+                .iter()
+                .map(|w| w.count_ones() as usize)
                 .sum::<usize>()
         };
-        if self.leaves.len() != self.blocks.len() || self.leaves.iter().any(|l| bits(l) == 0) {
-            return Err("a block is empty or has no cells".to_owned());
+        if self.blocks.rows().iter().any(|block| bits(block) == 0) {
+            return Err("a block has no cells".to_owned());
         }
-        let counted: usize = self.leaves.iter().map(bits).sum();
+        let counted: usize = self.blocks.rows().iter().map(bits).sum();
         if counted != self.len {
             return Err(format!("{counted} cells are set, {} counted", self.len));
         }
@@ -222,9 +233,9 @@ impl OccupancyList {
     }
 
     pub(super) fn has(&self, code: CellCode) -> bool {
-        let leaf = self.blocks.find(code.block());
-        let leaf = leaf.and_then(|number| self.leaves.get(number as usize));
-        leaf.is_some_and(|leaf| is_set(leaf, code.place()))
+        let number = self.blocks.find(code.block());
+        let block = number.and_then(|number| self.blocks.rows().get(number as usize));
+        block.is_some_and(|block| is_set(&block.leaf, code.place()))
     }
 }
 
@@ -272,7 +283,7 @@ impl VoxelStore for OccupancyList {
     }
 
     fn sorted_keys(&self) -> Vec<Key> {
-        super::morton::sorted_keys(self.blocks.codes(), &self.leaves, self.len)
+        super::morton::sorted_keys(self.blocks.rows(), self.len)
     }
 
     /// The outcome does not depend on the number of threads of the current rayon pool.
@@ -304,18 +315,17 @@ impl VoxelStore for OccupancyList {
         let Some(number) = self.blocks.find(code.block()) else {
             return false;
         };
-        let Some(leaf) = self.leaves.get_mut(number as usize) else {
+        let Some(block) = self.blocks.row_mut(number) else {
             return false;
         };
-        if !is_set(leaf, code.place()) {
+        if !is_set(&block.leaf, code.place()) {
             return false;
         }
-        if let Some(word) = leaf.get_mut(code.place() >> 6) {
+        if let Some(word) = block.leaf.get_mut(code.place() >> 6) {
             *word &= !(1 << (code.place() & 63));
         }
-        if leaf.iter().all(|word| *word == 0) {
+        if block.leaf == [0; 8] {
             self.blocks.remove(code.block());
-            self.leaves.swap_remove(number as usize);
         }
         self.recent.forget(code);
         self.len -= 1;
@@ -323,7 +333,7 @@ impl VoxelStore for OccupancyList {
     }
 
     fn bytes(&self) -> usize {
-        self.blocks.bytes() + self.leaves.capacity() * size_of::<Leaf>() + Recent::BYTES
+        self.blocks.bytes() + Recent::BYTES
     }
 }
 

@@ -18,7 +18,7 @@ pub use simd::Simd;
 /// Half of one unit in the last place of 1.
 const EPSILON: f64 = 1.0 / (1_u64 << 24) as f64;
 /// The kernel answers for points less than this many cuboid sides from the phase's lattice point,
-const KERNEL_REACH: f64 = (1 << 17) as f64;
+const KERNEL_REACH: f64 = (1 << 13) as f64;
 /// which has indices smaller than this.
 const BASE_LIMIT: u64 = 1 << 18;
 
@@ -82,7 +82,7 @@ impl BatchQuantizer {
             lattice_from_points,
             rotation,
             kernel: Kernel::new(lattice, &lattice_from_points, simd),
-            side_m: super::generator::cube_root(lattice.cell_volume_m3()),
+            side_m: lattice.cell_side_m(),
         }
     }
 
@@ -95,6 +95,11 @@ impl BatchQuantizer {
             None => p,
         };
         self.lattice_from_points.translation.vector + turned
+    }
+
+    /// The translation of `lattice_from_points`, metres.
+    pub fn translation_m(&self) -> [f64; 3] {
+        self.lattice_from_points.translation.vector.into()
     }
 
     /// Appends the cell of each point, [`CellCode::NONE`] where [`Lattice::quantize`] of the
@@ -254,7 +259,7 @@ impl Kernel {
     fn new(lattice: &Lattice, lattice_from_points: &Isometry3<f64>, simd: Simd) -> Option<Kernel> {
         let generator = lattice.generator();
         let (axes, squares) = form::axes(lattice.kind(), &generator)?;
-        let side_m = super::generator::cube_root(lattice.cell_volume_m3());
+        let side_m = lattice.cell_side_m();
         let u_from_lattice = axes * generator.try_inverse()?;
         let m = u_from_lattice * lattice_from_points.rotation.to_rotation_matrix();
         let translation = lattice_from_points.translation.vector;
