@@ -7,5 +7,6 @@ pub mod cloud;
 pub mod geodesy;
 pub mod lattice;
 pub mod pose;
+pub mod raycast;
 pub mod simulate;
 pub mod voxels;

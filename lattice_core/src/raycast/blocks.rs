@@ -1,0 +1,224 @@
+//! Cells of known evidence, in blocks of 8 x 8 x 8 lattice indices.
+
+use super::evidence::{Steps, UNKNOWN};
+use super::masks::{Mask, random_multiplier, spread};
+use super::packed::Packed;
+
+/// Cells of a block.
+pub(super) const CELLS: usize = 512;
+/// Blocks that are allocated at once.
+const PAGE: usize = 64;
+
+/// No block is at this place of the table: the low bits of a block are zero.
+const EMPTY: u64 = 1;
+
+#[derive(Clone, Copy, Debug)]
+struct Entry {
+    block: u64,
+    slot: u32,
+}
+
+/// Log-odds of cells, found by block through an open table.
+#[derive(Clone, Debug)]
+pub(super) struct Blocks {
+    table: Vec<Entry>,
+    bits: u32,
+    multiplier: u64,
+    blocks: Vec<u64>,
+    pages: Vec<Box<[[i8; CELLS]]>>,
+    most: usize,
+    /// The slots of the blocks of a scan; kept to save the allocation.
+    slots: Vec<u32>,
+}
+
+/// In place of the slot of a block that is not there.
+const NONE: u32 = u32::MAX;
+
+impl Blocks {
+    /// At most `most` blocks.
+    pub(super) fn new(most: usize) -> Blocks {
+        let bits = 4;
+        Blocks {
+            table: vec![
+                Entry {
+                    block: EMPTY,
+                    slot: 0
+                };
+                1 << bits
+            ],
+            bits,
+            multiplier: random_multiplier(),
+            blocks: Vec::new(),
+            pages: Vec::new(),
+            // Whole pages, so that the last one is not half in vain.
+            most: (most / PAGE * PAGE).min(NONE as usize),
+            slots: Vec::new(),
+        }
+    }
+
+    /// Most memory for a block, bytes: cells, block and slot of a scan twice for the growth of
+    /// vectors, and a table filled to at least 3/8 beside the one that it grew from.
+    pub(super) const BYTES_PER_BLOCK: usize = CELLS + 2 * (8 + 4) + 4 * 16;
+
+    pub(super) fn bytes(&self) -> usize {
+        self.table.capacity() * size_of::<Entry>()
+            + self.blocks.capacity() * 8
+            + self.slots.capacity() * 4
+            + self.pages.capacity() * size_of::<Box<[[i8; CELLS]]>>()
+            + self.pages.len() * PAGE * CELLS
+    }
+
+    pub(super) fn len(&self) -> usize {
+        self.blocks.len()
+    }
+
+    pub(super) fn get(&self, cell: Packed) -> i8 {
+        let slot = self.find(cell.block());
+        let cells = self.cells(slot);
+        cells
+            .and_then(|c| c.get(cell.place()))
+            .copied()
+            .unwrap_or(UNKNOWN)
+    }
+
+    /// All cells that are known.
+    pub(super) fn known(&self) -> impl Iterator<Item = (Packed, i8)> {
+        (0..).zip(&self.blocks).flat_map(|(slot, &block)| {
+            let cells = self.cells(slot).into_iter().flatten().enumerate();
+            cells
+                .filter(|(_, value)| **value != UNKNOWN)
+                .map(move |(place, value)| (Packed::at(block, place), *value))
+        })
+    }
+
+    fn cells(&self, slot: u32) -> Option<&[i8; CELLS]> {
+        let slot = slot as usize;
+        self.pages.get(slot / PAGE)?.get(slot % PAGE)
+    }
+
+    fn cells_mut(&mut self, slot: u32) -> Option<&mut [i8; CELLS]> {
+        let slot = slot as usize;
+        self.pages.get_mut(slot / PAGE)?.get_mut(slot % PAGE)
+    }
+
+    /// The slot of a block, or `NONE`.
+    fn find(&self, block: u64) -> u32 {
+        let mask = self.table.len() - 1;
+        let mut at = spread(block, self.multiplier, self.bits);
+        while let Some(entry) = self.table.get(at) {
+            if entry.block == block {
+                return entry.slot;
+            }
+            if entry.block == EMPTY {
+                break;
+            }
+            at = (at + 1) & mask;
+        }
+        NONE
+    }
+
+    /// Adds a block that is not there, within the limit.
+    fn add(&mut self, block: u64) -> u32 {
+        let slot = self.blocks.len() as u32;
+        self.blocks.push(block);
+        if self.pages.len() * PAGE < self.blocks.len() {
+            self.pages
+                .push(vec![[UNKNOWN; CELLS]; PAGE].into_boxed_slice());
+        }
+        if self.blocks.len() * 2 > self.table.len() {
+            self.bits += 1;
+            let empty = Entry {
+                block: EMPTY,
+                slot: 0,
+            };
+            self.table.clear();
+            self.table.resize(1 << self.bits, empty);
+            for slot in 0..self.blocks.len() as u32 {
+                self.list(slot);
+            }
+        } else {
+            self.list(slot);
+        }
+        slot
+    }
+
+    /// Enters a block into the table.
+    fn list(&mut self, slot: u32) {
+        let Some(&block) = self.blocks.get(slot as usize) else {
+            return;
+        };
+        let mask = self.table.len() - 1;
+        let mut at = spread(block, self.multiplier, self.bits);
+        while self.table.get(at).is_some_and(|e| e.block != EMPTY) {
+            at = (at + 1) & mask;
+        }
+        if let Some(entry) = self.table.get_mut(at) {
+            *entry = Entry { block, slot };
+        }
+    }
+
+    /// Gives `update` the cells of each block with its masks. Blocks that are not there are added if
+    /// `wanted`; if they are too many, those with the lowest indices are, and the number of the
+    /// others is returned.
+    pub(super) fn apply<'a>(
+        &mut self,
+        scan: impl Iterator<Item = (u64, &'a Mask, &'a Mask)> + Clone,
+        wanted: impl Fn(&Mask, &Mask) -> bool,
+        mut update: impl FnMut(&mut [i8; CELLS], &Mask, &Mask),
+    ) -> u64 {
+        // All look-ups first: they are independent of each other, so that they wait for the memory
+        // together.
+        let mut slots = std::mem::take(&mut self.slots);
+        slots.clear();
+        slots.extend(scan.clone().map(|(block, ..)| self.find(block)));
+        let room = self.most.saturating_sub(self.len());
+        let wanted_new = scan
+            .clone()
+            .zip(&slots)
+            .filter(|((_, passed, hit), slot)| **slot == NONE && wanted(passed, hit))
+            .map(|((block, ..), _)| block);
+        let new = wanted_new.clone().count();
+        let mut last = u64::MAX;
+        if new > room {
+            let mut blocks: Vec<u64> = wanted_new.collect();
+            blocks.sort_unstable();
+            last = room
+                .checked_sub(1)
+                .and_then(|i| blocks.get(i))
+                .map_or(0, |b| *b);
+        }
+        let full = room == 0;
+        for ((block, passed, hit), slot) in scan.zip(&slots) {
+            let mut slot = *slot;
+            if slot == NONE && wanted(passed, hit) && block <= last && !full {
+                slot = self.add(block);
+            }
+            if let Some(cells) = self.cells_mut(slot) {
+                update(cells, passed, hit);
+            }
+        }
+        self.slots = slots;
+        new.saturating_sub(room) as u64
+    }
+}
+
+/// One hit for each cell that was hit, one miss for each other cell that was passed through.
+#[inline]
+pub(super) fn add_evidence(steps: &Steps, cells: &mut [i8; CELLS], passed: &Mask, hit: &Mask) {
+    for (word, (&passed, &hit)) in passed.0.iter().zip(&hit.0).enumerate() {
+        let Some(cells) = cells.get_mut(64 * word..64 * word + 64) else {
+            return;
+        };
+        each_bit(passed & !hit, |i| steps.miss(&mut cells[i]));
+        each_bit(hit, |i| steps.hit(&mut cells[i]));
+    }
+}
+
+/// Calls `visit` with the number of each bit that is set, below 64.
+#[inline(always)]
+pub(super) fn each_bit(mut word: u64, mut visit: impl FnMut(usize)) {
+    while word != 0 {
+        visit(word.trailing_zeros() as usize & 63);
+        word &= word - 1;
+    }
+}

@@ -1,0 +1,217 @@
+//! Free space in a coarser lattice.
+
+use std::collections::BTreeSet;
+
+use nalgebra::Vector3;
+use rustc_hash::FxHashSet;
+
+use super::blocks::{Blocks, CELLS, add_evidence, each_bit};
+use super::evidence::{Steps, UNKNOWN};
+use super::masks::{Cursor, Mask, ScanMasks};
+use super::packed::{Packed, difference};
+use crate::lattice::{Key, Lattice, LatticeError, LatticeIndex};
+
+/// Relative to the cell side, how near cells count as overlapping.
+const SLACK: f64 = 1e-9;
+
+/// Log-odds of cells `2^level` as wide as those of the map, with the same lattice point 0.
+///
+/// A lattice is its own sublattice of level 1, so that the coarse cell of a fine index `8 b + r` is
+/// that of `r` plus `8 b / 2^level`.
+#[derive(Clone, Debug)]
+pub(super) struct Coarse {
+    lattice: Lattice,
+    level: u32,
+    /// For each place of a fine block: the coarse cell that holds its lattice point.
+    belongs: Vec<LatticeIndex>,
+    /// For each place of a fine block: all coarse cells that its cell may overlap.
+    overlaps: Vec<Vec<LatticeIndex>>,
+    /// All fine cells that may overlap the coarse cell 0.
+    within: Vec<LatticeIndex>,
+    masks: ScanMasks,
+    cells: Blocks,
+}
+
+impl Coarse {
+    pub(super) fn new(fine: &Lattice, level: u32, bytes: usize) -> Result<Coarse, LatticeError> {
+        // A power of two, so that the generator is exactly 2^level times that of the fine lattice.
+        let times = f64::from(1 << (3 * level));
+        let lattice = Lattice::new(fine.kind(), fine.cell_volume_m3() * times)?;
+        let places = (0..CELLS as i32).map(|p| [p & 7, p >> 3 & 7, p >> 6]);
+        let (mut belongs, mut overlaps) = (Vec::new(), Vec::new());
+        let mut within = BTreeSet::new();
+        for place in places {
+            let p = fine.center(place);
+            let home = lattice.quantize(&p).unwrap_or_default();
+            let around = overlapping(&lattice, home, &p, fine.covering_radius_m());
+            within.extend(
+                around
+                    .iter()
+                    .map(|w| offset(place, w.map(|i| -(i << level)))),
+            );
+            belongs.push(home);
+            overlaps.push(around);
+        }
+        Ok(Coarse {
+            lattice,
+            level,
+            belongs,
+            overlaps,
+            within: within.into_iter().collect(),
+            masks: ScanMasks::new(bytes / 4 / ScanMasks::BYTES_PER_BLOCK),
+            cells: Blocks::new(bytes / 4 * 3 / Blocks::BYTES_PER_BLOCK),
+        })
+    }
+
+    pub(super) fn lattice(&self) -> &Lattice {
+        &self.lattice
+    }
+
+    pub(super) fn bytes(&self) -> usize {
+        self.masks.bytes() + self.cells.bytes()
+    }
+
+    /// The coarse cell that a fine cell belongs to.
+    pub(super) fn cell_of(&self, fine: Packed) -> Option<Packed> {
+        let base = self.base(fine.block());
+        let home = self.belongs.get(fine.place())?;
+        Packed::new(offset(base, *home))
+    }
+
+    /// The coarse index of the first cell of a fine block.
+    fn base(&self, block: u64) -> LatticeIndex {
+        Packed(block).unpack().map(|i| i >> self.level)
+    }
+
+    /// The coarse cells that a fine cell may overlap.
+    fn overlapped(&self, fine: Packed) -> impl Iterator<Item = Packed> + '_ {
+        let base = self.base(fine.block());
+        let around = self.overlaps.get(fine.place()).into_iter().flatten();
+        around.filter_map(move |w| Packed::new(offset(base, *w)))
+    }
+
+    /// Adds a scan: see [`super::FreeSpaceMap`]. Returns the number of blocks refused.
+    pub(super) fn apply(&mut self, steps: &Steps, scan: &ScanMasks, fine: &mut Blocks) -> u64 {
+        self.mark(scan);
+        let fine_refused = fine.apply(
+            scan.blocks(),
+            |_, hit| *hit != Mask::default(),
+            |cells, passed, hit| {
+                // Only what was hit before is worth a miss of its own.
+                let mut known = Mask::default();
+                for (i, value) in cells.iter().enumerate() {
+                    known.0[i >> 6] |= u64::from(*value != UNKNOWN) << (i & 63);
+                }
+                for (known, passed) in known.0.iter_mut().zip(&passed.0) {
+                    *known &= passed;
+                }
+                add_evidence(steps, cells, &known, hit);
+            },
+        );
+        let coarse_refused = self.cells.apply(
+            self.masks.blocks(),
+            |passed, hit| passed.0.iter().zip(&hit.0).any(|(p, h)| p & !h != 0),
+            |cells, passed, hit| {
+                let mut free = *passed;
+                for (free, hit) in free.0.iter_mut().zip(&hit.0) {
+                    *free &= !hit;
+                }
+                add_evidence(steps, cells, &free, &Mask::default());
+            },
+        );
+        fine_refused + coarse_refused
+    }
+
+    /// Marks the coarse cells of passed fine cells as passed, those that hit cells overlap as hit.
+    fn mark(&mut self, scan: &ScanMasks) {
+        self.masks.clear();
+        let mut blocks: Vec<_> = scan.blocks().collect();
+        blocks.sort_unstable_by_key(|(block, ..)| *block);
+        let mut cursor = Cursor::NONE;
+        for &(block, _, hit) in &blocks {
+            for (word, hit) in hit.0.iter().enumerate() {
+                each_bit(*hit, |i| {
+                    let fine = Packed::at(block, 64 * word + i);
+                    let base = Packed(block).unpack().map(|i| i >> self.level);
+                    for w in self.overlaps.get(fine.place()).into_iter().flatten() {
+                        if let Some(cell) = Packed::new(offset(base, *w)) {
+                            self.masks.hit(cell, &mut cursor);
+                        }
+                    }
+                });
+            }
+        }
+        for &(block, passed, _) in &blocks {
+            let Some(base) = Packed::new(self.base(block)) else {
+                continue;
+            };
+            for (word, passed) in passed.0.iter().enumerate() {
+                each_bit(*passed, |i| {
+                    if let Some(home) = self.belongs.get(64 * word + i) {
+                        self.masks.pass(base.plus(difference(*home)), &mut cursor);
+                    }
+                });
+            }
+        }
+    }
+
+    /// True if rays passed through the coarse cell and no occupied fine cell may overlap it.
+    pub(super) fn is_free(&self, steps: &Steps, fine: &Blocks, cell: Option<Packed>) -> bool {
+        let Some(cell) = cell else { return false };
+        let value = self.cells.get(cell);
+        if value == UNKNOWN || value >= steps.threshold {
+            return false;
+        }
+        let first = cell.unpack().map(|i| i << self.level);
+        let mut within = self.within.iter();
+        !within.any(|w| {
+            let value = Packed::new(offset(first, *w)).map_or(UNKNOWN, |w| fine.get(w));
+            value != UNKNOWN && value >= steps.threshold
+        })
+    }
+
+    /// All free coarse cells in ascending order.
+    pub(super) fn free_keys(&self, steps: &Steps, fine: &Blocks) -> Vec<Key> {
+        let occupied = fine.known().filter(|(_, value)| *value >= steps.threshold);
+        let blocked: FxHashSet<Packed> = occupied.flat_map(|(w, _)| self.overlapped(w)).collect();
+        let known = self.cells.known();
+        let free = known.filter(|(w, value)| *value < steps.threshold && !blocked.contains(w));
+        let mut keys: Vec<Key> = free.filter_map(|(w, _)| w.key()).collect();
+        keys.sort_unstable();
+        keys
+    }
+}
+
+fn offset(a: LatticeIndex, b: LatticeIndex) -> LatticeIndex {
+    [a[0] + b[0], a[1] + b[1], a[2] + b[2]]
+}
+
+/// All cells that a ball may overlap, from the one that holds its centre; a few more than do, none
+/// missing: a cell is left out only if one of its faces has the whole ball on the other side.
+fn overlapping(
+    lattice: &Lattice,
+    home: LatticeIndex,
+    center_m: &Vector3<f64>,
+    radius_m: f64,
+) -> Vec<LatticeIndex> {
+    let faces = lattice.face_neighbors();
+    let may_overlap = |w: LatticeIndex| {
+        let p = center_m - lattice.center(w);
+        faces.iter().all(|n| {
+            let n = lattice.center(*n);
+            n.dot(&p) - 0.5 * n.norm_squared() <= (radius_m + SLACK * n.norm()) * n.norm()
+        })
+    };
+    let mut found = BTreeSet::from([home]);
+    let mut open = vec![home];
+    // The cells that a ball overlaps hang together by faces.
+    while let Some(w) = open.pop() {
+        for n in faces {
+            let next = offset(w, *n);
+            if may_overlap(next) && found.insert(next) {
+                open.push(next);
+            }
+        }
+    }
+    found.into_iter().collect()
+}

@@ -1,0 +1,221 @@
+//! Log-odds in fixed point.
+
+use thiserror::Error;
+
+/// The log-odds of one step of a cell.
+const UNIT: f64 = 1.0 / 32.0;
+
+/// A cell of which nothing is known.
+pub(super) const UNKNOWN: i8 = i8::MIN;
+
+/// How hits and misses add up, as probabilities; the defaults are those of octomap.
+///
+/// Log-odds `ln(p / (1 - p))` are kept in steps of 1/32, to which every value is rounded: with the
+/// defaults a hit adds 0.844, a miss takes 0.406, and cells stay within -2 and 3.5.
+#[derive(Clone, Copy, PartialEq, Debug)]
+pub struct Evidence {
+    /// Probability of an occupied cell given one hit, above 0.5.
+    pub hit: f64,
+    /// Probability of an occupied cell given one miss, below 0.5.
+    pub miss: f64,
+    /// No cell becomes less probable than this.
+    pub least: f64,
+    /// No cell becomes more probable than this.
+    pub most: f64,
+    /// Cells of at least this probability are occupied.
+    pub threshold: f64,
+}
+
+impl Default for Evidence {
+    fn default() -> Evidence {
+        Evidence {
+            hit: 0.7,
+            miss: 0.4,
+            least: 0.1192,
+            most: 0.971,
+            threshold: 0.5,
+        }
+    }
+}
+
+impl Evidence {
+    /// What the last scan saw decides, whatever was seen before.
+    pub fn latest() -> Evidence {
+        Evidence {
+            hit: 0.9,
+            miss: 0.1,
+            least: 0.25,
+            most: 0.75,
+            threshold: 0.5,
+        }
+    }
+}
+
+/// Probabilities that do not go together.
+#[derive(Clone, Copy, PartialEq, Debug, Error)]
+#[error(
+    "hit {hit}, miss {miss}, least {least}, most {most}, threshold {threshold}: all must be between \
+     0.02 and 0.98, miss < 0.5 < hit, least < threshold <= most and least < 0.5 < most, each by a \
+     log-odds of 1/32 or more"
+)]
+pub struct EvidenceError {
+    /// Probability after a hit.
+    pub hit: f64,
+    /// Probability after a miss.
+    pub miss: f64,
+    /// Lower clamp.
+    pub least: f64,
+    /// Upper clamp.
+    pub most: f64,
+    /// Threshold of occupied cells.
+    pub threshold: f64,
+}
+
+/// The next value of a cell for each value that it may have.
+#[derive(Clone, Debug)]
+pub(super) struct Steps {
+    after_hit: [i8; 256],
+    after_miss: [i8; 256],
+    pub(super) threshold: i8,
+}
+
+impl Steps {
+    pub(super) fn new(evidence: &Evidence) -> Result<Steps, EvidenceError> {
+        let Evidence {
+            hit,
+            miss,
+            least,
+            most,
+            threshold,
+        } = *evidence;
+        let error = EvidenceError {
+            hit,
+            miss,
+            least,
+            most,
+            threshold,
+        };
+        let in_units = |p: f64| {
+            let fits = (0.02..=0.98).contains(&p);
+            let rounded = fits.then(|| (log_odds(p) / UNIT).round() as i32);
+            rounded.ok_or(error)
+        };
+        let (up, down) = (in_units(hit)?, in_units(miss)?);
+        let (low, high, threshold) = (in_units(least)?, in_units(most)?, in_units(threshold)?);
+        if up < 1 || down > -1 || low > -1 || high < 1 || low >= threshold || threshold > high {
+            return Err(error);
+        }
+        let table = |add: i32| {
+            let mut next = [UNKNOWN; 256];
+            for (bits, next) in next.iter_mut().enumerate() {
+                let now = bits as u8 as i8;
+                let now = if now == UNKNOWN { 0 } else { i32::from(now) };
+                *next = (now + add).clamp(low, high) as i8;
+            }
+            next
+        };
+        Ok(Steps {
+            after_hit: table(up),
+            after_miss: table(down),
+            threshold: threshold as i8,
+        })
+    }
+
+    #[inline(always)]
+    pub(super) fn hit(&self, cell: &mut i8) {
+        *cell = self.after_hit[usize::from(*cell as u8)];
+    }
+
+    #[inline(always)]
+    pub(super) fn miss(&self, cell: &mut i8) {
+        *cell = self.after_miss[usize::from(*cell as u8)];
+    }
+}
+
+/// `ln(p / (1 - p))` by the series of 2 atanh(2 p - 1), the same bits on every machine.
+fn log_odds(p: f64) -> f64 {
+    let x = 2.0 * p - 1.0;
+    let (mut power, mut sum) = (x, 0.0);
+    for k in 0..1000 {
+        sum += power / f64::from(2 * k + 1);
+        power *= x * x;
+    }
+    2.0 * sum
+}
+
+/// The log-odds of a known cell.
+pub(super) fn log_odds_of(cell: i8) -> Option<f64> {
+    (cell != UNKNOWN).then(|| f64::from(cell) * UNIT)
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn the_series_is_the_logarithm() {
+        for i in 20..=980 {
+            let p = f64::from(i) / 1000.0;
+            assert!((log_odds(p) - (p / (1.0 - p)).ln()).abs() < 1e-12, "{p}");
+        }
+    }
+
+    #[test]
+    fn the_defaults_are_those_of_octomap_within_the_rounding() {
+        let steps = Steps::new(&Evidence::default()).unwrap();
+        let mut cell = UNKNOWN;
+        steps.hit(&mut cell);
+        assert!((log_odds_of(cell).unwrap() - 0.8473).abs() < 0.5 * UNIT);
+        for _ in 0..10 {
+            steps.hit(&mut cell);
+        }
+        assert!((log_odds_of(cell).unwrap() - 3.5110).abs() < 0.5 * UNIT);
+        let before = log_odds_of(cell).unwrap();
+        steps.miss(&mut cell);
+        assert!((before - log_odds_of(cell).unwrap() - 0.4055).abs() < 0.5 * UNIT);
+        for _ in 0..20 {
+            steps.miss(&mut cell);
+        }
+        assert!((log_odds_of(cell).unwrap() + 2.0).abs() < 0.5 * UNIT);
+        assert_eq!(steps.threshold, 0);
+    }
+
+    #[test]
+    fn the_latest_scan_decides_if_so_asked() {
+        let steps = Steps::new(&Evidence::latest()).unwrap();
+        let mut cell = UNKNOWN;
+        for _ in 0..5 {
+            steps.hit(&mut cell);
+        }
+        steps.miss(&mut cell);
+        assert!(cell < steps.threshold);
+        steps.miss(&mut cell);
+        steps.hit(&mut cell);
+        assert!(cell >= steps.threshold);
+    }
+
+    #[test]
+    fn what_does_not_go_together_is_refused() {
+        let good = Evidence::default();
+        for bad in [
+            Evidence { hit: 0.5, ..good },
+            Evidence { miss: 0.51, ..good },
+            Evidence {
+                hit: f64::NAN,
+                ..good
+            },
+            Evidence { most: 1.0, ..good },
+            Evidence { least: 0.6, ..good },
+            Evidence {
+                threshold: 0.99,
+                ..good
+            },
+            Evidence {
+                threshold: 0.1,
+                ..good
+            },
+        ] {
+            assert!(Steps::new(&bad).is_err(), "{bad:?}");
+        }
+    }
+}

@@ -1,0 +1,207 @@
+//! The planes between neighbouring cells, and the inner loop that walks through them.
+
+use nalgebra::{Matrix3, Vector3};
+
+use super::packed::{self, Packed};
+use crate::lattice::{Lattice, LatticeIndex};
+
+/// A numerator that is never reached: the plane of a family that the ray does not cross.
+const NEVER: f64 = 1e300;
+
+/// Steps between two computations of the numerators from integers.
+const ANCHOR_STEPS: u64 = 512;
+
+/// Low bits of a parameter that say which face it belongs to.
+const TAG: u64 = 15;
+
+/// A face that is reached from here on is met at the end: the end decides on which side it is.
+const LAST: f64 = 1.0 - 1.0 / (1_u64 << 48) as f64;
+
+/// A step along a ray slower than this part of a plane spacing is no crossing within the ray.
+const PARALLEL: f64 = 1.0 / (1_u64 << 50) as f64;
+
+/// What changes when a face is crossed.
+#[derive(Clone, Copy, Debug)]
+struct Crossing<const P: usize> {
+    /// Added to the numerators: Gram products with the vector of the face.
+    add: [f64; P],
+    /// Added to the packed lattice index.
+    step: u64,
+}
+
+/// The pairs of faces `+-n` of a cell, padded to `P`.
+///
+/// For a ray `s + t d` in the cell of lattice point `c` the face `sigma n`, with `sigma` the sign of
+/// `n . d`, is reached at `t = q / (n . d)`, `q = sigma |n|^2 / 2 - n . (s - c)`. A crossing of face
+/// `k` adds the Gram products `sigma_k n . n_k` to all `q`.
+#[derive(Clone, Debug)]
+pub(super) struct Families<const P: usize> {
+    count: usize,
+    normals: [Vector3<f64>; P],
+    half_squares: [f64; P],
+    /// Gram products of each normal with the basis.
+    with_basis: [Vector3<f64>; P],
+    /// For face `n_k` at `2 k`, for `-n_k` at `2 k + 1`.
+    crossings: [Crossing<P>; 16],
+}
+
+impl<const P: usize> Families<P> {
+    /// `faces` holds one vector of each pair; at most `P` and 8 count.
+    pub(super) fn new(generator: &Matrix3<f64>, faces: &[LatticeIndex]) -> Families<P> {
+        let faces = faces.get(..faces.len().min(P).min(8)).unwrap_or_default();
+        let mut normals = [Vector3::zeros(); P];
+        for (normal, w) in normals.iter_mut().zip(faces) {
+            *normal = generator * Vector3::from(w.map(f64::from));
+        }
+        let none = Crossing {
+            add: [0.0; P],
+            step: 0,
+        };
+        let mut crossings = [none; 16];
+        for (k, (w, normal)) in faces.iter().zip(&normals).enumerate() {
+            let add = normals.map(|n| n.dot(normal));
+            let step = packed::difference(*w);
+            crossings[2 * k] = Crossing { add, step };
+            crossings[2 * k + 1] = Crossing {
+                add: add.map(|a| -a),
+                step: step.wrapping_neg(),
+            };
+        }
+        Families {
+            count: faces.len(),
+            normals,
+            half_squares: normals.map(|n| 0.5 * n.norm_squared()),
+            with_basis: normals.map(|n| generator.tr_mul(&n)),
+            crossings,
+        }
+    }
+
+    /// Where rays start: `s - c` for a point `s` in the cell of lattice point `c`, at index `cell`.
+    pub(super) fn origin(&self, from_center_m: Vector3<f64>, cell: Packed) -> Origin<P> {
+        Origin {
+            cell,
+            along: self.normals.map(|n| n.dot(&from_center_m)),
+        }
+    }
+
+    /// A ray from `origin` that ends at `t = 1` after `direction_m`.
+    #[inline(always)]
+    pub(super) fn walk(&self, origin: &Origin<P>, direction_m: &Vector3<f64>) -> Walk<P> {
+        let mut walk = Walk {
+            q: [NEVER; P],
+            inverse: [1.0; P],
+            tag: [0; P],
+            cell: origin.cell,
+        };
+        for j in 0..P {
+            let along = self.normals[j].dot(direction_m);
+            let sign = if along < 0.0 { -1.0 } else { 1.0 };
+            let crosses = along.abs() > PARALLEL * self.half_squares[j];
+            let q = sign * self.half_squares[j] - origin.along[j];
+            walk.q[j] = if crosses { q } else { NEVER };
+            walk.inverse[j] = if crosses { 1.0 / along } else { 1.0 };
+            walk.tag[j] = 2 * j as u64 + u64::from(along < 0.0);
+        }
+        walk
+    }
+
+    /// Calls `visit` with each cell that the ray leaves before `t = 1`, at most `limit`, until it
+    /// answers false; the cell after these is in `walk`. Returns the number of steps.
+    #[inline(always)]
+    pub(super) fn run(
+        &self,
+        origin: &Origin<P>,
+        walk: &mut Walk<P>,
+        limit: u64,
+        mut visit: impl FnMut(Packed) -> bool,
+    ) -> u64 {
+        let mut done = 0;
+        while done < limit {
+            let until = limit.min(done + ANCHOR_STEPS);
+            while done < until {
+                let t = walk.next_exit();
+                if t >= LAST || !visit(walk.cell) {
+                    return done;
+                }
+                self.cross(walk, t);
+                done += 1;
+            }
+            self.anchor(origin, walk);
+        }
+        done
+    }
+
+    /// Goes through the face whose tag `t` carries.
+    #[inline(always)]
+    fn cross(&self, walk: &mut Walk<P>, t: f64) {
+        let crossing = &self.crossings[(t.to_bits() & TAG) as usize];
+        for j in 0..P {
+            walk.q[j] += crossing.add[j];
+        }
+        walk.cell = walk.cell.plus(crossing.step);
+    }
+
+    /// Computes the numerators anew from the integer index, so that their roundings do not add up.
+    #[inline(never)]
+    fn anchor(&self, origin: &Origin<P>, walk: &mut Walk<P>) {
+        let (from, at) = (origin.cell.unpack(), walk.cell.unpack());
+        let gone = Vector3::new(
+            f64::from(at[0] - from[0]),
+            f64::from(at[1] - from[1]),
+            f64::from(at[2] - from[2]),
+        );
+        for j in 0..self.count {
+            if walk.q[j] < 0.5 * NEVER {
+                let sign = if walk.inverse[j] < 0.0 { -1.0 } else { 1.0 };
+                walk.q[j] =
+                    sign * self.half_squares[j] - origin.along[j] + self.with_basis[j].dot(&gone);
+            }
+        }
+    }
+}
+
+/// A start of rays: its cell and its offset from the lattice point along each normal.
+#[derive(Clone, Copy, Debug)]
+pub(super) struct Origin<const P: usize> {
+    pub(super) cell: Packed,
+    along: [f64; P],
+}
+
+/// Where a ray is.
+#[derive(Clone, Copy, Debug)]
+pub(super) struct Walk<const P: usize> {
+    q: [f64; P],
+    inverse: [f64; P],
+    tag: [u64; P],
+    pub(super) cell: Packed,
+}
+
+impl<const P: usize> Walk<P> {
+    /// The parameter at which the ray leaves its cell; its low bits tell through which face.
+    #[inline(always)]
+    fn next_exit(&self) -> f64 {
+        let mut t = [0.0; P];
+        for (j, t) in t.iter_mut().enumerate() {
+            let exact = self.q[j] * self.inverse[j];
+            *t = f64::from_bits(exact.to_bits() & !TAG | self.tag[j]);
+        }
+        // Two lanes down to the end, so that SSE2 does it.
+        let mut least = [t[0], t[1]];
+        for pair in t.chunks_exact(2).skip(1) {
+            least = [lesser(least[0], pair[0]), lesser(least[1], pair[1])];
+        }
+        lesser(least[0], least[1])
+    }
+}
+
+/// The lesser of two numbers, one instruction.
+#[inline(always)]
+fn lesser(a: f64, b: f64) -> f64 {
+    if a < b { a } else { b }
+}
+
+/// One face vector of each pair `+-n` of a lattice.
+pub(super) fn face_pairs(lattice: &Lattice) -> Vec<LatticeIndex> {
+    let faces = lattice.face_neighbors().iter().copied();
+    faces.filter(|w| *w > w.map(|i| -i)).collect()
+}

@@ -1,0 +1,225 @@
+//! The cells that one scan hits and passes through.
+
+use std::hash::{BuildHasher, RandomState};
+
+use super::packed::Packed;
+
+/// One bit for each cell of a block, a cache line.
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
+#[repr(align(64))]
+pub(super) struct Mask(pub(super) [u64; 8]);
+
+impl Mask {
+    #[inline(always)]
+    fn set(&mut self, place: usize) -> bool {
+        let bit = 1 << (place & 63);
+        let word = &mut self.0[place >> 6 & 7];
+        let new = *word & bit == 0;
+        *word |= bit;
+        new
+    }
+}
+
+/// An odd multiplier that nobody who sends points can know.
+pub(super) fn random_multiplier() -> u64 {
+    RandomState::new().hash_one(0) | 1
+}
+
+/// The place of a hash in a table of a power of two.
+#[inline(always)]
+pub(super) fn spread(block: u64, multiplier: u64, bits: u32) -> usize {
+    // The low three bits of a block are zero, so that both halves need a turn.
+    let mixed = (block ^ block >> 32).wrapping_mul(multiplier);
+    (mixed >> (64 - bits)) as usize
+}
+
+#[derive(Clone, Copy, Debug, Default)]
+struct Entry {
+    block: u64,
+    slot: u32,
+    /// The entry is empty unless this is the stamp of the scan.
+    stamp: u32,
+}
+
+/// The blocks of one scan. Emptied in constant time.
+#[derive(Clone, Debug)]
+pub(super) struct ScanMasks {
+    table: Vec<Entry>,
+    bits: u32,
+    multiplier: u64,
+    stamp: u32,
+    /// Slot 0 takes the cells of blocks that are refused.
+    blocks: Vec<u64>,
+    passed: Vec<Mask>,
+    hit: Vec<Mask>,
+    most: usize,
+    entries_refused: u64,
+}
+
+/// The block of the cell before; a ray stays in one for several cells.
+#[derive(Clone, Copy, Debug)]
+pub(super) struct Cursor {
+    block: u64,
+    slot: usize,
+}
+
+impl Cursor {
+    /// In no block: the low bits of a block are zero.
+    pub(super) const NONE: Cursor = Cursor { block: 1, slot: 0 };
+}
+
+impl ScanMasks {
+    /// At most `most` blocks in a scan.
+    pub(super) fn new(most: usize) -> ScanMasks {
+        let bits = 8;
+        ScanMasks {
+            table: vec![Entry::default(); 1 << bits],
+            bits,
+            multiplier: random_multiplier(),
+            stamp: 1,
+            blocks: vec![1],
+            passed: vec![Mask::default()],
+            hit: vec![Mask::default()],
+            most: most.min(u32::MAX as usize - 1),
+            entries_refused: 0,
+        }
+    }
+
+    /// Most memory for a block, bytes: masks and block twice for the growth of vectors, and a table
+    /// filled to at least 3/8 beside the one that it grew from.
+    pub(super) const BYTES_PER_BLOCK: usize = 2 * (2 * size_of::<Mask>() + 8) + 4 * 16;
+
+    pub(super) fn bytes(&self) -> usize {
+        self.table.capacity() * size_of::<Entry>()
+            + (self.passed.capacity() + self.hit.capacity()) * size_of::<Mask>()
+            + self.blocks.capacity() * 8
+    }
+
+    pub(super) fn clear(&mut self) {
+        self.blocks.truncate(1);
+        self.passed.truncate(1);
+        self.hit.truncate(1);
+        self.entries_refused = 0;
+        self.stamp = self.stamp.wrapping_add(1);
+        if self.stamp == 0 {
+            self.table.fill(Entry::default());
+            self.stamp = 1;
+        }
+    }
+
+    /// How often a ray or end came into a block that is not held, for want of memory.
+    pub(super) fn entries_refused(&self) -> u64 {
+        self.entries_refused
+    }
+
+    /// Every block with what passed through and what was hit.
+    pub(super) fn blocks(&self) -> impl Iterator<Item = (u64, &Mask, &Mask)> + Clone {
+        let masks = self.passed.iter().zip(&self.hit);
+        let blocks = self.blocks.iter().zip(masks).skip(1);
+        blocks.map(|(block, (passed, hit))| (*block, passed, hit))
+    }
+
+    /// Marks a cell as passed through.
+    #[inline(always)]
+    pub(super) fn pass(&mut self, cell: Packed, cursor: &mut Cursor) {
+        if cell.block() != cursor.block {
+            *cursor = self.enter(cell.block());
+        }
+        if let Some(mask) = self.passed.get_mut(cursor.slot) {
+            mask.set(cell.place());
+        }
+    }
+
+    /// Marks a cell as hit; true if it was not yet, or if its block is refused.
+    #[inline]
+    pub(super) fn hit(&mut self, cell: Packed, cursor: &mut Cursor) -> bool {
+        if cell.block() != cursor.block {
+            *cursor = self.enter(cell.block());
+        }
+        let new = self.hit.get_mut(cursor.slot);
+        new.is_some_and(|mask| mask.set(cell.place())) || cursor.slot == 0
+    }
+
+    /// True if the cell was hit.
+    pub(super) fn is_hit(&self, cell: Packed) -> bool {
+        let mask = self.find(cell.block()).and_then(|slot| self.hit.get(slot));
+        let place = cell.place();
+        mask.is_some_and(|mask| mask.0[place >> 6 & 7] >> (place & 63) & 1 == 1)
+    }
+
+    fn find(&self, block: u64) -> Option<usize> {
+        let mask = self.table.len() - 1;
+        let mut at = spread(block, self.multiplier, self.bits);
+        loop {
+            let entry = self.table.get(at)?;
+            if entry.stamp != self.stamp {
+                return None;
+            }
+            if entry.block == block {
+                return Some(entry.slot as usize);
+            }
+            at = (at + 1) & mask;
+        }
+    }
+
+    /// The slot of a block, new or not.
+    #[inline]
+    fn enter(&mut self, block: u64) -> Cursor {
+        let mask = self.table.len() - 1;
+        let mut at = spread(block, self.multiplier, self.bits);
+        while let Some(entry) = self.table.get(at) {
+            if entry.stamp != self.stamp {
+                break;
+            }
+            if entry.block == block {
+                let slot = entry.slot as usize;
+                return Cursor { block, slot };
+            }
+            at = (at + 1) & mask;
+        }
+        self.add(block, at)
+    }
+
+    #[inline(never)]
+    fn add(&mut self, block: u64, at: usize) -> Cursor {
+        let slot = self.blocks.len();
+        if slot > self.most {
+            self.entries_refused += 1;
+            return Cursor { block, slot: 0 };
+        }
+        self.blocks.push(block);
+        self.passed.push(Mask::default());
+        self.hit.push(Mask::default());
+        if let Some(entry) = self.table.get_mut(at) {
+            *entry = Entry {
+                block,
+                slot: slot as u32,
+                stamp: self.stamp,
+            };
+        }
+        if self.blocks.len() * 2 > self.table.len() {
+            self.grow();
+        }
+        Cursor { block, slot }
+    }
+
+    fn grow(&mut self) {
+        self.bits += 1;
+        let mask = (1 << self.bits) - 1;
+        self.table.clear();
+        self.table.resize(mask + 1, Entry::default());
+        for (slot, &block) in self.blocks.iter().enumerate().skip(1) {
+            let mut at = spread(block, self.multiplier, self.bits);
+            while self.table.get(at).is_some_and(|e| e.stamp == self.stamp) {
+                at = (at + 1) & mask;
+            }
+            if let Some(entry) = self.table.get_mut(at) {
+                *entry = Entry {
+                    block,
+                    slot: slot as u32,
+                    stamp: self.stamp,
+                };
+            }
+        }
+    }
+}

@@ -1,0 +1,21 @@
+//! Free space: which cells a ray passes through, and what scans say about them.
+//!
+//! [`Traversal`] follows a segment through the cells of any lattice, exactly. [`FreeSpaceMap`] adds
+//! up scans to occupied, free and unknown cells.
+
+mod blocks;
+mod coarse;
+mod evidence;
+mod families;
+mod map;
+mod masks;
+mod options;
+mod packed;
+mod scan;
+mod traversal;
+
+pub use evidence::{Evidence, EvidenceError};
+pub use map::{CellCounts, CellState, FreeSpaceMap};
+pub use options::{FreeSpaceError, FreeSpaceOptions, MAX_FREE_LEVEL, MIN_MAP_BYTES};
+pub use scan::ScanReport;
+pub use traversal::{Traversal, TraversalError};

@@ -1,0 +1,76 @@
+//! What a map of free space is asked for, and what is wrong with it.
+
+use thiserror::Error;
+
+use super::evidence::{Evidence, EvidenceError};
+use crate::lattice::LatticeError;
+use crate::voxels::DatumError;
+
+/// Coarsest free level: cells 8 times as wide.
+pub const MAX_FREE_LEVEL: u32 = 3;
+/// Least memory of a map, bytes.
+pub const MIN_MAP_BYTES: usize = 1 << 20;
+
+/// How a [`super::FreeSpaceMap`] is kept.
+#[derive(Clone, Copy, PartialEq, Debug)]
+pub struct FreeSpaceOptions {
+    /// How hits and misses add up.
+    pub evidence: Evidence,
+    /// Rays of points that are farther than this are followed to this range, metres, and give no
+    /// hit; infinite for no limit.
+    pub max_range_m: f64,
+    /// Free cells are kept in cells `2^free_level` as wide, at most [`MAX_FREE_LEVEL`].
+    pub free_level: u32,
+    /// Most memory, bytes, at least [`MIN_MAP_BYTES`]. When it is used up, known blocks of cells are
+    /// still updated, and no new ones are added.
+    pub max_bytes: usize,
+}
+
+impl Default for FreeSpaceOptions {
+    fn default() -> FreeSpaceOptions {
+        FreeSpaceOptions {
+            evidence: Evidence::default(),
+            max_range_m: f64::INFINITY,
+            free_level: 0,
+            max_bytes: 1 << 30,
+        }
+    }
+}
+
+/// Why there is no map of free space.
+#[derive(Clone, PartialEq, Debug, Error)]
+pub enum FreeSpaceError {
+    /// The probabilities do not go together.
+    #[error(transparent)]
+    Evidence(#[from] EvidenceError),
+    /// The datum is out of reach.
+    #[error(transparent)]
+    Datum(#[from] DatumError),
+    /// The coarse lattice of the free level cannot be made.
+    #[error("free level: {0}")]
+    Coarse(#[from] LatticeError),
+    /// The range limit is not positive.
+    #[error("max_range_m {0} is not above 0")]
+    Range(f64),
+    /// The free level is too coarse.
+    #[error("free_level {0} is above {MAX_FREE_LEVEL}")]
+    FreeLevel(u32),
+    /// The limit of memory is too low.
+    #[error("max_bytes {0} is below {MIN_MAP_BYTES}")]
+    Memory(usize),
+}
+
+impl FreeSpaceOptions {
+    pub(super) fn check(&self) -> Result<(), FreeSpaceError> {
+        if self.max_range_m.is_nan() || self.max_range_m <= 0.0 {
+            return Err(FreeSpaceError::Range(self.max_range_m));
+        }
+        if self.free_level > MAX_FREE_LEVEL {
+            return Err(FreeSpaceError::FreeLevel(self.free_level));
+        }
+        if self.max_bytes < MIN_MAP_BYTES {
+            return Err(FreeSpaceError::Memory(self.max_bytes));
+        }
+        Ok(())
+    }
+}

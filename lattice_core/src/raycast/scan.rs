@@ -1,0 +1,193 @@
+//! The rays of a scan: one for each cell that they end in.
+
+use nalgebra::Vector3;
+use rustc_hash::FxHashSet;
+
+use super::families::Families;
+use super::masks::{Cursor, ScanMasks};
+use super::packed::Packed;
+use super::traversal::{Kernel, Traversal, with_families};
+use crate::cloud::Cloud;
+
+/// What became of a scan.
+#[derive(Clone, Copy, PartialEq, Eq, Debug, Default)]
+pub struct ScanReport {
+    /// Points in the scan.
+    pub points: u64,
+    /// Points with a coordinate that is NaN or infinite; all points if the origin has one.
+    pub not_finite: u64,
+    /// Points too many cells from the datum; all points if the origin is.
+    pub out_of_range: u64,
+    /// Points beyond the range limit, whose rays were followed up to it.
+    pub beyond_max_range: u64,
+    /// Cells that were hit.
+    pub hits: u64,
+    /// Rays that were followed: one for each cell that one ends in.
+    pub rays: u64,
+    /// Cells passed through, counted anew for each ray.
+    pub visits: u64,
+    /// Cells passed through and not hit, each counted once.
+    pub misses: u64,
+    /// New blocks of 512 cells that there was no memory for.
+    pub blocks_refused: u64,
+    /// Times that a ray or end came into a block that there was no memory for during the scan.
+    pub entries_refused: u64,
+}
+
+/// Where rays end. Each cell comes once.
+pub(super) struct Ends {
+    /// Cells that were hit.
+    hits: Vec<Packed>,
+    /// Cells where the range limit cuts rays.
+    open: Vec<Packed>,
+}
+
+/// Marks the cells that a scan hits and passes through; `origin` and the points in metres from the
+/// lattice point 0, points as offsets from `base_m`.
+///
+/// Rays go to the lattice points of the cells that they end in, so that the marks do not depend on
+/// the order of the points.
+pub(super) fn mark(
+    traversal: &Traversal,
+    masks: &mut ScanMasks,
+    origin_m: &Vector3<f64>,
+    base_m: &Vector3<f64>,
+    scan: &Cloud,
+    max_range_m: f64,
+) -> ScanReport {
+    masks.clear();
+    let mut report = ScanReport {
+        points: scan.offsets_m.len() as u64,
+        ..ScanReport::default()
+    };
+    match traversal.cell_of(origin_m) {
+        Err(super::TraversalError::NotFinite) => report.not_finite = report.points,
+        Err(super::TraversalError::OutOfRange(_)) => report.out_of_range = report.points,
+        Ok(start) => {
+            let rays = Rays {
+                traversal,
+                origin_m,
+                start,
+                base_m,
+                max_range_m,
+            };
+            rays.mark(masks, scan, &mut report);
+        }
+    }
+    report
+}
+
+struct Rays<'a> {
+    traversal: &'a Traversal,
+    origin_m: &'a Vector3<f64>,
+    start: Packed,
+    base_m: &'a Vector3<f64>,
+    max_range_m: f64,
+}
+
+impl Rays<'_> {
+    fn mark(&self, masks: &mut ScanMasks, scan: &Cloud, report: &mut ScanReport) {
+        let mut ends = self.ends(masks, scan, report);
+        report.visits = self.follow_all(masks, &ends);
+        if masks.entries_refused() > 0 {
+            // Which blocks are refused must not depend on the order of the points: once more, with
+            // ends that are complete and sorted.
+            ends.hits = self.all_hits(scan);
+            ends.open.sort_unstable();
+            masks.clear();
+            let mut cursor = Cursor::NONE;
+            for cell in &ends.hits {
+                masks.hit(*cell, &mut cursor);
+            }
+            report.visits = self.follow_all(masks, &ends);
+        }
+        report.hits = ends.hits.len() as u64;
+        report.rays = (ends.hits.len() + ends.open.len()) as u64;
+        report.entries_refused = masks.entries_refused();
+    }
+
+    fn ends(&self, masks: &mut ScanMasks, scan: &Cloud, report: &mut ScanReport) -> Ends {
+        let (mut hits, mut cursor) = (Vec::new(), Cursor::NONE);
+        let mut open = FxHashSet::default();
+        let reach_square = self.max_range_m * self.max_range_m;
+        self.quantize_each(scan, |p, cell| {
+            let from_origin = p - self.origin_m;
+            let square = from_origin.norm_squared();
+            if !square.is_finite() {
+                report.not_finite += 1;
+            } else if square <= reach_square {
+                match cell {
+                    Some(cell) if masks.hit(cell, &mut cursor) => hits.push(cell),
+                    Some(_) => {}
+                    None => report.out_of_range += 1,
+                }
+            } else {
+                let end = self.origin_m + from_origin * (self.max_range_m / square.sqrt());
+                match self.traversal.cell_of(&end) {
+                    Ok(cell) => {
+                        report.beyond_max_range += 1;
+                        open.insert(cell);
+                    }
+                    Err(_) => report.out_of_range += 1,
+                }
+            }
+        });
+        // The same ray serves both.
+        open.retain(|cell| !masks.is_hit(*cell));
+        let open = open.into_iter().collect();
+        Ends { hits, open }
+    }
+
+    /// The cells of all points within range, sorted.
+    fn all_hits(&self, scan: &Cloud) -> Vec<Packed> {
+        let reach_square = self.max_range_m * self.max_range_m;
+        let mut cells = Vec::new();
+        self.quantize_each(scan, |p, cell| {
+            if (p - self.origin_m).norm_squared() <= reach_square {
+                cells.extend(cell);
+            }
+        });
+        cells.sort_unstable();
+        cells.dedup();
+        cells
+    }
+
+    fn quantize_each(&self, scan: &Cloud, mut visit: impl FnMut(Vector3<f64>, Option<Packed>)) {
+        let [bx, by, bz] = (*self.base_m).into();
+        let offsets = scan.offsets_m.iter();
+        let points =
+            offsets.map(|&[x, y, z]| [bx + f64::from(x), by + f64::from(y), bz + f64::from(z)]);
+        self.traversal.lattice().quantize_each(points, |p, w| {
+            let cell = w.and_then(|w| self.traversal.in_range(w));
+            visit(Vector3::from(p), cell);
+        });
+    }
+
+    fn follow_all(&self, masks: &mut ScanMasks, ends: &Ends) -> u64 {
+        with_families!(&self.traversal.kernel, families => self.follow(families, masks, ends))
+    }
+
+    /// Marks the cells from the origin to each end, without the end.
+    fn follow<const P: usize>(
+        &self,
+        families: &Families<P>,
+        masks: &mut ScanMasks,
+        ends: &Ends,
+    ) -> u64 {
+        let lattice = self.traversal.lattice();
+        let from_center = self.origin_m - lattice.center(self.start.unpack());
+        let origin = families.origin(from_center, self.start);
+        let mut cursor = Cursor::NONE;
+        let mut visits = 0;
+        for end in ends.hits.iter().chain(&ends.open) {
+            let ray = lattice.center(end.unpack()) - self.origin_m;
+            let limit = self.traversal.most_steps(ray.norm());
+            let mut walk = families.walk(&origin, &ray);
+            visits += families.run(&origin, &mut walk, limit, |cell| {
+                masks.pass(cell, &mut cursor);
+                true
+            });
+        }
+        visits
+    }
+}
