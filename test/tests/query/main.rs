@@ -1,0 +1,6 @@
+//! Queries against brute force, on every lattice, near and far from the map origin.
+
+mod clearance;
+mod nearest;
+mod polyhedra;
+mod worlds;
