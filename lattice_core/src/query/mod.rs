@@ -9,9 +9,12 @@
 //! questions, and go to the lower key where distances are equal.
 
 mod clearance;
+mod corridor;
 mod error;
+mod field;
 mod gjk;
 mod nearest;
+mod path;
 mod search;
 mod shape;
 mod shells;
@@ -25,8 +28,11 @@ use crate::lattice::Key;
 use crate::voxels::VoxelStore;
 
 pub use clearance::{Clearance, MAX_PIECES};
+pub use corridor::MAX_ROBOT_CELLS;
 pub use error::QueryError;
+pub use field::{Bounds, DistanceField};
 pub use nearest::Neighbor;
+pub use path::{Path, PathError, PathOptions, Steps};
 pub use shape::{ConvexShape, OrientedBox, Segment};
 pub use shells::Shells;
 

@@ -1,0 +1,96 @@
+//! Which cells block a ball at the centre of a cell, and on its way to the next.
+
+use rustc_hash::FxHashSet;
+
+use super::clearance::cell_distance_m;
+use super::shells::{add, steps_within};
+use super::{PathError, Segment};
+use crate::lattice::{Key, Lattice, LatticeIndex};
+use crate::voxels::VoxelStore;
+
+/// Most cells that a robot may cover.
+pub const MAX_ROBOT_CELLS: usize = 1 << 16;
+
+/// Occupied cells that touch a ball.
+pub(super) struct Corridor {
+    /// Cells that touch the ball in the middle of cell 0, nearest first.
+    at: Vec<LatticeIndex>,
+    /// To where a step leads, and its length.
+    pub(super) steps: Vec<(LatticeIndex, f64)>,
+    /// For each step, cells that touch the ball on its way and at neither end.
+    between: Vec<Vec<LatticeIndex>>,
+}
+
+impl Corridor {
+    pub(super) fn new(
+        lattice: &Lattice,
+        radius_m: f64,
+        steps: &[LatticeIndex],
+    ) -> Result<Corridor, PathError> {
+        let covering_m = lattice.covering_radius_m();
+        // Cells are within a covering radius of the ball; see below for the slack.
+        let reach_m = radius_m + 1.001 * covering_m;
+        let volume = 4.0 / 3.0 * std::f64::consts::PI * reach_m.powi(3);
+        let cells = volume / lattice.cell_volume_m3();
+        if cells.is_nan() || cells > MAX_ROBOT_CELLS as f64 {
+            return Err(PathError::Radius { radius_m, cells });
+        }
+        // Contact blocks; the slack makes that independent of rounding.
+        let blocked_m = radius_m + 1e-9 * covering_m;
+        let touching = |line: &Segment, reach_m: f64| -> Vec<LatticeIndex> {
+            let near = steps_within(lattice, reach_m)
+                .into_iter()
+                .map(|step| step.by);
+            let distance_m = |w| cell_distance_m(line, lattice.cell(), &lattice.center(w));
+            near.filter(|&w| distance_m(w) <= blocked_m).collect()
+        };
+        let zero = lattice.center([0; 3]);
+        let way = |to: LatticeIndex| Segment {
+            from_m: zero,
+            to_m: lattice.center(to),
+        };
+        let at = touching(&way([0; 3]), reach_m);
+        let ball: FxHashSet<LatticeIndex> = at.iter().copied().collect();
+        let between = |&to: &LatticeIndex| -> Vec<LatticeIndex> {
+            let back = to.map(|w| -w);
+            // One of both directions decides for both, so that ways back are the same.
+            let forward = if to > back { to } else { back };
+            let line = way(forward);
+            let cells = touching(&line, reach_m + line.to_m.norm());
+            let behind = forward.map(|w| -w);
+            let new = |w: &LatticeIndex| !ball.contains(w) && !ball.contains(&add(*w, behind));
+            let shift = if to == forward { [0; 3] } else { to };
+            let cells = cells.into_iter().filter(new);
+            cells.map(|w| add(w, shift)).collect()
+        };
+        Ok(Corridor {
+            at,
+            between: steps.iter().map(between).collect(),
+            steps: steps
+                .iter()
+                .map(|&to| (to, lattice.center(to).norm()))
+                .collect(),
+        })
+    }
+
+    /// True if the ball fits in the middle of a cell.
+    pub(super) fn is_clear(&self, store: &impl VoxelStore, w: LatticeIndex) -> bool {
+        none_occupied(store, w, &self.at)
+    }
+
+    /// True if the ball, which fits at both ends, fits between them too.
+    pub(super) fn is_way_clear(
+        &self,
+        store: &impl VoxelStore,
+        w: LatticeIndex,
+        step: usize,
+    ) -> bool {
+        let between = self.between.get(step);
+        between.is_some_and(|between| none_occupied(store, w, between))
+    }
+}
+
+fn none_occupied(store: &impl VoxelStore, w: LatticeIndex, around: &[LatticeIndex]) -> bool {
+    let occupied = |by: &LatticeIndex| Key::pack(add(w, *by)).is_some_and(|k| store.contains(k));
+    !around.iter().any(occupied)
+}

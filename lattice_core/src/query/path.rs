@@ -1,0 +1,308 @@
+//! Shortest paths of a ball through free cells: A* (Hart, Nilsson & Raphael 1968).
+
+use std::cmp::Ordering;
+use std::collections::BinaryHeap;
+
+use nalgebra::Vector3;
+use rustc_hash::FxHashMap;
+use thiserror::Error;
+
+use super::corridor::{Corridor, MAX_ROBOT_CELLS};
+use super::shells::add;
+use super::{Bounds, Query, QueryError, Segment};
+use crate::lattice::Key;
+use crate::voxels::VoxelStore;
+
+/// Which cells a step may lead to.
+#[derive(Clone, Copy, PartialEq, Eq, Debug, Default)]
+pub enum Steps {
+    /// Cells that share a face.
+    #[default]
+    Face,
+    /// Cells that share a face, an edge or a vertex.
+    Touching,
+}
+
+/// What path is wanted.
+#[derive(Clone, Copy, PartialEq, Debug)]
+pub struct PathOptions {
+    /// Radius of the ball that moves, metres.
+    pub radius_m: f64,
+    /// Steps that it can take.
+    pub steps: Steps,
+    /// Where the centres of its cells must be, map frame; `None` for everywhere.
+    pub bounds: Option<Bounds>,
+    /// The search gives up after this many cells.
+    pub max_expanded: usize,
+}
+
+/// A path from cell to cell.
+#[derive(Clone, PartialEq, Debug)]
+pub struct Path {
+    /// The cells, from that of the start to that of the goal.
+    pub keys: Vec<Key>,
+    /// Their centres, map frame, metres.
+    pub centers_m: Vec<Vector3<f64>>,
+    /// Length from the first centre to the last, metres.
+    pub length_m: f64,
+    /// Cells that the search looked around from.
+    pub expanded: usize,
+}
+
+/// Why there is no path.
+#[derive(Clone, PartialEq, Debug, Error)]
+pub enum PathError {
+    /// The question makes no sense.
+    #[error(transparent)]
+    Query(#[from] QueryError),
+    /// The ball is too large for the cells.
+    #[error(
+        "radius {radius_m} m covers some {cells:.0} cells, at most {MAX_ROBOT_CELLS}: use larger cells"
+    )]
+    Radius {
+        /// Radius asked for, metres.
+        radius_m: f64,
+        /// Cells that it covers, about.
+        cells: f64,
+    },
+    /// The start or goal is out of the bounds or of the range of keys.
+    #[error("the cell of {end} {point_m:?} m is out of bounds")]
+    OutOfBounds {
+        /// "start" or "goal".
+        end: &'static str,
+        /// Where it is, map frame, metres.
+        point_m: [f64; 3],
+    },
+    /// The ball does not fit at the start or goal.
+    #[error("the cell of {end} {point_m:?} m is not passable with radius {radius_m} m")]
+    Blocked {
+        /// "start" or "goal".
+        end: &'static str,
+        /// Where it is, map frame, metres.
+        point_m: [f64; 3],
+        /// Radius asked for, metres.
+        radius_m: f64,
+    },
+    /// Every cell that can be reached was looked at.
+    #[error("no path: the goal is not among the {expanded} cells that can be reached")]
+    NoPath {
+        /// Cells looked around from.
+        expanded: usize,
+    },
+    /// The search gave up.
+    #[error("no path found among {expanded} cells: allow more, or set tighter bounds")]
+    Limit {
+        /// Cells looked around from.
+        expanded: usize,
+    },
+}
+
+impl<S: VoxelStore> Query<'_, S> {
+    /// The shortest path along centres of cells on which a ball touches no occupied cell, neither at
+    /// the centres nor between them.
+    ///
+    /// `start_m` and `goal_m` (map frame) stand for the cells that hold them. `passable` can forbid
+    /// more, such as unknown space; it is asked at most once a cell. Paths of equal length are
+    /// chosen between by key, so that the same map gives the same path.
+    pub fn shortest_path(
+        &self,
+        start_m: &Vector3<f64>,
+        goal_m: &Vector3<f64>,
+        options: &PathOptions,
+        mut passable: impl FnMut(Key) -> bool,
+    ) -> Result<Path, PathError> {
+        super::error::check_distance(options.radius_m)?;
+        if let Some(bounds) = &options.bounds {
+            bounds.check()?;
+        }
+        let lattice = self.store.lattice();
+        let steps = match options.steps {
+            Steps::Face => lattice.face_neighbors(),
+            Steps::Touching => lattice.touching_neighbors(),
+        };
+        let corridor = Corridor::new(lattice, options.radius_m, steps)?;
+        let bounds = options.bounds.map(|b| b.moved(&-self.store.datum_m()));
+        let inside = |key: Key| bounds.is_none_or(|b| b.contains(&lattice.center(key.unpack())));
+        let mut is_open = |key: Key| corridor.is_clear(self.store, key.unpack()) && passable(key);
+        let mut end_cell = |end: &'static str, point: &Vector3<f64>| {
+            let _ = self.local(point)?;
+            let point_m = (*point).into();
+            let key = self.store.key_of(point).filter(|&key| inside(key));
+            let key = key.ok_or(PathError::OutOfBounds { end, point_m })?;
+            let radius_m = options.radius_m;
+            let blocked = PathError::Blocked {
+                end,
+                point_m,
+                radius_m,
+            };
+            if is_open(key) { Ok(key) } else { Err(blocked) }
+        };
+        let start = end_cell("start", start_m)?;
+        let goal = end_cell("goal", goal_m)?;
+
+        let goal_center_m = lattice.center(goal.unpack());
+        let to_goal_m = |key: Key| (lattice.center(key.unpack()) - goal_center_m).norm();
+        let mut cells = FxHashMap::default();
+        let mut waiting = BinaryHeap::new();
+        cells.insert(goal, Cell::Open);
+        let reached = Reached {
+            from: start,
+            length_m: 0.0,
+        };
+        cells.insert(start, Cell::Reached(reached));
+        waiting.push(Waiting::new(start, 0.0, to_goal_m(start)));
+        let mut expanded = 0;
+        while let Some(next) = waiting.pop() {
+            let Some(Cell::Reached(reached)) = cells.get(&next.key).copied() else {
+                continue;
+            };
+            if next.length_m > reached.length_m {
+                continue;
+            }
+            if next.key == goal {
+                return Ok(self.path_to(goal, next.length_m, &cells, expanded));
+            }
+            if expanded == options.max_expanded {
+                return Err(PathError::Limit { expanded });
+            }
+            expanded += 1;
+            let w = next.key.unpack();
+            for (i, &(by, step_m)) in corridor.steps.iter().enumerate() {
+                let Some(key) = Key::pack(add(w, by)).filter(|&key| inside(key)) else {
+                    continue;
+                };
+                let cell = cells.entry(key).or_insert_with(|| {
+                    if is_open(key) {
+                        Cell::Open
+                    } else {
+                        Cell::Closed
+                    }
+                });
+                let length_m = reached.length_m + step_m;
+                let better = match cell {
+                    Cell::Closed => false,
+                    Cell::Open => true,
+                    Cell::Reached(known) => length_m < known.length_m,
+                };
+                if better && corridor.is_way_clear(self.store, w, i) {
+                    *cell = Cell::Reached(Reached {
+                        from: next.key,
+                        length_m,
+                    });
+                    waiting.push(Waiting::new(key, length_m, to_goal_m(key)));
+                }
+            }
+        }
+        Err(PathError::NoPath { expanded })
+    }
+
+    /// Takes corners out of a path where a straight line keeps a ball clear of occupied cells;
+    /// the ends stay, and the path gets no longer. Only occupied cells count, no other rule.
+    ///
+    /// Goes on from each point to the last one of the run that it sees, so that it takes as many
+    /// lines of sight as there are points.
+    pub fn shorten(
+        &self,
+        path_m: &[Vector3<f64>],
+        radius_m: f64,
+    ) -> Result<Vec<Vector3<f64>>, QueryError> {
+        let Some((&first, rest)) = path_m.split_first() else {
+            return Err(QueryError::EmptyPath);
+        };
+        let mut short = vec![first];
+        let mut from_m = first;
+        let mut seen = first;
+        for &to_m in rest {
+            if !self.is_free(&Segment { from_m, to_m }, radius_m)? && seen != from_m {
+                short.push(seen);
+                from_m = seen;
+            }
+            seen = to_m;
+        }
+        if seen != first || short.len() > 1 {
+            short.push(seen);
+        }
+        Ok(short)
+    }
+
+    fn path_to(
+        &self,
+        goal: Key,
+        length_m: f64,
+        cells: &FxHashMap<Key, Cell>,
+        expanded: usize,
+    ) -> Path {
+        let before = |key: &Key| match cells.get(key) {
+            Some(Cell::Reached(reached)) if reached.from != *key => Some(reached.from),
+            _ => None,
+        };
+        let mut keys: Vec<Key> = std::iter::successors(Some(goal), before).collect();
+        keys.reverse();
+        Path {
+            centers_m: keys.iter().map(|&key| self.store.center_m(key)).collect(),
+            keys,
+            length_m,
+            expanded,
+        }
+    }
+}
+
+/// What is known of a cell.
+#[derive(Clone, Copy)]
+enum Cell {
+    /// The ball does not fit.
+    Closed,
+    /// It fits, but no way there is known.
+    Open,
+    Reached(Reached),
+}
+
+/// The shortest way known.
+#[derive(Clone, Copy)]
+struct Reached {
+    from: Key,
+    length_m: f64,
+}
+
+/// A cell to look around from; the greatest is the next.
+#[derive(Clone, Copy)]
+struct Waiting {
+    key: Key,
+    length_m: f64,
+    to_goal_m: f64,
+    total_m: f64,
+}
+
+impl Waiting {
+    fn new(key: Key, length_m: f64, to_goal_m: f64) -> Waiting {
+        Waiting {
+            key,
+            length_m,
+            to_goal_m,
+            total_m: length_m + to_goal_m,
+        }
+    }
+}
+
+impl Ord for Waiting {
+    /// Shortest in total first, then nearest to the goal, then lowest key.
+    fn cmp(&self, other: &Waiting) -> Ordering {
+        let total = other.total_m.total_cmp(&self.total_m);
+        let to_goal = other.to_goal_m.total_cmp(&self.to_goal_m);
+        total.then(to_goal).then(other.key.cmp(&self.key))
+    }
+}
+
+impl PartialOrd for Waiting {
+    fn partial_cmp(&self, other: &Waiting) -> Option<Ordering> {
+        Some(self.cmp(other))
+    }
+}
+
+impl PartialEq for Waiting {
+    fn eq(&self, other: &Waiting) -> bool {
+        self.cmp(other).is_eq()
+    }
+}
+
+impl Eq for Waiting {}
