@@ -7,10 +7,10 @@ use nalgebra::Vector3;
 use super::blocks::{Blocks, add_evidence};
 use super::coarse::Coarse;
 use super::evidence::{Steps, UNKNOWN, log_odds_of};
-use super::masks::ScanMasks;
+use super::masks::{Mask, ScanMasks};
 use super::options::{FreeSpaceError, FreeSpaceOptions};
 use super::packed::Packed;
-use super::scan::{self, ScanReport};
+use super::scan::{self, Reach, ScanReport};
 use super::traversal::Traversal;
 use crate::cloud::Cloud;
 use crate::lattice::{Key, Lattice};
@@ -110,9 +110,12 @@ impl FreeSpaceMap {
             &(origin_m - self.datum_m),
             &(scan.datum_m - self.datum_m),
             scan,
-            self.options.max_range_m,
+            Reach {
+                max_range_m: self.options.max_range_m,
+                keep_m: 0.0,
+            },
         );
-        let missed = |(_, passed, hit): (u64, &super::masks::Mask, &super::masks::Mask)| {
+        let missed = |(_, passed, hit): (u64, &Mask, &Mask)| {
             let words = passed.0.iter().zip(&hit.0);
             words
                 .map(|(p, h)| u64::from((p & !h).count_ones()))

@@ -1,9 +1,11 @@
 //! Free space: which cells a ray passes through, and what scans say about them.
 //!
 //! [`Traversal`] follows a segment through the cells of any lattice, exactly. [`FreeSpaceMap`] adds
-//! up scans to occupied, free and unknown cells.
+//! up scans to occupied, free and unknown cells, [`RayClearer`] removes from a voxel store what rays
+//! pass through.
 
 mod blocks;
+mod clear;
 mod coarse;
 mod evidence;
 mod families;
@@ -14,6 +16,7 @@ mod packed;
 mod scan;
 mod traversal;
 
+pub use clear::{ClearOptions, ClearReport, RayClearer, clear_rays};
 pub use evidence::{Evidence, EvidenceError};
 pub use map::{CellCounts, CellState, FreeSpaceMap};
 pub use options::{FreeSpaceError, FreeSpaceOptions, MAX_FREE_LEVEL, MIN_MAP_BYTES};

@@ -34,6 +34,15 @@ pub struct ScanReport {
     pub entries_refused: u64,
 }
 
+/// Which parts of rays count.
+#[derive(Clone, Copy, Debug)]
+pub(super) struct Reach {
+    /// Points beyond this give no hit, and their rays end here.
+    pub(super) max_range_m: f64,
+    /// The last part of each ray, which passes through nothing.
+    pub(super) keep_m: f64,
+}
+
 /// Where rays end. Each cell comes once.
 pub(super) struct Ends {
     /// Cells that were hit.
@@ -53,7 +62,7 @@ pub(super) fn mark(
     origin_m: &Vector3<f64>,
     base_m: &Vector3<f64>,
     scan: &Cloud,
-    max_range_m: f64,
+    reach: Reach,
 ) -> ScanReport {
     masks.clear();
     let mut report = ScanReport {
@@ -69,7 +78,7 @@ pub(super) fn mark(
                 origin_m,
                 start,
                 base_m,
-                max_range_m,
+                reach,
             };
             rays.mark(masks, scan, &mut report);
         }
@@ -82,7 +91,7 @@ struct Rays<'a> {
     origin_m: &'a Vector3<f64>,
     start: Packed,
     base_m: &'a Vector3<f64>,
-    max_range_m: f64,
+    reach: Reach,
 }
 
 impl Rays<'_> {
@@ -109,7 +118,7 @@ impl Rays<'_> {
     fn ends(&self, masks: &mut ScanMasks, scan: &Cloud, report: &mut ScanReport) -> Ends {
         let (mut hits, mut cursor) = (Vec::new(), Cursor::NONE);
         let mut open = FxHashSet::default();
-        let reach_square = self.max_range_m * self.max_range_m;
+        let reach_square = self.reach.max_range_m * self.reach.max_range_m;
         self.quantize_each(scan, |p, cell| {
             let from_origin = p - self.origin_m;
             let square = from_origin.norm_squared();
@@ -122,7 +131,7 @@ impl Rays<'_> {
                     None => report.out_of_range += 1,
                 }
             } else {
-                let end = self.origin_m + from_origin * (self.max_range_m / square.sqrt());
+                let end = self.origin_m + from_origin * (self.reach.max_range_m / square.sqrt());
                 match self.traversal.cell_of(&end) {
                     Ok(cell) => {
                         report.beyond_max_range += 1;
@@ -140,7 +149,7 @@ impl Rays<'_> {
 
     /// The cells of all points within range, sorted.
     fn all_hits(&self, scan: &Cloud) -> Vec<Packed> {
-        let reach_square = self.max_range_m * self.max_range_m;
+        let reach_square = self.reach.max_range_m * self.reach.max_range_m;
         let mut cells = Vec::new();
         self.quantize_each(scan, |p, cell| {
             if (p - self.origin_m).norm_squared() <= reach_square {
@@ -180,8 +189,15 @@ impl Rays<'_> {
         let mut cursor = Cursor::NONE;
         let mut visits = 0;
         for end in ends.hits.iter().chain(&ends.open) {
-            let ray = lattice.center(end.unpack()) - self.origin_m;
-            let limit = self.traversal.most_steps(ray.norm());
+            let mut ray = lattice.center(end.unpack()) - self.origin_m;
+            let length = ray.norm();
+            if self.reach.keep_m > 0.0 {
+                if length <= self.reach.keep_m {
+                    continue;
+                }
+                ray *= 1.0 - self.reach.keep_m / length;
+            }
+            let limit = self.traversal.most_steps(length);
             let mut walk = families.walk(&origin, &ray);
             visits += families.run(&origin, &mut walk, limit, |cell| {
                 masks.pass(cell, &mut cursor);

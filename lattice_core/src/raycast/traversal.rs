@@ -87,7 +87,7 @@ impl Traversal {
         let (reach, volume) = (2.0 * lattice.covering_radius_m(), lattice.cell_volume_m3());
         Traversal {
             faces: lattice.face_neighbors().iter().map(face).collect(),
-            index_limit: (1 << 20) - 2 * index_margin(lattice),
+            index_limit: (1 << 20) - 4 * index_margin(lattice),
             cells_per_metre: 3.2 * reach * reach / volume,
             cells_at_ends: 4.2 * reach * reach * reach / volume + 8.0,
             lattice: lattice.clone(),

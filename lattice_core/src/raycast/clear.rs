@@ -1,0 +1,176 @@
+//! Removing voxels that rays pass through.
+
+use nalgebra::Vector3;
+use rustc_hash::FxHashMap;
+
+use super::blocks::each_bit;
+use super::masks::ScanMasks;
+use super::packed::{Packed, difference};
+use super::scan::{self, Reach, ScanReport};
+use super::traversal::Traversal;
+use crate::cloud::Cloud;
+use crate::lattice::{Key, Lattice, LatticeIndex};
+use crate::voxels::VoxelStore;
+
+/// When voxels are removed.
+#[derive(Clone, Copy, PartialEq, Debug)]
+pub struct ClearOptions {
+    /// Scans that must pass through a voxel, with none between that hits it, to remove it.
+    pub misses: u32,
+    /// The last part of each ray that removes nothing, metres: rays that graze a surface pass
+    /// through the voxels before the one that they end in.
+    pub keep_m: f64,
+    /// Rays are followed to this range, metres.
+    pub max_range_m: f64,
+    /// Most memory for the marks of a scan, bytes; cells beyond it are not cleared.
+    pub max_bytes: usize,
+}
+
+impl Default for ClearOptions {
+    fn default() -> ClearOptions {
+        ClearOptions {
+            misses: 1,
+            keep_m: 0.0,
+            max_range_m: f64::INFINITY,
+            max_bytes: 1 << 28,
+        }
+    }
+}
+
+/// What a scan cleared.
+#[derive(Clone, PartialEq, Eq, Debug, Default)]
+pub struct ClearReport {
+    /// The rays; `hits` and `misses` count cells whether they are occupied or not.
+    pub scan: ScanReport,
+    /// Occupied voxels that rays passed through and that nothing kept.
+    pub missed: u64,
+    /// Occupied voxels that rays passed through, kept since they touch a cell that the scan hit.
+    pub kept: u64,
+    /// The voxels that were removed, in ascending order.
+    pub removed: Vec<Key>,
+}
+
+/// Removes from a store what rays pass through, for scenes in which things move.
+///
+/// A voxel is passed through if a ray to the lattice point of a cell with a point crosses it more
+/// than `keep_m` before that end. Voxels that the scan hits, and those that touch one in at least a
+/// vertex, are safe from it: a surface seen at a flat angle does not clear itself.
+#[derive(Clone, Debug)]
+pub struct RayClearer {
+    traversal: Traversal,
+    options: ClearOptions,
+    touching: Vec<LatticeIndex>,
+    masks: ScanMasks,
+    missed: FxHashMap<Key, u32>,
+}
+
+impl RayClearer {
+    /// For stores of this lattice; use one for each store, since it counts misses.
+    pub fn new(lattice: &Lattice, options: ClearOptions) -> RayClearer {
+        RayClearer {
+            traversal: Traversal::new(lattice),
+            options,
+            touching: lattice.touching_neighbors().to_vec(),
+            masks: ScanMasks::new(options.max_bytes / ScanMasks::BYTES_PER_BLOCK),
+            missed: FxHashMap::default(),
+        }
+    }
+
+    /// Clears along the rays of a scan (map frame) taken from `origin_m` (map frame, metres). The
+    /// points themselves are not inserted; do that before or after.
+    ///
+    /// The outcome does not depend on the order of the points. Nothing happens to a store of
+    /// another lattice than that of the clearer.
+    pub fn clear(
+        &mut self,
+        store: &mut impl VoxelStore,
+        origin_m: Vector3<f64>,
+        scan: &Cloud,
+    ) -> ClearReport {
+        let mut report = ClearReport::default();
+        if store.lattice() != self.traversal.lattice() {
+            return report;
+        }
+        let reach = Reach {
+            max_range_m: self.options.max_range_m,
+            keep_m: self.options.keep_m.max(0.0),
+        };
+        let datum_m = store.datum_m();
+        let (from, base) = (origin_m - datum_m, scan.datum_m - datum_m);
+        report.scan = scan::mark(&self.traversal, &mut self.masks, &from, &base, scan, reach);
+        self.forget_hits(store);
+        let mut keys: Vec<Key> = Vec::new();
+        for (block, passed, hit) in self.masks.blocks() {
+            for (word, (passed, hit)) in passed.0.iter().zip(&hit.0).enumerate() {
+                each_bit(passed & !hit, |i| {
+                    let cell = Packed::at(block, 64 * word + i);
+                    let Some(key) = cell.key().filter(|key| store.contains(*key)) else {
+                        return;
+                    };
+                    if self.touches_hit(cell) {
+                        report.kept += 1;
+                    } else {
+                        keys.push(key);
+                    }
+                });
+            }
+        }
+        keys.sort_unstable();
+        report.missed = keys.len() as u64;
+        keys.retain(|key| self.is_enough(*key) && store.remove(*key));
+        report.removed = keys;
+        report
+    }
+
+    fn touches_hit(&self, cell: Packed) -> bool {
+        let mut around = self.touching.iter().map(|n| cell.plus(difference(*n)));
+        around.any(|cell| self.masks.is_hit(cell))
+    }
+
+    /// Counts a miss; true if the voxel is to be removed.
+    fn is_enough(&mut self, key: Key) -> bool {
+        if self.options.misses <= 1 {
+            return true;
+        }
+        let count = self.missed.entry(key).or_default();
+        *count += 1;
+        let enough = *count >= self.options.misses;
+        if enough {
+            self.missed.remove(&key);
+        }
+        enough
+    }
+
+    /// Forgets the misses of what the scan hits, and of what others have removed if it is much.
+    fn forget_hits(&mut self, store: &impl VoxelStore) {
+        if self.missed.is_empty() {
+            return;
+        }
+        for (block, _, hit) in self.masks.blocks() {
+            for (word, hit) in hit.0.iter().enumerate() {
+                each_bit(*hit, |i| {
+                    if let Some(key) = Packed::at(block, 64 * word + i).key() {
+                        self.missed.remove(&key);
+                    }
+                });
+            }
+        }
+        if self.missed.len() > store.len() {
+            self.missed.retain(|key, _| store.contains(*key));
+        }
+    }
+}
+
+/// [`RayClearer::clear`] once, with every voxel removed that a ray passes through.
+pub fn clear_rays(
+    store: &mut impl VoxelStore,
+    origin_m: Vector3<f64>,
+    scan: &Cloud,
+    keep_m: f64,
+) -> ClearReport {
+    let options = ClearOptions {
+        keep_m,
+        ..ClearOptions::default()
+    };
+    RayClearer::new(&store.lattice().clone(), options).clear(store, origin_m, scan)
+}
