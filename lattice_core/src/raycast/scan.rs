@@ -3,11 +3,14 @@
 use nalgebra::Vector3;
 use rustc_hash::FxHashSet;
 
-use super::families::Families;
+use super::families::{Families, Ray};
 use super::masks::{Cursor, ScanMasks};
 use super::packed::Packed;
 use super::traversal::{Kernel, Traversal, with_families};
 use crate::cloud::Cloud;
+
+/// Rays that take turns.
+const LANES: usize = 4;
 
 /// What became of a scan.
 #[derive(Clone, Copy, PartialEq, Eq, Debug, Default)]
@@ -186,23 +189,46 @@ impl Rays<'_> {
         let lattice = self.traversal.lattice();
         let from_center = self.origin_m - lattice.center(self.start.unpack());
         let origin = families.origin(from_center, self.start);
-        let mut cursor = Cursor::NONE;
-        let mut visits = 0;
-        for end in ends.hits.iter().chain(&ends.open) {
+        let ends = ends.hits.iter().chain(&ends.open);
+        let mut rays = ends.filter_map(|end| {
             let mut ray = lattice.center(end.unpack()) - self.origin_m;
             let length = ray.norm();
             if self.reach.keep_m > 0.0 {
                 if length <= self.reach.keep_m {
-                    continue;
+                    return None;
                 }
                 ray *= 1.0 - self.reach.keep_m / length;
             }
-            let limit = self.traversal.most_steps(length);
-            let mut walk = families.walk(&origin, &ray);
-            visits += families.run(&origin, &mut walk, limit, |cell| {
-                masks.pass(cell, &mut cursor);
-                true
-            });
+            Some(Ray {
+                walk: families.walk(&origin, &ray),
+                steps: 0,
+                limit: self.traversal.most_steps(length),
+            })
+        });
+        let mut visits = 0;
+        let mut lanes: Vec<(Ray<P>, Cursor)> = rays
+            .by_ref()
+            .take(LANES)
+            .map(|ray| (ray, Cursor::NONE))
+            .collect();
+        while let Ok(full) = <&mut [(Ray<P>, Cursor); LANES]>::try_from(lanes.as_mut_slice()) {
+            let mut ended = None;
+            for (i, (ray, cursor)) in full.iter_mut().enumerate() {
+                if !families.step(&origin, ray, |cell| masks.pass(cell, cursor)) {
+                    visits += std::mem::take(&mut ray.steps);
+                    match rays.next() {
+                        Some(next) => *ray = next,
+                        None => ended = Some(i),
+                    }
+                }
+            }
+            if let Some(i) = ended {
+                lanes.swap_remove(i);
+            }
+        }
+        for (ray, cursor) in &mut lanes {
+            while families.step(&origin, ray, |cell| masks.pass(cell, cursor)) {}
+            visits += ray.steps;
         }
         visits
     }
