@@ -3,6 +3,7 @@
 
 pub mod bag;
 pub mod bag_player;
+pub mod bench;
 pub mod cli;
 pub mod compute;
 pub mod convert;

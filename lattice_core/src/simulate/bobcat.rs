@@ -196,12 +196,7 @@ impl Bobcat {
     pub fn scan(&self, laser: Laser, index: u64) -> Lms200Scan {
         let mut noise = Stream::new(self.seed, Purpose::LaserRange, laser as u64, index);
         let own_body_m = |time_ns: i64, in_laser: &Vector3<f64>| {
-            let mount = self.base_from_laser(laser, time_ns);
-            let (origin, direction) = (mount.translation.vector, mount.rotation * in_laser);
-            let distances = self.body.iter().filter_map(|b| b.cast(&origin, &direction));
-            distances
-                .map(|(distance_m, _)| distance_m)
-                .min_by(f64::total_cmp)
+            self.own_body_m(&self.base_from_laser(laser, time_ns), in_laser)
         };
         let map_from_laser =
             |time_ns: i64| self.map_from_base(time_ns) * self.base_from_laser(laser, time_ns);
@@ -212,6 +207,20 @@ impl Bobcat {
             map_from_laser,
             own_body_m,
         )
+    }
+
+    /// Distance along a ray in a sensor's frame at which it meets the machine itself, m.
+    pub(super) fn own_body_m(
+        &self,
+        base_from_sensor: &Isometry3<f64>,
+        in_sensor: &Vector3<f64>,
+    ) -> Option<f64> {
+        let origin = base_from_sensor.translation.vector;
+        let direction = base_from_sensor.rotation * in_sensor;
+        let distances = self.body.iter().filter_map(|b| b.cast(&origin, &direction));
+        distances
+            .map(|(distance_m, _)| distance_m)
+            .min_by(f64::total_cmp)
     }
 
     /// Scans `range` of a scanner, in order, computed in parallel.

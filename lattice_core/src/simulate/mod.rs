@@ -16,10 +16,13 @@ mod lms200;
 mod loader;
 mod mission;
 mod obstacles;
+mod pose_error;
 mod profile;
 mod random;
 mod site;
+mod spin64;
 mod spline;
+mod survey;
 #[cfg(test)]
 mod tests;
 
@@ -37,3 +40,4 @@ pub use lms200::{
 pub use loader::Loader;
 pub use obstacles::{Block, Obstacle, Post};
 pub use site::{Hit, Site};
+pub use survey::{Survey, SurveyPattern, SurveyScan, SurveyScans};

@@ -13,6 +13,8 @@ pub(super) enum Purpose {
     Ins = 2,
     /// Range noise; one stream per scan. The lasers take `LaserRange + 0`, `+ 1` and `+ 2`.
     LaserRange = 16,
+    /// Range noise of the 64-beam scanner of surveys; one stream per sweep.
+    SpinRange = 32,
 }
 
 /// A stream of uniform and normal numbers.

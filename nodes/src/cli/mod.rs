@@ -1,5 +1,6 @@
 //! The `lattice` command.
 
+mod bench;
 mod demo;
 mod map;
 mod node;
@@ -41,6 +42,9 @@ enum Command {
     Simulate(simulate::Simulate),
     /// Quantize a point file (ply, pcd, xyz, KITTI bin) and show what each lattice makes of it
     Quantize(quantize::Quantize),
+    /// Measure quantizers and stores on a raw point file
+    #[command(subcommand)]
+    Bench(bench::Bench),
     /// Look into map files and export them
     #[command(subcommand)]
     Map(map::Map),
@@ -55,6 +59,7 @@ pub fn main() -> ExitCode {
         Command::Replay(command) => command.run(),
         Command::Simulate(command) => command.run(),
         Command::Quantize(command) => command.run(),
+        Command::Bench(command) => command.run(),
         Command::Map(command) => command.run(),
     };
     match result {

@@ -1,20 +1,25 @@
-//! `lattice simulate`: logs of simulated machines.
+//! `lattice simulate`: logs and point files of simulated machines.
 
 use std::path::PathBuf;
 
 use clap::{Args, Subcommand, ValueEnum};
 
+use lattice_core::simulate::SurveyPattern;
+
 use super::progress::Progress;
 use super::{CliResult, init_logging};
 use crate::bag::Storage;
+use crate::bench::{SiteOptions, write_site};
 use crate::simulate::{BobcatOptions, BobcatSummary, write_bobcat};
 
-/// Write the log of a simulated machine
+/// Write the log or the points of a simulated machine
 #[derive(Subcommand)]
 pub enum Simulate {
     /// A skid-steer loader on an earth-moving site: three laser scanners, one on a turntable, and
     /// an INS at 100 Hz
     Bobcat(Bobcat),
+    /// A survey of the same site as raw little-endian f32 `x y z i` points, for benchmarks
+    Site(Site),
 }
 
 /// Container of a log.
@@ -47,22 +52,82 @@ pub struct Bobcat {
     json: bool,
 }
 
+/// Scanners of a survey.
+#[derive(Clone, Copy, Debug, ValueEnum)]
+enum PatternName {
+    /// Three SICK LMS200, one of them on a turntable
+    Lms200,
+    /// One spinning scanner of 64 beams
+    Os64,
+}
+
+/// Options of `lattice simulate site`.
+#[derive(Args)]
+pub struct Site {
+    /// Number of points
+    #[arg(long, default_value_t = 10_000_000)]
+    points: u64,
+    /// The scanners
+    #[arg(long, value_enum, default_value = "lms200")]
+    pattern: PatternName,
+    /// The same seed gives the same bytes
+    #[arg(long, default_value_t = 1)]
+    seed: u64,
+    /// Point file; FILE.scans gets the scanner's position (three f64) and the points (u64) of each scan
+    #[arg(long, value_name = "FILE")]
+    out: PathBuf,
+    /// Print what was written as JSON
+    #[arg(long)]
+    json: bool,
+}
+
 impl Simulate {
     /// Runs the command.
     pub fn run(self) -> CliResult {
         init_logging();
-        let Self::Bobcat(command) = self;
+        match self {
+            Self::Bobcat(command) => command.run(),
+            Self::Site(command) => command.run(),
+        }
+    }
+}
+
+impl Site {
+    fn run(self) -> CliResult {
+        let progress = Progress::new("simulate");
+        let options = SiteOptions {
+            seed: self.seed,
+            pattern: match self.pattern {
+                PatternName::Lms200 => SurveyPattern::Lms200,
+                PatternName::Os64 => SurveyPattern::Os64,
+            },
+            points: self.points,
+            out: self.out,
+        };
+        let summary = write_site(&options, &mut |done| progress.set(done))?;
+        progress.done();
+        if self.json {
+            println!("{}", serde_json::to_string_pretty(&summary)?);
+        } else {
+            println!("{summary}");
+        }
+        Ok(())
+    }
+}
+
+impl Bobcat {
+    fn run(self) -> CliResult {
         let summary = bobcat(&BobcatOptions {
-            seed: command.seed,
-            duration_s: command.duration,
-            storage: match command.storage {
+            seed: self.seed,
+            duration_s: self.duration,
+            storage: match self.storage {
                 StorageName::Mcap => Storage::Mcap,
                 StorageName::Sqlite3 => Storage::Sqlite3,
             },
-            out: command.out,
-            overwrite: command.overwrite,
+            out: self.out,
+            overwrite: self.overwrite,
         })?;
-        if command.json {
+        if self.json {
             println!("{}", serde_json::to_string_pretty(&summary)?);
         } else {
             println!("{summary}");

@@ -1,0 +1,21 @@
+//! Benchmarks on raw point files: their input, their clock and what they print.
+//!
+//! A point file is little-endian f32 `x y z i`, 16 bytes a point. `FILE.scans` beside it says which points
+//! belong to one scan: records of 32 bytes, three f64 (position of the scanner, m) and a u64 (points).
+
+mod clock;
+mod hash26;
+mod insert;
+mod neighbors;
+mod points;
+mod quantize;
+mod report;
+mod site;
+
+pub use clock::{Spent, timed};
+pub use insert::{InsertOptions, Store, insert};
+pub use neighbors::{NeighborMethod, neighbors};
+pub use points::{PointFileError, ScanRecord, read_points, read_scans, scans_path};
+pub use quantize::{QuantizeMethod, quantize};
+pub use report::Report;
+pub use site::{SiteOptions, SiteSummary, write_site};

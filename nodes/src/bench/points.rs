@@ -1,0 +1,210 @@
+//! Raw point files and their scans.
+
+use std::ffi::OsString;
+use std::fs::File;
+use std::io::{self, Read};
+use std::path::{Path, PathBuf};
+
+use nalgebra::Vector3;
+use thiserror::Error;
+
+/// Bytes of a point: x, y, z (m) and intensity as little-endian f32.
+const POINT_BYTES: usize = 16;
+/// Bytes of a scan's record: position of the scanner as three f64 (m), points as u64; little-endian.
+const SCAN_BYTES: usize = 32;
+
+/// Why a point file or its scans cannot be used.
+#[derive(Debug, Error)]
+pub enum PointFileError {
+    /// The operating system says no.
+    #[error("{}: {source}", path.display())]
+    Io {
+        /// The file.
+        path: PathBuf,
+        /// What it said.
+        source: io::Error,
+    },
+    /// The length is not a whole number of records.
+    #[error("{}: {bytes} bytes are not a whole number of {record}-byte records", path.display())]
+    Length {
+        /// The file.
+        path: PathBuf,
+        /// Its length.
+        bytes: usize,
+        /// Length of a record.
+        record: usize,
+    },
+    /// The scans do not hold as many points as the file.
+    #[error("{}: the scans hold {scanned} points, the point file {points}", path.display())]
+    Scans {
+        /// The file of scans.
+        path: PathBuf,
+        /// Sum of the scans' points.
+        scanned: u128,
+        /// Points in the point file.
+        points: usize,
+    },
+}
+
+/// One scan of a point file.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct ScanRecord {
+    /// Position of the scanner, m.
+    pub origin_m: Vector3<f64>,
+    /// Points of the scan; scans follow each other in the file.
+    pub points: usize,
+}
+
+impl ScanRecord {
+    /// The record as it is in the file.
+    pub fn to_bytes(self) -> [u8; 32] {
+        let mut bytes = [0; 32];
+        let words = [
+            self.origin_m.x.to_bits(),
+            self.origin_m.y.to_bits(),
+            self.origin_m.z.to_bits(),
+            self.points as u64,
+        ];
+        for (to, word) in bytes.chunks_exact_mut(8).zip(words) {
+            to.copy_from_slice(&word.to_le_bytes());
+        }
+        bytes
+    }
+}
+
+/// A point as it is in the file.
+pub(super) fn point_to_bytes(point: [f32; 4]) -> [u8; POINT_BYTES] {
+    let mut bytes = [0; POINT_BYTES];
+    for (to, value) in bytes.chunks_exact_mut(4).zip(point) {
+        to.copy_from_slice(&value.to_le_bytes());
+    }
+    bytes
+}
+
+/// Place of the scans of a point file: `.scans` added to its name.
+pub fn scans_path(points: &Path) -> PathBuf {
+    let mut name = OsString::from(points);
+    name.push(".scans");
+    PathBuf::from(name)
+}
+
+/// Reads the positions (m) of a point file, at most `max_points` from its start.
+pub fn read_points(path: &Path, max_points: usize) -> Result<Vec<[f32; 3]>, PointFileError> {
+    let bytes = read(path, POINT_BYTES, max_points)?;
+    let points = bytes.chunks_exact(POINT_BYTES).map(|point| {
+        let value = |i: usize| f32::from_bits(u32::from_le_bytes(array(point, 4 * i)));
+        [value(0), value(1), value(2)]
+    });
+    Ok(points.collect())
+}
+
+/// Reads the scans beside a point file of which `points` were read; the last scan is cut to fit.
+pub fn read_scans(points_path: &Path, points: usize) -> Result<Vec<ScanRecord>, PointFileError> {
+    let path = scans_path(points_path);
+    let bytes = read(&path, SCAN_BYTES, usize::MAX)?;
+    let (mut scans, mut left, mut scanned) = (Vec::new(), points, 0u128);
+    for record in bytes.chunks_exact(SCAN_BYTES) {
+        let word = |i: usize| u64::from_le_bytes(array(record, 8 * i));
+        let claimed = word(3);
+        scanned += u128::from(claimed);
+        let points = usize::try_from(claimed).unwrap_or(usize::MAX).min(left);
+        left -= points;
+        if points > 0 {
+            let [x, y, z] = [word(0), word(1), word(2)].map(f64::from_bits);
+            let origin_m = Vector3::new(x, y, z);
+            scans.push(ScanRecord { origin_m, points });
+        }
+    }
+    if left > 0 {
+        return Err(PointFileError::Scans {
+            path,
+            scanned,
+            points,
+        });
+    }
+    Ok(scans)
+}
+
+fn read(path: &Path, record: usize, max_records: usize) -> Result<Vec<u8>, PointFileError> {
+    let io_error = |source| PointFileError::Io {
+        path: path.to_owned(),
+        source,
+    };
+    let limit = max_records.saturating_mul(record) as u64;
+    let file = File::open(path).map_err(io_error)?;
+    let mut bytes = Vec::new();
+    file.take(limit).read_to_end(&mut bytes).map_err(io_error)?;
+    if bytes.len() % record != 0 {
+        return Err(PointFileError::Length {
+            path: path.to_owned(),
+            bytes: bytes.len(),
+            record,
+        });
+    }
+    Ok(bytes)
+}
+
+/// `N` bytes from `at`; zeros beyond the end.
+fn array<const N: usize>(bytes: &[u8], at: usize) -> [u8; N] {
+    let mut out = [0; N];
+    if let Some(from) = bytes.get(at..at + N) {
+        out.copy_from_slice(from);
+    }
+    out
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use std::fs;
+
+    fn file_of(points: usize, scans: &[usize]) -> (tempfile::TempDir, PathBuf) {
+        let dir = tempfile::tempdir().unwrap();
+        let path = dir.path().join("p.xyzi");
+        let bytes: Vec<u8> = (0..points)
+            .flat_map(|i| point_to_bytes([i as f32, 0.5, -1.25, 7.0]))
+            .collect();
+        fs::write(&path, bytes).unwrap();
+        let records: Vec<u8> = scans
+            .iter()
+            .flat_map(|&points| {
+                let origin_m = Vector3::new(1.0, -2.0, 3.5);
+                ScanRecord { origin_m, points }.to_bytes()
+            })
+            .collect();
+        fs::write(scans_path(&path), records).unwrap();
+        (dir, path)
+    }
+
+    #[test]
+    fn points_and_scans_come_back() {
+        let (_dir, path) = file_of(5, &[2, 0, 3]);
+        let points = read_points(&path, usize::MAX).unwrap();
+        assert_eq!(points.len(), 5);
+        assert_eq!(points[4], [4.0, 0.5, -1.25]);
+        let scans = read_scans(&path, 5).unwrap();
+        assert_eq!(scans.iter().map(|s| s.points).collect::<Vec<_>>(), [2, 3]);
+        assert_eq!(scans[0].origin_m, Vector3::new(1.0, -2.0, 3.5));
+    }
+
+    #[test]
+    fn fewer_points_cut_the_last_scan() {
+        let (_dir, path) = file_of(9, &[4, 4, 1]);
+        assert_eq!(read_points(&path, 6).unwrap().len(), 6);
+        let scans = read_scans(&path, 6).unwrap();
+        assert_eq!(scans.iter().map(|s| s.points).collect::<Vec<_>>(), [4, 2]);
+    }
+
+    #[test]
+    fn cut_files_and_missing_scans_are_refused() {
+        let (_dir, path) = file_of(3, &[2]);
+        let error = read_scans(&path, 3).unwrap_err().to_string();
+        assert!(error.contains("hold 2 points, the point file 3"), "{error}");
+        let mut bytes = fs::read(&path).unwrap();
+        bytes.pop();
+        fs::write(&path, bytes).unwrap();
+        let error = read_points(&path, usize::MAX).unwrap_err().to_string();
+        assert!(error.contains("47 bytes"), "{error}");
+        assert!(read_points(Path::new("/nonexistent"), 1).is_err());
+    }
+}

@@ -1,0 +1,221 @@
+//! `lattice bench`: one measurement a call, one line of JSON.
+
+use std::path::PathBuf;
+
+use clap::{Args, Subcommand, ValueEnum};
+use lattice_core::lattice::{Lattice, LatticeKind};
+
+use super::{CliResult, init_logging};
+use crate::bench::{self, InsertOptions, NeighborMethod, QuantizeMethod, Report, Store};
+
+/// Measure operations on a raw point file (f32 `x y z i`; see `lattice simulate site`)
+///
+/// The points are in memory before the clock starts; only the operation itself is timed.
+#[derive(Subcommand)]
+pub enum Bench {
+    /// Quantize all points and pack their keys, without a store
+    Quantize(Quantize),
+    /// Insert all points into a store
+    Insert(Insert),
+    /// Count the occupied touching neighbours of all voxels
+    Neighbors(Neighbors),
+}
+
+/// What every measurement needs.
+#[derive(Args)]
+struct Common {
+    /// Point file
+    #[arg(long)]
+    points: PathBuf,
+    /// Use only so many points from the start of the file
+    #[arg(long, default_value_t = 500_000_000)]
+    max_points: usize,
+    /// Side of a cube with the volume of a cell, m
+    #[arg(long)]
+    cell: f64,
+    /// cubic, bcc, fcc, mcc or hex
+    #[arg(long, default_value = "fcc")]
+    lattice: LatticeKind,
+    /// Threads of the operation
+    #[arg(long, default_value_t = 1)]
+    threads: usize,
+    /// Print the result as one line of JSON
+    #[arg(long)]
+    json: bool,
+}
+
+/// Options of `lattice bench quantize`.
+#[derive(Args)]
+pub struct Quantize {
+    #[command(flatten)]
+    common: Common,
+    /// How points become keys
+    #[arg(long, value_enum, default_value = "scalar")]
+    method: QuantizeName,
+}
+
+/// Options of `lattice bench insert`.
+#[derive(Args)]
+pub struct Insert {
+    #[command(flatten)]
+    common: Common,
+    /// What holds the voxels
+    #[arg(long, value_enum, default_value = "list")]
+    store: StoreName,
+    /// Insert scan by scan, as FILE.scans says, not all points at once
+    #[arg(long)]
+    scans: bool,
+}
+
+/// Options of `lattice bench neighbors`.
+#[derive(Args)]
+pub struct Neighbors {
+    #[command(flatten)]
+    common: Common,
+    /// What holds the voxels
+    #[arg(long, value_enum, default_value = "list")]
+    store: StoreName,
+    /// How neighbours are found
+    #[arg(long, value_enum, default_value = "probe")]
+    method: NeighborName,
+}
+
+#[derive(Clone, Copy, ValueEnum)]
+enum QuantizeName {
+    /// One point at a time in f64
+    Scalar,
+}
+
+#[derive(Clone, Copy, ValueEnum)]
+enum StoreName {
+    /// Count and sum of offsets of each voxel
+    List,
+}
+
+#[derive(Clone, Copy, ValueEnum)]
+enum NeighborName {
+    /// One look-up in the store for each touching neighbour
+    Probe,
+    /// The measure: 26 probes of a hash set for each voxel of the cubic lattice
+    Hash26,
+}
+
+impl StoreName {
+    fn store(self) -> Store {
+        match self {
+            Self::List => Store::List,
+        }
+    }
+}
+
+impl Bench {
+    /// Runs the command.
+    pub fn run(self) -> CliResult {
+        init_logging();
+        match self {
+            Self::Quantize(command) => command.run(),
+            Self::Insert(command) => command.run(),
+            Self::Neighbors(command) => command.run(),
+        }
+    }
+}
+
+impl Quantize {
+    fn run(self) -> CliResult {
+        let lattice = self.common.lattice()?;
+        let points = self.common.points()?;
+        let method = match self.method {
+            QuantizeName::Scalar => QuantizeMethod::Scalar,
+        };
+        let cell = self.common.cell;
+        let report = self
+            .common
+            .pool()?
+            .install(|| bench::quantize(method, &lattice, cell, &points));
+        self.common.print(&report)
+    }
+}
+
+impl Insert {
+    fn run(self) -> CliResult {
+        let lattice = self.common.lattice()?;
+        let points = self.common.points()?;
+        let scans = match self.scans {
+            true => Some(bench::read_scans(&self.common.points, points.len())?),
+            false => None,
+        };
+        let options = self.common.insert_options(self.store);
+        let (report, _) = self
+            .common
+            .pool()?
+            .install(|| bench::insert(options, &lattice, points, scans.as_deref()))?;
+        self.common.print(&report)
+    }
+}
+
+impl Neighbors {
+    fn run(self) -> CliResult {
+        let lattice = self.common.lattice()?;
+        let points = self.common.points()?;
+        let options = self.common.insert_options(self.store);
+        let method = match self.method {
+            NeighborName::Probe => NeighborMethod::Probe,
+            NeighborName::Hash26 => NeighborMethod::Hash26,
+        };
+        let (name, cell) = (self.store.store().name(), self.common.cell);
+        let report = self.common.pool()?.install(|| {
+            let (_, store) = bench::insert(options, &lattice, points, None)?;
+            Ok::<_, lattice_core::voxels::DatumError>(bench::neighbors(
+                method,
+                store.as_ref(),
+                name,
+                cell,
+            ))
+        })?;
+        let report = report.ok_or("--method hash26 is the measure for --lattice cubic only")?;
+        self.common.print(&report)
+    }
+}
+
+impl Common {
+    fn lattice(&self) -> Result<Lattice, lattice_core::lattice::LatticeError> {
+        Lattice::new(self.lattice, self.cell * self.cell * self.cell)
+    }
+
+    fn points(&self) -> Result<Vec<[f32; 3]>, bench::PointFileError> {
+        bench::read_points(&self.points, self.max_points)
+    }
+
+    fn pool(&self) -> Result<rayon::ThreadPool, rayon::ThreadPoolBuildError> {
+        let threads = self.threads.max(1);
+        rayon::ThreadPoolBuilder::new().num_threads(threads).build()
+    }
+
+    fn insert_options(&self, store: StoreName) -> InsertOptions {
+        InsertOptions {
+            store: store.store(),
+            res_m: self.cell,
+        }
+    }
+
+    fn print(&self, report: &Report) -> CliResult {
+        if self.json {
+            println!("{}", serde_json::to_string(report)?);
+            return Ok(());
+        }
+        let rate = report.n as f64 / report.wall_s / 1e6;
+        println!(
+            "{} {} {} m, {} threads: {} in {:.4} s ({rate:.1} M/s), {:.4} s of processor time, {} voxels, {} bytes",
+            report.sys,
+            report.lattice,
+            report.res,
+            report.threads,
+            report.n,
+            report.wall_s,
+            report.cpu_s,
+            report.voxels,
+            report.bytes
+        );
+        Ok(())
+    }
+}
