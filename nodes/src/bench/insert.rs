@@ -2,7 +2,7 @@
 
 use lattice_core::cloud::Cloud;
 use lattice_core::lattice::Lattice;
-use lattice_core::voxels::{DatumError, VoxelList, VoxelStore};
+use lattice_core::voxels::{DatumError, OccupancyList, VoxelList, VoxelStore};
 use nalgebra::Vector3;
 
 use super::points::ScanRecord;
@@ -14,6 +14,8 @@ const MAX_VOXELS: usize = 1 << 31;
 /// Which store is measured.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum Store {
+    /// [`OccupancyList`]: one bit of each voxel.
+    Occupancy,
     /// [`VoxelList`]: count and sum of offsets of each voxel.
     List,
 }
@@ -22,17 +24,19 @@ impl Store {
     /// Name in reports.
     pub fn name(self) -> &'static str {
         match self {
+            Self::Occupancy => "lattice-occupancy",
             Self::List => "lattice-list",
         }
     }
 }
 
 /// An empty store about the origin.
-pub(super) fn empty(
-    store: Store,
-    lattice: &Lattice,
-) -> Result<Box<dyn VoxelStore + Send>, DatumError> {
+fn empty(store: Store, lattice: &Lattice) -> Result<Box<dyn VoxelStore + Send>, DatumError> {
     match store {
+        Store::Occupancy => {
+            let list = OccupancyList::new(lattice.clone(), Vector3::zeros(), usize::MAX)?;
+            Ok(Box::new(list))
+        }
         Store::List => {
             let list = VoxelList::new(lattice.clone(), Vector3::zeros(), MAX_VOXELS)?;
             Ok(Box::new(list))
@@ -40,7 +44,7 @@ pub(super) fn empty(
     }
 }
 
-/// Side of a cube of the cells' volume, as asked for.
+/// What to insert into.
 #[derive(Clone, Copy, Debug)]
 pub struct InsertOptions {
     /// The store.
@@ -111,16 +115,15 @@ mod tests {
             origin_m: Vector3::zeros(),
             points,
         };
-        let options = InsertOptions {
-            store: Store::List,
-            res_m: 0.1,
-        };
         let scans = [scan(300), scan(1), scan(699)];
-        let (whole, _) = insert(options, &lattice, points.clone(), None).unwrap();
-        let (parts, store) = insert(options, &lattice, points, Some(&scans)).unwrap();
-        assert_eq!(whole.voxels, 301);
-        assert_eq!(parts.voxels, 301);
-        assert_eq!(store.len(), 301);
-        assert_eq!((parts.n, parts.count), (1000, None));
+        for store in [Store::Occupancy, Store::List] {
+            let options = InsertOptions { store, res_m: 0.1 };
+            let (whole, _) = insert(options, &lattice, points.clone(), None).unwrap();
+            let (parts, store) = insert(options, &lattice, points.clone(), Some(&scans)).unwrap();
+            assert_eq!(whole.voxels, 301);
+            assert_eq!(parts.voxels, 301);
+            assert_eq!(store.len(), 301);
+            assert_eq!((parts.n, parts.count), (1000, None));
+        }
     }
 }

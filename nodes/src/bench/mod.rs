@@ -9,6 +9,7 @@ mod insert;
 mod neighbors;
 mod points;
 mod quantize;
+mod raycast;
 mod report;
 mod site;
 
@@ -17,5 +18,6 @@ pub use insert::{InsertOptions, Store, insert};
 pub use neighbors::{NeighborMethod, neighbors};
 pub use points::{PointFileError, ScanRecord, read_points, read_scans, scans_path};
 pub use quantize::{QuantizeMethod, quantize};
+pub use raycast::raycast;
 pub use report::Report;
 pub use site::{SiteOptions, SiteSummary, write_site};

@@ -1,18 +1,21 @@
 //! Quantizing and packing keys, without a store.
 
-use lattice_core::lattice::{Key, Lattice};
+use lattice_core::lattice::{BatchQuantizer, CellCode, Lattice, Simd};
+use nalgebra::Isometry3;
 use rayon::prelude::*;
 
 use super::{Report, timed};
 
 /// Points of one task.
 const CHUNK: usize = 1 << 14;
-/// Key of a point without one; no key has this bit.
-const NO_KEY: u64 = 1 << 63;
 
 /// How points become keys.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum QuantizeMethod {
+    /// The batch quantizer with the best instructions of this machine.
+    Batch,
+    /// The batch quantizer with what every machine of the target has.
+    Portable,
     /// One point at a time in f64.
     Scalar,
 }
@@ -20,12 +23,14 @@ pub enum QuantizeMethod {
 impl QuantizeMethod {
     fn name(self) -> &'static str {
         match self {
-            Self::Scalar => "lattice-quantize-scalar",
+            Self::Batch => "lattice-batch",
+            Self::Portable => "lattice-portable",
+            Self::Scalar => "lattice-scalar",
         }
     }
 }
 
-/// Quantizes all points into a stream of keys in memory; the report has the digest of the stream.
+/// Quantizes all points into a stream of keys ([`CellCode`]) in memory; the report has its digest.
 pub fn quantize(
     method: QuantizeMethod,
     lattice: &Lattice,
@@ -33,10 +38,14 @@ pub fn quantize(
     points_m: &[[f32; 3]],
 ) -> Report {
     // Written once before, so that no page is first touched while the clock runs.
-    let mut keys = vec![NO_KEY; points_m.len()];
+    let mut keys = vec![CellCode::NONE; points_m.len()];
+    let batch = |simd| BatchQuantizer::with_simd(lattice, Isometry3::identity(), simd);
+    let (best, portable) = (batch(Simd::detect()), batch(Simd::Portable));
     let ((), spent) = timed(|| {
         let chunks = points_m.par_chunks(CHUNK).zip(keys.par_chunks_mut(CHUNK));
         chunks.for_each(|(points_m, keys)| match method {
+            QuantizeMethod::Batch => blocks(&best, points_m, keys),
+            QuantizeMethod::Portable => blocks(&portable, points_m, keys),
             QuantizeMethod::Scalar => scalar(lattice, points_m, keys),
         });
     });
@@ -46,19 +55,27 @@ pub fn quantize(
     report
 }
 
-fn scalar(lattice: &Lattice, points_m: &[[f32; 3]], keys: &mut [u64]) {
+fn blocks(quantizer: &BatchQuantizer, points_m: &[[f32; 3]], mut keys: &mut [CellCode]) {
+    quantizer.for_blocks(points_m, |block, _| {
+        let (now, later) = std::mem::take(&mut keys).split_at_mut(block.len());
+        now.copy_from_slice(block);
+        keys = later;
+    });
+}
+
+fn scalar(lattice: &Lattice, points_m: &[[f32; 3]], keys: &mut [CellCode]) {
     let mut keys = keys.iter_mut();
     let points = points_m.iter().map(|p| p.map(f64::from));
     lattice.quantize_each(points, |_, w| {
         if let Some(key) = keys.next() {
-            *key = w.and_then(Key::pack).map_or(NO_KEY, Key::raw);
+            *key = w.and_then(CellCode::pack).unwrap_or(CellCode::NONE);
         }
     });
 }
 
 /// FNV-1a over the bytes of the keys, little-endian.
-fn digest(keys: &[u64]) -> u64 {
-    let bytes = keys.iter().flat_map(|key| key.to_le_bytes());
+fn digest(keys: &[CellCode]) -> u64 {
+    let bytes = keys.iter().flat_map(|key| key.raw().to_le_bytes());
     bytes.fold(0xcbf2_9ce4_8422_2325, |hash, byte| {
         (hash ^ u64::from(byte)).wrapping_mul(0x100_0000_01b3)
     })
@@ -73,7 +90,7 @@ mod tests {
     fn the_digest_is_that_of_fnv_1a() {
         assert_eq!(digest(&[]), 0xcbf2_9ce4_8422_2325);
         // "foobar\0\0" by the reference implementation's definition, folded by hand over its bytes.
-        let key = u64::from_le_bytes(*b"foobar\0\0");
+        let key = CellCode::from_raw(u64::from_le_bytes(*b"foobar\0\0")).unwrap();
         let foobar: u64 = 0x8594_4171_f739_67e8;
         let prime: u64 = 0x100_0000_01b3;
         assert_eq!(
@@ -83,19 +100,26 @@ mod tests {
     }
 
     #[test]
-    fn threads_do_not_change_the_digest_but_points_do() {
+    fn neither_threads_nor_method_change_the_digest_but_points_do() {
         let lattice = Lattice::new(LatticeKind::Fcc, 0.001).unwrap();
         let points: Vec<[f32; 3]> = (0..50_000)
             .map(|i| [0.01 * i as f32, 0.3 - 0.007 * i as f32, 2.0])
             .collect();
-        let hash = |threads, points: &[[f32; 3]]| {
+        let hash = |threads, method, points: &[[f32; 3]]| {
             let pool = rayon::ThreadPoolBuilder::new()
                 .num_threads(threads)
                 .build()
                 .unwrap();
-            pool.install(|| quantize(QuantizeMethod::Scalar, &lattice, 0.1, points).hash)
+            pool.install(|| quantize(method, &lattice, 0.1, points).hash)
         };
-        assert_eq!(hash(1, &points), hash(3, &points));
-        assert_ne!(hash(1, &points), hash(1, &points[1..]));
+        let one = hash(1, QuantizeMethod::Scalar, &points);
+        for method in [
+            QuantizeMethod::Scalar,
+            QuantizeMethod::Batch,
+            QuantizeMethod::Portable,
+        ] {
+            assert_eq!(hash(3, method, &points), one, "{method:?}");
+            assert_ne!(hash(1, method, &points[1..]), one, "{method:?}");
+        }
     }
 }

@@ -19,6 +19,8 @@ pub enum Bench {
     Insert(Insert),
     /// Count the occupied touching neighbours of all voxels
     Neighbors(Neighbors),
+    /// Clear free space along the rays of all scans, as FILE.scans has them
+    Raycast(Raycast),
 }
 
 /// What every measurement needs.
@@ -50,7 +52,7 @@ pub struct Quantize {
     #[command(flatten)]
     common: Common,
     /// How points become keys
-    #[arg(long, value_enum, default_value = "scalar")]
+    #[arg(long, value_enum, default_value = "batch")]
     method: QuantizeName,
 }
 
@@ -60,7 +62,7 @@ pub struct Insert {
     #[command(flatten)]
     common: Common,
     /// What holds the voxels
-    #[arg(long, value_enum, default_value = "list")]
+    #[arg(long, value_enum, default_value = "occupancy")]
     store: StoreName,
     /// Insert scan by scan, as FILE.scans says, not all points at once
     #[arg(long)]
@@ -73,21 +75,34 @@ pub struct Neighbors {
     #[command(flatten)]
     common: Common,
     /// What holds the voxels
-    #[arg(long, value_enum, default_value = "list")]
+    #[arg(long, value_enum, default_value = "occupancy")]
     store: StoreName,
     /// How neighbours are found
     #[arg(long, value_enum, default_value = "probe")]
     method: NeighborName,
 }
 
+/// Options of `lattice bench raycast`.
+#[derive(Args)]
+pub struct Raycast {
+    #[command(flatten)]
+    common: Common,
+}
+
 #[derive(Clone, Copy, ValueEnum)]
 enum QuantizeName {
+    /// The batch quantizer with the best instructions of this machine
+    Batch,
+    /// The batch quantizer with what every machine of the target has
+    Portable,
     /// One point at a time in f64
     Scalar,
 }
 
 #[derive(Clone, Copy, ValueEnum)]
 enum StoreName {
+    /// One bit of each voxel
+    Occupancy,
     /// Count and sum of offsets of each voxel
     List,
 }
@@ -103,6 +118,7 @@ enum NeighborName {
 impl StoreName {
     fn store(self) -> Store {
         match self {
+            Self::Occupancy => Store::Occupancy,
             Self::List => Store::List,
         }
     }
@@ -116,6 +132,7 @@ impl Bench {
             Self::Quantize(command) => command.run(),
             Self::Insert(command) => command.run(),
             Self::Neighbors(command) => command.run(),
+            Self::Raycast(command) => command.run(),
         }
     }
 }
@@ -125,6 +142,8 @@ impl Quantize {
         let lattice = self.common.lattice()?;
         let points = self.common.points()?;
         let method = match self.method {
+            QuantizeName::Batch => QuantizeMethod::Batch,
+            QuantizeName::Portable => QuantizeMethod::Portable,
             QuantizeName::Scalar => QuantizeMethod::Scalar,
         };
         let cell = self.common.cell;
@@ -173,6 +192,20 @@ impl Neighbors {
             ))
         })?;
         let report = report.ok_or("--method hash26 is the measure for --lattice cubic only")?;
+        self.common.print(&report)
+    }
+}
+
+impl Raycast {
+    fn run(self) -> CliResult {
+        let lattice = self.common.lattice()?;
+        let points = self.common.points()?;
+        let scans = bench::read_scans(&self.common.points, points.len())?;
+        let cell = self.common.cell;
+        let report = self
+            .common
+            .pool()?
+            .install(|| bench::raycast(&lattice, cell, points, &scans))?;
         self.common.print(&report)
     }
 }
