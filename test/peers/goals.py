@@ -113,8 +113,10 @@ def insert(found, pattern, cell):
 def neighbors(found, pattern, cell):
     place, rows = f"{pattern} {cell} m", []
     for lattice in task_list.LATTICES:
-        ours = found("neighbors", pattern, cell, f"pass {lattice}")
-        rows += ratio_row(place, f"pass {lattice} against 26 hash probes", ours, found("neighbors", pattern, cell, "26 hash probes cubic"), 3)
+        probes = found("neighbors", pattern, cell, "26 hash probes cubic")
+        for method in task_list.NEIGHBOR_METHODS:
+            ours = found("neighbors", pattern, cell, f"{method} {lattice}")
+            rows += ratio_row(place, f"{method} {lattice} against 26 hash probes, for each voxel", ours, probes, 3)
     return rows
 
 

@@ -2,9 +2,12 @@
 
 import dataclasses
 import statistics
+import subprocess
 
 CELLS = (0.1, 0.2, 0.5)
 LATTICES = ("cubic", "bcc", "fcc", "mcc", "hex")
+# How `lattice bench neighbors` is asked to count; `hash26` is the measure.
+NEIGHBOR_METHODS = ("pass", "probe")
 # The first points only: rays are long.
 RAY_POINTS = {"lms200": 300_000, "os64": 165_000}
 
@@ -37,6 +40,10 @@ class Task:
 
     def voxels(self):
         return self.runs[-1]["voxels"]
+
+    def known(self):
+        """Occupied neighbours or known cells, 0 where the system does not count them."""
+        return self.runs[-1].get("count") or 0
 
     def bytes_per_voxel(self):
         last = self.runs[-1]
@@ -90,6 +97,12 @@ class Maker:
         label += f", {threads} threads" if threads > 1 else ""
         self.add(group, cell, label, command, threads=threads, **kinds)
 
+    def offers(self, word, *command):
+        """Whether the help of `lattice bench` (or of one of its commands) lists a command or method."""
+        command = (str(self.programs["lattice"]), "bench", *command, "--help")
+        done = subprocess.run(command, capture_output=True, text=True)
+        return any(line.strip().startswith((word + " ", f"- {word}:")) for line in done.stdout.splitlines())
+
     def add(self, group, cell, label, command, **kinds):
         command = [str(part) for part in command]
         self.tasks.append(Task(group, self.pattern, cell, label, command, **kinds))
@@ -98,7 +111,7 @@ class Maker:
         for lattice in LATTICES:
             for method in ("batch", "portable", "scalar"):
                 self.lattice("quantize", cell, method, lattice, options=("--method", method), exact_keys=True)
-            if lattice != "cubic":
+            if lattice != "cubic" and self.offers("paper27", "quantize"):
                 few = ("--method", "paper27", "--max-points", str(slow_points))
                 self.lattice("quantize", cell, "paper27", lattice, options=few)
 
@@ -129,19 +142,23 @@ class Maker:
 
     def neighbors(self, cell):
         for lattice in LATTICES:
-            options = ("--store", "occupancy", "--method", "pass")
-            self.lattice("neighbors", cell, "pass", lattice, options=options, exact_cubes=lattice == "cubic")
+            method = next((m for m in NEIGHBOR_METHODS if self.offers(m, "neighbors")), "probe")
+            options = ("--store", "occupancy", "--method", method)
+            self.lattice("neighbors", cell, method, lattice, options=options, exact_cubes=lattice == "cubic")
         hash26 = ("--store", "occupancy", "--method", "hash26")
         self.lattice("neighbors", cell, "26 hash probes", "cubic", options=hash26, exact_cubes=True)
 
     def raycast(self, cell, points):
         few = ("--max-points", str(points))
         for lattice in LATTICES:
-            self.lattice("raycast", cell, "free space", lattice, options=few)
+            self.lattice("raycast", cell, "free space", lattice, options=few, exact_cubes=lattice == "cubic")
         self.peer("raycast", cell, "octomap insertPointCloud", "octomap", "rays", options=few, most_rounds=3)
-        self.peer("raycast", cell, "octomap insertPointCloud discretized", "octomap", "rays-discrete", options=few, most_rounds=3)
+        self.peer("raycast", cell, "octomap insertPointCloud discretized", "octomap", "rays-discrete", options=few, most_rounds=3,
+                  exact_cubes=True)
 
     def file(self, cell):
+        if not self.offers("file"):
+            return
         for lattice in LATTICES:
             for method in ("save", "load"):
                 self.lattice("file", cell, method, lattice, options=("--method", method))
