@@ -2,6 +2,8 @@
 //!
 //! `cargo bench -p lattice_core --bench quantize`
 
+#![allow(clippy::expect_used)]
+
 use divan::counter::ItemsCount;
 use divan::{Bencher, black_box};
 use lattice_core::lattice::{BatchQuantizer, CellCode, Lattice, LatticeKind, Simd};
