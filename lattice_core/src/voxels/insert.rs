@@ -7,14 +7,17 @@ use super::VoxelList;
 use super::columns::{Details, LabelCount, Stamps};
 use super::distortion::DistortionSums;
 use super::fixed::{fixed_points, moment_unit_m, moments_of, voxel_of};
+use super::gather::{Gather, Partial};
 use super::shard::{Point, SHARDS, Shard, shard_of};
 use crate::cloud::Cloud;
 use crate::lattice::{BatchQuantizer, BatchSums, CellCode, Lattice};
 
-/// Points that one task quantizes.
-const CHUNK: usize = 4096;
+/// Points that one task gathers.
+const CHUNK: usize = 1 << 14;
 /// Points between two merges; bounds the memory for what is not yet merged.
 const WAVE: usize = 16 * CHUNK;
+/// Cells that are searched together.
+const BATCH: usize = 64;
 
 /// What became of the points of a cloud; the reasons add up to `points`.
 #[derive(Clone, Copy, PartialEq, Eq, Debug, Default)]
@@ -85,14 +88,11 @@ struct Origin<'a> {
     labels: Option<&'a [u16]>,
 }
 
-/// The points of a chunk, quantized and in the order of their shards.
+/// The points of a chunk, quantized and gathered by cell, the cells by shard.
 struct Chunk {
-    codes: Vec<CellCode>,
-    points: Vec<Point>,
-    /// Numbers of the points with a cell, shard after shard.
-    order: Vec<u16>,
-    /// Where in `order` the shards end.
-    ends: [usize; SHARDS],
+    gather: Gather,
+    partials: Vec<Partial>,
+    by_shard: Vec<Vec<Partial>>,
     report: InsertReport,
     sums: DistortionSums,
 }
@@ -116,7 +116,6 @@ impl VoxelList {
         let now = self.advance();
         let shift = Translation3::from(cloud.datum_m - self.datum_m);
         let quantizer = BatchQuantizer::new(&self.lattice, shift.into());
-        let threads = rayon::current_num_threads();
         let mut chunks: Vec<Chunk> = Vec::new();
         let mut labels = labels;
         for wave in cloud.offsets_m.chunks(WAVE) {
@@ -126,12 +125,30 @@ impl VoxelList {
             };
             labels = labels.get(wave.len()..).unwrap_or_default();
             let may_fill = self.len().saturating_add(wave.len()) > self.max_voxels;
-            let alone = threads == 1 || wave.len() <= CHUNK || may_fill;
-            if alone || !self.payload.is_plain() {
-                self.insert_serially(&quantizer, wave, origin, now, &mut report);
+            if may_fill || !self.payload.is_plain() {
+                self.insert_singly(&quantizer, wave, origin, now, &mut report);
+                continue;
+            }
+            let threads = if wave.len() <= CHUNK {
+                1
             } else {
-                chunks.resize_with(wave.len().div_ceil(CHUNK), Chunk::new);
-                self.insert_wave(&quantizer, wave, now, &mut chunks, &mut report);
+                rayon::current_num_threads()
+            };
+            chunks.resize_with(
+                if threads == 1 {
+                    1
+                } else {
+                    wave.len().div_ceil(CHUNK)
+                },
+                Chunk::new,
+            );
+            match chunks.first_mut() {
+                Some(chunk) if threads == 1 => self.insert_gathered(&quantizer, wave, now, chunk),
+                _ => self.insert_wave(&quantizer, wave, now, &mut chunks),
+            }
+            for chunk in &mut chunks {
+                report.add(&std::mem::take(&mut chunk.report));
+                self.sums.add(&std::mem::take(&mut chunk.sums));
             }
         }
         report.inserted =
@@ -140,7 +157,8 @@ impl VoxelList {
         report
     }
 
-    fn insert_serially(
+    /// Point by point: knows of each point whether it found room.
+    fn insert_singly(
         &mut self,
         quantizer: &BatchQuantizer,
         offsets_m: &[[f32; 3]],
@@ -148,43 +166,19 @@ impl VoxelList {
         now: u32,
         report: &mut InsertReport,
     ) {
-        let base_m = quantizer.translation_m();
         let mut room = self.max_voxels.saturating_sub(self.len());
-        let mut points = [[0; 4]; BatchQuantizer::BLOCK];
         let mut place = 0;
-        quantizer.for_blocks_with_sums(offsets_m, |codes, sums| {
-            let here = offsets_m.get(place..).unwrap_or_default();
-            report.count_rejects(quantizer, here, codes, sums);
-            fixed_points(base_m, here, &mut points);
-            // All searches begin before the first of them is followed: their waits for memory
-            // overlap.
-            let mut peeked = [0; BatchQuantizer::BLOCK];
-            for (peeked, &code) in peeked.iter_mut().zip(codes) {
-                *peeked = self
-                    .shards
-                    .get(shard_of(code))
-                    .map_or(0, |shard| shard.voxels.peek(code.raw()));
-            }
+        for_fixed_blocks(quantizer, offsets_m, |offsets_m, codes, points, sums| {
+            report.count_rejects(quantizer, offsets_m, codes, sums);
             let mut refused = false;
-            for (i, ((&code, point), &peeked)) in codes.iter().zip(&points).zip(&peeked).enumerate()
-            {
-                let Some(shard) = self.shards.get_mut(shard_of(code)) else {
+            for (i, (&code, point)) in codes.iter().zip(points).enumerate() {
+                let shard = self.shards.get_mut(shard_of(code));
+                let Some(shard) = shard.filter(|_| code != CellCode::NONE) else {
                     continue;
                 };
-                if let Some(number) = shard.voxels.find_in(peeked, code.raw()) {
-                    shard.add(number, point, now);
-                    if !self.payload.is_plain() {
-                        let details = details(&self.lattice, code, point, origin, place + i);
-                        shard.columns.add(number as usize, &details);
-                    }
-                    continue;
-                }
-                if code == CellCode::NONE {
-                    continue;
-                }
                 let known = shard.len();
                 let limit = known.saturating_add(room);
-                let Some(number) = shard.find_or_add(code.raw(), limit, now) else {
+                let Some(number) = shard.find_or_add(code, limit, now) else {
                     report.list_full += 1;
                     refused = true;
                     continue;
@@ -198,7 +192,7 @@ impl VoxelList {
             }
             place += codes.len();
             if refused {
-                self.add_sums_of_known(quantizer, here, codes);
+                self.add_sums_of_known(quantizer, offsets_m, codes);
             } else {
                 self.sums.add_batch(sums);
             }
@@ -221,31 +215,80 @@ impl VoxelList {
         }
     }
 
+    /// On this thread. There must be room for a voxel for each point.
+    fn insert_gathered(
+        &mut self,
+        quantizer: &BatchQuantizer,
+        wave: &[[f32; 3]],
+        now: u32,
+        chunk: &mut Chunk,
+    ) {
+        chunk.gather(quantizer, wave, |partials| {
+            // First all searches, then all sums: the waits for the memory of the rows overlap.
+            let mut numbers = [None; BATCH];
+            for batch in partials.chunks(BATCH) {
+                for (number, partial) in numbers.iter_mut().zip(batch) {
+                    let shard = self.shards.get_mut(shard_of(partial.code));
+                    *number =
+                        shard.and_then(|shard| shard.find_or_add(partial.code, usize::MAX, now));
+                }
+                for (number, partial) in numbers.iter().zip(batch) {
+                    let shard = self.shards.get_mut(shard_of(partial.code));
+                    if let (Some(number), Some(shard)) = (*number, shard) {
+                        shard.add(number, &partial.points, now);
+                    }
+                }
+            }
+            partials.clear();
+        });
+    }
+
+    /// On the threads of the current pool: first by chunks of points, then by shards.
     fn insert_wave(
         &mut self,
         quantizer: &BatchQuantizer,
         wave: &[[f32; 3]],
         now: u32,
         chunks: &mut [Chunk],
-        report: &mut InsertReport,
     ) {
         let parts = wave.par_chunks(CHUNK).zip(chunks.par_iter_mut());
-        parts.for_each(|(offsets_m, chunk)| chunk.fill(quantizer, offsets_m));
+        parts.for_each(|(offsets_m, chunk)| chunk.sort(quantizer, offsets_m));
         let shards = self.shards.par_iter_mut().enumerate();
         shards.for_each(|(part, shard)| {
-            for chunk in chunks.iter() {
-                chunk.for_shard(part, |code, point| {
-                    if let Some(number) = shard.find_or_add(code.raw(), usize::MAX, now) {
-                        shard.add(number, point, now);
+            let lists = chunks.iter().filter_map(|chunk| chunk.by_shard.get(part));
+            let mut numbers = [None; BATCH];
+            for batch in lists.flat_map(|list| list.chunks(BATCH)) {
+                for (number, partial) in numbers.iter_mut().zip(batch) {
+                    *number = shard.find_or_add(partial.code, usize::MAX, now);
+                }
+                for (number, partial) in numbers.iter().zip(batch) {
+                    if let Some(number) = *number {
+                        shard.add(number, &partial.points, now);
                     }
-                });
+                }
             }
         });
-        for chunk in chunks {
-            report.add(&chunk.report);
-            self.sums.add(&chunk.sums);
-        }
     }
+}
+
+/// Visits up to a block of points at a time: offsets, cells, fixed-point positions, errors.
+#[inline]
+fn for_fixed_blocks(
+    quantizer: &BatchQuantizer,
+    offsets_m: &[[f32; 3]],
+    mut visit: impl FnMut(&[[f32; 3]], &[CellCode], &[Point], &BatchSums),
+) {
+    let base_m = quantizer.translation_m();
+    let mut points = [[0; 4]; BatchQuantizer::BLOCK];
+    let mut place = 0;
+    quantizer.for_blocks_with_sums(offsets_m, |codes, sums| {
+        let here = offsets_m
+            .get(place..place + codes.len())
+            .unwrap_or_default();
+        place += codes.len();
+        fixed_points(base_m, here, &mut points);
+        visit(here, codes, &points, sums);
+    });
 }
 
 /// What a point adds to the further columns.
@@ -274,70 +317,50 @@ fn details(
 impl Chunk {
     fn new() -> Chunk {
         Chunk {
-            codes: Vec::with_capacity(CHUNK),
-            points: Vec::with_capacity(CHUNK),
-            order: Vec::with_capacity(CHUNK),
-            ends: [0; SHARDS],
+            gather: Gather::new(),
+            partials: Vec::new(),
+            by_shard: vec![Vec::new(); SHARDS],
             report: InsertReport::default(),
             sums: DistortionSums::default(),
         }
     }
 
-    /// Quantizes at most `CHUNK` points.
-    fn fill(&mut self, quantizer: &BatchQuantizer, offsets_m: &[[f32; 3]]) {
-        self.codes.clear();
-        self.points.clear();
-        (self.report, self.sums) = Default::default();
-        let base_m = quantizer.translation_m();
-        let mut points = [[0; 4]; BatchQuantizer::BLOCK];
-        quantizer.for_blocks_with_sums(offsets_m, |codes, sums| {
-            let here = offsets_m.get(self.codes.len()..).unwrap_or_default();
-            self.report.count_rejects(quantizer, here, codes, sums);
-            self.sums.add_batch(sums);
-            fixed_points(base_m, here, &mut points);
-            self.codes.extend_from_slice(codes);
-            self.points.extend(points.iter().take(codes.len()));
-        });
-        self.sort();
-    }
-
-    /// Counting sort of the points by shard.
-    fn sort(&mut self) {
-        let with_cell = || self.codes.iter().filter(|code| **code != CellCode::NONE);
-        let mut nexts = [0; SHARDS];
-        for &code in with_cell() {
-            nexts[shard_of(code)] += 1;
-        }
-        let mut total = 0;
-        for (next, end) in nexts.iter_mut().zip(&mut self.ends) {
-            let begin = total;
-            total += *next;
-            (*next, *end) = (begin, total);
-        }
-        self.order.clear();
-        self.order.resize(total, 0);
-        for (number, &code) in (0_u16..).zip(&self.codes) {
-            if code == CellCode::NONE {
-                continue;
-            }
-            let next = &mut nexts[shard_of(code)];
-            if let Some(place) = self.order.get_mut(*next) {
-                *place = number;
-            }
-            *next += 1;
-        }
-    }
-
-    /// Visits the points of a shard.
+    /// Quantizes points and hands on what they add to cells, whenever some have come together and
+    /// at the end; `take` empties the list.
     #[inline]
-    fn for_shard(&self, shard: usize, mut visit: impl FnMut(CellCode, &Point)) {
-        let begin = shard.checked_sub(1).map_or(0, |before| self.ends[before]);
-        let numbers = self.order.get(begin..self.ends[shard]);
-        for &number in numbers.unwrap_or_default() {
-            let number = usize::from(number);
-            if let (Some(&code), Some(point)) = (self.codes.get(number), self.points.get(number)) {
-                visit(code, point);
+    fn gather(
+        &mut self,
+        quantizer: &BatchQuantizer,
+        offsets_m: &[[f32; 3]],
+        mut take: impl FnMut(&mut Vec<Partial>),
+    ) {
+        for_fixed_blocks(quantizer, offsets_m, |offsets_m, codes, points, sums| {
+            self.report.count_rejects(quantizer, offsets_m, codes, sums);
+            self.sums.add_batch(sums);
+            self.gather.add(codes, points, &mut self.partials);
+            if self.partials.len() >= BATCH {
+                self.partials
+                    .retain(|partial| partial.code != CellCode::NONE);
+                take(&mut self.partials);
             }
-        }
+        });
+        self.gather.drain(&mut self.partials);
+        self.partials
+            .retain(|partial| partial.code != CellCode::NONE);
+        take(&mut self.partials);
+    }
+
+    /// Gathers points by cell, and the cells by shard.
+    fn sort(&mut self, quantizer: &BatchQuantizer, offsets_m: &[[f32; 3]]) {
+        let mut by_shard = std::mem::take(&mut self.by_shard);
+        by_shard.iter_mut().for_each(Vec::clear);
+        self.gather(quantizer, offsets_m, |partials| {
+            for partial in partials.drain(..) {
+                if let Some(list) = by_shard.get_mut(shard_of(partial.code)) {
+                    list.push(partial);
+                }
+            }
+        });
+        self.by_shard = by_shard;
     }
 }

@@ -339,7 +339,7 @@ impl VoxelStore for VoxelList {
         let now = self.advance();
         let code = CellCode::from(key);
         let shard = self.shards.get_mut(shard_of(code));
-        let removed = shard.is_some_and(|shard| shard.remove(code.raw(), now));
+        let removed = shard.is_some_and(|shard| shard.remove(code, now));
         self.bound_removed();
         removed
     }

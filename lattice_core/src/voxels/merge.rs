@@ -72,8 +72,8 @@ impl VoxelList {
         }
         let now = self.advance();
         for (ours, theirs) in self.shards.iter_mut().zip(&other.shards) {
-            for (their_number, entry) in theirs.voxels.rows().iter().enumerate() {
-                if let Some(number) = ours.find_or_add(entry.code, usize::MAX, now) {
+            for (their_number, (code, entry)) in theirs.iter().enumerate() {
+                if let Some(number) = ours.find_or_add(code, usize::MAX, now) {
                     ours.add(number, &entry.points, now);
                     if !self.payload.is_plain() {
                         ours.columns
@@ -97,7 +97,7 @@ impl VoxelList {
             return false;
         };
         let limit = shard.len().saturating_add(room);
-        let Some(number) = shard.find_or_add(code.raw(), limit, now) else {
+        let Some(number) = shard.find_or_add(code, limit, now) else {
             return false;
         };
         shard.add(number, &points, now);

@@ -6,11 +6,13 @@
 pub mod codec;
 pub mod file;
 
+mod cells;
 mod changes;
 mod columns;
 mod distortion;
 mod exposed;
 mod fixed;
+mod gather;
 mod grow;
 mod insert;
 mod list;

@@ -29,8 +29,6 @@ pub(super) struct Block {
 }
 
 impl Row for Block {
-    const NEAR_BITS: u32 = 0;
-
     #[inline(always)]
     fn code(&self) -> u64 {
         self.code

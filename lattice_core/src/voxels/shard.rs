@@ -2,8 +2,9 @@
 
 use rustc_hash::FxHashMap;
 
+use super::cells::CellTable;
 use super::columns::Columns;
-use super::table::{Place, Row, Table};
+use super::table::Place;
 use crate::lattice::CellCode;
 
 /// Number of parts of a list.
@@ -37,19 +38,10 @@ pub(super) struct Entry {
     pub(super) life: Life,
 }
 
-impl Row for Entry {
-    const NEAR_BITS: u32 = 9;
-
-    #[inline(always)]
-    fn code(&self) -> u64 {
-        self.code
-    }
-}
-
 /// The voxels of some blocks, in the order of their arrival.
 #[derive(Clone)]
 pub(super) struct Shard {
-    pub(super) voxels: Table<Entry>,
+    pub(super) voxels: CellTable,
     pub(super) columns: Columns,
     /// Voxels that went: when they had come, and when they went.
     pub(super) removed: FxHashMap<u64, Life>,
@@ -64,7 +56,7 @@ pub(super) fn shard_of(code: CellCode) -> usize {
 impl Shard {
     pub(super) fn new(columns: Columns) -> Shard {
         Shard {
-            voxels: Table::new(),
+            voxels: CellTable::new(),
             columns,
             removed: FxHashMap::default(),
         }
@@ -83,15 +75,15 @@ impl Shard {
     /// The voxel of a cell, with its number.
     #[inline]
     pub(super) fn get(&self, code: CellCode) -> Option<(u32, &Entry)> {
-        let number = self.voxels.find(code.raw())?;
+        let number = self.voxels.find(code)?;
         Some((number, self.voxels.rows().get(number as usize)?))
     }
 
     /// The number of a cell, which becomes a voxel if fewer than `limit` are there.
     #[inline(always)]
-    pub(super) fn find_or_add(&mut self, code: u64, limit: usize, now: u32) -> Option<u32> {
+    pub(super) fn find_or_add(&mut self, code: CellCode, limit: usize, now: u32) -> Option<u32> {
         let empty = || Entry {
-            code,
+            code: code.raw(),
             points: [0; 4],
             life: Life {
                 born: now,
@@ -102,7 +94,7 @@ impl Shard {
             Place::Known(number) => Some(number),
             Place::New(number) => {
                 self.columns.push();
-                self.remember(code, number);
+                self.remember(code.raw(), number);
                 Some(number)
             }
         }
@@ -133,12 +125,12 @@ impl Shard {
     }
 
     /// Removes a voxel; false if it was not there.
-    pub(super) fn remove(&mut self, code: u64, now: u32) -> bool {
+    pub(super) fn remove(&mut self, code: CellCode, now: u32) -> bool {
         let Some((number, entry)) = self.voxels.remove(code) else {
             return false;
         };
         self.columns.swap_remove(number as usize);
-        self.removed.insert(code, entry.life.ended(now));
+        self.removed.insert(code.raw(), entry.life.ended(now));
         true
     }
 

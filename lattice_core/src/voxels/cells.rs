@@ -1,0 +1,238 @@
+//! A table of voxels that is found block by block.
+
+use super::grow;
+use super::occupancy::Leaf;
+use super::shard::Entry;
+use super::table::{Place, Row, Table};
+use crate::lattice::CellCode;
+
+/// The voxels of a block.
+#[derive(Clone)]
+struct Block {
+    code: u64,
+    /// One bit for each cell, by its place.
+    leaf: Leaf,
+    /// Voxels before each word of the leaf.
+    before: [u16; 8],
+    /// Numbers of the voxels, by place.
+    numbers: Vec<u32>,
+}
+
+impl Row for Block {
+    #[inline(always)]
+    fn code(&self) -> u64 {
+        self.code
+    }
+}
+
+impl Block {
+    fn new(code: u64) -> Block {
+        Block {
+            code,
+            leaf: [0; 8],
+            before: [0; 8],
+            numbers: Vec::new(),
+        }
+    }
+
+    /// Whether a place is taken, and its rank among the taken ones.
+    #[inline(always)]
+    fn rank(&self, place: usize) -> (bool, usize) {
+        let (word, bit) = (place >> 6 & 7, place & 63);
+        let below = self.leaf[word] & ((1 << bit) - 1);
+        let rank = usize::from(self.before[word]) + below.count_ones() as usize;
+        (self.leaf[word] >> bit & 1 != 0, rank)
+    }
+
+    #[inline(always)]
+    fn find(&self, place: usize) -> Option<u32> {
+        let (taken, rank) = self.rank(place);
+        if taken {
+            self.numbers.get(rank).copied()
+        } else {
+            None
+        }
+    }
+
+    fn insert(&mut self, place: usize, number: u32) {
+        let (_, rank) = self.rank(place);
+        if self.numbers.len() == self.numbers.capacity() {
+            self.numbers.reserve_exact((self.numbers.len() / 2).max(4));
+        }
+        self.numbers.insert(rank, number);
+        self.leaf[place >> 6 & 7] |= 1 << (place & 63);
+        self.count_before();
+    }
+
+    fn remove(&mut self, place: usize) -> Option<u32> {
+        let (taken, rank) = self.rank(place);
+        if !taken {
+            return None;
+        }
+        self.leaf[place >> 6 & 7] &= !(1 << (place & 63));
+        self.count_before();
+        Some(self.numbers.remove(rank))
+    }
+
+    fn count_before(&mut self) {
+        let mut total = 0;
+        for (before, word) in self.before.iter_mut().zip(&self.leaf) {
+            *before = total;
+            total += word.count_ones() as u16;
+        }
+    }
+}
+
+/// Voxels in the order of their arrival, found by their codes.
+///
+/// A scan fills few blocks, over and over: they stay near the processor however large the map is,
+/// where a hash table over all cells would touch a far line of memory for each.
+#[derive(Clone)]
+pub(super) struct CellTable {
+    blocks: Table<Block>,
+    rows: Vec<Entry>,
+    /// Bytes of all `Block::numbers`.
+    number_bytes: usize,
+    /// The block found before.
+    last: (u64, u32),
+}
+
+impl CellTable {
+    pub(super) fn new() -> CellTable {
+        CellTable {
+            blocks: Table::new(),
+            rows: Vec::new(),
+            number_bytes: 0,
+            last: (u64::MAX, 0),
+        }
+    }
+
+    /// Number of voxels.
+    pub(super) fn len(&self) -> usize {
+        self.rows.len()
+    }
+
+    /// All voxels by number.
+    pub(super) fn rows(&self) -> &[Entry] {
+        &self.rows
+    }
+
+    /// All voxels by number. Their codes must stay.
+    pub(super) fn rows_mut(&mut self) -> &mut [Entry] {
+        &mut self.rows
+    }
+
+    /// The voxel of a number.
+    #[inline(always)]
+    pub(super) fn row_mut(&mut self, number: u32) -> Option<&mut Entry> {
+        self.rows.get_mut(number as usize)
+    }
+
+    pub(super) fn bytes(&self) -> usize {
+        self.blocks.bytes() + self.number_bytes + self.rows.capacity() * size_of::<Entry>()
+    }
+
+    /// The number of a cell.
+    #[inline]
+    pub(super) fn find(&self, code: CellCode) -> Option<u32> {
+        let block = self.blocks.find(code.block())?;
+        self.blocks.rows().get(block as usize)?.find(code.place())
+    }
+
+    /// The number of a cell; a row is made for it if it is new and fewer than `limit` are there.
+    #[inline(always)]
+    pub(super) fn find_or_add(
+        &mut self,
+        code: CellCode,
+        limit: usize,
+        row: impl FnOnce() -> Entry,
+    ) -> Option<Place> {
+        let (last, mut number) = self.last;
+        if last != code.block() {
+            number = match self.blocks.find(code.block()) {
+                Some(number) => number,
+                None => return self.add(code, limit, row()),
+            };
+            self.last = (code.block(), number);
+        }
+        let block = self.blocks.rows().get(number as usize)?;
+        match block.find(code.place()) {
+            Some(number) => Some(Place::Known(number)),
+            None => self.add(code, limit, row()),
+        }
+    }
+
+    #[inline(never)]
+    fn add(&mut self, code: CellCode, limit: usize, row: Entry) -> Option<Place> {
+        let number = self.rows.len();
+        if number >= limit.min(u32::MAX as usize - 1) {
+            return None;
+        }
+        let number = number as u32;
+        let empty = || Block::new(code.block());
+        let (Place::Known(at) | Place::New(at)) =
+            self.blocks.find_or_add(code.block(), usize::MAX, empty)?;
+        self.last = (code.block(), at);
+        let block = self.blocks.row_mut(at)?;
+        let before = block.numbers.capacity();
+        block.insert(code.place(), number);
+        self.number_bytes += (block.numbers.capacity() - before) * size_of::<u32>();
+        grow::push(&mut self.rows, row);
+        Some(Place::New(number))
+    }
+
+    /// Removes a voxel; the last voxel takes its number, which is given too.
+    pub(super) fn remove(&mut self, code: CellCode) -> Option<(u32, Entry)> {
+        let at = self.blocks.find(code.block())?;
+        let block = self.blocks.row_mut(at)?;
+        let number = block.remove(code.place())?;
+        if block.numbers.is_empty() {
+            self.number_bytes -= block.numbers.capacity() * size_of::<u32>();
+            self.blocks.remove(code.block());
+            self.last = (u64::MAX, 0);
+        }
+        let entry = self.rows.swap_remove(number as usize);
+        if let Some(moved) = self.rows.get(number as usize)
+            && let Some(moved) = CellCode::from_raw(moved.code)
+            && let Some(at) = self.blocks.find(moved.block())
+            && let Some(block) = self.blocks.row_mut(at)
+        {
+            let (_, rank) = block.rank(moved.place());
+            if let Some(renamed) = block.numbers.get_mut(rank) {
+                *renamed = number;
+            }
+        }
+        Some((number, entry))
+    }
+
+    pub(super) fn clear(&mut self) {
+        *self = CellTable::new();
+    }
+
+    /// Checks that every row is found and nothing else is in the blocks.
+    pub(super) fn validate(&self) -> Result<(), String> {
+        self.blocks.validate()?;
+        for (number, row) in self.rows.iter().enumerate() {
+            let found = CellCode::from_raw(row.code).and_then(|code| self.find(code));
+            if found != Some(number as u32) {
+                return Err(format!("cell {:#x} is not found under {number}", row.code));
+            }
+        }
+        let blocks = self.blocks.rows();
+        let listed: usize = blocks.iter().map(|block| block.numbers.len()).sum();
+        let set = blocks.iter().flat_map(|block| &block.leaf);
+        let set: usize = set.map(|word| word.count_ones() as usize).sum();
+        let capacities = blocks.iter().map(|block| block.numbers.capacity());
+        if capacities.sum::<usize>() * size_of::<u32>() != self.number_bytes {
+            return Err("the memory of the blocks is miscounted".to_owned());
+        }
+        if listed == self.rows.len() && set == listed {
+            Ok(())
+        } else {
+            Err(format!(
+                "{listed} cells listed and {set} set for {} voxels",
+                self.rows.len()
+            ))
+        }
+    }
+}

@@ -1,0 +1,78 @@
+//! Points gathered by cell before they reach the table.
+
+use super::shard::Point;
+use crate::lattice::CellCode;
+
+const SLOTS_LOG2: u32 = 11;
+const SLOTS: usize = 1 << SLOTS_LOG2;
+
+/// Points of one cell.
+#[derive(Clone, Copy, Debug)]
+pub(super) struct Partial {
+    pub(super) code: CellCode,
+    pub(super) points: Point,
+}
+
+const EMPTY: Partial = Partial {
+    code: CellCode::NONE,
+    points: [0; 4],
+};
+
+/// The cells that are being filled, as many as fit a direct-mapped table near the processor.
+///
+/// Neighbouring beams and successive scans fill the same cells: most points end here, and the large
+/// table sees a cell once for many points.
+#[derive(Clone, Debug)]
+pub(super) struct Gather {
+    slots: Vec<Partial>,
+    used: Vec<u16>,
+}
+
+impl Gather {
+    pub(super) fn new() -> Gather {
+        Gather {
+            slots: vec![EMPTY; SLOTS],
+            used: Vec::with_capacity(SLOTS),
+        }
+    }
+
+    /// Adds points in order; a cell that has to make room for another goes to `out`.
+    #[inline]
+    pub(super) fn add(&mut self, codes: &[CellCode], points: &[Point], out: &mut Vec<Partial>) {
+        let Some(slots) = self.slots.first_chunk_mut::<SLOTS>() else {
+            return;
+        };
+        for (&code, point) in codes.iter().zip(points) {
+            let number =
+                (code.raw().wrapping_mul(0x9e37_79b9_7f4a_7c15) >> (64 - SLOTS_LOG2)) as usize;
+            let slot = &mut slots[number];
+            if slot.code == code {
+                for (sum, term) in slot.points.iter_mut().zip(point) {
+                    *sum = sum.wrapping_add(*term);
+                }
+                continue;
+            }
+            if slot.code == CellCode::NONE {
+                self.used.push(number as u16);
+            } else {
+                out.push(*slot);
+            }
+            *slot = Partial {
+                code,
+                points: *point,
+            };
+        }
+    }
+
+    /// Moves all cells to `out`. Points without a cell are left out.
+    pub(super) fn drain(&mut self, out: &mut Vec<Partial>) {
+        for number in self.used.drain(..) {
+            if let Some(slot) = self.slots.get_mut(usize::from(number)) {
+                if slot.code != CellCode::NONE {
+                    out.push(*slot);
+                }
+                *slot = EMPTY;
+            }
+        }
+    }
+}
