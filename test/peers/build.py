@@ -9,7 +9,7 @@ EIGEN = ["-isystem", "/usr/include/eigen3"]
 
 
 def programs(root, build_all):
-    """Paths of all programs, built where `build_all`; peers whose libraries are missing are left out."""
+    """Paths of all programs, built where `build_all` and older than their source."""
     out = root / "target/peers"
     source = root / "test/peers"
     lattice = root / "target/release/lattice"
@@ -22,13 +22,10 @@ def programs(root, build_all):
         "openvdb": ["-lopenvdb", "-ltbb", "-lImath", "-lpthread"],
         "small_gicp": [*EIGEN, "-isystem", out / "small_gicp/include", "-fopenmp"],
         "pcl": [*EIGEN, "-isystem", pcl, "-l:libpcl_filters.so.1.13", "-l:libpcl_common.so.1.13"],
-        "bonxai": ["-isystem", out / "bonxai/include"],
     }
     built = {"lattice": lattice, "python": out / "python/bin/python", "python_peer": source / "python_peer.py"}
     (out / "bin").mkdir(parents=True, exist_ok=True)
     for name, recipe in recipes.items():
-        if name == "bonxai" and not (out / "bonxai/include").is_dir():
-            continue
         program, code = out / "bin" / name, source / f"{name}_peer.cpp"
         newest = max(code.stat().st_mtime, (source / "peer.hpp").stat().st_mtime)
         if build_all and not (program.exists() and program.stat().st_mtime > newest):

@@ -89,7 +89,8 @@ def insert(found, pattern, cell):
     place, rows = f"{pattern} {cell} m", []
     at = lambda label: found("insert", pattern, cell, label)  # noqa: E731
     mask, octomap = at("OpenVDB MaskGrid"), at("octomap updateNode")
-    counting = at("Bonxai i32") or at("OpenVDB FloatGrid")
+    # Stands for Bonxai, of which there is no package.
+    counting = at("OpenVDB FloatGrid")
     for lattice in JUDGED:
         occupancy, payload = at(f"occupancy {lattice}"), at(f"list {lattice}")
         rows += ratio_row(place, f"occupancy {lattice} against MaskGrid", occupancy, mask, 1.2)

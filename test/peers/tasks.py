@@ -88,8 +88,6 @@ class Maker:
         self.add(group, cell, label, command, lattice=lattice, threads=threads, **kinds)
 
     def peer(self, group, cell, label, program, mode=None, threads=1, options=(), **kinds):
-        if program not in self.programs:
-            return
         command = [self.programs[program]]
         command += [self.programs["python_peer"]] if program == "python" else []
         command += ["--points", self.path, "--cell", str(cell), "--threads", str(threads), *options]
@@ -131,8 +129,6 @@ class Maker:
         self.peer("insert", cell, "OpenVDB FloatGrid", "openvdb", "float", **exact)
         self.peer("insert", cell, "OpenVDB FloatGrid counting", "openvdb", "count", **exact)
         self.peer("insert", cell, "OpenVDB centroid grid", "openvdb", "centroid", **exact)
-        for mode in ("u8", "i32", "centroid"):
-            self.peer("insert", cell, f"Bonxai {mode}", "bonxai", mode, **exact)
         self.peer("insert", cell, "octomap updateNode", "octomap", "insert", **exact)
         self.peer("insert", cell, "small_gicp voxelgrid", "small_gicp", **exact)
         self.peer("insert", cell, "small_gicp voxelgrid", "small_gicp", threads=2)
