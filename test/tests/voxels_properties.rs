@@ -1,4 +1,4 @@
-//! The voxel list: the same bytes for any order, threads and grouping, and files that hold.
+//! The voxel list: the same bytes for any order, threads and grouping.
 
 use std::collections::BTreeSet;
 
@@ -240,70 +240,4 @@ proptest! {
         prop_assert_eq!(decode_keys(&encode_keys(&keys), keys.len()).unwrap(), keys.clone());
         prop_assert_eq!(read.take_changes().changed, keys);
     }
-
-    #[test]
-    fn a_damaged_file_is_refused(
-        kind in any_kind(), offsets in any_offsets(), at in any::<prop::sample::Index>(), flip in 1..=255_u8,
-    ) {
-        let mut file = bytes(&filled(kind, &offsets));
-        let cut = at.index(file.len());
-        prop_assert!(read_map(&file[..cut], 1000).is_err());
-        file[cut] ^= flip;
-        let error = read_map(&file[..], 1000).unwrap_err().to_string();
-        prop_assert!(error.contains("map"), "{}", error);
-    }
-
-    #[test]
-    fn a_forged_file_is_refused_or_is_a_map(
-        kind in any_kind(),
-        offsets in any_offsets(),
-        edits in prop::collection::vec((any::<prop::sample::Index>(), any::<u8>()), 1..4),
-    ) {
-        // The checksum is right, so that only the content can give the forgery away.
-        let mut file = bytes(&filled(kind, &offsets));
-        file.truncate(file.len() - 4);
-        for (at, byte) in edits {
-            let at = at.index(file.len());
-            file[at] = byte;
-        }
-        file.extend(crc32(&file).to_le_bytes());
-        if let Ok(list) = read_map(&file[..], 1000) {
-            list.validate().unwrap();
-            prop_assert_eq!(bytes(&list), file);
-        }
-    }
-
-    #[test]
-    fn noise_is_no_map(noise in prop::collection::vec(any::<u8>(), 0..300)) {
-        prop_assert!(read_map(&noise[..], 1000).is_err());
-        let disguised = [&b"LATTICE1fcc\0\0\0\0\0"[..], &0.125_f64.to_le_bytes(), &noise].concat();
-        prop_assert!(read_map(&disguised[..], usize::MAX).is_err());
-    }
-}
-
-/// CRC-32 of zip, bit by bit.
-fn crc32(bytes: &[u8]) -> u32 {
-    let mut crc = u32::MAX;
-    for &byte in bytes {
-        crc ^= u32::from(byte);
-        for _ in 0..8 {
-            crc = (crc >> 1) ^ (0xedb8_8320 & (crc & 1).wrapping_neg());
-        }
-    }
-    !crc
-}
-
-#[test]
-fn absurd_counts_cost_no_memory() {
-    let mut header = bytes(&empty(LatticeKind::Fcc, 0));
-    header.truncate(96);
-    header.extend(u64::MAX.to_le_bytes());
-    let error = read_map(&header[..], usize::MAX).unwrap_err().to_string();
-    assert!(
-        error.contains("cut short") && error.contains("byte 104"),
-        "{error}"
-    );
-    let error = read_map(&header[..], 1000).unwrap_err().to_string();
-    assert!(error.contains("1000"), "{error}");
-    assert!(decode_keys(&[0x80], usize::MAX).is_err());
 }

@@ -52,37 +52,35 @@ pub fn encode_keys(sorted: &[Key]) -> Vec<u8> {
 /// Decodes at most `max` keys; they ascend strictly. Allocates no more than the input justifies.
 pub fn decode_keys(bytes: &[u8], max: usize) -> Result<Vec<Key>, CodecError> {
     let mut keys = Vec::with_capacity(bytes.len().min(max));
-    let mut varint = Varint::default();
-    let mut before = None;
-    for (position, &byte) in bytes.iter().enumerate() {
-        let Some(step) = varint
-            .push(byte)
-            .map_err(|_| CodecError::Varint { position })?
-        else {
+    let mut steps = Varints::new(bytes);
+    let mut before: Option<Key> = None;
+    loop {
+        if let Some(last) = before
+            && max - keys.len() >= 8
+            && let Some(next) = steps.next_eight(last)
+        {
+            keys.extend_from_slice(&next);
+            before = next.last().copied();
             continue;
+        }
+        let Some(step) = steps.next_value()? else {
+            return Ok(keys);
         };
         if keys.len() == max {
             return Err(CodecError::TooMany { max });
         }
-        let index = keys.len();
         let key = next_key(before, step).ok_or(CodecError::Key {
-            index,
-            position: position + 1,
+            index: keys.len(),
+            position: steps.position(),
         })?;
         before = Some(key);
         keys.push(key);
     }
-    if varint.is_open() {
-        Err(CodecError::Truncated {
-            position: bytes.len(),
-        })
-    } else {
-        Ok(keys)
-    }
 }
 
 /// The key `step` after `before`.
-pub(super) fn next_key(before: Option<Key>, step: u64) -> Option<Key> {
+#[inline]
+fn next_key(before: Option<Key>, step: u64) -> Option<Key> {
     match before {
         Some(_) if step == 0 => None,
         Some(before) => before.raw().checked_add(step).and_then(Key::from_raw),
@@ -99,38 +97,74 @@ pub(super) fn push_varint(bytes: &mut Vec<u8>, mut value: u64) {
     bytes.push(value as u8);
 }
 
-/// A varint is too long.
-#[derive(Clone, Copy, PartialEq, Eq, Debug)]
-pub(super) struct NotShortest;
-
-/// Puts varints together from bytes.
-#[derive(Default)]
-pub(super) struct Varint {
-    value: u64,
-    shift: u32,
+/// Takes varints off bytes.
+pub(super) struct Varints<'a> {
+    bytes: &'a [u8],
+    position: usize,
 }
 
-impl Varint {
-    /// Takes a byte; gives the number when it was the last.
-    #[inline]
-    pub(super) fn push(&mut self, byte: u8) -> Result<Option<u64>, NotShortest> {
-        let bits = u64::from(byte & 0x7f);
-        if (self.shift == 63 && byte > 1) || (self.shift > 0 && byte == 0) {
-            return Err(NotShortest);
-        }
-        self.value |= bits << self.shift;
-        if byte >= 0x80 {
-            self.shift += 7;
-            return Ok(None);
-        }
-        let value = self.value;
-        *self = Varint::default();
-        Ok(Some(value))
+/// The top bits of eight bytes.
+const TOP_BITS: u64 = 0x8080_8080_8080_8080;
+
+impl<'a> Varints<'a> {
+    pub(super) fn new(bytes: &'a [u8]) -> Varints<'a> {
+        Varints { bytes, position: 0 }
     }
 
-    /// True within a number.
-    pub(super) fn is_open(&self) -> bool {
-        self.shift > 0
+    /// Bytes taken.
+    pub(super) fn position(&self) -> usize {
+        self.position
+    }
+
+    /// The next number, `None` at the end.
+    #[inline]
+    pub(super) fn next_value(&mut self) -> Result<Option<u64>, CodecError> {
+        match self.bytes.get(self.position) {
+            Some(&byte) if byte < 0x80 => {
+                self.position += 1;
+                Ok(Some(u64::from(byte)))
+            }
+            Some(_) => self.next_long().map(Some),
+            None => Ok(None),
+        }
+    }
+
+    fn next_long(&mut self) -> Result<u64, CodecError> {
+        let (mut value, mut shift) = (0, 0);
+        for &byte in self.bytes.iter().skip(self.position) {
+            if (shift == 63 && byte > 1) || (shift > 0 && byte == 0) {
+                let position = self.position;
+                return Err(CodecError::Varint { position });
+            }
+            self.position += 1;
+            value |= u64::from(byte & 0x7f) << shift;
+            if byte < 0x80 {
+                return Ok(value);
+            }
+            shift += 7;
+        }
+        Err(CodecError::Truncated {
+            position: self.position,
+        })
+    }
+
+    /// The eight keys after `last` if each step is a byte, none zero, and stays far below 2^63.
+    #[inline]
+    fn next_eight(&mut self, last: Key) -> Option<[Key; 8]> {
+        let rest = self.bytes.get(self.position..)?;
+        let (steps, _) = rest.split_first_chunk::<8>()?;
+        let packed = u64::from_le_bytes(*steps);
+        // Without top bits, taking 1 from each byte sets one exactly if there is a zero byte.
+        if (packed | packed.wrapping_sub(TOP_BITS >> 7)) & TOP_BITS != 0 {
+            return None;
+        }
+        Key::from_raw(last.raw() + 8 * 0x7f)?;
+        let mut raw = last.raw();
+        self.position += 8;
+        Some(steps.map(|step| {
+            raw += u64::from(step);
+            Key::from_raw(raw).unwrap_or(last)
+        }))
     }
 }
 
@@ -198,6 +232,45 @@ mod tests {
             raws.insert((1 << 63) - 1);
             let keys: Vec<Key> = raws.into_iter().map(key).collect();
             prop_assert_eq!(decode_keys(&encode_keys(&keys), keys.len()), Ok(keys));
+        }
+
+        #[test]
+        fn runs_of_short_steps_round_trip(
+            first in 1_u64..1 << 62,
+            steps in prop::collection::vec(prop_oneof![9 => 1_u64..128, 1 => 1_u64..1 << 40], 0..200),
+            zero in any::<prop::sample::Index>(),
+        ) {
+            let mut raw = first;
+            let mut keys = vec![key(first)];
+            for step in &steps {
+                raw += step;
+                keys.push(key(raw));
+            }
+            let mut bytes = encode_keys(&keys);
+            prop_assert_eq!(decode_keys(&bytes, keys.len()), Ok(keys.clone()));
+            prop_assert_eq!(
+                decode_keys(&bytes, keys.len() - 1),
+                Err(CodecError::TooMany { max: keys.len() - 1 })
+            );
+            // A step of zero is found wherever it is, and at the end of the range too.
+            let start = encode_keys(&keys[..1]).len();
+            let at = start + zero.index(bytes.len() - start + 1);
+            let before = decode_keys(&bytes[..at], keys.len());
+            bytes.insert(at, 0);
+            prop_assert!(before.is_err() || decode_keys(&bytes, keys.len() + 1).is_err());
+        }
+
+        #[test]
+        fn no_run_passes_the_last_key(below in 0_u64..2000) {
+            let mut bytes = encode_keys(&[key((1 << 63) - 1 - below)]);
+            let start = bytes.len();
+            bytes.resize(start + 24, 0x7f);
+            let fits = below / 0x7f >= 24;
+            let decoded = decode_keys(&bytes, 25);
+            prop_assert_eq!(decoded.is_ok(), fits);
+            if let Err(CodecError::Key { index, position }) = decoded {
+                prop_assert_eq!((index as u64, position - start), (below / 0x7f + 1, index));
+            }
         }
 
         #[test]

@@ -5,6 +5,7 @@
 
 pub mod codec;
 pub mod file;
+pub mod set_ops;
 
 mod cells;
 mod changes;

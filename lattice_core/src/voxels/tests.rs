@@ -1,8 +1,8 @@
-//! Tests of the list; those over threads and files of any size are in the test crate.
+//! Tests of the list; those over threads are in the test crate.
 
 use nalgebra::Vector3;
 
-use super::file::{FileError, read_map, write_map};
+use super::file::write_map;
 use super::*;
 use crate::cloud::Cloud;
 use crate::lattice::{Key, Lattice, LatticeKind};
@@ -233,78 +233,4 @@ fn lists_of_different_cells_do_not_merge() {
         })
     );
     assert_eq!(bytes(&map), before);
-}
-
-#[test]
-fn the_file_has_the_bytes_of_its_description() {
-    let mut map = list(LatticeKind::Cubic, [-0.5, 0.0, 1.0], 10);
-    map.insert(&cloud(
-        [-0.5, 0.0, 1.0],
-        &[[0.125, 0.0, -0.125], [0.0, 0.5, 0.0]],
-    ));
-    let mut expected = b"LATTICE1cubic\0\0\0".to_vec();
-    expected.extend(0.125_f64.to_le_bytes());
-    [-1_i64, 0, 2]
-        .iter()
-        .for_each(|i| expected.extend(i.to_le_bytes()));
-    expected.extend(2_u64.to_le_bytes());
-    expected.extend((1_u128 << 17).to_le_bytes());
-    let distance = (0.125_f64.sqrt() * 2.0_f64.powi(20)).round();
-    expected.extend((distance as u128).to_le_bytes());
-    expected.extend((1_u64 << 17).to_le_bytes());
-    expected.extend(2_u64.to_le_bytes());
-    // Key of (0, 0, 0): the three top bits, 7 << 60, nine groups of seven bits.
-    expected.extend([0x80, 0x80, 0x80, 0x80, 0x80, 0x80, 0x80, 0x80, 0x70, 1]);
-    expected.extend([0x80, 0x80, 0x10, 0, 0xff, 0xff, 0x0f]);
-    expected.extend([2, 1, 0, 0, 0]);
-    let crc = crc32fast::hash(&expected);
-    expected.extend(crc.to_le_bytes());
-    assert_eq!(bytes(&map), expected);
-}
-
-#[test]
-fn damaged_files_are_refused_with_a_reason() {
-    let mut map = list(LatticeKind::Mcc, [0.0; 3], 10);
-    map.insert(&cloud([0.0; 3], &[[0.1; 3], [1.0; 3]]));
-    let good = bytes(&map);
-    assert_eq!(bytes(&read_map(&good[..], 2).unwrap()), good);
-    let read = |bytes: &[u8]| read_map(bytes, 2).unwrap_err();
-    for end in 0..good.len() {
-        let FileError::Truncated { position } = read(&good[..end]) else {
-            panic!("cut at {end}")
-        };
-        assert_eq!(position, end as u64);
-    }
-    assert!(matches!(
-        read_map(&good[..], 1),
-        Err(FileError::TooManyVoxels { voxels: 2, .. })
-    ));
-    let mut longer = good.clone();
-    longer.push(0);
-    assert!(
-        matches!(read(&longer), FileError::TrailingBytes { position } if position == good.len() as u64)
-    );
-    let with = |at: usize, byte: u8| {
-        let mut bytes = good.clone();
-        bytes[at] = byte;
-        read(&bytes)
-    };
-    assert!(matches!(with(3, b'x'), FileError::Magic { .. }));
-    assert!(matches!(
-        with(8, b'x'),
-        FileError::Corrupt { position: 16, .. }
-    ));
-    assert!(matches!(
-        with(23, 0xff),
-        FileError::Corrupt { position: 24, .. }
-    ));
-    assert!(matches!(
-        with(47, 0x7f),
-        FileError::Corrupt { position: 48, .. }
-    ));
-    assert!(matches!(with(48, 1), FileError::Corrupt { .. }));
-    assert!(matches!(
-        with(good.len() - 1, good[good.len() - 1] ^ 1),
-        FileError::Checksum { .. }
-    ));
 }

@@ -1,0 +1,166 @@
+//! What a map file holds, in order of the keys.
+
+use nalgebra::Vector3;
+use thiserror::Error;
+
+use crate::lattice::{Key, Lattice};
+use crate::voxels::distortion::DistortionSums;
+use crate::voxels::{Distortion, OFFSET_UNIT_M, Voxel, VoxelList, VoxelStore};
+
+/// Parts that do not make a map.
+#[derive(Clone, PartialEq, Eq, Debug, Error)]
+#[error("these do not make a map: {0}")]
+pub struct ContentsError(String);
+
+/// A map as sorted columns: what a file holds, and what set operations on files work with.
+///
+/// Keys ascend strictly, and voxels, where there are any, are one for each key.
+#[derive(Clone, PartialEq, Debug)]
+pub struct MapContents {
+    pub(super) lattice: Lattice,
+    pub(super) datum_index: [i64; 3],
+    pub(super) keys: Vec<Key>,
+    pub(super) voxels: Option<Vec<Voxel>>,
+    pub(super) sums: DistortionSums,
+}
+
+impl MapContents {
+    /// A map without payload and statistics. Fails if keys do not ascend or the datum is more than
+    /// 2^48 cells from the map origin.
+    pub fn occupancy(
+        lattice: Lattice,
+        datum_index: [i64; 3],
+        keys: Vec<Key>,
+    ) -> Result<MapContents, ContentsError> {
+        let contents = MapContents {
+            lattice,
+            datum_index,
+            keys,
+            voxels: None,
+            sums: DistortionSums::default(),
+        };
+        contents.check_datum().map_err(ContentsError)?;
+        match contents.keys.is_sorted_by(|a, b| a < b) {
+            true => Ok(contents),
+            false => Err(ContentsError("the keys do not ascend".to_owned())),
+        }
+    }
+
+    /// Copies a list.
+    pub fn from_list(list: &VoxelList) -> MapContents {
+        let (keys, voxels) = list.sorted().into_iter().unzip();
+        MapContents {
+            lattice: list.lattice.clone(),
+            datum_index: list.datum_index,
+            keys,
+            voxels: Some(voxels),
+            sums: list.sums,
+        }
+    }
+
+    /// Copies the occupied cells of any store.
+    pub fn from_store(store: &impl VoxelStore) -> MapContents {
+        MapContents {
+            lattice: store.lattice().clone(),
+            datum_index: store.datum_index(),
+            keys: store.sorted_keys(),
+            voxels: None,
+            sums: DistortionSums::default(),
+        }
+    }
+
+    /// The map as a list of at most `max_voxels`; the voxels beyond are left out.
+    ///
+    /// A map without payload becomes one of a point at each centre, with statistics to match.
+    pub fn into_list(self, max_voxels: usize) -> VoxelList {
+        let mut list = VoxelList::at_datum(self.lattice, self.datum_index, max_voxels);
+        match self.voxels {
+            Some(voxels) => {
+                for (key, voxel) in self.keys.iter().zip(&voxels) {
+                    list.add(*key, voxel);
+                }
+                list.sums = self.sums;
+            }
+            None => {
+                let (count, sum) = (1, [0; 3]);
+                for key in &self.keys {
+                    list.add(*key, &Voxel { count, sum });
+                }
+                list.sums.points = self.keys.len() as u64;
+            }
+        }
+        list
+    }
+
+    /// The lattice.
+    pub fn lattice(&self) -> &Lattice {
+        &self.lattice
+    }
+
+    /// Index of the datum in the lattice of the map frame.
+    pub fn datum_index(&self) -> [i64; 3] {
+        self.datum_index
+    }
+
+    /// The lattice point that keys count from, map frame, metres.
+    pub fn datum_m(&self) -> Vector3<f64> {
+        self.lattice.center_wide(self.datum_index)
+    }
+
+    /// The occupied cells in ascending (Morton) order.
+    pub fn keys(&self) -> &[Key] {
+        &self.keys
+    }
+
+    /// The occupied cells, without the rest.
+    pub fn into_keys(self) -> Vec<Key> {
+        self.keys
+    }
+
+    /// The payload, one for each key, if there is any.
+    pub fn voxels(&self) -> Option<&[Voxel]> {
+        self.voxels.as_deref()
+    }
+
+    /// Quantization error over all points that were ever inserted.
+    pub fn distortion(&self) -> Distortion {
+        self.sums.summary(&self.lattice)
+    }
+
+    /// Centre of a cell, map frame, metres.
+    pub fn center_m(&self, key: Key) -> Vector3<f64> {
+        self.datum_m() + self.lattice.center(key.unpack())
+    }
+
+    /// No point is farther from its lattice point than this, in `OFFSET_UNIT_M`, roundings included.
+    pub(super) fn reach(&self) -> u64 {
+        (self.lattice.covering_radius_m() / OFFSET_UNIT_M) as u64 + 2
+    }
+
+    /// Says what is wrong with the datum.
+    pub(super) fn check_datum(&self) -> Result<(), String> {
+        match self.lattice.quantize_wide(&self.datum_m()) {
+            Some(_) => Ok(()),
+            None => Err(format!(
+                "datum index {:?} is out of range",
+                self.datum_index
+            )),
+        }
+    }
+
+    /// Says what is wrong with the statistics; keys and voxels are checked as they are read.
+    pub(super) fn check(&self) -> Result<(), String> {
+        if let Some(fault) = self.sums.fault(&self.lattice) {
+            return Err(fault);
+        }
+        let counts = self.voxels.iter().flatten().map(|voxel| voxel.count);
+        let counted = counts.fold(0, |sum: u64, count| sum.saturating_add(u64::from(count)));
+        if counted > self.sums.points {
+            return Err(format!(
+                "voxels hold {counted} points, statistics {}",
+                self.sums.points
+            ));
+        }
+        Ok(())
+    }
+}

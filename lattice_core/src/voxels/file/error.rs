@@ -1,0 +1,78 @@
+//! Why a map file was not written or read.
+
+use std::io;
+
+use thiserror::Error;
+
+/// Why a map was not written or read; positions are bytes from the start of the file.
+#[derive(Debug, Error)]
+pub enum FileError {
+    /// The system could not read or write.
+    #[error("input or output of the map file failed at byte {position}: {source}")]
+    Io {
+        /// Bytes read or written before.
+        position: u64,
+        /// What the system said.
+        source: io::Error,
+    },
+    /// It is some other file.
+    #[error("not a map file: it starts with {:?} instead of \"LATTICE2\"", found.escape_ascii().to_string())]
+    Magic {
+        /// The first eight bytes.
+        found: [u8; 8],
+    },
+    /// The format of before 2026-11, without sections.
+    #[error("the map file has format 1, which is no longer read: make the map again from its log")]
+    OldVersion,
+    /// The end comes too early.
+    #[error("the map file is cut short: it ends at byte {position}, within the {part}")]
+    Truncated {
+        /// Length of the file.
+        position: u64,
+        /// What is not all there.
+        part: String,
+    },
+    /// More voxels than the caller allows.
+    #[error(
+        "the map file has {voxels} voxels, but at most {max_voxels} are allowed: raise max_voxels"
+    )]
+    TooManyVoxels {
+        /// Voxels in the file.
+        voxels: u64,
+        /// What the caller allows.
+        max_voxels: usize,
+    },
+    /// The bytes cannot be a map.
+    #[error("the map file is damaged at byte {position}: {reason}")]
+    Corrupt {
+        /// Where the impossible bytes are; for a number of a column the byte after it.
+        position: u64,
+        /// What is impossible.
+        reason: String,
+    },
+    /// A checksum does not match.
+    #[error(
+        "the map file is damaged between bytes {start} and {end}, the {part}: their CRC should be {saved:08x}, but is {calculated:08x}"
+    )]
+    Checksum {
+        /// First byte that the checksum is of.
+        start: u64,
+        /// The byte after the last.
+        end: u64,
+        /// What the bytes are.
+        part: String,
+        /// In the file.
+        saved: u32,
+        /// From the content.
+        calculated: u32,
+    },
+    /// Something follows the end marker.
+    #[error("the map ends at byte {position}, but the file goes on")]
+    TrailingBytes {
+        /// Length that the file should have.
+        position: u64,
+    },
+    /// The writer was asked for a level that readers of the format need not take.
+    #[error("zstd level {0} is not between 1 and 19")]
+    Level(i32),
+}

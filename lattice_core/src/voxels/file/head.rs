@@ -1,0 +1,259 @@
+//! The fixed head of a map file, of a section, and its end.
+
+use super::FileError;
+use crate::lattice::{Lattice, LatticeKind};
+use crate::voxels::distortion::DistortionSums;
+
+pub(super) const MAGIC: &[u8; 8] = b"LATTICE2";
+pub(super) const OLD_MAGIC: &[u8; 8] = b"LATTICE1";
+pub(super) const SECTION_TAG: &[u8; 4] = b"SECT";
+pub(super) const END_TAG: &[u8; 4] = b"LEND";
+/// Bytes of the head, its checksum included.
+pub(super) const HEAD_BYTES: usize = 224;
+/// Bytes of the head of a section, its checksum included.
+pub(super) const SECTION_HEAD_BYTES: usize = 48;
+
+/// What a map is of, and how many sections follow.
+pub(super) struct Head {
+    pub(super) lattice: Lattice,
+    pub(super) datum_index: [i64; 3],
+    pub(super) sums: DistortionSums,
+    pub(super) voxels: u64,
+    pub(super) sections: u32,
+}
+
+impl Head {
+    pub(super) fn to_bytes(&self) -> Vec<u8> {
+        let mut bytes = Vec::with_capacity(HEAD_BYTES);
+        bytes.extend(MAGIC);
+        bytes.extend(name16(self.lattice.kind().name()));
+        bytes.extend(self.lattice.cell_volume_m3().to_le_bytes());
+        for value in orientation(&self.lattice)
+            .iter()
+            .chain(self.lattice.generator().iter())
+        {
+            bytes.extend(value.to_le_bytes());
+        }
+        self.datum_index
+            .iter()
+            .for_each(|i| bytes.extend(i.to_le_bytes()));
+        bytes.extend(self.sums.points.to_le_bytes());
+        bytes.extend(self.sums.squares.to_le_bytes());
+        bytes.extend(self.sums.distances.to_le_bytes());
+        bytes.extend(self.sums.largest_square.to_le_bytes());
+        bytes.extend(self.voxels.to_le_bytes());
+        bytes.extend(self.sections.to_le_bytes());
+        bytes.extend(crc32fast::hash(&bytes).to_le_bytes());
+        bytes
+    }
+
+    /// Reads what follows the magic, without the checksum; the datum is not checked.
+    pub(super) fn from_bytes(bytes: &[u8]) -> Result<Head, FileError> {
+        let mut fields = Fields {
+            bytes,
+            position: MAGIC.len() as u64,
+        };
+        let at = fields.position;
+        let name = name_of(&fields.array::<16>()).map_err(|reason| corrupt(at, reason))?;
+        let kind: LatticeKind = name
+            .parse()
+            .map_err(|error| corrupt(at, format!("{error}")))?;
+        let at = fields.position;
+        let volume_m3 = fields.f64();
+        let orientation: [f64; 4] = std::array::from_fn(|_| fields.f64());
+        let generator: [f64; 9] = std::array::from_fn(|_| fields.f64());
+        let lattice = lattice(kind, volume_m3, orientation, generator)
+            .map_err(|reason| corrupt(at, reason))?;
+        let datum_index = std::array::from_fn(|_| i64::from_le_bytes(fields.array()));
+        let sums = DistortionSums {
+            points: fields.u64(),
+            squares: u128::from_le_bytes(fields.array()),
+            distances: u128::from_le_bytes(fields.array()),
+            largest_square: fields.u64(),
+        };
+        let (voxels, sections) = (fields.u64(), u32::from_le_bytes(fields.array()));
+        Ok(Head {
+            lattice,
+            datum_index,
+            sums,
+            voxels,
+            sections,
+        })
+    }
+}
+
+/// `map_from_lattice` as w, x, y, z.
+fn orientation(_lattice: &Lattice) -> [f64; 4] {
+    [1.0, 0.0, 0.0, 0.0]
+}
+
+/// The lattice of these figures, if it is the one that they were written for, to the bit.
+fn lattice(
+    kind: LatticeKind,
+    volume_m3: f64,
+    turned: [f64; 4],
+    generator: [f64; 9],
+) -> Result<Lattice, String> {
+    let lattice = Lattice::new(kind, volume_m3).map_err(|error| error.to_string())?;
+    let bits = |values: &[f64]| values.iter().map(|v| v.to_bits()).collect::<Vec<_>>();
+    if bits(&turned) != bits(&orientation(&lattice)) {
+        return Err(format!("orientation {turned:?} is not known"));
+    }
+    if bits(&generator) != bits(lattice.generator().as_slice()) {
+        return Err(format!(
+            "generator {generator:?} is not that of {lattice:?}"
+        ));
+    }
+    Ok(lattice)
+}
+
+/// How the values of a section are coded.
+#[derive(Clone, Copy, PartialEq, Eq, Debug)]
+#[repr(u8)]
+pub(super) enum Encoding {
+    /// LEB128 of the difference to the value before, the first absolute.
+    Steps = 0,
+    /// LEB128.
+    Unsigned = 1,
+    /// LEB128 of the zigzag form: 0, -1, 1, -2, ...
+    Signed = 2,
+}
+
+/// How the bytes of a section are packed.
+#[derive(Clone, Copy, PartialEq, Eq, Debug)]
+#[repr(u8)]
+pub(super) enum Codec {
+    Raw = 0,
+    Zstd = 1,
+}
+
+/// A column: its name and what its values are.
+#[derive(Clone, Copy, PartialEq, Eq, Debug)]
+pub(super) struct Column {
+    pub(super) name: &'static str,
+    pub(super) encoding: Encoding,
+    /// Values for each voxel.
+    pub(super) components: u8,
+    /// Most bytes that a value takes.
+    pub(super) longest: u64,
+}
+
+pub(super) const KEYS: Column = Column {
+    name: "keys",
+    encoding: Encoding::Steps,
+    components: 1,
+    longest: 9,
+};
+pub(super) const COUNT: Column = Column {
+    name: "count",
+    encoding: Encoding::Unsigned,
+    components: 1,
+    longest: 5,
+};
+pub(super) const OFFSET_SUM: Column = Column {
+    name: "offset_sum",
+    encoding: Encoding::Signed,
+    components: 3,
+    longest: 10,
+};
+
+/// The head of a section; columns of later versions have other names, encodings and codecs.
+#[derive(Clone, PartialEq, Eq, Debug)]
+pub(super) struct SectionHead {
+    pub(super) name: String,
+    pub(super) encoding: u8,
+    pub(super) components: u8,
+    pub(super) codec: u8,
+    pub(super) raw_bytes: u64,
+    pub(super) stored_bytes: u64,
+    pub(super) crc: u32,
+}
+
+impl SectionHead {
+    pub(super) fn to_bytes(&self) -> Vec<u8> {
+        let mut bytes = Vec::with_capacity(SECTION_HEAD_BYTES);
+        bytes.extend(SECTION_TAG);
+        bytes.extend(name16(&self.name));
+        bytes.extend([self.encoding, self.components, self.codec, 0]);
+        bytes.extend(self.raw_bytes.to_le_bytes());
+        bytes.extend(self.stored_bytes.to_le_bytes());
+        bytes.extend(self.crc.to_le_bytes());
+        bytes.extend(crc32fast::hash(&bytes).to_le_bytes());
+        bytes
+    }
+
+    /// Reads what follows the tag, without the checksum; `start` is the position of the tag.
+    pub(super) fn from_bytes(bytes: &[u8], start: u64) -> Result<SectionHead, FileError> {
+        let at = start + SECTION_TAG.len() as u64;
+        let mut fields = Fields {
+            bytes,
+            position: at,
+        };
+        let name = name_of(&fields.array::<16>()).map_err(|reason| corrupt(at, reason))?;
+        let [encoding, components, codec, reserved] = fields.array();
+        if reserved != 0 {
+            return Err(corrupt(fields.position - 1, "a byte should be zero".into()));
+        }
+        Ok(SectionHead {
+            name,
+            encoding,
+            components,
+            codec,
+            raw_bytes: fields.u64(),
+            stored_bytes: fields.u64(),
+            crc: u32::from_le_bytes(fields.array()),
+        })
+    }
+}
+
+pub(super) fn corrupt(position: u64, reason: String) -> FileError {
+    FileError::Corrupt { position, reason }
+}
+
+/// A name filled up with zero bytes.
+fn name16(name: &str) -> [u8; 16] {
+    let mut bytes = [0; 16];
+    bytes
+        .iter_mut()
+        .zip(name.bytes())
+        .for_each(|(to, from)| *to = from);
+    bytes
+}
+
+fn name_of(bytes: &[u8; 16]) -> Result<String, String> {
+    let name: String = bytes
+        .iter()
+        .take_while(|b| **b != 0)
+        .map(|b| char::from(*b))
+        .collect();
+    let plain = |c: char| c.is_ascii_lowercase() || c.is_ascii_digit() || c == '_';
+    if name.is_empty() || !name.chars().all(plain) || name16(&name) != *bytes {
+        return Err(format!("{:?} is no name", bytes.escape_ascii().to_string()));
+    }
+    Ok(name)
+}
+
+/// Takes fields off bytes of known length; beyond the end there are zeros.
+struct Fields<'a> {
+    bytes: &'a [u8],
+    position: u64,
+}
+
+impl Fields<'_> {
+    fn array<const N: usize>(&mut self) -> [u8; N] {
+        self.position += N as u64;
+        let Some((array, rest)) = self.bytes.split_first_chunk() else {
+            return [0; N];
+        };
+        self.bytes = rest;
+        *array
+    }
+
+    fn u64(&mut self) -> u64 {
+        u64::from_le_bytes(self.array())
+    }
+
+    fn f64(&mut self) -> f64 {
+        f64::from_le_bytes(self.array())
+    }
+}

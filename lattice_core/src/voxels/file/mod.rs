@@ -1,0 +1,64 @@
+//! Maps as files: lattice, datum, sorted keys and, if wanted, the payload of each voxel.
+//!
+//! `docs/map_file.md` describes the format and has a reader in Python.
+
+mod contents;
+mod error;
+mod head;
+mod operations;
+mod read;
+mod write;
+
+#[cfg(test)]
+mod tests;
+
+use std::io::{Read, Write};
+
+use super::{VoxelList, VoxelStore};
+
+pub use contents::{ContentsError, MapContents};
+pub use error::FileError;
+pub use operations::OperationError;
+
+/// A section may not unpack to more than this many times its stored bytes.
+///
+/// Bounds what a small file can make a reader allocate; maps of surfaces stay far below.
+pub const MAX_EXPANSION: u64 = 64;
+
+/// Most voxels that a file of this many bytes can hold.
+pub fn max_voxels_of(file_bytes: u64) -> usize {
+    usize::try_from(file_bytes.saturating_mul(MAX_EXPANSION)).unwrap_or(usize::MAX)
+}
+
+/// Log2 of the largest zstd window that a reader takes: that of level 19.
+const MAX_WINDOW_LOG: u32 = 23;
+
+/// How a map is written.
+#[derive(Clone, Copy, PartialEq, Eq, Debug, Default)]
+pub struct WriteOptions {
+    /// Sections packed by zstd at this level, 1 to 19; stored as they are if `None`.
+    pub zstd_level: Option<i32>,
+    /// Leaves out counts and offset sums.
+    pub occupancy_only: bool,
+}
+
+/// Writes a list with its payload, not packed; equal maps give equal bytes.
+pub fn write_map(list: &VoxelList, writer: impl Write) -> Result<(), FileError> {
+    MapContents::from_list(list).write(writer, &WriteOptions::default())
+}
+
+/// Writes the occupied cells of any store, with empty statistics.
+pub fn write_occupancy(
+    store: &impl VoxelStore,
+    writer: impl Write,
+    options: &WriteOptions,
+) -> Result<(), FileError> {
+    MapContents::from_store(store).write(writer, options)
+}
+
+/// Reads a map of at most `max_voxels`, which becomes its bound; all voxels count as changed.
+///
+/// A map without payload becomes one of a point at each centre. See [`MapContents::read`].
+pub fn read_map(reader: impl Read, max_voxels: usize) -> Result<VoxelList, FileError> {
+    Ok(MapContents::read(reader, max_voxels)?.into_list(max_voxels))
+}

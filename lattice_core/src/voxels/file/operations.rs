@@ -1,0 +1,152 @@
+//! Operations on maps as sorted columns, without a hash table.
+
+use nalgebra::Vector3;
+use thiserror::Error;
+
+use super::MapContents;
+use crate::lattice::Key;
+use crate::voxels::Voxel;
+
+/// Why two maps do not go together. The receiving map is as before.
+#[derive(Clone, PartialEq, Eq, Debug, Error)]
+pub enum OperationError {
+    /// The cells are different.
+    #[error("one map is of {ours}, the other of {theirs}: only maps of the same cells go together")]
+    Lattice {
+        /// The lattice of the receiving map.
+        ours: String,
+        /// The lattice of the other map.
+        theirs: String,
+    },
+    /// A cell of the other map cannot be counted from the datum of the receiving one.
+    #[error(
+        "cell {cell:?} of the other map is more than 2^20 cells from datum index {datum_index:?}: give both maps datums near each other"
+    )]
+    OutOfRange {
+        /// Index of the cell in the lattice of the map frame.
+        cell: [i64; 3],
+        /// The datum of the receiving map.
+        datum_index: [i64; 3],
+    },
+    /// One map has counts and offsets, the other has not.
+    #[error("only one of the maps has point counts: drop them with occupancy only")]
+    Payload,
+}
+
+impl MapContents {
+    /// Leaves out counts and offsets; keeps the statistics.
+    pub fn drop_payload(&mut self) {
+        self.voxels = None;
+    }
+
+    /// The same cells, counted from another lattice point of the map frame.
+    pub fn with_datum(mut self, datum_index: [i64; 3]) -> Result<MapContents, OperationError> {
+        if datum_index == self.datum_index {
+            return Ok(self);
+        }
+        let shift: [i128; 3] =
+            [0, 1, 2].map(|i| i128::from(self.datum_index[i]) - i128::from(datum_index[i]));
+        let mut moved = Vec::with_capacity(self.keys.len());
+        for (place, key) in self.keys.iter().enumerate() {
+            let w = key.unpack();
+            let shifted = [0, 1, 2].map(|i| i32::try_from(i128::from(w[i]) + shift[i]).ok());
+            let key = match shifted {
+                [Some(x), Some(y), Some(z)] => Key::pack([x, y, z]),
+                _ => None,
+            };
+            let Some(key) = key else {
+                let cell = [0, 1, 2].map(|i| self.datum_index[i].saturating_add(i64::from(w[i])));
+                return Err(OperationError::OutOfRange { cell, datum_index });
+            };
+            moved.push((key, place));
+        }
+        moved.sort_unstable();
+        let voxels = self.voxels.as_ref();
+        self.voxels = voxels.map(|voxels| {
+            let at = |place: usize| voxels.get(place).copied().unwrap_or_default();
+            moved.iter().map(|&(_, place)| at(place)).collect()
+        });
+        self.keys = moved.into_iter().map(|(key, _)| key).collect();
+        self.datum_index = datum_index;
+        Ok(self)
+    }
+
+    /// Adds all voxels and statistics of `other`, exactly; order and grouping do not matter as long
+    /// as the first map gives the datum.
+    pub fn merge(&mut self, other: MapContents) -> Result<(), OperationError> {
+        self.expect_cells_of(&other)?;
+        if self.voxels.is_some() != other.voxels.is_some() {
+            return Err(OperationError::Payload);
+        }
+        let other = other.with_datum(self.datum_index)?;
+        let room = self.keys.len().saturating_add(other.keys.len());
+        let mut keys = Vec::with_capacity(room);
+        let mut voxels = Vec::with_capacity(if self.voxels.is_some() { room } else { 0 });
+        let (mut ours, mut theirs) = (self.rows().peekable(), other.rows().peekable());
+        loop {
+            let (key, voxel) = match (ours.peek(), theirs.peek()) {
+                (Some((a, _)), Some((b, _))) if a == b => {
+                    let row = ours.next().zip(theirs.next());
+                    let Some(((key, a), (_, b))) = row else { break };
+                    let sum = a.zip(b).map(|(mut a, b)| {
+                        a.add(&b);
+                        a
+                    });
+                    (key, sum)
+                }
+                (Some((a, _)), Some((b, _))) if a > b => match theirs.next() {
+                    Some(row) => row,
+                    None => break,
+                },
+                (Some(_), _) => match ours.next() {
+                    Some(row) => row,
+                    None => break,
+                },
+                (None, _) => match theirs.next() {
+                    Some(row) => row,
+                    None => break,
+                },
+            };
+            keys.push(key);
+            voxels.extend(voxel);
+        }
+        drop(ours);
+        (self.keys, self.voxels) = (keys, self.voxels.is_some().then_some(voxels));
+        self.sums.add(&other.sums);
+        Ok(())
+    }
+
+    /// Keeps the cells that `keep` wants, called in ascending order with key and centre (map frame,
+    /// metres). The statistics stay those of all points that were ever inserted.
+    pub fn retain(&mut self, mut keep: impl FnMut(Key, Vector3<f64>) -> bool) {
+        let datum_m = self.datum_m();
+        let kept: Vec<bool> = self
+            .keys
+            .iter()
+            .map(|&key| keep(key, datum_m + self.lattice.center(key.unpack())))
+            .collect();
+        let mut flags = kept.iter();
+        self.keys.retain(|_| flags.next() == Some(&true));
+        if let Some(voxels) = &mut self.voxels {
+            let mut flags = kept.iter();
+            voxels.retain(|_| flags.next() == Some(&true));
+        }
+    }
+
+    /// Fails unless both maps are of the same cells.
+    pub fn expect_cells_of(&self, other: &MapContents) -> Result<(), OperationError> {
+        if self.lattice == other.lattice {
+            return Ok(());
+        }
+        Err(OperationError::Lattice {
+            ours: format!("{:?}", self.lattice),
+            theirs: format!("{:?}", other.lattice),
+        })
+    }
+
+    fn rows(&self) -> impl Iterator<Item = (Key, Option<Voxel>)> {
+        let voxel = |place| self.voxels.as_ref().and_then(|v| v.get(place).copied());
+        let keys = self.keys.iter().enumerate();
+        keys.map(move |(place, &key)| (key, voxel(place)))
+    }
+}

@@ -1,0 +1,401 @@
+//! Reading.
+
+use std::io::{self, Read};
+
+use super::head::{
+    COUNT, Codec, Column, END_TAG, HEAD_BYTES, Head, KEYS, MAGIC, OFFSET_SUM, OLD_MAGIC,
+    SECTION_HEAD_BYTES, SECTION_TAG, SectionHead, corrupt,
+};
+use super::{FileError, MAX_EXPANSION, MAX_WINDOW_LOG, MapContents};
+use crate::voxels::Voxel;
+use crate::voxels::codec::{CodecError, Varints, decode_keys, unzigzag};
+
+/// Bytes that are asked for before any has come.
+const FIRST_BYTES: u64 = 1 << 20;
+
+impl MapContents {
+    /// Reads a map of at most `max_voxels`.
+    ///
+    /// Columns with unknown names are skipped; otherwise this refuses anything that no writer of
+    /// this format writes. Allocates in proportion to the bytes that have been read.
+    pub fn read(reader: impl Read, max_voxels: usize) -> Result<MapContents, FileError> {
+        let mut source = Source {
+            reader,
+            crc: crc32fast::Hasher::new(),
+            position: 0,
+        };
+        let head = source.head()?;
+        if head.voxels > max_voxels as u64 {
+            return Err(FileError::TooManyVoxels {
+                voxels: head.voxels,
+                max_voxels,
+            });
+        }
+        let mut contents = MapContents {
+            lattice: head.lattice,
+            datum_index: head.datum_index,
+            keys: Vec::new(),
+            voxels: None,
+            sums: head.sums,
+        };
+        contents
+            .check_datum()
+            .map_err(|reason| corrupt(136, reason))?;
+        let mut known = 0;
+        for number in 0..head.sections {
+            let section = source.section_head()?;
+            let expected = [KEYS, COUNT, OFFSET_SUM];
+            let column = expected.iter().find(|column| column.name == section.name);
+            if column != expected.get(known) && (column.is_some() || number == 0) {
+                return Err(corrupt(
+                    source.position - SECTION_HEAD_BYTES as u64,
+                    format!("section {number} cannot be {:?} here", section.name),
+                ));
+            }
+            let Some(column) = column else {
+                source.skip(&section)?;
+                continue;
+            };
+            known += 1;
+            source.column(column, &section, head.voxels, &mut contents)?;
+        }
+        if known == 0 || known == 2 {
+            let missing = if known == 0 { "keys" } else { "offset_sum" };
+            return Err(corrupt(
+                source.position,
+                format!("there is no section {missing:?}"),
+            ));
+        }
+        contents.check().map_err(|reason| corrupt(160, reason))?;
+        source.finish()?;
+        Ok(contents)
+    }
+
+    /// The point counts, one for each key.
+    fn set_counts(&mut self, bytes: &[u8]) -> Result<(), Fault> {
+        let mut values = Varints::new(bytes);
+        let mut voxels = Vec::with_capacity(self.keys.len());
+        while let Some(count) = values.next_value()? {
+            let Ok(count) = u32::try_from(count) else {
+                return Err(values.fault(format!("a voxel has {count} points")));
+            };
+            voxels.push(Voxel { count, sum: [0; 3] });
+        }
+        if voxels.len() != self.keys.len() {
+            return Err(values.fault(format!("it has {} values", voxels.len())));
+        }
+        self.voxels = Some(voxels);
+        Ok(())
+    }
+
+    /// The offset sums, three for each key.
+    fn set_sums(&mut self, bytes: &[u8]) -> Result<(), Fault> {
+        let mut values = Varints::new(bytes);
+        let reach = self.reach();
+        for voxel in self.voxels.iter_mut().flatten() {
+            for sum in &mut voxel.sum {
+                let value = values.next_value()?;
+                *sum = unzigzag(value.ok_or_else(|| values.fault("it has too few values".into()))?);
+            }
+            if let Some(fault) = voxel.fault(reach) {
+                return Err(values.fault(fault));
+            }
+        }
+        match values.next_value()? {
+            Some(_) => Err(values.fault("it has too many values".into())),
+            None => Ok(()),
+        }
+    }
+}
+
+/// What is wrong with the values of a column, and before which of its bytes.
+struct Fault {
+    offset: usize,
+    reason: String,
+}
+
+impl From<CodecError> for Fault {
+    fn from(error: CodecError) -> Fault {
+        let (CodecError::Truncated { position: offset }
+        | CodecError::Varint { position: offset }
+        | CodecError::Key {
+            position: offset, ..
+        }) = error
+        else {
+            let (offset, reason) = (0, "it has too many values".to_owned());
+            return Fault { offset, reason };
+        };
+        let reason = match error {
+            CodecError::Truncated { .. } => "it ends within a number".to_owned(),
+            CodecError::Key { index, .. } => {
+                format!("key {index} does not ascend or is not below 2^63")
+            }
+            _ => "a number is not a shortest 64-bit varint".to_owned(),
+        };
+        Fault { offset, reason }
+    }
+}
+
+impl Varints<'_> {
+    fn fault(&self, reason: String) -> Fault {
+        Fault {
+            offset: self.position(),
+            reason,
+        }
+    }
+}
+
+/// Hands out bytes and knows their place and checksum.
+struct Source<R> {
+    reader: R,
+    crc: crc32fast::Hasher,
+    position: u64,
+}
+
+impl<R: Read> Source<R> {
+    /// Fills as much of the buffer as there is.
+    fn fill(&mut self, buffer: &mut [u8], part: &str) -> Result<(), FileError> {
+        let mut filled = 0;
+        while let Some(rest) = buffer.get_mut(filled..).filter(|rest| !rest.is_empty()) {
+            match self.reader.read(rest) {
+                Ok(0) => {
+                    return Err(FileError::Truncated {
+                        position: self.position,
+                        part: part.to_owned(),
+                    });
+                }
+                Ok(bytes) => {
+                    filled += bytes;
+                    self.position += bytes as u64;
+                }
+                Err(error) if error.kind() == io::ErrorKind::Interrupted => {}
+                Err(source) => {
+                    return Err(FileError::Io {
+                        position: self.position,
+                        source,
+                    });
+                }
+            }
+        }
+        Ok(())
+    }
+
+    /// Bytes of which the last four are the checksum of those before; hands out those.
+    fn summed<const N: usize>(&mut self, begin: &[u8], part: &str) -> Result<Vec<u8>, FileError> {
+        let start = self.position - begin.len() as u64;
+        let mut bytes = vec![0; N - begin.len() - 4];
+        self.fill(&mut bytes, part)?;
+        let mut crc = crc32fast::Hasher::new();
+        crc.update(begin);
+        crc.update(&bytes);
+        self.crc.combine(&crc);
+        let end = self.position;
+        let saved = self.crc_value(part)?;
+        verify(start..end, part, saved, crc.finalize())?;
+        self.crc.update(&saved.to_le_bytes());
+        Ok(bytes)
+    }
+
+    fn crc_value(&mut self, part: &str) -> Result<u32, FileError> {
+        let mut saved = [0; 4];
+        self.fill(&mut saved, part)?;
+        Ok(u32::from_le_bytes(saved))
+    }
+
+    fn head(&mut self) -> Result<Head, FileError> {
+        let mut magic = [0; 8];
+        self.fill(&mut magic, "head")?;
+        if magic == *OLD_MAGIC {
+            return Err(FileError::OldVersion);
+        }
+        if magic != *MAGIC {
+            return Err(FileError::Magic { found: magic });
+        }
+        Head::from_bytes(&self.summed::<HEAD_BYTES>(&magic, "head")?)
+    }
+
+    fn section_head(&mut self) -> Result<SectionHead, FileError> {
+        let start = self.position;
+        let mut tag = [0; 4];
+        self.fill(&mut tag, "head of a section")?;
+        if tag != *SECTION_TAG {
+            return Err(corrupt(start, "a section should begin here".to_owned()));
+        }
+        let bytes = self.summed::<SECTION_HEAD_BYTES>(&tag, "head of a section")?;
+        SectionHead::from_bytes(&bytes, start)
+    }
+
+    /// Reads a section of a known column into `contents`.
+    fn column(
+        &mut self,
+        column: &Column,
+        section: &SectionHead,
+        voxels: u64,
+        contents: &mut MapContents,
+    ) -> Result<(), FileError> {
+        let head_at = self.position - SECTION_HEAD_BYTES as u64;
+        let wrong = |reason: String| corrupt(head_at, format!("section {}: {reason}", column.name));
+        if (section.encoding, section.components) != (column.encoding as u8, column.components) {
+            return Err(wrong(format!(
+                "encoding {} of {} components is not known",
+                section.encoding, section.components
+            )));
+        }
+        let values = voxels.saturating_mul(u64::from(column.components));
+        let longest = values.saturating_mul(column.longest);
+        if !(values..=longest).contains(&section.raw_bytes) {
+            return Err(wrong(format!(
+                "{values} values do not take {} bytes",
+                section.raw_bytes
+            )));
+        }
+        let (raw, stored) = (section.raw_bytes, section.stored_bytes);
+        let plausible = match section.codec {
+            codec if codec == Codec::Raw as u8 => stored == raw,
+            codec if codec == Codec::Zstd as u8 => {
+                stored < raw && raw <= stored.saturating_mul(MAX_EXPANSION)
+            }
+            codec => return Err(wrong(format!("codec {codec} is not known"))),
+        };
+        if !plausible {
+            return Err(wrong(format!(
+                "{raw} bytes are not stored in {stored} by codec {}",
+                section.codec
+            )));
+        }
+        let start = self.position;
+        let mut bytes = self.stored(section)?;
+        let packed = section.codec == Codec::Zstd as u8;
+        if packed {
+            bytes = decompress(&bytes, raw)
+                .map_err(|reason| corrupt(start, format!("section {}: {reason}", column.name)))?;
+        }
+        let done = match *column {
+            KEYS => contents.set_keys(&bytes, voxels),
+            COUNT => contents.set_counts(&bytes),
+            _ => contents.set_sums(&bytes),
+        };
+        done.map_err(|Fault { offset, reason }| {
+            let (place, unpacked) = if packed {
+                (start, format!(", unpacked byte {offset}"))
+            } else {
+                (start + offset as u64, String::new())
+            };
+            corrupt(
+                place,
+                format!("section {}{unpacked}: {reason}", column.name),
+            )
+        })
+    }
+
+    /// The stored bytes of a section, checked.
+    fn stored(&mut self, section: &SectionHead) -> Result<Vec<u8>, FileError> {
+        let (start, part) = (self.position, format!("section {}", section.name));
+        let mut bytes = Vec::new();
+        let mut wanted = section.stored_bytes;
+        while wanted > 0 {
+            // Doubling: never more than twice of what has come, whatever the head promises.
+            let step = wanted.min((bytes.len() as u64).max(FIRST_BYTES));
+            let before = bytes.len();
+            let length = usize::try_from(step).unwrap_or(usize::MAX);
+            bytes.resize(before.saturating_add(length), 0);
+            self.fill(bytes.get_mut(before..).unwrap_or_default(), &part)?;
+            wanted -= step;
+        }
+        let mut crc = crc32fast::Hasher::new();
+        crc.update(&bytes);
+        self.crc.combine(&crc);
+        verify(start..self.position, &part, section.crc, crc.finalize())?;
+        Ok(bytes)
+    }
+
+    /// Passes over a section, in constant memory.
+    fn skip(&mut self, section: &SectionHead) -> Result<(), FileError> {
+        let (start, part) = (self.position, format!("section {}", section.name));
+        let mut crc = crc32fast::Hasher::new();
+        let mut buffer = vec![0; section.stored_bytes.min(FIRST_BYTES) as usize];
+        let mut wanted = section.stored_bytes;
+        while wanted > 0 {
+            let step = wanted.min(FIRST_BYTES);
+            let bytes = buffer.get_mut(..step as usize).unwrap_or_default();
+            self.fill(bytes, &part)?;
+            crc.update(bytes);
+            wanted -= step;
+        }
+        self.crc.combine(&crc);
+        verify(start..self.position, &part, section.crc, crc.finalize())
+    }
+
+    /// Reads and checks the end marker, its checksum and the end.
+    fn finish(&mut self) -> Result<(), FileError> {
+        let start = self.position;
+        let mut tag = [0; 4];
+        self.fill(&mut tag, "end marker")?;
+        if tag != *END_TAG {
+            return Err(corrupt(start, "the end marker should be here".to_owned()));
+        }
+        self.crc.update(&tag);
+        let end = self.position;
+        let saved = self.crc_value("end marker")?;
+        verify(0..end, "whole file", saved, self.crc.clone().finalize())?;
+        let position = self.position;
+        match self.fill(&mut [0], "end marker") {
+            Err(FileError::Truncated { .. }) => Ok(()),
+            Err(error) => Err(error),
+            Ok(()) => Err(FileError::TrailingBytes { position }),
+        }
+    }
+}
+
+impl MapContents {
+    /// The keys, which are the first column.
+    fn set_keys(&mut self, bytes: &[u8], voxels: u64) -> Result<(), Fault> {
+        let max = usize::try_from(voxels).unwrap_or(usize::MAX);
+        self.keys = decode_keys(bytes, max)?;
+        if self.keys.len() != max {
+            let reason = format!("it has {} keys instead of {voxels}", self.keys.len());
+            let offset = bytes.len();
+            return Err(Fault { offset, reason });
+        }
+        Ok(())
+    }
+}
+
+fn verify(
+    range: std::ops::Range<u64>,
+    part: &str,
+    saved: u32,
+    calculated: u32,
+) -> Result<(), FileError> {
+    if saved == calculated {
+        return Ok(());
+    }
+    Err(FileError::Checksum {
+        start: range.start,
+        end: range.end,
+        part: part.to_owned(),
+        saved,
+        calculated,
+    })
+}
+
+/// One zstd frame of exactly `raw_bytes`.
+fn decompress(stored: &[u8], raw_bytes: u64) -> Result<Vec<u8>, String> {
+    let unpack = || -> io::Result<(Vec<u8>, usize)> {
+        let mut decoder = zstd::stream::read::Decoder::with_buffer(stored)?.single_frame();
+        decoder.window_log_max(MAX_WINDOW_LOG)?;
+        let mut raw = Vec::new();
+        decoder
+            .by_ref()
+            .take(raw_bytes.saturating_add(1))
+            .read_to_end(&mut raw)?;
+        Ok((raw, decoder.finish().len()))
+    };
+    let (raw, left) = unpack().map_err(|error| format!("zstd: {error}"))?;
+    if raw.len() as u64 != raw_bytes || left > 0 {
+        return Err(format!(
+            "it does not unpack to {raw_bytes} bytes and nothing else"
+        ));
+    }
+    Ok(raw)
+}
