@@ -1,0 +1,109 @@
+//! Map files that commands write.
+
+use std::error::Error;
+use std::fs::{self, File};
+use std::io::{BufWriter, Write};
+use std::path::Path;
+
+use clap::Args;
+use lattice_core::voxels::file::{MapContents, WriteOptions};
+use serde::Serialize;
+
+/// The form of a map file.
+#[derive(Args)]
+pub struct Form {
+    /// Pack by zstd, at a level from 1 to 19 (--zstd=LEVEL)
+    #[arg(
+        long, value_name = "LEVEL", num_args = 0..=1, require_equals = true,
+        default_missing_value = "3", value_parser = clap::value_parser!(i32).range(1..=19),
+    )]
+    zstd: Option<i32>,
+    /// Leave out the counts and mean offsets of the voxels
+    #[arg(long)]
+    pub occupancy_only: bool,
+}
+
+/// What was written.
+#[derive(Serialize)]
+pub struct Written {
+    voxels: usize,
+    points: u64,
+    file_bytes: u64,
+    bytes_per_voxel: f64,
+}
+
+impl Form {
+    /// Writes a map; readers see the whole file or what was there before.
+    pub fn write(
+        &self,
+        map: &MapContents,
+        out: &Path,
+    ) -> Result<Written, Box<dyn Error + Send + Sync>> {
+        let options = WriteOptions {
+            zstd_level: self.zstd,
+            occupancy_only: self.occupancy_only,
+        };
+        let here = |e: &dyn std::fmt::Display| format!("{}: {e}", out.display());
+        // A pipe or device is no file that another could take the place of.
+        let whole = fs::metadata(out).map_or(true, |at| at.is_file());
+        let mut partial = out.as_os_str().to_owned();
+        partial.push(".partial");
+        let path = if whole { Path::new(&partial) } else { out };
+        let write = || -> Result<u64, Box<dyn Error + Send + Sync>> {
+            let mut file = Counted {
+                writer: BufWriter::new(File::create(path)?),
+                bytes: 0,
+            };
+            map.write(&mut file, &options)?;
+            if whole {
+                fs::rename(path, out)?;
+            }
+            Ok(file.bytes)
+        };
+        let file_bytes = write().map_err(|e| {
+            if whole {
+                let _ = fs::remove_file(path);
+            }
+            here(&e)
+        })?;
+        let voxels = map.keys().len();
+        Ok(Written {
+            voxels,
+            points: map.distortion().points,
+            file_bytes,
+            bytes_per_voxel: file_bytes as f64 / voxels.max(1) as f64,
+        })
+    }
+}
+
+impl Written {
+    /// Shows what was written, as JSON if so wanted.
+    pub fn print(&self, json: bool) -> Result<(), serde_json::Error> {
+        if json {
+            println!("{}", serde_json::to_string_pretty(self)?);
+        } else {
+            println!(
+                "{} voxels, {} bytes, {:.2} a voxel",
+                self.voxels, self.file_bytes, self.bytes_per_voxel
+            );
+        }
+        Ok(())
+    }
+}
+
+struct Counted<W> {
+    writer: W,
+    bytes: u64,
+}
+
+impl<W: Write> Write for Counted<W> {
+    fn write(&mut self, bytes: &[u8]) -> std::io::Result<usize> {
+        let written = self.writer.write(bytes)?;
+        self.bytes += written as u64;
+        Ok(written)
+    }
+
+    fn flush(&mut self) -> std::io::Result<()> {
+        self.writer.flush()
+    }
+}
