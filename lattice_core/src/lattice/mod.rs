@@ -20,7 +20,7 @@ use thiserror::Error;
 
 use closed_form::{ClosedForm, Quantizer, with_form};
 
-pub use batch::{BatchQuantizer, BatchSums, Simd};
+pub use batch::{BatchBlock, BatchQuantizer, BatchSums, Simd};
 pub(crate) use closed_form::nearest_integer;
 pub use code::CellCode;
 pub use key::Key;

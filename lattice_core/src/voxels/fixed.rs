@@ -2,7 +2,7 @@
 
 use super::shard::Point;
 use super::{OFFSET_UNIT_M, Voxel};
-use crate::lattice::{BatchQuantizer, CellCode, Lattice, nearest_integer};
+use crate::lattice::{BatchBlock, BatchQuantizer, CellCode, Lattice, nearest_integer};
 
 const PER_METRE: f64 = 1.0 / OFFSET_UNIT_M;
 
@@ -12,18 +12,68 @@ pub(super) fn fixed(metres: [f64; 3]) -> [i64; 3] {
     metres.map(|m| nearest_integer(m * PER_METRE))
 }
 
-/// The points at `base_m + offset` in fixed point.
-#[inline]
-pub(super) fn fixed_points(
-    base_m: [f64; 3],
-    offsets_m: &[[f32; 3]],
-    out: &mut [Point; BatchQuantizer::BLOCK],
-) {
-    for (point, offset) in out.iter_mut().zip(offsets_m) {
-        let [x, y, z] = [0, 1, 2].map(|i| base_m[i] + f64::from(offset[i]));
-        let [x, y, z] = fixed([x, y, z]);
-        *point = [x, y, z, 1];
+/// The points of a block in fixed point from the datum.
+///
+/// The base is rounded, then the offset, so that neither the other points of a cloud nor the way it
+/// is cut into blocks matters.
+#[derive(Clone, Copy)]
+pub(super) struct FixedBlock<'a> {
+    base: [i64; 3],
+    offsets_m: &'a [[f32; 3]],
+    near: Option<&'a [[i32; BatchQuantizer::BLOCK]; 3]>,
+}
+
+impl FixedBlock<'_> {
+    /// Points at `base_m + offset`.
+    pub(super) fn new<'a>(
+        base_m: [f64; 3],
+        offsets_m: &'a [[f32; 3]],
+        block: &BatchBlock<'a>,
+    ) -> FixedBlock<'a> {
+        FixedBlock {
+            base: fixed(base_m),
+            offsets_m,
+            near: (!block.sums.far).then_some(block.fixed),
+        }
     }
+
+    /// The coordinates from the base, unless some point is far.
+    #[inline(always)]
+    pub(super) fn near(&self) -> Option<(&[[i32; BatchQuantizer::BLOCK]; 3], [i64; 3])> {
+        Some((self.near?, self.base))
+    }
+
+    /// Point number `i`.
+    #[inline(always)]
+    pub(super) fn point(&self, i: usize) -> Point {
+        match self.near {
+            Some(near) => near_point(near, self.base, i),
+            None => from_base(self.base, self.far(i)),
+        }
+    }
+
+    #[cold]
+    fn far(&self, i: usize) -> [i64; 3] {
+        let offset = self.offsets_m.get(i).copied().unwrap_or_default();
+        fixed(offset.map(f64::from))
+    }
+}
+
+/// Point number `i` of those whose coordinates from the base fit 32 bits.
+#[inline(always)]
+pub(super) fn near_point(
+    [x, y, z]: &[[i32; BatchQuantizer::BLOCK]; 3],
+    base: [i64; 3],
+    i: usize,
+) -> Point {
+    let i = i % BatchQuantizer::BLOCK;
+    from_base(base, [x[i], y[i], z[i]].map(i64::from))
+}
+
+#[inline(always)]
+fn from_base(base: [i64; 3], offset: [i64; 3]) -> Point {
+    let sum = |axis: usize| base[axis].wrapping_add(offset[axis]);
+    [sum(0), sum(1), sum(2), 1]
 }
 
 /// The centre of a cell in fixed point, from the datum.

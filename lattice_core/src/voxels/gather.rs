@@ -36,31 +36,36 @@ impl Gather {
         }
     }
 
-    /// Adds points in order; a cell that has to make room for another goes to `out`.
-    #[inline]
-    pub(super) fn add(&mut self, codes: &[CellCode], points: &[Point], out: &mut Vec<Partial>) {
+    /// Adds points in order, each as its number's `point`; a cell that has to make room for another
+    /// goes to `out`.
+    #[inline(always)]
+    pub(super) fn add(
+        &mut self,
+        codes: &[CellCode],
+        point: impl Fn(usize) -> Point,
+        out: &mut Vec<Partial>,
+    ) {
         let Some(slots) = self.slots.first_chunk_mut::<SLOTS>() else {
             return;
         };
-        for (&code, point) in codes.iter().zip(points) {
-            let number =
-                (code.raw().wrapping_mul(0x9e37_79b9_7f4a_7c15) >> (64 - SLOTS_LOG2)) as usize;
+        for (i, &code) in codes.iter().enumerate() {
+            let hash = code.raw().wrapping_mul(0x9e37_79b9_7f4a_7c15);
+            let number = (hash >> (64 - SLOTS_LOG2)) as usize;
             let slot = &mut slots[number];
-            if slot.code == code {
-                for (sum, term) in slot.points.iter_mut().zip(point) {
-                    *sum = sum.wrapping_add(*term);
+            if slot.code != code {
+                if slot.code == CellCode::NONE {
+                    self.used.push(number as u16);
+                } else {
+                    out.push(*slot);
                 }
-                continue;
+                *slot = Partial {
+                    code,
+                    points: [0; 4],
+                };
             }
-            if slot.code == CellCode::NONE {
-                self.used.push(number as u16);
-            } else {
-                out.push(*slot);
+            for (sum, term) in slot.points.iter_mut().zip(point(i)) {
+                *sum = sum.wrapping_add(term);
             }
-            *slot = Partial {
-                code,
-                points: *point,
-            };
         }
     }
 

@@ -6,11 +6,11 @@ use rayon::prelude::*;
 use super::VoxelList;
 use super::columns::{Details, LabelCount, Stamps};
 use super::distortion::DistortionSums;
-use super::fixed::{fixed_points, moment_unit_m, moments_of, voxel_of};
+use super::fixed::{FixedBlock, moment_unit_m, moments_of, near_point, voxel_of};
 use super::gather::{Gather, Partial};
 use super::shard::{Point, SHARDS, Shard, shard_of};
 use crate::cloud::Cloud;
-use crate::lattice::{BatchQuantizer, BatchSums, CellCode, Lattice};
+use crate::lattice::{BatchBlock, BatchQuantizer, BatchSums, CellCode, Lattice};
 
 /// Points that one task gathers.
 const CHUNK: usize = 1 << 14;
@@ -168,10 +168,11 @@ impl VoxelList {
     ) {
         let mut room = self.max_voxels.saturating_sub(self.len());
         let mut place = 0;
-        for_fixed_blocks(quantizer, offsets_m, |offsets_m, codes, points, sums| {
+        for_fixed_blocks(quantizer, offsets_m, |offsets_m, block, points| {
+            let (codes, sums) = (block.codes, block.sums);
             report.count_rejects(quantizer, offsets_m, codes, sums);
             let mut refused = false;
-            for (i, (&code, point)) in codes.iter().zip(points).enumerate() {
+            for (i, &code) in codes.iter().enumerate() {
                 let shard = self.shards.get_mut(shard_of(code));
                 let Some(shard) = shard.filter(|_| code != CellCode::NONE) else {
                     continue;
@@ -184,6 +185,7 @@ impl VoxelList {
                     continue;
                 };
                 room -= shard.len() - known;
+                let point = &points.point(i);
                 shard.add(number, point, now);
                 if !self.payload.is_plain() {
                     let details = details(&self.lattice, code, point, origin, place + i);
@@ -271,23 +273,20 @@ impl VoxelList {
     }
 }
 
-/// Visits up to a block of points at a time: offsets, cells, fixed-point positions, errors.
-#[inline]
+/// Visits up to a block of points at a time: offsets, cells and errors, fixed-point positions.
+#[inline(always)]
 fn for_fixed_blocks(
     quantizer: &BatchQuantizer,
     offsets_m: &[[f32; 3]],
-    mut visit: impl FnMut(&[[f32; 3]], &[CellCode], &[Point], &BatchSums),
+    mut visit: impl FnMut(&[[f32; 3]], &BatchBlock, &FixedBlock),
 ) {
     let base_m = quantizer.translation_m();
-    let mut points = [[0; 4]; BatchQuantizer::BLOCK];
     let mut place = 0;
-    quantizer.for_blocks_with_sums(offsets_m, |codes, sums| {
-        let here = offsets_m
-            .get(place..place + codes.len())
-            .unwrap_or_default();
-        place += codes.len();
-        fixed_points(base_m, here, &mut points);
-        visit(here, codes, &points, sums);
+    quantizer.for_blocks_with_sums(offsets_m, |block| {
+        let end = place + block.codes.len();
+        let here = offsets_m.get(place..end).unwrap_or_default();
+        place = end;
+        visit(here, block, &FixedBlock::new(base_m, here, block));
     });
 }
 
@@ -334,10 +333,19 @@ impl Chunk {
         offsets_m: &[[f32; 3]],
         mut take: impl FnMut(&mut Vec<Partial>),
     ) {
-        for_fixed_blocks(quantizer, offsets_m, |offsets_m, codes, points, sums| {
+        for_fixed_blocks(quantizer, offsets_m, |offsets_m, block, points| {
+            let (codes, sums) = (block.codes, block.sums);
             self.report.count_rejects(quantizer, offsets_m, codes, sums);
             self.sums.add_batch(sums);
-            self.gather.add(codes, points, &mut self.partials);
+            match points.near() {
+                Some((near, base)) => {
+                    let point = |i| near_point(near, base, i);
+                    self.gather.add(codes, point, &mut self.partials);
+                }
+                None => self
+                    .gather
+                    .add(codes, |i| points.point(i), &mut self.partials),
+            }
             if self.partials.len() >= BATCH {
                 self.partials
                     .retain(|partial| partial.code != CellCode::NONE);

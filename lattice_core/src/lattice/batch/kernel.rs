@@ -67,6 +67,14 @@ pub(super) fn to_int(v: f32) -> i32 {
     nearest(v).0
 }
 
+/// A coordinate below `FIXED_REACH_M` in 1/`FIXED_PER_METRE`, half to even: first what 12 bits
+/// less can hold, then the rest, which is exact.
+#[inline(always)]
+pub(crate) fn to_fixed(metres: f32) -> i32 {
+    let (high, rest) = nearest(metres * 256.0);
+    (high << 12).wrapping_add(to_int(rest * 4096.0))
+}
+
 #[inline(always)]
 pub(super) fn lane<F: Form, const DIAGONAL: bool>(c: &Constants, [x, y, z]: [f32; 3]) -> Lane {
     let [r0, r1, r2] = &c.rows;
@@ -124,12 +132,19 @@ pub(super) fn lane<F: Form, const DIAGONAL: bool>(c: &Constants, [x, y, z]: [f32
     }
 }
 
+/// Offsets in fixed point count in this fraction of a metre,
+pub(crate) const FIXED_PER_METRE: f32 = (1_u32 << 20) as f32;
+/// and reach to this, which 32 bits hold.
+pub(super) const FIXED_REACH_M: f32 = 2000.0;
+
 /// Codes and marks of a block of points.
 #[derive(Clone)]
 pub(super) struct Lanes {
     pub(super) codes: [CellCode; BLOCK],
     /// All ones if decided.
     pub(super) decided: [i32; BLOCK],
+    /// The points in 1/`FIXED_PER_METRE`, axis by axis; with statistics only.
+    pub(super) fixed: [[i32; BLOCK]; 3],
 }
 
 impl Default for Lanes {
@@ -137,6 +152,7 @@ impl Default for Lanes {
         Lanes {
             codes: [CellCode::NONE; BLOCK],
             decided: [0; BLOCK],
+            fixed: [[0; BLOCK]; 3],
         }
     }
 }
@@ -150,6 +166,7 @@ pub(super) struct LaneSums {
 }
 
 #[inline(always)]
+#[allow(clippy::needless_range_loop)] // Several arrays side by side.
 pub(super) fn block<F: Form, const DIAGONAL: bool, const STATISTICS: bool>(
     c: &Constants,
     points: &[[f32; 3]; BLOCK],
@@ -171,6 +188,13 @@ pub(super) fn block<F: Form, const DIAGONAL: bool, const STATISTICS: bool>(
             sums.distances = sums.distances.wrapping_add(lane.distance & lane.decided);
             sums.squares = sums.squares.wrapping_add(lane.square & lane.decided);
             sums.largest_square = sums.largest_square.max(lane.square & lane.decided);
+        }
+    }
+    if STATISTICS {
+        for (fixed, axis) in out.fixed.iter_mut().zip(&axes) {
+            for (fixed, offset) in fixed.iter_mut().zip(axis) {
+                *fixed = to_fixed(*offset);
+            }
         }
     }
     for i in 0..BLOCK {

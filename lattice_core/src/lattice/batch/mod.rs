@@ -51,6 +51,18 @@ pub struct BatchSums {
     pub squares: u64,
     /// The largest squared distance.
     pub largest_square: u64,
+    /// True if some point is too far from the origin of the points for 32-bit fixed point.
+    pub far: bool,
+}
+
+/// A block of points and what is known of them.
+pub struct BatchBlock<'a> {
+    /// The cell of each.
+    pub codes: &'a [CellCode],
+    /// Quantization error of those that have a cell.
+    pub sums: &'a BatchSums,
+    /// Coordinates of the points, axis by axis, in 2^-20 m, within one unit; void if `sums.far`.
+    pub fixed: &'a [[i32; BLOCK]; 3],
 }
 
 impl BatchSums {
@@ -60,6 +72,7 @@ impl BatchSums {
         self.distances += other.distances;
         self.squares += other.squares;
         self.largest_square = self.largest_square.max(other.largest_square);
+        self.far |= other.far;
     }
 }
 
@@ -112,17 +125,13 @@ impl BatchQuantizer {
     /// Visits the cells of up to [`BatchQuantizer::BLOCK`] points at a time, in order. Of the sums
     /// only the number of points with a cell is kept.
     #[inline]
-    pub fn for_blocks(&self, points: &[[f32; 3]], visit: impl FnMut(&[CellCode], &BatchSums)) {
-        self.blocks::<false>(points, visit);
+    pub fn for_blocks(&self, points: &[[f32; 3]], mut visit: impl FnMut(&[CellCode], &BatchSums)) {
+        self.blocks::<false>(points, |block| visit(block.codes, block.sums));
     }
 
     /// [`BatchQuantizer::for_blocks`] with the quantization error of the points that have a cell.
     #[inline]
-    pub fn for_blocks_with_sums(
-        &self,
-        points: &[[f32; 3]],
-        visit: impl FnMut(&[CellCode], &BatchSums),
-    ) {
+    pub fn for_blocks_with_sums(&self, points: &[[f32; 3]], visit: impl FnMut(&BatchBlock)) {
         self.blocks::<true>(points, visit);
     }
 
@@ -133,13 +142,20 @@ impl BatchQuantizer {
     fn blocks<const STATISTICS: bool>(
         &self,
         points: &[[f32; 3]],
-        mut visit: impl FnMut(&[CellCode], &BatchSums),
+        mut visit: impl FnMut(&BatchBlock),
     ) {
         let mut lanes = Lanes::default();
         let (blocks, rest) = points.as_chunks::<BLOCK>();
-        for block in blocks {
+        for (number, block) in blocks.iter().enumerate() {
+            if let Some(soon) = blocks.get(number + 2) {
+                simd::prefetch(soon);
+            }
             let sums = self.block::<STATISTICS>(block, BLOCK, &mut lanes);
-            visit(&lanes.codes, &sums);
+            visit(&BatchBlock {
+                codes: &lanes.codes,
+                sums: &sums,
+                fixed: &lanes.fixed,
+            });
         }
         if !rest.is_empty() {
             let mut block = [[f32::NAN; 3]; BLOCK];
@@ -148,7 +164,11 @@ impl BatchQuantizer {
                 .zip(rest)
                 .for_each(|(to, from)| *to = *from);
             let sums = self.block::<STATISTICS>(&block, rest.len(), &mut lanes);
-            visit(lanes.codes.get(..rest.len()).unwrap_or_default(), &sums);
+            visit(&BatchBlock {
+                codes: lanes.codes.get(..rest.len()).unwrap_or_default(),
+                sums: &sums,
+                fixed: &lanes.fixed,
+            });
         }
     }
 
@@ -175,6 +195,7 @@ impl BatchQuantizer {
             distances: sums.distances as u64,
             squares: sums.squares as u64,
             largest_square: sums.largest_square as u64,
+            far: false,
         };
         // One bit for each eight points that are not all decided.
         let groups = lanes.decided.as_chunks::<8>().0.iter();
@@ -207,6 +228,8 @@ impl BatchQuantizer {
             if decided != 0 {
                 continue;
             }
+            let near = |x: f32| x.abs() < kernel::FIXED_REACH_M;
+            sums.far |= !p.into_iter().all(near);
             let (exact, own) = self.exactly(p);
             *code = exact;
             if exact == CellCode::NONE {
@@ -234,6 +257,7 @@ impl BatchQuantizer {
             distances: kernel::to_int(square.sqrt() * STEPS) as u64,
             squares: square_steps,
             largest_square: square_steps,
+            far: false,
         };
         (code, sums)
     }
@@ -248,6 +272,7 @@ impl BatchQuantizer {
                     distances: lane.distance as u64,
                     squares: lane.square as u64,
                     largest_square: lane.square as u64,
+                    far: false,
                 };
             }
         }
@@ -286,7 +311,7 @@ impl Kernel {
             squared_sides: squares.map(|s| (s / (side_m * side_m)) as f32),
             error_per_metre: (1.01 * roundings * EPSILON * largest) as f32,
             error: (8.0 * EPSILON + 1e-14 * far) as f32,
-            reach_m: (KERNEL_REACH / largest) as f32,
+            reach_m: ((KERNEL_REACH / largest) as f32).min(kernel::FIXED_REACH_M),
         };
         Some(match lattice.kind() {
             LatticeKind::Cubic => Self::of::<Cubic>(constants, diagonal, simd),

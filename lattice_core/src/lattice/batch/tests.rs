@@ -54,7 +54,8 @@ proptest! {
             let single: Vec<_> = points.iter().map(|&p| single(&lattice, &batch.transform(p))).collect();
             prop_assert_eq!(&codes, &single);
             let (mut sums, mut one_by_one) = (BatchSums::default(), BatchSums::default());
-            batch.for_blocks_with_sums(&points, |_, block| sums.add(block));
+            batch.for_blocks_with_sums(&points, |block| sums.add(block.sums));
+            sums.far = false;
             for (&p, &code) in points.iter().zip(&codes) {
                 if code != CellCode::NONE {
                     one_by_one.add(&batch.sums_of(p));
