@@ -4,3 +4,4 @@ pub mod clouds;
 pub mod data;
 pub mod domain;
 pub mod python;
+pub mod random;

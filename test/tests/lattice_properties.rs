@@ -1,35 +1,9 @@
 //! The closed-form quantizers against exhaustive search and against lattice theory.
 
 use lattice_core::lattice::{Key, Lattice, LatticeIndex, LatticeKind};
+use lattice_test::random::Random;
 use nalgebra::Vector3;
 use proptest::prelude::*;
-
-/// A small reproducible generator (SplitMix64).
-struct Random(u64);
-
-impl Random {
-    fn next(&mut self) -> u64 {
-        self.0 = self.0.wrapping_add(0x9e37_79b9_7f4a_7c15);
-        let mut z = self.0;
-        z = (z ^ (z >> 30)).wrapping_mul(0xbf58_476d_1ce4_e5b9);
-        z = (z ^ (z >> 27)).wrapping_mul(0x94d0_49bb_1331_11eb);
-        z ^ (z >> 31)
-    }
-
-    /// In [0, 1).
-    fn unit(&mut self) -> f64 {
-        (self.next() >> 11) as f64 / (1_u64 << 53) as f64
-    }
-
-    /// In a cube around 0.
-    fn point(&mut self, half_side: f64) -> Vector3<f64> {
-        Vector3::from_fn(|_, _| (2.0 * self.unit() - 1.0) * half_side)
-    }
-
-    fn below(&mut self, n: usize) -> usize {
-        (self.next() % n as u64) as usize
-    }
-}
 
 /// The index that plain rounding of `G^-1 x` gives, eq. (1).
 struct Rounding {
@@ -155,8 +129,8 @@ fn each_quantizer_equals_exhaustive_search_on_a_million_points() {
         }
     }
     assert!(
-        ties > 2_250_000,
-        "only {ties} of 2 500 000 border points were on a border"
+        ties > 2_700_000,
+        "only {ties} of 3 000 000 border points were on a border"
     );
 }
 
@@ -236,6 +210,13 @@ fn distortion_is_that_of_the_theory() {
         (LatticeKind::Fcc, 0.0787451, 0.4694674, 0.4860403, 0.7937005),
         (LatticeKind::Mcc, 0.0786696, 0.4693437, 0.4858075, 0.7282377),
         (LatticeKind::Hex, 0.0834602, 0.4813262, 0.5003803, 0.7972334),
+        (
+            LatticeKind::HexOptimal,
+            0.0812227,
+            0.4753937,
+            0.4936275,
+            0.7959505,
+        ),
     ] {
         let lattice = Lattice::new(kind, 1.0).unwrap();
         let (mut distances, mut squares, mut largest) = (0.0, 0.0, 0.0_f64);
@@ -333,7 +314,7 @@ fn keys_are_the_same_bits_on_every_machine() {
         0x1396_45a3_ffee_b0b0,
         0xc8c0_36a3_9429_d185,
     ];
-    let hashes = LatticeKind::ALL.map(|kind| {
+    let hashes = LatticeKind::PAPER.map(|kind| {
         let lattice = Lattice::new(kind, 0.001).unwrap();
         let mut random = Random(3);
         let mut hash = 0xcbf2_9ce4_8422_2325_u64;

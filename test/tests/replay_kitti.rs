@@ -51,7 +51,8 @@ fn replayed(bag: &Path, source: Option<InsSource>, threads: usize) -> (RunReport
     let plan = replay::plan(&reader, &wishes).unwrap();
     let mut options = TransformerOptions::new(plan.source);
     options.ins.origin = Some(Geodetic::from_degrees(49.0, 8.4, 116.0).unwrap());
-    let maps = LatticeKind::ALL.map(|kind| MapperOptions::new(Lattice::new(kind, 0.125).unwrap()));
+    let maps =
+        LatticeKind::PAPER.map(|kind| MapperOptions::new(Lattice::new(kind, 0.125).unwrap()));
     let mut pipeline = Pipeline::new(options, maps, &MarkerOptions::default()).unwrap();
     let pool = rayon::ThreadPoolBuilder::new().num_threads(threads).build();
     let report = pool
@@ -120,7 +121,8 @@ fn the_sqlite3_log_is_the_first_three_scans() {
     // The same scans from the other container.
     let reader = BagReader::open(&mcap).unwrap();
     let plan = replay::plan(&reader, &TopicWishes::default()).unwrap();
-    let maps = LatticeKind::ALL.map(|kind| MapperOptions::new(Lattice::new(kind, 0.125).unwrap()));
+    let maps =
+        LatticeKind::PAPER.map(|kind| MapperOptions::new(Lattice::new(kind, 0.125).unwrap()));
     let options = TransformerOptions::new(plan.source);
     let mut first = Pipeline::new(options, maps, &MarkerOptions::default()).unwrap();
     let mut clouds = 0;

@@ -5,9 +5,12 @@
 //! comparisons and rounding half to even, so that every machine gives the same bits. On a cell
 //! border: half to even, the uncentred coset, the lowest axis.
 
+use std::sync::Arc;
+
 use nalgebra::Matrix3;
 
 use super::LatticeKind;
+use super::basis::Basis;
 
 /// Adding this leaves a double rounded half to even with the integer in its low bits.
 const ROUND: f64 = 1.5 * (1_u64 << 52) as f64;
@@ -17,9 +20,9 @@ const REACH: f64 = (1_u64 << 48) as f64;
 
 /// A coordinate split into its nearest integer and the rest, in [-1/2, 1/2].
 #[derive(Clone, Copy)]
-struct Split {
-    near: i64,
-    rest: f64,
+pub(super) struct Split {
+    pub(super) near: i64,
+    pub(super) rest: f64,
 }
 
 /// The nearest integer, half to even, for |u| < 2^51.
@@ -29,7 +32,7 @@ pub(crate) fn nearest_integer(u: f64) -> i64 {
 }
 
 #[inline(always)]
-fn split(u: f64) -> Split {
+pub(super) fn split(u: f64) -> Split {
     Split {
         near: nearest_integer(u),
         rest: u - ((u + ROUND) - ROUND),
@@ -46,7 +49,7 @@ impl Split {
 
 /// False for NaN and beyond `REACH`.
 #[inline(always)]
-fn within_reach(u: [f64; 3]) -> bool {
+pub(super) fn within_reach(u: [f64; 3]) -> bool {
     (u[0].abs() < REACH) & (u[1].abs() < REACH) & (u[2].abs() < REACH)
 }
 
@@ -163,34 +166,39 @@ impl ClosedForm for Hex {
     }
 }
 
-/// The form of a lattice.
-#[derive(Clone, Copy, Debug)]
+/// The form of a lattice; a basis of its own has a short search instead.
+#[derive(Clone, Debug)]
 pub(super) enum Quantizer {
     Cubic(Cubic),
     Bcc(Bcc),
     Fcc(Fcc),
     Mcc(Mcc),
     Hex(Hex),
+    Basis(Arc<Basis>),
 }
 
 /// Runs the same code for whichever form it is, with the choice made outside.
 macro_rules! with_form {
     ($quantizer:expr, $form:ident => $body:expr) => {
         match $quantizer {
-            Quantizer::Cubic($form) => $body,
-            Quantizer::Bcc($form) => $body,
-            Quantizer::Fcc($form) => $body,
-            Quantizer::Mcc($form) => $body,
-            Quantizer::Hex($form) => $body,
+            &Quantizer::Cubic($form) => $body,
+            &Quantizer::Bcc($form) => $body,
+            &Quantizer::Fcc($form) => $body,
+            &Quantizer::Mcc($form) => $body,
+            &Quantizer::Hex($form) => $body,
+            Quantizer::Basis(basis) => {
+                let $form = basis.as_ref();
+                $body
+            }
         }
     };
 }
 pub(super) use with_form;
 
 impl Quantizer {
-    /// The form for a generator in metres, oriented as the paper prints it.
-    pub(super) fn new(kind: LatticeKind, g: &Matrix3<f64>) -> Quantizer {
-        match kind {
+    /// The form for a generator in metres, oriented as the paper prints it; `None` for `Custom`.
+    pub(super) fn new(kind: LatticeKind, g: &Matrix3<f64>) -> Option<Quantizer> {
+        Some(match kind {
             LatticeKind::Cubic => Self::Cubic(Cubic {
                 per_metre: 1.0 / g.m11,
             }),
@@ -203,10 +211,11 @@ impl Quantizer {
             LatticeKind::Mcc => Self::Mcc(Mcc {
                 turn: cuboid_axes(g),
             }),
-            LatticeKind::Hex => Self::Hex(Hex {
+            LatticeKind::Hex | LatticeKind::HexOptimal => Self::Hex(Hex {
                 per_metre: [1.0 / g.m11, 0.5 / g.m22, 1.0 / g.m33],
             }),
-        }
+            LatticeKind::Custom => return None,
+        })
     }
 }
 

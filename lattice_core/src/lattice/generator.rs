@@ -9,9 +9,11 @@ use nalgebra::Matrix3;
 use super::LatticeKind;
 
 /// The generator of unit determinant, columns are the basis, axes as in Ryde & Brünig eq. (8)-(12).
+///
+/// The identity for `Custom`, which has none of its own.
 pub(super) fn unit_generator(kind: LatticeKind) -> Matrix3<f64> {
     match kind {
-        LatticeKind::Cubic => Matrix3::identity(),
+        LatticeKind::Cubic | LatticeKind::Custom => Matrix3::identity(),
         LatticeKind::Bcc => {
             let a = cube_root(2.0);
             let b = 0.5 * a;
@@ -31,10 +33,21 @@ pub(super) fn unit_generator(kind: LatticeKind) -> Matrix3<f64> {
         }
         LatticeKind::Hex => {
             let a = (2.0 / cube_root(3.0)).sqrt();
-            let (y, z) = (0.5 * 3.0_f64.sqrt() * a, a / 2.0_f64.sqrt());
-            Matrix3::new(a, -0.5 * a, 0.0, 0.0, y, 0.0, 0.0, 0.0, z)
+            prisms(a, a / 2.0_f64.sqrt())
+        }
+        LatticeKind::HexOptimal => {
+            // Mean squared error 5/18 A / sqrt(3) + h^2 / 12 is least, for A h = 1, at this height.
+            let root = 3.0_f64.sqrt();
+            let h = cube_root(5.0 / (3.0 * root));
+            prisms((2.0 / (root * h)).sqrt(), h)
         }
     }
+}
+
+/// Hexagonal prisms whose centres are `a` apart in the plane and `h` along z.
+fn prisms(a: f64, h: f64) -> Matrix3<f64> {
+    let y = 0.5 * 3.0_f64.sqrt() * a;
+    Matrix3::new(a, -0.5 * a, 0.0, 0.0, y, 0.0, 0.0, 0.0, h)
 }
 
 /// Cube root of a positive normal number, the same bits on every machine (libm's are not).
@@ -69,11 +82,24 @@ mod tests {
                 1.0987, -0.4551, -0.1885, 0.0, 1.0, -0.5858, 0.0, 0.0, 0.9102,
             ],
             LatticeKind::Hex => [1.1776, -0.5888, 0.0, 0.0, 1.0198, 0.0, 0.0, 0.0, 0.8327],
+            LatticeKind::HexOptimal | LatticeKind::Custom => panic!("not in the paper"),
         };
-        for kind in LatticeKind::ALL {
+        for kind in LatticeKind::PAPER {
             let error = unit_generator(kind) - Matrix3::from_row_slice(&printed(kind));
             assert!(error.amax() < 0.5001e-4, "{kind}: {error}");
         }
+    }
+
+    #[test]
+    fn the_best_prisms_have_the_known_sides() {
+        let g = unit_generator(LatticeKind::HexOptimal);
+        assert!((g.m11 - 1.0814837).abs() < 5e-8 && (g.m33 - 0.9872551).abs() < 5e-8);
+        // Mean squared error of a hexagon of side a / sqrt 3, and of a height.
+        let error = |a: f64, h: f64| (5.0 / 36.0 * a * a + h * h / 12.0) / 3.0;
+        let at = |h: f64| error((2.0 / (3.0_f64.sqrt() * h)).sqrt(), h);
+        let least = at(g.m33);
+        assert!((least - 0.0812227).abs() < 5e-8, "{least}");
+        assert!(at(0.999 * g.m33) > least && at(1.001 * g.m33) > least);
     }
 
     #[test]

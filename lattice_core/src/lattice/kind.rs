@@ -7,7 +7,7 @@ use serde::{Deserialize, Serialize};
 
 use super::LatticeError;
 
-/// The lattices of Ryde & Brünig 2011, section II-A.
+/// The lattices of Ryde & Brünig 2011, section II-A, the best prisms, and any other.
 #[derive(Clone, Copy, PartialEq, Eq, Hash, Debug, Serialize, Deserialize)]
 #[serde(rename_all = "lowercase")]
 pub enum LatticeKind {
@@ -21,11 +21,26 @@ pub enum LatticeKind {
     Mcc,
     /// Hexagonal prisms, eq. (12): flat cells, z up.
     Hex,
+    /// The hexagonal prisms of least mean squared error; a little taller than those of the paper.
+    #[serde(rename = "hexopt")]
+    HexOptimal,
+    /// The basis that [`super::Lattice::from_basis`] was given.
+    Custom,
 }
 
 impl LatticeKind {
-    /// Every lattice, in the order of the paper.
-    pub const ALL: [LatticeKind; 5] = [Self::Cubic, Self::Bcc, Self::Fcc, Self::Mcc, Self::Hex];
+    /// The lattices of the paper, in its order.
+    pub const PAPER: [LatticeKind; 5] = [Self::Cubic, Self::Bcc, Self::Fcc, Self::Mcc, Self::Hex];
+
+    /// Every lattice that has a name and a cell volume: those of the paper, then ours.
+    pub const ALL: [LatticeKind; 6] = [
+        Self::Cubic,
+        Self::Bcc,
+        Self::Fcc,
+        Self::Mcc,
+        Self::Hex,
+        Self::HexOptimal,
+    ];
 
     /// The name used in parameters, messages and files.
     pub fn name(self) -> &'static str {
@@ -35,6 +50,8 @@ impl LatticeKind {
             Self::Fcc => "fcc",
             Self::Mcc => "mcc",
             Self::Hex => "hex",
+            Self::HexOptimal => "hexopt",
+            Self::Custom => "custom",
         }
     }
 }
@@ -65,6 +82,16 @@ mod tests {
         for kind in LatticeKind::ALL {
             assert_eq!(kind.to_string().parse::<LatticeKind>(), Ok(kind));
         }
+    }
+
+    #[test]
+    fn those_of_the_paper_come_first() {
+        assert!(LatticeKind::ALL.starts_with(&LatticeKind::PAPER));
+    }
+
+    #[test]
+    fn a_custom_lattice_has_no_name_to_ask_for() {
+        assert!("custom".parse::<LatticeKind>().is_err());
     }
 
     #[test]

@@ -1,8 +1,10 @@
 //! Lattices: generators, exact quantizers, neighbours, Voronoi cells and keys.
 //!
 //! A lattice is all `G w` for integer `w`, with the generator matrix `G` of Ryde & Brünig 2011,
-//! eq. (8)-(12), scaled to a cell volume. [`Lattice::quantize`] finds the cell of a point.
+//! eq. (8)-(12), scaled to a cell volume, or any basis. [`Lattice::quantize`] finds the cell of a
+//! point. [`Lattice::oriented`] turns a lattice in the map.
 
+mod basis;
 mod batch;
 mod closed_form;
 mod code;
@@ -10,30 +12,38 @@ mod generator;
 mod key;
 mod kind;
 mod neighbors;
+mod orientation;
+mod shape;
 mod voronoi;
 
 use std::fmt;
 use std::sync::Arc;
 
-use nalgebra::{Matrix3, Vector3};
+use nalgebra::{Matrix3, UnitQuaternion, Vector3};
 use thiserror::Error;
 
+use basis::Basis;
 use closed_form::{ClosedForm, Quantizer, with_form};
+use shape::Shape;
 
 pub use batch::{BatchBlock, BatchQuantizer, BatchSums, Simd};
 pub(crate) use closed_form::nearest_integer;
 pub use code::CellCode;
 pub use key::Key;
 pub use kind::LatticeKind;
+pub use orientation::Orientation;
 pub use voronoi::{CellFace, VoronoiCell};
 
-/// A lattice point as integer coordinates `w` in the basis that the paper prints.
+/// A lattice point as integer coordinates `w` in the basis that the paper prints, or in the one given.
 pub type LatticeIndex = [i32; 3];
 
 /// Smallest cell volume, m^3: cells of 1 mm.
 pub const MIN_CELL_VOLUME_M3: f64 = 1e-9;
 /// Largest cell volume, m^3: cells of 1 km.
 pub const MAX_CELL_VOLUME_M3: f64 = 1e9;
+
+/// Largest covering radius of a custom lattice, in cube roots of the cell volume.
+pub const MAX_COVERING_SIDES: f64 = 2.0;
 
 /// Indices of [`Lattice::quantize`] are smaller than this.
 const INDEX_LIMIT: u64 = 1 << 20;
@@ -42,57 +52,127 @@ const INDEX_LIMIT: u64 = 1 << 20;
 #[derive(Clone, Debug, PartialEq, Error)]
 pub enum LatticeError {
     /// No lattice has this name.
-    #[error("unknown lattice {0:?}: use one of cubic, bcc, fcc, mcc, hex")]
+    #[error("unknown lattice {0:?}: use one of cubic, bcc, fcc, mcc, hex, hexopt")]
     UnknownName(String),
     /// The cell volume is not a number, or too small or large.
     #[error("cell volume {0} m^3 is not between {MIN_CELL_VOLUME_M3} and {MAX_CELL_VOLUME_M3} m^3")]
     CellVolume(f64),
+    /// `Custom` says nothing of the vectors.
+    #[error("a custom lattice is made from its basis, with Lattice::from_basis")]
+    NoBasis,
+    /// An entry of a basis is NaN or infinite.
+    #[error("a basis vector is not finite")]
+    NotFinite,
+    /// The basis vectors are too long for the lattice that they span, or too close to one plane.
+    #[error("the basis is too skewed: {0}")]
+    Skewed(String),
+    /// A point can be farther from its lattice point than [`MAX_COVERING_SIDES`] allows.
+    #[error(
+        "cells are too long or flat: points up to {covering_radius_m} m from their lattice point, \
+         allowed are {MAX_COVERING_SIDES} cell sides of {side_m} m"
+    )]
+    Elongated {
+        /// Covering radius, metres.
+        covering_radius_m: f64,
+        /// Cube root of the cell volume, metres.
+        side_m: f64,
+    },
+    /// No orientation has this name.
+    #[error("unknown orientation {0:?}: use paper, ground, or a crystal direction like 110-up")]
+    UnknownOrientation(String),
+    /// The lattice has no such crystal direction.
+    #[error("{1} has no direction for {0}: use paper or ground")]
+    NoCrystalAxes(Orientation, LatticeKind),
 }
 
-/// A lattice of one kind and cell volume. Cheap to clone.
+/// A lattice of one kind, cell volume and orientation. Cheap to clone.
 #[derive(Clone)]
 pub struct Lattice {
     quantizer: Quantizer,
+    /// In the axes of the map.
     generator: Matrix3<f64>,
+    /// Rows that take a point to the axes of the quantizer, if they are not those of the map.
+    lattice_from_map: Option<[[f64; 3]; 3]>,
     shape: Arc<Shape>,
-}
-
-struct Shape {
-    kind: LatticeKind,
-    cell_volume_m3: f64,
-    cell: VoronoiCell,
-    covering_radius_m: f64,
-    packing_radius_m: f64,
 }
 
 impl Lattice {
     /// The lattice with cells of `cell_volume_m3`, axes as the paper prints them.
     ///
-    /// Fails outside of [`MIN_CELL_VOLUME_M3`] to [`MAX_CELL_VOLUME_M3`].
+    /// Fails outside of [`MIN_CELL_VOLUME_M3`] to [`MAX_CELL_VOLUME_M3`], and for `Custom`.
     pub fn new(kind: LatticeKind, cell_volume_m3: f64) -> Result<Lattice, LatticeError> {
-        if !(MIN_CELL_VOLUME_M3..=MAX_CELL_VOLUME_M3).contains(&cell_volume_m3) {
-            return Err(LatticeError::CellVolume(cell_volume_m3));
-        }
+        check_volume(cell_volume_m3)?;
         let generator = generator::unit_generator(kind) * generator::cube_root(cell_volume_m3);
-        let cell = VoronoiCell::new(&generator, neighbors::faces(kind));
-        let covering_radius_m = cell.vertices.iter().map(|v| v.norm()).fold(0.0, f64::max);
-        let nearest = |w: &LatticeIndex| 0.5 * center(&generator, *w).norm();
-        let packing_radius_m = neighbors::faces(kind)
-            .iter()
-            .map(nearest)
-            .fold(f64::MAX, f64::min);
-        let shape = Shape {
-            kind,
-            cell_volume_m3,
-            cell,
-            covering_radius_m,
-            packing_radius_m,
-        };
-        Ok(Lattice {
-            quantizer: Quantizer::new(kind, &generator),
-            generator,
+        let quantizer = Quantizer::new(kind, &generator).ok_or(LatticeError::NoBasis)?;
+        let (faces, touching) = (neighbors::faces(kind), neighbors::touching(kind));
+        let shape = Shape::new(kind, cell_volume_m3, generator, faces, touching);
+        Ok(Self::unoriented(quantizer, shape))
+    }
+
+    /// The lattice of the basis vectors in the columns of `generator_m`, metres; indices refer to
+    /// them. Its kind is `Custom`.
+    ///
+    /// Fails if a number is not finite, if the volume is out of range as for [`Lattice::new`], if the
+    /// vectors are nearly in one plane or far longer than needed, or if the cells are too long or
+    /// flat ([`MAX_COVERING_SIDES`]).
+    pub fn from_basis(generator_m: Matrix3<f64>) -> Result<Lattice, LatticeError> {
+        if generator_m.iter().any(|entry| !entry.is_finite()) {
+            return Err(LatticeError::NotFinite);
+        }
+        let cell_volume_m3 = generator_m.determinant().abs();
+        check_volume(cell_volume_m3)?;
+        let basis = Basis::new(&generator_m)?;
+        let (faces, others) = basis.neighbors();
+        let touching = [faces.as_slice(), &others].concat();
+        let kind = LatticeKind::Custom;
+        let shape = Shape::new(kind, cell_volume_m3, generator_m, &faces, &touching);
+        let side_m = generator::cube_root(cell_volume_m3);
+        let covering_radius_m = shape.covering_radius_m;
+        if covering_radius_m > MAX_COVERING_SIDES * side_m {
+            return Err(LatticeError::Elongated {
+                covering_radius_m,
+                side_m,
+            });
+        }
+        Ok(Self::unoriented(Quantizer::Basis(Arc::new(basis)), shape))
+    }
+
+    fn unoriented(quantizer: Quantizer, shape: Shape) -> Lattice {
+        Lattice {
+            quantizer,
+            generator: shape.generator,
+            lattice_from_map: None,
             shape: Arc::new(shape),
-        })
+        }
+    }
+
+    /// The same lattice turned about 0, so that its own axes lie in the map as `map_from_lattice`
+    /// says; replaces an earlier orientation. Without a rotation, every bit is as before.
+    ///
+    /// With a rotation that is not finite, no point has a cell.
+    pub fn oriented(self, map_from_lattice: UnitQuaternion<f64>) -> Lattice {
+        let rotation = orientation::canonical(map_from_lattice);
+        if rotation == self.shape.map_from_lattice {
+            return self;
+        }
+        let shape = self.shape.oriented(rotation);
+        if rotation == UnitQuaternion::identity() {
+            return Self::unoriented(self.quantizer, shape);
+        }
+        let matrix = orientation::matrix(&rotation);
+        let column = |i| [matrix[(0, i)], matrix[(1, i)], matrix[(2, i)]];
+        Lattice {
+            quantizer: self.quantizer,
+            generator: matrix * shape.generator,
+            lattice_from_map: Some([column(0), column(1), column(2)]),
+            shape: Arc::new(shape),
+        }
+    }
+
+    /// The rotation from the lattice's own axes to those of the map; of the two quaternions the one
+    /// with a positive real part.
+    pub fn orientation(&self) -> UnitQuaternion<f64> {
+        self.shape.map_from_lattice
     }
 
     /// Which lattice it is.
@@ -110,9 +190,23 @@ impl Lattice {
         generator::cube_root(self.cell_volume_m3())
     }
 
-    /// The generator `G`: columns are the basis vectors, metres.
+    /// The generator in the axes of the map: columns are the basis vectors, metres.
     pub fn generator(&self) -> Matrix3<f64> {
         self.generator
+    }
+
+    /// The generator `G` in the lattice's own axes, as printed by the paper or given, metres.
+    pub fn unoriented_generator(&self) -> Matrix3<f64> {
+        self.shape.generator
+    }
+
+    #[inline(always)]
+    fn nearest(&self, p: [f64; 3]) -> Option<[i64; 3]> {
+        let p = match &self.lattice_from_map {
+            None => p,
+            Some(rows) => turn(rows, p),
+        };
+        with_form!(&self.quantizer, form => form.nearest(p))
     }
 
     /// The lattice point nearest to `p` (metres), exactly; eq. (2) in closed form.
@@ -121,7 +215,7 @@ impl Lattice {
     /// cells the answer is one of them, the same on every machine.
     #[inline]
     pub fn quantize(&self, p: &Vector3<f64>) -> Option<LatticeIndex> {
-        with_form!(self.quantizer, form => form.nearest([p.x, p.y, p.z]).and_then(narrow))
+        self.nearest([p.x, p.y, p.z]).and_then(narrow)
     }
 
     /// [`Lattice::quantize`] for many points (metres): `visit` gets each point and its answer.
@@ -131,7 +225,14 @@ impl Lattice {
         points_m: impl IntoIterator<Item = [f64; 3]>,
         mut visit: impl FnMut([f64; 3], Option<LatticeIndex>),
     ) {
-        with_form!(self.quantizer, form => {
+        if let Some(rows) = &self.lattice_from_map {
+            return with_form!(&self.quantizer, form => {
+                for p in points_m {
+                    visit(p, form.nearest(turn(rows, p)).and_then(narrow));
+                }
+            });
+        }
+        with_form!(&self.quantizer, form => {
             for p in points_m {
                 visit(p, form.nearest(p).and_then(narrow));
             }
@@ -140,7 +241,7 @@ impl Lattice {
 
     /// [`Lattice::quantize`] with 64-bit indices, up to some 2^48 cells from 0.
     pub fn quantize_wide(&self, p: &Vector3<f64>) -> Option<[i64; 3]> {
-        with_form!(self.quantizer, form => form.nearest([p.x, p.y, p.z]))
+        self.nearest([p.x, p.y, p.z])
     }
 
     /// The lattice point `G w`, metres.
@@ -155,16 +256,16 @@ impl Lattice {
     }
 
     /// Index differences to the cells that share a face.
-    pub fn face_neighbors(&self) -> &'static [LatticeIndex] {
-        neighbors::faces(self.kind())
+    pub fn face_neighbors(&self) -> &[LatticeIndex] {
+        self.shape.face_neighbors()
     }
 
     /// Index differences to the cells that share a face, an edge or a vertex; faces come first.
-    pub fn touching_neighbors(&self) -> &'static [LatticeIndex] {
-        neighbors::touching(self.kind())
+    pub fn touching_neighbors(&self) -> &[LatticeIndex] {
+        &self.shape.touching
     }
 
-    /// The Voronoi cell around the lattice point 0.
+    /// The Voronoi cell around the lattice point 0, in the axes of the map.
     pub fn cell(&self) -> &VoronoiCell {
         &self.shape.cell
     }
@@ -183,14 +284,35 @@ impl Lattice {
 /// Equal if every index means the same point, to the bit.
 impl PartialEq for Lattice {
     fn eq(&self, other: &Lattice) -> bool {
-        self.kind() == other.kind() && self.cell_volume_m3() == other.cell_volume_m3()
+        let (a, b) = (&self.shape, &other.shape);
+        a.kind == b.kind
+            && a.cell_volume_m3 == b.cell_volume_m3
+            && a.generator == b.generator
+            && a.map_from_lattice == b.map_from_lattice
     }
 }
 
 impl fmt::Debug for Lattice {
     fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
-        write!(f, "Lattice({}, {} m^3)", self.kind(), self.cell_volume_m3())
+        write!(f, "Lattice({}, {} m^3", self.kind(), self.cell_volume_m3())?;
+        if self.lattice_from_map.is_some() {
+            write!(f, ", turned by {:?}", self.orientation().coords)?;
+        }
+        f.write_str(")")
     }
+}
+
+fn check_volume(cell_volume_m3: f64) -> Result<(), LatticeError> {
+    if (MIN_CELL_VOLUME_M3..=MAX_CELL_VOLUME_M3).contains(&cell_volume_m3) {
+        Ok(())
+    } else {
+        Err(LatticeError::CellVolume(cell_volume_m3))
+    }
+}
+
+#[inline(always)]
+fn turn(rows: &[[f64; 3]; 3], p: [f64; 3]) -> [f64; 3] {
+    rows.map(|row| row[0] * p[0] + row[1] * p[1] + row[2] * p[2])
 }
 
 #[inline(always)]
@@ -204,13 +326,13 @@ fn center(g: &Matrix3<f64>, w: LatticeIndex) -> Vector3<f64> {
     combine(g, w.map(f64::from))
 }
 
-/// `G w` in a fixed order of operations. Every generator is upper triangular.
+/// `G w` in a fixed order of operations.
 #[inline(always)]
 fn combine(g: &Matrix3<f64>, w: [f64; 3]) -> Vector3<f64> {
     Vector3::new(
         g.m11 * w[0] + g.m12 * w[1] + g.m13 * w[2],
-        g.m22 * w[1] + g.m23 * w[2],
-        g.m33 * w[2],
+        g.m21 * w[0] + g.m22 * w[1] + g.m23 * w[2],
+        g.m31 * w[0] + g.m32 * w[1] + g.m33 * w[2],
     )
 }
 

@@ -82,25 +82,27 @@ static HEX: [LatticeIndex; 20] = pairs([
     [1, 1, -1],
 ]);
 
-/// Every cell that shares at least a vertex, face neighbours first.
+/// Every cell that shares at least a vertex, face neighbours first; none for `Custom`.
 pub(super) fn touching(kind: LatticeKind) -> &'static [LatticeIndex] {
     match kind {
         LatticeKind::Cubic => &CUBIC,
         LatticeKind::Bcc => &BCC,
         LatticeKind::Fcc => &FCC,
         LatticeKind::Mcc => &MCC,
-        LatticeKind::Hex => &HEX,
+        LatticeKind::Hex | LatticeKind::HexOptimal => &HEX,
+        LatticeKind::Custom => &[],
     }
 }
 
-/// The cells that share a face: the Voronoi-relevant vectors.
+/// The cells that share a face: the Voronoi-relevant vectors; none for `Custom`.
 pub(super) fn faces(kind: LatticeKind) -> &'static [LatticeIndex] {
     match kind {
         LatticeKind::Cubic => &CUBIC[..6],
         LatticeKind::Bcc => &BCC,
         LatticeKind::Fcc => &FCC[..12],
         LatticeKind::Mcc => &MCC,
-        LatticeKind::Hex => &HEX[..8],
+        LatticeKind::Hex | LatticeKind::HexOptimal => &HEX[..8],
+        LatticeKind::Custom => &[],
     }
 }
 
@@ -145,6 +147,7 @@ mod tests {
             (LatticeKind::Fcc, 12, 18),
             (LatticeKind::Mcc, 14, 14),
             (LatticeKind::Hex, 8, 20),
+            (LatticeKind::HexOptimal, 8, 20),
         ] {
             let classes = shortest_of_each_class(kind);
             let relevant: BTreeSet<_> = classes

@@ -5,7 +5,7 @@ use proptest::prelude::*;
 use super::*;
 
 fn any_lattice() -> impl Strategy<Value = Lattice> {
-    (0..5_usize, -9.0..9.0_f64)
+    (0..LatticeKind::ALL.len(), -9.0..9.0_f64)
         .prop_map(|(i, e)| Lattice::new(LatticeKind::ALL[i], 10_f64.powf(e)).unwrap())
 }
 
@@ -15,6 +15,105 @@ fn every_generator_is_upper_triangular() {
         let g = Lattice::new(kind, 1.0).unwrap().generator();
         assert_eq!((g.m21, g.m31, g.m32), (0.0, 0.0, 0.0), "{kind}");
     }
+}
+
+#[test]
+fn without_a_rotation_every_bit_is_that_of_the_triangular_product() {
+    for kind in LatticeKind::ALL {
+        let lattice = Lattice::new(kind, 0.3).unwrap();
+        let turned = lattice
+            .clone()
+            .oriented(UnitQuaternion::from_euler_angles(1.0, 2.0, 3.0));
+        assert_ne!(turned, lattice);
+        let back = turned.oriented(UnitQuaternion::identity());
+        assert_eq!(back, lattice);
+        assert_eq!(
+            (back.generator(), back.cell()),
+            (lattice.generator(), lattice.cell())
+        );
+        let g = lattice.generator();
+        for code in 0..729 {
+            let w = [code % 9 - 4, code / 9 % 9 - 4, code / 81 - 4].map(|i| i * 12_345);
+            let [x, y, z] = w.map(f64::from);
+            let product = Vector3::new(
+                g.m11 * x + g.m12 * y + g.m13 * z,
+                g.m22 * y + g.m23 * z,
+                g.m33 * z,
+            );
+            assert_eq!(lattice.center(w), product);
+            assert_eq!(back.center(w), product);
+        }
+    }
+}
+
+#[test]
+fn a_turned_lattice_is_the_lattice_seen_from_elsewhere() {
+    let rotation = UnitQuaternion::from_euler_angles(0.4, -0.9, 2.2);
+    let opposite = UnitQuaternion::new_unchecked(-rotation.into_inner());
+    for kind in LatticeKind::ALL {
+        let own = Lattice::new(kind, 0.125).unwrap();
+        let turned = own.clone().oriented(rotation);
+        assert_eq!(turned, own.clone().oriented(opposite));
+        assert_eq!(turned, turned.clone().oriented(turned.orientation()));
+        assert_eq!(turned.unoriented_generator(), own.generator());
+        assert!(
+            (turned.generator() - rotation.to_rotation_matrix() * own.generator()).amax() < 1e-15
+        );
+        assert!((turned.cell().volume_m3() - 0.125).abs() < 1e-12);
+        for (face, w) in turned.cell().faces.iter().zip(turned.face_neighbors()) {
+            let normal = turned.center(*w);
+            assert_eq!(face.neighbor, *w);
+            for p in turned.cell().polygon(face) {
+                assert!((normal.dot(&p) / normal.norm_squared() - 0.5).abs() < 1e-12);
+            }
+        }
+        let mut points = Vec::new();
+        for code in 0..1000 {
+            let p = Vector3::new(code % 10, code / 10 % 10, code / 100).cast::<f64>() * 0.137;
+            // Away from the borders.
+            let p = p + Vector3::new(0.011, 0.023, 0.037);
+            assert_eq!(
+                turned.quantize(&(rotation * p)),
+                own.quantize(&p),
+                "{kind} {p}"
+            );
+            points.push((rotation * p).into());
+        }
+        turned.quantize_each(points, |p, w| assert_eq!(w, turned.quantize(&p.into())));
+    }
+}
+
+#[test]
+fn rotations_that_are_none_give_no_cell() {
+    for bad in [f64::NAN, f64::INFINITY, 0.0] {
+        let rotation = UnitQuaternion::new_unchecked(nalgebra::Quaternion::new(bad, bad, 0.0, 0.0));
+        let lattice = Lattice::new(LatticeKind::Fcc, 1.0)
+            .unwrap()
+            .oriented(rotation);
+        assert_eq!(lattice.quantize(&Vector3::new(1.0, 2.0, 3.0)), None);
+    }
+}
+
+#[test]
+fn bases_that_span_no_sensible_cells_are_refused() {
+    let refused = |entries: [f64; 9]| {
+        let basis = nalgebra::Matrix3::from_column_slice(&entries);
+        Lattice::from_basis(basis).unwrap_err().to_string()
+    };
+    let flat = refused([1.0, 0.0, 0.0, 0.0, 1.0, 0.0, 1.0, 1.0, 0.0]);
+    assert!(flat.contains("cell volume 0 m^3"), "{flat}");
+    let nearly = refused([1e5, 0.0, 0.0, 1e5, 1.0, 0.0, 1e5, 0.0, 1e-4]);
+    assert!(nearly.contains("one plane"), "{nearly}");
+    let skewed = refused([1.0, 0.0, 0.0, 0.0, 1.0, 0.0, 5000.3, 0.2, 1.0]);
+    assert!(skewed.contains("beyond 1000"), "{skewed}");
+    let long = refused([1.0, 0.0, 0.0, 0.0, 1.0, 0.0, 0.0, 0.0, 20.0]);
+    assert!(long.contains("too long or flat"), "{long}");
+    for bad in [f64::NAN, f64::INFINITY] {
+        let error = refused([1.0, 0.0, 0.0, 0.0, bad, 0.0, 0.0, 0.0, 1.0]);
+        assert!(error.contains("not finite"), "{error}");
+    }
+    let error = Lattice::new(LatticeKind::Custom, 1.0).unwrap_err();
+    assert!(error.to_string().contains("from_basis"), "{error}");
 }
 
 #[test]

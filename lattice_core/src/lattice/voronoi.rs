@@ -7,7 +7,7 @@ use super::LatticeIndex;
 /// How far beyond a face a vertex may lie, relative to the squared length of the neighbour.
 const SLACK: f64 = 1e-9;
 
-/// The cell around the lattice point 0: all points nearest to it. Metres, axes of the lattice.
+/// The cell around the lattice point 0: all points nearest to it. Metres, axes of the map.
 #[derive(Clone, Debug, PartialEq)]
 pub struct VoronoiCell {
     /// Corners, each once.
@@ -177,7 +177,8 @@ mod tests {
                 LatticeKind::Cubic => (8, vec![(4, 6)]),
                 LatticeKind::Bcc | LatticeKind::Mcc => (24, vec![(4, 6), (6, 8)]),
                 LatticeKind::Fcc => (14, vec![(4, 12)]),
-                LatticeKind::Hex => (12, vec![(4, 6), (6, 2)]),
+                LatticeKind::Hex | LatticeKind::HexOptimal => (12, vec![(4, 6), (6, 2)]),
+                LatticeKind::Custom => panic!("has no known solid"),
             };
             assert_eq!(
                 (cell.vertices.len(), sizes),
@@ -234,6 +235,7 @@ mod tests {
             (LatticeKind::Fcc, 0.7937005, 0.5612310),
             (LatticeKind::Mcc, 0.7282377, 0.5493421),
             (LatticeKind::Hex, 0.7972334, 0.4163416),
+            (LatticeKind::HexOptimal, 0.7959505, 0.4936275),
         ] {
             let lattice = Lattice::new(kind, 8.0).unwrap();
             assert!(

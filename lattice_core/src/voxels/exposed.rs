@@ -53,7 +53,8 @@ mod tests {
     #[test]
     fn a_lone_cell_shows_all_faces_and_a_pair_all_but_two() {
         for kind in LatticeKind::ALL {
-            let faces = Lattice::new(kind, 1.0).unwrap().face_neighbors();
+            let lattice = Lattice::new(kind, 1.0).unwrap();
+            let faces = lattice.face_neighbors();
             let alone: Vec<_> = list(kind, &[[3, -1, 2]]).exposed_faces();
             let key = Key::pack([3, -1, 2]).unwrap();
             let expected: Vec<_> = (0..faces.len()).map(|face| (key, face)).collect();

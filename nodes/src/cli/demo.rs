@@ -29,8 +29,8 @@ pub struct Demo {
     /// Speed of the log, 1 is real time
     #[arg(long, default_value_t = 1.0)]
     rate: f64,
-    /// cubic, bcc, fcc, mcc, hex, several with commas, or all
-    #[arg(long, default_value = "all")]
+    /// cubic, bcc, fcc, mcc, hex, hexopt, several with commas (five at most), or paper
+    #[arg(long, default_value = "paper")]
     lattice: Lattices,
     /// Print the report as JSON
     #[arg(long)]

@@ -71,7 +71,7 @@ pub fn main() -> ExitCode {
     }
 }
 
-/// One lattice by name, or all of them.
+/// Lattices by name, those of the `paper`, or `all`.
 #[derive(Clone, Debug)]
 pub struct Lattices(pub Vec<LatticeKind>);
 
@@ -79,12 +79,14 @@ impl std::str::FromStr for Lattices {
     type Err = String;
 
     fn from_str(text: &str) -> Result<Self, String> {
-        if text == "all" {
-            return Ok(Self(LatticeKind::ALL.to_vec()));
+        match text {
+            "all" => return Ok(Self(LatticeKind::ALL.to_vec())),
+            "paper" => return Ok(Self(LatticeKind::PAPER.to_vec())),
+            _ => {}
         }
         let kinds = text.split(',').map(|name| {
             let kind = name.trim().parse::<LatticeKind>();
-            kind.map_err(|e| format!("{e}; or 'all'"))
+            kind.map_err(|e| format!("{e}; or 'all', or 'paper' for the five of the paper"))
         });
         kinds.collect::<Result<_, _>>().map(Self)
     }

@@ -20,7 +20,7 @@ use crate::files::points::{PointFileLimits, read_points};
 pub struct Quantize {
     /// ply, pcd, xyz or txt (also .bz2), or KITTI bin
     file: PathBuf,
-    /// cubic, bcc, fcc, mcc, hex, several with commas, or all
+    /// cubic, bcc, fcc, mcc, hex, hexopt, several with commas, paper, or all
     #[arg(long, default_value = "all")]
     lattice: Lattices,
     /// Volume of one cell in m^3

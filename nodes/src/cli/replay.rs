@@ -21,6 +21,9 @@ use crate::runtime::params::Params;
 use crate::runtime::ros_args::RosArgs;
 use crate::voxel_marker_publisher::MarkerOptions;
 
+/// Lattices of a replay over DDS: each takes two of the twelve participants that loopback shows.
+const MAX_LOOPBACK_LATTICES: usize = 5;
+
 /// Map a rosbag2 log
 #[derive(Args, Clone, Debug)]
 pub struct Replay {
@@ -30,7 +33,7 @@ pub struct Replay {
     /// the log over DDS to one process for each node
     #[arg(long)]
     pub direct: bool,
-    /// cubic, bcc, fcc, mcc, hex, several with commas, or all; of the parameters if not given
+    /// cubic, bcc, fcc, mcc, hex, hexopt, several with commas, paper, or all; of the parameters if not given
     #[arg(long)]
     pub lattice: Option<Lattices>,
     /// Volume of one cell in m^3; of the parameters if not given (0.125)
@@ -88,7 +91,8 @@ impl Replay {
         }
         let bag = BagReader::open(&self.bag)?;
         let plan = replay::plan(&bag, &self.wishes()?)?;
-        let lattices = self.maps()?.into_iter().map(|map| map.lattice).collect();
+        let lattices: Vec<_> = self.maps()?.into_iter().map(|map| map.lattice).collect();
+        let count = lattices.len();
         let progress = Progress::new("play");
         let report = processes::run(
             &DdsReplay {
@@ -102,6 +106,13 @@ impl Replay {
                 // Apart from a robot on domain 0, and from other replays.
                 domain: match std::env::var_os("ROS_DOMAIN_ID") {
                     Some(_) => None,
+                    None if count > MAX_LOOPBACK_LATTICES => {
+                        return Err(format!(
+                            "{count} lattices over DDS on loopback: at most \
+                             {MAX_LOOPBACK_LATTICES} find each other; use --direct"
+                        )
+                        .into());
+                    }
                     None => Some(LoopbackDomain::take()?),
                 },
             },

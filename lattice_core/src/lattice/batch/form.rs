@@ -113,7 +113,10 @@ pub(super) fn axes(
         LatticeKind::Bcc => Matrix3::new(1.0, 0.0, 0.5, 0.0, 1.0, 0.5, 0.0, 0.0, 0.5),
         LatticeKind::Fcc => Matrix3::new(1.0, 0.0, 0.5, 1.0, 1.0, -0.5, 0.0, 0.0, -0.5),
         LatticeKind::Mcc => 0.5 * Matrix3::new(1.0, 1.0, -1.0, -1.0, 1.0, 1.0, 1.0, -1.0, 1.0),
-        LatticeKind::Hex => Matrix3::new(1.0, -0.5, 0.0, 0.0, 0.5, 0.0, 0.0, 0.0, 1.0),
+        LatticeKind::Hex | LatticeKind::HexOptimal => {
+            Matrix3::new(1.0, -0.5, 0.0, 0.0, 0.5, 0.0, 0.0, 0.0, 1.0)
+        }
+        LatticeKind::Custom => return None,
     };
     // Columns of G T^-1 are the sides of the cuboid.
     let sides = generator * turn.try_inverse()?;
@@ -156,5 +159,6 @@ mod tests {
         check::<Fcc>(LatticeKind::Fcc);
         check::<Mcc>(LatticeKind::Mcc);
         check::<Hex>(LatticeKind::Hex);
+        check::<Hex>(LatticeKind::HexOptimal);
     }
 }

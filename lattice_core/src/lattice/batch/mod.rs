@@ -318,7 +318,10 @@ impl Kernel {
             LatticeKind::Bcc => Self::of::<Bcc>(constants, diagonal, simd),
             LatticeKind::Fcc => Self::of::<Fcc>(constants, diagonal, simd),
             LatticeKind::Mcc => Self::of::<Mcc>(constants, diagonal, simd),
-            LatticeKind::Hex => Self::of::<Hex>(constants, diagonal, simd),
+            LatticeKind::Hex | LatticeKind::HexOptimal => {
+                Self::of::<Hex>(constants, diagonal, simd)
+            }
+            LatticeKind::Custom => return None,
         })
     }
 

@@ -82,6 +82,7 @@ mod tests {
             (LatticeKind::Fcc, 3),
             (LatticeKind::Mcc, 6),
             (LatticeKind::Hex, 2),
+            (LatticeKind::HexOptimal, 2),
         ] {
             let lattice = Lattice::new(kind, 1.0).unwrap();
             let shared = SharedVertices::new(&lattice);
