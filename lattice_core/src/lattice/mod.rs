@@ -6,6 +6,7 @@
 
 mod basis;
 mod batch;
+mod clearance;
 mod closed_form;
 mod code;
 mod generator;
@@ -14,6 +15,7 @@ mod kind;
 mod neighbors;
 mod orientation;
 mod shape;
+mod theory;
 mod voronoi;
 
 use std::fmt;
