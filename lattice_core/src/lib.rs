@@ -7,6 +7,7 @@ pub mod cloud;
 pub mod geodesy;
 pub mod lattice;
 pub mod pose;
+mod prefetch;
 pub mod query;
 pub mod raycast;
 pub mod simulate;

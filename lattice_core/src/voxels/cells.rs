@@ -5,6 +5,7 @@ use super::occupancy::Leaf;
 use super::shard::Entry;
 use super::table::{Place, Row, Table};
 use crate::lattice::CellCode;
+use crate::prefetch::prefetch;
 
 /// The voxels of a block.
 #[derive(Clone)]
@@ -57,11 +58,13 @@ impl Block {
     fn insert(&mut self, place: usize, number: u32) {
         let (_, rank) = self.rank(place);
         if self.numbers.len() == self.numbers.capacity() {
-            self.numbers.reserve_exact((self.numbers.len() / 2).max(4));
+            self.numbers.reserve_exact(self.numbers.len().max(8));
         }
         self.numbers.insert(rank, number);
         self.leaf[place >> 6 & 7] |= 1 << (place & 63);
-        self.count_before();
+        for before in self.before.iter_mut().skip((place >> 6 & 7) + 1) {
+            *before += 1;
+        }
     }
 
     fn remove(&mut self, place: usize) -> Option<u32> {
@@ -70,16 +73,10 @@ impl Block {
             return None;
         }
         self.leaf[place >> 6 & 7] &= !(1 << (place & 63));
-        self.count_before();
-        Some(self.numbers.remove(rank))
-    }
-
-    fn count_before(&mut self) {
-        let mut total = 0;
-        for (before, word) in self.before.iter_mut().zip(&self.leaf) {
-            *before = total;
-            total += word.count_ones() as u16;
+        for before in self.before.iter_mut().skip((place >> 6 & 7) + 1) {
+            *before -= 1;
         }
+        Some(self.numbers.remove(rank))
     }
 }
 
@@ -137,6 +134,22 @@ impl CellTable {
     pub(super) fn find(&self, code: CellCode) -> Option<u32> {
         let block = self.blocks.find(code.block())?;
         self.blocks.rows().get(block as usize)?.find(code.place())
+    }
+
+    /// Asks for the block of a cell, which will be searched soon.
+    #[inline(always)]
+    pub(super) fn prefetch_block(&self, code: CellCode) {
+        if let Some(block) = self.blocks.likely(code.block()) {
+            prefetch::<2, _>(block);
+        }
+    }
+
+    /// Asks for a voxel, which will be needed soon.
+    #[inline(always)]
+    pub(super) fn prefetch_row(&self, number: u32) {
+        if let Some(row) = self.rows.get(number as usize) {
+            prefetch::<1, _>(row);
+        }
     }
 
     /// The number of a cell; a row is made for it if it is new and fewer than `limit` are there.

@@ -3,7 +3,7 @@
 use super::shard::Point;
 use crate::lattice::CellCode;
 
-const SLOTS_LOG2: u32 = 11;
+const SLOTS_LOG2: u32 = 13;
 const SLOTS: usize = 1 << SLOTS_LOG2;
 
 /// Points of one cell.

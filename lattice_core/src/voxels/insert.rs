@@ -8,7 +8,7 @@ use super::columns::{Details, LabelCount, Stamps};
 use super::distortion::DistortionSums;
 use super::fixed::{FixedBlock, moment_unit_m, moments_of, near_point, voxel_of};
 use super::gather::{Gather, Partial};
-use super::shard::{Point, SHARDS, Shard, shard_of};
+use super::shard::{BATCH, Point, SHARDS, Shard, shard_of};
 use crate::cloud::Cloud;
 use crate::lattice::{BatchBlock, BatchQuantizer, BatchSums, CellCode, Lattice};
 
@@ -16,8 +16,6 @@ use crate::lattice::{BatchBlock, BatchQuantizer, BatchSums, CellCode, Lattice};
 const CHUNK: usize = 1 << 14;
 /// Points between two merges; bounds the memory for what is not yet merged.
 const WAVE: usize = 16 * CHUNK;
-/// Cells that are searched together.
-const BATCH: usize = 64;
 
 /// What became of the points of a cloud; the reasons add up to `points`.
 #[derive(Clone, Copy, PartialEq, Eq, Debug, Default)]
@@ -226,23 +224,31 @@ impl VoxelList {
         chunk: &mut Chunk,
     ) {
         chunk.gather(quantizer, wave, |partials| {
-            // First all searches, then all sums: the waits for the memory of the rows overlap.
-            let mut numbers = [None; BATCH];
             for batch in partials.chunks(BATCH) {
-                for (number, partial) in numbers.iter_mut().zip(batch) {
-                    let shard = self.shards.get_mut(shard_of(partial.code));
-                    *number =
-                        shard.and_then(|shard| shard.find_or_add(partial.code, usize::MAX, now));
-                }
-                for (number, partial) in numbers.iter().zip(batch) {
-                    let shard = self.shards.get_mut(shard_of(partial.code));
-                    if let (Some(number), Some(shard)) = (*number, shard) {
-                        shard.add(number, &partial.points, now);
-                    }
-                }
+                self.add_batch(batch, now);
             }
             partials.clear();
         });
+    }
+
+    /// Adds gathered points in steps, so that the waits for memory of one step overlap.
+    fn add_batch(&mut self, batch: &[Partial], now: u32) {
+        for partial in batch {
+            if let Some(shard) = self.shards.get(shard_of(partial.code)) {
+                shard.voxels.prefetch_block(partial.code);
+            }
+        }
+        let mut numbers = [None; BATCH];
+        for (number, partial) in numbers.iter_mut().zip(batch) {
+            let shard = self.shards.get_mut(shard_of(partial.code));
+            *number = shard.and_then(|shard| shard.find_soon(partial.code, now));
+        }
+        for (number, partial) in numbers.iter().zip(batch) {
+            let shard = self.shards.get_mut(shard_of(partial.code));
+            if let (Some(number), Some(shard)) = (*number, shard) {
+                shard.add(number, &partial.points, now);
+            }
+        }
     }
 
     /// On the threads of the current pool: first by chunks of points, then by shards.
@@ -258,16 +264,8 @@ impl VoxelList {
         let shards = self.shards.par_iter_mut().enumerate();
         shards.for_each(|(part, shard)| {
             let lists = chunks.iter().filter_map(|chunk| chunk.by_shard.get(part));
-            let mut numbers = [None; BATCH];
             for batch in lists.flat_map(|list| list.chunks(BATCH)) {
-                for (number, partial) in numbers.iter_mut().zip(batch) {
-                    *number = shard.find_or_add(partial.code, usize::MAX, now);
-                }
-                for (number, partial) in numbers.iter().zip(batch) {
-                    if let Some(number) = *number {
-                        shard.add(number, &partial.points, now);
-                    }
-                }
+                shard.add_batch(batch, now);
             }
         });
     }

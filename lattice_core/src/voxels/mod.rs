@@ -19,6 +19,7 @@ mod insert;
 mod list;
 mod merge;
 mod morton;
+mod neighbors;
 mod occupancy;
 mod recent;
 mod shard;

@@ -4,11 +4,15 @@ use rustc_hash::FxHashMap;
 
 use super::cells::CellTable;
 use super::columns::Columns;
+use super::gather::Partial;
 use super::table::Place;
 use crate::lattice::CellCode;
 
 /// Number of parts of a list.
 pub(super) const SHARDS: usize = 16;
+
+/// Cells that are searched together.
+pub(super) const BATCH: usize = 64;
 
 /// Fixed-point position of a point from the datum, in `OFFSET_UNIT_M`, and 1.
 pub(super) type Point = [i64; 4];
@@ -121,6 +125,31 @@ impl Shard {
                 *sum = sum.wrapping_add(*term);
             }
             entry.life.touched = now;
+        }
+    }
+
+    /// [`Shard::find_or_add`] without limit for a voxel that is added to soon.
+    #[inline(always)]
+    pub(super) fn find_soon(&mut self, code: CellCode, now: u32) -> Option<u32> {
+        let number = self.find_or_add(code, usize::MAX, now)?;
+        self.voxels.prefetch_row(number);
+        Some(number)
+    }
+
+    /// Adds the gathered points of cells of this shard in steps, so that the waits for memory of
+    /// one step overlap.
+    pub(super) fn add_batch(&mut self, batch: &[Partial], now: u32) {
+        for partial in batch {
+            self.voxels.prefetch_block(partial.code);
+        }
+        let mut numbers = [None; BATCH];
+        for (number, partial) in numbers.iter_mut().zip(batch) {
+            *number = self.find_soon(partial.code, now);
+        }
+        for (number, partial) in numbers.iter().zip(batch) {
+            if let Some(number) = *number {
+                self.add(number, &partial.points, now);
+            }
         }
     }
 

@@ -87,6 +87,13 @@ impl<R: Row> Table<R> {
         ((hash >> self.shift) as usize, hash << 32)
     }
 
+    /// The row that a search looks at first.
+    #[inline(always)]
+    pub(super) fn likely(&self, code: u64) -> Option<&R> {
+        let (at, _) = self.home(code);
+        self.rows.get(number_in(self.slot(at)) as usize)
+    }
+
     #[inline(always)]
     fn slot(&self, at: usize) -> u64 {
         self.slots.get(at).copied().unwrap_or(FREE)

@@ -67,10 +67,10 @@ pub(super) fn to_int(v: f32) -> i32 {
     nearest(v).0
 }
 
-/// A coordinate below `FIXED_REACH_M` in 1/`FIXED_PER_METRE`, half to even: first what 12 bits
-/// less can hold, then the rest, which is exact.
+/// A coordinate below `FIXED_REACH_M` in 2^-20 m, half to even: first with 12 bits less, then the
+/// rest, which is exact.
 #[inline(always)]
-pub(crate) fn to_fixed(metres: f32) -> i32 {
+fn to_fixed(metres: f32) -> i32 {
     let (high, rest) = nearest(metres * 256.0);
     (high << 12).wrapping_add(to_int(rest * 4096.0))
 }
@@ -132,9 +132,7 @@ pub(super) fn lane<F: Form, const DIAGONAL: bool>(c: &Constants, [x, y, z]: [f32
     }
 }
 
-/// Offsets in fixed point count in this fraction of a metre,
-pub(crate) const FIXED_PER_METRE: f32 = (1_u32 << 20) as f32;
-/// and reach to this, which 32 bits hold.
+/// Coordinates below this (metres) fit 32 bits in units of 2^-20 m.
 pub(super) const FIXED_REACH_M: f32 = 2000.0;
 
 /// Codes and marks of a block of points.
@@ -143,7 +141,7 @@ pub(super) struct Lanes {
     pub(super) codes: [CellCode; BLOCK],
     /// All ones if decided.
     pub(super) decided: [i32; BLOCK],
-    /// The points in 1/`FIXED_PER_METRE`, axis by axis; with statistics only.
+    /// The points in 2^-20 m, axis by axis; with statistics only.
     pub(super) fixed: [[i32; BLOCK]; 3],
 }
 

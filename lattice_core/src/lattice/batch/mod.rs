@@ -11,9 +11,13 @@ mod simd;
 use nalgebra::{Isometry3, Matrix3, Vector3};
 
 use super::{CellCode, Lattice, LatticeKind};
+use crate::prefetch::prefetch;
 use form::{Bcc, Cubic, Fcc, Form, Hex, Mcc};
 use kernel::{BLOCK, Constants, Lane, LaneSums, Lanes, STEPS};
 pub use simd::Simd;
+
+/// Lines of memory of a block of points.
+const BLOCK_LINES: usize = BLOCK * size_of::<[f32; 3]>() / 64;
 
 /// Half of one unit in the last place of 1.
 const EPSILON: f64 = 1.0 / (1_u64 << 24) as f64;
@@ -148,7 +152,8 @@ impl BatchQuantizer {
         let (blocks, rest) = points.as_chunks::<BLOCK>();
         for (number, block) in blocks.iter().enumerate() {
             if let Some(soon) = blocks.get(number + 2) {
-                simd::prefetch(soon);
+                // Their turn comes in bursts, which the processor's own prefetching does not foresee.
+                prefetch::<BLOCK_LINES, _>(soon);
             }
             let sums = self.block::<STATISTICS>(block, BLOCK, &mut lanes);
             visit(&BatchBlock {

@@ -66,23 +66,3 @@ fn avx2<F: Form, const DIAGONAL: bool, const STATISTICS: bool>(
 ) -> LaneSums {
     kernel::block::<F, DIAGONAL, STATISTICS>(c, points, out)
 }
-
-/// Asks for points that will be needed soon. Their turn comes in bursts, which the processor's own
-/// prefetching does not foresee.
-#[inline(always)]
-#[allow(unsafe_code)]
-pub(super) fn prefetch(points: &[[f32; 3]]) {
-    #[cfg(target_arch = "x86_64")]
-    for line in points.as_chunks::<16>().0 {
-        use std::arch::x86_64::{_MM_HINT_T0, _mm_prefetch};
-        let first = std::ptr::from_ref(line).cast::<i8>();
-        // SAFETY: a prefetch reads nothing that the program sees; the addresses are those of points.
-        unsafe {
-            _mm_prefetch::<_MM_HINT_T0>(first);
-            _mm_prefetch::<_MM_HINT_T0>(first.add(64));
-            _mm_prefetch::<_MM_HINT_T0>(first.add(128));
-        }
-    }
-    #[cfg(not(target_arch = "x86_64"))]
-    let _ = points;
-}

@@ -1,0 +1,17 @@
+//! Asking for memory before its turn.
+
+/// Asks for the lines of memory that an item begins in, `LINES` of them; changes nothing that a
+/// program can see.
+#[inline(always)]
+#[allow(unsafe_code)]
+pub(crate) fn prefetch<const LINES: usize, T: ?Sized>(item: &T) {
+    #[cfg(target_arch = "x86_64")]
+    for line in 0..LINES {
+        use std::arch::x86_64::{_MM_HINT_T0, _mm_prefetch};
+        let first = std::ptr::from_ref(item).cast::<i8>();
+        // SAFETY: a prefetch is a hint for any address, and reads nothing.
+        unsafe { _mm_prefetch::<_MM_HINT_T0>(first.wrapping_add(64 * line)) };
+    }
+    #[cfg(not(target_arch = "x86_64"))]
+    let _ = item;
+}
