@@ -12,10 +12,10 @@ use super::shard::{BATCH, Point, SHARDS, Shard, shard_of};
 use crate::cloud::Cloud;
 use crate::lattice::{BatchBlock, BatchQuantizer, BatchSums, CellCode, Lattice};
 
-/// Points that one task gathers.
-const CHUNK: usize = 1 << 14;
+/// Fewest points that are worth a thread.
+const PART: usize = 1 << 13;
 /// Points between two merges; bounds the memory for what is not yet merged.
-const WAVE: usize = 16 * CHUNK;
+const WAVE: usize = 1 << 18;
 
 /// What became of the points of a cloud; the reasons add up to `points`.
 #[derive(Clone, Copy, PartialEq, Eq, Debug, Default)]
@@ -127,22 +127,17 @@ impl VoxelList {
                 self.insert_singly(&quantizer, wave, origin, now, &mut report);
                 continue;
             }
-            let threads = if wave.len() <= CHUNK {
-                1
-            } else {
-                rayon::current_num_threads()
-            };
-            chunks.resize_with(
-                if threads == 1 {
-                    1
-                } else {
-                    wave.len().div_ceil(CHUNK)
-                },
-                Chunk::new,
-            );
+            // A part for each thread: which points are in which does not matter to the sums.
+            let parts = (wave.len() / PART).clamp(1, rayon::current_num_threads());
+            chunks.resize_with(parts.max(chunks.len()), Chunk::new);
             match chunks.first_mut() {
-                Some(chunk) if threads == 1 => self.insert_gathered(&quantizer, wave, now, chunk),
-                _ => self.insert_wave(&quantizer, wave, now, &mut chunks),
+                Some(chunk) if parts == 1 => self.insert_gathered(&quantizer, wave, now, chunk),
+                _ => self.insert_wave(
+                    &quantizer,
+                    wave,
+                    now,
+                    chunks.get_mut(..parts).unwrap_or_default(),
+                ),
             }
             for chunk in &mut chunks {
                 report.add(&std::mem::take(&mut chunk.report));
@@ -259,7 +254,8 @@ impl VoxelList {
         now: u32,
         chunks: &mut [Chunk],
     ) {
-        let parts = wave.par_chunks(CHUNK).zip(chunks.par_iter_mut());
+        let parts = wave.par_chunks(wave.len().div_ceil(chunks.len().max(1)).max(1));
+        let parts = parts.zip(chunks.par_iter_mut());
         parts.for_each(|(offsets_m, chunk)| chunk.sort(quantizer, offsets_m));
         let shards = self.shards.par_iter_mut().enumerate();
         shards.for_each(|(part, shard)| {

@@ -11,10 +11,10 @@ use super::{DatumError, InsertReport, VoxelStore};
 use crate::cloud::Cloud;
 use crate::lattice::{BatchQuantizer, CellCode, Key, Lattice};
 
-/// Points that one task quantizes.
-const CHUNK: usize = 1 << 13;
+/// Fewest points that are worth a thread.
+const PART: usize = 1 << 13;
 /// Points between two merges into the list; bounds the memory for what is not yet merged.
-const WAVE: usize = 32 * CHUNK;
+const WAVE: usize = 1 << 18;
 /// Memory for a block, growth of the vectors and of the table included.
 const BLOCK_BYTES: usize = 112;
 
@@ -169,33 +169,36 @@ impl OccupancyList {
         self.recent = recent;
     }
 
-    fn insert_wave(
+    /// Inserts waves on the threads of the current pool: while the cells of one are set, the next
+    /// is quantized. There must be room for a block for each point.
+    fn insert_waves(
         &mut self,
         quantizer: &BatchQuantizer,
-        wave: &[[f32; 3]],
+        waves: &[&[[f32; 3]]],
         report: &mut InsertReport,
     ) {
-        let sift = |recent: &mut Recent, points: &[[f32; 3]]| {
-            let mut rejects = InsertReport::default();
-            let mut kept = Vec::with_capacity(points.len() / 4);
-            let mut place = 0;
-            recent.forget_all();
-            quantizer.for_blocks(points, |codes, sums| {
-                let here = points.get(place..).unwrap_or_default();
-                place += codes.len();
-                rejects.count_rejects(quantizer, here, codes, sums);
-                let mut fresh = [CellCode::NONE; BatchQuantizer::BLOCK];
-                let count = recent.sift(codes, &mut fresh);
-                kept.extend_from_slice(fresh.get(..count).unwrap_or_default());
-            });
-            (kept, rejects)
-        };
-        let chunks = wave.par_chunks(CHUNK);
-        let sifted: Vec<_> = chunks.map_init(Recent::new, sift).collect();
+        let parts = 2 * rayon::current_num_threads();
+        let mut filled: Vec<Sifter> = Vec::new();
+        let mut next: Vec<Sifter> = (0..parts).map(|_| Sifter::new()).collect();
+        for wave in waves.iter().map(Some).chain([None]) {
+            let sift = || {
+                let wave = wave.copied().unwrap_or_default();
+                let points = wave.par_chunks(wave.len().div_ceil(parts).max(PART));
+                points
+                    .zip(next.par_iter_mut())
+                    .for_each(|(points, sifter)| sifter.sift(quantizer, points));
+            };
+            rayon::join(|| self.set_all(&mut filled, report), sift);
+            filled.resize_with(parts, Sifter::new);
+            std::mem::swap(&mut filled, &mut next);
+        }
+    }
+
+    fn set_all(&mut self, sifted: &mut [Sifter], report: &mut InsertReport) {
         let mut last = Last::default();
-        for (codes, rejects) in &sifted {
-            report.add(rejects);
-            for &code in codes {
+        for sifter in sifted {
+            report.add(&std::mem::take(&mut sifter.rejects));
+            for code in sifter.kept.drain(..) {
                 if code != CellCode::NONE {
                     self.set(code, &mut last);
                 }
@@ -234,6 +237,36 @@ impl OccupancyList {
         let number = self.blocks.find(code.block());
         let block = number.and_then(|number| self.blocks.rows().get(number as usize));
         block.is_some_and(|block| is_set(&block.leaf, code.place()))
+    }
+}
+
+/// Quantizes points and leaves out cells that it has just seen.
+struct Sifter {
+    recent: Recent,
+    kept: Vec<CellCode>,
+    rejects: InsertReport,
+}
+
+impl Sifter {
+    fn new() -> Sifter {
+        Sifter {
+            recent: Recent::new(),
+            kept: Vec::new(),
+            rejects: InsertReport::default(),
+        }
+    }
+
+    fn sift(&mut self, quantizer: &BatchQuantizer, points: &[[f32; 3]]) {
+        let mut place = 0;
+        quantizer.for_blocks(points, |codes, sums| {
+            let here = points.get(place..).unwrap_or_default();
+            place += codes.len();
+            self.rejects.count_rejects(quantizer, here, codes, sums);
+            let mut fresh = [CellCode::NONE; BatchQuantizer::BLOCK];
+            let count = self.recent.sift(codes, &mut fresh);
+            self.kept
+                .extend_from_slice(fresh.get(..count).unwrap_or_default());
+        });
     }
 }
 
@@ -293,14 +326,12 @@ impl VoxelStore for OccupancyList {
         };
         let before = self.len;
         let quantizer = self.quantizer(cloud);
-        let threads = rayon::current_num_threads();
-        for wave in points.chunks(WAVE) {
-            let may_fill = self.blocks.len().saturating_add(wave.len()) > self.max_blocks;
-            if threads == 1 || wave.len() <= CHUNK || may_fill {
-                self.insert_serially(&quantizer, wave, &mut report);
-            } else {
-                self.insert_wave(&quantizer, wave, &mut report);
-            }
+        let waves: Vec<_> = points.chunks(WAVE).collect();
+        let may_fill = self.blocks.len().saturating_add(points.len()) > self.max_blocks;
+        if rayon::current_num_threads() == 1 || points.len() < 2 * PART || may_fill {
+            self.insert_serially(&quantizer, points, &mut report);
+        } else {
+            self.insert_waves(&quantizer, &waves, &mut report);
         }
         report.inserted =
             report.points - report.not_finite - report.out_of_range - report.list_full;
