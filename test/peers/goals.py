@@ -103,6 +103,8 @@ def insert(found, pattern, cell):
                 rows += ratio_row(place, f"store of at most 8 B/voxel, {lattice}, against octomap", occupancy, octomap, 9)
         name = counting.label if counting else ""
         rows += ratio_row(place, f"count and centroid {lattice} against {name}", payload, counting, 1.1)
+        same = at("OpenVDB centroid grid")
+        rows += ratio_row(place, f"count and centroid {lattice} against an OpenVDB grid of counts and sums", payload, same, 1.1)
         rows += ratio_row(place, f"count and centroid {lattice} against small_gicp", payload, at("small_gicp voxelgrid"), 4)
         if lattice != "bcc":
             for store, one in (("occupancy", occupancy), ("list", payload)):

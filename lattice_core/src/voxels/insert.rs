@@ -131,7 +131,9 @@ impl VoxelList {
             let parts = (wave.len() / PART).clamp(1, rayon::current_num_threads());
             chunks.resize_with(parts.max(chunks.len()), Chunk::new);
             match chunks.first_mut() {
-                Some(chunk) if parts == 1 => self.insert_gathered(&quantizer, wave, now, chunk),
+                Some(chunk) if parts == 1 && wave.len() < PART => {
+                    self.insert_gathered(&quantizer, wave, now, chunk)
+                }
                 _ => self.insert_wave(
                     &quantizer,
                     wave,

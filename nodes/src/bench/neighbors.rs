@@ -1,7 +1,7 @@
 //! Counting the occupied neighbours of all voxels.
 
 use lattice_core::lattice::{Key, Lattice, LatticeKind};
-use lattice_core::voxels::VoxelStore;
+use lattice_core::voxels::{OccupancyList, VoxelStore};
 use rayon::prelude::*;
 
 use super::hash26::Cubes;
@@ -10,6 +10,8 @@ use super::{Report, timed};
 /// How neighbours are found.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum NeighborMethod {
+    /// One pass over the blocks of the store's cells.
+    Pass,
     /// One look-up in the store for each touching neighbour of each voxel.
     Probe,
     /// The measure: 26 probes of a hash set for each cube.
@@ -27,6 +29,22 @@ pub fn neighbors(
 ) -> Option<Report> {
     let lattice = store.lattice();
     let (sys, (count, spent), bytes) = match method {
+        NeighborMethod::Pass => {
+            let cells = OccupancyList::from_keys(
+                lattice.clone(),
+                store.datum_index(),
+                store.sorted_keys(),
+                usize::MAX,
+            );
+            let result = timed(|| {
+                let mut total = 0;
+                cells.count_neighbors(lattice.touching_neighbors(), |_, count| {
+                    total += u64::from(count);
+                });
+                total
+            });
+            (format!("{name}-pass"), result, cells.bytes())
+        }
         NeighborMethod::Probe => {
             let result = timed(|| probe(store, lattice));
             (format!("{name}-probe"), result, store.bytes())
@@ -79,7 +97,11 @@ mod tests {
             res_m: 1.0,
         };
         let (_, store) = insert(options, &lattice, points, None).unwrap();
-        for method in [NeighborMethod::Probe, NeighborMethod::Hash26] {
+        for method in [
+            NeighborMethod::Pass,
+            NeighborMethod::Probe,
+            NeighborMethod::Hash26,
+        ] {
             let report = neighbors(method, store.as_ref(), "x", 1.0).unwrap();
             assert_eq!(report.count, Some(7 * 7 * 7 - 27), "{method:?}");
             assert_eq!(report.n, 28);

@@ -78,7 +78,7 @@ pub struct Neighbors {
     #[arg(long, value_enum, default_value = "occupancy")]
     store: StoreName,
     /// How neighbours are found
-    #[arg(long, value_enum, default_value = "probe")]
+    #[arg(long, value_enum, default_value = "pass")]
     method: NeighborName,
 }
 
@@ -109,6 +109,8 @@ enum StoreName {
 
 #[derive(Clone, Copy, ValueEnum)]
 enum NeighborName {
+    /// One pass over the blocks of the store's cells
+    Pass,
     /// One look-up in the store for each touching neighbour
     Probe,
     /// The measure: 26 probes of a hash set for each voxel of the cubic lattice
@@ -178,6 +180,7 @@ impl Neighbors {
         let points = self.common.points()?;
         let options = self.common.insert_options(self.store);
         let method = match self.method {
+            NeighborName::Pass => NeighborMethod::Pass,
             NeighborName::Probe => NeighborMethod::Probe,
             NeighborName::Hash26 => NeighborMethod::Hash26,
         };
