@@ -200,7 +200,8 @@ impl BatchQuantizer {
             distances: sums.distances as u64,
             squares: sums.squares as u64,
             largest_square: sums.largest_square as u64,
-            far: false,
+            // Without a kernel nobody has filled in the fixed-point positions.
+            far: self.kernel.is_none(),
         };
         // One bit for each eight points that are not all decided.
         let groups = lanes.decided.as_chunks::<8>().0.iter();
