@@ -2,29 +2,63 @@
 
 use lattice_core::cloud::Cloud;
 use lattice_core::lattice::{Key, Lattice, LatticeKind};
-use lattice_core::voxels::VoxelList;
 use lattice_core::voxels::codec::decode_keys;
-use lattice_core::voxels::file::{MapContents, WriteOptions, max_voxels_of, read_map};
-use nalgebra::Vector3;
+use lattice_core::voxels::file::{
+    MapContents, WriteOptions, max_voxels_of, read_map, read_occupancy,
+};
+use lattice_core::voxels::{Payload, VoxelList, VoxelStore};
+use nalgebra::{Matrix3, UnitQuaternion, Vector3};
 use proptest::prelude::*;
 
-fn any_map() -> impl Strategy<Value = MapContents> {
+fn any_lattice() -> impl Strategy<Value = Lattice> {
     let kind = prop::sample::select(&LatticeKind::ALL[..]);
+    let named = (kind, -12.0..9.0_f64)
+        .prop_map(|(kind, exponent)| Lattice::new(kind, exponent.exp2()).unwrap());
+    let basis = prop::array::uniform9(-1.0..1.0_f64);
+    let custom = basis.prop_filter_map("too skewed", |entries| {
+        Lattice::from_basis(Matrix3::from_row_slice(&entries)).ok()
+    });
+    let turn = prop::option::of(prop::array::uniform3(-3.0..3.0_f64));
+    (prop_oneof![2 => named, 1 => custom], turn).prop_map(|(lattice, turn)| match turn {
+        Some([roll, pitch, yaw]) => {
+            lattice.oriented(UnitQuaternion::from_euler_angles(roll, pitch, yaw))
+        }
+        None => lattice,
+    })
+}
+
+fn any_payload() -> impl Strategy<Value = Payload> {
+    let kept = prop::array::uniform3(any::<bool>());
+    kept.prop_map(|[moments, stamps, labels]| Payload {
+        moments,
+        stamps,
+        labels,
+    })
+}
+
+fn any_map() -> impl Strategy<Value = MapContents> {
     let coordinate = prop_oneof![
         8 => -2.0..2.0_f32,
         2 => (-8..8_i32).prop_map(|i| i as f32 * 0.25),
         1 => -1e4..1e4_f32,
     ];
     let offsets = prop::collection::vec(prop::array::uniform3(coordinate), 0..150);
-    (kind, offsets, -12.0..9.0_f64).prop_map(|(kind, offsets_m, exponent)| {
-        let lattice = Lattice::new(kind, exponent.exp2()).unwrap();
+    let stamp = prop_oneof![any::<i64>(), Just(0)];
+    let inputs = (any_lattice(), any_payload(), offsets, stamp);
+    inputs.prop_map(|(lattice, payload, offsets_m, stamp_ns)| {
         let datum_m = Vector3::new(1e6, -2e6, 30.0);
-        let mut list = VoxelList::new(lattice, datum_m, usize::MAX).unwrap();
-        list.insert(&Cloud {
-            stamp_ns: 0,
+        let list = VoxelList::new(lattice, datum_m, usize::MAX).unwrap();
+        let mut list = list.with_payload(payload);
+        let labels: Vec<u16> = (0..offsets_m.len() as u16).map(|i| i % 3 * 3000).collect();
+        let mut cloud = Cloud {
+            stamp_ns,
             datum_m,
             offsets_m,
-        });
+        };
+        list.insert_labelled(&cloud, &labels);
+        cloud.offsets_m.truncate(20);
+        cloud.stamp_ns = stamp_ns.wrapping_add(1 << 60);
+        list.insert(&cloud);
         MapContents::from_list(&list)
     })
 }
@@ -89,12 +123,15 @@ proptest! {
     fn files_read_back_to_the_bit(map in any_map(), options in any_options()) {
         let file = bytes(&map, &options);
         let back = read(&file).unwrap();
-        prop_assert_eq!(bytes(&back, &options), file);
+        prop_assert_eq!(&bytes(&back, &options), &file);
         let mut expected = map;
         if options.occupancy_only {
             expected.drop_payload();
         }
         prop_assert_eq!(&back, &expected);
+        let cells = read_occupancy(&file[..], 1 << 30).unwrap();
+        cells.validate().unwrap();
+        prop_assert_eq!(&cells.sorted_keys()[..], expected.keys());
         let list = back.into_list(usize::MAX);
         list.validate().unwrap();
         let cells: Vec<Key> = list.sorted().into_iter().map(|(key, _)| key).collect();

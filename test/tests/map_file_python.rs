@@ -7,9 +7,9 @@ use std::process::Command;
 
 use lattice_core::cloud::Cloud;
 use lattice_core::lattice::{Lattice, LatticeKind};
-use lattice_core::voxels::VoxelList;
 use lattice_core::voxels::file::{MapContents, WriteOptions};
-use nalgebra::Vector3;
+use lattice_core::voxels::{Payload, VoxelList};
+use nalgebra::{Matrix3, UnitQuaternion, Vector3};
 use serde_json::Value;
 
 const PRINT: &str = r#"
@@ -40,7 +40,7 @@ fn read_by_python(directory: &Path, files: &[Vec<u8>]) -> Vec<Value> {
     let docs = std::fs::read_to_string(docs).unwrap();
     let (_, code) = docs.split_once("```python\n").unwrap();
     let (code, _) = code.split_once("```").unwrap();
-    assert!(code.lines().count() < 45, "{} lines", code.lines().count());
+    assert!(code.lines().count() < 50, "{} lines", code.lines().count());
     let script = directory.join("read.py");
     std::fs::write(&script, [code, PRINT].concat()).unwrap();
     let paths: Vec<_> = (0..files.len())
@@ -64,10 +64,14 @@ fn read_by_python(directory: &Path, files: &[Vec<u8>]) -> Vec<Value> {
 }
 
 fn maps() -> Vec<MapContents> {
-    let map = |kind: LatticeKind| {
-        let lattice = Lattice::new(kind, 0.02).unwrap();
+    let map = |lattice: Lattice| {
         let datum_m = Vector3::new(-4321.0, 98765.4, 12.0);
-        let mut list = VoxelList::new(lattice, datum_m, usize::MAX).unwrap();
+        let list = VoxelList::new(lattice, datum_m, usize::MAX).unwrap();
+        let mut list = list.with_payload(Payload {
+            moments: true,
+            stamps: true,
+            labels: true,
+        });
         let offset = |i: u32| {
             [
                 0.13 * (i % 37) as f32,
@@ -82,7 +86,13 @@ fn maps() -> Vec<MapContents> {
         });
         MapContents::from_list(&list)
     };
-    LatticeKind::ALL.into_iter().map(map).collect()
+    let named = LatticeKind::ALL.map(|kind| Lattice::new(kind, 0.02).unwrap());
+    let turn = UnitQuaternion::from_euler_angles(0.3, -1.2, 2.5);
+    let skewed = Matrix3::new(0.3, 0.1, 0.0, 0.0, 0.2, 0.1, 0.1, -0.1, 0.3);
+    let custom = Lattice::from_basis(skewed).unwrap();
+    let turned = [custom.clone(), named[2].clone()].map(|lattice| lattice.oriented(turn));
+    let lattices = named.into_iter().chain([custom]).chain(turned);
+    lattices.map(map).collect()
 }
 
 fn compare(zstd_level: Option<i32>, occupancy_only: bool) {

@@ -104,6 +104,11 @@ impl CellTable {
         }
     }
 
+    /// Makes room for more voxels.
+    pub(super) fn reserve(&mut self, voxels: usize) {
+        self.rows.reserve_exact(voxels);
+    }
+
     /// Number of voxels.
     pub(super) fn len(&self) -> usize {
         self.rows.len()

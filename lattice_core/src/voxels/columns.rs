@@ -39,7 +39,8 @@ pub struct Stamps {
 }
 
 impl Stamps {
-    const NONE: Stamps = Stamps {
+    /// Of no points.
+    pub(super) const NONE: Stamps = Stamps {
         first_ns: i64::MAX,
         last_ns: i64::MIN,
     };
@@ -54,7 +55,7 @@ impl Stamps {
 pub(super) type Moments = [i64; 6];
 
 /// The further columns of a shard; those that are not kept are empty.
-#[derive(Clone, Debug)]
+#[derive(Clone, PartialEq, Debug)]
 pub(super) struct Columns {
     payload: Payload,
     pub(super) moments: Vec<Moments>,
@@ -78,6 +79,45 @@ impl Columns {
             stamps: Vec::new(),
             labels: Vec::new(),
         }
+    }
+
+    /// Which columns are kept.
+    pub(super) fn payload(&self) -> Payload {
+        self.payload
+    }
+
+    /// Keeps these moments, a row for each voxel.
+    pub(super) fn set_moments(&mut self, moments: Vec<Moments>) {
+        self.payload.moments = true;
+        self.moments = moments;
+    }
+
+    /// Keeps these stamps, a row for each voxel.
+    pub(super) fn set_stamps(&mut self, stamps: Vec<Stamps>) {
+        self.payload.stamps = true;
+        self.stamps = stamps;
+    }
+
+    /// Keeps these labels, a row for each voxel.
+    pub(super) fn set_labels(&mut self, labels: Vec<Vec<LabelCount>>) {
+        self.payload.labels = true;
+        self.labels = labels;
+    }
+
+    /// Appends row `number` of columns of the same payload.
+    pub(super) fn push_row(&mut self, other: &Columns, number: usize) {
+        self.moments.extend(other.moments.get(number));
+        self.stamps.extend(other.stamps.get(number));
+        self.labels.extend(other.labels.get(number).cloned());
+    }
+
+    /// The rows with these numbers, in this order.
+    pub(super) fn gather(&self, numbers: impl Iterator<Item = usize>) -> Columns {
+        let mut gathered = Columns::new(self.payload);
+        if !self.payload.is_plain() {
+            numbers.for_each(|number| gathered.push_row(self, number));
+        }
+        gathered
     }
 
     pub(super) fn push(&mut self) {

@@ -236,6 +236,29 @@ impl VoxelList {
         voxels
     }
 
+    /// All voxels in Morton order, with the further columns.
+    pub(super) fn sorted_columns(&self) -> (Vec<Key>, Vec<Voxel>, Columns) {
+        let mut columns = Columns::new(self.payload);
+        if self.payload.is_plain() {
+            let (keys, voxels) = self.sorted().into_iter().unzip();
+            return (keys, voxels, columns);
+        }
+        let rows = |shard| Shard::iter(shard).enumerate().map(move |row| (shard, row));
+        let mut rows: Vec<_> = (self.shards.iter().flat_map(rows))
+            .filter_map(|(shard, (number, (code, entry)))| {
+                let voxel = voxel_of(&self.lattice, code, &entry.points);
+                Some((code.key()?, voxel, &shard.columns, number))
+            })
+            .collect();
+        rows.par_sort_unstable_by_key(|&(key, ..)| key);
+        let cells = rows.into_iter().map(|(key, voxel, theirs, number)| {
+            columns.push_row(theirs, number);
+            (key, voxel)
+        });
+        let (keys, voxels) = cells.unzip();
+        (keys, voxels, columns)
+    }
+
     /// Quantization error over all points that were inserted, also of voxels removed since.
     pub fn distortion(&self) -> Distortion {
         self.sums.summary(&self.lattice)

@@ -2,8 +2,9 @@
 
 use thiserror::Error;
 
+use super::columns::Columns;
 use super::fixed::points_of;
-use super::shard::shard_of;
+use super::shard::{SHARDS, shard_of};
 use super::{Voxel, VoxelList};
 use crate::lattice::{CellCode, Key};
 
@@ -86,21 +87,30 @@ impl VoxelList {
         Ok(())
     }
 
-    /// Adds points to a cell; false if the cell is new and the list is full.
-    pub(super) fn add(&mut self, key: Key, voxel: &Voxel) -> bool {
-        let code = CellCode::from(key);
-        let points = points_of(&self.lattice, code, voxel);
+    /// Adds cells of which none is in the list, with the further columns row by row, until the list
+    /// is full. Keys of one block should come together.
+    pub(super) fn fill(&mut self, cells: impl Iterator<Item = (Key, Voxel)>, columns: &Columns) {
         let room = self.max_voxels.saturating_sub(self.len());
         let now = self.sequence.max(1);
         self.sequence = now;
-        let Some(shard) = self.shards.get_mut(shard_of(code)) else {
-            return false;
-        };
-        let limit = shard.len().saturating_add(room);
-        let Some(number) = shard.find_or_add(code, limit, now) else {
-            return false;
-        };
-        shard.add(number, &points, now);
-        true
+        let expected = cells.size_hint().0.min(room) / SHARDS;
+        for shard in &mut self.shards {
+            // Shards differ by a few blocks.
+            shard.voxels.reserve(expected + expected / 16);
+        }
+        for (row, (key, voxel)) in cells.take(room).enumerate() {
+            let code = CellCode::from(key);
+            let points = points_of(&self.lattice, code, &voxel);
+            let Some(shard) = self.shards.get_mut(shard_of(code)) else {
+                continue;
+            };
+            let Some(number) = shard.find_or_add(code, usize::MAX, now) else {
+                continue;
+            };
+            shard.add(number, &points, now);
+            if !self.payload.is_plain() {
+                shard.columns.add(number as usize, &columns.get(row));
+            }
+        }
     }
 }

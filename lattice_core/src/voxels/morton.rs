@@ -23,6 +23,24 @@ static MORTON_OF_PLACE: [u16; CellCode::BLOCK_CELLS] = {
     table
 };
 
+/// The inverse: the place in a block of the low nine bits of a key.
+static PLACE_OF_MORTON: [u16; CellCode::BLOCK_CELLS] = {
+    let mut table = [0; CellCode::BLOCK_CELLS];
+    let mut place = 0;
+    while place < table.len() {
+        table[MORTON_OF_PLACE[place] as usize] = place as u16;
+        place += 1;
+    }
+    table
+};
+
+/// Sets the bit of a cell of the block, by the low nine bits of its key.
+#[inline(always)]
+pub(super) fn set(leaf: &mut Leaf, key: Key) {
+    let place = usize::from(PLACE_OF_MORTON[key.raw() as usize % CellCode::BLOCK_CELLS]);
+    leaf[place >> 6 & 7] |= 1 << (place & 63);
+}
+
 /// Positions of the bits that are set.
 #[inline]
 pub(super) fn places(leaf: &Leaf) -> impl Iterator<Item = usize> + '_ {

@@ -7,7 +7,7 @@ use rayon::prelude::*;
 
 use super::recent::Recent;
 use super::table::{Place, Row, Table};
-use super::{DatumError, InsertReport, VoxelStore};
+use super::{DatumError, InsertReport, VoxelStore, morton};
 use crate::cloud::Cloud;
 use crate::lattice::{BatchQuantizer, CellCode, Key, Lattice};
 
@@ -77,7 +77,8 @@ impl OccupancyList {
         }
     }
 
-    /// The cells with these keys, so far as they fit into `max_bytes`.
+    /// The cells with these keys, so far as they fit into `max_bytes`; fast for sorted keys, of which
+    /// a whole block at a time is added.
     pub fn from_keys(
         lattice: Lattice,
         datum_index: [i64; 3],
@@ -85,10 +86,42 @@ impl OccupancyList {
         max_bytes: usize,
     ) -> OccupancyList {
         let mut list = Self::at_datum(lattice, datum_index, max_bytes);
+        let (mut block, mut leaf) = (u64::MAX, [0; 8]);
         for key in keys {
-            list.add(key);
+            let its_block = key.raw() >> 9;
+            if its_block != block {
+                list.add_block(block, &leaf);
+                (block, leaf) = (its_block, [0; 8]);
+            }
+            morton::set(&mut leaf, key);
         }
+        list.add_block(block, &leaf);
         list
+    }
+
+    /// Adds the cells of a block, by the bits that their keys share; does nothing if the list is full.
+    fn add_block(&mut self, morton: u64, leaf: &Leaf) {
+        let Some(first) = morton.checked_mul(512).and_then(Key::from_raw) else {
+            return;
+        };
+        let code = CellCode::from(first).block();
+        let empty = || Block { code, leaf: [0; 8] };
+        let place = self.blocks.find_or_add(code, self.max_blocks, empty);
+        let Some(Place::Known(number) | Place::New(number)) = place else {
+            return;
+        };
+        for (to, from) in (self.blocks.row_mut(number).into_iter())
+            .flat_map(|row| &mut row.leaf)
+            .zip(leaf)
+        {
+            self.len += (from & !*to).count_ones() as usize;
+            *to |= from;
+        }
+    }
+
+    /// Most voxels that a list of `max_bytes` can hold, if all their blocks are full.
+    pub fn max_voxels_within(max_bytes: usize) -> usize {
+        (max_bytes / BLOCK_BYTES).saturating_mul(CellCode::BLOCK_CELLS)
     }
 
     /// Most bytes that the list takes.

@@ -8,9 +8,11 @@ use std::collections::BTreeMap;
 
 use lattice_core::cloud::Cloud;
 use lattice_core::lattice::{Key, Lattice, LatticeKind};
-use lattice_core::voxels::file::{MapContents, WriteOptions, max_voxels_of};
-use lattice_core::voxels::{InsertReport, OFFSET_UNIT_M, OccupancyList, VoxelList, VoxelStore};
-use nalgebra::Vector3;
+use lattice_core::voxels::file::{MapContents, WriteOptions, max_voxels_of, read_occupancy};
+use lattice_core::voxels::{
+    InsertReport, OFFSET_UNIT_M, OccupancyList, Payload, VoxelList, VoxelStore,
+};
+use nalgebra::{Matrix3, UnitQuaternion, Vector3};
 
 /// Reads bytes as a map file, as they are and with checksums that fit.
 pub fn map_file(bytes: &[u8]) {
@@ -41,6 +43,9 @@ fn read_and_write(bytes: &[u8]) {
         assert_eq!(back, map);
         assert_eq!(write(&back), file);
     }
+    let cells = read_occupancy(bytes, usize::MAX).unwrap();
+    cells.validate().unwrap();
+    assert_eq!(cells.sorted_keys(), map.keys());
     if map.voxels().is_some() {
         let list = map.clone().into_list(usize::MAX);
         list.validate().unwrap();
@@ -208,9 +213,46 @@ fn reference(
     (voxels, report)
 }
 
+/// Files of a custom and of a turned lattice with all columns.
+fn detailed_maps() -> Vec<Vec<u8>> {
+    let basis = Matrix3::new(0.5, 0.1, 0.0, 0.0, 0.4, 0.2, 0.1, -0.1, 0.6);
+    let custom = Lattice::from_basis(basis).unwrap();
+    let turn = UnitQuaternion::from_euler_angles(0.3, -1.2, 2.5);
+    let fcc = Lattice::new(LatticeKind::Fcc, 0.125).unwrap();
+    let mut files = Vec::new();
+    for lattice in [custom.clone(), custom.oriented(turn), fcc.oriented(turn)] {
+        let list = VoxelList::new(lattice, Vector3::zeros(), usize::MAX).unwrap();
+        let mut list = list.with_payload(Payload {
+            moments: true,
+            stamps: true,
+            labels: true,
+        });
+        for scan in 0..2 {
+            let cloud = Cloud {
+                stamp_ns: scan * 1_700_000_000_000_000_000,
+                datum_m: Vector3::zeros(),
+                offsets_m: (0..30).map(|i| [0.1 * i as f32, 0.2, 0.3]).collect(),
+            };
+            let labels: Vec<u16> = (0..25).map(|i| i % 3 * 30_000).collect();
+            list.insert_labelled(&cloud, &labels);
+        }
+        for zstd_level in [None, Some(3)] {
+            let options = WriteOptions {
+                zstd_level,
+                occupancy_only: false,
+            };
+            let mut file = Vec::new();
+            let map = MapContents::from_list(&list);
+            map.write(&mut file, &options).unwrap();
+            files.push(file);
+        }
+    }
+    files
+}
+
 /// Inputs to start from, by target.
 pub fn seeds() -> BTreeMap<&'static str, Vec<Vec<u8>>> {
-    let mut maps = Vec::new();
+    let mut maps = detailed_maps();
     let mut clouds = Vec::new();
     for (number, kind) in (0_u8..).zip(LatticeKind::ALL) {
         let lattice = Lattice::new(kind, 0.125).unwrap();

@@ -4,8 +4,11 @@ use nalgebra::Vector3;
 use thiserror::Error;
 
 use crate::lattice::{Key, Lattice};
+use crate::voxels::columns::Columns;
 use crate::voxels::distortion::DistortionSums;
-use crate::voxels::{Distortion, OFFSET_UNIT_M, Voxel, VoxelList, VoxelStore};
+use crate::voxels::{
+    Distortion, OFFSET_UNIT_M, OccupancyList, Payload, Voxel, VoxelList, VoxelStore,
+};
 
 /// Parts that do not make a map.
 #[derive(Clone, PartialEq, Eq, Debug, Error)]
@@ -14,13 +17,15 @@ pub struct ContentsError(String);
 
 /// A map as sorted columns: what a file holds, and what set operations on files work with.
 ///
-/// Keys ascend strictly, and voxels, where there are any, are one for each key.
+/// Keys ascend strictly; voxels and further columns, where there are any, have a row for each key.
 #[derive(Clone, PartialEq, Debug)]
 pub struct MapContents {
     pub(super) lattice: Lattice,
     pub(super) datum_index: [i64; 3],
     pub(super) keys: Vec<Key>,
     pub(super) voxels: Option<Vec<Voxel>>,
+    /// Empty without voxels.
+    pub(super) columns: Columns,
     pub(super) sums: DistortionSums,
 }
 
@@ -37,6 +42,7 @@ impl MapContents {
             datum_index,
             keys,
             voxels: None,
+            columns: no_columns(),
             sums: DistortionSums::default(),
         };
         contents.check_datum().map_err(ContentsError)?;
@@ -48,12 +54,13 @@ impl MapContents {
 
     /// Copies a list.
     pub fn from_list(list: &VoxelList) -> MapContents {
-        let (keys, voxels) = list.sorted().into_iter().unzip();
+        let (keys, voxels, columns) = list.sorted_columns();
         MapContents {
             lattice: list.lattice.clone(),
             datum_index: list.datum_index,
             keys,
             voxels: Some(voxels),
+            columns,
             sums: list.sums,
         }
     }
@@ -65,6 +72,7 @@ impl MapContents {
             datum_index: store.datum_index(),
             keys: store.sorted_keys(),
             voxels: None,
+            columns: no_columns(),
             sums: DistortionSums::default(),
         }
     }
@@ -73,23 +81,27 @@ impl MapContents {
     ///
     /// A map without payload becomes one of a point at each centre, with statistics to match.
     pub fn into_list(self, max_voxels: usize) -> VoxelList {
-        let mut list = VoxelList::at_datum(self.lattice, self.datum_index, max_voxels);
+        let list = VoxelList::at_datum(self.lattice, self.datum_index, max_voxels);
+        let mut list = list.with_payload(self.columns.payload());
+        let keys = self.keys.iter().copied();
         match self.voxels {
             Some(voxels) => {
-                for (key, voxel) in self.keys.iter().zip(&voxels) {
-                    list.add(*key, voxel);
-                }
+                list.fill(keys.zip(voxels), &self.columns);
                 list.sums = self.sums;
             }
             None => {
                 let (count, sum) = (1, [0; 3]);
-                for key in &self.keys {
-                    list.add(*key, &Voxel { count, sum });
-                }
+                let voxels = std::iter::repeat(Voxel { count, sum });
+                list.fill(keys.zip(voxels), &self.columns);
                 list.sums.points = self.keys.len() as u64;
             }
         }
         list
+    }
+
+    /// The occupied cells as a list, so far as they fit into `max_bytes`.
+    pub fn into_occupancy(self, max_bytes: usize) -> OccupancyList {
+        OccupancyList::from_keys(self.lattice, self.datum_index, self.keys, max_bytes)
     }
 
     /// The lattice.
@@ -120,6 +132,11 @@ impl MapContents {
     /// The payload, one for each key, if there is any.
     pub fn voxels(&self) -> Option<&[Voxel]> {
         self.voxels.as_deref()
+    }
+
+    /// Which further columns there are.
+    pub fn payload(&self) -> Payload {
+        self.columns.payload()
     }
 
     /// Quantization error over all points that were ever inserted.
@@ -163,4 +180,8 @@ impl MapContents {
         }
         Ok(())
     }
+}
+
+pub(super) fn no_columns() -> Columns {
+    Columns::new(Payload::default())
 }

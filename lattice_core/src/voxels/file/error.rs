@@ -42,6 +42,16 @@ pub enum FileError {
         /// What the caller allows.
         max_voxels: usize,
     },
+    /// More than the caller allows to be held.
+    #[error(
+        "the {voxels} voxels of the map file take more than {max_bytes} bytes: raise max_bytes"
+    )]
+    TooLarge {
+        /// Voxels in the file.
+        voxels: u64,
+        /// What the caller allows.
+        max_bytes: usize,
+    },
     /// The bytes cannot be a map.
     #[error("the map file is damaged at byte {position}: {reason}")]
     Corrupt {
@@ -72,6 +82,9 @@ pub enum FileError {
         /// Length that the file should have.
         position: u64,
     },
+    /// No reader would take the lattice of the map.
+    #[error("the lattice cannot be written: {0}")]
+    Lattice(String),
     /// The writer was asked for a level that readers of the format need not take.
     #[error("zstd level {0} is not between 1 and 19")]
     Level(i32),

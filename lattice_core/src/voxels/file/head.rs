@@ -1,5 +1,7 @@
 //! The fixed head of a map file, of a section, and its end.
 
+use nalgebra::{Matrix3, Quaternion, UnitQuaternion};
+
 use super::FileError;
 use crate::lattice::{Lattice, LatticeKind};
 use crate::voxels::distortion::DistortionSums;
@@ -12,6 +14,13 @@ pub(super) const END_TAG: &[u8; 4] = b"LEND";
 pub(super) const HEAD_BYTES: usize = 224;
 /// Bytes of the head of a section, its checksum included.
 pub(super) const SECTION_HEAD_BYTES: usize = 48;
+
+/// Places in the head.
+const VOLUME_AT: u64 = 24;
+const ORIENTATION_AT: u64 = 32;
+const GENERATOR_AT: u64 = 64;
+/// How far the squared length of a quaternion may be from 1.
+const UNIT_SLACK: f64 = 1e-6;
 
 /// What a map is of, and how many sections follow.
 pub(super) struct Head {
@@ -30,7 +39,7 @@ impl Head {
         bytes.extend(self.lattice.cell_volume_m3().to_le_bytes());
         for value in orientation(&self.lattice)
             .iter()
-            .chain(self.lattice.generator().iter())
+            .chain(self.lattice.unoriented_generator().iter())
         {
             bytes.extend(value.to_le_bytes());
         }
@@ -55,15 +64,16 @@ impl Head {
         };
         let at = fields.position;
         let name = name_of(&fields.array::<16>()).map_err(|reason| corrupt(at, reason))?;
-        let kind: LatticeKind = name
-            .parse()
-            .map_err(|error| corrupt(at, format!("{error}")))?;
-        let at = fields.position;
+        let kind = match LatticeKind::Custom.name() == name {
+            true => Ok(LatticeKind::Custom),
+            false => name.parse(),
+        };
+        let kind: LatticeKind = kind.map_err(|error| corrupt(at, format!("{error}")))?;
         let volume_m3 = fields.f64();
         let orientation: [f64; 4] = std::array::from_fn(|_| fields.f64());
         let generator: [f64; 9] = std::array::from_fn(|_| fields.f64());
         let lattice = lattice(kind, volume_m3, orientation, generator)
-            .map_err(|reason| corrupt(at, reason))?;
+            .map_err(|(at, reason)| corrupt(at, reason))?;
         let datum_index = std::array::from_fn(|_| i64::from_le_bytes(fields.array()));
         let sums = DistortionSums {
             points: fields.u64(),
@@ -83,26 +93,57 @@ impl Head {
 }
 
 /// `map_from_lattice` as w, x, y, z.
-fn orientation(_lattice: &Lattice) -> [f64; 4] {
-    [1.0, 0.0, 0.0, 0.0]
+fn orientation(lattice: &Lattice) -> [f64; 4] {
+    let q = lattice.orientation();
+    [q.w, q.i, q.j, q.k]
 }
 
-/// The lattice of these figures, if it is the one that they were written for, to the bit.
+/// What is wrong with a rotation.
+pub(super) fn orientation_fault(map_from_lattice: &UnitQuaternion<f64>) -> Option<String> {
+    let square = map_from_lattice.coords.norm_squared();
+    // Not a number is refused too.
+    let unit = (square - 1.0).abs() <= UNIT_SLACK;
+    (!unit).then(|| {
+        format!(
+            "the orientation {:?} is no unit quaternion",
+            map_from_lattice.coords
+        )
+    })
+}
+
+/// The lattice of these figures, if it is the one that they were written for, to the bit; or the
+/// place of what is wrong.
 fn lattice(
     kind: LatticeKind,
     volume_m3: f64,
     turned: [f64; 4],
     generator: [f64; 9],
-) -> Result<Lattice, String> {
-    let lattice = Lattice::new(kind, volume_m3).map_err(|error| error.to_string())?;
-    let bits = |values: &[f64]| values.iter().map(|v| v.to_bits()).collect::<Vec<_>>();
-    if bits(&turned) != bits(&orientation(&lattice)) {
-        return Err(format!("orientation {turned:?} is not known"));
+) -> Result<Lattice, (u64, String)> {
+    let lattice = match kind {
+        LatticeKind::Custom => Lattice::from_basis(Matrix3::from_column_slice(&generator))
+            .map_err(|error| (GENERATOR_AT, error.to_string()))?,
+        _ => Lattice::new(kind, volume_m3).map_err(|error| (VOLUME_AT, error.to_string()))?,
+    };
+    let [w, x, y, z] = turned;
+    let rotation = UnitQuaternion::new_unchecked(Quaternion::new(w, x, y, z));
+    if let Some(fault) = orientation_fault(&rotation) {
+        return Err((ORIENTATION_AT, fault));
     }
-    if bits(&generator) != bits(lattice.generator().as_slice()) {
-        return Err(format!(
-            "generator {generator:?} is not that of {lattice:?}"
-        ));
+    let lattice = lattice.oriented(rotation);
+    let bits = |values: &[f64]| values.iter().map(|v| v.to_bits()).collect::<Vec<_>>();
+    if volume_m3.to_bits() != lattice.cell_volume_m3().to_bits() {
+        let found = lattice.cell_volume_m3();
+        let reason = format!("the cell volume is {volume_m3} m^3, that of the basis {found} m^3");
+        return Err((VOLUME_AT, reason));
+    }
+    let expected = orientation(&lattice);
+    if bits(&turned) != bits(&expected) {
+        let reason = format!("orientation {turned:?} should be written as {expected:?}");
+        return Err((ORIENTATION_AT, reason));
+    }
+    if bits(&generator) != bits(lattice.unoriented_generator().as_slice()) {
+        let reason = format!("generator {generator:?} is not that of {lattice:?}");
+        return Err((GENERATOR_AT, reason));
     }
     Ok(lattice)
 }
@@ -117,6 +158,10 @@ pub(super) enum Encoding {
     Unsigned = 1,
     /// LEB128 of the zigzag form: 0, -1, 1, -2, ...
     Signed = 2,
+    /// As `Signed`, of the difference to the same value of the voxel before.
+    SignedSteps = 3,
+    /// As `Unsigned`; a row begins with how many entries it has.
+    Rows = 4,
 }
 
 /// How the bytes of a section are packed.
@@ -156,6 +201,29 @@ pub(super) const OFFSET_SUM: Column = Column {
     components: 3,
     longest: 10,
 };
+
+pub(super) const MOMENTS: Column = Column {
+    name: "moments",
+    encoding: Encoding::Signed,
+    components: 6,
+    longest: 10,
+};
+pub(super) const STAMPS: Column = Column {
+    name: "stamps",
+    encoding: Encoding::SignedSteps,
+    components: 2,
+    longest: 10,
+};
+pub(super) const LABELS: Column = Column {
+    name: "labels",
+    encoding: Encoding::Rows,
+    components: 1,
+    // The number, and each label with its count.
+    longest: 3 + 65_536 * 8,
+};
+
+/// The columns in their order: the first, two that come together, and three of which each may lack.
+pub(super) const COLUMNS: [Column; 6] = [KEYS, COUNT, OFFSET_SUM, MOMENTS, STAMPS, LABELS];
 
 /// The head of a section; columns of later versions have other names, encodings and codecs.
 #[derive(Clone, PartialEq, Eq, Debug)]

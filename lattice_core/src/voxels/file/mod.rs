@@ -2,6 +2,7 @@
 //!
 //! `docs/map_file.md` describes the format and has a reader in Python.
 
+mod columns;
 mod contents;
 mod error;
 mod head;
@@ -14,7 +15,7 @@ mod tests;
 
 use std::io::{Read, Write};
 
-use super::{VoxelList, VoxelStore};
+use super::{OccupancyList, VoxelList, VoxelStore};
 
 pub use contents::{ContentsError, MapContents};
 pub use error::FileError;
@@ -38,7 +39,7 @@ const MAX_WINDOW_LOG: u32 = 23;
 pub struct WriteOptions {
     /// Sections packed by zstd at this level, 1 to 19; stored as they are if `None`.
     pub zstd_level: Option<i32>,
-    /// Leaves out counts and offset sums.
+    /// Leaves out counts, offset sums and all further columns.
     pub occupancy_only: bool,
 }
 
@@ -61,4 +62,22 @@ pub fn write_occupancy(
 /// A map without payload becomes one of a point at each centre. See [`MapContents::read`].
 pub fn read_map(reader: impl Read, max_voxels: usize) -> Result<VoxelList, FileError> {
     Ok(MapContents::read(reader, max_voxels)?.into_list(max_voxels))
+}
+
+/// Reads the occupied cells of a map into a list of at most `max_bytes`, whatever else the map holds.
+///
+/// Fails with [`FileError::TooLarge`] if they do not fit. See [`MapContents::read`].
+pub fn read_occupancy(reader: impl Read, max_bytes: usize) -> Result<OccupancyList, FileError> {
+    let most = OccupancyList::max_voxels_within(max_bytes);
+    let too_large = |voxels| FileError::TooLarge { voxels, max_bytes };
+    let contents = match MapContents::read_keys(reader, most) {
+        Err(FileError::TooManyVoxels { voxels, .. }) => return Err(too_large(voxels)),
+        other => other?,
+    };
+    let voxels = contents.keys.len();
+    let list = contents.into_occupancy(max_bytes);
+    match list.len() == voxels {
+        true => Ok(list),
+        false => Err(too_large(voxels as u64)),
+    }
 }

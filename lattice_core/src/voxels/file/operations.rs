@@ -4,8 +4,10 @@ use nalgebra::Vector3;
 use thiserror::Error;
 
 use super::MapContents;
+use super::contents::no_columns;
 use crate::lattice::Key;
-use crate::voxels::Voxel;
+use crate::voxels::columns::Columns;
+use crate::voxels::{Voxel, set_ops};
 
 /// Why two maps do not go together. The receiving map is as before.
 #[derive(Clone, PartialEq, Eq, Debug, Error)]
@@ -28,15 +30,16 @@ pub enum OperationError {
         /// The datum of the receiving map.
         datum_index: [i64; 3],
     },
-    /// One map has counts and offsets, the other has not.
-    #[error("only one of the maps has point counts: drop them with occupancy only")]
-    Payload,
+    /// One map has counts and offsets, or a further column, that the other has not.
+    #[error("only one of the maps has {0}: drop all but the cells with occupancy only")]
+    Payload(&'static str),
 }
 
 impl MapContents {
-    /// Leaves out counts and offsets; keeps the statistics.
+    /// Leaves out counts, offsets and further columns; keeps the statistics.
     pub fn drop_payload(&mut self) {
         self.voxels = None;
+        self.columns = no_columns();
     }
 
     /// The same cells, counted from another lattice point of the map frame.
@@ -66,6 +69,7 @@ impl MapContents {
             let at = |place: usize| voxels.get(place).copied().unwrap_or_default();
             moved.iter().map(|&(_, place)| at(place)).collect()
         });
+        self.columns = self.columns.gather(moved.iter().map(|&(_, place)| place));
         self.keys = moved.into_iter().map(|(key, _)| key).collect();
         self.datum_index = datum_index;
         Ok(self)
@@ -75,43 +79,36 @@ impl MapContents {
     /// as the first map gives the datum.
     pub fn merge(&mut self, other: MapContents) -> Result<(), OperationError> {
         self.expect_cells_of(&other)?;
-        if self.voxels.is_some() != other.voxels.is_some() {
-            return Err(OperationError::Payload);
-        }
+        self.expect_columns_of(&other)?;
         let other = other.with_datum(self.datum_index)?;
         let room = self.keys.len().saturating_add(other.keys.len());
         let mut keys = Vec::with_capacity(room);
         let mut voxels = Vec::with_capacity(if self.voxels.is_some() { room } else { 0 });
-        let (mut ours, mut theirs) = (self.rows().peekable(), other.rows().peekable());
-        loop {
-            let (key, voxel) = match (ours.peek(), theirs.peek()) {
-                (Some((a, _)), Some((b, _))) if a == b => {
-                    let row = ours.next().zip(theirs.next());
-                    let Some(((key, a), (_, b))) = row else { break };
-                    let sum = a.zip(b).map(|(mut a, b)| {
-                        a.add(&b);
-                        a
-                    });
-                    (key, sum)
+        let mut columns = Columns::new(self.columns.payload());
+        let (mut ours, mut theirs) = (0, 0);
+        set_ops::walk(&self.keys, &other.keys, |key, side| {
+            let mut voxel = Voxel::default();
+            columns.push();
+            let mut add = |map: &MapContents, place: &mut usize| {
+                if let Some(more) = map.voxels.as_ref().and_then(|v| v.get(*place)) {
+                    voxel.add(more);
                 }
-                (Some((a, _)), Some((b, _))) if a > b => match theirs.next() {
-                    Some(row) => row,
-                    None => break,
-                },
-                (Some(_), _) => match ours.next() {
-                    Some(row) => row,
-                    None => break,
-                },
-                (None, _) => match theirs.next() {
-                    Some(row) => row,
-                    None => break,
-                },
+                if !columns.payload().is_plain() {
+                    columns.add(keys.len(), &map.columns.get(*place));
+                }
+                *place += 1;
             };
+            if side.is_le() {
+                add(self, &mut ours);
+            }
+            if side.is_ge() {
+                add(&other, &mut theirs);
+            }
             keys.push(key);
-            voxels.extend(voxel);
-        }
-        drop(ours);
+            voxels.extend(self.voxels.is_some().then_some(voxel));
+        });
         (self.keys, self.voxels) = (keys, self.voxels.is_some().then_some(voxels));
+        self.columns = columns;
         self.sums.add(&other.sums);
         Ok(())
     }
@@ -127,6 +124,8 @@ impl MapContents {
             .collect();
         let mut flags = kept.iter();
         self.keys.retain(|_| flags.next() == Some(&true));
+        let places = kept.iter().enumerate().filter(|(_, kept)| **kept);
+        self.columns = self.columns.gather(places.map(|(place, _)| place));
         if let Some(voxels) = &mut self.voxels {
             let mut flags = kept.iter();
             voxels.retain(|_| flags.next() == Some(&true));
@@ -144,9 +143,21 @@ impl MapContents {
         })
     }
 
-    fn rows(&self) -> impl Iterator<Item = (Key, Option<Voxel>)> {
-        let voxel = |place| self.voxels.as_ref().and_then(|v| v.get(place).copied());
-        let keys = self.keys.iter().enumerate();
-        keys.map(move |(place, &key)| (key, voxel(place)))
+    fn expect_columns_of(&self, other: &MapContents) -> Result<(), OperationError> {
+        let (ours, theirs) = (self.payload(), other.payload());
+        for (name, differs) in [
+            (
+                "point counts",
+                self.voxels.is_some() != other.voxels.is_some(),
+            ),
+            ("moments", ours.moments != theirs.moments),
+            ("stamps", ours.stamps != theirs.stamps),
+            ("labels", ours.labels != theirs.labels),
+        ] {
+            if differs {
+                return Err(OperationError::Payload(name));
+            }
+        }
+        Ok(())
     }
 }

@@ -2,9 +2,11 @@
 
 use std::io::{self, Read};
 
+use super::columns::{decode_labels, decode_moments, decode_stamps, expect, expect_end};
+use super::contents::no_columns;
 use super::head::{
-    COUNT, Codec, Column, END_TAG, HEAD_BYTES, Head, KEYS, MAGIC, OFFSET_SUM, OLD_MAGIC,
-    SECTION_HEAD_BYTES, SECTION_TAG, SectionHead, corrupt,
+    COLUMNS, COUNT, Codec, Column, END_TAG, HEAD_BYTES, Head, KEYS, MAGIC, MOMENTS, OFFSET_SUM,
+    OLD_MAGIC, SECTION_HEAD_BYTES, SECTION_TAG, STAMPS, SectionHead, corrupt,
 };
 use super::{FileError, MAX_EXPANSION, MAX_WINDOW_LOG, MapContents};
 use crate::voxels::Voxel;
@@ -19,6 +21,23 @@ impl MapContents {
     /// Columns with unknown names are skipped; otherwise this refuses anything that no writer of
     /// this format writes. Allocates in proportion to the bytes that have been read.
     pub fn read(reader: impl Read, max_voxels: usize) -> Result<MapContents, FileError> {
+        Self::read_columns(reader, max_voxels, COLUMNS.len())
+    }
+
+    /// As [`MapContents::read`], but skips everything behind the keys.
+    pub(super) fn read_keys(
+        reader: impl Read,
+        max_voxels: usize,
+    ) -> Result<MapContents, FileError> {
+        Self::read_columns(reader, max_voxels, 1)
+    }
+
+    /// Reads the first `wanted` of the columns that are known.
+    fn read_columns(
+        reader: impl Read,
+        max_voxels: usize,
+        wanted: usize,
+    ) -> Result<MapContents, FileError> {
         let mut source = Source {
             reader,
             crc: crc32fast::Hasher::new(),
@@ -36,6 +55,7 @@ impl MapContents {
             datum_index: head.datum_index,
             keys: Vec::new(),
             voxels: None,
+            columns: no_columns(),
             sums: head.sums,
         };
         contents
@@ -44,19 +64,25 @@ impl MapContents {
         let mut known = 0;
         for number in 0..head.sections {
             let section = source.section_head()?;
-            let expected = [KEYS, COUNT, OFFSET_SUM];
-            let column = expected.iter().find(|column| column.name == section.name);
-            if column != expected.get(known) && (column.is_some() || number == 0) {
+            let place = COLUMNS
+                .iter()
+                .position(|column| column.name == section.name);
+            let fits = match place {
+                Some(place) => place == known || (place > known && known > 2),
+                None => number > 0,
+            };
+            if !fits {
                 return Err(corrupt(
                     source.position - SECTION_HEAD_BYTES as u64,
                     format!("section {number} cannot be {:?} here", section.name),
                 ));
             }
-            let Some(column) = column else {
+            known = place.map_or(known, |place| place + 1);
+            let read = place.filter(|place| *place < wanted);
+            let Some(column) = read.and_then(|place| COLUMNS.get(place)) else {
                 source.skip(&section)?;
                 continue;
             };
-            known += 1;
             source.column(column, &section, head.voxels, &mut contents)?;
         }
         if known == 0 || known == 2 {
@@ -94,22 +120,33 @@ impl MapContents {
         let reach = self.reach();
         for voxel in self.voxels.iter_mut().flatten() {
             for sum in &mut voxel.sum {
-                let value = values.next_value()?;
-                *sum = unzigzag(value.ok_or_else(|| values.fault("it has too few values".into()))?);
+                *sum = unzigzag(expect(&mut values)?);
             }
             if let Some(fault) = voxel.fault(reach) {
                 return Err(values.fault(fault));
             }
         }
-        match values.next_value()? {
-            Some(_) => Err(values.fault("it has too many values".into())),
-            None => Ok(()),
+        expect_end(&mut values)
+    }
+
+    /// A column behind the payload.
+    fn set_further(&mut self, column: &Column, bytes: &[u8]) -> Result<(), Fault> {
+        let voxels = self.voxels.as_deref().unwrap_or_default();
+        let (reach, len) = (self.reach(), voxels.len());
+        match *column {
+            MOMENTS => {
+                let moments = decode_moments(bytes, voxels, &self.lattice, reach)?;
+                self.columns.set_moments(moments);
+            }
+            STAMPS => self.columns.set_stamps(decode_stamps(bytes, len)?),
+            _ => self.columns.set_labels(decode_labels(bytes, len)?),
         }
+        Ok(())
     }
 }
 
 /// What is wrong with the values of a column, and before which of its bytes.
-struct Fault {
+pub(super) struct Fault {
     offset: usize,
     reason: String,
 }
@@ -137,7 +174,8 @@ impl From<CodecError> for Fault {
 }
 
 impl Varints<'_> {
-    fn fault(&self, reason: String) -> Fault {
+    /// A fault at the place of the next value.
+    pub(super) fn fault(&self, reason: String) -> Fault {
         Fault {
             offset: self.position(),
             reason,
@@ -273,7 +311,8 @@ impl<R: Read> Source<R> {
         let done = match *column {
             KEYS => contents.set_keys(&bytes, voxels),
             COUNT => contents.set_counts(&bytes),
-            _ => contents.set_sums(&bytes),
+            OFFSET_SUM => contents.set_sums(&bytes),
+            _ => contents.set_further(column, &bytes),
         };
         done.map_err(|Fault { offset, reason }| {
             let (place, unpacked) = if packed {

@@ -3,8 +3,9 @@
 use super::head::{HEAD_BYTES, SECTION_HEAD_BYTES};
 use super::*;
 use crate::cloud::Cloud;
-use crate::lattice::{Key, Lattice, LatticeKind};
-use crate::voxels::Voxel;
+use crate::lattice::{Key, Lattice, LatticeKind, Orientation};
+use crate::voxels::columns::Columns;
+use crate::voxels::{LabelCount, Payload, Stamps, Voxel};
 
 fn map(kind: LatticeKind, offsets_m: &[[f32; 3]]) -> VoxelList {
     let datum_m = nalgebra::Vector3::new(-0.5, 0.0, 1.0);
@@ -332,7 +333,8 @@ fn maps_with_other_datums_merge_to_the_same_cells() {
     ));
     let mut bare = other.clone();
     bare.drop_payload();
-    assert_eq!(merged.merge(bare.clone()), Err(OperationError::Payload));
+    let refused = merged.merge(bare.clone());
+    assert_eq!(refused, Err(OperationError::Payload("point counts")));
     assert_eq!(merged, before);
     let far = other.clone().with_datum([i64::MIN, 0, i64::MAX]);
     assert!(matches!(far, Err(OperationError::OutOfRange { .. })));
@@ -355,4 +357,250 @@ fn retaining_keeps_payload_with_its_cell() {
     }
     assert_eq!(contents.distortion(), list.distortion());
     contents.into_list(9).validate().unwrap();
+}
+
+/// Further columns of every kind, in a list that was also edited and merged.
+fn detailed(lattice: Lattice) -> VoxelList {
+    let datum_m = nalgebra::Vector3::new(-0.5, 0.0, 1.0);
+    let payload = Payload {
+        moments: true,
+        stamps: true,
+        labels: true,
+    };
+    let empty = VoxelList::new(lattice, datum_m, 10_000).unwrap();
+    let mut list = empty.with_payload(payload);
+    for scan in 0..3_i32 {
+        let offsets_m = (0..300).map(|i| {
+            let i = i as f32;
+            [0.1 * (i % 20.0), 0.07 * i, 0.3 * scan as f32 - 0.01 * i]
+        });
+        let cloud = Cloud {
+            stamp_ns: i64::from(scan - 1) * 1_700_000_000_000_000_000,
+            datum_m,
+            offsets_m: offsets_m.collect(),
+        };
+        let labels: Vec<u16> = (0..250).map(|i| (i % 7) * 9362).collect();
+        list.insert_labelled(&cloud, &labels);
+    }
+    let gone = list.sorted().first().unwrap().0;
+    assert!(VoxelStore::remove(&mut list, gone));
+    list
+}
+
+fn lattices() -> Vec<Lattice> {
+    use nalgebra::{Matrix3, UnitQuaternion};
+    let turn = UnitQuaternion::from_euler_angles(0.3, -1.2, 2.5);
+    let skewed = Matrix3::new(0.5, 0.1, -0.0, 0.0, 0.4, 0.2, 0.1, -0.1, 0.6);
+    let custom = Lattice::from_basis(skewed).unwrap();
+    let mut lattices = vec![custom.clone(), custom.oriented(turn)];
+    for kind in LatticeKind::ALL {
+        let lattice = Lattice::new(kind, 0.125).unwrap();
+        lattices.push(lattice.clone());
+        lattices.push(lattice.clone().oriented(turn));
+        lattices.push(lattice.with_orientation(Orientation::Ground).unwrap());
+    }
+    lattices
+}
+
+#[test]
+fn every_lattice_and_column_comes_back_to_the_bit() {
+    for lattice in lattices() {
+        let list = detailed(lattice.clone());
+        assert_eq!(list.validate(), Ok(()), "{lattice:?}");
+        let contents = MapContents::from_list(&list);
+        for zstd_level in [None, Some(3)] {
+            let options = WriteOptions {
+                zstd_level,
+                occupancy_only: false,
+            };
+            let file = bytes(&contents, options);
+            let back = MapContents::read(&file[..], 10_000).unwrap();
+            assert_eq!(back, contents);
+            assert_eq!(bytes(&back, options), file);
+            let bits = |lattice: &Lattice| {
+                let q = lattice.orientation().coords.map(f64::to_bits);
+                (lattice.generator().map(f64::to_bits), q)
+            };
+            assert_eq!(bits(back.lattice()), bits(&lattice));
+            let again = back.into_list(10_000);
+            again.validate().unwrap();
+            assert_eq!(again.payload(), list.payload());
+            for (key, voxel) in list.sorted() {
+                assert_eq!(again.get(key), Some(voxel));
+                assert_eq!(again.center_m(key), list.center_m(key));
+                assert_eq!(again.covariance_m2(key), list.covariance_m2(key));
+                assert_eq!(again.stamps(key), list.stamps(key));
+                assert_eq!(again.labels(key), list.labels(key));
+            }
+        }
+    }
+}
+
+#[test]
+fn a_lattice_that_no_writer_writes_is_refused_with_its_place() {
+    let place = |lattice: &Lattice, at: usize, value: f64| {
+        let empty = VoxelList::at_datum(lattice.clone(), [0; 3], 1);
+        let mut file = Vec::new();
+        write_map(&empty, &mut file).unwrap();
+        file[at..at + 8].copy_from_slice(&value.to_le_bytes());
+        let crc = crc32fast::hash(&file[..220]);
+        file[220..224].copy_from_slice(&crc.to_le_bytes());
+        let end = file.len() - 4;
+        let crc = crc32fast::hash(&file[..end]);
+        file[end..].copy_from_slice(&crc.to_le_bytes());
+        match read_map(&file[..], 1).map(|list| list.lattice().clone()) {
+            Err(FileError::Corrupt { position, reason }) => (position, reason),
+            other => panic!("{other:?}"),
+        }
+    };
+    let [custom, turned, cubic, ..] = &lattices()[..] else {
+        panic!("a lattice is missing")
+    };
+    for (lattice, at, value, position, words) in [
+        (cubic, 32, f64::NAN, 32, "unit quaternion"),
+        (cubic, 32, 1.001, 32, "unit quaternion"),
+        (cubic, 40, f64::INFINITY, 32, "unit quaternion"),
+        (turned, 32, 0.0, 32, "unit quaternion"),
+        (cubic, 32, -1.0, 32, "should be"),
+        (cubic, 40, -0.0, 32, "should be"),
+        (cubic, 24, f64::NAN, 24, "volume"),
+        (cubic, 64, 0.25, 64, "generator"),
+        (cubic, 72, -0.0, 64, "generator"),
+        (custom, 64, f64::NAN, 64, "finite"),
+        (custom, 64, 1e300, 64, "volume"),
+        (custom, 88, 1e7, 64, "in one plane"),
+        (custom, 96, 1e4, 64, "too skewed"),
+        (custom, 64, 50.0, 64, "long or flat"),
+        (custom, 24, 0.2, 24, "that of the basis"),
+    ] {
+        let (found, reason) = place(lattice, at, value);
+        assert!(reason.contains(words), "{reason} instead of {words}");
+        assert_eq!(found, position, "{reason}");
+    }
+    let lost =
+        nalgebra::UnitQuaternion::new_unchecked(nalgebra::Quaternion::new(f64::NAN, 0.0, 0.0, 0.0));
+    let lost = VoxelList::at_datum(cubic.clone().oriented(lost), [0; 3], 1);
+    let error = write_map(&lost, Vec::new()).unwrap_err();
+    assert!(matches!(error, FileError::Lattice(_)), "{error}");
+}
+
+#[test]
+fn forged_further_columns_are_refused_where_they_are_wrong() {
+    let map = map(LatticeKind::Fcc, &[[0.0; 3]]);
+    let plain = || {
+        vec![
+            section(b"keys", [0, 1, 0, 0], 9, &FIRST_KEY),
+            section(b"count", [1, 1, 0, 0], 1, &[1]),
+            section(b"offset_sum", [2, 3, 0, 0], 3, &[0; 3]),
+        ]
+    };
+    let read = |more: Vec<Vec<u8>>| {
+        let sections = [plain(), more].concat();
+        let file = forged(&map, 1, &sections);
+        MapContents::read(&file[..], 1).map_err(|error| match error {
+            FileError::Corrupt { reason, .. } => reason,
+            other => panic!("{other}"),
+        })
+    };
+    let of = |name: &[u8], kind: [u8; 2], data: &[u8]| {
+        section(name, [kind[0], kind[1], 0, 0], data.len() as u64, data)
+    };
+    let moments = |data: &[u8]| of(b"moments", [2, 6], data);
+    let stamps = |data: &[u8]| of(b"stamps", [3, 2], data);
+    let labels = |data: &[u8]| of(b"labels", [4, 1], data);
+    let all = vec![
+        moments(&[2, 1, 0, 4, 0, 0]),
+        stamps(&[1, 2]),
+        labels(&[1, 7, 1]),
+    ];
+    let good = read(all).unwrap();
+    let payload = good.payload();
+    assert!(payload.moments && payload.stamps && payload.labels);
+    let list = good.into_list(1);
+    let key = list.sorted()[0].0;
+    let (first_ns, last_ns) = (-1, 1);
+    assert_eq!(list.stamps(key), Some(Stamps { first_ns, last_ns }));
+    let (label, count) = (7, 1);
+    assert_eq!(list.label(key), Some(LabelCount { label, count }));
+    let huge = [0x80, 0x80, 0x80, 0x80, 0x80, 0x80, 0x01, 0, 0, 0, 0, 0];
+    for (more, words) in [
+        (vec![moments(&[1, 0, 0, 0, 0, 0])], "no 1 points"),
+        (vec![moments(&huge)], "no 1 points"),
+        (vec![moments(&[0; 5])], "do not take 5"),
+        (vec![moments(&[0; 7])], "too many"),
+        (vec![moments(&[2, 0x80, 1, 0, 0, 0])], "too few"),
+        (vec![stamps(&[2, 1])], "after the last"),
+        (vec![stamps(&[0, 0, 0])], "too many"),
+        (vec![labels(&[1, 7])], "too few"),
+        (vec![labels(&[0, 7])], "too many"),
+        (vec![labels(&[1, 7, 0])], "of 0 points"),
+        (vec![labels(&[1, 0x80, 0x80, 4, 1])], "label 65536"),
+        (vec![labels(&[2, 7, 1, 7, 1])], "ascend"),
+        (vec![labels(&[0x80, 0x80, 0x80, 0x80, 0x10])], "too few"),
+        (
+            vec![stamps(&[1, 2]), moments(&[0; 6])],
+            "cannot be \"moments\"",
+        ),
+        (
+            vec![stamps(&[1, 2]), stamps(&[1, 2])],
+            "cannot be \"stamps\"",
+        ),
+        (vec![of(b"stamps", [2, 2], &[1, 2])], "encoding"),
+    ] {
+        let reason = read(more).unwrap_err();
+        assert!(reason.contains(words), "{reason} instead of {words}");
+    }
+    let bare = [plain()[0].clone(), stamps(&[1, 2])];
+    let error = read_map(&forged(&map, 1, &bare)[..], 1).unwrap_err();
+    assert!(
+        error.to_string().contains("cannot be \"stamps\""),
+        "{error}"
+    );
+}
+
+#[test]
+fn further_columns_go_with_their_voxels() {
+    let list = detailed(Lattice::new(LatticeKind::Bcc, 0.125).unwrap());
+    let whole = MapContents::from_list(&list);
+    let (mut low, mut high) = (whole.clone(), whole.clone());
+    low.retain(|_, center_m| center_m.y < 8.0);
+    high.retain(|_, center_m| center_m.y >= 8.0);
+    assert!(!low.keys().is_empty() && !high.keys().is_empty());
+    let far = high.with_datum([-700, 20, 9]).unwrap();
+    let mut merged = low.clone();
+    merged.merge(far).unwrap();
+    assert_eq!(merged.columns, whole.columns);
+    assert_eq!(merged.voxels, whole.voxels);
+    let mut twice = list.clone();
+    twice.merge(&list).unwrap();
+    let mut both = whole.clone();
+    both.merge(whole.clone()).unwrap();
+    assert_eq!(both, MapContents::from_list(&twice));
+    let mut plain = whole.clone();
+    plain.columns = Columns::new(Payload::default());
+    assert_eq!(plain.merge(whole), Err(OperationError::Payload("moments")));
+}
+
+#[test]
+fn occupancy_is_read_in_one_go_and_bounded() {
+    let list = detailed(Lattice::new(LatticeKind::HexOptimal, 0.125).unwrap());
+    let file = bytes(&MapContents::from_list(&list), WriteOptions::default());
+    let occupancy = read_occupancy(&file[..], 1 << 20).unwrap();
+    occupancy.validate().unwrap();
+    assert_eq!(occupancy.sorted_keys(), list.sorted_keys());
+    assert_eq!(occupancy.datum_index(), list.datum_index());
+    let mut written = [Vec::new(), Vec::new()];
+    write_occupancy(&occupancy, &mut written[0], &WriteOptions::default()).unwrap();
+    write_occupancy(&list, &mut written[1], &WriteOptions::default()).unwrap();
+    assert_eq!(written[0], written[1]);
+    for max_bytes in [0, 200, 1000] {
+        let error = read_occupancy(&file[..], max_bytes).unwrap_err();
+        assert!(matches!(error, FileError::TooLarge { .. }), "{error}");
+    }
+    // What is skipped is checked.
+    for at in [HEAD_BYTES + 60, file.len() / 2, file.len() - 20] {
+        let mut damaged = file.clone();
+        damaged[at] ^= 4;
+        assert!(read_occupancy(&damaged[..], 1 << 20).is_err());
+    }
 }

@@ -2,7 +2,11 @@
 
 use std::io::Write;
 
-use super::head::{COUNT, Codec, Column, END_TAG, Head, KEYS, OFFSET_SUM, SectionHead};
+use super::columns::{encode_labels, encode_moments, encode_stamps};
+use super::head::{
+    COUNT, Codec, Column, END_TAG, Head, KEYS, LABELS, MOMENTS, OFFSET_SUM, STAMPS, SectionHead,
+    orientation_fault,
+};
 use super::{FileError, MAX_EXPANSION, MapContents, WriteOptions};
 use crate::voxels::codec::{encode_keys, push_varint, zigzag};
 
@@ -13,13 +17,19 @@ impl MapContents {
         if let Some(level) = level.filter(|level| !(1..=19).contains(level)) {
             return Err(FileError::Level(level));
         }
+        if let Some(fault) = orientation_fault(&self.lattice.orientation()) {
+            return Err(FileError::Lattice(fault));
+        }
         let voxels = self.voxels.as_ref().filter(|_| !options.occupancy_only);
+        let payload = self.columns.payload();
+        let further = [payload.moments, payload.stamps, payload.labels];
+        let further = further.iter().map(|&kept| u32::from(kept)).sum::<u32>();
         let head = Head {
             lattice: self.lattice.clone(),
             datum_index: self.datum_index,
             sums: self.sums,
             voxels: self.keys.len() as u64,
-            sections: if voxels.is_some() { 3 } else { 1 },
+            sections: if voxels.is_some() { 3 + further } else { 1 },
         };
         let mut sink = Sink {
             writer,
@@ -40,6 +50,15 @@ impl MapContents {
                 .flat_map(|voxel| voxel.sum)
                 .for_each(|sum| push_varint(&mut bytes, zigzag(sum)));
             sink.section(&OFFSET_SUM, bytes, level)?;
+            if payload.moments {
+                sink.section(&MOMENTS, encode_moments(&self.columns), level)?;
+            }
+            if payload.stamps {
+                sink.section(&STAMPS, encode_stamps(&self.columns), level)?;
+            }
+            if payload.labels {
+                sink.section(&LABELS, encode_labels(&self.columns), level)?;
+            }
         }
         sink.write(END_TAG)?;
         let crc = sink.crc.clone().finalize();
