@@ -6,7 +6,9 @@ use lattice_core::cloud::Cloud;
 use lattice_core::lattice::{Lattice, LatticeKind};
 use lattice_core::voxels::VoxelList;
 use lattice_core::voxels::codec::{decode_keys, encode_keys};
-use lattice_core::voxels::file::{MapContents, WriteOptions, read_map};
+use lattice_core::voxels::file::{
+    MapContents, WriteOptions, read_map, read_occupancy, write_occupancy,
+};
 use nalgebra::Vector3;
 
 const KINDS: [&str; 3] = ["cubic", "bcc", "fcc"];
@@ -59,6 +61,27 @@ fn load_occupancy(bencher: divan::Bencher, kind: &str) {
     bencher
         .counter(voxels(&map))
         .bench(|| MapContents::read(&file[..], usize::MAX).unwrap());
+}
+
+#[divan::bench(args = KINDS)]
+fn save_occupancy_of_a_list(bencher: divan::Bencher, kind: &str) {
+    let map = map(kind);
+    let count = voxels(&map);
+    let list = map.into_occupancy(usize::MAX);
+    bencher.counter(count).bench(|| {
+        let mut bytes = Vec::new();
+        write_occupancy(&list, &mut bytes, &BARE).unwrap();
+        bytes
+    });
+}
+
+#[divan::bench(args = KINDS)]
+fn load_occupancy_into_a_list(bencher: divan::Bencher, kind: &str) {
+    let map = map(kind);
+    let file = bytes(&map, &BARE);
+    bencher
+        .counter(voxels(&map))
+        .bench(|| read_occupancy(&file[..], usize::MAX).unwrap());
 }
 
 #[divan::bench(args = KINDS)]
