@@ -98,7 +98,9 @@ fn the_number_of_threads_does_not_change_a_byte() {
                 out_of_range,
                 list_full,
                 new_voxels,
+                forgotten_voxels,
             } = one.0;
+            assert_eq!(forgotten_voxels, 0);
             assert_eq!(points, inserted + not_finite + out_of_range + list_full);
             assert_eq!((not_finite, out_of_range), (400, 400));
             assert_eq!(list_full > 0, max_voxels == 2000);

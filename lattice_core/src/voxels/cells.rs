@@ -84,7 +84,6 @@ impl Block {
 ///
 /// A scan fills few blocks, over and over: they stay near the processor however large the map is,
 /// where a hash table over all cells would touch a far line of memory for each.
-#[derive(Clone)]
 pub(super) struct CellTable {
     blocks: Table<Block>,
     rows: Vec<Entry>,
@@ -92,6 +91,20 @@ pub(super) struct CellTable {
     number_bytes: usize,
     /// The block found before.
     last: (u64, u32),
+}
+
+impl Clone for CellTable {
+    fn clone(&self) -> CellTable {
+        let blocks = self.blocks.clone();
+        // Copies of vectors have no room to spare.
+        let capacities = blocks.rows().iter().map(|block| block.numbers.capacity());
+        CellTable {
+            number_bytes: capacities.sum::<usize>() * size_of::<u32>(),
+            blocks,
+            rows: self.rows.clone(),
+            last: self.last,
+        }
+    }
 }
 
 impl CellTable {
@@ -128,6 +141,14 @@ impl CellTable {
     #[inline(always)]
     pub(super) fn row_mut(&mut self, number: u32) -> Option<&mut Entry> {
         self.rows.get_mut(number as usize)
+    }
+
+    /// The blocks, each with one bit for each of its voxels.
+    pub(super) fn blocks(&self) -> impl Iterator<Item = (u64, &Leaf)> {
+        self.blocks
+            .rows()
+            .iter()
+            .map(|block| (block.code, &block.leaf))
     }
 
     pub(super) fn bytes(&self) -> usize {

@@ -32,6 +32,8 @@ pub struct InsertReport {
     pub list_full: u64,
     /// Voxels that were not in the list before.
     pub new_voxels: u64,
+    /// Voxels that went to make room, see [`super::WhenFull`].
+    pub forgotten_voxels: u64,
 }
 
 impl InsertReport {
@@ -76,6 +78,7 @@ impl InsertReport {
         self.out_of_range += other.out_of_range;
         self.list_full += other.list_full;
         self.new_voxels += other.new_voxels;
+        self.forgotten_voxels += other.forgotten_voxels;
     }
 }
 
@@ -116,7 +119,8 @@ impl VoxelList {
         let quantizer = BatchQuantizer::new(&self.lattice, shift.into());
         let mut chunks: Vec<Chunk> = Vec::new();
         let mut labels = labels;
-        for wave in cloud.offsets_m.chunks(WAVE) {
+        for wave in cloud.offsets_m.chunks(self.wave_points(WAVE)) {
+            report.forgotten_voxels += self.make_room(wave.len(), now) as u64;
             let origin = Origin {
                 stamp_ns: cloud.stamp_ns,
                 labels: (!labels.is_empty()).then_some(labels),
@@ -148,7 +152,7 @@ impl VoxelList {
         }
         report.inserted =
             report.points - report.not_finite - report.out_of_range - report.list_full;
-        report.new_voxels = (self.len() - before) as u64;
+        report.new_voxels = self.len() as u64 + report.forgotten_voxels - before as u64;
         report
     }
 

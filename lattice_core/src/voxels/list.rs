@@ -10,9 +10,9 @@ use super::columns::{Columns, Details, LabelCount, Payload, Stamps};
 use super::distortion::{Distortion, DistortionSums};
 use super::fixed::{moment_unit_m, voxel_of};
 use super::shard::{Entry, SHARDS, Shard, shard_of};
-use super::{InsertReport, OFFSET_UNIT_M, Voxel, VoxelStore};
+use super::{InsertReport, OFFSET_UNIT_M, Voxel, VoxelStore, WhenFull};
 use crate::cloud::Cloud;
-use crate::lattice::{CellCode, Key, Lattice};
+use crate::lattice::{CellCode, Key, Lattice, LatticeIndex};
 
 /// The datum is not finite or too many cells from the origin of the map frame.
 #[derive(Clone, Copy, PartialEq, Debug, Error)]
@@ -36,6 +36,7 @@ pub struct VoxelList {
     pub(super) datum_index: [i64; 3],
     pub(super) datum_m: Vector3<f64>,
     pub(super) max_voxels: usize,
+    pub(super) when_full: WhenFull,
     pub(super) payload: Payload,
     pub(super) shards: Vec<Shard>,
     pub(super) sums: DistortionSums,
@@ -69,6 +70,7 @@ impl VoxelList {
             lattice,
             datum_index,
             max_voxels,
+            when_full: WhenFull::default(),
             payload: Payload::default(),
             shards: vec![Shard::new(Columns::new(Payload::default())); SHARDS],
             sums: DistortionSums::default(),
@@ -81,6 +83,7 @@ impl VoxelList {
     pub fn with_payload(self, payload: Payload) -> VoxelList {
         let mut list = VoxelList::at_datum(self.lattice, self.datum_index, self.max_voxels);
         list.payload = payload;
+        list.when_full = self.when_full;
         list.shards = vec![Shard::new(Columns::new(payload)); SHARDS];
         list
     }
@@ -365,6 +368,14 @@ impl VoxelStore for VoxelList {
         let removed = shard.is_some_and(|shard| shard.remove(code, now));
         self.bound_removed();
         removed
+    }
+
+    fn retain_cells(
+        &mut self,
+        keep_block: &(dyn Fn(LatticeIndex) -> Option<bool> + Sync),
+        keep: &(dyn Fn(Key) -> bool + Sync),
+    ) -> usize {
+        self.retain_in_blocks(keep_block, keep)
     }
 
     fn bytes(&self) -> usize {

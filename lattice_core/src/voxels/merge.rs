@@ -5,14 +5,14 @@ use thiserror::Error;
 use super::columns::Columns;
 use super::fixed::points_of;
 use super::shard::{SHARDS, shard_of};
-use super::{Voxel, VoxelList};
+use super::{Voxel, VoxelList, VoxelStore};
 use crate::lattice::{CellCode, Key};
 
-/// Why two lists do not merge. The receiving list is as before.
+/// Why two stores do not go together. The receiving one is as before.
 #[derive(Clone, PartialEq, Debug, Error)]
 pub enum MergeError {
     /// The cells are different.
-    #[error("cannot merge {theirs} into {ours}: make both maps with one lattice and cell volume")]
+    #[error("{theirs} does not go with {ours}: make both maps with one lattice and cell volume")]
     Lattice {
         /// The lattice of the receiving list.
         ours: String,
@@ -21,7 +21,7 @@ pub enum MergeError {
     },
     /// The same lattice, counted from different points.
     #[error(
-        "cannot merge a map with datum {theirs:?} m into one with datum {ours:?} m: give both the same datum"
+        "a map with datum {theirs:?} m does not go with one with datum {ours:?} m: give both the same datum"
     )]
     Datum {
         /// Datum of the receiving list, map frame, metres.
@@ -39,23 +39,22 @@ pub enum MergeError {
         /// What the receiving list allows.
         max_voxels: usize,
     },
+    /// The union takes too much memory.
+    #[error("the merged map takes {bytes} B, but at most {max_bytes} are allowed: raise max_bytes")]
+    FullBytes {
+        /// Memory for the union.
+        bytes: usize,
+        /// What the receiving list allows.
+        max_bytes: usize,
+    },
 }
 
 impl VoxelList {
     /// Adds all voxels and statistics of `other`, exactly; order and grouping of merges do not
-    /// matter. Fails, changing nothing, for another lattice or datum or if the union is too large.
+    /// matter. Fails, changing nothing, for another lattice or datum or if the union is too large,
+    /// whatever [`super::WhenFull`] says.
     pub fn merge(&mut self, other: &VoxelList) -> Result<(), MergeError> {
-        if self.lattice != other.lattice {
-            let describe = |list: &VoxelList| format!("{:?}", list.lattice);
-            return Err(MergeError::Lattice {
-                ours: describe(self),
-                theirs: describe(other),
-            });
-        }
-        if self.datum_index != other.datum_index {
-            let (ours, theirs) = (self.datum_m.into(), other.datum_m.into());
-            return Err(MergeError::Datum { ours, theirs });
-        }
+        self.expect_cells_of(other)?;
         let new = other
             .shards
             .iter()

@@ -9,7 +9,7 @@ use super::recent::Recent;
 use super::table::{Place, Row, Table};
 use super::{DatumError, InsertReport, VoxelStore, morton};
 use crate::cloud::Cloud;
-use crate::lattice::{BatchQuantizer, CellCode, Key, Lattice};
+use crate::lattice::{BatchQuantizer, CellCode, Key, Lattice, LatticeIndex};
 
 /// Fewest points that are worth a thread.
 const PART: usize = 1 << 13;
@@ -394,6 +394,14 @@ impl VoxelStore for OccupancyList {
         true
     }
 
+    fn retain_cells(
+        &mut self,
+        keep_block: &(dyn Fn(LatticeIndex) -> Option<bool> + Sync),
+        keep: &(dyn Fn(Key) -> bool + Sync),
+    ) -> usize {
+        self.retain_in_blocks(keep_block, keep)
+    }
+
     fn bytes(&self) -> usize {
         self.blocks.bytes() + Recent::BYTES
     }
@@ -410,5 +418,7 @@ impl fmt::Debug for OccupancyList {
     }
 }
 
+mod merge;
+mod retain;
 #[cfg(test)]
 mod tests;

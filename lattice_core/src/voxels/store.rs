@@ -2,9 +2,9 @@
 
 use nalgebra::Vector3;
 
-use super::InsertReport;
+use super::{InsertReport, MergeError, Region};
 use crate::cloud::Cloud;
-use crate::lattice::{Key, Lattice};
+use crate::lattice::{Key, Lattice, LatticeIndex};
 
 /// Occupied voxels of a lattice whose indices count from a datum in the map frame.
 ///
@@ -35,6 +35,17 @@ pub trait VoxelStore: Sync {
     /// Removes a voxel; false if the cell was not occupied.
     fn remove(&mut self, key: Key) -> bool;
 
+    /// Removes the cells that `keep` denies; gives their number.
+    ///
+    /// A block of 8 x 8 x 8 indices, told by its lowest, is kept or removed as a whole if
+    /// `keep_block` says so; `keep` is asked about the cells of the others. Both are called in no
+    /// order and on many threads.
+    fn retain_cells(
+        &mut self,
+        keep_block: &(dyn Fn(LatticeIndex) -> Option<bool> + Sync),
+        keep: &(dyn Fn(Key) -> bool + Sync),
+    ) -> usize;
+
     /// Memory that the store holds, bytes.
     fn bytes(&self) -> usize;
 
@@ -52,5 +63,57 @@ pub trait VoxelStore: Sync {
     fn key_of(&self, point_m: &Vector3<f64>) -> Option<Key> {
         let w = self.lattice().quantize(&(point_m - self.datum_m()))?;
         Key::pack(w)
+    }
+
+    /// Fails unless a key means the same cell in both stores.
+    fn expect_cells_of(&self, other: &dyn VoxelStore) -> Result<(), MergeError> {
+        if self.lattice() != other.lattice() {
+            return Err(MergeError::Lattice {
+                ours: format!("{:?}", self.lattice()),
+                theirs: format!("{:?}", other.lattice()),
+            });
+        }
+        if self.datum_index() != other.datum_index() {
+            let (ours, theirs) = (self.datum_m().into(), other.datum_m().into());
+            return Err(MergeError::Datum { ours, theirs });
+        }
+        Ok(())
+    }
+
+    /// Removes the cells that `other` has too, with all that is kept of them; gives their number.
+    ///
+    /// Fails, changing nothing, for another lattice or datum.
+    fn subtract(&mut self, other: &dyn VoxelStore) -> Result<usize, MergeError> {
+        self.expect_cells_of(other)?;
+        Ok(self.retain_cells(&|_| None, &|key| !other.contains(key)))
+    }
+
+    /// Removes the cells that `other` has not; what is kept of the rest stays as it is. Gives the
+    /// number of removed cells.
+    ///
+    /// Fails, changing nothing, for another lattice or datum.
+    fn intersect(&mut self, other: &dyn VoxelStore) -> Result<usize, MergeError> {
+        self.expect_cells_of(other)?;
+        Ok(self.retain_cells(&|_| None, &|key| other.contains(key)))
+    }
+
+    /// Removes the cells with their centre in a region; gives their number.
+    fn remove_region(&mut self, region: &Region) -> usize {
+        let cells = region.of_cells(self.lattice(), self.datum_m());
+        self.retain_cells(
+            &|first| cells.block_is_inside(first).map(|inside| !inside),
+            &|key| !cells.is_inside(key),
+        )
+    }
+
+    /// Removes the cells with their centre outside of a region; gives their number.
+    ///
+    /// With a region around the latest pose this is a rolling window: one look at each block, and at
+    /// each cell of the blocks on the border.
+    fn keep_region(&mut self, region: &Region) -> usize {
+        let cells = region.of_cells(self.lattice(), self.datum_m());
+        self.retain_cells(&|first| cells.block_is_inside(first), &|key| {
+            cells.is_inside(key)
+        })
     }
 }

@@ -82,6 +82,7 @@ fn points_are_counted_by_reason() {
         out_of_range: 1,
         list_full: 1,
         new_voxels: 1,
+        forgotten_voxels: 0,
     };
     assert_eq!(report, expected);
     assert_eq!(map.distortion().points, 2);

@@ -1,0 +1,88 @@
+//! Removing many voxels at once.
+
+use rayon::prelude::*;
+
+use super::fixed::voxel_of;
+use super::morton::places;
+use super::shard::{Entry, Shard};
+use super::{Voxel, VoxelList};
+use crate::lattice::{CellCode, Key, LatticeIndex};
+
+/// The lowest index of a block.
+pub(super) fn first_index(block: u64) -> Option<LatticeIndex> {
+    CellCode::from_raw(block << 9).map(CellCode::unpack)
+}
+
+impl VoxelList {
+    /// Removes the voxels that `keep` denies; gives their number. It is called in no order.
+    ///
+    /// [`VoxelList::distortion`] still counts their points.
+    pub fn retain(&mut self, mut keep: impl FnMut(Key, &Voxel) -> bool) -> usize {
+        let lattice = self.lattice.clone();
+        let mut goes = |code: CellCode, entry: &Entry| {
+            let voxel = voxel_of(&lattice, code, &entry.points);
+            code.key().is_some_and(|key| !keep(key, &voxel))
+        };
+        let select = |shard: &Shard| {
+            let gone = shard.iter().filter(|(code, entry)| goes(*code, entry));
+            gone.map(|(code, _)| code).collect()
+        };
+        let gone = self.shards.iter().map(select).collect();
+        self.remove_all(gone)
+    }
+
+    /// Removes the voxels that `goes` wants, told also their numbers in their shards.
+    pub(super) fn remove_where(
+        &mut self,
+        goes: impl Fn(&Shard, usize, &Entry) -> bool + Sync,
+    ) -> usize {
+        let select = |shard: &Shard| {
+            let rows = shard.iter().enumerate();
+            let gone = rows.filter(|(number, (_, entry))| goes(shard, *number, entry));
+            gone.map(|(_, (code, _))| code).collect()
+        };
+        let gone = self.shards.par_iter().map(select).collect();
+        self.remove_all(gone)
+    }
+
+    pub(super) fn retain_in_blocks(
+        &mut self,
+        keep_block: &(dyn Fn(LatticeIndex) -> Option<bool> + Sync),
+        keep: &(dyn Fn(Key) -> bool + Sync),
+    ) -> usize {
+        let goes = |code: &CellCode| code.key().is_some_and(|key| !keep(key));
+        let select = |shard: &Shard| {
+            let mut gone = Vec::new();
+            for (block, leaf) in shard.voxels.blocks() {
+                let cells =
+                    places(leaf).filter_map(|place| CellCode::from_raw(block << 9 | place as u64));
+                match first_index(block).and_then(keep_block) {
+                    Some(true) => {}
+                    Some(false) => gone.extend(cells),
+                    None => gone.extend(cells.filter(goes)),
+                }
+            }
+            gone
+        };
+        let gone = self.shards.par_iter().map(select).collect();
+        self.remove_all(gone)
+    }
+
+    /// Removes the voxels of these cells, listed by shard, as one change of state.
+    fn remove_all(&mut self, gone: Vec<Vec<CellCode>>) -> usize {
+        let now = self.advance();
+        self.remove_at(gone, now)
+    }
+
+    /// Removes the voxels of these cells, listed by shard, as part of state `now`.
+    pub(super) fn remove_at(&mut self, gone: Vec<Vec<CellCode>>, now: u32) -> usize {
+        let shards = self.shards.par_iter_mut().zip(gone);
+        let removed = shards.map(|(shard, gone)| {
+            let cells = gone.into_iter();
+            cells.filter(|&code| shard.remove(code, now)).count()
+        });
+        let removed = removed.sum();
+        self.bound_removed();
+        removed
+    }
+}
