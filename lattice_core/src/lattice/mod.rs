@@ -14,6 +14,7 @@ mod key;
 mod kind;
 mod neighbors;
 mod orientation;
+pub mod paper;
 mod shape;
 mod theory;
 mod voronoi;

@@ -1,5 +1,6 @@
 //! Quantizing and packing keys, without a store.
 
+use lattice_core::lattice::paper::Search27;
 use lattice_core::lattice::{BatchQuantizer, CellCode, Lattice, Simd};
 use nalgebra::Isometry3;
 use rayon::prelude::*;
@@ -18,6 +19,9 @@ pub enum QuantizeMethod {
     Portable,
     /// One point at a time in f64.
     Scalar,
+    /// The nearest of 27 candidates, as Ryde & Brünig 2011 do it, with the best instructions; keys
+    /// of points on borders may be others.
+    Paper27,
 }
 
 impl QuantizeMethod {
@@ -26,6 +30,7 @@ impl QuantizeMethod {
             Self::Batch => "lattice-batch",
             Self::Portable => "lattice-portable",
             Self::Scalar => "lattice-scalar",
+            Self::Paper27 => "lattice-paper27",
         }
     }
 }
@@ -41,12 +46,18 @@ pub fn quantize(
     let mut keys = vec![CellCode::NONE; points_m.len()];
     let batch = |simd| BatchQuantizer::with_simd(lattice, Isometry3::identity(), simd);
     let (best, portable) = (batch(Simd::detect()), batch(Simd::Portable));
+    let paper = Search27::new(lattice, Simd::detect());
     let ((), spent) = timed(|| {
         let chunks = points_m.par_chunks(CHUNK).zip(keys.par_chunks_mut(CHUNK));
         chunks.for_each(|(points_m, keys)| match method {
             QuantizeMethod::Batch => blocks(&best, points_m, keys),
             QuantizeMethod::Portable => blocks(&portable, points_m, keys),
             QuantizeMethod::Scalar => scalar(lattice, points_m, keys),
+            QuantizeMethod::Paper27 => {
+                if let Some(paper) = &paper {
+                    paper.codes(points_m, keys);
+                }
+            }
         });
     });
     let mut report = Report::new(method.name(), lattice.kind().name(), res_m, spent);
@@ -121,5 +132,16 @@ mod tests {
             assert_eq!(hash(3, method, &points), one, "{method:?}");
             assert_ne!(hash(1, method, &points[1..]), one, "{method:?}");
         }
+        let paper = |points| hash(2, QuantizeMethod::Paper27, points);
+        // Its keys are the exact ones where single precision is enough.
+        let near: Vec<[f32; 3]> = points
+            .iter()
+            .map(|p| p.map(|x| x.rem_euclid(1.7)))
+            .collect();
+        assert_eq!(
+            paper(&near[..500]),
+            hash(1, QuantizeMethod::Scalar, &near[..500])
+        );
+        assert_ne!(paper(&points[1..]), paper(&points));
     }
 }

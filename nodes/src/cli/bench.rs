@@ -97,6 +97,8 @@ enum QuantizeName {
     Portable,
     /// One point at a time in f64
     Scalar,
+    /// The nearest of 27 candidates, as Ryde & Brünig 2011 do it
+    Paper27,
 }
 
 #[derive(Clone, Copy, ValueEnum)]
@@ -147,6 +149,7 @@ impl Quantize {
             QuantizeName::Batch => QuantizeMethod::Batch,
             QuantizeName::Portable => QuantizeMethod::Portable,
             QuantizeName::Scalar => QuantizeMethod::Scalar,
+            QuantizeName::Paper27 => QuantizeMethod::Paper27,
         };
         let cell = self.common.cell;
         let report = self
