@@ -12,6 +12,8 @@ use super::shard::{BATCH, Point, SHARDS, Shard, shard_of};
 use crate::cloud::Cloud;
 use crate::lattice::{BatchBlock, BatchQuantizer, BatchSums, CellCode, Lattice};
 
+/// Fewer points are not worth gathering.
+const FEW: usize = 1 << 12;
 /// Fewest points that are worth a thread.
 const PART: usize = 1 << 13;
 /// Points between two merges; bounds the memory for what is not yet merged.
@@ -127,24 +129,15 @@ impl VoxelList {
             };
             labels = labels.get(wave.len()..).unwrap_or_default();
             let may_fill = self.len().saturating_add(wave.len()) > self.max_voxels;
-            if may_fill || !self.payload.is_plain() {
+            if may_fill || !self.payload.is_plain() || wave.len() < FEW {
                 self.insert_singly(&quantizer, wave, origin, now, &mut report);
                 continue;
             }
             // A part for each thread: which points are in which does not matter to the sums.
             let parts = (wave.len() / PART).clamp(1, rayon::current_num_threads());
             chunks.resize_with(parts.max(chunks.len()), Chunk::new);
-            match chunks.first_mut() {
-                Some(chunk) if parts == 1 && wave.len() < PART => {
-                    self.insert_gathered(&quantizer, wave, now, chunk)
-                }
-                _ => self.insert_wave(
-                    &quantizer,
-                    wave,
-                    now,
-                    chunks.get_mut(..parts).unwrap_or_default(),
-                ),
-            }
+            let parts = chunks.get_mut(..parts).unwrap_or_default();
+            self.insert_wave(&quantizer, wave, now, parts);
             for chunk in &mut chunks {
                 report.add(&std::mem::take(&mut chunk.report));
                 self.sums.add(&std::mem::take(&mut chunk.sums));
@@ -216,43 +209,8 @@ impl VoxelList {
         }
     }
 
-    /// On this thread. There must be room for a voxel for each point.
-    fn insert_gathered(
-        &mut self,
-        quantizer: &BatchQuantizer,
-        wave: &[[f32; 3]],
-        now: u32,
-        chunk: &mut Chunk,
-    ) {
-        chunk.gather(quantizer, wave, |partials| {
-            for batch in partials.chunks(BATCH) {
-                self.add_batch(batch, now);
-            }
-            partials.clear();
-        });
-    }
-
-    /// Adds gathered points in steps, so that the waits for memory of one step overlap.
-    fn add_batch(&mut self, batch: &[Partial], now: u32) {
-        for partial in batch {
-            if let Some(shard) = self.shards.get(shard_of(partial.code)) {
-                shard.voxels.prefetch_block(partial.code);
-            }
-        }
-        let mut numbers = [None; BATCH];
-        for (number, partial) in numbers.iter_mut().zip(batch) {
-            let shard = self.shards.get_mut(shard_of(partial.code));
-            *number = shard.and_then(|shard| shard.find_soon(partial.code, now));
-        }
-        for (number, partial) in numbers.iter().zip(batch) {
-            let shard = self.shards.get_mut(shard_of(partial.code));
-            if let (Some(number), Some(shard)) = (*number, shard) {
-                shard.add(number, &partial.points, now);
-            }
-        }
-    }
-
-    /// On the threads of the current pool: first by chunks of points, then by shards.
+    /// On the threads of the current pool: first by parts of the points, then by shards. There must be
+    /// room for a voxel for each point.
     fn insert_wave(
         &mut self,
         quantizer: &BatchQuantizer,

@@ -235,3 +235,31 @@ fn lists_of_different_cells_do_not_merge() {
     );
     assert_eq!(bytes(&map), before);
 }
+
+#[test]
+fn points_fill_a_list_alike_in_one_cloud_or_in_many() {
+    for kind in LatticeKind::ALL {
+        let at =
+            |i: u32, m: u32| (i.wrapping_mul(2_654_435_761).wrapping_mul(m) >> 18) as f32 * 1e-3;
+        let mut points: Vec<[f32; 3]> = (0..20_000)
+            .map(|i| [at(i, 3), at(i, 7) - 8.0, 0.1 * at(i, 11)])
+            .collect();
+        // Some too far for fixed point of 32 bits, some without a cell.
+        points[77] = [3000.0, -2500.0, 1.0];
+        points[500] = [f32::NAN; 3];
+        points[9000] = [1e9, 0.0, 0.0];
+        let datum = [1e5, -7.0, 3.0];
+        let mut whole = list(kind, [1e5, 0.0, 0.0], 1 << 20);
+        let report = whole.insert(&cloud(datum, &points));
+        let mut parts = list(kind, [1e5, 0.0, 0.0], 1 << 20);
+        let mut total = 0;
+        for part in points.chunks(97) {
+            total += parts.insert(&cloud(datum, part)).inserted;
+        }
+        assert_eq!((report.inserted, total), (19_998, 19_998), "{kind}");
+        assert_eq!(whole.sorted(), parts.sorted(), "{kind}");
+        assert_eq!(whole.distortion(), parts.distortion(), "{kind}");
+        whole.validate().unwrap();
+        parts.validate().unwrap();
+    }
+}
