@@ -1,4 +1,4 @@
-//! `lattice map merge`, `diff` and `crop` as a user runs them.
+//! `lattice map merge`, `diff`, `crop` and `query` as a user runs them.
 #![allow(clippy::unwrap_used)]
 
 use std::path::Path;
@@ -189,4 +189,46 @@ fn what_does_not_go_together_is_refused_in_a_line() {
     assert!(!Path::new(&out).exists());
     let nowhere = at("no/where");
     assert!(error(&["map", "merge", &hex, "-o", &nowhere]).contains(&nowhere));
+}
+
+#[test]
+fn maps_answer_questions() {
+    let directory = tempfile::tempdir().unwrap();
+    // A wall at x = 2 with a gap above y = 3.
+    let wall = |i: i32| [2.0, 0.1 * (i % 80 - 50) as f32, 0.1 * (i / 80 - 20) as f32];
+    let cells: Vec<_> = (0..80 * 40).map(wall).collect();
+    let list = map(LatticeKind::Cubic, [0.0; 3], &cells);
+    let path = save(directory.path(), "wall", &list);
+    let ask = |rest: &[&str]| json(&[&["map", "query", &path], rest].concat());
+    let near = ask(&["--nearest", "1", "0", "0", "-k", "3"]);
+    let near = near["nearest"].as_array().unwrap();
+    assert_eq!(near.len(), 3);
+    assert_eq!(near[0]["center_m"], serde_json::json!([2.0, 0.0, 0.0]));
+    assert_eq!(
+        (&near[0]["distance_m"], &near[1]["distance_m"]),
+        (&1.0.into(), &1.25_f64.sqrt().into())
+    );
+    let clear = ask(&["--clearance", "1", "0", "-0.1"]);
+    assert_eq!(clear["clearance"]["distance_m"], 0.75);
+    let inside = ask(&["--clearance", "2", "0", "0"]);
+    assert_eq!(inside["clearance"]["distance_m"], 0.0);
+    let ends = ["--path", "0", "0", "0", "4", "0", "0", "--radius", "0.3"];
+    let way = &ask(&ends)["path"];
+    let length_m = way["length_m"].as_f64().unwrap();
+    assert!((7.0..9.0).contains(&length_m), "{length_m}");
+    let centers = way["centers_m"].as_array().unwrap();
+    assert_eq!(
+        centers.first().unwrap(),
+        &serde_json::json!([0.0, 0.0, 0.0])
+    );
+    assert_eq!(centers.last().unwrap(), &serde_json::json!([4.0, 0.0, 0.0]));
+    let plain = lattice(&["map", "query", &path, "--nearest", "1", "0", "0"]);
+    let plain = String::from_utf8(plain.stdout).unwrap();
+    assert_eq!(plain, "1.000 m to the cell at 2.000 0.000 0.000\n");
+    let blocked = [
+        "map", "query", &path, "--path", "2", "0", "0", "4", "0", "0", "--radius", "0",
+    ];
+    assert!(error(&blocked).contains("not passable"));
+    let nothing = lattice(&["map", "query", &path]);
+    assert!(!nothing.status.success());
 }

@@ -25,7 +25,7 @@ use std::sync::{Arc, OnceLock};
 use nalgebra::Vector3;
 
 use crate::lattice::Key;
-use crate::voxels::VoxelStore;
+use crate::voxels::{LabelCount, VoxelList, VoxelStore};
 
 pub use clearance::{Clearance, MAX_PIECES};
 pub use corridor::MAX_ROBOT_CELLS;
@@ -107,5 +107,13 @@ impl<'a, S: VoxelStore> Query<'a, S> {
         let local = point_m - self.store.datum_m();
         error::check_point(point_m)?;
         Ok(local)
+    }
+}
+
+impl Query<'_, VoxelList> {
+    /// The most frequent label of a cell, the smallest of equals; `None` if the cell has no labels
+    /// or the list keeps none.
+    pub fn label(&self, key: Key) -> Option<LabelCount> {
+        self.store.label(key)
     }
 }

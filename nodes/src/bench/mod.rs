@@ -4,6 +4,7 @@
 //! belong to one scan: records of 32 bytes, three f64 (position of the scanner, m) and a u64 (points).
 
 mod clock;
+mod file;
 mod hash26;
 mod insert;
 mod neighbors;
@@ -14,6 +15,7 @@ mod report;
 mod site;
 
 pub use clock::{Spent, timed};
+pub use file::{FileMethod, file};
 pub use insert::{InsertOptions, Store, insert};
 pub use neighbors::{NeighborMethod, neighbors};
 pub use points::{PointFileError, ScanRecord, read_points, read_scans, scans_path};

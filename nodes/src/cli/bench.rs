@@ -6,7 +6,9 @@ use clap::{Args, Subcommand, ValueEnum};
 use lattice_core::lattice::{Lattice, LatticeKind};
 
 use super::{CliResult, init_logging};
-use crate::bench::{self, InsertOptions, NeighborMethod, QuantizeMethod, Report, Store};
+use crate::bench::{
+    self, FileMethod, InsertOptions, NeighborMethod, QuantizeMethod, Report, Store,
+};
 
 /// Measure operations on a raw point file (f32 `x y z i`; see `lattice simulate site`)
 ///
@@ -21,6 +23,8 @@ pub enum Bench {
     Neighbors(Neighbors),
     /// Clear free space along the rays of all scans, as FILE.scans has them
     Raycast(Raycast),
+    /// Save the occupied voxels as a map file in memory, or load them
+    File(MapFile),
 }
 
 /// What every measurement needs.
@@ -89,6 +93,27 @@ pub struct Raycast {
     common: Common,
 }
 
+/// Options of `lattice bench file`.
+#[derive(Args)]
+pub struct MapFile {
+    #[command(flatten)]
+    common: Common,
+    /// Which way
+    #[arg(long, value_enum, default_value = "save")]
+    method: FileName,
+    /// Pack by zstd at this level, 1 to 19
+    #[arg(long, value_parser = clap::value_parser!(i32).range(1..=19))]
+    zstd: Option<i32>,
+}
+
+#[derive(Clone, Copy, ValueEnum)]
+enum FileName {
+    /// From a store to the bytes of a file
+    Save,
+    /// From the bytes of a file to a store
+    Load,
+}
+
 #[derive(Clone, Copy, ValueEnum)]
 enum QuantizeName {
     /// The batch quantizer with the best instructions of this machine
@@ -137,6 +162,7 @@ impl Bench {
             Self::Insert(command) => command.run(),
             Self::Neighbors(command) => command.run(),
             Self::Raycast(command) => command.run(),
+            Self::File(command) => command.run(),
         }
     }
 }
@@ -212,6 +238,26 @@ impl Raycast {
             .common
             .pool()?
             .install(|| bench::raycast(&lattice, cell, points, &scans))?;
+        self.common.print(&report)
+    }
+}
+
+impl MapFile {
+    fn run(self) -> CliResult {
+        let lattice = self.common.lattice()?;
+        let points = self.common.points()?;
+        let method = match self.method {
+            FileName::Save => FileMethod::Save,
+            FileName::Load => FileMethod::Load,
+        };
+        let (options, cell) = (
+            self.common.insert_options(StoreName::Occupancy),
+            self.common.cell,
+        );
+        let report = self.common.pool()?.install(|| {
+            let (_, store) = bench::insert(options, &lattice, points, None)?;
+            bench::file(method, store.as_ref(), self.zstd, cell)
+        })?;
         self.common.print(&report)
     }
 }

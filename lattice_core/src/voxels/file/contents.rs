@@ -66,7 +66,7 @@ impl MapContents {
     }
 
     /// Copies the occupied cells of any store.
-    pub fn from_store(store: &impl VoxelStore) -> MapContents {
+    pub fn from_store(store: &(impl VoxelStore + ?Sized)) -> MapContents {
         MapContents {
             lattice: store.lattice().clone(),
             datum_index: store.datum_index(),

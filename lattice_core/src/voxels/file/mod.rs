@@ -50,7 +50,7 @@ pub fn write_map(list: &VoxelList, writer: impl Write) -> Result<(), FileError> 
 
 /// Writes the occupied cells of any store, with empty statistics.
 pub fn write_occupancy(
-    store: &impl VoxelStore,
+    store: &(impl VoxelStore + ?Sized),
     writer: impl Write,
     options: &WriteOptions,
 ) -> Result<(), FileError> {

@@ -4,6 +4,7 @@ mod combine;
 mod export;
 mod info;
 mod output;
+mod query;
 
 use std::fs::File;
 use std::io::BufReader;
@@ -16,7 +17,7 @@ use super::{CliResult, init_logging};
 
 pub use export::picture;
 
-/// Look into map files, export, merge, compare and cut them
+/// Look into map files, export, merge, compare, cut and question them
 #[derive(Subcommand)]
 pub enum Map {
     /// Lattice, size, extent and statistics
@@ -29,6 +30,8 @@ pub enum Map {
     Diff(combine::Diff),
     /// The voxels with their centre in a box
     Crop(combine::Crop),
+    /// The nearest voxels, the clearance of a point, or the shortest path of a ball
+    Query(query::Query),
 }
 
 impl Map {
@@ -41,6 +44,7 @@ impl Map {
             Self::Merge(command) => command.run(),
             Self::Diff(command) => command.run(),
             Self::Crop(command) => command.run(),
+            Self::Query(command) => command.run(),
         }
     }
 }
