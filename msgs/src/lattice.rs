@@ -4,8 +4,8 @@ use serde::{Deserialize, Serialize};
 use serde_bytes::ByteBuf;
 
 use crate::geographic_msgs::GeoPoint;
-use crate::geometry_msgs::Pose;
-use crate::interface::messages;
+use crate::geometry_msgs::{Point, Pose};
+use crate::interface::{messages, services};
 use crate::std_msgs::Header;
 
 messages! {
@@ -13,6 +13,14 @@ messages! {
     LatticeInfo [Pose, GeoPoint];
     LatticeMap [Header, LatticeInfo];
     LatticeMapUpdate [Header, LatticeInfo];
+}
+
+services! {
+    "lattice_msgs" in "../srv/";
+    SaveMap: SaveMapRequest [], SaveMapResponse [];
+    LoadMap: LoadMapRequest [], LoadMapResponse [];
+    ClearBox: ClearBoxRequest [Point], ClearBoxResponse [];
+    QueryMap: QueryMapRequest [Point], QueryMapResponse [Point];
 }
 
 /// Which lattice a map is kept on, and where it lies.
@@ -114,4 +122,104 @@ pub struct LatticeMapUpdate {
 impl LatticeMapUpdate {
     /// The only encoding so far.
     pub const KEY_ENCODING_MORTON21: &'static str = "morton21_delta_leb128";
+}
+
+/// Writes the map to a file of the machine that the node runs on.
+#[derive(Clone, Copy, Debug)]
+pub struct SaveMap;
+
+/// Request of [`SaveMap`].
+#[derive(Clone, Debug, Default, PartialEq, Serialize, Deserialize)]
+pub struct SaveMapRequest {
+    /// Where to; a file that is there is replaced once the new one is complete.
+    pub path: String,
+}
+
+/// Response of [`SaveMap`].
+#[derive(Clone, Debug, Default, PartialEq, Serialize, Deserialize)]
+pub struct SaveMapResponse {
+    /// True: done.
+    pub success: bool,
+    /// What came of it.
+    pub message: String,
+    /// Voxels in the file.
+    pub voxels: u64,
+}
+
+/// Replaces the map by that of a file, which must be of the same lattice.
+#[derive(Clone, Copy, Debug)]
+pub struct LoadMap;
+
+/// Request of [`LoadMap`].
+#[derive(Clone, Debug, Default, PartialEq, Serialize, Deserialize)]
+pub struct LoadMapRequest {
+    /// A map file of the machine that the node runs on.
+    pub path: String,
+}
+
+/// Response of [`LoadMap`].
+#[derive(Clone, Debug, Default, PartialEq, Serialize, Deserialize)]
+pub struct LoadMapResponse {
+    /// True: done; false: the map is as before.
+    pub success: bool,
+    /// What came of it.
+    pub message: String,
+    /// Voxels in the map now.
+    pub voxels: u64,
+}
+
+/// Removes the voxels whose centres lie in a box along the axes of the map frame.
+#[derive(Clone, Copy, Debug)]
+pub struct ClearBox;
+
+/// Request of [`ClearBox`].
+#[derive(Clone, Debug, Default, PartialEq, Serialize, Deserialize)]
+pub struct ClearBoxRequest {
+    /// Lower corner, m.
+    pub min: Point,
+    /// Upper corner, m.
+    pub max: Point,
+}
+
+/// Response of [`ClearBox`].
+#[derive(Clone, Debug, Default, PartialEq, Serialize, Deserialize)]
+pub struct ClearBoxResponse {
+    /// True: done.
+    pub success: bool,
+    /// What came of it.
+    pub message: String,
+    /// Voxels that went.
+    pub removed: u64,
+}
+
+/// Asks what is occupied around a point.
+#[derive(Clone, Copy, Debug)]
+pub struct QueryMap;
+
+/// Request of [`QueryMap`].
+#[derive(Clone, Debug, Default, PartialEq, Serialize, Deserialize)]
+pub struct QueryMapRequest {
+    /// In the map frame, m.
+    pub point: Point,
+}
+
+/// Response of [`QueryMap`].
+#[derive(Clone, Debug, Default, PartialEq, Serialize, Deserialize)]
+pub struct QueryMapResponse {
+    /// False: not answered, the message says why.
+    pub success: bool,
+    /// What came of it.
+    pub message: String,
+    /// Whether the cell of the point is occupied.
+    pub occupied: bool,
+    /// Points in this cell.
+    pub points: u32,
+    /// False: the map is empty.
+    pub has_nearest: bool,
+    /// Distance to the nearest occupied cell, 0 inside of one, m.
+    pub clearance_m: f64,
+    /// Centre of the occupied cell that is nearest to the point, m.
+    pub nearest: Point,
+    /// Distance to this centre, m.
+    pub nearest_distance_m: f64,
 }

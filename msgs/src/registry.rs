@@ -20,6 +20,7 @@ pub fn visit_messages(visitor: &mut impl MessageVisitor) {
     geographic_msgs::visit_messages(visitor);
     geometry_msgs::visit_messages(visitor);
     lattice::visit_messages(visitor);
+    lattice::visit_services(visitor);
     nav_msgs::visit_messages(visitor);
     novatel_oem7_msgs::visit_messages(visitor);
     rcl_interfaces::visit_messages(visitor);

@@ -20,8 +20,11 @@ pub struct MapperCounts {
     pub points_not_finite: u64,
     /// Points refused: farther from the datum than voxel keys reach.
     pub points_out_of_range: u64,
-    /// Points refused: they need a voxel more than `max_voxels`.
+    /// Points refused: they need a voxel more than `max_voxels` or `max_map_bytes` allow.
     pub points_list_full: u64,
+    /// Voxels that went because the map was full or they were too old.
+    #[serde(default)]
+    pub voxels_forgotten: u64,
     /// Update steps made.
     pub updates: u64,
     /// Keyframes made.
@@ -36,5 +39,6 @@ impl MapperCounts {
         self.points_not_finite += report.not_finite;
         self.points_out_of_range += report.out_of_range;
         self.points_list_full += report.list_full;
+        self.voxels_forgotten += report.forgotten_voxels;
     }
 }

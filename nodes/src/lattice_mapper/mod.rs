@@ -2,18 +2,23 @@
 //!
 //! [`LatticeMapper`] is a state machine without I/O; [`node`] runs it behind DDS.
 
+mod calls;
 mod counts;
 pub mod node;
 mod options;
+mod services;
 
+pub use calls::LoadRefusal;
 pub use counts::MapperCounts;
 pub use options::MapperOptions;
 
 use lattice_core::cloud::CloudLimits;
+use lattice_core::query::Shells;
 use lattice_core::voxels::{DatumError, Distortion, VoxelList};
 use lattice_msgs::geographic_msgs::{GeoPoint, GeoPointStamped};
 use lattice_msgs::lattice::{LatticeMap, LatticeMapUpdate};
 use lattice_msgs::sensor_msgs::{PointCloud2, PointField};
+use std::sync::{Arc, OnceLock};
 use thiserror::Error;
 
 use crate::convert::{cloud, geometry, map};
@@ -44,7 +49,11 @@ pub struct LatticeMapper {
     sequence: u64,
     origin: Option<GeoPoint>,
     last_stamp_ns: i64,
+    /// Stamp at which old voxels were last looked for.
+    forgot_at_ns: i64,
     counts: MapperCounts,
+    /// For queries, made when the first one comes.
+    shells: OnceLock<Arc<Shells>>,
 }
 
 impl LatticeMapper {
@@ -53,7 +62,9 @@ impl LatticeMapper {
     /// Refused when the datum is not a place that the lattice reaches.
     pub fn new(options: MapperOptions, epoch: u64) -> Result<Self, DatumError> {
         let lattice = options.lattice.clone();
-        let list = VoxelList::new(lattice, options.datum_near_m, options.max_voxels)?;
+        let list = VoxelList::new(lattice, options.datum_near_m, options.voxel_limit())?
+            .with_payload(options.payload())
+            .with_when_full(options.when_full);
         Ok(Self {
             options,
             list,
@@ -61,7 +72,9 @@ impl LatticeMapper {
             sequence: 0,
             origin: None,
             last_stamp_ns: 0,
+            forgot_at_ns: 0,
             counts: MapperCounts::default(),
+            shells: OnceLock::new(),
         })
     }
 
@@ -89,22 +102,40 @@ impl LatticeMapper {
         let report = self.list.insert(&cloud);
         self.counts.add(&report);
         self.last_stamp_ns = cloud.stamp_ns;
+        self.forget_old();
         Ok(())
+    }
+
+    /// Removes the voxels that are too old, whenever a sixteenth of their age has passed.
+    fn forget_old(&mut self) {
+        let (age, now) = (self.options.forget_after_ns, self.last_stamp_ns);
+        // In a log that is played again, time goes back.
+        if age == 0 || now.abs_diff(self.forgot_at_ns) < age.unsigned_abs() / 16 {
+            return;
+        }
+        self.forgot_at_ns = now;
+        let forgotten = self.list.forget_before(now.saturating_sub(age));
+        self.counts.voxels_forgotten += forgotten.unwrap_or(0) as u64;
     }
 
     /// Forgets all voxels and begins a new epoch.
     pub fn reset(&mut self, epoch: u64) {
         self.list.clear();
+        self.begin(epoch);
+    }
+
+    fn begin(&mut self, epoch: u64) {
         // Followers learn of the removal by the epoch.
         self.list.take_changes();
         self.epoch = epoch;
         self.sequence = 0;
         self.last_stamp_ns = 0;
+        self.forgot_at_ns = 0;
     }
 
-    /// What a copy of the map is of: changes with every cloud and every reset.
+    /// What a copy of the map is of: changes with whatever may change the map.
     pub fn state(&self) -> (u64, u64) {
-        (self.epoch, self.counts.clouds_in)
+        (self.epoch, self.list.sequence().into())
     }
 
     /// The changes since the update before, as one step of the sequence; empty when there are none.

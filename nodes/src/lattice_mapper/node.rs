@@ -3,6 +3,7 @@
 use std::collections::VecDeque;
 use std::sync::atomic::{AtomicBool, AtomicU64, Ordering};
 use std::sync::{Arc, Mutex, MutexGuard, PoisonError};
+use std::thread::JoinHandle;
 use std::time::{Duration, SystemTime, UNIX_EPOCH};
 
 use lattice_msgs::geographic_msgs::GeoPointStamped;
@@ -10,6 +11,7 @@ use lattice_msgs::lattice::{LatticeMap, LatticeMapUpdate};
 use lattice_msgs::sensor_msgs::PointCloud2;
 use lattice_msgs::std_msgs::Empty;
 
+use super::services::{self, Call};
 use super::{LatticeMapper, MapperOptions};
 use crate::compute::{Compute, ComputeLimits, Inbox};
 use crate::convert::cloud;
@@ -29,6 +31,7 @@ enum Event {
     Update,
     Centers,
     Reset,
+    Call(Call),
     /// Ends, with the samples that did not decode and the clouds that were lost before the inbox.
     Finish {
         undecodable: u64,
@@ -50,6 +53,7 @@ pub fn start(runtime: &Runtime, name: &str) -> Result<Finish, NodeError> {
     let centers_period = period(&node, "centers_period_s", 1.0)?;
     let lost = Arc::new(AtomicU64::new(0));
     let wishes = Arc::new(Wishes::default());
+    let max_voxels = options.voxel_limit();
     let mut shell = Shell {
         machine: LatticeMapper::new(options, epoch())?,
         outputs: Outputs::open(&node)?,
@@ -59,6 +63,7 @@ pub fn start(runtime: &Runtime, name: &str) -> Result<Finish, NodeError> {
         wishes: Arc::clone(&wishes),
         pending: VecDeque::new(),
         not_published: 0,
+        writing: None,
         centers_of: None,
         report_file: params.string("report_file", "")?,
     };
@@ -103,6 +108,7 @@ pub fn start(runtime: &Runtime, name: &str) -> Result<Finish, NodeError> {
             .into(),
         )
     })?;
+    let calls = services::serve(&node, &inbox, Event::Call, max_voxels)?;
     let updates = inbox.clone();
     runtime.timer(update_period, move || tell(&updates, Event::Update));
     runtime.timer(centers_period, move || tell(&inbox, Event::Centers));
@@ -110,7 +116,7 @@ pub fn start(runtime: &Runtime, name: &str) -> Result<Finish, NodeError> {
     Ok(Box::new(move || {
         let undecodable = points.undecodable() + origins.undecodable();
         let lost = points.lost();
-        drop((points, origins, asked, request_keyframe, reset));
+        drop((points, origins, asked, request_keyframe, reset, calls));
         compute.finish_with(Event::Finish { undecodable, lost });
     }))
 }
@@ -181,6 +187,8 @@ struct Shell {
     /// Chunks of a keyframe that are still to be published.
     pending: VecDeque<Arc<LatticeMap>>,
     not_published: u64,
+    /// A map file on its way to the disk.
+    writing: Option<JoinHandle<()>>,
     /// State of the map that the last centres are of.
     centers_of: Option<(u64, u64)>,
     report_file: String,
@@ -200,11 +208,23 @@ impl Shell {
             Event::Centers => self.centers(),
             Event::Reset => {
                 self.machine.reset(epoch());
-                self.pending.clear();
-                self.wishes.keyframe.store(true, Ordering::Relaxed);
+                self.replaced();
+            }
+            Event::Call(call) => {
+                let done = services::answer(&mut self.machine, call, epoch());
+                if done.replaced {
+                    self.replaced();
+                }
+                self.writing = done.writing.or(self.writing.take());
             }
             Event::Finish { undecodable, lost } => self.finish(undecodable, lost),
         }
+    }
+
+    /// Shows followers the map of a new epoch.
+    fn replaced(&mut self) {
+        self.pending.clear();
+        self.wishes.keyframe.store(true, Ordering::Relaxed);
     }
 
     /// Publishes what changed, and a keyframe where one was asked for or an update was lost.
@@ -262,7 +282,8 @@ impl Shell {
         let (level, message) = if counts.clouds_in == 0 {
             (Level::Warn, "no cloud yet".to_owned())
         } else if counts.points_list_full > 0 {
-            (Level::Warn, "the list is full (`max_voxels`)".to_owned())
+            let limits = "`max_voxels` or `max_map_bytes`";
+            (Level::Warn, format!("the list is full ({limits})"))
         } else if refused + lost > 0 {
             (
                 Level::Warn,
@@ -283,6 +304,11 @@ impl Shell {
 
     fn finish(&mut self, undecodable: u64, lost: u64) {
         self.lost.fetch_add(lost, Ordering::Relaxed);
+        if let Some(writing) = self.writing.take()
+            && writing.join().is_err()
+        {
+            log::error!("a map file was not completed");
+        }
         self.update();
         let mut left = usize::MAX;
         while !self.pending.is_empty() && self.pending.len() < left {

@@ -1,6 +1,7 @@
 //! Parameters of the mapper.
 
 use lattice_core::lattice::{Lattice, LatticeKind};
+use lattice_core::voxels::{Payload, VoxelList, WhenFull};
 use nalgebra::Vector3;
 
 use crate::runtime::params::{ParamError, Params};
@@ -14,8 +15,14 @@ pub struct MapperOptions {
     pub map_frame: String,
     /// Place in the map frame near which voxel keys are counted from, in metres.
     pub datum_near_m: Vector3<f64>,
-    /// Most voxels kept; further ones are refused and counted.
+    /// Most voxels kept.
     pub max_voxels: usize,
+    /// Most memory for voxels, which may allow fewer than `max_voxels`; 0: as many as those take.
+    pub max_map_bytes: usize,
+    /// What happens to points in new cells when the map is full.
+    pub when_full: WhenFull,
+    /// Age in the time of the clouds at which a voxel goes, ns; 0: never. Needs stamps of all voxels.
+    pub forget_after_ns: i64,
     /// Most points of one cloud.
     pub max_cloud_points: usize,
     /// Largest serialised message of `map` and `map_updates`.
@@ -30,6 +37,9 @@ impl MapperOptions {
             map_frame: "map".into(),
             datum_near_m: Vector3::zeros(),
             max_voxels: 20_000_000,
+            max_map_bytes: 0,
+            when_full: WhenFull::Refuse,
+            forget_after_ns: 0,
             max_cloud_points: 4_000_000,
             chunk_bytes: 60_000,
         }
@@ -52,9 +62,49 @@ impl MapperOptions {
             map_frame: params.string("map_frame", &defaults.map_frame)?,
             datum_near_m: Vector3::new(x, y, z),
             max_voxels: params.usize("max_voxels", defaults.max_voxels)?,
+            max_map_bytes: params.usize("max_map_bytes", defaults.max_map_bytes)?,
+            when_full: when_full(params)?,
+            forget_after_ns: forget_after_ns(params)?,
             max_cloud_points: params.usize("max_cloud_points", defaults.max_cloud_points)?,
             chunk_bytes: params.usize("chunk_bytes", defaults.chunk_bytes)?,
             ..defaults
         })
     }
+
+    /// What is kept of each voxel.
+    pub(super) fn payload(&self) -> Payload {
+        Payload {
+            stamps: self.forget_after_ns > 0,
+            ..Payload::default()
+        }
+    }
+
+    /// Most voxels that both limits allow.
+    pub(super) fn voxel_limit(&self) -> usize {
+        match self.max_map_bytes {
+            0 => self.max_voxels,
+            bytes => (self.max_voxels).min(VoxelList::voxels_within(bytes, self.payload())),
+        }
+    }
+}
+
+fn when_full(params: &Params) -> Result<WhenFull, ParamError> {
+    match params.string("when_full", "refuse")?.as_str() {
+        "refuse" => Ok(WhenFull::Refuse),
+        "forget_oldest" => Ok(WhenFull::ForgetOldest),
+        other => {
+            let problem = format!("{other:?}, expected refuse or forget_oldest");
+            Err(params.invalid("when_full", problem))
+        }
+    }
+}
+
+fn forget_after_ns(params: &Params) -> Result<i64, ParamError> {
+    let seconds = params.f64("forget_after_s", 0.0)?;
+    // A century; and less than a nanosecond is not an age.
+    if seconds == 0.0 || (1e-3..=3e9).contains(&seconds) {
+        return Ok((seconds * 1e9) as i64);
+    }
+    let problem = format!("{seconds}, expected 0 (never) or 0.001 to 3e9");
+    Err(params.invalid("forget_after_s", problem))
 }

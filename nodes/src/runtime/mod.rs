@@ -37,7 +37,7 @@ pub use error::{PublishError, RuntimeError};
 pub use node::Node;
 pub use publisher::{Publisher, RawPublisher};
 pub use runtime::Runtime;
-pub use service::Server;
+pub use service::{Reply, Server};
 pub use shutdown::Shutdown;
 pub use subscription::{Load, Subscription};
 pub use tf::{StaticTfBroadcaster, TfBroadcaster};

@@ -6,7 +6,7 @@ use std::time::Duration;
 use lattice_msgs::std_srvs::{Trigger, TriggerRequest, TriggerResponse};
 use lattice_msgs::{RosMessage, RosService};
 use rustdds::GUID;
-use smol::channel::{Receiver, bounded};
+use smol::channel::{Receiver, Sender, bounded};
 use smol::{Task, Timer};
 
 use super::core::Core;
@@ -51,12 +51,45 @@ impl Server {
     }
 }
 
+/// Answers one request, from any thread. Of clones, the first to send counts.
+pub struct Reply<R>(Sender<R>);
+
+impl<R> Clone for Reply<R> {
+    fn clone(&self) -> Self {
+        Self(self.0.clone())
+    }
+}
+
+impl<R> Reply<R> {
+    /// Sends the answer. A request whose reply is dropped instead is not answered.
+    pub fn send(self, response: R) {
+        // The server may have ended.
+        let _ = self.0.try_send(response);
+    }
+
+    /// A reply that goes to the receiver instead of a client.
+    pub fn channel() -> (Self, Receiver<R>) {
+        let (sender, receiver) = bounded(1);
+        (Self(sender), receiver)
+    }
+}
+
 impl Node {
     /// Serves `S`; the handler runs on the io thread and must return at once.
     pub fn service<S: RosService + 'static>(
         &self,
         name: &str,
-        handler: impl FnMut(S::Request) -> S::Response + Send + 'static,
+        mut handler: impl FnMut(S::Request) -> S::Response + Send + 'static,
+    ) -> Result<Server, RuntimeError> {
+        self.service_later::<S>(name, move |request, reply| reply.send(handler(request)))
+    }
+
+    /// Serves `S` with answers that may take their time: the handler runs on the io thread and must
+    /// return at once, the reply may be sent later. The next request waits until then.
+    pub fn service_later<S: RosService + 'static>(
+        &self,
+        name: &str,
+        handler: impl FnMut(S::Request, Reply<S::Response>) + Send + 'static,
     ) -> Result<Server, RuntimeError> {
         let name = self.resolve_service(name)?;
         self.core().serve::<S>(self.id(), &name, handler)
@@ -80,7 +113,7 @@ impl Core {
         &self,
         node: NodeId,
         name: &str,
-        handler: impl FnMut(S::Request) -> S::Response + Send + 'static,
+        handler: impl FnMut(S::Request, Reply<S::Response>) + Send + 'static,
     ) -> Result<Server, RuntimeError> {
         let clients = Arc::new(Peers::of_server(name));
         let topic = names::dds_request(name);
@@ -144,7 +177,7 @@ struct Serving {
 }
 
 impl Serving {
-    async fn run<S: RosService>(self, mut handler: impl FnMut(S::Request) -> S::Response) {
+    async fn run<S: RosService>(self, mut handler: impl FnMut(S::Request, Reply<S::Response>)) {
         loop {
             let sample = self.requests.next().await;
             if let Err(why) = self.answer::<S>(sample, &mut handler).await
@@ -159,12 +192,15 @@ impl Serving {
     async fn answer<S: RosService>(
         &self,
         sample: Result<SampleOrigin, String>,
-        handler: &mut impl FnMut(S::Request) -> S::Response,
+        handler: &mut impl FnMut(S::Request, Reply<S::Response>),
     ) -> Result<(), String> {
         let origin = sample?;
         let (request, reply_to) = read_request::<S::Request>(&self.requests.bytes(), &origin)
             .map_err(|e| e.to_string())?;
-        let reply = handler(request);
+        let (reply, answered) = Reply::channel();
+        handler(request, reply);
+        let answer = answered.recv().await;
+        let reply = answer.map_err(|_| "nobody answered it".to_owned())?;
         let (body, related) = write_reply(&reply, &reply_to).map_err(|e| e.to_string())?;
         self.wait_for_reader(&origin.writer).await;
         self.replies

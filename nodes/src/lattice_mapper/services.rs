@@ -1,0 +1,365 @@
+//! The services of the node: requests become events, files are read and written on threads of their own.
+
+use std::fs::{self, File};
+use std::io::{BufReader, BufWriter, Write};
+use std::path::{Path, PathBuf};
+use std::thread::{self, JoinHandle};
+
+use lattice_core::voxels::file::{FileError, MapContents, WriteOptions};
+use lattice_msgs::lattice::{
+    ClearBox, ClearBoxRequest, ClearBoxResponse, LoadMap, LoadMapRequest, LoadMapResponse,
+    QueryMap, QueryMapRequest, QueryMapResponse, SaveMap, SaveMapRequest, SaveMapResponse,
+};
+use thiserror::Error;
+
+use super::LatticeMapper;
+use crate::compute::Inbox;
+use crate::node::NodeError;
+use crate::runtime::{Node, Reply, Server};
+
+/// Level that costs little time.
+const ZSTD_LEVEL: i32 = 3;
+const BUSY: &str = "busy, ask again";
+
+/// A request that the compute thread answers.
+pub(super) enum Call {
+    Save(SaveMapRequest, Reply<SaveMapResponse>),
+    /// With the map that was read.
+    Load(Box<MapContents>, Reply<LoadMapResponse>),
+    ClearBox(ClearBoxRequest, Reply<ClearBoxResponse>),
+    Query(QueryMapRequest, Reply<QueryMapResponse>),
+}
+
+/// Why a file was not read or written.
+#[derive(Debug, Error)]
+enum IoRefusal {
+    #[error("{0:?} is not a regular file")]
+    NotAFile(PathBuf),
+    #[error("{0:?}: {1}")]
+    Io(PathBuf, std::io::Error),
+    #[error("{0:?}: {1}")]
+    Format(PathBuf, FileError),
+    #[error("no path is given")]
+    NoPath,
+}
+
+/// Serves all calls; `wrap` makes an event of one.
+pub(super) fn serve<E: Send + 'static>(
+    node: &Node,
+    inbox: &Inbox<E>,
+    wrap: fn(Call) -> E,
+    max_voxels: usize,
+) -> Result<[Server; 4], NodeError> {
+    let to = inbox.clone();
+    let save = node.service_later::<SaveMap>("~/save_map", move |request, reply| {
+        let busy = reply.clone();
+        if !to.send(wrap(Call::Save(request, reply)), 0) {
+            busy.send(save_failed(BUSY));
+        }
+    })?;
+    let to = inbox.clone();
+    let load = node.service_later::<LoadMap>("~/load_map", move |request, reply| {
+        let (to, late) = (to.clone(), reply.clone());
+        let read = move || load(&request, max_voxels, reply, |call| to.send(wrap(call), 0));
+        if let Err(error) = spawn("load map", read) {
+            late.send(load_failed(error));
+        }
+    })?;
+    let to = inbox.clone();
+    let clear_box = node.service_later::<ClearBox>("~/clear_box", move |request, reply| {
+        let busy = reply.clone();
+        if !to.send(wrap(Call::ClearBox(request, reply)), 0) {
+            let message = BUSY.to_owned();
+            busy.send(ClearBoxResponse {
+                message,
+                ..Default::default()
+            });
+        }
+    })?;
+    let to = inbox.clone();
+    let query = node.service_later::<QueryMap>("~/query", move |request, reply| {
+        let busy = reply.clone();
+        if !to.send(wrap(Call::Query(request, reply)), 0) {
+            let message = BUSY.to_owned();
+            busy.send(QueryMapResponse {
+                message,
+                ..Default::default()
+            });
+        }
+    })?;
+    Ok([save, load, clear_box, query])
+}
+
+/// What became of a call.
+#[derive(Default)]
+pub(super) struct Done {
+    /// A file is being written.
+    pub(super) writing: Option<JoinHandle<()>>,
+    /// The map has been replaced.
+    pub(super) replaced: bool,
+}
+
+/// Answers a call on the compute thread.
+pub(super) fn answer(machine: &mut LatticeMapper, call: Call, epoch: u64) -> Done {
+    let mut done = Done::default();
+    match call {
+        Call::Save(request, reply) => {
+            let (contents, late) = (machine.contents(), reply.clone());
+            match spawn("save map", move || reply.send(save(&request, &contents))) {
+                Ok(thread) => done.writing = Some(thread),
+                Err(error) => late.send(save_failed(error)),
+            }
+        }
+        Call::Load(contents, reply) => match machine.load(*contents, epoch) {
+            Ok(voxels) => {
+                done.replaced = true;
+                reply.send(LoadMapResponse {
+                    success: true,
+                    message: format!("{voxels} voxels loaded"),
+                    voxels: voxels as u64,
+                });
+            }
+            Err(refusal) => reply.send(load_failed(refusal)),
+        },
+        Call::ClearBox(request, reply) => reply.send(machine.clear_box(&request)),
+        Call::Query(request, reply) => reply.send(machine.query(&request)),
+    }
+    done
+}
+
+fn spawn(name: &str, work: impl FnOnce() + Send + 'static) -> std::io::Result<JoinHandle<()>> {
+    thread::Builder::new().name(name.to_owned()).spawn(work)
+}
+
+fn save_failed(why: impl ToString) -> SaveMapResponse {
+    SaveMapResponse {
+        message: why.to_string(),
+        ..SaveMapResponse::default()
+    }
+}
+
+fn load_failed(why: impl ToString) -> LoadMapResponse {
+    LoadMapResponse {
+        message: why.to_string(),
+        ..LoadMapResponse::default()
+    }
+}
+
+fn load(
+    request: &LoadMapRequest,
+    max_voxels: usize,
+    reply: Reply<LoadMapResponse>,
+    send: impl FnOnce(Call) -> bool,
+) {
+    match read(Path::new(&request.path), max_voxels) {
+        Ok(contents) => {
+            let busy = reply.clone();
+            if !send(Call::Load(Box::new(contents), reply)) {
+                busy.send(load_failed(BUSY));
+            }
+        }
+        Err(refusal) => reply.send(load_failed(refusal)),
+    }
+}
+
+fn read(path: &Path, max_voxels: usize) -> Result<MapContents, IoRefusal> {
+    let io = |error| IoRefusal::Io(path.to_owned(), error);
+    // A pipe would keep the thread for ever.
+    if !fs::metadata(path).map_err(io)?.is_file() {
+        return Err(IoRefusal::NotAFile(path.to_owned()));
+    }
+    let file = BufReader::new(File::open(path).map_err(io)?);
+    let contents = MapContents::read(file, max_voxels);
+    contents.map_err(|error| IoRefusal::Format(path.to_owned(), error))
+}
+
+fn save(request: &SaveMapRequest, contents: &MapContents) -> SaveMapResponse {
+    match write(Path::new(&request.path), contents) {
+        Ok(()) => SaveMapResponse {
+            success: true,
+            message: format!("saved to {:?}", request.path),
+            voxels: contents.keys().len() as u64,
+        },
+        Err(refusal) => save_failed(refusal),
+    }
+}
+
+/// Beside the place first, so that a broken file never takes that of a good one.
+fn write(path: &Path, contents: &MapContents) -> Result<(), IoRefusal> {
+    let io = |error| IoRefusal::Io(path.to_owned(), error);
+    let mut name = path.file_name().ok_or(IoRefusal::NoPath)?.to_owned();
+    if path.exists() && !path.is_file() {
+        return Err(IoRefusal::NotAFile(path.to_owned()));
+    }
+    name.push(".part");
+    let part = path.with_file_name(name);
+    let written =
+        write_to(&part, path, contents).and_then(|()| fs::rename(&part, path).map_err(io));
+    if written.is_err() {
+        // What is there is of no use; that it stays does no harm.
+        let _ = fs::remove_file(&part);
+    }
+    written
+}
+
+fn write_to(part: &Path, path: &Path, contents: &MapContents) -> Result<(), IoRefusal> {
+    let io = |error| IoRefusal::Io(path.to_owned(), error);
+    let mut file = BufWriter::new(File::create(part).map_err(io)?);
+    let options = WriteOptions {
+        zstd_level: Some(ZSTD_LEVEL),
+        ..WriteOptions::default()
+    };
+    let written = contents.write(&mut file, &options);
+    written.map_err(|error| IoRefusal::Format(path.to_owned(), error))?;
+    file.flush().map_err(io)?;
+    file.get_ref().sync_all().map_err(io)
+}
+
+#[cfg(test)]
+mod tests {
+    use lattice_core::lattice::{Lattice, LatticeKind};
+    use lattice_core::voxels::VoxelList;
+    use lattice_msgs::geometry_msgs::Point;
+    use nalgebra::Vector3;
+
+    use super::*;
+    use crate::lattice_mapper::MapperOptions;
+
+    fn machine() -> LatticeMapper {
+        let lattice = Lattice::new(LatticeKind::Bcc, 0.125).unwrap();
+        LatticeMapper::new(MapperOptions::new(lattice), 1).unwrap()
+    }
+
+    fn with_points() -> LatticeMapper {
+        let mut machine = machine();
+        let cloud = lattice_core::cloud::Cloud {
+            stamp_ns: 5,
+            datum_m: Vector3::zeros(),
+            offsets_m: (0..100).map(|x| [x as f32, 0.0, 0.0]).collect(),
+        };
+        let lattice = machine.list().lattice().clone();
+        let mut list = VoxelList::new(lattice, Vector3::zeros(), 1000).unwrap();
+        list.insert(&cloud);
+        assert_eq!(machine.load(MapContents::from_list(&list), 2).unwrap(), 100);
+        machine
+    }
+
+    fn save_to(machine: &mut LatticeMapper, path: &Path) -> SaveMapResponse {
+        let (reply, answered) = Reply::channel();
+        let path = path.display().to_string();
+        let done = answer(machine, Call::Save(SaveMapRequest { path }, reply), 9);
+        done.writing.unwrap().join().unwrap();
+        answered.try_recv().unwrap()
+    }
+
+    fn load_from(machine: &mut LatticeMapper, path: &Path) -> LoadMapResponse {
+        let (reply, answered) = Reply::channel();
+        let path = path.display().to_string();
+        load(&LoadMapRequest { path }, 1000, reply, |call| {
+            answer(machine, call, 9);
+            true
+        });
+        answered.try_recv().unwrap()
+    }
+
+    #[test]
+    fn a_saved_map_is_loaded_by_another_node() {
+        let dir = tempfile::tempdir().unwrap();
+        let path = dir.path().join("site.lattice");
+        let mut first = with_points();
+        for _ in 0..2 {
+            let saved = save_to(&mut first, &path);
+            assert_eq!(
+                (saved.success, saved.voxels),
+                (true, 100),
+                "{}",
+                saved.message
+            );
+        }
+        assert_eq!(
+            fs::read_dir(dir.path()).unwrap().count(),
+            1,
+            "nothing but the map is left"
+        );
+        let mut second = machine();
+        let loaded = load_from(&mut second, &path);
+        assert_eq!(
+            (loaded.success, loaded.voxels),
+            (true, 100),
+            "{}",
+            loaded.message
+        );
+        assert_eq!(second.list().sorted(), first.list().sorted());
+    }
+
+    #[test]
+    fn what_is_no_map_is_refused_with_the_reason() {
+        let dir = tempfile::tempdir().unwrap();
+        let path = dir.path().join("site.lattice");
+        let mut machine = with_points();
+        save_to(&mut machine, &path);
+        let good = fs::read(&path).unwrap();
+        let mut flipped = good.clone();
+        flipped[good.len() / 2] ^= 4;
+        for hostile in [
+            &b""[..],
+            b"not a map at all",
+            &good[..good.len() - 3],
+            &flipped,
+        ] {
+            fs::write(&path, hostile).unwrap();
+            let refused = load_from(&mut machine, &path);
+            assert!(
+                !refused.success && refused.message.contains("site.lattice"),
+                "{refused:?}"
+            );
+        }
+        for nowhere in [dir.path(), &dir.path().join("absent"), Path::new("")] {
+            assert!(!load_from(&mut machine, nowhere).success);
+        }
+        for nowhere in [dir.path(), &dir.path().join("absent/map"), Path::new("")] {
+            let refused = save_to(&mut machine, nowhere);
+            assert!(
+                !refused.success && !refused.message.is_empty(),
+                "{refused:?}"
+            );
+        }
+        assert_eq!(machine.list().len(), 100);
+    }
+
+    #[test]
+    fn a_full_inbox_or_an_ended_node_is_told() {
+        let dir = tempfile::tempdir().unwrap();
+        let path = dir.path().join("site.lattice");
+        let mut machine = with_points();
+        save_to(&mut machine, &path);
+        let (reply, answered) = Reply::channel();
+        let path = path.display().to_string();
+        load(&LoadMapRequest { path }, 1000, reply, |_| false);
+        assert_eq!(answered.try_recv().unwrap().message, BUSY);
+    }
+
+    #[test]
+    fn boxes_and_queries_are_answered() {
+        let mut machine = with_points();
+        let (reply, answered) = Reply::channel();
+        let [min, max] = [-0.5, 9.5].map(|x| Point { x, y: x, z: x });
+        answer(
+            &mut machine,
+            Call::ClearBox(ClearBoxRequest { min, max }, reply),
+            9,
+        );
+        assert_eq!(answered.try_recv().unwrap().removed, 10);
+        let (reply, answered) = Reply::channel();
+        let point = Point {
+            x: 20.0,
+            ..Point::default()
+        };
+        answer(
+            &mut machine,
+            Call::Query(QueryMapRequest { point }, reply),
+            9,
+        );
+        assert!(answered.try_recv().unwrap().occupied);
+    }
+}

@@ -1,0 +1,286 @@
+//! Limits, ageing and services of the mapper: followers see what goes and what is loaded.
+
+use lattice_core::lattice::{Lattice, LatticeKind};
+use lattice_core::voxels::WhenFull;
+use lattice_core::voxels::file::{MapContents, WriteOptions};
+use lattice_msgs::geometry_msgs::Point;
+use lattice_msgs::lattice::{ClearBoxRequest, QueryMapRequest};
+use lattice_nodes::lattice_mapper::{LatticeMapper, LoadRefusal, MapperOptions};
+use lattice_nodes::map_follower::MapFollower;
+use lattice_test::clouds::cloud;
+use nalgebra::Vector3;
+
+fn options(kind: LatticeKind) -> MapperOptions {
+    MapperOptions::new(Lattice::new(kind, 0.125).unwrap())
+}
+
+fn mapper(options: MapperOptions) -> LatticeMapper {
+    LatticeMapper::new(options, 7).unwrap()
+}
+
+/// A row of points 1 m apart, from `first` on.
+fn row(first: i32, count: i32) -> Vec<[f32; 3]> {
+    (first..first + count)
+        .map(|x| [x as f32, 0.0, 0.0])
+        .collect()
+}
+
+/// A mapper and one who follows its updates only.
+struct Pair {
+    mapper: LatticeMapper,
+    follower: MapFollower,
+}
+
+impl Pair {
+    fn new(options: MapperOptions) -> Pair {
+        let mut mapper = mapper(options);
+        let mut follower = MapFollower::new(100_000);
+        for chunk in mapper.keyframe() {
+            follower.on_map(&chunk).unwrap();
+        }
+        Pair { mapper, follower }
+    }
+
+    fn insert(&mut self, stamp_s: i32, points: &[[f32; 3]]) {
+        self.mapper
+            .on_cloud(&cloud("map", i64::from(stamp_s) * 1_000_000_000, points))
+            .unwrap();
+        self.follow();
+    }
+
+    fn follow(&mut self) {
+        for chunk in self.mapper.take_update() {
+            self.follower.on_update(&chunk).unwrap();
+        }
+        let mut keys: Vec<_> = self
+            .follower
+            .map()
+            .unwrap()
+            .voxels()
+            .keys()
+            .copied()
+            .collect();
+        keys.sort();
+        assert!(
+            keys.iter()
+                .eq(self.mapper.list().sorted().iter().map(|(key, _)| key))
+        );
+        self.mapper.list().validate().unwrap();
+    }
+
+    fn has(&self, x: f64) -> bool {
+        let answer = self.mapper.query(&at(x, 0.0, 0.0));
+        assert!(answer.success, "{}", answer.message);
+        answer.occupied
+    }
+}
+
+fn at(x: f64, y: f64, z: f64) -> QueryMapRequest {
+    QueryMapRequest {
+        point: Point { x, y, z },
+    }
+}
+
+#[test]
+fn a_full_map_refuses_or_forgets_the_oldest() {
+    for kind in LatticeKind::ALL {
+        let mut refusing = Pair::new(MapperOptions {
+            max_voxels: 40,
+            ..options(kind)
+        });
+        let when_full = WhenFull::ForgetOldest;
+        let mut forgetting = Pair::new(MapperOptions {
+            max_voxels: 40,
+            when_full,
+            ..options(kind)
+        });
+        for step in 0..20 {
+            refusing.insert(step, &row(step * 4, 4));
+            forgetting.insert(step, &row(step * 4, 4));
+        }
+        assert_eq!((refusing.has(0.0), refusing.has(79.0)), (true, false));
+        assert_eq!(refusing.mapper.counts().points_list_full, 40);
+        assert_eq!((forgetting.has(0.0), forgetting.has(79.0)), (false, true));
+        assert_eq!(forgetting.mapper.counts().points_list_full, 0);
+        let len = forgetting.mapper.list().len() as u64;
+        assert_eq!(forgetting.mapper.counts().voxels_forgotten, 80 - len);
+        assert!((30..=40).contains(&len), "{len}");
+    }
+}
+
+#[test]
+fn memory_bounds_the_map() {
+    let max_map_bytes = 100_000;
+    let mapper = mapper(MapperOptions {
+        max_map_bytes,
+        ..options(LatticeKind::Bcc)
+    });
+    let limit = mapper.list().max_voxels();
+    assert!((500..3000).contains(&limit), "{limit}");
+    let aged = MapperOptions {
+        max_map_bytes,
+        forget_after_ns: 1,
+        ..options(LatticeKind::Bcc)
+    };
+    assert!(self::mapper(aged).list().max_voxels() < limit);
+}
+
+#[test]
+fn old_voxels_go_by_the_time_of_the_clouds() {
+    let forget_after_ns = 10_000_000_000;
+    let mut pair = Pair::new(MapperOptions {
+        forget_after_ns,
+        ..options(LatticeKind::Hex)
+    });
+    pair.insert(100, &row(0, 5));
+    pair.insert(105, &row(3, 5));
+    assert!(pair.has(0.0));
+    pair.insert(111, &row(20, 1));
+    assert_eq!(
+        [0.0, 2.0, 3.0, 7.0, 20.0].map(|x| pair.has(x)),
+        [false, false, true, true, true]
+    );
+    pair.insert(130, &[]);
+    assert!(pair.mapper.list().is_empty());
+    assert_eq!(pair.mapper.counts().voxels_forgotten, 9);
+    // The log begins again.
+    pair.insert(100, &row(0, 5));
+    assert!(pair.has(0.0));
+}
+
+#[test]
+fn a_cleared_box_is_gone_for_followers_too() {
+    let mut pair = Pair::new(options(LatticeKind::Cubic));
+    pair.insert(1, &row(0, 10));
+    let corner = |x| Point {
+        x,
+        y: -1.0,
+        z: -1.0,
+    };
+    let request = ClearBoxRequest {
+        min: corner(1.5),
+        max: Point {
+            x: 4.5,
+            y: 1.0,
+            z: 1.0,
+        },
+    };
+    let before = pair.mapper.state();
+    let answer = pair.mapper.clear_box(&request);
+    assert!(answer.success && answer.removed == 3, "{answer:?}");
+    assert_ne!(pair.mapper.state(), before);
+    pair.follow();
+    assert_eq!(
+        [1.0, 2.0, 4.0, 5.0].map(|x| pair.has(x)),
+        [true, false, false, true]
+    );
+    for bad in [f64::NAN, -5.0] {
+        let max = Point {
+            x: bad,
+            ..request.max.clone()
+        };
+        let answer = pair.mapper.clear_box(&ClearBoxRequest {
+            max,
+            ..request.clone()
+        });
+        assert!(
+            !answer.success && answer.message.contains("corner"),
+            "{answer:?}"
+        );
+    }
+    assert_eq!(pair.mapper.list().len(), 7);
+}
+
+#[test]
+fn a_query_tells_what_is_near() {
+    let mut pair = Pair::new(options(LatticeKind::Cubic));
+    let empty = pair.mapper.query(&at(0.0, 0.0, 0.0));
+    assert!(empty.success && !empty.occupied && !empty.has_nearest);
+    pair.insert(1, &[[0.0; 3], [0.1; 3], [5.0, 0.0, 0.0]]);
+    let inside = pair.mapper.query(&at(0.1, 0.0, 0.0));
+    assert!(inside.occupied && inside.points == 2 && inside.clearance_m == 0.0);
+    let outside = pair.mapper.query(&at(0.0, 3.0, 0.0));
+    assert!(!outside.occupied && outside.points == 0 && outside.has_nearest);
+    assert!((outside.clearance_m - 2.75).abs() < 1e-12, "{outside:?}");
+    assert!((outside.nearest_distance_m - 3.0).abs() < 1e-12);
+    assert_eq!(outside.nearest, Point::default());
+    let nowhere = pair.mapper.query(&at(0.0, f64::NAN, 0.0));
+    assert!(!nowhere.success && nowhere.message.contains("finite"));
+}
+
+#[test]
+fn a_loaded_map_replaces_all() {
+    let mut source = Pair::new(options(LatticeKind::Fcc));
+    source.insert(1, &row(0, 30));
+    let mut bytes = Vec::new();
+    source
+        .mapper
+        .contents()
+        .write(&mut bytes, &WriteOptions::default())
+        .unwrap();
+    let contents = || MapContents::read(&bytes[..], 1000).unwrap();
+
+    // Counted from another datum; what was there before is gone.
+    let datum_near_m = Vector3::new(700.0, -30.0, 4.0);
+    let mut pair = Pair::new(MapperOptions {
+        datum_near_m,
+        ..options(LatticeKind::Fcc)
+    });
+    pair.insert(1, &row(500, 5));
+    assert_eq!(pair.mapper.load(contents(), 8).unwrap(), 30);
+    for chunk in pair.mapper.keyframe() {
+        assert_eq!(chunk.info.epoch, 8);
+        pair.follower.on_map(&chunk).unwrap();
+    }
+    pair.follow();
+    assert_eq!([0.0, 29.0, 500.0].map(|x| pair.has(x)), [true, true, false]);
+    let counts = |pair: &Pair| {
+        pair.mapper
+            .list()
+            .sorted()
+            .iter()
+            .map(|(_, v)| v.count)
+            .sum::<u32>()
+    };
+    assert_eq!(counts(&pair), counts(&source));
+    // And the map goes on.
+    pair.insert(2, &row(30, 5));
+    assert_eq!(pair.mapper.list().len(), 35);
+
+    let refused = |options: MapperOptions| {
+        let mut pair = Pair::new(options);
+        pair.insert(1, &row(500, 5));
+        let refusal = pair.mapper.load(contents(), 8).unwrap_err();
+        assert_eq!((pair.mapper.list().len(), pair.mapper.state().0), (5, 7));
+        pair.insert(2, &row(600, 5));
+        refusal
+    };
+    let refusal = refused(options(LatticeKind::Bcc));
+    assert!(matches!(refusal, LoadRefusal::Lattice { .. }), "{refusal}");
+    let refusal = refused(MapperOptions {
+        max_voxels: 29,
+        ..options(LatticeKind::Fcc)
+    });
+    assert!(
+        matches!(refusal, LoadRefusal::TooMany { voxels: 30, .. }),
+        "{refusal}"
+    );
+    let aged = MapperOptions {
+        forget_after_ns: 1_000_000_000,
+        ..options(LatticeKind::Fcc)
+    };
+    assert!(matches!(refused(aged.clone()), LoadRefusal::Stamps));
+
+    // With stamps it goes into either, and ages on.
+    let mut source = Pair::new(aged.clone());
+    source.insert(1, &row(0, 30));
+    let mut pair = Pair::new(options(LatticeKind::Fcc));
+    assert_eq!(pair.mapper.load(source.mapper.contents(), 8).unwrap(), 30);
+    assert!(pair.mapper.list().payload().is_plain());
+    let mut pair = Pair::new(aged);
+    assert_eq!(pair.mapper.load(source.mapper.contents(), 8).unwrap(), 30);
+    pair.mapper
+        .on_cloud(&cloud("map", 9_000_000_000, &row(50, 1)))
+        .unwrap();
+    assert_eq!(pair.mapper.list().len(), 1);
+}
