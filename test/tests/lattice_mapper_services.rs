@@ -177,7 +177,7 @@ fn a_cleared_box_is_gone_for_followers_too() {
     for bad in [f64::NAN, -5.0] {
         let max = Point {
             x: bad,
-            ..request.max.clone()
+            ..request.max
         };
         let answer = pair.mapper.clear_box(&ClearBoxRequest {
             max,
