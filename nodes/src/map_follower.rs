@@ -282,6 +282,7 @@ impl MapFollower {
             known.epoch == info.epoch
                 && known.lattice == info.lattice
                 && known.cell_volume_m3 == info.cell_volume_m3
+                && known.generator == info.generator
                 && known.map_from_lattice == info.map_from_lattice
         });
         if same {

@@ -68,8 +68,14 @@ fn figures(report: &Value) -> Vec<Value> {
 fn a_log_played_through_node_processes_gives_the_map_of_the_direct_replay() {
     let directory = tempfile::tempdir().unwrap();
     let log = simulated(directory.path(), "mcap", "3");
-    let common = [&*log, "--params", PARAMS, "--lattice", "fcc,mcc", "--json"];
+    let given = [&*log, "--params", PARAMS, "--lattice", "fcc,mcc", "--json"];
+    let common = [&given[..], &["--orientation", "ground"]].concat();
     let direct = json(&[&["replay", "--direct"], &common[..]].concat());
+    let by_param = [&given[..], &["-p", "lattice_orientation:=ground"]].concat();
+    let by_param = json(&[&["replay", "--direct"], &by_param[..]].concat());
+    assert_eq!(figures(&by_param), figures(&direct));
+    let paper = json(&[&["replay", "--direct"], &given[..]].concat());
+    assert_ne!(figures(&paper), figures(&direct));
     let played = json(&[&["replay"], &common[..]].concat());
     assert_eq!(
         direct["transformer"]["counts"]["clouds_dropped"],

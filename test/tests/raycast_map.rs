@@ -7,7 +7,7 @@ use lattice_core::lattice::{Key, Lattice, LatticeIndex, LatticeKind};
 use lattice_core::raycast::{
     CellState, Evidence, FreeSpaceMap, FreeSpaceOptions, MIN_MAP_BYTES, ScanReport, Traversal,
 };
-use nalgebra::Vector3;
+use nalgebra::{Matrix3, UnitQuaternion, Vector3};
 use proptest::prelude::*;
 
 const DATUM_M: [f64; 3] = [4e5, -3e5, 200.0];
@@ -41,7 +41,21 @@ fn cloud(offsets_m: Vec<[f32; 3]>) -> Cloud {
 }
 
 fn map(kind: LatticeKind, options: FreeSpaceOptions) -> FreeSpaceMap {
-    let lattice = Lattice::new(kind, 0.027).unwrap();
+    map_of(Lattice::new(kind, 0.027).unwrap(), options)
+}
+
+/// As printed, turned, and of a basis that has no name.
+fn any_lattice() -> impl Strategy<Value = Lattice> {
+    let skew = Matrix3::new(0.3, 0.1, 0.0, 0.0, 0.25, 0.1, 0.1, 0.0, 0.35);
+    let mut lattices = vec![Lattice::from_basis(skew).unwrap()];
+    lattices.extend(LatticeKind::ALL.map(|kind| Lattice::new(kind, 0.027).unwrap()));
+    let turn = UnitQuaternion::from_euler_angles(0.5, -0.3, 1.1);
+    let turned: Vec<_> = lattices.iter().map(|l| l.clone().oriented(turn)).collect();
+    lattices.extend(turned);
+    prop::sample::select(lattices)
+}
+
+fn map_of(lattice: Lattice, options: FreeSpaceOptions) -> FreeSpaceMap {
     FreeSpaceMap::new(lattice, origin([0.3, 0.2, 0.1]), options).unwrap()
 }
 
@@ -148,13 +162,13 @@ proptest! {
     /// cell was passed through.
     #[test]
     fn coarse_free_cells_hold_nothing_occupied(
-        kind in any_kind(),
+        lattice in any_lattice(),
         scans in any_scans(),
         free_level in 1..4_u32,
         inside in prop::array::uniform3(-0.5..0.5_f64),
     ) {
-        let mut fine = map(kind, FreeSpaceOptions::default());
-        let mut coarse = map(kind, FreeSpaceOptions { free_level, ..FreeSpaceOptions::default() });
+        let mut fine = map_of(lattice.clone(), FreeSpaceOptions::default());
+        let mut coarse = map_of(lattice, FreeSpaceOptions { free_level, ..FreeSpaceOptions::default() });
         for (offset, points) in scans {
             let (origin_m, scan) = (origin(offset), cloud(points));
             let report = fine.insert_scan(origin_m, &scan);

@@ -3,12 +3,13 @@
 use std::collections::BTreeMap;
 
 use lattice_core::lattice::{Lattice, LatticeKind};
+use lattice_core::voxels::VoxelStore;
 use lattice_msgs::cdr;
 use lattice_msgs::visualization_msgs::{Marker, MarkerArray};
 use lattice_nodes::lattice_mapper::{LatticeMapper, MapperOptions};
 use lattice_nodes::voxel_marker_publisher::{MarkerOptions, MarkerStyle, VoxelMarkers};
 use lattice_test::clouds::cloud;
-use nalgebra::Vector3;
+use nalgebra::{Matrix3, Quaternion, UnitQuaternion, Vector3};
 
 /// A mapper, its markers, and a viewer that obeys the markers.
 struct Bench {
@@ -19,7 +20,10 @@ struct Bench {
 
 impl Bench {
     fn new(kind: LatticeKind, options: MarkerOptions) -> Self {
-        let lattice = Lattice::new(kind, 0.125).unwrap();
+        Self::of(Lattice::new(kind, 0.125).unwrap(), options)
+    }
+
+    fn of(lattice: Lattice, options: MarkerOptions) -> Self {
         let mut mapper = LatticeMapper::new(MapperOptions::new(lattice), 1).unwrap();
         let mut markers = VoxelMarkers::new(options);
         for chunk in mapper.keyframe() {
@@ -50,7 +54,9 @@ impl Bench {
             match marker.action {
                 Marker::ADD => {
                     assert_ne!(marker.scale.x, 0.0);
-                    assert_eq!(marker.pose.orientation.w, 1.0);
+                    let q = &marker.pose.orientation;
+                    let square = q.w * q.w + q.x * q.x + q.y * q.y + q.z * q.z;
+                    assert!((square - 1.0).abs() < 1e-12);
                     assert!(
                         !marker.points.is_empty(),
                         "an empty ADD is an error in Foxglove"
@@ -108,6 +114,60 @@ fn one_voxel_is_its_whole_cell() {
         bench.insert(&[[3.0, 4.0, 5.0]]);
         assert_eq!(bench.triangles().len(), triangles, "{kind}");
         assert!((volume(&bench.triangles()) - 0.125).abs() < 1e-12, "{kind}");
+    }
+}
+
+/// A custom lattice and named ones, turned.
+fn turned() -> Vec<Lattice> {
+    let turn = UnitQuaternion::from_euler_angles(0.5, -0.3, 1.1);
+    let skew = Matrix3::new(0.5, 0.1, 0.0, 0.0, 0.4, 0.1, 0.2, 0.0, 0.6);
+    let mut lattices = vec![Lattice::from_basis(skew).unwrap()];
+    lattices.extend(LatticeKind::ALL.map(|kind| Lattice::new(kind, 0.125).unwrap()));
+    lattices.into_iter().map(|l| l.oriented(turn)).collect()
+}
+
+#[test]
+fn markers_lie_as_the_lattice_of_the_mapper_lies() {
+    for lattice in turned() {
+        let mut bench = Bench::of(lattice.clone(), MarkerOptions::default());
+        bench.insert(&[[3.0, 4.0, 5.0]]);
+        let list = bench.mapper.list();
+        let center = list.center_m(list.sorted()[0].0);
+        let triangles = bench.triangles();
+        assert!((volume(&triangles) - lattice.cell_volume_m3()).abs() < 1e-12);
+        for vertex in &lattice.cell().vertices {
+            let corners = triangles.iter().flatten();
+            let nearest = corners.map(|corner| (corner - center - vertex).norm());
+            assert!(nearest.fold(f64::MAX, f64::min) < 1e-12, "{lattice:?}");
+        }
+    }
+}
+
+#[test]
+fn cubes_are_turned_and_stand_on_the_centres() {
+    for lattice in turned() {
+        let options = MarkerOptions {
+            style: MarkerStyle::Cubes,
+            ..MarkerOptions::default()
+        };
+        let mut bench = Bench::of(lattice.clone(), options);
+        bench.insert(&line(20, 0.3));
+        let mut found = 0;
+        for marker in bench.shown.values() {
+            assert_eq!(marker.type_, Marker::CUBE_LIST);
+            let (p, q) = (&marker.pose.position, &marker.pose.orientation);
+            let turn = UnitQuaternion::new_unchecked(Quaternion::new(q.w, q.x, q.y, q.z));
+            assert_eq!(turn, lattice.orientation());
+            for point in &marker.points {
+                let at =
+                    Vector3::new(p.x, p.y, p.z) + turn * Vector3::new(point.x, point.y, point.z);
+                let key = bench.mapper.list().key_of(&at).unwrap();
+                assert!((bench.mapper.list().center_m(key) - at).norm() < 1e-12);
+                assert!(bench.mapper.list().get(key).is_some());
+                found += 1;
+            }
+        }
+        assert_eq!(found, bench.mapper.list().len());
     }
 }
 

@@ -172,6 +172,20 @@ impl Lattice {
         }
     }
 
+    /// The lattice with all lengths `factor` times as long; kind, orientation and indices stay.
+    ///
+    /// With a power of two every vector is exactly `factor` times that of this lattice. Fails if the
+    /// cell volume gets out of range as for [`Lattice::new`].
+    pub fn scaled(&self, factor: f64) -> Result<Lattice, LatticeError> {
+        let cell_volume_m3 = self.cell_volume_m3() * (factor * factor * factor);
+        check_volume(cell_volume_m3)?;
+        let lattice = match self.kind() {
+            LatticeKind::Custom => Lattice::from_basis(self.unoriented_generator() * factor)?,
+            kind => Lattice::new(kind, cell_volume_m3)?,
+        };
+        Ok(lattice.oriented(self.orientation()))
+    }
+
     /// The rotation from the lattice's own axes to those of the map; of the two quaternions the one
     /// with a positive real part.
     pub fn orientation(&self) -> UnitQuaternion<f64> {

@@ -161,6 +161,26 @@ fn the_index_range_ends_at_2_to_the_20() {
 }
 
 #[test]
+fn a_scaled_lattice_keeps_kind_orientation_and_indices() {
+    let turn = UnitQuaternion::from_euler_angles(0.4, -0.2, 1.0);
+    let skew = Matrix3::new(0.5, 0.1, 0.0, 0.0, 0.4, 0.1, 0.2, 0.0, 0.6);
+    let mut lattices = vec![Lattice::from_basis(skew).unwrap()];
+    lattices.extend(LatticeKind::ALL.map(|kind| Lattice::new(kind, 0.3).unwrap()));
+    for lattice in lattices.into_iter().map(|lattice| lattice.oriented(turn)) {
+        let large = lattice.scaled(8.0).unwrap();
+        assert_eq!(large.kind(), lattice.kind());
+        assert_eq!(large.orientation(), lattice.orientation());
+        for w in [[1, 2, 3], [-100, 7, 60], [99_999, -5, 1]] {
+            assert_eq!(large.center(w), lattice.center(w) * 8.0, "{lattice:?}");
+        }
+        assert_eq!(large.scaled(0.125).unwrap(), lattice);
+        for factor in [0.0, -1.0, f64::NAN, f64::INFINITY, 1e4, 1e-4] {
+            assert!(lattice.scaled(factor).is_err(), "{factor}");
+        }
+    }
+}
+
+#[test]
 fn zero_and_its_mirror_image_share_a_cell() {
     for kind in LatticeKind::ALL {
         let lattice = Lattice::new(kind, 0.3).unwrap();

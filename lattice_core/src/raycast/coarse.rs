@@ -35,8 +35,7 @@ pub(super) struct Coarse {
 impl Coarse {
     pub(super) fn new(fine: &Lattice, level: u32, bytes: usize) -> Result<Coarse, LatticeError> {
         // A power of two, so that the generator is exactly 2^level times that of the fine lattice.
-        let times = f64::from(1 << (3 * level));
-        let lattice = Lattice::new(fine.kind(), fine.cell_volume_m3() * times)?;
+        let lattice = fine.scaled(f64::from(1 << level))?;
         let places = (0..CELLS as i32).map(|p| [p & 7, p >> 3 & 7, p >> 6]);
         let (mut belongs, mut overlaps) = (Vec::new(), Vec::new());
         let mut within = BTreeSet::new();

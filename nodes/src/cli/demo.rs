@@ -58,6 +58,7 @@ impl Demo {
             direct: false,
             lattice: Some(self.lattice.clone()),
             cell_volume: None,
+            orientation: None,
             params: vec![params],
             param: Vec::new(),
             points: Vec::new(),

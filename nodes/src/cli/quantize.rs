@@ -6,7 +6,7 @@ use std::path::PathBuf;
 
 use clap::Args;
 use lattice_core::cloud::Cloud;
-use lattice_core::lattice::Lattice;
+use lattice_core::lattice::{Lattice, Orientation};
 use lattice_core::voxels::VoxelList;
 use lattice_core::voxels::file::write_map;
 use nalgebra::Vector3;
@@ -26,6 +26,9 @@ pub struct Quantize {
     /// Volume of one cell in m^3
     #[arg(long, default_value_t = 0.125)]
     cell_volume: f64,
+    /// How the cells lie: paper, ground (flattest), or a crystal direction that points up, as 110-up
+    #[arg(long, default_value = "paper")]
+    orientation: Orientation,
     /// Most points to read
     #[arg(long, default_value_t = 500_000_000)]
     max_points: usize,
@@ -73,6 +76,7 @@ impl Quantize {
         let mut rows = Vec::new();
         for (i, kind) in self.lattice.0.iter().enumerate() {
             let lattice = Lattice::new(*kind, self.cell_volume)?;
+            let lattice = lattice.with_orientation(self.orientation)?;
             let mut list = VoxelList::new(lattice, datum_m, self.max_voxels)?;
             let report = list.insert(&cloud);
             let distortion = list.distortion();

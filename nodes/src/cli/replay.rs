@@ -5,7 +5,7 @@ use std::io::BufWriter;
 use std::path::PathBuf;
 
 use clap::Args;
-use lattice_core::lattice::Lattice;
+use lattice_core::lattice::{Lattice, Orientation};
 use lattice_core::voxels::file::write_map;
 
 use super::progress::Progress;
@@ -39,6 +39,10 @@ pub struct Replay {
     /// Volume of one cell in m^3; of the parameters if not given (0.125)
     #[arg(long)]
     pub cell_volume: Option<f64>,
+    /// How the cells lie: paper, ground (flattest), or a crystal direction that points up, as
+    /// 110-up; of the parameters if not given (paper)
+    #[arg(long)]
+    pub orientation: Option<Orientation>,
     /// Parameter files of the nodes, later ones win
     #[arg(long = "params", value_name = "FILE")]
     pub params: Vec<PathBuf>,
@@ -102,6 +106,7 @@ impl Replay {
                 lattices,
                 params_files: &self.params,
                 params: &self.param,
+                orientation: self.orientation,
                 rate: self.rate,
                 // Apart from a robot on domain 0, and from other replays.
                 domain: match std::env::var_os("ROS_DOMAIN_ID") {
@@ -168,7 +173,12 @@ impl Replay {
 
     /// Options of one mapper for each lattice.
     fn maps(&self) -> Result<Vec<MapperOptions>, Box<dyn std::error::Error + Send + Sync>> {
-        let given = MapperOptions::from_params(&self.params_of("lattice_mapper")?)?;
+        let params = self.params_of("lattice_mapper")?;
+        let given = MapperOptions::from_params(&params)?;
+        let orientation = match self.orientation {
+            Some(orientation) => orientation,
+            None => MapperOptions::orientation_from(&params)?,
+        };
         let kinds = match &self.lattice {
             Some(Lattices(kinds)) => kinds.clone(),
             None => vec![given.lattice.kind()],
@@ -176,7 +186,7 @@ impl Replay {
         let volume_m3 = self.cell_volume.unwrap_or(given.lattice.cell_volume_m3());
         let map = |kind| {
             Ok(MapperOptions {
-                lattice: Lattice::new(kind, volume_m3)?,
+                lattice: Lattice::new(kind, volume_m3)?.with_orientation(orientation)?,
                 ..given.clone()
             })
         };

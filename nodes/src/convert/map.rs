@@ -6,7 +6,7 @@ use lattice_core::voxels::{Voxel, VoxelList};
 use lattice_msgs::geographic_msgs::GeoPoint;
 use lattice_msgs::lattice::{LatticeInfo, LatticeMap, LatticeMapUpdate};
 use lattice_msgs::std_msgs::Header;
-use nalgebra::{Isometry3, Translation3, UnitQuaternion, Vector3};
+use nalgebra::{Isometry3, Matrix3, Quaternion, Translation3, UnitQuaternion, Vector3};
 use serde_bytes::ByteBuf;
 use thiserror::Error;
 
@@ -19,6 +19,8 @@ pub const KEY_ENCODING: &str = "morton21_delta_leb128";
 const CHUNK_OVERHEAD_BYTES: usize = 1024;
 /// Count and mean offset of one voxel.
 const PAYLOAD_BYTES: usize = 4 + 3 * 2;
+/// What a generator, a cell volume and a quaternion may be off, relative to their size.
+const TOLERANCE: f64 = 1e-9;
 
 /// Why a `LatticeMap` or `LatticeMapUpdate` cannot be used.
 #[derive(Debug, Error)]
@@ -87,16 +89,14 @@ pub struct VoxelState {
     pub mean_offset: [i16; 3],
 }
 
-/// The lattice, its place in the map frame and the epoch, as a message.
+/// The lattice, its place in the map frame and the epoch, as a message: the generator in the
+/// lattice's own axes, which `map_from_lattice` turns.
 pub fn info_of(list: &VoxelList, epoch: u64, origin: Option<&GeoPoint>) -> LatticeInfo {
     let lattice = list.lattice();
-    let g = lattice.generator().transpose();
+    let g = lattice.unoriented_generator().transpose();
     let mut generator = [0.0; 9];
     generator.copy_from_slice(g.as_slice());
-    let datum = Isometry3::from_parts(
-        Translation3::from(list.datum_m()),
-        UnitQuaternion::identity(),
-    );
+    let datum = Isometry3::from_parts(Translation3::from(list.datum_m()), lattice.orientation());
     LatticeInfo {
         lattice: lattice.kind().name().to_owned(),
         cell_volume_m3: lattice.cell_volume_m3(),
@@ -108,21 +108,45 @@ pub fn info_of(list: &VoxelList, epoch: u64, origin: Option<&GeoPoint>) -> Latti
     }
 }
 
-/// The lattice that a message names, and its datum in the map frame.
+/// The lattice of a message, turned as it lies in the map, and its datum in the map frame.
+///
+/// Refused if generator, name and cell volume do not agree; a custom lattice is that of its generator.
 pub fn lattice_from(info: &LatticeInfo) -> Result<(Lattice, Vector3<f64>), MapMessageError> {
     let refuse = |reason: String| MapMessageError::Lattice {
         lattice: info.lattice.chars().take(32).collect(),
         cell_volume_m3: info.cell_volume_m3,
         reason,
     };
-    let kind: LatticeKind = info.lattice.parse().map_err(|e| refuse(format!("{e}")))?;
-    let lattice = Lattice::new(kind, info.cell_volume_m3).map_err(|e| refuse(format!("{e}")))?;
+    let generator = Matrix3::from_row_slice(&info.generator);
+    let lattice = if info.lattice == LatticeKind::Custom.name() {
+        Lattice::from_basis(generator)
+    } else {
+        let kind = info.lattice.parse::<LatticeKind>();
+        kind.and_then(|kind| Lattice::new(kind, info.cell_volume_m3))
+    };
+    let lattice = lattice.map_err(|e| refuse(format!("{e}")))?;
+    let volume_m3 = lattice.cell_volume_m3();
+    let volume_off = (info.cell_volume_m3 - volume_m3).abs() / volume_m3;
+    let generator_off = (generator - lattice.unoriented_generator()).abs().sum();
+    let agrees = volume_off <= TOLERANCE && generator_off <= TOLERANCE * lattice.cell_side_m();
+    if !agrees {
+        let expected = lattice.unoriented_generator();
+        return Err(refuse(format!(
+            "generator and volume are not those of the lattice, {:?} row by row and {volume_m3} m^3",
+            expected.transpose().as_slice()
+        )));
+    }
     let place =
         geometry::isometry_from_pose(&info.map_from_lattice).ok_or(MapMessageError::Frame)?;
-    if place.rotation.angle() > 1e-9 {
-        return Err(refuse("a rotated lattice frame is not supported".into()));
-    }
-    Ok((lattice, place.translation.vector))
+    let q = &info.map_from_lattice.orientation;
+    let sent = Quaternion::new(q.w, q.x, q.y, q.z);
+    // As sent, to the bit, where it is of length 1 but for rounding.
+    let rotation = if (sent.norm_squared() - 1.0).abs() <= TOLERANCE {
+        UnitQuaternion::new_unchecked(sent)
+    } else {
+        place.rotation
+    };
+    Ok((lattice.oriented(rotation), place.translation.vector))
 }
 
 /// The whole list as self-contained chunks; an empty list is one chunk without voxels.
@@ -305,4 +329,68 @@ fn split(keys: &[Key], payload_bytes: usize, chunk_bytes: usize) -> Vec<&[Key]> 
 
 fn varint_len(value: u64) -> usize {
     (64 - (value | 1).leading_zeros()).div_ceil(7) as usize
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    fn list(lattice: &Lattice) -> VoxelList {
+        VoxelList::new(lattice.clone(), Vector3::new(100.0, -50.0, 3.0), 10).unwrap()
+    }
+
+    fn lattices() -> Vec<Lattice> {
+        let mut lattices = Vec::new();
+        for kind in LatticeKind::ALL {
+            for name in ["paper", "ground"] {
+                let lattice = Lattice::new(kind, 0.1).unwrap();
+                lattices.push(lattice.with_orientation(name.parse().unwrap()).unwrap());
+            }
+        }
+        let skew = Matrix3::new(0.5, 0.1, 0.0, 0.0, 0.4, 0.1, 0.2, 0.0, 0.6);
+        let turn = UnitQuaternion::from_euler_angles(0.1, -0.4, 2.0);
+        lattices.push(Lattice::from_basis(skew).unwrap());
+        lattices.push(Lattice::from_basis(skew).unwrap().oriented(turn));
+        lattices
+    }
+
+    #[test]
+    fn lattices_come_back_as_they_were_to_the_bit() {
+        for lattice in lattices() {
+            let list = list(&lattice);
+            let info = info_of(&list, 1, None);
+            let (back, datum_m) = lattice_from(&info).unwrap();
+            assert_eq!(back, lattice);
+            assert_eq!(datum_m, list.datum_m());
+            let row = Matrix3::from_row_slice(&info.generator);
+            assert_eq!(row, lattice.unoriented_generator());
+            let q = &info.map_from_lattice.orientation;
+            assert_eq!(
+                [q.x, q.y, q.z, q.w],
+                <[f64; 4]>::from(lattice.orientation().coords)
+            );
+        }
+    }
+
+    #[test]
+    fn a_description_that_contradicts_itself_is_refused() {
+        for lattice in lattices() {
+            let good = info_of(&list(&lattice), 1, None);
+            let refused = |change: &dyn Fn(&mut LatticeInfo)| {
+                let mut info = good.clone();
+                change(&mut info);
+                lattice_from(&info).unwrap_err().to_string()
+            };
+            let error = refused(&|info| info.cell_volume_m3 *= 1.001);
+            assert!(error.contains("not those of the lattice"), "{error}");
+            assert!(refused(&|info| info.generator[8] = f64::NAN).contains("lattice '"));
+            assert!(refused(&|info| info.lattice = "bccc".into()).contains("unknown lattice"));
+            refused(&|info| info.map_from_lattice.orientation = Default::default());
+            refused(&|info| info.map_from_lattice.position.x = f64::INFINITY);
+            if lattice.kind() != LatticeKind::Custom {
+                let error = refused(&|info| info.generator[0] += 1e-3);
+                assert!(error.contains("not those of the lattice"), "{error}");
+            }
+        }
+    }
 }

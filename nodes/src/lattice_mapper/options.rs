@@ -1,6 +1,6 @@
 //! Parameters of the mapper.
 
-use lattice_core::lattice::{Lattice, LatticeKind};
+use lattice_core::lattice::{Lattice, LatticeKind, Orientation};
 use lattice_core::voxels::{Payload, VoxelList, WhenFull};
 use nalgebra::Vector3;
 
@@ -9,7 +9,7 @@ use crate::runtime::params::{ParamError, Params};
 /// Everything that a [`super::LatticeMapper`] can be told.
 #[derive(Clone, Debug)]
 pub struct MapperOptions {
-    /// Lattice and cell volume.
+    /// Lattice, cell volume and orientation.
     pub lattice: Lattice,
     /// Frame that clouds must be in and that the map is in.
     pub map_frame: String,
@@ -53,6 +53,9 @@ impl MapperOptions {
             .map_err(|e| params.invalid("lattice", format!("{e}")))?;
         let lattice = Lattice::new(kind, params.f64("cell_volume_m3", 0.125)?)
             .map_err(|e| params.invalid("cell_volume_m3", format!("{e}")))?;
+        let lattice = Self::orientation_from(params)
+            .map(|orientation| lattice.with_orientation(orientation))?
+            .map_err(|e| params.invalid("lattice_orientation", format!("{e}")))?;
         let defaults = Self::new(lattice);
         let datum = params.f64_array("datum_m", &[0.0; 3])?;
         let [x, y, z] = datum[..] else {
@@ -69,6 +72,13 @@ impl MapperOptions {
             chunk_bytes: params.usize("chunk_bytes", defaults.chunk_bytes)?,
             ..defaults
         })
+    }
+
+    /// How the parameters want the lattice to lie in the map, whichever lattice it is.
+    pub fn orientation_from(params: &Params) -> Result<Orientation, ParamError> {
+        let name = params.string("lattice_orientation", "paper")?;
+        name.parse()
+            .map_err(|e| params.invalid("lattice_orientation", format!("{e}")))
     }
 
     /// What is kept of each voxel.

@@ -5,7 +5,7 @@ use std::path::{Path, PathBuf};
 use std::process::ExitStatus;
 use std::time::Instant;
 
-use lattice_core::lattice::Lattice;
+use lattice_core::lattice::{Lattice, Orientation};
 use thiserror::Error;
 
 use super::node_process::{END_TIME, MATCH_TIME, NodeProcess};
@@ -71,6 +71,8 @@ pub struct DdsReplay<'a> {
     pub plan: &'a TopicPlan,
     /// One map for each.
     pub lattices: Vec<Lattice>,
+    /// How they lie in the map, if it is not to be as the parameters say.
+    pub orientation: Option<Orientation>,
     /// Parameter files of the nodes.
     pub params_files: &'a [PathBuf],
     /// Further parameters, `name:=value`.
@@ -205,15 +207,17 @@ impl Branch {
             let report = scratch.join(format!("{name}_{node}.json"));
             NodeProcess::start_in(node, Some(name), &params, replay, &report)
         };
-        let mapper = start(
-            "lattice_mapper",
-            vec![
-                param("lattice", name),
-                param("cell_volume_m3", &format!("{:?}", lattice.cell_volume_m3())),
-                param("qos./points_enu.reliability", "reliable"),
-                param("qos./points_enu.depth", "512"),
-            ],
-        )?;
+        let orientation = replay
+            .orientation
+            .map(|o| param("lattice_orientation", &o.to_string()));
+        let mut params = vec![
+            param("lattice", name),
+            param("cell_volume_m3", &format!("{:?}", lattice.cell_volume_m3())),
+            param("qos./points_enu.reliability", "reliable"),
+            param("qos./points_enu.depth", "512"),
+        ];
+        params.extend(orientation);
+        let mapper = start("lattice_mapper", params)?;
         let markers = start("voxel_marker_publisher", Vec::new())?;
         Ok(Self {
             namespace: format!("/{name}"),

@@ -1,9 +1,9 @@
 //! The markers of one block: true cells, cubes or points.
 
-use lattice_msgs::geometry_msgs::{Point, Pose, Vector3 as ScaleVector};
+use lattice_msgs::geometry_msgs::{Point, Pose, Quaternion, Vector3 as ScaleVector};
 use lattice_msgs::std_msgs::ColorRGBA;
 use lattice_msgs::visualization_msgs::Marker;
-use nalgebra::Vector3;
+use nalgebra::{UnitQuaternion, Vector3};
 
 use super::blocks::{BlockId, Blocks, offset};
 use super::options::{ColorBy, MarkerOptions, MarkerStyle};
@@ -23,6 +23,9 @@ pub fn of_block(
     };
     let mut builder = Builder::new(style, options, map.lattice.cell_volume_m3().cbrt());
     builder.origin_m = map.center_m(first);
+    if style == MarkerStyle::Cubes {
+        builder.rotation = map.lattice.orientation();
+    }
     let cell = map.lattice.cell();
     for key in blocks.keys(block) {
         let center_m = map.center_m(key);
@@ -52,6 +55,8 @@ struct Builder<'a> {
     options: &'a MarkerOptions,
     side_m: f64,
     origin_m: Vector3<f64>,
+    /// Of the marker: viewers draw the cubes of a list along its axes.
+    rotation: UnitQuaternion<f64>,
     max_points: usize,
     points: Vec<Point>,
     colors: Vec<ColorRGBA>,
@@ -70,6 +75,7 @@ impl<'a> Builder<'a> {
             options,
             side_m,
             origin_m: Vector3::zeros(),
+            rotation: UnitQuaternion::identity(),
             // Whole polygons must fit: those of six corners have four triangles.
             max_points: (room / point_bytes).max(12),
             points: Vec::new(),
@@ -101,7 +107,7 @@ impl<'a> Builder<'a> {
     }
 
     fn push(&mut self, at_m: &Vector3<f64>) {
-        let p = at_m - self.origin_m;
+        let p = self.rotation.inverse() * (at_m - self.origin_m);
         self.points.push(Point {
             x: p.x,
             y: p.y,
@@ -127,7 +133,12 @@ impl<'a> Builder<'a> {
         pose.position.x = self.origin_m.x;
         pose.position.y = self.origin_m.y;
         pose.position.z = self.origin_m.z;
-        pose.orientation.w = 1.0;
+        pose.orientation = Quaternion {
+            x: self.rotation.i,
+            y: self.rotation.j,
+            z: self.rotation.k,
+            w: self.rotation.w,
+        };
         self.markers.push(Marker {
             type_,
             action: Marker::ADD,
