@@ -385,7 +385,7 @@ mod tests {
             assert!(error.contains("not those of the lattice"), "{error}");
             assert!(refused(&|info| info.generator[8] = f64::NAN).contains("lattice '"));
             assert!(refused(&|info| info.lattice = "bccc".into()).contains("unknown lattice"));
-            refused(&|info| info.map_from_lattice.orientation = Default::default());
+            refused(&|info| info.map_from_lattice.orientation.x = f64::NAN);
             refused(&|info| info.map_from_lattice.position.x = f64::INFINITY);
             if lattice.kind() != LatticeKind::Custom {
                 let error = refused(&|info| info.generator[0] += 1e-3);
