@@ -1,5 +1,10 @@
 //! Map files over any map: exact round trips, and no damage that goes unseen.
 
+#[allow(dead_code)] // The bodies of the fuzz targets.
+#[path = "../fuzz/src/lib.rs"]
+mod fuzz;
+
+use fuzz::{crc32, mend_checksums};
 use lattice_core::cloud::Cloud;
 use lattice_core::lattice::{Key, Lattice, LatticeKind};
 use lattice_core::voxels::codec::decode_keys;
@@ -80,42 +85,6 @@ fn bytes(map: &MapContents, options: &WriteOptions) -> Vec<u8> {
 
 fn read(bytes: &[u8]) -> Result<MapContents, String> {
     MapContents::read(bytes, max_voxels_of(bytes.len() as u64)).map_err(|e| e.to_string())
-}
-
-/// CRC-32 of zip, bit by bit.
-fn crc32(bytes: &[u8]) -> [u8; 4] {
-    let mut crc = u32::MAX;
-    for &byte in bytes {
-        crc ^= u32::from(byte);
-        for _ in 0..8 {
-            crc = (crc >> 1) ^ (0xedb8_8320 & (crc & 1).wrapping_neg());
-        }
-    }
-    (!crc).to_le_bytes()
-}
-
-/// Makes every checksum right again, as far as the lengths in the file lead.
-fn mend_checksums(file: &mut [u8]) {
-    let head = crc32(&file[..220]);
-    file[220..224].copy_from_slice(&head);
-    let mut at = 224;
-    while at + 48 <= file.len() && &file[at..at + 4] == b"SECT" {
-        let stored = u64::from_le_bytes(file[at + 32..at + 40].try_into().unwrap());
-        let end = usize::try_from(stored)
-            .ok()
-            .and_then(|n| n.checked_add(at + 48));
-        let Some(end) = end.filter(|&end| end <= file.len()) else {
-            break;
-        };
-        let crc = crc32(&file[at + 48..end]);
-        file[at + 40..at + 44].copy_from_slice(&crc);
-        let crc = crc32(&file[at..at + 44]);
-        file[at + 44..at + 48].copy_from_slice(&crc);
-        at = end;
-    }
-    let end = file.len() - 4;
-    let crc = crc32(&file[..end]);
-    file[end..].copy_from_slice(&crc);
 }
 
 proptest! {

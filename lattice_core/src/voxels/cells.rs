@@ -7,6 +7,9 @@ use super::table::{Place, Row, Table};
 use crate::lattice::CellCode;
 use crate::prefetch::prefetch;
 
+/// Voxels that a block has room for at first.
+const FIRST_NUMBERS: usize = 8;
+
 /// The voxels of a block.
 #[derive(Clone)]
 struct Block {
@@ -58,7 +61,8 @@ impl Block {
     fn insert(&mut self, place: usize, number: u32) {
         let (_, rank) = self.rank(place);
         if self.numbers.len() == self.numbers.capacity() {
-            self.numbers.reserve_exact(self.numbers.len().max(8));
+            self.numbers
+                .reserve_exact(self.numbers.len().max(FIRST_NUMBERS));
         }
         self.numbers.insert(rank, number);
         self.leaf[place >> 6 & 7] |= 1 << (place & 63);
@@ -108,6 +112,13 @@ impl Clone for CellTable {
 }
 
 impl CellTable {
+    /// Most bytes for a voxel: that of one alone in its block.
+    pub(super) const VOXEL_BYTES: usize =
+        grow::most_bytes::<Entry>() + Table::<Block>::ROW_BYTES + FIRST_NUMBERS * size_of::<u32>();
+    /// Most bytes besides those of voxels.
+    pub(super) const FIRST_BYTES: usize =
+        Table::<Block>::FIRST_BYTES + grow::FIRST * size_of::<Entry>();
+
     pub(super) fn new() -> CellTable {
         CellTable {
             blocks: Table::new(),

@@ -37,7 +37,7 @@ impl Gather {
     }
 
     /// Adds points in order, each as its number's `point`; a cell that has to make room for another
-    /// goes to `out`.
+    /// goes to `out`, but not what has no cell.
     #[inline(always)]
     pub(super) fn add(
         &mut self,

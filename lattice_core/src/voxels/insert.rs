@@ -305,14 +305,10 @@ impl Chunk {
                     .add(codes, |i| points.point(i), &mut self.partials),
             }
             if self.partials.len() >= BATCH {
-                self.partials
-                    .retain(|partial| partial.code != CellCode::NONE);
                 take(&mut self.partials);
             }
         });
         self.gather.drain(&mut self.partials);
-        self.partials
-            .retain(|partial| partial.code != CellCode::NONE);
         take(&mut self.partials);
     }
 

@@ -6,10 +6,12 @@ use nalgebra::{Matrix3, Vector3};
 use rayon::prelude::*;
 use thiserror::Error;
 
+use super::cells::CellTable;
 use super::columns::{Columns, Details, LabelCount, Payload, Stamps};
 use super::distortion::{Distortion, DistortionSums};
 use super::fixed::{moment_unit_m, voxel_of};
-use super::shard::{Entry, SHARDS, Shard, shard_of};
+use super::grow;
+use super::shard::{Life, SHARDS, Shard, shard_of};
 use super::{InsertReport, OFFSET_UNIT_M, Voxel, VoxelStore, WhenFull};
 use crate::cloud::Cloud;
 use crate::lattice::{CellCode, Key, Lattice, LatticeIndex};
@@ -93,18 +95,20 @@ impl VoxelList {
         self.payload
     }
 
-    /// How many voxels of a payload fit into `max_bytes`, tables and room to grow included; the
-    /// number to bound a list by.
+    /// How many voxels of a payload surely fit into `max_bytes`, the number to bound a list by.
+    ///
+    /// Each may be alone in its block and may be remembered as removed: some 330 bytes, where on
+    /// surfaces a voxel takes 60. Of labels a handful a voxel is assumed.
     pub fn voxels_within(max_bytes: usize, payload: Payload) -> usize {
         let columns = |kept: bool, bytes: usize| if kept { bytes } else { 0 };
-        let row = size_of::<Entry>();
-        let row = row
-            + columns(payload.moments, 48)
+        let columns = columns(payload.moments, 48)
             + columns(payload.stamps, 16)
-            // A handful of labels.
             + columns(payload.labels, 24 + 8 * 8);
-        // Vectors grow by a quarter; the table is at least 3/8 full.
-        max_bytes / (row + row / 4 + 22)
+        // A hash map may be less than half full.
+        let removed = 5 * size_of::<(u64, Life)>() / 2;
+        let voxel = CellTable::VOXEL_BYTES + columns + columns / 4 + removed;
+        let first = SHARDS * (CellTable::FIRST_BYTES + grow::FIRST * columns);
+        max_bytes.saturating_sub(first) / voxel
     }
 
     /// Makes the next state and gives its number.

@@ -16,7 +16,9 @@ const PART: usize = 1 << 13;
 /// Points between two merges into the list; bounds the memory for what is not yet merged.
 const WAVE: usize = 1 << 18;
 /// Memory for a block, growth of the vectors and of the table included.
-const BLOCK_BYTES: usize = 112;
+const BLOCK_BYTES: usize = Table::<Block>::ROW_BYTES;
+/// Most memory besides that of blocks.
+const FIRST_BYTES: usize = Table::<Block>::FIRST_BYTES + Recent::BYTES;
 
 /// The cells of a block, one bit each, by their place.
 pub(super) type Leaf = [u64; 8];
@@ -37,7 +39,7 @@ impl Row for Block {
 
 /// Occupied voxels without payload: blocks of 8 x 8 x 8 indices with one bit for each cell.
 ///
-/// The fastest store and the smallest, 3 to 8 bytes a voxel on surfaces. When `max_bytes` is
+/// The fastest store and the smallest, 2 to 4 bytes a voxel on surfaces. When `max_bytes` is
 /// reached, points in new blocks are refused and counted; blocks that exist go on to take points.
 #[derive(Clone)]
 pub struct OccupancyList {
@@ -70,7 +72,7 @@ impl OccupancyList {
             datum_m: lattice.center_wide(datum_index),
             lattice,
             datum_index,
-            max_blocks: max_bytes / BLOCK_BYTES,
+            max_blocks: max_bytes.saturating_sub(FIRST_BYTES) / BLOCK_BYTES,
             blocks: Table::new(),
             len: 0,
             recent: Recent::new(),
@@ -121,12 +123,14 @@ impl OccupancyList {
 
     /// Most voxels that a list of `max_bytes` can hold, if all their blocks are full.
     pub fn max_voxels_within(max_bytes: usize) -> usize {
-        (max_bytes / BLOCK_BYTES).saturating_mul(CellCode::BLOCK_CELLS)
+        (max_bytes.saturating_sub(FIRST_BYTES) / BLOCK_BYTES).saturating_mul(CellCode::BLOCK_CELLS)
     }
 
     /// Most bytes that the list takes.
     pub fn max_bytes(&self) -> usize {
-        self.max_blocks.saturating_mul(BLOCK_BYTES)
+        self.max_blocks
+            .saturating_mul(BLOCK_BYTES)
+            .saturating_add(FIRST_BYTES)
     }
 
     /// Makes a cell occupied; false if the list is full.

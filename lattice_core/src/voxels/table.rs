@@ -9,6 +9,9 @@ use super::grow;
 const FIRST_SLOTS: usize = 64;
 /// Slots are doubled beyond this share in use: n / d.
 const FULL: (usize, usize) = (3, 8);
+/// Most bytes of slots for a row: they are at least half as full as when they double, which they do
+/// beside the old ones.
+const SLOT_BYTES: usize = 3 * size_of::<u64>() * FULL.1 / FULL.0;
 /// A slot that holds nothing.
 const FREE: u64 = 0;
 /// The half of a slot that is of the hash; the other is the number plus 1.
@@ -49,6 +52,12 @@ pub(super) enum Place {
 }
 
 impl<R: Row> Table<R> {
+    /// Most bytes for a row, the room to grow and the table that it grows from included.
+    pub(super) const ROW_BYTES: usize = grow::most_bytes::<R>() + SLOT_BYTES;
+    /// Most bytes besides those of rows.
+    pub(super) const FIRST_BYTES: usize =
+        FIRST_SLOTS * size_of::<u64>() + grow::FIRST * size_of::<R>();
+
     pub(super) fn new() -> Table<R> {
         static SEED: LazyLock<u64> = LazyLock::new(|| RandomState::new().hash_one(0) | 1);
         Table {

@@ -55,7 +55,7 @@ fn read_and_write(bytes: &[u8]) {
 }
 
 /// CRC-32 of zip, bit by bit.
-fn crc32(bytes: &[u8]) -> [u8; 4] {
+pub fn crc32(bytes: &[u8]) -> [u8; 4] {
     let mut crc = u32::MAX;
     for &byte in bytes {
         crc ^= u32::from(byte);

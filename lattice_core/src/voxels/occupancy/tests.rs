@@ -6,6 +6,7 @@ use proptest::prelude::*;
 
 use super::*;
 use crate::lattice::LatticeKind;
+use crate::voxels::{Payload, VoxelList};
 
 const PLENTY: usize = 1 << 30;
 
@@ -55,7 +56,7 @@ fn any_number_of_threads_gives_the_same_list() {
 
 #[test]
 fn a_full_list_refuses_new_blocks_and_counts_every_point() {
-    let two_blocks = 2 * BLOCK_BYTES;
+    let two_blocks = FIRST_BYTES + 2 * BLOCK_BYTES;
     let mut list = OccupancyList::new(lattice(0), Vector3::zeros(), two_blocks).unwrap();
     let report = list.insert(&cloud(
         [0.0; 3],
@@ -71,6 +72,34 @@ fn a_full_list_refuses_new_blocks_and_counts_every_point() {
     assert!(list.remove(Key::pack([20; 3]).unwrap()));
     assert_eq!(list.insert(&cloud([0.0; 3], vec![[20.0; 3]])).inserted, 1);
     list.validate().unwrap();
+}
+
+#[test]
+fn the_limit_in_bytes_is_kept() {
+    // Each cell alone in its block: the most that a voxel takes.
+    let lone: Vec<[f32; 3]> = (0..40_000)
+        .map(|i| [(4 * (i % 200)) as f32, (4 * (i / 200)) as f32, 0.0])
+        .collect();
+    for max_bytes in [100_000, 300_000, 1_000_000, 3_000_000] {
+        let mut list = OccupancyList::new(lattice(0), Vector3::zeros(), max_bytes).unwrap();
+        let report = list.insert(&cloud([0.0; 3], lone.clone()));
+        assert!(report.list_full > 0 && report.inserted > 0, "{max_bytes}");
+        assert!(list.bytes() <= max_bytes, "{} > {max_bytes}", list.bytes());
+        let max_voxels = VoxelList::voxels_within(max_bytes, Payload::default());
+        let mut list = VoxelList::new(lattice(0), Vector3::zeros(), max_voxels).unwrap();
+        list.insert(&cloud([0.0; 3], lone.clone()));
+        list.take_changes();
+        assert_eq!(list.len(), max_voxels.min(lone.len()));
+        let keys: Vec<_> = list.sorted_keys();
+        keys.iter()
+            .step_by(2)
+            .for_each(|key| assert!(list.remove(*key)));
+        let bytes = VoxelStore::bytes(&list);
+        assert!(
+            max_voxels == 0 || bytes <= max_bytes,
+            "{bytes} > {max_bytes}"
+        );
+    }
 }
 
 #[test]
