@@ -110,7 +110,7 @@ fn a_full_map_refuses_or_forgets_the_oldest() {
 
 #[test]
 fn memory_bounds_the_map() {
-    let max_map_bytes = 100_000;
+    let max_map_bytes = 1_000_000;
     let mapper = mapper(MapperOptions {
         max_map_bytes,
         ..options(LatticeKind::Bcc)

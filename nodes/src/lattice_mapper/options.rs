@@ -61,7 +61,7 @@ impl MapperOptions {
         let [x, y, z] = datum[..] else {
             return Err(params.invalid("datum_m", "expected three numbers, x y z in metres"));
         };
-        Ok(Self {
+        let options = Self {
             map_frame: params.string("map_frame", &defaults.map_frame)?,
             datum_near_m: Vector3::new(x, y, z),
             max_voxels: params.usize("max_voxels", defaults.max_voxels)?,
@@ -71,7 +71,12 @@ impl MapperOptions {
             max_cloud_points: params.usize("max_cloud_points", defaults.max_cloud_points)?,
             chunk_bytes: params.usize("chunk_bytes", defaults.chunk_bytes)?,
             ..defaults
-        })
+        };
+        if options.max_voxels > 0 && options.voxel_limit() == 0 {
+            let problem = "too little for a single voxel; a small map takes 1000000";
+            return Err(params.invalid("max_map_bytes", problem));
+        }
+        Ok(options)
     }
 
     /// How the parameters want the lattice to lie in the map, whichever lattice it is.
