@@ -10,5 +10,6 @@ pub mod pose;
 mod prefetch;
 pub mod query;
 pub mod raycast;
+pub mod registration;
 pub mod simulate;
 pub mod voxels;
