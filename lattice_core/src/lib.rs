@@ -6,6 +6,7 @@
 pub mod cloud;
 pub mod geodesy;
 pub mod lattice;
+pub mod metrics;
 pub mod pose;
 mod prefetch;
 pub mod query;

@@ -7,6 +7,7 @@
 mod buffer;
 mod frame_name;
 mod interpolate;
+pub mod se3;
 mod tf_error;
 mod track;
 mod transforms;

@@ -1,0 +1,55 @@
+//! Why a cloud cannot be registered.
+
+use thiserror::Error;
+
+/// Why a cloud cannot be prepared for registration.
+#[derive(Clone, Debug, PartialEq, Error)]
+pub enum RegistrationError {
+    /// Too few points for the neighbourhoods asked for.
+    #[error("{points} points, at least {least} are needed")]
+    TooFewPoints {
+        /// Points of the cloud.
+        points: usize,
+        /// Points needed.
+        least: usize,
+    },
+    /// More points than can be numbered.
+    #[error("{points} points, at most {most} are taken")]
+    TooManyPoints {
+        /// Points of the cloud.
+        points: usize,
+        /// Points taken at most.
+        most: usize,
+    },
+    /// A coordinate is not a number or beyond [`MAX_COORDINATE_M`](super::MAX_COORDINATE_M).
+    #[error("point {index} is not finite or too far away")]
+    NotFinite {
+        /// Its place in the cloud.
+        index: usize,
+    },
+    /// All points are equal or on one line, up to rounding.
+    #[error("all points are on one line")]
+    Collinear,
+    /// There must be a label for each point or none at all.
+    #[error("{labels} labels for {points} points")]
+    LabelCount {
+        /// Labels of the cloud.
+        labels: usize,
+        /// Points of the cloud.
+        points: usize,
+    },
+    /// Neighbours of a neighbourhood out of range.
+    #[error("{neighbors} neighbours, from 3 to {most} are taken")]
+    Neighbors {
+        /// Neighbours asked for.
+        neighbors: usize,
+        /// Neighbours at most.
+        most: usize,
+    },
+    /// The plane regularisation must be over 0 and at most 1.
+    #[error("a plane epsilon of {plane_epsilon} is not in (0, 1]")]
+    PlaneEpsilon {
+        /// What was asked for.
+        plane_epsilon: f64,
+    },
+}
