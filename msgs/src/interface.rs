@@ -13,7 +13,7 @@ const SEPARATOR: &str =
 pub struct Schema {
     /// Type name, such as `sensor_msgs/msg/PointCloud2`.
     pub type_name: &'static str,
-    /// Text of the `.msg` file, or of one half of the `.srv` file.
+    /// Text of the `.msg` file, or of one part of the `.srv` or `.action` file.
     pub text: &'static str,
     /// Messages that the fields refer to.
     pub dependencies: &'static [&'static Schema],
@@ -29,7 +29,10 @@ impl Schema {
             for &dependency in schema.dependencies {
                 if !seen.iter().any(|s| s.type_name == dependency.type_name) {
                     seen.push(dependency);
-                    let name = dependency.type_name.replacen("/msg/", "/", 1);
+                    // As the fields name it, where the middle is left out.
+                    let mut parts = dependency.type_name.split('/');
+                    let (package, name) = (parts.next(), parts.next_back());
+                    let name = [package, name].map(Option::unwrap_or_default).join("/");
                     text += &format!("{SEPARATOR}\nMSG: {name}\n{}", dependency.text);
                 }
             }
@@ -39,7 +42,7 @@ impl Schema {
     }
 }
 
-/// A message, or one half of a service.
+/// A message, or one part of a service or an action.
 pub trait RosMessage:
     Clone + Debug + Default + PartialEq + Serialize + DeserializeOwned + Send + Sync + 'static
 {
@@ -76,7 +79,7 @@ pub fn dds_type_name(type_name: &str) -> Option<String> {
         .then(|| format!("{package}::{kind}::dds_::{name}_"))
 }
 
-/// Start of the line `---` in the text of a service.
+/// Start of the first line `---` in the text of a service or an action.
 const fn divider(text: &str) -> usize {
     let bytes = text.as_bytes();
     let mut i = 0;
@@ -87,15 +90,15 @@ const fn divider(text: &str) -> usize {
         }
         i += 1;
     }
-    panic!("a service definition has a line of three dashes")
+    panic!("the parts of a definition are divided by a line of three dashes")
 }
 
-/// First half of the text of a service. Fails to compile where there is no divider.
+/// Text before the first divider. Fails to compile where there is no divider.
 pub(crate) const fn request_text(text: &'static str) -> &'static str {
     text.split_at(divider(text)).0
 }
 
-/// Second half of the text of a service. Fails to compile where there is no divider.
+/// Text after the first divider. Fails to compile where there is no divider.
 pub(crate) const fn response_text(text: &'static str) -> &'static str {
     text.split_at(divider(text) + "---\n".len()).1
 }
@@ -155,6 +158,7 @@ macro_rules! services {
     };
 }
 
+pub(crate) use crate::action::actions;
 pub(crate) use {messages, services};
 
 #[cfg(test)]

@@ -5,7 +5,10 @@
 //! [`cdr`] reads and writes the bytes that are on the wire and in bags.
 #![forbid(unsafe_code)]
 
+mod action;
+pub mod action_msgs;
 pub mod builtin_interfaces;
+pub mod calibration;
 pub mod cdr;
 pub mod diagnostic_msgs;
 pub mod geographic_msgs;
@@ -22,7 +25,10 @@ pub mod std_msgs;
 pub mod std_srvs;
 pub mod tf2_msgs;
 mod time;
+pub mod unique_identifier_msgs;
+pub mod vision_msgs;
 pub mod visualization_msgs;
 
+pub use action::RosAction;
 pub use interface::{RosMessage, RosService, Schema, dds_type_name};
 pub use registry::{MessageVisitor, definition_of, visit_messages};

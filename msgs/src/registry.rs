@@ -2,9 +2,9 @@
 
 use crate::interface::RosMessage;
 use crate::{
-    builtin_interfaces, diagnostic_msgs, geographic_msgs, geometry_msgs, lattice, nav_msgs,
-    novatel_oem7_msgs, rcl_interfaces, rosgraph_msgs, sensor_msgs, std_msgs, std_srvs, tf2_msgs,
-    visualization_msgs,
+    action_msgs, builtin_interfaces, calibration, diagnostic_msgs, geographic_msgs, geometry_msgs,
+    lattice, nav_msgs, novatel_oem7_msgs, rcl_interfaces, rosgraph_msgs, sensor_msgs, std_msgs,
+    std_srvs, tf2_msgs, unique_identifier_msgs, vision_msgs, visualization_msgs,
 };
 
 /// Something to do with every message type; see [`visit_messages`].
@@ -13,9 +13,14 @@ pub trait MessageVisitor {
     fn visit<M: RosMessage>(&mut self);
 }
 
-/// Shows the visitor every message, request and response that this crate knows.
+/// Shows the visitor every message, and every part of a service or an action, that this crate knows.
 pub fn visit_messages(visitor: &mut impl MessageVisitor) {
+    action_msgs::visit_messages(visitor);
+    action_msgs::visit_services(visitor);
     builtin_interfaces::visit_messages(visitor);
+    calibration::visit_messages(visitor);
+    calibration::visit_services(visitor);
+    calibration::visit_actions(visitor);
     diagnostic_msgs::visit_messages(visitor);
     geographic_msgs::visit_messages(visitor);
     geometry_msgs::visit_messages(visitor);
@@ -30,6 +35,8 @@ pub fn visit_messages(visitor: &mut impl MessageVisitor) {
     std_msgs::visit_messages(visitor);
     std_srvs::visit_services(visitor);
     tf2_msgs::visit_messages(visitor);
+    unique_identifier_msgs::visit_messages(visitor);
+    vision_msgs::visit_messages(visitor);
     visualization_msgs::visit_messages(visitor);
 }
 
@@ -89,7 +96,9 @@ mod tests {
         let mut names = Names::default();
         visit_messages(&mut names);
         let root = env!("CARGO_MANIFEST_DIR");
-        let mut folders = vec![(format!("{root}/msg"), "lattice_msgs".to_owned())];
+        let mut folders: Vec<_> = ["msg", "srv", "action"]
+            .map(|kind| (format!("{root}/{kind}"), "lattice_msgs".to_owned()))
+            .into();
         for folder in std::fs::read_dir(format!("{root}/definitions")).unwrap() {
             let folder = folder.unwrap();
             let package = folder.file_name().into_string().unwrap();
@@ -100,6 +109,7 @@ mod tests {
                 let file = file.unwrap().file_name().into_string().unwrap();
                 let type_name = match file.split_once('.').unwrap() {
                     (name, "msg") => format!("{package}/msg/{name}"),
+                    (name, "action") => format!("{package}/action/{name}_Goal"),
                     (name, _) => format!("{package}/srv/{name}_Request"),
                 };
                 assert!(names.0.contains(&type_name.as_str()), "{type_name}");

@@ -61,7 +61,10 @@ fn full_name(kind: &str, package: &str) -> Option<String> {
 
 /// How the field of such a type shows in Rust.
 fn as_rust_shows(kind: &str) -> String {
-    let name = kind.rsplit('/').next().unwrap().replace("byte", "uint8");
+    let mut name = kind.rsplit('/').next().unwrap().replace("byte", "uint8");
+    if name.starts_with(char::is_uppercase) {
+        name = name.replace('_', "");
+    }
     match name.split_once("[<=") {
         Some((element, _)) => format!("{element}[]"),
         None => name,
@@ -101,7 +104,11 @@ impl MessageVisitor for FieldsAgree {
             .collect();
         assert_eq!(in_rust, in_text, "{}", M::TYPE);
 
-        let mut stated: Vec<_> = M::SCHEMA.dependencies.iter().map(|d| d.type_name).collect();
+        // Fields name a part of an action as if it were a message.
+        let dependencies = M::SCHEMA.dependencies.iter();
+        let mut stated: Vec<_> = dependencies
+            .map(|d| d.type_name.replace("/action/", "/msg/"))
+            .collect();
         stated.sort_unstable();
         used.sort_unstable();
         used.dedup();
@@ -178,6 +185,8 @@ fn constants_agree() {
     visit_messages(&mut in_text);
     let mut in_text = in_text.0;
     let packages = [
+        "action_msgs",
+        "calibration",
         "diagnostic_msgs",
         "lattice",
         "novatel_oem7_msgs",

@@ -98,8 +98,8 @@ def main():
     jazzy = get_typestore(Stores.ROS2_JAZZY)
     for line in sys.stdin:
         asked = json.loads(line)
-        # The library knows no services: their halves are messages to it.
-        name = asked["type"].replace("/srv/", "/msg/")
+        # The library knows no services and actions: their parts are messages to it.
+        name = asked["type"].replace("/srv/", "/msg/").replace("/action/", "/msg/")
         register(store, asked["definition"], name)
         samples = []
         for length in (0, 1, 2, 5):

@@ -1,0 +1,93 @@
+//! What all actions share: goals, how far they are, and how they are canceled.
+
+use serde::{Deserialize, Serialize};
+
+use crate::builtin_interfaces::Time;
+use crate::interface::{messages, services};
+use crate::unique_identifier_msgs::UUID;
+
+messages! {
+    "action_msgs" in "../definitions/action_msgs/";
+    GoalInfo [UUID, Time];
+    GoalStatus [GoalInfo];
+    GoalStatusArray [GoalStatus];
+}
+
+services! {
+    "action_msgs" in "../definitions/action_msgs/";
+    CancelGoal: CancelGoalRequest [GoalInfo], CancelGoalResponse [GoalInfo];
+}
+
+/// A goal of an action.
+#[derive(Clone, Copy, Debug, Default, PartialEq, Serialize, Deserialize)]
+pub struct GoalInfo {
+    /// Chosen by the client.
+    pub goal_id: UUID,
+    /// When the server accepted it.
+    pub stamp: Time,
+}
+
+/// How far a goal is.
+#[derive(Clone, Copy, Debug, Default, PartialEq, Serialize, Deserialize)]
+pub struct GoalStatus {
+    /// The goal.
+    pub goal_info: GoalInfo,
+    /// One of the constants.
+    pub status: i8,
+}
+
+impl GoalStatus {
+    /// Not told of.
+    pub const STATUS_UNKNOWN: i8 = 0;
+    /// Waits.
+    pub const STATUS_ACCEPTED: i8 = 1;
+    /// At work.
+    pub const STATUS_EXECUTING: i8 = 2;
+    /// About to end early, as asked.
+    pub const STATUS_CANCELING: i8 = 3;
+    /// Done.
+    pub const STATUS_SUCCEEDED: i8 = 4;
+    /// Ended early, as asked.
+    pub const STATUS_CANCELED: i8 = 5;
+    /// Ended by the server.
+    pub const STATUS_ABORTED: i8 = 6;
+}
+
+/// How far all goals of an action server are.
+#[derive(Clone, Debug, Default, PartialEq, Serialize, Deserialize)]
+pub struct GoalStatusArray {
+    /// Those at work and those that ended of late.
+    pub status_list: Vec<GoalStatus>,
+}
+
+/// Asks to end goals early: the one of the id; all that were accepted by the stamp, if the id is
+/// zero; both where both are given; all, where neither is.
+#[derive(Clone, Copy, Debug)]
+pub struct CancelGoal;
+
+/// Request of [`CancelGoal`].
+#[derive(Clone, Debug, Default, PartialEq, Serialize, Deserialize)]
+pub struct CancelGoalRequest {
+    /// Which.
+    pub goal_info: GoalInfo,
+}
+
+/// Response of [`CancelGoal`].
+#[derive(Clone, Debug, Default, PartialEq, Serialize, Deserialize)]
+pub struct CancelGoalResponse {
+    /// One of the constants.
+    pub return_code: i8,
+    /// Those that end early.
+    pub goals_canceling: Vec<GoalInfo>,
+}
+
+impl CancelGoalResponse {
+    /// At least one goal ends early.
+    pub const ERROR_NONE: i8 = 0;
+    /// The server does not want to.
+    pub const ERROR_REJECTED: i8 = 1;
+    /// No such goal.
+    pub const ERROR_UNKNOWN_GOAL_ID: i8 = 2;
+    /// Ended before.
+    pub const ERROR_GOAL_TERMINATED: i8 = 3;
+}
