@@ -1,0 +1,195 @@
+//! What goes into a calibration and what comes out.
+
+use std::ops::ControlFlow;
+
+use nalgebra::{Isometry3, Matrix6, Point3, Vector3};
+
+use crate::registration::{Confusion, SemanticCloud};
+
+/// What one look of the headset saw.
+#[derive(Clone, PartialEq, Debug, Default)]
+pub struct Gaze {
+    /// Points in the headset's frame: metres, forward, left, up, gravity along -z.
+    pub cloud: SemanticCloud,
+    /// Where the headset was, in the same frame, if it is known.
+    pub sensor_m: Option<Point3<f64>>,
+}
+
+/// One calibration that is asked for.
+#[derive(Clone, Copy, Debug)]
+pub struct CalibrationRequest<'a> {
+    /// Looks in one frame; each further one multiplies the likelihood.
+    pub gazes: &'a [Gaze],
+    /// `map_from_headset` near which the answer is, if something is known.
+    pub start: Option<Isometry3<f64>>,
+    /// What earlier calibrations taught about the labels.
+    pub confusion: Option<&'a Confusion>,
+}
+
+/// How a calibration is done. All lengths are metres.
+#[derive(Clone, Copy, PartialEq, Debug)]
+pub struct CalibrationOptions {
+    /// Fewest points of the headset.
+    pub min_points: usize,
+    /// Most points of the headset.
+    pub max_points: usize,
+    /// Points of the headset that are registered, about; more are thinned.
+    pub registered_points: usize,
+    /// Standard deviation of the headset's points.
+    pub noise_m: f64,
+    /// Share of places where equal class numbers are expected to agree before anything was learned;
+    /// 0 if the label sets have nothing to do with each other.
+    pub agreement: f64,
+    /// How far the answer may be from a given start.
+    pub start_radius_m: f64,
+    /// How far its heading may be from that of a given start, radians.
+    pub start_yaw_rad: f64,
+    /// Log-likelihood by which the answer must beat every other pose.
+    pub min_margin: f64,
+    /// Share of the headset's points that must lie on the map.
+    pub min_inliers: f64,
+    /// Largest standard deviation of the position in any direction.
+    pub max_sigma_m: f64,
+    /// Largest standard deviation of the orientation about any axis, radians.
+    pub max_sigma_rad: f64,
+}
+
+impl Default for CalibrationOptions {
+    fn default() -> CalibrationOptions {
+        CalibrationOptions {
+            min_points: 100,
+            max_points: 500_000,
+            registered_points: 2_500,
+            noise_m: 0.015,
+            agreement: 0.6,
+            start_radius_m: 2.0,
+            start_yaw_rad: 1.0,
+            min_margin: 20.0,
+            min_inliers: 0.4,
+            max_sigma_m: 0.05,
+            max_sigma_rad: 0.02,
+        }
+    }
+}
+
+/// What can be said of a calibration.
+#[derive(Clone, Copy, PartialEq, Eq, Debug)]
+pub enum Verdict {
+    /// The pose holds.
+    Ok,
+    /// Another pose fits nearly as well.
+    Ambiguous,
+    /// The pose may slide in the weak directions.
+    Degenerate,
+    /// The headset saw nothing that is on the map.
+    NoOverlap,
+    /// The input cannot be used.
+    RejectedInput,
+}
+
+/// Whether a direction is one of motion or of turning.
+#[derive(Clone, Copy, PartialEq, Eq, Debug)]
+pub enum DirectionKind {
+    /// Motion; sigma in metres.
+    Translation,
+    /// Turning; sigma in radians.
+    Rotation,
+}
+
+/// A direction in which the pose is not held.
+#[derive(Clone, Copy, PartialEq, Debug)]
+pub struct WeakDirection {
+    /// Unit vector in the map frame.
+    pub axis: Vector3<f64>,
+    /// What it is a direction of.
+    pub kind: DirectionKind,
+    /// Standard deviation along it, metres or radians.
+    pub sigma: f64,
+}
+
+/// How a class of the headset agrees with the map.
+#[derive(Clone, Copy, PartialEq, Debug)]
+pub struct ClassReliability {
+    /// Class of the headset.
+    pub source_class: u16,
+    /// Share of its observations where the map says the same number.
+    pub agreement: f64,
+    /// Its observations.
+    pub weight: f64,
+}
+
+/// The answer.
+#[derive(Clone, PartialEq, Debug)]
+pub struct Calibration {
+    /// What can be said of it.
+    pub verdict: Verdict,
+    /// Why, in a sentence.
+    pub reason: String,
+    /// Whether it was ended before it was done.
+    pub cancelled: bool,
+    /// The best pose that was found; to be used only if the verdict says so.
+    pub map_from_headset: Isometry3<f64>,
+    /// Of x, y, z (m^2) and the turns about x, y, z (rad^2), in the map frame, as in
+    /// `geometry_msgs/PoseWithCovariance`.
+    pub covariance: Matrix6<f64>,
+    /// Log-likelihood above that of the best different pose.
+    pub log_margin: f64,
+    /// Share of the headset's points on a surface of the map.
+    pub inlier_fraction: f64,
+    /// Root mean square distance of those from the surfaces, metres.
+    pub rmse_m: f64,
+    /// Directions in which the pose is not held.
+    pub weak_directions: Vec<WeakDirection>,
+    /// How the headset's classes agree with the map.
+    pub class_reliability: Vec<ClassReliability>,
+    /// Which of the candidates it is.
+    pub method: &'static str,
+    /// What was learned of the labels, together with what was known.
+    pub confusion: Confusion,
+}
+
+impl Calibration {
+    /// An answer without a pose.
+    pub fn refused(verdict: Verdict, reason: impl Into<String>) -> Calibration {
+        Calibration {
+            verdict,
+            reason: reason.into(),
+            cancelled: false,
+            map_from_headset: Isometry3::identity(),
+            covariance: Matrix6::zeros(),
+            log_margin: 0.0,
+            inlier_fraction: 0.0,
+            rmse_m: 0.0,
+            weak_directions: Vec::new(),
+            class_reliability: Vec::new(),
+            method: "none",
+            confusion: Confusion::default(),
+        }
+    }
+}
+
+/// Parts of a calibration.
+#[derive(Clone, Copy, PartialEq, Eq, Debug)]
+pub enum Stage {
+    /// The clouds are made ready.
+    Prepare,
+    /// All places are tried.
+    Search,
+    /// The best are refined.
+    Refine,
+    /// One is chosen and judged.
+    Judge,
+}
+
+/// Hears how far a calibration is, and may end it.
+pub trait Progress: Sync {
+    /// `fraction` of the whole is done; `Break` ends the calibration.
+    fn report(&self, stage: Stage, fraction: f64) -> ControlFlow<()>;
+}
+
+/// Hears nothing.
+impl Progress for () {
+    fn report(&self, _stage: Stage, _fraction: f64) -> ControlFlow<()> {
+        ControlFlow::Continue(())
+    }
+}

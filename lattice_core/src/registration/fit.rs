@@ -1,0 +1,279 @@
+//! How well a source fits a target at a pose: the likelihood that all candidates are judged by.
+
+use nalgebra::{Isometry3, Point3, Vector3};
+use rayon::prelude::*;
+
+use super::confusion::{Confusion, Counts, Lift};
+use super::{Neighbors, PreparedCloud};
+
+/// Share of source points that have a partner in the target.
+const INLIERS: f64 = 0.8;
+/// How much denser points are on a surface of the map than anywhere.
+const CONTRAST: f64 = 25.0;
+/// Parts of the source that labels are judged by while they are learned from the others.
+const FOLDS: usize = 5;
+/// Points of a region that count as independent, at most.
+const INDEPENDENT: f64 = 4.0;
+/// Target points that a source point may belong to.
+const NEIGHBORS: usize = 4;
+
+/// How closely points are expected to agree.
+#[derive(Clone, Copy, PartialEq, Debug)]
+pub struct FitScale {
+    /// Standard deviation across a surface, metres.
+    pub normal_m: f64,
+    /// Standard deviation along a surface, metres: about the spacing of the map's points.
+    pub tangent_m: f64,
+    /// Side of the regions that count as one observation each, metres.
+    pub region_m: f64,
+}
+
+impl FitScale {
+    /// For a map whose points are about `spacing_m` apart and clouds with `noise_m` of their own.
+    pub fn new(spacing_m: f64, noise_m: f64) -> FitScale {
+        FitScale {
+            normal_m: (0.25 * spacing_m).hypot(noise_m),
+            tangent_m: spacing_m.hypot(noise_m),
+            region_m: 8.0 * spacing_m,
+        }
+    }
+
+    /// The same for points that are refined only roughly.
+    pub fn coarser(self, factor: f64) -> FitScale {
+        FitScale {
+            normal_m: self.normal_m * factor,
+            tangent_m: self.tangent_m * factor,
+            ..self
+        }
+    }
+
+    /// Farthest that a partner may be, metres.
+    fn gate_m(&self) -> f64 {
+        3.0 * self.tangent_m.max(self.normal_m)
+    }
+}
+
+/// A partner of a source point and how likely they are one place, 1 at most.
+#[derive(Clone, Copy, Debug)]
+struct Partner {
+    target: u32,
+    nearness: f64,
+}
+
+/// The source, cut into regions, ready to be judged at many poses.
+pub struct Fit<'a> {
+    source: &'a PreparedCloud,
+    target: &'a PreparedCloud,
+    scale: FitScale,
+    /// Weight of each source point; points of a crowded region share what it counts.
+    weights: Vec<f64>,
+    folds: Vec<u8>,
+}
+
+/// Source points with their partners at a pose.
+pub struct Partners {
+    of_point: Vec<[Partner; NEIGHBORS]>,
+    /// Root mean square distance across the surfaces of points with a partner, metres.
+    pub rmse_m: f64,
+    /// Share of the points that have a partner.
+    pub inlier_fraction: f64,
+}
+
+/// Log-likelihood of a pose against that of a pose far from everything.
+#[derive(Clone, Copy, PartialEq, Debug)]
+pub struct Likelihood {
+    /// By the surfaces alone.
+    pub surfaces: f64,
+    /// What the labels add, each judged by what the others taught.
+    pub labels: f64,
+}
+
+impl Likelihood {
+    /// Of both.
+    pub fn total(&self) -> f64 {
+        self.surfaces + self.labels
+    }
+}
+
+impl<'a> Fit<'a> {
+    /// Of a source in a target.
+    pub fn new(source: &'a PreparedCloud, target: &'a PreparedCloud, scale: FitScale) -> Fit<'a> {
+        let regions: Vec<[i64; 3]> = (source.points_m().iter())
+            .map(|p| [p.x, p.y, p.z].map(|c| (c / scale.region_m).floor() as i64))
+            .collect();
+        let mut sizes = rustc_hash::FxHashMap::default();
+        for region in &regions {
+            *sizes.entry(*region).or_insert(0.0) += 1.0;
+        }
+        let weight = |region: &[i64; 3]| {
+            let size: f64 = sizes.get(region).copied().unwrap_or(1.0);
+            size.min(INDEPENDENT) / size
+        };
+        let fold = |region: &[i64; 3]| {
+            let [x, y, z] = region.map(|c| c as u64);
+            let mixed = x.wrapping_mul(0x9e37_79b9_7f4a_7c15)
+                ^ y.wrapping_mul(0xc2b2_ae3d_27d4_eb4f)
+                ^ z.wrapping_mul(0x1656_67b1_9e37_79f9);
+            (mixed.wrapping_mul(0xff51_afd7_ed55_8ccd) >> 40) as usize % FOLDS
+        };
+        Fit {
+            source,
+            target,
+            scale,
+            weights: regions.iter().map(weight).collect(),
+            folds: regions.iter().map(|r| fold(r) as u8).collect(),
+        }
+    }
+
+    /// Independent observations in the source.
+    pub fn observations(&self) -> f64 {
+        self.weights.iter().sum()
+    }
+
+    /// Finds the partners of all source points.
+    pub fn partners(&self, target_from_source: &Isometry3<f64>) -> Partners {
+        let points = self.source.points_m();
+        let of_point: Vec<([Partner; NEIGHBORS], f64)> = points
+            .par_iter()
+            .enumerate()
+            .with_min_len(256)
+            .map(|(i, point)| self.partners_of(i, point, target_from_source))
+            .collect();
+        let (mut sum, mut n) = (0.0, 0.0);
+        for (_, squared) in of_point.iter().filter(|p| p.1.is_finite()) {
+            sum += squared;
+            n += 1.0;
+        }
+        Partners {
+            rmse_m: if n > 0.0 { f64::sqrt(sum / n) } else { 0.0 },
+            inlier_fraction: n / points.len().max(1) as f64,
+            of_point: of_point.into_iter().map(|p| p.0).collect(),
+        }
+    }
+
+    /// Partners of one point, and its squared distance across the surface of the nearest.
+    fn partners_of(
+        &self,
+        i: usize,
+        point: &Point3<f64>,
+        target_from_source: &Isometry3<f64>,
+    ) -> ([Partner; NEIGHBORS], f64) {
+        let place = target_from_source * point;
+        let normal = self
+            .source
+            .normals()
+            .get(i)
+            .copied()
+            .unwrap_or_else(Vector3::zeros);
+        let normal = target_from_source.rotation * normal;
+        let mut partners = [Partner {
+            target: 0,
+            nearness: 0.0,
+        }; NEIGHBORS];
+        let mut nearest = f64::INFINITY;
+        let mut near = Neighbors::default();
+        let gate_m = self.scale.gate_m();
+        self.target.nearest_k(&place, NEIGHBORS, gate_m, &mut near);
+        for (slot, (j, _)) in partners.iter_mut().zip(near.iter()) {
+            let (Some(q), Some(m)) = (self.target.points_m().get(j), self.target.normals().get(j))
+            else {
+                continue;
+            };
+            let r = place - q;
+            let across = r.dot(m);
+            let along_sq = (r.norm_squared() - across * across).max(0.0);
+            let square =
+                (across / self.scale.normal_m).powi(2) + along_sq / self.scale.tangent_m.powi(2);
+            let facing = 0.3 + 0.7 * normal.dot(m).powi(2);
+            *slot = Partner {
+                target: j as u32,
+                nearness: facing * (-0.5 * square).exp() / NEIGHBORS as f64,
+            };
+            if across.abs() < 3.0 * self.scale.normal_m {
+                nearest = nearest.min(across * across);
+            }
+        }
+        (partners, nearest)
+    }
+
+    /// Likelihood of a pose whose partners these are. Labels count as far as `known` and what the
+    /// other folds teach predict them; `agreement` as in [`Confusion::lift`].
+    pub fn likelihood(&self, partners: &Partners, known: &Confusion, agreement: f64) -> Likelihood {
+        let lifts = self.lifts(partners, known, agreement);
+        let (mut surfaces, mut both) = (0.0, 0.0);
+        for (i, near) in partners.of_point.iter().enumerate() {
+            let weight = self.weights.get(i).copied().unwrap_or(0.0);
+            let label = self.source.label(i);
+            let lift = self
+                .folds
+                .get(i)
+                .and_then(|&fold| lifts.get(usize::from(fold)));
+            let (mut plain, mut labelled) = (0.0, 0.0);
+            for partner in near.iter().filter(|p| p.nearness > 0.0) {
+                plain += partner.nearness;
+                labelled += partner.nearness
+                    * lift.map_or(1.0, |lift| {
+                        lift.expected(&label, &self.target.label(partner.target as usize))
+                    });
+            }
+            surfaces += weight * log_density(plain);
+            both += weight * log_density(labelled);
+        }
+        Likelihood {
+            surfaces,
+            labels: both - surfaces,
+        }
+    }
+
+    /// The lift to judge each fold by.
+    fn lifts(&self, partners: &Partners, known: &Confusion, agreement: f64) -> Vec<Lift> {
+        if !self.source.is_labelled() || !self.target.is_labelled() {
+            return Vec::new();
+        }
+        let counts = self.count(partners);
+        let lift = |fold: usize| {
+            let mut others = Counts::default();
+            for (i, counts) in counts.iter().enumerate() {
+                if i != fold {
+                    others.add_all(counts);
+                }
+            }
+            known.merged(&others.confusion()).lift(agreement)
+        };
+        (0..FOLDS).map(lift).collect()
+    }
+
+    /// Labels seen in one place, by fold.
+    fn count(&self, partners: &Partners) -> Vec<Counts> {
+        let mut counts = vec![Counts::default(); FOLDS];
+        for (i, near) in partners.of_point.iter().enumerate() {
+            let weight = self.weights.get(i).copied().unwrap_or(0.0);
+            let fold = self.folds.get(i).copied().unwrap_or(0);
+            let label = self.source.label(i);
+            let sum: f64 = near.iter().map(|p| p.nearness).sum();
+            // Share of the source point that is on the map at all.
+            let share = INLIERS * CONTRAST / (1.0 - INLIERS + INLIERS * CONTRAST * sum);
+            for partner in near.iter().filter(|p| p.nearness > 0.0) {
+                let target = self.target.label(partner.target as usize);
+                if let Some(counts) = counts.get_mut(usize::from(fold)) {
+                    counts.add(&label, &target, weight * share * partner.nearness);
+                }
+            }
+        }
+        counts
+    }
+
+    /// What this pose teaches about the labels.
+    pub fn learn(&self, partners: &Partners) -> Confusion {
+        let mut all = Counts::default();
+        for counts in &self.count(partners) {
+            all.add_all(counts);
+        }
+        all.confusion()
+    }
+}
+
+/// Log of a mixture of partners and of a point anywhere, against a point that is nowhere near.
+fn log_density(nearness: f64) -> f64 {
+    (1.0 - INLIERS + INLIERS * CONTRAST * nearness).ln()
+}

@@ -1,0 +1,224 @@
+//! All positions of a turned cloud in the map at once.
+
+use nalgebra::{Rotation3, Vector3};
+
+use super::field::Field;
+
+/// A heading and a place that the source fits, and how well.
+#[derive(Clone, Copy, PartialEq, Debug)]
+pub(super) struct Peak {
+    /// Sum of the scores of the points.
+    pub score: u32,
+    /// Turn about the vertical, radians.
+    pub yaw_rad: f64,
+    /// Where the reference point of the source comes to lie in the map, metres.
+    pub place_m: Vector3<f64>,
+}
+
+/// Part of the grid that the reference point may be in: first cell and number of cells.
+#[derive(Clone, Copy, Debug)]
+pub(super) struct Window {
+    pub first: [usize; 3],
+    pub dims: [usize; 3],
+}
+
+/// The best places of the source's reference point for one heading.
+///
+/// `points` are relative to the reference point, in the source frame, with the channel of each at this
+/// heading. At most `most` local maxima come back, the best first.
+pub(super) fn best_places(
+    field: &Field,
+    points: impl Iterator<Item = (Vector3<f64>, usize)>,
+    yaw_rad: f64,
+    window: Window,
+    most: usize,
+) -> Vec<Peak> {
+    let turn = Rotation3::from_axis_angle(&Vector3::z_axis(), yaw_rad);
+    let mut steps: Vec<(usize, [i64; 3])> = points
+        .map(|(p, channel)| {
+            let step = (turn * p) / field.grid.cell_m;
+            (channel, [step.x, step.y, step.z].map(|s| s.round() as i64))
+        })
+        .collect();
+    // Each occupied cell of the source counts once.
+    steps.sort_unstable_by_key(|(channel, [x, y, z])| (*channel, *z, *y, *x));
+    steps.dedup();
+    let sums = sum_all(field, &steps, window);
+    maxima(&sums, window.dims, most)
+        .into_iter()
+        .map(|(score, cell)| Peak {
+            score,
+            yaw_rad,
+            place_m: field
+                .grid
+                .center_m(std::array::from_fn(|a| cell[a] + window.first[a])),
+        })
+        .collect()
+}
+
+/// Score of every cell of the window: rows of the field, shifted by the step of each point, added up.
+///
+/// Zero for rows that leave less than half of the points within the field.
+fn sum_all(field: &Field, steps: &[(usize, [i64; 3])], window: Window) -> Vec<u16> {
+    let [nx, ny, nz] = field.grid.dims.map(|n| n as i64);
+    let [wx, wy, wz] = window.dims;
+    let mut sums = vec![0_u16; wx * wy * wz];
+    for (row, sums) in sums.chunks_exact_mut(wx.max(1)).enumerate() {
+        let y = (window.first[1] + row % wy) as i64;
+        let z = (window.first[2] + row / wy) as i64;
+        let inside = |step: &&(usize, [i64; 3])| {
+            (0..ny).contains(&(y + step.1[1])) && (0..nz).contains(&(z + step.1[2]))
+        };
+        if 2 * steps.iter().filter(inside).count() < steps.len() {
+            continue;
+        }
+        for (channel, step) in steps {
+            let (y, z) = (y + step[1], z + step[2]);
+            if !(0..ny).contains(&y) || !(0..nz).contains(&z) {
+                continue;
+            }
+            // Cells of the field that the window's row falls on.
+            let x = window.first[0] as i64 + step[0];
+            let (from, to) = (x.clamp(0, nx), (x + wx as i64).clamp(0, nx));
+            let base = (z * ny + y) * nx;
+            let scores = field.channels.get(*channel);
+            let scores = scores.and_then(|s| s.get((base + from) as usize..(base + to) as usize));
+            let Some(sums) = sums.get_mut((from - x) as usize..) else {
+                continue;
+            };
+            for (sum, score) in sums.iter_mut().zip(scores.unwrap_or_default()) {
+                *sum += u16::from(*score);
+            }
+        }
+    }
+    sums
+}
+
+/// Local maxima among 26 neighbours, the best first; of equal ones that with the lesser number.
+fn maxima(sums: &[u16], dims: [usize; 3], most: usize) -> Vec<(u32, [usize; 3])> {
+    let [nx, ny, nz] = dims;
+    let top = sums.iter().copied().max().unwrap_or(0);
+    let floor = (u32::from(top) * 6 / 10).max(1);
+    let mut found = Vec::new();
+    for (i, &sum) in sums.iter().enumerate() {
+        if u32::from(sum) < floor {
+            continue;
+        }
+        let (x, y, z) = (i % nx, i / nx % ny, i / (nx * ny));
+        let around = |n: usize, at: usize| at.saturating_sub(1)..=(at + 1).min(n - 1);
+        let beaten = around(nz, z).any(|z| {
+            around(ny, y).any(|y| {
+                around(nx, x).any(|x| {
+                    let j = (z * ny + y) * nx + x;
+                    let other = sums.get(j).copied().unwrap_or(0);
+                    other > sum || (other == sum && j < i)
+                })
+            })
+        });
+        if !beaten {
+            found.push((u32::from(sum), [x, y, z]));
+        }
+    }
+    found.sort_by_key(|(score, cell)| (std::cmp::Reverse(*score), *cell));
+    found.truncate(most);
+    found
+}
+
+#[cfg(test)]
+mod tests {
+    use super::super::grid::Grid;
+    use super::*;
+    use nalgebra::Point3;
+
+    /// The same by looking up every point at every place.
+    fn slow(field: &Field, steps: &[(usize, [i64; 3])], window: Window) -> Vec<u16> {
+        let [wx, wy, wz] = window.dims;
+        let mut sums = Vec::new();
+        for (z, y, x) in all_cells(wz, wy, wx) {
+            let [_, ny, nz] = field.grid.dims.map(|n| n as i64);
+            let (row_y, row_z) = ((y + window.first[1]) as i64, (z + window.first[2]) as i64);
+            let outside = |s: &&(usize, [i64; 3])| {
+                !(0..ny).contains(&(row_y + s.1[1])) || !(0..nz).contains(&(row_z + s.1[2]))
+            };
+            if 2 * steps.iter().filter(outside).count() > steps.len() {
+                sums.push(0);
+                continue;
+            }
+            let base = [
+                x + window.first[0],
+                y + window.first[1],
+                z + window.first[2],
+            ];
+            let score = |(channel, step): &(usize, [i64; 3])| {
+                let cell = std::array::from_fn(|a| base[a] as i64 + step[a]);
+                let at = field.grid.index(cell);
+                at.map_or(0, |at| u16::from(field.channels[*channel][at]))
+            };
+            sums.push(steps.iter().map(score).sum());
+        }
+        sums
+    }
+
+    fn all_cells(a: usize, b: usize, c: usize) -> Vec<(usize, usize, usize)> {
+        let all = (0..a).flat_map(|i| (0..b).map(move |j| (i, j)));
+        all.flat_map(|(i, j)| (0..c).map(move |k| (i, j, k)))
+            .collect()
+    }
+
+    #[test]
+    fn shifted_rows_are_the_sum_over_points() {
+        let mut state = 12345_u64;
+        let mut random = |n: u64| {
+            state = state
+                .wrapping_mul(6364136223846793005)
+                .wrapping_add(1442695040888963407);
+            (state >> 33) % n
+        };
+        let grid = Grid {
+            origin_m: Vector3::zeros(),
+            cell_m: 1.0,
+            dims: [13, 9, 5],
+        };
+        let channels = (0..2).map(|_| (0..grid.len()).map(|_| random(101) as u8).collect());
+        let field = Field {
+            channels: channels.collect(),
+            grid,
+        };
+        let steps: Vec<_> = (0..50)
+            .map(|_| {
+                let step = [
+                    random(31) as i64 - 15,
+                    random(21) as i64 - 10,
+                    random(9) as i64 - 4,
+                ];
+                (random(2) as usize, step)
+            })
+            .collect();
+        let window = Window {
+            first: [2, 1, 0],
+            dims: [10, 8, 4],
+        };
+        assert_eq!(
+            sum_all(&field, &steps, window),
+            slow(&field, &steps, window)
+        );
+    }
+
+    #[test]
+    fn a_cloud_is_found_where_it_came_from() {
+        let points: Vec<Point3<f64>> = [[0, 0, 0], [3, 0, 0], [3, 2, 0], [3, 2, 1], [9, 9, 2]]
+            .map(|p| Point3::from(p.map(f64::from)))
+            .to_vec();
+        let grid = Grid::around(&points, 1.0, 1).unwrap();
+        let dims = grid.dims;
+        let field = Field::build(grid, &points, 1, |_, _| 100);
+        let window = Window {
+            first: [0; 3],
+            dims,
+        };
+        let source = points[..4].iter().map(|p| (p - points[2], 0));
+        let peaks = best_places(&field, source, 0.0, window, 3);
+        assert_eq!(peaks[0].score, 400);
+        assert_eq!(peaks[0].place_m, points[2].coords);
+    }
+}
