@@ -42,11 +42,6 @@ fn the_right_place_is_among_the_first() {
                 nalgebra::distance(&(pose * eye), &(truth * eye)) < 0.2
                     && pose.rotation.angle_to(&turn) < 0.08
             });
-            println!(
-                "look {i}: rank {rank:?} of {} in {:?}",
-                found.len(),
-                began.elapsed()
-            );
             assert!(rank.is_some_and(|r| r < 3), "{rank:?}");
         }
     }
