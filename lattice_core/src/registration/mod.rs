@@ -7,11 +7,17 @@ mod confusion;
 mod error;
 mod fit;
 mod labels;
+mod options;
+mod pairs;
 mod plane;
 mod prepared;
 pub mod search;
+mod solver;
+mod surface;
+mod system;
 #[cfg(test)]
 mod testing;
+mod thin;
 mod tree;
 
 pub use calibrate::{
@@ -23,5 +29,8 @@ pub use confusion::{Confusion, Lift};
 pub use error::RegistrationError;
 pub use fit::{Fit, FitScale, Likelihood, Partners};
 pub use labels::{LabelDistribution, UNLABELED};
+pub use options::{LabelUse, MAX_CANDIDATES, Method, PairWeight, RegisterOptions, SemanticVariant};
 pub use prepared::{MAX_COORDINATE_M, PrepareOptions, PreparedCloud};
+pub use solver::{Registration, register};
+pub use thin::thin;
 pub use tree::{MAX_NEIGHBORS, Neighbors};

@@ -1,16 +1,20 @@
 //! A cloud ready to be registered.
 
+use std::collections::BTreeMap;
+use std::sync::OnceLock;
+
 use nalgebra::{Matrix3, Point3, Vector3};
 use rayon::prelude::*;
 
 use super::plane;
-use super::tree::{Item, MAX_NEIGHBORS, Nearest, Neighbors, Tree};
-use super::{LabelDistribution, RegistrationError, SemanticCloud};
+use super::surface::Surface;
+use super::tree::{MAX_NEIGHBORS, Nearest, Neighbors};
+use super::{LabelDistribution, RegistrationError, SemanticCloud, UNLABELED};
 
 /// Largest coordinate that is taken, metres.
 pub const MAX_COORDINATE_M: f64 = 1e8;
-/// Points of one piece of parallel work.
-const CHUNK: usize = 512;
+/// Neighbours whose labels are blurred into one, as the authors of Semantic-ICP do.
+const BLUR: usize = 20;
 
 /// How a cloud is prepared.
 #[derive(Clone, Copy, PartialEq, Debug)]
@@ -39,12 +43,11 @@ impl Default for PrepareOptions {
 /// Points are kept in the order of the tree, near points near each other; indices are places in this
 /// order and [`order`](Self::order) tells where each was in the cloud.
 pub struct PreparedCloud {
-    points_m: Vec<Point3<f64>>,
-    normals: Vec<Vector3<f64>>,
+    surface: Surface,
     labels: Vec<LabelDistribution>,
-    order: Vec<u32>,
-    tree: Tree,
-    plane_epsilon: f64,
+    options: PrepareOptions,
+    classes: OnceLock<Vec<(u16, Surface)>>,
+    blurred: OnceLock<Vec<LabelDistribution>>,
 }
 
 impl PreparedCloud {
@@ -54,68 +57,57 @@ impl PreparedCloud {
         options: &PrepareOptions,
     ) -> Result<PreparedCloud, RegistrationError> {
         check(&cloud, options)?;
-        let mut items: Vec<Item> = (0..)
-            .zip(&cloud.points_m)
-            .map(|(index, p)| Item {
-                coords_m: [p.x, p.y, p.z],
-                index,
-            })
-            .collect();
-        let tree = Tree::build(&mut items);
-        let points_m: Vec<Point3<f64>> = items.iter().map(|i| i.coords_m.into()).collect();
+        let surface = Surface::new(&cloud.points_m, options.neighbors);
         let labels = if cloud.labels.is_empty() {
             Vec::new()
         } else {
-            items
-                .iter()
-                .map(|i| cloud.label(i.index as usize))
-                .collect()
+            let label = |&i: &u32| cloud.label(i as usize);
+            surface.order.iter().map(label).collect()
         };
         Ok(PreparedCloud {
-            normals: normals(&tree, &points_m, options.neighbors),
-            order: items.iter().map(|i| i.index).collect(),
-            plane_epsilon: options.plane_epsilon,
-            points_m,
+            surface,
             labels,
-            tree,
+            options: *options,
+            classes: OnceLock::new(),
+            blurred: OnceLock::new(),
         })
     }
 
     /// Number of points.
     pub fn len(&self) -> usize {
-        self.points_m.len()
+        self.surface.points_m.len()
     }
 
     /// Whether there is no point; never, for a prepared cloud.
     pub fn is_empty(&self) -> bool {
-        self.points_m.is_empty()
+        self.surface.points_m.is_empty()
     }
 
     /// Points, metres, in the order of the tree.
     pub fn points_m(&self) -> &[Point3<f64>] {
-        &self.points_m
+        &self.surface.points_m
     }
 
     /// Place of each point in the cloud that was prepared.
     pub fn order(&self) -> &[u32] {
-        &self.order
+        &self.surface.order
     }
 
     /// Unit normals of the planes through the neighbourhoods; their signs are arbitrary.
     pub fn normals(&self) -> &[Vector3<f64>] {
-        &self.normals
+        &self.surface.normals
     }
 
     /// Covariance of each point, m^2: U diag(1, 1, epsilon) U^T (Segal et al. 2009, section III.B).
     pub fn covariances_m2(&self) -> impl ExactSizeIterator<Item = Matrix3<f64>> + '_ {
-        let flat = 1.0 - self.plane_epsilon;
+        let flat = 1.0 - self.options.plane_epsilon;
         let covariance = move |n: &Vector3<f64>| Matrix3::identity() - flat * n * n.transpose();
-        self.normals.iter().map(covariance)
+        self.surface.normals.iter().map(covariance)
     }
 
     /// Variance across the planes, where those along them are 1 m^2.
     pub fn plane_epsilon(&self) -> f64 {
-        self.plane_epsilon
+        self.options.plane_epsilon
     }
 
     /// Whether the cloud came with labels.
@@ -136,7 +128,7 @@ impl PreparedCloud {
             index: u32::MAX,
             squared: squared_reach(max_distance_m),
         };
-        self.tree.search(query, &mut nearest);
+        self.surface.tree.search(query, &mut nearest);
         (nearest.index != u32::MAX).then_some((nearest.index as usize, nearest.squared))
     }
 
@@ -149,7 +141,58 @@ impl PreparedCloud {
         out: &mut Neighbors,
     ) {
         out.start(k, squared_reach(max_distance_m));
-        self.tree.search(query, out);
+        self.surface.tree.search(query, out);
+    }
+
+    pub(super) fn surface(&self) -> &Surface {
+        &self.surface
+    }
+
+    /// One for each point, or none.
+    pub(super) fn labels(&self) -> &[LabelDistribution] {
+        &self.labels
+    }
+
+    /// The points of each class, by their most probable one, with trees and covariances of their own; made
+    /// when first asked for. Classes with fewer points than a neighbourhood are left out.
+    pub(super) fn classes(&self) -> &[(u16, Surface)] {
+        self.classes.get_or_init(|| {
+            let mut of_class: BTreeMap<u16, Vec<Point3<f64>>> = BTreeMap::new();
+            for (point, label) in self.points_m().iter().zip(&self.labels) {
+                if let Some(class) = label.top() {
+                    of_class.entry(class).or_default().push(*point);
+                }
+            }
+            let neighbors = self.options.neighbors;
+            of_class.retain(|_, points_m| points_m.len() >= neighbors);
+            let surface =
+                |(class, points_m): (u16, Vec<_>)| (class, Surface::new(&points_m, neighbors));
+            of_class.into_iter().map(surface).collect()
+        })
+    }
+
+    /// Shares of the most probable classes of the nearest points of each point; made when first asked for.
+    pub(super) fn blurred_labels(&self) -> &[LabelDistribution] {
+        self.blurred.get_or_init(|| {
+            if self.labels.is_empty() {
+                return Vec::new();
+            }
+            let blur = |found: &mut Neighbors, point: &Point3<f64>| {
+                self.nearest_k(point, BLUR, f64::MAX, found);
+                let share = 1.0 / found.len().max(1) as f32;
+                let mut shares: Vec<(u16, f32)> = Vec::new();
+                for (i, _) in found.iter() {
+                    let class = self.label(i).top().unwrap_or(UNLABELED);
+                    match shares.iter_mut().find(|(c, _)| *c == class) {
+                        Some((_, sum)) => *sum += share,
+                        None => shares.push((class, share)),
+                    }
+                }
+                LabelDistribution::from_weights(shares)
+            };
+            let points_m = self.points_m().par_iter();
+            points_m.map_init(Neighbors::default, blur).collect()
+        })
     }
 }
 
@@ -197,21 +240,6 @@ fn check(cloud: &SemanticCloud, options: &PrepareOptions) -> Result<(), Registra
         return Err(RegistrationError::Collinear);
     }
     Ok(())
-}
-
-/// Normals of the planes through the `neighbors` nearest points of each point.
-fn normals(tree: &Tree, points_m: &[Point3<f64>], neighbors: usize) -> Vec<Vector3<f64>> {
-    let chunks = points_m.par_chunks(CHUNK).map(|chunk| {
-        let mut found = Neighbors::default();
-        let normal = |point: &Point3<f64>| {
-            found.start(neighbors, f64::MAX);
-            tree.search(point, &mut found);
-            let around = found.indices().iter().map(|&i| points_m[i as usize]);
-            plane::normal(&plane::scatter(around))
-        };
-        chunk.iter().map(normal).collect::<Vec<_>>()
-    });
-    chunks.collect::<Vec<_>>().concat()
 }
 
 #[cfg(test)]
