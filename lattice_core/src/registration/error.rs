@@ -52,4 +52,10 @@ pub enum RegistrationError {
         /// What was asked for.
         plane_epsilon: f64,
     },
+    /// The side of a map's cells is not a length.
+    #[error("a cell side of {cell_side_m} m is not a positive length")]
+    CellSide {
+        /// What was given, metres.
+        cell_side_m: f64,
+    },
 }

@@ -21,8 +21,8 @@ mod thin;
 mod tree;
 
 pub use calibrate::{
-    Calibration, CalibrationOptions, CalibrationRequest, ClassReliability, DirectionKind, Gaze,
-    Progress, Stage, Verdict, WeakDirection,
+    Calibration, CalibrationMap, CalibrationOptions, CalibrationRequest, ClassReliability,
+    DirectionKind, Gaze, Progress, Stage, TrackUpdate, Tracker, Verdict, WeakDirection, calibrate,
 };
 pub use cloud::SemanticCloud;
 pub use confusion::{Confusion, Lift};

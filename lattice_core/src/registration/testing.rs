@@ -42,7 +42,6 @@ pub struct Flat(Vec<Patch>);
 /// Classes of the flat.
 pub const WALL: u16 = 0;
 pub const FLOOR: u16 = 1;
-#[allow(dead_code)]
 pub const FURNITURE: [u16; 5] = [4, 5, 6, 8, 9];
 
 impl Flat {

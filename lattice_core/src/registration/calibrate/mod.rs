@@ -1,8 +1,182 @@
-//! Where a headset's frame lies in a robot's map: what is asked and what is answered.
+//! Where a headset's frame lies in a robot's map: no marker, no guess, and an honest verdict.
+//!
+//! All places are searched by surfaces and by labels; the best are refined by GICP-SE(3) and by
+//! Semantic-ICP with learned labels; one likelihood judges them all (`fit`), in which labels count as
+//! far as they predict each other on parts of the view they were not learned from. GICP-SE(3) from a
+//! given start stands unless another pose is clearly better.
 
+mod candidates;
+mod covariance;
+mod input;
+mod judge;
+mod map;
+mod rays;
+mod tracker;
 mod types;
 
+use std::ops::ControlFlow;
+
+use nalgebra::Isometry3;
+use rayon::prelude::*;
+
+use super::search::{Hypothesis, Region, SearchMap, SearchSource, search};
+use super::{LabelDistribution, PreparedCloud, RegisterOptions, register};
+use candidates::{Candidate, Workbench};
+use input::Input;
+
+pub use map::CalibrationMap;
+pub use tracker::{TrackUpdate, Tracker};
 pub use types::{
     Calibration, CalibrationOptions, CalibrationRequest, ClassReliability, DirectionKind, Gaze,
     Progress, Stage, Verdict, WeakDirection,
 };
+
+/// Hypotheses of each kind of search.
+const HYPOTHESES: usize = 48;
+/// Candidates that are refined to the end.
+const FINALISTS: usize = 4;
+/// Classes that are searched by, at most.
+const SEARCHED_CLASSES: usize = 24;
+
+/// Finds the pose of the headset's frame in the map.
+///
+/// Never fails: input that cannot be used is a verdict. Deterministic on any number of threads.
+pub fn calibrate(
+    map: &CalibrationMap,
+    request: &CalibrationRequest<'_>,
+    options: &CalibrationOptions,
+    progress: &dyn Progress,
+) -> Calibration {
+    run(map, request, options, progress).unwrap_or_else(|refused| refused)
+}
+
+fn run(
+    map: &CalibrationMap,
+    request: &CalibrationRequest<'_>,
+    options: &CalibrationOptions,
+    progress: &dyn Progress,
+) -> Result<Calibration, Calibration> {
+    step(progress, Stage::Prepare, 0.0)?;
+    let input = Input::new(request, options, map.spacing_m)?;
+    let bench = Workbench::new(map, &input, options, request.confusion);
+    step(progress, Stage::Search, 0.1)?;
+    let region = request.start.map(|about| Region {
+        about,
+        radius_m: options.start_radius_m,
+        yaw_rad: options.start_yaw_rad,
+    });
+    let mut hypotheses = by_surfaces(&bench, region.as_ref());
+    step(progress, Stage::Search, 0.3)?;
+    hypotheses.extend(by_labels(&bench, region.as_ref()));
+    step(progress, Stage::Refine, 0.5)?;
+    let first = bench.first_look(&hypotheses);
+    step(progress, Stage::Refine, 0.6)?;
+    let second = bench.second_look(&first);
+    step(progress, Stage::Refine, 0.7)?;
+    let mut all: Vec<Candidate> = second
+        .par_iter()
+        .take(FINALISTS)
+        .flat_map_iter(|c| bench.portfolio(&c.map_from_headset, "search"))
+        .collect();
+    all.extend(second);
+    if let Some(start) = &request.start {
+        // The first of all is what GICP alone would answer.
+        let mut from_start = from_start(&bench, start);
+        from_start.append(&mut all);
+        all = from_start;
+    }
+    step(progress, Stage::Judge, 0.9)?;
+    let calibration = judge::answer(&bench, all, request.start.is_some());
+    let mirrored = judge::misread(&bench, &first, &[judge::MIRRORED]);
+    let misread = mirrored.or_else(|| match calibration.verdict {
+        Verdict::Ok => None,
+        _ => judge::misread(&bench, &first, &judge::ON_THEIR_SIDE),
+    });
+    let _ = progress.report(Stage::Judge, 1.0);
+    Ok(match misread {
+        Some(reading) => Calibration::refused(
+            Verdict::RejectedInput,
+            format!("the cloud fits the map only when it is read {reading}: check its axes"),
+        ),
+        None => calibration,
+    })
+}
+
+/// Tells of progress, and ends if that is wanted.
+fn step(progress: &dyn Progress, stage: Stage, fraction: f64) -> Result<(), Calibration> {
+    match progress.report(stage, fraction) {
+        ControlFlow::Continue(()) => Ok(()),
+        ControlFlow::Break(()) => Err(Calibration {
+            cancelled: true,
+            ..Calibration::refused(Verdict::RejectedInput, "cancelled")
+        }),
+    }
+}
+
+/// Poses that the surfaces fit.
+fn by_surfaces(bench: &Workbench<'_>, region: Option<&Region>) -> Vec<Hypothesis> {
+    let source = SearchSource::by_surface(&bench.input.few, bench.input.sensor_m);
+    search(&bench.map.surfaces, &source, region, HYPOTHESES)
+}
+
+/// Poses that the labels fit, as far as it is known how they go together.
+fn by_labels(bench: &Workbench<'_>, region: Option<&Region>) -> Vec<Hypothesis> {
+    let (few, map) = (&bench.input.few, &bench.map.cloud);
+    if !few.is_labelled() || !map.is_labelled() {
+        return Vec::new();
+    }
+    let classes = frequent_classes(few);
+    let lift = bench.known.lift(bench.options.agreement);
+    let score = |i: usize, channel: usize| {
+        let class = classes.get(channel).copied().unwrap_or_default();
+        let lift = lift.expected(&LabelDistribution::hard(class), &map.label(i));
+        // From 0 for a quarter of chance to 100 for four times of it.
+        (50.0 * (1.0 + lift.clamp(0.25, 4.0).ln() / 4.0_f64.ln())) as u8
+    };
+    let channels: Vec<Option<usize>> = (0..few.len())
+        .map(|i| {
+            few.label(i)
+                .top()
+                .and_then(|top| classes.iter().position(|c| *c == top))
+        })
+        .collect();
+    let Some(labels) = SearchMap::of_classes(map, bench.map.spacing_m, classes.len(), score) else {
+        return Vec::new();
+    };
+    let source = SearchSource::by_class(few, bench.input.sensor_m, &channels);
+    search(&labels, &source, region, HYPOTHESES)
+}
+
+/// The classes of most points.
+fn frequent_classes(cloud: &PreparedCloud) -> Vec<u16> {
+    let mut counts = std::collections::BTreeMap::new();
+    for class in (0..cloud.len()).filter_map(|i| cloud.label(i).top()) {
+        *counts.entry(class).or_insert(0_usize) += 1;
+    }
+    let mut classes: Vec<(u16, usize)> = counts.into_iter().collect();
+    classes.sort_by_key(|(class, n)| (std::cmp::Reverse(*n), *class));
+    classes.truncate(SEARCHED_CLASSES);
+    classes.into_iter().map(|(class, _)| class).collect()
+}
+
+/// What the methods make of a given start, GICP-SE(3) first.
+fn from_start(bench: &Workbench<'_>, start: &Isometry3<f64>) -> Vec<Candidate> {
+    let mut all = bench.portfolio(start, "gicp");
+    let (source, map) = (&bench.input.full, &bench.map.cloud);
+    if source.is_labelled() && map.is_labelled() {
+        let gate_m = (30.0 * bench.map.spacing_m).max(1.0);
+        let options = RegisterOptions {
+            gate_m,
+            inner_iterations: 2,
+            min_class_points: 20,
+            ..RegisterOptions::class_wise()
+        };
+        let pose = register(source, map, start, &options);
+        let polished = bench.polish(&pose.target_from_source);
+        all.push(bench.judge(&bench.fit, polished, "class-wise"));
+    }
+    all
+}
+
+#[cfg(test)]
+mod tests;

@@ -59,7 +59,7 @@ impl Default for CalibrationOptions {
         CalibrationOptions {
             min_points: 100,
             max_points: 500_000,
-            registered_points: 2_500,
+            registered_points: 2_000,
             noise_m: 0.015,
             agreement: 0.6,
             start_radius_m: 2.0,

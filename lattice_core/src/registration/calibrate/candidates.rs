@@ -1,0 +1,218 @@
+//! Poses that may be the answer, refined and judged.
+
+use nalgebra::{Isometry3, Point3, Vector3};
+use rayon::prelude::*;
+
+use super::super::fit::{Fit, Likelihood, Partners};
+use super::super::search::Hypothesis;
+use super::super::{
+    Confusion, LabelDistribution, LabelUse, Lift, PairWeight, PreparedCloud, RegisterOptions,
+    register,
+};
+use super::input::Input;
+use super::map::CalibrationMap;
+use super::rays::blocked_fraction;
+use super::types::CalibrationOptions;
+
+/// Hypotheses of a first look.
+const FIRST_LOOK: usize = 96;
+/// Of those, the ones that are refined with all points.
+const SECOND_LOOK: usize = 10;
+/// Log-likelihood that a blocked line of sight costs an observation.
+const BLOCKED_COST: f64 = 2.0;
+
+/// A pose with what speaks for it.
+#[derive(Clone, Debug)]
+pub(super) struct Candidate {
+    pub map_from_headset: Isometry3<f64>,
+    pub method: &'static str,
+    pub likelihood: Likelihood,
+    /// Lines of sight through walls, as log-likelihood.
+    pub blocked: f64,
+    pub inlier_fraction: f64,
+    pub rmse_m: f64,
+    pub confusion: Confusion,
+}
+
+impl Candidate {
+    /// All that speaks for it.
+    pub fn total(&self) -> f64 {
+        self.likelihood.total() - self.blocked
+    }
+
+    /// Whether two are one place up to `shift_m` and `turn_rad`; places are compared in the midst of the
+    /// points.
+    pub fn is_near(
+        &self,
+        other: &Isometry3<f64>,
+        middle: &Point3<f64>,
+        shift_m: f64,
+        turn_rad: f64,
+    ) -> bool {
+        let pose = &self.map_from_headset;
+        nalgebra::distance(&(pose * middle), &(other * middle)) < shift_m
+            && pose.rotation.angle_to(&other.rotation) < turn_rad
+    }
+}
+
+/// What candidates are made from.
+pub(super) struct Workbench<'a> {
+    pub map: &'a CalibrationMap,
+    pub input: &'a Input,
+    pub options: &'a CalibrationOptions,
+    /// What is known of the labels before this calibration.
+    pub known: Confusion,
+    pub fit: Fit<'a>,
+    pub few: Fit<'a>,
+}
+
+impl<'a> Workbench<'a> {
+    pub fn new(
+        map: &'a CalibrationMap,
+        input: &'a Input,
+        options: &'a CalibrationOptions,
+        known: Option<&Confusion>,
+    ) -> Workbench<'a> {
+        let scale = map.scale(options.noise_m);
+        let labels = |cloud: &PreparedCloud| -> Vec<_> {
+            (0..cloud.len()).map(|i| cloud.label(i)).collect()
+        };
+        let (source, target) = (labels(&input.few), labels(&map.cloud));
+        let unseen = Confusion::unseen(source.iter(), target.iter());
+        Workbench {
+            map,
+            input,
+            options,
+            known: known.map_or_else(|| unseen.clone(), |known| known.merged(&unseen)),
+            fit: Fit::new(&input.full, &map.cloud, scale),
+            few: Fit::new(&input.few, &map.cloud, scale.coarser(2.0)),
+        }
+    }
+
+    /// The hypotheses that stand a first look, refined with a few points, the best first and all
+    /// different.
+    pub fn first_look(&self, hypotheses: &[Hypothesis]) -> Vec<Candidate> {
+        let mut found: Vec<Candidate> = hypotheses
+            .par_iter()
+            .take(FIRST_LOOK)
+            .map(|hypothesis| {
+                let pose = self.refine_few(&self.input.few, &hypothesis.target_from_source);
+                self.judge(&self.few, pose, "search")
+            })
+            .collect();
+        found.sort_by(|a, b| b.total().total_cmp(&a.total()));
+        self.different(found, SECOND_LOOK)
+    }
+
+    /// The same candidates after some steps with more points, judged by all of them, the best first.
+    pub fn second_look(&self, first: &[Candidate]) -> Vec<Candidate> {
+        let options = RegisterOptions {
+            max_iterations: 8,
+            source_stride: 3,
+            ..self.baseline()
+        };
+        let mut found: Vec<Candidate> = first
+            .par_iter()
+            .map(|candidate| {
+                let (full, map) = (&self.input.full, &self.map.cloud);
+                let pose = register(full, map, &candidate.map_from_headset, &options);
+                self.judge(&self.fit, pose.target_from_source, "search")
+            })
+            .collect();
+        found.sort_by(|a, b| b.total().total_cmp(&a.total()));
+        found
+    }
+
+    /// A few steps of GICP-SE(3) with a few points.
+    pub fn refine_few(&self, few: &PreparedCloud, start: &Isometry3<f64>) -> Isometry3<f64> {
+        let options = RegisterOptions {
+            gate_m: 8.0 * self.map.spacing_m,
+            max_iterations: 10,
+            ..self.baseline()
+        };
+        register(few, &self.map.cloud, start, &options).target_from_source
+    }
+
+    /// The first of each place.
+    pub fn different(&self, candidates: Vec<Candidate>, most: usize) -> Vec<Candidate> {
+        let middle = self.middle();
+        let mut kept: Vec<Candidate> = Vec::new();
+        for candidate in candidates {
+            let pose = &candidate.map_from_headset;
+            let near = |other: &Candidate| other.is_near(pose, &middle, self.map.spacing_m, 0.02);
+            if kept.len() < most && !kept.iter().any(near) {
+                kept.push(candidate);
+            }
+        }
+        kept
+    }
+
+    /// GICP-SE(3) with all points from a pose: what every candidate ends with.
+    pub fn polish(&self, start: &Isometry3<f64>) -> Isometry3<f64> {
+        let options = self.baseline();
+        register(&self.input.full, &self.map.cloud, start, &options).target_from_source
+    }
+
+    /// GICP-SE(3) as everything is compared with.
+    pub fn baseline(&self) -> RegisterOptions<'static> {
+        RegisterOptions {
+            gate_m: (20.0 * self.map.spacing_m).clamp(0.5, 3.0),
+            inner_iterations: 2,
+            rotation_tolerance_rad: 1e-4,
+            translation_tolerance_m: 1e-4,
+            ..RegisterOptions::gicp_se3()
+        }
+    }
+
+    /// Candidates from a pose: GICP-SE(3) and Semantic-ICP with what the labels taught so far.
+    pub fn portfolio(&self, start: &Isometry3<f64>, method: &'static str) -> Vec<Candidate> {
+        let mut all = vec![self.judge(&self.fit, self.polish(start), method)];
+        let labelled = self.input.full.is_labelled() && self.map.cloud.is_labelled();
+        if labelled {
+            let learned = all.first().map(|c| self.known.merged(&c.confusion));
+            let lift = learned.unwrap_or_default().lift(self.options.agreement);
+            let options = RegisterOptions {
+                pair_weight: Some(&lift),
+                max_iterations: 15,
+                anneal: 1.0,
+                ..RegisterOptions::semantic_em(self.baseline().gate_m, LabelUse::Soft)
+            };
+            let pose = register(&self.input.full, &self.map.cloud, start, &options);
+            let polished = self.polish(&pose.target_from_source);
+            all.push(self.judge(&self.fit, polished, "semantic"));
+        }
+        all
+    }
+
+    /// What speaks for a pose.
+    pub fn judge(&self, fit: &Fit<'_>, pose: Isometry3<f64>, method: &'static str) -> Candidate {
+        let partners: Partners = fit.partners(&pose);
+        let likelihood = fit.likelihood(&partners, &self.known, self.options.agreement);
+        let blocked = self.input.sensor_m.map_or(0.0, |sensor| {
+            let clear_m = 5.0 * self.map.spacing_m;
+            blocked_fraction(&self.map.occupied, &self.input.few, &sensor, &pose, clear_m)
+        });
+        Candidate {
+            map_from_headset: pose,
+            method,
+            likelihood,
+            blocked: blocked * fit.observations() * BLOCKED_COST,
+            inlier_fraction: partners.inlier_fraction,
+            rmse_m: partners.rmse_m,
+            confusion: fit.learn(&partners),
+        }
+    }
+
+    /// The midst of the headset's points, in its frame.
+    pub fn middle(&self) -> Point3<f64> {
+        let points = self.input.few.points_m();
+        let sum: Vector3<f64> = points.iter().map(|p| p.coords).sum();
+        (sum / points.len().max(1) as f64).into()
+    }
+}
+
+impl PairWeight for Lift {
+    fn weight(&self, source: &LabelDistribution, target: &LabelDistribution) -> f64 {
+        self.expected(source, target)
+    }
+}

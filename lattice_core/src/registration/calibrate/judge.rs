@@ -1,0 +1,230 @@
+//! Which candidate is the answer, and what can be said of it.
+
+use nalgebra::{Matrix3, Matrix6};
+use rayon::prelude::*;
+
+use super::super::fit::Fit;
+use super::super::search::{SearchSource, search};
+use super::super::{PrepareOptions, PreparedCloud, SemanticCloud};
+use super::HYPOTHESES;
+use super::candidates::{Candidate, Workbench};
+use super::covariance::{PoseCovariance, Regions};
+use super::types::{Calibration, ClassReliability, DirectionKind, Verdict, WeakDirection};
+
+/// Poses farther apart than this in the midst of the points, or turned by more, are different answers.
+const DIFFERENT_M: f64 = 0.1;
+const DIFFERENT_RAD: f64 = 0.03;
+/// GICP from a given start stands unless another is better by this log-likelihood.
+const DISPLACE: f64 = 10.0;
+
+/// Chooses among candidates. With `started`, the first is what GICP makes of the start.
+pub(super) fn answer(bench: &Workbench<'_>, all: Vec<Candidate>, started: bool) -> Calibration {
+    let Some(best) = choose(bench, &all, started) else {
+        return Calibration::refused(Verdict::NoOverlap, "no place was found");
+    };
+    let middle = bench.middle();
+    let (shift_m, turn_rad) = different(bench);
+    let pose = best.map_from_headset;
+    let rival = all
+        .iter()
+        .filter(|c| !c.is_near(&pose, &middle, shift_m, turn_rad))
+        .map(Candidate::total)
+        .fold(0.0, f64::max);
+    let log_margin = best.total() - rival;
+    let covariance = covariance(bench, best);
+    let directions = (covariance.as_ref())
+        .map(|c| c.directions(&pose, &middle))
+        .unwrap_or_default();
+    let options = bench.options;
+    let weak: Vec<WeakDirection> = directions
+        .into_iter()
+        .filter(|d| match d.kind {
+            DirectionKind::Translation => d.sigma > options.max_sigma_m,
+            DirectionKind::Rotation => d.sigma > options.max_sigma_rad,
+        })
+        .collect();
+    let (verdict, reason) = verdict(bench, best, log_margin, covariance.is_some(), &weak);
+    let confusion = bench.known.merged(&best.confusion);
+    Calibration {
+        verdict,
+        reason,
+        cancelled: false,
+        map_from_headset: pose,
+        covariance: covariance.map_or_else(Matrix6::zeros, |c| c.in_target(&pose)),
+        log_margin,
+        inlier_fraction: best.inlier_fraction,
+        rmse_m: best.rmse_m,
+        weak_directions: weak,
+        class_reliability: reliability(best),
+        method: best.method,
+        confusion: match verdict {
+            Verdict::Ok => confusion,
+            _ => bench.known.clone(),
+        },
+    }
+}
+
+/// How far apart different answers are.
+fn different(bench: &Workbench<'_>) -> (f64, f64) {
+    (DIFFERENT_M.max(2.0 * bench.map.spacing_m), DIFFERENT_RAD)
+}
+
+/// The likeliest, but what GICP makes of a start if that is the same place or nearly as likely.
+fn choose<'a>(bench: &Workbench<'_>, all: &'a [Candidate], started: bool) -> Option<&'a Candidate> {
+    let best = all
+        .iter()
+        .reduce(|a, b| if b.total() > a.total() { b } else { a })?;
+    let gicp = all.first().filter(|_| started);
+    Some(match gicp {
+        Some(gicp) => {
+            let spacing_m = bench.map.spacing_m;
+            let same = gicp.is_near(
+                &best.map_from_headset,
+                &bench.middle(),
+                spacing_m / 2.0,
+                0.005,
+            );
+            match same || best.total() < gicp.total() + DISPLACE {
+                true => gicp,
+                false => best,
+            }
+        }
+        None => best,
+    })
+}
+
+fn verdict(
+    bench: &Workbench<'_>,
+    best: &Candidate,
+    log_margin: f64,
+    held: bool,
+    weak: &[WeakDirection],
+) -> (Verdict, String) {
+    let options = bench.options;
+    let percent = 100.0 * best.inlier_fraction;
+    if best.inlier_fraction < options.min_inliers || best.total() <= 0.0 {
+        let least = 100.0 * options.min_inliers;
+        let reason =
+            format!("only {percent:.0} % of the points lie on the map, {least:.0} % are needed");
+        return (Verdict::NoOverlap, reason);
+    }
+    if log_margin < options.min_margin {
+        let least = options.min_margin;
+        let reason = format!(
+            "another pose fits nearly as well: log-margin {log_margin:.1}, {least:.0} is needed; look elsewhere too"
+        );
+        return (Verdict::Ambiguous, reason);
+    }
+    if let Some(worst) = weak.first() {
+        let [x, y, z] = [worst.axis.x, worst.axis.y, worst.axis.z];
+        let reason = match worst.kind {
+            DirectionKind::Translation => format!(
+                "the pose may slide along ({x:.2}, {y:.2}, {z:.2}): standard deviation {:.2} m",
+                worst.sigma
+            ),
+            DirectionKind::Rotation => format!(
+                "the pose may turn about ({x:.2}, {y:.2}, {z:.2}): standard deviation {:.1} degrees",
+                worst.sigma.to_degrees()
+            ),
+        };
+        return (Verdict::Degenerate, reason);
+    }
+    if !held {
+        return (Verdict::Degenerate, "too few surfaces hold the pose".into());
+    }
+    let reason = format!("{percent:.0} % of the points lie on the map, log-margin {log_margin:.0}");
+    (Verdict::Ok, reason)
+}
+
+fn covariance(bench: &Workbench<'_>, best: &Candidate) -> Option<PoseCovariance> {
+    let spacing_m = bench.map.spacing_m;
+    let regions = Regions {
+        side_m: 12.0 * spacing_m,
+        gate_m: 6.0 * spacing_m,
+        floor: (0.1 * spacing_m, 5e-4),
+    };
+    let (source, target) = (&bench.input.full, &bench.map.cloud);
+    PoseCovariance::at(source, target, &best.map_from_headset, &regions)
+}
+
+fn reliability(best: &Candidate) -> Vec<ClassReliability> {
+    let mut classes: Vec<u16> = best.confusion.pairs().iter().map(|p| p.0).collect();
+    classes.dedup();
+    let of = |source_class: u16| {
+        let (agreement, weight) = best.confusion.agreement(source_class);
+        ClassReliability {
+            source_class,
+            agreement,
+            weight,
+        }
+    };
+    classes
+        .into_iter()
+        .map(of)
+        .filter(|c| c.weight > 0.0)
+        .collect()
+}
+
+/// A way in which the axes of a cloud may have been misread, with the matrix that mends it.
+pub(super) struct Misreading {
+    pub name: &'static str,
+    rows: [[f64; 3]; 3],
+}
+
+/// The one that may fit by chance, so that it is always looked at.
+pub(super) const MIRRORED: Misreading = Misreading {
+    name: "mirrored",
+    rows: [[1., 0., 0.], [0., -1., 0.], [0., 0., 1.]],
+};
+
+/// Those that stand on their side, `semantic_icp.md` 5.1.
+pub(super) const ON_THEIR_SIDE: [Misreading; 3] = [
+    Misreading {
+        name: "as Unity's left-handed axes",
+        rows: [[0., 0., 1.], [-1., 0., 0.], [0., 1., 0.]],
+    },
+    Misreading {
+        name: "as WinRT's axes",
+        rows: [[0., 0., -1.], [-1., 0., 0.], [0., 1., 0.]],
+    },
+    Misreading {
+        name: "as a camera's optical axes",
+        rows: [[0., 0., 1.], [-1., 0., 0.], [0., -1., 0.]],
+    },
+];
+
+/// How the cloud must be read to fit, if it fits clearly better so than as it is.
+pub(super) fn misread(
+    bench: &Workbench<'_>,
+    straight: &[Candidate],
+    readings: &[Misreading],
+) -> Option<&'static str> {
+    let straight = straight
+        .iter()
+        .map(|c| c.likelihood.surfaces)
+        .fold(0.0, f64::max);
+    let fits = readings.iter().filter_map(|reading| {
+        let axes = Matrix3::from_fn(|row, column| reading.rows[row][column]);
+        Some((surfaces_with(bench, &axes)?, reading.name))
+    });
+    let (best, name) = fits.max_by(|a, b| a.0.total_cmp(&b.0))?;
+    let clear = straight + bench.options.min_margin;
+    (best > clear && best > 0.5 * bench.few.observations()).then_some(name)
+}
+
+/// The best likelihood by surfaces of the cloud with other axes, after a first look.
+fn surfaces_with(bench: &Workbench<'_>, axes: &Matrix3<f64>) -> Option<f64> {
+    let points = bench.input.few.points_m();
+    let turned = SemanticCloud::unlabelled(points.iter().map(|p| axes * p).collect());
+    let turned = PreparedCloud::new(turned, &PrepareOptions::default()).ok()?;
+    let source = SearchSource::by_surface(&turned, bench.input.sensor_m.map(|p| axes * p));
+    let hypotheses = search(&bench.map.surfaces, &source, None, HYPOTHESES);
+    let scale = bench.map.scale(bench.options.noise_m).coarser(2.0);
+    let fit = Fit::new(&turned, &bench.map.cloud, scale);
+    let likelihoods = hypotheses.par_iter().map(|h| {
+        let pose = bench.refine_few(&turned, &h.target_from_source);
+        let partners = fit.partners(&pose);
+        fit.likelihood(&partners, &bench.known, 0.0).surfaces
+    });
+    likelihoods.max_by(f64::total_cmp)
+}

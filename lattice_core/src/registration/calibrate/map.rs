@@ -1,0 +1,53 @@
+//! A map made ready for calibrations.
+
+use super::super::fit::FitScale;
+use super::super::search::{OccupiedGrid, SearchMap};
+use super::super::{PrepareOptions, PreparedCloud, RegistrationError, SemanticCloud};
+
+/// A map with all that a calibration looks up in it; made once, shared by all calibrations.
+pub struct CalibrationMap {
+    pub(super) cloud: PreparedCloud,
+    pub(super) surfaces: SearchMap,
+    pub(super) occupied: OccupiedGrid,
+    pub(super) spacing_m: f64,
+}
+
+impl CalibrationMap {
+    /// Of the centroids of a map's voxels, labelled or not, and the side of a cube as large as a voxel.
+    ///
+    /// # Errors
+    /// If there are too few points, some are not finite, or the side is not a length.
+    pub fn new(
+        cloud: SemanticCloud,
+        cell_side_m: f64,
+    ) -> Result<CalibrationMap, RegistrationError> {
+        if !(cell_side_m.is_finite() && cell_side_m > 0.0) {
+            return Err(RegistrationError::CellSide { cell_side_m });
+        }
+        let cloud = PreparedCloud::new(cloud, &PrepareOptions::default())?;
+        let surfaces = SearchMap::of_surfaces(&cloud, cell_side_m);
+        let occupied = OccupiedGrid::new(cloud.points_m(), 2.0 * cell_side_m);
+        let (Some(surfaces), Some(occupied)) = (surfaces, occupied) else {
+            return Err(RegistrationError::TooFewPoints {
+                points: 0,
+                least: 1,
+            });
+        };
+        Ok(CalibrationMap {
+            cloud,
+            surfaces,
+            occupied,
+            spacing_m: cell_side_m,
+        })
+    }
+
+    /// The points of the map.
+    pub fn cloud(&self) -> &PreparedCloud {
+        &self.cloud
+    }
+
+    /// How closely points agree with this map, with noise of their own.
+    pub(super) fn scale(&self, noise_m: f64) -> FitScale {
+        FitScale::new(self.spacing_m, noise_m)
+    }
+}

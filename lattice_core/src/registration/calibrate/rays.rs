@@ -1,0 +1,45 @@
+//! Whether a headset looked through walls.
+
+use nalgebra::{Isometry3, Point3};
+
+use super::super::PreparedCloud;
+use super::super::search::OccupiedGrid;
+
+/// Rays that are looked at, at most.
+const RAYS: usize = 300;
+
+/// Share of the rays to the points that pass through something on their way.
+///
+/// The way ends before the point by `clear_m`, and begins as far after the sensor.
+pub(super) fn blocked_fraction(
+    occupied: &OccupiedGrid,
+    source: &PreparedCloud,
+    sensor_m: &Point3<f64>,
+    target_from_source: &Isometry3<f64>,
+    clear_m: f64,
+) -> f64 {
+    let points = source.points_m();
+    let from = target_from_source * sensor_m;
+    let step = points.len().div_ceil(RAYS).max(1);
+    let (mut rays, mut blocked) = (0_u32, 0_u32);
+    for point in points.iter().step_by(step) {
+        let to = target_from_source * point;
+        let way = to - from;
+        let length = way.norm();
+        if length < 3.0 * clear_m {
+            continue;
+        }
+        rays += 1;
+        let direction = way / length;
+        // Two occupied cells in a row are a surface, one may be a corner that was brushed.
+        let stride = occupied.cell_m();
+        let cells = ((length - 2.0 * clear_m) / stride) as usize;
+        let mut met = 0;
+        for i in 0..=cells {
+            let place = from + direction * (clear_m + i as f64 * stride);
+            met += usize::from(occupied.contains(&place));
+        }
+        blocked += u32::from(met > 0);
+    }
+    f64::from(blocked) / f64::from(rays.max(1))
+}
