@@ -3,7 +3,7 @@
 use nalgebra::{Isometry3, Point3};
 
 use super::super::{PrepareOptions, PreparedCloud, SemanticCloud, thin};
-use super::types::{Calibration, CalibrationOptions, CalibrationRequest, Verdict};
+use super::types::{CalibrationOptions, CalibrationRequest, Refusal};
 
 /// Farthest that a point may be from the headset's origin, metres.
 const MAX_RANGE_M: f64 = 10_000.0;
@@ -24,8 +24,8 @@ impl Input {
         request: &CalibrationRequest<'_>,
         options: &CalibrationOptions,
         spacing_m: f64,
-    ) -> Result<Input, Calibration> {
-        let rejected = |reason: String| Calibration::refused(Verdict::RejectedInput, reason);
+    ) -> Result<Input, Refusal> {
+        let rejected = Refusal::Input;
         let n: usize = request.gazes.iter().map(|g| g.cloud.len()).sum();
         if n > options.max_points {
             let most = options.max_points;

@@ -23,6 +23,7 @@ use super::search::{Hypothesis, Region, SearchMap, SearchSource, search};
 use super::{LabelDistribution, PreparedCloud, RegisterOptions, register};
 use candidates::{Candidate, Workbench};
 use input::Input;
+use types::Refusal;
 
 pub use map::CalibrationMap;
 pub use tracker::{TrackUpdate, Tracker};
@@ -47,7 +48,7 @@ pub fn calibrate(
     options: &CalibrationOptions,
     progress: &dyn Progress,
 ) -> Calibration {
-    run(map, request, options, progress).unwrap_or_else(|refused| refused)
+    run(map, request, options, progress).unwrap_or_else(Calibration::from)
 }
 
 fn run(
@@ -55,7 +56,7 @@ fn run(
     request: &CalibrationRequest<'_>,
     options: &CalibrationOptions,
     progress: &dyn Progress,
-) -> Result<Calibration, Calibration> {
+) -> Result<Calibration, Refusal> {
     step(progress, Stage::Prepare, 0.0)?;
     let input = Input::new(request, options, map.spacing_m)?;
     let bench = Workbench::new(map, &input, options, request.confusion);
@@ -103,13 +104,10 @@ fn run(
 }
 
 /// Tells of progress, and ends if that is wanted.
-fn step(progress: &dyn Progress, stage: Stage, fraction: f64) -> Result<(), Calibration> {
+fn step(progress: &dyn Progress, stage: Stage, fraction: f64) -> Result<(), Refusal> {
     match progress.report(stage, fraction) {
         ControlFlow::Continue(()) => Ok(()),
-        ControlFlow::Break(()) => Err(Calibration {
-            cancelled: true,
-            ..Calibration::refused(Verdict::RejectedInput, "cancelled")
-        }),
+        ControlFlow::Break(()) => Err(Refusal::Cancelled),
     }
 }
 

@@ -168,6 +168,27 @@ impl Calibration {
     }
 }
 
+/// Why a calibration ends early.
+#[derive(Clone, PartialEq, Debug)]
+pub(super) enum Refusal {
+    /// The input cannot be used, and why.
+    Input(String),
+    /// It was ended from outside.
+    Cancelled,
+}
+
+impl From<Refusal> for Calibration {
+    fn from(refusal: Refusal) -> Calibration {
+        match refusal {
+            Refusal::Input(reason) => Calibration::refused(Verdict::RejectedInput, reason),
+            Refusal::Cancelled => Calibration {
+                cancelled: true,
+                ..Calibration::refused(Verdict::RejectedInput, "cancelled")
+            },
+        }
+    }
+}
+
 /// Parts of a calibration.
 #[derive(Clone, Copy, PartialEq, Eq, Debug)]
 pub enum Stage {
