@@ -2,7 +2,7 @@
 //!
 //! [`Traversal`] follows a segment through the cells of any lattice, exactly. [`FreeSpaceMap`] adds
 //! up scans to occupied, free and unknown cells, [`RayClearer`] removes from a voxel store what rays
-//! pass through.
+//! pass through. [`mesh`] casts rays on triangle meshes.
 
 mod blocks;
 mod clear;
@@ -11,6 +11,7 @@ mod evidence;
 mod families;
 mod map;
 mod masks;
+pub mod mesh;
 mod options;
 mod packed;
 mod scan;

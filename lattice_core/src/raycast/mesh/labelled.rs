@@ -1,0 +1,194 @@
+//! A triangle mesh with a class and an instance for each triangle.
+
+use thiserror::Error;
+
+/// Most triangles, and vertices, of a mesh.
+pub const MAX_TRIANGLES: usize = 20_000_000;
+/// Coordinates beyond this have no millimetres in f32.
+pub const MAX_COORDINATE_M: f32 = 1.0e4;
+
+/// What a mesh is refused for. Vertices and triangles count from 0.
+#[derive(Clone, Copy, PartialEq, Debug, Error)]
+pub enum MeshError {
+    /// A coordinate is NaN, infinite or too large.
+    #[error(
+        "vertex {vertex} is at {value} m, not within {MAX_COORDINATE_M} m; check the unit or move the mesh to its origin"
+    )]
+    Coordinate {
+        /// Which vertex.
+        vertex: usize,
+        /// The first coordinate at fault, metres.
+        value: f32,
+    },
+    /// A triangle names a vertex that is not there.
+    #[error("triangle {triangle} has vertex {vertex}, but there are {vertices}")]
+    Index {
+        /// Which triangle.
+        triangle: usize,
+        /// The vertex it names.
+        vertex: u32,
+        /// Number of vertices.
+        vertices: usize,
+    },
+    /// Not one value for each triangle.
+    #[error("{found} {what} for {triangles} triangles")]
+    Length {
+        /// What there is not one of each.
+        what: &'static str,
+        /// How many there are.
+        found: usize,
+        /// Number of triangles.
+        triangles: usize,
+    },
+    /// Triangles within triangles, over and over.
+    #[error("the triangles are nested {depth} levels deep; cut away what nobody sees")]
+    Depth {
+        /// Levels of the search tree.
+        depth: u32,
+    },
+    /// More than [`MAX_TRIANGLES`].
+    #[error("{found} {what}, but at most {MAX_TRIANGLES} are taken")]
+    TooMany {
+        /// Vertices or triangles.
+        what: &'static str,
+        /// How many there are.
+        found: usize,
+    },
+}
+
+/// Triangles with a class and an instance each, in a frame that the holder names.
+///
+/// An instance is one thing: a chair, a shelf, or all walls.
+#[derive(Clone, PartialEq, Debug, Default)]
+pub struct LabelledMesh {
+    vertices_m: Vec<[f32; 3]>,
+    triangles: Vec<[u32; 3]>,
+    labels: Vec<u16>,
+    instances: Vec<u16>,
+}
+
+impl LabelledMesh {
+    /// A mesh of vertices (metres), triangles (three vertices each) and the class and instance of
+    /// each triangle.
+    pub fn new(
+        vertices_m: Vec<[f32; 3]>,
+        triangles: Vec<[u32; 3]>,
+        labels: Vec<u16>,
+        instances: Vec<u16>,
+    ) -> Result<LabelledMesh, MeshError> {
+        for (what, found) in [
+            ("vertices", vertices_m.len()),
+            ("triangles", triangles.len()),
+        ] {
+            if found > MAX_TRIANGLES {
+                return Err(MeshError::TooMany { what, found });
+            }
+        }
+        for (what, found) in [("labels", labels.len()), ("instances", instances.len())] {
+            if found != triangles.len() {
+                let triangles = triangles.len();
+                return Err(MeshError::Length {
+                    what,
+                    found,
+                    triangles,
+                });
+            }
+        }
+        for (vertex, point) in vertices_m.iter().enumerate() {
+            // Not `>`, which a NaN would pass.
+            let fault = |c: &&f32| !(c.abs() <= MAX_COORDINATE_M);
+            if let Some(&value) = point.iter().find(fault) {
+                return Err(MeshError::Coordinate { vertex, value });
+            }
+        }
+        let vertices = vertices_m.len();
+        for (triangle, corners) in triangles.iter().enumerate() {
+            if let Some(&vertex) = corners.iter().find(|&&v| v as usize >= vertices) {
+                return Err(MeshError::Index {
+                    triangle,
+                    vertex,
+                    vertices,
+                });
+            }
+        }
+        Ok(LabelledMesh {
+            vertices_m,
+            triangles,
+            labels,
+            instances,
+        })
+    }
+
+    /// Number of triangles.
+    pub fn len(&self) -> usize {
+        self.triangles.len()
+    }
+
+    /// Whether there is no triangle.
+    pub fn is_empty(&self) -> bool {
+        self.triangles.is_empty()
+    }
+
+    /// The vertices, metres.
+    pub fn vertices_m(&self) -> &[[f32; 3]] {
+        &self.vertices_m
+    }
+
+    /// The vertices of each triangle; all of them are there.
+    pub fn triangles(&self) -> &[[u32; 3]] {
+        &self.triangles
+    }
+
+    /// The class of each triangle.
+    pub fn labels(&self) -> &[u16] {
+        &self.labels
+    }
+
+    /// The instance of each triangle.
+    pub fn instances(&self) -> &[u16] {
+        &self.instances
+    }
+
+    /// The corners of each triangle, metres.
+    pub fn corners_m(&self) -> impl ExactSizeIterator<Item = [[f32; 3]; 3]> + '_ {
+        self.triangles
+            .iter()
+            .map(|corners| corners.map(|v| self.vertices_m[v as usize]))
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn what_is_no_mesh_is_refused_with_the_place_of_the_fault() {
+        let corners = vec![[0.0; 3], [1.0, 0.0, 0.0], [0.0, 1.0, 0.0]];
+        let mesh = |corners: &[[f32; 3]], triangles: &[[u32; 3]], labels: usize| {
+            let (triangles, labels) = (triangles.to_vec(), vec![1; labels]);
+            LabelledMesh::new(corners.to_vec(), triangles, labels.clone(), labels)
+        };
+        assert_eq!(mesh(&corners, &[[0, 1, 2]], 1).unwrap().len(), 1);
+        assert!(mesh(&[], &[], 0).unwrap().is_empty());
+        let triangles = 1;
+        let (what, found) = ("labels", 2);
+        assert_eq!(
+            mesh(&corners, &[[0, 1, 2]], 2),
+            Err(MeshError::Length {
+                what,
+                found,
+                triangles
+            })
+        );
+        let fault = mesh(&corners, &[[0, 1, 2], [2, 3, 0]], 2).unwrap_err();
+        assert_eq!(
+            fault.to_string(),
+            "triangle 1 has vertex 3, but there are 3"
+        );
+        for value in [f32::NAN, f32::NEG_INFINITY, 2.0e4] {
+            let corners = [[0.0; 3], [0.0, value, 0.0]];
+            let fault = mesh(&corners, &[], 0).unwrap_err();
+            assert!(matches!(fault, MeshError::Coordinate { vertex: 1, .. }));
+        }
+    }
+}
