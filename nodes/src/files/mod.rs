@@ -1,4 +1,5 @@
-//! Point files in, pictures and meshes of maps out.
+//! Point files, meshes and class names in, pictures and meshes of maps out.
 
+pub mod classes;
 pub mod export;
 pub mod points;

@@ -1,4 +1,4 @@
-//! Points from files: PLY, PCD, text and KITTI scans, any of them packed with bzip2.
+//! Points from files: PLY, PCD, text and KITTI scans, any of them packed with bzip2; meshes from PLY.
 //!
 //! Files are read as a stream, so that memory is bounded by the points kept and not by what a
 //! header promises. Coordinates are taken as they stand, in metres: the viewpoint of a PCD file and
@@ -16,9 +16,10 @@ mod text;
 
 use std::fs::File;
 use std::io::{BufRead, BufReader};
-use std::path::Path;
+use std::path::{Path, PathBuf};
 
 use bzip2::bufread::MultiBzDecoder;
+use lattice_core::raycast::mesh::{LabelledMesh, MAX_TRIANGLES};
 
 pub use error::PointFileError;
 pub use format::PointFormat;
@@ -61,18 +62,34 @@ pub struct PointFile {
 /// The content decides on the format where it has a signature, otherwise the extension does.
 /// Errors do not name the file.
 pub fn read_points(path: &Path, limits: &PointFileLimits) -> Result<PointFile, PointFileError> {
+    let (reader, name) = open(path)?;
+    read_stream(reader, &name, limits)
+}
+
+/// The content of a file and its name, both after unpacking.
+fn open(path: &Path) -> Result<(Box<dyn BufRead>, PathBuf), PointFileError> {
     let io = |source| PointFileError::Io { byte: 0, source };
     let mut packed = BufReader::with_capacity(BUFFER, File::open(path).map_err(io)?);
     if !format::is_bzip2(packed.fill_buf().map_err(io)?) {
-        return read_stream(Box::new(packed), path, limits);
+        return Ok((Box::new(packed), path.to_owned()));
     }
-    let inner = path.with_extension("");
     let name = match path.extension() {
-        Some(extension) if extension.eq_ignore_ascii_case("bz2") => &inner,
-        _ => path,
+        Some(extension) if extension.eq_ignore_ascii_case("bz2") => path.with_extension(""),
+        _ => path.to_owned(),
     };
     let unpacked = BufReader::with_capacity(BUFFER, MultiBzDecoder::new(packed));
-    read_stream(Box::new(unpacked), name, limits)
+    Ok((Box::new(unpacked), name))
+}
+
+/// A mesh file with a class and an instance for each triangle.
+///
+/// PLY, also packed with bzip2: vertices with `x`, `y`, `z` (metres), faces with a list `vertex_indices`
+/// or `vertex_index` and numbers `label` and `instance`. Polygons become fans of triangles. Without
+/// labels all are [`UNLABELED`](lattice_core::registration::UNLABELED), without instances each label is
+/// one.
+pub fn read_mesh(path: &Path, max_triangles: usize) -> Result<LabelledMesh, PointFileError> {
+    let (reader, _) = open(path)?;
+    ply::mesh::read(&mut Source::new(reader), max_triangles.min(MAX_TRIANGLES))
 }
 
 fn read_stream(

@@ -27,8 +27,15 @@ pub(super) struct Element {
 
 #[derive(Debug)]
 pub(super) enum Property {
-    Scalar { name: String, scalar: Scalar },
-    List { count: Scalar, item: Scalar },
+    Scalar {
+        name: String,
+        scalar: Scalar,
+    },
+    List {
+        name: String,
+        count: Scalar,
+        item: Scalar,
+    },
 }
 
 impl Header {
@@ -101,12 +108,13 @@ fn element(name: &str, count: &str) -> Result<Element, String> {
 
 fn property(words: &[&str]) -> Result<Property, String> {
     match words {
-        ["list", count, item, _] => {
+        ["list", count, item, name] => {
             let (count, item) = (scalar(count)?, scalar(item)?);
             if count.is_float() {
                 return Err("the length of a list must be an integer".to_owned());
             }
-            Ok(Property::List { count, item })
+            let name = (*name).to_owned();
+            Ok(Property::List { name, count, item })
         }
         [of, name] => Ok(Property::Scalar {
             name: (*name).to_owned(),

@@ -3,6 +3,7 @@
 //! Points are the element `vertex`. Elements before it are passed over, what follows is not read.
 
 mod header;
+pub(super) mod mesh;
 mod record;
 
 use header::{Element, Header, Property};

@@ -16,9 +16,21 @@ pub(super) fn read(
     part: impl Display,
     visit: impl FnMut(usize, f64),
 ) -> Result<(), PointFileError> {
+    read_with_list(source, header, element, None, part, visit)
+}
+
+/// [`read`], where `visit` also gets the items of the list property `list`, one after the other.
+pub(super) fn read_with_list(
+    source: &mut Source,
+    header: &Header,
+    element: &Element,
+    list: Option<usize>,
+    part: impl Display,
+    visit: impl FnMut(usize, f64),
+) -> Result<(), PointFileError> {
     match header.format {
-        PointFormat::PlyAscii => read_text(source, element, part, visit),
-        _ => read_binary(source, header.format, element, part, visit),
+        PointFormat::PlyAscii => read_text(source, element, list, part, visit),
+        _ => read_binary(source, header.format, element, list, part, visit),
     }
 }
 
@@ -55,10 +67,11 @@ fn read_binary(
     source: &mut Source,
     format: PointFormat,
     element: &Element,
+    list: Option<usize>,
     part: impl Display,
     mut visit: impl FnMut(usize, f64),
 ) -> Result<(), PointFileError> {
-    let value = |source: &mut Source, scalar: Scalar| {
+    let value = |source: &mut Source, scalar: Scalar| -> Result<f64, PointFileError> {
         let mut bytes = [0; 8];
         let (bytes, _) = bytes.split_at_mut(scalar.size());
         source.exact(bytes, &part)?;
@@ -70,7 +83,7 @@ fn read_binary(
     for (index, property) in element.properties.iter().enumerate() {
         match property {
             Property::Scalar { scalar, .. } => visit(index, value(source, *scalar)?),
-            Property::List { count, item } => {
+            Property::List { count, item, .. } => {
                 let byte = source.byte();
                 let length = value(source, *count)?;
                 if length < 0.0 {
@@ -80,6 +93,12 @@ fn read_binary(
                         byte,
                         reason,
                     });
+                }
+                if list == Some(index) {
+                    for _ in 0..length as u64 {
+                        visit(index, value(source, *item)?);
+                    }
+                    continue;
                 }
                 // At most 2^32 numbers of 8 bytes.
                 source.skip(length as u64 * item.size() as u64, &part)?;
@@ -93,6 +112,7 @@ fn read_binary(
 fn read_text(
     source: &mut Source,
     element: &Element,
+    list: Option<usize>,
     part: impl Display,
     mut visit: impl FnMut(usize, f64),
 ) -> Result<(), PointFileError> {
@@ -115,7 +135,10 @@ fn read_text(
                     let fault = |_| format!("{shown:?} is not the length of a list, in {part}");
                     let length: u32 = word.parse().map_err(fault)?;
                     for _ in 0..length {
-                        words.next().ok_or_else(cut)?;
+                        let word = words.next().ok_or_else(cut)?;
+                        if list == Some(index) {
+                            visit(index, number(word).unwrap_or(f64::NAN));
+                        }
                     }
                 }
             }
