@@ -4,12 +4,15 @@
 //! them on a turntable, and a SPAN-CPT-like INS, on an earth-moving [`Site`]. Everything is a pure function
 //! of a seed and a time, so that any number of threads gives the same bytes.
 //!
+//! [`house`] is another world: a furnished house, a robot that maps it and a headset.
+//!
 //! Times are nanoseconds since the start of the log. The map frame is east, north, up (metres) about the
 //! middle of the site; `base_link` is forward, left, up on the ground in the middle of the wheels.
 
 mod bobcat;
 mod ground;
 mod height_field;
+pub mod house;
 mod ins;
 mod layout;
 mod lms200;

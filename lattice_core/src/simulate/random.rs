@@ -15,6 +15,22 @@ pub(super) enum Purpose {
     LaserRange = 16,
     /// Range noise of the 64-beam scanner of surveys; one stream per sweep.
     SpinRange = 32,
+    /// Where the robot of a house stops.
+    RobotPath = 48,
+    /// Pose and noise of a view of the robot; one stream per view.
+    RobotView = 49,
+    /// Where one stands before an object; one stream per object.
+    HeadsetStand = 50,
+    /// Frame and gazes of a headset.
+    HeadsetFrame = 51,
+    /// Depth views of a headset; one stream per view.
+    HeadsetView = 52,
+    /// Labels of a gaze; one stream per gaze.
+    HeadsetGaze = 53,
+    /// Which regions are labelled wrongly, and as what.
+    LabelFlips = 54,
+    /// Labels of single points; one stream per block of points.
+    PointFlips = 55,
 }
 
 /// A stream of uniform and normal numbers.

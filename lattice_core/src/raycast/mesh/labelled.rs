@@ -95,8 +95,7 @@ impl LabelledMesh {
             }
         }
         for (vertex, point) in vertices_m.iter().enumerate() {
-            // Not `>`, which a NaN would pass.
-            let fault = |c: &&f32| !(c.abs() <= MAX_COORDINATE_M);
+            let fault = |c: &&f32| !(-MAX_COORDINATE_M..=MAX_COORDINATE_M).contains(*c);
             if let Some(&value) = point.iter().find(fault) {
                 return Err(MeshError::Coordinate { vertex, value });
             }

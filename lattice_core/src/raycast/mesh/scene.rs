@@ -91,10 +91,12 @@ impl MeshScene {
         direction: &Vector3<f64>,
         max_m: f64,
     ) -> Option<MeshHit> {
-        let direction = direction.try_normalize(1e-12)?.cast::<f32>();
+        // The traversal takes a negative zero now for one side and now for the other.
+        let direction = direction.try_normalize(1e-12)?;
+        let direction = direction.map(|c| c as f32 + 0.0);
         let origin = origin_m.coords.cast::<f32>();
         let finite = (direction.iter().chain(origin.iter())).all(|c| c.is_finite());
-        if self.triangles.is_empty() || !finite || !(max_m > 0.0) {
+        if self.triangles.is_empty() || !finite || max_m.is_nan() || max_m <= 0.0 {
             return None;
         }
         let [origin, direction]: [[f32; 3]; 2] = [origin.into(), direction.into()];
@@ -213,6 +215,33 @@ mod tests {
                 1.9,
             );
             assert_eq!(short, None);
+        }
+    }
+
+    #[test]
+    fn rays_along_the_axes_hit() {
+        let wall = |axis: usize, far: f32| {
+            let mut corners = [[0.0; 3]; 3];
+            for (i, corner) in corners.iter_mut().enumerate() {
+                corner[axis] = far;
+                corner[(axis + 1) % 3] = [-9.0, 9.0, 0.0][i];
+                corner[(axis + 2) % 3] = [-9.0, -9.0, 9.0][i];
+            }
+            corners
+        };
+        let walls = (0..3).flat_map(|axis| [wall(axis, -2.0), wall(axis, 3.0)]);
+        let scene = MeshScene::new(&mesh(&walls.collect::<Vec<_>>())).unwrap();
+        let origin = Point3::new(0.1, -0.2, 0.3);
+        for axis in 0..3 {
+            for (far, sign) in [(-2.0, -1.0), (3.0, 1.0)] {
+                let direction = Vector3::from_fn(|i, _| if i == axis { 1.0 } else { 0.0 }) * sign;
+                let hit = scene.cast(&origin, &direction, 9.0).unwrap();
+                let expected = (far - origin[axis]) * sign;
+                assert!(
+                    (hit.distance_m - expected).abs() < 1e-5,
+                    "{direction:?} {hit:?}"
+                );
+            }
         }
     }
 
