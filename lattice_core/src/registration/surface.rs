@@ -8,6 +8,8 @@ use super::tree::{Item, Neighbors, Tree};
 
 /// Points of one piece of parallel work.
 const CHUNK: usize = 512;
+/// More than what rounding takes from a sum of distances.
+const SLACK: f64 = 1.0 + 1e-12;
 
 /// Points in the order of their tree, with the normals of the planes around them.
 pub(super) struct Surface {
@@ -37,6 +39,8 @@ impl Surface {
     }
 }
 
+/// The neighbours of the last point bound how far those of the next can be: points follow each other
+/// closely, so most searches begin with almost their final reach.
 fn normals(tree: &Tree, points_m: &[Point3<f64>], neighbors: usize) -> Vec<Vector3<f64>> {
     let mut normals = vec![Vector3::zeros(); points_m.len()];
     let chunks = normals
@@ -44,9 +48,14 @@ fn normals(tree: &Tree, points_m: &[Point3<f64>], neighbors: usize) -> Vec<Vecto
         .zip(points_m.par_chunks(CHUNK));
     chunks.for_each(|(normals, points)| {
         let mut found = Neighbors::default();
+        let mut last: Option<(&Point3<f64>, f64)> = None;
         for (normal, point) in normals.iter_mut().zip(points) {
-            found.start(neighbors, f64::MAX);
+            let reach_m = last.map_or(f64::INFINITY, |(last, farthest)| {
+                (farthest.sqrt() + nalgebra::distance(last, point)) * SLACK
+            });
+            found.start(neighbors, reach_m * reach_m);
             tree.search(point, &mut found);
+            last = found.farthest_of(neighbors).map(|squared| (point, squared));
             let around = found.indices().iter().map(|&i| points_m[i as usize]);
             *normal = plane::normal(&plane::scatter(around));
         }

@@ -226,6 +226,11 @@ impl Neighbors {
         found.map(|(&index, &squared)| (index as usize, squared))
     }
 
+    /// Squared distance of the last of `k` neighbours, if there are so many.
+    pub(super) fn farthest_of(&self, k: usize) -> Option<f64> {
+        (self.len == k && k > 0).then(|| self.squared[k - 1])
+    }
+
     /// Indices of what was found.
     pub(super) fn indices(&self) -> &[u32] {
         &self.index[..self.len]
