@@ -31,6 +31,8 @@ pub(super) enum Purpose {
     LabelFlips = 54,
     /// Labels of single points; one stream per block of points.
     PointFlips = 55,
+    /// Books and clutter of a house.
+    OwnHouse = 56,
 }
 
 /// A stream of uniform and normal numbers.

@@ -1,7 +1,7 @@
 //! A furnished house, a robot that maps it, and a headset that looks at four of its corners.
 //!
 //! Made for the calibration of a headset to a robot map (semantic_icp, evaluation track A): a
-//! [`House`] is a labelled mesh at a pose in the map, [`Survey`] the labelled points that a robot with
+//! [`House`] is a labelled mesh, of a real house or [`House::own`], at a pose in the map, [`Survey`] the labelled points that a robot with
 //! a depth camera gathers in it, [`HeadsetTrial`] what a headset sees of a [`Scene`] on its own coarse
 //! mesh, with the true `map_from_headset`, and [`LabelModel`] how wrong the labels of the two are.
 //! Everything depends on seeds alone, on any number of threads.
@@ -15,6 +15,7 @@ mod free_space;
 mod headset;
 mod headset_mesh;
 mod labels;
+mod own;
 mod place;
 mod regions;
 mod robot;

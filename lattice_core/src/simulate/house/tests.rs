@@ -309,3 +309,62 @@ fn the_map_of_a_survey_is_relabelled_as_inserting_it_anew_would() {
     // One in ten of the random classes is right by chance.
     assert!((share - 0.09).abs() < 0.01, "{share}");
 }
+
+#[test]
+fn our_own_house_has_rooms_and_all_four_scenes() {
+    let house = House::own(1).unwrap();
+    assert!(House::own(1).unwrap().mesh() == house.mesh());
+    assert!(House::own(2).unwrap().mesh() != house.mesh());
+    println!(
+        "{} triangles, {} regions",
+        house.mesh().len(),
+        house.regions().len()
+    );
+    for room in [
+        [4.0, 1.5],
+        [9.0, 4.0],
+        [17.0, 4.0],
+        [10.0, 7.2],
+        [3.0, 8.6],
+        [8.0, 9.5],
+        [11.0, 10.4],
+        [18.0, 9.2],
+    ] {
+        let near = |cell: &&[f64; 2]| (cell[0] - room[0]).hypot(cell[1] - room[1]) < 0.7;
+        assert!(
+            house.free.cells_m.iter().any(|cell| near(&cell)),
+            "nowhere to stand at {room:?}"
+        );
+    }
+    let inside = |[x, y]: &[f64; 2]| *x > 0.0 && *x < 20.0 && *y > 0.0 && *y < 12.0;
+    assert!(house.free.cells_m.iter().all(inside));
+    assert!(
+        !house
+            .free
+            .cells_m
+            .iter()
+            .any(|[x, y]| *x > 15.6 && *y > 11.0),
+        "outside"
+    );
+    for scene in Scene::ALL {
+        for seed in 0..4 {
+            let trial = HeadsetTrial::new(&house, scene, &HeadsetOptions::default(), seed).unwrap();
+            let gaze = &trial.gazes[0];
+            let object = house.class(scene.object());
+            let label = |r: &&u16| house.regions().get(usize::from(**r)).map(|r| r.label);
+            let seen = gaze.regions.iter().filter(|r| label(r) == object).count();
+            let near = gaze
+                .points_m
+                .iter()
+                .step_by(29)
+                .filter(|p| distance_m(&house, &(trial.map_from_headset * **p), 1.0) < 0.1);
+            let share = near.count() as f64 / (gaze.points_m.len().div_ceil(29) as f64);
+            println!(
+                "{} {seed}: {} points, {seen} of the object, {share:.3} near",
+                scene.name(),
+                gaze.points_m.len()
+            );
+            assert!(seen > 200 && share > 0.9);
+        }
+    }
+}
