@@ -1,6 +1,7 @@
 //! Maps for other programs and for people: PLY of centres, PLY mesh of cells, and pictures.
 
 mod centers;
+mod cloud;
 mod error;
 mod mesh;
 mod palette;
@@ -8,6 +9,7 @@ mod render;
 mod vertices;
 
 pub use centers::write_centers_ply;
+pub use cloud::write_labelled_ply;
 pub use error::ExportError;
 pub use mesh::write_mesh_ply;
 pub use palette::{HeightRange, color_at};

@@ -8,6 +8,7 @@ const TRUSTED: u64 = 1 << 16;
 /// Takes points up to a limit, and leaves out those that are not finite.
 pub(super) struct Collector {
     points_m: Vec<[f64; 3]>,
+    labels: Vec<u16>,
     skipped: usize,
     max_points: usize,
 }
@@ -16,6 +17,7 @@ impl Collector {
     pub(super) fn new(max_points: usize) -> Collector {
         Collector {
             points_m: Vec::new(),
+            labels: Vec::new(),
             skipped: 0,
             max_points,
         }
@@ -48,10 +50,30 @@ impl Collector {
         Ok(())
     }
 
+    /// Takes a point with its label; all points of a file have one or none has.
+    pub(super) fn push_labelled(
+        &mut self,
+        point_m: [f64; 3],
+        label: u16,
+    ) -> Result<(), PointFileError> {
+        let known = self.points_m.len();
+        self.push(point_m)?;
+        if self.points_m.len() > known {
+            self.labels.push(label);
+        }
+        Ok(())
+    }
+
     pub(super) fn skipped_not_finite(&self) -> usize {
         self.skipped
     }
 
+    /// Points, and labels if there are any.
+    pub(super) fn into_parts(self) -> (Vec<[f64; 3]>, Vec<u16>) {
+        (self.points_m, self.labels)
+    }
+
+    #[cfg(test)]
     pub(super) fn into_points(self) -> Vec<[f64; 3]> {
         self.points_m
     }

@@ -51,6 +51,9 @@ impl Default for PointFileLimits {
 pub struct PointFile {
     /// Finite points in the order of the file, metres, in the frame of the file.
     pub points_m: Vec<[f64; 3]>,
+    /// Class of each point, [`UNLABELED`](lattice_core::registration::UNLABELED) where it has none;
+    /// empty if the file has no `label`. Only PLY has.
+    pub labels: Vec<u16>,
     /// What kind of file it was.
     pub format: PointFormat,
     /// Points left out because a coordinate was NaN or infinite.
@@ -105,10 +108,13 @@ fn read_stream(
         format::Family::Text => text::read(&mut source, &mut points)?,
         format::Family::Kitti => kitti::read(&mut source, &mut points)?,
     };
+    let skipped_not_finite = points.skipped_not_finite();
+    let (points_m, labels) = points.into_parts();
     Ok(PointFile {
-        skipped_not_finite: points.skipped_not_finite(),
-        points_m: points.into_points(),
+        points_m,
+        labels,
         format,
+        skipped_not_finite,
     })
 }
 

@@ -135,6 +135,7 @@ fn every_format_gives_the_same_points_packed_or_not() {
     for (name, bytes, format, _) in files() {
         let expected = PointFile {
             points_m: points(),
+            labels: Vec::new(),
             format,
             skipped_not_finite: 0,
         };

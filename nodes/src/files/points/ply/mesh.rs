@@ -4,7 +4,7 @@ use lattice_core::raycast::mesh::LabelledMesh;
 use lattice_core::registration::UNLABELED;
 
 use super::header::{Element, Header, Property};
-use super::{axes, record};
+use super::{axes, number, record};
 use crate::files::points::PointFileError;
 use crate::files::points::source::Source;
 
@@ -90,8 +90,8 @@ fn read_vertices(
     parts
         .vertices_m
         .reserve(element.count.min(TRUSTED) as usize);
-    for number in 1..=element.count {
-        let part = format_args!("vertex {number} of {}", element.count);
+    for vertex in 1..=element.count {
+        let part = format_args!("vertex {vertex} of {}", element.count);
         let mut point_m = [f32::NAN; 3];
         record::read(source, header, element, part, |property, value| {
             for (coordinate, axis) in point_m.iter_mut().zip(axes) {
@@ -192,14 +192,10 @@ fn whole(value: f64, most: f64, what: &str) -> Result<f64, String> {
 fn face_columns(face: &Element) -> Result<FaceColumns, String> {
     let list = |p: &Property| matches!(p, Property::List { name, .. } if name == "vertex_indices" || name == "vertex_index");
     let corners = face.properties.iter().position(list);
-    let number = |wanted: &str| {
-        let is = |p: &Property| matches!(p, Property::Scalar { name, .. } if name == wanted);
-        face.properties.iter().position(is)
-    };
     Ok(FaceColumns {
         corners: corners.ok_or("element face has no list named vertex_indices")?,
-        label: number("label"),
-        instance: number("instance"),
+        label: number(face, "label"),
+        instance: number(face, "instance"),
     })
 }
 

@@ -1,12 +1,14 @@
 //! PLY: a header that names elements and their properties, and the elements, as text or binary.
 //!
-//! Points are the element `vertex`. Elements before it are passed over, what follows is not read.
+//! Points are the element `vertex`, with a number `label` if they have classes. Elements before it are passed over, what follows is not read.
 
 mod header;
 pub(super) mod mesh;
 mod record;
 
 use header::{Element, Header, Property};
+
+use lattice_core::registration::UNLABELED;
 
 use super::collect::Collector;
 use super::source::Source;
@@ -28,18 +30,34 @@ pub(super) fn read(
             continue;
         }
         let axes = axes(element).map_err(fault)?;
+        let label = number(element, "label");
         points.promise(element.count)?;
         for number in 1..=element.count {
             let part = format_args!("vertex {number} of {}", element.count);
             let mut point_m = [f64::NAN; 3];
+            let mut class = f64::NAN;
             record::read(source, &header, element, part, |property, value| {
                 for (coordinate, axis) in point_m.iter_mut().zip(axes) {
                     if axis == property {
                         *coordinate = value;
                     }
                 }
+                if label == Some(property) {
+                    class = value;
+                }
             })?;
-            points.push(point_m)?;
+            if label.is_none() {
+                points.push(point_m)?;
+                continue;
+            }
+            let class = class_of(class).ok_or_else(|| PointFileError::Data {
+                format: header.format,
+                byte: source.byte(),
+                reason: format!(
+                    "label {class} is no whole number from 0 to 65535 or -1, in {part}"
+                ),
+            })?;
+            points.push_labelled(point_m, class)?;
         }
         return Ok(header.format);
     }
@@ -49,11 +67,25 @@ pub(super) fn read(
 /// Which properties of the vertex are x, y and z.
 fn axes(vertex: &Element) -> Result<[usize; 3], String> {
     let find = |axis: &str| {
-        let is_axis = |p: &Property| matches!(p, Property::Scalar { name, .. } if name == axis);
-        let found = vertex.properties.iter().position(is_axis);
+        let found = number(vertex, axis);
         found.ok_or_else(|| format!("element vertex has no number named {axis}"))
     };
     Ok([find("x")?, find("y")?, find("z")?])
+}
+
+/// Which property of an element is the number of a name.
+fn number(element: &Element, wanted: &str) -> Option<usize> {
+    let is = |p: &Property| matches!(p, Property::Scalar { name, .. } if name == wanted);
+    element.properties.iter().position(is)
+}
+
+/// A class number; -1 is none, as 65535.
+fn class_of(value: f64) -> Option<u16> {
+    if value == -1.0 {
+        return Some(UNLABELED);
+    }
+    let whole = value.fract() == 0.0 && (0.0..=f64::from(u16::MAX)).contains(&value);
+    whole.then_some(value as u16)
 }
 
 #[cfg(test)]

@@ -172,3 +172,28 @@ fn counts_are_not_believed() {
     let lists = format!("element row 9\nproperty list int double a\n{vertices}");
     assert!(binary(&lists, &[255; 99]).ends_with("a list of length -1 in row 1 of 9"));
 }
+
+#[test]
+fn labels_come_back_and_wrong_ones_are_refused() {
+    let read = |kind: &str, rows: &str| {
+        let file = format!(
+            "ply\nformat ascii 1.0\nelement vertex 3\n{XYZ}property {kind} label\nend_header\n{rows}"
+        );
+        let mut points = Collector::new(1000);
+        let mut source = Source::new(Box::new(std::io::Cursor::new(file.into_bytes())));
+        let read = read(&mut source, &mut points).map_err(|error| error.to_string());
+        read.map(|_| points.into_parts())
+    };
+    let (points, labels) = read("ushort", "0 0 1 7\nnan 0 0 8\n0 0 2 65535\n").unwrap();
+    assert_eq!(points, [[0.0, 0.0, 1.0], [0.0, 0.0, 2.0]]);
+    assert_eq!(labels, [7, UNLABELED]);
+    let (_, labels) = read("int", "0 0 1 -1\n0 0 0 300\n0 0 2 0\n").unwrap();
+    assert_eq!(labels, [UNLABELED, 300, 0]);
+    for wrong in ["-2", "65536", "0.5", "nan"] {
+        let fault = read("float", &format!("0 0 1 1\n0 0 1 {wrong}\n0 0 1 1\n")).unwrap_err();
+        assert!(
+            fault.contains("no whole number") && fault.contains("vertex 2 of 3"),
+            "{fault}"
+        );
+    }
+}

@@ -1,0 +1,52 @@
+//! Labelled clouds.
+
+use std::io::{self, BufWriter, Write};
+
+use nalgebra::Point3;
+
+/// Writes points as vertices of a binary PLY file: `x`, `y`, `z` (double, metres) and `label`
+/// (ushort, 65535 for none, also for points beyond the labels). `comment` is one line that says in
+/// which frame they are.
+pub fn write_labelled_ply(
+    points_m: &[Point3<f64>],
+    labels: &[u16],
+    comment: &str,
+    writer: impl Write,
+) -> io::Result<()> {
+    let mut writer = BufWriter::new(writer);
+    let comment = comment.replace(['\n', '\r'], " ");
+    write!(
+        writer,
+        "ply\nformat binary_little_endian 1.0\ncomment {comment}\nelement vertex {}\n\
+         property double x\nproperty double y\nproperty double z\nproperty ushort label\n\
+         end_header\n",
+        points_m.len()
+    )?;
+    let labels = labels.iter().copied().chain(std::iter::repeat(u16::MAX));
+    for (point, label) in points_m.iter().zip(labels) {
+        for coordinate in point.iter() {
+            writer.write_all(&coordinate.to_le_bytes())?;
+        }
+        writer.write_all(&label.to_le_bytes())?;
+    }
+    writer.flush()
+}
+
+#[cfg(test)]
+mod tests {
+    use crate::files::points::{PointFileLimits, read_points};
+
+    use super::*;
+
+    #[test]
+    fn what_is_written_is_read() {
+        let folder = tempfile::tempdir().unwrap();
+        let path = folder.path().join("cloud.ply");
+        let points = [Point3::new(4e5, -0.25, 1e-9), Point3::new(0.1, 0.2, 0.3)];
+        let file = std::fs::File::create(&path).unwrap();
+        write_labelled_ply(&points, &[12], "two\nend_header", file).unwrap();
+        let read = read_points(&path, &PointFileLimits::default()).unwrap();
+        assert_eq!(read.points_m, points.map(<[f64; 3]>::from));
+        assert_eq!(read.labels, [12, u16::MAX]);
+    }
+}
