@@ -37,7 +37,7 @@ enum Command {
     Node(node::NodeCommand),
     /// Map a rosbag2 log: directly, or played through separate node processes
     Replay(replay::Replay),
-    /// Write the log of a simulated machine
+    /// Write the log, the points or the map of a simulated machine
     #[command(subcommand)]
     Simulate(simulate::Simulate),
     /// Quantize a point file (ply, pcd, xyz, KITTI bin) and show what each lattice makes of it

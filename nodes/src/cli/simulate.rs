@@ -1,5 +1,7 @@
 //! `lattice simulate`: logs and point files of simulated machines.
 
+mod house;
+
 use std::path::PathBuf;
 
 use clap::{Args, Subcommand, ValueEnum};
@@ -12,7 +14,7 @@ use crate::bag::Storage;
 use crate::bench::{SiteOptions, write_site};
 use crate::simulate::{BobcatOptions, BobcatSummary, write_bobcat};
 
-/// Write the log or the points of a simulated machine
+/// Write the log, the points or the map of a simulated machine
 #[derive(Subcommand)]
 pub enum Simulate {
     /// A skid-steer loader on an earth-moving site: three laser scanners, one on a turntable, and
@@ -20,6 +22,8 @@ pub enum Simulate {
     Bobcat(Bobcat),
     /// A survey of the same site as raw little-endian f32 `x y z i` points, for benchmarks
     Site(Site),
+    /// A furnished house: a robot's labelled map, what a headset sees of four scenes, and the truth
+    House(house::House),
 }
 
 /// Container of a log.
@@ -88,6 +92,7 @@ impl Simulate {
         match self {
             Self::Bobcat(command) => command.run(),
             Self::Site(command) => command.run(),
+            Self::House(command) => command.run(),
         }
     }
 }

@@ -19,8 +19,12 @@
 //! `truth/` in the log's directory holds `poses.csv` (true `base_link` in `map` at every INS epoch: stamp in ns, metres,
 //! quaternion), `points.ply` (true points in `map`, one for each point of the clouds, in the order of the log) and
 //! `site.yaml` (origin, mounts, noise, seed).
+//!
+//! [`write_house`] writes another world: a furnished house as a robot maps it and as a headset sees
+//! four of its corners (see [`lattice_core::simulate::house`]), for calibrations.
 
 mod facts;
+mod house;
 mod log;
 mod messages;
 mod truth;
@@ -30,6 +34,10 @@ pub use facts::{
     BASE_FRAME, BOBCAT_GPS_WEEK, BOBCAT_GPS_WEEK_MS, BOBCAT_LEAP_SECONDS, BOBCAT_ORIGIN,
     BOBCAT_UNDULATION_M, IMU_FRAME, INSPVAX_TOPIC, MAP_FRAME, ODOMETRY_TOPIC, TF_STATIC_TOPIC,
     TF_TOPIC, TURNTABLE_FRAME, bobcat_origin, bobcat_start_ns, points_topic,
+};
+pub use house::{
+    CLASSES_FILE, GazeTruth, HeadsetAxes, HouseFilesError, HouseOptions, HouseSummary, MAP_FILE,
+    Pose, SceneTruth, read_house, write_house,
 };
 pub use log::LogEntry;
 pub use write::{BobcatOptions, BobcatSummary, SimulateError, write_bobcat};

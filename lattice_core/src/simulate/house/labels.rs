@@ -108,13 +108,24 @@ impl LabelModel {
         trial: &HeadsetTrial,
         seed: u64,
     ) -> Result<LabelDraw, HouseError> {
+        self.draw_all(house, std::slice::from_ref(trial), seed)
+    }
+
+    /// [`LabelModel::draw`] for one map and several trials, whose pictures count as one.
+    pub fn draw_all(
+        &self,
+        house: &House,
+        trials: &[HeadsetTrial],
+        seed: u64,
+    ) -> Result<LabelDraw, HouseError> {
         within("region_flips", self.region_flips, 0.0, 1.0)?;
         within("iid", self.iid, 0.0, 1.0)?;
         within("softness", self.softness, 0.0, 1.0)?;
         let regions = house.regions();
         let mut stream = Stream::new(seed, Purpose::LabelFlips, 0, 0);
         let mut pixels = vec![0_u64; regions.len()];
-        for region in trial.gazes.iter().flat_map(|gaze| &gaze.regions) {
+        let gazes = trials.iter().flat_map(|trial| &trial.gazes);
+        for region in gazes.flat_map(|gaze| &gaze.regions) {
             if let Some(pixels) = pixels.get_mut(usize::from(*region)) {
                 *pixels += 1;
             }
