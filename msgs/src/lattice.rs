@@ -69,7 +69,7 @@ pub struct LatticeMap {
     pub offset_unit_m: f64,
     /// X, y, z of (mean point - cell centre) of each voxel, in offset_unit_m; empty: not kept.
     pub mean_offsets: Vec<i16>,
-    /// Most frequent label of each voxel; empty: not kept.
+    /// Most frequent label of each voxel, 65535 if none; empty: not kept.
     pub labels: Vec<u16>,
     /// Points with that label in each voxel; empty: not kept.
     pub label_counts: Vec<u32>,
@@ -109,7 +109,7 @@ pub struct LatticeMapUpdate {
     pub offset_unit_m: f64,
     /// X, y, z of (mean point - cell centre) of each voxel, in offset_unit_m; empty: not kept.
     pub mean_offsets: Vec<i16>,
-    /// Most frequent label of each voxel; empty: not kept.
+    /// Most frequent label of each voxel, 65535 if none; empty: not kept.
     pub labels: Vec<u16>,
     /// Points with that label in each voxel; empty: not kept.
     pub label_counts: Vec<u32>,

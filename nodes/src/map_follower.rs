@@ -3,6 +3,7 @@
 use std::collections::{BTreeMap, BTreeSet, HashMap};
 
 use lattice_core::lattice::{Key, Lattice};
+use lattice_core::registration::{LabelDistribution, SemanticCloud, UNLABELED};
 use lattice_msgs::lattice::{LatticeInfo, LatticeMap, LatticeMapUpdate};
 use nalgebra::Vector3;
 use rustc_hash::{FxBuildHasher, FxHashMap, FxHashSet};
@@ -70,6 +71,26 @@ impl FollowedMap {
     /// Centre of a cell in the map frame, in metres.
     pub fn center_m(&self, key: Key) -> Vector3<f64> {
         self.datum_m + self.lattice.center(key.unpack())
+    }
+
+    /// The mean point of each voxel with the share of its most frequent label, in the map frame and
+    /// in the order of the keys; without labels if the map has none.
+    pub fn semantic_cloud(&self) -> SemanticCloud {
+        let mut voxels: Vec<(&Key, &VoxelState)> = self.voxels.iter().collect();
+        voxels.sort_unstable_by_key(|(key, _)| **key);
+        let mut cloud = SemanticCloud::default();
+        for (key, voxel) in &voxels {
+            let offset = Vector3::from(voxel.mean_offset.map(f64::from)) * self.offset_unit_m;
+            cloud.points_m.push((self.center_m(**key) + offset).into());
+        }
+        if voxels.iter().any(|(_, voxel)| voxel.label_count > 0) {
+            cloud.labels.extend(voxels.iter().map(|(_, voxel)| {
+                let rest = voxel.count.saturating_sub(voxel.label_count);
+                let weights = [(voxel.label, voxel.label_count), (UNLABELED, rest)];
+                LabelDistribution::from_weights(weights.map(|(label, n)| (label, n as f32)))
+            }));
+        }
+        cloud
     }
 }
 
@@ -160,13 +181,7 @@ impl MapFollower {
                 limit: self.max_voxels,
             });
         }
-        let voxels = map::voxels_from(
-            &message.key_encoding,
-            &message.keys,
-            &message.counts,
-            &message.mean_offsets,
-            self.max_voxels,
-        )?;
+        let voxels = map::voxels_from(message.into(), self.max_voxels)?;
         let fresh = self.describe(&message.info, message.offset_unit_m)?;
         if fresh.is_none() && message.sequence < self.sequence {
             return Ok(Followed::Old);
@@ -367,13 +382,7 @@ impl MapFollower {
         let Some(map) = &mut self.map else {
             return Ok(());
         };
-        let voxels = map::voxels_from(
-            &message.key_encoding,
-            &message.keys,
-            &message.counts,
-            &message.mean_offsets,
-            limit,
-        )?;
+        let voxels = map::voxels_from(message.into(), limit)?;
         let removed = map::keys_from(&message.key_encoding, &message.removed_keys, limit)?;
         if map.voxels.len() + voxels.len() > limit {
             let new = voxels

@@ -104,3 +104,19 @@ pub fn odometry(stamp_ns: i64, map_from_base: &Isometry3<f64>) -> Odometry {
     message.pose.pose = pose(map_from_base);
     message
 }
+
+/// A cloud of `x y z` in f32 and `label` in u16.
+pub fn labelled_cloud(frame: &str, stamp_ns: i64, points: &[([f32; 3], u16)]) -> PointCloud2 {
+    let mut data = Vec::new();
+    for (point, label) in points {
+        data.extend(point.iter().flat_map(|v| v.to_le_bytes()));
+        data.extend(label.to_le_bytes());
+    }
+    let mut message = cloud(frame, stamp_ns, &[]);
+    message.fields.push(field("label", 12, PointField::UINT16));
+    message.width = points.len() as u32;
+    message.point_step = 14;
+    message.row_step = 14 * message.width;
+    message.data = ByteBuf::from(data);
+    message
+}

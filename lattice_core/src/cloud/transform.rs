@@ -42,6 +42,8 @@ pub struct Transformed {
     pub out_of_range: usize,
     /// Points within range that have no time.
     pub no_time: usize,
+    /// Which points were kept out for any reason: their indices, ascending.
+    pub left_out: Vec<usize>,
 }
 
 /// Brings the points of `view` into the map: point `i` by `map_from_sensor(times[i])`, or
@@ -105,6 +107,7 @@ fn transform<E: Send>(
         all.not_finite += part.not_finite;
         all.out_of_range += part.out_of_range;
         all.no_time += part.no_time;
+        all.left_out.extend(part.left_out);
     }
     Ok(all)
 }
@@ -128,9 +131,11 @@ fn transform_part<E>(
             out.out_of_range += 1;
         } else if let Some(pose) = pose_of(i) {
             out.points_m.push((pose? * Point3::from(p)).coords);
+            continue;
         } else {
             out.no_time += 1;
         }
+        out.left_out.push(i);
     }
     Ok(out)
 }

@@ -99,8 +99,18 @@ impl<'a> CloudView<'a> {
     /// First element of `field` of point `i`, widened; NaN if it is not there.
     #[inline]
     pub fn scalar(&self, field: &PointField, i: usize) -> f64 {
+        self.element(field, i, 0)
+    }
+
+    /// Element `n` of `field` of point `i`, widened; NaN if it is not there.
+    #[inline]
+    pub fn element(&self, field: &PointField, i: usize, n: u32) -> f64 {
         let start = self.point_start(i);
-        let offset = field.offset as usize;
+        let datatype = Datatype::from_code(field.datatype);
+        let Some(width) = datatype.filter(|_| n < field.count).map(Datatype::bytes) else {
+            return f64::NAN;
+        };
+        let offset = field.offset as usize + n as usize * width as usize;
         match Datatype::from_code(field.datatype) {
             Some(Datatype::Float32) => self.f32_at(start, offset),
             Some(Datatype::Float64) => self.f64_at(start, offset),
@@ -111,6 +121,44 @@ impl<'a> CloudView<'a> {
             Some(Datatype::Uint8) => self.read(start, offset, |b| u8::from_be_bytes(b).into()),
             Some(Datatype::Int8) => self.read(start, offset, |b| i8::from_be_bytes(b).into()),
             None => f64::NAN,
+        }
+    }
+
+    /// The first four bytes of `field` of point `i` as they are, as colours are packed into a float;
+    /// none if they are not there or belong to another field.
+    #[inline]
+    pub fn packed(&self, field: &PointField, i: usize) -> Option<u32> {
+        let width = Datatype::from_code(field.datatype)?.bytes();
+        let start = self.point_start(i).saturating_add(field.offset as usize);
+        let bytes = self.data.get(start..)?.first_chunk::<4>()?;
+        (width == 4).then(|| match self.big_endian {
+            true => u32::from_be_bytes(*bytes),
+            false => u32::from_le_bytes(*bytes),
+        })
+    }
+
+    /// Appends all elements of `field` of point `i`, little endian; zeros if there is no such
+    /// point, nothing if there is no such field.
+    pub fn copy_field(&self, field: &PointField, i: usize, out: &mut Vec<u8>) {
+        let Some(width) = Datatype::from_code(field.datatype).map(Datatype::bytes) else {
+            return;
+        };
+        let width = width as usize;
+        let bytes = (field.count as usize).saturating_mul(width);
+        if bytes > self.point_step {
+            return;
+        }
+        let start = self.point_start(i).saturating_add(field.offset as usize);
+        let there = self.data.get(start..start.saturating_add(bytes));
+        let first = out.len();
+        match there {
+            Some(elements) => out.extend_from_slice(elements),
+            None => out.resize(first + bytes, 0),
+        }
+        if self.big_endian
+            && let Some(new) = out.get_mut(first..)
+        {
+            new.chunks_exact_mut(width).for_each(<[u8]>::reverse);
         }
     }
 

@@ -1,6 +1,6 @@
 //! PointCloud2 and the core's clouds.
 
-use lattice_core::cloud::{Cloud, CloudError, CloudLayout, CloudLimits, PointField};
+use lattice_core::cloud::{Cloud, CloudError, CloudLayout, CloudLimits, Datatype, PointField};
 use lattice_msgs::sensor_msgs::{self, PointCloud2};
 use lattice_msgs::std_msgs::Header;
 use nalgebra::Vector3;
@@ -54,26 +54,45 @@ pub fn message_from_points(
     points_m: &[Vector3<f64>],
     precision: Precision,
 ) -> PointCloud2 {
+    message_with_fields(header, points_m, precision, &[], |_, _| {})
+}
+
+/// The same with further fields, of which `append` writes those of point `i`, little endian and one
+/// behind the other. Their offsets are set here.
+pub fn message_with_fields(
+    header: Header,
+    points_m: &[Vector3<f64>],
+    precision: Precision,
+    further: &[PointField],
+    mut append: impl FnMut(usize, &mut Vec<u8>),
+) -> PointCloud2 {
     let (size, datatype) = match precision {
         Precision::Float32 => (4_u32, sensor_msgs::PointField::FLOAT32),
         Precision::Float64 => (8, sensor_msgs::PointField::FLOAT64),
     };
-    let mut data = Vec::with_capacity(points_m.len() * 3 * size as usize);
-    for p in points_m {
+    let mut fields = xyz_fields(datatype, size);
+    let mut point_step = 3 * size;
+    for field in further {
+        let width = Datatype::from_code(field.datatype).map_or(0, Datatype::bytes);
+        fields.push(sensor_msgs::PointField {
+            name: field.name.clone(),
+            offset: point_step,
+            datatype: field.datatype,
+            count: field.count,
+        });
+        point_step = point_step.saturating_add(field.count.saturating_mul(width));
+    }
+    let mut data = Vec::with_capacity(points_m.len() * point_step as usize);
+    for (i, p) in points_m.iter().enumerate() {
         for v in [p.x, p.y, p.z] {
             match precision {
                 Precision::Float32 => data.extend_from_slice(&(v as f32).to_le_bytes()),
                 Precision::Float64 => data.extend_from_slice(&v.to_le_bytes()),
             }
         }
+        append(i, &mut data);
     }
-    dense_cloud(
-        header,
-        xyz_fields(datatype, size),
-        3 * size,
-        points_m.len(),
-        data,
-    )
+    dense_cloud(header, fields, point_step, points_m.len(), data)
 }
 
 /// An unordered cloud of `points` rows of `point_step` bytes, little endian.

@@ -1,6 +1,7 @@
 //! Voxel lists as `LatticeMap` keyframes and `LatticeMapUpdate` deltas of bounded size.
 
 use lattice_core::lattice::{Key, Lattice, LatticeKind};
+use lattice_core::registration::UNLABELED;
 use lattice_core::voxels::codec;
 use lattice_core::voxels::{Voxel, VoxelList};
 use lattice_msgs::geographic_msgs::GeoPoint;
@@ -19,6 +20,8 @@ pub const KEY_ENCODING: &str = "morton21_delta_leb128";
 const CHUNK_OVERHEAD_BYTES: usize = 1024;
 /// Count and mean offset of one voxel.
 const PAYLOAD_BYTES: usize = 4 + 3 * 2;
+/// Label and label count of one voxel.
+const LABEL_BYTES: usize = 2 + 4;
 /// What a generator, a cell volume and a quaternion may be off, relative to their size.
 const TOLERANCE: f64 = 1e-9;
 
@@ -87,6 +90,10 @@ pub struct VoxelState {
     pub count: u32,
     /// Mean of the points from the cell centre, in units of the message.
     pub mean_offset: [i16; 3],
+    /// Most frequent label; [`UNLABELED`] if there is none.
+    pub label: u16,
+    /// Points with that label.
+    pub label_count: u32,
 }
 
 /// The lattice, its place in the map frame and the epoch, as a message: the generator in the
@@ -155,13 +162,14 @@ pub fn keyframe(list: &VoxelList, stamp: &MapStamp) -> Vec<LatticeMap> {
     let info = info_of(list, stamp.epoch, stamp.origin);
     let unit_m = offset_unit_m(list.lattice());
     let keys: Vec<Key> = voxels.iter().map(|(key, _)| *key).collect();
-    let parts = split(&keys, PAYLOAD_BYTES, stamp.chunk_bytes);
+    let parts = split(&keys, payload_bytes(list), stamp.chunk_bytes);
     let chunks = parts.len() as u32;
     let mut rest = voxels.as_slice();
     let mut out = Vec::with_capacity(parts.len());
     for (chunk, keys) in (0..).zip(parts) {
         let (voxels, tail) = rest.split_at(keys.len().min(rest.len()));
         rest = tail;
+        let (labels, label_counts) = labels_of(list, keys);
         out.push(LatticeMap {
             header: stamp.header.clone(),
             info: info.clone(),
@@ -175,7 +183,8 @@ pub fn keyframe(list: &VoxelList, stamp: &MapStamp) -> Vec<LatticeMap> {
             counts: voxels.iter().map(|(_, voxel)| voxel.count).collect(),
             offset_unit_m: unit_m,
             mean_offsets: mean_offsets(voxels.iter().map(|(_, voxel)| voxel), unit_m),
-            ..LatticeMap::default()
+            labels,
+            label_counts,
         });
     }
     out
@@ -202,7 +211,8 @@ pub fn update(
     };
     let mut out = Vec::new();
     if !changed.is_empty() {
-        for keys in split(changed, PAYLOAD_BYTES, stamp.chunk_bytes) {
+        for keys in split(changed, payload_bytes(list), stamp.chunk_bytes) {
+            let (labels, label_counts) = labels_of(list, keys);
             let voxels: Vec<Voxel> = keys
                 .iter()
                 .map(|key| list.get(*key).unwrap_or_default())
@@ -212,6 +222,8 @@ pub fn update(
                 keys: ByteBuf::from(codec::encode_keys(keys)),
                 counts: voxels.iter().map(|voxel| voxel.count).collect(),
                 mean_offsets: mean_offsets(voxels.iter(), unit_m),
+                labels,
+                label_counts,
                 ..template.clone()
             });
         }
@@ -233,15 +245,55 @@ pub fn update(
     out
 }
 
+/// The columns of the voxels of a message, empty where not kept.
+#[derive(Clone, Copy, Debug)]
+pub struct VoxelColumns<'a> {
+    /// How the keys are written.
+    pub key_encoding: &'a str,
+    /// Keys.
+    pub keys: &'a [u8],
+    /// Points.
+    pub counts: &'a [u32],
+    /// Three mean offsets each.
+    pub mean_offsets: &'a [i16],
+    /// Most frequent labels.
+    pub labels: &'a [u16],
+    /// Points with them.
+    pub label_counts: &'a [u32],
+}
+
+impl<'a> From<&'a LatticeMap> for VoxelColumns<'a> {
+    fn from(message: &'a LatticeMap) -> Self {
+        Self {
+            key_encoding: &message.key_encoding,
+            keys: &message.keys,
+            counts: &message.counts,
+            mean_offsets: &message.mean_offsets,
+            labels: &message.labels,
+            label_counts: &message.label_counts,
+        }
+    }
+}
+
+impl<'a> From<&'a LatticeMapUpdate> for VoxelColumns<'a> {
+    fn from(message: &'a LatticeMapUpdate) -> Self {
+        Self {
+            key_encoding: &message.key_encoding,
+            keys: &message.keys,
+            counts: &message.counts,
+            mean_offsets: &message.mean_offsets,
+            labels: &message.labels,
+            label_counts: &message.label_counts,
+        }
+    }
+}
+
 /// Voxels of a keyframe chunk or of the changed part of an update.
 pub fn voxels_from(
-    key_encoding: &str,
-    keys: &[u8],
-    counts: &[u32],
-    offsets: &[i16],
+    columns: VoxelColumns,
     max_voxels: usize,
 ) -> Result<Vec<(Key, VoxelState)>, MapMessageError> {
-    let keys = keys_from(key_encoding, keys, max_voxels)?;
+    let keys = keys_from(columns.key_encoding, columns.keys, max_voxels)?;
     let check = |column, expected, found| {
         if expected == found {
             Ok(())
@@ -254,18 +306,29 @@ pub fn voxels_from(
             })
         }
     };
-    check("counts", keys.len(), counts.len())?;
-    check("mean_offsets", keys.len() * 3, offsets.len())?;
+    check("counts", keys.len(), columns.counts.len())?;
+    check("mean_offsets", keys.len() * 3, columns.mean_offsets.len())?;
+    let labelled = !(columns.labels.is_empty() && columns.label_counts.is_empty());
+    if labelled {
+        check("labels", keys.len(), columns.labels.len())?;
+        check("label_counts", keys.len(), columns.label_counts.len())?;
+    }
+    let labels = columns.labels.iter().zip(columns.label_counts);
+    let labels = labels.map(|(label, count)| (*label, *count));
+    let labels = labels.chain(std::iter::repeat((UNLABELED, 0)));
     Ok(keys
         .into_iter()
-        .zip(counts)
-        .zip(offsets.chunks_exact(3))
-        .map(|((key, count), offset)| {
+        .zip(columns.counts)
+        .zip(columns.mean_offsets.chunks_exact(3))
+        .zip(labels)
+        .map(|(((key, count), offset), (label, label_count))| {
             let mut mean_offset = [0; 3];
             mean_offset.copy_from_slice(offset);
             let state = VoxelState {
                 count: *count,
                 mean_offset,
+                label,
+                label_count,
             };
             (key, state)
         })
@@ -296,6 +359,36 @@ fn mean_offsets<'a>(voxels: impl Iterator<Item = &'a Voxel>, unit_m: f64) -> Vec
         .flat_map(Voxel::mean_offset_m)
         .map(|offset_m| (offset_m / unit_m).round() as i16)
         .collect()
+}
+
+/// Bytes of a voxel besides its key.
+fn payload_bytes(list: &VoxelList) -> usize {
+    PAYLOAD_BYTES
+        + if list.payload().labels {
+            LABEL_BYTES
+        } else {
+            0
+        }
+}
+
+/// The columns `labels` and `label_counts`, empty if labels are not kept.
+fn labels_of(list: &VoxelList, keys: &[Key]) -> (Vec<u16>, Vec<u32>) {
+    if !list.payload().labels {
+        return (Vec::new(), Vec::new());
+    }
+    let labels = keys.iter().map(|key| main_label(list, *key));
+    labels.unzip()
+}
+
+/// The most frequent label of a cell, the smallest of equals, with its points; [`UNLABELED`] and 0 if
+/// no point of it has one.
+pub fn main_label(list: &VoxelList, key: Key) -> (u16, u32) {
+    let labels = list
+        .labels(key)
+        .into_iter()
+        .filter(|l| l.label != UNLABELED);
+    let main = labels.min_by_key(|counted| (std::cmp::Reverse(counted.count), counted.label));
+    main.map_or((UNLABELED, 0), |counted| (counted.label, counted.count))
 }
 
 /// Cuts sorted keys so that each part fits `chunk_bytes`; at least one part, of at least one key.

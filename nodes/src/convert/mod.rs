@@ -1,5 +1,7 @@
 //! Between messages and the core, without logic.
 
+pub mod calibration;
 pub mod cloud;
 pub mod geometry;
 pub mod map;
+pub mod semantic;

@@ -389,10 +389,22 @@ impl EnuTransformer {
         let mut header = message.header.clone();
         header.stamp = Time::from_ns(waiting.stamp_ns);
         header.frame_id.clone_from(&self.options.map_frame);
-        Ok(cloud::message_from_points(
+        let passed = self.options.pass_fields.iter();
+        let passed = passed.filter_map(|name| view.fields().iter().find(|f| f.name == *name));
+        let passed: Vec<_> = passed.cloned().collect();
+        let mut left_out = moved.left_out.iter().copied().peekable();
+        let mut kept = (0..view.len()).filter(|i| left_out.next_if_eq(i).is_none());
+        Ok(cloud::message_with_fields(
             header,
             &moved.points_m,
             self.options.precision,
+            &passed,
+            |_, data| {
+                let i = kept.next().unwrap_or(view.len());
+                passed
+                    .iter()
+                    .for_each(|field| view.copy_field(field, i, data));
+            },
         ))
     }
 

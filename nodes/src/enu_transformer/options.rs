@@ -45,7 +45,15 @@ pub struct TransformerOptions {
     pub max_waiting_bytes: usize,
     /// How coordinates are written.
     pub precision: Precision,
+    /// Fields of the clouds that `points_enu` keeps, where they have them.
+    pub pass_fields: Vec<String>,
 }
+
+/// More than any cloud has that a map needs.
+const MAX_PASS_FIELDS: usize = 64;
+
+/// Labels, and what they are worth.
+const LABEL_FIELDS: [&str; 3] = ["label", "confidence", "label_probs"];
 
 impl TransformerOptions {
     /// Defaults for a source: `map`, `base_link`, no range limits.
@@ -77,6 +85,7 @@ impl TransformerOptions {
             max_waiting_clouds: 512,
             max_waiting_bytes: 256 << 20,
             precision: Precision::Float32,
+            pass_fields: LABEL_FIELDS.map(str::to_owned).into(),
         }
     }
 
@@ -110,6 +119,15 @@ impl TransformerOptions {
             "float64" => Ok(Precision::Float64),
             _ => Err(format!("'{text}', expected float32 or float64")),
         })?;
+        options.pass_fields = params.string_array("pass_fields", &LABEL_FIELDS)?;
+        if options.pass_fields.len() > MAX_PASS_FIELDS {
+            let problem = format!("expected at most {MAX_PASS_FIELDS} names");
+            return Err(params.invalid("pass_fields", problem));
+        }
+        let mut names = std::collections::BTreeSet::from(["x", "y", "z"]);
+        if !options.pass_fields.iter().all(|name| names.insert(name)) {
+            return Err(params.invalid("pass_fields", "expected each name once, and not x, y, z"));
+        }
         Ok(options)
     }
 }

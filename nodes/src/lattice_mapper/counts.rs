@@ -12,6 +12,9 @@ pub struct MapperCounts {
     pub clouds_wrong_frame: u64,
     /// Clouds refused: the bytes are not what the header says.
     pub clouds_malformed: u64,
+    /// Clouds taken without labels, where those are kept.
+    #[serde(default)]
+    pub clouds_unlabelled: u64,
     /// Points of the clouds that were taken.
     pub points_in: u64,
     /// Points in the map.

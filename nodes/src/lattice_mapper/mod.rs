@@ -21,7 +21,7 @@ use lattice_msgs::sensor_msgs::{PointCloud2, PointField};
 use std::sync::{Arc, OnceLock};
 use thiserror::Error;
 
-use crate::convert::{cloud, geometry, map};
+use crate::convert::{cloud, geometry, map, semantic};
 
 /// Why a cloud was not mapped. The map is as it was before.
 #[derive(Debug, Error)]
@@ -99,7 +99,16 @@ impl LatticeMapper {
         };
         let cloud = cloud::cloud_from_message(message, &limits, &self.list.datum_m())
             .inspect_err(|_| self.counts.clouds_malformed += 1)?;
-        let report = self.list.insert(&cloud);
+        let report = match &self.options.labels {
+            None => self.list.insert(&cloud),
+            Some(options) => {
+                let most = self.options.max_cloud_points;
+                let labels = semantic::labels_from_message(message, most, options)?;
+                self.counts.clouds_unlabelled += u64::from(labels.is_none());
+                self.list
+                    .insert_labelled(&cloud, &labels.unwrap_or_default())
+            }
+        };
         self.counts.add(&report);
         self.last_stamp_ns = cloud.stamp_ns;
         self.forget_old();
@@ -166,24 +175,36 @@ impl LatticeMapper {
         map::keyframe(&self.list, &self.stamp())
     }
 
-    /// Cell centres in the map frame, with the number of points as `intensity`.
+    /// Cell centres in the map frame, with the number of points as `intensity` and, where labels are
+    /// kept, the most frequent one as `label`.
     pub fn centers(&self) -> PointCloud2 {
         let voxels = self.list.sorted();
+        let mut further = vec![("intensity", PointField::FLOAT32)];
+        let labelled = self.list.payload().labels;
+        if labelled {
+            further.push(("label", PointField::UINT16));
+        }
         let mut fields = cloud::xyz_fields(PointField::FLOAT32, 4);
-        fields.push(PointField {
-            name: "intensity".into(),
-            offset: 12,
-            datatype: PointField::FLOAT32,
+        fields.extend((3..).zip(further).map(|(i, (name, datatype))| PointField {
+            name: name.to_owned(),
+            offset: 4 * i,
+            datatype,
             count: 1,
-        });
-        let mut data = Vec::with_capacity(voxels.len() * 16);
+        }));
+        let point_step = 4 * fields.len() as u32;
+        let mut data = Vec::with_capacity(voxels.len() * point_step as usize);
         for (key, voxel) in &voxels {
             let center = self.list.center_m(*key);
             for v in [center.x, center.y, center.z, f64::from(voxel.count)] {
                 data.extend_from_slice(&(v as f32).to_le_bytes());
             }
+            if labelled {
+                let (label, _) = map::main_label(&self.list, *key);
+                // Padded to four bytes.
+                data.extend_from_slice(&u32::from(label).to_le_bytes());
+            }
         }
-        cloud::dense_cloud(self.header(), fields, 16, voxels.len(), data)
+        cloud::dense_cloud(self.header(), fields, point_step, voxels.len(), data)
     }
 
     /// Mean squared error per dimension, mean distance and RMS of all points so far.

@@ -4,6 +4,7 @@ use lattice_core::lattice::{Lattice, LatticeKind, Orientation};
 use lattice_core::voxels::{Payload, VoxelList, WhenFull};
 use nalgebra::Vector3;
 
+use crate::convert::semantic::LabelOptions;
 use crate::runtime::params::{ParamError, Params};
 
 /// Everything that a [`super::LatticeMapper`] can be told.
@@ -25,6 +26,8 @@ pub struct MapperOptions {
     pub forget_after_ns: i64,
     /// Most points of one cloud.
     pub max_cloud_points: usize,
+    /// How labels of the points are read and counted in each voxel; none: they are not.
+    pub labels: Option<LabelOptions>,
     /// Largest serialised message of `map` and `map_updates`.
     pub chunk_bytes: usize,
 }
@@ -41,6 +44,7 @@ impl MapperOptions {
             when_full: WhenFull::Refuse,
             forget_after_ns: 0,
             max_cloud_points: 4_000_000,
+            labels: None,
             chunk_bytes: 60_000,
         }
     }
@@ -69,6 +73,7 @@ impl MapperOptions {
             when_full: when_full(params)?,
             forget_after_ns: forget_after_ns(params)?,
             max_cloud_points: params.usize("max_cloud_points", defaults.max_cloud_points)?,
+            labels: Self::labels_from(params)?,
             chunk_bytes: params.usize("chunk_bytes", defaults.chunk_bytes)?,
             ..defaults
         };
@@ -77,6 +82,11 @@ impl MapperOptions {
             return Err(params.invalid("max_map_bytes", problem));
         }
         Ok(options)
+    }
+
+    fn labels_from(params: &Params) -> Result<Option<LabelOptions>, ParamError> {
+        let options = LabelOptions::from_params(params)?;
+        Ok(params.bool("keep_labels", false)?.then_some(options))
     }
 
     /// How the parameters want the lattice to lie in the map, whichever lattice it is.
@@ -90,6 +100,7 @@ impl MapperOptions {
     pub(super) fn payload(&self) -> Payload {
         Payload {
             stamps: self.forget_after_ns > 0,
+            labels: self.labels.is_some(),
             ..Payload::default()
         }
     }

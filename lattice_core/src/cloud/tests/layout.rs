@@ -279,3 +279,46 @@ fn foreign_names_are_cut_in_errors() {
     );
     assert!(error.to_string().len() < 200, "{error}");
 }
+
+#[test]
+fn fields_of_several_elements_come_in_either_byte_order() {
+    let mut row = vec![0_u8; 12];
+    let big = [0x0102_u16, 0x0304, 0x0506].map(u16::to_be_bytes).concat();
+    row.extend_from_slice(&big);
+    row.extend_from_slice(&0x7f80_1020_u32.to_be_bytes());
+    let mut probabilities = field("p", 12, 4);
+    probabilities.count = 3;
+    let color = field("rgb", 18, F32);
+    let layout = CloudLayout {
+        width: 1,
+        height: 1,
+        point_step: 22,
+        row_step: 22,
+        is_bigendian: true,
+        fields: vec![
+            field("x", 0, F32),
+            field("y", 4, F32),
+            field("z", 8, F32),
+            probabilities.clone(),
+            color.clone(),
+        ],
+    };
+    let view = layout.view(&row, &CloudLimits::default()).unwrap();
+    let elements = [0, 1, 2].map(|n| view.element(&probabilities, 0, n));
+    assert_eq!(elements, [258.0, 772.0, 1286.0]);
+    assert!(view.element(&probabilities, 0, 3).is_nan());
+    assert!(view.element(&probabilities, 1, 0).is_nan());
+    // A packed colour is no number: as a float this one is not even finite.
+    assert_eq!(view.packed(&color, 0), Some(0x7f80_1020));
+    assert_eq!(view.packed(&color, 1), None);
+    assert_eq!(view.packed(&probabilities, 0), None);
+
+    let mut copied = vec![9];
+    view.copy_field(&probabilities, 0, &mut copied);
+    view.copy_field(&probabilities, 1, &mut copied);
+    let little = [0x0102_u16, 0x0304, 0x0506].map(u16::to_le_bytes).concat();
+    assert_eq!(copied, [&[9], &little[..], &[0; 6]].concat());
+    probabilities.count = u32::MAX;
+    view.copy_field(&probabilities, 0, &mut copied);
+    assert_eq!(copied.len(), 13, "a field of another cloud");
+}

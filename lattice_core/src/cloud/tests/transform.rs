@@ -107,6 +107,7 @@ fn what_is_kept_out_is_counted_and_needs_no_pose() {
             not_finite: 2,
             out_of_range: 3,
             no_time: 1,
+            left_out: (0..6).collect(),
         }
     );
     // Times that are too few are no times.

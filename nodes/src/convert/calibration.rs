@@ -1,0 +1,101 @@
+//! What a calibration found, as a message.
+
+use lattice_core::registration::{Calibration, DirectionKind, Verdict};
+use lattice_msgs::calibration::{CalibrationResult, ClassReliability, WeakDirection};
+use lattice_msgs::geometry_msgs::Vector3;
+use nalgebra::{Isometry3, Matrix6};
+
+use super::geometry::transform_stamped;
+
+/// A verdict as the message has it.
+pub fn verdict_code(verdict: Verdict) -> u8 {
+    match verdict {
+        Verdict::Ok => CalibrationResult::OK,
+        Verdict::Ambiguous => CalibrationResult::AMBIGUOUS,
+        Verdict::Degenerate => CalibrationResult::DEGENERATE,
+        Verdict::NoOverlap => CalibrationResult::NO_OVERLAP,
+        Verdict::RejectedInput => CalibrationResult::REJECTED_INPUT,
+    }
+}
+
+/// All that is known of a calibration itself; header, frames and counts are the caller's.
+pub fn result_from(found: &Calibration) -> CalibrationResult {
+    let weak = found.weak_directions.iter();
+    let reliability = found.class_reliability.iter();
+    let mut result = CalibrationResult {
+        verdict: match found.cancelled {
+            true => CalibrationResult::NONE,
+            false => verdict_code(found.verdict),
+        },
+        reason: found.reason.clone(),
+        log_margin: found.log_margin,
+        inlier_fraction: found.inlier_fraction,
+        rmse_m: found.rmse_m,
+        weak_directions: weak
+            .map(|weak| WeakDirection {
+                axis: Vector3 {
+                    x: weak.axis.x,
+                    y: weak.axis.y,
+                    z: weak.axis.z,
+                },
+                kind: match weak.kind {
+                    DirectionKind::Translation => WeakDirection::TRANSLATION,
+                    DirectionKind::Rotation => WeakDirection::ROTATION,
+                },
+                sigma: weak.sigma,
+            })
+            .collect(),
+        class_reliability: reliability
+            .map(|class| ClassReliability {
+                class_id: class.source_class,
+                agreement: class.agreement,
+                weight: class.weight,
+            })
+            .collect(),
+        method: found.method.to_owned(),
+        ..CalibrationResult::default()
+    };
+    set_pose(&mut result, &found.map_from_headset, &found.covariance);
+    result
+}
+
+/// Puts a pose and its covariance into a result.
+pub fn set_pose(
+    result: &mut CalibrationResult,
+    map_from_headset: &Isometry3<f64>,
+    covariance: &Matrix6<f64>,
+) {
+    result.transform = transform_stamped("", "", 0, map_from_headset).transform;
+    // Symmetric, so that rows and columns are the same.
+    result.covariance.copy_from_slice(covariance.as_slice());
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::convert::geometry::isometry_from_transform;
+    use nalgebra::Vector3 as V;
+
+    #[test]
+    fn everything_that_was_found_is_told() {
+        let mut found = Calibration::refused(Verdict::Degenerate, "slides");
+        found.map_from_headset = Isometry3::new(V::new(1.0, 2.0, 3.0), V::new(0.1, 0.2, 0.3));
+        found.covariance[(0, 5)] = 0.5;
+        found.covariance[(5, 0)] = 0.5;
+        found.weak_directions = vec![lattice_core::registration::WeakDirection {
+            axis: V::new(0.0, 0.6, 0.8),
+            kind: DirectionKind::Rotation,
+            sigma: 0.25,
+        }];
+        let result = result_from(&found);
+        assert_eq!(result.verdict, CalibrationResult::DEGENERATE);
+        assert_eq!((&*result.reason, &*result.method), ("slides", "none"));
+        let pose = isometry_from_transform(&result.transform).unwrap();
+        assert!((pose.to_homogeneous() - found.map_from_headset.to_homogeneous()).norm() < 1e-12);
+        assert_eq!((result.covariance[5], result.covariance[30]), (0.5, 0.5));
+        assert_eq!(result.weak_directions[0].kind, WeakDirection::ROTATION);
+        assert_eq!(result.weak_directions[0].axis.z, 0.8);
+        found.cancelled = true;
+        assert_eq!(result_from(&found).verdict, CalibrationResult::NONE);
+    }
+}

@@ -1,0 +1,151 @@
+//! PointCloud2 with labels and the core's [`SemanticCloud`].
+//!
+//! There is no standard for labels in a cloud; [`LabelReader`] knows the fields that are in use.
+
+mod fields;
+mod options;
+mod write;
+
+pub use fields::LabelReader;
+pub use options::{Color, LabelOptions, SemanticOptions};
+pub use write::{color_of, message_from_semantic};
+
+use lattice_core::cloud::{CloudError, CloudLimits};
+use lattice_core::registration::{LabelDistribution, SemanticCloud};
+use lattice_msgs::sensor_msgs::PointCloud2;
+use thiserror::Error;
+
+use super::cloud;
+
+/// Why a cloud cannot be used.
+#[derive(Debug, Error)]
+pub enum SemanticError {
+    /// The bytes are not what the header says, or there are too many points.
+    #[error(transparent)]
+    Cloud(#[from] CloudError),
+    /// Nothing in it.
+    #[error("the cloud has no points")]
+    Empty,
+    /// Nothing that is a place.
+    #[error(
+        "none of the {points} points is finite and within {max_range_m} m of the origin of the headset"
+    )]
+    NoPlace {
+        /// Points of the cloud.
+        points: usize,
+        /// The limit.
+        max_range_m: f64,
+    },
+    /// No field of a known form.
+    #[error(
+        "the cloud has no labels: there is no field label, label_probs, p_0, semantic_color or \
+         semantic_color1 among {found} (colours need `palette_rgb_class`)"
+    )]
+    NoLabels {
+        /// Names of its fields.
+        found: String,
+    },
+    /// A field, but nothing in it.
+    #[error("none of the {points} points has a label of a known class")]
+    AllUnlabelled {
+        /// Points of the cloud.
+        points: usize,
+    },
+}
+
+/// What was left out of a cloud.
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
+pub struct SemanticReport {
+    /// Points of the message.
+    pub points: usize,
+    /// Left out: NaN or infinite.
+    pub not_finite: usize,
+    /// Left out: farther from the origin than the limit.
+    pub too_far: usize,
+    /// Kept, but of no known class.
+    pub unlabelled: usize,
+}
+
+/// Reads a cloud and brings it to the axes of ROS.
+///
+/// Without labels in the message the cloud has none, unless they are required.
+pub fn semantic_from_message(
+    message: &PointCloud2,
+    options: &SemanticOptions,
+) -> Result<(SemanticCloud, SemanticReport), SemanticError> {
+    let layout = cloud::layout_of(message);
+    let limits = CloudLimits {
+        max_points: options.max_points,
+    };
+    let view = layout.view(&message.data, &limits)?;
+    let mut report = SemanticReport {
+        points: view.len(),
+        ..SemanticReport::default()
+    };
+    if view.is_empty() {
+        return Err(SemanticError::Empty);
+    }
+    let reader = LabelReader::find(view.fields(), &options.labels);
+    if reader.is_none() && options.require_labels {
+        let names = view.fields().iter().take(24);
+        let names: Vec<String> = names.map(|f| f.name.chars().take(32).collect()).collect();
+        return Err(SemanticError::NoLabels {
+            found: names.join(", "),
+        });
+    }
+    let mut semantic = SemanticCloud::default();
+    semantic.points_m.reserve(view.len());
+    for i in 0..view.len() {
+        let p = view.xyz(i);
+        let distance_m = p.norm();
+        if !distance_m.is_finite() {
+            report.not_finite += 1;
+        } else if distance_m > options.max_range_m {
+            report.too_far += 1;
+        } else {
+            semantic.points_m.push(options.axes.to_ros(p).into());
+            if let Some(reader) = &reader {
+                let label = reader.read(&view, i);
+                report.unlabelled += usize::from(label == LabelDistribution::UNKNOWN);
+                semantic.labels.push(label);
+            }
+        }
+    }
+    if semantic.is_empty() {
+        return Err(SemanticError::NoPlace {
+            points: report.points,
+            max_range_m: options.max_range_m,
+        });
+    }
+    if reader.is_none() || report.unlabelled == semantic.len() {
+        if options.require_labels {
+            return Err(SemanticError::AllUnlabelled {
+                points: semantic.len(),
+            });
+        }
+        report.unlabelled = semantic.len();
+        semantic.labels.clear();
+    }
+    Ok((semantic, report))
+}
+
+/// The most probable class of each point of a message, in its order, NaN points included; `None` if
+/// it has no labels.
+pub fn labels_from_message(
+    message: &PointCloud2,
+    max_points: usize,
+    options: &LabelOptions,
+) -> Result<Option<Vec<u16>>, CloudError> {
+    use lattice_core::registration::UNLABELED;
+
+    let layout = cloud::layout_of(message);
+    let view = layout.view(&message.data, &CloudLimits { max_points })?;
+    let Some(reader) = LabelReader::find(view.fields(), options) else {
+        return Ok(None);
+    };
+    let labels = (0..view.len()).map(|i| reader.read(&view, i).top().unwrap_or(UNLABELED));
+    Ok(Some(labels.collect()))
+}
+
+#[cfg(test)]
+mod tests;

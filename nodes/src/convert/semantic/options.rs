@@ -1,0 +1,112 @@
+//! How labels are read.
+
+use std::collections::{BTreeMap, BTreeSet};
+
+use lattice_core::pose::Axes;
+
+use crate::runtime::params::{ParamError, Params};
+
+/// Red, green and blue.
+pub type Color = [u8; 3];
+
+/// What labels and colours mean.
+#[derive(Clone, Debug, PartialEq)]
+pub struct LabelOptions {
+    /// Whether only the low 16 bits of a label of 32 bits are the class (SemanticKITTI, where the
+    /// others are the instance).
+    pub low_16_bits: bool,
+    /// Classes that say nothing, as the 0 of SemanticKITTI.
+    pub ignored: BTreeSet<u16>,
+    /// Class of a colour, for clouds whose labels are colours.
+    pub palette: BTreeMap<Color, u16>,
+}
+
+impl Default for LabelOptions {
+    fn default() -> Self {
+        Self {
+            low_16_bits: true,
+            ignored: BTreeSet::new(),
+            palette: BTreeMap::new(),
+        }
+    }
+}
+
+impl LabelOptions {
+    /// Reads `label_low_16_bits`, `ignored_labels` and `palette_rgb_class`.
+    pub fn from_params(params: &Params) -> Result<Self, ParamError> {
+        let defaults = Self::default();
+        let ignored = params.i64_array("ignored_labels", &[])?;
+        let ignored: Result<_, _> = ignored.into_iter().map(u16::try_from).collect();
+        let palette = params.i64_array("palette_rgb_class", &[])?;
+        Ok(Self {
+            low_16_bits: params.bool("label_low_16_bits", defaults.low_16_bits)?,
+            ignored: ignored.map_err(|_| {
+                params.invalid("ignored_labels", "expected numbers from 0 to 65535")
+            })?,
+            palette: palette_from(&palette).ok_or_else(|| {
+                let problem = "expected four numbers for each class: red, green, blue from 0 to \
+                               255 and the class from 0 to 65534";
+                params.invalid("palette_rgb_class", problem)
+            })?,
+        })
+    }
+}
+
+fn palette_from(numbers: &[i64]) -> Option<BTreeMap<Color, u16>> {
+    let (entries, rest) = numbers.as_chunks::<4>();
+    let entries = entries.iter().map(|&[r, g, b, class]| {
+        let byte = |v: i64| u8::try_from(v).ok();
+        let class = u16::try_from(class).ok().filter(|class| *class < u16::MAX);
+        Some(([byte(r)?, byte(g)?, byte(b)?], class?))
+    });
+    rest.is_empty().then(|| entries.collect()).flatten()
+}
+
+/// How the cloud of a headset is read.
+#[derive(Clone, Debug, PartialEq)]
+pub struct SemanticOptions {
+    /// Most points of one cloud.
+    pub max_points: usize,
+    /// Points farther from the origin are left out, m.
+    pub max_range_m: f64,
+    /// Axes of the sender.
+    pub axes: Axes,
+    /// Whether clouds without labels are refused.
+    pub require_labels: bool,
+    /// What labels mean.
+    pub labels: LabelOptions,
+}
+
+impl Default for SemanticOptions {
+    fn default() -> Self {
+        Self {
+            max_points: 500_000,
+            max_range_m: 200.0,
+            axes: Axes::RosFlu,
+            require_labels: false,
+            labels: LabelOptions::default(),
+        }
+    }
+}
+
+impl SemanticOptions {
+    /// Reads `max_cloud_points`, `max_range_m`, `headset_axes`, `require_labels` and what
+    /// [`LabelOptions`] has.
+    pub fn from_params(params: &Params) -> Result<Self, ParamError> {
+        let defaults = Self::default();
+        let axes = params.string("headset_axes", defaults.axes.name())?;
+        let max_range_m = params.f64("max_range_m", defaults.max_range_m)?;
+        if !(max_range_m > 0.0 && max_range_m.is_finite()) {
+            return Err(params.invalid("max_range_m", "expected a number above 0"));
+        }
+        Ok(Self {
+            max_points: params.usize("max_cloud_points", defaults.max_points)?,
+            max_range_m,
+            axes: axes
+                .parse()
+                .map_err(|e| params.invalid("headset_axes", format!("{e}")))?,
+            require_labels: params.bool("require_labels", defaults.require_labels)?,
+            labels: LabelOptions::from_params(params)?,
+        })
+    }
+}

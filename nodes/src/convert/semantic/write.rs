@@ -1,0 +1,60 @@
+//! Clouds with labels as messages.
+
+use lattice_core::registration::{SemanticCloud, UNLABELED};
+use lattice_msgs::sensor_msgs::{PointCloud2, PointField};
+use lattice_msgs::std_msgs::Header;
+
+use super::Color;
+use crate::convert::cloud::{dense_cloud, xyz_fields};
+
+/// x, y, z, rgb, label, confidence.
+const POINT_STEP: u32 = 22;
+
+/// Points in the frame of `header` with the most probable class of each as `label` (uint16), its
+/// probability as `confidence`, and a colour of the class as `rgb`.
+pub fn message_from_semantic(header: Header, cloud: &SemanticCloud) -> PointCloud2 {
+    let mut fields = xyz_fields(PointField::FLOAT32, 4);
+    let further = [
+        ("rgb", 12, PointField::FLOAT32),
+        ("label", 16, PointField::UINT16),
+        ("confidence", 18, PointField::FLOAT32),
+    ];
+    fields.extend(further.map(|(name, offset, datatype)| PointField {
+        name: name.to_owned(),
+        offset,
+        datatype,
+        count: 1,
+    }));
+    let mut data = Vec::with_capacity(cloud.len() * POINT_STEP as usize);
+    for (i, point) in cloud.points_m.iter().enumerate() {
+        let label = cloud.label(i).iter().next();
+        let (class, confidence) = label.unwrap_or((UNLABELED, 0.0));
+        let [r, g, b] = color_of(class);
+        for v in point.iter() {
+            data.extend_from_slice(&(*v as f32).to_le_bytes());
+        }
+        data.extend_from_slice(&[b, g, r, 0]);
+        data.extend_from_slice(&class.to_le_bytes());
+        data.extend_from_slice(&confidence.to_le_bytes());
+    }
+    dense_cloud(header, fields, POINT_STEP, cloud.len(), data)
+}
+
+/// A colour for a class, far from those of the classes next to it; grey for no class.
+///
+/// Bits of the number set the brightest bits of red, green and blue in turn, as the colour map of
+/// Pascal VOC does; class 0, black there, gets the colour of 256.
+pub fn color_of(class: u16) -> Color {
+    if class == UNLABELED {
+        return [128; 3];
+    }
+    let mut rest = if class == 0 { 256 } else { u32::from(class) };
+    let mut color = [0_u8; 3];
+    for bit in (0..8).rev() {
+        for channel in &mut color {
+            *channel |= ((rest & 1) as u8) << bit;
+            rest >>= 1;
+        }
+    }
+    color
+}
