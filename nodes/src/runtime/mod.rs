@@ -1,5 +1,6 @@
 //! What rcl does and ros2-client does not: arguments, names, parameters, and the transport.
 
+mod action;
 mod clock;
 mod core;
 mod dds;
@@ -31,6 +32,7 @@ mod tf;
 mod transport_status;
 pub(crate) mod worker;
 
+pub use action::{ActionLimits, ActionServer, Feedback, GoalHandle};
 pub use clock::Clock;
 pub use diagnostics::{Diagnostics, Level};
 pub use error::{PublishError, RuntimeError};

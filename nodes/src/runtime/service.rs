@@ -3,11 +3,13 @@
 use std::sync::Arc;
 use std::time::Duration;
 
+use futures::StreamExt;
+use futures::stream::FuturesUnordered;
 use lattice_msgs::std_srvs::{Trigger, TriggerRequest, TriggerResponse};
 use lattice_msgs::{RosMessage, RosService};
 use rustdds::GUID;
 use smol::channel::{Receiver, Sender, bounded};
-use smol::{Task, Timer};
+use smol::{Task, Timer, future};
 
 use super::core::Core;
 use super::dds::reader::{DdsReader, SampleOrigin};
@@ -19,7 +21,7 @@ use super::names;
 use super::node::Node;
 use super::peers::Peers;
 use super::qos::Qos;
-use super::service_wire::{read_request, write_reply};
+use super::service_wire::{ReplyTo, read_request, write_reply};
 
 /// Requests are short.
 const MAX_REQUEST_BYTES: usize = 4 << 20;
@@ -91,8 +93,20 @@ impl Node {
         name: &str,
         handler: impl FnMut(S::Request, Reply<S::Response>) + Send + 'static,
     ) -> Result<Server, RuntimeError> {
+        self.service_concurrent::<S>(name, 1, handler)
+    }
+
+    /// Serves `S` with answers that may take their time, up to `max_pending` of them at a time; further
+    /// requests wait.
+    pub fn service_concurrent<S: RosService + 'static>(
+        &self,
+        name: &str,
+        max_pending: usize,
+        handler: impl FnMut(S::Request, Reply<S::Response>) + Send + 'static,
+    ) -> Result<Server, RuntimeError> {
         let name = self.resolve_service(name)?;
-        self.core().serve::<S>(self.id(), &name, handler)
+        self.core()
+            .serve::<S>(self.id(), &name, max_pending, handler)
     }
 
     /// Serves `std_srvs/srv/Trigger`; the handler answers success and what came of it.
@@ -113,6 +127,7 @@ impl Core {
         &self,
         node: NodeId,
         name: &str,
+        max_pending: usize,
         handler: impl FnMut(S::Request, Reply<S::Response>) + Send + 'static,
     ) -> Result<Server, RuntimeError> {
         let clients = Arc::new(Peers::of_server(name));
@@ -150,6 +165,7 @@ impl Core {
             replies,
             readers,
             reader_joined,
+            max_pending: max_pending.max(1),
             warning: Throttle::new(WARNING_PERIOD),
         };
         let task =
@@ -173,36 +189,77 @@ struct Serving {
     replies: DdsWriter,
     readers: Arc<Peers>,
     reader_joined: Receiver<()>,
+    max_pending: usize,
     warning: Throttle,
+}
+
+/// A request that waits for its answer.
+struct Asked<R> {
+    answered: Receiver<R>,
+    reply_to: ReplyTo,
+    client: GUID,
+}
+
+/// What a server does next.
+enum Step {
+    Take(Result<SampleOrigin, String>),
+    Answered(Result<(), String>),
 }
 
 impl Serving {
     async fn run<S: RosService>(self, mut handler: impl FnMut(S::Request, Reply<S::Response>)) {
+        let mut pending = FuturesUnordered::new();
         loop {
-            let sample = self.requests.next().await;
-            if let Err(why) = self.answer::<S>(sample, &mut handler).await
+            let has_room = pending.len() < self.max_pending;
+            let take = async {
+                match has_room {
+                    true => Step::Take(self.requests.next().await),
+                    false => future::pending().await,
+                }
+            };
+            let answered = async {
+                match pending.next().await {
+                    Some(result) => Step::Answered(result),
+                    None => future::pending().await,
+                }
+            };
+            let outcome = match future::or(answered, take).await {
+                Step::Take(sample) => self
+                    .ask::<S>(sample, &mut handler)
+                    .map(|asked| pending.push(self.answer(asked))),
+                Step::Answered(result) => result,
+            };
+            if let Err(why) = outcome
                 && self.warning.check().is_some()
             {
                 log::warn!("{}: request not answered: {why}", self.name);
             }
-            smol::future::yield_now().await;
+            future::yield_now().await;
         }
     }
 
-    async fn answer<S: RosService>(
+    fn ask<S: RosService>(
         &self,
         sample: Result<SampleOrigin, String>,
         handler: &mut impl FnMut(S::Request, Reply<S::Response>),
-    ) -> Result<(), String> {
+    ) -> Result<Asked<S::Response>, String> {
         let origin = sample?;
         let (request, reply_to) = read_request::<S::Request>(&self.requests.bytes(), &origin)
             .map_err(|e| e.to_string())?;
         let (reply, answered) = Reply::channel();
         handler(request, reply);
-        let answer = answered.recv().await;
+        Ok(Asked {
+            answered,
+            reply_to,
+            client: origin.writer,
+        })
+    }
+
+    async fn answer<R: RosMessage>(&self, asked: Asked<R>) -> Result<(), String> {
+        let answer = asked.answered.recv().await;
         let reply = answer.map_err(|_| "nobody answered it".to_owned())?;
-        let (body, related) = write_reply(&reply, &reply_to).map_err(|e| e.to_string())?;
-        self.wait_for_reader(&origin.writer).await;
+        let (body, related) = write_reply(&reply, &asked.reply_to).map_err(|e| e.to_string())?;
+        self.wait_for_reader(&asked.client).await;
         self.replies
             .send_body(body, related)
             .map_err(|e| e.to_string())
@@ -217,6 +274,6 @@ impl Serving {
         let timeout = async {
             Timer::after(WAIT_FOR_CLIENT).await;
         };
-        smol::future::or(wait, timeout).await;
+        future::or(wait, timeout).await;
     }
 }
