@@ -130,9 +130,9 @@ impl WeakDirection {
 pub struct ClassReliability {
     /// As the headset numbers it.
     pub class_id: u16,
-    /// Share of the points of this class on the map that have the same label there, or its counterpart.
+    /// Share of its points on the map that have the same class there, 0 to 1.
     pub agreement: f64,
-    /// What a label of this class counted, 0: nothing.
+    /// How many points this was learned from, about.
     pub weight: f64,
 }
 
@@ -193,6 +193,6 @@ pub struct CalibrateResult {
 pub struct CalibrateFeedback {
     /// What is being done.
     pub stage: String,
-    /// Share of this stage that is done, 0 to 1.
+    /// Share of the whole that is done, 0 to 1.
     pub fraction: f32,
 }

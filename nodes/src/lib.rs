@@ -15,5 +15,6 @@ pub mod node;
 pub mod replay;
 pub mod report;
 pub mod runtime;
+pub mod semantic_icp_server;
 pub mod simulate;
 pub mod voxel_marker_publisher;

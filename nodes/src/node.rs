@@ -7,7 +7,7 @@ use crate::runtime::Runtime;
 use crate::runtime::logging;
 use crate::runtime::params::Params;
 use crate::runtime::ros_args::RosArgs;
-use crate::{enu_transformer, lattice_mapper, voxel_marker_publisher};
+use crate::{enu_transformer, lattice_mapper, semantic_icp_server, voxel_marker_publisher};
 
 /// Any error that keeps a node from starting.
 pub type NodeError = Box<dyn Error + Send + Sync>;
@@ -19,13 +19,14 @@ pub type Finish = Box<dyn FnOnce()>;
 pub type Start = fn(&Runtime, &str) -> Result<Finish, NodeError>;
 
 /// Every node that can share a process, in the order in which data flows.
-pub const NODES: [(&str, Start); 3] = [
+pub const NODES: [(&str, Start); 4] = [
     ("enu_transformer", enu_transformer::node::start),
     ("lattice_mapper", lattice_mapper::node::start),
     (
         "voxel_marker_publisher",
         voxel_marker_publisher::node::start,
     ),
+    ("semantic_icp_server", semantic_icp_server::node::start),
 ];
 
 /// Finds the node of an executable name.
@@ -61,7 +62,7 @@ pub fn answers_help(name: &str, args: &RosArgs) -> bool {
             "Usage: {name} [--ros-args [-r FROM:=TO] [-p NAME:=VALUE] [--params-file FILE] \
              [--log-level LEVEL] ...]\n\n\
              Topics and services are in README.md; every parameter, with its unit and meaning, is in\n\
-             params/bobcat.yaml.\n\n\
+             params/bobcat.yaml and params/semantic_icp.yaml.\n\n\
              Environment: ROS_DOMAIN_ID, ROS_AUTOMATIC_DISCOVERY_RANGE (LOCALHOST or SUBNET), RUST_LOG."
         );
     }

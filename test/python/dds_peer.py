@@ -360,4 +360,5 @@ def main():
     print(json.dumps(run(scenario, directory)), flush=True)
 
 
-main()
+if __name__ == "__main__":
+    main()

@@ -1,7 +1,7 @@
-"""The ROS messages that dds_peer.py speaks, as IDL types of the cyclonedds package."""
+"""The ROS messages that the peers over DDS speak, as IDL types of the cyclonedds package."""
 
 from cyclonedds.idl import annotations, make_idl_struct
-from cyclonedds.idl.types import array, float32, float64, int16, int32, int64
+from cyclonedds.idl.types import array, float32, float64, int8, int16, int32, int64
 from cyclonedds.idl.types import sequence, uint8, uint16, uint32, uint64
 
 
@@ -136,3 +136,57 @@ LatticeMap = ros(
 ASKED = {"client": uint64, "number": int64}
 TriggerRequest = ros("std_srvs/srv/Trigger_Request", **ASKED, structure_needs_at_least_one_member=uint8)
 TriggerResponse = ros("std_srvs/srv/Trigger_Response", **ASKED, success=bool, message=str)
+
+String = ros("std_msgs/msg/String", data=str)
+VisionClass = ros("vision_msgs/msg/VisionClass", class_id=uint16, class_name=str)
+LabelInfo = ros(
+    "vision_msgs/msg/LabelInfo", header=Header, class_map=sequence[VisionClass], threshold=float32
+)
+WeakDirection = ros("lattice_msgs/msg/WeakDirection", axis=Vector3, kind=uint8, sigma=float64)
+ClassReliability = ros(
+    "lattice_msgs/msg/ClassReliability", class_id=uint16, agreement=float64, weight=float64
+)
+CalibrationResult = ros(
+    "lattice_msgs/msg/CalibrationResult",
+    header=Header,
+    child_frame_id=str,
+    session=str,
+    verdict=uint8,
+    reason=str,
+    transform=Transform,
+    covariance=array[float64, 36],
+    log_margin=float64,
+    inlier_fraction=float64,
+    rmse_m=float64,
+    weak_directions=sequence[WeakDirection],
+    class_reliability=sequence[ClassReliability],
+    method=str,
+    duration_s=float64,
+    gazes=uint32,
+    points=uint64,
+)
+ASKS = {"has_guess": bool, "guess": Pose, "session": str}
+ANSWERS = {"success": bool, "message": str, "result": CalibrationResult}
+CalibrateRequest = ros("lattice_msgs/srv/Calibrate_Request", **ASKED, **ASKS)
+CalibrateResponse = ros("lattice_msgs/srv/Calibrate_Response", **ASKED, **ANSWERS)
+
+UUID = ros("unique_identifier_msgs/msg/UUID", uuid=array[uint8, 16])
+GoalInfo = ros("action_msgs/msg/GoalInfo", goal_id=UUID, stamp=Time)
+GoalStatus = ros("action_msgs/msg/GoalStatus", goal_info=GoalInfo, status=int8)
+GoalStatusArray = ros("action_msgs/msg/GoalStatusArray", status_list=sequence[GoalStatus])
+CancelGoalRequest = ros("action_msgs/srv/CancelGoal_Request", **ASKED, goal_info=GoalInfo)
+CancelGoalResponse = ros(
+    "action_msgs/srv/CancelGoal_Response",
+    **ASKED,
+    return_code=int8,
+    goals_canceling=sequence[GoalInfo],
+)
+CALIBRATE = "lattice_msgs/action/Calibrate"
+Goal = ros(f"{CALIBRATE}_Goal", **ASKS)
+Result = ros(f"{CALIBRATE}_Result", **ANSWERS)
+Feedback = ros(f"{CALIBRATE}_Feedback", stage=str, fraction=float32)
+SendGoalRequest = ros(f"{CALIBRATE}_SendGoal_Request", **ASKED, goal_id=UUID, goal=Goal)
+SendGoalResponse = ros(f"{CALIBRATE}_SendGoal_Response", **ASKED, accepted=bool, stamp=Time)
+GetResultRequest = ros(f"{CALIBRATE}_GetResult_Request", **ASKED, goal_id=UUID)
+GetResultResponse = ros(f"{CALIBRATE}_GetResult_Response", **ASKED, status=int8, result=Result)
+FeedbackMessage = ros(f"{CALIBRATE}_FeedbackMessage", goal_id=UUID, feedback=Feedback)

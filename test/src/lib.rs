@@ -3,5 +3,6 @@
 pub mod clouds;
 pub mod data;
 pub mod domain;
+pub mod flat;
 pub mod python;
 pub mod random;

@@ -7,6 +7,7 @@ use lattice_nodes::enu_transformer::TransformerOptions;
 use lattice_nodes::lattice_mapper::MapperOptions;
 use lattice_nodes::runtime::params::Params;
 use lattice_nodes::runtime::ros_args::RosArgs;
+use lattice_nodes::semantic_icp_server::ServerOptions;
 use lattice_nodes::simulate;
 use lattice_nodes::voxel_marker_publisher::MarkerOptions;
 use serde_json::Value;
@@ -115,6 +116,30 @@ fn every_parameter_is_in_the_file_for_the_simulated_loader() {
     let params = self::params("bobcat.yaml", "/voxel_marker_publisher");
     MarkerOptions::from_params(&params).unwrap();
     assert_eq!(declared(&params), Vec::<String>::new());
+}
+
+#[test]
+fn the_file_for_a_headset_has_every_parameter_and_its_default() {
+    let params = params("semantic_icp.yaml", "/robot/semantic_icp_server");
+    let options = ServerOptions::from_params(&params).unwrap();
+    assert_eq!(
+        format!("{options:?}"),
+        format!("{:?}", ServerOptions::default())
+    );
+    let shell = [
+        "inbox_bytes",
+        "inbox_events",
+        "mapper",
+        "tf_rate_hz",
+        "threads",
+    ];
+    assert_eq!(params.unused(), shell);
+    let declared = params.declared().into_iter().map(|d| d.name);
+    let missing: Vec<_> = declared.filter(|name| !params.is_given(name)).collect();
+    assert_eq!(missing, Vec::<String>::new());
+    let params = self::params("semantic_icp.yaml", "/lattice_mapper");
+    let options = MapperOptions::from_params(&params).unwrap();
+    assert!(options.labels.is_some() && params.unused().is_empty());
 }
 
 #[test]

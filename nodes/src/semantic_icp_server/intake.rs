@@ -1,0 +1,88 @@
+//! Clouds of the headset.
+
+use lattice_core::cloud::CloudError;
+use lattice_msgs::sensor_msgs::PointCloud2;
+use thiserror::Error;
+
+use super::*;
+use crate::convert::semantic::{SemanticError, semantic_from_message};
+
+/// Why a cloud cannot be used.
+#[derive(Debug, Error)]
+enum Refusal {
+    #[error("cloud in frame '{found}', expected '{expected}'")]
+    Frame { found: String, expected: String },
+    #[error(transparent)]
+    Cloud(#[from] SemanticError),
+}
+
+impl SemanticIcpServer {
+    /// Takes a cloud of the headset. What cannot be used is told as rejected, with the reason.
+    pub fn on_headset_cloud(&mut self, message: &PointCloud2, now_ns: i64) -> Vec<Output> {
+        let mut out = Vec::new();
+        self.counts.clouds_in += 1;
+        let gaze = match self.read(message) {
+            Ok(gaze) => Arc::new(gaze),
+            Err(refusal) => {
+                self.count(&refusal);
+                let reason = refusal.to_string();
+                let mut result = self.result(CalibrationResult::REJECTED_INPUT, &reason);
+                result.header.stamp = message.header.stamp;
+                self.tell(result, now_ns, &mut out);
+                return out;
+            }
+        };
+        let stamp_ns = message.header.stamp.to_ns();
+        if !self.has_map() {
+            self.counts.clouds_no_map += 1;
+            self.gazes.push(gaze, stamp_ns, now_ns);
+            let result = self.result(CalibrationResult::REJECTED_INPUT, NO_MAP);
+            self.tell(result, now_ns, &mut out);
+            return out;
+        }
+        if self.known.is_some() && self.options.track {
+            self.look = Some((gaze, stamp_ns));
+        } else {
+            self.gazes.push(gaze, stamp_ns, now_ns);
+            self.fresh_cloud = true;
+        }
+        self.go_on(now_ns, &mut out);
+        let begun = out.iter().any(|output| matches!(output, Output::Job(_)));
+        self.counts.clouds_kept += u64::from(!begun);
+        out
+    }
+
+    fn read(&mut self, message: &PointCloud2) -> Result<Gaze, Refusal> {
+        let found = message.header.frame_id.trim_start_matches('/');
+        if found != self.options.headset_frame {
+            return Err(Refusal::Frame {
+                found: found.chars().take(64).collect(),
+                expected: self.options.headset_frame.clone(),
+            });
+        }
+        let (cloud, report) = semantic_from_message(message, &self.options.semantic)?;
+        self.counts.points_not_finite += report.not_finite as u64;
+        self.counts.points_too_far += report.too_far as u64;
+        Ok(Gaze {
+            cloud,
+            sensor_m: None,
+        })
+    }
+
+    fn count(&mut self, refusal: &Refusal) {
+        let counts = &mut self.counts;
+        let counter = match refusal {
+            Refusal::Frame { .. } => &mut counts.clouds_wrong_frame,
+            Refusal::Cloud(SemanticError::Empty) => &mut counts.clouds_empty,
+            Refusal::Cloud(SemanticError::NoPlace { .. }) => &mut counts.clouds_no_place,
+            Refusal::Cloud(
+                SemanticError::NoLabels { .. } | SemanticError::AllUnlabelled { .. },
+            ) => &mut counts.clouds_unlabelled,
+            Refusal::Cloud(SemanticError::Cloud(CloudError::TooManyPoints { .. })) => {
+                &mut counts.clouds_too_large
+            }
+            Refusal::Cloud(SemanticError::Cloud(_)) => &mut counts.clouds_malformed,
+        };
+        *counter += 1;
+    }
+}

@@ -1,0 +1,378 @@
+//! Where a headset is in the map: its labelled clouds are found in the voxels of the robot.
+//!
+//! [`SemanticIcpServer`] is a state machine without I/O and without heavy work: what takes its time is
+//! a [`Job`] for another thread. [`node`] runs both behind DDS.
+
+mod counts;
+mod gazes;
+mod intake;
+pub mod node;
+mod options;
+mod search;
+mod state;
+mod worker;
+
+pub use counts::ServerCounts;
+pub use options::{SearchWhen, ServerOptions, WhenBusy};
+pub use search::{Done, Job, LatticeSearch, MapCloud, Search, Work};
+
+use std::collections::BTreeMap;
+use std::sync::Arc;
+use std::sync::atomic::{AtomicBool, Ordering::Relaxed};
+
+use lattice_core::registration::{Calibration, Gaze, Stage, TrackUpdate, Verdict};
+use lattice_msgs::calibration::{
+    CalibrateFeedback, CalibrateGoal, CalibrateResult, CalibrationResult,
+};
+use lattice_msgs::geometry_msgs::TransformStamped;
+use lattice_msgs::lattice::{LatticeMap, LatticeMapUpdate};
+use lattice_msgs::std_msgs::String as StringMessage;
+use lattice_msgs::vision_msgs::LabelInfo;
+use nalgebra::Isometry3;
+
+use self::gazes::Gazes;
+use self::state::{Caller, Known, Running, Wanted};
+use crate::convert::calibration::{result_from, set_pose};
+use crate::convert::geometry;
+use crate::map_follower::{FollowError, Followed, MapFollower};
+
+/// Who asked for a calibration: a number that the shell gives.
+pub type CallId = u64;
+
+/// How a request ends.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub enum End {
+    /// The headset was found.
+    Found,
+    /// It was not, or the request was refused.
+    Failed,
+    /// The client did not want it any more.
+    Canceled,
+}
+
+/// What the server has to say.
+#[derive(Clone, Debug)]
+pub enum Output {
+    /// For `calibration`.
+    Result(Box<CalibrationResult>),
+    /// For `/tf`.
+    Transform(TransformStamped),
+    /// To be calculated on another thread; its end is told by [`SemanticIcpServer::on_done`].
+    Job(Job),
+    /// The answer to a request.
+    Answer(CallId, End, Box<CalibrateResult>),
+    /// How far a request is.
+    Feedback(CallId, CalibrateFeedback),
+    /// A part of the map was lost: a keyframe is to be asked for.
+    NeedKeyframe,
+}
+
+/// Follows a map and a headset, and says where the headset is.
+pub struct SemanticIcpServer {
+    options: ServerOptions,
+    follower: MapFollower,
+    session: String,
+    gazes: Gazes,
+    /// Class names of the headset.
+    names: BTreeMap<u16, String>,
+    known: Option<Known>,
+    /// Searches in a row that did not find the headset where it was.
+    misses: u32,
+    /// When a look that fits somewhat may be doubted again.
+    doubt_again_ns: i64,
+    running: Option<Running>,
+    wanted: Option<Wanted>,
+    /// A cloud came that no search has used.
+    fresh_cloud: bool,
+    /// The newest cloud that the known pose is still to be refined by, and its stamp.
+    look: Option<(Arc<Gaze>, i64)>,
+    next_job: u64,
+    /// State of the map that the searcher has: epoch, sequence, and when.
+    prepared: Option<(u64, u64, i64)>,
+    last: CalibrationResult,
+    last_told_ns: i64,
+    counts: ServerCounts,
+}
+
+impl SemanticIcpServer {
+    /// A server that has seen nothing.
+    pub fn new(options: ServerOptions) -> Self {
+        Self {
+            follower: MapFollower::new(options.max_map_voxels),
+            session: String::new(),
+            gazes: Gazes::new(options.max_gazes, options.gaze_period_ns),
+            names: BTreeMap::new(),
+            known: None,
+            misses: 0,
+            doubt_again_ns: 0,
+            running: None,
+            wanted: None,
+            fresh_cloud: false,
+            look: None,
+            next_job: 0,
+            prepared: None,
+            last: CalibrationResult::default(),
+            last_told_ns: 0,
+            counts: ServerCounts::default(),
+            options,
+        }
+    }
+
+    /// Takes one chunk of a keyframe of the map.
+    pub fn on_map(&mut self, message: &LatticeMap, now_ns: i64) -> Vec<Output> {
+        let followed = self.follower.on_map(message);
+        self.followed(followed, now_ns)
+    }
+
+    /// Takes one chunk of an update of the map.
+    pub fn on_map_update(&mut self, message: &LatticeMapUpdate, now_ns: i64) -> Vec<Output> {
+        let followed = self.follower.on_update(message);
+        self.followed(followed, now_ns)
+    }
+
+    fn followed(&mut self, followed: Result<Followed, FollowError>, now_ns: i64) -> Vec<Output> {
+        let mut out = Vec::new();
+        match followed {
+            Ok(Followed::NeedKeyframe) => out.push(Output::NeedKeyframe),
+            Ok(_) => {}
+            Err(error) => {
+                log::debug!("part of the map refused: {error}");
+                self.counts.map_refused += 1;
+            }
+        }
+        let (_, replaced) = self.follower.take_touched();
+        if replaced && self.prepared.is_some() {
+            // Its frame may be another one.
+            self.forget("the map is a new one", now_ns, &mut out);
+        }
+        out
+    }
+
+    /// Takes the names of the headset's classes.
+    pub fn on_label_info(&mut self, message: &LabelInfo) {
+        let classes = message.class_map.iter().take(usize::from(u16::MAX));
+        let name = |name: &str| name.chars().take(64).collect();
+        self.names = classes
+            .map(|class| (class.class_id, name(&class.class_name)))
+            .collect();
+    }
+
+    /// Takes the session of the headset: another one means another origin, of which nothing is known.
+    pub fn on_session(&mut self, message: &StringMessage, now_ns: i64) -> Vec<Output> {
+        let mut out = Vec::new();
+        let session: String = message.data.chars().take(256).collect();
+        if session != self.session {
+            self.counts.sessions += 1;
+            self.session = session;
+            self.gazes.clear();
+            self.forget("the headset has begun a new session", now_ns, &mut out);
+        }
+        out
+    }
+
+    /// What was known does not hold any more.
+    fn forget(&mut self, why: &str, now_ns: i64, out: &mut Vec<Output>) {
+        self.known = None;
+        self.misses = 0;
+        self.doubt_again_ns = 0;
+        self.fresh_cloud = false;
+        self.look = None;
+        if let Some(wanted) = self.wanted.take() {
+            self.answer_failed(wanted.caller, why, out);
+        }
+        if let Some(running) = &mut self.running {
+            running.canceled.store(true, Relaxed);
+            running.outdated = true;
+            let caller = running.caller.take();
+            self.answer_failed(caller, why, out);
+        }
+        let result = self.result(CalibrationResult::NONE, why);
+        self.tell(result, now_ns, out);
+    }
+
+    /// Takes a request; it is answered at once or when its search has ended.
+    pub fn calibrate(&mut self, call: CallId, goal: &CalibrateGoal, now_ns: i64) -> Vec<Output> {
+        let mut out = Vec::new();
+        self.counts.requests_in += 1;
+        let start = match self.start_of(goal) {
+            Ok(start) => start,
+            Err(reason) => {
+                self.counts.requests_refused += 1;
+                let result = self.result(CalibrationResult::REJECTED_INPUT, &reason);
+                out.push(answer(call, End::Failed, result));
+                return out;
+            }
+        };
+        let caller = Some(Caller { call });
+        let asked = self.running.as_ref().is_some_and(|r| r.caller.is_some());
+        if asked || self.wanted.is_some() {
+            if self.options.when_busy == WhenBusy::Reject {
+                self.counts.requests_busy += 1;
+                let reason = "busy: a calibration that was asked for before is at work";
+                self.answer_failed(caller, reason, &mut out);
+                return out;
+            }
+            let why = "superseded by another request";
+            let wanted = self.wanted.take().and_then(|wanted| wanted.caller);
+            self.answer_failed(wanted, why, &mut out);
+            self.end_running(why, &mut out);
+        } else if let Some(running) = self.running.as_mut().filter(|r| r.is_search()) {
+            if start.is_none() && !running.outdated {
+                // It is at work already.
+                running.caller = caller;
+                return out;
+            }
+            self.end_running("superseded by a request", &mut out);
+        }
+        self.wanted = Some(Wanted { caller, start });
+        self.go_on(now_ns, &mut out);
+        out
+    }
+
+    /// The start of a request, or why it is refused.
+    fn start_of(&self, goal: &CalibrateGoal) -> Result<Option<Isometry3<f64>>, String> {
+        if !goal.session.is_empty() && goal.session != self.session {
+            let asked: String = goal.session.chars().take(64).collect();
+            return Err(format!(
+                "the session of the headset is '{}', not '{asked}'",
+                self.session
+            ));
+        }
+        if !self.has_map() {
+            return Err(NO_MAP.into());
+        }
+        if self.gazes.is_empty() {
+            return Err("there is no cloud of the headset yet".into());
+        }
+        if !goal.has_guess {
+            return Ok(None);
+        }
+        let guess = geometry::isometry_from_pose(&goal.guess);
+        let guess = guess.filter(|guess| guess.translation.vector.norm() < MAX_GUESS_M);
+        guess
+            .map(Some)
+            .ok_or_else(|| "the guess is not a pose: a number is not finite or too large".into())
+    }
+
+    /// A client does not want its request any more.
+    pub fn cancel(&mut self, call: CallId) -> Vec<Output> {
+        let mut out = Vec::new();
+        let is_it = |caller: &Option<Caller>| caller.as_ref().is_some_and(|c| c.call == call);
+        let mut was_asked = false;
+        if self.wanted.as_ref().is_some_and(|w| is_it(&w.caller)) {
+            self.wanted = None;
+            was_asked = true;
+        }
+        if let Some(running) = self.running.as_mut().filter(|r| is_it(&r.caller)) {
+            running.canceled.store(true, Relaxed);
+            running.outdated = true;
+            running.caller = None;
+            was_asked = true;
+        }
+        if was_asked {
+            let result = self.result(CalibrationResult::NONE, "canceled");
+            out.push(answer(call, End::Canceled, result));
+        }
+        out
+    }
+
+    /// Hears how far a job is.
+    pub fn on_progress(&self, job: u64, stage: Stage, fraction: f64) -> Option<Output> {
+        let running = self.running.as_ref().filter(|r| r.job == job)?;
+        let caller = running.caller.as_ref()?;
+        let stage = match stage {
+            Stage::Prepare => "prepare",
+            Stage::Search => "search",
+            Stage::Refine => "refine",
+            Stage::Judge => "judge",
+        };
+        let feedback = CalibrateFeedback {
+            stage: stage.to_owned(),
+            fraction: fraction as f32,
+        };
+        Some(Output::Feedback(caller.call, feedback))
+    }
+
+    /// Takes what came of a job.
+    pub fn on_done(&mut self, job: u64, done: Done, now_ns: i64) -> Vec<Output> {
+        let mut out = Vec::new();
+        let Some(running) = self.running.take_if(|r| r.job == job) else {
+            return out;
+        };
+        match done {
+            Done::NoMap(why) => self.no_map(&running, &why, now_ns, &mut out),
+            Done::Calibrated(found) => self.searched(&running, &found, now_ns, &mut out),
+            Done::Tracked(update) => self.tracked(&running, update, now_ns, &mut out),
+        }
+        self.go_on(now_ns, &mut out);
+        out
+    }
+
+    /// Publishes the transform again, for those who have come late. To be called now and then.
+    pub fn tick(&mut self, now_ns: i64) -> Option<Output> {
+        let known = self.known.as_ref()?;
+        Some(Output::Transform(self.transform(known, now_ns)))
+    }
+
+    /// Ends everything: whoever waits is answered.
+    pub fn finish(&mut self) -> Vec<Output> {
+        let mut out = Vec::new();
+        let why = "the server ends";
+        let wanted = self.wanted.take().and_then(|wanted| wanted.caller);
+        self.answer_failed(wanted, why, &mut out);
+        self.end_running(why, &mut out);
+        out
+    }
+
+    /// What came in and what was found, by reason.
+    pub fn counts(&self) -> &ServerCounts {
+        &self.counts
+    }
+
+    /// `map_from_headset_origin`, while it is known.
+    pub fn map_from_headset(&self) -> Option<Isometry3<f64>> {
+        self.known.as_ref().map(|known| known.map_from_headset)
+    }
+
+    /// The result told last.
+    pub fn last_result(&self) -> &CalibrationResult {
+        &self.last
+    }
+
+    /// Name of a class of the headset, where it is known.
+    pub fn class_name(&self, class: u16) -> Option<&str> {
+        self.names.get(&class).map(String::as_str)
+    }
+
+    /// Voxels of the map that is followed.
+    pub fn map_voxels(&self) -> usize {
+        self.follower.map().map_or(0, |map| map.voxels().len())
+    }
+
+    fn has_map(&self) -> bool {
+        self.map_voxels() > 0
+    }
+
+    fn transform(&self, known: &Known, now_ns: i64) -> TransformStamped {
+        geometry::transform_stamped(
+            &self.options.map_frame,
+            &self.options.headset_frame,
+            now_ns,
+            &known.map_from_headset,
+        )
+    }
+}
+
+/// Farther from the origin than any guess.
+const MAX_GUESS_M: f64 = 1e6;
+
+const NO_MAP: &str = "there is no map yet";
+
+fn answer(call: CallId, end: End, result: CalibrationResult) -> Output {
+    let answer = CalibrateResult {
+        success: end == End::Found,
+        message: result.reason.clone(),
+        result,
+    };
+    Output::Answer(call, end, Box::new(answer))
+}

@@ -1,0 +1,366 @@
+//! The server as a ROS node: a thin shell around [`SemanticIcpServer`].
+
+use std::collections::BTreeMap;
+use std::sync::Arc;
+use std::sync::atomic::{AtomicU64, Ordering};
+use std::time::Duration;
+
+use lattice_msgs::calibration::{
+    Calibrate, CalibrateAction, CalibrateGoal, CalibrateRequest, CalibrateResponse,
+    CalibrateResult, CalibrationResult,
+};
+use lattice_msgs::lattice::{LatticeMap, LatticeMapUpdate};
+use lattice_msgs::sensor_msgs::PointCloud2;
+use lattice_msgs::std_msgs::{Empty, String as StringMessage};
+use lattice_msgs::vision_msgs::LabelInfo;
+
+use super::worker::{Worker, WorkerPort};
+use super::{CallId, End, LatticeSearch, Output, SemanticIcpServer, ServerOptions};
+use crate::compute::{Compute, ComputeLimits, Inbox};
+use crate::convert::cloud;
+use crate::node::{Finish, NodeError, warn_unused};
+use crate::report;
+use crate::runtime::logging::Throttle;
+use crate::runtime::qos::Qos;
+use crate::runtime::{
+    ActionLimits, Clock, Diagnostics, Feedback, GoalHandle, Level, Load, Publisher, Reply, Runtime,
+    TfBroadcaster,
+};
+
+/// Between two messages on diagnostics.
+const DIAGNOSE: Duration = Duration::from_secs(1);
+
+/// What the thread of the machine is told.
+enum Event {
+    Worker(WorkerPort),
+    Map(Arc<LatticeMap>),
+    Update(Arc<LatticeMapUpdate>),
+    Cloud(Arc<PointCloud2>),
+    Session(Arc<StringMessage>),
+    LabelInfo(Arc<LabelInfo>),
+    Request(Box<CalibrateRequest>, Reply<CalibrateResponse>),
+    Goal(Box<CalibrateGoal>, GoalHandle<CalibrateAction>),
+    /// A client has canceled, or the searcher has news.
+    Look,
+    Tick,
+    Diagnose,
+    Finish,
+}
+
+/// Starts the node.
+pub fn start(runtime: &Runtime, name: &str) -> Result<Finish, NodeError> {
+    let node = runtime.node(name)?;
+    let params = node.params();
+    let options = ServerOptions::from_params(params)?;
+    let limits = ComputeLimits {
+        events: params.usize("inbox_events", 4096)?,
+        bytes: params.usize("inbox_bytes", 256 << 20)?,
+        threads: 1,
+    };
+    let threads = params.usize("threads", 0)?;
+    let rate_hz = params.f64("tf_rate_hz", 10.0)?;
+    if !(0.1..=100.0).contains(&rate_hz) {
+        let reason = format!("{rate_hz}, expected 0.1 to 100");
+        return Err(params.invalid("tf_rate_hz", reason).into());
+    }
+    let mapper = params.string("mapper", "lattice_mapper")?;
+    let search = LatticeSearch::new(options.calibration);
+    let lost = Arc::new(AtomicU64::new(0));
+    let outputs = Outputs {
+        calibration: node.publisher("calibration", Qos::latched(1))?,
+        tf: TfBroadcaster::new(&node)?,
+        request: node.publisher(&format!("{mapper}/request_keyframe"), Qos::DEFAULT)?,
+    };
+    let mut shell = Shell {
+        machine: SemanticIcpServer::new(options),
+        worker: None,
+        outputs,
+        diagnostics: node.diagnostics(),
+        clock: node.clock(),
+        lost: Arc::clone(&lost),
+        calls: BTreeMap::new(),
+        next_call: 0,
+        requests: Throttle::new(Duration::from_secs(1)),
+    };
+    let compute = Compute::spawn(name, limits, runtime.shutdown_handle(), move |event| {
+        shell.on(event)
+    })?;
+    let inbox = compute.inbox();
+    let wake = inbox.clone();
+    let worker = Worker::spawn(
+        &format!("{name} search"),
+        threads,
+        runtime.shutdown_handle(),
+        search,
+        move || tell(&wake, Event::Look),
+    )?;
+    // The first of all events.
+    tell(&inbox, Event::Worker(worker.port()));
+
+    let to = inbox.clone();
+    let missed = Arc::clone(&lost);
+    let maps = node.subscribe("map", Qos::MAP, Load::Small, move |map: Arc<LatticeMap>| {
+        let bytes = map.keys.len() + map.counts.len() * 16;
+        hand_over(&to, Event::Map(map), bytes, &missed);
+    })?;
+    let to = inbox.clone();
+    let missed = Arc::clone(&lost);
+    let on_update = move |update: Arc<LatticeMapUpdate>| {
+        let bytes = update.keys.len() + update.counts.len() * 16 + update.removed_keys.len();
+        hand_over(&to, Event::Update(update), bytes, &missed);
+    };
+    let updates = node.subscribe("map_updates", Qos::DELTAS, Load::Small, on_update)?;
+    let to = inbox.clone();
+    let missed = Arc::clone(&lost);
+    let on_cloud = move |message: Arc<PointCloud2>| {
+        let bytes = cloud::bytes_of(&message);
+        hand_over(&to, Event::Cloud(message), bytes, &missed);
+    };
+    let clouds = node.subscribe("headset/points", Qos::SENSOR, Load::Large, on_cloud)?;
+    let to = inbox.clone();
+    let missed = Arc::clone(&lost);
+    let on_session = move |message| hand_over(&to, Event::Session(message), 0, &missed);
+    let sessions = node.subscribe("headset/session", Qos::LATCHED, Load::Small, on_session)?;
+    let to = inbox.clone();
+    let missed = Arc::clone(&lost);
+    let on_info = move |message| hand_over(&to, Event::LabelInfo(message), 0, &missed);
+    let infos = node.subscribe("headset/label_info", Qos::LATCHED, Load::Small, on_info)?;
+
+    let to = inbox.clone();
+    // One answer does not wait for another: a busy server says so at once.
+    let service =
+        node.service_concurrent::<Calibrate>("~/calibrate", 16, move |request, reply| {
+            let busy = reply.clone();
+            if !to.send(Event::Request(Box::new(request), reply), 0) {
+                busy.send(CalibrateResponse {
+                    message: "busy, ask again".into(),
+                    ..CalibrateResponse::default()
+                });
+            }
+        })?;
+    let (to, look) = (inbox.clone(), inbox.clone());
+    let action = node.action_server::<CalibrateAction>(
+        "~/calibrate",
+        ActionLimits::default(),
+        move |goal, handle| to.send(Event::Goal(Box::new(goal), handle), 0),
+        move |_| tell(&look, Event::Look),
+    )?;
+    let ticks = inbox.clone();
+    runtime.timer(Duration::from_secs_f64(1.0 / rate_hz), move || {
+        tell(&ticks, Event::Tick);
+    });
+    runtime.timer(DIAGNOSE, move || {
+        action.expire();
+        tell(&inbox, Event::Diagnose);
+    });
+    warn_unused(params);
+    Ok(Box::new(move || {
+        drop((maps, updates, clouds, sessions, infos, service));
+        compute.finish_with(Event::Finish);
+        worker.finish();
+    }))
+}
+
+/// Hands over what must not be lost unseen.
+fn hand_over(inbox: &Inbox<Event>, event: Event, bytes: usize, lost: &AtomicU64) {
+    if !inbox.send(event, bytes) {
+        lost.fetch_add(1, Ordering::Relaxed);
+    }
+}
+
+/// Hands over what comes again with the next tick.
+fn tell(inbox: &Inbox<Event>, event: Event) {
+    if !inbox.send(event, 0) {
+        log::debug!("the inbox is full");
+    }
+}
+
+/// The topics that the node speaks on.
+struct Outputs {
+    calibration: Publisher<CalibrationResult>,
+    tf: TfBroadcaster,
+    request: Publisher<Empty>,
+}
+
+/// A client that waits.
+enum Client {
+    Service(Reply<CalibrateResponse>),
+    Action(GoalHandle<CalibrateAction>, Feedback<CalibrateAction>),
+}
+
+/// State of the machine's thread.
+struct Shell {
+    machine: SemanticIcpServer,
+    worker: Option<WorkerPort>,
+    outputs: Outputs,
+    diagnostics: Diagnostics,
+    clock: Clock,
+    /// Messages that found the inbox full.
+    lost: Arc<AtomicU64>,
+    calls: BTreeMap<CallId, Client>,
+    next_call: CallId,
+    requests: Throttle,
+}
+
+impl Shell {
+    fn on(&mut self, event: Event) {
+        let now_ns = self.clock.now_ns();
+        let outputs = match event {
+            Event::Worker(port) => {
+                self.worker = Some(port);
+                Vec::new()
+            }
+            Event::Map(chunk) => self.machine.on_map(&chunk, now_ns),
+            Event::Update(chunk) => self.machine.on_map_update(&chunk, now_ns),
+            Event::Cloud(cloud) => self.machine.on_headset_cloud(&cloud, now_ns),
+            Event::Session(session) => self.machine.on_session(&session, now_ns),
+            Event::LabelInfo(info) => {
+                self.machine.on_label_info(&info);
+                Vec::new()
+            }
+            Event::Request(request, reply) => {
+                let CalibrateRequest {
+                    has_guess,
+                    guess,
+                    session,
+                } = *request;
+                let goal = CalibrateGoal {
+                    has_guess,
+                    guess,
+                    session,
+                };
+                let call = self.remember(Client::Service(reply));
+                self.machine.calibrate(call, &goal, now_ns)
+            }
+            Event::Goal(goal, handle) => {
+                handle.execute();
+                let feedback = handle.feedback();
+                let call = self.remember(Client::Action(handle, feedback));
+                self.machine.calibrate(call, &goal, now_ns)
+            }
+            Event::Look => Vec::new(),
+            Event::Tick => self.machine.tick(now_ns).into_iter().collect(),
+            Event::Diagnose => {
+                self.diagnose();
+                Vec::new()
+            }
+            Event::Finish => self.machine.finish(),
+        };
+        self.put(outputs);
+        self.look(now_ns);
+    }
+
+    fn remember(&mut self, client: Client) -> CallId {
+        self.next_call += 1;
+        self.calls.insert(self.next_call, client);
+        self.next_call
+    }
+
+    /// Takes what the searcher has found, and what clients do not want any more.
+    fn look(&mut self, now_ns: i64) {
+        let worker = self.worker.as_ref();
+        let progress = worker.and_then(WorkerPort::take_progress);
+        let done = worker.map_or_else(Vec::new, WorkerPort::take_done);
+        if let Some((job, stage, fraction)) = progress {
+            let feedback = self.machine.on_progress(job, stage, fraction);
+            self.put(feedback.into_iter().collect());
+        }
+        for (job, done) in done {
+            let outputs = self.machine.on_done(job, done, now_ns);
+            self.put(outputs);
+        }
+        let canceled = |(call, client): (&CallId, &Client)| match client {
+            Client::Action(handle, _) => handle.is_canceled().then_some(*call),
+            Client::Service(_) => None,
+        };
+        let canceled: Vec<CallId> = self.calls.iter().filter_map(canceled).collect();
+        for call in canceled {
+            let outputs = self.machine.cancel(call);
+            self.put(outputs);
+        }
+    }
+
+    fn put(&mut self, outputs: Vec<Output>) {
+        for output in outputs {
+            match output {
+                Output::Result(result) => {
+                    if result.verdict != CalibrationResult::OK {
+                        log::info!("not calibrated: {}", result.reason);
+                    }
+                    if let Err(error) = self.outputs.calibration.publish(*result) {
+                        log::warn!("calibration not published: {error}");
+                    }
+                }
+                Output::Transform(transform) => {
+                    if let Err(error) = self.outputs.tf.send(vec![transform]) {
+                        log::debug!("transform not published: {error}");
+                    }
+                }
+                Output::Job(job) => {
+                    if !self.worker.as_ref().is_some_and(|worker| worker.begin(job)) {
+                        log::error!("the searching thread takes no job");
+                    }
+                }
+                Output::Answer(call, end, result) => self.answer(call, end, *result),
+                Output::Feedback(call, feedback) => {
+                    if let Some(Client::Action(_, to)) = self.calls.get(&call) {
+                        to.send(feedback);
+                    }
+                }
+                Output::NeedKeyframe => {
+                    if self.requests.check().is_some()
+                        && let Err(error) = self.outputs.request.publish(Empty::default())
+                    {
+                        log::debug!("keyframe not asked for: {error}");
+                    }
+                }
+            }
+        }
+    }
+
+    fn answer(&mut self, call: CallId, end: End, result: CalibrateResult) {
+        match self.calls.remove(&call) {
+            Some(Client::Service(reply)) => reply.send(CalibrateResponse {
+                success: result.success,
+                message: result.message,
+                result: result.result,
+            }),
+            Some(Client::Action(handle, _)) => match end {
+                End::Found => handle.succeed(result),
+                End::Failed => handle.abort(result),
+                End::Canceled => handle.cancel(result),
+            },
+            None => {}
+        }
+    }
+
+    fn diagnose(&self) {
+        let counts = self.machine.counts();
+        let lost = self.lost.load(Ordering::Relaxed);
+        let last = self.machine.last_result();
+        let (level, message) = if self.machine.map_voxels() == 0 {
+            (Level::Warn, "no map yet".to_owned())
+        } else if counts.clouds_in == 0 {
+            (Level::Warn, "no cloud of the headset yet".to_owned())
+        } else if self.machine.map_from_headset().is_some() {
+            (Level::Ok, "calibrated".to_owned())
+        } else {
+            (Level::Warn, format!("not calibrated: {}", last.reason))
+        };
+        let mut values = report::key_values(counts);
+        values.extend([
+            ("inbox_full".into(), lost.to_string()),
+            ("map_voxels".into(), self.machine.map_voxels().to_string()),
+            ("session".into(), last.session.clone()),
+            ("last_reason".into(), last.reason.clone()),
+            ("method".into(), last.method.clone()),
+        ]);
+        for class in &last.class_reliability {
+            let name = self.machine.class_name(class.class_id);
+            let name = name.map_or_else(|| class.class_id.to_string(), str::to_owned);
+            let worth = format!("agrees {:.2}, weight {:.2}", class.agreement, class.weight);
+            values.push((format!("class {name}"), worth));
+        }
+        self.diagnostics.set("calibration", level, message, values);
+    }
+}

@@ -1,0 +1,180 @@
+//! What the server has others calculate, and how.
+
+use std::ops::ControlFlow;
+use std::sync::Arc;
+use std::sync::atomic::{AtomicBool, Ordering::Relaxed};
+
+use lattice_core::registration::{
+    Calibration, CalibrationMap, CalibrationOptions, CalibrationRequest, Confusion, Gaze, Progress,
+    SemanticCloud, Stage, TrackUpdate, Tracker, Verdict, calibrate,
+};
+use nalgebra::Isometry3;
+
+/// A map to be made ready.
+#[derive(Clone, Debug)]
+pub struct MapCloud {
+    /// The mean point of each voxel, with labels.
+    pub cloud: SemanticCloud,
+    /// Side of a cube as large as a voxel, m.
+    pub cell_side_m: f64,
+}
+
+/// Finds poses; made for the thread that calculates.
+pub trait Search: Send + 'static {
+    /// Makes a map ready, for all that follows. The error says why it cannot be used.
+    fn prepare(&mut self, map: MapCloud) -> Result<(), String>;
+
+    /// Searches the map.
+    fn calibrate(
+        &mut self,
+        gazes: &[Gaze],
+        start: Option<Isometry3<f64>>,
+        progress: &dyn Progress,
+    ) -> Calibration;
+
+    /// Refines `map_from_headset` by a look; `None` without a map.
+    fn track(&mut self, gaze: &Gaze, map_from_headset: &Isometry3<f64>) -> Option<TrackUpdate>;
+}
+
+/// The search of the core.
+pub struct LatticeSearch {
+    options: CalibrationOptions,
+    map: Option<CalibrationMap>,
+    /// What was learned of the labels so far.
+    confusion: Option<Confusion>,
+    tracker: Option<Tracker>,
+}
+
+impl LatticeSearch {
+    /// Without a map.
+    pub fn new(options: CalibrationOptions) -> Self {
+        Self {
+            options,
+            map: None,
+            confusion: None,
+            tracker: None,
+        }
+    }
+}
+
+impl Search for LatticeSearch {
+    fn prepare(&mut self, map: MapCloud) -> Result<(), String> {
+        self.map = None;
+        let map = CalibrationMap::new(map.cloud, map.cell_side_m).map_err(|e| e.to_string())?;
+        self.map = Some(map);
+        Ok(())
+    }
+
+    fn calibrate(
+        &mut self,
+        gazes: &[Gaze],
+        start: Option<Isometry3<f64>>,
+        progress: &dyn Progress,
+    ) -> Calibration {
+        let Some(map) = &self.map else {
+            return Calibration::refused(Verdict::RejectedInput, "there is no map yet");
+        };
+        let request = CalibrationRequest {
+            gazes,
+            start,
+            confusion: self.confusion.as_ref(),
+        };
+        let found = calibrate(map, &request, &self.options, progress);
+        if found.verdict == Verdict::Ok {
+            self.confusion = Some(found.confusion.clone());
+        }
+        found
+    }
+
+    fn track(&mut self, gaze: &Gaze, map_from_headset: &Isometry3<f64>) -> Option<TrackUpdate> {
+        let map = self.map.as_ref()?;
+        let same = |tracker: &mut Tracker| tracker.map_from_headset() == *map_from_headset;
+        let tracker = self.tracker.take_if(same);
+        let tracker = tracker.unwrap_or_else(|| Tracker::new(*map_from_headset));
+        let tracker = self.tracker.insert(tracker);
+        Some(tracker.update(map, gaze, &self.options))
+    }
+}
+
+/// What is to be calculated.
+#[derive(Clone, Debug)]
+pub enum Work {
+    /// A pose by several looks, near a start if there is one.
+    Calibrate {
+        /// The looks.
+        gazes: Vec<Arc<Gaze>>,
+        /// `map_from_headset`, about.
+        start: Option<Isometry3<f64>>,
+    },
+    /// The known pose by one more look.
+    Track {
+        /// The look.
+        gaze: Arc<Gaze>,
+        /// The pose.
+        map_from_headset: Isometry3<f64>,
+    },
+}
+
+/// One calculation.
+#[derive(Clone, Debug)]
+pub struct Job {
+    /// Its number.
+    pub id: u64,
+    /// A map to be made ready first.
+    pub map: Option<MapCloud>,
+    /// What is to be calculated.
+    pub work: Work,
+    /// Is set when the calculation is to end early.
+    pub canceled: Arc<AtomicBool>,
+}
+
+/// What came of a calculation.
+#[derive(Clone, Debug)]
+pub enum Done {
+    /// The search has ended.
+    Calibrated(Box<Calibration>),
+    /// The pose was refined; `None`: there is no map.
+    Tracked(Option<TrackUpdate>),
+    /// The map cannot be used, for this reason.
+    NoMap(String),
+}
+
+struct Watch<'a, F> {
+    canceled: &'a AtomicBool,
+    tell: F,
+}
+
+impl<F: Fn(Stage, f64) + Sync> Progress for Watch<'_, F> {
+    fn report(&self, stage: Stage, fraction: f64) -> ControlFlow<()> {
+        (self.tell)(stage, fraction);
+        match self.canceled.load(Relaxed) {
+            true => ControlFlow::Break(()),
+            false => ControlFlow::Continue(()),
+        }
+    }
+}
+
+impl Job {
+    /// Calculates; `tell` hears how far the search is.
+    pub fn run(self, search: &mut dyn Search, tell: impl Fn(Stage, f64) + Sync) -> Done {
+        if let Some(map) = self.map
+            && let Err(reason) = search.prepare(map)
+        {
+            return Done::NoMap(reason);
+        }
+        match self.work {
+            Work::Track {
+                gaze,
+                map_from_headset,
+            } => Done::Tracked(search.track(&gaze, &map_from_headset)),
+            Work::Calibrate { gazes, start } => {
+                let gazes: Vec<Gaze> = gazes.into_iter().map(Arc::unwrap_or_clone).collect();
+                let watch = Watch {
+                    canceled: &self.canceled,
+                    tell,
+                };
+                Done::Calibrated(Box::new(search.calibrate(&gazes, start, &watch)))
+            }
+        }
+    }
+}
