@@ -79,7 +79,7 @@ pub struct Partners {
     pub inlier_fraction: f64,
 }
 
-/// Log-likelihood of a pose against that of a pose far from everything.
+/// Log-likelihood of a pose; each observation adds 0 where it lies on the map as often as by chance.
 #[derive(Clone, Copy, PartialEq, Debug)]
 pub struct Likelihood {
     /// By the surfaces alone.
@@ -128,6 +128,11 @@ impl<'a> Fit<'a> {
     /// Independent observations in the source.
     pub fn observations(&self) -> f64 {
         self.weights.iter().sum()
+    }
+
+    /// Log-likelihood of a pose that puts no point near the target.
+    pub fn nowhere(&self) -> f64 {
+        self.observations() * log_density(0.0)
     }
 
     /// Finds the partners of all source points.
@@ -273,7 +278,7 @@ impl<'a> Fit<'a> {
     }
 }
 
-/// Log of a mixture of partners and of a point anywhere, against a point that is nowhere near.
+/// Log of a mixture of partners and of a point anywhere.
 fn log_density(nearness: f64) -> f64 {
     (1.0 - INLIERS + INLIERS * CONTRAST * nearness).ln()
 }

@@ -108,7 +108,7 @@ impl<'a> Workbench<'a> {
     pub fn second_look(&self, first: &[Candidate]) -> Vec<Candidate> {
         let options = RegisterOptions {
             max_iterations: 8,
-            source_stride: 3,
+            source_stride: self.input.full.len().div_ceil(700),
             ..self.baseline()
         };
         let mut found: Vec<Candidate> = first
@@ -150,6 +150,15 @@ impl<'a> Workbench<'a> {
     /// GICP-SE(3) with all points from a pose: what every candidate ends with.
     pub fn polish(&self, start: &Isometry3<f64>) -> Isometry3<f64> {
         let options = self.baseline();
+        register(&self.input.full, &self.map.cloud, start, &options).target_from_source
+    }
+
+    /// GICP-SE(3) with near partners only.
+    pub fn tighten(&self, start: &Isometry3<f64>) -> Isometry3<f64> {
+        let options = RegisterOptions {
+            gate_m: 4.0 * self.map.spacing_m,
+            ..self.baseline()
+        };
         register(&self.input.full, &self.map.cloud, start, &options).target_from_source
     }
 

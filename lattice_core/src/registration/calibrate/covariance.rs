@@ -1,30 +1,47 @@
 //! How sure a pose is.
 
-use nalgebra::{Isometry3, Matrix3, Matrix3x6, Matrix6, Point3, Vector3, Vector6};
+use nalgebra::{Isometry3, Matrix3, Matrix3x6, Matrix6, Matrix6x3, Point3, Vector3, Vector6};
 use rustc_hash::FxHashMap;
 
 use super::super::PreparedCloud;
 use super::types::{DirectionKind, WeakDirection};
+use crate::pose::se3;
 
 /// Distance in standard deviations at which a point counts half.
 const KERNEL: f64 = 3.0;
 
-/// Covariance of a pose by the scatter of the pull of whole regions (a sandwich estimate with
-/// clusters): points of a region err together, which the inverse Hessian alone does not know.
+/// Covariance of a pose whose source is a surface that is wrong by whole regions.
+///
+/// Points of a region err together (a mesh is bent, a depth camera is off), which the inverse Hessian
+/// does not know: it would be far too small (Bonnabel et al., arXiv 1410.7632). So the pull of each
+/// region is what varies, once as the residuals show it and once as the source is known to err:
+/// H^-1 (sum over regions of the covariance of their pulls) H^-1.
 #[derive(Clone, Copy, PartialEq, Debug)]
 pub(super) struct PoseCovariance {
     /// Of a motion and a turn in the source frame (rho, phi; right perturbation).
     pub at_source: Matrix6<f64>,
 }
 
-/// What the covariance is computed from.
-pub(super) struct Regions {
-    /// Side of a region, metres.
-    pub side_m: f64,
+/// How the source errs.
+pub(super) struct ErrorModel {
+    /// Side of a region that errs as one, metres.
+    pub region_m: f64,
+    /// Standard deviation of a region's place along each axis, metres.
+    pub sigma_m: f64,
+    /// Standard deviation of the source's scale.
+    pub scale_sigma: f64,
+    /// Place in the source from which its scale counts.
+    pub center: Point3<f64>,
     /// Farthest that a partner may be, metres.
     pub gate_m: f64,
-    /// Standard deviation that even the best map leaves, metres and radians.
-    pub floor: (f64, f64),
+}
+
+/// What the points of a region pull at the pose.
+struct Pull {
+    /// By their residuals.
+    residual: Vector6<f64>,
+    /// By a motion of the region.
+    motion: Matrix6x3<f64>,
 }
 
 impl PoseCovariance {
@@ -33,15 +50,16 @@ impl PoseCovariance {
         source: &PreparedCloud,
         target: &PreparedCloud,
         target_from_source: &Isometry3<f64>,
-        regions: &Regions,
+        model: &ErrorModel,
     ) -> Option<PoseCovariance> {
         let turn = target_from_source.rotation.to_rotation_matrix();
         let turn = turn.matrix();
         let mut hessian = Matrix6::zeros();
-        let mut pulls: FxHashMap<[i64; 3], Vector6<f64>> = FxHashMap::default();
+        let mut scaling = Vector6::zeros();
+        let mut pulls: FxHashMap<[i64; 3], Pull> = FxHashMap::default();
         for (point, spread) in source.points_m().iter().zip(source.covariances_m2()) {
             let place = target_from_source * point;
-            let Some((j, _)) = target.nearest(&place, regions.gate_m) else {
+            let Some((j, _)) = target.nearest(&place, model.gate_m) else {
                 continue;
             };
             let (Some(q), Some(n)) = (target.points_m().get(j), target.normals().get(j)) else {
@@ -55,27 +73,50 @@ impl PoseCovariance {
             let r = q - place;
             let jacobian = jacobian(turn, point);
             let weight = 1.0 / (1.0 + r.dot(&(m * r)) / (KERNEL * KERNEL));
-            hessian += jacobian.transpose() * m * jacobian * weight;
-            let region = [point.x, point.y, point.z].map(|c| (c / regions.side_m).floor() as i64);
-            *pulls.entry(region).or_insert_with(Vector6::zeros) +=
-                jacobian.transpose() * m * r * weight;
+            let lever = jacobian.transpose() * m * weight;
+            hessian += lever * jacobian;
+            scaling += lever * (turn * (point - model.center));
+            let region = [point.x, point.y, point.z].map(|c| (c / model.region_m).floor() as i64);
+            let pull = pulls.entry(region).or_insert_with(|| Pull {
+                residual: Vector6::zeros(),
+                motion: Matrix6x3::zeros(),
+            });
+            pull.residual += lever * r;
+            pull.motion += lever;
         }
         // In the order of the regions, so that the sum is the same every time.
         let mut pulls: Vec<_> = pulls.into_iter().collect();
         pulls.sort_by_key(|(region, _)| *region);
-        let n = pulls.len() as f64;
-        if n < 7.0 {
-            return None;
+        let mut scatter = model.scale_sigma.powi(2) * scaling * scaling.transpose();
+        for (_, pull) in &pulls {
+            scatter += pull.residual * pull.residual.transpose();
+            scatter += model.sigma_m.powi(2) * pull.motion * pull.motion.transpose();
         }
-        let scatter: Matrix6<f64> = pulls.iter().map(|(_, g)| g * g.transpose()).sum();
         let inverse = hessian.try_inverse()?;
-        let mut at_source = inverse * scatter * inverse * (n / (n - 6.0));
-        for i in 0..3 {
-            at_source[(i, i)] += regions.floor.0 * regions.floor.0;
-            at_source[(i + 3, i + 3)] += regions.floor.1 * regions.floor.1;
-        }
+        let at_source = inverse * scatter * inverse;
         let finite = at_source.iter().all(|c| c.is_finite());
-        finite.then_some(PoseCovariance { at_source })
+        (finite && !pulls.is_empty()).then_some(PoseCovariance { at_source })
+    }
+
+    /// As wide as it takes for another pose to be that probable.
+    pub fn with_rival(
+        self,
+        pose: &Isometry3<f64>,
+        rival: &Isometry3<f64>,
+        probability: f64,
+    ) -> PoseCovariance {
+        let off = se3::log(&(pose.inverse() * rival));
+        // Variance of a choice between the two.
+        let spread = probability * (1.0 - probability) * off * off.transpose();
+        // Rivals of one kind come many times: the widest counts, not their sum.
+        let here = off.dot(&(self.at_source * off));
+        let wider = off.dot(&(spread * off)) > here;
+        match wider {
+            true => PoseCovariance {
+                at_source: self.at_source + spread,
+            },
+            false => self,
+        }
     }
 
     /// In the order of `geometry_msgs/PoseWithCovariance`, about the axes of the target frame.

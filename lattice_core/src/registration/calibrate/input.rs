@@ -57,7 +57,7 @@ impl Input {
             return Err(rejected("the start is not a pose".into()));
         }
         let full = thinned_to(&all, spacing_m, options.registered_points);
-        let few = thinned_to(&full, 2.0 * spacing_m, options.registered_points / 5);
+        let few = thinned_to(&full, 2.0 * spacing_m, options.registered_points / 8);
         let sensors: Vec<Point3<f64>> = request.gazes.iter().filter_map(|g| g.sensor_m).collect();
         let prepare = |cloud| {
             PreparedCloud::new(cloud, &PrepareOptions::default())

@@ -4,16 +4,19 @@ use nalgebra::{Matrix3, Matrix6};
 use rayon::prelude::*;
 
 use super::super::fit::Fit;
-use super::super::search::{SearchSource, search};
+use super::super::search::{Region, SearchSource, search};
 use super::super::{PrepareOptions, PreparedCloud, SemanticCloud};
-use super::HYPOTHESES;
 use super::candidates::{Candidate, Workbench};
-use super::covariance::{PoseCovariance, Regions};
+use super::covariance::{ErrorModel, PoseCovariance};
 use super::types::{Calibration, ClassReliability, DirectionKind, Verdict, WeakDirection};
+use super::{HYPOTHESES, likeliest};
 
-/// Poses farther apart than this in the midst of the points, or turned by more, are different answers.
-const DIFFERENT_M: f64 = 0.1;
-const DIFFERENT_RAD: f64 = 0.03;
+/// Poses farther apart than this in the midst of the points, or turned by more, are different answers;
+/// nearer ones say how sure the answer is.
+const DIFFERENT_M: f64 = 0.5;
+const DIFFERENT_RAD: f64 = 0.26;
+/// Log-likelihood that is as good as a natural logarithm of odds: observations are not independent.
+const SOFTNESS: f64 = 8.0;
 /// GICP from a given start stands unless another is better by this log-likelihood.
 const DISPLACE: f64 = 10.0;
 
@@ -29,9 +32,17 @@ pub(super) fn answer(bench: &Workbench<'_>, all: Vec<Candidate>, started: bool) 
         .iter()
         .filter(|c| !c.is_near(&pose, &middle, shift_m, turn_rad))
         .map(Candidate::total)
-        .fold(0.0, f64::max);
+        .fold(bench.fit.nowhere(), f64::max);
     let log_margin = best.total() - rival;
-    let covariance = covariance(bench, best);
+    let covariance = covariance(bench, best).map(|sure| {
+        let near = all
+            .iter()
+            .filter(|c| c.is_near(&pose, &middle, shift_m, turn_rad));
+        near.fold(sure, |sure, rival| {
+            let odds = ((rival.total() - best.total()) / SOFTNESS).exp().min(1.0);
+            sure.with_rival(&pose, &rival.map_from_headset, odds / (1.0 + odds))
+        })
+    });
     let directions = (covariance.as_ref())
         .map(|c| c.directions(&pose, &middle))
         .unwrap_or_default();
@@ -66,14 +77,12 @@ pub(super) fn answer(bench: &Workbench<'_>, all: Vec<Candidate>, started: bool) 
 
 /// How far apart different answers are.
 fn different(bench: &Workbench<'_>) -> (f64, f64) {
-    (DIFFERENT_M.max(2.0 * bench.map.spacing_m), DIFFERENT_RAD)
+    (DIFFERENT_M.max(4.0 * bench.map.spacing_m), DIFFERENT_RAD)
 }
 
 /// The likeliest, but what GICP makes of a start if that is the same place or nearly as likely.
 fn choose<'a>(bench: &Workbench<'_>, all: &'a [Candidate], started: bool) -> Option<&'a Candidate> {
-    let best = all
-        .iter()
-        .reduce(|a, b| if b.total() > a.total() { b } else { a })?;
+    let best = likeliest(all)?;
     let gicp = all.first().filter(|_| started);
     Some(match gicp {
         Some(gicp) => {
@@ -102,14 +111,16 @@ fn verdict(
 ) -> (Verdict, String) {
     let options = bench.options;
     let percent = 100.0 * best.inlier_fraction;
-    if best.inlier_fraction < options.min_inliers || best.total() <= 0.0 {
+    if best.inlier_fraction < options.min_inliers {
         let least = 100.0 * options.min_inliers;
         let reason =
             format!("only {percent:.0} % of the points lie on the map, {least:.0} % are needed");
         return (Verdict::NoOverlap, reason);
     }
-    if log_margin < options.min_margin {
-        let least = options.min_margin;
+    // What is not explained might be explained elsewhere.
+    let unexplained = bench.fit.observations() * (1.0 - best.inlier_fraction);
+    let least = options.min_margin.max(0.5 * unexplained);
+    if log_margin < least {
         let reason = format!(
             "another pose fits nearly as well: log-margin {log_margin:.1}, {least:.0} is needed; look elsewhere too"
         );
@@ -137,14 +148,16 @@ fn verdict(
 }
 
 fn covariance(bench: &Workbench<'_>, best: &Candidate) -> Option<PoseCovariance> {
-    let spacing_m = bench.map.spacing_m;
-    let regions = Regions {
-        side_m: 12.0 * spacing_m,
-        gate_m: 6.0 * spacing_m,
-        floor: (0.1 * spacing_m, 5e-4),
+    let options = bench.options;
+    let model = ErrorModel {
+        region_m: options.region_m,
+        sigma_m: options.noise_m,
+        scale_sigma: options.scale_sigma,
+        center: bench.input.sensor_m.unwrap_or_else(|| bench.middle()),
+        gate_m: 6.0 * bench.map.spacing_m,
     };
     let (source, target) = (&bench.input.full, &bench.map.cloud);
-    PoseCovariance::at(source, target, &best.map_from_headset, &regions)
+    PoseCovariance::at(source, target, &best.map_from_headset, &model)
 }
 
 fn reliability(best: &Candidate) -> Vec<ClassReliability> {
@@ -198,6 +211,7 @@ pub(super) fn misread(
     bench: &Workbench<'_>,
     straight: &[Candidate],
     readings: &[Misreading],
+    region: Option<&Region>,
 ) -> Option<&'static str> {
     let straight = straight
         .iter()
@@ -205,20 +219,25 @@ pub(super) fn misread(
         .fold(0.0, f64::max);
     let fits = readings.iter().filter_map(|reading| {
         let axes = Matrix3::from_fn(|row, column| reading.rows[row][column]);
-        Some((surfaces_with(bench, &axes)?, reading.name))
+        Some((surfaces_with(bench, &axes, region)?, reading.name))
     });
     let (best, name) = fits.max_by(|a, b| a.0.total_cmp(&b.0))?;
-    let clear = straight + bench.options.min_margin;
-    (best > clear && best > 0.5 * bench.few.observations()).then_some(name)
+    let observations = bench.few.observations();
+    let clear = straight + bench.options.min_margin.max(0.25 * observations);
+    (best > clear && best > 0.5 * observations).then_some(name)
 }
 
 /// The best likelihood by surfaces of the cloud with other axes, after a first look.
-fn surfaces_with(bench: &Workbench<'_>, axes: &Matrix3<f64>) -> Option<f64> {
+fn surfaces_with(
+    bench: &Workbench<'_>,
+    axes: &Matrix3<f64>,
+    region: Option<&Region>,
+) -> Option<f64> {
     let points = bench.input.few.points_m();
     let turned = SemanticCloud::unlabelled(points.iter().map(|p| axes * p).collect());
     let turned = PreparedCloud::new(turned, &PrepareOptions::default()).ok()?;
     let source = SearchSource::by_surface(&turned, bench.input.sensor_m.map(|p| axes * p));
-    let hypotheses = search(&bench.map.surfaces, &source, None, HYPOTHESES);
+    let hypotheses = search(&bench.map.surfaces, &source, region, HYPOTHESES);
     let scale = bench.map.scale(bench.options.noise_m).coarser(2.0);
     let fit = Fit::new(&turned, &bench.map.cloud, scale);
     let likelihoods = hypotheses.par_iter().map(|h| {

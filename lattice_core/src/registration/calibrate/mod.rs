@@ -36,6 +36,8 @@ pub use types::{
 const HYPOTHESES: usize = 48;
 /// Candidates that are refined to the end.
 const FINALISTS: usize = 4;
+/// Share of points on the map above which a cloud is surely not on its side.
+const GOOD_INLIERS: f64 = 0.8;
 /// Classes that are searched by, at most.
 const SEARCHED_CLASSES: usize = 24;
 
@@ -80,6 +82,11 @@ fn run(
         .flat_map_iter(|c| bench.portfolio(&c.map_from_headset, "search"))
         .collect();
     all.extend(second);
+    // The likeliest again with near partners only, which leaves out what one of the two has not seen.
+    if let Some(best) = likeliest(&all) {
+        let tight = bench.tighten(&best.map_from_headset);
+        all.push(bench.judge(&bench.fit, tight, best.method));
+    }
     if let Some(start) = &request.start {
         // The first of all is what GICP alone would answer.
         let mut from_start = from_start(&bench, start);
@@ -88,19 +95,29 @@ fn run(
     }
     step(progress, Stage::Judge, 0.9)?;
     let calibration = judge::answer(&bench, all, request.start.is_some());
-    let mirrored = judge::misread(&bench, &first, &[judge::MIRRORED]);
-    let misread = mirrored.or_else(|| match calibration.verdict {
-        Verdict::Ok => None,
-        _ => judge::misread(&bench, &first, &judge::ON_THEIR_SIDE),
+    let mirrored = judge::misread(&bench, &first, &[judge::MIRRORED], region.as_ref());
+    let good = calibration.verdict == Verdict::Ok && calibration.inlier_fraction > GOOD_INLIERS;
+    let misread = mirrored.or_else(|| match good {
+        true => None,
+        false => judge::misread(&bench, &first, &judge::ON_THEIR_SIDE, None),
     });
     let _ = progress.report(Stage::Judge, 1.0);
     Ok(match misread {
-        Some(reading) => Calibration::refused(
-            Verdict::RejectedInput,
-            format!("the cloud fits the map only when it is read {reading}: check its axes"),
-        ),
+        Some(reading) => Calibration {
+            verdict: Verdict::RejectedInput,
+            reason: format!(
+                "the cloud fits the map only when it is read {reading}: check its axes"
+            ),
+            ..calibration
+        },
         None => calibration,
     })
+}
+
+/// The candidate that most speaks for.
+fn likeliest(all: &[Candidate]) -> Option<&Candidate> {
+    all.iter()
+        .reduce(|a, b| if b.total() > a.total() { b } else { a })
 }
 
 /// Tells of progress, and ends if that is wanted.

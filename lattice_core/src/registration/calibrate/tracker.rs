@@ -75,7 +75,7 @@ impl Tracker {
         } else {
             old
         };
-        self.misses = match best.inlier_fraction < options.min_inliers || best.total() <= 0.0 {
+        self.misses = match best.inlier_fraction < options.min_inliers {
             true => self.misses + 1,
             false => 0,
         };

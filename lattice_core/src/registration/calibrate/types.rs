@@ -35,8 +35,12 @@ pub struct CalibrationOptions {
     pub max_points: usize,
     /// Points of the headset that are registered, about; more are thinned.
     pub registered_points: usize,
-    /// Standard deviation of the headset's points.
+    /// Standard deviation of the headset's points, and of the place of whole regions of them.
     pub noise_m: f64,
+    /// Side of the regions of the headset's cloud that err together.
+    pub region_m: f64,
+    /// Standard deviation of the headset's scale.
+    pub scale_sigma: f64,
     /// Share of places where equal class numbers are expected to agree before anything was learned;
     /// 0 if the label sets have nothing to do with each other.
     pub agreement: f64,
@@ -54,20 +58,35 @@ pub struct CalibrationOptions {
     pub max_sigma_rad: f64,
 }
 
+impl CalibrationOptions {
+    /// For scans of laser scanners outdoors instead of a headset's mesh.
+    pub fn lidar() -> CalibrationOptions {
+        CalibrationOptions {
+            noise_m: 0.03,
+            scale_sigma: 0.0,
+            start_radius_m: 30.0,
+            max_sigma_m: 0.15,
+            ..CalibrationOptions::default()
+        }
+    }
+}
+
 impl Default for CalibrationOptions {
     fn default() -> CalibrationOptions {
         CalibrationOptions {
             min_points: 100,
             max_points: 500_000,
-            registered_points: 2_000,
-            noise_m: 0.015,
+            registered_points: 4_000,
+            noise_m: 0.018,
+            region_m: 1.0,
+            scale_sigma: 0.005,
             agreement: 0.6,
             start_radius_m: 2.0,
             start_yaw_rad: 1.0,
-            min_margin: 20.0,
+            min_margin: 15.0,
             min_inliers: 0.4,
-            max_sigma_m: 0.05,
-            max_sigma_rad: 0.02,
+            max_sigma_m: 0.08,
+            max_sigma_rad: 0.04,
         }
     }
 }
