@@ -27,7 +27,7 @@ mod warp;
 
 pub use error::HouseError;
 pub use headset::{HeadsetGaze, HeadsetOptions, HeadsetTrial, unity_from_flu};
-pub use labels::{FlipSide, LabelDraw, LabelModel, RegionLabels};
+pub use labels::{FlipSide, LabelDraw, LabelModel, MEASURED_AGREEMENTS, RegionLabels};
 pub use place::{House, SurfaceHit};
 pub use regions::{NO_REGION, Region};
 pub use robot::{Survey, SurveyOptions};
