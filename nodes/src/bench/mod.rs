@@ -1,4 +1,4 @@
-//! Benchmarks on raw point files: their input, their clock and what they print.
+//! Benchmarks: their input, their clock and what they print.
 //!
 //! A point file is little-endian f32 `x y z i`, 16 bytes a point. `FILE.scans` beside it says which points
 //! belong to one scan: records of 32 bytes, three f64 (position of the scanner, m) and a u64 (points).
@@ -11,6 +11,7 @@ mod neighbors;
 mod points;
 mod quantize;
 mod raycast;
+mod register;
 mod report;
 mod site;
 
@@ -21,5 +22,6 @@ pub use neighbors::{NeighborMethod, neighbors};
 pub use points::{PointFileError, ScanRecord, read_points, read_scans, scans_path};
 pub use quantize::{QuantizeMethod, quantize};
 pub use raycast::raycast;
+pub use register::{RegisterReport, RegisterSetup, RegisterTimes, register, register_options};
 pub use report::Report;
 pub use site::{SiteOptions, SiteSummary, write_site};

@@ -25,6 +25,8 @@ pub enum Bench {
     Raycast(Raycast),
     /// Save the occupied voxels as a map file in memory, or load them
     File(MapFile),
+    /// Prepare two point files of any format and register one to the other
+    Register(super::bench_register::Register),
 }
 
 /// What every measurement needs.
@@ -163,6 +165,7 @@ impl Bench {
             Self::Neighbors(command) => command.run(),
             Self::Raycast(command) => command.run(),
             Self::File(command) => command.run(),
+            Self::Register(command) => command.run(),
         }
     }
 }

@@ -1,6 +1,7 @@
 //! The `lattice` command.
 
 mod bench;
+mod bench_register;
 mod demo;
 mod map;
 mod node;
