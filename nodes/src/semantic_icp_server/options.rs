@@ -137,6 +137,7 @@ fn calibration_from(
         min_inliers: number(params, "min_inliers", d.min_inliers, 0.0..=1.0)?,
         max_sigma_m: number(params, "max_sigma_m", d.max_sigma_m, meters)?,
         max_sigma_rad: number(params, "max_sigma_rad", d.max_sigma_rad, 1e-6..=3.2)?,
+        ..d
     })
 }
 
