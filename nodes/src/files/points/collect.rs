@@ -1,5 +1,7 @@
 //! The points found so far.
 
+use lattice_core::registration::UNLABELED;
+
 use super::PointFileError;
 
 /// Room that is made on the word of a header alone, points.
@@ -62,6 +64,22 @@ impl Collector {
             self.labels.push(label);
         }
         Ok(())
+    }
+
+    /// Takes a point with the label that a file has for it, if it has labels; what is no class number is
+    /// no label.
+    pub(super) fn push_with(
+        &mut self,
+        point_m: [f64; 3],
+        label: Option<f64>,
+    ) -> Result<(), PointFileError> {
+        match label {
+            Some(label) => {
+                let is_class = label.fract() == 0.0 && (0.0..65535.0).contains(&label);
+                self.push_labelled(point_m, if is_class { label as u16 } else { UNLABELED })
+            }
+            None => self.push(point_m),
+        }
     }
 
     pub(super) fn skipped_not_finite(&self) -> usize {

@@ -52,7 +52,7 @@ pub struct PointFile {
     /// Finite points in the order of the file, metres, in the frame of the file.
     pub points_m: Vec<[f64; 3]>,
     /// Class of each point, [`UNLABELED`](lattice_core::registration::UNLABELED) where it has none;
-    /// empty if the file has no `label`. Only PLY has.
+    /// empty if the file has no `label`.
     pub labels: Vec<u16>,
     /// What kind of file it was.
     pub format: PointFormat,

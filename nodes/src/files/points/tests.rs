@@ -150,6 +150,33 @@ fn every_format_gives_the_same_points_packed_or_not() {
 }
 
 #[test]
+fn labels_are_classes_in_every_format_that_names_them() {
+    let ply = "ply\nformat ascii 1.0\nelement vertex 4\nproperty int label\nproperty float x\n\
+        property float y\nproperty float z\nend_header\n7 1 2 3\n9 nan 2 3\n-1 1 2 3\n65534 1 2 3\n";
+    let pcd = "VERSION 0.7\nFIELDS x y z label\nSIZE 4 4 4 4\nTYPE F F F I\nWIDTH 4\nHEIGHT 1\n\
+        DATA ascii\n1 2 3 7\nnan 2 3 9\n1 2 3 -1\n1 2 3 65534\n";
+    let mut binary = pcd.replace("ascii", "binary").into_bytes();
+    binary.truncate(binary.len() - "1 2 3 7\nnan 2 3 9\n1 2 3 -1\n1 2 3 65534\n".len());
+    for (x, label) in [(1.0_f32, 7_i32), (f32::NAN, 9), (1.0, -1), (1.0, 65534)] {
+        for coordinate in [x, 2.0, 3.0] {
+            binary.extend(coordinate.to_le_bytes());
+        }
+        binary.extend(label.to_le_bytes());
+    }
+    let text = "x,label,y,z\n1,7,2,3\nnan,9,2,3\n1,wall,2,3\n1,65534,2,3\n";
+    for (name, bytes) in [
+        ("a.ply", ply.as_bytes()),
+        ("a.pcd", pcd.as_bytes()),
+        ("a.pcd", &binary),
+        ("a.csv", text.as_bytes()),
+    ] {
+        let file = read_bytes(name, bytes).unwrap();
+        assert_eq!(file.points_m, [[1.0, 2.0, 3.0]; 3], "{name}");
+        assert_eq!(file.labels, [7, u16::MAX, 65534], "{name}");
+    }
+}
+
+#[test]
 fn points_that_are_not_finite_are_counted() {
     let file = read_bytes("a.xyz", b"1 2 3\nnan 2 3\n1 2 inf\n").unwrap();
     assert_eq!(

@@ -1,7 +1,7 @@
 //! Text files: one point a line, columns between blanks, commas or semicolons.
 //!
-//! x, y and z are the first three columns, unless the first line names its columns. Further columns
-//! are ignored, and so are empty lines and what follows `#`, `%` or `//`.
+//! x, y and z are the first three columns, unless the first line names its columns; a column that it
+//! names `label` is the class. Further columns are ignored, and so are empty lines and what follows `#`, `%` or `//`.
 
 use super::collect::Collector;
 use super::source::Source;
@@ -11,7 +11,7 @@ pub(super) fn read(
     source: &mut Source,
     points: &mut Collector,
 ) -> Result<PointFormat, PointFileError> {
-    let mut columns = [0, 1, 2];
+    let (mut columns, mut label_at) = ([0, 1, 2], None);
     let mut first = true;
     let mut line_number = 0;
     while let Some(line) = source.line()? {
@@ -21,8 +21,14 @@ pub(super) fn read(
             continue;
         }
         match (point(content, columns), first.then(|| names(content))) {
-            (Ok(point_m), _) => points.push(point_m)?,
-            (Err(_), Some(Some(named))) => columns = named,
+            (Ok(point_m), _) => {
+                let label = label_at.map(|at| fields(content).nth(at).and_then(number));
+                points.push_with(point_m, label.map(|l| l.unwrap_or(f64::NAN)))?;
+            }
+            (Err(_), Some(Some(named))) => {
+                columns = named;
+                label_at = column_named(content, "label");
+            }
             (Err(reason), _) => {
                 return Err(PointFileError::Line {
                     format: PointFormat::Text,
@@ -56,10 +62,12 @@ fn fields(content: &str) -> impl Iterator<Item = &str> {
 
 /// Where the columns x, y and z are, if the line names them.
 fn names(content: &str) -> Option<[usize; 3]> {
-    let column = |name: &str| {
-        fields(content).position(|field| field.trim_matches('"').eq_ignore_ascii_case(name))
-    };
+    let column = |name: &str| column_named(content, name);
     Some([column("x")?, column("y")?, column("z")?])
+}
+
+fn column_named(content: &str, name: &str) -> Option<usize> {
+    fields(content).position(|field| field.trim_matches('"').eq_ignore_ascii_case(name))
 }
 
 fn point(content: &str, columns: [usize; 3]) -> Result<[f64; 3], String> {

@@ -1,6 +1,6 @@
 //! The points of a PCD file.
 
-use super::header::Header;
+use super::header::{Axis, Header};
 use super::lzf;
 use crate::files::points::collect::Collector;
 use crate::files::points::source::Source;
@@ -40,7 +40,11 @@ pub(super) fn read_text(
                 ))
             })?;
         }
-        points.push(point_m)?;
+        let label = header.label.map(|label| {
+            let word = words.get(label.column as usize).copied();
+            word.and_then(number).unwrap_or(f64::NAN)
+        });
+        points.push_with(point_m, label)?;
     }
     Ok(())
 }
@@ -55,10 +59,11 @@ pub(super) fn read_binary(
     for index in 1..=header.points {
         let part = format_args!("point {index} of {}", header.points);
         source.exact(&mut record, part)?;
-        points.push(header.axes.map(|axis| {
+        let value = |axis: Axis| {
             let bytes = record.get(axis.offset as usize..).unwrap_or_default();
             axis.scalar.decode(bytes).unwrap_or(f64::NAN)
-        }))?;
+        };
+        points.push_with(header.axes.map(value), header.label.map(value))?;
     }
     Ok(())
 }
@@ -94,12 +99,13 @@ pub(super) fn read_compressed(
     let data = lzf::unpack(&packed, unpacked as usize)
         .map_err(|lzf::Corrupt { byte, reason }| fault(start + byte as u64, reason))?;
     for index in 0..header.points {
-        points.push(header.axes.map(|axis| {
+        let value = |axis: Axis| {
             // All of a field lies together; within the data, which is below 2^32 bytes.
             let at = axis.offset * header.points + index * axis.scalar.size() as u64;
             let bytes = data.get(at as usize..).unwrap_or_default();
             axis.scalar.decode(bytes).unwrap_or(f64::NAN)
-        }))?;
+        };
+        points.push_with(header.axes.map(value), header.label.map(value))?;
     }
     Ok(())
 }

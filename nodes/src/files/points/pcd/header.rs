@@ -22,9 +22,11 @@ pub(super) struct Header {
     pub(super) columns: u64,
     /// x, y and z.
     pub(super) axes: [Axis; 3],
+    /// The class, if there is a field `label` of one number.
+    pub(super) label: Option<Axis>,
 }
 
-/// Where one coordinate is.
+/// Where one number is.
 #[derive(Clone, Copy, Debug)]
 pub(super) struct Axis {
     pub(super) scalar: Scalar,
@@ -130,7 +132,7 @@ impl Lines {
             ));
         }
         let (mut offset, mut column) = (0_u64, 0_u64);
-        let mut axes = [None; 3];
+        let (mut axes, mut label) = ([None; 3], None);
         for (((name, &size), kind), &count) in self
             .fields
             .iter()
@@ -147,6 +149,13 @@ impl Lines {
                         column,
                     });
                 }
+            }
+            if let ("label", Some(scalar), 1) = (name.as_str(), number_kind(kind, size), count) {
+                label = Some(Axis {
+                    scalar,
+                    offset,
+                    column,
+                });
             }
             column = column.saturating_add(count);
             offset = offset.saturating_add(size.saturating_mul(count));
@@ -168,6 +177,7 @@ impl Lines {
             point_bytes: offset,
             columns: column,
             axes: [x, y, z],
+            label,
         })
     }
 
@@ -190,6 +200,20 @@ fn integer(word: &str) -> Result<u64, String> {
     word.parse().map_err(|_| {
         let word: String = word.chars().take(40).collect();
         format!("{word:?} is not a number without sign")
+    })
+}
+
+fn number_kind(kind: &str, size: u64) -> Option<Scalar> {
+    Some(match (kind, size) {
+        ("I", 1) => Scalar::I8,
+        ("U", 1) => Scalar::U8,
+        ("I", 2) => Scalar::I16,
+        ("U", 2) => Scalar::U16,
+        ("I", 4) => Scalar::I32,
+        ("U", 4) => Scalar::U32,
+        ("F", 4) => Scalar::F32,
+        ("F", 8) => Scalar::F64,
+        _ => return None,
     })
 }
 
