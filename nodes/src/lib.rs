@@ -8,6 +8,7 @@ pub mod cli;
 pub mod compute;
 pub mod convert;
 pub mod enu_transformer;
+pub mod evaluate;
 pub mod files;
 pub mod lattice_mapper;
 pub mod map_follower;

@@ -2,7 +2,9 @@
 
 mod bench;
 mod bench_register;
+mod calibrate;
 mod demo;
+mod evaluate;
 mod map;
 mod node;
 mod progress;
@@ -43,6 +45,11 @@ enum Command {
     Simulate(simulate::Simulate),
     /// Quantize a point file (ply, pcd, xyz, KITTI bin) and show what each lattice makes of it
     Quantize(quantize::Quantize),
+    /// Find where a cloud lies in a map, without a guess, and whether the answer holds
+    Calibrate(calibrate::Calibrate),
+    /// Measure what the algorithms are worth
+    #[command(subcommand)]
+    Evaluate(evaluate::Evaluate),
     /// Measure quantizers and stores on a raw point file
     #[command(subcommand)]
     Bench(bench::Bench),
@@ -60,6 +67,8 @@ pub fn main() -> ExitCode {
         Command::Replay(command) => command.run(),
         Command::Simulate(command) => command.run(),
         Command::Quantize(command) => command.run(),
+        Command::Calibrate(command) => command.run(),
+        Command::Evaluate(command) => command.run(),
         Command::Bench(command) => command.run(),
         Command::Map(command) => command.run(),
     };

@@ -1,5 +1,6 @@
-//! Point files, meshes and class names in, pictures and meshes of maps out.
+//! Point files, labelled clouds, meshes and class names in, pictures and meshes of maps out.
 
 pub mod classes;
 pub mod export;
 pub mod points;
+pub mod semantic;

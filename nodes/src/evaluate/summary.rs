@@ -1,0 +1,460 @@
+//! What the trials say together. Nothing is left out: a pose that was refused counts as it is.
+
+use std::collections::BTreeMap;
+
+use serde::Serialize;
+
+use super::settings::Settings;
+use super::statistics::{Share, median, quantile};
+use super::trial::{OURS, TIMED, TRACKED, Trial, WRONG, WRONG_TIGHT};
+
+/// Farther from the other by this is worse: metres and degrees.
+const TOLERANCE: (f64, f64) = (0.01, 0.2);
+
+/// What the paper prints for a scene (Nakamura et al. 2019, table 1).
+#[derive(Clone, Copy, PartialEq, Debug, Serialize)]
+pub struct Printed {
+    /// Scene.
+    pub scene: &'static str,
+    /// d_SE3 of GICP-SE(3).
+    pub gicp_se3: f64,
+    /// d_SE3 of Semantic-ICP.
+    pub semantic_icp: f64,
+}
+
+/// Table 1 of the paper.
+pub const PRINTED: [Printed; 4] = [
+    printed("tv", 0.22, 8.68),
+    printed("desk", 5.42, 0.05),
+    printed("bookshelf", 0.08, 0.76),
+    printed("dining", 0.06, 0.04),
+];
+
+const fn printed(scene: &'static str, gicp_se3: f64, semantic_icp: f64) -> Printed {
+    Printed {
+        scene,
+        gicp_se3,
+        semantic_icp,
+    }
+}
+
+/// One method on one scene with one share of wrong labels from one start.
+#[derive(Clone, PartialEq, Debug, Serialize)]
+pub struct Row {
+    /// Scene, or `all`.
+    pub scene: String,
+    /// Start.
+    pub start: String,
+    /// Share of the view that is labelled wrongly.
+    pub q: f64,
+    /// Method.
+    pub method: String,
+    /// Poses within [`WRONG`].
+    pub success: Share,
+    /// Medians: of d_SE3 as printed,
+    pub d_se3: Option<f64>,
+    /// of its left form,
+    pub d_se3_left: Option<f64>,
+    /// of the distance (m),
+    pub translation_m: Option<f64>,
+    /// of the angle (degrees),
+    pub rotation_deg: Option<f64>,
+    /// of the mean distance of the seen points (m).
+    pub view_m: Option<f64>,
+}
+
+/// Ours against another from the same starts.
+#[derive(Clone, PartialEq, Debug, Serialize)]
+pub struct Paired {
+    /// The other.
+    pub against: String,
+    /// Start, or `all`.
+    pub start: String,
+    /// Share of wrong labels; None for all.
+    pub q: Option<f64>,
+    /// Distance and angle both within 1 cm and 0.2 degrees of the other's, or smaller.
+    pub not_worse: Share,
+    /// The same, or ours is right where the other is wrong.
+    pub not_worse_or_saved: Share,
+    /// By the mean distance of the seen points alone, within 1 cm.
+    pub not_worse_in_view: Share,
+    /// Ours is right and the other wrong.
+    pub saved: Share,
+    /// Ours is wrong and the other right.
+    pub spoiled: Share,
+}
+
+/// What is accepted, and how much of it is wrong.
+#[derive(Clone, PartialEq, Debug, Serialize)]
+pub struct Accepted {
+    /// Scene, or `all`.
+    pub scene: String,
+    /// Start.
+    pub start: String,
+    /// Share of wrong labels; None for all.
+    pub q: Option<f64>,
+    /// Verdict OK.
+    pub accepted: Share,
+    /// Of these, beyond 0.15 m or 3 degrees.
+    pub wrong: Share,
+    /// Of these, beyond 0.10 m or 3 degrees.
+    pub wrong_tight: Share,
+    /// Of these, seen points that are on average beyond 0.15 m, or 3 degrees.
+    pub wrong_in_view: Share,
+    /// Right before any verdict.
+    pub right: Share,
+    /// How often each verdict.
+    pub verdicts: BTreeMap<String, usize>,
+}
+
+/// Normalised squared errors of accepted poses.
+#[derive(Clone, PartialEq, Debug, Serialize)]
+pub struct Consistency {
+    /// Start, or `all`.
+    pub start: String,
+    /// Accepted poses with a covariance.
+    pub n: usize,
+    /// Mean over 6, where 1 is right.
+    pub mean_over_6: Option<f64>,
+    /// Median over 5.35, that of six degrees of freedom.
+    pub median_over_expected: Option<f64>,
+}
+
+/// Wall times of a method.
+#[derive(Clone, PartialEq, Debug, Serialize)]
+pub struct TimeRow {
+    /// Method.
+    pub method: String,
+    /// Start.
+    pub start: String,
+    /// Trials.
+    pub n: usize,
+    /// Milliseconds.
+    pub median_ms: Option<f64>,
+    /// Milliseconds.
+    pub p90_ms: Option<f64>,
+}
+
+/// All tables.
+#[derive(Clone, PartialEq, Debug, Serialize)]
+pub struct Summary {
+    /// Of what.
+    pub settings: Settings,
+    /// Threads that timed trials had; the others had one.
+    pub timed_threads: usize,
+    /// Lines of results.
+    pub trials: usize,
+    /// What the paper prints.
+    pub printed: [Printed; 4],
+    /// By scene, start, share of wrong labels and method; and over all scenes.
+    pub rows: Vec<Row>,
+    /// Ours against the others.
+    pub paired: Vec<Paired>,
+    /// What is accepted.
+    pub accepted: Vec<Accepted>,
+    /// Whether the covariance is right.
+    pub consistency: Vec<Consistency>,
+    /// How long it takes.
+    pub times: Vec<TimeRow>,
+    /// Trials of ours that were refused, or accepted and wrong.
+    pub failures: Vec<Trial>,
+}
+
+/// Scenes of a table: each, and all together.
+fn with_all(trials: &[&Trial], of: impl Fn(&Trial) -> String) -> Vec<String> {
+    let mut names: Vec<String> = trials.iter().map(|t| of(t)).collect();
+    names.sort_unstable();
+    names.dedup();
+    names.push("all".to_owned());
+    names
+}
+
+fn distinct(trials: &[&Trial], of: impl Fn(&Trial) -> String) -> Vec<String> {
+    let mut names = with_all(trials, of);
+    names.pop();
+    names
+}
+
+fn flips(trials: &[&Trial]) -> Vec<f64> {
+    let mut flips: Vec<f64> = trials.iter().map(|t| t.cell.q).collect();
+    flips.sort_by(f64::total_cmp);
+    flips.dedup();
+    flips
+}
+
+fn flips_and_all(trials: &[&Trial]) -> Vec<Option<f64>> {
+    let flips = flips(trials).into_iter().map(Some);
+    flips.chain([None]).collect()
+}
+
+fn is_of(name: &str, wanted: &str) -> bool {
+    wanted == "all" || name == wanted
+}
+
+impl Summary {
+    /// Of trials in the order of [`Results::sorted`](super::Results::sorted).
+    pub fn new(settings: &Settings, trials: &[Trial], timed_threads: usize) -> Summary {
+        let (timed, plain): (Vec<&Trial>, Vec<&Trial>) =
+            (trials.iter()).partition(|t| [TIMED, TRACKED].contains(&t.method.as_str()));
+        let ours: Vec<&Trial> = plain.iter().copied().filter(|t| t.method == OURS).collect();
+        let refused = |t: &&&Trial| !t.is_accepted() || !t.is_within(WRONG);
+        Summary {
+            settings: settings.clone(),
+            timed_threads,
+            trials: trials.len(),
+            printed: PRINTED,
+            rows: rows(&plain),
+            paired: paired(&plain, &ours),
+            accepted: accepted(&ours),
+            consistency: consistency(&ours),
+            times: times(&plain, &timed),
+            failures: ours.iter().filter(refused).map(|t| (**t).clone()).collect(),
+        }
+    }
+}
+
+fn rows(trials: &[&Trial]) -> Vec<Row> {
+    let mut cells: BTreeMap<(String, String, u64, String), Vec<&Trial>> = BTreeMap::new();
+    for trial in trials {
+        for scene in [trial.cell.scene.as_str(), "all"] {
+            // Shares are not negative, so that their bits are in their order.
+            let key = (
+                scene.to_owned(),
+                trial.cell.start.clone(),
+                trial.cell.q.to_bits(),
+            );
+            let key = (key.0, key.1, key.2, trial.method.clone());
+            cells.entry(key).or_default().push(trial);
+        }
+    }
+    let row = |((scene, start, q, method), trials): (_, Vec<&Trial>)| {
+        let median_of = |of: fn(&Trial) -> f64| median(trials.iter().map(|t| of(t)));
+        Row {
+            scene,
+            start,
+            q: f64::from_bits(q),
+            method,
+            success: Share::of(trials.iter().map(|t| t.is_within(WRONG))),
+            d_se3: median_of(|t| t.d_se3),
+            d_se3_left: median_of(|t| t.d_se3_left),
+            translation_m: median_of(|t| t.translation_m),
+            rotation_deg: median_of(|t| t.rotation_deg),
+            view_m: median_of(|t| t.view_m),
+        }
+    };
+    cells.into_iter().map(row).collect()
+}
+
+fn paired(trials: &[&Trial], ours: &[&Trial]) -> Vec<Paired> {
+    let key = |t: &Trial| {
+        (
+            t.cell.scene.clone(),
+            t.cell.seed,
+            t.cell.q.to_bits(),
+            t.cell.start.clone(),
+        )
+    };
+    let mine: BTreeMap<_, &Trial> = ours.iter().map(|t| (key(t), *t)).collect();
+    let others = distinct(trials, |t| t.method.clone());
+    let mut table = Vec::new();
+    for against in others.into_iter().filter(|method| method != OURS) {
+        let of_method = trials.iter().filter(|t| t.method == against);
+        let pairs: Vec<(&Trial, &Trial)> = of_method
+            .filter_map(|other| Some((*mine.get(&key(other))?, *other)))
+            .collect();
+        let others: Vec<&Trial> = pairs.iter().map(|(_, other)| *other).collect();
+        for start in with_all(&others, |t| t.cell.start.clone()) {
+            for q in flips_and_all(&others) {
+                let wanted = |(_, t): &&(&Trial, &Trial)| {
+                    is_of(&t.cell.start, &start) && q.is_none_or(|q| q == t.cell.q)
+                };
+                let cell: Vec<_> = pairs.iter().filter(wanted).copied().collect();
+                table.push(compare(&against, &start, q, &cell));
+            }
+        }
+    }
+    table
+}
+
+fn compare(against: &str, start: &str, q: Option<f64>, pairs: &[(&Trial, &Trial)]) -> Paired {
+    let not_worse = |(a, b): &(&Trial, &Trial)| {
+        a.translation_m <= b.translation_m + TOLERANCE.0
+            && a.rotation_deg <= b.rotation_deg + TOLERANCE.1
+    };
+    let saved = |(a, b): &(&Trial, &Trial)| a.is_within(WRONG) && !b.is_within(WRONG);
+    let spoiled = |(a, b): &(&Trial, &Trial)| !a.is_within(WRONG) && b.is_within(WRONG);
+    Paired {
+        against: against.to_owned(),
+        start: start.to_owned(),
+        q,
+        not_worse: Share::of(pairs.iter().map(not_worse)),
+        not_worse_or_saved: Share::of(pairs.iter().map(|p| not_worse(p) || saved(p))),
+        not_worse_in_view: Share::of(
+            pairs
+                .iter()
+                .map(|(a, b)| a.view_m <= b.view_m + TOLERANCE.0),
+        ),
+        saved: Share::of(pairs.iter().map(saved)),
+        spoiled: Share::of(pairs.iter().map(spoiled)),
+    }
+}
+
+fn accepted(ours: &[&Trial]) -> Vec<Accepted> {
+    let mut table = Vec::new();
+    for start in distinct(ours, |t| t.cell.start.clone()) {
+        let of_start = ours.iter().filter(|t| t.cell.start == start);
+        let of_start: Vec<&Trial> = of_start.copied().collect();
+        for scene in with_all(&of_start, |t| t.cell.scene.clone()) {
+            for q in flips_and_all(&of_start) {
+                let wanted =
+                    |t: &&&Trial| is_of(&t.cell.scene, &scene) && q.is_none_or(|q| q == t.cell.q);
+                let cell: Vec<&Trial> = of_start.iter().filter(wanted).copied().collect();
+                let taken = cell.iter().filter(|t| t.is_accepted());
+                let taken: Vec<&&Trial> = taken.collect();
+                let mut verdicts = BTreeMap::new();
+                for judged in cell.iter().filter_map(|t| t.judged.as_ref()) {
+                    *verdicts.entry(judged.verdict.clone()).or_insert(0) += 1;
+                }
+                table.push(Accepted {
+                    scene: scene.clone(),
+                    start: start.clone(),
+                    q,
+                    accepted: Share::new(taken.len(), cell.len()),
+                    wrong: Share::of(taken.iter().map(|t| !t.is_within(WRONG))),
+                    wrong_tight: Share::of(taken.iter().map(|t| !t.is_within(WRONG_TIGHT))),
+                    wrong_in_view: Share::of(taken.iter().map(|t| !t.is_within_in_view(WRONG))),
+                    right: Share::of(cell.iter().map(|t| t.is_within(WRONG))),
+                    verdicts,
+                });
+            }
+        }
+    }
+    table
+}
+
+fn consistency(ours: &[&Trial]) -> Vec<Consistency> {
+    let taken = ours.iter().filter(|t| t.is_accepted()).copied();
+    let taken: Vec<&Trial> = taken.collect();
+    let of_start = |start: String| {
+        let of = taken.iter().filter(|t| is_of(&t.cell.start, &start));
+        let nees: Vec<f64> = of.filter_map(|t| t.judged.as_ref()?.nees).collect();
+        let mean = nees.iter().sum::<f64>() / nees.len() as f64;
+        Consistency {
+            start,
+            n: nees.len(),
+            mean_over_6: (!nees.is_empty()).then_some(mean / 6.0),
+            median_over_expected: median(nees).map(|nees| nees / 5.348),
+        }
+    };
+    let starts = with_all(&taken, |t| t.cell.start.clone());
+    starts.into_iter().map(of_start).collect()
+}
+
+fn times(plain: &[&Trial], timed: &[&Trial]) -> Vec<TimeRow> {
+    let mut cells: BTreeMap<(String, String), Vec<f64>> = BTreeMap::new();
+    for trial in plain.iter().chain(timed) {
+        let key = (trial.method.clone(), trial.cell.start.clone());
+        cells.entry(key).or_default().push(trial.wall_ms);
+    }
+    let row = |((method, start), ms): (_, Vec<f64>)| TimeRow {
+        method,
+        start,
+        n: ms.len(),
+        median_ms: median(ms.iter().copied()),
+        p90_ms: quantile(ms, 0.9),
+    };
+    cells.into_iter().map(row).collect()
+}
+
+#[cfg(test)]
+mod tests {
+    use lattice_core::registration::{Calibration, Verdict};
+    use nalgebra::{Isometry3, Matrix6, Vector3};
+
+    use super::super::settings::Cell;
+    use super::*;
+
+    /// Off by metres and by degrees about the vertical.
+    fn trial(seed: u64, method: &str, m: f64, deg: f64, verdict: Verdict) -> Trial {
+        let cell = Cell {
+            scene: "tv".to_owned(),
+            seed,
+            q: 0.2,
+            start: "0.3/10".to_owned(),
+        };
+        let pose = Isometry3::new(Vector3::x() * m, Vector3::z() * deg.to_radians());
+        let truth = Isometry3::identity();
+        let trial = Trial::of_pose(&cell, method, &pose, &truth, &[Vector3::x().into()], 10.0);
+        let calibration = Calibration {
+            map_from_headset: pose,
+            covariance: Matrix6::identity() * 1e-4,
+            ..Calibration::refused(verdict, "")
+        };
+        match method {
+            OURS => trial.with_judgement(&calibration, &truth),
+            _ => trial,
+        }
+    }
+
+    #[test]
+    fn refused_poses_count_in_comparisons_and_not_among_the_accepted() {
+        let trials = [
+            trial(0, OURS, 0.02, 0.1, Verdict::Ok),
+            trial(1, OURS, 0.30, 0.0, Verdict::Ok),
+            trial(2, OURS, 0.02, 0.0, Verdict::Ambiguous),
+            trial(3, OURS, 5.00, 90.0, Verdict::NoOverlap),
+            trial(0, "gicp_se3", 0.015, 0.0, Verdict::Ok),
+            trial(1, "gicp_se3", 2.0, 50.0, Verdict::Ok),
+            trial(2, "gicp_se3", 0.2, 0.1, Verdict::Ok),
+            trial(3, "gicp_se3", 0.02, 0.1, Verdict::Ok),
+        ];
+        let summary = Summary::new(&Settings::default(), &trials, 2);
+        let paired = summary
+            .paired
+            .iter()
+            .find(|p| p.start == "all" && p.q.is_none())
+            .unwrap();
+        let counts = |share: &Share| (share.k, share.n);
+        assert_eq!(counts(&paired.not_worse), (3, 4));
+        assert_eq!(
+            (counts(&paired.saved), counts(&paired.spoiled)),
+            ((1, 4), (1, 4))
+        );
+
+        let of_all = |a: &&Accepted| a.scene == "all" && a.q.is_none();
+        let accepted = summary.accepted.iter().find(of_all).unwrap();
+        assert_eq!(counts(&accepted.accepted), (2, 4));
+        assert_eq!(counts(&accepted.wrong), (1, 2));
+        assert_eq!(counts(&accepted.right), (2, 4));
+        assert_eq!(summary.failures.len(), 3);
+
+        // (0.02^2 + 0.1 deg^2) / 1e-4 and 0.3^2 / 1e-4.
+        let both = summary
+            .consistency
+            .iter()
+            .find(|c| c.start == "all")
+            .unwrap();
+        let expected = (4.0 + 0.1_f64.to_radians().powi(2) / 1e-4 + 900.0) / 2.0 / 6.0;
+        assert!((both.mean_over_6.unwrap() - expected).abs() < 1e-6);
+
+        let row = summary
+            .rows
+            .iter()
+            .find(|r| r.scene == "all" && r.method == OURS)
+            .unwrap();
+        assert_eq!(counts(&row.success), (2, 4));
+        assert!((row.translation_m.unwrap() - 0.16).abs() < 1e-6);
+        assert!(
+            super::super::markdown(&summary).contains("| GICP-SE(3) | all | all | 75.0 % of 4")
+        );
+    }
+
+    #[test]
+    fn no_trials_make_empty_tables() {
+        let summary = Summary::new(&Settings::default(), &[], 2);
+        assert!(summary.rows.is_empty() && summary.failures.is_empty());
+        assert!(super::super::markdown(&summary).contains("0 results"));
+        let folder = tempfile::tempdir().unwrap();
+        super::super::draw(folder.path(), &summary, &[]).unwrap();
+    }
+}

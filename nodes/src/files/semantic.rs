@@ -1,0 +1,62 @@
+//! Labelled clouds from map files and point files.
+
+use std::error::Error;
+use std::fs::File;
+use std::io::{BufReader, Read};
+use std::path::Path;
+
+use lattice_core::registration::{LabelDistribution, SemanticCloud};
+use lattice_core::voxels::file::{max_voxels_of, read_map};
+use nalgebra::Point3;
+
+use super::points::{PointFileLimits, read_points};
+
+/// What every map file starts with, whatever its version.
+const MAP_MAGIC: &[u8; 7] = b"LATTICE";
+
+/// A cloud from a file.
+#[derive(Clone, PartialEq, Debug)]
+pub struct SemanticFile {
+    /// Points in the frame of the file, with labels where the file has some.
+    pub cloud: SemanticCloud,
+    /// Side of a cube as large as a voxel, metres, if the file is a map.
+    pub cell_side_m: Option<f64>,
+}
+
+/// Reads a map file, of which each voxel is a point, or a point file with or without a number `label`.
+///
+/// At most `max_points` points; errors name the file.
+pub fn read_semantic(
+    path: &Path,
+    max_points: usize,
+) -> Result<SemanticFile, Box<dyn Error + Send + Sync>> {
+    let here = |e: &dyn std::fmt::Display| format!("{}: {e}", path.display());
+    if is_map(path).map_err(|e| here(&e))? {
+        let file = File::open(path).map_err(|e| here(&e))?;
+        let bytes = file.metadata().map_err(|e| here(&e))?.len();
+        let most = max_voxels_of(bytes).min(max_points);
+        let map = read_map(BufReader::new(file), most).map_err(|e| here(&e))?;
+        return Ok(SemanticFile {
+            cell_side_m: Some(map.lattice().cell_volume_m3().cbrt()),
+            cloud: SemanticCloud::from_voxels(&map),
+        });
+    }
+    let limits = PointFileLimits { max_points };
+    let file = read_points(path, &limits).map_err(|e| here(&e))?;
+    Ok(SemanticFile {
+        cloud: SemanticCloud {
+            points_m: file.points_m.into_iter().map(Point3::from).collect(),
+            labels: (file.labels.into_iter())
+                .map(LabelDistribution::hard)
+                .collect(),
+        },
+        cell_side_m: None,
+    })
+}
+
+fn is_map(path: &Path) -> std::io::Result<bool> {
+    let mut start = Vec::with_capacity(MAP_MAGIC.len());
+    let file = File::open(path)?;
+    file.take(MAP_MAGIC.len() as u64).read_to_end(&mut start)?;
+    Ok(start == MAP_MAGIC)
+}
