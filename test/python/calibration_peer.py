@@ -155,6 +155,7 @@ def run(scenario, directory):
     headset.map_is_there(len(data) // 14)
 
     first = headset.look("good", OK, "one")
+    found["duration_s"] = [first.duration_s]
     found["transform"] = transform(first.transform)
     found["covariance"] = list(first.covariance)
     found["frames"] = [first.header.frame_id, first.child_frame_id, first.session]
@@ -168,7 +169,7 @@ def run(scenario, directory):
     }.items():
         refused = headset.look(name, REJECTED, "one", **options)
         found["refused"][options.get("frame", name)] = refused.reason
-        headset.look("good", OK, "one")
+        found["duration_s"].append(headset.look("good", OK, "one").duration_s)
     headset.transforms.clear()
     headset.peer.until(lambda: headset.transforms, lambda: "no transform")
     parent, child, last = headset.transforms[-1]

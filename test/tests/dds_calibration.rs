@@ -107,6 +107,7 @@ fn a_cyclone_headset_is_found_and_every_bad_cloud_refused() {
     assert!(output.status.success(), "the peer: {}", output.status);
     let found: Value = serde_json::from_slice(&output.stdout).unwrap();
 
+    eprintln!("searched, then tracked, s: {}", found["duration_s"]);
     assert_eq!(found["no_map"], "there is no map yet");
     assert_eq!(found["frames"], json!(["map", "headset_origin", "one"]));
     assert_true(&found["transform"]);

@@ -81,6 +81,7 @@ pub fn start(runtime: &Runtime, name: &str) -> Result<Finish, NodeError> {
         calls: BTreeMap::new(),
         next_call: 0,
         requests: Throttle::new(Duration::from_secs(1)),
+        refusals: Throttle::new(Duration::from_secs(5)),
     };
     let compute = Compute::spawn(name, limits, runtime.shutdown_handle(), move |event| {
         shell.on(event)
@@ -200,6 +201,7 @@ struct Shell {
     calls: BTreeMap<CallId, Client>,
     next_call: CallId,
     requests: Throttle,
+    refusals: Throttle,
 }
 
 impl Shell {
@@ -284,8 +286,10 @@ impl Shell {
         for output in outputs {
             match output {
                 Output::Result(result) => {
-                    if result.verdict != CalibrationResult::OK {
-                        log::info!("not calibrated: {}", result.reason);
+                    if result.verdict != CalibrationResult::OK
+                        && let Some(more) = self.refusals.check()
+                    {
+                        log::info!("not calibrated: {} ({more} more like it)", result.reason);
                     }
                     if let Err(error) = self.outputs.calibration.publish(*result) {
                         log::warn!("calibration not published: {error}");
