@@ -8,6 +8,7 @@ mod gazes;
 mod intake;
 pub mod node;
 mod options;
+mod outcome;
 mod search;
 mod state;
 mod worker;

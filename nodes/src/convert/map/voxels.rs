@@ -1,0 +1,145 @@
+//! The voxels in the columns of a message.
+
+use lattice_core::lattice::Key;
+use lattice_core::registration::UNLABELED;
+use lattice_core::voxels::{VoxelList, codec};
+use lattice_msgs::lattice::{LatticeMap, LatticeMapUpdate};
+
+use super::{KEY_ENCODING, MapMessageError};
+
+/// One voxel as a consumer sees it.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct VoxelState {
+    /// Points that fell into the cell.
+    pub count: u32,
+    /// Mean of the points from the cell centre, in units of the message.
+    pub mean_offset: [i16; 3],
+    /// Most frequent label; [`UNLABELED`] if there is none.
+    pub label: u16,
+    /// Points with that label.
+    pub label_count: u32,
+}
+
+/// The columns of the voxels of a message, empty where not kept.
+#[derive(Clone, Copy, Debug)]
+pub struct VoxelColumns<'a> {
+    /// How the keys are written.
+    pub key_encoding: &'a str,
+    /// Keys.
+    pub keys: &'a [u8],
+    /// Points.
+    pub counts: &'a [u32],
+    /// Three mean offsets each.
+    pub mean_offsets: &'a [i16],
+    /// Most frequent labels.
+    pub labels: &'a [u16],
+    /// Points with them.
+    pub label_counts: &'a [u32],
+}
+
+impl<'a> From<&'a LatticeMap> for VoxelColumns<'a> {
+    fn from(message: &'a LatticeMap) -> Self {
+        Self {
+            key_encoding: &message.key_encoding,
+            keys: &message.keys,
+            counts: &message.counts,
+            mean_offsets: &message.mean_offsets,
+            labels: &message.labels,
+            label_counts: &message.label_counts,
+        }
+    }
+}
+
+impl<'a> From<&'a LatticeMapUpdate> for VoxelColumns<'a> {
+    fn from(message: &'a LatticeMapUpdate) -> Self {
+        Self {
+            key_encoding: &message.key_encoding,
+            keys: &message.keys,
+            counts: &message.counts,
+            mean_offsets: &message.mean_offsets,
+            labels: &message.labels,
+            label_counts: &message.label_counts,
+        }
+    }
+}
+
+/// Voxels of a keyframe chunk or of the changed part of an update.
+pub fn voxels_from(
+    columns: VoxelColumns,
+    max_voxels: usize,
+) -> Result<Vec<(Key, VoxelState)>, MapMessageError> {
+    let keys = keys_from(columns.key_encoding, columns.keys, max_voxels)?;
+    let check = |column, expected, found| {
+        if expected == found {
+            Ok(())
+        } else {
+            Err(MapMessageError::Length {
+                column,
+                voxels: keys.len(),
+                expected,
+                found,
+            })
+        }
+    };
+    check("counts", keys.len(), columns.counts.len())?;
+    check("mean_offsets", keys.len() * 3, columns.mean_offsets.len())?;
+    let labelled = !(columns.labels.is_empty() && columns.label_counts.is_empty());
+    if labelled {
+        check("labels", keys.len(), columns.labels.len())?;
+        check("label_counts", keys.len(), columns.label_counts.len())?;
+    }
+    let labels = columns.labels.iter().zip(columns.label_counts);
+    let labels = labels.map(|(label, count)| (*label, *count));
+    let labels = labels.chain(std::iter::repeat((UNLABELED, 0)));
+    Ok(keys
+        .into_iter()
+        .zip(columns.counts)
+        .zip(columns.mean_offsets.chunks_exact(3))
+        .zip(labels)
+        .map(|(((key, count), offset), (label, label_count))| {
+            let mut mean_offset = [0; 3];
+            mean_offset.copy_from_slice(offset);
+            let state = VoxelState {
+                count: *count,
+                mean_offset,
+                label,
+                label_count,
+            };
+            (key, state)
+        })
+        .collect())
+}
+
+/// Keys of a message.
+pub fn keys_from(
+    key_encoding: &str,
+    keys: &[u8],
+    max_voxels: usize,
+) -> Result<Vec<Key>, MapMessageError> {
+    if key_encoding != KEY_ENCODING {
+        return Err(MapMessageError::Encoding(
+            key_encoding.chars().take(32).collect(),
+        ));
+    }
+    Ok(codec::decode_keys(keys, max_voxels)?)
+}
+
+/// The columns `labels` and `label_counts`, empty if labels are not kept.
+pub(super) fn labels_of(list: &VoxelList, keys: &[Key]) -> (Vec<u16>, Vec<u32>) {
+    if !list.payload().labels {
+        return (Vec::new(), Vec::new());
+    }
+    let labels = keys.iter().map(|key| main_label(list, *key));
+    labels.unzip()
+}
+
+/// The most frequent label of a cell, the smallest of equals, with its points; [`UNLABELED`] and 0 if
+/// no point of it has one.
+pub fn main_label(list: &VoxelList, key: Key) -> (u16, u32) {
+    let labels = list
+        .labels(key)
+        .into_iter()
+        .filter(|l| l.label != UNLABELED);
+    let main = labels.min_by_key(|counted| (std::cmp::Reverse(counted.count), counted.label));
+    main.map_or((UNLABELED, 0), |counted| (counted.label, counted.count))
+}
