@@ -130,6 +130,8 @@ fn calibration_from(
         max_points: semantic.max_points,
         registered_points: at_least_one(params, "registered_points", d.registered_points)?,
         noise_m: number(params, "noise_m", d.noise_m, meters.clone())?,
+        region_m: number(params, "region_m", d.region_m, 1e-3..=1e4)?,
+        scale_sigma: number(params, "scale_sigma", d.scale_sigma, 0.0..=0.5)?,
         agreement: number(params, "agreement", d.agreement, 0.0..=1.0)?,
         start_radius_m: number(params, "guess_radius_m", d.start_radius_m, meters.clone())?,
         start_yaw_rad: number(params, "guess_yaw_rad", d.start_yaw_rad, 0.0..=3.2)?,
@@ -137,7 +139,6 @@ fn calibration_from(
         min_inliers: number(params, "min_inliers", d.min_inliers, 0.0..=1.0)?,
         max_sigma_m: number(params, "max_sigma_m", d.max_sigma_m, meters)?,
         max_sigma_rad: number(params, "max_sigma_rad", d.max_sigma_rad, 1e-6..=3.2)?,
-        ..d
     })
 }
 
