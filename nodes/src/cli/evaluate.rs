@@ -12,7 +12,8 @@ use lattice_core::simulate::house::{House, Scene};
 use super::progress::Progress;
 use super::{CliResult, init_logging};
 use crate::evaluate::{
-    EvaluateError, Plan, Results, Settings, Start, Summary, World, draw, markdown, run,
+    Baseline, EvaluateError, OURS, Pivot, Plan, Results, Settings, Start, Summary, TIMED, TRACKED,
+    World, draw, markdown, run,
 };
 use crate::files::classes::read_classes;
 use crate::files::points::read_mesh;
@@ -49,6 +50,12 @@ pub struct Calibration {
     /// What is known before: metres/degrees off, or none
     #[arg(long, value_delimiter = ',', default_values_t = Plan::default().starts)]
     starts: Vec<Start>,
+    /// What starts are moved and turned at: view (the midst of what is seen) or headset
+    #[arg(long, value_parser = pivot, default_value = "view")]
+    pivot: Pivot,
+    /// Only these methods, named as in trials.jsonl [default: all]
+    #[arg(long, value_delimiter = ',', value_parser = method)]
+    methods: Vec<String>,
     /// Trials at once [default: as many as processors]
     #[arg(long)]
     threads: Option<usize>,
@@ -80,6 +87,26 @@ fn scene(name: &str) -> Result<Scene, String> {
     found.ok_or_else(|| "one of tv, desk, bookshelf, dining".to_owned())
 }
 
+fn method(name: &str) -> Result<String, String> {
+    let mut known: Vec<&str> = Baseline::all()
+        .iter()
+        .map(|baseline| baseline.name)
+        .collect();
+    known.extend([OURS, TIMED, TRACKED]);
+    match known.contains(&name) {
+        true => Ok(name.to_owned()),
+        false => Err(format!("one of {}", known.join(", "))),
+    }
+}
+
+fn pivot(name: &str) -> Result<Pivot, String> {
+    match name {
+        "view" => Ok(Pivot::View),
+        "headset" => Ok(Pivot::Headset),
+        _ => Err("one of view, headset".to_owned()),
+    }
+}
+
 impl Evaluate {
     /// Runs the command.
     pub fn run(self) -> CliResult {
@@ -100,6 +127,7 @@ impl Calibration {
             gazes: self.gazes,
             consistent: self.consistent,
             iid: self.iid,
+            pivot: self.pivot,
             ..Settings::default()
         };
         let plan = self.plan();
@@ -135,6 +163,7 @@ impl Calibration {
                 seeds: 1,
                 flips: vec![0.0, 0.6],
                 starts: vec![Start::Off { m: 0.3, deg: 10.0 }, Start::None],
+                methods: self.methods.clone(),
                 timed_seeds: 1,
             };
         }
@@ -143,6 +172,7 @@ impl Calibration {
             seeds: self.seeds,
             flips: self.flips.clone(),
             starts: self.starts.clone(),
+            methods: self.methods.clone(),
             ..Plan::default()
         }
     }

@@ -3,7 +3,7 @@
 use std::error::Error;
 use std::path::Path;
 
-use plotters::coord::{CoordTranslate, Shift};
+use plotters::coord::Shift;
 use plotters::prelude::*;
 
 use super::markdown::methods;
@@ -15,6 +15,8 @@ type Area<'a> = DrawingArea<SVGBackend<'a>, Shift>;
 
 /// Size of one panel, pixels.
 const PANEL: (u32, u32) = (430, 330);
+/// Width of what the colours mean, pixels.
+const KEY_WIDTH: u32 = 170;
 /// Range of errors that is shown.
 const ERRORS: std::ops::Range<f64> = 0.005..30.0;
 
@@ -41,19 +43,40 @@ fn color(method: &str) -> RGBColor {
     }
 }
 
+/// Panels beside each other and below, with what their colours mean on the right.
 fn panels<'a>(
     path: &'a Path,
     columns: usize,
     rows: usize,
+    key: &[(RGBColor, &str)],
 ) -> Result<(Area<'a>, Vec<Area<'a>>), Fault> {
-    let size = (
-        PANEL.0 * columns.max(1) as u32,
-        PANEL.1 * rows.max(1) as u32,
-    );
+    let (columns, rows) = (columns.max(1), rows.max(1));
+    let width = PANEL.0 * columns as u32;
+    let size = (width + KEY_WIDTH, PANEL.1 * rows as u32);
     let root = SVGBackend::new(path, size).into_drawing_area();
     root.fill(&WHITE)?;
-    let areas = root.split_evenly((rows.max(1), columns.max(1)));
-    Ok((root, areas))
+    let (left, right) = root.split_horizontally(width);
+    for (row, (color, title)) in (0..).zip(key) {
+        let y = 40 + 18 * row;
+        right.draw(&PathElement::new([(4, y), (24, y)], color.stroke_width(3)))?;
+        right.draw(&Text::new(*title, (32, y - 6), ("sans-serif", 14)))?;
+    }
+    Ok((root, left.split_evenly((rows, columns))))
+}
+
+fn key_of_methods() -> Vec<(RGBColor, &'static str)> {
+    let methods = methods().into_iter();
+    methods
+        .map(|(method, title)| (color(method), title))
+        .collect()
+}
+
+/// Accepted and refused.
+fn key_of_verdicts() -> [(RGBColor, &'static str); 2] {
+    [
+        (color("gicp"), "accepted"),
+        (color("class_wise"), "refused"),
+    ]
 }
 
 fn distinct(values: impl Iterator<Item = String>) -> Vec<String> {
@@ -70,13 +93,13 @@ fn lines<'a>(
     start: &'a str,
     value: impl Fn(&Row) -> Option<f64> + Copy + 'a,
 ) -> impl Iterator<Item = (&'static str, RGBColor, Vec<(f64, f64)>)> + 'a {
-    methods().into_iter().filter_map(move |(method, title)| {
+    methods().into_iter().filter_map(move |(method, _)| {
         let of = rows
             .iter()
             .filter(|r| r.scene == scene && r.start == start && r.method == method);
         let mut points: Vec<(f64, f64)> = of.filter_map(|r| Some((r.q, value(r)?))).collect();
         points.sort_by(|a, b| a.0.total_cmp(&b.0));
-        (!points.is_empty()).then(|| (title, color(method), points))
+        (!points.is_empty()).then(|| (method, color(method), points))
     })
 }
 
@@ -85,7 +108,7 @@ fn d_se3(path: &Path, summary: &Summary) -> Result<(), Fault> {
     let rows = &summary.rows;
     let starts = distinct(rows.iter().map(|r| r.start.clone()));
     let scenes = distinct(rows.iter().map(|r| r.scene.clone()).filter(|s| s != "all"));
-    let (root, areas) = panels(path, scenes.len(), starts.len())?;
+    let (root, areas) = panels(path, scenes.len(), starts.len(), &key_of_methods())?;
     let cells = starts
         .iter()
         .flat_map(|start| scenes.iter().map(move |scene| (start, scene)));
@@ -102,42 +125,24 @@ fn d_se3(path: &Path, summary: &Summary) -> Result<(), Fault> {
             .y_desc("median d_SE3")
             .light_line_style(WHITE)
             .draw()?;
-        for (title, color, points) in lines(rows, scene, start, |r| r.d_se3) {
+        for (_, color, points) in lines(rows, scene, start, |r| r.d_se3) {
             let points: Vec<(f64, f64)> = points
                 .into_iter()
                 .map(|(q, d)| (q, d.clamp(ERRORS.start, ERRORS.end)))
                 .collect();
             let marks = points.clone();
-            chart
-                .draw_series(LineSeries::new(points, color.stroke_width(2)))?
-                .label(title)
-                .legend(move |(x, y)| {
-                    PathElement::new([(x, y), (x + 14, y)], color.stroke_width(2))
-                });
+            chart.draw_series(LineSeries::new(points, color.stroke_width(2)))?;
             chart.draw_series(marks.into_iter().map(|p| Circle::new(p, 3, color.filled())))?;
         }
-        legend(&mut chart, SeriesLabelPosition::UpperLeft)?;
     }
     Ok(root.present()?)
-}
-
-fn legend<'a, B: DrawingBackend + 'a, C: CoordTranslate>(
-    chart: &mut ChartContext<'a, B, C>,
-    position: SeriesLabelPosition,
-) -> Result<(), DrawingAreaErrorKind<B::ErrorType>> {
-    chart
-        .configure_series_labels()
-        .position(position)
-        .background_style(WHITE.mix(0.7))
-        .label_font(("sans-serif", 10))
-        .draw()
 }
 
 /// Right poses by q, all scenes: a panel for each start.
 fn success(path: &Path, summary: &Summary) -> Result<(), Fault> {
     let rows = &summary.rows;
     let starts = distinct(rows.iter().map(|r| r.start.clone()));
-    let (root, areas) = panels(path, starts.len(), 1)?;
+    let (root, areas) = panels(path, starts.len(), 1, &key_of_methods())?;
     for (start, area) in starts.iter().zip(&areas) {
         let mut chart = ChartBuilder::on(area)
             .caption(format!("all scenes, start {start}"), ("sans-serif", 15))
@@ -151,18 +156,10 @@ fn success(path: &Path, summary: &Summary) -> Result<(), Fault> {
             .y_desc("right within 0.15 m and 3 deg")
             .light_line_style(WHITE)
             .draw()?;
-        for (title, color, points) in lines(rows, "all", start, |r| r.success.share) {
-            chart
-                .draw_series(LineSeries::new(points, color.stroke_width(2)))?
-                .label(title)
-                .legend(move |(x, y)| {
-                    PathElement::new([(x, y), (x + 14, y)], color.stroke_width(2))
-                });
-            let bars = rows
-                .iter()
-                .filter(|r| r.scene == "all" && &r.start == start);
-            let bars =
-                bars.filter(|r| methods().iter().any(|(m, t)| *m == r.method && *t == title));
+        for (method, color, points) in lines(rows, "all", start, |r| r.success.share) {
+            chart.draw_series(LineSeries::new(points, color.stroke_width(2)))?;
+            let of = |r: &&Row| r.scene == "all" && &r.start == start && r.method == method;
+            let bars = rows.iter().filter(of);
             chart.draw_series(bars.map(|r| {
                 PathElement::new(
                     [(r.q, r.success.low), (r.q, r.success.high)],
@@ -170,7 +167,6 @@ fn success(path: &Path, summary: &Summary) -> Result<(), Fault> {
                 )
             }))?;
         }
-        legend(&mut chart, SeriesLabelPosition::LowerLeft)?;
     }
     Ok(root.present()?)
 }
@@ -189,7 +185,7 @@ fn paired(path: &Path, trials: &[Trial]) -> Result<(), Fault> {
     let theirs: std::collections::BTreeMap<_, &Trial> =
         of("gicp_se3").map(|t| (key(t), t)).collect();
     let starts = distinct(theirs.values().map(|t| t.cell.start.clone()));
-    let (root, areas) = panels(path, starts.len(), 1)?;
+    let (root, areas) = panels(path, starts.len(), 1, &key_of_verdicts())?;
     for (start, area) in starts.iter().zip(&areas) {
         let mut chart = ChartBuilder::on(area)
             .caption(
@@ -223,24 +219,13 @@ fn paired(path: &Path, trials: &[Trial]) -> Result<(), Fault> {
                 color.mix(0.6).filled(),
             )
         }))?;
-        let named = [
-            ("accepted", color("gicp")),
-            ("refused", color("class_wise")),
-        ];
-        for (title, color) in named {
-            chart
-                .draw_series(std::iter::empty::<Circle<(f64, f64), i32>>())?
-                .label(title)
-                .legend(move |(x, y)| Circle::new((x + 7, y), 3, color.filled()));
-        }
-        legend(&mut chart, SeriesLabelPosition::UpperLeft)?;
     }
     Ok(root.present()?)
 }
 
 /// Log-margin over the error, without a start.
 fn margins(path: &Path, trials: &[Trial]) -> Result<(), Fault> {
-    let (root, areas) = panels(path, 1, 1)?;
+    let (root, areas) = panels(path, 1, 1, &key_of_verdicts())?;
     let margins = 0.1..100_000.0;
     if let Some(area) = areas.first() {
         let mut chart = ChartBuilder::on(area)

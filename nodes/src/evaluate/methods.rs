@@ -1,16 +1,12 @@
 //! What ours is compared with.
 
 use lattice_core::registration::{
-    LabelUse, PreparedCloud, RegisterOptions, SemanticVariant, register,
+    LabelUse, Method, PreparedCloud, RegisterOptions, SemanticVariant, register,
 };
 use nalgebra::Isometry3;
 
 /// Gate of the methods for which none is published, metres.
 const GATE_M: f64 = 1.0;
-
-/// Least points of a class for the class-wise method: published are 400 for laser scans; a view of a
-/// headset has some 1500 points, and few of its classes would be left.
-const MIN_CLASS_POINTS: usize = 30;
 
 /// A registration from a start, or the start as it is.
 #[derive(Clone, Copy, Debug)]
@@ -20,6 +16,15 @@ pub struct Baseline {
     /// Name in reports.
     pub title: &'static str,
     options: Option<RegisterOptions<'static>>,
+}
+
+/// The points of the headset, made ready.
+pub struct Sources<'a> {
+    /// Thinned to the cells of the map.
+    pub thinned: &'a PreparedCloud,
+    /// All of them, for the class-wise method: it leaves out classes of fewer than 400 points, which would
+    /// be nearly all of the thinned ones.
+    pub full: &'a PreparedCloud,
 }
 
 impl Baseline {
@@ -55,10 +60,7 @@ impl Baseline {
             of(
                 "class_wise",
                 "class-wise 2017",
-                Some(RegisterOptions {
-                    min_class_points: MIN_CLASS_POINTS,
-                    ..RegisterOptions::class_wise()
-                }),
+                Some(RegisterOptions::class_wise()),
             ),
         ]
     }
@@ -66,12 +68,18 @@ impl Baseline {
     /// Where it ends.
     pub fn run(
         &self,
-        source: &PreparedCloud,
+        sources: &Sources<'_>,
         target: &PreparedCloud,
         start: &Isometry3<f64>,
     ) -> Isometry3<f64> {
         match &self.options {
-            Some(options) => register(source, target, start, options).target_from_source,
+            Some(options) => {
+                let source = match options.method {
+                    Method::ClassWise => sources.full,
+                    _ => sources.thinned,
+                };
+                register(source, target, start, options).target_from_source
+            }
             None => *start,
         }
     }

@@ -29,7 +29,7 @@ pub use markdown::markdown;
 pub use methods::Baseline;
 pub use results::{FILE, Results, ResultsError};
 pub use run::run;
-pub use settings::{Cell, FORMAT, Plan, Settings, Start};
+pub use settings::{Cell, FORMAT, Pivot, Plan, Settings, Start};
 pub use statistics::{Share, median, quantile};
 pub use summary::Summary;
 pub use trial::{Bounds, Judged, OURS, TIMED, TRACKED, Trial, WRONG, WRONG_TIGHT, verdict_name};

@@ -11,7 +11,7 @@ use lattice_core::simulate::house::Scene;
 use nalgebra::Isometry3;
 
 use super::EvaluateError;
-use super::methods::Baseline;
+use super::methods::{Baseline, Sources};
 use super::results::{Results, name};
 use super::settings::{Cell, Plan, Start};
 use super::start::{off, seed_of};
@@ -177,6 +177,7 @@ fn jobs(plan: &Plan, done: &HashSet<String>, timed: bool) -> Vec<Job> {
             false => tasks(plan, scene, seed),
         }
         .into_iter()
+        .filter(|task| plan.wants(task.method.name()))
         .filter(|task| !done.contains(&name(&task.cell, task.method.name())))
         .collect(),
     };
@@ -263,7 +264,7 @@ fn run_task(scenario: &Scenario, task: &Task, job: &Job) -> Trial {
         Start::Off { m, deg } => {
             // The same for every q.
             let seed = seed_of(&[START, job.seed, job.scene as u64, m.to_bits()]);
-            Some(off(&scenario.truth, &scenario.sensor_m, m, deg, seed))
+            Some(off(&scenario.truth, &scenario.pivot_m, m, deg, seed))
         }
     };
     let trial = |pose: &Isometry3<f64>, wall_ms| Trial {
@@ -283,7 +284,11 @@ fn run_task(scenario: &Scenario, task: &Task, job: &Job) -> Trial {
     match task.method {
         TaskMethod::Baseline(baseline) => {
             let start = start.unwrap_or_default();
-            let pose = baseline.run(&scenario.source, scenario.map.cloud(), &start);
+            let sources = Sources {
+                thinned: &scenario.source,
+                full: &scenario.full,
+            };
+            let pose = baseline.run(&sources, scenario.map.cloud(), &start);
             trial(&pose, ms(started))
         }
         TaskMethod::Ours | TaskMethod::Timed => {

@@ -28,6 +28,19 @@ pub struct Settings {
     pub consistent: bool,
     /// Share of single points with a random class.
     pub iid: f64,
+    /// What starts are moved and turned at.
+    pub pivot: Pivot,
+}
+
+/// What a start is moved and turned at.
+#[derive(Clone, Copy, PartialEq, Eq, Debug, Default, Serialize, Deserialize)]
+#[serde(rename_all = "snake_case")]
+pub enum Pivot {
+    /// The midst of the seen points.
+    #[default]
+    View,
+    /// The headset's place: what is seen then moves farther than is said.
+    Headset,
 }
 
 impl Default for Settings {
@@ -41,6 +54,7 @@ impl Default for Settings {
             gazes: 1,
             consistent: false,
             iid: 0.0,
+            pivot: Pivot::default(),
         }
     }
 }
@@ -48,7 +62,7 @@ impl Default for Settings {
 /// What is known of the pose before.
 #[derive(Clone, Copy, PartialEq, Debug)]
 pub enum Start {
-    /// The truth, moved by metres and turned about the vertical by degrees, both at the headset.
+    /// The truth, moved by metres and turned about the vertical by degrees, both at the [`Pivot`].
     Off {
         /// Metres.
         m: f64,
@@ -100,6 +114,8 @@ pub struct Plan {
     pub flips: Vec<f64>,
     /// What is known before.
     pub starts: Vec<Start>,
+    /// Names of the methods that are run; all of them if empty.
+    pub methods: Vec<String>,
     /// Seeds of each scene whose times are measured with nothing else running.
     pub timed_seeds: u64,
 }
@@ -116,6 +132,7 @@ impl Default for Plan {
                 Start::Off { m: 0.8, deg: 35.0 },
                 Start::None,
             ],
+            methods: Vec::new(),
             timed_seeds: 4,
         }
     }
@@ -135,6 +152,11 @@ pub struct Cell {
 }
 
 impl Plan {
+    /// Whether a method is run.
+    pub fn wants(&self, method: &str) -> bool {
+        self.methods.is_empty() || self.methods.iter().any(|name| name == method)
+    }
+
     /// All views, seed by seed, so that what is done first covers all scenes.
     pub fn views(&self) -> Vec<(u64, Scene)> {
         let of_seed = |seed| self.scenes.iter().map(move |&scene| (seed, scene));

@@ -3,13 +3,13 @@
 use nalgebra::{Isometry3, Point3, Translation3, UnitQuaternion, Vector3};
 
 /// The truth, moved by exactly `m` and turned by exactly `deg` about the vertical, either way, both at
-/// the headset's place `sensor_m` (headset frame).
+/// `pivot_m` (headset frame).
 ///
 /// Upright, as both frames are. Three quarters of the motion's variance are level: people guess their
 /// height better than their place.
 pub fn off(
     truth: &Isometry3<f64>,
-    sensor_m: &Point3<f64>,
+    pivot_m: &Point3<f64>,
     m: f64,
     deg: f64,
     seed: u64,
@@ -22,7 +22,7 @@ pub fn off(
     let level = (1.0 - lift * lift).sqrt();
     let moved = Vector3::new(heading.cos() * level, heading.sin() * level, lift) * m;
     let turn = UnitQuaternion::from_scaled_axis(Vector3::z() * (side * deg.to_radians()));
-    let place = Translation3::from((truth * sensor_m).coords);
+    let place = Translation3::from((truth * pivot_m).coords);
     let moved_place = Translation3::from(place.vector + moved);
     moved_place * turn * place.inverse() * truth
 }
@@ -50,13 +50,13 @@ mod tests {
     use super::*;
 
     #[test]
-    fn starts_are_off_by_as_much_as_is_said_at_the_headset() {
+    fn starts_are_off_by_as_much_as_is_said_at_the_pivot() {
         let truth = Isometry3::new(Vector3::new(7.0, -2.0, 1.6), Vector3::z() * 2.5);
-        let sensor = Point3::new(3.0, 4.0, 0.1);
+        let pivot = Point3::new(3.0, 4.0, 0.1);
         let mut sides = 0;
         for seed in 0..200 {
-            let start = off(&truth, &sensor, 0.8, 35.0, seed_of(&[seed, 2]));
-            let moved = (start * sensor) - (truth * sensor);
+            let start = off(&truth, &pivot, 0.8, 35.0, seed_of(&[seed, 2]));
+            let moved = (start * pivot) - (truth * pivot);
             assert!((moved.norm() - 0.8).abs() < 1e-9 && moved.z.abs() <= 0.4 + 1e-9);
             let turn = (start.rotation * truth.rotation.inverse()).scaled_axis();
             assert!((turn.norm().to_degrees() - 35.0).abs() < 1e-9);
@@ -64,6 +64,6 @@ mod tests {
             sides += i32::from(turn.z > 0.0);
         }
         assert!((70..=130).contains(&sides), "{sides}");
-        assert_eq!(off(&truth, &sensor, 0.0, 0.0, 1) * sensor, truth * sensor);
+        assert_eq!(off(&truth, &pivot, 0.0, 0.0, 1) * pivot, truth * pivot);
     }
 }

@@ -11,10 +11,10 @@ use lattice_core::simulate::house::{
     HeadsetOptions, HeadsetTrial, House, HouseError, LabelModel, Scene, Survey, SurveyMap,
     SurveyOptions,
 };
-use nalgebra::{Isometry3, Point3};
+use nalgebra::{Isometry3, Point3, Vector3};
 
 use super::EvaluateError;
-use super::settings::Settings;
+use super::settings::{Pivot, Settings};
 use super::start::seed_of;
 
 /// Purposes of seeds.
@@ -43,10 +43,12 @@ pub struct Scenario {
     pub map: CalibrationMap,
     /// All points of the headset.
     pub gazes: Vec<Gaze>,
-    /// The same as one cloud, thinned to the cells of the map: the source of single registrations.
+    /// The same as one cloud.
+    pub full: PreparedCloud,
+    /// The same thinned to the cells of the map: the source of single registrations.
     pub source: PreparedCloud,
-    /// Where the headset was, in its frame.
-    pub sensor_m: Point3<f64>,
+    /// What starts are moved and turned at, in the headset's frame.
+    pub pivot_m: Point3<f64>,
     /// `map_from_headset`.
     pub truth: Isometry3<f64>,
     /// Share of the view whose labels differ between map and headset.
@@ -95,21 +97,26 @@ impl World {
             sensor_m: Some(gaze.sensor_m),
         };
         let gazes: Vec<Gaze> = (0..).zip(&view.trial.gazes).map(gaze).collect();
-        let sensor_m = view.trial.gazes.first().map(|gaze| gaze.sensor_m);
         let mut all = SemanticCloud::default();
         for gaze in &gazes {
             all.points_m.extend_from_slice(&gaze.cloud.points_m);
             all.labels.extend_from_slice(&gaze.cloud.labels);
         }
-        let source = thin(&all, self.settings.cell_side_m);
+        let middle = all.points_m.iter().map(|p| p.coords).sum::<Vector3<f64>>();
+        let pivot_m = match self.settings.pivot {
+            Pivot::View => Some((middle / all.len().max(1) as f64).into()),
+            Pivot::Headset => view.trial.gazes.first().map(|gaze| gaze.sensor_m),
+        };
+        let thinned = thin(&all, self.settings.cell_side_m);
         let started = Instant::now();
         let map = CalibrationMap::new(map, self.settings.cell_side_m)?;
         Ok(Scenario {
             map_ms: started.elapsed().as_secs_f64() * 1e3,
             map,
             gazes,
-            source: PreparedCloud::new(source, &PrepareOptions::default())?,
-            sensor_m: sensor_m.unwrap_or_default(),
+            source: PreparedCloud::new(thinned, &PrepareOptions::default())?,
+            full: PreparedCloud::new(all, &PrepareOptions::default())?,
+            pivot_m: pivot_m.unwrap_or_default(),
             truth: view.trial.map_from_headset,
             different_share: draw.different_share,
         })
