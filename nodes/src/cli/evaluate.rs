@@ -9,6 +9,7 @@ use std::time::{Duration, Instant};
 use clap::{Args, Subcommand};
 use lattice_core::simulate::house::{House, Scene};
 
+use super::evaluate_kitti::Kitti;
 use super::progress::Progress;
 use super::{CliResult, init_logging};
 use crate::evaluate::{
@@ -24,6 +25,8 @@ pub enum Evaluate {
     /// Calibrate a headset to a robot's map in a simulated house: four scenes, wrong labels, starts that
     /// are off or none at all, against ICP, GICP and Semantic-ICP
     Calibration(Calibration),
+    /// Register real labelled laser scans with each method, against the truth of an INS
+    Kitti(Kitti),
 }
 
 /// Options of `lattice evaluate calibration`.
@@ -113,6 +116,7 @@ impl Evaluate {
         init_logging();
         match self {
             Self::Calibration(command) => command.run(),
+            Self::Kitti(command) => command.run(),
         }
     }
 }

@@ -5,6 +5,7 @@ mod bench_register;
 mod calibrate;
 mod demo;
 mod evaluate;
+mod evaluate_kitti;
 mod map;
 mod node;
 mod progress;

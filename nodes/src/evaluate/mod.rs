@@ -6,6 +6,7 @@
 //! included.
 
 mod figures;
+pub mod kitti;
 mod markdown;
 mod methods;
 mod results;

@@ -2,7 +2,7 @@
 
 import numpy as np
 
-TYPES = {"float": "<f4", "float32": "<f4", "double": "<f8", "float64": "<f8", "uchar": "u1", "uint8": "u1"}
+TYPES = {"float": "<f4", "float32": "<f4", "double": "<f8", "float64": "<f8", "ushort": "<u2", "uchar": "u1", "uint8": "u1"}
 
 
 def read(path):
