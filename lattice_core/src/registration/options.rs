@@ -78,6 +78,9 @@ pub struct RegisterOptions<'a> {
     /// Factor a search on the variances, from a third of the gate across planes down to the true ones, for
     /// [`SemanticVariant::Em`]; 1 or more for none.
     pub anneal: f64,
+    /// Whether the kernel of [`Method::ClassWise`] takes the square of the squared distance, as the program
+    /// of 2017 does.
+    pub kernel_of_square: bool,
     /// Fewest source points of a class for [`Method::ClassWise`].
     pub min_class_points: usize,
     /// Whether the gradient follows the source covariance as it turns. The step does in no case.
@@ -124,6 +127,7 @@ impl RegisterOptions<'_> {
             pair_weight: None,
             outlier_squared: 9.0,
             anneal: 1.0,
+            kernel_of_square: false,
             min_class_points: 0,
             turn_covariance: false,
         }
@@ -167,6 +171,15 @@ impl RegisterOptions<'_> {
         }
     }
 
+    /// Class-wise Semantic-ICP with the kernel and the stop of GICP-SE(3), for sparse clouds.
+    pub fn class_wise_cauchy() -> Self {
+        RegisterOptions {
+            method: Method::ClassWise,
+            min_class_points: 30,
+            ..Self::gicp_se3()
+        }
+    }
+
     /// Class-wise Semantic-ICP as published in 2017 (semantic_icp.hpp).
     pub fn class_wise() -> Self {
         // They stop at ||log||^2 < 1e-3.
@@ -177,6 +190,7 @@ impl RegisterOptions<'_> {
             max_iterations: 35,
             rotation_tolerance_rad: tolerance,
             translation_tolerance_m: tolerance,
+            kernel_of_square: true,
             min_class_points: 400,
             ..Self::gicp_se3()
         }

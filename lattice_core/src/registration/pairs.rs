@@ -402,7 +402,7 @@ fn kernel(options: &RegisterOptions, scale: f64) -> Kernel {
     match options.method {
         Method::PointToPoint | Method::Gicp => Kernel::None,
         Method::Semantic(SemanticVariant::AsPrinted) => Kernel::CauchyAround { a2 },
-        Method::ClassWise => Kernel::CauchyOfSquare { a2 },
-        Method::GicpSe3 | Method::Semantic(_) => Kernel::Cauchy { a2 },
+        Method::ClassWise if options.kernel_of_square => Kernel::CauchyOfSquare { a2 },
+        Method::GicpSe3 | Method::Semantic(_) | Method::ClassWise => Kernel::Cauchy { a2 },
     }
 }

@@ -39,6 +39,7 @@ fn color(method: &str) -> RGBColor {
         "semantic_soft" => RGBColor(240, 228, 66),
         "em_hard" => RGBColor(204, 121, 167),
         "class_wise" => RGBColor(213, 94, 0),
+        "class_wise_cauchy" => RGBColor(128, 56, 0),
         _ => BLACK,
     }
 }

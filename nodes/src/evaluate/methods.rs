@@ -22,7 +22,7 @@ pub struct Baseline {
 pub struct Sources<'a> {
     /// Thinned to the cells of the map.
     pub thinned: &'a PreparedCloud,
-    /// All of them, for the class-wise method: it leaves out classes of fewer than 400 points, which would
+    /// All of them, for the class-wise method of 2017: it leaves out classes of fewer than 400 points, which would
     /// be nearly all of the thinned ones.
     pub full: &'a PreparedCloud,
 }
@@ -62,6 +62,11 @@ impl Baseline {
                 "class-wise 2017",
                 Some(RegisterOptions::class_wise()),
             ),
+            of(
+                "class_wise_cauchy",
+                "class-wise, Cauchy",
+                Some(RegisterOptions::class_wise_cauchy()),
+            ),
         ]
     }
 
@@ -75,7 +80,7 @@ impl Baseline {
         match &self.options {
             Some(options) => {
                 let source = match options.method {
-                    Method::ClassWise => sources.full,
+                    Method::ClassWise if options.kernel_of_square => sources.full,
                     _ => sources.thinned,
                 };
                 register(source, target, start, options).target_from_source

@@ -132,6 +132,7 @@ fn calibration_from(
         noise_m: number(params, "noise_m", d.noise_m, meters.clone())?,
         region_m: number(params, "region_m", d.region_m, 1e-3..=1e4)?,
         scale_sigma: number(params, "scale_sigma", d.scale_sigma, 0.0..=0.5)?,
+        gravity_sigma_rad: gravity_sigma_rad(params, d.gravity_sigma_rad)?,
         agreement: number(params, "agreement", d.agreement, 0.0..=1.0)?,
         start_radius_m: number(params, "guess_radius_m", d.start_radius_m, meters.clone())?,
         start_yaw_rad: number(params, "guess_yaw_rad", d.start_yaw_rad, 0.0..=3.2)?,
@@ -140,6 +141,12 @@ fn calibration_from(
         max_sigma_m: number(params, "max_sigma_m", d.max_sigma_m, meters)?,
         max_sigma_rad: number(params, "max_sigma_rad", d.max_sigma_rad, 1e-6..=3.2)?,
     })
+}
+
+/// Zero in the parameters stands for a frame that does not know where down is.
+fn gravity_sigma_rad(params: &Params, default: f64) -> Result<f64, ParamError> {
+    let sigma = number(params, "gravity_sigma_rad", default, 0.0..=3.2)?;
+    Ok(if sigma > 0.0 { sigma } else { f64::INFINITY })
 }
 
 fn number(

@@ -127,7 +127,7 @@ impl<'a> Workbench<'a> {
     pub fn refine_few(&self, few: &PreparedCloud, start: &Isometry3<f64>) -> Isometry3<f64> {
         let options = RegisterOptions {
             gate_m: 8.0 * self.map.spacing_m,
-            max_iterations: 10,
+            max_iterations: 7,
             ..self.baseline()
         };
         register(few, &self.map.cloud, start, &options).target_from_source

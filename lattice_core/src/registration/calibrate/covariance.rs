@@ -1,6 +1,8 @@
 //! How sure a pose is.
 
-use nalgebra::{Isometry3, Matrix3, Matrix3x6, Matrix6, Matrix6x3, Point3, Vector3, Vector6};
+use nalgebra::{
+    Isometry3, Matrix2, Matrix2x6, Matrix3, Matrix3x6, Matrix6, Matrix6x3, Point3, Vector3, Vector6,
+};
 use rustc_hash::FxHashMap;
 
 use super::super::PreparedCloud;
@@ -9,6 +11,8 @@ use crate::pose::se3;
 
 /// Distance in standard deviations at which a point counts half.
 const KERNEL: f64 = 3.0;
+/// Squared tilt in standard deviations that is still believed; one in ten thousand is larger.
+const MAX_TILT_SQUARED: f64 = 18.4;
 
 /// Covariance of a pose whose source is a surface that is wrong by whole regions.
 ///
@@ -98,6 +102,36 @@ impl PoseCovariance {
         (finite && !pulls.is_empty()).then_some(PoseCovariance { at_source })
     }
 
+    /// The pose and its covariance when both frames are known to stand upright up to `sigma_rad`.
+    ///
+    /// A Kalman update with the tilt as measurement. None if the pose leans by more than both can
+    /// explain: then one of the frames does not stand upright.
+    pub fn upright(
+        &self,
+        pose: &Isometry3<f64>,
+        sigma_rad: f64,
+    ) -> Option<(Isometry3<f64>, PoseCovariance)> {
+        let up = pose.rotation * Vector3::z();
+        let tilt = up.xy();
+        // R Exp(phi) z = R z + R (phi x z).
+        let turn = pose.rotation.to_rotation_matrix();
+        let lean = turn.matrix() * -Vector3::z().cross_matrix();
+        let mut by = Matrix2x6::zeros();
+        by.fixed_view_mut::<2, 3>(0, 3)
+            .copy_from(&lean.fixed_view::<2, 3>(0, 0));
+        let spread = by * self.at_source * by.transpose() + Matrix2::identity() * sigma_rad.powi(2);
+        let inverse = spread.try_inverse()?;
+        if tilt.dot(&(inverse * tilt)) > MAX_TILT_SQUARED {
+            return None;
+        }
+        let gain = self.at_source * by.transpose() * inverse;
+        let at_source = (Matrix6::identity() - gain * by) * self.at_source;
+        let upright = PoseCovariance {
+            at_source: 0.5 * (at_source + at_source.transpose()),
+        };
+        Some((pose * se3::exp(&-(gain * tilt)), upright))
+    }
+
     /// As wide as it takes for another pose to be that probable.
     pub fn with_rival(
         self,
@@ -170,4 +204,30 @@ fn jacobian(turn: &Matrix3<f64>, point: &Point3<f64>) -> Matrix3x6<f64> {
     let lever = turn * point.coords.cross_matrix();
     jacobian.fixed_view_mut::<3, 3>(0, 3).copy_from(&lever);
     jacobian
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use nalgebra::UnitQuaternion;
+
+    #[test]
+    fn a_pose_that_leans_a_little_is_set_upright() {
+        let turn = UnitQuaternion::from_euler_angles(0.02, -0.03, 1.2);
+        let pose = Isometry3::from_parts(Vector3::new(1.0, 2.0, 3.0).into(), turn);
+        let loose = PoseCovariance {
+            at_source: Matrix6::identity() * 1e-3,
+        };
+        let (upright, sure) = loose.upright(&pose, 1e-4).unwrap();
+        assert!((upright.rotation * Vector3::z()).xy().norm() < 1e-3);
+        assert!((upright.rotation.euler_angles().2 - 1.2).abs() < 2e-3);
+        assert!(sure.at_source[(3, 3)] < 1e-6 && sure.at_source[(5, 5)] > 9e-4);
+        // Held by its surfaces it stays where it is; a lean that nothing explains is left alone.
+        let held = PoseCovariance {
+            at_source: Matrix6::identity() * 1e-8,
+        };
+        let (stays, _) = held.upright(&pose, 0.02).unwrap();
+        assert!(stays.rotation.angle_to(&turn) < 1e-5);
+        assert!(held.upright(&pose, 1e-3).is_none());
+    }
 }

@@ -17,6 +17,8 @@ const DIFFERENT_M: f64 = 0.5;
 const DIFFERENT_RAD: f64 = 0.26;
 /// Log-likelihood that is as good as a natural logarithm of odds: observations are not independent.
 const SOFTNESS: f64 = 8.0;
+/// How much larger than its residuals the error of a region may be.
+const INVISIBLE: f64 = 4.0;
 /// GICP from a given start stands unless another is better by this log-likelihood.
 const DISPLACE: f64 = 10.0;
 
@@ -43,6 +45,15 @@ pub(super) fn answer(bench: &Workbench<'_>, all: Vec<Candidate>, started: bool) 
             sure.with_rival(&pose, &rival.map_from_headset, odds / (1.0 + odds))
         })
     });
+    // Both frames know where down is.
+    let gravity = bench.options.gravity_sigma_rad;
+    let upright = (covariance.as_ref())
+        .filter(|_| gravity.is_finite())
+        .and_then(|covariance| covariance.upright(&pose, gravity));
+    let (pose, covariance) = match upright {
+        Some((pose, sure)) => (pose, Some(sure)),
+        None => (pose, covariance),
+    };
     let directions = (covariance.as_ref())
         .map(|c| c.directions(&pose, &middle))
         .unwrap_or_default();
@@ -83,22 +94,19 @@ fn different(bench: &Workbench<'_>) -> (f64, f64) {
 /// The likeliest, but what GICP makes of a start if that is the same place or nearly as likely.
 fn choose<'a>(bench: &Workbench<'_>, all: &'a [Candidate], started: bool) -> Option<&'a Candidate> {
     let best = likeliest(all)?;
-    let gicp = all.first().filter(|_| started);
-    Some(match gicp {
-        Some(gicp) => {
-            let spacing_m = bench.map.spacing_m;
-            let same = gicp.is_near(
-                &best.map_from_headset,
-                &bench.middle(),
-                spacing_m / 2.0,
-                0.005,
-            );
-            match same || best.total() < gicp.total() + DISPLACE {
-                true => gicp,
-                false => best,
-            }
-        }
-        None => best,
+    let Some(gicp) = all.first().filter(|_| started) else {
+        return Some(best);
+    };
+    // A little to the side of what GICP found is hardly better, whatever the likelihood says.
+    let (shift_m, turn_rad) = (3.0 * bench.map.spacing_m, 0.09);
+    let beside = gicp.is_near(&best.map_from_headset, &bench.middle(), shift_m, turn_rad);
+    let least = match beside {
+        true => DISPLACE.max(0.2 * bench.fit.observations()),
+        false => DISPLACE,
+    };
+    Some(match best.total() < gicp.total() + least {
+        true => gicp,
+        false => best,
     })
 }
 
@@ -151,7 +159,8 @@ fn covariance(bench: &Workbench<'_>, best: &Candidate) -> Option<PoseCovariance>
     let options = bench.options;
     let model = ErrorModel {
         region_m: options.region_m,
-        sigma_m: options.noise_m,
+        // A cloud that fits far closer than expected also errs less as a whole.
+        sigma_m: options.noise_m.min(INVISIBLE * best.rmse_m),
         scale_sigma: options.scale_sigma,
         center: bench.input.sensor_m.unwrap_or_else(|| bench.middle()),
         gate_m: 6.0 * bench.map.spacing_m,

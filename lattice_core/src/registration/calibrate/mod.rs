@@ -36,6 +36,8 @@ pub use types::{
 const HYPOTHESES: usize = 48;
 /// Candidates that are refined to the end.
 const FINALISTS: usize = 4;
+/// Log-likelihood of an observation that refining a candidate may still win it.
+const HOPE: f64 = 0.25;
 /// Share of points on the map above which a cloud is surely not on its side.
 const GOOD_INLIERS: f64 = 0.8;
 /// Classes that are searched by, at most.
@@ -76,9 +78,11 @@ fn run(
     step(progress, Stage::Refine, 0.6)?;
     let second = bench.second_look(&first);
     step(progress, Stage::Refine, 0.7)?;
+    let hopeful = second.first().map_or(0.0, Candidate::total) - HOPE * bench.fit.observations();
     let mut all: Vec<Candidate> = second
         .par_iter()
         .take(FINALISTS)
+        .filter(|c| c.total() >= hopeful)
         .flat_map_iter(|c| bench.portfolio(&c.map_from_headset, "search"))
         .collect();
     all.extend(second);
@@ -183,8 +187,7 @@ fn from_start(bench: &Workbench<'_>, start: &Isometry3<f64>) -> Vec<Candidate> {
         let options = RegisterOptions {
             gate_m,
             inner_iterations: 2,
-            min_class_points: 20,
-            ..RegisterOptions::class_wise()
+            ..RegisterOptions::class_wise_cauchy()
         };
         let pose = register(source, map, start, &options);
         let polished = bench.polish(&pose.target_from_source);

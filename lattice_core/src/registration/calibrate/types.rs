@@ -41,6 +41,9 @@ pub struct CalibrationOptions {
     pub region_m: f64,
     /// Standard deviation of the headset's scale.
     pub scale_sigma: f64,
+    /// Standard deviation of the tilt between the two frames, radians; infinite if one does not know
+    /// where down is.
+    pub gravity_sigma_rad: f64,
     /// Share of places where equal class numbers are expected to agree before anything was learned;
     /// 0 if the label sets have nothing to do with each other.
     pub agreement: f64,
@@ -64,6 +67,7 @@ impl CalibrationOptions {
         CalibrationOptions {
             noise_m: 0.03,
             scale_sigma: 0.0,
+            gravity_sigma_rad: f64::INFINITY,
             start_radius_m: 30.0,
             max_sigma_m: 0.15,
             ..CalibrationOptions::default()
@@ -77,15 +81,16 @@ impl Default for CalibrationOptions {
             min_points: 100,
             max_points: 500_000,
             registered_points: 4_000,
-            noise_m: 0.018,
+            noise_m: 0.02,
             region_m: 1.0,
             scale_sigma: 0.005,
+            gravity_sigma_rad: 0.006,
             agreement: 0.6,
             start_radius_m: 2.0,
             start_yaw_rad: 1.0,
-            min_margin: 15.0,
+            min_margin: 25.0,
             min_inliers: 0.4,
-            max_sigma_m: 0.08,
+            max_sigma_m: 0.1,
             max_sigma_rad: 0.04,
         }
     }

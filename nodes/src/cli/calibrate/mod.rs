@@ -62,15 +62,36 @@ pub struct Calibrate {
     /// 1/400 of the diagonal, at least 0.05]
     #[arg(long)]
     cell: Option<f64>,
-    /// Standard deviation of the cloud's points, m
-    #[arg(long, default_value_t = CalibrationOptions::default().noise_m)]
-    noise: f64,
+    /// What made the cloud: how far it errs, and whether it knows where down is, follow from it
+    #[arg(long, value_enum, default_value_t = Sensor::Headset)]
+    from: Sensor,
+    /// Standard deviation of the cloud's points, m [default: 0.02 of a headset, 0.03 of a lidar]
+    #[arg(long)]
+    noise: Option<f64>,
     /// Most points to read of a file
     #[arg(long, default_value_t = 20_000_000)]
     max_points: usize,
     /// Print as JSON
     #[arg(long)]
     json: bool,
+}
+
+/// What makes clouds.
+#[derive(Clone, Copy, Debug, clap::ValueEnum)]
+enum Sensor {
+    /// The mesh of a mixed-reality headset, upright
+    Headset,
+    /// A laser scanner, outdoors, that may lean
+    Lidar,
+}
+
+impl Sensor {
+    fn options(self) -> CalibrationOptions {
+        match self {
+            Sensor::Headset => CalibrationOptions::default(),
+            Sensor::Lidar => CalibrationOptions::lidar(),
+        }
+    }
 }
 
 impl Calibrate {
@@ -126,7 +147,7 @@ impl Calibrate {
         };
         positive("gate", self.gate)?;
         positive("cell", self.cell)?;
-        positive("noise", Some(self.noise))
+        positive("noise", self.noise)
     }
 
     /// Searches, judges and keeps what was learned.
@@ -153,9 +174,10 @@ impl Calibrate {
             start: self.guess.as_ref().map(|guess| guess.0),
             confusion: known.as_ref(),
         };
+        let usual = self.from.options();
         let options = CalibrationOptions {
-            noise_m: self.noise,
-            ..CalibrationOptions::default()
+            noise_m: self.noise.unwrap_or(usual.noise_m),
+            ..usual
         };
         let started = Instant::now();
         let calibration = calibrate(&map, &request, &options, &Shown(&bar));
