@@ -45,8 +45,8 @@ fn an_evaluation_is_continued_and_does_not_depend_on_threads() {
         String::from_utf8_lossy(&output.stderr)
     );
     let all = trials(folder.path());
-    // Settings; two shares of wrong labels, from a start by nine methods and without by ours; two timed.
-    assert_eq!(all.len(), 1 + 2 * (9 + 1) + 2);
+    // Settings; two shares of wrong labels, from a start by ten methods and without by ours; two timed.
+    assert_eq!(all.len(), 1 + 2 * (10 + 1) + 2);
     let report = String::from_utf8(output.stdout).unwrap();
     for part in [
         "## Table 1 of the paper",
