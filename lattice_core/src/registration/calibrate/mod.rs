@@ -40,8 +40,6 @@ const FINALISTS: usize = 4;
 const HOPE: f64 = 0.25;
 /// Share of points on the map above which a cloud is surely not on its side.
 const GOOD_INLIERS: f64 = 0.8;
-/// Margin of an observation above which it is neither, however little of it is on the map.
-const CLEAR: f64 = 0.5;
 /// Classes that are searched by, at most.
 const SEARCHED_CLASSES: usize = 24;
 
@@ -102,9 +100,9 @@ fn run(
     step(progress, Stage::Judge, 0.9)?;
     let calibration = judge::answer(&bench, all, request.start.is_some());
     let mirrored = judge::misread(&bench, &first, &[judge::MIRRORED], region.as_ref());
-    let clear = calibration.log_margin > CLEAR * bench.fit.observations();
-    let good =
-        calibration.verdict == Verdict::Ok && (clear || calibration.inlier_fraction > GOOD_INLIERS);
+    let good = calibration.verdict == Verdict::Ok && calibration.inlier_fraction > GOOD_INLIERS;
+    // A cloud that may lean is not of a headset, whose axes are often mistaken.
+    let good = good || !options.gravity_sigma_rad.is_finite();
     let misread = mirrored.or_else(|| match good {
         true => None,
         false => judge::misread(&bench, &first, &judge::ON_THEIR_SIDE, None),
