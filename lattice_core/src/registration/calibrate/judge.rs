@@ -45,10 +45,11 @@ pub(super) fn answer(bench: &Workbench<'_>, all: Vec<Candidate>, started: bool) 
             sure.with_rival(&pose, &rival.map_from_headset, odds / (1.0 + odds))
         })
     });
-    // Both frames know where down is.
+    // Both frames know where down is; but what GICP made of a start stands as it is.
     let gravity = bench.options.gravity_sigma_rad;
+    let stands = started && all.first().is_some_and(|gicp| std::ptr::eq(gicp, best));
     let upright = (covariance.as_ref())
-        .filter(|_| gravity.is_finite())
+        .filter(|_| gravity.is_finite() && !stands)
         .and_then(|covariance| covariance.upright(&pose, gravity));
     let (pose, covariance) = match upright {
         Some((pose, sure)) => (pose, Some(sure)),
