@@ -75,7 +75,9 @@ impl Confusion {
     /// Share of a source class's observations that met the same class number; its observations.
     pub fn agreement(&self, class: u16) -> (f64, f64) {
         let of = |keep: &dyn Fn(&(u16, u16, f64)) -> bool| -> f64 {
-            self.pairs.iter().filter(|p| keep(p)).map(|p| p.2).sum()
+            // Not a sum, which is -0 where there is nothing.
+            let kept = self.pairs.iter().filter(|p| keep(p));
+            kept.fold(0.0, |sum, p| sum + p.2)
         };
         let all = of(&|p| p.0 == class);
         let same = of(&|p| p.0 == class && p.1 == class);
@@ -311,6 +313,7 @@ mod tests {
         assert!((both.mass() - MAX_MASS).abs() < 1e-6);
         assert!((both.agreement(1).0 - 0.9).abs() < 1e-9);
         assert_eq!(both.agreement(5), (0.0, 0.0));
+        assert!(learned(&[(1, 2, 5.0)]).agreement(1).0.is_sign_positive());
         assert!(both.is_valid());
         let back: Confusion = learned(&[(1, 1, f64::NAN)]);
         assert!(!back.is_valid());
