@@ -4,7 +4,7 @@ use std::collections::BTreeMap;
 
 use serde::{Deserialize, Serialize};
 
-use super::LabelDistribution;
+use super::{LabelDistribution, PreparedCloud};
 
 /// Observations that count as much as what is assumed beforehand.
 const PRIOR_MASS: f64 = 30.0;
@@ -27,13 +27,9 @@ pub struct Confusion {
 }
 
 impl Confusion {
-    /// Next to no observations of every pair of classes that two clouds hold, so that their lift is what
-    /// is assumed beforehand.
-    pub fn unseen<'a>(
-        source: impl Iterator<Item = &'a LabelDistribution>,
-        target: impl Iterator<Item = &'a LabelDistribution>,
-    ) -> Confusion {
-        let (source, target) = (shares(source), shares(target));
+    /// Next to no observations of every pair of classes that two clouds hold, by the shares of each, so
+    /// that their lift is what is assumed beforehand.
+    pub(super) fn unseen(source: &[(u16, f64)], target: &[(u16, f64)]) -> Confusion {
         let pairs = source
             .iter()
             .flat_map(|(a, p)| target.iter().map(move |(b, q)| (*a, *b, p * q * 1e-3)));
@@ -129,10 +125,16 @@ impl Confusion {
 }
 
 /// Shares of the most frequent classes, in the order of their numbers.
-fn shares<'a>(labels: impl Iterator<Item = &'a LabelDistribution>) -> Vec<(u16, f64)> {
+pub(super) fn shares(cloud: &PreparedCloud) -> Vec<(u16, f64)> {
+    shares_of((0..cloud.len()).map(|i| cloud.label(i)))
+}
+
+fn shares_of(labels: impl Iterator<Item = LabelDistribution>) -> Vec<(u16, f64)> {
     let mut sums: BTreeMap<u16, f64> = BTreeMap::new();
-    for (class, weight) in labels.flat_map(LabelDistribution::iter) {
-        *sums.entry(class).or_default() += f64::from(weight);
+    for label in labels {
+        for (class, weight) in label.iter() {
+            *sums.entry(class).or_default() += f64::from(weight);
+        }
     }
     let all: f64 = sums.values().sum::<f64>().max(1e-9);
     let mut shares: Vec<(u16, f64)> = sums.into_iter().map(|(c, w)| (c, w / all)).collect();
@@ -300,7 +302,10 @@ mod tests {
     fn unseen_classes_are_expected_to_agree_as_far_as_they_are_shared() {
         let source = [1, 1, 2].map(LabelDistribution::hard);
         let target = [2, 3].map(LabelDistribution::hard);
-        let unseen = Confusion::unseen(source.iter(), target.iter());
+        let unseen = Confusion::unseen(
+            &shares_of(source.into_iter()),
+            &shares_of(target.into_iter()),
+        );
         let lift = unseen.lift(0.6);
         assert!(lift.of(2, 2) > 1.2 && lift.of(2, 2) > lift.of(2, 3));
         assert!((unseen.lift(0.0).of(2, 2) - 1.0).abs() < 1e-9);

@@ -202,9 +202,16 @@ impl<'a> Fit<'a> {
     }
 
     /// Likelihood of a pose whose partners these are. Labels count as far as `known` and what the
-    /// other folds teach predict them; `agreement` as in [`Confusion::lift`].
-    pub fn likelihood(&self, partners: &Partners, known: &Confusion, agreement: f64) -> Likelihood {
-        let lifts = self.lifts(partners, known, agreement);
+    /// other folds teach predict them; `agreement` as in [`Confusion::lift`]. With it comes what the
+    /// pose teaches about the labels.
+    pub fn likelihood(
+        &self,
+        partners: &Partners,
+        known: &Confusion,
+        agreement: f64,
+    ) -> (Likelihood, Confusion) {
+        let counts = self.count(partners);
+        let lifts = lifts(&counts, known, agreement);
         let (mut surfaces, mut both) = (0.0, 0.0);
         for (i, near) in partners.of_point.iter().enumerate() {
             let weight = self.weights.get(i).copied().unwrap_or(0.0);
@@ -224,32 +231,18 @@ impl<'a> Fit<'a> {
             surfaces += weight * log_density(plain);
             both += weight * log_density(labelled);
         }
-        Likelihood {
+        let likelihood = Likelihood {
             surfaces,
             labels: both - surfaces,
-        }
+        };
+        (likelihood, sum(counts.iter()))
     }
 
-    /// The lift to judge each fold by.
-    fn lifts(&self, partners: &Partners, known: &Confusion, agreement: f64) -> Vec<Lift> {
+    /// Labels seen in one place, by fold; none where one cloud has none.
+    fn count(&self, partners: &Partners) -> Vec<Counts> {
         if !self.source.is_labelled() || !self.target.is_labelled() {
             return Vec::new();
         }
-        let counts = self.count(partners);
-        let lift = |fold: usize| {
-            let mut others = Counts::default();
-            for (i, counts) in counts.iter().enumerate() {
-                if i != fold {
-                    others.add_all(counts);
-                }
-            }
-            known.merged(&others.confusion()).lift(agreement)
-        };
-        (0..FOLDS).map(lift).collect()
-    }
-
-    /// Labels seen in one place, by fold.
-    fn count(&self, partners: &Partners) -> Vec<Counts> {
         let mut counts = vec![Counts::default(); FOLDS];
         for (i, near) in partners.of_point.iter().enumerate() {
             let weight = self.weights.get(i).copied().unwrap_or(0.0);
@@ -267,15 +260,22 @@ impl<'a> Fit<'a> {
         }
         counts
     }
+}
 
-    /// What this pose teaches about the labels.
-    pub fn learn(&self, partners: &Partners) -> Confusion {
-        let mut all = Counts::default();
-        for counts in &self.count(partners) {
-            all.add_all(counts);
-        }
-        all.confusion()
-    }
+/// The lift to judge each fold by: what is known and what the others teach.
+fn lifts(counts: &[Counts], known: &Confusion, agreement: f64) -> Vec<Lift> {
+    let lift = |fold: usize| {
+        let others = counts.iter().enumerate().filter(|(i, _)| *i != fold);
+        let others = sum(others.map(|(_, counts)| counts));
+        known.merged(&others).lift(agreement)
+    };
+    (0..counts.len()).map(lift).collect()
+}
+
+fn sum<'a>(counts: impl Iterator<Item = &'a Counts>) -> Confusion {
+    let mut all = Counts::default();
+    counts.for_each(|counts| all.add_all(counts));
+    all.confusion()
 }
 
 /// Log of a mixture of partners and of a point anywhere.

@@ -3,6 +3,7 @@
 use nalgebra::{Isometry3, Point3, Vector3};
 use rayon::prelude::*;
 
+use super::super::confusion::shares;
 use super::super::fit::{Fit, Likelihood, Partners};
 use super::super::search::Hypothesis;
 use super::super::{
@@ -74,11 +75,7 @@ impl<'a> Workbench<'a> {
         known: Option<&Confusion>,
     ) -> Workbench<'a> {
         let scale = map.scale(options.noise_m);
-        let labels = |cloud: &PreparedCloud| -> Vec<_> {
-            (0..cloud.len()).map(|i| cloud.label(i)).collect()
-        };
-        let (source, target) = (labels(&input.few), labels(&map.cloud));
-        let unseen = Confusion::unseen(source.iter(), target.iter());
+        let unseen = Confusion::unseen(&shares(&input.few), &map.classes);
         Workbench {
             map,
             input,
@@ -196,7 +193,8 @@ impl<'a> Workbench<'a> {
     /// What speaks for a pose.
     pub fn judge(&self, fit: &Fit<'_>, pose: Isometry3<f64>, method: &'static str) -> Candidate {
         let partners: Partners = fit.partners(&pose);
-        let likelihood = fit.likelihood(&partners, &self.known, self.options.agreement);
+        let (likelihood, confusion) =
+            fit.likelihood(&partners, &self.known, self.options.agreement);
         let blocked = self.input.sensor_m.map_or(0.0, |sensor| {
             let clear_m = 5.0 * self.map.spacing_m;
             blocked_fraction(&self.map.occupied, &self.input.few, &sensor, &pose, clear_m)
@@ -208,7 +206,7 @@ impl<'a> Workbench<'a> {
             blocked: blocked * fit.observations() * BLOCKED_COST,
             inlier_fraction: partners.inlier_fraction,
             rmse_m: partners.rmse_m,
-            confusion: fit.learn(&partners),
+            confusion,
         }
     }
 

@@ -253,7 +253,8 @@ fn surfaces_with(
     let likelihoods = hypotheses.par_iter().map(|h| {
         let pose = bench.refine_few(&turned, &h.target_from_source);
         let partners = fit.partners(&pose);
-        fit.likelihood(&partners, &bench.known, 0.0).surfaces
+        let (likelihood, _) = fit.likelihood(&partners, &bench.known, 0.0);
+        likelihood.surfaces
     });
     likelihoods.max_by(f64::total_cmp)
 }

@@ -1,5 +1,6 @@
 //! A map made ready for calibrations.
 
+use super::super::confusion::shares;
 use super::super::fit::FitScale;
 use super::super::search::{OccupiedGrid, SearchMap};
 use super::super::{PrepareOptions, PreparedCloud, RegistrationError, SemanticCloud};
@@ -10,6 +11,8 @@ pub struct CalibrationMap {
     pub(super) surfaces: SearchMap,
     pub(super) occupied: OccupiedGrid,
     pub(super) spacing_m: f64,
+    /// Shares of the classes.
+    pub(super) classes: Vec<(u16, f64)>,
 }
 
 impl CalibrationMap {
@@ -34,6 +37,7 @@ impl CalibrationMap {
             });
         };
         Ok(CalibrationMap {
+            classes: shares(&cloud),
             cloud,
             surfaces,
             occupied,

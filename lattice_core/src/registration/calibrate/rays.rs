@@ -7,6 +7,8 @@ use super::super::search::OccupiedGrid;
 
 /// Rays that are looked at, at most.
 const RAYS: usize = 300;
+/// Cells of a ray that are looked at, at most, however far a point claims to be.
+const STEPS: usize = 1000;
 
 /// Share of the rays to the points that pass through something on their way.
 ///
@@ -31,15 +33,13 @@ pub(super) fn blocked_fraction(
         }
         rays += 1;
         let direction = way / length;
-        // Two occupied cells in a row are a surface, one may be a corner that was brushed.
         let stride = occupied.cell_m();
         let cells = ((length - 2.0 * clear_m) / stride) as usize;
-        let mut met = 0;
-        for i in 0..=cells {
+        let meets = (0..=cells.min(STEPS)).any(|i| {
             let place = from + direction * (clear_m + i as f64 * stride);
-            met += usize::from(occupied.contains(&place));
-        }
-        blocked += u32::from(met > 0);
+            occupied.contains(&place)
+        });
+        blocked += u32::from(meets);
     }
     f64::from(blocked) / f64::from(rays.max(1))
 }
