@@ -195,7 +195,7 @@ fn what_is_not_a_segment_in_range_is_refused() {
     }
 }
 
-/// A random line crosses surface / 4 faces per unit volume: `lattices.md` A4.
+/// A random line crosses surface / 4 faces per unit volume (Cauchy and Crofton).
 #[test]
 fn crossings_per_length_are_those_of_the_theory() {
     for (kind, expected) in [

@@ -80,7 +80,7 @@ impl Confusion {
         (if all > 0.0 { same / all } else { 0.0 }, all)
     }
 
-    /// The lift of each pair of classes (`semantic_icp.md` 3.1):
+    /// The lift of each pair of classes:
     /// P(a, b in one place) / (P(a) P(b)).
     ///
     /// `agreement` is the share of places where equal class numbers are expected beforehand, 0 if the

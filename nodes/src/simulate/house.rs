@@ -7,10 +7,11 @@ use std::io::{self, BufWriter, Write};
 use std::path::{Path, PathBuf};
 
 use lattice_core::lattice::{Lattice, LatticeError, LatticeKind};
+use lattice_core::pose::Axes;
 use lattice_core::registration::UNLABELED;
 use lattice_core::simulate::house::{
     HeadsetOptions, HeadsetTrial, House, HouseError, LabelDraw, LabelModel, Scene, Survey,
-    SurveyOptions, unity_from_flu,
+    SurveyOptions,
 };
 use lattice_core::voxels::file::{FileError, write_map};
 use nalgebra::{Isometry3, Point3};
@@ -287,7 +288,7 @@ fn write_scene(
     let name = trial.scene.name();
     let turned = |point_m: &Point3<f64>| match options.axes {
         HeadsetAxes::Ros => *point_m,
-        HeadsetAxes::Unity => unity_from_flu(point_m),
+        HeadsetAxes::Unity => Axes::UnityRuf.from_ros(point_m.coords).into(),
     };
     let mut truth = SceneTruth {
         scene: name.to_owned(),

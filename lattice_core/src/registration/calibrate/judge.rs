@@ -1,6 +1,6 @@
 //! Which candidate is the answer, and what can be said of it.
 
-use nalgebra::{Matrix3, Matrix6};
+use nalgebra::{Matrix3, Matrix6, Vector3};
 use rayon::prelude::*;
 
 use super::super::fit::Fit;
@@ -10,6 +10,7 @@ use super::candidates::{Candidate, Workbench};
 use super::covariance::{ErrorModel, PoseCovariance};
 use super::types::{Calibration, ClassReliability, DirectionKind, Verdict, WeakDirection};
 use super::{HYPOTHESES, likeliest};
+use crate::pose::Axes;
 
 /// Poses farther apart than this in the midst of the points, or turned by more, are different answers;
 /// nearer ones say how sure the answer is.
@@ -188,33 +189,41 @@ fn reliability(best: &Candidate) -> Vec<ClassReliability> {
         .collect()
 }
 
-/// A way in which the axes of a cloud may have been misread, with the matrix that mends it.
-pub(super) struct Misreading {
-    pub name: &'static str,
-    rows: [[f64; 3]; 3],
+/// A way in which the axes of a cloud may have been misread.
+#[derive(Clone, Copy)]
+pub(super) enum Misreading {
+    /// One axis has the wrong sign. It may fit by chance, so it is always looked at.
+    Mirrored,
+    /// Other axes than those of ROS.
+    Axes(Axes),
 }
 
-/// The one that may fit by chance, so that it is always looked at.
-pub(super) const MIRRORED: Misreading = Misreading {
-    name: "mirrored",
-    rows: [[1., 0., 0.], [0., -1., 0.], [0., 0., 1.]],
-};
-
-/// Those that stand on their side, `semantic_icp.md` 5.1.
+/// Those that stand on their side.
 pub(super) const ON_THEIR_SIDE: [Misreading; 3] = [
-    Misreading {
-        name: "as Unity's left-handed axes",
-        rows: [[0., 0., 1.], [-1., 0., 0.], [0., 1., 0.]],
-    },
-    Misreading {
-        name: "as WinRT's axes",
-        rows: [[0., 0., -1.], [-1., 0., 0.], [0., 1., 0.]],
-    },
-    Misreading {
-        name: "as a camera's optical axes",
-        rows: [[0., 0., 1.], [-1., 0., 0.], [0., -1., 0.]],
-    },
+    Misreading::Axes(Axes::UnityRuf),
+    Misreading::Axes(Axes::WinrtRub),
+    Misreading::Axes(Axes::Optical),
 ];
+
+impl Misreading {
+    fn name(self) -> &'static str {
+        match self {
+            Misreading::Mirrored => "mirrored",
+            Misreading::Axes(Axes::UnityRuf) => "as Unity's left-handed axes",
+            Misreading::Axes(Axes::WinrtRub) => "as WinRT's axes",
+            Misreading::Axes(Axes::Optical) => "as a camera's optical axes",
+            Misreading::Axes(Axes::RosFlu) => "as ROS axes",
+        }
+    }
+
+    /// What mends it.
+    fn matrix(self) -> Matrix3<f64> {
+        match self {
+            Misreading::Mirrored => Matrix3::from_diagonal(&Vector3::new(1.0, -1.0, 1.0)),
+            Misreading::Axes(axes) => axes.matrix(),
+        }
+    }
+}
 
 /// How the cloud must be read to fit, if it fits clearly better so than as it is.
 pub(super) fn misread(
@@ -228,8 +237,10 @@ pub(super) fn misread(
         .map(|c| c.likelihood.surfaces)
         .fold(0.0, f64::max);
     let fits = readings.iter().filter_map(|reading| {
-        let axes = Matrix3::from_fn(|row, column| reading.rows[row][column]);
-        Some((surfaces_with(bench, &axes, region)?, reading.name))
+        Some((
+            surfaces_with(bench, &reading.matrix(), region)?,
+            reading.name(),
+        ))
     });
     let (best, name) = fits.max_by(|a, b| a.0.total_cmp(&b.0))?;
     let observations = bench.few.observations();

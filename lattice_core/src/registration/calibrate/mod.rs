@@ -99,7 +99,12 @@ fn run(
     }
     step(progress, Stage::Judge, 0.9)?;
     let calibration = judge::answer(&bench, all, request.start.is_some());
-    let mirrored = judge::misread(&bench, &first, &[judge::MIRRORED], region.as_ref());
+    let mirrored = judge::misread(
+        &bench,
+        &first,
+        &[judge::Misreading::Mirrored],
+        region.as_ref(),
+    );
     let good = calibration.verdict == Verdict::Ok && calibration.inlier_fraction > GOOD_INLIERS;
     // A cloud that may lean is not of a headset, whose axes are often mistaken.
     let good = good || !options.gravity_sigma_rad.is_finite();

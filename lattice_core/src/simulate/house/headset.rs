@@ -100,12 +100,6 @@ pub struct HeadsetTrial {
     pub mesh: LabelledMesh,
 }
 
-/// Left-handed axes of Unity (x right, y up, z forward) of a point in ROS axes (x forward, y left,
-/// z up): (-y, z, x).
-pub fn unity_from_flu(point_m: &Point3<f64>) -> Point3<f64> {
-    Point3::new(-point_m.y, point_m.z, point_m.x)
-}
-
 impl HeadsetTrial {
     /// Stands before the object of a scene and looks at it; single-threaded, by the seed alone.
     pub fn new(

@@ -1,6 +1,6 @@
 //! A furnished house, a robot that maps it, and a headset that looks at four of its corners.
 //!
-//! Made for the calibration of a headset to a robot map (semantic_icp, evaluation track A): a
+//! Made for the calibration of a headset to a robot map: a
 //! [`House`] is a labelled mesh, of a real house or [`House::own`], at a pose in the map, [`Survey`] the labelled points that a robot with
 //! a depth camera gathers in it, [`HeadsetTrial`] what a headset sees of a [`Scene`] on its own coarse
 //! mesh, with the true `map_from_headset`, and [`LabelModel`] how wrong the labels of the two are.
@@ -26,7 +26,7 @@ mod tests;
 mod warp;
 
 pub use error::HouseError;
-pub use headset::{HeadsetGaze, HeadsetOptions, HeadsetTrial, unity_from_flu};
+pub use headset::{HeadsetGaze, HeadsetOptions, HeadsetTrial};
 pub use labels::{FlipSide, LabelDraw, LabelModel, MEASURED_AGREEMENTS, RegionLabels};
 pub use place::{House, SurfaceHit};
 pub use regions::{NO_REGION, Region};
