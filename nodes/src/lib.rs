@@ -13,6 +13,7 @@ pub mod files;
 pub mod lattice_mapper;
 pub mod map_follower;
 pub mod node;
+pub mod paper;
 pub mod replay;
 pub mod report;
 pub mod runtime;

@@ -1,0 +1,6 @@
+//! The two papers behind this library, each table and figure computed anew and set beside what is
+//! printed: Ryde & Brünig 2011 (lattices) and Nakamura et al. (calibration).
+
+pub mod calibration;
+pub mod report;
+pub mod voxels;

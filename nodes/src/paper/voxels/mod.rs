@@ -1,0 +1,1 @@
+//! Ryde & Brünig, "Lattice Occupied Voxel Lists for Representation of Spatial Occupancy".
