@@ -44,6 +44,16 @@ pub enum ExportError {
         /// 1 for the whole map.
         zoom: f64,
     },
+    /// There is no such place.
+    #[error(
+        "a picture {width_m} m wide around {center_m:?}: both must be finite, the width 0.001 to 1e7"
+    )]
+    Focus {
+        /// In the middle, metres.
+        center_m: [f64; 3],
+        /// Metres.
+        width_m: f64,
+    },
     /// The PNG encoder failed.
     #[error("writing the PNG failed: {0}")]
     Png(#[from] png::EncodingError),

@@ -12,8 +12,8 @@ pub use centers::write_centers_ply;
 pub use cloud::write_labelled_ply;
 pub use error::ExportError;
 pub use mesh::write_mesh_ply;
-pub use palette::{HeightRange, color_at};
-pub use render::{RenderOptions, render_png};
+pub use palette::{HeightRange, category_color, color_at};
+pub use render::{Focus, LabelColors, RenderOptions, render_labels_png, render_png};
 pub use vertices::SharedVertices;
 
 use lattice_core::voxels::VoxelList;

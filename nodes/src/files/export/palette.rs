@@ -23,6 +23,20 @@ pub(super) fn linear_at(fraction: f64) -> [f64; 3] {
     };
     let between = |[low, high]: [f64; 2]| low + (high - low) * t;
     let (lightness, hue) = (between(LIGHTNESS), between(HUE_DEG).to_radians());
+    on_screen(lightness, hue)
+}
+
+/// sRGB colour of one of a row of things that have no order: neighbours in the row are far apart.
+pub fn category_color(index: usize) -> [u8; 3] {
+    /// Degrees: the golden angle, so that any first few hues are spread.
+    const TURN_DEG: f64 = 137.507_764;
+    let lightness = [0.70, 0.56, 0.82][index % 3];
+    let hue = (30.0 + index as f64 * TURN_DEG).rem_euclid(360.0);
+    on_screen(lightness, hue.to_radians()).map(srgb)
+}
+
+/// Linear light of an OKLab lightness and hue (rad), as much coloured as the screen can.
+fn on_screen(lightness: f64, hue: f64) -> [f64; 3] {
     let mut chroma = CHROMA;
     loop {
         let rgb = oklab_to_linear(lightness, chroma * hue.cos(), chroma * hue.sin());
@@ -131,6 +145,17 @@ mod tests {
         assert_eq!(color_at(-3.0), color_at(0.0));
         assert_eq!(color_at(f64::INFINITY), color_at(1.0));
         assert_eq!(color_at(f64::NAN), color_at(0.5));
+    }
+
+    #[test]
+    fn categories_are_told_apart() {
+        for i in 0..18 {
+            for j in 0..i {
+                let pairs = category_color(i).into_iter().zip(category_color(j));
+                let apart = pairs.map(|(a, b)| f64::from(a.abs_diff(b)).powi(2));
+                assert!(apart.sum::<f64>().sqrt() > 25.0, "{i} {j}");
+            }
+        }
     }
 
     #[test]

@@ -8,9 +8,11 @@ mod raster;
 mod shade;
 mod view;
 
+use std::collections::BTreeMap;
 use std::io::Write;
 
 use lattice_core::voxels::VoxelList;
+use nalgebra::Vector3;
 
 use super::ExportError;
 use raster::Scene;
@@ -38,6 +40,26 @@ pub struct RenderOptions {
     pub background: [u8; 4],
     /// 1 shows the whole map, 2 half of its width and height around where most cells are.
     pub zoom: f64,
+    /// A place to show in place of the whole map, at the same size whatever else there is.
+    pub focus: Option<Focus>,
+}
+
+/// What a picture is centred on.
+#[derive(Clone, Copy, PartialEq, Debug)]
+pub struct Focus {
+    /// In the middle of the picture: map frame, metres.
+    pub center_m: [f64; 3],
+    /// From the left to the right of the picture with a zoom of 1, metres.
+    pub width_m: f64,
+}
+
+/// sRGB colours of labels.
+pub type LabelColors = BTreeMap<u16, [u8; 3]>;
+
+/// What the colour of a cell tells.
+enum Paint<'a> {
+    Height,
+    Label(&'a LabelColors),
 }
 
 impl Default for RenderOptions {
@@ -50,6 +72,7 @@ impl Default for RenderOptions {
             elevation_deg: 35.0,
             background: [255; 4],
             zoom: 1.0,
+            focus: None,
         }
     }
 }
@@ -62,11 +85,36 @@ pub fn render_png(
     options: &RenderOptions,
     writer: impl Write,
 ) -> Result<(), ExportError> {
+    render(list, &Paint::Height, options, writer)
+}
+
+/// The same, coloured by the most counted label of each cell; grey where it has none or none of these.
+pub fn render_labels_png(
+    list: &VoxelList,
+    colors: &LabelColors,
+    options: &RenderOptions,
+    writer: impl Write,
+) -> Result<(), ExportError> {
+    render(list, &Paint::Label(colors), options, writer)
+}
+
+fn render(
+    list: &VoxelList,
+    paint: &Paint,
+    options: &RenderOptions,
+    writer: impl Write,
+) -> Result<(), ExportError> {
     check(options)?;
-    let scene = Scene::new(list);
+    let scene = Scene::new(list, paint);
     let size = [options.width, options.height].map(|side| side as usize * SAMPLES);
-    let view =
-        View::new(options.azimuth_deg, options.elevation_deg, size).fit(&scene, options.zoom);
+    let view = View::new(options.azimuth_deg, options.elevation_deg, size);
+    let view = match options.focus {
+        Some(focus) => {
+            let center_m = Vector3::from(focus.center_m) - list.datum_m();
+            view.at(&center_m, focus.width_m / options.zoom)
+        }
+        None => view.fit(&scene, options.zoom),
+    };
     let pixels = shade::picture(&scene, &view, options);
 
     let mut encoder = png::Encoder::new(writer, options.width, options.height);
@@ -105,6 +153,11 @@ fn check(options: &RenderOptions) -> Result<(), ExportError> {
             elevation_deg,
             zoom,
         });
+    }
+    if let Some(Focus { center_m, width_m }) = options.focus
+        && !(center_m.iter().all(|c| c.is_finite()) && (1e-3..=1e7).contains(&width_m))
+    {
+        return Err(ExportError::Focus { center_m, width_m });
     }
     Ok(())
 }

@@ -4,41 +4,78 @@ use lattice_core::lattice::{Key, Lattice};
 use lattice_core::voxels::VoxelList;
 use nalgebra::Vector3;
 
+use super::Paint;
 use super::view::View;
 use crate::files::export::HeightRange;
+use crate::files::export::palette::{linear, linear_at};
 
 /// Depth where there is nothing.
 pub(super) const NOTHING: f32 = f32::NEG_INFINITY;
 /// Cells smaller than this on the screen, samples, are drawn larger so that none is lost.
 const SMALL: f64 = 2.0;
+/// sRGB of cells without a label.
+const NO_LABEL: u8 = 150;
 
 /// A map as it is drawn.
 pub(super) struct Scene {
     lattice: Lattice,
-    /// Cell and index of the face.
-    exposed: Vec<(Key, usize)>,
-    heights: HeightRange,
+    exposed: Vec<Exposed>,
+    /// Linear colour of each tone.
+    pub(super) palette: Vec<[f64; 3]>,
     /// Largest extent of a cell from its centre, metres.
     pub(super) radius_m: f64,
 }
 
+/// A face that can be seen.
+struct Exposed {
+    key: Key,
+    face: u8,
+    tone: u8,
+}
+
 impl Scene {
-    pub(super) fn new(list: &VoxelList) -> Scene {
+    pub(super) fn new(list: &VoxelList, paint: &Paint) -> Scene {
         let lattice = list.lattice().clone();
-        let exposed = list.exposed_faces();
-        let height = |&(key, _): &(Key, usize)| lattice.center(key.unpack()).z;
+        let faces = list.exposed_faces();
+        let height = |key: Key| lattice.center(key.unpack()).z;
+        let exposed = |tone: &dyn Fn(Key) -> u8| {
+            let exposed = |&(key, face): &(Key, usize)| Exposed {
+                key,
+                face: face as u8,
+                tone: tone(key),
+            };
+            faces.iter().map(exposed).collect()
+        };
+        let (palette, exposed) = match paint {
+            Paint::Height => {
+                let heights = HeightRange::of(faces.iter().map(|&(key, _)| height(key)));
+                let palette = (0..=255).map(|tone| linear_at(f64::from(tone) / 255.0));
+                let tone = |key| (heights.fraction(height(key)) * 255.0).round() as u8;
+                (palette.collect(), exposed(&tone))
+            }
+            Paint::Label(colors) => {
+                // The first tone is of cells without a label.
+                let palette = [&[NO_LABEL; 3]].into_iter().chain(colors.values());
+                let tone = |key| {
+                    let label = list.label(key).map(|counted| counted.label);
+                    let place = colors.keys().position(|of| Some(*of) == label);
+                    place.map_or(0, |at| u8::try_from(at + 1).unwrap_or(0))
+                };
+                (palette.map(|c| c.map(linear)).collect(), exposed(&tone))
+            }
+        };
         Scene {
-            heights: HeightRange::of(exposed.iter().map(height)),
             radius_m: lattice.covering_radius_m(),
             lattice,
             exposed,
+            palette,
         }
     }
 
     /// Centres of the cells that can be seen, relative to the datum, metres.
     pub(super) fn centers(&self) -> impl Iterator<Item = Vector3<f64>> + '_ {
         let mut last = None;
-        let keys = self.exposed.iter().map(|&(key, _)| key);
+        let keys = self.exposed.iter().map(|exposed| exposed.key);
         let new = keys.filter(move |&key| last.replace(key) != Some(key));
         new.map(|key| self.lattice.center(key.unpack()))
     }
@@ -66,11 +103,10 @@ impl Scene {
             .zip(self.normals())
             .map(|(face, normal)| Stamp::new(view, &normal, cell.polygon(face), self.radius_m))
             .collect();
-        for &(key, face) in &self.exposed {
-            if let Some(Some(stamp)) = stamps.get(face) {
+        for &Exposed { key, face, tone } in &self.exposed {
+            if let Some(Some(stamp)) = stamps.get(usize::from(face)) {
                 let center = self.lattice.center(key.unpack());
-                let tone = (self.heights.fraction(center.z) * 255.0).round() as u8;
-                stamp.draw(view.project(&center), [tone, face as u8], &mut screen);
+                stamp.draw(view.project(&center), [tone, face], &mut screen);
             }
         }
         screen
@@ -80,7 +116,7 @@ impl Scene {
 /// What is seen at a sample.
 #[derive(Clone, Copy, Default, Debug)]
 pub(super) struct Surface {
-    /// Height of the cell, 0 to 255 of the range.
+    /// Of the cell: place in the palette.
     pub(super) tone: u8,
     /// Index of the face.
     pub(super) face: u8,

@@ -7,7 +7,7 @@ use super::light::{Sun, openness};
 use super::raster::{NOTHING, Scene, Screen};
 use super::view::View;
 use super::{RenderOptions, SAMPLES};
-use crate::files::export::palette::{linear, linear_at, srgb};
+use crate::files::export::palette::{linear, srgb};
 
 /// Linear light of the sun, a little warm.
 const SUN: [f64; 3] = [1.02, 0.98, 0.90];
@@ -26,9 +26,7 @@ pub(super) fn picture(scene: &Scene, view: &View, options: &RenderOptions) -> Ve
     let shader = Shader {
         sun: Sun::new(scene, options.azimuth_deg, view.size),
         normals: scene.normals(),
-        palette: (0..=255)
-            .map(|tone| linear_at(f64::from(tone) / 255.0))
-            .collect(),
+        palette: &scene.palette,
         edge: EDGE * fraction(scene.radius_m * view.scale, EDGES_FROM),
         radius_m: scene.radius_m,
         screen: &screen,
@@ -56,7 +54,7 @@ fn fraction(value: f64, [low, high]: [f64; 2]) -> f64 {
 struct Shader<'a> {
     sun: Sun,
     normals: Vec<Vector3<f64>>,
-    palette: Vec<[f64; 3]>,
+    palette: &'a [[f64; 3]],
     edge: f64,
     radius_m: f64,
     screen: &'a Screen,

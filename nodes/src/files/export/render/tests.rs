@@ -30,6 +30,10 @@ fn options() -> RenderOptions {
 fn render(list: &VoxelList, options: &RenderOptions) -> Vec<Vec<[u8; 4]>> {
     let mut bytes = Vec::new();
     render_png(list, options, &mut bytes).unwrap();
+    decoded(bytes, options)
+}
+
+fn decoded(bytes: Vec<u8>, options: &RenderOptions) -> Vec<Vec<[u8; 4]>> {
     let mut reader = png::Decoder::new(std::io::Cursor::new(bytes))
         .read_info()
         .unwrap();
@@ -158,6 +162,66 @@ fn zoom_enlarges_the_middle() {
 }
 
 #[test]
+fn labels_have_their_colours_and_cells_without_are_grey() {
+    let places = [[-3.0, 0.0, 0.0], [0.0; 3], [3.0, 0.0, 0.0]];
+    let lattice = Lattice::new(LatticeKind::Cubic, 1.0).unwrap();
+    let list = VoxelList::new(lattice, Vector3::zeros(), 1000).unwrap();
+    let mut list = list.with_payload(lattice_core::voxels::Payload {
+        labels: true,
+        ..Default::default()
+    });
+    let points: Vec<_> = places.iter().map(|&p| Vector3::from(p)).collect();
+    let cloud = Cloud::from_points(0, Vector3::zeros(), &points);
+    list.insert_labelled(&cloud, &[7, 500, 3]);
+    let colors = LabelColors::from([(3, [0, 0, 255]), (7, [255, 0, 0])]);
+    let options = RenderOptions {
+        azimuth_deg: 180.0,
+        elevation_deg: 90.0,
+        ..options()
+    };
+    let mut bytes = Vec::new();
+    render_labels_png(&list, &colors, &options, &mut bytes).unwrap();
+    let row = decoded(bytes, &options).swap_remove(24);
+    // 7 cells fill 64 pixels but for a small margin.
+    let [red, grey, blue] = [7, 32, 57].map(|x| row[x].map(i32::from));
+    assert!(red[0] > 100 && red[2] == 0, "{red:?}");
+    assert!(blue[2] > 100 && blue[0] == 0, "{blue:?}");
+    let [r, g, b, _] = grey;
+    assert!(
+        r > 60 && (r - g).abs() < 20 && (g - b).abs() < 20,
+        "{grey:?}"
+    );
+}
+
+#[test]
+fn a_focus_does_not_depend_on_what_else_there_is() {
+    let focused = |places: &[[f64; 3]]| {
+        let datum_m = list(LatticeKind::Cubic, &[]).datum_m();
+        let focus = Focus {
+            center_m: datum_m.into(),
+            width_m: 8.0,
+        };
+        let options = RenderOptions {
+            azimuth_deg: 180.0,
+            elevation_deg: 90.0,
+            focus: Some(focus),
+            ..options()
+        };
+        render(&list(LatticeKind::Cubic, places), &options)
+    };
+    let (one, two) = (
+        focused(&[[0.0; 3]]),
+        focused(&[[0.0; 3], [90.0, 9.0, -9.0]]),
+    );
+    // One cell is an eighth of the width, with the farther one too.
+    let wide = |picture: &[Vec<[u8; 4]>]| {
+        let row = picture[24].iter();
+        row.filter(|&&p| p != options().background).count()
+    };
+    assert_eq!((wide(&one), wide(&two)), (8, 8));
+}
+
+#[test]
 fn a_transparent_background_stays_so() {
     let options = RenderOptions {
         background: [0; 4],
@@ -191,5 +255,13 @@ fn impossible_pictures_are_refused() {
             ..options()
         });
         assert!(matches!(error, ExportError::Camera { .. }));
+    }
+    for (x, width_m) in [(f64::NAN, 1.0), (0.0, 0.0), (0.0, f64::INFINITY)] {
+        let center_m = [x, 0.0, 0.0];
+        let error = refused(RenderOptions {
+            focus: Some(Focus { center_m, width_m }),
+            ..options()
+        });
+        assert!(matches!(error, ExportError::Focus { .. }));
     }
 }

@@ -72,6 +72,13 @@ impl View {
         self
     }
 
+    /// Puts a point, relative to the datum, in the middle of a screen that is so wide.
+    pub(super) fn at(mut self, center_m: &Vector3<f64>, width_m: f64) -> View {
+        self.middle_m = self.along(center_m);
+        self.scale = self.size[0] as f64 / width_m;
+        self
+    }
+
     fn along(&self, p: &Vector3<f64>) -> [f64; 3] {
         [self.right.dot(p), self.up.dot(p), self.toward.dot(p)]
     }
