@@ -164,6 +164,7 @@ impl Calibration {
         if self.quick {
             return Plan {
                 scenes: self.scenes.clone(),
+                first_seed: 0,
                 seeds: 1,
                 flips: vec![0.0, 0.6],
                 starts: vec![Start::Off { m: 0.3, deg: 10.0 }, Start::None],

@@ -31,10 +31,10 @@ pub use methods::Baseline;
 pub use results::{FILE, Results, ResultsError};
 pub use run::run;
 pub use settings::{Cell, FORMAT, Pivot, Plan, Settings, Start};
-pub use statistics::{Share, median, quantile};
-pub use summary::Summary;
+pub use statistics::{LEAST_FOR_INTERVAL, Share, median, median_interval, quantile};
+pub use summary::{PRINTED, Printed, Summary};
 pub use trial::{Bounds, Judged, OURS, TIMED, TRACKED, Trial, WRONG, WRONG_TIGHT, verdict_name};
-pub use world::World;
+pub use world::{Scenario, View, World};
 
 /// Why an evaluation stopped.
 #[derive(Debug, Error)]

@@ -1,5 +1,6 @@
 //! The file of results: a line of settings, then a line for each trial, as it is done.
 
+use std::borrow::Cow;
 use std::collections::HashSet;
 use std::fs::{self, File, OpenOptions};
 use std::io::{self, Write};
@@ -48,10 +49,10 @@ pub enum ResultsError {
 }
 
 /// Results that grow.
-#[derive(Debug)]
+#[derive(Debug, Default)]
 pub struct Results {
-    path: PathBuf,
-    file: File,
+    /// Where they are kept, if anywhere.
+    file: Option<(PathBuf, File)>,
     trials: Vec<Trial>,
     done: HashSet<String>,
 }
@@ -62,6 +63,29 @@ struct Head {
 }
 
 impl Results {
+    /// Results that are not kept.
+    pub fn in_memory() -> Results {
+        Results::default()
+    }
+
+    /// Reads the results in a folder and what they are of; a last line that was not finished is left out.
+    pub fn read(folder: &Path) -> Result<(Settings, Vec<Trial>), ResultsError> {
+        let path = folder.join(FILE);
+        let text = fs::read(&path).map_err(|source| ResultsError::Io {
+            path: path.clone(),
+            source,
+        })?;
+        let (text, _) = whole_lines(&text);
+        let first = text.lines().next().unwrap_or_default();
+        let head: Head = serde_json::from_str(first).map_err(|e| ResultsError::Line {
+            path: path.clone(),
+            line: 1,
+            reason: e.to_string(),
+        })?;
+        let trials = read(&path, &text, &head.settings)?;
+        Ok((head.settings, sorted(trials)))
+    }
+
     /// Opens the results in a folder, which is made if need be; a last line that was not finished is
     /// cut off.
     pub fn open(folder: &Path, settings: &Settings) -> Result<Results, ResultsError> {
@@ -76,11 +100,7 @@ impl Results {
             Err(e) if e.kind() == io::ErrorKind::NotFound => Vec::new(),
             Err(e) => return Err(io(e)),
         };
-        let whole = text
-            .iter()
-            .rposition(|byte| *byte == b'\n')
-            .map_or(0, |at| at + 1);
-        let text = String::from_utf8_lossy(text.get(..whole).unwrap_or_default());
+        let (text, whole) = whole_lines(&text);
         let trials = read(&path, &text, settings)?;
         let mut file = OpenOptions::new();
         let mut file = file.create(true).append(true).open(&path).map_err(io)?;
@@ -93,8 +113,7 @@ impl Results {
         }
         let done = trials.iter().map(|t| name(&t.cell, &t.method)).collect();
         Ok(Results {
-            path: path.clone(),
-            file,
+            file: Some((path, file)),
             trials,
             done,
         })
@@ -105,33 +124,47 @@ impl Results {
         self.done.contains(&name(cell, method))
     }
 
-    /// Keeps a trial, on the disk when this returns.
+    /// Keeps a trial, on the disk when this returns if it is kept there.
     pub fn add(&mut self, trial: Trial) -> Result<(), ResultsError> {
-        write_line(&mut self.file, &trial).map_err(|source| ResultsError::Io {
-            path: self.path.clone(),
-            source,
-        })?;
+        if let Some((path, file)) = &mut self.file {
+            write_line(file, &trial).map_err(|source| ResultsError::Io {
+                path: path.clone(),
+                source,
+            })?;
+        }
         self.done.insert(name(&trial.cell, &trial.method));
         self.trials.push(trial);
         Ok(())
     }
 
     /// All trials, in an order that does not depend on when each was done.
-    pub fn sorted(mut self) -> Vec<Trial> {
-        self.trials.sort_by(|a, b| {
-            let key = |t: &Trial| (t.cell.scene.clone(), t.cell.start.clone(), t.method.clone());
-            key(a)
-                .cmp(&key(b))
-                .then(a.cell.q.total_cmp(&b.cell.q))
-                .then(a.cell.seed.cmp(&b.cell.seed))
-        });
-        self.trials
+    pub fn sorted(self) -> Vec<Trial> {
+        sorted(self.trials)
     }
 
     /// Names of all trials that are done.
     pub fn done(&self) -> HashSet<String> {
         self.done.clone()
     }
+}
+
+fn sorted(mut trials: Vec<Trial>) -> Vec<Trial> {
+    trials.sort_by(|a, b| {
+        let key = |t: &Trial| (t.cell.scene.clone(), t.cell.start.clone(), t.method.clone());
+        key(a)
+            .cmp(&key(b))
+            .then(a.cell.q.total_cmp(&b.cell.q))
+            .then(a.cell.seed.cmp(&b.cell.seed))
+    });
+    trials
+}
+
+/// The lines that were finished, and where they end.
+fn whole_lines(bytes: &[u8]) -> (Cow<'_, str>, usize) {
+    let end = bytes.iter().rposition(|byte| *byte == b'\n');
+    let whole = end.map_or(0, |at| at + 1);
+    let lines = bytes.get(..whole).unwrap_or_default();
+    (String::from_utf8_lossy(lines), whole)
 }
 
 /// One name for each trial and method.
@@ -208,13 +241,31 @@ mod tests {
         results.add(trial(0)).unwrap();
         assert_eq!(fs::read(&path).unwrap(), whole);
         assert_eq!(results.sorted(), [trial(0), trial(1)]);
+        let read = Results::read(folder.path()).unwrap();
+        assert_eq!(read, (settings.clone(), vec![trial(0), trial(1)]));
 
         // Not even the settings were written.
         fs::write(&path, &whole[..20]).unwrap();
+        let fault = Results::read(folder.path()).unwrap_err();
+        assert!(
+            matches!(fault, ResultsError::Line { line: 1, .. }),
+            "{fault}"
+        );
         let results = Results::open(folder.path(), &settings).unwrap();
         assert_eq!(results.sorted(), []);
         let head = whole.iter().position(|b| *b == b'\n').unwrap() + 1;
         assert_eq!(fs::read(&path).unwrap(), &whole[..head]);
+    }
+
+    #[test]
+    fn what_is_not_kept_is_counted_all_the_same() {
+        let mut results = Results::in_memory();
+        results.add(trial(1)).unwrap();
+        results.add(trial(0)).unwrap();
+        assert!(results.has(&trial(1).cell, "icp"));
+        assert_eq!(results.sorted(), [trial(0), trial(1)]);
+        let folder = tempfile::tempdir().unwrap();
+        assert!(Results::read(folder.path()).is_err());
     }
 
     #[test]

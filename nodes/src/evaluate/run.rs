@@ -215,7 +215,7 @@ fn tasks(plan: &Plan, scene: Scene, seed: u64) -> Vec<Task> {
 /// Without a start and by the tracker, in the middle of the flips.
 fn timed_tasks(plan: &Plan, scene: Scene, seed: u64) -> Vec<Task> {
     let q = plan.flips.get(plan.flips.len() / 2).copied();
-    let Some(q) = q.filter(|_| seed < plan.timed_seeds) else {
+    let Some(q) = q.filter(|_| seed.wrapping_sub(plan.first_seed) < plan.timed_seeds) else {
         return Vec::new();
     };
     let tracked = Start::Off {

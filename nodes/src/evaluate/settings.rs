@@ -108,7 +108,9 @@ impl FromStr for Start {
 pub struct Plan {
     /// What is looked at.
     pub scenes: Vec<Scene>,
-    /// Trials of a cell have the seeds 0 to this, exclusive.
+    /// Seed of the first trial of a cell.
+    pub first_seed: u64,
+    /// Trials of a cell; their seeds follow each other.
     pub seeds: u64,
     /// Shares of the view that are labelled wrongly.
     pub flips: Vec<f64>,
@@ -125,6 +127,7 @@ impl Default for Plan {
     fn default() -> Plan {
         Plan {
             scenes: Scene::ALL.to_vec(),
+            first_seed: 0,
             seeds: 30,
             flips: vec![0.0, 0.2, 0.4, 0.6, 0.8],
             starts: vec![
@@ -160,7 +163,8 @@ impl Plan {
     /// All views, seed by seed, so that what is done first covers all scenes.
     pub fn views(&self) -> Vec<(u64, Scene)> {
         let of_seed = |seed| self.scenes.iter().map(move |&scene| (seed, scene));
-        (0..self.seeds).flat_map(of_seed).collect()
+        let seeds = (0..self.seeds).map(|i| self.first_seed.wrapping_add(i));
+        seeds.flat_map(of_seed).collect()
     }
 }
 
@@ -184,5 +188,11 @@ mod tests {
         let views = Plan::default().views();
         assert_eq!(views.len(), 120);
         assert!(views[..4].iter().all(|(seed, _)| *seed == 0));
+        let later = Plan {
+            first_seed: 7,
+            seeds: 1,
+            ..Plan::default()
+        };
+        assert!(later.views().iter().all(|(seed, _)| *seed == 7));
     }
 }

@@ -56,6 +56,32 @@ impl Share {
     }
 }
 
+/// Fewest values of which an interval of the median can hold 95 %.
+pub const LEAST_FOR_INTERVAL: usize = 6;
+
+/// An interval that holds the median of what the values were drawn from in 95 % of all draws or more,
+/// whatever its distribution: ranks by the binomial of one half (Conover 1999, section 3.2).
+///
+/// Of fewer than [`LEAST_FOR_INTERVAL`] values it is all of them, which hold it less often; None of nothing.
+pub fn median_interval(values: impl IntoIterator<Item = f64>) -> Option<[f64; 2]> {
+    let mut values: Vec<f64> = values.into_iter().collect();
+    values.sort_by(f64::total_cmp);
+    let n = values.len();
+    // Logarithm of the chance that k of n lie below the median, from k = 0 on.
+    let mut chance = n as f64 * 0.5_f64.ln();
+    let (mut below, mut outside) = (0.0, 0);
+    for k in 0..n / 2 {
+        below += chance.exp();
+        if below > 0.025 {
+            break;
+        }
+        outside = k;
+        chance += ((n - k) as f64 / (k + 1) as f64).ln();
+    }
+    let last = n.checked_sub(1 + outside)?;
+    Some([*values.get(outside)?, *values.get(last)?])
+}
+
 /// The median; None of nothing.
 pub fn median(values: impl IntoIterator<Item = f64>) -> Option<f64> {
     quantile(values, 0.5)
@@ -94,6 +120,20 @@ mod tests {
         }
         assert_eq!(Share::of([]).share, None);
         assert_eq!(Share::of([true, false]).share, Some(0.5));
+    }
+
+    #[test]
+    fn intervals_of_the_median_have_the_ranks_of_the_binomial() {
+        // Ranks, counted from 1, of the narrowest intervals that hold 95 %: they hold 96.9, 96.1, 95.9,
+        // 95.7, 96.7 and 95.3 %.
+        for (n, low) in [(6, 1), (9, 2), (20, 6), (30, 10), (50, 18), (2000, 956)] {
+            let high = n + 1 - low;
+            let values = (1..=n).rev().map(f64::from);
+            let expected = [f64::from(low), f64::from(high)];
+            assert_eq!(median_interval(values), Some(expected), "{n}");
+        }
+        assert_eq!(median_interval([2.0, 1.0, 3.0]), Some([1.0, 3.0]));
+        assert_eq!(median_interval([]), None);
     }
 
     #[test]

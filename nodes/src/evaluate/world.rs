@@ -71,6 +71,11 @@ impl World {
         })
     }
 
+    /// Where all of it is.
+    pub fn house(&self) -> &House {
+        &self.house
+    }
+
     /// What the headset sees of a scene.
     pub fn view(&self, scene: Scene, seed: u64) -> Result<View, EvaluateError> {
         let options = HeadsetOptions {
