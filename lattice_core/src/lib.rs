@@ -10,6 +10,7 @@ pub mod metrics;
 pub mod pose;
 mod prefetch;
 pub mod query;
+pub mod random;
 pub mod raycast;
 pub mod registration;
 pub mod simulate;

@@ -14,6 +14,7 @@ pub mod lattice_mapper;
 pub mod map_follower;
 pub mod node;
 pub mod paper;
+mod plot;
 pub mod replay;
 pub mod report;
 pub mod runtime;

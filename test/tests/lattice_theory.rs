@@ -10,10 +10,11 @@ use lattice_core::lattice::paper::{
 use lattice_core::lattice::{
     BatchQuantizer, CellCode, Lattice, LatticeIndex, LatticeKind, Simd, VoronoiCell,
 };
+use lattice_core::random::arvo;
 use lattice_nodes::bench::{self, QuantizeMethod};
 use lattice_nodes::files::points::{PointFileLimits, read_points};
 use lattice_test::random::Random;
-use nalgebra::{Isometry3, Matrix3, Rotation3, UnitQuaternion, Vector3};
+use nalgebra::{Isometry3, Matrix3, UnitQuaternion, Vector3};
 
 const ZERO: LatticeIndex = [0; 3];
 
@@ -395,17 +396,6 @@ fn the_key_stream_of_a_point_file_has_one_digest_on_every_machine() {
     assert_eq!(found, recorded);
 }
 
-/// Uniform over all rotations, after Arvo 1992, "Fast random rotation matrices": a turn about z,
-/// then a reflection that takes the pole anywhere.
-fn arvo(random: &mut Random) -> UnitQuaternion<f64> {
-    let turn = UnitQuaternion::from_axis_angle(&Vector3::z_axis(), TAU * random.unit());
-    let (angle, height) = (TAU * random.unit(), random.unit());
-    let (across, up) = (height.sqrt(), (1.0 - height).sqrt());
-    let v = Vector3::new(angle.cos() * across, angle.sin() * across, up);
-    let matrix = (2.0 * v * v.transpose() - Matrix3::identity()) * turn.to_rotation_matrix();
-    UnitQuaternion::from_rotation_matrix(&Rotation3::from_matrix_unchecked(matrix))
-}
-
 #[test]
 fn a_real_scan_takes_fewer_voxels_and_less_distortion_whatever_its_orientation() {
     let Some(path) = lattice_test::data::shared("pairs/small_gicp/target.ply") else {
@@ -418,7 +408,12 @@ fn a_real_scan_takes_fewer_voxels_and_less_distortion_whatever_its_orientation()
     assert_eq!(points.len(), 69_088);
     let mut random = Random(9);
     let poses: Vec<Isometry3<f64>> = (0..200)
-        .map(|_| Isometry3::from_parts(random.point(1.0).into(), arvo(&mut random)))
+        .map(|_| {
+            Isometry3::from_parts(
+                random.point(1.0).into(),
+                arvo([(); 3].map(|()| random.unit())),
+            )
+        })
         .collect();
     // Mean count, its standard deviation, and the mean distance.
     let measure = |kind| {

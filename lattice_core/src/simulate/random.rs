@@ -1,7 +1,6 @@
 //! Random streams that depend on nothing but seed, purpose and index.
 
-use rand_chacha::ChaCha8Rng;
-use rand_chacha::rand_core::{Rng, SeedableRng};
+pub(super) use crate::random::Stream;
 
 /// What a stream is for; streams of different purposes are independent.
 #[derive(Clone, Copy, Debug)]
@@ -35,39 +34,11 @@ pub(super) enum Purpose {
     OwnHouse = 56,
 }
 
-/// A stream of uniform and normal numbers.
-pub(super) struct Stream {
-    generator: ChaCha8Rng,
-    spare_normal: Option<f64>,
-}
-
 impl Stream {
     /// Stream number `index` (below 2^48) of a purpose; `lane` separates equal devices.
     pub(super) fn new(seed: u64, purpose: Purpose, lane: u64, index: u64) -> Self {
-        let mut generator = ChaCha8Rng::seed_from_u64(seed);
-        generator
-            .set_stream(((purpose as u64).wrapping_add(lane) << 48) | (index & 0xffff_ffff_ffff));
-        Self {
-            generator,
-            spare_normal: None,
-        }
-    }
-
-    /// Uniform in [0, 1).
-    pub(super) fn uniform(&mut self) -> f64 {
-        const SCALE: f64 = 1.0 / (1u64 << 53) as f64;
-        (self.generator.next_u64() >> 11) as f64 * SCALE
-    }
-
-    /// Standard normal (Box & Muller 1958).
-    pub(super) fn normal(&mut self) -> f64 {
-        if let Some(spare) = self.spare_normal.take() {
-            return spare;
-        }
-        let radius = (-2.0 * (1.0 - self.uniform()).ln()).sqrt();
-        let (sin, cos) = (std::f64::consts::TAU * self.uniform()).sin_cos();
-        self.spare_normal = Some(radius * sin);
-        radius * cos
+        let number = ((purpose as u64).wrapping_add(lane) << 48) | (index & 0xffff_ffff_ffff);
+        Self::numbered(seed, number)
     }
 }
 

@@ -8,6 +8,7 @@ mod evaluate;
 mod evaluate_kitti;
 mod map;
 mod node;
+mod paper;
 mod progress;
 mod quantize;
 mod replay;
@@ -51,6 +52,9 @@ enum Command {
     /// Measure what the algorithms are worth
     #[command(subcommand)]
     Evaluate(evaluate::Evaluate),
+    /// Compute every table and figure of a paper and set it beside what is printed
+    #[command(subcommand)]
+    Paper(paper::Paper),
     /// Measure quantizers and stores on a raw point file
     #[command(subcommand)]
     Bench(bench::Bench),
@@ -70,6 +74,7 @@ pub fn main() -> ExitCode {
         Command::Quantize(command) => command.run(),
         Command::Calibrate(command) => command.run(),
         Command::Evaluate(command) => command.run(),
+        Command::Paper(command) => command.run(),
         Command::Bench(command) => command.run(),
         Command::Map(command) => command.run(),
     };

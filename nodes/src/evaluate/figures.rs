@@ -1,17 +1,13 @@
 //! The pictures of the report.
 
-use std::error::Error;
 use std::path::Path;
 
-use plotters::coord::Shift;
 use plotters::prelude::*;
 
 use super::markdown::methods;
 use super::summary::{Row, Summary};
 use super::trial::{OURS, Trial, WRONG};
-
-type Fault = Box<dyn Error + Send + Sync>;
-type Area<'a> = DrawingArea<SVGBackend<'a>, Shift>;
+use crate::plot::{self, Area, Fault, Layout};
 
 /// Size of one panel, pixels.
 const PANEL: (u32, u32) = (430, 330);
@@ -51,18 +47,14 @@ fn panels<'a>(
     rows: usize,
     key: &[(RGBColor, &str)],
 ) -> Result<(Area<'a>, Vec<Area<'a>>), Fault> {
-    let (columns, rows) = (columns.max(1), rows.max(1));
-    let width = PANEL.0 * columns as u32;
-    let size = (width + KEY_WIDTH, PANEL.1 * rows as u32);
-    let root = SVGBackend::new(path, size).into_drawing_area();
-    root.fill(&WHITE)?;
-    let (left, right) = root.split_horizontally(width);
-    for (row, (color, title)) in (0..).zip(key) {
-        let y = 40 + 18 * row;
-        right.draw(&PathElement::new([(4, y), (24, y)], color.stroke_width(3)))?;
-        right.draw(&Text::new(*title, (32, y - 6), ("sans-serif", 14)))?;
-    }
-    Ok((root, left.split_evenly((rows, columns))))
+    let layout = Layout {
+        panel: PANEL,
+        columns,
+        rows,
+        key_width: KEY_WIDTH,
+        key,
+    };
+    plot::panels(SVGBackend::new(path, layout.size()), &layout)
 }
 
 fn key_of_methods() -> Vec<(RGBColor, &'static str)> {

@@ -1,1 +1,93 @@
-//! Ryde & Brünig, "Lattice Occupied Voxel Lists for Representation of Spatial Occupancy".
+//! Ryde & Brünig 2011, "Lattice Occupied Voxel Lists for Representation of Spatial Occupancy", computed
+//! anew.
+
+mod cells;
+mod distances;
+mod generators;
+mod neighbors;
+mod quantization;
+
+use std::path::PathBuf;
+
+use lattice_core::lattice::{Lattice, LatticeIndex, LatticeKind};
+
+use super::report::plot::Fault;
+use super::report::{Head, Report, Section};
+
+/// What to compute.
+#[derive(Clone, Debug)]
+pub struct Options {
+    /// The same seed gives the same bytes.
+    pub seed: u64,
+    /// Fewer samples and trials.
+    pub quick: bool,
+    /// Point files of single scans, for Fig. 5.
+    pub scans: Vec<PathBuf>,
+    /// Logs, for Table I.
+    pub bags: Vec<PathBuf>,
+    /// Folder of pairs of scans, for Fig. 6.
+    pub pairs: Option<PathBuf>,
+}
+
+type Make = fn(&Options, &mut dyn FnMut(f64)) -> Result<Section, Fault>;
+
+/// Name, share of the time, and what makes it; in the order of the paper.
+const SECTIONS: [(&str, f64, Make); 5] = [
+    ("cells", 0.1, cells::section),
+    ("eq. (1)-(2)", 3.0, quantization::section),
+    ("eq. (3)-(7)", 0.1, neighbors::section),
+    ("eq. (8)-(12)", 0.1, generators::section),
+    ("Fig. 3", 0.1, distances::section),
+];
+
+/// Computes all sections; `progress` is told how much is done, from 0 to 1, and what comes next.
+pub fn run(options: &Options, progress: &mut dyn FnMut(f64, &str)) -> Result<Report, Fault> {
+    let all: f64 = SECTIONS.iter().map(|(_, share, _)| share).sum();
+    let mut before = 0.0;
+    let mut sections = Vec::new();
+    for (name, share, make) in SECTIONS {
+        progress(before / all, name);
+        let mut tell = |done: f64| progress((before + share * done) / all, name);
+        sections.push(make(options, &mut tell)?);
+        before += share;
+    }
+    let head = Head {
+        paper: "Ryde and Brünig 2011, Lattice Occupied Voxel Lists for Representation of Spatial \
+                Occupancy"
+            .into(),
+        command: command(options),
+        seed: options.seed,
+        quick: options.quick,
+    };
+    Ok(Report::new(head, sections))
+}
+
+/// The command line, with the names of files but not where they lie.
+fn command(options: &Options) -> String {
+    let mut words = format!("lattice paper voxels --seed {}", options.seed);
+    if options.quick {
+        words.push_str(" --quick");
+    }
+    let named = |option: &str, path: &PathBuf| {
+        let name = path.file_name().unwrap_or_default().to_string_lossy();
+        format!(" --{option} {name}")
+    };
+    words.extend(options.scans.iter().map(|path| named("scan", path)));
+    words.extend(options.bags.iter().map(|path| named("bag", path)));
+    words.extend(options.pairs.iter().map(|path| named("pairs", path)));
+    words
+}
+
+/// The lattice with cells of 1 m^3.
+fn unit(kind: LatticeKind) -> Result<Lattice, Fault> {
+    Ok(Lattice::new(kind, 1.0)?)
+}
+
+/// One of each pair of opposite differences, written "±(1,0,0)".
+fn pairs(differences: impl IntoIterator<Item = LatticeIndex>) -> String {
+    let half = differences.into_iter().filter(|w| *w > [0; 3]);
+    let mut half: Vec<LatticeIndex> = half.collect();
+    half.sort_unstable();
+    let words = half.iter().map(|[a, b, c]| format!("±({a},{b},{c})"));
+    words.collect::<Vec<_>>().join(" ")
+}

@@ -1,0 +1,51 @@
+//! `lattice paper voxels`: Ryde & Brünig 2011, computed anew.
+
+use std::path::PathBuf;
+
+use clap::Args;
+
+use super::make;
+use crate::cli::CliResult;
+use crate::paper::voxels::{Options, run};
+
+/// Options of `lattice paper voxels`.
+#[derive(Args)]
+pub struct Voxels {
+    /// Folder of the report: report.html, report.json, a CSV for each table, an SVG for each figure
+    #[arg(long, value_name = "DIR")]
+    out: PathBuf,
+    /// The same seed gives the same bytes
+    #[arg(long, default_value_t = 1)]
+    seed: u64,
+    /// Fewer samples and trials, in less than a minute
+    #[arg(long)]
+    quick: bool,
+    /// A point file of one scan (ply, pcd, xyz, KITTI bin) for Fig. 5; may be given several times
+    #[arg(long = "scan", value_name = "FILE")]
+    scans: Vec<PathBuf>,
+    /// A rosbag2 log of clouds and an INS for Table I; may be given several times
+    #[arg(long = "bag", value_name = "DIR")]
+    bags: Vec<PathBuf>,
+    /// Folder of pairs of scans for Fig. 6
+    #[arg(long, value_name = "DIR")]
+    pairs: Option<PathBuf>,
+    /// Print the report as JSON
+    #[arg(long)]
+    json: bool,
+}
+
+impl Voxels {
+    /// Runs the command.
+    pub fn run(self) -> CliResult {
+        let options = Options {
+            seed: self.seed,
+            quick: self.quick,
+            scans: self.scans,
+            bags: self.bags,
+            pairs: self.pairs,
+        };
+        make("paper", &self.out, self.json, |progress| {
+            run(&options, progress)
+        })
+    }
+}
