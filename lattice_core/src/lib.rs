@@ -6,6 +6,7 @@
 pub mod cloud;
 pub mod geodesy;
 pub mod lattice;
+pub mod matching;
 pub mod metrics;
 pub mod pose;
 mod prefetch;

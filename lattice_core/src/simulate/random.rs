@@ -32,6 +32,10 @@ pub(super) enum Purpose {
     PointFlips = 55,
     /// Books and clutter of a house.
     OwnHouse = 56,
+    /// Where a laser scanner stands.
+    LaserStand = 57,
+    /// Range noise of a scan of the house; one stream per scan.
+    LaserScan = 58,
 }
 
 impl Stream {

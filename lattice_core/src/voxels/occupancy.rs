@@ -423,6 +423,7 @@ impl fmt::Debug for OccupancyList {
 }
 
 mod merge;
+mod overlap;
 mod retain;
 #[cfg(test)]
 mod tests;

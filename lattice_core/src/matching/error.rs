@@ -1,0 +1,80 @@
+//! Why a scan is not matched.
+
+use thiserror::Error;
+
+use super::{MAX_LEVELS, MAX_POINTS};
+use crate::lattice::LatticeError;
+use crate::voxels::DatumError;
+
+/// Why a list is not made or a scan not matched.
+#[derive(Clone, PartialEq, Debug, Error)]
+pub enum MatchError {
+    /// No levels, or too many.
+    #[error("{levels} levels, from 1 to {MAX_LEVELS} are taken")]
+    Levels {
+        /// Levels asked for.
+        levels: usize,
+    },
+    /// The cells of a level are too large.
+    #[error(transparent)]
+    Lattice(#[from] LatticeError),
+    /// The datum is too far away or not finite.
+    #[error(transparent)]
+    Datum(#[from] DatumError),
+    /// An option out of its range.
+    #[error("{name} is {value}, not within {least} to {most}")]
+    Option {
+        /// Which option.
+        name: &'static str,
+        /// Its value.
+        value: f64,
+        /// Least value taken.
+        least: f64,
+        /// Greatest value taken.
+        most: f64,
+    },
+    /// A number of the pose that a search begins with is NaN or infinite.
+    #[error("the pose to begin with is not finite")]
+    Pose,
+    /// The map has no voxel.
+    #[error("the map is empty")]
+    EmptyMap,
+    /// No point of the scan has a cell.
+    #[error("none of {points} points is finite and near enough to its datum")]
+    NoPoints {
+        /// Points of the scan.
+        points: usize,
+    },
+    /// More points than can be numbered.
+    #[error("{points} points, at most {MAX_POINTS} are taken")]
+    TooManyPoints {
+        /// Points of the scan.
+        points: usize,
+    },
+    /// The grid of a search has too many poses.
+    #[error("{poses} poses on the coarsest grid, at most {most} are allowed")]
+    TooManyPoses {
+        /// Poses of the grid.
+        poses: f64,
+        /// Poses allowed.
+        most: usize,
+    },
+}
+
+/// Checks that an option is in its range; NaN never is.
+pub(super) fn within(
+    name: &'static str,
+    value: f64,
+    least: f64,
+    most: f64,
+) -> Result<(), MatchError> {
+    if (least..=most).contains(&value) {
+        return Ok(());
+    }
+    Err(MatchError::Option {
+        name,
+        value,
+        least,
+        most,
+    })
+}

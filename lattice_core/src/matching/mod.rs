@@ -1,0 +1,23 @@
+//! Where a scan lies in a map, by occupied cells alone: lists of several resolutions (Ryde & Hu, the
+//! matcher behind Fig. 6 of Ryde & Brünig 2011).
+//!
+//! A [`MultiResolutionList`] holds the map once for each level, with cells of twice the side from one
+//! level to the next. A pose is as good as the number of scan points that it puts into occupied
+//! cells. [`align`] climbs from a guess, the coarsest level first; [`search`] tries a grid of poses
+//! and divides the best ones, level by level. Both take any lattice.
+
+mod align;
+mod error;
+mod levels;
+mod options;
+mod sample;
+mod search;
+#[cfg(test)]
+mod tests;
+
+pub use align::{Alignment, align, refine};
+pub use error::MatchError;
+pub use levels::{MAX_LEVELS, MultiResolutionList};
+pub use options::{AlignOptions, SearchOptions, Spread};
+pub use sample::{MAX_POINTS, sample};
+pub use search::search;

@@ -1,0 +1,212 @@
+//! A laser scanner that stands in the house and looks all around.
+
+use std::f64::consts::TAU;
+
+use nalgebra::{Isometry3, Point3, Vector3};
+use rayon::prelude::*;
+
+use super::error::within;
+use super::{House, HouseError};
+use crate::simulate::random::{Purpose, Stream};
+
+/// How a scanner looks around, and how far two of its stands are apart.
+#[derive(Clone, Copy, PartialEq, Debug)]
+pub struct LaserOptions {
+    /// Directions all around.
+    pub columns: usize,
+    /// Directions up and down.
+    pub rows: usize,
+    /// Elevation of the outermost rows, degrees.
+    pub elevation_deg: f64,
+    /// Height above the floor, metres.
+    pub height_m: f64,
+    /// Farthest return, metres.
+    pub max_range_m: f64,
+    /// Least and greatest distance between the stands of a pair, metres.
+    pub apart_m: [f64; 2],
+    /// How far the heading may turn within a pair, degrees.
+    pub turn_deg: f64,
+}
+
+impl Default for LaserOptions {
+    /// A nodding scanner on a robot that stops every half metre or so.
+    fn default() -> LaserOptions {
+        LaserOptions {
+            columns: 480,
+            rows: 96,
+            elevation_deg: 45.0,
+            height_m: 1.0,
+            max_range_m: 30.0,
+            apart_m: [0.4, 0.9],
+            turn_deg: 30.0,
+        }
+    }
+}
+
+/// What a scanner would measure from a stand without errors.
+#[derive(Clone, PartialEq, Debug)]
+pub struct LaserView {
+    /// Where it stood.
+    pub house_from_laser: Isometry3<f64>,
+    /// Unit vectors, scanner's frame, and how far the surfaces are, metres.
+    rays: Vec<(Vector3<f64>, f64)>,
+}
+
+impl LaserView {
+    /// Looks around from a pose in the house; the x axis of the scanner is forward, z up.
+    pub fn new(
+        house: &House,
+        house_from_laser: &Isometry3<f64>,
+        options: &LaserOptions,
+    ) -> Result<LaserView, HouseError> {
+        within("columns", options.columns as f64, 1.0, 1e4)?;
+        within("rows", options.rows as f64, 1.0, 1e4)?;
+        within("elevation_deg", options.elevation_deg, 0.0, 90.0)?;
+        within("max_range_m", options.max_range_m, 0.1, 1e3)?;
+        let origin_m = Point3::from(house_from_laser.translation.vector);
+        let ray = |number: usize| {
+            let (column, row) = (number / options.rows, number % options.rows);
+            let azimuth = TAU * column as f64 / options.columns as f64;
+            let height = 2.0 * (row as f64 + 0.5) / options.rows as f64 - 1.0;
+            let elevation = (options.elevation_deg * height).to_radians();
+            let ((sin, cos), (up, along)) = (azimuth.sin_cos(), elevation.sin_cos());
+            let ray = Vector3::new(cos * along, sin * along, up);
+            let direction = house_from_laser.rotation * ray;
+            let range_m = house.depth_m(&origin_m, &direction, options.max_range_m)?;
+            Some((ray, range_m))
+        };
+        let rays = (0..options.columns * options.rows).into_par_iter();
+        Ok(LaserView {
+            house_from_laser: *house_from_laser,
+            rays: rays.filter_map(ray).collect(),
+        })
+    }
+
+    /// Views from pairs of stands all over the house, both of a pair in sight of each other.
+    pub fn pairs(
+        house: &House,
+        pairs: usize,
+        options: &LaserOptions,
+        seed: u64,
+    ) -> Result<Vec<[LaserView; 2]>, HouseError> {
+        within("pairs", pairs as f64, 1.0, 1e4)?;
+        within("height_m", options.height_m, 0.0, 10.0)?;
+        within("turn_deg", options.turn_deg, 0.0, 180.0)?;
+        let mut stream = Stream::new(seed, Purpose::LaserStand, 0, 0);
+        let firsts = house.free.spread_m(pairs, || stream.uniform());
+        let pair = |first_m: [f64; 2]| {
+            let yaw = TAU * stream.uniform();
+            let turn = (options.turn_deg * (2.0 * stream.uniform() - 1.0)).to_radians();
+            let from = house.free.above_m(first_m, options.height_m);
+            let seconds: Vec<Point3<f64>> = (house.free.cells_m.iter())
+                .map(|&cell| house.free.above_m(cell, options.height_m))
+                .filter(|to| in_reach(house, &from, to, options.apart_m))
+                .collect();
+            let drawn = (stream.uniform() * seconds.len() as f64) as usize;
+            let Some(to) = seconds.get(drawn) else {
+                return Ok(None);
+            };
+            let first = super::camera::looking(from, yaw, 0.0);
+            let second = super::camera::looking(*to, yaw + turn, 0.0);
+            let view = |pose| LaserView::new(house, &pose, options);
+            Ok(Some([view(first)?, view(second)?]))
+        };
+        let made: Result<Vec<_>, HouseError> = firsts.into_iter().map(pair).collect();
+        let made: Vec<_> = made?.into_iter().flatten().collect();
+        match made.is_empty() {
+            true => Err(HouseError::NoFreeSpace),
+            false => Ok(made),
+        }
+    }
+
+    /// One scan, scanner's frame, metres: ranges with normal errors of `noise_m`, by stream `number`
+    /// of the seed.
+    pub fn scan(&self, noise_m: f64, seed: u64, number: u64) -> Vec<[f32; 3]> {
+        let mut stream = Stream::new(seed, Purpose::LaserScan, 0, number);
+        let point = |(ray, range_m): &(Vector3<f64>, f64)| {
+            let point = ray * (range_m + noise_m * stream.normal());
+            point.map(|x| x as f32).into()
+        };
+        self.rays.iter().map(point).collect()
+    }
+}
+
+fn in_reach(house: &House, from: &Point3<f64>, to: &Point3<f64>, apart_m: [f64; 2]) -> bool {
+    let way = to - from;
+    let apart = way.norm();
+    let [least, most] = apart_m;
+    (least..=most).contains(&apart) && house.depth_m(from, &way, apart).is_none()
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn scans_of_a_pair_show_one_place() {
+        let house = House::own(3).unwrap();
+        let options = LaserOptions {
+            columns: 90,
+            rows: 20,
+            ..LaserOptions::default()
+        };
+        let pairs = LaserView::pairs(&house, 5, &options, 4).unwrap();
+        assert_eq!(pairs, LaserView::pairs(&house, 5, &options, 4).unwrap());
+        assert_eq!(pairs.len(), 5);
+        for (number, [first, second]) in (0..).zip(&pairs) {
+            let between = first.house_from_laser.inverse() * second.house_from_laser;
+            let apart = between.translation.vector.norm();
+            assert!((0.4..=0.9).contains(&apart) && between.rotation.angle() <= 0.53);
+            for view in [first, second] {
+                let exact = view.scan(0.0, 1, number);
+                assert_eq!(exact.len(), 90 * 20);
+                for p in exact.iter().step_by(7) {
+                    let p = view.house_from_laser * Point3::from(p.map(f64::from));
+                    assert!((-0.2..20.2).contains(&p.x) && (-0.2..12.2).contains(&p.y));
+                    assert!((-0.01..2.81).contains(&p.z));
+                }
+                let noisy = view.scan(0.02, 1, number);
+                let off = |(a, b): (&[f32; 3], &[f32; 3])| {
+                    let change = Vector3::from(*a) - Vector3::from(*b);
+                    f64::from(change.norm_squared())
+                };
+                let sum: f64 = exact.iter().zip(&noisy).map(off).sum();
+                let rms = (sum / exact.len() as f64).sqrt();
+                assert!((rms - 0.02).abs() < 0.002, "{rms}");
+                assert_ne!(noisy, view.scan(0.02, 1, number + 1));
+            }
+        }
+    }
+
+    #[test]
+    fn options_out_of_range_are_refused() {
+        let house = House::own(3).unwrap();
+        let default = LaserOptions::default();
+        for options in [
+            LaserOptions { rows: 0, ..default },
+            LaserOptions {
+                elevation_deg: f64::NAN,
+                ..default
+            },
+            LaserOptions {
+                max_range_m: f64::INFINITY,
+                ..default
+            },
+            LaserOptions {
+                turn_deg: -1.0,
+                ..default
+            },
+            LaserOptions {
+                apart_m: [50.0, 60.0],
+                columns: 4,
+                rows: 4,
+                ..default
+            },
+        ] {
+            assert!(
+                LaserView::pairs(&house, 2, &options, 1).is_err(),
+                "{options:?}"
+            );
+        }
+    }
+}
