@@ -8,6 +8,16 @@ use lattice_core::random::Stream;
 pub enum Purpose {
     /// Points whose nearest lattice point is sought.
     Quantize = 256,
+    /// Points of a cell.
+    Cell = 257,
+    /// Points that are spread evenly in space.
+    Uniform = 258,
+    /// Rotations and offsets of a cloud.
+    Pose = 259,
+    /// Which points of a cloud are taken.
+    Thin = 260,
+    /// Where a lattice lies about a cloud.
+    Offset = 261,
 }
 
 /// Stream `index` (below 2^48) of a purpose.

@@ -150,6 +150,17 @@ pub struct Check {
 }
 
 impl Check {
+    /// Something that must be so: 1 if it is, 0 if not.
+    pub fn that(name: impl Into<String>, is_so: bool) -> Check {
+        Check {
+            name: format!("{} (1: yes)", name.into()),
+            printed: None,
+            expected: 1.0,
+            found: f64::from(u8::from(is_so)),
+            tolerance: 0.0,
+        }
+    }
+
     /// Whether the number is near enough; never, if it is not a number.
     pub fn holds(&self) -> bool {
         (self.found - self.expected).abs() <= self.tolerance

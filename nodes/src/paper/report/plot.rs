@@ -144,6 +144,16 @@ pub type NamedBox = (String, RGBColor, BoxStats);
 /// Boxes beside each other: whiskers at 1.5 interquartile ranges, outliers as dots, the interval of the
 /// median as a darker band. What lies above the panel is counted there. `axes.xs` is not used.
 pub fn boxes(area: &Area, axes: &Axes, boxes: &[NamedBox]) -> Result<(), Fault> {
+    boxes_with_marks(area, axes, boxes, &[])
+}
+
+/// [`boxes`] with a cross at a value of each box, in their order.
+pub fn boxes_with_marks(
+    area: &Area,
+    axes: &Axes,
+    boxes: &[NamedBox],
+    marks: &[Option<f64>],
+) -> Result<(), Fault> {
     let last = boxes.len() as f64 - 0.4;
     let mut chart = ChartBuilder::on(area)
         .caption(axes.title, ("sans-serif", 15))
@@ -196,6 +206,9 @@ pub fn boxes(area: &Area, axes: &Axes, boxes: &[NamedBox]) -> Result<(), Fault> 
             chart.draw_series([Text::new(words, (x - 0.3, top), style)])?;
         }
     }
+    let crosses = marks.iter().enumerate();
+    let crosses = crosses.filter_map(|(i, mark)| Some((i as f64, (*mark)?)));
+    chart.draw_series(crosses.map(|at| Cross::new(at, 6, BLACK.stroke_width(3))))?;
     Ok(())
 }
 

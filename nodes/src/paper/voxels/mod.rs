@@ -4,8 +4,14 @@
 mod cells;
 mod distances;
 mod generators;
+mod loader;
 mod neighbors;
 mod quantization;
+mod radial;
+mod rotations;
+mod sample;
+mod scan;
+mod theory;
 
 use std::path::PathBuf;
 
@@ -32,12 +38,16 @@ pub struct Options {
 type Make = fn(&Options, &mut dyn FnMut(f64)) -> Result<Section, Fault>;
 
 /// Name, share of the time, and what makes it; in the order of the paper.
-const SECTIONS: [(&str, f64, Make); 5] = [
+const SECTIONS: [(&str, f64, Make); 9] = [
     ("cells", 0.1, cells::section),
     ("eq. (1)-(2)", 3.0, quantization::section),
     ("eq. (3)-(7)", 0.1, neighbors::section),
     ("eq. (8)-(12)", 0.1, generators::section),
+    ("eq. (13)", 3.0, theory::section),
     ("Fig. 3", 0.1, distances::section),
+    ("Fig. 4", 6.0, radial::section),
+    ("Fig. 5", 60.0, rotations::section),
+    ("Table I", 10.0, loader::section),
 ];
 
 /// Computes all sections; `progress` is told how much is done, from 0 to 1, and what comes next.
