@@ -53,11 +53,41 @@ impl FitScale {
     }
 }
 
-/// A partner of a source point and how likely they are one place, 1 at most.
+/// Deviations across surfaces that a pose may turn out to have, as parts of the expected one.
+const CLOSENESS: [f64; 5] = [
+    1.0,
+    std::f64::consts::FRAC_1_SQRT_2,
+    0.5,
+    0.5 * std::f64::consts::FRAC_1_SQRT_2,
+    0.25,
+];
+
+/// A partner of a source point.
 #[derive(Clone, Copy, Debug)]
 struct Partner {
     target: u32,
-    nearness: f64,
+    /// How likely they are one place by all but their distance across the surface, 1 at most.
+    beside: f64,
+    /// Squared distance across the surface in expected deviations.
+    across: f64,
+}
+
+impl Partner {
+    const NONE: Partner = Partner {
+        target: 0,
+        beside: 0.0,
+        across: 0.0,
+    };
+
+    /// How likely they are one place, if the deviation across surfaces is `closeness` of the expected
+    /// one; 1 over that at most.
+    fn nearness(&self, closeness: f64) -> f64 {
+        if self.beside > 0.0 {
+            self.beside / closeness * (-0.5 * self.across / (closeness * closeness)).exp()
+        } else {
+            0.0
+        }
+    }
 }
 
 /// The source, cut into regions, ready to be judged at many poses.
@@ -171,10 +201,7 @@ impl<'a> Fit<'a> {
             .copied()
             .unwrap_or_else(Vector3::zeros);
         let normal = target_from_source.rotation * normal;
-        let mut partners = [Partner {
-            target: 0,
-            nearness: 0.0,
-        }; NEIGHBORS];
+        let mut partners = [Partner::NONE; NEIGHBORS];
         let mut nearest = f64::INFINITY;
         let mut near = Neighbors::default();
         let gate_m = self.scale.gate_m();
@@ -187,12 +214,12 @@ impl<'a> Fit<'a> {
             let r = place - q;
             let across = r.dot(m);
             let along_sq = (r.norm_squared() - across * across).max(0.0);
-            let square =
-                (across / self.scale.normal_m).powi(2) + along_sq / self.scale.tangent_m.powi(2);
+            let along = along_sq / self.scale.tangent_m.powi(2);
             let facing = 0.3 + 0.7 * normal.dot(m).powi(2);
             *slot = Partner {
                 target: j as u32,
-                nearness: facing * (-0.5 * square).exp() / NEIGHBORS as f64,
+                beside: facing * (-0.5 * along).exp() / NEIGHBORS as f64,
+                across: (across / self.scale.normal_m).powi(2),
             };
             if across.abs() < 3.0 * self.scale.normal_m {
                 nearest = nearest.min(across * across);
@@ -201,35 +228,41 @@ impl<'a> Fit<'a> {
         (partners, nearest)
     }
 
-    /// Likelihood of a pose whose partners these are. Labels count as far as `known` and what the
-    /// other folds teach predict them; `agreement` as in [`Confusion::lift`]. With it comes what the
-    /// pose teaches about the labels.
+    /// Likelihood of a pose whose partners these are. How close surfaces are is learned from the pose, up
+    /// to the expected closeness: one that fits better than it had to is the likelier. Labels count as far
+    /// as `known` and what the other folds teach predict them; `agreement` as in [`Confusion::lift`]. With
+    /// it comes what the pose teaches about the labels.
     pub fn likelihood(
         &self,
         partners: &Partners,
         known: &Confusion,
         agreement: f64,
     ) -> (Likelihood, Confusion) {
-        let counts = self.count(partners);
+        let mut surfaces = f64::NEG_INFINITY;
+        let mut closeness = 1.0;
+        for part in CLOSENESS {
+            let of_part = self.by_surfaces(partners, part);
+            if of_part > surfaces {
+                (surfaces, closeness) = (of_part, part);
+            }
+        }
+        let counts = self.count(partners, closeness);
         let lifts = lifts(&counts, known, agreement);
-        let (mut surfaces, mut both) = (0.0, 0.0);
+        let mut both = 0.0;
         for (i, near) in partners.of_point.iter().enumerate() {
-            let weight = self.weights.get(i).copied().unwrap_or(0.0);
             let label = self.source.label(i);
             let lift = self
                 .folds
                 .get(i)
                 .and_then(|&fold| lifts.get(usize::from(fold)));
-            let (mut plain, mut labelled) = (0.0, 0.0);
-            for partner in near.iter().filter(|p| p.nearness > 0.0) {
-                plain += partner.nearness;
-                labelled += partner.nearness
+            let mut labelled = 0.0;
+            for partner in near.iter().filter(|p| p.beside > 0.0) {
+                labelled += partner.nearness(closeness)
                     * lift.map_or(1.0, |lift| {
                         lift.expected(&label, &self.target.label(partner.target as usize))
                     });
             }
-            surfaces += weight * log_density(plain);
-            both += weight * log_density(labelled);
+            both += self.weight(i) * log_density(labelled);
         }
         let likelihood = Likelihood {
             surfaces,
@@ -238,23 +271,36 @@ impl<'a> Fit<'a> {
         (likelihood, sum(counts.iter()))
     }
 
+    fn weight(&self, i: usize) -> f64 {
+        self.weights.get(i).copied().unwrap_or(0.0)
+    }
+
+    /// Log-likelihood without labels.
+    fn by_surfaces(&self, partners: &Partners, closeness: f64) -> f64 {
+        let of_point = partners.of_point.iter().enumerate().map(|(i, near)| {
+            let plain: f64 = near.iter().map(|p| p.nearness(closeness)).sum();
+            self.weight(i) * log_density(plain)
+        });
+        of_point.sum()
+    }
+
     /// Labels seen in one place, by fold; none where one cloud has none.
-    fn count(&self, partners: &Partners) -> Vec<Counts> {
+    fn count(&self, partners: &Partners, closeness: f64) -> Vec<Counts> {
         if !self.source.is_labelled() || !self.target.is_labelled() {
             return Vec::new();
         }
         let mut counts = vec![Counts::default(); FOLDS];
         for (i, near) in partners.of_point.iter().enumerate() {
-            let weight = self.weights.get(i).copied().unwrap_or(0.0);
             let fold = self.folds.get(i).copied().unwrap_or(0);
             let label = self.source.label(i);
-            let sum: f64 = near.iter().map(|p| p.nearness).sum();
+            let sum: f64 = near.iter().map(|p| p.nearness(closeness)).sum();
             // Share of the source point that is on the map at all.
             let share = INLIERS * CONTRAST / (1.0 - INLIERS + INLIERS * CONTRAST * sum);
-            for partner in near.iter().filter(|p| p.nearness > 0.0) {
+            for partner in near.iter().filter(|p| p.beside > 0.0) {
                 let target = self.target.label(partner.target as usize);
                 if let Some(counts) = counts.get_mut(usize::from(fold)) {
-                    counts.add(&label, &target, weight * share * partner.nearness);
+                    let nearness = partner.nearness(closeness);
+                    counts.add(&label, &target, self.weight(i) * share * nearness);
                 }
             }
         }

@@ -15,10 +15,8 @@ use super::map::CalibrationMap;
 use super::rays::blocked_fraction;
 use super::types::CalibrationOptions;
 
-/// Hypotheses of a first look.
-const FIRST_LOOK: usize = 96;
-/// Of those, the ones that are refined with all points.
-const SECOND_LOOK: usize = 10;
+/// Hypotheses that are refined with more points after a first look.
+const SECOND_LOOK: usize = 24;
 /// Log-likelihood that a blocked line of sight costs an observation.
 const BLOCKED_COST: f64 = 2.0;
 
@@ -91,7 +89,6 @@ impl<'a> Workbench<'a> {
     pub fn first_look(&self, hypotheses: &[Hypothesis]) -> Vec<Candidate> {
         let mut found: Vec<Candidate> = hypotheses
             .par_iter()
-            .take(FIRST_LOOK)
             .map(|hypothesis| {
                 let pose = self.refine_few(&self.input.few, &hypothesis.target_from_source);
                 self.judge(&self.few, pose, "search")

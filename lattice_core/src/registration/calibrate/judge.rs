@@ -8,8 +8,8 @@ use super::super::search::{Region, SearchSource, search};
 use super::super::{PrepareOptions, PreparedCloud, SemanticCloud};
 use super::candidates::{Candidate, Workbench};
 use super::covariance::{ErrorModel, PoseCovariance};
+use super::likeliest;
 use super::types::{Calibration, ClassReliability, DirectionKind, Verdict, WeakDirection};
-use super::{HYPOTHESES, likeliest};
 use crate::pose::Axes;
 
 /// Poses farther apart than this in the midst of the points, or turned by more, are different answers;
@@ -20,6 +20,8 @@ const DIFFERENT_RAD: f64 = 0.26;
 const SOFTNESS: f64 = 8.0;
 /// How much larger than its residuals the error of a region may be.
 const INVISIBLE: f64 = 4.0;
+/// Hypotheses of a search with other axes.
+const MISREAD: usize = 48;
 /// GICP from a given start stands unless another is better by this log-likelihood.
 const DISPLACE: f64 = 10.0;
 
@@ -258,7 +260,7 @@ fn surfaces_with(
     let turned = SemanticCloud::unlabelled(points.iter().map(|p| axes * p).collect());
     let turned = PreparedCloud::new(turned, &PrepareOptions::default()).ok()?;
     let source = SearchSource::by_surface(&turned, bench.input.sensor_m.map(|p| axes * p));
-    let hypotheses = search(&bench.map.surfaces, &source, region, HYPOTHESES);
+    let hypotheses = search(&bench.map.surfaces, &source, region, MISREAD);
     let scale = bench.map.scale(bench.options.noise_m).coarser(2.0);
     let fit = Fit::new(&turned, &bench.map.cloud, scale);
     let likelihoods = hypotheses.par_iter().map(|h| {

@@ -29,7 +29,7 @@ impl CalibrationMap {
         }
         let cloud = PreparedCloud::new(cloud, &PrepareOptions::default())?;
         let surfaces = SearchMap::of_surfaces(&cloud, cell_side_m);
-        let occupied = OccupiedGrid::new(cloud.points_m(), 2.0 * cell_side_m);
+        let occupied = OccupiedGrid::new(cloud.points_m(), cloud.normals(), 2.0 * cell_side_m);
         let (Some(surfaces), Some(occupied)) = (surfaces, occupied) else {
             return Err(RegistrationError::TooFewPoints {
                 points: 0,

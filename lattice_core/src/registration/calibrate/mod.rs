@@ -32,12 +32,14 @@ pub use types::{
     Progress, Stage, Verdict, WeakDirection,
 };
 
-/// Hypotheses of each kind of search.
-const HYPOTHESES: usize = 48;
+/// Hypotheses of the search by surfaces: a piece of wall fits many walls.
+const BY_SURFACES: usize = 128;
+/// Hypotheses of the search by labels.
+const BY_LABELS: usize = 64;
 /// Candidates that are refined to the end.
 const FINALISTS: usize = 4;
 /// Log-likelihood of an observation that refining a candidate may still win it.
-const HOPE: f64 = 0.25;
+const HOPE: f64 = 0.5;
 /// Share of points on the map above which a cloud is surely not on its side.
 const GOOD_INLIERS: f64 = 0.8;
 /// Classes that are searched by, at most.
@@ -142,7 +144,7 @@ fn step(progress: &dyn Progress, stage: Stage, fraction: f64) -> Result<(), Refu
 /// Poses that the surfaces fit.
 fn by_surfaces(bench: &Workbench<'_>, region: Option<&Region>) -> Vec<Hypothesis> {
     let source = SearchSource::by_surface(&bench.input.few, bench.input.sensor_m);
-    search(&bench.map.surfaces, &source, region, HYPOTHESES)
+    search(&bench.map.surfaces, &source, region, BY_SURFACES)
 }
 
 /// Poses that the labels fit, as far as it is known how they go together.
@@ -170,7 +172,7 @@ fn by_labels(bench: &Workbench<'_>, region: Option<&Region>) -> Vec<Hypothesis> 
         return Vec::new();
     };
     let source = SearchSource::by_class(few, bench.input.sensor_m, &channels);
-    search(&labels, &source, region, HYPOTHESES)
+    search(&labels, &source, region, BY_LABELS)
 }
 
 /// The classes of most points.

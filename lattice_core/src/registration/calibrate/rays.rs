@@ -7,10 +7,12 @@ use super::super::search::OccupiedGrid;
 
 /// Rays that are looked at, at most.
 const RAYS: usize = 300;
-/// Cells of a ray that are looked at, at most, however far a point claims to be.
+/// Places of a ray that are looked at, at most, however far a point claims to be.
 const STEPS: usize = 1000;
+/// How far apart they are, in cells.
+const STRIDE: f64 = 0.7;
 
-/// Share of the rays to the points that pass through something on their way.
+/// Share of the rays to the points that go through a surface on their way.
 ///
 /// The way ends before the point by `clear_m`, and begins as far after the sensor.
 pub(super) fn blocked_fraction(
@@ -33,11 +35,14 @@ pub(super) fn blocked_fraction(
         }
         rays += 1;
         let direction = way / length;
-        let stride = occupied.cell_m();
-        let cells = ((length - 2.0 * clear_m) / stride) as usize;
-        let meets = (0..=cells.min(STEPS)).any(|i| {
-            let place = from + direction * (clear_m + i as f64 * stride);
-            occupied.contains(&place)
+        // Less than a cell, so that none is passed over but at its corners.
+        let stride = STRIDE * occupied.cell_m();
+        let (begin_m, end_m) = (clear_m, length - clear_m);
+        let steps = ((end_m - begin_m) / stride) as usize;
+        let meets = (0..=steps.min(STEPS)).any(|i| {
+            let place = from + direction * (begin_m + i as f64 * stride);
+            let crossing = occupied.crossing_m(&place, &from, &direction);
+            crossing.is_some_and(|along_m| along_m > begin_m && along_m < end_m)
         });
         blocked += u32::from(meets);
     }

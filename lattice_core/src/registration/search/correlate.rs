@@ -4,6 +4,9 @@ use nalgebra::{Rotation3, Vector3};
 
 use super::field::Field;
 
+/// Cells of the source that are looked at, at most; more tell little that is new.
+const MAX_STEPS: usize = 256;
+
 /// A heading and a place that the source fits, and how well.
 #[derive(Clone, Copy, PartialEq, Debug)]
 pub(super) struct Peak {
@@ -43,6 +46,8 @@ pub(super) fn best_places(
     // Each occupied cell of the source counts once.
     steps.sort_unstable_by_key(|(channel, [x, y, z])| (*channel, *z, *y, *x));
     steps.dedup();
+    let stride = steps.len().div_ceil(MAX_STEPS).max(1);
+    let steps: Vec<_> = steps.into_iter().step_by(stride).collect();
     let sums = sum_all(field, &steps, window);
     maxima(&sums, window.dims, most)
         .into_iter()

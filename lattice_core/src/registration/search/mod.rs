@@ -25,8 +25,8 @@ pub use occupied::OccupiedGrid;
 
 /// Places kept of each heading.
 const PLACES: usize = 24;
-/// Most peaks that are climbed.
-const CLIMBED: usize = 160;
+/// Peaks that are climbed for each hypothesis that is wanted.
+const CLIMBED: usize = 3;
 /// Points that climbs look at, about.
 const CLIMB_POINTS: usize = 200;
 /// Coarse cells of a map, about; a larger map gets larger ones.
@@ -169,7 +169,7 @@ pub fn search(
         .flat_map_iter(|yaw| best_places(&map.coarse, probe.at_heading(yaw), yaw, window, PLACES))
         .collect();
     peaks.sort_by_key(|peak| std::cmp::Reverse(peak.score));
-    peaks.truncate(CLIMBED);
+    peaks.truncate(CLIMBED * most);
     let mut found: Vec<(f64, f64, Vector3<f64>)> = peaks
         .par_iter()
         .map(|peak| {

@@ -1,28 +1,71 @@
-//! Where something is, for lines of sight.
+//! Where surfaces are, for lines of sight.
 
-use nalgebra::Point3;
+use nalgebra::{Point3, Vector3};
 
 use super::grid::Grid;
 
-/// Occupied cells of a map.
+/// Fewest points of a facet.
+const MIN_POINTS: u32 = 3;
+/// Length of the mean of unit normals below which a cell holds an edge or clutter.
+const FLAT: f32 = 0.8;
+/// Cosine between ray and normal below which a ray runs along a facet rather than through it.
+const STEEP: f64 = 0.4;
+/// How far from the midst of a facet a ray goes through it, in cells.
+const REACH: f64 = 0.75;
+
+/// Cells of a map with the facets of surfaces in them.
 #[derive(Clone, Debug)]
 pub struct OccupiedGrid {
     grid: Grid,
-    cells: Vec<bool>,
+    /// Number of the facet of each cell, from 1; 0 for none.
+    cells: Vec<u32>,
+    facets: Vec<Facet>,
+}
+
+/// The piece of surface in a cell.
+#[derive(Clone, Copy, Debug)]
+struct Facet {
+    /// Mean of the points.
+    middle_m: Point3<f32>,
+    /// Mean of the normals, all on one side.
+    normal: Vector3<f32>,
+    points: u32,
 }
 
 impl OccupiedGrid {
-    /// Of points in cells of `cell_m`, or larger ones if the map is vast. None without points.
-    pub fn new(points_m: &[Point3<f64>], cell_m: f64) -> Option<OccupiedGrid> {
+    /// Of points with unit normals, in cells of `cell_m`, or larger ones if the map is vast. None without
+    /// points.
+    pub fn new(
+        points_m: &[Point3<f64>],
+        normals: &[Vector3<f64>],
+        cell_m: f64,
+    ) -> Option<OccupiedGrid> {
         let grid = Grid::around(points_m, cell_m, 0)?;
-        let mut cells = vec![false; grid.len()];
-        for point in points_m {
+        let mut cells = vec![0_u32; grid.len()];
+        let mut facets: Vec<Facet> = Vec::new();
+        for (point, normal) in points_m.iter().zip(normals) {
             let at = grid.index(grid.cell_of(&point.coords));
-            if let Some(cell) = at.and_then(|at| cells.get_mut(at)) {
-                *cell = true;
+            let Some(cell) = at.and_then(|at| cells.get_mut(at)) else {
+                continue;
+            };
+            let (point, normal) = (point.cast::<f32>(), normal.cast::<f32>());
+            match facets.get_mut((*cell as usize).wrapping_sub(1)) {
+                Some(facet) => facet.add(&point, &normal),
+                None => {
+                    facets.push(Facet {
+                        middle_m: point,
+                        normal,
+                        points: 1,
+                    });
+                    *cell = facets.len() as u32;
+                }
             }
         }
-        Some(OccupiedGrid { grid, cells })
+        Some(OccupiedGrid {
+            grid,
+            cells,
+            facets,
+        })
     }
 
     /// Side of a cell, metres.
@@ -30,11 +73,91 @@ impl OccupiedGrid {
         self.grid.cell_m
     }
 
-    /// Whether the cell of a place is occupied.
-    pub fn contains(&self, place_m: &Point3<f64>) -> bool {
-        let at = self.grid.index(self.grid.cell_of(&place_m.coords));
-        at.and_then(|at| self.cells.get(at))
-            .copied()
-            .unwrap_or(false)
+    /// How far along a ray, metres, it goes through the surface in the cell of a place on it. Rays along a
+    /// surface, past an edge or through clutter do not count.
+    pub fn crossing_m(
+        &self,
+        place_m: &Point3<f64>,
+        from_m: &Point3<f64>,
+        direction: &Vector3<f64>,
+    ) -> Option<f64> {
+        let at = self.grid.index(self.grid.cell_of(&place_m.coords))?;
+        let number = self.cells.get(at).copied()? as usize;
+        let facet = self.facets.get(number.checked_sub(1)?)?;
+        let flatness = facet.normal.norm();
+        if facet.points < MIN_POINTS || flatness < FLAT {
+            return None;
+        }
+        let normal = (facet.normal / flatness).cast::<f64>();
+        let middle_m = facet.middle_m.cast::<f64>();
+        let steepness = normal.dot(direction);
+        if steepness.abs() < STEEP {
+            return None;
+        }
+        let along_m = normal.dot(&(middle_m - from_m)) / steepness;
+        let beside_m = (from_m + direction * along_m - middle_m).norm();
+        (beside_m < REACH * self.grid.cell_m).then_some(along_m)
+    }
+}
+
+impl Facet {
+    fn add(&mut self, point: &Point3<f32>, normal: &Vector3<f32>) {
+        self.points = self.points.saturating_add(1);
+        let share = 1.0 / self.points as f32;
+        let side = normal.dot(&self.normal).signum();
+        self.middle_m += (point - self.middle_m) * share;
+        self.normal += (normal * side - self.normal) * share;
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    /// A square wall at x = 2 m, 5 cm between its points.
+    fn wall() -> OccupiedGrid {
+        let places = (-20..=20).flat_map(|y| (-20..=20).map(move |z| (y, z)));
+        let points: Vec<_> = places
+            .map(|(y, z)| Point3::new(2.0, 0.05 * f64::from(y), 0.05 * f64::from(z)))
+            .collect();
+        // Normals have no side of their own.
+        let normals: Vec<_> = (0..points.len())
+            .map(|i| Vector3::x() * if i % 2 == 0 { 1.0 } else { -1.0 })
+            .collect();
+        OccupiedGrid::new(&points, &normals, 0.1).unwrap()
+    }
+
+    #[test]
+    fn a_ray_through_a_wall_crosses_it_and_one_along_it_does_not() {
+        let (wall, from) = (wall(), Point3::origin());
+        let through = Vector3::new(0.9, 0.2, 0.1).normalize();
+        let at = from + through * (2.0 / through.x);
+        let along = wall.crossing_m(&at, &from, &through).unwrap();
+        assert!((along - 2.0 / through.x).abs() < 1e-6);
+        let beside = Point3::new(2.0, -0.6, 0.0);
+        assert_eq!(
+            wall.crossing_m(&Point3::new(2.0, 0.0, 0.0), &beside, &Vector3::y()),
+            None
+        );
+        let elsewhere = Point3::new(1.0, 0.0, 0.0);
+        assert_eq!(wall.crossing_m(&elsewhere, &from, &through), None);
+    }
+
+    #[test]
+    fn a_few_points_or_an_edge_are_no_facet() {
+        let few = [Point3::new(2.0, 0.0, 0.0); 2];
+        let grid = OccupiedGrid::new(&few, &[Vector3::x(); 2], 0.1).unwrap();
+        assert_eq!(
+            grid.crossing_m(&few[0], &Point3::origin(), &Vector3::x()),
+            None
+        );
+        let edge = [Point3::new(2.0, 0.0, 0.0); 4];
+        let normals = [Vector3::x(), Vector3::y(), Vector3::x(), Vector3::y()];
+        let grid = OccupiedGrid::new(&edge, &normals, 0.1).unwrap();
+        assert_eq!(
+            grid.crossing_m(&edge[0], &Point3::origin(), &Vector3::x()),
+            None
+        );
+        assert!(OccupiedGrid::new(&[], &[], 0.1).is_none());
     }
 }
