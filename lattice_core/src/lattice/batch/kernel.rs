@@ -155,6 +155,17 @@ impl Default for Lanes {
     }
 }
 
+impl Lanes {
+    /// One bit for each eight points that are not all decided.
+    #[inline]
+    pub(super) fn open(&self) -> u32 {
+        let groups = self.decided.as_chunks::<8>().0.iter();
+        groups.rev().fold(0_u32, |open, marks| {
+            open << 1 | u32::from(marks.iter().fold(-1, |all, mark| all & mark) == 0)
+        })
+    }
+}
+
 /// Sums over the decided points of a block.
 #[derive(Clone, Copy, Default, Debug)]
 pub(super) struct LaneSums {
