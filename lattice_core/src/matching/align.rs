@@ -23,7 +23,7 @@ pub struct Alignment {
 /// Aligns a scan with a map from a guess: climbs on every level, the coarsest first, by steps of a
 /// cell side, then refines on the finest ([`refine`]).
 ///
-/// Each level looks at one point of a cell of its own size. A step goes along or about one axis of the
+/// Each level looks at one point of a cell of its own size, drawn from one of each finest cell. A step goes along or about one axis of the
 /// map; turns are about the middle of those points, so that they do not shift the scan as well. Fails
 /// for an empty map, a scan without points and a guess that is not finite.
 pub fn align(
@@ -34,9 +34,11 @@ pub fn align(
 ) -> Result<Alignment, MatchError> {
     options.check()?;
     let mut pose = begin(map, cloud, map_from_cloud)?;
+    let finest = map.levels().first().ok_or(MatchError::EmptyMap)?;
+    let all = sample_of(&cloud.offsets_m, finest.lattice(), MAX_POINTS, 0)?;
     let mut evaluations = 0;
     for (level, list) in map.levels().iter().enumerate().rev() {
-        let points = sample_of(cloud, list.lattice(), options.max_points, 0)?;
+        let points = sample_of(&all, list.lattice(), options.max_points, 0)?;
         let steps = Steps {
             metres: list.lattice().cell_side_m(),
             radians: options.step_rad * (1_u32 << level) as f64,
@@ -73,7 +75,7 @@ fn refine_from(
     options: &AlignOptions,
 ) -> Result<Alignment, MatchError> {
     let list = map.levels().first().ok_or(MatchError::EmptyMap)?;
-    let points = sample_of(cloud, list.lattice(), options.max_points, 1)?;
+    let points = sample_of(&cloud.offsets_m, list.lattice(), options.max_points, 1)?;
     let steps = Steps {
         metres: options.fine_step * list.lattice().cell_side_m(),
         radians: options.fine_step * options.step_rad,
@@ -112,16 +114,16 @@ pub(super) fn end(cloud: &Cloud, pose: &Isometry3<f64>) -> Isometry3<f64> {
     pose * Translation3::from(-cloud.datum_m)
 }
 
-/// A sample of the offsets of a cloud; fails without any.
+/// A [`sample`] that fails if no point has a cell.
 pub(super) fn sample_of(
-    cloud: &Cloud,
+    points_m: &[[f32; 3]],
     lattice: &Lattice,
     most: usize,
     round: u64,
 ) -> Result<Vec<[f32; 3]>, MatchError> {
-    let points = sample(&cloud.offsets_m, lattice, most, round);
+    let points = sample(points_m, lattice, most, round);
     if points.is_empty() {
-        let points = cloud.len();
+        let points = points_m.len();
         return Err(MatchError::NoPoints { points });
     }
     Ok(points)

@@ -46,7 +46,7 @@ pub fn search(
     let (mut evaluations, mut sampled) = (0, 0);
     let mut spacing = grid.spacing;
     for (number, list) in map.levels().iter().rev().enumerate() {
-        let points = sample_of(cloud, list.lattice(), options.max_points, 0)?;
+        let points = sample_of(&cloud.offsets_m, list.lattice(), options.max_points, 0)?;
         let score = |offset: &Offset| list.overlap(&pose(offset), &points);
         let (tried, best) = if number == 0 {
             let all = grid.poses() as usize;

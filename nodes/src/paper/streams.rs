@@ -18,6 +18,10 @@ pub enum Purpose {
     Thin = 260,
     /// Where a lattice lies about a cloud.
     Offset = 261,
+    /// How lattices lie and where alignments start.
+    Matching = 272,
+    /// Resamples of trials.
+    Bootstrap = 273,
 }
 
 /// Stream `index` (below 2^48) of a purpose.

@@ -26,7 +26,8 @@ pub struct Voxels {
     /// A rosbag2 log of clouds and an INS for Table I; may be given several times
     #[arg(long = "bag", value_name = "DIR")]
     bags: Vec<PathBuf>,
-    /// Folder of pairs of scans for Fig. 6
+    /// Folder of pairs of scans for Fig. 6: small_gicp/{target,source}.ply with T_target_source.txt, and
+    /// room_scan{1,2}.pcd; either may be missing
     #[arg(long, value_name = "DIR")]
     pairs: Option<PathBuf>,
     /// Print the report as JSON

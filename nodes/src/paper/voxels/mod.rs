@@ -5,6 +5,7 @@ mod cells;
 mod distances;
 mod generators;
 mod loader;
+mod matching;
 mod neighbors;
 mod quantization;
 mod radial;
@@ -38,7 +39,7 @@ pub struct Options {
 type Make = fn(&Options, &mut dyn FnMut(f64)) -> Result<Section, Fault>;
 
 /// Name, share of the time, and what makes it; in the order of the paper.
-const SECTIONS: [(&str, f64, Make); 9] = [
+const SECTIONS: [(&str, f64, Make); 10] = [
     ("cells", 0.1, cells::section),
     ("eq. (1)-(2)", 3.0, quantization::section),
     ("eq. (3)-(7)", 0.1, neighbors::section),
@@ -48,6 +49,7 @@ const SECTIONS: [(&str, f64, Make); 9] = [
     ("Fig. 4", 6.0, radial::section),
     ("Fig. 5", 60.0, rotations::section),
     ("Table I", 10.0, loader::section),
+    ("Fig. 6", 150.0, matching::section),
 ];
 
 /// Computes all sections; `progress` is told how much is done, from 0 to 1, and what comes next.
