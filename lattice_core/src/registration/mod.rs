@@ -22,7 +22,7 @@ mod tree;
 
 pub use calibrate::{
     Calibration, CalibrationMap, CalibrationOptions, CalibrationRequest, ClassReliability,
-    DirectionKind, Gaze, Progress, Stage, TrackUpdate, Tracker, Verdict, WeakDirection, calibrate,
+    DirectionKind, Gaze, Progress, Stage, TrackUpdate, Verdict, WeakDirection, calibrate, track,
 };
 pub use cloud::SemanticCloud;
 pub use confusion::{Confusion, Lift};

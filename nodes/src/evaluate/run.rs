@@ -6,7 +6,7 @@ use std::sync::atomic::{AtomicBool, AtomicUsize, Ordering};
 use std::sync::mpsc;
 use std::time::Instant;
 
-use lattice_core::registration::{CalibrationOptions, CalibrationRequest, Tracker, calibrate};
+use lattice_core::registration::{CalibrationOptions, CalibrationRequest, calibrate, track};
 use lattice_core::simulate::house::Scene;
 use nalgebra::Isometry3;
 
@@ -303,12 +303,11 @@ fn run_task(scenario: &Scenario, task: &Task, job: &Job) -> Trial {
                 .with_judgement(&calibration, &scenario.truth)
         }
         TaskMethod::Tracked => {
-            let mut tracker = Tracker::new(start.unwrap_or_default());
-            if let Some(gaze) = scenario.gazes.first() {
-                tracker.update(&scenario.map, gaze, &options);
-            }
+            let start = start.unwrap_or_default();
+            let update =
+                (scenario.gazes.first()).map(|gaze| track(&scenario.map, gaze, &start, &options));
             let wall_ms = ms(started);
-            trial(&tracker.map_from_headset(), wall_ms)
+            trial(&update.map_or(start, |u| u.map_from_headset), wall_ms)
         }
     }
 }

@@ -128,9 +128,7 @@ impl SemanticIcpServer {
             return;
         };
         let inliers = known.result.inlier_fraction;
-        let least = self.options.calibration.min_inliers;
-        let fits = |u: &TrackUpdate| u.holds && u.inlier_fraction >= least;
-        let update = update.filter(fits);
+        let update = update.filter(|update| update.fits);
         // A mirrored cloud has the same floor: it fits somewhat.
         let in_doubt = |u: &TrackUpdate| {
             let too_few = u.inlier_fraction < self.options.doubt_below * inliers;

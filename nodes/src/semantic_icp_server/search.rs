@@ -6,7 +6,7 @@ use std::sync::atomic::{AtomicBool, Ordering::Relaxed};
 
 use lattice_core::registration::{
     Calibration, CalibrationMap, CalibrationOptions, CalibrationRequest, Confusion, Gaze, Progress,
-    SemanticCloud, Stage, TrackUpdate, Tracker, Verdict, calibrate,
+    SemanticCloud, Stage, TrackUpdate, Verdict, calibrate, track,
 };
 use nalgebra::Isometry3;
 
@@ -42,7 +42,6 @@ pub struct LatticeSearch {
     map: Option<CalibrationMap>,
     /// What was learned of the labels so far.
     confusion: Option<Confusion>,
-    tracker: Option<Tracker>,
 }
 
 impl LatticeSearch {
@@ -52,7 +51,6 @@ impl LatticeSearch {
             options,
             map: None,
             confusion: None,
-            tracker: None,
         }
     }
 }
@@ -88,11 +86,7 @@ impl Search for LatticeSearch {
 
     fn track(&mut self, gaze: &Gaze, map_from_headset: &Isometry3<f64>) -> Option<TrackUpdate> {
         let map = self.map.as_ref()?;
-        let same = |tracker: &mut Tracker| tracker.map_from_headset() == *map_from_headset;
-        let tracker = self.tracker.take_if(same);
-        let tracker = tracker.unwrap_or_else(|| Tracker::new(*map_from_headset));
-        let tracker = self.tracker.insert(tracker);
-        Some(tracker.update(map, gaze, &self.options))
+        Some(track(map, gaze, map_from_headset, &self.options))
     }
 }
 

@@ -11,7 +11,7 @@ mod input;
 mod judge;
 mod map;
 mod rays;
-mod tracker;
+mod track;
 mod types;
 
 use std::ops::ControlFlow;
@@ -26,7 +26,7 @@ use input::Input;
 use types::Refusal;
 
 pub use map::CalibrationMap;
-pub use tracker::{TrackUpdate, Tracker};
+pub use track::{TrackUpdate, track};
 pub use types::{
     Calibration, CalibrationOptions, CalibrationRequest, ClassReliability, DirectionKind, Gaze,
     Progress, Stage, Verdict, WeakDirection,

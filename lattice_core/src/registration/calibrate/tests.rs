@@ -172,11 +172,10 @@ fn a_tracked_pose_follows_and_breaks() {
     let map = map(&flat);
     let truth = truth(4);
     let off = truth * Isometry3::new(Vector3::new(0.03, -0.02, 0.01), Vector3::z() * 0.01);
-    let mut tracker = Tracker::new(off);
     let gaze = flat.gaze(Point3::from(LOOKS[1].0), LOOKS[1].1, &truth, 4);
     let options = CalibrationOptions::default();
-    let update = tracker.update(&map, &gaze, &options);
-    assert!(update.holds);
+    let update = track(&map, &gaze, &off, &options);
+    assert!(update.fits);
     assert!(PoseError::between(&update.map_from_headset, &truth).translation_m < 0.01);
     let elsewhere = flat.gaze(
         Point3::from(LOOKS[1].0),
@@ -184,8 +183,8 @@ fn a_tracked_pose_follows_and_breaks() {
         &Isometry3::translation(50.0, 0.0, 9.0),
         4,
     );
-    let held: Vec<bool> = (0..3)
-        .map(|_| tracker.update(&map, &elsewhere, &options).holds)
-        .collect();
-    assert_eq!(held, [true, true, false]);
+    let lost = track(&map, &elsewhere, &truth, &options);
+    assert!(!lost.fits && lost.map_from_headset == truth);
+    let unusable = track(&map, &Gaze::default(), &truth, &options);
+    assert!(!unusable.fits && unusable.map_from_headset == truth);
 }

@@ -1,0 +1,66 @@
+//! Following a headset that is already calibrated.
+
+use nalgebra::Isometry3;
+
+use super::candidates::Workbench;
+use super::input::Input;
+use super::map::CalibrationMap;
+use super::types::{CalibrationOptions, CalibrationRequest, Gaze};
+
+/// Log-likelihood by which a refined pose must be better to replace the old one.
+const BETTER: f64 = 2.0;
+
+/// What a further look says of a pose.
+#[derive(Clone, Copy, PartialEq, Debug)]
+pub struct TrackUpdate {
+    /// Whether the look fits; a full search is due when several in a row do not.
+    pub fits: bool,
+    /// `map_from_headset` after the look; as before if it does not fit.
+    pub map_from_headset: Isometry3<f64>,
+    /// Share of the points on a surface of the map.
+    pub inlier_fraction: f64,
+    /// Root mean square distance of those from the surfaces, metres.
+    pub rmse_m: f64,
+}
+
+/// Refines a known pose by one more look, cheaply: nothing is searched.
+///
+/// A look that cannot be used fits as little as one from elsewhere.
+pub fn track(
+    map: &CalibrationMap,
+    gaze: &Gaze,
+    map_from_headset: &Isometry3<f64>,
+    options: &CalibrationOptions,
+) -> TrackUpdate {
+    let request = CalibrationRequest {
+        gazes: std::slice::from_ref(gaze),
+        start: None,
+        confusion: None,
+    };
+    let Ok(input) = Input::new(&request, options, map.spacing_m) else {
+        return TrackUpdate {
+            fits: false,
+            map_from_headset: *map_from_headset,
+            inlier_fraction: 0.0,
+            rmse_m: 0.0,
+        };
+    };
+    let bench = Workbench::new(map, &input, options, None);
+    let old = bench.judge(&bench.fit, *map_from_headset, "tracking");
+    let pose = bench.polish(map_from_headset);
+    let new = bench.judge(&bench.fit, pose, "tracking");
+    let best = match new.total() > old.total() + BETTER {
+        true => new,
+        false => old,
+    };
+    let fits = best.inlier_fraction >= options.min_inliers;
+    TrackUpdate {
+        fits,
+        map_from_headset: match fits {
+            true => best.map_from_headset,
+            false => *map_from_headset,
+        },
+        inlier_fraction: best.inlier_fraction,
+        rmse_m: best.rmse_m,
+    }
+}
