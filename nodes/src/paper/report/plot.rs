@@ -58,6 +58,24 @@ pub struct Axes<'a> {
     pub ys: std::ops::Range<f64>,
 }
 
+/// Number of labels at an axis, about.
+const TICKS: usize = 7;
+
+/// Labels of an axis that shows a range, with as many digits as they need.
+pub fn labels(range: &std::ops::Range<f64>) -> impl Fn(&f64) -> String + use<> {
+    let step = (range.end - range.start) / TICKS as f64;
+    let digits = (-step.log10()).ceil().clamp(0.0, 9.0) as usize;
+    move |value| {
+        // No -0.
+        let value = if value.abs() < step / 1e6 {
+            0.0
+        } else {
+            *value
+        };
+        format!("{value:.digits$}")
+    }
+}
+
 /// A line of a colour.
 pub type Curve = (RGBColor, Vec<(f64, f64)>);
 
@@ -73,6 +91,9 @@ pub fn curves(area: &Area, axes: &Axes, curves: &[Curve]) -> Result<(), Fault> {
         .configure_mesh()
         .x_desc(axes.x)
         .y_desc(axes.y)
+        .x_labels(TICKS)
+        .x_label_formatter(&labels(&axes.xs))
+        .y_label_formatter(&labels(&axes.ys))
         .light_line_style(WHITE)
         .label_style(LABELS)
         .draw()?;
@@ -85,14 +106,25 @@ pub fn curves(area: &Area, axes: &Axes, curves: &[Curve]) -> Result<(), Fault> {
     Ok(())
 }
 
-/// The share of values up to each of them, as steps.
+/// Values from which a cumulative curve is drawn by its quantiles.
+const MANY: usize = 200;
+
+/// The share of values up to each of them: as steps, or as a line where they are many.
 pub fn cumulative(values: &[f64]) -> Vec<(f64, f64)> {
     let mut sorted = values.to_vec();
     sorted.sort_by(f64::total_cmp);
-    let n = sorted.len() as f64;
+    let n = sorted.len();
+    if n > MANY {
+        let at = |i: usize| {
+            let value = sorted.get(i * (n - 1) / MANY)?;
+            Some((*value, i as f64 / MANY as f64))
+        };
+        return (0..=MANY).filter_map(at).collect();
+    }
     let steps = sorted.iter().enumerate();
+    let share = |i: usize| i as f64 / n as f64;
     steps
-        .flat_map(|(i, &x)| [(x, i as f64 / n), (x, (i + 1) as f64 / n)])
+        .flat_map(|(i, &x)| [(x, share(i)), (x, share(i + 1))])
         .collect()
 }
 
@@ -171,6 +203,7 @@ pub fn boxes_with_marks(
         .disable_x_mesh()
         .x_labels(boxes.len() + 1)
         .x_label_formatter(&name)
+        .y_label_formatter(&labels(&axes.ys))
         .x_desc(axes.x)
         .y_desc(axes.y)
         .light_line_style(WHITE)
@@ -244,9 +277,23 @@ mod tests {
     }
 
     #[test]
+    fn labels_have_the_digits_that_they_need() {
+        let said = |range, value: f64| labels(&range)(&value);
+        assert_eq!(said(17_000.0..17_300.0, 17_100.0), "17100");
+        assert_eq!(said(0.23..0.242, 0.234), "0.234");
+        assert_eq!(
+            (said(0.0..2.6, 0.5), said(-1.0..2.6, -1e-17)),
+            ("0.5".into(), "0.0".into())
+        );
+    }
+
+    #[test]
     fn a_cumulative_curve_goes_from_0_to_1() {
         let steps = cumulative(&[3.0, 1.0]);
         assert_eq!(steps, [(1.0, 0.0), (1.0, 0.5), (3.0, 0.5), (3.0, 1.0)]);
+        let many: Vec<f64> = (0..=1000).rev().map(f64::from).collect();
+        let line = cumulative(&many);
+        assert!(line.len() <= 201 && line.iter().all(|(x, share)| x / 1000.0 == *share));
     }
 
     #[test]

@@ -6,7 +6,7 @@ use lattice_core::lattice::{Lattice, LatticeKind};
 use plotters::prelude::*;
 
 use super::{Options, unit};
-use crate::paper::report::plot::{Fault, LABELS, Layout, color, key, svg, title};
+use crate::paper::report::plot::{Fault, LABELS, Layout, color, key, labels, svg, title};
 use crate::paper::report::{Cell, Check, Figure, Section, Table, Verdict};
 
 /// How many touching cells are how far away, unit volume.
@@ -213,6 +213,8 @@ fn draw() -> Result<String, Fault> {
             .x_desc("lattice point, by distance")
             .y_desc("distance (cell sides)")
             .x_labels(14)
+            .x_label_formatter(&labels(&(0.0..27.0)))
+            .y_label_formatter(&labels(&(0.75..1.85)))
             .light_line_style(WHITE)
             .label_style(LABELS)
             .draw()?;

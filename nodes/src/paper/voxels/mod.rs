@@ -14,6 +14,7 @@ mod sample;
 mod scan;
 mod theory;
 
+use std::fs;
 use std::path::PathBuf;
 
 use lattice_core::lattice::{Lattice, LatticeIndex, LatticeKind};
@@ -54,6 +55,15 @@ const SECTIONS: [(&str, f64, Make); 10] = [
 
 /// Computes all sections; `progress` is told how much is done, from 0 to 1, and what comes next.
 pub fn run(options: &Options, progress: &mut dyn FnMut(f64, &str)) -> Result<Report, Fault> {
+    // Before a minute of work.
+    for path in options
+        .scans
+        .iter()
+        .chain(&options.bags)
+        .chain(&options.pairs)
+    {
+        fs::metadata(path).map_err(|e| format!("{}: {e}", path.display()))?;
+    }
     let all: f64 = SECTIONS.iter().map(|(_, share, _)| share).sum();
     let mut before = 0.0;
     let mut sections = Vec::new();

@@ -88,8 +88,7 @@ pub fn theory(all: &[Placed]) -> Table {
         "printed \"distance error\" (m)",
     ];
     let row = |placed: &Placed| {
-        let side_m = placed.lattice.cell_side_m();
-        let mse = placed.lattice.second_moment() * side_m * side_m;
+        let mse = placed.mse_of_theory();
         let mut row = vec![
             placed.name().into(),
             Cell::Number(mse, 6),

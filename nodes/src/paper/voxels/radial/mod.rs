@@ -101,7 +101,7 @@ pub fn section(options: &Options, progress: &mut dyn FnMut(f64)) -> Result<Secti
             "With the paper's sets the standard deviation is {} and the range {:.1} % against cubic: as printed. \
              But that compares the 12 face neighbours of FCC with all 26 touching cubes. Like for like, FCC gains \
              little, and of faces only nothing; the tightest neighbourhood of touching cells is that of BCC.",
-            said(0, |change| format!("{:+.2} ± {:.2} %", change.std, change.half)),
+            said(0, |change| format!("{:+.3} ± {:.3} %", change.std, change.half)),
             changes.first().map_or(f64::NAN, |change| change.range),
         ),
         verdict: Verdict::Corrected(format!(
@@ -230,7 +230,7 @@ impl Change {
 
     fn row(&self) -> Vec<Cell> {
         let figures = [self.std, self.half, self.exact_std, self.range];
-        let figures = figures.map(|value| Cell::Number(value, 2));
+        let figures = figures.map(|value| Cell::Number(value, 3));
         iter::once(self.name.into()).chain(figures).collect()
     }
 
@@ -287,7 +287,7 @@ fn draw(spreads: &[Spread]) -> Result<String, Fault> {
                 x: "distance (cell sides)",
                 y: "density",
                 xs: 0.0..2.6,
-                ys: 0.0..3.4,
+                ys: 0.0..3.7,
             };
             let shown = spreads
                 .iter()

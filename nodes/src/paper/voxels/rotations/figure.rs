@@ -1,0 +1,73 @@
+//! Fig. 5 itself.
+
+use lattice_core::lattice::LatticeKind;
+
+use super::{Run, ends};
+use crate::paper::report::Figure;
+use crate::paper::report::plot::{Axes, Curve, Fault, Layout, color, cumulative, curves, key, svg};
+use crate::paper::voxels::scan::Scan;
+
+/// Cumulative distributions of a cloud: a row for each kind of turns.
+pub fn figure(scan: &Scan, runs: &[&Run]) -> Result<Figure, Fault> {
+    let layout = Layout {
+        panel: (500, 310),
+        columns: 2,
+        rows: runs.len(),
+        key_width: 130,
+        key: &key(&LatticeKind::ALL),
+    };
+    let picture = svg(&layout, |areas| {
+        let panels = runs.iter().flat_map(|run| [(run, false), (run, true)]);
+        for (area, (run, counts)) in areas.iter().zip(panels) {
+            let lines: Vec<Curve> = LatticeKind::ALL
+                .into_iter()
+                .filter_map(|kind| {
+                    let measured = run.paper(kind)?;
+                    let values = match counts {
+                        true => &measured.counts,
+                        false => &measured.means_m,
+                    };
+                    Some((color(kind), cumulative(values)))
+                })
+                .collect();
+            let (what, x) = match counts {
+                true => ("voxel count", "voxels"),
+                false => ("distortion", "mean distance (m)"),
+            };
+            let name = format!("{what}, {}", run.turns.name());
+            let axes = Axes {
+                title: &name,
+                x,
+                y: "share of poses",
+                xs: reach(&lines),
+                ys: 0.0..1.0,
+            };
+            curves(area, &axes, &lines)?;
+        }
+        Ok(())
+    })?;
+    Ok(Figure {
+        name: format!("fig5_{}", scan.id),
+        caption: format!(
+            "{} points, {}, cells of {} m³: share of {} poses with at most so much distortion (left) and so many voxels \
+             (right).",
+            scan.points.len(),
+            scan.title,
+            scan.volumes_m3.first().copied().unwrap_or(f64::NAN),
+            runs.first()
+                .and_then(|run| run.cubic())
+                .map_or(0, |m| m.counts.len()),
+        ),
+        svg: picture,
+    })
+}
+
+/// From the least to the greatest x of some lines, and a little more.
+fn reach(lines: &[Curve]) -> std::ops::Range<f64> {
+    let xs = lines
+        .iter()
+        .flat_map(|(_, points)| points.iter().map(|p| p.0));
+    let (low, high) = ends(xs);
+    let room = 0.04 * (high - low).max(1e-9);
+    low - room..high + room
+}

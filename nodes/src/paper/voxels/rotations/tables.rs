@@ -1,0 +1,109 @@
+//! The numbers of Fig. 5.
+
+use lattice_core::lattice::LatticeKind;
+
+use super::measure::Laid;
+use super::{ROUND, Run, spread};
+use crate::evaluate::Share;
+use crate::paper::estimate::Estimate;
+use crate::paper::report::{Cell, Table};
+
+/// "-5.0 ± 0.1".
+fn percent(change: Estimate) -> Cell {
+    Cell::Text(format!(
+        "{:+.2} ± {:.2}",
+        100.0 * change.mean,
+        100.0 * change.half
+    ))
+}
+
+/// A row for each run: the change of the count, lattice by lattice.
+pub fn summary(runs: &[Run]) -> Table {
+    let laid: Vec<Laid> = LatticeKind::ALL
+        .into_iter()
+        .skip(1)
+        .map(Laid::paper)
+        .chain(ROUND.map(Laid::flat))
+        .collect();
+    let row = |run: &Run| {
+        let cubic = run.cubic();
+        let count = cubic.map(|cubic| Estimate::of(cubic.counts.iter().copied()).mean);
+        let mut row = vec![
+            Cell::Text(run.scan.title.clone()),
+            run.turns.name().into(),
+            Cell::Number(run.volume_m3, 3),
+            count.map_or(Cell::Empty, |count| Cell::Number(count, 0)),
+        ];
+        row.extend(laid.iter().map(|laid| {
+            let change = cubic.and_then(|cubic| Some(run.of(*laid)?.count_to(cubic)));
+            change.map_or(Cell::Empty, percent)
+        }));
+        row
+    };
+    let mut columns = ["points", "turned by", "cell volume (m³)", "voxels, cubic"]
+        .map(String::from)
+        .to_vec();
+    columns.extend(laid.iter().map(|laid| format!("{} (%)", laid.name())));
+    Table {
+        name: "fig5_counts".into(),
+        caption: "Voxel count against cubic at the same poses, mean with 95 % interval".into(),
+        columns,
+        rows: runs.iter().map(row).collect(),
+    }
+}
+
+/// A row for each lattice of each run.
+pub fn details(runs: &[Run]) -> Table {
+    let columns = [
+        "points",
+        "turned by",
+        "cell volume (m³)",
+        "lattice",
+        "poses",
+        "voxels",
+        "±",
+        "to cubic (%)",
+        "±",
+        "std of voxels",
+        "±",
+        "std to cubic",
+        "mean distance (m)",
+        "to cubic (%)",
+        "±",
+        "poses at which cubic takes fewer (%)",
+        "95 % interval",
+    ];
+    let mut rows = Vec::new();
+    for run in runs {
+        let Some(cubic) = run.cubic() else {
+            continue;
+        };
+        for measured in &run.measured {
+            let mut row: Vec<Cell> = vec![
+                Cell::Text(run.scan.title.clone()),
+                run.turns.name().into(),
+                Cell::Number(run.volume_m3, 3),
+                Cell::Text(measured.laid.name()),
+                measured.counts.len().into(),
+            ];
+            row.extend(Estimate::of(measured.counts.iter().copied()).cells(1.0, 1));
+            row.extend(measured.count_to(cubic).cells(100.0, 2));
+            row.extend(spread(measured).cells(1.0, 1));
+            row.push(Cell::Number(spread(measured).mean / spread(cubic).mean, 3));
+            let mean = Estimate::of(measured.means_m.iter().copied()).mean;
+            row.push(Cell::Number(mean, 5));
+            row.extend(measured.mean_to(cubic).cells(100.0, 2));
+            let rare = Share::of(measured.more_than(cubic));
+            row.push(Cell::Number(100.0 * rare.share.unwrap_or(f64::NAN), 1));
+            let interval = format!("{:.1} to {:.1}", 100.0 * rare.low, 100.0 * rare.high);
+            row.push(Cell::Text(interval));
+            rows.push(row);
+        }
+    }
+    Table {
+        name: "fig5".into(),
+        caption: "All lattices on all clouds, with 95 % intervals".into(),
+        columns: columns.map(String::from).into(),
+        rows,
+    }
+}
