@@ -7,17 +7,15 @@ use std::path::{Path, PathBuf};
 use std::time::{Duration, Instant};
 
 use clap::{Args, Subcommand};
-use lattice_core::simulate::house::{House, Scene};
+use lattice_core::simulate::house::Scene;
 
 use super::evaluate_kitti::Kitti;
 use super::progress::Progress;
 use super::{CliResult, init_logging};
 use crate::evaluate::{
     Baseline, EvaluateError, OURS, Pivot, Plan, Results, Settings, Start, Summary, TIMED, TRACKED,
-    World, draw, markdown, run,
+    World, draw, markdown, read_house, run,
 };
-use crate::files::classes::read_classes;
-use crate::files::points::read_mesh;
 
 /// Measure what the algorithms are worth
 #[derive(Subcommand)]
@@ -123,7 +121,8 @@ impl Evaluate {
 
 impl Calibration {
     fn run(self) -> CliResult {
-        let (house, mesh_crc32) = self.house()?;
+        let mesh = self.mesh.as_deref().zip(self.classes.as_deref());
+        let (house, mesh_crc32) = read_house(mesh, 1)?;
         let settings = Settings {
             mesh_crc32,
             cell_side_m: self.cell,
@@ -180,19 +179,6 @@ impl Calibration {
             methods: self.methods.clone(),
             ..Plan::default()
         }
-    }
-
-    /// The house and the checksum of its mesh.
-    fn house(&self) -> Result<(House, Option<u32>), Box<dyn std::error::Error + Send + Sync>> {
-        let (Some(mesh), Some(classes)) = (&self.mesh, &self.classes) else {
-            return Ok((House::own(1)?, None));
-        };
-        let here = |path: &Path, e: &dyn std::fmt::Display| format!("{}: {e}", path.display());
-        let names = read_classes(classes).map_err(|e| here(classes, &e))?;
-        let crc32 = crc32fast::hash(&fs::read(mesh).map_err(|e| here(mesh, &e))?);
-        let surfaces = read_mesh(mesh, usize::MAX).map_err(|e| here(mesh, &e))?;
-        let house = House::from_mesh(surfaces, names).map_err(|e| here(mesh, &e))?;
-        Ok((house, Some(crc32)))
     }
 }
 

@@ -6,6 +6,7 @@
 //! included.
 
 mod figures;
+mod house;
 pub mod kitti;
 mod markdown;
 mod methods;
@@ -26,6 +27,7 @@ use lattice_core::simulate::house::HouseError;
 use thiserror::Error;
 
 pub use figures::draw;
+pub use house::read_house;
 pub use markdown::markdown;
 pub use methods::Baseline;
 pub use results::{FILE, Results, ResultsError};
@@ -42,6 +44,14 @@ pub enum EvaluateError {
     /// The house has no such view, or options are out of range.
     #[error("the house: {0}")]
     House(#[from] HouseError),
+    /// The mesh of a house or the names of its classes cannot be read.
+    #[error("{path}: {reason}")]
+    Mesh {
+        /// The file.
+        path: PathBuf,
+        /// Why.
+        reason: String,
+    },
     /// Lattice cells are not possible.
     #[error("{0}")]
     Lattice(#[from] LatticeError),
