@@ -40,6 +40,8 @@ pub struct RenderOptions {
     pub background: [u8; 4],
     /// 1 shows the whole map, 2 half of its width and height around where most cells are.
     pub zoom: f64,
+    /// How much light and shadow change the colours: 1 as outdoors, 0 not at all.
+    pub contrast: f64,
     /// A place to show in place of the whole map, at the same size whatever else there is.
     pub focus: Option<Focus>,
 }
@@ -72,6 +74,7 @@ impl Default for RenderOptions {
             elevation_deg: 35.0,
             background: [255; 4],
             zoom: 1.0,
+            contrast: 1.0,
             focus: None,
         }
     }

@@ -27,6 +27,7 @@ pub(super) fn picture(scene: &Scene, view: &View, options: &RenderOptions) -> Ve
         sun: Sun::new(scene, options.azimuth_deg, view.size),
         normals: scene.normals(),
         palette: &scene.palette,
+        contrast: options.contrast.clamp(0.0, 1.0),
         edge: EDGE * fraction(scene.radius_m * view.scale, EDGES_FROM),
         radius_m: scene.radius_m,
         screen: &screen,
@@ -56,6 +57,7 @@ struct Shader<'a> {
     normals: Vec<Vector3<f64>>,
     palette: &'a [[f64; 3]],
     edge: f64,
+    contrast: f64,
     radius_m: f64,
     screen: &'a Screen,
     view: &'a View,
@@ -85,6 +87,7 @@ impl Shader<'_> {
         // Edges fade over two samples.
         let line = 1.0 - self.edge * (1.0 - f64::from(surface.inset) / 32.0).max(0.0);
         let light = SUN.iter().zip(SKY).map(|(s, a)| (s * sun + a * sky) * line);
+        let light = light.map(|light| 1.0 + self.contrast * (light - 1.0));
         let mut lit = *color;
         lit.iter_mut().zip(light).for_each(|(c, light)| *c *= light);
         Some(lit)

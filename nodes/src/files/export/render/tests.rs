@@ -132,6 +132,12 @@ fn a_tower_throws_its_shadow_away_from_the_sun() {
     let shaded = brightness(picture[49][67]);
     let lit = brightness(picture[61][43]);
     assert!(4 * shaded < 3 * lit, "{shaded} {lit}");
+    let flat = RenderOptions {
+        contrast: 0.0,
+        ..options
+    };
+    let flat = render(&list(LatticeKind::Cubic, &cells), &flat);
+    assert_eq!(flat[49][67], flat[61][43]);
 }
 
 #[test]
