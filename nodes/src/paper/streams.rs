@@ -22,6 +22,8 @@ pub enum Purpose {
     Matching = 272,
     /// Resamples of trials.
     Bootstrap = 273,
+    /// Frames in which one calibration is told.
+    Frames = 768,
 }
 
 /// Stream `index` (below 2^48) of a purpose.

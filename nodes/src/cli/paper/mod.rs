@@ -1,5 +1,6 @@
 //! `lattice paper`: the papers behind this library, computed anew.
 
+mod calibration;
 mod voxels;
 
 use std::path::Path;
@@ -15,6 +16,8 @@ use crate::paper::report::{self, Report};
 pub enum Paper {
     /// Ryde and Brünig 2011, lattice occupied voxel lists
     Voxels(voxels::Voxels),
+    /// Nakamura et al., calibration of a headset by Semantic-ICP
+    Calibration(calibration::Calibration),
 }
 
 impl Paper {
@@ -23,6 +26,7 @@ impl Paper {
         init_logging();
         match self {
             Self::Voxels(command) => command.run(),
+            Self::Calibration(command) => command.run(),
         }
     }
 }

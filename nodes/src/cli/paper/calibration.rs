@@ -1,0 +1,55 @@
+//! `lattice paper calibration`: Nakamura et al., computed anew.
+
+use std::path::PathBuf;
+
+use clap::Args;
+
+use super::make;
+use crate::cli::CliResult;
+use crate::paper::calibration::{Options, run};
+
+/// Options of `lattice paper calibration`.
+#[derive(Args)]
+pub struct Calibration {
+    /// Folder of the report: report.html, report.json, a CSV for each table, an SVG for each figure
+    #[arg(long, value_name = "DIR")]
+    out: PathBuf,
+    /// The same seed gives the same bytes
+    #[arg(long, default_value_t = 1)]
+    seed: u64,
+    /// Fewer trials, in less than a minute
+    #[arg(long)]
+    quick: bool,
+    /// PLY of a house, metres, z up, with `label` and `instance` of each face [default: a house of our own]
+    #[arg(long, value_name = "PLY", requires = "classes")]
+    mesh: Option<PathBuf>,
+    /// YAML with the names of its classes
+    #[arg(long, value_name = "YAML", requires = "mesh")]
+    classes: Option<PathBuf>,
+    /// Folder of `lattice evaluate calibration` whose trials are taken; without it they are run
+    #[arg(long, value_name = "DIR")]
+    results: Option<PathBuf>,
+    /// Trials at once [default: as many as processors]
+    #[arg(long)]
+    threads: Option<usize>,
+    /// Print the report as JSON
+    #[arg(long)]
+    json: bool,
+}
+
+impl Calibration {
+    /// Runs the command.
+    pub fn run(self) -> CliResult {
+        let processors = || std::thread::available_parallelism().map_or(1, usize::from);
+        let options = Options {
+            seed: self.seed,
+            quick: self.quick,
+            mesh: self.mesh.zip(self.classes),
+            results: self.results,
+            threads: self.threads.unwrap_or_else(processors).clamp(1, 1024),
+        };
+        make("paper", &self.out, self.json, |progress| {
+            run(&options, progress)
+        })
+    }
+}
