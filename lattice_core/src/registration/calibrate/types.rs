@@ -88,7 +88,7 @@ impl Default for CalibrationOptions {
             agreement: 0.6,
             start_radius_m: 2.0,
             start_yaw_rad: 1.0,
-            min_margin: 30.0,
+            min_margin: 40.0,
             min_inliers: 0.4,
             max_sigma_m: 0.1,
             max_sigma_rad: 0.04,
