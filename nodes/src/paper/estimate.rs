@@ -40,6 +40,16 @@ impl Estimate {
         }
     }
 
+    /// The ratio to another estimate, for errors that are small against both.
+    pub fn over(&self, other: &Estimate) -> Estimate {
+        let mean = self.mean / other.mean;
+        let share = (self.half / self.mean).hypot(other.half / other.mean);
+        Estimate {
+            mean,
+            half: mean.abs() * share,
+        }
+    }
+
     /// Whether all of the interval is below 0.
     pub fn is_negative(&self) -> bool {
         self.mean + self.half < 0.0

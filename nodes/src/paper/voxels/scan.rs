@@ -36,6 +36,8 @@ pub struct Scan {
     pub title: String,
     /// Where it comes from.
     pub source: Source,
+    /// Whether the ground is most of it.
+    pub outdoors: bool,
     /// The points.
     pub points: Vec<[f32; 3]>,
     /// Volumes of the cells that it is quantized to, the first of which is drawn, m^3.
@@ -58,6 +60,7 @@ fn uniform(options: &Options) -> Scan {
         id: "uniform".into(),
         title: "evenly spread points".into(),
         source: Source::Uniform,
+        outdoors: false,
         points: (0..POINTS).map(|_| point().cast::<f32>().into()).collect(),
         volumes_m3: vec![0.125],
     }
@@ -73,6 +76,7 @@ fn room(options: &Options) -> Result<Scan, Fault> {
         id: "room".into(),
         title: "simulated scan in a house".into(),
         source: Source::Simulated,
+        outdoors: false,
         points: thinned(points, POINTS, options.seed, 0),
         volumes_m3: vec![0.125, 0.001],
     })
@@ -92,6 +96,7 @@ fn site(options: &Options) -> Result<Scan, Fault> {
         id: "site".into(),
         title: "simulated scan of an earth-moving site".into(),
         source: Source::Simulated,
+        outdoors: true,
         points: thinned(points, POINTS, options.seed, 1),
         volumes_m3: vec![0.125],
     })
@@ -118,6 +123,7 @@ fn file(path: &Path, number: usize, options: &Options) -> Result<Scan, Fault> {
         id: format!("scan{}", number + 1),
         title: format!("scan {name}"),
         source: Source::File,
+        outdoors: false,
         points: thinned(points.collect(), FILE_POINTS, options.seed, 2 + number),
         volumes_m3: vec![0.125, 0.008],
     })

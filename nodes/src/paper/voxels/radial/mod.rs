@@ -200,12 +200,11 @@ impl Change {
         };
         let a = find(comparison.ours)?;
         let b = find((LatticeKind::Cubic, comparison.cubic))?;
-        let ratio = a.std.mean / b.std.mean;
-        let share = (a.std.half / a.std.mean).hypot(b.std.half / b.std.mean);
+        let ratio = a.std.over(&b.std);
         Ok(Change {
             name: comparison.name,
-            std: 100.0 * (ratio - 1.0),
-            half: 100.0 * ratio * share,
+            std: 100.0 * (ratio.mean - 1.0),
+            half: 100.0 * ratio.half,
             exact_std: 100.0 * (a.exact_std / b.exact_std - 1.0),
             range: 100.0 * (a.range() / b.range() - 1.0),
         })
@@ -287,7 +286,7 @@ fn draw(spreads: &[Spread]) -> Result<String, Fault> {
                 x: "distance (cell sides)",
                 y: "density",
                 xs: 0.0..2.6,
-                ys: 0.0..3.7,
+                ys: 0.0..4.0,
             };
             let shown = spreads
                 .iter()
