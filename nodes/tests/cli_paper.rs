@@ -45,26 +45,127 @@ fn page(folder: &Path, body: &str) -> PathBuf {
     path
 }
 
+/// A report that was made twice.
+struct Made {
+    folder: PathBuf,
+    files: BTreeMap<String, Vec<u8>>,
+    report: Value,
+}
+
+impl Made {
+    /// A quick report of a paper, on one thread and on three: the same bytes, and all checks hold.
+    fn new(paper: &str, folder: &Path, threads: [&[&str]; 2]) -> Made {
+        let [one, three] = ["one", "three"].map(|name| folder.join(name));
+        let quick = ["paper", paper, "--quick"];
+        let [on_one, on_three] = threads.map(|more| [&quick, more].concat());
+        let words = good(&lattice(&on_one, "1", &one));
+        good(&lattice(&on_three, "3", &three));
+        let made = files(&one);
+        assert_eq!(
+            made.keys().collect::<Vec<_>>(),
+            files(&three).keys().collect::<Vec<_>>()
+        );
+        for (name, bytes) in files(&three) {
+            assert!(
+                made[&name] == bytes,
+                "{name} depends on the number of threads"
+            );
+        }
+        let report: Value = serde_json::from_slice(&made["report.json"]).unwrap();
+        let command = format!("lattice paper {paper} --seed 1 --quick");
+        assert_eq!(report["command"], command);
+        let made = Made {
+            folder: one,
+            files: made,
+            report,
+        };
+        let checks = made.all("checks");
+        let failing: Vec<_> = checks.filter(|check| check["holds"] != true).collect();
+        assert!(
+            failing.is_empty() && !words.contains("fails: "),
+            "{failing:?}"
+        );
+        made.is_complete();
+        made
+    }
+
+    fn sections(&self) -> &[Value] {
+        self.report["sections"].as_array().unwrap()
+    }
+
+    /// All checks, tables or figures.
+    fn all<'a>(&'a self, list: &'a str) -> impl Iterator<Item = &'a Value> {
+        let sections = self.sections().iter();
+        sections.flat_map(move |section| section[list].as_array().unwrap())
+    }
+
+    fn ids(&self) -> Vec<&str> {
+        let sections = self.sections().iter();
+        sections.map(|s| s["id"].as_str().unwrap()).collect()
+    }
+
+    fn verdict(section: &Value) -> &str {
+        section["verdict"]["verdict"].as_str().unwrap()
+    }
+
+    /// Every table and figure is there, and the page has all in itself.
+    fn is_complete(&self) {
+        for section in self.sections() {
+            assert_ne!(Made::verdict(section), "not_reproduced", "{section}");
+        }
+        for (list, ending) in [("tables", "csv"), ("figures", "svg")] {
+            for made_of in self.all(list) {
+                let name = format!("{}.{ending}", made_of["name"].as_str().unwrap());
+                assert!(self.files.contains_key(&name), "{name}");
+            }
+        }
+        let html = String::from_utf8(self.files["report.html"].clone()).unwrap();
+        for word in [
+            "<script",
+            "src=",
+            "@import",
+            "url(",
+            "href=\"http",
+            ">NaN",
+            " NaN",
+            ">inf",
+            " inf ",
+        ] {
+            assert!(!html.contains(word), "{word} in the page");
+        }
+    }
+
+    /// Opens it in a browser, if there is one: no word on the console, nothing cut off or too wide.
+    fn opens(&self) {
+        let Some(chromium) = browser::chromium() else {
+            return;
+        };
+        let opened = browser::open(&chromium, &self.folder.join("report.html"));
+        assert_eq!(opened.console, Vec::<String>::new());
+        let seen = opened.seen;
+        assert_eq!(seen.others, Vec::<String>::new());
+        assert_eq!(seen.ids, Vec::<String>::new());
+        assert_eq!(seen.cut, Vec::<String>::new());
+        assert!(
+            seen.widths[1] <= seen.widths[0],
+            "wider than the window: {:?}",
+            seen.widths
+        );
+        assert_eq!(seen.figures.len(), self.all("figures").count());
+        for (name, width, height) in &seen.figures {
+            assert!(
+                *width > 300.0 && *height > 150.0,
+                "{name}: {width} x {height}"
+            );
+        }
+    }
+}
+
 #[test]
 fn a_quick_report_of_the_voxel_paper_is_repeatable_holds_and_opens() {
     let folder = tempfile::tempdir().unwrap();
-    let [one, three] = ["one", "three"].map(|name| folder.path().join(name));
-    let words = good(&lattice(&["paper", "voxels", "--quick"], "1", &one));
-    good(&lattice(&["paper", "voxels", "--quick"], "3", &three));
-    let made = files(&one);
-    assert_eq!(
-        made.keys().collect::<Vec<_>>(),
-        files(&three).keys().collect::<Vec<_>>()
-    );
-    for (name, bytes) in files(&three) {
-        assert!(
-            made[&name] == bytes,
-            "{name} depends on the number of threads"
-        );
-    }
-    let report: Value = serde_json::from_slice(&made["report.json"]).unwrap();
-    assert_eq!(report["command"], "lattice paper voxels --seed 1 --quick");
-    let sections = report["sections"].as_array().unwrap();
+    let made = Made::new("voxels", folder.path(), [&[], &[]]);
+    let ids = made.ids();
     for id in [
         "fig1",
         "quantization",
@@ -77,68 +178,32 @@ fn a_quick_report_of_the_voxel_paper_is_repeatable_holds_and_opens() {
         "table1",
         "fig6",
     ] {
-        assert!(sections.iter().any(|section| section["id"] == id), "{id}");
+        assert!(ids.contains(&id), "{id}");
     }
-    let checks = || {
-        sections
-            .iter()
-            .flat_map(|section| section["checks"].as_array().unwrap())
-    };
-    let failing: Vec<_> = checks().filter(|check| check["holds"] != true).collect();
-    assert!(
-        failing.is_empty() && !words.contains("fails: "),
-        "{failing:?}"
-    );
-    assert!(checks().count() > 300);
-    for section in sections {
-        let verdict = section["verdict"]["verdict"].as_str().unwrap();
-        assert_ne!(verdict, "not_reproduced", "{section}");
-        for (list, ending) in [("tables", "csv"), ("figures", "svg")] {
-            for made_of in section[list].as_array().unwrap() {
-                let name = format!("{}.{ending}", made_of["name"].as_str().unwrap());
-                assert!(made.contains_key(&name), "{name}");
-            }
-        }
-    }
-    let html = String::from_utf8(made["report.html"].clone()).unwrap();
-    for word in [
-        "<script",
-        "src=",
-        "@import",
-        "url(",
-        "href=\"http",
-        ">NaN",
-        " NaN",
-        ">inf",
-        " inf ",
-    ] {
-        assert!(!html.contains(word), "{word} in the page");
-    }
+    assert!(made.all("checks").count() > 300);
+    made.opens();
+}
 
-    let Some(chromium) = browser::chromium() else {
-        return;
-    };
-    let opened = browser::open(&chromium, &one.join("report.html"));
-    assert_eq!(opened.console, Vec::<String>::new());
-    let seen = opened.seen;
-    assert_eq!(seen.others, Vec::<String>::new());
-    assert_eq!(seen.ids, Vec::<String>::new());
-    assert_eq!(seen.cut, Vec::<String>::new());
-    assert!(
-        seen.widths[1] <= seen.widths[0],
-        "wider than the window: {:?}",
-        seen.widths
+#[test]
+fn a_quick_report_of_the_calibration_paper_is_repeatable_holds_and_opens() {
+    let folder = tempfile::tempdir().unwrap();
+    let threads: [&[&str]; 2] = [&["--threads", "1"], &["--threads", "3"]];
+    let made = Made::new("calibration", folder.path(), threads);
+    assert_eq!(
+        made.ids(),
+        [
+            "eq1-4", "eq5-8", "eq9", "table1", "claim", "fig3", "fig4", "fig2"
+        ]
     );
-    let figures = sections
-        .iter()
-        .flat_map(|section| section["figures"].as_array().unwrap());
-    assert_eq!(seen.figures.len(), figures.count());
-    for (name, width, height) in &seen.figures {
-        assert!(
-            *width > 300.0 && *height > 150.0,
-            "{name}: {width} x {height}"
-        );
+    for section in &made.sections()[..3] {
+        assert_eq!(Made::verdict(section), "corrected", "{section}");
     }
+    assert!(made.all("checks").count() > 35);
+    // Both sides and their differences, of four scenes.
+    let page = String::from_utf8_lossy(&made.files["report.html"]);
+    assert_eq!(page.matches("data:image/png;base64,").count(), 12);
+    assert!(page.len() < 1_500_000, "{}", page.len());
+    made.opens();
 }
 
 #[test]

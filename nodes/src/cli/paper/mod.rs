@@ -16,7 +16,7 @@ use crate::paper::report::{self, Report};
 pub enum Paper {
     /// Ryde and Brünig 2011, lattice occupied voxel lists
     Voxels(voxels::Voxels),
-    /// Nakamura et al., calibration of a headset by Semantic-ICP
+    /// Nakamura et al. 2019, calibration of a headset by Semantic-ICP
     Calibration(calibration::Calibration),
 }
 

@@ -1,4 +1,4 @@
-//! Nakamura et al., "Calibration System Using Semantic-ICP for Visualization of Robot Spatial Perception Through
+//! Nakamura et al. 2019, "Calibration System Using Semantic-ICP for Visualization of Robot Spatial Perception Through
 //! Mixed Reality", computed anew.
 
 mod equations;
@@ -50,7 +50,7 @@ struct Context {
 pub fn run(options: &Options, progress: &mut dyn FnMut(f64, &str)) -> Result<Report, Fault> {
     let sections = sections(options, progress)?;
     let head = Head {
-        paper: "Nakamura, El Hafi, Hagiwara and Taniguchi, Calibration System Using Semantic-ICP for Visualization of Robot \
+        paper: "Nakamura, El Hafi, Hagiwara and Taniguchi 2019, Calibration System Using Semantic-ICP for Visualization of Robot \
                 Spatial Perception Through Mixed Reality"
             .to_owned(),
         command: command(options),

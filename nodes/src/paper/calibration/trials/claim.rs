@@ -69,7 +69,7 @@ fn verdict(trials: &Trials) -> Verdict {
     };
     if !of(&|words| words.contains(&Word::Unknown)).is_empty() {
         return Verdict::DependsOnData(
-            "more trials than a quick run has: run without --quick".to_owned(),
+            "more trials of each kind, as a run without --quick has them".to_owned(),
         );
     }
     let as_said = of(&|words| words == [Word::Better, Word::Worse]);
@@ -77,12 +77,13 @@ fn verdict(trials: &Trials) -> Verdict {
     match (as_said.is_empty(), others.is_empty()) {
         (false, true) => Verdict::Reproduced,
         (true, _) => Verdict::NotReproduced(
-            "no program named Semantic-ICP is both better with right labels from the bad start and worse with wrong ones from the \
+            "no form of Semantic-ICP is both better with right labels from the bad start and worse with wrong ones from the \
              good one"
                 .to_owned(),
         ),
         (false, false) => Verdict::Corrected(format!(
-            "with the program said: it holds for {}, not for {}; and \"better\" is said of bad starts",
+            "with the form of Semantic-ICP and the start said: better with right labels from bad starts and worse with wrong ones from \
+             good starts holds for {}, not for {}",
             as_said.join(" and "),
             others.join(" and ")
         )),

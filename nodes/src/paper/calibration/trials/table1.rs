@@ -29,8 +29,8 @@ pub(super) fn section(trials: &Trials) -> Result<Section, Fault> {
         finding: finding(trials),
         verdict: Verdict::DependsOnData(
             "the eight numbers hang on the authors' clouds and labels, the start, the size of voxels, the gate, Theta and the \
-             place of the map's origin, none of which is told, and on which of the programs named Semantic-ICP was run; shown \
-             instead: both starts, both kinds of labels, three programs, many trials"
+             place of the map's origin, none of which is told, and on which form of Semantic-ICP was run; shown \
+             instead: two starts, right and wrong labels, three forms, many trials"
                 .to_owned(),
         ),
         checks: Vec::new(),
@@ -76,7 +76,7 @@ fn finding(trials: &Trials) -> String {
     format!(
         "{n} simulated trials for each method, kind of labels and start, all scenes together. With labels as the paper \
          finds them (wrong before the television and the bookshelf, right at the desk and the table), both starts and any of the \
-         three programs named Semantic-ICP: {}. Which of the two methods is the better one is judged in the next section.",
+         three forms of Semantic-ICP: {}. Which of the two methods is the better one is judged in the next section.",
         within.join("; ")
     )
 }
@@ -120,8 +120,7 @@ fn medians(trials: &Trials, name: &str, start: &str) -> Table {
     Table {
         name: name.to_owned(),
         caption: format!(
-            "Median d_SE(3) with its 95 % interval, from starts {}; the printed errors stand where the paper finds the labels \
-             so",
+            "Median d_SE(3) [95 % interval], starts {}; printed errors beside the labels that the paper tells of",
             in_words(start)
         ),
         columns,
