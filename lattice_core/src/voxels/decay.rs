@@ -28,9 +28,6 @@ impl VoxelList {
 
     /// Removes the voxels with fewer than `min_count` points; gives their number.
     pub fn forget_rare(&mut self, min_count: u32) -> usize {
-        self.remove_where(|_, _, entry| {
-            let [_, _, _, count] = entry.points;
-            count < i64::from(min_count)
-        })
+        self.remove_where(|_, _, entry| entry.count() < min_count)
     }
 }

@@ -1,10 +1,24 @@
 //! Positions in fixed point.
 
-use super::shard::Point;
 use super::{OFFSET_UNIT_M, Voxel};
 use crate::lattice::{BatchBlock, BatchQuantizer, CellCode, Lattice, nearest_integer};
 
 const PER_METRE: f64 = 1.0 / OFFSET_UNIT_M;
+
+/// Sums of positions from the datum in `OFFSET_UNIT_M`, modulo 2^32, and the number of points.
+///
+/// Where the cell is known, so are the sums of [`most_points`], from its centre.
+pub(super) type Point = [u32; 4];
+
+/// Sums of offsets from the centre of a cell in `OFFSET_UNIT_M`, and the number of points.
+pub(super) type Offsets = [i64; 4];
+
+/// The greatest number of points whose sums of offsets surely fit 32 bits: 1 at least, since no
+/// covering radius takes more.
+pub(super) fn most_points(reach: u64) -> u32 {
+    let most = (1_u64 << 31).saturating_sub(1) / reach.max(1);
+    u32::try_from(most).unwrap_or(u32::MAX - 1).max(1)
+}
 
 /// A position (metres) in `OFFSET_UNIT_M`.
 #[inline(always)]
@@ -18,7 +32,7 @@ pub(super) fn fixed(metres: [f64; 3]) -> [i64; 3] {
 /// is cut into blocks matters.
 #[derive(Clone, Copy)]
 pub(super) struct FixedBlock<'a> {
-    base: [i64; 3],
+    base: [u32; 3],
     offsets_m: &'a [[f32; 3]],
     near: Option<&'a [[i32; BatchQuantizer::BLOCK]; 3]>,
 }
@@ -31,7 +45,7 @@ impl FixedBlock<'_> {
         block: &BatchBlock<'a>,
     ) -> FixedBlock<'a> {
         FixedBlock {
-            base: fixed(base_m),
+            base: fixed(base_m).map(low),
             offsets_m,
             near: (!block.sums.far).then_some(block.fixed),
         }
@@ -39,7 +53,7 @@ impl FixedBlock<'_> {
 
     /// The coordinates from the base, unless some point is far.
     #[inline(always)]
-    pub(super) fn near(&self) -> Option<(&[[i32; BatchQuantizer::BLOCK]; 3], [i64; 3])> {
+    pub(super) fn near(&self) -> Option<(&[[i32; BatchQuantizer::BLOCK]; 3], [u32; 3])> {
         Some((self.near?, self.base))
     }
 
@@ -53,9 +67,9 @@ impl FixedBlock<'_> {
     }
 
     #[cold]
-    fn far(&self, i: usize) -> [i64; 3] {
+    fn far(&self, i: usize) -> [u32; 3] {
         let offset = self.offsets_m.get(i).copied().unwrap_or_default();
-        fixed(offset.map(f64::from))
+        fixed(offset.map(f64::from)).map(low)
     }
 }
 
@@ -63,48 +77,71 @@ impl FixedBlock<'_> {
 #[inline(always)]
 pub(super) fn near_point(
     [x, y, z]: &[[i32; BatchQuantizer::BLOCK]; 3],
-    base: [i64; 3],
+    base: [u32; 3],
     i: usize,
 ) -> Point {
     let i = i % BatchQuantizer::BLOCK;
-    from_base(base, [x[i], y[i], z[i]].map(i64::from))
+    from_base(base, [x[i], y[i], z[i]].map(|c| c as u32))
 }
 
 #[inline(always)]
-fn from_base(base: [i64; 3], offset: [i64; 3]) -> Point {
+fn from_base(base: [u32; 3], offset: [u32; 3]) -> Point {
     let sum = |axis: usize| base[axis].wrapping_add(offset[axis]);
     [sum(0), sum(1), sum(2), 1]
 }
 
-/// The centre of a cell in fixed point, from the datum.
-#[inline]
-pub(super) fn fixed_center(lattice: &Lattice, code: CellCode) -> [i64; 3] {
-    fixed(lattice.center(code.unpack()).into())
+/// Modulo 2^32.
+#[inline(always)]
+fn low(value: i64) -> u32 {
+    value as u32
 }
 
-/// The points of a voxel as offsets from the centre of its cell.
+/// The centre of a cell from the datum, modulo 2^32.
 #[inline]
-pub(super) fn voxel_of(lattice: &Lattice, code: CellCode, points: &Point) -> Voxel {
-    let center = fixed_center(lattice, code);
+fn low_center(lattice: &Lattice, code: CellCode) -> [u32; 3] {
+    fixed(lattice.center(code.unpack()).into()).map(low)
+}
+
+/// At most [`most_points`] of a cell as offsets from its centre.
+#[inline]
+pub(super) fn offsets_of(lattice: &Lattice, code: CellCode, points: &Point) -> Offsets {
+    let center = low_center(lattice, code);
     let [x, y, z, count] = *points;
-    let from_center = |sum: i64, center: i64| sum.wrapping_sub(center.wrapping_mul(count));
+    let offset = |sum: u32, center: u32| {
+        let rest = sum.wrapping_sub(center.wrapping_mul(count));
+        i64::from(rest as i32)
+    };
+    [
+        offset(x, center[0]),
+        offset(y, center[1]),
+        offset(z, center[2]),
+        i64::from(count),
+    ]
+}
+
+/// The inverse of [`offsets_of`].
+#[inline]
+pub(super) fn points_of(lattice: &Lattice, code: CellCode, offsets: &Offsets) -> Point {
+    let center = low_center(lattice, code);
+    let [.., count] = offsets.map(low);
+    let sum = |i: usize| low(offsets[i]).wrapping_add(center[i].wrapping_mul(count));
+    [sum(0), sum(1), sum(2), count]
+}
+
+/// A voxel of these points.
+#[inline]
+pub(super) fn voxel_of([x, y, z, count]: Offsets) -> Voxel {
     Voxel {
         count: u32::try_from(count).unwrap_or(u32::MAX),
-        sum: [
-            from_center(x, center[0]),
-            from_center(y, center[1]),
-            from_center(z, center[2]),
-        ],
+        sum: [x, y, z],
     }
 }
 
-/// The inverse of [`voxel_of`].
+/// The points of a voxel.
 #[inline]
-pub(super) fn points_of(lattice: &Lattice, code: CellCode, voxel: &Voxel) -> Point {
-    let center = fixed_center(lattice, code);
-    let count = i64::from(voxel.count);
-    let from_datum = |i: usize| voxel.sum[i].wrapping_add(center[i].wrapping_mul(count));
-    [from_datum(0), from_datum(1), from_datum(2), count]
+pub(super) fn offsets_in(voxel: &Voxel) -> Offsets {
+    let [x, y, z] = voxel.sum;
+    [x, y, z, i64::from(voxel.count)]
 }
 
 /// Of second moments: offsets are counted in a 2^16th of the covering radius, so that the moments
@@ -127,11 +164,22 @@ mod tests {
 
     proptest! {
         #[test]
-        fn sums_wrap_and_come_back(kind in 0..5_usize, w in prop::array::uniform3(-1_000_000..1_000_000_i32), count in 1..u32::MAX, sum in prop::array::uniform3(-1_i64 << 52..1 << 52)) {
-            let lattice = Lattice::new(LatticeKind::ALL[kind], 1e9).unwrap();
+        fn sums_wrap_and_come_back(
+            kind in 0..5_usize,
+            log_side in -6.0..9.9_f64,
+            w in prop::array::uniform3(-1_000_000..1_000_000_i32),
+            share in 0.0..=1.0,
+            sum in prop::array::uniform3(-1.0..=1.0),
+        ) {
+            let lattice = Lattice::new(LatticeKind::ALL[kind], log_side.exp2().powi(3)).unwrap();
             let code = CellCode::pack(w).unwrap();
-            let voxel = Voxel { count, sum };
-            prop_assert_eq!(voxel_of(&lattice, code, &points_of(&lattice, code, &voxel)), voxel);
+            let reach = (lattice.covering_radius_m() * PER_METRE) as u64 + 2;
+            let count = (f64::from(most_points(reach)) * share) as i64 + 1;
+            let count = count.min(i64::from(most_points(reach)));
+            let [x, y, z] = sum.map(|s: f64| (s * (count * reach as i64) as f64) as i64);
+            let offsets = [x, y, z, count];
+            let points = points_of(&lattice, code, &offsets);
+            prop_assert_eq!(offsets_of(&lattice, code, &points), offsets);
         }
     }
 }

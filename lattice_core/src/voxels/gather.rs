@@ -1,6 +1,6 @@
 //! Points gathered by cell before they reach the table.
 
-use super::shard::Point;
+use super::fixed::Point;
 use crate::lattice::CellCode;
 
 const SLOTS_LOG2: u32 = 13;
@@ -37,12 +37,13 @@ impl Gather {
     }
 
     /// Adds points in order, each as its number's `point`; a cell that has to make room for another
-    /// goes to `out`, but not what has no cell.
+    /// goes to `out`, as does one with `most_points`, but not what has no cell.
     #[inline(always)]
     pub(super) fn add(
         &mut self,
         codes: &[CellCode],
         point: impl Fn(usize) -> Point,
+        most_points: u32,
         out: &mut Vec<Partial>,
     ) {
         let Some(slots) = self.slots.first_chunk_mut::<SLOTS>() else {
@@ -52,7 +53,7 @@ impl Gather {
             let hash = code.raw().wrapping_mul(0x9e37_79b9_7f4a_7c15);
             let number = (hash >> (64 - SLOTS_LOG2)) as usize;
             let slot = &mut slots[number];
-            if slot.code != code {
+            if slot.code != code || slot.points[3] >= most_points {
                 if slot.code == CellCode::NONE {
                     self.used.push(number as u16);
                 } else {

@@ -6,9 +6,9 @@ use rayon::prelude::*;
 use super::VoxelList;
 use super::columns::{Details, LabelCount, Stamps};
 use super::distortion::DistortionSums;
-use super::fixed::{FixedBlock, moment_unit_m, moments_of, near_point, voxel_of};
+use super::fixed::{FixedBlock, Point, moment_unit_m, moments_of, near_point, offsets_of};
 use super::gather::{Gather, Partial};
-use super::shard::{BATCH, Point, SHARDS, Shard, shard_of};
+use super::shard::{BATCH, SHARDS, Shard, shard_of};
 use crate::cloud::Cloud;
 use crate::lattice::{BatchBlock, BatchQuantizer, BatchSums, CellCode, Lattice};
 
@@ -220,7 +220,8 @@ impl VoxelList {
     ) {
         let parts = wave.par_chunks(wave.len().div_ceil(chunks.len().max(1)).max(1));
         let parts = parts.zip(chunks.par_iter_mut());
-        parts.for_each(|(offsets_m, chunk)| chunk.sort(quantizer, offsets_m));
+        let most_points = self.shards.first().map_or(1, Shard::most_points);
+        parts.for_each(|(offsets_m, chunk)| chunk.sort(quantizer, offsets_m, most_points));
         let shards = self.shards.par_iter_mut().enumerate();
         shards.for_each(|(part, shard)| {
             let lists = chunks.iter().filter_map(|chunk| chunk.by_shard.get(part));
@@ -257,9 +258,9 @@ fn details(
     place: usize,
 ) -> Details {
     let label = origin.labels.and_then(|labels| labels.get(place).copied());
-    let offset = voxel_of(lattice, code, point).sum;
+    let [x, y, z, _] = offsets_of(lattice, code, point);
     Details {
-        moments: moments_of(offset, moment_unit_m(lattice)),
+        moments: moments_of([x, y, z], moment_unit_m(lattice)),
         stamps: Some(Stamps {
             first_ns: origin.stamp_ns,
             last_ns: origin.stamp_ns,
@@ -289,6 +290,7 @@ impl Chunk {
         &mut self,
         quantizer: &BatchQuantizer,
         offsets_m: &[[f32; 3]],
+        most_points: u32,
         mut take: impl FnMut(&mut Vec<Partial>),
     ) {
         for_fixed_blocks(quantizer, offsets_m, |offsets_m, block, points| {
@@ -298,11 +300,14 @@ impl Chunk {
             match points.near() {
                 Some((near, base)) => {
                     let point = |i| near_point(near, base, i);
-                    self.gather.add(codes, point, &mut self.partials);
+                    self.gather
+                        .add(codes, point, most_points, &mut self.partials);
                 }
-                None => self
-                    .gather
-                    .add(codes, |i| points.point(i), &mut self.partials),
+                None => {
+                    let point = |i| points.point(i);
+                    self.gather
+                        .add(codes, point, most_points, &mut self.partials);
+                }
             }
             if self.partials.len() >= BATCH {
                 take(&mut self.partials);
@@ -312,11 +317,11 @@ impl Chunk {
         take(&mut self.partials);
     }
 
-    /// Gathers points by cell, and the cells by shard.
-    fn sort(&mut self, quantizer: &BatchQuantizer, offsets_m: &[[f32; 3]]) {
+    /// Gathers points by cell, up to `most_points`, and the cells by shard.
+    fn sort(&mut self, quantizer: &BatchQuantizer, offsets_m: &[[f32; 3]], most_points: u32) {
         let mut by_shard = std::mem::take(&mut self.by_shard);
         by_shard.iter_mut().for_each(Vec::clear);
-        self.gather(quantizer, offsets_m, |partials| {
+        self.gather(quantizer, offsets_m, most_points, |partials| {
             for partial in partials.drain(..) {
                 if let Some(list) = by_shard.get_mut(shard_of(partial.code)) {
                     list.push(partial);

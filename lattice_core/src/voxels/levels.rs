@@ -9,8 +9,8 @@ use thiserror::Error;
 
 use super::columns::Details;
 use super::distortion::DistortionSums;
-use super::fixed::{fixed, moment_unit_m, voxel_of};
-use super::shard::{Entry, shard_of};
+use super::fixed::{Offsets, fixed, moment_unit_m, voxel_of};
+use super::shard::shard_of;
 use super::{OccupancyList, Voxel, VoxelList, VoxelStore};
 use crate::lattice::{CellCode, Key, Lattice, LatticeError, LatticeIndex};
 
@@ -94,7 +94,8 @@ impl VoxelList {
         for shard in &self.shards {
             for (number, (code, entry)) in shard.iter().enumerate() {
                 let details = || shard.columns.get(number);
-                list.take_finer(&level, &self.lattice, (code, entry), details, now);
+                let offsets = shard.offsets(code, entry);
+                list.take_finer(&level, &self.lattice, (code, offsets), details, now);
             }
         }
         Ok(list)
@@ -104,11 +105,11 @@ impl VoxelList {
         &mut self,
         level: &Level,
         fine: &Lattice,
-        (code, entry): (CellCode, &Entry),
+        (code, offsets): (CellCode, Offsets),
         details: impl FnOnce() -> Details,
         now: u32,
     ) {
-        let voxel = voxel_of(fine, code, &entry.points);
+        let voxel = voxel_of(offsets);
         let center_m = fine.center(code.unpack());
         let mean_m = match voxel.count {
             u32::MAX => Vector3::zeros(),
@@ -120,21 +121,22 @@ impl VoxelList {
         let Some(coarse) = CellCode::pack(w) else {
             return;
         };
-        let [x, y, z, count] = entry.points;
-        let [dx, dy, dz] = fixed(level.shift_m.into()).map(|d| d.wrapping_mul(count));
-        let points = [
-            x.wrapping_add(dx),
-            y.wrapping_add(dy),
-            z.wrapping_add(dz),
-            count,
-        ];
+        // The finer centre from the coarser one, in whole steps.
+        let [from, shift, to] =
+            [center_m, level.shift_m, level.lattice.center(w)].map(|p| fixed(p.into()));
+        let [.., count] = offsets;
+        let mut moved = offsets;
+        for (i, sum) in moved.iter_mut().take(3).enumerate() {
+            let step = from[i].wrapping_add(shift[i]).wrapping_sub(to[i]);
+            *sum = sum.wrapping_add(step.wrapping_mul(count));
+        }
         // From the coarse centre.
         let moved_m = center_m + level.shift_m - level.lattice.center(w);
         let Some(shard) = self.shards.get_mut(shard_of(coarse)) else {
             return;
         };
         if let Some(number) = shard.find_or_add(coarse, usize::MAX, now) {
-            shard.add(number, &points, now);
+            shard.add_offsets(number, &moved, now);
             if !self.payload.is_plain() {
                 let units_m = [fine, &level.lattice].map(moment_unit_m);
                 let mut details = details();

@@ -6,13 +6,12 @@ use nalgebra::{Matrix3, Vector3};
 use rayon::prelude::*;
 use thiserror::Error;
 
-use super::cells::CellTable;
 use super::columns::{Columns, Details, LabelCount, Payload, Stamps};
 use super::distortion::{Distortion, DistortionSums};
-use super::fixed::{moment_unit_m, voxel_of};
+use super::fixed::moment_unit_m;
 use super::grow;
-use super::shard::{Life, SHARDS, Shard, shard_of};
-use super::{InsertReport, OFFSET_UNIT_M, Voxel, VoxelStore, WhenFull};
+use super::shard::{Life, SHARDS, Shard, reach, shard_of};
+use super::{InsertReport, Voxel, VoxelStore, WhenFull};
 use crate::cloud::Cloud;
 use crate::lattice::{CellCode, Key, Lattice, LatticeIndex};
 
@@ -69,12 +68,12 @@ impl VoxelList {
     ) -> VoxelList {
         VoxelList {
             datum_m: lattice.center_wide(datum_index),
+            shards: vec![Shard::new(&lattice, Columns::new(Payload::default())); SHARDS],
             lattice,
             datum_index,
             max_voxels,
             when_full: WhenFull::default(),
             payload: Payload::default(),
-            shards: vec![Shard::new(Columns::new(Payload::default())); SHARDS],
             sums: DistortionSums::default(),
             sequence: 0,
             taken: 0,
@@ -86,7 +85,7 @@ impl VoxelList {
         let mut list = VoxelList::at_datum(self.lattice, self.datum_index, self.max_voxels);
         list.payload = payload;
         list.when_full = self.when_full;
-        list.shards = vec![Shard::new(Columns::new(payload)); SHARDS];
+        list.shards = vec![Shard::new(&list.lattice, Columns::new(payload)); SHARDS];
         list
     }
 
@@ -97,8 +96,8 @@ impl VoxelList {
 
     /// How many voxels of a payload surely fit into `max_bytes`, the number to bound a list by.
     ///
-    /// Each may be alone in its block and may be remembered as removed: some 330 bytes, where on
-    /// surfaces a voxel takes 60. Of labels a handful a voxel is assumed.
+    /// Each may be alone in its block and may be remembered as removed: some 350 bytes, where on
+    /// surfaces a voxel takes 46. Of labels a handful a voxel is assumed.
     pub fn voxels_within(max_bytes: usize, payload: Payload) -> usize {
         let columns = |kept: bool, bytes: usize| if kept { bytes } else { 0 };
         let columns = columns(payload.moments, 48)
@@ -106,8 +105,8 @@ impl VoxelList {
             + columns(payload.labels, 24 + 8 * 8);
         // A hash map may be less than half full.
         let removed = 5 * size_of::<(u64, Life)>() / 2;
-        let voxel = CellTable::VOXEL_BYTES + columns + columns / 4 + removed;
-        let first = SHARDS * (CellTable::FIRST_BYTES + grow::FIRST * columns);
+        let voxel = Shard::VOXEL_BYTES + columns + columns / 4 + removed;
+        let first = SHARDS * (Shard::FIRST_BYTES + grow::FIRST * columns);
         max_bytes.saturating_sub(first) / voxel
     }
 
@@ -174,8 +173,9 @@ impl VoxelList {
     /// The voxel of a cell, if occupied.
     pub fn get(&self, key: Key) -> Option<Voxel> {
         let code = CellCode::from(key);
-        let (_, entry) = self.shard(code)?.get(code)?;
-        Some(voxel_of(&self.lattice, code, &entry.points))
+        let shard = self.shard(code)?;
+        let (_, entry) = shard.get(code)?;
+        Some(shard.voxel(code, entry))
     }
 
     /// True if the cell is occupied.
@@ -234,10 +234,8 @@ impl VoxelList {
         let mut voxels: Vec<_> = self
             .shards
             .par_iter()
-            .flat_map_iter(Shard::iter)
-            .filter_map(|(code, entry)| {
-                Some((code.key()?, voxel_of(&self.lattice, code, &entry.points)))
-            })
+            .flat_map_iter(|shard| shard.iter().map(move |cell| (shard, cell)))
+            .filter_map(|(shard, (code, entry))| Some((code.key()?, shard.voxel(code, entry))))
             .collect();
         voxels.par_sort_unstable_by_key(|&(key, _)| key);
         voxels
@@ -253,7 +251,7 @@ impl VoxelList {
         let rows = |shard| Shard::iter(shard).enumerate().map(move |row| (shard, row));
         let mut rows: Vec<_> = (self.shards.iter().flat_map(rows))
             .filter_map(|(shard, (number, (code, entry)))| {
-                let voxel = voxel_of(&self.lattice, code, &entry.points);
+                let voxel = shard.voxel(code, entry);
                 Some((code.key()?, voxel, &shard.columns, number))
             })
             .collect();
@@ -291,14 +289,9 @@ impl VoxelList {
         }
     }
 
-    /// No point is farther from its lattice point than this, in `OFFSET_UNIT_M`, roundings included.
-    pub(super) fn reach(&self) -> u64 {
-        (self.lattice.covering_radius_m() / OFFSET_UNIT_M) as u64 + 2
-    }
-
     /// Checks everything that must hold between calls; says what does not.
     pub fn validate(&self) -> Result<(), String> {
-        let reach = self.reach();
+        let reach = reach(&self.lattice);
         if self.len() > self.max_voxels {
             return Err(format!(
                 "{} voxels, but at most {} allowed",
@@ -310,7 +303,7 @@ impl VoxelList {
         for shard in &self.shards {
             shard.validate()?;
             for (code, entry) in shard.iter() {
-                let voxel = voxel_of(&self.lattice, code, &entry.points);
+                let voxel = shard.voxel(code, entry);
                 if let Some(fault) = voxel.fault(reach) {
                     return Err(format!("voxel {:?}: {fault}", code.unpack()));
                 }

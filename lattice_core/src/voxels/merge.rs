@@ -3,7 +3,7 @@
 use thiserror::Error;
 
 use super::columns::Columns;
-use super::fixed::points_of;
+use super::fixed::offsets_in;
 use super::shard::{SHARDS, shard_of};
 use super::{Voxel, VoxelList, VoxelStore};
 use crate::lattice::{CellCode, Key};
@@ -74,7 +74,7 @@ impl VoxelList {
         for (ours, theirs) in self.shards.iter_mut().zip(&other.shards) {
             for (their_number, (code, entry)) in theirs.iter().enumerate() {
                 if let Some(number) = ours.find_or_add(code, usize::MAX, now) {
-                    ours.add(number, &entry.points, now);
+                    ours.add_offsets(number, &theirs.offsets(code, entry), now);
                     if !self.payload.is_plain() {
                         ours.columns
                             .add(number as usize, &theirs.columns.get(their_number));
@@ -99,14 +99,13 @@ impl VoxelList {
         }
         for (row, (key, voxel)) in cells.take(room).enumerate() {
             let code = CellCode::from(key);
-            let points = points_of(&self.lattice, code, &voxel);
             let Some(shard) = self.shards.get_mut(shard_of(code)) else {
                 continue;
             };
             let Some(number) = shard.find_or_add(code, usize::MAX, now) else {
                 continue;
             };
-            shard.add(number, &points, now);
+            shard.add_offsets(number, &offsets_in(&voxel), now);
             if !self.payload.is_plain() {
                 shard.columns.add(number as usize, &columns.get(row));
             }

@@ -31,6 +31,7 @@ mod shard;
 mod store;
 mod table;
 mod voxel;
+mod wide;
 
 pub use changes::Changes;
 pub use columns::{LabelCount, Payload, Stamps};

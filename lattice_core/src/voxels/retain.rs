@@ -2,7 +2,6 @@
 
 use rayon::prelude::*;
 
-use super::fixed::voxel_of;
 use super::morton::places;
 use super::shard::{Entry, Shard};
 use super::{Voxel, VoxelList};
@@ -18,13 +17,14 @@ impl VoxelList {
     ///
     /// [`VoxelList::distortion`] still counts their points.
     pub fn retain(&mut self, mut keep: impl FnMut(Key, &Voxel) -> bool) -> usize {
-        let lattice = self.lattice.clone();
-        let mut goes = |code: CellCode, entry: &Entry| {
-            let voxel = voxel_of(&lattice, code, &entry.points);
+        let mut goes = |shard: &Shard, code: CellCode, entry: &Entry| {
+            let voxel = shard.voxel(code, entry);
             code.key().is_some_and(|key| !keep(key, &voxel))
         };
         let select = |shard: &Shard| {
-            let gone = shard.iter().filter(|(code, entry)| goes(*code, entry));
+            let gone = shard
+                .iter()
+                .filter(|(code, entry)| goes(shard, *code, entry));
             gone.map(|(code, _)| code).collect()
         };
         let gone = self.shards.iter().map(select).collect();

@@ -4,18 +4,18 @@ use rustc_hash::FxHashMap;
 
 use super::cells::CellTable;
 use super::columns::Columns;
+use super::fixed::{Offsets, Point, most_points, offsets_of, points_of, voxel_of};
 use super::gather::Partial;
 use super::table::Place;
-use crate::lattice::CellCode;
+use super::wide::WideSums;
+use super::{OFFSET_UNIT_M, Voxel};
+use crate::lattice::{CellCode, Lattice};
 
 /// Number of parts of a list.
 pub(super) const SHARDS: usize = 16;
 
 /// Cells that are searched together.
 pub(super) const BATCH: usize = 64;
-
-/// Fixed-point position of a point from the datum, in `OFFSET_UNIT_M`, and 1.
-pub(super) type Point = [i64; 4];
 
 /// When a voxel came and when it last changed, as states of the list.
 #[derive(Clone, Copy, PartialEq, Eq, Debug)]
@@ -37,8 +37,8 @@ impl Life {
 #[derive(Clone)]
 pub(super) struct Entry {
     pub(super) code: u64,
-    /// Sums of positions and the count. They wrap, which differences to a cell centre undo.
-    pub(super) points: Point,
+    /// Of up to [`Shard::most_points`]; of more the number of their [`WideSums`], and the count.
+    points: Point,
     pub(super) life: Life,
 }
 
@@ -47,8 +47,23 @@ pub(super) struct Entry {
 pub(super) struct Shard {
     pub(super) voxels: CellTable,
     pub(super) columns: Columns,
+    lattice: Lattice,
+    most_points: u32,
+    wide: WideSums,
     /// Voxels that went: when they had come, and when they went.
     pub(super) removed: FxHashMap<u64, Life>,
+}
+
+impl Entry {
+    /// Number of points; stays at `u32::MAX` once there.
+    pub(super) fn count(&self) -> u32 {
+        self.points[3]
+    }
+}
+
+/// No point is farther from its lattice point than this, in `OFFSET_UNIT_M`, roundings included.
+pub(super) fn reach(lattice: &Lattice) -> u64 {
+    (lattice.covering_radius_m() / OFFSET_UNIT_M) as u64 + 2
 }
 
 /// Which shard a cell belongs to: all cells of a block to one.
@@ -58,10 +73,18 @@ pub(super) fn shard_of(code: CellCode) -> usize {
 }
 
 impl Shard {
-    pub(super) fn new(columns: Columns) -> Shard {
+    /// Most bytes for a voxel, its columns and its memory once it is removed aside.
+    pub(super) const VOXEL_BYTES: usize = CellTable::VOXEL_BYTES + WideSums::ROW_BYTES;
+    /// Most bytes besides those of voxels.
+    pub(super) const FIRST_BYTES: usize = CellTable::FIRST_BYTES + WideSums::FIRST_BYTES;
+
+    pub(super) fn new(lattice: &Lattice, columns: Columns) -> Shard {
         Shard {
             voxels: CellTable::new(),
             columns,
+            lattice: lattice.clone(),
+            most_points: most_points(reach(lattice)),
+            wide: WideSums::new(),
             removed: FxHashMap::default(),
         }
     }
@@ -73,6 +96,7 @@ impl Shard {
     pub(super) fn bytes(&self) -> usize {
         self.voxels.bytes()
             + self.columns.bytes()
+            + self.wide.bytes()
             + self.removed.capacity() * (size_of::<(u64, Life)>() + 1)
     }
 
@@ -117,15 +141,70 @@ impl Shard {
         }
     }
 
-    /// Adds points to a voxel.
+    /// Most points that are added at once.
+    pub(super) fn most_points(&self) -> u32 {
+        self.most_points
+    }
+
+    /// Adds up to [`Shard::most_points`] to a voxel.
     #[inline(always)]
-    pub(super) fn add(&mut self, number: u32, point: &Point, now: u32) {
-        if let Some(entry) = self.voxels.row_mut(number) {
-            for (sum, term) in entry.points.iter_mut().zip(point) {
-                *sum = sum.wrapping_add(*term);
-            }
-            entry.life.touched = now;
+    pub(super) fn add(&mut self, number: u32, points: &Point, now: u32) {
+        let Some(entry) = self.voxels.row_mut(number) else {
+            return;
+        };
+        entry.life.touched = now;
+        if entry.points[3].saturating_add(points[3]) > self.most_points {
+            self.add_wide(number, |lattice, code| offsets_of(lattice, code, points));
+            return;
         }
+        for (sum, term) in entry.points.iter_mut().zip(points) {
+            *sum = sum.wrapping_add(*term);
+        }
+    }
+
+    /// Adds any number of points to a voxel.
+    pub(super) fn add_offsets(&mut self, number: u32, offsets: &Offsets, now: u32) {
+        match self.voxels.row_mut(number) {
+            Some(entry) if offsets[3] <= i64::from(self.most_points) => {
+                let code = CellCode::from_raw(entry.code).unwrap_or(CellCode::NONE);
+                self.add(number, &points_of(&self.lattice, code, offsets), now);
+            }
+            Some(entry) => {
+                entry.life.touched = now;
+                self.add_wide(number, |_, _| *offsets);
+            }
+            None => {}
+        }
+    }
+
+    #[cold]
+    fn add_wide(&mut self, number: u32, more: impl FnOnce(&Lattice, CellCode) -> Offsets) {
+        let Some(entry) = self.voxels.row_mut(number) else {
+            return;
+        };
+        let code = CellCode::from_raw(entry.code).unwrap_or(CellCode::NONE);
+        if entry.points[3] <= self.most_points {
+            let known = offsets_of(&self.lattice, code, &entry.points);
+            entry.points = [self.wide.put(known), 0, 0, 0];
+        }
+        let count = self.wide.add(entry.points[0], &more(&self.lattice, code));
+        entry.points[3] = u32::try_from(count).unwrap_or(u32::MAX);
+    }
+
+    /// Of the points of a voxel.
+    #[inline]
+    pub(super) fn offsets(&self, code: CellCode, entry: &Entry) -> Offsets {
+        if entry.points[3] <= self.most_points {
+            offsets_of(&self.lattice, code, &entry.points)
+        } else {
+            self.wide.get(entry.points[0])
+        }
+    }
+
+    /// A voxel as others see it.
+    #[inline]
+    pub(super) fn voxel(&self, code: CellCode, entry: &Entry) -> Voxel {
+        voxel_of(self.offsets(code, entry))
     }
 
     /// [`Shard::find_or_add`] without limit for a voxel that is added to soon.
@@ -158,6 +237,9 @@ impl Shard {
         let Some((number, entry)) = self.voxels.remove(code) else {
             return false;
         };
+        if entry.points[3] > self.most_points {
+            self.wide.free(entry.points[0]);
+        }
         self.columns.swap_remove(number as usize);
         self.removed.insert(code.raw(), entry.life.ended(now));
         true
@@ -169,6 +251,7 @@ impl Shard {
             self.removed.insert(entry.code, entry.life.ended(now));
         }
         self.voxels.clear();
+        self.wide.clear();
         self.columns.clear();
     }
 
@@ -184,6 +267,10 @@ impl Shard {
             return Err("the columns of a shard differ in length".to_owned());
         }
         let rows = self.voxels.rows();
+        let is_wide = |entry: &&Entry| entry.points[3] > self.most_points;
+        if rows.iter().filter(is_wide).count() != self.wide.used() {
+            return Err("sums of many points are lost or belong to no voxel".to_owned());
+        }
         if rows
             .iter()
             .any(|entry| entry.life.born > entry.life.touched)

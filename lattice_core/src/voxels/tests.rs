@@ -2,7 +2,7 @@
 
 use nalgebra::Vector3;
 
-use super::file::write_map;
+use super::file::{read_map, write_map};
 use super::*;
 use crate::cloud::Cloud;
 use crate::lattice::{Key, Lattice, LatticeKind};
@@ -261,5 +261,67 @@ fn points_fill_a_list_alike_in_one_cloud_or_in_many() {
         assert_eq!(whole.distortion(), parts.distortion(), "{kind}");
         whole.validate().unwrap();
         parts.validate().unwrap();
+    }
+}
+
+/// The voxels of points, summed in 64 bits, from the definition.
+fn voxels_of(map: &VoxelList, offsets_m: &[[f32; 3]]) -> Vec<(Key, Voxel)> {
+    let mut voxels = std::collections::BTreeMap::<Key, Voxel>::new();
+    let fixed = |metres: f64| (metres / OFFSET_UNIT_M).round_ties_even() as i64;
+    for offset in offsets_m {
+        let point = offset.map(f64::from);
+        let w = map.lattice().quantize(&point.into()).unwrap();
+        let center: [f64; 3] = map.lattice().center(w).into();
+        let sum = [0, 1, 2].map(|i| fixed(point[i]) - fixed(center[i]));
+        voxels
+            .entry(key(w))
+            .or_default()
+            .add(&Voxel { count: 1, sum });
+    }
+    voxels.into_iter().collect()
+}
+
+#[test]
+fn sums_of_any_number_of_points_are_exact() {
+    for (side_m, kind) in [(1000.0, LatticeKind::Cubic), (200.0, LatticeKind::Fcc)]
+        .into_iter()
+        .chain([(40.0, LatticeKind::Bcc), (0.5, LatticeKind::Hex)])
+    {
+        // In a few corners of a few cells, so that the sums of many points are large.
+        let near = |i: usize, axis: usize| ((i * (7 + 2 * axis) + i / 5) % 11) as f64 - 5.0;
+        let place = |i: usize| [0, 1, 2].map(|axis| (near(i, axis) * 0.25 * side_m) as f32);
+        let offsets: Vec<[f32; 3]> = (0..40_000).map(|i| place(i % 24)).collect();
+        let lattice = Lattice::new(kind, side_m * side_m * side_m).unwrap();
+        let empty = VoxelList::new(lattice, Vector3::zeros(), 1000).unwrap();
+        let full = VoxelList::new(empty.lattice().clone(), Vector3::zeros(), 40_001).unwrap();
+        let expected = voxels_of(&empty, &offsets);
+
+        // Point by point, then gathered.
+        let (mut singly, mut gathered) = (empty.clone(), full);
+        singly.insert(&cloud([0.0; 3], &offsets));
+        gathered.insert(&cloud([0.0; 3], &offsets));
+        for map in [&singly, &gathered] {
+            map.validate().unwrap();
+            assert_eq!(map.sorted(), expected, "{:?}", map.lattice());
+        }
+
+        let twice: Vec<_> = offsets.iter().chain(&offsets).copied().collect();
+        singly.merge(&gathered).unwrap();
+        singly.validate().unwrap();
+        assert_eq!(singly.sorted(), voxels_of(&empty, &twice));
+
+        // Voxels that come back start at nothing.
+        let (first, voxel) = expected[0];
+        assert!(singly.remove(first) && singly.remove(expected[1].0));
+        singly.validate().unwrap();
+        singly.merge(&gathered).unwrap();
+        assert_eq!(singly.get(first), Some(voxel));
+        singly.validate().unwrap();
+
+        let read = read_map(&*bytes(&singly), 1000).unwrap();
+        assert_eq!(read.sorted(), singly.sorted());
+        singly.clear();
+        singly.insert(&cloud([0.0; 3], &offsets));
+        assert_eq!(singly.sorted(), expected);
     }
 }
