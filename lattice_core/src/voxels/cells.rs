@@ -181,12 +181,27 @@ impl CellTable {
         }
     }
 
-    /// Asks for a voxel, which will be needed soon.
+    /// The block of a cell, for [`CellTable::find_in`]; asks for the number of its voxel.
     #[inline(always)]
-    pub(super) fn prefetch_row(&self, number: u32) {
+    pub(super) fn block_of(&self, code: CellCode) -> Option<u32> {
+        let at = self.blocks.find(code.block())?;
+        let block = self.blocks.rows().get(at as usize)?;
+        let (_, rank) = block.rank(code.place());
+        if let Some(number) = block.numbers.get(rank) {
+            prefetch::<1, _>(number);
+        }
+        Some(at)
+    }
+
+    /// The number of a cell of a block; asks for its voxel.
+    #[inline(always)]
+    pub(super) fn find_in(&self, block: u32, code: CellCode) -> Option<u32> {
+        let block = self.blocks.rows().get(block as usize)?;
+        let number = block.find(code.place())?;
         if let Some(row) = self.rows.get(number as usize) {
             prefetch::<1, _>(row);
         }
+        Some(number)
     }
 
     /// The number of a cell; a row is made for it if it is new and fewer than `limit` are there.

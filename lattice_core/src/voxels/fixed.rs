@@ -1,5 +1,7 @@
 //! Positions in fixed point.
 
+use wide::u32x4;
+
 use super::{OFFSET_UNIT_M, Voxel};
 use crate::lattice::{BatchBlock, BatchQuantizer, CellCode, Lattice, nearest_integer};
 
@@ -8,7 +10,7 @@ const PER_METRE: f64 = 1.0 / OFFSET_UNIT_M;
 /// Sums of positions from the datum in `OFFSET_UNIT_M`, modulo 2^32, and the number of points.
 ///
 /// Where the cell is known, so are the sums of [`most_points`], from its centre.
-pub(super) type Point = [u32; 4];
+pub(super) type Point = u32x4;
 
 /// Sums of offsets from the centre of a cell in `OFFSET_UNIT_M`, and the number of points.
 pub(super) type Offsets = [i64; 4];
@@ -32,7 +34,7 @@ pub(super) fn fixed(metres: [f64; 3]) -> [i64; 3] {
 /// is cut into blocks matters.
 #[derive(Clone, Copy)]
 pub(super) struct FixedBlock<'a> {
-    base: [u32; 3],
+    base: Point,
     offsets_m: &'a [[f32; 3]],
     near: Option<&'a [[i32; BatchQuantizer::BLOCK]; 3]>,
 }
@@ -45,7 +47,7 @@ impl FixedBlock<'_> {
         block: &BatchBlock<'a>,
     ) -> FixedBlock<'a> {
         FixedBlock {
-            base: fixed(base_m).map(low),
+            base: point_at(fixed(base_m).map(low), 0),
             offsets_m,
             near: (!block.sums.far).then_some(block.fixed),
         }
@@ -53,7 +55,7 @@ impl FixedBlock<'_> {
 
     /// The coordinates from the base, unless some point is far.
     #[inline(always)]
-    pub(super) fn near(&self) -> Option<(&[[i32; BatchQuantizer::BLOCK]; 3], [u32; 3])> {
+    pub(super) fn near(&self) -> Option<(&[[i32; BatchQuantizer::BLOCK]; 3], Point)> {
         Some((self.near?, self.base))
     }
 
@@ -62,7 +64,7 @@ impl FixedBlock<'_> {
     pub(super) fn point(&self, i: usize) -> Point {
         match self.near {
             Some(near) => near_point(near, self.base, i),
-            None => from_base(self.base, self.far(i)),
+            None => self.base + point_at(self.far(i), 1),
         }
     }
 
@@ -77,17 +79,16 @@ impl FixedBlock<'_> {
 #[inline(always)]
 pub(super) fn near_point(
     [x, y, z]: &[[i32; BatchQuantizer::BLOCK]; 3],
-    base: [u32; 3],
+    base: Point,
     i: usize,
 ) -> Point {
     let i = i % BatchQuantizer::BLOCK;
-    from_base(base, [x[i], y[i], z[i]].map(|c| c as u32))
+    base + point_at([x[i], y[i], z[i]].map(|c| c as u32), 1)
 }
 
 #[inline(always)]
-fn from_base(base: [u32; 3], offset: [u32; 3]) -> Point {
-    let sum = |axis: usize| base[axis].wrapping_add(offset[axis]);
-    [sum(0), sum(1), sum(2), 1]
+fn point_at([x, y, z]: [u32; 3], count: u32) -> Point {
+    Point::new([x, y, z, count])
 }
 
 /// Modulo 2^32.
@@ -106,7 +107,7 @@ fn low_center(lattice: &Lattice, code: CellCode) -> [u32; 3] {
 #[inline]
 pub(super) fn offsets_of(lattice: &Lattice, code: CellCode, points: &Point) -> Offsets {
     let center = low_center(lattice, code);
-    let [x, y, z, count] = *points;
+    let [x, y, z, count] = points.to_array();
     let offset = |sum: u32, center: u32| {
         let rest = sum.wrapping_sub(center.wrapping_mul(count));
         i64::from(rest as i32)
@@ -125,7 +126,7 @@ pub(super) fn points_of(lattice: &Lattice, code: CellCode, offsets: &Offsets) ->
     let center = low_center(lattice, code);
     let [.., count] = offsets.map(low);
     let sum = |i: usize| low(offsets[i]).wrapping_add(center[i].wrapping_mul(count));
-    [sum(0), sum(1), sum(2), count]
+    Point::new([sum(0), sum(1), sum(2), count])
 }
 
 /// A voxel of these points.

@@ -1,8 +1,9 @@
 //! Points gathered by cell before they reach the table.
 
 use super::fixed::Point;
-use crate::lattice::CellCode;
+use crate::lattice::{BatchQuantizer, CellCode};
 
+const BLOCK: usize = BatchQuantizer::BLOCK;
 const SLOTS_LOG2: u32 = 13;
 const SLOTS: usize = 1 << SLOTS_LOG2;
 
@@ -15,8 +16,12 @@ pub(super) struct Partial {
 
 const EMPTY: Partial = Partial {
     code: CellCode::NONE,
-    points: [0; 4],
+    points: Point::ZERO,
 };
+
+/// More than this share of the points of a block in other cells than those before, n / d, and
+/// branches on it cost more than they save.
+const SCATTERED: (usize, usize) = (1, 5);
 
 /// The cells that are being filled, as many as fit a direct-mapped table near the processor.
 ///
@@ -25,60 +30,129 @@ const EMPTY: Partial = Partial {
 #[derive(Clone, Debug)]
 pub(super) struct Gather {
     slots: Vec<Partial>,
-    used: Vec<u16>,
+    /// What a block of points moved out of its slots.
+    moved: Vec<Partial>,
+    scattered: bool,
 }
 
 impl Gather {
     pub(super) fn new() -> Gather {
         Gather {
             slots: vec![EMPTY; SLOTS],
-            used: Vec::with_capacity(SLOTS),
+            moved: vec![EMPTY; 2 * BLOCK],
+            scattered: false,
         }
     }
 
-    /// Adds points in order, each as its number's `point`; a cell that has to make room for another
-    /// goes to `out`, as does one with `most_points`, but not what has no cell.
+    /// Adds the points of a block in order, each as its number's `point`; gives the cells that had to
+    /// make room for others, or have `most_points`. [`CellCode::NONE`] may be among them.
     #[inline(always)]
     pub(super) fn add(
         &mut self,
         codes: &[CellCode],
         point: impl Fn(usize) -> Point,
         most_points: u32,
-        out: &mut Vec<Partial>,
-    ) {
-        let Some(slots) = self.slots.first_chunk_mut::<SLOTS>() else {
-            return;
+    ) -> &[Partial] {
+        let moved = if self.scattered {
+            self.add_to_slots::<false>(codes, point, most_points)
+        } else {
+            self.add_to_slots::<true>(codes, point, most_points)
         };
-        for (i, &code) in codes.iter().enumerate() {
-            let hash = code.raw().wrapping_mul(0x9e37_79b9_7f4a_7c15);
-            let number = (hash >> (64 - SLOTS_LOG2)) as usize;
-            let slot = &mut slots[number];
-            if slot.code != code || slot.points[3] >= most_points {
-                if slot.code == CellCode::NONE {
-                    self.used.push(number as u16);
-                } else {
-                    out.push(*slot);
-                }
-                *slot = Partial {
-                    code,
-                    points: [0; 4],
-                };
-            }
-            for (sum, term) in slot.points.iter_mut().zip(point(i)) {
-                *sum = sum.wrapping_add(term);
-            }
-        }
+        self.scattered = moved * SCATTERED.1 > codes.len() * SCATTERED.0;
+        self.moved.get(..moved).unwrap_or_default()
     }
 
-    /// Moves all cells to `out`. Points without a cell are left out.
-    pub(super) fn drain(&mut self, out: &mut Vec<Partial>) {
-        for number in self.used.drain(..) {
-            if let Some(slot) = self.slots.get_mut(usize::from(number)) {
-                if slot.code != CellCode::NONE {
-                    out.push(*slot);
+    /// With or without a branch on whether a point is in the cell of its slot.
+    #[inline(always)]
+    fn add_to_slots<const BRANCH: bool>(
+        &mut self,
+        codes: &[CellCode],
+        point: impl Fn(usize) -> Point,
+        most_points: u32,
+    ) -> usize {
+        let slots = self.slots.first_chunk_mut::<SLOTS>();
+        let to = self.moved.first_chunk_mut::<{ 2 * BLOCK }>();
+        let (Some(slots), Some(to)) = (slots, to) else {
+            return 0;
+        };
+        let mut moved = 0;
+        for (i, &code) in codes.iter().take(BLOCK).enumerate() {
+            let hash = code.raw().wrapping_mul(0x9e37_79b9_7f4a_7c15);
+            let slot = &mut slots[(hash >> (64 - SLOTS_LOG2)) as usize];
+            let stays = slot.code == code;
+            if BRANCH {
+                if !stays {
+                    to[moved % (2 * BLOCK)] = *slot;
+                    moved += 1;
+                    *slot = EMPTY;
                 }
+                slot.points += point(i);
+            } else {
+                to[moved % (2 * BLOCK)] = *slot;
+                moved += usize::from(!stays);
+                let mask = Point::splat(u32::from(stays).wrapping_neg());
+                slot.points = (slot.points & mask) + point(i);
+            }
+            slot.code = code;
+            if slot.points.as_array()[3] >= most_points {
+                to[moved % (2 * BLOCK)] = *slot;
+                moved += 1;
                 *slot = EMPTY;
             }
+        }
+        moved
+    }
+
+    /// Hands out all cells.
+    pub(super) fn drain(&mut self) -> impl Iterator<Item = Partial> {
+        let slots = self.slots.iter_mut();
+        let partials = slots.map(|slot| std::mem::replace(slot, EMPTY));
+        partials.filter(|partial| partial.code != CellCode::NONE)
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use std::collections::HashMap;
+
+    use proptest::prelude::*;
+
+    use super::*;
+
+    proptest! {
+        #[test]
+        fn every_point_leaves_once(
+            seed in any::<u32>(),
+            blocks in prop::collection::vec((1..=BLOCK, 1..60_000_u32), 1..30),
+            most_points in 1..40_u32,
+        ) {
+            let mut gather = Gather::new();
+            let (mut given, mut got) = (HashMap::new(), HashMap::new());
+            let mut count = |partial: Partial| {
+                assert!(partial.points.as_array()[3] <= most_points);
+                *got.entry(partial.code).or_insert(Point::ZERO) += partial.points;
+            };
+            let mut random = seed;
+            for (points, cells) in blocks {
+                let codes: Vec<CellCode> = (0..points)
+                    .map(|_| {
+                        random = random.wrapping_mul(1_664_525).wrapping_add(1_013_904_223);
+                        let cell = (random >> 8) % cells;
+                        CellCode::pack([cell as i32, 0, 0]).filter(|_| cell != 7).unwrap_or(CellCode::NONE)
+                    })
+                    .collect();
+                let point = |i: usize| Point::new([i as u32, 3, u32::MAX - 5, 1]);
+                for (i, &code) in codes.iter().enumerate() {
+                    *given.entry(code).or_insert(Point::ZERO) += point(i);
+                }
+                gather.add(&codes, point, most_points).iter().copied().for_each(&mut count);
+            }
+            gather.drain().for_each(&mut count);
+            prop_assert!(gather.drain().next().is_none());
+            for totals in [&mut given, &mut got] {
+                totals.remove(&CellCode::NONE);
+            }
+            prop_assert_eq!(given, got);
         }
     }
 }

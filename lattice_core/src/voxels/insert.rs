@@ -94,7 +94,6 @@ struct Origin<'a> {
 /// The points of a chunk, quantized and gathered by cell, the cells by shard.
 struct Chunk {
     gather: Gather,
-    partials: Vec<Partial>,
     by_shard: Vec<Vec<Partial>>,
     report: InsertReport,
     sums: DistortionSums,
@@ -276,58 +275,40 @@ impl Chunk {
     fn new() -> Chunk {
         Chunk {
             gather: Gather::new(),
-            partials: Vec::new(),
             by_shard: vec![Vec::new(); SHARDS],
             report: InsertReport::default(),
             sums: DistortionSums::default(),
         }
     }
 
-    /// Quantizes points and hands on what they add to cells, whenever some have come together and
-    /// at the end; `take` empties the list.
-    #[inline]
-    fn gather(
-        &mut self,
-        quantizer: &BatchQuantizer,
-        offsets_m: &[[f32; 3]],
-        most_points: u32,
-        mut take: impl FnMut(&mut Vec<Partial>),
-    ) {
-        for_fixed_blocks(quantizer, offsets_m, |offsets_m, block, points| {
-            let (codes, sums) = (block.codes, block.sums);
-            self.report.count_rejects(quantizer, offsets_m, codes, sums);
-            self.sums.add_batch(sums);
-            match points.near() {
-                Some((near, base)) => {
-                    let point = |i| near_point(near, base, i);
-                    self.gather
-                        .add(codes, point, most_points, &mut self.partials);
-                }
-                None => {
-                    let point = |i| points.point(i);
-                    self.gather
-                        .add(codes, point, most_points, &mut self.partials);
-                }
-            }
-            if self.partials.len() >= BATCH {
-                take(&mut self.partials);
-            }
-        });
-        self.gather.drain(&mut self.partials);
-        take(&mut self.partials);
-    }
-
     /// Gathers points by cell, up to `most_points`, and the cells by shard.
     fn sort(&mut self, quantizer: &BatchQuantizer, offsets_m: &[[f32; 3]], most_points: u32) {
-        let mut by_shard = std::mem::take(&mut self.by_shard);
+        let Chunk {
+            gather,
+            by_shard,
+            report,
+            sums,
+        } = self;
         by_shard.iter_mut().for_each(Vec::clear);
-        self.gather(quantizer, offsets_m, most_points, |partials| {
-            for partial in partials.drain(..) {
-                if let Some(list) = by_shard.get_mut(shard_of(partial.code)) {
-                    list.push(partial);
-                }
+        let mut take = |partial: Partial| {
+            if let Some(list) = by_shard.get_mut(shard_of(partial.code)) {
+                list.push(partial);
             }
+        };
+        for_fixed_blocks(quantizer, offsets_m, |offsets_m, block, points| {
+            report.count_rejects(quantizer, offsets_m, block.codes, block.sums);
+            sums.add_batch(block.sums);
+            let moved = match points.near() {
+                Some((near, base)) => {
+                    gather.add(block.codes, |i| near_point(near, base, i), most_points)
+                }
+                None => gather.add(block.codes, |i| points.point(i), most_points),
+            };
+            let moved = moved.iter().copied();
+            moved
+                .filter(|partial| partial.code != CellCode::NONE)
+                .for_each(&mut take);
         });
-        self.by_shard = by_shard;
+        gather.drain().for_each(take);
     }
 }

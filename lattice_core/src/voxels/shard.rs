@@ -15,7 +15,7 @@ use crate::lattice::{CellCode, Lattice};
 pub(super) const SHARDS: usize = 16;
 
 /// Cells that are searched together.
-pub(super) const BATCH: usize = 64;
+pub(super) const BATCH: usize = 128;
 
 /// When a voxel came and when it last changed, as states of the list.
 #[derive(Clone, Copy, PartialEq, Eq, Debug)]
@@ -56,8 +56,14 @@ pub(super) struct Shard {
 
 impl Entry {
     /// Number of points; stays at `u32::MAX` once there.
+    #[inline(always)]
     pub(super) fn count(&self) -> u32 {
-        self.points[3]
+        self.points.as_array()[3]
+    }
+
+    /// Number of the sums of a voxel of many points.
+    fn wide(&self) -> u32 {
+        self.points.as_array()[0]
     }
 }
 
@@ -112,7 +118,7 @@ impl Shard {
     pub(super) fn find_or_add(&mut self, code: CellCode, limit: usize, now: u32) -> Option<u32> {
         let empty = || Entry {
             code: code.raw(),
-            points: [0; 4],
+            points: Point::ZERO,
             life: Life {
                 born: now,
                 touched: now,
@@ -121,7 +127,9 @@ impl Shard {
         match self.voxels.find_or_add(code, limit, empty)? {
             Place::Known(number) => Some(number),
             Place::New(number) => {
-                self.columns.push();
+                if !self.columns.payload().is_plain() {
+                    self.columns.push();
+                }
                 self.remember(code.raw(), number);
                 Some(number)
             }
@@ -153,13 +161,11 @@ impl Shard {
             return;
         };
         entry.life.touched = now;
-        if entry.points[3].saturating_add(points[3]) > self.most_points {
+        if entry.count().saturating_add(points.as_array()[3]) > self.most_points {
             self.add_wide(number, |lattice, code| offsets_of(lattice, code, points));
             return;
         }
-        for (sum, term) in entry.points.iter_mut().zip(points) {
-            *sum = sum.wrapping_add(*term);
-        }
+        entry.points += *points;
     }
 
     /// Adds any number of points to a voxel.
@@ -183,21 +189,24 @@ impl Shard {
             return;
         };
         let code = CellCode::from_raw(entry.code).unwrap_or(CellCode::NONE);
-        if entry.points[3] <= self.most_points {
-            let known = offsets_of(&self.lattice, code, &entry.points);
-            entry.points = [self.wide.put(known), 0, 0, 0];
-        }
-        let count = self.wide.add(entry.points[0], &more(&self.lattice, code));
-        entry.points[3] = u32::try_from(count).unwrap_or(u32::MAX);
+        let wide = if entry.count() <= self.most_points {
+            self.wide
+                .put(offsets_of(&self.lattice, code, &entry.points))
+        } else {
+            entry.wide()
+        };
+        let count = self.wide.add(wide, &more(&self.lattice, code));
+        let count = u32::try_from(count).unwrap_or(u32::MAX);
+        entry.points = Point::new([wide, 0, 0, count]);
     }
 
     /// Of the points of a voxel.
     #[inline]
     pub(super) fn offsets(&self, code: CellCode, entry: &Entry) -> Offsets {
-        if entry.points[3] <= self.most_points {
+        if entry.count() <= self.most_points {
             offsets_of(&self.lattice, code, &entry.points)
         } else {
-            self.wide.get(entry.points[0])
+            self.wide.get(entry.wide())
         }
     }
 
@@ -207,26 +216,44 @@ impl Shard {
         voxel_of(self.offsets(code, entry))
     }
 
-    /// [`Shard::find_or_add`] without limit for a voxel that is added to soon.
-    #[inline(always)]
-    pub(super) fn find_soon(&mut self, code: CellCode, now: u32) -> Option<u32> {
-        let number = self.find_or_add(code, usize::MAX, now)?;
-        self.voxels.prefetch_row(number);
-        Some(number)
-    }
-
     /// Adds the gathered points of cells of this shard in steps, so that the waits for memory of
     /// one step overlap.
     pub(super) fn add_batch(&mut self, batch: &[Partial], now: u32) {
+        #[cfg(target_arch = "x86_64")]
+        if is_x86_feature_detected!("popcnt") {
+            // SAFETY: the machine has the instruction.
+            #[allow(unsafe_code)]
+            return unsafe { self.add_batch_popcnt(batch, now) };
+        }
+        self.add_batch_anywhere(batch, now);
+    }
+
+    /// With an instruction that counts bits, for the ranks of voxels in their blocks.
+    #[cfg(target_arch = "x86_64")]
+    #[target_feature(enable = "popcnt")]
+    fn add_batch_popcnt(&mut self, batch: &[Partial], now: u32) {
+        self.add_batch_anywhere(batch, now);
+    }
+
+    #[inline(always)]
+    fn add_batch_anywhere(&mut self, batch: &[Partial], now: u32) {
         for partial in batch {
             self.voxels.prefetch_block(partial.code);
         }
-        let mut numbers = [None; BATCH];
-        for (number, partial) in numbers.iter_mut().zip(batch) {
-            *number = self.find_soon(partial.code, now);
+        let mut places = [None; BATCH];
+        for (place, partial) in places.iter_mut().zip(batch) {
+            *place = self.voxels.block_of(partial.code);
         }
-        for (number, partial) in numbers.iter().zip(batch) {
-            if let Some(number) = *number {
+        // From the numbers of blocks to those of voxels.
+        for (place, partial) in places.iter_mut().zip(batch) {
+            let known = place.and_then(|block| self.voxels.find_in(block, partial.code));
+            *place = match known {
+                Some(number) => Some(number),
+                None => self.find_or_add(partial.code, usize::MAX, now),
+            };
+        }
+        for (place, partial) in places.iter().zip(batch) {
+            if let Some(number) = *place {
                 self.add(number, &partial.points, now);
             }
         }
@@ -237,8 +264,8 @@ impl Shard {
         let Some((number, entry)) = self.voxels.remove(code) else {
             return false;
         };
-        if entry.points[3] > self.most_points {
-            self.wide.free(entry.points[0]);
+        if entry.count() > self.most_points {
+            self.wide.free(entry.wide());
         }
         self.columns.swap_remove(number as usize);
         self.removed.insert(code.raw(), entry.life.ended(now));
@@ -266,21 +293,15 @@ impl Shard {
         if !self.columns.fits(self.len()) {
             return Err("the columns of a shard differ in length".to_owned());
         }
-        let rows = self.voxels.rows();
-        let is_wide = |entry: &&Entry| entry.points[3] > self.most_points;
-        if rows.iter().filter(is_wide).count() != self.wide.used() {
+        let rows = || self.voxels.rows().iter();
+        let is_wide = |entry: &&Entry| entry.count() > self.most_points;
+        if rows().filter(is_wide).count() != self.wide.used() {
             return Err("sums of many points are lost or belong to no voxel".to_owned());
         }
-        if rows
-            .iter()
-            .any(|entry| entry.life.born > entry.life.touched)
-        {
+        if rows().any(|entry| entry.life.born > entry.life.touched) {
             return Err("a voxel changed before it came".to_owned());
         }
-        match rows
-            .iter()
-            .find(|entry| self.removed.contains_key(&entry.code))
-        {
+        match rows().find(|entry| self.removed.contains_key(&entry.code)) {
             Some(entry) => Err(format!("removed voxel {:#x} is in the list", entry.code)),
             None => Ok(()),
         }
