@@ -55,8 +55,8 @@ pub fn align(
     })
 }
 
-/// The last part of [`align`] alone: climbs on the finest level by a fraction of its steps, on another
-/// sample of the scan.
+/// The last part of [`align`] alone: climbs on the finest level by a fraction of its steps, and by a
+/// fraction of that in each further stage, on another sample of the scan.
 pub fn refine(
     map: &MultiResolutionList,
     cloud: &Cloud,
@@ -76,12 +76,23 @@ fn refine_from(
 ) -> Result<Alignment, MatchError> {
     let list = map.levels().first().ok_or(MatchError::EmptyMap)?;
     let points = sample_of(&cloud.offsets_m, list.lattice(), options.max_points, 1)?;
-    let steps = Steps {
-        metres: options.fine_step * list.lattice().cell_side_m(),
-        radians: options.fine_step * options.step_rad,
-        most: options.fine_iterations,
+    let mut top = Top {
+        pose: *pose,
+        hits: 0,
+        evaluations: 0,
     };
-    let top = climb(*pose, list, &points, &steps);
+    let mut fraction = 1.0;
+    for _ in 0..options.fine_stages {
+        fraction *= options.fine_step;
+        let steps = Steps {
+            metres: fraction * list.lattice().cell_side_m(),
+            radians: fraction * options.step_rad,
+            most: options.fine_iterations,
+        };
+        let before = top.evaluations;
+        top = climb(top.pose, list, &points, &steps);
+        top.evaluations += before;
+    }
     Ok(Alignment {
         map_from_cloud: end(cloud, &top.pose),
         hits: top.hits,

@@ -7,6 +7,8 @@ use super::error::within;
 
 /// Most iterations of one climb.
 const MOST_ITERATIONS: f64 = 1e5;
+/// Most climbs by shorter and shorter steps.
+const MOST_STAGES: f64 = 8.0;
 /// Most points of a sample.
 const MOST_SAMPLE: f64 = 1e7;
 /// Most poses of a grid.
@@ -16,16 +18,19 @@ const MOST_KEPT: f64 = 1e4;
 /// Largest spread of a search, metres.
 const MOST_SPREAD_M: f64 = 1e5;
 
-/// How [`align`](super::align) climbs; the numbers of the original by default.
+/// How [`align`](super::align) climbs; by default the numbers of the original, with a second fine stage.
 #[derive(Clone, Copy, PartialEq, Debug)]
 pub struct AlignOptions {
     /// Most points of the scan that are looked at, one of a cell.
     pub max_points: usize,
     /// Most steps on one level.
     pub level_iterations: usize,
-    /// Most steps of the last climb, on the finest level.
+    /// Last climbs, on the finest level, each by shorter steps than the one before; the original has one.
+    pub fine_stages: usize,
+    /// Most steps of each of the last climbs.
     pub fine_iterations: usize,
-    /// Steps of the last climb over those of the finest level.
+    /// Steps of the first of the last climbs over those of the finest level, and of each over those of
+    /// the one before.
     pub fine_step: f64,
     /// Turn of one step on the finest level, radians; twice as much from one level to the next.
     pub step_rad: f64,
@@ -36,6 +41,7 @@ impl Default for AlignOptions {
         AlignOptions {
             max_points: 2000,
             level_iterations: 20,
+            fine_stages: 2,
             fine_iterations: 100,
             fine_step: 0.25,
             step_rad: 0.5_f64.to_radians(),
@@ -48,6 +54,7 @@ impl AlignOptions {
         within("max_points", self.max_points as f64, 1.0, MOST_SAMPLE)?;
         let iterations = self.level_iterations as f64;
         within("level_iterations", iterations, 0.0, MOST_ITERATIONS)?;
+        within("fine_stages", self.fine_stages as f64, 1.0, MOST_STAGES)?;
         let iterations = self.fine_iterations as f64;
         within("fine_iterations", iterations, 0.0, MOST_ITERATIONS)?;
         within("fine_step", self.fine_step, 1e-3, 1.0)?;

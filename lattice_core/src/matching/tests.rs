@@ -120,7 +120,7 @@ fn a_known_pose_is_found_from_nearby() {
         };
         let before = refine(&map, &scan, &start, &none).unwrap();
         assert!(found.hits > before.hits && found.points == before.points);
-        assert!(before.evaluations == 1 && found.evaluations > 13 * 4);
+        assert!(before.evaluations == 2 && found.evaluations > 13 * 5);
     }
 }
 
@@ -269,6 +269,11 @@ fn bad_input_is_refused() {
         ..options
     };
     assert!(align(&map, &scan, &start, &none).is_err());
+    let none = AlignOptions {
+        fine_stages: 0,
+        ..options
+    };
+    assert!(align(&map, &scan, &start, &none).is_err());
     let wide = Spread {
         translation_m: [1e4; 3],
         rotation_rad: [3.0; 3],
@@ -338,5 +343,9 @@ proptest! {
         let options = AlignOptions { level_iterations: 0, ..AlignOptions::default() };
         let after = align(&map, &scan, &start, &options).unwrap();
         prop_assert!(after.hits >= before.hits && after.points == before.points);
+        let options = AlignOptions { fine_stages: 1, ..AlignOptions::default() };
+        let coarser = refine(&map, &scan, &start, &options).unwrap();
+        let finer = refine(&map, &scan, &start, &AlignOptions::default()).unwrap();
+        prop_assert!(finer.hits >= coarser.hits && coarser.hits >= before.hits);
     }
 }
