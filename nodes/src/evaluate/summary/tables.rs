@@ -1,0 +1,133 @@
+//! The rows of the tables.
+
+use std::collections::BTreeMap;
+
+use serde::Serialize;
+
+use crate::evaluate::statistics::Share;
+#[cfg(doc)]
+use crate::evaluate::trial::WRONG;
+
+/// What the paper prints for a scene (Nakamura et al. 2019, table 1).
+#[derive(Clone, Copy, PartialEq, Debug, Serialize)]
+pub struct Printed {
+    /// Scene.
+    pub scene: &'static str,
+    /// d_SE3 of GICP-SE(3).
+    pub gicp_se3: f64,
+    /// d_SE3 of Semantic-ICP.
+    pub semantic_icp: f64,
+}
+
+/// Table 1 of the paper.
+pub const PRINTED: [Printed; 4] = [
+    printed("tv", 0.22, 8.68),
+    printed("desk", 5.42, 0.05),
+    printed("bookshelf", 0.08, 0.76),
+    printed("dining", 0.06, 0.04),
+];
+
+const fn printed(scene: &'static str, gicp_se3: f64, semantic_icp: f64) -> Printed {
+    Printed {
+        scene,
+        gicp_se3,
+        semantic_icp,
+    }
+}
+
+/// One method on one scene with one share of wrong labels from one start.
+#[derive(Clone, PartialEq, Debug, Serialize)]
+pub struct Row {
+    /// Scene, or `all`.
+    pub scene: String,
+    /// Start.
+    pub start: String,
+    /// Share of the view that is labelled wrongly.
+    pub q: f64,
+    /// Method.
+    pub method: String,
+    /// Poses within [`WRONG`].
+    pub success: Share,
+    /// Medians: of d_SE3 as printed,
+    pub d_se3: Option<f64>,
+    /// of its left form,
+    pub d_se3_left: Option<f64>,
+    /// of the distance (m),
+    pub translation_m: Option<f64>,
+    /// of the angle (degrees),
+    pub rotation_deg: Option<f64>,
+    /// of the mean distance of the seen points (m).
+    pub view_m: Option<f64>,
+}
+
+/// Ours against another from the same starts.
+#[derive(Clone, PartialEq, Debug, Serialize)]
+pub struct Paired {
+    /// The other.
+    pub against: String,
+    /// Start, or `all`.
+    pub start: String,
+    /// Share of wrong labels; None for all.
+    pub q: Option<f64>,
+    /// Distance and angle both within 1 cm and 0.2 degrees of the other's, or smaller.
+    pub not_worse: Share,
+    /// The same, or ours is right where the other is wrong.
+    pub not_worse_or_saved: Share,
+    /// By the mean distance of the seen points alone, within 1 cm.
+    pub not_worse_in_view: Share,
+    /// Ours is right and the other wrong.
+    pub saved: Share,
+    /// Ours is wrong and the other right.
+    pub spoiled: Share,
+}
+
+/// What is accepted, and how much of it is wrong.
+#[derive(Clone, PartialEq, Debug, Serialize)]
+pub struct Accepted {
+    /// Scene, or `all`.
+    pub scene: String,
+    /// Start.
+    pub start: String,
+    /// Share of wrong labels; None for all.
+    pub q: Option<f64>,
+    /// Verdict OK.
+    pub accepted: Share,
+    /// Of these, beyond 0.15 m or 3 degrees.
+    pub wrong: Share,
+    /// Of these, beyond 0.10 m or 3 degrees.
+    pub wrong_tight: Share,
+    /// Of these, seen points that are on average beyond 0.15 m, or 3 degrees.
+    pub wrong_in_view: Share,
+    /// Right before any verdict.
+    pub right: Share,
+    /// How often each verdict.
+    pub verdicts: BTreeMap<String, usize>,
+}
+
+/// Normalised squared errors of accepted poses.
+#[derive(Clone, PartialEq, Debug, Serialize)]
+pub struct Consistency {
+    /// Start, or `all`.
+    pub start: String,
+    /// Accepted poses with a covariance.
+    pub n: usize,
+    /// Mean over 6, where 1 is right.
+    pub mean_over_6: Option<f64>,
+    /// Median over 5.35, that of six degrees of freedom.
+    pub median_over_expected: Option<f64>,
+}
+
+/// Wall times of a method.
+#[derive(Clone, PartialEq, Debug, Serialize)]
+pub struct TimeRow {
+    /// Method.
+    pub method: String,
+    /// Start.
+    pub start: String,
+    /// Trials.
+    pub n: usize,
+    /// Milliseconds.
+    pub median_ms: Option<f64>,
+    /// Milliseconds.
+    pub p90_ms: Option<f64>,
+}
