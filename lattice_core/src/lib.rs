@@ -8,6 +8,7 @@ pub mod geodesy;
 pub mod lattice;
 pub mod matching;
 pub mod metrics;
+pub mod options;
 pub mod pose;
 mod prefetch;
 pub mod query;

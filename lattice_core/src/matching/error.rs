@@ -4,6 +4,7 @@ use thiserror::Error;
 
 use super::{MAX_LEVELS, MAX_POINTS};
 use crate::lattice::LatticeError;
+use crate::options::OutOfRange;
 use crate::voxels::DatumError;
 
 /// Why a list is not made or a scan not matched.
@@ -22,17 +23,8 @@ pub enum MatchError {
     #[error(transparent)]
     Datum(#[from] DatumError),
     /// An option out of its range.
-    #[error("{name} is {value}, not within {least} to {most}")]
-    Option {
-        /// Which option.
-        name: &'static str,
-        /// Its value.
-        value: f64,
-        /// Least value taken.
-        least: f64,
-        /// Greatest value taken.
-        most: f64,
-    },
+    #[error(transparent)]
+    Option(#[from] OutOfRange),
     /// A number of the pose that a search begins with is NaN or infinite.
     #[error("the pose to begin with is not finite")]
     Pose,
@@ -59,22 +51,4 @@ pub enum MatchError {
         /// Poses allowed.
         most: usize,
     },
-}
-
-/// Checks that an option is in its range; NaN never is.
-pub(super) fn within(
-    name: &'static str,
-    value: f64,
-    least: f64,
-    most: f64,
-) -> Result<(), MatchError> {
-    if (least..=most).contains(&value) {
-        return Ok(());
-    }
-    Err(MatchError::Option {
-        name,
-        value,
-        least,
-        most,
-    })
 }

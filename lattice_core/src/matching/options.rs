@@ -2,8 +2,7 @@
 
 use std::f64::consts::PI;
 
-use super::MatchError;
-use super::error::within;
+use crate::options::{OutOfRange, within};
 
 /// Most iterations of one climb.
 const MOST_ITERATIONS: f64 = 1e5;
@@ -50,7 +49,7 @@ impl Default for AlignOptions {
 }
 
 impl AlignOptions {
-    pub(super) fn check(&self) -> Result<(), MatchError> {
+    pub(super) fn check(&self) -> Result<(), OutOfRange> {
         within("max_points", self.max_points as f64, 1.0, MOST_SAMPLE)?;
         let iterations = self.level_iterations as f64;
         within("level_iterations", iterations, 0.0, MOST_ITERATIONS)?;
@@ -73,7 +72,7 @@ pub struct Spread {
 }
 
 impl Spread {
-    pub(super) fn check(&self) -> Result<(), MatchError> {
+    pub(super) fn check(&self) -> Result<(), OutOfRange> {
         for value in self.translation_m {
             within("translation_m", value, 0.0, MOST_SPREAD_M)?;
         }
@@ -109,7 +108,7 @@ impl Default for SearchOptions {
 }
 
 impl SearchOptions {
-    pub(super) fn check(&self) -> Result<(), MatchError> {
+    pub(super) fn check(&self) -> Result<(), OutOfRange> {
         within("max_points", self.max_points as f64, 1.0, MOST_SAMPLE)?;
         within("keep", self.keep as f64, 1.0, MOST_KEPT)?;
         within("feature_range_m", self.feature_range_m, 1e-3, 1e6)?;

@@ -8,6 +8,7 @@ use rand_chacha::ChaCha8Rng;
 use super::*;
 use crate::cloud::Cloud;
 use crate::lattice::{Lattice, LatticeKind};
+use crate::options::OutOfRange;
 use crate::voxels::VoxelStore;
 
 const PLENTY: usize = 1 << 28;
@@ -246,10 +247,10 @@ fn bad_input_is_refused() {
         let found = search(&map, &scan, &start, &spread, &SearchOptions::default());
         assert!(matches!(
             found,
-            Err(MatchError::Option {
+            Err(MatchError::Option(OutOfRange {
                 name: "translation_m",
                 ..
-            })
+            }))
         ));
         let options = AlignOptions {
             fine_step: bad,
@@ -258,10 +259,10 @@ fn bad_input_is_refused() {
         let found = align(&map, &scan, &start, &options);
         assert!(matches!(
             found,
-            Err(MatchError::Option {
+            Err(MatchError::Option(OutOfRange {
                 name: "fine_step",
                 ..
-            })
+            }))
         ));
     }
     let none = AlignOptions {

@@ -3,6 +3,7 @@
 use thiserror::Error;
 
 use super::Scene;
+use crate::options::OutOfRange;
 use crate::raycast::mesh::MeshError;
 use crate::voxels::DatumError;
 
@@ -49,33 +50,6 @@ pub enum HouseError {
         far_m: f64,
     },
     /// An option out of its range.
-    #[error("{name} is {value}, not within {least} to {most}")]
-    Option {
-        /// Which option.
-        name: &'static str,
-        /// Its value.
-        value: f64,
-        /// Least value taken.
-        least: f64,
-        /// Greatest value taken.
-        most: f64,
-    },
-}
-
-/// Checks that an option is in its range.
-pub(super) fn within(
-    name: &'static str,
-    value: f64,
-    least: f64,
-    most: f64,
-) -> Result<(), HouseError> {
-    if (least..=most).contains(&value) {
-        return Ok(());
-    }
-    Err(HouseError::Option {
-        name,
-        value,
-        least,
-        most,
-    })
+    #[error(transparent)]
+    Option(#[from] OutOfRange),
 }

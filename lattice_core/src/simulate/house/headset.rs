@@ -3,11 +3,11 @@
 use nalgebra::{Isometry3, Point3, Translation3, UnitQuaternion, Vector3};
 
 use super::camera::{Camera, Image, looking};
-use super::error::within;
 use super::headset_mesh::{DepthView, Volume};
 use super::scenes::{self, Stand};
 use super::warp::Warp;
 use super::{House, HouseError, Scene};
+use crate::options::{OutOfRange, within};
 use crate::raycast::mesh::{LabelledMesh, MeshScene};
 use crate::simulate::random::{Purpose, Stream};
 
@@ -158,7 +158,7 @@ impl HeadsetTrial {
     }
 }
 
-fn check(options: &HeadsetOptions) -> Result<(), HouseError> {
+fn check(options: &HeadsetOptions) -> Result<(), OutOfRange> {
     within("gazes", options.gazes as f64, 1.0, 6.0)?;
     let pixels = options.width.saturating_mul(options.height);
     within("pixels", pixels as f64, 1.0, 1e7)?;

@@ -8,6 +8,7 @@ use nalgebra::{Isometry3, Point3, Vector3};
 use super::HouseError;
 use super::camera::Image;
 use super::warp::Warp;
+use crate::options::within;
 use crate::raycast::mesh::LabelledMesh;
 
 /// Truncation of the distance in voxels.
@@ -37,8 +38,8 @@ impl Volume {
         voxel_m: f64,
     ) -> Result<Volume, HouseError> {
         let sides = (high_m - low_m).map(|size_m| (size_m / voxel_m).ceil().max(0.0) + 3.0);
-        super::error::within("voxels along a side", sides.max(), 1.0, MAX_SIDE)?;
-        super::error::within("voxels", sides.product(), 1.0, MAX_VOXELS)?;
+        within("voxels along a side", sides.max(), 1.0, MAX_SIDE)?;
+        within("voxels", sides.product(), 1.0, MAX_VOXELS)?;
         Ok(Volume {
             low_m,
             voxel_m,

@@ -4,9 +4,9 @@ use std::collections::BTreeMap;
 
 use nalgebra::Point3;
 
-use super::error::within;
 use super::regions::{NO_REGION, Region};
 use super::{HeadsetTrial, House, HouseError};
+use crate::options::within;
 use crate::registration::{LabelDistribution, SemanticCloud, UNLABELED};
 use crate::simulate::random::{Purpose, Stream};
 

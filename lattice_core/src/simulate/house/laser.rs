@@ -5,8 +5,8 @@ use std::f64::consts::TAU;
 use nalgebra::{Isometry3, Point3, Vector3};
 use rayon::prelude::*;
 
-use super::error::within;
 use super::{House, HouseError};
+use crate::options::within;
 use crate::simulate::random::{Purpose, Stream};
 
 /// How a scanner looks around, and how far two of its stands are apart.

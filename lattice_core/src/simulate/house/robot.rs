@@ -4,10 +4,10 @@ use nalgebra::{Isometry3, Point3, Translation3, UnitQuaternion, Vector3};
 use rayon::prelude::*;
 
 use super::camera::{Camera, Image, looking};
-use super::error::within;
 use super::regions::NO_REGION;
 use super::{House, HouseError};
 use crate::cloud::Cloud;
+use crate::options::within;
 use crate::simulate::random::{Purpose, Stream};
 
 /// Views from one place.
