@@ -15,11 +15,15 @@ pub(super) type Point = u32x4;
 /// Sums of offsets from the centre of a cell in `OFFSET_UNIT_M`, and the number of points.
 pub(super) type Offsets = [i64; 4];
 
-/// The greatest number of points whose sums of offsets surely fit 32 bits: 1 at least, since no
-/// covering radius takes more.
-pub(super) fn most_points(reach: u64) -> u32 {
-    let most = (1_u64 << 31).saturating_sub(1) / reach.max(1);
-    u32::try_from(most).unwrap_or(u32::MAX - 1).max(1)
+/// No point is farther from its lattice point than this, in `OFFSET_UNIT_M`, roundings included.
+pub(super) fn reach(lattice: &Lattice) -> u64 {
+    (lattice.covering_radius_m() * PER_METRE) as u64 + 2
+}
+
+/// The greatest number of points of a cell whose sums of offsets surely fit 32 bits: 1 at least, since
+/// no covering radius takes more.
+pub(super) fn most_points(lattice: &Lattice) -> u32 {
+    (i32::MAX as u64 / reach(lattice)).max(1) as u32
 }
 
 /// A position (metres) in `OFFSET_UNIT_M`.
@@ -174,10 +178,10 @@ mod tests {
         ) {
             let lattice = Lattice::new(LatticeKind::ALL[kind], log_side.exp2().powi(3)).unwrap();
             let code = CellCode::pack(w).unwrap();
-            let reach = (lattice.covering_radius_m() * PER_METRE) as u64 + 2;
-            let count = (f64::from(most_points(reach)) * share) as i64 + 1;
-            let count = count.min(i64::from(most_points(reach)));
-            let [x, y, z] = sum.map(|s: f64| (s * (count * reach as i64) as f64) as i64);
+            let most = i64::from(most_points(&lattice));
+            let count = ((most as f64 * share) as i64 + 1).min(most);
+            let reach = reach(&lattice) as i64;
+            let [x, y, z] = sum.map(|s: f64| (s * (count * reach) as f64) as i64);
             let offsets = [x, y, z, count];
             let points = points_of(&lattice, code, &offsets);
             prop_assert_eq!(offsets_of(&lattice, code, &points), offsets);

@@ -6,7 +6,9 @@ use rayon::prelude::*;
 use super::VoxelList;
 use super::columns::{Details, LabelCount, Stamps};
 use super::distortion::DistortionSums;
-use super::fixed::{FixedBlock, Point, moment_unit_m, moments_of, near_point, offsets_of};
+use super::fixed::{
+    FixedBlock, Point, moment_unit_m, moments_of, most_points, near_point, offsets_of,
+};
 use super::gather::{Gather, Partial};
 use super::shard::{BATCH, SHARDS, Shard, shard_of};
 use crate::cloud::Cloud;
@@ -219,7 +221,7 @@ impl VoxelList {
     ) {
         let parts = wave.par_chunks(wave.len().div_ceil(chunks.len().max(1)).max(1));
         let parts = parts.zip(chunks.par_iter_mut());
-        let most_points = self.shards.first().map_or(1, Shard::most_points);
+        let most_points = most_points(&self.lattice);
         parts.for_each(|(offsets_m, chunk)| chunk.sort(quantizer, offsets_m, most_points));
         let shards = self.shards.par_iter_mut().enumerate();
         shards.for_each(|(part, shard)| {

@@ -8,9 +8,9 @@ use thiserror::Error;
 
 use super::columns::{Columns, Details, LabelCount, Payload, Stamps};
 use super::distortion::{Distortion, DistortionSums};
-use super::fixed::moment_unit_m;
+use super::fixed::{moment_unit_m, reach};
 use super::grow;
-use super::shard::{Life, SHARDS, Shard, reach, shard_of};
+use super::shard::{Life, SHARDS, Shard, shard_of};
 use super::{InsertReport, Voxel, VoxelStore, WhenFull};
 use crate::cloud::Cloud;
 use crate::lattice::{CellCode, Key, Lattice, LatticeIndex};

@@ -2,13 +2,13 @@
 
 use rustc_hash::FxHashMap;
 
+use super::Voxel;
 use super::cells::CellTable;
 use super::columns::Columns;
 use super::fixed::{Offsets, Point, most_points, offsets_of, points_of, voxel_of};
 use super::gather::Partial;
 use super::table::Place;
 use super::wide::WideSums;
-use super::{OFFSET_UNIT_M, Voxel};
 use crate::lattice::{CellCode, Lattice};
 
 /// Number of parts of a list.
@@ -37,7 +37,7 @@ impl Life {
 #[derive(Clone)]
 pub(super) struct Entry {
     pub(super) code: u64,
-    /// Of up to [`Shard::most_points`]; of more the number of their [`WideSums`], and the count.
+    /// Of up to [`most_points`]; of more the number of their [`WideSums`], and the count.
     points: Point,
     pub(super) life: Life,
 }
@@ -67,11 +67,6 @@ impl Entry {
     }
 }
 
-/// No point is farther from its lattice point than this, in `OFFSET_UNIT_M`, roundings included.
-pub(super) fn reach(lattice: &Lattice) -> u64 {
-    (lattice.covering_radius_m() / OFFSET_UNIT_M) as u64 + 2
-}
-
 /// Which shard a cell belongs to: all cells of a block to one.
 #[inline(always)]
 pub(super) fn shard_of(code: CellCode) -> usize {
@@ -89,7 +84,7 @@ impl Shard {
             voxels: CellTable::new(),
             columns,
             lattice: lattice.clone(),
-            most_points: most_points(reach(lattice)),
+            most_points: most_points(lattice),
             wide: WideSums::new(),
             removed: FxHashMap::default(),
         }
@@ -149,12 +144,7 @@ impl Shard {
         }
     }
 
-    /// Most points that are added at once.
-    pub(super) fn most_points(&self) -> u32 {
-        self.most_points
-    }
-
-    /// Adds up to [`Shard::most_points`] to a voxel.
+    /// Adds up to [`most_points`] to a voxel.
     #[inline(always)]
     pub(super) fn add(&mut self, number: u32, points: &Point, now: u32) {
         let Some(entry) = self.voxels.row_mut(number) else {

@@ -4,9 +4,10 @@ use std::fs::{self, File};
 use std::io::Write;
 use std::path::{Path, PathBuf};
 use std::process::{Command, Stdio};
-use std::time::{Duration, Instant};
+use std::time::Duration;
 
 use serde::Deserialize;
+use wait_timeout::ChildExt;
 
 /// A page that is not there by then never will be.
 const PATIENCE: Duration = Duration::from_secs(120);
@@ -137,19 +138,12 @@ fn dump(chromium: &Path, page: &Path) -> (String, Vec<String>) {
         .stderr(File::create(&log).unwrap())
         .spawn()
         .unwrap_or_else(|e| panic!("{}: {e}", chromium.display()));
-    let begin = Instant::now();
-    let status = loop {
-        if let Some(status) = browser.try_wait().unwrap() {
-            break status;
-        }
-        if begin.elapsed() > PATIENCE {
-            browser.kill().unwrap();
-            panic!(
-                "chromium did not end: {}",
-                fs::read_to_string(&log).unwrap()
-            );
-        }
-        std::thread::sleep(Duration::from_millis(50));
+    let Some(status) = browser.wait_timeout(PATIENCE).unwrap() else {
+        browser.kill().unwrap();
+        panic!(
+            "chromium did not end: {}",
+            fs::read_to_string(&log).unwrap()
+        );
     };
     let log = String::from_utf8_lossy(&fs::read(&log).unwrap()).into_owned();
     assert!(status.success(), "{status}: {log}");

@@ -6,9 +6,7 @@ use thiserror::Error;
 use crate::lattice::{Key, Lattice};
 use crate::voxels::columns::Columns;
 use crate::voxels::distortion::DistortionSums;
-use crate::voxels::{
-    Distortion, OFFSET_UNIT_M, OccupancyList, Payload, Voxel, VoxelList, VoxelStore,
-};
+use crate::voxels::{Distortion, OccupancyList, Payload, Voxel, VoxelList, VoxelStore};
 
 /// Parts that do not make a map.
 #[derive(Clone, PartialEq, Eq, Debug, Error)]
@@ -147,11 +145,6 @@ impl MapContents {
     /// Centre of a cell, map frame, metres.
     pub fn center_m(&self, key: Key) -> Vector3<f64> {
         self.datum_m() + self.lattice.center(key.unpack())
-    }
-
-    /// No point is farther from its lattice point than this, in `OFFSET_UNIT_M`, roundings included.
-    pub(super) fn reach(&self) -> u64 {
-        (self.lattice.covering_radius_m() / OFFSET_UNIT_M) as u64 + 2
     }
 
     /// Says what is wrong with the datum.

@@ -11,6 +11,7 @@ use super::head::{
 use super::{FileError, MAX_EXPANSION, MAX_WINDOW_LOG, MapContents};
 use crate::voxels::Voxel;
 use crate::voxels::codec::{CodecError, Varints, decode_keys, unzigzag};
+use crate::voxels::fixed::reach;
 
 /// Bytes that are asked for before any has come.
 const FIRST_BYTES: u64 = 1 << 20;
@@ -117,7 +118,7 @@ impl MapContents {
     /// The offset sums, three for each key.
     fn set_sums(&mut self, bytes: &[u8]) -> Result<(), Fault> {
         let mut values = Varints::new(bytes);
-        let reach = self.reach();
+        let reach = reach(&self.lattice);
         for voxel in self.voxels.iter_mut().flatten() {
             for sum in &mut voxel.sum {
                 *sum = unzigzag(expect(&mut values)?);
@@ -132,7 +133,7 @@ impl MapContents {
     /// A column behind the payload.
     fn set_further(&mut self, column: &Column, bytes: &[u8]) -> Result<(), Fault> {
         let voxels = self.voxels.as_deref().unwrap_or_default();
-        let (reach, len) = (self.reach(), voxels.len());
+        let (reach, len) = (reach(&self.lattice), voxels.len());
         match *column {
             MOMENTS => {
                 let moments = decode_moments(bytes, voxels, &self.lattice, reach)?;

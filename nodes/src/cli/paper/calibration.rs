@@ -4,19 +4,15 @@ use std::path::PathBuf;
 
 use clap::Args;
 
-use super::make;
+use super::{ReportOptions, make};
 use crate::cli::CliResult;
 use crate::paper::calibration::{Options, run};
 
 /// Options of `lattice paper calibration`.
 #[derive(Args)]
 pub struct Calibration {
-    /// Folder of the report: report.html, report.json, a CSV for each table, an SVG for each figure
-    #[arg(long, value_name = "DIR")]
-    out: PathBuf,
-    /// The same seed gives the same bytes
-    #[arg(long, default_value_t = 1)]
-    seed: u64,
+    #[command(flatten)]
+    report: ReportOptions,
     /// Fewer trials, in less than a minute
     #[arg(long)]
     quick: bool,
@@ -32,9 +28,6 @@ pub struct Calibration {
     /// Trials at once [default: as many as processors]
     #[arg(long)]
     threads: Option<usize>,
-    /// Print the report as JSON
-    #[arg(long)]
-    json: bool,
 }
 
 impl Calibration {
@@ -42,14 +35,12 @@ impl Calibration {
     pub fn run(self) -> CliResult {
         let processors = || std::thread::available_parallelism().map_or(1, usize::from);
         let options = Options {
-            seed: self.seed,
+            seed: self.report.seed,
             quick: self.quick,
             mesh: self.mesh.zip(self.classes),
             results: self.results,
             threads: self.threads.unwrap_or_else(processors).clamp(1, 1024),
         };
-        make("paper", &self.out, self.json, |progress| {
-            run(&options, progress)
-        })
+        make(&self.report, |progress| run(&options, progress))
     }
 }

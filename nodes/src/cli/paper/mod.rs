@@ -3,9 +3,9 @@
 mod calibration;
 mod voxels;
 
-use std::path::Path;
+use std::path::PathBuf;
 
-use clap::Subcommand;
+use clap::{Args, Subcommand};
 
 use super::progress::Progress;
 use super::{CliResult, init_logging};
@@ -31,22 +31,34 @@ impl Paper {
     }
 }
 
+/// What both papers take.
+#[derive(Args)]
+struct ReportOptions {
+    /// Folder of the report: report.html, report.json, a CSV for each table, an SVG for each figure
+    #[arg(long, value_name = "DIR")]
+    out: PathBuf,
+    /// The same seed gives the same bytes
+    #[arg(long, default_value_t = 1)]
+    seed: u64,
+    /// Print the report as JSON
+    #[arg(long)]
+    json: bool,
+}
+
 /// Computes a report behind a progress bar, writes it and says how each section stands.
 fn make<E: std::fmt::Display>(
-    name: &str,
-    folder: &Path,
-    json: bool,
+    options: &ReportOptions,
     compute: impl FnOnce(&mut dyn FnMut(f64, &str)) -> Result<Report, E>,
 ) -> CliResult {
-    let bar = Progress::new(name);
+    let bar = Progress::new("paper");
     let report = compute(&mut |done, what| {
         bar.set(done);
         bar.say(what);
     });
     bar.done();
     let report = report.map_err(|e| e.to_string())?;
-    report::write(&report, folder)?;
-    if json {
+    report::write(&report, &options.out)?;
+    if options.json {
         println!("{}", serde_json::to_string_pretty(&report)?);
         return Ok(());
     }
@@ -56,6 +68,6 @@ fn make<E: std::fmt::Display>(
     for (section, check) in report.failing() {
         println!("fails: {}: {}", section.id, check.name);
     }
-    println!("written to {}", folder.join("report.html").display());
+    println!("written to {}", options.out.join("report.html").display());
     Ok(())
 }

@@ -4,19 +4,15 @@ use std::path::PathBuf;
 
 use clap::Args;
 
-use super::make;
+use super::{ReportOptions, make};
 use crate::cli::CliResult;
 use crate::paper::voxels::{Options, run};
 
 /// Options of `lattice paper voxels`.
 #[derive(Args)]
 pub struct Voxels {
-    /// Folder of the report: report.html, report.json, a CSV for each table, an SVG for each figure
-    #[arg(long, value_name = "DIR")]
-    out: PathBuf,
-    /// The same seed gives the same bytes
-    #[arg(long, default_value_t = 1)]
-    seed: u64,
+    #[command(flatten)]
+    report: ReportOptions,
     /// Fewer samples and trials, in less than a minute
     #[arg(long)]
     quick: bool,
@@ -30,23 +26,18 @@ pub struct Voxels {
     /// room_scan{1,2}.pcd; either may be missing
     #[arg(long, value_name = "DIR")]
     pairs: Option<PathBuf>,
-    /// Print the report as JSON
-    #[arg(long)]
-    json: bool,
 }
 
 impl Voxels {
     /// Runs the command.
     pub fn run(self) -> CliResult {
         let options = Options {
-            seed: self.seed,
+            seed: self.report.seed,
             quick: self.quick,
             scans: self.scans,
             bags: self.bags,
             pairs: self.pairs,
         };
-        make("paper", &self.out, self.json, |progress| {
-            run(&options, progress)
-        })
+        make(&self.report, |progress| run(&options, progress))
     }
 }

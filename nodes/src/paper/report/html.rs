@@ -215,7 +215,7 @@ fn number(value: f64, digits: usize) -> String {
 }
 
 /// As text or as an attribute in double quotes.
-fn escaped(text: &str) -> String {
+pub fn escaped(text: &str) -> String {
     let mut safe = String::with_capacity(text.len());
     for c in text.chars() {
         match c {

@@ -10,7 +10,7 @@ use serde::ser::SerializeStruct;
 use serde::{Serialize, Serializer};
 
 pub use files::{ReportError, write};
-pub use html::html;
+pub use html::{escaped, html};
 
 /// A paper, reproduced.
 #[derive(Clone, PartialEq, Debug, Serialize)]

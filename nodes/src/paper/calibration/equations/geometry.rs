@@ -184,7 +184,7 @@ pub(super) fn figure(
 pub(super) fn section(bench: &Bench) -> Result<Section, Fault> {
     let (source, target) = (bench.source(), bench.target());
     let truth = bench.scenario.truth;
-    let start = bench.off(Vector3::new(0.25, -0.15, 0.05), 10.0_f64.to_radians());
+    let start = bench.start();
     let options = RegisterOptions::gicp_se3();
     let pairs = literal::nearest(source, target, &truth, 1, GATE_M);
     let far = literal::nearest(source, target, &start, 1, GATE_M);

@@ -38,6 +38,11 @@ impl Bench {
         Translation3::from(moved_m) * place * turn * place.inverse() * truth
     }
 
+    /// 0.3 m and 10 degrees off.
+    fn start(&self) -> Isometry3<f64> {
+        self.off(Vector3::new(0.25, -0.15, 0.05), 10.0_f64.to_radians())
+    }
+
     /// Mean distance of the seen points from where they should be, metres.
     fn seen_m(&self, pose: &Isometry3<f64>) -> f64 {
         let points_m = self.source().points_m();

@@ -54,7 +54,7 @@ const SEEDS: u64 = 4;
 pub(super) fn section(context: &Context, bench: &Bench) -> Result<Section, Fault> {
     let (source, target) = (bench.source(), bench.target());
     let truth = bench.scenario.truth;
-    let start = bench.off(Vector3::new(0.25, -0.15, 0.05), 10.0_f64.to_radians());
+    let start = bench.start();
     let options = |variant| RegisterOptions::semantic(variant, LabelUse::Hard);
     let published = options(SemanticVariant::Published);
     let printed = options(SemanticVariant::AsPrinted);

@@ -2,7 +2,10 @@
 
 use std::fmt::Write;
 
+use base64::prelude::{BASE64_STANDARD, Engine};
+
 use super::picture::SIZE;
+use crate::paper::report::escaped;
 
 /// Height of the line above a picture, and of a line of the key, pixels.
 const LINE: u32 = 26;
@@ -32,7 +35,7 @@ pub(super) fn sheet(pictures: &[(&str, Vec<u8>)], key: &[Entry]) -> String {
              href=\"data:image/png;base64,{}\"/>",
             x + width / 2,
             escaped(title),
-            base64(png)
+            BASE64_STANDARD.encode(png)
         );
     }
     for (i, ([r, g, b], meaning)) in key.iter().enumerate() {
@@ -51,42 +54,9 @@ pub(super) fn sheet(pictures: &[(&str, Vec<u8>)], key: &[Entry]) -> String {
     svg
 }
 
-fn escaped(text: &str) -> String {
-    let text = text.replace('&', "&amp;").replace('<', "&lt;");
-    text.replace('>', "&gt;").replace('"', "&quot;")
-}
-
-/// RFC 4648, section 4.
-fn base64(bytes: &[u8]) -> String {
-    const DIGITS: &[u8; 64] = b"ABCDEFGHIJKLMNOPQRSTUVWXYZabcdefghijklmnopqrstuvwxyz0123456789+/";
-    let mut text = String::with_capacity(bytes.len().div_ceil(3) * 4);
-    for three in bytes.chunks(3) {
-        let all = (0..3).fold(0, |all: u32, i| {
-            (all << 8) | three.get(i).map_or(0, |byte| u32::from(*byte))
-        });
-        for i in 0..4 {
-            let digit = (all >> (18 - 6 * i)) as usize % 64;
-            let digit = DIGITS.get(digit).filter(|_| i <= three.len());
-            text.push(digit.map_or('=', |d| char::from(*d)));
-        }
-    }
-    text
-}
-
 #[cfg(test)]
 mod tests {
     use super::*;
-
-    #[test]
-    fn bytes_are_written_as_the_rfc_says() {
-        let expected = [
-            "", "Zg==", "Zm8=", "Zm9v", "Zm9vYg==", "Zm9vYmE=", "Zm9vYmFy",
-        ];
-        for (length, expected) in expected.into_iter().enumerate() {
-            assert_eq!(base64(&b"foobar"[..length]), expected);
-        }
-        assert_eq!(base64(&[0xfb, 0xff]), "+/8=");
-    }
 
     #[test]
     fn a_sheet_is_one_element_with_all_pictures_and_meanings() {
