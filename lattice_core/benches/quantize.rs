@@ -6,7 +6,7 @@
 
 use divan::counter::ItemsCount;
 use divan::{Bencher, black_box};
-use lattice_core::lattice::{BatchQuantizer, CellCode, Lattice, LatticeKind, Simd};
+use lattice_core::lattice::{BatchQuantizer, BlockKey, Lattice, LatticeKind, Simd};
 use nalgebra::{Isometry3, Vector3};
 
 /// Points of a batch: they fit into the caches, so that the kernel is measured and not the memory.
@@ -34,7 +34,7 @@ fn single_points(bencher: Bencher, kind: LatticeKind) {
     bencher.counter(ItemsCount::new(POINTS)).bench_local(|| {
         let codes = points.iter().filter_map(|p| {
             let w = lattice.quantize(&Vector3::from(p.map(f64::from)))?;
-            CellCode::pack(w)
+            BlockKey::pack(w)
         });
         codes.fold(0, |sum, code| sum ^ black_box(code).raw())
     });

@@ -6,14 +6,9 @@
 pub mod cloud;
 pub mod geodesy;
 pub mod lattice;
-pub mod matching;
-pub mod metrics;
-pub mod options;
 pub mod pose;
 mod prefetch;
 pub mod query;
-pub mod random;
 pub mod raycast;
 pub mod registration;
-pub mod simulate;
 pub mod voxels;

@@ -8,15 +8,16 @@ use lattice_msgs::builtin_interfaces::Time;
 use lattice_msgs::rosgraph_msgs::Clock;
 use serde::Serialize;
 
-use crate::bag::{
+use crate::executables::{answers_help, start_runtime};
+use crate::report;
+use crate::start::{NodeError, warn_unused};
+use lattice_bag::{
     BagHistory, BagQos, BagReader, BagReliability, Player, PlayerOptions, Step, TopicInfo,
 };
-use crate::node::{NodeError, answers_help, start_runtime, warn_unused};
-use crate::report;
-use crate::runtime::params::Params;
-use crate::runtime::qos::{Durability, Qos, Reliability};
-use crate::runtime::ros_args::RosArgs;
-use crate::runtime::{Node, Publisher, RawPublisher, Shutdown};
+use lattice_runtime::params::Params;
+use lattice_runtime::qos::{Durability, Qos, Reliability};
+use lattice_runtime::ros_args::RosArgs;
+use lattice_runtime::{Node, Publisher, RawPublisher, Shutdown};
 
 /// Name of the executable and of the node unless it is remapped.
 pub const NAME: &str = "bag_player";

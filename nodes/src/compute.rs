@@ -9,8 +9,8 @@ use std::thread::{self, JoinHandle};
 
 use crossbeam_channel::{Sender, bounded};
 
-use crate::runtime::Shutdown;
-use crate::runtime::worker::guarded;
+use lattice_runtime::Shutdown;
+use lattice_runtime::guarded;
 
 /// Bounds of a compute thread.
 #[derive(Clone, Copy, Debug)]

@@ -1,23 +1,18 @@
-//! The Lattice ROS 2 nodes: state machines without I/O, and the runtime that moves their messages.
+//! The Lattice ROS 2 nodes: state machines without I/O, and the shells that connect them to topics.
 #![forbid(unsafe_code)]
 
-pub mod bag;
+#[cfg(feature = "bags")]
 pub mod bag_player;
-pub mod bench;
-pub mod cli;
 pub mod compute;
 pub mod convert;
 pub mod enu_transformer;
-pub mod evaluate;
+pub mod executables;
 pub mod files;
 pub mod lattice_mapper;
 pub mod map_follower;
-pub mod node;
-pub mod paper;
-mod plot;
+#[cfg(feature = "bags")]
 pub mod replay;
 pub mod report;
-pub mod runtime;
 pub mod semantic_icp_server;
-pub mod simulate;
+pub mod start;
 pub mod voxel_marker_publisher;

@@ -2,7 +2,7 @@
 
 use std::collections::{BTreeMap, BTreeSet, HashMap};
 
-use lattice_core::lattice::{Key, Lattice};
+use lattice_core::lattice::{Lattice, MortonKey};
 use lattice_core::registration::{LabelDistribution, SemanticCloud, UNLABELED};
 use lattice_msgs::lattice::{LatticeInfo, LatticeMap, LatticeMapUpdate};
 use nalgebra::Vector3;
@@ -59,24 +59,24 @@ pub struct FollowedMap {
     pub stamp_ns: i64,
     /// Unit of mean offsets, in metres.
     pub offset_unit_m: f64,
-    voxels: FxHashMap<Key, VoxelState>,
+    voxels: FxHashMap<MortonKey, VoxelState>,
 }
 
 impl FollowedMap {
     /// Voxels in no order.
-    pub fn voxels(&self) -> &HashMap<Key, VoxelState, FxBuildHasher> {
+    pub fn voxels(&self) -> &HashMap<MortonKey, VoxelState, FxBuildHasher> {
         &self.voxels
     }
 
     /// Centre of a cell in the map frame, in metres.
-    pub fn center_m(&self, key: Key) -> Vector3<f64> {
+    pub fn center_m(&self, key: MortonKey) -> Vector3<f64> {
         self.datum_m + self.lattice.center(key.unpack())
     }
 
     /// The mean point of each voxel with the share of its most frequent label, in the map frame and
     /// in the order of the keys; without labels if the map has none.
     pub fn semantic_cloud(&self) -> SemanticCloud {
-        let mut voxels: Vec<(&Key, &VoxelState)> = self.voxels.iter().collect();
+        let mut voxels: Vec<(&MortonKey, &VoxelState)> = self.voxels.iter().collect();
         voxels.sort_unstable_by_key(|(key, _)| **key);
         let mut cloud = SemanticCloud::default();
         for (key, voxel) in &voxels {
@@ -123,7 +123,7 @@ struct OpenUpdate {
 struct Staging {
     sequence: u64,
     chunks: Chunks,
-    voxels: FxHashMap<Key, VoxelState>,
+    voxels: FxHashMap<MortonKey, VoxelState>,
     later: Vec<LatticeMapUpdate>,
     later_voxels: usize,
 }
@@ -135,7 +135,7 @@ pub struct MapFollower {
     sequence: u64,
     staging: Option<Staging>,
     open_updates: BTreeMap<u64, OpenUpdate>,
-    touched: FxHashSet<Key>,
+    touched: FxHashSet<MortonKey>,
     replaced: bool,
 }
 
@@ -165,7 +165,7 @@ impl MapFollower {
 
     /// Keys whose voxels came, changed or went since the call before, and whether the lattice,
     /// epoch or datum is a new one (then nothing of the old map holds).
-    pub fn take_touched(&mut self) -> (FxHashSet<Key>, bool) {
+    pub fn take_touched(&mut self) -> (FxHashSet<MortonKey>, bool) {
         (
             std::mem::take(&mut self.touched),
             std::mem::take(&mut self.replaced),
@@ -327,7 +327,7 @@ impl MapFollower {
     fn stage(
         &mut self,
         chunk: u32,
-        voxels: Vec<(Key, VoxelState)>,
+        voxels: Vec<(MortonKey, VoxelState)>,
     ) -> Result<Followed, FollowError> {
         let Some(staging) = &mut self.staging else {
             return Ok(Followed::Applied);

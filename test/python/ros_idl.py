@@ -162,7 +162,7 @@ CalibrationResult = ros(
     class_reliability=sequence[ClassReliability],
     method=str,
     duration_s=float64,
-    gazes=uint32,
+    headset_scans=uint32,
     points=uint64,
 )
 ASKS = {"has_guess": bool, "guess": Pose, "session": str}

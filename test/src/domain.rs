@@ -1,7 +1,7 @@
 //! DDS domains for tests: one for each test, whatever else runs on the machine.
 
-use lattice_nodes::replay::LoopbackDomain;
-use lattice_nodes::runtime::env::{DiscoveryRange, Transport};
+use lattice_runtime::LoopbackDomain;
+use lattice_runtime::env::{DiscoveryRange, Transport};
 
 /// A domain that no other test uses while this lives.
 pub struct TestDomain(LoopbackDomain);

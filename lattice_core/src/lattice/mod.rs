@@ -6,15 +6,14 @@
 
 mod basis;
 mod batch;
+mod block_key;
 mod clearance;
 mod closed_form;
-mod code;
 mod generator;
-mod key;
 mod kind;
+mod morton_key;
 mod neighbors;
 mod orientation;
-pub mod paper;
 mod shape;
 mod theory;
 mod voronoi;
@@ -30,10 +29,10 @@ use closed_form::{ClosedForm, Quantizer, with_form};
 use shape::Shape;
 
 pub use batch::{BatchBlock, BatchQuantizer, BatchSums, Simd};
+pub use block_key::BlockKey;
 pub(crate) use closed_form::nearest_integer;
-pub use code::CellCode;
-pub use key::Key;
 pub use kind::LatticeKind;
+pub use morton_key::MortonKey;
 pub use orientation::Orientation;
 pub use voronoi::{CellFace, VoronoiCell};
 

@@ -6,7 +6,7 @@ use super::error::check_distance;
 use super::search::Search;
 use super::shape::BoxHull;
 use super::{ConvexShape, OrientedBox, Query, QueryError, Segment, gjk};
-use crate::lattice::{Key, VoronoiCell};
+use crate::lattice::{MortonKey, VoronoiCell};
 use crate::voxels::VoxelStore;
 
 /// Most convex pieces that a swept path may need.
@@ -18,7 +18,7 @@ pub struct Clearance {
     /// Distance from the shape to the cell, metres; 0 if they touch or overlap.
     pub distance_m: f64,
     /// The cell.
-    pub key: Key,
+    pub key: MortonKey,
 }
 
 impl<S: VoxelStore> Query<'_, S> {
@@ -281,7 +281,7 @@ impl<C: ConvexShape> Search for ClearanceSearch<'_, C> {
         self.best.limit_m + self.covering_radius_m
     }
 
-    fn visit(&mut self, key: Key, center_m: &Vector3<f64>) {
+    fn visit(&mut self, key: MortonKey, center_m: &Vector3<f64>) {
         // In contact with a lower key already: no cell can do better.
         let settled = |best: Clearance| best.distance_m == 0.0 && best.key < key;
         let slack_m = 1e-9 * self.covering_radius_m;

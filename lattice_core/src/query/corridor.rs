@@ -5,7 +5,7 @@ use rustc_hash::FxHashSet;
 use super::clearance::cell_distance_m;
 use super::shells::{add, steps_within};
 use super::{PathError, Segment};
-use crate::lattice::{Key, Lattice, LatticeIndex};
+use crate::lattice::{Lattice, LatticeIndex, MortonKey};
 use crate::voxels::VoxelStore;
 
 /// Most cells that a robot may cover.
@@ -91,6 +91,7 @@ impl Corridor {
 }
 
 fn none_occupied(store: &impl VoxelStore, w: LatticeIndex, around: &[LatticeIndex]) -> bool {
-    let occupied = |by: &LatticeIndex| Key::pack(add(w, *by)).is_some_and(|k| store.contains(k));
+    let occupied =
+        |by: &LatticeIndex| MortonKey::pack(add(w, *by)).is_some_and(|k| store.contains(k));
     !around.iter().any(occupied)
 }

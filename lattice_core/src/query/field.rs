@@ -6,7 +6,7 @@ use rayon::prelude::*;
 use super::error::{check_distance, check_point};
 use super::shells::dual;
 use super::{Query, QueryError};
-use crate::lattice::{Key, Lattice, LatticeIndex};
+use crate::lattice::{Lattice, LatticeIndex, MortonKey};
 use crate::voxels::VoxelStore;
 
 /// Cells that one task works on.
@@ -50,14 +50,14 @@ impl Bounds {
 #[derive(Clone, PartialEq, Debug)]
 pub struct DistanceField {
     /// Cells whose centres are in the box, ascending.
-    pub keys: Vec<Key>,
+    pub keys: Vec<MortonKey>,
     /// For each key, metres; 0 in occupied cells, infinite where the bound cuts.
     pub distance_m: Vec<f64>,
 }
 
 impl DistanceField {
     /// The distance of a cell, metres; `None` for cells out of the box.
-    pub fn at(&self, key: Key) -> Option<f64> {
+    pub fn at(&self, key: MortonKey) -> Option<f64> {
         let index = self.keys.binary_search(&key).ok()?;
         self.distance_m.get(index).copied()
     }
@@ -80,10 +80,10 @@ impl<S: VoxelStore> Query<'_, S> {
         let lattice = self.store.lattice();
         let mut keys = cells_in(lattice, &local, max_cells)?;
         keys.par_sort_unstable();
-        let distances = |cells: &[Key]| {
+        let distances = |cells: &[MortonKey]| {
             // The nearest cell of the last one bounds the distance of the next.
             let mut last: Option<LatticeIndex> = None;
-            let distance = |key: &Key| {
+            let distance = |key: &MortonKey| {
                 let center_m = lattice.center(key.unpack());
                 let known_m = last.map_or(max_m, |w| (lattice.center(w) - center_m).norm());
                 let nearest = self.nearest_to(center_m, 1, known_m.min(max_m));
@@ -100,7 +100,11 @@ impl<S: VoxelStore> Query<'_, S> {
 }
 
 /// The cells whose centres are in a box of the frame of the datum, row by row.
-fn cells_in(lattice: &Lattice, bounds: &Bounds, max_cells: usize) -> Result<Vec<Key>, QueryError> {
+fn cells_in(
+    lattice: &Lattice,
+    bounds: &Bounds,
+    max_cells: usize,
+) -> Result<Vec<MortonKey>, QueryError> {
     let extents = bounds.max_m - bounds.min_m;
     let refuse = |cells: f64| QueryError::TooManyCells { cells, max_cells };
     let cells = extents.product() / lattice.cell_volume_m3();
@@ -131,7 +135,7 @@ fn cells_in(lattice: &Lattice, bounds: &Bounds, max_cells: usize) -> Result<Vec<
             for x in first..=last {
                 let w = [x, y, z];
                 if bounds.contains(&lattice.center(w)) {
-                    keys.extend(Key::pack(w));
+                    keys.extend(MortonKey::pack(w));
                 }
             }
             if keys.len() > max_cells {

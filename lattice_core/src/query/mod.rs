@@ -24,7 +24,7 @@ use std::sync::{Arc, OnceLock};
 
 use nalgebra::Vector3;
 
-use crate::lattice::Key;
+use crate::lattice::MortonKey;
 use crate::voxels::{LabelCount, VoxelList, VoxelStore};
 
 pub use clearance::{Clearance, MAX_PIECES};
@@ -80,7 +80,7 @@ impl<'a, S: VoxelStore> Query<'a, S> {
     }
 
     /// The key of the cell that holds a point (map frame, metres), if it is occupied.
-    pub fn occupied(&self, point_m: &Vector3<f64>) -> Option<Key> {
+    pub fn occupied(&self, point_m: &Vector3<f64>) -> Option<MortonKey> {
         let key = self.store.key_of(point_m)?;
         self.store.contains(key).then_some(key)
     }
@@ -113,7 +113,7 @@ impl<'a, S: VoxelStore> Query<'a, S> {
 impl Query<'_, VoxelList> {
     /// The most frequent label of a cell, the smallest of equals; `None` if the cell has no labels
     /// or the list keeps none.
-    pub fn label(&self, key: Key) -> Option<LabelCount> {
+    pub fn label(&self, key: MortonKey) -> Option<LabelCount> {
         self.store.label(key)
     }
 }

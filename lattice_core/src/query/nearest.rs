@@ -8,14 +8,14 @@ use nalgebra::Vector3;
 use super::error::check_distance;
 use super::search::Search;
 use super::{Query, QueryError};
-use crate::lattice::Key;
+use crate::lattice::MortonKey;
 use crate::voxels::VoxelStore;
 
 /// An occupied cell near a point.
 #[derive(Clone, Copy, PartialEq, Debug)]
 pub struct Neighbor {
     /// The cell.
-    pub key: Key,
+    pub key: MortonKey,
     /// Its centre, map frame, metres.
     pub center_m: Vector3<f64>,
     /// Distance of the centre from the point, metres.
@@ -67,7 +67,7 @@ impl<S: VoxelStore> Query<'_, S> {
 #[derive(Clone, Copy, Debug)]
 pub(super) struct Found {
     pub(super) distance_m: f64,
-    pub(super) key: Key,
+    pub(super) key: MortonKey,
 }
 
 impl Ord for Found {
@@ -113,7 +113,7 @@ impl Search for NearestSearch {
         worst.map_or(self.max_m, |worst| worst.distance_m)
     }
 
-    fn visit(&mut self, key: Key, center_m: &Vector3<f64>) {
+    fn visit(&mut self, key: MortonKey, center_m: &Vector3<f64>) {
         let distance_m = self.distance_m(center_m);
         if distance_m > self.max_m {
             return;

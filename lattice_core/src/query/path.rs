@@ -10,7 +10,7 @@ use thiserror::Error;
 use super::corridor::{Corridor, MAX_ROBOT_CELLS};
 use super::shells::add;
 use super::{Bounds, Query, QueryError, Segment};
-use crate::lattice::Key;
+use crate::lattice::MortonKey;
 use crate::voxels::VoxelStore;
 
 /// Which cells a step may lead to.
@@ -40,7 +40,7 @@ pub struct PathOptions {
 #[derive(Clone, PartialEq, Debug)]
 pub struct Path {
     /// The cells, from that of the start to that of the goal.
-    pub keys: Vec<Key>,
+    pub keys: Vec<MortonKey>,
     /// Their centres, map frame, metres.
     pub centers_m: Vec<Vector3<f64>>,
     /// Length from the first centre to the last, metres.
@@ -109,7 +109,7 @@ impl<S: VoxelStore> Query<'_, S> {
         start_m: &Vector3<f64>,
         goal_m: &Vector3<f64>,
         options: &PathOptions,
-        mut passable: impl FnMut(Key) -> bool,
+        mut passable: impl FnMut(MortonKey) -> bool,
     ) -> Result<Path, PathError> {
         super::error::check_distance(options.radius_m)?;
         if let Some(bounds) = &options.bounds {
@@ -122,8 +122,10 @@ impl<S: VoxelStore> Query<'_, S> {
         };
         let corridor = Corridor::new(lattice, options.radius_m, steps)?;
         let bounds = options.bounds.map(|b| b.moved(&-self.store.datum_m()));
-        let inside = |key: Key| bounds.is_none_or(|b| b.contains(&lattice.center(key.unpack())));
-        let mut is_open = |key: Key| corridor.is_clear(self.store, key.unpack()) && passable(key);
+        let inside =
+            |key: MortonKey| bounds.is_none_or(|b| b.contains(&lattice.center(key.unpack())));
+        let mut is_open =
+            |key: MortonKey| corridor.is_clear(self.store, key.unpack()) && passable(key);
         let mut end_cell = |end: &'static str, point: &Vector3<f64>| {
             let _ = self.local(point)?;
             let point_m = (*point).into();
@@ -141,7 +143,7 @@ impl<S: VoxelStore> Query<'_, S> {
         let goal = end_cell("goal", goal_m)?;
 
         let goal_center_m = lattice.center(goal.unpack());
-        let to_goal_m = |key: Key| (lattice.center(key.unpack()) - goal_center_m).norm();
+        let to_goal_m = |key: MortonKey| (lattice.center(key.unpack()) - goal_center_m).norm();
         let mut cells = FxHashMap::default();
         let mut waiting = BinaryHeap::new();
         cells.insert(goal, Cell::Open);
@@ -168,7 +170,7 @@ impl<S: VoxelStore> Query<'_, S> {
             expanded += 1;
             let w = next.key.unpack();
             for (i, &(by, step_m)) in corridor.steps.iter().enumerate() {
-                let Some(key) = Key::pack(add(w, by)).filter(|&key| inside(key)) else {
+                let Some(key) = MortonKey::pack(add(w, by)).filter(|&key| inside(key)) else {
                     continue;
                 };
                 let cell = cells.entry(key).or_insert_with(|| {
@@ -227,16 +229,16 @@ impl<S: VoxelStore> Query<'_, S> {
 
     fn path_to(
         &self,
-        goal: Key,
+        goal: MortonKey,
         length_m: f64,
-        cells: &FxHashMap<Key, Cell>,
+        cells: &FxHashMap<MortonKey, Cell>,
         expanded: usize,
     ) -> Path {
-        let before = |key: &Key| match cells.get(key) {
+        let before = |key: &MortonKey| match cells.get(key) {
             Some(Cell::Reached(reached)) if reached.from != *key => Some(reached.from),
             _ => None,
         };
-        let mut keys: Vec<Key> = std::iter::successors(Some(goal), before).collect();
+        let mut keys: Vec<MortonKey> = std::iter::successors(Some(goal), before).collect();
         keys.reverse();
         Path {
             centers_m: keys.iter().map(|&key| self.store.center_m(key)).collect(),
@@ -260,21 +262,21 @@ enum Cell {
 /// The shortest way known.
 #[derive(Clone, Copy)]
 struct Reached {
-    from: Key,
+    from: MortonKey,
     length_m: f64,
 }
 
 /// A cell to look around from; the greatest is the next.
 #[derive(Clone, Copy)]
 struct Waiting {
-    key: Key,
+    key: MortonKey,
     length_m: f64,
     to_goal_m: f64,
     total_m: f64,
 }
 
 impl Waiting {
-    fn new(key: Key, length_m: f64, to_goal_m: f64) -> Waiting {
+    fn new(key: MortonKey, length_m: f64, to_goal_m: f64) -> Waiting {
         Waiting {
             key,
             length_m,

@@ -2,7 +2,7 @@
 
 use nalgebra::Vector3;
 
-use crate::lattice::Key;
+use crate::lattice::MortonKey;
 
 /// Looks at occupied cells, nearest first as far as possible. Frame of the datum, metres.
 ///
@@ -19,7 +19,7 @@ pub(super) trait Search {
     fn reach_m(&self) -> f64;
 
     /// An occupied cell.
-    fn visit(&mut self, key: Key, center_m: &Vector3<f64>);
+    fn visit(&mut self, key: MortonKey, center_m: &Vector3<f64>);
 
     /// All cells will be visited again; the reach may stay.
     fn restart(&mut self);

@@ -3,7 +3,7 @@
 use nalgebra::Vector3;
 
 use super::search::{Search, slack_m};
-use crate::lattice::{Key, Lattice, LatticeIndex};
+use crate::lattice::{Lattice, LatticeIndex, MortonKey};
 use crate::voxels::VoxelStore;
 
 /// About how many cells are probed before a search turns to sorted keys.
@@ -57,7 +57,7 @@ impl Shells {
                 return true;
             }
             let w = add(start, step.by);
-            if let Some(key) = Key::pack(w).filter(|&key| store.contains(key)) {
+            if let Some(key) = MortonKey::pack(w).filter(|&key| store.contains(key)) {
                 search.visit(key, &self.lattice.center(w));
             }
         }

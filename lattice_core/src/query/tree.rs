@@ -3,7 +3,7 @@
 use nalgebra::Vector3;
 
 use super::search::{Search, slack_m};
-use crate::lattice::{Key, Lattice};
+use crate::lattice::{Lattice, MortonKey};
 
 /// Runs of at most this many keys are looked at one by one.
 const LEAF: usize = 8;
@@ -12,7 +12,7 @@ const LEAF: usize = 8;
 /// its centres lie in a parallelepiped of 2^l cells a side.
 pub(super) struct Tree {
     lattice: Lattice,
-    keys: Vec<Key>,
+    keys: Vec<MortonKey>,
     /// Half of the longest diagonal of the parallelepiped of the basis.
     half_diagonal_m: f64,
 }
@@ -20,7 +20,7 @@ pub(super) struct Tree {
 /// A run of keys and what they span.
 #[derive(Clone, Copy)]
 struct Node<'a> {
-    keys: &'a [Key],
+    keys: &'a [MortonKey],
     level: u32,
     /// No centre in it is nearer to the query.
     bound_m: f64,
@@ -28,7 +28,7 @@ struct Node<'a> {
 
 impl Tree {
     /// The keys ascend.
-    pub(super) fn new(lattice: Lattice, keys: Vec<Key>) -> Tree {
+    pub(super) fn new(lattice: Lattice, keys: Vec<MortonKey>) -> Tree {
         let g = lattice.generator();
         let diagonal = |y: f64, z: f64| (g * Vector3::new(1.0, y, z)).norm();
         let signs = [(1.0, 1.0), (1.0, -1.0), (-1.0, 1.0), (-1.0, -1.0)];
@@ -60,7 +60,7 @@ impl Tree {
         // The runs of children: keys that agree in the three bits below the node's level.
         for child in &mut children {
             let Some(first) = rest.first() else { break };
-            let code = |key: &Key| key.raw() >> (3 * node.level.saturating_sub(1));
+            let code = |key: &MortonKey| key.raw() >> (3 * node.level.saturating_sub(1));
             let end = rest.partition_point(|key| code(key) == code(first));
             let (run, after) = rest.split_at(end);
             *child = self.node(run, search);
@@ -79,10 +79,10 @@ impl Tree {
     }
 
     /// The smallest node with these keys, `None` without keys or out of reach.
-    fn node<'a>(&self, keys: &'a [Key], search: &impl Search) -> Option<Node<'a>> {
+    fn node<'a>(&self, keys: &'a [MortonKey], search: &impl Search) -> Option<Node<'a>> {
         let (first, last) = (keys.first()?.raw(), keys.last()?.raw());
         let level = (u64::BITS - (first ^ last).leading_zeros()).div_ceil(3);
-        let corner = Key::from_raw(first >> (3 * level) << (3 * level))?;
+        let corner = MortonKey::from_raw(first >> (3 * level) << (3 * level))?;
         let half_side = 0.5 * ((1_u64 << level) - 1) as f64;
         let middle = corner.unpack().map(|w| f64::from(w) + half_side);
         let distance_m = search.distance_m(&(self.lattice.generator() * Vector3::from(middle)));

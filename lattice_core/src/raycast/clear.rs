@@ -9,7 +9,7 @@ use super::packed::{Packed, difference};
 use super::scan::{self, Reach, ScanReport};
 use super::traversal::Traversal;
 use crate::cloud::Cloud;
-use crate::lattice::{Key, Lattice, LatticeIndex};
+use crate::lattice::{Lattice, LatticeIndex, MortonKey};
 use crate::voxels::VoxelStore;
 
 /// When voxels are removed.
@@ -47,7 +47,7 @@ pub struct ClearReport {
     /// Occupied voxels that rays passed through, kept since they touch a cell that the scan hit.
     pub kept: u64,
     /// The voxels that were removed, in ascending order.
-    pub removed: Vec<Key>,
+    pub removed: Vec<MortonKey>,
 }
 
 /// Removes from a store what rays pass through, for scenes in which things move.
@@ -61,7 +61,7 @@ pub struct RayClearer {
     options: ClearOptions,
     touching: Vec<LatticeIndex>,
     masks: ScanMasks,
-    missed: FxHashMap<Key, u32>,
+    missed: FxHashMap<MortonKey, u32>,
 }
 
 impl RayClearer {
@@ -99,7 +99,7 @@ impl RayClearer {
         let (from, base) = (origin_m - datum_m, scan.datum_m - datum_m);
         report.scan = scan::mark(&self.traversal, &mut self.masks, &from, &base, scan, reach);
         self.forget_hits(store);
-        let mut keys: Vec<Key> = Vec::new();
+        let mut keys: Vec<MortonKey> = Vec::new();
         for (block, passed, hit) in self.masks.blocks() {
             for (word, (passed, hit)) in passed.0.iter().zip(&hit.0).enumerate() {
                 each_bit(passed & !hit, |i| {
@@ -128,7 +128,7 @@ impl RayClearer {
     }
 
     /// Counts a miss; true if the voxel is to be removed.
-    fn is_enough(&mut self, key: Key) -> bool {
+    fn is_enough(&mut self, key: MortonKey) -> bool {
         if self.options.misses <= 1 {
             return true;
         }

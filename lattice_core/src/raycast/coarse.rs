@@ -9,7 +9,7 @@ use super::blocks::{Blocks, CELLS, add_evidence, each_bit};
 use super::evidence::{Steps, UNKNOWN};
 use super::masks::{Cursor, Mask, ScanMasks};
 use super::packed::{Packed, difference};
-use crate::lattice::{Key, Lattice, LatticeError, LatticeIndex};
+use crate::lattice::{Lattice, LatticeError, LatticeIndex, MortonKey};
 
 /// Relative to the cell side, how near cells count as overlapping.
 const SLACK: f64 = 1e-9;
@@ -170,12 +170,12 @@ impl Coarse {
     }
 
     /// All free coarse cells in ascending order.
-    pub(super) fn free_keys(&self, steps: &Steps, fine: &Blocks) -> Vec<Key> {
+    pub(super) fn free_keys(&self, steps: &Steps, fine: &Blocks) -> Vec<MortonKey> {
         let occupied = fine.known().filter(|(_, value)| *value >= steps.threshold);
         let blocked: FxHashSet<Packed> = occupied.flat_map(|(w, _)| self.overlapped(w)).collect();
         let known = self.cells.known();
         let free = known.filter(|(w, value)| *value < steps.threshold && !blocked.contains(w));
-        let mut keys: Vec<Key> = free.filter_map(|(w, _)| w.key()).collect();
+        let mut keys: Vec<MortonKey> = free.filter_map(|(w, _)| w.key()).collect();
         keys.sort_unstable();
         keys
     }

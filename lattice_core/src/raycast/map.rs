@@ -13,7 +13,7 @@ use super::packed::Packed;
 use super::scan::{self, Reach, ScanReport};
 use super::traversal::Traversal;
 use crate::cloud::Cloud;
-use crate::lattice::{Key, Lattice};
+use crate::lattice::{Lattice, MortonKey};
 use crate::voxels::DatumError;
 
 /// What is known of a cell.
@@ -137,7 +137,7 @@ impl FreeSpaceMap {
     /// What is known of a cell of the lattice.
     ///
     /// With a free level, a cell that was never hit is free if the coarse cell that it belongs to is.
-    pub fn state(&self, key: Key) -> CellState {
+    pub fn state(&self, key: MortonKey) -> CellState {
         let Some(cell) = Packed::new(key.unpack()) else {
             return CellState::Unknown;
         };
@@ -156,33 +156,33 @@ impl FreeSpaceMap {
     }
 
     /// The log-odds of a cell of the lattice, `None` if it has none.
-    pub fn log_odds(&self, key: Key) -> Option<f64> {
+    pub fn log_odds(&self, key: MortonKey) -> Option<f64> {
         log_odds_of(self.cells.get(Packed::new(key.unpack())?))
     }
 
     /// The probability that a cell of the lattice is occupied, `None` if nothing is known of it.
-    pub fn probability(&self, key: Key) -> Option<f64> {
+    pub fn probability(&self, key: MortonKey) -> Option<f64> {
         let odds = self.log_odds(key)?.exp();
         Some(odds / (1.0 + odds))
     }
 
     /// All occupied cells in ascending order.
-    pub fn occupied_keys(&self) -> Vec<Key> {
+    pub fn occupied_keys(&self) -> Vec<MortonKey> {
         self.sorted(|value| value >= self.steps.threshold)
     }
 
     /// All free cells of [`FreeSpaceMap::free_lattice`] in ascending order.
-    pub fn free_keys(&self) -> Vec<Key> {
+    pub fn free_keys(&self) -> Vec<MortonKey> {
         match &self.coarse {
             None => self.sorted(|value| value < self.steps.threshold),
             Some(coarse) => coarse.free_keys(&self.steps, &self.cells),
         }
     }
 
-    fn sorted(&self, wanted: impl Fn(i8) -> bool) -> Vec<Key> {
+    fn sorted(&self, wanted: impl Fn(i8) -> bool) -> Vec<MortonKey> {
         let known = self.cells.known();
         let wanted = known.filter(|(_, value)| wanted(*value));
-        let mut keys: Vec<Key> = wanted.filter_map(|(cell, _)| cell.key()).collect();
+        let mut keys: Vec<MortonKey> = wanted.filter_map(|(cell, _)| cell.key()).collect();
         keys.sort_unstable();
         keys
     }
@@ -233,8 +233,8 @@ impl FreeSpaceMap {
     }
 
     /// The cell of a point (map frame, metres), `None` if not finite or out of the range of keys.
-    pub fn key_of(&self, point_m: &Vector3<f64>) -> Option<Key> {
-        Key::pack(self.lattice().quantize(&(point_m - self.datum_m))?)
+    pub fn key_of(&self, point_m: &Vector3<f64>) -> Option<MortonKey> {
+        MortonKey::pack(self.lattice().quantize(&(point_m - self.datum_m))?)
     }
 
     /// Memory that the map holds, with what it keeps for the next scan, bytes; at most `max_bytes`.

@@ -2,7 +2,7 @@
 //!
 //! [`Traversal`] follows a segment through the cells of any lattice, exactly. [`FreeSpaceMap`] adds
 //! up scans to occupied, free and unknown cells, [`RayClearer`] removes from a voxel store what rays
-//! pass through. [`mesh`] casts rays on triangle meshes.
+//! pass through.
 
 mod blocks;
 mod clear;
@@ -11,7 +11,6 @@ mod evidence;
 mod families;
 mod map;
 mod masks;
-pub mod mesh;
 mod options;
 mod packed;
 mod scan;

@@ -1,6 +1,6 @@
 //! A lattice index in one word, in a form that steps by one addition and splits into blocks.
 
-use crate::lattice::{Key, LatticeIndex};
+use crate::lattice::{LatticeIndex, MortonKey};
 
 const BITS: u32 = 21;
 const OFFSET: i64 = 1 << (BITS - 1);
@@ -54,8 +54,8 @@ impl Packed {
 
     /// The Morton key of the index.
     #[inline]
-    pub(super) fn key(self) -> Option<Key> {
-        Key::pack(self.unpack())
+    pub(super) fn key(self) -> Option<MortonKey> {
+        MortonKey::pack(self.unpack())
     }
 }
 
@@ -80,7 +80,7 @@ mod tests {
             prop_assert_eq!(packed.unpack(), w);
             let moved = [w[0] + d[0], w[1] + d[1], w[2] + d[2]];
             prop_assert_eq!(packed.plus(difference(d)).unpack(), moved);
-            prop_assert_eq!(packed.key(), Key::pack(w));
+            prop_assert_eq!(packed.key(), MortonKey::pack(w));
             let place = w.map(|i| i.rem_euclid(8) as usize);
             prop_assert_eq!(packed.place(), place[0] + 8 * place[1] + 64 * place[2]);
             prop_assert_eq!(Packed::at(packed.block(), packed.place()), packed);

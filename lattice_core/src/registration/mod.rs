@@ -4,9 +4,10 @@
 mod calibrate;
 mod cloud;
 mod confusion;
+mod downsample;
 mod error;
-mod fit;
 mod labels;
+mod likelihood;
 mod options;
 mod pairs;
 mod plane;
@@ -17,20 +18,20 @@ mod surface;
 mod system;
 #[cfg(test)]
 mod testing;
-mod thin;
 mod tree;
 
 pub use calibrate::{
     Calibration, CalibrationMap, CalibrationOptions, CalibrationRequest, ClassReliability,
-    DirectionKind, Gaze, Progress, Stage, TrackUpdate, Verdict, WeakDirection, calibrate, track,
+    DirectionKind, HeadsetScan, Progress, Stage, TrackUpdate, Verdict, WeakDirection, calibrate,
+    track,
 };
 pub use cloud::SemanticCloud;
 pub use confusion::{Confusion, Lift};
+pub use downsample::voxel_downsample;
 pub use error::RegistrationError;
-pub use fit::{Fit, FitScale, Likelihood, Partners};
 pub use labels::{LabelDistribution, UNLABELED};
+pub use likelihood::{Fit, FitScale, Likelihood, Partners};
 pub use options::{LabelUse, MAX_CANDIDATES, Method, PairWeight, RegisterOptions, SemanticVariant};
 pub use prepared::{MAX_COORDINATE_M, PrepareOptions, PreparedCloud};
 pub use solver::{Registration, register};
-pub use thin::thin;
 pub use tree::{MAX_NEIGHBORS, Neighbors};

@@ -2,7 +2,13 @@
 
 use nalgebra::{Isometry3, Point3, Vector3};
 
-use super::{Gaze, LabelDistribution, SemanticCloud};
+use super::{HeadsetScan, LabelDistribution, SemanticCloud};
+
+/// Distance between two poses, metres, and the angle between them, radians.
+pub fn distance(a: &Isometry3<f64>, b: &Isometry3<f64>) -> (f64, f64) {
+    let apart = (a.translation.vector - b.translation.vector).norm();
+    (apart, a.rotation.angle_to(&b.rotation))
+}
 
 /// Numbers from a seed.
 pub struct Random(u64);
@@ -118,13 +124,13 @@ impl Flat {
     }
 
     /// What a headset sees from a place, in its own frame.
-    pub fn gaze(
+    pub fn headset_scan(
         &self,
         eye: Point3<f64>,
         yaw: f64,
         map_from_headset: &Isometry3<f64>,
         seed: u64,
-    ) -> Gaze {
+    ) -> HeadsetScan {
         let mut random = Random::new(seed);
         let headset_from_map = map_from_headset.inverse();
         let mut cloud = SemanticCloud::default();
@@ -143,7 +149,7 @@ impl Flat {
                 cloud.labels.push(LabelDistribution::hard(label));
             }
         }
-        Gaze {
+        HeadsetScan {
             cloud,
             sensor_m: Some(headset_from_map * eye),
         }

@@ -4,7 +4,7 @@ use super::grow;
 use super::occupancy::Leaf;
 use super::shard::Entry;
 use super::table::{Place, Row, Table};
-use crate::lattice::CellCode;
+use crate::lattice::BlockKey;
 use crate::prefetch::prefetch;
 
 /// Voxels that a block has room for at first.
@@ -168,14 +168,14 @@ impl CellTable {
 
     /// The number of a cell.
     #[inline]
-    pub(super) fn find(&self, code: CellCode) -> Option<u32> {
+    pub(super) fn find(&self, code: BlockKey) -> Option<u32> {
         let block = self.blocks.find(code.block())?;
         self.blocks.rows().get(block as usize)?.find(code.place())
     }
 
     /// Asks for the block of a cell, which will be searched soon.
     #[inline(always)]
-    pub(super) fn prefetch_block(&self, code: CellCode) {
+    pub(super) fn prefetch_block(&self, code: BlockKey) {
         if let Some(block) = self.blocks.likely(code.block()) {
             prefetch::<2, _>(block);
         }
@@ -183,7 +183,7 @@ impl CellTable {
 
     /// The block of a cell, for [`CellTable::find_in`]; asks for the number of its voxel.
     #[inline(always)]
-    pub(super) fn block_of(&self, code: CellCode) -> Option<u32> {
+    pub(super) fn block_of(&self, code: BlockKey) -> Option<u32> {
         let at = self.blocks.find(code.block())?;
         let block = self.blocks.rows().get(at as usize)?;
         let (_, rank) = block.rank(code.place());
@@ -195,7 +195,7 @@ impl CellTable {
 
     /// The number of a cell of a block; asks for its voxel.
     #[inline(always)]
-    pub(super) fn find_in(&self, block: u32, code: CellCode) -> Option<u32> {
+    pub(super) fn find_in(&self, block: u32, code: BlockKey) -> Option<u32> {
         let block = self.blocks.rows().get(block as usize)?;
         let number = block.find(code.place())?;
         if let Some(row) = self.rows.get(number as usize) {
@@ -208,7 +208,7 @@ impl CellTable {
     #[inline(always)]
     pub(super) fn find_or_add(
         &mut self,
-        code: CellCode,
+        code: BlockKey,
         limit: usize,
         row: impl FnOnce() -> Entry,
     ) -> Option<Place> {
@@ -228,7 +228,7 @@ impl CellTable {
     }
 
     #[inline(never)]
-    fn add(&mut self, code: CellCode, limit: usize, row: Entry) -> Option<Place> {
+    fn add(&mut self, code: BlockKey, limit: usize, row: Entry) -> Option<Place> {
         let number = self.rows.len();
         if number >= limit.min(u32::MAX as usize - 1) {
             return None;
@@ -247,7 +247,7 @@ impl CellTable {
     }
 
     /// Removes a voxel; the last voxel takes its number, which is given too.
-    pub(super) fn remove(&mut self, code: CellCode) -> Option<(u32, Entry)> {
+    pub(super) fn remove(&mut self, code: BlockKey) -> Option<(u32, Entry)> {
         let at = self.blocks.find(code.block())?;
         let block = self.blocks.row_mut(at)?;
         let number = block.remove(code.place())?;
@@ -258,7 +258,7 @@ impl CellTable {
         }
         let entry = self.rows.swap_remove(number as usize);
         if let Some(moved) = self.rows.get(number as usize)
-            && let Some(moved) = CellCode::from_raw(moved.code)
+            && let Some(moved) = BlockKey::from_raw(moved.code)
             && let Some(at) = self.blocks.find(moved.block())
             && let Some(block) = self.blocks.row_mut(at)
         {
@@ -278,7 +278,7 @@ impl CellTable {
     pub(super) fn validate(&self) -> Result<(), String> {
         self.blocks.validate()?;
         for (number, row) in self.rows.iter().enumerate() {
-            let found = CellCode::from_raw(row.code).and_then(|code| self.find(code));
+            let found = BlockKey::from_raw(row.code).and_then(|code| self.find(code));
             if found != Some(number as u32) {
                 return Err(format!("cell {:#x} is not found under {number}", row.code));
             }

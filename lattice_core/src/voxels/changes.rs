@@ -2,15 +2,15 @@
 
 use super::VoxelList;
 use super::shard::Life;
-use crate::lattice::{CellCode, Key};
+use crate::lattice::{BlockKey, MortonKey};
 
 /// Keys that differ from an earlier state, sorted.
 #[derive(Clone, PartialEq, Eq, Debug, Default)]
 pub struct Changes {
     /// Voxels that are new or have more points.
-    pub changed: Vec<Key>,
+    pub changed: Vec<MortonKey>,
     /// Voxels of the earlier state that are no longer there.
-    pub removed: Vec<Key>,
+    pub removed: Vec<MortonKey>,
 }
 
 impl VoxelList {
@@ -26,12 +26,12 @@ impl VoxelList {
         let shards = || self.shards.iter();
         let changed = shards().flat_map(|shard| shard.iter());
         let changed = changed.filter(|(_, entry)| entry.life.touched > sequence);
-        let mut changed: Vec<Key> = changed.filter_map(|(code, _)| code.key()).collect();
+        let mut changed: Vec<MortonKey> = changed.filter_map(|(code, _)| code.key()).collect();
         let known = |life: &Life| life.born <= sequence && life.touched > sequence;
         let removed = shards().flat_map(|shard| shard.removed.iter());
-        let mut removed: Vec<Key> = removed
+        let mut removed: Vec<MortonKey> = removed
             .filter(|(_, life)| known(life))
-            .filter_map(|(code, _)| CellCode::from_raw(*code)?.key())
+            .filter_map(|(code, _)| BlockKey::from_raw(*code)?.key())
             .collect();
         changed.sort_unstable();
         removed.sort_unstable();

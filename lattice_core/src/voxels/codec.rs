@@ -5,7 +5,7 @@
 
 use thiserror::Error;
 
-use crate::lattice::Key;
+use crate::lattice::MortonKey;
 
 /// What is wrong with encoded keys; positions are bytes from the start of the keys.
 #[derive(Clone, Copy, PartialEq, Eq, Debug, Error)]
@@ -39,7 +39,7 @@ pub enum CodecError {
 }
 
 /// Encodes keys, which must ascend strictly; others do not decode.
-pub fn encode_keys(sorted: &[Key]) -> Vec<u8> {
+pub fn encode_keys(sorted: &[MortonKey]) -> Vec<u8> {
     let mut bytes = Vec::with_capacity(sorted.len().saturating_mul(2));
     let mut before = 0;
     for key in sorted {
@@ -50,10 +50,10 @@ pub fn encode_keys(sorted: &[Key]) -> Vec<u8> {
 }
 
 /// Decodes at most `max` keys; they ascend strictly. Allocates no more than the input justifies.
-pub fn decode_keys(bytes: &[u8], max: usize) -> Result<Vec<Key>, CodecError> {
+pub fn decode_keys(bytes: &[u8], max: usize) -> Result<Vec<MortonKey>, CodecError> {
     let mut keys = Vec::with_capacity(bytes.len().min(max));
     let mut steps = Varints::new(bytes);
-    let mut before: Option<Key> = None;
+    let mut before: Option<MortonKey> = None;
     loop {
         if let Some(last) = before
             && max - keys.len() >= 8
@@ -80,11 +80,11 @@ pub fn decode_keys(bytes: &[u8], max: usize) -> Result<Vec<Key>, CodecError> {
 
 /// The key `step` after `before`.
 #[inline]
-fn next_key(before: Option<Key>, step: u64) -> Option<Key> {
+fn next_key(before: Option<MortonKey>, step: u64) -> Option<MortonKey> {
     match before {
         Some(_) if step == 0 => None,
-        Some(before) => before.raw().checked_add(step).and_then(Key::from_raw),
-        None => Key::from_raw(step),
+        Some(before) => before.raw().checked_add(step).and_then(MortonKey::from_raw),
+        None => MortonKey::from_raw(step),
     }
 }
 
@@ -150,7 +150,7 @@ impl<'a> Varints<'a> {
 
     /// The eight keys after `last` if each step is a byte, none zero, and stays far below 2^63.
     #[inline]
-    fn next_eight(&mut self, last: Key) -> Option<[Key; 8]> {
+    fn next_eight(&mut self, last: MortonKey) -> Option<[MortonKey; 8]> {
         let rest = self.bytes.get(self.position..)?;
         let (steps, _) = rest.split_first_chunk::<8>()?;
         let packed = u64::from_le_bytes(*steps);
@@ -158,12 +158,12 @@ impl<'a> Varints<'a> {
         if (packed | packed.wrapping_sub(TOP_BITS >> 7)) & TOP_BITS != 0 {
             return None;
         }
-        Key::from_raw(last.raw() + 8 * 0x7f)?;
+        MortonKey::from_raw(last.raw() + 8 * 0x7f)?;
         let mut raw = last.raw();
         self.position += 8;
         Some(steps.map(|step| {
             raw += u64::from(step);
-            Key::from_raw(raw).unwrap_or(last)
+            MortonKey::from_raw(raw).unwrap_or(last)
         }))
     }
 }
@@ -183,8 +183,8 @@ mod tests {
     use super::*;
     use proptest::prelude::*;
 
-    fn key(raw: u64) -> Key {
-        Key::from_raw(raw).unwrap()
+    fn key(raw: u64) -> MortonKey {
+        MortonKey::from_raw(raw).unwrap()
     }
 
     #[test]
@@ -230,7 +230,7 @@ mod tests {
         #[test]
         fn round_trip(mut raws in prop::collection::btree_set(0_u64..1 << 63, 0..100)) {
             raws.insert((1 << 63) - 1);
-            let keys: Vec<Key> = raws.into_iter().map(key).collect();
+            let keys: Vec<MortonKey> = raws.into_iter().map(key).collect();
             prop_assert_eq!(decode_keys(&encode_keys(&keys), keys.len()), Ok(keys));
         }
 

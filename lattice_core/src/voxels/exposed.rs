@@ -3,18 +3,18 @@
 use rayon::prelude::*;
 
 use super::VoxelList;
-use crate::lattice::Key;
+use crate::lattice::MortonKey;
 
 impl VoxelList {
     /// The faces of a cell behind which no cell is occupied, as indices of `VoronoiCell::faces`.
     ///
     /// The cell itself need not be occupied. Beyond the range of keys nothing is occupied.
-    pub fn exposed_faces_of(&self, key: Key) -> impl Iterator<Item = usize> + '_ {
+    pub fn exposed_faces_of(&self, key: MortonKey) -> impl Iterator<Item = usize> + '_ {
         let [x, y, z] = key.unpack();
         let faces = self.lattice.face_neighbors().iter().enumerate();
         faces.filter_map(move |(face, [dx, dy, dz])| {
             // 21-bit indices and small differences: no overflow.
-            let behind = Key::pack([x + dx, y + dy, z + dz]);
+            let behind = MortonKey::pack([x + dx, y + dy, z + dz]);
             let covered = behind.is_some_and(|key| self.contains(key));
             (!covered).then_some(face)
         })
@@ -23,7 +23,7 @@ impl VoxelList {
     /// All exposed faces of occupied cells, in Morton order of the cells and then by face.
     ///
     /// The number is the index of the face in `VoronoiCell::faces`.
-    pub fn exposed_faces(&self) -> Vec<(Key, usize)> {
+    pub fn exposed_faces(&self) -> Vec<(MortonKey, usize)> {
         self.sorted()
             .into_par_iter()
             .flat_map_iter(|(key, _)| self.exposed_faces_of(key).map(move |face| (key, face)))
@@ -56,7 +56,7 @@ mod tests {
             let lattice = Lattice::new(kind, 1.0).unwrap();
             let faces = lattice.face_neighbors();
             let alone: Vec<_> = list(kind, &[[3, -1, 2]]).exposed_faces();
-            let key = Key::pack([3, -1, 2]).unwrap();
+            let key = MortonKey::pack([3, -1, 2]).unwrap();
             let expected: Vec<_> = (0..faces.len()).map(|face| (key, face)).collect();
             assert_eq!(alone, expected, "{kind}");
             for &other in faces {
@@ -72,7 +72,7 @@ mod tests {
             let mut cells = Lattice::new(kind, 1.0).unwrap().face_neighbors().to_vec();
             cells.push([0; 3]);
             let exposed = list(kind, &cells).exposed_faces();
-            let inner = Key::pack([0; 3]).unwrap();
+            let inner = MortonKey::pack([0; 3]).unwrap();
             assert!(exposed.iter().all(|&(key, _)| key != inner), "{kind}");
             assert!(exposed.is_sorted());
         }
@@ -80,7 +80,7 @@ mod tests {
 
     #[test]
     fn the_border_of_the_key_range_is_exposed() {
-        let corner = Key::pack([(1 << 20) - 1; 3]).unwrap();
+        let corner = MortonKey::pack([(1 << 20) - 1; 3]).unwrap();
         let list = list(LatticeKind::Cubic, &[]);
         assert_eq!(list.exposed_faces_of(corner).count(), 6);
     }

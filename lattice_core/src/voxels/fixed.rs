@@ -3,7 +3,7 @@
 use wide::u32x4;
 
 use super::{OFFSET_UNIT_M, Voxel};
-use crate::lattice::{BatchBlock, BatchQuantizer, CellCode, Lattice, nearest_integer};
+use crate::lattice::{BatchBlock, BatchQuantizer, BlockKey, Lattice, nearest_integer};
 
 const PER_METRE: f64 = 1.0 / OFFSET_UNIT_M;
 
@@ -103,13 +103,13 @@ fn low(value: i64) -> u32 {
 
 /// The centre of a cell from the datum, modulo 2^32.
 #[inline]
-fn low_center(lattice: &Lattice, code: CellCode) -> [u32; 3] {
+fn low_center(lattice: &Lattice, code: BlockKey) -> [u32; 3] {
     fixed(lattice.center(code.unpack()).into()).map(low)
 }
 
 /// At most [`most_points`] of a cell as offsets from its centre.
 #[inline]
-pub(super) fn offsets_of(lattice: &Lattice, code: CellCode, points: &Point) -> Offsets {
+pub(super) fn offsets_of(lattice: &Lattice, code: BlockKey, points: &Point) -> Offsets {
     let center = low_center(lattice, code);
     let [x, y, z, count] = points.to_array();
     let offset = |sum: u32, center: u32| {
@@ -126,7 +126,7 @@ pub(super) fn offsets_of(lattice: &Lattice, code: CellCode, points: &Point) -> O
 
 /// The inverse of [`offsets_of`].
 #[inline]
-pub(super) fn points_of(lattice: &Lattice, code: CellCode, offsets: &Offsets) -> Point {
+pub(super) fn points_of(lattice: &Lattice, code: BlockKey, offsets: &Offsets) -> Point {
     let center = low_center(lattice, code);
     let [.., count] = offsets.map(low);
     let sum = |i: usize| low(offsets[i]).wrapping_add(center[i].wrapping_mul(count));
@@ -177,7 +177,7 @@ mod tests {
             sum in prop::array::uniform3(-1.0..=1.0),
         ) {
             let lattice = Lattice::new(LatticeKind::ALL[kind], log_side.exp2().powi(3)).unwrap();
-            let code = CellCode::pack(w).unwrap();
+            let code = BlockKey::pack(w).unwrap();
             let most = i64::from(most_points(&lattice));
             let count = ((most as f64 * share) as i64 + 1).min(most);
             let reach = reach(&lattice) as i64;

@@ -1,7 +1,7 @@
 //! Points gathered by cell before they reach the table.
 
 use super::fixed::Point;
-use crate::lattice::{BatchQuantizer, CellCode};
+use crate::lattice::{BatchQuantizer, BlockKey};
 
 const BLOCK: usize = BatchQuantizer::BLOCK;
 const SLOTS_LOG2: u32 = 13;
@@ -10,12 +10,12 @@ const SLOTS: usize = 1 << SLOTS_LOG2;
 /// Points of one cell.
 #[derive(Clone, Copy, Debug)]
 pub(super) struct Partial {
-    pub(super) code: CellCode,
+    pub(super) code: BlockKey,
     pub(super) points: Point,
 }
 
 const EMPTY: Partial = Partial {
-    code: CellCode::NONE,
+    code: BlockKey::NONE,
     points: Point::ZERO,
 };
 
@@ -45,11 +45,11 @@ impl Gather {
     }
 
     /// Adds the points of a block in order, each as its number's `point`; gives the cells that had to
-    /// make room for others, or have `most_points`. [`CellCode::NONE`] may be among them.
+    /// make room for others, or have `most_points`. [`BlockKey::NONE`] may be among them.
     #[inline(always)]
     pub(super) fn add(
         &mut self,
-        codes: &[CellCode],
+        codes: &[BlockKey],
         point: impl Fn(usize) -> Point,
         most_points: u32,
     ) -> &[Partial] {
@@ -66,7 +66,7 @@ impl Gather {
     #[inline(always)]
     fn add_to_slots<const BRANCH: bool>(
         &mut self,
-        codes: &[CellCode],
+        codes: &[BlockKey],
         point: impl Fn(usize) -> Point,
         most_points: u32,
     ) -> usize {
@@ -107,7 +107,7 @@ impl Gather {
     pub(super) fn drain(&mut self) -> impl Iterator<Item = Partial> {
         let slots = self.slots.iter_mut();
         let partials = slots.map(|slot| std::mem::replace(slot, EMPTY));
-        partials.filter(|partial| partial.code != CellCode::NONE)
+        partials.filter(|partial| partial.code != BlockKey::NONE)
     }
 }
 
@@ -134,11 +134,11 @@ mod tests {
             };
             let mut random = seed;
             for (points, cells) in blocks {
-                let codes: Vec<CellCode> = (0..points)
+                let codes: Vec<BlockKey> = (0..points)
                     .map(|_| {
                         random = random.wrapping_mul(1_664_525).wrapping_add(1_013_904_223);
                         let cell = (random >> 8) % cells;
-                        CellCode::pack([cell as i32, 0, 0]).filter(|_| cell != 7).unwrap_or(CellCode::NONE)
+                        BlockKey::pack([cell as i32, 0, 0]).filter(|_| cell != 7).unwrap_or(BlockKey::NONE)
                     })
                     .collect();
                 let point = |i: usize| Point::new([i as u32, 3, u32::MAX - 5, 1]);
@@ -150,7 +150,7 @@ mod tests {
             gather.drain().for_each(&mut count);
             prop_assert!(gather.drain().next().is_none());
             for totals in [&mut given, &mut got] {
-                totals.remove(&CellCode::NONE);
+                totals.remove(&BlockKey::NONE);
             }
             prop_assert_eq!(given, got);
         }

@@ -12,7 +12,7 @@ use super::fixed::{
 use super::gather::{Gather, Partial};
 use super::shard::{BATCH, SHARDS, Shard, shard_of};
 use crate::cloud::Cloud;
-use crate::lattice::{BatchBlock, BatchQuantizer, BatchSums, CellCode, Lattice};
+use crate::lattice::{BatchBlock, BatchQuantizer, BatchSums, BlockKey, Lattice};
 
 /// Fewer points are not worth gathering.
 const FEW: usize = 1 << 12;
@@ -47,7 +47,7 @@ impl InsertReport {
         &mut self,
         quantizer: &BatchQuantizer,
         points: &[[f32; 3]],
-        codes: &[CellCode],
+        codes: &[BlockKey],
         sums: &BatchSums,
     ) {
         if sums.points < codes.len() as u64 {
@@ -60,10 +60,10 @@ impl InsertReport {
         &mut self,
         quantizer: &BatchQuantizer,
         points: &[[f32; 3]],
-        codes: &[CellCode],
+        codes: &[BlockKey],
     ) {
         for (point, code) in points.iter().zip(codes) {
-            if *code == CellCode::NONE {
+            if *code == BlockKey::NONE {
                 let finite = quantizer.transform(*point).iter().all(|x| x.is_finite());
                 *(if finite {
                     &mut self.out_of_range
@@ -167,7 +167,7 @@ impl VoxelList {
             let mut refused = false;
             for (i, &code) in codes.iter().enumerate() {
                 let shard = self.shards.get_mut(shard_of(code));
-                let Some(shard) = shard.filter(|_| code != CellCode::NONE) else {
+                let Some(shard) = shard.filter(|_| code != BlockKey::NONE) else {
                     continue;
                 };
                 let known = shard.len();
@@ -200,11 +200,11 @@ impl VoxelList {
         &mut self,
         quantizer: &BatchQuantizer,
         offsets_m: &[[f32; 3]],
-        codes: &[CellCode],
+        codes: &[BlockKey],
     ) {
         for (&offset, &code) in offsets_m.iter().zip(codes) {
             let known = |shard: &Shard| shard.get(code).is_some();
-            if code != CellCode::NONE && self.shard(code).is_some_and(known) {
+            if code != BlockKey::NONE && self.shard(code).is_some_and(known) {
                 self.sums.add_batch(&quantizer.sums_of(offset));
             }
         }
@@ -253,7 +253,7 @@ fn for_fixed_blocks(
 /// What a point adds to the further columns.
 fn details(
     lattice: &Lattice,
-    code: CellCode,
+    code: BlockKey,
     point: &Point,
     origin: Origin,
     place: usize,
@@ -308,7 +308,7 @@ impl Chunk {
             };
             let moved = moved.iter().copied();
             moved
-                .filter(|partial| partial.code != CellCode::NONE)
+                .filter(|partial| partial.code != BlockKey::NONE)
                 .for_each(&mut take);
         });
         gather.drain().for_each(take);

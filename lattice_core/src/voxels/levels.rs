@@ -12,7 +12,7 @@ use super::distortion::DistortionSums;
 use super::fixed::{Offsets, fixed, moment_unit_m, voxel_of};
 use super::shard::shard_of;
 use super::{OccupancyList, Voxel, VoxelList, VoxelStore};
-use crate::lattice::{CellCode, Key, Lattice, LatticeError, LatticeIndex};
+use crate::lattice::{BlockKey, Lattice, LatticeError, LatticeIndex, MortonKey};
 
 /// Highest level: cells of 2^20 sides.
 const MAX_LEVEL: u32 = 20;
@@ -105,7 +105,7 @@ impl VoxelList {
         &mut self,
         level: &Level,
         fine: &Lattice,
-        (code, offsets): (CellCode, Offsets),
+        (code, offsets): (BlockKey, Offsets),
         details: impl FnOnce() -> Details,
         now: u32,
     ) {
@@ -118,7 +118,7 @@ impl VoxelList {
         let Some(w) = level.cell_of(center_m + mean_m) else {
             return;
         };
-        let Some(coarse) = CellCode::pack(w) else {
+        let Some(coarse) = BlockKey::pack(w) else {
             return;
         };
         // The finer centre from the coarser one, in whole steps.
@@ -194,7 +194,7 @@ impl OccupancyList {
         let mut list = OccupancyList::at_datum(made.lattice.clone(), made.datum_index, max_bytes);
         for key in self.sorted_keys() {
             let cell = made.cell_of(self.lattice().center(key.unpack()));
-            if let Some(key) = cell.and_then(Key::pack)
+            if let Some(key) = cell.and_then(MortonKey::pack)
                 && !list.add(key)
             {
                 return Err(LevelError::Full { level, max_bytes });

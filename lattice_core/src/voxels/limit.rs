@@ -2,7 +2,7 @@
 
 use super::VoxelList;
 use super::shard::Shard;
-use crate::lattice::CellCode;
+use crate::lattice::BlockKey;
 
 /// What a list does with points in new cells when it has as many voxels as it may.
 #[derive(Clone, Copy, PartialEq, Eq, Debug, Default)]
@@ -68,11 +68,11 @@ impl VoxelList {
         let older = older.iter().filter(|touched| **touched < state).count();
         let mut equal: Vec<u64> = rows()
             .filter(|entry| entry.life.touched == state)
-            .filter_map(|entry| Some(CellCode::from_raw(entry.code)?.key()?.raw()))
+            .filter_map(|entry| Some(BlockKey::from_raw(entry.code)?.key()?.raw()))
             .collect();
         let (_, &mut last_key, _) = equal.select_nth_unstable(last - older);
         let select = |shard: &Shard| {
-            let goes = |code: CellCode, touched: u32| {
+            let goes = |code: BlockKey, touched: u32| {
                 let upto = || code.key().is_some_and(|key| key.raw() <= last_key);
                 touched < state || (touched == state && upto())
             };

@@ -13,7 +13,7 @@ use super::grow;
 use super::shard::{Life, SHARDS, Shard, shard_of};
 use super::{InsertReport, Voxel, VoxelStore, WhenFull};
 use crate::cloud::Cloud;
-use crate::lattice::{CellCode, Key, Lattice, LatticeIndex};
+use crate::lattice::{BlockKey, Lattice, LatticeIndex, MortonKey};
 
 /// The datum is not finite or too many cells from the origin of the map frame.
 #[derive(Clone, Copy, PartialEq, Debug, Error)]
@@ -136,7 +136,7 @@ impl VoxelList {
         (self.taken, self.sequence) = (0, 1);
     }
 
-    pub(super) fn shard(&self, code: CellCode) -> Option<&Shard> {
+    pub(super) fn shard(&self, code: BlockKey) -> Option<&Shard> {
         self.shards.get(shard_of(code))
     }
 
@@ -171,47 +171,47 @@ impl VoxelList {
     }
 
     /// The voxel of a cell, if occupied.
-    pub fn get(&self, key: Key) -> Option<Voxel> {
-        let code = CellCode::from(key);
+    pub fn get(&self, key: MortonKey) -> Option<Voxel> {
+        let code = BlockKey::from(key);
         let shard = self.shard(code)?;
         let (_, entry) = shard.get(code)?;
         Some(shard.voxel(code, entry))
     }
 
     /// True if the cell is occupied.
-    pub fn contains(&self, key: Key) -> bool {
-        let code = CellCode::from(key);
+    pub fn contains(&self, key: MortonKey) -> bool {
+        let code = BlockKey::from(key);
         self.shard(code)
             .is_some_and(|shard| shard.get(code).is_some())
     }
 
-    fn details(&self, key: Key) -> Option<Details> {
-        let code = CellCode::from(key);
+    fn details(&self, key: MortonKey) -> Option<Details> {
+        let code = BlockKey::from(key);
         let shard = self.shard(code)?;
         let (number, _) = shard.get(code)?;
         Some(shard.columns.get(number as usize))
     }
 
     /// Stamps of the first and last point in a cell; none if not kept.
-    pub fn stamps(&self, key: Key) -> Option<Stamps> {
+    pub fn stamps(&self, key: MortonKey) -> Option<Stamps> {
         self.details(key)?.stamps
     }
 
     /// Labels of the points in a cell with their counts, by label; empty if not kept.
-    pub fn labels(&self, key: Key) -> Vec<LabelCount> {
+    pub fn labels(&self, key: MortonKey) -> Vec<LabelCount> {
         self.details(key)
             .map(|details| details.labels)
             .unwrap_or_default()
     }
 
     /// The most frequent label of a cell, the smallest of equals.
-    pub fn label(&self, key: Key) -> Option<LabelCount> {
+    pub fn label(&self, key: MortonKey) -> Option<LabelCount> {
         let labels = self.labels(key).into_iter();
         labels.min_by_key(|counted| (std::cmp::Reverse(counted.count), counted.label))
     }
 
     /// Covariance of the points in a cell, m^2; none if not kept or for fewer than two points.
-    pub fn covariance_m2(&self, key: Key) -> Option<Matrix3<f64>> {
+    pub fn covariance_m2(&self, key: MortonKey) -> Option<Matrix3<f64>> {
         if !self.payload.moments {
             return None;
         }
@@ -225,12 +225,12 @@ impl VoxelList {
     }
 
     /// Centre of a cell, map frame, metres.
-    pub fn center_m(&self, key: Key) -> Vector3<f64> {
+    pub fn center_m(&self, key: MortonKey) -> Vector3<f64> {
         self.datum_m + self.lattice.center(key.unpack())
     }
 
     /// All voxels in Morton order.
-    pub fn sorted(&self) -> Vec<(Key, Voxel)> {
+    pub fn sorted(&self) -> Vec<(MortonKey, Voxel)> {
         let mut voxels: Vec<_> = self
             .shards
             .par_iter()
@@ -242,7 +242,7 @@ impl VoxelList {
     }
 
     /// All voxels in Morton order, with the further columns.
-    pub(super) fn sorted_columns(&self) -> (Vec<Key>, Vec<Voxel>, Columns) {
+    pub(super) fn sorted_columns(&self) -> (Vec<MortonKey>, Vec<Voxel>, Columns) {
         let mut columns = Columns::new(self.payload);
         if self.payload.is_plain() {
             let (keys, voxels) = self.sorted().into_iter().unzip();
@@ -343,13 +343,13 @@ impl VoxelStore for VoxelList {
         VoxelList::len(self)
     }
 
-    fn contains(&self, key: Key) -> bool {
+    fn contains(&self, key: MortonKey) -> bool {
         VoxelList::contains(self, key)
     }
 
-    fn sorted_keys(&self) -> Vec<Key> {
+    fn sorted_keys(&self) -> Vec<MortonKey> {
         let cells = self.shards.iter().flat_map(Shard::iter);
-        let mut keys: Vec<Key> = cells.filter_map(|(code, _)| code.key()).collect();
+        let mut keys: Vec<MortonKey> = cells.filter_map(|(code, _)| code.key()).collect();
         keys.par_sort_unstable();
         keys
     }
@@ -358,9 +358,9 @@ impl VoxelStore for VoxelList {
         VoxelList::insert(self, cloud)
     }
 
-    fn remove(&mut self, key: Key) -> bool {
+    fn remove(&mut self, key: MortonKey) -> bool {
         let now = self.advance();
-        let code = CellCode::from(key);
+        let code = BlockKey::from(key);
         let shard = self.shards.get_mut(shard_of(code));
         let removed = shard.is_some_and(|shard| shard.remove(code, now));
         self.bound_removed();
@@ -370,7 +370,7 @@ impl VoxelStore for VoxelList {
     fn retain_cells(
         &mut self,
         keep_block: &(dyn Fn(LatticeIndex) -> Option<bool> + Sync),
-        keep: &(dyn Fn(Key) -> bool + Sync),
+        keep: &(dyn Fn(MortonKey) -> bool + Sync),
     ) -> usize {
         self.retain_in_blocks(keep_block, keep)
     }

@@ -6,7 +6,7 @@ use super::columns::Columns;
 use super::fixed::offsets_in;
 use super::shard::{SHARDS, shard_of};
 use super::{Voxel, VoxelList, VoxelStore};
-use crate::lattice::{CellCode, Key};
+use crate::lattice::{BlockKey, MortonKey};
 
 /// Why two stores do not go together. The receiving one is as before.
 #[derive(Clone, PartialEq, Debug, Error)]
@@ -88,7 +88,11 @@ impl VoxelList {
 
     /// Adds cells of which none is in the list, with the further columns row by row, until the list
     /// is full. Keys of one block should come together.
-    pub(super) fn fill(&mut self, cells: impl Iterator<Item = (Key, Voxel)>, columns: &Columns) {
+    pub(super) fn fill(
+        &mut self,
+        cells: impl Iterator<Item = (MortonKey, Voxel)>,
+        columns: &Columns,
+    ) {
         let room = self.max_voxels.saturating_sub(self.len());
         let now = self.sequence.max(1);
         self.sequence = now;
@@ -98,7 +102,7 @@ impl VoxelList {
             shard.voxels.reserve(expected + expected / 16);
         }
         for (row, (key, voxel)) in cells.take(room).enumerate() {
-            let code = CellCode::from(key);
+            let code = BlockKey::from(key);
             let Some(shard) = self.shards.get_mut(shard_of(code)) else {
                 continue;
             };

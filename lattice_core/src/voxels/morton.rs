@@ -3,11 +3,11 @@
 use rayon::slice::ParallelSliceMut;
 
 use super::occupancy::{Block, Leaf};
-use crate::lattice::{CellCode, Key};
+use crate::lattice::{BlockKey, MortonKey};
 
 /// The low nine bits of the key of each place in a block.
-static MORTON_OF_PLACE: [u16; CellCode::BLOCK_CELLS] = {
-    let mut table = [0; CellCode::BLOCK_CELLS];
+static MORTON_OF_PLACE: [u16; BlockKey::BLOCK_CELLS] = {
+    let mut table = [0; BlockKey::BLOCK_CELLS];
     let mut place = 0;
     while place < table.len() {
         let (mut bit, mut morton) = (0, 0);
@@ -24,8 +24,8 @@ static MORTON_OF_PLACE: [u16; CellCode::BLOCK_CELLS] = {
 };
 
 /// The inverse: the place in a block of the low nine bits of a key.
-static PLACE_OF_MORTON: [u16; CellCode::BLOCK_CELLS] = {
-    let mut table = [0; CellCode::BLOCK_CELLS];
+static PLACE_OF_MORTON: [u16; BlockKey::BLOCK_CELLS] = {
+    let mut table = [0; BlockKey::BLOCK_CELLS];
     let mut place = 0;
     while place < table.len() {
         table[MORTON_OF_PLACE[place] as usize] = place as u16;
@@ -36,8 +36,8 @@ static PLACE_OF_MORTON: [u16; CellCode::BLOCK_CELLS] = {
 
 /// Sets the bit of a cell of the block, by the low nine bits of its key.
 #[inline(always)]
-pub(super) fn set(leaf: &mut Leaf, key: Key) {
-    let place = usize::from(PLACE_OF_MORTON[key.raw() as usize % CellCode::BLOCK_CELLS]);
+pub(super) fn set(leaf: &mut Leaf, key: MortonKey) {
+    let place = usize::from(PLACE_OF_MORTON[key.raw() as usize % BlockKey::BLOCK_CELLS]);
     leaf[place >> 6 & 7] |= 1 << (place & 63);
 }
 
@@ -55,8 +55,8 @@ pub(super) fn places(leaf: &Leaf) -> impl Iterator<Item = usize> + '_ {
 }
 
 /// All `len` cells of the blocks as ascending keys: blocks are sorted, not cells.
-pub(super) fn sorted_keys(blocks: &[Block], len: usize) -> Vec<Key> {
-    let first_key = |block: u64| CellCode::from_raw(block << 9).and_then(CellCode::key);
+pub(super) fn sorted_keys(blocks: &[Block], len: usize) -> Vec<MortonKey> {
+    let first_key = |block: u64| BlockKey::from_raw(block << 9).and_then(BlockKey::key);
     let mut order: Vec<(u64, &Leaf)> = blocks
         .iter()
         .filter_map(|block| Some((first_key(block.code)?.raw(), &block.leaf)))
@@ -71,7 +71,7 @@ pub(super) fn sorted_keys(blocks: &[Block], len: usize) -> Vec<Key> {
                 *word |= 1 << (morton & 63);
             }
         }
-        keys.extend(places(&turned).filter_map(|low| Key::from_raw(first | low as u64)));
+        keys.extend(places(&turned).filter_map(|low| MortonKey::from_raw(first | low as u64)));
     }
     keys
 }

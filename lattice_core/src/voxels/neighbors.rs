@@ -3,7 +3,7 @@
 use super::OccupancyList;
 use super::morton::places;
 use super::occupancy::Leaf;
-use crate::lattice::{CellCode, LatticeIndex};
+use crate::lattice::{BlockKey, LatticeIndex};
 
 /// Blocks around a block, itself included.
 const AROUND: usize = 27;
@@ -22,7 +22,7 @@ impl Places {
     fn new(stencil: &[LatticeIndex]) -> Places {
         let is_near = |d: &&LatticeIndex| d.iter().all(|i| (-REACH..=REACH).contains(i));
         let near: Vec<_> = stencil.iter().filter(is_near).collect();
-        let targets = (0..CellCode::BLOCK_CELLS as i32).flat_map(|place| {
+        let targets = (0..BlockKey::BLOCK_CELLS as i32).flat_map(|place| {
             near.iter().map(move |d| {
                 let at = [
                     (place >> 6) + d[0],
@@ -31,7 +31,7 @@ impl Places {
                 ];
                 let block = at.iter().fold(0, |sum, i| 3 * sum + (i >> 3) + 1);
                 let place = at.iter().fold(0, |sum, i| 8 * sum + (i & 7));
-                (block * CellCode::BLOCK_CELLS as i32 + place) as u16
+                (block * BlockKey::BLOCK_CELLS as i32 + place) as u16
             })
         });
         Places {
@@ -48,7 +48,7 @@ impl OccupancyList {
     ///
     /// A block and those around it are fetched once for all of their cells, so that a neighbour
     /// costs a bit test, not a search.
-    pub fn count_neighbors(&self, stencil: &[LatticeIndex], mut visit: impl FnMut(CellCode, u32)) {
+    pub fn count_neighbors(&self, stencil: &[LatticeIndex], mut visit: impl FnMut(BlockKey, u32)) {
         let table = Places::new(stencil);
         let mut around = [0_u64; AROUND * 8];
         for block in self.blocks.rows() {
@@ -61,7 +61,7 @@ impl OccupancyList {
                     (word >> (target & 63)) as u32 & 1
                 };
                 let mut count: u32 = targets.unwrap_or_default().iter().map(bit).sum();
-                let Some(code) = CellCode::from_raw(block.code << 9 | place as u64) else {
+                let Some(code) = BlockKey::from_raw(block.code << 9 | place as u64) else {
                     continue;
                 };
                 if !table.far.is_empty() {
@@ -74,13 +74,13 @@ impl OccupancyList {
 
     /// The bits of the blocks around a block; none beyond the range of indices.
     fn fetch_around(&self, block: u64, around: &mut [u64; AROUND * 8]) {
-        let Some(first) = CellCode::from_raw(block << 9) else {
+        let Some(first) = BlockKey::from_raw(block << 9) else {
             return;
         };
         let [x, y, z] = first.unpack();
         for (number, leaf) in around.as_chunks_mut::<8>().0.iter_mut().enumerate() {
             let step = |place: usize| 8 * ((number / place % 3) as i32 - 1);
-            let code = CellCode::pack([x + step(9), y + step(3), z + step(1)]);
+            let code = BlockKey::pack([x + step(9), y + step(3), z + step(1)]);
             *leaf = code.map_or([0; 8], |code| self.leaf(code.block()));
         }
     }
@@ -92,10 +92,10 @@ impl OccupancyList {
     }
 
     #[cold]
-    fn count_far(&self, code: CellCode, far: &[LatticeIndex]) -> u32 {
+    fn count_far(&self, code: BlockKey, far: &[LatticeIndex]) -> u32 {
         let [x, y, z] = code.unpack();
         let neighbor = |d: &LatticeIndex| {
-            CellCode::pack([
+            BlockKey::pack([
                 x.saturating_add(d[0]),
                 y.saturating_add(d[1]),
                 z.saturating_add(d[2]),
@@ -113,7 +113,7 @@ mod tests {
     use proptest::prelude::*;
 
     use super::*;
-    use crate::lattice::{Key, Lattice, LatticeKind};
+    use crate::lattice::{Lattice, LatticeKind, MortonKey};
     use crate::voxels::VoxelStore;
 
     proptest! {
@@ -128,7 +128,7 @@ mod tests {
             let shift = if edge { (1 << 20) - 12 } else { 0 };
             let cells: BTreeSet<LatticeIndex> = cells.iter().map(|w| w.map(|i| i + shift)).collect();
             let lattice = Lattice::new(LatticeKind::ALL[kind], 1.0).unwrap();
-            let keys = cells.iter().map(|w| Key::pack(*w).unwrap());
+            let keys = cells.iter().map(|w| MortonKey::pack(*w).unwrap());
             let list = OccupancyList::from_keys(lattice.clone(), [0; 3], keys, 1 << 20);
             let mut stencil = lattice.touching_neighbors().to_vec();
             stencil.extend(far);

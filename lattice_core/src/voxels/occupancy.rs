@@ -8,7 +8,7 @@ use super::recent::Recent;
 use super::table::{Place, Row, Table};
 use super::{DatumError, InsertReport, VoxelStore, morton};
 use crate::cloud::Cloud;
-use crate::lattice::{CellCode, Key, Lattice, LatticeIndex};
+use crate::lattice::{BlockKey, Lattice, LatticeIndex, MortonKey};
 
 /// Memory for a block, growth of the vectors and of the table included.
 const BLOCK_BYTES: usize = Table::<Block>::ROW_BYTES;
@@ -79,7 +79,7 @@ impl OccupancyList {
     pub fn from_keys(
         lattice: Lattice,
         datum_index: [i64; 3],
-        keys: impl IntoIterator<Item = Key>,
+        keys: impl IntoIterator<Item = MortonKey>,
         max_bytes: usize,
     ) -> OccupancyList {
         let mut list = Self::at_datum(lattice, datum_index, max_bytes);
@@ -98,10 +98,10 @@ impl OccupancyList {
 
     /// Adds the cells of a block, by the bits that their keys share; does nothing if the list is full.
     fn add_block(&mut self, morton: u64, leaf: &Leaf) {
-        let Some(first) = morton.checked_mul(512).and_then(Key::from_raw) else {
+        let Some(first) = morton.checked_mul(512).and_then(MortonKey::from_raw) else {
             return;
         };
-        let code = CellCode::from(first).block();
+        let code = BlockKey::from(first).block();
         let empty = || Block { code, leaf: [0; 8] };
         let place = self.blocks.find_or_add(code, self.max_blocks, empty);
         let Some(Place::Known(number) | Place::New(number)) = place else {
@@ -118,7 +118,7 @@ impl OccupancyList {
 
     /// Most voxels that a list of `max_bytes` can hold, if all their blocks are full.
     pub fn max_voxels_within(max_bytes: usize) -> usize {
-        (max_bytes.saturating_sub(FIRST_BYTES) / BLOCK_BYTES).saturating_mul(CellCode::BLOCK_CELLS)
+        (max_bytes.saturating_sub(FIRST_BYTES) / BLOCK_BYTES).saturating_mul(BlockKey::BLOCK_CELLS)
     }
 
     /// Most bytes that the list takes.
@@ -129,8 +129,8 @@ impl OccupancyList {
     }
 
     /// Makes a cell occupied; false if the list is full.
-    pub fn add(&mut self, key: Key) -> bool {
-        self.set(CellCode::from(key), &mut Last::default())
+    pub fn add(&mut self, key: MortonKey) -> bool {
+        self.set(BlockKey::from(key), &mut Last::default())
     }
 
     /// Removes all voxels; keeps lattice, datum and limit.
@@ -142,7 +142,7 @@ impl OccupancyList {
 
     /// Sets the bit of a cell; false if its block is new and the list is full.
     #[inline(always)]
-    fn set(&mut self, code: CellCode, last: &mut Last) -> bool {
+    fn set(&mut self, code: BlockKey, last: &mut Last) -> bool {
         let block = code.block();
         let number = if block == last.block {
             last.number
@@ -193,7 +193,7 @@ impl OccupancyList {
         self.recent.validate(|code| self.has(code))
     }
 
-    pub(super) fn has(&self, code: CellCode) -> bool {
+    pub(super) fn has(&self, code: BlockKey) -> bool {
         let number = self.blocks.find(code.block());
         let block = number.and_then(|number| self.blocks.rows().get(number as usize));
         block.is_some_and(|block| is_set(&block.leaf, code.place()))
@@ -239,11 +239,11 @@ impl VoxelStore for OccupancyList {
         self.len
     }
 
-    fn contains(&self, key: Key) -> bool {
-        self.has(CellCode::from(key))
+    fn contains(&self, key: MortonKey) -> bool {
+        self.has(BlockKey::from(key))
     }
 
-    fn sorted_keys(&self) -> Vec<Key> {
+    fn sorted_keys(&self) -> Vec<MortonKey> {
         super::morton::sorted_keys(self.blocks.rows(), self.len)
     }
 
@@ -252,8 +252,8 @@ impl VoxelStore for OccupancyList {
         self.insert_cloud(cloud)
     }
 
-    fn remove(&mut self, key: Key) -> bool {
-        let code = CellCode::from(key);
+    fn remove(&mut self, key: MortonKey) -> bool {
+        let code = BlockKey::from(key);
         let Some(number) = self.blocks.find(code.block()) else {
             return false;
         };
@@ -277,7 +277,7 @@ impl VoxelStore for OccupancyList {
     fn retain_cells(
         &mut self,
         keep_block: &(dyn Fn(LatticeIndex) -> Option<bool> + Sync),
-        keep: &(dyn Fn(Key) -> bool + Sync),
+        keep: &(dyn Fn(MortonKey) -> bool + Sync),
     ) -> usize {
         self.retain_in_blocks(keep_block, keep)
     }

@@ -1,6 +1,6 @@
 //! A filter for cells that have just been seen.
 
-use crate::lattice::CellCode;
+use crate::lattice::BlockKey;
 
 const SLOTS_LOG2: u32 = 12;
 const SLOTS: usize = 1 << SLOTS_LOG2;
@@ -10,30 +10,30 @@ const SLOTS: usize = 1 << SLOTS_LOG2;
 /// Neighbouring beams and successive scans see the same cells: nine points in ten end here.
 #[derive(Clone, Default)]
 pub(super) struct Recent {
-    slots: Vec<CellCode>,
+    slots: Vec<BlockKey>,
 }
 
 impl Recent {
-    pub(super) const BYTES: usize = SLOTS * size_of::<CellCode>();
+    pub(super) const BYTES: usize = SLOTS * size_of::<BlockKey>();
 
     pub(super) fn new() -> Recent {
         Recent {
-            slots: vec![CellCode::NONE; SLOTS],
+            slots: vec![BlockKey::NONE; SLOTS],
         }
     }
 
     #[inline(always)]
-    fn slot(code: CellCode) -> usize {
+    fn slot(code: BlockKey) -> usize {
         (code.raw().wrapping_mul(0x9e37_79b9_7f4a_7c15) >> (64 - SLOTS_LOG2)) as usize
     }
 
     /// Copies the codes that were not seen, in order, to the front of `fresh`; gives their number.
-    /// [`CellCode::NONE`] may be among them.
+    /// [`BlockKey::NONE`] may be among them.
     #[inline]
     pub(super) fn sift<const N: usize>(
         &mut self,
-        codes: &[CellCode],
-        fresh: &mut [CellCode; N],
+        codes: &[BlockKey],
+        fresh: &mut [BlockKey; N],
     ) -> usize {
         let mut count = 0;
         let Some(slots) = self.slots.first_chunk_mut::<SLOTS>() else {
@@ -49,24 +49,24 @@ impl Recent {
     }
 
     /// Makes a code unseen.
-    pub(super) fn forget(&mut self, code: CellCode) {
+    pub(super) fn forget(&mut self, code: BlockKey) {
         if let Some(slot) = self
             .slots
             .get_mut(Self::slot(code))
             .filter(|slot| **slot == code)
         {
-            *slot = CellCode::NONE;
+            *slot = BlockKey::NONE;
         }
     }
 
     /// Makes all codes unseen.
     pub(super) fn forget_all(&mut self) {
-        self.slots.fill(CellCode::NONE);
+        self.slots.fill(BlockKey::NONE);
     }
 
     /// Checks that all codes here are in the store.
-    pub(super) fn validate(&self, has: impl Fn(CellCode) -> bool) -> Result<(), String> {
-        let known = |code: &CellCode| *code == CellCode::NONE || has(*code);
+    pub(super) fn validate(&self, has: impl Fn(BlockKey) -> bool) -> Result<(), String> {
+        let known = |code: &BlockKey| *code == BlockKey::NONE || has(*code);
         match self.slots.iter().find(|code| !known(code)) {
             Some(code) => Err(format!(
                 "cell {:?} was seen but is not there",

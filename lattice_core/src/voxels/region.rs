@@ -3,7 +3,7 @@
 use nalgebra::Vector3;
 use thiserror::Error;
 
-use crate::lattice::{Key, Lattice, LatticeIndex};
+use crate::lattice::{Lattice, LatticeIndex, MortonKey};
 
 /// Numbers that do not bound a region.
 #[derive(Clone, PartialEq, Debug, Error)]
@@ -107,7 +107,7 @@ pub(super) struct CellsOf {
 }
 
 impl CellsOf {
-    pub(super) fn is_inside(&self, key: Key) -> bool {
+    pub(super) fn is_inside(&self, key: MortonKey) -> bool {
         let center_m = self.datum_m + self.lattice.center(key.unpack());
         self.region.contains(&center_m)
     }

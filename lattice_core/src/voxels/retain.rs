@@ -5,19 +5,19 @@ use rayon::prelude::*;
 use super::morton::places;
 use super::shard::{Entry, Shard};
 use super::{Voxel, VoxelList};
-use crate::lattice::{CellCode, Key, LatticeIndex};
+use crate::lattice::{BlockKey, LatticeIndex, MortonKey};
 
 /// The lowest index of a block.
 pub(super) fn first_index(block: u64) -> Option<LatticeIndex> {
-    CellCode::from_raw(block << 9).map(CellCode::unpack)
+    BlockKey::from_raw(block << 9).map(BlockKey::unpack)
 }
 
 impl VoxelList {
     /// Removes the voxels that `keep` denies; gives their number. It is called in no order.
     ///
     /// [`VoxelList::distortion`] still counts their points.
-    pub fn retain(&mut self, mut keep: impl FnMut(Key, &Voxel) -> bool) -> usize {
-        let mut goes = |shard: &Shard, code: CellCode, entry: &Entry| {
+    pub fn retain(&mut self, mut keep: impl FnMut(MortonKey, &Voxel) -> bool) -> usize {
+        let mut goes = |shard: &Shard, code: BlockKey, entry: &Entry| {
             let voxel = shard.voxel(code, entry);
             code.key().is_some_and(|key| !keep(key, &voxel))
         };
@@ -48,14 +48,14 @@ impl VoxelList {
     pub(super) fn retain_in_blocks(
         &mut self,
         keep_block: &(dyn Fn(LatticeIndex) -> Option<bool> + Sync),
-        keep: &(dyn Fn(Key) -> bool + Sync),
+        keep: &(dyn Fn(MortonKey) -> bool + Sync),
     ) -> usize {
-        let goes = |code: &CellCode| code.key().is_some_and(|key| !keep(key));
+        let goes = |code: &BlockKey| code.key().is_some_and(|key| !keep(key));
         let select = |shard: &Shard| {
             let mut gone = Vec::new();
             for (block, leaf) in shard.voxels.blocks() {
                 let cells =
-                    places(leaf).filter_map(|place| CellCode::from_raw(block << 9 | place as u64));
+                    places(leaf).filter_map(|place| BlockKey::from_raw(block << 9 | place as u64));
                 match first_index(block).and_then(keep_block) {
                     Some(true) => {}
                     Some(false) => gone.extend(cells),
@@ -69,13 +69,13 @@ impl VoxelList {
     }
 
     /// Removes the voxels of these cells, listed by shard, as one change of state.
-    fn remove_all(&mut self, gone: Vec<Vec<CellCode>>) -> usize {
+    fn remove_all(&mut self, gone: Vec<Vec<BlockKey>>) -> usize {
         let now = self.advance();
         self.remove_at(gone, now)
     }
 
     /// Removes the voxels of these cells, listed by shard, as part of state `now`.
-    pub(super) fn remove_at(&mut self, gone: Vec<Vec<CellCode>>, now: u32) -> usize {
+    pub(super) fn remove_at(&mut self, gone: Vec<Vec<BlockKey>>, now: u32) -> usize {
         let shards = self.shards.par_iter_mut().zip(gone);
         let removed = shards.map(|(shard, gone)| {
             let cells = gone.into_iter();

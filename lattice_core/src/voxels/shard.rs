@@ -9,7 +9,7 @@ use super::fixed::{Offsets, Point, most_points, offsets_of, points_of, voxel_of}
 use super::gather::Partial;
 use super::table::Place;
 use super::wide::WideSums;
-use crate::lattice::{CellCode, Lattice};
+use crate::lattice::{BlockKey, Lattice};
 
 /// Number of parts of a list.
 pub(super) const SHARDS: usize = 16;
@@ -69,7 +69,7 @@ impl Entry {
 
 /// Which shard a cell belongs to: all cells of a block to one.
 #[inline(always)]
-pub(super) fn shard_of(code: CellCode) -> usize {
+pub(super) fn shard_of(code: BlockKey) -> usize {
     (code.block().wrapping_mul(0x9e37_79b9_7f4a_7c15) >> 60) as usize
 }
 
@@ -103,14 +103,14 @@ impl Shard {
 
     /// The voxel of a cell, with its number.
     #[inline]
-    pub(super) fn get(&self, code: CellCode) -> Option<(u32, &Entry)> {
+    pub(super) fn get(&self, code: BlockKey) -> Option<(u32, &Entry)> {
         let number = self.voxels.find(code)?;
         Some((number, self.voxels.rows().get(number as usize)?))
     }
 
     /// The number of a cell, which becomes a voxel if fewer than `limit` are there.
     #[inline(always)]
-    pub(super) fn find_or_add(&mut self, code: CellCode, limit: usize, now: u32) -> Option<u32> {
+    pub(super) fn find_or_add(&mut self, code: BlockKey, limit: usize, now: u32) -> Option<u32> {
         let empty = || Entry {
             code: code.raw(),
             points: Point::ZERO,
@@ -162,7 +162,7 @@ impl Shard {
     pub(super) fn add_offsets(&mut self, number: u32, offsets: &Offsets, now: u32) {
         match self.voxels.row_mut(number) {
             Some(entry) if offsets[3] <= i64::from(self.most_points) => {
-                let code = CellCode::from_raw(entry.code).unwrap_or(CellCode::NONE);
+                let code = BlockKey::from_raw(entry.code).unwrap_or(BlockKey::NONE);
                 self.add(number, &points_of(&self.lattice, code, offsets), now);
             }
             Some(entry) => {
@@ -174,11 +174,11 @@ impl Shard {
     }
 
     #[cold]
-    fn add_wide(&mut self, number: u32, more: impl FnOnce(&Lattice, CellCode) -> Offsets) {
+    fn add_wide(&mut self, number: u32, more: impl FnOnce(&Lattice, BlockKey) -> Offsets) {
         let Some(entry) = self.voxels.row_mut(number) else {
             return;
         };
-        let code = CellCode::from_raw(entry.code).unwrap_or(CellCode::NONE);
+        let code = BlockKey::from_raw(entry.code).unwrap_or(BlockKey::NONE);
         let wide = if entry.count() <= self.most_points {
             self.wide
                 .put(offsets_of(&self.lattice, code, &entry.points))
@@ -192,7 +192,7 @@ impl Shard {
 
     /// Of the points of a voxel.
     #[inline]
-    pub(super) fn offsets(&self, code: CellCode, entry: &Entry) -> Offsets {
+    pub(super) fn offsets(&self, code: BlockKey, entry: &Entry) -> Offsets {
         if entry.count() <= self.most_points {
             offsets_of(&self.lattice, code, &entry.points)
         } else {
@@ -202,7 +202,7 @@ impl Shard {
 
     /// A voxel as others see it.
     #[inline]
-    pub(super) fn voxel(&self, code: CellCode, entry: &Entry) -> Voxel {
+    pub(super) fn voxel(&self, code: BlockKey, entry: &Entry) -> Voxel {
         voxel_of(self.offsets(code, entry))
     }
 
@@ -250,7 +250,7 @@ impl Shard {
     }
 
     /// Removes a voxel; false if it was not there.
-    pub(super) fn remove(&mut self, code: CellCode, now: u32) -> bool {
+    pub(super) fn remove(&mut self, code: BlockKey, now: u32) -> bool {
         let Some((number, entry)) = self.voxels.remove(code) else {
             return false;
         };
@@ -273,9 +273,9 @@ impl Shard {
     }
 
     /// Every voxel with its cell.
-    pub(super) fn iter(&self) -> impl Iterator<Item = (CellCode, &Entry)> {
+    pub(super) fn iter(&self) -> impl Iterator<Item = (BlockKey, &Entry)> {
         let rows = self.voxels.rows().iter();
-        rows.filter_map(|entry| Some((CellCode::from_raw(entry.code)?, entry)))
+        rows.filter_map(|entry| Some((BlockKey::from_raw(entry.code)?, entry)))
     }
 
     pub(super) fn validate(&self) -> Result<(), String> {

@@ -4,7 +4,7 @@ use nalgebra::Vector3;
 
 use super::{InsertReport, MergeError, Region};
 use crate::cloud::Cloud;
-use crate::lattice::{Key, Lattice, LatticeIndex};
+use crate::lattice::{Lattice, LatticeIndex, MortonKey};
 
 /// Occupied voxels of a lattice whose indices count from a datum in the map frame.
 ///
@@ -24,16 +24,16 @@ pub trait VoxelStore: Sync {
     fn len(&self) -> usize;
 
     /// True if the cell is occupied.
-    fn contains(&self, key: Key) -> bool;
+    fn contains(&self, key: MortonKey) -> bool;
 
     /// All occupied cells in ascending (Morton) order.
-    fn sorted_keys(&self) -> Vec<Key>;
+    fn sorted_keys(&self) -> Vec<MortonKey>;
 
     /// Adds every finite point in range to its cell.
     fn insert(&mut self, cloud: &Cloud) -> InsertReport;
 
     /// Removes a voxel; false if the cell was not occupied.
-    fn remove(&mut self, key: Key) -> bool;
+    fn remove(&mut self, key: MortonKey) -> bool;
 
     /// Removes the cells that `keep` denies; gives their number.
     ///
@@ -43,7 +43,7 @@ pub trait VoxelStore: Sync {
     fn retain_cells(
         &mut self,
         keep_block: &(dyn Fn(LatticeIndex) -> Option<bool> + Sync),
-        keep: &(dyn Fn(Key) -> bool + Sync),
+        keep: &(dyn Fn(MortonKey) -> bool + Sync),
     ) -> usize;
 
     /// Memory that the store holds, bytes.
@@ -55,14 +55,14 @@ pub trait VoxelStore: Sync {
     }
 
     /// Centre of a cell, map frame, metres.
-    fn center_m(&self, key: Key) -> Vector3<f64> {
+    fn center_m(&self, key: MortonKey) -> Vector3<f64> {
         self.datum_m() + self.lattice().center(key.unpack())
     }
 
     /// The cell of a point (map frame, metres), `None` if not finite or out of the range of keys.
-    fn key_of(&self, point_m: &Vector3<f64>) -> Option<Key> {
+    fn key_of(&self, point_m: &Vector3<f64>) -> Option<MortonKey> {
         let w = self.lattice().quantize(&(point_m - self.datum_m()))?;
-        Key::pack(w)
+        MortonKey::pack(w)
     }
 
     /// Fails unless a key means the same cell in both stores.

@@ -5,7 +5,7 @@ use nalgebra::Vector3;
 use super::file::{read_map, write_map};
 use super::*;
 use crate::cloud::Cloud;
-use crate::lattice::{Key, Lattice, LatticeKind};
+use crate::lattice::{Lattice, LatticeKind, MortonKey};
 
 fn list(kind: LatticeKind, datum: [f64; 3], max_voxels: usize) -> VoxelList {
     VoxelList::new(Lattice::new(kind, 0.125).unwrap(), datum.into(), max_voxels).unwrap()
@@ -19,8 +19,8 @@ fn cloud(datum: [f64; 3], offsets_m: &[[f32; 3]]) -> Cloud {
     }
 }
 
-fn key(w: [i32; 3]) -> Key {
-    Key::pack(w).unwrap()
+fn key(w: [i32; 3]) -> MortonKey {
+    MortonKey::pack(w).unwrap()
 }
 
 fn bytes(list: &VoxelList) -> Vec<u8> {
@@ -265,8 +265,8 @@ fn points_fill_a_list_alike_in_one_cloud_or_in_many() {
 }
 
 /// The voxels of points, summed in 64 bits, from the definition.
-fn voxels_of(map: &VoxelList, offsets_m: &[[f32; 3]]) -> Vec<(Key, Voxel)> {
-    let mut voxels = std::collections::BTreeMap::<Key, Voxel>::new();
+fn voxels_of(map: &VoxelList, offsets_m: &[[f32; 3]]) -> Vec<(MortonKey, Voxel)> {
+    let mut voxels = std::collections::BTreeMap::<MortonKey, Voxel>::new();
     let fixed = |metres: f64| (metres / OFFSET_UNIT_M).round_ties_even() as i64;
     for offset in offsets_m {
         let point = offset.map(f64::from);

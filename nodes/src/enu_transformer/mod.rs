@@ -6,10 +6,12 @@ mod counts;
 pub mod ins;
 pub mod node;
 mod options;
+mod report;
 mod waiting;
 
 pub use counts::TransformerCounts;
 pub use options::TransformerOptions;
+pub use report::TransformerReport;
 
 use std::sync::Arc;
 

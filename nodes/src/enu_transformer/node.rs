@@ -13,14 +13,14 @@ use lattice_msgs::sensor_msgs::{Imu, NavSatFix, PointCloud2};
 use lattice_msgs::tf2_msgs::TFMessage;
 
 use super::ins::{InsMessage, InsSource};
-use super::{EnuOutput, EnuTransformer, TransformerOptions};
+use super::{EnuOutput, EnuTransformer, TransformerOptions, TransformerReport};
 use crate::compute::{Compute, ComputeLimits, Inbox};
 use crate::convert::cloud;
-use crate::node::{Finish, NodeError, warn_unused};
-use crate::report::{self, TransformerReport};
-use crate::runtime::logging::Throttle;
-use crate::runtime::qos::Qos;
-use crate::runtime::{
+use crate::report;
+use crate::start::{Finish, NodeError, warn_unused};
+use lattice_runtime::logging::Throttle;
+use lattice_runtime::qos::Qos;
+use lattice_runtime::{
     Clock, Diagnostics, Level, Load, Node, Publisher, Runtime, StaticTfBroadcaster, Subscription,
     TfBroadcaster,
 };
@@ -43,9 +43,6 @@ enum Event {
     },
 }
 
-/// Clouds in and out. Line scanners send hundreds of small ones a second, in bursts when they waited
-/// for a pose.
-pub const SCANS: Qos = Qos::best_effort(20);
 /// Starts the node.
 pub fn start(runtime: &Runtime, name: &str) -> Result<Finish, NodeError> {
     let node = runtime.node(name)?;
@@ -81,7 +78,7 @@ pub fn start(runtime: &Runtime, name: &str) -> Result<Finish, NodeError> {
                 lost.fetch_add(1, Ordering::Relaxed);
             }
         };
-        clouds.push(node.subscribe(&topic, SCANS, Load::Large, hand_over)?);
+        clouds.push(node.subscribe(&topic, Qos::SCANS, Load::Large, hand_over)?);
     }
     let transforms = |m| Event::Transforms(m, false);
     inputs.push(subscribe(&node, "/tf", Qos::TF, &inbox, transforms)?);
@@ -157,7 +154,7 @@ struct Outputs {
 impl Outputs {
     fn open(node: &Node) -> Result<Self, NodeError> {
         Ok(Self {
-            points: node.publisher("points_enu", SCANS)?,
+            points: node.publisher("points_enu", Qos::SCANS)?,
             tf: TfBroadcaster::new(node)?,
             tf_static: StaticTfBroadcaster::new(node)?,
             origin: node.publisher("map_origin", Qos::LATCHED)?,

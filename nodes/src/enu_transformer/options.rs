@@ -6,7 +6,7 @@ use nalgebra::Vector3;
 
 use super::ins::{HeightDatum, InsOptions, InsSource, InsStamp};
 use crate::convert::cloud::Precision;
-use crate::runtime::params::{ParamError, Params};
+use lattice_runtime::params::{ParamError, Params};
 
 /// Everything that an [`super::EnuTransformer`] can be told.
 #[derive(Clone, Debug)]

@@ -6,11 +6,13 @@ mod calls;
 mod counts;
 pub mod node;
 mod options;
+mod report;
 mod services;
 
 pub use calls::LoadRefusal;
 pub use counts::MapperCounts;
 pub use options::MapperOptions;
+pub use report::MapperReport;
 
 use lattice_core::cloud::CloudLimits;
 use lattice_core::query::Shells;

@@ -12,15 +12,14 @@ use lattice_msgs::sensor_msgs::PointCloud2;
 use lattice_msgs::std_msgs::Empty;
 
 use super::services::{self, Call};
-use super::{LatticeMapper, MapperOptions};
+use super::{LatticeMapper, MapperOptions, MapperReport};
 use crate::compute::{Compute, ComputeLimits, Inbox};
 use crate::convert::cloud;
-use crate::enu_transformer::node::SCANS;
-use crate::node::{Finish, NodeError, warn_unused};
-use crate::report::{self, MapperReport};
-use crate::runtime::logging::Throttle;
-use crate::runtime::qos::Qos;
-use crate::runtime::{Diagnostics, Level, Load, Node, Publisher, Runtime};
+use crate::report;
+use crate::start::{Finish, NodeError, warn_unused};
+use lattice_runtime::logging::Throttle;
+use lattice_runtime::qos::Qos;
+use lattice_runtime::{Diagnostics, Level, Load, Node, Publisher, Runtime};
 
 /// Chunks of a keyframe published in one update period: 3 MB.
 const CHUNKS_PER_ROUND: usize = 50;
@@ -79,7 +78,7 @@ pub fn start(runtime: &Runtime, name: &str) -> Result<Finish, NodeError> {
             lost.fetch_add(1, Ordering::Relaxed);
         }
     };
-    let points = node.subscribe("points_enu", SCANS, Load::Large, hand_over)?;
+    let points = node.subscribe("points_enu", Qos::SCANS, Load::Large, hand_over)?;
     let origins = Arc::clone(&wishes);
     let take = move |origin| *lock(&origins.origin) = Some(origin);
     let origins = node.subscribe("map_origin", Qos::LATCHED, Load::Small, take)?;

@@ -5,7 +5,7 @@ use lattice_core::voxels::{Payload, VoxelList, WhenFull};
 use nalgebra::Vector3;
 
 use crate::convert::semantic::LabelOptions;
-use crate::runtime::params::{ParamError, Params};
+use lattice_runtime::params::{ParamError, Params};
 
 /// Everything that a [`super::LatticeMapper`] can be told.
 #[derive(Clone, Debug)]

@@ -14,8 +14,8 @@ use thiserror::Error;
 
 use super::LatticeMapper;
 use crate::compute::Inbox;
-use crate::node::NodeError;
-use crate::runtime::{Node, Reply, Server};
+use crate::start::NodeError;
+use lattice_runtime::{Node, Reply, Server};
 
 /// Level that costs little time.
 const ZSTD_LEVEL: i32 = 3;

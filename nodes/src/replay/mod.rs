@@ -2,12 +2,10 @@
 //!
 //! Messages pass in the order of the log, so the map depends on nothing else.
 
-mod domain;
-mod node_process;
-pub mod processes;
+mod report;
 mod topics;
 
-pub use domain::LoopbackDomain;
+pub use report::{LatticeReport, RunReport};
 pub use topics::{Role, TopicError, TopicPlan, TopicWishes, plan};
 
 use std::sync::Arc;
@@ -24,12 +22,11 @@ use lattice_msgs::sensor_msgs::{Imu, NavSatFix, PointCloud2};
 use lattice_msgs::tf2_msgs::TFMessage;
 use serde::de::DeserializeOwned;
 
-use crate::bag::{BagMessage, BagReader, ReadOptions};
 use crate::enu_transformer::ins::InsMessage;
-use crate::enu_transformer::{EnuOutput, EnuTransformer, TransformerOptions};
-use crate::lattice_mapper::{LatticeMapper, MapperOptions};
-use crate::report::{LatticeReport, MapperReport, MarkerReport, RunReport, TransformerReport};
-use crate::voxel_marker_publisher::{MarkerOptions, VoxelMarkers};
+use crate::enu_transformer::{EnuOutput, EnuTransformer, TransformerOptions, TransformerReport};
+use crate::lattice_mapper::{LatticeMapper, MapperOptions, MapperReport};
+use crate::voxel_marker_publisher::{MarkerOptions, MarkerReport, VoxelMarkers};
+use lattice_bag::{BagMessage, BagReader, ReadOptions};
 
 /// Epoch of maps that come from a replay: the same log gives the same bytes.
 const EPOCH: u64 = 1;
@@ -178,30 +175,19 @@ impl Branch {
                 log::warn!("{error}");
             }
         }
-        self.report.published_bytes += bytes_of(&mut self.markers) as u64;
+        self.report.published_bytes += self.markers.take_bytes() as u64;
     }
 
     fn finish(&mut self) -> LatticeReport {
         self.report.counts = self.markers.counts().clone();
         self.report.voxels = self.markers.voxels();
         self.markers.redraw();
-        self.report.marker_bytes = bytes_of(&mut self.markers);
+        self.report.marker_bytes = self.markers.take_bytes();
         LatticeReport {
             map: MapperReport::of(&mut self.mapper),
             markers: self.report.clone(),
         }
     }
-}
-
-/// Bytes as CDR of all arrays that are due.
-pub fn bytes_of(markers: &mut VoxelMarkers) -> usize {
-    let mut bytes = 0;
-    while markers.is_dirty() {
-        for array in markers.take_arrays(1 << 20) {
-            bytes += cdr::to_vec(&array).map_or(0, |cdr| cdr.len());
-        }
-    }
-    bytes
 }
 
 fn decode<T: DeserializeOwned>(data: &[u8]) -> Result<T, CdrError> {

@@ -7,8 +7,8 @@ use lattice_msgs::cdr;
 use lattice_msgs::sensor_msgs::PointCloud2;
 use thiserror::Error;
 
-use crate::bag::{BagError, BagReader, ReadOptions};
 use crate::enu_transformer::ins::InsSource;
+use lattice_bag::{BagError, BagReader, ReadOptions};
 
 /// Why a log cannot be replayed.
 #[derive(Debug, Error)]

@@ -21,8 +21,8 @@ impl SemanticIcpServer {
     pub fn on_headset_cloud(&mut self, message: &PointCloud2, now_ns: i64) -> Vec<Output> {
         let mut out = Vec::new();
         self.counts.clouds_in += 1;
-        let gaze = match self.read(message) {
-            Ok(gaze) => Arc::new(gaze),
+        let headset_scan = match self.read(message) {
+            Ok(headset_scan) => Arc::new(headset_scan),
             Err(refusal) => {
                 self.count(&refusal);
                 let reason = refusal.to_string();
@@ -35,15 +35,15 @@ impl SemanticIcpServer {
         let stamp_ns = message.header.stamp.to_ns();
         if !self.has_map() {
             self.counts.clouds_no_map += 1;
-            self.gazes.push(gaze, stamp_ns, now_ns);
+            self.headset_scans.push(headset_scan, stamp_ns, now_ns);
             let result = self.result(CalibrationResult::REJECTED_INPUT, NO_MAP);
             self.tell(result, now_ns, &mut out);
             return out;
         }
         if self.known.is_some() && self.options.track {
-            self.look = Some((gaze, stamp_ns));
+            self.look = Some((headset_scan, stamp_ns));
         } else {
-            self.gazes.push(gaze, stamp_ns, now_ns);
+            self.headset_scans.push(headset_scan, stamp_ns, now_ns);
             self.fresh_cloud = true;
         }
         self.go_on(now_ns, &mut out);
@@ -52,7 +52,7 @@ impl SemanticIcpServer {
         out
     }
 
-    fn read(&mut self, message: &PointCloud2) -> Result<Gaze, Refusal> {
+    fn read(&mut self, message: &PointCloud2) -> Result<HeadsetScan, Refusal> {
         let found = message.header.frame_id.trim_start_matches('/');
         if found != self.options.headset_frame {
             return Err(Refusal::Frame {
@@ -63,7 +63,7 @@ impl SemanticIcpServer {
         let (cloud, report) = semantic_from_message(message, &self.options.semantic)?;
         self.counts.points_not_finite += report.not_finite as u64;
         self.counts.points_too_far += report.too_far as u64;
-        Ok(Gaze {
+        Ok(HeadsetScan {
             cloud,
             sensor_m: None,
         })

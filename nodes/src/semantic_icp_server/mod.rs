@@ -4,7 +4,7 @@
 //! a [`Job`] for another thread. [`node`] runs both behind DDS.
 
 mod counts;
-mod gazes;
+mod headset_scans;
 mod intake;
 pub mod node;
 mod options;
@@ -21,7 +21,7 @@ use std::collections::BTreeMap;
 use std::sync::Arc;
 use std::sync::atomic::{AtomicBool, Ordering::Relaxed};
 
-use lattice_core::registration::{Calibration, Gaze, Stage, TrackUpdate, Verdict};
+use lattice_core::registration::{Calibration, HeadsetScan, Stage, TrackUpdate, Verdict};
 use lattice_msgs::calibration::{
     CalibrateFeedback, CalibrateGoal, CalibrateResult, CalibrationResult,
 };
@@ -31,7 +31,7 @@ use lattice_msgs::std_msgs::String as StringMessage;
 use lattice_msgs::vision_msgs::LabelInfo;
 use nalgebra::Isometry3;
 
-use self::gazes::Gazes;
+use self::headset_scans::HeadsetScans;
 use self::state::{Caller, Known, Running, Wanted};
 use crate::convert::calibration::{result_from, set_pose};
 use crate::convert::geometry;
@@ -73,7 +73,7 @@ pub struct SemanticIcpServer {
     options: ServerOptions,
     follower: MapFollower,
     session: String,
-    gazes: Gazes,
+    headset_scans: HeadsetScans,
     /// Class names of the headset.
     names: BTreeMap<u16, String>,
     known: Option<Known>,
@@ -86,7 +86,7 @@ pub struct SemanticIcpServer {
     /// A cloud came that no search has used.
     fresh_cloud: bool,
     /// The newest cloud that the known pose is still to be refined by, and its stamp.
-    look: Option<(Arc<Gaze>, i64)>,
+    look: Option<(Arc<HeadsetScan>, i64)>,
     next_job: u64,
     /// State of the map that the searcher has: epoch, sequence, and when.
     prepared: Option<(u64, u64, i64)>,
@@ -101,7 +101,10 @@ impl SemanticIcpServer {
         Self {
             follower: MapFollower::new(options.max_map_voxels),
             session: String::new(),
-            gazes: Gazes::new(options.max_gazes, options.gaze_period_ns),
+            headset_scans: HeadsetScans::new(
+                options.max_headset_scans,
+                options.headset_scan_period_ns,
+            ),
             names: BTreeMap::new(),
             known: None,
             misses: 0,
@@ -165,7 +168,7 @@ impl SemanticIcpServer {
         if session != self.session {
             self.counts.sessions += 1;
             self.session = session;
-            self.gazes.clear();
+            self.headset_scans.clear();
             self.forget("the headset has begun a new session", now_ns, &mut out);
         }
         out
@@ -242,7 +245,7 @@ impl SemanticIcpServer {
         if !self.has_map() {
             return Err(NO_MAP.into());
         }
-        if self.gazes.is_empty() {
+        if self.headset_scans.is_empty() {
             return Err("there is no cloud of the headset yet".into());
         }
         if !goal.has_guess {

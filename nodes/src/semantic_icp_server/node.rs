@@ -18,11 +18,11 @@ use super::worker::{Worker, WorkerPort};
 use super::{CallId, End, LatticeSearch, Output, SemanticIcpServer, ServerOptions};
 use crate::compute::{Compute, ComputeLimits, Inbox};
 use crate::convert::cloud;
-use crate::node::{Finish, NodeError, warn_unused};
 use crate::report;
-use crate::runtime::logging::Throttle;
-use crate::runtime::qos::Qos;
-use crate::runtime::{
+use crate::start::{Finish, NodeError, warn_unused};
+use lattice_runtime::logging::Throttle;
+use lattice_runtime::qos::Qos;
+use lattice_runtime::{
     ActionLimits, Clock, Diagnostics, Feedback, GoalHandle, Level, Load, Publisher, Reply, Runtime,
     TfBroadcaster,
 };

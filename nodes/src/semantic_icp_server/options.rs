@@ -3,7 +3,7 @@
 use lattice_core::registration::CalibrationOptions;
 
 use crate::convert::semantic::SemanticOptions;
-use crate::runtime::params::{ParamError, Params};
+use lattice_runtime::params::{ParamError, Params};
 
 /// When a whole search begins by itself.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
@@ -41,9 +41,9 @@ pub struct ServerOptions {
     /// What becomes of a request while another one is at work.
     pub when_busy: WhenBusy,
     /// Clouds of one session that are searched with together, at most.
-    pub max_gazes: usize,
+    pub max_headset_scans: usize,
     /// A cloud replaces the one before unless it is later by this, ns.
-    pub gaze_period_ns: i64,
+    pub headset_scan_period_ns: i64,
     /// Whether the pose is refined by each cloud once it is known.
     pub track: bool,
     /// Searches that must fail in a row before a pose that is tracked is given up.
@@ -65,8 +65,8 @@ impl Default for ServerOptions {
             max_map_voxels: 5_000_000,
             search: SearchWhen::Lost,
             when_busy: WhenBusy::Reject,
-            max_gazes: 3,
-            gaze_period_ns: 1_000_000_000,
+            max_headset_scans: 3,
+            headset_scan_period_ns: 1_000_000_000,
             track: true,
             lost_after: 3,
             doubt_below: 0.7,
@@ -107,8 +107,13 @@ impl ServerOptions {
                     ("supersede", WhenBusy::Supersede),
                 ],
             )?,
-            max_gazes: at_least_one(params, "max_gazes", defaults.max_gazes)?,
-            gaze_period_ns: (number(params, "gaze_period_s", 1.0, 0.0..=1e6)? * 1e9) as i64,
+            max_headset_scans: at_least_one(
+                params,
+                "max_headset_scans",
+                defaults.max_headset_scans,
+            )?,
+            headset_scan_period_ns: (number(params, "headset_scan_period_s", 1.0, 0.0..=1e6)? * 1e9)
+                as i64,
             track: params.bool("track", defaults.track)?,
             lost_after: u32::try_from(lost_after.max(1)).unwrap_or(u32::MAX),
             doubt_below: number(params, "doubt_below", defaults.doubt_below, 0.0..=1.0)?,

@@ -28,8 +28,12 @@ impl SemanticIcpServer {
         let mut result = result_from(found);
         self.describe(&mut result, running.stamp_ns);
         result.duration_s = now_ns.saturating_sub(running.begun_ns) as f64 * 1e-9;
-        result.gazes = running.gazes.len() as u32;
-        result.points = running.gazes.iter().map(|g| g.cloud.len() as u64).sum();
+        result.gazes = running.headset_scans.len() as u32;
+        result.points = running
+            .headset_scans
+            .iter()
+            .map(|g| g.cloud.len() as u64)
+            .sum();
         let counts = &mut self.counts;
         *match found.verdict {
             Verdict::Ok => &mut counts.searches_ok,
@@ -56,11 +60,12 @@ impl SemanticIcpServer {
                 let before = self.known.as_ref().map(|known| known.map_from_headset);
                 if before.is_some_and(|before| !is_near(&before, &found.map_from_headset, MOVED)) {
                     // The headset has another origin than for the looks before.
-                    self.gazes.clear();
+                    self.headset_scans.clear();
                 }
-                self.gazes.remove(&running.gazes);
-                for gaze in &running.gazes {
-                    self.gazes.add(Arc::clone(gaze), running.stamp_ns, now_ns);
+                self.headset_scans.remove(&running.headset_scans);
+                for headset_scan in &running.headset_scans {
+                    self.headset_scans
+                        .add(Arc::clone(headset_scan), running.stamp_ns, now_ns);
                 }
                 let known = Known {
                     map_from_headset: found.map_from_headset,
@@ -70,9 +75,9 @@ impl SemanticIcpServer {
                 self.known = Some(known);
             }
             // These looks say nothing, and would spoil the next search.
-            Verdict::RejectedInput => self.gazes.remove(&running.gazes),
+            Verdict::RejectedInput => self.headset_scans.remove(&running.headset_scans),
             Verdict::NoOverlap => {
-                self.gazes.remove(&running.gazes);
+                self.headset_scans.remove(&running.headset_scans);
                 self.missed();
             }
             // A further look may tell.
@@ -141,8 +146,8 @@ impl SemanticIcpServer {
         self.counts.tracking_misses += u64::from(update.is_none());
         self.counts.tracking_doubts += u64::from(update.is_some());
         // Is the cloud not what it should be, or the headset not where it was?
-        let (gazes, stamp_ns) = (running.gazes.clone(), running.stamp_ns);
-        self.begin_search(Wanted::default(), gazes, stamp_ns, now_ns, out);
+        let (headset_scans, stamp_ns) = (running.headset_scans.clone(), running.stamp_ns);
+        self.begin_search(Wanted::default(), headset_scans, stamp_ns, now_ns, out);
         if let Some(running) = &mut self.running {
             running.doubted = update;
         }
@@ -162,11 +167,15 @@ impl SemanticIcpServer {
         result.method = "tracking".into();
         result.reason = "the look fits where the headset is".into();
         result.gazes = 1;
-        result.points = running.gazes.iter().map(|g| g.cloud.len() as u64).sum();
+        result.points = running
+            .headset_scans
+            .iter()
+            .map(|g| g.cloud.len() as u64)
+            .sum();
         result.duration_s = now_ns.saturating_sub(running.begun_ns) as f64 * 1e-9;
         self.describe(&mut result, running.stamp_ns);
-        for gaze in &running.gazes {
-            (self.gazes).push(Arc::clone(gaze), running.stamp_ns, now_ns);
+        for headset_scan in &running.headset_scans {
+            (self.headset_scans).push(Arc::clone(headset_scan), running.stamp_ns, now_ns);
         }
         let told = geometry::isometry_from_transform(&self.last.transform);
         let same = told.is_some_and(|told| is_near(&told, &update.map_from_headset, SAME_POSE));

@@ -5,8 +5,8 @@ use std::sync::Arc;
 use std::sync::atomic::{AtomicBool, Ordering::Relaxed};
 
 use lattice_core::registration::{
-    Calibration, CalibrationMap, CalibrationOptions, CalibrationRequest, Confusion, Gaze, Progress,
-    SemanticCloud, Stage, TrackUpdate, Verdict, calibrate, track,
+    Calibration, CalibrationMap, CalibrationOptions, CalibrationRequest, Confusion, HeadsetScan,
+    Progress, SemanticCloud, Stage, TrackUpdate, Verdict, calibrate, track,
 };
 use nalgebra::Isometry3;
 
@@ -27,13 +27,17 @@ pub trait Search: Send + 'static {
     /// Searches the map.
     fn calibrate(
         &mut self,
-        gazes: &[Gaze],
+        headset_scans: &[HeadsetScan],
         start: Option<Isometry3<f64>>,
         progress: &dyn Progress,
     ) -> Calibration;
 
     /// Refines `map_from_headset` by a look; `None` without a map.
-    fn track(&mut self, gaze: &Gaze, map_from_headset: &Isometry3<f64>) -> Option<TrackUpdate>;
+    fn track(
+        &mut self,
+        headset_scan: &HeadsetScan,
+        map_from_headset: &Isometry3<f64>,
+    ) -> Option<TrackUpdate>;
 }
 
 /// The search of the core.
@@ -65,7 +69,7 @@ impl Search for LatticeSearch {
 
     fn calibrate(
         &mut self,
-        gazes: &[Gaze],
+        headset_scans: &[HeadsetScan],
         start: Option<Isometry3<f64>>,
         progress: &dyn Progress,
     ) -> Calibration {
@@ -73,7 +77,7 @@ impl Search for LatticeSearch {
             return Calibration::refused(Verdict::RejectedInput, "there is no map yet");
         };
         let request = CalibrationRequest {
-            gazes,
+            headset_scans,
             start,
             confusion: self.confusion.as_ref(),
         };
@@ -84,9 +88,13 @@ impl Search for LatticeSearch {
         found
     }
 
-    fn track(&mut self, gaze: &Gaze, map_from_headset: &Isometry3<f64>) -> Option<TrackUpdate> {
+    fn track(
+        &mut self,
+        headset_scan: &HeadsetScan,
+        map_from_headset: &Isometry3<f64>,
+    ) -> Option<TrackUpdate> {
         let map = self.map.as_ref()?;
-        Some(track(map, gaze, map_from_headset, &self.options))
+        Some(track(map, headset_scan, map_from_headset, &self.options))
     }
 }
 
@@ -96,14 +104,14 @@ pub enum Work {
     /// A pose by several looks, near a start if there is one.
     Calibrate {
         /// The looks.
-        gazes: Vec<Arc<Gaze>>,
+        headset_scans: Vec<Arc<HeadsetScan>>,
         /// `map_from_headset`, about.
         start: Option<Isometry3<f64>>,
     },
     /// The known pose by one more look.
     Track {
         /// The look.
-        gaze: Arc<Gaze>,
+        headset_scan: Arc<HeadsetScan>,
         /// The pose.
         map_from_headset: Isometry3<f64>,
     },
@@ -158,16 +166,22 @@ impl Job {
         }
         match self.work {
             Work::Track {
-                gaze,
+                headset_scan,
                 map_from_headset,
-            } => Done::Tracked(search.track(&gaze, &map_from_headset)),
-            Work::Calibrate { gazes, start } => {
-                let gazes: Vec<Gaze> = gazes.into_iter().map(Arc::unwrap_or_clone).collect();
+            } => Done::Tracked(search.track(&headset_scan, &map_from_headset)),
+            Work::Calibrate {
+                headset_scans,
+                start,
+            } => {
+                let headset_scans: Vec<HeadsetScan> = headset_scans
+                    .into_iter()
+                    .map(Arc::unwrap_or_clone)
+                    .collect();
                 let watch = Watch {
                     canceled: &self.canceled,
                     tell,
                 };
-                Done::Calibrated(Box::new(search.calibrate(&gazes, start, &watch)))
+                Done::Calibrated(Box::new(search.calibrate(&headset_scans, start, &watch)))
             }
         }
     }

@@ -32,7 +32,7 @@ pub(super) struct Running {
     pub begun_ns: i64,
     pub stamp_ns: i64,
     /// Looks of a search; of tracking the one look.
-    pub gazes: Vec<Arc<Gaze>>,
+    pub headset_scans: Vec<Arc<HeadsetScan>>,
     pub tracking: bool,
     /// Of a search with a look that fits the known pose, yet less than it should: how it fits.
     pub doubted: Option<TrackUpdate>,
@@ -52,40 +52,52 @@ impl SemanticIcpServer {
         }
         if let Some(wanted) = self.wanted.take() {
             self.fresh_cloud = false;
-            let gazes = self.gazes.all();
-            self.begin_search(wanted, gazes, self.gazes.stamp_ns(), now_ns, out);
+            let headset_scans = self.headset_scans.all();
+            self.begin_search(
+                wanted,
+                headset_scans,
+                self.headset_scans.stamp_ns(),
+                now_ns,
+                out,
+            );
             return;
         }
-        if let Some((gaze, stamp_ns)) = self.look.take() {
+        if let Some((headset_scan, stamp_ns)) = self.look.take() {
             if let Some(known) = &self.known {
                 let map_from_headset = known.map_from_headset;
                 self.counts.clouds_tracked += 1;
-                self.begin_tracking(gaze, map_from_headset, stamp_ns, now_ns, out);
+                self.begin_tracking(headset_scan, map_from_headset, stamp_ns, now_ns, out);
                 return;
             }
-            self.gazes.push(gaze, stamp_ns, now_ns);
+            self.headset_scans.push(headset_scan, stamp_ns, now_ns);
             self.fresh_cloud = true;
         }
-        let due = self.fresh_cloud && self.known.is_none() && !self.gazes.is_empty();
+        let due = self.fresh_cloud && self.known.is_none() && !self.headset_scans.is_empty();
         if due && self.options.search == SearchWhen::Lost && self.has_map() {
             self.fresh_cloud = false;
             self.counts.clouds_searched += 1;
-            let gazes = self.gazes.all();
+            let headset_scans = self.headset_scans.all();
             let wanted = Wanted::default();
-            self.begin_search(wanted, gazes, self.gazes.stamp_ns(), now_ns, out);
+            self.begin_search(
+                wanted,
+                headset_scans,
+                self.headset_scans.stamp_ns(),
+                now_ns,
+                out,
+            );
         }
     }
 
     pub(super) fn begin_search(
         &mut self,
         wanted: Wanted,
-        gazes: Vec<Arc<Gaze>>,
+        headset_scans: Vec<Arc<HeadsetScan>>,
         stamp_ns: i64,
         now_ns: i64,
         out: &mut Vec<Output>,
     ) {
         let work = Work::Calibrate {
-            gazes: gazes.clone(),
+            headset_scans: headset_scans.clone(),
             start: wanted.start,
         };
         let map = self.map_to_prepare(now_ns, 0);
@@ -97,7 +109,7 @@ impl SemanticIcpServer {
             outdated: false,
             begun_ns: now_ns,
             stamp_ns,
-            gazes,
+            headset_scans,
             tracking: false,
             doubted: None,
         });
@@ -105,14 +117,14 @@ impl SemanticIcpServer {
 
     fn begin_tracking(
         &mut self,
-        gaze: Arc<Gaze>,
+        headset_scan: Arc<HeadsetScan>,
         map_from_headset: Isometry3<f64>,
         stamp_ns: i64,
         now_ns: i64,
         out: &mut Vec<Output>,
     ) {
         let work = Work::Track {
-            gaze: Arc::clone(&gaze),
+            headset_scan: Arc::clone(&headset_scan),
             map_from_headset,
         };
         let map = self.map_to_prepare(now_ns, self.options.map_refresh_ns);
@@ -124,7 +136,7 @@ impl SemanticIcpServer {
             outdated: false,
             begun_ns: now_ns,
             stamp_ns,
-            gazes: vec![gaze],
+            headset_scans: vec![headset_scan],
             tracking: true,
             doubted: None,
         });
@@ -189,7 +201,7 @@ impl SemanticIcpServer {
             reason: reason.to_owned(),
             ..CalibrationResult::default()
         };
-        self.describe(&mut result, self.gazes.stamp_ns());
+        self.describe(&mut result, self.headset_scans.stamp_ns());
         result
     }
 

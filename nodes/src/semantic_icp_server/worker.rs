@@ -7,7 +7,7 @@ use lattice_core::registration::Stage;
 
 use super::search::{Done, Job, Search};
 use crate::compute::{Compute, ComputeLimits, Inbox};
-use crate::runtime::Shutdown;
+use lattice_runtime::Shutdown;
 
 /// What the searching thread has to tell.
 #[derive(Default)]

@@ -2,7 +2,7 @@
 
 use std::collections::{BTreeMap, BTreeSet};
 
-use lattice_core::lattice::{Key, LatticeIndex};
+use lattice_core::lattice::{LatticeIndex, MortonKey};
 
 /// A cube of lattice indices: the leading bits of its voxels' keys.
 pub type BlockId = u64;
@@ -15,7 +15,7 @@ pub struct Ids {
 
 #[derive(Default)]
 struct Block {
-    keys: BTreeSet<Key>,
+    keys: BTreeSet<MortonKey>,
     ids: Vec<i32>,
 }
 
@@ -39,7 +39,7 @@ impl Blocks {
     }
 
     /// The block of a voxel.
-    pub fn id_of(&self, key: Key) -> BlockId {
+    pub fn id_of(&self, key: MortonKey) -> BlockId {
         key.raw() >> self.shift
     }
 
@@ -49,7 +49,7 @@ impl Blocks {
     }
 
     /// Voxels of a block, in order.
-    pub fn keys(&self, block: BlockId) -> impl Iterator<Item = Key> + '_ {
+    pub fn keys(&self, block: BlockId) -> impl Iterator<Item = MortonKey> + '_ {
         let block = self.blocks.get(&block);
         block
             .into_iter()
@@ -57,7 +57,7 @@ impl Blocks {
     }
 
     /// Whether a voxel is occupied.
-    pub fn contains(&self, key: Key) -> bool {
+    pub fn contains(&self, key: MortonKey) -> bool {
         let block = self.blocks.get(&self.id_of(key));
         block.is_some_and(|block| block.keys.contains(&key))
     }
@@ -66,7 +66,7 @@ impl Blocks {
     /// added to `dirty`.
     pub fn set(
         &mut self,
-        key: Key,
+        key: MortonKey,
         occupied: bool,
         neighbors: &[LatticeIndex],
         dirty: &mut BTreeSet<BlockId>,
@@ -118,9 +118,9 @@ impl Blocks {
 }
 
 /// The key at a difference of lattice indices; `None` beyond the range of keys.
-pub fn offset(key: Key, difference: &LatticeIndex) -> Option<Key> {
+pub fn offset(key: MortonKey, difference: &LatticeIndex) -> Option<MortonKey> {
     let w = key.unpack();
-    Key::pack([
+    MortonKey::pack([
         w[0] + difference[0],
         w[1] + difference[1],
         w[2] + difference[2],

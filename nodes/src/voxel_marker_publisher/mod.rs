@@ -6,12 +6,15 @@ mod blocks;
 mod color;
 pub mod node;
 mod options;
+mod report;
 mod shape;
 
 pub use options::{ColorBy, MarkerOptions, MarkerStyle};
+pub use report::MarkerReport;
 
 use std::collections::BTreeSet;
 
+use lattice_msgs::cdr;
 use lattice_msgs::geometry_msgs::Pose;
 use lattice_msgs::lattice::{LatticeMap, LatticeMapUpdate};
 use lattice_msgs::std_msgs::Header;
@@ -66,6 +69,17 @@ impl VoxelMarkers {
             counts: MarkerCounts::default(),
             options,
         }
+    }
+
+    /// Bytes as CDR of all arrays that are due, which then no longer are.
+    pub fn take_bytes(&mut self) -> usize {
+        let mut bytes = 0;
+        while self.is_dirty() {
+            for array in self.take_arrays(1 << 20) {
+                bytes += cdr::to_vec(&array).map_or(0, |cdr| cdr.len());
+            }
+        }
+        bytes
     }
 
     /// Takes a chunk of a keyframe.

@@ -9,15 +9,14 @@ use lattice_msgs::lattice::{LatticeMap, LatticeMapUpdate};
 use lattice_msgs::std_msgs::Empty;
 use lattice_msgs::visualization_msgs::MarkerArray;
 
-use super::{MarkerOptions, VoxelMarkers};
+use super::{MarkerOptions, MarkerReport, VoxelMarkers};
 use crate::compute::{Compute, ComputeLimits};
 use crate::map_follower::{FollowError, Followed};
-use crate::node::{Finish, NodeError, warn_unused};
-use crate::replay::bytes_of;
-use crate::report::{self, MarkerReport};
-use crate::runtime::logging::Throttle;
-use crate::runtime::qos::Qos;
-use crate::runtime::{Diagnostics, Level, Load, Publisher, Runtime};
+use crate::report;
+use crate::start::{Finish, NodeError, warn_unused};
+use lattice_runtime::logging::Throttle;
+use lattice_runtime::qos::Qos;
+use lattice_runtime::{Diagnostics, Level, Load, Publisher, Runtime};
 
 /// What the compute thread is told.
 enum Event {
@@ -204,7 +203,7 @@ impl Shell {
         let report = MarkerReport {
             counts,
             voxels: self.machine.voxels(),
-            marker_bytes: bytes_of(&mut self.machine),
+            marker_bytes: self.machine.take_bytes(),
             published_bytes: self.published_bytes,
             arrays_not_published: self.not_published,
         };

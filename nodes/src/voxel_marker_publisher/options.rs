@@ -1,6 +1,6 @@
 //! Parameters of the marker publisher.
 
-use crate::runtime::params::{ParamError, Params};
+use lattice_runtime::params::{ParamError, Params};
 
 /// How a voxel is drawn.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]

@@ -7,7 +7,7 @@
 use std::collections::BTreeMap;
 
 use lattice_core::cloud::Cloud;
-use lattice_core::lattice::{Key, Lattice, LatticeKind};
+use lattice_core::lattice::{Lattice, LatticeKind, MortonKey};
 use lattice_core::voxels::file::{MapContents, WriteOptions, max_voxels_of, read_occupancy};
 use lattice_core::voxels::{
     InsertReport, OFFSET_UNIT_M, OccupancyList, Payload, VoxelList, VoxelStore,
@@ -175,7 +175,7 @@ pub fn insert(bytes: &[u8]) {
     assert!(occupancy.sorted_keys().iter().eq(voxels.keys()));
 }
 
-type Voxels = BTreeMap<Key, (u32, [f64; 3])>;
+type Voxels = BTreeMap<MortonKey, (u32, [f64; 3])>;
 
 /// Count and sum of offsets (metres) of every cell, one point after the other.
 fn reference(
@@ -193,7 +193,7 @@ fn reference(
     for offset_m in &cloud.offsets_m {
         let p_m = base_m + Vector3::from(offset_m.map(f64::from));
         let cell = lattice.quantize(&p_m);
-        let Some((w, key)) = cell.and_then(|w| Key::pack(w).map(|key| (w, key))) else {
+        let Some((w, key)) = cell.and_then(|w| MortonKey::pack(w).map(|key| (w, key))) else {
             let finite = p_m.iter().all(|x| x.is_finite());
             report.out_of_range += u64::from(finite);
             report.not_finite += u64::from(!finite);

@@ -8,7 +8,7 @@
 use std::num::Wrapping;
 
 use super::form::Form;
-use crate::lattice::code::{CellCode, halves};
+use crate::lattice::BlockKey;
 
 /// Points that are quantized together.
 pub(crate) const BLOCK: usize = 128;
@@ -125,7 +125,7 @@ pub(super) fn lane<F: Form, const DIAGONAL: bool>(c: &Constants, [x, y, z]: [f32
     let s = &c.squared_sides;
     let square = s[0] * (dx * dx) + s[1] * (dy * dy) + s[2] * (dz * dz);
     Lane {
-        code: halves(offset),
+        code: BlockKey::halves(offset),
         decided: -i32::from(decided),
         distance: to_int(square.sqrt() * STEPS),
         square: to_int(square * STEPS),
@@ -138,7 +138,7 @@ pub(super) const FIXED_REACH_M: f32 = 2000.0;
 /// Codes and marks of a block of points.
 #[derive(Clone)]
 pub(super) struct Lanes {
-    pub(super) codes: [CellCode; BLOCK],
+    pub(super) codes: [BlockKey; BLOCK],
     /// All ones if decided.
     pub(super) decided: [i32; BLOCK],
     /// The points in 2^-20 m, axis by axis; with statistics only.
@@ -148,7 +148,7 @@ pub(super) struct Lanes {
 impl Default for Lanes {
     fn default() -> Lanes {
         Lanes {
-            codes: [CellCode::NONE; BLOCK],
+            codes: [BlockKey::NONE; BLOCK],
             decided: [0; BLOCK],
             fixed: [[0; BLOCK]; 3],
         }
@@ -207,7 +207,7 @@ pub(super) fn block<F: Form, const DIAGONAL: bool, const STATISTICS: bool>(
         }
     }
     for i in 0..BLOCK {
-        out.codes[i] = CellCode::from_halves([codes[0][i], codes[1][i]]);
+        out.codes[i] = BlockKey::from_halves([codes[0][i], codes[1][i]]);
     }
     sums
 }

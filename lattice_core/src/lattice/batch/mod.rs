@@ -11,7 +11,7 @@ mod wide;
 
 use nalgebra::{Isometry3, Matrix3, Vector3};
 
-use super::{CellCode, Lattice, LatticeKind};
+use super::{BlockKey, Lattice, LatticeKind};
 use crate::prefetch::prefetch;
 use form::{Bcc, Cubic, Fcc, Form, Hex, Mcc};
 use kernel::{BLOCK, Constants, Lane, LaneSums, Lanes, STEPS};
@@ -65,7 +65,7 @@ pub struct BatchSums {
 /// A block of points and what is known of them.
 pub struct BatchBlock<'a> {
     /// The cell of each.
-    pub codes: &'a [CellCode],
+    pub codes: &'a [BlockKey],
     /// Quantization error of those that have a cell.
     pub sums: &'a BatchSums,
     /// Coordinates of the points, axis by axis, in 2^-20 m, within one unit; void if `sums.far`.
@@ -128,9 +128,9 @@ impl BatchQuantizer {
         self.lattice_from_points.translation.vector.into()
     }
 
-    /// Appends the cell of each point, [`CellCode::NONE`] where [`Lattice::quantize`] of the
+    /// Appends the cell of each point, [`BlockKey::NONE`] where [`Lattice::quantize`] of the
     /// transformed point gives none.
-    pub fn codes(&self, points: &[[f32; 3]], codes: &mut Vec<CellCode>) {
+    pub fn codes(&self, points: &[[f32; 3]], codes: &mut Vec<BlockKey>) {
         codes.reserve(points.len());
         self.for_blocks(points, |block, _| codes.extend_from_slice(block));
     }
@@ -138,7 +138,7 @@ impl BatchQuantizer {
     /// Visits the cells of up to [`BatchQuantizer::BLOCK`] points at a time, in order. Of the sums
     /// only the number of points with a cell is kept.
     #[inline]
-    pub fn for_blocks(&self, points: &[[f32; 3]], mut visit: impl FnMut(&[CellCode], &BatchSums)) {
+    pub fn for_blocks(&self, points: &[[f32; 3]], mut visit: impl FnMut(&[BlockKey], &BatchSums)) {
         self.blocks::<false>(points, |block| visit(block.codes, block.sums));
     }
 
@@ -243,7 +243,7 @@ impl BatchQuantizer {
             sums.far |= !p.into_iter().all(near);
             let (exact, own) = self.exactly(p);
             *code = exact;
-            if exact == CellCode::NONE {
+            if exact == BlockKey::NONE {
                 sums.points -= 1;
             } else {
                 sums.distances += own.distances;
@@ -254,11 +254,11 @@ impl BatchQuantizer {
     }
 
     /// Code and quantization error of one point in double precision.
-    fn exactly(&self, p: [f32; 3]) -> (CellCode, BatchSums) {
+    fn exactly(&self, p: [f32; 3]) -> (BlockKey, BatchSums) {
         let p = self.transform(p);
         let found = self.lattice.quantize(&p);
-        let Some((w, code)) = found.and_then(|w| Some((w, CellCode::pack(w)?))) else {
-            return (CellCode::NONE, BatchSums::default());
+        let Some((w, code)) = found.and_then(|w| Some((w, BlockKey::pack(w)?))) else {
+            return (BlockKey::NONE, BatchSums::default());
         };
         let off = (p - self.lattice.center(w)) / self.side_m;
         let square = (off.x * off.x + off.y * off.y + off.z * off.z) as f32;

@@ -10,9 +10,9 @@ fn lattices() -> impl Strategy<Value = Lattice> {
         .prop_map(|(i, e)| Lattice::new(LatticeKind::ALL[i], 10_f64.powf(e)).unwrap())
 }
 
-fn single(lattice: &Lattice, p: &Vector3<f64>) -> CellCode {
+fn single(lattice: &Lattice, p: &Vector3<f64>) -> BlockKey {
     let w = lattice.quantize(p);
-    w.and_then(CellCode::pack).unwrap_or(CellCode::NONE)
+    w.and_then(BlockKey::pack).unwrap_or(BlockKey::NONE)
 }
 
 /// Points in units of the basis vectors, many of them near borders of cells.
@@ -84,7 +84,7 @@ proptest! {
             batch.for_blocks_with_sums(&points, |block| sums.add(block.sums));
             sums.far = false;
             for (&p, &code) in points.iter().zip(&codes) {
-                if code != CellCode::NONE {
+                if code != BlockKey::NONE {
                     one_by_one.add(&batch.sums_of(p));
                 }
             }

@@ -1,14 +1,14 @@
 //! Batches of points in double precision.
 
 use super::kernel::{BLOCK, Lanes};
-use super::{BatchQuantizer, CellCode};
+use super::{BatchQuantizer, BlockKey};
 
 impl BatchQuantizer {
     /// [`BatchQuantizer::codes`] of points in double precision, metres.
     ///
     /// The kernel sees them rounded and knows it: what the rounding leaves open is decided by the points
     /// as they are. Far from the origin of the points that is more of them.
-    pub fn codes_wide(&self, points: &[[f64; 3]], codes: &mut Vec<CellCode>) {
+    pub fn codes_wide(&self, points: &[[f64; 3]], codes: &mut Vec<BlockKey>) {
         codes.reserve(points.len());
         let mut lanes = Lanes::default();
         let mut block = [[f32::NAN; 3]; BLOCK];
@@ -42,7 +42,7 @@ impl BatchQuantizer {
         let eight = points.iter().zip(marks).skip(first).take(8);
         for (p, (code, _)) in eight.filter(|(_, (_, decided))| **decided == 0) {
             let found = self.lattice.quantize(&self.transform_wide(*p));
-            *code = found.and_then(CellCode::pack).unwrap_or(CellCode::NONE);
+            *code = found.and_then(BlockKey::pack).unwrap_or(BlockKey::NONE);
         }
     }
 }

@@ -4,7 +4,7 @@ use nalgebra::{Isometry3, Point3, Vector3};
 use rayon::prelude::*;
 
 use super::super::confusion::shares;
-use super::super::fit::{Fit, Likelihood, Partners};
+use super::super::likelihood::{Fit, Likelihood, Partners};
 use super::super::search::Hypothesis;
 use super::super::{
     Confusion, LabelDistribution, LabelUse, Lift, PairWeight, PreparedCloud, RegisterOptions,

@@ -2,7 +2,7 @@
 
 use nalgebra::{Isometry3, Point3};
 
-use super::super::{PrepareOptions, PreparedCloud, SemanticCloud, thin};
+use super::super::{PrepareOptions, PreparedCloud, SemanticCloud, voxel_downsample};
 use super::types::{CalibrationOptions, CalibrationRequest, Refusal};
 
 /// Farthest that a point may be from the headset's origin, metres.
@@ -19,30 +19,30 @@ pub(super) struct Input {
 }
 
 impl Input {
-    /// Checks the gazes, puts them together and thins them to the spacing of the map.
+    /// Checks the headset scans, puts them together and thins them to the spacing of the map.
     pub fn new(
         request: &CalibrationRequest<'_>,
         options: &CalibrationOptions,
         spacing_m: f64,
     ) -> Result<Input, Refusal> {
         let rejected = Refusal::Input;
-        let n: usize = request.gazes.iter().map(|g| g.cloud.len()).sum();
+        let n: usize = request.headset_scans.iter().map(|g| g.cloud.len()).sum();
         if n > options.max_points {
             let most = options.max_points;
             return Err(rejected(format!("{n} points, at most {most} are taken")));
         }
         let mut all = SemanticCloud::default();
-        let labelled = (request.gazes.iter()).any(|g| !g.cloud.labels.is_empty());
-        for gaze in request.gazes {
-            if ![0, gaze.cloud.len()].contains(&gaze.cloud.labels.len()) {
+        let labelled = (request.headset_scans.iter()).any(|g| !g.cloud.labels.is_empty());
+        for headset_scan in request.headset_scans {
+            if ![0, headset_scan.cloud.len()].contains(&headset_scan.cloud.labels.len()) {
                 return Err(rejected("labels are not as many as points".into()));
             }
-            for (i, point) in gaze.cloud.points_m.iter().enumerate() {
+            for (i, point) in headset_scan.cloud.points_m.iter().enumerate() {
                 // What is not a number fails this too.
                 if point.iter().all(|c| c.abs() <= MAX_RANGE_M) {
                     all.points_m.push(*point);
                     if labelled {
-                        all.labels.push(gaze.cloud.label(i));
+                        all.labels.push(headset_scan.cloud.label(i));
                     }
                 }
             }
@@ -58,7 +58,11 @@ impl Input {
         }
         let full = thinned_to(&all, spacing_m, options.registered_points);
         let few = thinned_to(&full, 2.0 * spacing_m, options.registered_points / 8);
-        let sensors: Vec<Point3<f64>> = request.gazes.iter().filter_map(|g| g.sensor_m).collect();
+        let sensors: Vec<Point3<f64>> = request
+            .headset_scans
+            .iter()
+            .filter_map(|g| g.sensor_m)
+            .collect();
         let prepare = |cloud| {
             PreparedCloud::new(cloud, &PrepareOptions::default())
                 .map_err(|e| rejected(format!("the points cannot be registered: {e}")))
@@ -66,7 +70,7 @@ impl Input {
         Ok(Input {
             full: prepare(full)?,
             few: prepare(few)?,
-            sensor_m: match (sensors.as_slice(), request.gazes.len()) {
+            sensor_m: match (sensors.as_slice(), request.headset_scans.len()) {
                 ([sensor], 1) if sensor.iter().all(|c| c.abs() <= MAX_RANGE_M) => Some(*sensor),
                 _ => None,
             },
@@ -78,7 +82,7 @@ impl Input {
 fn thinned_to(cloud: &SemanticCloud, side_m: f64, most: usize) -> SemanticCloud {
     let mut side_m = side_m;
     loop {
-        let thinned = thin(cloud, side_m);
+        let thinned = voxel_downsample(cloud, side_m);
         if thinned.len() <= most.max(50) {
             return thinned;
         }

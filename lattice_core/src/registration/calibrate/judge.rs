@@ -3,7 +3,7 @@
 use nalgebra::{Matrix3, Matrix6, Vector3};
 use rayon::prelude::*;
 
-use super::super::fit::Fit;
+use super::super::likelihood::Fit;
 use super::super::search::{Region, SearchSource, search};
 use super::super::{PrepareOptions, PreparedCloud, SemanticCloud};
 use super::candidates::{Candidate, Workbench};

@@ -1,7 +1,7 @@
 //! A map made ready for calibrations.
 
 use super::super::confusion::shares;
-use super::super::fit::FitScale;
+use super::super::likelihood::FitScale;
 use super::super::search::{OccupiedGrid, SearchMap};
 use super::super::{PrepareOptions, PreparedCloud, RegistrationError, SemanticCloud};
 

@@ -28,8 +28,8 @@ use types::Refusal;
 pub use map::CalibrationMap;
 pub use track::{TrackUpdate, track};
 pub use types::{
-    Calibration, CalibrationOptions, CalibrationRequest, ClassReliability, DirectionKind, Gaze,
-    Progress, Stage, Verdict, WeakDirection,
+    Calibration, CalibrationOptions, CalibrationRequest, ClassReliability, DirectionKind,
+    HeadsetScan, Progress, Stage, Verdict, WeakDirection,
 };
 
 /// Hypotheses of the search by surfaces: a piece of wall fits many walls.

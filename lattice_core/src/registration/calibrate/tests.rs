@@ -3,8 +3,7 @@
 use nalgebra::{Isometry3, Point3, Translation3, UnitQuaternion, Vector3};
 
 use super::*;
-use crate::metrics::PoseError;
-use crate::registration::testing::{FURNITURE, Flat, Random};
+use crate::registration::testing::{FURNITURE, Flat, Random, distance};
 use crate::registration::{LabelDistribution, SemanticCloud};
 
 fn map(flat: &Flat) -> CalibrationMap {
@@ -25,9 +24,13 @@ fn truth(seed: u64) -> Isometry3<f64> {
     Isometry3::from_parts(Translation3::from(place), turn)
 }
 
-fn ask(map: &CalibrationMap, gazes: &[Gaze], start: Option<Isometry3<f64>>) -> Calibration {
+fn ask(
+    map: &CalibrationMap,
+    headset_scans: &[HeadsetScan],
+    start: Option<Isometry3<f64>>,
+) -> Calibration {
     let request = CalibrationRequest {
-        gazes,
+        headset_scans,
         start,
         confusion: None,
     };
@@ -49,14 +52,11 @@ fn every_place_is_found_without_a_start() {
     let map = map(&flat);
     for (seed, (eye, yaw)) in (1..).zip(LOOKS) {
         let truth = truth(seed);
-        let gaze = flat.gaze(Point3::from(eye), yaw, &truth, seed);
-        let found = ask(&map, &[gaze], None);
-        let error = PoseError::between(&found.map_from_headset, &truth);
+        let headset_scan = flat.headset_scan(Point3::from(eye), yaw, &truth, seed);
+        let found = ask(&map, &[headset_scan], None);
+        let error = distance(&found.map_from_headset, &truth);
         assert_eq!(found.verdict, Verdict::Ok, "{}", found.reason);
-        assert!(
-            error.translation_m < 0.03 && error.rotation_rad < 0.006,
-            "{error:?}"
-        );
+        assert!(error.0 < 0.03 && error.1 < 0.006, "{error:?}");
     }
 }
 
@@ -66,8 +66,8 @@ fn wrong_labels_cost_nothing() {
     let map = map(&flat);
     let (eye, yaw) = LOOKS[0];
     let truth = truth(9);
-    let mut gaze = flat.gaze(Point3::from(eye), yaw, &truth, 9);
-    for label in &mut gaze.cloud.labels {
+    let mut headset_scan = flat.headset_scan(Point3::from(eye), yaw, &truth, 9);
+    for label in &mut headset_scan.cloud.labels {
         // Every class is called by the name of another.
         let class = label.top().unwrap();
         let at = FURNITURE.iter().position(|c| *c == class);
@@ -75,10 +75,10 @@ fn wrong_labels_cost_nothing() {
     }
     let start = truth * Isometry3::new(Vector3::new(0.2, -0.2, 0.05), Vector3::z() * 0.15);
     for start in [None, Some(start)] {
-        let found = ask(&map, std::slice::from_ref(&gaze), start);
-        let error = PoseError::between(&found.map_from_headset, &truth);
+        let found = ask(&map, std::slice::from_ref(&headset_scan), start);
+        let error = distance(&found.map_from_headset, &truth);
         assert_eq!(found.verdict, Verdict::Ok, "{}", found.reason);
-        assert!(error.translation_m < 0.02, "{error:?}");
+        assert!(error.0 < 0.02, "{error:?}");
         // It was learned what they are called here.
         assert!(found.class_reliability.iter().all(|c| c.agreement < 0.3));
     }
@@ -89,11 +89,11 @@ fn what_cannot_be_used_is_refused_with_a_reason() {
     let flat = Flat::new();
     let map = map(&flat);
     let (eye, yaw) = LOOKS[0];
-    let gaze = flat.gaze(Point3::from(eye), yaw, &truth(3), 3);
+    let headset_scan = flat.headset_scan(Point3::from(eye), yaw, &truth(3), 3);
     let changed = |change: fn(&mut SemanticCloud)| {
-        let mut gaze = gaze.clone();
-        change(&mut gaze.cloud);
-        ask(&map, &[gaze], None)
+        let mut headset_scan = headset_scan.clone();
+        change(&mut headset_scan.cloud);
+        ask(&map, &[headset_scan], None)
     };
     let rejected = [
         changed(|cloud| *cloud = SemanticCloud::default()),
@@ -103,7 +103,7 @@ fn what_cannot_be_used_is_refused_with_a_reason() {
         ask(&map, &[], None),
         ask(
             &map,
-            std::slice::from_ref(&gaze),
+            std::slice::from_ref(&headset_scan),
             Some(Isometry3::translation(f64::NAN, 0.0, 0.0)),
         ),
     ];
@@ -134,13 +134,17 @@ fn what_cannot_be_used_is_refused_with_a_reason() {
 fn a_bare_wall_may_be_anywhere() {
     let flat = Flat::new();
     let map = map(&flat);
-    let mut gaze = flat.gaze(Point3::new(3.5, 3.0, 1.6), 1.6, &truth(5), 5);
-    let points = gaze.cloud.points_m.iter().zip(&gaze.cloud.labels);
+    let mut headset_scan = flat.headset_scan(Point3::new(3.5, 3.0, 1.6), 1.6, &truth(5), 5);
+    let points = headset_scan
+        .cloud
+        .points_m
+        .iter()
+        .zip(&headset_scan.cloud.labels);
     let wall = points
         .filter(|(_, l)| l.top() == Some(0))
         .map(|(p, l)| (*p, *l));
-    (gaze.cloud.points_m, gaze.cloud.labels) = wall.unzip();
-    let found = ask(&map, &[gaze], None);
+    (headset_scan.cloud.points_m, headset_scan.cloud.labels) = wall.unzip();
+    let found = ask(&map, &[headset_scan], None);
     assert_ne!(found.verdict, Verdict::Ok, "{}", found.reason);
 }
 
@@ -156,9 +160,9 @@ fn it_can_be_ended() {
         }
     }
     let flat = Flat::new();
-    let gaze = flat.gaze(Point3::from(LOOKS[0].0), LOOKS[0].1, &truth(3), 3);
+    let headset_scan = flat.headset_scan(Point3::from(LOOKS[0].0), LOOKS[0].1, &truth(3), 3);
     let request = CalibrationRequest {
-        gazes: &[gaze],
+        headset_scans: &[headset_scan],
         start: None,
         confusion: None,
     };
@@ -172,12 +176,12 @@ fn a_tracked_pose_follows_and_breaks() {
     let map = map(&flat);
     let truth = truth(4);
     let off = truth * Isometry3::new(Vector3::new(0.03, -0.02, 0.01), Vector3::z() * 0.01);
-    let gaze = flat.gaze(Point3::from(LOOKS[1].0), LOOKS[1].1, &truth, 4);
+    let headset_scan = flat.headset_scan(Point3::from(LOOKS[1].0), LOOKS[1].1, &truth, 4);
     let options = CalibrationOptions::default();
-    let update = track(&map, &gaze, &off, &options);
+    let update = track(&map, &headset_scan, &off, &options);
     assert!(update.fits);
-    assert!(PoseError::between(&update.map_from_headset, &truth).translation_m < 0.01);
-    let elsewhere = flat.gaze(
+    assert!(distance(&update.map_from_headset, &truth).0 < 0.01);
+    let elsewhere = flat.headset_scan(
         Point3::from(LOOKS[1].0),
         LOOKS[1].1,
         &Isometry3::translation(50.0, 0.0, 9.0),
@@ -185,6 +189,6 @@ fn a_tracked_pose_follows_and_breaks() {
     );
     let lost = track(&map, &elsewhere, &truth, &options);
     assert!(!lost.fits && lost.map_from_headset == truth);
-    let unusable = track(&map, &Gaze::default(), &truth, &options);
+    let unusable = track(&map, &HeadsetScan::default(), &truth, &options);
     assert!(!unusable.fits && unusable.map_from_headset == truth);
 }

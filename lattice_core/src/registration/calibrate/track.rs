@@ -5,7 +5,7 @@ use nalgebra::Isometry3;
 use super::candidates::Workbench;
 use super::input::Input;
 use super::map::CalibrationMap;
-use super::types::{CalibrationOptions, CalibrationRequest, Gaze};
+use super::types::{CalibrationOptions, CalibrationRequest, HeadsetScan};
 
 /// Log-likelihood by which a refined pose must be better to replace the old one.
 const BETTER: f64 = 2.0;
@@ -28,12 +28,12 @@ pub struct TrackUpdate {
 /// A look that cannot be used fits as little as one from elsewhere.
 pub fn track(
     map: &CalibrationMap,
-    gaze: &Gaze,
+    headset_scan: &HeadsetScan,
     map_from_headset: &Isometry3<f64>,
     options: &CalibrationOptions,
 ) -> TrackUpdate {
     let request = CalibrationRequest {
-        gazes: std::slice::from_ref(gaze),
+        headset_scans: std::slice::from_ref(headset_scan),
         start: None,
         confusion: None,
     };

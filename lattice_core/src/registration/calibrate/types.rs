@@ -8,7 +8,7 @@ use crate::registration::{Confusion, SemanticCloud};
 
 /// What one look of the headset saw.
 #[derive(Clone, PartialEq, Debug, Default)]
-pub struct Gaze {
+pub struct HeadsetScan {
     /// Points in the headset's frame: metres, forward, left, up, gravity along -z.
     pub cloud: SemanticCloud,
     /// Where the headset was, in the same frame, if it is known.
@@ -19,7 +19,7 @@ pub struct Gaze {
 #[derive(Clone, Copy, Debug)]
 pub struct CalibrationRequest<'a> {
     /// Looks in one frame; each further one multiplies the likelihood.
-    pub gazes: &'a [Gaze],
+    pub headset_scans: &'a [HeadsetScan],
     /// `map_from_headset` near which the answer is, if something is known.
     pub start: Option<Isometry3<f64>>,
     /// What earlier calibrations taught about the labels.
@@ -109,6 +109,19 @@ pub enum Verdict {
     NoOverlap,
     /// The input cannot be used.
     RejectedInput,
+}
+
+impl Verdict {
+    /// Name as in `CalibrationResult.msg`.
+    pub fn name(self) -> &'static str {
+        match self {
+            Verdict::Ok => "OK",
+            Verdict::Ambiguous => "AMBIGUOUS",
+            Verdict::Degenerate => "DEGENERATE",
+            Verdict::NoOverlap => "NO_OVERLAP",
+            Verdict::RejectedInput => "REJECTED_INPUT",
+        }
+    }
 }
 
 /// Whether a direction is one of motion or of turning.

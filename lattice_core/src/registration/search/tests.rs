@@ -27,16 +27,16 @@ fn the_right_place_is_among_the_first() {
     for (i, (eye, yaw)) in looks.into_iter().enumerate() {
         let turn = UnitQuaternion::from_axis_angle(&Vector3::z_axis(), 2.5 * i as f64);
         let truth = Isometry3::from_parts(Translation3::new(2.0, -1.0, 0.7), turn);
-        let gaze = flat.gaze(Point3::from(eye), yaw, &truth, 7);
-        let source = prepared(every(&gaze.cloud, 8));
-        for sensor_m in [None, gaze.sensor_m] {
+        let headset_scan = flat.headset_scan(Point3::from(eye), yaw, &truth, 7);
+        let source = prepared(every(&headset_scan.cloud, 8));
+        for sensor_m in [None, headset_scan.sensor_m] {
             let found = search(
                 &searched,
                 &SearchSource::by_surface(&source, sensor_m),
                 None,
                 20,
             );
-            let eye = gaze.sensor_m.unwrap();
+            let eye = headset_scan.sensor_m.unwrap();
             let rank = found.iter().position(|h| {
                 let pose = h.target_from_source;
                 nalgebra::distance(&(pose * eye), &(truth * eye)) < 0.2

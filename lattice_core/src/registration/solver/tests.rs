@@ -3,7 +3,7 @@
 use nalgebra::{Point3, Vector3};
 
 use super::*;
-use crate::metrics::PoseError;
+use crate::registration::testing::distance;
 use crate::registration::{LabelDistribution, LabelUse, PairWeight, PrepareOptions, SemanticCloud};
 
 /// A room's corner with a box and a round pillar, unevenly sampled; each surface is a class.
@@ -98,11 +98,11 @@ fn the_transform_comes_back_to_machine_precision() {
             ..precise(options)
         };
         let found = register(&source, &target, &off(&truth, 0.03, 0.01), &options);
-        let error = PoseError::between(&found.target_from_source, &truth);
+        let error = distance(&found.target_from_source, &truth);
         let method = options.method;
         assert!(found.converged, "{method:?} {found:?}");
-        assert!(error.translation_m < 1e-10, "{method:?} {error:?}");
-        assert!(error.rotation_rad < 1e-10, "{method:?} {error:?}");
+        assert!(error.0 < 1e-10, "{method:?} {error:?}");
+        assert!(error.1 < 1e-10, "{method:?} {error:?}");
         assert!(found.rmse_m < 1e-10 && found.inliers > 2500, "{method:?}");
     }
 }
@@ -112,10 +112,10 @@ fn four_candidates_end_close_by() {
     let (source, target, truth) = pair(6000);
     for options in all_methods() {
         let found = register(&source, &target, &off(&truth, 0.03, 0.01), &options);
-        let error = PoseError::between(&found.target_from_source, &truth);
+        let error = distance(&found.target_from_source, &truth);
         let method = (options.method, options.labels);
-        assert!(error.translation_m < 5e-3, "{method:?} {error:?}");
-        assert!(error.rotation_rad < 3e-3, "{method:?} {error:?}");
+        assert!(error.0 < 5e-3, "{method:?} {error:?}");
+        assert!(error.1 < 3e-3, "{method:?} {error:?}");
     }
 }
 
@@ -136,7 +136,7 @@ fn wrong_labels_drag_the_class_wise_variant_and_not_the_normalised_one() {
     let source = prepare(wrong);
     let error = |options: RegisterOptions| {
         let found = register(&source, &target, &off(&truth, 0.03, 0.01), &options);
-        PoseError::between(&found.target_from_source, &truth).translation_m
+        distance(&found.target_from_source, &truth).0
     };
     let class_wise = error(RegisterOptions {
         min_class_points: 50,
@@ -197,8 +197,8 @@ fn a_stride_uses_fewer_points_and_ends_in_the_same_place() {
         ..precise(RegisterOptions::gicp(1.0))
     };
     let found = register(&source, &target, &off(&truth, 0.05, 0.02), &options);
-    let error = PoseError::between(&found.target_from_source, &truth);
-    assert!(error.translation_m < 1e-10, "{error:?}");
+    let error = distance(&found.target_from_source, &truth);
+    assert!(error.0 < 1e-10, "{error:?}");
     assert_eq!(found.inliers, 6000usize.div_ceil(7));
 }
 

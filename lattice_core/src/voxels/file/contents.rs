@@ -3,7 +3,7 @@
 use nalgebra::Vector3;
 use thiserror::Error;
 
-use crate::lattice::{Key, Lattice};
+use crate::lattice::{Lattice, MortonKey};
 use crate::voxels::columns::Columns;
 use crate::voxels::distortion::DistortionSums;
 use crate::voxels::{Distortion, OccupancyList, Payload, Voxel, VoxelList, VoxelStore};
@@ -20,7 +20,7 @@ pub struct ContentsError(String);
 pub struct MapContents {
     pub(super) lattice: Lattice,
     pub(super) datum_index: [i64; 3],
-    pub(super) keys: Vec<Key>,
+    pub(super) keys: Vec<MortonKey>,
     pub(super) voxels: Option<Vec<Voxel>>,
     /// Empty without voxels.
     pub(super) columns: Columns,
@@ -33,7 +33,7 @@ impl MapContents {
     pub fn occupancy(
         lattice: Lattice,
         datum_index: [i64; 3],
-        keys: Vec<Key>,
+        keys: Vec<MortonKey>,
     ) -> Result<MapContents, ContentsError> {
         let contents = MapContents {
             lattice,
@@ -118,12 +118,12 @@ impl MapContents {
     }
 
     /// The occupied cells in ascending (Morton) order.
-    pub fn keys(&self) -> &[Key] {
+    pub fn keys(&self) -> &[MortonKey] {
         &self.keys
     }
 
     /// The occupied cells, without the rest.
-    pub fn into_keys(self) -> Vec<Key> {
+    pub fn into_keys(self) -> Vec<MortonKey> {
         self.keys
     }
 
@@ -143,7 +143,7 @@ impl MapContents {
     }
 
     /// Centre of a cell, map frame, metres.
-    pub fn center_m(&self, key: Key) -> Vector3<f64> {
+    pub fn center_m(&self, key: MortonKey) -> Vector3<f64> {
         self.datum_m() + self.lattice.center(key.unpack())
     }
 

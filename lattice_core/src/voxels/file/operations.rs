@@ -5,7 +5,7 @@ use thiserror::Error;
 
 use super::MapContents;
 use super::contents::no_columns;
-use crate::lattice::Key;
+use crate::lattice::MortonKey;
 use crate::voxels::columns::Columns;
 use crate::voxels::{Voxel, set_ops};
 
@@ -54,7 +54,7 @@ impl MapContents {
             let w = key.unpack();
             let shifted = [0, 1, 2].map(|i| i32::try_from(i128::from(w[i]) + shift[i]).ok());
             let key = match shifted {
-                [Some(x), Some(y), Some(z)] => Key::pack([x, y, z]),
+                [Some(x), Some(y), Some(z)] => MortonKey::pack([x, y, z]),
                 _ => None,
             };
             let Some(key) = key else {
@@ -115,7 +115,7 @@ impl MapContents {
 
     /// Keeps the cells that `keep` wants, called in ascending order with key and centre (map frame,
     /// metres). The statistics stay those of all points that were ever inserted.
-    pub fn retain(&mut self, mut keep: impl FnMut(Key, Vector3<f64>) -> bool) {
+    pub fn retain(&mut self, mut keep: impl FnMut(MortonKey, Vector3<f64>) -> bool) {
         let datum_m = self.datum_m();
         let kept: Vec<bool> = self
             .keys

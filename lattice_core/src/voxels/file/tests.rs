@@ -3,7 +3,7 @@
 use super::head::{HEAD_BYTES, SECTION_HEAD_BYTES};
 use super::*;
 use crate::cloud::Cloud;
-use crate::lattice::{Key, Lattice, LatticeKind, Orientation};
+use crate::lattice::{Lattice, LatticeKind, MortonKey, Orientation};
 use crate::voxels::columns::Columns;
 use crate::voxels::{LabelCount, Payload, Stamps, Voxel};
 

@@ -6,7 +6,7 @@ use super::super::InsertReport;
 use super::super::recent::Recent;
 use super::{Last, OccupancyList};
 use crate::cloud::Cloud;
-use crate::lattice::{BatchQuantizer, CellCode};
+use crate::lattice::{BatchQuantizer, BlockKey};
 
 /// Fewest points that are worth a thread.
 const PART: usize = 1 << 13;
@@ -53,17 +53,17 @@ impl OccupancyList {
             let here = points.get(place..).unwrap_or_default();
             place += codes.len();
             report.count_rejects(quantizer, here, codes, sums);
-            let mut fresh = [CellCode::NONE; BatchQuantizer::BLOCK];
+            let mut fresh = [BlockKey::NONE; BatchQuantizer::BLOCK];
             let count = recent.sift(codes, &mut fresh);
             let mut refused = false;
             for &code in fresh.iter().take(count) {
-                if code != CellCode::NONE && !self.set(code, &mut last) {
+                if code != BlockKey::NONE && !self.set(code, &mut last) {
                     recent.forget(code);
                     refused = true;
                 }
             }
             if refused {
-                let outside = |code: &&CellCode| **code != CellCode::NONE && !self.has(**code);
+                let outside = |code: &&BlockKey| **code != BlockKey::NONE && !self.has(**code);
                 report.list_full += codes.iter().filter(outside).count() as u64;
             }
         });
@@ -100,7 +100,7 @@ impl OccupancyList {
         for sifter in sifted {
             report.add(&std::mem::take(&mut sifter.rejects));
             for code in sifter.kept.drain(..) {
-                if code != CellCode::NONE {
+                if code != BlockKey::NONE {
                     self.set(code, &mut last);
                 }
             }
@@ -111,7 +111,7 @@ impl OccupancyList {
 /// Quantizes points and leaves out cells that it has just seen.
 struct Sifter {
     recent: Recent,
-    kept: Vec<CellCode>,
+    kept: Vec<BlockKey>,
     rejects: InsertReport,
 }
 
@@ -130,7 +130,7 @@ impl Sifter {
             let here = points.get(place..).unwrap_or_default();
             place += codes.len();
             self.rejects.count_rejects(quantizer, here, codes, sums);
-            let mut fresh = [CellCode::NONE; BatchQuantizer::BLOCK];
+            let mut fresh = [BlockKey::NONE; BatchQuantizer::BLOCK];
             let count = self.recent.sift(codes, &mut fresh);
             self.kept
                 .extend_from_slice(fresh.get(..count).unwrap_or_default());

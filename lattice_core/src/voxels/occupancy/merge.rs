@@ -1,7 +1,7 @@
 //! Uniting stores.
 
 use super::{BLOCK_BYTES, Last, OccupancyList};
-use crate::lattice::CellCode;
+use crate::lattice::BlockKey;
 use crate::voxels::{MergeError, VoxelStore};
 
 impl OccupancyList {
@@ -16,7 +16,7 @@ impl OccupancyList {
         let mut blocks = self.blocks.len();
         let mut last = u64::MAX;
         for &key in &keys {
-            let block = CellCode::from(key).block();
+            let block = BlockKey::from(key).block();
             if block != last {
                 last = block;
                 blocks += usize::from(self.blocks.find(block).is_none());
@@ -31,7 +31,7 @@ impl OccupancyList {
         let before = self.len;
         let mut last = Last::default();
         for key in keys {
-            self.set(CellCode::from(key), &mut last);
+            self.set(BlockKey::from(key), &mut last);
         }
         Ok(self.len - before)
     }

@@ -5,13 +5,13 @@ use rayon::prelude::*;
 use super::super::morton::places;
 use super::super::retain::first_index;
 use super::{Block, Leaf, OccupancyList};
-use crate::lattice::{CellCode, Key, LatticeIndex};
+use crate::lattice::{BlockKey, LatticeIndex, MortonKey};
 
 impl OccupancyList {
     pub(super) fn retain_in_blocks(
         &mut self,
         keep_block: &(dyn Fn(LatticeIndex) -> Option<bool> + Sync),
-        keep: &(dyn Fn(Key) -> bool + Sync),
+        keep: &(dyn Fn(MortonKey) -> bool + Sync),
     ) -> usize {
         let kept = |block: &Block| -> Leaf {
             match first_index(block.code).and_then(keep_block) {
@@ -20,7 +20,7 @@ impl OccupancyList {
                 None => {
                     let mut leaf = block.leaf;
                     for place in places(&block.leaf) {
-                        let key = cell(block.code, place).and_then(CellCode::key);
+                        let key = cell(block.code, place).and_then(BlockKey::key);
                         if key.is_some_and(|key| !keep(key))
                             && let Some(word) = leaf.get_mut(place >> 6)
                         {
@@ -68,6 +68,6 @@ impl OccupancyList {
     }
 }
 
-fn cell(block: u64, place: usize) -> Option<CellCode> {
-    CellCode::from_raw(block << 9 | place as u64)
+fn cell(block: u64, place: usize) -> Option<BlockKey> {
+    BlockKey::from_raw(block << 9 | place as u64)
 }

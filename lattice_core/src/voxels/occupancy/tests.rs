@@ -69,7 +69,7 @@ fn a_full_list_refuses_new_blocks_and_counts_every_point() {
         (4, 3, 3)
     );
     list.validate().unwrap();
-    assert!(list.remove(Key::pack([20; 3]).unwrap()));
+    assert!(list.remove(MortonKey::pack([20; 3]).unwrap()));
     assert_eq!(list.insert(&cloud([0.0; 3], vec![[20.0; 3]])).inserted, 1);
     list.validate().unwrap();
 }
@@ -127,7 +127,7 @@ proptest! {
         for (w, insert) in steps {
             // Several blocks, some of them with one cell.
             let w = w.map(|i| 5 * i);
-            let key = Key::pack(w).unwrap();
+            let key = MortonKey::pack(w).unwrap();
             if insert {
                 let center = list.center_m(key);
                 let point = [center.x as f32, center.y as f32, center.z as f32];

@@ -1,6 +1,6 @@
 //! Voxel lists as `LatticeMap` keyframes and `LatticeMapUpdate` deltas of bounded size.
 
-use lattice_core::lattice::{Key, Lattice, LatticeKind};
+use lattice_core::lattice::{Lattice, LatticeKind, MortonKey};
 use lattice_core::voxels::codec;
 use lattice_core::voxels::{Voxel, VoxelList};
 use lattice_msgs::geographic_msgs::GeoPoint;
@@ -152,7 +152,7 @@ pub fn keyframe(list: &VoxelList, stamp: &MapStamp) -> Vec<LatticeMap> {
     let voxels = list.sorted();
     let info = info_of(list, stamp.epoch, stamp.origin);
     let unit_m = offset_unit_m(list.lattice());
-    let keys: Vec<Key> = voxels.iter().map(|(key, _)| *key).collect();
+    let keys: Vec<MortonKey> = voxels.iter().map(|(key, _)| *key).collect();
     let parts = split(&keys, payload_bytes(list), stamp.chunk_bytes);
     let chunks = parts.len() as u32;
     let mut rest = voxels.as_slice();
@@ -184,8 +184,8 @@ pub fn keyframe(list: &VoxelList, stamp: &MapStamp) -> Vec<LatticeMap> {
 /// What changed since `previous_sequence`, with the state of each changed voxel, in chunks.
 pub fn update(
     list: &VoxelList,
-    changed: &[Key],
-    removed: &[Key],
+    changed: &[MortonKey],
+    removed: &[MortonKey],
     previous_sequence: u64,
     stamp: &MapStamp,
 ) -> Vec<LatticeMapUpdate> {
@@ -259,7 +259,7 @@ fn payload_bytes(list: &VoxelList) -> usize {
 }
 
 /// Cuts sorted keys so that each part fits `chunk_bytes`; at least one part, of at least one key.
-fn split(keys: &[Key], payload_bytes: usize, chunk_bytes: usize) -> Vec<&[Key]> {
+fn split(keys: &[MortonKey], payload_bytes: usize, chunk_bytes: usize) -> Vec<&[MortonKey]> {
     let room = chunk_bytes
         .saturating_sub(CHUNK_OVERHEAD_BYTES)
         .max(CHUNK_OVERHEAD_BYTES);

@@ -1,6 +1,6 @@
 //! The voxels in the columns of a message.
 
-use lattice_core::lattice::Key;
+use lattice_core::lattice::MortonKey;
 use lattice_core::registration::UNLABELED;
 use lattice_core::voxels::{VoxelList, codec};
 use lattice_msgs::lattice::{LatticeMap, LatticeMapUpdate};
@@ -67,7 +67,7 @@ impl<'a> From<&'a LatticeMapUpdate> for VoxelColumns<'a> {
 pub fn voxels_from(
     columns: VoxelColumns,
     max_voxels: usize,
-) -> Result<Vec<(Key, VoxelState)>, MapMessageError> {
+) -> Result<Vec<(MortonKey, VoxelState)>, MapMessageError> {
     let keys = keys_from(columns.key_encoding, columns.keys, max_voxels)?;
     let check = |column, expected, found| {
         if expected == found {
@@ -115,7 +115,7 @@ pub fn keys_from(
     key_encoding: &str,
     keys: &[u8],
     max_voxels: usize,
-) -> Result<Vec<Key>, MapMessageError> {
+) -> Result<Vec<MortonKey>, MapMessageError> {
     if key_encoding != KEY_ENCODING {
         return Err(MapMessageError::Encoding(
             key_encoding.chars().take(32).collect(),
@@ -125,7 +125,7 @@ pub fn keys_from(
 }
 
 /// The columns `labels` and `label_counts`, empty if labels are not kept.
-pub(super) fn labels_of(list: &VoxelList, keys: &[Key]) -> (Vec<u16>, Vec<u32>) {
+pub(super) fn labels_of(list: &VoxelList, keys: &[MortonKey]) -> (Vec<u16>, Vec<u32>) {
     if !list.payload().labels {
         return (Vec::new(), Vec::new());
     }
@@ -135,7 +135,7 @@ pub(super) fn labels_of(list: &VoxelList, keys: &[Key]) -> (Vec<u16>, Vec<u32>) 
 
 /// The most frequent label of a cell, the smallest of equals, with its points; [`UNLABELED`] and 0 if
 /// no point of it has one.
-pub fn main_label(list: &VoxelList, key: Key) -> (u16, u32) {
+pub fn main_label(list: &VoxelList, key: MortonKey) -> (u16, u32) {
     let labels = list
         .labels(key)
         .into_iter()

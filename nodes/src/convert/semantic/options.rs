@@ -4,7 +4,7 @@ use std::collections::{BTreeMap, BTreeSet};
 
 use lattice_core::pose::Axes;
 
-use crate::runtime::params::{ParamError, Params};
+use lattice_runtime::params::{ParamError, Params};
 
 /// Red, green and blue.
 pub type Color = [u8; 3];

@@ -1,11 +1,10 @@
-//! Maps for other programs and for people: PLY of centres, PLY mesh of cells, and pictures.
+//! Maps for other programs and for people: PLY of centres, PLY mesh of cells.
 
 mod centers;
 mod cloud;
 mod error;
 mod mesh;
-mod palette;
-mod render;
+pub mod palette;
 mod vertices;
 
 pub use centers::write_centers_ply;
@@ -13,7 +12,6 @@ pub use cloud::write_labelled_ply;
 pub use error::ExportError;
 pub use mesh::write_mesh_ply;
 pub use palette::{HeightRange, category_color, color_at};
-pub use render::{Focus, LabelColors, RenderOptions, render_labels_png, render_png};
 pub use vertices::SharedVertices;
 
 use lattice_core::voxels::VoxelList;

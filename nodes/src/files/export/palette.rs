@@ -15,7 +15,7 @@ pub fn color_at(fraction: f64) -> [u8; 3] {
 }
 
 /// [`color_at`] as linear light, 0 to 1.
-pub(super) fn linear_at(fraction: f64) -> [f64; 3] {
+pub fn linear_at(fraction: f64) -> [f64; 3] {
     let t = if fraction.is_nan() {
         0.5
     } else {
@@ -62,7 +62,7 @@ fn oklab_to_linear(l: f64, a: f64, b: f64) -> [f64; 3] {
 }
 
 /// Linear light 0 to 1 as an sRGB byte.
-pub(super) fn srgb(linear: f64) -> u8 {
+pub fn srgb(linear: f64) -> u8 {
     let c = linear.clamp(0.0, 1.0);
     let encoded = if c <= 0.003_130_8 {
         12.92 * c
@@ -73,7 +73,7 @@ pub(super) fn srgb(linear: f64) -> u8 {
 }
 
 /// An sRGB byte as linear light 0 to 1.
-pub(super) fn linear(srgb: u8) -> f64 {
+pub fn linear(srgb: u8) -> f64 {
     let c = f64::from(srgb) / 255.0;
     if c <= 0.040_45 {
         c / 12.92

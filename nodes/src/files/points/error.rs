@@ -54,19 +54,10 @@ pub enum PointFileError {
         /// What was being read.
         part: String,
     },
-    /// The parts of a mesh do not fit together.
-    #[error("the file was read, but is no mesh: {0}")]
-    Mesh(#[from] lattice_core::raycast::mesh::MeshError),
-    /// More triangles than the caller allows.
-    #[error(
-        "the file has {triangles} triangles or more, but at most {max_triangles} are allowed: simplify the mesh"
-    )]
-    TooManyTriangles {
-        /// Promised by the header, or found so far.
-        triangles: u64,
-        /// What the caller allows.
-        max_triangles: usize,
-    },
+    /// Packed, where this build cannot unpack.
+    #[cfg(not(feature = "bzip2"))]
+    #[error("the file is packed with bzip2, which this build lacks: unpack it first")]
+    Packed,
     /// More points than the caller allows.
     #[error(
         "the file has {points} points or more, but at most {max_points} are allowed: raise the limit or thin the file"

@@ -1,4 +1,4 @@
-//! Points from files: PLY, PCD, text and KITTI scans, any of them packed with bzip2; meshes from PLY.
+//! Points from files: PLY, PCD, text and KITTI scans, any of them packed with bzip2.
 //!
 //! Files are read as a stream, so that memory is bounded by the points kept and not by what a
 //! header promises. Coordinates are taken as they stand, in metres: the viewpoint of a PCD file and
@@ -9,17 +9,14 @@ mod error;
 mod format;
 mod kitti;
 mod pcd;
-mod ply;
+pub mod ply;
 mod scalar;
-mod source;
+pub mod source;
 mod text;
 
 use std::fs::File;
 use std::io::{BufRead, BufReader};
 use std::path::{Path, PathBuf};
-
-use bzip2::bufread::MultiBzDecoder;
-use lattice_core::raycast::mesh::{LabelledMesh, MAX_TRIANGLES};
 
 pub use error::PointFileError;
 pub use format::PointFormat;
@@ -69,8 +66,8 @@ pub fn read_points(path: &Path, limits: &PointFileLimits) -> Result<PointFile, P
     read_stream(reader, &name, limits)
 }
 
-/// The content of a file and its name, both after unpacking.
-fn open(path: &Path) -> Result<(Box<dyn BufRead>, PathBuf), PointFileError> {
+/// Content and name of a file, both after unpacking.
+pub fn open(path: &Path) -> Result<(Box<dyn BufRead>, PathBuf), PointFileError> {
     let io = |source| PointFileError::Io { byte: 0, source };
     let mut packed = BufReader::with_capacity(BUFFER, File::open(path).map_err(io)?);
     if !format::is_bzip2(packed.fill_buf().map_err(io)?) {
@@ -80,19 +77,18 @@ fn open(path: &Path) -> Result<(Box<dyn BufRead>, PathBuf), PointFileError> {
         Some(extension) if extension.eq_ignore_ascii_case("bz2") => path.with_extension(""),
         _ => path.to_owned(),
     };
-    let unpacked = BufReader::with_capacity(BUFFER, MultiBzDecoder::new(packed));
-    Ok((Box::new(unpacked), name))
+    Ok((unpacked(packed)?, name))
 }
 
-/// A mesh file with a class and an instance for each triangle.
-///
-/// PLY, also packed with bzip2: vertices with `x`, `y`, `z` (metres), faces with a list `vertex_indices`
-/// or `vertex_index` and numbers `label` and `instance`. Polygons become fans of triangles. Without
-/// labels all are [`UNLABELED`](lattice_core::registration::UNLABELED), without instances each label is
-/// one.
-pub fn read_mesh(path: &Path, max_triangles: usize) -> Result<LabelledMesh, PointFileError> {
-    let (reader, _) = open(path)?;
-    ply::mesh::read(&mut Source::new(reader), max_triangles.min(MAX_TRIANGLES))
+#[cfg(feature = "bzip2")]
+fn unpacked(packed: BufReader<File>) -> Result<Box<dyn BufRead>, PointFileError> {
+    let decoder = bzip2::bufread::MultiBzDecoder::new(packed);
+    Ok(Box::new(BufReader::with_capacity(BUFFER, decoder)))
+}
+
+#[cfg(not(feature = "bzip2"))]
+fn unpacked(_packed: BufReader<File>) -> Result<Box<dyn BufRead>, PointFileError> {
+    Err(PointFileError::Packed)
 }
 
 fn read_stream(

@@ -2,7 +2,7 @@
 
 /// Types of number in point files.
 #[derive(Clone, Copy, PartialEq, Eq, Debug)]
-pub(super) enum Scalar {
+pub enum Scalar {
     I8,
     U8,
     I16,
@@ -15,7 +15,7 @@ pub(super) enum Scalar {
 
 impl Scalar {
     /// Size in bytes.
-    pub(super) fn size(self) -> usize {
+    pub fn size(self) -> usize {
         match self {
             Scalar::I8 | Scalar::U8 => 1,
             Scalar::I16 | Scalar::U16 => 2,
@@ -24,12 +24,12 @@ impl Scalar {
         }
     }
 
-    pub(super) fn is_float(self) -> bool {
+    pub fn is_float(self) -> bool {
         matches!(self, Scalar::F32 | Scalar::F64)
     }
 
     /// The number at the start of little-endian `bytes`; `None` if there are too few.
-    pub(super) fn decode(self, bytes: &[u8]) -> Option<f64> {
+    pub fn decode(self, bytes: &[u8]) -> Option<f64> {
         Some(match self {
             Scalar::I8 => i8::from_le_bytes(first(bytes)?).into(),
             Scalar::U8 => u8::from_le_bytes(first(bytes)?).into(),

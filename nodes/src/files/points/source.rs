@@ -10,7 +10,7 @@ use super::PointFileError;
 const MAX_LINE: u64 = 1 << 20;
 
 /// Bytes of a file in order, with the position for messages.
-pub(super) struct Source {
+pub struct Source {
     reader: Box<dyn BufRead>,
     byte: u64,
     line: u64,
@@ -18,7 +18,8 @@ pub(super) struct Source {
 }
 
 impl Source {
-    pub(super) fn new(reader: Box<dyn BufRead>) -> Source {
+    /// A source at the beginning of its file.
+    pub fn new(reader: Box<dyn BufRead>) -> Source {
         Source {
             reader,
             byte: 0,
@@ -28,12 +29,12 @@ impl Source {
     }
 
     /// Bytes read so far.
-    pub(super) fn byte(&self) -> u64 {
+    pub fn byte(&self) -> u64 {
         self.byte
     }
 
     /// Number of the line read last, from 1.
-    pub(super) fn line_number(&self) -> u64 {
+    pub fn line_number(&self) -> u64 {
         self.line
     }
 
@@ -43,7 +44,7 @@ impl Source {
     }
 
     /// Some of the bytes to come; none at the end of the file only.
-    pub(super) fn peek(&mut self) -> Result<&[u8], PointFileError> {
+    pub fn peek(&mut self) -> Result<&[u8], PointFileError> {
         let byte = self.byte;
         self.reader
             .fill_buf()
@@ -51,7 +52,7 @@ impl Source {
     }
 
     /// The next line without its end, `None` at the end of the file.
-    pub(super) fn line(&mut self) -> Result<Option<Cow<'_, str>>, PointFileError> {
+    pub fn line(&mut self) -> Result<Option<Cow<'_, str>>, PointFileError> {
         self.buffer.clear();
         let mut limited = (&mut self.reader).take(MAX_LINE);
         let read = limited
@@ -71,20 +72,13 @@ impl Source {
     }
 
     /// The next line, which must be there for `part` to be whole.
-    pub(super) fn expect_line(
-        &mut self,
-        part: impl Display,
-    ) -> Result<Cow<'_, str>, PointFileError> {
+    pub fn expect_line(&mut self, part: impl Display) -> Result<Cow<'_, str>, PointFileError> {
         let byte = self.byte;
         self.line()?.ok_or_else(|| truncated(byte, part))
     }
 
     /// Fills `bytes`, which are needed for `part`.
-    pub(super) fn exact(
-        &mut self,
-        bytes: &mut [u8],
-        part: impl Display,
-    ) -> Result<(), PointFileError> {
+    pub fn exact(&mut self, bytes: &mut [u8], part: impl Display) -> Result<(), PointFileError> {
         let mut rest = bytes;
         while !rest.is_empty() {
             match self.reader.read(rest) {
@@ -101,11 +95,7 @@ impl Source {
     }
 
     /// The next `length` bytes, which are needed for `part`; takes no more memory than there is data.
-    pub(super) fn take(
-        &mut self,
-        length: u64,
-        part: impl Display,
-    ) -> Result<Vec<u8>, PointFileError> {
+    pub fn take(&mut self, length: u64, part: impl Display) -> Result<Vec<u8>, PointFileError> {
         let mut bytes = Vec::new();
         let read = (&mut self.reader).take(length).read_to_end(&mut bytes);
         self.advance(read.map(|read| read as u64), length, part)?;
@@ -113,7 +103,7 @@ impl Source {
     }
 
     /// Passes over `length` bytes of `part`.
-    pub(super) fn skip(&mut self, length: u64, part: impl Display) -> Result<(), PointFileError> {
+    pub fn skip(&mut self, length: u64, part: impl Display) -> Result<(), PointFileError> {
         let read = io::copy(&mut (&mut self.reader).take(length), &mut io::sink());
         self.advance(read, length, part)
     }

@@ -151,7 +151,7 @@ fn a_section_that_unpacks_to_too_much_is_refused() {
     assert!(reason(300, &some[..some.len() - 1]).contains("zstd"));
     assert!(reason(300, &[&some[..], &[0]].concat()).contains("nothing else"));
     // The writer keeps to what readers take.
-    let keys = (1..100_000).filter_map(Key::from_raw).collect();
+    let keys = (1..100_000).filter_map(MortonKey::from_raw).collect();
     let lattice = map.lattice().clone();
     let contents = MapContents::occupancy(lattice, [0; 3], keys).unwrap();
     let options = WriteOptions {

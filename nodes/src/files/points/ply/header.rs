@@ -9,37 +9,50 @@ const MAX_LINES: u64 = 10_000;
 
 /// What follows the header.
 #[derive(Debug)]
-pub(super) struct Header {
+pub struct Header {
     /// One of the PLY formats.
-    pub(super) format: PointFormat,
+    pub format: PointFormat,
     /// In the order of the data.
-    pub(super) elements: Vec<Element>,
+    pub elements: Vec<Element>,
     /// Lines of the header.
-    pub(super) lines: u64,
+    pub lines: u64,
 }
 
+/// Element of a header: so many records of the same properties.
 #[derive(Debug)]
-pub(super) struct Element {
-    pub(super) name: String,
-    pub(super) count: u64,
-    pub(super) properties: Vec<Property>,
+pub struct Element {
+    /// Name, as `vertex`.
+    pub name: String,
+    /// Number of records.
+    pub count: u64,
+    /// Properties in the order of a record.
+    pub properties: Vec<Property>,
 }
 
+/// Property of an element.
 #[derive(Debug)]
-pub(super) enum Property {
+pub enum Property {
+    /// One number in each record.
     Scalar {
+        /// Name, as `x`.
         name: String,
+        /// Type of the number.
         scalar: Scalar,
     },
+    /// A list in each record.
     List {
+        /// Name, as `vertex_indices`.
         name: String,
+        /// Type of its length.
         count: Scalar,
+        /// Type of its items.
         item: Scalar,
     },
 }
 
 impl Header {
-    pub(super) fn read(source: &mut Source) -> Result<Header, PointFileError> {
+    /// Reads up to and with the line `end_header`.
+    pub fn read(source: &mut Source) -> Result<Header, PointFileError> {
         let mut header = Header {
             format: PointFormat::PlyAscii,
             elements: Vec::new(),

@@ -2,9 +2,8 @@
 //!
 //! Points are the element `vertex`, with a number `label` if they have classes. Elements before it are passed over, what follows is not read.
 
-mod header;
-pub(super) mod mesh;
-mod record;
+pub mod header;
+pub mod record;
 
 use header::{Element, Header, Property};
 
@@ -65,7 +64,7 @@ pub(super) fn read(
 }
 
 /// Which properties of the vertex are x, y and z.
-fn axes(vertex: &Element) -> Result<[usize; 3], String> {
+pub fn axes(vertex: &Element) -> Result<[usize; 3], String> {
     let find = |axis: &str| {
         let found = number(vertex, axis);
         found.ok_or_else(|| format!("element vertex has no number named {axis}"))
@@ -74,7 +73,7 @@ fn axes(vertex: &Element) -> Result<[usize; 3], String> {
 }
 
 /// Which property of an element is the number of a name.
-fn number(element: &Element, wanted: &str) -> Option<usize> {
+pub fn number(element: &Element, wanted: &str) -> Option<usize> {
     let is = |p: &Property| matches!(p, Property::Scalar { name, .. } if name == wanted);
     element.properties.iter().position(is)
 }

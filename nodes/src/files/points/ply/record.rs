@@ -9,7 +9,7 @@ use crate::files::points::text::number;
 use crate::files::points::{PointFileError, PointFormat};
 
 /// Reads the next record of an element: `visit` gets the index and value of each scalar property.
-pub(super) fn read(
+pub fn read(
     source: &mut Source,
     header: &Header,
     element: &Element,
@@ -20,7 +20,7 @@ pub(super) fn read(
 }
 
 /// [`read`], where `visit` also gets the items of the list property `list`, one after the other.
-pub(super) fn read_with_list(
+pub fn read_with_list(
     source: &mut Source,
     header: &Header,
     element: &Element,
@@ -35,11 +35,7 @@ pub(super) fn read_with_list(
 }
 
 /// Passes over all records of an element.
-pub(super) fn skip(
-    source: &mut Source,
-    header: &Header,
-    element: &Element,
-) -> Result<(), PointFileError> {
+pub fn skip(source: &mut Source, header: &Header, element: &Element) -> Result<(), PointFileError> {
     let Element {
         name,
         count,

@@ -1,7 +1,0 @@
-//! Triangle meshes with labels, and what rays hit of them.
-
-mod labelled;
-mod scene;
-
-pub use labelled::{LabelledMesh, MAX_COORDINATE_M, MAX_TRIANGLES, MeshError};
-pub use scene::{MeshHit, MeshScene};

@@ -1,0 +1,243 @@
+//! The `.msg` and `.srv` texts say the same as the Rust structs.
+
+#![allow(clippy::unwrap_used)]
+
+use crate::shape::{Shape, filled};
+use lattice_msgs::{
+    MessageVisitor, RosMessage, Schema, geometry_msgs, sensor_msgs, visit_messages,
+};
+
+/// A line of a definition.
+#[derive(Debug, PartialEq)]
+enum Line<'a> {
+    Field {
+        kind: &'a str,
+        name: &'a str,
+        default: Option<&'a str>,
+    },
+    Constant {
+        kind: &'a str,
+        name: &'a str,
+        value: &'a str,
+    },
+}
+
+fn lines(text: &str) -> impl Iterator<Item = Line<'_>> {
+    let bodies = text
+        .lines()
+        .map(|line| line.split('#').next().unwrap_or_default().trim());
+    bodies.filter(|body| !body.is_empty()).map(|body| {
+        let (kind, rest) = body.split_once(' ').unwrap();
+        if let Some((name, value)) = rest.split_once('=') {
+            Line::Constant {
+                kind,
+                name: name.trim(),
+                value: value.trim(),
+            }
+        } else {
+            let mut words = rest.split_whitespace();
+            let (name, default) = (words.next().unwrap(), words.next());
+            assert_eq!(words.next(), None, "{body}");
+            Line::Field {
+                kind,
+                name,
+                default,
+            }
+        }
+    })
+}
+
+/// Full name of a message that a field refers to; `None` for what is no message.
+fn full_name(kind: &str, package: &str) -> Option<String> {
+    let name = kind.split('[').next().unwrap();
+    match name.split_once('/') {
+        Some((package, name)) => Some(format!("{package}/msg/{name}")),
+        None if name.starts_with(char::is_uppercase) => Some(format!("{package}/msg/{name}")),
+        None => None,
+    }
+}
+
+/// How the field of such a type shows in Rust.
+fn as_rust_shows(kind: &str) -> String {
+    let mut name = kind.rsplit('/').next().unwrap().replace("byte", "uint8");
+    if name.starts_with(char::is_uppercase) {
+        name = name.replace('_', "");
+    }
+    match name.split_once("[<=") {
+        Some((element, _)) => format!("{element}[]"),
+        None => name,
+    }
+}
+
+struct FieldsAgree(usize);
+
+impl MessageVisitor for FieldsAgree {
+    fn visit<M: RosMessage>(&mut self) {
+        let Shape::Message(struct_name, in_rust) = filled::<M>(1).1 else {
+            panic!("{} is not a struct", M::TYPE);
+        };
+        let (package, name) = (
+            M::TYPE.split('/').next().unwrap(),
+            M::TYPE.rsplit('/').next().unwrap().replace('_', ""),
+        );
+        assert_eq!(struct_name, name);
+
+        let mut in_text = Vec::new();
+        let mut used = Vec::new();
+        for line in lines(M::SCHEMA.text) {
+            if let Line::Field { kind, name, .. } = line {
+                in_text.push((name.to_owned(), as_rust_shows(kind)));
+                used.extend(full_name(kind, package));
+            }
+        }
+        if in_text.is_empty() {
+            in_text.push((
+                "structure_needs_at_least_one_member".to_owned(),
+                "uint8".to_owned(),
+            ));
+        }
+        let in_rust: Vec<_> = in_rust
+            .into_iter()
+            .map(|(name, shape)| (name.to_owned(), shape.to_string()))
+            .collect();
+        assert_eq!(in_rust, in_text, "{}", M::TYPE);
+
+        // Fields name a part of an action as if it were a message.
+        let dependencies = M::SCHEMA.dependencies.iter();
+        let mut stated: Vec<_> = dependencies
+            .map(|d| d.type_name.replace("/action/", "/msg/"))
+            .collect();
+        stated.sort_unstable();
+        used.sort_unstable();
+        used.dedup();
+        assert_eq!(stated, used, "dependencies of {}", M::TYPE);
+        self.0 += 1;
+    }
+}
+
+#[test]
+fn fields_agree_in_name_type_and_order() {
+    let mut fields = FieldsAgree(0);
+    visit_messages(&mut fields);
+    assert!(fields.0 > 60, "{} messages", fields.0);
+}
+
+/// `(struct, type, name, value)` of every constant in a source file.
+fn constants_in_rust(source: &str) -> Vec<[String; 4]> {
+    let mut name = "";
+    let mut found = Vec::new();
+    for line in source.lines() {
+        if let Some(rest) = line.strip_prefix("impl ") {
+            name = rest.trim_end_matches(" {");
+        } else if let Some(constant) = line.strip_prefix("    pub const ") {
+            let (constant, rest) = constant.split_once(": ").unwrap();
+            let (kind, value) = rest.split_once(" = ").unwrap();
+            let value = value.trim_end_matches(';');
+            found.push([name, kind, constant, value].map(str::to_owned));
+        }
+    }
+    found
+}
+
+/// `(struct, type, name, value)` of every constant in a definition.
+fn constants_in_text(schema: &Schema) -> Vec<[String; 4]> {
+    let name = schema
+        .type_name
+        .rsplit('/')
+        .next()
+        .unwrap()
+        .replace('_', "");
+    let constants = lines(schema.text).filter_map(|line| match line {
+        Line::Constant { kind, name, value } => Some((kind, name, value)),
+        Line::Field { .. } => None,
+    });
+    constants
+        .map(|(kind, constant, value)| {
+            let kind = match kind {
+                "byte" | "uint8" => "u8",
+                "int8" => "i8",
+                "uint16" => "u16",
+                "int32" => "i32",
+                "uint32" => "u32",
+                "uint64" => "u64",
+                "string" => "&'static str",
+                other => panic!("constants of type {other} are new: say how they show in Rust"),
+            };
+            [name.as_str(), kind, constant, value].map(str::to_owned)
+        })
+        .collect()
+}
+
+#[derive(Default)]
+struct Constants(Vec<[String; 4]>);
+
+impl MessageVisitor for Constants {
+    fn visit<M: RosMessage>(&mut self) {
+        self.0.extend(constants_in_text(M::SCHEMA));
+    }
+}
+
+#[test]
+fn constants_agree() {
+    let mut in_text = Constants::default();
+    visit_messages(&mut in_text);
+    let mut in_text = in_text.0;
+    let packages = [
+        "action_msgs",
+        "calibration",
+        "diagnostic_msgs",
+        "lattice",
+        "novatel_oem7_msgs",
+        "rcl_interfaces",
+    ];
+    let mut in_rust = Vec::new();
+    for package in packages
+        .iter()
+        .chain(&["sensor_msgs", "visualization_msgs"])
+    {
+        let path = format!("{}/src/{package}.rs", env!("CARGO_MANIFEST_DIR"));
+        in_rust.extend(constants_in_rust(&std::fs::read_to_string(path).unwrap()));
+    }
+    in_text.sort();
+    in_rust.sort();
+    assert_eq!(in_rust, in_text);
+}
+
+#[derive(Default)]
+struct Defaults(Vec<(&'static str, String, String)>);
+
+impl MessageVisitor for Defaults {
+    fn visit<M: RosMessage>(&mut self) {
+        for line in lines(M::SCHEMA.text) {
+            if let Line::Field {
+                name,
+                default: Some(value),
+                ..
+            } = line
+                && !["0", "false"].contains(&value)
+            {
+                self.0.push((M::TYPE, name.to_owned(), value.to_owned()));
+            }
+        }
+    }
+}
+
+#[test]
+fn defaults_agree() {
+    let mut defaults = Defaults::default();
+    visit_messages(&mut defaults);
+    let names: Vec<_> = defaults
+        .0
+        .iter()
+        .map(|(message, field, value)| (*message, &**field, &**value))
+        .collect();
+    assert_eq!(
+        names,
+        [
+            ("geometry_msgs/msg/Quaternion", "w", "1"),
+            ("sensor_msgs/msg/NavSatStatus", "status", "-2"),
+        ]
+    );
+    assert_eq!(geometry_msgs::Quaternion::default().w, 1.0);
+    assert_eq!(sensor_msgs::NavSatStatus::default().status, -2);
+}

@@ -1,0 +1,27 @@
+//! rosbag2 directories: reading, writing and playing.
+#![forbid(unsafe_code)]
+
+mod error;
+mod mcap_storage;
+mod messages;
+mod metadata;
+mod player;
+mod qos;
+mod reader;
+mod sniff;
+mod split;
+mod sqlite_storage;
+mod storage;
+#[cfg(test)]
+mod tests;
+mod topic;
+mod writer;
+mod zstd_files;
+
+pub use error::BagError;
+pub use messages::Messages;
+pub use player::{PlayedTopic, Player, PlayerOptions, Step};
+pub use qos::{BagDurability, BagDuration, BagHistory, BagLiveliness, BagQos, BagReliability};
+pub use reader::{BagReader, ReadOptions};
+pub use topic::{BagMessage, BagSummary, FileSummary, MAX_MESSAGE_BYTES, Storage, TopicInfo};
+pub use writer::{BagWriter, Compression, TopicSpec, WriterOptions};

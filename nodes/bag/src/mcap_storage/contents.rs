@@ -1,0 +1,188 @@
+//! What is known of an MCAP file before its messages are read.
+
+use std::{collections::BTreeMap, path::Path};
+
+use mcap::records::{Channel, Metadata as MetadataRecord, Record, op};
+
+use crate::{
+    BagError, TopicInfo,
+    metadata::Metadata,
+    storage::{StorageInfo, full_type_name, lenient_qos},
+};
+
+/// A stretch of the file that is read as one: a chunk, or messages outside of chunks.
+#[derive(Clone, Debug)]
+pub(super) struct Block {
+    /// Of the first record's opcode, bytes from the start of the file.
+    pub offset: u64,
+    /// Bytes of a chunk's record behind opcode and length, or of all records of a run of messages.
+    pub len: u64,
+    pub is_chunk: bool,
+    pub start_ns: u64,
+    pub end_ns: u64,
+    /// The channels inside, where known.
+    pub channels: Option<Box<[u16]>>,
+}
+
+struct Schema {
+    name: String,
+    encoding: String,
+    text: String,
+}
+
+/// Schemas, channels, blocks and counts.
+#[derive(Default)]
+pub(super) struct Contents {
+    schemas: BTreeMap<u16, Schema>,
+    pub channels: BTreeMap<u16, Channel>,
+    pub blocks: Vec<Block>,
+    pub counts: BTreeMap<u16, u64>,
+    pub message_count: u64,
+    pub range_ns: Option<(u64, u64)>,
+    pub metadata: Option<Metadata>,
+    pub damage: Option<BagError>,
+}
+
+impl Contents {
+    /// Takes a schema, channel or metadata record; the error is a reason.
+    pub(super) fn take(&mut self, opcode: u8, body: &[u8]) -> Result<(), String> {
+        match mcap::parse_record(opcode, body).map_err(|e| e.to_string())? {
+            Record::Schema { header, data } => {
+                let text = String::from_utf8_lossy(&data).into_owned();
+                let schema = Schema {
+                    name: header.name,
+                    encoding: header.encoding,
+                    text,
+                };
+                self.schemas.insert(header.id, schema);
+            }
+            Record::Channel(channel) => match self.channels.get(&channel.id) {
+                Some(known)
+                    if known.topic != channel.topic || known.schema_id != channel.schema_id =>
+                {
+                    return Err(format!(
+                        "channel {} is {} and again {}",
+                        channel.id, known.topic, channel.topic
+                    ));
+                }
+                _ => {
+                    self.channels.insert(channel.id, channel);
+                }
+            },
+            Record::Metadata(record) => self.take_metadata(&record),
+            _ => {}
+        }
+        Ok(())
+    }
+
+    pub(super) fn take_metadata(&mut self, record: &MetadataRecord) {
+        // rosbag2 writes the record again whenever it knows more; the last one holds.
+        if record.name == "rosbag2"
+            && let Some(text) = record.metadata.get("serialized_metadata")
+        {
+            self.metadata = Metadata::parse_embedded(text).or(self.metadata.take());
+        }
+    }
+
+    /// Counts a message seen in a scan.
+    pub(super) fn count(&mut self, channel: u16, log_time_ns: u64) {
+        *self.counts.entry(channel).or_default() += 1;
+        self.message_count += 1;
+        let (first, last) = self.range_ns.unwrap_or((log_time_ns, log_time_ns));
+        self.range_ns = Some((first.min(log_time_ns), last.max(log_time_ns)));
+    }
+
+    /// Whether every channel that has messages is known, with its schema.
+    pub(super) fn is_complete(&self) -> bool {
+        let has_schema = |c: &Channel| c.schema_id == 0 || self.schemas.contains_key(&c.schema_id);
+        self.channels.values().all(has_schema)
+            && self
+                .counts
+                .iter()
+                .all(|(id, count)| *count == 0 || self.channels.contains_key(id))
+    }
+
+    /// The topics, and the topic of each channel. Files without any CDR channel are foreign.
+    pub(super) fn topics(
+        &mut self,
+        path: &Path,
+        profile: &str,
+    ) -> Result<(StorageInfo, BTreeMap<u16, usize>), BagError> {
+        let is_cdr = |channel: &Channel| channel.message_encoding == "cdr";
+        if !self.channels.is_empty() && !self.channels.values().any(is_cdr) {
+            let mut encodings: Vec<_> = self
+                .channels
+                .values()
+                .map(|c| c.message_encoding.as_str())
+                .collect();
+            encodings.sort_unstable();
+            encodings.dedup();
+            return Err(BagError::Foreign {
+                path: path.to_path_buf(),
+                found: format!(
+                    "an MCAP file of {} messages (profile {profile:?})",
+                    encodings.join(" and ")
+                ),
+                remedy: "messages in CDR, as ROS 2 records them, are needed; convert it",
+            });
+        }
+        let mut info = StorageInfo {
+            message_count: self.message_count,
+            damage: self.damage.take(),
+            metadata: self.metadata.take(),
+            ..StorageInfo::default()
+        };
+        let mut topic_of = BTreeMap::new();
+        for (id, channel) in &self.channels {
+            let topic = self.topic(*id, channel);
+            let same = |t: &TopicInfo| t.is_same(&topic.name, &topic.type_name);
+            match info.topics.iter().position(same) {
+                Some(index) => {
+                    if let Some(known) = info.topics.get_mut(index) {
+                        known.message_count =
+                            known.message_count.saturating_add(topic.message_count);
+                    }
+                    topic_of.insert(*id, index);
+                }
+                None => {
+                    topic_of.insert(*id, info.topics.len());
+                    info.topics.push(topic);
+                }
+            }
+        }
+        Ok((info, topic_of))
+    }
+
+    fn topic(&self, id: u16, channel: &Channel) -> TopicInfo {
+        let schema = self.schemas.get(&channel.schema_id);
+        let is_text = |s: &&Schema| matches!(s.encoding.as_str(), "ros2msg" | "ros2idl" | "omgidl");
+        let qos = channel.metadata.get("offered_qos_profiles");
+        let hash = channel
+            .metadata
+            .get("topic_type_hash")
+            .filter(|hash| !hash.is_empty());
+        TopicInfo {
+            name: channel.topic.clone(),
+            type_name: schema.map(|s| full_type_name(&s.name)).unwrap_or_default(),
+            serialization_format: channel.message_encoding.clone(),
+            offered_qos: qos
+                .map(|text| lenient_qos(&channel.topic, text))
+                .unwrap_or_default(),
+            type_hash: hash.cloned(),
+            definition: schema
+                .filter(is_text)
+                .map(|s| s.text.clone())
+                .filter(|text| !text.is_empty()),
+            message_count: self.counts.get(&id).copied().unwrap_or(0),
+        }
+    }
+}
+
+/// Whether a record of the summary is one that [`Contents::take`] or the caller wants parsed.
+/// Attachments are left out on purpose: nothing of them is used.
+pub(super) fn is_wanted(opcode: u8) -> bool {
+    matches!(
+        opcode,
+        op::SCHEMA | op::CHANNEL | op::CHUNK_INDEX | op::STATISTICS | op::METADATA_INDEX
+    )
+}

@@ -1,0 +1,151 @@
+//! What to play, how fast and under which names.
+
+use crate::{BagError, BagReader, TopicInfo};
+
+/// Slowest and fastest playback.
+const RATES: std::ops::RangeInclusive<f64> = 1e-3..=1e3;
+/// Highest frequency of `/clock`, Hz.
+const MAX_CLOCK_HZ: f64 = 10_000.0;
+
+/// How to play a bag.
+#[derive(Clone, Debug)]
+pub struct PlayerOptions {
+    /// Bag seconds per second, 0.001 to 1000.
+    pub rate: f64,
+    /// Where to start, s after the first message.
+    pub start_offset_s: f64,
+    /// How much to play, s of the bag; to its end where nothing.
+    pub duration_s: Option<f64>,
+    /// Whether to start again at the end.
+    pub loop_: bool,
+    /// Names of the topics to play; all where nothing.
+    pub include: Option<Vec<String>>,
+    /// Names of topics not to play.
+    pub exclude: Vec<String>,
+    /// Pairs of a topic in the bag and the name it is published under.
+    pub remap: Vec<(String, String)>,
+    /// How often `/clock` is published per second of the caller; never where nothing.
+    pub clock_hz: Option<f64>,
+}
+
+impl Default for PlayerOptions {
+    fn default() -> Self {
+        PlayerOptions {
+            rate: 1.0,
+            start_offset_s: 0.0,
+            duration_s: None,
+            loop_: false,
+            include: None,
+            exclude: Vec::new(),
+            remap: Vec::new(),
+            clock_hz: None,
+        }
+    }
+}
+
+/// A topic that is played.
+#[derive(Clone, Debug)]
+pub struct PlayedTopic {
+    /// The name it is published under.
+    pub name: String,
+    /// Index into the reader's topics.
+    pub bag_topic: usize,
+    /// The topic as the bag has it.
+    pub info: TopicInfo,
+}
+
+impl PlayerOptions {
+    pub(super) fn check(&self) -> Result<(), BagError> {
+        check_rate(self.rate)?;
+        let seconds = |name, value: f64| match value.is_finite() && (0.0..=1e9).contains(&value) {
+            true => Ok(()),
+            false => Err(BagError::Invalid {
+                name,
+                reason: format!("{value} s; 0 to 1e9 s are accepted"),
+            }),
+        };
+        seconds("start_offset_s", self.start_offset_s)?;
+        self.duration_s
+            .map_or(Ok(()), |duration_s| seconds("duration_s", duration_s))?;
+        match self.clock_hz {
+            Some(hz) if !(hz > 0.0 && hz <= MAX_CLOCK_HZ) => Err(BagError::Invalid {
+                name: "clock_hz",
+                reason: format!("{hz} Hz; more than 0 and at most {MAX_CLOCK_HZ} Hz are accepted"),
+            }),
+            _ => Ok(()),
+        }
+    }
+
+    /// The topics to play, and those left out because they are not in CDR.
+    pub(super) fn topics(
+        &self,
+        reader: &BagReader,
+    ) -> Result<(Vec<PlayedTopic>, Vec<TopicInfo>), BagError> {
+        let remapped = self.remap.iter().map(|(from, _)| from);
+        let mut named = self
+            .include
+            .iter()
+            .flatten()
+            .chain(&self.exclude)
+            .chain(remapped);
+        if let Some(unknown) = named.find(|name| !reader.topics().iter().any(|t| t.name == **name))
+        {
+            let known: Vec<&str> = reader.topics().iter().map(|t| t.name.as_str()).collect();
+            return Err(BagError::Invalid {
+                name: "topics",
+                reason: format!(
+                    "{unknown} is not in the bag, which has {}",
+                    known.join(", ")
+                ),
+            });
+        }
+        if let Some((from, to)) = self.remap.iter().find(|(_, to)| !to.starts_with('/')) {
+            return Err(BagError::Invalid {
+                name: "remap",
+                reason: format!(
+                    "{from} to {to:?}, which is not a full topic name; it starts with '/'"
+                ),
+            });
+        }
+        let (mut played, mut skipped) = (Vec::new(), Vec::new());
+        for (bag_topic, info) in reader.topics().iter().enumerate() {
+            let is_included = self
+                .include
+                .as_ref()
+                .is_none_or(|names| names.contains(&info.name));
+            if !is_included || self.exclude.contains(&info.name) {
+                continue;
+            }
+            if info.serialization_format != "cdr" || info.type_name.is_empty() {
+                skipped.push(info.clone());
+                continue;
+            }
+            let to = self
+                .remap
+                .iter()
+                .find(|(from, _)| *from == info.name)
+                .map(|(_, to)| to);
+            played.push(PlayedTopic {
+                name: to.unwrap_or(&info.name).clone(),
+                bag_topic,
+                info: info.clone(),
+            });
+        }
+        Ok((played, skipped))
+    }
+}
+
+pub(super) fn check_rate(rate: f64) -> Result<(), BagError> {
+    match RATES.contains(&rate) {
+        true => Ok(()),
+        false => Err(BagError::Invalid {
+            name: "rate",
+            reason: format!("{rate}; 0.001 to 1000 is accepted"),
+        }),
+    }
+}
+
+/// Seconds checked before, in nanoseconds.
+pub(super) fn ns_from_s(seconds: f64) -> i64 {
+    (seconds * 1e9).round() as i64
+}

@@ -1,0 +1,343 @@
+//! Playing bags of a few messages.
+
+use std::{fs, path::Path};
+
+use super::*;
+use crate::{
+    BagWriter, Storage, WriterOptions,
+    tests::{cdr, spec},
+};
+
+const S: i64 = 1_000_000_000;
+const T0_NS: i64 = 1_700_000_000 * S;
+
+/// Messages at these whole seconds, on topics named with '!' for latched.
+fn bag(folder: &Path, messages: &[(&str, i64)]) -> BagReader {
+    let path = folder.join("bag");
+    let options = WriterOptions {
+        overwrite: true,
+        ..WriterOptions::default()
+    };
+    let mut writer = BagWriter::create(&path, Storage::Mcap, options).unwrap();
+    let mut names: Vec<&str> = messages.iter().map(|(name, _)| *name).collect();
+    names.sort_unstable();
+    names.dedup();
+    for name in &names {
+        writer
+            .add_topic(spec(name.trim_end_matches('!'), name.ends_with('!')))
+            .unwrap();
+    }
+    for (name, second) in messages {
+        let topic = names.iter().position(|n| n == name).unwrap();
+        writer
+            .write(topic, T0_NS + second * S, &cdr(*second, 2))
+            .unwrap();
+    }
+    writer.finish().unwrap();
+    BagReader::open(&path).unwrap()
+}
+
+/// Up to `count` steps, in short.
+fn play(player: &mut Player, count: usize) -> Vec<String> {
+    let mut steps = Vec::new();
+    while steps.len() < count {
+        steps.push(match player.next().unwrap() {
+            Step::Publish { topic, at_ns, .. } => {
+                format!(
+                    "{} {}",
+                    player.topics()[topic].name,
+                    at_ns as f64 / S as f64
+                )
+            }
+            Step::Clock(ns) => format!("clock {}", (ns - T0_NS) as f64 / S as f64),
+            Step::Looped => "looped".into(),
+            Step::End => {
+                steps.push("end".into());
+                break;
+            }
+        });
+    }
+    steps
+}
+
+fn options() -> PlayerOptions {
+    PlayerOptions::default()
+}
+
+#[test]
+fn messages_are_due_at_the_rate() {
+    let folder = tempfile::tempdir().unwrap();
+    let reader = bag(folder.path(), &[("/a", 0), ("/b", 1), ("/a", 4)]);
+    let mut player = Player::new(
+        reader,
+        PlayerOptions {
+            rate: 2.0,
+            ..options()
+        },
+    )
+    .unwrap();
+    assert_eq!(player.due_ns(), Some(0));
+    assert_eq!(play(&mut player, 9), ["/a 0", "/b 0.5", "/a 2", "end"]);
+    assert_eq!(player.next().unwrap(), Step::End);
+}
+
+#[test]
+fn latched_messages_before_the_start_come_first() {
+    let folder = tempfile::tempdir().unwrap();
+    let reader = bag(
+        folder.path(),
+        &[
+            ("/l!", 0),
+            ("/m!", 0),
+            ("/a", 1),
+            ("/l!", 2),
+            ("/a", 3),
+            ("/a", 5),
+            ("/l!", 6),
+        ],
+    );
+    let mut player = Player::new(
+        reader.clone(),
+        PlayerOptions {
+            start_offset_s: 3.0,
+            ..options()
+        },
+    )
+    .unwrap();
+    // Of /l only the last one before the start: its publisher kept one.
+    assert_eq!(
+        play(&mut player, 9),
+        ["/m 0", "/l 0", "/a 0", "/a 2", "/l 3", "end"]
+    );
+    let only = PlayerOptions {
+        start_offset_s: 3.0,
+        exclude: vec!["/m".into()],
+        duration_s: Some(2.0),
+        ..options()
+    };
+    let mut player = Player::new(reader, only).unwrap();
+    assert_eq!(play(&mut player, 9), ["/l 0", "/a 0", "end"]);
+}
+
+#[test]
+fn all_publishers_of_a_latched_topic_are_heard() {
+    let folder = tempfile::tempdir().unwrap();
+    let path = folder.path().join("bag");
+    let mut writer = BagWriter::create(&path, Storage::Sqlite3, WriterOptions::default()).unwrap();
+    let mut latched = spec("/tf_static", true);
+    latched.offered_qos.extend(latched.offered_qos.clone());
+    writer.add_topic(latched).unwrap();
+    writer.add_topic(spec("/a", false)).unwrap();
+    for second in 0..4 {
+        writer
+            .write(0, T0_NS + second * S, &cdr(second, 2))
+            .unwrap();
+    }
+    writer.write(1, T0_NS + 9 * S, &cdr(9, 2)).unwrap();
+    writer.finish().unwrap();
+    let options = PlayerOptions {
+        start_offset_s: 8.0,
+        ..options()
+    };
+    let mut player = Player::new(BagReader::open(&path).unwrap(), options).unwrap();
+    let Step::Publish { data, .. } = player.next().unwrap() else {
+        panic!()
+    };
+    assert_eq!(data, cdr(2, 2));
+    assert_eq!(play(&mut player, 9), ["/tf_static 0", "/a 1", "end"]);
+}
+
+#[test]
+fn loops_go_on_in_playback_time() {
+    let folder = tempfile::tempdir().unwrap();
+    let reader = bag(folder.path(), &[("/a", 0), ("/a", 2)]);
+    let mut player = Player::new(
+        reader,
+        PlayerOptions {
+            loop_: true,
+            ..options()
+        },
+    )
+    .unwrap();
+    assert_eq!(
+        play(&mut player, 7),
+        ["/a 0", "/a 2", "looped", "/a 2", "/a 4", "looped", "/a 4"]
+    );
+    // A single message does not spin.
+    let reader = bag(folder.path(), &[("/a", 0)]);
+    let mut player = Player::new(
+        reader,
+        PlayerOptions {
+            loop_: true,
+            ..options()
+        },
+    )
+    .unwrap();
+    assert_eq!(play(&mut player, 4), ["/a 0", "looped", "/a 0.1", "looped"]);
+    // Nothing at all does not loop.
+    let reader = bag(folder.path(), &[]);
+    let mut player = Player::new(
+        reader,
+        PlayerOptions {
+            loop_: true,
+            ..options()
+        },
+    )
+    .unwrap();
+    assert_eq!(play(&mut player, 4), ["end"]);
+}
+
+#[test]
+fn the_clock_ticks_between_messages() {
+    let folder = tempfile::tempdir().unwrap();
+    let reader = bag(folder.path(), &[("/a", 0), ("/a", 2)]);
+    let mut player = Player::new(
+        reader,
+        PlayerOptions {
+            clock_hz: Some(1.0),
+            rate: 0.5,
+            ..options()
+        },
+    )
+    .unwrap();
+    let expected = [
+        "clock 0",
+        "/a 0",
+        "clock 0.5",
+        "clock 1",
+        "clock 1.5",
+        "clock 2",
+        "/a 4",
+        "end",
+    ];
+    assert_eq!(play(&mut player, 20), expected);
+}
+
+#[test]
+fn pause_rate_and_seek_keep_the_time_consistent() {
+    let folder = tempfile::tempdir().unwrap();
+    let reader = bag(
+        folder.path(),
+        &[("/a", 0), ("/l!", 1), ("/a", 10), ("/a", 20), ("/a", 30)],
+    );
+    let mut player = Player::new(
+        reader,
+        PlayerOptions {
+            exclude: vec![],
+            ..options()
+        },
+    )
+    .unwrap();
+    assert_eq!(play(&mut player, 2), ["/a 0", "/l 1"]);
+    player.pause(4 * S);
+    assert_eq!(player.due_ns(), None);
+    assert_eq!(player.bag_time_ns(50 * S), T0_NS + 4 * S);
+    player.resume(100 * S);
+    assert_eq!(player.due_ns(), Some(106 * S));
+    player.set_rate(3.0, 100 * S).unwrap();
+    assert_eq!(player.due_ns(), Some(102 * S));
+    assert_eq!(play(&mut player, 1), ["/a 102"]);
+    player.seek(T0_NS + 15 * S, 200 * S).unwrap();
+    player.set_rate(1.0, 200 * S).unwrap();
+    assert_eq!(play(&mut player, 9), ["/l 200", "/a 205", "/a 215", "end"]);
+    // Back from the end, beyond the first message.
+    player.seek(0, 300 * S).unwrap();
+    assert_eq!(play(&mut player, 2), ["/a 300", "/l 301"]);
+}
+
+#[test]
+fn a_paused_player_plays_single_steps() {
+    let folder = tempfile::tempdir().unwrap();
+    let reader = bag(folder.path(), &[("/a", 0), ("/a", 5), ("/a", 6)]);
+    let mut player = Player::new(
+        reader,
+        PlayerOptions {
+            clock_hz: Some(10.0),
+            ..options()
+        },
+    )
+    .unwrap();
+    assert_eq!(play(&mut player, 2), ["clock 0", "/a 0"]);
+    player.pause(S);
+    assert!(matches!(player.next().unwrap(), Step::Publish { .. }));
+    player.resume(10 * S);
+    assert_eq!(player.bag_time_ns(10 * S), T0_NS + 5 * S);
+}
+
+#[test]
+fn topics_are_chosen_and_renamed() {
+    let folder = tempfile::tempdir().unwrap();
+    let reader = bag(folder.path(), &[("/a", 0), ("/b", 1), ("/c", 2)]);
+    let chosen = PlayerOptions {
+        include: Some(vec!["/a".into(), "/b".into()]),
+        exclude: vec!["/b".into()],
+        remap: vec![("/a".into(), "/front/points".into())],
+        ..options()
+    };
+    let mut player = Player::new(reader.clone(), chosen).unwrap();
+    assert_eq!(play(&mut player, 9), ["/front/points 0", "end"]);
+    for wrong in [
+        PlayerOptions {
+            include: Some(vec!["/x".into()]),
+            ..options()
+        },
+        PlayerOptions {
+            exclude: vec!["/x".into()],
+            ..options()
+        },
+        PlayerOptions {
+            remap: vec![("/a".into(), "b".into())],
+            ..options()
+        },
+        PlayerOptions {
+            rate: 0.0,
+            ..options()
+        },
+        PlayerOptions {
+            rate: f64::NAN,
+            ..options()
+        },
+        PlayerOptions {
+            start_offset_s: 3.0,
+            ..options()
+        },
+        PlayerOptions {
+            start_offset_s: -1.0,
+            ..options()
+        },
+        PlayerOptions {
+            duration_s: Some(f64::INFINITY),
+            ..options()
+        },
+        PlayerOptions {
+            clock_hz: Some(0.0),
+            ..options()
+        },
+    ] {
+        assert!(matches!(
+            Player::new(reader.clone(), wrong),
+            Err(BagError::Invalid { .. })
+        ));
+    }
+}
+
+#[test]
+fn a_truncated_bag_plays_up_to_the_cut_and_then_tells() {
+    let folder = tempfile::tempdir().unwrap();
+    let reader = bag(folder.path(), &[("/a", 0), ("/a", 1)]);
+    let file = reader.summary().files[0].path.clone();
+    let whole = fs::read(&file).unwrap();
+    // The data section ends with the first metadata record, written last.
+    let place = whole.windows(7).position(|w| w == b"rosbag2").unwrap();
+    fs::write(&file, &whole[..place]).unwrap();
+    let mut player = Player::new(BagReader::open(&file).unwrap(), options()).unwrap();
+    assert_eq!(play(&mut player, 2), ["/a 0", "/a 1"]);
+    assert!(matches!(
+        player.next(),
+        Err(BagError::Truncated {
+            readable_messages: 2,
+            ..
+        })
+    ));
+    assert_eq!(player.next().unwrap(), Step::End);
+}

@@ -1,0 +1,212 @@
+//! Messages of a SQLite file in order of log time, a page of keys at a time.
+
+use std::{collections::BTreeMap, collections::VecDeque, path::PathBuf, sync::Arc};
+
+use rusqlite::{Connection, params};
+use tempfile::TempPath;
+
+use crate::{
+    BagError, MAX_MESSAGE_BYTES,
+    storage::{Filter, StorageMessage},
+};
+
+/// Keys fetched at once; more where each fetch has to sort the whole table.
+const PAGE_KEYS: usize = 4096;
+const PAGE_KEYS_UNSORTED: usize = 1 << 20;
+/// Rescued keys are at most this many.
+const MAX_RESCUED_KEYS: usize = 1 << 26;
+
+/// Where a message is; sorts by time, then by row.
+#[derive(Clone, Copy, PartialEq, Eq, PartialOrd, Ord, Debug)]
+pub(super) struct Key {
+    pub timestamp_ns: i64,
+    pub id: i64,
+    pub topic_id: i64,
+    size_bytes: u64,
+}
+
+const KEY_COLUMNS: &str = "SELECT timestamp, id, topic_id, octet_length(data)";
+
+fn key(row: &rusqlite::Row<'_>) -> Result<Key, rusqlite::Error> {
+    Ok(Key {
+        timestamp_ns: row.get(0)?,
+        id: row.get(1)?,
+        topic_id: row.get(2)?,
+        size_bytes: row
+            .get::<_, Option<i64>>(3)?
+            .and_then(|n| u64::try_from(n).ok())
+            .unwrap_or(0),
+    })
+}
+
+/// The keys of all rows before the first one that cannot be read.
+pub(super) fn readable_keys(connection: &Connection) -> Vec<Key> {
+    let select = format!("{KEY_COLUMNS} FROM messages NOT INDEXED ORDER BY id");
+    let Ok(mut statement) = connection.prepare(&select) else {
+        return Vec::new();
+    };
+    let Ok(rows) = statement.query_map([], key) else {
+        return Vec::new();
+    };
+    rows.map_while(Result::ok).take(MAX_RESCUED_KEYS).collect()
+}
+
+pub(super) struct SqliteStream {
+    connection: Connection,
+    path: PathBuf,
+    /// Keeps a decompressed copy alive.
+    _temporary: Option<Arc<TempPath>>,
+    topic_of: Arc<BTreeMap<i64, usize>>,
+    filter: Filter,
+    keys: VecDeque<Key>,
+    /// The last key of the page before.
+    after: Option<(i64, i64)>,
+    page_keys: usize,
+    messages_read: u64,
+    damage: Option<BagError>,
+    ended: bool,
+}
+
+impl SqliteStream {
+    #[expect(
+        clippy::too_many_arguments,
+        reason = "one caller, which owns all of them"
+    )]
+    pub(super) fn new(
+        connection: Connection,
+        path: PathBuf,
+        temporary: Option<Arc<TempPath>>,
+        topic_of: Arc<BTreeMap<i64, usize>>,
+        filter: Filter,
+        rescued: Option<Arc<Vec<Key>>>,
+        has_time_index: bool,
+        damage: Option<BagError>,
+    ) -> SqliteStream {
+        let mut stream = SqliteStream {
+            connection,
+            path,
+            _temporary: temporary,
+            topic_of,
+            filter,
+            keys: VecDeque::new(),
+            after: None,
+            page_keys: if has_time_index {
+                PAGE_KEYS
+            } else {
+                PAGE_KEYS_UNSORTED
+            },
+            messages_read: 0,
+            damage,
+            ended: false,
+        };
+        if let Some(rescued) = rescued {
+            stream.keys = rescued
+                .iter()
+                .filter(|key| stream.wants(key))
+                .copied()
+                .collect();
+            // All there is: no page follows.
+            stream.page_keys = 0;
+        }
+        stream
+    }
+
+    fn wants(&self, key: &Key) -> bool {
+        self.topic_of
+            .get(&key.topic_id)
+            .is_some_and(|topic| self.filter.wants(*topic, key.timestamp_ns))
+    }
+
+    /// Fetches keys until some are wanted or none are left.
+    fn fetch_keys(&mut self) -> Result<(), BagError> {
+        let select = format!(
+            "{KEY_COLUMNS} FROM messages WHERE timestamp >= ?1 AND (timestamp, id) > (?1, ?2) AND timestamp <= ?3 \
+             ORDER BY timestamp, id LIMIT ?4"
+        );
+        while self.keys.is_empty() && self.page_keys > 0 {
+            let position = format!("message {}", self.messages_read);
+            let wrong = |e| BagError::sqlite(&self.path, &position, e);
+            let last_ns = match self.filter.end_ns {
+                None => i64::MAX,
+                Some(end_ns) => match end_ns.checked_sub(1) {
+                    Some(last_ns) => last_ns,
+                    None => return Ok(()),
+                },
+            };
+            let page: Vec<Key> = {
+                let mut statement = self.connection.prepare_cached(&select).map_err(wrong)?;
+                // Before the first page every row of the start time is due, whatever its id.
+                let (time_ns, id) = self.after.unwrap_or((self.filter.start_ns, i64::MIN));
+                let limit = i64::try_from(self.page_keys).unwrap_or(i64::MAX);
+                let rows = statement
+                    .query_map(params![time_ns, id, last_ns, limit], key)
+                    .map_err(wrong)?;
+                rows.collect::<Result<_, _>>().map_err(wrong)?
+            };
+            match page.last() {
+                Some(last) => self.after = Some((last.timestamp_ns, last.id)),
+                None => self.page_keys = 0,
+            }
+            self.keys = page.into_iter().filter(|key| self.wants(key)).collect();
+        }
+        Ok(())
+    }
+
+    fn read(&mut self, key: Key) -> Result<StorageMessage, BagError> {
+        let position = || format!("message {} (row {})", self.messages_read, key.id);
+        if key.size_bytes > MAX_MESSAGE_BYTES {
+            return Err(BagError::TooLarge {
+                path: self.path.clone(),
+                what: "a message",
+                position: position(),
+                size_bytes: key.size_bytes,
+                limit_bytes: MAX_MESSAGE_BYTES,
+                remedy: "delete the row, or leave its topic out",
+            });
+        }
+        let wrong = |e| BagError::sqlite(&self.path, position(), e);
+        let data = {
+            let select = "SELECT CAST(data AS BLOB) FROM messages WHERE id = ?1";
+            let mut statement = self.connection.prepare_cached(select).map_err(wrong)?;
+            statement
+                .query_row([key.id], |row| row.get::<_, Vec<u8>>(0))
+                .map_err(wrong)?
+        };
+        let topic = self
+            .topic_of
+            .get(&key.topic_id)
+            .copied()
+            .unwrap_or(usize::MAX);
+        self.messages_read += 1;
+        Ok(StorageMessage {
+            topic,
+            log_time_ns: key.timestamp_ns,
+            data,
+        })
+    }
+}
+
+impl Iterator for SqliteStream {
+    type Item = Result<StorageMessage, BagError>;
+
+    fn next(&mut self) -> Option<Self::Item> {
+        if self.ended {
+            return None;
+        }
+        let next = match self.fetch_keys() {
+            Ok(()) => self.keys.pop_front().map(|key| self.read(key)),
+            Err(error) => Some(Err(error)),
+        };
+        match next {
+            Some(Ok(message)) => Some(Ok(message)),
+            Some(Err(error)) => {
+                self.ended = true;
+                Some(Err(self.damage.take().unwrap_or(error)))
+            }
+            None => {
+                self.ended = true;
+                self.damage.take().map(Err)
+            }
+        }
+    }
+}

@@ -1,0 +1,232 @@
+//! What `lattice calibrate` answers.
+
+use std::fmt;
+
+use lattice_core::registration::{Calibration, DirectionKind, Registration};
+use nalgebra::Isometry3;
+use serde::Serialize;
+
+use std::collections::BTreeMap;
+
+/// An answer for people and programs.
+#[derive(Serialize)]
+pub struct Answer {
+    /// None for a single registration, which judges nothing.
+    verdict: Option<&'static str>,
+    reason: String,
+    method: String,
+    converged: Option<bool>,
+    map_from_cloud: Pose,
+    /// Row-major over x, y, z (m) and turns about x, y, z (rad), map frame; None without a verdict.
+    covariance: Option<Vec<f64>>,
+    sigma_m: Option<[f64; 3]>,
+    sigma_deg: Option<[f64; 3]>,
+    /// None if no other pose was found.
+    log_margin: Option<f64>,
+    inlier_fraction: f64,
+    rmse_m: f64,
+    weak_directions: Vec<Weak>,
+    classes: Vec<Class>,
+    points: usize,
+    map_points: usize,
+    times: Times,
+}
+
+#[derive(Serialize)]
+struct Pose {
+    translation_m: [f64; 3],
+    rotation_xyzw: [f64; 4],
+    yaw_deg: f64,
+}
+
+#[derive(Serialize)]
+struct Weak {
+    kind: &'static str,
+    axis: [f64; 3],
+    /// Metres or radians.
+    sigma: f64,
+}
+
+#[derive(Serialize)]
+struct Class {
+    class: u16,
+    name: Option<String>,
+    /// Share of its observations where the map says the same class.
+    agreement: f64,
+    observations: f64,
+}
+
+/// Wall times, milliseconds.
+#[derive(Clone, Copy, Default, Serialize)]
+pub struct Times {
+    pub read_ms: f64,
+    /// To make the map ready, which is done once for all calibrations.
+    pub map_ms: f64,
+    pub calibrate_ms: f64,
+}
+
+impl Answer {
+    /// Of a calibration.
+    pub fn of_calibration(calibration: &Calibration, names: &BTreeMap<u16, String>) -> Answer {
+        let covariance = &calibration.covariance;
+        let sigma = |i: usize| covariance[(i, i)].max(0.0).sqrt();
+        let weak = calibration.weak_directions.iter().map(|weak| Weak {
+            kind: match weak.kind {
+                DirectionKind::Translation => "translation",
+                DirectionKind::Rotation => "rotation",
+            },
+            axis: weak.axis.into(),
+            sigma: weak.sigma,
+        });
+        let classes = calibration.class_reliability.iter().map(|class| Class {
+            class: class.source_class,
+            name: names.get(&class.source_class).cloned(),
+            agreement: class.agreement,
+            observations: class.weight,
+        });
+        Answer {
+            verdict: Some(calibration.verdict.name()),
+            reason: calibration.reason.clone(),
+            method: calibration.method.to_owned(),
+            converged: None,
+            map_from_cloud: Pose::of(&calibration.map_from_headset),
+            // Symmetric, so that the order of columns is that of rows.
+            covariance: Some(covariance.iter().copied().collect()),
+            sigma_m: Some([0, 1, 2].map(sigma)),
+            sigma_deg: Some([3, 4, 5].map(|i| sigma(i).to_degrees())),
+            log_margin: (calibration.log_margin.is_finite()).then_some(calibration.log_margin),
+            inlier_fraction: calibration.inlier_fraction,
+            rmse_m: calibration.rmse_m,
+            weak_directions: weak.collect(),
+            classes: classes.collect(),
+            points: 0,
+            map_points: 0,
+            times: Times::default(),
+        }
+    }
+
+    /// Of a single registration of a cloud with so many points.
+    pub fn of_registration(method: &str, (registration, points): &(Registration, usize)) -> Answer {
+        Answer {
+            verdict: None,
+            reason: match registration.converged {
+                true => format!("converged after {} searches", registration.iterations),
+                false => format!("not converged after {} searches", registration.iterations),
+            },
+            method: method.to_owned(),
+            converged: Some(registration.converged),
+            map_from_cloud: Pose::of(&registration.target_from_source),
+            covariance: None,
+            sigma_m: None,
+            sigma_deg: None,
+            log_margin: None,
+            inlier_fraction: registration.inliers as f64 / (*points).max(1) as f64,
+            rmse_m: registration.rmse_m,
+            weak_directions: Vec::new(),
+            classes: Vec::new(),
+            points: 0,
+            map_points: 0,
+            times: Times::default(),
+        }
+    }
+
+    /// With what it was made of.
+    pub fn with_counts(self, points: usize, map_points: usize, times: Times) -> Answer {
+        Answer {
+            points,
+            map_points,
+            times,
+            ..self
+        }
+    }
+
+    /// Why the pose is not to be used, if so.
+    pub fn fault(&self) -> Option<String> {
+        match (self.verdict, self.converged) {
+            (Some("OK"), _) | (None, Some(true)) => None,
+            (Some(verdict), _) => Some(format!("{verdict}: {}", self.reason)),
+            (None, _) => Some(format!("{}: {}", self.method, self.reason)),
+        }
+    }
+}
+
+impl Pose {
+    fn of(pose: &Isometry3<f64>) -> Pose {
+        let forward = pose.rotation * nalgebra::Vector3::x();
+        Pose {
+            translation_m: pose.translation.vector.into(),
+            rotation_xyzw: pose.rotation.coords.into(),
+            yaw_deg: forward.y.atan2(forward.x).to_degrees(),
+        }
+    }
+}
+
+impl fmt::Display for Answer {
+    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
+        if let Some(verdict) = self.verdict {
+            writeln!(f, "verdict        {verdict}: {}", self.reason)?;
+            writeln!(f, "method         {}", self.method)?;
+        } else {
+            writeln!(f, "method         {}, {}", self.method, self.reason)?;
+        }
+        let [x, y, z] = self.map_from_cloud.translation_m;
+        writeln!(f, "translation    {x:.4} {y:.4} {z:.4} m")?;
+        let [qx, qy, qz, qw] = self.map_from_cloud.rotation_xyzw;
+        let yaw_deg = self.map_from_cloud.yaw_deg;
+        writeln!(
+            f,
+            "rotation       {qx:.6} {qy:.6} {qz:.6} {qw:.6} (x y z w), yaw {yaw_deg:.3} deg"
+        )?;
+        if let (Some([x, y, z]), Some([rx, ry, rz])) = (self.sigma_m, self.sigma_deg) {
+            writeln!(
+                f,
+                "sigma          {x:.4} {y:.4} {z:.4} m, {rx:.3} {ry:.3} {rz:.3} deg"
+            )?;
+        }
+        if let Some(margin) = self.log_margin.filter(|_| self.verdict.is_some()) {
+            writeln!(f, "log-margin     {margin:.1}")?;
+        }
+        writeln!(
+            f,
+            "on the map     {:.1} % of the points, {:.4} m RMS",
+            100.0 * self.inlier_fraction,
+            self.rmse_m
+        )?;
+        for weak in &self.weak_directions {
+            let [x, y, z] = weak.axis;
+            let sigma = match weak.kind {
+                "rotation" => format!("{:.3} deg", weak.sigma.to_degrees()),
+                _ => format!("{:.4} m", weak.sigma),
+            };
+            writeln!(
+                f,
+                "weak           {} along {x:.2} {y:.2} {z:.2}: {sigma}",
+                weak.kind
+            )?;
+        }
+        for class in &self.classes {
+            let name = class.name.as_deref().unwrap_or("class");
+            writeln!(
+                f,
+                "label          {name} ({}): map agrees {:.0} % of {:.0}",
+                class.class,
+                100.0 * class.agreement,
+                class.observations
+            )?;
+        }
+        let Times {
+            read_ms,
+            map_ms,
+            calibrate_ms,
+        } = self.times;
+        writeln!(
+            f,
+            "points         {} in a map of {}",
+            self.points, self.map_points
+        )?;
+        writeln!(
+            f,
+            "time           {read_ms:.0} ms to read, {map_ms:.0} ms for the map, {calibrate_ms:.0} ms to calibrate"
+        )
+    }
+}

@@ -1,0 +1,196 @@
+//! What `lattice calibrate` is given.
+
+use std::error::Error;
+use std::fs;
+use std::io::{ErrorKind, Write};
+use std::path::{Path, PathBuf};
+use std::str::FromStr;
+
+use lattice_core::pose::Axes;
+use lattice_core::registration::{Confusion, HeadsetScan, SemanticCloud, voxel_downsample};
+use nalgebra::{Isometry3, Point3, Quaternion, Translation3, UnitQuaternion, Vector3};
+
+use lattice_nodes::files::semantic::read_semantic;
+
+/// Least side of the cells of a map that is a point file, metres.
+const MIN_CELL_M: f64 = 0.05;
+/// Sides of cells on the diagonal of a map that is a point file.
+const CELLS_A_DIAGONAL: f64 = 400.0;
+/// Longest file of what was learned, bytes.
+const MAX_CONFUSION_BYTES: u64 = 1 << 20;
+
+type Fault = Box<dyn Error + Send + Sync>;
+
+/// `map_from_headset` as it is typed.
+#[derive(Clone, Debug)]
+pub struct Guess(pub Isometry3<f64>);
+
+/// A position as it is typed, metres.
+#[derive(Clone, Debug)]
+pub struct Place(pub Point3<f64>);
+
+impl FromStr for Guess {
+    type Err = String;
+
+    fn from_str(text: &str) -> Result<Guess, String> {
+        let (place, rotation) = match numbers(text)?.as_slice() {
+            &[x, y, z, yaw_deg] => {
+                let yaw = Vector3::z() * yaw_deg.to_radians();
+                ([x, y, z], UnitQuaternion::from_scaled_axis(yaw))
+            }
+            &[x, y, z, qx, qy, qz, qw] => {
+                let quaternion = Quaternion::new(qw, qx, qy, qz);
+                if (quaternion.norm() - 1.0).abs() > 0.01 {
+                    return Err(format!("the quaternion has length {}", quaternion.norm()));
+                }
+                ([x, y, z], UnitQuaternion::from_quaternion(quaternion))
+            }
+            other => return Err(format!("{} numbers instead of 4 or 7", other.len())),
+        };
+        Ok(Guess(Isometry3::from_parts(
+            Translation3::from(place),
+            rotation,
+        )))
+    }
+}
+
+impl FromStr for Place {
+    type Err = String;
+
+    fn from_str(text: &str) -> Result<Place, String> {
+        match numbers(text)?.as_slice() {
+            &[x, y, z] => Ok(Place(Point3::new(x, y, z))),
+            other => Err(format!("{} numbers instead of 3", other.len())),
+        }
+    }
+}
+
+fn numbers(text: &str) -> Result<Vec<f64>, String> {
+    let words = text.split([' ', ',']).filter(|word| !word.is_empty());
+    let number = |word: &str| {
+        let value = word.parse::<f64>().ok().filter(|v| v.is_finite());
+        value.ok_or_else(|| {
+            format!(
+                "{:?} is not a number",
+                word.chars().take(40).collect::<String>()
+            )
+        })
+    };
+    words.map(number).collect()
+}
+
+/// The map and the side of its cells; point files are thinned to cells.
+pub fn map(
+    path: &Path,
+    cell_side_m: Option<f64>,
+    max_points: usize,
+) -> Result<(SemanticCloud, f64), Fault> {
+    let file = read_semantic(path, max_points)?;
+    if file.cloud.is_empty() {
+        return Err(format!("{}: the map has no points", path.display()).into());
+    }
+    if let (Some(side_m), None) = (file.cell_side_m, cell_side_m) {
+        return Ok((file.cloud, side_m));
+    }
+    let side_m = cell_side_m.unwrap_or_else(|| usual_cell_m(&file.cloud));
+    Ok((voxel_downsample(&file.cloud, side_m), side_m))
+}
+
+fn usual_cell_m(cloud: &SemanticCloud) -> f64 {
+    let mut low = Point3::from([f64::INFINITY; 3]);
+    let mut high = Point3::from([f64::NEG_INFINITY; 3]);
+    for point in &cloud.points_m {
+        low = low.inf(point);
+        high = high.sup(point);
+    }
+    ((high - low).norm() / CELLS_A_DIAGONAL).max(MIN_CELL_M)
+}
+
+/// The clouds, in the axes of ROS.
+pub fn headset_scans(
+    paths: &[PathBuf],
+    axes: Axes,
+    sensor_m: Option<Point3<f64>>,
+    max_points: usize,
+) -> Result<Vec<HeadsetScan>, Fault> {
+    let headset_scan = |path: &PathBuf| {
+        let mut cloud = read_semantic(path, max_points)?.cloud;
+        for point in &mut cloud.points_m {
+            *point = axes.point_to_ros(point);
+        }
+        Ok(HeadsetScan { cloud, sensor_m })
+    };
+    paths.iter().map(headset_scan).collect()
+}
+
+/// What was learned before, if there is a file.
+pub fn confusion(path: &Path) -> Result<Option<Confusion>, Fault> {
+    let here = |e: &dyn std::fmt::Display| format!("{}: {e}", path.display());
+    let bytes = match fs::metadata(path) {
+        Err(e) if e.kind() == ErrorKind::NotFound => return Ok(None),
+        Err(e) => return Err(here(&e).into()),
+        Ok(about) if about.len() > MAX_CONFUSION_BYTES => {
+            return Err(here(&"too long for what calibrations learn").into());
+        }
+        Ok(_) => fs::read(path).map_err(|e| here(&e))?,
+    };
+    let known: Confusion = serde_json::from_slice(&bytes).map_err(|e| here(&e))?;
+    match known.is_valid() {
+        true => Ok(Some(known)),
+        false => Err(here(&"not what a calibration learned").into()),
+    }
+}
+
+/// Writes what was learned; readers see the whole file or what was there before.
+pub fn keep_confusion(path: &Path, confusion: &Confusion) -> Result<(), Fault> {
+    let folder = path
+        .parent()
+        .filter(|folder| !folder.as_os_str().is_empty());
+    let write = || -> Result<(), Fault> {
+        let mut file = tempfile::NamedTempFile::new_in(folder.unwrap_or(Path::new(".")))?;
+        file.write_all(&serde_json::to_vec_pretty(confusion)?)?;
+        file.persist(path)?;
+        Ok(())
+    };
+    write().map_err(|e| format!("{}: {e}", path.display()).into())
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn guesses_are_a_heading_or_a_quaternion() {
+        let a: Guess = "1 -2 0.5 90".parse().unwrap();
+        let half = 0.5_f64.sqrt();
+        let b: Guess = format!("1, -2, 0.5, 0, 0, {half}, {half}").parse().unwrap();
+        assert!((a.0.to_homogeneous() - b.0.to_homogeneous()).norm() < 1e-12);
+        assert!((a.0 * Point3::new(1.0, 0.0, 0.0) - Point3::new(1.0, -1.0, 0.5)).norm() < 1e-12);
+        for (text, fault) in [
+            ("1 2 3", "3 numbers instead of 4 or 7"),
+            ("1 2 3 x", "\"x\" is not a number"),
+            ("1 2 3 inf", "\"inf\" is not a number"),
+            ("0 0 0 0 0 0 2", "the quaternion has length 2"),
+        ] {
+            assert_eq!(text.parse::<Guess>().unwrap_err(), fault);
+        }
+        assert_eq!(
+            "1 2".parse::<Place>().unwrap_err(),
+            "2 numbers instead of 3"
+        );
+    }
+
+    #[test]
+    fn what_was_learned_is_kept_and_nonsense_is_refused() {
+        let folder = tempfile::tempdir().unwrap();
+        let path = folder.path().join("learned.json");
+        assert_eq!(confusion(&path).unwrap(), None);
+        keep_confusion(&path, &Confusion::default()).unwrap();
+        assert_eq!(confusion(&path).unwrap(), Some(Confusion::default()));
+        for text in ["", "[]", "{\"pairs\":[[1,1,-5.0]]}"] {
+            fs::write(&path, text).unwrap();
+            let fault = confusion(&path).unwrap_err().to_string();
+            assert!(fault.contains("learned.json"), "{fault}");
+        }
+    }
+}

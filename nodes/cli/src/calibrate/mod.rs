@@ -1,0 +1,215 @@
+//! `lattice calibrate`: where one cloud lies in another.
+
+mod answer;
+mod input;
+mod methods;
+
+use std::collections::BTreeMap;
+use std::ops::ControlFlow;
+use std::path::PathBuf;
+use std::time::Instant;
+
+use clap::Args;
+use lattice_core::pose::Axes;
+use lattice_core::registration::{
+    CalibrationMap, CalibrationOptions, CalibrationRequest, Stage, Verdict, calibrate,
+};
+
+use super::progress::Progress;
+use super::{CliResult, init_logging};
+use answer::{Answer, Times};
+use input::{Guess, Place};
+use lattice_nodes::files::classes::read_classes;
+use methods::MethodName;
+
+/// Options of `lattice calibrate`.
+///
+/// Finds where the frame of a cloud lies in a map, without a guess if none is given, and says whether
+/// the answer can be trusted. The exit status is 0 only with the verdict OK, or with a method other
+/// than `auto` if it converged; the answer is printed in any case.
+#[derive(Args)]
+pub struct Calibrate {
+    /// Map file, or ply, pcd, xyz (also .bz2) with or without a number `label` of each point; metres, z up
+    #[arg(long, value_name = "FILE")]
+    map: PathBuf,
+    /// Cloud to find in it, of the same kinds; gravity along -z once the axes are those of ROS. Several
+    /// of one frame are taken together
+    #[arg(long, value_name = "FILE", required = true)]
+    cloud: Vec<PathBuf>,
+    /// YAML with the names of the classes, `classes:` followed by lines `number: name`
+    #[arg(long, value_name = "FILE")]
+    labels: Option<PathBuf>,
+    /// The cloud's frame in the map as far as it is known: "x y z yaw_deg" or "x y z qx qy qz qw"
+    #[arg(long, allow_hyphen_values = true)]
+    guess: Option<Guess>,
+    /// Where the sensor of the cloud was, in its axes: "x y z" (m)
+    #[arg(long, allow_hyphen_values = true)]
+    sensor: Option<Place>,
+    /// Axes of the cloud: ros_flu, unity_ruf (left-handed), winrt_rub or optical
+    #[arg(long, default_value = "ros_flu")]
+    axes: Axes,
+    /// auto searches and judges; the others are single registrations from the guess
+    #[arg(long, value_enum, default_value = "auto")]
+    method: MethodName,
+    /// Longest distance of a pair of points for the single registrations, m [default: as published]
+    #[arg(long)]
+    gate: Option<f64>,
+    /// What earlier calibrations learned of how the labels go together: read if it is there, written back
+    /// after a calibration that is OK
+    #[arg(long, value_name = "FILE")]
+    confusion: Option<PathBuf>,
+    /// Side of the cells that points are thinned to, m [default: that of the map file; of a point file
+    /// 1/400 of the diagonal, at least 0.05]
+    #[arg(long)]
+    cell: Option<f64>,
+    /// What made the cloud: how far it errs, and whether it knows where down is, follow from it
+    #[arg(long, value_enum, default_value_t = Sensor::Headset)]
+    from: Sensor,
+    /// Standard deviation of the cloud's points, m [default: 0.02 of a headset, 0.03 of a lidar]
+    #[arg(long)]
+    noise: Option<f64>,
+    /// Most points to read of a file
+    #[arg(long, default_value_t = 20_000_000)]
+    max_points: usize,
+    /// Print as JSON
+    #[arg(long)]
+    json: bool,
+}
+
+/// What makes clouds.
+#[derive(Clone, Copy, Debug, clap::ValueEnum)]
+enum Sensor {
+    /// The mesh of a mixed-reality headset, upright
+    Headset,
+    /// A laser scanner, outdoors, that may lean
+    Lidar,
+}
+
+impl Sensor {
+    fn options(self) -> CalibrationOptions {
+        match self {
+            Sensor::Headset => CalibrationOptions::default(),
+            Sensor::Lidar => CalibrationOptions::lidar(),
+        }
+    }
+}
+
+impl Calibrate {
+    /// Runs the command.
+    pub fn run(self) -> CliResult {
+        init_logging();
+        self.check()?;
+        let names = match &self.labels {
+            Some(path) => read_classes(path).map_err(|e| format!("{}: {e}", path.display()))?,
+            None => BTreeMap::new(),
+        };
+        let started = Instant::now();
+        let (map, cell_side_m) = input::map(&self.map, self.cell, self.max_points)?;
+        let sensor_m = self.sensor.as_ref().map(|p| self.axes.point_to_ros(&p.0));
+        let headset_scans =
+            input::headset_scans(&self.cloud, self.axes, sensor_m, self.max_points)?;
+        let mut times = Times {
+            read_ms: milliseconds(started),
+            ..Times::default()
+        };
+        let points = headset_scans
+            .iter()
+            .map(|headset_scan| headset_scan.cloud.len())
+            .sum();
+        let map_points = map.len();
+        let answer = match self.method.single() {
+            Some(method) => {
+                let start = self.guess.as_ref().map(|g| g.0).unwrap_or_default();
+                let single = methods::Single {
+                    method,
+                    gate_m: self.gate,
+                    cell_side_m,
+                };
+                let registration = single.register(map, headset_scans, &start, &mut times)?;
+                Answer::of_registration(self.method.name(), &registration)
+            }
+            None => self.search(map, cell_side_m, &headset_scans, &names, &mut times)?,
+        };
+        let answer = answer.with_counts(points, map_points, times);
+        if self.json {
+            println!("{}", serde_json::to_string_pretty(&answer)?);
+        } else {
+            print!("{answer}");
+        }
+        match answer.fault() {
+            None => Ok(()),
+            Some(fault) => Err(fault.into()),
+        }
+    }
+
+    fn check(&self) -> Result<(), String> {
+        let positive = |name: &str, value: Option<f64>| match value {
+            Some(v) if !(v.is_finite() && v > 0.0) => {
+                Err(format!("--{name} {v} is no length over 0"))
+            }
+            _ => Ok(()),
+        };
+        positive("gate", self.gate)?;
+        positive("cell", self.cell)?;
+        positive("noise", self.noise)
+    }
+
+    /// Searches, judges and keeps what was learned.
+    fn search(
+        &self,
+        map: lattice_core::registration::SemanticCloud,
+        cell_side_m: f64,
+        headset_scans: &[lattice_core::registration::HeadsetScan],
+        names: &BTreeMap<u16, String>,
+        times: &mut Times,
+    ) -> Result<Answer, Box<dyn std::error::Error + Send + Sync>> {
+        let known = match &self.confusion {
+            Some(path) => input::confusion(path)?,
+            None => None,
+        };
+        let bar = Progress::new("calibrate");
+        bar.say("map");
+        let started = Instant::now();
+        let map = CalibrationMap::new(map, cell_side_m)
+            .map_err(|e| format!("{}: {e}", self.map.display()))?;
+        times.map_ms = milliseconds(started);
+        let request = CalibrationRequest {
+            headset_scans,
+            start: self.guess.as_ref().map(|guess| guess.0),
+            confusion: known.as_ref(),
+        };
+        let usual = self.from.options();
+        let options = CalibrationOptions {
+            noise_m: self.noise.unwrap_or(usual.noise_m),
+            ..usual
+        };
+        let started = Instant::now();
+        let calibration = calibrate(&map, &request, &options, &Shown(&bar));
+        times.calibrate_ms = milliseconds(started);
+        bar.done();
+        if let (Some(path), Verdict::Ok) = (&self.confusion, calibration.verdict) {
+            input::keep_confusion(path, &calibration.confusion)?;
+        }
+        Ok(Answer::of_calibration(&calibration, names))
+    }
+}
+
+fn milliseconds(since: Instant) -> f64 {
+    since.elapsed().as_secs_f64() * 1e3
+}
+
+/// Shows how far a calibration is.
+struct Shown<'a>(&'a Progress);
+
+impl lattice_core::registration::Progress for Shown<'_> {
+    fn report(&self, stage: Stage, fraction: f64) -> ControlFlow<()> {
+        self.0.set(fraction);
+        self.0.say(match stage {
+            Stage::Prepare => "clouds",
+            Stage::Search => "search",
+            Stage::Refine => "refine",
+            Stage::Judge => "judge",
+        });
+        ControlFlow::Continue(())
+    }
+}

@@ -1,0 +1,98 @@
+//! `lattice demo`: from a simulated log to maps of all lattices, through real nodes.
+
+use std::fs;
+use std::path::PathBuf;
+
+use clap::Args;
+
+use super::{picture, simulate};
+use crate::replay::Replay;
+use crate::{CliResult, Lattices, init_logging};
+use lattice_bag::Storage;
+use lattice_core::lattice::LatticeKind;
+use lattice_lab::datasets::BobcatOptions;
+use lattice_lab::render::RenderOptions;
+
+/// Parameters of the simulated machine, for users to copy.
+const BOBCAT_PARAMS: &str = include_str!("../../../../params/bobcat.yaml");
+
+/// Simulate, play, map
+#[derive(Args)]
+pub struct Demo {
+    /// Directory for the log and the maps
+    #[arg(long, default_value = "target/lattice_demo")]
+    out: PathBuf,
+    /// Seed of the simulation
+    #[arg(long, default_value_t = 1)]
+    seed: u64,
+    /// Length of the log in s
+    #[arg(long, default_value_t = 20.0)]
+    duration: f64,
+    /// Speed of the log, 1 is real time
+    #[arg(long, default_value_t = 1.0)]
+    rate: f64,
+    /// cubic, bcc, fcc, mcc, hex, hexopt, several with commas (five at most), or paper
+    #[arg(long, default_value = "paper")]
+    lattice: Lattices,
+    /// Print the report as JSON
+    #[arg(long)]
+    json: bool,
+}
+
+impl Demo {
+    /// Runs the command.
+    pub fn run(self) -> CliResult {
+        init_logging();
+        let bag = self.out.join("log");
+        let params = self.out.join("bobcat.yaml");
+        fs::create_dir_all(&self.out).map_err(|e| format!("{}: {e}", self.out.display()))?;
+        fs::write(&params, BOBCAT_PARAMS).map_err(|e| format!("{}: {e}", params.display()))?;
+        let summary = simulate::bobcat(&BobcatOptions {
+            seed: self.seed,
+            duration_s: self.duration,
+            storage: Storage::Mcap,
+            out: bag.clone(),
+            overwrite: true,
+        })?;
+        eprintln!("{summary}");
+        let replay = Replay {
+            bag,
+            direct: false,
+            lattice: Some(self.lattice.clone()),
+            cell_volume: None,
+            orientation: None,
+            params: vec![params],
+            param: Vec::new(),
+            points: Vec::new(),
+            ins: None,
+            ins_topic: None,
+            threads: 0,
+            rate: self.rate,
+            map_out: None,
+            json: self.json,
+        };
+        let report = replay.replay()?;
+        // The same log without DDS: the map that the nodes should have made, and its picture.
+        let png = self.out.join("map.png");
+        let direct = Replay {
+            direct: true,
+            lattice: Some(Lattices(vec![LatticeKind::Fcc])),
+            map_out: Some(self.out.join("map.lattice")),
+            ..replay
+        };
+        direct.replay()?;
+        let (map, _) = crate::map::read(&self.out.join("map.lattice"))?;
+        picture(&map.into_list(usize::MAX), &RenderOptions::default(), &png)?;
+        if self.json {
+            println!("{}", serde_json::to_string_pretty(&report)?);
+        } else {
+            println!("{report}");
+            println!(
+                "log {}, picture {}",
+                self.out.join("log").display(),
+                png.display()
+            );
+        }
+        Ok(())
+    }
+}

@@ -1,0 +1,222 @@
+//! `lattice evaluate`: what the algorithms are worth, measured.
+
+use std::fs;
+use std::io::Write;
+use std::ops::ControlFlow;
+use std::path::{Path, PathBuf};
+use std::time::{Duration, Instant};
+
+use clap::{Args, Subcommand};
+use lattice_lab::simulate::house::Scene;
+
+use super::evaluate_kitti::Kitti;
+use crate::progress::Progress;
+use crate::{CliResult, init_logging};
+use lattice_lab::evaluate::{
+    Baseline, EvaluateError, OURS, Pivot, Plan, Results, Settings, Start, Summary, TIMED, TRACKED,
+    World, draw, markdown, read_house, run,
+};
+
+/// Measure what the algorithms are worth
+#[derive(Subcommand)]
+pub enum Evaluate {
+    /// Calibrate a headset to a robot's map in a simulated house: four scenes, wrong labels, starts that
+    /// are off or none at all, against ICP, GICP and Semantic-ICP
+    Calibration(Calibration),
+    /// Register real labelled laser scans with each method, against the truth of an INS
+    Kitti(Kitti),
+}
+
+/// Options of `lattice evaluate calibration`.
+#[derive(Args)]
+pub struct Calibration {
+    /// Folder of the results and the report; a run that was ended goes on where it was
+    #[arg(long)]
+    out: PathBuf,
+    /// PLY of a house, metres, z up, with `label` and `instance` of each face [default: a house of our own]
+    #[arg(long, value_name = "PLY", requires = "classes")]
+    mesh: Option<PathBuf>,
+    /// YAML with the names of its classes
+    #[arg(long, value_name = "YAML", requires = "mesh")]
+    classes: Option<PathBuf>,
+    /// Trials of each cell
+    #[arg(long, default_value_t = 30)]
+    seeds: u64,
+    /// Shares of the view that are labelled wrongly, object by object
+    #[arg(long, value_delimiter = ',', default_values_t = Plan::default().flips)]
+    flips: Vec<f64>,
+    /// Of tv, desk, bookshelf, dining
+    #[arg(long, value_delimiter = ',', value_parser = scene, default_value = "tv,desk,bookshelf,dining")]
+    scenes: Vec<Scene>,
+    /// What is known before: metres/degrees off, or none
+    #[arg(long, value_delimiter = ',', default_values_t = Plan::default().starts)]
+    starts: Vec<Start>,
+    /// What starts are moved and turned at: view (the midst of what is seen) or headset
+    #[arg(long, value_parser = pivot, default_value = "view")]
+    pivot: Pivot,
+    /// Only these methods, named as in trials.jsonl [default: all]
+    #[arg(long, value_delimiter = ',', value_parser = method)]
+    methods: Vec<String>,
+    /// Trials at once [default: as many as processors]
+    #[arg(long)]
+    threads: Option<usize>,
+    /// Pictures that the headset takes
+    #[arg(long, default_value_t = 1)]
+    headset_scans: usize,
+    /// A class is always taken for the same other one
+    #[arg(long)]
+    consistent: bool,
+    /// Share of single points with a random class
+    #[arg(long, default_value_t = 0.0)]
+    iid: f64,
+    /// Side of a cell of the robot's map, m
+    #[arg(long, default_value_t = Settings::default().cell_side_m)]
+    cell: f64,
+    /// Surveys of the robot
+    #[arg(long, default_value_t = Settings::default().map_seeds)]
+    maps: u64,
+    /// A few trials, in less than a minute
+    #[arg(long)]
+    quick: bool,
+    /// Print the report as JSON
+    #[arg(long)]
+    json: bool,
+}
+
+fn scene(name: &str) -> Result<Scene, String> {
+    let found = Scene::ALL.into_iter().find(|scene| scene.name() == name);
+    found.ok_or_else(|| "one of tv, desk, bookshelf, dining".to_owned())
+}
+
+fn method(name: &str) -> Result<String, String> {
+    let mut known: Vec<&str> = Baseline::all()
+        .iter()
+        .map(|baseline| baseline.name)
+        .collect();
+    known.extend([OURS, TIMED, TRACKED]);
+    match known.contains(&name) {
+        true => Ok(name.to_owned()),
+        false => Err(format!("one of {}", known.join(", "))),
+    }
+}
+
+fn pivot(name: &str) -> Result<Pivot, String> {
+    match name {
+        "view" => Ok(Pivot::View),
+        "headset" => Ok(Pivot::Headset),
+        _ => Err("one of view, headset".to_owned()),
+    }
+}
+
+impl Evaluate {
+    /// Runs the command.
+    pub fn run(self) -> CliResult {
+        init_logging();
+        match self {
+            Self::Calibration(command) => command.run(),
+            Self::Kitti(command) => command.run(),
+        }
+    }
+}
+
+impl Calibration {
+    fn run(self) -> CliResult {
+        let mesh = self.mesh.as_deref().zip(self.classes.as_deref());
+        let (house, mesh_crc32) = read_house(mesh, 1)?;
+        let settings = Settings {
+            mesh_crc32,
+            cell_side_m: self.cell,
+            map_seeds: if self.quick { 1 } else { self.maps },
+            headset_scans: self.headset_scans,
+            consistent: self.consistent,
+            iid: self.iid,
+            pivot: self.pivot,
+            ..Settings::default()
+        };
+        let plan = self.plan();
+        let threads = self.threads.unwrap_or_else(processors).clamp(1, 1024);
+        let world = World::new(house, &settings)?;
+        let mut results = Results::open(&self.out, &settings)?;
+        let bar = Progress::new("evaluate");
+        let started = Instant::now();
+        let ran = run(&world, &plan, &mut results, threads, &mut |done, total| {
+            bar.set(done as f64 / total.max(1) as f64);
+            let left = started
+                .elapsed()
+                .mul_f64((total - done) as f64 / done.max(1) as f64);
+            bar.say(&format!("{done} of {total}, {} left", clock(left)));
+            ControlFlow::Continue(())
+        });
+        bar.done();
+        ran?;
+        let summary = report(&self.out, &settings, results, threads)?;
+        if self.json {
+            println!("{}", serde_json::to_string_pretty(&summary)?);
+        } else {
+            print!("{}", markdown(&summary));
+            println!("\nwritten to {}", self.out.display());
+        }
+        Ok(())
+    }
+
+    fn plan(&self) -> Plan {
+        if self.quick {
+            return Plan {
+                scenes: self.scenes.clone(),
+                first_seed: 0,
+                seeds: 1,
+                flips: vec![0.0, 0.6],
+                starts: vec![Start::Off { m: 0.3, deg: 10.0 }, Start::None],
+                methods: self.methods.clone(),
+                timed_seeds: 1,
+            };
+        }
+        Plan {
+            scenes: self.scenes.clone(),
+            seeds: self.seeds,
+            flips: self.flips.clone(),
+            starts: self.starts.clone(),
+            methods: self.methods.clone(),
+            ..Plan::default()
+        }
+    }
+}
+
+fn processors() -> usize {
+    std::thread::available_parallelism().map_or(1, usize::from)
+}
+
+fn clock(time: Duration) -> String {
+    let seconds = time.as_secs();
+    format!(
+        "{}:{:02}:{:02}",
+        seconds / 3600,
+        seconds / 60 % 60,
+        seconds % 60
+    )
+}
+
+/// Writes report.md, report.json and the pictures.
+fn report(
+    folder: &Path,
+    settings: &Settings,
+    results: Results,
+    threads: usize,
+) -> Result<Summary, EvaluateError> {
+    let trials = results.sorted();
+    let summary = Summary::new(settings, &trials, threads);
+    let fault = |path: &Path, e: &dyn std::fmt::Display| EvaluateError::Report {
+        path: path.to_owned(),
+        reason: e.to_string(),
+    };
+    let write = |name: &str, content: &[u8]| {
+        let path = folder.join(name);
+        let file = fs::File::create(&path).and_then(|mut file| file.write_all(content));
+        file.map_err(|e| fault(&path, &e))
+    };
+    write("report.md", markdown(&summary).as_bytes())?;
+    let json = serde_json::to_vec_pretty(&summary).map_err(|e| fault(folder, &e))?;
+    write("report.json", &json)?;
+    draw(folder, &summary, &trials).map_err(|e| fault(folder, &e))?;
+    Ok(summary)
+}

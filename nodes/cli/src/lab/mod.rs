@@ -1,0 +1,57 @@
+//! The commands of the laboratory: simulation, papers, evaluations, benchmarks.
+
+mod bench;
+mod bench_register;
+mod demo;
+mod evaluate;
+mod evaluate_kitti;
+mod paper;
+mod simulate;
+
+use std::fs::File;
+use std::io::BufWriter;
+use std::path::Path;
+
+use clap::Subcommand;
+use lattice_core::voxels::VoxelList;
+use lattice_lab::render::{RenderOptions, render_png};
+
+use crate::CliResult;
+
+/// Commands of the laboratory.
+#[derive(Subcommand)]
+pub enum Lab {
+    /// Simulate a loader at work, play its log through the nodes, show the maps of all lattices
+    Demo(demo::Demo),
+    /// Write the log, the points or the map of a simulated machine
+    #[command(subcommand)]
+    Simulate(simulate::Simulate),
+    /// Measure what the algorithms are worth
+    #[command(subcommand)]
+    Evaluate(evaluate::Evaluate),
+    /// Compute every table and figure of a paper and set it beside what is printed
+    #[command(subcommand)]
+    Paper(paper::Paper),
+    /// Measure quantizers and stores on a raw point file
+    #[command(subcommand)]
+    Bench(bench::Bench),
+}
+
+impl Lab {
+    /// Runs the command.
+    pub fn run(self) -> CliResult {
+        match self {
+            Lab::Demo(command) => command.run(),
+            Lab::Simulate(command) => command.run(),
+            Lab::Evaluate(command) => command.run(),
+            Lab::Paper(command) => command.run(),
+            Lab::Bench(command) => command.run(),
+        }
+    }
+}
+
+/// Draws a map as a PNG file.
+pub fn picture(list: &VoxelList, options: &RenderOptions, out: &Path) -> CliResult {
+    let file = File::create(out).map_err(|e| format!("{}: {e}", out.display()))?;
+    Ok(render_png(list, options, BufWriter::new(file))?)
+}

@@ -1,0 +1,43 @@
+//! `lattice paper voxels`: Ryde & Brünig 2011, computed anew.
+
+use std::path::PathBuf;
+
+use clap::Args;
+
+use super::{ReportOptions, make};
+use crate::CliResult;
+use lattice_lab::paper::voxels::{Options, run};
+
+/// Options of `lattice paper voxels`.
+#[derive(Args)]
+pub struct Voxels {
+    #[command(flatten)]
+    report: ReportOptions,
+    /// Fewer samples and trials, in less than a minute
+    #[arg(long)]
+    quick: bool,
+    /// A point file of one scan (ply, pcd, xyz, KITTI bin) for Fig. 5; may be given several times
+    #[arg(long = "scan", value_name = "FILE")]
+    scans: Vec<PathBuf>,
+    /// A rosbag2 log of clouds and an INS for Table I; may be given several times
+    #[arg(long = "bag", value_name = "DIR")]
+    bags: Vec<PathBuf>,
+    /// Folder of pairs of scans for Fig. 6: small_gicp/{target,source}.ply with T_target_source.txt, and
+    /// room_scan{1,2}.pcd; either may be missing
+    #[arg(long, value_name = "DIR")]
+    pairs: Option<PathBuf>,
+}
+
+impl Voxels {
+    /// Runs the command.
+    pub fn run(self) -> CliResult {
+        let options = Options {
+            seed: self.report.seed,
+            quick: self.quick,
+            scans: self.scans,
+            bags: self.bags,
+            pairs: self.pairs,
+        };
+        make(&self.report, |progress| run(&options, progress))
+    }
+}

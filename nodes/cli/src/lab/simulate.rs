@@ -1,0 +1,152 @@
+//! `lattice simulate`: logs and point files of simulated machines.
+
+mod house;
+
+use std::path::PathBuf;
+
+use clap::{Args, Subcommand, ValueEnum};
+
+use lattice_lab::simulate::SurveyPattern;
+
+use crate::progress::Progress;
+use crate::{CliResult, init_logging};
+use lattice_bag::Storage;
+use lattice_lab::bench::{SiteOptions, write_site};
+use lattice_lab::datasets::{BobcatOptions, BobcatSummary, write_bobcat};
+
+/// Write the log, the points or the map of a simulated machine
+#[derive(Subcommand)]
+pub enum Simulate {
+    /// A skid-steer loader on an earth-moving site: three laser scanners, one on a turntable, and
+    /// an INS at 100 Hz
+    Bobcat(Bobcat),
+    /// A survey of the same site as raw little-endian f32 `x y z i` points, for benchmarks
+    Site(Site),
+    /// A furnished house: a robot's labelled map, what a headset sees of four scenes, and the truth
+    House(house::House),
+}
+
+/// Container of a log.
+#[derive(Clone, Copy, Debug, ValueEnum)]
+enum StorageName {
+    Mcap,
+    Sqlite3,
+}
+
+/// Options of `lattice simulate bobcat`.
+#[derive(Args)]
+pub struct Bobcat {
+    /// Directory of the log; it gets the rosbag2 files, and `truth/` with what no sensor knows
+    #[arg(long, default_value = "bobcat")]
+    out: PathBuf,
+    /// The same seed gives the same bytes
+    #[arg(long, default_value_t = 1)]
+    seed: u64,
+    /// Length of the log in s
+    #[arg(long, default_value_t = 30.0)]
+    duration: f64,
+    /// Container of the messages
+    #[arg(long, value_enum, default_value = "mcap")]
+    storage: StorageName,
+    /// Replace a log that is already there
+    #[arg(long)]
+    overwrite: bool,
+    /// Print what was written as JSON
+    #[arg(long)]
+    json: bool,
+}
+
+/// Scanners of a survey.
+#[derive(Clone, Copy, Debug, ValueEnum)]
+enum PatternName {
+    /// Three SICK LMS200, one of them on a turntable
+    Lms200,
+    /// One spinning scanner of 64 beams
+    Os64,
+}
+
+/// Options of `lattice simulate site`.
+#[derive(Args)]
+pub struct Site {
+    /// Number of points
+    #[arg(long, default_value_t = 10_000_000)]
+    points: u64,
+    /// The scanners
+    #[arg(long, value_enum, default_value = "lms200")]
+    pattern: PatternName,
+    /// The same seed gives the same bytes
+    #[arg(long, default_value_t = 1)]
+    seed: u64,
+    /// Point file; FILE.scans gets the scanner's position (three f64) and the points (u64) of each scan
+    #[arg(long, value_name = "FILE")]
+    out: PathBuf,
+    /// Print what was written as JSON
+    #[arg(long)]
+    json: bool,
+}
+
+impl Simulate {
+    /// Runs the command.
+    pub fn run(self) -> CliResult {
+        init_logging();
+        match self {
+            Self::Bobcat(command) => command.run(),
+            Self::Site(command) => command.run(),
+            Self::House(command) => command.run(),
+        }
+    }
+}
+
+impl Site {
+    fn run(self) -> CliResult {
+        let progress = Progress::new("simulate");
+        let options = SiteOptions {
+            seed: self.seed,
+            pattern: match self.pattern {
+                PatternName::Lms200 => SurveyPattern::Lms200,
+                PatternName::Os64 => SurveyPattern::Os64,
+            },
+            points: self.points,
+            out: self.out,
+        };
+        let summary = write_site(&options, &mut |done| progress.set(done))?;
+        progress.done();
+        if self.json {
+            println!("{}", serde_json::to_string_pretty(&summary)?);
+        } else {
+            println!("{summary}");
+        }
+        Ok(())
+    }
+}
+
+impl Bobcat {
+    fn run(self) -> CliResult {
+        let summary = bobcat(&BobcatOptions {
+            seed: self.seed,
+            duration_s: self.duration,
+            storage: match self.storage {
+                StorageName::Mcap => Storage::Mcap,
+                StorageName::Sqlite3 => Storage::Sqlite3,
+            },
+            out: self.out,
+            overwrite: self.overwrite,
+        })?;
+        if self.json {
+            println!("{}", serde_json::to_string_pretty(&summary)?);
+        } else {
+            println!("{summary}");
+        }
+        Ok(())
+    }
+}
+
+/// Writes a log behind a progress bar.
+pub fn bobcat(
+    options: &BobcatOptions,
+) -> Result<BobcatSummary, Box<dyn std::error::Error + Send + Sync>> {
+    let progress = Progress::new("simulate");
+    let summary = write_bobcat(options, &mut |done| progress.set(done))?;
+    progress.done();
+    Ok(summary)
+}

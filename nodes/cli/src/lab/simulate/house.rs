@@ -1,0 +1,140 @@
+//! `lattice simulate house`: a robot's map and headset clouds with the truth.
+
+use std::path::PathBuf;
+
+use clap::{Args, ValueEnum};
+use lattice_core::lattice::LatticeKind;
+use lattice_lab::simulate::house::{FlipSide, HeadsetOptions, LabelModel, SurveyOptions};
+use nalgebra::{Isometry3, Vector3};
+
+use crate::CliResult;
+use crate::progress::Progress;
+use lattice_lab::datasets::{HeadsetAxes, HouseOptions, write_house};
+
+/// Options of `lattice simulate house`.
+#[derive(Args)]
+pub struct House {
+    /// Folder for map.lattice, classes.yaml, and for each of tv, desk, bookshelf and dining a cloud
+    /// (.ply) with the truth beside it (.json)
+    #[arg(long, default_value = "house")]
+    out: PathBuf,
+    /// A mesh (PLY; faces with label and instance) instead of our own house
+    #[arg(long, value_name = "PLY", requires = "classes")]
+    mesh: Option<PathBuf>,
+    /// Names of the classes of the mesh
+    #[arg(long, value_name = "YAML", requires = "mesh")]
+    classes: Option<PathBuf>,
+    /// The same seed gives the same bytes
+    #[arg(long, default_value_t = 1)]
+    seed: u64,
+    /// Where the house stands in the map, m and degrees
+    #[arg(long, num_args = 4, value_names = ["X", "Y", "Z", "YAW"], allow_negative_numbers = true)]
+    place: Option<Vec<f64>>,
+    /// Share of the headset's view whose regions are labelled wrongly, 0 to 1
+    #[arg(long, value_name = "Q", default_value_t = 0.0)]
+    flips: f64,
+    /// Which device has the wrong labels
+    #[arg(long, value_enum, default_value = "either")]
+    flips_side: Side,
+    /// Classes are always taken for the same other one
+    #[arg(long)]
+    flips_consistent: bool,
+    /// Share of single points with a random label, 0 to 1
+    #[arg(long, value_name = "SHARE", default_value_t = 0.0)]
+    label_noise: f64,
+    /// Pictures of each scene; the further ones look to the sides
+    #[arg(long, default_value_t = 1)]
+    headset_scans: usize,
+    /// Depth views of the robot
+    #[arg(long, default_value_t = SurveyOptions::default().views)]
+    views: usize,
+    /// Lattice of the map
+    #[arg(long, default_value = "cubic")]
+    lattice: LatticeKind,
+    /// Side of a cube as large as its cells, m
+    #[arg(long, default_value_t = 0.05)]
+    cell_side: f64,
+    /// Axes of the headset's clouds
+    #[arg(long, value_enum, default_value = "ros")]
+    axes: Axes,
+    /// Replace files that are already there
+    #[arg(long)]
+    overwrite: bool,
+    /// Print what was written as JSON
+    #[arg(long)]
+    json: bool,
+}
+
+#[derive(Clone, Copy, Debug, ValueEnum)]
+enum Side {
+    /// One or the other, half of the view each
+    Either,
+    /// The robot
+    Map,
+    /// The headset
+    Headset,
+    /// Both
+    Both,
+}
+
+#[derive(Clone, Copy, Debug, ValueEnum)]
+enum Axes {
+    /// x forward, y left, z up
+    Ros,
+    /// x right, y up, z forward: left-handed
+    Unity,
+}
+
+impl House {
+    pub(super) fn run(self) -> CliResult {
+        let place = match self.place.as_deref() {
+            Some(&[x, y, z, yaw_deg]) => {
+                let turn = Vector3::z() * yaw_deg.to_radians();
+                Isometry3::new(Vector3::new(x, y, z), turn)
+            }
+            _ => Isometry3::identity(),
+        };
+        let options = HouseOptions {
+            out: self.out,
+            overwrite: self.overwrite,
+            mesh: self.mesh.zip(self.classes),
+            map_from_house: place,
+            seed: self.seed,
+            survey: SurveyOptions {
+                views: self.views,
+                ..SurveyOptions::default()
+            },
+            headset: HeadsetOptions {
+                headset_scans: self.headset_scans,
+                ..HeadsetOptions::default()
+            },
+            labels: LabelModel {
+                region_flips: self.flips,
+                side: match self.flips_side {
+                    Side::Either => FlipSide::Either,
+                    Side::Map => FlipSide::Map,
+                    Side::Headset => FlipSide::Headset,
+                    Side::Both => FlipSide::Both,
+                },
+                consistent: self.flips_consistent,
+                iid: self.label_noise,
+                softness: 0.0,
+            },
+            lattice: self.lattice,
+            cell_side_m: self.cell_side,
+            axes: match self.axes {
+                Axes::Ros => HeadsetAxes::Ros,
+                Axes::Unity => HeadsetAxes::Unity,
+            },
+        };
+        let progress = Progress::new("simulate");
+        let summary = write_house(&options, &mut |done| progress.set(done))?;
+        progress.done();
+        if self.json {
+            println!("{}", serde_json::to_string_pretty(&summary)?);
+        } else {
+            println!("{summary}");
+        }
+        Ok(())
+    }
+}

@@ -1,0 +1,71 @@
+//! `lattice link`: a name for each node.
+
+use std::fs;
+use std::io::ErrorKind;
+use std::path::{Path, PathBuf};
+
+use clap::Args;
+
+use crate::{CliResult, node};
+
+/// Options of `lattice link`.
+///
+/// Called by the name of a node, this program is that node: `DIR/lattice_mapper --ros-args ...`.
+#[derive(Args)]
+pub struct Link {
+    /// Directory of the links; made if it is not there
+    dir: PathBuf,
+    /// Path that the links lead to [default: this program]
+    #[arg(long, value_name = "PATH")]
+    to: Option<PathBuf>,
+}
+
+impl Link {
+    /// Runs the command.
+    pub fn run(self) -> CliResult {
+        let target = match self.to {
+            Some(target) => target,
+            None => std::env::current_exe()?,
+        };
+        fs::create_dir_all(&self.dir).map_err(|e| format!("{}: {e}", self.dir.display()))?;
+        for name in node::names() {
+            let link = self.dir.join(name);
+            make(&target, &link).map_err(|e| format!("{}: {e}", link.display()))?;
+            println!("{}", link.display());
+        }
+        Ok(())
+    }
+}
+
+/// Makes a link, in place of an older one but not of anything else.
+fn make(target: &Path, link: &Path) -> std::io::Result<()> {
+    if fs::symlink_metadata(link).is_ok_and(|found| found.is_symlink()) {
+        fs::remove_file(link)?;
+    }
+    std::os::unix::fs::symlink(target, link).map_err(|error| match error.kind() {
+        ErrorKind::AlreadyExists => std::io::Error::new(
+            ErrorKind::AlreadyExists,
+            "something that is no link has this name: remove it, or link elsewhere",
+        ),
+        _ => error,
+    })
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn older_links_are_replaced_and_files_are_not() {
+        let folder = tempfile::tempdir().unwrap();
+        let link = folder.path().join("lattice_mapper");
+        for target in ["one", "two"] {
+            make(Path::new(target), &link).unwrap();
+            assert_eq!(fs::read_link(&link).unwrap(), Path::new(target));
+        }
+        let file = folder.path().join("bag_player");
+        fs::write(&file, "mine").unwrap();
+        assert!(make(Path::new("one"), &file).is_err());
+        assert_eq!(fs::read(&file).unwrap(), b"mine");
+    }
+}

@@ -1,0 +1,117 @@
+//! The `lattice` command, and every node by its name.
+
+mod calibrate;
+#[cfg(feature = "lab")]
+mod lab;
+mod link;
+mod map;
+mod node;
+mod progress;
+mod quantize;
+#[cfg(feature = "bags")]
+mod replay;
+mod run;
+
+use std::error::Error;
+use std::process::ExitCode;
+
+use clap::{Parser, Subcommand};
+use lattice_core::lattice::LatticeKind;
+
+/// Any error on its way to the user.
+type CliResult = Result<(), Box<dyn Error + Send + Sync>>;
+
+/// Lattice voxel maps from logs and live robots.
+#[derive(Parser)]
+#[command(name = "lattice", version, about, arg_required_else_help = true)]
+struct Cli {
+    #[command(subcommand)]
+    command: Command,
+}
+
+#[derive(Subcommand)]
+enum Command {
+    /// Run several nodes in one process, as parameter files say
+    Run(run::Run),
+    /// Run one node
+    Node(node::NodeCommand),
+    /// Make a link to this program for every node, by whose name it is that node
+    Link(link::Link),
+    /// Map a rosbag2 log: directly, or played through separate node processes
+    #[cfg(feature = "bags")]
+    Replay(replay::Replay),
+    /// Quantize a point file (ply, pcd, xyz, KITTI bin) and show what each lattice makes of it
+    Quantize(quantize::Quantize),
+    /// Find where a cloud lies in a map, without a guess, and whether the answer holds
+    Calibrate(calibrate::Calibrate),
+    /// Look into map files and export them
+    #[command(subcommand)]
+    Map(map::Map),
+    #[cfg(feature = "lab")]
+    #[command(flatten)]
+    Lab(lab::Lab),
+}
+
+/// Runs a node if the program was called by its name, the command line otherwise. Errors are one line
+/// on standard error and a non-zero status.
+fn main() -> ExitCode {
+    let node = node::called_as(std::env::args_os().next());
+    let result = match &node {
+        Some(name) => node::run(name, std::env::args().skip(1)),
+        None => Cli::parse().command.run(),
+    };
+    match result {
+        Ok(()) => ExitCode::SUCCESS,
+        Err(error) => {
+            eprintln!("{}: {error}", node.as_deref().unwrap_or("lattice"));
+            ExitCode::FAILURE
+        }
+    }
+}
+
+impl Command {
+    fn run(self) -> CliResult {
+        match self {
+            Command::Run(command) => command.run(),
+            Command::Node(command) => command.run(),
+            Command::Link(command) => command.run(),
+            #[cfg(feature = "bags")]
+            Command::Replay(command) => command.run(),
+            Command::Quantize(command) => command.run(),
+            Command::Calibrate(command) => command.run(),
+            Command::Map(command) => command.run(),
+            #[cfg(feature = "lab")]
+            Command::Lab(command) => command.run(),
+        }
+    }
+}
+
+/// Lattices by name, those of the `paper`, or `all`.
+#[derive(Clone, Debug)]
+struct Lattices(pub Vec<LatticeKind>);
+
+impl std::str::FromStr for Lattices {
+    type Err = String;
+
+    fn from_str(text: &str) -> Result<Self, String> {
+        match text {
+            "all" => return Ok(Self(LatticeKind::ALL.to_vec())),
+            "paper" => return Ok(Self(LatticeKind::PAPER.to_vec())),
+            _ => {}
+        }
+        let kinds = text.split(',').map(|name| {
+            let kind = name.trim().parse::<LatticeKind>();
+            kind.map_err(|e| format!("{e}; or 'all', or 'paper' for the five of the paper"))
+        });
+        kinds.collect::<Result<_, _>>().map(Self)
+    }
+}
+
+/// Log lines of the tools themselves; nodes have their own.
+fn init_logging() {
+    let env = env_logger::Env::default().default_filter_or("warn");
+    // A second command in one process (tests) keeps the first logger.
+    let _ = env_logger::Builder::from_env(env)
+        .format_timestamp(None)
+        .try_init();
+}

@@ -1,0 +1,58 @@
+//! `lattice map`: map files.
+
+mod combine;
+mod export;
+mod info;
+mod output;
+mod query;
+
+use std::fs::File;
+use std::io::BufReader;
+use std::path::Path;
+
+use clap::Subcommand;
+use lattice_core::voxels::file::{MapContents, max_voxels_of};
+
+use super::{CliResult, init_logging};
+
+/// Look into map files, export, merge, compare, cut and question them
+#[derive(Subcommand)]
+pub enum Map {
+    /// Lattice, size, extent and statistics
+    Info(info::Info),
+    /// As PLY (cell centres, or a mesh of exposed cell faces) or as a picture
+    Export(export::Export),
+    /// One map of the voxels of several with the same cells; of one, to write it in another form
+    Merge(combine::Merge),
+    /// How many voxels are in one map, in the other, in both; writes those only in the first
+    Diff(combine::Diff),
+    /// The voxels with their centre in a box
+    Crop(combine::Crop),
+    /// The nearest voxels, the clearance of a point, or the shortest path of a ball
+    Query(query::Query),
+}
+
+impl Map {
+    /// Runs the command.
+    pub fn run(self) -> CliResult {
+        init_logging();
+        match self {
+            Self::Info(command) => command.run(),
+            Self::Export(command) => command.run(),
+            Self::Merge(command) => command.run(),
+            Self::Diff(command) => command.run(),
+            Self::Crop(command) => command.run(),
+            Self::Query(command) => command.run(),
+        }
+    }
+}
+
+/// Reads a map, and the bytes of its file, which bound the voxels.
+pub fn read(path: &Path) -> Result<(MapContents, u64), Box<dyn std::error::Error + Send + Sync>> {
+    let here = |e: &dyn std::fmt::Display| format!("{}: {e}", path.display());
+    let file = File::open(path).map_err(|e| here(&e))?;
+    let bytes = file.metadata().map_err(|e| here(&e))?.len();
+    let map =
+        MapContents::read(BufReader::new(file), max_voxels_of(bytes)).map_err(|e| here(&e))?;
+    Ok((map, bytes))
+}

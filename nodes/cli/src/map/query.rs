@@ -1,0 +1,164 @@
+//! `lattice map query`.
+
+use std::fs::File;
+use std::io::BufReader;
+use std::path::PathBuf;
+
+use clap::Args;
+use lattice_core::lattice::MortonKey;
+use lattice_core::query::{PathOptions, Query as Questions, Steps};
+use lattice_core::voxels::VoxelStore;
+use lattice_core::voxels::file::read_occupancy;
+use nalgebra::Vector3;
+use serde::Serialize;
+
+use crate::CliResult;
+
+/// Options of `lattice map query`.
+#[derive(Args)]
+#[command(group = clap::ArgGroup::new("question").required(true))]
+pub struct Query {
+    /// Map file
+    map: PathBuf,
+    /// The occupied cells with centres nearest to a point, map frame, in m
+    #[arg(long, num_args = 3, value_names = ["X", "Y", "Z"], allow_negative_numbers = true, group = "question")]
+    nearest: Option<Vec<f64>>,
+    /// How many of them
+    #[arg(short, default_value_t = 1, requires = "nearest")]
+    k: usize,
+    /// Distance from a point to the nearest occupied cell as the polyhedron that it is, and 0 in one
+    #[arg(long, num_args = 3, value_names = ["X", "Y", "Z"], allow_negative_numbers = true, group = "question")]
+    clearance: Option<Vec<f64>>,
+    /// The shortest way of a ball between two points along centres of free cells
+    #[arg(
+        long, num_args = 6, value_names = ["X", "Y", "Z", "X", "Y", "Z"], allow_negative_numbers = true,
+        group = "question", requires = "radius",
+    )]
+    path: Option<Vec<f64>>,
+    /// Radius of the ball, m
+    #[arg(long, requires = "path")]
+    radius: Option<f64>,
+    /// Give up the search for a path after this many cells
+    #[arg(long, default_value_t = 2_000_000, requires = "path")]
+    max_cells: usize,
+    /// Print as JSON
+    #[arg(long)]
+    json: bool,
+}
+
+/// An occupied cell and how far it is.
+#[derive(Serialize)]
+struct Cell {
+    key: u64,
+    center_m: [f64; 3],
+    distance_m: f64,
+}
+
+#[derive(Serialize)]
+struct Way {
+    length_m: f64,
+    expanded: usize,
+    centers_m: Vec<[f64; 3]>,
+}
+
+#[derive(Serialize)]
+#[serde(rename_all = "lowercase")]
+enum Answer {
+    Nearest(Vec<Cell>),
+    /// None if no cell is occupied.
+    Clearance(Option<Cell>),
+    Path(Way),
+}
+
+impl Query {
+    /// Runs the command.
+    pub fn run(self) -> CliResult {
+        let here = |e: &dyn std::fmt::Display| format!("{}: {e}", self.map.display());
+        let file = File::open(&self.map).map_err(|e| here(&e))?;
+        // The size of the file bounds what it makes us hold.
+        let store = read_occupancy(BufReader::new(file), usize::MAX).map_err(|e| here(&e))?;
+        let answer = self.answer(&Questions::new(&store))?;
+        if self.json {
+            println!("{}", serde_json::to_string_pretty(&answer)?);
+        } else {
+            answer.print();
+        }
+        Ok(())
+    }
+
+    fn answer(
+        &self,
+        questions: &Questions<impl VoxelStore>,
+    ) -> Result<Answer, Box<dyn std::error::Error + Send + Sync>> {
+        let cell = |key: MortonKey, distance_m| Cell {
+            key: key.raw(),
+            center_m: questions.store().center_m(key).into(),
+            distance_m,
+        };
+        if let Some(point) = self.nearest.as_deref().and_then(first_point) {
+            let found = questions.nearest(&point, self.k)?.into_iter();
+            return Ok(Answer::Nearest(
+                found.map(|near| cell(near.key, near.distance_m)).collect(),
+            ));
+        }
+        if let Some(point) = self.clearance.as_deref().and_then(first_point) {
+            let found = questions.clearance(&point, f64::INFINITY)?;
+            let found = found.map(|clearance| cell(clearance.key, clearance.distance_m));
+            return Ok(Answer::Clearance(found));
+        }
+        let ends = self.path.as_deref().and_then(|ends| {
+            let goal = ends.get(3..).and_then(first_point)?;
+            Some((first_point(ends)?, goal))
+        });
+        let (Some((start, goal)), Some(radius_m)) = (ends, self.radius) else {
+            return Err("ask for --nearest, --clearance or --path with --radius".into());
+        };
+        let options = PathOptions {
+            radius_m,
+            steps: Steps::Touching,
+            bounds: None,
+            max_expanded: self.max_cells,
+        };
+        let path = questions.shortest_path(&start, &goal, &options, |_| true)?;
+        Ok(Answer::Path(Way {
+            length_m: path.length_m,
+            expanded: path.expanded,
+            centers_m: path.centers_m.into_iter().map(Into::into).collect(),
+        }))
+    }
+}
+
+fn first_point(coordinates: &[f64]) -> Option<Vector3<f64>> {
+    let point: [f64; 3] = *coordinates.first_chunk()?;
+    Some(point.into())
+}
+
+impl Answer {
+    fn print(&self) {
+        match self {
+            Self::Nearest(cells) if cells.is_empty() => println!("no cell is occupied"),
+            Self::Clearance(None) => println!("no cell is occupied"),
+            Self::Nearest(cells) => cells.iter().for_each(Cell::print),
+            Self::Clearance(Some(cell)) => cell.print(),
+            Self::Path(way) => {
+                println!(
+                    "{:.3} m, {} cells looked around from",
+                    way.length_m, way.expanded
+                );
+                for [x, y, z] in &way.centers_m {
+                    println!("  {x:.3} {y:.3} {z:.3}");
+                }
+            }
+        }
+    }
+}
+
+impl Cell {
+    fn print(&self) {
+        let [x, y, z] = self.center_m;
+        println!(
+            "{:.3} m to the cell at {x:.3} {y:.3} {z:.3}",
+            self.distance_m
+        );
+    }
+}

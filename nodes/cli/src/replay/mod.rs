@@ -1,0 +1,236 @@
+//! `lattice replay`: a log becomes maps.
+
+mod node_process;
+mod processes;
+
+use std::fs::File;
+use std::io::BufWriter;
+use std::path::PathBuf;
+
+use clap::Args;
+use lattice_core::lattice::{Lattice, Orientation};
+use lattice_core::voxels::file::write_map;
+
+use super::progress::Progress;
+use super::{CliResult, Lattices, init_logging};
+use lattice_bag::BagReader;
+use lattice_nodes::enu_transformer::TransformerOptions;
+use lattice_nodes::enu_transformer::ins::InsSource;
+use lattice_nodes::lattice_mapper::MapperOptions;
+use lattice_nodes::replay::{self, Pipeline, RunReport, TopicWishes};
+use lattice_nodes::voxel_marker_publisher::MarkerOptions;
+use lattice_runtime::LoopbackDomain;
+use lattice_runtime::params::Params;
+use lattice_runtime::ros_args::RosArgs;
+use processes::DdsReplay;
+
+/// Lattices of a replay over DDS: each takes two of the twelve participants that loopback shows.
+const MAX_LOOPBACK_LATTICES: usize = 5;
+
+/// Map a rosbag2 log
+#[derive(Args, Clone, Debug)]
+pub struct Replay {
+    /// rosbag2 directory, or one mcap or db3 file of it
+    pub bag: PathBuf,
+    /// Feed the nodes' state machines in this process, as fast as it goes, instead of playing
+    /// the log over DDS to one process for each node
+    #[arg(long)]
+    pub direct: bool,
+    /// cubic, bcc, fcc, mcc, hex, hexopt, several with commas, paper, or all; of the parameters if not given
+    #[arg(long)]
+    pub lattice: Option<Lattices>,
+    /// Volume of one cell in m^3; of the parameters if not given (0.125)
+    #[arg(long)]
+    pub cell_volume: Option<f64>,
+    /// How the cells lie: paper, ground (flattest), or a crystal direction that points up, as
+    /// 110-up; of the parameters if not given (paper)
+    #[arg(long)]
+    pub orientation: Option<Orientation>,
+    /// Parameter files of the nodes, later ones win
+    #[arg(long = "params", value_name = "FILE")]
+    pub params: Vec<PathBuf>,
+    /// One parameter, as in `-p ins.source:=odometry`
+    #[arg(short = 'p', long = "param", value_name = "NAME:=VALUE")]
+    pub param: Vec<String>,
+    /// Cloud topics; found in the log if not given
+    #[arg(long, value_name = "TOPIC")]
+    pub points: Vec<String>,
+    /// INS source: inspva, inspvax, navsatfix_imu, odometry, pose; found in the log if not given
+    #[arg(long)]
+    pub ins: Option<InsSource>,
+    /// Topic of the INS; found in the log if not given
+    #[arg(long, value_name = "TOPIC")]
+    pub ins_topic: Option<String>,
+    /// Threads of the direct replay; 0: all cores
+    #[arg(long, default_value_t = 0)]
+    pub threads: usize,
+    /// Speed of the log over DDS, 1 is real time
+    #[arg(long, default_value_t = 1.0)]
+    pub rate: f64,
+    /// Write the map here, for `lattice map`; with several lattices the name goes before the ending
+    #[arg(long, value_name = "FILE")]
+    pub map_out: Option<PathBuf>,
+    /// Print the report as JSON
+    #[arg(long)]
+    pub json: bool,
+}
+
+impl Replay {
+    /// Runs the command.
+    pub fn run(self) -> CliResult {
+        init_logging();
+        let report = self.replay()?;
+        if self.json {
+            println!("{}", serde_json::to_string_pretty(&report)?);
+        } else {
+            println!("{report}");
+        }
+        Ok(())
+    }
+
+    /// Runs the replay and returns what came of it.
+    pub fn replay(&self) -> Result<RunReport, Box<dyn std::error::Error + Send + Sync>> {
+        if self.direct {
+            return self.replay_direct();
+        }
+        if self.map_out.is_some() {
+            return Err("--map-out needs --direct".into());
+        }
+        let bag = BagReader::open(&self.bag)?;
+        let plan = replay::plan(&bag, &self.wishes()?)?;
+        let lattices: Vec<_> = self.maps()?.into_iter().map(|map| map.lattice).collect();
+        let count = lattices.len();
+        let progress = Progress::new("play");
+        let report = processes::run(
+            &DdsReplay {
+                bag: &self.bag,
+                reader: &bag,
+                plan: &plan,
+                lattices,
+                params_files: &self.params,
+                params: &self.param,
+                orientation: self.orientation,
+                rate: self.rate,
+                // Apart from a robot on domain 0, and from other replays.
+                domain: match std::env::var_os("ROS_DOMAIN_ID") {
+                    Some(_) => None,
+                    None if count > MAX_LOOPBACK_LATTICES => {
+                        return Err(format!(
+                            "{count} lattices over DDS on loopback: at most \
+                             {MAX_LOOPBACK_LATTICES} find each other; use --direct"
+                        )
+                        .into());
+                    }
+                    None => Some(LoopbackDomain::take()?),
+                },
+            },
+            &mut |done, what| {
+                progress.set(done);
+                progress.say(what);
+            },
+        )?;
+        progress.done();
+        Ok(report)
+    }
+
+    fn replay_direct(&self) -> Result<RunReport, Box<dyn std::error::Error + Send + Sync>> {
+        let bag = BagReader::open(&self.bag)?;
+        let plan = replay::plan(&bag, &self.wishes()?)?;
+        let mut transformer = TransformerOptions::from_params(&self.params_of("enu_transformer")?)?;
+        transformer.ins.source = plan.source;
+        let markers = MarkerOptions::from_params(&self.params_of("voxel_marker_publisher")?)?;
+        let mut pipeline = Pipeline::new(transformer, self.maps()?, &markers)?;
+        let pool = rayon::ThreadPoolBuilder::new()
+            .num_threads(self.threads)
+            .build()?;
+        let progress = Progress::new("replay");
+        let source = self.bag.display().to_string();
+        let report = pool.install(|| {
+            let tell = &mut |done| progress.set(done);
+            replay::run(&bag, &plan, &mut pipeline, &source, tell)
+        })?;
+        progress.done();
+        self.write_maps(&pipeline)?;
+        Ok(report)
+    }
+
+    fn write_maps(&self, pipeline: &Pipeline) -> CliResult {
+        let Some(path) = &self.map_out else {
+            return Ok(());
+        };
+        let several = pipeline.mappers().count() > 1;
+        for mapper in pipeline.mappers() {
+            let mut path = path.clone();
+            if several {
+                let name = mapper.list().lattice().kind().name();
+                let ending = path.extension().unwrap_or_default().to_owned();
+                path.set_extension(name);
+                path.as_mut_os_string().push(".");
+                path.as_mut_os_string().push(ending);
+            }
+            let file = File::create(&path).map_err(|e| format!("{}: {e}", path.display()))?;
+            write_map(mapper.list(), BufWriter::new(file))?;
+        }
+        Ok(())
+    }
+
+    /// Options of one mapper for each lattice.
+    fn maps(&self) -> Result<Vec<MapperOptions>, Box<dyn std::error::Error + Send + Sync>> {
+        let params = self.params_of("lattice_mapper")?;
+        let given = MapperOptions::from_params(&params)?;
+        let orientation = match self.orientation {
+            Some(orientation) => orientation,
+            None => MapperOptions::orientation_from(&params)?,
+        };
+        let kinds = match &self.lattice {
+            Some(Lattices(kinds)) => kinds.clone(),
+            None => vec![given.lattice.kind()],
+        };
+        let volume_m3 = self.cell_volume.unwrap_or(given.lattice.cell_volume_m3());
+        let map = |kind| {
+            Ok(MapperOptions {
+                lattice: Lattice::new(kind, volume_m3)?.with_orientation(orientation)?,
+                ..given.clone()
+            })
+        };
+        kinds.into_iter().map(map).collect()
+    }
+
+    fn wishes(&self) -> Result<TopicWishes, Box<dyn std::error::Error + Send + Sync>> {
+        let params = self.params_of("enu_transformer")?;
+        let mut points = self.points.clone();
+        if points.is_empty() {
+            points = params.string_array("points_topics", &[])?;
+        }
+        let given = params.string("ins.source", "")?;
+        let source = match (self.ins, given.as_str()) {
+            (Some(source), _) => Some(source),
+            (None, "") => None,
+            (None, name) => Some(name.parse()?),
+        };
+        // The topic of the parameters belongs to their source.
+        let topic = match self.ins {
+            Some(_) => String::new(),
+            None => params.string("ins.topic", "")?,
+        };
+        let ins = self.ins_topic.clone();
+        let ins = ins.or(Some(topic).filter(|topic| !topic.is_empty()));
+        Ok(TopicWishes {
+            points,
+            source,
+            ins,
+        })
+    }
+
+    fn params_of(&self, node: &str) -> Result<Params, Box<dyn std::error::Error + Send + Sync>> {
+        let mut arguments = vec!["--ros-args".to_owned()];
+        for file in &self.params {
+            arguments.extend(["--params-file".to_owned(), file.display().to_string()]);
+        }
+        for param in &self.param {
+            arguments.extend(["-p".to_owned(), param.clone()]);
+        }
+        let args = RosArgs::parse(arguments)?;
+        Ok(Params::load(&args, &format!("/{node}"))?)
+    }
+}

@@ -1,0 +1,220 @@
+//! One node in a process of its own: started, listened to, ended.
+
+use std::collections::BTreeSet;
+use std::io::{self, BufRead, BufReader};
+use std::path::{Path, PathBuf};
+use std::process::{Child, Command, ExitStatus, Stdio};
+use std::sync::{Mutex, PoisonError};
+use std::thread::{self, JoinHandle};
+use std::time::{Duration, Instant};
+
+use crossbeam_channel::{Receiver, Sender, unbounded};
+
+use super::processes::{DdsReplay, ProcessError, param, yaml_text};
+use lattice_nodes::report;
+
+/// Texts of warnings that are remembered.
+const MAX_TEXTS: usize = 1000;
+/// Time for all nodes to find each other.
+pub const MATCH_TIME: Duration = Duration::from_secs(30);
+/// Time for a node to work off its inbox when told to end.
+pub const END_TIME: Duration = Duration::from_secs(60);
+
+/// A node in a process of its own, and what it logs.
+pub struct NodeProcess {
+    name: String,
+    child: Child,
+    lines: Receiver<String>,
+    seen: Vec<String>,
+    reader: Option<JoinHandle<()>>,
+    report: PathBuf,
+}
+
+impl NodeProcess {
+    pub fn start(
+        node: &str,
+        params: &[String],
+        replay: &DdsReplay,
+        report: &Path,
+    ) -> Result<Self, ProcessError> {
+        Self::start_in(node, None, params, replay, report)
+    }
+
+    pub fn start_in(
+        node: &str,
+        namespace: Option<&str>,
+        params: &[String],
+        replay: &DdsReplay,
+        report: &Path,
+    ) -> Result<Self, ProcessError> {
+        let mut command = Command::new(std::env::current_exe()?);
+        command.args(["node", node, "--ros-args", "--log-level", "info"]);
+        for file in replay.params_files {
+            command.arg("--params-file").arg(file);
+        }
+        if let Some(namespace) = namespace {
+            command.args(["-r", &format!("__ns:=/{namespace}")]);
+            for shared in ["points_enu", "map_origin"] {
+                command.args(["-r", &format!("{shared}:=/{shared}")]);
+            }
+        }
+        let report_file = param("report_file", &yaml_text(report));
+        for param in replay.params.iter().chain(params).chain([&report_file]) {
+            command.args(["-p", param]);
+        }
+        if let Some(domain) = &replay.domain {
+            command.env("ROS_DOMAIN_ID", domain.id().to_string());
+        }
+        command
+            .env_remove("ROS_LOCALHOST_ONLY")
+            .env("ROS_AUTOMATIC_DISCOVERY_RANGE", "LOCALHOST")
+            .stdin(Stdio::null())
+            .stdout(Stdio::null())
+            .stderr(Stdio::piped());
+        let what = match namespace {
+            Some(namespace) => format!("{namespace}/{node}"),
+            None => node.to_owned(),
+        };
+        let start = |error| ProcessError::Start {
+            what: what.clone(),
+            error,
+        };
+        let mut child = command.spawn().map_err(start)?;
+        let (sender, lines) = unbounded();
+        let stderr = child.stderr.take();
+        let reader = stderr.map(|stderr| forward(stderr, what.clone(), sender));
+        Ok(Self {
+            name: what,
+            child,
+            lines,
+            seen: Vec::new(),
+            reader,
+            report: report.to_owned(),
+        })
+    }
+
+    /// Waits until the node has logged a line with this text.
+    pub fn expect(&mut self, text: &str) -> Result<(), ProcessError> {
+        let deadline = Instant::now() + MATCH_TIME;
+        while !self.seen.iter().any(|line| line.contains(text)) {
+            match self.lines.recv_deadline(deadline) {
+                Ok(line) => self.seen.push(line),
+                Err(_) => {
+                    if let Some(status) = self.child.try_wait()? {
+                        return Err(self.ended(status));
+                    }
+                    return Err(ProcessError::NotMatched {
+                        what: self.name.clone(),
+                        waited: text.to_owned(),
+                    });
+                }
+            }
+        }
+        Ok(())
+    }
+
+    /// Waits for the player's end and tells how far it is.
+    pub fn played(mut self, progress: &mut dyn FnMut(f64)) -> Result<(), ProcessError> {
+        while let Ok(line) = self.lines.recv() {
+            let told = line.rsplit_once("played ").map(|(_, share)| share);
+            let share = told.and_then(|share| share.trim_end_matches(" %").parse::<f64>().ok());
+            if let Some(share) = share {
+                progress(share / 100.0);
+            }
+            self.seen.push(line);
+        }
+        let status = self.child.wait()?;
+        if status.success() {
+            Ok(())
+        } else {
+            Err(self.ended(status))
+        }
+    }
+
+    /// Tells the node to end, waits until it has, and reads its report.
+    pub fn end<T: for<'de> serde::Deserialize<'de>>(mut self) -> Result<T, ProcessError> {
+        interrupt(&self.child)?;
+        let deadline = Instant::now() + END_TIME;
+        // The log ends when the process does.
+        loop {
+            match self.lines.recv_deadline(deadline) {
+                Ok(line) => self.seen.push(line),
+                Err(error) if error.is_timeout() => {
+                    return Err(ProcessError::Stuck {
+                        what: self.name.clone(),
+                    });
+                }
+                Err(_) => break,
+            }
+        }
+        let status = self.child.wait()?;
+        if !status.success() {
+            return Err(self.ended(status));
+        }
+        report::read(&self.report).map_err(|error| ProcessError::NoReport {
+            what: self.name.clone(),
+            error,
+        })
+    }
+
+    fn ended(&mut self, status: ExitStatus) -> ProcessError {
+        self.seen.extend(self.lines.try_iter());
+        ProcessError::Ended {
+            what: self.name.clone(),
+            status,
+            words: self.seen.last().cloned().unwrap_or_default(),
+        }
+    }
+}
+
+impl Drop for NodeProcess {
+    /// Leaves no process behind when a replay fails half-way.
+    fn drop(&mut self) {
+        if let Ok(None) = self.child.try_wait() {
+            let _ = self.child.kill();
+            let _ = self.child.wait();
+        }
+        if let Some(reader) = self.reader.take() {
+            let _ = reader.join();
+        }
+    }
+}
+
+/// Passes the log of a node on, warnings to our own log.
+fn forward(
+    stderr: impl io::Read + Send + 'static,
+    name: String,
+    lines: Sender<String>,
+) -> JoinHandle<()> {
+    thread::spawn(move || {
+        for line in BufReader::new(stderr).lines().map_while(Result::ok) {
+            // Twelve processes say the same of one machine: it is shown once.
+            let text = line.rsplit_once("]: ").map_or(&*line, |(_, text)| text);
+            let warning = line.contains("[WARN]") || line.contains("[ERROR]");
+            if warning && first_time(text) {
+                log::warn!("{name}: {text}");
+            } else {
+                log::debug!("{name}: {line}");
+            }
+            if lines.send(line).is_err() {
+                break;
+            }
+        }
+    })
+}
+
+/// Whether no process has logged this text before.
+fn first_time(text: &str) -> bool {
+    static SEEN: Mutex<BTreeSet<String>> = Mutex::new(BTreeSet::new());
+    let mut seen = SEEN.lock().unwrap_or_else(PoisonError::into_inner);
+    seen.len() >= MAX_TEXTS || seen.insert(text.to_owned())
+}
+
+/// The signal of Ctrl-C.
+fn interrupt(child: &Child) -> io::Result<()> {
+    let pid = rustix::process::Pid::from_child(child);
+    Ok(rustix::process::kill_process(
+        pid,
+        rustix::process::Signal::INT,
+    )?)
+}

@@ -1,0 +1,245 @@
+//! Replay over DDS: the player and one process for each node, on a loopback domain of their own.
+
+use std::io;
+use std::path::{Path, PathBuf};
+use std::process::ExitStatus;
+use std::time::Instant;
+
+use lattice_core::lattice::{Lattice, Orientation};
+use thiserror::Error;
+
+use super::node_process::{END_TIME, MATCH_TIME, NodeProcess};
+use lattice_bag::BagReader;
+use lattice_nodes::replay::{LatticeReport, Role, RunReport, TopicPlan};
+use lattice_runtime::LoopbackDomain;
+
+/// Why a replay over DDS failed.
+#[derive(Debug, Error)]
+pub enum ProcessError {
+    /// A process did not start.
+    #[error("cannot start {what}: {error}")]
+    Start {
+        /// Node.
+        what: String,
+        /// Reason.
+        error: io::Error,
+    },
+    /// A process ended by itself.
+    #[error("{what} ended with {status}; its last words: {words}")]
+    Ended {
+        /// Node.
+        what: String,
+        /// Status.
+        status: ExitStatus,
+        /// Last line of its log.
+        words: String,
+    },
+    /// The nodes did not find each other.
+    #[error("{what} did not log '{waited}' within {} s: is the loopback interface up, and its domain used by nothing else?", MATCH_TIME.as_secs())]
+    NotMatched {
+        /// Node.
+        what: String,
+        /// Line waited for.
+        waited: String,
+    },
+    /// A node did not end when told to.
+    #[error("{what} did not end within {} s", END_TIME.as_secs())]
+    Stuck {
+        /// Node.
+        what: String,
+    },
+    /// A node left no report.
+    #[error("no report of {what}: {error}")]
+    NoReport {
+        /// Node.
+        what: String,
+        /// Reason.
+        error: io::Error,
+    },
+    /// Files.
+    #[error("{0}")]
+    Io(#[from] io::Error),
+}
+
+/// What is to be replayed and how.
+pub struct DdsReplay<'a> {
+    /// The log.
+    pub bag: &'a Path,
+    /// The same, open.
+    pub reader: &'a BagReader,
+    /// Roles of its topics.
+    pub plan: &'a TopicPlan,
+    /// One map for each.
+    pub lattices: Vec<Lattice>,
+    /// How they lie in the map, if it is not to be as the parameters say.
+    pub orientation: Option<Orientation>,
+    /// Parameter files of the nodes.
+    pub params_files: &'a [PathBuf],
+    /// Further parameters, `name:=value`.
+    pub params: &'a [String],
+    /// Speed, 1 is real time.
+    pub rate: f64,
+    /// Domain of the processes; `None`: that of `ROS_DOMAIN_ID`.
+    pub domain: Option<LoopbackDomain>,
+}
+
+/// Plays the log through separate processes and collects what they report.
+pub fn run(
+    replay: &DdsReplay,
+    progress: &mut dyn FnMut(f64, &str),
+) -> Result<RunReport, ProcessError> {
+    let scratch = tempfile::tempdir()?;
+    let begin = Instant::now();
+    progress(0.0, "nodes find each other");
+    let mut branches = Vec::new();
+    for lattice in &replay.lattices {
+        branches.push(Branch::start(replay, lattice, scratch.path())?);
+    }
+    let mut transformer = NodeProcess::start(
+        "enu_transformer",
+        &replay.transformer_arguments(),
+        replay,
+        &scratch.path().join("enu_transformer.json"),
+    )?;
+    for branch in &mut branches {
+        branch.matched()?;
+    }
+    transformer.expect(&format!(
+        "/points_enu: subscriber matched ({})",
+        branches.len()
+    ))?;
+    let player = NodeProcess::start(
+        "bag_player",
+        &replay.player_arguments(),
+        replay,
+        &scratch.path().join("bag_player.json"),
+    )?;
+    player.played(&mut |done| progress(done, ""))?;
+    progress(1.0, "nodes end");
+    let transformer = transformer.end()?;
+    let lattices = branches.into_iter().map(Branch::end);
+    Ok(RunReport {
+        source: replay.bag.display().to_string(),
+        clouds_in_log: replay.plan.clouds(replay.reader),
+        transformer,
+        lattices: lattices.collect::<Result<_, _>>()?,
+        wall_s: begin.elapsed().as_secs_f64(),
+    })
+}
+
+impl DdsReplay<'_> {
+    fn topic(&self, wanted: impl Fn(&Role) -> bool) -> Vec<&str> {
+        let roles = self.plan.roles.iter();
+        let wanted = roles.filter(|(_, role)| wanted(role));
+        let topics = wanted.filter_map(|(i, _)| self.reader.topics().get(*i));
+        topics.map(|topic| topic.name.as_str()).collect()
+    }
+
+    fn clouds(&self) -> Vec<&str> {
+        self.topic(|role| *role == Role::Cloud)
+    }
+
+    fn transformer_arguments(&self) -> Vec<String> {
+        let source = self.plan.source;
+        let mut arguments = vec![
+            param("points_topics", &quoted(&self.clouds())),
+            param("ins.source", &source.to_string()),
+            param("qos./points_enu.reliability", "reliable"),
+            param("qos./points_enu.depth", "512"),
+        ];
+        for (name, type_name) in ["ins.topic", "ins.imu_topic"]
+            .iter()
+            .zip(source.type_names())
+        {
+            for topic in self.topic(|role| *role == Role::Ins(type_name)) {
+                arguments.push(param(name, topic));
+            }
+        }
+        for topic in self.clouds() {
+            arguments.push(param(&format!("qos.{topic}.reliability"), "reliable"));
+            arguments.push(param(&format!("qos.{topic}.depth"), "64"));
+        }
+        arguments
+    }
+
+    fn player_arguments(&self) -> Vec<String> {
+        let wanted = self.topic(|_| true);
+        let waited = self.topic(|role| !matches!(role, Role::Transforms(_)));
+        let mut arguments = vec![
+            param("bag", &yaml_text(self.bag)),
+            param("rate", &format!("{:?}", self.rate)),
+            param("topics", &quoted(&wanted)),
+            param("wait_for_subscribers", &quoted(&waited)),
+        ];
+        for topic in self.clouds() {
+            arguments.push(param(&format!("qos.{topic}.reliability"), "reliable"));
+        }
+        arguments
+    }
+}
+
+/// A parameter as `-p` takes it.
+pub(super) fn param(name: &str, value: &str) -> String {
+    format!("{name}:={value}")
+}
+
+/// A path as YAML text.
+pub(super) fn yaml_text(path: &Path) -> String {
+    format!("'{}'", path.display().to_string().replace('\'', "''"))
+}
+
+fn quoted(names: &[&str]) -> String {
+    let names: Vec<String> = names.iter().map(|name| format!("'{name}'")).collect();
+    format!("[{}]", names.join(", "))
+}
+
+/// One map and its markers.
+struct Branch {
+    namespace: String,
+    mapper: NodeProcess,
+    markers: NodeProcess,
+}
+
+impl Branch {
+    fn start(replay: &DdsReplay, lattice: &Lattice, scratch: &Path) -> Result<Self, ProcessError> {
+        let name = lattice.kind().name();
+        let start = |node: &str, params: Vec<String>| {
+            let report = scratch.join(format!("{name}_{node}.json"));
+            NodeProcess::start_in(node, Some(name), &params, replay, &report)
+        };
+        let orientation = replay
+            .orientation
+            .map(|o| param("lattice_orientation", &o.to_string()));
+        let mut params = vec![
+            param("lattice", name),
+            param("cell_volume_m3", &format!("{:?}", lattice.cell_volume_m3())),
+            param("qos./points_enu.reliability", "reliable"),
+            param("qos./points_enu.depth", "512"),
+        ];
+        params.extend(orientation);
+        let mapper = start("lattice_mapper", params)?;
+        let markers = start("voxel_marker_publisher", Vec::new())?;
+        Ok(Self {
+            namespace: format!("/{name}"),
+            mapper,
+            markers,
+        })
+    }
+
+    fn matched(&mut self) -> Result<(), ProcessError> {
+        for topic in ["map", "map_updates"] {
+            let line = format!("{}/{topic}: subscriber matched (1)", self.namespace);
+            self.mapper.expect(&line)?;
+            let line = format!("{}/{topic}: publisher matched (1)", self.namespace);
+            self.markers.expect(&line)?;
+        }
+        self.mapper.expect("/points_enu: publisher matched (1)")
+    }
+
+    fn end(self) -> Result<LatticeReport, ProcessError> {
+        Ok(LatticeReport {
+            map: self.mapper.end()?,
+            markers: self.markers.end()?,
+        })
+    }
+}

@@ -1,0 +1,64 @@
+//! `lattice run`: several nodes in one process.
+
+use std::path::PathBuf;
+
+use clap::Args;
+
+use super::CliResult;
+use lattice_nodes::executables;
+use lattice_runtime::params_file;
+use lattice_runtime::ros_args::RosArgs;
+
+/// Run several nodes in one process
+#[derive(Args)]
+pub struct Run {
+    /// Parameter files; the nodes that they name are run
+    #[arg(required = true)]
+    params: Vec<PathBuf>,
+    /// Nodes to run, when the files name others too
+    #[arg(long, value_name = "NODE")]
+    only: Vec<String>,
+    /// As for any ROS node: `--ros-args -r from:=to -p name:=value ...`
+    #[arg(last = true)]
+    ros_args: Vec<String>,
+}
+
+impl Run {
+    /// Runs the command.
+    pub fn run(self) -> CliResult {
+        let mut arguments = vec!["--ros-args".to_owned()];
+        let mut named = Vec::new();
+        for file in &self.params {
+            named.extend(
+                params_file::read(file)?
+                    .into_iter()
+                    .map(|param| param.nodes),
+            );
+            arguments.extend(["--params-file".to_owned(), file.display().to_string()]);
+        }
+        arguments.push("--".to_owned());
+        arguments.extend(self.ros_args);
+        let wanted = |name: &str| {
+            let named = named.iter().any(|pattern| pattern.names(name));
+            named && (self.only.is_empty() || self.only.iter().any(|only| only == name))
+        };
+        let nodes: Vec<_> = executables::NODES
+            .iter()
+            .filter(|(name, _)| wanted(name))
+            .collect();
+        if nodes.is_empty() {
+            let known: Vec<&str> = executables::NODES.iter().map(|(name, _)| *name).collect();
+            return Err(format!(
+                "the parameter files name none of the nodes {}",
+                known.join(", ")
+            )
+            .into());
+        }
+        let runtime = executables::start_runtime("lattice", RosArgs::parse(arguments)?)?;
+        let mut running = Vec::new();
+        for (name, start) in nodes {
+            running.push(start(&runtime, name)?);
+        }
+        executables::run_until_told(&runtime, running)
+    }
+}

@@ -1,0 +1,227 @@
+//! `lattice calibrate` as a user runs it.
+
+use std::path::Path;
+use std::process::{Command, Output};
+
+use nalgebra::{Isometry3, Point3, Vector3};
+use serde_json::Value;
+
+fn lattice(arguments: &[&str]) -> Output {
+    Command::new(env!("CARGO_BIN_EXE_lattice"))
+        .arg("calibrate")
+        .args(arguments)
+        .output()
+        .unwrap()
+}
+
+fn answer(output: &Output) -> Value {
+    let errors = String::from_utf8_lossy(&output.stderr);
+    serde_json::from_slice(&output.stdout).unwrap_or_else(|_| panic!("{errors}"))
+}
+
+fn fault(output: &Output) -> String {
+    assert!(!output.status.success());
+    let text = String::from_utf8(output.stderr.clone()).unwrap();
+    assert_eq!(text.lines().count(), 1, "{text}");
+    text
+}
+
+struct Labelled(Vec<(Point3<f64>, u16)>);
+
+impl Labelled {
+    fn boxed(&mut self, low: [f64; 3], high: [f64; 3], label: u16) {
+        let step = 0.04;
+        for axis in 0..3 {
+            let (u, v) = ((axis + 1) % 3, (axis + 2) % 3);
+            let count = |a: usize| ((high[a] - low[a]) / step) as usize;
+            for (i, j) in (0..=count(u)).flat_map(|i| (0..=count(v)).map(move |j| (i, j))) {
+                for side in [low[axis], high[axis]] {
+                    let mut p = [0.0; 3];
+                    p[axis] = side;
+                    p[u] = low[u] + step * i as f64;
+                    p[v] = low[v] + step * j as f64;
+                    self.0.push((p.into(), label));
+                }
+            }
+        }
+    }
+
+    /// A room of 6 m by 4.5 m with furniture that is nowhere the same.
+    fn room() -> Labelled {
+        let mut room = Labelled(Vec::new());
+        room.boxed([0.0, 0.0, 0.0], [6.0, 4.5, 2.4], 0);
+        room.boxed([0.3, 0.2, 0.0], [1.9, 0.9, 0.75], 5);
+        room.boxed([4.6, 0.1, 0.0], [5.9, 0.6, 1.9], 9);
+        room.boxed([3.2, 3.2, 0.0], [5.0, 4.3, 0.45], 8);
+        room.boxed([0.1, 2.9, 0.0], [0.6, 3.6, 1.2], 4);
+        room
+    }
+
+    fn write(&self, directory: &Path, name: &str, of: impl Fn(&Point3<f64>) -> [f64; 3]) -> String {
+        let mut text = format!(
+            "ply\nformat ascii 1.0\nelement vertex {}\nproperty float x\nproperty float y\n\
+             property float z\nproperty ushort label\nend_header\n",
+            self.0.len()
+        );
+        for (point, label) in &self.0 {
+            let [x, y, z] = of(point);
+            text += &format!("{x:.5} {y:.5} {z:.5} {label}\n");
+        }
+        let path = directory.join(name);
+        std::fs::write(&path, text).unwrap();
+        path.display().to_string()
+    }
+}
+
+fn truth() -> Isometry3<f64> {
+    Isometry3::new(Vector3::new(2.6, 2.2, 1.5), Vector3::z() * 2.0)
+}
+
+/// What is in front of the headset, within 70 degrees.
+fn seen(room: &Labelled) -> Labelled {
+    let headset_from_map = truth().inverse();
+    let in_view = |p: &Point3<f64>| p.x > 0.3 && p.y.abs() < 0.7 * p.x && p.z < 0.6 * p.x;
+    let points = room.0.iter().map(|(p, l)| (headset_from_map * p, *l));
+    Labelled(points.filter(|(p, _)| in_view(p)).collect())
+}
+
+fn check_pose(answer: &Value) {
+    let pose = &answer["map_from_cloud"];
+    let expected = truth().translation.vector;
+    for axis in 0..3 {
+        let found = pose["translation_m"][axis].as_f64().unwrap();
+        assert!((found - expected[axis]).abs() < 0.03, "{pose}");
+    }
+    let yaw_deg = pose["yaw_deg"].as_f64().unwrap();
+    assert!((yaw_deg - 2.0_f64.to_degrees()).abs() < 0.7, "{pose}");
+}
+
+#[test]
+fn a_cloud_is_found_without_a_guess_whatever_its_axes_and_labels_are_learned() {
+    let folder = tempfile::tempdir().unwrap();
+    let room = Labelled::room();
+    let map = room.write(folder.path(), "map.ply", |p| p.coords.into());
+    let seen = seen(&room);
+    let ros = seen.write(folder.path(), "ros.ply", |p| p.coords.into());
+    let unity = seen.write(folder.path(), "unity.ply", |p| [-p.y, p.z, p.x]);
+    let names = folder.path().join("classes.yaml");
+    std::fs::write(&names, "classes: {0: wall, 8: sofa}").unwrap();
+    let names = names.display().to_string();
+    let learned = folder.path().join("learned.json");
+    let learned_name = learned.display().to_string();
+
+    let arguments = ["--map", &map, "--cloud", &ros, "--labels", &names];
+    let more = ["--sensor", "0 0 0", "--confusion", &learned_name, "--json"];
+    let output = lattice(&[&arguments[..], &more].concat());
+    let first = answer(&output);
+    assert!(output.status.success(), "{first}");
+    assert_eq!(first["verdict"], "OK");
+    check_pose(&first);
+    let classes = first["classes"].as_array().unwrap();
+    let wall = classes.iter().find(|c| c["class"] == 0).unwrap();
+    assert_eq!(wall["name"], "wall");
+    assert!(wall["agreement"].as_f64().unwrap() > 0.8);
+    assert_eq!(first["covariance"].as_array().unwrap().len(), 36);
+
+    // What was learned is read again.
+    assert!(learned.exists());
+    let axes = [
+        "--map",
+        &map,
+        "--cloud",
+        &unity,
+        "--axes",
+        "unity_ruf",
+        "--json",
+    ];
+    let output = lattice(&[&axes[..], &["--confusion", &learned_name]].concat());
+    assert!(output.status.success());
+    check_pose(&answer(&output));
+
+    let text = lattice(&["--map", &map, "--cloud", &ros, "--guess", "2.5 2.1 1.5 110"]);
+    let text = String::from_utf8(text.stdout).unwrap();
+    for line in [
+        "verdict        OK",
+        "translation    2.",
+        "sigma ",
+        "log-margin ",
+        "time ",
+    ] {
+        assert!(text.contains(line), "{text}");
+    }
+}
+
+#[test]
+fn what_is_not_ok_fails_and_is_printed_all_the_same() {
+    let folder = tempfile::tempdir().unwrap();
+    let room = Labelled::room();
+    let map = room.write(folder.path(), "map.ply", |p| p.coords.into());
+    // A piece of bare floor is everywhere.
+    let of_floor = room
+        .0
+        .iter()
+        .filter(|(p, _)| p.z == 0.0 && p.x < 1.0 && p.y < 1.0);
+    let floor = Labelled(of_floor.copied().collect());
+    let floor = floor.write(folder.path(), "floor.ply", |p| p.coords.into());
+    let output = lattice(&["--map", &map, "--cloud", &floor, "--json"]);
+    let verdict = answer(&output)["verdict"].as_str().unwrap().to_owned();
+    assert_ne!(verdict, "OK");
+    assert!(fault(&output).contains(&verdict));
+}
+
+#[test]
+fn single_registrations_start_from_the_guess() {
+    let folder = tempfile::tempdir().unwrap();
+    let room = Labelled::room();
+    let map = room.write(folder.path(), "map.ply", |p| p.coords.into());
+    let cloud = seen(&room).write(folder.path(), "cloud.ply", |p| p.coords.into());
+    let common = [
+        "--map",
+        &map,
+        "--cloud",
+        &cloud,
+        "--guess",
+        "2.65 2.15 1.5 116",
+        "--json",
+    ];
+    for method in ["gicp", "gicp-se3", "semantic-published", "class-wise"] {
+        let output = lattice(&[&common[..], &["--method", method]].concat());
+        let answer = answer(&output);
+        assert!(output.status.success(), "{answer}");
+        assert_eq!(
+            (&answer["verdict"], &answer["converged"]),
+            (&Value::Null, &Value::Bool(true))
+        );
+        check_pose(&answer);
+    }
+}
+
+#[test]
+fn faults_are_one_line() {
+    let folder = tempfile::tempdir().unwrap();
+    let room = Labelled::room();
+    let map = room.write(folder.path(), "map.ply", |p| p.coords.into());
+    let none = Labelled(Vec::new()).write(folder.path(), "none.ply", |p| p.coords.into());
+    let common = ["--map", &map, "--cloud", &map];
+    for (arguments, message) in [
+        (vec!["--map", "/no/such", "--cloud", &map], "/no/such: "),
+        (vec!["--map", &map, "--cloud", "/no/such"], "/no/such: "),
+        (
+            vec!["--map", &none, "--cloud", &map],
+            "the map has no points",
+        ),
+        ([&common[..], &["--labels", &map]].concat(), "map.ply: "),
+        ([&common[..], &["--confusion", &map]].concat(), "map.ply: "),
+        (
+            [&common[..], &["--cell", "0"]].concat(),
+            "--cell 0 is no length over 0",
+        ),
+    ] {
+        let text = fault(&lattice(&arguments));
+        assert!(text.contains(message), "{text}");
+    }
+    // Those of the command line itself come with the usage.
+    let output = lattice(&[&common[..], &["--guess", "1 2 3"]].concat());
+    let text = String::from_utf8(output.stderr).unwrap();
+    assert!(text.contains("3 numbers instead of 4 or 7"), "{text}");
+}

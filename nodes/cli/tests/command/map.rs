@@ -1,0 +1,233 @@
+//! `lattice map merge`, `diff`, `crop` and `query` as a user runs them.
+
+use std::path::Path;
+use std::process::{Command, Output};
+
+use lattice_core::cloud::Cloud;
+use lattice_core::lattice::{Lattice, LatticeKind};
+use lattice_core::voxels::VoxelList;
+use lattice_core::voxels::file::{MapContents, write_map};
+use nalgebra::Vector3;
+use serde_json::Value;
+
+fn lattice(arguments: &[&str]) -> Output {
+    Command::new(env!("CARGO_BIN_EXE_lattice"))
+        .args(arguments)
+        .output()
+        .unwrap()
+}
+
+fn json(arguments: &[&str]) -> Value {
+    let output = lattice(&[arguments, &["--json"]].concat());
+    let errors = String::from_utf8_lossy(&output.stderr);
+    assert!(output.status.success(), "{arguments:?}: {errors}");
+    serde_json::from_slice(&output.stdout).unwrap()
+}
+
+/// The one line of an error.
+fn error(arguments: &[&str]) -> String {
+    let output = lattice(arguments);
+    assert!(!output.status.success(), "{arguments:?} should fail");
+    assert!(output.stdout.is_empty());
+    let text = String::from_utf8(output.stderr).unwrap();
+    assert_eq!(text.lines().count(), 1, "{text}");
+    text
+}
+
+/// The map of points in the map frame, with the datum near a place.
+fn map(kind: LatticeKind, datum_m: [f64; 3], points_m: &[[f32; 3]]) -> VoxelList {
+    let lattice = Lattice::new(kind, 0.125).unwrap();
+    let mut list = VoxelList::new(lattice, datum_m.into(), usize::MAX).unwrap();
+    list.insert(&Cloud {
+        stamp_ns: 0,
+        datum_m: Vector3::zeros(),
+        offsets_m: points_m.to_vec(),
+    });
+    list
+}
+
+fn save(directory: &Path, name: &str, list: &VoxelList) -> String {
+    let path = directory.join(name);
+    write_map(list, std::fs::File::create(&path).unwrap()).unwrap();
+    path.display().to_string()
+}
+
+fn load(path: &str) -> MapContents {
+    MapContents::read(&std::fs::read(path).unwrap()[..], usize::MAX).unwrap()
+}
+
+fn points(range: std::ops::Range<i32>) -> Vec<[f32; 3]> {
+    let point = |i: i32| [0.21 * i as f32, 0.4 * (i % 9) as f32, -0.3 * (i % 5) as f32];
+    range.map(point).collect()
+}
+
+#[test]
+fn maps_merge_differ_and_are_cut() {
+    let directory = tempfile::tempdir().unwrap();
+    let at = |name: &str| directory.path().join(name).display().to_string();
+    let (first, second) = (points(-50..120), points(80..200));
+    let a = save(
+        directory.path(),
+        "a",
+        &map(LatticeKind::Fcc, [0.0; 3], &first),
+    );
+    // The same cells counted from elsewhere.
+    let far_m = [300.0, -20.0, 7.0];
+    let b = save(
+        directory.path(),
+        "b",
+        &map(LatticeKind::Fcc, far_m, &second),
+    );
+    let whole = map(LatticeKind::Fcc, [0.0; 3], &[&first[..], &second].concat());
+    let (a_keys, whole_keys) = (load(&a), MapContents::from_list(&whole));
+
+    let merged = at("merged");
+    let written = json(&["map", "merge", &a, &b, "-o", &merged]);
+    assert_eq!(written["voxels"], whole.len());
+    assert_eq!(written["points"], 290);
+    assert_eq!(
+        written["file_bytes"],
+        std::fs::metadata(&merged).unwrap().len()
+    );
+    assert_eq!(load(&merged).keys(), whole_keys.keys());
+    assert!(!Path::new(&at("merged.partial")).exists());
+
+    let rest = at("rest");
+    let counts = json(&["map", "diff", &merged, &a, "-o", &rest]);
+    assert_eq!(counts["only_a"], whole.len() - a_keys.keys().len());
+    assert_eq!(
+        (&counts["only_b"], &counts["both"]),
+        (&0.into(), &a_keys.keys().len().into())
+    );
+    assert_eq!(json(&["map", "diff", &b, &rest])["only_b"], 0);
+    assert_eq!(json(&["map", "diff", &a, &rest])["both"], 0);
+    let again = at("again");
+    json(&[
+        "map",
+        "merge",
+        &a,
+        &rest,
+        "-o",
+        &again,
+        "--occupancy-only",
+        "--zstd=19",
+    ]);
+    assert_eq!(load(&again).keys(), whole_keys.keys());
+    assert!(load(&again).voxels().is_none());
+    let info = json(&["map", "info", &again]);
+    assert_eq!(info["counts"], false);
+    assert!(
+        lattice(&["map", "export", &again, "-o", &at("again.ply")])
+            .status
+            .success()
+    );
+
+    let (left, right) = (at("left"), at("right"));
+    let (low, high) = (["-1e3", "-1e3", "-2"], ["1e3", "1e3", "2"]);
+    let boxed = |min: [&str; 3], max: [&str; 3], out: &str| {
+        let sides = [&["--min"], &min[..], &["--max"], &max[..]].concat();
+        json(&[&["map", "crop", &merged, "-o", out, "--zstd"], &sides[..]].concat())
+    };
+    let cut = boxed(low, ["7.5", high[1], high[2]], &left)["voxels"].as_u64();
+    let other = boxed(["7.5", low[1], low[2]], high, &right)["voxels"].as_u64();
+    assert!(cut > Some(10) && other > Some(10));
+    assert_eq!(cut.unwrap() + other.unwrap(), whole.len() as u64);
+    let left = load(&left);
+    assert!(left.keys().iter().all(|key| left.center_m(*key).x < 7.5));
+    for (key, voxel) in left.keys().iter().zip(left.voxels().unwrap()) {
+        assert_eq!(voxel.count, whole.get(*key).unwrap().count);
+    }
+}
+
+#[test]
+fn what_does_not_go_together_is_refused_in_a_line() {
+    let directory = tempfile::tempdir().unwrap();
+    let at = |name: &str| directory.path().join(name).display().to_string();
+    let fcc = save(
+        directory.path(),
+        "fcc",
+        &map(LatticeKind::Fcc, [0.0; 3], &points(0..9)),
+    );
+    let hex = save(
+        directory.path(),
+        "hex",
+        &map(LatticeKind::Hex, [0.0; 3], &points(0..9)),
+    );
+    let far_m = [1e7, 0.0, 0.0];
+    let far = save(directory.path(), "far", &{
+        let mut list = map(LatticeKind::Fcc, far_m, &[]);
+        list.insert(&Cloud {
+            stamp_ns: 0,
+            datum_m: far_m.into(),
+            offsets_m: points(0..9),
+        });
+        list
+    });
+    let out = at("out");
+    for command in [
+        vec!["merge", &fcc, &hex, "-o", &out],
+        vec!["diff", &fcc, &hex],
+    ] {
+        let line = error(&[&["map"], &command[..]].concat());
+        assert!(line.contains(&hex) && line.contains("same cells"), "{line}");
+    }
+    let line = error(&["map", "merge", &fcc, &far, "-o", &out]);
+    assert!(line.contains(&far) && line.contains("datum"), "{line}");
+    let bare = at("bare");
+    json(&["map", "merge", &fcc, "-o", &bare, "--occupancy-only"]);
+    let line = error(&["map", "merge", &fcc, &bare, "-o", &out]);
+    assert!(line.contains("occupancy only"), "{line}");
+    let sides = ["--min", "0", "0", "0", "--max", "1", "0", "1"];
+    let line = error(&[&["map", "crop", &fcc, "-o", &out], &sides[..]].concat());
+    assert!(line.contains("--max"), "{line}");
+    let mut bytes = std::fs::read(&fcc).unwrap();
+    bytes.pop();
+    std::fs::write(&fcc, &bytes).unwrap();
+    let line = error(&["map", "merge", &fcc, "-o", &out]);
+    assert!(line.contains("cut short") && line.contains(&fcc), "{line}");
+    assert!(!Path::new(&out).exists());
+    let nowhere = at("no/where");
+    assert!(error(&["map", "merge", &hex, "-o", &nowhere]).contains(&nowhere));
+}
+
+#[test]
+fn maps_answer_questions() {
+    let directory = tempfile::tempdir().unwrap();
+    // A wall at x = 2 with a gap above y = 3.
+    let wall = |i: i32| [2.0, 0.1 * (i % 80 - 50) as f32, 0.1 * (i / 80 - 20) as f32];
+    let cells: Vec<_> = (0..80 * 40).map(wall).collect();
+    let list = map(LatticeKind::Cubic, [0.0; 3], &cells);
+    let path = save(directory.path(), "wall", &list);
+    let ask = |rest: &[&str]| json(&[&["map", "query", &path], rest].concat());
+    let near = ask(&["--nearest", "1", "0", "0", "-k", "3"]);
+    let near = near["nearest"].as_array().unwrap();
+    assert_eq!(near.len(), 3);
+    assert_eq!(near[0]["center_m"], serde_json::json!([2.0, 0.0, 0.0]));
+    assert_eq!(
+        (&near[0]["distance_m"], &near[1]["distance_m"]),
+        (&1.0.into(), &1.25_f64.sqrt().into())
+    );
+    let clear = ask(&["--clearance", "1", "0", "-0.1"]);
+    assert_eq!(clear["clearance"]["distance_m"], 0.75);
+    let inside = ask(&["--clearance", "2", "0", "0"]);
+    assert_eq!(inside["clearance"]["distance_m"], 0.0);
+    let ends = ["--path", "0", "0", "0", "4", "0", "0", "--radius", "0.3"];
+    let way = &ask(&ends)["path"];
+    let length_m = way["length_m"].as_f64().unwrap();
+    assert!((7.0..9.0).contains(&length_m), "{length_m}");
+    let centers = way["centers_m"].as_array().unwrap();
+    assert_eq!(
+        centers.first().unwrap(),
+        &serde_json::json!([0.0, 0.0, 0.0])
+    );
+    assert_eq!(centers.last().unwrap(), &serde_json::json!([4.0, 0.0, 0.0]));
+    let plain = lattice(&["map", "query", &path, "--nearest", "1", "0", "0"]);
+    let plain = String::from_utf8(plain.stdout).unwrap();
+    assert_eq!(plain, "1.000 m to the cell at 2.000 0.000 0.000\n");
+    let blocked = [
+        "map", "query", &path, "--path", "2", "0", "0", "4", "0", "0", "--radius", "0",
+    ];
+    assert!(error(&blocked).contains("not passable"));
+    let nothing = lattice(&["map", "query", &path]);
+    assert!(!nothing.status.success());
+}

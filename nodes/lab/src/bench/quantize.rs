@@ -1,0 +1,147 @@
+//! Quantizing and packing keys, without a store.
+
+use crate::printed::Search27;
+use lattice_core::lattice::{BatchQuantizer, BlockKey, Lattice, Simd};
+use nalgebra::Isometry3;
+use rayon::prelude::*;
+
+use super::{Report, timed};
+
+/// Points of one task.
+const CHUNK: usize = 1 << 14;
+
+/// How points become keys.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub enum QuantizeMethod {
+    /// The batch quantizer with the best instructions of this machine.
+    Batch,
+    /// The batch quantizer with what every machine of the target has.
+    Portable,
+    /// One point at a time in f64.
+    Scalar,
+    /// The nearest of 27 candidates, as Ryde & Brünig 2011 do it, with the best instructions; keys
+    /// of points on borders may be others.
+    Paper27,
+}
+
+impl QuantizeMethod {
+    fn name(self) -> &'static str {
+        match self {
+            Self::Batch => "lattice-batch",
+            Self::Portable => "lattice-portable",
+            Self::Scalar => "lattice-scalar",
+            Self::Paper27 => "lattice-paper27",
+        }
+    }
+}
+
+/// Quantizes all points into a stream of keys ([`BlockKey`]) in memory; the report has its digest.
+pub fn quantize(
+    method: QuantizeMethod,
+    lattice: &Lattice,
+    res_m: f64,
+    points_m: &[[f32; 3]],
+) -> Report {
+    // Written once before, so that no page is first touched while the clock runs.
+    let mut keys = vec![BlockKey::NONE; points_m.len()];
+    let batch = |simd| BatchQuantizer::with_simd(lattice, Isometry3::identity(), simd);
+    let (best, portable) = (batch(Simd::detect()), batch(Simd::Portable));
+    let paper = Search27::new(lattice, Simd::detect());
+    let ((), spent) = timed(|| {
+        let chunks = points_m.par_chunks(CHUNK).zip(keys.par_chunks_mut(CHUNK));
+        chunks.for_each(|(points_m, keys)| match method {
+            QuantizeMethod::Batch => blocks(&best, points_m, keys),
+            QuantizeMethod::Portable => blocks(&portable, points_m, keys),
+            QuantizeMethod::Scalar => scalar(lattice, points_m, keys),
+            QuantizeMethod::Paper27 => {
+                if let Some(paper) = &paper {
+                    paper.codes(points_m, keys);
+                }
+            }
+        });
+    });
+    let mut report = Report::new(method.name(), lattice.kind().name(), res_m, spent);
+    report.n = points_m.len() as u64;
+    report.hash = Some(format!("{:016x}", digest(&keys)));
+    report
+}
+
+fn blocks(quantizer: &BatchQuantizer, points_m: &[[f32; 3]], mut keys: &mut [BlockKey]) {
+    quantizer.for_blocks(points_m, |block, _| {
+        let (now, later) = std::mem::take(&mut keys).split_at_mut(block.len());
+        now.copy_from_slice(block);
+        keys = later;
+    });
+}
+
+fn scalar(lattice: &Lattice, points_m: &[[f32; 3]], keys: &mut [BlockKey]) {
+    let mut keys = keys.iter_mut();
+    let points = points_m.iter().map(|p| p.map(f64::from));
+    lattice.quantize_each(points, |_, w| {
+        if let Some(key) = keys.next() {
+            *key = w.and_then(BlockKey::pack).unwrap_or(BlockKey::NONE);
+        }
+    });
+}
+
+/// FNV-1a over the bytes of the keys, little-endian.
+fn digest(keys: &[BlockKey]) -> u64 {
+    let bytes = keys.iter().flat_map(|key| key.raw().to_le_bytes());
+    bytes.fold(0xcbf2_9ce4_8422_2325, |hash, byte| {
+        (hash ^ u64::from(byte)).wrapping_mul(0x100_0000_01b3)
+    })
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use lattice_core::lattice::LatticeKind;
+
+    #[test]
+    fn the_digest_is_that_of_fnv_1a() {
+        assert_eq!(digest(&[]), 0xcbf2_9ce4_8422_2325);
+        // "foobar\0\0" by the reference implementation's definition, folded by hand over its bytes.
+        let key = BlockKey::from_raw(u64::from_le_bytes(*b"foobar\0\0")).unwrap();
+        let foobar: u64 = 0x8594_4171_f739_67e8;
+        let prime: u64 = 0x100_0000_01b3;
+        assert_eq!(
+            digest(&[key]),
+            foobar.wrapping_mul(prime).wrapping_mul(prime)
+        );
+    }
+
+    #[test]
+    fn neither_threads_nor_method_change_the_digest_but_points_do() {
+        let lattice = Lattice::new(LatticeKind::Fcc, 0.001).unwrap();
+        let points: Vec<[f32; 3]> = (0..50_000)
+            .map(|i| [0.01 * i as f32, 0.3 - 0.007 * i as f32, 2.0])
+            .collect();
+        let hash = |threads, method, points: &[[f32; 3]]| {
+            let pool = rayon::ThreadPoolBuilder::new()
+                .num_threads(threads)
+                .build()
+                .unwrap();
+            pool.install(|| quantize(method, &lattice, 0.1, points).hash)
+        };
+        let one = hash(1, QuantizeMethod::Scalar, &points);
+        for method in [
+            QuantizeMethod::Scalar,
+            QuantizeMethod::Batch,
+            QuantizeMethod::Portable,
+        ] {
+            assert_eq!(hash(3, method, &points), one, "{method:?}");
+            assert_ne!(hash(1, method, &points[1..]), one, "{method:?}");
+        }
+        let paper = |points| hash(2, QuantizeMethod::Paper27, points);
+        // Its keys are the exact ones where single precision is enough.
+        let near: Vec<[f32; 3]> = points
+            .iter()
+            .map(|p| p.map(|x| x.rem_euclid(1.7)))
+            .collect();
+        assert_eq!(
+            paper(&near[..500]),
+            hash(1, QuantizeMethod::Scalar, &near[..500])
+        );
+        assert_ne!(paper(&points[1..]), paper(&points));
+    }
+}

@@ -1,0 +1,172 @@
+//! Registering one cloud to another.
+
+use lattice_core::registration::{
+    Method, PrepareOptions, PreparedCloud, RegisterOptions, RegistrationError, SemanticCloud,
+    register as run, voxel_downsample,
+};
+use nalgebra::Isometry3;
+use serde::Serialize;
+
+use super::timed;
+
+/// What is registered, and how often.
+#[derive(Clone, Copy, Debug)]
+pub struct RegisterSetup<'a> {
+    /// Method with its tolerances.
+    pub options: RegisterOptions<'a>,
+    /// How the clouds are prepared.
+    pub prepare: PrepareOptions,
+    /// Side of the cells whose means are taken while the clock runs, m; `None` takes all points.
+    pub cell_m: Option<f64>,
+    /// Start.
+    pub target_from_source: Isometry3<f64>,
+    /// Runs; one more goes before that is not counted.
+    pub rounds: usize,
+}
+
+/// What a registration took and where it ended.
+#[derive(Clone, Debug, PartialEq, Serialize)]
+pub struct RegisterReport {
+    /// System and variant.
+    pub sys: String,
+    /// Threads that it could use.
+    pub threads: usize,
+    /// Points that were registered, after thinning.
+    pub source_points: usize,
+    /// Points of the target, after thinning.
+    pub target_points: usize,
+    /// Wall time.
+    pub wall: RegisterTimes,
+    /// Processor time of all threads.
+    pub cpu: RegisterTimes,
+    /// 4 x 4 rows of the transform.
+    pub target_from_source: [[f64; 4]; 4],
+    /// Whether it converged.
+    pub converged: bool,
+    /// Searches for pairs.
+    pub iterations: usize,
+    /// Source points with a pair.
+    pub inliers: usize,
+    /// Root mean square distance of the pairs, m.
+    pub rmse_m: f64,
+}
+
+/// What each round took, s.
+#[derive(Clone, Debug, PartialEq, Default, Serialize)]
+pub struct RegisterTimes {
+    /// Thinning, trees and covariances of both clouds.
+    pub prepare: Vec<f64>,
+    /// The registration.
+    pub register: Vec<f64>,
+}
+
+/// Prepares both clouds and registers them, again and again from the start.
+pub fn register(
+    name: &str,
+    source: &SemanticCloud,
+    target: &SemanticCloud,
+    setup: &RegisterSetup,
+) -> Result<RegisterReport, RegistrationError> {
+    let thinned = |cloud: &SemanticCloud| match setup.cell_m {
+        Some(cell_m) => voxel_downsample(cloud, cell_m),
+        None => cloud.clone(),
+    };
+    let mut report = None;
+    let (mut wall, mut cpu) = (RegisterTimes::default(), RegisterTimes::default());
+    for round in 0..setup.rounds.max(1) + 1 {
+        let (prepared, prepare) = timed(|| {
+            let (source, target) = rayon::join(
+                || PreparedCloud::new(thinned(source), &setup.prepare),
+                || PreparedCloud::new(thinned(target), &setup.prepare),
+            );
+            Ok((source?, target?))
+        });
+        let (source, target) = prepared?;
+        let start = &setup.target_from_source;
+        let (found, spent) = timed(|| run(&source, &target, start, &setup.options));
+        if round > 0 {
+            wall.prepare.push(prepare.wall_s);
+            wall.register.push(spent.wall_s);
+            cpu.prepare.push(prepare.cpu_s);
+            cpu.register.push(spent.cpu_s);
+        }
+        report = Some((found, source.len(), target.len()));
+    }
+    let (found, source_points, target_points) = report.ok_or(RegistrationError::TooFewPoints {
+        points: 0,
+        least: 1,
+    })?;
+    let matrix = found.target_from_source.to_homogeneous();
+    let row = |r: usize| [0, 1, 2, 3].map(|c| matrix[(r, c)]);
+    Ok(RegisterReport {
+        sys: format!("lattice-{name}"),
+        threads: rayon::current_num_threads(),
+        source_points,
+        target_points,
+        wall,
+        cpu,
+        target_from_source: [0, 1, 2, 3].map(row),
+        converged: found.converged,
+        iterations: found.iterations,
+        inliers: found.inliers,
+        rmse_m: found.rmse_m,
+    })
+}
+
+/// The published options of a method with a gate.
+pub fn register_options(method: Method, gate_m: f64) -> RegisterOptions<'static> {
+    let options = match method {
+        Method::PointToPoint => RegisterOptions::point_to_point(gate_m),
+        Method::Gicp | Method::Semantic(_) | Method::ClassWise => RegisterOptions::gicp(gate_m),
+        Method::GicpSe3 => RegisterOptions::gicp_se3(),
+    };
+    RegisterOptions { gate_m, ..options }
+}
+
+#[cfg(test)]
+mod tests {
+    use nalgebra::Point3;
+
+    use super::*;
+
+    #[test]
+    fn a_report_tells_every_round_and_where_it_ended() {
+        let place = |i: u32| {
+            let (u, v) = (f64::from(i % 30) * 0.1, f64::from(i / 30 % 30) * 0.1);
+            match i / 900 {
+                0 => Point3::new(u, v, 0.0),
+                1 => Point3::new(u, 0.0, v),
+                _ => Point3::new(0.0, u, v),
+            }
+        };
+        let target = SemanticCloud::unlabelled((0..2700).map(place).collect());
+        let points_m = target
+            .points_m
+            .iter()
+            .map(|p| p + nalgebra::Vector3::new(0.02, 0.0, 0.01));
+        let source = SemanticCloud::unlabelled(points_m.collect());
+        let setup = RegisterSetup {
+            options: register_options(Method::Gicp, 1.0),
+            prepare: PrepareOptions::default(),
+            cell_m: None,
+            target_from_source: Isometry3::identity(),
+            rounds: 3,
+        };
+        let report = register("gicp", &source, &target, &setup).unwrap();
+        assert_eq!(report.wall.register.len(), 3);
+        assert_eq!((report.source_points, report.target_points), (2700, 2700));
+        assert!(report.converged);
+        assert!(
+            (report.target_from_source[0][3] + 0.02).abs() < 1e-4,
+            "{report:?}"
+        );
+        assert!(
+            (report.target_from_source[2][3] + 0.01).abs() < 1e-4,
+            "{report:?}"
+        );
+        let cell_m = Some(0.35);
+        let report =
+            register("gicp", &source, &target, &RegisterSetup { cell_m, ..setup }).unwrap();
+        assert!(report.source_points < 500, "{report:?}");
+    }
+}

@@ -1,0 +1,173 @@
+//! Writes the point file of a simulated survey.
+
+use std::fmt;
+use std::fs::File;
+use std::io::{self, BufWriter, Write};
+use std::path::{Path, PathBuf};
+
+use crate::simulate::{SimulationError, Survey, SurveyPattern};
+use serde::Serialize;
+use thiserror::Error;
+
+use super::points::{ScanRecord, point_to_bytes, scans_path};
+
+/// What to simulate and where to write it.
+#[derive(Clone, Debug)]
+pub struct SiteOptions {
+    /// Seed of all noise; the same seed gives the same bytes.
+    pub seed: u64,
+    /// The scanners.
+    pub pattern: SurveyPattern,
+    /// Number of points; the last scan is cut.
+    pub points: u64,
+    /// The point file; its scans get `.scans` added to the name.
+    pub out: PathBuf,
+}
+
+/// What was written.
+#[derive(Clone, Debug, PartialEq, Serialize)]
+pub struct SiteSummary {
+    /// The point file.
+    pub out: PathBuf,
+    /// Points in it.
+    pub points: u64,
+    /// Scans that they belong to.
+    pub scans: u64,
+    /// Time that the scanners took, s.
+    pub duration_s: f64,
+    /// Mean distance of the points from the origin of their scan, m.
+    pub mean_range_m: f64,
+}
+
+impl fmt::Display for SiteSummary {
+    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
+        write!(
+            f,
+            "{}: {} points in {} scans over {:.1} s, mean range {:.2} m",
+            self.out.display(),
+            self.points,
+            self.scans,
+            self.duration_s,
+            self.mean_range_m
+        )
+    }
+}
+
+/// Why no point file was written.
+#[derive(Debug, Error)]
+pub enum SiteError {
+    /// The simulation refused its options.
+    #[error(transparent)]
+    Simulation(#[from] SimulationError),
+    /// The file cannot be written.
+    #[error("{}: {source}", path.display())]
+    Io {
+        /// The file.
+        path: PathBuf,
+        /// What the operating system said.
+        source: io::Error,
+    },
+    /// The longest simulation has fewer points.
+    #[error("only {points} points in the longest simulation; ask for no more")]
+    TooMany {
+        /// Points that there are.
+        points: u64,
+    },
+}
+
+/// Writes a survey; `progress` hears the share done, 0..1.
+pub fn write_site(
+    options: &SiteOptions,
+    progress: &mut dyn FnMut(f64),
+) -> Result<SiteSummary, SiteError> {
+    let survey = Survey::new(options.seed, options.pattern)?;
+    let scans_out = scans_path(&options.out);
+    let mut points_file = create(&options.out)?;
+    let mut scans_file = create(&scans_out)?;
+    let (mut points, mut scans, mut sum_m) = (0u64, 0u64, 0.0);
+    for scan in survey.scans() {
+        if points >= options.points {
+            break;
+        }
+        let left = usize::try_from(options.points - points).unwrap_or(usize::MAX);
+        let kept = scan.points.get(..left).unwrap_or(&scan.points);
+        for &point in kept {
+            let [x, y, z, _] = point.map(f64::from);
+            sum_m += (nalgebra::Vector3::new(x, y, z) - scan.origin_m).norm();
+            let written = points_file.write_all(&point_to_bytes(point));
+            written.map_err(at(&options.out))?;
+        }
+        let record = ScanRecord {
+            origin_m: scan.origin_m,
+            points: kept.len(),
+        };
+        let written = scans_file.write_all(&record.to_bytes());
+        written.map_err(at(&scans_out))?;
+        points += kept.len() as u64;
+        scans += 1;
+        progress(points as f64 / options.points as f64);
+    }
+    points_file.flush().map_err(at(&options.out))?;
+    scans_file.flush().map_err(at(&scans_out))?;
+    if points < options.points {
+        return Err(SiteError::TooMany { points });
+    }
+    Ok(SiteSummary {
+        out: options.out.clone(),
+        points,
+        scans,
+        duration_s: scans as f64 / options.pattern.scans_per_s(),
+        mean_range_m: if points > 0 {
+            sum_m / points as f64
+        } else {
+            0.0
+        },
+    })
+}
+
+fn create(path: &Path) -> Result<BufWriter<File>, SiteError> {
+    let file = File::create(path).map_err(at(path))?;
+    Ok(BufWriter::with_capacity(1 << 20, file))
+}
+
+fn at(path: &Path) -> impl Fn(io::Error) -> SiteError {
+    let path = path.to_owned();
+    move |source| SiteError::Io {
+        path: path.clone(),
+        source,
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use std::fs;
+
+    fn written(threads: usize, seed: u64, pattern: SurveyPattern) -> (Vec<u8>, Vec<u8>) {
+        let dir = tempfile::tempdir().unwrap();
+        let out = dir.path().join("site.xyzi");
+        let options = SiteOptions {
+            seed,
+            pattern,
+            points: 40_000,
+            out: out.clone(),
+        };
+        let pool = rayon::ThreadPoolBuilder::new()
+            .num_threads(threads)
+            .build()
+            .unwrap();
+        let summary = pool.install(|| write_site(&options, &mut |_| ())).unwrap();
+        assert_eq!(summary.points, 40_000);
+        (fs::read(&out).unwrap(), fs::read(scans_path(&out)).unwrap())
+    }
+
+    #[test]
+    fn any_number_of_threads_writes_the_same_bytes() {
+        for pattern in [SurveyPattern::Lms200, SurveyPattern::Os64] {
+            let one = written(1, 3, pattern);
+            assert_eq!(one.0.len(), 640_000);
+            assert!(one == written(3, 3, pattern), "{pattern:?}");
+            assert!(one != written(1, 4, pattern), "{pattern:?}");
+        }
+    }
+}

@@ -1,0 +1,332 @@
+//! Writes a simulated house: the robot's map, and what headsets see, with the truth.
+
+use std::collections::BTreeMap;
+use std::fmt;
+use std::fs::{self, File};
+use std::io::{self, BufWriter, Write};
+use std::path::{Path, PathBuf};
+
+use crate::simulate::house::{
+    HeadsetOptions, HeadsetTrial, House, HouseError, LabelDraw, LabelModel, Scene, Survey,
+    SurveyOptions,
+};
+use lattice_core::lattice::{Lattice, LatticeError, LatticeKind};
+use lattice_core::pose::Axes;
+use lattice_core::registration::UNLABELED;
+use lattice_core::voxels::file::{FileError, write_map};
+use nalgebra::{Isometry3, Point3};
+use serde::{Deserialize, Serialize};
+use thiserror::Error;
+
+use crate::mesh::{MeshFileError, read_mesh};
+use lattice_nodes::files::classes::{ClassesError, read_classes};
+use lattice_nodes::files::export::write_labelled_ply;
+
+/// Name of the robot's map in the folder.
+pub const MAP_FILE: &str = "map.lattice";
+/// Name of the list of classes.
+pub const CLASSES_FILE: &str = "classes.yaml";
+/// Most triangles of a mesh that is read.
+const MAX_TRIANGLES: usize = 5_000_000;
+
+/// Axes of the headset's clouds.
+#[derive(Clone, Copy, PartialEq, Eq, Debug, Default, Serialize, Deserialize)]
+#[serde(rename_all = "lowercase")]
+pub enum HeadsetAxes {
+    /// x forward, y left, z up.
+    #[default]
+    Ros,
+    /// x right, y up, z forward: left-handed.
+    Unity,
+}
+
+/// What to simulate and where to write it.
+#[derive(Clone, Debug)]
+pub struct HouseOptions {
+    /// The folder.
+    pub out: PathBuf,
+    /// Whether files of an earlier run are replaced.
+    pub overwrite: bool,
+    /// A mesh instead of our own house, with the names of its classes.
+    pub mesh: Option<(PathBuf, PathBuf)>,
+    /// Where the house stands in the map.
+    pub map_from_house: Isometry3<f64>,
+    /// Seed of everything; the same seed gives the same bytes.
+    pub seed: u64,
+    /// The robot.
+    pub survey: SurveyOptions,
+    /// The headset.
+    pub headset: HeadsetOptions,
+    /// How labels are wrong.
+    pub labels: LabelModel,
+    /// Lattice of the map.
+    pub lattice: LatticeKind,
+    /// Side of a cube of the volume of its cells, m.
+    pub cell_side_m: f64,
+    /// Axes of the headset's clouds.
+    pub axes: HeadsetAxes,
+}
+
+/// What was written.
+#[derive(Clone, Debug, PartialEq, Serialize)]
+pub struct HouseSummary {
+    /// The folder.
+    pub out: PathBuf,
+    /// Triangles of the house.
+    pub triangles: usize,
+    /// Points of the robot's survey.
+    pub survey_points: usize,
+    /// Voxels of its map.
+    pub voxels: usize,
+    /// Points of each headset cloud, by file.
+    pub headset_points: BTreeMap<String, usize>,
+    /// Share of the headset's points in regions whose labels differ between headset and map.
+    pub different_share: f64,
+}
+
+impl fmt::Display for HouseSummary {
+    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
+        writeln!(
+            f,
+            "{}: house of {} triangles, map of {} voxels from {} points, labels of {:.0} % of the view differ",
+            self.out.display(),
+            self.triangles,
+            self.voxels,
+            self.survey_points,
+            100.0 * self.different_share
+        )?;
+        let clouds = self.headset_points.iter();
+        let clouds: Vec<_> = clouds
+            .map(|(name, points)| format!("{name} {points}"))
+            .collect();
+        write!(f, "points: {}", clouds.join(", "))
+    }
+}
+
+/// What is written beside the clouds of a scene.
+#[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
+pub struct SceneTruth {
+    /// Name of the scene.
+    pub scene: String,
+    /// Seed of the simulation.
+    pub seed: u64,
+    /// Axes of the clouds and of `sensor_m`; the truth is always in ROS axes.
+    pub axes: HeadsetAxes,
+    /// A cloud for each headset scan, in the same frame.
+    pub headset_scans: Vec<HeadsetScanTruth>,
+    /// The pose that a calibration looks for.
+    pub map_from_headset: Pose,
+    /// Side of a voxel of the headset's mesh, m.
+    pub voxel_m: f64,
+    /// Scale of the headset's distances.
+    pub scale: f64,
+}
+
+/// One cloud.
+#[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
+pub struct HeadsetScanTruth {
+    /// File in the same folder.
+    pub cloud: String,
+    /// Position of the camera in the frame of the cloud, m.
+    pub sensor_m: [f64; 3],
+}
+
+/// A rigid transform.
+#[derive(Clone, Copy, Debug, PartialEq, Serialize, Deserialize)]
+pub struct Pose {
+    /// m.
+    pub translation_m: [f64; 3],
+    /// Quaternion.
+    pub rotation_xyzw: [f64; 4],
+}
+
+impl From<Isometry3<f64>> for Pose {
+    fn from(pose: Isometry3<f64>) -> Pose {
+        Pose {
+            translation_m: pose.translation.vector.into(),
+            rotation_xyzw: pose.rotation.coords.into(),
+        }
+    }
+}
+
+/// Why nothing, or not all, was written.
+#[derive(Debug, Error)]
+pub enum HouseFilesError {
+    /// The simulation refused.
+    #[error(transparent)]
+    House(#[from] HouseError),
+    /// The lattice was refused.
+    #[error(transparent)]
+    Lattice(#[from] LatticeError),
+    /// There are files already.
+    #[error("{}: there is a file already; choose another folder or allow to overwrite", path.display())]
+    Exists {
+        /// The file.
+        path: PathBuf,
+    },
+    /// The mesh was not read.
+    #[error("{}: {source}", path.display())]
+    Mesh {
+        /// The file.
+        path: PathBuf,
+        /// Why.
+        source: MeshFileError,
+    },
+    /// The classes were not read.
+    #[error("{}: {source}", path.display())]
+    Classes {
+        /// The file.
+        path: PathBuf,
+        /// Why.
+        source: ClassesError,
+    },
+    /// The map was not written.
+    #[error("{}: {source}", path.display())]
+    Map {
+        /// The file.
+        path: PathBuf,
+        /// Why.
+        source: FileError,
+    },
+    /// A file was not written.
+    #[error("{}: {source}; check permissions and free space", path.display())]
+    Io {
+        /// The file.
+        path: PathBuf,
+        /// The cause.
+        source: io::Error,
+    },
+}
+
+/// Simulates a house and writes it to a folder: [`MAP_FILE`], [`CLASSES_FILE`], and for each scene
+/// `NAME.ply` (further headset scans `NAME_2.ply` and so on) with `NAME.json`, a [`SceneTruth`], beside it.
+/// `progress` hears the share done, 0..1.
+pub fn write_house(
+    options: &HouseOptions,
+    progress: &mut dyn FnMut(f64),
+) -> Result<HouseSummary, HouseFilesError> {
+    let lattice = Lattice::new(options.lattice, options.cell_side_m.powi(3))?;
+    let house = match &options.mesh {
+        None => House::own(options.seed)?,
+        Some((mesh, classes)) => read_house(mesh, classes)?,
+    };
+    let house = house.placed(options.map_from_house);
+    progress(0.1);
+    fs::create_dir_all(&options.out).map_err(io_at(&options.out))?;
+    let mut trials = Vec::new();
+    for scene in Scene::ALL {
+        trials.push(HeadsetTrial::new(
+            &house,
+            scene,
+            &options.headset,
+            options.seed,
+        )?);
+        progress(0.1 + 0.1 * trials.len() as f64);
+    }
+    let draw = options.labels.draw_all(&house, &trials, options.seed)?;
+    let mut summary = HouseSummary {
+        out: options.out.clone(),
+        triangles: house.mesh().len(),
+        survey_points: 0,
+        voxels: 0,
+        headset_points: BTreeMap::new(),
+        different_share: draw.different_share,
+    };
+    for trial in &trials {
+        write_scene(options, trial, &draw, &mut summary)?;
+    }
+    let survey = Survey::new(&house, &options.survey, options.seed)?;
+    progress(0.8);
+    let list = survey.voxels(&lattice, &draw.map)?;
+    summary.survey_points = survey.cloud.len();
+    summary.voxels = list.len();
+    let (path, file) = create(options, MAP_FILE)?;
+    write_map(&list, BufWriter::new(file))
+        .map_err(|source| HouseFilesError::Map { path, source })?;
+    let classes = BTreeMap::from([("classes", house.class_names())]);
+    let text = serde_yaml::to_string(&classes).map_err(io::Error::other);
+    let (path, mut file) = create(options, CLASSES_FILE)?;
+    let written = text.and_then(|text| file.write_all(text.as_bytes()));
+    written.map_err(io_at(&path))?;
+    progress(1.0);
+    Ok(summary)
+}
+
+fn io_at(path: &Path) -> impl FnOnce(io::Error) -> HouseFilesError + use<> {
+    let path = path.to_owned();
+    move |source| HouseFilesError::Io { path, source }
+}
+
+/// Reads a house from a mesh and the names of its classes.
+pub fn read_house(mesh: &Path, classes: &Path) -> Result<House, HouseFilesError> {
+    let names = read_classes(classes).map_err(|source| HouseFilesError::Classes {
+        path: classes.to_owned(),
+        source,
+    })?;
+    let mesh = read_mesh(mesh, MAX_TRIANGLES).map_err(|source| HouseFilesError::Mesh {
+        path: mesh.to_owned(),
+        source,
+    })?;
+    Ok(House::from_mesh(mesh, names)?)
+}
+
+fn create(options: &HouseOptions, name: &str) -> Result<(PathBuf, File), HouseFilesError> {
+    let path = options.out.join(name);
+    if path.exists() && !options.overwrite {
+        return Err(HouseFilesError::Exists { path });
+    }
+    let file = File::create(&path).map_err(io_at(&path))?;
+    Ok((path, file))
+}
+
+fn write_scene(
+    options: &HouseOptions,
+    trial: &HeadsetTrial,
+    draw: &LabelDraw,
+    summary: &mut HouseSummary,
+) -> Result<(), HouseFilesError> {
+    let name = trial.scene.name();
+    let turned = |point_m: &Point3<f64>| match options.axes {
+        HeadsetAxes::Ros => *point_m,
+        HeadsetAxes::Unity => Axes::UnityRuf.from_ros(point_m.coords).into(),
+    };
+    let mut truth = SceneTruth {
+        scene: name.to_owned(),
+        seed: options.seed,
+        axes: options.axes,
+        headset_scans: Vec::new(),
+        map_from_headset: trial.map_from_headset.into(),
+        voxel_m: trial.voxel_m,
+        scale: trial.scale,
+    };
+    for (number, headset_scan) in (1..).zip(&trial.headset_scans) {
+        let cloud_name = match number {
+            1 => format!("{name}.ply"),
+            _ => format!("{name}_{number}.ply"),
+        };
+        let points: Vec<Point3<f64>> = headset_scan.points_m.iter().map(turned).collect();
+        let lane = trial.scene as u64 * 64 + number;
+        let cloud = draw.headset.cloud(&points, &headset_scan.regions, lane);
+        let labels = cloud
+            .labels
+            .iter()
+            .map(|label| label.top().unwrap_or(UNLABELED));
+        let labels: Vec<u16> = labels.collect();
+        let (path, file) = create(options, &cloud_name)?;
+        let comment = match options.axes {
+            HeadsetAxes::Ros => "metres, headset_origin: x forward, y left, z up",
+            HeadsetAxes::Unity => "metres, headset_origin: x right, y up, z forward (left-handed)",
+        };
+        write_labelled_ply(&points, &labels, comment, file).map_err(io_at(&path))?;
+        summary
+            .headset_points
+            .insert(cloud_name.clone(), points.len());
+        truth.headset_scans.push(HeadsetScanTruth {
+            cloud: cloud_name,
+            sensor_m: turned(&headset_scan.sensor_m).into(),
+        });
+    }
+    let (path, file) = create(options, &format!("{name}.json"))?;
+    let written = serde_json::to_writer_pretty(BufWriter::new(file), &truth);
+    written.map_err(io::Error::other).map_err(io_at(&path))
+}

@@ -1,0 +1,208 @@
+//! The messages of a log in the order in which a recorder receives them.
+
+use crate::simulate::{Bobcat, InsSample, InsSamples, Laser};
+use lattice_core::geodesy::EnuFrame;
+use lattice_msgs::cdr;
+use rayon::prelude::*;
+
+use super::facts::{
+    INSPVAX_TOPIC, ODOMETRY_TOPIC, TF_STATIC_TOPIC, TF_TOPIC, bobcat_origin, bobcat_start_ns,
+    points_topic,
+};
+use super::{SimulateError, messages};
+
+/// Length of log that is computed at a time, ns.
+const BLOCK_NS: i64 = 1_000_000_000;
+/// From the last beam of a scan to its arrival at the recorder, ns.
+const CLOUD_DELAY_NS: i64 = 3_000_000;
+/// From a turntable's stamp to its arrival, ns.
+const TURNTABLE_DELAY_NS: i64 = 400_000;
+
+/// A message as it is recorded.
+#[derive(Clone, Debug, PartialEq)]
+pub struct LogEntry {
+    /// Topic, absolute.
+    pub topic: &'static str,
+    /// Time of arrival at the recorder, UTC, ns since the Unix epoch.
+    pub log_time_ns: i64,
+    /// The message as CDR with its header.
+    pub cdr: Vec<u8>,
+    /// For a cloud its points without noise, in the map frame (m), in the order of the cloud.
+    pub true_points_m: Vec<[f32; 3]>,
+}
+
+/// What one block of the log holds.
+#[derive(Debug)]
+pub(super) struct Block<'a> {
+    /// Messages ordered by log time.
+    pub(super) entries: Vec<LogEntry>,
+    /// INS epochs, for their true poses.
+    pub(super) epochs: &'a [InsSample],
+    /// End of the block, ns since the start of the log.
+    pub(super) end_ns: i64,
+}
+
+/// Computes a log block by block; the memory it takes does not grow with the duration.
+pub(super) struct Log<'a> {
+    bobcat: &'a Bobcat,
+    map: EnuFrame,
+    samples: std::iter::Peekable<InsSamples<'a>>,
+    next_scan: [u64; 3],
+    begin_ns: i64,
+    epochs: Vec<InsSample>,
+    pending: Vec<LogEntry>,
+}
+
+impl<'a> Log<'a> {
+    pub(super) fn new(bobcat: &'a Bobcat) -> Result<Self, SimulateError> {
+        let mounts = LogEntry {
+            topic: TF_STATIC_TOPIC,
+            log_time_ns: bobcat_start_ns(),
+            cdr: cdr::to_vec(&messages::mounts())?,
+            true_points_m: Vec::new(),
+        };
+        Ok(Self {
+            bobcat,
+            map: EnuFrame::new(bobcat_origin()?),
+            samples: bobcat.ins().peekable(),
+            next_scan: [0; 3],
+            begin_ns: 0,
+            epochs: Vec::new(),
+            pending: vec![mounts],
+        })
+    }
+
+    /// The next block, None after the last. Each block holds what arrives in it, wherever it was measured.
+    pub(super) fn next_block(&mut self) -> Result<Option<Block<'_>>, SimulateError> {
+        if self.begin_ns > self.bobcat.duration_ns() {
+            return Ok(None);
+        }
+        let end_ns = self.begin_ns.saturating_add(BLOCK_NS);
+        let scans = self.scans_before(end_ns);
+        let clouds = scans
+            .into_par_iter()
+            .map(|(laser, index)| self.cloud(laser, index));
+        let clouds = clouds.collect::<Result<Vec<_>, _>>()?;
+        self.pending.extend(clouds);
+        self.epochs.clear();
+        while let Some(sample) = self.samples.next_if(|sample| sample.time_ns < end_ns) {
+            self.epochs.push(sample);
+        }
+        for sample in &self.epochs {
+            self.pending.extend(self.epoch(sample)?);
+        }
+        // Log times of one topic differ, so that this order is the only one.
+        self.pending
+            .sort_by(|a, b| (a.log_time_ns, a.topic).cmp(&(b.log_time_ns, b.topic)));
+        let last = end_ns > self.bobcat.duration_ns();
+        let limit_ns = bobcat_start_ns().saturating_add(end_ns);
+        let arrived = if last {
+            self.pending.len()
+        } else {
+            self.pending.partition_point(|e| e.log_time_ns < limit_ns)
+        };
+        let entries = self.pending.drain(..arrived).collect();
+        self.begin_ns = end_ns;
+        Ok(Some(Block {
+            entries,
+            epochs: &self.epochs,
+            end_ns,
+        }))
+    }
+
+    /// The scans that start before a time and were not yet computed.
+    fn scans_before(&mut self, end_ns: i64) -> Vec<(Laser, u64)> {
+        let mut scans = Vec::new();
+        for (laser, next) in Laser::ALL.into_iter().zip(&mut self.next_scan) {
+            let count = self.bobcat.scan_count(laser);
+            while *next < count && self.bobcat.scan_start_ns(laser, *next) < end_ns {
+                scans.push((laser, *next));
+                *next += 1;
+            }
+        }
+        scans
+    }
+
+    fn cloud(&self, laser: Laser, index: u64) -> Result<LogEntry, SimulateError> {
+        let scan = self.bobcat.scan(laser, index);
+        let arrival_ns = scan.start_ns + crate::simulate::SCAN_SPAN_NS + CLOUD_DELAY_NS;
+        Ok(LogEntry {
+            topic: points_topic(laser),
+            log_time_ns: bobcat_start_ns().saturating_add(arrival_ns),
+            cdr: cdr::to_vec(&messages::cloud(laser, &scan))?,
+            true_points_m: scan
+                .returns
+                .iter()
+                .map(|hit| hit.truth_m.map(|v| v as f32).into())
+                .collect(),
+        })
+    }
+
+    /// Both forms of the INS pose, which arrive together, and the turntable.
+    fn epoch(&self, sample: &InsSample) -> Result<[LogEntry; 3], SimulateError> {
+        let entry = |topic, delay_ns: i64, cdr| LogEntry {
+            topic,
+            log_time_ns: bobcat_start_ns()
+                .saturating_add(sample.time_ns)
+                .saturating_add(delay_ns),
+            cdr,
+            true_points_m: Vec::new(),
+        };
+        let inspvax = messages::inspvax(&self.map, sample)?;
+        Ok([
+            entry(INSPVAX_TOPIC, sample.delay_ns, cdr::to_vec(&inspvax)?),
+            entry(
+                ODOMETRY_TOPIC,
+                sample.delay_ns,
+                cdr::to_vec(&messages::odometry(sample))?,
+            ),
+            entry(
+                TF_TOPIC,
+                TURNTABLE_DELAY_NS,
+                cdr::to_vec(&messages::turntable(self.bobcat, sample.time_ns))?,
+            ),
+        ])
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    fn entries(seed: u64, duration_s: f64) -> Vec<LogEntry> {
+        let bobcat = Bobcat::new(seed, duration_s).unwrap();
+        let mut log = Log::new(&bobcat).unwrap();
+        let mut entries = Vec::new();
+        while let Some(block) = log.next_block().unwrap() {
+            entries.extend(block.entries);
+        }
+        entries
+    }
+
+    #[test]
+    fn messages_come_in_the_order_of_arrival_and_none_is_lost() {
+        let entries = entries(1, 3.0);
+        assert!(
+            entries
+                .windows(2)
+                .all(|pair| pair[0].log_time_ns <= pair[1].log_time_ns)
+        );
+        let count = |topic| entries.iter().filter(|e| e.topic == topic).count();
+        assert_eq!(count(TF_STATIC_TOPIC), 1);
+        assert_eq!(entries[0].topic, TF_STATIC_TOPIC);
+        for topic in [INSPVAX_TOPIC, ODOMETRY_TOPIC, TF_TOPIC] {
+            assert_eq!(count(topic), 301);
+        }
+        let bobcat = Bobcat::new(1, 3.0).unwrap();
+        for laser in Laser::ALL {
+            assert_eq!(count(points_topic(laser)) as u64, bobcat.scan_count(laser));
+        }
+    }
+
+    #[test]
+    fn a_longer_log_begins_like_a_shorter_one() {
+        let (short, long) = (entries(5, 1.5), entries(5, 2.5));
+        let same = short.iter().zip(&long).take_while(|(a, b)| a == b).count();
+        assert!(same > short.len() - 20, "{same} of {}", short.len());
+    }
+}

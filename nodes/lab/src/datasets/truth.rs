@@ -1,0 +1,232 @@
+//! The noise-free truth beside a log.
+
+use std::fs::File;
+use std::io::{self, BufWriter, Seek, SeekFrom, Write};
+use std::path::{Path, PathBuf};
+
+use crate::simulate::{
+    BASE_FROM_TURNTABLE_M, INS_POSITION_RMS_M, InsSample, Laser, MAX_RANGE_M, MIN_RANGE_M,
+    RANGE_NOISE_M, TURNTABLE_PERIOD_NS, base_from_imu,
+};
+use nalgebra::{Isometry3, Vector3};
+use serde::Serialize;
+
+use super::facts::{
+    BASE_FRAME, BOBCAT_GPS_WEEK, BOBCAT_GPS_WEEK_MS, BOBCAT_LEAP_SECONDS, BOBCAT_ORIGIN,
+    BOBCAT_UNDULATION_M, IMU_FRAME, TURNTABLE_FRAME, bobcat_start_ns,
+};
+use super::{BobcatOptions, SimulateError};
+
+/// The folder in the log's directory.
+pub(super) const FOLDER: &str = "truth";
+/// The files in it.
+pub(super) const FILES: [&str; 3] = [SITE_FILE, POSES_FILE, POINTS_FILE];
+const SITE_FILE: &str = "site.yaml";
+const POSES_FILE: &str = "poses.csv";
+const POINTS_FILE: &str = "points.ply";
+/// The PLY header is padded to this length, since the number of points is known only at the end.
+const PLY_HEADER_BYTES: usize = 256;
+
+/// The open files of a truth folder.
+pub(super) struct Truth {
+    poses: (PathBuf, BufWriter<File>),
+    points: (PathBuf, BufWriter<File>),
+    point_count: u64,
+}
+
+impl Truth {
+    /// Makes the folder, writes the site's facts and opens the other files.
+    pub(super) fn create(options: &BobcatOptions) -> Result<Self, SimulateError> {
+        let folder = options.out.join(FOLDER);
+        let failed = |path: &Path| {
+            let path = path.to_owned();
+            move |source| SimulateError::Io { path, source }
+        };
+        std::fs::create_dir_all(&folder).map_err(failed(&folder))?;
+        let site = folder.join(SITE_FILE);
+        let facts = serde_yaml::to_string(&SiteFacts::new(options))
+            .map_err(io::Error::other)
+            .map_err(failed(&site))?;
+        std::fs::write(&site, facts).map_err(failed(&site))?;
+        let open = |name: &str| {
+            let path = folder.join(name);
+            let file = File::create(&path).map_err(failed(&path))?;
+            Ok::<_, SimulateError>((path, BufWriter::new(file)))
+        };
+        let (mut poses, mut points) = (open(POSES_FILE)?, open(POINTS_FILE)?);
+        writeln!(poses.1, "stamp_ns,x,y,z,qx,qy,qz,qw").map_err(failed(&poses.0))?;
+        points
+            .1
+            .write_all(&ply_header(0))
+            .map_err(failed(&points.0))?;
+        Ok(Self {
+            poses,
+            points,
+            point_count: 0,
+        })
+    }
+
+    /// Adds the true pose of `base_link` in the map.
+    pub(super) fn pose(&mut self, sample: &InsSample) -> Result<(), SimulateError> {
+        let stamp_ns = bobcat_start_ns().saturating_add(sample.time_ns);
+        let Isometry3 {
+            rotation,
+            translation,
+        } = sample.true_map_from_base;
+        let (p, q) = (translation.vector, rotation.coords);
+        let (path, file) = &mut self.poses;
+        writeln!(
+            file,
+            "{stamp_ns},{},{},{},{},{},{},{}",
+            p.x, p.y, p.z, q.x, q.y, q.z, q.w
+        )
+        .map_err(|source| SimulateError::Io {
+            path: path.clone(),
+            source,
+        })
+    }
+
+    /// Adds the true points of a cloud.
+    pub(super) fn points(&mut self, points_m: &[[f32; 3]]) -> Result<(), SimulateError> {
+        let bytes: Vec<u8> = points_m
+            .iter()
+            .flatten()
+            .flat_map(|v| v.to_le_bytes())
+            .collect();
+        let (path, file) = &mut self.points;
+        file.write_all(&bytes).map_err(|source| SimulateError::Io {
+            path: path.clone(),
+            source,
+        })?;
+        self.point_count = self.point_count.saturating_add(points_m.len() as u64);
+        Ok(())
+    }
+
+    /// Completes the files.
+    pub(super) fn finish(self) -> Result<(), SimulateError> {
+        let Self {
+            poses: (poses_path, mut poses),
+            points: (points_path, mut points),
+            point_count,
+        } = self;
+        poses.flush().map_err(|source| SimulateError::Io {
+            path: poses_path,
+            source,
+        })?;
+        points
+            .seek(SeekFrom::Start(0))
+            .and_then(|_| points.write_all(&ply_header(point_count)))
+            .and_then(|()| points.flush())
+            .map_err(|source| SimulateError::Io {
+                path: points_path,
+                source,
+            })
+    }
+}
+
+/// Header of a binary PLY of float points, padded by a comment.
+fn ply_header(points: u64) -> Vec<u8> {
+    let begin = format!(
+        "ply\nformat binary_little_endian 1.0\ncomment true points in the map frame, m, in the order of the log\n\
+         element vertex {points}\nproperty float x\nproperty float y\nproperty float z\ncomment "
+    );
+    let end = "\nend_header\n";
+    let padding = PLY_HEADER_BYTES.saturating_sub(begin.len() + end.len());
+    format!("{begin}{}{end}", "-".repeat(padding)).into_bytes()
+}
+
+/// What `site.yaml` tells.
+#[derive(Serialize)]
+struct SiteFacts {
+    simulation: &'static str,
+    seed: u64,
+    duration_s: f64,
+    start_utc_ns: i64,
+    start_gps_week: u32,
+    start_gps_week_ms: u32,
+    leap_seconds: i32,
+    origin: Origin,
+    mounts: Vec<Mount>,
+    turntable_period_s: f64,
+    range_noise_m: f64,
+    min_range_m: f64,
+    max_range_m: f64,
+    ins_position_rms_m: f64,
+}
+
+/// The map's origin.
+#[derive(Serialize)]
+struct Origin {
+    latitude_deg: f64,
+    longitude_deg: f64,
+    ellipsoidal_height_m: f64,
+    undulation_m: f32,
+}
+
+/// `parent_from_child`; the turntable's is that at angle zero.
+#[derive(Serialize)]
+struct Mount {
+    parent: &'static str,
+    child: &'static str,
+    translation_m: [f64; 3],
+    rotation_xyzw: [f64; 4],
+}
+
+impl Mount {
+    fn new(parent: &'static str, child: &'static str, parent_from_child: &Isometry3<f64>) -> Self {
+        let translation_m = parent_from_child.translation.vector.into();
+        let rotation_xyzw = parent_from_child.rotation.coords.into();
+        Self {
+            parent,
+            child,
+            translation_m,
+            rotation_xyzw,
+        }
+    }
+}
+
+impl SiteFacts {
+    fn new(options: &BobcatOptions) -> Self {
+        let [latitude_deg, longitude_deg, ellipsoidal_height_m] = BOBCAT_ORIGIN;
+        let turntable = Isometry3::from(Vector3::from(BASE_FROM_TURNTABLE_M));
+        Self {
+            simulation: "bobcat",
+            seed: options.seed,
+            duration_s: options.duration_s,
+            start_utc_ns: bobcat_start_ns(),
+            start_gps_week: BOBCAT_GPS_WEEK,
+            start_gps_week_ms: BOBCAT_GPS_WEEK_MS,
+            leap_seconds: BOBCAT_LEAP_SECONDS,
+            origin: Origin {
+                latitude_deg,
+                longitude_deg,
+                ellipsoidal_height_m,
+                undulation_m: BOBCAT_UNDULATION_M,
+            },
+            mounts: vec![
+                Mount::new(BASE_FRAME, IMU_FRAME, &base_from_imu()),
+                Mount::new(BASE_FRAME, Laser::Left.frame(), &Laser::Left.mount()),
+                Mount::new(BASE_FRAME, Laser::Right.frame(), &Laser::Right.mount()),
+                Mount::new(BASE_FRAME, TURNTABLE_FRAME, &turntable),
+                Mount::new(TURNTABLE_FRAME, Laser::Top.frame(), &Laser::Top.mount()),
+            ],
+            turntable_period_s: TURNTABLE_PERIOD_NS as f64 * 1e-9,
+            range_noise_m: RANGE_NOISE_M,
+            min_range_m: MIN_RANGE_M,
+            max_range_m: MAX_RANGE_M,
+            ins_position_rms_m: INS_POSITION_RMS_M,
+        }
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn the_header_keeps_its_length() {
+        assert_eq!(ply_header(0).len(), PLY_HEADER_BYTES);
+        assert_eq!(ply_header(u64::MAX).len(), PLY_HEADER_BYTES);
+        assert!(ply_header(12).ends_with(b"-\nend_header\n"));
+    }
+}

@@ -1,0 +1,231 @@
+//! Writes a simulated log.
+
+use std::collections::HashMap;
+use std::fmt;
+use std::fs;
+use std::io;
+use std::path::{Path, PathBuf};
+
+use crate::simulate::{Bobcat, Laser, SimulationError};
+use lattice_core::geodesy::GeodesyError;
+use lattice_msgs::RosMessage;
+use lattice_msgs::cdr::CdrError;
+use lattice_msgs::nav_msgs::Odometry;
+use lattice_msgs::novatel_oem7_msgs::INSPVAX;
+use lattice_msgs::sensor_msgs::PointCloud2;
+use lattice_msgs::tf2_msgs::TFMessage;
+use serde::Serialize;
+use thiserror::Error;
+
+use super::facts::{INSPVAX_TOPIC, ODOMETRY_TOPIC, TF_STATIC_TOPIC, TF_TOPIC, points_topic};
+use super::log::{Block, Log};
+use super::truth::{self, Truth};
+use lattice_bag::{BagDurability, BagError, BagQos, BagWriter, Storage, TopicSpec, WriterOptions};
+
+/// What to simulate and where to write it.
+#[derive(Clone, Debug)]
+pub struct BobcatOptions {
+    /// Seed of all noise; the same seed gives the same messages.
+    pub seed: u64,
+    /// Length of the log, s.
+    pub duration_s: f64,
+    /// Storage of the bag.
+    pub storage: Storage,
+    /// Directory of the bag.
+    pub out: PathBuf,
+    /// Whether an earlier log at `out` is replaced.
+    pub overwrite: bool,
+}
+
+/// What was written.
+#[derive(Clone, Debug, PartialEq, Serialize)]
+pub struct BobcatSummary {
+    /// Directory of the bag.
+    pub out: PathBuf,
+    /// Length of the log, s.
+    pub duration_s: f64,
+    /// Messages on all topics.
+    pub messages: u64,
+    /// Clouds among them.
+    pub clouds: u64,
+    /// Points in the clouds.
+    pub points: u64,
+    /// INS epochs, each of which is an INSPVAX and an Odometry.
+    pub ins_epochs: u64,
+}
+
+impl fmt::Display for BobcatSummary {
+    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
+        write!(
+            f,
+            "{}: {:.1} s, {} messages, {} clouds with {} points, {} poses",
+            self.out.display(),
+            self.duration_s,
+            self.messages,
+            self.clouds,
+            self.points,
+            self.ins_epochs
+        )
+    }
+}
+
+/// Why a log was not written.
+#[derive(Debug, Error)]
+pub enum SimulateError {
+    /// The simulation refused its options.
+    #[error(transparent)]
+    Simulation(#[from] SimulationError),
+    /// There is something at the place of the log.
+    #[error("{}: there is a log already; choose another directory or allow to overwrite it", path.display())]
+    Exists {
+        /// The directory.
+        path: PathBuf,
+    },
+    /// There is something that no simulation wrote.
+    #[error("{}: not written by a simulation and not overwritten; move it or choose another directory", path.display())]
+    Foreign {
+        /// The file.
+        path: PathBuf,
+    },
+    /// The bag was not written.
+    #[error(transparent)]
+    Bag(#[from] BagError),
+    /// A file of the truth was not written.
+    #[error("{}: {source}; check permissions and free space", path.display())]
+    Io {
+        /// The file or folder.
+        path: PathBuf,
+        /// The cause.
+        source: io::Error,
+    },
+    /// A message was not serialised.
+    #[error(transparent)]
+    Cdr(#[from] CdrError),
+    /// A position has no place on the earth.
+    #[error(transparent)]
+    Geodesy(#[from] GeodesyError),
+}
+
+/// Simulates the skid-steer loader and writes its log as a rosbag2 directory, the truth beside it. `progress` is told
+/// the fraction done, 0..1.
+pub fn write_bobcat(
+    options: &BobcatOptions,
+    progress: &mut dyn FnMut(f64),
+) -> Result<BobcatSummary, SimulateError> {
+    let bobcat = Bobcat::new(options.seed, options.duration_s)?;
+    make_way(&options.out, options.overwrite)?;
+    let writer = WriterOptions {
+        overwrite: options.overwrite,
+        ..WriterOptions::default()
+    };
+    let mut bag = BagWriter::create(&options.out, options.storage, writer)?;
+    let mut topics = HashMap::new();
+    for topic in topic_specs() {
+        let name = topic.name.clone();
+        topics.insert(name, bag.add_topic(topic)?);
+    }
+    let mut truth = Truth::create(options)?;
+    let mut summary = BobcatSummary {
+        out: options.out.clone(),
+        duration_s: options.duration_s,
+        messages: 0,
+        clouds: 0,
+        points: 0,
+        ins_epochs: 0,
+    };
+    let mut log = Log::new(&bobcat)?;
+    while let Some(block) = log.next_block()? {
+        write_block(&block, &mut bag, &topics, &mut truth, &mut summary)?;
+        progress((block.end_ns as f64 / bobcat.duration_ns() as f64).min(1.0));
+    }
+    truth.finish()?;
+    bag.finish()?;
+    Ok(summary)
+}
+
+fn write_block(
+    block: &Block<'_>,
+    bag: &mut BagWriter,
+    topics: &HashMap<String, usize>,
+    truth: &mut Truth,
+    summary: &mut BobcatSummary,
+) -> Result<(), SimulateError> {
+    for entry in &block.entries {
+        let topic = topics.get(entry.topic).copied().unwrap_or(usize::MAX);
+        bag.write(topic, entry.log_time_ns, &entry.cdr)?;
+        truth.points(&entry.true_points_m)?;
+        summary.messages += 1;
+        summary.points += entry.true_points_m.len() as u64;
+        summary.clouds += u64::from(
+            Laser::ALL
+                .iter()
+                .any(|&laser| points_topic(laser) == entry.topic),
+        );
+    }
+    for sample in block.epochs {
+        truth.pose(sample)?;
+        summary.ins_epochs += 1;
+    }
+    Ok(())
+}
+
+/// The topics as their publishers offer them.
+fn topic_specs() -> Vec<TopicSpec> {
+    let reliable = |depth| BagQos {
+        depth,
+        ..BagQos::default()
+    };
+    let mut specs: Vec<_> = Laser::ALL
+        .map(|laser| spec::<PointCloud2>(points_topic(laser), reliable(20)))
+        .into();
+    specs.push(spec::<INSPVAX>(INSPVAX_TOPIC, reliable(100)));
+    specs.push(spec::<Odometry>(ODOMETRY_TOPIC, reliable(100)));
+    specs.push(spec::<TFMessage>(TF_TOPIC, reliable(100)));
+    let latched = BagQos {
+        durability: BagDurability::TransientLocal,
+        ..reliable(1)
+    };
+    specs.push(spec::<TFMessage>(TF_STATIC_TOPIC, latched));
+    specs
+}
+
+fn spec<M: RosMessage>(name: &str, qos: BagQos) -> TopicSpec {
+    TopicSpec {
+        name: name.to_owned(),
+        type_name: M::TYPE.to_owned(),
+        definition: Some(M::definition()),
+        offered_qos: vec![qos],
+    }
+}
+
+/// Removes the truth of an earlier log, file by file; the bag beside it is the writer's matter.
+fn make_way(out: &Path, overwrite: bool) -> Result<(), SimulateError> {
+    let folder = out.join(truth::FOLDER);
+    if !folder.exists() {
+        return Ok(());
+    }
+    if !overwrite {
+        return Err(SimulateError::Exists {
+            path: out.to_owned(),
+        });
+    }
+    let failed = |path: &Path| {
+        let path = path.to_owned();
+        move |source| SimulateError::Io { path, source }
+    };
+    let mut files = Vec::new();
+    for entry in fs::read_dir(&folder).map_err(failed(&folder))? {
+        let path = entry.map_err(failed(&folder))?.path();
+        if !truth::FILES
+            .iter()
+            .any(|&name| path.file_name() == Some(name.as_ref()))
+        {
+            return Err(SimulateError::Foreign { path });
+        }
+        files.push(path);
+    }
+    files
+        .iter()
+        .try_for_each(|path| fs::remove_file(path).map_err(failed(path)))?;
+    fs::remove_dir(&folder).map_err(failed(&folder))
+}

@@ -1,0 +1,209 @@
+//! What one method made of one trial.
+
+use crate::metrics::PoseError;
+use lattice_core::registration::{Calibration, Verdict};
+use nalgebra::{Isometry3, Point3, Vector3, Vector6};
+use serde::{Deserialize, Serialize};
+
+use super::settings::Cell;
+
+/// The method whose results are ours.
+pub const OURS: &str = "ours";
+/// Ours, its time measured with nothing else running.
+pub const TIMED: &str = "ours_timed";
+/// One step of the tracker from a pose 3 cm and 1 degree off, its time measured with nothing else running.
+pub const TRACKED: &str = "tracking_timed";
+
+/// One line of the results.
+#[derive(Clone, PartialEq, Debug, Serialize, Deserialize)]
+pub struct Trial {
+    /// Which trial it is.
+    #[serde(flatten)]
+    pub cell: Cell,
+    /// What was asked.
+    pub method: String,
+    /// Share of the view whose labels differ between map and headset.
+    pub different_share: f64,
+    /// Distance of the headset's origin from the truth, metres.
+    pub translation_m: f64,
+    /// Angle from the truth, degrees.
+    pub rotation_deg: f64,
+    /// Of it, how far the vertical is off, degrees.
+    pub tilt_deg: f64,
+    /// ||log(T* T_GT^-1)||, as the paper prints it.
+    pub d_se3: f64,
+    /// ||log(T_GT^-1 T*)||.
+    pub d_se3_left: f64,
+    /// Mean distance of the seen points from where they should be, metres.
+    pub view_m: f64,
+    /// Wall time, milliseconds, on one thread but for those that are timed.
+    pub wall_ms: f64,
+    /// What only a calibration says.
+    #[serde(skip_serializing_if = "Option::is_none", default)]
+    pub judged: Option<Judged>,
+}
+
+/// What a calibration says of its pose.
+#[derive(Clone, PartialEq, Debug, Serialize, Deserialize)]
+pub struct Judged {
+    /// As in `lattice_msgs/CalibrationResult`.
+    pub verdict: String,
+    /// Why.
+    pub reason: String,
+    /// Which candidate was chosen.
+    pub chosen: String,
+    /// Log-likelihood above the best different pose; None if there was none.
+    pub margin: Option<f64>,
+    /// Share of the points on the map.
+    pub inliers: f64,
+    /// Normalised squared error of the stated covariance, 6 degrees of freedom; None without a covariance.
+    pub nees: Option<f64>,
+}
+
+/// Bounds of a right pose: metres and degrees.
+#[derive(Clone, Copy, PartialEq, Debug)]
+pub struct Bounds {
+    /// Metres.
+    pub m: f64,
+    /// Degrees.
+    pub deg: f64,
+}
+
+/// Beyond it a pose is wrong.
+pub const WRONG: Bounds = Bounds { m: 0.15, deg: 3.0 };
+/// A tighter one.
+pub const WRONG_TIGHT: Bounds = Bounds { m: 0.10, deg: 3.0 };
+
+impl Trial {
+    /// Compares a pose with the truth; `seen_m` are points of the headset, in its frame.
+    pub fn of_pose(
+        cell: &Cell,
+        method: &str,
+        pose: &Isometry3<f64>,
+        truth: &Isometry3<f64>,
+        seen_m: &[Point3<f64>],
+        wall_ms: f64,
+    ) -> Trial {
+        let up = Vector3::z();
+        let error = PoseError::between(pose, truth);
+        let apart_m = seen_m
+            .iter()
+            .map(|p| nalgebra::distance(&(pose * p), &(truth * p)));
+        Trial {
+            cell: cell.clone(),
+            method: method.to_owned(),
+            different_share: 0.0,
+            translation_m: rounded(error.translation_m),
+            rotation_deg: rounded(error.rotation_rad.to_degrees()),
+            tilt_deg: rounded(
+                (pose.rotation * up)
+                    .angle(&(truth.rotation * up))
+                    .to_degrees(),
+            ),
+            d_se3: rounded(error.d_se3),
+            d_se3_left: rounded(error.d_se3_left),
+            view_m: rounded(apart_m.sum::<f64>() / seen_m.len().max(1) as f64),
+            wall_ms: rounded(wall_ms),
+            judged: None,
+        }
+    }
+
+    /// With what a calibration says.
+    pub fn with_judgement(self, calibration: &Calibration, truth: &Isometry3<f64>) -> Trial {
+        let margin = calibration.log_margin;
+        Trial {
+            judged: Some(Judged {
+                verdict: calibration.verdict.name().to_owned(),
+                reason: calibration.reason.clone(),
+                chosen: calibration.method.to_owned(),
+                margin: margin.is_finite().then_some(rounded(margin)),
+                inliers: rounded(calibration.inlier_fraction),
+                nees: nees(calibration, truth).map(rounded),
+            }),
+            ..self
+        }
+    }
+
+    /// Whether the pose is within bounds.
+    pub fn is_within(&self, bounds: Bounds) -> bool {
+        self.translation_m <= bounds.m && self.rotation_deg <= bounds.deg
+    }
+
+    /// The same of the seen points in place of the headset's origin, which may be metres away from them.
+    pub fn is_within_in_view(&self, bounds: Bounds) -> bool {
+        self.view_m <= bounds.m && self.rotation_deg <= bounds.deg
+    }
+
+    /// Whether a calibration said that the pose holds.
+    pub fn is_accepted(&self) -> bool {
+        let judged = self.judged.as_ref();
+        judged.is_some_and(|j| j.verdict == Verdict::Ok.name())
+    }
+}
+
+/// As many digits as are read back exactly from a file.
+pub(super) fn rounded(value: f64) -> f64 {
+    const UNIT: f64 = 1e6;
+    if value.abs() < 1e9 {
+        (value * UNIT).round() / UNIT
+    } else {
+        value.round()
+    }
+}
+
+/// e^T C^-1 e of the position and the rotation vector by which a pose is off, both along the axes of
+/// the map.
+fn nees(calibration: &Calibration, truth: &Isometry3<f64>) -> Option<f64> {
+    let pose = &calibration.map_from_headset;
+    let moved = pose.translation.vector - truth.translation.vector;
+    let turned = (pose.rotation * truth.rotation.inverse()).scaled_axis();
+    let error = Vector6::new(moved.x, moved.y, moved.z, turned.x, turned.y, turned.z);
+    let solved = calibration.covariance.cholesky()?.solve(&error);
+    Some(error.dot(&solved)).filter(|value| value.is_finite())
+}
+
+#[cfg(test)]
+mod tests {
+    use nalgebra::Matrix6;
+
+    use super::*;
+
+    fn cell() -> Cell {
+        Cell {
+            scene: "tv".to_owned(),
+            seed: 3,
+            q: 0.4,
+            start: "none".to_owned(),
+        }
+    }
+
+    #[test]
+    fn errors_are_those_of_the_pose() {
+        let truth = Isometry3::new(Vector3::new(4.0, -3.0, 1.0), Vector3::z() * 2.0);
+        let off = Isometry3::new(Vector3::new(4.03, -3.04, 1.0), Vector3::z() * 2.01);
+        let seen = [Point3::new(0.0, 0.0, 0.0)];
+        let trial = Trial::of_pose(&cell(), OURS, &off, &truth, &seen, 1.0);
+        assert!((trial.translation_m - 0.05).abs() < 1e-6);
+        assert!((trial.view_m - 0.05).abs() < 1e-6);
+        assert!((trial.rotation_deg - 0.01_f64.to_degrees()).abs() < 1e-6);
+        assert_eq!(trial.tilt_deg, 0.0);
+        assert!(trial.is_within(WRONG) && !trial.is_accepted());
+
+        let calibration = Calibration {
+            map_from_headset: off,
+            covariance: Matrix6::from_diagonal(&Vector6::from([1e-4; 6])),
+            log_margin: f64::INFINITY,
+            ..Calibration::refused(Verdict::Ok, "")
+        };
+        let trial = trial.with_judgement(&calibration, &truth);
+        let judged = trial.judged.clone().unwrap();
+        assert!(trial.is_accepted() && judged.margin.is_none());
+        // (0.03^2 + 0.04^2 + 0.01^2) / 1e-4.
+        assert!((judged.nees.unwrap() - 26.0).abs() < 1e-6);
+
+        let line = serde_json::to_string(&trial).unwrap();
+        assert_eq!(serde_json::from_str::<Trial>(&line).unwrap(), trial);
+        let refused = Calibration::refused(Verdict::NoOverlap, "");
+        assert_eq!(nees(&refused, &truth), None);
+    }
+}

@@ -1,0 +1,217 @@
+//! Climbing from a guess.
+
+use nalgebra::{Isometry3, Point3, Translation3, UnitQuaternion, Vector3};
+
+use super::{AlignOptions, MAX_POINTS, MatchError, MultiResolutionList, sample};
+use lattice_core::cloud::Cloud;
+use lattice_core::lattice::Lattice;
+use lattice_core::voxels::{OccupancyList, VoxelStore};
+
+/// A pose of a scan and how well it fits.
+#[derive(Clone, Copy, PartialEq, Debug)]
+pub struct Alignment {
+    /// The pose.
+    pub map_from_cloud: Isometry3<f64>,
+    /// Points of the sample in occupied cells of the finest level.
+    pub hits: usize,
+    /// Points of the sample.
+    pub points: usize,
+    /// How many poses were tried to find it.
+    pub evaluations: usize,
+}
+
+/// Aligns a scan with a map from a guess: climbs on every level, the coarsest first, by steps of a
+/// cell side, then refines on the finest ([`refine`]).
+///
+/// Each level looks at one point of a cell of its own size, drawn from one of each finest cell. A step goes along or about one axis of the
+/// map; turns are about the middle of those points, so that they do not shift the scan as well. Fails
+/// for an empty map, a scan without points and a guess that is not finite.
+pub fn align(
+    map: &MultiResolutionList,
+    cloud: &Cloud,
+    map_from_cloud: &Isometry3<f64>,
+    options: &AlignOptions,
+) -> Result<Alignment, MatchError> {
+    options.check()?;
+    let mut pose = begin(map, cloud, map_from_cloud)?;
+    let finest = map.levels().first().ok_or(MatchError::EmptyMap)?;
+    let all = sample_of(&cloud.offsets_m, finest.lattice(), MAX_POINTS, 0)?;
+    let mut evaluations = 0;
+    for (level, list) in map.levels().iter().enumerate().rev() {
+        let points = sample_of(&all, list.lattice(), options.max_points, 0)?;
+        let steps = Steps {
+            metres: list.lattice().cell_side_m(),
+            radians: options.step_rad * (1_u32 << level) as f64,
+            most: options.level_iterations,
+        };
+        let top = climb(pose, list, &points, &steps);
+        pose = top.pose;
+        evaluations += top.evaluations;
+    }
+    let refined = refine_from(map, cloud, &pose, options)?;
+    Ok(Alignment {
+        evaluations: refined.evaluations + evaluations,
+        ..refined
+    })
+}
+
+/// The last part of [`align`] alone: climbs on the finest level by a fraction of its steps, and by a
+/// fraction of that in each further stage, on another sample of the scan.
+pub fn refine(
+    map: &MultiResolutionList,
+    cloud: &Cloud,
+    map_from_cloud: &Isometry3<f64>,
+    options: &AlignOptions,
+) -> Result<Alignment, MatchError> {
+    options.check()?;
+    let pose = begin(map, cloud, map_from_cloud)?;
+    refine_from(map, cloud, &pose, options)
+}
+
+fn refine_from(
+    map: &MultiResolutionList,
+    cloud: &Cloud,
+    pose: &Isometry3<f64>,
+    options: &AlignOptions,
+) -> Result<Alignment, MatchError> {
+    let list = map.levels().first().ok_or(MatchError::EmptyMap)?;
+    let points = sample_of(&cloud.offsets_m, list.lattice(), options.max_points, 1)?;
+    let mut top = Top {
+        pose: *pose,
+        hits: 0,
+        evaluations: 0,
+    };
+    let mut fraction = 1.0;
+    for _ in 0..options.fine_stages {
+        fraction *= options.fine_step;
+        let steps = Steps {
+            metres: fraction * list.lattice().cell_side_m(),
+            radians: fraction * options.step_rad,
+            most: options.fine_iterations,
+        };
+        let before = top.evaluations;
+        top = climb(top.pose, list, &points, &steps);
+        top.evaluations += before;
+    }
+    Ok(Alignment {
+        map_from_cloud: end(cloud, &top.pose),
+        hits: top.hits,
+        points: points.len(),
+        evaluations: top.evaluations,
+    })
+}
+
+/// Checks what a search begins with and gives the pose of the offsets of the cloud, whose datum is
+/// then its origin.
+pub(super) fn begin(
+    map: &MultiResolutionList,
+    cloud: &Cloud,
+    map_from_cloud: &Isometry3<f64>,
+) -> Result<Isometry3<f64>, MatchError> {
+    if map.is_empty() {
+        return Err(MatchError::EmptyMap);
+    }
+    if cloud.len() > MAX_POINTS {
+        let points = cloud.len();
+        return Err(MatchError::TooManyPoints { points });
+    }
+    let pose = map_from_cloud * Translation3::from(cloud.datum_m);
+    let finite = pose.to_homogeneous().iter().all(|entry| entry.is_finite());
+    finite.then_some(pose).ok_or(MatchError::Pose)
+}
+
+/// The pose of a cloud from that of its offsets.
+pub(super) fn end(cloud: &Cloud, pose: &Isometry3<f64>) -> Isometry3<f64> {
+    pose * Translation3::from(-cloud.datum_m)
+}
+
+/// A [`sample`] that fails if no point has a cell.
+pub(super) fn sample_of(
+    points_m: &[[f32; 3]],
+    lattice: &Lattice,
+    most: usize,
+    round: u64,
+) -> Result<Vec<[f32; 3]>, MatchError> {
+    let points = sample(points_m, lattice, most, round);
+    if points.is_empty() {
+        let points = points_m.len();
+        return Err(MatchError::NoPoints { points });
+    }
+    Ok(points)
+}
+
+/// How far a step goes, and how many there are.
+struct Steps {
+    metres: f64,
+    radians: f64,
+    most: usize,
+}
+
+struct Top {
+    pose: Isometry3<f64>,
+    hits: usize,
+    evaluations: usize,
+}
+
+/// Goes to the best of the twelve poses one step away as long as it is better; of equally good ones to
+/// the first.
+fn climb(
+    mut pose: Isometry3<f64>,
+    list: &OccupancyList,
+    points_m: &[[f32; 3]],
+    steps: &Steps,
+) -> Top {
+    let about_m = middle_m(points_m);
+    let mut hits = list.overlap(&pose, points_m);
+    let mut evaluations = 1;
+    let axes = [Vector3::x(), Vector3::y(), Vector3::z()];
+    for _ in 0..steps.most {
+        let mut best = None;
+        for axis in axes {
+            for sign in [-1.0, 1.0] {
+                let shift = Vector3::from(axis * (sign * steps.metres));
+                let turn = Vector3::from(axis * (sign * steps.radians));
+                for (shift, turn) in [(shift, Vector3::zeros()), (Vector3::zeros(), turn)] {
+                    let near = moved(&pose, &about_m, &shift, &turn);
+                    let found = list.overlap(&near, points_m);
+                    evaluations += 1;
+                    if found > hits {
+                        hits = found;
+                        best = Some(near);
+                    }
+                }
+            }
+        }
+        match best {
+            Some(better) => pose = better,
+            None => break,
+        }
+    }
+    Top {
+        pose,
+        hits,
+        evaluations,
+    }
+}
+
+/// The mean of points, metres.
+pub(super) fn middle_m(points_m: &[[f32; 3]]) -> Point3<f64> {
+    let points = points_m.iter().map(|p| Vector3::from(p.map(f64::from)));
+    let sum: Vector3<f64> = points.sum();
+    (sum / points_m.len().max(1) as f64).into()
+}
+
+/// A pose shifted along the axes of the map (metres) and turned by a rotation vector (radians) about
+/// where it puts a point (metres).
+pub(super) fn moved(
+    pose: &Isometry3<f64>,
+    about_m: &Point3<f64>,
+    shift_m: &Vector3<f64>,
+    turn_rad: &Vector3<f64>,
+) -> Isometry3<f64> {
+    let rotation = UnitQuaternion::from_scaled_axis(*turn_rad) * pose.rotation;
+    let before = pose.rotation * about_m.coords;
+    let shift = shift_m + before - rotation * about_m.coords;
+    let translation = Translation3::from(pose.translation.vector + shift);
+    Isometry3::from_parts(translation, rotation)
+}

@@ -1,0 +1,76 @@
+//! A map at several resolutions.
+
+use nalgebra::{Isometry3, Vector3};
+
+use super::MatchError;
+use lattice_core::cloud::Cloud;
+use lattice_core::lattice::Lattice;
+use lattice_core::voxels::{InsertReport, OccupancyList, VoxelStore};
+
+/// Most levels of a list.
+pub const MAX_LEVELS: usize = 12;
+
+/// Occupied cells of one lattice at several sizes: level 0 is the finest, each next one has cells of
+/// twice the side.
+///
+/// Every point is quantized at every level: a coarse list is not made from a finer one, whose cells
+/// do not nest in it.
+#[derive(Clone, Debug)]
+pub struct MultiResolutionList {
+    levels: Vec<OccupancyList>,
+}
+
+impl MultiResolutionList {
+    /// An empty list of so many levels, the finest with the cells of `finest`, their datums near
+    /// `datum_near_m` (map frame, metres). All levels together hold at most `max_bytes`.
+    pub fn new(
+        finest: &Lattice,
+        datum_near_m: Vector3<f64>,
+        levels: usize,
+        max_bytes: usize,
+    ) -> Result<MultiResolutionList, MatchError> {
+        if !(1..=MAX_LEVELS).contains(&levels) {
+            return Err(MatchError::Levels { levels });
+        }
+        let level = |level: usize| {
+            let lattice = finest.scaled((1_u32 << level) as f64)?;
+            Ok(OccupancyList::new(
+                lattice,
+                datum_near_m,
+                max_bytes / levels,
+            )?)
+        };
+        let levels: Result<_, MatchError> = (0..levels).map(level).collect();
+        Ok(MultiResolutionList { levels: levels? })
+    }
+
+    /// Adds a cloud to every level; what became of its points, the finest level first.
+    ///
+    /// The outcome does not depend on the number of threads.
+    pub fn insert(&mut self, cloud: &Cloud) -> Vec<InsertReport> {
+        let levels = self.levels.iter_mut();
+        levels.map(|list| list.insert(cloud)).collect()
+    }
+
+    /// The lists, the finest first; never none.
+    pub fn levels(&self) -> &[OccupancyList] {
+        &self.levels
+    }
+
+    /// True if no level has a voxel.
+    pub fn is_empty(&self) -> bool {
+        self.levels.iter().all(VoxelStore::is_empty)
+    }
+
+    /// How many points `map_from_points` puts into occupied cells of a level; of a level that is not
+    /// there, none.
+    pub fn overlap(
+        &self,
+        level: usize,
+        map_from_points: &Isometry3<f64>,
+        points_m: &[[f32; 3]],
+    ) -> usize {
+        let list = self.levels.get(level);
+        list.map_or(0, |list| list.overlap(map_from_points, points_m))
+    }
+}

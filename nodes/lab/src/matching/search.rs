@@ -1,0 +1,202 @@
+//! Trying all poses about a guess.
+
+use nalgebra::{Isometry3, Point3, Vector3};
+use rayon::prelude::*;
+
+use super::align::{begin, end, moved, sample_of};
+use super::{Alignment, MatchError, MultiResolutionList, SearchOptions, Spread};
+use lattice_core::cloud::Cloud;
+use lattice_core::voxels::VoxelStore;
+
+/// Poses about a middle: three shifts (metres), then a rotation vector (radians).
+type Offset = [f64; 6];
+
+/// The best poses of a scan within a spread about a guess, the best first, at most `keep`.
+///
+/// On the coarsest level the poses of a grid are tried, one cell side apart and, in turn, a cell side
+/// over the range of the features. The best are kept and divided in two along every axis that is
+/// searched, level by level; [`refine`](super::refine) makes the best one finer than the grid. Of
+/// equally good poses the first of the grid comes first, on any number of threads. Fails as
+/// [`align`](super::align) does, and for a grid of too many poses.
+pub fn search(
+    map: &MultiResolutionList,
+    cloud: &Cloud,
+    map_from_cloud: &Isometry3<f64>,
+    spread: &Spread,
+    options: &SearchOptions,
+) -> Result<Vec<Alignment>, MatchError> {
+    options.check()?;
+    spread.check()?;
+    let middle = begin(map, cloud, map_from_cloud)?;
+    let coarsest = map.levels().last().ok_or(MatchError::EmptyMap)?;
+    let side_m = coarsest.lattice().cell_side_m();
+    let grid = Grid::new(spread, side_m, side_m / options.feature_range_m);
+    if grid.poses() > options.max_poses as f64 {
+        return Err(MatchError::TooManyPoses {
+            poses: grid.poses(),
+            most: options.max_poses,
+        });
+    }
+    let pose = |o: &Offset| {
+        let [x, y, z, a, b, c] = *o;
+        let (shift, turn) = (Vector3::new(x, y, z), Vector3::new(a, b, c));
+        moved(&middle, &Point3::origin(), &shift, &turn)
+    };
+    let mut kept: Vec<(usize, Offset)> = Vec::new();
+    let (mut evaluations, mut sampled) = (0, 0);
+    let mut spacing = grid.spacing;
+    for (number, list) in map.levels().iter().rev().enumerate() {
+        let points = sample_of(&cloud.offsets_m, list.lattice(), options.max_points, 0)?;
+        let score = |offset: &Offset| list.overlap(&pose(offset), &points);
+        let (tried, best) = if number == 0 {
+            let all = grid.poses() as usize;
+            let at = |place: usize| grid.at(place);
+            (all, best_of(all, at, score, options.keep))
+        } else {
+            spacing = spacing.map(|s| s / 2.0);
+            let children: Vec<Offset> = (kept.iter())
+                .flat_map(|(_, parent)| divided(parent, &spacing))
+                .collect();
+            let at = |place: usize| children.get(place).copied().unwrap_or([0.0; 6]);
+            let best = best_of(children.len(), at, score, options.keep);
+            (children.len(), best)
+        };
+        evaluations += tried;
+        sampled = points.len();
+        kept = best;
+    }
+    let alignment = |(hits, offset): &(usize, Offset)| Alignment {
+        map_from_cloud: end(cloud, &pose(offset)),
+        hits: *hits,
+        points: sampled,
+        evaluations,
+    };
+    Ok(kept.iter().map(alignment).collect())
+}
+
+/// The best `keep` of `n` poses, the best first; of equally good ones the first.
+fn best_of(
+    n: usize,
+    at: impl Fn(usize) -> Offset + Sync,
+    score: impl Fn(&Offset) -> usize + Sync,
+    keep: usize,
+) -> Vec<(usize, Offset)> {
+    let score = |place: usize| score(&at(place)) as u32;
+    let scores: Vec<u32> = (0..n).into_par_iter().map(score).collect();
+    let mut places: Vec<u32> = (0..n as u32).collect();
+    let lot = |place: &u32| {
+        let score = scores.get(*place as usize).copied().unwrap_or(0);
+        (std::cmp::Reverse(score), *place)
+    };
+    if n > keep {
+        places.select_nth_unstable_by_key(keep, lot);
+        places.truncate(keep);
+    }
+    places.sort_unstable_by_key(lot);
+    let found = |place: u32| (lot(&place).0.0 as usize, at(place as usize));
+    places.into_iter().map(found).collect()
+}
+
+/// A regular grid of offsets over a spread: each stands in the middle of its share.
+struct Grid {
+    counts: [f64; 6],
+    half: Offset,
+    spacing: Offset,
+}
+
+impl Grid {
+    /// Steps are at most so long.
+    fn new(spread: &Spread, step_m: f64, step_rad: f64) -> Grid {
+        let [x, y, z] = spread.translation_m;
+        let [a, b, c] = spread.rotation_rad;
+        let half = [x, y, z, a, b, c];
+        let steps = [step_m, step_m, step_m, step_rad, step_rad, step_rad];
+        let count = |(half, step): (f64, f64)| (2.0 * half / step).ceil().max(1.0);
+        let counts: [f64; 6] = std::array::from_fn(|i| count((half[i], steps[i])));
+        Grid {
+            counts,
+            half,
+            spacing: std::array::from_fn(|i| 2.0 * half[i] / counts[i]),
+        }
+    }
+
+    fn poses(&self) -> f64 {
+        self.counts.iter().product()
+    }
+
+    fn at(&self, mut place: usize) -> Offset {
+        let mut offset = [0.0; 6];
+        for (i, offset) in offset.iter_mut().enumerate() {
+            let count = self.counts[i] as usize;
+            let along = (place % count) as f64 + 0.5;
+            place /= count;
+            *offset = along * self.spacing[i] - self.half[i];
+        }
+        offset
+    }
+}
+
+/// The middles of the halves of an offset's share along every axis that has one; `spacing` is that of
+/// the halves.
+fn divided(parent: &Offset, spacing: &Offset) -> Vec<Offset> {
+    let mut children = vec![*parent];
+    for (axis, spacing) in spacing.iter().enumerate() {
+        if *spacing == 0.0 {
+            continue;
+        }
+        let halves = |child: Offset| {
+            [-0.5, 0.5].map(|sign| {
+                let mut half = child;
+                half[axis] += sign * spacing;
+                half
+            })
+        };
+        children = children.into_iter().flat_map(halves).collect();
+    }
+    children
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn the_grid_covers_the_spread_and_its_shares_divide_it() {
+        let spread = Spread {
+            translation_m: [1.0, 0.0, 0.3],
+            rotation_rad: [0.0, 0.0, 0.2],
+        };
+        let grid = Grid::new(&spread, 0.5, 0.15);
+        assert_eq!(grid.counts, [4.0, 1.0, 2.0, 1.0, 1.0, 3.0]);
+        let all: Vec<Offset> = (0..24).map(|i| grid.at(i)).collect();
+        let spacing = grid.spacing.map(|s| s / 2.0);
+        let fine = |o: &Offset| divided(o, &spacing);
+        let mut finer: Vec<Offset> = all.iter().flat_map(fine).collect();
+        assert_eq!(finer.len(), 24 * 8);
+        for axis in 0..6 {
+            let mut along: Vec<f64> = finer.iter().map(|o| o[axis]).collect();
+            along.sort_by(f64::total_cmp);
+            along.dedup_by(|a, b| (*a - *b).abs() < 1e-12);
+            let (half, count) = (grid.half[axis], along.len() as f64);
+            for (i, value) in along.iter().enumerate() {
+                let expected = (i as f64 + 0.5) * 2.0 * half / count - half;
+                assert!((value - expected).abs() < 1e-12);
+            }
+        }
+        finer.dedup();
+        assert_eq!(finer.len(), 24 * 8);
+    }
+
+    #[test]
+    fn the_best_come_first_and_equal_ones_in_order() {
+        let at = |place: usize| [place as f64, 0.0, 0.0, 0.0, 0.0, 0.0];
+        let score = |o: &Offset| (o[0] as usize * 7) % 5;
+        let best = best_of(20, at, score, 6);
+        let scores: Vec<_> = best
+            .iter()
+            .map(|(hits, o)| (*hits, o[0] as usize))
+            .collect();
+        assert_eq!(scores, [(4, 2), (4, 7), (4, 12), (4, 17), (3, 4), (3, 9)]);
+        assert_eq!(best_of(0, at, score, 6), []);
+    }
+}

@@ -1,0 +1,183 @@
+//! Nakamura et al. 2019, "Calibration System Using Semantic-ICP for Visualization of Robot Spatial Perception Through
+//! Mixed Reality", computed anew.
+
+mod equations;
+mod label_maps;
+mod metric;
+mod trials;
+
+use std::path::PathBuf;
+
+use crate::simulate::house::House;
+
+use super::report::{Head, Report, Section};
+use crate::evaluate::{Results, Settings, Trial, World, read_house};
+use crate::plot::Fault;
+
+/// What to compute.
+#[derive(Clone, Debug)]
+pub struct Options {
+    /// The same seed gives the same bytes.
+    pub seed: u64,
+    /// Fewer trials.
+    pub quick: bool,
+    /// PLY of a house and YAML with the names of its classes; else a house of our own.
+    pub mesh: Option<(PathBuf, PathBuf)>,
+    /// Folder of an evaluation whose trials are taken; else they are run.
+    pub results: Option<PathBuf>,
+    /// Trials at once.
+    pub threads: usize,
+}
+
+/// Seeds of trials that each seed of a report has for itself.
+const SEEDS_EACH: u64 = 1000;
+/// Views of the robot's survey in a quick run.
+const QUICK_VIEWS: usize = 192;
+
+/// What the sections share.
+struct Context {
+    world: World,
+    seed: u64,
+    /// Seed of the first trial.
+    first_seed: u64,
+    quick: bool,
+    threads: usize,
+    /// Side of a cell of the robot's map, metres.
+    cell_side_m: f64,
+}
+
+/// Computes all sections; `progress` is told how much is done, from 0 to 1, and what comes next.
+pub fn run(options: &Options, progress: &mut dyn FnMut(f64, &str)) -> Result<Report, Fault> {
+    let sections = sections(options, progress)?;
+    let head = Head {
+        paper: "Nakamura, El Hafi, Hagiwara and Taniguchi 2019, Calibration System Using Semantic-ICP for Visualization of Robot \
+                Spatial Perception Through Mixed Reality"
+            .to_owned(),
+        command: command(options),
+        seed: options.seed,
+        quick: options.quick,
+    };
+    Ok(Report::new(head, sections))
+}
+
+fn sections(options: &Options, progress: &mut dyn FnMut(f64, &str)) -> Result<Vec<Section>, Fault> {
+    progress(0.0, "house");
+    let mesh = options
+        .mesh
+        .as_ref()
+        .map(|(m, c)| (m.as_path(), c.as_path()));
+    let (house, mesh_crc32) = read_house(mesh, options.seed)?;
+    let (settings, trials) = evaluated(options, mesh_crc32)?;
+    let context = context(options, house, &settings)?;
+    let mut tell = |done: f64| progress(0.02 + 0.08 * done, "equations");
+    let mut sections = equations::sections(&context, &mut tell)?;
+    sections.push(metric::section(&context)?);
+    let mut tell = |done: f64| progress(0.1 + 0.85 * done, "Table 1");
+    sections.extend(trials::sections(&context, trials, &mut tell)?);
+    let mut tell = |done: f64| progress(0.95 + 0.05 * done, "Figs. 3 and 4");
+    sections.extend(label_maps::sections(&context, &mut tell)?);
+    Ok(sections)
+}
+
+fn context(options: &Options, house: House, settings: &Settings) -> Result<Context, Fault> {
+    Ok(Context {
+        world: World::new(house, settings)?,
+        seed: options.seed,
+        first_seed: options.seed.wrapping_sub(1).wrapping_mul(SEEDS_EACH),
+        quick: options.quick,
+        threads: options.threads.max(1),
+        cell_side_m: settings.cell_side_m,
+    })
+}
+
+/// Settings of the trials, and the trials if they were run before.
+fn evaluated(
+    options: &Options,
+    mesh_crc32: Option<u32>,
+) -> Result<(Settings, Option<Vec<Trial>>), Fault> {
+    let Some(folder) = &options.results else {
+        let default = Settings::default();
+        let settings = Settings {
+            mesh_crc32,
+            map_seeds: if options.quick { 1 } else { default.map_seeds },
+            survey_views: if options.quick {
+                QUICK_VIEWS
+            } else {
+                default.survey_views
+            },
+            ..default
+        };
+        return Ok((settings, None));
+    };
+    let (settings, trials) = Results::read(folder)?;
+    if settings.mesh_crc32 != mesh_crc32 {
+        return Err(format!(
+            "{}: these trials are of {}; give the same --mesh and --classes, if any",
+            folder.display(),
+            match settings.mesh_crc32 {
+                Some(crc) => format!("a mesh with CRC-32 {crc:08x}"),
+                None => "the house of our own making".to_owned(),
+            }
+        )
+        .into());
+    }
+    Ok((settings, Some(trials)))
+}
+
+/// The command line, with the names of files but not where they lie.
+fn command(options: &Options) -> String {
+    let mut words = format!("lattice paper calibration --seed {}", options.seed);
+    if options.quick {
+        words.push_str(" --quick");
+    }
+    let mut named = |option: &str, path: &PathBuf| {
+        let name = path.file_name().unwrap_or_default().to_string_lossy();
+        words.push_str(&format!(" --{option} {name}"));
+    };
+    if let Some((mesh, classes)) = &options.mesh {
+        named("mesh", mesh);
+        named("classes", classes);
+    }
+    if let Some(results) = &options.results {
+        named("results", results);
+    }
+    words
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    fn options(results: Option<PathBuf>) -> Options {
+        Options {
+            seed: 4,
+            quick: true,
+            mesh: Some(("a/b/house.ply".into(), "a/classes.yaml".into())),
+            results,
+            threads: 1,
+        }
+    }
+
+    #[test]
+    fn the_command_names_files_but_not_where_they_are() {
+        assert_eq!(
+            command(&options(Some("/tmp/x/trials".into()))),
+            "lattice paper calibration --seed 4 --quick --mesh house.ply --classes classes.yaml --results trials"
+        );
+    }
+
+    #[test]
+    fn trials_of_another_house_are_refused() {
+        let folder = tempfile::tempdir().unwrap();
+        let settings = Settings {
+            mesh_crc32: Some(7),
+            ..Settings::default()
+        };
+        drop(Results::open(folder.path(), &settings).unwrap());
+        let options = options(Some(folder.path().to_owned()));
+        let (found, trials) = evaluated(&options, Some(7)).unwrap();
+        assert_eq!((found, trials), (settings, Some(Vec::new())));
+        let fault = evaluated(&options, None).unwrap_err().to_string();
+        assert!(fault.contains("CRC-32 00000007"), "{fault}");
+    }
+}

@@ -1,0 +1,32 @@
+//! Random numbers of the reproductions, apart from those of the simulation.
+
+use crate::random::Stream;
+
+/// What random numbers are for; streams of different purposes are independent.
+#[derive(Clone, Copy, Debug)]
+#[repr(u64)]
+pub enum Purpose {
+    /// Points whose nearest lattice point is sought.
+    Quantize = 256,
+    /// Points of a cell.
+    Cell = 257,
+    /// Points that are spread evenly in space.
+    Uniform = 258,
+    /// Rotations and offsets of a cloud.
+    Pose = 259,
+    /// Which points of a cloud are taken.
+    Thin = 260,
+    /// Where a lattice lies about a cloud.
+    Offset = 261,
+    /// How lattices lie and where alignments start.
+    Matching = 272,
+    /// Resamples of trials.
+    Bootstrap = 273,
+    /// Frames in which one calibration is told.
+    Frames = 768,
+}
+
+/// Stream `index` (below 2^48) of a purpose.
+pub fn stream(seed: u64, purpose: Purpose, index: usize) -> Stream {
+    Stream::numbered(seed, (purpose as u64) << 48 | index as u64)
+}

@@ -1,0 +1,156 @@
+//! The tables beside Table I.
+
+use std::path::Path;
+
+use lattice_core::lattice::LatticeKind;
+
+use super::{POINTS, Placed, Printed, VOLUME_M3, range, rms_m};
+use crate::paper::report::plot::title;
+use crate::paper::report::{Cell, Table};
+use lattice_nodes::replay::RunReport;
+
+/// As printed and as simulated.
+pub fn compared(all: &[Placed]) -> Table {
+    let columns = [
+        "lattice",
+        "voxels, printed",
+        "voxels",
+        "±",
+        "least",
+        "most",
+        "to cubic, printed (%)",
+        "to cubic (%)",
+        "MSE/dim, printed (m²)",
+        "MSE/dim (m²)",
+        "mean distance (m)",
+        "RMS, printed (m)",
+        "RMS (m)",
+        "least",
+        "most",
+    ];
+    let cubic = |of: fn(&Placed) -> f64| {
+        let mut all = all.iter();
+        all.find(|placed| placed.lattice.kind() == LatticeKind::Cubic)
+            .map_or(f64::NAN, of)
+    };
+    let cubic_printed = cubic(|placed| placed.printed.map_or(f64::NAN, |row| row.voxels));
+    let cubic_voxels = cubic(|placed| placed.voxels().mean);
+    let row = |placed: &Placed| {
+        let of_paper = |of: fn(&Printed) -> f64, digits| {
+            let cell = |row| Cell::Number(of(row), digits);
+            placed.printed.map_or(Cell::Empty, cell)
+        };
+        let voxels = placed.voxels();
+        let [least, most] = range(&placed.each(|q| q.voxels as f64));
+        let [low, high] = range(&placed.each(rms_m));
+        let to_cubic = placed.printed.map_or(Cell::Empty, |row| {
+            Cell::Number(100.0 * (row.voxels / cubic_printed - 1.0), 1)
+        });
+        vec![
+            placed.name().into(),
+            of_paper(|row| row.voxels, 0),
+            Cell::Number(voxels.mean, 1),
+            Cell::Number(voxels.half, 1),
+            Cell::Number(least, 0),
+            Cell::Number(most, 0),
+            to_cubic,
+            Cell::Number(100.0 * (voxels.mean / cubic_voxels - 1.0), 1),
+            of_paper(|row| row.mse, 4),
+            Cell::Number(placed.mean(|q| q.mse_m2).mean, 6),
+            Cell::Number(placed.mean(|q| q.mean_m).mean, 5),
+            of_paper(|row| row.distance_error, 4),
+            Cell::Number((3.0 * placed.mean(|q| q.mse_m2).mean).sqrt(), 5),
+            Cell::Number(low, 4),
+            Cell::Number(high, 4),
+        ]
+    };
+    Table {
+        name: "table1".into(),
+        caption: format!(
+            "Table I as printed and {POINTS} points of a simulated loader's log in cells of {VOLUME_M3} m³: mean over all \
+             places of the lattice with 95 % interval, least and most of any place"
+        ),
+        columns: columns.map(String::from).into(),
+        rows: all.iter().map(row).collect(),
+    }
+}
+
+/// As printed and as theory has it.
+pub fn theory(all: &[Placed]) -> Table {
+    let columns = [
+        "lattice",
+        "theory: MSE/dim (m²)",
+        "theory: mean distance (m)",
+        "theory: RMS (m)",
+        "printed MSE/dim (m²)",
+        "to theory (%)",
+        "√(3 printed MSE) (m)",
+        "printed \"distance error\" (m)",
+    ];
+    let row = |placed: &Placed| {
+        let mse = placed.mse_of_theory();
+        let mut row = vec![
+            placed.name().into(),
+            Cell::Number(mse, 6),
+            Cell::Number(placed.lattice.mean_distance_m([0; 3]), 5),
+            Cell::Number((3.0 * mse).sqrt(), 5),
+        ];
+        row.extend(match placed.printed {
+            Some(printed) => [
+                Cell::Number(printed.mse, 4),
+                Cell::Number(100.0 * (printed.mse / mse - 1.0), 1),
+                Cell::Number((3.0 * printed.mse).sqrt(), 4),
+                Cell::Number(printed.distance_error, 4),
+            ],
+            None => [Cell::Empty, Cell::Empty, Cell::Empty, Cell::Empty],
+        });
+        row
+    };
+    Table {
+        name: "table1_theory".into(),
+        caption: format!(
+            "Table I against theory for evenly spread points, cells of {VOLUME_M3} m³"
+        ),
+        columns: columns.map(String::from).into(),
+        rows: all.iter().map(row).collect(),
+    }
+}
+
+/// A log that was given.
+pub fn of_log(run: &RunReport, path: &Path, number: usize) -> Table {
+    let columns = [
+        "lattice",
+        "points",
+        "voxels",
+        "to cubic (%)",
+        "MSE/dim (m²)",
+        "mean distance (m)",
+        "RMS (m)",
+        "largest distance (m)",
+    ];
+    let cubic = run
+        .lattices
+        .first()
+        .map_or(f64::NAN, |l| l.map.voxels as f64);
+    let lattices = LatticeKind::ALL.into_iter().zip(&run.lattices);
+    let rows = lattices.map(|(kind, lattice)| {
+        let map = &lattice.map;
+        vec![
+            title(kind).into(),
+            Cell::Count(map.points),
+            map.voxels.into(),
+            Cell::Number(100.0 * (map.voxels as f64 / cubic - 1.0), 2),
+            Cell::Number(map.mse_per_dimension_m2, 6),
+            Cell::Number(map.mean_distance_m, 5),
+            Cell::Number(map.rms_m, 5),
+            Cell::Number(map.max_distance_m, 4),
+        ]
+    });
+    let name = path.file_name().unwrap_or_default().to_string_lossy();
+    Table {
+        name: format!("table1_log{}", number + 1),
+        caption: format!("The log {name} in cells of {VOLUME_M3} m³"),
+        columns: columns.map(String::from).into(),
+        rows: rows.collect(),
+    }
+}

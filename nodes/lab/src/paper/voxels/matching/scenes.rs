@@ -1,0 +1,258 @@
+//! What is matched: scans of a simulated house, and pairs of files.
+
+use std::path::Path;
+
+use crate::matching::{MultiResolutionList, SearchOptions, Spread, search};
+use crate::simulate::RANGE_NOISE_M;
+use crate::simulate::house::{House, LaserOptions, LaserView};
+use lattice_core::cloud::Cloud;
+use lattice_core::lattice::{Lattice, LatticeKind};
+use lattice_core::registration::{
+    PrepareOptions, PreparedCloud, RegisterOptions, SemanticCloud, register, voxel_downsample,
+};
+use nalgebra::{Isometry3, Matrix3, Rotation3, Translation3, UnitQuaternion, Vector3};
+
+use crate::paper::report::plot::Fault;
+use lattice_nodes::files::points::{PointFileLimits, read_points};
+
+/// Pairs of stands all over the house.
+const STANDS: usize = 12;
+/// Most bytes of the lists of a trial.
+pub(super) const MAX_BYTES: usize = 1 << 28;
+
+/// Where scans come from.
+pub(super) enum Source {
+    /// Views of the house, each trial with range noise of its own.
+    Simulated(Vec<[LaserView; 2]>),
+    /// One scan as the map, one to match.
+    Files {
+        scans: [Vec<[f32; 3]>; 2],
+        map_from_scan: Isometry3<f64>,
+        /// If the truth is our own: how far it and that from the other scan are apart, metres.
+        doubt_m: Option<f64>,
+    },
+}
+
+/// Two scans, each in the frame of its scanner, metres, and the truth.
+pub(super) struct Pair {
+    pub(super) map: Vec<[f32; 3]>,
+    pub(super) scan: Vec<[f32; 3]>,
+    pub(super) map_from_scan: Isometry3<f64>,
+}
+
+impl Source {
+    /// The scans of trial `number`, with noise of lane `lane`.
+    pub(super) fn pair(&self, seed: u64, lane: usize, number: usize) -> Option<Pair> {
+        match self {
+            Source::Simulated(views) => {
+                let [map, scan] = views.get(number % views.len().max(1))?;
+                let stream = ((lane as u64) << 32 | number as u64) << 1;
+                Some(Pair {
+                    map: map.scan(RANGE_NOISE_M, seed, stream),
+                    scan: scan.scan(RANGE_NOISE_M, seed, stream + 1),
+                    map_from_scan: map.house_from_laser.inverse() * scan.house_from_laser,
+                })
+            }
+            Source::Files {
+                scans: [map, scan],
+                map_from_scan,
+                ..
+            } => Some(Pair {
+                map: map.clone(),
+                scan: scan.clone(),
+                map_from_scan: *map_from_scan,
+            }),
+        }
+    }
+
+    /// How far our own truth may be off, metres, if it is ours.
+    pub(super) fn doubt_m(&self) -> Option<f64> {
+        match self {
+            Source::Simulated(_) => None,
+            Source::Files { doubt_m, .. } => *doubt_m,
+        }
+    }
+}
+
+/// One panel of the figure.
+pub(super) struct Scene {
+    /// "simulated rooms".
+    pub(super) place: &'static str,
+    /// Which source.
+    pub(super) source: usize,
+    /// Side of a cube of the finest cell's volume, metres.
+    pub(super) side_m: f64,
+    /// A start is off by up to this along each axis, metres.
+    pub(super) start_m: f64,
+}
+
+impl Scene {
+    /// "simulated rooms, 0.1 m cells, start ±0.2 m".
+    pub(super) fn title(&self) -> String {
+        let Scene {
+            place,
+            side_m,
+            start_m,
+            ..
+        } = self;
+        format!("{place}, {side_m} m cells, start ±{start_m} m")
+    }
+}
+
+/// The name of what is simulated.
+pub(super) const ROOMS: &str = "simulated rooms";
+/// The pair of small_gicp.
+pub(super) const STREET: &str = "street (small_gicp)";
+/// The pair of the Point Cloud Library.
+pub(super) const OFFICE: &str = "room (PCL)";
+
+/// All scenes, and what they are made of.
+pub(super) fn scenes(seed: u64, pairs: Option<&Path>) -> Result<(Vec<Source>, Vec<Scene>), Fault> {
+    let house = House::own(seed)?;
+    let views = LaserView::pairs(&house, STANDS, &LaserOptions::default(), seed)?;
+    let mut sources = vec![Source::Simulated(views)];
+    let mut scenes = Vec::new();
+    let mut add = |place, source, cases: &[(f64, f64)]| {
+        scenes.extend(cases.iter().map(|&(side_m, start_m)| Scene {
+            place,
+            source,
+            side_m,
+            start_m,
+        }));
+    };
+    add(ROOMS, 0, &[(0.1, 0.2), (0.2, 0.3), (0.2, 0.6)]);
+    let Some(folder) = pairs else {
+        return Ok((sources, scenes));
+    };
+    let truth = folder.join("small_gicp/T_target_source.txt");
+    if truth.is_file() {
+        let scans = ["target.ply", "source.ply"].map(|name| folder.join("small_gicp").join(name));
+        let [map, scan] = [points(&scans[0])?, points(&scans[1])?];
+        add(STREET, sources.len(), &[(0.5, 1.0), (0.25, 0.5)]);
+        sources.push(Source::Files {
+            scans: [map, scan],
+            map_from_scan: pose(&truth)?,
+            doubt_m: None,
+        });
+    }
+    let scans = ["room_scan1.pcd", "room_scan2.pcd"].map(|name| folder.join(name));
+    if scans.iter().all(|path| path.is_file()) {
+        let [map, scan] = [points(&scans[0])?, points(&scans[1])?];
+        let truth = registered(&map, &scan)?;
+        let back = registered(&scan, &map)?.inverse();
+        let apart = truth.translation.vector - back.translation.vector;
+        add(OFFICE, sources.len(), &[(0.1, 0.2), (0.2, 0.3)]);
+        sources.push(Source::Files {
+            scans: [map, scan],
+            map_from_scan: truth,
+            doubt_m: Some(apart.norm()),
+        });
+    }
+    if sources.len() == 1 {
+        let words =
+            "has neither small_gicp/T_target_source.txt nor room_scan1.pcd and room_scan2.pcd";
+        return Err(format!("{}: {words}", folder.display()).into());
+    }
+    Ok((sources, scenes))
+}
+
+fn points(path: &Path) -> Result<Vec<[f32; 3]>, Fault> {
+    let file = read_points(path, &PointFileLimits::default());
+    let file = file.map_err(|e| format!("{}: {e}", path.display()))?;
+    let narrow = |p: &[f64; 3]| p.map(|x| x as f32);
+    Ok(file.points_m.iter().map(narrow).collect())
+}
+
+/// A transform from a file of 16 numbers, row by row.
+fn pose(path: &Path) -> Result<Isometry3<f64>, Fault> {
+    let wrong = |why: &str| format!("{}: {why}", path.display());
+    let text = std::fs::read_to_string(path).map_err(|e| wrong(&e.to_string()))?;
+    parse_pose(&text).ok_or_else(|| wrong("is not a rigid transform of 4 x 4 numbers").into())
+}
+
+fn parse_pose(text: &str) -> Option<Isometry3<f64>> {
+    let numbers: Option<Vec<f64>> = text.split_whitespace().map(|w| w.parse().ok()).collect();
+    let rows: [f64; 16] = numbers?.try_into().ok()?;
+    let [a, b, c, x, d, e, f, y, g, h, i, z, ..] = rows;
+    let matrix = Matrix3::new(a, b, c, d, e, f, g, h, i);
+    let off = (matrix * matrix.transpose() - Matrix3::identity()).amax();
+    // The file of small_gicp has six digits.
+    let rigid = off < 1e-3 && matrix.determinant() > 0.0 && [x, y, z].iter().all(|t| t.is_finite());
+    rigid.then(|| {
+        let rotation = Rotation3::from_matrix(&matrix);
+        let translation = Translation3::new(x, y, z);
+        Isometry3::from_parts(translation, UnitQuaternion::from_rotation_matrix(&rotation))
+    })
+}
+
+/// Where a scan lies that comes without a pose: by our search for a heading and a place, then by GICP.
+fn registered(map: &[[f32; 3]], scan: &[[f32; 3]]) -> Result<Isometry3<f64>, Fault> {
+    let cloud = |points: &[[f32; 3]]| Cloud {
+        stamp_ns: 0,
+        datum_m: Vector3::zeros(),
+        offsets_m: points.to_vec(),
+    };
+    let lattice = Lattice::new(LatticeKind::Bcc, 0.2_f64.powi(3))?;
+    let mut list = MultiResolutionList::new(&lattice, Vector3::zeros(), 3, MAX_BYTES)?;
+    list.insert(&cloud(map));
+    let spread = Spread {
+        translation_m: [4.0, 4.0, 0.4],
+        rotation_rad: [0.0, 0.0, std::f64::consts::PI],
+    };
+    let (start, options) = (Isometry3::identity(), SearchOptions::default());
+    let found = search(&list, &cloud(scan), &start, &spread, &options)?;
+    let best = found.first().ok_or("the search found nothing")?;
+    let prepare = |points: &[[f32; 3]]| {
+        let wide = |p: &[f32; 3]| p.map(f64::from).into();
+        let cloud = SemanticCloud::unlabelled(points.iter().map(wide).collect());
+        PreparedCloud::new(voxel_downsample(&cloud, 0.05), &PrepareOptions::default())
+    };
+    let (source, target) = (prepare(scan)?, prepare(map)?);
+    let mut pose = best.map_from_cloud;
+    // From a wide gate to a narrow one.
+    for gate_m in [0.5, 0.2, 0.1] {
+        let options = RegisterOptions {
+            max_iterations: 100,
+            rotation_tolerance_rad: 1e-5,
+            translation_tolerance_m: 1e-5,
+            ..RegisterOptions::gicp(gate_m)
+        };
+        pose = register(&source, &target, &pose, &options).target_from_source;
+    }
+    Ok(pose)
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn a_transform_is_read_and_anything_else_refused() {
+        let text = "0 -1 0 1\n1 0 0 2\n0 0 1 3\n0 0 0 1\n";
+        let read = parse_pose(text).unwrap();
+        let expected = Isometry3::new(
+            Vector3::new(1.0, 2.0, 3.0),
+            Vector3::z() * std::f64::consts::FRAC_PI_2,
+        );
+        assert!((read.to_homogeneous() - expected.to_homogeneous()).amax() < 1e-12);
+        for bad in [
+            "",
+            "1 0 0 0 0 1 0 0 0 0 1 0 0 0 0",
+            "0 1 0 0 1 0 0 0 0 0 1 0 0 0 0 1",
+            "2 0 0 0 0 2 0 0 0 0 2 0 0 0 0 1",
+            "1 0 0 NaN 0 1 0 0 0 0 1 0 0 0 0 1",
+            "1 0 0 x 0 1 0 0 0 0 1 0 0 0 0 1",
+        ] {
+            assert_eq!(parse_pose(bad), None, "{bad}");
+        }
+    }
+
+    #[test]
+    fn a_folder_without_pairs_is_refused() {
+        let folder = tempfile::tempdir().unwrap();
+        let error = scenes(1, Some(folder.path())).err().unwrap().to_string();
+        assert!(error.contains("room_scan1.pcd"), "{error}");
+        let (sources, scenes) = scenes(1, None).unwrap();
+        assert_eq!((sources.len(), scenes.len()), (1, 3));
+    }
+}

@@ -1,0 +1,131 @@
+//! The quantizers of Ryde & Brünig 2011 as printed: to show their errata, and to measure against.
+//!
+//! Nothing else uses them: [`Lattice::quantize`](super::Lattice::quantize) is exact and many times
+//! faster. What is wrong as printed: eq. (1) misses the nearest point of a sixth to 7/16 of space;
+//! eq. (2) needs the column 0, which eq. (4)-(7) lack; eq. (4) lacks ±(1,0,0), so that even with 0 it
+//! misses 1/96 of space, and lists faces only, not all touching cells; eq. (7) lacks ±(1,1,1).
+
+mod search27;
+
+use nalgebra::{Matrix3, Vector3};
+
+use lattice_core::lattice::{LatticeIndex, LatticeKind};
+
+pub use search27::Search27;
+
+/// The generator matrix of eq. (8)-(12), with the four digits that are printed; `None` for a lattice
+/// that is not in the paper.
+pub fn printed_generator(kind: LatticeKind) -> Option<Matrix3<f64>> {
+    let rows = match kind {
+        LatticeKind::Cubic => [1.0, 0.0, 0.0, 0.0, 1.0, 0.0, 0.0, 0.0, 1.0],
+        LatticeKind::Bcc => [1.2599, 0.0, 0.63, 0.0, 1.2599, 0.63, 0.0, 0.0, 0.63],
+        LatticeKind::Fcc => [1.5874, 0.7937, 0.0, 0.0, -0.7937, 0.7937, 0.0, 0.0, -0.7937],
+        LatticeKind::Mcc => [
+            1.0987, -0.4551, -0.1885, 0.0, 1.0, -0.5858, 0.0, 0.0, 0.9102,
+        ],
+        LatticeKind::Hex => [1.1776, -0.5888, 0.0, 0.0, 1.0198, 0.0, 0.0, 0.0, 0.8327],
+        LatticeKind::HexOptimal | LatticeKind::Custom => return None,
+    };
+    Some(Matrix3::from_row_slice(&rows))
+}
+
+/// The columns of the matrix of eq. (3)-(7) in printed order, those with + first; empty for a
+/// lattice that is not in the paper.
+///
+/// Eq. (3) is elided in print; it is taken for all 27 columns, with 0, in the order that it starts in.
+pub fn printed_delta(kind: LatticeKind) -> Vec<LatticeIndex> {
+    let rows: [&[i32]; 3] = match kind {
+        LatticeKind::Cubic => return off_by_one().to_vec(),
+        LatticeKind::Fcc => [
+            &[1, 0, 1, 0, 0, 1],
+            &[-2, -1, -1, 0, -1, -1],
+            &[-1, -1, -1, -1, 0, 0],
+        ],
+        LatticeKind::Bcc => [
+            &[1, 0, 1, 0, 1, 0, -1],
+            &[1, 0, 0, 1, 1, -1, 0],
+            &[-2, -1, -1, -1, -1, 0, 0],
+        ],
+        LatticeKind::Mcc => [
+            &[-1, 0, -1, 0, -1, 0, -1],
+            &[-1, -1, 0, 0, -1, -1, 0],
+            &[-1, -1, -1, -1, 0, 0, 0],
+        ],
+        LatticeKind::Hex => [
+            &[0, -1, 0, 1, 0, 1, -1, 0, -1],
+            &[-1, 0, 0, 0, 1, 1, -1, -1, 0],
+            &[-1, -1, -1, -1, -1, -1, 0, 0, 0],
+        ],
+        LatticeKind::HexOptimal | LatticeKind::Custom => return Vec::new(),
+    };
+    let [x, y, z] = rows;
+    let plus = x.iter().zip(y).zip(z).map(|((&x, &y), &z)| [x, y, z]);
+    plus.clone()
+        .chain(plus.map(|column| column.map(|i| -i)))
+        .collect()
+}
+
+/// All differences with entries -1, 0 and 1, the last one fastest.
+pub fn off_by_one() -> [LatticeIndex; 27] {
+    std::array::from_fn(|i| [i / 9, i / 3 % 3, i % 3].map(|entry| entry as i32 - 1))
+}
+
+/// Eq. (1) and (2) for a basis and a set of differences, in double precision.
+#[derive(Clone, Debug)]
+pub struct PaperQuantizer {
+    generator: Matrix3<f64>,
+    inverse: Matrix3<f64>,
+    differences: Vec<(LatticeIndex, Vector3<f64>)>,
+}
+
+impl PaperQuantizer {
+    /// For the basis in the columns of `generator_m` (metres) and the columns of Delta, which holds
+    /// no 0 unless it is given; `None` if the basis has no inverse.
+    pub fn new(generator_m: Matrix3<f64>, delta: &[LatticeIndex]) -> Option<PaperQuantizer> {
+        let differences = delta
+            .iter()
+            .map(|&w| (w, generator_m * Vector3::from(w.map(f64::from))));
+        Some(PaperQuantizer {
+            generator: generator_m,
+            inverse: generator_m.try_inverse()?,
+            differences: differences.collect(),
+        })
+    }
+
+    /// Eq. (1): every coordinate of `G^-1 p` rounded, for |w| < 2^31.
+    pub fn rounded(&self, p: &Vector3<f64>) -> LatticeIndex {
+        let w = self.inverse * p;
+        [w.x, w.y, w.z].map(|x| x.round() as i32)
+    }
+
+    /// Eq. (2): of the rounded index plus each difference the one nearest to `p`, the first of
+    /// equals; the rounded index if there are no differences.
+    pub fn nearest(&self, p: &Vector3<f64>) -> LatticeIndex {
+        let w = self.rounded(p);
+        let rest = p - self.generator * Vector3::from(w.map(f64::from));
+        let (mut step, mut least) = ([0; 3], f64::INFINITY);
+        for (difference, vector) in &self.differences {
+            let square = (rest - vector).norm_squared();
+            if square < least {
+                (step, least) = (*difference, square);
+            }
+        }
+        [0, 1, 2].map(|i| w[i].wrapping_add(step[i]))
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use lattice_core::lattice::Lattice;
+
+    use super::*;
+
+    #[test]
+    fn rounds_to_the_digits_the_paper_prints() {
+        for kind in LatticeKind::PAPER {
+            let error =
+                Lattice::new(kind, 1.0).unwrap().generator() - printed_generator(kind).unwrap();
+            assert!(error.amax() < 0.5001e-4, "{kind}: {error}");
+        }
+    }
+}

@@ -1,0 +1,389 @@
+//! A house of one room, small enough to know all of it.
+
+use std::collections::BTreeMap;
+use std::time::Instant;
+
+use nalgebra::{Isometry3, Point3, Vector3};
+
+use super::*;
+use crate::mesh::LabelledMesh;
+use lattice_core::lattice::{Lattice, LatticeKind};
+use lattice_core::registration::SemanticCloud;
+
+#[derive(Default)]
+struct Boxes {
+    vertices_m: Vec<[f32; 3]>,
+    triangles: Vec<[u32; 3]>,
+    labels: Vec<u16>,
+    instances: Vec<u16>,
+    next: u16,
+}
+
+impl Boxes {
+    fn add(&mut self, label: u16, low: [f32; 3], high: [f32; 3]) {
+        let first = self.vertices_m.len() as u32;
+        for i in 0..8 {
+            let at = |axis: usize| {
+                if i >> axis & 1 == 0 {
+                    low[axis]
+                } else {
+                    high[axis]
+                }
+            };
+            self.vertices_m.push([at(0), at(1), at(2)]);
+        }
+        for quad in [
+            [0, 1, 3, 2],
+            [4, 5, 7, 6],
+            [0, 1, 5, 4],
+            [2, 3, 7, 6],
+            [0, 2, 6, 4],
+            [1, 3, 7, 5],
+        ] {
+            for [a, b, c] in [[0, 1, 2], [0, 2, 3]] {
+                self.triangles
+                    .push([a, b, c].map(|i: usize| first + quad[i]));
+                self.labels.push(label);
+                self.instances.push(self.next);
+            }
+        }
+        self.next += 1;
+    }
+}
+
+fn names() -> BTreeMap<u16, String> {
+    let names = [
+        "wall",
+        "floor",
+        "ceiling",
+        "tv",
+        "cabinet",
+        "desk",
+        "table",
+        "chair",
+        "sofa",
+        "bookshelf",
+    ];
+    (0..).zip(names.map(str::to_owned)).collect()
+}
+
+/// A room of 6 x 5 x 2.8 m within walls of 0.1 m.
+fn room() -> House {
+    let mut boxes = Boxes::default();
+    boxes.add(1, [-0.1, -0.1, -0.1], [6.1, 5.1, 0.0]);
+    boxes.add(2, [-0.1, -0.1, 2.8], [6.1, 5.1, 2.9]);
+    boxes.add(0, [-0.1, -0.1, 0.0], [0.0, 5.1, 2.8]);
+    boxes.add(0, [6.0, -0.1, 0.0], [6.1, 5.1, 2.8]);
+    boxes.add(0, [0.0, -0.1, 0.0], [6.0, 0.0, 2.8]);
+    boxes.add(0, [0.0, 5.0, 0.0], [6.0, 5.1, 2.8]);
+    boxes.add(4, [1.0, 4.5, 0.0], [2.6, 5.0, 0.5]);
+    boxes.add(3, [1.2, 4.8, 0.6], [2.4, 4.9, 1.3]);
+    boxes.add(5, [5.3, 1.0, 0.0], [6.0, 2.4, 0.74]);
+    boxes.add(9, [3.6, 4.7, 0.0], [4.6, 5.0, 1.9]);
+    boxes.add(6, [1.6, 1.2, 0.7], [2.8, 2.0, 0.75]);
+    boxes.add(7, [1.1, 1.4, 0.0], [1.5, 1.8, 0.45]);
+    boxes.add(7, [2.9, 1.4, 0.0], [3.3, 1.8, 0.45]);
+    let Boxes {
+        vertices_m,
+        triangles,
+        labels,
+        instances,
+        ..
+    } = boxes;
+    let mesh = LabelledMesh::new(vertices_m, triangles, labels, instances).unwrap();
+    House::from_mesh(mesh, names()).unwrap()
+}
+
+fn pose() -> Isometry3<f64> {
+    Isometry3::new(Vector3::new(4.0e5, -3.0e3, 21.0), Vector3::z() * 0.7)
+}
+
+/// Distance of a point of the house to its surfaces, metres, at most `most_m`.
+fn distance_m(house: &House, p: &Point3<f64>, most_m: f64) -> f64 {
+    let to = house.mesh().corners_m().map(|corners| {
+        let [a, b, c] = corners.map(|p| Point3::from(p.map(f64::from)));
+        to_triangle_m(p, a, b, c)
+    });
+    to.fold(most_m, f64::min)
+}
+
+/// Ericson, Real-Time Collision Detection, 5.1.5.
+fn to_triangle_m(p: &Point3<f64>, a: Point3<f64>, b: Point3<f64>, c: Point3<f64>) -> f64 {
+    let (ab, ac, ap) = (b - a, c - a, p - a);
+    let normal = ab.cross(&ac);
+    let n2 = normal.norm_squared();
+    if n2 > 0.0 {
+        let v = ap.cross(&ac).dot(&normal) / n2;
+        let w = ab.cross(&ap).dot(&normal) / n2;
+        if v >= 0.0 && w >= 0.0 && v + w <= 1.0 {
+            return ap.dot(&normal).abs() / n2.sqrt();
+        }
+    }
+    let to_edge = |a: Point3<f64>, b: Point3<f64>| {
+        let ab = b - a;
+        let t = ((p - a).dot(&ab) / ab.norm_squared().max(1e-300)).clamp(0.0, 1.0);
+        (p - (a + ab * t)).norm()
+    };
+    to_edge(a, b).min(to_edge(b, c)).min(to_edge(c, a))
+}
+
+fn small() -> SurveyOptions {
+    SurveyOptions {
+        views: 64,
+        width: 48,
+        height: 36,
+        ..SurveyOptions::default()
+    }
+}
+
+fn on_threads<T: Send>(threads: usize, work: impl FnOnce() -> T + Send) -> T {
+    let pool = rayon::ThreadPoolBuilder::new().num_threads(threads).build();
+    pool.unwrap().install(work)
+}
+
+#[test]
+fn a_survey_is_the_same_on_any_number_of_threads_and_lies_on_the_surfaces() {
+    let house = room().placed(pose());
+    let survey = on_threads(1, || Survey::new(&house, &small(), 3).unwrap());
+    assert!(on_threads(4, || Survey::new(&house, &small(), 3).unwrap()) == survey);
+    assert!(Survey::new(&house, &small(), 4).unwrap() != survey);
+    assert_eq!(survey.sensors_m.len(), 64);
+    let house_from_map = pose().inverse();
+    let mut near = 0;
+    let mut right = 0;
+    let sample: Vec<usize> = (0..survey.cloud.len()).step_by(37).collect();
+    for &i in &sample {
+        let p = house_from_map * Point3::from(survey.cloud.point_m(i));
+        near += usize::from(distance_m(&house, &p, 1.0) < 0.04);
+        let label = house.regions()[usize::from(survey.regions[i])].label;
+        let of_label = house.mesh().labels().iter().zip(house.mesh().corners_m());
+        let of_label = of_label.filter(|(l, _)| **l == label);
+        let to = of_label.map(|(_, t)| {
+            let [a, b, c] = t.map(|p| Point3::from(p.map(f64::from)));
+            to_triangle_m(&p, a, b, c)
+        });
+        right += usize::from(to.fold(f64::INFINITY, f64::min) < 0.1);
+    }
+    assert!(
+        near as f64 > 0.97 * sample.len() as f64,
+        "{near} of {}",
+        sample.len()
+    );
+    assert!(
+        right as f64 > 0.95 * sample.len() as f64,
+        "{right} of {}",
+        sample.len()
+    );
+}
+
+#[test]
+fn the_headset_cloud_lies_where_the_truth_says() {
+    let house = room().placed(pose());
+    for scene in Scene::ALL {
+        for seed in 0..3 {
+            let options = HeadsetOptions {
+                headset_scans: 1 + seed as usize % 2,
+                ..HeadsetOptions::default()
+            };
+            let start = Instant::now();
+            let trial = HeadsetTrial::new(&house, scene, &options, seed).unwrap();
+            let took_ms = start.elapsed().as_millis();
+            let house_from_headset = pose().inverse() * trial.map_from_headset;
+            let mut off_m = Vec::new();
+            for headset_scan in &trial.headset_scans {
+                assert_eq!(headset_scan.points_m.len(), headset_scan.regions.len());
+                for p in headset_scan.points_m.iter().step_by(11) {
+                    off_m.push(distance_m(&house, &(house_from_headset * p), 1.0));
+                }
+            }
+            off_m.sort_by(f64::total_cmp);
+            let within = off_m.partition_point(|d| *d < 0.1) as f64 / off_m.len() as f64;
+            let median_m = off_m[off_m.len() / 2];
+            println!(
+                "{} {seed}: {} points, {within:.3} within 10 cm, median {median_m:.4} m, {} triangles, {took_ms} ms",
+                scene.name(),
+                trial.headset_scans[0].points_m.len(),
+                trial.mesh.len()
+            );
+            assert!(trial.headset_scans[0].points_m.len() > 4000);
+            assert!(within > 0.9, "{within}");
+            assert!((0.002..0.04).contains(&median_m), "{median_m}");
+            let up = trial.map_from_headset.rotation * Vector3::z();
+            assert!(up.angle(&Vector3::z()).to_degrees() <= 0.5 + 1e-6);
+            let object = house.class(scene.object());
+            let of_object = trial.headset_scans[0]
+                .regions
+                .iter()
+                .filter(|r| house.regions().get(usize::from(**r)).map(|r| r.label) == object);
+            assert!(of_object.count() > 200, "{} is not looked at", scene.name());
+        }
+    }
+}
+
+#[test]
+fn trials_depend_on_the_seed_alone() {
+    let house = room();
+    let trial =
+        |seed| HeadsetTrial::new(&house, Scene::Desk, &HeadsetOptions::default(), seed).unwrap();
+    let (a, b, c) = (trial(5), trial(5), trial(6));
+    assert!(a.headset_scans == b.headset_scans);
+    assert_eq!(a.map_from_headset, b.map_from_headset);
+    assert!(a.headset_scans != c.headset_scans);
+}
+
+#[test]
+fn flips_hit_the_share_asked_for_on_the_side_asked_for() {
+    let house = room();
+    let trial = HeadsetTrial::new(&house, Scene::Tv, &HeadsetOptions::default(), 1).unwrap();
+    let seen = &trial.headset_scans[0].regions;
+    let regions = 0..house.regions().len() as u16;
+    let count = |region: u16| seen.iter().filter(|r| **r == region).count();
+    let largest = regions.map(count).max().unwrap() as f64 / seen.len() as f64;
+    for q in [0.0, 0.2, 0.5, 0.8, 1.0] {
+        for seed in 0..40 {
+            let draw = LabelModel::flips(q).draw(&house, &trial, seed).unwrap();
+            assert!(draw == LabelModel::flips(q).draw(&house, &trial, seed).unwrap());
+            let off = (draw.flipped_share - q).abs();
+            assert!(
+                off <= largest / 2.0 + 0.05,
+                "{q} {} of {largest}",
+                draw.flipped_share
+            );
+            assert_eq!(draw.flipped_share, draw.different_share);
+        }
+    }
+    let truth = RegionLabels::truth(&house);
+    let classes = |labels: &RegionLabels| -> Vec<u16> {
+        (0..house.regions().len() as u16)
+            .map(|r| labels.class(r))
+            .collect()
+    };
+    for (side, in_map, in_headset) in [
+        (FlipSide::Map, true, false),
+        (FlipSide::Headset, false, true),
+        (FlipSide::Both, true, true),
+        (FlipSide::Either, true, true),
+    ] {
+        let model = LabelModel {
+            side,
+            ..LabelModel::flips(1.0)
+        };
+        let draw = model.draw(&house, &trial, 9).unwrap();
+        assert_eq!(classes(&draw.map) != classes(&truth), in_map);
+        assert_eq!(classes(&draw.headset) != classes(&truth), in_headset);
+    }
+    let consistent = LabelModel {
+        side: FlipSide::Both,
+        consistent: true,
+        ..LabelModel::flips(1.0)
+    };
+    let draw = consistent.draw(&house, &trial, 2).unwrap();
+    assert_eq!(classes(&draw.map), classes(&draw.headset));
+    assert_eq!(draw.different_share, 0.0);
+    assert!(LabelModel::flips(1.5).draw(&house, &trial, 0).is_err());
+}
+
+#[test]
+fn the_map_of_a_survey_is_relabelled_as_inserting_it_anew_would() {
+    let house = room().placed(pose());
+    let survey = Survey::new(&house, &small(), 1).unwrap();
+    let trial = HeadsetTrial::new(&house, Scene::Dining, &HeadsetOptions::default(), 1).unwrap();
+    let lattice = Lattice::new(LatticeKind::Fcc, 0.05_f64.powi(3)).unwrap();
+    let map = SurveyMap::new(&survey, &lattice).unwrap();
+    let draw = LabelModel::flips(0.6).draw(&house, &trial, 4).unwrap();
+    for labels in [&RegionLabels::truth(&house), &draw.map] {
+        let list = survey.voxels(&lattice, labels).unwrap();
+        assert!(map.cloud(labels) == SemanticCloud::from_voxels(&list));
+    }
+    let noisy = LabelModel {
+        iid: 0.1,
+        ..LabelModel::default()
+    };
+    let noisy = noisy.draw(&house, &trial, 4).unwrap();
+    let cloud = noisy.headset.cloud(
+        &trial.headset_scans[0].points_m,
+        &trial.headset_scans[0].regions,
+        0,
+    );
+    let wrong = trial.headset_scans[0].regions.iter().enumerate();
+    let wrong = wrong.filter(|(i, r)| cloud.label(*i).top() != Some(noisy.headset.class(**r)));
+    let share = wrong.count() as f64 / cloud.len() as f64;
+    // One in ten of the random classes is right by chance.
+    assert!((share - 0.09).abs() < 0.01, "{share}");
+}
+
+#[test]
+fn our_own_house_has_rooms_and_all_four_scenes() {
+    let house = House::own(1).unwrap();
+    assert!(House::own(1).unwrap().mesh() == house.mesh());
+    assert!(House::own(2).unwrap().mesh() != house.mesh());
+    println!(
+        "{} triangles, {} regions",
+        house.mesh().len(),
+        house.regions().len()
+    );
+    for room in [
+        [4.0, 1.5],
+        [9.0, 4.0],
+        [17.0, 4.0],
+        [10.0, 7.2],
+        [3.0, 8.6],
+        [8.0, 9.5],
+        [11.0, 10.4],
+        [18.0, 9.2],
+    ] {
+        let near = |cell: &&[f64; 2]| (cell[0] - room[0]).hypot(cell[1] - room[1]) < 0.7;
+        assert!(
+            house.free.cells_m.iter().any(|cell| near(&cell)),
+            "nowhere to stand at {room:?}"
+        );
+    }
+    let inside = |[x, y]: &[f64; 2]| *x > 0.0 && *x < 20.0 && *y > 0.0 && *y < 12.0;
+    assert!(house.free.cells_m.iter().all(inside));
+    assert!(
+        !house
+            .free
+            .cells_m
+            .iter()
+            .any(|[x, y]| *x > 15.6 && *y > 11.0),
+        "outside"
+    );
+    for scene in Scene::ALL {
+        for seed in 0..4 {
+            let trial = HeadsetTrial::new(&house, scene, &HeadsetOptions::default(), seed).unwrap();
+            let headset_scan = &trial.headset_scans[0];
+            let object = house.class(scene.object());
+            let label = |r: &&u16| house.regions().get(usize::from(**r)).map(|r| r.label);
+            let seen = headset_scan
+                .regions
+                .iter()
+                .filter(|r| label(r) == object)
+                .count();
+            let near = headset_scan
+                .points_m
+                .iter()
+                .step_by(29)
+                .filter(|p| distance_m(&house, &(trial.map_from_headset * **p), 1.0) < 0.1);
+            let share = near.count() as f64 / (headset_scan.points_m.len().div_ceil(29) as f64);
+            println!(
+                "{} {seed}: {} points, {seen} of the object, {share:.3} near",
+                scene.name(),
+                headset_scan.points_m.len()
+            );
+            assert!(seen > 200 && share > 0.9);
+        }
+    }
+}
+
+#[test]
+fn measured_disagreement_is_met_on_average() {
+    let house = room();
+    let trial = HeadsetTrial::new(&house, Scene::Desk, &HeadsetOptions::default(), 1).unwrap();
+    let trials = [trial];
+    let draws = (0..300).map(|seed| LabelModel::draw_measured(&house, &trials, seed).unwrap());
+    let mean = draws.map(|draw| draw.different_share).sum::<f64>() / 300.0;
+    let expected = 1.0 - MEASURED_AGREEMENTS.iter().sum::<f64>() / 8.0;
+    assert!((mean - expected).abs() < 0.05, "{mean} {expected}");
+    let draw = |seed| LabelModel::draw_measured(&house, &trials, seed).unwrap();
+    assert!(draw(7) == draw(7) && draw(7) != draw(8));
+}

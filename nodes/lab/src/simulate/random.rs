@@ -1,0 +1,89 @@
+//! Random streams that depend on nothing but seed, purpose and index.
+
+pub(super) use crate::random::Stream;
+
+/// What a stream is for; streams of different purposes are independent.
+#[derive(Clone, Copy, Debug)]
+#[repr(u64)]
+pub(super) enum Purpose {
+    /// Phases of the loader's vibration.
+    Vibration = 1,
+    /// Errors of the INS.
+    Ins = 2,
+    /// Range noise; one stream per scan. The lasers take `LaserRange + 0`, `+ 1` and `+ 2`.
+    LaserRange = 16,
+    /// Range noise of the 64-beam scanner of surveys; one stream per sweep.
+    SpinRange = 32,
+    /// Where the robot of a house stops.
+    RobotPath = 48,
+    /// Pose and noise of a view of the robot; one stream per view.
+    RobotView = 49,
+    /// Where one stands before an object; one stream per object.
+    HeadsetStand = 50,
+    /// Frame and headset scans of a headset.
+    HeadsetFrame = 51,
+    /// Depth views of a headset; one stream per view.
+    HeadsetView = 52,
+    /// Labels of a headset scan; one stream per headset scan.
+    HeadsetHeadsetScan = 53,
+    /// Which regions are labelled wrongly, and as what.
+    LabelFlips = 54,
+    /// Labels of single points; one stream per block of points.
+    PointFlips = 55,
+    /// Books and clutter of a house.
+    OwnHouse = 56,
+    /// Where a laser scanner stands.
+    LaserStand = 57,
+    /// Range noise of a scan of the house; one stream per scan.
+    LaserScan = 58,
+}
+
+impl Stream {
+    /// Stream number `index` (below 2^48) of a purpose; `lane` separates equal devices.
+    pub(super) fn new(seed: u64, purpose: Purpose, lane: u64, index: u64) -> Self {
+        let number = ((purpose as u64).wrapping_add(lane) << 48) | (index & 0xffff_ffff_ffff);
+        Self::numbered(seed, number)
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn normals_have_mean_zero_and_variance_one() {
+        let mut stream = Stream::new(7, Purpose::Ins, 0, 0);
+        let n = 100_000;
+        let (mut sum, mut squares) = (0.0, 0.0);
+        for _ in 0..n {
+            let value = stream.normal();
+            sum += value;
+            squares += value * value;
+        }
+        assert!((sum / n as f64).abs() < 0.015, "mean {}", sum / n as f64);
+        assert!(
+            (squares / n as f64 - 1.0).abs() < 0.02,
+            "variance {}",
+            squares / n as f64
+        );
+    }
+
+    #[test]
+    fn streams_differ_by_seed_purpose_lane_and_index() {
+        let first = |seed, purpose, lane, index| Stream::new(seed, purpose, lane, index).uniform();
+        let values = [
+            first(1, Purpose::Ins, 0, 0),
+            first(2, Purpose::Ins, 0, 0),
+            first(1, Purpose::Vibration, 0, 0),
+            first(1, Purpose::LaserRange, 0, 0),
+            first(1, Purpose::LaserRange, 1, 0),
+            first(1, Purpose::LaserRange, 1, 1),
+        ];
+        for (i, a) in values.iter().enumerate() {
+            for b in &values[i + 1..] {
+                assert_ne!(a, b);
+            }
+        }
+        assert_eq!(first(1, Purpose::Ins, 0, 0), values[0]);
+    }
+}

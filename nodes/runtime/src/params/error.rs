@@ -1,0 +1,91 @@
+use super::value::ValueError;
+use crate::params_file::ScanError;
+use std::path::PathBuf;
+use thiserror::Error;
+
+/// Why parameters are refused.
+#[derive(Debug, Error)]
+pub enum ParamError {
+    /// The file cannot be read.
+    #[error("parameter file {path:?}: {source}")]
+    Read {
+        /// The file.
+        path: PathBuf,
+        /// What the system says.
+        source: std::io::Error,
+    },
+    /// The file is larger than any parameter file should be.
+    #[error("parameter file {path:?} is larger than {bytes_max} bytes")]
+    TooLarge {
+        /// The file.
+        path: PathBuf,
+        /// The limit, bytes.
+        bytes_max: u64,
+    },
+    /// The file is no YAML, or has a key twice.
+    #[error("parameter file {path:?}: {message}")]
+    Yaml {
+        /// The file.
+        path: PathBuf,
+        /// What the YAML reader says, with line and column.
+        message: String,
+    },
+    /// The file has an anchor, an alias, or too deep nesting.
+    #[error("parameter file {path:?}, {source}")]
+    Scan {
+        /// The file.
+        path: PathBuf,
+        /// What it has, and where.
+        source: ScanError,
+    },
+    /// The file is YAML of another shape.
+    #[error("parameter file {path:?}, at `{key}`: found {found}, expected {expected}")]
+    Shape {
+        /// The file.
+        path: PathBuf,
+        /// The keys that lead there.
+        key: String,
+        /// What is allowed.
+        expected: &'static str,
+        /// What is there.
+        found: String,
+    },
+    /// The file has a value of no parameter type.
+    #[error("parameter file {path:?}, at `{key}`: {source}")]
+    Value {
+        /// The file.
+        path: PathBuf,
+        /// The keys that lead there.
+        key: String,
+        /// What is wrong with it.
+        source: ValueError,
+    },
+    /// The value has another type than the node asks for.
+    #[error("parameter `{name}` of {node}: expected {expected}, found {found} ({origin})")]
+    Type {
+        /// The node's full name.
+        node: String,
+        /// The parameter.
+        name: String,
+        /// The type the node asks for, and how to write it.
+        expected: &'static str,
+        /// Type and value that were given.
+        found: String,
+        /// Where it was given.
+        origin: String,
+    },
+    /// The value has the right type and cannot be used.
+    #[error("parameter `{name}` of {node} = {value} ({origin}): {problem}")]
+    Invalid {
+        /// The node's full name.
+        node: String,
+        /// The parameter.
+        name: String,
+        /// The value.
+        value: String,
+        /// Where it was given.
+        origin: String,
+        /// What is wrong with it and what would be right.
+        problem: String,
+    },
+}

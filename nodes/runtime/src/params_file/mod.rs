@@ -1,0 +1,203 @@
+//! Parameter files: `node: ros__parameters: name: value`, by the rules of rcl_yaml_param_parser.
+//!
+//! Stricter than rcl in one point: a key given twice is refused and does not override.
+
+mod pattern;
+mod scan;
+
+pub use pattern::NodePattern;
+pub use scan::ScanError;
+pub(crate) use scan::scan;
+
+use crate::params::{ParamError, ParamValue};
+use serde_yaml::{Mapping, Value};
+use std::{collections::HashSet, fs::File, io::Read, path::Path};
+
+/// Longest parameter file, bytes.
+pub const FILE_BYTES_MAX: u64 = 1 << 20;
+/// Most levels of maps above or below `ros__parameters`.
+pub const DEPTH_MAX: usize = 16;
+
+const PARAMETERS: &str = "ros__parameters";
+
+/// One parameter of a file.
+#[derive(Clone, Debug, PartialEq)]
+pub struct FileParam {
+    /// The nodes it is for.
+    pub nodes: NodePattern,
+    /// Its name, levels separated by dots.
+    pub name: String,
+    /// Its value.
+    pub value: ParamValue,
+    /// Where it stands in the file.
+    pub key: String,
+}
+
+/// Reads a parameter file; entries in the order of the file.
+pub fn read(path: &Path) -> Result<Vec<FileParam>, ParamError> {
+    let failed = |source| ParamError::Read {
+        path: path.to_owned(),
+        source,
+    };
+    let mut bytes = Vec::new();
+    let file = File::open(path).map_err(failed)?;
+    let limit = FILE_BYTES_MAX.saturating_add(1);
+    let length = file.take(limit).read_to_end(&mut bytes).map_err(failed)?;
+    if u64::try_from(length).is_ok_and(|length| length >= limit) {
+        return Err(ParamError::TooLarge {
+            path: path.to_owned(),
+            bytes_max: FILE_BYTES_MAX,
+        });
+    }
+    let text = String::from_utf8(bytes).map_err(|error| ParamError::Yaml {
+        path: path.to_owned(),
+        message: error.utf8_error().to_string(),
+    })?;
+    parse(&text, path)
+}
+
+/// Reads the text of a parameter file; `path` is for messages.
+pub fn parse(text: &str, path: &Path) -> Result<Vec<FileParam>, ParamError> {
+    scan(text).map_err(|source| ParamError::Scan {
+        path: path.to_owned(),
+        source,
+    })?;
+    let value: Value = serde_yaml::from_str(text).map_err(|error| ParamError::Yaml {
+        path: path.to_owned(),
+        message: error.to_string(),
+    })?;
+    let mut reader = Reader {
+        path,
+        keys: Vec::new(),
+        params: Vec::new(),
+    };
+    reader.nodes(value, "")?;
+    Ok(reader.params)
+}
+
+/// Walks the file with the keys that lead to where it is.
+struct Reader<'a> {
+    path: &'a Path,
+    keys: Vec<String>,
+    params: Vec<FileParam>,
+}
+
+impl Reader<'_> {
+    /// A map of nodes and namespaces below `prefix`.
+    fn nodes(&mut self, value: Value, prefix: &str) -> Result<(), ParamError> {
+        const EXPECTED: &str = "a map of nodes, each with `ros__parameters` below it";
+        let map = match value {
+            Value::Null if prefix.is_empty() => return Ok(()),
+            value => self.map(value, EXPECTED)?,
+        };
+        for (key, value) in map {
+            let key = self.enter(key)?;
+            if key == PARAMETERS {
+                let nodes = NodePattern::parse(prefix)
+                    .map_err(|problem| self.shape("a node name or pattern", problem.to_owned()))?;
+                let mut names = HashSet::new();
+                match value {
+                    Value::Null => {}
+                    value => self.parameters(value, &nodes, "", &mut names)?,
+                }
+            } else {
+                let slash = if prefix.ends_with('/') || key.starts_with('/') {
+                    ""
+                } else {
+                    "/"
+                };
+                let prefix = format!("{prefix}{slash}{key}");
+                self.nodes(value, &prefix)?;
+            }
+            self.keys.pop();
+        }
+        Ok(())
+    }
+
+    /// A map of parameters and of maps of parameters.
+    fn parameters(
+        &mut self,
+        value: Value,
+        nodes: &NodePattern,
+        prefix: &str,
+        names: &mut HashSet<String>,
+    ) -> Result<(), ParamError> {
+        for (key, value) in self.map(value, "a map of parameters")? {
+            let key = self.enter(key)?;
+            let name = if prefix.is_empty() {
+                key
+            } else {
+                format!("{prefix}.{key}")
+            };
+            if value.is_mapping() {
+                self.parameters(value, nodes, &name, names)?;
+            } else {
+                if !names.insert(name.clone()) {
+                    return Err(self.shape("each parameter once", format!("`{name}` again")));
+                }
+                let value = ParamValue::from_yaml(value).map_err(|source| ParamError::Value {
+                    path: self.path.to_owned(),
+                    key: self.keys.join("."),
+                    source,
+                })?;
+                let key = self.keys.join(".");
+                self.params.push(FileParam {
+                    nodes: nodes.clone(),
+                    name,
+                    value,
+                    key,
+                });
+            }
+            self.keys.pop();
+        }
+        Ok(())
+    }
+
+    fn map(&self, value: Value, expected: &'static str) -> Result<Mapping, ParamError> {
+        match value {
+            Value::Mapping(map) => Ok(map),
+            other => Err(self.shape(expected, found(&other))),
+        }
+    }
+
+    /// Steps below a key, which is a text or counts as one.
+    fn enter(&mut self, key: Value) -> Result<String, ParamError> {
+        let key = match key {
+            Value::String(key) if !key.is_empty() => key,
+            Value::Number(key) => key.to_string(),
+            Value::Bool(key) => key.to_string(),
+            other => return Err(self.shape("a name as the key", found(&other))),
+        };
+        self.keys.push(key.clone());
+        if self.keys.len() > DEPTH_MAX {
+            return Err(self.shape("at most 16 levels", "one more".to_owned()));
+        }
+        Ok(key)
+    }
+
+    fn shape(&self, expected: &'static str, found: String) -> ParamError {
+        let key = self.keys.join(".");
+        ParamError::Shape {
+            path: self.path.to_owned(),
+            key,
+            expected,
+            found,
+        }
+    }
+}
+
+fn found(value: &Value) -> String {
+    match value {
+        Value::Null => "nothing".to_owned(),
+        Value::String(text) if text.is_empty() => "an empty text".to_owned(),
+        Value::Sequence(_) => "a list".to_owned(),
+        Value::Mapping(_) => "a map".to_owned(),
+        Value::Tagged(_) => "a tagged value".to_owned(),
+        Value::Bool(_) => "a bool".to_owned(),
+        Value::Number(_) => "a number".to_owned(),
+        Value::String(_) => "a text".to_owned(),
+    }
+}
+
+#[cfg(test)]
+mod tests;

@@ -1,0 +1,283 @@
+//! Qualities of service of our topics, and their overrides by parameters.
+
+use crate::params::{ParamError, Params};
+
+/// Deepest history a parameter may ask for, samples.
+pub const DEPTH_MAX: usize = 10_000;
+
+/// Whether lost samples are sent again.
+#[derive(Clone, Copy, Debug, PartialEq, Eq, Hash)]
+pub enum Reliability {
+    /// They are not.
+    BestEffort,
+    /// They are.
+    Reliable,
+}
+
+/// Whether readers that join late get the last samples.
+#[derive(Clone, Copy, Debug, PartialEq, Eq, Hash)]
+pub enum Durability {
+    /// They do not.
+    Volatile,
+    /// They do.
+    TransientLocal,
+}
+
+/// The qualities of a topic; history is always "keep the last `depth`".
+#[derive(Clone, Copy, Debug, PartialEq, Eq, Hash)]
+pub struct Qos {
+    /// Whether lost samples are sent again.
+    pub reliability: Reliability,
+    /// Whether readers that join late get the last samples.
+    pub durability: Durability,
+    /// Samples kept, at least 1.
+    pub depth: usize,
+}
+
+impl Qos {
+    /// Clouds of a headset: matches every driver.
+    pub const SENSOR: Qos = Qos::best_effort(5);
+    /// Point clouds, in and between our nodes: line scanners send hundreds of small ones a second, in
+    /// bursts when they waited for a pose.
+    pub const SCANS: Qos = Qos::best_effort(20);
+    /// INS, IMU and GNSS in: 2 s at 100 Hz, for interpolation.
+    pub const INS: Qos = Qos::best_effort(200);
+    /// The map: room for the chunks of a keyframe, at most 60 kB each.
+    pub const MAP: Qos = Qos::latched(500);
+    /// Markers and cell centres: room for all chunks, at most 60 kB each.
+    pub const MARKERS: Qos = Qos::latched(500);
+    /// Small results of which the last one counts: origin, calibration.
+    pub const LATCHED: Qos = Qos::latched(1);
+    /// Changes of the map since a keyframe.
+    pub const DELTAS: Qos = Qos::reliable(100);
+    /// `/tf`, both ends.
+    pub const TF: Qos = Qos::reliable(100);
+    /// `/tf_static`, the publisher: one message with all its transforms.
+    pub const TF_STATIC: Qos = Qos::latched(1);
+    /// `/tf_static`, the listener: the messages of many publishers.
+    pub const TF_STATIC_LISTENER: Qos = Qos::latched(100);
+    /// `/diagnostics`.
+    pub const DIAGNOSTICS: Qos = Qos::reliable(10);
+    /// `/clock`, the reader: matches every player and simulator.
+    pub const CLOCK: Qos = Qos::best_effort(1);
+    /// `/clock`, the player: matches every reader.
+    pub const CLOCK_PLAYER: Qos = Qos::reliable(1);
+    /// `/rosout`.
+    pub const ROSOUT: Qos = Qos::latched(1000);
+    /// Services.
+    pub const SERVICES: Qos = Qos::reliable(10);
+    /// The default of ROS.
+    pub const DEFAULT: Qos = Qos::reliable(10);
+
+    /// Best effort, volatile.
+    pub const fn best_effort(depth: usize) -> Qos {
+        Qos {
+            reliability: Reliability::BestEffort,
+            durability: Durability::Volatile,
+            depth,
+        }
+    }
+
+    /// Reliable, volatile.
+    pub const fn reliable(depth: usize) -> Qos {
+        Qos {
+            reliability: Reliability::Reliable,
+            durability: Durability::Volatile,
+            depth,
+        }
+    }
+
+    /// Reliable, transient local.
+    pub const fn latched(depth: usize) -> Qos {
+        Qos {
+            reliability: Reliability::Reliable,
+            durability: Durability::TransientLocal,
+            depth,
+        }
+    }
+
+    /// Applies `qos.<topic>.reliability`, `.durability` and `.depth`.
+    ///
+    /// The topic is named as the node's code names it (`map`) or by its full name (`/robot/map`),
+    /// which wins.
+    pub fn with_overrides(
+        self,
+        params: &Params,
+        resolved_topic: &str,
+        relative_topic: &str,
+    ) -> Result<Qos, ParamError> {
+        let keys = Keys {
+            params,
+            resolved_topic,
+            relative_topic,
+        };
+        let reliability = keys.choose(
+            "reliability",
+            self.reliability,
+            &[
+                ("best_effort", Reliability::BestEffort),
+                ("reliable", Reliability::Reliable),
+            ],
+        )?;
+        let durability = keys.choose(
+            "durability",
+            self.durability,
+            &[
+                ("volatile", Durability::Volatile),
+                ("transient_local", Durability::TransientLocal),
+            ],
+        )?;
+        Ok(Qos {
+            reliability,
+            durability,
+            depth: keys.depth(self.depth)?,
+        })
+    }
+}
+
+/// The two names of a topic's parameters.
+struct Keys<'a> {
+    params: &'a Params,
+    resolved_topic: &'a str,
+    relative_topic: &'a str,
+}
+
+impl Keys<'_> {
+    /// Reads a quality by the relative name, then by the full name if that is given.
+    fn each<T>(
+        &self,
+        quality: &str,
+        default: T,
+        read: impl Fn(&str, T) -> Result<T, ParamError>,
+    ) -> Result<T, ParamError> {
+        let relative = format!("qos.{}.{quality}", self.relative_topic);
+        let full = format!("qos.{}.{quality}", self.resolved_topic);
+        let value = read(&relative, default)?;
+        if self.params.is_given(&full) {
+            read(&full, value)
+        } else {
+            Ok(value)
+        }
+    }
+
+    fn choose<T: Copy + PartialEq>(
+        &self,
+        quality: &str,
+        default: T,
+        choices: &[(&str, T)],
+    ) -> Result<T, ParamError> {
+        self.each(quality, default, |key, default| {
+            let word = choices
+                .iter()
+                .find(|(_, value)| *value == default)
+                .map_or("", |(w, _)| w);
+            let word = self.params.string(key, word)?;
+            choices
+                .iter()
+                .find(|(choice, _)| *choice == word)
+                .map(|(_, value)| *value)
+                .ok_or_else(|| {
+                    let words: Vec<&str> = choices.iter().map(|(word, _)| *word).collect();
+                    self.params
+                        .invalid(key, format!("expected {}", words.join(" or ")))
+                })
+        })
+    }
+
+    fn depth(&self, default: usize) -> Result<usize, ParamError> {
+        self.each("depth", default, |key, default| {
+            let depth = self
+                .params
+                .i64(key, i64::try_from(default).unwrap_or(i64::MAX))?;
+            usize::try_from(depth)
+                .ok()
+                .filter(|depth| (1..=DEPTH_MAX).contains(depth))
+                .ok_or_else(|| {
+                    self.params
+                        .invalid(key, format!("expected a number from 1 to {DEPTH_MAX}"))
+                })
+        })
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::params::ParamValue;
+
+    fn params(values: &[(&str, &str)]) -> Params {
+        let read = |(name, text): &(&str, &str)| {
+            (
+                (*name).to_owned(),
+                ParamValue::from_yaml_text(text).unwrap(),
+            )
+        };
+        Params::from_values("/robot/mapper", values.iter().map(read))
+    }
+
+    fn map_qos(values: &[(&str, &str)]) -> Result<Qos, ParamError> {
+        Qos::MAP.with_overrides(&params(values), "/robot/map", "map")
+    }
+
+    #[test]
+    fn nothing_given_changes_nothing() {
+        for qos in [Qos::SCANS, Qos::MAP, Qos::TF_STATIC, Qos::CLOCK] {
+            assert_eq!(
+                qos.with_overrides(&params(&[]), "/robot/map", "map")
+                    .unwrap(),
+                qos
+            );
+        }
+    }
+
+    #[test]
+    fn both_names_count_and_the_full_one_wins() {
+        let relative = ("qos.map.depth", "7");
+        let full = ("qos./robot/map.depth", "8");
+        assert_eq!(map_qos(&[relative]).unwrap().depth, 7);
+        assert_eq!(map_qos(&[full]).unwrap().depth, 8);
+        assert_eq!(map_qos(&[relative, full]).unwrap().depth, 8);
+        let qos = map_qos(&[
+            ("qos.map.reliability", "best_effort"),
+            ("qos.map.durability", "volatile"),
+        ]);
+        assert_eq!(qos.unwrap(), Qos::best_effort(Qos::MAP.depth));
+    }
+
+    #[test]
+    fn overrides_are_declared_and_so_not_unused() {
+        let params = params(&[
+            ("qos.map.depth", "7"),
+            ("qos./robot/map.depth", "8"),
+            ("qos.mop.depth", "9"),
+        ]);
+        let _ = Qos::MAP
+            .with_overrides(&params, "/robot/map", "map")
+            .unwrap();
+        assert_eq!(params.unused(), ["qos.mop.depth"]);
+        assert_eq!(params.declared().len(), 4);
+    }
+
+    #[test]
+    fn wrong_values_say_what_is_expected() {
+        for (name, value, part) in [
+            ("qos.map.reliability", "maybe", "best_effort or reliable"),
+            (
+                "qos./robot/map.durability",
+                "latched",
+                "volatile or transient_local",
+            ),
+            ("qos.map.depth", "0", "1 to 10000"),
+            ("qos.map.depth", "-1", "1 to 10000"),
+            ("qos.map.depth", "10001", "1 to 10000"),
+            ("qos.map.depth", "many", "an integer"),
+            ("qos.map.reliability", "1", "a text"),
+        ] {
+            let error = map_qos(&[(name, value)]).unwrap_err().to_string();
+            assert!(
+                error.contains(part) && error.contains(name),
+                "{name}: {error}"
+            );
+        }
+    }
+}

@@ -1,7 +1,0 @@
-//! The `lattice` command: see `lattice --help`.
-
-use std::process::ExitCode;
-
-fn main() -> ExitCode {
-    lattice_nodes::cli::main()
-}

@@ -1,0 +1,93 @@
+//! Executables: the table of nodes, a runtime for one or several of them, an orderly end.
+
+use std::process::ExitCode;
+
+use crate::start::{Finish, NodeError, Start};
+use crate::{enu_transformer, lattice_mapper, semantic_icp_server, voxel_marker_publisher};
+use lattice_runtime::Runtime;
+use lattice_runtime::logging;
+use lattice_runtime::ros_args::RosArgs;
+
+/// Every node that can share a process, in the order in which data flows.
+pub const NODES: [(&str, Start); 4] = [
+    ("enu_transformer", enu_transformer::node::start),
+    ("lattice_mapper", lattice_mapper::node::start),
+    (
+        "voxel_marker_publisher",
+        voxel_marker_publisher::node::start,
+    ),
+    ("semantic_icp_server", semantic_icp_server::node::start),
+];
+
+/// Finds the node of an executable name.
+pub fn find(name: &str) -> Option<Start> {
+    let found = NODES.iter().find(|(node, _)| *node == name);
+    found.map(|(_, start)| *start)
+}
+
+/// Runs one node until it is told to stop. `arguments` are those of the command line.
+pub fn run(
+    name: &str,
+    start: Start,
+    arguments: impl IntoIterator<Item = String>,
+) -> Result<(), NodeError> {
+    let args = RosArgs::parse(arguments)?;
+    if answers_help(name, &args) {
+        return Ok(());
+    }
+    let name = args.node_name(name);
+    let runtime = start_runtime(&name, args)?;
+    let finish = start(&runtime, &name)?;
+    run_until_told(&runtime, vec![finish])
+}
+
+/// Prints how an executable is used if its arguments ask for it.
+pub fn answers_help(name: &str, args: &RosArgs) -> bool {
+    let asked = args
+        .user_args
+        .iter()
+        .any(|arg| arg == "--help" || arg == "-h");
+    if asked {
+        println!(
+            "Usage: {name} [--ros-args [-r FROM:=TO] [-p NAME:=VALUE] [--params-file FILE] \
+             [--log-level LEVEL] ...]\n\n\
+             Topics and services are in README.md; every parameter, with its unit and meaning, is in\n\
+             params/bobcat.yaml and params/semantic_icp.yaml.\n\n\
+             Environment: ROS_DOMAIN_ID, ROS_AUTOMATIC_DISCOVERY_RANGE (LOCALHOST or SUBNET), RUST_LOG."
+        );
+    }
+    asked
+}
+
+/// Log lines as ROS users know them, and a runtime.
+pub fn start_runtime(name: &str, args: RosArgs) -> Result<Runtime, NodeError> {
+    if let Err(error) = logging::init(&args, name) {
+        eprintln!("{name}: another logger is in place: {error}");
+    }
+    // The first is the program where a caller passes it along.
+    for unknown in args.user_args.iter().filter(|arg| arg.starts_with('-')) {
+        log::warn!("argument '{unknown}' has no meaning here; ROS arguments follow --ros-args");
+    }
+    Ok(Runtime::start(name, args)?)
+}
+
+/// Waits until told to end, lets each node work off its inbox and publish the rest, and leaves.
+pub fn run_until_told(runtime: &Runtime, running: Vec<Finish>) -> Result<(), NodeError> {
+    runtime.shutdown_handle().wait();
+    // In the order in which data flows, so that each still hears the one before.
+    for finish in running {
+        finish();
+    }
+    Ok(runtime.spin()?)
+}
+
+/// The whole `main` of an executable that is one node.
+pub fn main(name: &str, start: Start) -> ExitCode {
+    match run(name, start, std::env::args().skip(1)) {
+        Ok(()) => ExitCode::SUCCESS,
+        Err(error) => {
+            eprintln!("{name}: {error}");
+            ExitCode::FAILURE
+        }
+    }
+}

@@ -1,0 +1,85 @@
+//! The clouds of one session that a search may use.
+
+use std::collections::VecDeque;
+use std::sync::Arc;
+
+use lattice_core::registration::HeadsetScan;
+
+/// A bounded number of clouds, the newest last.
+pub(super) struct HeadsetScans {
+    kept: VecDeque<Kept>,
+    max: usize,
+    period_ns: i64,
+}
+
+struct Kept {
+    headset_scan: Arc<HeadsetScan>,
+    /// When the first of the clouds came that this one stands for.
+    since_ns: i64,
+    stamp_ns: i64,
+}
+
+impl HeadsetScans {
+    pub fn new(max: usize, period_ns: i64) -> Self {
+        Self {
+            kept: VecDeque::new(),
+            max: max.max(1),
+            period_ns,
+        }
+    }
+
+    /// Adds a cloud; it replaces the newest if that has not been there for the period, and the oldest
+    /// if there are too many. A headset that looks around slowly is seen from several sides.
+    pub fn push(&mut self, headset_scan: Arc<HeadsetScan>, stamp_ns: i64, now_ns: i64) {
+        let mut since_ns = now_ns;
+        if let Some(newest) = self.kept.back()
+            && now_ns.saturating_sub(newest.since_ns) < self.period_ns
+        {
+            since_ns = newest.since_ns;
+            self.kept.pop_back();
+        }
+        self.add(headset_scan, stamp_ns, since_ns);
+    }
+
+    /// Adds a cloud; the oldest goes if there are too many.
+    pub fn add(&mut self, headset_scan: Arc<HeadsetScan>, stamp_ns: i64, since_ns: i64) {
+        if self.kept.len() >= self.max {
+            self.kept.pop_front();
+        }
+        self.kept.push_back(Kept {
+            headset_scan,
+            since_ns,
+            stamp_ns,
+        });
+    }
+
+    pub fn clear(&mut self) {
+        self.kept.clear();
+    }
+
+    /// Drops those.
+    pub fn remove(&mut self, headset_scans: &[Arc<HeadsetScan>]) {
+        let is_one = |kept: &Kept| {
+            headset_scans
+                .iter()
+                .any(|headset_scan| Arc::ptr_eq(headset_scan, &kept.headset_scan))
+        };
+        self.kept.retain(|kept| !is_one(kept));
+    }
+
+    pub fn all(&self) -> Vec<Arc<HeadsetScan>> {
+        self.kept
+            .iter()
+            .map(|kept| Arc::clone(&kept.headset_scan))
+            .collect()
+    }
+
+    pub fn is_empty(&self) -> bool {
+        self.kept.is_empty()
+    }
+
+    /// Stamp of the newest; 0 without any.
+    pub fn stamp_ns(&self) -> i64 {
+        self.kept.back().map_or(0, |kept| kept.stamp_ns)
+    }
+}

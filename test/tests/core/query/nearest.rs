@@ -1,0 +1,155 @@
+//! k nearest occupied cells.
+
+use lattice_core::cloud::Cloud;
+use lattice_core::lattice::{Lattice, LatticeKind, MortonKey};
+use lattice_core::query::{Query, QueryError};
+use lattice_core::voxels::{LabelCount, Payload, VoxelList, VoxelStore};
+use nalgebra::Vector3;
+use proptest::prelude::*;
+
+use super::worlds::{World, any_offset, any_world, cells, ground};
+
+/// Distance and key of the k nearest by looking at all.
+fn nearest_of_all(voxels: &VoxelList, p: &Vector3<f64>, k: usize) -> Vec<(f64, MortonKey)> {
+    let local = p - voxels.datum_m();
+    let distance = |(key, center): (MortonKey, Vector3<f64>)| ((center - local).norm(), key);
+    let mut all: Vec<_> = cells(voxels).into_iter().map(distance).collect();
+    all.sort_by(|a, b| a.0.total_cmp(&b.0).then(a.1.cmp(&b.1)));
+    all.truncate(k);
+    all
+}
+
+fn found(query: &Query<'_, VoxelList>, p: &Vector3<f64>, k: usize) -> Vec<(f64, MortonKey)> {
+    let found = query.nearest(p, k).unwrap();
+    found.iter().map(|n| (n.distance_m, n.key)).collect()
+}
+
+proptest! {
+    #![proptest_config(ProptestConfig::with_cases(400))]
+
+    #[test]
+    fn nearest_are_those_of_brute_force(
+        world in any_world(120),
+        at in prop_oneof![any_offset(3.0), any_offset(40.0), any_offset(1e7)],
+        k in prop_oneof![0_usize..12, Just(usize::MAX)],
+    ) {
+        let voxels = world.voxels();
+        let p = world.datum_m + at;
+        let query = Query::new(&voxels);
+        prop_assert_eq!(found(&query, &p, k), nearest_of_all(&voxels, &p, k));
+        for neighbor in query.nearest(&p, k).unwrap() {
+            prop_assert!(voxels.contains(neighbor.key));
+            prop_assert_eq!(neighbor.center_m, VoxelStore::center_m(&voxels, neighbor.key));
+        }
+    }
+
+    #[test]
+    fn a_bound_only_cuts_the_list(
+        world in any_world(80),
+        at in any_offset(4.0),
+        max_m in 0.0..6.0_f64,
+    ) {
+        let voxels = world.voxels();
+        let query = Query::new(&voxels);
+        let p = world.datum_m + at;
+        let all = query.nearest(&p, 20).unwrap();
+        let bounded = query.nearest_within(&p, 20, max_m).unwrap();
+        let expected: Vec<_> = all.into_iter().filter(|n| n.distance_m <= max_m).collect();
+        prop_assert_eq!(bounded, expected);
+    }
+}
+
+/// Probing and the octree of a large store agree with brute force, whichever comes first.
+#[test]
+fn near_and_far_questions_of_a_large_store_are_exact() {
+    for kind in LatticeKind::ALL {
+        for datum in [Vector3::zeros(), Vector3::new(4.4e5, -5.5e6, 120.0)] {
+            let voxels = ground(kind, datum);
+            assert!(voxels.len() > 6000, "{}", voxels.len());
+            let points: Vec<_> = (0..60)
+                .map(|i| {
+                    let t = f64::from(i);
+                    let spread = if i % 10 == 9 { 400.0 } else { 14.0 };
+                    let z = 3.0 * (0.77 * t).cos();
+                    datum + Vector3::new((1.3 * t).sin() * spread, (2.1 * t).cos() * spread, z)
+                })
+                .collect();
+            // The first query probes until a far point comes, the second has sorted before.
+            let (fresh, warm) = (Query::new(&voxels), Query::new(&voxels));
+            warm.nearest(&(datum + Vector3::x() * 1e5), 1).unwrap();
+            for p in &points {
+                let expected = nearest_of_all(&voxels, p, 5);
+                assert_eq!(found(&fresh, p, 5), expected, "{kind} {p}");
+                assert_eq!(found(&warm, p, 5), expected, "{kind} {p}");
+            }
+        }
+    }
+}
+
+#[test]
+fn equal_distances_go_to_the_lower_key() {
+    let offsets =
+        (0..27).map(|i| Vector3::from([i % 3 - 1, i / 3 % 3 - 1, i / 9 - 1].map(f64::from)));
+    let voxels = World {
+        kind: LatticeKind::Cubic,
+        cell_volume_m3: 1.0,
+        datum_m: Vector3::zeros(),
+        offsets_m: offsets.filter(|o| *o != Vector3::zeros()).collect(),
+    }
+    .voxels();
+    let neighbors = Query::new(&voxels).nearest(&Vector3::zeros(), 4).unwrap();
+    assert!(neighbors.iter().all(|n| n.distance_m == 1.0));
+    assert!(neighbors.is_sorted_by_key(|n| n.key));
+    let lowest = [[-1, 0, 0], [0, -1, 0], [0, 0, -1]].map(|w| MortonKey::pack(w).unwrap());
+    assert!(neighbors.iter().filter(|n| lowest.contains(&n.key)).count() == 3);
+}
+
+#[test]
+fn senseless_questions_are_refused() {
+    let lattice = Lattice::new(LatticeKind::Bcc, 0.125).unwrap();
+    let mut voxels = VoxelList::new(lattice, Vector3::zeros(), 10).unwrap();
+    for filled in [false, true] {
+        if filled {
+            let points = [Vector3::zeros()];
+            voxels.insert(&lattice_core::cloud::Cloud::from_points(
+                0, points[0], &points,
+            ));
+        }
+        let query = Query::new(&voxels);
+        for bad in [f64::NAN, f64::INFINITY, f64::NEG_INFINITY, 1e300, -1e13] {
+            let error = query.nearest(&Vector3::new(0.0, bad, 0.0), 1).unwrap_err();
+            assert!(matches!(error, QueryError::Point(_)));
+            assert_eq!(query.occupied(&Vector3::new(bad, 0.0, 0.0)), None);
+        }
+        for bad in [f64::NAN, -1e-9] {
+            let error = query.nearest_within(&Vector3::zeros(), 1, bad);
+            assert!(matches!(error, Err(QueryError::Distance(_))));
+        }
+        let far = Vector3::new(1e12, -1e12, 1e12);
+        let found = query.nearest(&far, 3).unwrap();
+        assert_eq!(found.len(), usize::from(filled));
+        assert_eq!(query.nearest(&far, 0).unwrap(), []);
+        assert_eq!(query.occupied(&Vector3::zeros()).is_some(), filled);
+    }
+}
+
+#[test]
+fn the_label_of_a_cell_is_the_most_frequent_one() {
+    let lattice = Lattice::new(LatticeKind::Fcc, 1.0).unwrap();
+    let list = VoxelList::new(lattice, Vector3::zeros(), 10).unwrap();
+    let mut list = list.with_payload(Payload {
+        labels: true,
+        ..Payload::default()
+    });
+    let cloud = Cloud {
+        stamp_ns: 0,
+        datum_m: Vector3::zeros(),
+        offsets_m: vec![[0.0, 0.1, 0.0]; 5],
+    };
+    list.insert_labelled(&cloud, &[9, 4, 9, 4, 70]);
+    let query = Query::new(&list);
+    let (label, count) = (4, 2);
+    let key = query.occupied(&Vector3::zeros()).unwrap();
+    assert_eq!(query.label(key), Some(LabelCount { label, count }));
+    assert_eq!(query.label(MortonKey::pack([5; 3]).unwrap()), None);
+}

@@ -1,0 +1,150 @@
+//! Clearing voxels along rays: what is passed through goes, what the scan sees stays.
+
+use std::collections::BTreeSet;
+
+use lattice_core::cloud::Cloud;
+use lattice_core::lattice::{Lattice, LatticeKind, MortonKey};
+use lattice_core::raycast::{ClearOptions, RayClearer, Traversal, clear_rays};
+use lattice_core::voxels::{VoxelList, VoxelStore};
+use nalgebra::Vector3;
+use proptest::prelude::*;
+
+const DATUM_M: [f64; 3] = [4e5, -3e5, 200.0];
+
+fn at(offset: [f64; 3]) -> Vector3<f64> {
+    Vector3::from(DATUM_M) + Vector3::from(offset)
+}
+
+fn cloud(offsets_m: Vec<[f32; 3]>) -> Cloud {
+    Cloud {
+        stamp_ns: 0,
+        datum_m: Vector3::from(DATUM_M),
+        offsets_m,
+    }
+}
+
+fn list(kind: LatticeKind, points: &[[f32; 3]]) -> VoxelList {
+    let lattice = Lattice::new(kind, 0.027).unwrap();
+    let mut list = VoxelList::new(lattice, at([0.3, 0.2, 0.1]), usize::MAX).unwrap();
+    list.insert(&cloud(points.to_vec()));
+    list
+}
+
+fn any_points(n: usize) -> impl Strategy<Value = Vec<[f32; 3]>> {
+    prop::collection::vec(prop::array::uniform3(-3.0..3.0_f32), 0..n)
+}
+
+proptest! {
+    #![proptest_config(ProptestConfig::with_cases(60))]
+
+    #[test]
+    fn what_is_removed_is_what_rays_cross_away_from_hits(
+        kind in prop::sample::select(&LatticeKind::ALL[..]),
+        (stored, mut scan) in (any_points(800), any_points(40)),
+    ) {
+        let mut store = list(kind, &stored);
+        let (lattice, datum_m) = (store.lattice().clone(), store.datum_m());
+        let before: BTreeSet<MortonKey> = store.sorted_keys().into_iter().collect();
+        let from = at([0.1, 0.0, 0.2]) - datum_m;
+        let ends: BTreeSet<MortonKey> = cloud(scan.clone())
+            .points_m()
+            .map(|p| store.key_of(&p).unwrap())
+            .collect();
+        let touches = |key: &MortonKey| {
+            let w = key.unpack();
+            let mut around = lattice.touching_neighbors().iter().chain(&[[0; 3]]);
+            around.any(|n| {
+                let key = MortonKey::pack([w[0] + n[0], w[1] + n[1], w[2] + n[2]]).unwrap();
+                ends.contains(&key)
+            })
+        };
+        let traversal = Traversal::new(&lattice);
+        let mut expected = BTreeSet::new();
+        for end in &ends {
+            let cells = traversal.cells(&from, &lattice.center(end.unpack())).unwrap();
+            expected.extend(cells.into_iter().map(|w| MortonKey::pack(w).unwrap()));
+        }
+        expected.retain(|key| before.contains(key) && !touches(key));
+        let mut again = list(kind, &stored);
+        let report = clear_rays(&mut store, at([0.1, 0.0, 0.2]), &cloud(scan.clone()), 0.0);
+        prop_assert_eq!(&report.removed, &expected.iter().copied().collect::<Vec<_>>());
+        prop_assert_eq!(report.missed as usize, expected.len());
+        let left: Vec<MortonKey> = before.difference(&expected).copied().collect();
+        prop_assert_eq!(store.sorted_keys(), left);
+        scan.reverse();
+        prop_assert_eq!(report, clear_rays(&mut again, at([0.1, 0.0, 0.2]), &cloud(scan), 0.0));
+    }
+}
+
+/// Flat ground seen from 1.5 m above, out to 15 m where rays graze it; a post on it is gone.
+#[test]
+fn ground_at_a_flat_angle_does_not_clear_itself() {
+    for kind in LatticeKind::ALL {
+        let ground: Vec<[f32; 3]> = (0..40_000)
+            .map(|i| [(i % 200) as f32 * 0.075, (i / 200) as f32 * 0.05 - 5.0, 0.0])
+            .collect();
+        let post: Vec<[f32; 3]> = (8..30).map(|i| [5.0, 0.0, i as f32 * 0.05]).collect();
+        let mut store = list(kind, &ground);
+        let on_ground = store.sorted_keys();
+        store.insert(&cloud(post.clone()));
+        let posts = store.len() - on_ground.len();
+        assert!(posts >= 3, "{kind}");
+        // Two ways, three scans needed.
+        let options = ClearOptions {
+            misses: 3,
+            ..ClearOptions::default()
+        };
+        let mut clearer = RayClearer::new(&store.lattice().clone(), options);
+        for scan in 1..=3 {
+            let report = clearer.clear(&mut store, at([0.0, 0.0, 1.5]), &cloud(ground.clone()));
+            assert!(report.missed > 0, "{kind}");
+            assert_eq!(report.removed.is_empty(), scan < 3, "{kind}");
+        }
+        assert!(on_ground.iter().all(|key| store.contains(*key)), "{kind}");
+        // All of the post that is not next to the ground and that rays to the ground cross.
+        assert!(store.len() < on_ground.len() + posts, "{kind}");
+    }
+}
+
+#[test]
+fn a_hit_between_starts_the_count_of_misses_anew() {
+    let near = vec![[2.0, 0.0, 0.0]];
+    let far = cloud(vec![[6.0, 0.0, 0.0]]);
+    let mut store = list(LatticeKind::Fcc, &near);
+    // The ray goes to a lattice point, so that the voxel has to be where it passes.
+    let key = store.sorted_keys()[0];
+    let through = store.center_m(key) - at([0.0; 3]);
+    let origin = at([0.0; 3]) - through.normalize() * 1.0;
+    let ahead = Cloud {
+        datum_m: store.center_m(key) + through.normalize() * 4.0,
+        ..cloud(vec![[0.0; 3]])
+    };
+    let options = ClearOptions {
+        misses: 2,
+        ..ClearOptions::default()
+    };
+    let mut clearer = RayClearer::new(&store.lattice().clone(), options);
+    let mut clear = |scan: &Cloud| clearer.clear(&mut store, origin, scan);
+    assert_eq!((clear(&ahead).missed, clear(&cloud(near)).missed), (1, 0));
+    assert!(clear(&ahead).removed.is_empty());
+    assert_eq!(clear(&ahead).removed, [key]);
+    assert!(store.is_empty());
+    let mut other = list(LatticeKind::Bcc, &[[2.0, 0.0, 0.0]]);
+    let report = clearer.clear(&mut other, origin, &far);
+    assert_eq!((report.removed.len(), other.len()), (0, 1));
+}
+
+#[test]
+fn the_last_part_of_a_ray_clears_nothing() {
+    for (keep_m, removed) in [(0.0, 1), (1.5, 1), (2.5, 0), (1e9, 0)] {
+        let mut store = list(LatticeKind::Cubic, &[[4.0, 0.0, 0.0]]);
+        let center = store.center_m(store.sorted_keys()[0]);
+        let scan = Cloud {
+            datum_m: center + Vector3::x() * 2.1,
+            ..cloud(vec![[0.0; 3]])
+        };
+        let origin = center - Vector3::x() * 4.0;
+        let report = clear_rays(&mut store, origin, &scan, keep_m);
+        assert_eq!(report.removed.len(), removed, "{keep_m}");
+    }
+}

@@ -1,0 +1,377 @@
+//! Free space: the same as from the cells of each ray one by one, in any order of the points.
+
+use std::collections::{BTreeMap, BTreeSet};
+
+use lattice_core::cloud::Cloud;
+use lattice_core::lattice::{Lattice, LatticeIndex, LatticeKind, MortonKey};
+use lattice_core::raycast::{
+    CellState, Evidence, FreeSpaceMap, FreeSpaceOptions, MIN_MAP_BYTES, ScanReport, Traversal,
+};
+use nalgebra::{Matrix3, UnitQuaternion, Vector3};
+use proptest::prelude::*;
+
+const DATUM_M: [f64; 3] = [4e5, -3e5, 200.0];
+
+fn any_kind() -> impl Strategy<Value = LatticeKind> {
+    prop::sample::select(&LatticeKind::ALL[..])
+}
+
+/// Origins and offsets from the datum, some in one cell, some that are no points.
+fn any_scans() -> impl Strategy<Value = Vec<([f64; 3], Vec<[f32; 3]>)>> {
+    let coordinate = prop_oneof![
+        40 => -4.0..4.0_f32,
+        20 => (-8..8_i32).prop_map(|i| i as f32 * 0.5),
+        1 => prop::sample::select(vec![f32::NAN, f32::INFINITY, 1e7]),
+    ];
+    let points = prop::collection::vec(prop::array::uniform3(coordinate), 0..40);
+    let scan = (prop::array::uniform3(-1.0..1.0_f64), points);
+    prop::collection::vec(scan, 1..5)
+}
+
+fn origin(offset: [f64; 3]) -> Vector3<f64> {
+    Vector3::from(DATUM_M) + Vector3::from(offset)
+}
+
+fn cloud(offsets_m: Vec<[f32; 3]>) -> Cloud {
+    Cloud {
+        stamp_ns: 0,
+        datum_m: Vector3::from(DATUM_M),
+        offsets_m,
+    }
+}
+
+fn map(kind: LatticeKind, options: FreeSpaceOptions) -> FreeSpaceMap {
+    map_of(Lattice::new(kind, 0.027).unwrap(), options)
+}
+
+/// As printed, turned, and of a basis that has no name.
+fn any_lattice() -> impl Strategy<Value = Lattice> {
+    let skew = Matrix3::new(0.3, 0.1, 0.0, 0.0, 0.25, 0.1, 0.1, 0.0, 0.35);
+    let mut lattices = vec![Lattice::from_basis(skew).unwrap()];
+    lattices.extend(LatticeKind::ALL.map(|kind| Lattice::new(kind, 0.027).unwrap()));
+    let turn = UnitQuaternion::from_euler_angles(0.5, -0.3, 1.1);
+    let turned: Vec<_> = lattices.iter().map(|l| l.clone().oriented(turn)).collect();
+    lattices.extend(turned);
+    prop::sample::select(lattices)
+}
+
+fn map_of(lattice: Lattice, options: FreeSpaceOptions) -> FreeSpaceMap {
+    FreeSpaceMap::new(lattice, origin([0.3, 0.2, 0.1]), options).unwrap()
+}
+
+/// The log-odds in 32nds by sets of cells.
+#[derive(Default)]
+struct Reference {
+    cells: BTreeMap<LatticeIndex, i32>,
+}
+
+impl Reference {
+    fn insert(&mut self, map: &FreeSpaceMap, origin_m: Vector3<f64>, scan: &Cloud) -> ScanReport {
+        let traversal = Traversal::new(map.lattice());
+        let from = origin_m - map.datum_m();
+        let mut report = ScanReport {
+            points: scan.len() as u64,
+            ..ScanReport::default()
+        };
+        let mut ends = BTreeSet::new();
+        for p in scan.points_m() {
+            match map.key_of(&p) {
+                Some(key) => drop(ends.insert(key.unpack())),
+                None if p.iter().all(|x| x.is_finite()) => report.out_of_range += 1,
+                None => report.not_finite += 1,
+            }
+        }
+        let mut passed = BTreeSet::new();
+        for end in &ends {
+            let to = map.lattice().center(*end);
+            let cells = traversal.cells(&from, &to).unwrap();
+            report.visits += cells.len() as u64 - 1;
+            passed.extend(cells);
+        }
+        report.hits = ends.len() as u64;
+        report.rays = report.hits;
+        report.misses = passed.difference(&ends).count() as u64;
+        for w in passed.union(&ends) {
+            let value = self.cells.entry(*w).or_default();
+            let step = if ends.contains(w) { 27 } else { -13 };
+            *value = (*value + step).clamp(-64, 112);
+        }
+        report
+    }
+}
+
+/// All that can be told about a map.
+fn contents(map: &FreeSpaceMap) -> Vec<(MortonKey, CellState, Option<f64>)> {
+    let mut keys = map.occupied_keys();
+    keys.extend(map.free_keys());
+    keys.sort_unstable();
+    let told = |key| (key, map.state(key), map.log_odds(key));
+    keys.into_iter().map(told).collect()
+}
+
+proptest! {
+    #![proptest_config(ProptestConfig::with_cases(60))]
+
+    #[test]
+    fn a_map_is_what_its_rays_say_one_by_one(kind in any_kind(), scans in any_scans()) {
+        let mut map = map(kind, FreeSpaceOptions::default());
+        let mut reference = Reference::default();
+        for (offset, points) in scans {
+            let (origin_m, scan) = (origin(offset), cloud(points));
+            let report = map.insert_scan(origin_m, &scan);
+            prop_assert_eq!(report, reference.insert(&map, origin_m, &scan));
+        }
+        let mut counts = (0, 0);
+        for (w, value) in &reference.cells {
+            let key = MortonKey::pack(*w).unwrap();
+            prop_assert_eq!(map.log_odds(key), Some(f64::from(*value) / 32.0));
+            let occupied = *value >= 0;
+            let state = if occupied { CellState::Occupied } else { CellState::Free };
+            prop_assert_eq!(map.state(key), state);
+            *(if occupied { &mut counts.0 } else { &mut counts.1 }) += 1;
+        }
+        let (occupied, free) = (map.occupied_keys(), map.free_keys());
+        prop_assert_eq!((occupied.len(), free.len()), counts);
+        prop_assert!(occupied.is_sorted() && free.is_sorted());
+        let counted = map.counts();
+        prop_assert_eq!((counted.occupied as usize, counted.free as usize), counts);
+        prop_assert_eq!(map.state(MortonKey::pack([900_000; 3]).unwrap()), CellState::Unknown);
+    }
+
+    #[test]
+    fn the_order_of_the_points_does_not_matter(
+        kind in any_kind(),
+        scans in any_scans(),
+        free_level in 0..3_u32,
+        max_range_m in prop::sample::select(vec![2.5, f64::INFINITY]),
+    ) {
+        let options = FreeSpaceOptions { free_level, max_range_m, ..FreeSpaceOptions::default() };
+        let (mut one, mut other) = (map(kind, options), map(kind, options));
+        for (offset, mut points) in scans {
+            let first = one.insert_scan(origin(offset), &cloud(points.clone()));
+            points.reverse();
+            let half = points.len() / 2;
+            points.rotate_left(half);
+            prop_assert_eq!(first, other.insert_scan(origin(offset), &cloud(points)));
+        }
+        prop_assert_eq!(contents(&one), contents(&other));
+        prop_assert!(one.bytes() <= options.max_bytes);
+    }
+
+    /// No point of an occupied cell is in a coarse cell that is called free, and every free coarse
+    /// cell was passed through.
+    #[test]
+    fn coarse_free_cells_hold_nothing_occupied(
+        lattice in any_lattice(),
+        scans in any_scans(),
+        free_level in 1..4_u32,
+        inside in prop::array::uniform3(-0.5..0.5_f64),
+    ) {
+        let mut fine = map_of(lattice.clone(), FreeSpaceOptions::default());
+        let mut coarse = map_of(lattice, FreeSpaceOptions { free_level, ..FreeSpaceOptions::default() });
+        for (offset, points) in scans {
+            let (origin_m, scan) = (origin(offset), cloud(points));
+            let report = fine.insert_scan(origin_m, &scan);
+            prop_assert_eq!(report, coarse.insert_scan(origin_m, &scan));
+        }
+        let lattice = coarse.free_lattice();
+        let home = |p: Vector3<f64>| MortonKey::pack(lattice.quantize(&p).unwrap()).unwrap();
+        // Fine lattice points may lie on the border of coarse cells.
+        let homes = |p: Vector3<f64>| {
+            let near = lattice.quantize(&p).unwrap();
+            let around = lattice.touching_neighbors().iter().chain(&[[0; 3]]);
+            let around = around.map(move |n| [near[0] + n[0], near[1] + n[1], near[2] + n[2]]);
+            let least = (lattice.center(near) - p).norm() + 1e-9;
+            let nearest = around.filter(move |w| (lattice.center(*w) - p).norm() < least);
+            nearest.map(|w| MortonKey::pack(w).unwrap()).collect::<Vec<_>>()
+        };
+        let free: BTreeSet<MortonKey> = coarse.free_keys().into_iter().collect();
+        let occupied = coarse.occupied_keys();
+        prop_assert!(occupied.iter().all(|key| coarse.state(*key) == CellState::Occupied));
+        for key in &occupied {
+            let center = coarse.lattice().center(key.unpack());
+            prop_assert!(homes(center).iter().all(|key| !free.contains(key)));
+            for corner in &coarse.lattice().cell().vertices {
+                prop_assert!(!free.contains(&home(center + corner * 0.999)));
+            }
+            let edge = Vector3::from(inside) * 0.3;
+            if coarse.lattice().quantize(&(center + edge)) == Some(key.unpack()) {
+                prop_assert!(!free.contains(&home(center + edge)));
+            }
+        }
+        let passed: BTreeSet<MortonKey> = fine
+            .free_keys()
+            .into_iter()
+            .chain(fine.occupied_keys())
+            .flat_map(|key| homes(fine.lattice().center(key.unpack())))
+            .collect();
+        prop_assert!(free.is_subset(&passed));
+        for key in fine.free_keys() {
+            let homes = homes(fine.lattice().center(key.unpack()));
+            let known = coarse.log_odds(key).is_some();
+            let told = coarse.state(key) == CellState::Free;
+            prop_assert!(known || homes.iter().any(|home| free.contains(home) == told));
+        }
+    }
+}
+
+/// A wall seen from 4 m, then gone: it is freed, along the rays only.
+#[test]
+fn a_wall_that_goes_away_is_freed() {
+    for kind in LatticeKind::ALL {
+        for free_level in [0, 1, 2] {
+            let options = FreeSpaceOptions {
+                free_level,
+                ..FreeSpaceOptions::default()
+            };
+            let mut map = map(kind, options);
+            let wall = |x: f32| {
+                let grid = (-30..31).flat_map(|i| (-30..31).map(move |k| (i as f32, k as f32)));
+                cloud(grid.map(|(y, z)| [x, y * 0.02 * x, z * 0.02 * x]).collect())
+            };
+            for _ in 0..3 {
+                map.insert_scan(origin([0.0; 3]), &wall(4.0));
+            }
+            let near = map.key_of(&origin([4.0, 0.0, 0.0])).unwrap();
+            let before = map.key_of(&origin([1.0, 0.0, 0.0])).unwrap();
+            let behind = map.key_of(&origin([5.5, 0.0, 0.0])).unwrap();
+            let state = |map: &FreeSpaceMap| [before, near, behind].map(|key| map.state(key));
+            use CellState::{Free, Occupied, Unknown};
+            assert_eq!(
+                state(&map),
+                [Free, Occupied, Unknown],
+                "{kind} {free_level}"
+            );
+            for _ in 0..20 {
+                map.insert_scan(origin([0.0; 3]), &wall(9.0));
+            }
+            assert_eq!(state(&map), [Free, Free, Free], "{kind} {free_level}");
+        }
+    }
+}
+
+#[test]
+fn points_beyond_the_range_free_the_way_there_and_hit_nothing() {
+    for kind in LatticeKind::ALL {
+        let options = FreeSpaceOptions {
+            max_range_m: 5.0,
+            ..FreeSpaceOptions::default()
+        };
+        let mut map = map(kind, options);
+        let report = map.insert_scan(
+            origin([0.0; 3]),
+            &cloud(vec![[80.0, 0.0, 0.0], [3e38, 0.0, 0.0], [0.0, 2.0, 0.0]]),
+        );
+        assert_eq!(
+            (report.beyond_max_range, report.hits, report.rays),
+            (2, 1, 2)
+        );
+        let state = |x| map.state(map.key_of(&origin([x, 0.0, 0.0])).unwrap());
+        assert_eq!(map.occupied_keys().len(), 1);
+        assert_eq!(state(4.3), CellState::Free);
+        assert_eq!(state(5.7), CellState::Unknown);
+    }
+}
+
+#[test]
+fn the_limit_of_memory_holds_and_what_it_refuses_is_counted() {
+    let sphere = |n: u32| -> Vec<[f32; 3]> {
+        (0..n)
+            .map(|i| {
+                let up = 2.0 * (i as f32 + 0.5) / n as f32 - 1.0;
+                let (flat, a) = ((1.0 - up * up).sqrt(), 2.399_963 * i as f32);
+                [30.0 * flat * a.cos(), 30.0 * flat * a.sin(), 30.0 * up]
+            })
+            .collect()
+    };
+    for free_level in [0, 2] {
+        let options = FreeSpaceOptions {
+            free_level,
+            max_bytes: MIN_MAP_BYTES,
+            ..FreeSpaceOptions::default()
+        };
+        let (mut one, mut other) = (
+            map(LatticeKind::Fcc, options),
+            map(LatticeKind::Fcc, options),
+        );
+        let mut points = sphere(3000);
+        let first = one.insert_scan(origin([0.0; 3]), &cloud(points.clone()));
+        assert!(one.bytes() <= MIN_MAP_BYTES, "{}", one.bytes());
+        assert!(first.entries_refused > 0, "{first:?}");
+        points.reverse();
+        let second = other.insert_scan(origin([0.0; 3]), &cloud(points));
+        assert_eq!(first, second);
+        assert_eq!(contents(&one), contents(&other));
+        assert!(!one.free_keys().is_empty());
+        let mut refused = 0;
+        for i in 0..20 {
+            let from = origin([f64::from(i), 0.0, 0.0]);
+            refused += one.insert_scan(from, &cloud(sphere(500))).blocks_refused;
+            assert!(one.bytes() <= MIN_MAP_BYTES, "{}", one.bytes());
+        }
+        assert!(refused > 0);
+    }
+}
+
+#[test]
+fn a_scan_from_nowhere_changes_nothing() {
+    let mut map = map(LatticeKind::Fcc, FreeSpaceOptions::default());
+    let scan = cloud(vec![[1.0, 2.0, 3.0]; 7]);
+    let report = map.insert_scan(Vector3::new(f64::NAN, 0.0, 0.0), &scan);
+    assert_eq!((report.points, report.not_finite), (7, 7));
+    let report = map.insert_scan(Vector3::new(1e9, 0.0, 0.0), &scan);
+    assert_eq!((report.points, report.out_of_range), (7, 7));
+    assert!(contents(&map).is_empty());
+}
+
+#[test]
+fn options_that_cannot_be_are_refused() {
+    let good = FreeSpaceOptions::default();
+    for (bad, expected) in [
+        (
+            FreeSpaceOptions {
+                max_range_m: 0.0,
+                ..good
+            },
+            "max_range_m 0",
+        ),
+        (
+            FreeSpaceOptions {
+                max_range_m: f64::NAN,
+                ..good
+            },
+            "max_range_m NaN",
+        ),
+        (
+            FreeSpaceOptions {
+                free_level: 4,
+                ..good
+            },
+            "free_level 4",
+        ),
+        (
+            FreeSpaceOptions {
+                max_bytes: 1000,
+                ..good
+            },
+            "max_bytes 1000",
+        ),
+        (
+            FreeSpaceOptions {
+                evidence: Evidence {
+                    hit: 0.4,
+                    ..Evidence::default()
+                },
+                ..good
+            },
+            "hit 0.4",
+        ),
+    ] {
+        let lattice = Lattice::new(LatticeKind::Fcc, 1.0).unwrap();
+        let error = FreeSpaceMap::new(lattice, Vector3::zeros(), bad).unwrap_err();
+        assert!(error.to_string().starts_with(expected), "{error}");
+    }
+    let far = Vector3::new(f64::NAN, 0.0, 0.0);
+    let lattice = Lattice::new(LatticeKind::Fcc, 1.0).unwrap();
+    assert!(FreeSpaceMap::new(lattice, far, good).is_err());
+}

@@ -1,0 +1,472 @@
+//! Operations on stores of voxels against sets and maps of the standard library.
+
+use std::collections::{BTreeMap, BTreeSet};
+
+use lattice_core::cloud::Cloud;
+use lattice_core::lattice::{Lattice, LatticeKind, MortonKey};
+use lattice_core::voxels::{
+    LabelCount, MergeError, OFFSET_UNIT_M, OccupancyList, Payload, Region, Stamps, Voxel,
+    VoxelList, VoxelStore, WhenFull,
+};
+use nalgebra::{Matrix3, UnitQuaternion, Vector3};
+use proptest::prelude::*;
+
+type Offsets = Vec<[f32; 3]>;
+
+const DATUM_M: [f64; 3] = [9.0, 20.0, 31.0];
+const ALL_COLUMNS: Payload = Payload {
+    moments: true,
+    stamps: true,
+    labels: true,
+};
+
+/// All named lattices, one turned, one of a basis of its own.
+fn any_lattice() -> impl Strategy<Value = Lattice> {
+    (0..LatticeKind::ALL.len() + 2).prop_map(|number| match LatticeKind::ALL.get(number) {
+        Some(&kind) => Lattice::new(kind, 0.125).unwrap(),
+        None if number == LatticeKind::ALL.len() => Lattice::new(LatticeKind::Fcc, 0.125)
+            .unwrap()
+            .oriented(UnitQuaternion::from_euler_angles(0.3, -0.2, 1.1)),
+        None => {
+            Lattice::from_basis(Matrix3::new(0.5, 0.1, 0.0, 0.0, 0.6, 0.2, 0.1, 0.0, 0.45)).unwrap()
+        }
+    })
+}
+
+/// Points in some dozens of cells of several blocks.
+fn any_offsets() -> impl Strategy<Value = Offsets> {
+    let coordinate = prop_oneof![3 => -2.0..2.0_f32, 1 => -9.0..9.0_f32];
+    prop::collection::vec(prop::array::uniform3(coordinate), 0..120)
+}
+
+fn cloud(stamp_ns: i64, offsets_m: &[[f32; 3]]) -> Cloud {
+    Cloud {
+        stamp_ns,
+        datum_m: Vector3::new(10.0, 20.0, 30.0),
+        offsets_m: offsets_m.to_vec(),
+    }
+}
+
+fn empty(lattice: &Lattice, max_voxels: usize) -> VoxelList {
+    VoxelList::new(lattice.clone(), DATUM_M.into(), max_voxels).unwrap()
+}
+
+fn filled(lattice: &Lattice, offsets: &[[f32; 3]]) -> VoxelList {
+    let mut list = empty(lattice, usize::MAX);
+    list.insert(&cloud(0, offsets));
+    list
+}
+
+/// With all columns; the points of three stamps and labels.
+fn rich(lattice: &Lattice, offsets: &[[f32; 3]]) -> VoxelList {
+    let mut list = empty(lattice, usize::MAX).with_payload(ALL_COLUMNS);
+    for (stamp_ns, part) in offsets.chunks(offsets.len().div_ceil(3).max(1)).enumerate() {
+        let labels: Vec<u16> = (0..part.len() as u16).map(|i| i % 3).collect();
+        list.insert_labelled(&cloud(stamp_ns as i64, part), &labels);
+    }
+    list
+}
+
+fn occupancy(lattice: &Lattice, offsets: &[[f32; 3]]) -> OccupancyList {
+    let mut list = OccupancyList::new(lattice.clone(), DATUM_M.into(), 1 << 20).unwrap();
+    list.insert(&cloud(0, offsets));
+    list
+}
+
+fn keys(store: &dyn VoxelStore) -> BTreeSet<MortonKey> {
+    store.sorted_keys().into_iter().collect()
+}
+
+type Row = (Voxel, Option<Stamps>, Vec<LabelCount>, Option<Matrix3<f64>>);
+
+/// All that is kept of each voxel.
+fn rows(list: &VoxelList) -> BTreeMap<MortonKey, Row> {
+    let row = |(key, voxel)| {
+        let covariance = list.covariance_m2(key);
+        (key, (voxel, list.stamps(key), list.labels(key), covariance))
+    };
+    list.sorted().into_iter().map(row).collect()
+}
+
+/// Keys as a consumer of the changes knows them.
+#[derive(Default)]
+struct Follower(BTreeSet<MortonKey>);
+
+impl Follower {
+    fn follow(&mut self, list: &mut VoxelList) {
+        let changes = list.take_changes();
+        for key in &changes.removed {
+            assert!(self.0.remove(key), "removed what was never there");
+        }
+        self.0.extend(changes.changed);
+        assert_eq!(self.0, keys(list));
+        list.validate().unwrap();
+    }
+}
+
+fn merged(a: &VoxelList, b: &VoxelList) -> VoxelList {
+    let mut sum = a.clone();
+    sum.merge(b).unwrap();
+    sum.validate().unwrap();
+    sum
+}
+
+/// Count, sum of fixed-point positions from the coarse datum, and the points from there.
+type Gathered = (u32, [i64; 3], Vec<Vector3<f64>>);
+
+/// A position in `OFFSET_UNIT_M`.
+fn fixed(metres: Vector3<f64>) -> [i64; 3] {
+    [0, 1, 2].map(|i| (metres[i] / OFFSET_UNIT_M).round_ties_even() as i64)
+}
+
+proptest! {
+    #[test]
+    fn differences_and_intersections_are_those_of_sets(
+        lattice in any_lattice(), a in any_offsets(), b in any_offsets(), occupied in any::<bool>(),
+    ) {
+        let mut follower = Follower::default();
+        let mut whole = rich(&lattice, &a);
+        follower.follow(&mut whole);
+        let other: Box<dyn VoxelStore> = match occupied {
+            true => Box::new(occupancy(&lattice, &b)),
+            false => Box::new(filled(&lattice, &b)),
+        };
+        let (ours, theirs) = (keys(&whole), keys(&*other));
+        let (mut rest, mut both) = (whole.clone(), whole.clone());
+        prop_assert_eq!(rest.subtract(&*other).unwrap(), (&ours & &theirs).len());
+        prop_assert_eq!(both.intersect(&*other).unwrap(), (&ours - &theirs).len());
+        prop_assert_eq!(keys(&rest), &ours - &theirs);
+        prop_assert_eq!(keys(&both), &ours & &theirs);
+        // What stays is as it was, and together they are the whole.
+        let expected = rows(&whole);
+        prop_assert!(rows(&rest).iter().all(|(key, row)| expected.get(key) == Some(row)));
+        prop_assert_eq!(rows(&merged(&rest, &both)), expected);
+        Follower(follower.0.clone()).follow(&mut rest);
+        follower.follow(&mut both);
+
+        let whole = occupancy(&lattice, &a);
+        let (mut rest, mut both) = (whole.clone(), whole.clone());
+        prop_assert_eq!(rest.subtract(&*other).unwrap(), (&ours & &theirs).len());
+        prop_assert_eq!(both.intersect(&*other).unwrap(), (&ours - &theirs).len());
+        prop_assert_eq!(keys(&rest), &ours - &theirs);
+        prop_assert_eq!(keys(&both), &ours & &theirs);
+        rest.validate().unwrap();
+        both.validate().unwrap();
+        // A cell that went can come back although it had just been seen.
+        both.insert(&cloud(0, &a));
+        prop_assert_eq!(keys(&both), ours.clone());
+        prop_assert_eq!(rest.merge(&both).unwrap(), (&ours & &theirs).len());
+        prop_assert_eq!(keys(&rest), ours);
+    }
+
+    #[test]
+    fn merging_is_commutative_and_associative_with_all_columns(
+        lattice in any_lattice(), a in any_offsets(), b in any_offsets(), c in any_offsets(),
+    ) {
+        let lists = [&a, &b, &c].map(|offsets| rich(&lattice, offsets));
+        let [x, y, z] = &lists;
+        let left = merged(&merged(x, y), z);
+        prop_assert_eq!(rows(&left), rows(&merged(x, &merged(z, y))));
+        prop_assert_eq!(left.distortion(), merged(z, &merged(y, x)).distortion());
+
+        let sets = [&a, &b, &c].map(|offsets| occupancy(&lattice, offsets));
+        let union = |order: [usize; 3]| {
+            let mut union = OccupancyList::new(lattice.clone(), DATUM_M.into(), 1 << 20).unwrap();
+            for i in order {
+                let before = union.len();
+                let new = union.merge(&sets[i]).unwrap();
+                assert_eq!(union.len(), before + new);
+            }
+            union.validate().unwrap();
+            keys(&union)
+        };
+        prop_assert_eq!(union([0, 1, 2]), keys(&left));
+        prop_assert_eq!(union([2, 0, 1]), keys(&left));
+        let mut of_list = sets[0].clone();
+        of_list.merge(&merged(y, z)).unwrap();
+        prop_assert_eq!(keys(&of_list), keys(&left));
+    }
+
+    #[test]
+    fn retain_and_decay_are_those_of_a_map(
+        lattice in any_lattice(), offsets in any_offsets(), stamp_ns in -1..4_i64, min_count in 0..5_u32,
+    ) {
+        let list = rich(&lattice, &offsets);
+        let all = rows(&list);
+        let check = |mut list: VoxelList, removed: usize, expected: BTreeMap<MortonKey, Row>| {
+            assert_eq!(rows(&list), expected);
+            assert_eq!(removed, all.len() - expected.len());
+            Follower(all.keys().copied().collect()).follow(&mut list);
+        };
+        let only = |wanted: &dyn Fn(&MortonKey, &Row) -> bool| {
+            let kept = all.clone().into_iter().filter(|(key, row)| wanted(key, row));
+            kept.collect::<BTreeMap<_, _>>()
+        };
+        let start = || { let mut list = list.clone(); list.take_changes(); list };
+
+        let mut kept = start();
+        let removed = kept.retain(|key, voxel| key.raw() % 3 != 0 && voxel.sum[0] > 0);
+        check(kept, removed, only(&|key, (voxel, ..)| key.raw() % 3 != 0 && voxel.sum[0] > 0));
+
+        let mut kept = start();
+        let removed = kept.forget_before(stamp_ns).unwrap();
+        check(kept, removed, only(&|_, (_, stamps, ..)| stamps.unwrap().last_ns >= stamp_ns));
+
+        let mut kept = start();
+        let removed = kept.forget_rare(min_count);
+        check(kept, removed, only(&|_, (voxel, ..)| voxel.count >= min_count));
+    }
+
+    #[test]
+    fn regions_are_those_of_the_centres(
+        lattice in any_lattice(),
+        offsets in any_offsets(),
+        from in prop::array::uniform3(-6.0..4.0_f64),
+        size in prop::array::uniform3(0.0..8.0_f64),
+        ball in any::<bool>(),
+    ) {
+        let from = Vector3::new(10.0, 20.0, 30.0) + Vector3::from(from);
+        let region = match ball {
+            true => Region::ball(from, size[0]),
+            false => Region::cuboid(from, from + Vector3::from(size)),
+        }.unwrap();
+        let mut list = filled(&lattice, &offsets);
+        let mut set = occupancy(&lattice, &offsets);
+        let all = keys(&list);
+        let inside: BTreeSet<MortonKey> = all.iter().copied().filter(|&key| {
+            let center_m = VoxelList::center_m(&list, key);
+            match ball {
+                true => (center_m - from).norm() <= size[0],
+                false => (0..3).all(|i| (from[i]..=from[i] + size[i]).contains(&center_m[i])),
+            }
+        }).collect();
+        let mut cropped = (list.clone(), set.clone());
+        prop_assert_eq!(cropped.0.keep_region(&region), all.len() - inside.len());
+        prop_assert_eq!(cropped.1.keep_region(&region), all.len() - inside.len());
+        prop_assert_eq!(list.remove_region(&region), inside.len());
+        prop_assert_eq!(set.remove_region(&region), inside.len());
+        for (kept, removed) in [(&cropped.0 as &dyn VoxelStore, &list as &dyn VoxelStore), (&cropped.1, &set)] {
+            prop_assert_eq!(keys(kept), inside.clone());
+            prop_assert_eq!(keys(removed), &all - &inside);
+        }
+        prop_assert_eq!(list.validate().and(cropped.0.validate()), Ok(()));
+        prop_assert_eq!(set.validate().and(cropped.1.validate()), Ok(()));
+    }
+
+    #[test]
+    fn coarser_maps_hold_the_same_points(
+        lattice in any_lattice(), offsets in any_offsets(), level in 0..4_u32, moved in -9..9_i32,
+    ) {
+        let datum_m = Vector3::from(DATUM_M).add_scalar(f64::from(moved) * 0.7);
+        let fill = |list: VoxelList| {
+            let mut list = list.with_payload(ALL_COLUMNS);
+            list.insert_labelled(&cloud(7, &offsets), &vec![3; offsets.len()]);
+            list
+        };
+        let fine = fill(VoxelList::new(lattice.clone(), datum_m, 1000).unwrap());
+        let coarse = fine.coarser(level).unwrap();
+        coarse.validate().unwrap();
+        let sides = f64::from(1_u32 << level);
+        prop_assert_eq!(coarse.lattice().generator(), lattice.generator() * sides);
+        prop_assert_eq!(coarse.datum_index(), fine.datum_index().map(|i| i >> level));
+        prop_assert_eq!(coarse.distortion().points, fine.distortion().points);
+        let rest = [0, 1, 2].map(|i| (fine.datum_index()[i] - (coarse.datum_index()[i] << level)) as i32);
+        let shift_m = lattice.center(rest);
+
+        let mut expected: BTreeMap<MortonKey, Gathered> = BTreeMap::new();
+        let mut points: BTreeMap<MortonKey, Vec<Vector3<f64>>> = BTreeMap::new();
+        for p in cloud(0, &offsets).points_m() {
+            points.entry(fine.key_of(&p).unwrap()).or_default().push(p - coarse.datum_m());
+        }
+        for (key, voxel) in fine.sorted() {
+            let center_m = lattice.center(key.unpack());
+            let mean_m = center_m + Vector3::from(voxel.mean_offset_m());
+            let cell = coarse.lattice().quantize(&(mean_m + shift_m)).unwrap();
+            let to = if level == 0 { key } else { MortonKey::pack(cell).unwrap() };
+            let to = expected.entry(to).or_default();
+            to.0 += voxel.count;
+            for i in 0..3 {
+                let step = fixed(center_m)[i] + fixed(shift_m)[i];
+                to.1[i] += voxel.sum[i] + i64::from(voxel.count) * step;
+            }
+            to.2.extend(&points[&key]);
+        }
+        prop_assert_eq!(keys(&coarse), expected.keys().copied().collect::<BTreeSet<_>>());
+        for (key, (count, sum, points)) in expected {
+            let voxel = coarse.get(key).unwrap();
+            let center = fixed(coarse.lattice().center(key.unpack()));
+            prop_assert_eq!(voxel.count, count);
+            prop_assert_eq!([0, 1, 2].map(|i| voxel.sum[i] + i64::from(count) * center[i]), sum);
+            prop_assert_eq!(coarse.stamps(key), Some(Stamps { first_ns: 7, last_ns: 7 }));
+            prop_assert_eq!(coarse.labels(key), vec![LabelCount { label: 3, count }]);
+            if count > 1 {
+                let mean = points.iter().sum::<Vector3<f64>>() / f64::from(count);
+                let squares = points.iter().map(|p| (p - mean) * (p - mean).transpose());
+                let covariance = squares.sum::<Matrix3<f64>>() / f64::from(count - 1);
+                let off = (coarse.covariance_m2(key).unwrap() - covariance).amax();
+                prop_assert!(off < 1e-4 * sides * sides, "{off}");
+            }
+        }
+
+        let set = occupancy(&lattice, &offsets);
+        let coarse = set.coarser(level).unwrap();
+        coarse.validate().unwrap();
+        let shift_m = set.datum_m() - coarse.datum_m();
+        let cell_of = |key: MortonKey| {
+            let center_m = lattice.center(key.unpack());
+            (coarse.lattice().quantize(&(center_m + shift_m)), center_m + shift_m)
+        };
+        // The shift is rounded here: a centre on a border may belong to either cell.
+        let reach_m = coarse.lattice().covering_radius_m() + 1e-9;
+        for key in set.sorted_keys() {
+            let (cell, center_m) = cell_of(key);
+            let is_near = |to: MortonKey| (coarse.lattice().center(to.unpack()) - center_m).norm() < reach_m;
+            let own = MortonKey::pack(cell.unwrap()).unwrap();
+            prop_assert!(coarse.contains(own) || coarse.sorted_keys().into_iter().any(is_near));
+        }
+        prop_assert!(coarse.len() <= set.len());
+    }
+
+    #[test]
+    fn the_oldest_voxels_make_room(
+        lattice in any_lattice(),
+        max_voxels in 0..60_usize,
+        clouds in prop::collection::vec(any_offsets(), 1..6),
+    ) {
+        let mut list = empty(&lattice, max_voxels).with_when_full(WhenFull::ForgetOldest);
+        let mut follower = Follower::default();
+        let mut model: BTreeMap<MortonKey, usize> = BTreeMap::new();
+        let portion = max_voxels.div_ceil(8).max(1);
+        for (state, offsets) in clouds.iter().enumerate() {
+            let (mut new, mut forgotten) = (0, 0);
+            for part in offsets.chunks(portion) {
+                if model.len() + part.len() > max_voxels && max_voxels > 0 {
+                    let mut by_age: Vec<_> = model.iter().map(|(k, s)| (*s, *k)).collect();
+                    by_age.sort();
+                    by_age.truncate(model.len().saturating_sub(max_voxels - portion));
+                    forgotten += by_age.len() as u64;
+                    by_age.iter().for_each(|(_, key)| assert!(model.remove(key).is_some()));
+                }
+                for p in cloud(0, part).points_m().filter(|_| max_voxels > 0) {
+                    let key = list.key_of(&p).unwrap();
+                    new += u64::from(model.insert(key, state).is_none());
+                }
+            }
+            let report = list.insert(&cloud(0, offsets));
+            prop_assert_eq!(report.list_full, if max_voxels == 0 { report.points } else { 0 });
+            prop_assert_eq!((report.new_voxels, report.forgotten_voxels), (new, forgotten));
+            prop_assert_eq!(keys(&list), model.keys().copied().collect::<BTreeSet<_>>());
+            follower.follow(&mut list);
+        }
+    }
+}
+
+#[test]
+fn a_window_rolls_along() {
+    for kind in LatticeKind::ALL {
+        let lattice = Lattice::new(kind, 0.125).unwrap();
+        let mut list = empty(&lattice, usize::MAX);
+        let mut set = OccupancyList::new(lattice.clone(), DATUM_M.into(), 1 << 24).unwrap();
+        let mut follower = Follower::default();
+        let (mut most, mut last) = (0, 0);
+        for step in 0..60 {
+            let east = step as f32;
+            let ring = (0..400).map(|i| {
+                let (row, column) = (i / 20, i % 20);
+                [
+                    east + row as f32 * 0.5 - 5.0,
+                    column as f32 * 0.5 - 5.0,
+                    0.1,
+                ]
+            });
+            let scan = cloud(0, &ring.collect::<Vec<_>>());
+            let position_m = scan.datum_m + Vector3::new(f64::from(east), 0.0, 0.0);
+            let window = Region::ball(position_m, 8.0).unwrap();
+            list.insert(&scan);
+            set.insert(&scan);
+            assert_eq!(
+                list.keep_region(&window),
+                set.keep_region(&window),
+                "{kind}"
+            );
+            assert_eq!(keys(&list), keys(&set));
+            set.validate().unwrap();
+            follower.follow(&mut list);
+            let is_near = |key: &MortonKey| (set.center_m(*key) - position_m).norm() <= 8.0;
+            assert!(follower.0.iter().all(is_near));
+            most = most.max(list.len());
+            last = list.len();
+        }
+        // As many as at the tenth step at the last one.
+        assert!(last > 300 && most < 2 * last, "{kind}: {last} of {most}");
+    }
+}
+
+#[test]
+fn threads_do_not_change_what_is_forgotten() {
+    let offsets: Offsets = (0..600_000_u32)
+        .map(|i| {
+            let j = i.wrapping_mul(2_654_435_761) >> 12;
+            [
+                (j & 255) as f32 * 0.3,
+                (j >> 8 & 255) as f32 * 0.3,
+                (i >> 16) as f32,
+            ]
+        })
+        .collect();
+    let lattice = Lattice::new(LatticeKind::Bcc, 0.03).unwrap();
+    let outcome = |threads| {
+        let pool = rayon::ThreadPoolBuilder::new().num_threads(threads);
+        pool.build().unwrap().install(|| {
+            let mut list = empty(&lattice, 100_000).with_when_full(WhenFull::ForgetOldest);
+            let reports = offsets
+                .chunks(90_000)
+                .map(|part| list.insert(&cloud(0, part)));
+            let reports: Vec<_> = reports.collect();
+            list.validate().unwrap();
+            (reports, list.sorted())
+        })
+    };
+    let one = outcome(1);
+    let forgotten = one.0.iter().map(|report| report.forgotten_voxels);
+    assert!(
+        forgotten.clone().sum::<u64>() > 50_000,
+        "{:?}",
+        forgotten.collect::<Vec<_>>()
+    );
+    assert!(one.0.iter().all(|report| report.list_full == 0));
+    assert!(one.1.len() > 80_000);
+    assert_eq!(one, outcome(3));
+}
+
+#[test]
+fn what_does_not_go_together_is_refused() {
+    let lattice = Lattice::new(LatticeKind::HexOptimal, 0.125).unwrap();
+    let offsets: Offsets = (0..50).map(|i| [i as f32, 0.0, 0.0]).collect();
+    let turned = lattice
+        .clone()
+        .oriented(UnitQuaternion::from_euler_angles(0.1, 0.0, 0.0));
+    let elsewhere = VoxelList::new(lattice.clone(), Vector3::zeros(), 10).unwrap();
+    let mut list = filled(&lattice, &offsets);
+    let mut set = occupancy(&lattice, &offsets);
+    let before = (list.len(), set.len());
+    let error = list.subtract(&filled(&turned, &offsets)).unwrap_err();
+    assert!(matches!(error, MergeError::Lattice { .. }) && error.to_string().contains("turned"));
+    let error = set.intersect(&elsewhere).unwrap_err();
+    assert!(matches!(error, MergeError::Datum { .. }), "{error}");
+    assert!(set.merge(&filled(&turned, &offsets)).is_err());
+    let mut small = OccupancyList::new(lattice.clone(), DATUM_M.into(), 300).unwrap();
+    let error = small.merge(&list).unwrap_err();
+    assert!(matches!(error, MergeError::FullBytes { .. }), "{error}");
+    assert_eq!(
+        (list.len(), set.len(), small.len()),
+        (before.0, before.1, 0)
+    );
+    let error = list.forget_before(0).unwrap_err().to_string();
+    assert!(error.contains("stamps: true"), "{error}");
+    let error = list.coarser(40).unwrap_err().to_string();
+    assert!(
+        error.contains("level 40") && error.contains("cell volume"),
+        "{error}"
+    );
+}

@@ -1,0 +1,158 @@
+//! The runtime against ros2-client as a peer: services by both rmw mappings, parameters, the graph.
+
+use std::sync::mpsc::channel;
+use std::time::Duration;
+
+use futures::StreamExt;
+use lattice_msgs::rcl_interfaces::{GetParametersRequest, GetParametersResponse};
+use lattice_msgs::std_srvs::{TriggerRequest, TriggerResponse};
+use lattice_runtime::Runtime;
+use lattice_runtime::ros_args::RosArgs;
+use lattice_test::domain::TestDomain;
+use ros2_client::qos::WhenFull;
+use ros2_client::{
+    Context, Message, Name, Node, NodeEvent, NodeName, NodeOptions, QosProfile, ServiceMapping,
+    ServiceTypeName,
+};
+use rustdds::DomainParticipantBuilder;
+use serde::{Deserialize, Serialize};
+
+/// Long enough for a loaded machine; a test that passes does not wait for it.
+const PATIENCE: Duration = Duration::from_secs(60);
+
+/// Gives one of our messages to ros2-client.
+#[derive(Clone, Debug, Serialize, Deserialize)]
+#[serde(transparent)]
+struct Foreign<M>(M);
+
+impl<M: Serialize + serde::de::DeserializeOwned> Message for Foreign<M> {}
+
+fn runtime(domain: &TestDomain, args: &[&str]) -> Runtime {
+    let args = args.iter().map(|&arg| arg.to_owned());
+    let args = RosArgs::parse(args).unwrap();
+    Runtime::with_transport("mapper", args, &domain.transport()).unwrap()
+}
+
+/// A node of ros2-client with its spinner running.
+fn peer(domain: &TestDomain) -> Node {
+    let participant = DomainParticipantBuilder::new(domain.id())
+        .with_only_networks([std::net::Ipv4Addr::LOCALHOST])
+        .build()
+        .unwrap();
+    let context = Context::from_domain_participant(participant).unwrap();
+    let options = NodeOptions::new().start_parameter_services(false);
+    let mut node = context
+        .new_node(NodeName::new("/", "peer").unwrap(), options)
+        .unwrap();
+    let spinner = node.spinner().unwrap();
+    smol::spawn(spinner.spin()).detach();
+    node
+}
+
+/// Calls a service, again until the endpoints on both sides know each other.
+fn call<Q, R>(
+    peer: &mut Node,
+    mapping: ServiceMapping,
+    service: &str,
+    type_name: &ServiceTypeName,
+    request: Q,
+) -> R
+where
+    Q: Message + Clone + 'static,
+    R: Message + 'static,
+{
+    let qos = QosProfile::publisher_default().reliability_reliable(WhenFull::Fail);
+    let name = Name::parse(service).unwrap();
+    let client = peer
+        .create_client::<Q, R>(mapping, &name, type_name, qos.clone(), qos)
+        .unwrap();
+    let answer = async {
+        client.wait_for_service(peer).await;
+        client.async_call_service(request).await.unwrap()
+    };
+    let timeout = async {
+        smol::Timer::after(PATIENCE).await;
+        panic!("{service} did not answer to {mapping:?}");
+    };
+    smol::block_on(smol::future::or(answer, timeout))
+}
+
+#[test]
+fn a_trigger_answers_clients_of_both_rmw() {
+    let domain = TestDomain::take();
+    let runtime = runtime(&domain, &[]);
+    let mut calls = 0;
+    let server = runtime
+        .node("mapper")
+        .unwrap()
+        .service_trigger("~/reset", move || {
+            calls += 1;
+            (true, format!("call {calls}"))
+        })
+        .unwrap();
+    assert_eq!(server.name(), "/mapper/reset");
+    let type_name = ServiceTypeName::new("std_srvs", "Trigger");
+    for (i, mapping) in [ServiceMapping::Enhanced, ServiceMapping::Cyclone]
+        .into_iter()
+        .enumerate()
+    {
+        // Two clients of one participant would see each other's replies.
+        let mut peer = peer(&domain);
+        let request = Foreign(TriggerRequest::default());
+        let reply: Foreign<TriggerResponse> =
+            call(&mut peer, mapping, "/mapper/reset", &type_name, request);
+        let expected = TriggerResponse {
+            success: true,
+            message: format!("call {}", i + 1),
+        };
+        assert_eq!(reply.0, expected, "{mapping:?}");
+    }
+}
+
+#[test]
+fn parameters_are_served_to_clients_of_both_rmw() {
+    let domain = TestDomain::take();
+    let runtime = runtime(&domain, &["--ros-args", "-p", "max_message_bytes:=5000"]);
+    let type_name = ServiceTypeName::new("rcl_interfaces", "GetParameters");
+    for mapping in [ServiceMapping::Enhanced, ServiceMapping::Cyclone] {
+        let mut peer = peer(&domain);
+        let request = Foreign(GetParametersRequest {
+            names: vec!["max_message_bytes".to_owned(), "none".to_owned()],
+        });
+        let reply: Foreign<GetParametersResponse> = call(
+            &mut peer,
+            mapping,
+            "/mapper/get_parameters",
+            &type_name,
+            request,
+        );
+        let values: Vec<_> = reply.0.values.iter().map(|v| v.integer_value).collect();
+        assert_eq!(values, [5000, 0], "{mapping:?}");
+    }
+    drop(runtime);
+}
+
+#[test]
+fn the_graph_names_every_node_with_its_endpoints() {
+    let domain = TestDomain::take();
+    let peer = peer(&domain);
+    let mut events = Box::pin(peer.status_receiver().unwrap());
+    let (sender, announced) = channel();
+    // Its queue is short: what is not taken at once is lost.
+    let listener = smol::spawn(async move {
+        while let Some(event) = events.next().await {
+            if let NodeEvent::ParticipantEntities(info) = event {
+                let nodes = info.nodes().iter();
+                let mut names: Vec<_> = nodes.map(|n| n.fully_qualified_name()).collect();
+                names.sort();
+                let _ = sender.send(names);
+            }
+        }
+    });
+    let runtime = runtime(&domain, &["--ros-args", "-r", "__ns:=/robot"]);
+    let markers = runtime.node("markers").unwrap();
+    let expected = ["/robot/mapper", "/robot/markers"];
+    while announced.recv_timeout(PATIENCE).unwrap() != expected {}
+    drop(listener);
+    drop(markers);
+}

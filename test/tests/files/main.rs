@@ -1,0 +1,6 @@
+//! Files and messages against foreign libraries.
+
+mod bags;
+mod map_file_python;
+mod msgs_conformance;
+mod point_files;

@@ -1,0 +1,186 @@
+//! Direct replay of real scans against an exhaustive nearest-point search made elsewhere.
+
+use std::path::Path;
+
+use lattice_bag::BagReader;
+use lattice_core::geodesy::Geodetic;
+use lattice_core::lattice::{Lattice, LatticeKind};
+use lattice_nodes::enu_transformer::TransformerOptions;
+use lattice_nodes::enu_transformer::ins::InsSource;
+use lattice_nodes::lattice_mapper::MapperOptions;
+use lattice_nodes::replay::RunReport;
+use lattice_nodes::replay::{self, Pipeline, TopicWishes};
+use lattice_nodes::voxel_marker_publisher::MarkerOptions;
+use lattice_test::data::shared;
+
+/// Voxels, MSE per dimension, mean distance, RMS, largest distance; cells of 0.125 m^3, f64.
+const EXPECTED: [(LatticeKind, f64, [f64; 4]); 5] = [
+    (
+        LatticeKind::Cubic,
+        26353.0,
+        [0.020679, 0.23923, 0.24907, 0.4295],
+    ),
+    (
+        LatticeKind::Bcc,
+        27515.0,
+        [0.019616, 0.23456, 0.24259, 0.3514],
+    ),
+    (
+        LatticeKind::Fcc,
+        28175.0,
+        [0.019670, 0.23464, 0.24292, 0.3947],
+    ),
+    (
+        LatticeKind::Mcc,
+        27178.0,
+        [0.019646, 0.23446, 0.24277, 0.3631],
+    ),
+    (
+        LatticeKind::Hex,
+        25311.0,
+        [0.020907, 0.24097, 0.25044, 0.3974],
+    ),
+];
+
+fn replayed(bag: &Path, source: Option<InsSource>, threads: usize) -> (RunReport, Pipeline) {
+    let reader = BagReader::open(bag).unwrap();
+    let wishes = TopicWishes {
+        source,
+        ..TopicWishes::default()
+    };
+    let plan = replay::plan(&reader, &wishes).unwrap();
+    let mut options = TransformerOptions::new(plan.source);
+    options.ins.origin = Some(Geodetic::from_degrees(49.0, 8.4, 116.0).unwrap());
+    let maps =
+        LatticeKind::PAPER.map(|kind| MapperOptions::new(Lattice::new(kind, 0.125).unwrap()));
+    let mut pipeline = Pipeline::new(options, maps, &MarkerOptions::default()).unwrap();
+    let pool = rayon::ThreadPoolBuilder::new().num_threads(threads).build();
+    let report = pool
+        .unwrap()
+        .install(|| replay::run(&reader, &plan, &mut pipeline, "kitti", &mut |_| {}).unwrap());
+    (report, pipeline)
+}
+
+#[test]
+fn all_lattices_agree_with_an_exhaustive_search() {
+    let Some(bag) = shared("kitti00/bag_mcap") else {
+        return;
+    };
+    let (report, pipeline) = replayed(&bag, None, 1);
+    assert_eq!(report.transformer.counts.clouds_in, 8);
+    assert_eq!(report.losses(), Vec::<String>::new());
+    for (kind, voxels, figures) in EXPECTED {
+        let found = report.lattices.iter().map(|branch| &branch.map);
+        let map = found
+            .clone()
+            .find(|map| map.lattice == kind.name())
+            .unwrap();
+        assert_eq!(map.points, 994_498);
+        assert!(
+            (map.voxels as f64 / voxels - 1.0).abs() < 5e-4,
+            "{kind}: {}",
+            map.voxels
+        );
+        let ours = [
+            map.mse_per_dimension_m2,
+            map.mean_distance_m,
+            map.rms_m,
+            map.max_distance_m,
+        ];
+        for (ours, expected) in ours.into_iter().zip(figures) {
+            assert!(
+                (ours / expected - 1.0).abs() < 2e-4,
+                "{kind}: {ours}, expected {expected}"
+            );
+        }
+    }
+    let (parallel, again) = replayed(&bag, None, 2);
+    for (one, two) in report.lattices.iter().zip(&parallel.lattices) {
+        assert_eq!(one, two);
+    }
+    for (one, two) in pipeline.mappers().zip(again.mappers()) {
+        let file = |mapper: &lattice_nodes::lattice_mapper::LatticeMapper| {
+            let mut bytes = Vec::new();
+            lattice_core::voxels::file::write_map(mapper.list(), &mut bytes).unwrap();
+            bytes
+        };
+        assert!(
+            file(one) == file(two),
+            "the map depends on the number of threads"
+        );
+    }
+}
+
+#[test]
+fn the_sqlite3_log_is_the_first_three_scans() {
+    let (Some(mcap), Some(sqlite3)) = (shared("kitti00/bag_mcap"), shared("kitti00/bag_sqlite3"))
+    else {
+        return;
+    };
+    let (_, pipeline) = replayed(&sqlite3, None, 2);
+    // The same scans from the other container.
+    let reader = BagReader::open(&mcap).unwrap();
+    let plan = replay::plan(&reader, &TopicWishes::default()).unwrap();
+    let maps =
+        LatticeKind::PAPER.map(|kind| MapperOptions::new(Lattice::new(kind, 0.125).unwrap()));
+    let options = TransformerOptions::new(plan.source);
+    let mut first = Pipeline::new(options, maps, &MarkerOptions::default()).unwrap();
+    let mut clouds = 0;
+    for message in reader.messages(&Default::default()).unwrap() {
+        let message = message.unwrap();
+        let Some(role) = plan.roles.get(&message.topic) else {
+            continue;
+        };
+        if *role == replay::Role::Cloud {
+            clouds += 1;
+            if clouds > 3 {
+                continue;
+            }
+        }
+        first.on_message(*role, &message);
+    }
+    first.finish();
+    for (one, two) in pipeline.mappers().zip(first.mappers()) {
+        assert_eq!(one.list().sorted(), two.list().sorted());
+        assert_eq!(one.distortion(), two.distortion());
+    }
+}
+
+#[test]
+fn odometry_and_fix_with_imu_agree() {
+    let Some(bag) = shared("kitti00/bag_mcap") else {
+        return;
+    };
+    let reader = BagReader::open(&bag).unwrap();
+    let mut tracks = Vec::new();
+    for source in [InsSource::Odometry, InsSource::NavsatfixImu] {
+        let wishes = TopicWishes {
+            source: Some(source),
+            ..TopicWishes::default()
+        };
+        let plan = replay::plan(&reader, &wishes).unwrap();
+        let mut options = TransformerOptions::new(source);
+        options.ins.origin = Some(Geodetic::from_degrees(49.0, 8.4, 116.0).unwrap());
+        let maps: [MapperOptions; 0] = [];
+        let mut pipeline = Pipeline::new(options, maps, &MarkerOptions::default()).unwrap();
+        let mut track = Vec::new();
+        for message in reader.messages(&Default::default()).unwrap() {
+            let message = message.unwrap();
+            if let Some(role @ replay::Role::Ins(_)) = plan.roles.get(&message.topic) {
+                pipeline.on_message(*role, &message);
+                track.extend(pipeline.newest_pose());
+            }
+        }
+        track.dedup_by_key(|pose| pose.stamp_ns);
+        tracks.push(track);
+    }
+    assert_eq!(tracks[0].len(), tracks[1].len());
+    assert!(tracks[0].len() > 300);
+    for (odometry, fix) in tracks[0].iter().zip(&tracks[1]) {
+        assert_eq!(odometry.stamp_ns, fix.stamp_ns);
+        let (a, b) = (&odometry.map_from_base, &fix.map_from_base);
+        let apart_m = (a.translation.vector - b.translation.vector).norm();
+        assert!(apart_m < 1e-3, "{apart_m} m apart at {}", odometry.stamp_ns);
+        assert!(a.rotation.angle_to(&b.rotation) < 2e-4);
+    }
+}

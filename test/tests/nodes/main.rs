@@ -1,0 +1,9 @@
+//! The state machines of the nodes, without I/O.
+
+mod enu_transformer;
+mod lattice_mapper;
+mod lattice_mapper_services;
+mod map_labels;
+mod semantic_clouds;
+mod semantic_icp_server;
+mod voxel_markers;

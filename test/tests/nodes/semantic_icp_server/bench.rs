@@ -1,0 +1,204 @@
+//! The state machine with a search that answers what it is told.
+
+use std::collections::VecDeque;
+use std::ops::ControlFlow;
+
+use lattice_core::lattice::{Lattice, LatticeKind};
+use lattice_core::registration::{
+    Calibration, CalibrationOptions, HeadsetScan, Progress, Stage, TrackUpdate, Verdict,
+};
+use lattice_msgs::calibration::{CalibrateGoal, CalibrateResult, CalibrationResult};
+use lattice_msgs::geometry_msgs::TransformStamped;
+use lattice_msgs::sensor_msgs::PointCloud2;
+use lattice_msgs::std_msgs::String as StringMessage;
+use lattice_nodes::convert::semantic::LabelOptions;
+use lattice_nodes::lattice_mapper::{LatticeMapper, MapperOptions};
+use lattice_nodes::semantic_icp_server::{
+    CallId, End, Job, MapCloud, Output, Search, SemanticIcpServer, ServerOptions,
+};
+use lattice_test::clouds::{SECOND_NS, labelled_cloud};
+use nalgebra::Isometry3;
+
+/// Answers as it is told.
+#[derive(Default)]
+pub struct Fake {
+    pub maps: usize,
+    pub map_labelled: bool,
+    pub verdicts: VecDeque<Calibration>,
+    /// Shares of points on the map.
+    pub fits: VecDeque<f64>,
+    pub headset_scans: Vec<usize>,
+    pub starts: Vec<Option<Isometry3<f64>>>,
+    pub refuse_map: bool,
+}
+
+pub fn found(verdict: Verdict, x: f64) -> Calibration {
+    let mut found = Calibration::refused(verdict, format!("{verdict:?}"));
+    found.map_from_headset = Isometry3::translation(x, 0.0, 0.0);
+    found.inlier_fraction = 0.9;
+    found
+}
+
+impl Search for Fake {
+    fn prepare(&mut self, map: MapCloud) -> Result<(), String> {
+        self.maps += 1;
+        self.map_labelled = map.cloud.labels.len() == map.cloud.len();
+        match self.refuse_map {
+            true => Err("too small".into()),
+            false => Ok(()),
+        }
+    }
+
+    fn calibrate(
+        &mut self,
+        headset_scans: &[HeadsetScan],
+        start: Option<Isometry3<f64>>,
+        progress: &dyn Progress,
+    ) -> Calibration {
+        self.headset_scans.push(headset_scans.len());
+        self.starts.push(start);
+        if let ControlFlow::Break(()) = progress.report(Stage::Search, 0.5) {
+            let mut ended = found(Verdict::RejectedInput, 0.0);
+            ended.cancelled = true;
+            return ended;
+        }
+        let next = self.verdicts.pop_front();
+        next.unwrap_or_else(|| found(Verdict::Ok, 1.0))
+    }
+
+    fn track(&mut self, _: &HeadsetScan, map_from_headset: &Isometry3<f64>) -> Option<TrackUpdate> {
+        let fits = self.fits.pop_front().unwrap_or(0.9);
+        Some(TrackUpdate {
+            fits: fits >= CalibrationOptions::default().min_inliers,
+            map_from_headset: Isometry3::translation(0.001, 0.0, 0.0) * map_from_headset,
+            inlier_fraction: fits,
+            rmse_m: 0.01,
+        })
+    }
+}
+
+pub struct Bench<S> {
+    pub machine: SemanticIcpServer,
+    pub search: S,
+    pub now_ns: i64,
+    pub jobs: VecDeque<Job>,
+    pub results: Vec<CalibrationResult>,
+    pub transforms: Vec<TransformStamped>,
+    pub answers: Vec<(CallId, End, CalibrateResult)>,
+    pub feedback: Vec<(CallId, String)>,
+}
+
+impl<S: Search> Bench<S> {
+    pub fn new(options: ServerOptions, search: S) -> Self {
+        Self {
+            machine: SemanticIcpServer::new(options),
+            search,
+            now_ns: 1_700_000_000 * SECOND_NS,
+            jobs: VecDeque::new(),
+            results: Vec::new(),
+            transforms: Vec::new(),
+            answers: Vec::new(),
+            feedback: Vec::new(),
+        }
+    }
+
+    pub fn put(&mut self, outputs: impl IntoIterator<Item = Output>) {
+        for output in outputs {
+            match output {
+                Output::Result(result) => self.results.push(*result),
+                Output::Transform(transform) => self.transforms.push(transform),
+                Output::Job(job) => self.jobs.push_back(job),
+                Output::Answer(call, end, result) => self.answers.push((call, end, *result)),
+                Output::Feedback(call, feedback) => self.feedback.push((call, feedback.stage)),
+                Output::NeedKeyframe => panic!("nothing was lost"),
+            }
+        }
+        assert!(self.jobs.len() <= 1, "one at a time");
+    }
+
+    pub fn map(&mut self, mapper: &mut LatticeMapper) {
+        mapper.take_update();
+        for chunk in mapper.keyframe() {
+            let outputs = self.machine.on_map(&chunk, self.now_ns);
+            self.put(outputs);
+        }
+    }
+
+    /// A cloud two seconds after what was before; nothing is calculated yet.
+    pub fn send(&mut self, message: &PointCloud2) {
+        self.now_ns += 2 * SECOND_NS;
+        let outputs = self.machine.on_headset_cloud(message, self.now_ns);
+        self.put(outputs);
+    }
+
+    /// Calculates until there is nothing more to do.
+    pub fn work(&mut self) {
+        while let Some(job) = self.jobs.pop_front() {
+            let id = job.id;
+            let told = std::sync::Mutex::new(Vec::new());
+            let done = job.run(&mut self.search, |stage, fraction| {
+                told.lock().unwrap().push((stage, fraction));
+            });
+            for (stage, fraction) in told.into_inner().unwrap() {
+                let output = self.machine.on_progress(id, stage, fraction);
+                self.put(output);
+            }
+            self.now_ns += SECOND_NS / 4;
+            let outputs = self.machine.on_done(id, done, self.now_ns);
+            self.put(outputs);
+        }
+    }
+
+    pub fn cloud(&mut self, message: &PointCloud2) {
+        self.send(message);
+        self.work();
+    }
+
+    pub fn ask(&mut self, call: CallId, goal: &CalibrateGoal) {
+        let outputs = self.machine.calibrate(call, goal, self.now_ns);
+        self.put(outputs);
+    }
+
+    pub fn session(&mut self, name: &str) {
+        let data = name.to_owned();
+        let outputs = self
+            .machine
+            .on_session(&StringMessage { data }, self.now_ns);
+        self.put(outputs);
+    }
+
+    pub fn verdict(&self) -> u8 {
+        self.results.last().unwrap().verdict
+    }
+
+    pub fn reason(&self) -> &str {
+        &self.results.last().unwrap().reason
+    }
+}
+
+pub fn mapper(epoch: u64) -> LatticeMapper {
+    let mut options = MapperOptions::new(Lattice::new(LatticeKind::Cubic, 0.000_125).unwrap());
+    options.labels = Some(LabelOptions::default());
+    LatticeMapper::new(options, epoch).unwrap()
+}
+
+pub fn bench(options: ServerOptions) -> Bench<Fake> {
+    let mut mapper = mapper(1);
+    let points = [([0.0; 3], 3), ([1.0, 0.0, 0.0], 4)];
+    mapper.on_cloud(&labelled_cloud("map", 1, &points)).unwrap();
+    let mut bench = Bench::new(options, Fake::default());
+    bench.map(&mut mapper);
+    bench
+}
+
+pub fn good() -> PointCloud2 {
+    labelled_cloud(
+        "headset_origin",
+        5,
+        &[([1.0, 2.0, 3.0], 7), ([1.0, 2.0, 4.0], 8)],
+    )
+}
+
+pub const OK: u8 = CalibrationResult::OK;
+pub const REJECTED: u8 = CalibrationResult::REJECTED_INPUT;
+pub const NONE: u8 = CalibrationResult::NONE;
