@@ -1,0 +1,12 @@
+//! Rules of the architecture that the compiler does not know.
+
+mod crates;
+mod modules;
+mod params;
+mod source;
+
+use std::path::Path;
+
+fn root() -> &'static Path {
+    Path::new(env!("CARGO_MANIFEST_DIR")).parent().unwrap()
+}

@@ -1,0 +1,192 @@
+//! Modules of a crate depend on each other one way, and those of the core have a user.
+
+use std::collections::BTreeSet;
+use std::fs;
+use std::path::Path;
+
+use super::root;
+use super::source::{code, files, module};
+
+/// Modules of crates in layers: each may use those before it in the list.
+const LAYERS: [(&str, &[&str]); 1] = [(
+    "lattice_core/src",
+    &[
+        "prefetch",
+        "lattice",
+        "cloud",
+        "geodesy",
+        "pose",
+        "voxels",
+        "query",
+        "raycast",
+        "registration",
+    ],
+)];
+
+/// First words after `crate::`, also in braces, and after as many `super::` as lead to the root.
+fn root_names(code: &str, depth: usize) -> BTreeSet<String> {
+    let mut found = BTreeSet::new();
+    let prefixes = ["crate::".to_owned(), "super::".repeat(depth)];
+    for prefix in prefixes.iter().filter(|prefix| !prefix.is_empty()) {
+        for (at, _) in code.match_indices(prefix.as_str()) {
+            // `super::super::` is also found in a longer chain, `crate::` in `$crate::`.
+            if code[..at].ends_with(['$', ':']) {
+                continue;
+            }
+            let rest = &code[at + prefix.len()..];
+            match rest.strip_prefix('{') {
+                None => found.extend(first_word(rest)),
+                Some(list) => found.extend(items(list).iter().filter_map(|item| first_word(item))),
+            }
+        }
+    }
+    found
+}
+
+fn first_word(text: &str) -> Option<String> {
+    let is_word = |c: char| c.is_alphanumeric() || c == '_';
+    let word: String = text
+        .trim_start()
+        .chars()
+        .take_while(|c| is_word(*c))
+        .collect();
+    (!word.is_empty()).then_some(word)
+}
+
+/// Items of a list in braces, of which `list` is what follows the opening one.
+fn items(list: &str) -> Vec<String> {
+    let (mut items, mut depth) = (vec![String::new()], 0);
+    for c in list.chars() {
+        match c {
+            '{' => depth += 1,
+            '}' if depth == 0 => break,
+            '}' => depth -= 1,
+            ',' if depth == 0 => items.push(String::new()),
+            _ if depth == 0 => items.last_mut().unwrap().push(c),
+            _ => {}
+        }
+    }
+    items
+}
+
+/// Names that the root of a crate brings up from its modules, with the module of each.
+fn reexports(source: &Path) -> Vec<(String, String)> {
+    let text = code(&source.join("lib.rs"));
+    let mut found = Vec::new();
+    for statement in text.split(';') {
+        let Some((_, path)) = statement.split_once("pub use ") else {
+            continue;
+        };
+        let Some((from, names)) = path.split_once("::") else {
+            continue;
+        };
+        let names = names.trim_start_matches('{').trim_end_matches('}');
+        let names = names
+            .split([',', '{', '}'])
+            .filter_map(|name| first_word(name.rsplit("::").next()?));
+        found.extend(names.map(|name| (name, from.trim().to_owned())));
+    }
+    found
+}
+
+#[test]
+fn modules_point_one_way() {
+    for (source, layers) in LAYERS {
+        let source = root().join(source);
+        let place = |name: &str| layers.iter().position(|layer| *layer == name);
+        let brought_up = reexports(&source);
+        let mut seen = BTreeSet::new();
+        for file in files(&source) {
+            let Some(path) = module(&source, &file) else {
+                continue;
+            };
+            let Some(here) = path.first() else {
+                continue;
+            };
+            let from = place(here).unwrap_or_else(|| {
+                panic!("{here} is missing in the layers of {}", source.display())
+            });
+            seen.insert(here.clone());
+            for name in root_names(&code(&file), path.len()) {
+                let module = brought_up.iter().find(|(item, _)| *item == name);
+                let to = module.map_or(name.as_str(), |(_, module)| module);
+                if let Some(to_place) = place(to) {
+                    assert!(
+                        to_place <= from,
+                        "{}: {here} uses {to}, which comes after it",
+                        file.display()
+                    );
+                }
+            }
+        }
+        let layers: BTreeSet<String> = layers.iter().map(|layer| (*layer).to_owned()).collect();
+        assert_eq!(seen, layers, "{}", source.display());
+    }
+}
+
+/// Public modules below a file, as paths after the crate's name.
+fn public_modules(source: &Path) -> Vec<Vec<String>> {
+    let mut found = Vec::new();
+    for file in files(source) {
+        let Some(path) = module(source, &file) else {
+            continue;
+        };
+        for line in code(&file).lines() {
+            if let Some(name) = line.strip_prefix("pub mod ").and_then(first_word) {
+                found.push([path.clone(), vec![name]].concat());
+            }
+        }
+    }
+    found
+}
+
+#[test]
+fn every_public_module_of_the_core_has_a_user() {
+    let mut users = String::new();
+    for directory in ["nodes/src", "nodes/cli/src"] {
+        let directory = root().join(directory);
+        for file in files(&directory) {
+            if module(&directory, &file)
+                .is_some_and(|path| path.first().is_none_or(|name| name != "lab"))
+            {
+                users += &code(&file);
+            }
+        }
+    }
+    for path in public_modules(&root().join("lattice_core/src")) {
+        // Of nested modules the last two names say enough.
+        let tail = path[path.len().saturating_sub(2)..].join("::");
+        let named = if path.len() == 1 {
+            format!("lattice_core::{tail}")
+        } else {
+            tail
+        };
+        assert!(
+            users.contains(&named),
+            "no node and no command uses lattice_core::{}",
+            path.join("::")
+        );
+    }
+}
+
+#[test]
+fn files_are_small() {
+    let mut lines = Vec::new();
+    for directory in ["lattice_core", "msgs", "nodes", "test"] {
+        for file in files(&root().join(directory)) {
+            let count = fs::read_to_string(&file).unwrap().lines().count();
+            assert!(
+                count <= 400,
+                "{}: {count} lines: are there two things in one?",
+                file.display()
+            );
+            lines.push(count);
+        }
+    }
+    lines.sort_unstable();
+    let median = lines[lines.len() / 2];
+    assert!(
+        median <= 150,
+        "half of the files have more than {median} lines"
+    );
+}

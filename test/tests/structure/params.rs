@@ -1,0 +1,120 @@
+//! Parameter files have every parameter of the nodes, and no other.
+
+use lattice_lab::datasets;
+use lattice_nodes::enu_transformer::TransformerOptions;
+use lattice_nodes::lattice_mapper::MapperOptions;
+use lattice_nodes::semantic_icp_server::ServerOptions;
+use lattice_nodes::voxel_marker_publisher::MarkerOptions;
+use lattice_runtime::params::Params;
+use lattice_runtime::ros_args::RosArgs;
+
+use super::root;
+
+fn params(file: &str, node: &str) -> Params {
+    let file = root().join("params").join(file).display().to_string();
+    let arguments = ["--ros-args", "--params-file", &file].map(str::to_owned);
+    Params::load(&RosArgs::parse(arguments).unwrap(), node).unwrap()
+}
+
+#[test]
+fn parameter_files_name_only_what_nodes_read() {
+    for namespace in ["", "/robot"] {
+        let params = params("bobcat.yaml", &format!("{namespace}/enu_transformer"));
+        TransformerOptions::from_params(&params).unwrap();
+        let shell = [
+            "inbox_events",
+            "ins.imu_topic",
+            "ins.topic",
+            "points_topics",
+            "report_file",
+            "threads",
+        ];
+        assert_eq!(params.unused(), shell);
+        let params = self::params("bobcat.yaml", &format!("{namespace}/lattice_mapper"));
+        MapperOptions::from_params(&params).unwrap();
+        let shell = [
+            "centers_period_s",
+            "inbox_bytes",
+            "inbox_events",
+            "report_file",
+            "threads",
+            "update_period_s",
+        ];
+        assert_eq!(params.unused(), shell);
+        let params = self::params(
+            "bobcat.yaml",
+            &format!("{namespace}/voxel_marker_publisher"),
+        );
+        MarkerOptions::from_params(&params).unwrap();
+        let shell = [
+            "inbox_bytes",
+            "inbox_events",
+            "mapper",
+            "max_bytes_per_s",
+            "rate_hz",
+            "report_file",
+            "threads",
+        ];
+        assert_eq!(params.unused(), shell);
+    }
+}
+
+#[test]
+fn every_parameter_is_in_the_file_for_the_simulated_loader() {
+    let declared = |params: &Params| {
+        let names = params.declared().into_iter().map(|declared| declared.name);
+        names
+            .filter(|name| !params.is_given(name))
+            .collect::<Vec<_>>()
+    };
+    let params = params("bobcat.yaml", "/enu_transformer");
+    TransformerOptions::from_params(&params).unwrap();
+    assert_eq!(declared(&params), Vec::<String>::new());
+    let params = self::params("bobcat.yaml", "/lattice_mapper");
+    MapperOptions::from_params(&params).unwrap();
+    assert_eq!(declared(&params), Vec::<String>::new());
+    let params = self::params("bobcat.yaml", "/voxel_marker_publisher");
+    MarkerOptions::from_params(&params).unwrap();
+    assert_eq!(declared(&params), Vec::<String>::new());
+}
+
+#[test]
+fn the_file_for_a_headset_has_every_parameter_and_its_default() {
+    let params = params("semantic_icp.yaml", "/robot/semantic_icp_server");
+    let options = ServerOptions::from_params(&params).unwrap();
+    assert_eq!(
+        format!("{options:?}"),
+        format!("{:?}", ServerOptions::default())
+    );
+    let shell = [
+        "inbox_bytes",
+        "inbox_events",
+        "mapper",
+        "tf_rate_hz",
+        "threads",
+    ];
+    assert_eq!(params.unused(), shell);
+    let declared = params.declared().into_iter().map(|d| d.name);
+    let missing: Vec<_> = declared.filter(|name| !params.is_given(name)).collect();
+    assert_eq!(missing, Vec::<String>::new());
+    let params = self::params("semantic_icp.yaml", "/lattice_mapper");
+    let options = MapperOptions::from_params(&params).unwrap();
+    assert!(options.labels.is_some() && params.unused().is_empty());
+}
+
+#[test]
+fn the_parameter_file_fits_the_simulated_loader() {
+    let params = params("bobcat.yaml", "/enu_transformer");
+    let options = TransformerOptions::from_params(&params).unwrap();
+    assert_eq!(options.ins.origin, datasets::bobcat_origin().ok());
+    assert_eq!(options.ins.leap_seconds, datasets::BOBCAT_LEAP_SECONDS);
+    let lever_arm_m: [f64; 3] = options.ins.mount.lever_arm_m.into();
+    assert_eq!(lever_arm_m, lattice_lab::simulate::BASE_FROM_IMU_M);
+    assert_eq!(
+        params.string("ins.topic", "").unwrap(),
+        datasets::INSPVAX_TOPIC
+    );
+    let topics = params.string_array("points_topics", &[]).unwrap();
+    let lasers = lattice_lab::simulate::Laser::ALL.map(datasets::points_topic);
+    assert_eq!(topics, lasers);
+}

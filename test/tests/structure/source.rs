@@ -1,0 +1,46 @@
+//! Source files of a crate, as text without tests and comments.
+
+use std::fs;
+use std::path::{Path, PathBuf};
+
+/// All `.rs` files below a directory, sorted.
+pub fn files(directory: &Path) -> Vec<PathBuf> {
+    let mut found = Vec::new();
+    for entry in fs::read_dir(directory).unwrap() {
+        let path = entry.unwrap().path();
+        if path.is_dir() {
+            found.extend(files(&path));
+        } else if path.extension().is_some_and(|ending| ending == "rs") {
+            found.push(path);
+        }
+    }
+    found.sort();
+    found
+}
+
+/// Path of a module from the root of its crate, empty for the root itself; `None` for tests.
+pub fn module(source: &Path, file: &Path) -> Option<Vec<String>> {
+    let relative = file.strip_prefix(source).unwrap().with_extension("");
+    let mut parts: Vec<String> = relative
+        .iter()
+        .map(|part| part.to_str().unwrap().to_owned())
+        .collect();
+    if matches!(
+        parts.last().map(String::as_str),
+        Some("mod" | "lib" | "main")
+    ) {
+        parts.pop();
+    }
+    let is_test = |part: &String| ["tests", "testing"].contains(&part.as_str());
+    (!parts.iter().any(is_test)).then_some(parts)
+}
+
+/// Code of a file without its comments and its `mod tests`.
+pub fn code(file: &Path) -> String {
+    let text = fs::read_to_string(file).unwrap();
+    let text = text.split("#[cfg(test)]\nmod tests {").next().unwrap();
+    let lines = text
+        .lines()
+        .filter(|line| !line.trim_start().starts_with("//"));
+    lines.collect::<Vec<_>>().join("\n")
+}
