@@ -1,7 +1,7 @@
 //! What became different since some state of the list.
 
 use super::VoxelList;
-use super::shard::Life;
+use super::store::shard::Life;
 use crate::lattice::{BlockKey, MortonKey};
 
 /// Keys that differ from an earlier state, sorted.

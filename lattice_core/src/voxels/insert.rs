@@ -4,13 +4,13 @@ use nalgebra::Translation3;
 use rayon::prelude::*;
 
 use super::VoxelList;
-use super::columns::{Details, LabelCount, Stamps};
 use super::distortion::DistortionSums;
-use super::fixed::{
+use super::store::fixed_point::{
     FixedBlock, Point, moment_unit_m, moments_of, most_points, near_point, offsets_of,
 };
-use super::gather::{Gather, Partial};
-use super::shard::{BATCH, SHARDS, Shard, shard_of};
+use super::store::payload_columns::{Details, LabelCount, Stamps};
+use super::store::point_gather::{Gather, Partial};
+use super::store::shard::{BATCH, SHARDS, Shard, shard_of};
 use crate::cloud::Cloud;
 use crate::lattice::{BatchBlock, BatchQuantizer, BatchSums, BlockKey, Lattice};
 

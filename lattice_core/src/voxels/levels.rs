@@ -7,10 +7,10 @@
 use nalgebra::Vector3;
 use thiserror::Error;
 
-use super::columns::Details;
 use super::distortion::DistortionSums;
-use super::fixed::{Offsets, fixed, moment_unit_m, voxel_of};
-use super::shard::shard_of;
+use super::store::fixed_point::{Offsets, fixed, moment_unit_m, voxel_of};
+use super::store::payload_columns::Details;
+use super::store::shard::shard_of;
 use super::{OccupancyList, Voxel, VoxelList, VoxelStore};
 use crate::lattice::{BlockKey, Lattice, LatticeError, LatticeIndex, MortonKey};
 

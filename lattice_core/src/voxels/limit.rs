@@ -1,7 +1,7 @@
 //! What happens when a list is full.
 
 use super::VoxelList;
-use super::shard::Shard;
+use super::store::shard::Shard;
 use crate::lattice::BlockKey;
 
 /// What a list does with points in new cells when it has as many voxels as it may.

@@ -6,11 +6,11 @@ use nalgebra::{Matrix3, Vector3};
 use rayon::prelude::*;
 use thiserror::Error;
 
-use super::columns::{Columns, Details, LabelCount, Payload, Stamps};
 use super::distortion::{Distortion, DistortionSums};
-use super::fixed::{moment_unit_m, reach};
-use super::grow;
-use super::shard::{Life, SHARDS, Shard, shard_of};
+use super::store::fixed_point::{moment_unit_m, reach};
+use super::store::growth;
+use super::store::payload_columns::{Columns, Details, LabelCount, Payload, Stamps};
+use super::store::shard::{Life, SHARDS, Shard, shard_of};
 use super::{InsertReport, Voxel, VoxelStore, WhenFull};
 use crate::cloud::Cloud;
 use crate::lattice::{BlockKey, Lattice, LatticeIndex, MortonKey};
@@ -106,7 +106,7 @@ impl VoxelList {
         // A hash map may be less than half full.
         let removed = 5 * size_of::<(u64, Life)>() / 2;
         let voxel = Shard::VOXEL_BYTES + columns + columns / 4 + removed;
-        let first = SHARDS * (Shard::FIRST_BYTES + grow::FIRST * columns);
+        let first = SHARDS * (Shard::FIRST_BYTES + growth::FIRST * columns);
         max_bytes.saturating_sub(first) / voxel
     }
 

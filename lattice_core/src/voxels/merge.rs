@@ -2,9 +2,9 @@
 
 use thiserror::Error;
 
-use super::columns::Columns;
-use super::fixed::offsets_in;
-use super::shard::{SHARDS, shard_of};
+use super::store::fixed_point::offsets_in;
+use super::store::payload_columns::Columns;
+use super::store::shard::{SHARDS, shard_of};
 use super::{Voxel, VoxelList, VoxelStore};
 use crate::lattice::{BlockKey, MortonKey};
 

@@ -7,34 +7,23 @@ pub mod codec;
 pub mod file;
 pub mod set_ops;
 
-mod cells;
 mod changes;
-mod columns;
 mod decay;
 mod distortion;
 mod exposed;
-mod fixed;
-mod gather;
-mod grow;
 mod insert;
 mod levels;
 mod limit;
 mod list;
 mod merge;
-mod morton;
-mod neighbors;
 mod occupancy;
-mod recent;
 mod region;
 mod retain;
-mod shard;
 mod store;
-mod table;
 mod voxel;
-mod wide;
+mod voxel_store;
 
 pub use changes::Changes;
-pub use columns::{LabelCount, Payload, Stamps};
 pub use decay::NoStamps;
 pub use distortion::Distortion;
 pub use insert::InsertReport;
@@ -44,8 +33,9 @@ pub use list::{DatumError, VoxelList};
 pub use merge::MergeError;
 pub use occupancy::OccupancyList;
 pub use region::{Region, RegionError};
-pub use store::VoxelStore;
+pub use store::payload_columns::{LabelCount, Payload, Stamps};
 pub use voxel::{OFFSET_UNIT_M, Voxel};
+pub use voxel_store::VoxelStore;
 
 #[cfg(test)]
 mod tests;

@@ -2,8 +2,8 @@
 
 use rayon::prelude::*;
 
-use super::morton::places;
-use super::shard::{Entry, Shard};
+use super::store::block_mask::places;
+use super::store::shard::{Entry, Shard};
 use super::{Voxel, VoxelList};
 use crate::lattice::{BlockKey, LatticeIndex, MortonKey};
 

@@ -4,8 +4,8 @@ use nalgebra::Vector3;
 use thiserror::Error;
 
 use crate::lattice::{Lattice, MortonKey};
-use crate::voxels::columns::Columns;
 use crate::voxels::distortion::DistortionSums;
+use crate::voxels::store::payload_columns::Columns;
 use crate::voxels::{Distortion, OccupancyList, Payload, Voxel, VoxelList, VoxelStore};
 
 /// Parts that do not make a map.

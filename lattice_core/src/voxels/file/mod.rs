@@ -2,12 +2,13 @@
 //!
 //! `docs/map_file.md` describes the format and has a reader in Python.
 
-mod columns;
+mod column_values;
 mod contents;
 mod error;
 mod head;
 mod operations;
 mod read;
+mod source;
 mod write;
 
 #[cfg(test)]

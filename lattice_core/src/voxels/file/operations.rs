@@ -6,7 +6,7 @@ use thiserror::Error;
 use super::MapContents;
 use super::contents::no_columns;
 use crate::lattice::MortonKey;
-use crate::voxels::columns::Columns;
+use crate::voxels::store::payload_columns::Columns;
 use crate::voxels::{Voxel, set_ops};
 
 /// Why two maps do not go together. The receiving map is as before.

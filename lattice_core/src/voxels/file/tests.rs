@@ -4,7 +4,7 @@ use super::head::{HEAD_BYTES, SECTION_HEAD_BYTES};
 use super::*;
 use crate::cloud::Cloud;
 use crate::lattice::{Lattice, LatticeKind, MortonKey, Orientation};
-use crate::voxels::columns::Columns;
+use crate::voxels::store::payload_columns::Columns;
 use crate::voxels::{LabelCount, Payload, Stamps, Voxel};
 
 mod refused;

@@ -2,10 +2,10 @@
 
 use rayon::prelude::*;
 
-use super::super::morton::places;
-use super::super::retain::first_index;
-use super::{Block, Leaf, OccupancyList};
+use super::{Block, OccupancyList};
 use crate::lattice::{BlockKey, LatticeIndex, MortonKey};
+use crate::voxels::retain::first_index;
+use crate::voxels::store::block_mask::{BlockMask, places};
 
 impl OccupancyList {
     pub(super) fn retain_in_blocks(
@@ -13,7 +13,7 @@ impl OccupancyList {
         keep_block: &(dyn Fn(LatticeIndex) -> Option<bool> + Sync),
         keep: &(dyn Fn(MortonKey) -> bool + Sync),
     ) -> usize {
-        let kept = |block: &Block| -> Leaf {
+        let kept = |block: &Block| -> BlockMask {
             match first_index(block.code).and_then(keep_block) {
                 Some(true) => block.leaf,
                 Some(false) => [0; 8],
@@ -32,7 +32,7 @@ impl OccupancyList {
             }
         };
         let rows = self.blocks.rows().par_iter().enumerate();
-        let changed: Vec<(usize, Leaf)> = rows
+        let changed: Vec<(usize, BlockMask)> = rows
             .map(|(number, block)| (number, block, kept(block)))
             .filter(|(_, block, leaf)| *leaf != block.leaf)
             .map(|(number, _, leaf)| (number, leaf))
@@ -46,7 +46,7 @@ impl OccupancyList {
     }
 
     /// Leaves a block only some of its cells.
-    fn reduce(&mut self, number: usize, leaf: Leaf) {
+    fn reduce(&mut self, number: usize, leaf: BlockMask) {
         let Some(block) = self.blocks.row_mut(number as u32) else {
             return;
         };

@@ -3,8 +3,8 @@
 use super::read::Fault;
 use crate::lattice::Lattice;
 use crate::voxels::codec::{Varints, push_varint, unzigzag, zigzag};
-use crate::voxels::columns::{Columns, Moments};
-use crate::voxels::fixed::moment_unit_m;
+use crate::voxels::store::fixed_point::moment_unit_m;
+use crate::voxels::store::payload_columns::{Columns, Moments};
 use crate::voxels::{LabelCount, OFFSET_UNIT_M, Stamps, Voxel};
 
 /// Moments of more points may have wrapped.

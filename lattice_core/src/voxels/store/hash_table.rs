@@ -3,7 +3,7 @@
 use std::hash::{BuildHasher, RandomState};
 use std::sync::LazyLock;
 
-use super::grow;
+use super::growth;
 
 /// Slots at the start.
 const FIRST_SLOTS: usize = 64;
@@ -24,7 +24,7 @@ fn number_in(slot: u64) -> u32 {
 }
 
 /// What a table holds.
-pub(super) trait Row {
+pub(crate) trait Row {
     /// The key of the row, which never changes.
     fn code(&self) -> u64;
 }
@@ -35,7 +35,7 @@ pub(super) trait Row {
 /// number plus 1 and half of the hash, so that a search rarely looks at a row that is not the right
 /// one. The hash is seeded for each process against inputs made to collide.
 #[derive(Clone)]
-pub(super) struct Table<R> {
+pub(crate) struct Table<R> {
     slots: Vec<u64>,
     rows: Vec<R>,
     shift: u32,
@@ -44,7 +44,7 @@ pub(super) struct Table<R> {
 
 /// Where a code is.
 #[derive(Clone, Copy, PartialEq, Eq, Debug)]
-pub(super) enum Place {
+pub(crate) enum Place {
     /// It was there.
     Known(u32),
     /// It has just been added, with the next number.
@@ -53,12 +53,12 @@ pub(super) enum Place {
 
 impl<R: Row> Table<R> {
     /// Most bytes for a row, the room to grow and the table that it grows from included.
-    pub(super) const ROW_BYTES: usize = grow::most_bytes::<R>() + SLOT_BYTES;
+    pub(crate) const ROW_BYTES: usize = growth::most_bytes::<R>() + SLOT_BYTES;
     /// Most bytes besides those of rows.
-    pub(super) const FIRST_BYTES: usize =
-        FIRST_SLOTS * size_of::<u64>() + grow::FIRST * size_of::<R>();
+    pub(crate) const FIRST_BYTES: usize =
+        FIRST_SLOTS * size_of::<u64>() + growth::FIRST * size_of::<R>();
 
-    pub(super) fn new() -> Table<R> {
+    pub(crate) fn new() -> Table<R> {
         static SEED: LazyLock<u64> = LazyLock::new(|| RandomState::new().hash_one(0) | 1);
         Table {
             slots: vec![FREE; FIRST_SLOTS],
@@ -69,22 +69,22 @@ impl<R: Row> Table<R> {
     }
 
     /// Number of rows.
-    pub(super) fn len(&self) -> usize {
+    pub(crate) fn len(&self) -> usize {
         self.rows.len()
     }
 
     /// All rows by number.
-    pub(super) fn rows(&self) -> &[R] {
+    pub(crate) fn rows(&self) -> &[R] {
         &self.rows
     }
 
     /// The row of a number.
     #[inline(always)]
-    pub(super) fn row_mut(&mut self, number: u32) -> Option<&mut R> {
+    pub(crate) fn row_mut(&mut self, number: u32) -> Option<&mut R> {
         self.rows.get_mut(number as usize)
     }
 
-    pub(super) fn bytes(&self) -> usize {
+    pub(crate) fn bytes(&self) -> usize {
         size_of::<u64>() * self.slots.capacity() + size_of::<R>() * self.rows.capacity()
     }
 
@@ -98,7 +98,7 @@ impl<R: Row> Table<R> {
 
     /// The row that a search looks at first.
     #[inline(always)]
-    pub(super) fn likely(&self, code: u64) -> Option<&R> {
+    pub(crate) fn likely(&self, code: u64) -> Option<&R> {
         let (at, _) = self.home(code);
         self.rows.get(number_in(self.slot(at)) as usize)
     }
@@ -143,14 +143,14 @@ impl<R: Row> Table<R> {
 
     /// The number of a code.
     #[inline(always)]
-    pub(super) fn find(&self, code: u64) -> Option<u32> {
+    pub(crate) fn find(&self, code: u64) -> Option<u32> {
         let (_, slot) = self.slot_of(code);
         (slot != FREE).then(|| number_in(slot))
     }
 
     /// The number of a code; a row is made for it if it is new and fewer than `limit` are there.
     #[inline(always)]
-    pub(super) fn find_or_add(
+    pub(crate) fn find_or_add(
         &mut self,
         code: u64,
         limit: usize,
@@ -171,7 +171,7 @@ impl<R: Row> Table<R> {
             return None;
         }
         self.put(at, self.home(row.code()).1 | (number as u64 + 1));
-        grow::push(&mut self.rows, row);
+        growth::push(&mut self.rows, row);
         if self.rows.len() * FULL.1 > self.slots.len() * FULL.0 {
             self.rebuild(self.slots.len() * 2);
         }
@@ -190,7 +190,7 @@ impl<R: Row> Table<R> {
     }
 
     /// Removes a row; the last row takes its number, which is given too.
-    pub(super) fn remove(&mut self, code: u64) -> Option<(u32, R)> {
+    pub(crate) fn remove(&mut self, code: u64) -> Option<(u32, R)> {
         let (at, slot) = self.slot_of(code);
         if slot == FREE {
             return None;
@@ -230,12 +230,12 @@ impl<R: Row> Table<R> {
         self.put(hole, FREE);
     }
 
-    pub(super) fn clear(&mut self) {
+    pub(crate) fn clear(&mut self) {
         *self = Table::new();
     }
 
     /// Checks that every row is found under its number and nothing else is in the slots.
-    pub(super) fn validate(&self) -> Result<(), String> {
+    pub(crate) fn validate(&self) -> Result<(), String> {
         for (number, code) in self.rows.iter().map(R::code).enumerate() {
             if self.find(code) != Some(number as u32) {
                 return Err(format!("code {code:#x} is not found under number {number}"));

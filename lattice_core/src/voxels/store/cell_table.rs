@@ -1,9 +1,9 @@
 //! A table of voxels that is found block by block.
 
-use super::grow;
-use super::occupancy::Leaf;
+use super::block_mask::BlockMask;
+use super::growth;
+use super::hash_table::{Place, Row, Table};
 use super::shard::Entry;
-use super::table::{Place, Row, Table};
 use crate::lattice::BlockKey;
 use crate::prefetch::prefetch;
 
@@ -15,7 +15,7 @@ const FIRST_NUMBERS: usize = 8;
 struct Block {
     code: u64,
     /// One bit for each cell, by its place.
-    leaf: Leaf,
+    leaf: BlockMask,
     /// Voxels before each word of the leaf.
     before: [u16; 8],
     /// Numbers of the voxels, by place.
@@ -88,7 +88,7 @@ impl Block {
 ///
 /// A scan fills few blocks, over and over: they stay near the processor however large the map is,
 /// where a hash table over all cells would touch a far line of memory for each.
-pub(super) struct CellTable {
+pub(crate) struct CellTable {
     blocks: Table<Block>,
     rows: Vec<Entry>,
     /// Bytes of all `Block::numbers`.
@@ -113,13 +113,14 @@ impl Clone for CellTable {
 
 impl CellTable {
     /// Most bytes for a voxel: that of one alone in its block.
-    pub(super) const VOXEL_BYTES: usize =
-        grow::most_bytes::<Entry>() + Table::<Block>::ROW_BYTES + FIRST_NUMBERS * size_of::<u32>();
+    pub(crate) const VOXEL_BYTES: usize = growth::most_bytes::<Entry>()
+        + Table::<Block>::ROW_BYTES
+        + FIRST_NUMBERS * size_of::<u32>();
     /// Most bytes besides those of voxels.
-    pub(super) const FIRST_BYTES: usize =
-        Table::<Block>::FIRST_BYTES + grow::FIRST * size_of::<Entry>();
+    pub(crate) const FIRST_BYTES: usize =
+        Table::<Block>::FIRST_BYTES + growth::FIRST * size_of::<Entry>();
 
-    pub(super) fn new() -> CellTable {
+    pub(crate) fn new() -> CellTable {
         CellTable {
             blocks: Table::new(),
             rows: Vec::new(),
@@ -129,53 +130,53 @@ impl CellTable {
     }
 
     /// Makes room for more voxels.
-    pub(super) fn reserve(&mut self, voxels: usize) {
+    pub(crate) fn reserve(&mut self, voxels: usize) {
         self.rows.reserve_exact(voxels);
     }
 
     /// Number of voxels.
-    pub(super) fn len(&self) -> usize {
+    pub(crate) fn len(&self) -> usize {
         self.rows.len()
     }
 
     /// All voxels by number.
-    pub(super) fn rows(&self) -> &[Entry] {
+    pub(crate) fn rows(&self) -> &[Entry] {
         &self.rows
     }
 
     /// All voxels by number. Their codes must stay.
-    pub(super) fn rows_mut(&mut self) -> &mut [Entry] {
+    pub(crate) fn rows_mut(&mut self) -> &mut [Entry] {
         &mut self.rows
     }
 
     /// The voxel of a number.
     #[inline(always)]
-    pub(super) fn row_mut(&mut self, number: u32) -> Option<&mut Entry> {
+    pub(crate) fn row_mut(&mut self, number: u32) -> Option<&mut Entry> {
         self.rows.get_mut(number as usize)
     }
 
     /// The blocks, each with one bit for each of its voxels.
-    pub(super) fn blocks(&self) -> impl Iterator<Item = (u64, &Leaf)> {
+    pub(crate) fn blocks(&self) -> impl Iterator<Item = (u64, &BlockMask)> {
         self.blocks
             .rows()
             .iter()
             .map(|block| (block.code, &block.leaf))
     }
 
-    pub(super) fn bytes(&self) -> usize {
+    pub(crate) fn bytes(&self) -> usize {
         self.blocks.bytes() + self.number_bytes + self.rows.capacity() * size_of::<Entry>()
     }
 
     /// The number of a cell.
     #[inline]
-    pub(super) fn find(&self, code: BlockKey) -> Option<u32> {
+    pub(crate) fn find(&self, code: BlockKey) -> Option<u32> {
         let block = self.blocks.find(code.block())?;
         self.blocks.rows().get(block as usize)?.find(code.place())
     }
 
     /// Asks for the block of a cell, which will be searched soon.
     #[inline(always)]
-    pub(super) fn prefetch_block(&self, code: BlockKey) {
+    pub(crate) fn prefetch_block(&self, code: BlockKey) {
         if let Some(block) = self.blocks.likely(code.block()) {
             prefetch::<2, _>(block);
         }
@@ -183,7 +184,7 @@ impl CellTable {
 
     /// The block of a cell, for [`CellTable::find_in`]; asks for the number of its voxel.
     #[inline(always)]
-    pub(super) fn block_of(&self, code: BlockKey) -> Option<u32> {
+    pub(crate) fn block_of(&self, code: BlockKey) -> Option<u32> {
         let at = self.blocks.find(code.block())?;
         let block = self.blocks.rows().get(at as usize)?;
         let (_, rank) = block.rank(code.place());
@@ -195,7 +196,7 @@ impl CellTable {
 
     /// The number of a cell of a block; asks for its voxel.
     #[inline(always)]
-    pub(super) fn find_in(&self, block: u32, code: BlockKey) -> Option<u32> {
+    pub(crate) fn find_in(&self, block: u32, code: BlockKey) -> Option<u32> {
         let block = self.blocks.rows().get(block as usize)?;
         let number = block.find(code.place())?;
         if let Some(row) = self.rows.get(number as usize) {
@@ -206,7 +207,7 @@ impl CellTable {
 
     /// The number of a cell; a row is made for it if it is new and fewer than `limit` are there.
     #[inline(always)]
-    pub(super) fn find_or_add(
+    pub(crate) fn find_or_add(
         &mut self,
         code: BlockKey,
         limit: usize,
@@ -242,12 +243,12 @@ impl CellTable {
         let before = block.numbers.capacity();
         block.insert(code.place(), number);
         self.number_bytes += (block.numbers.capacity() - before) * size_of::<u32>();
-        grow::push(&mut self.rows, row);
+        growth::push(&mut self.rows, row);
         Some(Place::New(number))
     }
 
     /// Removes a voxel; the last voxel takes its number, which is given too.
-    pub(super) fn remove(&mut self, code: BlockKey) -> Option<(u32, Entry)> {
+    pub(crate) fn remove(&mut self, code: BlockKey) -> Option<(u32, Entry)> {
         let at = self.blocks.find(code.block())?;
         let block = self.blocks.row_mut(at)?;
         let number = block.remove(code.place())?;
@@ -270,12 +271,12 @@ impl CellTable {
         Some((number, entry))
     }
 
-    pub(super) fn clear(&mut self) {
+    pub(crate) fn clear(&mut self) {
         *self = CellTable::new();
     }
 
     /// Checks that every row is found and nothing else is in the blocks.
-    pub(super) fn validate(&self) -> Result<(), String> {
+    pub(crate) fn validate(&self) -> Result<(), String> {
         self.blocks.validate()?;
         for (number, row) in self.rows.iter().enumerate() {
             let found = BlockKey::from_raw(row.code).and_then(|code| self.find(code));

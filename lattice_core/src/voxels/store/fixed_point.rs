@@ -2,33 +2,33 @@
 
 use wide::u32x4;
 
-use super::{OFFSET_UNIT_M, Voxel};
 use crate::lattice::{BatchBlock, BatchQuantizer, BlockKey, Lattice, nearest_integer};
+use crate::voxels::{OFFSET_UNIT_M, Voxel};
 
 const PER_METRE: f64 = 1.0 / OFFSET_UNIT_M;
 
 /// Sums of positions from the datum in `OFFSET_UNIT_M`, modulo 2^32, and the number of points.
 ///
 /// Where the cell is known, so are the sums of [`most_points`], from its centre.
-pub(super) type Point = u32x4;
+pub(crate) type Point = u32x4;
 
 /// Sums of offsets from the centre of a cell in `OFFSET_UNIT_M`, and the number of points.
-pub(super) type Offsets = [i64; 4];
+pub(crate) type Offsets = [i64; 4];
 
 /// No point is farther from its lattice point than this, in `OFFSET_UNIT_M`, roundings included.
-pub(super) fn reach(lattice: &Lattice) -> u64 {
+pub(crate) fn reach(lattice: &Lattice) -> u64 {
     (lattice.covering_radius_m() * PER_METRE) as u64 + 2
 }
 
 /// The greatest number of points of a cell whose sums of offsets surely fit 32 bits: 1 at least, since
 /// no covering radius takes more.
-pub(super) fn most_points(lattice: &Lattice) -> u32 {
+pub(crate) fn most_points(lattice: &Lattice) -> u32 {
     (i32::MAX as u64 / reach(lattice)).max(1) as u32
 }
 
 /// A position (metres) in `OFFSET_UNIT_M`.
 #[inline(always)]
-pub(super) fn fixed(metres: [f64; 3]) -> [i64; 3] {
+pub(crate) fn fixed(metres: [f64; 3]) -> [i64; 3] {
     metres.map(|m| nearest_integer(m * PER_METRE))
 }
 
@@ -37,7 +37,7 @@ pub(super) fn fixed(metres: [f64; 3]) -> [i64; 3] {
 /// The base is rounded, then the offset, so that neither the other points of a cloud nor the way it
 /// is cut into blocks matters.
 #[derive(Clone, Copy)]
-pub(super) struct FixedBlock<'a> {
+pub(crate) struct FixedBlock<'a> {
     base: Point,
     offsets_m: &'a [[f32; 3]],
     near: Option<&'a [[i32; BatchQuantizer::BLOCK]; 3]>,
@@ -45,7 +45,7 @@ pub(super) struct FixedBlock<'a> {
 
 impl FixedBlock<'_> {
     /// Points at `base_m + offset`.
-    pub(super) fn new<'a>(
+    pub(crate) fn new<'a>(
         base_m: [f64; 3],
         offsets_m: &'a [[f32; 3]],
         block: &BatchBlock<'a>,
@@ -59,13 +59,13 @@ impl FixedBlock<'_> {
 
     /// The coordinates from the base, unless some point is far.
     #[inline(always)]
-    pub(super) fn near(&self) -> Option<(&[[i32; BatchQuantizer::BLOCK]; 3], Point)> {
+    pub(crate) fn near(&self) -> Option<(&[[i32; BatchQuantizer::BLOCK]; 3], Point)> {
         Some((self.near?, self.base))
     }
 
     /// Point number `i`.
     #[inline(always)]
-    pub(super) fn point(&self, i: usize) -> Point {
+    pub(crate) fn point(&self, i: usize) -> Point {
         match self.near {
             Some(near) => near_point(near, self.base, i),
             None => self.base + point_at(self.far(i), 1),
@@ -81,7 +81,7 @@ impl FixedBlock<'_> {
 
 /// Point number `i` of those whose coordinates from the base fit 32 bits.
 #[inline(always)]
-pub(super) fn near_point(
+pub(crate) fn near_point(
     [x, y, z]: &[[i32; BatchQuantizer::BLOCK]; 3],
     base: Point,
     i: usize,
@@ -109,7 +109,7 @@ fn low_center(lattice: &Lattice, code: BlockKey) -> [u32; 3] {
 
 /// At most [`most_points`] of a cell as offsets from its centre.
 #[inline]
-pub(super) fn offsets_of(lattice: &Lattice, code: BlockKey, points: &Point) -> Offsets {
+pub(crate) fn offsets_of(lattice: &Lattice, code: BlockKey, points: &Point) -> Offsets {
     let center = low_center(lattice, code);
     let [x, y, z, count] = points.to_array();
     let offset = |sum: u32, center: u32| {
@@ -126,7 +126,7 @@ pub(super) fn offsets_of(lattice: &Lattice, code: BlockKey, points: &Point) -> O
 
 /// The inverse of [`offsets_of`].
 #[inline]
-pub(super) fn points_of(lattice: &Lattice, code: BlockKey, offsets: &Offsets) -> Point {
+pub(crate) fn points_of(lattice: &Lattice, code: BlockKey, offsets: &Offsets) -> Point {
     let center = low_center(lattice, code);
     let [.., count] = offsets.map(low);
     let sum = |i: usize| low(offsets[i]).wrapping_add(center[i].wrapping_mul(count));
@@ -135,7 +135,7 @@ pub(super) fn points_of(lattice: &Lattice, code: BlockKey, offsets: &Offsets) ->
 
 /// A voxel of these points.
 #[inline]
-pub(super) fn voxel_of([x, y, z, count]: Offsets) -> Voxel {
+pub(crate) fn voxel_of([x, y, z, count]: Offsets) -> Voxel {
     Voxel {
         count: u32::try_from(count).unwrap_or(u32::MAX),
         sum: [x, y, z],
@@ -144,19 +144,19 @@ pub(super) fn voxel_of([x, y, z, count]: Offsets) -> Voxel {
 
 /// The points of a voxel.
 #[inline]
-pub(super) fn offsets_in(voxel: &Voxel) -> Offsets {
+pub(crate) fn offsets_in(voxel: &Voxel) -> Offsets {
     let [x, y, z] = voxel.sum;
     [x, y, z, i64::from(voxel.count)]
 }
 
 /// Of second moments: offsets are counted in a 2^16th of the covering radius, so that the moments
 /// of 2^31 points fit.
-pub(super) fn moment_unit_m(lattice: &Lattice) -> f64 {
+pub(crate) fn moment_unit_m(lattice: &Lattice) -> f64 {
     lattice.covering_radius_m() / f64::from(1_u32 << 16)
 }
 
 /// What a point at `offset` from its cell's centre adds to the moments.
-pub(super) fn moments_of(offset: [i64; 3], unit_m: f64) -> [i64; 6] {
+pub(crate) fn moments_of(offset: [i64; 3], unit_m: f64) -> [i64; 6] {
     let [x, y, z] = offset.map(|o| nearest_integer(o as f64 * OFFSET_UNIT_M / unit_m));
     [x * x, x * y, x * z, y * y, y * z, z * z]
 }

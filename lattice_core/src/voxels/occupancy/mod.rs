@@ -4,9 +4,11 @@ use std::fmt;
 
 use nalgebra::Vector3;
 
-use super::recent::Recent;
-use super::table::{Place, Row, Table};
-use super::{DatumError, InsertReport, VoxelStore, morton};
+use recent_cells::Recent;
+
+use super::store::block_mask::{self, BlockMask};
+use super::store::hash_table::{Place, Row, Table};
+use super::{DatumError, InsertReport, VoxelStore};
 use crate::cloud::Cloud;
 use crate::lattice::{BlockKey, Lattice, LatticeIndex, MortonKey};
 
@@ -15,14 +17,11 @@ const BLOCK_BYTES: usize = Table::<Block>::ROW_BYTES;
 /// Most memory besides that of blocks.
 const FIRST_BYTES: usize = Table::<Block>::FIRST_BYTES + Recent::BYTES;
 
-/// The cells of a block, one bit each, by their place.
-pub(super) type Leaf = [u64; 8];
-
 /// A block with occupied cells.
 #[derive(Clone)]
 pub(super) struct Block {
     pub(super) code: u64,
-    pub(super) leaf: Leaf,
+    pub(super) leaf: BlockMask,
 }
 
 impl Row for Block {
@@ -90,14 +89,14 @@ impl OccupancyList {
                 list.add_block(block, &leaf);
                 (block, leaf) = (its_block, [0; 8]);
             }
-            morton::set(&mut leaf, key);
+            block_mask::set(&mut leaf, key);
         }
         list.add_block(block, &leaf);
         list
     }
 
     /// Adds the cells of a block, by the bits that their keys share; does nothing if the list is full.
-    fn add_block(&mut self, morton: u64, leaf: &Leaf) {
+    fn add_block(&mut self, morton: u64, leaf: &BlockMask) {
         let Some(first) = morton.checked_mul(512).and_then(MortonKey::from_raw) else {
             return;
         };
@@ -196,7 +195,7 @@ impl OccupancyList {
     pub(super) fn has(&self, code: BlockKey) -> bool {
         let number = self.blocks.find(code.block());
         let block = number.and_then(|number| self.blocks.rows().get(number as usize));
-        block.is_some_and(|block| is_set(&block.leaf, code.place()))
+        block.is_some_and(|block| block_mask::is_set(&block.leaf, code.place()))
     }
 }
 
@@ -214,12 +213,6 @@ impl Default for Last {
             number: 0,
         }
     }
-}
-
-#[inline(always)]
-pub(super) fn is_set(leaf: &Leaf, place: usize) -> bool {
-    leaf.get(place >> 6)
-        .is_some_and(|word| word >> (place & 63) & 1 != 0)
 }
 
 impl VoxelStore for OccupancyList {
@@ -244,7 +237,8 @@ impl VoxelStore for OccupancyList {
     }
 
     fn sorted_keys(&self) -> Vec<MortonKey> {
-        super::morton::sorted_keys(self.blocks.rows(), self.len)
+        let blocks = self.blocks.rows().iter();
+        block_mask::sorted_keys(blocks.map(|block| (block.code, &block.leaf)), self.len)
     }
 
     /// The outcome does not depend on the number of threads of the current rayon pool.
@@ -260,7 +254,7 @@ impl VoxelStore for OccupancyList {
         let Some(block) = self.blocks.row_mut(number) else {
             return false;
         };
-        if !is_set(&block.leaf, code.place()) {
+        if !block_mask::is_set(&block.leaf, code.place()) {
             return false;
         }
         if let Some(word) = block.leaf.get_mut(code.place() >> 6) {
@@ -300,7 +294,9 @@ impl fmt::Debug for OccupancyList {
 
 mod insert;
 mod merge;
+mod neighbors;
 mod overlap;
+mod recent_cells;
 mod retain;
 #[cfg(test)]
 mod tests;

@@ -1,9 +1,8 @@
 //! A pass over all voxels that counts their occupied neighbours.
 
 use super::OccupancyList;
-use super::morton::places;
-use super::occupancy::Leaf;
 use crate::lattice::{BlockKey, LatticeIndex};
+use crate::voxels::store::block_mask::{BlockMask, places};
 
 /// Blocks around a block, itself included.
 const AROUND: usize = 27;
@@ -85,7 +84,7 @@ impl OccupancyList {
         }
     }
 
-    fn leaf(&self, block: u64) -> Leaf {
+    fn leaf(&self, block: u64) -> BlockMask {
         let number = self.blocks.find(block);
         let row = number.and_then(|number| self.blocks.rows().get(number as usize));
         row.map_or([0; 8], |row| row.leaf)

@@ -1,16 +1,16 @@
 //! Vectors that keep little room to spare.
 
 /// Items that there is room for at first.
-pub(super) const FIRST: usize = 64;
+pub(crate) const FIRST: usize = 64;
 
 /// Most bytes for an item in a vector that grows by [`push`], but for the first.
-pub(super) const fn most_bytes<T>() -> usize {
+pub(crate) const fn most_bytes<T>() -> usize {
     size_of::<T>() + size_of::<T>() / 4 + 1
 }
 
 /// Appends an item. The vector grows by a quarter instead of twofold: the memory held counts.
 #[inline(always)]
-pub(super) fn push<T>(vec: &mut Vec<T>, item: T) {
+pub(crate) fn push<T>(vec: &mut Vec<T>, item: T) {
     if vec.len() == vec.capacity() {
         reserve(vec);
     }

@@ -1,6 +1,6 @@
 //! Points gathered by cell before they reach the table.
 
-use super::fixed::Point;
+use super::fixed_point::Point;
 use crate::lattice::{BatchQuantizer, BlockKey};
 
 const BLOCK: usize = BatchQuantizer::BLOCK;
@@ -9,9 +9,9 @@ const SLOTS: usize = 1 << SLOTS_LOG2;
 
 /// Points of one cell.
 #[derive(Clone, Copy, Debug)]
-pub(super) struct Partial {
-    pub(super) code: BlockKey,
-    pub(super) points: Point,
+pub(crate) struct Partial {
+    pub(crate) code: BlockKey,
+    pub(crate) points: Point,
 }
 
 const EMPTY: Partial = Partial {
@@ -28,7 +28,7 @@ const SCATTERED: (usize, usize) = (1, 5);
 /// Neighbouring beams and successive scans fill the same cells: most points end here, and the large
 /// table sees a cell once for many points.
 #[derive(Clone, Debug)]
-pub(super) struct Gather {
+pub(crate) struct Gather {
     slots: Vec<Partial>,
     /// What a block of points moved out of its slots.
     moved: Vec<Partial>,
@@ -36,7 +36,7 @@ pub(super) struct Gather {
 }
 
 impl Gather {
-    pub(super) fn new() -> Gather {
+    pub(crate) fn new() -> Gather {
         Gather {
             slots: vec![EMPTY; SLOTS],
             moved: vec![EMPTY; 2 * BLOCK],
@@ -47,7 +47,7 @@ impl Gather {
     /// Adds the points of a block in order, each as its number's `point`; gives the cells that had to
     /// make room for others, or have `most_points`. [`BlockKey::NONE`] may be among them.
     #[inline(always)]
-    pub(super) fn add(
+    pub(crate) fn add(
         &mut self,
         codes: &[BlockKey],
         point: impl Fn(usize) -> Point,
@@ -104,7 +104,7 @@ impl Gather {
     }
 
     /// Hands out all cells.
-    pub(super) fn drain(&mut self) -> impl Iterator<Item = Partial> {
+    pub(crate) fn drain(&mut self) -> impl Iterator<Item = Partial> {
         let slots = self.slots.iter_mut();
         let partials = slots.map(|slot| std::mem::replace(slot, EMPTY));
         partials.filter(|partial| partial.code != BlockKey::NONE)

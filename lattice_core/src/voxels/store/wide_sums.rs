@@ -1,14 +1,14 @@
 //! Sums that do not fit the rows of a table.
 
-use super::fixed::Offsets;
-use super::grow;
+use super::fixed_point::Offsets;
+use super::growth;
 
 /// No row.
 const NONE: u32 = u32::MAX;
 
 /// Sums with numbers of their own, which are used again.
 #[derive(Clone)]
-pub(super) struct WideSums {
+pub(crate) struct WideSums {
     rows: Vec<Offsets>,
     /// The last number that was given back; its row holds the one before.
     free: u32,
@@ -16,41 +16,41 @@ pub(super) struct WideSums {
 
 impl WideSums {
     /// Most bytes for a row.
-    pub(super) const ROW_BYTES: usize = grow::most_bytes::<Offsets>();
+    pub(crate) const ROW_BYTES: usize = growth::most_bytes::<Offsets>();
     /// Most bytes besides those of rows.
-    pub(super) const FIRST_BYTES: usize = grow::FIRST * size_of::<Offsets>();
+    pub(crate) const FIRST_BYTES: usize = growth::FIRST * size_of::<Offsets>();
 
-    pub(super) fn new() -> WideSums {
+    pub(crate) fn new() -> WideSums {
         WideSums {
             rows: Vec::new(),
             free: NONE,
         }
     }
 
-    pub(super) fn bytes(&self) -> usize {
+    pub(crate) fn bytes(&self) -> usize {
         self.rows.capacity() * size_of::<Offsets>()
     }
 
     /// Keeps sums; gives their number, which is below 2^32 - 1.
-    pub(super) fn put(&mut self, sums: Offsets) -> u32 {
+    pub(crate) fn put(&mut self, sums: Offsets) -> u32 {
         let number = self.free;
         if let Some(row) = self.rows.get_mut(number as usize) {
             self.free = row[0] as u32;
             *row = sums;
             number
         } else {
-            grow::push(&mut self.rows, sums);
+            growth::push(&mut self.rows, sums);
             (self.rows.len() - 1) as u32
         }
     }
 
     /// The sums of a number; zero for numbers that were not given.
-    pub(super) fn get(&self, number: u32) -> Offsets {
+    pub(crate) fn get(&self, number: u32) -> Offsets {
         self.rows.get(number as usize).copied().unwrap_or_default()
     }
 
     /// Adds to the sums of a number and gives the number of points; sums wrap.
-    pub(super) fn add(&mut self, number: u32, more: &Offsets) -> i64 {
+    pub(crate) fn add(&mut self, number: u32, more: &Offsets) -> i64 {
         let Some(sums) = self.rows.get_mut(number as usize) else {
             return 0;
         };
@@ -61,19 +61,19 @@ impl WideSums {
     }
 
     /// Takes a number back.
-    pub(super) fn free(&mut self, number: u32) {
+    pub(crate) fn free(&mut self, number: u32) {
         if let Some(row) = self.rows.get_mut(number as usize) {
             *row = [i64::from(self.free), 0, 0, 0];
             self.free = number;
         }
     }
 
-    pub(super) fn clear(&mut self) {
+    pub(crate) fn clear(&mut self) {
         *self = WideSums::new();
     }
 
     /// Numbers in use.
-    pub(super) fn used(&self) -> usize {
+    pub(crate) fn used(&self) -> usize {
         let mut free = 0;
         let mut next = self.free;
         while let Some(row) = self.rows.get(next as usize) {

@@ -2,26 +2,26 @@
 
 use rustc_hash::FxHashMap;
 
-use super::Voxel;
-use super::cells::CellTable;
-use super::columns::Columns;
-use super::fixed::{Offsets, Point, most_points, offsets_of, points_of, voxel_of};
-use super::gather::Partial;
-use super::table::Place;
-use super::wide::WideSums;
+use super::cell_table::CellTable;
+use super::fixed_point::{Offsets, Point, most_points, offsets_of, points_of, voxel_of};
+use super::hash_table::Place;
+use super::payload_columns::Columns;
+use super::point_gather::Partial;
+use super::wide_sums::WideSums;
 use crate::lattice::{BlockKey, Lattice};
+use crate::voxels::Voxel;
 
 /// Number of parts of a list.
-pub(super) const SHARDS: usize = 16;
+pub(crate) const SHARDS: usize = 16;
 
 /// Cells that are searched together.
-pub(super) const BATCH: usize = 128;
+pub(crate) const BATCH: usize = 128;
 
 /// When a voxel came and when it last changed, as states of the list.
 #[derive(Clone, Copy, PartialEq, Eq, Debug)]
-pub(super) struct Life {
-    pub(super) born: u32,
-    pub(super) touched: u32,
+pub(crate) struct Life {
+    pub(crate) born: u32,
+    pub(crate) touched: u32,
 }
 
 impl Life {
@@ -35,29 +35,29 @@ impl Life {
 
 /// A voxel.
 #[derive(Clone)]
-pub(super) struct Entry {
-    pub(super) code: u64,
+pub(crate) struct Entry {
+    pub(crate) code: u64,
     /// Of up to [`most_points`]; of more the number of their [`WideSums`], and the count.
     points: Point,
-    pub(super) life: Life,
+    pub(crate) life: Life,
 }
 
 /// The voxels of some blocks, in the order of their arrival.
 #[derive(Clone)]
-pub(super) struct Shard {
-    pub(super) voxels: CellTable,
-    pub(super) columns: Columns,
+pub(crate) struct Shard {
+    pub(crate) voxels: CellTable,
+    pub(crate) columns: Columns,
     lattice: Lattice,
     most_points: u32,
     wide: WideSums,
     /// Voxels that went: when they had come, and when they went.
-    pub(super) removed: FxHashMap<u64, Life>,
+    pub(crate) removed: FxHashMap<u64, Life>,
 }
 
 impl Entry {
     /// Number of points; stays at `u32::MAX` once there.
     #[inline(always)]
-    pub(super) fn count(&self) -> u32 {
+    pub(crate) fn count(&self) -> u32 {
         self.points.as_array()[3]
     }
 
@@ -69,17 +69,17 @@ impl Entry {
 
 /// Which shard a cell belongs to: all cells of a block to one.
 #[inline(always)]
-pub(super) fn shard_of(code: BlockKey) -> usize {
+pub(crate) fn shard_of(code: BlockKey) -> usize {
     (code.block().wrapping_mul(0x9e37_79b9_7f4a_7c15) >> 60) as usize
 }
 
 impl Shard {
     /// Most bytes for a voxel, its columns and its memory once it is removed aside.
-    pub(super) const VOXEL_BYTES: usize = CellTable::VOXEL_BYTES + WideSums::ROW_BYTES;
+    pub(crate) const VOXEL_BYTES: usize = CellTable::VOXEL_BYTES + WideSums::ROW_BYTES;
     /// Most bytes besides those of voxels.
-    pub(super) const FIRST_BYTES: usize = CellTable::FIRST_BYTES + WideSums::FIRST_BYTES;
+    pub(crate) const FIRST_BYTES: usize = CellTable::FIRST_BYTES + WideSums::FIRST_BYTES;
 
-    pub(super) fn new(lattice: &Lattice, columns: Columns) -> Shard {
+    pub(crate) fn new(lattice: &Lattice, columns: Columns) -> Shard {
         Shard {
             voxels: CellTable::new(),
             columns,
@@ -90,11 +90,11 @@ impl Shard {
         }
     }
 
-    pub(super) fn len(&self) -> usize {
+    pub(crate) fn len(&self) -> usize {
         self.voxels.len()
     }
 
-    pub(super) fn bytes(&self) -> usize {
+    pub(crate) fn bytes(&self) -> usize {
         self.voxels.bytes()
             + self.columns.bytes()
             + self.wide.bytes()
@@ -103,14 +103,14 @@ impl Shard {
 
     /// The voxel of a cell, with its number.
     #[inline]
-    pub(super) fn get(&self, code: BlockKey) -> Option<(u32, &Entry)> {
+    pub(crate) fn get(&self, code: BlockKey) -> Option<(u32, &Entry)> {
         let number = self.voxels.find(code)?;
         Some((number, self.voxels.rows().get(number as usize)?))
     }
 
     /// The number of a cell, which becomes a voxel if fewer than `limit` are there.
     #[inline(always)]
-    pub(super) fn find_or_add(&mut self, code: BlockKey, limit: usize, now: u32) -> Option<u32> {
+    pub(crate) fn find_or_add(&mut self, code: BlockKey, limit: usize, now: u32) -> Option<u32> {
         let empty = || Entry {
             code: code.raw(),
             points: Point::ZERO,
@@ -146,7 +146,7 @@ impl Shard {
 
     /// Adds up to [`most_points`] to a voxel.
     #[inline(always)]
-    pub(super) fn add(&mut self, number: u32, points: &Point, now: u32) {
+    pub(crate) fn add(&mut self, number: u32, points: &Point, now: u32) {
         let Some(entry) = self.voxels.row_mut(number) else {
             return;
         };
@@ -159,7 +159,7 @@ impl Shard {
     }
 
     /// Adds any number of points to a voxel.
-    pub(super) fn add_offsets(&mut self, number: u32, offsets: &Offsets, now: u32) {
+    pub(crate) fn add_offsets(&mut self, number: u32, offsets: &Offsets, now: u32) {
         match self.voxels.row_mut(number) {
             Some(entry) if offsets[3] <= i64::from(self.most_points) => {
                 let code = BlockKey::from_raw(entry.code).unwrap_or(BlockKey::NONE);
@@ -192,7 +192,7 @@ impl Shard {
 
     /// Of the points of a voxel.
     #[inline]
-    pub(super) fn offsets(&self, code: BlockKey, entry: &Entry) -> Offsets {
+    pub(crate) fn offsets(&self, code: BlockKey, entry: &Entry) -> Offsets {
         if entry.count() <= self.most_points {
             offsets_of(&self.lattice, code, &entry.points)
         } else {
@@ -202,13 +202,13 @@ impl Shard {
 
     /// A voxel as others see it.
     #[inline]
-    pub(super) fn voxel(&self, code: BlockKey, entry: &Entry) -> Voxel {
+    pub(crate) fn voxel(&self, code: BlockKey, entry: &Entry) -> Voxel {
         voxel_of(self.offsets(code, entry))
     }
 
     /// Adds the gathered points of cells of this shard in steps, so that the waits for memory of
     /// one step overlap.
-    pub(super) fn add_batch(&mut self, batch: &[Partial], now: u32) {
+    pub(crate) fn add_batch(&mut self, batch: &[Partial], now: u32) {
         #[cfg(target_arch = "x86_64")]
         if is_x86_feature_detected!("popcnt") {
             // SAFETY: the machine has the instruction.
@@ -250,7 +250,7 @@ impl Shard {
     }
 
     /// Removes a voxel; false if it was not there.
-    pub(super) fn remove(&mut self, code: BlockKey, now: u32) -> bool {
+    pub(crate) fn remove(&mut self, code: BlockKey, now: u32) -> bool {
         let Some((number, entry)) = self.voxels.remove(code) else {
             return false;
         };
@@ -263,7 +263,7 @@ impl Shard {
     }
 
     /// Removes all voxels.
-    pub(super) fn clear(&mut self, now: u32) {
+    pub(crate) fn clear(&mut self, now: u32) {
         for entry in self.voxels.rows() {
             self.removed.insert(entry.code, entry.life.ended(now));
         }
@@ -273,12 +273,12 @@ impl Shard {
     }
 
     /// Every voxel with its cell.
-    pub(super) fn iter(&self) -> impl Iterator<Item = (BlockKey, &Entry)> {
+    pub(crate) fn iter(&self) -> impl Iterator<Item = (BlockKey, &Entry)> {
         let rows = self.voxels.rows().iter();
         rows.filter_map(|entry| Some((BlockKey::from_raw(entry.code)?, entry)))
     }
 
-    pub(super) fn validate(&self) -> Result<(), String> {
+    pub(crate) fn validate(&self) -> Result<(), String> {
         self.voxels.validate()?;
         if !self.columns.fits(self.len()) {
             return Err("the columns of a shard differ in length".to_owned());

@@ -1,9 +1,11 @@
-//! Cells of blocks in the order of their keys.
+//! One bit for each cell of a block, and the order of cells by their keys.
 
 use rayon::slice::ParallelSliceMut;
 
-use super::occupancy::{Block, Leaf};
 use crate::lattice::{BlockKey, MortonKey};
+
+/// The cells of a block, one bit each, by their place.
+pub(crate) type BlockMask = [u64; 8];
 
 /// The low nine bits of the key of each place in a block.
 static MORTON_OF_PLACE: [u16; BlockKey::BLOCK_CELLS] = {
@@ -36,14 +38,21 @@ static PLACE_OF_MORTON: [u16; BlockKey::BLOCK_CELLS] = {
 
 /// Sets the bit of a cell of the block, by the low nine bits of its key.
 #[inline(always)]
-pub(super) fn set(leaf: &mut Leaf, key: MortonKey) {
+pub(crate) fn set(leaf: &mut BlockMask, key: MortonKey) {
     let place = usize::from(PLACE_OF_MORTON[key.raw() as usize % BlockKey::BLOCK_CELLS]);
     leaf[place >> 6 & 7] |= 1 << (place & 63);
 }
 
+/// True if the cell at `place` of the block is occupied.
+#[inline(always)]
+pub(crate) fn is_set(leaf: &BlockMask, place: usize) -> bool {
+    leaf.get(place >> 6)
+        .is_some_and(|word| word >> (place & 63) & 1 != 0)
+}
+
 /// Positions of the bits that are set.
 #[inline]
-pub(super) fn places(leaf: &Leaf) -> impl Iterator<Item = usize> + '_ {
+pub(crate) fn places(leaf: &BlockMask) -> impl Iterator<Item = usize> + '_ {
     leaf.iter().enumerate().flat_map(|(word, &bits)| {
         let mut bits = bits;
         std::iter::from_fn(move || {
@@ -55,16 +64,18 @@ pub(super) fn places(leaf: &Leaf) -> impl Iterator<Item = usize> + '_ {
 }
 
 /// All `len` cells of the blocks as ascending keys: blocks are sorted, not cells.
-pub(super) fn sorted_keys(blocks: &[Block], len: usize) -> Vec<MortonKey> {
+pub(crate) fn sorted_keys<'a>(
+    blocks: impl Iterator<Item = (u64, &'a BlockMask)>,
+    len: usize,
+) -> Vec<MortonKey> {
     let first_key = |block: u64| BlockKey::from_raw(block << 9).and_then(BlockKey::key);
-    let mut order: Vec<(u64, &Leaf)> = blocks
-        .iter()
-        .filter_map(|block| Some((first_key(block.code)?.raw(), &block.leaf)))
+    let mut order: Vec<(u64, &BlockMask)> = blocks
+        .filter_map(|(block, mask)| Some((first_key(block)?.raw(), mask)))
         .collect();
     order.par_sort_unstable_by_key(|&(key, _)| key);
     let mut keys = Vec::with_capacity(len);
     for (first, leaf) in order {
-        let mut turned: Leaf = [0; 8];
+        let mut turned: BlockMask = [0; 8];
         for place in places(leaf) {
             let morton = usize::from(MORTON_OF_PLACE.get(place).copied().unwrap_or(0));
             if let Some(word) = turned.get_mut(morton >> 6) {

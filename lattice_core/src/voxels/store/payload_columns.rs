@@ -1,6 +1,6 @@
 //! What is kept of a voxel besides count and sum of its points.
 
-use super::grow;
+use super::growth;
 
 /// Which further columns a list keeps; each costs memory and time.
 #[derive(Clone, Copy, PartialEq, Eq, Debug, Default)]
@@ -40,7 +40,7 @@ pub struct Stamps {
 
 impl Stamps {
     /// Of no points.
-    pub(super) const NONE: Stamps = Stamps {
+    pub(crate) const NONE: Stamps = Stamps {
         first_ns: i64::MAX,
         last_ns: i64::MIN,
     };
@@ -52,27 +52,27 @@ impl Stamps {
 }
 
 /// Sums of products of offsets from the cell centre: xx, xy, xz, yy, yz, zz, in units of the list.
-pub(super) type Moments = [i64; 6];
+pub(crate) type Moments = [i64; 6];
 
 /// The further columns of a shard; those that are not kept are empty.
 #[derive(Clone, PartialEq, Debug)]
-pub(super) struct Columns {
+pub(crate) struct Columns {
     payload: Payload,
-    pub(super) moments: Vec<Moments>,
-    pub(super) stamps: Vec<Stamps>,
-    pub(super) labels: Vec<Vec<LabelCount>>,
+    pub(crate) moments: Vec<Moments>,
+    pub(crate) stamps: Vec<Stamps>,
+    pub(crate) labels: Vec<Vec<LabelCount>>,
 }
 
 /// What points add to the further columns of a voxel.
 #[derive(Clone, Debug, Default)]
-pub(super) struct Details {
-    pub(super) moments: Moments,
-    pub(super) stamps: Option<Stamps>,
-    pub(super) labels: Vec<LabelCount>,
+pub(crate) struct Details {
+    pub(crate) moments: Moments,
+    pub(crate) stamps: Option<Stamps>,
+    pub(crate) labels: Vec<LabelCount>,
 }
 
 impl Columns {
-    pub(super) fn new(payload: Payload) -> Columns {
+    pub(crate) fn new(payload: Payload) -> Columns {
         Columns {
             payload,
             moments: Vec::new(),
@@ -82,37 +82,37 @@ impl Columns {
     }
 
     /// Which columns are kept.
-    pub(super) fn payload(&self) -> Payload {
+    pub(crate) fn payload(&self) -> Payload {
         self.payload
     }
 
     /// Keeps these moments, a row for each voxel.
-    pub(super) fn set_moments(&mut self, moments: Vec<Moments>) {
+    pub(crate) fn set_moments(&mut self, moments: Vec<Moments>) {
         self.payload.moments = true;
         self.moments = moments;
     }
 
     /// Keeps these stamps, a row for each voxel.
-    pub(super) fn set_stamps(&mut self, stamps: Vec<Stamps>) {
+    pub(crate) fn set_stamps(&mut self, stamps: Vec<Stamps>) {
         self.payload.stamps = true;
         self.stamps = stamps;
     }
 
     /// Keeps these labels, a row for each voxel.
-    pub(super) fn set_labels(&mut self, labels: Vec<Vec<LabelCount>>) {
+    pub(crate) fn set_labels(&mut self, labels: Vec<Vec<LabelCount>>) {
         self.payload.labels = true;
         self.labels = labels;
     }
 
     /// Appends row `number` of columns of the same payload.
-    pub(super) fn push_row(&mut self, other: &Columns, number: usize) {
+    pub(crate) fn push_row(&mut self, other: &Columns, number: usize) {
         self.moments.extend(other.moments.get(number));
         self.stamps.extend(other.stamps.get(number));
         self.labels.extend(other.labels.get(number).cloned());
     }
 
     /// The rows with these numbers, in this order.
-    pub(super) fn gather(&self, numbers: impl Iterator<Item = usize>) -> Columns {
+    pub(crate) fn gather(&self, numbers: impl Iterator<Item = usize>) -> Columns {
         let mut gathered = Columns::new(self.payload);
         if !self.payload.is_plain() {
             numbers.for_each(|number| gathered.push_row(self, number));
@@ -120,20 +120,20 @@ impl Columns {
         gathered
     }
 
-    pub(super) fn push(&mut self) {
+    pub(crate) fn push(&mut self) {
         if self.payload.moments {
-            grow::push(&mut self.moments, [0; 6]);
+            growth::push(&mut self.moments, [0; 6]);
         }
         if self.payload.stamps {
-            grow::push(&mut self.stamps, Stamps::NONE);
+            growth::push(&mut self.stamps, Stamps::NONE);
         }
         if self.payload.labels {
-            grow::push(&mut self.labels, Vec::new());
+            growth::push(&mut self.labels, Vec::new());
         }
     }
 
     /// Adds to the columns of voxel `number` that are kept.
-    pub(super) fn add(&mut self, number: usize, details: &Details) {
+    pub(crate) fn add(&mut self, number: usize, details: &Details) {
         if let Some(moments) = self.moments.get_mut(number) {
             for (sum, term) in moments.iter_mut().zip(details.moments) {
                 *sum = sum.wrapping_add(term);
@@ -157,7 +157,7 @@ impl Columns {
     }
 
     /// What the columns hold of voxel `number`.
-    pub(super) fn get(&self, number: usize) -> Details {
+    pub(crate) fn get(&self, number: usize) -> Details {
         Details {
             moments: self.moments.get(number).copied().unwrap_or_default(),
             stamps: self.stamps.get(number).copied(),
@@ -165,7 +165,7 @@ impl Columns {
         }
     }
 
-    pub(super) fn swap_remove(&mut self, number: usize) {
+    pub(crate) fn swap_remove(&mut self, number: usize) {
         if self.payload.moments {
             self.moments.swap_remove(number);
         }
@@ -177,11 +177,11 @@ impl Columns {
         }
     }
 
-    pub(super) fn clear(&mut self) {
+    pub(crate) fn clear(&mut self) {
         *self = Columns::new(self.payload);
     }
 
-    pub(super) fn bytes(&self) -> usize {
+    pub(crate) fn bytes(&self) -> usize {
         let labels = self
             .labels
             .iter()
@@ -193,7 +193,7 @@ impl Columns {
     }
 
     /// True if every column that is kept has `len` rows and no other has any.
-    pub(super) fn fits(&self, len: usize) -> bool {
+    pub(crate) fn fits(&self, len: usize) -> bool {
         let expected = |kept: bool| if kept { len } else { 0 };
         self.moments.len() == expected(self.payload.moments)
             && self.stamps.len() == expected(self.payload.stamps)
