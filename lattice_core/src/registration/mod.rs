@@ -9,16 +9,11 @@ mod error;
 mod labels;
 mod likelihood;
 mod options;
-mod pairs;
-mod plane;
 mod prepared;
 pub mod search;
 mod solver;
-mod surface;
-mod system;
 #[cfg(test)]
 mod testing;
-mod tree;
 
 pub use calibrate::{
     Calibration, CalibrationMap, CalibrationOptions, CalibrationRequest, ClassReliability,
@@ -32,6 +27,6 @@ pub use error::RegistrationError;
 pub use labels::{LabelDistribution, UNLABELED};
 pub use likelihood::{Fit, FitScale, Likelihood, Partners};
 pub use options::{LabelUse, MAX_CANDIDATES, Method, PairWeight, RegisterOptions, SemanticVariant};
+pub use prepared::kd_tree::{MAX_NEIGHBORS, Neighbors};
 pub use prepared::{MAX_COORDINATE_M, PrepareOptions, PreparedCloud};
 pub use solver::{Registration, register};
-pub use tree::{MAX_NEIGHBORS, Neighbors};

@@ -7,7 +7,7 @@
 use nalgebra::Point3;
 
 /// Points of a leaf.
-pub(super) const BLOCK: usize = 8;
+pub(crate) const BLOCK: usize = 8;
 /// Smallest number of points whose halves are built in parallel.
 const PARALLEL: usize = 4096;
 
@@ -16,7 +16,7 @@ type Block = [[f64; BLOCK]; 3];
 
 /// A point and its place in the cloud, while the tree is built.
 #[derive(Clone, Copy)]
-pub(super) struct Item {
+pub(crate) struct Item {
     pub coords_m: [f64; 3],
     pub index: u32,
 }
@@ -29,13 +29,13 @@ struct Split {
 }
 
 /// The tree. Answers are positions in the order of the points it was built to.
-pub(super) struct Tree {
+pub(crate) struct Tree {
     blocks: Vec<Block>,
     splits: Vec<Split>,
 }
 
 /// What a search keeps.
-pub(super) trait Keep {
+pub(crate) trait Keep {
     /// Squared distance beyond which nothing is of interest.
     fn reach(&self) -> f64;
     /// A point within reach, or at it.
@@ -44,7 +44,7 @@ pub(super) trait Keep {
 
 impl Tree {
     /// Sorts finite points into the order of the tree and builds it; the same on any number of threads.
-    pub(super) fn build(items: &mut [Item]) -> Tree {
+    pub(crate) fn build(items: &mut [Item]) -> Tree {
         let blocks = items.len().div_ceil(BLOCK);
         let mut splits = vec![Split::default(); blocks];
         sort(items, &mut splits);
@@ -65,7 +65,7 @@ impl Tree {
 
     /// Offers every point within the reach.
     #[inline]
-    pub(super) fn search(&self, query: &Point3<f64>, keep: &mut impl Keep) {
+    pub(crate) fn search(&self, query: &Point3<f64>, keep: &mut impl Keep) {
         let q = [query.x, query.y, query.z, 0.0];
         if !self.blocks.is_empty() {
             self.descend(0, self.blocks.len() as u32, [0.0; 4], &q, keep);
@@ -154,7 +154,7 @@ fn widest_axis(items: &[Item]) -> usize {
 }
 
 /// Keeps the nearest point.
-pub(super) struct Nearest {
+pub(crate) struct Nearest {
     pub index: u32,
     pub squared: f64,
 }
@@ -200,7 +200,7 @@ impl Default for Neighbors {
 
 impl Neighbors {
     /// Empty, for `k` neighbours (at most [`MAX_NEIGHBORS`]) within a squared distance.
-    pub(super) fn start(&mut self, k: usize, squared: f64) {
+    pub(crate) fn start(&mut self, k: usize, squared: f64) {
         self.len = 0;
         self.k = k.min(MAX_NEIGHBORS);
         self.reach = if self.k == 0 {
@@ -227,12 +227,12 @@ impl Neighbors {
     }
 
     /// Squared distance of the last of `k` neighbours, if there are so many.
-    pub(super) fn farthest_of(&self, k: usize) -> Option<f64> {
+    pub(crate) fn farthest_of(&self, k: usize) -> Option<f64> {
         (self.len == k && k > 0).then(|| self.squared[k - 1])
     }
 
     /// Indices of what was found.
-    pub(super) fn indices(&self) -> &[u32] {
+    pub(crate) fn indices(&self) -> &[u32] {
         &self.index[..self.len]
     }
 }

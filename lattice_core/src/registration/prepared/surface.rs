@@ -3,8 +3,8 @@
 use nalgebra::{Point3, Vector3};
 use rayon::prelude::*;
 
+use super::kd_tree::{Item, Neighbors, Tree};
 use super::plane;
-use super::tree::{Item, Neighbors, Tree};
 
 /// Points of one piece of parallel work.
 const CHUNK: usize = 512;
@@ -12,7 +12,7 @@ const CHUNK: usize = 512;
 const SLACK: f64 = 1.0 + 1e-12;
 
 /// Points in the order of their tree, with the normals of the planes around them.
-pub(super) struct Surface {
+pub(crate) struct Surface {
     pub points_m: Vec<Point3<f64>>,
     pub normals: Vec<Vector3<f64>>,
     /// Place of each point in what the surface was made of.

@@ -1,9 +1,20 @@
 //! Levenberg-Marquardt on SE(3), between searches for pairs.
+//!
+//! To be read in this order: this file has the loop, [`pairs`] finds the pairs of a pose,
+//! [`pair_weights`] weighs them, [`pair`] measures one, [`robust_kernel`] limits its cost,
+//! [`normal_equations`] sums up their linear system.
+
+mod normal_equations;
+mod pair;
+mod pair_weights;
+mod pairs;
+mod robust_kernel;
 
 use nalgebra::{Isometry3, Matrix6, Vector6};
 
-use super::pairs::Pairs;
-use super::system::Sums;
+use normal_equations::Sums;
+use pairs::Pairs;
+
 use super::{Method, PreparedCloud, RegisterOptions, SemanticVariant};
 use crate::pose::se3;
 

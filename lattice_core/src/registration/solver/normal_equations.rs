@@ -4,144 +4,10 @@
 //! r into r - rho - phi x z, so J = [-I, [z]x]; with axes turned by R^T it is the right perturbation
 //! T Exp(delta).
 
-use nalgebra::{Isometry3, Matrix3, Matrix6, Point3, Vector3, Vector6};
+use nalgebra::{Isometry3, Matrix3, Matrix6, Vector3, Vector6};
 
-/// How the distance of a pair is measured.
-#[derive(Clone, Copy, Debug)]
-pub(super) enum Metric {
-    /// |r|^2.
-    Points,
-    /// r^T (C_t + R C_s R^T)^-1 r, where C = I - flatness n n^T.
-    Planes { target: f64, source: f64 },
-}
-
-/// Inverse covariance of a pair: base I + a_weight a a^T + m_weight m m^T.
-pub(super) struct Information {
-    base: f64,
-    a: Vector3<f64>,
-    a_weight: f64,
-    m_weight: f64,
-    /// Determinant of the covariance, m^6.
-    pub determinant: f64,
-}
-
-impl Metric {
-    /// Inverse of 2 I - t n n^T - s m m^T by Woodbury's identity: only a 2 x 2 matrix is inverted.
-    #[inline(always)]
-    pub fn information(self, n: &Vector3<f64>, m: &Vector3<f64>) -> Information {
-        match self {
-            Metric::Points => Information {
-                base: 1.0,
-                a: Vector3::zeros(),
-                a_weight: 0.0,
-                m_weight: 0.0,
-                determinant: 1.0,
-            },
-            Metric::Planes { target, source } => {
-                let cross = n.dot(m) * (target * source).sqrt();
-                let (t, s) = (2.0 - target, 2.0 - source);
-                let inner = t * s - cross * cross;
-                Information {
-                    base: 0.5,
-                    a: n * target.sqrt() + m * (source.sqrt() * cross / s),
-                    a_weight: 0.5 * s / inner,
-                    m_weight: 0.5 * source / s,
-                    determinant: 2.0 * inner,
-                }
-            }
-        }
-    }
-
-    /// Determinant of the covariance of two parallel planes, m^6.
-    pub fn least_determinant(self) -> f64 {
-        let axis = Vector3::z();
-        self.information(&axis, &axis).determinant
-    }
-}
-
-/// What the squared Mahalanobis distance d2 of a pair with weight w costs.
-#[derive(Clone, Copy, Debug)]
-pub(super) enum Kernel {
-    /// w d2
-    None,
-    /// w a2 ln(1 + d2 / a2)
-    Cauchy { a2: f64 },
-    /// a2 ln(1 + w d2 / a2), as the seed prints it
-    CauchyAround { a2: f64 },
-    /// w a2 / 2 ln(1 + d2^2 / a2), a Cauchy loss on the residual d2
-    CauchyOfSquare { a2: f64 },
-}
-
-impl Kernel {
-    /// The cost and its derivative by d2.
-    #[inline(always)]
-    pub fn apply(self, weight: f64, squared: f64) -> (f64, f64) {
-        match self {
-            Kernel::None => (weight * squared, weight),
-            Kernel::Cauchy { a2 } => {
-                let x = squared / a2;
-                (weight * a2 * x.ln_1p(), weight / (1.0 + x))
-            }
-            Kernel::CauchyAround { a2 } => {
-                let x = weight * squared / a2;
-                (a2 * x.ln_1p(), weight / (1.0 + x))
-            }
-            Kernel::CauchyOfSquare { a2 } => {
-                let x = squared * squared / a2;
-                let slope = weight * squared / (1.0 + x);
-                (0.5 * weight * a2 * x.ln_1p(), slope)
-            }
-        }
-    }
-}
-
-/// A pair in the axes of the target.
-pub(super) struct Pair {
-    /// Target point minus transformed source point, m.
-    pub r: Vector3<f64>,
-    /// Rotated source point, m.
-    pub z: Vector3<f64>,
-    /// Rotated source normal.
-    pub m: Vector3<f64>,
-    pub information: Information,
-}
-
-impl Pair {
-    /// Of source point `x` that the pose takes to `q`, and target point `y`.
-    #[inline(always)]
-    pub fn new(
-        metric: Metric,
-        p: &Vector3<f64>,
-        (q, m): (&Point3<f64>, &Vector3<f64>),
-        (y, n): (&Point3<f64>, &Vector3<f64>),
-    ) -> Pair {
-        Pair {
-            r: y - q,
-            z: q.coords - p,
-            m: *m,
-            information: metric.information(n, m),
-        }
-    }
-
-    /// M r, 1/m.
-    #[inline(always)]
-    fn pull(&self) -> Vector3<f64> {
-        let i = &self.information;
-        let along_a = i.a_weight * i.a.dot(&self.r);
-        let along_m = i.m_weight * self.m.dot(&self.r);
-        i.base * self.r + along_a * i.a + along_m * self.m
-    }
-
-    /// r^T M r.
-    #[inline(always)]
-    pub fn squared(&self) -> f64 {
-        let i = &self.information;
-        let (along_a, along_m) = (i.a.dot(&self.r), self.m.dot(&self.r));
-        i.base * self.r.norm_squared()
-            + i.a_weight * along_a * along_a
-            + i.m_weight * along_m * along_m
-    }
-}
+use super::pair::Pair;
+use super::robust_kernel::Kernel;
 
 /// Sums over pairs.
 #[derive(Clone, Copy, Debug, Default)]
@@ -273,11 +139,12 @@ impl Sums {
 
 #[cfg(test)]
 mod tests {
-    use nalgebra::SMatrix;
+    use nalgebra::{Point3, SMatrix};
     use proptest::prelude::*;
 
     use super::*;
     use crate::pose::se3;
+    use crate::registration::solver::pair::Metric;
 
     /// A pair as its points and normals in their own frames.
     #[derive(Clone, Debug)]

@@ -3,25 +3,27 @@
 use nalgebra::{Isometry3, Point3, Vector3};
 use rayon::prelude::*;
 
-use super::prepared::squared_reach;
-use super::surface::Surface;
-use super::system::{Kernel, Metric, Pair, Sums};
-use super::tree::{Nearest, Neighbors};
-use super::{
-    LabelDistribution, LabelUse, MAX_CANDIDATES, Method, PreparedCloud, RegisterOptions,
-    SemanticVariant,
+use super::normal_equations::Sums;
+use super::pair::{Metric, Pair};
+use super::pair_weights::{Labels, labels};
+use super::robust_kernel::Kernel;
+use crate::registration::prepared::kd_tree::{Nearest, Neighbors};
+use crate::registration::prepared::squared_reach;
+use crate::registration::prepared::surface::Surface;
+use crate::registration::{
+    MAX_CANDIDATES, Method, PreparedCloud, RegisterOptions, SemanticVariant,
 };
 
 /// Source points of one piece of parallel work.
 const CHUNK: usize = 256;
 /// Slot without a pair.
-const NONE: u32 = u32::MAX;
+pub(super) const NONE: u32 = u32::MAX;
 
 /// A candidate of a source point.
 #[derive(Clone, Copy)]
-struct Slot {
-    target: u32,
-    weight: f64,
+pub(super) struct Slot {
+    pub target: u32,
+    pub weight: f64,
 }
 
 /// A surface to be laid upon another: of whole clouds, or of one class.
@@ -30,23 +32,17 @@ pub(super) struct Layer<'a> {
     pub target: &'a Surface,
 }
 
-/// Labels of both clouds, by place in the order of the tree.
-pub(super) struct Labels<'a> {
-    pub source: &'a [LabelDistribution],
-    pub target: &'a [LabelDistribution],
-}
-
 /// Pairs of all layers.
 pub(super) struct Pairs<'a> {
     layers: Vec<Layer<'a>>,
-    labels: Labels<'a>,
-    options: &'a RegisterOptions<'a>,
-    metric: Metric,
+    pub(super) labels: Labels<'a>,
+    pub(super) options: &'a RegisterOptions<'a>,
+    pub(super) metric: Metric,
     kernel: Kernel,
     /// Flatness of the source's covariances if the gradient follows them, else 0.
     turn: f64,
     /// Variances are taken as so many times as large.
-    scale: f64,
+    pub(super) scale: f64,
     candidates: usize,
     stride: usize,
     squared_gate_m2: f64,
@@ -55,7 +51,7 @@ pub(super) struct Pairs<'a> {
 }
 
 /// A pose taken apart for many points.
-struct Placed {
+pub(super) struct Placed {
     rotation: nalgebra::Matrix3<f64>,
     p: Vector3<f64>,
 }
@@ -193,7 +189,7 @@ impl<'a> Pairs<'a> {
     }
 
     #[inline(always)]
-    fn pair(
+    pub(super) fn pair(
         &self,
         layer: &Layer,
         placed: &Placed,
@@ -265,115 +261,6 @@ impl<'a> Pairs<'a> {
                 target: indices.next().copied().unwrap_or(NONE),
                 weight: 1.0,
             };
-        }
-    }
-
-    /// Weighs the candidates of a source point; those that do not count stay without a pair.
-    fn weigh(
-        &self,
-        variant: SemanticVariant,
-        layer: &Layer,
-        placed: &Placed,
-        (i, q, m): (usize, &Point3<f64>, &Vector3<f64>),
-        slots: &mut [Slot],
-    ) {
-        let source = label_at(self.labels.source, i);
-        let (mut total, least) = (0.0, self.metric.least_determinant());
-        for slot in slots.iter_mut().filter(|slot| slot.target != NONE) {
-            let target = label_at(self.labels.target, slot.target as usize);
-            let agreement = self.agreement(variant, &source, &target);
-            let density = |over: f64| {
-                let pair = self.pair(layer, placed, (q, m), slot.target);
-                let spread = pair.information.determinant / over;
-                (-0.5 * pair.squared() / self.scale).exp() / spread.sqrt()
-            };
-            slot.weight = match variant {
-                SemanticVariant::Published => agreement,
-                // |2 pi C|^(1/2)
-                SemanticVariant::AsPrinted => agreement * density(std::f64::consts::TAU.powi(-3)),
-                SemanticVariant::Em => agreement * density(least),
-            };
-            total += slot.weight;
-        }
-        let outlier = (-0.5 * self.options.outlier_squared).exp();
-        for slot in slots {
-            if variant == SemanticVariant::Em {
-                slot.weight /= total + outlier;
-            }
-            if slot.weight.is_nan() || slot.weight <= 0.0 {
-                slot.target = NONE;
-            }
-        }
-    }
-
-    /// Likelihood that two points are of one class (seed eq. 5, in brackets), or the weight in its place.
-    fn agreement(
-        &self,
-        variant: SemanticVariant,
-        source: &LabelDistribution,
-        target: &LabelDistribution,
-    ) -> f64 {
-        if let Some(pair_weight) = self.options.pair_weight {
-            let weight = pair_weight.weight(source, target);
-            return if weight.is_finite() {
-                weight.max(0.0)
-            } else {
-                0.0
-            };
-        }
-        let equal: f64 = match self.options.labels {
-            LabelUse::Hard => match (source.top(), target.top()) {
-                (Some(s), Some(t)) => f64::from(u8::from(s == t)),
-                _ => 0.0,
-            },
-            LabelUse::Soft => overlap(source, target),
-        };
-        if variant != SemanticVariant::Em {
-            return equal;
-        }
-        // What is unknown agrees with anything.
-        let unknown = |l: &LabelDistribution| match self.options.labels {
-            LabelUse::Hard => f64::from(u8::from(l.top().is_none())),
-            LabelUse::Soft => f64::from(l.unknown()),
-        };
-        let (s, t) = (unknown(source), unknown(target));
-        equal + s + t - s * t
-    }
-}
-
-/// Sum over classes of the products of probabilities.
-fn overlap(source: &LabelDistribution, target: &LabelDistribution) -> f64 {
-    let mut sum = 0.0;
-    for (s, p) in source.iter() {
-        for (t, q) in target.iter() {
-            if s == t {
-                sum += f64::from(p) * f64::from(q);
-            }
-        }
-    }
-    sum
-}
-
-fn label_at(labels: &[LabelDistribution], i: usize) -> LabelDistribution {
-    labels.get(i).copied().unwrap_or(LabelDistribution::UNKNOWN)
-}
-
-fn labels<'a>(
-    source: &'a PreparedCloud,
-    target: &'a PreparedCloud,
-    options: &RegisterOptions,
-) -> Labels<'a> {
-    let blurred = options.method == Method::Semantic(SemanticVariant::Published)
-        && options.labels == LabelUse::Soft;
-    if blurred {
-        Labels {
-            source: source.blurred_labels(),
-            target: target.blurred_labels(),
-        }
-    } else {
-        Labels {
-            source: source.labels(),
-            target: target.labels(),
         }
     }
 }
