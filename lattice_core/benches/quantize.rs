@@ -56,20 +56,6 @@ fn batch_transformed(bencher: Bencher, kind: LatticeKind) {
     run_batch(bencher, kind, pose, Simd::detect());
 }
 
-#[divan::bench(args = LatticeKind::ALL)]
-fn batch_double_precision(bencher: Bencher, kind: LatticeKind) {
-    let quantizer = BatchQuantizer::new(&lattice(kind), Isometry3::identity());
-    let mut codes = Vec::with_capacity(POINTS);
-    let points: Vec<[f64; 3]> = points_m().iter().map(|p| p.map(f64::from)).collect();
-    bencher
-        .counter(ItemsCount::new(POINTS))
-        .bench_local(move || {
-            codes.clear();
-            quantizer.codes_wide(black_box(&points), &mut codes);
-            black_box(codes.last().copied())
-        });
-}
-
 fn run_batch(bencher: Bencher, kind: LatticeKind, pose: Isometry3<f64>, simd: Simd) {
     let quantizer = BatchQuantizer::with_simd(&lattice(kind), pose, simd);
     let (points, mut codes) = (points_m(), Vec::with_capacity(POINTS));

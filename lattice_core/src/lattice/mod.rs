@@ -7,7 +7,6 @@
 mod basis;
 mod batch;
 mod block_key;
-mod clearance;
 mod closed_form;
 mod generator;
 mod kind;
@@ -15,7 +14,6 @@ mod morton_key;
 mod neighbors;
 mod orientation;
 mod shape;
-mod theory;
 mod voronoi;
 
 use std::fmt;

@@ -15,3 +15,4 @@ pub mod printed;
 pub mod random;
 pub mod render;
 pub mod simulate;
+pub mod theory;

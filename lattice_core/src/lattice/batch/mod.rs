@@ -7,7 +7,6 @@
 mod form;
 mod kernel;
 mod simd;
-mod wide;
 
 use nalgebra::{Isometry3, Matrix3, Vector3};
 
@@ -43,8 +42,6 @@ struct Kernel {
     run_with_statistics: simd::Run,
     one: fn(&Constants, [f32; 3]) -> Lane,
     constants: Constants,
-    /// The same for points that were rounded to single precision.
-    rounded: Constants,
 }
 
 /// Sums over the points of a batch, in 1/2^20 of a cell side (cube root of the cell volume).
@@ -109,13 +106,7 @@ impl BatchQuantizer {
     /// The point in the lattice, metres: rotated, then moved, each in double precision.
     #[inline]
     pub fn transform(&self, p: [f32; 3]) -> Vector3<f64> {
-        self.transform_wide(p.map(f64::from))
-    }
-
-    /// [`BatchQuantizer::transform`] of a point in double precision.
-    #[inline]
-    pub fn transform_wide(&self, p: [f64; 3]) -> Vector3<f64> {
-        let p = Vector3::from(p);
+        let p = Vector3::from(p.map(f64::from));
         let turned = match &self.rotation {
             Some(rotation) => rotation * p,
             None => p,
@@ -324,7 +315,7 @@ impl Kernel {
             error: (8.0 * EPSILON + 1e-14 * far) as f32,
             reach_m: ((KERNEL_REACH / largest) as f32).min(kernel::FIXED_REACH_M),
         };
-        let kernel = match lattice.kind() {
+        Some(match lattice.kind() {
             LatticeKind::Cubic => Self::of::<Cubic>(constants, diagonal, simd),
             LatticeKind::Bcc => Self::of::<Bcc>(constants, diagonal, simd),
             LatticeKind::Fcc => Self::of::<Fcc>(constants, diagonal, simd),
@@ -333,14 +324,6 @@ impl Kernel {
                 Self::of::<Hex>(constants, diagonal, simd)
             }
             LatticeKind::Custom => return None,
-        };
-        Some(Kernel {
-            rounded: Constants {
-                // One rounding more, of the coordinates themselves.
-                error_per_metre: (1.01 * (roundings + 1.0) * EPSILON * largest) as f32,
-                ..kernel.constants
-            },
-            ..kernel
         })
     }
 
@@ -364,7 +347,6 @@ impl Kernel {
             run,
             run_with_statistics,
             one,
-            rounded: constants,
             constants,
         }
     }

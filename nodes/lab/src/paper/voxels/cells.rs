@@ -8,6 +8,7 @@ use nalgebra::Vector3;
 use super::{Options, unit};
 use crate::paper::report::plot::{Fault, color, title};
 use crate::paper::report::{Cell, Check, Figure, Section, Table, Verdict};
+use crate::theory::surface_m2;
 
 /// What the polyhedron of a name has.
 struct Shape {
@@ -111,7 +112,7 @@ pub fn section(_: &Options, _: &mut dyn FnMut(f64)) -> Result<Section, Fault> {
             cell.faces.len().into(),
             Cell::Number(lattice.covering_radius_m(), 6),
             Cell::Number(lattice.packing_radius_m(), 6),
-            Cell::Number(lattice.surface_m2(), 5),
+            Cell::Number(surface_m2(&lattice), 5),
         ]);
     }
     let columns = [

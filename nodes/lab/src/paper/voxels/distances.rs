@@ -8,6 +8,7 @@ use plotters::prelude::*;
 use super::{Options, unit};
 use crate::paper::report::plot::{Fault, LABELS, Layout, color, key, labels, svg, title};
 use crate::paper::report::{Cell, Check, Figure, Section, Table, Verdict};
+use crate::theory::{clearance_stencil, distance_between_cells_m, touching_clearance_m};
 
 /// How many touching cells are how far away, unit volume.
 const SHELLS: [(LatticeKind, &[(usize, f64)]); 5] = [
@@ -105,7 +106,7 @@ pub fn section(_: &Options, _: &mut dyn FnMut(f64)) -> Result<Section, Fault> {
     let mut near = Vec::new();
     for (kind, expected) in CLEARANCES {
         let lattice = unit(kind)?;
-        let found = lattice.touching_clearance_m();
+        let found = touching_clearance_m(&lattice);
         checks.push(Check {
             name: format!(
                 "{}: safe distance of the touching cells (cell sides)",
@@ -118,7 +119,7 @@ pub fn section(_: &Options, _: &mut dyn FnMut(f64)) -> Result<Section, Fault> {
         });
         let mut row = vec![title(kind).into(), Cell::Number(found, 3)];
         for radius in CLEARANCE_RADII {
-            let stencil = lattice.clearance_stencil(radius).map(|cells| cells.len());
+            let stencil = clearance_stencil(&lattice, radius).map(|cells| cells.len());
             row.push(stencil.map_or(Cell::Empty, Cell::from));
         }
         near.push(row);
@@ -129,7 +130,7 @@ pub fn section(_: &Options, _: &mut dyn FnMut(f64)) -> Result<Section, Fault> {
         .touching_neighbors()
         .iter()
         .skip(fcc.face_neighbors().len());
-    let gap = others.map(|&w| fcc.distance_between_cells_m(w));
+    let gap = others.map(|&w| distance_between_cells_m(&fcc, w));
     checks.push(Check {
         name: "FCC: safe distance of the 12 printed cells (cell sides)".into(),
         printed: None,

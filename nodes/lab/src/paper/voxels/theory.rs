@@ -8,6 +8,7 @@ use crate::paper::estimate::Estimate;
 use crate::paper::parallel::in_parallel;
 use crate::paper::report::plot::{Fault, title};
 use crate::paper::report::{Cell, Check, Section, Table, Verdict};
+use crate::theory::{mean_distance_m, mean_width_m, second_moment, surface_m2};
 
 /// What is known of a cell of unit volume.
 struct Known {
@@ -70,13 +71,13 @@ pub fn section(options: &Options, progress: &mut dyn FnMut(f64)) -> Result<Secti
     let mut checks = Vec::new();
     let (mut exact_rows, mut random_rows) = (Vec::new(), Vec::new());
     let cubic = unit(LatticeKind::Cubic)?;
-    let (cubic_mse, cubic_mean) = (cubic.second_moment(), cubic.mean_distance_m([0; 3]));
+    let (cubic_mse, cubic_mean) = (second_moment(&cubic), mean_distance_m(&cubic, [0; 3]));
     let mut gains = Vec::new();
     for (number, known) in KNOWN.iter().enumerate() {
         let lattice = unit(known.kind)?;
         let name = title(known.kind);
-        let mse = lattice.second_moment();
-        let mean = lattice.mean_distance_m([0; 3]);
+        let mse = second_moment(&lattice);
+        let mean = mean_distance_m(&lattice, [0; 3]);
         let mut tell = |done| progress((number as f64 + done) / KNOWN.len() as f64);
         let draws = in_parallel(samples.draws, &mut tell, |draw| {
             let (mut n, mut sum, mut squares, mut largest) = (0.0, 0.0, 0.0, 0.0_f64);
@@ -124,8 +125,8 @@ pub fn section(options: &Options, progress: &mut dyn FnMut(f64)) -> Result<Secti
             lattice.covering_radius_m(),
         );
         near("nearest face", known.packing, lattice.packing_radius_m());
-        near("mean width", known.mean_width, lattice.mean_width_m());
-        near("surface", known.surface, lattice.surface_m2());
+        near("mean width", known.mean_width, mean_width_m(&lattice));
+        near("surface", known.surface, surface_m2(&lattice));
         checks.push(Check::that(
             format!("{name}: no random point beyond the farthest corner"),
             largest <= lattice.covering_radius_m() * (1.0 + 1e-12),
@@ -140,9 +141,9 @@ pub fn section(options: &Options, progress: &mut dyn FnMut(f64)) -> Result<Secti
             Cell::Number((3.0 * mse).sqrt(), 7),
             Cell::Number(lattice.covering_radius_m(), 7),
             Cell::Number(lattice.packing_radius_m(), 7),
-            Cell::Number(lattice.mean_width_m(), 6),
-            change(lattice.mean_width_m(), cubic.mean_width_m()),
-            Cell::Number(lattice.surface_m2(), 5),
+            Cell::Number(mean_width_m(&lattice), 6),
+            change(mean_width_m(&lattice), mean_width_m(&cubic)),
+            Cell::Number(surface_m2(&lattice), 5),
         ]);
         let mut row = vec![name.into()];
         row.extend(random_mse.cells(1.0, 7));
@@ -152,7 +153,7 @@ pub fn section(options: &Options, progress: &mut dyn FnMut(f64)) -> Result<Secti
         gains.push([
             100.0 * (mse / cubic_mse - 1.0),
             100.0 * (mean / cubic_mean - 1.0),
-            100.0 * (lattice.mean_width_m() / cubic.mean_width_m() - 1.0),
+            100.0 * (mean_width_m(&lattice) / mean_width_m(&cubic) - 1.0),
         ]);
     }
     // Of cubic, BCC, FCC, MCC, hex and the best prisms.

@@ -14,6 +14,7 @@ use crate::paper::parallel::in_parallel;
 use crate::paper::report::plot::{Fault, title};
 use crate::paper::report::{Check, Figure, Section, Verdict};
 use crate::paper::streams::{Purpose, stream};
+use crate::theory::{mean_distance_m, second_moment};
 use figure::draw;
 use log::{SPAN_S, replayed, simulated_log};
 use tables::{compared, of_log, theory};
@@ -78,7 +79,7 @@ impl Placed {
 
     /// Mean squared error by dimension of evenly spread points, m^2.
     fn mse_of_theory(&self) -> f64 {
-        self.lattice.second_moment() * self.lattice.cell_side_m().powi(2)
+        second_moment(&self.lattice) * self.lattice.cell_side_m().powi(2)
     }
 }
 
@@ -189,7 +190,7 @@ fn checks(all: &[Placed], tolerance: f64) -> Vec<Check> {
             ),
             (
                 "mean distance over all places (m)",
-                placed.lattice.mean_distance_m([0; 3]),
+                mean_distance_m(&placed.lattice, [0; 3]),
                 placed.mean(|q| q.mean_m),
             ),
         ] {
@@ -245,7 +246,7 @@ fn finding(all: &[Placed]) -> String {
     let [low, high] = cubic.map_or([f64::NAN; 2], |placed| range(&placed.each(rms_m)));
     let less = all.iter().map(|placed| {
         let rms_m = (3.0 * placed.mse_of_theory()).sqrt();
-        100.0 * (1.0 - placed.lattice.mean_distance_m([0; 3]) / rms_m)
+        100.0 * (1.0 - mean_distance_m(&placed.lattice, [0; 3]) / rms_m)
     });
     let [least, most] = range(&less.collect::<Vec<_>>());
     let within: Vec<&str> = all
@@ -294,7 +295,7 @@ mod tests {
                 quantized(&[[3.1, -0.2, 7.7]], &lattice, pose).mse_m2
             });
             let mean = each.sum::<f64>() / 512.0;
-            let theory = lattice.second_moment() * 0.25;
+            let theory = second_moment(&lattice) * 0.25;
             assert!(
                 (mean / theory - 1.0).abs() < 0.03,
                 "{kind}: {mean}, not {theory}"

@@ -7,6 +7,7 @@ use lattice_core::lattice::LatticeKind;
 use super::{POINTS, Placed, Printed, VOLUME_M3, range, rms_m};
 use crate::paper::report::plot::title;
 use crate::paper::report::{Cell, Table};
+use crate::theory::mean_distance_m;
 use lattice_nodes::replay::RunReport;
 
 /// As printed and as simulated.
@@ -92,7 +93,7 @@ pub fn theory(all: &[Placed]) -> Table {
         let mut row = vec![
             placed.name().into(),
             Cell::Number(mse, 6),
-            Cell::Number(placed.lattice.mean_distance_m([0; 3]), 5),
+            Cell::Number(mean_distance_m(&placed.lattice, [0; 3]), 5),
             Cell::Number((3.0 * mse).sqrt(), 5),
         ];
         row.extend(match placed.printed {

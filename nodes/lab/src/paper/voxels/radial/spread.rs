@@ -9,6 +9,7 @@ use crate::paper::report::Cell;
 use crate::paper::report::plot::{Curve, Fault, color, title};
 use crate::paper::voxels::sample::Samples;
 use crate::paper::voxels::unit;
+use crate::theory::{mean_distance_m, second_moment};
 
 /// Of the curves, cell sides.
 const BIN: f64 = 0.02;
@@ -97,9 +98,13 @@ impl Spread {
         }
         // Of all cells together: mean distances, and squares by the law of the parallel axis.
         let n = set.len() as f64;
-        let exact_mean = set.iter().map(|&w| lattice.mean_distance_m(w)).sum::<f64>() / n;
+        let exact_mean = set
+            .iter()
+            .map(|&w| mean_distance_m(&lattice, w))
+            .sum::<f64>()
+            / n;
         let of_centers = centers.iter().map(|c| c.norm_squared()).sum::<f64>() / n;
-        let square = 3.0 * lattice.second_moment() + of_centers;
+        let square = 3.0 * second_moment(&lattice) + of_centers;
         let corners = lattice.cell().vertices.iter();
         let far = corners.flat_map(|v| centers.iter().map(move |c| (v + c).norm()));
         Ok(Spread {

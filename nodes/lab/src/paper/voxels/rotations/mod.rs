@@ -11,6 +11,7 @@ use super::{Options, unit};
 use crate::paper::estimate::Estimate;
 use crate::paper::report::plot::{Fault, title};
 use crate::paper::report::{Check, Section, Verdict};
+use crate::theory::mean_distance_m;
 use figure::figure;
 use measure::{Laid, Measured, Turns, measure};
 pub use measure::{Quantized, quantized};
@@ -163,10 +164,10 @@ fn check(run: &Run) -> Result<Vec<Check>, Fault> {
         return Ok(checks);
     };
     if run.scan.source == Source::Uniform {
-        let cube = unit(LatticeKind::Cubic)?.mean_distance_m([0; 3]);
+        let cube = mean_distance_m(&unit(LatticeKind::Cubic)?, [0; 3]);
         for measured in &run.measured {
             let kind = measured.laid.kind;
-            let of_theory = unit(kind)?.mean_distance_m([0; 3]) / cube - 1.0;
+            let of_theory = mean_distance_m(&unit(kind)?, [0; 3]) / cube - 1.0;
             checks.push(Check {
                 name: format!("{name}: mean distance of {} to cubic (%)", title(kind)),
                 printed: None,

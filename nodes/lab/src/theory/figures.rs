@@ -3,74 +3,69 @@
 use std::collections::BTreeMap;
 use std::f64::consts::PI;
 
+use lattice_core::lattice::{Lattice, LatticeIndex, VoronoiCell};
 use nalgebra::Vector3;
-
-use super::{Lattice, LatticeIndex, VoronoiCell};
 
 /// Parts of a side of a triangle over which distances are integrated.
 const PARTS: usize = 16;
 /// Weight of the midst in Radon's rule of 1948, exact for polynomials up to degree 5 over a triangle.
 const MIDST: f64 = 9.0 / 40.0;
 
-impl Lattice {
-    /// Mean squared distance of a uniform point from its lattice point, by dimension and over the
-    /// squared cell side: the constant G of quantization theory, 1/12 for cubes.
-    pub fn second_moment(&self) -> f64 {
-        let moment = |[a, b, c]: [Vector3<f64>; 3]| {
-            let volume = a.dot(&b.cross(&c)) / 6.0;
-            let squares = a.norm_squared() + b.norm_squared() + c.norm_squared();
-            volume / 10.0 * (squares + a.dot(&b) + b.dot(&c) + c.dot(&a))
-        };
-        let sum: f64 = triangles(self.cell()).map(moment).sum();
-        sum / (3.0 * self.cell_volume_m3() * self.cell_side_m() * self.cell_side_m())
-    }
-
-    /// Width of the cell averaged over all directions, metres. Over the cell volume: the cells per
-    /// area that a plane of random orientation cuts.
-    pub fn mean_width_m(&self) -> f64 {
-        // Edges by their lengths and the angles between the normals of their faces.
-        let mut normals: BTreeMap<(u16, u16), Vec<Vector3<f64>>> = BTreeMap::new();
-        for face in &self.cell().faces {
-            let next = face.vertices.iter().cycle().skip(1);
-            for (&from, &to) in face.vertices.iter().zip(next) {
-                let edge = (from.min(to), from.max(to));
-                normals
-                    .entry(edge)
-                    .or_default()
-                    .push(self.center(face.neighbor));
-            }
-        }
-        let vertex = |i: u16| self.cell().vertices.get(usize::from(i)).copied();
-        let term = |(&(from, to), normals): (&(u16, u16), &Vec<Vector3<f64>>)| {
-            let ([a, b], Some(p), Some(q)) = (normals.as_slice(), vertex(from), vertex(to)) else {
-                return 0.0;
-            };
-            (p - q).norm() * a.cross(b).norm().atan2(a.dot(b))
-        };
-        normals.iter().map(term).sum::<f64>() / (4.0 * PI)
-    }
-
-    /// Surface of the cell, m^2. A quarter of it over the cell volume: the cells that a line of
-    /// random direction enters per metre.
-    pub fn surface_m2(&self) -> f64 {
-        let area = |[a, b, c]: [Vector3<f64>; 3]| 0.5 * (b - a).cross(&(c - a)).norm();
-        triangles(self.cell()).map(area).sum()
-    }
+/// Mean squared distance of a uniform point from its lattice point, by dimension and over the
+/// squared cell side: the constant G of quantization theory, 1/12 for cubes.
+pub fn second_moment(lattice: &Lattice) -> f64 {
+    let moment = |[a, b, c]: [Vector3<f64>; 3]| {
+        let volume = a.dot(&b.cross(&c)) / 6.0;
+        let squares = a.norm_squared() + b.norm_squared() + c.norm_squared();
+        volume / 10.0 * (squares + a.dot(&b) + b.dot(&c) + c.dot(&a))
+    };
+    let sum: f64 = triangles(lattice.cell()).map(moment).sum();
+    sum / (3.0 * lattice.cell_volume_m3() * lattice.cell_side_m() * lattice.cell_side_m())
 }
 
-impl Lattice {
-    /// Mean distance of a uniform point of the cell `w` from the lattice point 0, metres; of the cell 0
-    /// the expected distortion of eq. (13). Exact to some ten digits.
-    pub fn mean_distance_m(&self, w: LatticeIndex) -> f64 {
-        let center = self.center(w);
-        // The divergence of |x| x is 4 |x|: an integral over the surface.
-        let term = |corners: [Vector3<f64>; 3]| {
-            let [a, b, c] = corners.map(|corner| corner + center);
-            let flux = 0.5 * a.dot(&(b - a).cross(&(c - a)));
-            flux * mean_norm(a, b, c) / 4.0
-        };
-        triangles(self.cell()).map(term).sum::<f64>() / self.cell_volume_m3()
+/// Width of the cell averaged over all directions, metres. Over the cell volume: the cells per
+/// area that a plane of random orientation cuts.
+pub fn mean_width_m(lattice: &Lattice) -> f64 {
+    // Edges by their lengths and the angles between the normals of their faces.
+    let mut normals: BTreeMap<(u16, u16), Vec<Vector3<f64>>> = BTreeMap::new();
+    for face in &lattice.cell().faces {
+        let next = face.vertices.iter().cycle().skip(1);
+        for (&from, &to) in face.vertices.iter().zip(next) {
+            let edge = (from.min(to), from.max(to));
+            normals
+                .entry(edge)
+                .or_default()
+                .push(lattice.center(face.neighbor));
+        }
     }
+    let vertex = |i: u16| lattice.cell().vertices.get(usize::from(i)).copied();
+    let term = |(&(from, to), normals): (&(u16, u16), &Vec<Vector3<f64>>)| {
+        let ([a, b], Some(p), Some(q)) = (normals.as_slice(), vertex(from), vertex(to)) else {
+            return 0.0;
+        };
+        (p - q).norm() * a.cross(b).norm().atan2(a.dot(b))
+    };
+    normals.iter().map(term).sum::<f64>() / (4.0 * PI)
+}
+
+/// Surface of the cell, m^2. A quarter of it over the cell volume: the cells that a line of
+/// random direction enters per metre.
+pub fn surface_m2(lattice: &Lattice) -> f64 {
+    let area = |[a, b, c]: [Vector3<f64>; 3]| 0.5 * (b - a).cross(&(c - a)).norm();
+    triangles(lattice.cell()).map(area).sum()
+}
+
+/// Mean distance of a uniform point of the cell `w` from the lattice point 0, metres; of the cell 0
+/// the expected distortion of eq. (13). Exact to some ten digits.
+pub fn mean_distance_m(lattice: &Lattice, w: LatticeIndex) -> f64 {
+    let center = lattice.center(w);
+    // The divergence of |x| x is 4 |x|: an integral over the surface.
+    let term = |corners: [Vector3<f64>; 3]| {
+        let [a, b, c] = corners.map(|corner| corner + center);
+        let flux = 0.5 * a.dot(&(b - a).cross(&(c - a)));
+        flux * mean_norm(a, b, c) / 4.0
+    };
+    triangles(lattice.cell()).map(term).sum::<f64>() / lattice.cell_volume_m3()
 }
 
 /// Mean of the norm over a triangle.
@@ -108,10 +103,10 @@ fn triangles(cell: &VoronoiCell) -> impl Iterator<Item = [Vector3<f64>; 3]> + '_
 
 #[cfg(test)]
 mod tests {
+    use lattice_core::lattice::LatticeKind;
     use nalgebra::{Matrix3, UnitQuaternion};
 
     use super::*;
-    use crate::lattice::LatticeKind;
 
     #[test]
     fn constants_are_those_of_the_theory() {
@@ -126,13 +121,13 @@ mod tests {
             // Whatever the size and the orientation.
             let turn = UnitQuaternion::from_euler_angles(0.3, 0.2, 0.1);
             let lattice = Lattice::new(kind, 8.0).unwrap().oriented(turn);
-            assert!((lattice.second_moment() - moment).abs() < 5.1e-8, "{kind}");
+            assert!((second_moment(&lattice) - moment).abs() < 5.1e-8, "{kind}");
             assert!(
-                (lattice.mean_width_m() / 2.0 - width).abs() < 5.1e-7,
+                (mean_width_m(&lattice) / 2.0 - width).abs() < 5.1e-7,
                 "{kind}"
             );
             assert!(
-                (lattice.surface_m2() / 4.0 - surface).abs() < 5.1e-6,
+                (surface_m2(&lattice) / 4.0 - surface).abs() < 5.1e-6,
                 "{kind}"
             );
         }
@@ -144,9 +139,9 @@ mod tests {
         let lattice = Lattice::from_basis(Matrix3::from_diagonal(&sides)).unwrap();
         let side = lattice.cell_side_m();
         let moment = sides.norm_squared() / 36.0 / (side * side);
-        assert!((lattice.second_moment() - moment).abs() < 1e-12);
-        assert!((lattice.mean_width_m() - sides.sum() / 2.0).abs() < 1e-12);
-        assert!((lattice.surface_m2() - 5.5).abs() < 1e-12);
+        assert!((second_moment(&lattice) - moment).abs() < 1e-12);
+        assert!((mean_width_m(&lattice) - sides.sum() / 2.0).abs() < 1e-12);
+        assert!((surface_m2(&lattice) - 5.5).abs() < 1e-12);
     }
 
     #[test]
@@ -159,16 +154,16 @@ mod tests {
             (LatticeKind::Hex, 0.4813262),
             (LatticeKind::HexOptimal, 0.4753937),
         ] {
-            let found = Lattice::new(kind, 8.0).unwrap().mean_distance_m([0; 3]) / 2.0;
+            let found = mean_distance_m(&Lattice::new(kind, 8.0).unwrap(), [0; 3]) / 2.0;
             assert!((found - own).abs() < 2e-7, "{kind}: {found}");
         }
         // Robbins' constant: a cube about its corner.
         let cube = Lattice::new(LatticeKind::Cubic, 1.0).unwrap();
         let corner = 0.9605919564;
         let eighths = Lattice::new(LatticeKind::Cubic, 8.0).unwrap();
-        assert!((eighths.mean_distance_m([0; 3]) - corner).abs() < 1e-9);
+        assert!((mean_distance_m(&eighths, [0; 3]) - corner).abs() < 1e-9);
         // Far away it is the distance of the centre and the spread across it.
-        let far = cube.mean_distance_m([1000, 0, 0]);
+        let far = mean_distance_m(&cube, [1000, 0, 0]);
         assert!((far - 1000.0 - 1.0 / 12_000.0).abs() < 1e-7, "{far}");
     }
 }
