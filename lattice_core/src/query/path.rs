@@ -8,8 +8,9 @@ use rustc_hash::FxHashMap;
 use thiserror::Error;
 
 use super::corridor::{Corridor, MAX_ROBOT_CELLS};
+use super::error::check_point;
 use super::shells::add;
-use super::{Bounds, Query, QueryError, Segment};
+use super::{Query, QueryError, Segment};
 use crate::lattice::MortonKey;
 use crate::voxels::VoxelStore;
 
@@ -21,6 +22,40 @@ pub enum Steps {
     Face,
     /// Cells that share a face, an edge or a vertex.
     Touching,
+}
+
+/// A box along the axes of the map frame, metres.
+#[derive(Clone, Copy, PartialEq, Debug)]
+pub struct Bounds {
+    /// Lowest corner.
+    pub min_m: Vector3<f64>,
+    /// Highest corner.
+    pub max_m: Vector3<f64>,
+}
+
+impl Bounds {
+    /// True for points in the box or on its surface.
+    pub fn contains(&self, point_m: &Vector3<f64>) -> bool {
+        (0..3).all(|i| (self.min_m[i]..=self.max_m[i]).contains(&point_m[i]))
+    }
+
+    fn check(&self) -> Result<(), QueryError> {
+        check_point(&self.min_m)?;
+        check_point(&self.max_m)?;
+        let extents = self.max_m - self.min_m;
+        if extents.iter().all(|x| *x >= 0.0) {
+            Ok(())
+        } else {
+            Err(QueryError::Box(extents.into()))
+        }
+    }
+
+    fn moved(&self, by_m: &Vector3<f64>) -> Bounds {
+        Bounds {
+            min_m: self.min_m + by_m,
+            max_m: self.max_m + by_m,
+        }
+    }
 }
 
 /// What path is wanted.

@@ -1,6 +1,6 @@
 //! Compares shortest paths across lattices of equal cell volume in random worlds of balls.
 //!
-//! `cargo run -p lattice_core --example paths [WORLDS]`
+//! `cargo run -p lattice_lab --example paths [WORLDS]`
 #![allow(clippy::unwrap_used)]
 
 use std::time::Instant;
