@@ -1,4 +1,4 @@
-//! What became different since some state of the list.
+//! Changes of a list since they were asked for last.
 
 use super::VoxelList;
 use super::store::shard::Life;
@@ -19,10 +19,19 @@ impl VoxelList {
         self.sequence
     }
 
-    /// What changed after state `sequence`, for a consumer that knows that state.
+    /// What changed since the call before (since the beginning for the first).
     ///
-    /// Removed voxels are remembered until [`VoxelList::forget_changes_until`].
-    pub fn changes_since(&self, sequence: u32) -> Changes {
+    /// The memory for this is bounded by the number of voxels that were there at that call.
+    pub fn take_changes(&mut self) -> Changes {
+        let changes = self.changes_since(self.taken);
+        self.taken = self.sequence;
+        for shard in &mut self.shards {
+            shard.removed.clear();
+        }
+        changes
+    }
+
+    fn changes_since(&self, sequence: u32) -> Changes {
         let shards = || self.shards.iter();
         let changed = shards().flat_map(|shard| shard.iter());
         let changed = changed.filter(|(_, entry)| entry.life.touched > sequence);
@@ -36,23 +45,5 @@ impl VoxelList {
         changed.sort_unstable();
         removed.sort_unstable();
         Changes { changed, removed }
-    }
-
-    /// Forgets the voxels that were removed up to state `sequence`: nobody asks for changes since
-    /// an earlier one any more.
-    pub fn forget_changes_until(&mut self, sequence: u32) {
-        for shard in &mut self.shards {
-            shard.removed.retain(|_, life| life.touched > sequence);
-        }
-    }
-
-    /// What changed since the call before (since the beginning for the first).
-    ///
-    /// The memory for this is bounded by the number of voxels that were there at that call.
-    pub fn take_changes(&mut self) -> Changes {
-        let changes = self.changes_since(self.taken);
-        self.taken = self.sequence;
-        self.forget_changes_until(self.taken);
-        changes
     }
 }

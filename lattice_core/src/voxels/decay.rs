@@ -1,4 +1,4 @@
-//! Forgetting voxels that are old or rarely seen.
+//! Forgetting voxels that are old.
 //!
 //! Those that beams pass through are cleared by [`crate::raycast::RayClearer`].
 
@@ -24,10 +24,5 @@ impl VoxelList {
             let stamps = shard.columns.stamps.get(number);
             stamps.is_some_and(|stamps| stamps.last_ns < stamp_ns)
         }))
-    }
-
-    /// Removes the voxels with fewer than `min_count` points; gives their number.
-    pub fn forget_rare(&mut self, min_count: u32) -> usize {
-        self.remove_where(|_, _, entry| entry.count() < min_count)
     }
 }

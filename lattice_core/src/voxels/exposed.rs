@@ -1,4 +1,4 @@
-//! Which faces of the occupied cells can be seen from outside.
+//! Faces of the occupied cells that can be seen from outside.
 
 use rayon::prelude::*;
 
@@ -9,7 +9,7 @@ impl VoxelList {
     /// The faces of a cell behind which no cell is occupied, as indices of `VoronoiCell::faces`.
     ///
     /// The cell itself need not be occupied. Beyond the range of keys nothing is occupied.
-    pub fn exposed_faces_of(&self, key: MortonKey) -> impl Iterator<Item = usize> + '_ {
+    fn exposed_faces_of(&self, key: MortonKey) -> impl Iterator<Item = usize> + '_ {
         let [x, y, z] = key.unpack();
         let faces = self.lattice.face_neighbors().iter().enumerate();
         faces.filter_map(move |(face, [dx, dy, dz])| {

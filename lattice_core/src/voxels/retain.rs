@@ -2,9 +2,9 @@
 
 use rayon::prelude::*;
 
+use super::VoxelList;
 use super::store::block_mask::places;
 use super::store::shard::{Entry, Shard};
-use super::{Voxel, VoxelList};
 use crate::lattice::{BlockKey, LatticeIndex, MortonKey};
 
 /// The lowest index of a block.
@@ -13,25 +13,7 @@ pub(super) fn first_index(block: u64) -> Option<LatticeIndex> {
 }
 
 impl VoxelList {
-    /// Removes the voxels that `keep` denies; gives their number. It is called in no order.
-    ///
-    /// [`VoxelList::distortion`] still counts their points.
-    pub fn retain(&mut self, mut keep: impl FnMut(MortonKey, &Voxel) -> bool) -> usize {
-        let mut goes = |shard: &Shard, code: BlockKey, entry: &Entry| {
-            let voxel = shard.voxel(code, entry);
-            code.key().is_some_and(|key| !keep(key, &voxel))
-        };
-        let select = |shard: &Shard| {
-            let gone = shard
-                .iter()
-                .filter(|(code, entry)| goes(shard, *code, entry));
-            gone.map(|(code, _)| code).collect()
-        };
-        let gone = self.shards.iter().map(select).collect();
-        self.remove_all(gone)
-    }
-
-    /// Removes the voxels that `goes` wants, told also their numbers in their shards.
+    /// Removes the voxels that `goes` wants, by shard, number in the shard and row.
     pub(super) fn remove_where(
         &mut self,
         goes: impl Fn(&Shard, usize, &Entry) -> bool + Sync,

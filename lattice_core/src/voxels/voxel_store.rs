@@ -80,23 +80,6 @@ pub trait VoxelStore: Sync {
         Ok(())
     }
 
-    /// Removes the cells that `other` has too, with all that is kept of them; gives their number.
-    ///
-    /// Fails, changing nothing, for another lattice or datum.
-    fn subtract(&mut self, other: &dyn VoxelStore) -> Result<usize, MergeError> {
-        self.expect_cells_of(other)?;
-        Ok(self.retain_cells(&|_| None, &|key| !other.contains(key)))
-    }
-
-    /// Removes the cells that `other` has not; what is kept of the rest stays as it is. Gives the
-    /// number of removed cells.
-    ///
-    /// Fails, changing nothing, for another lattice or datum.
-    fn intersect(&mut self, other: &dyn VoxelStore) -> Result<usize, MergeError> {
-        self.expect_cells_of(other)?;
-        Ok(self.retain_cells(&|_| None, &|key| other.contains(key)))
-    }
-
     /// Removes the cells with their centre in a region; gives their number.
     fn remove_region(&mut self, region: &Region) -> usize {
         let cells = region.of_cells(self.lattice(), self.datum_m());
@@ -104,16 +87,5 @@ pub trait VoxelStore: Sync {
             &|first| cells.block_is_inside(first).map(|inside| !inside),
             &|key| !cells.is_inside(key),
         )
-    }
-
-    /// Removes the cells with their centre outside of a region; gives their number.
-    ///
-    /// With a region around the latest pose this is a rolling window: one look at each block, and at
-    /// each cell of the blocks on the border.
-    fn keep_region(&mut self, region: &Region) -> usize {
-        let cells = region.of_cells(self.lattice(), self.datum_m());
-        self.retain_cells(&|first| cells.block_is_inside(first), &|key| {
-            cells.is_inside(key)
-        })
     }
 }
