@@ -23,7 +23,7 @@ const LEAST_ABSOLUTE: [(f64, TimeUnit); 4] = [
     (1.0e8, TimeUnit::Seconds),
 ];
 
-/// What the times of a cloud were taken for; its `Display` is fit for a log line.
+/// Interpretation of the times of a cloud; its `Display` is fit for a log line.
 #[derive(Clone, Debug, PartialEq)]
 pub struct TimeDecision {
     /// Name of the field.
@@ -32,7 +32,7 @@ pub struct TimeDecision {
     pub datatype: Datatype,
     /// Its unit.
     pub unit: TimeUnit,
-    /// What it counts from.
+    /// Instant that it counts from.
     pub reference: TimeReference,
     /// Latest minus earliest point of this cloud, seconds.
     pub span_s: f64,
@@ -94,7 +94,7 @@ impl CloudView<'_> {
         Ok(Some(times))
     }
 
-    /// What [`CloudView::point_times`] takes the times of this cloud for.
+    /// Interpretation of the times of this cloud by [`CloudView::point_times`].
     pub fn time_decision(
         &self,
         stamp_ns: i64,

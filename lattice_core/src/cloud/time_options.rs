@@ -1,4 +1,4 @@
-//! What a user may say about per-point time.
+//! Settings for per-point time.
 
 use std::fmt;
 use std::str::FromStr;
@@ -39,7 +39,7 @@ impl TimeUnit {
     }
 }
 
-/// What a time field counts from.
+/// Instant that a time field counts from.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum TimeReference {
     /// `stamp_start`: from the stamp of the cloud, negative before it. Times of a free
@@ -66,9 +66,9 @@ impl TimeReference {
 #[derive(Clone, Debug, PartialEq, Eq, Error)]
 #[error("'{found}' is not one of {expected}")]
 pub struct UnknownTimeName {
-    /// What was given.
+    /// Name given.
     pub found: String,
-    /// What there is.
+    /// Names that exist.
     pub expected: &'static str,
 }
 
@@ -124,7 +124,7 @@ pub struct TimeOptions {
     pub field: Option<String>,
     /// Its unit.
     pub unit: Option<TimeUnit>,
-    /// What it counts from.
+    /// Instant that it counts from.
     pub reference: Option<TimeReference>,
     /// The times of a cloud span less than this, seconds.
     pub max_span_s: f64,

@@ -1,4 +1,4 @@
-//! What the tree of frames refuses, and what it cannot answer.
+//! Errors of the tree of frames.
 
 use thiserror::Error;
 
@@ -81,7 +81,7 @@ pub enum TfInsertError {
     },
 }
 
-/// Why there is no transform.
+/// A transform that is not available.
 #[derive(Clone, Debug, PartialEq, Eq, Error)]
 pub enum TfMiss {
     /// No transform ever named the frame.

@@ -72,7 +72,7 @@ pub(super) fn cell_distance_m(
 
 /// The least clearance so far.
 struct Best {
-    /// What is farther does not matter.
+    /// Cells that are farther do not matter.
     limit_m: f64,
     clearance: Option<Clearance>,
 }

@@ -1,11 +1,11 @@
-//! What is wrong with a question.
+//! Errors in questions to a map.
 
 use nalgebra::Vector3;
 use thiserror::Error;
 
 use super::MAX_COORDINATE_M;
 
-/// What is wrong with a question.
+/// Error in a question.
 #[derive(Clone, PartialEq, Debug, Error)]
 pub enum QueryError {
     /// A coordinate or extent is not a number or beyond [`MAX_COORDINATE_M`].

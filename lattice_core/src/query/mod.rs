@@ -1,7 +1,7 @@
 //! Questions about the occupied voxels of any store: the nearest ones, the clearance of a shape, and
 //! the shortest way around them.
 //!
-//! Everything is in the map frame, metres. Two distances are in use, and names tell which:
+//! Everything is in the map frame, metres. Two distances are in use, by name:
 //! - `nearest` measures to the centres of occupied cells;
 //! - `clearance` measures to the cells themselves, convex polyhedra, which no point in them can beat.
 //!

@@ -14,7 +14,7 @@ use super::{Query, QueryError, Segment};
 use crate::lattice::MortonKey;
 use crate::voxels::VoxelStore;
 
-/// Which cells a step may lead to.
+/// Cells that a step may lead to.
 #[derive(Clone, Copy, PartialEq, Eq, Debug, Default)]
 pub enum Steps {
     /// Cells that share a face.
@@ -58,14 +58,14 @@ impl Bounds {
     }
 }
 
-/// What path is wanted.
+/// Options of a search for a path.
 #[derive(Clone, Copy, PartialEq, Debug)]
 pub struct PathOptions {
     /// Radius of the ball that moves, metres.
     pub radius_m: f64,
     /// Steps that it can take.
     pub steps: Steps,
-    /// Where the centres of its cells must be, map frame; `None` for everywhere.
+    /// Box that holds the centres of its cells, map frame; `None` for everywhere.
     pub bounds: Option<Bounds>,
     /// The search gives up after this many cells.
     pub max_expanded: usize,
@@ -84,7 +84,7 @@ pub struct Path {
     pub expanded: usize,
 }
 
-/// Why there is no path.
+/// Failure of a search for a path.
 #[derive(Clone, PartialEq, Debug, Error)]
 pub enum PathError {
     /// The question makes no sense.
@@ -105,7 +105,7 @@ pub enum PathError {
     OutOfBounds {
         /// "start" or "goal".
         end: &'static str,
-        /// Where it is, map frame, metres.
+        /// Its place, map frame, metres.
         point_m: [f64; 3],
     },
     /// The ball does not fit at the start or goal.
@@ -113,7 +113,7 @@ pub enum PathError {
     Blocked {
         /// "start" or "goal".
         end: &'static str,
-        /// Where it is, map frame, metres.
+        /// Its place, map frame, metres.
         point_m: [f64; 3],
         /// Radius asked for, metres.
         radius_m: f64,
@@ -284,7 +284,7 @@ impl<S: VoxelStore> Query<'_, S> {
     }
 }
 
-/// What is known of a cell.
+/// State of a cell in the search.
 #[derive(Clone, Copy)]
 enum Cell {
     /// The ball does not fit.

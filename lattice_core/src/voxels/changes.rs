@@ -19,7 +19,7 @@ impl VoxelList {
         self.sequence
     }
 
-    /// What changed since the call before (since the beginning for the first).
+    /// Changes since the call before (since the beginning for the first).
     ///
     /// The memory for this is bounded by the number of voxels that were there at that call.
     pub fn take_changes(&mut self) -> Changes {

@@ -21,7 +21,7 @@ const PART: usize = 1 << 13;
 /// Points between two merges; bounds the memory for what is not yet merged.
 const WAVE: usize = 1 << 18;
 
-/// What became of the points of a cloud; the reasons add up to `points`.
+/// Points of a cloud by outcome; the outcomes add up to `points`.
 #[derive(Clone, Copy, PartialEq, Eq, Debug, Default)]
 pub struct InsertReport {
     /// Points in the cloud.
@@ -104,7 +104,7 @@ struct Chunk {
 impl VoxelList {
     /// Adds every finite point in range to its cell, on the threads of the current rayon pool.
     ///
-    /// When the list is full, points in known cells still count; which cells are new is decided in
+    /// In a full list, points in known cells still count; new cells are decided on in
     /// the order of the points. The outcome does not depend on the number of threads.
     pub fn insert(&mut self, cloud: &Cloud) -> InsertReport {
         self.insert_labelled(cloud, &[])
@@ -250,7 +250,7 @@ fn for_fixed_blocks(
     });
 }
 
-/// What a point adds to the further columns.
+/// Contribution of a point to the further columns.
 fn details(
     lattice: &Lattice,
     code: BlockKey,

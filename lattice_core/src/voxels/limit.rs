@@ -1,10 +1,10 @@
-//! What happens when a list is full.
+//! Full lists: refuse new voxels or forget the oldest.
 
 use super::VoxelList;
 use super::store::shard::Shard;
 use crate::lattice::BlockKey;
 
-/// What a list does with points in new cells when it has as many voxels as it may.
+/// Policy of a full list for points in new cells.
 #[derive(Clone, Copy, PartialEq, Eq, Debug, Default)]
 pub enum WhenFull {
     /// Refuses them; points in known cells still count.
@@ -27,7 +27,7 @@ impl VoxelList {
         self
     }
 
-    /// What happens when the list is full.
+    /// Policy when the list is full.
     pub fn when_full(&self) -> WhenFull {
         self.when_full
     }

@@ -89,12 +89,12 @@ impl VoxelList {
         list
     }
 
-    /// Which further columns are kept.
+    /// Further columns that are kept.
     pub fn payload(&self) -> Payload {
         self.payload
     }
 
-    /// How many voxels of a payload surely fit into `max_bytes`, the number to bound a list by.
+    /// Number of voxels of a payload that surely fit into `max_bytes`, to bound a list by.
     ///
     /// Each may be alone in its block and may be remembered as removed: some 350 bytes, where on
     /// surfaces a voxel takes 46. Of labels a handful a voxel is assumed.
@@ -119,7 +119,7 @@ impl VoxelList {
         self.sequence
     }
 
-    /// Starts counting states anew; what `take_changes` has told stays told.
+    /// Starts counting states anew; changes that were taken stay taken.
     fn renumber(&mut self) {
         let taken = self.taken;
         let new = |state: u32| u32::from(state > taken);
@@ -278,7 +278,7 @@ impl VoxelList {
     }
 
     /// Bounds the memory for removed voxels: of more than `max_voxels` only those are remembered
-    /// that the last `take_changes` told of.
+    /// that were there at the last `take_changes`.
     pub(super) fn bound_removed(&mut self) {
         let remembered: usize = self.shards.iter().map(|shard| shard.removed.len()).sum();
         if remembered > self.max_voxels {

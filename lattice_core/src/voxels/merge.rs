@@ -8,7 +8,7 @@ use super::store::shard::{SHARDS, shard_of};
 use super::{Voxel, VoxelList, VoxelStore};
 use crate::lattice::{BlockKey, MortonKey};
 
-/// Why two stores do not go together. The receiving one is as before.
+/// Two stores that do not go together. The receiving one is as before.
 #[derive(Clone, PartialEq, Debug, Error)]
 pub enum MergeError {
     /// The cells are different.
@@ -36,7 +36,7 @@ pub enum MergeError {
     Full {
         /// Voxels in the union.
         voxels: usize,
-        /// What the receiving list allows.
+        /// Limit of the receiving list.
         max_voxels: usize,
     },
     /// The union takes too much memory.
@@ -44,7 +44,7 @@ pub enum MergeError {
     FullBytes {
         /// Memory for the union.
         bytes: usize,
-        /// What the receiving list allows.
+        /// Limit of the receiving list.
         max_bytes: usize,
     },
 }

@@ -1,4 +1,4 @@
-//! What every store of occupied voxels can do.
+//! Interface of all stores of occupied voxels.
 
 use nalgebra::Vector3;
 
@@ -37,7 +37,7 @@ pub trait VoxelStore: Sync {
 
     /// Removes the cells that `keep` denies; gives their number.
     ///
-    /// A block of 8 x 8 x 8 indices, told by its lowest, is kept or removed as a whole if
+    /// A block of 8 x 8 x 8 indices, given by its lowest, is kept or removed as a whole if
     /// `keep_block` says so; `keep` is asked about the cells of the others. Both are called in no
     /// order and on many threads.
     fn retain_cells(

@@ -49,9 +49,9 @@ struct Kernel {
 pub struct BatchSums {
     /// Number of points.
     pub points: u64,
-    /// Of distances from the lattice points.
+    /// Sum of distances from the lattice points.
     pub distances: u64,
-    /// Of squared distances.
+    /// Sum of squared distances.
     pub squares: u64,
     /// The largest squared distance.
     pub largest_square: u64,
@@ -200,7 +200,7 @@ impl BatchQuantizer {
             distances: sums.distances as u64,
             squares: sums.squares as u64,
             largest_square: sums.largest_square as u64,
-            // Without a kernel nobody has filled in the fixed-point positions.
+            // Without a kernel the fixed-point positions are not filled in.
             far: self.kernel.is_none(),
         };
         let mut open = lanes.open();
@@ -264,7 +264,7 @@ impl BatchQuantizer {
         (code, sums)
     }
 
-    /// What one point adds to the sums of [`BatchQuantizer::for_blocks_with_sums`].
+    /// Contribution of one point to the sums of [`BatchQuantizer::for_blocks_with_sums`].
     pub fn sums_of(&self, p: [f32; 3]) -> BatchSums {
         if let Some(kernel) = &self.kernel {
             let lane = (kernel.one)(&kernel.constants, p);

@@ -21,7 +21,7 @@ pub(crate) struct Item {
     pub index: u32,
 }
 
-/// Where a node splits: coordinates of the left part are at most `at_m`, of the right at least.
+/// Split of a node: coordinates of the left part are at most `at_m`, of the right at least.
 #[derive(Clone, Copy, Default)]
 struct Split {
     at_m: f64,
@@ -34,7 +34,7 @@ pub(crate) struct Tree {
     splits: Vec<Split>,
 }
 
-/// What a search keeps.
+/// The results that a search keeps.
 pub(crate) trait Keep {
     /// Squared distance beyond which nothing is of interest.
     fn reach(&self) -> f64;
@@ -215,7 +215,7 @@ impl Neighbors {
         self.len
     }
 
-    /// Whether none was found.
+    /// True if none was found.
     pub fn is_empty(&self) -> bool {
         self.len == 0
     }

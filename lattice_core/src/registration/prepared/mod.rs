@@ -21,7 +21,7 @@ pub const MAX_COORDINATE_M: f64 = 1e8;
 /// Neighbours whose labels are blurred into one, as the authors of Semantic-ICP do.
 const BLUR: usize = 20;
 
-/// How a cloud is prepared.
+/// Options for preparing a cloud.
 #[derive(Clone, Copy, PartialEq, Debug)]
 pub struct PrepareOptions {
     /// Points of the neighbourhood of a covariance, the point itself among them.
@@ -46,7 +46,7 @@ impl Default for PrepareOptions {
 /// A cloud ready to be registered: points, plane-regularised covariances, nearest neighbours, labels.
 ///
 /// Points are kept in the order of the tree, near points near each other; indices are places in this
-/// order and [`order`](Self::order) tells where each was in the cloud.
+/// order and [`order`](Self::order) has the place of each in the cloud.
 pub struct PreparedCloud {
     surface: Surface,
     labels: Vec<LabelDistribution>,
@@ -83,7 +83,7 @@ impl PreparedCloud {
         self.surface.points_m.len()
     }
 
-    /// Whether there is no point; never, for a prepared cloud.
+    /// True if there is no point; never, for a prepared cloud.
     pub fn is_empty(&self) -> bool {
         self.surface.points_m.is_empty()
     }
@@ -115,12 +115,12 @@ impl PreparedCloud {
         self.options.plane_epsilon
     }
 
-    /// Whether the cloud came with labels.
+    /// True if the cloud came with labels.
     pub fn is_labelled(&self) -> bool {
         !self.labels.is_empty()
     }
 
-    /// What is known of the class of point `i`.
+    /// Label distribution of point `i`.
     pub fn label(&self, i: usize) -> LabelDistribution {
         let label = self.labels.get(i).copied();
         label.unwrap_or(LabelDistribution::UNKNOWN)
@@ -153,7 +153,7 @@ impl PreparedCloud {
         &self.surface
     }
 
-    /// One for each point, or none.
+    /// Label distributions, one for each point or none.
     pub(super) fn labels(&self) -> &[LabelDistribution] {
         &self.labels
     }

@@ -69,7 +69,7 @@ pub(super) fn normal(scatter: &Matrix3<f64>) -> Vector3<f64> {
     eigen.eigenvectors.column(smallest).into_owned()
 }
 
-/// Whether points with this scatter and size all lie on one line, up to rounding.
+/// True if points with this scatter and size all lie on one line, up to rounding.
 pub(super) fn is_line(scatter: &Matrix3<f64>, largest_m: f64) -> bool {
     let mut eigenvalues = scatter.symmetric_eigenvalues();
     eigenvalues.as_mut_slice().sort_by(f64::total_cmp);

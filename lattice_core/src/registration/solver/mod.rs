@@ -28,21 +28,21 @@ const TRIES: usize = 12;
 /// Share of the tolerances at which the steps between two searches end.
 const INNER_SHARE: f64 = 1e-3;
 
-/// What a registration found.
+/// Result of a registration.
 ///
 /// `hessian`, `cost`, `inliers` and `rmse_m` are of the last pairs, before the last step.
 #[derive(Clone, PartialEq, Debug)]
 pub struct Registration {
     /// Takes source points to the target frame.
     pub target_from_source: Isometry3<f64>,
-    /// Whether the last step was below the tolerances.
+    /// True if the last step was below the tolerances.
     pub converged: bool,
     /// Searches for pairs.
     pub iterations: usize,
     /// Half of the second derivative of the cost (Gauss-Newton) by the right perturbation (rho, phi):
     /// the sum of J^T M J under the weights of the kernel.
     pub hessian: Matrix6<f64>,
-    /// What was minimised.
+    /// Value of the minimised cost.
     pub cost: f64,
     /// Source points with a pair.
     pub inliers: usize,

@@ -4,7 +4,7 @@
 
 use nalgebra::{Point3, Vector3};
 
-/// How the distance of a pair is measured.
+/// Measure of the distance of a pair.
 #[derive(Clone, Copy, Debug)]
 pub(super) enum Metric {
     /// |r|^2.
@@ -69,7 +69,7 @@ pub(super) struct Pair {
 }
 
 impl Pair {
-    /// Of source point `x` that the pose takes to `q`, and target point `y`.
+    /// Pair of a source point that the pose takes to `q`, and target point `y`.
     #[inline(always)]
     pub fn new(
         metric: Metric,

@@ -77,7 +77,7 @@ impl Pairs<'_> {
         if variant != SemanticVariant::Em {
             return equal;
         }
-        // What is unknown agrees with anything.
+        // Unknown labels agree with anything.
         let unknown = |l: &LabelDistribution| match self.options.labels {
             LabelUse::Hard => f64::from(u8::from(l.top().is_none())),
             LabelUse::Soft => f64::from(l.unknown()),

@@ -1,4 +1,4 @@
-//! Which target points a source point is paired with, and how much each pair counts.
+//! Pairs of source and target points, found at one pose and measured at others.
 
 use nalgebra::{Isometry3, Point3, Vector3};
 use rayon::prelude::*;

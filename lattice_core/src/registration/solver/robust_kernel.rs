@@ -1,6 +1,6 @@
 //! Robust kernels: the cost of a distance, and how far a pair still pulls.
 
-/// What the squared Mahalanobis distance d2 of a pair with weight w costs.
+/// Cost of a pair with weight w and squared Mahalanobis distance d2.
 #[derive(Clone, Copy, Debug)]
 pub(super) enum Kernel {
     /// w d2

@@ -1,4 +1,4 @@
-//! What a map file holds, in order of the keys.
+//! Contents of a map file, in the order of the keys.
 
 use nalgebra::Vector3;
 use thiserror::Error;
@@ -132,7 +132,7 @@ impl MapContents {
         self.voxels.as_deref()
     }
 
-    /// Which further columns there are.
+    /// The further columns that are there.
     pub fn payload(&self) -> Payload {
         self.columns.payload()
     }

@@ -152,7 +152,7 @@ impl MapContents {
     }
 }
 
-/// What is wrong with the values of a column, and before which of its bytes.
+/// Error in the values of a column, with the byte behind it.
 pub(super) struct Fault {
     offset: usize,
     reason: String,

@@ -316,7 +316,7 @@ fn occupancy_is_read_in_one_go_and_bounded() {
         let error = read_occupancy(&file[..], max_bytes).unwrap_err();
         assert!(matches!(error, FileError::TooLarge { .. }), "{error}");
     }
-    // What is skipped is checked.
+    // Skipped sections are checked too.
     for at in [HEAD_BYTES + 60, file.len() / 2, file.len() - 20] {
         let mut damaged = file.clone();
         damaged[at] ^= 4;

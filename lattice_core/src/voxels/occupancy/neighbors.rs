@@ -9,7 +9,7 @@ const AROUND: usize = 27;
 /// Index differences up to this lead from a block to one of those.
 const REACH: i32 = 8;
 
-/// Where in the blocks around a block the neighbours of its cells are.
+/// Places of the neighbours of a block's cells in the blocks around it.
 struct Places {
     /// For each place of the block as many as there are differences: block of `AROUND` * 512 + place.
     targets: Vec<u16>,

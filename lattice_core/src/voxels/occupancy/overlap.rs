@@ -1,4 +1,4 @@
-//! How many points lie in occupied cells.
+//! Number of points in occupied cells.
 
 use nalgebra::{Isometry3, Translation3};
 
@@ -7,7 +7,7 @@ use crate::lattice::BatchQuantizer;
 use crate::voxels::store::block_mask::{self, BlockMask};
 
 impl OccupancyList {
-    /// How many points (metres) `map_from_points` puts into occupied cells; fastest for points in an
+    /// Number of points (metres) that `map_from_points` puts into occupied cells; fastest for points in an
     /// order that keeps near ones together.
     pub fn overlap(&self, map_from_points: &Isometry3<f64>, points_m: &[[f32; 3]]) -> usize {
         const NOTHING: &BlockMask = &[0; 8];

@@ -39,7 +39,7 @@ impl Block {
         }
     }
 
-    /// Whether a place is taken, and its rank among the taken ones.
+    /// True if a place is taken, and its rank among the taken ones.
     #[inline(always)]
     fn rank(&self, place: usize) -> (bool, usize) {
         let (word, bit) = (place >> 6 & 7, place & 63);

@@ -9,7 +9,7 @@ const PER_METRE: f64 = 1.0 / OFFSET_UNIT_M;
 
 /// Sums of positions from the datum in `OFFSET_UNIT_M`, modulo 2^32, and the number of points.
 ///
-/// Where the cell is known, so are the sums of [`most_points`], from its centre.
+/// With the cell known, the sums of [`most_points`] are known from its centre.
 pub(crate) type Point = u32x4;
 
 /// Sums of offsets from the centre of a cell in `OFFSET_UNIT_M`, and the number of points.
@@ -149,13 +149,13 @@ pub(crate) fn offsets_in(voxel: &Voxel) -> Offsets {
     [x, y, z, i64::from(voxel.count)]
 }
 
-/// Of second moments: offsets are counted in a 2^16th of the covering radius, so that the moments
+/// Unit of second moments: offsets are counted in a 2^16th of the covering radius, so that the moments
 /// of 2^31 points fit.
 pub(crate) fn moment_unit_m(lattice: &Lattice) -> f64 {
     lattice.covering_radius_m() / f64::from(1_u32 << 16)
 }
 
-/// What a point at `offset` from its cell's centre adds to the moments.
+/// Contribution to the moments of a point at `offset` from its cell's centre.
 pub(crate) fn moments_of(offset: [i64; 3], unit_m: f64) -> [i64; 6] {
     let [x, y, z] = offset.map(|o| nearest_integer(o as f64 * OFFSET_UNIT_M / unit_m));
     [x * x, x * y, x * z, y * y, y * z, z * z]

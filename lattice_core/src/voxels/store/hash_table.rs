@@ -23,7 +23,7 @@ fn number_in(slot: u64) -> u32 {
     (slot as u32).wrapping_sub(1)
 }
 
-/// What a table holds.
+/// A row of a table.
 pub(crate) trait Row {
     /// The key of the row, which never changes.
     fn code(&self) -> u64;
@@ -42,7 +42,7 @@ pub(crate) struct Table<R> {
     seed: u64,
 }
 
-/// Where a code is.
+/// Number of a code's row.
 #[derive(Clone, Copy, PartialEq, Eq, Debug)]
 pub(crate) enum Place {
     /// It was there.
@@ -88,7 +88,7 @@ impl<R: Row> Table<R> {
         size_of::<u64>() * self.slots.capacity() + size_of::<R>() * self.rows.capacity()
     }
 
-    /// Where the search for a code begins, and the tag of its slot.
+    /// First slot of the search for a code, and the tag of its slot.
     #[inline(always)]
     fn home(&self, code: u64) -> (usize, u64) {
         let product = code.wrapping_mul(self.seed);
@@ -221,7 +221,7 @@ impl<R: Row> Table<R> {
             let number = number_in(slot);
             let number = if number == renamed { last } else { number };
             let home = self.home(self.code(number)).0;
-            // Whether the hole is on the way from its home.
+            // True if the hole is on the way from its home.
             if at.wrapping_sub(home) & mask >= at.wrapping_sub(hole) & mask {
                 self.put(hole, slot);
                 hole = at;

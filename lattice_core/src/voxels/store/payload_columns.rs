@@ -1,15 +1,15 @@
-//! What is kept of a voxel besides count and sum of its points.
+//! Further columns of voxels: second moments, stamps, labels.
 
 use super::growth;
 
-/// Which further columns a list keeps; each costs memory and time.
+/// Further columns that a list keeps; each costs memory and time.
 #[derive(Clone, Copy, PartialEq, Eq, Debug, Default)]
 pub struct Payload {
     /// Second moments of the points, for a covariance: 48 bytes a voxel.
     pub moments: bool,
     /// Stamps of the first and the last point: 16 bytes a voxel.
     pub stamps: bool,
-    /// How many points had which label: 24 bytes a voxel and 8 for each label.
+    /// Number of points of each label: 24 bytes a voxel and 8 for each label.
     pub labels: bool,
 }
 
@@ -32,14 +32,14 @@ pub struct LabelCount {
 /// Stamps of the first and last point in a voxel, ns.
 #[derive(Clone, Copy, PartialEq, Eq, Debug)]
 pub struct Stamps {
-    /// Of the first point.
+    /// Stamp of the first point.
     pub first_ns: i64,
-    /// Of the last point.
+    /// Stamp of the last point.
     pub last_ns: i64,
 }
 
 impl Stamps {
-    /// Of no points.
+    /// Stamps of no points.
     pub(crate) const NONE: Stamps = Stamps {
         first_ns: i64::MAX,
         last_ns: i64::MIN,
@@ -63,7 +63,7 @@ pub(crate) struct Columns {
     pub(crate) labels: Vec<Vec<LabelCount>>,
 }
 
-/// What points add to the further columns of a voxel.
+/// Contribution of points to the further columns of a voxel.
 #[derive(Clone, Debug, Default)]
 pub(crate) struct Details {
     pub(crate) moments: Moments,
@@ -81,7 +81,7 @@ impl Columns {
         }
     }
 
-    /// Which columns are kept.
+    /// Columns that are kept.
     pub(crate) fn payload(&self) -> Payload {
         self.payload
     }
@@ -156,7 +156,7 @@ impl Columns {
         }
     }
 
-    /// What the columns hold of voxel `number`.
+    /// Row of voxel `number`.
     pub(crate) fn get(&self, number: usize) -> Details {
         Details {
             moments: self.moments.get(number).copied().unwrap_or_default(),

@@ -30,7 +30,7 @@ const SCATTERED: (usize, usize) = (1, 5);
 #[derive(Clone, Debug)]
 pub(crate) struct Gather {
     slots: Vec<Partial>,
-    /// What a block of points moved out of its slots.
+    /// Cells that a block of points moved out of their slots.
     moved: Vec<Partial>,
     scattered: bool,
 }

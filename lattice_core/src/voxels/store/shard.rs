@@ -17,7 +17,7 @@ pub(crate) const SHARDS: usize = 16;
 /// Cells that are searched together.
 pub(crate) const BATCH: usize = 128;
 
-/// When a voxel came and when it last changed, as states of the list.
+/// States of the list in which a voxel came and last changed.
 #[derive(Clone, Copy, PartialEq, Eq, Debug)]
 pub(crate) struct Life {
     pub(crate) born: u32,
@@ -37,7 +37,7 @@ impl Life {
 #[derive(Clone)]
 pub(crate) struct Entry {
     pub(crate) code: u64,
-    /// Of up to [`most_points`]; of more the number of their [`WideSums`], and the count.
+    /// Sums of up to [`most_points`]; of more the number of their [`WideSums`], and the count.
     points: Point,
     pub(crate) life: Life,
 }
@@ -67,7 +67,7 @@ impl Entry {
     }
 }
 
-/// Which shard a cell belongs to: all cells of a block to one.
+/// Number of the shard of a cell; all cells of a block belong to one.
 #[inline(always)]
 pub(crate) fn shard_of(code: BlockKey) -> usize {
     (code.block().wrapping_mul(0x9e37_79b9_7f4a_7c15) >> 60) as usize
@@ -131,7 +131,7 @@ impl Shard {
         }
     }
 
-    /// Who knew of a voxel before it went need not be told that it went when it comes back.
+    /// Takes back the removal of a voxel that comes again, for consumers that know it still.
     #[inline]
     fn remember(&mut self, code: u64, number: u32) {
         if self.removed.is_empty() {
@@ -190,7 +190,7 @@ impl Shard {
         entry.points = Point::new([wide, 0, 0, count]);
     }
 
-    /// Of the points of a voxel.
+    /// Offset sums of the points of a voxel.
     #[inline]
     pub(crate) fn offsets(&self, code: BlockKey, entry: &Entry) -> Offsets {
         if entry.count() <= self.most_points {

@@ -1,4 +1,4 @@
-//! Sums that do not fit the rows of a table.
+//! Sums of voxels with more points than a row has room for.
 
 use super::fixed_point::Offsets;
 use super::growth;
