@@ -1,9 +1,5 @@
 //! Settings for per-point time.
 
-use std::fmt;
-use std::str::FromStr;
-use thiserror::Error;
-
 /// Unit of a time field.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum TimeUnit {
@@ -49,72 +45,6 @@ pub enum TimeReference {
     StampEnd,
     /// `absolute`: from the Unix epoch, whatever the stamp.
     Absolute,
-}
-
-impl TimeReference {
-    /// Name in parameters.
-    pub fn name(self) -> &'static str {
-        match self {
-            TimeReference::StampStart => "stamp_start",
-            TimeReference::StampEnd => "stamp_end",
-            TimeReference::Absolute => "absolute",
-        }
-    }
-}
-
-/// A name that is no unit or no reference.
-#[derive(Clone, Debug, PartialEq, Eq, Error)]
-#[error("'{found}' is not one of {expected}")]
-pub struct UnknownTimeName {
-    /// Name given.
-    pub found: String,
-    /// Names that exist.
-    pub expected: &'static str,
-}
-
-impl FromStr for TimeUnit {
-    type Err = UnknownTimeName;
-
-    fn from_str(name: &str) -> Result<TimeUnit, UnknownTimeName> {
-        match name {
-            "s" => Ok(TimeUnit::Seconds),
-            "ms" => Ok(TimeUnit::Milliseconds),
-            "us" => Ok(TimeUnit::Microseconds),
-            "ns" => Ok(TimeUnit::Nanoseconds),
-            _ => Err(UnknownTimeName {
-                found: name.to_owned(),
-                expected: "s, ms, us, ns",
-            }),
-        }
-    }
-}
-
-impl FromStr for TimeReference {
-    type Err = UnknownTimeName;
-
-    fn from_str(name: &str) -> Result<TimeReference, UnknownTimeName> {
-        match name {
-            "stamp_start" => Ok(TimeReference::StampStart),
-            "stamp_end" => Ok(TimeReference::StampEnd),
-            "absolute" => Ok(TimeReference::Absolute),
-            _ => Err(UnknownTimeName {
-                found: name.to_owned(),
-                expected: "stamp_start, stamp_end, absolute",
-            }),
-        }
-    }
-}
-
-impl fmt::Display for TimeUnit {
-    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
-        f.write_str(self.name())
-    }
-}
-
-impl fmt::Display for TimeReference {
-    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
-        f.write_str(self.name())
-    }
 }
 
 /// Overrides of the detector; the default guesses all by name and type.

@@ -10,7 +10,7 @@ mod labels;
 mod likelihood;
 mod options;
 mod prepared;
-pub mod search;
+mod search;
 mod solver;
 #[cfg(test)]
 mod testing;

@@ -1,6 +1,6 @@
 //! Matching: one pose of 2000 points against a list, and an alignment from start to end.
 //!
-//! `cargo bench -p lattice_core --bench matching`
+//! `cargo bench -p lattice_lab --bench matching`
 
 #![allow(clippy::expect_used)]
 

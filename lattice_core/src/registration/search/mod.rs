@@ -93,11 +93,6 @@ impl SearchMap {
             fine: make(fine),
         })
     }
-
-    /// Side of the cells that all places are tried on, metres.
-    pub fn coarse_cell_m(&self) -> f64 {
-        self.coarse.grid.cell_m
-    }
 }
 
 /// A source cloud made ready to be searched for.
