@@ -1,4 +1,4 @@
-//! One integer per cell, block by block.
+//! Block key of a cell: an integer that orders cells block by block.
 
 use super::{LatticeIndex, MortonKey};
 

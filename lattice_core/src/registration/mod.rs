@@ -21,11 +21,10 @@ pub use calibrate::{
     track,
 };
 pub use cloud::SemanticCloud;
-pub use confusion::{Confusion, Lift};
+pub use confusion::Confusion;
 pub use downsample::voxel_downsample;
 pub use error::RegistrationError;
 pub use labels::{LabelDistribution, UNLABELED};
-pub use likelihood::{Fit, FitScale, Likelihood, Partners};
 pub use options::{LabelUse, MAX_CANDIDATES, Method, PairWeight, RegisterOptions, SemanticVariant};
 pub use prepared::kd_tree::{MAX_NEIGHBORS, Neighbors};
 pub use prepared::{MAX_COORDINATE_M, PrepareOptions, PreparedCloud};

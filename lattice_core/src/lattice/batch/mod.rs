@@ -1,4 +1,4 @@
-//! Many points at once: the fast way to the answer of [`Lattice::quantize`].
+//! Batch quantizer: [`Lattice::quantize`] for many points at once.
 //!
 //! Points go through a single precision kernel that knows which of its answers are certain
 //! (`kernel`); the others, some in a thousand, go through the double precision closed form. So the

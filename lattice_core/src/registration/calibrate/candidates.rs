@@ -3,12 +3,11 @@
 use nalgebra::{Isometry3, Point3, Vector3};
 use rayon::prelude::*;
 
-use super::super::confusion::shares;
+use super::super::confusion::{Lift, shares};
 use super::super::likelihood::{Fit, Likelihood, Partners};
 use super::super::search::Hypothesis;
 use super::super::{
-    Confusion, LabelDistribution, LabelUse, Lift, PairWeight, PreparedCloud, RegisterOptions,
-    register,
+    Confusion, LabelDistribution, LabelUse, PairWeight, PreparedCloud, RegisterOptions, register,
 };
 use super::input::Input;
 use super::map::CalibrationMap;

@@ -1,4 +1,4 @@
-//! A map made ready for calibrations.
+//! A map prepared for calibrations.
 
 use super::super::confusion::shares;
 use super::super::likelihood::FitScale;

@@ -1,4 +1,4 @@
-//! Writing.
+//! Writing a map: head, sections, end.
 
 use std::io::Write;
 

@@ -1,4 +1,4 @@
-//! Inserting clouds into bits.
+//! Inserting clouds into an occupancy list.
 
 use rayon::prelude::*;
 

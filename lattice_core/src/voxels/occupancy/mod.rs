@@ -297,6 +297,6 @@ mod merge;
 mod neighbors;
 mod overlap;
 mod recent_cells;
-mod retain;
+mod remove;
 #[cfg(test)]
 mod tests;

@@ -4,8 +4,7 @@ use rayon::prelude::*;
 
 use super::{Block, OccupancyList};
 use crate::lattice::{BlockKey, LatticeIndex, MortonKey};
-use crate::voxels::retain::first_index;
-use crate::voxels::store::block_mask::{BlockMask, places};
+use crate::voxels::store::block_mask::{BlockMask, first_index, places};
 
 impl OccupancyList {
     pub(super) fn retain_in_blocks(

@@ -1,8 +1,8 @@
 //! Full lists: refuse new voxels or forget the oldest.
 
 use super::VoxelList;
-use super::store::shard::Shard;
 use crate::lattice::BlockKey;
+use crate::voxels::store::shard::Shard;
 
 /// Policy of a full list for points in new cells.
 #[derive(Clone, Copy, PartialEq, Eq, Debug, Default)]
@@ -38,7 +38,7 @@ impl VoxelList {
     }
 
     /// Points to insert at once.
-    pub(super) fn wave_points(&self, wave: usize) -> usize {
+    pub(crate) fn wave_points(&self, wave: usize) -> usize {
         match self.when_full {
             WhenFull::Refuse => wave,
             WhenFull::ForgetOldest => wave.min(self.portion()),
@@ -46,7 +46,7 @@ impl VoxelList {
     }
 
     /// Forgets voxels, if it is the policy and `points` may not fit; gives their number.
-    pub(super) fn make_room(&mut self, points: usize, now: u32) -> usize {
+    pub(crate) fn make_room(&mut self, points: usize, now: u32) -> usize {
         let len = self.len();
         if self.when_full == WhenFull::Refuse || len.saturating_add(points) <= self.max_voxels {
             return 0;

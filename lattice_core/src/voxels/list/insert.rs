@@ -1,18 +1,18 @@
-//! Inserting clouds.
+//! Inserting clouds into a list, on one thread or many.
 
 use nalgebra::Translation3;
 use rayon::prelude::*;
 
 use super::VoxelList;
-use super::distortion::DistortionSums;
-use super::store::fixed_point::{
-    FixedBlock, Point, moment_unit_m, moments_of, most_points, near_point, offsets_of,
-};
-use super::store::payload_columns::{Details, LabelCount, Stamps};
-use super::store::point_gather::{Gather, Partial};
-use super::store::shard::{BATCH, SHARDS, Shard, shard_of};
 use crate::cloud::Cloud;
 use crate::lattice::{BatchBlock, BatchQuantizer, BatchSums, BlockKey, Lattice};
+use crate::voxels::distortion::DistortionSums;
+use crate::voxels::store::fixed_point::{
+    FixedBlock, Point, moment_unit_m, moments_of, most_points, near_point, offsets_of,
+};
+use crate::voxels::store::payload_columns::{Details, LabelCount, Stamps};
+use crate::voxels::store::point_gather::{Gather, Partial};
+use crate::voxels::store::shard::{BATCH, SHARDS, Shard, shard_of};
 
 /// Fewer points are not worth gathering.
 const FEW: usize = 1 << 12;
@@ -36,14 +36,14 @@ pub struct InsertReport {
     pub list_full: u64,
     /// Voxels that were not in the list before.
     pub new_voxels: u64,
-    /// Voxels that went to make room, see [`super::WhenFull`].
+    /// Voxels that went to make room, see [`crate::voxels::WhenFull`].
     pub forgotten_voxels: u64,
 }
 
 impl InsertReport {
     /// Counts the points of a batch that have no cell, by reason.
     #[inline]
-    pub(super) fn count_rejects(
+    pub(crate) fn count_rejects(
         &mut self,
         quantizer: &BatchQuantizer,
         points: &[[f32; 3]],
@@ -75,7 +75,7 @@ impl InsertReport {
     }
 
     /// Adds what became of other points.
-    pub(super) fn add(&mut self, other: &InsertReport) {
+    pub(crate) fn add(&mut self, other: &InsertReport) {
         self.points += other.points;
         self.inserted += other.inserted;
         self.not_finite += other.not_finite;

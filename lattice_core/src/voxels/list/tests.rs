@@ -1,11 +1,9 @@
 //! Tests of the list; those over threads are in the test crate.
 
-use nalgebra::Vector3;
-
-use super::file::{read_map, write_map};
 use super::*;
-use crate::cloud::Cloud;
-use crate::lattice::{Lattice, LatticeKind, MortonKey};
+use crate::lattice::LatticeKind;
+use crate::voxels::OFFSET_UNIT_M;
+use crate::voxels::file::{read_map, write_map};
 
 fn list(kind: LatticeKind, datum: [f64; 3], max_voxels: usize) -> VoxelList {
     VoxelList::new(Lattice::new(kind, 0.125).unwrap(), datum.into(), max_voxels).unwrap()

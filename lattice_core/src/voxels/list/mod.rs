@@ -1,4 +1,12 @@
-//! The list itself.
+//! Voxel list: construction, look-up, invariants; each change of a list has a file of its own.
+
+mod changes;
+mod exposed_faces;
+mod forget_old;
+mod insert;
+mod merge;
+mod remove;
+mod when_full;
 
 use std::fmt;
 
@@ -11,9 +19,15 @@ use super::store::fixed_point::{moment_unit_m, reach};
 use super::store::growth;
 use super::store::payload_columns::{Columns, Details, LabelCount, Payload, Stamps};
 use super::store::shard::{Life, SHARDS, Shard, shard_of};
-use super::{InsertReport, Voxel, VoxelStore, WhenFull};
+use super::{Voxel, VoxelStore};
 use crate::cloud::Cloud;
 use crate::lattice::{BlockKey, Lattice, LatticeIndex, MortonKey};
+
+pub use changes::Changes;
+pub use forget_old::NoStamps;
+pub use insert::InsertReport;
+pub use merge::MergeError;
+pub use when_full::WhenFull;
 
 /// The datum is not finite or too many cells from the origin of the map frame.
 #[derive(Clone, Copy, PartialEq, Debug, Error)]
@@ -391,3 +405,6 @@ impl fmt::Debug for VoxelList {
         )
     }
 }
+
+#[cfg(test)]
+mod tests;

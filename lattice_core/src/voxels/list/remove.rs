@@ -3,18 +3,13 @@
 use rayon::prelude::*;
 
 use super::VoxelList;
-use super::store::block_mask::places;
-use super::store::shard::{Entry, Shard};
 use crate::lattice::{BlockKey, LatticeIndex, MortonKey};
-
-/// The lowest index of a block.
-pub(super) fn first_index(block: u64) -> Option<LatticeIndex> {
-    BlockKey::from_raw(block << 9).map(BlockKey::unpack)
-}
+use crate::voxels::store::block_mask::{first_index, places};
+use crate::voxels::store::shard::{Entry, Shard};
 
 impl VoxelList {
     /// Removes the voxels that `goes` wants, by shard, number in the shard and row.
-    pub(super) fn remove_where(
+    pub(crate) fn remove_where(
         &mut self,
         goes: impl Fn(&Shard, usize, &Entry) -> bool + Sync,
     ) -> usize {
@@ -27,7 +22,7 @@ impl VoxelList {
         self.remove_all(gone)
     }
 
-    pub(super) fn retain_in_blocks(
+    pub(crate) fn retain_in_blocks(
         &mut self,
         keep_block: &(dyn Fn(LatticeIndex) -> Option<bool> + Sync),
         keep: &(dyn Fn(MortonKey) -> bool + Sync),
@@ -57,7 +52,7 @@ impl VoxelList {
     }
 
     /// Removes the voxels of these cells, listed by shard, as part of state `now`.
-    pub(super) fn remove_at(&mut self, gone: Vec<Vec<BlockKey>>, now: u32) -> usize {
+    pub(crate) fn remove_at(&mut self, gone: Vec<Vec<BlockKey>>, now: u32) -> usize {
         let shards = self.shards.par_iter_mut().zip(gone);
         let removed = shards.map(|(shard, gone)| {
             let cells = gone.into_iter();

@@ -1,8 +1,8 @@
 //! Changes of a list since they were asked for last.
 
 use super::VoxelList;
-use super::store::shard::Life;
 use crate::lattice::{BlockKey, MortonKey};
+use crate::voxels::store::shard::Life;
 
 /// Keys that differ from an earlier state, sorted.
 #[derive(Clone, PartialEq, Eq, Debug, Default)]

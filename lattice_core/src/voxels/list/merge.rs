@@ -2,11 +2,11 @@
 
 use thiserror::Error;
 
-use super::store::fixed_point::offsets_in;
-use super::store::payload_columns::Columns;
-use super::store::shard::{SHARDS, shard_of};
-use super::{Voxel, VoxelList, VoxelStore};
 use crate::lattice::{BlockKey, MortonKey};
+use crate::voxels::store::fixed_point::offsets_in;
+use crate::voxels::store::payload_columns::Columns;
+use crate::voxels::store::shard::{SHARDS, shard_of};
+use crate::voxels::{Voxel, VoxelList, VoxelStore};
 
 /// Two stores that do not go together. The receiving one is as before.
 #[derive(Clone, PartialEq, Debug, Error)]
@@ -52,7 +52,7 @@ pub enum MergeError {
 impl VoxelList {
     /// Adds all voxels and statistics of `other`, exactly; order and grouping of merges do not
     /// matter. Fails, changing nothing, for another lattice or datum or if the union is too large,
-    /// whatever [`super::WhenFull`] says.
+    /// whatever [`crate::voxels::WhenFull`] says.
     pub fn merge(&mut self, other: &VoxelList) -> Result<(), MergeError> {
         self.expect_cells_of(other)?;
         let new = other
@@ -88,7 +88,7 @@ impl VoxelList {
 
     /// Adds cells of which none is in the list, with the further columns row by row, until the list
     /// is full. Keys of one block should come together.
-    pub(super) fn fill(
+    pub(crate) fn fill(
         &mut self,
         cells: impl Iterator<Item = (MortonKey, Voxel)>,
         columns: &Columns,
