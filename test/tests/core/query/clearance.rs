@@ -21,7 +21,7 @@ fn distances(voxels: &VoxelList, body: &Body) -> Vec<(MortonKey, f64)> {
     cells(voxels).into_iter().map(distance).collect()
 }
 
-/// What was found is the least of all distances, belongs to its cell, and obeys the bound.
+/// Checks that the answer is the least of all distances, belongs to its cell, and obeys the bound.
 fn check(
     all: &[(MortonKey, f64)],
     found: Option<Clearance>,
