@@ -46,4 +46,42 @@ impl VoxelList {
         removed.sort_unstable();
         Changes { changed, removed }
     }
+
+    /// Makes the next state and gives its number.
+    pub(crate) fn advance(&mut self) -> u32 {
+        if self.sequence == u32::MAX {
+            self.renumber();
+        }
+        self.sequence += 1;
+        self.sequence
+    }
+
+    /// Starts counting states anew; changes that were taken stay taken.
+    fn renumber(&mut self) {
+        let taken = self.taken;
+        let new = |state: u32| u32::from(state > taken);
+        for shard in &mut self.shards {
+            let lives = shard
+                .voxels
+                .rows_mut()
+                .iter_mut()
+                .map(|entry| &mut entry.life);
+            for life in lives.chain(shard.removed.values_mut()) {
+                (life.born, life.touched) = (new(life.born), new(life.touched));
+            }
+        }
+        (self.taken, self.sequence) = (0, 1);
+    }
+
+    /// Bounds the memory for removed voxels: of more than `max_voxels` only those are remembered
+    /// that were there at the last `take_changes`.
+    pub(crate) fn bound_removed(&mut self) {
+        let remembered: usize = self.shards.iter().map(|shard| shard.removed.len()).sum();
+        if remembered > self.max_voxels {
+            let taken = self.taken;
+            for shard in &mut self.shards {
+                shard.removed.retain(|_, life| life.born <= taken);
+            }
+        }
+    }
 }
