@@ -15,7 +15,7 @@ use super::params::Params;
 use super::publisher::{Publisher, RawPublisher};
 use super::qos::Qos;
 use super::ros_args::RosArgs;
-use super::subscription::{Load, Subscription};
+use super::subscription::{Load, Sample, Stats, Subscription, Undecoded};
 
 /// A node of a [`Runtime`](super::Runtime). Clones are the same node.
 #[derive(Clone)]
@@ -173,7 +173,35 @@ impl Node {
         topic: &str,
         qos: Qos,
         load: Load,
-        handler: impl FnMut(Arc<M>) + Send + 'static,
+        mut handler: impl FnMut(Arc<M>) + Send + 'static,
+    ) -> Result<Subscription, RuntimeError> {
+        self.subscribe_samples(topic, qos, load, move |sample, stats| {
+            if let Some(message) = stats.decode(sample) {
+                handler(message);
+            }
+        })
+    }
+
+    /// Gives every message on a topic to `handler` as it came, to be decoded by who works on it; else
+    /// as [`Node::subscribe`]. For large messages of which one thread must keep the order.
+    pub fn subscribe_undecoded<M: RosMessage>(
+        &self,
+        topic: &str,
+        qos: Qos,
+        load: Load,
+        mut handler: impl FnMut(Undecoded<M>) + Send + 'static,
+    ) -> Result<Subscription, RuntimeError> {
+        self.subscribe_samples(topic, qos, load, move |sample, stats| {
+            handler(Undecoded::new(sample, stats));
+        })
+    }
+
+    fn subscribe_samples<M: RosMessage>(
+        &self,
+        topic: &str,
+        qos: Qos,
+        load: Load,
+        handler: impl FnMut(Sample<'_, M>, &Arc<Stats>) + Send + 'static,
     ) -> Result<Subscription, RuntimeError> {
         let resolved = self.resolve(topic)?;
         let qos = qos.with_overrides(&self.inner.params, &resolved, topic)?;

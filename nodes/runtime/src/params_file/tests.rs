@@ -217,7 +217,7 @@ fn large_files_are_refused() {
     let directory = tempfile::tempdir().unwrap();
     assert!(matches!(
         read(directory.path()),
-        Err(ParamError::Read { .. })
+        Err(ParamError::NotAFile { .. })
     ));
 }
 
