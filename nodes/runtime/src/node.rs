@@ -47,13 +47,11 @@ impl Node {
         names::validate_namespace(&namespace)?;
         let fqn = names::fully_qualified(&name, &namespace);
         let params = Arc::new(Params::load(args, &fqn)?);
-        let about = "length in bytes above which a message is refused";
-        let default = i64::try_from(DEFAULT_MAX_MESSAGE_BYTES).unwrap_or(i64::MAX);
-        let max = params.about(about).i64("max_message_bytes", default)?;
-        let max_message_bytes = usize::try_from(max)
-            .ok()
-            .filter(|max| (1..=u32::MAX as usize).contains(max))
-            .ok_or_else(|| params.invalid("max_message_bytes", "expected 1 to 4294967295"))?;
+        let max_message_bytes = params.usize_in(
+            "max_message_bytes",
+            DEFAULT_MAX_MESSAGE_BYTES,
+            1..=u32::MAX as usize,
+        )?;
         let id = core.graph.add_node(&namespace, &name);
         let about = "go by the time on /clock instead of the system's";
         let clock = if params.about(about).bool("use_sim_time", false)? {

@@ -228,3 +228,16 @@ proptest! {
         let _ = read_text(&format!("m:\n  ros__parameters:\n    {text}"));
     }
 }
+
+#[test]
+fn a_fifo_is_refused_and_not_waited_for() {
+    let directory = tempfile::tempdir().unwrap();
+    let path = directory.path().join("params.yaml");
+    let made = std::process::Command::new("mkfifo").arg(&path).status();
+    assert!(made.unwrap().success());
+    let (sender, refused) = std::sync::mpsc::channel();
+    std::thread::spawn(move || sender.send(read(&path)));
+    let refused = refused.recv_timeout(std::time::Duration::from_secs(10));
+    let refused = refused.expect("reading waits for a writer");
+    assert!(matches!(refused, Err(ParamError::NotAFile { .. })));
+}
