@@ -11,10 +11,10 @@ use std::time::Instant;
 use super::answer::Times;
 use super::milliseconds;
 
-/// Gate where nothing is published, metres.
+/// Gate of methods without a published one, metres.
 const GATE_M: f64 = 1.0;
 
-/// How to calibrate.
+/// Methods of calibration.
 #[derive(Clone, Copy, PartialEq, Eq, Debug, ValueEnum)]
 pub enum MethodName {
     /// Search, several registrations, one judge
@@ -75,7 +75,7 @@ pub struct Single {
 }
 
 impl Single {
-    /// Prepares both clouds and registers; also tells how many points of the cloud were left.
+    /// Prepares both clouds and registers; also the number of points left of the cloud.
     pub fn register(
         &self,
         map: SemanticCloud,
