@@ -1,7 +1,7 @@
 //! Latency of single questions to a map of rooms: nearest cells, clearance of a point, a segment, a box
 //! and a box that moves, and a distance field.
 //!
-//! `cargo bench -p lattice_core --bench query`; each call is one question, at places that take turns. How
+//! `cargo bench -p lattice_lab --bench query`; each call is one question, at places that take turns. How
 //! paths compare between lattices: `cargo run -p lattice_core --example paths`.
 
 #![allow(clippy::expect_used)]
@@ -26,7 +26,7 @@ fn main() {
 
 /// A laser's scan as a map, and places around the laser, always the same.
 fn rooms(kind: LatticeKind) -> (OccupancyList, Vec<Vector3<f64>>) {
-    let house = House::own(1).expect("the house stands");
+    let house = House::generated(1).expect("the house stands");
     let views = LaserView::pairs(&house, 1, &LaserOptions::default(), 1).expect("a pair is found");
     let [view, _] = &views[0];
     let cloud = Cloud {
