@@ -49,7 +49,7 @@ pub struct Calibrate {
     #[arg(long, default_value = "ros_flu")]
     axes: Axes,
     /// auto searches and judges; the others are single registrations from the guess
-    #[arg(long, value_enum, default_value = "auto")]
+    #[arg(long, value_parser = MethodName::parser(), default_value = "auto")]
     method: MethodName,
     /// Longest distance of a pair of points for the single registrations, m [default: as published]
     #[arg(long)]
