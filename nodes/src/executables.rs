@@ -76,6 +76,7 @@ pub fn run_until_told(runtime: &Runtime, running: Vec<Finish>) -> Result<(), Nod
     runtime.shutdown_handle().wait();
     // In the order in which data flows, so that each still hears the one before.
     for finish in running {
+        runtime.work_off();
         finish();
     }
     Ok(runtime.spin()?)

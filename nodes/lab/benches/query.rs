@@ -25,7 +25,7 @@ fn main() {
 
 /// A laser's scan as a map, and places around the laser, always the same.
 fn rooms(kind: LatticeKind) -> (OccupancyList, Vec<Vector3<f64>>) {
-    let house = House::own(1).expect("the house stands");
+    let house = House::generated(1).expect("the house stands");
     let views = LaserView::pairs(&house, 1, &LaserOptions::default(), 1).expect("a pair is found");
     let [view, _] = &views[0];
     let cloud = Cloud {

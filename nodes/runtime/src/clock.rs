@@ -10,7 +10,7 @@ use super::core::Core;
 use super::error::RuntimeError;
 use super::graph::NodeId;
 use super::qos::Qos;
-use super::subscription::{Load, Subscription};
+use super::subscription::{Load, Sample, Stats, Subscription};
 use super::sync::lock;
 
 /// Tells the time. Clones tell the same.
@@ -63,8 +63,10 @@ impl Core {
             sim_ns: Some(Arc::clone(&now_ns)),
         };
         // ros2-client's own subscription to /clock has a wrong type.
-        let handler = move |message: Arc<rosgraph_msgs::Clock>| {
-            now_ns.store(message.clock.to_ns(), Relaxed);
+        let handler = move |sample: Sample<'_, rosgraph_msgs::Clock>, stats: &Arc<Stats>| {
+            if let Some(message) = stats.decode(sample) {
+                now_ns.store(message.clock.to_ns(), Relaxed);
+            }
         };
         let subscription =
             self.subscribe(node, topic, &Qos::CLOCK, Load::Small, 1 << 10, handler)?;

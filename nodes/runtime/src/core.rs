@@ -1,4 +1,4 @@
-//! What the nodes of a process share: the participant, the threads, the local bus.
+//! The parts that the nodes of a process share: the participant, the threads, the local bus.
 
 use std::sync::atomic::{AtomicBool, AtomicU64};
 use std::sync::{Arc, Mutex, Weak};
@@ -24,10 +24,10 @@ use super::names;
 use super::peers::Peers;
 use super::publisher;
 use super::qos::{Durability, Qos};
-use super::reader_port::ReaderPort;
-use super::service::Server;
+use super::reader_port::{Command, ReaderPort, wait_for};
+use super::service::{Answers, Server};
 use super::shutdown::Shutdown;
-use super::subscription::{Load, Running, Source, Stats, Subscription, spawn_reader};
+use super::subscription::{Load, Running, Sample, Source, Stats, Subscription, spawn_reader};
 use super::sync::lock;
 use super::transport_status::ReceiveBuffer;
 use super::worker::Worker;
@@ -45,7 +45,7 @@ const LOCAL_SMALL_MESSAGES: usize = 1024;
 /// The same for large ones: several bursts of line scans, and not too much of 4 MB clouds.
 const LOCAL_LARGE_MESSAGES: usize = 128;
 
-/// Time to send what is queued when shutting down.
+/// Time for each of three at the end: handlers, answers, and what is queued to be sent.
 const DRAIN_TIME: Duration = Duration::from_secs(2);
 
 /// Length of a message that is accepted unless a parameter says otherwise.
@@ -59,6 +59,7 @@ pub(crate) struct Core {
     pub receive_buffer: ReceiveBuffer,
     pub sim_time: Mutex<Option<SimTime>>,
     publishing: Worker,
+    pub answers: Answers,
     pub endpoints: Arc<Endpoints>,
     pub graph: Arc<Graph>,
     /// Held while a writer is made, or a reader that a writer must not meet.
@@ -96,6 +97,7 @@ impl Core {
             receive_buffer: ReceiveBuffer::probe(),
             sim_time: Mutex::default(),
             publishing,
+            answers: Answers::default(),
             endpoints,
             graph: Graph::new(),
             writer_order: Mutex::default(),
@@ -180,13 +182,21 @@ impl Core {
             writer,
             peers: Arc::clone(&peers),
             local,
-            latched: qos.durability == Durability::TransientLocal,
+            latch: (qos.durability == Durability::TransientLocal)
+                .then(|| Mutex::new(publisher::Latch::new(latch_depth(qos)))),
+            shutdown: self.shutdown.clone(),
             _graph: self.graph.join(node, EndpointKind::Writer, guid),
         });
         if let Some(open) = lock(&self.open).as_mut() {
             open.publishers.retain(|p| p.strong_count() > 0);
             open.publishers.push(Arc::downgrade(&core));
         }
+        let joined = Arc::downgrade(&core);
+        peers.on_joined(Box::new(move || {
+            if let Some(core) = joined.upgrade() {
+                core.peer_joined();
+            }
+        }));
         self.endpoints.register(guid, &peers);
         Ok(core)
     }
@@ -199,7 +209,7 @@ impl Core {
         type_name: &str,
         qos: &Qos,
         when_full: WhenFull,
-    ) -> Result<DdsWriter, RuntimeError> {
+    ) -> Result<Arc<DdsWriter>, RuntimeError> {
         let mut guard = lock(&self.open);
         let open = guard.as_mut().ok_or_else(|| closed(name))?;
         let writer = open.dds.writer(name, dds_topic, type_name, qos)?;
@@ -208,7 +218,7 @@ impl Core {
             .spawn(task)
             .ok_or_else(|| closed(name))?
             .detach();
-        Ok(writer)
+        Ok(Arc::new(writer))
     }
 
     /// A reader of samples up to `max_bytes`.
@@ -237,7 +247,7 @@ impl Core {
         qos: &Qos,
         load: Load,
         max_bytes: usize,
-        handler: impl FnMut(Arc<M>) + Send + 'static,
+        mut handler: impl FnMut(Sample<'_, M>, &Arc<Stats>) + Send + 'static,
     ) -> Result<Subscription, RuntimeError> {
         let peers = Arc::new(Peers::of_subscription(topic));
         let stats = Arc::new(Stats::new(Arc::clone(&peers)));
@@ -252,7 +262,7 @@ impl Core {
             stats.lost_counter(),
             latched,
         )?;
-        let (commands, told) = unbounded();
+        let (commands, orders) = unbounded();
         let port = Arc::new(ReaderPort {
             node,
             topic: topic.to_owned(),
@@ -266,12 +276,12 @@ impl Core {
             graph: Mutex::default(),
         });
         let source = Source {
-            commands: told,
+            commands: orders,
             local,
             _membership: membership,
-            stats,
+            stats: Arc::clone(&stats),
         };
-        let task = source.run(handler);
+        let task = source.run(move |sample: Sample<'_, M>| handler(sample, &stats));
         let running = match load {
             Load::Small => Running::OnIoThread {
                 _task: self.io.spawn(task).ok_or_else(|| closed(topic))?,
@@ -314,11 +324,29 @@ impl Core {
         open.barrier.begin(&open.dds, &self.endpoints).ok()
     }
 
-    /// Ends everything: timers and readers first, then what is queued goes out, then we leave.
+    /// Has all subscriptions give their handlers what waits in this process. Not from a thread of the
+    /// runtime.
+    pub(crate) fn work_off(&self, deadline: Instant) {
+        let orders: Vec<_> = (self.ports().into_iter())
+            .filter_map(|port| Some((port.order(Command::WorkOff)?, port)))
+            .collect();
+        for (order, port) in orders {
+            if !wait_for(&order, deadline.saturating_duration_since(Instant::now())) {
+                log::warn!("{}: messages of this process were not handled", port.topic);
+            }
+        }
+    }
+
+    /// Ends everything: what waits for handlers and clients first, then timers and readers, then what
+    /// is queued goes out, then we leave.
     ///
     /// Not from a thread of the runtime.
     pub(crate) fn close(&self) {
         self.shutdown.request();
+        if lock(&self.open).is_some() {
+            self.work_off(deadline());
+        }
+        let answers = self.answers.end(deadline());
         let Some(open) = lock(&self.open).take() else {
             return;
         };
@@ -328,19 +356,25 @@ impl Core {
             // Its panic has been reported by the thread itself.
             let _ = thread.join();
         }
-        let start = Instant::now();
-        let publishers: Vec<_> = open.publishers.iter().filter_map(Weak::upgrade).collect();
-        for publisher in &publishers {
-            let left = DRAIN_TIME.saturating_sub(start.elapsed());
-            if !publisher.writer.flush(left) {
-                log::warn!("{}: not everything was delivered", publisher.writer.topic());
+        let publishers = open.publishers.iter().filter_map(Weak::upgrade);
+        let writers = publishers.map(|publisher| Arc::clone(&publisher.writer));
+        let deadline = deadline();
+        for writer in answers.into_iter().chain(writers) {
+            if !writer.flush(deadline.saturating_duration_since(Instant::now())) {
+                log::warn!("{}: not everything was delivered", writer.topic());
             }
-            publisher.writer.close();
+            writer.close();
         }
         self.publishing.stop();
         drop(open.servers);
         drop(open.dds);
     }
+}
+
+/// End of a phase of the shutdown that begins now.
+pub(crate) fn deadline() -> Instant {
+    let now = Instant::now();
+    now.checked_add(DRAIN_TIME).unwrap_or(now)
 }
 
 impl Drop for Core {

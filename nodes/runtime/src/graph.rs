@@ -126,7 +126,7 @@ impl Graph {
     }
 
     /// Tells every change until the task is dropped.
-    pub(crate) async fn publish(self: Arc<Self>, participant: GUID, writer: DdsWriter) {
+    pub(crate) async fn publish(self: Arc<Self>, participant: GUID, writer: Arc<DdsWriter>) {
         let gid_bytes = gid_bytes(std::env::var("ROS_DISTRO").ok().as_deref());
         while self.changes.recv().await.is_ok() {
             // Endpoints come in bursts, and each telling stays in the history for late joiners.

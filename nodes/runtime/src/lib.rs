@@ -43,6 +43,6 @@ pub use publisher::{Publisher, RawPublisher};
 pub use runtime::Runtime;
 pub use service::{Reply, Server};
 pub use shutdown::Shutdown;
-pub use subscription::{Load, Subscription};
+pub use subscription::{Load, Subscription, Undecoded};
 pub use tf::{StaticTfBroadcaster, TfBroadcaster};
 pub use worker::guarded;

@@ -48,6 +48,8 @@ pub(crate) struct Topic {
 #[derive(Default)]
 struct Inner {
     next_id: u64,
+    /// Number of the last change of publishers or subscribers.
+    change: u64,
     type_name: Option<String>,
     rust_type: Option<(TypeId, Decode)>,
     publishers: Vec<PublisherEntry>,
@@ -152,42 +154,36 @@ impl Topic {
         claim: impl FnOnce(&mut Inner) -> Result<(), RuntimeError>,
         add: impl FnOnce(&mut Inner, u64),
     ) -> Result<Membership, RuntimeError> {
-        let id = {
-            let mut inner = lock(&self.inner);
-            claim(&mut inner)?;
-            let id = inner.next_id;
-            inner.next_id = id.wrapping_add(1);
-            add(&mut inner, id);
-            id
-        };
-        self.tell_counts();
+        let mut inner = lock(&self.inner);
+        claim(&mut inner)?;
+        let id = inner.next_id;
+        inner.next_id = id.wrapping_add(1);
+        add(&mut inner, id);
+        let counts = inner.count();
+        drop(inner);
+        counts.hand_on();
         Ok(Membership {
             topic: Arc::clone(self),
             id,
         })
     }
+}
 
-    /// Callbacks run outside the lock.
-    fn tell_counts(&self) {
-        let (publishers, subscribers) = {
-            let inner = lock(&self.inner);
-            let publishers: Vec<_> = inner
-                .publishers
-                .iter()
-                .map(|p| Arc::clone(&p.peers))
-                .collect();
-            let subscribers: Vec<_> = inner
-                .subscribers
-                .iter()
-                .map(|s| Arc::clone(&s.peers))
-                .collect();
-            (publishers, subscribers)
-        };
-        for peers in &publishers {
-            peers.set_local(subscribers.len());
+/// Endpoints of a topic as they were at one change.
+struct Counts {
+    change: u64,
+    publishers: Vec<Arc<Peers>>,
+    subscribers: Vec<Arc<Peers>>,
+}
+
+impl Counts {
+    /// Gives each side the number of the other; not under the lock, since it runs callbacks.
+    fn hand_on(&self) {
+        for peers in &self.publishers {
+            peers.set_local(self.subscribers.len(), self.change);
         }
-        for peers in &subscribers {
-            peers.set_local(publishers.len());
+        for peers in &self.subscribers {
+            peers.set_local(self.publishers.len(), self.change);
         }
     }
 }
@@ -216,20 +212,37 @@ impl Membership {
 
 impl Drop for Membership {
     fn drop(&mut self) {
-        {
-            let mut inner = lock(&self.topic.inner);
-            inner.publishers.retain(|p| p.id != self.id);
-            inner.subscribers.retain(|s| s.id != self.id);
-            if inner.publishers.is_empty() && inner.subscribers.is_empty() {
-                inner.type_name = None;
-                inner.rust_type = None;
-            }
+        let mut inner = lock(&self.topic.inner);
+        inner.publishers.retain(|p| p.id != self.id);
+        inner.subscribers.retain(|s| s.id != self.id);
+        if inner.publishers.is_empty() && inner.subscribers.is_empty() {
+            inner.type_name = None;
+            inner.rust_type = None;
         }
-        self.topic.tell_counts();
+        let counts = inner.count();
+        drop(inner);
+        counts.hand_on();
     }
 }
 
 impl Inner {
+    fn count(&mut self) -> Counts {
+        self.change = self.change.wrapping_add(1);
+        Counts {
+            change: self.change,
+            publishers: self
+                .publishers
+                .iter()
+                .map(|p| Arc::clone(&p.peers))
+                .collect(),
+            subscribers: self
+                .subscribers
+                .iter()
+                .map(|s| Arc::clone(&s.peers))
+                .collect(),
+        }
+    }
+
     fn claim_type(&mut self, topic: &str, want: &str) -> Result<(), RuntimeError> {
         match &self.type_name {
             Some(have) if have != want => Err(RuntimeError::TypeMismatch {

@@ -15,7 +15,7 @@ use super::params::Params;
 use super::publisher::{Publisher, RawPublisher};
 use super::qos::Qos;
 use super::ros_args::RosArgs;
-use super::subscription::{Load, Subscription};
+use super::subscription::{Load, Sample, Stats, Subscription, Undecoded};
 
 /// A node of a [`Runtime`](super::Runtime). Clones are the same node.
 #[derive(Clone)]
@@ -47,13 +47,11 @@ impl Node {
         names::validate_namespace(&namespace)?;
         let fqn = names::fully_qualified(&name, &namespace);
         let params = Arc::new(Params::load(args, &fqn)?);
-        let about = "length in bytes above which a message is refused";
-        let default = i64::try_from(DEFAULT_MAX_MESSAGE_BYTES).unwrap_or(i64::MAX);
-        let max = params.about(about).i64("max_message_bytes", default)?;
-        let max_message_bytes = usize::try_from(max)
-            .ok()
-            .filter(|max| (1..=u32::MAX as usize).contains(max))
-            .ok_or_else(|| params.invalid("max_message_bytes", "expected 1 to 4294967295"))?;
+        let max_message_bytes = params.usize_in(
+            "max_message_bytes",
+            DEFAULT_MAX_MESSAGE_BYTES,
+            1..=u32::MAX as usize,
+        )?;
         let id = core.graph.add_node(&namespace, &name);
         let about = "go by the time on /clock instead of the system's";
         let clock = if params.about(about).bool("use_sim_time", false)? {
@@ -175,7 +173,35 @@ impl Node {
         topic: &str,
         qos: Qos,
         load: Load,
-        handler: impl FnMut(Arc<M>) + Send + 'static,
+        mut handler: impl FnMut(Arc<M>) + Send + 'static,
+    ) -> Result<Subscription, RuntimeError> {
+        self.subscribe_samples(topic, qos, load, move |sample, stats| {
+            if let Some(message) = stats.decode(sample) {
+                handler(message);
+            }
+        })
+    }
+
+    /// Gives every message on a topic to `handler` as it came, to be decoded by who works on it; else
+    /// as [`Node::subscribe`]. For large messages of which one thread must keep the order.
+    pub fn subscribe_undecoded<M: RosMessage>(
+        &self,
+        topic: &str,
+        qos: Qos,
+        load: Load,
+        mut handler: impl FnMut(Undecoded<M>) + Send + 'static,
+    ) -> Result<Subscription, RuntimeError> {
+        self.subscribe_samples(topic, qos, load, move |sample, stats| {
+            handler(Undecoded::new(sample, stats));
+        })
+    }
+
+    fn subscribe_samples<M: RosMessage>(
+        &self,
+        topic: &str,
+        qos: Qos,
+        load: Load,
+        handler: impl FnMut(Sample<'_, M>, &Arc<Stats>) + Send + 'static,
     ) -> Result<Subscription, RuntimeError> {
         let resolved = self.resolve(topic)?;
         let qos = qos.with_overrides(&self.inner.params, &resolved, topic)?;

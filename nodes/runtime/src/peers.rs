@@ -5,7 +5,7 @@ use std::sync::{Arc, Mutex};
 
 use rustdds::GUID;
 
-use super::sync::lock;
+use super::sync::{Changed, lock};
 
 /// Peers of one endpoint that are told apart, at most.
 const MAX_PEERS: usize = 4096;
@@ -13,7 +13,7 @@ const MAX_PEERS: usize = 4096;
 /// Called when a peer joins; must return at once.
 pub(crate) type OnJoined = Box<dyn FnMut() + Send>;
 
-/// Who is at the other end of a publisher or subscription.
+/// The endpoints at the other end of one publisher, subscription or server.
 pub(crate) struct Peers {
     topic: String,
     peer_kind: &'static str,
@@ -21,12 +21,15 @@ pub(crate) struct Peers {
     hears_own: bool,
     state: Mutex<State>,
     on_joined: Mutex<Vec<Arc<Mutex<OnJoined>>>>,
+    joined: Changed,
 }
 
 #[derive(Default)]
 struct State {
     remote: BTreeSet<GUID>,
     local: usize,
+    /// Number of the change that `local` was counted at.
+    local_change: u64,
     incompatible: BTreeSet<GUID>,
     warned: BTreeSet<&'static str>,
 }
@@ -73,6 +76,7 @@ impl Peers {
             hears_own: false,
             state: Mutex::default(),
             on_joined: Mutex::default(),
+            joined: Changed::default(),
         }
     }
 
@@ -85,9 +89,10 @@ impl Peers {
         lock(&self.state).remote.len()
     }
 
-    /// True if there is such a peer in another process.
-    pub(crate) fn any_remote(&self, wanted: impl FnMut(&GUID) -> bool) -> bool {
-        lock(&self.state).remote.iter().any(wanted)
+    /// Completes when such a peer in another process is known.
+    pub(crate) async fn known(&self, wanted: impl Fn(&GUID) -> bool) {
+        let known = || lock(&self.state).remote.iter().any(&wanted).then_some(());
+        self.joined.until(known).await;
     }
 
     /// Peers here and elsewhere.
@@ -136,11 +141,15 @@ impl Peers {
         }
     }
 
-    /// The number of peers in this process has changed.
-    pub(crate) fn set_local(&self, local: usize) {
+    /// Sets the number of peers in this process as counted at a change, unless a later change has been
+    /// counted already: counts are handed on outside the lock under which they were made.
+    pub(crate) fn set_local(&self, local: usize, change: u64) {
         let mut state = lock(&self.state);
+        if change < state.local_change {
+            return;
+        }
         let grown = local > state.local;
-        state.local = local;
+        (state.local, state.local_change) = (local, change);
         let count = state.remote.len().saturating_add(local);
         drop(state);
         if grown {
@@ -172,6 +181,7 @@ impl Peers {
             self.topic,
             self.peer_kind
         );
+        self.joined.notify();
         // A callback may register another: not called under the lock.
         let callbacks = lock(&self.on_joined).clone();
         for callback in &callbacks {
@@ -184,6 +194,8 @@ impl Peers {
 mod tests {
     use std::sync::Arc;
     use std::sync::atomic::{AtomicUsize, Ordering};
+
+    use futures::FutureExt;
 
     use super::*;
 
@@ -203,12 +215,32 @@ mod tests {
         assert_eq!(calls.load(Ordering::Relaxed), 1, "one was there already");
         peers.add(peer(1));
         peers.add(peer(2));
-        peers.set_local(1);
-        peers.set_local(0);
+        peers.set_local(1, 1);
+        peers.set_local(0, 2);
         assert_eq!(calls.load(Ordering::Relaxed), 3);
         assert_eq!((peers.remote(), peers.count()), (2, 2));
         peers.remove(|p| *p == peer(1));
         assert_eq!(peers.count(), 1);
+    }
+
+    #[test]
+    fn a_count_that_comes_late_is_not_believed() {
+        let peers = Peers::of_publisher("/map");
+        peers.set_local(2, 2);
+        peers.set_local(1, 1);
+        assert_eq!(peers.count(), 2);
+    }
+
+    #[test]
+    fn each_who_waits_for_a_peer_hears_of_it() {
+        let peers = Peers::of_replies("/save_map");
+        let mut first = Box::pin(peers.known(|p| *p == peer(1)));
+        let mut second = Box::pin(peers.known(|p| *p == peer(2)));
+        assert!((&mut first).now_or_never().is_none());
+        assert!((&mut second).now_or_never().is_none());
+        peers.add(peer(2));
+        assert!((&mut first).now_or_never().is_none(), "takes the only note");
+        assert!(second.now_or_never().is_some());
     }
 
     #[test]

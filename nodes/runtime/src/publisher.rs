@@ -1,7 +1,8 @@
 //! Publishers of messages and of CDR bytes.
 
+use std::collections::VecDeque;
 use std::marker::PhantomData;
-use std::sync::Arc;
+use std::sync::{Arc, Mutex};
 use std::time::Duration;
 
 use lattice_msgs::RosMessage;
@@ -9,25 +10,80 @@ use lattice_msgs::cdr;
 use rustdds::bytes::Bytes;
 
 use super::dds::payload::ENCAPSULATION_BYTES;
-use super::dds::writer::DdsWriter;
+use super::dds::writer::{DdsWriter, Serialize};
 use super::error::PublishError;
 use super::graph;
 use super::local_bus::Membership;
 use super::peers::Peers;
+use super::shutdown::Shutdown;
+use super::sync::lock;
 
-/// What both kinds of publisher are made of.
+/// The parts that both kinds of publisher are made of.
 pub(crate) struct Core {
-    pub writer: DdsWriter,
+    pub writer: Arc<DdsWriter>,
     pub peers: Arc<Peers>,
     pub local: Membership,
-    /// Keeps messages for late joiners, so it must hear every one.
-    pub latched: bool,
+    /// Messages for late joiners; none where they are not kept.
+    pub latch: Option<Mutex<Latch>>,
+    pub shutdown: Shutdown,
     pub _graph: graph::Membership,
 }
 
+/// The last messages of a latched publisher that no other process has listened to yet. They are
+/// serialised when the first one does; from then on DDS keeps them.
+pub(crate) struct Latch {
+    kept: VecDeque<Serialize>,
+    depth: usize,
+    heard: bool,
+}
+
+impl Latch {
+    /// Keeps up to `depth` messages.
+    pub(crate) fn new(depth: usize) -> Self {
+        Self {
+            kept: VecDeque::new(),
+            depth,
+            heard: false,
+        }
+    }
+}
+
 impl Core {
-    fn wants_dds(&self) -> bool {
-        self.latched || self.peers.remote() > 0
+    fn send(&self, message: Serialize) -> Result<(), PublishError> {
+        let remote = self.peers.remote() > 0;
+        let Some(latch) = &self.latch else {
+            return match remote {
+                true => self.writer.send(message),
+                false => Ok(()),
+            };
+        };
+        let mut latch = lock(latch);
+        if remote || latch.heard {
+            self.release(&mut latch);
+            return self.writer.send(message);
+        }
+        while latch.kept.len() >= latch.depth {
+            latch.kept.pop_front();
+        }
+        latch.kept.push_back(message);
+        Ok(())
+    }
+
+    /// Hands kept messages to DDS once another process listens.
+    pub(crate) fn peer_joined(&self) {
+        if let Some(latch) = &self.latch
+            && self.peers.remote() > 0
+        {
+            self.release(&mut lock(latch));
+        }
+    }
+
+    fn release(&self, latch: &mut Latch) {
+        latch.heard = true;
+        for message in latch.kept.drain(..) {
+            // A full queue is counted as a drop.
+            let _ = self.writer.send(message);
+        }
     }
 }
 
@@ -61,11 +117,7 @@ impl<M: RosMessage> Publisher<M> {
     pub fn publish(&self, message: impl Into<Arc<M>>) -> Result<(), PublishError> {
         let message: Arc<M> = message.into();
         self.core.local.publish(&(Arc::clone(&message) as _));
-        if !self.core.wants_dds() {
-            return Ok(());
-        }
         self.core
-            .writer
             .send(Box::new(move || cdr::to_vec(message.as_ref())))
     }
 }
@@ -83,8 +135,8 @@ impl RawPublisher {
 
     /// Publishes a message of plain little-endian CDR, encapsulation header included, as it is.
     ///
-    /// Waits while the queue is full, so nothing is lost on this side. Not to be called from a
-    /// handler, callback or timer.
+    /// Waits while the queue is full, so nothing is lost on this side; a request to shut down ends the
+    /// wait with an error. Not to be called from a handler, callback or timer.
     pub fn publish_blocking(&self, cdr: Vec<u8>) -> Result<(), PublishError> {
         let mut body = Bytes::from(cdr);
         if body.get(..2) != Some(&[0, 1]) || body.len() < ENCAPSULATION_BYTES {
@@ -100,12 +152,13 @@ impl RawPublisher {
                 self.topic()
             );
         }
-        if !self.core.wants_dds() {
+        if self.core.latch.is_none() && self.core.peers.remote() == 0 {
             return Ok(());
         }
+        let body = body.split_off(ENCAPSULATION_BYTES);
         self.core
             .writer
-            .send_body_blocking(body.split_off(ENCAPSULATION_BYTES))
+            .send_body_blocking(body, &self.core.shutdown)
     }
 }
 
@@ -143,6 +196,11 @@ macro_rules! shared_by_publishers {
             /// Messages handed to DDS for other processes.
             pub fn sent(&self) -> u64 {
                 self.core.writer.sent()
+            }
+
+            /// Bytes of them as they were serialised, without headers.
+            pub fn sent_bytes(&self) -> u64 {
+                self.core.writer.sent_bytes()
             }
         }
     )*};

@@ -8,7 +8,8 @@ use std::sync::{Arc, Mutex, Weak};
 use std::time::Duration;
 
 use smol::Timer;
-use smol::channel::{Sender, bounded};
+use smol::channel::{Receiver, Sender, bounded};
+use smol::future::or;
 
 use super::core::Core;
 use super::dds::barrier::Wait;
@@ -24,12 +25,14 @@ use super::sync::lock;
 /// A task that runs closes its reader at once.
 const PATIENCE: Duration = Duration::from_secs(1);
 
-/// What the task of a subscription is told.
+/// Orders to the task of a subscription. It drops the sender of an order that is carried out.
 pub(crate) enum Command {
     /// Take samples from this reader.
     Use(Box<DdsReader>),
-    /// Close the reader, then answer.
+    /// Close the reader.
     Close(Sender<()>),
+    /// Give the handler everything that waits in this process.
+    WorkOff(Sender<()>),
 }
 
 /// How to make the reader of a subscription.
@@ -67,19 +70,19 @@ impl ReaderPort {
         Ok(())
     }
 
+    /// Gives the task an order; the receiver ends when it is carried out. `None`: the task has ended.
+    pub(crate) fn order(&self, order: fn(Sender<()>) -> Command) -> Option<Receiver<()>> {
+        let (done, carried_out) = bounded(1);
+        self.commands.try_send(order(done)).ok()?;
+        Some(carried_out)
+    }
+
     /// Has the task close the reader, and waits for that.
     fn close(&self) {
-        let (done, closed) = bounded(1);
-        if self.commands.try_send(Command::Close(done)).is_err() {
+        let Some(closed) = self.order(Command::Close) else {
             return;
-        }
-        let closed = smol::block_on(smol::future::or(
-            async { closed.recv().await.is_ok() },
-            async {
-                Timer::after(PATIENCE).await;
-                false
-            },
-        ));
+        };
+        let closed = wait_for(&closed, PATIENCE);
         if !closed {
             log::warn!(
                 "{}: a publisher was made while the subscription of this process was busy; make \
@@ -91,6 +94,15 @@ impl ReaderPort {
         lock(&self.graph).take();
         self.peers.remove(|_| true);
     }
+}
+
+/// Waits until all senders of a channel are dropped. False: not in time.
+pub(crate) fn wait_for(dropped: &Receiver<()>, patience: Duration) -> bool {
+    let late = async {
+        Timer::after(patience).await;
+        false
+    };
+    smol::block_on(or(async { dropped.recv().await.is_err() }, late))
 }
 
 impl Core {

@@ -6,7 +6,7 @@ use std::time::{Duration, Instant};
 use lattice_msgs::diagnostic_msgs::DiagnosticArray;
 use smol::Timer;
 
-use super::core::Core;
+use super::core::{Core, deadline};
 use super::env::Transport;
 use super::error::RuntimeError;
 use super::node::Node;
@@ -110,6 +110,12 @@ impl Runtime {
             Some(thread) => Err(RuntimeError::Panicked { thread }),
             None => Ok(()),
         }
+    }
+
+    /// Waits until the handlers have had every message that waits in this process, for two seconds at
+    /// most. Not from a handler, callback or timer.
+    pub fn work_off(&self) {
+        self.core.work_off(deadline());
     }
 
     fn publish_log(&self) -> Result<Arc<rosout::Listener>, RuntimeError> {

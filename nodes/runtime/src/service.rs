@@ -1,7 +1,7 @@
 //! Servers of services, for clients of either rmw.
 
-use std::sync::Arc;
-use std::time::Duration;
+use std::sync::{Arc, Mutex, Weak};
+use std::time::{Duration, Instant};
 
 use futures::StreamExt;
 use futures::stream::FuturesUnordered;
@@ -9,7 +9,8 @@ use lattice_msgs::std_srvs::{Trigger, TriggerRequest, TriggerResponse};
 use lattice_msgs::{RosMessage, RosService};
 use rustdds::GUID;
 use smol::channel::{Receiver, Sender, bounded};
-use smol::{Task, Timer, future};
+use smol::future::{self, or};
+use smol::{Task, Timer};
 
 use super::core::Core;
 use super::dds::reader::{DdsReader, SampleOrigin};
@@ -21,7 +22,9 @@ use super::names;
 use super::node::Node;
 use super::peers::Peers;
 use super::qos::Qos;
+use super::reader_port::wait_for;
 use super::service_wire::{ReplyTo, read_request, write_reply};
+use super::sync::lock;
 
 /// Requests are short.
 const MAX_REQUEST_BYTES: usize = 4 << 20;
@@ -140,11 +143,6 @@ impl Core {
             MAX_REQUEST_BYTES,
         )?;
         let readers = Arc::new(Peers::of_replies(name));
-        let (joined, reader_joined) = bounded(1);
-        readers.on_joined(Box::new(move || {
-            // One note that something has changed is enough.
-            let _ = joined.try_send(());
-        }));
         let topic = names::dds_reply(name);
         let replies = self.dds_writer(
             name,
@@ -159,12 +157,14 @@ impl Core {
         ];
         self.endpoints.register(requests.guid(), &clients);
         self.endpoints.register(replies.guid(), &readers);
+        let (end, ending) = bounded(1);
+        self.answers.add(end, &replies);
         let serving = Serving {
             name: name.to_owned(),
             requests,
             replies,
             readers,
-            reader_joined,
+            ending,
             max_pending: max_pending.max(1),
             warning: Throttle::new(WARNING_PERIOD),
         };
@@ -186,9 +186,9 @@ impl Core {
 struct Serving {
     name: String,
     requests: DdsReader,
-    replies: DdsWriter,
+    replies: Arc<DdsWriter>,
     readers: Arc<Peers>,
-    reader_joined: Receiver<()>,
+    ending: Receiver<Sender<()>>,
     max_pending: usize,
     warning: Throttle,
 }
@@ -200,19 +200,56 @@ struct Asked<R> {
     client: GUID,
 }
 
-/// What a server does next.
+/// Next event of a server.
 enum Step {
     Take(Result<SampleOrigin, String>),
     Answered(Result<(), String>),
+    End(Sender<()>),
+}
+
+/// The servers of a process, for its end.
+#[derive(Default)]
+pub(crate) struct Answers {
+    servers: Mutex<Vec<(Sender<Sender<()>>, Weak<DdsWriter>)>>,
+}
+
+impl Answers {
+    fn add(&self, end: Sender<Sender<()>>, replies: &Arc<DdsWriter>) {
+        let mut servers = lock(&self.servers);
+        servers.retain(|(end, _)| !end.is_closed());
+        servers.push((end, Arc::downgrade(replies)));
+    }
+
+    /// Ends all servers once they have queued their answers to the requests they have taken; an answer
+    /// that does not come holds them up until `deadline`. Returns the writers of the answers.
+    pub(crate) fn end(&self, deadline: Instant) -> Vec<Arc<DdsWriter>> {
+        let servers = std::mem::take(&mut *lock(&self.servers));
+        let (done, all_done) = bounded(1);
+        let mut writers = Vec::new();
+        for (end, replies) in servers {
+            // Fails where the server has ended.
+            let _ = end.try_send(done.clone());
+            writers.extend(replies.upgrade());
+        }
+        drop(done);
+        if !wait_for(
+            &all_done,
+            deadline.saturating_duration_since(Instant::now()),
+        ) {
+            log::warn!("not every request was answered");
+        }
+        writers
+    }
 }
 
 impl Serving {
     async fn run<S: RosService>(self, mut handler: impl FnMut(S::Request, Reply<S::Response>)) {
         let mut pending = FuturesUnordered::new();
-        loop {
-            let has_room = pending.len() < self.max_pending;
+        let mut ended = None;
+        while ended.is_none() || !pending.is_empty() {
+            let takes = ended.is_none() && pending.len() < self.max_pending;
             let take = async {
-                match has_room {
+                match takes {
                     true => Step::Take(self.requests.next().await),
                     false => future::pending().await,
                 }
@@ -223,11 +260,21 @@ impl Serving {
                     None => future::pending().await,
                 }
             };
-            let outcome = match future::or(answered, take).await {
+            let end = async {
+                match self.ending.recv().await {
+                    Ok(done) => Step::End(done),
+                    Err(_) => future::pending().await,
+                }
+            };
+            let outcome = match or(end, or(answered, take)).await {
                 Step::Take(sample) => self
                     .ask::<S>(sample, &mut handler)
                     .map(|asked| pending.push(self.answer(asked))),
                 Step::Answered(result) => result,
+                Step::End(done) => {
+                    ended = Some(done);
+                    Ok(())
+                }
             };
             if let Err(why) = outcome
                 && self.warning.check().is_some()
@@ -266,14 +313,10 @@ impl Serving {
     }
 
     async fn wait_for_reader(&self, client: &GUID) {
-        let known = || {
-            self.readers
-                .any_remote(|reader| reader.prefix == client.prefix)
-        };
-        let wait = async { while !known() && self.reader_joined.recv().await.is_ok() {} };
+        let known = self.readers.known(|reader| reader.prefix == client.prefix);
         let timeout = async {
             Timer::after(WAIT_FOR_CLIENT).await;
         };
-        future::or(wait, timeout).await;
+        or(known, timeout).await;
     }
 }

@@ -30,7 +30,7 @@ const WARNING_PERIOD: Duration = Duration::from_secs(5);
 /// Writers whose last sample is remembered.
 const MAX_WRITERS: usize = 1024;
 
-/// How much work the messages of a subscription are.
+/// Size of the messages of a subscription, which decides the thread that takes them.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum Load {
     /// Poses, transforms, clocks: taken on the io thread.
@@ -53,7 +53,7 @@ pub(crate) enum Running {
     OnOwnThread { _stop: Sender<()> },
 }
 
-/// What is counted of a subscription.
+/// Counters of a subscription.
 pub(crate) struct Stats {
     peers: Arc<Peers>,
     received: AtomicU64,
@@ -135,13 +135,76 @@ impl Stats {
         Arc::clone(&self.lost)
     }
 
-    fn not_decodable(&self, why: &str) {
+    /// Decodes a sample and counts what comes of it.
+    pub(crate) fn decode<M: RosMessage>(&self, sample: Sample<'_, M>) -> Option<Arc<M>> {
+        let message = match sample {
+            Sample::Shared(message) => Some(message),
+            Sample::Cdr(bytes) => cdr::from_slice::<M>(bytes)
+                .inspect_err(|why| self.not_decodable(why))
+                .ok()
+                .map(Arc::new),
+        };
+        if message.is_some() {
+            self.received.fetch_add(1, Relaxed);
+        }
+        message
+    }
+
+    fn not_decodable(&self, why: &dyn std::fmt::Display) {
         let count = self.undecodable.fetch_add(1, Relaxed).saturating_add(1);
         if self.warning.check().is_some() {
             log::warn!(
                 "{}: undecodable sample ({count} so far): {why}",
                 self.peers.topic()
             );
+        }
+    }
+}
+
+/// A message as a subscription gets it.
+pub(crate) enum Sample<'a, M> {
+    /// From this process.
+    Shared(Arc<M>),
+    /// From another process, encapsulation header first. The buffer may be taken.
+    Cdr(&'a mut Vec<u8>),
+}
+
+/// A message that is decoded on the thread that needs it, not on the one that received it.
+pub struct Undecoded<M> {
+    content: Content<M>,
+    stats: Arc<Stats>,
+}
+
+enum Content<M> {
+    Shared(Arc<M>),
+    Cdr(Vec<u8>),
+}
+
+impl<M: RosMessage> Undecoded<M> {
+    pub(crate) fn new(sample: Sample<'_, M>, stats: &Arc<Stats>) -> Self {
+        Self {
+            content: match sample {
+                Sample::Shared(message) => Content::Shared(message),
+                Sample::Cdr(bytes) => Content::Cdr(std::mem::take(bytes)),
+            },
+            stats: Arc::clone(stats),
+        }
+    }
+
+    /// Length in bytes; `shared` measures a message that comes from this process.
+    pub fn bytes(&self, shared: impl FnOnce(&M) -> usize) -> usize {
+        match &self.content {
+            Content::Shared(message) => shared(message),
+            Content::Cdr(bytes) => bytes.len(),
+        }
+    }
+
+    /// The message. `None`: the bytes are no message of the type, which is counted and logged.
+    pub fn decode(self) -> Option<Arc<M>> {
+        let Self { content, stats } = self;
+        match content {
+            Content::Shared(message) => stats.decode(Sample::Shared(message)),
+            Content::Cdr(mut bytes) => stats.decode(Sample::Cdr(&mut bytes)),
         }
     }
 }
@@ -156,7 +219,7 @@ pub(crate) struct Source {
 
 impl Source {
     /// Gives messages to the handler until the task is dropped.
-    pub(crate) async fn run<M: RosMessage>(self, mut handler: impl FnMut(Arc<M>)) {
+    pub(crate) async fn run<M: RosMessage>(self, mut handler: impl FnMut(Sample<'_, M>)) {
         let mut turn: u32 = 0;
         let mut gaps = Gaps::default();
         let mut reader: Option<Box<DdsReader>> = None;
@@ -165,32 +228,31 @@ impl Source {
             if turn.is_multiple_of(MESSAGES_PER_TURN) {
                 smol::future::yield_now().await;
             }
-            let message = match self.next(reader.as_deref(), turn.is_multiple_of(2)).await {
-                Heard::Local(message) => message.downcast::<M>().ok(),
-                Heard::Remote(sample) => {
-                    if let Ok(origin) = &sample {
-                        let gap = gaps.before(origin.writer, origin.sequence_number.into());
-                        self.stats.lost.fetch_add(gap, Relaxed);
+            match self.next(reader.as_deref(), turn.is_multiple_of(2)).await {
+                Heard::Local(message) => give_shared(message, &mut handler),
+                Heard::Remote(Ok(origin)) => {
+                    let gap = gaps.before(origin.writer, origin.sequence_number.into());
+                    self.stats.lost.fetch_add(gap, Relaxed);
+                    if let Some(reader) = &reader {
+                        handler(Sample::Cdr(&mut reader.bytes()));
                     }
-                    reader
-                        .as_ref()
-                        .and_then(|reader| self.decode::<M>(reader, sample))
                 }
-                Heard::Command(Command::Use(new)) => {
-                    reader = Some(new);
-                    None
-                }
+                Heard::Remote(Err(why)) => self.stats.not_decodable(&why),
+                Heard::Command(Command::Use(new)) => reader = Some(new),
                 Heard::Command(Command::Close(done)) => {
                     reader = None;
-                    // Nobody may be waiting any more.
-                    let _ = done.try_send(());
-                    None
+                    drop(done);
+                }
+                Heard::Command(Command::WorkOff(done)) => {
+                    for _ in 0..self.local.len() {
+                        let message = self.local.try_recv();
+                        message
+                            .into_iter()
+                            .for_each(|m| give_shared(m, &mut handler));
+                    }
+                    drop(done);
                 }
                 Heard::End => return,
-            };
-            if let Some(message) = message {
-                self.stats.received.fetch_add(1, Relaxed);
-                handler(message);
             }
         }
     }
@@ -216,18 +278,11 @@ impl Source {
             or(command, or(remote, local)).await
         }
     }
+}
 
-    fn decode<M: RosMessage>(
-        &self,
-        reader: &DdsReader,
-        sample: Result<SampleOrigin, String>,
-    ) -> Option<Arc<M>> {
-        let decoded =
-            sample.and_then(|_| cdr::from_slice::<M>(&reader.bytes()).map_err(|e| e.to_string()));
-        decoded
-            .inspect_err(|why| self.stats.not_decodable(why))
-            .ok()
-            .map(Arc::new)
+fn give_shared<M: RosMessage>(message: AnyMessage, handler: &mut impl FnMut(Sample<'_, M>)) {
+    if let Ok(message) = message.downcast::<M>() {
+        handler(Sample::Shared(message));
     }
 }
 

@@ -1,27 +1,27 @@
-//! Small statistics.
+//! Shares, medians and quantiles with their intervals.
 
 use serde::Serialize;
 
 /// Normal quantile of a two-sided 95 % interval.
 const Z: f64 = 1.959_963_984_540_054;
 
-/// How many of how many, with the 95 % interval of Wilson (1927).
+/// A share of trials, with the 95 % interval of Wilson (1927).
 #[derive(Clone, Copy, PartialEq, Debug, Serialize)]
 pub struct Share {
-    /// How many.
+    /// Number of hits.
     pub k: usize,
-    /// Of how many.
+    /// Number of trials.
     pub n: usize,
-    /// k / n; None of none.
+    /// The share k / n; None of no trials.
     pub share: Option<f64>,
-    /// Lower end.
+    /// Lower end of the interval.
     pub low: f64,
-    /// Upper end.
+    /// Upper end of the interval.
     pub high: f64,
 }
 
 impl Share {
-    /// Of those for which something holds.
+    /// The share of those for which something holds.
     pub fn of(holds: impl IntoIterator<Item = bool>) -> Share {
         let (mut k, mut n) = (0, 0);
         for one in holds {
@@ -31,7 +31,19 @@ impl Share {
         Share::new(k, n)
     }
 
-    /// `k` of `n`.
+    /// "75.0 % of 4 [30.1, 95.4]", with so many digits; a dash for none of none.
+    pub fn text(&self, digits: usize) -> String {
+        let Some(share) = self.share else {
+            return "-".to_owned();
+        };
+        let [share, low, high] = [share, self.low, self.high].map(|value| 100.0 * value);
+        format!(
+            "{share:.digits$} % of {} [{low:.digits$}, {high:.digits$}]",
+            self.n
+        )
+    }
+
+    /// The share `k` of `n`.
     pub fn new(k: usize, n: usize) -> Share {
         if n == 0 {
             return Share {

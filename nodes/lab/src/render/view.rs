@@ -20,7 +20,7 @@ pub(super) struct View {
     pub(super) size: [usize; 2],
     /// Samples a metre.
     pub(super) scale: f64,
-    /// What is in the middle of the screen, along right, up and toward, metres.
+    /// Middle of the screen, along right, up and toward, metres.
     middle_m: [f64; 3],
 }
 

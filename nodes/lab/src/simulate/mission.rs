@@ -1,4 +1,4 @@
-//! What the loader does: a closed tour of drives and turns on the spot.
+//! The loader's tour: a closed sequence of drives and turns on the spot.
 
 use nalgebra::{Rotation2, Vector2};
 

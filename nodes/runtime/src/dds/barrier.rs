@@ -10,7 +10,6 @@ use std::sync::Arc;
 use std::time::Duration;
 
 use smol::Timer;
-use smol::channel::bounded;
 
 use super::events::Endpoints;
 use super::participant::Dds;
@@ -70,13 +69,11 @@ impl Barrier {
 impl Wait {
     /// Completes when discovery knows them, or after two seconds.
     pub(crate) async fn end(self) {
-        let (sender, matched) = bounded(1);
-        self.peers.on_joined(Box::new(move || {
-            // Once is enough.
-            let _ = sender.try_send(());
-        }));
         self.endpoints.register(self.writer.guid(), &self.peers);
-        let known = async { matched.recv().await.is_ok() };
+        let known = async {
+            self.peers.known(|_| true).await;
+            true
+        };
         let too_long = async {
             Timer::after(PATIENCE).await;
             false

@@ -1,14 +1,14 @@
-//! How many bytes may wait in the queue of one publisher.
+//! Budget of the bytes that wait in the queue of one publisher.
 
-use std::sync::{Condvar, Mutex, PoisonError};
+use std::sync::Mutex;
 
-use crate::sync::lock;
+use crate::sync::{Changed, lock};
 
 /// Counts bytes against a limit. One message always fits, however long.
 pub(crate) struct Budget {
     limit: usize,
     state: Mutex<State>,
-    freed: Condvar,
+    freed: Changed,
 }
 
 #[derive(Default)]
@@ -29,7 +29,7 @@ impl Budget {
         Self {
             limit,
             state: Mutex::default(),
-            freed: Condvar::new(),
+            freed: Changed::default(),
         }
     }
 
@@ -43,33 +43,26 @@ impl Budget {
         fits
     }
 
-    /// Waits until `bytes` fit and takes them. False: closed meanwhile.
-    pub(crate) fn take_blocking(&self, bytes: usize) -> bool {
-        let mut state = lock(&self.state);
-        while !state.closed && !state.fits(bytes, self.limit) {
-            state = self
-                .freed
-                .wait(state)
-                .unwrap_or_else(PoisonError::into_inner);
-        }
-        if state.closed {
-            return false;
-        }
-        state.used = state.used.saturating_add(bytes);
-        true
+    /// Completes when `bytes` fit and are taken. False: closed meanwhile.
+    pub(crate) async fn take(&self, bytes: usize) -> bool {
+        let taken = || {
+            let closed = lock(&self.state).closed;
+            (closed || self.try_take(bytes)).then_some(!closed)
+        };
+        self.freed.until(taken).await
     }
 
     /// Gives `bytes` back.
     pub(crate) fn give_back(&self, bytes: usize) {
         let mut state = lock(&self.state);
         state.used = state.used.saturating_sub(bytes);
-        self.freed.notify_all();
+        self.freed.notify();
     }
 
-    /// Lets nobody wait any more.
+    /// Refuses further bytes; everyone who waits for room is refused.
     pub(crate) fn close(&self) {
         lock(&self.state).closed = true;
-        self.freed.notify_all();
+        self.freed.notify();
     }
 }
 
@@ -95,11 +88,11 @@ mod tests {
         let budget = Arc::new(Budget::new(10));
         assert!(budget.try_take(10));
         let waiting = Arc::clone(&budget);
-        let thread = std::thread::spawn(move || waiting.take_blocking(5));
+        let thread = std::thread::spawn(move || smol::block_on(waiting.take(5)));
         budget.give_back(10);
         assert!(thread.join().unwrap());
         let waiting = Arc::clone(&budget);
-        let thread = std::thread::spawn(move || waiting.take_blocking(6));
+        let thread = std::thread::spawn(move || smol::block_on(waiting.take(6)));
         budget.close();
         assert!(!thread.join().unwrap());
     }

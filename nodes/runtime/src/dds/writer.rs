@@ -16,11 +16,13 @@ use rustdds::rpc::SampleIdentity;
 use rustdds::{GUID, RTPSEntity, Timestamp, WriteOptionsBuilder};
 use smol::Timer;
 use smol::channel::{Receiver, Sender, TrySendError, bounded};
+use smol::future::or;
 
 use super::payload::{ENCAPSULATION_BYTES, Payload, PayloadSerializer};
 use super::queue::Budget;
 use crate::error::PublishError;
 use crate::logging::Throttle;
+use crate::shutdown::Shutdown;
 use crate::sync::lock;
 
 pub(crate) type RawWriter = DataWriter<Payload, PayloadSerializer>;
@@ -78,6 +80,7 @@ struct Shared {
     last_bytes: AtomicUsize,
     dropped: AtomicU64,
     sent: AtomicU64,
+    sent_bytes: AtomicU64,
     stuck: AtomicBool,
     warning: Throttle,
 }
@@ -101,6 +104,7 @@ impl DdsWriter {
             last_bytes: AtomicUsize::new(0),
             dropped: AtomicU64::new(0),
             sent: AtomicU64::new(0),
+            sent_bytes: AtomicU64::new(0),
             stuck: AtomicBool::new(false),
             warning: Throttle::new(WARNING_PERIOD),
         });
@@ -112,6 +116,7 @@ impl DdsWriter {
         self.guid
     }
 
+    /// Resolved topic or service, for messages.
     pub(crate) fn topic(&self) -> &str {
         &self.shared.topic
     }
@@ -124,6 +129,11 @@ impl DdsWriter {
     /// Samples handed to DDS.
     pub(crate) fn sent(&self) -> u64 {
         self.shared.sent.load(Relaxed)
+    }
+
+    /// Bytes of them, without their encapsulation headers.
+    pub(crate) fn sent_bytes(&self) -> u64 {
+        self.shared.sent_bytes.load(Relaxed)
     }
 
     /// Queues a sample that is serialized later. Its size is taken to be that of the one before.
@@ -142,18 +152,33 @@ impl DdsWriter {
         self.try_queue(Content::Body(body), bytes, related)
     }
 
-    /// Queues the body of a sample; waits while the queue is full. Not from the runtime's threads.
-    pub(crate) fn send_body_blocking(&self, body: Bytes) -> Result<(), PublishError> {
+    /// Queues the body of a sample; waits while the queue is full, but not beyond a request to end.
+    /// Not from the runtime's threads.
+    pub(crate) fn send_body_blocking(
+        &self,
+        body: Bytes,
+        shutdown: &Shutdown,
+    ) -> Result<(), PublishError> {
         let reserved = body.len();
-        if !self.shared.budget.take_blocking(reserved) {
-            return Err(self.closed());
-        }
-        let job = Job::Sample {
-            content: Content::Body(body),
-            reserved,
-            related: None,
+        let queued = async {
+            if !self.shared.budget.take(reserved).await {
+                return false;
+            }
+            let job = Job::Sample {
+                content: Content::Body(body),
+                reserved,
+                related: None,
+            };
+            self.jobs.send(job).await.is_ok()
         };
-        self.jobs.send_blocking(job).map_err(|_| self.closed())
+        let ended = async {
+            shutdown.requested().await;
+            false
+        };
+        match smol::block_on(or(queued, ended)) {
+            true => Ok(()),
+            false => Err(self.closed()),
+        }
     }
 
     /// Waits until the queue is empty and every reliable reader has acknowledged. False: not in time.
@@ -283,6 +308,7 @@ impl Shared {
                 Ok(_) => {
                     self.stuck.store(false, Relaxed);
                     self.sent.fetch_add(1, Relaxed);
+                    self.sent_bytes.fetch_add(body.len() as u64, Relaxed);
                     return;
                 }
                 // RustDDS gave up waiting; whether we do is decided by our own patience.
@@ -314,5 +340,34 @@ async fn serve(shared: Arc<Shared>, queue: Receiver<Job>) {
                 let _ = done.try_send(());
             }
         }
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::super::participant::Dds;
+    use super::*;
+    use crate::loopback_domain::LoopbackDomain;
+    use crate::qos::Qos;
+
+    #[test]
+    fn a_request_to_end_frees_who_waits_for_a_full_queue() {
+        let domain = LoopbackDomain::take().unwrap();
+        let dds = Dds::join(domain.id(), true).unwrap();
+        let topic = "rt/chatter".to_owned();
+        let qos = Qos::reliable(1);
+        let writer = dds.writer("/chatter", topic, "std_msgs/msg/String", &qos);
+        // Nobody serves the queue, as when a reader is stuck.
+        let (writer, _task) =
+            DdsWriter::new("/chatter", writer.unwrap(), WhenFull::Wait, 1, usize::MAX);
+        let (shutdown, body) = (Shutdown::default(), Bytes::from_static(b"body"));
+        writer.send_body_blocking(body.clone(), &shutdown).unwrap();
+        let asked = shutdown.clone();
+        let (waiting, result) = std::sync::mpsc::channel();
+        std::thread::spawn(move || waiting.send(writer.send_body_blocking(body, &asked)));
+        shutdown.request();
+        let result = result.recv_timeout(Duration::from_secs(10));
+        let result = result.expect("waits for room until a second request");
+        assert!(matches!(result, Err(PublishError::Closed { .. })));
     }
 }

@@ -14,6 +14,12 @@ pub enum ParamError {
         /// What the system says.
         source: std::io::Error,
     },
+    /// The path leads to a fifo, a directory or a device.
+    #[error("parameter file {path:?} is no regular file")]
+    NotAFile {
+        /// The path.
+        path: PathBuf,
+    },
     /// The file is larger than any parameter file should be.
     #[error("parameter file {path:?} is larger than {bytes_max} bytes")]
     TooLarge {

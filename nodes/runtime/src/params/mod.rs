@@ -1,6 +1,7 @@
-//! A node's parameters: given by files and the command line, declared by the node as it reads them.
+//! Parameters of a node: given by files and the command line, declared by the node as it reads them.
 
 mod error;
+mod ranges;
 mod value;
 
 pub use error::ParamError;
@@ -138,8 +139,7 @@ impl Params {
 
     /// A count: an integer from 0 on.
     pub fn usize(&self, name: &str, default: usize) -> Result<usize, ParamError> {
-        let value = self.i64(name, i64::try_from(default).unwrap_or(i64::MAX))?;
-        usize::try_from(value).map_err(|_| self.invalid(name, "expected 0 or more"))
+        self.usize_in(name, default, 0..=usize::MAX)
     }
 
     /// A float, never NaN; an integer counts, with a line in the log.
@@ -175,7 +175,7 @@ impl Params {
         }
     }
 
-    /// Whether a file or the command line gives the parameter.
+    /// True if a file or the command line gives the parameter.
     pub fn is_given(&self, name: &str) -> bool {
         self.given.contains_key(name)
     }

@@ -39,6 +39,12 @@ pub fn read(path: &Path) -> Result<Vec<FileParam>, ParamError> {
         path: path.to_owned(),
         source,
     };
+    // To open a fifo would wait for a writer.
+    if !std::fs::metadata(path).map_err(failed)?.is_file() {
+        return Err(ParamError::NotAFile {
+            path: path.to_owned(),
+        });
+    }
     let mut bytes = Vec::new();
     let file = File::open(path).map_err(failed)?;
     let limit = FILE_BYTES_MAX.saturating_add(1);

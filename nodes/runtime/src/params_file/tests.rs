@@ -217,7 +217,7 @@ fn large_files_are_refused() {
     let directory = tempfile::tempdir().unwrap();
     assert!(matches!(
         read(directory.path()),
-        Err(ParamError::Read { .. })
+        Err(ParamError::NotAFile { .. })
     ));
 }
 
@@ -227,4 +227,17 @@ proptest! {
         let _ = read_text(&text);
         let _ = read_text(&format!("m:\n  ros__parameters:\n    {text}"));
     }
+}
+
+#[test]
+fn a_fifo_is_refused_and_not_waited_for() {
+    let directory = tempfile::tempdir().unwrap();
+    let path = directory.path().join("params.yaml");
+    let made = std::process::Command::new("mkfifo").arg(&path).status();
+    assert!(made.unwrap().success());
+    let (sender, refused) = std::sync::mpsc::channel();
+    std::thread::spawn(move || sender.send(read(&path)));
+    let refused = refused.recv_timeout(std::time::Duration::from_secs(10));
+    let refused = refused.expect("reading waits for a writer");
+    assert!(matches!(refused, Err(ParamError::NotAFile { .. })));
 }

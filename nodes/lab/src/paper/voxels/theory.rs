@@ -4,13 +4,14 @@ use lattice_core::lattice::LatticeKind;
 
 use super::sample::Samples;
 use super::{Options, unit};
+use crate::AnyError;
 use crate::paper::estimate::Estimate;
 use crate::paper::parallel::in_parallel;
-use crate::paper::report::plot::{Fault, title};
-use crate::paper::report::{Cell, Check, Section, Table, Verdict};
+use crate::report::plot::title;
+use crate::report::{Cell, Check, Section, Table, Verdict};
 use crate::theory::{mean_distance_m, mean_width_m, second_moment, surface_m2};
 
-/// What is known of a cell of unit volume.
+/// Known figures of a cell of unit volume.
 struct Known {
     kind: LatticeKind,
     /// Mean squared error by dimension.
@@ -45,7 +46,7 @@ const fn known(kind: LatticeKind, figures: [f64; 7]) -> Known {
     }
 }
 
-/// Worked out elsewhere, from the polyhedra and from random points.
+/// Figures worked out elsewhere, from the polyhedra and from random points.
 #[rustfmt::skip]
 const KNOWN: [Known; 6] = [
     known(LatticeKind::Cubic, [0.0833333, 0.4802960, 0.5000000, 0.8660254, 0.5000000, 1.500000, 6.00000]),
@@ -56,7 +57,7 @@ const KNOWN: [Known; 6] = [
     known(LatticeKind::HexOptimal, [0.0812227, 0.4753937, 0.4936275, 0.7959505, 0.4936275, 1.430220, 5.72444]),
 ];
 
-/// How far a figure may be off, of itself.
+/// Allowed error of a figure, as a share of it.
 const TOLERANCE: f64 = 0.002;
 
 /// Mean squared error by dimension, mean distance and largest distance of one draw of points.
@@ -66,7 +67,7 @@ struct Draw {
     largest: f64,
 }
 
-pub fn section(options: &Options, progress: &mut dyn FnMut(f64)) -> Result<Section, Fault> {
+pub fn section(options: &Options, progress: &mut dyn FnMut(f64)) -> Result<Section, AnyError> {
     let samples = Samples::new(options);
     let mut checks = Vec::new();
     let (mut exact_rows, mut random_rows) = (Vec::new(), Vec::new());
@@ -98,13 +99,12 @@ pub fn section(options: &Options, progress: &mut dyn FnMut(f64)) -> Result<Secti
         let random_mean = Estimate::of(draws.iter().map(|draw| draw.mean));
         let largest = draws.iter().map(|draw| draw.largest).fold(0.0, f64::max);
         let mut near = |what: &str, expected: f64, found: f64| {
-            checks.push(Check {
-                name: format!("{name}: {what}"),
-                printed: None,
+            checks.push(Check::new(
+                format!("{name}: {what}"),
                 expected,
                 found,
-                tolerance: TOLERANCE * expected,
-            });
+                TOLERANCE * expected,
+            ));
         };
         near("MSE by dimension, exact", known.mse, mse);
         near(
@@ -216,21 +216,11 @@ pub fn section(options: &Options, progress: &mut dyn FnMut(f64)) -> Result<Secti
         )),
         checks,
         tables: vec![
-            Table {
-                name: "distortion_exact".into(),
-                caption: "Exact figures of cells of unit volume, lengths in cell sides".into(),
-                columns: exact_columns.map(String::from).into(),
-                rows: exact_rows,
-            },
-            Table {
-                name: "distortion_random".into(),
-                caption: format!(
+            Table::new("distortion_exact", "Exact figures of cells of unit volume, lengths in cell sides", exact_columns, exact_rows),
+            Table::new("distortion_random", format!(
                     "The same from {} random points for each lattice, with 95 % intervals",
                     samples.points()
-                ),
-                columns: random_columns.map(String::from).into(),
-                rows: random_rows,
-            },
+                ), random_columns, random_rows),
         ],
         figures: Vec::new(),
     })

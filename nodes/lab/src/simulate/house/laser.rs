@@ -5,11 +5,13 @@ use std::f64::consts::TAU;
 use nalgebra::{Isometry3, Point3, Vector3};
 use rayon::prelude::*;
 
-use super::{House, HouseError};
+use super::House;
+use super::free_space::NO_FREE_SPACE;
+use crate::AnyError;
 use crate::options::within;
 use crate::simulate::random::{Purpose, Stream};
 
-/// How a scanner looks around, and how far two of its stands are apart.
+/// Options of a scanner and of the distance of its two stands.
 #[derive(Clone, Copy, PartialEq, Debug)]
 pub struct LaserOptions {
     /// Directions all around.
@@ -24,7 +26,7 @@ pub struct LaserOptions {
     pub max_range_m: f64,
     /// Least and greatest distance between the stands of a pair, metres.
     pub apart_m: [f64; 2],
-    /// How far the heading may turn within a pair, degrees.
+    /// Largest turn of the heading within a pair, degrees.
     pub turn_deg: f64,
 }
 
@@ -43,10 +45,10 @@ impl Default for LaserOptions {
     }
 }
 
-/// What a scanner would measure from a stand without errors.
+/// A scanner's view from a stand, without errors.
 #[derive(Clone, PartialEq, Debug)]
 pub struct LaserView {
-    /// Where it stood.
+    /// Pose of the scanner.
     pub house_from_laser: Isometry3<f64>,
     /// Unit vectors, scanner's frame, and how far the surfaces are, metres.
     rays: Vec<(Vector3<f64>, f64)>,
@@ -58,7 +60,7 @@ impl LaserView {
         house: &House,
         house_from_laser: &Isometry3<f64>,
         options: &LaserOptions,
-    ) -> Result<LaserView, HouseError> {
+    ) -> Result<LaserView, AnyError> {
         within("columns", options.columns as f64, 1.0, 1e4)?;
         within("rows", options.rows as f64, 1.0, 1e4)?;
         within("elevation_deg", options.elevation_deg, 0.0, 90.0)?;
@@ -88,7 +90,7 @@ impl LaserView {
         pairs: usize,
         options: &LaserOptions,
         seed: u64,
-    ) -> Result<Vec<[LaserView; 2]>, HouseError> {
+    ) -> Result<Vec<[LaserView; 2]>, AnyError> {
         within("pairs", pairs as f64, 1.0, 1e4)?;
         within("height_m", options.height_m, 0.0, 10.0)?;
         within("turn_deg", options.turn_deg, 0.0, 180.0)?;
@@ -111,10 +113,10 @@ impl LaserView {
             let view = |pose| LaserView::new(house, &pose, options);
             Ok(Some([view(first)?, view(second)?]))
         };
-        let made: Result<Vec<_>, HouseError> = firsts.into_iter().map(pair).collect();
+        let made: Result<Vec<_>, AnyError> = firsts.into_iter().map(pair).collect();
         let made: Vec<_> = made?.into_iter().flatten().collect();
         match made.is_empty() {
-            true => Err(HouseError::NoFreeSpace),
+            true => Err(NO_FREE_SPACE.into()),
             false => Ok(made),
         }
     }
@@ -144,7 +146,7 @@ mod tests {
 
     #[test]
     fn scans_of_a_pair_show_one_place() {
-        let house = House::own(3).unwrap();
+        let house = House::generated(3).unwrap();
         let options = LaserOptions {
             columns: 90,
             rows: 20,
@@ -180,7 +182,7 @@ mod tests {
 
     #[test]
     fn options_out_of_range_are_refused() {
-        let house = House::own(3).unwrap();
+        let house = House::generated(3).unwrap();
         let default = LaserOptions::default();
         for options in [
             LaserOptions { rows: 0, ..default },

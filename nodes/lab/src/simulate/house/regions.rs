@@ -1,8 +1,8 @@
-//! What a segmenter sees as one: pieces of furniture, and patches of walls, floors and ceilings.
+//! Regions that a segmenter sees as one: pieces of furniture, and patches of walls, floors and ceilings.
 
 use std::collections::BTreeMap;
 
-use super::HouseError;
+use crate::AnyError;
 use crate::mesh::LabelledMesh;
 
 /// Region of a point of which nothing is known.
@@ -58,7 +58,7 @@ impl Regions {
     pub(super) fn new(
         mesh: &LabelledMesh,
         structural: impl Fn(u16) -> bool,
-    ) -> Result<Regions, HouseError> {
+    ) -> Result<Regions, AnyError> {
         let mut numbers: BTreeMap<(u16, u16), usize> = BTreeMap::new();
         let keys = || {
             mesh.instances()
@@ -119,7 +119,10 @@ impl Regions {
             list.extend(std::iter::repeat_n(region, regions));
             if list.len() > MAX_REGIONS {
                 let regions = list.len();
-                return Err(HouseError::TooManyRegions { regions });
+                return Err(format!(
+                    "the mesh has {regions} instances and patches of walls, at most {MAX_REGIONS} are taken"
+                )
+                .into());
             }
         }
         Ok(Regions {

@@ -3,12 +3,11 @@
 use lattice_core::lattice::LatticeKind;
 
 use super::{Placed, Printed, range, rms_m};
-use crate::paper::report::plot::{
-    Area, Axes, BoxStats, Fault, Layout, NamedBox, boxes_with_marks, color, svg,
-};
+use crate::AnyError;
+use crate::report::plot::{Area, Axes, BoxStats, Layout, NamedBox, boxes_with_marks, color, svg};
 
 /// Voxels against the mean of cubic, and RMS: boxes over all places, crosses as printed.
-pub fn draw(all: &[Placed]) -> Result<String, Fault> {
+pub fn draw(all: &[Placed]) -> Result<String, AnyError> {
     let layout = Layout {
         panel: (500, 350),
         columns: 2,
@@ -42,7 +41,7 @@ fn panel(
     all: &[Placed],
     values: &dyn Fn(&Placed) -> Vec<f64>,
     mark: &dyn Fn(&Printed) -> f64,
-) -> Result<(), Fault> {
+) -> Result<(), AnyError> {
     let named = all.iter().filter_map(|placed| {
         let stats = BoxStats::of(&values(placed))?;
         let name = placed.name().to_owned();

@@ -9,11 +9,12 @@ use nalgebra::{Isometry3, Translation3, UnitQuaternion, Vector3};
 
 use super::Options;
 use super::rotations::{Quantized, quantized};
+use crate::AnyError;
 use crate::paper::estimate::Estimate;
 use crate::paper::parallel::in_parallel;
-use crate::paper::report::plot::{Fault, title};
-use crate::paper::report::{Check, Figure, Section, Verdict};
 use crate::paper::streams::{Purpose, stream};
+use crate::report::plot::title;
+use crate::report::{Check, Figure, Section, Verdict};
 use crate::theory::{mean_distance_m, second_moment};
 use figure::draw;
 use log::{SPAN_S, replayed, simulated_log};
@@ -22,7 +23,7 @@ use tables::{compared, of_log, theory};
 /// Points of the log, and the volume of a cell, as in the paper.
 const POINTS: usize = 19_399;
 const VOLUME_M3: f64 = 0.125;
-/// How far a mean over all places of the lattice may be from theory, of itself: full and quick.
+/// Allowed error of a mean over all places of the lattice, as a share of theory: full and quick.
 const TOLERANCES: [f64; 2] = [0.002, 0.01];
 /// Half of the last printed digit.
 const DIGIT: f64 = 0.5e-4;
@@ -96,7 +97,7 @@ fn range(values: &[f64]) -> [f64; 2] {
     ]
 }
 
-pub fn section(options: &Options, progress: &mut dyn FnMut(f64)) -> Result<Section, Fault> {
+pub fn section(options: &Options, progress: &mut dyn FnMut(f64)) -> Result<Section, AnyError> {
     let bags = options.bags.len() as f64;
     let share = 1.0 / (1.0 + bags);
     let points = simulated_log(options.seed)?;
@@ -140,16 +141,12 @@ pub fn section(options: &Options, progress: &mut dyn FnMut(f64)) -> Result<Secti
         ),
         checks: checks(&all, TOLERANCES[usize::from(options.quick)]),
         tables,
-        figures: vec![Figure {
-            name: "table1".into(),
-            caption: format!(
+        figures: vec![Figure::new("table1", format!(
                 "{POINTS} points of {SPAN_S} s of a simulated loader's log, {} places of each lattice: voxels against cubic (left) and RMS \
                  (right). Boxes hold half of the places, whiskers reach 1.5 interquartile ranges. Crosses: Table I as \
                  printed, of the authors' log.",
                 side * side * side
-            ),
-            svg: draw(&all)?,
-        }],
+            ), draw(&all)?)],
     })
 }
 
@@ -168,16 +165,18 @@ fn checks(all: &[Placed], tolerance: f64) -> Vec<Check> {
     for row in &TABLE {
         // Both columns are rounded.
         let root = (3.0 * row.mse).sqrt();
-        checks.push(Check {
-            name: format!(
-                "{}: printed distance error is √(3 MSE) as printed (m)",
-                title(row.kind)
-            ),
-            printed: Some(row.distance_error),
-            expected: row.distance_error,
-            found: root,
-            tolerance: DIGIT + 1.5 * DIGIT / root,
-        });
+        checks.push(
+            Check::new(
+                format!(
+                    "{}: printed distance error is √(3 MSE) as printed (m)",
+                    title(row.kind)
+                ),
+                row.distance_error,
+                root,
+                DIGIT + 1.5 * DIGIT / root,
+            )
+            .with_printed(Some(row.distance_error)),
+        );
     }
     for placed in all {
         let name = placed.name();
@@ -194,13 +193,12 @@ fn checks(all: &[Placed], tolerance: f64) -> Vec<Check> {
                 placed.mean(|q| q.mean_m),
             ),
         ] {
-            checks.push(Check {
-                name: format!("{name}: {what}"),
-                printed: None,
+            checks.push(Check::new(
+                format!("{name}: {what}"),
                 expected,
-                found: found.mean,
-                tolerance: tolerance * expected,
-            });
+                found.mean,
+                tolerance * expected,
+            ));
         }
     }
     let voxels = |kind| {

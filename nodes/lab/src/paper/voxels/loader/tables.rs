@@ -5,8 +5,8 @@ use std::path::Path;
 use lattice_core::lattice::LatticeKind;
 
 use super::{POINTS, Placed, Printed, VOLUME_M3, range, rms_m};
-use crate::paper::report::plot::title;
-use crate::paper::report::{Cell, Table};
+use crate::report::plot::title;
+use crate::report::{Cell, Table};
 use crate::theory::mean_distance_m;
 use lattice_nodes::replay::RunReport;
 
@@ -65,15 +65,15 @@ pub fn compared(all: &[Placed]) -> Table {
             Cell::Number(high, 4),
         ]
     };
-    Table {
-        name: "table1".into(),
-        caption: format!(
+    Table::new(
+        "table1",
+        format!(
             "Table I as printed and {POINTS} points of a simulated loader's log in cells of {VOLUME_M3} m³: mean over all \
              places of the lattice with 95 % interval, least and most of any place"
         ),
-        columns: columns.map(String::from).into(),
-        rows: all.iter().map(row).collect(),
-    }
+        columns,
+        all.iter().map(row),
+    )
 }
 
 /// As printed and as theory has it.
@@ -107,14 +107,12 @@ pub fn theory(all: &[Placed]) -> Table {
         });
         row
     };
-    Table {
-        name: "table1_theory".into(),
-        caption: format!(
-            "Table I against theory for evenly spread points, cells of {VOLUME_M3} m³"
-        ),
-        columns: columns.map(String::from).into(),
-        rows: all.iter().map(row).collect(),
-    }
+    Table::new(
+        "table1_theory",
+        format!("Table I against theory for evenly spread points, cells of {VOLUME_M3} m³"),
+        columns,
+        all.iter().map(row),
+    )
 }
 
 /// A log that was given.
@@ -148,10 +146,10 @@ pub fn of_log(run: &RunReport, path: &Path, number: usize) -> Table {
         ]
     });
     let name = path.file_name().unwrap_or_default().to_string_lossy();
-    Table {
-        name: format!("table1_log{}", number + 1),
-        caption: format!("The log {name} in cells of {VOLUME_M3} m³"),
-        columns: columns.map(String::from).into(),
-        rows: rows.collect(),
-    }
+    Table::new(
+        format!("table1_log{}", number + 1),
+        format!("The log {name} in cells of {VOLUME_M3} m³"),
+        columns,
+        rows,
+    )
 }

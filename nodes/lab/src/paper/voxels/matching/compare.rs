@@ -4,7 +4,7 @@ use super::trials::Trials;
 use crate::evaluate::quantile;
 use crate::paper::streams::{Purpose, stream};
 
-/// What of the errors is compared.
+/// Quantiles of the errors that are compared.
 pub(super) const SHARES: [f64; 2] = [0.5, 0.95];
 /// The lattice that others are compared with: cubic.
 const CUBIC: usize = 0;

@@ -3,12 +3,13 @@
 use crate::printed::printed_delta;
 use lattice_core::lattice::{Lattice, LatticeIndex, LatticeKind};
 
+use crate::AnyError;
 use crate::paper::estimate::Estimate;
 use crate::paper::parallel::in_parallel;
-use crate::paper::report::Cell;
-use crate::paper::report::plot::{Curve, Fault, color, title};
 use crate::paper::voxels::sample::Samples;
 use crate::paper::voxels::unit;
+use crate::report::Cell;
+use crate::report::plot::{Curve, color, title};
 use crate::theory::{mean_distance_m, second_moment};
 
 /// Of the curves, cell sides.
@@ -69,7 +70,7 @@ impl Spread {
         samples: &Samples,
         seed: u64,
         progress: &mut dyn FnMut(f64),
-    ) -> Result<Spread, Fault> {
+    ) -> Result<Spread, AnyError> {
         let lattice = unit(kind)?;
         let set = cells.of(&lattice);
         let centers: Vec<_> = set.iter().map(|&w| lattice.center(w)).collect();

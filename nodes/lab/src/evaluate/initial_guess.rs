@@ -1,4 +1,4 @@
-//! Starts that are off.
+//! Starts: the true pose, moved and turned by a given amount.
 
 use nalgebra::{Isometry3, Point3, Translation3, UnitQuaternion, Vector3};
 
@@ -7,7 +7,7 @@ use nalgebra::{Isometry3, Point3, Translation3, UnitQuaternion, Vector3};
 ///
 /// Upright, as both frames are. Three quarters of the motion's variance are level: people guess their
 /// height better than their place.
-pub fn off(
+pub fn perturbed(
     truth: &Isometry3<f64>,
     pivot_m: &Point3<f64>,
     m: f64,
@@ -55,7 +55,7 @@ mod tests {
         let pivot = Point3::new(3.0, 4.0, 0.1);
         let mut sides = 0;
         for seed in 0..200 {
-            let start = off(&truth, &pivot, 0.8, 35.0, seed_of(&[seed, 2]));
+            let start = perturbed(&truth, &pivot, 0.8, 35.0, seed_of(&[seed, 2]));
             let moved = (start * pivot) - (truth * pivot);
             assert!((moved.norm() - 0.8).abs() < 1e-9 && moved.z.abs() <= 0.4 + 1e-9);
             let turn = (start.rotation * truth.rotation.inverse()).scaled_axis();
@@ -64,6 +64,9 @@ mod tests {
             sides += i32::from(turn.z > 0.0);
         }
         assert!((70..=130).contains(&sides), "{sides}");
-        assert_eq!(off(&truth, &pivot, 0.0, 0.0, 1) * pivot, truth * pivot);
+        assert_eq!(
+            perturbed(&truth, &pivot, 0.0, 0.0, 1) * pivot,
+            truth * pivot
+        );
     }
 }

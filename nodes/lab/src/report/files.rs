@@ -1,34 +1,23 @@
 //! The files of a report: `report.html`, `report.json`, a `.csv` for each table, an `.svg` for each figure.
 
 use std::fs;
-use std::io;
-use std::path::{Path, PathBuf};
+use std::path::Path;
 
-use thiserror::Error;
-
-use super::{Cell, Report, Table, html};
-
-/// Why a report was not written.
-#[derive(Debug, Error)]
-#[error("{path}: {source}")]
-pub struct ReportError {
-    path: PathBuf,
-    source: io::Error,
-}
+use super::html::html;
+use super::{Cell, Report, Table};
+use crate::{AnyError, at};
 
 /// Writes a report into a folder, which is made where it is missing; its files are replaced.
-pub fn write(report: &Report, folder: &Path) -> Result<(), ReportError> {
-    let at = |path: &Path| {
-        let path = path.to_owned();
-        |source| ReportError { path, source }
-    };
+pub fn write(report: &Report, folder: &Path) -> Result<(), AnyError> {
     fs::create_dir_all(folder).map_err(at(folder))?;
     let put = |name: &str, text: &str| {
         let path = folder.join(name);
         fs::write(&path, text).map_err(at(&path))
     };
-    let json = serde_json::to_string_pretty(report).map_err(io::Error::other);
-    put("report.json", &(json.map_err(at(folder))? + "\n"))?;
+    put(
+        "report.json",
+        &(serde_json::to_string_pretty(report)? + "\n"),
+    )?;
     for section in report.sections() {
         for table in &section.tables {
             put(&format!("{}.csv", table.name), &csv(table))?;
@@ -89,7 +78,7 @@ mod tests {
         let section = &json["sections"][0];
         assert_eq!(section["tables"][0]["rows"][0][1], 0.1234567);
         assert_eq!(section["checks"][0]["holds"], true);
-        assert_eq!(json["seed"], 5);
+        assert_eq!(json["command"], "lattice paper");
         assert!(read("sketch.svg").starts_with("<svg"));
         assert!(read("report.html").starts_with("<!doctype html>"));
     }

@@ -1,11 +1,10 @@
-//! The house, the robot's maps of it and what the headset sees in them.
+//! The testbed of the trials: the house, the robot's maps of it and the views of the headset.
 
 use std::sync::OnceLock;
 use std::time::Instant;
 
 use crate::simulate::house::{
-    HeadsetOptions, HeadsetTrial, House, HouseError, LabelModel, Scene, Survey, SurveyMap,
-    SurveyOptions,
+    HeadsetOptions, HeadsetTrial, House, LabelModel, Scene, Survey, SurveyMap, SurveyOptions,
 };
 use lattice_core::lattice::{Lattice, LatticeKind};
 use lattice_core::registration::{
@@ -13,24 +12,24 @@ use lattice_core::registration::{
 };
 use nalgebra::{Isometry3, Point3, Vector3};
 
-use super::EvaluateError;
+use super::initial_guess::seed_of;
 use super::settings::{Pivot, Settings};
-use super::start::seed_of;
+use crate::AnyError;
 
 /// Purposes of seeds.
 const LABELS: u64 = 1;
 const SURVEY: u64 = 2;
 const VIEW: u64 = 3;
 
-/// What all trials share.
-pub struct World {
+/// A house with the maps of several surveys, shared by all trials.
+pub struct Testbed {
     house: House,
     settings: Settings,
     lattice: Lattice,
-    surveys: Vec<OnceLock<Result<SurveyMap, HouseError>>>,
+    surveys: Vec<OnceLock<Result<SurveyMap, String>>>,
 }
 
-/// What the headset saw.
+/// A view of the headset.
 pub struct View {
     scene: Scene,
     seed: u64,
@@ -39,29 +38,29 @@ pub struct View {
 
 /// A view and a map with the labels of one draw.
 pub struct Scenario {
-    /// The map, made ready; also the target of single registrations.
+    /// Prepared map; also the target of single registrations.
     pub map: CalibrationMap,
-    /// All points of the headset.
+    /// Scans of the headset.
     pub headset_scans: Vec<HeadsetScan>,
-    /// The same as one cloud.
+    /// All points of the headset as one cloud.
     pub full: PreparedCloud,
-    /// The same thinned to the cells of the map: the source of single registrations.
+    /// The cloud thinned to the cells of the map: the source of single registrations.
     pub source: PreparedCloud,
-    /// What starts are moved and turned at, in the headset's frame.
+    /// Point at which starts are moved and turned, in the headset's frame.
     pub pivot_m: Point3<f64>,
     /// `map_from_headset`.
     pub truth: Isometry3<f64>,
     /// Share of the view whose labels differ between map and headset.
     pub different_share: f64,
-    /// To make the map ready, milliseconds.
+    /// Time to prepare the map, milliseconds.
     pub map_ms: f64,
 }
 
-impl World {
-    /// A world in a house.
-    pub fn new(house: House, settings: &Settings) -> Result<World, EvaluateError> {
+impl Testbed {
+    /// A testbed in a house.
+    pub fn new(house: House, settings: &Settings) -> Result<Testbed, AnyError> {
         let cell_volume_m3 = settings.cell_side_m.powi(3);
-        Ok(World {
+        Ok(Testbed {
             lattice: Lattice::new(LatticeKind::Cubic, cell_volume_m3)?,
             surveys: (0..settings.map_seeds.clamp(1, 1000))
                 .map(|_| OnceLock::new())
@@ -71,13 +70,13 @@ impl World {
         })
     }
 
-    /// Where all of it is.
+    /// The house.
     pub fn house(&self) -> &House {
         &self.house
     }
 
-    /// What the headset sees of a scene.
-    pub fn view(&self, scene: Scene, seed: u64) -> Result<View, EvaluateError> {
+    /// The headset's view of a scene.
+    pub fn view(&self, scene: Scene, seed: u64) -> Result<View, AnyError> {
         let options = HeadsetOptions {
             headset_scans: self.settings.headset_scans,
             ..HeadsetOptions::default()
@@ -87,7 +86,7 @@ impl World {
     }
 
     /// The view and the map with a share `q` of the view labelled wrongly.
-    pub fn scenario(&self, view: &View, q: f64) -> Result<Scenario, EvaluateError> {
+    pub fn scenario(&self, view: &View, q: f64) -> Result<Scenario, AnyError> {
         let model = LabelModel {
             consistent: self.settings.consistent,
             iid: self.settings.iid,
@@ -98,13 +97,11 @@ impl World {
         let draw = model.draw(&self.house, &view.trial, seed)?;
         let map = self.survey(view.seed)?.cloud(&draw.map);
         let headset_scan =
-            |(lane, headset_scan): (u64, &crate::simulate::house::HeadsetHeadsetScan)| {
-                HeadsetScan {
-                    cloud: draw
-                        .headset
-                        .cloud(&headset_scan.points_m, &headset_scan.regions, lane),
-                    sensor_m: Some(headset_scan.sensor_m),
-                }
+            |(lane, headset_scan): (u64, &crate::simulate::house::HouseScan)| HeadsetScan {
+                cloud: draw
+                    .headset
+                    .cloud(&headset_scan.points_m, &headset_scan.regions, lane),
+                sensor_m: Some(headset_scan.sensor_m),
             };
         let headset_scans: Vec<HeadsetScan> = (0..)
             .zip(&view.trial.headset_scans)
@@ -140,9 +137,9 @@ impl World {
     }
 
     /// The robot's map for a seed, surveyed when it is first needed.
-    fn survey(&self, seed: u64) -> Result<&SurveyMap, EvaluateError> {
+    fn survey(&self, seed: u64) -> Result<&SurveyMap, AnyError> {
         let number = seed % self.surveys.len() as u64;
-        let make = || {
+        let make = || -> Result<SurveyMap, AnyError> {
             let options = SurveyOptions {
                 views: self.settings.survey_views,
                 ..SurveyOptions::default()
@@ -153,9 +150,8 @@ impl World {
         let slot = self
             .surveys
             .get(number as usize)
-            .ok_or(EvaluateError::NoMap)?;
-        slot.get_or_init(make)
-            .as_ref()
-            .map_err(|e| EvaluateError::House(e.clone()))
+            .ok_or("no map of that number")?;
+        let made = slot.get_or_init(|| make().map_err(|error| error.to_string()));
+        made.as_ref().map_err(|error| error.clone().into())
     }
 }

@@ -1,4 +1,4 @@
-//! A house of our own: eight rooms, 20 x 12 m.
+//! The generated house: eight rooms, 20 x 12 m.
 
 mod builder;
 mod furniture;
@@ -7,7 +7,8 @@ mod walls;
 
 use std::collections::BTreeMap;
 
-use super::{House, HouseError};
+use super::House;
+use crate::AnyError;
 use crate::simulate::random::{Purpose, Stream};
 use builder::Builder;
 
@@ -55,9 +56,9 @@ const OTHER: u16 = 17;
 impl House {
     /// A furnished house of boxes and drums, 20 x 12 x 2.8 m from the origin on, no two rooms alike.
     /// Books, clutter and how chairs stand are up to the seed.
-    pub fn own(seed: u64) -> Result<House, HouseError> {
+    pub fn generated(seed: u64) -> Result<House, AnyError> {
         let mut builder = Builder::default();
-        let mut stream = Stream::new(seed, Purpose::OwnHouse, 0, 0);
+        let mut stream = Stream::new(seed, Purpose::GeneratedHouse, 0, 0);
         walls::build(&mut builder);
         rooms::furnish(&mut builder, &mut stream);
         let names = CLASSES.map(str::to_owned);

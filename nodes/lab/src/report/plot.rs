@@ -3,10 +3,11 @@
 use lattice_core::lattice::LatticeKind;
 use plotters::prelude::*;
 
+pub use super::picture::{Area, Layout, chart, svg};
+use crate::AnyError;
 use crate::evaluate::{median_interval, quantile};
-pub use crate::plot::{Area, Fault, Layout, svg};
 
-/// Letters at axes.
+/// Font at axes.
 pub const LABELS: (&str, u32) = ("sans-serif", 13);
 
 /// A lattice's colour, told apart by most eyes (Wong 2011).
@@ -43,18 +44,18 @@ pub fn key(kinds: &[LatticeKind]) -> Vec<(RGBColor, &'static str)> {
         .collect()
 }
 
-/// What a panel is about, and what of it is shown.
+/// Title, axes and ranges of a panel.
 #[derive(Clone, Debug)]
 pub struct Axes<'a> {
-    /// Above it.
+    /// Title above it.
     pub title: &'a str,
-    /// Below it, with a unit.
+    /// Name of x below it, with a unit.
     pub x: &'a str,
-    /// At its left, with a unit.
+    /// Name of y at its left, with a unit.
     pub y: &'a str,
-    /// What x is shown.
+    /// Range of x.
     pub xs: std::ops::Range<f64>,
-    /// What y is shown.
+    /// Range of y.
     pub ys: std::ops::Range<f64>,
 }
 
@@ -80,7 +81,7 @@ pub fn labels(range: &std::ops::Range<f64>) -> impl Fn(&f64) -> String + use<> {
 pub type Curve = (RGBColor, Vec<(f64, f64)>);
 
 /// Lines in one panel.
-pub fn curves(area: &Area, axes: &Axes, curves: &[Curve]) -> Result<(), Fault> {
+pub fn curves(area: &Area, axes: &Axes, curves: &[Curve]) -> Result<(), AnyError> {
     let mut chart = ChartBuilder::on(area)
         .caption(axes.title, ("sans-serif", 15))
         .margin(8)
@@ -128,27 +129,27 @@ pub fn cumulative(values: &[f64]) -> Vec<(f64, f64)> {
         .collect()
 }
 
-/// What a box plot shows of some values (Tukey 1977).
+/// Numbers of a box plot (Tukey 1977).
 #[derive(Clone, PartialEq, Debug)]
 pub struct BoxStats {
     /// Number of values.
     pub n: usize,
-    /// A quarter is below.
+    /// Lower quartile.
     pub lower: f64,
-    /// Half is below.
+    /// Median.
     pub median: f64,
     /// 95 % interval of the median.
     pub median_interval: [f64; 2],
-    /// A quarter is above.
+    /// Upper quartile.
     pub upper: f64,
     /// The last values within 1.5 interquartile ranges of the box.
     pub whiskers: [f64; 2],
-    /// All beyond, in order.
+    /// Values beyond the whiskers, in order.
     pub outliers: Vec<f64>,
 }
 
 impl BoxStats {
-    /// Of values that are finite; None of nothing.
+    /// Numbers of the finite ones of some values; None of no values.
     pub fn of(values: &[f64]) -> Option<BoxStats> {
         let mut sorted: Vec<f64> = values.iter().copied().filter(|v| v.is_finite()).collect();
         sorted.sort_by(f64::total_cmp);
@@ -175,7 +176,7 @@ pub type NamedBox = (String, RGBColor, BoxStats);
 
 /// Boxes beside each other: whiskers at 1.5 interquartile ranges, outliers as dots, the interval of the
 /// median as a darker band. What lies above the panel is counted there. `axes.xs` is not used.
-pub fn boxes(area: &Area, axes: &Axes, boxes: &[NamedBox]) -> Result<(), Fault> {
+pub fn boxes(area: &Area, axes: &Axes, boxes: &[NamedBox]) -> Result<(), AnyError> {
     boxes_with_marks(area, axes, boxes, &[])
 }
 
@@ -185,7 +186,7 @@ pub fn boxes_with_marks(
     axes: &Axes,
     boxes: &[NamedBox],
     marks: &[Option<f64>],
-) -> Result<(), Fault> {
+) -> Result<(), AnyError> {
     let last = boxes.len() as f64 - 0.4;
     let mut chart = ChartBuilder::on(area)
         .caption(axes.title, ("sans-serif", 15))

@@ -1,4 +1,4 @@
-//! What stands where.
+//! Furniture of each room.
 
 use super::builder::{Builder, Spot};
 use super::furniture::{

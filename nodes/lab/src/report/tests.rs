@@ -1,13 +1,7 @@
 use super::*;
 
 pub(super) fn check(found: f64) -> Check {
-    Check {
-        name: "side of <cubic> (m)".into(),
-        printed: Some(1.0),
-        expected: 1.0,
-        found,
-        tolerance: 0.01,
-    }
+    Check::new("side of <cubic> (m)", 1.0, found, 0.01).with_printed(Some(1.0))
 }
 
 pub(super) fn section(verdict: Verdict, found: f64) -> Section {
@@ -18,13 +12,11 @@ pub(super) fn section(verdict: Verdict, found: f64) -> Section {
         finding: "So they are.".into(),
         verdict,
         checks: vec![check(1.0), check(found)],
-        tables: vec![Table {
-            name: "sides".into(),
-            caption: "Sides".into(),
-            columns: ["lattice", "side (m)", "cells", "a, b"]
-                .map(String::from)
-                .into(),
-            rows: vec![
+        tables: vec![Table::new(
+            "sides",
+            "Sides",
+            ["lattice", "side (m)", "cells", "a, b"],
+            vec![
                 vec![
                     "cubic".into(),
                     Cell::Number(0.1234567, 3),
@@ -38,12 +30,12 @@ pub(super) fn section(verdict: Verdict, found: f64) -> Section {
                     "<i>".into(),
                 ],
             ],
-        }],
-        figures: vec![Figure {
-            name: "sketch".into(),
-            caption: "A \"sketch\"".into(),
-            svg: "<svg width=\"9\" height=\"9\"></svg>\n".into(),
-        }],
+        )],
+        figures: vec![Figure::new(
+            "sketch",
+            "A \"sketch\"",
+            "<svg width=\"9\" height=\"9\"></svg>\n".into(),
+        )],
     }
 }
 
@@ -52,12 +44,7 @@ pub(super) fn report() -> Report {
 }
 
 pub(super) fn report_of(sections: Vec<Section>) -> Report {
-    let head = Head {
-        paper: "A paper".into(),
-        command: "lattice paper".into(),
-        seed: 5,
-        quick: true,
-    };
+    let head = Head::of_paper("A paper", "lattice paper".into(), true);
     Report::new(head, sections)
 }
 

@@ -8,7 +8,7 @@ const HEIGHT: f32 = 2.8;
 /// Half the thickness of a wall, m.
 const HALF: f32 = 0.06;
 
-/// What breaks a wall: from and to along it, from what height to what height, m.
+/// An opening in a wall: from and to along it, lower and upper height, m.
 #[derive(Clone, Copy)]
 enum Opening {
     /// Open, with a door leaf turned by so many degrees, if any.

@@ -1,12 +1,12 @@
-//! The house itself.
+//! The house: a labelled mesh at a pose in the map.
 
 use std::collections::BTreeMap;
 
 use nalgebra::{Isometry3, Point3, Vector3};
 
-use super::HouseError;
 use super::free_space::FreeSpace;
 use super::regions::{Region, Regions};
+use crate::AnyError;
 use crate::mesh::{LabelledMesh, MeshScene};
 
 /// Longest house, metres.
@@ -14,7 +14,7 @@ const MAX_SIZE_M: f64 = 200.0;
 /// Classes that segmenters get wrong in parts.
 const STRUCTURAL: [&str; 3] = ["wall", "floor", "ceiling"];
 
-/// What a ray in the house hits.
+/// The first surface that a ray hits.
 #[derive(Clone, Copy, PartialEq, Debug)]
 pub struct SurfaceHit {
     /// Distance from the origin of the ray, metres.
@@ -44,7 +44,7 @@ impl House {
     pub fn from_mesh(
         mesh: LabelledMesh,
         class_names: BTreeMap<u16, String>,
-    ) -> Result<House, HouseError> {
+    ) -> Result<House, AnyError> {
         let structural = |label| {
             let name = class_names.get(&label);
             name.is_some_and(|name| STRUCTURAL.contains(&name.as_str()))
@@ -55,10 +55,10 @@ impl House {
             let high_m = regions.things.iter().map(|thing| thing.high_m[axis]);
             let size_m = high_m.fold(0.0, f64::max) - low_m.fold(0.0, f64::min);
             if size_m > MAX_SIZE_M {
-                return Err(HouseError::TooLarge {
-                    size_m,
-                    most_m: MAX_SIZE_M,
-                });
+                return Err(format!(
+                    "the mesh is {size_m} m long, but at most {MAX_SIZE_M} m are taken; check the unit"
+                )
+                .into());
             }
         }
         let scene = MeshScene::new(&mesh)?;
@@ -81,12 +81,12 @@ impl House {
         }
     }
 
-    /// Where the house stands; the identity unless [`House::placed`].
+    /// Pose of the house; the identity unless [`House::placed`].
     pub fn map_from_house(&self) -> Isometry3<f64> {
         self.map_from_house
     }
 
-    /// Its surfaces, house frame, metres.
+    /// Surfaces of the house, house frame, metres.
     pub fn mesh(&self) -> &LabelledMesh {
         &self.mesh
     }
@@ -107,7 +107,7 @@ impl House {
         &self.regions.list
     }
 
-    /// What a ray hits first within `max_m`, house frame.
+    /// The first surface that a ray hits within `max_m`, house frame.
     pub fn cast(
         &self,
         origin_m: &Point3<f64>,
@@ -123,7 +123,7 @@ impl House {
         })
     }
 
-    /// The least of [`House::cast`]: the distance alone, metres.
+    /// Distance to the first surface alone, metres.
     pub(super) fn depth_m(
         &self,
         origin_m: &Point3<f64>,

@@ -2,12 +2,13 @@
 
 use std::f32::consts::TAU;
 
-use crate::mesh::{LabelledMesh, MeshError};
+use crate::AnyError;
+use crate::mesh::LabelledMesh;
 
 /// Sides of a drum.
 const SIDES: u32 = 14;
 
-/// Where a piece of furniture stands: its back against a wall, its front along y turned by `yaw`.
+/// Place of a piece of furniture: its back against a wall, its front along y turned by `yaw`.
 #[derive(Clone, Copy, Debug)]
 pub(super) struct Spot {
     pub(super) x: f32,
@@ -113,7 +114,7 @@ impl Builder {
         self.instances.push(self.instance);
     }
 
-    pub(super) fn build(self) -> Result<LabelledMesh, MeshError> {
+    pub(super) fn build(self) -> Result<LabelledMesh, AnyError> {
         LabelledMesh::new(self.vertices_m, self.triangles, self.labels, self.instances)
     }
 }

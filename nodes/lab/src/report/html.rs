@@ -1,32 +1,34 @@
-//! The report as one page that needs nothing else: style inline, pictures inline, no scripts.
+//! The HTML of a report: one page with its style and pictures inline, and no scripts.
 
-use super::{Cell, Check, Figure, Report, Section, Table, Verdict};
+use super::{Cell, Check, Figure, Report, Section, Table, Verdict, number};
 
 /// Rows from which a table is folded away.
 const LONG: usize = 14;
 /// Characters up to which a text in a table is not broken.
 const SHORT: usize = 32;
 
-/// The page.
+/// The report as an HTML page.
 pub fn html(report: &Report) -> String {
-    let paper = escaped(&report.paper);
+    let title = escaped(&report.title);
     let mut page = format!(
         "<!doctype html>\n<html lang=\"en\">\n<head>\n<meta charset=\"utf-8\">\n\
          <meta name=\"viewport\" content=\"width=device-width, initial-scale=1\">\n\
          <link rel=\"icon\" href=\"data:,\">\n\
-         <title>{paper}, reproduced</title>\n<style>\n{}</style>\n</head>\n<body>\n\
-         <h1>{paper}</h1>\n\
-         <p class=\"run\">Each table and figure computed anew. <code>{}</code>, seed {}, Lattice {}{}</p>\n",
+         <title>{title}</title>\n<style>\n{}</style>\n</head>\n<body>\n\
+         <h1>{title}</h1>\n\
+         <p class=\"run\">{} <code>{}</code>, Lattice {}</p>\n",
         include_str!("style.css"),
+        escaped(&report.lead),
         escaped(&report.command),
-        report.seed,
         escaped(report.version),
-        match report.quick {
-            true => ". A quick run: fewer samples and trials than a full report.",
-            false => ".",
-        }
     );
-    contents(&mut page, report);
+    if report
+        .sections
+        .iter()
+        .any(|section| !section.claim.is_empty())
+    {
+        add_verdicts(&mut page, report);
+    }
     for section in &report.sections {
         add_section(&mut page, section);
     }
@@ -34,8 +36,8 @@ pub fn html(report: &Report) -> String {
     page
 }
 
-/// What stands where, and how it stands.
-fn contents(page: &mut String, report: &Report) {
+/// The table of all verdicts, with links to the sections.
+fn add_verdicts(page: &mut String, report: &Report) {
     page.push_str(
         "<div class=\"scroll\"><table>\n<caption>Verdicts</caption>\n\
          <thead><tr><th>Of the paper</th><th>Verdict</th><th class=\"n\">Checks that hold</th><th>Why</th></tr></thead>\n<tbody>\n",
@@ -62,6 +64,7 @@ fn badge(verdict: &Verdict) -> String {
         Verdict::Corrected(_) => "corrected",
         Verdict::DependsOnData(_) => "data",
         Verdict::NotReproduced(_) => "failed",
+        Verdict::Measured => return String::new(),
     };
     format!("<span class=\"badge {class}\">{}</span>", verdict.name())
 }
@@ -77,12 +80,15 @@ fn add_section(page: &mut String, section: &Section) {
         let why = escaped(section.verdict.why());
         page.push_str(&format!("<p class=\"why\">{why}</p>\n"));
     }
-    page.push_str(&format!(
-        "<div class=\"sides\"><div><h3>The paper</h3><p>{}</p></div>\
-         <div class=\"ours\"><h3>What we find</h3><p>{}</p></div></div>\n",
-        escaped(&section.claim),
-        escaped(&section.finding)
-    ));
+    let finding = escaped(&section.finding);
+    match section.claim.as_str() {
+        "" => page.push_str(&format!("<p>{finding}</p>\n")),
+        claim => page.push_str(&format!(
+            "<div class=\"sides\"><div><h3>The paper</h3><p>{}</p></div>\
+             <div class=\"ours\"><h3>What we find</h3><p>{finding}</p></div></div>\n",
+            escaped(claim),
+        )),
+    }
     for figure in &section.figures {
         add_figure(page, figure);
     }
@@ -163,12 +169,7 @@ fn add_table(page: &mut String, table: &Table) {
                 Cell::Text(_) => "",
                 _ => class(column),
             };
-            let text = match cell {
-                Cell::Text(text) => escaped(text),
-                Cell::Number(value, digits) => number(*value, *digits),
-                Cell::Count(count) => count.to_string(),
-                Cell::Empty => String::new(),
-            };
+            let text = escaped(&cell.shown());
             rows.push_str(&format!("<td{class}>{text}</td>"));
         }
         rows.push_str("</tr>\n");
@@ -198,23 +199,7 @@ fn digits_of(tolerance: f64) -> usize {
     }
 }
 
-fn number(value: f64, digits: usize) -> String {
-    if !value.is_finite() {
-        return "–".to_owned();
-    }
-    let text = format!("{value:.digits$}");
-    // No -0.00.
-    match text
-        .trim_start_matches('-')
-        .bytes()
-        .all(|b| b == b'0' || b == b'.')
-    {
-        true => text.trim_start_matches('-').to_owned(),
-        false => text,
-    }
-}
-
-/// As text or as an attribute in double quotes.
+/// Escaped text, for an element or an attribute in double quotes.
 pub fn escaped(text: &str) -> String {
     let mut safe = String::with_capacity(text.len());
     for c in text.chars() {
@@ -239,7 +224,7 @@ mod tests {
     fn a_page_says_what_was_run_and_escapes_all_words() {
         let page = html(&report());
         for part in [
-            "<code>lattice paper</code>, seed 5, Lattice ",
+            "<code>lattice paper</code>, Lattice ",
             "A quick run",
             "Cells are &lt;b&gt;cubes&lt;/b&gt;.",
             "Fig. 1: cells &amp; sides",

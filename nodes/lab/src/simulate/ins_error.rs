@@ -1,4 +1,4 @@
-//! How far measured poses are off the true ones, at any time.
+//! Errors of the measured poses at any time.
 
 use nalgebra::{Isometry3, Translation3, UnitQuaternion, Vector3};
 
@@ -10,12 +10,12 @@ const POSITION_SHARE: f64 = 2.0 / 3.0;
 
 /// Difference of a measured from a true pose.
 #[derive(Clone, Copy, Debug)]
-pub(super) struct PoseError {
+pub(super) struct InsError {
     position_m: Vector3<f64>,
     rotation: UnitQuaternion<f64>,
 }
 
-impl PoseError {
+impl InsError {
     fn of(sample: &InsSample) -> Self {
         let (measured, truth) = (&sample.map_from_base, &sample.true_map_from_base);
         Self {
@@ -35,13 +35,13 @@ impl PoseError {
 
 /// The errors of the epochs about the scans at hand.
 #[derive(Debug)]
-pub(super) struct Errors<'a> {
+pub(super) struct InsErrors<'a> {
     samples: InsSamples<'a>,
-    known: Vec<PoseError>,
+    known: Vec<InsError>,
     first_epoch: i64,
 }
 
-impl<'a> Errors<'a> {
+impl<'a> InsErrors<'a> {
     pub(super) fn new(bobcat: &'a Bobcat) -> Self {
         Self {
             samples: bobcat.ins(),
@@ -59,11 +59,11 @@ impl<'a> Errors<'a> {
         let last_epoch = to_ns / INS_PERIOD_NS + 1;
         let missing = last_epoch + 1 - self.first_epoch - self.known.len() as i64;
         let more = self.samples.by_ref().take(missing.max(0) as usize);
-        self.known.extend(more.map(|sample| PoseError::of(&sample)));
+        self.known.extend(more.map(|sample| InsError::of(&sample)));
     }
 
     /// The error between two epochs, ns; the nearest one beyond their ends.
-    pub(super) fn at(&self, time_ns: i64) -> PoseError {
+    pub(super) fn at(&self, time_ns: i64) -> InsError {
         let at = (time_ns / INS_PERIOD_NS - self.first_epoch).max(0) as usize;
         let share = time_ns.rem_euclid(INS_PERIOD_NS) as f64 / INS_PERIOD_NS as f64;
         match (
@@ -71,12 +71,12 @@ impl<'a> Errors<'a> {
             self.known.get(at + 1),
             self.known.last(),
         ) {
-            (Some(a), Some(b), _) => PoseError {
+            (Some(a), Some(b), _) => InsError {
                 position_m: a.position_m.lerp(&b.position_m, share),
                 rotation: a.rotation.nlerp(&b.rotation, share),
             },
             (Some(e), None, _) | (None, _, Some(e)) => *e,
-            (None, _, None) => PoseError {
+            (None, _, None) => InsError {
                 position_m: Vector3::zeros(),
                 rotation: UnitQuaternion::identity(),
             },
