@@ -76,7 +76,6 @@ pub fn write_bobcat(
     make_way(&options.out, options.overwrite)?;
     let writer = WriterOptions {
         overwrite: options.overwrite,
-        ..WriterOptions::default()
     };
     let mut bag = BagWriter::create(&options.out, options.storage, writer)?;
     let mut topics = HashMap::new();

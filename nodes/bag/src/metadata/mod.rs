@@ -1,14 +1,15 @@
 //! `metadata.yaml` of rosbag2, versions 1 to 9 (ros2/rosbag2, `rosbag2_storage/metadata_io`).
 
+#[cfg(test)]
+mod tests;
+
 use std::{
-    collections::BTreeMap,
     fs::File,
     io::Read,
     path::{Component, Path, PathBuf},
 };
 
 use serde::{Deserialize, Serialize};
-use serde_yaml::Value;
 
 use super::{BagError, BagQos};
 
@@ -16,10 +17,10 @@ use super::{BagError, BagQos};
 pub(crate) const METADATA_VERSION: u32 = 9;
 /// Larger metadata files are refused, bytes.
 const MAX_METADATA_BYTES: u64 = 16 << 20;
-/// How an empty bag spells its start.
+/// Start of an empty bag, ns.
 const EMPTY_START_NS: i64 = i64::MAX;
 
-/// How storage files or messages are compressed outside the storage's own means.
+/// Compression of storage files or messages outside the storage's own means.
 #[derive(Clone, Copy, PartialEq, Eq, Debug, Default)]
 pub(crate) enum CompressionMode {
     /// Not at all.
@@ -48,10 +49,11 @@ pub(crate) struct Metadata {
     pub relative_file_paths: Vec<String>,
     #[serde(deserialize_with = "null_is_default")]
     pub files: Vec<FileInformation>,
-    #[serde(deserialize_with = "scalar_map")]
-    pub custom_data: Option<BTreeMap<String, String>>,
-    #[serde(deserialize_with = "null_is_default")]
-    pub ros_distro: String,
+    /// Nothing: its users' own pairs are not read.
+    #[serde(skip_deserializing)]
+    pub custom_data: (),
+    #[serde(skip_deserializing)]
+    pub ros_distro: &'static str,
 }
 
 #[derive(Clone, Copy, Debug, Default, Serialize, Deserialize)]
@@ -88,8 +90,8 @@ pub(crate) struct TopicMetadata {
     pub serialization_format: String,
     #[serde(default, deserialize_with = "qos_profiles")]
     pub offered_qos_profiles: Vec<BagQos>,
-    #[serde(default, deserialize_with = "null_is_default")]
-    pub type_description_hash: String,
+    #[serde(skip_deserializing)]
+    pub type_description_hash: &'static str,
 }
 
 #[derive(Clone, Debug, Serialize, Deserialize)]
@@ -155,14 +157,6 @@ impl Metadata {
             }
         }
         Ok(metadata)
-    }
-
-    /// Parses the metadata that storage files embed (no outer key); nothing when it is unusable.
-    pub(crate) fn parse_embedded(text: &str) -> Option<Metadata> {
-        serde_yaml::from_str::<Document>(text)
-            .map(|document| document.rosbag2_bagfile_information)
-            .or_else(|_| serde_yaml::from_str::<Metadata>(text))
-            .ok()
     }
 
     /// The text of `metadata.yaml`.
@@ -238,27 +232,6 @@ where
     Ok(Option::<T>::deserialize(deserializer)?.unwrap_or_default())
 }
 
-/// rosbag2 writes custom values without quotes, so that a number reads as a number.
-fn scalar_map<'de, D>(deserializer: D) -> Result<Option<BTreeMap<String, String>>, D::Error>
-where
-    D: serde::Deserializer<'de>,
-{
-    let map = Option::<BTreeMap<String, Value>>::deserialize(deserializer)?;
-    let text = |value: Value| match value {
-        Value::String(text) => text,
-        Value::Null => String::new(),
-        other => serde_yaml::to_string(&other)
-            .unwrap_or_default()
-            .trim_end()
-            .to_owned(),
-    };
-    Ok(map.map(|map| {
-        map.into_iter()
-            .map(|(key, value)| (key, text(value)))
-            .collect()
-    }))
-}
-
 /// A YAML text up to version 8, a list from 9 on.
 fn qos_profiles<'de, D>(deserializer: D) -> Result<Vec<BagQos>, D::Error>
 where
@@ -274,142 +247,5 @@ where
         None => Ok(Vec::new()),
         Some(Profiles::List(list)) => Ok(list),
         Some(Profiles::Text(text)) => BagQos::parse_list(&text).map_err(serde::de::Error::custom),
-    }
-}
-
-#[cfg(test)]
-mod tests {
-    use super::*;
-    use crate::{BagDurability, BagReliability};
-
-    fn parse(body: &str) -> Result<Metadata, BagError> {
-        Metadata::parse(
-            Path::new("metadata.yaml"),
-            &format!("rosbag2_bagfile_information:\n{body}"),
-        )
-    }
-
-    #[test]
-    fn version_1_has_the_least() {
-        let metadata = parse(
-            "  version: 1\n  storage_identifier: sqlite3\n  relative_file_paths:\n    - bag.db3\n  \
-             duration:\n    nanoseconds: 8\n  starting_time:\n    nanoseconds_since_epoch: 5\n  message_count: 2\n  \
-             topics_with_message_count:\n    - topic_metadata:\n        name: /a\n        type: std_msgs/String\n        \
-             serialization_format: cdr\n      message_count: 2\n",
-        )
-        .unwrap();
-        assert_eq!(
-            metadata.topics_with_message_count[0]
-                .topic_metadata
-                .offered_qos_profiles,
-            vec![]
-        );
-        assert_eq!(
-            metadata.compression(Path::new("m")).unwrap(),
-            CompressionMode::None
-        );
-        assert_eq!(metadata.starting_time.nanoseconds_since_epoch, 5);
-    }
-
-    #[test]
-    fn version_4_has_qos_as_text_and_version_9_as_a_list() {
-        for profiles in [
-            r#""- history: 3\n  depth: 0\n  reliability: 1\n  durability: 1""#,
-            "[{history: unknown, depth: 0, reliability: reliable, durability: transient_local}]",
-        ] {
-            let metadata = parse(&format!(
-                "  version: 9\n  topics_with_message_count:\n  - message_count: 2\n    topic_metadata: {{name: /a, type: x/msg/Y, \
-                 serialization_format: cdr, offered_qos_profiles: {profiles}}}\n"
-            ))
-            .unwrap();
-            let qos = &metadata.topics_with_message_count[0]
-                .topic_metadata
-                .offered_qos_profiles[0];
-            assert_eq!(
-                (qos.durability, qos.reliability),
-                (BagDurability::TransientLocal, BagReliability::Reliable)
-            );
-        }
-    }
-
-    #[test]
-    fn custom_data_may_hold_numbers() {
-        let metadata =
-            parse("  version: 6\n  custom_data: {run: 7, note: ~, site: pit}\n").unwrap();
-        let custom = metadata.custom_data.unwrap();
-        assert_eq!(custom["run"], "7");
-        assert_eq!(custom["note"], "");
-        assert_eq!(custom["site"], "pit");
-    }
-
-    #[test]
-    fn versions_out_of_range_are_refused() {
-        assert!(
-            parse("  version: 10\n")
-                .unwrap_err()
-                .to_string()
-                .contains("version 10")
-        );
-        assert!(
-            parse("  storage_identifier: mcap\n")
-                .unwrap_err()
-                .to_string()
-                .contains("without a version")
-        );
-        assert!(parse("  version: [\n").is_err());
-    }
-
-    #[test]
-    fn paths_stay_in_the_bag() {
-        let bag = Path::new("/bags/run");
-        let paths = |version: u32, entry: &str| {
-            Metadata {
-                version,
-                relative_file_paths: vec![entry.into()],
-                ..Metadata::default()
-            }
-            .storage_paths(bag, Path::new("metadata.yaml"))
-            .map(|paths| paths[0].1.clone())
-        };
-        assert_eq!(paths(9, "run_0.mcap").unwrap(), bag.join("run_0.mcap"));
-        assert_eq!(paths(3, "run/run_0.db3").unwrap(), bag.join("run_0.db3"));
-        assert_eq!(
-            paths(9, "data/run_0.db3").unwrap(),
-            bag.join("data/run_0.db3")
-        );
-        for bad in [
-            "../x.db3",
-            "/etc/passwd",
-            "a/../../b",
-            "",
-            "..\\x",
-            "./../x",
-        ] {
-            assert!(
-                matches!(paths(9, bad), Err(BagError::PathTraversal { .. })),
-                "{bad}"
-            );
-            assert!(
-                matches!(paths(2, bad), Err(BagError::PathTraversal { .. })),
-                "{bad}"
-            );
-        }
-    }
-
-    #[test]
-    fn compression_names_are_checked() {
-        let mode = |mode: &str, format: &str| {
-            Metadata {
-                compression_mode: mode.into(),
-                compression_format: format.into(),
-                ..Metadata::default()
-            }
-            .compression(Path::new("m"))
-        };
-        assert_eq!(mode("FILE", "zstd").unwrap(), CompressionMode::File);
-        assert_eq!(mode("message", "zstd").unwrap(), CompressionMode::Message);
-        assert_eq!(mode("NONE", "").unwrap(), CompressionMode::None);
-        assert!(mode("file", "lz4").unwrap_err().to_string().contains("lz4"));
-        assert!(mode("chunk", "zstd").is_err());
     }
 }
