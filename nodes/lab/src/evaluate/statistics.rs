@@ -111,6 +111,13 @@ pub fn quantile(values: impl IntoIterator<Item = f64>, share: f64) -> Option<f64
     Some(low + (high - low) * at.fract())
 }
 
+/// Least and greatest of some values; infinite of no values.
+pub fn extent(values: impl IntoIterator<Item = f64>) -> [f64; 2] {
+    let ends = [f64::INFINITY, f64::NEG_INFINITY];
+    let wider = |[low, high]: [f64; 2], value: f64| [low.min(value), high.max(value)];
+    values.into_iter().fold(ends, wider)
+}
+
 #[cfg(test)]
 mod tests {
     use super::*;

@@ -4,7 +4,8 @@ use std::path::Path;
 
 use lattice_core::lattice::LatticeKind;
 
-use super::{POINTS, Placed, Printed, VOLUME_M3, range, rms_m};
+use super::{POINTS, Placed, Printed, VOLUME_M3, rms_m};
+use crate::evaluate::extent;
 use crate::report::plot::title;
 use crate::report::{Cell, Table};
 use crate::theory::mean_distance_m;
@@ -42,8 +43,8 @@ pub fn compared(all: &[Placed]) -> Table {
             placed.printed.map_or(Cell::Empty, cell)
         };
         let voxels = placed.voxels();
-        let [least, most] = range(&placed.each(|q| q.voxels as f64));
-        let [low, high] = range(&placed.each(rms_m));
+        let [least, most] = extent(placed.each(|q| q.voxels as f64));
+        let [low, high] = extent(placed.each(rms_m));
         let to_cubic = placed.printed.map_or(Cell::Empty, |row| {
             Cell::Number(100.0 * (row.voxels / cubic_printed - 1.0), 1)
         });
