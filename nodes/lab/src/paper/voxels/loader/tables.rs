@@ -10,7 +10,7 @@ use crate::report::plot::title;
 use crate::report::{Cell, Table};
 use lattice_nodes::replay::RunReport;
 
-/// As printed and as simulated.
+/// Table I as printed and as simulated.
 pub fn compared(all: &[Placed]) -> Table {
     let columns = [
         "lattice",
@@ -76,7 +76,7 @@ pub fn compared(all: &[Placed]) -> Table {
     )
 }
 
-/// As printed and as theory has it.
+/// Table I as printed and as theory has it.
 pub fn theory(all: &[Placed]) -> Table {
     let columns = [
         "lattice",

@@ -11,7 +11,7 @@ use crate::paper::voxels::unit;
 use crate::report::Cell;
 use crate::report::plot::{Curve, color, title};
 
-/// Of the curves, cell sides.
+/// Bins of the curves, cell sides.
 const BIN: f64 = 0.02;
 const BINS: usize = 140;
 
@@ -19,7 +19,7 @@ const BINS: usize = 140;
 #[derive(Clone, Copy, PartialEq, Eq, Debug)]
 pub enum Cells {
     Own,
-    /// As printed in eq. (3)-(7), without 0.
+    /// Cells printed in eq. (3)-(7), without 0.
     Printed,
     Faces,
     Touching,
@@ -111,7 +111,7 @@ impl Spread {
             std: Estimate::of(draws.iter().map(|draw| draw.1)),
             exact_mean,
             exact_std: (square - exact_mean * exact_mean).sqrt(),
-            // The nearest point is in the midst of a face.
+            // The nearest point is in the middle of a face.
             nearest: match cells {
                 Cells::Own => 0.0,
                 _ => lattice.packing_radius_m(),
