@@ -113,7 +113,7 @@ fn a_robot_and_headsets_see_the_real_house() {
     }
 }
 
-/// What `lattice simulate house` reads back as.
+/// The files of `lattice simulate house`, read back.
 fn options(out: &Path, overwrite: bool) -> HouseOptions {
     HouseOptions {
         out: out.to_owned(),

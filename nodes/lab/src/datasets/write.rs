@@ -66,8 +66,8 @@ impl fmt::Display for BobcatSummary {
     }
 }
 
-/// Simulates the skid-steer loader and writes its log as a rosbag2 directory, the truth beside it. `progress` is told
-/// the fraction done, 0..1.
+/// Simulates the skid-steer loader and writes its log as a rosbag2 directory, the truth beside it. `progress` gets
+/// the share done.
 pub fn write_bobcat(
     options: &BobcatOptions,
     progress: &mut dyn FnMut(f64),

@@ -103,7 +103,7 @@ impl Survey {
 }
 
 struct View {
-    /// From the origin of the house, axes of the map, metres.
+    /// Points from the origin of the house, axes of the map, metres.
     offsets_m: Vec<[f32; 3]>,
     regions: Vec<u16>,
     sensor_m: Point3<f64>,

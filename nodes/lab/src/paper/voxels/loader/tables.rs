@@ -11,7 +11,7 @@ use crate::report::{Cell, Table};
 use crate::theory::mean_distance_m;
 use lattice_nodes::replay::RunReport;
 
-/// As printed and as simulated.
+/// Table I as printed and as simulated.
 pub fn compared(all: &[Placed]) -> Table {
     let columns = [
         "lattice",
@@ -77,7 +77,7 @@ pub fn compared(all: &[Placed]) -> Table {
     )
 }
 
-/// As printed and as theory has it.
+/// Table I as printed and as theory has it.
 pub fn theory(all: &[Placed]) -> Table {
     let columns = [
         "lattice",

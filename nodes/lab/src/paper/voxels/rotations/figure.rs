@@ -64,7 +64,7 @@ pub fn figure(scan: &Scan, runs: &[&Run]) -> Result<Figure, AnyError> {
     ))
 }
 
-/// From the least to the greatest x of some lines, and a little more.
+/// Range of x of some lines, and a little more.
 fn reach(lines: &[Curve]) -> std::ops::Range<f64> {
     let xs = lines
         .iter()
