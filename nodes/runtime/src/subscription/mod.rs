@@ -1,34 +1,28 @@
-//! Subscriptions: from DDS and from this process to one handler.
+//! Subscriptions: their handles, counters and messages.
 
-use std::collections::BTreeMap;
+mod intake;
+mod source;
+
+pub(crate) use intake::{Command, Intake};
+pub(crate) use source::Source;
+
 use std::sync::Arc;
 use std::sync::atomic::{AtomicU64, Ordering::Relaxed};
 use std::thread::JoinHandle;
 use std::time::Duration;
 
 use lattice_msgs::{RosMessage, cdr};
-use rustdds::GUID;
 use smol::Task;
-use smol::channel::{Receiver, Sender, bounded};
-use smol::future::{or, pending};
+use smol::channel::{Sender, bounded};
 
-use super::dds::reader::{DdsReader, SampleOrigin};
 use super::error::RuntimeError;
-use super::local_bus::{AnyMessage, Membership};
 use super::logging::Throttle;
 use super::peers::Peers;
-use super::reader_port::{Command, ReaderPort};
 use super::shutdown::Shutdown;
-use super::worker::guarded;
-
-/// After so many messages in a row, a task lets the others of its thread have a turn.
-const MESSAGES_PER_TURN: u32 = 16;
+use super::task_thread::guarded;
 
 /// Between two warnings of undecodable samples.
 const WARNING_PERIOD: Duration = Duration::from_secs(5);
-
-/// Writers whose last sample is remembered.
-const MAX_WRITERS: usize = 1024;
 
 /// Size of the messages of a subscription, which decides the thread that takes them.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
@@ -42,7 +36,7 @@ pub enum Load {
 /// A subscription; dropping it ends it.
 #[must_use = "dropping a subscription ends it"]
 pub struct Subscription {
-    port: Arc<ReaderPort>,
+    intake: Arc<Intake>,
     _running: Running,
 }
 
@@ -63,15 +57,15 @@ pub(crate) struct Stats {
 }
 
 impl Subscription {
-    pub(crate) fn new(port: Arc<ReaderPort>, running: Running) -> Self {
+    pub(crate) fn new(intake: Arc<Intake>, running: Running) -> Self {
         Self {
-            port,
+            intake,
             _running: running,
         }
     }
 
     fn stats(&self) -> &Stats {
-        &self.port.stats
+        &self.intake.stats
     }
 
     /// Resolved topic.
@@ -209,109 +203,6 @@ impl<M: RosMessage> Undecoded<M> {
     }
 }
 
-/// Everything one subscription hears.
-pub(crate) struct Source {
-    pub commands: Receiver<Command>,
-    pub local: Receiver<AnyMessage>,
-    pub _membership: Membership,
-    pub stats: Arc<Stats>,
-}
-
-impl Source {
-    /// Gives messages to the handler until the task is dropped.
-    pub(crate) async fn run<M: RosMessage>(self, mut handler: impl FnMut(Sample<'_, M>)) {
-        let mut turn: u32 = 0;
-        let mut gaps = Gaps::default();
-        let mut reader: Option<Box<DdsReader>> = None;
-        loop {
-            turn = turn.wrapping_add(1);
-            if turn.is_multiple_of(MESSAGES_PER_TURN) {
-                smol::future::yield_now().await;
-            }
-            match self.next(reader.as_deref(), turn.is_multiple_of(2)).await {
-                Heard::Local(message) => give_shared(message, &mut handler),
-                Heard::Remote(Ok(origin)) => {
-                    let gap = gaps.before(origin.writer, origin.sequence_number.into());
-                    self.stats.lost.fetch_add(gap, Relaxed);
-                    if let Some(reader) = &reader {
-                        handler(Sample::Cdr(&mut reader.bytes()));
-                    }
-                }
-                Heard::Remote(Err(why)) => self.stats.not_decodable(&why),
-                Heard::Command(Command::Use(new)) => reader = Some(new),
-                Heard::Command(Command::Close(done)) => {
-                    reader = None;
-                    drop(done);
-                }
-                Heard::Command(Command::WorkOff(done)) => {
-                    for _ in 0..self.local.len() {
-                        let message = self.local.try_recv();
-                        message
-                            .into_iter()
-                            .for_each(|m| give_shared(m, &mut handler));
-                    }
-                    drop(done);
-                }
-                Heard::End => return,
-            }
-        }
-    }
-
-    /// Both sides get their turn, whichever has more to say.
-    async fn next(&self, reader: Option<&DdsReader>, local_first: bool) -> Heard {
-        let command = async {
-            self.commands
-                .recv()
-                .await
-                .map_or(Heard::End, Heard::Command)
-        };
-        let local = async { self.local.recv().await.map_or(Heard::End, Heard::Local) };
-        let remote = async {
-            match reader {
-                Some(reader) => Heard::Remote(reader.next().await),
-                None => pending().await,
-            }
-        };
-        if local_first {
-            or(command, or(local, remote)).await
-        } else {
-            or(command, or(remote, local)).await
-        }
-    }
-}
-
-fn give_shared<M: RosMessage>(message: AnyMessage, handler: &mut impl FnMut(Sample<'_, M>)) {
-    if let Ok(message) = message.downcast::<M>() {
-        handler(Sample::Shared(message));
-    }
-}
-
-enum Heard {
-    Command(Command),
-    Local(AnyMessage),
-    Remote(Result<SampleOrigin, String>),
-    End,
-}
-
-/// Finds the samples that a writer numbered and we never saw.
-#[derive(Default)]
-struct Gaps {
-    last: BTreeMap<GUID, i64>,
-}
-
-impl Gaps {
-    /// Samples missing between the one before and this one of the same writer.
-    fn before(&mut self, writer: GUID, number: i64) -> u64 {
-        if self.last.len() >= MAX_WRITERS && !self.last.contains_key(&writer) {
-            self.last.clear();
-        }
-        let last = self.last.entry(writer).or_insert(number.saturating_sub(1));
-        let gap = number.saturating_sub(*last).saturating_sub(1);
-        *last = number.max(*last);
-        u64::try_from(gap).unwrap_or(0)
-    }
-}
-
 /// Runs a subscription on a thread of its own until the sender is dropped.
 pub(crate) fn spawn_reader(
     shutdown: &Shutdown,
@@ -330,29 +221,4 @@ pub(crate) fn spawn_reader(
             });
         })?;
     Ok((stop, thread))
-}
-
-#[cfg(test)]
-mod tests {
-    use super::*;
-
-    #[test]
-    fn gaps_are_counted_for_each_writer() {
-        let (a, b) = (GUID::from_bytes([1; 16]), GUID::from_bytes([2; 16]));
-        let mut gaps = Gaps::default();
-        let steps = [
-            (a, 7, 0),
-            (b, 1, 0),
-            (a, 8, 0),
-            (b, 5, 3),
-            (a, 8, 0),
-            (a, 7, 0),
-            (a, 10, 1),
-        ];
-        for (writer, number, gap) in steps {
-            assert_eq!(gaps.before(writer, number), gap, "{number}");
-        }
-        assert_eq!(gaps.before(a, i64::MAX), (i64::MAX - 11) as u64);
-        assert_eq!(gaps.before(a, i64::MIN), 0);
-    }
 }

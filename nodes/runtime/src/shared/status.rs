@@ -2,14 +2,14 @@
 
 use lattice_msgs::diagnostic_msgs::DiagnosticStatus;
 
-use super::core::Core;
-use super::dds::participant::effective_receive_buffer;
-use super::diagnostics::{Level, status};
+use super::Shared;
+use crate::dds::effective_receive_buffer;
+use crate::diagnostics::{Level, status};
 
 /// Below this, bursts of large messages are lost; twice the largest message is needed.
 const ENOUGH_BYTES: usize = 16 << 20;
 
-/// What the kernel grants a socket, asked once.
+/// Receive buffer that the kernel grants a socket, asked once.
 #[derive(Clone, Copy, Debug)]
 pub(crate) struct ReceiveBuffer {
     bytes: Option<usize>,
@@ -26,7 +26,7 @@ impl ReceiveBuffer {
         self.bytes.is_some_and(|bytes| bytes < ENOUGH_BYTES)
     }
 
-    /// Tells the operator what to do about a short buffer.
+    /// Logs the command that mends a short buffer.
     pub(crate) fn warn_if_short(self) {
         if let Some(bytes) = self.bytes.filter(|_| self.is_short()) {
             log::warn!(
@@ -38,7 +38,7 @@ impl ReceiveBuffer {
     }
 }
 
-impl Core {
+impl Shared {
     /// State of the transport of this process, as a task of `node`.
     pub(crate) fn transport_status(&self, node: &str) -> DiagnosticStatus {
         let mut values = vec![(
@@ -75,8 +75,8 @@ impl Core {
                 incompatible as u64,
             );
         }
-        for port in self.ports() {
-            let subscription = &port.stats;
+        for intake in self.intakes() {
+            let subscription = &intake.stats;
             let topic = subscription.peers().topic();
             add(
                 "undecodable",

@@ -1,30 +1,31 @@
 //! A logical node: name, parameters, remaps, and the endpoints made under them.
 
+mod services;
+
 use std::sync::Arc;
 
 use lattice_msgs::RosMessage;
 
 use super::clock::Clock;
-use super::core::{Core, DEFAULT_MAX_MESSAGE_BYTES};
 use super::diagnostics::Diagnostics;
 use super::error::RuntimeError;
 use super::graph::NodeId;
 use super::names;
-use super::param_services;
 use super::params::Params;
 use super::publisher::{Publisher, RawPublisher};
 use super::qos::Qos;
 use super::ros_args::RosArgs;
+use super::shared::{DEFAULT_MAX_MESSAGE_BYTES, Shared};
 use super::subscription::{Load, Sample, Stats, Subscription, Undecoded};
 
-/// A node of a [`Runtime`](super::Runtime). Clones are the same node.
+/// A node of the process. Clones are the same node.
 #[derive(Clone)]
 pub struct Node {
     inner: Arc<Inner>,
 }
 
 struct Inner {
-    core: Arc<Core>,
+    shared: Arc<Shared>,
     args: Arc<RosArgs>,
     name: String,
     namespace: String,
@@ -37,7 +38,7 @@ struct Inner {
 
 impl Node {
     pub(crate) fn new(
-        core: &Arc<Core>,
+        shared: &Arc<Shared>,
         args: &Arc<RosArgs>,
         default_name: &str,
     ) -> Result<Self, RuntimeError> {
@@ -52,16 +53,16 @@ impl Node {
             DEFAULT_MAX_MESSAGE_BYTES,
             1..=u32::MAX as usize,
         )?;
-        let id = core.graph.add_node(&namespace, &name);
+        let id = shared.graph.add_node(&namespace, &name);
         let about = "go by the time on /clock instead of the system's";
         let clock = if params.about(about).bool("use_sim_time", false)? {
             let topic = names::resolve_topic("/clock", &name, &namespace, &args.remaps)?;
-            core.sim_clock(id, &topic)?
+            shared.sim_clock(id, &topic)?
         } else {
             Clock::default()
         };
         let inner = Inner {
-            core: Arc::clone(core),
+            shared: Arc::clone(shared),
             args: Arc::clone(args),
             name,
             namespace,
@@ -71,15 +72,13 @@ impl Node {
             clock,
             max_message_bytes,
         };
-        let node = Self {
+        Ok(Self {
             inner: Arc::new(inner),
-        };
-        core.keep(param_services::serve(&node, &node.inner.params)?);
-        Ok(node)
+        })
     }
 
-    pub(crate) fn core(&self) -> &Arc<Core> {
-        &self.inner.core
+    pub(crate) fn shared(&self) -> &Arc<Shared> {
+        &self.inner.shared
     }
 
     pub(crate) fn id(&self) -> NodeId {
@@ -102,7 +101,7 @@ impl Node {
     }
 
     /// Parameters.
-    pub fn params(&self) -> &Params {
+    pub fn params(&self) -> &Arc<Params> {
         &self.inner.params
     }
 
@@ -135,9 +134,9 @@ impl Node {
         self.inner.clock.clone()
     }
 
-    /// Where this node states how its tasks are.
+    /// States of this node's tasks, for `/diagnostics`.
     pub fn diagnostics(&self) -> Diagnostics {
-        Diagnostics::new(&self.inner.fqn, &self.inner.core.tasks)
+        Diagnostics::new(&self.inner.fqn, &self.inner.shared.tasks)
     }
 
     /// A publisher; the parameters `qos.<topic>.*` override the QoS.
@@ -148,7 +147,7 @@ impl Node {
     ) -> Result<Publisher<M>, RuntimeError> {
         let resolved = self.resolve(topic)?;
         let qos = qos.with_overrides(&self.inner.params, &resolved, topic)?;
-        self.inner.core.publisher(self.id(), &resolved, &qos)
+        self.inner.shared.publisher(self.id(), &resolved, &qos)
     }
 
     /// A publisher of CDR bytes of the type, such as `sensor_msgs/msg/Imu`, on a full topic name.
@@ -160,7 +159,7 @@ impl Node {
     ) -> Result<RawPublisher, RuntimeError> {
         names::validate_full_name(resolved_topic)?;
         self.inner
-            .core
+            .shared
             .raw_publisher(self.id(), resolved_topic, type_name, &qos)
     }
 
@@ -207,7 +206,7 @@ impl Node {
         let qos = qos.with_overrides(&self.inner.params, &resolved, topic)?;
         let max = self.inner.max_message_bytes;
         self.inner
-            .core
+            .shared
             .subscribe(self.id(), &resolved, &qos, load, max, handler)
     }
 }

@@ -6,13 +6,14 @@ use std::time::{Duration, Instant};
 use lattice_msgs::diagnostic_msgs::DiagnosticArray;
 use smol::Timer;
 
-use super::core::{Core, deadline};
 use super::env::Transport;
 use super::error::RuntimeError;
 use super::node::Node;
+use super::param_services;
 use super::qos::Qos;
 use super::ros_args::RosArgs;
 use super::rosout;
+use super::shared::{Shared, deadline};
 use super::shutdown::{Shutdown, SignalWatch};
 
 /// Between two messages on `/diagnostics`.
@@ -25,7 +26,7 @@ const MIN_TIMER_PERIOD: Duration = Duration::from_millis(1);
 ///
 /// SIGINT and SIGTERM ask for shutdown while it lives. Not to be dropped on one of its own threads.
 pub struct Runtime {
-    core: Arc<Core>,
+    shared: Arc<Shared>,
     args: Arc<RosArgs>,
     main: Node,
     main_default_name: String,
@@ -48,13 +49,13 @@ impl Runtime {
         for warning in &transport.warnings {
             log::warn!("{warning}");
         }
-        let core = Core::start(transport.domain_id, transport.localhost_only)?;
-        core.receive_buffer.warn_if_short();
-        let signals = SignalWatch::start(core.shutdown.clone())?;
+        let shared = Shared::start(transport.domain_id, transport.localhost_only)?;
+        shared.receive_buffer.warn_if_short();
+        let signals = SignalWatch::start(shared.shutdown.clone())?;
         let args = Arc::new(args);
-        let main = Node::new(&core, &args, default_node_name)?;
+        let main = node(&shared, &args, default_node_name)?;
         let mut runtime = Self {
-            core,
+            shared,
             args,
             main,
             main_default_name: default_node_name.to_owned(),
@@ -73,7 +74,7 @@ impl Runtime {
         if default_name == self.main_default_name {
             return Ok(self.main.clone());
         }
-        Node::new(&self.core, &self.args, default_name)
+        node(&self.shared, &self.args, default_name)
     }
 
     /// Calls `callback` in every period of the system's steady clock, 1 ms at least, until shutdown.
@@ -81,7 +82,7 @@ impl Runtime {
     /// It runs on the io thread and must return at once. Periods that were missed are left out.
     pub fn timer(&self, period: Duration, mut callback: impl FnMut() + Send + 'static) {
         let period = period.max(MIN_TIMER_PERIOD);
-        let task = self.core.io.spawn(async move {
+        let task = self.shared.io.spawn(async move {
             let mut due = Instant::now().checked_add(period);
             while let Some(at) = due {
                 let _ = Timer::at(at).await;
@@ -97,16 +98,16 @@ impl Runtime {
 
     /// A handle to ask for shutdown.
     pub fn shutdown_handle(&self) -> Shutdown {
-        self.core.shutdown.clone()
+        self.shared.shutdown.clone()
     }
 
     /// Blocks until shutdown is asked for, then ends timers, sends what is queued, and leaves.
     ///
     /// The error is a thread that panicked.
     pub fn spin(&self) -> Result<(), RuntimeError> {
-        self.core.shutdown.wait();
-        self.core.close();
-        match self.core.shutdown.failed_thread() {
+        self.shared.shutdown.wait();
+        self.shared.close();
+        match self.shared.shutdown.failed_thread() {
             Some(thread) => Err(RuntimeError::Panicked { thread }),
             None => Ok(()),
         }
@@ -115,14 +116,16 @@ impl Runtime {
     /// Waits until the handlers have had every message that waits in this process, for two seconds at
     /// most. Not from a handler, callback or timer.
     pub fn work_off(&self) {
-        self.core.work_off(deadline());
+        self.shared.work_off(deadline());
     }
 
     fn publish_log(&self) -> Result<Arc<rosout::Listener>, RuntimeError> {
         let topic = self.main.resolve("/rosout")?;
-        let publisher = self.core.publisher(self.main.id(), &topic, &Qos::ROSOUT)?;
+        let publisher = self
+            .shared
+            .publisher(self.main.id(), &topic, &Qos::ROSOUT)?;
         let (listener, records) = rosout::listen();
-        if let Some(task) = self.core.io.spawn(rosout::publish(records, publisher)) {
+        if let Some(task) = self.shared.io.spawn(rosout::publish(records, publisher)) {
             task.detach();
         }
         Ok(listener)
@@ -131,14 +134,14 @@ impl Runtime {
     fn publish_diagnostics(&self) -> Result<(), RuntimeError> {
         let topic = self.main.resolve("/diagnostics")?;
         let publisher =
-            self.core
+            self.shared
                 .publisher::<DiagnosticArray>(self.main.id(), &topic, &Qos::DIAGNOSTICS)?;
-        let core = Arc::downgrade(&self.core);
+        let shared = Arc::downgrade(&self.shared);
         let (clock, fqn) = (self.main.clock(), self.main.fqn().to_owned());
         self.timer(DIAGNOSTICS_PERIOD, move || {
-            if let Some(core) = core.upgrade() {
-                let transport = core.transport_status(&fqn);
-                let message = core.tasks.message(clock.now_ns(), transport);
+            if let Some(shared) = shared.upgrade() {
+                let transport = shared.transport_status(&fqn);
+                let message = shared.tasks.message(clock.now_ns(), transport);
                 // A full queue is counted, and stated in the next message.
                 let _ = publisher.publish(message);
             }
@@ -147,8 +150,19 @@ impl Runtime {
     }
 }
 
+/// A node with its parameter services.
+fn node(
+    shared: &Arc<Shared>,
+    args: &Arc<RosArgs>,
+    default_name: &str,
+) -> Result<Node, RuntimeError> {
+    let node = Node::new(shared, args, default_name)?;
+    shared.keep(param_services::serve(&node, node.params())?);
+    Ok(node)
+}
+
 impl Drop for Runtime {
     fn drop(&mut self) {
-        self.core.close();
+        self.shared.close();
     }
 }

@@ -1,6 +1,12 @@
 //! ROS names: expansion, remapping and validity as in rcl and rmw, and their names in DDS.
 
-use crate::ros_args::{NameKind, RemapRule, RemapTarget};
+mod remap;
+mod shown;
+
+pub(crate) use remap::split_node;
+pub use remap::{NameKind, RemapRule, RemapTarget};
+pub(crate) use shown::shown;
+
 use thiserror::Error;
 
 /// rmw's limit of a full topic or service name, bytes.
@@ -47,12 +53,12 @@ pub enum NameError {
     },
 }
 
-/// Whether `text` is one token of a remap rule: an identifier with single underscores.
+/// True if `text` is one token of a remap rule: an identifier with single underscores.
 pub fn is_token(text: &str) -> bool {
     is_identifier(text) && !text.contains("__")
 }
 
-/// Whether `text` is one part of a name: letters, digits and underscores, no digit first.
+/// True if `text` is one part of a name: letters, digits and underscores, no digit first.
 pub fn is_identifier(text: &str) -> bool {
     text.bytes().all(is_word) && !text.starts_with(|c: char| c.is_ascii_digit()) && !text.is_empty()
 }

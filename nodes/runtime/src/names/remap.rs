@@ -1,8 +1,7 @@
-use super::error::shown;
-use crate::names::{is_token, validate_namespace};
+use super::{is_token, shown, validate_namespace};
 use std::str::FromStr;
 
-/// What a name rule touches.
+/// Kind of names that a rule applies to.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, Hash)]
 pub enum NameKind {
     /// Topics and services.
@@ -13,7 +12,7 @@ pub enum NameKind {
     Service,
 }
 
-/// What a rule replaces.
+/// Replacement that a rule makes.
 #[derive(Clone, Debug, PartialEq, Eq)]
 pub enum RemapTarget {
     /// `__node:=name`.
@@ -41,7 +40,7 @@ pub struct RemapRule {
 }
 
 impl RemapRule {
-    /// Whether the rule is for the node of this name.
+    /// True if the rule is for the node of this name.
     pub fn applies_to(&self, node_name: &str) -> bool {
         self.node.as_deref().is_none_or(|node| node == node_name)
     }
@@ -70,7 +69,7 @@ impl FromStr for RemapRule {
 }
 
 /// Splits `node:rest`; `rostopic://` and `rosservice://` are no node prefixes.
-pub(super) fn split_node(text: &str) -> (Option<&str>, &str) {
+pub(crate) fn split_node(text: &str) -> (Option<&str>, &str) {
     match text.split_once(':') {
         Some((node, rest))
             if is_token(node)

@@ -5,12 +5,8 @@
 
 use lattice_msgs::RosMessage;
 use lattice_msgs::cdr::{self, CdrError};
-use rustdds::SequenceNumber;
-use rustdds::bytes::Bytes;
-use rustdds::rpc::SampleIdentity;
 
-use super::dds::payload::ENCAPSULATION_BYTES;
-use super::dds::reader::SampleOrigin;
+use crate::port::{Bytes, ENCAPSULATION_BYTES, Origin, SampleId};
 
 /// First two bytes of the GUIDs of a vendor.
 const CYCLONE_VENDOR: [u8; 2] = [0x01, 0x10];
@@ -22,7 +18,7 @@ const CYCLONE_HEADER_BYTES: usize = 16;
 /// Which request a reply belongs to, in the manner of the client.
 #[derive(Clone, Debug, PartialEq)]
 pub(crate) enum ReplyTo {
-    Enhanced(SampleIdentity),
+    Enhanced(SampleId),
     Cyclone([u8; CYCLONE_HEADER_BYTES]),
 }
 
@@ -35,7 +31,7 @@ enum Mapping {
 /// Reads a request, its encapsulation header first. The error is that of the likelier mapping.
 pub(crate) fn read_request<Q: RosMessage>(
     bytes: &[u8],
-    origin: &SampleOrigin,
+    origin: &Origin,
 ) -> Result<(Q, ReplyTo), CdrError> {
     let (first, second) = match likely_mapping(origin) {
         Mapping::Enhanced => (Mapping::Enhanced, Mapping::Cyclone),
@@ -48,7 +44,7 @@ pub(crate) fn read_request<Q: RosMessage>(
 pub(crate) fn write_reply<R: RosMessage>(
     reply: &R,
     to: &ReplyTo,
-) -> Result<(Bytes, Option<SampleIdentity>), CdrError> {
+) -> Result<(Bytes, Option<SampleId>), CdrError> {
     let message = cdr::to_vec(reply)?;
     let body = message.get(ENCAPSULATION_BYTES..).unwrap_or_default();
     Ok(match to {
@@ -58,19 +54,18 @@ pub(crate) fn write_reply<R: RosMessage>(
     })
 }
 
-fn likely_mapping(origin: &SampleOrigin) -> Mapping {
-    let guid = origin.writer.to_bytes();
-    match guid.first_chunk() {
-        Some(&CYCLONE_VENDOR) => Mapping::Cyclone,
+fn likely_mapping(origin: &Origin) -> Mapping {
+    match origin.sample.writer.vendor() {
+        CYCLONE_VENDOR => Mapping::Cyclone,
         // ros2-client speaks both; only with the header does it name the request in a client.
-        Some(&RUSTDDS_VENDOR) if origin.related.is_some() => Mapping::Cyclone,
+        RUSTDDS_VENDOR if origin.related.is_some() => Mapping::Cyclone,
         _ => Mapping::Enhanced,
     }
 }
 
 fn read_as<Q: RosMessage>(
     bytes: &[u8],
-    origin: &SampleOrigin,
+    origin: &Origin,
     mapping: Mapping,
 ) -> Result<(Q, ReplyTo), CdrError> {
     match mapping {
@@ -99,53 +94,51 @@ fn read_as<Q: RosMessage>(
 }
 
 /// The request as the client knows it: its reply reader if it names that, else its writer.
-fn identity(origin: &SampleOrigin) -> SampleIdentity {
-    let own = SampleIdentity {
-        writer_guid: origin.writer,
-        sequence_number: origin.sequence_number,
-    };
+fn identity(origin: &Origin) -> SampleId {
     match origin.related {
         // FastDDS names the reader but leaves the number to the sample.
-        Some(related) if related.sequence_number <= SequenceNumber::zero() => SampleIdentity {
-            writer_guid: related.writer_guid,
-            ..own
+        Some(related) if related.number <= 0 => SampleId {
+            writer: related.writer,
+            ..origin.sample
         },
         Some(related) => related,
-        None => own,
+        None => origin.sample,
     }
 }
 
 #[cfg(test)]
 mod tests {
     use lattice_msgs::std_srvs::{SetBoolRequest, TriggerResponse};
-    use rustdds::GUID;
 
     use super::*;
+    use crate::port::EndpointId;
 
-    fn origin(vendor: [u8; 2], related: Option<SampleIdentity>) -> SampleOrigin {
+    fn origin(vendor: [u8; 2], related: Option<SampleId>) -> Origin {
         let mut guid = [7; 16];
         guid[..2].copy_from_slice(&vendor);
-        SampleOrigin {
-            writer: GUID::from_bytes(guid),
-            sequence_number: SequenceNumber::from(5_i64),
+        Origin {
+            sample: SampleId {
+                writer: EndpointId(guid),
+                number: 5,
+            },
             related,
         }
     }
 
     #[test]
     fn fastdds_names_its_reader_and_we_answer_to_it() {
-        let reader = GUID::from_bytes([9; 16]);
-        let related = SampleIdentity {
-            writer_guid: reader,
-            sequence_number: SequenceNumber::UNKNOWN,
+        let reader = EndpointId([9; 16]);
+        let related = SampleId {
+            writer: reader,
+            number: 0,
         };
         let bytes = cdr::to_vec(&SetBoolRequest { data: true }).unwrap();
         let (request, to) =
             read_request::<SetBoolRequest>(&bytes, &origin([0x01, 0x0f], Some(related))).unwrap();
         assert!(request.data);
-        let expected = SampleIdentity {
-            writer_guid: reader,
-            sequence_number: SequenceNumber::from(5_i64),
+        let expected = SampleId {
+            writer: reader,
+            number: 5,
         };
         assert_eq!(to, ReplyTo::Enhanced(expected));
         let (_, inline) = write_reply(&TriggerResponse::default(), &to).unwrap();

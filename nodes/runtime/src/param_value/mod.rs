@@ -1,4 +1,10 @@
-use crate::params_file::{ScanError, scan};
+//! Values of parameters, and the YAML that they are written in.
+
+mod scan;
+
+pub use scan::ScanError;
+pub(crate) use scan::scan;
+
 use serde_yaml::Value;
 use std::fmt;
 use thiserror::Error;
@@ -217,7 +223,7 @@ impl ParamValue {
     }
 }
 
-/// Whether the text can have stood without quotes: YAML itself does not read it as something else.
+/// True if the text can have stood without quotes: YAML itself does not read it as something else.
 fn may_be_plain(text: &str) -> bool {
     matches!(serde_yaml::from_str(text), Ok(Value::String(plain)) if plain == text)
 }

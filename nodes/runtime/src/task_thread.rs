@@ -1,4 +1,4 @@
-//! A thread that runs tasks until it is told to stop.
+//! A thread that runs tasks until it is stopped.
 
 use std::panic::{AssertUnwindSafe, catch_unwind};
 use std::sync::{Arc, Mutex};
@@ -12,7 +12,7 @@ use super::shutdown::Shutdown;
 use super::sync::lock;
 
 /// One thread with its tasks. A task that panics ends the process in good order, with a message.
-pub(crate) struct Worker {
+pub(crate) struct TaskThread {
     name: &'static str,
     shutdown: Shutdown,
     executor: Mutex<Option<Arc<Executor<'static>>>>,
@@ -20,7 +20,7 @@ pub(crate) struct Worker {
     thread: Mutex<Option<JoinHandle<()>>>,
 }
 
-impl Worker {
+impl TaskThread {
     pub(crate) fn start(name: &'static str, shutdown: Shutdown) -> std::io::Result<Self> {
         let executor = Arc::new(Executor::new());
         let (stop, stopped) = bounded(1);
@@ -68,7 +68,7 @@ impl Worker {
     }
 }
 
-impl Drop for Worker {
+impl Drop for TaskThread {
     fn drop(&mut self) {
         self.stop();
     }
@@ -100,7 +100,7 @@ mod tests {
     #[test]
     fn tasks_run_and_a_panic_asks_for_shutdown() {
         let shutdown = Shutdown::default();
-        let worker = Worker::start("test", shutdown.clone()).unwrap();
+        let worker = TaskThread::start("test", shutdown.clone()).unwrap();
         let (sender, receiver) = bounded(1);
         let task = worker.spawn(async move { sender.send(42).await.unwrap() });
         assert_eq!(receiver.recv_blocking(), Ok(42));

@@ -1,4 +1,4 @@
-//! What the YAML reader is not shown: anchors and aliases, which it resolves silently and rcl
+//! Refusal of YAML before it is read: anchors and aliases, which it resolves silently and rcl
 //! refuses, and deep nesting, on which its time grows with the square of the depth.
 
 use thiserror::Error;
@@ -46,7 +46,7 @@ enum Found {
     Deep,
 }
 
-/// What is open at the end of a line.
+/// Quotes, brackets and texts that are open at the end of a line.
 #[derive(Default)]
 struct Scan {
     /// The quote a text began with.
