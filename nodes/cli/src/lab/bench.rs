@@ -197,9 +197,7 @@ impl Quantize {
         let points = self.common.points()?;
         let method = self.method;
         let cell = self.common.cell;
-        let report = self
-            .common
-            .pool()?
+        let report = lattice_lab::pool(self.common.threads)?
             .install(|| bench::quantize(method, &lattice, cell, &points));
         self.common.print(&report)
     }
@@ -214,9 +212,7 @@ impl Insert {
             false => None,
         };
         let options = self.common.insert_options(self.store);
-        let (report, _) = self
-            .common
-            .pool()?
+        let (report, _) = lattice_lab::pool(self.common.threads)?
             .install(|| bench::insert(options, &lattice, points, scans.as_deref()))?;
         self.common.print(&report)
     }
@@ -229,7 +225,7 @@ impl Neighbors {
         let options = self.common.insert_options(self.store);
         let method = self.method;
         let (name, cell) = (self.store.name(), self.common.cell);
-        let report = self.common.pool()?.install(|| {
+        let report = lattice_lab::pool(self.common.threads)?.install(|| {
             let (_, store) = bench::insert(options, &lattice, points, None)?;
             Ok::<_, lattice_core::voxels::DatumError>(bench::neighbors(
                 method,
@@ -249,9 +245,7 @@ impl Raycast {
         let points = self.common.points()?;
         let scans = bench::read_scans(&self.common.points, points.len())?;
         let cell = self.common.cell;
-        let report = self
-            .common
-            .pool()?
+        let report = lattice_lab::pool(self.common.threads)?
             .install(|| bench::raycast(&lattice, cell, points, &scans))?;
         self.common.print(&report)
     }
@@ -266,7 +260,7 @@ impl MapFile {
             self.common.insert_options(Store::Occupancy),
             self.common.cell,
         );
-        let report = self.common.pool()?.install(|| {
+        let report = lattice_lab::pool(self.common.threads)?.install(|| {
             let (_, store) = bench::insert(options, &lattice, points, None)?;
             bench::file(method, store.as_ref(), self.zstd, cell)
         })?;
@@ -281,11 +275,6 @@ impl Common {
 
     fn points(&self) -> Result<Vec<[f32; 3]>, lattice_lab::AnyError> {
         bench::read_points(&self.points, self.max_points)
-    }
-
-    fn pool(&self) -> Result<rayon::ThreadPool, rayon::ThreadPoolBuildError> {
-        let threads = self.threads.max(1);
-        rayon::ThreadPoolBuilder::new().num_threads(threads).build()
     }
 
     fn insert_options(&self, store: Store) -> InsertOptions {

@@ -8,7 +8,7 @@ use clap::{Args, Subcommand};
 
 use lattice_lab::simulate::SurveyPattern;
 
-use super::choice;
+use super::{choice, show};
 use crate::progress::Progress;
 use crate::{CliResult, init_logging};
 use lattice_bag::Storage;
@@ -113,12 +113,7 @@ impl Site {
         };
         let summary = write_site(&options, &mut |done| progress.set(done))?;
         progress.done();
-        if self.json {
-            println!("{}", serde_json::to_string_pretty(&summary)?);
-        } else {
-            println!("{summary}");
-        }
-        Ok(())
+        show(self.json, &summary)
     }
 }
 
@@ -131,12 +126,7 @@ impl Bobcat {
             out: self.out,
             overwrite: self.overwrite,
         })?;
-        if self.json {
-            println!("{}", serde_json::to_string_pretty(&summary)?);
-        } else {
-            println!("{summary}");
-        }
-        Ok(())
+        show(self.json, &summary)
     }
 }
 
