@@ -11,7 +11,7 @@ use divan::Bencher;
 use divan::counter::ItemsCount;
 use lattice_core::cloud::Cloud;
 use lattice_core::lattice::{Lattice, LatticeKind};
-use lattice_core::raycast::{FreeSpaceMap, FreeSpaceOptions, Traversal};
+use lattice_core::raycast::{FreeSpaceMap, FreeSpaceOptions, RayBundle, Traversal};
 use nalgebra::Vector3;
 
 const SIDES_M: [f64; 3] = [0.1, 0.2, 0.5];
@@ -98,7 +98,11 @@ fn insert(scans: &[Scan], kind: LatticeKind, side_m: f64) -> (FreeSpaceMap, u64)
     let mut map = FreeSpaceMap::new(lattice, Vector3::zeros(), options).unwrap();
     let mut visits = 0;
     for scan in scans {
-        visits += map.insert_scan(scan.origin_m, &scan.cloud).visits;
+        let bundle = RayBundle {
+            origin_m: scan.origin_m,
+            ends: &scan.cloud,
+        };
+        visits += map.insert_scan(&[bundle]).visits;
     }
     (map, visits)
 }

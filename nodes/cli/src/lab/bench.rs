@@ -7,7 +7,7 @@ use lattice_core::lattice::{Lattice, LatticeKind};
 
 use crate::{CliResult, init_logging};
 use lattice_lab::bench::{
-    self, FileMethod, InsertOptions, NeighborMethod, QuantizeMethod, Report, Store,
+    self, FileMethod, InsertOptions, NeighborMethod, QuantizeMethod, RaycastMethod, Report, Store,
 };
 
 /// Measure operations on a raw point file (f32 `x y z i`; see `lattice simulate site`)
@@ -93,6 +93,9 @@ pub struct Neighbors {
 pub struct Raycast {
     #[command(flatten)]
     common: Common,
+    /// Use of the rays
+    #[arg(long, value_enum, default_value = "map")]
+    method: RaycastName,
 }
 
 /// Options of `lattice bench file`.
@@ -106,6 +109,16 @@ pub struct MapFile {
     /// Pack by zstd at this level, 1 to 19
     #[arg(long, value_parser = clap::value_parser!(i32).range(1..=19))]
     zstd: Option<i32>,
+}
+
+#[derive(Clone, Copy, ValueEnum)]
+enum RaycastName {
+    /// Log-odds of all cells, free ones too
+    Map,
+    /// Voxels, without those that rays pass through: `free_space: clear` of the mapper
+    Clear,
+    /// Voxels, without those that are free by the log-odds: `free_space: evidence`
+    Evidence,
 }
 
 #[derive(Clone, Copy, ValueEnum)]
@@ -237,10 +250,15 @@ impl Raycast {
         let points = self.common.points()?;
         let scans = bench::read_scans(&self.common.points, points.len())?;
         let cell = self.common.cell;
+        let method = match self.method {
+            RaycastName::Map => RaycastMethod::Map,
+            RaycastName::Clear => RaycastMethod::Clear,
+            RaycastName::Evidence => RaycastMethod::Evidence,
+        };
         let report = self
             .common
             .pool()?
-            .install(|| bench::raycast(&lattice, cell, points, &scans))?;
+            .install(|| bench::raycast(method, &lattice, cell, points, &scans))?;
         self.common.print(&report)
     }
 }
