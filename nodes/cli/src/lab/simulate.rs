@@ -45,6 +45,9 @@ pub struct Bobcat {
     /// Length of the log in s
     #[arg(long, default_value_t = 30.0)]
     duration: f64,
+    /// Let a person walk through the yard in the first 15 s
+    #[arg(long)]
+    person: bool,
     /// Container of the messages
     #[arg(long, value_enum, default_value = "mcap")]
     storage: StorageName,
@@ -125,6 +128,7 @@ impl Bobcat {
         let summary = bobcat(&BobcatOptions {
             seed: self.seed,
             duration_s: self.duration,
+            person: self.person,
             storage: match self.storage {
                 StorageName::Mcap => Storage::Mcap,
                 StorageName::Sqlite3 => Storage::Sqlite3,

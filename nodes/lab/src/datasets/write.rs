@@ -29,6 +29,8 @@ pub struct BobcatOptions {
     pub seed: u64,
     /// Length of the log, s.
     pub duration_s: f64,
+    /// Whether a person walks through the yard.
+    pub person: bool,
     /// Storage of the bag.
     pub storage: Storage,
     /// Directory of the bag.
@@ -112,7 +114,7 @@ pub fn write_bobcat(
     options: &BobcatOptions,
     progress: &mut dyn FnMut(f64),
 ) -> Result<BobcatSummary, SimulateError> {
-    let bobcat = Bobcat::new(options.seed, options.duration_s)?;
+    let bobcat = Bobcat::new(options.seed, options.duration_s)?.with_person(options.person);
     make_way(&options.out, options.overwrite)?;
     let writer = WriterOptions {
         overwrite: options.overwrite,

@@ -19,6 +19,7 @@ mod lms200;
 mod loader;
 mod mission;
 mod obstacles;
+mod person;
 mod pose_error;
 mod profile;
 mod random;
@@ -42,5 +43,6 @@ pub use lms200::{
 };
 pub use loader::Loader;
 pub use obstacles::{Block, Obstacle, Post};
+pub use person::Person;
 pub use site::{Hit, Site};
 pub use survey::{Survey, SurveyPattern, SurveyScan, SurveyScans};
