@@ -8,7 +8,7 @@ use lattice_core::lattice::{Lattice, LatticeKind};
 use super::choice;
 use crate::{CliResult, init_logging};
 use lattice_lab::bench::{
-    self, FileMethod, InsertOptions, NeighborMethod, QuantizeMethod, Report, Store,
+    self, FileMethod, InsertOptions, NeighborMethod, QuantizeMethod, RaycastMethod, Report, Store,
 };
 
 /// Measure operations on a raw point file (f32 `x y z i`; see `lattice simulate site`)
@@ -94,6 +94,9 @@ pub struct Neighbors {
 pub struct Raycast {
     #[command(flatten)]
     common: Common,
+    /// Use of the rays
+    #[arg(long, value_parser = choice(&RAYCASTS), default_value = "map")]
+    method: RaycastMethod,
 }
 
 /// Options of `lattice bench file`.
@@ -120,6 +123,25 @@ const FILES: [(&str, &str, FileMethod); 2] = [
         "load",
         "From the bytes of a file to a store",
         FileMethod::Load,
+    ),
+];
+
+/// Values of `--method` of `lattice bench raycast`.
+const RAYCASTS: [(&str, &str, RaycastMethod); 3] = [
+    (
+        "map",
+        "Log-odds of all cells, free ones too",
+        RaycastMethod::Map,
+    ),
+    (
+        "clear",
+        "Voxels, without those that rays pass through: `free_space: clear` of the mapper",
+        RaycastMethod::Clear,
+    ),
+    (
+        "evidence",
+        "Voxels, without those that are free by the log-odds: `free_space: evidence`",
+        RaycastMethod::Evidence,
     ),
 ];
 
@@ -246,7 +268,7 @@ impl Raycast {
         let scans = bench::read_scans(&self.common.points, points.len())?;
         let cell = self.common.cell;
         let report = lattice_lab::pool(self.common.threads)?
-            .install(|| bench::raycast(&lattice, cell, points, &scans))?;
+            .install(|| bench::raycast(self.method, &lattice, cell, points, &scans))?;
         self.common.print(&report)
     }
 }

@@ -59,6 +59,9 @@ pub struct Bobcat {
     /// Length of the log in s
     #[arg(long, default_value_t = 30.0)]
     duration: f64,
+    /// Let a person walk through the yard in the first 15 s
+    #[arg(long)]
+    person: bool,
     /// Container of the messages
     #[arg(long, value_parser = choice(&STORAGES), default_value = "mcap")]
     storage: Storage,
@@ -122,6 +125,7 @@ impl Bobcat {
         let summary = bobcat(&BobcatOptions {
             seed: self.seed,
             duration_s: self.duration,
+            person: self.person,
             storage: self.storage,
             out: self.out,
             overwrite: self.overwrite,

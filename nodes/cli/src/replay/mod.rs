@@ -9,7 +9,7 @@ use std::path::PathBuf;
 
 use clap::Args;
 use lattice_core::lattice::{Lattice, Orientation};
-use lattice_core::voxels::file::write_map;
+use lattice_core::voxels::file::WriteOptions;
 
 use super::progress::Progress;
 use super::{CliResult, Lattices, init_logging};
@@ -169,7 +169,9 @@ impl Replay {
                 path.as_mut_os_string().push(ending);
             }
             let file = File::create(&path).map_err(|e| format!("{}: {e}", path.display()))?;
-            write_map(mapper.list(), BufWriter::new(file))?;
+            mapper
+                .contents()
+                .write(BufWriter::new(file), &WriteOptions::default())?;
         }
         Ok(())
     }

@@ -26,6 +26,8 @@ pub struct BobcatOptions {
     pub seed: u64,
     /// Length of the log, s.
     pub duration_s: f64,
+    /// Whether a person walks through the yard.
+    pub person: bool,
     /// Storage of the bag.
     pub storage: Storage,
     /// Directory of the bag.
@@ -72,7 +74,7 @@ pub fn write_bobcat(
     options: &BobcatOptions,
     progress: &mut dyn FnMut(f64),
 ) -> Result<BobcatSummary, AnyError> {
-    let bobcat = Bobcat::new(options.seed, options.duration_s)?;
+    let bobcat = Bobcat::new(options.seed, options.duration_s)?.with_person(options.person);
     make_way(&options.out, options.overwrite)?;
     let writer = WriterOptions {
         overwrite: options.overwrite,
