@@ -20,7 +20,7 @@ use thiserror::Error;
 use super::facts::{INSPVAX_TOPIC, ODOMETRY_TOPIC, TF_STATIC_TOPIC, TF_TOPIC, points_topic};
 use super::log::{Block, Log};
 use super::truth::{self, Truth};
-use lattice_bag::{BagDurability, BagError, BagQos, BagWriter, Storage, TopicSpec, WriterOptions};
+use lattice_bag::{BagError, BagQos, BagWriter, Storage, TopicSpec, WriterOptions};
 
 /// What to simulate and where to write it.
 #[derive(Clone, Debug)]
@@ -181,7 +181,7 @@ fn topic_specs() -> Vec<TopicSpec> {
     specs.push(spec::<Odometry>(ODOMETRY_TOPIC, reliable(100)));
     specs.push(spec::<TFMessage>(TF_TOPIC, reliable(100)));
     let latched = BagQos {
-        durability: BagDurability::TransientLocal,
+        latched: true,
         ..reliable(1)
     };
     specs.push(spec::<TFMessage>(TF_STATIC_TOPIC, latched));
