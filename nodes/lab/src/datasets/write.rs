@@ -17,7 +17,7 @@ use serde::Serialize;
 use super::facts::{INSPVAX_TOPIC, ODOMETRY_TOPIC, TF_STATIC_TOPIC, TF_TOPIC, points_topic};
 use super::log::{Block, Log};
 use super::truth::{self, Truth};
-use lattice_bag::{BagDurability, BagQos, BagWriter, Storage, TopicSpec, WriterOptions};
+use lattice_bag::{BagQos, BagWriter, Storage, TopicSpec, WriterOptions};
 
 /// Options of a simulated log.
 #[derive(Clone, Debug)]
@@ -143,7 +143,7 @@ fn topic_specs() -> Vec<TopicSpec> {
     specs.push(spec::<Odometry>(ODOMETRY_TOPIC, reliable(100)));
     specs.push(spec::<TFMessage>(TF_TOPIC, reliable(100)));
     let latched = BagQos {
-        durability: BagDurability::TransientLocal,
+        latched: true,
         ..reliable(1)
     };
     specs.push(spec::<TFMessage>(TF_STATIC_TOPIC, latched));
