@@ -8,6 +8,7 @@ use crate::simulate::{
     BASE_FROM_TURNTABLE_M, INS_POSITION_RMS_M, InsSample, Laser, MAX_RANGE_M, MIN_RANGE_M,
     RANGE_NOISE_M, TURNTABLE_PERIOD_NS, base_from_imu,
 };
+use lattice_nodes::files::export::ply_header;
 use nalgebra::{Isometry3, Vector3};
 use serde::Serialize;
 
@@ -126,13 +127,12 @@ impl Truth {
 
 /// Header of a binary PLY of float points, padded by a comment.
 fn ply_header(points: u64) -> Vec<u8> {
-    let begin = format!(
-        "ply\nformat binary_little_endian 1.0\ncomment true points in the map frame, m, in the order of the log\n\
-         element vertex {points}\nproperty float x\nproperty float y\nproperty float z\ncomment "
-    );
-    let end = "\nend_header\n";
-    let padding = PLY_HEADER_BYTES.saturating_sub(begin.len() + end.len());
-    format!("{begin}{}{end}", "-".repeat(padding)).into_bytes()
+    let vertices = [("vertex", points, &["float x", "float y", "float z"][..])];
+    let comment = "true points in the map frame, m, in the order of the log ";
+    let bare = ply_header(comment, &vertices);
+    let padding = PLY_HEADER_BYTES.saturating_sub(bare.len());
+    let comment = format!("{comment}{}", "-".repeat(padding));
+    ply_header(&comment, &vertices).into_bytes()
 }
 
 /// What `site.yaml` tells.
