@@ -2,15 +2,15 @@
 //!
 //! [`LatticeMapper`] is a state machine without I/O; [`node`] runs it behind DDS.
 
-mod calls;
 mod counts;
 pub mod node;
+mod operations;
 mod options;
 mod report;
 mod services;
 
-pub use calls::LoadRefusal;
 pub use counts::MapperCounts;
+pub use operations::LoadRefusal;
 pub use options::MapperOptions;
 pub use report::MapperReport;
 
@@ -25,7 +25,7 @@ use thiserror::Error;
 
 use crate::convert::{cloud, geometry, map, semantic};
 
-/// Why a cloud was not mapped. The map is as it was before.
+/// Reason for which a cloud was not mapped. The map is as it was before.
 #[derive(Debug, Error)]
 pub enum CloudRefusal {
     /// In another frame than the map's.
@@ -43,7 +43,7 @@ pub enum CloudRefusal {
     Malformed(#[from] lattice_core::cloud::CloudError),
 }
 
-/// Builds one occupied voxel list and tells what changed.
+/// Builds one occupied voxel list, with its changes for followers.
 pub struct LatticeMapper {
     options: MapperOptions,
     list: VoxelList,
@@ -144,7 +144,7 @@ impl LatticeMapper {
         self.forgot_at_ns = 0;
     }
 
-    /// What a copy of the map is of: changes with whatever may change the map.
+    /// Epoch and state of the list: a copy of the map is old once they differ.
     pub fn state(&self) -> (u64, u64) {
         (self.epoch, self.list.sequence().into())
     }
@@ -214,7 +214,7 @@ impl LatticeMapper {
         self.list.distortion()
     }
 
-    /// What came in and what was refused, by reason.
+    /// Counters of clouds and points, by reason of refusal.
     pub fn counts(&self) -> &MapperCounts {
         &self.counts
     }
