@@ -1,4 +1,4 @@
-//! Where the machine was.
+//! Poses of the machine by time.
 
 use nalgebra::Isometry3;
 use thiserror::Error;
@@ -39,7 +39,7 @@ impl Default for PoseBufferOptions {
     }
 }
 
-/// What became of a pose.
+/// Outcome of a push.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum PushOutcome {
     /// Kept.
@@ -52,7 +52,7 @@ pub enum PushOutcome {
     NotFinite,
 }
 
-/// Why there is no pose.
+/// Reason for which there is no pose.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, Error)]
 pub enum PoseMiss {
     /// No pose came yet.

@@ -50,7 +50,7 @@ pub enum TfInsertError {
     Itself(String),
 }
 
-/// Why there is no transform.
+/// Reason for which there is no transform.
 #[derive(Clone, Debug, PartialEq, Eq, Error)]
 pub enum TfMiss {
     /// No transform ever named the frame.
