@@ -107,7 +107,6 @@ fn options(params: &Params) -> Result<PlayerOptions, NodeError> {
         include: (!include.is_empty()).then_some(include),
         exclude: params.string_array("exclude_topics", &[])?,
         clock_hz: (clock_hz > 0.0).then_some(clock_hz),
-        ..PlayerOptions::default()
     })
 }
 
@@ -115,10 +114,10 @@ fn options(params: &Params) -> Result<PlayerOptions, NodeError> {
 fn open_topics(node: &Node, player: &Player) -> Result<Vec<RawPublisher>, NodeError> {
     let mut publishers = Vec::new();
     for topic in player.topics() {
-        let resolved = node.resolve(&topic.name)?;
-        let offered = offered(&topic.info);
-        let qos = offered.with_overrides(node.params(), &resolved, &topic.name)?;
-        publishers.push(node.raw_publisher(&resolved, &topic.info.type_name, qos)?);
+        let info = &topic.info;
+        let resolved = node.resolve(&info.name)?;
+        let qos = offered(info).with_overrides(node.params(), &resolved, &info.name)?;
+        publishers.push(node.raw_publisher(&resolved, &info.type_name, qos)?);
     }
     Ok(publishers)
 }
@@ -171,7 +170,7 @@ impl Shell {
     fn wait_for(&self, names: &[String], timeout: Duration) {
         let deadline = Instant::now() + timeout;
         for (publisher, topic) in self.topics.iter().zip(self.player.topics()) {
-            if !names.contains(&topic.name) {
+            if !names.contains(&topic.info.name) {
                 continue;
             }
             let (joined, join) = mpsc::channel();
@@ -181,7 +180,7 @@ impl Shell {
             while publisher.subscriber_count() == 0 && !self.shutdown.is_requested() {
                 let left = deadline.saturating_duration_since(Instant::now());
                 if left.is_zero() {
-                    log::warn!("{}: nobody listens, playing all the same", topic.name);
+                    log::warn!("{}: nobody listens, playing all the same", topic.info.name);
                     break;
                 }
                 let _ = join.recv_timeout(left.min(NAP));
@@ -195,17 +194,15 @@ impl Shell {
         let span_ns = last_ns.saturating_sub(first_ns).max(1);
         let mut percent = 0;
         while !self.shutdown.is_requested() {
-            let Some(due_ns) = self.player.due_ns() else {
-                break;
-            };
-            let due = begin + Duration::from_nanos(u64::try_from(due_ns).unwrap_or(0));
+            let due_ns = u64::try_from(self.player.due_ns()).unwrap_or(0);
+            let due = begin + Duration::from_nanos(due_ns);
             let now = Instant::now();
             if due > now {
                 std::thread::sleep((due - now).min(NAP));
                 continue;
             }
             match self.player.next()? {
-                Step::Publish { topic, data, .. } => {
+                Step::Publish { topic, data } => {
                     let late_ms = (now - due).as_millis() as u64;
                     self.report.latest_ms = self.report.latest_ms.max(late_ms);
                     self.publish(topic, data);

@@ -76,6 +76,7 @@ pub fn run_until_stopped(runtime: &Runtime, running: Vec<Finish>) -> Result<(), 
     runtime.shutdown_handle().wait();
     // In the order in which data flows, so that each still gets what the one before publishes.
     for finish in running {
+        runtime.work_off();
         finish();
     }
     Ok(runtime.spin()?)

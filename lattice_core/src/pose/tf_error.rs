@@ -50,7 +50,7 @@ pub enum TfInsertError {
     Itself(String),
 }
 
-/// Reason for which there is no transform.
+/// A transform that is not available.
 #[derive(Clone, Debug, PartialEq, Eq, Error)]
 pub enum TfMiss {
     /// No transform ever named the frame.

@@ -45,12 +45,12 @@ impl SemanticCloud {
         self.points_m.len()
     }
 
-    /// Whether there is no point.
+    /// True if there is no point.
     pub fn is_empty(&self) -> bool {
         self.points_m.is_empty()
     }
 
-    /// What is known of the class of point `i`.
+    /// Label distribution of point `i`.
     pub fn label(&self, i: usize) -> LabelDistribution {
         let label = self.labels.get(i).copied();
         label.unwrap_or(LabelDistribution::UNKNOWN)

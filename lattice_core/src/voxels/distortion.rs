@@ -1,11 +1,11 @@
-//! How far the points are from their lattice points.
+//! Distances of the points from their lattice points.
 
 use crate::lattice::{BatchSums, Lattice};
 
 /// Distances are summed in this fraction of a cell side, their squares in this fraction of its
 /// square.
 const STEPS: f64 = (1_u64 << 20) as f64;
-/// How much a squared distance may exceed the largest in a cell, relative.
+/// Largest relative excess of a squared distance over the largest in a cell.
 const SLACK: f64 = 0.02;
 
 /// Quantization error over all inserted points.
@@ -27,9 +27,9 @@ pub struct Distortion {
 #[derive(Clone, Copy, PartialEq, Eq, Debug, Default)]
 pub(super) struct DistortionSums {
     pub(super) points: u64,
-    /// Of squared distances, in cell sides^2 / 2^20.
+    /// Sum of squared distances, in cell sides^2 / 2^20.
     pub(super) squares: u128,
-    /// Of distances, in cell sides / 2^20.
+    /// Sum of distances, in cell sides / 2^20.
     pub(super) distances: u128,
     /// The largest squared distance, in cell sides^2 / 2^20.
     pub(super) largest_square: u64,
@@ -55,7 +55,7 @@ impl DistortionSums {
         self.largest_square = self.largest_square.max(other.largest_square);
     }
 
-    /// What cannot be true of points in cells of the lattice.
+    /// Contradiction between these sums and points in cells of the lattice.
     pub(super) fn fault(&self, lattice: &Lattice) -> Option<String> {
         let points = u128::from(self.points);
         let reach = lattice.covering_radius_m() / lattice.cell_side_m();

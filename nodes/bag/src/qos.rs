@@ -1,4 +1,4 @@
-//! Quality of service as bags record it: integers up to metadata version 8, names from 9 on.
+//! Quality of service in bags: integers up to metadata version 8, names from 9 on.
 
 use serde::{Deserialize, Serialize};
 
@@ -8,13 +8,6 @@ macro_rules! policy {
         #[derive(Clone, Copy, PartialEq, Eq, Hash, Debug, Serialize, Deserialize)]
         #[serde(from = "Policy", into = "&'static str")]
         pub enum $name { $($(#[$vdoc])* $variant,)* }
-
-        impl $name {
-            /// The name in metadata version 9.
-            pub fn name(self) -> &'static str {
-                match self { $(Self::$variant => $text,)* }
-            }
-        }
 
         impl From<Policy> for $name {
             fn from(policy: Policy) -> Self {
@@ -27,7 +20,9 @@ macro_rules! policy {
         }
 
         impl From<$name> for &'static str {
-            fn from(policy: $name) -> Self { policy.name() }
+            fn from(policy: $name) -> Self {
+                match policy { $($name::$variant => $text,)* }
+            }
         }
     };
 }
@@ -41,9 +36,9 @@ enum Policy {
 }
 
 policy! {
-    /// How many samples a writer keeps.
+    /// Samples that a writer keeps.
     BagHistory {
-        /// Whatever the middleware does.
+        /// The middleware's choice.
         SystemDefault = 0 "system_default",
         /// The newest `depth`.
         KeepLast = 1 "keep_last",
@@ -55,9 +50,9 @@ policy! {
 }
 
 policy! {
-    /// Whether lost samples are sent again.
+    /// Repetition of lost samples.
     BagReliability {
-        /// Whatever the middleware does.
+        /// The middleware's choice.
         SystemDefault = 0 "system_default",
         /// Sent again.
         Reliable = 1 "reliable",
@@ -71,9 +66,9 @@ policy! {
 }
 
 policy! {
-    /// Whether late joiners get old samples.
+    /// Old samples for late joiners.
     BagDurability {
-        /// Whatever the middleware does.
+        /// The middleware's choice.
         SystemDefault = 0 "system_default",
         /// They do ("latched").
         TransientLocal = 1 "transient_local",
@@ -86,69 +81,18 @@ policy! {
     }
 }
 
-policy! {
-    /// How a writer shows that it is alive.
-    BagLiveliness {
-        /// Whatever the middleware does.
-        SystemDefault = 0 "system_default",
-        /// By the middleware.
-        Automatic = 1 "automatic",
-        /// By the node (deprecated).
-        ManualByNode = 2 "manual_by_node",
-        /// By each topic.
-        ManualByTopic = 3 "manual_by_topic",
-        /// Not known.
-        Unknown = 4 "unknown",
-        /// As the other side has it.
-        BestAvailable = 5 "best_available",
-    }
-}
-
-/// A duration of a policy; [`BagDuration::INFINITE`] where there is no bound.
-#[derive(Clone, Copy, PartialEq, Eq, Hash, Debug, Serialize, Deserialize)]
-pub struct BagDuration {
-    /// Whole seconds.
-    pub sec: u64,
-    /// Nanoseconds.
-    pub nsec: u64,
-}
-
-impl BagDuration {
-    /// No bound: 2^63 - 1 ns.
-    pub const INFINITE: BagDuration = BagDuration {
-        sec: 9_223_372_036,
-        nsec: 854_775_807,
-    };
-}
-
-impl Default for BagDuration {
-    fn default() -> Self {
-        Self::INFINITE
-    }
-}
-
 /// The quality of service that one recorded publisher offered.
 #[derive(Clone, PartialEq, Eq, Hash, Debug, Serialize, Deserialize)]
-#[serde(default)]
+#[serde(default, into = "WrittenQos")]
 pub struct BagQos {
-    /// How many samples are kept.
+    /// Samples that are kept.
     pub history: BagHistory,
     /// The number of samples kept under [`BagHistory::KeepLast`].
     pub depth: u64,
-    /// Whether lost samples are sent again.
+    /// Repetition of lost samples.
     pub reliability: BagReliability,
-    /// Whether late joiners get old samples.
+    /// Old samples for late joiners.
     pub durability: BagDurability,
-    /// Longest time between samples.
-    pub deadline: BagDuration,
-    /// How long a sample is valid.
-    pub lifespan: BagDuration,
-    /// How the writer shows that it is alive.
-    pub liveliness: BagLiveliness,
-    /// How often it must.
-    pub liveliness_lease_duration: BagDuration,
-    /// Whether the topic name carries no ROS prefix.
-    pub avoid_ros_namespace_conventions: bool,
 }
 
 impl Default for BagQos {
@@ -159,17 +103,54 @@ impl Default for BagQos {
             depth: 10,
             reliability: BagReliability::Reliable,
             durability: BagDurability::Volatile,
-            deadline: BagDuration::INFINITE,
-            lifespan: BagDuration::INFINITE,
-            liveliness: BagLiveliness::Automatic,
-            liveliness_lease_duration: BagDuration::INFINITE,
+        }
+    }
+}
+
+/// All policies as rosbag2 wants them; those that nothing here reads have no bound.
+#[derive(Serialize)]
+struct WrittenQos {
+    history: BagHistory,
+    depth: u64,
+    reliability: BagReliability,
+    durability: BagDurability,
+    deadline: WrittenDuration,
+    lifespan: WrittenDuration,
+    liveliness: &'static str,
+    liveliness_lease_duration: WrittenDuration,
+    avoid_ros_namespace_conventions: bool,
+}
+
+#[derive(Clone, Copy, Serialize)]
+struct WrittenDuration {
+    sec: u64,
+    nsec: u64,
+}
+
+/// No bound: 2^63 - 1 ns.
+const INFINITE: WrittenDuration = WrittenDuration {
+    sec: 9_223_372_036,
+    nsec: 854_775_807,
+};
+
+impl From<BagQos> for WrittenQos {
+    fn from(qos: BagQos) -> Self {
+        WrittenQos {
+            history: qos.history,
+            depth: qos.depth,
+            reliability: qos.reliability,
+            durability: qos.durability,
+            deadline: INFINITE,
+            lifespan: INFINITE,
+            liveliness: "automatic",
+            liveliness_lease_duration: INFINITE,
             avoid_ros_namespace_conventions: false,
         }
     }
 }
 
 impl BagQos {
-    /// Whether the publisher kept samples for late joiners.
+    /// True if the publisher kept samples for late joiners.
     pub fn is_latched(&self) -> bool {
         self.durability == BagDurability::TransientLocal
     }
@@ -191,17 +172,13 @@ mod tests {
 
     #[test]
     fn numbers_and_names_mean_the_same() {
-        let numbers = "- history: 1\n  depth: 7\n  reliability: 2\n  durability: 1\n  deadline: {sec: 0, nsec: 5}\n  \
-                       lifespan: {sec: 2147483647, nsec: 4294967295}\n  liveliness: 3\n";
-        let names = "- history: keep_last\n  depth: 7\n  reliability: best_effort\n  durability: TRANSIENT_LOCAL\n  \
-                     deadline: {sec: 0, nsec: 5}\n  lifespan: {sec: 2147483647, nsec: 4294967295}\n  \
-                     liveliness: manual_by_topic\n";
+        let numbers = "- history: 1\n  depth: 7\n  reliability: 2\n  durability: 1\n  deadline: {sec: 0, nsec: 5}\n";
+        let names = "- history: keep_last\n  depth: 7\n  reliability: best_effort\n  durability: TRANSIENT_LOCAL\n";
         let parsed = BagQos::parse_list(numbers).unwrap();
         assert_eq!(parsed, BagQos::parse_list(names).unwrap());
         assert_eq!(parsed[0].depth, 7);
         assert_eq!(parsed[0].reliability, BagReliability::BestEffort);
         assert!(parsed[0].is_latched());
-        assert_eq!(parsed[0].deadline, BagDuration { sec: 0, nsec: 5 });
     }
 
     #[test]

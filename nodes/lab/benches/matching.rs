@@ -1,6 +1,6 @@
 //! Matching: one pose of 2000 points against a list, and an alignment from start to end.
 //!
-//! `cargo bench -p lattice_core --bench matching`
+//! `cargo bench -p lattice_lab --bench matching`
 
 #![allow(clippy::expect_used)]
 
@@ -28,7 +28,7 @@ struct Pair {
 }
 
 fn pair(kind: LatticeKind) -> Pair {
-    let house = House::own(1).expect("the house stands");
+    let house = House::generated(1).expect("the house stands");
     let views = LaserView::pairs(&house, 1, &LaserOptions::default(), 1).expect("a pair is found");
     let [map, query] = &views[0];
     let cloud = |view: &LaserView, number| Cloud {

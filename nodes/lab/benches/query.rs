@@ -1,18 +1,17 @@
-//! Latency of single questions to a map of rooms: nearest cells, clearance of a point, a segment, a box
-//! and a box that moves, and a distance field.
+//! Latency of single questions to a map of rooms: nearest cells, clearance of a point and of a segment.
 //!
-//! `cargo bench -p lattice_core --bench query`; each call is one question, at places that take turns. How
-//! paths compare between lattices: `cargo run -p lattice_core --example paths`.
+//! `cargo bench -p lattice_lab --bench query`; each call is one question, at places that take turns. How
+//! paths compare between lattices: `cargo run -p lattice_lab --example paths`.
 
 #![allow(clippy::expect_used)]
 
 use divan::{Bencher, black_box};
 use lattice_core::cloud::Cloud;
 use lattice_core::lattice::{Lattice, LatticeKind};
-use lattice_core::query::{Bounds, OrientedBox, Query, Segment};
+use lattice_core::query::{Query, Segment};
 use lattice_core::voxels::{OccupancyList, VoxelStore};
 use lattice_lab::simulate::house::{House, LaserOptions, LaserView};
-use nalgebra::{Isometry3, Vector3};
+use nalgebra::Vector3;
 
 /// Side of the cells, metres.
 const SIDE_M: f64 = 0.1;
@@ -26,7 +25,7 @@ fn main() {
 
 /// A laser's scan as a map, and places around the laser, always the same.
 fn rooms(kind: LatticeKind) -> (OccupancyList, Vec<Vector3<f64>>) {
-    let house = House::own(1).expect("the house stands");
+    let house = House::generated(1).expect("the house stands");
     let views = LaserView::pairs(&house, 1, &LaserOptions::default(), 1).expect("a pair is found");
     let [view, _] = &views[0];
     let cloud = Cloud {
@@ -82,45 +81,5 @@ fn clearance_of_a_segment_of_1_m(bencher: Bencher, kind: LatticeKind) {
         };
         let found = query.clearance(&segment, MAX_M).ok().flatten();
         found.map_or(MAX_M, |clearance| clearance.distance_m)
-    });
-}
-
-#[divan::bench(args = KINDS)]
-fn clearance_of_a_box(bencher: Bencher, kind: LatticeKind) {
-    each(bencher, kind, |query, place| {
-        let body = OrientedBox {
-            pose: Isometry3::new(*place, Vector3::z() * 0.7),
-            half_extents_m: Vector3::new(0.4, 0.3, 0.2),
-        };
-        let found = query.clearance(&body, MAX_M).ok().flatten();
-        found.map_or(MAX_M, |clearance| clearance.distance_m)
-    });
-}
-
-#[divan::bench(args = KINDS, sample_count = 20)]
-fn clearance_of_a_box_that_moves(bencher: Bencher, kind: LatticeKind) {
-    each(bencher, kind, |query, place| {
-        let poses = [
-            Isometry3::new(*place, Vector3::zeros()),
-            Isometry3::new(place + Vector3::x(), Vector3::z() * 0.7),
-        ];
-        let half_extents_m = Vector3::new(0.4, 0.3, 0.2);
-        let found = query.swept_box_clearance(&half_extents_m, &poses, MAX_M);
-        found.ok().flatten().map_or(MAX_M, |c| c.distance_m)
-    });
-}
-
-#[divan::bench(args = KINDS, sample_count = 20)]
-fn distance_field_of_a_cubic_metre(bencher: Bencher, kind: LatticeKind) {
-    each(bencher, kind, |query, place| {
-        let half = Vector3::repeat(0.5);
-        let bounds = Bounds {
-            min_m: place - half,
-            max_m: place + half,
-        };
-        let field = query.distance_field(&bounds, MAX_M, 10_000);
-        field.map_or(0.0, |field| {
-            field.distance_m.iter().copied().fold(0.0, f64::max)
-        })
     });
 }

@@ -4,7 +4,6 @@ use std::sync::Arc;
 use std::sync::atomic::{AtomicBool, Ordering};
 use std::time::Duration;
 
-use lattice_msgs::cdr;
 use lattice_msgs::lattice::{LatticeMap, LatticeMapUpdate};
 use lattice_msgs::std_msgs::Empty;
 use lattice_msgs::visualization_msgs::MarkerArray;
@@ -55,7 +54,6 @@ pub fn start(runtime: &Runtime, name: &str) -> Result<Finish, NodeError> {
         requests: Throttle::new(Duration::from_secs(1)),
         seconds: Throttle::new(Duration::from_secs(1)),
         budget_bytes: (bytes_per_s as f64 / rate_hz) as usize,
-        published_bytes: 0,
         not_published: 0,
         incomplete: false,
         repairs: Throttle::new(Duration::from_secs(5)),
@@ -109,7 +107,6 @@ struct Shell {
     requests: Throttle,
     seconds: Throttle,
     budget_bytes: usize,
-    published_bytes: u64,
     not_published: u64,
     incomplete: bool,
     repairs: Throttle,
@@ -168,7 +165,6 @@ impl Shell {
             return;
         }
         for array in self.machine.take_arrays(self.budget_bytes) {
-            self.published_bytes += cdr::to_vec(&array).map_or(0, |bytes| bytes.len() as u64);
             if self.markers.publish(Arc::new(array)).is_err() {
                 self.not_published += 1;
                 self.incomplete = true;
@@ -211,7 +207,7 @@ impl Shell {
             counts,
             voxels: self.machine.voxels(),
             marker_bytes: self.machine.take_bytes(),
-            published_bytes: self.published_bytes,
+            published_bytes: self.markers.sent_bytes(),
             arrays_not_published: self.not_published,
         };
         if let Err(error) = report::write(&self.report_file, &report) {

@@ -253,6 +253,7 @@ fn a_late_joiner_hears_what_was_latched() {
     let publisher = from.publisher::<RosString>("origin", Qos::LATCHED).unwrap();
     publisher.publish(text("here")).unwrap();
     assert!(publisher.flush(PATIENCE));
+    assert_eq!(publisher.sent(), 0, "serialised for nobody");
     for (runtime, name) in [(&a, "same_process"), (&b, "b")] {
         let node = runtime.node(name).unwrap();
         let (_subscription, heard) = hear::<RosString>(&node, "origin", Qos::LATCHED, Load::Small);
@@ -376,6 +377,47 @@ fn undecodable_and_long_samples_are_counted_and_the_next_arrives() {
             "{topic}"
         );
     }
+}
+
+#[test]
+fn a_message_is_decoded_by_who_works_on_it() {
+    let domain = TestDomain::take();
+    let (a, b) = (runtime(&domain, "a"), runtime(&domain, "b"));
+    let (from, to) = (a.node("a").unwrap(), b.node("b").unwrap());
+    let (qos, (sender, heard)) = (Qos::DEFAULT, channel());
+    let subscription = to
+        .subscribe_undecoded::<RosString>("chatter", qos, Load::Small, move |message| {
+            let _ = sender.send(message);
+        })
+        .unwrap();
+    let next = || heard.recv_timeout(PATIENCE).unwrap();
+    let there = from
+        .raw_publisher("/chatter", RosString::TYPE, qos)
+        .unwrap();
+    wait_for_match!(there, subscription);
+    let good = cdr::to_vec(&text("outside")).unwrap();
+    let length = good.len();
+    there
+        .publish_blocking(vec![0, 1, 0, 0, 9, 0, 0, 0])
+        .unwrap();
+    there.publish_blocking(good).unwrap();
+    let (bad, good) = (next(), next());
+    assert_eq!(
+        (subscription.received(), subscription.undecodable()),
+        (0, 0)
+    );
+    assert!(bad.decode().is_none());
+    assert_eq!(good.bytes(|_| 0), length);
+    assert_eq!(good.decode().unwrap().data, "outside");
+    let here = to.publisher::<RosString>("chatter", qos).unwrap();
+    here.publish(text("here")).unwrap();
+    let shared = next();
+    assert_eq!(shared.bytes(|message| message.data.len()), 4);
+    assert_eq!(shared.decode().unwrap().data, "here");
+    assert_eq!(
+        (subscription.received(), subscription.undecodable()),
+        (2, 1)
+    );
 }
 
 #[test]
@@ -525,6 +567,30 @@ fn shutdown_stops_timers_sends_what_is_queued_and_leaves_at_once() {
     ));
     let late = from.publisher::<RosString>("late", Qos::DEFAULT);
     assert!(matches!(late, Err(RuntimeError::Closed { .. })));
+}
+
+#[test]
+fn the_last_messages_of_the_process_reach_their_handlers() {
+    let domain = TestDomain::take();
+    for load in [Load::Small, Load::Large] {
+        let runtime = runtime(&domain, "a");
+        let node = runtime.node("a").unwrap();
+        let publisher = node.publisher::<RosString>("last", Qos::DEFAULT).unwrap();
+        let (shutdown, (sender, heard)) = (runtime.shutdown_handle(), channel());
+        let _subscription = node
+            .subscribe::<RosString>("last", Qos::DEFAULT, load, move |message| {
+                // The end begins while all but the first wait.
+                shutdown.wait();
+                let _ = sender.send(message);
+            })
+            .unwrap();
+        for i in 0..100 {
+            publisher.publish(text(&i.to_string())).unwrap();
+        }
+        runtime.shutdown_handle().request();
+        runtime.spin().unwrap();
+        assert_eq!(heard.try_iter().count(), 100, "{load:?}");
+    }
 }
 
 #[test]

@@ -8,7 +8,7 @@ use super::root;
 use super::source::{code, files, module};
 
 /// Modules of crates in layers: each may use those before it in the list.
-const LAYERS: [(&str, &[&str]); 2] = [
+const LAYERS: [(&str, &[&str]); 3] = [
     (
         "lattice_core/src",
         &[
@@ -40,6 +40,43 @@ const LAYERS: [(&str, &[&str]); 2] = [
             "replay",
             "executables",
             "bag_player",
+        ],
+    ),
+    (
+        "nodes/runtime/src",
+        &[
+            "sync",
+            "names",
+            "param_value",
+            "params_file",
+            "ros_args",
+            "params",
+            "env",
+            "logging",
+            "qos",
+            "error",
+            "shutdown",
+            "task_thread",
+            "clock",
+            "diagnostics",
+            "loopback_domain",
+            "port",
+            "dds",
+            "peers",
+            "endpoints",
+            "outbox",
+            "graph",
+            "local_bus",
+            "publisher",
+            "subscription",
+            "service",
+            "rosout",
+            "shared",
+            "node",
+            "param_services",
+            "action",
+            "tf",
+            "process",
         ],
     ),
 ];

@@ -120,7 +120,7 @@ impl TransformBuffer {
     /// `target_from_source` at a time, by way of the nearest common ancestor; exact at the
     /// samples of a moving frame, linear and slerp between them, nothing outside of them.
     ///
-    /// Of several misses the one is told that no waiting can heal.
+    /// Of several misses the one is reported that no waiting can heal.
     pub fn lookup(
         &self,
         target: &str,

@@ -1,4 +1,4 @@
-//! What a source point scores where it falls in the map.
+//! Score of a source point at a place in the map.
 
 use nalgebra::{Point3, Vector3};
 
@@ -19,7 +19,7 @@ pub(super) struct Field {
 /// Ranges of azimuth (modulo half a turn) of upright surfaces.
 const AZIMUTHS: usize = 8;
 
-/// How a point's surface lies.
+/// Direction of the surface at a point.
 #[derive(Clone, Copy, Debug)]
 pub(super) enum Facing {
     Level,

@@ -1,11 +1,11 @@
-//! What a map file holds, in order of the keys.
+//! Contents of a map file, in the order of the keys.
 
 use nalgebra::Vector3;
 use thiserror::Error;
 
 use crate::lattice::{Lattice, MortonKey};
-use crate::voxels::columns::Columns;
 use crate::voxels::distortion::DistortionSums;
+use crate::voxels::store::payload_columns::Columns;
 use crate::voxels::{Distortion, OccupancyList, Payload, Voxel, VoxelList, VoxelStore};
 
 /// Parts that do not make a map.
@@ -132,7 +132,7 @@ impl MapContents {
         self.voxels.as_deref()
     }
 
-    /// Which further columns there are.
+    /// The further columns that are there.
     pub fn payload(&self) -> Payload {
         self.columns.payload()
     }

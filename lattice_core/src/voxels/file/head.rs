@@ -19,10 +19,10 @@ pub(super) const SECTION_HEAD_BYTES: usize = 48;
 const VOLUME_AT: u64 = 24;
 const ORIENTATION_AT: u64 = 32;
 const GENERATOR_AT: u64 = 64;
-/// How far the squared length of a quaternion may be from 1.
+/// Largest deviation of the squared length of a quaternion from 1.
 const UNIT_SLACK: f64 = 1e-6;
 
-/// What a map is of, and how many sections follow.
+/// Head of a map file: lattice, datum, counts.
 pub(super) struct Head {
     pub(super) lattice: Lattice,
     pub(super) datum_index: [i64; 3],
@@ -98,7 +98,7 @@ fn orientation(lattice: &Lattice) -> [f64; 4] {
     [q.w, q.i, q.j, q.k]
 }
 
-/// What is wrong with a rotation.
+/// Error in a rotation.
 pub(super) fn orientation_fault(map_from_lattice: &UnitQuaternion<f64>) -> Option<String> {
     let square = map_from_lattice.coords.norm_squared();
     // Not a number is refused too.
@@ -148,7 +148,7 @@ fn lattice(
     Ok(lattice)
 }
 
-/// How the values of a section are coded.
+/// Encoding of the values of a section.
 #[derive(Clone, Copy, PartialEq, Eq, Debug)]
 #[repr(u8)]
 pub(super) enum Encoding {
@@ -164,7 +164,7 @@ pub(super) enum Encoding {
     Rows = 4,
 }
 
-/// How the bytes of a section are packed.
+/// Compression of the bytes of a section.
 #[derive(Clone, Copy, PartialEq, Eq, Debug)]
 #[repr(u8)]
 pub(super) enum Codec {

@@ -1,8 +1,8 @@
-//! Writing.
+//! Writing a map: head, sections, end.
 
 use std::io::Write;
 
-use super::columns::{encode_labels, encode_moments, encode_stamps};
+use super::column_values::{encode_labels, encode_moments, encode_stamps};
 use super::head::{
     COUNT, Codec, Column, END_TAG, Head, KEYS, LABELS, MOMENTS, OFFSET_SUM, STAMPS, SectionHead,
     orientation_fault,

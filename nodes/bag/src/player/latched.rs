@@ -7,10 +7,10 @@ use crate::{BagError, BagHistory, BagMessage, BagQos, BagReader, ReadOptions};
 
 /// Messages kept of one topic.
 const MAX_PER_TOPIC: u64 = 1000;
-/// All that is kept, bytes; beyond it the oldest go, but for the last one of each topic.
+/// Size of all kept messages, bytes; beyond it the oldest go, but for the last one of each topic.
 const MAX_BYTES: usize = 256 << 20;
 
-/// How many of the last messages of a topic its publishers kept together.
+/// Number of the last messages of a topic that its publishers kept together.
 fn kept(profiles: &[BagQos]) -> usize {
     let depth = |qos: &BagQos| match qos.history {
         BagHistory::KeepAll => MAX_PER_TOPIC,

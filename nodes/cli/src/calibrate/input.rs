@@ -1,4 +1,4 @@
-//! What `lattice calibrate` is given.
+//! Inputs of `lattice calibrate`: clouds, guesses, learned confusions.
 
 use std::error::Error;
 use std::fs;
@@ -16,7 +16,7 @@ use lattice_nodes::files::semantic::read_semantic;
 const MIN_CELL_M: f64 = 0.05;
 /// Sides of cells on the diagonal of a map that is a point file.
 const CELLS_A_DIAGONAL: f64 = 400.0;
-/// Longest file of what was learned, bytes.
+/// Longest file of a learned confusion, bytes.
 const MAX_CONFUSION_BYTES: u64 = 1 << 20;
 
 type Fault = Box<dyn Error + Send + Sync>;
@@ -123,7 +123,7 @@ pub fn headset_scans(
     paths.iter().map(headset_scan).collect()
 }
 
-/// What was learned before, if there is a file.
+/// The confusion that earlier calibrations learned, if there is a file.
 pub fn confusion(path: &Path) -> Result<Option<Confusion>, Fault> {
     let here = |e: &dyn std::fmt::Display| format!("{}: {e}", path.display());
     let bytes = match fs::metadata(path) {
@@ -141,7 +141,7 @@ pub fn confusion(path: &Path) -> Result<Option<Confusion>, Fault> {
     }
 }
 
-/// Writes what was learned; readers see the whole file or what was there before.
+/// Writes the learned confusion; readers see the whole file or the one before.
 pub fn keep_confusion(path: &Path, confusion: &Confusion) -> Result<(), Fault> {
     let folder = path
         .parent()

@@ -24,7 +24,7 @@ pub enum Map {
     Export(export::Export),
     /// One map of the voxels of several with the same cells; of one, to write it in another form
     Merge(combine::Merge),
-    /// How many voxels are in one map, in the other, in both; writes those only in the first
+    /// Numbers of voxels in one map, in the other, in both; writes those only in the first
     Diff(combine::Diff),
     /// The voxels with their centre in a box
     Crop(combine::Crop),

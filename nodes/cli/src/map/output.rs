@@ -23,7 +23,7 @@ pub struct Form {
     pub occupancy_only: bool,
 }
 
-/// What was written.
+/// Size of a map file that was written.
 #[derive(Serialize)]
 pub struct Written {
     voxels: usize,
@@ -33,7 +33,7 @@ pub struct Written {
 }
 
 impl Form {
-    /// Writes a map; readers see the whole file or what was there before.
+    /// Writes a map; readers see the whole file or the one before.
     pub fn write(
         &self,
         map: &MapContents,
@@ -77,7 +77,7 @@ impl Form {
 }
 
 impl Written {
-    /// Shows what was written, as JSON if so wanted.
+    /// Prints the size, as JSON on request.
     pub fn print(&self, json: bool) -> Result<(), serde_json::Error> {
         if json {
             println!("{}", serde_json::to_string_pretty(self)?);

@@ -1,4 +1,4 @@
-//! `lattice replay`: a log becomes maps.
+//! `lattice replay`: maps of a log.
 
 mod node_process;
 mod processes;
@@ -42,7 +42,7 @@ pub struct Replay {
     /// Volume of one cell in m^3; of the parameters if not given (0.125)
     #[arg(long)]
     pub cell_volume: Option<f64>,
-    /// How the cells lie: paper, ground (flattest), or a crystal direction that points up, as
+    /// Orientation of the cells: paper, ground (flattest), or a crystal direction that points up, as
     /// 110-up; of the parameters if not given (paper)
     #[arg(long)]
     pub orientation: Option<Orientation>,
@@ -88,7 +88,7 @@ impl Replay {
         Ok(())
     }
 
-    /// Runs the replay and returns what came of it.
+    /// Runs the replay and returns its report.
     pub fn replay(&self) -> Result<RunReport, Box<dyn std::error::Error + Send + Sync>> {
         if self.direct {
             return self.replay_direct();

@@ -10,7 +10,7 @@ use super::{Report, timed};
 /// Points of one task.
 const CHUNK: usize = 1 << 14;
 
-/// How points become keys.
+/// Way to quantize points.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum QuantizeMethod {
     /// The batch quantizer with the best instructions of this machine.
