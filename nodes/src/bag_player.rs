@@ -22,7 +22,7 @@ pub const NAME: &str = "bag_player";
 
 /// Time that what is queued at the end has to reach its readers.
 const FLUSH_TIME: Duration = Duration::from_secs(20);
-/// The same when told to end.
+/// The same after a signal.
 const HURRIED_FLUSH_TIME: Duration = Duration::from_secs(2);
 /// Longest sleep between two looks at the shutdown flag.
 const NAP: Duration = Duration::from_millis(100);
@@ -38,11 +38,11 @@ pub struct PlayerReport {
     pub failed: u64,
     /// Latest that a message was after its time, in ms.
     pub latest_ms: u64,
-    /// Whether all reliable readers acknowledged everything in time.
+    /// True if all reliable readers acknowledged everything in time.
     pub acknowledged: bool,
 }
 
-/// Plays the log that the parameters name and returns at its end or when told to stop.
+/// Plays the log that the parameters name and returns at its end or after a signal.
 pub fn run(arguments: impl IntoIterator<Item = String>) -> Result<(), NodeError> {
     let args = RosArgs::parse(arguments)?;
     if answers_help(NAME, &args) {
@@ -89,13 +89,8 @@ pub fn run(arguments: impl IntoIterator<Item = String>) -> Result<(), NodeError>
 
 /// A time of up to a day.
 fn seconds(params: &Params, name: &str, default: f64) -> Result<Duration, NodeError> {
-    let seconds = params.f64(name, default)?;
-    if (0.0..=86_400.0).contains(&seconds) {
-        Ok(Duration::from_secs_f64(seconds))
-    } else {
-        let problem = format!("{seconds}, expected 0 to 86400 s");
-        Err(params.invalid(name, problem).into())
-    }
+    let seconds = params.f64_in(name, default, 0.0..=86_400.0)?;
+    Ok(Duration::from_secs_f64(seconds))
 }
 
 fn options(params: &Params) -> Result<PlayerOptions, NodeError> {

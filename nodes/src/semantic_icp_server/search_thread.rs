@@ -1,4 +1,4 @@
-//! The thread that searches, and the way back of what it finds.
+//! Thread that searches, and the way back of what it finds.
 
 use std::io;
 use std::sync::{Arc, Mutex, MutexGuard, PoisonError};
@@ -9,7 +9,7 @@ use super::search::{Done, Job, Search};
 use crate::compute::{Compute, ComputeLimits, Inbox};
 use lattice_runtime::Shutdown;
 
-/// What the searching thread has to tell.
+/// News of the searching thread.
 #[derive(Default)]
 struct News {
     progress: Option<(u64, Stage, f64)>,
@@ -17,13 +17,13 @@ struct News {
 }
 
 /// Searches on a thread of its own, one job after another.
-pub(super) struct Worker {
+pub(super) struct SearchThread {
     compute: Compute<Option<Job>>,
     news: Arc<Mutex<News>>,
 }
 
-/// Takes jobs for a [`Worker`], and has what became of them.
-pub(super) struct WorkerPort {
+/// Takes jobs for a [`SearchThread`], and has what became of them.
+pub(super) struct SearchPort {
     inbox: Inbox<Option<Job>>,
     news: Arc<Mutex<News>>,
 }
@@ -32,9 +32,9 @@ fn lock<T>(mutex: &Mutex<T>) -> MutexGuard<'_, T> {
     mutex.lock().unwrap_or_else(PoisonError::into_inner)
 }
 
-impl Worker {
+impl SearchThread {
     /// Starts the thread with a pool of `threads`; `wake` is called on it whenever there is news, and
-    /// may fail to be heard: what is told stays until it is taken.
+    /// may fail to be heard: news stay until they are taken.
     pub fn spawn(
         name: &str,
         threads: usize,
@@ -43,7 +43,7 @@ impl Worker {
         wake: impl Fn() + Send + Sync + 'static,
     ) -> io::Result<Self> {
         let news = Arc::<Mutex<News>>::default();
-        let told = Arc::clone(&news);
+        let results = Arc::clone(&news);
         let limits = ComputeLimits {
             events: 2,
             bytes: 0,
@@ -54,20 +54,20 @@ impl Worker {
                 return;
             };
             let id = job.id;
-            let tell = |stage, fraction| {
-                lock(&told).progress = Some((id, stage, fraction));
+            let on_progress = |stage, fraction| {
+                lock(&results).progress = Some((id, stage, fraction));
                 wake();
             };
-            let done = job.run(&mut search, tell);
-            lock(&told).done.push((id, done));
+            let done = job.run(&mut search, on_progress);
+            lock(&results).done.push((id, done));
             wake();
         })?;
         Ok(Self { compute, news })
     }
 
-    /// Where jobs are handed in.
-    pub fn port(&self) -> WorkerPort {
-        WorkerPort {
+    /// Port at which jobs are handed in.
+    pub fn port(&self) -> SearchPort {
+        SearchPort {
             inbox: self.compute.inbox(),
             news: Arc::clone(&self.news),
         }
@@ -79,18 +79,18 @@ impl Worker {
     }
 }
 
-impl WorkerPort {
+impl SearchPort {
     /// Hands in a job. False: the thread has ended, or has two already.
     pub fn begin(&self, job: Job) -> bool {
         self.inbox.send(Some(job), 0)
     }
 
-    /// How far the job at work is, if that is news.
+    /// Progress of the running job, if that is news.
     pub fn take_progress(&self) -> Option<(u64, Stage, f64)> {
         lock(&self.news).progress.take()
     }
 
-    /// What has ended since the last call.
+    /// Jobs that have ended since the last call.
     pub fn take_done(&self) -> Vec<(u64, Done)> {
         std::mem::take(&mut lock(&self.news).done)
     }

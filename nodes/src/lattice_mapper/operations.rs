@@ -1,4 +1,4 @@
-//! What the services do with the map.
+//! Operations that services ask for: load, clear a box, query.
 
 use std::sync::Arc;
 
@@ -12,7 +12,7 @@ use thiserror::Error;
 
 use super::LatticeMapper;
 
-/// Why a map was not loaded. The mapper's is as it was before.
+/// Reason for which a map was not loaded. The mapper's is as it was before.
 #[derive(Debug, Error)]
 pub enum LoadRefusal {
     /// Of other cells than those of the parameters.
@@ -28,7 +28,7 @@ pub enum LoadRefusal {
     /// A cell is too far from the mapper's datum.
     #[error(transparent)]
     Datum(#[from] OperationError),
-    /// Old voxels are to be forgotten, but nobody knows how old these are.
+    /// Old voxels are to be forgotten, but these have no stamps.
     #[error("the file has no stamps, which `forget_after_s` needs: save it where that is set")]
     Stamps,
     /// More voxels than the mapper may keep.
@@ -36,10 +36,10 @@ pub enum LoadRefusal {
     TooMany {
         /// Voxels of the file.
         voxels: usize,
-        /// What the parameters allow.
+        /// Limit of the parameters.
         max_voxels: usize,
     },
-    /// What does not go together for another reason.
+    /// Lists that cannot be merged for another reason.
     #[error(transparent)]
     Merge(#[from] MergeError),
 }

@@ -1,15 +1,15 @@
-//! What comes of a job.
+//! Results of searches and of tracking.
 
 use super::*;
 
-/// Poses that differ by less are told as one, m and rad.
+/// Poses that differ by less are published as one, m and rad.
 const SAME_POSE: (f64, f64) = (0.005, 0.002);
 /// Poses that differ by more are of another origin, m and rad.
 const MOVED: (f64, f64) = (0.3, 0.1);
 /// After a doubt that was not confirmed there is none for this time, ns.
 const DOUBT_AGAIN_NS: i64 = 10_000_000_000;
-/// A tracked pose is told again after this time though nothing has changed, ns.
-const TELL_AGAIN_NS: i64 = 5_000_000_000;
+/// A tracked pose is published again after this time though nothing has changed, ns.
+const PUBLISH_AGAIN_NS: i64 = 5_000_000_000;
 
 impl SemanticIcpServer {
     /// A search has ended.
@@ -90,7 +90,7 @@ impl SemanticIcpServer {
             };
             out.push(answer(caller.call, end, result.clone()));
         }
-        self.tell(result, now_ns, out);
+        self.publish(result, now_ns, out);
     }
 
     fn missed(&mut self) {
@@ -118,7 +118,7 @@ impl SemanticIcpServer {
         if let Some(caller) = running.caller {
             out.push(answer(caller.call, End::Failed, result.clone()));
         }
-        self.tell(result, now_ns, out);
+        self.publish(result, now_ns, out);
     }
 
     /// The known pose was refined, or did not fit.
@@ -177,16 +177,17 @@ impl SemanticIcpServer {
         for headset_scan in &running.headset_scans {
             (self.headset_scans).push(Arc::clone(headset_scan), running.stamp_ns, now_ns);
         }
-        let told = geometry::isometry_from_transform(&self.last.transform);
-        let same = told.is_some_and(|told| is_near(&told, &update.map_from_headset, SAME_POSE));
-        let recent = now_ns.saturating_sub(self.last_told_ns) < TELL_AGAIN_NS;
+        let published = geometry::isometry_from_transform(&self.last.transform);
+        let same =
+            published.is_some_and(|last| is_near(&last, &update.map_from_headset, SAME_POSE));
+        let recent = now_ns.saturating_sub(self.published_ns) < PUBLISH_AGAIN_NS;
         if !(same && recent && self.last.verdict == CalibrationResult::OK) {
-            self.tell(result, now_ns, out);
+            self.publish(result, now_ns, out);
         }
     }
 }
 
-/// Whether two poses differ by less than a distance (m) and an angle (rad).
+/// True if two poses differ by less than a distance (m) and an angle (rad).
 fn is_near(a: &Isometry3<f64>, b: &Isometry3<f64>, (distance_m, angle_rad): (f64, f64)) -> bool {
     let moved = a.inverse() * b;
     moved.translation.vector.norm() < distance_m && moved.rotation.angle() < angle_rad
