@@ -18,6 +18,11 @@ pub struct ClearOptions {
     /// The last part of each ray that removes nothing, metres: rays that graze a surface pass
     /// through the voxels before the one that they end in.
     pub keep_m: f64,
+    /// The same as a fraction of the ray, 0 to 1: ground seen at a flat angle from a height is passed
+    /// over, within its own cells, on a part of the way that grows with the distance.
+    pub keep_ratio: f64,
+    /// Whether voxels that touch a cell which the scan hit are spared.
+    pub spare_touching: bool,
     /// Rays are followed to this range, metres.
     pub max_range_m: f64,
     /// Most memory for the marks of a scan, bytes; cells beyond it are not cleared.
@@ -29,6 +34,8 @@ impl Default for ClearOptions {
         ClearOptions {
             misses: 1,
             keep_m: 0.0,
+            keep_ratio: 0.0,
+            spare_touching: true,
             max_range_m: f64::INFINITY,
             max_bytes: 1 << 28,
         }
@@ -51,8 +58,9 @@ pub struct ClearReport {
 /// Removes from a store what rays pass through, for scenes in which things move.
 ///
 /// A voxel is passed through if a ray to the lattice point of a cell with a point crosses it more
-/// than `keep_m` before that end. Voxels that the scan hits, and those that touch one in at least a
-/// vertex, are safe from it: a surface seen at a flat angle does not clear itself.
+/// than `keep_m` before that end. Voxels that the scan hits and, with `spare_touching`, those that
+/// touch one in at least a vertex are safe from it: a surface seen at a flat angle does not clear
+/// itself.
 #[derive(Clone, Debug)]
 pub struct RayClearer {
     traversal: Traversal,
@@ -86,7 +94,8 @@ impl RayClearer {
         }
         let reach = Reach {
             max_range_m: self.options.max_range_m,
-            keep_m: self.options.keep_m.max(0.0),
+            keep_m: self.options.keep_m,
+            keep_ratio: self.options.keep_ratio,
         };
         let datum_m = store.datum_m();
         report.scan = scan::mark(&self.traversal, &mut self.masks, &datum_m, scan, reach);
@@ -99,7 +108,7 @@ impl RayClearer {
                     let Some(key) = cell.key().filter(|key| store.contains(*key)) else {
                         return;
                     };
-                    if self.touches_hit(cell) {
+                    if self.options.spare_touching && self.touches_hit(cell) {
                         report.kept += 1;
                     } else {
                         keys.push(key);

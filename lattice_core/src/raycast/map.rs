@@ -125,7 +125,8 @@ impl FreeSpaceMap {
             scan,
             Reach {
                 max_range_m: self.options.max_range_m,
-                keep_m: 0.0,
+                keep_m: self.options.keep_m,
+                keep_ratio: self.options.keep_ratio,
             },
         );
         let missed = |(_, passed, hit): (u64, &Mask, &Mask)| {

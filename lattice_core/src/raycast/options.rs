@@ -19,6 +19,11 @@ pub struct FreeSpaceOptions {
     /// Rays of points that are farther than this are followed to this range, metres, and give no
     /// hit; infinite for no limit.
     pub max_range_m: f64,
+    /// The last part of each ray that gives no miss, metres, and as a fraction of the ray: rays that
+    /// graze a surface pass through its cells.
+    pub keep_m: f64,
+    /// See `keep_m`; the longer of the two counts.
+    pub keep_ratio: f64,
     /// Free cells are kept in cells `2^free_level` as wide, at most [`MAX_FREE_LEVEL`]; `None`: only
     /// cells that were hit are kept.
     pub free_level: Option<u32>,
@@ -32,6 +37,8 @@ impl Default for FreeSpaceOptions {
         FreeSpaceOptions {
             evidence: Evidence::default(),
             max_range_m: f64::INFINITY,
+            keep_m: 0.0,
+            keep_ratio: 0.0,
             free_level: Some(0),
             max_bytes: 1 << 30,
         }

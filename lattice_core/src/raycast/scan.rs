@@ -52,8 +52,10 @@ pub struct ScanReport {
 pub(super) struct Reach {
     /// Points beyond this give no hit, and their rays end here.
     pub(super) max_range_m: f64,
-    /// The last part of each ray, which passes through nothing.
+    /// The last part of each ray, which passes through nothing: at least this,
     pub(super) keep_m: f64,
+    /// and at least this fraction of the ray.
+    pub(super) keep_ratio: f64,
 }
 
 /// Where rays end. Each cell comes once.
@@ -231,11 +233,12 @@ impl Rays<'_> {
         let mut rays = ends.filter_map(|end| {
             let mut ray = lattice.center(end.unpack()) - self.origin_m;
             let length = ray.norm();
-            if self.reach.keep_m > 0.0 {
-                if length <= self.reach.keep_m {
+            let keep_m = self.reach.keep_m.max(self.reach.keep_ratio * length);
+            if keep_m > 0.0 {
+                if length <= keep_m {
                     return None;
                 }
-                ray *= 1.0 - self.reach.keep_m / length;
+                ray *= 1.0 - keep_m / length;
             }
             Some(Ray {
                 walk: families.walk(&origin, &ray),

@@ -25,7 +25,7 @@ pub struct MappedFreeSpace {
     pub method: FreeSpaceMethod,
     /// Clouds of this long are one scan, ns; 0: each is one.
     pub sweep_ns: i64,
-    /// Range, misses and memory; evidence uses range and memory.
+    /// Range, kept ends, misses and memory; evidence uses all but the misses.
     pub clear: ClearOptions,
     /// Hits and misses that make a cell occupied or free.
     pub evidence: Evidence,
@@ -66,6 +66,13 @@ impl MappedFreeSpace {
         let clear = ClearOptions {
             misses,
             keep_m: within(params, "rays.keep_m", defaults.clear.keep_m, [0.0, 1e6])?,
+            keep_ratio: within(
+                params,
+                "rays.keep_ratio",
+                defaults.clear.keep_ratio,
+                [0.0, 1.0],
+            )?,
+            spare_touching: params.bool("rays.spare_touching", defaults.clear.spare_touching)?,
             max_range_m: if max_range_m > 0.0 {
                 max_range_m
             } else {

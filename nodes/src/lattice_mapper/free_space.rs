@@ -57,6 +57,8 @@ impl FreeSpace {
                 let options = FreeSpaceOptions {
                     evidence: options.evidence,
                     max_range_m: options.clear.max_range_m,
+                    keep_m: options.clear.keep_m,
+                    keep_ratio: options.clear.keep_ratio,
                     free_level: Some(options.free_level).filter(|level| *level > 0),
                     max_bytes: options.clear.max_bytes,
                 };

@@ -30,6 +30,10 @@ fn list(kind: LatticeKind, points: &[[f32; 3]]) -> VoxelList {
     list
 }
 
+fn bundle(origin_m: Vector3<f64>, ends: &Cloud) -> RayBundle<'_> {
+    RayBundle { origin_m, ends }
+}
+
 /// Clears along the rays of one scan.
 fn clear_rays(
     store: &mut VoxelList,
@@ -42,7 +46,7 @@ fn clear_rays(
         ..ClearOptions::default()
     };
     let mut clearer = RayClearer::new(&store.lattice().clone(), options);
-    clearer.clear(store, &[RayBundle { origin_m, ends }])
+    clearer.clear(store, &[bundle(origin_m, ends)])
 }
 
 fn any_points(n: usize) -> impl Strategy<Value = Vec<[f32; 3]>> {
@@ -112,7 +116,7 @@ fn ground_at_a_flat_angle_does_not_clear_itself() {
         let mut clearer = RayClearer::new(&store.lattice().clone(), options);
         for scan in 1..=3 {
             let (origin_m, ends) = (at([0.0, 0.0, 1.5]), &cloud(ground.clone()));
-            let report = clearer.clear(&mut store, &[RayBundle { origin_m, ends }]);
+            let report = clearer.clear(&mut store, &[bundle(origin_m, ends)]);
             assert!(report.missed > 0, "{kind}");
             assert_eq!(report.removed.is_empty(), scan < 3, "{kind}");
         }
@@ -140,9 +144,6 @@ fn a_hit_between_starts_the_count_of_misses_anew() {
         ..ClearOptions::default()
     };
     let mut clearer = RayClearer::new(&store.lattice().clone(), options);
-    fn bundle(origin_m: Vector3<f64>, ends: &Cloud) -> RayBundle<'_> {
-        RayBundle { origin_m, ends }
-    }
     let mut clear = |scan: &Cloud| clearer.clear(&mut store, &[bundle(origin, scan)]);
     assert_eq!((clear(&ahead).missed, clear(&cloud(near)).missed), (1, 0));
     assert!(clear(&ahead).removed.is_empty());
