@@ -1,18 +1,16 @@
 //! Removing voxels that rays pass through.
 
-use nalgebra::Vector3;
 use rustc_hash::FxHashMap;
 
 use super::blocks::each_bit;
 use super::masks::ScanMasks;
 use super::packed::{Packed, difference};
-use super::scan::{self, Reach, ScanReport};
+use super::scan::{self, RayBundle, Reach, ScanReport};
 use super::traversal::Traversal;
-use crate::cloud::Cloud;
 use crate::lattice::{Lattice, LatticeIndex, MortonKey};
 use crate::voxels::VoxelStore;
 
-/// When voxels are removed.
+/// Conditions under which a voxel is removed.
 #[derive(Clone, Copy, PartialEq, Debug)]
 pub struct ClearOptions {
     /// Scans that must pass through a voxel, with none between that hits it, to remove it.
@@ -37,7 +35,7 @@ impl Default for ClearOptions {
     }
 }
 
-/// What a scan cleared.
+/// Voxels that a scan removed, and those that it passed through.
 #[derive(Clone, PartialEq, Eq, Debug, Default)]
 pub struct ClearReport {
     /// The rays; `hits` and `misses` count cells whether they are occupied or not.
@@ -76,17 +74,12 @@ impl RayClearer {
         }
     }
 
-    /// Clears along the rays of a scan (map frame) taken from `origin_m` (map frame, metres). The
-    /// points themselves are not inserted; do that before or after.
+    /// Clears along the rays of a scan. The points themselves are not inserted; do that before or
+    /// after.
     ///
-    /// The outcome does not depend on the order of the points. Nothing happens to a store of
-    /// another lattice than that of the clearer.
-    pub fn clear(
-        &mut self,
-        store: &mut impl VoxelStore,
-        origin_m: Vector3<f64>,
-        scan: &Cloud,
-    ) -> ClearReport {
+    /// The outcome does not depend on the order of the points of a bundle. Nothing happens to a
+    /// store of another lattice than that of the clearer.
+    pub fn clear(&mut self, store: &mut dyn VoxelStore, scan: &[RayBundle]) -> ClearReport {
         let mut report = ClearReport::default();
         if store.lattice() != self.traversal.lattice() {
             return report;
@@ -96,8 +89,7 @@ impl RayClearer {
             keep_m: self.options.keep_m.max(0.0),
         };
         let datum_m = store.datum_m();
-        let (from, base) = (origin_m - datum_m, scan.datum_m - datum_m);
-        report.scan = scan::mark(&self.traversal, &mut self.masks, &from, &base, scan, reach);
+        report.scan = scan::mark(&self.traversal, &mut self.masks, &datum_m, scan, reach);
         self.forget_hits(store);
         let mut keys: Vec<MortonKey> = Vec::new();
         for (block, passed, hit) in self.masks.blocks() {
@@ -142,7 +134,7 @@ impl RayClearer {
     }
 
     /// Forgets the misses of what the scan hits, and of what others have removed if it is much.
-    fn forget_hits(&mut self, store: &impl VoxelStore) {
+    fn forget_hits(&mut self, store: &dyn VoxelStore) {
         if self.missed.is_empty() {
             return;
         }
@@ -159,18 +151,4 @@ impl RayClearer {
             self.missed.retain(|key, _| store.contains(*key));
         }
     }
-}
-
-/// [`RayClearer::clear`] once, with every voxel removed that a ray passes through.
-pub fn clear_rays(
-    store: &mut impl VoxelStore,
-    origin_m: Vector3<f64>,
-    scan: &Cloud,
-    keep_m: f64,
-) -> ClearReport {
-    let options = ClearOptions {
-        keep_m,
-        ..ClearOptions::default()
-    };
-    RayClearer::new(&store.lattice().clone(), options).clear(store, origin_m, scan)
 }

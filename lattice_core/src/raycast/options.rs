@@ -1,4 +1,4 @@
-//! What a map of free space is asked for, and what is wrong with it.
+//! Options of a map of free space, and the reasons for which they are refused.
 
 use thiserror::Error;
 
@@ -11,7 +11,7 @@ pub const MAX_FREE_LEVEL: u32 = 3;
 /// Least memory of a map, bytes.
 pub const MIN_MAP_BYTES: usize = 1 << 20;
 
-/// How a [`super::FreeSpaceMap`] is kept.
+/// Evidence, range, resolution and memory of a [`super::FreeSpaceMap`].
 #[derive(Clone, Copy, PartialEq, Debug)]
 pub struct FreeSpaceOptions {
     /// How hits and misses add up.
@@ -19,8 +19,9 @@ pub struct FreeSpaceOptions {
     /// Rays of points that are farther than this are followed to this range, metres, and give no
     /// hit; infinite for no limit.
     pub max_range_m: f64,
-    /// Free cells are kept in cells `2^free_level` as wide, at most [`MAX_FREE_LEVEL`].
-    pub free_level: u32,
+    /// Free cells are kept in cells `2^free_level` as wide, at most [`MAX_FREE_LEVEL`]; `None`: only
+    /// cells that were hit are kept.
+    pub free_level: Option<u32>,
     /// Most memory, bytes, at least [`MIN_MAP_BYTES`]. When it is used up, known blocks of cells are
     /// still updated, and no new ones are added.
     pub max_bytes: usize,
@@ -31,13 +32,13 @@ impl Default for FreeSpaceOptions {
         FreeSpaceOptions {
             evidence: Evidence::default(),
             max_range_m: f64::INFINITY,
-            free_level: 0,
+            free_level: Some(0),
             max_bytes: 1 << 30,
         }
     }
 }
 
-/// Why there is no map of free space.
+/// An option that a map of free space cannot have.
 #[derive(Clone, PartialEq, Debug, Error)]
 pub enum FreeSpaceError {
     /// The probabilities do not go together.
@@ -65,8 +66,8 @@ impl FreeSpaceOptions {
         if self.max_range_m.is_nan() || self.max_range_m <= 0.0 {
             return Err(FreeSpaceError::Range(self.max_range_m));
         }
-        if self.free_level > MAX_FREE_LEVEL {
-            return Err(FreeSpaceError::FreeLevel(self.free_level));
+        if let Some(level) = self.free_level.filter(|level| *level > MAX_FREE_LEVEL) {
+            return Err(FreeSpaceError::FreeLevel(level));
         }
         if self.max_bytes < MIN_MAP_BYTES {
             return Err(FreeSpaceError::Memory(self.max_bytes));

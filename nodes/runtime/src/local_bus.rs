@@ -9,11 +9,11 @@ use std::sync::{Arc, Mutex};
 
 use lattice_msgs::RosMessage;
 use lattice_msgs::cdr::{self, CdrError};
-use rustdds::bytes::Bytes;
 use smol::channel::Sender;
 
 use super::error::RuntimeError;
 use super::peers::Peers;
+use super::port::Bytes;
 use super::sync::lock;
 
 /// A message of any type.
@@ -78,8 +78,8 @@ struct SubscriberEntry {
     lost: Arc<AtomicU64>,
 }
 
-/// A place on a topic; dropping it leaves the topic.
-pub(crate) struct Membership {
+/// A publisher or subscriber on a topic of the process; dropping it leaves the topic.
+pub(crate) struct LocalEndpoint {
     topic: Arc<Topic>,
     id: u64,
 }
@@ -90,7 +90,7 @@ impl Topic {
         self: &Arc<Self>,
         peers: &Arc<Peers>,
         latch_depth: usize,
-    ) -> Result<Membership, RuntimeError> {
+    ) -> Result<LocalEndpoint, RuntimeError> {
         self.join(
             |inner| {
                 inner.claim_type(&self.name, M::TYPE)?;
@@ -106,7 +106,7 @@ impl Topic {
         type_name: &str,
         peers: &Arc<Peers>,
         latch_depth: usize,
-    ) -> Result<Membership, RuntimeError> {
+    ) -> Result<LocalEndpoint, RuntimeError> {
         self.join(
             |inner| inner.claim_type(&self.name, type_name),
             |inner, id| inner.add_publisher(id, peers, latch_depth),
@@ -121,7 +121,7 @@ impl Topic {
         sender: Sender<AnyMessage>,
         lost: Arc<AtomicU64>,
         latched: bool,
-    ) -> Result<Membership, RuntimeError> {
+    ) -> Result<LocalEndpoint, RuntimeError> {
         self.join(
             |inner| {
                 inner.claim_type(&self.name, M::TYPE)?;
@@ -153,7 +153,7 @@ impl Topic {
         self: &Arc<Self>,
         claim: impl FnOnce(&mut Inner) -> Result<(), RuntimeError>,
         add: impl FnOnce(&mut Inner, u64),
-    ) -> Result<Membership, RuntimeError> {
+    ) -> Result<LocalEndpoint, RuntimeError> {
         let mut inner = lock(&self.inner);
         claim(&mut inner)?;
         let id = inner.next_id;
@@ -162,7 +162,7 @@ impl Topic {
         let counts = inner.count();
         drop(inner);
         counts.hand_on();
-        Ok(Membership {
+        Ok(LocalEndpoint {
             topic: Arc::clone(self),
             id,
         })
@@ -188,7 +188,7 @@ impl Counts {
     }
 }
 
-impl Membership {
+impl LocalEndpoint {
     /// Hands a message to all subscribers.
     pub(crate) fn publish(&self, message: &AnyMessage) {
         let mut inner = lock(&self.topic.inner);
@@ -210,7 +210,7 @@ impl Membership {
     }
 }
 
-impl Drop for Membership {
+impl Drop for LocalEndpoint {
     fn drop(&mut self) {
         let mut inner = lock(&self.topic.inner);
         inner.publishers.retain(|p| p.id != self.id);
@@ -327,7 +327,7 @@ mod tests {
         Arc::new(RosString { data: s.to_owned() })
     }
 
-    fn publisher(bus: &LocalBus, latch: usize) -> (Membership, Arc<Peers>) {
+    fn publisher(bus: &LocalBus, latch: usize) -> (LocalEndpoint, Arc<Peers>) {
         let peers = Arc::new(Peers::of_publisher("/a"));
         let joined = bus.topic("/a").join_publisher::<RosString>(&peers, latch);
         (joined.unwrap(), peers)

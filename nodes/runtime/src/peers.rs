@@ -3,8 +3,7 @@
 use std::collections::BTreeSet;
 use std::sync::{Arc, Mutex};
 
-use rustdds::GUID;
-
+use super::port::EndpointId;
 use super::sync::{Changed, lock};
 
 /// Peers of one endpoint that are told apart, at most.
@@ -18,7 +17,6 @@ pub(crate) struct Peers {
     topic: String,
     peer_kind: &'static str,
     joins: log::Level,
-    hears_own: bool,
     state: Mutex<State>,
     on_joined: Mutex<Vec<Arc<Mutex<OnJoined>>>>,
     joined: Changed,
@@ -26,46 +24,33 @@ pub(crate) struct Peers {
 
 #[derive(Default)]
 struct State {
-    remote: BTreeSet<GUID>,
+    remote: BTreeSet<EndpointId>,
     local: usize,
     /// Number of the change that `local` was counted at.
     local_change: u64,
-    incompatible: BTreeSet<GUID>,
+    incompatible: BTreeSet<EndpointId>,
     warned: BTreeSet<&'static str>,
 }
 
 impl Peers {
-    /// Of a publisher, whose peers are subscribers.
+    /// For a publisher, whose peers are subscribers.
     pub(crate) fn of_publisher(topic: &str) -> Self {
         Self::new(topic, "subscriber", log::Level::Info)
     }
 
-    /// Of a subscription, whose peers are publishers.
+    /// For a subscription, whose peers are publishers.
     pub(crate) fn of_subscription(topic: &str) -> Self {
         Self::new(topic, "publisher", log::Level::Info)
     }
 
-    /// Of the requests of a server, whose peers are clients.
+    /// For the requests of a server, whose peers are clients.
     pub(crate) fn of_server(service: &str) -> Self {
         Self::new(service, "client", log::Level::Debug)
     }
 
-    /// Of the replies of a server, whose peers are the other ends of clients.
+    /// For the replies of a server, whose peers are the other ends of clients.
     pub(crate) fn of_replies(service: &str) -> Self {
         Self::new(service, "reply reader", log::Level::Debug)
-    }
-
-    /// Of a probe, whose peer is in its own participant.
-    pub(crate) fn of_probe(topic: &str) -> Self {
-        Self {
-            hears_own: true,
-            ..Self::new(topic, "probe", log::Level::Trace)
-        }
-    }
-
-    /// False where endpoints of the own participant do not count: nothing is delivered between them.
-    pub(crate) fn hears_own(&self) -> bool {
-        self.hears_own
     }
 
     fn new(topic: &str, peer_kind: &'static str, joins: log::Level) -> Self {
@@ -73,7 +58,6 @@ impl Peers {
             topic: topic.to_owned(),
             peer_kind,
             joins,
-            hears_own: false,
             state: Mutex::default(),
             on_joined: Mutex::default(),
             joined: Changed::default(),
@@ -90,7 +74,7 @@ impl Peers {
     }
 
     /// Completes when such a peer in another process is known.
-    pub(crate) async fn known(&self, wanted: impl Fn(&GUID) -> bool) {
+    pub(crate) async fn known(&self, wanted: impl Fn(&EndpointId) -> bool) {
         let known = || lock(&self.state).remote.iter().any(&wanted).then_some(());
         self.joined.until(known).await;
     }
@@ -117,7 +101,7 @@ impl Peers {
     }
 
     /// A peer in another process has matched.
-    pub(crate) fn add(&self, peer: GUID) {
+    pub(crate) fn add(&self, peer: EndpointId) {
         let mut state = lock(&self.state);
         state.incompatible.remove(&peer);
         if state.remote.len() >= MAX_PEERS || !state.remote.insert(peer) {
@@ -129,7 +113,7 @@ impl Peers {
     }
 
     /// Peers in other processes have gone.
-    pub(crate) fn remove(&self, gone: impl Fn(&GUID) -> bool) {
+    pub(crate) fn remove(&self, gone: impl Fn(&EndpointId) -> bool) {
         let mut state = lock(&self.state);
         let before = state.remote.len();
         state.remote.retain(|peer| !gone(peer));
@@ -158,7 +142,7 @@ impl Peers {
     }
 
     /// A peer asks for, or offers, a QoS that does not go with ours.
-    pub(crate) fn incompatible(&self, peer: GUID, policy: &'static str) {
+    pub(crate) fn incompatible(&self, peer: EndpointId, policy: &'static str) {
         let mut state = lock(&self.state);
         if state.incompatible.len() < MAX_PEERS {
             state.incompatible.insert(peer);
@@ -199,8 +183,8 @@ mod tests {
 
     use super::*;
 
-    fn peer(byte: u8) -> GUID {
-        GUID::from_bytes([byte; 16])
+    fn peer(byte: u8) -> EndpointId {
+        EndpointId([byte; 16])
     }
 
     #[test]
@@ -258,7 +242,7 @@ mod tests {
         peers.incompatible(peer(1), "reliability");
         peers.incompatible(peer(1), "reliability");
         assert_eq!(peers.incompatible_count(), 1);
-        peers.remove(|p| p.prefix == peer(1).prefix);
+        peers.remove(|p| p.is_beside(&peer(1)));
         assert_eq!(peers.incompatible_count(), 0);
     }
 }

@@ -7,26 +7,25 @@ use std::time::Duration;
 
 use lattice_msgs::RosMessage;
 use lattice_msgs::cdr;
-use rustdds::bytes::Bytes;
 
-use super::dds::payload::ENCAPSULATION_BYTES;
-use super::dds::writer::{DdsWriter, Serialize};
 use super::error::PublishError;
-use super::graph;
-use super::local_bus::Membership;
+use super::graph::NodeEndpoint;
+use super::local_bus::LocalEndpoint;
+use super::outbox::{Outbox, Serialize};
 use super::peers::Peers;
+use super::port::{Bytes, ENCAPSULATION_BYTES};
 use super::shutdown::Shutdown;
 use super::sync::lock;
 
 /// The parts that both kinds of publisher are made of.
-pub(crate) struct Core {
-    pub writer: Arc<DdsWriter>,
+pub(crate) struct PublisherParts {
+    pub writer: Arc<Outbox>,
     pub peers: Arc<Peers>,
-    pub local: Membership,
+    pub local: LocalEndpoint,
     /// Messages for late joiners; none where they are not kept.
     pub latch: Option<Mutex<Latch>>,
     pub shutdown: Shutdown,
-    pub _graph: graph::Membership,
+    pub _graph: NodeEndpoint,
 }
 
 /// The last messages of a latched publisher that no other process has listened to yet. They are
@@ -48,7 +47,7 @@ impl Latch {
     }
 }
 
-impl Core {
+impl PublisherParts {
     fn send(&self, message: Serialize) -> Result<(), PublishError> {
         let remote = self.peers.remote() > 0;
         let Some(latch) = &self.latch else {
@@ -89,23 +88,23 @@ impl Core {
 
 /// Publishes messages of one type on one topic. Clones share the publisher.
 pub struct Publisher<M> {
-    core: Arc<Core>,
+    parts: Arc<PublisherParts>,
     message: PhantomData<fn(M)>,
 }
 
 impl<M> Clone for Publisher<M> {
     fn clone(&self) -> Self {
         Self {
-            core: Arc::clone(&self.core),
+            parts: Arc::clone(&self.parts),
             message: PhantomData,
         }
     }
 }
 
 impl<M: RosMessage> Publisher<M> {
-    pub(crate) fn new(core: Arc<Core>) -> Self {
+    pub(crate) fn new(parts: Arc<PublisherParts>) -> Self {
         Self {
-            core,
+            parts,
             message: PhantomData,
         }
     }
@@ -116,8 +115,8 @@ impl<M: RosMessage> Publisher<M> {
     /// on the publisher thread; a full queue is an error, and counted.
     pub fn publish(&self, message: impl Into<Arc<M>>) -> Result<(), PublishError> {
         let message: Arc<M> = message.into();
-        self.core.local.publish(&(Arc::clone(&message) as _));
-        self.core
+        self.parts.local.publish(&(Arc::clone(&message) as _));
+        self.parts
             .send(Box::new(move || cdr::to_vec(message.as_ref())))
     }
 }
@@ -125,12 +124,12 @@ impl<M: RosMessage> Publisher<M> {
 /// Publishes messages that are CDR bytes already, as a bag player has them.
 #[derive(Clone)]
 pub struct RawPublisher {
-    core: Arc<Core>,
+    parts: Arc<PublisherParts>,
 }
 
 impl RawPublisher {
-    pub(crate) fn new(core: Arc<Core>) -> Self {
-        Self { core }
+    pub(crate) fn new(parts: Arc<PublisherParts>) -> Self {
+        Self { parts }
     }
 
     /// Publishes a message of plain little-endian CDR, encapsulation header included, as it is.
@@ -146,19 +145,19 @@ impl RawPublisher {
                 header: body.iter().take(ENCAPSULATION_BYTES).copied().collect(),
             });
         }
-        if let Err(error) = self.core.local.publish_cdr(&body) {
+        if let Err(error) = self.parts.local.publish_cdr(&body) {
             log::warn!(
                 "{}: message not given to this process: {error}",
                 self.topic()
             );
         }
-        if self.core.latch.is_none() && self.core.peers.remote() == 0 {
+        if self.parts.latch.is_none() && self.parts.peers.remote() == 0 {
             return Ok(());
         }
         let body = body.split_off(ENCAPSULATION_BYTES);
-        self.core
+        self.parts
             .writer
-            .send_body_blocking(body, &self.core.shutdown)
+            .send_body_blocking(body, &self.parts.shutdown)
     }
 }
 
@@ -167,40 +166,40 @@ macro_rules! shared_by_publishers {
         impl<$($generics)*> $publisher {
             /// Resolved topic.
             pub fn topic(&self) -> &str {
-                self.core.peers.topic()
+                self.parts.peers.topic()
             }
 
             /// Matched subscribers, here and in other processes.
             pub fn subscriber_count(&self) -> usize {
-                self.core.peers.count()
+                self.parts.peers.count()
             }
 
             /// Calls `callback` for every subscriber that joins, and now if there is one already.
             ///
             /// It runs on a thread of the runtime and must return at once.
             pub fn on_subscriber_joined(&self, callback: impl FnMut() + Send + 'static) {
-                self.core.peers.on_joined(Box::new(callback));
+                self.parts.peers.on_joined(Box::new(callback));
             }
 
             /// Waits until the queue is empty and every reliable subscriber in another process has
             /// acknowledged. False: not in time. Not from a handler, callback or timer.
             pub fn flush(&self, timeout: Duration) -> bool {
-                self.core.writer.flush(timeout)
+                self.parts.writer.flush(timeout)
             }
 
             /// Messages not sent to other processes: queue or send window full.
             pub fn dropped(&self) -> u64 {
-                self.core.writer.dropped()
+                self.parts.writer.dropped()
             }
 
             /// Messages handed to DDS for other processes.
             pub fn sent(&self) -> u64 {
-                self.core.writer.sent()
+                self.parts.writer.sent()
             }
 
             /// Bytes of them as they were serialised, without headers.
             pub fn sent_bytes(&self) -> u64 {
-                self.core.writer.sent_bytes()
+                self.parts.writer.sent_bytes()
             }
         }
     )*};

@@ -1,8 +1,11 @@
 //! Locks and waiting, shared by all modules.
 
 use std::sync::{Mutex, MutexGuard, PoisonError};
+use std::time::Duration;
 
+use smol::Timer;
 use smol::channel::{Receiver, Sender, bounded};
+use smol::future::or;
 
 /// Locks, poisoned or not: what is protected here is valid at every step.
 pub(crate) fn lock<T: ?Sized>(mutex: &Mutex<T>) -> MutexGuard<'_, T> {
@@ -43,6 +46,15 @@ impl Changed {
         waiting.push(sender);
         change
     }
+}
+
+/// Waits until all senders of a channel are dropped. False: not in time.
+pub(crate) fn wait_for(dropped: &Receiver<()>, patience: Duration) -> bool {
+    let late = async {
+        Timer::after(patience).await;
+        false
+    };
+    smol::block_on(or(async { dropped.recv().await.is_err() }, late))
 }
 
 #[cfg(test)]

@@ -63,12 +63,6 @@ pub struct Calibration {
     /// Pictures that the headset takes
     #[arg(long, default_value_t = 1)]
     headset_scans: usize,
-    /// A class is always taken for the same other one
-    #[arg(long)]
-    consistent: bool,
-    /// Share of single points with a random class
-    #[arg(long, default_value_t = 0.0)]
-    iid: f64,
     /// Side of a cell of the robot's map, m
     #[arg(long, default_value_t = Settings::default().cell_side_m)]
     cell: f64,
@@ -125,8 +119,6 @@ impl Calibration {
             cell_side_m: self.cell,
             map_seeds: if self.quick { 1 } else { self.maps },
             headset_scans: self.headset_scans,
-            consistent: self.consistent,
-            iid: self.iid,
             pivot: self.pivot,
             ..Settings::default()
         };

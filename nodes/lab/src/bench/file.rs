@@ -8,9 +8,9 @@ use super::{Report, timed};
 /// Direction of the measurement.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum FileMethod {
-    /// From a store to the bytes of a file.
+    /// Store to the bytes of a file.
     Save,
-    /// From the bytes of a file to a store.
+    /// Bytes of a file to a store.
     Load,
 }
 

@@ -7,7 +7,7 @@ use std::io::{BufWriter, Write};
 use std::path::PathBuf;
 
 use crate::simulate::house::{
-    HeadsetOptions, HeadsetTrial, LabelDraw, LabelModel, Scene, Survey, SurveyOptions,
+    HeadsetOptions, HeadsetTrial, LabelDraw, Scene, Survey, SurveyOptions,
 };
 use lattice_core::lattice::{Lattice, LatticeKind};
 use lattice_core::pose::Axes;
@@ -53,8 +53,8 @@ pub struct HouseOptions {
     pub survey: SurveyOptions,
     /// The headset.
     pub headset: HeadsetOptions,
-    /// Model of wrong labels.
-    pub labels: LabelModel,
+    /// Share of the headset's view whose regions are labelled wrongly, 0 to 1.
+    pub flips: f64,
     /// Lattice of the map.
     pub lattice: LatticeKind,
     /// Side of a cube of the volume of its cells, m.
@@ -171,7 +171,7 @@ pub fn write_house(
         )?);
         progress(0.1 + 0.1 * trials.len() as f64);
     }
-    let draw = options.labels.draw_all(&house, &trials, options.seed)?;
+    let draw = LabelDraw::new(&house, &trials, options.flips, options.seed)?;
     let mut summary = HouseSummary {
         out: options.out.clone(),
         triangles: house.mesh().len(),
@@ -237,8 +237,7 @@ fn write_scene(
             _ => format!("{name}_{number}.ply"),
         };
         let points: Vec<Point3<f64>> = headset_scan.points_m.iter().map(turned).collect();
-        let lane = trial.scene as u64 * 64 + number;
-        let cloud = draw.headset.cloud(&points, &headset_scan.regions, lane);
+        let cloud = draw.headset.cloud(&points, &headset_scan.regions);
         let labels = cloud
             .labels
             .iter()

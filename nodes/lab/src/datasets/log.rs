@@ -14,9 +14,9 @@ use crate::AnyError;
 
 /// Length of log that is computed at a time, ns.
 const BLOCK_NS: i64 = 1_000_000_000;
-/// From the last beam of a scan to its arrival at the recorder, ns.
+/// Time from the last beam of a scan to its arrival at the recorder, ns.
 const CLOUD_DELAY_NS: i64 = 3_000_000;
-/// From a turntable's stamp to its arrival, ns.
+/// Time from a turntable's stamp to its arrival, ns.
 const TURNTABLE_DELAY_NS: i64 = 400_000;
 
 /// A message as it is recorded.

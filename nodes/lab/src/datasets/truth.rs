@@ -8,6 +8,7 @@ use crate::simulate::{
     BASE_FROM_TURNTABLE_M, INS_POSITION_RMS_M, InsSample, Laser, MAX_RANGE_M, MIN_RANGE_M,
     RANGE_NOISE_M, TURNTABLE_PERIOD_NS, base_from_imu,
 };
+use lattice_nodes::files::export::ply_header;
 use nalgebra::{Isometry3, Vector3};
 use serde::Serialize;
 
@@ -50,7 +51,10 @@ impl Truth {
         };
         let (mut poses, mut points) = (open(POSES_FILE)?, open(POINTS_FILE)?);
         writeln!(poses.1, "stamp_ns,x,y,z,qx,qy,qz,qw").map_err(at(&poses.0))?;
-        points.1.write_all(&ply_header(0)).map_err(at(&points.0))?;
+        points
+            .1
+            .write_all(&padded_header(0))
+            .map_err(at(&points.0))?;
         Ok(Self {
             poses,
             points,
@@ -98,21 +102,20 @@ impl Truth {
         poses.flush().map_err(at(&poses_path))?;
         points
             .seek(SeekFrom::Start(0))
-            .and_then(|_| points.write_all(&ply_header(point_count)))
+            .and_then(|_| points.write_all(&padded_header(point_count)))
             .and_then(|()| points.flush())
             .map_err(at(&points_path))
     }
 }
 
 /// Header of a binary PLY of float points, padded by a comment.
-fn ply_header(points: u64) -> Vec<u8> {
-    let begin = format!(
-        "ply\nformat binary_little_endian 1.0\ncomment true points in the map frame, m, in the order of the log\n\
-         element vertex {points}\nproperty float x\nproperty float y\nproperty float z\ncomment "
-    );
-    let end = "\nend_header\n";
-    let padding = PLY_HEADER_BYTES.saturating_sub(begin.len() + end.len());
-    format!("{begin}{}{end}", "-".repeat(padding)).into_bytes()
+fn padded_header(points: u64) -> Vec<u8> {
+    let vertices = [("vertex", points, &["float x", "float y", "float z"][..])];
+    let comment = "true points in the map frame, m, in the order of the log ";
+    let bare = ply_header(comment, &vertices);
+    let padding = PLY_HEADER_BYTES.saturating_sub(bare.len());
+    let comment = format!("{comment}{}", "-".repeat(padding));
+    ply_header(&comment, &vertices).into_bytes()
 }
 
 /// Contents of `site.yaml`.
@@ -205,8 +208,8 @@ mod tests {
 
     #[test]
     fn the_header_keeps_its_length() {
-        assert_eq!(ply_header(0).len(), PLY_HEADER_BYTES);
-        assert_eq!(ply_header(u64::MAX).len(), PLY_HEADER_BYTES);
-        assert!(ply_header(12).ends_with(b"-\nend_header\n"));
+        assert_eq!(padded_header(0).len(), PLY_HEADER_BYTES);
+        assert_eq!(padded_header(u64::MAX).len(), PLY_HEADER_BYTES);
+        assert!(padded_header(12).ends_with(b"\nend_header\n"));
     }
 }

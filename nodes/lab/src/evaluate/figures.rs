@@ -5,7 +5,7 @@ use std::collections::BTreeMap;
 use plotters::prelude::*;
 
 use super::methods::{color, competitors, title};
-use super::summary::{Row, Summary};
+use super::summary::{Summary, sorted};
 use super::trial::{OURS, Trial, WRONG};
 use crate::AnyError;
 use crate::report::Figure;
@@ -47,40 +47,14 @@ fn verdict_color(trial: &Trial) -> RGBColor {
     }
 }
 
-fn distinct<'a>(values: impl Iterator<Item = &'a str>) -> Vec<&'a str> {
-    let mut values: Vec<&str> = values.collect();
-    values.sort_unstable();
-    values.dedup();
-    values
-}
-
 fn shown(error: f64) -> f64 {
     error.clamp(ERRORS.start, ERRORS.end)
 }
 
-/// Rows of a scene and start by method, in the order of their shares of wrong labels.
-fn lines<'a>(
-    rows: &'a [Row],
-    scene: &'a str,
-    start: &'a str,
-) -> impl Iterator<Item = (RGBColor, Vec<&'a Row>)> {
-    competitors().map(move |method| {
-        let of = |r: &&Row| r.scene == scene && r.start == start && r.method == method;
-        let mut of: Vec<&Row> = rows.iter().filter(of).collect();
-        of.sort_by(|a, b| a.q.total_cmp(&b.q));
-        (color(method), of)
-    })
-}
-
 /// Median d_SE3 by q: a row for each start, a column for each scene.
 pub fn d_se3(summary: &Summary) -> Result<Figure, AnyError> {
-    let rows = &summary.rows;
-    let starts = distinct(rows.iter().map(|r| r.start.as_str()));
-    let scenes = distinct(
-        rows.iter()
-            .map(|r| r.scene.as_str())
-            .filter(|s| *s != "all"),
-    );
+    let starts = summary.starts();
+    let scenes = summary.scenes();
     let cells = starts
         .iter()
         .flat_map(|start| scenes.iter().map(move |scene| (*start, *scene)));
@@ -91,7 +65,8 @@ pub fn d_se3(summary: &Summary) -> Result<Figure, AnyError> {
                 ("median d_SE3", ERRORS.log_scale()),
             );
             let mut chart = chart(area, &format!("{scene}, start {start}"), xs, ys)?;
-            for (color, rows) in lines(rows, scene, start) {
+            for method in competitors() {
+                let (color, rows) = (color(method), summary.of_method(scene, start, method));
                 let points = rows.iter().filter_map(|r| Some((r.q, shown(r.d_se3?))));
                 chart.draw_series(LineSeries::new(points.clone(), color.stroke_width(2)))?;
                 chart.draw_series(points.map(|p| Circle::new(p, 3, color.filled())))?;
@@ -109,13 +84,14 @@ pub fn d_se3(summary: &Summary) -> Result<Figure, AnyError> {
 
 /// Right poses by q, all scenes: a panel for each start.
 pub fn success(summary: &Summary) -> Result<Figure, AnyError> {
-    let starts = distinct(summary.rows.iter().map(|r| r.start.as_str()));
+    let starts = summary.starts();
     let draw = |areas: &[Area]| {
         for (start, area) in starts.iter().zip(areas) {
             let xs = ("share of wrong labels q", FLIPS);
             let ys = ("right within 0.15 m and 3 deg", 0.0..1.02);
             let mut chart = chart(area, &format!("all scenes, start {start}"), xs, ys)?;
-            for (color, rows) in lines(&summary.rows, "all", start) {
+            for method in competitors() {
+                let (color, rows) = (color(method), summary.of_method("all", start, method));
                 let points = rows.iter().filter_map(|r| Some((r.q, r.success.share?)));
                 chart.draw_series(LineSeries::new(points, color.stroke_width(2)))?;
                 chart.draw_series(rows.iter().map(|r| {
@@ -138,7 +114,7 @@ pub fn success(summary: &Summary) -> Result<Figure, AnyError> {
 pub fn paired(trials: &[Trial]) -> Result<Figure, AnyError> {
     let of = |method: &'static str| trials.iter().filter(move |t| t.method == method);
     let theirs: BTreeMap<_, &Trial> = of("gicp_se3").map(|t| (t.cell.key(), t)).collect();
-    let starts = distinct(theirs.values().map(|t| t.cell.start.as_str()));
+    let starts = sorted(theirs.values().map(|t| t.cell.start.as_str()));
     let draw = |areas: &[Area]| {
         for (start, area) in starts.iter().zip(areas) {
             let title = format!("mean distance in the view (m), start {start}");

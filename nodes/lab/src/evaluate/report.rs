@@ -44,13 +44,6 @@ pub fn report(summary: &Summary, trials: &[Trial]) -> Result<Report, AnyError> {
     Ok(Report::new(head, sections))
 }
 
-fn starts(summary: &Summary) -> Vec<&str> {
-    let mut starts: Vec<&str> = summary.rows.iter().map(|r| r.start.as_str()).collect();
-    starts.sort_unstable();
-    starts.dedup();
-    starts
-}
-
 fn flips(summary: &Summary) -> Vec<f64> {
     let mut flips: Vec<f64> = summary.rows.iter().map(|r| r.q).collect();
     flips.sort_by(f64::total_cmp);
@@ -108,7 +101,7 @@ fn printed(summary: &Summary) -> Result<Section, AnyError> {
             summary.printed.iter().map(row),
         )
     };
-    let starts = starts(summary);
+    let starts = summary.starts();
     let known = starts.iter().filter(|start| **start != "none");
     Ok(Section {
         tables: known.enumerate().map(table).collect(),
@@ -144,7 +137,12 @@ fn by_start(summary: &Summary) -> Result<Section, AnyError> {
         )
     };
     Ok(Section {
-        tables: starts(summary).into_iter().enumerate().map(table).collect(),
+        tables: summary
+            .starts()
+            .into_iter()
+            .enumerate()
+            .map(table)
+            .collect(),
         figures: vec![figures::success(summary)?],
         ..Section::measured("right", "Right poses, all scenes", "")
     })

@@ -24,10 +24,6 @@ pub struct Settings {
     pub map_seeds: u64,
     /// Pictures that the headset takes.
     pub headset_scans: usize,
-    /// True if a class is always taken for the same other one.
-    pub consistent: bool,
-    /// Share of single points with a random class.
-    pub iid: f64,
     /// Point at which starts are moved and turned.
     pub pivot: Pivot,
 }
@@ -52,8 +48,6 @@ impl Default for Settings {
             survey_views: 384,
             map_seeds: 3,
             headset_scans: 1,
-            consistent: false,
-            iid: 0.0,
             pivot: Pivot::default(),
         }
     }

@@ -74,7 +74,7 @@ pub const LEAST_FOR_INTERVAL: usize = 6;
 /// An interval that holds the median of what the values were drawn from in 95 % of all draws or more,
 /// whatever its distribution: ranks by the binomial of one half (Conover 1999, section 3.2).
 ///
-/// Of fewer than [`LEAST_FOR_INTERVAL`] values it is all of them, which hold it less often; None of nothing.
+/// For fewer than [`LEAST_FOR_INTERVAL`] values it spans all of them and holds less often; None of no values.
 pub fn median_interval(values: impl IntoIterator<Item = f64>) -> Option<[f64; 2]> {
     let mut values: Vec<f64> = values.into_iter().collect();
     values.sort_by(f64::total_cmp);
@@ -109,6 +109,13 @@ pub fn quantile(values: impl IntoIterator<Item = f64>, share: f64) -> Option<f64
         values.get(at.ceil() as usize)?,
     );
     Some(low + (high - low) * at.fract())
+}
+
+/// Least and greatest of some values; infinite of no values.
+pub fn extent(values: impl IntoIterator<Item = f64>) -> [f64; 2] {
+    let ends = [f64::INFINITY, f64::NEG_INFINITY];
+    let wider = |[low, high]: [f64; 2], value: f64| [low.min(value), high.max(value)];
+    values.into_iter().fold(ends, wider)
 }
 
 #[cfg(test)]

@@ -92,6 +92,35 @@ impl Summary {
     }
 }
 
+impl Summary {
+    /// Distinct starts, in order.
+    pub(super) fn starts(&self) -> Vec<&str> {
+        sorted(self.rows.iter().map(|row| row.start.as_str()))
+    }
+
+    /// Distinct scenes, in order, without all of them together.
+    pub(super) fn scenes(&self) -> Vec<&str> {
+        let scenes = self.rows.iter().map(|row| row.scene.as_str());
+        sorted(scenes.filter(|scene| *scene != "all"))
+    }
+
+    /// Rows of a scene, start and method, in the order of their shares of wrong labels.
+    pub(super) fn of_method(&self, scene: &str, start: &str, method: &str) -> Vec<&Row> {
+        let of = |r: &&Row| r.scene == scene && r.start == start && r.method == method;
+        let mut rows: Vec<&Row> = self.rows.iter().filter(of).collect();
+        rows.sort_by(|a, b| a.q.total_cmp(&b.q));
+        rows
+    }
+}
+
+/// Distinct names, in order.
+pub(super) fn sorted<'a>(names: impl Iterator<Item = &'a str>) -> Vec<&'a str> {
+    let mut names: Vec<&str> = names.collect();
+    names.sort_unstable();
+    names.dedup();
+    names
+}
+
 fn rows(trials: &[&Trial]) -> Vec<Row> {
     let mut cells: BTreeMap<(String, String, u64, String), Vec<&Trial>> = BTreeMap::new();
     for trial in trials {

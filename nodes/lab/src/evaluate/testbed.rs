@@ -4,7 +4,8 @@ use std::sync::OnceLock;
 use std::time::Instant;
 
 use crate::simulate::house::{
-    HeadsetOptions, HeadsetTrial, House, LabelModel, Scene, Survey, SurveyMap, SurveyOptions,
+    HeadsetOptions, HeadsetTrial, House, HouseScan, LabelDraw, Scene, Survey, SurveyMap,
+    SurveyOptions,
 };
 use lattice_core::lattice::{Lattice, LatticeKind};
 use lattice_core::registration::{
@@ -87,26 +88,15 @@ impl Testbed {
 
     /// The view and the map with a share `q` of the view labelled wrongly.
     pub fn scenario(&self, view: &View, q: f64) -> Result<Scenario, AnyError> {
-        let model = LabelModel {
-            consistent: self.settings.consistent,
-            iid: self.settings.iid,
-            ..LabelModel::flips(q)
-        };
         // The same for every q, so that the wrong regions of a small q are wrong at a larger one too.
         let seed = seed_of(&[LABELS, view.seed, view.scene as u64]);
-        let draw = model.draw(&self.house, &view.trial, seed)?;
+        let draw = LabelDraw::new(&self.house, std::slice::from_ref(&view.trial), q, seed)?;
         let map = self.survey(view.seed)?.cloud(&draw.map);
-        let headset_scan =
-            |(lane, headset_scan): (u64, &crate::simulate::house::HouseScan)| HeadsetScan {
-                cloud: draw
-                    .headset
-                    .cloud(&headset_scan.points_m, &headset_scan.regions, lane),
-                sensor_m: Some(headset_scan.sensor_m),
-            };
-        let headset_scans: Vec<HeadsetScan> = (0..)
-            .zip(&view.trial.headset_scans)
-            .map(headset_scan)
-            .collect();
+        let scan = |scan: &HouseScan| HeadsetScan {
+            cloud: draw.headset.cloud(&scan.points_m, &scan.regions),
+            sensor_m: Some(scan.sensor_m),
+        };
+        let headset_scans: Vec<HeadsetScan> = view.trial.headset_scans.iter().map(scan).collect();
         let mut all = SemanticCloud::default();
         for headset_scan in &headset_scans {
             all.points_m.extend_from_slice(&headset_scan.cloud.points_m);

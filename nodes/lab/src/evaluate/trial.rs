@@ -141,7 +141,7 @@ impl Trial {
     }
 }
 
-/// As many digits as are read back exactly from a file.
+/// A value rounded to the digits that are read back exactly from a file.
 pub(super) fn rounded(value: f64) -> f64 {
     const UNIT: f64 = 1e6;
     if value.abs() < 1e9 {

@@ -30,7 +30,8 @@ pub fn search(
     let coarsest = map.levels().last().ok_or(EMPTY_MAP)?;
     let side_m = coarsest.lattice().cell_side_m();
     let grid = Grid::new(spread, side_m, side_m / options.feature_range_m);
-    if !(grid.poses() <= options.max_poses as f64) {
+    let mut spreads = spread.translation_m.iter().chain(&spread.rotation_rad);
+    if !spreads.all(|half| half.is_finite()) || grid.poses() > options.max_poses as f64 {
         let (poses, most) = (grid.poses(), options.max_poses);
         return Err(
             format!("{poses} poses on the coarsest grid, at most {most} are allowed").into(),

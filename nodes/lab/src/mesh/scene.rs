@@ -29,7 +29,7 @@ pub struct MeshHit {
 /// Laine 2017, by the crate `obvhs`). Both sides of a triangle are seen.
 pub struct MeshScene {
     bvh: CwBvh,
-    /// In the order of the leaves.
+    /// Triangles in the order of the leaves.
     triangles: Vec<Triangle>,
     /// Their numbers in the mesh.
     numbers: Vec<u32>,

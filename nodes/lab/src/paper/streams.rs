@@ -22,7 +22,7 @@ pub enum Purpose {
     Matching = 272,
     /// Resamples of trials.
     Bootstrap = 273,
-    /// Frames in which one calibration is told.
+    /// Frames in which one calibration is measured.
     Frames = 768,
 }
 

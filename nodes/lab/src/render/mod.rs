@@ -49,9 +49,9 @@ pub struct RenderOptions {
 /// Place that a picture is centred on.
 #[derive(Clone, Copy, PartialEq, Debug)]
 pub struct Focus {
-    /// In the middle of the picture: map frame, metres.
+    /// Middle of the picture: map frame, metres.
     pub center_m: [f64; 3],
-    /// From the left to the right of the picture with a zoom of 1, metres.
+    /// Width of the picture with a zoom of 1, metres.
     pub width_m: f64,
 }
 

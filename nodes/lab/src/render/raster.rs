@@ -116,7 +116,7 @@ impl Scene {
 /// Surface that is seen at a sample.
 #[derive(Clone, Copy, Default, Debug)]
 pub(super) struct Surface {
-    /// Of the cell: place in the palette.
+    /// Place of the cell's colour in the palette.
     pub(super) tone: u8,
     /// Index of the face.
     pub(super) face: u8,

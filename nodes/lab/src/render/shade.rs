@@ -1,4 +1,4 @@
-//! From faces on the screen to colours.
+//! Shading: the colours of faces on the screen.
 
 use nalgebra::Vector3;
 use rayon::prelude::*;

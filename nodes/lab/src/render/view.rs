@@ -25,7 +25,7 @@ pub(super) struct View {
 }
 
 impl View {
-    /// From a camera at this compass direction and height seen from the map.
+    /// A view from a camera at this compass direction and height seen from the map.
     pub(super) fn new(azimuth_deg: f64, elevation_deg: f64, size: [usize; 2]) -> View {
         let (sin_a, cos_a) = azimuth_deg.to_radians().sin_cos();
         let (sin_e, cos_e) = elevation_deg.to_radians().sin_cos();

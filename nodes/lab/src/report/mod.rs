@@ -134,9 +134,9 @@ impl Section {
 #[derive(Clone, PartialEq, Debug, Serialize)]
 #[serde(tag = "verdict", content = "why", rename_all = "snake_case")]
 pub enum Verdict {
-    /// As the paper says.
+    /// Result as in the paper.
     Reproduced,
-    /// As the paper says once this is corrected.
+    /// Result as in the paper once this is corrected.
     Corrected(String),
     /// Not to be settled without these data, which we do not have.
     DependsOnData(String),

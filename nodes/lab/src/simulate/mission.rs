@@ -209,6 +209,7 @@ impl Mission {
         PlanarPose { effort: 0.0, ..to }
     }
 
+    #[cfg(test)]
     /// Duration of one round, s.
     pub(super) fn duration_s(&self) -> f64 {
         self.duration_s

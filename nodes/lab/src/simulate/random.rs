@@ -28,8 +28,6 @@ pub(super) enum Purpose {
     HeadsetScan = 53,
     /// Regions that are labelled wrongly, and their wrong classes.
     LabelFlips = 54,
-    /// Labels of single points; one stream per block of points.
-    PointFlips = 55,
     /// Books and clutter of a house.
     GeneratedHouse = 56,
     /// Stand of a laser scanner.

@@ -2,10 +2,9 @@
 
 mod error;
 mod ranges;
-mod value;
 
+pub use crate::param_value::{ParamValue, ValueError};
 pub use error::ParamError;
-pub use value::{ParamValue, ValueError};
 
 use crate::{params_file, ros_args::RosArgs};
 use std::{

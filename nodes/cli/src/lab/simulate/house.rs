@@ -4,11 +4,11 @@ use std::path::PathBuf;
 
 use clap::Args;
 use lattice_core::lattice::LatticeKind;
-use lattice_lab::simulate::house::{FlipSide, HeadsetOptions, LabelModel, SurveyOptions};
+use lattice_lab::simulate::house::{HeadsetOptions, SurveyOptions};
 use nalgebra::{Isometry3, Vector3};
 
 use crate::CliResult;
-use crate::lab::choice;
+use crate::lab::{choice, show};
 use crate::progress::Progress;
 use lattice_lab::datasets::{HeadsetAxes, HouseOptions, write_house};
 
@@ -34,15 +34,6 @@ pub struct House {
     /// Share of the headset's view whose regions are labelled wrongly, 0 to 1
     #[arg(long, value_name = "Q", default_value_t = 0.0)]
     flips: f64,
-    /// Device with the wrong labels
-    #[arg(long, value_parser = choice(&SIDES), default_value = "either")]
-    flips_side: FlipSide,
-    /// Classes are always taken for the same other one
-    #[arg(long)]
-    flips_consistent: bool,
-    /// Share of single points with a random label, 0 to 1
-    #[arg(long, value_name = "SHARE", default_value_t = 0.0)]
-    label_noise: f64,
     /// Pictures of each scene; the further ones look to the sides
     #[arg(long, default_value_t = 1)]
     headset_scans: usize,
@@ -65,18 +56,6 @@ pub struct House {
     #[arg(long)]
     json: bool,
 }
-
-/// Values of `--flips-side`.
-const SIDES: [(&str, &str, FlipSide); 4] = [
-    (
-        "either",
-        "One or the other, half of the view each",
-        FlipSide::Either,
-    ),
-    ("map", "The robot", FlipSide::Map),
-    ("headset", "The headset", FlipSide::Headset),
-    ("both", "Both", FlipSide::Both),
-];
 
 /// Values of `--axes`.
 const AXES: [(&str, &str, HeadsetAxes); 2] = [
@@ -111,12 +90,7 @@ impl House {
                 headset_scans: self.headset_scans,
                 ..HeadsetOptions::default()
             },
-            labels: LabelModel {
-                region_flips: self.flips,
-                side: self.flips_side,
-                consistent: self.flips_consistent,
-                iid: self.label_noise,
-            },
+            flips: self.flips,
             lattice: self.lattice,
             cell_side_m: self.cell_side,
             axes: self.axes,
@@ -124,11 +98,6 @@ impl House {
         let progress = Progress::new("simulate");
         let summary = write_house(&options, &mut |done| progress.set(done))?;
         progress.done();
-        if self.json {
-            println!("{}", serde_json::to_string_pretty(&summary)?);
-        } else {
-            println!("{summary}");
-        }
-        Ok(())
+        show(self.json, &summary)
     }
 }

@@ -42,7 +42,7 @@ struct Errors {
     scene_m: f64,
 }
 
-/// A calibration that is off, with the frames it is told in.
+/// A calibration with an error, and the frames that it is measured in.
 struct Case {
     /// Distance of the map's origin from the scene, metres, and its direction, radians.
     map: (f64, f64),
@@ -254,7 +254,7 @@ fn distances() -> Table {
     Table::new(
         "eq9_distances",
         format!(
-            "One error, {TURN_DEG} degrees about the vertical and {MOVE_M} m at the scene, told in maps with origins at \
+            "One error, {TURN_DEG} degrees about the vertical and {MOVE_M} m at the scene, measured in maps with origins at \
              several distances; over {} directions",
             DIRECTIONS * DIRECTIONS
         ),

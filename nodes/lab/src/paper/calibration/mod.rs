@@ -46,7 +46,7 @@ struct Context {
     cell_side_m: f64,
 }
 
-/// Computes all sections; `progress` is told how much is done, from 0 to 1, and what comes next.
+/// Computes all sections; `progress` gets the share done and the name of the next section.
 pub fn run(options: &Options, progress: &mut dyn FnMut(f64, &str)) -> Result<Report, AnyError> {
     let sections = sections(options, progress)?;
     let head = Head::of_paper(

@@ -53,7 +53,7 @@ const SECTIONS: [(&str, f64, Make); 10] = [
     ("Fig. 6", 150.0, matching::section),
 ];
 
-/// Computes all sections; `progress` is told how much is done, from 0 to 1, and what comes next.
+/// Computes all sections; `progress` gets the share done and the name of the next section.
 pub fn run(options: &Options, progress: &mut dyn FnMut(f64, &str)) -> Result<Report, AnyError> {
     // Before a minute of work.
     for path in options

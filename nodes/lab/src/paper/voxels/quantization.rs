@@ -128,7 +128,7 @@ fn ways(lattice: &Lattice) -> Result<[PaperQuantizer; 4], AnyError> {
 #[derive(Clone, Copy, Default)]
 struct Wrong {
     ways: [usize; 4],
-    /// Of the third way: how much farther than the nearest, cell sides.
+    /// Largest excess of the third way over the nearest distance, cell sides.
     excess: f64,
 }
 

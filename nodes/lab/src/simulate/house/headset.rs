@@ -109,7 +109,7 @@ impl HeadsetTrial {
         options: &HeadsetOptions,
         seed: u64,
     ) -> Result<HeadsetTrial, AnyError> {
-        check(options)?;
+        within("headset_scans", options.headset_scans as f64, 1.0, 6.0)?;
         let stand = scenes::stand(house, scene, options.eye_height_m, seed)?;
         let lane = scene as u64;
         let mut stream = Stream::new(seed, Purpose::HeadsetFrame, 0, lane);
@@ -157,19 +157,6 @@ impl HeadsetTrial {
             mesh,
         })
     }
-}
-
-fn check(options: &HeadsetOptions) -> Result<(), AnyError> {
-    within("headset_scans", options.headset_scans as f64, 1.0, 6.0)?;
-    let pixels = options.width.saturating_mul(options.height);
-    within("pixels", pixels as f64, 1.0, 1e7)?;
-    within("hfov_deg", options.hfov_deg, 1.0, 150.0)?;
-    within("eye_height_m", options.eye_height_m, 0.1, 3.0)?;
-    within("max_range_m", options.max_range_m, 0.5, 12.0)?;
-    within("voxel_m", options.voxel_m.unwrap_or(0.06), 0.01, 0.3)?;
-    within("warp_m", options.warp_m, 0.0, 0.2)?;
-    within("scale_sigma", options.scale_sigma, 0.0, 0.01)?;
-    within("tilt_deg", options.tilt_deg, 0.0, 10.0)
 }
 
 /// Pose at which the app was started: some metres away at any heading, nearly upright.

@@ -3,7 +3,7 @@
 //! Made for the calibration of a headset to a robot map: a
 //! [`House`] is a labelled mesh, of a real house or [`House::generated`], at a pose in the map, [`Survey`] the labelled points that a robot with
 //! a depth camera gathers in it, [`HeadsetTrial`] what a headset sees of a [`Scene`] on its own coarse
-//! mesh, with the true `map_from_headset`, and [`LabelModel`] how wrong the labels of the two are.
+//! mesh, with the true `map_from_headset`, and [`LabelDraw`] labels of the two of which some are wrong.
 //! Everything depends on seeds alone, on any number of threads.
 //!
 //! The frame of the house is that of its mesh: metres, z up. Cameras look along their x axis, with y
@@ -27,7 +27,7 @@ mod warp;
 
 pub use building::{House, SurfaceHit};
 pub use headset::{HeadsetOptions, HeadsetTrial, HouseScan};
-pub use labels::{FlipSide, LabelDraw, LabelModel, RegionLabels};
+pub use labels::{LabelDraw, RegionLabels};
 pub use laser::{LaserOptions, LaserView};
 pub use regions::{NO_REGION, Region};
 pub use robot::{Survey, SurveyOptions};

@@ -15,15 +15,13 @@ const PATCH_M: f64 = 2.0;
 /// Most patches along a side.
 const MAX_PATCHES: f64 = 48.0;
 
-/// One thing, or a patch of a structural one: what a segmenter would get wrong as a whole.
+/// A region that a segmenter gets wrong as a whole: one thing, or a patch of a structural one.
 #[derive(Clone, Copy, PartialEq, Eq, Debug)]
 pub struct Region {
     /// The true class.
     pub label: u16,
     /// Instance of the mesh.
     pub instance: u16,
-    /// Part of a wall, floor or ceiling.
-    pub structural: bool,
 }
 
 /// All triangles with one instance and class.
@@ -98,9 +96,8 @@ impl Regions {
         let mut list = Vec::new();
         for thing in &mut things {
             thing.first_region = list.len();
-            let structural = structural(thing.label);
             let mut regions = 1;
-            if structural {
+            if structural(thing.label) {
                 let size_m = [0, 1].map(|axis| thing.high_m[axis] - thing.low_m[axis]);
                 let side_m = PATCH_M.max(size_m[0].max(size_m[1]) / MAX_PATCHES);
                 let [columns, rows] = size_m.map(|size_m| (size_m / side_m) as usize + 1);
@@ -114,7 +111,6 @@ impl Regions {
             let region = Region {
                 label: thing.label,
                 instance: thing.instance,
-                structural,
             };
             list.extend(std::iter::repeat_n(region, regions));
             if list.len() > MAX_REGIONS {

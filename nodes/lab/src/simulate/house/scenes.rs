@@ -32,7 +32,7 @@ pub enum Scene {
 }
 
 impl Scene {
-    /// All of them, in the order of the paper.
+    /// All scenes, in the order of the paper.
     pub const ALL: [Scene; 4] = [Scene::Tv, Scene::Desk, Scene::Bookshelf, Scene::Dining];
 
     /// Name in reports and files.

@@ -51,10 +51,9 @@ impl SurveyMap {
     /// The centroids with the shares of their labels, map frame, in the order of
     /// [`SemanticCloud::from_voxels`].
     pub fn cloud(&self, labels: &RegionLabels) -> SemanticCloud {
-        let mut draws = labels.draws(0);
         let voxel = |range: &[usize]| {
             let regions = self.regions.get(range[0]..range[1]).unwrap_or_default();
-            draws.of_counts(regions)
+            labels.of_counts(regions)
         };
         SemanticCloud {
             labels: self.starts.windows(2).map(voxel).collect(),
@@ -66,8 +65,7 @@ impl SurveyMap {
 impl Survey {
     /// The survey as a map of labelled voxels: label histograms as `lattice_mapper` keeps them.
     pub fn voxels(&self, lattice: &Lattice, labels: &RegionLabels) -> Result<VoxelList, AnyError> {
-        let mut draws = labels.draws(0);
-        let labels = self.regions.iter().map(|&region| draws.class(region));
+        let labels = self.regions.iter().map(|&region| labels.class(region));
         voxels(self, lattice, &labels.collect::<Vec<u16>>())
     }
 }

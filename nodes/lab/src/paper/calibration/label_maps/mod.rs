@@ -1,4 +1,4 @@
-//! Figs. 3 and 4: what both devices call what the headset looks at.
+//! Figs. 3 and 4: the labels of both devices in the headset's view.
 
 mod picture;
 mod sheet;
@@ -164,7 +164,7 @@ impl Colors {
         name.unwrap_or_else(|| "no label".to_owned())
     }
 
-    /// Of the classes among these, in their order.
+    /// Key of the classes among these, in their order.
     fn key<'a>(&self, classes: impl Iterator<Item = &'a u16>) -> Vec<Entry> {
         let mut classes: Vec<u16> = classes.copied().collect();
         classes.sort_unstable();

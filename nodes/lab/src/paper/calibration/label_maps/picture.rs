@@ -110,7 +110,7 @@ impl Bounds {
 }
 
 impl Sides {
-    /// Of a scenario, whose map has cells with this side.
+    /// Both sides of a scenario, whose map has cells with this side.
     pub(super) fn new(scenario: &Scenario, cell_m: f64) -> Sides {
         let truth = &scenario.truth;
         let mut headset = Labelled::default();

@@ -96,8 +96,8 @@ fn dots_of(area: &Area, trials: &Trials, start: &str, scene: Scene) -> Result<()
                 let line = |points| PathElement::new(points, color.stroke_width(2));
                 chart.draw_series(lines.into_iter().map(line))?;
             }
-            let told = printed(scene).filter(|_| blamed(scene) == (side == 1));
-            let value = told.and_then(|printed| match *method {
+            let known = printed(scene).filter(|_| blamed(scene) == (side == 1));
+            let value = known.and_then(|printed| match *method {
                 GICP => Some(printed.gicp_se3),
                 method if SEMANTIC.contains(&method) => Some(printed.semantic_icp),
                 _ => None,

@@ -52,7 +52,7 @@ struct Trials {
 }
 
 impl Trials {
-    /// Runs them; `progress` is told how much is done.
+    /// Runs the trials; `progress` gets the share done.
     fn run(context: &Context, progress: &mut dyn FnMut(f64)) -> Result<Trials, AnyError> {
         let names = |methods: Vec<&str>| methods.into_iter().map(str::to_owned).collect();
         let plan = Plan {
@@ -92,7 +92,7 @@ impl Trials {
         Trials::of(results.sorted())
     }
 
-    /// Of an evaluation: the nearest start and the farthest, and the share of wrong labels nearest to
+    /// Trials of an evaluation: the nearest start and the farthest, and the share of wrong labels nearest to
     /// [`BAD`].
     fn of(all: Vec<Trial>) -> Result<Trials, AnyError> {
         let off = |trial: &Trial| match trial.cell.start.parse() {
@@ -115,7 +115,7 @@ impl Trials {
         }
     }
 
-    /// Of one method; of all scenes if `None`.
+    /// Trials of one method; of all scenes if `None`.
     fn of_method(
         &self,
         scene: Option<Scene>,

@@ -102,14 +102,14 @@ fn medians(trials: &Trials, name: &str, start: &str) -> Table {
         .into_iter()
         .flat_map(|scene| [0.0, trials.bad].map(|q| (scene, q)));
     let row = |(scene, q): (Scene, f64)| {
-        let told = printed(scene).filter(|_| labels_of(trials, scene) == q);
+        let known = printed(scene).filter(|_| labels_of(trials, scene) == q);
         let number = |value: Option<f64>| value.map_or(Cell::Empty, |v| Cell::Number(v, 2));
         let mut row = vec![
             scene.name().into(),
             format!("{:.0} %", 100.0 * q).into(),
             trials.of_method(Some(scene), q, start, GICP).count().into(),
-            number(told.map(|p| p.gicp_se3)),
-            number(told.map(|p| p.semantic_icp)),
+            number(known.map(|p| p.gicp_se3)),
+            number(known.map(|p| p.semantic_icp)),
         ];
         row.extend(methods().into_iter().map(|method| {
             let estimate = trials.d_se3(Some(scene), q, start, method);

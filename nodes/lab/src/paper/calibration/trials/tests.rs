@@ -43,7 +43,7 @@ fn is_semantic(method: &str) -> bool {
     SEMANTIC.contains(&method)
 }
 
-/// As the paper says.
+/// Errors as the paper has them.
 fn as_said(q: f64, good: bool, method: &str) -> f64 {
     match (is_semantic(method), q > 0.5, good) {
         (true, true, _) => 9.0,

@@ -2,8 +2,9 @@
 
 use lattice_core::lattice::LatticeKind;
 
-use super::{Placed, Printed, range, rms_m};
+use super::{Placed, Printed, rms_m};
 use crate::AnyError;
+use crate::evaluate::extent;
 use crate::report::plot::{Area, Axes, BoxStats, Layout, NamedBox, boxes_with_marks, color, svg};
 
 /// Voxels against the mean of cubic, and RMS: boxes over all places, crosses as printed.
@@ -53,7 +54,7 @@ fn panel(
         .iter()
         .flat_map(values)
         .chain(marks.iter().copied().flatten());
-    let [low, high] = range(&shown.collect::<Vec<_>>());
+    let [low, high] = extent(shown);
     let room = 0.06 * (high - low);
     let axes = Axes {
         title,

@@ -10,6 +10,7 @@ use nalgebra::{Isometry3, Translation3, UnitQuaternion, Vector3};
 use super::Options;
 use super::rotations::{Quantized, quantized};
 use crate::AnyError;
+use crate::evaluate::extent;
 use crate::paper::estimate::Estimate;
 use crate::paper::parallel::in_parallel;
 use crate::paper::streams::{Purpose, stream};
@@ -86,15 +87,6 @@ impl Placed {
 
 fn rms_m(q: &Quantized) -> f64 {
     (3.0 * q.mse_m2).sqrt()
-}
-
-/// Least and greatest.
-fn range(values: &[f64]) -> [f64; 2] {
-    let low = values.iter().copied().fold(f64::INFINITY, f64::min);
-    [
-        low,
-        values.iter().copied().fold(f64::NEG_INFINITY, f64::max),
-    ]
 }
 
 pub fn section(options: &Options, progress: &mut dyn FnMut(f64)) -> Result<Section, AnyError> {
@@ -241,16 +233,16 @@ fn finding(all: &[Placed]) -> String {
         };
         counts.iter().map(of).collect()
     };
-    let [low, high] = cubic.map_or([f64::NAN; 2], |placed| range(&placed.each(rms_m)));
+    let [low, high] = cubic.map_or([f64::NAN; 2], |placed| extent(placed.each(rms_m)));
     let less = all.iter().map(|placed| {
         let rms_m = (3.0 * placed.mse_of_theory()).sqrt();
         100.0 * (1.0 - mean_distance_m(&placed.lattice, [0; 3]) / rms_m)
     });
-    let [least, most] = range(&less.collect::<Vec<_>>());
+    let [least, most] = extent(less);
     let within: Vec<&str> = all
         .iter()
         .filter(|placed| {
-            let [low, high] = range(&placed.each(rms_m));
+            let [low, high] = extent(placed.each(rms_m));
             let printed = placed.printed.map_or(f64::NAN, |row| row.distance_error);
             (low..=high).contains(&printed)
         })

@@ -4,13 +4,14 @@ use std::path::Path;
 
 use lattice_core::lattice::LatticeKind;
 
-use super::{POINTS, Placed, Printed, VOLUME_M3, range, rms_m};
+use super::{POINTS, Placed, Printed, VOLUME_M3, rms_m};
+use crate::evaluate::extent;
 use crate::report::plot::title;
 use crate::report::{Cell, Table};
 use crate::theory::mean_distance_m;
 use lattice_nodes::replay::RunReport;
 
-/// As printed and as simulated.
+/// Table I as printed and as simulated.
 pub fn compared(all: &[Placed]) -> Table {
     let columns = [
         "lattice",
@@ -42,8 +43,8 @@ pub fn compared(all: &[Placed]) -> Table {
             placed.printed.map_or(Cell::Empty, cell)
         };
         let voxels = placed.voxels();
-        let [least, most] = range(&placed.each(|q| q.voxels as f64));
-        let [low, high] = range(&placed.each(rms_m));
+        let [least, most] = extent(placed.each(|q| q.voxels as f64));
+        let [low, high] = extent(placed.each(rms_m));
         let to_cubic = placed.printed.map_or(Cell::Empty, |row| {
             Cell::Number(100.0 * (row.voxels / cubic_printed - 1.0), 1)
         });
@@ -76,7 +77,7 @@ pub fn compared(all: &[Placed]) -> Table {
     )
 }
 
-/// As printed and as theory has it.
+/// Table I as printed and as theory has it.
 pub fn theory(all: &[Placed]) -> Table {
     let columns = [
         "lattice",

@@ -170,7 +170,7 @@ const COMPARISONS: [Comparison; 4] = [
 /// Change of the spread of one set against that of another, %.
 struct Change {
     name: &'static str,
-    /// Of the standard deviation, from random points, and half of its 95 % interval.
+    /// Change of the standard deviation, from random points, and half of its 95 % interval.
     std: f64,
     half: f64,
     exact_std: f64,

@@ -12,7 +12,7 @@ use crate::report::Cell;
 use crate::report::plot::{Curve, color, title};
 use crate::theory::{mean_distance_m, second_moment};
 
-/// Of the curves, cell sides.
+/// Bins of the curves, cell sides.
 const BIN: f64 = 0.02;
 const BINS: usize = 140;
 
@@ -20,7 +20,7 @@ const BINS: usize = 140;
 #[derive(Clone, Copy, PartialEq, Eq, Debug)]
 pub enum Cells {
     Own,
-    /// As printed in eq. (3)-(7), without 0.
+    /// Cells printed in eq. (3)-(7), without 0.
     Printed,
     Faces,
     Touching,
@@ -116,7 +116,7 @@ impl Spread {
             std: Estimate::of(draws.iter().map(|draw| draw.1)),
             exact_mean,
             exact_std: (square - exact_mean * exact_mean).sqrt(),
-            // The nearest point is in the midst of a face.
+            // The nearest point is in the middle of a face.
             nearest: match cells {
                 Cells::Own => 0.0,
                 _ => lattice.packing_radius_m(),

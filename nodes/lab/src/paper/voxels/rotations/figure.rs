@@ -2,8 +2,9 @@
 
 use lattice_core::lattice::LatticeKind;
 
-use super::{Run, ends};
+use super::Run;
 use crate::AnyError;
+use crate::evaluate::extent;
 use crate::paper::voxels::scan::Scan;
 use crate::report::Figure;
 use crate::report::plot::{Axes, Curve, Layout, color, cumulative, curves, key, svg};
@@ -63,12 +64,12 @@ pub fn figure(scan: &Scan, runs: &[&Run]) -> Result<Figure, AnyError> {
     ))
 }
 
-/// From the least to the greatest x of some lines, and a little more.
+/// Range of x of some lines, and a little more.
 fn reach(lines: &[Curve]) -> std::ops::Range<f64> {
     let xs = lines
         .iter()
         .flat_map(|(_, points)| points.iter().map(|p| p.0));
-    let (low, high) = ends(xs);
+    let [low, high] = extent(xs);
     let room = 0.04 * (high - low).max(1e-9);
     low - room..high + room
 }

@@ -22,7 +22,7 @@ pub enum Turns {
 }
 
 impl Turns {
-    /// In words.
+    /// Name in words.
     pub fn name(self) -> &'static str {
         match self {
             Self::Any => "any rotation",
@@ -55,7 +55,7 @@ pub struct Laid {
 }
 
 impl Laid {
-    /// In the axes of the paper.
+    /// A lattice in the axes of the paper.
     pub fn paper(kind: LatticeKind) -> Laid {
         Laid {
             kind,
@@ -63,7 +63,7 @@ impl Laid {
         }
     }
 
-    /// With the flattest cells.
+    /// A lattice with its flattest side down.
     pub fn flat(kind: LatticeKind) -> Laid {
         Laid {
             kind,
@@ -71,7 +71,7 @@ impl Laid {
         }
     }
 
-    /// In words.
+    /// Name in words.
     pub fn name(&self) -> String {
         match self.orientation {
             Orientation::Paper => title(self.kind).to_owned(),

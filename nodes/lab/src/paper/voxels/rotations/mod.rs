@@ -9,6 +9,7 @@ use lattice_core::lattice::LatticeKind;
 use super::scan::{Scan, Source, scans};
 use super::{Options, unit};
 use crate::AnyError;
+use crate::evaluate::extent;
 use crate::paper::estimate::Estimate;
 use crate::report::plot::title;
 use crate::report::{Check, Section, Verdict};
@@ -98,17 +99,17 @@ pub fn section(options: &Options, progress: &mut dyn FnMut(f64)) -> Result<Secti
     });
     let figures = figures.collect::<Result<Vec<_>, AnyError>>()?;
     let count = |turns, kind| {
-        let (low, high) = over_scans(&runs, turns, |run| Some(run.count_change(kind)?.mean));
+        let [low, high] = over_scans(&runs, turns, |run| Some(run.count_change(kind)?.mean));
         format!("{:+.1} to {:+.1} %", 100.0 * low, 100.0 * high)
     };
     let steadiness = |kind| {
-        let (low, high) = over_scans(&runs, Turns::Any, |run| {
+        let [low, high] = over_scans(&runs, Turns::Any, |run| {
             Some(spread(run.paper(kind)?).mean / spread(run.cubic()?).mean)
         });
         format!("{low:.2} to {high:.2}")
     };
     let mean = |kind| {
-        let (low, high) = over_scans(&runs, Turns::Any, |run| {
+        let [low, high] = over_scans(&runs, Turns::Any, |run| {
             Some(run.paper(kind)?.mean_to(run.cubic()?).mean)
         });
         format!("{:+.1} to {:+.1} %", 100.0 * low, 100.0 * high)
@@ -149,12 +150,12 @@ pub fn section(options: &Options, progress: &mut dyn FnMut(f64)) -> Result<Secti
 }
 
 /// Least and greatest value of the scans in their first cells.
-fn over_scans(runs: &[Run], turns: Turns, value: impl Fn(&Run) -> Option<f64>) -> (f64, f64) {
+fn over_scans(runs: &[Run], turns: Turns, value: impl Fn(&Run) -> Option<f64>) -> [f64; 2] {
     let drawn = runs
         .iter()
         .filter(|run| run.turns == turns && run.is_drawn());
     let scans = drawn.filter(|run| run.scan.source != Source::Uniform);
-    ends(scans.filter_map(value))
+    extent(scans.filter_map(value))
 }
 
 /// Checks of a run against theory and the paper.
@@ -233,11 +234,4 @@ fn check(run: &Run) -> Result<Vec<Check>, AnyError> {
 /// Standard deviation of the count.
 fn spread(measured: &Measured) -> Estimate {
     Estimate::deviation_of(&measured.counts)
-}
-
-/// Least and greatest.
-fn ends(values: impl Iterator<Item = f64>) -> (f64, f64) {
-    values.fold((f64::INFINITY, f64::NEG_INFINITY), |(low, high), x| {
-        (low.min(x), high.max(x))
-    })
 }

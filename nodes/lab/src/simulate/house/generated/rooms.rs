@@ -8,7 +8,7 @@ use super::furniture::{
 use super::{COUNTER, OTHER, between};
 use crate::simulate::random::Stream;
 
-/// From the middle of a wall to what stands against it, m.
+/// Distance from the middle of a wall to furniture against it, m.
 const GAP: f32 = 0.08;
 
 /// Against a wall on the low or high side of x or y.

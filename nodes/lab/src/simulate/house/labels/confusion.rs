@@ -1,10 +1,9 @@
 //! Classes that segmenters confuse.
 
-use std::collections::BTreeMap;
+use std::collections::{BTreeMap, BTreeSet};
 
 use lattice_core::registration::UNLABELED;
 
-use super::one_of;
 use crate::simulate::house::House;
 use crate::simulate::random::Stream;
 
@@ -30,23 +29,14 @@ const CONFUSIONS: [(&str, &[&str]); 18] = [
     ("other", &["chair", "table", "cabinet", "picture"]),
 ];
 
-/// Classes that others are mistaken for.
-pub(super) struct Confusion {
-    /// Plausible other classes of each class.
-    others: BTreeMap<u16, Vec<u16>>,
-    /// The one that each class is always taken for.
-    usual: BTreeMap<u16, u16>,
-    /// All classes of the house.
-    pub(super) known: Vec<u16>,
-}
+/// Plausible other classes of each class of a house.
+pub(super) struct Confusion(BTreeMap<u16, Vec<u16>>);
 
 impl Confusion {
-    pub(super) fn new(house: &House, stream: &mut Stream) -> Confusion {
-        let mut known: Vec<u16> = house.regions().iter().map(|region| region.label).collect();
+    pub(super) fn new(house: &House) -> Confusion {
+        let mut known: BTreeSet<u16> = house.regions().iter().map(|r| r.label).collect();
         known.extend(house.class_names().keys());
-        known.sort_unstable();
-        known.dedup();
-        known.retain(|class| *class != UNLABELED);
+        known.remove(&UNLABELED);
         let plausible = |class: &u16| {
             let name = house.class_names().get(class);
             let row = name.and_then(|name| CONFUSIONS.iter().find(|(of, _)| of == name));
@@ -61,25 +51,18 @@ impl Confusion {
                 false => others,
             }
         };
-        let others: BTreeMap<u16, Vec<u16>> = known.iter().map(|c| (*c, plausible(c))).collect();
-        let usual = others
-            .iter()
-            .map(|(class, others)| (*class, one_of(others, *class, stream)));
-        Confusion {
-            usual: usual.collect(),
-            others,
-            known,
-        }
+        Confusion(known.iter().map(|c| (*c, plausible(c))).collect())
     }
 
-    /// The class that another is always taken for.
-    pub(super) fn usual(&self, class: u16) -> u16 {
-        self.usual.get(&class).copied().unwrap_or(class)
+    /// Number of classes.
+    pub(super) fn len(&self) -> usize {
+        self.0.len()
     }
 
-    /// A plausible other class.
+    /// A plausible other class, or the class itself if there is none.
     pub(super) fn any(&self, class: u16, stream: &mut Stream) -> u16 {
-        let others = self.others.get(&class).map(Vec::as_slice);
-        one_of(others.unwrap_or_default(), class, stream)
+        let others = self.0.get(&class).map_or(&[][..], Vec::as_slice);
+        let choice = (stream.uniform() * others.len() as f64) as usize;
+        others.get(choice).copied().unwrap_or(class)
     }
 }
