@@ -11,7 +11,7 @@ use super::{
     messages::MessageCompression,
     metadata::{CompressionMode, Metadata},
     split::Split,
-    storage::full_type_name,
+    storage::{Filter, full_type_name},
 };
 
 /// More storage files than this are refused.
@@ -116,9 +116,11 @@ impl BagReader {
         Ok(Messages::new(
             self.splits.clone(),
             self.topics.clone(),
-            wanted,
-            options.start_ns.unwrap_or(i64::MIN),
-            options.end_ns,
+            Filter {
+                topics: wanted,
+                start_ns: options.start_ns.unwrap_or(i64::MIN),
+                end_ns: options.end_ns,
+            },
             self.compression,
         ))
     }
@@ -184,16 +186,7 @@ impl BagReader {
             log::warn!("{damage}");
         }
         let all_open = splits.iter().all(|split| split.open.is_some());
-        let listed = metadata
-            .as_ref()
-            .filter(|m| m.message_count > 0)
-            .and_then(|m| {
-                let start_ns = m.starting_time.nanoseconds_since_epoch;
-                Some((
-                    start_ns,
-                    start_ns.checked_add(m.duration.nanoseconds.max(0))?,
-                ))
-            });
+        let listed = metadata.as_ref().and_then(Metadata::range_ns);
         let seen = splits
             .iter()
             .filter_map(|split| split.range_ns)
