@@ -18,7 +18,7 @@ pub(crate) enum OpenFile {
 }
 
 impl OpenFile {
-    /// Opens `path` by what it is, whatever its name.
+    /// Opens `path` by its content, not its name.
     pub(crate) fn open(path: &Path) -> Result<OpenFile, BagError> {
         match identify(path)? {
             FileKind::Mcap => McapFile::open(path, None).map(OpenFile::Mcap),
