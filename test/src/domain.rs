@@ -1,4 +1,4 @@
-//! DDS domains for tests: one for each test, whatever else runs on the machine.
+//! DDS domains for tests: one for each test, apart from all else on the machine.
 
 use lattice_runtime::LoopbackDomain;
 use lattice_runtime::env::{DiscoveryRange, Transport};

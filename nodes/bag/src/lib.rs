@@ -10,6 +10,7 @@ mod qos;
 mod reader;
 mod sniff;
 mod split;
+mod split_list;
 mod sqlite_storage;
 mod storage;
 #[cfg(test)]

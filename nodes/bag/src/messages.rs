@@ -6,7 +6,7 @@ use super::{
     BagError, BagMessage, TopicInfo,
     sniff::ZSTD_MAGIC,
     split::{OpenFile, Split},
-    storage::{StorageMessage, StorageStream},
+    storage::{Filter, StorageMessage, StorageStream},
     zstd_files::decompress_message,
 };
 
@@ -26,9 +26,8 @@ pub(crate) enum MessageCompression {
 pub struct Messages {
     splits: Arc<[Split]>,
     topics: Arc<[TopicInfo]>,
-    wanted: Vec<bool>,
-    start_ns: i64,
-    end_ns: Option<i64>,
+    /// By topics of the bag.
+    filter: Filter,
     compression: MessageCompression,
     /// Not yet opened, in order of time.
     pending: VecDeque<usize>,
@@ -51,15 +50,14 @@ impl Messages {
     pub(crate) fn new(
         splits: Arc<[Split]>,
         topics: Arc<[TopicInfo]>,
-        wanted: Vec<bool>,
-        start_ns: i64,
-        end_ns: Option<i64>,
+        filter: Filter,
         compression: MessageCompression,
     ) -> Messages {
         let in_range = |split: &Split| {
-            split.range_ns.is_none_or(|(first, last)| {
-                last >= start_ns && end_ns.is_none_or(|end_ns| first < end_ns)
-            }) || split.damage().is_some()
+            split
+                .range_ns
+                .is_none_or(|range_ns| filter.overlaps(range_ns))
+                || split.damage().is_some()
         };
         let pending = splits
             .iter()
@@ -70,9 +68,7 @@ impl Messages {
         Messages {
             splits,
             topics,
-            wanted,
-            start_ns,
-            end_ns,
+            filter,
             compression,
             pending,
             active: Vec::new(),
@@ -106,13 +102,7 @@ impl Messages {
                     &opened
                 }
             };
-            let (mut stream, topic_of) = open.wanted(
-                &split.path,
-                &self.topics,
-                &self.wanted,
-                self.start_ns,
-                self.end_ns,
-            )?;
+            let (mut stream, topic_of) = open.wanted(&split.path, &self.topics, &self.filter)?;
             if let Some(head) = stream.next() {
                 let head_ns = head.as_ref().map_or(i64::MAX, |m| m.log_time_ns);
                 let path = split.path.clone();

@@ -11,11 +11,9 @@ use super::{
     messages::MessageCompression,
     metadata::{CompressionMode, Metadata},
     split::Split,
-    storage::full_type_name,
+    split_list::{in_order_of_time, listed_splits, splits_in},
+    storage::{Filter, full_type_name},
 };
-
-/// More storage files than this are refused.
-const MAX_FILES: usize = 100_000;
 
 /// Selection of messages by topic and time; the default is all.
 #[derive(Clone, Debug, Default)]
@@ -50,38 +48,10 @@ impl BagReader {
         }
         let metadata_path = path.join("metadata.yaml");
         if !metadata_path.exists() {
-            let splits = list_storage_files(path)?
-                .into_iter()
-                .map(|file| Split::new(file, false));
-            return Self::assemble(path, None, splits.collect::<Result<_, _>>()?);
+            return Self::assemble(path, None, splits_in(path)?);
         }
         let metadata = Metadata::read(&metadata_path)?;
-        if !matches!(metadata.storage_identifier.as_str(), "mcap" | "sqlite3") {
-            return Err(BagError::Unsupported {
-                path: metadata_path,
-                what: format!("storage plugin {:?}", metadata.storage_identifier),
-                remedy: "mcap and sqlite3 are known; convert with `ros2 bag convert`",
-            });
-        }
-        let mut splits = Vec::new();
-        for (entry, file) in metadata.storage_paths(path, &metadata_path)? {
-            // Some versions of rosbag2 list compressed files by their names before compression.
-            let packed = PathBuf::from(format!("{}.zstd", file.display()));
-            let file = if !file.exists() && packed.exists() {
-                packed
-            } else {
-                file
-            };
-            // The first one is opened at once for the message definitions.
-            let mut split = Split::new(file, !splits.is_empty())?;
-            if split.open.is_none()
-                && let Some(listed) = metadata.files.iter().find(|file| file.path == entry)
-            {
-                split.range_ns = listed.range_ns();
-                split.message_count = Some(listed.message_count);
-            }
-            splits.push(split);
-        }
+        let splits = listed_splits(path, &metadata, &metadata_path)?;
         Self::assemble(path, Some(metadata), splits)
     }
 
@@ -116,9 +86,11 @@ impl BagReader {
         Ok(Messages::new(
             self.splits.clone(),
             self.topics.clone(),
-            wanted,
-            options.start_ns.unwrap_or(i64::MIN),
-            options.end_ns,
+            Filter {
+                topics: wanted,
+                start_ns: options.start_ns.unwrap_or(i64::MIN),
+                end_ns: options.end_ns,
+            },
             self.compression,
         ))
     }
@@ -148,18 +120,9 @@ impl BagReader {
     fn assemble(
         path: &Path,
         metadata: Option<Metadata>,
-        mut splits: Vec<Split>,
+        splits: Vec<Split>,
     ) -> Result<BagReader, BagError> {
-        // Files of unknown time keep their place behind the one before.
-        let mut place_ns = i64::MIN;
-        let mut keyed: Vec<(i64, Split)> = Vec::with_capacity(splits.len());
-        for split in splits.drain(..) {
-            place_ns = split.range_ns.map_or(place_ns, |(start_ns, _)| start_ns);
-            keyed.push((place_ns, split));
-        }
-        keyed.sort_by_key(|(place_ns, _)| *place_ns);
-        let splits: Vec<Split> = keyed.into_iter().map(|(_, split)| split).collect();
-
+        let splits = in_order_of_time(splits);
         let infos = || {
             splits
                 .iter()
@@ -184,16 +147,7 @@ impl BagReader {
             log::warn!("{damage}");
         }
         let all_open = splits.iter().all(|split| split.open.is_some());
-        let listed = metadata
-            .as_ref()
-            .filter(|m| m.message_count > 0)
-            .and_then(|m| {
-                let start_ns = m.starting_time.nanoseconds_since_epoch;
-                Some((
-                    start_ns,
-                    start_ns.checked_add(m.duration.nanoseconds.max(0))?,
-                ))
-            });
+        let listed = metadata.as_ref().and_then(Metadata::range_ns);
         let seen = splits
             .iter()
             .filter_map(|split| split.range_ns)
@@ -254,37 +208,4 @@ fn merge_topic(topics: &mut Vec<TopicInfo>, topic: &TopicInfo, counted: bool) {
     if counted {
         known.message_count = known.message_count.saturating_add(topic.message_count);
     }
-}
-
-/// The storage files of a bag without `metadata.yaml`, in the order of their numbers.
-fn list_storage_files(folder: &Path) -> Result<Vec<PathBuf>, BagError> {
-    let mut files = Vec::new();
-    for entry in fs::read_dir(folder).map_err(BagError::io(folder, "list"))? {
-        let path = entry.map_err(BagError::io(folder, "list"))?.path();
-        let name = path
-            .file_name()
-            .unwrap_or_default()
-            .to_string_lossy()
-            .into_owned();
-        let bare = name.strip_suffix(".zstd").unwrap_or(&name);
-        if bare.ends_with(".mcap") || bare.ends_with(".db3") {
-            files.push(path);
-        }
-        if files.len() > MAX_FILES {
-            return Err(BagError::Unsupported {
-                path: folder.to_path_buf(),
-                what: format!("a bag of more than {MAX_FILES} files"),
-                remedy: "open the files one by one",
-            });
-        }
-    }
-    if files.is_empty() {
-        return Err(BagError::Foreign {
-            path: folder.to_path_buf(),
-            found: "a folder without metadata.yaml, .mcap or .db3 files".into(),
-            remedy: "give the folder that `ros2 bag record` made",
-        });
-    }
-    files.sort_by_key(|path| (path.as_os_str().len(), path.clone()));
-    Ok(files)
 }

@@ -18,7 +18,7 @@ pub(crate) enum OpenFile {
 }
 
 impl OpenFile {
-    /// Opens `path` by what it is, whatever its name.
+    /// Opens `path` by its content, not its name.
     pub(crate) fn open(path: &Path) -> Result<OpenFile, BagError> {
         match identify(path)? {
             FileKind::Mcap => McapFile::open(path, None).map(OpenFile::Mcap),
@@ -59,9 +59,7 @@ impl OpenFile {
         &self,
         path: &Path,
         topics: &[TopicInfo],
-        wanted: &[bool],
-        start_ns: i64,
-        end_ns: Option<i64>,
+        wanted: &Filter,
     ) -> Result<(StorageStream, Vec<usize>), BagError> {
         let find = |name: &str, type_name: &str| {
             topics
@@ -85,12 +83,11 @@ impl OpenFile {
         let mapped = mapped?;
         let by_file = mapped
             .iter()
-            .map(|index| wanted.get(*index).copied().unwrap_or(false))
+            .map(|index| wanted.wants_topic(*index))
             .collect();
         let stream = self.stream(Filter {
             topics: by_file,
-            start_ns,
-            end_ns,
+            ..*wanted
         })?;
         Ok((stream, mapped))
     }

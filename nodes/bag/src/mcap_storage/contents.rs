@@ -30,6 +30,28 @@ struct Schema {
     text: String,
 }
 
+/// Number of messages, and their first and last log time.
+#[derive(Clone, Copy, Default)]
+pub(super) struct Seen {
+    pub messages: u64,
+    pub range_ns: Option<(u64, u64)>,
+}
+
+impl Seen {
+    pub(super) fn one(log_time_ns: u64) -> Seen {
+        Seen {
+            messages: 1,
+            range_ns: Some((log_time_ns, log_time_ns)),
+        }
+    }
+
+    pub(super) fn add(&mut self, other: Seen) {
+        self.messages = self.messages.saturating_add(other.messages);
+        let ranges = [self.range_ns, other.range_ns].into_iter().flatten();
+        self.range_ns = ranges.reduce(|a, b| (a.0.min(b.0), a.1.max(b.1)));
+    }
+}
+
 /// Schemas, channels, blocks and counts.
 #[derive(Default)]
 pub(super) struct Contents {
@@ -37,8 +59,7 @@ pub(super) struct Contents {
     pub channels: BTreeMap<u16, Channel>,
     pub blocks: Vec<Block>,
     pub counts: BTreeMap<u16, u64>,
-    pub message_count: u64,
-    pub range_ns: Option<(u64, u64)>,
+    pub seen: Seen,
     pub damage: Option<BagError>,
 }
 
@@ -71,14 +92,6 @@ impl Contents {
             _ => {}
         }
         Ok(())
-    }
-
-    /// Counts a message seen in a scan.
-    pub(super) fn count(&mut self, channel: u16, log_time_ns: u64) {
-        *self.counts.entry(channel).or_default() += 1;
-        self.message_count += 1;
-        let (first, last) = self.range_ns.unwrap_or((log_time_ns, log_time_ns));
-        self.range_ns = Some((first.min(log_time_ns), last.max(log_time_ns)));
     }
 
     /// True if every channel that has messages is known, with its schema.
@@ -116,7 +129,7 @@ impl Contents {
             });
         }
         let mut info = StorageInfo {
-            message_count: self.message_count,
+            message_count: self.seen.messages,
             damage: self.damage.take(),
             ..StorageInfo::default()
         };

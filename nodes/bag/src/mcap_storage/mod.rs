@@ -54,7 +54,7 @@ impl McapFile {
             scan::scan(&mut file, path, size)
         });
         let (mut info, topic_of) = contents.topics(path, &profile)?;
-        if let Some((first, last)) = contents.range_ns {
+        if let Some((first, last)) = contents.seen.range_ns {
             let signed = |ns: u64| {
                 i64::try_from(ns).map_err(|_| {
                     let reason = format!("log time {ns} ns is beyond the year 2262");
@@ -74,15 +74,7 @@ impl McapFile {
 
     /// The wanted messages in order of log time.
     pub(crate) fn stream(&self, filter: Filter) -> Result<StorageStream, BagError> {
-        let stream = McapStream::new(
-            self.path.clone(),
-            self.temporary.clone(),
-            &self.blocks,
-            self.topic_of.clone(),
-            filter,
-            self.info.damage.clone(),
-        )?;
-        Ok(Box::new(stream))
+        Ok(Box::new(McapStream::new(self, filter)?))
     }
 }
 

@@ -1,7 +1,7 @@
 //! Index of an MCAP file without a usable summary (unfinished, cut or unchunked), from its records.
 
 use std::{
-    collections::BTreeSet,
+    collections::{BTreeMap, BTreeSet},
     fs::File,
     io::{Seek, SeekFrom},
     ops::ControlFlow,
@@ -11,7 +11,7 @@ use std::{
 use mcap::{records::op, sans_io::LinearReaderOptions};
 
 use super::{
-    contents::{Block, Contents},
+    contents::{Block, Contents, Seen},
     records::{Place, RECORD_HEADER_BYTES, RecordError, parse_message, visit_chunk, visit_records},
 };
 use crate::{BagError, sniff::MCAP_MAGIC};
@@ -25,7 +25,7 @@ pub(super) fn scan(file: &mut File, path: &Path, size: u64) -> Contents {
     let ended = scan.records(file, size);
     scan.end_run();
     let mut contents = scan.contents;
-    let readable_messages = contents.message_count;
+    let readable_messages = contents.seen.messages;
     contents.damage = match ended {
         Ok(ControlFlow::Break(())) => None,
         Ok(ControlFlow::Continue(())) => Some(BagError::Truncated {
@@ -72,12 +72,19 @@ impl Scan {
 
     fn chunk(&mut self, byte: u64, body: &[u8]) -> Result<(), RecordError> {
         self.end_run();
-        let mut messages = Vec::new();
+        // By channel, so that a chunk of countless small messages takes no memory for them.
+        let mut seen: BTreeMap<u16, (Place, Seen)> = BTreeMap::new();
         let mut records = Vec::new();
         // The content of a chunk counts only once its CRC is right.
         let header = visit_chunk(byte, body, &mut |place, opcode, body| {
             match opcode {
-                op::MESSAGE => messages.push((place, parse_message(place, body)?.0)),
+                op::MESSAGE => {
+                    let (message, _) = parse_message(place, body)?;
+                    let (_, of_channel) = seen
+                        .entry(message.channel_id)
+                        .or_insert((place, Seen::default()));
+                    of_channel.add(Seen::one(message.log_time));
+                }
                 op::SCHEMA | op::CHANNEL => records.push((place, opcode, body.to_vec())),
                 _ => {}
             }
@@ -94,14 +101,17 @@ impl Scan {
             end_ns: header.message_end_time,
             channels: None,
         };
-        let mut channels = BTreeSet::new();
-        for (place, message) in messages {
-            self.count(place, message.channel_id, message.log_time)?;
-            block.start_ns = block.start_ns.min(message.log_time);
-            block.end_ns = block.end_ns.max(message.log_time);
-            channels.insert(message.channel_id);
+        for (channel, (place, _)) in &seen {
+            self.expect_channel(*place, *channel)?;
         }
-        block.channels = Some(channels.into_iter().collect());
+        block.channels = Some(seen.keys().copied().collect());
+        for (channel, (_, of_channel)) in seen {
+            self.count(channel, of_channel);
+            if let Some((first_ns, last_ns)) = of_channel.range_ns {
+                block.start_ns = block.start_ns.min(first_ns);
+                block.end_ns = block.end_ns.max(last_ns);
+            }
+        }
         self.contents.blocks.push(block);
         Ok(())
     }
@@ -110,7 +120,8 @@ impl Scan {
     fn message(&mut self, place: Place, body: &[u8]) -> Result<(), RecordError> {
         let (message, _) = parse_message(place, body)?;
         let (channel, log_time_ns) = (message.channel_id, message.log_time);
-        self.count(place, channel, log_time_ns)?;
+        self.expect_channel(place, channel)?;
+        self.count(channel, Seen::one(log_time_ns));
         let (block, channels) = self.run.get_or_insert_with(|| {
             let block = Block {
                 offset: place.byte,
@@ -144,12 +155,18 @@ impl Scan {
         taken.map_err(|reason| RecordError::bad(place, reason))
     }
 
-    fn count(&mut self, place: Place, channel: u16, log_time_ns: u64) -> Result<(), RecordError> {
-        if !self.contents.channels.contains_key(&channel) {
-            let reason = format!("a message of channel {channel}, which no record announced");
-            return Err(RecordError::bad(place, reason));
+    fn expect_channel(&self, place: Place, channel: u16) -> Result<(), RecordError> {
+        match self.contents.channels.contains_key(&channel) {
+            true => Ok(()),
+            false => Err(RecordError::bad(
+                place,
+                format!("a message of channel {channel}, which no record announced"),
+            )),
         }
-        self.contents.count(channel, log_time_ns);
-        Ok(())
+    }
+
+    fn count(&mut self, channel: u16, seen: Seen) {
+        *self.contents.counts.entry(channel).or_default() += seen.messages;
+        self.contents.seen.add(seen);
     }
 }

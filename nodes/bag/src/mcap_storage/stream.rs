@@ -14,6 +14,7 @@ use mcap::{records::op, sans_io::LinearReaderOptions};
 use tempfile::TempPath;
 
 use super::{
+    McapFile,
     contents::Block,
     records::{Cause, Place, RecordError, parse_message, visit_chunk, visit_records},
 };
@@ -52,15 +53,8 @@ struct Waiting {
 }
 
 impl McapStream {
-    pub(super) fn new(
-        path: PathBuf,
-        temporary: Option<Arc<TempPath>>,
-        blocks: &[Block],
-        topic_of: Arc<BTreeMap<u16, usize>>,
-        filter: Filter,
-        damage: Option<BagError>,
-    ) -> Result<McapStream, BagError> {
-        let file = File::open(&path).map_err(BagError::io(&path, "open"))?;
+    pub(super) fn new(file: &McapFile, filter: Filter) -> Result<McapStream, BagError> {
+        let topic_of = file.topic_of.clone();
         let is_wanted = |block: &&Block| {
             let clamp = |ns: u64| i64::try_from(ns).unwrap_or(i64::MAX);
             let has_topic = block.channels.as_ref().is_none_or(|channels| {
@@ -71,19 +65,19 @@ impl McapStream {
             // Empty chunks may carry a reversed range.
             has_topic && filter.overlaps((clamp(block.start_ns), clamp(block.end_ns)))
         };
-        let mut blocks: Vec<Block> = blocks.iter().filter(is_wanted).cloned().collect();
+        let mut blocks: Vec<Block> = file.blocks.iter().filter(is_wanted).cloned().collect();
         blocks.sort_by_key(|block| (block.start_ns, block.offset));
         Ok(McapStream {
-            file,
-            path,
-            _temporary: temporary,
+            file: File::open(&file.path).map_err(BagError::io(&file.path, "open"))?,
+            path: file.path.clone(),
+            _temporary: file.temporary.clone(),
             blocks: blocks.into(),
             blocks_read: 0,
             topic_of,
             filter,
             waiting: BinaryHeap::new(),
             waiting_bytes: 0,
-            damage,
+            damage: file.info.damage.clone(),
             ended: false,
         })
     }

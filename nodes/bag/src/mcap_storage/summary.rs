@@ -12,7 +12,7 @@ use mcap::{
 };
 
 use super::{
-    contents::{Block, Contents},
+    contents::{Block, Contents, Seen},
     records::{Cause, RECORD_HEADER_BYTES, RecordError, first_record, visit_records},
 };
 
@@ -47,10 +47,12 @@ pub(super) fn read_summary(file: &mut File, size: u64) -> Result<Contents, Strin
     for chunk in chunks {
         contents.blocks.push(block(chunk, start)?);
     }
-    contents.message_count = statistics.message_count;
     contents.counts = statistics.channel_message_counts;
-    contents.range_ns = (statistics.message_count > 0)
-        .then_some((statistics.message_start_time, statistics.message_end_time));
+    contents.seen = Seen {
+        messages: statistics.message_count,
+        range_ns: (statistics.message_count > 0)
+            .then_some((statistics.message_start_time, statistics.message_end_time)),
+    };
     if !contents.is_complete() {
         return Err("its summary lacks schemas or channels".into());
     }

@@ -105,12 +105,17 @@ pub(crate) struct FileInformation {
     pub message_count: u64,
 }
 
+/// First and last log time, or nothing without messages.
+fn range_ns(start: StartingTime, duration: Nanoseconds, message_count: u64) -> Option<(i64, i64)> {
+    let start_ns = start.nanoseconds_since_epoch;
+    let end_ns = start_ns.checked_add(duration.nanoseconds.max(0))?;
+    (message_count > 0).then_some((start_ns, end_ns))
+}
+
 impl FileInformation {
-    /// First and last log time, or nothing for a file without messages.
+    /// First and last log time of the file, or nothing without messages.
     pub(crate) fn range_ns(&self) -> Option<(i64, i64)> {
-        let start_ns = self.starting_time.nanoseconds_since_epoch;
-        let end_ns = start_ns.checked_add(self.duration.nanoseconds.max(0))?;
-        (self.message_count > 0).then_some((start_ns, end_ns))
+        range_ns(self.starting_time, self.duration, self.message_count)
     }
 }
 
@@ -157,6 +162,11 @@ impl Metadata {
             }
         }
         Ok(metadata)
+    }
+
+    /// First and last log time of the bag, or nothing without messages.
+    pub(crate) fn range_ns(&self) -> Option<(i64, i64)> {
+        range_ns(self.starting_time, self.duration, self.message_count)
     }
 
     /// The text of `metadata.yaml`.

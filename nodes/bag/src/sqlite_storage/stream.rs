@@ -5,6 +5,7 @@ use std::{collections::BTreeMap, collections::VecDeque, path::PathBuf, sync::Arc
 use rusqlite::{Connection, params};
 use tempfile::TempPath;
 
+use super::{SqliteFile, connection::connect};
 use crate::{
     BagError, MAX_MESSAGE_BYTES,
     storage::{Filter, StorageMessage},
@@ -68,38 +69,25 @@ pub(super) struct SqliteStream {
 }
 
 impl SqliteStream {
-    #[expect(
-        clippy::too_many_arguments,
-        reason = "one caller, which owns all of them"
-    )]
-    pub(super) fn new(
-        connection: Connection,
-        path: PathBuf,
-        temporary: Option<Arc<TempPath>>,
-        topic_of: Arc<BTreeMap<i64, usize>>,
-        filter: Filter,
-        rescued: Option<Arc<Vec<Key>>>,
-        has_time_index: bool,
-        damage: Option<BagError>,
-    ) -> SqliteStream {
+    pub(super) fn new(file: &SqliteFile, filter: Filter) -> Result<SqliteStream, BagError> {
         let mut stream = SqliteStream {
-            connection,
-            path,
-            _temporary: temporary,
-            topic_of,
+            connection: connect(&file.path)?,
+            path: file.path.clone(),
+            _temporary: file.temporary.clone(),
+            topic_of: file.topic_of.clone(),
             filter,
             keys: VecDeque::new(),
             after: None,
-            page_keys: if has_time_index {
+            page_keys: if file.has_time_index {
                 PAGE_KEYS
             } else {
                 PAGE_KEYS_UNSORTED
             },
             messages_read: 0,
-            damage,
+            damage: file.info.damage.clone(),
             ended: false,
         };
-        if let Some(rescued) = rescued {
+        if let Some(rescued) = &file.rescued {
             stream.keys = rescued
                 .iter()
                 .filter(|key| stream.wants(key))
@@ -108,7 +96,7 @@ impl SqliteStream {
             // All there is: no page follows.
             stream.page_keys = 0;
         }
-        stream
+        Ok(stream)
     }
 
     fn wants(&self, key: &Key) -> bool {

@@ -132,6 +132,22 @@ fn lengths_that_lie_are_refused_before_memory_is_taken() {
     }
 }
 
+#[test]
+fn a_bent_summary_is_passed_over() {
+    let folder = tempfile::tempdir().unwrap();
+    let (path, written) = write_foreign(folder.path(), mcap::WriteOptions::new(), "cdr");
+    let whole = fs::read(&path).unwrap();
+    // Opcode and length of the footer take 9 bytes, the footer and the magic 37.
+    let footer = whole.len() - 37;
+    let start = u64::from_le_bytes(whole[footer + 9..footer + 17].try_into().unwrap());
+    for at in usize::try_from(start).unwrap()..footer {
+        let mut bent = whole.clone();
+        bent[at] ^= 0x40;
+        fs::write(&path, &bent).unwrap();
+        assert_eq!(read(&path).unwrap(), written, "byte {at}");
+    }
+}
+
 /// Places of all byte strings like `needle`.
 fn places(bytes: &[u8], needle: &[u8]) -> Vec<usize> {
     let windows = bytes.windows(needle.len()).enumerate();

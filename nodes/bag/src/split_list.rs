@@ -1,0 +1,94 @@
+//! The storage files of a bag: those that `metadata.yaml` lists, or those in the folder.
+
+use std::{
+    fs,
+    path::{Path, PathBuf},
+};
+
+use super::{BagError, metadata::Metadata, split::Split};
+
+/// More storage files than this are refused.
+const MAX_FILES: usize = 100_000;
+
+/// The storage files that the metadata lists, in its order.
+pub(crate) fn listed_splits(
+    folder: &Path,
+    metadata: &Metadata,
+    metadata_path: &Path,
+) -> Result<Vec<Split>, BagError> {
+    if !matches!(metadata.storage_identifier.as_str(), "mcap" | "sqlite3") {
+        return Err(BagError::Unsupported {
+            path: metadata_path.to_path_buf(),
+            what: format!("storage plugin {:?}", metadata.storage_identifier),
+            remedy: "mcap and sqlite3 are known; convert with `ros2 bag convert`",
+        });
+    }
+    let mut splits = Vec::new();
+    for (entry, file) in metadata.storage_paths(folder, metadata_path)? {
+        // Some versions of rosbag2 list compressed files by their names before compression.
+        let packed = PathBuf::from(format!("{}.zstd", file.display()));
+        let file = if !file.exists() && packed.exists() {
+            packed
+        } else {
+            file
+        };
+        // The first one is opened at once for the message definitions.
+        let mut split = Split::new(file, !splits.is_empty())?;
+        if split.open.is_none()
+            && let Some(listed) = metadata.files.iter().find(|file| file.path == entry)
+        {
+            split.range_ns = listed.range_ns();
+            split.message_count = Some(listed.message_count);
+        }
+        splits.push(split);
+    }
+    Ok(splits)
+}
+
+/// The storage files of a bag without `metadata.yaml`, in the order of their numbers.
+pub(crate) fn splits_in(folder: &Path) -> Result<Vec<Split>, BagError> {
+    let mut files: Vec<PathBuf> = Vec::new();
+    for entry in fs::read_dir(folder).map_err(BagError::io(folder, "list"))? {
+        let path = entry.map_err(BagError::io(folder, "list"))?.path();
+        let name = path
+            .file_name()
+            .unwrap_or_default()
+            .to_string_lossy()
+            .into_owned();
+        let bare = name.strip_suffix(".zstd").unwrap_or(&name);
+        if bare.ends_with(".mcap") || bare.ends_with(".db3") {
+            files.push(path);
+        }
+        if files.len() > MAX_FILES {
+            return Err(BagError::Unsupported {
+                path: folder.to_path_buf(),
+                what: format!("a bag of more than {MAX_FILES} files"),
+                remedy: "open the files one by one",
+            });
+        }
+    }
+    if files.is_empty() {
+        return Err(BagError::Foreign {
+            path: folder.to_path_buf(),
+            found: "a folder without metadata.yaml, .mcap or .db3 files".into(),
+            remedy: "give the folder that `ros2 bag record` made",
+        });
+    }
+    files.sort_by_key(|path| (path.as_os_str().len(), path.clone()));
+    files
+        .into_iter()
+        .map(|file| Split::new(file, false))
+        .collect()
+}
+
+/// Sorts by start; files of unknown time keep their place behind the one before.
+pub(crate) fn in_order_of_time(splits: Vec<Split>) -> Vec<Split> {
+    let mut place_ns = i64::MIN;
+    let mut keyed: Vec<(i64, Split)> = Vec::with_capacity(splits.len());
+    for split in splits {
+        place_ns = split.range_ns.map_or(place_ns, |(start_ns, _)| start_ns);
+        keyed.push((place_ns, split));
+    }
+    keyed.sort_by_key(|(place_ns, _)| *place_ns);
+    keyed.into_iter().map(|(_, split)| split).collect()
+}

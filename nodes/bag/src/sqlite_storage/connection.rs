@@ -1,0 +1,119 @@
+//! Connections to SQLite files that write nothing beside them, and a check of the file's size.
+
+use std::{
+    fmt::Write,
+    fs::File,
+    io::Read,
+    path::{Path, PathBuf},
+};
+
+use rusqlite::{Connection, OpenFlags, config::DbConfig};
+
+use crate::BagError;
+
+/// Opens read-only. `immutable` keeps SQLite from creating files beside the database, so that a
+/// read-only folder works; it would hide rows still in a write-ahead log, so not where one exists.
+pub(super) fn connect(path: &Path) -> Result<Connection, BagError> {
+    let path = &std::path::absolute(path).map_err(BagError::io(path, "locate"))?;
+    let has_wal = wal_path(path).metadata().is_ok_and(|wal| wal.len() > 0);
+    let parameters = if has_wal {
+        "mode=ro"
+    } else {
+        "mode=ro&immutable=1"
+    };
+    let uri = format!("file:{}?{parameters}", percent_encode(path));
+    let flags = OpenFlags::SQLITE_OPEN_READ_ONLY
+        | OpenFlags::SQLITE_OPEN_URI
+        | OpenFlags::SQLITE_OPEN_NO_MUTEX;
+    let wrong = |e| {
+        let remedy = if has_wal {
+            "a recorder did not finish: copy the .db3 and .db3-wal files to a writable folder and open them there"
+        } else {
+            "recover the rows with `sqlite3 FILE .recover` or take another copy"
+        };
+        BagError::corrupt(path, "its start", e, remedy)
+    };
+    let connection = Connection::open_with_flags(uri, flags).map_err(wrong)?;
+    connection
+        .set_db_config(DbConfig::SQLITE_DBCONFIG_DEFENSIVE, true)
+        .map_err(wrong)?;
+    connection
+        .set_db_config(DbConfig::SQLITE_DBCONFIG_TRUSTED_SCHEMA, false)
+        .map_err(wrong)?;
+    connection
+        .set_db_config(DbConfig::SQLITE_DBCONFIG_ENABLE_TRIGGER, false)
+        .map_err(wrong)?;
+    connection
+        .set_db_config(DbConfig::SQLITE_DBCONFIG_ENABLE_VIEW, false)
+        .map_err(wrong)?;
+    connection
+        .execute_batch("PRAGMA cell_size_check = ON; PRAGMA mmap_size = 0;")
+        .map_err(wrong)?;
+    Ok(connection)
+}
+
+/// SQLite appends "-wal" to the whole name.
+fn wal_path(path: &Path) -> PathBuf {
+    let mut name = path.as_os_str().to_owned();
+    name.push("-wal");
+    PathBuf::from(name)
+}
+
+fn percent_encode(path: &Path) -> String {
+    let mut encoded = String::new();
+    for byte in path.as_os_str().as_encoded_bytes() {
+        match byte {
+            b'a'..=b'z' | b'A'..=b'Z' | b'0'..=b'9' | b'/' | b'.' | b'-' | b'_' | b'~' => {
+                encoded.push(char::from(*byte));
+            }
+            // Writing to a string cannot fail.
+            _ => drop(write!(encoded, "%{byte:02X}")),
+        }
+    }
+    encoded
+}
+
+/// Compares the size in the database header with the file's (https://www.sqlite.org/fileformat.html, 1.3).
+pub(super) fn missing_pages(path: &Path) -> Result<Option<BagError>, BagError> {
+    let mut file = File::open(path).map_err(BagError::io(path, "open"))?;
+    let size_bytes = file
+        .metadata()
+        .map_err(BagError::io(path, "examine"))?
+        .len();
+    let truncated = |inside: String| BagError::Truncated {
+        path: path.to_path_buf(),
+        size_bytes,
+        inside,
+        readable_messages: 0,
+    };
+    let mut header = [0; 100];
+    if size_bytes < header.len() as u64 {
+        return Err(truncated("the 100-byte database header at byte 0".into()));
+    }
+    file.read_exact(&mut header)
+        .map_err(BagError::io(path, "read"))?;
+    let word = |at: usize| {
+        header
+            .get(at..at + 4)
+            .and_then(|b| b.try_into().ok())
+            .map_or(0, u32::from_be_bytes)
+    };
+    let page_bytes = match header {
+        [_, _, _, _, _, _, _, _, _, _, _, _, _, _, _, _, 0, 1, ..] => 65_536,
+        [_, _, _, _, _, _, _, _, _, _, _, _, _, _, _, _, a, b, ..] => {
+            u64::from(u16::from_be_bytes([a, b]))
+        }
+    };
+    // The count holds only where the version it is valid for equals the change counter.
+    let pages = if word(24) == word(92) {
+        u64::from(word(28))
+    } else {
+        0
+    };
+    let cut = pages * page_bytes > size_bytes;
+    Ok(cut.then(|| {
+        truncated(format!(
+            "the database, whose header counts {pages} pages of {page_bytes} bytes"
+        ))
+    }))
+}
