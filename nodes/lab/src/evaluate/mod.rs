@@ -25,7 +25,9 @@ pub use report::report;
 pub use results::{FILE, Results};
 pub use run::run;
 pub use settings::{Cell, FORMAT, Pivot, Plan, Settings, Start};
-pub use statistics::{LEAST_FOR_INTERVAL, Share, extent, median, median_interval, quantile};
+pub use statistics::{
+    LEAST_FOR_INTERVAL, Share, distinct, extent, median, median_interval, quantile,
+};
 pub use summary::{PRINTED, Printed, Summary};
 pub use testbed::{Scenario, Testbed, View};
 pub use trial::{Bounds, Judged, OURS, TIMED, TRACKED, Trial, WRONG, WRONG_TIGHT};

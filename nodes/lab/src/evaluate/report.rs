@@ -44,13 +44,6 @@ pub fn report(summary: &Summary, trials: &[Trial]) -> Result<Report, AnyError> {
     Ok(Report::new(head, sections))
 }
 
-fn flips(summary: &Summary) -> Vec<f64> {
-    let mut flips: Vec<f64> = summary.rows.iter().map(|r| r.q).collect();
-    flips.sort_by(f64::total_cmp);
-    flips.dedup();
-    flips
-}
-
 fn find<'a>(
     summary: &'a Summary,
     scene: &str,
@@ -70,7 +63,7 @@ fn share_cell(q: Option<f64>) -> Cell {
 }
 
 fn printed(summary: &Summary) -> Result<Section, AnyError> {
-    let flips = flips(summary);
+    let flips = summary.flips();
     let (low, high) = (flips.first().copied(), flips.last().copied());
     let table = |(number, start): (usize, &&str)| {
         let row = |printed: &super::Printed| {
@@ -117,7 +110,7 @@ fn printed(summary: &Summary) -> Result<Section, AnyError> {
 }
 
 fn by_start(summary: &Summary) -> Result<Section, AnyError> {
-    let flips = flips(summary);
+    let flips = summary.flips();
     let table = |(number, start): (usize, &str)| {
         let row = |method: &'static str| {
             let of = |q: &f64| find(summary, "all", start, *q, method);

@@ -7,7 +7,7 @@ use std::collections::BTreeMap;
 use serde::Serialize;
 
 use super::settings::Settings;
-use super::statistics::{Share, median, quantile};
+use super::statistics::{Share, distinct, median, quantile};
 use super::trial::{OURS, TIMED, TRACKED, Trial, WRONG, WRONG_TIGHT};
 pub use tables::{Accepted, Consistency, PRINTED, Paired, Printed, Row, TimeRow};
 
@@ -40,30 +40,15 @@ pub struct Summary {
 }
 
 /// Distinct names in their order, and "all".
-fn with_all(trials: &[&Trial], of: impl Fn(&Trial) -> String) -> Vec<String> {
-    let mut names: Vec<String> = trials.iter().map(|t| of(t)).collect();
-    names.sort_unstable();
-    names.dedup();
-    names.push("all".to_owned());
+fn with_all<'a>(trials: &[&'a Trial], of: impl Fn(&'a Trial) -> &'a str) -> Vec<&'a str> {
+    let mut names = sorted(trials.iter().map(|t| of(t)));
+    names.push("all");
     names
-}
-
-fn distinct(trials: &[&Trial], of: impl Fn(&Trial) -> String) -> Vec<String> {
-    let mut names = with_all(trials, of);
-    names.pop();
-    names
-}
-
-fn flips(trials: &[&Trial]) -> Vec<f64> {
-    let mut flips: Vec<f64> = trials.iter().map(|t| t.cell.q).collect();
-    flips.sort_by(f64::total_cmp);
-    flips.dedup();
-    flips
 }
 
 fn flips_and_all(trials: &[&Trial]) -> Vec<Option<f64>> {
-    let flips = flips(trials).into_iter().map(Some);
-    flips.chain([None]).collect()
+    let flips = distinct(trials.iter().map(|t| t.cell.q)).into_iter();
+    flips.map(Some).chain([None]).collect()
 }
 
 fn is_of(name: &str, wanted: &str) -> bool {
@@ -96,6 +81,11 @@ impl Summary {
     /// Distinct starts, in order.
     pub(super) fn starts(&self) -> Vec<&str> {
         sorted(self.rows.iter().map(|row| row.start.as_str()))
+    }
+
+    /// Distinct shares of wrong labels, in order.
+    pub(super) fn flips(&self) -> Vec<f64> {
+        distinct(self.rows.iter().map(|row| row.q))
     }
 
     /// Distinct scenes, in order, without all of them together.
@@ -155,21 +145,21 @@ fn rows(trials: &[&Trial]) -> Vec<Row> {
 
 fn paired(trials: &[&Trial], ours: &[&Trial]) -> Vec<Paired> {
     let mine: BTreeMap<_, &Trial> = ours.iter().map(|t| (t.cell.key(), *t)).collect();
-    let others = distinct(trials, |t| t.method.clone());
+    let others = sorted(trials.iter().map(|t| t.method.as_str()));
     let mut table = Vec::new();
-    for against in others.into_iter().filter(|method| method != OURS) {
+    for against in others.into_iter().filter(|method| *method != OURS) {
         let of_method = trials.iter().filter(|t| t.method == against);
         let pairs: Vec<(&Trial, &Trial)> = of_method
             .filter_map(|other| Some((*mine.get(&other.cell.key())?, *other)))
             .collect();
         let others: Vec<&Trial> = pairs.iter().map(|(_, other)| *other).collect();
-        for start in with_all(&others, |t| t.cell.start.clone()) {
+        for start in with_all(&others, |t| &t.cell.start) {
             for q in flips_and_all(&others) {
                 let wanted = |(_, t): &&(&Trial, &Trial)| {
-                    is_of(&t.cell.start, &start) && q.is_none_or(|q| q == t.cell.q)
+                    is_of(&t.cell.start, start) && q.is_none_or(|q| q == t.cell.q)
                 };
                 let cell: Vec<_> = pairs.iter().filter(wanted).copied().collect();
-                table.push(compare(&against, &start, q, &cell));
+                table.push(compare(against, start, q, &cell));
             }
         }
     }
@@ -201,13 +191,13 @@ fn compare(against: &str, start: &str, q: Option<f64>, pairs: &[(&Trial, &Trial)
 
 fn accepted(ours: &[&Trial]) -> Vec<Accepted> {
     let mut table = Vec::new();
-    for start in distinct(ours, |t| t.cell.start.clone()) {
+    for start in sorted(ours.iter().map(|t| t.cell.start.as_str())) {
         let of_start = ours.iter().filter(|t| t.cell.start == start);
         let of_start: Vec<&Trial> = of_start.copied().collect();
-        for scene in with_all(&of_start, |t| t.cell.scene.clone()) {
+        for scene in with_all(&of_start, |t| &t.cell.scene) {
             for q in flips_and_all(&of_start) {
                 let wanted =
-                    |t: &&&Trial| is_of(&t.cell.scene, &scene) && q.is_none_or(|q| q == t.cell.q);
+                    |t: &&&Trial| is_of(&t.cell.scene, scene) && q.is_none_or(|q| q == t.cell.q);
                 let cell: Vec<&Trial> = of_start.iter().filter(wanted).copied().collect();
                 let taken = cell.iter().filter(|t| t.is_accepted());
                 let taken: Vec<&&Trial> = taken.collect();
@@ -216,8 +206,8 @@ fn accepted(ours: &[&Trial]) -> Vec<Accepted> {
                     *verdicts.entry(judged.verdict.clone()).or_insert(0) += 1;
                 }
                 table.push(Accepted {
-                    scene: scene.clone(),
-                    start: start.clone(),
+                    scene: scene.to_owned(),
+                    start: start.to_owned(),
                     q,
                     accepted: Share::new(taken.len(), cell.len()),
                     wrong: Share::of(taken.iter().map(|t| !t.is_within(WRONG))),
@@ -235,18 +225,18 @@ fn accepted(ours: &[&Trial]) -> Vec<Accepted> {
 fn consistency(ours: &[&Trial]) -> Vec<Consistency> {
     let taken = ours.iter().filter(|t| t.is_accepted()).copied();
     let taken: Vec<&Trial> = taken.collect();
-    let of_start = |start: String| {
-        let of = taken.iter().filter(|t| is_of(&t.cell.start, &start));
+    let of_start = |start: &str| {
+        let of = taken.iter().filter(|t| is_of(&t.cell.start, start));
         let nees: Vec<f64> = of.filter_map(|t| t.judged.as_ref()?.nees).collect();
         let mean = nees.iter().sum::<f64>() / nees.len() as f64;
         Consistency {
-            start,
+            start: start.to_owned(),
             n: nees.len(),
             mean_over_6: (!nees.is_empty()).then_some(mean / 6.0),
             median_over_expected: median(nees).map(|nees| nees / 5.348),
         }
     };
-    let starts = with_all(&taken, |t| t.cell.start.clone());
+    let starts = with_all(&taken, |t| &t.cell.start);
     starts.into_iter().map(of_start).collect()
 }
 

@@ -1,7 +1,6 @@
 //! The testbed of the trials: the house, the robot's maps of it and the views of the headset.
 
 use std::sync::OnceLock;
-use std::time::Instant;
 
 use crate::simulate::house::{
     HeadsetOptions, HeadsetTrial, House, HouseScan, LabelDraw, Scene, Survey, SurveyMap,
@@ -53,8 +52,6 @@ pub struct Scenario {
     pub truth: Isometry3<f64>,
     /// Share of the view whose labels differ between map and headset.
     pub different_share: f64,
-    /// Time to prepare the map, milliseconds.
-    pub map_ms: f64,
 }
 
 impl Testbed {
@@ -112,10 +109,8 @@ impl Testbed {
                 .map(|headset_scan| headset_scan.sensor_m),
         };
         let thinned = voxel_downsample(&all, self.settings.cell_side_m);
-        let started = Instant::now();
         let map = CalibrationMap::new(map, self.settings.cell_side_m)?;
         Ok(Scenario {
-            map_ms: started.elapsed().as_secs_f64() * 1e3,
             map,
             headset_scans,
             source: PreparedCloud::new(thinned, &PrepareOptions::default())?,

@@ -25,7 +25,7 @@ pub struct Alignment {
 }
 
 /// Aligns a scan with a map from a guess: climbs on every level, the coarsest first, by steps of a
-/// cell side, then refines on the finest ([`refine`]).
+/// cell side, then refines on the finest.
 ///
 /// Each level looks at one point of a cell of its own size, drawn from one of each finest cell. A step goes along or about one axis of the
 /// map; turns are about the middle of those points, so that they do not shift the scan as well. Fails
@@ -60,7 +60,8 @@ pub fn align(
 
 /// The last part of [`align`] alone: climbs on the finest level by a fraction of its steps, and by a
 /// fraction of that in each further stage, on another sample of the scan.
-pub fn refine(
+#[cfg(test)]
+pub(super) fn refine(
     map: &MultiResolutionList,
     cloud: &Cloud,
     map_from_cloud: &Isometry3<f64>,

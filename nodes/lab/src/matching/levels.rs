@@ -1,6 +1,6 @@
 //! A map at several resolutions.
 
-use nalgebra::{Isometry3, Vector3};
+use nalgebra::Vector3;
 
 use crate::AnyError;
 use lattice_core::cloud::Cloud;
@@ -60,17 +60,5 @@ impl MultiResolutionList {
     /// True if no level has a voxel.
     pub fn is_empty(&self) -> bool {
         self.levels.iter().all(VoxelStore::is_empty)
-    }
-
-    /// Number of points that `map_from_points` puts into occupied cells of a level; none of a level that
-    /// is not there.
-    pub fn overlap(
-        &self,
-        level: usize,
-        map_from_points: &Isometry3<f64>,
-        points_m: &[[f32; 3]],
-    ) -> usize {
-        let list = self.levels.get(level);
-        list.map_or(0, |list| list.overlap(map_from_points, points_m))
     }
 }

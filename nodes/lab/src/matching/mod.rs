@@ -14,7 +14,9 @@ mod search;
 #[cfg(test)]
 mod tests;
 
-pub use align::{Alignment, align, refine};
+#[cfg(test)]
+use align::refine;
+pub use align::{Alignment, align};
 pub use levels::MultiResolutionList;
 pub use options::{AlignOptions, SearchOptions, Spread};
 use sample::{MAX_POINTS, sample};

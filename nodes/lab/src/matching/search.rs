@@ -16,7 +16,7 @@ type Offset = [f64; 6];
 ///
 /// On the coarsest level the poses of a grid are tried, one cell side apart and, in turn, a cell side
 /// over the range of the features. The best are kept and divided in two along every axis that is
-/// searched, level by level; [`refine`](super::refine) makes the best one finer than the grid. Of
+/// searched, level by level. Of
 /// equally good poses the first of the grid comes first, on any number of threads. Fails as
 /// [`align`](super::align) does, and for a grid of too many poses.
 pub fn search(

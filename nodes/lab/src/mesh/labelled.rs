@@ -80,11 +80,13 @@ impl LabelledMesh {
     }
 
     /// The vertices, metres.
+    #[cfg(test)]
     pub fn vertices_m(&self) -> &[[f32; 3]] {
         &self.vertices_m
     }
 
     /// The vertices of each triangle; all of them are there.
+    #[cfg(test)]
     pub fn triangles(&self) -> &[[u32; 3]] {
         &self.triangles
     }

@@ -204,7 +204,7 @@ impl HeightField {
 }
 
 /// Ray parameter at which a coordinate `start + step t` leaves the unit interval that begins at `cell`.
-fn leave(start: f64, step: f64, cell: f64) -> f64 {
+pub(super) fn leave(start: f64, step: f64, cell: f64) -> f64 {
     if step > 0.0 {
         (cell + 1.0 - start) / step
     } else if step < 0.0 {

@@ -3,7 +3,7 @@
 use nalgebra::{Vector2, Vector3};
 
 use super::ground::ground_height_m;
-use super::height_field::HeightField;
+use super::height_field::{HeightField, leave};
 use super::layout::earth_moving_obstacles;
 use super::obstacles::Obstacle;
 
@@ -215,14 +215,6 @@ impl Site {
     fn cell_size_m(&self) -> f64 {
         self.ground.spacing_m() * SQUARES_PER_CELL as f64
     }
-}
-
-/// Ray parameter at which a coordinate leaves the unit interval that begins at `cell`.
-fn leave(start: f64, step: f64, cell: f64) -> f64 {
-    if step == 0.0 {
-        return f64::INFINITY;
-    }
-    (cell + if step > 0.0 { 1.0 } else { 0.0 } - start) / step
 }
 
 /// A fixed value in -1..1 for a node of the ground's grid (a mix of its indices).

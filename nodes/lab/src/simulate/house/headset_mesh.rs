@@ -116,12 +116,7 @@ impl Volume {
         });
         let triangles: Vec<[u32; 3]> = triangles.collect();
         let none = vec![0; triangles.len()];
-        Ok(LabelledMesh::new(
-            vertices_m.collect(),
-            triangles,
-            none.clone(),
-            none,
-        )?)
+        LabelledMesh::new(vertices_m.collect(), triangles, none.clone(), none)
     }
 }
 

@@ -13,7 +13,8 @@ use super::Context;
 use super::label_maps::BAD;
 use crate::AnyError;
 use crate::evaluate::{
-    LEAST_FOR_INTERVAL, OURS, Plan, Results, Start, Trial, WRONG, median, median_interval, run,
+    LEAST_FOR_INTERVAL, OURS, Plan, Results, Start, Trial, WRONG, distinct, median,
+    median_interval, run,
 };
 use crate::report::Section;
 
@@ -156,10 +157,7 @@ impl Trials {
 
     /// Shares of wrong labels of which there are trials.
     fn flips(&self) -> Vec<f64> {
-        let mut flips: Vec<f64> = self.all.iter().map(|trial| trial.cell.q).collect();
-        flips.sort_by(f64::total_cmp);
-        flips.dedup();
-        flips
+        distinct(self.all.iter().map(|trial| trial.cell.q))
     }
 }
 
