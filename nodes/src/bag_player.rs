@@ -24,7 +24,7 @@ pub const NAME: &str = "bag_player";
 
 /// Time that what is queued at the end has to reach its readers.
 const FLUSH_TIME: Duration = Duration::from_secs(20);
-/// The same when told to end.
+/// The same after a request to end.
 const HURRIED_FLUSH_TIME: Duration = Duration::from_secs(2);
 /// Longest sleep between two looks at the shutdown flag.
 const NAP: Duration = Duration::from_millis(100);
@@ -40,11 +40,11 @@ pub struct PlayerReport {
     pub failed: u64,
     /// Latest that a message was after its time, in ms.
     pub latest_ms: u64,
-    /// Whether all reliable readers acknowledged everything in time.
+    /// True if all reliable readers acknowledged everything in time.
     pub acknowledged: bool,
 }
 
-/// Plays the log that the parameters name and returns at its end or when told to stop.
+/// Plays the log that the parameters name and returns at its end or on a request to end.
 pub fn run(arguments: impl IntoIterator<Item = String>) -> Result<(), NodeError> {
     let args = RosArgs::parse(arguments)?;
     if answers_help(NAME, &args) {

@@ -54,8 +54,7 @@ impl Node {
             1..=u32::MAX as usize,
         )?;
         let id = shared.graph.add_node(&namespace, &name);
-        let about = "go by the time on /clock instead of the system's";
-        let clock = if params.about(about).bool("use_sim_time", false)? {
+        let clock = if params.bool("use_sim_time", false)? {
             let topic = names::resolve_topic("/clock", &name, &namespace, &args.remaps)?;
             shared.sim_clock(id, &topic)?
         } else {
@@ -181,8 +180,8 @@ impl Node {
         })
     }
 
-    /// Gives every message on a topic to `handler` as it came, to be decoded by who works on it; else
-    /// as [`Node::subscribe`]. For large messages of which one thread must keep the order.
+    /// A subscription whose handler gets messages undecoded, for the thread that works on them; otherwise
+    /// as [`Node::subscribe`]. For large messages that one thread must keep in order.
     pub fn subscribe_undecoded<M: RosMessage>(
         &self,
         topic: &str,

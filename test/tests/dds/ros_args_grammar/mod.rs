@@ -1,11 +1,12 @@
-//! The `--ros-args` grammar as a table: argument lines against what they mean, or why they fail.
+//! The `--ros-args` grammar as a table: argument lines with their meaning or their refusal.
+
+mod any_words;
 
 use lattice_runtime::{
     names::{resolve_service, resolve_topic},
     params::{ParamValue, Params},
     ros_args::{LogLevel, NameKind, RemapTarget, RosArgs, RosArgsError},
 };
-use proptest::prelude::*;
 
 /// Splits at spaces.
 fn words(line: &str) -> Vec<String> {
@@ -379,56 +380,4 @@ fn a_launch_file_configures_a_node() {
     assert_eq!(params.f64("rate", 0.0).unwrap(), 2.0);
     assert_eq!(params.string("frame", "map").unwrap(), "earth");
     assert_eq!(params.unused(), ["qos.map.depth"]);
-}
-
-/// A word that is often close to something the grammar knows.
-fn word() -> impl Strategy<Value = String> {
-    prop_oneof![
-        proptest::sample::select(vec![
-            "--ros-args",
-            "--",
-            "-r",
-            "--remap",
-            "-p",
-            "--param",
-            "--params-file",
-            "-e",
-            "--log-level",
-            "--log-config-file",
-            "--disable-rosout-logs",
-            "__ns:=/a",
-            "__node:=b",
-            "a:=b",
-            "a:=[1, 2]",
-        ])
-        .prop_map(str::to_owned),
-        "[a-z0-9_~/:=.{}*\\[\\]'\" -]{0,12}",
-        "\\PC{0,12}",
-        any::<String>(),
-    ]
-}
-
-proptest! {
-    #[test]
-    fn no_command_line_panics(argv in proptest::collection::vec(word(), 0..12)) {
-        match RosArgs::parse(argv.clone()) {
-            Ok(args) => {
-                let kept = args.user_args.len() + args.unparsed.len() + args.remaps.len()
-                    + args.param_overrides.len() + args.params_files.len() + args.log_levels.len();
-                prop_assert!(kept <= argv.len());
-                let name = args.node_name("mapper");
-                let namespace = args.namespace("mapper");
-                for topic in ["points", "~/map", "/tf"] {
-                    prop_assert!(resolve_topic(topic, &name, &namespace, &args.remaps).is_ok());
-                }
-            }
-            Err(error) => prop_assert!(error.to_string().contains("for example")),
-        }
-    }
-
-    #[test]
-    fn words_outside_a_scope_are_left_alone(argv in proptest::collection::vec("[a-zA-Z0-9=./_-]{0,12}", 0..12)) {
-        let args = RosArgs::parse(argv.clone()).unwrap();
-        prop_assert_eq!(args.user_args, argv);
-    }
 }
