@@ -1,13 +1,15 @@
 //! Parameters of the mapper.
 
 use lattice_core::lattice::{Lattice, LatticeKind, Orientation};
-use lattice_core::voxels::{Payload, VoxelList, WhenFull};
+use lattice_core::voxels::{OccupancyList, Payload, VoxelList, WhenFull};
 use nalgebra::Vector3;
 
+use super::free_options::MappedFreeSpace;
 use crate::convert::semantic::LabelOptions;
+use crate::options;
 use lattice_runtime::params::{ParamError, Params};
 
-/// Everything that a [`super::LatticeMapper`] can be told.
+/// Options of a [`super::LatticeMapper`].
 #[derive(Clone, Debug)]
 pub struct MapperOptions {
     /// Lattice, cell volume and orientation.
@@ -20,16 +22,30 @@ pub struct MapperOptions {
     pub max_voxels: usize,
     /// Most memory for voxels, which may allow fewer than `max_voxels`; 0: as many as those take.
     pub max_map_bytes: usize,
-    /// What happens to points in new cells when the map is full.
+    /// Treatment of points in new cells when the map is full.
     pub when_full: WhenFull,
     /// Age in the time of the clouds at which a voxel goes, ns; 0: never. Needs stamps of all voxels.
     pub forget_after_ns: i64,
     /// Most points of one cloud.
     pub max_cloud_points: usize,
-    /// How labels of the points are read and counted in each voxel; none: they are not.
+    /// Reading of labels, which are counted in each voxel; none: they are not kept.
     pub labels: Option<LabelOptions>,
-    /// Largest serialised message of `map` and `map_updates`.
+    /// Largest serialised message of `map`, `map_updates` and `free`.
     pub chunk_bytes: usize,
+    /// Whether a voxel is more than a bit.
+    pub payload: MapPayload,
+    /// Rays that clear voxels.
+    pub free_space: MappedFreeSpace,
+}
+
+/// Contents of a voxel.
+#[derive(Clone, Copy, PartialEq, Eq, Debug, Default)]
+pub enum MapPayload {
+    /// Count and mean of the points, and stamps or labels where asked for.
+    #[default]
+    Centroid,
+    /// That it is occupied: 2 to 3 bytes a voxel.
+    Occupancy,
 }
 
 impl MapperOptions {
@@ -46,6 +62,8 @@ impl MapperOptions {
             max_cloud_points: 4_000_000,
             labels: None,
             chunk_bytes: 60_000,
+            payload: MapPayload::Centroid,
+            free_space: MappedFreeSpace::default(),
         }
     }
 
@@ -65,23 +83,39 @@ impl MapperOptions {
         let [x, y, z] = datum[..] else {
             return Err(params.invalid("datum_m", "expected three numbers, x y z in metres"));
         };
-        let options = Self {
-            map_frame: params.string("map_frame", &defaults.map_frame)?,
+        let read = Self {
+            map_frame: options::frame(params, "map_frame", &defaults.map_frame)?,
             datum_near_m: Vector3::new(x, y, z),
-            max_voxels: params.usize("max_voxels", defaults.max_voxels)?,
+            max_voxels: params.usize_in("max_voxels", defaults.max_voxels, 1..=usize::MAX)?,
             max_map_bytes: params.usize("max_map_bytes", defaults.max_map_bytes)?,
             when_full: when_full(params)?,
             forget_after_ns: forget_after_ns(params)?,
-            max_cloud_points: params.usize("max_cloud_points", defaults.max_cloud_points)?,
+            max_cloud_points: params.usize_in(
+                "max_cloud_points",
+                defaults.max_cloud_points,
+                1..=usize::MAX,
+            )?,
             labels: Self::labels_from(params)?,
-            chunk_bytes: params.usize("chunk_bytes", defaults.chunk_bytes)?,
+            chunk_bytes: options::chunk_bytes(params, defaults.chunk_bytes)?,
+            payload: map_payload(params)?,
+            free_space: MappedFreeSpace::from_params(params)?,
             ..defaults
         };
-        if options.max_voxels > 0 && options.voxel_limit() == 0 {
+        if read.payload == MapPayload::Occupancy && (read.payload().stamps || read.payload().labels)
+        {
+            let problem = "occupancy has neither stamps nor labels: needs centroid with \
+                           forget_after_s or keep_labels";
+            return Err(params.invalid("payload", problem));
+        }
+        if read.payload == MapPayload::Occupancy && read.when_full != WhenFull::Refuse {
+            let problem = "payload occupancy knows no oldest voxel: needs refuse";
+            return Err(params.invalid("when_full", problem));
+        }
+        if read.voxel_limit() == 0 {
             let problem = "too little for a single voxel; a small map takes 1000000";
             return Err(params.invalid("max_map_bytes", problem));
         }
-        Ok(options)
+        Ok(read)
     }
 
     fn labels_from(params: &Params) -> Result<Option<LabelOptions>, ParamError> {
@@ -89,14 +123,14 @@ impl MapperOptions {
         Ok(params.bool("keep_labels", false)?.then_some(options))
     }
 
-    /// How the parameters want the lattice to lie in the map, whichever lattice it is.
+    /// Orientation of the lattice in the map that the parameters ask for, whichever lattice it is.
     pub fn orientation_from(params: &Params) -> Result<Orientation, ParamError> {
         let name = params.string("lattice_orientation", "paper")?;
         name.parse()
             .map_err(|e| params.invalid("lattice_orientation", format!("{e}")))
     }
 
-    /// What is kept of each voxel.
+    /// Columns of a voxel of centroids.
     pub(super) fn payload(&self) -> Payload {
         Payload {
             stamps: self.forget_after_ns > 0,
@@ -109,6 +143,9 @@ impl MapperOptions {
     pub(super) fn voxel_limit(&self) -> usize {
         match self.max_map_bytes {
             0 => self.max_voxels,
+            bytes if self.payload == MapPayload::Occupancy => {
+                (self.max_voxels).min(OccupancyList::max_voxels_within(bytes))
+            }
             bytes => (self.max_voxels).min(VoxelList::voxels_within(bytes, self.payload())),
         }
     }
@@ -121,6 +158,17 @@ fn when_full(params: &Params) -> Result<WhenFull, ParamError> {
         other => {
             let problem = format!("{other:?}, expected refuse or forget_oldest");
             Err(params.invalid("when_full", problem))
+        }
+    }
+}
+
+fn map_payload(params: &Params) -> Result<MapPayload, ParamError> {
+    match params.string("payload", "centroid")?.as_str() {
+        "centroid" => Ok(MapPayload::Centroid),
+        "occupancy" => Ok(MapPayload::Occupancy),
+        other => {
+            let problem = format!("{other:?}, expected centroid or occupancy");
+            Err(params.invalid("payload", problem))
         }
     }
 }

@@ -12,7 +12,7 @@ use std::sync::Arc;
 use std::time::Instant;
 
 use lattice_core::pose::StampedPose;
-use lattice_core::voxels::DatumError;
+use lattice_core::raycast::FreeSpaceError;
 use lattice_msgs::RosMessage;
 use lattice_msgs::cdr::{self, CdrError};
 use lattice_msgs::geometry_msgs::PoseStamped;
@@ -53,8 +53,8 @@ impl Pipeline {
         transformer: TransformerOptions,
         maps: impl IntoIterator<Item = MapperOptions>,
         markers: &MarkerOptions,
-    ) -> Result<Self, DatumError> {
-        let branch = |options| {
+    ) -> Result<Self, FreeSpaceError> {
+        let branch = |options| -> Result<Branch, FreeSpaceError> {
             Ok(Branch {
                 mapper: LatticeMapper::new(options, EPOCH)?,
                 markers: VoxelMarkers::new(markers.clone()),
@@ -181,7 +181,7 @@ impl Branch {
     fn finish(&mut self) -> LatticeReport {
         self.report.counts = self.markers.counts().clone();
         self.report.voxels = self.markers.voxels();
-        self.markers.redraw();
+        self.markers.wipe();
         self.report.marker_bytes = self.markers.take_bytes();
         LatticeReport {
             map: MapperReport::of(&mut self.mapper),
@@ -194,7 +194,7 @@ fn decode<T: DeserializeOwned>(data: &[u8]) -> Result<T, CdrError> {
     cdr::from_slice(data)
 }
 
-/// Replays a whole log; `progress` is told how much of it has passed, from 0 to 1.
+/// Replays a whole log; `progress` gets the part that has passed, from 0 to 1.
 pub fn run(
     bag: &BagReader,
     plan: &TopicPlan,

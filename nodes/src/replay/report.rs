@@ -20,7 +20,7 @@ pub struct LatticeReport {
 /// A whole run over a log.
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
 pub struct RunReport {
-    /// Where the clouds came from.
+    /// Source of the clouds.
     pub source: String,
     /// Clouds on the topics that were replayed.
     pub clouds_in_log: u64,
@@ -66,6 +66,11 @@ impl RunReport {
                     map.counts.clouds_wrong_frame,
                 ),
                 ("clouds", "malformed", map.counts.clouds_malformed),
+                (
+                    "clouds",
+                    "without sensor positions, so that they clear nothing",
+                    map.counts.clouds_no_viewpoint,
+                ),
                 (
                     "clouds",
                     "lost on the way or inbox full",

@@ -8,7 +8,7 @@ use super::root;
 use super::source::{code, files, module};
 
 /// Modules of crates in layers: each may use those before it in the list.
-const LAYERS: [(&str, &[&str]); 2] = [
+const LAYERS: [(&str, &[&str]); 3] = [
     (
         "lattice_core/src",
         &[
@@ -21,6 +21,25 @@ const LAYERS: [(&str, &[&str]); 2] = [
             "query",
             "raycast",
             "registration",
+        ],
+    ),
+    (
+        "nodes/src",
+        &[
+            "files",
+            "convert",
+            "report",
+            "start",
+            "compute",
+            "options",
+            "map_follower",
+            "enu_transformer",
+            "lattice_mapper",
+            "voxel_marker_publisher",
+            "semantic_icp_server",
+            "replay",
+            "executables",
+            "bag_player",
         ],
     ),
     (
