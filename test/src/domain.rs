@@ -1,7 +1,7 @@
 //! DDS domains for tests: one for each test, apart from all else on the machine.
 
 use lattice_runtime::LoopbackDomain;
-use lattice_runtime::env::{DiscoveryRange, Transport};
+use lattice_runtime::env::Network;
 
 /// A domain that no other test uses while this lives.
 pub struct TestDomain(LoopbackDomain);
@@ -18,12 +18,10 @@ impl TestDomain {
     }
 
     /// The domain on loopback only.
-    pub fn transport(&self) -> Transport {
-        Transport {
+    pub fn transport(&self) -> Network {
+        Network {
             domain_id: self.id(),
-            discovery: DiscoveryRange::Localhost,
             localhost_only: true,
-            static_peers: Vec::new(),
             warnings: Vec::new(),
         }
     }

@@ -13,7 +13,7 @@ use super::sync::lock;
 /// Tasks of all nodes of a process, at most.
 const MAX_TASKS: usize = 1000;
 
-/// How a task is.
+/// State of a task.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, PartialOrd, Ord)]
 pub enum Level {
     /// As it should be.
@@ -26,7 +26,7 @@ pub enum Level {
     Stale,
 }
 
-/// Where a node states how its tasks are.
+/// States of one node's tasks.
 #[derive(Clone)]
 pub struct Diagnostics {
     node: String,

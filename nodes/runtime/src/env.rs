@@ -1,4 +1,4 @@
-//! What ROS 2 reads from the environment about the network.
+//! Network settings that ROS 2 reads from the environment.
 
 use thiserror::Error;
 
@@ -12,35 +12,18 @@ const LOCALHOST_ONLY: &str = "ROS_LOCALHOST_ONLY";
 const DISCOVERY_RANGE: &str = "ROS_AUTOMATIC_DISCOVERY_RANGE";
 const STATIC_PEERS: &str = "ROS_STATIC_PEERS";
 
-/// Where to look for other participants.
-#[derive(Clone, Copy, Debug, PartialEq, Eq)]
-pub enum DiscoveryRange {
-    /// Nowhere.
-    Off,
-    /// On this machine.
-    Localhost,
-    /// Wherever multicast reaches; the default.
-    Subnet,
-    /// As the DDS implementation does without ROS.
-    SystemDefault,
-}
-
 /// The network settings of a process.
 #[derive(Clone, Debug, PartialEq, Eq)]
-pub struct Transport {
+pub struct Network {
     /// DDS domain, 0 to 232.
     pub domain_id: u16,
-    /// Where to look for others.
-    pub discovery: DiscoveryRange,
-    /// True where nothing may leave this machine (`discovery` is then `Localhost`, or `Off`).
+    /// True where nothing may leave this machine.
     pub localhost_only: bool,
-    /// `ROS_STATIC_PEERS` as given; not used by this transport.
-    pub static_peers: Vec<String>,
-    /// What the user should hear.
+    /// Lines for the log.
     pub warnings: Vec<String>,
 }
 
-/// Why the environment is refused.
+/// Reason why the environment is refused.
 #[derive(Clone, Debug, PartialEq, Eq, Error)]
 pub enum EnvError {
     /// `ROS_DOMAIN_ID` is no domain.
@@ -51,16 +34,16 @@ pub enum EnvError {
     },
 }
 
-impl Transport {
+impl Network {
     /// Reads the environment of the process.
-    pub fn from_env() -> Result<Transport, EnvError> {
+    pub fn from_env() -> Result<Network, EnvError> {
         Self::from_lookup(|name| {
             std::env::var_os(name).map(|value| value.to_string_lossy().into_owned())
         })
     }
 
     /// Reads an environment given as a function; an empty variable counts as unset.
-    pub fn from_lookup(lookup: impl Fn(&str) -> Option<String>) -> Result<Transport, EnvError> {
+    pub fn from_lookup(lookup: impl Fn(&str) -> Option<String>) -> Result<Network, EnvError> {
         let get = |name| lookup(name).filter(|value| !value.is_empty());
         let mut warnings = Vec::new();
         let domain_id = match get(DOMAIN_ID) {
@@ -73,36 +56,24 @@ impl Transport {
                  0 to 101 and 215 to 232 are safe"
             ));
         }
-        let mut discovery = match get(DISCOVERY_RANGE) {
-            None => DiscoveryRange::Subnet,
-            Some(value) => discovery_range(&value, &mut warnings),
-        };
-        if localhost_only(get(LOCALHOST_ONLY), &mut warnings) {
-            if discovery != DiscoveryRange::Localhost && get(DISCOVERY_RANGE).is_some() {
-                warnings.push(format!(
-                    "{DISCOVERY_RANGE} is ignored since {LOCALHOST_ONLY} is 1"
-                ));
-            }
-            discovery = DiscoveryRange::Localhost;
+        let range = get(DISCOVERY_RANGE);
+        let local_range = range
+            .as_deref()
+            .is_some_and(|range| is_local(range, &mut warnings));
+        let localhost_only = localhost_only(get(LOCALHOST_ONLY), &mut warnings);
+        if localhost_only && !local_range && range.is_some() {
+            warnings.push(format!(
+                "{DISCOVERY_RANGE} is ignored since {LOCALHOST_ONLY} is 1"
+            ));
         }
-        let static_peers: Vec<String> = get(STATIC_PEERS)
-            .unwrap_or_default()
-            .split(';')
-            .map(str::trim)
-            .filter(|peer| !peer.is_empty())
-            .map(str::to_owned)
-            .collect();
-        if !static_peers.is_empty() {
+        if get(STATIC_PEERS).is_some() {
             warnings.push(format!(
                 "{STATIC_PEERS} is ignored: this transport finds others by multicast only"
             ));
         }
-        let localhost_only = matches!(discovery, DiscoveryRange::Localhost | DiscoveryRange::Off);
-        Ok(Transport {
+        Ok(Network {
             domain_id,
-            discovery,
-            localhost_only,
-            static_peers,
+            localhost_only: localhost_only || local_range,
             warnings,
         })
     }
@@ -112,18 +83,17 @@ fn domain_id(value: &str) -> Option<u16> {
     value.trim().parse().ok().filter(|id| *id <= DOMAIN_ID_MAX)
 }
 
-fn discovery_range(value: &str, warnings: &mut Vec<String>) -> DiscoveryRange {
-    match value {
-        "OFF" => DiscoveryRange::Off,
-        "LOCALHOST" => DiscoveryRange::Localhost,
-        "SUBNET" => DiscoveryRange::Subnet,
-        "SYSTEM_DEFAULT" => DiscoveryRange::SystemDefault,
+/// True for a discovery range that stays on this machine.
+fn is_local(range: &str, warnings: &mut Vec<String>) -> bool {
+    match range {
+        "OFF" | "LOCALHOST" => true,
+        "SUBNET" | "SYSTEM_DEFAULT" => false,
         _ => {
             warnings.push(format!(
-                "{DISCOVERY_RANGE}={value:?} is none of OFF, LOCALHOST, SUBNET, SYSTEM_DEFAULT; \
+                "{DISCOVERY_RANGE}={range:?} is none of OFF, LOCALHOST, SUBNET, SYSTEM_DEFAULT; \
                  LOCALHOST is assumed"
             ));
-            DiscoveryRange::Localhost
+            true
         }
     }
 }
@@ -149,8 +119,8 @@ fn localhost_only(value: Option<String>, warnings: &mut Vec<String>) -> bool {
 mod tests {
     use super::*;
 
-    fn read(variables: &[(&str, &str)]) -> Result<Transport, EnvError> {
-        Transport::from_lookup(|name| {
+    fn read(variables: &[(&str, &str)]) -> Result<Network, EnvError> {
+        Network::from_lookup(|name| {
             variables
                 .iter()
                 .find(|(key, _)| *key == name)
@@ -160,11 +130,9 @@ mod tests {
 
     #[test]
     fn an_empty_environment_has_the_defaults_of_ros() {
-        let expected = Transport {
+        let expected = Network {
             domain_id: 0,
-            discovery: DiscoveryRange::Subnet,
             localhost_only: false,
-            static_peers: vec![],
             warnings: vec![],
         };
         assert_eq!(read(&[]).unwrap(), expected);
@@ -183,9 +151,9 @@ mod tests {
             ("215", 215, 0),
             ("232", 232, 0),
         ] {
-            let transport = read(&[(DOMAIN_ID, value)]).unwrap();
+            let network = read(&[(DOMAIN_ID, value)]).unwrap();
             assert_eq!(
-                (transport.domain_id, transport.warnings.len()),
+                (network.domain_id, network.warnings.len()),
                 (id, warnings),
                 "{value}"
             );
@@ -204,47 +172,33 @@ mod tests {
 
     #[test]
     fn discovery_ranges_follow_the_variable() {
-        for (value, range, localhost_only) in [
-            ("OFF", DiscoveryRange::Off, true),
-            ("LOCALHOST", DiscoveryRange::Localhost, true),
-            ("SUBNET", DiscoveryRange::Subnet, false),
-            ("SYSTEM_DEFAULT", DiscoveryRange::SystemDefault, false),
+        for (value, local, warnings) in [
+            ("OFF", true, 0),
+            ("LOCALHOST", true, 0),
+            ("SUBNET", false, 0),
+            ("SYSTEM_DEFAULT", false, 0),
+            ("subnet", true, 1),
         ] {
-            let transport = read(&[(DISCOVERY_RANGE, value)]).unwrap();
-            assert_eq!(
-                (transport.discovery, transport.localhost_only),
-                (range, localhost_only)
-            );
-            assert!(transport.warnings.is_empty(), "{value}");
+            let network = read(&[(DISCOVERY_RANGE, value)]).unwrap();
+            let found = (network.localhost_only, network.warnings.len());
+            assert_eq!(found, (local, warnings), "{value}");
         }
-        let transport = read(&[(DISCOVERY_RANGE, "subnet")]).unwrap();
-        assert_eq!(transport.discovery, DiscoveryRange::Localhost);
-        assert!(
-            transport.warnings[0].contains("\"subnet\""),
-            "{:?}",
-            transport.warnings
-        );
     }
 
     #[test]
     fn localhost_only_overrides_the_range() {
-        let transport = read(&[(LOCALHOST_ONLY, "1"), (DISCOVERY_RANGE, "SUBNET")]).unwrap();
-        assert_eq!(transport.discovery, DiscoveryRange::Localhost);
-        assert!(transport.localhost_only);
-        assert_eq!(
-            transport.warnings.len(),
-            2,
-            "deprecated, and the range ignored"
-        );
+        let network = read(&[(LOCALHOST_ONLY, "1"), (DISCOVERY_RANGE, "SUBNET")]).unwrap();
+        assert!(network.localhost_only);
+        let warnings = network.warnings.len();
+        assert_eq!(warnings, 2, "deprecated, and the range ignored");
         assert!(!read(&[(LOCALHOST_ONLY, "0")]).unwrap().localhost_only);
         let odd = read(&[(LOCALHOST_ONLY, "true")]).unwrap();
         assert_eq!((odd.localhost_only, odd.warnings.len()), (false, 1));
     }
 
     #[test]
-    fn static_peers_are_kept_and_warned_about() {
-        let transport = read(&[(STATIC_PEERS, "10.0.0.1; robot ;")]).unwrap();
-        assert_eq!(transport.static_peers, ["10.0.0.1", "robot"]);
-        assert_eq!(transport.warnings.len(), 1);
+    fn static_peers_are_warned_about() {
+        let network = read(&[(STATIC_PEERS, "10.0.0.1; robot ;")]).unwrap();
+        assert_eq!(network.warnings.len(), 1);
     }
 }

@@ -1,4 +1,4 @@
-//! What can go wrong between a node and the network.
+//! Errors between a node and the network.
 
 use thiserror::Error;
 
@@ -6,7 +6,7 @@ use super::env::EnvError;
 use super::names::NameError;
 use super::params::ParamError;
 
-/// Why a runtime, a node or an endpoint cannot be made.
+/// Reason why a runtime, a node or an endpoint cannot be made.
 #[derive(Debug, Error)]
 pub enum RuntimeError {
     /// No DDS participant.
@@ -75,7 +75,7 @@ pub enum RuntimeError {
     },
 }
 
-/// Why a message was not queued.
+/// Reason why a message was not queued.
 #[derive(Debug, Error)]
 pub enum PublishError {
     /// The queue holds as much as it may.

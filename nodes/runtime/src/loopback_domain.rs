@@ -1,4 +1,4 @@
-//! A DDS domain on loopback that nobody else of ours uses.
+//! Locks on DDS domains of this machine, which keep replays and tests apart.
 
 use std::fs::{File, OpenOptions};
 use std::io;

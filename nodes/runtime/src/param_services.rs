@@ -1,5 +1,5 @@
 //! The parameter services of a node, for `ros2 param` and its like. Parameters cannot change while a
-//! node runs; who tries is told so.
+//! node runs; requests to set them are refused.
 
 use std::collections::BTreeSet;
 use std::sync::Arc;
@@ -15,7 +15,7 @@ use lattice_msgs::rcl_interfaces::{
 
 use super::error::RuntimeError;
 use super::node::Node;
-use super::params::{Declared, ParamValue, Params};
+use super::params::{ParamValue, Params};
 use super::service::Server;
 
 /// Serves the six parameter services of `node` for as long as the servers live.
@@ -40,17 +40,9 @@ pub(crate) fn serve(node: &Node, params: &Arc<Params>) -> Result<Vec<Server>, Ru
     ])
 }
 
-fn find<'a>(declared: &'a [Declared], name: &str) -> Option<&'a Declared> {
-    declared.iter().find(|d| d.name == name)
-}
-
 fn get_values(params: &Params, request: &GetParametersRequest) -> GetParametersResponse {
     let declared = params.declared();
-    let value = |name: &String| {
-        find(&declared, name)
-            .map(|d| message(&d.value))
-            .unwrap_or_default()
-    };
+    let value = |name: &String| declared.get(name).map(message).unwrap_or_default();
     GetParametersResponse {
         values: request.names.iter().map(value).collect(),
     }
@@ -59,7 +51,7 @@ fn get_values(params: &Params, request: &GetParametersRequest) -> GetParametersR
 fn get_types(params: &Params, request: &GetParameterTypesRequest) -> GetParameterTypesResponse {
     let declared = params.declared();
     let names = request.names.iter();
-    let types: Vec<u8> = names.map(|name| type_of(find(&declared, name))).collect();
+    let types: Vec<u8> = names.map(|name| type_of(declared.get(name))).collect();
     GetParameterTypesResponse {
         types: types.into(),
     }
@@ -70,15 +62,11 @@ fn describe_all(
     request: &DescribeParametersRequest,
 ) -> DescribeParametersResponse {
     let declared = params.declared();
-    let describe = |name: &String| {
-        let found = find(&declared, name);
-        ParameterDescriptor {
-            name: name.clone(),
-            type_: type_of(found),
-            description: found.map(|d| d.description.clone()).unwrap_or_default(),
-            read_only: true,
-            ..ParameterDescriptor::default()
-        }
+    let describe = |name: &String| ParameterDescriptor {
+        name: name.clone(),
+        type_: type_of(declared.get(name)),
+        read_only: true,
+        ..ParameterDescriptor::default()
     };
     DescribeParametersResponse {
         descriptors: request.names.iter().map(describe).collect(),
@@ -104,8 +92,7 @@ fn list_names(params: &Params, request: &ListParametersRequest) -> ListParameter
     };
     let names: Vec<String> = params
         .declared()
-        .into_iter()
-        .map(|d| d.name)
+        .into_keys()
         .filter(|name| wanted(name))
         .collect();
     let prefixes: BTreeSet<String> = names
@@ -139,8 +126,8 @@ fn refuse_all() -> SetParametersAtomicallyResponse {
     SetParametersAtomicallyResponse { result: refusal() }
 }
 
-fn type_of(declared: Option<&Declared>) -> u8 {
-    declared.map_or(ParameterType::PARAMETER_NOT_SET, |d| d.value.type_code())
+fn type_of(declared: Option<&ParamValue>) -> u8 {
+    declared.map_or(ParameterType::PARAMETER_NOT_SET, ParamValue::type_code)
 }
 
 fn message(value: &ParamValue) -> ParameterValue {
@@ -167,10 +154,7 @@ mod tests {
 
     fn params() -> Params {
         let params = Params::from_values("/n", [("lattice", ParamValue::String("fcc".to_owned()))]);
-        params
-            .about("name of the lattice")
-            .string("lattice", "bcc")
-            .unwrap();
+        params.string("lattice", "bcc").unwrap();
         params.f64("cell_volume_m3", 0.125).unwrap();
         params.i64("qos.map.depth", 500).unwrap();
         params
@@ -185,7 +169,7 @@ mod tests {
     }
 
     #[test]
-    fn values_types_and_descriptions_are_told() {
+    fn values_and_types_are_given() {
         let names: Vec<String> = ["lattice", "cell_volume_m3", "none"]
             .map(str::to_owned)
             .into();
@@ -200,9 +184,8 @@ mod tests {
             names: names.clone(),
         };
         assert_eq!(get_types(&params(), &request).types.as_slice(), [4, 3, 0]);
-        let told = describe_all(&params(), &DescribeParametersRequest { names }).descriptors;
-        assert_eq!(told[0].description, "name of the lattice");
-        assert!(told[0].read_only && told[2].type_ == 0);
+        let descriptors = describe_all(&params(), &DescribeParametersRequest { names }).descriptors;
+        assert!(descriptors[0].read_only && descriptors[2].type_ == 0);
     }
 
     #[test]

@@ -6,7 +6,7 @@ use std::sync::{Arc, Mutex};
 use super::port::EndpointId;
 use super::sync::{Changed, lock};
 
-/// Peers of one endpoint that are told apart, at most.
+/// Peers of one endpoint that are remembered, at most.
 const MAX_PEERS: usize = 4096;
 
 /// Called when a peer joins; must return at once.
@@ -93,7 +93,7 @@ impl Peers {
     /// Calls `callback` for every peer that joins, and now if there is one already.
     pub(crate) fn on_joined(&self, callback: OnJoined) {
         let callback = Arc::new(Mutex::new(callback));
-        // First known, then asked: a peer that joins meanwhile is told twice rather than never.
+        // Registered before counting: a peer that joins meanwhile is called for twice rather than never.
         lock(&self.on_joined).push(Arc::clone(&callback));
         if self.count() > 0 {
             lock(&callback)();

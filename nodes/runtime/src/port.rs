@@ -106,8 +106,8 @@ pub(crate) trait Transport: Send + Sync {
     /// Changes of peers. Only one stream hears them.
     fn events(&self) -> BoxStream<'static, PortEvent>;
 
-    /// Begins to wait until discovery knows every writer made so far: a reader of the same topic in the
-    /// same participant must not be made before.
+    /// A wait for discovery to know all writers made so far: a reader of the same topic in the same
+    /// participant must not be made before.
     fn writers_known(&self) -> Result<BoxFuture<'static, ()>, RuntimeError>;
 }
 

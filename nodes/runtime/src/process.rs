@@ -6,7 +6,7 @@ use std::time::{Duration, Instant};
 use lattice_msgs::diagnostic_msgs::DiagnosticArray;
 use smol::Timer;
 
-use super::env::Transport;
+use super::env::Network;
 use super::error::RuntimeError;
 use super::node::Node;
 use super::param_services;
@@ -37,19 +37,19 @@ pub struct Runtime {
 impl Runtime {
     /// Starts the runtime and its main node, on the network that the environment names.
     pub fn start(default_node_name: &str, args: RosArgs) -> Result<Self, RuntimeError> {
-        Self::with_transport(default_node_name, args, &Transport::from_env()?)
+        Self::with_transport(default_node_name, args, &Network::from_env()?)
     }
 
     /// The same on a network that is given.
     pub fn with_transport(
         default_node_name: &str,
         args: RosArgs,
-        transport: &Transport,
+        network: &Network,
     ) -> Result<Self, RuntimeError> {
-        for warning in &transport.warnings {
+        for warning in &network.warnings {
             log::warn!("{warning}");
         }
-        let shared = Shared::start(transport.domain_id, transport.localhost_only)?;
+        let shared = Shared::start(network.domain_id, network.localhost_only)?;
         shared.receive_buffer.warn_if_short();
         let signals = SignalWatch::start(shared.shutdown.clone())?;
         let args = Arc::new(args);

@@ -5,7 +5,7 @@ use crate::params::{ParamError, Params};
 /// Deepest history a parameter may ask for, samples.
 pub const DEPTH_MAX: usize = 10_000;
 
-/// Whether lost samples are sent again.
+/// Reliability: samples that were lost are sent again, or not.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, Hash)]
 pub enum Reliability {
     /// They are not.
@@ -14,7 +14,7 @@ pub enum Reliability {
     Reliable,
 }
 
-/// Whether readers that join late get the last samples.
+/// Durability: readers that join late get the last samples, or not.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, Hash)]
 pub enum Durability {
     /// They do not.
@@ -26,9 +26,9 @@ pub enum Durability {
 /// The qualities of a topic; history is always "keep the last `depth`".
 #[derive(Clone, Copy, Debug, PartialEq, Eq, Hash)]
 pub struct Qos {
-    /// Whether lost samples are sent again.
+    /// Fate of lost samples.
     pub reliability: Reliability,
-    /// Whether readers that join late get the last samples.
+    /// Fate of samples from before a reader joined.
     pub durability: Durability,
     /// Samples kept, at least 1.
     pub depth: usize,
@@ -186,16 +186,7 @@ impl Keys<'_> {
 
     fn depth(&self, default: usize) -> Result<usize, ParamError> {
         self.each("depth", default, |key, default| {
-            let depth = self
-                .params
-                .i64(key, i64::try_from(default).unwrap_or(i64::MAX))?;
-            usize::try_from(depth)
-                .ok()
-                .filter(|depth| (1..=DEPTH_MAX).contains(depth))
-                .ok_or_else(|| {
-                    self.params
-                        .invalid(key, format!("expected a number from 1 to {DEPTH_MAX}"))
-                })
+            self.params.usize_in(key, default, 1..=DEPTH_MAX)
         })
     }
 }

@@ -26,7 +26,7 @@ pub(crate) struct Listener {
     sender: Sender<Log>,
 }
 
-/// Starts to hear the log. What is heard is for [`publish`].
+/// A listener to the log, and the records for [`publish`].
 pub(crate) fn listen() -> (std::sync::Arc<Listener>, Receiver<Log>) {
     let (sender, receiver) = bounded(QUEUE_RECORDS);
     let listener = std::sync::Arc::new(Listener { sender });
@@ -36,7 +36,7 @@ pub(crate) fn listen() -> (std::sync::Arc<Listener>, Receiver<Log>) {
     (listener, receiver)
 }
 
-/// Publishes what is heard until the task is dropped.
+/// Publishes records until the task is dropped.
 ///
 /// Records may come from any thread, under any lock: only here do they meet publishers.
 pub(crate) async fn publish(records: Receiver<Log>, publisher: Publisher<Log>) {

@@ -94,8 +94,7 @@ fn set_at_once(value: bool) {
     }
 }
 
-/// Turns SIGINT and SIGTERM into a request while it lives; a second signal ends the process at once,
-/// for who does not want to wait until queues have drained.
+/// Turns SIGINT and SIGTERM into a request while it lives; a second signal ends the process at once.
 pub(crate) struct SignalWatch {
     handle: Handle,
     thread: Option<std::thread::JoinHandle<()>>,

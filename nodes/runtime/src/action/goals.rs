@@ -1,4 +1,4 @@
-//! The goals of an action server and how far they are, without I/O.
+//! The goals of an action server with their states, without I/O.
 
 use std::collections::BTreeMap;
 use std::sync::Arc;
@@ -17,7 +17,7 @@ use super::ActionLimits;
 /// An identifier that names no goal.
 const NO_ID: UUID = UUID { uuid: [0; 16] };
 
-/// Why a goal was not taken.
+/// Reason why a goal was not taken.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub(super) enum Refused {
     /// There is a goal of this identifier, or it is zero.
@@ -29,7 +29,7 @@ pub(super) enum Refused {
 /// A goal from its acceptance until its result is forgotten. `W` waits for the result.
 struct Goal<A: RosAction, W> {
     info: GoalInfo,
-    /// Whether the goal was taken for good; clients hear of no other.
+    /// True for a goal that was taken for good; clients hear of no other.
     confirmed: bool,
     status: i8,
     canceled: Arc<AtomicBool>,
@@ -156,7 +156,7 @@ impl<A: RosAction, W> Goals<A, W> {
         None
     }
 
-    /// How far all goals are.
+    /// States of all goals.
     pub fn status(&self) -> GoalStatusArray {
         let status = |goal: &Goal<A, W>| GoalStatus {
             goal_info: goal.info,
@@ -289,8 +289,8 @@ mod tests {
         assert_eq!(cancel(&mut goals, id(3), none), (0, vec![id(3)]));
         assert_eq!(cancel(&mut goals, NO_ID, at(1)), (0, vec![id(1)]));
         assert_eq!(cancel(&mut goals, id(4), at(1)), (0, vec![id(1), id(4)]));
-        let told: Vec<bool> = flags.iter().map(|flag| flag.load(Relaxed)).collect();
-        assert_eq!(told, [true, false, true, true, false]);
+        let canceled: Vec<bool> = flags.iter().map(|flag| flag.load(Relaxed)).collect();
+        assert_eq!(canceled, [true, false, true, true, false]);
         assert_eq!(statuses(&goals), [3, 1, 3, 3, 1]);
         assert!(!goals.execute(id(3)), "it is canceling");
 
@@ -298,7 +298,7 @@ mod tests {
         assert_eq!(cancel(&mut goals, id(3), none), (3, vec![]));
         let (response, new) = goals.cancel(&CancelGoalRequest::default());
         assert_eq!(response.goals_canceling.len(), 4);
-        assert_eq!(new, [id(2), id(5)], "told only once");
+        assert_eq!(new, [id(2), id(5)], "called only once");
     }
 
     #[test]

@@ -22,7 +22,7 @@ use super::sync::lock;
 /// Requests of `get_result` that wait at a time, at most.
 const MAX_WAITING_REQUESTS: usize = 64;
 
-/// What an action server keeps, at most.
+/// Bounds of an action server.
 #[derive(Clone, Copy, Debug)]
 pub struct ActionLimits {
     /// Goals that have not ended; more are rejected.
@@ -31,7 +31,7 @@ pub struct ActionLimits {
     pub max_results: usize,
     /// Clients that wait for the result of one goal; more get the status unknown.
     pub max_waiting: usize,
-    /// How long a result can be asked for.
+    /// Time in which a result can be asked for.
     pub keep_results: Duration,
 }
 
@@ -78,17 +78,12 @@ impl<A: RosAction> GoalHandle<A> {
         self.goal_id
     }
 
-    /// Is set when a client wants the goal to end early.
-    pub fn cancel_flag(&self) -> Arc<AtomicBool> {
-        Arc::clone(&self.canceled)
-    }
-
-    /// Whether a client wants the goal to end early.
+    /// True once a client wants the goal to end early.
     pub fn is_canceled(&self) -> bool {
         self.canceled.load(Relaxed)
     }
 
-    /// Tells that the goal is at work.
+    /// Sets the goal's status to executing.
     pub fn execute(&self) {
         let mut goals = lock(&self.shared.goals);
         if goals.execute(self.goal_id) {
@@ -96,7 +91,7 @@ impl<A: RosAction> GoalHandle<A> {
         }
     }
 
-    /// Who can tell how far the goal is, from any thread.
+    /// Publisher of the goal's feedback, for any thread.
     pub fn feedback(&self) -> Feedback<A> {
         Feedback {
             publisher: self.shared.feedback.clone(),
@@ -134,7 +129,7 @@ impl<A: RosAction> Drop for GoalHandle<A> {
     }
 }
 
-/// Tells clients how far one goal is.
+/// Publisher of the feedback of one goal.
 pub struct Feedback<A: RosAction> {
     publisher: Publisher<A::FeedbackMessage>,
     goal_id: UUID,

@@ -17,7 +17,7 @@ const CHATTY: [&str; 7] = [
     "cdr_encoding",
 ];
 
-/// What the arguments and the environment say about the console log.
+/// Settings of the console log, from the arguments and the environment.
 #[derive(Debug, PartialEq, Eq)]
 pub(super) struct Plan {
     /// Target and level; the longest target that fits counts, and of equal ones the last.
@@ -84,7 +84,7 @@ mod tests {
     use super::*;
     use log::{Level, Log, Metadata};
 
-    /// Whether a plan lets a record through, by env_logger's own rules.
+    /// True if a plan lets a record through, by env_logger's own rules.
     fn shows(rules: &[&str], rust_log: Option<&str>, level: Level, target: &str) -> bool {
         let log_levels = rules.iter().map(|rule| rule.parse().unwrap()).collect();
         let args = RosArgs {

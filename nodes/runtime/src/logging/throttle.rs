@@ -8,9 +8,7 @@ use std::{
 
 static START: LazyLock<Instant> = LazyLock::new(Instant::now);
 
-/// Lets a message through at most once per period, and counts the others.
-///
-/// Meant as a `static` beside the message; see [`crate::log_throttled`].
+/// Gate for log lines: one message per period passes, the others are counted.
 #[derive(Debug)]
 pub struct Throttle {
     period_ns: u64,
@@ -30,13 +28,12 @@ impl Throttle {
         }
     }
 
-    /// Whether to log now: the messages suppressed since the last one, or `None`.
+    /// The number of messages suppressed since the last one if a message may pass now.
     pub fn check(&self) -> Option<u64> {
         self.check_at(u64::try_from(START.elapsed().as_nanos()).unwrap_or(u64::MAX))
     }
 
-    /// The same at a time of the caller's clock, ns.
-    pub fn check_at(&self, now_ns: u64) -> Option<u64> {
+    fn check_at(&self, now_ns: u64) -> Option<u64> {
         let next_ns = self.next_ns.load(Ordering::Relaxed);
         let after_ns = now_ns.saturating_add(self.period_ns);
         let ours = now_ns >= next_ns
@@ -52,28 +49,9 @@ impl Throttle {
     }
 }
 
-/// Logs at most once per period at this place, with the number of messages left out.
-///
-/// `log_throttled!(log::Level::Warn, Duration::from_secs(5), "no pose for {stamp_ns}")`
-#[macro_export]
-macro_rules! log_throttled {
-    ($level:expr, $period:expr, $($message:tt)+) => {{
-        static THROTTLE: $crate::logging::Throttle =
-            $crate::logging::Throttle::new($period);
-        match THROTTLE.check() {
-            Some(0) => log::log!($level, $($message)+),
-            Some(more) => {
-                log::log!($level, "{} ({more} more like this)", format_args!($($message)+))
-            }
-            None => {}
-        }
-    }};
-}
-
 #[cfg(test)]
 mod tests {
     use super::*;
-    use std::sync::Mutex;
 
     #[test]
     fn one_message_per_period_and_a_count_of_the_rest() {
@@ -99,36 +77,5 @@ mod tests {
         });
         assert_eq!(passed, 1);
         assert_eq!(throttle.suppressed.load(Ordering::Relaxed), 3999);
-    }
-
-    /// Keeps what is logged from this module.
-    struct Memory(Mutex<Vec<String>>);
-
-    impl log::Log for Memory {
-        fn enabled(&self, _: &log::Metadata<'_>) -> bool {
-            true
-        }
-
-        fn log(&self, record: &log::Record<'_>) {
-            if record.target() == module_path!() {
-                self.0.lock().unwrap().push(record.args().to_string());
-            }
-        }
-
-        fn flush(&self) {}
-    }
-
-    #[test]
-    fn the_macro_logs_once_per_period() {
-        static MEMORY: Memory = Memory(Mutex::new(Vec::new()));
-        log::set_logger(&MEMORY).unwrap();
-        log::set_max_level(log::LevelFilter::Trace);
-        for attempt in 0..3 {
-            log_throttled!(log::Level::Warn, Duration::MAX, "one {attempt}");
-        }
-        for attempt in 0..2 {
-            log_throttled!(log::Level::Warn, Duration::ZERO, "two {attempt}");
-        }
-        assert_eq!(*MEMORY.0.lock().unwrap(), ["one 0", "two 0", "two 1"]);
     }
 }

@@ -16,13 +16,13 @@ pub const NAMESPACE_LENGTH_MAX: usize = 245;
 /// rmw's limit of a node's name, bytes.
 pub const NODE_NAME_LENGTH_MAX: usize = 255;
 
-/// Why a name is refused.
+/// Reason why a name is refused.
 #[derive(Clone, Debug, PartialEq, Eq, Error)]
 pub enum NameError {
     /// The name breaks one of the rules.
     #[error("the {what} {name:?} {problem}")]
     Invalid {
-        /// What the name should be: a topic, a node, a namespace.
+        /// Kind of name: a topic, a node, a namespace.
         what: &'static str,
         /// The name, cut to a readable length.
         name: String,
@@ -36,13 +36,13 @@ pub enum NameError {
     UnknownSubstitution {
         /// The name.
         name: String,
-        /// What stands between the braces.
+        /// Text between the braces.
         key: String,
     },
     /// The name is longer than rmw allows.
     #[error("the {what} {name:?} has {length} bytes, {length_max} are allowed")]
     TooLong {
-        /// What the name should be.
+        /// Kind of name.
         what: &'static str,
         /// The name, cut to a readable length.
         name: String,

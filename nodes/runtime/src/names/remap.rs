@@ -25,7 +25,7 @@ pub enum RemapTarget {
         kind: NameKind,
         /// The name to replace.
         from: String,
-        /// What takes its place.
+        /// The name in its place.
         to: String,
     },
 }
@@ -35,7 +35,7 @@ pub enum RemapTarget {
 pub struct RemapRule {
     /// The only node the rule is for, or all of them.
     pub node: Option<String>,
-    /// What it replaces.
+    /// The name or namespace that it replaces.
     pub target: RemapTarget,
 }
 

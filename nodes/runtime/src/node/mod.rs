@@ -16,7 +16,7 @@ use super::publisher::{Publisher, RawPublisher};
 use super::qos::Qos;
 use super::ros_args::RosArgs;
 use super::shared::{DEFAULT_MAX_MESSAGE_BYTES, Shared};
-use super::subscription::{Load, Sample, Stats, Subscription, Undecoded};
+use super::subscription::{Load, Subscription};
 
 /// A node of the process. Clones are the same node.
 #[derive(Clone)]
@@ -54,8 +54,7 @@ impl Node {
             1..=u32::MAX as usize,
         )?;
         let id = shared.graph.add_node(&namespace, &name);
-        let about = "go by the time on /clock instead of the system's";
-        let clock = if params.about(about).bool("use_sim_time", false)? {
+        let clock = if params.bool("use_sim_time", false)? {
             let topic = names::resolve_topic("/clock", &name, &namespace, &args.remaps)?;
             shared.sim_clock(id, &topic)?
         } else {
@@ -172,35 +171,7 @@ impl Node {
         topic: &str,
         qos: Qos,
         load: Load,
-        mut handler: impl FnMut(Arc<M>) + Send + 'static,
-    ) -> Result<Subscription, RuntimeError> {
-        self.subscribe_samples(topic, qos, load, move |sample, stats| {
-            if let Some(message) = stats.decode(sample) {
-                handler(message);
-            }
-        })
-    }
-
-    /// Gives every message on a topic to `handler` as it came, to be decoded by who works on it; else
-    /// as [`Node::subscribe`]. For large messages of which one thread must keep the order.
-    pub fn subscribe_undecoded<M: RosMessage>(
-        &self,
-        topic: &str,
-        qos: Qos,
-        load: Load,
-        mut handler: impl FnMut(Undecoded<M>) + Send + 'static,
-    ) -> Result<Subscription, RuntimeError> {
-        self.subscribe_samples(topic, qos, load, move |sample, stats| {
-            handler(Undecoded::new(sample, stats));
-        })
-    }
-
-    fn subscribe_samples<M: RosMessage>(
-        &self,
-        topic: &str,
-        qos: Qos,
-        load: Load,
-        handler: impl FnMut(Sample<'_, M>, &Arc<Stats>) + Send + 'static,
+        handler: impl FnMut(Arc<M>) + Send + 'static,
     ) -> Result<Subscription, RuntimeError> {
         let resolved = self.resolve(topic)?;
         let qos = qos.with_overrides(&self.inner.params, &resolved, topic)?;

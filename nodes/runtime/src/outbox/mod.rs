@@ -22,7 +22,7 @@ use crate::port::{Bytes, ENCAPSULATION_BYTES, EndpointId, SampleId, SampleWriter
 use crate::shutdown::Shutdown;
 use crate::sync::lock;
 
-/// How long a sample waits for a full send window before it is dropped.
+/// Longest time that a sample waits for a full send window before it is dropped.
 const PATIENCE: Duration = Duration::from_secs(1);
 
 /// The same, after a sample was dropped: a peer that hangs must not slow down the others.

@@ -30,7 +30,7 @@ pub enum ParamValue {
     StringArray(Vec<String>),
 }
 
-/// Why a YAML value is no parameter value.
+/// Reason why a YAML value is no parameter value.
 #[derive(Clone, Debug, PartialEq, Eq, Error)]
 pub enum ValueError {
     /// Nothing, or `null`.

@@ -6,7 +6,7 @@ use thiserror::Error;
 /// Most brackets, braces and list dashes around a value.
 const NESTING_MAX: usize = 64;
 
-/// Why a YAML text is refused before it is read.
+/// Reason why a YAML text is refused before it is read.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, Error)]
 pub enum ScanError {
     /// `&name` or `*name` where a value begins.

@@ -18,7 +18,7 @@ pub enum ParamError {
         expected: &'static str,
         /// Type and value that were given.
         found: String,
-        /// Where it was given.
+        /// File, command line or default.
         origin: String,
     },
     /// The value has the right type and cannot be used.
@@ -30,9 +30,9 @@ pub enum ParamError {
         name: String,
         /// The value.
         value: String,
-        /// Where it was given.
+        /// File, command line or default.
         origin: String,
-        /// What is wrong with it and what would be right.
+        /// The problem with it, and what would be right.
         problem: String,
     },
 }

@@ -20,10 +20,10 @@ use std::{
 pub struct Params {
     node: String,
     given: BTreeMap<String, Given>,
-    declared: Mutex<BTreeMap<String, Declared>>,
+    declared: Mutex<BTreeMap<String, ParamValue>>,
 }
 
-/// A value and where it comes from.
+/// A value with its origin.
 #[derive(Clone, Debug)]
 struct Given {
     value: ParamValue,
@@ -45,17 +45,6 @@ impl std::fmt::Display for Origin {
             Origin::File { path, key } => write!(f, "from {}, `{key}`", path.display()),
         }
     }
-}
-
-/// A parameter that the node has read.
-#[derive(Clone, Debug, PartialEq)]
-pub struct Declared {
-    /// The parameter, levels separated by dots.
-    pub name: String,
-    /// The value in use.
-    pub value: ParamValue,
-    /// What it means, with its unit; may be empty.
-    pub description: String,
 }
 
 impl Params {
@@ -128,12 +117,24 @@ impl Params {
 
     /// A bool; `yes`, `on`, `no`, `off` count.
     pub fn bool(&self, name: &str, default: bool) -> Result<bool, ParamError> {
-        self.about("").bool(name, default)
+        self.read(
+            name,
+            default,
+            "a bool (true or false)",
+            ParamValue::as_bool,
+            ParamValue::Bool,
+        )
     }
 
     /// An integer; `0x1F` and the octal `010` count.
     pub fn i64(&self, name: &str, default: i64) -> Result<i64, ParamError> {
-        self.about("").i64(name, default)
+        self.read(
+            name,
+            default,
+            "an integer (no point, no exponent, no quotes)",
+            ParamValue::as_i64,
+            ParamValue::I64,
+        )
     }
 
     /// A count: an integer from 0 on.
@@ -143,35 +144,80 @@ impl Params {
 
     /// A float, never NaN; an integer counts, with a line in the log.
     pub fn f64(&self, name: &str, default: f64) -> Result<f64, ParamError> {
-        self.about("").f64(name, default)
+        self.read(
+            name,
+            default,
+            "a float (with a point, no quotes)",
+            |value| self.float(name, value),
+            ParamValue::F64,
+        )
     }
 
     /// A text.
     pub fn string(&self, name: &str, default: &str) -> Result<String, ParamError> {
-        self.about("").string(name, default)
+        let text = |value: &ParamValue| value.as_str().map(str::to_owned);
+        self.read(
+            name,
+            default.to_owned(),
+            "a text (in quotes)",
+            text,
+            ParamValue::String,
+        )
     }
 
     /// A list of integers.
     pub fn i64_array(&self, name: &str, default: &[i64]) -> Result<Vec<i64>, ParamError> {
-        self.about("").i64_array(name, default)
+        let expected = "a list of integers ([1, 2])";
+        let list = |value: &ParamValue| list(value, ParamValue::as_i64);
+        self.read(name, default.to_vec(), expected, list, ParamValue::I64Array)
     }
 
     /// A list of floats, none NaN; integers count, with a line in the log.
     pub fn f64_array(&self, name: &str, default: &[f64]) -> Result<Vec<f64>, ParamError> {
-        self.about("").f64_array(name, default)
+        let expected = "a list of floats ([1.0, 2.0])";
+        let list = |value: &ParamValue| list(value, |item| self.float(name, item));
+        self.read(name, default.to_vec(), expected, list, ParamValue::F64Array)
     }
 
     /// A list of texts.
     pub fn string_array(&self, name: &str, default: &[&str]) -> Result<Vec<String>, ParamError> {
-        self.about("").string_array(name, default)
+        let expected = "a list of texts ([\"a\", \"b\"])";
+        let list = |value: &ParamValue| list(value, |item| item.as_str().map(str::to_owned));
+        let default = default.iter().map(|text| (*text).to_owned()).collect();
+        self.read(name, default, expected, list, ParamValue::StringArray)
     }
 
-    /// The same readers with a description for the parameter service: meaning and unit.
-    pub fn about<'a>(&'a self, description: &'a str) -> Described<'a> {
-        Described {
-            params: self,
-            description,
+    fn float(&self, name: &str, value: &ParamValue) -> Option<f64> {
+        if matches!(value, ParamValue::I64(_)) {
+            let node = &self.node;
+            log::info!("parameter `{name}` of {node}: the integer {value} is taken as a float");
         }
+        value.as_f64().filter(|value| !value.is_nan())
+    }
+
+    fn read<T: Clone>(
+        &self,
+        name: &str,
+        default: T,
+        expected: &'static str,
+        convert: impl Fn(&ParamValue) -> Option<T>,
+        wrap: impl Fn(T) -> ParamValue,
+    ) -> Result<T, ParamError> {
+        let value = match self.given.get(name) {
+            None => default,
+            Some(Given { value, origin }) => convert(value).ok_or_else(|| ParamError::Type {
+                node: self.node.clone(),
+                name: name.to_owned(),
+                expected,
+                found: format!("{} {}", value.type_name(), brief(value)),
+                origin: origin.to_string(),
+            })?,
+        };
+        let declared = || wrap(value.clone());
+        self.declared_lock()
+            .entry(name.to_owned())
+            .or_insert_with(declared);
+        Ok(value)
     }
 
     /// True if a file or the command line gives the parameter.
@@ -181,10 +227,7 @@ impl Params {
 
     /// An error for a value of the right type that cannot be used.
     pub fn invalid(&self, name: &str, problem: impl Into<String>) -> ParamError {
-        let value = self
-            .declared_lock()
-            .get(name)
-            .map(|declared| brief(&declared.value));
+        let value = self.declared_lock().get(name).map(brief);
         let given = self.given.get(name);
         ParamError::Invalid {
             node: self.node.clone(),
@@ -209,127 +252,13 @@ impl Params {
             .collect()
     }
 
-    /// Parameters the node has read, by name.
-    pub fn declared(&self) -> Vec<Declared> {
-        self.declared_lock().values().cloned().collect()
+    /// Parameters the node has read, with the values in use.
+    pub fn declared(&self) -> BTreeMap<String, ParamValue> {
+        self.declared_lock().clone()
     }
 
-    fn declared_lock(&self) -> MutexGuard<'_, BTreeMap<String, Declared>> {
+    fn declared_lock(&self) -> MutexGuard<'_, BTreeMap<String, ParamValue>> {
         self.declared.lock().unwrap_or_else(PoisonError::into_inner)
-    }
-}
-
-/// [`Params`] with a description for what is read next.
-#[derive(Clone, Copy, Debug)]
-pub struct Described<'a> {
-    params: &'a Params,
-    description: &'a str,
-}
-
-impl Described<'_> {
-    /// See [`Params::bool`].
-    pub fn bool(&self, name: &str, default: bool) -> Result<bool, ParamError> {
-        self.read(
-            name,
-            default,
-            "a bool (true or false)",
-            ParamValue::as_bool,
-            ParamValue::Bool,
-        )
-    }
-
-    /// See [`Params::i64`].
-    pub fn i64(&self, name: &str, default: i64) -> Result<i64, ParamError> {
-        self.read(
-            name,
-            default,
-            "an integer (no point, no exponent, no quotes)",
-            ParamValue::as_i64,
-            ParamValue::I64,
-        )
-    }
-
-    /// See [`Params::f64`].
-    pub fn f64(&self, name: &str, default: f64) -> Result<f64, ParamError> {
-        self.read(
-            name,
-            default,
-            "a float (with a point, no quotes)",
-            |value| self.float(name, value),
-            ParamValue::F64,
-        )
-    }
-
-    /// See [`Params::string`].
-    pub fn string(&self, name: &str, default: &str) -> Result<String, ParamError> {
-        let text = |value: &ParamValue| value.as_str().map(str::to_owned);
-        self.read(
-            name,
-            default.to_owned(),
-            "a text (in quotes)",
-            text,
-            ParamValue::String,
-        )
-    }
-
-    /// See [`Params::i64_array`].
-    pub fn i64_array(&self, name: &str, default: &[i64]) -> Result<Vec<i64>, ParamError> {
-        let expected = "a list of integers ([1, 2])";
-        let list = |value: &ParamValue| list(value, ParamValue::as_i64);
-        self.read(name, default.to_vec(), expected, list, ParamValue::I64Array)
-    }
-
-    /// See [`Params::f64_array`].
-    pub fn f64_array(&self, name: &str, default: &[f64]) -> Result<Vec<f64>, ParamError> {
-        let expected = "a list of floats ([1.0, 2.0])";
-        let list = |value: &ParamValue| list(value, |item| self.float(name, item));
-        self.read(name, default.to_vec(), expected, list, ParamValue::F64Array)
-    }
-
-    /// See [`Params::string_array`].
-    pub fn string_array(&self, name: &str, default: &[&str]) -> Result<Vec<String>, ParamError> {
-        let expected = "a list of texts ([\"a\", \"b\"])";
-        let list = |value: &ParamValue| list(value, |item| item.as_str().map(str::to_owned));
-        let default = default.iter().map(|text| (*text).to_owned()).collect();
-        self.read(name, default, expected, list, ParamValue::StringArray)
-    }
-
-    fn float(&self, name: &str, value: &ParamValue) -> Option<f64> {
-        if matches!(value, ParamValue::I64(_)) {
-            let node = &self.params.node;
-            log::info!("parameter `{name}` of {node}: the integer {value} is taken as a float");
-        }
-        value.as_f64().filter(|value| !value.is_nan())
-    }
-
-    fn read<T: Clone>(
-        &self,
-        name: &str,
-        default: T,
-        expected: &'static str,
-        convert: impl Fn(&ParamValue) -> Option<T>,
-        wrap: impl Fn(T) -> ParamValue,
-    ) -> Result<T, ParamError> {
-        let value = match self.params.given.get(name) {
-            None => default,
-            Some(Given { value, origin }) => convert(value).ok_or_else(|| ParamError::Type {
-                node: self.params.node.clone(),
-                name: name.to_owned(),
-                expected,
-                found: format!("{} {}", value.type_name(), brief(value)),
-                origin: origin.to_string(),
-            })?,
-        };
-        let mut declared = self.params.declared_lock();
-        let entry = declared.entry(name.to_owned()).or_insert_with(|| Declared {
-            name: name.to_owned(),
-            value: wrap(value.clone()),
-            description: String::new(),
-        });
-        if !self.description.is_empty() {
-            self.description.clone_into(&mut entry.description);
-        }
-        Ok(value)
     }
 }
 

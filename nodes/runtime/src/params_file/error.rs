@@ -12,7 +12,7 @@ pub enum ParamFileError {
     Read {
         /// The file.
         path: PathBuf,
-        /// What the system says.
+        /// Answer of the system.
         source: std::io::Error,
     },
     /// The path leads to a fifo, a directory or a device.
@@ -34,7 +34,7 @@ pub enum ParamFileError {
     Yaml {
         /// The file.
         path: PathBuf,
-        /// What the YAML reader says, with line and column.
+        /// Message of the YAML reader, with line and column.
         message: String,
     },
     /// The file has an anchor, an alias, or too deep nesting.
@@ -42,7 +42,7 @@ pub enum ParamFileError {
     Scan {
         /// The file.
         path: PathBuf,
-        /// What it has, and where.
+        /// The construct, and its line.
         source: ScanError,
     },
     /// The file is YAML of another shape.
@@ -52,9 +52,9 @@ pub enum ParamFileError {
         path: PathBuf,
         /// The keys that lead there.
         key: String,
-        /// What is allowed.
+        /// Allowed form.
         expected: &'static str,
-        /// What is there.
+        /// Form in the file.
         found: String,
     },
     /// The file has a value of no parameter type.
@@ -64,7 +64,7 @@ pub enum ParamFileError {
         path: PathBuf,
         /// The keys that lead there.
         key: String,
-        /// What is wrong with it.
+        /// The problem with it.
         source: ValueError,
     },
 }

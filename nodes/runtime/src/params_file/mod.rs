@@ -28,7 +28,7 @@ pub struct FileParam {
     pub name: String,
     /// Its value.
     pub value: ParamValue,
-    /// Where it stands in the file.
+    /// Keys that lead to it in the file.
     pub key: String,
 }
 

@@ -34,12 +34,12 @@ impl NodePattern {
         })
     }
 
-    /// Whether the last part of the pattern is this node name itself, not a wildcard.
+    /// True if the last part of the pattern is this node name itself, not a wildcard.
     pub fn names(&self, node_name: &str) -> bool {
         matches!(self.parts.last(), Some(Part::Name(name)) if name == node_name)
     }
 
-    /// Whether the pattern covers the node of this full name.
+    /// True if the pattern covers the node of this full name.
     pub fn matches(&self, node_fqn: &str) -> bool {
         let name: Vec<&str> = node_fqn
             .split('/')

@@ -1,6 +1,6 @@
 use thiserror::Error;
 
-/// Why a command line was refused; every message shows the argument, what was expected and an example.
+/// Reason why a command line is refused; its message shows the argument, what is accepted and an example.
 #[derive(Clone, Debug, PartialEq, Eq, Error)]
 pub enum RosArgsError {
     /// The last argument is a flag that needs a value.
@@ -11,7 +11,7 @@ pub enum RosArgsError {
     MissingValue {
         /// The flag as given.
         flag: String,
-        /// What has to follow it.
+        /// Form of the value that has to follow it.
         expected: &'static str,
         /// A value that would be accepted.
         example: &'static str,
@@ -23,9 +23,9 @@ pub enum RosArgsError {
         flag: String,
         /// The value as given, escaped and shortened.
         argument: String,
-        /// What is wrong with it.
+        /// The problem with it.
         problem: String,
-        /// What is accepted.
+        /// Form of an accepted value.
         expected: &'static str,
         /// A value that would be accepted.
         example: &'static str,

@@ -4,7 +4,7 @@ use crate::names::shown;
 const SCOPE: &str = "--ros-args";
 const SCOPE_END: &str = "--";
 
-/// What may follow a flag that takes a value, and an example.
+/// Form of the value of a flag, and an example.
 struct Value {
     expected: &'static str,
     example: &'static str,
@@ -41,7 +41,7 @@ struct Arguments<I> {
 }
 
 impl<I: Iterator<Item = String>> Arguments<I> {
-    /// The value of `flag`, turned into what it means.
+    /// The parsed value of `flag`.
     fn value<T>(
         &mut self,
         flag: &str,

@@ -20,7 +20,8 @@ use super::sync::{lock, wait_for};
 #[must_use = "dropping a server ends it"]
 pub struct Server {
     name: String,
-    clients: Arc<Peers>,
+    /// Hear of matches.
+    _clients: Arc<Peers>,
     _task: Task<()>,
     _graph: [NodeEndpoint; 2],
 }
@@ -34,7 +35,7 @@ impl Server {
     ) -> Self {
         Self {
             name: name.to_owned(),
-            clients,
+            _clients: clients,
             _task: task,
             _graph: graph,
         }
@@ -43,11 +44,6 @@ impl Server {
     /// Full name of the service.
     pub fn name(&self) -> &str {
         &self.name
-    }
-
-    /// Clients that could send a request now.
-    pub fn client_count(&self) -> usize {
-        self.clients.count()
     }
 }
 

@@ -1,4 +1,4 @@
-//! How requests and replies lie on DDS: each rmw has its own way, told apart by who sent the request.
+//! Requests and replies on DDS: each rmw has its own form, recognised by the vendor of the client.
 //!
 //! rmw_fastrtps sends the bare message and names the request in the inline QoS (the "Enhanced" mapping
 //! of DDS-RPC 1.0); rmw_cyclonedds puts a header of 16 bytes in front of it.
@@ -15,7 +15,7 @@ const RUSTDDS_VENDOR: [u8; 2] = [0x01, 0x12];
 /// Eight bytes of the client's GUID and eight of the request's number.
 const CYCLONE_HEADER_BYTES: usize = 16;
 
-/// Which request a reply belongs to, in the manner of the client.
+/// Identity of a request in a reply, in the form of the client's rmw.
 #[derive(Clone, Debug, PartialEq)]
 pub(crate) enum ReplyTo {
     Enhanced(SampleId),

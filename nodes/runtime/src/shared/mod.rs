@@ -30,7 +30,7 @@ use super::publisher::PublisherParts;
 use super::qos::Qos;
 use super::service::{Answers, Server};
 use super::shutdown::Shutdown;
-use super::subscription::{Command, Intake, Load, Sample, Stats, Subscription};
+use super::subscription::{Command, Intake, Load, Subscription};
 use super::sync::{lock, wait_for};
 use super::task_thread::TaskThread;
 
@@ -40,7 +40,7 @@ const QUEUE_MESSAGES: usize = 1024;
 /// Bytes that wait in the queue of one publisher, at most.
 const QUEUE_BYTES: usize = 128 << 20;
 
-/// Time for each of three at the end: handlers, answers, and what is queued to be sent.
+/// Longest time for each phase of the end: handlers, answers, queues.
 const DRAIN_TIME: Duration = Duration::from_secs(2);
 
 /// Length of a message that is accepted unless a parameter says otherwise.
@@ -190,10 +190,8 @@ impl Shared {
         }
         let now_ns = Arc::new(AtomicI64::new(0));
         let clock = Clock::simulated(Arc::clone(&now_ns));
-        let handler = move |sample: Sample<'_, rosgraph_msgs::Clock>, stats: &Arc<Stats>| {
-            if let Some(message) = stats.decode(sample) {
-                now_ns.store(message.clock.to_ns(), Relaxed);
-            }
+        let handler = move |message: Arc<rosgraph_msgs::Clock>| {
+            now_ns.store(message.clock.to_ns(), Relaxed);
         };
         let subscription =
             self.subscribe(node, topic, &Qos::CLOCK, Load::Small, 1 << 10, handler)?;
@@ -218,14 +216,13 @@ impl Shared {
         all.filter_map(Weak::upgrade).collect()
     }
 
-    /// Begins to wait until discovery knows the writers made so far. `None` after shutdown.
+    /// A wait for discovery to know all writers made so far. `None` after shutdown.
     fn writers_known(&self) -> Option<BoxFuture<'static, ()>> {
         let open = lock(&self.open);
         open.as_ref()?.transport.writers_known().ok()
     }
 
-    /// Has all subscriptions give their handlers what waits in this process. Not from a thread of the
-    /// runtime.
+    /// Gives handlers the messages that wait in this process. Not from a thread of the runtime.
     pub(crate) fn work_off(&self, deadline: Instant) {
         let orders: Vec<_> = (self.intakes().into_iter())
             .filter_map(|intake| Some((intake.order(Command::WorkOff)?, intake)))
@@ -240,8 +237,8 @@ impl Shared {
         }
     }
 
-    /// Ends everything: what waits for handlers and clients first, then timers and readers, then what
-    /// is queued goes out, then we leave.
+    /// Ends the runtime: handlers and clients get their last messages, timers and readers end, queues
+    /// are sent, and the participant leaves.
     ///
     /// Not from a thread of the runtime.
     pub(crate) fn close(&self) {
