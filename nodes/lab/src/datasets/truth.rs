@@ -51,7 +51,10 @@ impl Truth {
         };
         let (mut poses, mut points) = (open(POSES_FILE)?, open(POINTS_FILE)?);
         writeln!(poses.1, "stamp_ns,x,y,z,qx,qy,qz,qw").map_err(at(&poses.0))?;
-        points.1.write_all(&padded_header(0)).map_err(at(&points.0))?;
+        points
+            .1
+            .write_all(&padded_header(0))
+            .map_err(at(&points.0))?;
         Ok(Self {
             poses,
             points,
