@@ -11,9 +11,7 @@ use serde::Serialize;
 use crate::executables::{answers_help, start_runtime};
 use crate::report;
 use crate::start::{NodeError, warn_unused};
-use lattice_bag::{
-    BagHistory, BagQos, BagReader, BagReliability, Player, PlayerOptions, Step, TopicInfo,
-};
+use lattice_bag::{BagQos, BagReader, Player, PlayerOptions, Step, TopicInfo};
 use lattice_runtime::params::Params;
 use lattice_runtime::qos::{Durability, Qos, Reliability};
 use lattice_runtime::ros_args::RosArgs;
@@ -126,14 +124,13 @@ fn open_topics(node: &Node, player: &Player) -> Result<Vec<RawPublisher>, NodeEr
 /// reader of then finds it, and room for the last samples of all of them.
 fn offered(topic: &TopicInfo) -> Qos {
     let recorded = topic.offered_qos.as_slice();
-    let reliable = |qos: &BagQos| qos.reliability != BagReliability::BestEffort;
-    let depth = |qos: &BagQos| match qos.history {
-        BagHistory::KeepAll => MAX_DEPTH,
-        _ => qos.depth.max(1),
+    let depth = |qos: &BagQos| match qos.keep_all {
+        true => MAX_DEPTH,
+        false => qos.depth.max(1),
     };
     let latched = match recorded {
         [] => topic.is_latched(),
-        recorded => recorded.iter().all(BagQos::is_latched),
+        recorded => recorded.iter().all(|qos| qos.latched),
     };
     let depths = recorded.iter().map(depth);
     let depth = match (recorded, latched) {
@@ -143,7 +140,7 @@ fn offered(topic: &TopicInfo) -> Qos {
         (_, false) => depths.max().unwrap_or(10),
     };
     Qos {
-        reliability: match recorded.iter().all(reliable) {
+        reliability: match recorded.iter().all(|qos| qos.reliable) {
             true => Reliability::Reliable,
             false => Reliability::BestEffort,
         },

@@ -28,7 +28,7 @@ pub enum Axes {
 pub struct UnknownAxes(pub String);
 
 impl Axes {
-    /// All of them.
+    /// All axes.
     pub const ALL: [Axes; 4] = [Axes::RosFlu, Axes::UnityRuf, Axes::WinrtRub, Axes::Optical];
 
     /// Name in parameters.

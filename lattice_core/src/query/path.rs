@@ -289,7 +289,7 @@ impl<S: VoxelStore> Query<'_, S> {
 enum Cell {
     /// The ball does not fit.
     Closed,
-    /// It fits, but no way there is known.
+    /// The ball fits, but no way there is known.
     Open,
     Reached(Reached),
 }

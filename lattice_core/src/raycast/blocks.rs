@@ -1,7 +1,7 @@
 //! Cells of known evidence, in blocks of 8 x 8 x 8 lattice indices.
 
 use super::evidence::{Steps, UNKNOWN};
-use super::masks::{Mask, random_multiplier, spread};
+use super::masks::{Mask, ScanMasks, random_multiplier, spread};
 use super::packed::Packed;
 
 /// Cells of a block.
@@ -79,6 +79,11 @@ impl Blocks {
             .and_then(|c| c.get(cell.place()))
             .copied()
             .unwrap_or(UNKNOWN)
+    }
+
+    /// The cells of a block, `None` if nothing is known of it.
+    pub(super) fn block(&self, block: u64) -> Option<&[i8; CELLS]> {
+        self.cells(self.find(block))
     }
 
     /// All cells that are known.
@@ -200,6 +205,25 @@ impl Blocks {
         self.slots = slots;
         new.saturating_sub(room) as u64
     }
+}
+
+/// One hit for each cell of a scan that was hit, one miss for each other cell that was passed through
+/// and hit by an earlier one: for maps that keep no free cells. Returns the number of blocks refused.
+pub(super) fn apply_to_hit(steps: &Steps, scan: &ScanMasks, cells: &mut Blocks) -> u64 {
+    cells.apply(
+        scan.blocks(),
+        |_, hit| *hit != Mask::default(),
+        |cells, passed, hit| {
+            let mut known = Mask::default();
+            for (i, value) in cells.iter().enumerate() {
+                known.0[i >> 6] |= u64::from(*value != UNKNOWN) << (i & 63);
+            }
+            for (known, passed) in known.0.iter_mut().zip(&passed.0) {
+                *known &= passed;
+            }
+            add_evidence(steps, cells, &known, hit);
+        },
+    )
 }
 
 /// One hit for each cell that was hit, one miss for each other cell that was passed through.

@@ -1,18 +1,16 @@
 //! Removing voxels that rays pass through.
 
-use nalgebra::Vector3;
 use rustc_hash::FxHashMap;
 
 use super::blocks::each_bit;
 use super::masks::ScanMasks;
 use super::packed::{Packed, difference};
-use super::scan::{self, Reach, ScanReport};
+use super::scan::{self, RayBundle, Reach, ScanReport};
 use super::traversal::Traversal;
-use crate::cloud::Cloud;
 use crate::lattice::{Lattice, LatticeIndex, MortonKey};
 use crate::voxels::VoxelStore;
 
-/// When voxels are removed.
+/// Conditions under which a voxel is removed.
 #[derive(Clone, Copy, PartialEq, Debug)]
 pub struct ClearOptions {
     /// Scans that must pass through a voxel, with none between that hits it, to remove it.
@@ -20,6 +18,11 @@ pub struct ClearOptions {
     /// The last part of each ray that removes nothing, metres: rays that graze a surface pass
     /// through the voxels before the one that they end in.
     pub keep_m: f64,
+    /// The same as a fraction of the ray, 0 to 1: ground seen at a flat angle from a height is passed
+    /// over, within its own cells, on a part of the way that grows with the distance.
+    pub keep_ratio: f64,
+    /// Whether voxels that touch a cell which the scan hit are spared.
+    pub spare_touching: bool,
     /// Rays are followed to this range, metres.
     pub max_range_m: f64,
     /// Most memory for the marks of a scan, bytes; cells beyond it are not cleared.
@@ -31,13 +34,15 @@ impl Default for ClearOptions {
         ClearOptions {
             misses: 1,
             keep_m: 0.0,
+            keep_ratio: 0.0,
+            spare_touching: true,
             max_range_m: f64::INFINITY,
             max_bytes: 1 << 28,
         }
     }
 }
 
-/// What a scan cleared.
+/// Voxels that a scan removed, and those that it passed through.
 #[derive(Clone, PartialEq, Eq, Debug, Default)]
 pub struct ClearReport {
     /// The rays; `hits` and `misses` count cells whether they are occupied or not.
@@ -53,8 +58,9 @@ pub struct ClearReport {
 /// Removes from a store what rays pass through, for scenes in which things move.
 ///
 /// A voxel is passed through if a ray to the lattice point of a cell with a point crosses it more
-/// than `keep_m` before that end. Voxels that the scan hits, and those that touch one in at least a
-/// vertex, are safe from it: a surface seen at a flat angle does not clear itself.
+/// than `keep_m` before that end. Voxels that the scan hits and, with `spare_touching`, those that
+/// touch one in at least a vertex are safe from it: a surface seen at a flat angle does not clear
+/// itself.
 #[derive(Clone, Debug)]
 pub struct RayClearer {
     traversal: Traversal,
@@ -76,28 +82,23 @@ impl RayClearer {
         }
     }
 
-    /// Clears along the rays of a scan (map frame) taken from `origin_m` (map frame, metres). The
-    /// points themselves are not inserted; do that before or after.
+    /// Clears along the rays of a scan. The points themselves are not inserted; do that before or
+    /// after.
     ///
-    /// The outcome does not depend on the order of the points. Nothing happens to a store of
-    /// another lattice than that of the clearer.
-    pub fn clear(
-        &mut self,
-        store: &mut impl VoxelStore,
-        origin_m: Vector3<f64>,
-        scan: &Cloud,
-    ) -> ClearReport {
+    /// The outcome does not depend on the order of the points of a bundle. Nothing happens to a
+    /// store of another lattice than that of the clearer.
+    pub fn clear(&mut self, store: &mut dyn VoxelStore, scan: &[RayBundle]) -> ClearReport {
         let mut report = ClearReport::default();
         if store.lattice() != self.traversal.lattice() {
             return report;
         }
         let reach = Reach {
             max_range_m: self.options.max_range_m,
-            keep_m: self.options.keep_m.max(0.0),
+            keep_m: self.options.keep_m,
+            keep_ratio: self.options.keep_ratio,
         };
         let datum_m = store.datum_m();
-        let (from, base) = (origin_m - datum_m, scan.datum_m - datum_m);
-        report.scan = scan::mark(&self.traversal, &mut self.masks, &from, &base, scan, reach);
+        report.scan = scan::mark(&self.traversal, &mut self.masks, &datum_m, scan, reach);
         self.forget_hits(store);
         let mut keys: Vec<MortonKey> = Vec::new();
         for (block, passed, hit) in self.masks.blocks() {
@@ -107,7 +108,7 @@ impl RayClearer {
                     let Some(key) = cell.key().filter(|key| store.contains(*key)) else {
                         return;
                     };
-                    if self.touches_hit(cell) {
+                    if self.options.spare_touching && self.touches_hit(cell) {
                         report.kept += 1;
                     } else {
                         keys.push(key);
@@ -142,7 +143,7 @@ impl RayClearer {
     }
 
     /// Forgets the misses of what the scan hits, and of what others have removed if it is much.
-    fn forget_hits(&mut self, store: &impl VoxelStore) {
+    fn forget_hits(&mut self, store: &dyn VoxelStore) {
         if self.missed.is_empty() {
             return;
         }
@@ -159,18 +160,4 @@ impl RayClearer {
             self.missed.retain(|key, _| store.contains(*key));
         }
     }
-}
-
-/// [`RayClearer::clear`] once, with every voxel removed that a ray passes through.
-pub fn clear_rays(
-    store: &mut impl VoxelStore,
-    origin_m: Vector3<f64>,
-    scan: &Cloud,
-    keep_m: f64,
-) -> ClearReport {
-    let options = ClearOptions {
-        keep_m,
-        ..ClearOptions::default()
-    };
-    RayClearer::new(&store.lattice().clone(), options).clear(store, origin_m, scan)
 }

@@ -5,7 +5,7 @@ use std::collections::BTreeSet;
 use nalgebra::Vector3;
 use rustc_hash::FxHashSet;
 
-use super::blocks::{Blocks, CELLS, add_evidence, each_bit};
+use super::blocks::{Blocks, CELLS, add_evidence, apply_to_hit, each_bit};
 use super::evidence::{Steps, UNKNOWN};
 use super::masks::{Cursor, Mask, ScanMasks};
 use super::packed::{Packed, difference};
@@ -92,21 +92,7 @@ impl Coarse {
     /// Adds a scan: see [`super::FreeSpaceMap`]. Returns the number of blocks refused.
     pub(super) fn apply(&mut self, steps: &Steps, scan: &ScanMasks, fine: &mut Blocks) -> u64 {
         self.mark(scan);
-        let fine_refused = fine.apply(
-            scan.blocks(),
-            |_, hit| *hit != Mask::default(),
-            |cells, passed, hit| {
-                // Only what was hit before is worth a miss of its own.
-                let mut known = Mask::default();
-                for (i, value) in cells.iter().enumerate() {
-                    known.0[i >> 6] |= u64::from(*value != UNKNOWN) << (i & 63);
-                }
-                for (known, passed) in known.0.iter_mut().zip(&passed.0) {
-                    *known &= passed;
-                }
-                add_evidence(steps, cells, &known, hit);
-            },
-        );
+        let fine_refused = apply_to_hit(steps, scan, fine);
         let coarse_refused = self.cells.apply(
             self.masks.blocks(),
             |passed, hit| passed.0.iter().zip(&hit.0).any(|(p, h)| p & !h != 0),

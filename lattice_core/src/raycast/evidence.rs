@@ -8,7 +8,7 @@ const UNIT: f64 = 1.0 / 32.0;
 /// A cell of which nothing is known.
 pub(super) const UNKNOWN: i8 = i8::MIN;
 
-/// How hits and misses add up, as probabilities; the defaults are those of octomap.
+/// Weights of hits and misses, as probabilities; the defaults are those of octomap.
 ///
 /// Log-odds `ln(p / (1 - p))` are kept in steps of 1/32, to which every value is rounded: with the
 /// defaults a hit adds 0.844, a miss takes 0.406, and cells stay within -2 and 3.5.
@@ -39,15 +39,9 @@ impl Default for Evidence {
 }
 
 impl Evidence {
-    /// What the last scan saw decides, whatever was seen before.
-    pub fn latest() -> Evidence {
-        Evidence {
-            hit: 0.9,
-            miss: 0.1,
-            least: 0.25,
-            most: 0.75,
-            threshold: 0.5,
-        }
+    /// Fails if the probabilities do not go together.
+    pub fn check(&self) -> Result<(), EvidenceError> {
+        Steps::new(self).map(|_| ())
     }
 }
 
@@ -178,20 +172,6 @@ mod tests {
         }
         assert!((log_odds_of(cell).unwrap() + 2.0).abs() < 0.5 * UNIT);
         assert_eq!(steps.threshold, 0);
-    }
-
-    #[test]
-    fn the_latest_scan_decides_if_so_asked() {
-        let steps = Steps::new(&Evidence::latest()).unwrap();
-        let mut cell = UNKNOWN;
-        for _ in 0..5 {
-            steps.hit(&mut cell);
-        }
-        steps.miss(&mut cell);
-        assert!(cell < steps.threshold);
-        steps.miss(&mut cell);
-        steps.hit(&mut cell);
-        assert!(cell >= steps.threshold);
     }
 
     #[test]

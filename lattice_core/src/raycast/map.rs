@@ -4,19 +4,22 @@ use std::fmt;
 
 use nalgebra::Vector3;
 
-use super::blocks::{Blocks, add_evidence};
+use super::blocks::{Blocks, add_evidence, apply_to_hit, each_bit};
+use super::clear::ClearReport;
 use super::coarse::Coarse;
 use super::evidence::{Steps, UNKNOWN, log_odds_of};
-use super::masks::{Mask, ScanMasks};
+use super::masks::{Cursor, Mask, ScanMasks};
 use super::options::{FreeSpaceError, FreeSpaceOptions};
 use super::packed::Packed;
-use super::scan::{self, Reach, ScanReport};
+use super::scan::{self, RayBundle, Reach, ScanReport};
 use super::traversal::Traversal;
-use crate::cloud::Cloud;
 use crate::lattice::{Lattice, MortonKey};
-use crate::voxels::DatumError;
+use crate::voxels::{DatumError, VoxelStore};
 
-/// What is known of a cell.
+/// Cells that are marked at once where many are known to be occupied; bounds the memory for it.
+const SEED_CELLS: usize = 1 << 14;
+
+/// Occupied, free or unknown.
 #[derive(Clone, Copy, PartialEq, Eq, PartialOrd, Ord, Hash, Debug)]
 pub enum CellState {
     /// No ray came here, or too few to say.
@@ -27,16 +30,16 @@ pub enum CellState {
     Occupied,
 }
 
-/// Which cells of a lattice are occupied, free or unknown, from scans with their origins.
+/// The occupied, free and unknown cells of a lattice, from scans with their origins.
 ///
 /// Each scan gives one hit to every cell that holds a point, and one miss to every other cell that a
 /// ray passes through before its end, however many rays do; one ray is followed to the lattice point
 /// of every cell that holds a point, through exactly the cells that it crosses. Evidence is in
 /// integers, so that the order of the points of a scan does not change a bit.
 ///
-/// With `free_level` 0 every cell has its log-odds, a byte. With a higher level only cells that were
-/// hit do, in blocks of 512; free space is kept in the cells of a lattice `2^free_level` as wide,
-/// which has the same datum. A scan gives a coarse cell one miss if a ray of it passes through a fine
+/// With `free_level` 0 every cell has its log-odds, a byte. With another only cells that were hit do,
+/// in blocks of 512; with a higher one free space is kept in the cells of a lattice `2^free_level` as
+/// wide, which has the same datum. A scan gives a coarse cell one miss if a ray of it passes through a fine
 /// cell that belongs to it and no fine cell that was hit overlaps it. A coarse cell is free if its
 /// log-odds are below the threshold and no occupied fine cell overlaps it.
 #[derive(Clone)]
@@ -48,7 +51,18 @@ pub struct FreeSpaceMap {
     steps: Steps,
     masks: ScanMasks,
     cells: Blocks,
-    coarse: Option<Box<Coarse>>,
+    free: Free,
+}
+
+/// Cells in which free space is kept.
+#[derive(Clone)]
+enum Free {
+    /// None but those that were hit.
+    Hit,
+    /// Those of the map.
+    Fine,
+    /// Wider ones.
+    Coarse(Box<Coarse>),
 }
 
 /// Numbers of known cells.
@@ -76,15 +90,15 @@ impl FreeSpaceMap {
         let datum_index = index.ok_or(DatumError { x, y, z })?;
         // A quarter of the memory is for the marks of one scan; with a free level half of everything
         // is for the coarse lattice.
-        let share = if options.free_level == 0 {
-            options.max_bytes
-        } else {
-            options.max_bytes / 2
+        let share = match options.free_level {
+            None | Some(0) => options.max_bytes,
+            Some(_) => options.max_bytes / 2,
         };
         let share = share - (1 << 16);
-        let coarse = match options.free_level {
-            0 => None,
-            level => Some(Box::new(Coarse::new(&lattice, level, share)?)),
+        let free = match options.free_level {
+            None => Free::Hit,
+            Some(0) => Free::Fine,
+            Some(level) => Free::Coarse(Box::new(Coarse::new(&lattice, level, share)?)),
         };
         Ok(FreeSpaceMap {
             datum_m: lattice.center_wide(datum_index),
@@ -94,25 +108,25 @@ impl FreeSpaceMap {
             steps,
             masks: ScanMasks::new(share / 4 / ScanMasks::BYTES_PER_BLOCK),
             cells: Blocks::new(share / 4 * 3 / Blocks::BYTES_PER_BLOCK),
-            coarse,
+            free,
         })
     }
 
-    /// Adds a scan (map frame) that was taken from `origin_m` (map frame, metres): one hit for each
-    /// cell with a point, one miss for each other cell that a ray passes through.
+    /// Adds a scan: one hit for each cell with a point, one miss for each other cell that a ray
+    /// passes through.
     ///
-    /// The outcome does not depend on the order of the points. Points that are not finite or out of
-    /// range are counted and left out; if the origin is, the scan is.
-    pub fn insert_scan(&mut self, origin_m: Vector3<f64>, scan: &Cloud) -> ScanReport {
+    /// The outcome does not depend on the order of the points of a bundle. Points that are not
+    /// finite or out of range are counted and left out; if the origin is, the bundle is.
+    pub fn insert_scan(&mut self, scan: &[RayBundle]) -> ScanReport {
         let mut report = scan::mark(
             &self.traversal,
             &mut self.masks,
-            &(origin_m - self.datum_m),
-            &(scan.datum_m - self.datum_m),
+            &self.datum_m,
             scan,
             Reach {
                 max_range_m: self.options.max_range_m,
-                keep_m: 0.0,
+                keep_m: self.options.keep_m,
+                keep_ratio: self.options.keep_ratio,
             },
         );
         let missed = |(_, passed, hit): (u64, &Mask, &Mask)| {
@@ -122,28 +136,85 @@ impl FreeSpaceMap {
                 .sum::<u64>()
         };
         report.misses = self.masks.blocks().map(missed).sum();
+        report.blocks_refused = self.apply_marks();
+        report
+    }
+
+    /// Adds the marks of a scan; returns the number of blocks refused.
+    fn apply_marks(&mut self) -> u64 {
         let steps = &self.steps;
-        report.blocks_refused = match &mut self.coarse {
-            None => self.cells.apply(
+        match &mut self.free {
+            Free::Hit => apply_to_hit(steps, &self.masks, &mut self.cells),
+            Free::Fine => self.cells.apply(
                 self.masks.blocks(),
                 |_, _| true,
                 |cells, passed, hit| add_evidence(steps, cells, passed, hit),
             ),
-            Some(coarse) => coarse.apply(steps, &self.masks, &mut self.cells),
-        };
+            Free::Coarse(coarse) => coarse.apply(steps, &self.masks, &mut self.cells),
+        }
+    }
+
+    /// Adds a scan whose points are in `store` already, and removes the voxels from it that the scan
+    /// has hit or passed through and that are not occupied by the evidence.
+    ///
+    /// Nothing happens to a store of another lattice or datum.
+    pub fn clear(&mut self, store: &mut dyn VoxelStore, scan: &[RayBundle]) -> ClearReport {
+        let mut report = ClearReport::default();
+        if store.lattice() != self.lattice() || store.datum_index() != self.datum_index {
+            return report;
+        }
+        report.scan = self.insert_scan(scan);
+        let is_free = |value: i8| value != UNKNOWN && value < self.steps.threshold;
+        for (block, passed, hit) in self.masks.blocks() {
+            let Some(cells) = self.cells.block(block) else {
+                continue;
+            };
+            for (word, (passed, hit)) in passed.0.iter().zip(&hit.0).enumerate() {
+                each_bit(passed | hit, |i| {
+                    let place = 64 * word + i;
+                    if cells.get(place).is_some_and(|value| is_free(*value)) {
+                        report.removed.extend(Packed::at(block, place).key());
+                    }
+                });
+            }
+        }
+        report.removed.sort_unstable();
+        report.removed.retain(|key| store.remove(*key));
+        report.missed = report.removed.len() as u64;
         report
     }
 
-    /// What is known of a cell of the lattice.
+    /// Counts cells as hit once, such as those of a map that was loaded.
+    pub fn insert_occupied(&mut self, keys: &[MortonKey]) {
+        for part in keys.chunks(SEED_CELLS) {
+            let mut cursor = Cursor::NONE;
+            self.masks.clear();
+            for cell in part.iter().filter_map(|key| Packed::new(key.unpack())) {
+                self.masks.hit(cell, &mut cursor);
+            }
+            self.apply_marks();
+        }
+    }
+
+    /// Forgets everything; keeps lattice, datum and options.
+    pub fn reset(&mut self) {
+        let (lattice, options) = (self.lattice().clone(), self.options);
+        // A map that could be made once can be made again.
+        if let Ok(empty) = Self::new(lattice, self.datum_m, options) {
+            *self = empty;
+        }
+    }
+
+    /// State of a cell of the lattice.
     ///
     /// With a free level, a cell that was never hit is free if the coarse cell that it belongs to is.
     pub fn state(&self, key: MortonKey) -> CellState {
         let Some(cell) = Packed::new(key.unpack()) else {
             return CellState::Unknown;
         };
-        match (self.cells.get(cell), &self.coarse) {
-            (UNKNOWN, None) => CellState::Unknown,
-            (UNKNOWN, Some(coarse)) => {
+        match (self.cells.get(cell), &self.free) {
+            (UNKNOWN, Free::Hit | Free::Fine) => CellState::Unknown,
+            (UNKNOWN, Free::Coarse(coarse)) => {
                 if coarse.is_free(&self.steps, &self.cells, coarse.cell_of(cell)) {
                     CellState::Free
                 } else {
@@ -171,11 +242,12 @@ impl FreeSpaceMap {
         self.sorted(|value| value >= self.steps.threshold)
     }
 
-    /// All free cells of [`FreeSpaceMap::free_lattice`] in ascending order.
+    /// All free cells of [`FreeSpaceMap::free_lattice`] in ascending order; without a free level
+    /// those that were hit once.
     pub fn free_keys(&self) -> Vec<MortonKey> {
-        match &self.coarse {
-            None => self.sorted(|value| value < self.steps.threshold),
-            Some(coarse) => coarse.free_keys(&self.steps, &self.cells),
+        match &self.free {
+            Free::Hit | Free::Fine => self.sorted(|value| value < self.steps.threshold),
+            Free::Coarse(coarse) => coarse.free_keys(&self.steps, &self.cells),
         }
     }
 
@@ -187,7 +259,7 @@ impl FreeSpaceMap {
         keys
     }
 
-    /// How many cells are occupied and free; goes through the whole map.
+    /// Numbers of occupied and free cells; goes through the whole map.
     pub fn counts(&self) -> CellCounts {
         let threshold = self.steps.threshold;
         let (mut occupied, mut free) = (0, 0);
@@ -198,7 +270,7 @@ impl FreeSpaceMap {
                 &mut free
             }) += 1;
         }
-        if self.coarse.is_some() {
+        if matches!(self.free, Free::Coarse(_)) {
             free = self.free_keys().len() as u64;
         }
         CellCounts { occupied, free }
@@ -211,9 +283,9 @@ impl FreeSpaceMap {
 
     /// The lattice of the free cells; its lattice point 0 is the datum, too.
     pub fn free_lattice(&self) -> &Lattice {
-        match &self.coarse {
-            None => self.lattice(),
-            Some(coarse) => coarse.lattice(),
+        match &self.free {
+            Free::Hit | Free::Fine => self.lattice(),
+            Free::Coarse(coarse) => coarse.lattice(),
         }
     }
 
@@ -239,7 +311,10 @@ impl FreeSpaceMap {
 
     /// Memory that the map holds, with what it keeps for the next scan, bytes; at most `max_bytes`.
     pub fn bytes(&self) -> usize {
-        let coarse = self.coarse.as_ref().map_or(0, |coarse| coarse.bytes());
+        let coarse = match &self.free {
+            Free::Hit | Free::Fine => 0,
+            Free::Coarse(coarse) => coarse.bytes(),
+        };
         self.cells.bytes() + self.masks.bytes() + coarse
     }
 }

@@ -16,9 +16,9 @@ mod packed;
 mod scan;
 mod traversal;
 
-pub use clear::{ClearOptions, ClearReport, RayClearer, clear_rays};
+pub use clear::{ClearOptions, ClearReport, RayClearer};
 pub use evidence::{Evidence, EvidenceError};
 pub use map::{CellCounts, CellState, FreeSpaceMap};
 pub use options::{FreeSpaceError, FreeSpaceOptions, MAX_FREE_LEVEL, MIN_MAP_BYTES};
-pub use scan::ScanReport;
+pub use scan::{RayBundle, ScanReport};
 pub use traversal::{Traversal, TraversalError};

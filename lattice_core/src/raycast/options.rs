@@ -1,4 +1,4 @@
-//! What a map of free space is asked for, and what is wrong with it.
+//! Options of a map of free space, and the reasons for which they are refused.
 
 use thiserror::Error;
 
@@ -11,16 +11,22 @@ pub const MAX_FREE_LEVEL: u32 = 3;
 /// Least memory of a map, bytes.
 pub const MIN_MAP_BYTES: usize = 1 << 20;
 
-/// How a [`super::FreeSpaceMap`] is kept.
+/// Evidence, range, resolution and memory of a [`super::FreeSpaceMap`].
 #[derive(Clone, Copy, PartialEq, Debug)]
 pub struct FreeSpaceOptions {
-    /// How hits and misses add up.
+    /// Weights of hits and misses.
     pub evidence: Evidence,
     /// Rays of points that are farther than this are followed to this range, metres, and give no
     /// hit; infinite for no limit.
     pub max_range_m: f64,
-    /// Free cells are kept in cells `2^free_level` as wide, at most [`MAX_FREE_LEVEL`].
-    pub free_level: u32,
+    /// The last part of each ray that gives no miss, metres, and as a fraction of the ray: rays that
+    /// graze a surface pass through its cells.
+    pub keep_m: f64,
+    /// See `keep_m`; the longer of the two counts.
+    pub keep_ratio: f64,
+    /// Free cells are kept in cells `2^free_level` as wide, at most [`MAX_FREE_LEVEL`]; `None`: only
+    /// cells that were hit are kept.
+    pub free_level: Option<u32>,
     /// Most memory, bytes, at least [`MIN_MAP_BYTES`]. When it is used up, known blocks of cells are
     /// still updated, and no new ones are added.
     pub max_bytes: usize,
@@ -31,13 +37,15 @@ impl Default for FreeSpaceOptions {
         FreeSpaceOptions {
             evidence: Evidence::default(),
             max_range_m: f64::INFINITY,
-            free_level: 0,
+            keep_m: 0.0,
+            keep_ratio: 0.0,
+            free_level: Some(0),
             max_bytes: 1 << 30,
         }
     }
 }
 
-/// Why there is no map of free space.
+/// An option that a map of free space cannot have.
 #[derive(Clone, PartialEq, Debug, Error)]
 pub enum FreeSpaceError {
     /// The probabilities do not go together.
@@ -65,8 +73,8 @@ impl FreeSpaceOptions {
         if self.max_range_m.is_nan() || self.max_range_m <= 0.0 {
             return Err(FreeSpaceError::Range(self.max_range_m));
         }
-        if self.free_level > MAX_FREE_LEVEL {
-            return Err(FreeSpaceError::FreeLevel(self.free_level));
+        if let Some(level) = self.free_level.filter(|level| *level > MAX_FREE_LEVEL) {
+            return Err(FreeSpaceError::FreeLevel(level));
         }
         if self.max_bytes < MIN_MAP_BYTES {
             return Err(FreeSpaceError::Memory(self.max_bytes));

@@ -6,21 +6,30 @@ use rustc_hash::FxHashSet;
 use super::families::{Families, Ray};
 use super::masks::{Cursor, ScanMasks};
 use super::packed::Packed;
-use super::traversal::{Kernel, Traversal, with_families};
+use super::traversal::{Kernel, Traversal, TraversalError, with_families};
 use crate::cloud::Cloud;
 use crate::lattice::Simd;
 
 /// Rays that take turns.
 const LANES: usize = 4;
 
-/// What became of a scan.
+/// Points that were seen from one place, in the map frame: a scan is one or more of these.
+#[derive(Clone, Copy, Debug)]
+pub struct RayBundle<'a> {
+    /// Position of the sensor, map frame, metres.
+    pub origin_m: Vector3<f64>,
+    /// Ends of the rays.
+    pub ends: &'a Cloud,
+}
+
+/// Numbers of points, rays and cells of a scan.
 #[derive(Clone, Copy, PartialEq, Eq, Debug, Default)]
 pub struct ScanReport {
     /// Points in the scan.
     pub points: u64,
-    /// Points with a coordinate that is NaN or infinite; all points if the origin has one.
+    /// Points with a coordinate that is NaN or infinite; all points of a bundle if its origin has one.
     pub not_finite: u64,
-    /// Points too many cells from the datum; all points if the origin is.
+    /// Points too many cells from the datum; all points of a bundle if its origin is.
     pub out_of_range: u64,
     /// Points beyond the range limit, whose rays were followed up to it.
     pub beyond_max_range: u64,
@@ -38,16 +47,18 @@ pub struct ScanReport {
     pub entries_refused: u64,
 }
 
-/// Which parts of rays count.
+/// Parts of rays that count.
 #[derive(Clone, Copy, Debug)]
 pub(super) struct Reach {
     /// Points beyond this give no hit, and their rays end here.
     pub(super) max_range_m: f64,
-    /// The last part of each ray, which passes through nothing.
+    /// The last part of each ray, which passes through nothing: at least this,
     pub(super) keep_m: f64,
+    /// and at least this fraction of the ray.
+    pub(super) keep_ratio: f64,
 }
 
-/// Where rays end. Each cell comes once.
+/// Cells where rays end, each once.
 pub(super) struct Ends {
     /// Cells that were hit.
     hits: Vec<Packed>,
@@ -55,75 +66,86 @@ pub(super) struct Ends {
     open: Vec<Packed>,
 }
 
-/// Marks the cells that a scan hits and passes through; `origin` and the points in metres from the
-/// lattice point 0, points as offsets from `base_m`.
+/// Marks the cells that a scan hits and passes through.
 ///
 /// Rays go to the lattice points of the cells that they end in, so that the marks do not depend on
-/// the order of the points.
+/// the order of the points of a bundle. A cell that several bundles hit has a ray of the first.
 pub(super) fn mark(
     traversal: &Traversal,
     masks: &mut ScanMasks,
-    origin_m: &Vector3<f64>,
-    base_m: &Vector3<f64>,
-    scan: &Cloud,
+    datum_m: &Vector3<f64>,
+    scan: &[RayBundle],
     reach: Reach,
 ) -> ScanReport {
     masks.clear();
-    let mut report = ScanReport {
-        points: scan.offsets_m.len() as u64,
-        ..ScanReport::default()
-    };
-    match traversal.cell_of(origin_m) {
-        Err(super::TraversalError::NotFinite) => report.not_finite = report.points,
-        Err(super::TraversalError::OutOfRange(_)) => report.out_of_range = report.points,
-        Ok(start) => {
-            let rays = Rays {
+    let mut report = ScanReport::default();
+    let mut bundles = Vec::with_capacity(scan.len());
+    for bundle in scan {
+        let points = bundle.ends.len() as u64;
+        report.points += points;
+        let origin_m = bundle.origin_m - datum_m;
+        match traversal.cell_of(&origin_m) {
+            Err(TraversalError::NotFinite) => report.not_finite += points,
+            Err(TraversalError::OutOfRange(_)) => report.out_of_range += points,
+            Ok(start) => bundles.push(Rays {
                 traversal,
                 origin_m,
                 start,
-                base_m,
+                base_m: bundle.ends.datum_m - datum_m,
+                points: bundle.ends,
                 reach,
-            };
-            rays.mark(masks, scan, &mut report);
+            }),
         }
     }
+    mark_bundles(&bundles, masks, &mut report);
     report
 }
 
+fn mark_bundles(bundles: &[Rays], masks: &mut ScanMasks, report: &mut ScanReport) {
+    let ends = |rays: &Rays| rays.ends(masks, report);
+    let mut ends: Vec<Ends> = bundles.iter().map(ends).collect();
+    for ends in &mut ends {
+        // The same ray serves both.
+        ends.open.retain(|cell| !masks.is_hit(*cell));
+    }
+    let follow = |masks: &mut ScanMasks, ends: &[Ends]| -> u64 {
+        let pairs = bundles.iter().zip(ends);
+        pairs.map(|(rays, ends)| rays.follow_all(masks, ends)).sum()
+    };
+    report.visits = follow(masks, &ends);
+    if masks.entries_refused() > 0 {
+        // The choice of refused blocks must not depend on the order of the points: once more, with
+        // ends that are complete and sorted.
+        masks.clear();
+        let mut cursor = Cursor::NONE;
+        for (rays, ends) in bundles.iter().zip(&mut ends) {
+            ends.hits = rays.all_hits();
+            ends.hits.retain(|cell| masks.hit(*cell, &mut cursor));
+            ends.open.sort_unstable();
+        }
+        report.visits = follow(masks, &ends);
+    }
+    report.hits = ends.iter().map(|ends| ends.hits.len() as u64).sum();
+    report.rays = report.hits + ends.iter().map(|ends| ends.open.len() as u64).sum::<u64>();
+    report.entries_refused = masks.entries_refused();
+}
+
+/// The rays of one bundle, in metres from the lattice point 0.
 struct Rays<'a> {
     traversal: &'a Traversal,
-    origin_m: &'a Vector3<f64>,
+    origin_m: Vector3<f64>,
     start: Packed,
-    base_m: &'a Vector3<f64>,
+    base_m: Vector3<f64>,
+    points: &'a Cloud,
     reach: Reach,
 }
 
 impl Rays<'_> {
-    fn mark(&self, masks: &mut ScanMasks, scan: &Cloud, report: &mut ScanReport) {
-        let mut ends = self.ends(masks, scan, report);
-        report.visits = self.follow_all(masks, &ends);
-        if masks.entries_refused() > 0 {
-            // Which blocks are refused must not depend on the order of the points: once more, with
-            // ends that are complete and sorted.
-            ends.hits = self.all_hits(scan);
-            ends.open.sort_unstable();
-            masks.clear();
-            let mut cursor = Cursor::NONE;
-            for cell in &ends.hits {
-                masks.hit(*cell, &mut cursor);
-            }
-            report.visits = self.follow_all(masks, &ends);
-        }
-        report.hits = ends.hits.len() as u64;
-        report.rays = (ends.hits.len() + ends.open.len()) as u64;
-        report.entries_refused = masks.entries_refused();
-    }
-
-    fn ends(&self, masks: &mut ScanMasks, scan: &Cloud, report: &mut ScanReport) -> Ends {
+    fn ends(&self, masks: &mut ScanMasks, report: &mut ScanReport) -> Ends {
         let (mut hits, mut cursor) = (Vec::new(), Cursor::NONE);
         let mut open = FxHashSet::default();
         let reach_square = self.reach.max_range_m * self.reach.max_range_m;
-        self.quantize_each(scan, |p, cell| {
+        self.quantize_each(|p, cell| {
             let from_origin = p - self.origin_m;
             let square = from_origin.norm_squared();
             if !square.is_finite() {
@@ -145,17 +167,15 @@ impl Rays<'_> {
                 }
             }
         });
-        // The same ray serves both.
-        open.retain(|cell| !masks.is_hit(*cell));
         let open = open.into_iter().collect();
         Ends { hits, open }
     }
 
     /// The cells of all points within range, sorted.
-    fn all_hits(&self, scan: &Cloud) -> Vec<Packed> {
+    fn all_hits(&self) -> Vec<Packed> {
         let reach_square = self.reach.max_range_m * self.reach.max_range_m;
         let mut cells = Vec::new();
-        self.quantize_each(scan, |p, cell| {
+        self.quantize_each(|p, cell| {
             if (p - self.origin_m).norm_squared() <= reach_square {
                 cells.extend(cell);
             }
@@ -165,9 +185,9 @@ impl Rays<'_> {
         cells
     }
 
-    fn quantize_each(&self, scan: &Cloud, mut visit: impl FnMut(Vector3<f64>, Option<Packed>)) {
-        let [bx, by, bz] = (*self.base_m).into();
-        let offsets = scan.offsets_m.iter();
+    fn quantize_each(&self, mut visit: impl FnMut(Vector3<f64>, Option<Packed>)) {
+        let [bx, by, bz] = self.base_m.into();
+        let offsets = self.points.offsets_m.iter();
         let points =
             offsets.map(|&[x, y, z]| [bx + f64::from(x), by + f64::from(y), bz + f64::from(z)]);
         self.traversal.lattice().quantize_each(points, |p, w| {
@@ -213,11 +233,12 @@ impl Rays<'_> {
         let mut rays = ends.filter_map(|end| {
             let mut ray = lattice.center(end.unpack()) - self.origin_m;
             let length = ray.norm();
-            if self.reach.keep_m > 0.0 {
-                if length <= self.reach.keep_m {
+            let keep_m = self.reach.keep_m.max(self.reach.keep_ratio * length);
+            if keep_m > 0.0 {
+                if length <= keep_m {
                     return None;
                 }
-                ray *= 1.0 - self.reach.keep_m / length;
+                ray *= 1.0 - keep_m / length;
             }
             Some(Ray {
                 walk: families.walk(&origin, &ray),

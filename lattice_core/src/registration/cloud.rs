@@ -10,7 +10,7 @@ use crate::voxels::VoxelList;
 pub struct SemanticCloud {
     /// Points, metres.
     pub points_m: Vec<Point3<f64>>,
-    /// One for each point, or none at all if nothing is known of any.
+    /// Label distributions, one for each point, or none at all if nothing is known of any.
     pub labels: Vec<LabelDistribution>,
 }
 

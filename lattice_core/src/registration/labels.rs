@@ -16,7 +16,7 @@ pub struct LabelDistribution {
 }
 
 impl LabelDistribution {
-    /// Nothing is known.
+    /// Distribution of a point of unknown class.
     pub const UNKNOWN: LabelDistribution = LabelDistribution {
         classes: [UNLABELED; KEPT],
         weights: [0.0; KEPT],

@@ -56,7 +56,7 @@ impl DistortionSums {
     }
 
     /// Contradiction between these sums and points in cells of the lattice.
-    pub(super) fn fault(&self, lattice: &Lattice) -> Option<String> {
+    pub(super) fn contradiction(&self, lattice: &Lattice) -> Option<String> {
         let points = u128::from(self.points);
         let reach = lattice.covering_radius_m() / lattice.cell_side_m();
         // A point on the border may have been taken for one just outside of its cell.
@@ -119,7 +119,7 @@ mod tests {
             (d.mse_per_dimension_m2, d.rms_m),
             (0.625 / 3.0, 0.625_f64.sqrt())
         );
-        assert_eq!(sums.fault(&lattice()), None);
+        assert_eq!(sums.contradiction(&lattice()), None);
     }
 
     #[test]
@@ -139,30 +139,30 @@ mod tests {
             distances: 4 << 10,
             largest_square: 9 << 10,
         };
-        let fault = |sums: DistortionSums| sums.fault(&lattice()).is_some();
-        assert!(!fault(good));
+        let contradicts = |sums: DistortionSums| sums.contradiction(&lattice()).is_some();
+        assert!(!contradicts(good));
         // Seen: near a centre the rounding of the square is much of the distance.
-        assert!(!fault(DistortionSums {
+        assert!(!contradicts(DistortionSums {
             points: 2,
             squares: 228,
             distances: 21_894,
             largest_square: 114,
         }));
-        assert!(fault(DistortionSums {
+        assert!(contradicts(DistortionSums {
             squares: 19 << 10,
             ..good
         }));
-        assert!(fault(DistortionSums {
+        assert!(contradicts(DistortionSums {
             squares: 8 << 10,
             ..good
         }));
-        assert!(fault(DistortionSums { points: 0, ..good }));
-        assert!(fault(DistortionSums {
+        assert!(contradicts(DistortionSums { points: 0, ..good }));
+        assert!(contradicts(DistortionSums {
             distances: 1 << 20,
             ..good
         }));
         let far = 1 << 20;
-        assert!(fault(DistortionSums {
+        assert!(contradicts(DistortionSums {
             largest_square: far,
             squares: far.into(),
             ..good

@@ -29,7 +29,7 @@ impl Voxel {
     }
 
     /// Contradiction in this voxel if no point is more than `reach` units off the centre.
-    pub(super) fn fault(&self, reach: u64) -> Option<String> {
+    pub(super) fn contradiction(&self, reach: u64) -> Option<String> {
         if self.count == 0 {
             return Some("a voxel without points".to_owned());
         }

@@ -3,7 +3,7 @@
 use super::BagQos;
 
 /// Larger messages are refused, bytes.
-pub const MAX_MESSAGE_BYTES: u64 = 1 << 30;
+pub(crate) const MAX_MESSAGE_BYTES: u64 = 1 << 30;
 
 /// The storage plugins of rosbag2.
 #[derive(Clone, Copy, PartialEq, Eq, Hash, Debug)]
@@ -61,7 +61,7 @@ impl TopicInfo {
         match self.offered_qos.as_slice() {
             // Bags up to metadata version 3 lack it, yet static transforms are always latched.
             [] => self.name.ends_with("/tf_static") && self.type_name == "tf2_msgs/msg/TFMessage",
-            profiles => profiles.iter().any(BagQos::is_latched),
+            profiles => profiles.iter().any(|qos| qos.latched),
         }
     }
 }

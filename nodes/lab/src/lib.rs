@@ -24,6 +24,12 @@ pub mod theory;
 /// Any error on its way to the user.
 pub type AnyError = Box<dyn Error + Send + Sync>;
 
+/// A pool of so many threads, at least one.
+pub fn pool(threads: usize) -> Result<rayon::ThreadPool, AnyError> {
+    let pool = rayon::ThreadPoolBuilder::new().num_threads(threads.max(1));
+    Ok(pool.build()?)
+}
+
 /// Names the file that an error is about.
 fn at<E: Display>(path: &Path) -> impl Fn(E) -> AnyError + use<E> {
     let path = path.to_owned();

@@ -5,3 +5,4 @@ pub mod cloud;
 pub mod geometry;
 pub mod map;
 pub mod semantic;
+pub mod viewpoint;

@@ -25,10 +25,11 @@ use lattice_msgs::builtin_interfaces::Time;
 use lattice_msgs::geographic_msgs::GeoPointStamped;
 use lattice_msgs::geometry_msgs::TransformStamped;
 use lattice_msgs::sensor_msgs::PointCloud2;
+use nalgebra::{Isometry3, Vector3};
 
 use self::ins::{InsDecoder, InsMessage, InsRefusal};
 use self::waiting::{Waiting, WaitingCloud};
-use crate::convert::cloud;
+use crate::convert::{cloud, viewpoint};
 
 /// A step back of the receiving clock by more than this is a log that loops.
 const CLOCK_JUMP_NS: i64 = 1_000_000_000;
@@ -288,7 +289,7 @@ impl EnuTransformer {
         let view = layout
             .view(&message.data, &limits)
             .map_err(|_| Drop::Malformed)?;
-        let map_from_sensor = |stamp_ns: i64| {
+        let map_from_sensor = |stamp_ns: i64| -> Result<Isometry3<f64>, Drop> {
             let map_from_base = self.poses.at(stamp_ns).map_err(|_| Drop::PoseGap)?;
             let base_from_sensor = self
                 .mount(&waiting.frame, stamp_ns)
@@ -300,32 +301,44 @@ impl EnuTransformer {
             max_range_m: self.options.max_range_m,
         };
         let times = waiting.times.as_deref();
-        let moved = transform_points(&view, waiting.stamp_ns, times, &range, map_from_sensor)?;
-        self.counts.points_in += view.len() as u64;
-        self.counts.points_out += moved.points_m.len() as u64;
-        self.counts.points_not_finite += moved.not_finite as u64;
-        self.counts.points_out_of_range += moved.out_of_range as u64;
-        self.counts.points_no_time += moved.no_time as u64;
+        let moved = transform_points(&view, waiting.stamp_ns, times, &range, &map_from_sensor)?;
         let mut header = message.header.clone();
         header.stamp = Time::from_ns(waiting.stamp_ns);
         header.frame_id.clone_from(&self.options.map_frame);
         let passed = self.options.pass_fields.iter();
         let passed = passed.filter_map(|name| view.fields().iter().find(|f| f.name == *name));
         let passed: Vec<_> = passed.cloned().collect();
+        let (precision, mut fields) = (self.options.precision, passed.clone());
+        let seen_from = |i: usize| {
+            let times = times.and_then(|times| times.get(i).copied());
+            let pose = map_from_sensor(times.unwrap_or(waiting.stamp_ns));
+            pose.map_or_else(
+                |_| Vector3::repeat(f64::NAN),
+                |pose| pose.translation.vector,
+            )
+        };
+        if self.options.viewpoints {
+            fields.extend(viewpoint::viewpoint_fields(precision));
+        }
         let mut left_out = moved.left_out.iter().copied().peekable();
         let mut kept = (0..view.len()).filter(|i| left_out.next_if_eq(i).is_none());
-        Ok(cloud::message_with_fields(
-            header,
-            &moved.points_m,
-            self.options.precision,
-            &passed,
-            |_, data| {
-                let i = kept.next().unwrap_or(view.len());
-                passed
-                    .iter()
-                    .for_each(|field| view.copy_field(field, i, data));
-            },
-        ))
+        let append = |_, data: &mut Vec<u8>| {
+            let i = kept.next().unwrap_or(view.len());
+            passed
+                .iter()
+                .for_each(|field| view.copy_field(field, i, data));
+            if self.options.viewpoints {
+                viewpoint::append_viewpoint(&seen_from(i), precision, data);
+            }
+        };
+        let points =
+            cloud::message_with_fields(header, &moved.points_m, precision, &fields, append);
+        self.counts.points_in += view.len() as u64;
+        self.counts.points_out += moved.points_m.len() as u64;
+        self.counts.points_not_finite += moved.not_finite as u64;
+        self.counts.points_out_of_range += moved.out_of_range as u64;
+        self.counts.points_no_time += moved.no_time as u64;
+        Ok(points)
     }
 
     fn drop_cloud(&mut self, reason: Drop) {

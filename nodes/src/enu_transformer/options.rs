@@ -6,6 +6,7 @@ use nalgebra::Vector3;
 
 use super::ins::{HeightDatum, InsOptions, InsSource, InsStamp};
 use crate::convert::cloud::Precision;
+use crate::convert::viewpoint::VIEWPOINT_FIELDS;
 use crate::options::{frame, one_of};
 use lattice_runtime::params::{ParamError, Params};
 
@@ -48,6 +49,9 @@ pub struct TransformerOptions {
     pub precision: Precision,
     /// Fields of the clouds that `points_enu` keeps, where they have them.
     pub pass_fields: Vec<String>,
+    /// Whether `points_enu` says for each point where the sensor was, which a mapper of free space
+    /// needs.
+    pub viewpoints: bool,
 }
 
 /// More than any cloud has that a map needs.
@@ -87,6 +91,7 @@ impl TransformerOptions {
             max_waiting_bytes: 256 << 20,
             precision: Precision::Float32,
             pass_fields: LABEL_FIELDS.map(str::to_owned).into(),
+            viewpoints: false,
         }
     }
 
@@ -139,9 +144,14 @@ impl TransformerOptions {
             let problem = format!("expected at most {MAX_PASS_FIELDS} names");
             return Err(params.invalid("pass_fields", problem));
         }
+        options.viewpoints = params.bool("viewpoints", options.viewpoints)?;
         let mut names = std::collections::BTreeSet::from(["x", "y", "z"]);
+        if options.viewpoints {
+            names.extend(VIEWPOINT_FIELDS);
+        }
         if !options.pass_fields.iter().all(|name| names.insert(name)) {
-            return Err(params.invalid("pass_fields", "expected each name once, and not x, y, z"));
+            let problem = "expected each name once, and not x, y, z or those of viewpoints";
+            return Err(params.invalid("pass_fields", problem));
         }
         Ok(options)
     }

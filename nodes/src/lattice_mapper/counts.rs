@@ -1,5 +1,6 @@
 //! Counters of a mapper: clouds and points taken, refused, mapped.
 
+use lattice_core::raycast::ClearReport;
 use lattice_core::voxels::InsertReport;
 use serde::{Deserialize, Serialize};
 
@@ -28,6 +29,18 @@ pub struct MapperCounts {
     /// Voxels that went because the map was full or they were too old.
     #[serde(default)]
     pub voxels_forgotten: u64,
+    /// Clouds without the place of the sensor, where rays clear voxels: they cleared none.
+    #[serde(default)]
+    pub clouds_no_viewpoint: u64,
+    /// Rays that were followed, one for each cell that a scan hit.
+    #[serde(default)]
+    pub rays: u64,
+    /// Voxels that went because rays passed through them.
+    #[serde(default)]
+    pub voxels_cleared: u64,
+    /// Times that a block of cells had no room in `rays.max_bytes`: rays there clear nothing.
+    #[serde(default)]
+    pub ray_blocks_refused: u64,
     /// Update steps made.
     pub updates: u64,
     /// Keyframes made.
@@ -35,6 +48,13 @@ pub struct MapperCounts {
 }
 
 impl MapperCounts {
+    /// Adds what the rays of a scan did.
+    pub fn add_rays(&mut self, report: &ClearReport) {
+        self.rays += report.scan.rays;
+        self.voxels_cleared += report.removed.len() as u64;
+        self.ray_blocks_refused += report.scan.blocks_refused + report.scan.entries_refused;
+    }
+
     /// Adds what one insertion did.
     pub fn add(&mut self, report: &InsertReport) {
         self.points_in += report.points;

@@ -3,27 +3,35 @@
 //! [`LatticeMapper`] is a state machine without I/O; [`node`] runs it behind DDS.
 
 mod counts;
+mod free_options;
+mod free_space;
 pub mod node;
+mod occupancy;
 mod operations;
 mod options;
 mod report;
 mod services;
 
 pub use counts::MapperCounts;
+pub use free_options::{FreeSpaceMethod, MappedFreeSpace};
 pub use operations::LoadRefusal;
-pub use options::MapperOptions;
+pub use options::{MapPayload, MapperOptions};
 pub use report::MapperReport;
 
-use lattice_core::cloud::CloudLimits;
+use lattice_core::cloud::{Cloud, CloudLimits};
+use lattice_core::lattice::MortonKey;
 use lattice_core::query::Shells;
-use lattice_core::voxels::{DatumError, Distortion, VoxelList};
+use lattice_core::raycast::FreeSpaceError;
+use lattice_core::voxels::{Changes, Distortion, VoxelList, VoxelStore};
 use lattice_msgs::geographic_msgs::{GeoPoint, GeoPointStamped};
 use lattice_msgs::lattice::{LatticeMap, LatticeMapUpdate};
 use lattice_msgs::sensor_msgs::{PointCloud2, PointField};
 use std::sync::{Arc, OnceLock};
 use thiserror::Error;
 
-use crate::convert::{cloud, geometry, map, semantic};
+use self::free_space::FreeSpace;
+use self::occupancy::OccupancyMap;
+use crate::convert::{cloud, geometry, map, semantic, viewpoint};
 
 /// Reason for which a cloud was not mapped. The map is as it was before.
 #[derive(Debug, Error)]
@@ -46,7 +54,10 @@ pub enum CloudRefusal {
 /// Builds one occupied voxel list, with its changes for followers.
 pub struct LatticeMapper {
     options: MapperOptions,
+    /// Empty with [`MapPayload::Occupancy`].
     list: VoxelList,
+    occupancy: Option<OccupancyMap>,
+    free_space: Option<FreeSpace>,
     epoch: u64,
     sequence: u64,
     origin: Option<GeoPoint>,
@@ -61,15 +72,27 @@ pub struct LatticeMapper {
 impl LatticeMapper {
     /// An empty map. `epoch` tells this map from earlier ones on the same topic.
     ///
-    /// Refused when the datum is not a place that the lattice reaches.
-    pub fn new(options: MapperOptions, epoch: u64) -> Result<Self, DatumError> {
-        let lattice = options.lattice.clone();
-        let list = VoxelList::new(lattice, options.datum_near_m, options.voxel_limit())?
+    /// Refused when the datum is not a place that the lattice reaches, or when the options of free
+    /// space do not go together.
+    pub fn new(options: MapperOptions, epoch: u64) -> Result<Self, FreeSpaceError> {
+        let (lattice, near_m) = (options.lattice.clone(), options.datum_near_m);
+        let max_voxels = options.voxel_limit();
+        let free_space = FreeSpace::new(
+            &options.free_space,
+            &lattice,
+            near_m,
+            options.max_cloud_points,
+        )?;
+        let list = VoxelList::new(lattice, near_m, max_voxels)?
             .with_payload(options.payload())
             .with_when_full(options.when_full);
+        let occupancy = (options.payload == MapPayload::Occupancy)
+            .then(|| OccupancyMap::new(&list, max_voxels, options.max_map_bytes));
         Ok(Self {
             options,
             list,
+            occupancy,
+            free_space,
             epoch,
             sequence: 0,
             origin: None,
@@ -101,9 +124,11 @@ impl LatticeMapper {
         };
         let cloud = cloud::cloud_from_message(message, &limits, &self.list.datum_m())
             .inspect_err(|_| self.counts.clouds_malformed += 1)?;
-        let report = match &self.options.labels {
-            None => self.list.insert(&cloud),
-            Some(options) => {
+        self.end_sweep(cloud.stamp_ns);
+        let report = match (&mut self.occupancy, &self.options.labels) {
+            (Some(occupancy), _) => occupancy.insert(&cloud),
+            (None, None) => self.list.insert(&cloud),
+            (None, Some(options)) => {
                 let most = self.options.max_cloud_points;
                 let labels = semantic::labels_from_message(message, most, options)?;
                 self.counts.clouds_unlabelled += u64::from(labels.is_none());
@@ -114,6 +139,48 @@ impl LatticeMapper {
         self.counts.add(&report);
         self.last_stamp_ns = cloud.stamp_ns;
         self.forget_old();
+        self.add_rays(message, &cloud, &limits)
+    }
+
+    /// Clears along the rays of a sweep that a cloud of this time does not belong to.
+    fn end_sweep(&mut self, stamp_ns: i64) {
+        if let Some(free_space) = &self.free_space
+            && free_space.is_complete(stamp_ns)
+        {
+            self.clear_rays();
+        }
+    }
+
+    fn clear_rays(&mut self) {
+        if let Some(free_space) = &mut self.free_space {
+            let report = match &mut self.occupancy {
+                Some(occupancy) => free_space.clear(occupancy),
+                None => free_space.clear(&mut self.list),
+            };
+            self.counts.add_rays(&report);
+        }
+    }
+
+    fn add_rays(
+        &mut self,
+        message: &PointCloud2,
+        cloud: &Cloud,
+        limits: &CloudLimits,
+    ) -> Result<(), CloudRefusal> {
+        let Some(free_space) = &mut self.free_space else {
+            return Ok(());
+        };
+        let Some(viewpoints) = viewpoint::viewpoints_from_message(message, limits)? else {
+            self.counts.clouds_no_viewpoint += 1;
+            return Ok(());
+        };
+        match &self.occupancy {
+            Some(occupancy) => free_space.add(occupancy, cloud, &viewpoints),
+            None => free_space.add(&self.list, cloud, &viewpoints),
+        }
+        if free_space.is_cloud_by_cloud() {
+            self.clear_rays();
+        }
         Ok(())
     }
 
@@ -132,12 +199,21 @@ impl LatticeMapper {
     /// Forgets all voxels and begins a new epoch.
     pub fn reset(&mut self, epoch: u64) {
         self.list.clear();
+        if let Some(occupancy) = &mut self.occupancy {
+            occupancy.clear();
+        }
         self.begin(epoch);
     }
 
     fn begin(&mut self, epoch: u64) {
         // Followers learn of the removal by the epoch.
-        self.list.take_changes();
+        self.take_changes();
+        if let Some(free_space) = &mut self.free_space {
+            match &self.occupancy {
+                Some(occupancy) => free_space.restart(occupancy),
+                None => free_space.restart(&self.list),
+            }
+        }
         self.epoch = epoch;
         self.sequence = 0;
         self.last_stamp_ns = 0;
@@ -146,24 +222,35 @@ impl LatticeMapper {
 
     /// Epoch and state of the list: a copy of the map is old once they differ.
     pub fn state(&self) -> (u64, u64) {
-        (self.epoch, self.list.sequence().into())
+        let sequence = match &self.occupancy {
+            Some(occupancy) => occupancy.sequence(),
+            None => self.list.sequence().into(),
+        };
+        (self.epoch, sequence)
+    }
+
+    fn take_changes(&mut self) -> Changes {
+        match &mut self.occupancy {
+            Some(occupancy) => occupancy.take_changes(),
+            None => self.list.take_changes(),
+        }
     }
 
     /// The changes since the update before, as one step of the sequence; empty when there are none.
     pub fn take_update(&mut self) -> Vec<LatticeMapUpdate> {
-        let changes = self.list.take_changes();
+        let changes = self.take_changes();
         if changes.changed.is_empty() && changes.removed.is_empty() {
             return Vec::new();
         }
         let previous = self.sequence;
         self.sequence += 1;
-        let messages = map::update(
-            &self.list,
-            &changes.changed,
-            &changes.removed,
-            previous,
-            &self.stamp(),
-        );
+        let (stamp, list) = (self.stamp(), &self.list);
+        let messages = match &self.occupancy {
+            Some(_) => {
+                map::update_of_cells(list.lattice(), list.datum_m(), &changes, previous, &stamp)
+            }
+            None => map::update(list, &changes, previous, &stamp),
+        };
         self.counts.updates += 1;
         messages
     }
@@ -174,13 +261,42 @@ impl LatticeMapper {
     /// differences, so taking both is harmless.
     pub fn keyframe(&mut self) -> Vec<LatticeMap> {
         self.counts.keyframes += 1;
-        map::keyframe(&self.list, &self.stamp())
+        let stamp = self.stamp();
+        match &self.occupancy {
+            Some(cells) => {
+                let keys = cells.sorted_keys();
+                map::keyframe_of_cells(cells.lattice(), cells.datum_m(), &keys, &stamp)
+            }
+            None => map::keyframe(&self.list, &stamp),
+        }
     }
 
-    /// Cell centres in the map frame, with the number of points as `intensity` and, where labels are
-    /// kept, the most frequent one as `label`.
+    /// The free cells in self-contained chunks, as those of a map; `None` where none are kept.
+    pub fn free(&self) -> Option<Vec<LatticeMap>> {
+        let (lattice, keys) = self.free_space.as_ref()?.free_cells()?;
+        let datum_m = self.list.datum_m();
+        Some(map::keyframe_of_cells(
+            lattice,
+            datum_m,
+            &keys,
+            &self.stamp(),
+        ))
+    }
+
+    /// Cell centres in the map frame, with the number of points (1 if not kept) as `intensity` and,
+    /// where labels are kept, the most frequent one as `label`.
     pub fn centers(&self) -> PointCloud2 {
-        let voxels = self.list.sorted();
+        let voxels: Vec<(MortonKey, u32)> = match &self.occupancy {
+            Some(cells) => cells
+                .sorted_keys()
+                .into_iter()
+                .map(|key| (key, 1))
+                .collect(),
+            None => {
+                let voxels = self.list.sorted().into_iter();
+                voxels.map(|(key, voxel)| (key, voxel.count)).collect()
+            }
+        };
         let mut further = vec![("intensity", PointField::FLOAT32)];
         let labelled = self.list.payload().labels;
         if labelled {
@@ -195,9 +311,9 @@ impl LatticeMapper {
         }));
         let point_step = 4 * fields.len() as u32;
         let mut data = Vec::with_capacity(voxels.len() * point_step as usize);
-        for (key, voxel) in &voxels {
+        for (key, count) in &voxels {
             let center = self.list.center_m(*key);
-            for v in [center.x, center.y, center.z, f64::from(voxel.count)] {
+            for v in [center.x, center.y, center.z, f64::from(*count)] {
                 data.extend_from_slice(&(v as f32).to_le_bytes());
             }
             if labelled {
@@ -219,9 +335,17 @@ impl LatticeMapper {
         &self.counts
     }
 
-    /// The list itself.
+    /// The voxels with their payload; empty with [`MapPayload::Occupancy`].
     pub fn list(&self) -> &VoxelList {
         &self.list
+    }
+
+    /// The occupied cells, whatever their payload.
+    pub fn cells(&self) -> &dyn VoxelStore {
+        match &self.occupancy {
+            Some(occupancy) => occupancy,
+            None => &self.list,
+        }
     }
 
     fn header(&self) -> lattice_msgs::std_msgs::Header {

@@ -2,7 +2,7 @@
 
 use std::collections::VecDeque;
 use std::sync::atomic::{AtomicBool, AtomicU64, Ordering};
-use std::sync::{Arc, Mutex, MutexGuard, PoisonError};
+use std::sync::{Arc, Mutex, MutexGuard, Once, PoisonError};
 use std::thread::JoinHandle;
 use std::time::{Duration, SystemTime, UNIX_EPOCH};
 
@@ -24,11 +24,15 @@ use lattice_runtime::{Diagnostics, Level, Load, Node, Publisher, Runtime};
 /// Chunks of a keyframe published in one update period: 3 MB.
 const CHUNKS_PER_ROUND: usize = 50;
 
+/// Said where rays shall clear voxels and a cloud does not say where they begin.
+const NO_VIEWPOINTS: &str = "no sensor positions (vp_x, vp_y, vp_z), so no free space: set `viewpoints: true` of enu_transformer";
+
 /// Event for the compute thread.
 enum Event {
     Cloud(Arc<PointCloud2>),
     Update,
     Centers,
+    Free,
     Reset,
     Call(Call),
     /// Ends, with the samples that did not decode and the clouds that were lost before the inbox.
@@ -50,15 +54,18 @@ pub fn start(runtime: &Runtime, name: &str) -> Result<Finish, NodeError> {
     };
     let update_period = period(&node, "update_period_s", 0.2)?;
     let centers_period = period(&node, "centers_period_s", 1.0)?;
+    let free_period = period(&node, "free_period_s", 1.0)?;
+    let has_free = mapper.free_space.free_level > 0;
     let lost = Arc::new(AtomicU64::new(0));
     let wishes = Arc::new(Wishes::default());
     let max_voxels = mapper.voxel_limit();
     let mut shell = Shell {
         machine: LatticeMapper::new(mapper, epoch())?,
-        outputs: Outputs::open(&node)?,
+        outputs: Outputs::open(&node, has_free)?,
         diagnostics: node.diagnostics(),
         lost: Arc::clone(&lost),
         refusals: Throttle::new(Duration::from_secs(5)),
+        no_viewpoints: Once::new(),
         wishes: Arc::clone(&wishes),
         pending: VecDeque::new(),
         not_published: 0,
@@ -110,6 +117,10 @@ pub fn start(runtime: &Runtime, name: &str) -> Result<Finish, NodeError> {
     let calls = services::serve(&node, &inbox, Event::Call, max_voxels)?;
     let updates = inbox.clone();
     runtime.timer(update_period, move || notify(&updates, Event::Update));
+    if has_free {
+        let free = inbox.clone();
+        runtime.timer(free_period, move || notify(&free, Event::Free));
+    }
     runtime.timer(centers_period, move || notify(&inbox, Event::Centers));
     warn_unused(params);
     Ok(Box::new(move || {
@@ -155,14 +166,17 @@ struct Outputs {
     map: Publisher<LatticeMap>,
     updates: Publisher<LatticeMapUpdate>,
     centers: Publisher<PointCloud2>,
+    free: Option<Publisher<LatticeMap>>,
 }
 
 impl Outputs {
-    fn open(node: &Node) -> Result<Self, NodeError> {
+    fn open(node: &Node, has_free: bool) -> Result<Self, NodeError> {
+        let free = has_free.then(|| node.publisher("free", Qos::MAP));
         Ok(Self {
             map: node.publisher("map", Qos::MAP)?,
             updates: node.publisher("map_updates", Qos::DELTAS)?,
             centers: node.publisher("map_centers", Qos::LATCHED)?,
+            free: free.transpose()?,
         })
     }
 }
@@ -174,6 +188,7 @@ struct Shell {
     diagnostics: Diagnostics,
     lost: Arc<AtomicU64>,
     refusals: Throttle,
+    no_viewpoints: Once,
     wishes: Arc<Wishes>,
     /// Chunks of a keyframe that are still to be published.
     pending: VecDeque<Arc<LatticeMap>>,
@@ -194,9 +209,14 @@ impl Shell {
                 {
                     log::warn!("{refusal} ({more} more like it)");
                 }
+                if self.machine.counts().clouds_no_viewpoint == 1 {
+                    self.no_viewpoints
+                        .call_once(|| log::warn!("{NO_VIEWPOINTS}"));
+                }
             }
             Event::Update => self.update(),
             Event::Centers => self.centers(),
+            Event::Free => self.free(),
             Event::Reset => {
                 self.machine.reset(epoch());
                 self.replaced();
@@ -258,6 +278,22 @@ impl Shell {
         }
     }
 
+    /// Publishes all free cells; one that joins later has them with the next time.
+    fn free(&mut self) {
+        let Some(publisher) = &self.outputs.free else {
+            return;
+        };
+        if publisher.subscriber_count() == 0 {
+            return;
+        }
+        for chunk in self.machine.free().into_iter().flatten() {
+            if let Err(error) = publisher.publish(Arc::new(chunk)) {
+                log::debug!("free cells not published: {error}");
+                return;
+            }
+        }
+    }
+
     fn report(&mut self) -> MapperReport {
         MapperReport {
             clouds_inbox_full: self.lost.load(Ordering::Relaxed),
@@ -275,6 +311,12 @@ impl Shell {
         } else if counts.points_list_full > 0 {
             let limits = "`max_voxels` or `max_map_bytes`";
             (Level::Warn, format!("the list is full ({limits})"))
+        } else if counts.clouds_no_viewpoint > 0 {
+            let clouds = counts.clouds_no_viewpoint;
+            (Level::Warn, format!("{clouds} clouds: {NO_VIEWPOINTS}"))
+        } else if counts.ray_blocks_refused > 0 {
+            let problem = "rays have no room (`rays.max_bytes`): not all voxels are cleared";
+            (Level::Warn, problem.to_owned())
         } else if refused + lost > 0 {
             (
                 Level::Warn,
@@ -287,7 +329,7 @@ impl Shell {
         let distortion = self.machine.distortion();
         values.extend([
             ("clouds_inbox_full".into(), lost.to_string()),
-            ("voxels".into(), self.machine.list().len().to_string()),
+            ("voxels".into(), self.machine.cells().len().to_string()),
             ("rms_m".into(), format!("{:.5}", distortion.rms_m)),
         ]);
         self.diagnostics.set("map", level, message, values);

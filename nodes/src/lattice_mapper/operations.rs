@@ -4,7 +4,7 @@ use std::sync::Arc;
 
 use lattice_core::query::{Query, QueryError, Shells};
 use lattice_core::voxels::file::{MapContents, OperationError};
-use lattice_core::voxels::{MergeError, Region, VoxelList, VoxelStore};
+use lattice_core::voxels::{MergeError, Region, VoxelStore};
 use lattice_msgs::geometry_msgs::Point;
 use lattice_msgs::lattice::{ClearBoxRequest, ClearBoxResponse, QueryMapRequest, QueryMapResponse};
 use nalgebra::Vector3;
@@ -47,7 +47,10 @@ pub enum LoadRefusal {
 impl LatticeMapper {
     /// A copy of the map as a file holds it.
     pub fn contents(&self) -> MapContents {
-        MapContents::from_list(&self.list)
+        match &self.occupancy {
+            Some(occupancy) => MapContents::from_store(occupancy),
+            None => MapContents::from_list(&self.list),
+        }
     }
 
     /// Replaces the map and begins a new epoch, as [`LatticeMapper::reset`] does; gives the number
@@ -68,6 +71,16 @@ impl LatticeMapper {
             return Err(LoadRefusal::TooMany { voxels, max_voxels });
         }
         let contents = contents.with_datum(self.list.datum_index())?;
+        if let Some(occupancy) = &mut self.occupancy {
+            let loaded = contents.into_occupancy(occupancy.max_bytes());
+            if loaded.len() < voxels {
+                let max_voxels = loaded.len();
+                return Err(LoadRefusal::TooMany { voxels, max_voxels });
+            }
+            occupancy.replace(loaded);
+            self.begin(epoch);
+            return Ok(voxels);
+        }
         let mut loaded = contents.into_list(max_voxels);
         if loaded.payload() != payload {
             let mut list = loaded.clone().with_payload(payload);
@@ -82,7 +95,11 @@ impl LatticeMapper {
     /// Removes the voxels in a box.
     pub fn clear_box(&mut self, request: &ClearBoxRequest) -> ClearBoxResponse {
         let region = Region::cuboid(vector(&request.min), vector(&request.max));
-        match region.map(|region| self.list.remove_region(&region)) {
+        let removed = region.map(|region| match &mut self.occupancy {
+            Some(occupancy) => occupancy.remove_region(&region),
+            None => self.list.remove_region(&region),
+        });
+        match removed {
             Ok(removed) => ClearBoxResponse {
                 success: true,
                 message: format!("{removed} voxels removed"),
@@ -105,18 +122,28 @@ impl LatticeMapper {
     }
 
     fn ask(&self, point_m: &Vector3<f64>) -> Result<QueryMapResponse, QueryError> {
-        let list: &VoxelList = &self.list;
+        match &self.occupancy {
+            Some(occupancy) => self.ask_store(occupancy, point_m),
+            None => self.ask_store(&self.list, point_m),
+        }
+    }
+
+    fn ask_store(
+        &self,
+        store: &impl VoxelStore,
+        point_m: &Vector3<f64>,
+    ) -> Result<QueryMapResponse, QueryError> {
         let shells = self
             .shells
-            .get_or_init(|| Arc::new(Shells::new(list.lattice())));
-        let query = Query::with_shells(list, Arc::clone(shells));
+            .get_or_init(|| Arc::new(Shells::new(store.lattice())));
+        let query = Query::with_shells(store, Arc::clone(shells));
         let key = query.occupied(point_m);
         let mut answer = QueryMapResponse {
             success: true,
             message: "the map is empty".to_owned(),
             occupied: key.is_some(),
             points: key
-                .and_then(|key| list.get(key))
+                .and_then(|key| self.list.get(key))
                 .map_or(0, |voxel| voxel.count),
             ..QueryMapResponse::default()
         };

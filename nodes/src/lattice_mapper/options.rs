@@ -1,9 +1,10 @@
 //! Parameters of the mapper.
 
 use lattice_core::lattice::{Lattice, LatticeKind, Orientation};
-use lattice_core::voxels::{Payload, VoxelList, WhenFull};
+use lattice_core::voxels::{OccupancyList, Payload, VoxelList, WhenFull};
 use nalgebra::Vector3;
 
+use super::free_options::MappedFreeSpace;
 use crate::convert::semantic::LabelOptions;
 use crate::options;
 use lattice_runtime::params::{ParamError, Params};
@@ -29,8 +30,22 @@ pub struct MapperOptions {
     pub max_cloud_points: usize,
     /// Reading of labels, which are counted in each voxel; none: they are not kept.
     pub labels: Option<LabelOptions>,
-    /// Largest serialised message of `map` and `map_updates`.
+    /// Largest serialised message of `map`, `map_updates` and `free`.
     pub chunk_bytes: usize,
+    /// Whether a voxel is more than a bit.
+    pub payload: MapPayload,
+    /// Rays that clear voxels.
+    pub free_space: MappedFreeSpace,
+}
+
+/// Contents of a voxel.
+#[derive(Clone, Copy, PartialEq, Eq, Debug, Default)]
+pub enum MapPayload {
+    /// Count and mean of the points, and stamps or labels where asked for.
+    #[default]
+    Centroid,
+    /// That it is occupied: 2 to 3 bytes a voxel.
+    Occupancy,
 }
 
 impl MapperOptions {
@@ -47,6 +62,8 @@ impl MapperOptions {
             max_cloud_points: 4_000_000,
             labels: None,
             chunk_bytes: 60_000,
+            payload: MapPayload::Centroid,
+            free_space: MappedFreeSpace::default(),
         }
     }
 
@@ -80,8 +97,20 @@ impl MapperOptions {
             )?,
             labels: Self::labels_from(params)?,
             chunk_bytes: options::chunk_bytes(params, defaults.chunk_bytes)?,
+            payload: map_payload(params)?,
+            free_space: MappedFreeSpace::from_params(params)?,
             ..defaults
         };
+        if read.payload == MapPayload::Occupancy && (read.payload().stamps || read.payload().labels)
+        {
+            let problem = "occupancy has neither stamps nor labels: needs centroid with \
+                           forget_after_s or keep_labels";
+            return Err(params.invalid("payload", problem));
+        }
+        if read.payload == MapPayload::Occupancy && read.when_full != WhenFull::Refuse {
+            let problem = "payload occupancy knows no oldest voxel: needs refuse";
+            return Err(params.invalid("when_full", problem));
+        }
         if read.voxel_limit() == 0 {
             let problem = "too little for a single voxel; a small map takes 1000000";
             return Err(params.invalid("max_map_bytes", problem));
@@ -101,7 +130,7 @@ impl MapperOptions {
             .map_err(|e| params.invalid("lattice_orientation", format!("{e}")))
     }
 
-    /// Payload of each voxel.
+    /// Columns of a voxel of centroids.
     pub(super) fn payload(&self) -> Payload {
         Payload {
             stamps: self.forget_after_ns > 0,
@@ -114,6 +143,9 @@ impl MapperOptions {
     pub(super) fn voxel_limit(&self) -> usize {
         match self.max_map_bytes {
             0 => self.max_voxels,
+            bytes if self.payload == MapPayload::Occupancy => {
+                (self.max_voxels).min(OccupancyList::max_voxels_within(bytes))
+            }
             bytes => (self.max_voxels).min(VoxelList::voxels_within(bytes, self.payload())),
         }
     }
@@ -126,6 +158,17 @@ fn when_full(params: &Params) -> Result<WhenFull, ParamError> {
         other => {
             let problem = format!("{other:?}, expected refuse or forget_oldest");
             Err(params.invalid("when_full", problem))
+        }
+    }
+}
+
+fn map_payload(params: &Params) -> Result<MapPayload, ParamError> {
+    match params.string("payload", "centroid")?.as_str() {
+        "centroid" => Ok(MapPayload::Centroid),
+        "occupancy" => Ok(MapPayload::Occupancy),
+        other => {
+            let problem = format!("{other:?}, expected centroid or occupancy");
+            Err(params.invalid("payload", problem))
         }
     }
 }

@@ -62,7 +62,8 @@ impl MapperReport {
                 crc.update(&offset.to_le_bytes());
             }
         }
-        let lattice = mapper.list().lattice();
+        let cells = mapper.cells();
+        let lattice = cells.lattice();
         Self {
             lattice: lattice.kind().name().to_owned(),
             cell_volume_m3: lattice.cell_volume_m3(),
@@ -70,7 +71,7 @@ impl MapperReport {
             clouds_inbox_full: 0,
             undecodable: 0,
             updates_not_published: 0,
-            voxels: mapper.list().len(),
+            voxels: cells.len(),
             points,
             mse_per_dimension_m2,
             mean_distance_m,

@@ -12,7 +12,7 @@ use std::sync::Arc;
 use std::time::Instant;
 
 use lattice_core::pose::StampedPose;
-use lattice_core::voxels::DatumError;
+use lattice_core::raycast::FreeSpaceError;
 use lattice_msgs::RosMessage;
 use lattice_msgs::cdr::{self, CdrError};
 use lattice_msgs::geometry_msgs::PoseStamped;
@@ -53,8 +53,8 @@ impl Pipeline {
         transformer: TransformerOptions,
         maps: impl IntoIterator<Item = MapperOptions>,
         markers: &MarkerOptions,
-    ) -> Result<Self, DatumError> {
-        let branch = |options| {
+    ) -> Result<Self, FreeSpaceError> {
+        let branch = |options| -> Result<Branch, FreeSpaceError> {
             Ok(Branch {
                 mapper: LatticeMapper::new(options, EPOCH)?,
                 markers: VoxelMarkers::new(markers.clone()),

@@ -68,6 +68,11 @@ impl RunReport {
                 ("clouds", "malformed", map.counts.clouds_malformed),
                 (
                     "clouds",
+                    "without sensor positions, so that they clear nothing",
+                    map.counts.clouds_no_viewpoint,
+                ),
+                (
+                    "clouds",
                     "lost on the way or inbox full",
                     map.clouds_inbox_full,
                 ),

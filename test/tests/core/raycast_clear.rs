@@ -4,7 +4,7 @@ use std::collections::BTreeSet;
 
 use lattice_core::cloud::Cloud;
 use lattice_core::lattice::{Lattice, LatticeKind, MortonKey};
-use lattice_core::raycast::{ClearOptions, RayClearer, Traversal, clear_rays};
+use lattice_core::raycast::{ClearOptions, ClearReport, RayBundle, RayClearer, Traversal};
 use lattice_core::voxels::{VoxelList, VoxelStore};
 use nalgebra::Vector3;
 use proptest::prelude::*;
@@ -28,6 +28,25 @@ fn list(kind: LatticeKind, points: &[[f32; 3]]) -> VoxelList {
     let mut list = VoxelList::new(lattice, at([0.3, 0.2, 0.1]), usize::MAX).unwrap();
     list.insert(&cloud(points.to_vec()));
     list
+}
+
+fn bundle(origin_m: Vector3<f64>, ends: &Cloud) -> RayBundle<'_> {
+    RayBundle { origin_m, ends }
+}
+
+/// Clears along the rays of one scan.
+fn clear_rays(
+    store: &mut VoxelList,
+    origin_m: Vector3<f64>,
+    ends: &Cloud,
+    keep_m: f64,
+) -> ClearReport {
+    let options = ClearOptions {
+        keep_m,
+        ..ClearOptions::default()
+    };
+    let mut clearer = RayClearer::new(&store.lattice().clone(), options);
+    clearer.clear(store, &[bundle(origin_m, ends)])
 }
 
 fn any_points(n: usize) -> impl Strategy<Value = Vec<[f32; 3]>> {
@@ -96,7 +115,8 @@ fn ground_at_a_flat_angle_does_not_clear_itself() {
         };
         let mut clearer = RayClearer::new(&store.lattice().clone(), options);
         for scan in 1..=3 {
-            let report = clearer.clear(&mut store, at([0.0, 0.0, 1.5]), &cloud(ground.clone()));
+            let (origin_m, ends) = (at([0.0, 0.0, 1.5]), &cloud(ground.clone()));
+            let report = clearer.clear(&mut store, &[bundle(origin_m, ends)]);
             assert!(report.missed > 0, "{kind}");
             assert_eq!(report.removed.is_empty(), scan < 3, "{kind}");
         }
@@ -124,13 +144,13 @@ fn a_hit_between_starts_the_count_of_misses_anew() {
         ..ClearOptions::default()
     };
     let mut clearer = RayClearer::new(&store.lattice().clone(), options);
-    let mut clear = |scan: &Cloud| clearer.clear(&mut store, origin, scan);
+    let mut clear = |scan: &Cloud| clearer.clear(&mut store, &[bundle(origin, scan)]);
     assert_eq!((clear(&ahead).missed, clear(&cloud(near)).missed), (1, 0));
     assert!(clear(&ahead).removed.is_empty());
     assert_eq!(clear(&ahead).removed, [key]);
     assert!(store.is_empty());
     let mut other = list(LatticeKind::Bcc, &[[2.0, 0.0, 0.0]]);
-    let report = clearer.clear(&mut other, origin, &far);
+    let report = clearer.clear(&mut other, &[bundle(origin, &far)]);
     assert_eq!((report.removed.len(), other.len()), (0, 1));
 }
 

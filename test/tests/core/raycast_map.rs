@@ -5,8 +5,10 @@ use std::collections::{BTreeMap, BTreeSet};
 use lattice_core::cloud::Cloud;
 use lattice_core::lattice::{Lattice, LatticeIndex, LatticeKind, MortonKey};
 use lattice_core::raycast::{
-    CellState, Evidence, FreeSpaceMap, FreeSpaceOptions, MIN_MAP_BYTES, ScanReport, Traversal,
+    CellState, Evidence, FreeSpaceMap, FreeSpaceOptions, MIN_MAP_BYTES, RayBundle, ScanReport,
+    Traversal,
 };
+use lattice_core::voxels::{OccupancyList, VoxelStore};
 use nalgebra::{Matrix3, UnitQuaternion, Vector3};
 use proptest::prelude::*;
 
@@ -57,6 +59,10 @@ fn any_lattice() -> impl Strategy<Value = Lattice> {
 
 fn map_of(lattice: Lattice, options: FreeSpaceOptions) -> FreeSpaceMap {
     FreeSpaceMap::new(lattice, origin([0.3, 0.2, 0.1]), options).unwrap()
+}
+
+fn insert(map: &mut FreeSpaceMap, origin_m: Vector3<f64>, ends: &Cloud) -> ScanReport {
+    map.insert_scan(&[RayBundle { origin_m, ends }])
 }
 
 /// The log-odds in 32nds by sets of cells.
@@ -118,7 +124,7 @@ proptest! {
         let mut reference = Reference::default();
         for (offset, points) in scans {
             let (origin_m, scan) = (origin(offset), cloud(points));
-            let report = map.insert_scan(origin_m, &scan);
+            let report = insert(&mut map, origin_m, &scan);
             prop_assert_eq!(report, reference.insert(&map, origin_m, &scan));
         }
         let mut counts = (0, 0);
@@ -138,21 +144,46 @@ proptest! {
         prop_assert_eq!(map.state(MortonKey::pack([900_000; 3]).unwrap()), CellState::Unknown);
     }
 
+    /// A scan in parts from different places is one scan: one hit or miss for each cell.
+    #[test]
+    fn bundles_of_one_scan_count_once(
+        kind in any_kind(),
+        offsets in prop::array::uniform2(prop::array::uniform3(-1.0..1.0_f64)),
+        points in prop::collection::vec(prop::array::uniform3(-4.0..4.0_f32), 1..40),
+    ) {
+        let mut map = map(kind, FreeSpaceOptions::default());
+        let clouds = [cloud(points[..points.len() / 2].to_vec()), cloud(points)];
+        let scan: Vec<RayBundle> = offsets
+            .iter()
+            .zip(&clouds)
+            .map(|(offset, ends)| RayBundle { origin_m: origin(*offset), ends })
+            .collect();
+        let report = map.insert_scan(&scan);
+        prop_assert_eq!(report.hits, map.occupied_keys().len() as u64);
+        prop_assert_eq!(report.rays, report.hits, "one ray for each cell");
+        for key in map.occupied_keys() {
+            prop_assert_eq!(map.log_odds(key), Some(27.0 / 32.0));
+        }
+        for key in map.free_keys() {
+            prop_assert_eq!(map.log_odds(key), Some(-13.0 / 32.0));
+        }
+    }
+
     #[test]
     fn the_order_of_the_points_does_not_matter(
         kind in any_kind(),
         scans in any_scans(),
-        free_level in 0..3_u32,
+        free_level in prop::option::of(0..3_u32),
         max_range_m in prop::sample::select(vec![2.5, f64::INFINITY]),
     ) {
         let options = FreeSpaceOptions { free_level, max_range_m, ..FreeSpaceOptions::default() };
         let (mut one, mut other) = (map(kind, options), map(kind, options));
         for (offset, mut points) in scans {
-            let first = one.insert_scan(origin(offset), &cloud(points.clone()));
+            let first = insert(&mut one, origin(offset), &cloud(points.clone()));
             points.reverse();
             let half = points.len() / 2;
             points.rotate_left(half);
-            prop_assert_eq!(first, other.insert_scan(origin(offset), &cloud(points)));
+            prop_assert_eq!(first, insert(&mut other, origin(offset), &cloud(points)));
         }
         prop_assert_eq!(contents(&one), contents(&other));
         prop_assert!(one.bytes() <= options.max_bytes);
@@ -168,11 +199,11 @@ proptest! {
         inside in prop::array::uniform3(-0.5..0.5_f64),
     ) {
         let mut fine = map_of(lattice.clone(), FreeSpaceOptions::default());
-        let mut coarse = map_of(lattice, FreeSpaceOptions { free_level, ..FreeSpaceOptions::default() });
+        let mut coarse = map_of(lattice, FreeSpaceOptions { free_level: Some(free_level), ..FreeSpaceOptions::default() });
         for (offset, points) in scans {
             let (origin_m, scan) = (origin(offset), cloud(points));
-            let report = fine.insert_scan(origin_m, &scan);
-            prop_assert_eq!(report, coarse.insert_scan(origin_m, &scan));
+            let report = insert(&mut fine, origin_m, &scan);
+            prop_assert_eq!(report, insert(&mut coarse, origin_m, &scan));
         }
         let lattice = coarse.free_lattice();
         let home = |p: Vector3<f64>| MortonKey::pack(lattice.quantize(&p).unwrap()).unwrap();
@@ -221,7 +252,7 @@ fn a_wall_that_goes_away_is_freed() {
     for kind in LatticeKind::ALL {
         for free_level in [0, 1, 2] {
             let options = FreeSpaceOptions {
-                free_level,
+                free_level: Some(free_level),
                 ..FreeSpaceOptions::default()
             };
             let mut map = map(kind, options);
@@ -230,7 +261,7 @@ fn a_wall_that_goes_away_is_freed() {
                 cloud(grid.map(|(y, z)| [x, y * 0.02 * x, z * 0.02 * x]).collect())
             };
             for _ in 0..3 {
-                map.insert_scan(origin([0.0; 3]), &wall(4.0));
+                insert(&mut map, origin([0.0; 3]), &wall(4.0));
             }
             let near = map.key_of(&origin([4.0, 0.0, 0.0])).unwrap();
             let before = map.key_of(&origin([1.0, 0.0, 0.0])).unwrap();
@@ -243,7 +274,7 @@ fn a_wall_that_goes_away_is_freed() {
                 "{kind} {free_level}"
             );
             for _ in 0..20 {
-                map.insert_scan(origin([0.0; 3]), &wall(9.0));
+                insert(&mut map, origin([0.0; 3]), &wall(9.0));
             }
             assert_eq!(state(&map), [Free, Free, Free], "{kind} {free_level}");
         }
@@ -258,7 +289,8 @@ fn points_beyond_the_range_free_the_way_there_and_hit_nothing() {
             ..FreeSpaceOptions::default()
         };
         let mut map = map(kind, options);
-        let report = map.insert_scan(
+        let report = insert(
+            &mut map,
             origin([0.0; 3]),
             &cloud(vec![[80.0, 0.0, 0.0], [3e38, 0.0, 0.0], [0.0, 2.0, 0.0]]),
         );
@@ -286,7 +318,7 @@ fn the_limit_of_memory_holds_and_what_it_refuses_is_counted() {
     };
     for free_level in [0, 2] {
         let options = FreeSpaceOptions {
-            free_level,
+            free_level: Some(free_level),
             max_bytes: MIN_MAP_BYTES,
             ..FreeSpaceOptions::default()
         };
@@ -295,31 +327,88 @@ fn the_limit_of_memory_holds_and_what_it_refuses_is_counted() {
             map(LatticeKind::Fcc, options),
         );
         let mut points = sphere(3000);
-        let first = one.insert_scan(origin([0.0; 3]), &cloud(points.clone()));
+        let first = insert(&mut one, origin([0.0; 3]), &cloud(points.clone()));
         assert!(one.bytes() <= MIN_MAP_BYTES, "{}", one.bytes());
         assert!(first.entries_refused > 0, "{first:?}");
         points.reverse();
-        let second = other.insert_scan(origin([0.0; 3]), &cloud(points));
+        let second = insert(&mut other, origin([0.0; 3]), &cloud(points));
         assert_eq!(first, second);
         assert_eq!(contents(&one), contents(&other));
         assert!(!one.free_keys().is_empty());
         let mut refused = 0;
         for i in 0..20 {
             let from = origin([f64::from(i), 0.0, 0.0]);
-            refused += one.insert_scan(from, &cloud(sphere(500))).blocks_refused;
+            refused += insert(&mut one, from, &cloud(sphere(500))).blocks_refused;
             assert!(one.bytes() <= MIN_MAP_BYTES, "{}", one.bytes());
         }
         assert!(refused > 0);
     }
 }
 
+/// A store holds what the evidence says is occupied, whatever free cells the map keeps.
+#[test]
+fn a_store_is_cleared_to_what_the_evidence_says() {
+    for free_level in [None, Some(0), Some(2)] {
+        let options = FreeSpaceOptions {
+            free_level,
+            ..FreeSpaceOptions::default()
+        };
+        let mut map = map(LatticeKind::Fcc, options);
+        let lattice = map.lattice().clone();
+        let mut store = OccupancyList::new(lattice, map.datum_m(), usize::MAX).unwrap();
+        let wall = |x: f32| {
+            let grid = (-20..21).flat_map(|i| (-20..21).map(move |k| (i as f32, k as f32)));
+            cloud(grid.map(|(y, z)| [x, y * 0.02 * x, z * 0.02 * x]).collect())
+        };
+        let mut see = |x: f32| {
+            let ends = wall(x);
+            store.insert(&ends);
+            let origin_m = origin([0.0; 3]);
+            let report = map.clear(
+                &mut store,
+                &[RayBundle {
+                    origin_m,
+                    ends: &ends,
+                }],
+            );
+            store.validate().unwrap();
+            assert_eq!(
+                store.sorted_keys(),
+                map.occupied_keys(),
+                "{free_level:?} {x} m"
+            );
+            report.removed.len()
+        };
+        assert_eq!([see(4.0), see(4.0), see(9.0), see(9.0), see(9.0)], [0; 5]);
+        let gone: usize = (0..5).map(|_| see(9.0)).sum();
+        assert!(gone > 50, "{free_level:?}: {gone}");
+        assert!(see(4.0) > 50, "one hit is not enough after many misses");
+    }
+}
+
+/// A loaded map has no scans: its cells count as hit once, so that rays can clear them.
+#[test]
+fn cells_that_were_loaded_can_be_cleared() {
+    let options = FreeSpaceOptions {
+        free_level: None,
+        ..FreeSpaceOptions::default()
+    };
+    let mut map = map(LatticeKind::Bcc, options);
+    let key = map.key_of(&origin([2.0, 0.1, 0.1])).unwrap();
+    map.insert_occupied(&[key]);
+    assert_eq!(map.occupied_keys(), [key]);
+    assert_eq!(map.log_odds(key), Some(27.0 / 32.0));
+    map.reset();
+    assert_eq!(map.state(key), CellState::Unknown);
+}
+
 #[test]
 fn a_scan_from_nowhere_changes_nothing() {
     let mut map = map(LatticeKind::Fcc, FreeSpaceOptions::default());
     let scan = cloud(vec![[1.0, 2.0, 3.0]; 7]);
-    let report = map.insert_scan(Vector3::new(f64::NAN, 0.0, 0.0), &scan);
+    let report = insert(&mut map, Vector3::new(f64::NAN, 0.0, 0.0), &scan);
     assert_eq!((report.points, report.not_finite), (7, 7));
-    let report = map.insert_scan(Vector3::new(1e9, 0.0, 0.0), &scan);
+    let report = insert(&mut map, Vector3::new(1e9, 0.0, 0.0), &scan);
     assert_eq!((report.points, report.out_of_range), (7, 7));
     assert!(contents(&map).is_empty());
 }
@@ -344,7 +433,7 @@ fn options_that_cannot_be_are_refused() {
         ),
         (
             FreeSpaceOptions {
-                free_level: 4,
+                free_level: Some(4),
                 ..good
             },
             "free_level 4",

@@ -6,8 +6,7 @@ use std::{
 };
 
 use lattice_bag::{
-    BagDurability, BagMessage, BagQos, BagReader, BagReliability, BagWriter, ReadOptions, Storage,
-    TopicSpec, WriterOptions,
+    BagMessage, BagQos, BagReader, BagWriter, ReadOptions, Storage, TopicSpec, WriterOptions,
 };
 use lattice_test::python::{python, script};
 use serde_json::{Value, json};
@@ -49,7 +48,7 @@ fn described(reader: &BagReader) -> Value {
         .topics()
         .iter()
         .map(|t| {
-            let latched: Vec<bool> = t.offered_qos.iter().map(BagQos::is_latched).collect();
+            let latched: Vec<bool> = t.offered_qos.iter().map(|q| q.latched).collect();
             json!({"name": t.name, "type": t.type_name, "count": t.message_count, "latched": latched,
                    "depths": t.offered_qos.iter().map(|q| q.depth).collect::<Vec<_>>(),
                    "definition": hash(t.definition.as_deref().unwrap_or("").as_bytes())})
@@ -128,11 +127,11 @@ fn our_bags_open_in_rosbags() {
 fn write_bag(bag: &Path, storage: Storage) {
     let latched = BagQos {
         depth: 1,
-        durability: BagDurability::TransientLocal,
+        latched: true,
         ..BagQos::default()
     };
     let sensor = BagQos {
-        reliability: BagReliability::BestEffort,
+        reliable: false,
         ..BagQos::default()
     };
     let topics = [

@@ -2,6 +2,7 @@
 
 mod cell_counts;
 mod evaluate_kitti;
+mod free_space;
 mod house;
 mod printed_formulas;
 mod replay_kitti;

@@ -23,6 +23,7 @@ fn write(out: &Path, storage: Storage, seed: u64) -> BobcatSummary {
     let options = BobcatOptions {
         seed,
         duration_s: DURATION_S,
+        person: false,
         storage,
         out: out.to_owned(),
         overwrite: false,
@@ -281,6 +282,7 @@ fn an_earlier_log_is_replaced_only_when_allowed() {
         let options = BobcatOptions {
             seed: 2,
             duration_s: 1.5,
+            person: false,
             storage: Storage::Sqlite3,
             out: out.clone(),
             overwrite,
@@ -311,6 +313,7 @@ fn foreign_files_are_never_removed() {
     let options = BobcatOptions {
         seed: 2,
         duration_s: 1.0,
+        person: false,
         storage: Storage::Mcap,
         out: out.clone(),
         overwrite: true,

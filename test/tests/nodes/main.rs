@@ -1,6 +1,7 @@
 //! The state machines of the nodes, without I/O.
 
 mod enu_transformer;
+mod free_space;
 mod lattice_mapper;
 mod lattice_mapper_services;
 mod map_follower;

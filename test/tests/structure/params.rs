@@ -34,6 +34,7 @@ fn parameter_files_name_only_what_nodes_read() {
         MapperOptions::from_params(&params).unwrap();
         let shell = [
             "centers_period_s",
+            "free_period_s",
             "inbox_bytes",
             "inbox_events",
             "report_file",

@@ -151,7 +151,7 @@ fn a_free_running_clock_needs_and_takes_an_override() {
 }
 
 #[test]
-fn tai_is_told_from_utc_unless_insisted_on() {
+fn tai_is_distinguished_from_utc_unless_insisted_on() {
     let times = f64s(&[STAMP_S + 37.0, STAMP_S + 37.0625]);
     let stamp_ns = 1_700_000_000_000_000_000;
     match read("timestamp", F64, &times, stamp_ns, &TimeOptions::default()) {

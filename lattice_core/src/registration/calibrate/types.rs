@@ -15,7 +15,7 @@ pub struct HeadsetScan {
     pub sensor_m: Option<Point3<f64>>,
 }
 
-/// One calibration that is asked for.
+/// Request for a calibration.
 #[derive(Clone, Copy, Debug)]
 pub struct CalibrationRequest<'a> {
     /// Scans in one frame; each further one multiplies the likelihood.
@@ -210,7 +210,7 @@ impl Calibration {
 pub(super) enum Refusal {
     /// The input cannot be used, and why.
     Input(String),
-    /// It was ended from outside.
+    /// Ended from outside.
     Cancelled,
 }
 

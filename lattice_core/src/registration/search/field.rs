@@ -48,7 +48,7 @@ impl Facing {
 }
 
 impl Field {
-    /// Scores by how surfaces lie: most for the same orientation, some for any, half of it one cell off.
+    /// Scores by the direction of surfaces: most for the same orientation, some for any, half of it one cell off.
     pub fn of_surfaces(grid: Grid, points_m: &[Point3<f64>], normals: &[Vector3<f64>]) -> Field {
         let scores = |normal: &Vector3<f64>, channel: usize| -> u8 {
             let own = Facing::of(normal).channel(0.0);

@@ -1,6 +1,6 @@
 //! The further columns of a list as bytes: moments, stamps and labels.
 
-use super::read::Fault;
+use super::read::ColumnError;
 use crate::lattice::Lattice;
 use crate::voxels::codec::{Varints, push_varint, unzigzag, zigzag};
 use crate::voxels::store::fixed_point::moment_unit_m;
@@ -24,7 +24,7 @@ pub(super) fn decode_moments(
     voxels: &[Voxel],
     lattice: &Lattice,
     reach: u64,
-) -> Result<Vec<Moments>, Fault> {
+) -> Result<Vec<Moments>, ColumnError> {
     let reach = reach as f64 * OFFSET_UNIT_M / moment_unit_m(lattice) + 2.0;
     let limit_of_one = (reach * reach) as u128;
     let mut values = Varints::new(bytes);
@@ -39,7 +39,7 @@ pub(super) fn decode_moments(
         let [xx, _, _, yy, _, zz] = moments;
         if voxel.count < MAX_MOMENT_POINTS && (beyond || xx < 0 || yy < 0 || zz < 0) {
             let count = voxel.count;
-            return Err(values.fault(format!("no {count} points in a cell have {moments:?}")));
+            return Err(values.error(format!("no {count} points in a cell have {moments:?}")));
         }
         column.push(moments);
     }
@@ -62,7 +62,7 @@ pub(super) fn encode_stamps(columns: &Columns) -> Vec<u8> {
 }
 
 /// The inverse of [`encode_stamps`].
-pub(super) fn decode_stamps(bytes: &[u8], voxels: usize) -> Result<Vec<Stamps>, Fault> {
+pub(super) fn decode_stamps(bytes: &[u8], voxels: usize) -> Result<Vec<Stamps>, ColumnError> {
     let mut values = Varints::new(bytes);
     let mut column = Vec::with_capacity(voxels);
     let mut row = [0_i64; 2];
@@ -73,7 +73,7 @@ pub(super) fn decode_stamps(bytes: &[u8], voxels: usize) -> Result<Vec<Stamps>, 
         let [first_ns, last_ns] = row;
         let stamps = Stamps { first_ns, last_ns };
         if first_ns > last_ns && stamps != Stamps::NONE {
-            return Err(values.fault(format!("{first_ns} ns is after the last, {last_ns} ns")));
+            return Err(values.error(format!("{first_ns} ns is after the last, {last_ns} ns")));
         }
         column.push(stamps);
     }
@@ -95,7 +95,10 @@ pub(super) fn encode_labels(columns: &Columns) -> Vec<u8> {
 }
 
 /// The inverse of [`encode_labels`].
-pub(super) fn decode_labels(bytes: &[u8], voxels: usize) -> Result<Vec<Vec<LabelCount>>, Fault> {
+pub(super) fn decode_labels(
+    bytes: &[u8],
+    voxels: usize,
+) -> Result<Vec<Vec<LabelCount>>, ColumnError> {
     let mut values = Varints::new(bytes);
     let mut column = Vec::with_capacity(voxels);
     for _ in 0..voxels {
@@ -105,10 +108,10 @@ pub(super) fn decode_labels(bytes: &[u8], voxels: usize) -> Result<Vec<Vec<Label
         for _ in 0..len {
             let (label, count) = (expect(&mut values)?, expect(&mut values)?);
             let (Ok(label), Ok(count @ 1..)) = (u16::try_from(label), u32::try_from(count)) else {
-                return Err(values.fault(format!("label {label} of {count} points")));
+                return Err(values.error(format!("label {label} of {count} points")));
             };
             if labels.last().is_some_and(|last| last.label >= label) {
-                return Err(values.fault(format!("label {label} does not ascend")));
+                return Err(values.error(format!("label {label} does not ascend")));
             }
             labels.push(LabelCount { label, count });
         }
@@ -120,15 +123,15 @@ pub(super) fn decode_labels(bytes: &[u8], voxels: usize) -> Result<Vec<Vec<Label
 }
 
 /// The next value, which must be there.
-pub(super) fn expect(values: &mut Varints) -> Result<u64, Fault> {
+pub(super) fn expect(values: &mut Varints) -> Result<u64, ColumnError> {
     let value = values.next_value()?;
-    value.ok_or_else(|| values.fault("it has too few values".into()))
+    value.ok_or_else(|| values.error("it has too few values".into()))
 }
 
 /// Fails if there are more values.
-pub(super) fn expect_end(values: &mut Varints) -> Result<(), Fault> {
+pub(super) fn expect_end(values: &mut Varints) -> Result<(), ColumnError> {
     match values.next_value()? {
-        Some(_) => Err(values.fault("it has too many values".into())),
+        Some(_) => Err(values.error("it has too many values".into())),
         None => Ok(()),
     }
 }

@@ -160,8 +160,8 @@ impl MapContents {
 
     /// Says what is wrong with the statistics; keys and voxels are checked as they are read.
     pub(super) fn check(&self) -> Result<(), String> {
-        if let Some(fault) = self.sums.fault(&self.lattice) {
-            return Err(fault);
+        if let Some(reason) = self.sums.contradiction(&self.lattice) {
+            return Err(reason);
         }
         let counts = self.voxels.iter().flatten().map(|voxel| voxel.count);
         let counted = counts.fold(0, |sum: u64, count| sum.saturating_add(u64::from(count)));

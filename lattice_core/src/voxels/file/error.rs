@@ -15,7 +15,7 @@ pub enum FileError {
         /// Error of the system.
         source: io::Error,
     },
-    /// It is some other file.
+    /// Not a map file.
     #[error("not a map file: it starts with {:?} instead of \"LATTICE2\"", found.escape_ascii().to_string())]
     Magic {
         /// The first eight bytes.

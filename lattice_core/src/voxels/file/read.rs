@@ -93,51 +93,51 @@ impl MapContents {
     }
 
     /// The keys, which are the first column.
-    fn set_keys(&mut self, bytes: &[u8], voxels: u64) -> Result<(), Fault> {
+    fn set_keys(&mut self, bytes: &[u8], voxels: u64) -> Result<(), ColumnError> {
         let max = usize::try_from(voxels).unwrap_or(usize::MAX);
         self.keys = decode_keys(bytes, max)?;
         if self.keys.len() != max {
             let reason = format!("it has {} keys instead of {voxels}", self.keys.len());
             let offset = bytes.len();
-            return Err(Fault { offset, reason });
+            return Err(ColumnError { offset, reason });
         }
         Ok(())
     }
 
     /// The point counts, one for each key.
-    fn set_counts(&mut self, bytes: &[u8]) -> Result<(), Fault> {
+    fn set_counts(&mut self, bytes: &[u8]) -> Result<(), ColumnError> {
         let mut values = Varints::new(bytes);
         let mut voxels = Vec::with_capacity(self.keys.len());
         while let Some(count) = values.next_value()? {
             let Ok(count) = u32::try_from(count) else {
-                return Err(values.fault(format!("a voxel has {count} points")));
+                return Err(values.error(format!("a voxel has {count} points")));
             };
             voxels.push(Voxel { count, sum: [0; 3] });
         }
         if voxels.len() != self.keys.len() {
-            return Err(values.fault(format!("it has {} values", voxels.len())));
+            return Err(values.error(format!("it has {} values", voxels.len())));
         }
         self.voxels = Some(voxels);
         Ok(())
     }
 
     /// The offset sums, three for each key.
-    fn set_sums(&mut self, bytes: &[u8]) -> Result<(), Fault> {
+    fn set_sums(&mut self, bytes: &[u8]) -> Result<(), ColumnError> {
         let mut values = Varints::new(bytes);
         let reach = reach(&self.lattice);
         for voxel in self.voxels.iter_mut().flatten() {
             for sum in &mut voxel.sum {
                 *sum = unzigzag(expect(&mut values)?);
             }
-            if let Some(fault) = voxel.fault(reach) {
-                return Err(values.fault(fault));
+            if let Some(reason) = voxel.contradiction(reach) {
+                return Err(values.error(reason));
             }
         }
         expect_end(&mut values)
     }
 
     /// A column behind the payload.
-    fn set_further(&mut self, column: &Column, bytes: &[u8]) -> Result<(), Fault> {
+    fn set_further(&mut self, column: &Column, bytes: &[u8]) -> Result<(), ColumnError> {
         let voxels = self.voxels.as_deref().unwrap_or_default();
         let (reach, len) = (reach(&self.lattice), voxels.len());
         match *column {
@@ -153,13 +153,13 @@ impl MapContents {
 }
 
 /// Error in the values of a column, with the byte behind it.
-pub(super) struct Fault {
+pub(super) struct ColumnError {
     offset: usize,
     reason: String,
 }
 
-impl From<CodecError> for Fault {
-    fn from(error: CodecError) -> Fault {
+impl From<CodecError> for ColumnError {
+    fn from(error: CodecError) -> ColumnError {
         let (CodecError::Truncated { position: offset }
         | CodecError::Varint { position: offset }
         | CodecError::Key {
@@ -167,7 +167,7 @@ impl From<CodecError> for Fault {
         }) = error
         else {
             let (offset, reason) = (0, "it has too many values".to_owned());
-            return Fault { offset, reason };
+            return ColumnError { offset, reason };
         };
         let reason = match error {
             CodecError::Truncated { .. } => "it ends within a number".to_owned(),
@@ -176,14 +176,14 @@ impl From<CodecError> for Fault {
             }
             _ => "a number is not a shortest 64-bit varint".to_owned(),
         };
-        Fault { offset, reason }
+        ColumnError { offset, reason }
     }
 }
 
 impl Varints<'_> {
-    /// A fault at the place of the next value.
-    pub(super) fn fault(&self, reason: String) -> Fault {
-        Fault {
+    /// An error at the place of the next value.
+    pub(super) fn error(&self, reason: String) -> ColumnError {
+        ColumnError {
             offset: self.position(),
             reason,
         }
@@ -242,7 +242,7 @@ impl<R: Read> Source<R> {
             OFFSET_SUM => contents.set_sums(&bytes),
             _ => contents.set_further(column, &bytes),
         };
-        done.map_err(|Fault { offset, reason }| {
+        done.map_err(|ColumnError { offset, reason }| {
             let (place, unpacked) = if packed {
                 (start, format!(", unpacked byte {offset}"))
             } else {

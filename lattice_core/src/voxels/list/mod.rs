@@ -280,8 +280,8 @@ impl VoxelList {
             shard.validate()?;
             for (code, entry) in shard.iter() {
                 let voxel = shard.voxel(code, entry);
-                if let Some(fault) = voxel.fault(reach) {
-                    return Err(format!("voxel {:?}: {fault}", code.unpack()));
+                if let Some(reason) = voxel.contradiction(reach) {
+                    return Err(format!("voxel {:?}: {reason}", code.unpack()));
                 }
                 if entry.life.touched > self.sequence {
                     return Err(format!("voxel {:?} is of a later state", code.unpack()));
@@ -289,8 +289,8 @@ impl VoxelList {
                 counted = counted.saturating_add(voxel.count.into());
             }
         }
-        if let Some(fault) = self.sums.fault(&self.lattice) {
-            return Err(fault);
+        if let Some(reason) = self.sums.contradiction(&self.lattice) {
+            return Err(reason);
         }
         if counted > self.sums.points {
             return Err(format!(

@@ -160,7 +160,7 @@ fn the_datum_is_part_of_the_lattice_of_the_map_frame() {
 }
 
 #[test]
-fn changes_are_told_once() {
+fn changes_are_taken_once() {
     let mut map = list(LatticeKind::Cubic, [0.0; 3], 10);
     map.insert(&cloud([0.0; 3], &[[0.5, 0.0, 0.0], [0.0; 3], [0.0; 3]]));
     let both = vec![key([0; 3]), key([1, 0, 0])];
@@ -184,7 +184,7 @@ fn changes_are_told_once() {
 }
 
 #[test]
-fn clearing_removes_what_was_told_and_only_that() {
+fn clearing_removes_what_was_taken_and_only_that() {
     let mut map = list(LatticeKind::Cubic, [0.0; 3], 10);
     map.insert(&cloud([0.0; 3], &[[0.5, 0.0, 0.0], [0.0; 3]]));
     map.take_changes();

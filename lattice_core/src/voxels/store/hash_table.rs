@@ -45,9 +45,9 @@ pub(crate) struct Table<R> {
 /// Number of a code's row.
 #[derive(Clone, Copy, PartialEq, Eq, Debug)]
 pub(crate) enum Place {
-    /// It was there.
+    /// A row that was there.
     Known(u32),
-    /// It has just been added, with the next number.
+    /// A row just added, with the next number.
     New(u32),
 }
 

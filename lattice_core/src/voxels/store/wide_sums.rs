@@ -3,7 +3,7 @@
 use super::fixed_point::Offsets;
 use super::growth;
 
-/// No row.
+/// Number of no row.
 const NONE: u32 = u32::MAX;
 
 /// Sums with numbers of their own, which are used again.

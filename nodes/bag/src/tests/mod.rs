@@ -14,18 +14,13 @@ const SECOND_NS: i64 = 1_000_000_000;
 const T0_NS: i64 = 1_700_000_000 * SECOND_NS;
 
 pub(super) fn spec(name: &str, latched: bool) -> TopicSpec {
-    let durability = if latched {
-        BagDurability::TransientLocal
-    } else {
-        BagDurability::Volatile
-    };
     TopicSpec {
         name: name.into(),
         type_name: "std_msgs/msg/String".into(),
         definition: Some("string data\n".into()),
         offered_qos: vec![BagQos {
             depth: 1,
-            durability,
+            latched,
             ..BagQos::default()
         }],
     }

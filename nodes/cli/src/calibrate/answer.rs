@@ -141,7 +141,7 @@ impl Answer {
     }
 
     /// The reason not to use the pose, if there is one.
-    pub fn fault(&self) -> Option<String> {
+    pub fn refusal(&self) -> Option<String> {
         match (self.verdict, self.converged) {
             (Some("OK"), _) | (None, Some(true)) => None,
             (Some(verdict), _) => Some(format!("{verdict}: {}", self.reason)),

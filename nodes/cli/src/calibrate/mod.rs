@@ -136,9 +136,9 @@ impl Calibrate {
         } else {
             print!("{answer}");
         }
-        match answer.fault() {
+        match answer.refusal() {
             None => Ok(()),
-            Some(fault) => Err(fault.into()),
+            Some(reason) => Err(reason.into()),
         }
     }
 
@@ -162,7 +162,7 @@ impl Calibrate {
         headset_scans: &[lattice_core::registration::HeadsetScan],
         names: &BTreeMap<u16, String>,
         times: &mut Times,
-    ) -> Result<Answer, Box<dyn std::error::Error + Send + Sync>> {
+    ) -> CliResult<Answer> {
         let known = match &self.confusion {
             Some(path) => input::confusion(path)?,
             None => None,

@@ -8,7 +8,7 @@ use lattice_core::lattice::{Lattice, LatticeKind};
 use super::choice;
 use crate::{CliResult, init_logging};
 use lattice_lab::bench::{
-    self, FileMethod, InsertOptions, NeighborMethod, QuantizeMethod, Report, Store,
+    self, FileMethod, InsertOptions, NeighborMethod, QuantizeMethod, RaycastMethod, Report, Store,
 };
 
 /// Measure operations on a raw point file (f32 `x y z i`; see `lattice simulate site`)
@@ -94,6 +94,9 @@ pub struct Neighbors {
 pub struct Raycast {
     #[command(flatten)]
     common: Common,
+    /// Use of the rays
+    #[arg(long, value_parser = choice(&RAYCASTS), default_value = "map")]
+    method: RaycastMethod,
 }
 
 /// Options of `lattice bench file`.
@@ -120,6 +123,25 @@ const FILES: [(&str, &str, FileMethod); 2] = [
         "load",
         "From the bytes of a file to a store",
         FileMethod::Load,
+    ),
+];
+
+/// Values of `--method` of `lattice bench raycast`.
+const RAYCASTS: [(&str, &str, RaycastMethod); 3] = [
+    (
+        "map",
+        "Log-odds of all cells, free ones too",
+        RaycastMethod::Map,
+    ),
+    (
+        "clear",
+        "Voxels, without those that rays pass through: `free_space: clear` of the mapper",
+        RaycastMethod::Clear,
+    ),
+    (
+        "evidence",
+        "Voxels, without those that are free by the log-odds: `free_space: evidence`",
+        RaycastMethod::Evidence,
     ),
 ];
 
@@ -197,9 +219,7 @@ impl Quantize {
         let points = self.common.points()?;
         let method = self.method;
         let cell = self.common.cell;
-        let report = self
-            .common
-            .pool()?
+        let report = lattice_lab::pool(self.common.threads)?
             .install(|| bench::quantize(method, &lattice, cell, &points));
         self.common.print(&report)
     }
@@ -214,9 +234,7 @@ impl Insert {
             false => None,
         };
         let options = self.common.insert_options(self.store);
-        let (report, _) = self
-            .common
-            .pool()?
+        let (report, _) = lattice_lab::pool(self.common.threads)?
             .install(|| bench::insert(options, &lattice, points, scans.as_deref()))?;
         self.common.print(&report)
     }
@@ -229,7 +247,7 @@ impl Neighbors {
         let options = self.common.insert_options(self.store);
         let method = self.method;
         let (name, cell) = (self.store.name(), self.common.cell);
-        let report = self.common.pool()?.install(|| {
+        let report = lattice_lab::pool(self.common.threads)?.install(|| {
             let (_, store) = bench::insert(options, &lattice, points, None)?;
             Ok::<_, lattice_core::voxels::DatumError>(bench::neighbors(
                 method,
@@ -249,10 +267,8 @@ impl Raycast {
         let points = self.common.points()?;
         let scans = bench::read_scans(&self.common.points, points.len())?;
         let cell = self.common.cell;
-        let report = self
-            .common
-            .pool()?
-            .install(|| bench::raycast(&lattice, cell, points, &scans))?;
+        let report = lattice_lab::pool(self.common.threads)?
+            .install(|| bench::raycast(self.method, &lattice, cell, points, &scans))?;
         self.common.print(&report)
     }
 }
@@ -266,7 +282,7 @@ impl MapFile {
             self.common.insert_options(Store::Occupancy),
             self.common.cell,
         );
-        let report = self.common.pool()?.install(|| {
+        let report = lattice_lab::pool(self.common.threads)?.install(|| {
             let (_, store) = bench::insert(options, &lattice, points, None)?;
             bench::file(method, store.as_ref(), self.zstd, cell)
         })?;
@@ -281,11 +297,6 @@ impl Common {
 
     fn points(&self) -> Result<Vec<[f32; 3]>, lattice_lab::AnyError> {
         bench::read_points(&self.points, self.max_points)
-    }
-
-    fn pool(&self) -> Result<rayon::ThreadPool, rayon::ThreadPoolBuildError> {
-        let threads = self.threads.max(1);
-        rayon::ThreadPoolBuilder::new().num_threads(threads).build()
     }
 
     fn insert_options(&self, store: Store) -> InsertOptions {

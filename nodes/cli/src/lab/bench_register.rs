@@ -69,10 +69,9 @@ impl Register {
             target_from_source: Isometry3::identity(),
             rounds: self.rounds,
         };
-        let threads = rayon::ThreadPoolBuilder::new().num_threads(self.threads.max(1));
-        let report = threads
-            .build()?
-            .install(|| bench::register(self.method.option, &source, &target, &setup))?;
+        let pool = lattice_lab::pool(self.threads)?;
+        let report =
+            pool.install(|| bench::register(self.method.option, &source, &target, &setup))?;
         if self.json {
             println!("{}", serde_json::to_string(&report)?);
             return Ok(());

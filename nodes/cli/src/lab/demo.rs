@@ -50,6 +50,7 @@ impl Demo {
         let summary = simulate::bobcat(&BobcatOptions {
             seed: self.seed,
             duration_s: self.duration,
+            person: false,
             storage: Storage::Mcap,
             out: bag.clone(),
             overwrite: true,

@@ -44,8 +44,7 @@ pub struct Kitti {
 impl Kitti {
     /// Runs the command.
     pub fn run(self) -> CliResult {
-        let threads = rayon::ThreadPoolBuilder::new().num_threads(self.threads.max(1));
-        let report = threads.build()?.install(|| self.measure())?;
+        let report = lattice_lab::pool(self.threads)?.install(|| self.measure())?;
         let json = serde_json::to_string_pretty(&report)?;
         let table = kitti_report(&report);
         lattice_lab::report::write(&table, &self.out)?;

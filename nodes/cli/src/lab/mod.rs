@@ -8,6 +8,7 @@ mod evaluate_kitti;
 mod paper;
 mod simulate;
 
+use std::fmt::Display;
 use std::fs::File;
 use std::io::BufWriter;
 use std::path::Path;
@@ -16,6 +17,7 @@ use clap::Subcommand;
 use clap::builder::{PossibleValue, PossibleValuesParser, TypedValueParser};
 use lattice_core::voxels::VoxelList;
 use lattice_lab::render::{RenderOptions, render_png};
+use serde::Serialize;
 
 use crate::CliResult;
 
@@ -70,6 +72,15 @@ fn choice<T: Clone + Send + Sync + 'static>(
             .map(|(_, _, value)| value.clone())
             .ok_or("no such choice")
     })
+}
+
+/// Prints a summary, as JSON if that is asked for.
+fn show(json: bool, summary: &(impl Serialize + Display)) -> CliResult {
+    match json {
+        true => println!("{}", serde_json::to_string_pretty(summary)?),
+        false => println!("{summary}"),
+    }
+    Ok(())
 }
 
 /// Number of processors.

@@ -8,7 +8,7 @@ use clap::{Args, Subcommand};
 
 use lattice_lab::simulate::SurveyPattern;
 
-use super::choice;
+use super::{choice, show};
 use crate::progress::Progress;
 use crate::{CliResult, init_logging};
 use lattice_bag::Storage;
@@ -59,6 +59,9 @@ pub struct Bobcat {
     /// Length of the log in s
     #[arg(long, default_value_t = 30.0)]
     duration: f64,
+    /// Let a person walk through the yard in the first 15 s
+    #[arg(long)]
+    person: bool,
     /// Container of the messages
     #[arg(long, value_parser = choice(&STORAGES), default_value = "mcap")]
     storage: Storage,
@@ -113,12 +116,7 @@ impl Site {
         };
         let summary = write_site(&options, &mut |done| progress.set(done))?;
         progress.done();
-        if self.json {
-            println!("{}", serde_json::to_string_pretty(&summary)?);
-        } else {
-            println!("{summary}");
-        }
-        Ok(())
+        show(self.json, &summary)
     }
 }
 
@@ -127,16 +125,12 @@ impl Bobcat {
         let summary = bobcat(&BobcatOptions {
             seed: self.seed,
             duration_s: self.duration,
+            person: self.person,
             storage: self.storage,
             out: self.out,
             overwrite: self.overwrite,
         })?;
-        if self.json {
-            println!("{}", serde_json::to_string_pretty(&summary)?);
-        } else {
-            println!("{summary}");
-        }
-        Ok(())
+        show(self.json, &summary)
     }
 }
 

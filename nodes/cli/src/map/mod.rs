@@ -48,7 +48,7 @@ impl Map {
 }
 
 /// Reads a map, and the bytes of its file, which bound the voxels.
-pub fn read(path: &Path) -> Result<(MapContents, u64), Box<dyn std::error::Error + Send + Sync>> {
+pub fn read(path: &Path) -> CliResult<(MapContents, u64)> {
     let here = |e: &dyn std::fmt::Display| format!("{}: {e}", path.display());
     let file = File::open(path).map_err(|e| here(&e))?;
     let bytes = file.metadata().map_err(|e| here(&e))?.len();

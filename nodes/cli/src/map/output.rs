@@ -1,6 +1,5 @@
 //! Map files that commands write.
 
-use std::error::Error;
 use std::fs::{self, File};
 use std::io::{BufWriter, Write};
 use std::path::Path;
@@ -8,6 +7,8 @@ use std::path::Path;
 use clap::Args;
 use lattice_core::voxels::file::{MapContents, WriteOptions};
 use serde::Serialize;
+
+use crate::CliResult;
 
 /// The form of a map file.
 #[derive(Args)]
@@ -34,11 +35,7 @@ pub struct Written {
 
 impl Form {
     /// Writes a map; readers see the whole file or the one before.
-    pub fn write(
-        &self,
-        map: &MapContents,
-        out: &Path,
-    ) -> Result<Written, Box<dyn Error + Send + Sync>> {
+    pub fn write(&self, map: &MapContents, out: &Path) -> CliResult<Written> {
         let options = WriteOptions {
             zstd_level: self.zstd,
             occupancy_only: self.occupancy_only,
@@ -49,7 +46,7 @@ impl Form {
         let mut partial = out.as_os_str().to_owned();
         partial.push(".partial");
         let path = if whole { Path::new(&partial) } else { out };
-        let write = || -> Result<u64, Box<dyn Error + Send + Sync>> {
+        let write = || -> CliResult<u64> {
             let mut file = Counted {
                 writer: BufWriter::new(File::create(path)?),
                 bytes: 0,

@@ -86,10 +86,7 @@ impl Query {
         Ok(())
     }
 
-    fn answer(
-        &self,
-        questions: &Questions<impl VoxelStore>,
-    ) -> Result<Answer, Box<dyn std::error::Error + Send + Sync>> {
+    fn answer(&self, questions: &Questions<impl VoxelStore>) -> CliResult<Answer> {
         let cell = |key: MortonKey, distance_m| Cell {
             key: key.raw(),
             center_m: questions.store().center_m(key).into(),

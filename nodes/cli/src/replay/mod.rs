@@ -9,7 +9,7 @@ use std::path::PathBuf;
 
 use clap::Args;
 use lattice_core::lattice::{Lattice, Orientation};
-use lattice_core::voxels::file::write_map;
+use lattice_core::voxels::file::WriteOptions;
 
 use super::progress::Progress;
 use super::{CliResult, Lattices, init_logging};
@@ -89,7 +89,7 @@ impl Replay {
     }
 
     /// Runs the replay and returns its report.
-    pub fn replay(&self) -> Result<RunReport, Box<dyn std::error::Error + Send + Sync>> {
+    pub fn replay(&self) -> CliResult<RunReport> {
         if self.direct {
             return self.replay_direct();
         }
@@ -133,7 +133,7 @@ impl Replay {
         Ok(report)
     }
 
-    fn replay_direct(&self) -> Result<RunReport, Box<dyn std::error::Error + Send + Sync>> {
+    fn replay_direct(&self) -> CliResult<RunReport> {
         let bag = BagReader::open(&self.bag)?;
         let plan = replay::plan(&bag, &self.wishes()?)?;
         let mut transformer = TransformerOptions::from_params(&self.params_of("enu_transformer")?)?;
@@ -169,13 +169,15 @@ impl Replay {
                 path.as_mut_os_string().push(ending);
             }
             let file = File::create(&path).map_err(|e| format!("{}: {e}", path.display()))?;
-            write_map(mapper.list(), BufWriter::new(file))?;
+            mapper
+                .contents()
+                .write(BufWriter::new(file), &WriteOptions::default())?;
         }
         Ok(())
     }
 
     /// Options of one mapper for each lattice.
-    fn maps(&self) -> Result<Vec<MapperOptions>, Box<dyn std::error::Error + Send + Sync>> {
+    fn maps(&self) -> CliResult<Vec<MapperOptions>> {
         let params = self.params_of("lattice_mapper")?;
         let given = MapperOptions::from_params(&params)?;
         let orientation = match self.orientation {
@@ -196,7 +198,7 @@ impl Replay {
         kinds.into_iter().map(map).collect()
     }
 
-    fn wishes(&self) -> Result<TopicWishes, Box<dyn std::error::Error + Send + Sync>> {
+    fn wishes(&self) -> CliResult<TopicWishes> {
         let params = self.params_of("enu_transformer")?;
         let mut points = self.points.clone();
         if points.is_empty() {
@@ -222,7 +224,7 @@ impl Replay {
         })
     }
 
-    fn params_of(&self, node: &str) -> Result<Params, Box<dyn std::error::Error + Send + Sync>> {
+    fn params_of(&self, node: &str) -> CliResult<Params> {
         let mut arguments = vec!["--ros-args".to_owned()];
         for file in &self.params {
             arguments.extend(["--params-file".to_owned(), file.display().to_string()]);

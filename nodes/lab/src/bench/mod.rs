@@ -21,7 +21,7 @@ pub use insert::{InsertOptions, Store, insert};
 pub use neighbors::{NeighborMethod, neighbors};
 pub use points::{ScanRecord, read_points, read_scans, scans_path};
 pub use quantize::{QuantizeMethod, quantize};
-pub use raycast::raycast;
+pub use raycast::{RaycastMethod, raycast};
 pub use register::{RegisterReport, RegisterSetup, RegisterTimes, register};
 pub use report::Report;
 pub use site::{SiteOptions, SiteSummary, write_site};

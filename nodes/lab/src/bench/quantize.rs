@@ -117,10 +117,7 @@ mod tests {
             .map(|i| [0.01 * i as f32, 0.3 - 0.007 * i as f32, 2.0])
             .collect();
         let hash = |threads, method, points: &[[f32; 3]]| {
-            let pool = rayon::ThreadPoolBuilder::new()
-                .num_threads(threads)
-                .build()
-                .unwrap();
+            let pool = crate::pool(threads).unwrap();
             pool.install(|| quantize(method, &lattice, 0.1, points).hash)
         };
         let one = hash(1, QuantizeMethod::Scalar, &points);

@@ -1,7 +1,11 @@
 //! Free space along the rays of scans.
 
+use lattice_core::cloud::Cloud;
 use lattice_core::lattice::Lattice;
-use lattice_core::raycast::{FreeSpaceError, FreeSpaceMap, FreeSpaceOptions};
+use lattice_core::raycast::{
+    ClearOptions, FreeSpaceError, FreeSpaceMap, FreeSpaceOptions, RayBundle, RayClearer,
+};
+use lattice_core::voxels::{OccupancyList, VoxelStore};
 use nalgebra::Vector3;
 
 use super::insert::clouds;
@@ -11,26 +15,75 @@ use super::{Report, timed};
 /// Most memory of a map, bytes: more than any benchmark makes.
 const MAX_BYTES: usize = 1 << 40;
 
+/// Use of the rays.
+#[derive(Clone, Copy, PartialEq, Eq, Debug)]
+pub enum RaycastMethod {
+    /// Log-odds of all cells, free ones too.
+    Map,
+    /// A store of voxels, from which those that rays pass through are removed.
+    Clear,
+    /// A store of voxels, from which those that are free by the log-odds are removed.
+    Evidence,
+}
+
 /// Inserts all scans without a range limit; only the insertions are timed.
 ///
-/// The report counts occupied voxels, and as `count` all known cells.
+/// The report counts occupied voxels, and as `count` all known cells, or the voxels removed.
 pub fn raycast(
+    method: RaycastMethod,
     lattice: &Lattice,
     res_m: f64,
     points_m: Vec<[f32; 3]>,
     scans: &[ScanRecord],
 ) -> Result<Report, FreeSpaceError> {
-    let n = points_m.len();
+    let n = points_m.len() as u64;
     let clouds = clouds(points_m, Some(scans));
+    let bundles = scans.iter().zip(&clouds).map(|(scan, ends)| RayBundle {
+        origin_m: scan.origin_m,
+        ends,
+    });
+    let report = match method {
+        RaycastMethod::Map => map(lattice, res_m, bundles)?,
+        RaycastMethod::Clear => {
+            let options = ClearOptions {
+                max_bytes: MAX_BYTES,
+                ..ClearOptions::default()
+            };
+            let mut clearer = RayClearer::new(lattice, options);
+            let clear = |store: &mut OccupancyList, scan: &[RayBundle]| {
+                clearer.clear(store, scan).removed.len()
+            };
+            store("lattice-clear", lattice, res_m, bundles, clear)?
+        }
+        RaycastMethod::Evidence => {
+            let options = FreeSpaceOptions {
+                free_level: None,
+                max_bytes: MAX_BYTES,
+                ..FreeSpaceOptions::default()
+            };
+            let mut map = FreeSpaceMap::new(lattice.clone(), Vector3::zeros(), options)?;
+            let clear = |store: &mut OccupancyList, scan: &[RayBundle]| {
+                map.clear(store, scan).removed.len()
+            };
+            store("lattice-evidence", lattice, res_m, bundles, clear)?
+        }
+    };
+    Ok(Report { n, ..report })
+}
+
+fn map<'a>(
+    lattice: &Lattice,
+    res_m: f64,
+    bundles: impl Iterator<Item = RayBundle<'a>>,
+) -> Result<Report, FreeSpaceError> {
     let options = FreeSpaceOptions {
         max_bytes: MAX_BYTES,
         ..FreeSpaceOptions::default()
     };
     let mut map = FreeSpaceMap::new(lattice.clone(), Vector3::zeros(), options)?;
     let (refused, spent) = timed(|| {
-        let pairs = scans.iter().zip(&clouds);
-        let refused = pairs.map(|(scan, cloud)| {
-            let report = map.insert_scan(scan.origin_m, cloud);
+        let refused = bundles.map(|bundle| {
+            let report = map.insert_scan(&[bundle]);
             report.out_of_range + report.not_finite + report.blocks_refused
         });
         refused.sum::<u64>()
@@ -38,10 +91,32 @@ pub fn raycast(
     debug_assert_eq!(refused, 0);
     let counts = map.counts();
     let mut report = Report::new("lattice-free-space", lattice.kind().name(), res_m, spent);
-    report.n = n as u64;
     report.voxels = counts.occupied;
     report.bytes = map.bytes() as u64;
     report.count = Some(counts.occupied + counts.free);
+    Ok(report)
+}
+
+fn store<'a>(
+    name: &str,
+    lattice: &Lattice,
+    res_m: f64,
+    bundles: impl Iterator<Item = RayBundle<'a>>,
+    mut clear: impl FnMut(&mut OccupancyList, &[RayBundle]) -> usize,
+) -> Result<Report, FreeSpaceError> {
+    let mut store = OccupancyList::new(lattice.clone(), Vector3::zeros(), MAX_BYTES)?;
+    let (removed, spent) = timed(|| {
+        let removed = bundles.map(|bundle| {
+            let ends: &Cloud = bundle.ends;
+            store.insert(ends);
+            clear(&mut store, &[bundle])
+        });
+        removed.sum::<usize>()
+    });
+    let mut report = Report::new(name, lattice.kind().name(), res_m, spent);
+    report.voxels = store.len() as u64;
+    report.bytes = store.bytes() as u64;
+    report.count = Some(removed as u64);
     Ok(report)
 }
 
@@ -57,7 +132,16 @@ mod tests {
             origin_m: Vector3::zeros(),
             points: 1,
         };
-        let report = raycast(&lattice, 1.0, vec![[10.0, 0.1, 0.1]], &[scan]).unwrap();
-        assert_eq!((report.n, report.voxels, report.count), (1, 1, Some(11)));
+        let points = vec![[5.0, 0.1, 0.1], [10.0, 0.1, 0.1]];
+        let run = |method| {
+            let scans = [scan, scan];
+            raycast(method, &lattice, 1.0, points.clone(), &scans).unwrap()
+        };
+        let map = run(RaycastMethod::Map);
+        assert_eq!((map.n, map.voxels, map.count), (2, 2, Some(11)));
+        let clear = run(RaycastMethod::Clear);
+        assert_eq!((clear.n, clear.voxels, clear.count), (2, 1, Some(1)));
+        let evidence = run(RaycastMethod::Evidence);
+        assert_eq!((evidence.voxels, evidence.count), (2, Some(0)));
     }
 }

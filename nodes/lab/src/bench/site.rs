@@ -124,10 +124,7 @@ mod tests {
             points: 40_000,
             out: out.clone(),
         };
-        let pool = rayon::ThreadPoolBuilder::new()
-            .num_threads(threads)
-            .build()
-            .unwrap();
+        let pool = crate::pool(threads).unwrap();
         let summary = pool.install(|| write_site(&options, &mut |_| ())).unwrap();
         assert_eq!(summary.points, 40_000);
         (fs::read(&out).unwrap(), fs::read(scans_path(&out)).unwrap())

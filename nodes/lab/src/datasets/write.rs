@@ -17,7 +17,7 @@ use serde::Serialize;
 use super::facts::{INSPVAX_TOPIC, ODOMETRY_TOPIC, TF_STATIC_TOPIC, TF_TOPIC, points_topic};
 use super::log::{Block, Log};
 use super::truth::{self, Truth};
-use lattice_bag::{BagDurability, BagQos, BagWriter, Storage, TopicSpec, WriterOptions};
+use lattice_bag::{BagQos, BagWriter, Storage, TopicSpec, WriterOptions};
 
 /// Options of a simulated log.
 #[derive(Clone, Debug)]
@@ -26,6 +26,8 @@ pub struct BobcatOptions {
     pub seed: u64,
     /// Length of the log, s.
     pub duration_s: f64,
+    /// Whether a person walks through the yard.
+    pub person: bool,
     /// Storage of the bag.
     pub storage: Storage,
     /// Directory of the bag.
@@ -72,7 +74,7 @@ pub fn write_bobcat(
     options: &BobcatOptions,
     progress: &mut dyn FnMut(f64),
 ) -> Result<BobcatSummary, AnyError> {
-    let bobcat = Bobcat::new(options.seed, options.duration_s)?;
+    let bobcat = Bobcat::new(options.seed, options.duration_s)?.with_person(options.person);
     make_way(&options.out, options.overwrite)?;
     let writer = WriterOptions {
         overwrite: options.overwrite,
@@ -141,7 +143,7 @@ fn topic_specs() -> Vec<TopicSpec> {
     specs.push(spec::<Odometry>(ODOMETRY_TOPIC, reliable(100)));
     specs.push(spec::<TFMessage>(TF_TOPIC, reliable(100)));
     let latched = BagQos {
-        durability: BagDurability::TransientLocal,
+        latched: true,
         ..reliable(1)
     };
     specs.push(spec::<TFMessage>(TF_STATIC_TOPIC, latched));

@@ -16,7 +16,7 @@ use super::results::{Results, name};
 use super::settings::{Cell, Plan, Start};
 use super::testbed::{Scenario, Testbed, View};
 use super::trial::{OURS, TIMED, TRACKED, Trial, rounded};
-use crate::AnyError;
+use crate::{AnyError, pool};
 
 /// Number of the seeds of starts.
 const START: u64 = 4;
@@ -156,11 +156,6 @@ fn work(
         }
     }
     Ok(())
-}
-
-fn pool(threads: usize) -> Result<rayon::ThreadPool, AnyError> {
-    let pool = rayon::ThreadPoolBuilder::new().num_threads(threads.max(1));
-    Ok(pool.build()?)
 }
 
 /// The jobs of a plan that are not done; `timed` for those that are measured alone.

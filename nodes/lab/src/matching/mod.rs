@@ -17,5 +17,5 @@ mod tests;
 pub use align::{Alignment, align, refine};
 pub use levels::MultiResolutionList;
 pub use options::{AlignOptions, SearchOptions, Spread};
-pub use sample::{MAX_POINTS, sample};
+use sample::{MAX_POINTS, sample};
 pub use search::search;

@@ -156,11 +156,7 @@ fn a_search_needs_no_guess_of_place_and_heading() {
 #[test]
 fn the_answer_is_the_same_on_any_number_of_threads() {
     let on = |threads: usize| {
-        let pool = rayon::ThreadPoolBuilder::new()
-            .num_threads(threads)
-            .build()
-            .unwrap();
-        pool.install(|| {
+        crate::pool(threads).unwrap().install(|| {
             let map = list(LatticeKind::Bcc, 0.1, 3, &room(20_000, 5));
             let scan = seen_from(&viewpoint(), &room(20_000, 6));
             let start = Isometry3::new(Vector3::new(2.5, 1.8, 1.2), Vector3::new(0.0, 0.0, 0.55));

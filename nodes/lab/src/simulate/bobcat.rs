@@ -7,9 +7,10 @@ use rayon::prelude::*;
 use thiserror::Error;
 
 use super::ins::InsSamples;
-use super::lms200::{self, Lms200Scan, SCAN_RATE_HZ, SCAN_SPAN_NS};
+use super::lms200::{self, Lms200Scan, MAX_RANGE_M, SCAN_RATE_HZ, SCAN_SPAN_NS};
 use super::loader::Loader;
 use super::obstacles::Block;
+use super::person::Person;
 use super::random::{Purpose, Stream};
 use super::site::Site;
 
@@ -108,6 +109,7 @@ pub struct Bobcat {
     site: Site,
     loader: Loader,
     body: [Block; 2],
+    person: bool,
 }
 
 impl Bobcat {
@@ -129,7 +131,13 @@ impl Bobcat {
                 block(0.0, [0.2, 1.2], 2.3, 1.6),
                 block(-0.1, [1.2, 2.05], 1.2, 1.0),
             ],
+            person: false,
         })
+    }
+
+    /// With a [`Person`] who walks through the yard; all else is the same.
+    pub fn with_person(self, person: bool) -> Self {
+        Self { person, ..self }
     }
 
     /// Seed of the noise.
@@ -200,8 +208,15 @@ impl Bobcat {
         };
         let map_from_laser =
             |time_ns: i64| self.map_from_base(time_ns) * self.base_from_laser(laser, time_ns);
+        let cast = |time_ns: i64, origin: &Vector3<f64>, direction: &Vector3<f64>| {
+            let hit = self.site.cast(origin, direction, MAX_RANGE_M);
+            match self.person {
+                true => Person::before(hit, time_ns as f64 * 1e-9, origin, direction),
+                false => hit,
+            }
+        };
         lms200::scan(
-            &self.site,
+            cast,
             self.scan_start_ns(laser, index),
             &mut noise,
             map_from_laser,

@@ -3,7 +3,7 @@
 use nalgebra::{Isometry3, Vector3};
 
 use super::random::Stream;
-use super::site::Site;
+use super::site::Hit;
 
 /// Beams of a scan, from -90 to +90 degrees about the scanner's z axis.
 pub const BEAMS: u16 = 181;
@@ -55,10 +55,10 @@ fn beam_direction(beam: u16) -> Vector3<f64> {
     Vector3::new(cos, sin, 0.0)
 }
 
-/// Measures one scan. `map_from_laser` gives the scanner's pose at a time (ns); `own_body_m` gives the distance
+/// Measures one scan. `cast` gives the first surface on a ray at a time (ns), `map_from_laser` gives the scanner's pose at a time (ns); `own_body_m` gives the distance
 /// at which a beam meets the carrying machine, whose returns the driver removes.
 pub(super) fn scan(
-    site: &Site,
+    cast: impl Fn(i64, &Vector3<f64>, &Vector3<f64>) -> Option<Hit>,
     start_ns: i64,
     noise: &mut Stream,
     map_from_laser: impl Fn(i64) -> Isometry3<f64>,
@@ -73,7 +73,7 @@ pub(super) fn scan(
         let in_laser = beam_direction(beam);
         let pose = map_from_laser(time_ns);
         let (origin, direction) = (pose.translation.vector, pose.rotation * in_laser);
-        let Some(hit) = site.cast(&origin, &direction, MAX_RANGE_M) else {
+        let Some(hit) = cast(time_ns, &origin, &direction) else {
             continue;
         };
         let measured_m = hit.range_m + error_m;

@@ -20,6 +20,7 @@ mod lms200;
 mod loader;
 mod mission;
 mod obstacles;
+mod person;
 mod profile;
 mod random;
 mod site;
@@ -42,5 +43,6 @@ pub use lms200::{
 };
 pub use loader::Loader;
 pub use obstacles::{Block, Obstacle, Post};
+pub use person::Person;
 pub use site::{Hit, Site};
 pub use survey::{Survey, SurveyPattern, SurveyScan, SurveyScans};

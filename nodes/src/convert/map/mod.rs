@@ -2,7 +2,7 @@
 
 use lattice_core::lattice::{Lattice, LatticeKind, MortonKey};
 use lattice_core::voxels::codec;
-use lattice_core::voxels::{Voxel, VoxelList};
+use lattice_core::voxels::{Changes, Voxel, VoxelList};
 use lattice_msgs::geographic_msgs::GeoPoint;
 use lattice_msgs::lattice::{LatticeInfo, LatticeMap, LatticeMapUpdate};
 use lattice_msgs::std_msgs::Header;
@@ -89,20 +89,19 @@ pub struct MapStamp<'a> {
 
 /// The lattice, its place in the map frame and the epoch, as a message: the generator in the
 /// lattice's own axes, which `map_from_lattice` turns.
-pub fn info_of(list: &VoxelList, epoch: u64, origin: Option<&GeoPoint>) -> LatticeInfo {
-    let lattice = list.lattice();
+pub fn info_of(lattice: &Lattice, datum_m: Vector3<f64>, stamp: &MapStamp) -> LatticeInfo {
     let g = lattice.unoriented_generator().transpose();
     let mut generator = [0.0; 9];
     generator.copy_from_slice(g.as_slice());
-    let datum = Isometry3::from_parts(Translation3::from(list.datum_m()), lattice.orientation());
+    let datum = Isometry3::from_parts(Translation3::from(datum_m), lattice.orientation());
     LatticeInfo {
         lattice: lattice.kind().name().to_owned(),
         cell_volume_m3: lattice.cell_volume_m3(),
         generator,
         map_from_lattice: geometry::pose_from(&datum),
-        origin: origin.copied().unwrap_or_default(),
-        has_origin: origin.is_some(),
-        epoch,
+        origin: stamp.origin.copied().unwrap_or_default(),
+        has_origin: stamp.origin.is_some(),
+        epoch: stamp.epoch,
     }
 }
 
@@ -147,80 +146,162 @@ pub fn lattice_from(info: &LatticeInfo) -> Result<(Lattice, Vector3<f64>), MapMe
     Ok((lattice.oriented(rotation), place.translation.vector))
 }
 
+/// Payload of the voxels of a chunk, empty where not kept.
+#[derive(Default)]
+struct Payloads {
+    counts: Vec<u32>,
+    mean_offsets: Vec<i16>,
+    labels: Vec<u16>,
+    label_counts: Vec<u32>,
+}
+
+impl Payloads {
+    fn of<'a>(
+        list: &VoxelList,
+        keys: &[MortonKey],
+        voxels: impl Iterator<Item = &'a Voxel> + Clone,
+    ) -> Self {
+        let (labels, label_counts) = labels_of(list, keys);
+        Self {
+            counts: voxels.clone().map(|voxel| voxel.count).collect(),
+            mean_offsets: mean_offsets(voxels, offset_unit_m(list.lattice())),
+            labels,
+            label_counts,
+        }
+    }
+}
+
 /// The whole list as self-contained chunks; an empty list is one chunk without voxels.
 pub fn keyframe(list: &VoxelList, stamp: &MapStamp) -> Vec<LatticeMap> {
     let voxels = list.sorted();
-    let info = info_of(list, stamp.epoch, stamp.origin);
-    let unit_m = offset_unit_m(list.lattice());
     let keys: Vec<MortonKey> = voxels.iter().map(|(key, _)| *key).collect();
     let parts = split(&keys, payload_bytes(list), stamp.chunk_bytes);
-    let chunks = parts.len() as u32;
     let mut rest = voxels.as_slice();
-    let mut out = Vec::with_capacity(parts.len());
-    for (chunk, keys) in (0..).zip(parts) {
+    keyframe_of_parts(list.lattice(), list.datum_m(), &parts, stamp, |keys| {
         let (voxels, tail) = rest.split_at(keys.len().min(rest.len()));
         rest = tail;
-        let (labels, label_counts) = labels_of(list, keys);
-        out.push(LatticeMap {
+        Payloads::of(list, keys, voxels.iter().map(|(_, voxel)| voxel))
+    })
+}
+
+/// The same of cells without payload.
+pub fn keyframe_of_cells(
+    lattice: &Lattice,
+    datum_m: Vector3<f64>,
+    keys: &[MortonKey],
+    stamp: &MapStamp,
+) -> Vec<LatticeMap> {
+    let parts = split(keys, 0, stamp.chunk_bytes);
+    keyframe_of_parts(lattice, datum_m, &parts, stamp, |_| Payloads::default())
+}
+
+fn keyframe_of_parts(
+    lattice: &Lattice,
+    datum_m: Vector3<f64>,
+    parts: &[&[MortonKey]],
+    stamp: &MapStamp,
+    mut payloads: impl FnMut(&[MortonKey]) -> Payloads,
+) -> Vec<LatticeMap> {
+    let info = info_of(lattice, datum_m, stamp);
+    let total: usize = parts.iter().map(|keys| keys.len()).sum();
+    let chunk = |(chunk, keys): (u32, &&[MortonKey])| {
+        let payloads = payloads(keys);
+        LatticeMap {
             header: stamp.header.clone(),
             info: info.clone(),
             sequence: stamp.sequence,
             chunk,
-            chunks,
-            voxels_total: list.len() as u64,
+            chunks: parts.len() as u32,
+            voxels_total: total as u64,
             key_encoding: KEY_ENCODING.to_owned(),
             voxels: keys.len() as u32,
             keys: ByteBuf::from(codec::encode_keys(keys)),
-            counts: voxels.iter().map(|(_, voxel)| voxel.count).collect(),
-            offset_unit_m: unit_m,
-            mean_offsets: mean_offsets(voxels.iter().map(|(_, voxel)| voxel), unit_m),
-            labels,
-            label_counts,
-        });
-    }
-    out
+            counts: payloads.counts,
+            offset_unit_m: offset_unit_m(lattice),
+            mean_offsets: payloads.mean_offsets,
+            labels: payloads.labels,
+            label_counts: payloads.label_counts,
+        }
+    };
+    (0..).zip(parts).map(chunk).collect()
 }
 
 /// Changes since `previous_sequence`, with the state of each changed voxel, in chunks.
 pub fn update(
     list: &VoxelList,
-    changed: &[MortonKey],
-    removed: &[MortonKey],
+    changes: &Changes,
     previous_sequence: u64,
     stamp: &MapStamp,
 ) -> Vec<LatticeMapUpdate> {
-    let info = info_of(list, stamp.epoch, stamp.origin);
-    let unit_m = offset_unit_m(list.lattice());
+    let place = (list.lattice(), list.datum_m());
+    let payload_bytes = payload_bytes(list);
+    update_of_parts(
+        place,
+        changes,
+        payload_bytes,
+        previous_sequence,
+        stamp,
+        |keys| {
+            let voxel = |key: &MortonKey| list.get(*key).unwrap_or_default();
+            let voxels: Vec<Voxel> = keys.iter().map(voxel).collect();
+            Payloads::of(list, keys, voxels.iter())
+        },
+    )
+}
+
+/// The same of cells without payload.
+pub fn update_of_cells(
+    lattice: &Lattice,
+    datum_m: Vector3<f64>,
+    changes: &Changes,
+    previous_sequence: u64,
+    stamp: &MapStamp,
+) -> Vec<LatticeMapUpdate> {
+    let none = |_: &[MortonKey]| Payloads::default();
+    update_of_parts(
+        (lattice, datum_m),
+        changes,
+        0,
+        previous_sequence,
+        stamp,
+        none,
+    )
+}
+
+fn update_of_parts(
+    (lattice, datum_m): (&Lattice, Vector3<f64>),
+    changes: &Changes,
+    payload_bytes: usize,
+    previous_sequence: u64,
+    stamp: &MapStamp,
+    payloads: impl Fn(&[MortonKey]) -> Payloads,
+) -> Vec<LatticeMapUpdate> {
     let template = LatticeMapUpdate {
         header: stamp.header.clone(),
-        info,
+        info: info_of(lattice, datum_m, stamp),
+        offset_unit_m: offset_unit_m(lattice),
         previous_sequence,
         sequence: stamp.sequence,
         key_encoding: KEY_ENCODING.to_owned(),
-        offset_unit_m: unit_m,
         ..LatticeMapUpdate::default()
     };
     let mut out = Vec::new();
-    if !changed.is_empty() {
-        for keys in split(changed, payload_bytes(list), stamp.chunk_bytes) {
-            let (labels, label_counts) = labels_of(list, keys);
-            let voxels: Vec<Voxel> = keys
-                .iter()
-                .map(|key| list.get(*key).unwrap_or_default())
-                .collect();
+    if !changes.changed.is_empty() {
+        for keys in split(&changes.changed, payload_bytes, stamp.chunk_bytes) {
+            let payloads = payloads(keys);
             out.push(LatticeMapUpdate {
                 voxels: keys.len() as u32,
                 keys: ByteBuf::from(codec::encode_keys(keys)),
-                counts: voxels.iter().map(|voxel| voxel.count).collect(),
-                mean_offsets: mean_offsets(voxels.iter(), unit_m),
-                labels,
-                label_counts,
+                counts: payloads.counts,
+                mean_offsets: payloads.mean_offsets,
+                labels: payloads.labels,
+                label_counts: payloads.label_counts,
                 ..template.clone()
             });
         }
     }
-    if !removed.is_empty() {
-        for keys in split(removed, 0, stamp.chunk_bytes) {
+    if !changes.removed.is_empty() {
+        for keys in split(&changes.removed, 0, stamp.chunk_bytes) {
             out.push(LatticeMapUpdate {
                 removed: keys.len() as u32,
                 removed_keys: ByteBuf::from(codec::encode_keys(keys)),
@@ -299,6 +380,17 @@ mod tests {
         VoxelList::new(lattice.clone(), Vector3::new(100.0, -50.0, 3.0), 10).unwrap()
     }
 
+    fn info(list: &VoxelList) -> LatticeInfo {
+        let stamp = MapStamp {
+            header: Header::default(),
+            epoch: 1,
+            sequence: 0,
+            origin: None,
+            chunk_bytes: 60_000,
+        };
+        info_of(list.lattice(), list.datum_m(), &stamp)
+    }
+
     fn lattices() -> Vec<Lattice> {
         let mut lattices = Vec::new();
         for kind in LatticeKind::ALL {
@@ -318,7 +410,7 @@ mod tests {
     fn lattices_come_back_as_they_were_to_the_bit() {
         for lattice in lattices() {
             let list = list(&lattice);
-            let info = info_of(&list, 1, None);
+            let info = info(&list);
             let (back, datum_m) = lattice_from(&info).unwrap();
             assert_eq!(back, lattice);
             assert_eq!(datum_m, list.datum_m());
@@ -335,7 +427,7 @@ mod tests {
     #[test]
     fn a_description_that_contradicts_itself_is_refused() {
         for lattice in lattices() {
-            let good = info_of(&list(&lattice), 1, None);
+            let good = info(&list(&lattice));
             let refused = |change: &dyn Fn(&mut LatticeInfo)| {
                 let mut info = good.clone();
                 change(&mut info);

@@ -10,7 +10,7 @@ use super::{KEY_ENCODING, MapMessageError};
 /// One voxel as a consumer sees it.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct VoxelState {
-    /// Points that fell into the cell.
+    /// Points that fell into the cell; 1 if they are not counted.
     pub count: u32,
     /// Mean of the points from the cell centre, in units of the message.
     pub mean_offset: [i16; 3],
@@ -81,8 +81,11 @@ pub fn voxels_from(
             })
         }
     };
-    check("counts", keys.len(), columns.counts.len())?;
-    check("mean_offsets", keys.len() * 3, columns.mean_offsets.len())?;
+    let counted = !(columns.counts.is_empty() && columns.mean_offsets.is_empty());
+    if counted {
+        check("counts", keys.len(), columns.counts.len())?;
+        check("mean_offsets", keys.len() * 3, columns.mean_offsets.len())?;
+    }
     let labelled = !(columns.labels.is_empty() && columns.label_counts.is_empty());
     if labelled {
         check("labels", keys.len(), columns.labels.len())?;
@@ -91,16 +94,16 @@ pub fn voxels_from(
     let labels = columns.labels.iter().zip(columns.label_counts);
     let labels = labels.map(|(label, count)| (*label, *count));
     let labels = labels.chain(std::iter::repeat((UNLABELED, 0)));
-    Ok(keys
-        .into_iter()
-        .zip(columns.counts)
-        .zip(columns.mean_offsets.chunks_exact(3))
-        .zip(labels)
-        .map(|(((key, count), offset), (label, label_count))| {
-            let mut mean_offset = [0; 3];
-            mean_offset.copy_from_slice(offset);
+    let offsets = columns.mean_offsets.chunks_exact(3);
+    let offsets = offsets.map(|offset| <[i16; 3]>::try_from(offset).unwrap_or_default());
+    let payloads = columns.counts.iter().copied().zip(offsets);
+    // Of a map of occupancy: one point at the centre.
+    let payloads = payloads.chain(std::iter::repeat((1, [0; 3])));
+    let voxels = keys.into_iter().zip(payloads).zip(labels);
+    Ok(voxels
+        .map(|((key, (count, mean_offset)), (label, label_count))| {
             let state = VoxelState {
-                count: *count,
+                count,
                 mean_offset,
                 label,
                 label_count,

@@ -8,7 +8,7 @@ use lattice_lab::simulate::house::{HeadsetOptions, SurveyOptions};
 use nalgebra::{Isometry3, Vector3};
 
 use crate::CliResult;
-use crate::lab::choice;
+use crate::lab::{choice, show};
 use crate::progress::Progress;
 use lattice_lab::datasets::{HeadsetAxes, HouseOptions, write_house};
 
@@ -98,11 +98,6 @@ impl House {
         let progress = Progress::new("simulate");
         let summary = write_house(&options, &mut |done| progress.set(done))?;
         progress.done();
-        if self.json {
-            println!("{}", serde_json::to_string_pretty(&summary)?);
-        } else {
-            println!("{summary}");
-        }
-        Ok(())
+        show(self.json, &summary)
     }
 }

@@ -137,8 +137,7 @@ fn small() -> SurveyOptions {
 }
 
 fn on_threads<T: Send>(threads: usize, work: impl FnOnce() -> T + Send) -> T {
-    let pool = rayon::ThreadPoolBuilder::new().num_threads(threads).build();
-    pool.unwrap().install(work)
+    crate::pool(threads).unwrap().install(work)
 }
 
 #[test]

@@ -135,9 +135,8 @@ mod tests {
         let (sources, scenes) = scenes(2, None).unwrap();
         let scene = &scenes[1];
         let on = |threads: usize| {
-            let pool = rayon::ThreadPoolBuilder::new().num_threads(threads);
             let go = || run(scene, 1, &sources[0], 2, 6, &mut |_| {}).unwrap();
-            pool.build().unwrap().install(go)
+            crate::pool(threads).unwrap().install(go)
         };
         let (one, two) = (on(1), on(2));
         for (lattice, kind) in LatticeKind::ALL.into_iter().enumerate() {

@@ -1,0 +1,191 @@
+//! Free space in the mapper: rays from the sensor to its points clear what stood there before.
+//!
+//! Clouds of a sweep are one scan: a cell that any of them hits is not cleared by the others, and it
+//! has one ray. So a planar laser on a turntable sees as a scanner that spins.
+
+use lattice_core::cloud::Cloud;
+use lattice_core::lattice::{Lattice, MortonKey};
+use lattice_core::raycast::{
+    ClearReport, FreeSpaceError, FreeSpaceMap, FreeSpaceOptions, RayBundle, RayClearer,
+};
+use lattice_core::voxels::VoxelStore;
+use nalgebra::Vector3;
+use rustc_hash::FxHashMap;
+
+use super::free_options::{FreeSpaceMethod, MappedFreeSpace};
+
+/// Most places from which one sweep is seen; points seen from others give no rays.
+const MAX_BUNDLES: usize = 4096;
+
+/// Rays and what they say of the cells of a map.
+pub(super) struct FreeSpace {
+    method: Method,
+    sweep_ns: i64,
+    max_points: usize,
+    sweep: Sweep,
+}
+
+enum Method {
+    Clear(Box<RayClearer>),
+    Evidence(Box<FreeSpaceMap>),
+}
+
+/// Points since the first cloud of the sweep, by the cell that they were seen from.
+#[derive(Default)]
+struct Sweep {
+    start_ns: Option<i64>,
+    /// Index in `bundles` by the cell of the viewpoint and the bits of the cloud's datum.
+    places: FxHashMap<(MortonKey, [u64; 3]), usize>,
+    bundles: Vec<(Vector3<f64>, Cloud)>,
+    points: usize,
+}
+
+impl FreeSpace {
+    /// Free space of a map, `None` if it is off.
+    pub(super) fn new(
+        options: &MappedFreeSpace,
+        lattice: &Lattice,
+        datum_near_m: Vector3<f64>,
+        max_points: usize,
+    ) -> Result<Option<FreeSpace>, FreeSpaceError> {
+        let method = match options.method {
+            FreeSpaceMethod::Off => return Ok(None),
+            FreeSpaceMethod::Clear => {
+                Method::Clear(Box::new(RayClearer::new(lattice, options.clear)))
+            }
+            FreeSpaceMethod::Evidence => {
+                let options = FreeSpaceOptions {
+                    evidence: options.evidence,
+                    max_range_m: options.clear.max_range_m,
+                    keep_m: options.clear.keep_m,
+                    keep_ratio: options.clear.keep_ratio,
+                    free_level: Some(options.free_level).filter(|level| *level > 0),
+                    max_bytes: options.clear.max_bytes,
+                };
+                let map = FreeSpaceMap::new(lattice.clone(), datum_near_m, options)?;
+                Method::Evidence(Box::new(map))
+            }
+        };
+        Ok(Some(FreeSpace {
+            method,
+            sweep_ns: options.sweep_ns,
+            max_points,
+            sweep: Sweep::default(),
+        }))
+    }
+
+    /// True if a cloud of this time begins another sweep, so that this one is to be cleared before
+    /// its points are inserted.
+    pub(super) fn is_complete(&self, stamp_ns: i64) -> bool {
+        let Some(start_ns) = self.sweep.start_ns else {
+            return false;
+        };
+        let since_ns = stamp_ns.saturating_sub(start_ns);
+        // In a log that is played again, time goes back.
+        since_ns >= self.sweep_ns
+            || since_ns < -self.sweep_ns
+            || self.sweep.points > self.max_points
+    }
+
+    /// Adds a cloud whose points are in `store` already.
+    pub(super) fn add(
+        &mut self,
+        store: &dyn VoxelStore,
+        cloud: &Cloud,
+        viewpoints: &[Vector3<f64>],
+    ) {
+        self.sweep.start_ns.get_or_insert(cloud.stamp_ns);
+        self.sweep.add(store, cloud, viewpoints);
+    }
+
+    /// True if each cloud is a scan.
+    pub(super) fn is_cloud_by_cloud(&self) -> bool {
+        self.sweep_ns == 0
+    }
+
+    /// Ends the sweep: its rays clear.
+    pub(super) fn clear(&mut self, store: &mut dyn VoxelStore) -> ClearReport {
+        let sweep = std::mem::take(&mut self.sweep);
+        let bundles = sweep.bundles.iter();
+        let scan: Vec<RayBundle> = bundles
+            .map(|(origin_m, ends)| RayBundle {
+                origin_m: *origin_m,
+                ends,
+            })
+            .collect();
+        match &mut self.method {
+            _ if scan.is_empty() => ClearReport::default(),
+            Method::Clear(clearer) => clearer.clear(store, &scan),
+            Method::Evidence(map) => map.clear(store, &scan),
+        }
+    }
+
+    /// Forgets all rays; `known` cells count as hit once.
+    pub(super) fn restart(&mut self, known: &dyn VoxelStore) {
+        self.sweep = Sweep::default();
+        if let Method::Evidence(map) = &mut self.method {
+            map.reset();
+            if !known.is_empty() {
+                map.insert_occupied(&known.sorted_keys());
+            }
+        }
+    }
+
+    /// Lattice and free cells of it, where they are kept.
+    pub(super) fn free_cells(&self) -> Option<(&Lattice, Vec<MortonKey>)> {
+        match &self.method {
+            Method::Evidence(map) if map.options().free_level.is_some() => {
+                Some((map.free_lattice(), map.free_keys()))
+            }
+            _ => None,
+        }
+    }
+}
+
+impl Sweep {
+    fn add(&mut self, store: &dyn VoxelStore, cloud: &Cloud, viewpoints: &[Vector3<f64>]) {
+        let datum = <[f64; 3]>::from(cloud.datum_m).map(f64::to_bits);
+        let mut last: Option<(Vector3<f64>, usize)> = None;
+        for (offset, viewpoint) in cloud.offsets_m.iter().zip(viewpoints) {
+            let index = match last {
+                Some((place, index)) if place == *viewpoint => index,
+                _ => {
+                    let Some(index) = self.bundle_at(store, *viewpoint, datum, cloud) else {
+                        continue;
+                    };
+                    last = Some((*viewpoint, index));
+                    index
+                }
+            };
+            if let Some((_, ends)) = self.bundles.get_mut(index) {
+                ends.offsets_m.push(*offset);
+                self.points += 1;
+            }
+        }
+    }
+
+    /// The bundle of a viewpoint: that of the first one in the same cell.
+    fn bundle_at(
+        &mut self,
+        store: &dyn VoxelStore,
+        viewpoint: Vector3<f64>,
+        datum: [u64; 3],
+        cloud: &Cloud,
+    ) -> Option<usize> {
+        let place = (store.key_of(&viewpoint)?, datum);
+        if let Some(index) = self.places.get(&place) {
+            return Some(*index);
+        }
+        let index = self.bundles.len();
+        if index >= MAX_BUNDLES {
+            return None;
+        }
+        self.places.insert(place, index);
+        let ends = Cloud {
+            offsets_m: Vec::new(),
+            ..*cloud
+        };
+        self.bundles.push((viewpoint, ends));
+        Some(index)
+    }
+}
