@@ -75,7 +75,7 @@ mod tests {
             (bytes, "inbox_bytes", "0", "1 or more"),
             (threads, "threads", "100000", "0 to 256"),
             (transformer, "min_range_m", "60.0", "at most `max_range_m`"),
-            (transformer, "min_range_m", ".nan", "0.0 or more"),
+            (transformer, "min_range_m", "-1.0", "0.0 or more"),
             (transformer, "map_frame", "''", "the name of a frame"),
             (transformer, "base_frame", "'/'", "the name of a frame"),
             (transformer, "max_cloud_points", "0", "1 or more"),

@@ -49,11 +49,6 @@ pub struct TransformerCounts {
 }
 
 impl TransformerCounts {
-    /// Clouds dropped for any reason.
-    pub fn clouds_dropped(&self) -> u64 {
-        self.reasons().iter().map(|(_, count)| count).sum()
-    }
-
     /// Dropped clouds by reason.
     pub fn reasons(&self) -> [(&'static str, u64); 7] {
         [

@@ -49,7 +49,7 @@ pub struct TransformerOptions {
     pub precision: Precision,
     /// Fields of the clouds that `points_enu` keeps, where they have them.
     pub pass_fields: Vec<String>,
-    /// Whether `points_enu` says for each point where the sensor was, which a mapper of free space
+    /// True if `points_enu` has for each point the place of the sensor, which a mapper of free space
     /// needs.
     pub viewpoints: bool,
 }

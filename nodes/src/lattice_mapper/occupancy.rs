@@ -60,7 +60,7 @@ impl OccupancyMap {
         self.sequence += 1;
     }
 
-    /// What changed since the call before, sorted.
+    /// Changes since the call before, sorted.
     pub(super) fn take_changes(&mut self) -> Changes {
         let mut changes = Changes::default();
         for (key, occupied) in self.changes.drain() {

@@ -32,7 +32,7 @@ pub struct MapperOptions {
     pub labels: Option<LabelOptions>,
     /// Largest serialised message of `map`, `map_updates` and `free`.
     pub chunk_bytes: usize,
-    /// Whether a voxel is more than a bit.
+    /// Content of a voxel: one bit, or count and mean point.
     pub payload: MapPayload,
     /// Rays that clear voxels.
     pub free_space: MappedFreeSpace,

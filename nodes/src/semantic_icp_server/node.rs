@@ -24,7 +24,7 @@ use lattice_runtime::logging::Throttle;
 use lattice_runtime::qos::Qos;
 use lattice_runtime::{
     ActionLimits, Clock, Diagnostics, Feedback, GoalHandle, Level, Load, Publisher, Reply, Runtime,
-    TfBroadcaster,
+    TfBroadcaster, Undecoded,
 };
 
 /// Between two messages on diagnostics.
@@ -33,8 +33,8 @@ const DIAGNOSE: Duration = Duration::from_secs(1);
 /// Event for the thread of the machine.
 enum Event {
     SearchPort(SearchPort),
-    Map(Arc<LatticeMap>),
-    Update(Arc<LatticeMapUpdate>),
+    Map(Undecoded<LatticeMap>),
+    Update(Undecoded<LatticeMapUpdate>),
     Cloud(Arc<PointCloud2>),
     Session(Arc<StringMessage>),
     LabelInfo(Arc<LabelInfo>),
@@ -97,21 +97,23 @@ pub fn start(runtime: &Runtime, name: &str) -> Result<Finish, NodeError> {
     notify(&inbox, Event::SearchPort(thread.port()));
 
     let (to, missed, part) = (inbox.clone(), Arc::clone(&lost), Arc::clone(&map_lost));
-    let on_map = move |map: Arc<LatticeMap>| {
-        let bytes = map.keys.len() + map.counts.len() * 16;
+    let on_map = move |map: Undecoded<LatticeMap>| {
+        let bytes = map.bytes(|map| map.keys.len() + map.counts.len() * 16);
         if !hand_over(&to, Event::Map(map), bytes, &missed) {
             part.store(true, Ordering::Relaxed);
         }
     };
-    let maps = node.subscribe("map", Qos::MAP, Load::Large, on_map)?;
+    let maps = node.subscribe_undecoded("map", Qos::MAP, Load::Small, on_map)?;
     let (to, missed, part) = (inbox.clone(), Arc::clone(&lost), map_lost);
-    let on_update = move |update: Arc<LatticeMapUpdate>| {
-        let bytes = update.keys.len() + update.counts.len() * 16 + update.removed_keys.len();
+    let on_update = move |update: Undecoded<LatticeMapUpdate>| {
+        let bytes = update.bytes(|update| {
+            update.keys.len() + update.counts.len() * 16 + update.removed_keys.len()
+        });
         if !hand_over(&to, Event::Update(update), bytes, &missed) {
             part.store(true, Ordering::Relaxed);
         }
     };
-    let updates = node.subscribe("map_updates", Qos::DELTAS, Load::Large, on_update)?;
+    let updates = node.subscribe_undecoded("map_updates", Qos::DELTAS, Load::Small, on_update)?;
     let to = inbox.clone();
     let missed = Arc::clone(&lost);
     let on_cloud = move |message: Arc<PointCloud2>| {
@@ -219,8 +221,14 @@ impl Shell {
                 self.search = Some(port);
                 Vec::new()
             }
-            Event::Map(chunk) => self.machine.on_map(&chunk, now_ns),
-            Event::Update(chunk) => self.machine.on_map_update(&chunk, now_ns),
+            Event::Map(chunk) => match chunk.decode() {
+                Some(chunk) => self.machine.on_map(&chunk, now_ns),
+                None => Vec::new(),
+            },
+            Event::Update(chunk) => match chunk.decode() {
+                Some(chunk) => self.machine.on_map_update(&chunk, now_ns),
+                None => Vec::new(),
+            },
             Event::Cloud(cloud) => self.machine.on_headset_cloud(&cloud, now_ns),
             Event::Session(session) => self.machine.on_session(&session, now_ns),
             Event::LabelInfo(info) => {

@@ -15,15 +15,15 @@ use crate::start::{Finish, NodeError, warn_unused};
 use crate::{options, report};
 use lattice_runtime::logging::Throttle;
 use lattice_runtime::qos::Qos;
-use lattice_runtime::{Diagnostics, Level, Load, Publisher, Runtime};
+use lattice_runtime::{Diagnostics, Level, Load, Publisher, Runtime, Undecoded};
 
 /// Longest wait for readers at the end, between two budgets of markers.
 const FLUSH: Duration = Duration::from_secs(2);
 
 /// Event for the compute thread.
 enum Event {
-    Map(Arc<LatticeMap>),
-    Update(Arc<LatticeMapUpdate>),
+    Map(Undecoded<LatticeMap>),
+    Update(Undecoded<LatticeMapUpdate>),
     Redraw,
     Draw,
     Finish,
@@ -66,21 +66,21 @@ pub fn start(runtime: &Runtime, name: &str) -> Result<Finish, NodeError> {
     let lost_map = Arc::clone(&lost);
     let lost_update = Arc::clone(&lost);
     let maps = inbox.clone();
-    let on_map = move |map: Arc<LatticeMap>| {
-        let bytes = map.keys.len() + map.counts.len() * 10;
+    let on_map = move |map: Undecoded<LatticeMap>| {
+        let bytes = map.bytes(|map| map.keys.len() + map.counts.len() * 10);
         if !maps.send(Event::Map(map), bytes) {
             lost_map.store(true, Ordering::Relaxed);
         }
     };
-    let maps = node.subscribe("map", Qos::MAP, Load::Large, on_map)?;
+    let maps = node.subscribe_undecoded("map", Qos::MAP, Load::Small, on_map)?;
     let updates = inbox.clone();
-    let on_update = move |update: Arc<LatticeMapUpdate>| {
-        let bytes = update.keys.len() + update.counts.len() * 10;
+    let on_update = move |update: Undecoded<LatticeMapUpdate>| {
+        let bytes = update.bytes(|update| update.keys.len() + update.counts.len() * 10);
         if !updates.send(Event::Update(update), bytes) {
             lost_update.store(true, Ordering::Relaxed);
         }
     };
-    let updates = node.subscribe("map_updates", Qos::DELTAS, Load::Large, on_update)?;
+    let updates = node.subscribe_undecoded("map_updates", Qos::DELTAS, Load::Small, on_update)?;
     let joined = inbox.clone();
     publisher.on_subscriber_joined(move || {
         let _ = joined.send(Event::Redraw, 0);
@@ -117,12 +117,16 @@ impl Shell {
     fn on(&mut self, event: Event) {
         match event {
             Event::Map(chunk) => {
-                let result = self.machine.on_map(&chunk);
-                self.followed(result);
+                let chunk = chunk.decode();
+                if let Some(result) = chunk.map(|chunk| self.machine.on_map(&chunk)) {
+                    self.followed(result);
+                }
             }
             Event::Update(chunk) => {
-                let result = self.machine.on_update(&chunk);
-                self.followed(result);
+                let chunk = chunk.decode();
+                if let Some(result) = chunk.map(|chunk| self.machine.on_update(&chunk)) {
+                    self.followed(result);
+                }
             }
             Event::Redraw => self.machine.redraw(),
             Event::Draw => {

@@ -8,4 +8,5 @@ mod map_follower;
 mod map_labels;
 mod semantic_clouds;
 mod semantic_icp_server;
+mod voxel_marker_node;
 mod voxel_markers;

@@ -3,12 +3,13 @@
 /// Most frames above a frame that are looked at.
 const MAX_ABOVE: usize = 32;
 
+/// A frame above another one; small, since every lookup makes two lists of them.
 #[derive(Clone, Copy, Debug, Default)]
 struct Step {
-    frame: usize,
+    frame: u32,
     /// Place of the frame below.
-    from: usize,
-    depth: usize,
+    from: u8,
+    depth: u8,
 }
 
 /// A frame and those above it, the nearest first.
@@ -24,20 +25,12 @@ impl Above {
             steps: [Step::default(); MAX_ABOVE],
             len: 0,
         };
-        above.push(Step {
-            frame,
-            from: 0,
-            depth: 0,
-        });
+        above.push(frame, 0, 0);
         let mut at = 0;
         while let Some(step) = above.steps().get(at).copied() {
-            for frame in parents(step.frame) {
+            for frame in parents(step.frame as usize) {
                 if above.place(frame).is_none() {
-                    above.push(Step {
-                        frame,
-                        from: at,
-                        depth: step.depth + 1,
-                    });
+                    above.push(frame, at, step.depth + 1);
                 }
             }
             at += 1;
@@ -45,9 +38,11 @@ impl Above {
         above
     }
 
-    fn push(&mut self, step: Step) {
-        if let Some(slot) = self.steps.get_mut(self.len) {
-            *slot = step;
+    fn push(&mut self, frame: usize, from: usize, depth: u8) {
+        if let (Some(slot), Ok(frame)) = (self.steps.get_mut(self.len), u32::try_from(frame)) {
+            // A place is below `MAX_ABOVE`.
+            let from = from as u8;
+            *slot = Step { frame, from, depth };
             self.len += 1;
         }
     }
@@ -57,16 +52,17 @@ impl Above {
     }
 
     fn place(&self, frame: usize) -> Option<usize> {
-        self.steps().iter().position(|step| step.frame == frame)
+        let mut steps = self.steps().iter();
+        steps.position(|step| step.frame as usize == frame)
     }
 
     /// Links as frame and parent, from a place down to the first frame.
     fn down(&self, mut place: usize) -> impl Iterator<Item = (usize, usize)> + '_ {
         std::iter::from_fn(move || {
             let upper = self.steps().get(place).filter(|_| place > 0)?;
-            place = upper.from;
+            place = usize::from(upper.from);
             let lower = self.steps().get(place)?;
-            Some((lower.frame, upper.frame))
+            Some((lower.frame as usize, upper.frame as usize))
         })
     }
 }
@@ -89,7 +85,7 @@ impl Path {
     ) -> Option<Self> {
         let (target, source) = (Above::of(target, &parents), Above::of(source, &parents));
         let common = source.steps().iter().enumerate().filter_map(|(at, step)| {
-            let place = target.place(step.frame)?;
+            let place = target.place(step.frame as usize)?;
             let depth = target.steps().get(place)?.depth + step.depth;
             Some((depth, [place, at]))
         });
