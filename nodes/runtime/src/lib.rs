@@ -45,6 +45,6 @@ pub use process::Runtime;
 pub use publisher::{Publisher, RawPublisher};
 pub use service::{Reply, Server};
 pub use shutdown::Shutdown;
-pub use subscription::{Load, Subscription};
+pub use subscription::{Load, Subscription, Undecoded};
 pub use task_thread::guarded;
 pub use tf::{StaticTfBroadcaster, TfBroadcaster};

@@ -186,7 +186,16 @@ impl Keys<'_> {
 
     fn depth(&self, default: usize) -> Result<usize, ParamError> {
         self.each("depth", default, |key, default| {
-            self.params.usize_in(key, default, 1..=DEPTH_MAX)
+            let depth = self
+                .params
+                .i64(key, i64::try_from(default).unwrap_or(i64::MAX))?;
+            usize::try_from(depth)
+                .ok()
+                .filter(|depth| (1..=DEPTH_MAX).contains(depth))
+                .ok_or_else(|| {
+                    self.params
+                        .invalid(key, format!("expected a number from 1 to {DEPTH_MAX}"))
+                })
         })
     }
 }

@@ -16,7 +16,7 @@ use super::publisher::{Publisher, RawPublisher};
 use super::qos::Qos;
 use super::ros_args::RosArgs;
 use super::shared::{DEFAULT_MAX_MESSAGE_BYTES, Shared};
-use super::subscription::{Load, Subscription};
+use super::subscription::{Load, Sample, Stats, Subscription, Undecoded};
 
 /// A node of the process. Clones are the same node.
 #[derive(Clone)]
@@ -171,7 +171,35 @@ impl Node {
         topic: &str,
         qos: Qos,
         load: Load,
-        handler: impl FnMut(Arc<M>) + Send + 'static,
+        mut handler: impl FnMut(Arc<M>) + Send + 'static,
+    ) -> Result<Subscription, RuntimeError> {
+        self.subscribe_samples(topic, qos, load, move |sample, stats| {
+            if let Some(message) = stats.decode(sample) {
+                handler(message);
+            }
+        })
+    }
+
+    /// A subscription whose handler gets messages undecoded, for the thread that works on them; otherwise
+    /// as [`Node::subscribe`]. For large messages that one thread must keep in order.
+    pub fn subscribe_undecoded<M: RosMessage>(
+        &self,
+        topic: &str,
+        qos: Qos,
+        load: Load,
+        mut handler: impl FnMut(Undecoded<M>) + Send + 'static,
+    ) -> Result<Subscription, RuntimeError> {
+        self.subscribe_samples(topic, qos, load, move |sample, stats| {
+            handler(Undecoded::new(sample, stats));
+        })
+    }
+
+    fn subscribe_samples<M: RosMessage>(
+        &self,
+        topic: &str,
+        qos: Qos,
+        load: Load,
+        handler: impl FnMut(Sample<'_, M>, &Arc<Stats>) + Send + 'static,
     ) -> Result<Subscription, RuntimeError> {
         let resolved = self.resolve(topic)?;
         let qos = qos.with_overrides(&self.inner.params, &resolved, topic)?;

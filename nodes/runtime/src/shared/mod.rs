@@ -30,7 +30,7 @@ use super::publisher::PublisherParts;
 use super::qos::Qos;
 use super::service::{Answers, Server};
 use super::shutdown::Shutdown;
-use super::subscription::{Command, Intake, Load, Subscription};
+use super::subscription::{Command, Intake, Load, Sample, Stats, Subscription};
 use super::sync::{lock, wait_for};
 use super::task_thread::TaskThread;
 
@@ -190,8 +190,10 @@ impl Shared {
         }
         let now_ns = Arc::new(AtomicI64::new(0));
         let clock = Clock::simulated(Arc::clone(&now_ns));
-        let handler = move |message: Arc<rosgraph_msgs::Clock>| {
-            now_ns.store(message.clock.to_ns(), Relaxed);
+        let handler = move |sample: Sample<'_, rosgraph_msgs::Clock>, stats: &Arc<Stats>| {
+            if let Some(message) = stats.decode(sample) {
+                now_ns.store(message.clock.to_ns(), Relaxed);
+            }
         };
         let subscription =
             self.subscribe(node, topic, &Qos::CLOCK, Load::Small, 1 << 10, handler)?;

@@ -12,7 +12,9 @@ use crate::error::RuntimeError;
 use crate::graph::NodeId;
 use crate::peers::Peers;
 use crate::qos::{Durability, Qos};
-use crate::subscription::{Intake, Load, Running, Source, Stats, Subscription, spawn_reader};
+use crate::subscription::{
+    Intake, Load, Running, Sample, Source, Stats, Subscription, spawn_reader,
+};
 use crate::sync::lock;
 
 /// Small messages of a publisher in this process that wait for a subscription, at least. They are
@@ -30,7 +32,7 @@ impl Shared {
         qos: &Qos,
         load: Load,
         max_bytes: usize,
-        handler: impl FnMut(Arc<M>) + Send + 'static,
+        mut handler: impl FnMut(Sample<'_, M>, &Arc<Stats>) + Send + 'static,
     ) -> Result<Subscription, RuntimeError> {
         let peers = Arc::new(Peers::of_subscription(topic));
         let stats = Arc::new(Stats::new(Arc::clone(&peers)));
@@ -62,9 +64,9 @@ impl Shared {
             commands: orders,
             local,
             _local: place,
-            stats,
+            stats: Arc::clone(&stats),
         };
-        let task = source.run(handler);
+        let task = source.run(move |sample: Sample<'_, M>| handler(sample, &stats));
         let running = match load {
             Load::Small => Running::OnIoThread {
                 _task: self.io.spawn(task).ok_or_else(|| closed(topic))?,

@@ -16,7 +16,6 @@ use smol::Task;
 use smol::channel::{Sender, bounded};
 
 use super::error::RuntimeError;
-use super::local_bus::AnyMessage;
 use super::logging::Throttle;
 use super::peers::Peers;
 use super::shutdown::Shutdown;
@@ -130,19 +129,19 @@ impl Stats {
         Arc::clone(&self.lost)
     }
 
-    /// Decodes a sample of another process, and counts it.
-    fn decode<M: RosMessage>(&self, bytes: &[u8]) -> Option<Arc<M>> {
-        let message = cdr::from_slice::<M>(bytes);
-        let message = message.inspect_err(|why| self.not_decodable(why)).ok()?;
-        self.received.fetch_add(1, Relaxed);
-        Some(Arc::new(message))
-    }
-
-    /// Counts a message of this process.
-    fn shared<M: RosMessage>(&self, message: AnyMessage) -> Option<Arc<M>> {
-        let message = message.downcast::<M>().ok()?;
-        self.received.fetch_add(1, Relaxed);
-        Some(message)
+    /// Decodes a sample and counts what comes of it.
+    pub(crate) fn decode<M: RosMessage>(&self, sample: Sample<'_, M>) -> Option<Arc<M>> {
+        let message = match sample {
+            Sample::Shared(message) => Some(message),
+            Sample::Cdr(bytes) => cdr::from_slice::<M>(bytes)
+                .inspect_err(|why| self.not_decodable(why))
+                .ok()
+                .map(Arc::new),
+        };
+        if message.is_some() {
+            self.received.fetch_add(1, Relaxed);
+        }
+        message
     }
 
     fn not_decodable(&self, why: &dyn std::fmt::Display) {
@@ -152,6 +151,54 @@ impl Stats {
                 "{}: undecodable sample ({count} so far): {why}",
                 self.peers.topic()
             );
+        }
+    }
+}
+
+/// A message as a subscription gets it.
+pub(crate) enum Sample<'a, M> {
+    /// From this process.
+    Shared(Arc<M>),
+    /// From another process, encapsulation header first. The buffer may be taken.
+    Cdr(&'a mut Vec<u8>),
+}
+
+/// A message that is decoded on the thread that needs it, not on the one that received it.
+pub struct Undecoded<M> {
+    content: Content<M>,
+    stats: Arc<Stats>,
+}
+
+enum Content<M> {
+    Shared(Arc<M>),
+    Cdr(Vec<u8>),
+}
+
+impl<M: RosMessage> Undecoded<M> {
+    pub(crate) fn new(sample: Sample<'_, M>, stats: &Arc<Stats>) -> Self {
+        Self {
+            content: match sample {
+                Sample::Shared(message) => Content::Shared(message),
+                Sample::Cdr(bytes) => Content::Cdr(std::mem::take(bytes)),
+            },
+            stats: Arc::clone(stats),
+        }
+    }
+
+    /// Length in bytes; `shared` measures a message that comes from this process.
+    pub fn bytes(&self, shared: impl FnOnce(&M) -> usize) -> usize {
+        match &self.content {
+            Content::Shared(message) => shared(message),
+            Content::Cdr(bytes) => bytes.len(),
+        }
+    }
+
+    /// The message. `None`: the bytes are no message of the type, which is counted and logged.
+    pub fn decode(self) -> Option<Arc<M>> {
+        let Self { content, stats } = self;
+        match content {
+            Content::Shared(message) => stats.decode(Sample::Shared(message)),
+            Content::Cdr(mut bytes) => stats.decode(Sample::Cdr(&mut bytes)),
         }
     }
 }

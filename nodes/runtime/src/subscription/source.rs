@@ -8,8 +8,8 @@ use lattice_msgs::RosMessage;
 use smol::channel::Receiver;
 use smol::future::{or, pending};
 
-use super::Stats;
 use super::intake::Command;
+use super::{Sample, Stats};
 use crate::local_bus::{AnyMessage, LocalEndpoint};
 use crate::port::{EndpointId, Origin, SampleId, SampleReader};
 
@@ -29,7 +29,7 @@ pub(crate) struct Source {
 
 impl Source {
     /// Gives messages to the handler until the task is dropped.
-    pub(crate) async fn run<M: RosMessage>(self, mut handler: impl FnMut(Arc<M>)) {
+    pub(crate) async fn run<M: RosMessage>(self, mut handler: impl FnMut(Sample<'_, M>)) {
         let mut turn: u32 = 0;
         let mut gaps = Gaps::default();
         let mut reader: Option<Box<dyn SampleReader>> = None;
@@ -39,18 +39,13 @@ impl Source {
                 smol::future::yield_now().await;
             }
             match self.next(reader.as_deref(), turn.is_multiple_of(2)).await {
-                Heard::Local(message) => self
-                    .stats
-                    .shared(message)
-                    .into_iter()
-                    .for_each(&mut handler),
+                Heard::Local(message) => give_shared(message, &mut handler),
                 Heard::Remote(Ok(origin)) => {
                     let gap = gaps.before(origin.sample);
                     self.stats.lost.fetch_add(gap, Relaxed);
-                    let decode =
-                        |reader: &Box<dyn SampleReader>| self.stats.decode(&reader.bytes());
-                    let message = reader.as_ref().and_then(decode);
-                    message.into_iter().for_each(&mut handler);
+                    if let Some(reader) = &reader {
+                        handler(Sample::Cdr(&mut reader.bytes()));
+                    }
                 }
                 Heard::Remote(Err(why)) => self.stats.not_decodable(&why),
                 Heard::Command(Command::Use(new)) => reader = Some(new),
@@ -60,9 +55,10 @@ impl Source {
                 }
                 Heard::Command(Command::WorkOff(done)) => {
                     for _ in 0..self.local.len() {
-                        let message = self.local.try_recv().ok();
-                        let message = message.and_then(|message| self.stats.shared(message));
-                        message.into_iter().for_each(&mut handler);
+                        let message = self.local.try_recv();
+                        message
+                            .into_iter()
+                            .for_each(|m| give_shared(m, &mut handler));
                     }
                     drop(done);
                 }
@@ -91,6 +87,12 @@ impl Source {
         } else {
             or(command, or(remote, local)).await
         }
+    }
+}
+
+fn give_shared<M: RosMessage>(message: AnyMessage, handler: &mut impl FnMut(Sample<'_, M>)) {
+    if let Ok(message) = message.downcast::<M>() {
+        handler(Sample::Shared(message));
     }
 }
 

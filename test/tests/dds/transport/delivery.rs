@@ -277,6 +277,47 @@ fn undecodable_and_long_samples_are_counted_and_the_next_arrives() {
 }
 
 #[test]
+fn a_message_is_decoded_by_who_works_on_it() {
+    let domain = TestDomain::take();
+    let (a, b) = (runtime(&domain, "a"), runtime(&domain, "b"));
+    let (from, to) = (a.node("a").unwrap(), b.node("b").unwrap());
+    let (qos, (sender, heard)) = (Qos::DEFAULT, channel());
+    let subscription = to
+        .subscribe_undecoded::<RosString>("chatter", qos, Load::Small, move |message| {
+            let _ = sender.send(message);
+        })
+        .unwrap();
+    let next = || heard.recv_timeout(PATIENCE).unwrap();
+    let there = from
+        .raw_publisher("/chatter", RosString::TYPE, qos)
+        .unwrap();
+    wait_for_match!(there, subscription);
+    let good = cdr::to_vec(&text("outside")).unwrap();
+    let length = good.len();
+    there
+        .publish_blocking(vec![0, 1, 0, 0, 9, 0, 0, 0])
+        .unwrap();
+    there.publish_blocking(good).unwrap();
+    let (bad, good) = (next(), next());
+    assert_eq!(
+        (subscription.received(), subscription.undecodable()),
+        (0, 0)
+    );
+    assert!(bad.decode().is_none());
+    assert_eq!(good.bytes(|_| 0), length);
+    assert_eq!(good.decode().unwrap().data, "outside");
+    let here = to.publisher::<RosString>("chatter", qos).unwrap();
+    here.publish(text("here")).unwrap();
+    let shared = next();
+    assert_eq!(shared.bytes(|message| message.data.len()), 4);
+    assert_eq!(shared.decode().unwrap().data, "here");
+    assert_eq!(
+        (subscription.received(), subscription.undecodable()),
+        (2, 1)
+    );
+}
+
+#[test]
 fn what_a_slow_subscriber_misses_is_counted() {
     let domain = TestDomain::take();
     let (a, b) = (runtime(&domain, "a"), runtime(&domain, "b"));
