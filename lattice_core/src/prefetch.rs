@@ -1,4 +1,4 @@
-//! Asking for memory before its turn.
+//! Prefetching of memory into the caches.
 
 /// Asks for the lines of memory that an item begins in, `LINES` of them; changes nothing that a
 /// program can see.

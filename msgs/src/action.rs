@@ -8,11 +8,11 @@ use crate::{RosMessage, RosService};
 pub trait RosAction: Send + 'static {
     /// Type name, such as `lattice_msgs/action/Calibrate`.
     const TYPE: &'static str;
-    /// What the client wants.
+    /// Goal of a client.
     type Goal: RosMessage;
-    /// What came of it.
+    /// Outcome of a goal.
     type Result: RosMessage;
-    /// How far it is.
+    /// Progress of a goal.
     type Feedback: RosMessage;
     /// The service `_action/send_goal`.
     type SendGoal: RosService + 'static;
@@ -71,16 +71,16 @@ macro_rules! actions {
         pub struct $send_request {
             /// Chosen by the client.
             pub goal_id: $crate::unique_identifier_msgs::UUID,
-            /// What it wants.
+            /// The goal itself.
             pub goal: $goal,
         }
 
         #[doc = concat!("Response of [`", stringify!($send_goal), "`].")]
         #[derive(Clone, Debug, Default, PartialEq, serde::Serialize, serde::Deserialize)]
         pub struct $send_response {
-            /// Whether the server takes the goal.
+            /// True if the server takes the goal.
             pub accepted: bool,
-            /// When it did.
+            /// Time of the decision.
             pub stamp: $crate::builtin_interfaces::Time,
         }
 
@@ -91,7 +91,7 @@ macro_rules! actions {
         #[doc = concat!("Request of [`", stringify!($get_result), "`].")]
         #[derive(Clone, Debug, Default, PartialEq, serde::Serialize, serde::Deserialize)]
         pub struct $get_request {
-            /// Which goal.
+            /// Number of the goal.
             pub goal_id: $crate::unique_identifier_msgs::UUID,
         }
 
@@ -100,16 +100,16 @@ macro_rules! actions {
         pub struct $get_response {
             /// One of `action_msgs/msg/GoalStatus`.
             pub status: i8,
-            /// What came of the goal.
+            /// Outcome of the goal.
             pub result: $result,
         }
 
         #[doc = concat!("The message of `_action/feedback` of [`", stringify!($action), "`].")]
         #[derive(Clone, Debug, Default, PartialEq, serde::Serialize, serde::Deserialize)]
         pub struct $feedback_message {
-            /// Which goal.
+            /// Number of the goal.
             pub goal_id: $crate::unique_identifier_msgs::UUID,
-            /// How far it is.
+            /// Progress of a goal.
             pub feedback: $feedback,
         }
 

@@ -1,4 +1,4 @@
-//! What all actions share: goals, how far they are, and how they are canceled.
+//! Messages common to all actions: goals, their states, their cancellation.
 
 use serde::{Deserialize, Serialize};
 
@@ -23,11 +23,11 @@ services! {
 pub struct GoalInfo {
     /// Chosen by the client.
     pub goal_id: UUID,
-    /// When the server accepted it.
+    /// Time at which the server accepted it.
     pub stamp: Time,
 }
 
-/// How far a goal is.
+/// State of a goal.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Serialize, Deserialize)]
 pub struct GoalStatus {
     /// The goal.
@@ -37,7 +37,7 @@ pub struct GoalStatus {
 }
 
 impl GoalStatus {
-    /// Not told of.
+    /// Not known.
     pub const STATUS_UNKNOWN: i8 = 0;
     /// Waits.
     pub const STATUS_ACCEPTED: i8 = 1;
@@ -53,7 +53,7 @@ impl GoalStatus {
     pub const STATUS_ABORTED: i8 = 6;
 }
 
-/// How far all goals of an action server are.
+/// States of all goals of an action server.
 #[derive(Clone, Debug, Default, PartialEq, Serialize, Deserialize)]
 pub struct GoalStatusArray {
     /// Those at work and those that ended of late.
@@ -68,7 +68,7 @@ pub struct CancelGoal;
 /// Request of [`CancelGoal`].
 #[derive(Clone, Debug, Default, PartialEq, Serialize, Deserialize)]
 pub struct CancelGoalRequest {
-    /// Which.
+    /// The goal.
     pub goal_info: GoalInfo,
 }
 

@@ -1,4 +1,4 @@
-//! Where a headset is in the map: the result, and the calls that ask for it.
+//! Calibration of a headset: its pose in the map, and the calls that ask for it.
 
 use serde::{Deserialize, Serialize};
 use serde_big_array::BigArray;
@@ -28,7 +28,7 @@ actions! {
     with CalibrateFeedbackMessage;
 }
 
-/// Where a headset is in the map, or why that is not told.
+/// Pose of a headset in the map, or the reason that there is none.
 ///
 /// Only with the verdict OK is the transform to be used, and only then is it on /tf.
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
@@ -57,9 +57,9 @@ pub struct CalibrationResult {
     pub rmse_m: f64,
     /// Directions that the clouds leave open.
     pub weak_directions: Vec<WeakDirection>,
-    /// What the labels of each class were worth.
+    /// Reliability of the labels, by class.
     pub class_reliability: Vec<ClassReliability>,
-    /// What found the transform.
+    /// Method that found the transform.
     pub method: String,
     /// Time it took, s.
     pub duration_s: f64,
@@ -125,14 +125,14 @@ impl WeakDirection {
     pub const ROTATION: u8 = 1;
 }
 
-/// What the labels of one class of the headset were worth.
+/// Reliability of the labels of one class of the headset.
 #[derive(Clone, Debug, Default, PartialEq, Serialize, Deserialize)]
 pub struct ClassReliability {
     /// As the headset numbers it.
     pub class_id: u16,
     /// Share of its points on the map that have the same class there, 0 to 1.
     pub agreement: f64,
-    /// How many points this was learned from, about.
+    /// Approximate number of points behind it.
     pub weight: f64,
 }
 
@@ -156,9 +156,9 @@ pub struct CalibrateRequest {
 pub struct CalibrateResponse {
     /// True: the verdict is OK.
     pub success: bool,
-    /// What came of it.
+    /// Explanation of the outcome.
     pub message: String,
-    /// What was found.
+    /// The calibration.
     pub result: CalibrationResult,
 }
 
@@ -182,16 +182,16 @@ pub struct CalibrateGoal {
 pub struct CalibrateResult {
     /// True: the verdict is OK.
     pub success: bool,
-    /// What came of it.
+    /// Explanation of the outcome.
     pub message: String,
-    /// What was found.
+    /// The calibration.
     pub result: CalibrationResult,
 }
 
 /// Feedback of [`CalibrateAction`].
 #[derive(Clone, Debug, Default, PartialEq, Serialize, Deserialize)]
 pub struct CalibrateFeedback {
-    /// What is being done.
+    /// Step at work.
     pub stage: String,
     /// Share of the whole that is done, 0 to 1.
     pub fraction: f32,

@@ -10,7 +10,7 @@ const LITTLE_ENDIAN: [u8; 4] = [0, 1, 0, 0];
 /// Padding that a sender may leave after the last field, to a multiple of four.
 const MAX_PADDING: usize = 3;
 
-/// Why bytes are no message, or a message has no bytes.
+/// An error of decoding or encoding a message.
 #[derive(Debug, Error)]
 pub enum CdrError {
     /// Not even a header.
@@ -32,7 +32,7 @@ pub enum CdrError {
         type_name: &'static str,
         /// Bytes there are, header included.
         length: usize,
-        /// What went wrong.
+        /// Cause.
         source: cdr_encoding::Error,
     },
     /// The type ends before the bytes do.
@@ -53,7 +53,7 @@ pub enum CdrError {
     Encode {
         /// Rust name of the type.
         type_name: &'static str,
-        /// What went wrong.
+        /// Cause.
         source: cdr_encoding::Error,
     },
     /// Lengths in CDR have 32 bits.

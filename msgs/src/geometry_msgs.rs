@@ -150,7 +150,7 @@ pub struct Transform {
     pub rotation: Quaternion,
 }
 
-/// Where the child frame is in the frame of the header: header.frame_id from child_frame_id.
+/// Pose of the child frame in the frame of the header: header.frame_id from child_frame_id.
 #[derive(Clone, Debug, Default, PartialEq, Serialize, Deserialize)]
 pub struct TransformStamped {
     /// Time, and parent frame.

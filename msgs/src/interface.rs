@@ -1,4 +1,4 @@
-//! What ROS knows of a message besides its fields: type name, schema text, dependencies.
+//! Interface of a message besides its fields: type name, schema text, dependencies.
 
 use std::fmt::Debug;
 
@@ -62,9 +62,9 @@ pub trait RosMessage:
 pub trait RosService {
     /// Type name, such as `std_srvs/srv/Trigger`.
     const TYPE: &'static str;
-    /// What the client sends.
+    /// Message of the client.
     type Request: RosMessage;
-    /// What the server answers.
+    /// Answer of the server.
     type Response: RosMessage;
 }
 

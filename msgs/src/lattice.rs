@@ -23,7 +23,7 @@ services! {
     QueryMap: QueryMapRequest [Point], QueryMapResponse [Point];
 }
 
-/// Which lattice a map is kept on, and where it lies.
+/// Lattice of a map, and its place.
 #[derive(Clone, Debug, Default, PartialEq, Serialize, Deserialize)]
 pub struct LatticeInfo {
     /// Cubic, bcc, fcc, mcc or hex.
@@ -34,7 +34,7 @@ pub struct LatticeInfo {
     pub generator: [f64; 9],
     /// Position is the datum of the keys (m), in the frame of the map.
     pub map_from_lattice: Pose,
-    /// Where the map frame (east-north-up) touches the earth.
+    /// Point of the earth that the map frame (east-north-up) touches.
     pub origin: GeoPoint,
     /// False: origin is not known.
     pub has_origin: bool,
@@ -57,7 +57,7 @@ pub struct LatticeMap {
     pub chunks: u32,
     /// Voxels in all chunks.
     pub voxels_total: u64,
-    /// How keys are written, KEY_ENCODING_*.
+    /// Encoding of the keys, KEY_ENCODING_*.
     pub key_encoding: String,
     /// Voxels in this chunk.
     pub voxels: u32,
@@ -97,7 +97,7 @@ pub struct LatticeMapUpdate {
     pub chunk: u32,
     /// Chunks of this update.
     pub chunks: u32,
-    /// How keys are written, KEY_ENCODING_*.
+    /// Encoding of the keys, KEY_ENCODING_*.
     pub key_encoding: String,
     /// Voxels in this chunk.
     pub voxels: u32,
@@ -131,7 +131,7 @@ pub struct SaveMap;
 /// Request of [`SaveMap`].
 #[derive(Clone, Debug, Default, PartialEq, Serialize, Deserialize)]
 pub struct SaveMapRequest {
-    /// Where to; a file that is there is replaced once the new one is complete.
+    /// File to write; an older one is replaced once the new one is complete.
     pub path: String,
 }
 
@@ -140,7 +140,7 @@ pub struct SaveMapRequest {
 pub struct SaveMapResponse {
     /// True: done.
     pub success: bool,
-    /// What came of it.
+    /// Explanation of the outcome.
     pub message: String,
     /// Voxels in the file.
     pub voxels: u64,
@@ -162,7 +162,7 @@ pub struct LoadMapRequest {
 pub struct LoadMapResponse {
     /// True: done; false: the map is as before.
     pub success: bool,
-    /// What came of it.
+    /// Explanation of the outcome.
     pub message: String,
     /// Voxels in the map now.
     pub voxels: u64,
@@ -186,7 +186,7 @@ pub struct ClearBoxRequest {
 pub struct ClearBoxResponse {
     /// True: done.
     pub success: bool,
-    /// What came of it.
+    /// Explanation of the outcome.
     pub message: String,
     /// Voxels that went.
     pub removed: u64,
@@ -208,9 +208,9 @@ pub struct QueryMapRequest {
 pub struct QueryMapResponse {
     /// False: not answered, the message says why.
     pub success: bool,
-    /// What came of it.
+    /// Explanation of the outcome.
     pub message: String,
-    /// Whether the cell of the point is occupied.
+    /// True if the cell of the point is occupied.
     pub occupied: bool,
     /// Points in this cell.
     pub points: u32,

@@ -31,4 +31,4 @@ pub mod visualization_msgs;
 
 pub use action::RosAction;
 pub use interface::{RosMessage, RosService, Schema, dds_type_name};
-pub use registry::{MessageVisitor, definition_of, visit_messages};
+pub use registry::{MessageVisitor, visit_messages};

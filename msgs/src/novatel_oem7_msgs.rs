@@ -77,7 +77,7 @@ impl InertialSolutionStatus {
     pub const MOTION_DETECT: u32 = 12;
 }
 
-/// How a position or velocity was found.
+/// Method of a position or velocity.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Serialize, Deserialize)]
 pub struct PositionOrVelocityType {
     /// One of the constants.
@@ -148,7 +148,7 @@ impl PositionOrVelocityType {
     pub const INS_PPP_BASIC: u32 = 80;
 }
 
-/// Which aids the inertial solution used; the names are spelt as the driver spells them.
+/// Aids that the inertial solution used; the names are spelt as the driver spells them.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Serialize, Deserialize)]
 pub struct INSExtendedSolutionStatus {
     /// The bits.
@@ -284,7 +284,7 @@ pub struct INSPVAX {
     pub nov_header: Oem7Header,
     /// State of the solution.
     pub ins_status: InertialSolutionStatus,
-    /// How the position was found.
+    /// Method of the position.
     pub pos_type: PositionOrVelocityType,
     /// In deg, datum of the receiver, by default WGS 84.
     pub latitude: f64,

@@ -34,7 +34,7 @@ services! {
 /// One line of a log.
 #[derive(Clone, Debug, Default, PartialEq, Serialize, Deserialize)]
 pub struct Log {
-    /// When it was written.
+    /// Time of writing.
     pub stamp: Time,
     /// One of the constants.
     pub level: u8,
@@ -150,7 +150,7 @@ pub struct IntegerRange {
     pub step: u64,
 }
 
-/// What is known of a parameter besides its value.
+/// Description of a parameter besides its value.
 #[derive(Clone, Debug, Default, PartialEq, Serialize, Deserialize)]
 pub struct ParameterDescriptor {
     /// Full name.
@@ -158,7 +158,7 @@ pub struct ParameterDescriptor {
     /// One of ParameterType.
     #[serde(rename = "type")]
     pub type_: u8,
-    /// What it is for.
+    /// Its purpose.
     pub description: String,
     /// Rules in words.
     pub additional_constraints: String,
@@ -172,12 +172,12 @@ pub struct ParameterDescriptor {
     pub integer_range: Vec<IntegerRange>,
 }
 
-/// Whether a parameter was set.
+/// Outcome of setting a parameter.
 #[derive(Clone, Debug, Default, PartialEq, Serialize, Deserialize)]
 pub struct SetParametersResult {
     /// True: it was.
     pub successful: bool,
-    /// Why not.
+    /// Reason of a refusal.
     pub reason: String,
 }
 
@@ -193,7 +193,7 @@ pub struct ListParametersResult {
 /// Change of parameters of a node.
 #[derive(Clone, Debug, Default, PartialEq, Serialize, Deserialize)]
 pub struct ParameterEvent {
-    /// When.
+    /// Time of the change.
     pub stamp: Time,
     /// Full name of the node.
     pub node: String,
@@ -212,7 +212,7 @@ pub struct DescribeParameters;
 /// Request of [`DescribeParameters`].
 #[derive(Clone, Debug, Default, PartialEq, Serialize, Deserialize)]
 pub struct DescribeParametersRequest {
-    /// Which.
+    /// Names of the parameters.
     pub names: Vec<String>,
 }
 
@@ -230,7 +230,7 @@ pub struct GetParameters;
 /// Request of [`GetParameters`].
 #[derive(Clone, Debug, Default, PartialEq, Serialize, Deserialize)]
 pub struct GetParametersRequest {
-    /// Which.
+    /// Names of the parameters.
     pub names: Vec<String>,
 }
 
@@ -248,7 +248,7 @@ pub struct GetParameterTypes;
 /// Request of [`GetParameterTypes`].
 #[derive(Clone, Debug, Default, PartialEq, Serialize, Deserialize)]
 pub struct GetParameterTypesRequest {
-    /// Which.
+    /// Names of the parameters.
     pub names: Vec<String>,
 }
 
@@ -280,7 +280,7 @@ impl ListParametersRequest {
 /// Response of [`ListParameters`].
 #[derive(Clone, Debug, Default, PartialEq, Serialize, Deserialize)]
 pub struct ListParametersResponse {
-    /// What was found.
+    /// The listing.
     pub result: ListParametersResult,
 }
 

@@ -1,4 +1,4 @@
-//! All messages of this crate, by type and by name.
+//! All messages of this crate, by type.
 
 use crate::interface::RosMessage;
 use crate::{
@@ -7,7 +7,7 @@ use crate::{
     std_srvs, tf2_msgs, unique_identifier_msgs, vision_msgs, visualization_msgs,
 };
 
-/// Something to do with every message type; see [`visit_messages`].
+/// Visitor of every message type; see [`visit_messages`].
 pub trait MessageVisitor {
     /// Called once for each type.
     fn visit<M: RosMessage>(&mut self);
@@ -40,30 +40,6 @@ pub fn visit_messages(visitor: &mut impl MessageVisitor) {
     visualization_msgs::visit_messages(visitor);
 }
 
-/// Schema text of a type by its full name, such as `sensor_msgs/msg/PointCloud2`, with all
-/// dependencies (MCAP schema encoding `ros2msg`); `None` for a type this crate does not know.
-pub fn definition_of(type_name: &str) -> Option<String> {
-    let mut find = Find {
-        type_name,
-        definition: None,
-    };
-    visit_messages(&mut find);
-    find.definition
-}
-
-struct Find<'a> {
-    type_name: &'a str,
-    definition: Option<String>,
-}
-
-impl MessageVisitor for Find<'_> {
-    fn visit<M: RosMessage>(&mut self) {
-        if M::TYPE == self.type_name {
-            self.definition = Some(M::definition());
-        }
-    }
-}
-
 #[cfg(test)]
 mod tests {
     use std::collections::BTreeSet;
@@ -80,15 +56,11 @@ mod tests {
     }
 
     #[test]
-    fn every_message_is_found_by_its_name_and_only_once() {
+    fn every_message_is_visited_only_once() {
         let mut names = Names::default();
         visit_messages(&mut names);
         let unique: BTreeSet<_> = names.0.iter().collect();
         assert_eq!(unique.len(), names.0.len());
-        for name in names.0 {
-            assert!(definition_of(name).is_some(), "{name}");
-        }
-        assert_eq!(definition_of("sensor_msgs/PointCloud2"), None);
     }
 
     #[test]

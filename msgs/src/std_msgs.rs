@@ -15,7 +15,7 @@ messages! {
     Float64 [];
 }
 
-/// When and in which frame the data holds.
+/// Time and frame of data.
 #[derive(Clone, Debug, Default, PartialEq, Serialize, Deserialize)]
 pub struct Header {
     /// Time of the data.

@@ -45,7 +45,7 @@ pub struct TriggerRequest {
 pub struct TriggerResponse {
     /// True: done.
     pub success: bool,
-    /// What came of it.
+    /// Explanation of the outcome.
     pub message: String,
 }
 
@@ -65,6 +65,6 @@ pub struct SetBoolRequest {
 pub struct SetBoolResponse {
     /// True: done.
     pub success: bool,
-    /// What came of it.
+    /// Explanation of the outcome.
     pub message: String,
 }

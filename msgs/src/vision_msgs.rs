@@ -1,4 +1,4 @@
-//! What labels mean.
+//! Meaning of labels.
 
 use serde::{Deserialize, Serialize};
 
@@ -11,7 +11,7 @@ messages! {
     LabelInfo [Header, VisionClass];
 }
 
-/// A class that a segmenter tells apart.
+/// A class of a segmenter.
 #[derive(Clone, Debug, Default, PartialEq, Serialize, Deserialize)]
 pub struct VisionClass {
     /// Its number.
@@ -20,7 +20,7 @@ pub struct VisionClass {
     pub class_name: String,
 }
 
-/// What the class numbers of a segmenter mean. The largest number (65535, or 255 in uint8) is no
+/// Meaning of a segmenter's class numbers. The largest number (65535, or 255 in uint8) is no
 /// class.
 #[derive(Clone, Debug, Default, PartialEq, Serialize, Deserialize)]
 pub struct LabelInfo {

@@ -29,7 +29,7 @@ pub struct UVCoordinate {
 /// A mesh sent along with its marker.
 #[derive(Clone, Debug, Default, PartialEq, Serialize, Deserialize)]
 pub struct MeshFile {
-    /// Its name, the suffix tells the format.
+    /// Its name; the suffix gives the format.
     pub filename: String,
     /// The file as bytes.
     pub data: ByteBuf,
@@ -44,7 +44,7 @@ pub struct Marker {
     pub ns: String,
     /// Number within ns.
     pub id: i32,
-    /// What to draw.
+    /// Shape to draw.
     #[serde(rename = "type")]
     pub type_: i32,
     /// ADD, DELETE or DELETEALL.

@@ -11,9 +11,7 @@ use serde::Serialize;
 use crate::executables::{answers_help, start_runtime};
 use crate::report;
 use crate::start::{NodeError, warn_unused};
-use lattice_bag::{
-    BagHistory, BagQos, BagReader, BagReliability, Player, PlayerOptions, Step, TopicInfo,
-};
+use lattice_bag::{BagQos, BagReader, Player, PlayerOptions, Step, TopicInfo};
 use lattice_runtime::params::Params;
 use lattice_runtime::qos::{Durability, Qos, Reliability};
 use lattice_runtime::ros_args::RosArgs;
@@ -24,7 +22,7 @@ pub const NAME: &str = "bag_player";
 
 /// Time that what is queued at the end has to reach its readers.
 const FLUSH_TIME: Duration = Duration::from_secs(20);
-/// The same when told to end.
+/// The same after a signal.
 const HURRIED_FLUSH_TIME: Duration = Duration::from_secs(2);
 /// Longest sleep between two looks at the shutdown flag.
 const NAP: Duration = Duration::from_millis(100);
@@ -40,11 +38,11 @@ pub struct PlayerReport {
     pub failed: u64,
     /// Latest that a message was after its time, in ms.
     pub latest_ms: u64,
-    /// Whether all reliable readers acknowledged everything in time.
+    /// True if all reliable readers acknowledged everything in time.
     pub acknowledged: bool,
 }
 
-/// Plays the log that the parameters name and returns at its end or when told to stop.
+/// Plays the log that the parameters name and returns at its end or after a signal.
 pub fn run(arguments: impl IntoIterator<Item = String>) -> Result<(), NodeError> {
     let args = RosArgs::parse(arguments)?;
     if answers_help(NAME, &args) {
@@ -91,13 +89,8 @@ pub fn run(arguments: impl IntoIterator<Item = String>) -> Result<(), NodeError>
 
 /// A time of up to a day.
 fn seconds(params: &Params, name: &str, default: f64) -> Result<Duration, NodeError> {
-    let seconds = params.f64(name, default)?;
-    if (0.0..=86_400.0).contains(&seconds) {
-        Ok(Duration::from_secs_f64(seconds))
-    } else {
-        let problem = format!("{seconds}, expected 0 to 86400 s");
-        Err(params.invalid(name, problem).into())
-    }
+    let seconds = params.f64_in(name, default, 0.0..=86_400.0)?;
+    Ok(Duration::from_secs_f64(seconds))
 }
 
 fn options(params: &Params) -> Result<PlayerOptions, NodeError> {
@@ -112,7 +105,6 @@ fn options(params: &Params) -> Result<PlayerOptions, NodeError> {
         include: (!include.is_empty()).then_some(include),
         exclude: params.string_array("exclude_topics", &[])?,
         clock_hz: (clock_hz > 0.0).then_some(clock_hz),
-        ..PlayerOptions::default()
     })
 }
 
@@ -120,10 +112,10 @@ fn options(params: &Params) -> Result<PlayerOptions, NodeError> {
 fn open_topics(node: &Node, player: &Player) -> Result<Vec<RawPublisher>, NodeError> {
     let mut publishers = Vec::new();
     for topic in player.topics() {
-        let resolved = node.resolve(&topic.name)?;
-        let offered = offered(&topic.info);
-        let qos = offered.with_overrides(node.params(), &resolved, &topic.name)?;
-        publishers.push(node.raw_publisher(&resolved, &topic.info.type_name, qos)?);
+        let info = &topic.info;
+        let resolved = node.resolve(&info.name)?;
+        let qos = offered(info).with_overrides(node.params(), &resolved, &info.name)?;
+        publishers.push(node.raw_publisher(&resolved, &info.type_name, qos)?);
     }
     Ok(publishers)
 }
@@ -132,14 +124,13 @@ fn open_topics(node: &Node, player: &Player) -> Result<Vec<RawPublisher>, NodeEr
 /// reader of then finds it, and room for the last samples of all of them.
 fn offered(topic: &TopicInfo) -> Qos {
     let recorded = topic.offered_qos.as_slice();
-    let reliable = |qos: &BagQos| qos.reliability != BagReliability::BestEffort;
-    let depth = |qos: &BagQos| match qos.history {
-        BagHistory::KeepAll => MAX_DEPTH,
-        _ => qos.depth.max(1),
+    let depth = |qos: &BagQos| match qos.keep_all {
+        true => MAX_DEPTH,
+        false => qos.depth.max(1),
     };
     let latched = match recorded {
         [] => topic.is_latched(),
-        recorded => recorded.iter().all(BagQos::is_latched),
+        recorded => recorded.iter().all(|qos| qos.latched),
     };
     let depths = recorded.iter().map(depth);
     let depth = match (recorded, latched) {
@@ -149,7 +140,7 @@ fn offered(topic: &TopicInfo) -> Qos {
         (_, false) => depths.max().unwrap_or(10),
     };
     Qos {
-        reliability: match recorded.iter().all(reliable) {
+        reliability: match recorded.iter().all(|qos| qos.reliable) {
             true => Reliability::Reliable,
             false => Reliability::BestEffort,
         },
@@ -176,7 +167,7 @@ impl Shell {
     fn wait_for(&self, names: &[String], timeout: Duration) {
         let deadline = Instant::now() + timeout;
         for (publisher, topic) in self.topics.iter().zip(self.player.topics()) {
-            if !names.contains(&topic.name) {
+            if !names.contains(&topic.info.name) {
                 continue;
             }
             let (joined, join) = mpsc::channel();
@@ -186,7 +177,7 @@ impl Shell {
             while publisher.subscriber_count() == 0 && !self.shutdown.is_requested() {
                 let left = deadline.saturating_duration_since(Instant::now());
                 if left.is_zero() {
-                    log::warn!("{}: nobody listens, playing all the same", topic.name);
+                    log::warn!("{}: nobody listens, playing all the same", topic.info.name);
                     break;
                 }
                 let _ = join.recv_timeout(left.min(NAP));
@@ -200,17 +191,15 @@ impl Shell {
         let span_ns = last_ns.saturating_sub(first_ns).max(1);
         let mut percent = 0;
         while !self.shutdown.is_requested() {
-            let Some(due_ns) = self.player.due_ns() else {
-                break;
-            };
-            let due = begin + Duration::from_nanos(u64::try_from(due_ns).unwrap_or(0));
+            let due_ns = u64::try_from(self.player.due_ns()).unwrap_or(0);
+            let due = begin + Duration::from_nanos(due_ns);
             let now = Instant::now();
             if due > now {
                 std::thread::sleep((due - now).min(NAP));
                 continue;
             }
             match self.player.next()? {
-                Step::Publish { topic, data, .. } => {
+                Step::Publish { topic, data } => {
                     let late_ms = (now - due).as_millis() as u64;
                     self.report.latest_ms = self.report.latest_ms.max(late_ms);
                     self.publish(topic, data);

@@ -101,10 +101,10 @@ impl<E: Send + 'static> Compute<E> {
     pub fn finish_with(self, last: E) {
         // Waits for room where readers could not: nobody reads any more.
         let sender = &self.inbox.sender;
-        let told = sender
+        let sent = sender
             .send(Some((last, 0)))
             .and_then(|()| sender.send(None));
-        if told.is_err() | self.thread.join().is_err() {
+        if sent.is_err() | self.thread.join().is_err() {
             log::error!("a compute thread panicked; its last results are lost");
         }
     }

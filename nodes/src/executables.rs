@@ -25,7 +25,7 @@ pub fn find(name: &str) -> Option<Start> {
     found.map(|(_, start)| *start)
 }
 
-/// Runs one node until it is told to stop. `arguments` are those of the command line.
+/// Runs one node until a signal stops it. `arguments` are those of the command line.
 pub fn run(
     name: &str,
     start: Start,
@@ -38,7 +38,7 @@ pub fn run(
     let name = args.node_name(name);
     let runtime = start_runtime(&name, args)?;
     let finish = start(&runtime, &name)?;
-    run_until_told(&runtime, vec![finish])
+    run_until_stopped(&runtime, vec![finish])
 }
 
 /// Prints how an executable is used if its arguments ask for it.
@@ -71,11 +71,12 @@ pub fn start_runtime(name: &str, args: RosArgs) -> Result<Runtime, NodeError> {
     Ok(Runtime::start(name, args)?)
 }
 
-/// Waits until told to end, lets each node work off its inbox and publish the rest, and leaves.
-pub fn run_until_told(runtime: &Runtime, running: Vec<Finish>) -> Result<(), NodeError> {
+/// Waits for the end, lets each node work off its inbox and publish the rest, and leaves.
+pub fn run_until_stopped(runtime: &Runtime, running: Vec<Finish>) -> Result<(), NodeError> {
     runtime.shutdown_handle().wait();
-    // In the order in which data flows, so that each still hears the one before.
+    // In the order in which data flows, so that each still gets what the one before publishes.
     for finish in running {
+        runtime.work_off();
         finish();
     }
     Ok(runtime.spin()?)

@@ -10,6 +10,7 @@ pub mod executables;
 pub mod files;
 pub mod lattice_mapper;
 pub mod map_follower;
+mod options;
 #[cfg(feature = "bags")]
 pub mod replay;
 pub mod report;

@@ -10,7 +10,7 @@ pub fn shared(name: &str) -> Option<PathBuf> {
     if path.exists() {
         return Some(path);
     }
-    // Past the harness, which keeps what a passing test prints to itself.
+    // Past the harness, which hides the output of passing tests.
     let _ = writeln!(
         stderr(),
         "SKIPPED: no {} beside the repository",

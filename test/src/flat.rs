@@ -1,4 +1,4 @@
-//! A labelled flat: rectangles that a robot has mapped and a headset looks at.
+//! A labelled flat: rectangles that a robot maps and a headset scans.
 
 use lattice_core::registration::{LabelDistribution, SemanticCloud};
 use lattice_msgs::sensor_msgs::PointCloud2;
@@ -12,7 +12,7 @@ type Patch = (Vector3<f64>, Vector3<f64>, Vector3<f64>, u16);
 const WALL: u16 = 1;
 const FLOOR: u16 = 2;
 
-/// Corner, size and class of what stands about.
+/// Corner, size and class of the furniture.
 const FURNITURE: [([f64; 3], [f64; 3], u16); 8] = [
     ([0.1, 0.1, 0.0], [0.6, 1.9, 0.8], 4),
     ([2.3, 0.1, 0.0], [1.5, 0.4, 1.9], 9),
@@ -75,7 +75,7 @@ impl Flat {
         labelled_cloud("map", stamp_ns, &points)
     }
 
-    /// What a headset sees that stands at `eye` in the map and looks along `yaw`, 80 x 60 rays, in its
+    /// Scan of a headset that stands at `eye` in the map and looks along `yaw`, 80 x 60 rays, in its
     /// own frame: x forward, y left, z up.
     pub fn look(
         &self,

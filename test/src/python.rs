@@ -5,8 +5,8 @@ use std::path::{Path, PathBuf};
 
 /// The interpreter that `LATTICE_PYTHON` names, one with `test/python/requirements.txt` installed.
 ///
-/// Where the variable is not set this says so on standard error, and the caller returns: such a
-/// test needs packages that cargo does not bring.
+/// Without the variable, a line on standard error says so and the caller returns: such a test needs
+/// packages that cargo does not bring.
 pub fn python() -> Option<PathBuf> {
     let Some(python) = std::env::var_os("LATTICE_PYTHON") else {
         let test = std::thread::current().name().unwrap_or_default().to_owned();

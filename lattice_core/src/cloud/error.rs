@@ -1,4 +1,4 @@
-//! What a cloud can be refused for.
+//! Errors of clouds.
 
 use thiserror::Error;
 

@@ -1,4 +1,4 @@
-//! How a sensor packs its points, and the checks that make it safe to read.
+//! Layout of a sensor's points, and the checks that make it safe to read.
 
 use super::view::Coordinates;
 use super::{CloudError, CloudView};
@@ -39,7 +39,7 @@ pub struct CloudLayout {
     pub fields: Vec<PointField>,
 }
 
-/// What is taken at most.
+/// Limits of a cloud.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub struct CloudLimits {
     /// Points of one cloud.

@@ -16,8 +16,8 @@ mod view;
 pub use error::CloudError;
 pub use layout::{CloudLayout, CloudLimits, Datatype, PointField};
 pub use points::Cloud;
-pub use time::{NO_TIME_NS, TimeDecision};
-pub use time_options::{TimeOptions, TimeReference, TimeUnit, UnknownTimeName};
+pub use time::NO_TIME_NS;
+pub use time_options::{TimeOptions, TimeReference, TimeUnit};
 pub use transform::{RangeLimits, Transformed, transform_points};
 pub use view::CloudView;
 

@@ -1,7 +1,6 @@
-//! Per-point time: which field, which unit, counted from what.
+//! Per-point time: field, unit and the instant that it counts from.
 
 use rayon::prelude::*;
-use std::fmt;
 
 use super::layout::{names, shown};
 use super::{CloudError, CloudView, Datatype, PointField, TimeOptions, TimeReference, TimeUnit};
@@ -23,39 +22,10 @@ const LEAST_ABSOLUTE: [(f64, TimeUnit); 4] = [
     (1.0e8, TimeUnit::Seconds),
 ];
 
-/// What the times of a cloud were taken for; its `Display` is fit for a log line.
-#[derive(Clone, Debug, PartialEq)]
-pub struct TimeDecision {
-    /// Name of the field.
-    pub field: String,
-    /// Its type.
-    pub datatype: Datatype,
-    /// Its unit.
-    pub unit: TimeUnit,
-    /// What it counts from.
-    pub reference: TimeReference,
-    /// Latest minus earliest point of this cloud, seconds.
-    pub span_s: f64,
-}
-
-impl fmt::Display for TimeDecision {
-    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
-        write!(
-            f,
-            "per-point time from field '{}' ({}), unit {}, reference {}, span {:.6} s",
-            self.field,
-            self.datatype.name(),
-            self.unit,
-            self.reference,
-            self.span_s
-        )
-    }
-}
-
-/// A decision, and what turns a value of the field into a time.
+/// Conversion of values of a field into times.
 struct Clock<'a> {
-    decision: TimeDecision,
     field: &'a PointField,
+    unit: TimeUnit,
     /// Nanoseconds since the epoch of the value zero.
     zero_ns: i64,
     /// Earliest and latest nanoseconds of the field.
@@ -80,11 +50,10 @@ impl CloudView<'_> {
             return Ok(None);
         };
         let (earliest_ns, latest_ns) = clock.range_ns;
-        let unit = clock.decision.unit;
         let times = (0..self.len())
             .into_par_iter()
             .with_min_len(MIN_TASK)
-            .map(|i| match to_ns(self.scalar(clock.field, i), unit) {
+            .map(|i| match to_ns(self.scalar(clock.field, i), clock.unit) {
                 Some(ns) if (earliest_ns..=latest_ns).contains(&ns) => {
                     clock.zero_ns.saturating_add(ns)
                 }
@@ -92,15 +61,6 @@ impl CloudView<'_> {
             })
             .collect();
         Ok(Some(times))
-    }
-
-    /// What [`CloudView::point_times`] takes the times of this cloud for.
-    pub fn time_decision(
-        &self,
-        stamp_ns: i64,
-        options: &TimeOptions,
-    ) -> Result<Option<TimeDecision>, CloudError> {
-        Ok(self.clock(stamp_ns, options)?.map(|clock| clock.decision))
     }
 
     fn clock(&self, stamp_ns: i64, options: &TimeOptions) -> Result<Option<Clock<'_>>, CloudError> {
@@ -163,14 +123,8 @@ impl CloudView<'_> {
             TimeReference::StampEnd => stamp_ns.saturating_sub(latest_ns),
         };
         Ok(Some(Clock {
-            decision: TimeDecision {
-                field: shown(&field.name),
-                datatype,
-                unit,
-                reference,
-                span_s,
-            },
             field,
+            unit,
             zero_ns,
             range_ns: (earliest_ns, latest_ns),
         }))

@@ -1,8 +1,4 @@
-//! What a user may say about per-point time.
-
-use std::fmt;
-use std::str::FromStr;
-use thiserror::Error;
+//! Settings for per-point time.
 
 /// Unit of a time field.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
@@ -39,7 +35,7 @@ impl TimeUnit {
     }
 }
 
-/// What a time field counts from.
+/// Instant that a time field counts from.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum TimeReference {
     /// `stamp_start`: from the stamp of the cloud, negative before it. Times of a free
@@ -51,72 +47,6 @@ pub enum TimeReference {
     Absolute,
 }
 
-impl TimeReference {
-    /// Name in parameters.
-    pub fn name(self) -> &'static str {
-        match self {
-            TimeReference::StampStart => "stamp_start",
-            TimeReference::StampEnd => "stamp_end",
-            TimeReference::Absolute => "absolute",
-        }
-    }
-}
-
-/// A name that is no unit or no reference.
-#[derive(Clone, Debug, PartialEq, Eq, Error)]
-#[error("'{found}' is not one of {expected}")]
-pub struct UnknownTimeName {
-    /// What was given.
-    pub found: String,
-    /// What there is.
-    pub expected: &'static str,
-}
-
-impl FromStr for TimeUnit {
-    type Err = UnknownTimeName;
-
-    fn from_str(name: &str) -> Result<TimeUnit, UnknownTimeName> {
-        match name {
-            "s" => Ok(TimeUnit::Seconds),
-            "ms" => Ok(TimeUnit::Milliseconds),
-            "us" => Ok(TimeUnit::Microseconds),
-            "ns" => Ok(TimeUnit::Nanoseconds),
-            _ => Err(UnknownTimeName {
-                found: name.to_owned(),
-                expected: "s, ms, us, ns",
-            }),
-        }
-    }
-}
-
-impl FromStr for TimeReference {
-    type Err = UnknownTimeName;
-
-    fn from_str(name: &str) -> Result<TimeReference, UnknownTimeName> {
-        match name {
-            "stamp_start" => Ok(TimeReference::StampStart),
-            "stamp_end" => Ok(TimeReference::StampEnd),
-            "absolute" => Ok(TimeReference::Absolute),
-            _ => Err(UnknownTimeName {
-                found: name.to_owned(),
-                expected: "stamp_start, stamp_end, absolute",
-            }),
-        }
-    }
-}
-
-impl fmt::Display for TimeUnit {
-    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
-        f.write_str(self.name())
-    }
-}
-
-impl fmt::Display for TimeReference {
-    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
-        f.write_str(self.name())
-    }
-}
-
 /// Overrides of the detector; the default guesses all by name and type.
 #[derive(Clone, Debug, PartialEq)]
 pub struct TimeOptions {
@@ -124,7 +54,7 @@ pub struct TimeOptions {
     pub field: Option<String>,
     /// Its unit.
     pub unit: Option<TimeUnit>,
-    /// What it counts from.
+    /// Instant that it counts from.
     pub reference: Option<TimeReference>,
     /// The times of a cloud span less than this, seconds.
     pub max_span_s: f64,

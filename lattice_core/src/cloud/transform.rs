@@ -42,7 +42,7 @@ pub struct Transformed {
     pub out_of_range: usize,
     /// Points within range that have no time.
     pub no_time: usize,
-    /// Which points were kept out for any reason: their indices, ascending.
+    /// Indices of the points kept out for any reason, ascending.
     pub left_out: Vec<usize>,
 }
 
@@ -143,7 +143,7 @@ fn transform_part<E>(
 /// Poses of the times that a cloud repeats: column by column, or row by row where the times
 /// of a row come again in the next.
 struct Memo {
-    /// Which pose a point has.
+    /// Number of the pose of each point.
     slots: Vec<u32>,
     /// Poses found; the misses are asked for again, to have their errors.
     poses: Vec<Option<Isometry3<f64>>>,

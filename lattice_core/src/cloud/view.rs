@@ -4,7 +4,7 @@ use nalgebra::Vector3;
 
 use super::{CloudLayout, Datatype, PointField};
 
-/// Where the coordinates of a point are, and whether they are f64.
+/// Offsets of the coordinates in a point, and their type.
 #[derive(Clone, Copy, Debug)]
 pub(super) struct Coordinates {
     pub offsets: [usize; 3],

@@ -22,7 +22,7 @@ impl EnuFrame {
         }
     }
 
-    /// Where the frame is.
+    /// Origin of the frame.
     pub fn origin(&self) -> &Geodetic {
         &self.origin
     }

@@ -1,4 +1,4 @@
-//! What a position can be refused for.
+//! Errors of positions.
 
 use thiserror::Error;
 
@@ -8,7 +8,7 @@ pub enum GeodesyError {
     /// A coordinate is NaN or infinite.
     #[error("{name} is {value}; drop the position until the receiver has a fix")]
     NotFinite {
-        /// Which coordinate, with its unit.
+        /// Name of the coordinate, with its unit.
         name: &'static str,
         /// Its value.
         value: f64,

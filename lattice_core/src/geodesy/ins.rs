@@ -1,4 +1,4 @@
-//! From what an INS reports to the pose of the machine.
+//! Pose of the machine from position and attitude of an INS.
 
 use nalgebra::{Isometry3, Translation3, UnitQuaternion, Vector3};
 use std::f64::consts::TAU;
@@ -35,7 +35,7 @@ pub fn base_position_m(
     sensor_position_m - map_from_base * lever_arm_m
 }
 
-/// Where an INS sits on the machine.
+/// Mount of an INS on the machine.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct InsMount {
     /// Reference point of the INS position in base_link (FLU), metres.

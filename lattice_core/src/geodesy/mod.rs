@@ -11,6 +11,6 @@ mod wgs84;
 
 pub use enu::EnuFrame;
 pub use error::GeodesyError;
-pub use gps_time::{GPS_EPOCH_UNIX_S, utc_ns_from_gps};
-pub use ins::{InsMount, base_position_m, enu_from_flu, yaw_rad_from_azimuth_deg};
-pub use wgs84::{FLATTENING, Geodetic, SEMI_MAJOR_AXIS_M, ecef_from_geodetic, geodetic_from_ecef};
+pub use gps_time::utc_ns_from_gps;
+pub use ins::{InsMount, enu_from_flu, yaw_rad_from_azimuth_deg};
+pub use wgs84::{Geodetic, ecef_from_geodetic, geodetic_from_ecef};

@@ -142,7 +142,7 @@ impl ClosedForm for &Basis {
             let (mut best, mut least) = (None, 0.0);
             for step in &self.steps {
                 let [x, y, z] = step.vector;
-                // What the step adds to the squared distance.
+                // Change of the squared distance by the step.
                 let change = step.square - 2.0 * (rest[0] * x + rest[1] * y + rest[2] * z);
                 if change < least {
                     (best, least) = (Some(step), change);

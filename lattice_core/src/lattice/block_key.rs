@@ -1,4 +1,4 @@
-//! One integer per cell, block by block.
+//! Block key of a cell: an integer that orders cells block by block.
 
 use super::{LatticeIndex, MortonKey};
 
@@ -15,7 +15,7 @@ const BLOCK_MASK: u64 = (1 << BLOCK_BITS) - 1;
 pub struct BlockKey(u64);
 
 impl BlockKey {
-    /// What a batch gives for a point without a cell.
+    /// Key of a point without a cell.
     pub const NONE: BlockKey = BlockKey(u64::MAX);
 
     /// Number of cells in a block.

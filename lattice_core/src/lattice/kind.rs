@@ -95,7 +95,7 @@ mod tests {
     }
 
     #[test]
-    fn an_unknown_name_is_told_the_known_ones() {
+    fn the_error_of_an_unknown_name_lists_the_known_ones() {
         let error = "BCC ".parse::<LatticeKind>().unwrap_err().to_string();
         assert!(error.contains("\"BCC \"") && error.contains("cubic, bcc, fcc, mcc, hex"));
     }

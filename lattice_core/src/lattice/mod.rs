@@ -7,7 +7,6 @@
 mod basis;
 mod batch;
 mod block_key;
-mod clearance;
 mod closed_form;
 mod generator;
 mod kind;
@@ -15,7 +14,6 @@ mod morton_key;
 mod neighbors;
 mod orientation;
 mod shape;
-mod theory;
 mod voronoi;
 
 use std::fmt;
@@ -50,7 +48,7 @@ pub const MAX_COVERING_SIDES: f64 = 2.0;
 /// Indices of [`Lattice::quantize`] are smaller than this.
 const INDEX_LIMIT: u64 = 1 << 20;
 
-/// What is wrong with the description of a lattice.
+/// Error in the description of a lattice.
 #[derive(Clone, Debug, PartialEq, Error)]
 pub enum LatticeError {
     /// No lattice has this name.
@@ -191,7 +189,7 @@ impl Lattice {
         self.shape.map_from_lattice
     }
 
-    /// Which lattice it is.
+    /// Kind of the lattice.
     pub fn kind(&self) -> LatticeKind {
         self.shape.kind
     }

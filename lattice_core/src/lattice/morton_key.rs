@@ -1,4 +1,4 @@
-//! One integer per cell.
+//! Morton key of a cell: its index with interleaved bits.
 
 use super::LatticeIndex;
 

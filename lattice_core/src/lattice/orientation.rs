@@ -1,4 +1,4 @@
-//! How a lattice lies in the map.
+//! Orientation of a lattice in the map.
 //!
 //! The number of cells that flat ground cuts grows with the height of the cell. In the paper's axes
 //! FCC cells stand 1.587 cell sides tall and BCC cells 1.260; lying flat they are 1.122 and 1.091.
@@ -117,7 +117,7 @@ pub(super) fn matrix(rotation: &UnitQuaternion<f64>) -> Matrix3<f64> {
     )
 }
 
-/// Of the two quaternions of a rotation the one whose first number other than 0 is positive.
+/// The one of the two quaternions of a rotation whose first number other than 0 is positive.
 pub(super) fn canonical(rotation: UnitQuaternion<f64>) -> UnitQuaternion<f64> {
     let (w, x, y, z) = (rotation.w, rotation.i, rotation.j, rotation.k);
     let first = [w, x, y, z].into_iter().find(|c| *c != 0.0);

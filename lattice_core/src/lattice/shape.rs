@@ -1,4 +1,4 @@
-//! What a lattice knows of its cells.
+//! Geometry of the cells of a lattice.
 
 use nalgebra::{Matrix3, UnitQuaternion};
 

@@ -4,7 +4,7 @@ use nalgebra::{Matrix3, Vector3};
 
 use super::LatticeIndex;
 
-/// How far beyond a face a vertex may lie, relative to the squared length of the neighbour.
+/// Largest distance of a vertex beyond a face, relative to the squared length of the neighbour.
 const SLACK: f64 = 1e-9;
 
 /// The cell around the lattice point 0: all points nearest to it. Metres, axes of the map.

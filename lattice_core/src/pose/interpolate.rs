@@ -1,4 +1,4 @@
-//! Between two poses.
+//! Interpolation between two poses.
 
 use nalgebra::{Isometry3, Quaternion, Translation3, Unit, UnitQuaternion};
 

@@ -1,10 +1,10 @@
-//! What the tree of frames refuses, and what it cannot answer.
+//! Transforms that are refused, and reasons for which there is none.
 
 use thiserror::Error;
 
 use super::buffer::seconds;
 
-/// A transform that would break the tree of frames.
+/// A transform that is refused.
 #[derive(Clone, Debug, PartialEq, Eq, Error)]
 pub enum TfInsertError {
     /// A frame has no name.
@@ -33,7 +33,7 @@ pub enum TfInsertError {
         /// Child frame.
         child: String,
     },
-    /// More frames than the limit.
+    /// More frames than the limit, all of them in use.
     #[error(
         "transform of '{child}' in '{parent}' would exceed {max_frames} frames; raise the limit or find who publishes so many"
     )]
@@ -45,43 +45,12 @@ pub enum TfInsertError {
         /// The limit.
         max_frames: usize,
     },
-    /// The child would become its own ancestor.
-    #[error(
-        "transform of '{child}' in '{parent}' closes a cycle: '{child}' is above '{parent}' already"
-    )]
-    Cycle {
-        /// Parent frame.
-        parent: String,
-        /// Child frame.
-        child: String,
-    },
-    /// The child has another parent.
-    #[error(
-        "'{child}' is a child of '{parent}', refused as a child of '{refused}': two publishers disagree"
-    )]
-    Reparented {
-        /// Child frame.
-        child: String,
-        /// Its parent.
-        parent: String,
-        /// The parent refused.
-        refused: String,
-    },
-    /// A static frame would move, or a moving one stand still.
-    #[error(
-        "'{child}' is a {known} frame, refused as a {refused} one: it is published on both tf and tf_static"
-    )]
-    KindChanged {
-        /// Child frame.
-        child: String,
-        /// `static` or `moving`, as known.
-        known: &'static str,
-        /// `static` or `moving`, as refused.
-        refused: &'static str,
-    },
+    /// A frame is given as its own parent.
+    #[error("transform of '{0}' in itself")]
+    Itself(String),
 }
 
-/// Why there is no transform.
+/// A transform that is not available.
 #[derive(Clone, Debug, PartialEq, Eq, Error)]
 pub enum TfMiss {
     /// No transform ever named the frame.

@@ -1,4 +1,4 @@
-//! Which cells block a ball at the centre of a cell, and on its way to the next.
+//! Stencils of the cells that block a ball at the centre of a cell, and on its way to the next.
 
 use rustc_hash::FxHashSet;
 

@@ -1,18 +1,18 @@
-//! What is wrong with a question.
+//! Errors in questions to a map.
 
 use nalgebra::Vector3;
 use thiserror::Error;
 
-use super::{MAX_COORDINATE_M, MAX_PIECES};
+use super::MAX_COORDINATE_M;
 
-/// What is wrong with a question.
+/// Error in a question.
 #[derive(Clone, PartialEq, Debug, Error)]
 pub enum QueryError {
     /// A coordinate or extent is not a number or beyond [`MAX_COORDINATE_M`].
     #[error("point or extent {0:?} m is not finite or beyond {MAX_COORDINATE_M} m")]
     Point([f64; 3]),
-    /// The extents of a box are negative, its rotation is not one, or a minimum exceeds a maximum.
-    #[error("box with extents {0:?} m is inside out or has no valid rotation")]
+    /// The minimum of a box exceeds its maximum.
+    #[error("box with extents {0:?} m is inside out")]
     Box([f64; 3]),
     /// A distance is not a number or negative.
     #[error("distance {0} m is not 0 or more")]
@@ -20,17 +20,6 @@ pub enum QueryError {
     /// A path has no points.
     #[error("a path needs at least one point")]
     EmptyPath,
-    /// A swept path would be cut into too many pieces.
-    #[error("swept path needs {0:.0} pieces, at most {MAX_PIECES}: give it in parts")]
-    TooManyPieces(f64),
-    /// A distance field would have too many cells.
-    #[error("the box has some {cells:.0} cells, but at most {max_cells} are allowed: ask for less")]
-    TooManyCells {
-        /// How many the box has, about.
-        cells: f64,
-        /// How many are allowed.
-        max_cells: usize,
-    },
 }
 
 /// Fails for what is not finite or too far away.

@@ -1,8 +1,8 @@
-//! Questions about the occupied voxels of any store: which are nearest, how clear a shape or a path
-//! is, how far every cell of a box is from them, and the shortest way around them.
+//! Questions about the occupied voxels of any store: the nearest ones, the clearance of a shape, and
+//! the shortest way around them.
 //!
-//! Everything is in the map frame, metres. Two distances are in use, and names tell which:
-//! - `nearest` and the distance field measure to the centres of occupied cells;
+//! Everything is in the map frame, metres. Two distances are in use, by name:
+//! - `nearest` measures to the centres of occupied cells;
 //! - `clearance` measures to the cells themselves, convex polyhedra, which no point in them can beat.
 //!
 //! Answers are exact up to the rounding of f64, do not depend on the number of threads or on earlier
@@ -11,7 +11,6 @@
 mod clearance;
 mod corridor;
 mod error;
-mod field;
 mod gjk;
 mod nearest;
 mod path;
@@ -27,13 +26,12 @@ use nalgebra::Vector3;
 use crate::lattice::MortonKey;
 use crate::voxels::{LabelCount, VoxelList, VoxelStore};
 
-pub use clearance::{Clearance, MAX_PIECES};
+pub use clearance::Clearance;
 pub use corridor::MAX_ROBOT_CELLS;
 pub use error::QueryError;
-pub use field::{Bounds, DistanceField};
 pub use nearest::Neighbor;
-pub use path::{Path, PathError, PathOptions, Steps};
-pub use shape::{ConvexShape, OrientedBox, Segment};
+pub use path::{Bounds, Path, PathError, PathOptions, Steps};
+pub use shape::{ConvexShape, Segment};
 pub use shells::Shells;
 
 use search::Search;

@@ -5,7 +5,6 @@ use std::collections::BinaryHeap;
 
 use nalgebra::Vector3;
 
-use super::error::check_distance;
 use super::search::Search;
 use super::{Query, QueryError};
 use crate::lattice::MortonKey;
@@ -26,19 +25,8 @@ impl<S: VoxelStore> Query<'_, S> {
     /// The `k` occupied cells whose centres are nearest to a point, nearest first; fewer if the
     /// store has fewer.
     pub fn nearest(&self, point_m: &Vector3<f64>, k: usize) -> Result<Vec<Neighbor>, QueryError> {
-        self.nearest_within(point_m, k, f64::INFINITY)
-    }
-
-    /// As [`Query::nearest`], but only cells with centres at most `max_m` away.
-    pub fn nearest_within(
-        &self,
-        point_m: &Vector3<f64>,
-        k: usize,
-        max_m: f64,
-    ) -> Result<Vec<Neighbor>, QueryError> {
         let local = self.local(point_m)?;
-        check_distance(max_m)?;
-        let found = self.nearest_to(local, k, max_m);
+        let found = self.nearest_to(local, k);
         let neighbor = |found: Found| Neighbor {
             key: found.key,
             center_m: self.store.center_m(found.key),
@@ -47,15 +35,15 @@ impl<S: VoxelStore> Query<'_, S> {
         Ok(found.into_iter().map(neighbor).collect())
     }
 
-    /// As [`Query::nearest_within`] in the frame of the datum.
-    pub(super) fn nearest_to(&self, local_m: Vector3<f64>, k: usize, max_m: f64) -> Vec<Found> {
+    /// As [`Query::nearest`] in the frame of the datum.
+    pub(super) fn nearest_to(&self, local_m: Vector3<f64>, k: usize) -> Vec<Found> {
         if k == 0 || self.store.is_empty() {
             return Vec::new();
         }
         let mut search = NearestSearch {
             local_m,
             k,
-            max_m,
+            max_m: f64::INFINITY,
             found: BinaryHeap::new(),
         };
         self.run(&mut search);

@@ -8,12 +8,13 @@ use rustc_hash::FxHashMap;
 use thiserror::Error;
 
 use super::corridor::{Corridor, MAX_ROBOT_CELLS};
+use super::error::check_point;
 use super::shells::add;
-use super::{Bounds, Query, QueryError, Segment};
+use super::{Query, QueryError, Segment};
 use crate::lattice::MortonKey;
 use crate::voxels::VoxelStore;
 
-/// Which cells a step may lead to.
+/// Cells that a step may lead to.
 #[derive(Clone, Copy, PartialEq, Eq, Debug, Default)]
 pub enum Steps {
     /// Cells that share a face.
@@ -23,14 +24,48 @@ pub enum Steps {
     Touching,
 }
 
-/// What path is wanted.
+/// A box along the axes of the map frame, metres.
+#[derive(Clone, Copy, PartialEq, Debug)]
+pub struct Bounds {
+    /// Lowest corner.
+    pub min_m: Vector3<f64>,
+    /// Highest corner.
+    pub max_m: Vector3<f64>,
+}
+
+impl Bounds {
+    /// True for points in the box or on its surface.
+    pub fn contains(&self, point_m: &Vector3<f64>) -> bool {
+        (0..3).all(|i| (self.min_m[i]..=self.max_m[i]).contains(&point_m[i]))
+    }
+
+    fn check(&self) -> Result<(), QueryError> {
+        check_point(&self.min_m)?;
+        check_point(&self.max_m)?;
+        let extents = self.max_m - self.min_m;
+        if extents.iter().all(|x| *x >= 0.0) {
+            Ok(())
+        } else {
+            Err(QueryError::Box(extents.into()))
+        }
+    }
+
+    fn moved(&self, by_m: &Vector3<f64>) -> Bounds {
+        Bounds {
+            min_m: self.min_m + by_m,
+            max_m: self.max_m + by_m,
+        }
+    }
+}
+
+/// Options of a search for a path.
 #[derive(Clone, Copy, PartialEq, Debug)]
 pub struct PathOptions {
     /// Radius of the ball that moves, metres.
     pub radius_m: f64,
     /// Steps that it can take.
     pub steps: Steps,
-    /// Where the centres of its cells must be, map frame; `None` for everywhere.
+    /// Box that holds the centres of its cells, map frame; `None` for everywhere.
     pub bounds: Option<Bounds>,
     /// The search gives up after this many cells.
     pub max_expanded: usize,
@@ -49,7 +84,7 @@ pub struct Path {
     pub expanded: usize,
 }
 
-/// Why there is no path.
+/// Failure of a search for a path.
 #[derive(Clone, PartialEq, Debug, Error)]
 pub enum PathError {
     /// The question makes no sense.
@@ -70,7 +105,7 @@ pub enum PathError {
     OutOfBounds {
         /// "start" or "goal".
         end: &'static str,
-        /// Where it is, map frame, metres.
+        /// Its place, map frame, metres.
         point_m: [f64; 3],
     },
     /// The ball does not fit at the start or goal.
@@ -78,7 +113,7 @@ pub enum PathError {
     Blocked {
         /// "start" or "goal".
         end: &'static str,
-        /// Where it is, map frame, metres.
+        /// Its place, map frame, metres.
         point_m: [f64; 3],
         /// Radius asked for, metres.
         radius_m: f64,
@@ -249,12 +284,12 @@ impl<S: VoxelStore> Query<'_, S> {
     }
 }
 
-/// What is known of a cell.
+/// State of a cell in the search.
 #[derive(Clone, Copy)]
 enum Cell {
     /// The ball does not fit.
     Closed,
-    /// It fits, but no way there is known.
+    /// The ball fits, but no way there is known.
     Open,
     Reached(Reached),
 }

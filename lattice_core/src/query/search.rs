@@ -1,4 +1,4 @@
-//! What a search through occupied cells is asked.
+//! Interface of searches through occupied cells.
 
 use nalgebra::Vector3;
 

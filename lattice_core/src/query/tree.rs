@@ -22,7 +22,7 @@ pub(super) struct Tree {
 struct Node<'a> {
     keys: &'a [MortonKey],
     level: u32,
-    /// No centre in it is nearer to the query.
+    /// Lower bound of the distance of its centres from the query.
     bound_m: f64,
 }
 

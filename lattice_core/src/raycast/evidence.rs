@@ -8,7 +8,7 @@ const UNIT: f64 = 1.0 / 32.0;
 /// A cell of which nothing is known.
 pub(super) const UNKNOWN: i8 = i8::MIN;
 
-/// How hits and misses add up, as probabilities; the defaults are those of octomap.
+/// Weights of hits and misses, as probabilities; the defaults are those of octomap.
 ///
 /// Log-odds `ln(p / (1 - p))` are kept in steps of 1/32, to which every value is rounded: with the
 /// defaults a hit adds 0.844, a miss takes 0.406, and cells stay within -2 and 3.5.

@@ -20,7 +20,7 @@ const LAST: f64 = 1.0 - 1.0 / (1_u64 << 48) as f64;
 /// A step along a ray slower than this part of a plane spacing is no crossing within the ray.
 const PARALLEL: f64 = 1.0 / (1_u64 << 50) as f64;
 
-/// What changes when a face is crossed.
+/// Change of state at the crossing of a face.
 #[derive(Clone, Copy, Debug)]
 struct Crossing<const P: usize> {
     /// Added to the numerators: Gram products with the vector of the face.
@@ -76,7 +76,7 @@ impl<const P: usize> Families<P> {
         }
     }
 
-    /// Where rays start: `s - c` for a point `s` in the cell of lattice point `c`, at index `cell`.
+    /// Starts of rays: `s - c` for a point `s` in the cell of lattice point `c`, at index `cell`.
     pub(super) fn origin(&self, from_center_m: Vector3<f64>, cell: Packed) -> Origin<P> {
         Origin {
             cell,
@@ -190,7 +190,7 @@ pub(super) struct Origin<const P: usize> {
     along: [f64; P],
 }
 
-/// Where a ray is.
+/// Position of a ray.
 #[derive(Clone, Copy, Debug)]
 pub(super) struct Walk<const P: usize> {
     q: [f64; P],
@@ -210,7 +210,7 @@ pub(super) struct Ray<const P: usize> {
 }
 
 impl<const P: usize> Walk<P> {
-    /// The parameter at which the ray leaves its cell; its low bits tell through which face.
+    /// The parameter at which the ray leaves its cell; its low bits are the number of the face.
     #[inline(always)]
     fn next_exit(&self) -> f64 {
         let mut t = [0.0; P];

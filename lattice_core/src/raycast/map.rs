@@ -199,13 +199,13 @@ impl FreeSpaceMap {
     /// Forgets everything; keeps lattice, datum and options.
     pub fn reset(&mut self) {
         let (lattice, options) = (self.lattice().clone(), self.options);
-        // What could be made once can be made again.
+        // A map that could be made once can be made again.
         if let Ok(empty) = Self::new(lattice, self.datum_m, options) {
             *self = empty;
         }
     }
 
-    /// What is known of a cell of the lattice.
+    /// State of a cell of the lattice.
     ///
     /// With a free level, a cell that was never hit is free if the coarse cell that it belongs to is.
     pub fn state(&self, key: MortonKey) -> CellState {
@@ -259,7 +259,7 @@ impl FreeSpaceMap {
         keys
     }
 
-    /// How many cells are occupied and free; goes through the whole map.
+    /// Numbers of occupied and free cells; goes through the whole map.
     pub fn counts(&self) -> CellCounts {
         let threshold = self.steps.threshold;
         let (mut occupied, mut free) = (0, 0);

@@ -20,7 +20,7 @@ impl Mask {
     }
 }
 
-/// An odd multiplier that nobody who sends points can know.
+/// An odd multiplier, unknown to senders of points.
 pub(super) fn random_multiplier() -> u64 {
     RandomState::new().hash_one(0) | 1
 }
@@ -107,7 +107,7 @@ impl ScanMasks {
         }
     }
 
-    /// How often a ray or end came into a block that is not held, for want of memory.
+    /// Rays and ends that came into a block that is not held, for want of memory.
     pub(super) fn entries_refused(&self) -> u64 {
         self.entries_refused
     }

@@ -14,7 +14,7 @@ pub const MIN_MAP_BYTES: usize = 1 << 20;
 /// Evidence, range, resolution and memory of a [`super::FreeSpaceMap`].
 #[derive(Clone, Copy, PartialEq, Debug)]
 pub struct FreeSpaceOptions {
-    /// How hits and misses add up.
+    /// Weights of hits and misses.
     pub evidence: Evidence,
     /// Rays of points that are farther than this are followed to this range, metres, and give no
     /// hit; infinite for no limit.

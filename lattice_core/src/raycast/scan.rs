@@ -47,7 +47,7 @@ pub struct ScanReport {
     pub entries_refused: u64,
 }
 
-/// Which parts of rays count.
+/// Parts of rays that count.
 #[derive(Clone, Copy, Debug)]
 pub(super) struct Reach {
     /// Points beyond this give no hit, and their rays end here.
@@ -58,7 +58,7 @@ pub(super) struct Reach {
     pub(super) keep_ratio: f64,
 }
 
-/// Where rays end. Each cell comes once.
+/// Cells where rays end, each once.
 pub(super) struct Ends {
     /// Cells that were hit.
     hits: Vec<Packed>,
@@ -114,7 +114,7 @@ fn mark_bundles(bundles: &[Rays], masks: &mut ScanMasks, report: &mut ScanReport
     };
     report.visits = follow(masks, &ends);
     if masks.entries_refused() > 0 {
-        // Which blocks are refused must not depend on the order of the points: once more, with
+        // The choice of refused blocks must not depend on the order of the points: once more, with
         // ends that are complete and sorted.
         masks.clear();
         let mut cursor = Cursor::NONE;

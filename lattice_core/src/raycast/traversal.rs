@@ -9,7 +9,7 @@ use super::families::{Families, face_pairs};
 use super::packed::{self, Packed};
 use crate::lattice::{Lattice, LatticeIndex};
 
-/// Why a segment was not followed.
+/// A segment that was not followed.
 #[derive(Clone, Copy, PartialEq, Debug, Error)]
 pub enum TraversalError {
     /// A coordinate is NaN or infinite.
@@ -103,7 +103,7 @@ impl Traversal {
     /// Calls `visit` with every cell that the segment touches, in order, from the cell of `from_m` to
     /// the cell of `to_m` (metres from the lattice point 0), until it breaks.
     ///
-    /// Where the segment meets an edge or a vertex it takes one of the ways around. Returns the
+    /// At an edge or a vertex the segment takes one of the ways around. Returns the
     /// number of cells visited. Fails if an end is not finite or out of range, before any visit.
     pub fn walk(
         &self,

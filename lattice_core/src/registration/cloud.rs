@@ -10,7 +10,7 @@ use crate::voxels::VoxelList;
 pub struct SemanticCloud {
     /// Points, metres.
     pub points_m: Vec<Point3<f64>>,
-    /// One for each point, or none at all if nothing is known of any.
+    /// Label distributions, one for each point, or none at all if nothing is known of any.
     pub labels: Vec<LabelDistribution>,
 }
 
@@ -45,12 +45,12 @@ impl SemanticCloud {
         self.points_m.len()
     }
 
-    /// Whether there is no point.
+    /// True if there is no point.
     pub fn is_empty(&self) -> bool {
         self.points_m.is_empty()
     }
 
-    /// What is known of the class of point `i`.
+    /// Label distribution of point `i`.
     pub fn label(&self, i: usize) -> LabelDistribution {
         let label = self.labels.get(i).copied();
         label.unwrap_or(LabelDistribution::UNKNOWN)

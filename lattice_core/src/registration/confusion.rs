@@ -1,4 +1,4 @@
-//! How two segmenters' labels go together, learned while clouds are registered.
+//! Co-occurrence of two segmenters' labels, learned while clouds are registered.
 
 use std::collections::BTreeMap;
 
@@ -11,12 +11,12 @@ const PRIOR_MASS: f64 = 30.0;
 /// Bounds of the lift: no pair of labels settles a correspondence alone.
 const MIN_LIFT: f64 = 0.05;
 const MAX_LIFT: f64 = 20.0;
-/// Classes of one segmenter that are told apart, at most; further ones say nothing.
+/// Most classes of one segmenter that are distinguished; further ones count as unknown.
 const MAX_CLASSES: usize = 64;
 /// Observations remembered at most: older ones fade.
 const MAX_MASS: f64 = 2_000.0;
 
-/// How often a class of the source met a class of the target in one place.
+/// Counts of source and target classes that met in one place.
 ///
 /// The two may have different label sets. Kept between calibrations, it makes labels useful that
 /// disagree in a consistent way, and harmless if they do not agree at all.
@@ -48,7 +48,7 @@ impl Confusion {
         &self.pairs
     }
 
-    /// Whether the numbers are those of observations, for one that was read from a file.
+    /// True if the numbers are those of observations, for one that was read from a file.
     pub fn is_valid(&self) -> bool {
         let finite = self.pairs.iter().all(|p| p.2 >= 0.0 && p.2.is_finite());
         finite && self.pairs.len() <= MAX_CLASSES * MAX_CLASSES && self.mass() < 1e12
@@ -101,7 +101,7 @@ impl Confusion {
         let prior = |a: usize, b: usize| {
             let independent = p[a] * q[b];
             let equal = source.names[a] == target.names[b];
-            // Where equal classes are expected, and the other class is seen as often.
+            // As often as both classes are seen, if they are expected to be equal.
             agreement * if equal { p[a].min(q[b]) } else { 0.0 } + (1.0 - agreement) * independent
         };
         let priors: Vec<f64> = (0..rows * columns)
@@ -217,7 +217,7 @@ impl Classes {
     }
 }
 
-/// How much more often than by chance two labels are seen in one place; 1 tells nothing.
+/// Ratio of the share of two labels in one place to that by chance; 1 says nothing.
 #[derive(Clone, Debug, Default)]
 pub struct Lift {
     source: Classes,

@@ -1,4 +1,4 @@
-//! Fewer points: the mean of each cubic cell.
+//! Voxel downsampling: the mean of each cubic cell.
 
 use nalgebra::{Point3, Vector3};
 

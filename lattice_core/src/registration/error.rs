@@ -1,8 +1,8 @@
-//! Why a cloud cannot be registered.
+//! Errors of clouds that cannot be registered.
 
 use thiserror::Error;
 
-/// Why a cloud cannot be prepared for registration.
+/// A cloud that cannot be prepared for registration.
 #[derive(Clone, Debug, PartialEq, Error)]
 pub enum RegistrationError {
     /// Too few points for the neighbourhoods asked for.
@@ -49,13 +49,13 @@ pub enum RegistrationError {
     /// The plane regularisation must be over 0 and at most 1.
     #[error("a plane epsilon of {plane_epsilon} is not in (0, 1]")]
     PlaneEpsilon {
-        /// What was asked for.
+        /// Number asked for.
         plane_epsilon: f64,
     },
     /// The side of a map's cells is not a length.
     #[error("a cell side of {cell_side_m} m is not a positive length")]
     CellSide {
-        /// What was given, metres.
+        /// Value given, metres.
         cell_side_m: f64,
     },
 }

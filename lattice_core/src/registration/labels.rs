@@ -1,4 +1,4 @@
-//! What is known of the semantic class of a point.
+//! Distribution of the semantic classes of a point.
 
 /// Class number of a point without a label, as in `vision_msgs/LabelInfo`.
 pub const UNLABELED: u16 = u16::MAX;
@@ -16,7 +16,7 @@ pub struct LabelDistribution {
 }
 
 impl LabelDistribution {
-    /// Nothing is known.
+    /// Distribution of a point of unknown class.
     pub const UNKNOWN: LabelDistribution = LabelDistribution {
         classes: [UNLABELED; KEPT],
         weights: [0.0; KEPT],
@@ -70,7 +70,7 @@ impl LabelDistribution {
         self.iter().next().map(|(class, _)| class)
     }
 
-    /// Probability that no class is told of.
+    /// Probability of none of the stored classes.
     pub fn unknown(&self) -> f32 {
         (1.0 - self.weights.iter().sum::<f32>()).max(0.0)
     }

@@ -1,4 +1,4 @@
-//! How well a source fits a target at a pose: the likelihood that all candidates are judged by.
+//! Likelihood of a pose given a source and a target, by which all candidates are judged.
 
 use nalgebra::{Isometry3, Point3, Vector3};
 use rayon::prelude::*;
@@ -8,7 +8,7 @@ use super::{Neighbors, PreparedCloud};
 
 /// Share of source points that have a partner in the target.
 const INLIERS: f64 = 0.8;
-/// How much denser points are on a surface of the map than anywhere.
+/// Density of points on a surface of the map over that anywhere else.
 const CONTRAST: f64 = 25.0;
 /// Parts of the source that labels are judged by while they are learned from the others.
 const FOLDS: usize = 5;
@@ -17,7 +17,7 @@ const INDEPENDENT: f64 = 4.0;
 /// Target points that a source point may belong to.
 const NEIGHBORS: usize = 4;
 
-/// How closely points are expected to agree.
+/// Deviations within which points are expected to agree.
 #[derive(Clone, Copy, PartialEq, Debug)]
 pub struct FitScale {
     /// Standard deviation across a surface, metres.
@@ -66,7 +66,7 @@ const CLOSENESS: [f64; 5] = [
 #[derive(Clone, Copy, Debug)]
 struct Partner {
     target: u32,
-    /// How likely they are one place by all but their distance across the surface, 1 at most.
+    /// Likelihood that they are one place by all but their distance across the surface, 1 at most.
     beside: f64,
     /// Squared distance across the surface in expected deviations.
     across: f64,
@@ -79,7 +79,7 @@ impl Partner {
         across: 0.0,
     };
 
-    /// How likely they are one place, if the deviation across surfaces is `closeness` of the expected
+    /// Likelihood that they are one place, if the deviation across surfaces is `closeness` of the expected
     /// one; 1 over that at most.
     fn nearness(&self, closeness: f64) -> f64 {
         if self.beside > 0.0 {
@@ -114,19 +114,19 @@ pub struct Partners {
 pub struct Likelihood {
     /// By the surfaces alone.
     pub surfaces: f64,
-    /// What the labels add, each judged by what the others taught.
+    /// Part of the labels, each judged by what the others taught.
     pub labels: f64,
 }
 
 impl Likelihood {
-    /// Of both.
+    /// Log-likelihood by surfaces and labels.
     pub fn total(&self) -> f64 {
         self.surfaces + self.labels
     }
 }
 
 impl<'a> Fit<'a> {
-    /// Of a source in a target.
+    /// Cuts a source into regions, to be judged in a target.
     pub fn new(source: &'a PreparedCloud, target: &'a PreparedCloud, scale: FitScale) -> Fit<'a> {
         let regions: Vec<[i64; 3]> = (source.points_m().iter())
             .map(|p| [p.x, p.y, p.z].map(|c| (c / scale.region_m).floor() as i64))

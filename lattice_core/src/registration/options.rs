@@ -1,10 +1,10 @@
-//! What to register by, and when to stop.
+//! Options of a registration: method, kernel, labels, and when to stop.
 
 use std::fmt;
 
 use super::LabelDistribution;
 
-/// What a registration minimises.
+/// Cost that a registration minimises.
 #[derive(Clone, Copy, PartialEq, Eq, Debug)]
 pub enum Method {
     /// Squared distance to the nearest point (Besl and McKay 1992).
@@ -19,7 +19,7 @@ pub enum Method {
     ClassWise,
 }
 
-/// Which Semantic-ICP.
+/// Variant of Semantic-ICP.
 #[derive(Clone, Copy, PartialEq, Eq, Debug)]
 pub enum SemanticVariant {
     /// As printed: density times label likelihood, not normalised, inside the kernel.
@@ -30,7 +30,7 @@ pub enum SemanticVariant {
     Em,
 }
 
-/// What of the labels is used.
+/// Use of the labels.
 #[derive(Clone, Copy, PartialEq, Eq, Debug)]
 pub enum LabelUse {
     /// The most probable class of each point.
@@ -40,18 +40,18 @@ pub enum LabelUse {
     Soft,
 }
 
-/// How well the labels of two points go together, in place of their equality.
+/// Weight of a pair by the labels of its points, in place of their equality.
 pub trait PairWeight: Sync {
     /// Not negative; 1 says nothing, less speaks against one place, more for it.
     fn weight(&self, source: &LabelDistribution, target: &LabelDistribution) -> f64;
 }
 
-/// How to register.
+/// Options of a registration.
 ///
 /// Tolerances are for the step of one iteration; both must hold.
 #[derive(Clone, Copy)]
 pub struct RegisterOptions<'a> {
-    /// What is minimised.
+    /// Method: the cost that is minimised.
     pub method: Method,
     /// Longest distance between the points of a pair, metres.
     pub gate_m: f64,
@@ -78,12 +78,12 @@ pub struct RegisterOptions<'a> {
     /// Factor a search on the variances, from a third of the gate across planes down to the true ones, for
     /// [`SemanticVariant::Em`]; 1 or more for none.
     pub anneal: f64,
-    /// Whether the kernel of [`Method::ClassWise`] takes the square of the squared distance, as the program
+    /// True if the kernel of [`Method::ClassWise`] takes the square of the squared distance, as the program
     /// of 2017 does.
     pub kernel_of_square: bool,
     /// Fewest source points of a class for [`Method::ClassWise`].
     pub min_class_points: usize,
-    /// Whether the gradient follows the source covariance as it turns. The step does in no case.
+    /// True if the gradient follows the source covariance as it turns. The step does in no case.
     pub turn_covariance: bool,
 }
 

@@ -123,7 +123,7 @@ impl Flat {
         cloud
     }
 
-    /// What a headset sees from a place, in its own frame.
+    /// A headset's scan from a place, in its own frame.
     pub fn headset_scan(
         &self,
         eye: Point3<f64>,

@@ -7,7 +7,7 @@ use thiserror::Error;
 
 use crate::lattice::MortonKey;
 
-/// What is wrong with encoded keys; positions are bytes from the start of the keys.
+/// Error in encoded keys; positions are bytes from the start of the keys.
 #[derive(Clone, Copy, PartialEq, Eq, Debug, Error)]
 pub enum CodecError {
     /// The bytes end within a varint.
@@ -25,7 +25,7 @@ pub enum CodecError {
     /// A key repeats or reaches 2^63.
     #[error("key {index}, before byte {position}, does not ascend or is not below 2^63")]
     Key {
-        /// Which key, from 0.
+        /// Number of the key, from 0.
         index: usize,
         /// The byte after it.
         position: usize,
@@ -33,7 +33,7 @@ pub enum CodecError {
     /// More keys than allowed.
     #[error("more than {max} keys")]
     TooMany {
-        /// What the caller allows.
+        /// Limit set by the caller.
         max: usize,
     },
 }

@@ -1,11 +1,11 @@
-//! How far the points are from their lattice points.
+//! Distances of the points from their lattice points.
 
 use crate::lattice::{BatchSums, Lattice};
 
 /// Distances are summed in this fraction of a cell side, their squares in this fraction of its
 /// square.
 const STEPS: f64 = (1_u64 << 20) as f64;
-/// How much a squared distance may exceed the largest in a cell, relative.
+/// Largest relative excess of a squared distance over the largest in a cell.
 const SLACK: f64 = 0.02;
 
 /// Quantization error over all inserted points.
@@ -27,9 +27,9 @@ pub struct Distortion {
 #[derive(Clone, Copy, PartialEq, Eq, Debug, Default)]
 pub(super) struct DistortionSums {
     pub(super) points: u64,
-    /// Of squared distances, in cell sides^2 / 2^20.
+    /// Sum of squared distances, in cell sides^2 / 2^20.
     pub(super) squares: u128,
-    /// Of distances, in cell sides / 2^20.
+    /// Sum of distances, in cell sides / 2^20.
     pub(super) distances: u128,
     /// The largest squared distance, in cell sides^2 / 2^20.
     pub(super) largest_square: u64,
@@ -55,8 +55,8 @@ impl DistortionSums {
         self.largest_square = self.largest_square.max(other.largest_square);
     }
 
-    /// What cannot be true of points in cells of the lattice.
-    pub(super) fn fault(&self, lattice: &Lattice) -> Option<String> {
+    /// Contradiction between these sums and points in cells of the lattice.
+    pub(super) fn contradiction(&self, lattice: &Lattice) -> Option<String> {
         let points = u128::from(self.points);
         let reach = lattice.covering_radius_m() / lattice.cell_side_m();
         // A point on the border may have been taken for one just outside of its cell.
@@ -119,7 +119,7 @@ mod tests {
             (d.mse_per_dimension_m2, d.rms_m),
             (0.625 / 3.0, 0.625_f64.sqrt())
         );
-        assert_eq!(sums.fault(&lattice()), None);
+        assert_eq!(sums.contradiction(&lattice()), None);
     }
 
     #[test]
@@ -139,30 +139,30 @@ mod tests {
             distances: 4 << 10,
             largest_square: 9 << 10,
         };
-        let fault = |sums: DistortionSums| sums.fault(&lattice()).is_some();
-        assert!(!fault(good));
+        let contradicts = |sums: DistortionSums| sums.contradiction(&lattice()).is_some();
+        assert!(!contradicts(good));
         // Seen: near a centre the rounding of the square is much of the distance.
-        assert!(!fault(DistortionSums {
+        assert!(!contradicts(DistortionSums {
             points: 2,
             squares: 228,
             distances: 21_894,
             largest_square: 114,
         }));
-        assert!(fault(DistortionSums {
+        assert!(contradicts(DistortionSums {
             squares: 19 << 10,
             ..good
         }));
-        assert!(fault(DistortionSums {
+        assert!(contradicts(DistortionSums {
             squares: 8 << 10,
             ..good
         }));
-        assert!(fault(DistortionSums { points: 0, ..good }));
-        assert!(fault(DistortionSums {
+        assert!(contradicts(DistortionSums { points: 0, ..good }));
+        assert!(contradicts(DistortionSums {
             distances: 1 << 20,
             ..good
         }));
         let far = 1 << 20;
-        assert!(fault(DistortionSums {
+        assert!(contradicts(DistortionSums {
             largest_square: far,
             squares: far.into(),
             ..good

@@ -1,4 +1,4 @@
-//! Parts of the map frame that cells are removed from or kept in.
+//! Boxes of the map frame that cells are removed from.
 
 use nalgebra::Vector3;
 use thiserror::Error;
@@ -16,65 +16,35 @@ pub enum RegionError {
         /// The upper corner, metres.
         max_m: [f64; 3],
     },
-    /// The centre is not finite, or the radius is NaN or negative.
-    #[error("{radius_m} m around {center_m:?} m is not a ball: give finite numbers, radius >= 0")]
-    Ball {
-        /// The centre, metres.
-        center_m: [f64; 3],
-        /// The radius, metres.
-        radius_m: f64,
-    },
 }
 
+/// A closed box in the map frame; a cell is in it if its centre is.
 #[derive(Clone, Copy, PartialEq, Debug)]
-enum Shape {
-    Box(Vector3<f64>, Vector3<f64>),
-    Ball(Vector3<f64>, f64),
+pub struct Region {
+    min_m: Vector3<f64>,
+    max_m: Vector3<f64>,
 }
-
-/// A closed box or ball in the map frame; a cell is in it if its centre is.
-#[derive(Clone, Copy, PartialEq, Debug)]
-pub struct Region(Shape);
 
 impl Region {
     /// The box between two corners (map frame, metres), along the axes; infinite ones are allowed.
     pub fn cuboid(min_m: Vector3<f64>, max_m: Vector3<f64>) -> Result<Region, RegionError> {
         if min_m.iter().zip(&max_m).all(|(min, max)| min <= max) {
-            return Ok(Region(Shape::Box(min_m, max_m)));
+            return Ok(Region { min_m, max_m });
         }
         let (min_m, max_m) = (min_m.into(), max_m.into());
         Err(RegionError::Corners { min_m, max_m })
     }
 
-    /// All within `radius_m` of a point (map frame, metres).
-    pub fn ball(center_m: Vector3<f64>, radius_m: f64) -> Result<Region, RegionError> {
-        if center_m.iter().all(|x| x.is_finite()) && radius_m >= 0.0 {
-            return Ok(Region(Shape::Ball(center_m, radius_m)));
-        }
-        let center_m = center_m.into();
-        Err(RegionError::Ball { center_m, radius_m })
-    }
-
     /// True if the point (map frame, metres) is inside or on the border.
-    pub fn contains(&self, p: &Vector3<f64>) -> bool {
-        match &self.0 {
-            Shape::Box(min, max) => (0..3).all(|i| min[i] <= p[i] && p[i] <= max[i]),
-            Shape::Ball(center, radius) => (p - center).norm() <= *radius,
-        }
+    fn contains(&self, p: &Vector3<f64>) -> bool {
+        self.contains_ball(p, 0.0) == Some(true)
     }
 
-    /// Whether all of a ball is inside, or all outside; `None` if neither is sure.
+    /// True if all of a ball is inside, false if all is outside; `None` if neither is sure.
     fn contains_ball(&self, p: &Vector3<f64>, reach: f64) -> Option<bool> {
-        let (inside, outside) = match &self.0 {
-            Shape::Box(min, max) => (
-                (0..3).all(|i| min[i] <= p[i] - reach && p[i] + reach <= max[i]),
-                (0..3).any(|i| p[i] + reach < min[i] || max[i] < p[i] - reach),
-            ),
-            Shape::Ball(center, radius) => {
-                let distance = (p - center).norm();
-                (distance + reach <= *radius, distance - reach > *radius)
-            }
-        };
+        let (min, max) = (&self.min_m, &self.max_m);
+        let inside = (0..3).all(|i| min[i] <= p[i] - reach && p[i] + reach <= max[i]);
+        let outside = (0..3).any(|i| p[i] + reach < min[i] || max[i] < p[i] - reach);
         (inside || outside).then_some(inside)
     }
 
@@ -112,7 +82,7 @@ impl CellsOf {
         self.region.contains(&center_m)
     }
 
-    /// For a block told by its lowest index, if it is the same for all of its cells.
+    /// The answer for all cells of a block, given by its lowest index, if they agree.
     pub(super) fn block_is_inside(&self, first: LatticeIndex) -> Option<bool> {
         let middle_m = self.datum_m + self.lattice.center(first) + self.middle_m;
         self.region.contains_ball(&middle_m, self.reach_m)
@@ -128,10 +98,7 @@ mod tests {
         let region = Region::cuboid(Vector3::zeros(), Vector3::repeat(1.0)).unwrap();
         assert!(region.contains(&Vector3::zeros()) && region.contains(&Vector3::repeat(1.0)));
         assert!(!region.contains(&Vector3::new(0.5, 0.5, 1.0 + 1e-15)));
-        let ball = Region::ball(Vector3::zeros(), 5.0).unwrap();
-        assert!(ball.contains(&Vector3::new(3.0, 4.0, 0.0)));
-        assert!(!ball.contains(&Vector3::new(3.0, 4.0, 1e-3)));
-        assert!(!ball.contains(&Vector3::repeat(f64::NAN)));
+        assert!(!region.contains(&Vector3::repeat(f64::NAN)));
     }
 
     #[test]
@@ -154,8 +121,5 @@ mod tests {
         let nan = Vector3::new(0.0, f64::NAN, 0.0);
         assert!(Region::cuboid(nan, high).is_err());
         assert!(Region::cuboid(high, Vector3::zeros()).is_err());
-        assert!(Region::ball(high, 1.0).is_err());
-        assert!(Region::ball(Vector3::zeros(), f64::NAN).is_err());
-        assert!(Region::ball(Vector3::zeros(), -1.0).is_err());
     }
 }

@@ -1,4 +1,4 @@
-//! What is kept of the points in one cell.
+//! Count and sum of the points in one cell.
 
 /// Unit of all payload sums, metres: 2^-20 m, about a micrometre.
 pub const OFFSET_UNIT_M: f64 = 1.0 / (1_u64 << 20) as f64;
@@ -28,8 +28,8 @@ impl Voxel {
         }
     }
 
-    /// What is impossible about this voxel if no point is more than `reach` units off the centre.
-    pub(super) fn fault(&self, reach: u64) -> Option<String> {
+    /// Contradiction in this voxel if no point is more than `reach` units off the centre.
+    pub(super) fn contradiction(&self, reach: u64) -> Option<String> {
         if self.count == 0 {
             return Some("a voxel without points".to_owned());
         }

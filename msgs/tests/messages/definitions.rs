@@ -57,7 +57,7 @@ fn full_name(kind: &str, package: &str) -> Option<String> {
     }
 }
 
-/// How the field of such a type shows in Rust.
+/// Type of such a field in Rust.
 fn as_rust_shows(kind: &str) -> String {
     let mut name = kind.rsplit('/').next().unwrap().replace("byte", "uint8");
     if name.starts_with(char::is_uppercase) {

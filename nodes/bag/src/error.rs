@@ -1,4 +1,4 @@
-//! What can go wrong with a bag: every variant names the file, the place, the reason and the remedy.
+//! Errors of bags, each with the file, the place, the reason and the remedy.
 
 use std::{io, path::Path, path::PathBuf, sync::Arc};
 
@@ -12,7 +12,7 @@ pub enum BagError {
     Io {
         /// The file or folder.
         path: PathBuf,
-        /// What was tried, such as "open".
+        /// The attempt, such as "open".
         doing: &'static str,
         /// The cause.
         #[source]
@@ -23,9 +23,9 @@ pub enum BagError {
     Foreign {
         /// The file.
         path: PathBuf,
-        /// What the file is.
+        /// The kind of the file.
         found: String,
-        /// What to do.
+        /// The remedy.
         remedy: &'static str,
     },
     /// The file ends early, as after a crash of the recorder.
@@ -38,11 +38,11 @@ pub enum BagError {
     Truncated {
         /// The file.
         path: PathBuf,
-        /// Where the file ends, bytes.
+        /// End of the file, bytes.
         size_bytes: u64,
-        /// What was cut, with its own offset.
+        /// The cut part, with its own offset.
         inside: String,
-        /// How many whole messages precede the cut.
+        /// Number of whole messages before the cut.
         readable_messages: u64,
     },
     /// The bytes contradict the format.
@@ -52,9 +52,9 @@ pub enum BagError {
         path: PathBuf,
         /// The byte offset, row or message.
         position: String,
-        /// What is wrong there, with the numbers.
+        /// The contradiction, with the numbers.
         reason: String,
-        /// What to do.
+        /// The remedy.
         remedy: &'static str,
     },
     /// `metadata.yaml` cannot be used.
@@ -62,7 +62,7 @@ pub enum BagError {
     Metadata {
         /// The metadata file.
         path: PathBuf,
-        /// What is wrong, with line and column where known.
+        /// The reason, with line and column where known.
         reason: String,
     },
     /// `metadata.yaml` points outside the bag.
@@ -78,7 +78,7 @@ pub enum BagError {
     TooLarge {
         /// The file.
         path: PathBuf,
-        /// What is too large.
+        /// The part that is too large.
         what: &'static str,
         /// The byte offset, row or message.
         position: String,
@@ -86,7 +86,7 @@ pub enum BagError {
         size_bytes: u64,
         /// The limit, bytes.
         limit_bytes: u64,
-        /// What to do.
+        /// The remedy.
         remedy: &'static str,
     },
     /// The bag uses something that is not implemented.
@@ -94,9 +94,9 @@ pub enum BagError {
     Unsupported {
         /// The file.
         path: PathBuf,
-        /// What is used.
+        /// The feature.
         what: String,
-        /// What to do.
+        /// The remedy.
         remedy: &'static str,
     },
     /// The target of a writer is taken.
@@ -104,7 +104,7 @@ pub enum BagError {
     Exists {
         /// The target.
         path: PathBuf,
-        /// Why it is not replaced, after a separator, or nothing.
+        /// The reason to keep it, after a separator, or nothing.
         why: String,
         /// The other remedy, or nothing.
         or_overwrite: &'static str,
@@ -120,7 +120,7 @@ pub enum BagError {
 }
 
 impl BagError {
-    /// The same, told of `file`: errors in a decompressed copy are of the compressed file.
+    /// The same error of `file`: errors in a decompressed copy are those of the compressed file.
     pub(crate) fn in_file(mut self, file: &Path) -> BagError {
         if let BagError::Io { path, .. }
         | BagError::Foreign { path, .. }

@@ -1,4 +1,4 @@
-//! Merges the storage files of a bag into one stream in order of log time.
+//! Messages of all storage files of a bag, merged in order of log time.
 
 use std::{collections::VecDeque, path::PathBuf, sync::Arc};
 
@@ -10,22 +10,22 @@ use super::{
     zstd_files::decompress_message,
 };
 
-/// How messages are compressed one by one.
+/// Compression of single messages.
 #[derive(Clone, Copy, PartialEq, Eq, Debug)]
 pub(crate) enum MessageCompression {
     /// They are not.
     None,
     /// All are.
     Zstd,
-    /// Nobody tells: those that start like a zstd frame are. CDR starts with a zero byte.
+    /// Unknown: those that start like a zstd frame are. CDR starts with a zero byte.
     Detect,
 }
 
 /// Messages of a bag in order of log time. Holds one message per storage file that overlaps in
 /// time, and for MCAP the chunks that overlap. Ends after the first error.
 pub struct Messages {
-    splits: Arc<Vec<Split>>,
-    topics: Arc<Vec<TopicInfo>>,
+    splits: Arc<[Split]>,
+    topics: Arc<[TopicInfo]>,
     wanted: Vec<bool>,
     start_ns: i64,
     end_ns: Option<i64>,
@@ -49,8 +49,8 @@ struct Active {
 
 impl Messages {
     pub(crate) fn new(
-        splits: Arc<Vec<Split>>,
-        topics: Arc<Vec<TopicInfo>>,
+        splits: Arc<[Split]>,
+        topics: Arc<[TopicInfo]>,
         wanted: Vec<bool>,
         start_ns: i64,
         end_ns: Option<i64>,

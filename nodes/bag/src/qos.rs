@@ -1,35 +1,41 @@
-//! Quality of service as bags record it: integers up to metadata version 8, names from 9 on.
+//! Quality of service in bags: integers up to metadata version 8, names from 9 on.
 
 use serde::{Deserialize, Serialize};
 
-macro_rules! policy {
-    ($(#[$doc:meta])* $name:ident { $($(#[$vdoc:meta])* $variant:ident = $number:literal $text:literal,)* }) => {
-        $(#[$doc])*
-        #[derive(Clone, Copy, PartialEq, Eq, Hash, Debug, Serialize, Deserialize)]
-        #[serde(from = "Policy", into = "&'static str")]
-        pub enum $name { $($(#[$vdoc])* $variant,)* }
+/// The quality of service that one recorded publisher offered, as far as playing needs it.
+#[derive(Clone, PartialEq, Eq, Hash, Debug, Serialize, Deserialize)]
+#[serde(from = "RecordedQos", into = "WrittenQos")]
+pub struct BagQos {
+    /// Keeps all samples, not only the newest `depth`.
+    pub keep_all: bool,
+    /// Number of samples kept otherwise.
+    pub depth: u64,
+    /// Sends lost samples again.
+    pub reliable: bool,
+    /// Keeps samples for late joiners (transient local).
+    pub latched: bool,
+}
 
-        impl $name {
-            /// The name in metadata version 9.
-            pub fn name(self) -> &'static str {
-                match self { $(Self::$variant => $text,)* }
-            }
+impl Default for BagQos {
+    /// Keep the last 10, reliable, volatile.
+    fn default() -> Self {
+        BagQos {
+            keep_all: false,
+            depth: 10,
+            reliable: true,
+            latched: false,
         }
+    }
+}
 
-        impl From<Policy> for $name {
-            fn from(policy: Policy) -> Self {
-                match policy {
-                    $(Policy::Number($number) => Self::$variant,)*
-                    $(Policy::Name(name) if name.eq_ignore_ascii_case($text) => Self::$variant,)*
-                    _ => Self::Unknown,
-                }
-            }
-        }
-
-        impl From<$name> for &'static str {
-            fn from(policy: $name) -> Self { policy.name() }
-        }
-    };
+/// The policies that are read; the others of a bag are passed over.
+#[derive(Deserialize)]
+#[serde(default)]
+struct RecordedQos {
+    history: Policy,
+    depth: u64,
+    reliability: Policy,
+    durability: Policy,
 }
 
 /// A policy in either of its two spellings.
@@ -40,140 +46,82 @@ enum Policy {
     Name(String),
 }
 
-policy! {
-    /// How many samples a writer keeps.
-    BagHistory {
-        /// Whatever the middleware does.
-        SystemDefault = 0 "system_default",
-        /// The newest `depth`.
-        KeepLast = 1 "keep_last",
-        /// All of them.
-        KeepAll = 2 "keep_all",
-        /// Not known.
-        Unknown = 3 "unknown",
+impl Policy {
+    fn is(&self, number: i64, name: &str) -> bool {
+        match self {
+            Policy::Number(found) => *found == number,
+            Policy::Name(found) => found.eq_ignore_ascii_case(name),
+        }
     }
 }
 
-policy! {
-    /// Whether lost samples are sent again.
-    BagReliability {
-        /// Whatever the middleware does.
-        SystemDefault = 0 "system_default",
-        /// Sent again.
-        Reliable = 1 "reliable",
-        /// Not sent again.
-        BestEffort = 2 "best_effort",
-        /// Not known.
-        Unknown = 3 "unknown",
-        /// As the other side has it.
-        BestAvailable = 4 "best_available",
-    }
-}
-
-policy! {
-    /// Whether late joiners get old samples.
-    BagDurability {
-        /// Whatever the middleware does.
-        SystemDefault = 0 "system_default",
-        /// They do ("latched").
-        TransientLocal = 1 "transient_local",
-        /// They do not.
-        Volatile = 2 "volatile",
-        /// Not known.
-        Unknown = 3 "unknown",
-        /// As the other side has it.
-        BestAvailable = 4 "best_available",
-    }
-}
-
-policy! {
-    /// How a writer shows that it is alive.
-    BagLiveliness {
-        /// Whatever the middleware does.
-        SystemDefault = 0 "system_default",
-        /// By the middleware.
-        Automatic = 1 "automatic",
-        /// By the node (deprecated).
-        ManualByNode = 2 "manual_by_node",
-        /// By each topic.
-        ManualByTopic = 3 "manual_by_topic",
-        /// Not known.
-        Unknown = 4 "unknown",
-        /// As the other side has it.
-        BestAvailable = 5 "best_available",
-    }
-}
-
-/// A duration of a policy; [`BagDuration::INFINITE`] where there is no bound.
-#[derive(Clone, Copy, PartialEq, Eq, Hash, Debug, Serialize, Deserialize)]
-pub struct BagDuration {
-    /// Whole seconds.
-    pub sec: u64,
-    /// Nanoseconds.
-    pub nsec: u64,
-}
-
-impl BagDuration {
-    /// No bound: 2^63 - 1 ns.
-    pub const INFINITE: BagDuration = BagDuration {
-        sec: 9_223_372_036,
-        nsec: 854_775_807,
-    };
-}
-
-impl Default for BagDuration {
+impl Default for RecordedQos {
     fn default() -> Self {
-        Self::INFINITE
+        let unknown = || Policy::Name(String::new());
+        RecordedQos {
+            history: unknown(),
+            depth: BagQos::default().depth,
+            reliability: unknown(),
+            durability: unknown(),
+        }
     }
 }
 
-/// The quality of service that one recorded publisher offered.
-#[derive(Clone, PartialEq, Eq, Hash, Debug, Serialize, Deserialize)]
-#[serde(default)]
-pub struct BagQos {
-    /// How many samples are kept.
-    pub history: BagHistory,
-    /// The number of samples kept under [`BagHistory::KeepLast`].
-    pub depth: u64,
-    /// Whether lost samples are sent again.
-    pub reliability: BagReliability,
-    /// Whether late joiners get old samples.
-    pub durability: BagDurability,
-    /// Longest time between samples.
-    pub deadline: BagDuration,
-    /// How long a sample is valid.
-    pub lifespan: BagDuration,
-    /// How the writer shows that it is alive.
-    pub liveliness: BagLiveliness,
-    /// How often it must.
-    pub liveliness_lease_duration: BagDuration,
-    /// Whether the topic name carries no ROS prefix.
-    pub avoid_ros_namespace_conventions: bool,
-}
-
-impl Default for BagQos {
-    /// Keep the last 10, reliable, volatile.
-    fn default() -> Self {
+impl From<RecordedQos> for BagQos {
+    fn from(recorded: RecordedQos) -> Self {
         BagQos {
-            history: BagHistory::KeepLast,
-            depth: 10,
-            reliability: BagReliability::Reliable,
-            durability: BagDurability::Volatile,
-            deadline: BagDuration::INFINITE,
-            lifespan: BagDuration::INFINITE,
-            liveliness: BagLiveliness::Automatic,
-            liveliness_lease_duration: BagDuration::INFINITE,
+            keep_all: recorded.history.is(2, "keep_all"),
+            depth: recorded.depth,
+            reliable: !recorded.reliability.is(2, "best_effort"),
+            latched: recorded.durability.is(1, "transient_local"),
+        }
+    }
+}
+
+/// All policies as rosbag2 wants them; those that nothing here reads have no bound.
+#[derive(Serialize)]
+struct WrittenQos {
+    history: &'static str,
+    depth: u64,
+    reliability: &'static str,
+    durability: &'static str,
+    deadline: WrittenDuration,
+    lifespan: WrittenDuration,
+    liveliness: &'static str,
+    liveliness_lease_duration: WrittenDuration,
+    avoid_ros_namespace_conventions: bool,
+}
+
+#[derive(Clone, Copy, Serialize)]
+struct WrittenDuration {
+    sec: u64,
+    nsec: u64,
+}
+
+/// No bound: 2^63 - 1 ns.
+const INFINITE: WrittenDuration = WrittenDuration {
+    sec: 9_223_372_036,
+    nsec: 854_775_807,
+};
+
+impl From<BagQos> for WrittenQos {
+    fn from(qos: BagQos) -> Self {
+        let choose = |first, yes, no| if first { yes } else { no };
+        WrittenQos {
+            history: choose(qos.keep_all, "keep_all", "keep_last"),
+            depth: qos.depth,
+            reliability: choose(qos.reliable, "reliable", "best_effort"),
+            durability: choose(qos.latched, "transient_local", "volatile"),
+            deadline: INFINITE,
+            lifespan: INFINITE,
+            liveliness: "automatic",
+            liveliness_lease_duration: INFINITE,
             avoid_ros_namespace_conventions: false,
         }
     }
 }
 
 impl BagQos {
-    /// Whether the publisher kept samples for late joiners.
-    pub fn is_latched(&self) -> bool {
-        self.durability == BagDurability::TransientLocal
-    }
-
     /// Parses the YAML list that storage files and metadata up to version 8 carry as text.
     pub(crate) fn parse_list(text: &str) -> Result<Vec<BagQos>, serde_yaml::Error> {
         Ok(serde_yaml::from_str::<Option<Vec<BagQos>>>(text)?.unwrap_or_default())
@@ -191,29 +139,27 @@ mod tests {
 
     #[test]
     fn numbers_and_names_mean_the_same() {
-        let numbers = "- history: 1\n  depth: 7\n  reliability: 2\n  durability: 1\n  deadline: {sec: 0, nsec: 5}\n  \
-                       lifespan: {sec: 2147483647, nsec: 4294967295}\n  liveliness: 3\n";
-        let names = "- history: keep_last\n  depth: 7\n  reliability: best_effort\n  durability: TRANSIENT_LOCAL\n  \
-                     deadline: {sec: 0, nsec: 5}\n  lifespan: {sec: 2147483647, nsec: 4294967295}\n  \
-                     liveliness: manual_by_topic\n";
-        let parsed = BagQos::parse_list(numbers).unwrap();
-        assert_eq!(parsed, BagQos::parse_list(names).unwrap());
-        assert_eq!(parsed[0].depth, 7);
-        assert_eq!(parsed[0].reliability, BagReliability::BestEffort);
-        assert!(parsed[0].is_latched());
-        assert_eq!(parsed[0].deadline, BagDuration { sec: 0, nsec: 5 });
+        let numbers = "- history: 2\n  depth: 7\n  reliability: 2\n  durability: 1\n  deadline: {sec: 0, nsec: 5}\n";
+        let names = "- history: keep_all\n  depth: 7\n  reliability: best_effort\n  durability: TRANSIENT_LOCAL\n";
+        let expected = BagQos {
+            keep_all: true,
+            depth: 7,
+            reliable: false,
+            latched: true,
+        };
+        for text in [numbers, names] {
+            assert_eq!(BagQos::parse_list(text).unwrap(), [expected.clone()]);
+        }
     }
 
     #[test]
     fn text_round_trips() {
-        let list = vec![
-            BagQos::default(),
-            BagQos {
-                depth: 1,
-                durability: BagDurability::TransientLocal,
-                ..BagQos::default()
-            },
-        ];
+        let latched = BagQos {
+            depth: 1,
+            latched: true,
+            ..BagQos::default()
+        };
+        let list = vec![BagQos::default(), latched];
         assert_eq!(
             BagQos::parse_list(&BagQos::to_text(&list).unwrap()).unwrap(),
             list
@@ -223,10 +169,9 @@ mod tests {
     }
 
     #[test]
-    fn strange_policies_are_unknown() {
+    fn strange_policies_are_those_of_most_publishers() {
         let parsed = BagQos::parse_list("- {history: 77, reliability: maybe}").unwrap();
-        assert_eq!(parsed[0].history, BagHistory::Unknown);
-        assert_eq!(parsed[0].reliability, BagReliability::Unknown);
+        assert_eq!(parsed, [BagQos::default()]);
         assert!(BagQos::parse_list("{not: [a, list").is_err());
     }
 }

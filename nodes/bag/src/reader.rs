@@ -1,4 +1,4 @@
-//! Opens rosbag2 directories and bare storage files.
+//! Reader of rosbag2 directories and bare storage files.
 
 use std::{
     fs,
@@ -7,7 +7,7 @@ use std::{
 };
 
 use super::{
-    BagError, BagSummary, FileSummary, Messages, TopicInfo,
+    BagError, Messages, TopicInfo,
     messages::MessageCompression,
     metadata::{CompressionMode, Metadata},
     split::Split,
@@ -17,7 +17,7 @@ use super::{
 /// More storage files than this are refused.
 const MAX_FILES: usize = 100_000;
 
-/// Which messages to read; the default is all.
+/// Selection of messages by topic and time; the default is all.
 #[derive(Clone, Debug, Default)]
 pub struct ReadOptions {
     /// Names of topics; all where nothing.
@@ -31,16 +31,18 @@ pub struct ReadOptions {
 /// A bag opened for reading. Cheap to clone.
 #[derive(Clone)]
 pub struct BagReader {
-    summary: Arc<BagSummary>,
-    topics: Arc<Vec<TopicInfo>>,
-    splits: Arc<Vec<Split>>,
+    path: PathBuf,
+    topics: Arc<[TopicInfo]>,
+    message_count: u64,
+    range_ns: Option<(i64, i64)>,
+    splits: Arc<[Split]>,
     compression: MessageCompression,
 }
 
 impl BagReader {
     /// Opens a rosbag2 directory, with or without `metadata.yaml`, or a bare storage file.
     ///
-    /// A damaged bag opens if anything of it can be read; [`BagSummary::damage`] tells.
+    /// A damaged bag opens, with a warning, if anything of it can be read.
     pub fn open(path: &Path) -> Result<BagReader, BagError> {
         let examined = fs::metadata(path).map_err(BagError::io(path, "open"))?;
         if !examined.is_dir() {
@@ -73,10 +75,10 @@ impl BagReader {
             // The first one is opened at once for the message definitions.
             let mut split = Split::new(file, !splits.is_empty())?;
             if split.open.is_none()
-                && let Some(told) = metadata.files.iter().find(|told| told.path == entry)
+                && let Some(listed) = metadata.files.iter().find(|file| file.path == entry)
             {
-                split.range_ns = told.range_ns();
-                split.message_count = Some(told.message_count);
+                split.range_ns = listed.range_ns();
+                split.message_count = Some(listed.message_count);
             }
             splits.push(split);
         }
@@ -90,22 +92,17 @@ impl BagReader {
 
     /// The first log time, ns since the Unix epoch; nothing without messages.
     pub fn start_ns(&self) -> Option<i64> {
-        self.summary.range_ns.map(|(start_ns, _)| start_ns)
+        self.range_ns.map(|(start_ns, _)| start_ns)
     }
 
     /// The last log time, ns since the Unix epoch; nothing without messages.
     pub fn end_ns(&self) -> Option<i64> {
-        self.summary.range_ns.map(|(_, end_ns)| end_ns)
+        self.range_ns.map(|(_, end_ns)| end_ns)
     }
 
-    /// How many messages there are, as the bag's index says.
+    /// Number of messages, by the bag's index.
     pub fn message_count(&self) -> u64 {
-        self.summary.message_count
-    }
-
-    /// What the bag holds as a whole.
-    pub fn summary(&self) -> &BagSummary {
-        &self.summary
+        self.message_count
     }
 
     /// The wanted messages in order of log time across all files, with bounded memory.
@@ -136,7 +133,7 @@ impl BagReader {
                 name: "topics",
                 reason: format!(
                     "{unknown} is not in {}, which has {}",
-                    self.summary.path.display(),
+                    self.path.display(),
                     known.join(", ")
                 ),
             });
@@ -169,7 +166,6 @@ impl BagReader {
                 .filter_map(|s| s.open.as_ref())
                 .map(|open| open.info())
         };
-        let embedded = infos().find_map(|info| info.metadata.clone());
         let compression = match &metadata {
             None => MessageCompression::Detect,
             Some(metadata) => match metadata.compression(path)? {
@@ -184,9 +180,11 @@ impl BagReader {
                 .iter()
                 .for_each(|topic| merge_topic(&mut topics, topic, counted));
         }
-        let damage = splits.iter().find_map(Split::damage);
+        for damage in splits.iter().filter_map(Split::damage) {
+            log::warn!("{damage}");
+        }
         let all_open = splits.iter().all(|split| split.open.is_some());
-        let told = metadata
+        let listed = metadata
             .as_ref()
             .filter(|m| m.message_count > 0)
             .and_then(|m| {
@@ -204,38 +202,15 @@ impl BagReader {
             .iter()
             .filter_map(|split| split.message_count)
             .fold(0, u64::saturating_add);
-        let files = splits.iter().map(|split| FileSummary {
-            path: split.path.clone(),
-            range_ns: split.range_ns,
-            message_count: split.message_count,
-        });
-        let first = splits.iter().find_map(|split| split.open.as_ref());
-        let described = metadata.as_ref().or(embedded.as_ref());
-        let summary = BagSummary {
+        Ok(BagReader {
             path: path.to_path_buf(),
-            storage: match (first, &metadata) {
-                (Some(open), _) => open.storage(),
-                (None, Some(m)) if m.storage_identifier == "sqlite3" => super::Storage::Sqlite3,
-                _ => super::Storage::Mcap,
-            },
-            metadata_version: metadata.as_ref().map(|m| m.version),
-            ros_distro: described.map(|m| m.ros_distro.clone()).unwrap_or_default(),
-            custom_data: described
-                .and_then(|m| m.custom_data.clone())
-                .unwrap_or_default(),
-            files: files.collect(),
-            topics: topics.clone(),
             message_count: match &metadata {
                 Some(m) if !all_open => m.message_count,
                 _ => count,
             },
-            range_ns: if all_open { seen } else { told.or(seen) },
-            damage,
-        };
-        Ok(BagReader {
-            summary: Arc::new(summary),
-            topics: Arc::new(topics),
-            splits: Arc::new(splits),
+            range_ns: if all_open { seen } else { listed.or(seen) },
+            topics: topics.into(),
+            splits: splits.into(),
             compression,
         })
     }
@@ -247,13 +222,12 @@ fn listed_topics(metadata: Option<&Metadata>) -> Vec<TopicInfo> {
         .map(|m| m.topics_with_message_count.as_slice())
         .unwrap_or_default();
     let topic = |counted: &super::metadata::CountedTopic| {
-        let told = counted.topic_metadata.clone();
+        let topic = counted.topic_metadata.clone();
         TopicInfo {
-            name: told.name,
-            type_name: full_type_name(&told.type_name),
-            serialization_format: told.serialization_format,
-            offered_qos: told.offered_qos_profiles,
-            type_hash: Some(told.type_description_hash).filter(|hash| !hash.is_empty()),
+            name: topic.name,
+            type_name: full_type_name(&topic.type_name),
+            serialization_format: topic.serialization_format,
+            offered_qos: topic.offered_qos_profiles,
             definition: None,
             message_count: counted.message_count,
         }
@@ -261,7 +235,7 @@ fn listed_topics(metadata: Option<&Metadata>) -> Vec<TopicInfo> {
     listed.iter().map(topic).collect()
 }
 
-/// Adds what a storage file knows of a topic; counts only where `metadata.yaml` does not tell.
+/// Completes a topic from a storage file; counts only where there is no `metadata.yaml`.
 fn merge_topic(topics: &mut Vec<TopicInfo>, topic: &TopicInfo, counted: bool) {
     let Some(known) = topics
         .iter_mut()
@@ -276,7 +250,6 @@ fn merge_topic(topics: &mut Vec<TopicInfo>, topic: &TopicInfo, counted: bool) {
     if known.offered_qos.is_empty() {
         known.offered_qos.clone_from(&topic.offered_qos);
     }
-    known.type_hash = known.type_hash.take().or_else(|| topic.type_hash.clone());
     known.definition = known.definition.take().or_else(|| topic.definition.clone());
     if counted {
         known.message_count = known.message_count.saturating_add(topic.message_count);

@@ -1,4 +1,4 @@
-//! Tells by its first bytes what a file is.
+//! Kind of a file by its first bytes.
 
 use std::{fs::File, io::Read, path::Path};
 
@@ -20,7 +20,7 @@ pub(crate) enum FileKind {
 
 const NO_BAG: &str = "give a rosbag2 folder, or an .mcap or .db3 file of one";
 
-/// What others leave where a bag is expected: first bytes, name, what to do.
+/// Kinds of file that people give for a bag: first bytes, name, remedy.
 const FOREIGN: &[(&[u8], &str, &str)] = &[
     (
         b"#ROSBAG V",

@@ -3,7 +3,7 @@
 use std::path::{Path, PathBuf};
 
 use super::{
-    BagError, Storage, TopicInfo,
+    BagError, TopicInfo,
     mcap_storage::McapFile,
     sniff::{FileKind, identify},
     sqlite_storage::SqliteFile,
@@ -37,13 +37,6 @@ impl OpenFile {
                 what: "a storage file compressed twice".into(),
                 remedy: "decompress it with `zstd -d`",
             }),
-        }
-    }
-
-    pub(crate) fn storage(&self) -> Storage {
-        match self {
-            OpenFile::Mcap(_) => Storage::Mcap,
-            OpenFile::Sqlite(_) => Storage::Sqlite3,
         }
     }
 
@@ -106,7 +99,7 @@ impl OpenFile {
 /// A storage file in the order of the bag.
 pub(crate) struct Split {
     pub(crate) path: PathBuf,
-    /// Where compressed and not yet needed: nothing.
+    /// Nothing where it is compressed and not yet needed.
     pub(crate) open: Option<OpenFile>,
     /// First and last log time, where known.
     pub(crate) range_ns: Option<(i64, i64)>,
@@ -114,7 +107,7 @@ pub(crate) struct Split {
 }
 
 impl Split {
-    /// What is wrong with the file; what precedes the damage can be read.
+    /// Damage of the file; all before it can be read.
     pub(crate) fn damage(&self) -> Option<BagError> {
         let damage = self.open.as_ref()?.info().damage.clone()?;
         Some(damage.in_file(&self.path))

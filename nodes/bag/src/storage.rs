@@ -1,8 +1,8 @@
-//! What the readers of the storage files have in common.
+//! Parts common to the readers of the storage files.
 
-use super::{BagError, BagQos, TopicInfo, metadata::Metadata};
+use super::{BagError, BagQos, TopicInfo};
 
-/// What is known of a storage file after opening it.
+/// Index of a storage file after opening it.
 #[derive(Clone, Debug, Default)]
 pub(crate) struct StorageInfo {
     pub topics: Vec<TopicInfo>,
@@ -10,8 +10,6 @@ pub(crate) struct StorageInfo {
     /// First and last log time.
     pub range_ns: Option<(i64, i64)>,
     pub damage: Option<BagError>,
-    /// The bag's metadata, where the file embeds it.
-    pub metadata: Option<Metadata>,
 }
 
 /// A message of one storage file.
@@ -25,7 +23,7 @@ pub(crate) struct StorageMessage {
 /// Messages in order of log time; ends after the first error.
 pub(crate) type StorageStream = Box<dyn Iterator<Item = Result<StorageMessage, BagError>> + Send>;
 
-/// Which messages are wanted.
+/// Selection of messages by topic and time.
 #[derive(Clone, Debug)]
 pub(crate) struct Filter {
     /// By index of the file's topics.
@@ -47,7 +45,7 @@ impl Filter {
         self.topics.get(topic).copied().unwrap_or(false)
     }
 
-    /// Whether any time of the closed range is wanted.
+    /// Overlap of the wanted times with a closed range.
     pub(crate) fn overlaps(&self, (first_ns, last_ns): (i64, i64)) -> bool {
         last_ns >= self.start_ns && self.end_ns.is_none_or(|end_ns| first_ns < end_ns)
     }
@@ -69,7 +67,7 @@ pub(crate) fn full_type_name(name: &str) -> String {
     }
 }
 
-/// How storage files name the language of a message definition.
+/// Language of a message definition, as storage files name it.
 pub(crate) fn definition_encoding(text: &str) -> &'static str {
     match text {
         "" => "",

@@ -18,8 +18,8 @@ use std::process::ExitCode;
 use clap::{Parser, Subcommand};
 use lattice_core::lattice::LatticeKind;
 
-/// Any error on its way to the user.
-type CliResult = Result<(), Box<dyn Error + Send + Sync>>;
+/// Result of a command, with any error on its way to the user.
+type CliResult<T = ()> = Result<T, Box<dyn Error + Send + Sync>>;
 
 /// Lattice voxel maps from logs and live robots.
 #[derive(Parser)]

@@ -1,4 +1,4 @@
-//! Progress bars on standard error, hidden where nobody looks.
+//! Progress bars on standard error, hidden unless that is a terminal.
 
 use std::time::Duration;
 
@@ -23,13 +23,13 @@ impl Progress {
         Self(bar)
     }
 
-    /// How much is done.
+    /// Sets the share that is done.
     pub fn set(&self, done: f64) {
         self.0
             .set_position((done.clamp(0.0, 1.0) * STEPS as f64) as u64);
     }
 
-    /// A word about what happens now.
+    /// Sets the text behind the bar.
     pub fn say(&self, text: &str) {
         self.0.set_message(text.to_owned());
     }

@@ -1,4 +1,4 @@
-//! `lattice quantize`: what each lattice makes of a point file.
+//! `lattice quantize`: statistics of a point file on each lattice.
 
 use std::fs::File;
 use std::io::BufWriter;
@@ -26,7 +26,7 @@ pub struct Quantize {
     /// Volume of one cell in m^3
     #[arg(long, default_value_t = 0.125)]
     cell_volume: f64,
-    /// How the cells lie: paper, ground (flattest), or a crystal direction that points up, as 110-up
+    /// Orientation of the cells: paper, ground (flattest), or a crystal direction that points up, as 110-up
     #[arg(long, default_value = "paper")]
     orientation: Orientation,
     /// Most points to read

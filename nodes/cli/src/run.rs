@@ -59,6 +59,6 @@ impl Run {
         for (name, start) in nodes {
             running.push(start(&runtime, name)?);
         }
-        executables::run_until_told(&runtime, running)
+        executables::run_until_stopped(&runtime, running)
     }
 }

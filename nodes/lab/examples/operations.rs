@@ -1,6 +1,6 @@
 //! Quantizes or inserts the same points some times over, for tools that count what that takes.
 //!
-//! `operations OPERATION LATTICE CELL_SIDE_M FILE TIMES`, where OPERATION is batch, double, portable, scalar,
+//! `operations OPERATION LATTICE CELL_SIDE_M FILE TIMES`, where OPERATION is batch, portable, scalar,
 //! paper27, occupancy or list, and FILE holds little-endian f32 `x y z i`; prints the number of points.
 #![allow(clippy::unwrap_used)]
 
@@ -46,17 +46,6 @@ fn of(operation: &str, lattice: &Lattice, points: Vec<[f32; 3]>) -> Box<dyn Fn()
             Box::new(move || {
                 let mut codes = Vec::with_capacity(points.len());
                 batch.codes(&points, &mut codes);
-                black_box(codes);
-            })
-        }
-        "double" => {
-            let (batch, wide): (_, Vec<_>) = (
-                batch(Simd::detect()),
-                points.iter().map(|p| p.map(f64::from)).collect(),
-            );
-            Box::new(move || {
-                let mut codes = Vec::with_capacity(wide.len());
-                batch.codes_wide(&wide, &mut codes);
                 black_box(codes);
             })
         }

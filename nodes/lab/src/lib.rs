@@ -2,16 +2,36 @@
 //! benchmarks. A robot builds none of it.
 #![deny(unsafe_code)]
 
+use std::error::Error;
+use std::fmt::Display;
+use std::path::Path;
+
 pub mod bench;
 pub mod datasets;
 pub mod evaluate;
 pub mod matching;
 pub mod mesh;
 pub mod metrics;
-pub mod options;
+mod options;
 pub mod paper;
-mod plot;
 pub mod printed;
 pub mod random;
 pub mod render;
+pub mod report;
 pub mod simulate;
+pub mod theory;
+
+/// Any error on its way to the user.
+pub type AnyError = Box<dyn Error + Send + Sync>;
+
+/// A pool of so many threads, at least one.
+pub fn pool(threads: usize) -> Result<rayon::ThreadPool, AnyError> {
+    let pool = rayon::ThreadPoolBuilder::new().num_threads(threads.max(1));
+    Ok(pool.build()?)
+}
+
+/// Names the file that an error is about.
+fn at<E: Display>(path: &Path) -> impl Fn(E) -> AnyError + use<E> {
+    let path = path.to_owned();
+    move |error| format!("{}: {error}", path.display()).into()
+}

@@ -101,12 +101,4 @@ mod tests {
             );
         }
     }
-
-    #[test]
-    fn streams_differ_by_seed_and_number() {
-        let first = |seed, number| Stream::numbered(seed, number).uniform();
-        assert_eq!(first(1, 2), first(1, 2));
-        assert!(first(1, 2) != first(2, 1) && first(1, 2) != first(1, 3));
-        assert!((0.0..1.0).contains(&Stream::numbered(1, 1).point().max()));
-    }
 }

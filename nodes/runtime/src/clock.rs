@@ -4,22 +4,20 @@ use std::sync::Arc;
 use std::sync::atomic::{AtomicI64, Ordering::Relaxed};
 use std::time::{SystemTime, UNIX_EPOCH};
 
-use lattice_msgs::rosgraph_msgs;
-
-use super::core::Core;
-use super::error::RuntimeError;
-use super::graph::NodeId;
-use super::qos::Qos;
-use super::subscription::{Load, Subscription};
-use super::sync::lock;
-
-/// Tells the time. Clones tell the same.
+/// Time of the system, or simulated time. Clones show the same.
 #[derive(Clone, Debug, Default)]
 pub struct Clock {
     sim_ns: Option<Arc<AtomicI64>>,
 }
 
 impl Clock {
+    /// Simulated time, set from elsewhere.
+    pub(crate) fn simulated(now_ns: Arc<AtomicI64>) -> Self {
+        Self {
+            sim_ns: Some(now_ns),
+        }
+    }
+
     /// Nanoseconds since the Unix epoch; with simulated time 0 until the first message on `/clock`.
     pub fn now_ns(&self) -> i64 {
         match &self.sim_ns {
@@ -41,41 +39,6 @@ fn system_ns() -> i64 {
     i64::try_from(elapsed.as_nanos()).unwrap_or(i64::MAX)
 }
 
-/// Simulated time, one for all nodes of a runtime.
-pub(crate) struct SimTime {
-    clock: Clock,
-    _subscription: Subscription,
-}
-
-impl Core {
-    /// The clock on `topic`, subscribed to at the first call.
-    pub(crate) fn sim_clock(
-        self: &Arc<Self>,
-        node: NodeId,
-        topic: &str,
-    ) -> Result<Clock, RuntimeError> {
-        let mut sim = lock(&self.sim_time);
-        if let Some(sim) = sim.as_ref() {
-            return Ok(sim.clock.clone());
-        }
-        let now_ns = Arc::new(AtomicI64::new(0));
-        let clock = Clock {
-            sim_ns: Some(Arc::clone(&now_ns)),
-        };
-        // ros2-client's own subscription to /clock has a wrong type.
-        let handler = move |message: Arc<rosgraph_msgs::Clock>| {
-            now_ns.store(message.clock.to_ns(), Relaxed);
-        };
-        let subscription =
-            self.subscribe(node, topic, &Qos::CLOCK, Load::Small, 1 << 10, handler)?;
-        *sim = Some(SimTime {
-            clock: clock.clone(),
-            _subscription: subscription,
-        });
-        Ok(clock)
-    }
-}
-
 #[cfg(test)]
 mod tests {
     use super::*;
@@ -86,9 +49,7 @@ mod tests {
         let first = clock.now_ns();
         assert!(first > 1_700_000_000_000_000_000 && clock.now_ns() >= first);
         assert!(!clock.is_sim());
-        let sim = Clock {
-            sim_ns: Some(Arc::default()),
-        };
+        let sim = Clock::simulated(Arc::default());
         assert_eq!((sim.now_ns(), sim.is_sim()), (0, true));
     }
 }

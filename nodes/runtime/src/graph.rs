@@ -1,20 +1,19 @@
-//! Which node owns which endpoint, told to `ros2 node list` and `ros2 node info`.
+//! The nodes of this process and their endpoints, for `ros2 node list` and `ros2 node info`.
 //!
 //! ROS 2 nodes are no DDS entities: every participant says on `ros_discovery_info` which nodes it
-//! holds, with the readers and writers of each (rmw_dds_common). ros2-client tells of one node, and not
-//! of endpoints made outside it, so we tell it ourselves.
+//! holds, with the readers and writers of each (rmw_dds_common).
 
 use std::collections::{BTreeMap, BTreeSet};
 use std::sync::{Arc, Mutex};
 use std::time::Duration;
 
 use lattice_msgs::cdr;
-use rustdds::GUID;
 use serde::ser::{Serialize, SerializeTuple, Serializer};
 use smol::Timer;
 use smol::channel::{Receiver, Sender, bounded};
 
-use super::dds::writer::DdsWriter;
+use super::outbox::Outbox;
+use super::port::EndpointId;
 use super::sync::lock;
 
 /// DDS topic, not mangled.
@@ -23,14 +22,14 @@ pub(crate) const TOPIC: &str = "ros_discovery_info";
 /// Its type.
 pub(crate) const TYPE: &str = "rmw_dds_common/msg/ParticipantEntitiesInfo";
 
-/// From a change to its telling.
+/// Time between a change and the message that names it.
 const SETTLE_TIME: Duration = Duration::from_millis(50);
 
 /// A node of this process.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, PartialOrd, Ord)]
 pub(crate) struct NodeId(u64);
 
-/// What an endpoint of a node does.
+/// Kind of an endpoint of a node.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub(crate) enum EndpointKind {
     Reader,
@@ -48,16 +47,16 @@ pub(crate) struct Graph {
 struct Entry {
     namespace: String,
     name: String,
-    readers: BTreeSet<GUID>,
-    writers: BTreeSet<GUID>,
+    readers: BTreeSet<EndpointId>,
+    writers: BTreeSet<EndpointId>,
 }
 
 /// An endpoint in the graph; dropping it takes it out.
-pub(crate) struct Membership {
+pub(crate) struct NodeEndpoint {
     graph: Arc<Graph>,
     node: NodeId,
     kind: EndpointKind,
-    guid: Option<GUID>,
+    guid: Option<EndpointId>,
 }
 
 impl Graph {
@@ -96,13 +95,13 @@ impl Graph {
         self: &Arc<Self>,
         node: NodeId,
         kind: EndpointKind,
-        guid: impl Into<Option<GUID>>,
-    ) -> Membership {
+        guid: impl Into<Option<EndpointId>>,
+    ) -> NodeEndpoint {
         let guid = guid.into();
         self.edit(node, kind, |set| {
             set.extend(guid);
         });
-        Membership {
+        NodeEndpoint {
             graph: Arc::clone(self),
             node,
             kind,
@@ -110,7 +109,12 @@ impl Graph {
         }
     }
 
-    fn edit(&self, node: NodeId, kind: EndpointKind, change: impl FnOnce(&mut BTreeSet<GUID>)) {
+    fn edit(
+        &self,
+        node: NodeId,
+        kind: EndpointKind,
+        change: impl FnOnce(&mut BTreeSet<EndpointId>),
+    ) {
         if let Some(entry) = lock(&self.nodes).get_mut(&node) {
             change(match kind {
                 EndpointKind::Reader => &mut entry.readers,
@@ -125,11 +129,11 @@ impl Graph {
         let _ = self.changed.try_send(());
     }
 
-    /// Tells every change until the task is dropped.
-    pub(crate) async fn publish(self: Arc<Self>, participant: GUID, writer: DdsWriter) {
+    /// Publishes the graph after every change, until the task is dropped.
+    pub(crate) async fn publish(self: Arc<Self>, participant: EndpointId, writer: Arc<Outbox>) {
         let gid_bytes = gid_bytes(std::env::var("ROS_DISTRO").ok().as_deref());
         while self.changes.recv().await.is_ok() {
-            // Endpoints come in bursts, and each telling stays in the history for late joiners.
+            // Endpoints come in bursts, and each message stays in the history for late joiners.
             Timer::after(SETTLE_TIME).await;
             let _ = self.changes.try_recv();
             let message = ParticipantEntitiesInfo {
@@ -142,13 +146,13 @@ impl Graph {
             if let Err(error) = writer.send(Box::new(move || cdr::to_vec(&message))) {
                 log::debug!("{error}");
             }
-            // What changes while this goes out is told in one.
+            // All changes while this goes out make one message.
             writer.flushed().await;
         }
     }
 }
 
-impl Drop for Membership {
+impl Drop for NodeEndpoint {
     fn drop(&mut self) {
         if let Some(guid) = self.guid {
             self.graph.edit(self.node, self.kind, |set| {
@@ -183,7 +187,8 @@ struct NodeEntitiesInfo {
 
 impl NodeEntitiesInfo {
     fn new(entry: &Entry, gid_bytes: usize) -> Self {
-        let gids = |set: &BTreeSet<GUID>| set.iter().map(|g| Gid::new(*g, gid_bytes)).collect();
+        let gids =
+            |set: &BTreeSet<EndpointId>| set.iter().map(|g| Gid::new(*g, gid_bytes)).collect();
         Self {
             namespace: entry.namespace.clone(),
             name: entry.name.clone(),
@@ -193,16 +198,15 @@ impl NodeEntitiesInfo {
     }
 }
 
-/// A GUID, padded to the length of the distribution.
+/// Identity of an endpoint, padded to the length of the distribution.
 struct Gid {
     bytes: [u8; 24],
     length: usize,
 }
 
 impl Gid {
-    fn new(guid: GUID, length: usize) -> Self {
-        let guid = guid.to_bytes();
-        let bytes = std::array::from_fn(|i| guid.get(i).copied().unwrap_or(0));
+    fn new(guid: EndpointId, length: usize) -> Self {
+        let bytes = std::array::from_fn(|i| guid.0.get(i).copied().unwrap_or(0));
         Self { bytes, length }
     }
 }
@@ -223,7 +227,7 @@ mod tests {
 
     #[test]
     fn the_wire_form_is_that_of_rmw_dds_common() {
-        let guid = |byte| GUID::from_bytes([byte; 16]);
+        let guid = |byte| EndpointId([byte; 16]);
         let graph = Graph::new();
         let node = graph.add_node("/", "n");
         let reader = graph.join(node, EndpointKind::Reader, guid(2));

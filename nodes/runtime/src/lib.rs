@@ -1,11 +1,12 @@
-//! What rcl does and ros2-client does not: arguments, names, parameters, and the transport.
+//! A ROS 2 client library for nodes: arguments, names, parameters, topics, services, actions, time and
+//! log, over a transport behind one port.
 #![forbid(unsafe_code)]
 
 mod action;
 mod clock;
-mod core;
 mod dds;
 mod diagnostics;
+mod endpoints;
 pub mod env;
 mod error;
 mod graph;
@@ -14,24 +15,25 @@ pub mod logging;
 mod loopback_domain;
 pub mod names;
 mod node;
+mod outbox;
 mod param_services;
+mod param_value;
 pub mod params;
 pub mod params_file;
 mod peers;
+mod port;
+mod process;
 mod publisher;
 pub mod qos;
-mod reader_port;
 pub mod ros_args;
 mod rosout;
-mod runtime;
 mod service;
-mod service_wire;
+mod shared;
 mod shutdown;
 mod subscription;
 mod sync;
+mod task_thread;
 mod tf;
-mod transport_status;
-mod worker;
 
 pub use action::{ActionLimits, ActionServer, Feedback, GoalHandle};
 pub use clock::Clock;
@@ -39,10 +41,10 @@ pub use diagnostics::{Diagnostics, Level};
 pub use error::{PublishError, RuntimeError};
 pub use loopback_domain::LoopbackDomain;
 pub use node::Node;
+pub use process::Runtime;
 pub use publisher::{Publisher, RawPublisher};
-pub use runtime::Runtime;
 pub use service::{Reply, Server};
 pub use shutdown::Shutdown;
-pub use subscription::{Load, Subscription};
+pub use subscription::{Load, Subscription, Undecoded};
+pub use task_thread::guarded;
 pub use tf::{StaticTfBroadcaster, TfBroadcaster};
-pub use worker::guarded;

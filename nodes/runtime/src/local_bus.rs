@@ -9,11 +9,11 @@ use std::sync::{Arc, Mutex};
 
 use lattice_msgs::RosMessage;
 use lattice_msgs::cdr::{self, CdrError};
-use rustdds::bytes::Bytes;
 use smol::channel::Sender;
 
 use super::error::RuntimeError;
 use super::peers::Peers;
+use super::port::Bytes;
 use super::sync::lock;
 
 /// A message of any type.
@@ -48,6 +48,8 @@ pub(crate) struct Topic {
 #[derive(Default)]
 struct Inner {
     next_id: u64,
+    /// Number of the last change of publishers or subscribers.
+    change: u64,
     type_name: Option<String>,
     rust_type: Option<(TypeId, Decode)>,
     publishers: Vec<PublisherEntry>,
@@ -76,8 +78,8 @@ struct SubscriberEntry {
     lost: Arc<AtomicU64>,
 }
 
-/// A place on a topic; dropping it leaves the topic.
-pub(crate) struct Membership {
+/// A publisher or subscriber on a topic of the process; dropping it leaves the topic.
+pub(crate) struct LocalEndpoint {
     topic: Arc<Topic>,
     id: u64,
 }
@@ -88,7 +90,7 @@ impl Topic {
         self: &Arc<Self>,
         peers: &Arc<Peers>,
         latch_depth: usize,
-    ) -> Result<Membership, RuntimeError> {
+    ) -> Result<LocalEndpoint, RuntimeError> {
         self.join(
             |inner| {
                 inner.claim_type(&self.name, M::TYPE)?;
@@ -104,7 +106,7 @@ impl Topic {
         type_name: &str,
         peers: &Arc<Peers>,
         latch_depth: usize,
-    ) -> Result<Membership, RuntimeError> {
+    ) -> Result<LocalEndpoint, RuntimeError> {
         self.join(
             |inner| inner.claim_type(&self.name, type_name),
             |inner, id| inner.add_publisher(id, peers, latch_depth),
@@ -119,7 +121,7 @@ impl Topic {
         sender: Sender<AnyMessage>,
         lost: Arc<AtomicU64>,
         latched: bool,
-    ) -> Result<Membership, RuntimeError> {
+    ) -> Result<LocalEndpoint, RuntimeError> {
         self.join(
             |inner| {
                 inner.claim_type(&self.name, M::TYPE)?;
@@ -151,48 +153,42 @@ impl Topic {
         self: &Arc<Self>,
         claim: impl FnOnce(&mut Inner) -> Result<(), RuntimeError>,
         add: impl FnOnce(&mut Inner, u64),
-    ) -> Result<Membership, RuntimeError> {
-        let id = {
-            let mut inner = lock(&self.inner);
-            claim(&mut inner)?;
-            let id = inner.next_id;
-            inner.next_id = id.wrapping_add(1);
-            add(&mut inner, id);
-            id
-        };
-        self.tell_counts();
-        Ok(Membership {
+    ) -> Result<LocalEndpoint, RuntimeError> {
+        let mut inner = lock(&self.inner);
+        claim(&mut inner)?;
+        let id = inner.next_id;
+        inner.next_id = id.wrapping_add(1);
+        add(&mut inner, id);
+        let counts = inner.count();
+        drop(inner);
+        counts.hand_on();
+        Ok(LocalEndpoint {
             topic: Arc::clone(self),
             id,
         })
     }
+}
 
-    /// Callbacks run outside the lock.
-    fn tell_counts(&self) {
-        let (publishers, subscribers) = {
-            let inner = lock(&self.inner);
-            let publishers: Vec<_> = inner
-                .publishers
-                .iter()
-                .map(|p| Arc::clone(&p.peers))
-                .collect();
-            let subscribers: Vec<_> = inner
-                .subscribers
-                .iter()
-                .map(|s| Arc::clone(&s.peers))
-                .collect();
-            (publishers, subscribers)
-        };
-        for peers in &publishers {
-            peers.set_local(subscribers.len());
+/// Endpoints of a topic as they were at one change.
+struct Counts {
+    change: u64,
+    publishers: Vec<Arc<Peers>>,
+    subscribers: Vec<Arc<Peers>>,
+}
+
+impl Counts {
+    /// Gives each side the number of the other; not under the lock, since it runs callbacks.
+    fn hand_on(&self) {
+        for peers in &self.publishers {
+            peers.set_local(self.subscribers.len(), self.change);
         }
-        for peers in &subscribers {
-            peers.set_local(publishers.len());
+        for peers in &self.subscribers {
+            peers.set_local(self.publishers.len(), self.change);
         }
     }
 }
 
-impl Membership {
+impl LocalEndpoint {
     /// Hands a message to all subscribers.
     pub(crate) fn publish(&self, message: &AnyMessage) {
         let mut inner = lock(&self.topic.inner);
@@ -214,22 +210,39 @@ impl Membership {
     }
 }
 
-impl Drop for Membership {
+impl Drop for LocalEndpoint {
     fn drop(&mut self) {
-        {
-            let mut inner = lock(&self.topic.inner);
-            inner.publishers.retain(|p| p.id != self.id);
-            inner.subscribers.retain(|s| s.id != self.id);
-            if inner.publishers.is_empty() && inner.subscribers.is_empty() {
-                inner.type_name = None;
-                inner.rust_type = None;
-            }
+        let mut inner = lock(&self.topic.inner);
+        inner.publishers.retain(|p| p.id != self.id);
+        inner.subscribers.retain(|s| s.id != self.id);
+        if inner.publishers.is_empty() && inner.subscribers.is_empty() {
+            inner.type_name = None;
+            inner.rust_type = None;
         }
-        self.topic.tell_counts();
+        let counts = inner.count();
+        drop(inner);
+        counts.hand_on();
     }
 }
 
 impl Inner {
+    fn count(&mut self) -> Counts {
+        self.change = self.change.wrapping_add(1);
+        Counts {
+            change: self.change,
+            publishers: self
+                .publishers
+                .iter()
+                .map(|p| Arc::clone(&p.peers))
+                .collect(),
+            subscribers: self
+                .subscribers
+                .iter()
+                .map(|s| Arc::clone(&s.peers))
+                .collect(),
+        }
+    }
+
     fn claim_type(&mut self, topic: &str, want: &str) -> Result<(), RuntimeError> {
         match &self.type_name {
             Some(have) if have != want => Err(RuntimeError::TypeMismatch {
@@ -314,7 +327,7 @@ mod tests {
         Arc::new(RosString { data: s.to_owned() })
     }
 
-    fn publisher(bus: &LocalBus, latch: usize) -> (Membership, Arc<Peers>) {
+    fn publisher(bus: &LocalBus, latch: usize) -> (LocalEndpoint, Arc<Peers>) {
         let peers = Arc::new(Peers::of_publisher("/a"));
         let joined = bus.topic("/a").join_publisher::<RosString>(&peers, latch);
         (joined.unwrap(), peers)

@@ -3,9 +3,8 @@
 use std::collections::BTreeSet;
 use std::sync::{Arc, Mutex};
 
-use rustdds::GUID;
-
-use super::sync::lock;
+use super::port::EndpointId;
+use super::sync::{Changed, lock};
 
 /// Peers of one endpoint that are told apart, at most.
 const MAX_PEERS: usize = 4096;
@@ -13,56 +12,45 @@ const MAX_PEERS: usize = 4096;
 /// Called when a peer joins; must return at once.
 pub(crate) type OnJoined = Box<dyn FnMut() + Send>;
 
-/// Who is at the other end of a publisher or subscription.
+/// The endpoints at the other end of one publisher, subscription or server.
 pub(crate) struct Peers {
     topic: String,
     peer_kind: &'static str,
     joins: log::Level,
-    hears_own: bool,
     state: Mutex<State>,
     on_joined: Mutex<Vec<Arc<Mutex<OnJoined>>>>,
+    joined: Changed,
 }
 
 #[derive(Default)]
 struct State {
-    remote: BTreeSet<GUID>,
+    remote: BTreeSet<EndpointId>,
     local: usize,
-    incompatible: BTreeSet<GUID>,
+    /// Number of the change that `local` was counted at.
+    local_change: u64,
+    incompatible: BTreeSet<EndpointId>,
     warned: BTreeSet<&'static str>,
 }
 
 impl Peers {
-    /// Of a publisher, whose peers are subscribers.
+    /// For a publisher, whose peers are subscribers.
     pub(crate) fn of_publisher(topic: &str) -> Self {
         Self::new(topic, "subscriber", log::Level::Info)
     }
 
-    /// Of a subscription, whose peers are publishers.
+    /// For a subscription, whose peers are publishers.
     pub(crate) fn of_subscription(topic: &str) -> Self {
         Self::new(topic, "publisher", log::Level::Info)
     }
 
-    /// Of the requests of a server, whose peers are clients.
+    /// For the requests of a server, whose peers are clients.
     pub(crate) fn of_server(service: &str) -> Self {
         Self::new(service, "client", log::Level::Debug)
     }
 
-    /// Of the replies of a server, whose peers are the other ends of clients.
+    /// For the replies of a server, whose peers are the other ends of clients.
     pub(crate) fn of_replies(service: &str) -> Self {
         Self::new(service, "reply reader", log::Level::Debug)
-    }
-
-    /// Of a probe, whose peer is in its own participant.
-    pub(crate) fn of_probe(topic: &str) -> Self {
-        Self {
-            hears_own: true,
-            ..Self::new(topic, "probe", log::Level::Trace)
-        }
-    }
-
-    /// False where endpoints of the own participant do not count: nothing is delivered between them.
-    pub(crate) fn hears_own(&self) -> bool {
-        self.hears_own
     }
 
     fn new(topic: &str, peer_kind: &'static str, joins: log::Level) -> Self {
@@ -70,9 +58,9 @@ impl Peers {
             topic: topic.to_owned(),
             peer_kind,
             joins,
-            hears_own: false,
             state: Mutex::default(),
             on_joined: Mutex::default(),
+            joined: Changed::default(),
         }
     }
 
@@ -85,9 +73,10 @@ impl Peers {
         lock(&self.state).remote.len()
     }
 
-    /// True if there is such a peer in another process.
-    pub(crate) fn any_remote(&self, wanted: impl FnMut(&GUID) -> bool) -> bool {
-        lock(&self.state).remote.iter().any(wanted)
+    /// Completes when such a peer in another process is known.
+    pub(crate) async fn known(&self, wanted: impl Fn(&EndpointId) -> bool) {
+        let known = || lock(&self.state).remote.iter().any(&wanted).then_some(());
+        self.joined.until(known).await;
     }
 
     /// Peers here and elsewhere.
@@ -112,7 +101,7 @@ impl Peers {
     }
 
     /// A peer in another process has matched.
-    pub(crate) fn add(&self, peer: GUID) {
+    pub(crate) fn add(&self, peer: EndpointId) {
         let mut state = lock(&self.state);
         state.incompatible.remove(&peer);
         if state.remote.len() >= MAX_PEERS || !state.remote.insert(peer) {
@@ -124,7 +113,7 @@ impl Peers {
     }
 
     /// Peers in other processes have gone.
-    pub(crate) fn remove(&self, gone: impl Fn(&GUID) -> bool) {
+    pub(crate) fn remove(&self, gone: impl Fn(&EndpointId) -> bool) {
         let mut state = lock(&self.state);
         let before = state.remote.len();
         state.remote.retain(|peer| !gone(peer));
@@ -136,11 +125,15 @@ impl Peers {
         }
     }
 
-    /// The number of peers in this process has changed.
-    pub(crate) fn set_local(&self, local: usize) {
+    /// Sets the number of peers in this process as counted at a change, unless a later change has been
+    /// counted already: counts are handed on outside the lock under which they were made.
+    pub(crate) fn set_local(&self, local: usize, change: u64) {
         let mut state = lock(&self.state);
+        if change < state.local_change {
+            return;
+        }
         let grown = local > state.local;
-        state.local = local;
+        (state.local, state.local_change) = (local, change);
         let count = state.remote.len().saturating_add(local);
         drop(state);
         if grown {
@@ -149,7 +142,7 @@ impl Peers {
     }
 
     /// A peer asks for, or offers, a QoS that does not go with ours.
-    pub(crate) fn incompatible(&self, peer: GUID, policy: &'static str) {
+    pub(crate) fn incompatible(&self, peer: EndpointId, policy: &'static str) {
         let mut state = lock(&self.state);
         if state.incompatible.len() < MAX_PEERS {
             state.incompatible.insert(peer);
@@ -172,6 +165,7 @@ impl Peers {
             self.topic,
             self.peer_kind
         );
+        self.joined.notify();
         // A callback may register another: not called under the lock.
         let callbacks = lock(&self.on_joined).clone();
         for callback in &callbacks {
@@ -185,10 +179,12 @@ mod tests {
     use std::sync::Arc;
     use std::sync::atomic::{AtomicUsize, Ordering};
 
+    use futures::FutureExt;
+
     use super::*;
 
-    fn peer(byte: u8) -> GUID {
-        GUID::from_bytes([byte; 16])
+    fn peer(byte: u8) -> EndpointId {
+        EndpointId([byte; 16])
     }
 
     #[test]
@@ -203,12 +199,32 @@ mod tests {
         assert_eq!(calls.load(Ordering::Relaxed), 1, "one was there already");
         peers.add(peer(1));
         peers.add(peer(2));
-        peers.set_local(1);
-        peers.set_local(0);
+        peers.set_local(1, 1);
+        peers.set_local(0, 2);
         assert_eq!(calls.load(Ordering::Relaxed), 3);
         assert_eq!((peers.remote(), peers.count()), (2, 2));
         peers.remove(|p| *p == peer(1));
         assert_eq!(peers.count(), 1);
+    }
+
+    #[test]
+    fn a_count_that_comes_late_is_not_believed() {
+        let peers = Peers::of_publisher("/map");
+        peers.set_local(2, 2);
+        peers.set_local(1, 1);
+        assert_eq!(peers.count(), 2);
+    }
+
+    #[test]
+    fn each_who_waits_for_a_peer_hears_of_it() {
+        let peers = Peers::of_replies("/save_map");
+        let mut first = Box::pin(peers.known(|p| *p == peer(1)));
+        let mut second = Box::pin(peers.known(|p| *p == peer(2)));
+        assert!((&mut first).now_or_never().is_none());
+        assert!((&mut second).now_or_never().is_none());
+        peers.add(peer(2));
+        assert!((&mut first).now_or_never().is_none(), "takes the only note");
+        assert!(second.now_or_never().is_some());
     }
 
     #[test]
@@ -226,7 +242,7 @@ mod tests {
         peers.incompatible(peer(1), "reliability");
         peers.incompatible(peer(1), "reliability");
         assert_eq!(peers.incompatible_count(), 1);
-        peers.remove(|p| p.prefix == peer(1).prefix);
+        peers.remove(|p| p.is_beside(&peer(1)));
         assert_eq!(peers.incompatible_count(), 0);
     }
 }

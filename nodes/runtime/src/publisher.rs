@@ -1,55 +1,110 @@
 //! Publishers of messages and of CDR bytes.
 
+use std::collections::VecDeque;
 use std::marker::PhantomData;
-use std::sync::Arc;
+use std::sync::{Arc, Mutex};
 use std::time::Duration;
 
 use lattice_msgs::RosMessage;
 use lattice_msgs::cdr;
-use rustdds::bytes::Bytes;
 
-use super::dds::payload::ENCAPSULATION_BYTES;
-use super::dds::writer::DdsWriter;
 use super::error::PublishError;
-use super::graph;
-use super::local_bus::Membership;
+use super::graph::NodeEndpoint;
+use super::local_bus::LocalEndpoint;
+use super::outbox::{Outbox, Serialize};
 use super::peers::Peers;
+use super::port::{Bytes, ENCAPSULATION_BYTES};
+use super::shutdown::Shutdown;
+use super::sync::lock;
 
-/// What both kinds of publisher are made of.
-pub(crate) struct Core {
-    pub writer: DdsWriter,
+/// The parts that both kinds of publisher are made of.
+pub(crate) struct PublisherParts {
+    pub writer: Arc<Outbox>,
     pub peers: Arc<Peers>,
-    pub local: Membership,
-    /// Keeps messages for late joiners, so it must hear every one.
-    pub latched: bool,
-    pub _graph: graph::Membership,
+    pub local: LocalEndpoint,
+    /// Messages for late joiners; none where they are not kept.
+    pub latch: Option<Mutex<Latch>>,
+    pub shutdown: Shutdown,
+    pub _graph: NodeEndpoint,
 }
 
-impl Core {
-    fn wants_dds(&self) -> bool {
-        self.latched || self.peers.remote() > 0
+/// The last messages of a latched publisher that no other process has listened to yet. They are
+/// serialised when the first one does; from then on DDS keeps them.
+pub(crate) struct Latch {
+    kept: VecDeque<Serialize>,
+    depth: usize,
+    heard: bool,
+}
+
+impl Latch {
+    /// Keeps up to `depth` messages.
+    pub(crate) fn new(depth: usize) -> Self {
+        Self {
+            kept: VecDeque::new(),
+            depth,
+            heard: false,
+        }
+    }
+}
+
+impl PublisherParts {
+    fn send(&self, message: Serialize) -> Result<(), PublishError> {
+        let remote = self.peers.remote() > 0;
+        let Some(latch) = &self.latch else {
+            return match remote {
+                true => self.writer.send(message),
+                false => Ok(()),
+            };
+        };
+        let mut latch = lock(latch);
+        if remote || latch.heard {
+            self.release(&mut latch);
+            return self.writer.send(message);
+        }
+        while latch.kept.len() >= latch.depth {
+            latch.kept.pop_front();
+        }
+        latch.kept.push_back(message);
+        Ok(())
+    }
+
+    /// Hands kept messages to DDS once another process listens.
+    pub(crate) fn peer_joined(&self) {
+        if let Some(latch) = &self.latch
+            && self.peers.remote() > 0
+        {
+            self.release(&mut lock(latch));
+        }
+    }
+
+    fn release(&self, latch: &mut Latch) {
+        latch.heard = true;
+        for message in latch.kept.drain(..) {
+            // A full queue is counted as a drop.
+            let _ = self.writer.send(message);
+        }
     }
 }
 
 /// Publishes messages of one type on one topic. Clones share the publisher.
 pub struct Publisher<M> {
-    core: Arc<Core>,
+    parts: Arc<PublisherParts>,
     message: PhantomData<fn(M)>,
 }
 
 impl<M> Clone for Publisher<M> {
     fn clone(&self) -> Self {
         Self {
-            core: Arc::clone(&self.core),
+            parts: Arc::clone(&self.parts),
             message: PhantomData,
         }
     }
 }
 
 impl<M: RosMessage> Publisher<M> {
-    pub(crate) fn new(core: Arc<Core>) -> Self {
+    pub(crate) fn new(parts: Arc<PublisherParts>) -> Self {
         Self {
-            core,
+            parts,
             message: PhantomData,
         }
     }
@@ -60,12 +115,8 @@ impl<M: RosMessage> Publisher<M> {
     /// on the publisher thread; a full queue is an error, and counted.
     pub fn publish(&self, message: impl Into<Arc<M>>) -> Result<(), PublishError> {
         let message: Arc<M> = message.into();
-        self.core.local.publish(&(Arc::clone(&message) as _));
-        if !self.core.wants_dds() {
-            return Ok(());
-        }
-        self.core
-            .writer
+        self.parts.local.publish(&(Arc::clone(&message) as _));
+        self.parts
             .send(Box::new(move || cdr::to_vec(message.as_ref())))
     }
 }
@@ -73,18 +124,18 @@ impl<M: RosMessage> Publisher<M> {
 /// Publishes messages that are CDR bytes already, as a bag player has them.
 #[derive(Clone)]
 pub struct RawPublisher {
-    core: Arc<Core>,
+    parts: Arc<PublisherParts>,
 }
 
 impl RawPublisher {
-    pub(crate) fn new(core: Arc<Core>) -> Self {
-        Self { core }
+    pub(crate) fn new(parts: Arc<PublisherParts>) -> Self {
+        Self { parts }
     }
 
     /// Publishes a message of plain little-endian CDR, encapsulation header included, as it is.
     ///
-    /// Waits while the queue is full, so nothing is lost on this side. Not to be called from a
-    /// handler, callback or timer.
+    /// Waits while the queue is full, so nothing is lost on this side; a request to shut down ends the
+    /// wait with an error. Not to be called from a handler, callback or timer.
     pub fn publish_blocking(&self, cdr: Vec<u8>) -> Result<(), PublishError> {
         let mut body = Bytes::from(cdr);
         if body.get(..2) != Some(&[0, 1]) || body.len() < ENCAPSULATION_BYTES {
@@ -94,18 +145,19 @@ impl RawPublisher {
                 header: body.iter().take(ENCAPSULATION_BYTES).copied().collect(),
             });
         }
-        if let Err(error) = self.core.local.publish_cdr(&body) {
+        if let Err(error) = self.parts.local.publish_cdr(&body) {
             log::warn!(
                 "{}: message not given to this process: {error}",
                 self.topic()
             );
         }
-        if !self.core.wants_dds() {
+        if self.parts.latch.is_none() && self.parts.peers.remote() == 0 {
             return Ok(());
         }
-        self.core
+        let body = body.split_off(ENCAPSULATION_BYTES);
+        self.parts
             .writer
-            .send_body_blocking(body.split_off(ENCAPSULATION_BYTES))
+            .send_body_blocking(body, &self.parts.shutdown)
     }
 }
 
@@ -114,35 +166,40 @@ macro_rules! shared_by_publishers {
         impl<$($generics)*> $publisher {
             /// Resolved topic.
             pub fn topic(&self) -> &str {
-                self.core.peers.topic()
+                self.parts.peers.topic()
             }
 
             /// Matched subscribers, here and in other processes.
             pub fn subscriber_count(&self) -> usize {
-                self.core.peers.count()
+                self.parts.peers.count()
             }
 
             /// Calls `callback` for every subscriber that joins, and now if there is one already.
             ///
             /// It runs on a thread of the runtime and must return at once.
             pub fn on_subscriber_joined(&self, callback: impl FnMut() + Send + 'static) {
-                self.core.peers.on_joined(Box::new(callback));
+                self.parts.peers.on_joined(Box::new(callback));
             }
 
             /// Waits until the queue is empty and every reliable subscriber in another process has
             /// acknowledged. False: not in time. Not from a handler, callback or timer.
             pub fn flush(&self, timeout: Duration) -> bool {
-                self.core.writer.flush(timeout)
+                self.parts.writer.flush(timeout)
             }
 
             /// Messages not sent to other processes: queue or send window full.
             pub fn dropped(&self) -> u64 {
-                self.core.writer.dropped()
+                self.parts.writer.dropped()
             }
 
             /// Messages handed to DDS for other processes.
             pub fn sent(&self) -> u64 {
-                self.core.writer.sent()
+                self.parts.writer.sent()
+            }
+
+            /// Bytes of them as they were serialised, without headers.
+            pub fn sent_bytes(&self) -> u64 {
+                self.parts.writer.sent_bytes()
             }
         }
     )*};

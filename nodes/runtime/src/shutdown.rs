@@ -1,16 +1,19 @@
 //! One request to end, from a signal, a failure or the program itself.
 
 use std::sync::atomic::{AtomicBool, Ordering};
-use std::sync::{Arc, Condvar, LazyLock, Mutex, PoisonError};
+use std::sync::{Arc, LazyLock, Mutex};
 use std::time::Duration;
 
 use signal_hook::consts::{SIGINT, SIGTERM};
 use signal_hook::flag::register_conditional_default;
 use signal_hook::iterator::{Handle, Signals};
 
-use super::sync::lock;
+use smol::Timer;
+use smol::future::{block_on, or};
 
-/// Asks a runtime to end, and tells whether it has been asked. Clones share the request.
+use super::sync::{Changed, lock};
+
+/// A request to end that a runtime, its nodes and signals share. Clones are the same request.
 #[derive(Clone, Default)]
 pub struct Shutdown {
     inner: Arc<Inner>,
@@ -19,7 +22,7 @@ pub struct Shutdown {
 #[derive(Default)]
 struct Inner {
     state: Mutex<State>,
-    changed: Condvar,
+    changed: Changed,
 }
 
 #[derive(Default)]
@@ -32,7 +35,7 @@ impl Shutdown {
     /// Asks to end. Again has no effect.
     pub fn request(&self) {
         lock(&self.inner.state).requested = true;
-        self.inner.changed.notify_all();
+        self.inner.changed.notify();
     }
 
     /// True once asked.
@@ -42,21 +45,21 @@ impl Shutdown {
 
     /// Blocks until asked.
     pub fn wait(&self) {
-        let mut state = lock(&self.inner.state);
-        while !state.requested {
-            state = self
-                .inner
-                .changed
-                .wait(state)
-                .unwrap_or_else(PoisonError::into_inner);
-        }
+        block_on(self.requested());
     }
 
     /// Blocks until asked, or for this long.
     pub fn wait_timeout(&self, timeout: Duration) {
-        let state = lock(&self.inner.state);
-        let asked = |state: &mut State| !state.requested;
-        drop(self.inner.changed.wait_timeout_while(state, timeout, asked));
+        let late = async {
+            Timer::after(timeout).await;
+        };
+        block_on(or(self.requested(), late));
+    }
+
+    /// Completes when asked.
+    pub(crate) async fn requested(&self) {
+        let check = || self.is_requested().then_some(());
+        self.inner.changed.until(check).await;
     }
 
     /// Asks to end because a thread cannot go on.

@@ -1,8 +1,87 @@
-//! Locks that go on after a panic elsewhere: what they protect here is valid at every step.
+//! Locks and waiting, shared by all modules.
 
 use std::sync::{Mutex, MutexGuard, PoisonError};
+use std::time::Duration;
 
-/// Locks, poisoned or not.
+use smol::Timer;
+use smol::channel::{Receiver, Sender, bounded};
+use smol::future::or;
+
+/// Locks, poisoned or not: what is protected here is valid at every step.
 pub(crate) fn lock<T: ?Sized>(mutex: &Mutex<T>) -> MutexGuard<'_, T> {
     mutex.lock().unwrap_or_else(PoisonError::into_inner)
+}
+
+/// A change that any number of tasks and threads may wait for; each change wakes all of them.
+#[derive(Default)]
+pub(crate) struct Changed {
+    waiting: Mutex<Vec<Sender<()>>>,
+}
+
+impl Changed {
+    /// Wakes everyone who waits.
+    pub(crate) fn notify(&self) {
+        // A receiver ends when its sender goes.
+        lock(&self.waiting).clear();
+    }
+
+    /// Completes when `check` gives a value; asks now and after each change.
+    pub(crate) async fn until<T>(&self, mut check: impl FnMut() -> Option<T>) -> T {
+        loop {
+            // Registered before asking, so that no change goes unseen.
+            let change = self.register();
+            if let Some(value) = check() {
+                return value;
+            }
+            // Ends when the sender goes.
+            let _ = change.recv().await;
+        }
+    }
+
+    fn register(&self) -> Receiver<()> {
+        let (sender, change) = bounded(1);
+        let mut waiting = lock(&self.waiting);
+        // Those that gave up waiting.
+        waiting.retain(|sender| !sender.is_closed());
+        waiting.push(sender);
+        change
+    }
+}
+
+/// Waits until all senders of a channel are dropped. False: not in time.
+pub(crate) fn wait_for(dropped: &Receiver<()>, patience: Duration) -> bool {
+    let late = async {
+        Timer::after(patience).await;
+        false
+    };
+    smol::block_on(or(async { dropped.recv().await.is_err() }, late))
+}
+
+#[cfg(test)]
+mod tests {
+    use std::sync::atomic::{AtomicU32, Ordering::Relaxed};
+
+    use futures::FutureExt;
+
+    use super::*;
+
+    #[test]
+    fn one_change_wakes_all_who_wait() {
+        let (changed, state) = (Changed::default(), &AtomicU32::new(0));
+        let at_least = |n: u32| changed.until(move || (state.load(Relaxed) >= n).then_some(n));
+        let (mut first, mut second) = (Box::pin(at_least(2)), Box::pin(at_least(1)));
+        assert_eq!((&mut first).now_or_never(), None);
+        assert_eq!((&mut second).now_or_never(), None);
+        state.store(1, Relaxed);
+        changed.notify();
+        assert_eq!((&mut first).now_or_never(), None, "still waits");
+        assert_eq!(second.now_or_never(), Some(1));
+        drop(first);
+        drop(changed.register());
+        assert_eq!(
+            lock(&changed.waiting).len(),
+            1,
+            "those that went are forgotten"
+        );
+    }
 }

@@ -1,4 +1,4 @@
-//! What a calibration found, as a message.
+//! Results of calibrations as messages.
 
 use lattice_core::registration::{Calibration, DirectionKind, Verdict};
 use lattice_msgs::calibration::{CalibrationResult, ClassReliability, WeakDirection};

@@ -9,7 +9,7 @@ use serde_bytes::ByteBuf;
 /// Datums of clouds that carry f64 coordinates are multiples of this.
 const DATUM_TILE_M: f64 = 1024.0;
 
-/// How the coordinates of `points_enu` are written.
+/// Type of the coordinates of `points_enu`.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum Precision {
     /// 12 bytes a point; 4 um at 64 m from the map origin, 4 mm at 64 km.

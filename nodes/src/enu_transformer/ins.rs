@@ -19,7 +19,7 @@ use crate::convert::geometry;
 /// Most fixes that wait for the attitude at their stamp.
 const MAX_WAITING_FIXES: usize = 64;
 
-/// Which messages carry the pose of the machine.
+/// Messages that carry the pose of the machine.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum InsSource {
     /// `novatel_oem7_msgs/INSPVA`: geodetic, ellipsoidal height.
@@ -77,7 +77,7 @@ impl FromStr for InsSource {
     }
 }
 
-/// Where the stamp of a NovAtel pose comes from.
+/// Source of the stamp of a NovAtel pose.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum InsStamp {
     /// `header.stamp`, which in the ROS driver is the time of arrival.
@@ -86,7 +86,7 @@ pub enum InsStamp {
     Gps,
 }
 
-/// What a NovAtel height is measured from.
+/// Surface that a NovAtel height is measured from.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum HeightDatum {
     /// WGS84 ellipsoid.
@@ -95,7 +95,7 @@ pub enum HeightDatum {
     Geoid,
 }
 
-/// How to read an INS.
+/// Options for reading an INS.
 #[derive(Clone, Debug)]
 pub struct InsOptions {
     /// Messages to read.
@@ -106,7 +106,7 @@ pub struct InsOptions {
     pub leap_seconds: i32,
     /// Height of INSPVAX.
     pub inspvax_height: HeightDatum,
-    /// Where the INS sits on the machine.
+    /// Place of the INS on the machine.
     pub mount: InsMount,
     /// Frame of the machine: odometry of this frame needs no lever arm.
     pub base_frame: String,
@@ -133,7 +133,7 @@ pub enum InsMessage<'a> {
     Pose(&'a PoseStamped),
 }
 
-/// Why a message gave no pose.
+/// Reason for which a message gave no pose.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum InsRefusal {
     /// The INS says that its solution is not good, or has no fix.

@@ -7,6 +7,7 @@ pub mod ins;
 pub mod node;
 mod options;
 mod report;
+mod transforms;
 mod waiting;
 
 pub use counts::TransformerCounts;
@@ -21,20 +22,19 @@ use lattice_core::pose::{
     TransformBufferOptions,
 };
 use lattice_msgs::builtin_interfaces::Time;
-use lattice_msgs::geographic_msgs::{GeoPoint, GeoPointStamped};
+use lattice_msgs::geographic_msgs::GeoPointStamped;
 use lattice_msgs::geometry_msgs::TransformStamped;
 use lattice_msgs::sensor_msgs::PointCloud2;
-use lattice_msgs::tf2_msgs::TFMessage;
 use nalgebra::{Isometry3, Vector3};
 
 use self::ins::{InsDecoder, InsMessage, InsRefusal};
 use self::waiting::{Waiting, WaitingCloud};
-use crate::convert::{cloud, geometry, viewpoint};
+use crate::convert::{cloud, viewpoint};
 
 /// A step back of the receiving clock by more than this is a log that loops.
 const CLOCK_JUMP_NS: i64 = 1_000_000_000;
 
-/// What the transformer has to say.
+/// Output of the transformer.
 #[derive(Clone, Debug)]
 pub enum EnuOutput {
     /// For `points_enu`.
@@ -47,7 +47,7 @@ pub enum EnuOutput {
     Origin(GeoPointStamped),
 }
 
-/// Why a cloud was dropped.
+/// Reason for which a cloud was dropped.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 enum Drop {
     Malformed,
@@ -58,7 +58,7 @@ enum Drop {
     TimeJump,
 }
 
-/// What is to be done with a cloud now.
+/// Treatment of a cloud at this time.
 enum Verdict {
     Transform,
     Wait,
@@ -77,27 +77,33 @@ pub struct EnuTransformer {
     mounts: TransformBuffer,
     waiting: Waiting,
     announced: bool,
+    /// Stamp of the newest `map` -> `odom_frame`.
+    odom_ns: Option<i64>,
     last_now_ns: Option<i64>,
     counts: TransformerCounts,
 }
 
 impl EnuTransformer {
-    /// A transformer that has seen nothing.
+    /// A transformer without poses.
     pub fn new(options: TransformerOptions) -> Self {
         let poses = PoseBuffer::new(PoseBufferOptions {
             span_s: options.pose_span_s,
             max_gap_s: options.max_pose_gap_s,
             ..PoseBufferOptions::default()
         });
+        let mut mounts = TransformBuffer::new(TransformBufferOptions {
+            history_s: options.pose_span_s,
+            ..TransformBufferOptions::default()
+        });
+        mounts.keep(&options.base_frame);
+        options.odom_frame.iter().for_each(|odom| mounts.keep(odom));
         Self {
             ins: InsDecoder::new(options.ins.clone()),
             poses,
-            mounts: TransformBuffer::new(TransformBufferOptions {
-                history_s: options.pose_span_s,
-                ..TransformBufferOptions::default()
-            }),
+            mounts,
             waiting: Waiting::new(options.max_waiting_clouds, options.max_waiting_bytes),
             announced: false,
+            odom_ns: None,
             last_now_ns: None,
             counts: TransformerCounts::default(),
             options,
@@ -117,33 +123,7 @@ impl EnuTransformer {
             Err(InsRefusal::NotGood) => self.counts.poses_not_good += 1,
             Err(InsRefusal::Invalid) => self.counts.poses_invalid += 1,
         }
-        self.announce(&mut out);
-        self.serve(now_ns, &mut out);
-        out
-    }
-
-    /// Takes transforms of the mounts, or of `odom_frame` -> `base_frame`.
-    pub fn on_tf(&mut self, message: &TFMessage, is_static: bool, now_ns: i64) -> Vec<EnuOutput> {
-        let mut out = Vec::new();
-        self.advance(now_ns);
-        for transform in &message.transforms {
-            if self.is_own(transform) {
-                continue;
-            }
-            let inserted = geometry::isometry_from_transform(&transform.transform).is_some_and(
-                |parent_from_child| {
-                    let parent = &transform.header.frame_id;
-                    let child = &transform.child_frame_id;
-                    let stamp_ns = transform.header.stamp.to_ns();
-                    self.mounts
-                        .insert(parent, child, stamp_ns, parent_from_child, is_static)
-                        .is_ok()
-                },
-            );
-            if !inserted {
-                self.counts.transforms_refused += 1;
-            }
-        }
+        self.announce_origin(&mut out);
         self.serve(now_ns, &mut out);
         out
     }
@@ -155,6 +135,7 @@ impl EnuTransformer {
         self.counts.clouds_in += 1;
         match WaitingCloud::new(message, now_ns, &self.options) {
             Ok(cloud) => {
+                self.mounts.keep(&cloud.frame);
                 self.counts.clouds_queue_full += self.waiting.push(cloud);
                 self.serve(now_ns, &mut out);
             }
@@ -181,7 +162,7 @@ impl EnuTransformer {
         }
     }
 
-    /// What came in and what was dropped, by reason.
+    /// Counters of clouds, points and poses, by reason.
     pub fn counts(&self) -> &TransformerCounts {
         &self.counts
     }
@@ -217,61 +198,7 @@ impl EnuTransformer {
                 return;
             }
         }
-        if self.options.publish_tf {
-            out.extend(self.transform_of(&pose).map(EnuOutput::Transform));
-        }
-    }
-
-    /// `map` -> `base_frame`, or `map` -> `odom_frame` where one is set and known.
-    fn transform_of(&self, pose: &StampedPose) -> Option<TransformStamped> {
-        let map = &self.options.map_frame;
-        let base = &self.options.base_frame;
-        let (child, map_from_child) = match &self.options.odom_frame {
-            None => (base, pose.map_from_base),
-            Some(odom) => {
-                let base_from_odom = self.mounts.lookup(base, odom, pose.stamp_ns).ok()?;
-                (odom, pose.map_from_base * base_from_odom)
-            }
-        };
-        Some(geometry::transform_stamped(
-            map,
-            child,
-            pose.stamp_ns,
-            &map_from_child,
-        ))
-    }
-
-    /// Says once where the map frame lies on the earth.
-    fn announce(&mut self, out: &mut Vec<EnuOutput>) {
-        let (false, Some(frame)) = (self.announced, self.ins.frame()) else {
-            return;
-        };
-        self.announced = true;
-        let stamp_ns = self.poses.newest_ns().unwrap_or(0);
-        let origin = frame.origin();
-        let position = GeoPoint {
-            latitude: origin.latitude_deg(),
-            longitude: origin.longitude_deg(),
-            altitude: origin.height_m,
-        };
-        out.push(EnuOutput::Origin(GeoPointStamped {
-            header: geometry::header(&self.options.map_frame, stamp_ns),
-            position,
-        }));
-        if self.options.publish_tf {
-            out.push(EnuOutput::StaticTransform(geometry::transform_stamped(
-                &self.options.earth_frame,
-                &self.options.map_frame,
-                stamp_ns,
-                &frame.ecef_from_enu(),
-            )));
-        }
-    }
-
-    /// Whether a transform is one that this node publishes itself.
-    fn is_own(&self, transform: &TransformStamped) -> bool {
-        let parent = transform.header.frame_id.trim_start_matches('/');
-        parent == self.options.map_frame || parent == self.options.earth_frame
+        self.announce_pose(&pose, out);
     }
 
     /// Notices a receiving clock that jumped back.
@@ -288,6 +215,7 @@ impl EnuTransformer {
     fn on_time_jump(&mut self, stamp_ns: i64) {
         self.counts.time_jumps += 1;
         self.mounts.clear_moving();
+        self.odom_ns = None;
         let after = (stamp_ns as f64 + self.options.max_wait_s * 1e9) as i64;
         let mut i = 0;
         while let Some(cloud) = self.waiting.get(i) {
@@ -350,15 +278,6 @@ impl EnuTransformer {
             }
         }
         Verdict::Transform
-    }
-
-    /// `base_from_sensor` at a stamp.
-    fn mount(&self, frame: &str, stamp_ns: i64) -> Result<Isometry3<f64>, TfMiss> {
-        if frame == self.options.base_frame {
-            return Ok(Isometry3::identity());
-        }
-        self.mounts
-            .lookup(&self.options.base_frame, frame, stamp_ns)
     }
 
     fn transform(&mut self, waiting: &WaitingCloud) -> Result<PointCloud2, Drop> {

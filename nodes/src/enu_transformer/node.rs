@@ -16,8 +16,8 @@ use super::ins::{InsMessage, InsSource};
 use super::{EnuOutput, EnuTransformer, TransformerOptions, TransformerReport};
 use crate::compute::{Compute, ComputeLimits, Inbox};
 use crate::convert::cloud;
-use crate::report;
 use crate::start::{Finish, NodeError, warn_unused};
+use crate::{options, report};
 use lattice_runtime::logging::Throttle;
 use lattice_runtime::qos::Qos;
 use lattice_runtime::{
@@ -25,7 +25,7 @@ use lattice_runtime::{
     TfBroadcaster,
 };
 
-/// What the compute thread is told.
+/// Event for the compute thread.
 enum Event {
     Cloud(Arc<PointCloud2>),
     Transforms(Arc<TFMessage>, bool),
@@ -47,16 +47,16 @@ enum Event {
 pub fn start(runtime: &Runtime, name: &str) -> Result<Finish, NodeError> {
     let node = runtime.node(name)?;
     let params = node.params();
-    let options = TransformerOptions::from_params(params)?;
-    let source = options.ins.source;
+    let transformer = TransformerOptions::from_params(params)?;
+    let source = transformer.ins.source;
     let limits = ComputeLimits {
-        events: params.usize("inbox_events", 8192)?,
-        bytes: options.max_waiting_bytes,
-        threads: params.usize("threads", 0)?,
+        events: options::inbox_events(params, 8192)?,
+        bytes: transformer.max_waiting_bytes,
+        threads: options::threads(params, 0)?,
     };
     let lost = Arc::new(AtomicU64::new(0));
     let mut shell = Shell {
-        machine: EnuTransformer::new(options),
+        machine: EnuTransformer::new(transformer),
         outputs: Outputs::open(&node)?,
         clock: node.clock(),
         diagnostics: node.diagnostics(),

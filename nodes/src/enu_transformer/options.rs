@@ -7,12 +7,13 @@ use nalgebra::Vector3;
 use super::ins::{HeightDatum, InsOptions, InsSource, InsStamp};
 use crate::convert::cloud::Precision;
 use crate::convert::viewpoint::VIEWPOINT_FIELDS;
+use crate::options::{frame, one_of};
 use lattice_runtime::params::{ParamError, Params};
 
-/// Everything that an [`super::EnuTransformer`] can be told.
+/// Options of an [`super::EnuTransformer`].
 #[derive(Clone, Debug)]
 pub struct TransformerOptions {
-    /// How poses come.
+    /// Options for reading the INS.
     pub ins: InsOptions,
     /// Frame of the output.
     pub map_frame: String,
@@ -22,7 +23,7 @@ pub struct TransformerOptions {
     pub odom_frame: Option<String>,
     /// Frame of the earth (ECEF), for the static transform of a georeferenced map.
     pub earth_frame: String,
-    /// Whether transforms are published at all.
+    /// True if transforms are published at all.
     pub publish_tf: bool,
     /// Points nearer to the sensor are left out, in m.
     pub min_range_m: f64,
@@ -30,21 +31,21 @@ pub struct TransformerOptions {
     pub max_range_m: f64,
     /// Most points of one cloud.
     pub max_cloud_points: usize,
-    /// How per-point times are found and read.
+    /// Field, unit and reference of the times of points.
     pub time: TimeOptions,
-    /// Whether points are moved to where they were at their own time.
+    /// True if points are moved to their place at their own time.
     pub deskew: bool,
-    /// How long a cloud waits for the pose that covers it, in s of message time.
+    /// Longest wait of a cloud for the pose that covers it, in s of message time.
     pub max_wait_s: f64,
     /// Longest gap between two poses that is interpolated, in s.
     pub max_pose_gap_s: f64,
-    /// How long poses and mounts are kept, in s.
+    /// Age up to which poses and mounts are kept, in s.
     pub pose_span_s: f64,
     /// Most clouds that wait.
     pub max_waiting_clouds: usize,
     /// Most bytes of clouds that wait.
     pub max_waiting_bytes: usize,
-    /// How coordinates are written.
+    /// Type of the coordinates.
     pub precision: Precision,
     /// Fields of the clouds that `points_enu` keeps, where they have them.
     pub pass_fields: Vec<String>,
@@ -96,34 +97,48 @@ impl TransformerOptions {
 
     /// Reads the parameters of the node.
     pub fn from_params(params: &Params) -> Result<Self, ParamError> {
-        let source: InsSource = choice(params, "ins.source", "inspvax", str::parse)?;
+        let source = params.string("ins.source", "inspvax")?;
+        let source: InsSource = source
+            .parse()
+            .map_err(|problem: String| params.invalid("ins.source", problem))?;
         let mut options = Self::new(source);
         options.ins = ins_options(params, options.ins)?;
         options.map_frame = frame(params, "map_frame", &options.map_frame)?;
         options.base_frame = frame(params, "base_frame", &options.base_frame)?;
         options.ins.base_frame.clone_from(&options.base_frame);
         options.earth_frame = frame(params, "earth_frame", &options.earth_frame)?;
-        options.odom_frame = Some(frame(params, "odom_frame", "")?).filter(|f| !f.is_empty());
+        options.odom_frame = match params.string("odom_frame", "")?.is_empty() {
+            true => None,
+            false => Some(frame(params, "odom_frame", "")?),
+        };
         options.publish_tf = params.bool("publish_tf", options.publish_tf)?;
         options.min_range_m = positive(params, "min_range_m", 0.0)?;
         let max_range_m = positive(params, "max_range_m", 0.0)?;
         if max_range_m > 0.0 {
             options.max_range_m = max_range_m;
         }
-        options.max_cloud_points = params.usize("max_cloud_points", options.max_cloud_points)?;
+        if options.min_range_m > options.max_range_m {
+            let problem = format!("expected at most `max_range_m`, {max_range_m}");
+            return Err(params.invalid("min_range_m", problem));
+        }
+        options.max_cloud_points =
+            params.usize_in("max_cloud_points", options.max_cloud_points, 1..=usize::MAX)?;
         options.deskew = params.bool("deskew", options.deskew)?;
         options.time = time_options(params)?;
         options.max_wait_s = positive(params, "max_wait_s", options.max_wait_s)?;
         options.max_pose_gap_s = positive(params, "max_pose_gap_s", options.max_pose_gap_s)?;
         options.pose_span_s = positive(params, "pose_span_s", options.pose_span_s)?;
+        let waiting = options.max_waiting_clouds;
         options.max_waiting_clouds =
-            params.usize("max_waiting_clouds", options.max_waiting_clouds)?;
-        options.max_waiting_bytes = params.usize("max_waiting_bytes", options.max_waiting_bytes)?;
-        options.precision = choice(params, "precision", "float32", |text| match text {
-            "float32" => Ok(Precision::Float32),
-            "float64" => Ok(Precision::Float64),
-            _ => Err(format!("'{text}', expected float32 or float64")),
-        })?;
+            params.usize_in("max_waiting_clouds", waiting, 1..=usize::MAX)?;
+        let waiting = options.max_waiting_bytes;
+        options.max_waiting_bytes =
+            params.usize_in("max_waiting_bytes", waiting, 1..=usize::MAX)?;
+        let precisions = [
+            ("float32", Precision::Float32),
+            ("float64", Precision::Float64),
+        ];
+        options.precision = one_of(params, "precision", &precisions)?;
         options.pass_fields = params.string_array("pass_fields", &LABEL_FIELDS)?;
         if options.pass_fields.len() > MAX_PASS_FIELDS {
             let problem = format!("expected at most {MAX_PASS_FIELDS} names");
@@ -143,15 +158,15 @@ impl TransformerOptions {
 }
 
 fn ins_options(params: &Params, defaults: InsOptions) -> Result<InsOptions, ParamError> {
-    let origin = choice(params, "origin.mode", "first_fix", |text| match text {
-        "first_fix" => Ok(false),
-        "fixed" => Ok(true),
-        _ => Err(format!("'{text}', expected first_fix or fixed")),
-    })?;
+    let is_fixed = one_of(
+        params,
+        "origin.mode",
+        &[("first_fix", false), ("fixed", true)],
+    )?;
     let latitude = params.f64("origin.latitude_deg", 0.0)?;
     let longitude = params.f64("origin.longitude_deg", 0.0)?;
     let height_m = params.f64("origin.height_m", 0.0)?;
-    let origin = if origin {
+    let origin = if is_fixed {
         let place = Geodetic::from_degrees(latitude, longitude, height_m)
             .map_err(|e| params.invalid("origin", e.to_string()))?;
         Some(place)
@@ -160,18 +175,21 @@ fn ins_options(params: &Params, defaults: InsOptions) -> Result<InsOptions, Para
     };
     let leap_seconds = params.i64("ins.leap_seconds", i64::from(defaults.leap_seconds))?;
     Ok(InsOptions {
-        stamp: choice(params, "ins.stamp", "gps", |text| match text {
-            "gps" => Ok(InsStamp::Gps),
-            "header" => Ok(InsStamp::Header),
-            _ => Err(format!("'{text}', expected gps or header")),
-        })?,
+        stamp: one_of(
+            params,
+            "ins.stamp",
+            &[("gps", InsStamp::Gps), ("header", InsStamp::Header)],
+        )?,
         leap_seconds: i32::try_from(leap_seconds)
             .map_err(|_| params.invalid("ins.leap_seconds", "expected a small number, 18"))?,
-        inspvax_height: choice(params, "ins.inspvax_height", "geoid", |text| match text {
-            "geoid" => Ok(HeightDatum::Geoid),
-            "ellipsoid" => Ok(HeightDatum::Ellipsoid),
-            _ => Err(format!("'{text}', expected geoid or ellipsoid")),
-        })?,
+        inspvax_height: one_of(
+            params,
+            "ins.inspvax_height",
+            &[
+                ("geoid", HeightDatum::Geoid),
+                ("ellipsoid", HeightDatum::Ellipsoid),
+            ],
+        )?,
         mount: InsMount::new(
             Vector3::from(triple(params, "ins.lever_arm_m")?),
             triple(params, "ins.boresight_rpy_rad")?,
@@ -186,42 +204,31 @@ fn time_options(params: &Params) -> Result<TimeOptions, ParamError> {
     let field = params.string("time.field", "")?;
     Ok(TimeOptions {
         field: Some(field).filter(|f| !f.is_empty()),
-        unit: choice(params, "time.unit", "auto", |text| match text {
-            "auto" => Ok(None),
-            "s" => Ok(Some(TimeUnit::Seconds)),
-            "ns" => Ok(Some(TimeUnit::Nanoseconds)),
-            _ => Err(format!("'{text}', expected auto, s or ns")),
-        })?,
-        reference: choice(params, "time.reference", "auto", |text| match text {
-            "auto" => Ok(None),
-            "stamp_start" => Ok(Some(TimeReference::StampStart)),
-            "stamp_end" => Ok(Some(TimeReference::StampEnd)),
-            "absolute" => Ok(Some(TimeReference::Absolute)),
-            _ => Err(format!(
-                "'{text}', expected auto, stamp_start, stamp_end or absolute"
-            )),
-        })?,
+        unit: one_of(
+            params,
+            "time.unit",
+            &[
+                ("auto", None),
+                ("s", Some(TimeUnit::Seconds)),
+                ("ns", Some(TimeUnit::Nanoseconds)),
+            ],
+        )?,
+        reference: one_of(
+            params,
+            "time.reference",
+            &[
+                ("auto", None),
+                ("stamp_start", Some(TimeReference::StampStart)),
+                ("stamp_end", Some(TimeReference::StampEnd)),
+                ("absolute", Some(TimeReference::Absolute)),
+            ],
+        )?,
         max_span_s: positive(params, "time.max_span_s", TimeOptions::default().max_span_s)?,
     })
 }
 
-fn choice<T>(
-    params: &Params,
-    name: &str,
-    default: &str,
-    parse: impl Fn(&str) -> Result<T, String>,
-) -> Result<T, ParamError> {
-    let text = params.string(name, default)?;
-    parse(&text).map_err(|reason| params.invalid(name, reason))
-}
-
 fn positive(params: &Params, name: &str, default: f64) -> Result<f64, ParamError> {
-    let value = params.f64(name, default)?;
-    if value.is_finite() && value >= 0.0 {
-        Ok(value)
-    } else {
-        Err(params.invalid(name, format!("{value}, expected zero or more")))
-    }
+    params.f64_in(name, default, 0.0..=f64::MAX)
 }
 
 fn triple(params: &Params, name: &str) -> Result<[f64; 3], ParamError> {
@@ -230,11 +237,4 @@ fn triple(params: &Params, name: &str) -> Result<[f64; 3], ParamError> {
         .ok()
         .filter(|values| values.iter().all(|v| v.is_finite()))
         .ok_or_else(|| params.invalid(name, "expected three finite numbers"))
-}
-
-fn frame(params: &Params, name: &str, default: &str) -> Result<String, ParamError> {
-    Ok(params
-        .string(name, default)?
-        .trim_start_matches('/')
-        .to_owned())
 }

@@ -20,7 +20,7 @@ pub struct WaitingCloud {
     /// Times of the earliest and latest point.
     pub first_ns: i64,
     pub last_ns: i64,
-    /// When it was received.
+    /// Time at which it was received.
     pub arrived_ns: i64,
 }
 

@@ -11,7 +11,7 @@ use thiserror::Error;
 /// Longest file, bytes.
 const MAX_BYTES: u64 = 1 << 20;
 
-/// Why names of classes could not be read.
+/// Error of a file of class names.
 #[derive(Debug, Error)]
 pub enum ClassesError {
     /// The system could not read the file.

@@ -11,7 +11,7 @@ use nalgebra::Point3;
 
 use super::points::{PointFileLimits, read_points};
 
-/// What every map file starts with, whatever its version.
+/// First bytes of every map file, whatever its version.
 const MAP_MAGIC: &[u8; 7] = b"LATTICE";
 
 /// A cloud from a file.

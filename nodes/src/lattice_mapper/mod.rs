@@ -2,19 +2,19 @@
 //!
 //! [`LatticeMapper`] is a state machine without I/O; [`node`] runs it behind DDS.
 
-mod calls;
 mod counts;
 mod free_options;
 mod free_space;
 pub mod node;
 mod occupancy;
+mod operations;
 mod options;
 mod report;
 mod services;
 
-pub use calls::LoadRefusal;
 pub use counts::MapperCounts;
 pub use free_options::{FreeSpaceMethod, MappedFreeSpace};
+pub use operations::LoadRefusal;
 pub use options::{MapPayload, MapperOptions};
 pub use report::MapperReport;
 
@@ -33,7 +33,7 @@ use self::free_space::FreeSpace;
 use self::occupancy::OccupancyMap;
 use crate::convert::{cloud, geometry, map, semantic, viewpoint};
 
-/// Why a cloud was not mapped. The map is as it was before.
+/// Reason for which a cloud was not mapped. The map is as it was before.
 #[derive(Debug, Error)]
 pub enum CloudRefusal {
     /// In another frame than the map's.
@@ -51,7 +51,7 @@ pub enum CloudRefusal {
     Malformed(#[from] lattice_core::cloud::CloudError),
 }
 
-/// Builds one occupied voxel list and tells what changed.
+/// Builds one occupied voxel list, with its changes for followers.
 pub struct LatticeMapper {
     options: MapperOptions,
     /// Empty with [`MapPayload::Occupancy`].
@@ -220,7 +220,7 @@ impl LatticeMapper {
         self.forgot_at_ns = 0;
     }
 
-    /// What a copy of the map is of: changes with whatever may change the map.
+    /// Epoch and state of the list: a copy of the map is old once they differ.
     pub fn state(&self) -> (u64, u64) {
         let sequence = match &self.occupancy {
             Some(occupancy) => occupancy.sequence(),
@@ -330,7 +330,7 @@ impl LatticeMapper {
         self.list.distortion()
     }
 
-    /// What came in and what was refused, by reason.
+    /// Counters of clouds and points, by reason of refusal.
     pub fn counts(&self) -> &MapperCounts {
         &self.counts
     }

@@ -15,8 +15,8 @@ use super::services::{self, Call};
 use super::{LatticeMapper, MapperOptions, MapperReport};
 use crate::compute::{Compute, ComputeLimits, Inbox};
 use crate::convert::cloud;
-use crate::report;
 use crate::start::{Finish, NodeError, warn_unused};
+use crate::{options, report};
 use lattice_runtime::logging::Throttle;
 use lattice_runtime::qos::Qos;
 use lattice_runtime::{Diagnostics, Level, Load, Node, Publisher, Runtime};
@@ -27,7 +27,7 @@ const CHUNKS_PER_ROUND: usize = 50;
 /// Said where rays shall clear voxels and a cloud does not say where they begin.
 const NO_VIEWPOINTS: &str = "no sensor positions (vp_x, vp_y, vp_z), so no free space: set `viewpoints: true` of enu_transformer";
 
-/// Work of the compute thread.
+/// Event for the compute thread.
 enum Event {
     Cloud(Arc<PointCloud2>),
     Update,
@@ -46,21 +46,21 @@ enum Event {
 pub fn start(runtime: &Runtime, name: &str) -> Result<Finish, NodeError> {
     let node = runtime.node(name)?;
     let params = node.params();
-    let options = MapperOptions::from_params(params)?;
+    let mapper = MapperOptions::from_params(params)?;
     let limits = ComputeLimits {
-        events: params.usize("inbox_events", 4096)?,
-        bytes: params.usize("inbox_bytes", 256 << 20)?,
-        threads: params.usize("threads", 0)?,
+        events: options::inbox_events(params, 4096)?,
+        bytes: options::inbox_bytes(params, 256 << 20)?,
+        threads: options::threads(params, 0)?,
     };
     let update_period = period(&node, "update_period_s", 0.2)?;
     let centers_period = period(&node, "centers_period_s", 1.0)?;
     let free_period = period(&node, "free_period_s", 1.0)?;
-    let has_free = options.free_space.free_level > 0;
+    let has_free = mapper.free_space.free_level > 0;
     let lost = Arc::new(AtomicU64::new(0));
     let wishes = Arc::new(Wishes::default());
-    let max_voxels = options.voxel_limit();
+    let max_voxels = mapper.voxel_limit();
     let mut shell = Shell {
-        machine: LatticeMapper::new(options, epoch())?,
+        machine: LatticeMapper::new(mapper, epoch())?,
         outputs: Outputs::open(&node, has_free)?,
         diagnostics: node.diagnostics(),
         lost: Arc::clone(&lost),
@@ -116,12 +116,12 @@ pub fn start(runtime: &Runtime, name: &str) -> Result<Finish, NodeError> {
     })?;
     let calls = services::serve(&node, &inbox, Event::Call, max_voxels)?;
     let updates = inbox.clone();
-    runtime.timer(update_period, move || tell(&updates, Event::Update));
+    runtime.timer(update_period, move || notify(&updates, Event::Update));
     if has_free {
         let free = inbox.clone();
-        runtime.timer(free_period, move || tell(&free, Event::Free));
+        runtime.timer(free_period, move || notify(&free, Event::Free));
     }
-    runtime.timer(centers_period, move || tell(&inbox, Event::Centers));
+    runtime.timer(centers_period, move || notify(&inbox, Event::Centers));
     warn_unused(params);
     Ok(Box::new(move || {
         let undecodable = points.undecodable() + origins.undecodable();
@@ -131,7 +131,7 @@ pub fn start(runtime: &Runtime, name: &str) -> Result<Finish, NodeError> {
     }))
 }
 
-/// What others want of the map, kept until the next update whatever waits in the inbox.
+/// Requests for the next update, kept whatever waits in the inbox.
 #[derive(Default)]
 struct Wishes {
     keyframe: AtomicBool,
@@ -144,7 +144,7 @@ fn lock<T>(mutex: &Mutex<T>) -> MutexGuard<'_, T> {
 }
 
 /// Hands over a timer's event; one that finds no room comes again with the next.
-fn tell(inbox: &Inbox<Event>, event: Event) {
+fn notify(inbox: &Inbox<Event>, event: Event) {
     if !inbox.send(event, 0) {
         log::debug!("the inbox is full");
     }
@@ -157,16 +157,8 @@ fn epoch() -> u64 {
 }
 
 fn period(node: &Node, name: &str, default_s: f64) -> Result<Duration, NodeError> {
-    let params = node.params();
-    let seconds = params.f64(name, default_s)?;
-    Duration::try_from_secs_f64(seconds)
-        .ok()
-        .filter(|period| *period >= Duration::from_millis(10))
-        .ok_or_else(|| {
-            params
-                .invalid(name, format!("{seconds}, expected 0.01 or more"))
-                .into()
-        })
+    let seconds = node.params().f64_in(name, default_s, 0.01..=86_400.0)?;
+    Ok(Duration::from_secs_f64(seconds))
 }
 
 /// The topics that the node speaks on.

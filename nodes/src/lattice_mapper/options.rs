@@ -6,6 +6,7 @@ use nalgebra::Vector3;
 
 use super::free_options::MappedFreeSpace;
 use crate::convert::semantic::LabelOptions;
+use crate::options;
 use lattice_runtime::params::{ParamError, Params};
 
 /// Options of a [`super::LatticeMapper`].
@@ -21,13 +22,13 @@ pub struct MapperOptions {
     pub max_voxels: usize,
     /// Most memory for voxels, which may allow fewer than `max_voxels`; 0: as many as those take.
     pub max_map_bytes: usize,
-    /// What happens to points in new cells when the map is full.
+    /// Treatment of points in new cells when the map is full.
     pub when_full: WhenFull,
     /// Age in the time of the clouds at which a voxel goes, ns; 0: never. Needs stamps of all voxels.
     pub forget_after_ns: i64,
     /// Most points of one cloud.
     pub max_cloud_points: usize,
-    /// How labels of the points are read and counted in each voxel; none: they are not.
+    /// Reading of labels, which are counted in each voxel; none: they are not kept.
     pub labels: Option<LabelOptions>,
     /// Largest serialised message of `map`, `map_updates` and `free`.
     pub chunk_bytes: usize,
@@ -82,36 +83,39 @@ impl MapperOptions {
         let [x, y, z] = datum[..] else {
             return Err(params.invalid("datum_m", "expected three numbers, x y z in metres"));
         };
-        let options = Self {
-            map_frame: params.string("map_frame", &defaults.map_frame)?,
+        let read = Self {
+            map_frame: options::frame(params, "map_frame", &defaults.map_frame)?,
             datum_near_m: Vector3::new(x, y, z),
-            max_voxels: params.usize("max_voxels", defaults.max_voxels)?,
+            max_voxels: params.usize_in("max_voxels", defaults.max_voxels, 1..=usize::MAX)?,
             max_map_bytes: params.usize("max_map_bytes", defaults.max_map_bytes)?,
             when_full: when_full(params)?,
             forget_after_ns: forget_after_ns(params)?,
-            max_cloud_points: params.usize("max_cloud_points", defaults.max_cloud_points)?,
+            max_cloud_points: params.usize_in(
+                "max_cloud_points",
+                defaults.max_cloud_points,
+                1..=usize::MAX,
+            )?,
             labels: Self::labels_from(params)?,
-            chunk_bytes: params.usize("chunk_bytes", defaults.chunk_bytes)?,
+            chunk_bytes: options::chunk_bytes(params, defaults.chunk_bytes)?,
             payload: map_payload(params)?,
             free_space: MappedFreeSpace::from_params(params)?,
             ..defaults
         };
-        if options.payload == MapPayload::Occupancy
-            && (options.payload().stamps || options.payload().labels)
+        if read.payload == MapPayload::Occupancy && (read.payload().stamps || read.payload().labels)
         {
             let problem = "occupancy has neither stamps nor labels: needs centroid with \
                            forget_after_s or keep_labels";
             return Err(params.invalid("payload", problem));
         }
-        if options.payload == MapPayload::Occupancy && options.when_full != WhenFull::Refuse {
+        if read.payload == MapPayload::Occupancy && read.when_full != WhenFull::Refuse {
             let problem = "payload occupancy knows no oldest voxel: needs refuse";
             return Err(params.invalid("when_full", problem));
         }
-        if options.max_voxels > 0 && options.voxel_limit() == 0 {
+        if read.voxel_limit() == 0 {
             let problem = "too little for a single voxel; a small map takes 1000000";
             return Err(params.invalid("max_map_bytes", problem));
         }
-        Ok(options)
+        Ok(read)
     }
 
     fn labels_from(params: &Params) -> Result<Option<LabelOptions>, ParamError> {
@@ -119,7 +123,7 @@ impl MapperOptions {
         Ok(params.bool("keep_labels", false)?.then_some(options))
     }
 
-    /// How the parameters want the lattice to lie in the map, whichever lattice it is.
+    /// Orientation of the lattice in the map that the parameters ask for, whichever lattice it is.
     pub fn orientation_from(params: &Params) -> Result<Orientation, ParamError> {
         let name = params.string("lattice_orientation", "paper")?;
         name.parse()

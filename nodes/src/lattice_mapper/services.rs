@@ -30,7 +30,7 @@ pub(super) enum Call {
     Query(QueryMapRequest, Reply<QueryMapResponse>),
 }
 
-/// Why a file was not read or written.
+/// Error of reading or writing a map file.
 #[derive(Debug, Error)]
 enum IoRefusal {
     #[error("{0:?} is not a regular file")]
@@ -90,7 +90,7 @@ pub(super) fn serve<E: Send + 'static>(
     Ok([save, load, clear_box, query])
 }
 
-/// What became of a call.
+/// Outcome of a call.
 #[derive(Default)]
 pub(super) struct Done {
     /// A file is being written.

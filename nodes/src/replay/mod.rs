@@ -181,7 +181,7 @@ impl Branch {
     fn finish(&mut self) -> LatticeReport {
         self.report.counts = self.markers.counts().clone();
         self.report.voxels = self.markers.voxels();
-        self.markers.redraw();
+        self.markers.wipe();
         self.report.marker_bytes = self.markers.take_bytes();
         LatticeReport {
             map: MapperReport::of(&mut self.mapper),
@@ -194,7 +194,7 @@ fn decode<T: DeserializeOwned>(data: &[u8]) -> Result<T, CdrError> {
     cdr::from_slice(data)
 }
 
-/// Replays a whole log; `progress` is told how much of it has passed, from 0 to 1.
+/// Replays a whole log; `progress` gets the part that has passed, from 0 to 1.
 pub fn run(
     bag: &BagReader,
     plan: &TopicPlan,

@@ -20,7 +20,7 @@ pub struct LatticeReport {
 /// A whole run over a log.
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
 pub struct RunReport {
-    /// Where the clouds came from.
+    /// Source of the clouds.
     pub source: String,
     /// Clouds on the topics that were replayed.
     pub clouds_in_log: u64,

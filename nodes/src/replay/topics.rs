@@ -1,4 +1,4 @@
-//! Which topics of a log carry clouds, poses and transforms.
+//! Topics of a log that carry clouds, poses and transforms.
 
 use std::collections::BTreeMap;
 
@@ -10,7 +10,7 @@ use thiserror::Error;
 use crate::enu_transformer::ins::InsSource;
 use lattice_bag::{BagError, BagReader, ReadOptions};
 
-/// Why a log cannot be replayed.
+/// Reason for which a log cannot be replayed.
 #[derive(Debug, Error)]
 pub enum TopicError {
     /// A topic that was asked for.
@@ -44,7 +44,7 @@ pub enum TopicError {
     Bag(#[from] BagError),
 }
 
-/// What a topic is to the replay.
+/// Role of a topic in the replay.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum Role {
     /// A sensor's clouds.

@@ -1,4 +1,4 @@
-//! What a server took in, refused and found.
+//! Counters of a server: clouds, requests, searches.
 
 use serde::{Deserialize, Serialize};
 

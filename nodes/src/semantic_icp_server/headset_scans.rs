@@ -14,7 +14,7 @@ pub(super) struct HeadsetScans {
 
 struct Kept {
     headset_scan: Arc<HeadsetScan>,
-    /// When the first of the clouds came that this one stands for.
+    /// Time of the first of the clouds that this one stands for.
     since_ns: i64,
     stamp_ns: i64,
 }
@@ -57,7 +57,7 @@ impl HeadsetScans {
         self.kept.clear();
     }
 
-    /// Drops those.
+    /// Drops the given scans.
     pub fn remove(&mut self, headset_scans: &[Arc<HeadsetScan>]) {
         let is_one = |kept: &Kept| {
             headset_scans

@@ -7,7 +7,7 @@ use thiserror::Error;
 use super::*;
 use crate::convert::semantic::{SemanticError, semantic_from_message};
 
-/// Why a cloud cannot be used.
+/// Error of a cloud that cannot be used.
 #[derive(Debug, Error)]
 enum Refusal {
     #[error("cloud in frame '{found}', expected '{expected}'")]
@@ -17,7 +17,7 @@ enum Refusal {
 }
 
 impl SemanticIcpServer {
-    /// Takes a cloud of the headset. What cannot be used is told as rejected, with the reason.
+    /// Takes a cloud of the headset. One that cannot be used is answered by a rejection with the reason.
     pub fn on_headset_cloud(&mut self, message: &PointCloud2, now_ns: i64) -> Vec<Output> {
         let mut out = Vec::new();
         self.counts.clouds_in += 1;
@@ -28,7 +28,7 @@ impl SemanticIcpServer {
                 let reason = refusal.to_string();
                 let mut result = self.result(CalibrationResult::REJECTED_INPUT, &reason);
                 result.header.stamp = message.header.stamp;
-                self.tell(result, now_ns, &mut out);
+                self.publish(result, now_ns, &mut out);
                 return out;
             }
         };
@@ -37,7 +37,7 @@ impl SemanticIcpServer {
             self.counts.clouds_no_map += 1;
             self.headset_scans.push(headset_scan, stamp_ns, now_ns);
             let result = self.result(CalibrationResult::REJECTED_INPUT, NO_MAP);
-            self.tell(result, now_ns, &mut out);
+            self.publish(result, now_ns, &mut out);
             return out;
         }
         if self.known.is_some() && self.options.track {

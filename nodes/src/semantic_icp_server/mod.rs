@@ -1,4 +1,4 @@
-//! Where a headset is in the map: its labelled clouds are found in the voxels of the robot.
+//! Calibration of a headset: its labelled clouds are found in the voxels of the robot.
 //!
 //! [`SemanticIcpServer`] is a state machine without I/O and without heavy work: what takes its time is
 //! a [`Job`] for another thread. [`node`] runs both behind DDS.
@@ -8,10 +8,10 @@ mod headset_scans;
 mod intake;
 pub mod node;
 mod options;
-mod outcome;
+mod results;
 mod search;
+mod search_thread;
 mod state;
-mod worker;
 
 pub use counts::ServerCounts;
 pub use options::{SearchWhen, ServerOptions, WhenBusy};
@@ -37,10 +37,10 @@ use crate::convert::calibration::{result_from, set_pose};
 use crate::convert::geometry;
 use crate::map_follower::{FollowError, Followed, MapFollower};
 
-/// Who asked for a calibration: a number that the shell gives.
+/// Number that the shell gives to a request.
 pub type CallId = u64;
 
-/// How a request ends.
+/// End of a request.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum End {
     /// The headset was found.
@@ -51,18 +51,18 @@ pub enum End {
     Canceled,
 }
 
-/// What the server has to say.
+/// Output of the server.
 #[derive(Clone, Debug)]
 pub enum Output {
     /// For `calibration`.
     Result(Box<CalibrationResult>),
     /// For `/tf`.
     Transform(TransformStamped),
-    /// To be calculated on another thread; its end is told by [`SemanticIcpServer::on_done`].
+    /// To be calculated on another thread; its result goes to [`SemanticIcpServer::on_done`].
     Job(Job),
     /// The answer to a request.
     Answer(CallId, End, Box<CalibrateResult>),
-    /// How far a request is.
+    /// Progress of a request.
     Feedback(CallId, CalibrateFeedback),
     /// A part of the map was lost: a keyframe is to be asked for.
     NeedKeyframe,
@@ -79,7 +79,7 @@ pub struct SemanticIcpServer {
     known: Option<Known>,
     /// Searches in a row that did not find the headset where it was.
     misses: u32,
-    /// When a look that fits somewhat may be doubted again.
+    /// Time from which a look that fits somewhat may be doubted again.
     doubt_again_ns: i64,
     running: Option<Running>,
     wanted: Option<Wanted>,
@@ -88,10 +88,12 @@ pub struct SemanticIcpServer {
     /// The newest cloud that the known pose is still to be refined by, and its stamp.
     look: Option<(Arc<HeadsetScan>, i64)>,
     next_job: u64,
+    /// Confusions of labels learned so far are of another session, segmenter or map.
+    unlearn: bool,
     /// State of the map that the searcher has: epoch, sequence, and when.
-    prepared: Option<(u64, u64, i64)>,
+    prepared: Option<(u64, Option<u64>, i64)>,
     last: CalibrationResult,
-    last_told_ns: i64,
+    published_ns: i64,
     counts: ServerCounts,
 }
 
@@ -114,9 +116,10 @@ impl SemanticIcpServer {
             fresh_cloud: false,
             look: None,
             next_job: 0,
+            unlearn: false,
             prepared: None,
             last: CalibrationResult::default(),
-            last_told_ns: 0,
+            published_ns: 0,
             counts: ServerCounts::default(),
             options,
         }
@@ -145,6 +148,7 @@ impl SemanticIcpServer {
             }
         }
         let (_, replaced) = self.follower.take_touched();
+        self.unlearn |= replaced;
         if replaced && self.prepared.is_some() {
             // Its frame may be another one.
             self.forget("the map is a new one", now_ns, &mut out);
@@ -152,13 +156,24 @@ impl SemanticIcpServer {
         out
     }
 
-    /// Takes the names of the headset's classes.
+    /// Asks for a keyframe if nothing more comes of an incomplete one. To be called once a second.
+    pub fn wait_a_second(&mut self) -> Option<Output> {
+        let overdue = self.follower.wait_a_second();
+        overdue.then_some(Output::NeedKeyframe)
+    }
+
+    /// Takes the names of the headset's classes. Others are of another segmenter, of whose confusions
+    /// nothing is known.
     pub fn on_label_info(&mut self, message: &LabelInfo) {
         let classes = message.class_map.iter().take(usize::from(u16::MAX));
         let name = |name: &str| name.chars().take(64).collect();
-        self.names = classes
+        let names = classes
             .map(|class| (class.class_id, name(&class.class_name)))
             .collect();
+        if self.names != names {
+            self.names = names;
+            self.unlearn = true;
+        }
     }
 
     /// Takes the session of the headset: another one means another origin, of which nothing is known.
@@ -167,6 +182,7 @@ impl SemanticIcpServer {
         let session: String = message.data.chars().take(256).collect();
         if session != self.session {
             self.counts.sessions += 1;
+            self.unlearn = true;
             self.session = session;
             self.headset_scans.clear();
             self.forget("the headset has begun a new session", now_ns, &mut out);
@@ -174,7 +190,7 @@ impl SemanticIcpServer {
         out
     }
 
-    /// What was known does not hold any more.
+    /// Drops the known pose and ends what is at work.
     fn forget(&mut self, why: &str, now_ns: i64, out: &mut Vec<Output>) {
         self.known = None;
         self.misses = 0;
@@ -191,7 +207,7 @@ impl SemanticIcpServer {
             self.answer_failed(caller, why, out);
         }
         let result = self.result(CalibrationResult::NONE, why);
-        self.tell(result, now_ns, out);
+        self.publish(result, now_ns, out);
     }
 
     /// Takes a request; it is answered at once or when its search has ended.
@@ -280,7 +296,7 @@ impl SemanticIcpServer {
         out
     }
 
-    /// Hears how far a job is.
+    /// Takes the progress of a job.
     pub fn on_progress(&self, job: u64, stage: Stage, fraction: f64) -> Option<Output> {
         let running = self.running.as_ref().filter(|r| r.job == job)?;
         let caller = running.caller.as_ref()?;
@@ -297,7 +313,7 @@ impl SemanticIcpServer {
         Some(Output::Feedback(caller.call, feedback))
     }
 
-    /// Takes what came of a job.
+    /// Takes the result of a job.
     pub fn on_done(&mut self, job: u64, done: Done, now_ns: i64) -> Vec<Output> {
         let mut out = Vec::new();
         let Some(running) = self.running.take_if(|r| r.job == job) else {
@@ -328,7 +344,7 @@ impl SemanticIcpServer {
         out
     }
 
-    /// What came in and what was found, by reason.
+    /// Counters of clouds, requests and searches, by reason.
     pub fn counts(&self) -> &ServerCounts {
         &self.counts
     }
@@ -338,7 +354,7 @@ impl SemanticIcpServer {
         self.known.as_ref().map(|known| known.map_from_headset)
     }
 
-    /// The result told last.
+    /// The newest result.
     pub fn last_result(&self) -> &CalibrationResult {
         &self.last
     }

@@ -2,7 +2,7 @@
 
 use std::collections::BTreeMap;
 use std::sync::Arc;
-use std::sync::atomic::{AtomicU64, Ordering};
+use std::sync::atomic::{AtomicBool, AtomicU64, Ordering};
 use std::time::Duration;
 
 use lattice_msgs::calibration::{
@@ -14,12 +14,12 @@ use lattice_msgs::sensor_msgs::PointCloud2;
 use lattice_msgs::std_msgs::{Empty, String as StringMessage};
 use lattice_msgs::vision_msgs::LabelInfo;
 
-use super::worker::{Worker, WorkerPort};
+use super::search_thread::{SearchPort, SearchThread};
 use super::{CallId, End, LatticeSearch, Output, SemanticIcpServer, ServerOptions};
 use crate::compute::{Compute, ComputeLimits, Inbox};
 use crate::convert::cloud;
-use crate::report;
 use crate::start::{Finish, NodeError, warn_unused};
+use crate::{options, report};
 use lattice_runtime::logging::Throttle;
 use lattice_runtime::qos::Qos;
 use lattice_runtime::{
@@ -30,9 +30,9 @@ use lattice_runtime::{
 /// Between two messages on diagnostics.
 const DIAGNOSE: Duration = Duration::from_secs(1);
 
-/// What the thread of the machine is told.
+/// Event for the thread of the machine.
 enum Event {
-    Worker(WorkerPort),
+    SearchPort(SearchPort),
     Map(Arc<LatticeMap>),
     Update(Arc<LatticeMapUpdate>),
     Cloud(Arc<PointCloud2>),
@@ -51,33 +51,31 @@ enum Event {
 pub fn start(runtime: &Runtime, name: &str) -> Result<Finish, NodeError> {
     let node = runtime.node(name)?;
     let params = node.params();
-    let options = ServerOptions::from_params(params)?;
+    let server = ServerOptions::from_params(params)?;
     let limits = ComputeLimits {
-        events: params.usize("inbox_events", 4096)?,
-        bytes: params.usize("inbox_bytes", 256 << 20)?,
+        events: options::inbox_events(params, 4096)?,
+        bytes: options::inbox_bytes(params, 256 << 20)?,
         threads: 1,
     };
-    let threads = params.usize("threads", 0)?;
-    let rate_hz = params.f64("tf_rate_hz", 10.0)?;
-    if !(0.1..=100.0).contains(&rate_hz) {
-        let reason = format!("{rate_hz}, expected 0.1 to 100");
-        return Err(params.invalid("tf_rate_hz", reason).into());
-    }
+    let threads = options::threads(params, 0)?;
+    let rate_hz = params.f64_in("tf_rate_hz", 10.0, 0.1..=100.0)?;
     let mapper = params.string("mapper", "lattice_mapper")?;
-    let search = LatticeSearch::new(options.calibration);
+    let search = LatticeSearch::new(server.calibration);
     let lost = Arc::new(AtomicU64::new(0));
+    let map_lost = Arc::new(AtomicBool::new(false));
     let outputs = Outputs {
         calibration: node.publisher("calibration", Qos::latched(1))?,
         tf: TfBroadcaster::new(&node)?,
         request: node.publisher(&format!("{mapper}/request_keyframe"), Qos::DEFAULT)?,
     };
     let mut shell = Shell {
-        machine: SemanticIcpServer::new(options),
-        worker: None,
+        machine: SemanticIcpServer::new(server),
+        search: None,
         outputs,
         diagnostics: node.diagnostics(),
         clock: node.clock(),
         lost: Arc::clone(&lost),
+        map_lost: Arc::clone(&map_lost),
         calls: BTreeMap::new(),
         next_call: 0,
         requests: Throttle::new(Duration::from_secs(1)),
@@ -88,43 +86,50 @@ pub fn start(runtime: &Runtime, name: &str) -> Result<Finish, NodeError> {
     })?;
     let inbox = compute.inbox();
     let wake = inbox.clone();
-    let worker = Worker::spawn(
+    let thread = SearchThread::spawn(
         &format!("{name} search"),
         threads,
         runtime.shutdown_handle(),
         search,
-        move || tell(&wake, Event::Look),
+        move || notify(&wake, Event::Look),
     )?;
     // The first of all events.
-    tell(&inbox, Event::Worker(worker.port()));
+    notify(&inbox, Event::SearchPort(thread.port()));
 
-    let to = inbox.clone();
-    let missed = Arc::clone(&lost);
-    let maps = node.subscribe("map", Qos::MAP, Load::Small, move |map: Arc<LatticeMap>| {
+    let (to, missed, part) = (inbox.clone(), Arc::clone(&lost), Arc::clone(&map_lost));
+    let on_map = move |map: Arc<LatticeMap>| {
         let bytes = map.keys.len() + map.counts.len() * 16;
-        hand_over(&to, Event::Map(map), bytes, &missed);
-    })?;
-    let to = inbox.clone();
-    let missed = Arc::clone(&lost);
+        if !hand_over(&to, Event::Map(map), bytes, &missed) {
+            part.store(true, Ordering::Relaxed);
+        }
+    };
+    let maps = node.subscribe("map", Qos::MAP, Load::Large, on_map)?;
+    let (to, missed, part) = (inbox.clone(), Arc::clone(&lost), map_lost);
     let on_update = move |update: Arc<LatticeMapUpdate>| {
         let bytes = update.keys.len() + update.counts.len() * 16 + update.removed_keys.len();
-        hand_over(&to, Event::Update(update), bytes, &missed);
+        if !hand_over(&to, Event::Update(update), bytes, &missed) {
+            part.store(true, Ordering::Relaxed);
+        }
     };
-    let updates = node.subscribe("map_updates", Qos::DELTAS, Load::Small, on_update)?;
+    let updates = node.subscribe("map_updates", Qos::DELTAS, Load::Large, on_update)?;
     let to = inbox.clone();
     let missed = Arc::clone(&lost);
     let on_cloud = move |message: Arc<PointCloud2>| {
         let bytes = cloud::bytes_of(&message);
-        hand_over(&to, Event::Cloud(message), bytes, &missed);
+        let _ = hand_over(&to, Event::Cloud(message), bytes, &missed);
     };
     let clouds = node.subscribe("headset/points", Qos::SENSOR, Load::Large, on_cloud)?;
     let to = inbox.clone();
     let missed = Arc::clone(&lost);
-    let on_session = move |message| hand_over(&to, Event::Session(message), 0, &missed);
+    let on_session = move |message| {
+        let _ = hand_over(&to, Event::Session(message), 0, &missed);
+    };
     let sessions = node.subscribe("headset/session", Qos::LATCHED, Load::Small, on_session)?;
     let to = inbox.clone();
     let missed = Arc::clone(&lost);
-    let on_info = move |message| hand_over(&to, Event::LabelInfo(message), 0, &missed);
+    let on_info = move |message| {
+        let _ = hand_over(&to, Event::LabelInfo(message), 0, &missed);
+    };
     let infos = node.subscribe("headset/label_info", Qos::LATCHED, Load::Small, on_info)?;
 
     let to = inbox.clone();
@@ -144,33 +149,33 @@ pub fn start(runtime: &Runtime, name: &str) -> Result<Finish, NodeError> {
         "~/calibrate",
         ActionLimits::default(),
         move |goal, handle| to.send(Event::Goal(Box::new(goal), handle), 0),
-        move |_| tell(&look, Event::Look),
+        move |_| notify(&look, Event::Look),
     )?;
     let ticks = inbox.clone();
     runtime.timer(Duration::from_secs_f64(1.0 / rate_hz), move || {
-        tell(&ticks, Event::Tick);
+        notify(&ticks, Event::Tick);
     });
     runtime.timer(DIAGNOSE, move || {
         action.expire();
-        tell(&inbox, Event::Diagnose);
+        notify(&inbox, Event::Diagnose);
     });
     warn_unused(params);
     Ok(Box::new(move || {
         drop((maps, updates, clouds, sessions, infos, service));
         compute.finish_with(Event::Finish);
-        worker.finish();
+        thread.finish();
     }))
 }
 
-/// Hands over what must not be lost unseen.
-fn hand_over(inbox: &Inbox<Event>, event: Event, bytes: usize, lost: &AtomicU64) {
-    if !inbox.send(event, bytes) {
-        lost.fetch_add(1, Ordering::Relaxed);
-    }
+/// Hands over a message, or counts it as lost and returns false.
+fn hand_over(inbox: &Inbox<Event>, event: Event, bytes: usize, lost: &AtomicU64) -> bool {
+    let sent = inbox.send(event, bytes);
+    lost.fetch_add(u64::from(!sent), Ordering::Relaxed);
+    sent
 }
 
 /// Hands over what comes again with the next tick.
-fn tell(inbox: &Inbox<Event>, event: Event) {
+fn notify(inbox: &Inbox<Event>, event: Event) {
     if !inbox.send(event, 0) {
         log::debug!("the inbox is full");
     }
@@ -192,12 +197,14 @@ enum Client {
 /// State of the machine's thread.
 struct Shell {
     machine: SemanticIcpServer,
-    worker: Option<WorkerPort>,
+    search: Option<SearchPort>,
     outputs: Outputs,
     diagnostics: Diagnostics,
     clock: Clock,
     /// Messages that found the inbox full.
     lost: Arc<AtomicU64>,
+    /// A part of the map is one of them.
+    map_lost: Arc<AtomicBool>,
     calls: BTreeMap<CallId, Client>,
     next_call: CallId,
     requests: Throttle,
@@ -208,8 +215,8 @@ impl Shell {
     fn on(&mut self, event: Event) {
         let now_ns = self.clock.now_ns();
         let outputs = match event {
-            Event::Worker(port) => {
-                self.worker = Some(port);
+            Event::SearchPort(port) => {
+                self.search = Some(port);
                 Vec::new()
             }
             Event::Map(chunk) => self.machine.on_map(&chunk, now_ns),
@@ -244,7 +251,12 @@ impl Shell {
             Event::Tick => self.machine.tick(now_ns).into_iter().collect(),
             Event::Diagnose => {
                 self.diagnose();
-                Vec::new()
+                let overdue = self.machine.wait_a_second();
+                let lost = self.map_lost.swap(false, Ordering::Relaxed);
+                overdue
+                    .or(lost.then_some(Output::NeedKeyframe))
+                    .into_iter()
+                    .collect()
             }
             Event::Finish => self.machine.finish(),
         };
@@ -260,9 +272,9 @@ impl Shell {
 
     /// Takes what the searcher has found, and what clients do not want any more.
     fn look(&mut self, now_ns: i64) {
-        let worker = self.worker.as_ref();
-        let progress = worker.and_then(WorkerPort::take_progress);
-        let done = worker.map_or_else(Vec::new, WorkerPort::take_done);
+        let search = self.search.as_ref();
+        let progress = search.and_then(SearchPort::take_progress);
+        let done = search.map_or_else(Vec::new, SearchPort::take_done);
         if let Some((job, stage, fraction)) = progress {
             let feedback = self.machine.on_progress(job, stage, fraction);
             self.put(feedback.into_iter().collect());
@@ -301,7 +313,7 @@ impl Shell {
                     }
                 }
                 Output::Job(job) => {
-                    if !self.worker.as_ref().is_some_and(|worker| worker.begin(job)) {
+                    if !self.search.as_ref().is_some_and(|search| search.begin(job)) {
                         log::error!("the searching thread takes no job");
                     }
                 }

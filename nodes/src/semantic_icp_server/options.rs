@@ -3,9 +3,10 @@
 use lattice_core::registration::CalibrationOptions;
 
 use crate::convert::semantic::SemanticOptions;
+use crate::options::{frame, one_of};
 use lattice_runtime::params::{ParamError, Params};
 
-/// When a whole search begins by itself.
+/// Occasion on which a whole search begins by itself.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum SearchWhen {
     /// With a cloud, as long as it is not known where the headset is.
@@ -14,7 +15,7 @@ pub enum SearchWhen {
     Asked,
 }
 
-/// What becomes of a request while another one is at work.
+/// Treatment of a request while another one is at work.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum WhenBusy {
     /// It is refused.
@@ -23,35 +24,35 @@ pub enum WhenBusy {
     Supersede,
 }
 
-/// Everything that a [`super::SemanticIcpServer`] can be told.
+/// Options of a [`super::SemanticIcpServer`].
 #[derive(Clone, Debug)]
 pub struct ServerOptions {
     /// Frame of the map, in which the answer is.
     pub map_frame: String,
     /// Frame that clouds must be in.
     pub headset_frame: String,
-    /// How clouds are read.
+    /// Options for reading clouds.
     pub semantic: SemanticOptions,
-    /// How calibrations are done.
+    /// Options of calibrations.
     pub calibration: CalibrationOptions,
     /// Maps of more voxels are not followed.
     pub max_map_voxels: usize,
-    /// When a whole search begins by itself.
+    /// Occasion on which a whole search begins by itself.
     pub search: SearchWhen,
-    /// What becomes of a request while another one is at work.
+    /// Treatment of a request while another one is at work.
     pub when_busy: WhenBusy,
     /// Clouds of one session that are searched with together, at most.
     pub max_headset_scans: usize,
     /// A cloud replaces the one before unless it is later by this, ns.
     pub headset_scan_period_ns: i64,
-    /// Whether the pose is refined by each cloud once it is known.
+    /// True if the pose is refined by each cloud once it is known.
     pub track: bool,
     /// Searches that must fail in a row before a pose that is tracked is given up.
     pub lost_after: u32,
     /// A look is searched with alone if its share of points on the map is below this share of that of
     /// the calibration: is it mirrored, or the headset elsewhere?
     pub doubt_below: f64,
-    /// How long a tracked pose is compared with an old state of the map, ns.
+    /// Age of the state of the map up to which a tracked pose is compared with it, ns.
     pub map_refresh_ns: i64,
 }
 
@@ -79,21 +80,18 @@ impl ServerOptions {
     /// Reads the parameters of the node.
     pub fn from_params(params: &Params) -> Result<Self, ParamError> {
         let defaults = Self::default();
-        let frame = |name: &str, default: &str| {
-            let frame = params.string(name, default)?;
-            let frame = frame.trim_start_matches('/').to_owned();
-            match frame.is_empty() {
-                true => Err(params.invalid(name, "expected a frame")),
-                false => Ok(frame),
-            }
-        };
         let semantic = SemanticOptions::from_params(params)?;
         let calibration = calibration_from(params, &semantic)?;
-        let lost_after = params.usize("lost_after", defaults.lost_after as usize)?;
+        let lost_after =
+            params.usize_in("lost_after", defaults.lost_after as usize, 1..=1 << 20)?;
         Ok(Self {
-            map_frame: frame("map_frame", &defaults.map_frame)?,
-            headset_frame: frame("headset_frame", &defaults.headset_frame)?,
-            max_map_voxels: params.usize("max_map_voxels", defaults.max_map_voxels)?,
+            map_frame: frame(params, "map_frame", &defaults.map_frame)?,
+            headset_frame: frame(params, "headset_frame", &defaults.headset_frame)?,
+            max_map_voxels: params.usize_in(
+                "max_map_voxels",
+                defaults.max_map_voxels,
+                1..=usize::MAX,
+            )?,
             search: one_of(
                 params,
                 "search",
@@ -107,17 +105,17 @@ impl ServerOptions {
                     ("supersede", WhenBusy::Supersede),
                 ],
             )?,
-            max_headset_scans: at_least_one(
-                params,
+            max_headset_scans: params.usize_in(
                 "max_headset_scans",
                 defaults.max_headset_scans,
+                1..=usize::MAX,
             )?,
-            headset_scan_period_ns: (number(params, "headset_scan_period_s", 1.0, 0.0..=1e6)? * 1e9)
+            headset_scan_period_ns: (params.f64_in("headset_scan_period_s", 1.0, 0.0..=1e6)? * 1e9)
                 as i64,
             track: params.bool("track", defaults.track)?,
-            lost_after: u32::try_from(lost_after.max(1)).unwrap_or(u32::MAX),
-            doubt_below: number(params, "doubt_below", defaults.doubt_below, 0.0..=1.0)?,
-            map_refresh_ns: (number(params, "map_refresh_s", 10.0, 0.0..=1e6)? * 1e9) as i64,
+            lost_after: u32::try_from(lost_after).unwrap_or(u32::MAX),
+            doubt_below: params.f64_in("doubt_below", defaults.doubt_below, 0.0..=1.0)?,
+            map_refresh_ns: (params.f64_in("map_refresh_s", 10.0, 0.0..=1e6)? * 1e9) as i64,
             semantic,
             calibration,
         })
@@ -133,54 +131,27 @@ fn calibration_from(
     Ok(CalibrationOptions {
         min_points: params.usize("min_points", d.min_points)?,
         max_points: semantic.max_points,
-        registered_points: at_least_one(params, "registered_points", d.registered_points)?,
-        noise_m: number(params, "noise_m", d.noise_m, meters.clone())?,
-        region_m: number(params, "region_m", d.region_m, 1e-3..=1e4)?,
-        scale_sigma: number(params, "scale_sigma", d.scale_sigma, 0.0..=0.5)?,
+        registered_points: params.usize_in(
+            "registered_points",
+            d.registered_points,
+            1..=usize::MAX,
+        )?,
+        noise_m: params.f64_in("noise_m", d.noise_m, meters.clone())?,
+        region_m: params.f64_in("region_m", d.region_m, 1e-3..=1e4)?,
+        scale_sigma: params.f64_in("scale_sigma", d.scale_sigma, 0.0..=0.5)?,
         gravity_sigma_rad: gravity_sigma_rad(params, d.gravity_sigma_rad)?,
-        agreement: number(params, "agreement", d.agreement, 0.0..=1.0)?,
-        start_radius_m: number(params, "guess_radius_m", d.start_radius_m, meters.clone())?,
-        start_yaw_rad: number(params, "guess_yaw_rad", d.start_yaw_rad, 0.0..=3.2)?,
-        min_margin: number(params, "min_margin", d.min_margin, 0.0..=1e9)?,
-        min_inliers: number(params, "min_inliers", d.min_inliers, 0.0..=1.0)?,
-        max_sigma_m: number(params, "max_sigma_m", d.max_sigma_m, meters)?,
-        max_sigma_rad: number(params, "max_sigma_rad", d.max_sigma_rad, 1e-6..=3.2)?,
+        agreement: params.f64_in("agreement", d.agreement, 0.0..=1.0)?,
+        start_radius_m: params.f64_in("guess_radius_m", d.start_radius_m, meters.clone())?,
+        start_yaw_rad: params.f64_in("guess_yaw_rad", d.start_yaw_rad, 0.0..=3.2)?,
+        min_margin: params.f64_in("min_margin", d.min_margin, 0.0..=1e9)?,
+        min_inliers: params.f64_in("min_inliers", d.min_inliers, 0.0..=1.0)?,
+        max_sigma_m: params.f64_in("max_sigma_m", d.max_sigma_m, meters)?,
+        max_sigma_rad: params.f64_in("max_sigma_rad", d.max_sigma_rad, 1e-6..=3.2)?,
     })
 }
 
 /// Zero in the parameters stands for a frame that does not know where down is.
 fn gravity_sigma_rad(params: &Params, default: f64) -> Result<f64, ParamError> {
-    let sigma = number(params, "gravity_sigma_rad", default, 0.0..=3.2)?;
+    let sigma = params.f64_in("gravity_sigma_rad", default, 0.0..=3.2)?;
     Ok(if sigma > 0.0 { sigma } else { f64::INFINITY })
-}
-
-fn number(
-    params: &Params,
-    name: &str,
-    default: f64,
-    range: std::ops::RangeInclusive<f64>,
-) -> Result<f64, ParamError> {
-    let value = params.f64(name, default)?;
-    if range.contains(&value) {
-        return Ok(value);
-    }
-    let problem = format!("{value}, expected {} to {}", range.start(), range.end());
-    Err(params.invalid(name, problem))
-}
-
-fn at_least_one(params: &Params, name: &str, default: usize) -> Result<usize, ParamError> {
-    match params.usize(name, default)? {
-        0 => Err(params.invalid(name, "expected 1 or more")),
-        value => Ok(value),
-    }
-}
-
-/// One of several words; the first is the default.
-fn one_of<T: Copy>(params: &Params, name: &str, words: &[(&str, T)]) -> Result<T, ParamError> {
-    let word = params.string(name, words.first().map_or("", |(word, _)| word))?;
-    let found = words.iter().find(|(known, _)| *known == word);
-    found.map(|(_, value)| *value).ok_or_else(|| {
-        let known: Vec<&str> = words.iter().map(|(word, _)| *word).collect();
-        params.invalid(name, format!("{word:?}, expected {}", known.join(" or ")))
-    })
 }

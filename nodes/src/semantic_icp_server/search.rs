@@ -1,4 +1,4 @@
-//! What the server has others calculate, and how.
+//! Searches and tracking as jobs for another thread.
 
 use std::ops::ControlFlow;
 use std::sync::Arc;
@@ -21,6 +21,9 @@ pub struct MapCloud {
 
 /// Finds poses; made for the thread that calculates.
 pub trait Search: Send + 'static {
+    /// Forgets the confusions of labels that it learned.
+    fn unlearn(&mut self);
+
     /// Makes a map ready, for all that follows. The error says why it cannot be used.
     fn prepare(&mut self, map: MapCloud) -> Result<(), String>;
 
@@ -44,7 +47,7 @@ pub trait Search: Send + 'static {
 pub struct LatticeSearch {
     options: CalibrationOptions,
     map: Option<CalibrationMap>,
-    /// What was learned of the labels so far.
+    /// Confusions of labels learned so far.
     confusion: Option<Confusion>,
 }
 
@@ -60,6 +63,10 @@ impl LatticeSearch {
 }
 
 impl Search for LatticeSearch {
+    fn unlearn(&mut self) {
+        self.confusion = None;
+    }
+
     fn prepare(&mut self, map: MapCloud) -> Result<(), String> {
         self.map = None;
         let map = CalibrationMap::new(map.cloud, map.cell_side_m).map_err(|e| e.to_string())?;
@@ -98,7 +105,7 @@ impl Search for LatticeSearch {
     }
 }
 
-/// What is to be calculated.
+/// Work of a job.
 #[derive(Clone, Debug)]
 pub enum Work {
     /// A pose by several looks, near a start if there is one.
@@ -122,15 +129,17 @@ pub enum Work {
 pub struct Job {
     /// Its number.
     pub id: u64,
+    /// Confusions of labels learned before do not hold any more.
+    pub unlearn: bool,
     /// A map to be made ready first.
     pub map: Option<MapCloud>,
-    /// What is to be calculated.
+    /// Work of a job.
     pub work: Work,
     /// Is set when the calculation is to end early.
     pub canceled: Arc<AtomicBool>,
 }
 
-/// What came of a calculation.
+/// Result of a job.
 #[derive(Clone, Debug)]
 pub enum Done {
     /// The search has ended.
@@ -143,12 +152,12 @@ pub enum Done {
 
 struct Watch<'a, F> {
     canceled: &'a AtomicBool,
-    tell: F,
+    on_progress: F,
 }
 
 impl<F: Fn(Stage, f64) + Sync> Progress for Watch<'_, F> {
     fn report(&self, stage: Stage, fraction: f64) -> ControlFlow<()> {
-        (self.tell)(stage, fraction);
+        (self.on_progress)(stage, fraction);
         match self.canceled.load(Relaxed) {
             true => ControlFlow::Break(()),
             false => ControlFlow::Continue(()),
@@ -157,8 +166,11 @@ impl<F: Fn(Stage, f64) + Sync> Progress for Watch<'_, F> {
 }
 
 impl Job {
-    /// Calculates; `tell` hears how far the search is.
-    pub fn run(self, search: &mut dyn Search, tell: impl Fn(Stage, f64) + Sync) -> Done {
+    /// Calculates; `on_progress` is called with the stage and its fraction.
+    pub fn run(self, search: &mut dyn Search, on_progress: impl Fn(Stage, f64) + Sync) -> Done {
+        if self.unlearn {
+            search.unlearn();
+        }
         if let Some(map) = self.map
             && let Err(reason) = search.prepare(map)
         {
@@ -179,7 +191,7 @@ impl Job {
                     .collect();
                 let watch = Watch {
                     canceled: &self.canceled,
-                    tell,
+                    on_progress,
                 };
                 Done::Calibrated(Box::new(search.calibrate(&headset_scans, start, &watch)))
             }

@@ -1,8 +1,8 @@
-//! What is at work, and what begins next.
+//! State of the server: the running job, the search that waits, the known pose.
 
 use super::*;
 
-/// Who waits for an answer.
+/// Client that waits for an answer.
 #[derive(Clone, Copy, Debug)]
 pub(super) struct Caller {
     pub call: CallId,
@@ -15,10 +15,10 @@ pub(super) struct Wanted {
     pub start: Option<Isometry3<f64>>,
 }
 
-/// Where the headset is.
+/// Known pose of the headset.
 pub(super) struct Known {
     pub map_from_headset: Isometry3<f64>,
-    /// As it was told when it was found.
+    /// Result of the search that found it.
     pub result: CalibrationResult,
 }
 
@@ -27,7 +27,7 @@ pub(super) struct Running {
     pub job: u64,
     pub caller: Option<Caller>,
     pub canceled: Arc<AtomicBool>,
-    /// Nobody wants its outcome any more.
+    /// Its outcome is to be ignored.
     pub outdated: bool,
     pub begun_ns: i64,
     pub stamp_ns: i64,
@@ -152,6 +152,7 @@ impl SemanticIcpServer {
         let canceled = Arc::new(AtomicBool::new(false));
         out.push(Output::Job(Job {
             id: self.next_job,
+            unlearn: std::mem::take(&mut self.unlearn),
             map,
             work,
             canceled: Arc::clone(&canceled),
@@ -176,7 +177,7 @@ impl SemanticIcpServer {
         })
     }
 
-    /// Ends what is being calculated; who waits for it is told why.
+    /// Ends what is being calculated; whoever waits for it is answered with the reason.
     pub(super) fn end_running(&mut self, why: &str, out: &mut Vec<Output>) {
         let Some(running) = &mut self.running else {
             return;
@@ -213,9 +214,14 @@ impl SemanticIcpServer {
         result.session.clone_from(&self.session);
     }
 
-    pub(super) fn tell(&mut self, result: CalibrationResult, now_ns: i64, out: &mut Vec<Output>) {
+    pub(super) fn publish(
+        &mut self,
+        result: CalibrationResult,
+        now_ns: i64,
+        out: &mut Vec<Output>,
+    ) {
         self.last = result.clone();
-        self.last_told_ns = now_ns;
+        self.published_ns = now_ns;
         out.push(Output::Result(Box::new(result)));
     }
 }

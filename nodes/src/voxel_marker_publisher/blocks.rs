@@ -56,7 +56,7 @@ impl Blocks {
             .flat_map(|block| block.keys.iter().copied())
     }
 
-    /// Whether a voxel is occupied.
+    /// True if a voxel is occupied.
     pub fn contains(&self, key: MortonKey) -> bool {
         let block = self.blocks.get(&self.id_of(key));
         block.is_some_and(|block| block.keys.contains(&key))

@@ -29,7 +29,7 @@ const NAMESPACE: &str = "voxels";
 /// Serialised bytes of a marker beside its points and colours, and of an array beside its markers.
 const OVERHEAD_BYTES: usize = 256;
 
-/// What the publisher took in and gave out.
+/// Counters of messages taken and markers given.
 #[derive(Clone, Debug, Default, PartialEq, Eq, Serialize, Deserialize)]
 pub struct MarkerCounts {
     /// Chunks of `map` and `map_updates` received.
@@ -94,13 +94,24 @@ impl VoxelMarkers {
         self.after(result)
     }
 
-    /// Draws everything again, for a viewer that has just come.
+    /// Draws everything again, for a viewer that has just come; what the others show stays.
     pub fn redraw(&mut self) {
-        self.wipe = true;
         self.dirty = self.blocks.ids().collect();
     }
 
-    /// Whether there is something to publish.
+    /// Takes away all that viewers show and draws everything again, after a loss of unknown markers.
+    pub fn wipe(&mut self) {
+        self.wipe = true;
+        self.redraw();
+    }
+
+    /// True if a keyframe is to be asked for, since nothing more comes of an incomplete one. To be
+    /// called once a second.
+    pub fn wait_a_second(&mut self) -> bool {
+        self.follower.wait_a_second()
+    }
+
+    /// True if there is something to publish.
     pub fn is_dirty(&self) -> bool {
         self.follower.map().is_some() && (self.wipe || !self.dirty.is_empty())
     }
@@ -150,7 +161,7 @@ impl VoxelMarkers {
         arrays
     }
 
-    /// What came in and went out.
+    /// Counters of messages and markers.
     pub fn counts(&self) -> &MarkerCounts {
         &self.counts
     }

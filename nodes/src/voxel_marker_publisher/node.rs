@@ -4,7 +4,6 @@ use std::sync::Arc;
 use std::sync::atomic::{AtomicBool, Ordering};
 use std::time::Duration;
 
-use lattice_msgs::cdr;
 use lattice_msgs::lattice::{LatticeMap, LatticeMapUpdate};
 use lattice_msgs::std_msgs::Empty;
 use lattice_msgs::visualization_msgs::MarkerArray;
@@ -12,13 +11,16 @@ use lattice_msgs::visualization_msgs::MarkerArray;
 use super::{MarkerOptions, MarkerReport, VoxelMarkers};
 use crate::compute::{Compute, ComputeLimits};
 use crate::map_follower::{FollowError, Followed};
-use crate::report;
 use crate::start::{Finish, NodeError, warn_unused};
+use crate::{options, report};
 use lattice_runtime::logging::Throttle;
 use lattice_runtime::qos::Qos;
 use lattice_runtime::{Diagnostics, Level, Load, Publisher, Runtime};
 
-/// What the compute thread is told.
+/// Longest wait for readers at the end, between two budgets of markers.
+const FLUSH: Duration = Duration::from_secs(2);
+
+/// Event for the compute thread.
 enum Event {
     Map(Arc<LatticeMap>),
     Update(Arc<LatticeMapUpdate>),
@@ -31,31 +33,27 @@ enum Event {
 pub fn start(runtime: &Runtime, name: &str) -> Result<Finish, NodeError> {
     let node = runtime.node(name)?;
     let params = node.params();
-    let options = MarkerOptions::from_params(params)?;
+    let markers = MarkerOptions::from_params(params)?;
     let limits = ComputeLimits {
-        events: params.usize("inbox_events", 4096)?,
-        bytes: params.usize("inbox_bytes", 64 << 20)?,
-        threads: params.usize("threads", 1)?,
+        events: options::inbox_events(params, 4096)?,
+        bytes: options::inbox_bytes(params, 64 << 20)?,
+        threads: options::threads(params, 1)?,
     };
-    let rate_hz = params.f64("rate_hz", 5.0)?;
-    if !(0.1..=100.0).contains(&rate_hz) {
-        let reason = format!("{rate_hz}, expected 0.1 to 100");
-        return Err(params.invalid("rate_hz", reason).into());
-    }
-    let bytes_per_s = params.usize("max_bytes_per_s", 20_000_000)?;
+    let rate_hz = params.f64_in("rate_hz", 5.0, 0.1..=100.0)?;
+    let bytes_per_s = params.usize_in("max_bytes_per_s", 20_000_000, 1..=usize::MAX)?;
     let mapper = params.string("mapper", "lattice_mapper")?;
-    let markers = node.publisher("voxel_markers", Qos::MARKERS)?;
+    let publisher = node.publisher("voxel_markers", Qos::MARKERS)?;
     let lost = Arc::new(AtomicBool::new(false));
     let mut shell = Shell {
         lost: Arc::clone(&lost),
-        machine: VoxelMarkers::new(options),
-        markers: markers.clone(),
+        machine: VoxelMarkers::new(markers),
+        markers: publisher.clone(),
         request: node.publisher(&format!("{mapper}/request_keyframe"), Qos::DEFAULT)?,
         diagnostics: node.diagnostics(),
         refusals: Throttle::new(Duration::from_secs(5)),
         requests: Throttle::new(Duration::from_secs(1)),
+        seconds: Throttle::new(Duration::from_secs(1)),
         budget_bytes: (bytes_per_s as f64 / rate_hz) as usize,
-        published_bytes: 0,
         not_published: 0,
         incomplete: false,
         repairs: Throttle::new(Duration::from_secs(5)),
@@ -68,26 +66,23 @@ pub fn start(runtime: &Runtime, name: &str) -> Result<Finish, NodeError> {
     let lost_map = Arc::clone(&lost);
     let lost_update = Arc::clone(&lost);
     let maps = inbox.clone();
-    let maps = node.subscribe("map", Qos::MAP, Load::Small, move |map: Arc<LatticeMap>| {
+    let on_map = move |map: Arc<LatticeMap>| {
         let bytes = map.keys.len() + map.counts.len() * 10;
         if !maps.send(Event::Map(map), bytes) {
             lost_map.store(true, Ordering::Relaxed);
         }
-    })?;
+    };
+    let maps = node.subscribe("map", Qos::MAP, Load::Large, on_map)?;
     let updates = inbox.clone();
-    let updates = node.subscribe(
-        "map_updates",
-        Qos::DELTAS,
-        Load::Small,
-        move |update: Arc<LatticeMapUpdate>| {
-            let bytes = update.keys.len() + update.counts.len() * 10;
-            if !updates.send(Event::Update(update), bytes) {
-                lost_update.store(true, Ordering::Relaxed);
-            }
-        },
-    )?;
+    let on_update = move |update: Arc<LatticeMapUpdate>| {
+        let bytes = update.keys.len() + update.counts.len() * 10;
+        if !updates.send(Event::Update(update), bytes) {
+            lost_update.store(true, Ordering::Relaxed);
+        }
+    };
+    let updates = node.subscribe("map_updates", Qos::DELTAS, Load::Large, on_update)?;
     let joined = inbox.clone();
-    markers.on_subscriber_joined(move || {
+    publisher.on_subscriber_joined(move || {
         let _ = joined.send(Event::Redraw, 0);
     });
     runtime.timer(Duration::from_secs_f64(1.0 / rate_hz), move || {
@@ -110,8 +105,8 @@ struct Shell {
     diagnostics: Diagnostics,
     refusals: Throttle,
     requests: Throttle,
+    seconds: Throttle,
     budget_bytes: usize,
-    published_bytes: u64,
     not_published: u64,
     incomplete: bool,
     repairs: Throttle,
@@ -132,6 +127,9 @@ impl Shell {
             Event::Redraw => self.machine.redraw(),
             Event::Draw => {
                 if self.lost.swap(false, Ordering::Relaxed) {
+                    self.ask_for_keyframe();
+                }
+                if self.seconds.check().is_some() && self.machine.wait_a_second() {
                     self.ask_for_keyframe();
                 }
                 self.repair();
@@ -167,7 +165,6 @@ impl Shell {
             return;
         }
         for array in self.machine.take_arrays(self.budget_bytes) {
-            self.published_bytes += cdr::to_vec(&array).map_or(0, |bytes| bytes.len() as u64);
             if self.markers.publish(Arc::new(array)).is_err() {
                 self.not_published += 1;
                 self.incomplete = true;
@@ -175,11 +172,11 @@ impl Shell {
         }
     }
 
-    /// What could not be published is drawn again, but not as fast as it could not be published.
+    /// Draws again after a loss, but not as fast as arrays are lost.
     fn repair(&mut self) {
         if self.incomplete && self.repairs.check().is_some() {
             self.incomplete = false;
-            self.machine.redraw();
+            self.machine.wipe();
         }
     }
 
@@ -196,15 +193,21 @@ impl Shell {
     }
 
     fn finish(&mut self) {
+        // One budget after another, as fast as viewers take them.
         self.draw();
-        self.markers.flush(Duration::from_secs(2));
+        while self.markers.flush(FLUSH)
+            && self.markers.subscriber_count() > 0
+            && self.machine.is_dirty()
+        {
+            self.draw();
+        }
         let counts = self.machine.counts().clone();
-        self.machine.redraw();
+        self.machine.wipe();
         let report = MarkerReport {
             counts,
             voxels: self.machine.voxels(),
             marker_bytes: self.machine.take_bytes(),
-            published_bytes: self.published_bytes,
+            published_bytes: self.markers.sent_bytes(),
             arrays_not_published: self.not_published,
         };
         if let Err(error) = report::write(&self.report_file, &report) {

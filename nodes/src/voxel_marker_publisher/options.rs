@@ -1,8 +1,9 @@
 //! Parameters of the marker publisher.
 
+use crate::options::{chunk_bytes, one_of};
 use lattice_runtime::params::{ParamError, Params};
 
-/// How a voxel is drawn.
+/// Shape of a voxel.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum MarkerStyle {
     /// Its Voronoi cell, exposed faces only (TRIANGLE_LIST).
@@ -13,7 +14,7 @@ pub enum MarkerStyle {
     Points,
 }
 
-/// What the colour tells.
+/// Meaning of the colour.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum ColorBy {
     /// Height of each vertex; 16 more bytes each.
@@ -22,12 +23,12 @@ pub enum ColorBy {
     Flat,
 }
 
-/// Everything that a [`super::VoxelMarkers`] can be told.
+/// Options of [`super::VoxelMarkers`].
 #[derive(Clone, Debug)]
 pub struct MarkerOptions {
-    /// How voxels are drawn.
+    /// Shape of voxels.
     pub style: MarkerStyle,
-    /// What the colour tells.
+    /// Meaning of the colour.
     pub color_by: ColorBy,
     /// Heights between two equal hues, in m.
     pub height_period_m: f64,
@@ -62,44 +63,26 @@ impl MarkerOptions {
     /// Reads the parameters of the node.
     pub fn from_params(params: &Params) -> Result<Self, ParamError> {
         let defaults = Self::default();
-        let style = match params.string("style", "cells")?.as_str() {
-            "cells" => MarkerStyle::Cells,
-            "cubes" => MarkerStyle::Cubes,
-            "points" => MarkerStyle::Points,
-            other => {
-                let reason = format!("'{other}', expected cells, cubes or points");
-                return Err(params.invalid("style", reason));
-            }
-        };
-        let color_by = match params.string("color_by", "height")?.as_str() {
-            "height" => ColorBy::Height,
-            "flat" => ColorBy::Flat,
-            other => {
-                let reason = format!("'{other}', expected height or flat");
-                return Err(params.invalid("color_by", reason));
-            }
-        };
-        let height_period_m = params.f64("height_period_m", defaults.height_period_m)?;
-        if !(height_period_m.is_finite() && height_period_m > 0.0) {
-            let reason = format!("{height_period_m}, expected more than zero");
-            return Err(params.invalid("height_period_m", reason));
-        }
-        let block_bits = params.usize("block_bits", defaults.block_bits as usize)?;
-        if !(1..=10).contains(&block_bits) {
-            let reason = format!("{block_bits}, expected 1 to 10");
-            return Err(params.invalid("block_bits", reason));
-        }
+        let styles = [
+            ("cells", MarkerStyle::Cells),
+            ("cubes", MarkerStyle::Cubes),
+            ("points", MarkerStyle::Points),
+        ];
+        let colors = [("height", ColorBy::Height), ("flat", ColorBy::Flat)];
+        let block_bits = params.usize_in("block_bits", defaults.block_bits as usize, 1..=10)?;
         Ok(Self {
-            style,
-            color_by,
-            height_period_m,
-            alpha: params
-                .f64("alpha", f64::from(defaults.alpha))?
-                .clamp(0.01, 1.0) as f32,
+            style: one_of(params, "style", &styles)?,
+            color_by: one_of(params, "color_by", &colors)?,
+            height_period_m: params.f64_in(
+                "height_period_m",
+                defaults.height_period_m,
+                1e-3..=1e9,
+            )?,
+            alpha: params.f64_in("alpha", f64::from(defaults.alpha), 0.01..=1.0)? as f32,
             block_bits: block_bits as u32,
-            chunk_bytes: params.usize("chunk_bytes", defaults.chunk_bytes)?,
+            chunk_bytes: chunk_bytes(params, defaults.chunk_bytes)?,
             max_marker_voxels: params.usize("max_marker_voxels", defaults.max_marker_voxels)?,
-            max_voxels: params.usize("max_voxels", defaults.max_voxels)?,
+            max_voxels: params.usize_in("max_voxels", defaults.max_voxels, 1..=usize::MAX)?,
         })
     }
 }

@@ -1,12 +1,10 @@
-//! Lattices of any basis against exhaustive search, and turned ones on level ground.
+//! Lattices of any basis against exhaustive search.
 
 use std::collections::BTreeSet;
 
-use lattice_core::lattice::{
-    BatchQuantizer, BlockKey, Lattice, LatticeIndex, LatticeKind, Orientation,
-};
+use lattice_core::lattice::{BatchQuantizer, BlockKey, Lattice, LatticeIndex, LatticeKind};
 use lattice_test::random::Random;
-use nalgebra::{Isometry3, Matrix3, UnitQuaternion, Vector3};
+use nalgebra::{Isometry3, Matrix3, Vector3};
 
 /// Random integer matrix of determinant +-1: a product of steps that add one column to another.
 fn unimodular(random: &mut Random, steps: usize) -> Matrix3<f64> {
@@ -201,54 +199,5 @@ fn a_batch_in_any_lattice_and_orientation_gives_what_single_points_give() {
             let w = lattice.quantize(&batch.transform(*p));
             assert_eq!(Some(code), w.and_then(BlockKey::pack), "{lattice:?}");
         }
-    }
-}
-
-/// Cells per square of the cell side that level ground at random heights cuts.
-fn ground_cells(lattice: &Lattice, random: &mut Random) -> f64 {
-    let half = 25.0;
-    let mut cells = 0;
-    for _ in 0..20 {
-        let height = random.unit() * 10.0;
-        let turn = UnitQuaternion::from_axis_angle(&Vector3::z_axis(), random.unit() * 6.3);
-        let mut seen = BTreeSet::new();
-        // Cells whose middle is over the square; the plane cuts those that are near enough.
-        for i in 0..300 {
-            for j in 0..300 {
-                let at = |k: i32| (f64::from(k) + 0.5) / 150.0 * half - half;
-                let p = turn * Vector3::new(at(i), at(j), height);
-                seen.insert(lattice.quantize(&p).unwrap());
-            }
-        }
-        cells += seen.len();
-    }
-    cells as f64 / 20.0 / (4.0 * half * half)
-}
-
-#[test]
-fn cells_that_lie_flat_take_fewer_voxels_on_level_ground() {
-    let mut random = Random(16);
-    for (kind, paper, ground) in [
-        (LatticeKind::Cubic, 1.0, 1.0),
-        (LatticeKind::Bcc, 1.259921, 1.0911236),
-        (LatticeKind::Fcc, 1.587401, 1.122462),
-        (LatticeKind::Mcc, 1.365, 1.0986841),
-        (LatticeKind::Hex, 0.832683, 0.832683),
-        (LatticeKind::HexOptimal, 0.987255, 0.987255),
-    ] {
-        let lattice = Lattice::new(kind, 1.0).unwrap();
-        // A plane cuts as many cells per area as they are tall; the rim of the square adds some,
-        // and points 0.17 apart miss some corners.
-        let cells = ground_cells(&lattice, &mut random);
-        assert!(
-            (cells / paper - 1.0).abs() < 0.06,
-            "{kind}: {cells}, not {paper}"
-        );
-        let flat = lattice.with_orientation(Orientation::Ground).unwrap();
-        let cells = ground_cells(&flat, &mut random);
-        assert!(
-            (cells / ground - 1.0).abs() < 0.06,
-            "{kind}: {cells}, not {ground}"
-        );
     }
 }

@@ -6,7 +6,6 @@ mod fuzz;
 mod geodesy;
 mod lattice_basis;
 mod lattice_properties;
-mod lattice_theory;
 mod map_file;
 mod map_file_fuzz;
 mod pose;

@@ -106,13 +106,13 @@ impl Reference {
     }
 }
 
-/// All that can be told about a map.
+/// All answers of a map.
 fn contents(map: &FreeSpaceMap) -> Vec<(MortonKey, CellState, Option<f64>)> {
     let mut keys = map.occupied_keys();
     keys.extend(map.free_keys());
     keys.sort_unstable();
-    let told = |key| (key, map.state(key), map.log_odds(key));
-    keys.into_iter().map(told).collect()
+    let answers = |key| (key, map.state(key), map.log_odds(key));
+    keys.into_iter().map(answers).collect()
 }
 
 proptest! {
@@ -240,8 +240,8 @@ proptest! {
         for key in fine.free_keys() {
             let homes = homes(fine.lattice().center(key.unpack()));
             let known = coarse.log_odds(key).is_some();
-            let told = coarse.state(key) == CellState::Free;
-            prop_assert!(known || homes.iter().any(|home| free.contains(home) == told));
+            let is_free = coarse.state(key) == CellState::Free;
+            prop_assert!(known || homes.iter().any(|home| free.contains(home) == is_free));
         }
     }
 }

@@ -7,7 +7,7 @@ use lattice_core::raycast::{Traversal, TraversalError};
 use nalgebra::Vector3;
 use proptest::prelude::*;
 
-/// Cells are told apart to this part of a cell side.
+/// Cells are distinguished to this part of a cell side.
 const SLACK: f64 = 1e-9;
 
 /// The part of the segment in the cell of `w` with all faces moved outwards by `grow_m`.

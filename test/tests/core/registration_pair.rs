@@ -23,7 +23,7 @@ fn pose(rows: &[f64]) -> Isometry3<f64> {
     Isometry3::from_parts(translation, UnitQuaternion::from_rotation_matrix(&rotation))
 }
 
-/// What small_gicp 1.0.1 from PyPI answers: `voxelgrid_sampling` to 0.25 m, `estimate_covariances` with so
+/// Answers of small_gicp 1.0.1 from PyPI: `voxelgrid_sampling` to 0.25 m, `estimate_covariances` with so
 /// many neighbours, `align` with its defaults (pairs up to 1 m), one thread.
 const SMALL_GICP: [(usize, [f64; 16]); 2] = [
     (

@@ -4,8 +4,7 @@ use std::collections::BTreeSet;
 
 use lattice_core::cloud::Cloud;
 use lattice_core::lattice::{Lattice, LatticeKind, MortonKey};
-use lattice_core::voxels::codec::{decode_keys, encode_keys};
-use lattice_core::voxels::file::{read_map, write_map};
+use lattice_core::voxels::file::write_map;
 use lattice_core::voxels::{InsertReport, VoxelList};
 use nalgebra::Vector3;
 use proptest::prelude::*;
@@ -185,21 +184,6 @@ proptest! {
     }
 
     #[test]
-    fn merging_is_commutative_and_associative(
-        kind in any_kind(), a in any_offsets(), b in any_offsets(), c in any_offsets(),
-    ) {
-        let [a, b, c] = [a, b, c].map(|offsets| filled(kind, &offsets));
-        let merge = |x: &VoxelList, y: &VoxelList| {
-            let mut sum = x.clone();
-            sum.merge(y).unwrap();
-            sum
-        };
-        prop_assert_eq!(bytes(&merge(&a, &b)), bytes(&merge(&b, &a)));
-        prop_assert_eq!(bytes(&merge(&merge(&a, &b), &c)), bytes(&merge(&a, &merge(&b, &c))));
-        prop_assert_eq!(bytes(&merge(&a, &empty(kind, 0))), bytes(&a));
-    }
-
-    #[test]
     fn a_follower_of_the_changes_has_the_keys_of_the_list(
         kind in any_kind(),
         max_voxels in 0..100_usize,
@@ -226,20 +210,5 @@ proptest! {
                 list.validate().unwrap();
             }
         }
-    }
-
-    #[test]
-    fn files_and_keys_round_trip(kind in any_kind(), offsets in any_offsets()) {
-        let list = filled(kind, &offsets);
-        let written = bytes(&list);
-        let mut read = read_map(&written[..], list.len()).unwrap();
-        read.validate().unwrap();
-        prop_assert_eq!(bytes(&read), written);
-        prop_assert_eq!(read.sorted(), list.sorted());
-        prop_assert_eq!(read.distortion(), list.distortion());
-        prop_assert_eq!((read.datum_index(), read.datum_m()), (list.datum_index(), list.datum_m()));
-        let keys: Vec<MortonKey> = list.sorted().into_iter().map(|(key, _)| key).collect();
-        prop_assert_eq!(decode_keys(&encode_keys(&keys), keys.len()).unwrap(), keys.clone());
-        prop_assert_eq!(read.take_changes().changed, keys);
     }
 }

@@ -115,8 +115,8 @@ async fn talk(peer: &Node, client: &Client, goals: &Goals) {
             smol::Timer::after(Duration::from_millis(20)).await;
         }
     });
-    let told = heard.next().await.unwrap().unwrap();
-    assert_eq!((&*told.0.stage, told.0.fraction), ("search", 0.5));
+    let feedback = heard.next().await.unwrap().unwrap();
+    assert_eq!((&*feedback.0.stage, feedback.0.fraction), ("search", 0.5));
     drop(telling);
     let ending = smol::spawn(async move {
         smol::Timer::after(Duration::from_millis(100)).await;

@@ -24,7 +24,7 @@ fn truth() -> Isometry3<f64> {
     Isometry3::from_parts(Translation3::new(3.0, 2.0, 1.5), turn)
 }
 
-/// How far a transform of the peer is from the truth, m and rad.
+/// Distance of a transform of the peer from the truth, m and rad.
 fn error(transform: &Value) -> (f64, f64) {
     let v: Vec<f64> = serde_json::from_value(transform.clone()).unwrap();
     let turn = UnitQuaternion::from_quaternion(Quaternion::new(v[6], v[3], v[4], v[5]));

@@ -5,7 +5,7 @@ use std::time::Duration;
 
 use futures::StreamExt;
 use lattice_msgs::rcl_interfaces::{GetParametersRequest, GetParametersResponse};
-use lattice_msgs::std_srvs::{TriggerRequest, TriggerResponse};
+use lattice_msgs::std_srvs::{Trigger, TriggerRequest, TriggerResponse};
 use lattice_runtime::Runtime;
 use lattice_runtime::ros_args::RosArgs;
 use lattice_test::domain::TestDomain;
@@ -107,6 +107,38 @@ fn a_trigger_answers_clients_of_both_rmw() {
         };
         assert_eq!(reply.0, expected, "{mapping:?}");
     }
+}
+
+#[test]
+fn an_answer_given_at_the_end_reaches_its_client() {
+    let domain = TestDomain::take();
+    let runtime = runtime(&domain, &[]);
+    let shutdown = runtime.shutdown_handle();
+    let (sender, asked) = channel();
+    let _server = runtime
+        .node("mapper")
+        .unwrap()
+        .service_later::<Trigger>("~/save_map", move |_, reply| {
+            // The end begins before this thread can send the answer.
+            sender.send(reply).unwrap();
+            shutdown.wait();
+        })
+        .unwrap();
+    let mut peer = peer(&domain);
+    let client = std::thread::spawn(move || {
+        let type_name = ServiceTypeName::new("std_srvs", "Trigger");
+        let (mapping, request) = (ServiceMapping::Enhanced, Foreign(TriggerRequest::default()));
+        call(&mut peer, mapping, "/mapper/save_map", &type_name, request)
+    });
+    let saved = TriggerResponse {
+        success: true,
+        message: "saved".to_owned(),
+    };
+    asked.recv_timeout(PATIENCE).unwrap().send(saved.clone());
+    runtime.shutdown_handle().request();
+    runtime.spin().unwrap();
+    let reply: Foreign<TriggerResponse> = client.join().unwrap();
+    assert_eq!(reply.0, saved);
 }
 
 #[test]

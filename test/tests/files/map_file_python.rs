@@ -34,7 +34,7 @@ fn runs(arguments: &[&str]) -> bool {
     ok
 }
 
-/// What the reader of the description makes of the files.
+/// The files as the reader of the description reads them.
 fn read_by_python(directory: &Path, files: &[Vec<u8>]) -> Vec<Value> {
     let docs = Path::new(env!("CARGO_MANIFEST_DIR")).join("../docs/map_file.md");
     let docs = std::fs::read_to_string(docs).unwrap();

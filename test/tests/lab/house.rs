@@ -12,7 +12,7 @@ use lattice_lab::datasets::{
 };
 use lattice_lab::mesh::read_mesh;
 use lattice_lab::simulate::house::{
-    HeadsetOptions, HeadsetTrial, House, LabelModel, RegionLabels, Scene, Survey, SurveyMap,
+    HeadsetOptions, HeadsetTrial, House, LabelDraw, RegionLabels, Scene, Survey, SurveyMap,
     SurveyOptions,
 };
 use lattice_nodes::files::classes::read_classes;
@@ -94,7 +94,7 @@ fn a_robot_and_headsets_see_the_real_house() {
                 .iter()
                 .filter(|r| label(r) == object)
                 .count();
-            let draw = LabelModel::flips(0.5).draw(&house, &trial, seed).unwrap();
+            let draw = LabelDraw::new(&house, std::slice::from_ref(&trial), 0.5, seed).unwrap();
             println!(
                 "{} {seed}: {} points, {:.2} of the object, {within:.3} within 10 cm, median {:.3} m, 90 % {:.3} m, {} triangles, q 0.5 -> {:.2}, {took:?}",
                 scene.name(),
@@ -113,7 +113,7 @@ fn a_robot_and_headsets_see_the_real_house() {
     }
 }
 
-/// What `lattice simulate house` reads back as.
+/// The files of `lattice simulate house`, read back.
 fn options(out: &Path, overwrite: bool) -> HouseOptions {
     HouseOptions {
         out: out.to_owned(),
@@ -130,7 +130,7 @@ fn options(out: &Path, overwrite: bool) -> HouseOptions {
             headset_scans: 2,
             ..HeadsetOptions::default()
         },
-        labels: LabelModel::flips(0.4),
+        flips: 0.4,
         lattice: LatticeKind::Fcc,
         cell_side_m: 0.05,
         axes: HeadsetAxes::Unity,

@@ -1,78 +1,12 @@
-//! The mapper and those who follow its map: deltas, keyframes, late joining, gaps, hostile input.
+//! The mapper: chunks, what it refuses, and its datum.
 
 use lattice_core::lattice::{Lattice, LatticeKind};
 use lattice_msgs::cdr;
-use lattice_msgs::lattice::{LatticeMap, LatticeMapUpdate};
 use lattice_nodes::lattice_mapper::{LatticeMapper, MapperOptions};
-use lattice_nodes::map_follower::{Followed, MapFollower};
+use lattice_nodes::map_follower::MapFollower;
 use lattice_test::clouds::cloud;
-use proptest::prelude::*;
 
-const MAX_VOXELS: usize = 1_000_000;
-
-fn mapper(kind: LatticeKind) -> LatticeMapper {
-    let lattice = Lattice::new(kind, 0.125).unwrap();
-    LatticeMapper::new(MapperOptions::new(lattice), 7).unwrap()
-}
-
-/// A deterministic cloud of `n` points about `at`, `size` metres wide.
-fn scatter(seed: u64, n: usize, at: [f32; 3], size: f32) -> Vec<[f32; 3]> {
-    let mut state = seed.wrapping_mul(0x9e37_79b9_7f4a_7c15) | 1;
-    let mut next = || {
-        state ^= state << 13;
-        state ^= state >> 7;
-        state ^= state << 17;
-        ((state >> 40) as f32 / (1u64 << 24) as f32 - 0.5) * size
-    };
-    (0..n).map(|_| at.map(|v| v + next())).collect()
-}
-
-fn insert(mapper: &mut LatticeMapper, points: &[[f32; 3]]) {
-    mapper.on_cloud(&cloud("map", 1, points)).unwrap();
-}
-
-fn follow_keyframe(follower: &mut MapFollower, chunks: &[LatticeMap]) {
-    for chunk in chunks {
-        assert_eq!(follower.on_map(chunk).unwrap(), Followed::Applied);
-    }
-}
-
-/// The follower has exactly the mapper's voxels.
-fn assert_same(follower: &MapFollower, mapper: &LatticeMapper) {
-    let map = follower.map().unwrap();
-    let list = mapper.list();
-    assert_eq!(map.voxels().len(), list.len());
-    for (key, voxel) in list.sorted() {
-        let state = map.voxels()[&key];
-        assert_eq!(state.count, voxel.count);
-        let mean_m = voxel.mean_offset_m();
-        for (sent, mean_m) in state.mean_offset.iter().zip(mean_m) {
-            let sent_m = f64::from(*sent) * map.offset_unit_m;
-            assert!((sent_m - mean_m).abs() <= map.offset_unit_m);
-        }
-        assert!((map.center_m(key) - list.center_m(key)).norm() < 1e-9);
-    }
-}
-
-#[test]
-fn a_follower_of_deltas_has_the_same_voxels() {
-    for kind in LatticeKind::ALL {
-        let mut mapper = mapper(kind);
-        let mut follower = MapFollower::new(MAX_VOXELS);
-        follow_keyframe(&mut follower, &mapper.keyframe());
-        for step in 0..10 {
-            insert(
-                &mut mapper,
-                &scatter(step, 2000, [step as f32, 0.0, 0.0], 8.0),
-            );
-            for chunk in mapper.take_update() {
-                assert_eq!(follower.on_update(&chunk).unwrap(), Followed::Applied);
-            }
-            assert_same(&follower, &mapper);
-        }
-        assert_eq!(follower.sequence(), 10);
-    }
-}
+use super::map_follower::{MAX_VOXELS, assert_same, follow_keyframe, insert, mapper, scatter};
 
 #[test]
 fn every_chunk_is_small_enough_not_to_be_fragmented() {
@@ -95,132 +29,6 @@ fn every_chunk_is_small_enough_not_to_be_fragmented() {
 }
 
 #[test]
-fn a_late_joiner_takes_the_keyframe_and_then_deltas() {
-    let mut mapper = mapper(LatticeKind::Bcc);
-    insert(&mut mapper, &scatter(1, 20_000, [0.0; 3], 100.0));
-    mapper.take_update();
-    let mut follower = MapFollower::new(MAX_VOXELS);
-    insert(&mut mapper, &scatter(2, 500, [0.0; 3], 10.0));
-    let early = mapper.take_update();
-    assert_eq!(
-        follower.on_update(&early[0]).unwrap(),
-        Followed::NeedKeyframe
-    );
-    let keyframe = mapper.keyframe();
-    let (first, rest) = keyframe.split_at(2);
-    follow_keyframe(&mut follower, first);
-    assert!(
-        follower.map().unwrap().voxels().is_empty(),
-        "half a map is no map"
-    );
-    insert(&mut mapper, &scatter(3, 500, [20.0, 0.0, 0.0], 10.0));
-    for chunk in mapper.take_update() {
-        follower.on_update(&chunk).unwrap();
-    }
-    follow_keyframe(&mut follower, rest);
-    assert_same(&follower, &mapper);
-}
-
-#[test]
-fn a_lost_update_is_noticed_and_a_keyframe_heals_it() {
-    let mut mapper = mapper(LatticeKind::Mcc);
-    let mut follower = MapFollower::new(MAX_VOXELS);
-    follow_keyframe(&mut follower, &mapper.keyframe());
-    insert(&mut mapper, &scatter(1, 100, [0.0; 3], 5.0));
-    mapper.take_update();
-    insert(&mut mapper, &scatter(2, 100, [50.0, 0.0, 0.0], 5.0));
-    let next = mapper.take_update();
-    assert_eq!(
-        follower.on_update(&next[0]).unwrap(),
-        Followed::NeedKeyframe
-    );
-    follow_keyframe(&mut follower, &mapper.keyframe());
-    assert_same(&follower, &mapper);
-    insert(&mut mapper, &scatter(3, 100, [0.0; 3], 5.0));
-    for chunk in mapper.take_update() {
-        assert_eq!(follower.on_update(&chunk).unwrap(), Followed::Applied);
-    }
-    assert_same(&follower, &mapper);
-}
-
-/// A mapper with a map of several chunks, and a follower that has all of it.
-fn followed() -> (LatticeMapper, MapFollower) {
-    let mut mapper = mapper(LatticeKind::Fcc);
-    insert(&mut mapper, &scatter(1, 20_000, [0.0; 3], 100.0));
-    mapper.take_update();
-    let mut follower = MapFollower::new(MAX_VOXELS);
-    follow_keyframe(&mut follower, &mapper.keyframe());
-    assert_same(&follower, &mapper);
-    (mapper, follower)
-}
-
-fn grown(mapper: &mut LatticeMapper, seed: u64) -> Vec<LatticeMapUpdate> {
-    insert(
-        mapper,
-        &scatter(seed, 50, [200.0 + seed as f32, 0.0, 0.0], 5.0),
-    );
-    mapper.take_update()
-}
-
-#[test]
-fn a_keyframe_that_updates_overtake_does_not_hide_later_losses() {
-    let (mut mapper, mut follower) = followed();
-    let keyframe = mapper.keyframe();
-    assert!(keyframe.len() > 1);
-    follow_keyframe(&mut follower, &keyframe[..1]);
-    for chunk in grown(&mut mapper, 2) {
-        assert_eq!(follower.on_update(&chunk).unwrap(), Followed::Applied);
-    }
-    for chunk in &keyframe[1..] {
-        assert_eq!(follower.on_map(chunk).unwrap(), Followed::Old);
-    }
-    assert_same(&follower, &mapper);
-    grown(&mut mapper, 3);
-    let after_a_loss = grown(&mut mapper, 4);
-    assert_eq!(
-        follower.on_update(&after_a_loss[0]).unwrap(),
-        Followed::NeedKeyframe
-    );
-}
-
-#[test]
-fn an_update_before_the_keyframe_that_heals_is_not_taken_for_done() {
-    let (mut mapper, mut follower) = followed();
-    grown(&mut mapper, 2);
-    let keyframe = mapper.keyframe();
-    let early = grown(&mut mapper, 3);
-    assert_eq!(
-        follower.on_update(&early[0]).unwrap(),
-        Followed::NeedKeyframe
-    );
-    follow_keyframe(&mut follower, &keyframe);
-    // The update came before the keyframe was begun, so it must come again.
-    let after = grown(&mut mapper, 4);
-    let followed = follower.on_update(&after[0]).unwrap();
-    assert_eq!(followed, Followed::NeedKeyframe);
-    follow_keyframe(&mut follower, &mapper.keyframe());
-    assert_same(&follower, &mapper);
-}
-
-#[test]
-fn a_keyframe_of_which_a_chunk_was_lost_is_asked_for_again() {
-    let mut mapper = mapper(LatticeKind::Fcc);
-    insert(&mut mapper, &scatter(1, 20_000, [0.0; 3], 100.0));
-    mapper.take_update();
-    let mut follower = MapFollower::new(MAX_VOXELS);
-    follow_keyframe(&mut follower, &mapper.keyframe()[1..]);
-    let mut asked = false;
-    for seed in 2..20 {
-        for chunk in grown(&mut mapper, seed) {
-            asked |= follower.on_update(&chunk).unwrap() == Followed::NeedKeyframe;
-        }
-    }
-    assert!(asked);
-    follow_keyframe(&mut follower, &mapper.keyframe());
-    assert_same(&follower, &mapper);
-}
-
-#[test]
 fn one_stray_point_does_not_move_the_others() {
     let points = scatter(1, 5000, [0.0; 3], 50.0);
     let mut clean = mapper(LatticeKind::Mcc);
@@ -239,18 +47,6 @@ fn one_stray_point_does_not_move_the_others() {
         };
         assert_eq!(near(with_stray.list()), near(clean.list()), "{stray}");
     }
-}
-
-#[test]
-fn a_reset_map_replaces_the_old_one() {
-    let mut mapper = mapper(LatticeKind::Hex);
-    let mut follower = MapFollower::new(MAX_VOXELS);
-    insert(&mut mapper, &scatter(1, 1000, [0.0; 3], 20.0));
-    follow_keyframe(&mut follower, &mapper.keyframe());
-    mapper.reset(8);
-    insert(&mut mapper, &scatter(2, 10, [0.0; 3], 2.0));
-    follow_keyframe(&mut follower, &mapper.keyframe());
-    assert_same(&follower, &mapper);
 }
 
 #[test]
@@ -317,69 +113,4 @@ fn a_datum_far_away_loses_no_digit() {
     let mut near = LatticeMapper::new(MapperOptions::new(lattice), 1).unwrap();
     near.on_cloud(&message).unwrap();
     assert_eq!(near.counts().points_out_of_range, 100);
-}
-
-/// One message of the map with one part of it made wrong.
-fn damaged() -> impl Strategy<Value = (LatticeMap, LatticeMapUpdate)> {
-    let mut mapper = mapper(LatticeKind::Fcc);
-    insert(&mut mapper, &scatter(1, 300, [0.0; 3], 10.0));
-    let update = mapper.take_update().remove(0);
-    let map = mapper.keyframe().remove(0);
-    (0..9, any::<u64>(), any::<Vec<u8>>()).prop_map(move |(what, number, bytes)| {
-        let (mut map, mut update) = (map.clone(), update.clone());
-        let word = number as u32;
-        match what {
-            0 => (map.chunk, update.chunk) = (word, word),
-            1 => (map.chunks, update.chunks) = (word, word),
-            2 => map.voxels_total = number,
-            3 => {
-                map.keys = serde_bytes::ByteBuf::from(bytes.clone());
-                update.keys = serde_bytes::ByteBuf::from(bytes);
-            }
-            4 => {
-                map.counts.truncate(number as usize % 100);
-                update.counts.truncate(number as usize % 100);
-            }
-            5 => {
-                map.mean_offsets.push(0);
-                update.mean_offsets.push(0);
-            }
-            6 => {
-                map.info.lattice = String::from_utf8_lossy(&bytes).into_owned();
-                update.removed_keys = serde_bytes::ByteBuf::from(bytes);
-            }
-            7 => {
-                map.info.cell_volume_m3 = f64::from_bits(number);
-                map.info.map_from_lattice.position.x = f64::from_bits(number);
-            }
-            _ => {
-                (map.sequence, update.sequence, update.previous_sequence) = (number, number, number)
-            }
-        }
-        (map, update)
-    })
-}
-
-proptest! {
-    #[test]
-    fn damaged_messages_never_panic_and_never_spoil_the_map((map, update) in damaged()) {
-        let mut mapper = mapper(LatticeKind::Fcc);
-        insert(&mut mapper, &scatter(1, 300, [0.0; 3], 10.0));
-        let mut follower = MapFollower::new(10_000);
-        follow_keyframe(&mut follower, &mapper.keyframe());
-        let _ = follower.on_map(&map);
-        let _ = follower.on_update(&update);
-        prop_assert!(follower.map().unwrap().voxels().len() <= 10_000);
-        // A new epoch is always taken.
-        mapper.reset(u64::MAX);
-        insert(&mut mapper, &scatter(2, 300, [0.0; 3], 10.0));
-        let mut good = mapper.keyframe();
-        for chunk in &mut good {
-            chunk.info.epoch = 12_345;
-        }
-        for chunk in &good {
-            prop_assert_eq!(follower.on_map(chunk).unwrap(), Followed::Applied);
-        }
-        assert_same(&follower, &mapper);
-    }
 }

@@ -4,6 +4,7 @@ mod enu_transformer;
 mod free_space;
 mod lattice_mapper;
 mod lattice_mapper_services;
+mod map_follower;
 mod map_labels;
 mod semantic_clouds;
 mod semantic_icp_server;

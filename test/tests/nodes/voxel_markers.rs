@@ -284,15 +284,17 @@ fn a_reset_map_takes_all_markers_away() {
 }
 
 #[test]
-fn a_viewer_that_joins_late_gets_everything() {
+fn a_viewer_that_joins_late_gets_everything_and_the_others_lose_nothing() {
     let mut bench = Bench::new(LatticeKind::Fcc, MarkerOptions::default());
     bench.insert(&line(100, 0.5));
     let before = std::mem::take(&mut bench.shown);
     bench.markers.redraw();
-    bench.draw();
+    let arrays = bench.draw();
     let points =
         |shown: &BTreeMap<_, Marker>| shown.values().map(|m| m.points.len()).sum::<usize>();
     assert_eq!(points(&bench.shown), points(&before));
+    let mut markers = arrays.iter().flat_map(|array| &array.markers);
+    assert!(markers.all(|marker| marker.action == Marker::ADD));
 }
 
 #[test]

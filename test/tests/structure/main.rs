@@ -1,6 +1,7 @@
 //! Rules of the architecture that the compiler does not know.
 
 mod crates;
+mod docs;
 mod modules;
 mod params;
 mod source;

@@ -8,20 +8,78 @@ use super::root;
 use super::source::{code, files, module};
 
 /// Modules of crates in layers: each may use those before it in the list.
-const LAYERS: [(&str, &[&str]); 1] = [(
-    "lattice_core/src",
-    &[
-        "prefetch",
-        "lattice",
-        "cloud",
-        "geodesy",
-        "pose",
-        "voxels",
-        "query",
-        "raycast",
-        "registration",
-    ],
-)];
+const LAYERS: [(&str, &[&str]); 3] = [
+    (
+        "lattice_core/src",
+        &[
+            "prefetch",
+            "lattice",
+            "cloud",
+            "geodesy",
+            "pose",
+            "voxels",
+            "query",
+            "raycast",
+            "registration",
+        ],
+    ),
+    (
+        "nodes/src",
+        &[
+            "files",
+            "convert",
+            "report",
+            "start",
+            "compute",
+            "options",
+            "map_follower",
+            "enu_transformer",
+            "lattice_mapper",
+            "voxel_marker_publisher",
+            "semantic_icp_server",
+            "replay",
+            "executables",
+            "bag_player",
+        ],
+    ),
+    (
+        "nodes/runtime/src",
+        &[
+            "sync",
+            "names",
+            "param_value",
+            "params_file",
+            "ros_args",
+            "params",
+            "env",
+            "logging",
+            "qos",
+            "error",
+            "shutdown",
+            "task_thread",
+            "clock",
+            "diagnostics",
+            "loopback_domain",
+            "port",
+            "dds",
+            "peers",
+            "endpoints",
+            "outbox",
+            "graph",
+            "local_bus",
+            "publisher",
+            "subscription",
+            "service",
+            "rosout",
+            "shared",
+            "node",
+            "param_services",
+            "action",
+            "tf",
+            "process",
+        ],
+    ),
+];
 
 /// First words after `crate::`, also in braces, and after as many `super::` as lead to the root.
 fn root_names(code: &str, depth: usize) -> BTreeSet<String> {

@@ -1,5 +1,5 @@
 use super::{F32, F64, field};
-use crate::cloud::{CloudError, CloudLayout, CloudLimits, CloudView, PointField};
+use crate::cloud::{CloudError, CloudLayout, CloudLimits, PointField};
 
 const LIMITS: CloudLimits = CloudLimits { max_points: 1000 };
 
@@ -22,56 +22,6 @@ fn refused(change: impl FnOnce(&mut CloudLayout), bytes: usize) -> CloudError {
         .view(&vec![0; bytes], &LIMITS)
         .map(|view| view.len())
         .unwrap_err()
-}
-
-fn coordinates(view: &CloudView<'_>) -> Vec<[f64; 3]> {
-    (0..view.len()).map(|i| view.xyz(i).into()).collect()
-}
-
-#[test]
-fn rows_may_be_padded_and_fields_unaligned() {
-    let mut padded = layout();
-    padded.point_step = 15;
-    padded.row_step = 37;
-    padded.fields = vec![field("z", 11, F32), field("x", 1, F32), field("y", 5, F32)];
-    let mut data = vec![0xAA; 80];
-    for (i, start) in [0, 15, 37, 52].into_iter().enumerate() {
-        let base = i as f32 * 10.0;
-        data[start + 1..start + 5].copy_from_slice(&(base + 1.0).to_le_bytes());
-        data[start + 5..start + 9].copy_from_slice(&(base + 2.0).to_le_bytes());
-        data[start + 11..start + 15].copy_from_slice(&(base + 3.0).to_le_bytes());
-    }
-    let view = padded.view(&data, &LIMITS).unwrap();
-    assert_eq!(
-        coordinates(&view),
-        [
-            [1.0, 2.0, 3.0],
-            [11.0, 12.0, 13.0],
-            [21.0, 22.0, 23.0],
-            [31.0, 32.0, 33.0]
-        ]
-    );
-    assert!(view.xyz(4).x.is_nan());
-    assert!(view.xyz(usize::MAX).z.is_nan());
-}
-
-#[test]
-fn f64_and_big_endian() {
-    let mut wide = layout();
-    wide.width = 1;
-    wide.height = 1;
-    wide.point_step = 24;
-    wide.row_step = 24;
-    wide.is_bigendian = true;
-    wide.fields = vec![field("x", 0, F64), field("y", 8, F64), field("z", 16, F64)];
-    let data: Vec<u8> = [4.0e6_f64, -0.1, f64::NAN]
-        .iter()
-        .flat_map(|v| v.to_be_bytes())
-        .collect();
-    let view = wide.view(&data, &LIMITS).unwrap();
-    assert_eq!(view.xyz(0).x, 4.0e6);
-    assert_eq!(view.xyz(0).y, -0.1);
-    assert!(view.xyz(0).z.is_nan());
 }
 
 #[test]

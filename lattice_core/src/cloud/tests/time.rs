@@ -1,7 +1,5 @@
 use super::{F32, F64, U32, timed};
-use crate::cloud::{
-    CloudError, CloudLimits, Datatype, NO_TIME_NS, TimeOptions, TimeReference, TimeUnit,
-};
+use crate::cloud::{CloudError, CloudLimits, NO_TIME_NS, TimeOptions, TimeReference, TimeUnit};
 
 const STAMP_NS: i64 = 1_700_000_000_123_456_789;
 const STAMP_S: f64 = 1_700_000_000.0;
@@ -97,22 +95,6 @@ fn f64_seconds_from_the_stamp() {
 }
 
 #[test]
-fn the_decision_is_told() {
-    let points = [[1.0, 0.0, 0.0]; 2];
-    let (layout, data) = timed("offset_time", U32, &points, &u32s(&[5, 1_000_005]));
-    let view = layout.view(&data, &CloudLimits::default()).unwrap();
-    let decision = view
-        .time_decision(0, &TimeOptions::default())
-        .unwrap()
-        .unwrap();
-    assert_eq!(decision.datatype, Datatype::Uint32);
-    assert_eq!(
-        decision.to_string(),
-        "per-point time from field 'offset_time' (UINT32), unit ns, reference stamp_start, span 0.001000 s"
-    );
-}
-
-#[test]
 fn no_field_no_time() {
     let times = f32s(&[0.0]);
     let options = TimeOptions::default();
@@ -169,7 +151,7 @@ fn a_free_running_clock_needs_and_takes_an_override() {
 }
 
 #[test]
-fn tai_is_told_from_utc_unless_insisted_on() {
+fn tai_is_distinguished_from_utc_unless_insisted_on() {
     let times = f64s(&[STAMP_S + 37.0, STAMP_S + 37.0625]);
     let stamp_ns = 1_700_000_000_000_000_000;
     match read("timestamp", F64, &times, stamp_ns, &TimeOptions::default()) {
@@ -275,27 +257,4 @@ fn extreme_values_do_not_overflow() {
             }
         }
     }
-}
-
-#[test]
-fn names_of_parameters_round_trip() {
-    for unit in [
-        TimeUnit::Seconds,
-        TimeUnit::Milliseconds,
-        TimeUnit::Microseconds,
-        TimeUnit::Nanoseconds,
-    ] {
-        assert_eq!(unit.name().parse(), Ok(unit));
-    }
-    for reference in [
-        TimeReference::StampStart,
-        TimeReference::StampEnd,
-        TimeReference::Absolute,
-    ] {
-        assert_eq!(reference.name().parse(), Ok(reference));
-    }
-    assert_eq!(
-        "sec".parse::<TimeUnit>().unwrap_err().to_string(),
-        "'sec' is not one of s, ms, us, ns"
-    );
 }

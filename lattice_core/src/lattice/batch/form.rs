@@ -14,7 +14,7 @@ use crate::lattice::LatticeKind;
 /// Integers of the kernel: those of undecided points may wrap.
 pub(super) type Int = Wrapping<i32>;
 
-/// What differs between lattices, known at compile time.
+/// Constants of a lattice, known at compile time.
 pub(super) trait Form: Copy + Send + Sync + 'static {
     /// True if there is a second copy.
     const CENTRED: bool;

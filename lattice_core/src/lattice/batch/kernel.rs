@@ -42,7 +42,7 @@ pub(super) struct Constants {
     pub(super) reach_m: f32,
 }
 
-/// What the kernel says of a point.
+/// Answer of the kernel for a point.
 #[derive(Clone, Copy)]
 pub(super) struct Lane {
     /// Low and high half.

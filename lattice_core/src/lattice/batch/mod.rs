@@ -1,4 +1,4 @@
-//! Many points at once: the fast way to the answer of [`Lattice::quantize`].
+//! Batch quantizer: [`Lattice::quantize`] for many points at once.
 //!
 //! Points go through a single precision kernel that knows which of its answers are certain
 //! (`kernel`); the others, some in a thousand, go through the double precision closed form. So the
@@ -7,7 +7,6 @@
 mod form;
 mod kernel;
 mod simd;
-mod wide;
 
 use nalgebra::{Isometry3, Matrix3, Vector3};
 
@@ -43,8 +42,6 @@ struct Kernel {
     run_with_statistics: simd::Run,
     one: fn(&Constants, [f32; 3]) -> Lane,
     constants: Constants,
-    /// The same for points that were rounded to single precision.
-    rounded: Constants,
 }
 
 /// Sums over the points of a batch, in 1/2^20 of a cell side (cube root of the cell volume).
@@ -52,9 +49,9 @@ struct Kernel {
 pub struct BatchSums {
     /// Number of points.
     pub points: u64,
-    /// Of distances from the lattice points.
+    /// Sum of distances from the lattice points.
     pub distances: u64,
-    /// Of squared distances.
+    /// Sum of squared distances.
     pub squares: u64,
     /// The largest squared distance.
     pub largest_square: u64,
@@ -109,13 +106,7 @@ impl BatchQuantizer {
     /// The point in the lattice, metres: rotated, then moved, each in double precision.
     #[inline]
     pub fn transform(&self, p: [f32; 3]) -> Vector3<f64> {
-        self.transform_wide(p.map(f64::from))
-    }
-
-    /// [`BatchQuantizer::transform`] of a point in double precision.
-    #[inline]
-    pub fn transform_wide(&self, p: [f64; 3]) -> Vector3<f64> {
-        let p = Vector3::from(p);
+        let p = Vector3::from(p.map(f64::from));
         let turned = match &self.rotation {
             Some(rotation) => rotation * p,
             None => p,
@@ -209,7 +200,7 @@ impl BatchQuantizer {
             distances: sums.distances as u64,
             squares: sums.squares as u64,
             largest_square: sums.largest_square as u64,
-            // Without a kernel nobody has filled in the fixed-point positions.
+            // Without a kernel the fixed-point positions are not filled in.
             far: self.kernel.is_none(),
         };
         let mut open = lanes.open();
@@ -273,7 +264,7 @@ impl BatchQuantizer {
         (code, sums)
     }
 
-    /// What one point adds to the sums of [`BatchQuantizer::for_blocks_with_sums`].
+    /// Contribution of one point to the sums of [`BatchQuantizer::for_blocks_with_sums`].
     pub fn sums_of(&self, p: [f32; 3]) -> BatchSums {
         if let Some(kernel) = &self.kernel {
             let lane = (kernel.one)(&kernel.constants, p);
@@ -324,7 +315,7 @@ impl Kernel {
             error: (8.0 * EPSILON + 1e-14 * far) as f32,
             reach_m: ((KERNEL_REACH / largest) as f32).min(kernel::FIXED_REACH_M),
         };
-        let kernel = match lattice.kind() {
+        Some(match lattice.kind() {
             LatticeKind::Cubic => Self::of::<Cubic>(constants, diagonal, simd),
             LatticeKind::Bcc => Self::of::<Bcc>(constants, diagonal, simd),
             LatticeKind::Fcc => Self::of::<Fcc>(constants, diagonal, simd),
@@ -333,14 +324,6 @@ impl Kernel {
                 Self::of::<Hex>(constants, diagonal, simd)
             }
             LatticeKind::Custom => return None,
-        };
-        Some(Kernel {
-            rounded: Constants {
-                // One rounding more, of the coordinates themselves.
-                error_per_metre: (1.01 * (roundings + 1.0) * EPSILON * largest) as f32,
-                ..kernel.constants
-            },
-            ..kernel
         })
     }
 
@@ -364,7 +347,6 @@ impl Kernel {
             run,
             run_with_statistics,
             one,
-            rounded: constants,
             constants,
         }
     }

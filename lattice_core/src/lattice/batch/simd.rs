@@ -1,4 +1,4 @@
-//! Which instructions the kernel is compiled for.
+//! Instruction sets that the kernel is compiled for.
 //!
 //! The kernel is plain code; the compiler vectorises it for what a function allows. AVX2 is worth a
 //! factor of two over the baseline; AVX-512 is not offered, since the compiler then gathers the
@@ -13,7 +13,7 @@ pub(super) type Run = fn(&Constants, &[[f32; 3]; BLOCK], &mut Lanes) -> LaneSums
 /// An instruction set; all give the same bits.
 #[derive(Clone, Copy, PartialEq, Eq, Debug)]
 pub enum Simd {
-    /// What every machine of the target has.
+    /// Instructions of every machine of the target.
     Portable,
     /// 256-bit vectors on x86-64; the portable code on a machine without them.
     Avx2,

@@ -40,33 +40,6 @@ fn transforms() -> impl Strategy<Value = Isometry3<f64>> {
 
 proptest! {
     #[test]
-    fn a_batch_in_double_precision_does_so_too(
-        lattice in lattices(),
-        points in points(),
-        nudge in -1e-7..1e-7_f64,
-        far in prop_oneof![Just(0.0), -3e3..3e3_f64, -1e5..1e5_f64],
-        transform in transforms(),
-    ) {
-        let (side, basis) = (lattice.cell_side_m(), lattice.generator());
-        // Not representable in single precision, near borders, and partly far from the origin.
-        let place = |p: &[f32; 3]| -> [f64; 3] {
-            let p = Vector3::from(p.map(|x| f64::from(x) + nudge + far));
-            (basis * p).into()
-        };
-        let points: Vec<[f64; 3]> = points.iter().map(place).collect();
-        let mut transform = transform;
-        transform.translation.vector *= side;
-        for simd in [Simd::Portable, Simd::Avx2] {
-            let batch = BatchQuantizer::with_simd(&lattice, transform, simd);
-            let mut codes = Vec::new();
-            batch.codes_wide(&points, &mut codes);
-            let single: Vec<_> =
-                points.iter().map(|&p| single(&lattice, &batch.transform_wide(p))).collect();
-            prop_assert_eq!(&codes, &single);
-        }
-    }
-
-    #[test]
     fn a_batch_gives_what_single_points_give(lattice in lattices(), points in points(), transform in transforms()) {
         let side = lattice.cell_volume_m3().cbrt();
         let basis = lattice.generator().cast::<f32>();

@@ -3,12 +3,11 @@
 use nalgebra::{Isometry3, Point3, Vector3};
 use rayon::prelude::*;
 
-use super::super::confusion::shares;
+use super::super::confusion::{Lift, shares};
 use super::super::likelihood::{Fit, Likelihood, Partners};
 use super::super::search::Hypothesis;
 use super::super::{
-    Confusion, LabelDistribution, LabelUse, Lift, PairWeight, PreparedCloud, RegisterOptions,
-    register,
+    Confusion, LabelDistribution, LabelUse, PairWeight, PreparedCloud, RegisterOptions, register,
 };
 use super::input::Input;
 use super::map::CalibrationMap;
@@ -34,12 +33,12 @@ pub(super) struct Candidate {
 }
 
 impl Candidate {
-    /// All that speaks for it.
+    /// Total log-likelihood.
     pub fn total(&self) -> f64 {
         self.likelihood.total() - self.blocked
     }
 
-    /// Whether two are one place up to `shift_m` and `turn_rad`; places are compared in the midst of the
+    /// True if two are one place up to `shift_m` and `turn_rad`; places are compared in the midst of the
     /// points.
     pub fn is_near(
         &self,
@@ -54,12 +53,12 @@ impl Candidate {
     }
 }
 
-/// What candidates are made from.
+/// Clouds and settings that candidates are made from.
 pub(super) struct Workbench<'a> {
     pub map: &'a CalibrationMap,
     pub input: &'a Input,
     pub options: &'a CalibrationOptions,
-    /// What is known of the labels before this calibration.
+    /// Co-occurrence of labels known before this calibration.
     pub known: Confusion,
     pub fit: Fit<'a>,
     pub few: Fit<'a>,
@@ -187,7 +186,7 @@ impl<'a> Workbench<'a> {
         all
     }
 
-    /// What speaks for a pose.
+    /// Likelihood of a pose.
     pub fn judge(&self, fit: &Fit<'_>, pose: Isometry3<f64>, method: &'static str) -> Candidate {
         let partners: Partners = fit.partners(&pose);
         let (likelihood, confusion) =

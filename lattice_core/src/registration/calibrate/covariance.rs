@@ -1,4 +1,4 @@
-//! How sure a pose is.
+//! Covariance of a pose.
 
 use nalgebra::{
     Isometry3, Matrix2, Matrix2x6, Matrix3, Matrix3x6, Matrix6, Matrix6x3, Point3, Vector3, Vector6,
@@ -22,11 +22,11 @@ const MAX_TILT_SQUARED: f64 = 18.4;
 /// H^-1 (sum over regions of the covariance of their pulls) H^-1.
 #[derive(Clone, Copy, PartialEq, Debug)]
 pub(super) struct PoseCovariance {
-    /// Of a motion and a turn in the source frame (rho, phi; right perturbation).
+    /// Covariance of a motion and a turn in the source frame (rho, phi; right perturbation).
     pub at_source: Matrix6<f64>,
 }
 
-/// How the source errs.
+/// Errors of the source.
 pub(super) struct ErrorModel {
     /// Side of a region that errs as one, metres.
     pub region_m: f64,
@@ -40,7 +40,7 @@ pub(super) struct ErrorModel {
     pub gate_m: f64,
 }
 
-/// What the points of a region pull at the pose.
+/// Pull of the points of a region on the pose.
 struct Pull {
     /// By their residuals.
     residual: Vector6<f64>,
@@ -197,7 +197,7 @@ impl PoseCovariance {
     }
 }
 
-/// Of q - T p by a motion and a turn on the right of T.
+/// Jacobian of q - T p by a motion and a turn on the right of T.
 fn jacobian(turn: &Matrix3<f64>, point: &Point3<f64>) -> Matrix3x6<f64> {
     let mut jacobian = Matrix3x6::zeros();
     jacobian.fixed_view_mut::<3, 3>(0, 0).copy_from(&-turn);

@@ -1,4 +1,4 @@
-//! What a headset sent, checked and made ready.
+//! Scans of a headset, checked and prepared.
 
 use nalgebra::{Isometry3, Point3};
 
@@ -10,11 +10,11 @@ const MAX_RANGE_M: f64 = 10_000.0;
 
 /// The headset's points at two densities.
 pub(super) struct Input {
-    /// All that is registered.
+    /// The points that are registered.
     pub full: PreparedCloud,
     /// A few of them, for a first look.
     pub few: PreparedCloud,
-    /// Where the headset was, if one place is known.
+    /// Place of the headset, if one is known.
     pub sensor_m: Option<Point3<f64>>,
 }
 
@@ -38,7 +38,7 @@ impl Input {
                 return Err(rejected("labels are not as many as points".into()));
             }
             for (i, point) in headset_scan.cloud.points_m.iter().enumerate() {
-                // What is not a number fails this too.
+                // NaN fails this too.
                 if point.iter().all(|c| c.abs() <= MAX_RANGE_M) {
                     all.points_m.push(*point);
                     if labelled {
@@ -92,7 +92,7 @@ fn thinned_to(cloud: &SemanticCloud, side_m: f64, most: usize) -> SemanticCloud 
     }
 }
 
-/// Whether all numbers of a pose are finite and it turns without stretching.
+/// True if all numbers of a pose are finite and it turns without stretching.
 pub(super) fn is_pose(pose: &Isometry3<f64>) -> bool {
     let near = pose.translation.vector.iter().all(|c| c.abs() <= 1e7);
     near && (pose.rotation.norm() - 1.0).abs() < 1e-3

@@ -1,4 +1,4 @@
-//! Which candidate is the answer, and what can be said of it.
+//! Choice of the winning candidate, and the verdict on it.
 
 use nalgebra::{Matrix3, Matrix6, Vector3};
 use rayon::prelude::*;
@@ -18,7 +18,7 @@ const DIFFERENT_M: f64 = 0.5;
 const DIFFERENT_RAD: f64 = 0.26;
 /// Log-likelihood that is as good as a natural logarithm of odds: observations are not independent.
 const SOFTNESS: f64 = 8.0;
-/// How much larger than its residuals the error of a region may be.
+/// Largest ratio of the error of a region to its residuals.
 const INVISIBLE: f64 = 4.0;
 /// Hypotheses of a search with other axes.
 const MISREAD: usize = 48;
@@ -90,7 +90,7 @@ pub(super) fn answer(bench: &Workbench<'_>, all: Vec<Candidate>, started: bool) 
     }
 }
 
-/// How far apart different answers are.
+/// Least distance between answers that count as different.
 fn different(bench: &Workbench<'_>) -> (f64, f64) {
     (DIFFERENT_M.max(4.0 * bench.map.spacing_m), DIFFERENT_RAD)
 }
@@ -129,7 +129,7 @@ fn verdict(
             format!("only {percent:.0} % of the points lie on the map, {least:.0} % are needed");
         return (Verdict::NoOverlap, reason);
     }
-    // What is not explained might be explained elsewhere.
+    // Points without a partner might have one elsewhere.
     let unexplained = bench.fit.observations() * (1.0 - best.inlier_fraction);
     let least = options.min_margin.max(0.5 * unexplained);
     if log_margin < least {
@@ -200,7 +200,7 @@ pub(super) enum Misreading {
     Axes(Axes),
 }
 
-/// Those that stand on their side.
+/// Misreadings of clouds that stand on their side.
 pub(super) const ON_THEIR_SIDE: [Misreading; 3] = [
     Misreading::Axes(Axes::UnityRuf),
     Misreading::Axes(Axes::WinrtRub),
@@ -218,7 +218,7 @@ impl Misreading {
         }
     }
 
-    /// What mends it.
+    /// The transform that mends it.
     fn matrix(self) -> Matrix3<f64> {
         match self {
             Misreading::Mirrored => Matrix3::from_diagonal(&Vector3::new(1.0, -1.0, 1.0)),
@@ -227,7 +227,7 @@ impl Misreading {
     }
 }
 
-/// How the cloud must be read to fit, if it fits clearly better so than as it is.
+/// The misreading (axes or scale) under which the cloud fits clearly better than as it is.
 pub(super) fn misread(
     bench: &Workbench<'_>,
     straight: &[Candidate],

@@ -1,4 +1,4 @@
-//! A map made ready for calibrations.
+//! A map prepared for calibrations.
 
 use super::super::confusion::shares;
 use super::super::likelihood::FitScale;
@@ -16,7 +16,7 @@ pub struct CalibrationMap {
 }
 
 impl CalibrationMap {
-    /// Of the centroids of a map's voxels, labelled or not, and the side of a cube as large as a voxel.
+    /// Prepares the centroids of a map's voxels, labelled or not, given the side of a cube as large as a voxel.
     ///
     /// # Errors
     /// If there are too few points, some are not finite, or the side is not a length.
@@ -50,7 +50,7 @@ impl CalibrationMap {
         &self.cloud
     }
 
-    /// How closely points agree with this map, with noise of their own.
+    /// Expected deviation of points from this map, with noise of their own.
     pub(super) fn scale(&self, noise_m: f64) -> FitScale {
         FitScale::new(self.spacing_m, noise_m)
     }

@@ -1,4 +1,4 @@
-//! Where a headset's frame lies in a robot's map: no marker, no guess, and an honest verdict.
+//! Calibration of a headset's frame in a robot's map: no marker, no guess, and an honest verdict.
 //!
 //! All places are searched by surfaces and by labels; the best are refined by GICP-SE(3) and by
 //! Semantic-ICP with learned labels; one likelihood judges them all (`fit`), in which labels count as
@@ -133,7 +133,7 @@ fn likeliest(all: &[Candidate]) -> Option<&Candidate> {
         .reduce(|a, b| if b.total() > a.total() { b } else { a })
 }
 
-/// Tells of progress, and ends if that is wanted.
+/// Reports progress; ends the calibration if the caller wants that.
 fn step(progress: &dyn Progress, stage: Stage, fraction: f64) -> Result<(), Refusal> {
     match progress.report(stage, fraction) {
         ControlFlow::Continue(()) => Ok(()),
@@ -187,7 +187,7 @@ fn frequent_classes(cloud: &PreparedCloud) -> Vec<u16> {
     classes.into_iter().map(|(class, _)| class).collect()
 }
 
-/// What the methods make of a given start, GICP-SE(3) first.
+/// Poses that the methods reach from a given start, GICP-SE(3) first.
 fn from_start(bench: &Workbench<'_>, start: &Isometry3<f64>) -> Vec<Candidate> {
     let (source, map) = (&bench.input.full, &bench.map.cloud);
     // As published, with its wide gate: it comes from farther than ours, and stands where it is right.

@@ -1,4 +1,4 @@
-//! Whether a headset looked through walls.
+//! Lines of sight of a headset: a right pose does not look through walls.
 
 use nalgebra::{Isometry3, Point3};
 
@@ -9,7 +9,7 @@ use super::super::search::OccupiedGrid;
 const RAYS: usize = 300;
 /// Places of a ray that are looked at, at most, however far a point claims to be.
 const STEPS: usize = 1000;
-/// How far apart they are, in cells.
+/// Distance between them, in cells.
 const STRIDE: f64 = 0.7;
 
 /// Share of the rays to the points that go through a surface on their way.

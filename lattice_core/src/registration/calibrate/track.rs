@@ -10,10 +10,10 @@ use super::types::{CalibrationOptions, CalibrationRequest, HeadsetScan};
 /// Log-likelihood by which a refined pose must be better to replace the old one.
 const BETTER: f64 = 2.0;
 
-/// What a further look says of a pose.
+/// Verdict of a further scan on a pose.
 #[derive(Clone, Copy, PartialEq, Debug)]
 pub struct TrackUpdate {
-    /// Whether the look fits; a full search is due when several in a row do not.
+    /// True if the scan fits; a full search is due when several in a row do not.
     pub fits: bool,
     /// `map_from_headset` after the look; as before if it does not fit.
     pub map_from_headset: Isometry3<f64>,

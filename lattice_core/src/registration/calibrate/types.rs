@@ -1,4 +1,4 @@
-//! What goes into a calibration and what comes out.
+//! Request, options and result of a calibration.
 
 use std::ops::ControlFlow;
 
@@ -6,27 +6,27 @@ use nalgebra::{Isometry3, Matrix6, Point3, Vector3};
 
 use crate::registration::{Confusion, SemanticCloud};
 
-/// What one look of the headset saw.
+/// One scan of the headset.
 #[derive(Clone, PartialEq, Debug, Default)]
 pub struct HeadsetScan {
     /// Points in the headset's frame: metres, forward, left, up, gravity along -z.
     pub cloud: SemanticCloud,
-    /// Where the headset was, in the same frame, if it is known.
+    /// Place of the headset in the same frame, if it is known.
     pub sensor_m: Option<Point3<f64>>,
 }
 
-/// One calibration that is asked for.
+/// Request for a calibration.
 #[derive(Clone, Copy, Debug)]
 pub struct CalibrationRequest<'a> {
-    /// Looks in one frame; each further one multiplies the likelihood.
+    /// Scans in one frame; each further one multiplies the likelihood.
     pub headset_scans: &'a [HeadsetScan],
     /// `map_from_headset` near which the answer is, if something is known.
     pub start: Option<Isometry3<f64>>,
-    /// What earlier calibrations taught about the labels.
+    /// Co-occurrence of labels from earlier calibrations.
     pub confusion: Option<&'a Confusion>,
 }
 
-/// How a calibration is done. All lengths are metres.
+/// Options of a calibration. All lengths are metres.
 #[derive(Clone, Copy, PartialEq, Debug)]
 pub struct CalibrationOptions {
     /// Fewest points of the headset.
@@ -47,9 +47,9 @@ pub struct CalibrationOptions {
     /// Share of places where equal class numbers are expected to agree before anything was learned;
     /// 0 if the label sets have nothing to do with each other.
     pub agreement: f64,
-    /// How far the answer may be from a given start.
+    /// Largest distance of the answer from a given start.
     pub start_radius_m: f64,
-    /// How far its heading may be from that of a given start, radians.
+    /// Largest difference of its heading from that of a given start, radians.
     pub start_yaw_rad: f64,
     /// Log-likelihood by which the answer must beat every other pose.
     pub min_margin: f64,
@@ -96,7 +96,7 @@ impl Default for CalibrationOptions {
     }
 }
 
-/// What can be said of a calibration.
+/// Verdict on a calibration.
 #[derive(Clone, Copy, PartialEq, Eq, Debug)]
 pub enum Verdict {
     /// The pose holds.
@@ -124,7 +124,7 @@ impl Verdict {
     }
 }
 
-/// Whether a direction is one of motion or of turning.
+/// Kind of a direction: of motion or of turning.
 #[derive(Clone, Copy, PartialEq, Eq, Debug)]
 pub enum DirectionKind {
     /// Motion; sigma in metres.
@@ -138,13 +138,13 @@ pub enum DirectionKind {
 pub struct WeakDirection {
     /// Unit vector in the map frame.
     pub axis: Vector3<f64>,
-    /// What it is a direction of.
+    /// Motion or turning.
     pub kind: DirectionKind,
     /// Standard deviation along it, metres or radians.
     pub sigma: f64,
 }
 
-/// How a class of the headset agrees with the map.
+/// Agreement of a class of the headset with the map.
 #[derive(Clone, Copy, PartialEq, Debug)]
 pub struct ClassReliability {
     /// Class of the headset.
@@ -158,15 +158,15 @@ pub struct ClassReliability {
 /// The answer.
 #[derive(Clone, PartialEq, Debug)]
 pub struct Calibration {
-    /// What can be said of it.
+    /// Verdict on it.
     pub verdict: Verdict,
-    /// Why, in a sentence.
+    /// Reason for the verdict, in a sentence.
     pub reason: String,
-    /// Whether it was ended before it was done.
+    /// True if it was ended before it was done.
     pub cancelled: bool,
     /// The best pose that was found; to be used only if the verdict says so.
     pub map_from_headset: Isometry3<f64>,
-    /// Of x, y, z (m^2) and the turns about x, y, z (rad^2), in the map frame, as in
+    /// Covariance of x, y, z (m^2) and the turns about x, y, z (rad^2), in the map frame, as in
     /// `geometry_msgs/PoseWithCovariance`.
     pub covariance: Matrix6<f64>,
     /// Log-likelihood above that of the best different pose.
@@ -177,11 +177,11 @@ pub struct Calibration {
     pub rmse_m: f64,
     /// Directions in which the pose is not held.
     pub weak_directions: Vec<WeakDirection>,
-    /// How the headset's classes agree with the map.
+    /// Agreement of the headset's classes with the map.
     pub class_reliability: Vec<ClassReliability>,
-    /// Which of the candidates it is.
+    /// Name of the method that made the winning candidate.
     pub method: &'static str,
-    /// What was learned of the labels, together with what was known.
+    /// Co-occurrence of labels learned here, merged with what was known.
     pub confusion: Confusion,
 }
 
@@ -205,12 +205,12 @@ impl Calibration {
     }
 }
 
-/// Why a calibration ends early.
+/// Reason to end a calibration early.
 #[derive(Clone, PartialEq, Debug)]
 pub(super) enum Refusal {
     /// The input cannot be used, and why.
     Input(String),
-    /// It was ended from outside.
+    /// Ended from outside.
     Cancelled,
 }
 

@@ -4,7 +4,7 @@ use nalgebra::{Rotation3, Vector3};
 
 use super::field::Field;
 
-/// Cells of the source that are looked at, at most; more tell little that is new.
+/// Cells of the source that are looked at, at most; more add little.
 const MAX_STEPS: usize = 256;
 
 /// A heading and a place that the source fits, and how well.
@@ -14,7 +14,7 @@ pub(super) struct Peak {
     pub score: u32,
     /// Turn about the vertical, radians.
     pub yaw_rad: f64,
-    /// Where the reference point of the source comes to lie in the map, metres.
+    /// Place of the source's reference point in the map, metres.
     pub place_m: Vector3<f64>,
 }
 

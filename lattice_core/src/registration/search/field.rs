@@ -1,4 +1,4 @@
-//! What a source point scores where it falls in the map.
+//! Score of a source point at a place in the map.
 
 use nalgebra::{Point3, Vector3};
 
@@ -19,7 +19,7 @@ pub(super) struct Field {
 /// Ranges of azimuth (modulo half a turn) of upright surfaces.
 const AZIMUTHS: usize = 8;
 
-/// How a point's surface lies.
+/// Direction of the surface at a point.
 #[derive(Clone, Copy, Debug)]
 pub(super) enum Facing {
     Level,
@@ -48,7 +48,7 @@ impl Facing {
 }
 
 impl Field {
-    /// Scores by how surfaces lie: most for the same orientation, some for any, half of it one cell off.
+    /// Scores by the direction of surfaces: most for the same orientation, some for any, half of it one cell off.
     pub fn of_surfaces(grid: Grid, points_m: &[Point3<f64>], normals: &[Vector3<f64>]) -> Field {
         let scores = |normal: &Vector3<f64>, channel: usize| -> u8 {
             let own = Facing::of(normal).channel(0.0);

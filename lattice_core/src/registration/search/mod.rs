@@ -1,4 +1,4 @@
-//! Where a cloud lies in a map, without a guess: all headings and places, gravity known.
+//! Search for the place of a cloud in a map without a guess: all headings and places, gravity known.
 //!
 //! The source is turned about the vertical in steps and laid on a coarse grid of the map at every
 //! place at once (correlation of the points with scores of the cells); the best are climbed on a
@@ -32,14 +32,14 @@ const CLIMB_POINTS: usize = 200;
 /// Coarse cells of a map, about; a larger map gets larger ones.
 const COARSE_CELLS: f64 = 200_000.0;
 
-/// Where the source may lie.
+/// Places and headings that the source may have.
 #[derive(Clone, Copy, PartialEq, Debug)]
 pub struct Region {
     /// Pose in the middle, `target_from_source`.
     pub about: Isometry3<f64>,
-    /// How far the reference point may be from where that pose puts it, metres.
+    /// Largest distance of the reference point from its place by that pose, metres.
     pub radius_m: f64,
-    /// How far the heading may be off, radians.
+    /// Largest error of the heading, radians.
     pub yaw_rad: f64,
 }
 
@@ -60,7 +60,7 @@ pub struct SearchMap {
 }
 
 impl SearchMap {
-    /// Of a map whose points are about `spacing_m` apart. None if it is empty.
+    /// Prepares a map whose points are about `spacing_m` apart. None if it is empty.
     pub fn of_surfaces(map: &PreparedCloud, spacing_m: f64) -> Option<SearchMap> {
         let (points, normals) = (map.points_m(), map.normals());
         let make = |grid| Field::of_surfaces(grid, points, normals);
@@ -92,11 +92,6 @@ impl SearchMap {
             coarse: make(Grid::around(points_m, coarse_m, 2)?),
             fine: make(fine),
         })
-    }
-
-    /// Side of the cells that all places are tried on, metres.
-    pub fn coarse_cell_m(&self) -> f64 {
-        self.coarse.grid.cell_m
     }
 }
 

@@ -1,4 +1,4 @@
-//! Where surfaces are, for lines of sight.
+//! Grid of the surfaces, for lines of sight.
 
 use nalgebra::{Point3, Vector3};
 
@@ -10,7 +10,7 @@ const MIN_POINTS: u32 = 3;
 const FLAT: f32 = 0.8;
 /// Cosine between ray and normal below which a ray runs along a facet rather than through it.
 const STEEP: f64 = 0.4;
-/// How far from the midst of a facet a ray goes through it, in cells.
+/// Largest distance from the midst of a facet at which a ray goes through it, in cells.
 const REACH: f64 = 0.75;
 
 /// Cells of a map with the facets of surfaces in them.
@@ -33,7 +33,7 @@ struct Facet {
 }
 
 impl OccupiedGrid {
-    /// Of points with unit normals, in cells of `cell_m`, or larger ones if the map is vast. None without
+    /// Grid of points with unit normals, in cells of `cell_m`, or larger ones if the map is vast. None without
     /// points.
     pub fn new(
         points_m: &[Point3<f64>],
@@ -73,7 +73,7 @@ impl OccupiedGrid {
         self.grid.cell_m
     }
 
-    /// How far along a ray, metres, it goes through the surface in the cell of a place on it. Rays along a
+    /// Distance along a ray, metres, at which it goes through the surface in the cell of a place on it. Rays along a
     /// surface, past an edge or through clutter do not count.
     pub fn crossing_m(
         &self,

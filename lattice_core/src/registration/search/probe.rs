@@ -1,4 +1,4 @@
-//! What of a source cloud the search looks at.
+//! The part of a source cloud that the search looks at.
 
 use nalgebra::{Point3, Vector3};
 

@@ -1,11 +1,11 @@
-//! What a map file holds, in order of the keys.
+//! Contents of a map file, in the order of the keys.
 
 use nalgebra::Vector3;
 use thiserror::Error;
 
 use crate::lattice::{Lattice, MortonKey};
-use crate::voxels::columns::Columns;
 use crate::voxels::distortion::DistortionSums;
+use crate::voxels::store::payload_columns::Columns;
 use crate::voxels::{Distortion, OccupancyList, Payload, Voxel, VoxelList, VoxelStore};
 
 /// Parts that do not make a map.
@@ -132,7 +132,7 @@ impl MapContents {
         self.voxels.as_deref()
     }
 
-    /// Which further columns there are.
+    /// The further columns that are there.
     pub fn payload(&self) -> Payload {
         self.columns.payload()
     }
@@ -160,8 +160,8 @@ impl MapContents {
 
     /// Says what is wrong with the statistics; keys and voxels are checked as they are read.
     pub(super) fn check(&self) -> Result<(), String> {
-        if let Some(fault) = self.sums.fault(&self.lattice) {
-            return Err(fault);
+        if let Some(reason) = self.sums.contradiction(&self.lattice) {
+            return Err(reason);
         }
         let counts = self.voxels.iter().flatten().map(|voxel| voxel.count);
         let counted = counts.fold(0, |sum: u64, count| sum.saturating_add(u64::from(count)));

@@ -1,10 +1,10 @@
-//! Why a map file was not written or read.
+//! Errors of writing and reading map files.
 
 use std::io;
 
 use thiserror::Error;
 
-/// Why a map was not written or read; positions are bytes from the start of the file.
+/// A map that was not written or read; positions are bytes from the start of the file.
 #[derive(Debug, Error)]
 pub enum FileError {
     /// The system could not read or write.
@@ -12,10 +12,10 @@ pub enum FileError {
     Io {
         /// Bytes read or written before.
         position: u64,
-        /// What the system said.
+        /// Error of the system.
         source: io::Error,
     },
-    /// It is some other file.
+    /// Not a map file.
     #[error("not a map file: it starts with {:?} instead of \"LATTICE2\"", found.escape_ascii().to_string())]
     Magic {
         /// The first eight bytes.
@@ -29,7 +29,7 @@ pub enum FileError {
     Truncated {
         /// Length of the file.
         position: u64,
-        /// What is not all there.
+        /// The part that is cut off.
         part: String,
     },
     /// More voxels than the caller allows.
@@ -39,7 +39,7 @@ pub enum FileError {
     TooManyVoxels {
         /// Voxels in the file.
         voxels: u64,
-        /// What the caller allows.
+        /// Limit set by the caller.
         max_voxels: usize,
     },
     /// More than the caller allows to be held.
@@ -49,15 +49,15 @@ pub enum FileError {
     TooLarge {
         /// Voxels in the file.
         voxels: u64,
-        /// What the caller allows.
+        /// Limit set by the caller.
         max_bytes: usize,
     },
     /// The bytes cannot be a map.
     #[error("the map file is damaged at byte {position}: {reason}")]
     Corrupt {
-        /// Where the impossible bytes are; for a number of a column the byte after it.
+        /// Place of the impossible bytes; for a number of a column the byte after it.
         position: u64,
-        /// What is impossible.
+        /// The contradiction.
         reason: String,
     },
     /// A checksum does not match.
@@ -69,7 +69,7 @@ pub enum FileError {
         start: u64,
         /// The byte after the last.
         end: u64,
-        /// What the bytes are.
+        /// Name of the part.
         part: String,
         /// In the file.
         saved: u32,

@@ -19,10 +19,10 @@ pub(super) const SECTION_HEAD_BYTES: usize = 48;
 const VOLUME_AT: u64 = 24;
 const ORIENTATION_AT: u64 = 32;
 const GENERATOR_AT: u64 = 64;
-/// How far the squared length of a quaternion may be from 1.
+/// Largest deviation of the squared length of a quaternion from 1.
 const UNIT_SLACK: f64 = 1e-6;
 
-/// What a map is of, and how many sections follow.
+/// Head of a map file: lattice, datum, counts.
 pub(super) struct Head {
     pub(super) lattice: Lattice,
     pub(super) datum_index: [i64; 3],
@@ -98,8 +98,8 @@ fn orientation(lattice: &Lattice) -> [f64; 4] {
     [q.w, q.i, q.j, q.k]
 }
 
-/// What is wrong with a rotation.
-pub(super) fn orientation_fault(map_from_lattice: &UnitQuaternion<f64>) -> Option<String> {
+/// Error in a rotation.
+pub(super) fn orientation_error(map_from_lattice: &UnitQuaternion<f64>) -> Option<String> {
     let square = map_from_lattice.coords.norm_squared();
     // Not a number is refused too.
     let unit = (square - 1.0).abs() <= UNIT_SLACK;
@@ -126,8 +126,8 @@ fn lattice(
     };
     let [w, x, y, z] = turned;
     let rotation = UnitQuaternion::new_unchecked(Quaternion::new(w, x, y, z));
-    if let Some(fault) = orientation_fault(&rotation) {
-        return Err((ORIENTATION_AT, fault));
+    if let Some(reason) = orientation_error(&rotation) {
+        return Err((ORIENTATION_AT, reason));
     }
     let lattice = lattice.oriented(rotation);
     let bits = |values: &[f64]| values.iter().map(|v| v.to_bits()).collect::<Vec<_>>();
@@ -148,7 +148,7 @@ fn lattice(
     Ok(lattice)
 }
 
-/// How the values of a section are coded.
+/// Encoding of the values of a section.
 #[derive(Clone, Copy, PartialEq, Eq, Debug)]
 #[repr(u8)]
 pub(super) enum Encoding {
@@ -164,7 +164,7 @@ pub(super) enum Encoding {
     Rows = 4,
 }
 
-/// How the bytes of a section are packed.
+/// Compression of the bytes of a section.
 #[derive(Clone, Copy, PartialEq, Eq, Debug)]
 #[repr(u8)]
 pub(super) enum Codec {
@@ -183,44 +183,24 @@ pub(super) struct Column {
     pub(super) longest: u64,
 }
 
-pub(super) const KEYS: Column = Column {
-    name: "keys",
-    encoding: Encoding::Steps,
-    components: 1,
-    longest: 9,
-};
-pub(super) const COUNT: Column = Column {
-    name: "count",
-    encoding: Encoding::Unsigned,
-    components: 1,
-    longest: 5,
-};
-pub(super) const OFFSET_SUM: Column = Column {
-    name: "offset_sum",
-    encoding: Encoding::Signed,
-    components: 3,
-    longest: 10,
-};
+impl Column {
+    const fn new(name: &'static str, encoding: Encoding, components: u8, longest: u64) -> Column {
+        Column {
+            name,
+            encoding,
+            components,
+            longest,
+        }
+    }
+}
 
-pub(super) const MOMENTS: Column = Column {
-    name: "moments",
-    encoding: Encoding::Signed,
-    components: 6,
-    longest: 10,
-};
-pub(super) const STAMPS: Column = Column {
-    name: "stamps",
-    encoding: Encoding::SignedSteps,
-    components: 2,
-    longest: 10,
-};
-pub(super) const LABELS: Column = Column {
-    name: "labels",
-    encoding: Encoding::Rows,
-    components: 1,
-    // The number, and each label with its count.
-    longest: 3 + 65_536 * 8,
-};
+pub(super) const KEYS: Column = Column::new("keys", Encoding::Steps, 1, 9);
+pub(super) const COUNT: Column = Column::new("count", Encoding::Unsigned, 1, 5);
+pub(super) const OFFSET_SUM: Column = Column::new("offset_sum", Encoding::Signed, 3, 10);
+pub(super) const MOMENTS: Column = Column::new("moments", Encoding::Signed, 6, 10);
+pub(super) const STAMPS: Column = Column::new("stamps", Encoding::SignedSteps, 2, 10);
+/// Longest: the number of labels, and each label with its count.
+pub(super) const LABELS: Column = Column::new("labels", Encoding::Rows, 1, 3 + 65_536 * 8);
 
 /// The columns in their order: the first, two that come together, and three of which each may lack.
 pub(super) const COLUMNS: [Column; 6] = [KEYS, COUNT, OFFSET_SUM, MOMENTS, STAMPS, LABELS];

@@ -2,12 +2,13 @@
 //!
 //! `docs/map_file.md` describes the format and has a reader in Python.
 
-mod columns;
+mod column_values;
 mod contents;
 mod error;
 mod head;
 mod operations;
 mod read;
+mod source;
 mod write;
 
 #[cfg(test)]
@@ -34,7 +35,7 @@ pub fn max_voxels_of(file_bytes: u64) -> usize {
 /// Log2 of the largest zstd window that a reader takes: that of level 19.
 const MAX_WINDOW_LOG: u32 = 23;
 
-/// How a map is written.
+/// Options for writing a map.
 #[derive(Clone, Copy, PartialEq, Eq, Debug, Default)]
 pub struct WriteOptions {
     /// Sections packed by zstd at this level, 1 to 19; stored as they are if `None`.

@@ -6,10 +6,10 @@ use thiserror::Error;
 use super::MapContents;
 use super::contents::no_columns;
 use crate::lattice::MortonKey;
-use crate::voxels::columns::Columns;
+use crate::voxels::store::payload_columns::Columns;
 use crate::voxels::{Voxel, set_ops};
 
-/// Why two maps do not go together. The receiving map is as before.
+/// Two maps that do not go together. The receiving map is as before.
 #[derive(Clone, PartialEq, Eq, Debug, Error)]
 pub enum OperationError {
     /// The cells are different.

@@ -1,20 +1,18 @@
-//! Reading.
+//! Reading a map: its sections in order, each column checked value by value.
 
 use std::io::{self, Read};
 
-use super::columns::{decode_labels, decode_moments, decode_stamps, expect, expect_end};
+use super::column_values::{decode_labels, decode_moments, decode_stamps, expect, expect_end};
 use super::contents::no_columns;
 use super::head::{
-    COLUMNS, COUNT, Codec, Column, END_TAG, HEAD_BYTES, Head, KEYS, MAGIC, MOMENTS, OFFSET_SUM,
-    OLD_MAGIC, SECTION_HEAD_BYTES, SECTION_TAG, STAMPS, SectionHead, corrupt,
+    COLUMNS, COUNT, Codec, Column, KEYS, MOMENTS, OFFSET_SUM, SECTION_HEAD_BYTES, STAMPS,
+    SectionHead, corrupt,
 };
+use super::source::Source;
 use super::{FileError, MAX_EXPANSION, MAX_WINDOW_LOG, MapContents};
 use crate::voxels::Voxel;
 use crate::voxels::codec::{CodecError, Varints, decode_keys, unzigzag};
-use crate::voxels::fixed::reach;
-
-/// Bytes that are asked for before any has come.
-const FIRST_BYTES: u64 = 1 << 20;
+use crate::voxels::store::fixed_point::reach;
 
 impl MapContents {
     /// Reads a map of at most `max_voxels`.
@@ -39,11 +37,7 @@ impl MapContents {
         max_voxels: usize,
         wanted: usize,
     ) -> Result<MapContents, FileError> {
-        let mut source = Source {
-            reader,
-            crc: crc32fast::Hasher::new(),
-            position: 0,
-        };
+        let mut source = Source::new(reader);
         let head = source.head()?;
         if head.voxels > max_voxels as u64 {
             return Err(FileError::TooManyVoxels {
@@ -74,7 +68,7 @@ impl MapContents {
             };
             if !fits {
                 return Err(corrupt(
-                    source.position - SECTION_HEAD_BYTES as u64,
+                    source.position() - SECTION_HEAD_BYTES as u64,
                     format!("section {number} cannot be {:?} here", section.name),
                 ));
             }
@@ -89,7 +83,7 @@ impl MapContents {
         if known == 0 || known == 2 {
             let missing = if known == 0 { "keys" } else { "offset_sum" };
             return Err(corrupt(
-                source.position,
+                source.position(),
                 format!("there is no section {missing:?}"),
             ));
         }
@@ -98,40 +92,52 @@ impl MapContents {
         Ok(contents)
     }
 
+    /// The keys, which are the first column.
+    fn set_keys(&mut self, bytes: &[u8], voxels: u64) -> Result<(), ColumnError> {
+        let max = usize::try_from(voxels).unwrap_or(usize::MAX);
+        self.keys = decode_keys(bytes, max)?;
+        if self.keys.len() != max {
+            let reason = format!("it has {} keys instead of {voxels}", self.keys.len());
+            let offset = bytes.len();
+            return Err(ColumnError { offset, reason });
+        }
+        Ok(())
+    }
+
     /// The point counts, one for each key.
-    fn set_counts(&mut self, bytes: &[u8]) -> Result<(), Fault> {
+    fn set_counts(&mut self, bytes: &[u8]) -> Result<(), ColumnError> {
         let mut values = Varints::new(bytes);
         let mut voxels = Vec::with_capacity(self.keys.len());
         while let Some(count) = values.next_value()? {
             let Ok(count) = u32::try_from(count) else {
-                return Err(values.fault(format!("a voxel has {count} points")));
+                return Err(values.error(format!("a voxel has {count} points")));
             };
             voxels.push(Voxel { count, sum: [0; 3] });
         }
         if voxels.len() != self.keys.len() {
-            return Err(values.fault(format!("it has {} values", voxels.len())));
+            return Err(values.error(format!("it has {} values", voxels.len())));
         }
         self.voxels = Some(voxels);
         Ok(())
     }
 
     /// The offset sums, three for each key.
-    fn set_sums(&mut self, bytes: &[u8]) -> Result<(), Fault> {
+    fn set_sums(&mut self, bytes: &[u8]) -> Result<(), ColumnError> {
         let mut values = Varints::new(bytes);
         let reach = reach(&self.lattice);
         for voxel in self.voxels.iter_mut().flatten() {
             for sum in &mut voxel.sum {
                 *sum = unzigzag(expect(&mut values)?);
             }
-            if let Some(fault) = voxel.fault(reach) {
-                return Err(values.fault(fault));
+            if let Some(reason) = voxel.contradiction(reach) {
+                return Err(values.error(reason));
             }
         }
         expect_end(&mut values)
     }
 
     /// A column behind the payload.
-    fn set_further(&mut self, column: &Column, bytes: &[u8]) -> Result<(), Fault> {
+    fn set_further(&mut self, column: &Column, bytes: &[u8]) -> Result<(), ColumnError> {
         let voxels = self.voxels.as_deref().unwrap_or_default();
         let (reach, len) = (reach(&self.lattice), voxels.len());
         match *column {
@@ -146,14 +152,14 @@ impl MapContents {
     }
 }
 
-/// What is wrong with the values of a column, and before which of its bytes.
-pub(super) struct Fault {
+/// Error in the values of a column, with the byte behind it.
+pub(super) struct ColumnError {
     offset: usize,
     reason: String,
 }
 
-impl From<CodecError> for Fault {
-    fn from(error: CodecError) -> Fault {
+impl From<CodecError> for ColumnError {
+    fn from(error: CodecError) -> ColumnError {
         let (CodecError::Truncated { position: offset }
         | CodecError::Varint { position: offset }
         | CodecError::Key {
@@ -161,7 +167,7 @@ impl From<CodecError> for Fault {
         }) = error
         else {
             let (offset, reason) = (0, "it has too many values".to_owned());
-            return Fault { offset, reason };
+            return ColumnError { offset, reason };
         };
         let reason = match error {
             CodecError::Truncated { .. } => "it ends within a number".to_owned(),
@@ -170,100 +176,21 @@ impl From<CodecError> for Fault {
             }
             _ => "a number is not a shortest 64-bit varint".to_owned(),
         };
-        Fault { offset, reason }
+        ColumnError { offset, reason }
     }
 }
 
 impl Varints<'_> {
-    /// A fault at the place of the next value.
-    pub(super) fn fault(&self, reason: String) -> Fault {
-        Fault {
+    /// An error at the place of the next value.
+    pub(super) fn error(&self, reason: String) -> ColumnError {
+        ColumnError {
             offset: self.position(),
             reason,
         }
     }
 }
 
-/// Hands out bytes and knows their place and checksum.
-struct Source<R> {
-    reader: R,
-    crc: crc32fast::Hasher,
-    position: u64,
-}
-
 impl<R: Read> Source<R> {
-    /// Fills as much of the buffer as there is.
-    fn fill(&mut self, buffer: &mut [u8], part: &str) -> Result<(), FileError> {
-        let mut filled = 0;
-        while let Some(rest) = buffer.get_mut(filled..).filter(|rest| !rest.is_empty()) {
-            match self.reader.read(rest) {
-                Ok(0) => {
-                    return Err(FileError::Truncated {
-                        position: self.position,
-                        part: part.to_owned(),
-                    });
-                }
-                Ok(bytes) => {
-                    filled += bytes;
-                    self.position += bytes as u64;
-                }
-                Err(error) if error.kind() == io::ErrorKind::Interrupted => {}
-                Err(source) => {
-                    return Err(FileError::Io {
-                        position: self.position,
-                        source,
-                    });
-                }
-            }
-        }
-        Ok(())
-    }
-
-    /// Bytes of which the last four are the checksum of those before; hands out those.
-    fn summed<const N: usize>(&mut self, begin: &[u8], part: &str) -> Result<Vec<u8>, FileError> {
-        let start = self.position - begin.len() as u64;
-        let mut bytes = vec![0; N - begin.len() - 4];
-        self.fill(&mut bytes, part)?;
-        let mut crc = crc32fast::Hasher::new();
-        crc.update(begin);
-        crc.update(&bytes);
-        self.crc.combine(&crc);
-        let end = self.position;
-        let saved = self.crc_value(part)?;
-        verify(start..end, part, saved, crc.finalize())?;
-        self.crc.update(&saved.to_le_bytes());
-        Ok(bytes)
-    }
-
-    fn crc_value(&mut self, part: &str) -> Result<u32, FileError> {
-        let mut saved = [0; 4];
-        self.fill(&mut saved, part)?;
-        Ok(u32::from_le_bytes(saved))
-    }
-
-    fn head(&mut self) -> Result<Head, FileError> {
-        let mut magic = [0; 8];
-        self.fill(&mut magic, "head")?;
-        if magic == *OLD_MAGIC {
-            return Err(FileError::OldVersion);
-        }
-        if magic != *MAGIC {
-            return Err(FileError::Magic { found: magic });
-        }
-        Head::from_bytes(&self.summed::<HEAD_BYTES>(&magic, "head")?)
-    }
-
-    fn section_head(&mut self) -> Result<SectionHead, FileError> {
-        let start = self.position;
-        let mut tag = [0; 4];
-        self.fill(&mut tag, "head of a section")?;
-        if tag != *SECTION_TAG {
-            return Err(corrupt(start, "a section should begin here".to_owned()));
-        }
-        let bytes = self.summed::<SECTION_HEAD_BYTES>(&tag, "head of a section")?;
-        SectionHead::from_bytes(&bytes, start)
-    }
-
     /// Reads a section of a known column into `contents`.
     fn column(
         &mut self,
@@ -272,7 +199,7 @@ impl<R: Read> Source<R> {
         voxels: u64,
         contents: &mut MapContents,
     ) -> Result<(), FileError> {
-        let head_at = self.position - SECTION_HEAD_BYTES as u64;
+        let head_at = self.position() - SECTION_HEAD_BYTES as u64;
         let wrong = |reason: String| corrupt(head_at, format!("section {}: {reason}", column.name));
         if (section.encoding, section.components) != (column.encoding as u8, column.components) {
             return Err(wrong(format!(
@@ -302,7 +229,7 @@ impl<R: Read> Source<R> {
                 section.codec
             )));
         }
-        let start = self.position;
+        let start = self.position();
         let mut bytes = self.stored(section)?;
         let packed = section.codec == Codec::Zstd as u8;
         if packed {
@@ -315,7 +242,7 @@ impl<R: Read> Source<R> {
             OFFSET_SUM => contents.set_sums(&bytes),
             _ => contents.set_further(column, &bytes),
         };
-        done.map_err(|Fault { offset, reason }| {
+        done.map_err(|ColumnError { offset, reason }| {
             let (place, unpacked) = if packed {
                 (start, format!(", unpacked byte {offset}"))
             } else {
@@ -327,96 +254,6 @@ impl<R: Read> Source<R> {
             )
         })
     }
-
-    /// The stored bytes of a section, checked.
-    fn stored(&mut self, section: &SectionHead) -> Result<Vec<u8>, FileError> {
-        let (start, part) = (self.position, format!("section {}", section.name));
-        let mut bytes = Vec::new();
-        let mut wanted = section.stored_bytes;
-        while wanted > 0 {
-            // Doubling: never more than twice of what has come, whatever the head promises.
-            let step = wanted.min((bytes.len() as u64).max(FIRST_BYTES));
-            let before = bytes.len();
-            let length = usize::try_from(step).unwrap_or(usize::MAX);
-            bytes.resize(before.saturating_add(length), 0);
-            self.fill(bytes.get_mut(before..).unwrap_or_default(), &part)?;
-            wanted -= step;
-        }
-        let mut crc = crc32fast::Hasher::new();
-        crc.update(&bytes);
-        self.crc.combine(&crc);
-        verify(start..self.position, &part, section.crc, crc.finalize())?;
-        Ok(bytes)
-    }
-
-    /// Passes over a section, in constant memory.
-    fn skip(&mut self, section: &SectionHead) -> Result<(), FileError> {
-        let (start, part) = (self.position, format!("section {}", section.name));
-        let mut crc = crc32fast::Hasher::new();
-        let mut buffer = vec![0; section.stored_bytes.min(FIRST_BYTES) as usize];
-        let mut wanted = section.stored_bytes;
-        while wanted > 0 {
-            let step = wanted.min(FIRST_BYTES);
-            let bytes = buffer.get_mut(..step as usize).unwrap_or_default();
-            self.fill(bytes, &part)?;
-            crc.update(bytes);
-            wanted -= step;
-        }
-        self.crc.combine(&crc);
-        verify(start..self.position, &part, section.crc, crc.finalize())
-    }
-
-    /// Reads and checks the end marker, its checksum and the end.
-    fn finish(&mut self) -> Result<(), FileError> {
-        let start = self.position;
-        let mut tag = [0; 4];
-        self.fill(&mut tag, "end marker")?;
-        if tag != *END_TAG {
-            return Err(corrupt(start, "the end marker should be here".to_owned()));
-        }
-        self.crc.update(&tag);
-        let end = self.position;
-        let saved = self.crc_value("end marker")?;
-        verify(0..end, "whole file", saved, self.crc.clone().finalize())?;
-        let position = self.position;
-        match self.fill(&mut [0], "end marker") {
-            Err(FileError::Truncated { .. }) => Ok(()),
-            Err(error) => Err(error),
-            Ok(()) => Err(FileError::TrailingBytes { position }),
-        }
-    }
-}
-
-impl MapContents {
-    /// The keys, which are the first column.
-    fn set_keys(&mut self, bytes: &[u8], voxels: u64) -> Result<(), Fault> {
-        let max = usize::try_from(voxels).unwrap_or(usize::MAX);
-        self.keys = decode_keys(bytes, max)?;
-        if self.keys.len() != max {
-            let reason = format!("it has {} keys instead of {voxels}", self.keys.len());
-            let offset = bytes.len();
-            return Err(Fault { offset, reason });
-        }
-        Ok(())
-    }
-}
-
-fn verify(
-    range: std::ops::Range<u64>,
-    part: &str,
-    saved: u32,
-    calculated: u32,
-) -> Result<(), FileError> {
-    if saved == calculated {
-        return Ok(());
-    }
-    Err(FileError::Checksum {
-        start: range.start,
-        end: range.end,
-        part: part.to_owned(),
-        saved,
-        calculated,
-    })
 }
 
 /// One zstd frame of exactly `raw_bytes`.

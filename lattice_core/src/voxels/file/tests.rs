@@ -3,8 +3,8 @@
 use super::head::{HEAD_BYTES, SECTION_HEAD_BYTES};
 use super::*;
 use crate::cloud::Cloud;
-use crate::lattice::{Lattice, LatticeKind, MortonKey, Orientation};
-use crate::voxels::columns::Columns;
+use crate::lattice::{Lattice, LatticeKind, MortonKey};
+use crate::voxels::store::payload_columns::Columns;
 use crate::voxels::{LabelCount, Payload, Stamps, Voxel};
 
 mod refused;
@@ -228,55 +228,6 @@ fn detailed(lattice: Lattice) -> VoxelList {
     list
 }
 
-fn lattices() -> Vec<Lattice> {
-    use nalgebra::{Matrix3, UnitQuaternion};
-    let turn = UnitQuaternion::from_euler_angles(0.3, -1.2, 2.5);
-    let skewed = Matrix3::new(0.5, 0.1, -0.0, 0.0, 0.4, 0.2, 0.1, -0.1, 0.6);
-    let custom = Lattice::from_basis(skewed).unwrap();
-    let mut lattices = vec![custom.clone(), custom.oriented(turn)];
-    for kind in LatticeKind::ALL {
-        let lattice = Lattice::new(kind, 0.125).unwrap();
-        lattices.push(lattice.clone());
-        lattices.push(lattice.clone().oriented(turn));
-        lattices.push(lattice.with_orientation(Orientation::Ground).unwrap());
-    }
-    lattices
-}
-
-#[test]
-fn every_lattice_and_column_comes_back_to_the_bit() {
-    for lattice in lattices() {
-        let list = detailed(lattice.clone());
-        assert_eq!(list.validate(), Ok(()), "{lattice:?}");
-        let contents = MapContents::from_list(&list);
-        for zstd_level in [None, Some(3)] {
-            let options = WriteOptions {
-                zstd_level,
-                occupancy_only: false,
-            };
-            let file = bytes(&contents, options);
-            let back = MapContents::read(&file[..], 10_000).unwrap();
-            assert_eq!(back, contents);
-            assert_eq!(bytes(&back, options), file);
-            let bits = |lattice: &Lattice| {
-                let q = lattice.orientation().coords.map(f64::to_bits);
-                (lattice.generator().map(f64::to_bits), q)
-            };
-            assert_eq!(bits(back.lattice()), bits(&lattice));
-            let again = back.into_list(10_000);
-            again.validate().unwrap();
-            assert_eq!(again.payload(), list.payload());
-            for (key, voxel) in list.sorted() {
-                assert_eq!(again.get(key), Some(voxel));
-                assert_eq!(again.center_m(key), list.center_m(key));
-                assert_eq!(again.covariance_m2(key), list.covariance_m2(key));
-                assert_eq!(again.stamps(key), list.stamps(key));
-                assert_eq!(again.labels(key), list.labels(key));
-            }
-        }
-    }
-}
-
 #[test]
 fn further_columns_go_with_their_voxels() {
     let list = detailed(Lattice::new(LatticeKind::Bcc, 0.125).unwrap());
@@ -316,7 +267,7 @@ fn occupancy_is_read_in_one_go_and_bounded() {
         let error = read_occupancy(&file[..], max_bytes).unwrap_err();
         assert!(matches!(error, FileError::TooLarge { .. }), "{error}");
     }
-    // What is skipped is checked.
+    // Skipped sections are checked too.
     for at in [HEAD_BYTES + 60, file.len() / 2, file.len() - 20] {
         let mut damaged = file.clone();
         damaged[at] ^= 4;

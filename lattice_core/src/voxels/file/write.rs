@@ -1,11 +1,11 @@
-//! Writing.
+//! Writing a map: head, sections, end.
 
 use std::io::Write;
 
-use super::columns::{encode_labels, encode_moments, encode_stamps};
+use super::column_values::{encode_labels, encode_moments, encode_stamps};
 use super::head::{
     COUNT, Codec, Column, END_TAG, Head, KEYS, LABELS, MOMENTS, OFFSET_SUM, STAMPS, SectionHead,
-    orientation_fault,
+    orientation_error,
 };
 use super::{FileError, MAX_EXPANSION, MapContents, WriteOptions};
 use crate::voxels::codec::{encode_keys, push_varint, zigzag};
@@ -17,8 +17,8 @@ impl MapContents {
         if let Some(level) = level.filter(|level| !(1..=19).contains(level)) {
             return Err(FileError::Level(level));
         }
-        if let Some(fault) = orientation_fault(&self.lattice.orientation()) {
-            return Err(FileError::Lattice(fault));
+        if let Some(reason) = orientation_error(&self.lattice.orientation()) {
+            return Err(FileError::Lattice(reason));
         }
         let voxels = self.voxels.as_ref().filter(|_| !options.occupancy_only);
         let payload = self.columns.payload();

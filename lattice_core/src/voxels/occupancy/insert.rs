@@ -1,12 +1,12 @@
-//! Inserting clouds into bits.
+//! Inserting clouds into an occupancy list.
 
 use rayon::prelude::*;
 
-use super::super::InsertReport;
-use super::super::recent::Recent;
+use super::recent_cells::Recent;
 use super::{Last, OccupancyList};
 use crate::cloud::Cloud;
 use crate::lattice::{BatchQuantizer, BlockKey};
+use crate::voxels::InsertReport;
 
 /// Fewest points that are worth a thread.
 const PART: usize = 1 << 13;

@@ -1,4 +1,4 @@
-//! Uniting stores.
+//! Merging another store into an occupancy list.
 
 use super::{BLOCK_BYTES, Last, OccupancyList};
 use crate::lattice::BlockKey;

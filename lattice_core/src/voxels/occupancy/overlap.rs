@@ -1,15 +1,16 @@
-//! How many points lie in occupied cells.
+//! Number of points in occupied cells.
 
 use nalgebra::{Isometry3, Translation3};
 
-use super::{Leaf, OccupancyList};
+use super::OccupancyList;
 use crate::lattice::BatchQuantizer;
+use crate::voxels::store::block_mask::{self, BlockMask};
 
 impl OccupancyList {
-    /// How many points (metres) `map_from_points` puts into occupied cells; fastest for points in an
+    /// Number of points (metres) that `map_from_points` puts into occupied cells; fastest for points in an
     /// order that keeps near ones together.
     pub fn overlap(&self, map_from_points: &Isometry3<f64>, points_m: &[[f32; 3]]) -> usize {
-        const NOTHING: &Leaf = &[0; 8];
+        const NOTHING: &BlockMask = &[0; 8];
         let datum_from_points = Translation3::from(-self.datum_m) * map_from_points;
         let quantizer = BatchQuantizer::new(&self.lattice, datum_from_points);
         let (mut block, mut leaf) = (u64::MAX, NOTHING);
@@ -23,7 +24,7 @@ impl OccupancyList {
                     let row = number.and_then(|number| self.blocks.rows().get(number as usize));
                     leaf = row.map_or(NOTHING, |row| &row.leaf);
                 }
-                hits += usize::from(super::is_set(leaf, code.place()));
+                hits += usize::from(block_mask::is_set(leaf, code.place()));
             }
         });
         hits

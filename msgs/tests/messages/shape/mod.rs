@@ -1,4 +1,4 @@
-//! What a message looks like to serde, and values that fill every field.
+//! Shape of a message as serde sees it, and values that fill every field.
 
 use std::fmt;
 

@@ -1,23 +1,23 @@
-//! What is known of an MCAP file before its messages are read.
+//! Index of an MCAP file: schemas, channels, stretches of messages and counts.
 
 use std::{collections::BTreeMap, path::Path};
 
-use mcap::records::{Channel, Metadata as MetadataRecord, Record, op};
+use mcap::records::{Channel, Record};
 
 use crate::{
     BagError, TopicInfo,
-    metadata::Metadata,
     storage::{StorageInfo, full_type_name, lenient_qos},
 };
 
 /// A stretch of the file that is read as one: a chunk, or messages outside of chunks.
 #[derive(Clone, Debug)]
 pub(super) struct Block {
-    /// Of the first record's opcode, bytes from the start of the file.
+    /// Of its first record, bytes from the start of the file.
     pub offset: u64,
-    /// Bytes of a chunk's record behind opcode and length, or of all records of a run of messages.
+    /// Of all its records, bytes.
     pub len: u64,
-    pub is_chunk: bool,
+    /// Opcode of its first record.
+    pub opcode: u8,
     pub start_ns: u64,
     pub end_ns: u64,
     /// The channels inside, where known.
@@ -39,12 +39,11 @@ pub(super) struct Contents {
     pub counts: BTreeMap<u16, u64>,
     pub message_count: u64,
     pub range_ns: Option<(u64, u64)>,
-    pub metadata: Option<Metadata>,
     pub damage: Option<BagError>,
 }
 
 impl Contents {
-    /// Takes a schema, channel or metadata record; the error is a reason.
+    /// Takes a schema or channel record; the error is a reason.
     pub(super) fn take(&mut self, opcode: u8, body: &[u8]) -> Result<(), String> {
         match mcap::parse_record(opcode, body).map_err(|e| e.to_string())? {
             Record::Schema { header, data } => {
@@ -69,19 +68,9 @@ impl Contents {
                     self.channels.insert(channel.id, channel);
                 }
             },
-            Record::Metadata(record) => self.take_metadata(&record),
             _ => {}
         }
         Ok(())
-    }
-
-    pub(super) fn take_metadata(&mut self, record: &MetadataRecord) {
-        // rosbag2 writes the record again whenever it knows more; the last one holds.
-        if record.name == "rosbag2"
-            && let Some(text) = record.metadata.get("serialized_metadata")
-        {
-            self.metadata = Metadata::parse_embedded(text).or(self.metadata.take());
-        }
     }
 
     /// Counts a message seen in a scan.
@@ -92,7 +81,7 @@ impl Contents {
         self.range_ns = Some((first.min(log_time_ns), last.max(log_time_ns)));
     }
 
-    /// Whether every channel that has messages is known, with its schema.
+    /// True if every channel that has messages is known, with its schema.
     pub(super) fn is_complete(&self) -> bool {
         let has_schema = |c: &Channel| c.schema_id == 0 || self.schemas.contains_key(&c.schema_id);
         self.channels.values().all(has_schema)
@@ -129,7 +118,6 @@ impl Contents {
         let mut info = StorageInfo {
             message_count: self.message_count,
             damage: self.damage.take(),
-            metadata: self.metadata.take(),
             ..StorageInfo::default()
         };
         let mut topic_of = BTreeMap::new();
@@ -157,10 +145,6 @@ impl Contents {
         let schema = self.schemas.get(&channel.schema_id);
         let is_text = |s: &&Schema| matches!(s.encoding.as_str(), "ros2msg" | "ros2idl" | "omgidl");
         let qos = channel.metadata.get("offered_qos_profiles");
-        let hash = channel
-            .metadata
-            .get("topic_type_hash")
-            .filter(|hash| !hash.is_empty());
         TopicInfo {
             name: channel.topic.clone(),
             type_name: schema.map(|s| full_type_name(&s.name)).unwrap_or_default(),
@@ -168,7 +152,6 @@ impl Contents {
             offered_qos: qos
                 .map(|text| lenient_qos(&channel.topic, text))
                 .unwrap_or_default(),
-            type_hash: hash.cloned(),
             definition: schema
                 .filter(is_text)
                 .map(|s| s.text.clone())
@@ -176,13 +159,4 @@ impl Contents {
             message_count: self.counts.get(&id).copied().unwrap_or(0),
         }
     }
-}
-
-/// Whether a record of the summary is one that [`Contents::take`] or the caller wants parsed.
-/// Attachments are left out on purpose: nothing of them is used.
-pub(super) fn is_wanted(opcode: u8) -> bool {
-    matches!(
-        opcode,
-        op::SCHEMA | op::CHANNEL | op::CHUNK_INDEX | op::STATISTICS | op::METADATA_INDEX
-    )
 }

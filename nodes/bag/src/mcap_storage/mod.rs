@@ -1,16 +1,14 @@
 //! MCAP storage files: summary where there is one, a scan of the whole file where not.
 
-mod chunk;
 mod contents;
+mod records;
 mod scan;
 mod stream;
 mod summary;
-mod walk;
 
 use std::{
     collections::BTreeMap,
     fs::File,
-    io::{BufReader, Seek, SeekFrom},
     path::{Path, PathBuf},
     sync::Arc,
 };
@@ -24,6 +22,7 @@ use super::{
     storage::{Filter, StorageInfo, StorageStream},
 };
 use contents::Block;
+use records::{Cause, Place, RecordError, first_record};
 use stream::McapStream;
 
 /// An MCAP file whose contents are known.
@@ -41,12 +40,11 @@ impl McapFile {
         path: &Path,
         temporary: Option<Arc<TempPath>>,
     ) -> Result<McapFile, BagError> {
-        let file = File::open(path).map_err(BagError::io(path, "open"))?;
+        let mut file = File::open(path).map_err(BagError::io(path, "open"))?;
         let size = file
             .metadata()
             .map_err(BagError::io(path, "examine"))?
             .len();
-        let mut file = BufReader::with_capacity(1 << 16, file);
         let profile = read_profile(&mut file, path, size)?;
         let mut contents = summary::read_summary(&mut file, size).unwrap_or_else(|reason| {
             log::info!(
@@ -89,40 +87,24 @@ impl McapFile {
 }
 
 /// Reads the header record, which must come first.
-fn read_profile(file: &mut BufReader<File>, path: &Path, size: u64) -> Result<String, BagError> {
+fn read_profile(file: &mut File, path: &Path, size: u64) -> Result<String, BagError> {
     let at = MCAP_MAGIC.len() as u64;
-    file.seek(SeekFrom::Start(at))
-        .map_err(BagError::io(path, "read"))?;
-    let cut = || BagError::Truncated {
-        path: path.to_path_buf(),
-        size_bytes: size,
-        inside: format!("the header record at byte {at}"),
-        readable_messages: 0,
+    let first = first_record(file, at, size).map_err(|error| error.in_file(path, size, 0))?;
+    let place = Place::in_file(at);
+    let error = match &first {
+        Some((op::HEADER, body)) => match mcap::parse_record(op::HEADER, body) {
+            Ok(Record::Header(header)) => return Ok(header.profile),
+            Ok(_) => RecordError::bad(place, "no header record"),
+            Err(error) => RecordError::bad(place, error),
+        },
+        Some((opcode, _)) => {
+            let reason = format!("opcode {opcode} where the header record is due");
+            RecordError::bad(place, reason)
+        }
+        None => RecordError {
+            place,
+            cause: Cause::Cut,
+        },
     };
-    let bad = |reason: String| {
-        BagError::corrupt(
-            path,
-            format!("byte {at}"),
-            reason,
-            "take another copy of the file",
-        )
-    };
-    let (opcode, len) = walk::record_header(file).map_err(|_| cut())?;
-    if opcode != op::HEADER {
-        return Err(bad(format!(
-            "opcode {opcode} where the header record is due"
-        )));
-    }
-    if len > size {
-        return Err(cut());
-    }
-    let body = walk::read_body(file, len).map_err(|e| match e {
-        Some(_) => cut(),
-        None => bad(format!("a header record of {len} bytes")),
-    })?;
-    match mcap::parse_record(opcode, &body) {
-        Ok(Record::Header(header)) => Ok(header.profile),
-        Ok(_) => Err(bad("no header record".into())),
-        Err(error) => Err(bad(format!("a header record: {error}"))),
-    }
+    Err(error.in_file(path, size, 0))
 }

@@ -4,18 +4,18 @@ use std::{
     cmp::Reverse,
     collections::{BTreeMap, BinaryHeap, VecDeque},
     fs::File,
-    io::{BufReader, Read, Seek, SeekFrom},
+    io::{Seek, SeekFrom},
+    ops::ControlFlow,
     path::PathBuf,
     sync::Arc,
 };
 
+use mcap::{records::op, sans_io::LinearReaderOptions};
 use tempfile::TempPath;
 
 use super::{
-    chunk::walk_chunk,
     contents::Block,
-    scan::walk_error,
-    walk::{Event, WalkError, walk},
+    records::{Cause, Place, RecordError, parse_message, visit_chunk, visit_records},
 };
 use crate::{
     BagError,
@@ -24,11 +24,9 @@ use crate::{
 
 /// Messages of overlapping blocks may wait in memory up to this size, bytes.
 const MAX_WAITING_BYTES: u64 = 2 << 30;
-/// What is reserved for a message before its bytes are seen.
-const RESERVED_BYTES: u64 = 1 << 20;
 
 pub(super) struct McapStream {
-    file: BufReader<File>,
+    file: File,
     path: PathBuf,
     /// Keeps a decompressed copy alive.
     _temporary: Option<Arc<TempPath>>,
@@ -76,7 +74,7 @@ impl McapStream {
         let mut blocks: Vec<Block> = blocks.iter().filter(is_wanted).cloned().collect();
         blocks.sort_by_key(|block| (block.start_ns, block.offset));
         Ok(McapStream {
-            file: BufReader::with_capacity(1 << 16, file),
+            file,
             path,
             _temporary: temporary,
             blocks: blocks.into(),
@@ -90,7 +88,7 @@ impl McapStream {
         })
     }
 
-    /// Whether a block may hold a message earlier than all that wait.
+    /// True if a block may hold a message earlier than all that wait.
     fn needs_block(&self) -> bool {
         match (self.blocks.front(), self.waiting.peek()) {
             (None, _) => false,
@@ -101,67 +99,80 @@ impl McapStream {
         }
     }
 
-    fn read_block(&mut self, block: &Block) -> Result<(), BagError> {
+    fn read_block(&mut self, block: &Block) -> Result<(), RecordError> {
         let number = self.blocks_read;
         self.blocks_read += 1;
+        let start = Place::in_file(block.offset);
+        self.file
+            .seek(SeekFrom::Start(block.offset))
+            .map_err(|error| RecordError::bad(start, error))?;
         let (filter, topic_of) = (&self.filter, &self.topic_of);
-        let (waiting, waiting_bytes) = (&mut self.waiting, &mut self.waiting_bytes);
+        let waiting_bytes = &mut self.waiting_bytes;
         // A chunk counts only once its CRC is right.
         let mut read = Vec::new();
-        let mut visit = |at: u64, event: Event<'_>| {
-            let Event::Message { header, len, body } = event else {
-                return Ok(());
-            };
-            let Some(&topic) = topic_of.get(&header.channel_id) else {
-                return Err(WalkError::bad(
-                    at,
-                    format!("a message of unknown channel {}", header.channel_id),
-                ));
-            };
-            let log_time_ns = i64::try_from(header.log_time).map_err(|_| {
-                WalkError::bad(
-                    at,
-                    format!("log time {} ns is beyond the year 2262", header.log_time),
-                )
-            })?;
-            if !filter.wants(topic, log_time_ns) {
-                return Ok(());
+        let mut take = |place, opcode, body: &[u8]| {
+            if opcode == op::MESSAGE
+                && let Some(message) = wanted(place, body, topic_of, filter, number)?
+            {
+                *waiting_bytes = waiting_bytes.saturating_add(message.data.len() as u64);
+                if *waiting_bytes > MAX_WAITING_BYTES {
+                    let cause = Cause::TooLarge {
+                        what: "all that chunks overlapping in time hold",
+                        size_bytes: *waiting_bytes,
+                        limit_bytes: MAX_WAITING_BYTES,
+                    };
+                    return Err(RecordError { place, cause });
+                }
+                read.push(message);
             }
-            *waiting_bytes = waiting_bytes.saturating_add(len);
-            if *waiting_bytes > MAX_WAITING_BYTES {
-                return Err(WalkError::TooLarge {
-                    what: "all that chunks overlapping in time hold",
-                    at,
-                    size_bytes: *waiting_bytes,
-                    limit_bytes: MAX_WAITING_BYTES,
-                });
-            }
-            let mut data =
-                Vec::with_capacity(usize::try_from(len.min(RESERVED_BYTES)).unwrap_or(0));
-            body.take(len)
-                .read_to_end(&mut data)
-                .map_err(|e| WalkError::bad(at, e))?;
-            read.push(Waiting {
-                log_time_ns,
-                block: number,
-                record: at,
-                topic,
-                data,
-            });
             Ok(())
         };
-        let (file, offset, len) = (&mut self.file, block.offset, block.len);
-        let walked = match block.is_chunk {
-            true => walk_chunk(file, offset, len, &mut visit).map(|_| ()),
-            false => file
-                .seek(SeekFrom::Start(offset))
-                .map_err(|e| WalkError::bad(0, e))
-                .and_then(|_| walk(file, len, &mut visit)),
-        };
-        walked.map_err(|e| walk_error(&self.path, offset, block.is_chunk, e))?;
-        waiting.extend(read.into_iter().map(Reverse));
+        let options = LinearReaderOptions::default().with_skip_end_magic(true);
+        let range = (block.offset, block.len);
+        let _ = visit_records(&self.file, range, options, &mut |place, opcode, body| {
+            if place.byte == block.offset && opcode != block.opcode {
+                let reason = format!("opcode {opcode}, where the index has {}", block.opcode);
+                return Err(RecordError::bad(place, reason));
+            }
+            match opcode {
+                op::CHUNK => drop(visit_chunk(place.byte, body, &mut take)?),
+                _ => take(place, opcode, body)?,
+            }
+            Ok(ControlFlow::Continue(()))
+        })
+        .map_err(|error| match error.cause {
+            Cause::Cut => RecordError::bad(error.place, "a record longer than the index has it"),
+            _ => error,
+        })?;
+        self.waiting.extend(read.into_iter().map(Reverse));
         Ok(())
     }
+}
+
+/// The message, if the filter wants it.
+fn wanted(
+    place: Place,
+    body: &[u8],
+    topic_of: &BTreeMap<u16, usize>,
+    filter: &Filter,
+    block: u64,
+) -> Result<Option<Waiting>, RecordError> {
+    let (header, data) = parse_message(place, body)?;
+    let Some(&topic) = topic_of.get(&header.channel_id) else {
+        let reason = format!("a message of unknown channel {}", header.channel_id);
+        return Err(RecordError::bad(place, reason));
+    };
+    let log_time_ns = i64::try_from(header.log_time).map_err(|_| {
+        let reason = format!("log time {} ns is beyond the year 2262", header.log_time);
+        RecordError::bad(place, reason)
+    })?;
+    Ok(filter.wants(topic, log_time_ns).then(|| Waiting {
+        log_time_ns,
+        block,
+        record: place.in_chunk.unwrap_or(place.byte),
+        topic,
+        data: data.to_vec(),
+    }))
 }
 
 impl Iterator for McapStream {
@@ -174,9 +185,9 @@ impl Iterator for McapStream {
         while self.needs_block() {
             let block = self.blocks.pop_front()?;
             if let Err(error) = self.read_block(&block) {
-                // What waits is whole, and earlier or close by: the damage is told after it.
+                // The waiting messages are whole, and earlier or close by: the error follows them.
                 self.blocks.clear();
-                self.damage = Some(error);
+                self.damage = Some(error.in_file(&self.path, 0, 0));
             }
         }
         if let Some(Reverse(message)) = self.waiting.pop() {

@@ -1,50 +1,37 @@
-//! Reads the summary at the end of a finished MCAP file, so that chunks can be found by time.
+//! Index of a finished MCAP file, from the summary at its end.
 
 use std::{
     fs::File,
-    io::{BufReader, Read, Seek, SeekFrom},
+    io::{Seek, SeekFrom},
+    ops::ControlFlow,
 };
 
-use mcap::records::{ChunkIndex, MetadataIndex, Record, Statistics, op};
+use mcap::{
+    records::{ChunkIndex, Record, Statistics, op},
+    sans_io::LinearReaderOptions,
+};
 
 use super::{
-    contents::{Block, Contents, is_wanted},
-    walk::{RECORD_HEADER_BYTES, read_body, record_header},
+    contents::{Block, Contents},
+    records::{Cause, RECORD_HEADER_BYTES, RecordError, first_record, visit_records},
 };
-use crate::sniff::MCAP_MAGIC;
 
-/// Footer record (9 + 20 bytes) and magic.
+/// Bytes of the footer record (9 + 20) and of the magic behind it.
 const TAIL_BYTES: u64 = 37;
-/// Bytes of the footer that its CRC covers.
-const FOOTER_HASHED_BYTES: usize = 25;
+/// Bytes of the data end record, which precedes the summary.
+const DATA_END_BYTES: u64 = 13;
+/// Longer records in a summary are refused, bytes.
+const MAX_RECORD_BYTES: usize = 64 << 20;
 
-struct Footer {
-    start: u64,
-    crc: u32,
-    hashed: [u8; FOOTER_HASHED_BYTES],
-}
-
-/// The contents that the summary tells, or why the file has to be scanned instead.
-pub(super) fn read_summary(file: &mut BufReader<File>, size: u64) -> Result<Contents, String> {
-    let footer = read_footer(file, size)?;
-    let end = size.saturating_sub(TAIL_BYTES);
-    if footer.start == 0 {
-        return Err("it has no summary".into());
-    }
-    if footer.start > end {
-        return Err(format!(
-            "its summary starts at byte {}, beyond the footer at {end}",
-            footer.start
-        ));
-    }
+/// The contents by the summary, or the reason to scan the file instead.
+pub(super) fn read_summary(file: &mut File, size: u64) -> Result<Contents, String> {
+    let start = summary_start(file, size)?;
     let mut found = Found::default();
-    found.read(file, &footer, end)?;
+    found.read(file, start, size)?;
     let Found {
         mut contents,
         statistics,
         chunks,
-        metadata,
-        ..
     } = found;
     let statistics = statistics.ok_or("its summary lacks statistics")?;
     if chunks.len() as u64 != u64::from(statistics.chunk_count) {
@@ -58,7 +45,7 @@ pub(super) fn read_summary(file: &mut BufReader<File>, size: u64) -> Result<Cont
         return Err("its messages are not in chunks".into());
     }
     for chunk in chunks {
-        contents.blocks.push(block(&chunk, footer.start)?);
+        contents.blocks.push(block(chunk, start)?);
     }
     contents.message_count = statistics.message_count;
     contents.counts = statistics.channel_message_counts;
@@ -67,37 +54,27 @@ pub(super) fn read_summary(file: &mut BufReader<File>, size: u64) -> Result<Cont
     if !contents.is_complete() {
         return Err("its summary lacks schemas or channels".into());
     }
-    for index in metadata.iter().filter(|index| index.name == "rosbag2") {
-        read_metadata(file, index, &mut contents);
-    }
     Ok(contents)
 }
 
-fn read_footer(file: &mut BufReader<File>, size: u64) -> Result<Footer, String> {
-    let mut tail = [0; TAIL_BYTES as usize];
-    let at = size
+fn summary_start(file: &mut File, size: u64) -> Result<u64, String> {
+    let tail = size
         .checked_sub(TAIL_BYTES)
         .ok_or("it is shorter than a footer")?;
-    file.seek(SeekFrom::Start(at)).map_err(|e| e.to_string())?;
-    file.read_exact(&mut tail).map_err(|e| e.to_string())?;
-    let [opcode, l0, l1, l2, l3, l4, l5, l6, l7, ..] = tail;
-    let (hashed, rest) = tail
-        .split_first_chunk::<FOOTER_HASHED_BYTES>()
-        .ok_or("short footer")?;
-    let (crc, magic) = rest.split_first_chunk::<4>().ok_or("short footer")?;
-    let len = u64::from_le_bytes([l0, l1, l2, l3, l4, l5, l6, l7]);
-    if magic != MCAP_MAGIC || opcode != op::FOOTER || len != 20 {
-        return Err("it does not end with a footer".into());
+    let start = match first_record(file, tail, size) {
+        Ok(Some((op::FOOTER, body))) => match mcap::parse_record(op::FOOTER, &body) {
+            Ok(Record::Footer(footer)) => footer.summary_start,
+            _ => return Err("its footer cannot be read".into()),
+        },
+        _ => return Err("it does not end with a footer".into()),
+    };
+    match start {
+        0 => Err("it has no summary".into()),
+        DATA_END_BYTES.. if start <= tail => Ok(start),
+        _ => Err(format!(
+            "its summary starts at byte {start}, and its footer at {tail}"
+        )),
     }
-    let start = hashed
-        .get(9..17)
-        .and_then(|bytes| bytes.try_into().ok())
-        .map(u64::from_le_bytes);
-    Ok(Footer {
-        start: start.ok_or("short footer")?,
-        crc: u32::from_le_bytes(*crc),
-        hashed: *hashed,
-    })
 }
 
 #[derive(Default)]
@@ -105,94 +82,66 @@ struct Found {
     contents: Contents,
     statistics: Option<Statistics>,
     chunks: Vec<ChunkIndex>,
-    metadata: Vec<MetadataIndex>,
 }
 
 impl Found {
-    fn read(
-        &mut self,
-        file: &mut BufReader<File>,
-        footer: &Footer,
-        end: u64,
-    ) -> Result<(), String> {
-        file.seek(SeekFrom::Start(footer.start))
+    /// Reads from the end of the data section, so that the reader checks the summary's CRC.
+    fn read(&mut self, file: &mut File, start: u64, size: u64) -> Result<(), String> {
+        let from = start.saturating_sub(DATA_END_BYTES);
+        file.seek(SeekFrom::Start(from))
             .map_err(|e| e.to_string())?;
-        let mut hasher = crc32fast::Hasher::new();
-        let mut left = end.saturating_sub(footer.start);
-        while left > 0 {
-            let (opcode, len) = record_header(file).map_err(|e| format!("its summary: {e}"))?;
-            let room = left.saturating_sub(RECORD_HEADER_BYTES);
-            if len > room {
-                return Err(format!(
-                    "its summary holds a record of {len} bytes where {room} are left"
-                ));
+        let range = (from, size.saturating_sub(from));
+        let options = LinearReaderOptions::default()
+            .with_validate_summary_section_crc(true)
+            .with_record_length_limit(MAX_RECORD_BYTES);
+        visit_records(file, range, options, &mut |place, opcode, body| {
+            if (place.byte == from) != (opcode == op::DATA_END) {
+                let reason = "no end of the data just before it";
+                return Err(RecordError::bad(place, reason));
             }
-            let body = read_body(file, len).map_err(|_| {
-                format!("its summary holds a record of {len} bytes that cannot be read")
-            })?;
-            hasher.update(&[opcode]);
-            hasher.update(&len.to_le_bytes());
-            hasher.update(&body);
-            if is_wanted(opcode) {
-                self.take(opcode, &body)?;
-            }
-            left = room.saturating_sub(len);
-        }
-        hasher.update(&footer.hashed);
-        let calculated = hasher.finalize();
-        match footer.crc {
-            0 => Ok(()),
-            saved if saved == calculated => Ok(()),
-            saved => Err(format!(
-                "its summary has CRC {calculated:08X}, where {saved:08X} is stored"
-            )),
-        }
+            self.take(opcode, body)
+                .map_err(|reason| RecordError::bad(place, reason))?;
+            Ok(ControlFlow::Continue(()))
+        })
+        .map(|_| ())
+        .map_err(|error| match error.cause {
+            Cause::Bad(reason) => format!("its summary at {}: {reason}", error.place),
+            _ => format!("its summary is cut at {}", error.place),
+        })
     }
 
     fn take(&mut self, opcode: u8, body: &[u8]) -> Result<(), String> {
-        match mcap::parse_record(opcode, body).map_err(|e| format!("its summary: {e}"))? {
-            Record::Statistics(statistics) => self.statistics = Some(statistics),
-            Record::ChunkIndex(index) => self.chunks.push(index),
-            Record::MetadataIndex(index) => self.metadata.push(index),
-            _ => self.contents.take(opcode, body)?,
+        // Attachments are left out on purpose: nothing of them is used.
+        match opcode {
+            op::SCHEMA | op::CHANNEL => self.contents.take(opcode, body)?,
+            op::CHUNK_INDEX | op::STATISTICS => {
+                match mcap::parse_record(opcode, body).map_err(|e| e.to_string())? {
+                    Record::Statistics(statistics) => self.statistics = Some(statistics),
+                    Record::ChunkIndex(index) => self.chunks.push(index),
+                    _ => {}
+                }
+            }
+            _ => {}
         }
         Ok(())
     }
 }
 
-fn block(chunk: &ChunkIndex, data_end: u64) -> Result<Block, String> {
-    let offset = chunk.chunk_start_offset;
-    let end = offset.checked_add(chunk.chunk_length);
-    let len = chunk.chunk_length.checked_sub(RECORD_HEADER_BYTES);
-    match (end, len) {
-        (Some(end), Some(len)) if end <= data_end => Ok(Block {
-            offset,
-            len,
-            is_chunk: true,
-            start_ns: chunk.message_start_time,
-            end_ns: chunk.message_end_time,
-            channels: (!chunk.message_index_offsets.is_empty())
-                .then(|| chunk.message_index_offsets.keys().copied().collect()),
-        }),
-        _ => Err(format!(
-            "its summary places a chunk of {} bytes at byte {offset}, beyond the data",
-            chunk.chunk_length
-        )),
+fn block(chunk: ChunkIndex, data_end: u64) -> Result<Block, String> {
+    let (offset, len) = (chunk.chunk_start_offset, chunk.chunk_length);
+    let ends_in_data = offset.checked_add(len).is_some_and(|end| end <= data_end);
+    if !ends_in_data || len < RECORD_HEADER_BYTES {
+        return Err(format!(
+            "its summary places a chunk of {len} bytes at byte {offset}, beyond the data"
+        ));
     }
-}
-
-/// Metadata is a bonus: what cannot be read is left out.
-fn read_metadata(file: &mut BufReader<File>, index: &MetadataIndex, contents: &mut Contents) {
-    let Ok(_) = file.seek(SeekFrom::Start(index.offset)) else {
-        return;
-    };
-    let Ok((op::METADATA, len)) = record_header(file) else {
-        return;
-    };
-    let Ok(body) = read_body(file, len) else {
-        return;
-    };
-    if let Ok(Record::Metadata(record)) = mcap::parse_record(op::METADATA, &body) {
-        contents.take_metadata(&record);
-    }
+    let channels = chunk.message_index_offsets;
+    Ok(Block {
+        offset,
+        len,
+        opcode: op::CHUNK,
+        start_ns: chunk.message_start_time,
+        end_ns: chunk.message_end_time,
+        channels: (!channels.is_empty()).then(|| channels.into_keys().collect()),
+    })
 }

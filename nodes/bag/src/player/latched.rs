@@ -3,20 +3,20 @@
 use std::collections::VecDeque;
 
 use super::PlayedTopic;
-use crate::{BagError, BagHistory, BagMessage, BagQos, BagReader, ReadOptions};
+use crate::{BagError, BagMessage, BagQos, BagReader, ReadOptions};
 
 /// Messages kept of one topic.
 const MAX_PER_TOPIC: u64 = 1000;
-/// All that is kept, bytes; beyond it the oldest go, but for the last one of each topic.
+/// Size of all kept messages, bytes; beyond it the oldest go, but for the last one of each topic.
 const MAX_BYTES: usize = 256 << 20;
 
-/// How many of the last messages of a topic its publishers kept together.
+/// Number of the last messages of a topic that its publishers kept together.
 fn kept(profiles: &[BagQos]) -> usize {
-    let depth = |qos: &BagQos| match qos.history {
-        BagHistory::KeepAll => MAX_PER_TOPIC,
-        _ => qos.depth.max(1),
+    let depth = |qos: &BagQos| match qos.keep_all {
+        true => MAX_PER_TOPIC,
+        false => qos.depth.max(1),
     };
-    let latched = profiles.iter().filter(|qos| qos.is_latched());
+    let latched = profiles.iter().filter(|qos| qos.latched);
     let total = latched
         .map(depth)
         .fold(0, u64::saturating_add)

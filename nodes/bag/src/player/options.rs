@@ -1,4 +1,4 @@
-//! What to play, how fast and under which names.
+//! Options of playback: topics, rate, range and clock.
 
 use crate::{BagError, BagReader, TopicInfo};
 
@@ -7,24 +7,22 @@ const RATES: std::ops::RangeInclusive<f64> = 1e-3..=1e3;
 /// Highest frequency of `/clock`, Hz.
 const MAX_CLOCK_HZ: f64 = 10_000.0;
 
-/// How to play a bag.
+/// Options of playback.
 #[derive(Clone, Debug)]
 pub struct PlayerOptions {
     /// Bag seconds per second, 0.001 to 1000.
     pub rate: f64,
-    /// Where to start, s after the first message.
+    /// Start, s after the first message.
     pub start_offset_s: f64,
-    /// How much to play, s of the bag; to its end where nothing.
+    /// Length, s of the bag; to its end where nothing.
     pub duration_s: Option<f64>,
-    /// Whether to start again at the end.
+    /// Starts again at the end.
     pub loop_: bool,
     /// Names of the topics to play; all where nothing.
     pub include: Option<Vec<String>>,
     /// Names of topics not to play.
     pub exclude: Vec<String>,
-    /// Pairs of a topic in the bag and the name it is published under.
-    pub remap: Vec<(String, String)>,
-    /// How often `/clock` is published per second of the caller; never where nothing.
+    /// Rate of `/clock`, per second of the caller; never where nothing.
     pub clock_hz: Option<f64>,
 }
 
@@ -37,7 +35,6 @@ impl Default for PlayerOptions {
             loop_: false,
             include: None,
             exclude: Vec::new(),
-            remap: Vec::new(),
             clock_hz: None,
         }
     }
@@ -46,8 +43,6 @@ impl Default for PlayerOptions {
 /// A topic that is played.
 #[derive(Clone, Debug)]
 pub struct PlayedTopic {
-    /// The name it is published under.
-    pub name: String,
     /// Index into the reader's topics.
     pub bag_topic: usize,
     /// The topic as the bag has it.
@@ -56,7 +51,12 @@ pub struct PlayedTopic {
 
 impl PlayerOptions {
     pub(super) fn check(&self) -> Result<(), BagError> {
-        check_rate(self.rate)?;
+        if !RATES.contains(&self.rate) {
+            return Err(BagError::Invalid {
+                name: "rate",
+                reason: format!("{}; 0.001 to 1000 is accepted", self.rate),
+            });
+        }
         let seconds = |name, value: f64| match value.is_finite() && (0.0..=1e9).contains(&value) {
             true => Ok(()),
             false => Err(BagError::Invalid {
@@ -76,18 +76,9 @@ impl PlayerOptions {
         }
     }
 
-    /// The topics to play, and those left out because they are not in CDR.
-    pub(super) fn topics(
-        &self,
-        reader: &BagReader,
-    ) -> Result<(Vec<PlayedTopic>, Vec<TopicInfo>), BagError> {
-        let remapped = self.remap.iter().map(|(from, _)| from);
-        let mut named = self
-            .include
-            .iter()
-            .flatten()
-            .chain(&self.exclude)
-            .chain(remapped);
+    /// The topics to play; those that are not in CDR of a known type are left out.
+    pub(super) fn topics(&self, reader: &BagReader) -> Result<Vec<PlayedTopic>, BagError> {
+        let mut named = self.include.iter().flatten().chain(&self.exclude);
         if let Some(unknown) = named.find(|name| !reader.topics().iter().any(|t| t.name == **name))
         {
             let known: Vec<&str> = reader.topics().iter().map(|t| t.name.as_str()).collect();
@@ -99,15 +90,7 @@ impl PlayerOptions {
                 ),
             });
         }
-        if let Some((from, to)) = self.remap.iter().find(|(_, to)| !to.starts_with('/')) {
-            return Err(BagError::Invalid {
-                name: "remap",
-                reason: format!(
-                    "{from} to {to:?}, which is not a full topic name; it starts with '/'"
-                ),
-            });
-        }
-        let (mut played, mut skipped) = (Vec::new(), Vec::new());
+        let mut played = Vec::new();
         for (bag_topic, info) in reader.topics().iter().enumerate() {
             let is_included = self
                 .include
@@ -117,31 +100,18 @@ impl PlayerOptions {
                 continue;
             }
             if info.serialization_format != "cdr" || info.type_name.is_empty() {
-                skipped.push(info.clone());
+                let (name, format) = (&info.name, &info.serialization_format);
+                log::warn!(
+                    "{name} is left out: its messages are {format:?}, not CDR of a known type"
+                );
                 continue;
             }
-            let to = self
-                .remap
-                .iter()
-                .find(|(from, _)| *from == info.name)
-                .map(|(_, to)| to);
             played.push(PlayedTopic {
-                name: to.unwrap_or(&info.name).clone(),
                 bag_topic,
                 info: info.clone(),
             });
         }
-        Ok((played, skipped))
-    }
-}
-
-pub(super) fn check_rate(rate: f64) -> Result<(), BagError> {
-    match RATES.contains(&rate) {
-        true => Ok(()),
-        false => Err(BagError::Invalid {
-            name: "rate",
-            reason: format!("{rate}; 0.001 to 1000 is accepted"),
-        }),
+        Ok(played)
     }
 }
 

@@ -16,7 +16,6 @@ use tempfile::TempPath;
 
 use super::{
     BagError, TopicInfo,
-    metadata::Metadata,
     storage::{Filter, StorageInfo, StorageStream, full_type_name, lenient_qos},
 };
 use stream::{Key, SqliteStream};
@@ -58,7 +57,6 @@ impl SqliteFile {
             (None, Err(error)) => file.rescue(&connection, error)?,
             (Some(damage), _) => file.rescue(&connection, damage)?,
         }
-        file.info.metadata = embedded_metadata(&connection);
         Ok(file)
     }
 
@@ -96,11 +94,12 @@ impl SqliteFile {
         let wrong = |e| BagError::sqlite(&self.path, "table topics", e);
         let columns =
             names(connection, "SELECT name FROM pragma_table_info('topics')").map_err(wrong)?;
-        let column = |name: &'static str| if columns.contains(name) { name } else { "''" };
+        let qos = match columns.contains("offered_qos_profiles") {
+            true => "offered_qos_profiles",
+            false => "''",
+        };
         let select = format!(
-            "SELECT id, name, type, serialization_format, {}, {} FROM topics ORDER BY id LIMIT {MAX_TOPICS}",
-            column("offered_qos_profiles"),
-            column("type_description_hash"),
+            "SELECT id, name, type, serialization_format, {qos} FROM topics ORDER BY id LIMIT {MAX_TOPICS}"
         );
         let mut statement = connection.prepare(&select).map_err(wrong)?;
         let rows = statement.query_map([], |row| {
@@ -114,18 +113,16 @@ impl SqliteFile {
                 text(2)?,
                 text(3)?,
                 text(4)?,
-                text(5)?,
             ))
         });
         let mut topic_of = BTreeMap::new();
         for row in rows.map_err(wrong)? {
-            let (id, name, type_name, serialization_format, qos, hash) = row.map_err(wrong)?;
+            let (id, name, type_name, serialization_format, qos) = row.map_err(wrong)?;
             let type_name = full_type_name(&type_name);
             topic_of.insert(id, self.info.topics.len());
             self.info.topics.push(TopicInfo {
                 offered_qos: lenient_qos(&name, &qos),
                 definition: definitions.get(&type_name).cloned(),
-                type_hash: (!hash.is_empty()).then_some(hash),
                 name,
                 type_name,
                 serialization_format,
@@ -332,7 +329,7 @@ fn missing_pages(path: &Path) -> Result<Option<BagError>, BagError> {
     let cut = pages * page_bytes > size_bytes;
     Ok(cut.then(|| {
         truncated(format!(
-            "the database, whose header tells {pages} pages of {page_bytes} bytes"
+            "the database, whose header counts {pages} pages of {page_bytes} bytes"
         ))
     }))
 }
@@ -341,13 +338,4 @@ fn names(connection: &Connection, select: &str) -> Result<BTreeSet<String>, rusq
     let mut statement = connection.prepare(select)?;
     let rows = statement.query_map([], |row| row.get(0))?;
     rows.take(MAX_TOPICS).collect()
-}
-
-/// From schema 3 on rosbag2 stores the metadata in the database too; a bonus, so errors are nothing.
-fn embedded_metadata(connection: &Connection) -> Option<Metadata> {
-    let select = "SELECT metadata FROM metadata ORDER BY id DESC LIMIT 1";
-    let text = connection
-        .query_row(select, [], |row| row.get::<_, String>(0))
-        .ok()?;
-    Metadata::parse_embedded(&text)
 }

@@ -16,7 +16,7 @@ const PAGE_KEYS_UNSORTED: usize = 1 << 20;
 /// Rescued keys are at most this many.
 const MAX_RESCUED_KEYS: usize = 1 << 26;
 
-/// Where a message is; sorts by time, then by row.
+/// Key of a message; sorts by time, then by row.
 #[derive(Clone, Copy, PartialEq, Eq, PartialOrd, Ord, Debug)]
 pub(super) struct Key {
     pub timestamp_ns: i64,

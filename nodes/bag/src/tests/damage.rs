@@ -34,24 +34,14 @@ fn check_cut(file: &Path, whole: &[u8], cut: usize, written: &[BagMessage]) {
 #[test]
 fn an_mcap_file_cut_at_any_byte_yields_what_precedes_the_cut() {
     let folder = tempfile::tempdir().unwrap();
-    for (compression, chunked) in [
-        (Compression::None, true),
-        (Compression::ZstdChunk, true),
-        (Compression::None, false),
+    let new = || mcap::WriteOptions::new().compression(None);
+    for options in [
+        new(),
+        new().compression(Some(mcap::Compression::Zstd)),
+        new().use_chunks(false),
     ] {
-        let bag = folder.path().join("bag");
-        let (file, written) = match chunked {
-            true => (None, write(&bag, Storage::Mcap, compression, 12, 0)),
-            false => {
-                let (file, written) = write_foreign(
-                    folder.path(),
-                    mcap::WriteOptions::new().use_chunks(false),
-                    "cdr",
-                );
-                (Some(file), written)
-            }
-        };
-        let whole = fs::read(file.unwrap_or_else(|| storage_file(&bag))).unwrap();
+        let (file, written) = write_foreign(folder.path(), options, "cdr");
+        let whole = fs::read(file).unwrap();
         let file = folder.path().join("cut.mcap");
         for cut in 0..=whole.len() {
             check_cut(&file, &whole, cut, &written);
@@ -69,10 +59,10 @@ proptest! {
         value in any::<u8>(),
         bend in any::<bool>(),
     ) {
-        let (storage, compression) = ALL[kind];
+        let (storage, packing) = ALL[kind];
         let folder = tempfile::tempdir().unwrap();
         let bag = folder.path().join("bag");
-        let written = write(&bag, storage, compression, 60, 0);
+        let written = write(&bag, storage, packing, 60, 0);
         let file = storage_file(&bag);
         let mut whole = fs::read(&file).unwrap();
         let place = (whole.len() as f64 * at) as usize;
@@ -89,7 +79,7 @@ proptest! {
 }
 
 #[test]
-fn a_bent_chunk_is_told_by_its_crc_and_place() {
+fn a_bent_chunk_is_found_by_its_crc_and_placed() {
     let folder = tempfile::tempdir().unwrap();
     let (path, written) = write_foreign(
         folder.path(),
@@ -106,10 +96,10 @@ fn a_bent_chunk_is_told_by_its_crc_and_place() {
     fs::write(&path, &bytes).unwrap();
     let (some, error) = read_some(&path);
     assert!(!some.is_empty() && some == written[..some.len()]);
-    let told = error.unwrap().to_string();
+    let error = error.unwrap().to_string();
     assert!(
-        told.contains("CRC") && told.contains("chunk at byte"),
-        "{told}"
+        error.contains("CRC") && error.contains("chunk at byte"),
+        "{error}"
     );
 }
 
@@ -140,4 +130,55 @@ fn lengths_that_lie_are_refused_before_memory_is_taken() {
             "{len}: {error:?}"
         );
     }
+}
+
+/// Places of all byte strings like `needle`.
+fn places(bytes: &[u8], needle: &[u8]) -> Vec<usize> {
+    let windows = bytes.windows(needle.len()).enumerate();
+    windows
+        .filter(|(_, w)| *w == needle)
+        .map(|(at, _)| at)
+        .collect()
+}
+
+#[test]
+fn a_record_that_reaches_beyond_its_chunk_is_an_error() {
+    let folder = tempfile::tempdir().unwrap();
+    let options = mcap::WriteOptions::new()
+        .compression(None)
+        .calculate_chunk_crcs(false);
+    let (path, written) = write_foreign(folder.path(), options, "cdr");
+    let bytes = fs::read(&path).unwrap();
+    // 94 bytes of data behind a header of 22, in a chunk that holds two or three of them.
+    let message = [&[5][..], &116_u64.to_le_bytes()].concat();
+    for at in places(&bytes, &message) {
+        for len in [117_u64, 400, 1 << 29, 1 << 40, u64::MAX - 8, u64::MAX] {
+            let mut bent = bytes.clone();
+            bent[at + 1..at + 9].copy_from_slice(&len.to_le_bytes());
+            fs::write(&path, &bent).unwrap();
+            let (some, error) = read_some(&path);
+            assert_eq!(some, written[..some.len()], "{len} at {at}");
+            let error = error.unwrap_or_else(|| panic!("{len} at {at}")).to_string();
+            assert!(error.contains("chunk at byte"), "{error}");
+        }
+    }
+}
+
+#[test]
+fn a_record_does_not_reach_into_the_padding_of_its_chunk() {
+    let folder = tempfile::tempdir().unwrap();
+    let options = mcap::WriteOptions::new()
+        .compression(None)
+        .calculate_chunk_crcs(false)
+        .emit_summary_records(false);
+    let (path, _) = write_foreign(folder.path(), options, "cdr");
+    let mut bytes = fs::read(&path).unwrap();
+    let word = |at: usize| u64::from_le_bytes(bytes[at..at + 8].try_into().unwrap());
+    // Magic (8), header record, then the chunk: opcode and length (9), times and sizes (32).
+    let size_at = 8 + 9 + usize::try_from(word(9)).unwrap() + 9 + 32;
+    let smaller = word(size_at) - 20;
+    bytes[size_at..size_at + 8].copy_from_slice(&smaller.to_le_bytes());
+    fs::write(&path, &bytes).unwrap();
+    let (some, error) = read_some(&path);
+    assert!(some.is_empty() && error.is_some());
 }

@@ -83,16 +83,19 @@ fn foreign_files_are_named() {
     let refused = |name: &str, bytes: &[u8]| {
         let path = folder.path().join(name);
         fs::write(&path, bytes).unwrap();
-        let told = BagReader::open(&path).err().unwrap().to_string();
-        assert!(told.contains(name), "{told}");
-        told
+        let error = BagReader::open(&path).err().unwrap().to_string();
+        assert!(error.contains(name), "{error}");
+        error
     };
     assert!(refused("ros1.bag", b"#ROSBAG V2.0\nEgo").contains("a ROS 1 bag"));
     assert!(refused("image.mcap", b"\x89PNG\r\n\x1a\n0000").contains("a PNG image"));
     assert!(refused("empty.db3", b"").contains("empty"));
     let (protobuf, _) = write_foreign(folder.path(), mcap::WriteOptions::new(), "protobuf");
-    let told = read(&protobuf).unwrap_err().to_string();
-    assert!(told.contains("an MCAP file of protobuf messages"), "{told}");
+    let error = read(&protobuf).unwrap_err().to_string();
+    assert!(
+        error.contains("an MCAP file of protobuf messages"),
+        "{error}"
+    );
 
     let other = folder.path().join("other.db3");
     Connection::open(&other)
@@ -127,7 +130,7 @@ fn metadata_cannot_lead_out_of_the_bag() {
         folder.path().join("bag"),
         folder.path().join("outside.mcap"),
     );
-    write(&bag, Storage::Mcap, Compression::None, 3, 0);
+    write(&bag, Storage::Mcap, Packing::None, 3, 0);
     fs::rename(storage_file(&bag), &outside).unwrap();
     let path = bag.join("metadata.yaml");
     let text = fs::read_to_string(&path).unwrap();

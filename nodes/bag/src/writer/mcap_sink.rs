@@ -22,13 +22,12 @@ pub(super) struct McapSink {
 }
 
 impl McapSink {
-    pub(super) fn create(path: &Path, compress: bool) -> Result<McapSink, BagError> {
+    pub(super) fn create(path: &Path) -> Result<McapSink, BagError> {
         let file = File::create_new(path).map_err(BagError::io(path, "create"))?;
         let writer = WriteOptions::new()
             .profile("ros2")
             .library(concat!("lattice ", env!("CARGO_PKG_VERSION")))
-            .compression(compress.then_some(mcap::Compression::Zstd))
-            .compression_threads(0)
+            .compression(None)
             .create(BufWriter::new(file))
             .map_err(|e| failed(path, "write", e))?;
         Ok(McapSink {

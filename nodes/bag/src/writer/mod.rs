@@ -1,50 +1,32 @@
-//! Writes rosbag2 directories of metadata version 9 with message definitions embedded.
+//! Writer of rosbag2 directories: metadata version 9, message definitions embedded.
 
 mod mcap_sink;
 mod sqlite_sink;
 
 use std::{
-    collections::BTreeMap,
     fs,
     path::{Path, PathBuf},
 };
 
 use super::{
-    BagError, BagQos, BagSummary, FileSummary, MAX_MESSAGE_BYTES, Storage, TopicInfo,
+    BagError, BagQos, MAX_MESSAGE_BYTES, Storage, TopicInfo,
     metadata::{
         CountedTopic, FileInformation, METADATA_VERSION, Metadata, Nanoseconds, StartingTime,
         TopicMetadata,
     },
-    zstd_files::compress_file,
 };
 use mcap_sink::McapSink;
 use sqlite_sink::SqliteSink;
 
-/// What is told as the distribution that recorded the bag.
+/// Name of the distribution in the metadata.
 const ROS_DISTRO: &str = "lattice";
 /// Bytes of the CDR encapsulation header.
 const ENCAPSULATION_BYTES: usize = 4;
 
-/// How a bag is compressed, always with zstd.
-#[derive(Clone, Copy, PartialEq, Eq, Hash, Debug, Default)]
-pub enum Compression {
-    /// Not at all.
-    #[default]
-    None,
-    /// Each chunk; MCAP only.
-    ZstdChunk,
-    /// Each message.
-    ZstdMessage,
-    /// The storage file, when it is finished.
-    ZstdFile,
-}
-
-/// How to write a bag.
+/// Options of writing a bag.
 #[derive(Clone, Copy, Debug, Default)]
 pub struct WriterOptions {
-    /// How it is compressed.
-    pub compression: Compression,
-    /// Whether a bag at the same path is replaced.
+    /// Replaces a bag at the same path.
     pub overwrite: bool,
 }
 
@@ -57,7 +39,7 @@ pub struct TopicSpec {
     pub type_name: String,
     /// The message definition with all it depends on (ros2msg or ros2idl text).
     pub definition: Option<String>,
-    /// What the publishers offer.
+    /// QoS of the publishers.
     pub offered_qos: Vec<BagQos>,
 }
 
@@ -71,10 +53,8 @@ pub struct BagWriter {
     folder: PathBuf,
     file: PathBuf,
     storage: Storage,
-    compression: Compression,
     sink: Sink,
     topics: Vec<TopicInfo>,
-    custom_data: BTreeMap<String, String>,
     message_count: u64,
     range_ns: Option<(i64, i64)>,
 }
@@ -86,14 +66,6 @@ impl BagWriter {
         storage: Storage,
         options: WriterOptions,
     ) -> Result<BagWriter, BagError> {
-        let compression = options.compression;
-        if storage == Storage::Sqlite3 && compression == Compression::ZstdChunk {
-            return Err(BagError::Invalid {
-                name: "compression",
-                reason: "sqlite3 has no chunks; choose per message or per file, or mcap storage"
-                    .into(),
-            });
-        }
         let name = path.file_name().ok_or_else(|| BagError::Invalid {
             name: "path",
             reason: format!("{} does not end in the name of a folder", path.display()),
@@ -106,28 +78,18 @@ impl BagWriter {
             storage.extension()
         ));
         let sink = match storage {
-            Storage::Mcap => {
-                let in_chunks = compression == Compression::ZstdChunk;
-                Sink::Mcap(Box::new(McapSink::create(&file, in_chunks)?))
-            }
+            Storage::Mcap => Sink::Mcap(Box::new(McapSink::create(&file)?)),
             Storage::Sqlite3 => Sink::Sqlite(SqliteSink::create(&file, ROS_DISTRO)?),
         };
         Ok(BagWriter {
             folder: path.to_path_buf(),
             file,
             storage,
-            compression,
             sink,
             topics: Vec::new(),
-            custom_data: BTreeMap::new(),
             message_count: 0,
             range_ns: None,
         })
-    }
-
-    /// Notes a free key-value pair in the metadata.
-    pub fn set_custom_data(&mut self, key: &str, value: &str) {
-        self.custom_data.insert(key.to_owned(), value.to_owned());
     }
 
     /// Announces a topic; the result is what [`BagWriter::write`] takes.
@@ -159,7 +121,6 @@ impl BagWriter {
             type_name: topic.type_name,
             serialization_format: "cdr".into(),
             offered_qos: topic.offered_qos,
-            type_hash: None,
             definition: topic.definition,
             message_count: 0,
         };
@@ -200,17 +161,9 @@ impl BagWriter {
                 ),
             );
         }
-        let compressed = match self.compression {
-            Compression::ZstdMessage => Some(
-                zstd::bulk::compress(cdr, 0)
-                    .map_err(BagError::io(&self.file, "compress a message of"))?,
-            ),
-            _ => None,
-        };
-        let data = compressed.as_deref().unwrap_or(cdr);
         match &mut self.sink {
-            Sink::Mcap(sink) => sink.write(topic, log_time_ns, data)?,
-            Sink::Sqlite(sink) => sink.write(topic, log_time_ns, data)?,
+            Sink::Mcap(sink) => sink.write(topic, log_time_ns, cdr)?,
+            Sink::Sqlite(sink) => sink.write(topic, log_time_ns, cdr)?,
         }
         info.message_count += 1;
         self.message_count += 1;
@@ -220,15 +173,8 @@ impl BagWriter {
     }
 
     /// Completes the storage file and writes `metadata.yaml`.
-    pub fn finish(self) -> Result<BagSummary, BagError> {
-        let packed = PathBuf::from(format!("{}.zstd", self.file.display()));
-        let is_packed = self.compression == Compression::ZstdFile;
-        let listed = if is_packed {
-            packed.clone()
-        } else {
-            self.file.clone()
-        };
-        let metadata = self.metadata(&listed);
+    pub fn finish(self) -> Result<(), BagError> {
+        let metadata = self.metadata();
         let unfit = |e: serde_yaml::Error| BagError::Invalid {
             name: "metadata",
             reason: e.to_string(),
@@ -239,41 +185,18 @@ impl BagWriter {
             Sink::Mcap(sink) => sink.finish(&embedded)?,
             Sink::Sqlite(sink) => sink.finish(METADATA_VERSION, &embedded)?,
         }
-        if is_packed {
-            compress_file(&self.file, &packed)?;
-            fs::remove_file(&self.file).map_err(BagError::io(&self.file, "remove"))?;
-        }
         // Renamed into place, so that a crash leaves no half metadata.
         let (path, unfinished) = (
             self.folder.join("metadata.yaml"),
             self.folder.join("metadata.yaml.tmp"),
         );
         fs::write(&unfinished, text).map_err(BagError::io(&unfinished, "write"))?;
-        fs::rename(&unfinished, &path).map_err(BagError::io(&path, "rename to"))?;
-        Ok(BagSummary {
-            path: self.folder,
-            storage: self.storage,
-            metadata_version: Some(METADATA_VERSION),
-            ros_distro: ROS_DISTRO.into(),
-            custom_data: self.custom_data,
-            files: vec![FileSummary {
-                path: listed,
-                range_ns: self.range_ns,
-                message_count: Some(self.message_count),
-            }],
-            topics: self.topics,
-            message_count: self.message_count,
-            range_ns: self.range_ns,
-            damage: None,
-        })
+        fs::rename(&unfinished, &path).map_err(BagError::io(&path, "rename to"))
     }
 
-    fn metadata(&self, listed: &Path) -> Metadata {
-        let name = listed
-            .file_name()
-            .unwrap_or_default()
-            .to_string_lossy()
-            .into_owned();
+    fn metadata(&self) -> Metadata {
+        let file_name = self.file.file_name().unwrap_or_default();
+        let name = file_name.to_string_lossy().into_owned();
         let starting_time = self
             .range_ns
             .map_or_else(StartingTime::default, |(first_ns, _)| StartingTime {
@@ -290,15 +213,9 @@ impl BagWriter {
                 type_name: topic.type_name.clone(),
                 serialization_format: topic.serialization_format.clone(),
                 offered_qos_profiles: topic.offered_qos.clone(),
-                type_description_hash: String::new(),
+                type_description_hash: "",
             },
             message_count: topic.message_count,
-        };
-        let (mode, format) = match self.compression {
-            // Chunks are the storage's own matter, which the metadata does not tell.
-            Compression::None | Compression::ZstdChunk => ("", ""),
-            Compression::ZstdMessage => ("message", "zstd"),
-            Compression::ZstdFile => ("file", "zstd"),
         };
         Metadata {
             version: METADATA_VERSION,
@@ -307,8 +224,8 @@ impl BagWriter {
             starting_time,
             message_count: self.message_count,
             topics_with_message_count: self.topics.iter().map(counted).collect(),
-            compression_format: format.into(),
-            compression_mode: mode.into(),
+            compression_format: String::new(),
+            compression_mode: String::new(),
             relative_file_paths: vec![name.clone()],
             files: vec![FileInformation {
                 path: name,
@@ -316,8 +233,8 @@ impl BagWriter {
                 duration,
                 message_count: self.message_count,
             }],
-            custom_data: (!self.custom_data.is_empty()).then(|| self.custom_data.clone()),
-            ros_distro: ROS_DISTRO.into(),
+            custom_data: (),
+            ros_distro: ROS_DISTRO,
         }
     }
 }

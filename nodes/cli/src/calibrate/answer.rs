@@ -1,4 +1,4 @@
-//! What `lattice calibrate` answers.
+//! Answer of `lattice calibrate`, as text and JSON.
 
 use std::fmt;
 
@@ -130,7 +130,7 @@ impl Answer {
         }
     }
 
-    /// With what it was made of.
+    /// Adds the sizes of the clouds and the times.
     pub fn with_counts(self, points: usize, map_points: usize, times: Times) -> Answer {
         Answer {
             points,
@@ -140,8 +140,8 @@ impl Answer {
         }
     }
 
-    /// Why the pose is not to be used, if so.
-    pub fn fault(&self) -> Option<String> {
+    /// The reason not to use the pose, if there is one.
+    pub fn refusal(&self) -> Option<String> {
         match (self.verdict, self.converged) {
             (Some("OK"), _) | (None, Some(true)) => None,
             (Some(verdict), _) => Some(format!("{verdict}: {}", self.reason)),

@@ -1,6 +1,5 @@
-//! What `lattice calibrate` is given.
+//! Inputs of `lattice calibrate`: clouds, guesses, learned confusions.
 
-use std::error::Error;
 use std::fs;
 use std::io::{ErrorKind, Write};
 use std::path::{Path, PathBuf};
@@ -10,16 +9,15 @@ use lattice_core::pose::Axes;
 use lattice_core::registration::{Confusion, HeadsetScan, SemanticCloud, voxel_downsample};
 use nalgebra::{Isometry3, Point3, Quaternion, Translation3, UnitQuaternion, Vector3};
 
+use crate::CliResult;
 use lattice_nodes::files::semantic::read_semantic;
 
 /// Least side of the cells of a map that is a point file, metres.
 const MIN_CELL_M: f64 = 0.05;
 /// Sides of cells on the diagonal of a map that is a point file.
 const CELLS_A_DIAGONAL: f64 = 400.0;
-/// Longest file of what was learned, bytes.
+/// Longest file of a learned confusion, bytes.
 const MAX_CONFUSION_BYTES: u64 = 1 << 20;
-
-type Fault = Box<dyn Error + Send + Sync>;
 
 /// `map_from_headset` as it is typed.
 #[derive(Clone, Debug)]
@@ -84,7 +82,7 @@ pub fn map(
     path: &Path,
     cell_side_m: Option<f64>,
     max_points: usize,
-) -> Result<(SemanticCloud, f64), Fault> {
+) -> CliResult<(SemanticCloud, f64)> {
     let file = read_semantic(path, max_points)?;
     if file.cloud.is_empty() {
         return Err(format!("{}: the map has no points", path.display()).into());
@@ -112,7 +110,7 @@ pub fn headset_scans(
     axes: Axes,
     sensor_m: Option<Point3<f64>>,
     max_points: usize,
-) -> Result<Vec<HeadsetScan>, Fault> {
+) -> CliResult<Vec<HeadsetScan>> {
     let headset_scan = |path: &PathBuf| {
         let mut cloud = read_semantic(path, max_points)?.cloud;
         for point in &mut cloud.points_m {
@@ -123,8 +121,8 @@ pub fn headset_scans(
     paths.iter().map(headset_scan).collect()
 }
 
-/// What was learned before, if there is a file.
-pub fn confusion(path: &Path) -> Result<Option<Confusion>, Fault> {
+/// The confusion that earlier calibrations learned, if there is a file.
+pub fn confusion(path: &Path) -> CliResult<Option<Confusion>> {
     let here = |e: &dyn std::fmt::Display| format!("{}: {e}", path.display());
     let bytes = match fs::metadata(path) {
         Err(e) if e.kind() == ErrorKind::NotFound => return Ok(None),
@@ -141,12 +139,12 @@ pub fn confusion(path: &Path) -> Result<Option<Confusion>, Fault> {
     }
 }
 
-/// Writes what was learned; readers see the whole file or what was there before.
-pub fn keep_confusion(path: &Path, confusion: &Confusion) -> Result<(), Fault> {
+/// Writes the learned confusion; readers see the whole file or the one before.
+pub fn keep_confusion(path: &Path, confusion: &Confusion) -> CliResult {
     let folder = path
         .parent()
         .filter(|folder| !folder.as_os_str().is_empty());
-    let write = || -> Result<(), Fault> {
+    let write = || -> CliResult {
         let mut file = tempfile::NamedTempFile::new_in(folder.unwrap_or(Path::new(".")))?;
         file.write_all(&serde_json::to_vec_pretty(confusion)?)?;
         file.persist(path)?;
@@ -166,13 +164,13 @@ mod tests {
         let b: Guess = format!("1, -2, 0.5, 0, 0, {half}, {half}").parse().unwrap();
         assert!((a.0.to_homogeneous() - b.0.to_homogeneous()).norm() < 1e-12);
         assert!((a.0 * Point3::new(1.0, 0.0, 0.0) - Point3::new(1.0, -1.0, 0.5)).norm() < 1e-12);
-        for (text, fault) in [
+        for (text, error) in [
             ("1 2 3", "3 numbers instead of 4 or 7"),
             ("1 2 3 x", "\"x\" is not a number"),
             ("1 2 3 inf", "\"inf\" is not a number"),
             ("0 0 0 0 0 0 2", "the quaternion has length 2"),
         ] {
-            assert_eq!(text.parse::<Guess>().unwrap_err(), fault);
+            assert_eq!(text.parse::<Guess>().unwrap_err(), error);
         }
         assert_eq!(
             "1 2".parse::<Place>().unwrap_err(),
@@ -189,8 +187,8 @@ mod tests {
         assert_eq!(confusion(&path).unwrap(), Some(Confusion::default()));
         for text in ["", "[]", "{\"pairs\":[[1,1,-5.0]]}"] {
             fs::write(&path, text).unwrap();
-            let fault = confusion(&path).unwrap_err().to_string();
-            assert!(fault.contains("learned.json"), "{fault}");
+            let error = confusion(&path).unwrap_err().to_string();
+            assert!(error.contains("learned.json"), "{error}");
         }
     }
 }

@@ -1,9 +1,9 @@
-//! Single registrations.
+//! Single registrations of `lattice calibrate --method`.
 
-use clap::ValueEnum;
+use clap::builder::{PossibleValue, PossibleValuesParser, TypedValueParser};
 use lattice_core::registration::{
-    HeadsetScan, LabelUse, PrepareOptions, PreparedCloud, RegisterOptions, Registration,
-    SemanticCloud, SemanticVariant, register, voxel_downsample,
+    HeadsetScan, NamedMethod, PrepareOptions, PreparedCloud, RegisterOptions, Registration,
+    SemanticCloud, register, voxel_downsample,
 };
 use nalgebra::Isometry3;
 use std::time::Instant;
@@ -11,71 +11,45 @@ use std::time::Instant;
 use super::answer::Times;
 use super::milliseconds;
 
-/// Gate where nothing is published, metres.
+/// Gate of the methods for which none is published, metres.
 const GATE_M: f64 = 1.0;
 
-/// How to calibrate.
-#[derive(Clone, Copy, PartialEq, Eq, Debug, ValueEnum)]
-pub enum MethodName {
-    /// Search, several registrations, one judge
-    Auto,
-    /// Point-to-point ICP
-    Icp,
-    /// Generalized ICP
-    Gicp,
-    /// GICP on SE(3) with a Cauchy kernel
-    GicpSe3,
-    /// Semantic-ICP as its authors' program runs, hard labels
-    SemanticPublished,
-    /// Semantic-ICP as the paper prints it, hard labels
-    SemanticPrinted,
-    /// Semantic-ICP with normalised weights and outliers, hard labels
-    SemanticEm,
-    /// Semantic-ICP of 2017, class by class
-    ClassWise,
-}
+/// A way to calibrate: by search and judgement, or by a single registration.
+#[derive(Clone, Copy, Debug)]
+pub struct MethodName(Option<&'static NamedMethod>);
 
 impl MethodName {
-    /// The name as it is typed.
+    /// The values of `--method` with their help.
+    pub fn parser() -> impl TypedValueParser<Value = MethodName> {
+        let auto = PossibleValue::new("auto").help("Search, several registrations, one judge");
+        let single = |method: &NamedMethod| PossibleValue::new(method.option).help(method.help);
+        let values = std::iter::once(auto).chain(NamedMethod::ALL.iter().map(single));
+        PossibleValuesParser::new(values)
+            .map(|option: String| MethodName(NamedMethod::ALL.iter().find(|m| m.option == option)))
+    }
+
+    /// The value of `--method`.
     pub fn name(self) -> &'static str {
-        match self {
-            MethodName::Auto => "auto",
-            MethodName::Icp => "icp",
-            MethodName::Gicp => "gicp",
-            MethodName::GicpSe3 => "gicp-se3",
-            MethodName::SemanticPublished => "semantic-published",
-            MethodName::SemanticPrinted => "semantic-printed",
-            MethodName::SemanticEm => "semantic-em",
-            MethodName::ClassWise => "class-wise",
-        }
+        self.0.map_or("auto", |method| method.option)
     }
 
     /// The registration, if it is a single one.
     pub fn single(self) -> Option<RegisterOptions<'static>> {
-        let semantic = |variant| RegisterOptions::semantic(variant, LabelUse::Hard);
-        Some(match self {
-            MethodName::Auto => return None,
-            MethodName::Icp => RegisterOptions::point_to_point(GATE_M),
-            MethodName::Gicp => RegisterOptions::gicp(GATE_M),
-            MethodName::GicpSe3 => RegisterOptions::gicp_se3(),
-            MethodName::SemanticPublished => semantic(SemanticVariant::Published),
-            MethodName::SemanticPrinted => semantic(SemanticVariant::AsPrinted),
-            MethodName::SemanticEm => RegisterOptions::semantic_em(GATE_M, LabelUse::Hard),
-            MethodName::ClassWise => RegisterOptions::class_wise(),
-        })
+        self.0.map(|method| method.options(GATE_M))
     }
 }
 
 /// One registration of a cloud that is thinned to the cells of the map.
 pub struct Single {
+    /// Options of the registration.
     pub method: RegisterOptions<'static>,
-    /// In place of the method's own, metres.
+    /// Gate in place of the method's own, metres.
     pub gate_m: Option<f64>,
     pub cell_side_m: f64,
 }
 
 impl Single {
-    /// Prepares both clouds and registers; also tells how many points of the cloud were left.
+    /// Prepares both clouds and registers; also the number of points left of the cloud.
     pub fn register(
         &self,
         map: SemanticCloud,

@@ -1,4 +1,4 @@
-//! `lattice calibrate`: where one cloud lies in another.
+//! `lattice calibrate`: pose of one cloud in another.
 
 mod answer;
 mod input;
@@ -24,7 +24,7 @@ use methods::MethodName;
 
 /// Options of `lattice calibrate`.
 ///
-/// Finds where the frame of a cloud lies in a map, without a guess if none is given, and says whether
+/// Finds the pose of a cloud's frame in a map, without a guess if none is given, and judges whether
 /// the answer can be trusted. The exit status is 0 only with the verdict OK, or with a method other
 /// than `auto` if it converged; the answer is printed in any case.
 #[derive(Args)]
@@ -42,19 +42,19 @@ pub struct Calibrate {
     /// The cloud's frame in the map as far as it is known: "x y z yaw_deg" or "x y z qx qy qz qw"
     #[arg(long, allow_hyphen_values = true)]
     guess: Option<Guess>,
-    /// Where the sensor of the cloud was, in its axes: "x y z" (m)
+    /// Position of the cloud's sensor, in its axes: "x y z" (m)
     #[arg(long, allow_hyphen_values = true)]
     sensor: Option<Place>,
     /// Axes of the cloud: ros_flu, unity_ruf (left-handed), winrt_rub or optical
     #[arg(long, default_value = "ros_flu")]
     axes: Axes,
     /// auto searches and judges; the others are single registrations from the guess
-    #[arg(long, value_enum, default_value = "auto")]
+    #[arg(long, value_parser = MethodName::parser(), default_value = "auto")]
     method: MethodName,
     /// Longest distance of a pair of points for the single registrations, m [default: as published]
     #[arg(long)]
     gate: Option<f64>,
-    /// What earlier calibrations learned of how the labels go together: read if it is there, written back
+    /// Confusion of labels learned by earlier calibrations: read if it is there, written back
     /// after a calibration that is OK
     #[arg(long, value_name = "FILE")]
     confusion: Option<PathBuf>,
@@ -62,7 +62,7 @@ pub struct Calibrate {
     /// 1/400 of the diagonal, at least 0.05]
     #[arg(long)]
     cell: Option<f64>,
-    /// What made the cloud: how far it errs, and whether it knows where down is, follow from it
+    /// Sensor of the cloud; its noise and its knowledge of the vertical follow from it
     #[arg(long, value_enum, default_value_t = Sensor::Headset)]
     from: Sensor,
     /// Standard deviation of the cloud's points, m [default: 0.02 of a headset, 0.03 of a lidar]
@@ -76,7 +76,7 @@ pub struct Calibrate {
     json: bool,
 }
 
-/// What makes clouds.
+/// Sensors of clouds.
 #[derive(Clone, Copy, Debug, clap::ValueEnum)]
 enum Sensor {
     /// The mesh of a mixed-reality headset, upright
@@ -136,9 +136,9 @@ impl Calibrate {
         } else {
             print!("{answer}");
         }
-        match answer.fault() {
+        match answer.refusal() {
             None => Ok(()),
-            Some(fault) => Err(fault.into()),
+            Some(reason) => Err(reason.into()),
         }
     }
 
@@ -154,7 +154,7 @@ impl Calibrate {
         positive("noise", self.noise)
     }
 
-    /// Searches, judges and keeps what was learned.
+    /// Searches, judges and keeps the learned confusion.
     fn search(
         &self,
         map: lattice_core::registration::SemanticCloud,
@@ -162,7 +162,7 @@ impl Calibrate {
         headset_scans: &[lattice_core::registration::HeadsetScan],
         names: &BTreeMap<u16, String>,
         times: &mut Times,
-    ) -> Result<Answer, Box<dyn std::error::Error + Send + Sync>> {
+    ) -> CliResult<Answer> {
         let known = match &self.confusion {
             Some(path) => input::confusion(path)?,
             None => None,
@@ -198,7 +198,7 @@ fn milliseconds(since: Instant) -> f64 {
     since.elapsed().as_secs_f64() * 1e3
 }
 
-/// Shows how far a calibration is.
+/// Shows the progress of a calibration.
 struct Shown<'a>(&'a Progress);
 
 impl lattice_core::registration::Progress for Shown<'_> {

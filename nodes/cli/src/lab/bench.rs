@@ -2,9 +2,10 @@
 
 use std::path::PathBuf;
 
-use clap::{Args, Subcommand, ValueEnum};
+use clap::{Args, Subcommand};
 use lattice_core::lattice::{Lattice, LatticeKind};
 
+use super::choice;
 use crate::{CliResult, init_logging};
 use lattice_lab::bench::{
     self, FileMethod, InsertOptions, NeighborMethod, QuantizeMethod, RaycastMethod, Report, Store,
@@ -29,7 +30,7 @@ pub enum Bench {
     Register(super::bench_register::Register),
 }
 
-/// What every measurement needs.
+/// Options of every measurement.
 #[derive(Args)]
 struct Common {
     /// Point file
@@ -57,9 +58,9 @@ struct Common {
 pub struct Quantize {
     #[command(flatten)]
     common: Common,
-    /// How points become keys
-    #[arg(long, value_enum, default_value = "batch")]
-    method: QuantizeName,
+    /// Way to quantize
+    #[arg(long, value_parser = choice(&QUANTIZERS), default_value = "batch")]
+    method: QuantizeMethod,
 }
 
 /// Options of `lattice bench insert`.
@@ -67,9 +68,9 @@ pub struct Quantize {
 pub struct Insert {
     #[command(flatten)]
     common: Common,
-    /// What holds the voxels
-    #[arg(long, value_enum, default_value = "occupancy")]
-    store: StoreName,
+    /// Store of the voxels
+    #[arg(long, value_parser = choice(&STORES), default_value = "occupancy")]
+    store: Store,
     /// Insert scan by scan, as FILE.scans says, not all points at once
     #[arg(long)]
     scans: bool,
@@ -80,12 +81,12 @@ pub struct Insert {
 pub struct Neighbors {
     #[command(flatten)]
     common: Common,
-    /// What holds the voxels
-    #[arg(long, value_enum, default_value = "occupancy")]
-    store: StoreName,
-    /// How neighbours are found
-    #[arg(long, value_enum, default_value = "pass")]
-    method: NeighborName,
+    /// Store of the voxels
+    #[arg(long, value_parser = choice(&STORES), default_value = "occupancy")]
+    store: Store,
+    /// Way to find neighbours
+    #[arg(long, value_parser = choice(&NEIGHBORS), default_value = "pass")]
+    method: NeighborMethod,
 }
 
 /// Options of `lattice bench raycast`.
@@ -94,8 +95,8 @@ pub struct Raycast {
     #[command(flatten)]
     common: Common,
     /// Use of the rays
-    #[arg(long, value_enum, default_value = "map")]
-    method: RaycastName,
+    #[arg(long, value_parser = choice(&RAYCASTS), default_value = "map")]
+    method: RaycastMethod,
 }
 
 /// Options of `lattice bench file`.
@@ -103,70 +104,99 @@ pub struct Raycast {
 pub struct MapFile {
     #[command(flatten)]
     common: Common,
-    /// Which way
-    #[arg(long, value_enum, default_value = "save")]
-    method: FileName,
+    /// Direction
+    #[arg(long, value_parser = choice(&FILES), default_value = "save")]
+    method: FileMethod,
     /// Pack by zstd at this level, 1 to 19
     #[arg(long, value_parser = clap::value_parser!(i32).range(1..=19))]
     zstd: Option<i32>,
 }
 
-#[derive(Clone, Copy, ValueEnum)]
-enum RaycastName {
-    /// Log-odds of all cells, free ones too
-    Map,
-    /// Voxels, without those that rays pass through: `free_space: clear` of the mapper
-    Clear,
-    /// Voxels, without those that are free by the log-odds: `free_space: evidence`
-    Evidence,
-}
+/// Values of `--method` of `lattice bench file`.
+const FILES: [(&str, &str, FileMethod); 2] = [
+    (
+        "save",
+        "From a store to the bytes of a file",
+        FileMethod::Save,
+    ),
+    (
+        "load",
+        "From the bytes of a file to a store",
+        FileMethod::Load,
+    ),
+];
 
-#[derive(Clone, Copy, ValueEnum)]
-enum FileName {
-    /// From a store to the bytes of a file
-    Save,
-    /// From the bytes of a file to a store
-    Load,
-}
+/// Values of `--method` of `lattice bench raycast`.
+const RAYCASTS: [(&str, &str, RaycastMethod); 3] = [
+    (
+        "map",
+        "Log-odds of all cells, free ones too",
+        RaycastMethod::Map,
+    ),
+    (
+        "clear",
+        "Voxels, without those that rays pass through: `free_space: clear` of the mapper",
+        RaycastMethod::Clear,
+    ),
+    (
+        "evidence",
+        "Voxels, without those that are free by the log-odds: `free_space: evidence`",
+        RaycastMethod::Evidence,
+    ),
+];
 
-#[derive(Clone, Copy, ValueEnum)]
-enum QuantizeName {
-    /// The batch quantizer with the best instructions of this machine
-    Batch,
-    /// The batch quantizer with what every machine of the target has
-    Portable,
-    /// One point at a time in f64
-    Scalar,
-    /// The nearest of 27 candidates, as Ryde & Brünig 2011 do it
-    Paper27,
-}
+/// Values of `--method` of `lattice bench quantize`.
+const QUANTIZERS: [(&str, &str, QuantizeMethod); 4] = [
+    (
+        "batch",
+        "The batch quantizer with the best instructions of this machine",
+        QuantizeMethod::Batch,
+    ),
+    (
+        "portable",
+        "The batch quantizer with what every machine of the target has",
+        QuantizeMethod::Portable,
+    ),
+    (
+        "scalar",
+        "One point at a time in f64",
+        QuantizeMethod::Scalar,
+    ),
+    (
+        "paper27",
+        "The nearest of 27 candidates, as Ryde & Brünig 2011 do it",
+        QuantizeMethod::Paper27,
+    ),
+];
 
-#[derive(Clone, Copy, ValueEnum)]
-enum StoreName {
-    /// One bit of each voxel
-    Occupancy,
-    /// Count and sum of offsets of each voxel
-    List,
-}
+/// Values of `--store`.
+const STORES: [(&str, &str, Store); 2] = [
+    ("occupancy", "One bit of each voxel", Store::Occupancy),
+    (
+        "list",
+        "Count and sum of offsets of each voxel",
+        Store::List,
+    ),
+];
 
-#[derive(Clone, Copy, ValueEnum)]
-enum NeighborName {
-    /// One pass over the blocks of the store's cells
-    Pass,
-    /// One look-up in the store for each touching neighbour
-    Probe,
-    /// The measure: 26 probes of a hash set for each voxel of the cubic lattice
-    Hash26,
-}
-
-impl StoreName {
-    fn store(self) -> Store {
-        match self {
-            Self::Occupancy => Store::Occupancy,
-            Self::List => Store::List,
-        }
-    }
-}
+/// Values of `--method` of `lattice bench neighbors`.
+const NEIGHBORS: [(&str, &str, NeighborMethod); 3] = [
+    (
+        "pass",
+        "One pass over the blocks of the store's cells",
+        NeighborMethod::Pass,
+    ),
+    (
+        "probe",
+        "One look-up in the store for each touching neighbour",
+        NeighborMethod::Probe,
+    ),
+    (
+        "hash26",
+        "The measure: 26 probes of a hash set for each voxel of the cubic lattice",
+        NeighborMethod::Hash26,
+    ),
+];
 
 impl Bench {
     /// Runs the command.
@@ -187,16 +217,9 @@ impl Quantize {
     fn run(self) -> CliResult {
         let lattice = self.common.lattice()?;
         let points = self.common.points()?;
-        let method = match self.method {
-            QuantizeName::Batch => QuantizeMethod::Batch,
-            QuantizeName::Portable => QuantizeMethod::Portable,
-            QuantizeName::Scalar => QuantizeMethod::Scalar,
-            QuantizeName::Paper27 => QuantizeMethod::Paper27,
-        };
+        let method = self.method;
         let cell = self.common.cell;
-        let report = self
-            .common
-            .pool()?
+        let report = lattice_lab::pool(self.common.threads)?
             .install(|| bench::quantize(method, &lattice, cell, &points));
         self.common.print(&report)
     }
@@ -211,9 +234,7 @@ impl Insert {
             false => None,
         };
         let options = self.common.insert_options(self.store);
-        let (report, _) = self
-            .common
-            .pool()?
+        let (report, _) = lattice_lab::pool(self.common.threads)?
             .install(|| bench::insert(options, &lattice, points, scans.as_deref()))?;
         self.common.print(&report)
     }
@@ -224,13 +245,9 @@ impl Neighbors {
         let lattice = self.common.lattice()?;
         let points = self.common.points()?;
         let options = self.common.insert_options(self.store);
-        let method = match self.method {
-            NeighborName::Pass => NeighborMethod::Pass,
-            NeighborName::Probe => NeighborMethod::Probe,
-            NeighborName::Hash26 => NeighborMethod::Hash26,
-        };
-        let (name, cell) = (self.store.store().name(), self.common.cell);
-        let report = self.common.pool()?.install(|| {
+        let method = self.method;
+        let (name, cell) = (self.store.name(), self.common.cell);
+        let report = lattice_lab::pool(self.common.threads)?.install(|| {
             let (_, store) = bench::insert(options, &lattice, points, None)?;
             Ok::<_, lattice_core::voxels::DatumError>(bench::neighbors(
                 method,
@@ -250,15 +267,8 @@ impl Raycast {
         let points = self.common.points()?;
         let scans = bench::read_scans(&self.common.points, points.len())?;
         let cell = self.common.cell;
-        let method = match self.method {
-            RaycastName::Map => RaycastMethod::Map,
-            RaycastName::Clear => RaycastMethod::Clear,
-            RaycastName::Evidence => RaycastMethod::Evidence,
-        };
-        let report = self
-            .common
-            .pool()?
-            .install(|| bench::raycast(method, &lattice, cell, points, &scans))?;
+        let report = lattice_lab::pool(self.common.threads)?
+            .install(|| bench::raycast(self.method, &lattice, cell, points, &scans))?;
         self.common.print(&report)
     }
 }
@@ -267,15 +277,12 @@ impl MapFile {
     fn run(self) -> CliResult {
         let lattice = self.common.lattice()?;
         let points = self.common.points()?;
-        let method = match self.method {
-            FileName::Save => FileMethod::Save,
-            FileName::Load => FileMethod::Load,
-        };
+        let method = self.method;
         let (options, cell) = (
-            self.common.insert_options(StoreName::Occupancy),
+            self.common.insert_options(Store::Occupancy),
             self.common.cell,
         );
-        let report = self.common.pool()?.install(|| {
+        let report = lattice_lab::pool(self.common.threads)?.install(|| {
             let (_, store) = bench::insert(options, &lattice, points, None)?;
             bench::file(method, store.as_ref(), self.zstd, cell)
         })?;
@@ -288,18 +295,13 @@ impl Common {
         Lattice::new(self.lattice, self.cell * self.cell * self.cell)
     }
 
-    fn points(&self) -> Result<Vec<[f32; 3]>, bench::PointFileError> {
+    fn points(&self) -> Result<Vec<[f32; 3]>, lattice_lab::AnyError> {
         bench::read_points(&self.points, self.max_points)
     }
 
-    fn pool(&self) -> Result<rayon::ThreadPool, rayon::ThreadPoolBuildError> {
-        let threads = self.threads.max(1);
-        rayon::ThreadPoolBuilder::new().num_threads(threads).build()
-    }
-
-    fn insert_options(&self, store: StoreName) -> InsertOptions {
+    fn insert_options(&self, store: Store) -> InsertOptions {
         InsertOptions {
-            store: store.store(),
+            store,
             res_m: self.cell,
         }
     }

@@ -2,8 +2,9 @@
 
 use std::path::{Path, PathBuf};
 
-use clap::{Args, ValueEnum};
-use lattice_core::registration::{Method, PrepareOptions, SemanticCloud};
+use clap::Args;
+use clap::builder::{PossibleValuesParser, TypedValueParser};
+use lattice_core::registration::{NamedMethod, PrepareOptions, RegisterOptions, SemanticCloud};
 use nalgebra::Isometry3;
 
 use crate::CliResult;
@@ -19,9 +20,9 @@ pub struct Register {
     /// Point file that stays
     #[arg(long)]
     target: PathBuf,
-    /// What is minimised
-    #[arg(long, value_enum, default_value = "gicp")]
-    method: MethodName,
+    /// Registration method
+    #[arg(long, value_parser = method_parser(), default_value = "gicp")]
+    method: &'static NamedMethod,
     /// Longest distance of a pair, m
     #[arg(long, default_value_t = 1.0)]
     gate: f64,
@@ -42,27 +43,24 @@ pub struct Register {
     json: bool,
 }
 
-#[derive(Clone, Copy, ValueEnum)]
-enum MethodName {
-    /// Point-to-point ICP
-    Icp,
-    /// GICP with the tolerances of small_gicp
-    Gicp,
-    /// GICP-SE(3) with a Cauchy kernel
-    GicpSe3,
+/// Methods that need no labels.
+fn method_parser() -> impl TypedValueParser<Value = &'static NamedMethod> {
+    let plain = ["icp", "gicp", "gicp-se3"];
+    PossibleValuesParser::new(plain).try_map(|option: String| {
+        let found = NamedMethod::ALL.iter().find(|m| m.option == option);
+        found.ok_or("no such method")
+    })
 }
 
 impl Register {
     /// Runs the command.
     pub fn run(self) -> CliResult {
         let (source, target) = (points(&self.source)?, points(&self.target)?);
-        let (method, name) = match self.method {
-            MethodName::Icp => (Method::PointToPoint, "icp"),
-            MethodName::Gicp => (Method::Gicp, "gicp"),
-            MethodName::GicpSe3 => (Method::GicpSe3, "gicp-se3"),
-        };
         let setup = RegisterSetup {
-            options: bench::register_options(method, self.gate),
+            options: RegisterOptions {
+                gate_m: self.gate,
+                ..self.method.options(self.gate)
+            },
             prepare: PrepareOptions {
                 neighbors: self.neighbors,
                 ..PrepareOptions::default()
@@ -71,10 +69,9 @@ impl Register {
             target_from_source: Isometry3::identity(),
             rounds: self.rounds,
         };
-        let threads = rayon::ThreadPoolBuilder::new().num_threads(self.threads.max(1));
-        let report = threads
-            .build()?
-            .install(|| bench::register(name, &source, &target, &setup))?;
+        let pool = lattice_lab::pool(self.threads)?;
+        let report =
+            pool.install(|| bench::register(self.method.option, &source, &target, &setup))?;
         if self.json {
             println!("{}", serde_json::to_string(&report)?);
             return Ok(());

@@ -1,23 +1,23 @@
-//! `lattice evaluate`: what the algorithms are worth, measured.
+//! `lattice evaluate`: calibration and registration, measured.
 
-use std::fs;
-use std::io::Write;
 use std::ops::ControlFlow;
-use std::path::{Path, PathBuf};
+use std::path::PathBuf;
 use std::time::{Duration, Instant};
 
 use clap::{Args, Subcommand};
 use lattice_lab::simulate::house::Scene;
 
 use super::evaluate_kitti::Kitti;
+use super::{choice, processors};
 use crate::progress::Progress;
 use crate::{CliResult, init_logging};
 use lattice_lab::evaluate::{
-    Baseline, EvaluateError, OURS, Pivot, Plan, Results, Settings, Start, Summary, TIMED, TRACKED,
-    World, draw, markdown, read_house, run,
+    Pivot, Plan, Results, Settings, Start, Summary, TIMED, TRACKED, Testbed, competitors,
+    read_house, report, run,
 };
+use lattice_lab::report::markdown;
 
-/// Measure what the algorithms are worth
+/// Measure calibration and registration
 #[derive(Subcommand)]
 pub enum Evaluate {
     /// Calibrate a headset to a robot's map in a simulated house: four scenes, wrong labels, starts that
@@ -45,14 +45,14 @@ pub struct Calibration {
     /// Shares of the view that are labelled wrongly, object by object
     #[arg(long, value_delimiter = ',', default_values_t = Plan::default().flips)]
     flips: Vec<f64>,
-    /// Of tv, desk, bookshelf, dining
-    #[arg(long, value_delimiter = ',', value_parser = scene, default_value = "tv,desk,bookshelf,dining")]
+    /// Scenes that are looked at
+    #[arg(long, value_delimiter = ',', value_parser = choice(&SCENES), default_value = "tv,desk,bookshelf,dining")]
     scenes: Vec<Scene>,
-    /// What is known before: metres/degrees off, or none
+    /// Starts: metres/degrees off the truth, or none
     #[arg(long, value_delimiter = ',', default_values_t = Plan::default().starts)]
     starts: Vec<Start>,
-    /// What starts are moved and turned at: view (the midst of what is seen) or headset
-    #[arg(long, value_parser = pivot, default_value = "view")]
+    /// Point at which starts are moved and turned
+    #[arg(long, value_parser = choice(&PIVOTS), default_value = "view")]
     pivot: Pivot,
     /// Only these methods, named as in trials.jsonl [default: all]
     #[arg(long, value_delimiter = ',', value_parser = method)]
@@ -63,12 +63,6 @@ pub struct Calibration {
     /// Pictures that the headset takes
     #[arg(long, default_value_t = 1)]
     headset_scans: usize,
-    /// A class is always taken for the same other one
-    #[arg(long)]
-    consistent: bool,
-    /// Share of single points with a random class
-    #[arg(long, default_value_t = 0.0)]
-    iid: f64,
     /// Side of a cell of the robot's map, m
     #[arg(long, default_value_t = Settings::default().cell_side_m)]
     cell: f64,
@@ -83,30 +77,27 @@ pub struct Calibration {
     json: bool,
 }
 
-fn scene(name: &str) -> Result<Scene, String> {
-    let found = Scene::ALL.into_iter().find(|scene| scene.name() == name);
-    found.ok_or_else(|| "one of tv, desk, bookshelf, dining".to_owned())
-}
-
 fn method(name: &str) -> Result<String, String> {
-    let mut known: Vec<&str> = Baseline::all()
-        .iter()
-        .map(|baseline| baseline.name)
-        .collect();
-    known.extend([OURS, TIMED, TRACKED]);
+    let known: Vec<&str> = competitors().chain([TIMED, TRACKED]).collect();
     match known.contains(&name) {
         true => Ok(name.to_owned()),
         false => Err(format!("one of {}", known.join(", "))),
     }
 }
 
-fn pivot(name: &str) -> Result<Pivot, String> {
-    match name {
-        "view" => Ok(Pivot::View),
-        "headset" => Ok(Pivot::Headset),
-        _ => Err("one of view, headset".to_owned()),
-    }
-}
+/// Values of `--scenes`.
+const SCENES: [(&str, &str, Scene); 4] = [
+    ("tv", "A television", Scene::Tv),
+    ("desk", "A desk", Scene::Desk),
+    ("bookshelf", "A bookshelf", Scene::Bookshelf),
+    ("dining", "A dining table", Scene::Dining),
+];
+
+/// Values of `--pivot`.
+const PIVOTS: [(&str, &str, Pivot); 2] = [
+    ("view", "The midst of what is seen", Pivot::View),
+    ("headset", "The headset", Pivot::Headset),
+];
 
 impl Evaluate {
     /// Runs the command.
@@ -128,32 +119,41 @@ impl Calibration {
             cell_side_m: self.cell,
             map_seeds: if self.quick { 1 } else { self.maps },
             headset_scans: self.headset_scans,
-            consistent: self.consistent,
-            iid: self.iid,
             pivot: self.pivot,
             ..Settings::default()
         };
         let plan = self.plan();
         let threads = self.threads.unwrap_or_else(processors).clamp(1, 1024);
-        let world = World::new(house, &settings)?;
+        let testbed = Testbed::new(house, &settings)?;
         let mut results = Results::open(&self.out, &settings)?;
         let bar = Progress::new("evaluate");
         let started = Instant::now();
-        let ran = run(&world, &plan, &mut results, threads, &mut |done, total| {
-            bar.set(done as f64 / total.max(1) as f64);
-            let left = started
-                .elapsed()
-                .mul_f64((total - done) as f64 / done.max(1) as f64);
-            bar.say(&format!("{done} of {total}, {} left", clock(left)));
-            ControlFlow::Continue(())
-        });
+        let ran = run(
+            &testbed,
+            &plan,
+            &mut results,
+            threads,
+            &mut |done, total| {
+                bar.set(done as f64 / total.max(1) as f64);
+                let left = started
+                    .elapsed()
+                    .mul_f64((total - done) as f64 / done.max(1) as f64);
+                bar.say(&format!("{done} of {total}, {} left", clock(left)));
+                ControlFlow::Continue(())
+            },
+        );
         bar.done();
         ran?;
-        let summary = report(&self.out, &settings, results, threads)?;
+        let trials = results.sorted();
+        let summary = Summary::new(&settings, &trials, threads);
+        let report = report(&summary, &trials)?;
+        lattice_lab::report::write(&report, &self.out)?;
+        let json = serde_json::to_string_pretty(&summary)?;
+        super::write(&self.out.join("summary.json"), &json)?;
         if self.json {
-            println!("{}", serde_json::to_string_pretty(&summary)?);
+            println!("{json}");
         } else {
-            print!("{}", markdown(&summary));
+            print!("{}", markdown(&report));
             println!("\nwritten to {}", self.out.display());
         }
         Ok(())
@@ -182,10 +182,6 @@ impl Calibration {
     }
 }
 
-fn processors() -> usize {
-    std::thread::available_parallelism().map_or(1, usize::from)
-}
-
 fn clock(time: Duration) -> String {
     let seconds = time.as_secs();
     format!(
@@ -194,29 +190,4 @@ fn clock(time: Duration) -> String {
         seconds / 60 % 60,
         seconds % 60
     )
-}
-
-/// Writes report.md, report.json and the pictures.
-fn report(
-    folder: &Path,
-    settings: &Settings,
-    results: Results,
-    threads: usize,
-) -> Result<Summary, EvaluateError> {
-    let trials = results.sorted();
-    let summary = Summary::new(settings, &trials, threads);
-    let fault = |path: &Path, e: &dyn std::fmt::Display| EvaluateError::Report {
-        path: path.to_owned(),
-        reason: e.to_string(),
-    };
-    let write = |name: &str, content: &[u8]| {
-        let path = folder.join(name);
-        let file = fs::File::create(&path).and_then(|mut file| file.write_all(content));
-        file.map_err(|e| fault(&path, &e))
-    };
-    write("report.md", markdown(&summary).as_bytes())?;
-    let json = serde_json::to_vec_pretty(&summary).map_err(|e| fault(folder, &e))?;
-    write("report.json", &json)?;
-    draw(folder, &summary, &trials).map_err(|e| fault(folder, &e))?;
-    Ok(summary)
 }

@@ -1,16 +1,16 @@
 //! `lattice evaluate kitti`.
 
-use std::fs;
-use std::path::{Path, PathBuf};
+use std::path::PathBuf;
 
 use clap::Args;
 
 use crate::CliResult;
 use crate::progress::Progress;
 use lattice_lab::evaluate::kitti::{
-    KittiMethod, KittiReport, KittiTopics, PairRow, Prepared, RIGHT, kitti_markdown, pairs_of,
+    KittiMethod, KittiReport, KittiTopics, PairRow, Prepared, RIGHT, kitti_report, pairs_of,
     read_scans, write_scans,
 };
+use lattice_lab::report::markdown;
 
 /// Options of `lattice evaluate kitti`.
 #[derive(Args)]
@@ -18,7 +18,7 @@ pub struct Kitti {
     /// Log with labelled scans and the odometry of an INS
     #[arg(long)]
     bag: PathBuf,
-    /// Folder of the scans, kitti.json and kitti.md
+    /// Folder of the scans, kitti.json and report.html
     #[arg(long)]
     out: PathBuf,
     /// Labelled scans
@@ -44,13 +44,15 @@ pub struct Kitti {
 impl Kitti {
     /// Runs the command.
     pub fn run(self) -> CliResult {
-        let threads = rayon::ThreadPoolBuilder::new().num_threads(self.threads.max(1));
-        let report = threads.build()?.install(|| self.measure())?;
+        let report = lattice_lab::pool(self.threads)?.install(|| self.measure())?;
         let json = serde_json::to_string_pretty(&report)?;
-        let table = kitti_markdown(&report);
-        write(&self.out.join("kitti.json"), &json)?;
-        write(&self.out.join("kitti.md"), &table)?;
-        print!("{}", if self.json { &json } else { &table });
+        let table = kitti_report(&report);
+        lattice_lab::report::write(&table, &self.out)?;
+        super::write(&self.out.join("kitti.json"), &json)?;
+        match self.json {
+            true => println!("{json}"),
+            false => print!("{}", markdown(&table)),
+        }
         Ok(())
     }
 
@@ -73,7 +75,7 @@ impl Kitti {
         for method in &methods {
             for known in [true, false] {
                 for pair in &pairs {
-                    bar.say(method.name());
+                    bar.say(&method.name());
                     rows.extend(pair.run(method, known, &prepared));
                     bar.set(rows.len() as f64 / total.max(1) as f64);
                 }
@@ -100,8 +102,4 @@ impl Kitti {
             rows,
         })
     }
-}
-
-fn write(path: &Path, text: &str) -> Result<(), String> {
-    fs::write(path, text).map_err(|e| format!("{}: {e}", path.display()))
 }

@@ -8,13 +8,16 @@ mod evaluate_kitti;
 mod paper;
 mod simulate;
 
+use std::fmt::Display;
 use std::fs::File;
 use std::io::BufWriter;
 use std::path::Path;
 
 use clap::Subcommand;
+use clap::builder::{PossibleValue, PossibleValuesParser, TypedValueParser};
 use lattice_core::voxels::VoxelList;
 use lattice_lab::render::{RenderOptions, render_png};
+use serde::Serialize;
 
 use crate::CliResult;
 
@@ -26,7 +29,7 @@ pub enum Lab {
     /// Write the log, the points or the map of a simulated machine
     #[command(subcommand)]
     Simulate(simulate::Simulate),
-    /// Measure what the algorithms are worth
+    /// Measure calibration and registration
     #[command(subcommand)]
     Evaluate(evaluate::Evaluate),
     /// Compute every table and figure of a paper and set it beside what is printed
@@ -54,4 +57,38 @@ impl Lab {
 pub fn picture(list: &VoxelList, options: &RenderOptions, out: &Path) -> CliResult {
     let file = File::create(out).map_err(|e| format!("{}: {e}", out.display()))?;
     Ok(render_png(list, options, BufWriter::new(file))?)
+}
+
+/// Parser of an option that takes one of some names, each with its help and its value.
+fn choice<T: Clone + Send + Sync + 'static>(
+    choices: &'static [(&'static str, &'static str, T)],
+) -> impl TypedValueParser<Value = T> {
+    let names = choices
+        .iter()
+        .map(|(name, help, _)| PossibleValue::new(*name).help(*help));
+    PossibleValuesParser::new(names).try_map(|chosen: String| {
+        let found = choices.iter().find(|(name, _, _)| *name == chosen);
+        found
+            .map(|(_, _, value)| value.clone())
+            .ok_or("no such choice")
+    })
+}
+
+/// Prints a summary, as JSON if that is asked for.
+fn show(json: bool, summary: &(impl Serialize + Display)) -> CliResult {
+    match json {
+        true => println!("{}", serde_json::to_string_pretty(summary)?),
+        false => println!("{summary}"),
+    }
+    Ok(())
+}
+
+/// Number of processors.
+fn processors() -> usize {
+    std::thread::available_parallelism().map_or(1, usize::from)
+}
+
+/// Writes a text file.
+fn write(path: &Path, text: &str) -> Result<(), String> {
+    std::fs::write(path, text).map_err(|e| format!("{}: {e}", path.display()))
 }

@@ -4,10 +4,11 @@ mod house;
 
 use std::path::PathBuf;
 
-use clap::{Args, Subcommand, ValueEnum};
+use clap::{Args, Subcommand};
 
 use lattice_lab::simulate::SurveyPattern;
 
+use super::{choice, show};
 use crate::progress::Progress;
 use crate::{CliResult, init_logging};
 use lattice_bag::Storage;
@@ -26,12 +27,25 @@ pub enum Simulate {
     House(house::House),
 }
 
-/// Container of a log.
-#[derive(Clone, Copy, Debug, ValueEnum)]
-enum StorageName {
-    Mcap,
-    Sqlite3,
-}
+/// Values of `--storage`.
+const STORAGES: [(&str, &str, Storage); 2] = [
+    ("mcap", "MCAP", Storage::Mcap),
+    ("sqlite3", "SQLite", Storage::Sqlite3),
+];
+
+/// Values of `--pattern`.
+const PATTERNS: [(&str, &str, SurveyPattern); 2] = [
+    (
+        "lms200",
+        "Three SICK LMS200, one of them on a turntable",
+        SurveyPattern::Lms200,
+    ),
+    (
+        "os64",
+        "One spinning scanner of 64 beams",
+        SurveyPattern::Os64,
+    ),
+];
 
 /// Options of `lattice simulate bobcat`.
 #[derive(Args)]
@@ -49,23 +63,14 @@ pub struct Bobcat {
     #[arg(long)]
     person: bool,
     /// Container of the messages
-    #[arg(long, value_enum, default_value = "mcap")]
-    storage: StorageName,
+    #[arg(long, value_parser = choice(&STORAGES), default_value = "mcap")]
+    storage: Storage,
     /// Replace a log that is already there
     #[arg(long)]
     overwrite: bool,
     /// Print what was written as JSON
     #[arg(long)]
     json: bool,
-}
-
-/// Scanners of a survey.
-#[derive(Clone, Copy, Debug, ValueEnum)]
-enum PatternName {
-    /// Three SICK LMS200, one of them on a turntable
-    Lms200,
-    /// One spinning scanner of 64 beams
-    Os64,
 }
 
 /// Options of `lattice simulate site`.
@@ -75,8 +80,8 @@ pub struct Site {
     #[arg(long, default_value_t = 10_000_000)]
     points: u64,
     /// The scanners
-    #[arg(long, value_enum, default_value = "lms200")]
-    pattern: PatternName,
+    #[arg(long, value_parser = choice(&PATTERNS), default_value = "lms200")]
+    pattern: SurveyPattern,
     /// The same seed gives the same bytes
     #[arg(long, default_value_t = 1)]
     seed: u64,
@@ -105,21 +110,13 @@ impl Site {
         let progress = Progress::new("simulate");
         let options = SiteOptions {
             seed: self.seed,
-            pattern: match self.pattern {
-                PatternName::Lms200 => SurveyPattern::Lms200,
-                PatternName::Os64 => SurveyPattern::Os64,
-            },
+            pattern: self.pattern,
             points: self.points,
             out: self.out,
         };
         let summary = write_site(&options, &mut |done| progress.set(done))?;
         progress.done();
-        if self.json {
-            println!("{}", serde_json::to_string_pretty(&summary)?);
-        } else {
-            println!("{summary}");
-        }
-        Ok(())
+        show(self.json, &summary)
     }
 }
 
@@ -129,19 +126,11 @@ impl Bobcat {
             seed: self.seed,
             duration_s: self.duration,
             person: self.person,
-            storage: match self.storage {
-                StorageName::Mcap => Storage::Mcap,
-                StorageName::Sqlite3 => Storage::Sqlite3,
-            },
+            storage: self.storage,
             out: self.out,
             overwrite: self.overwrite,
         })?;
-        if self.json {
-            println!("{}", serde_json::to_string_pretty(&summary)?);
-        } else {
-            println!("{summary}");
-        }
-        Ok(())
+        show(self.json, &summary)
     }
 }
 

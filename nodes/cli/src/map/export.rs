@@ -20,7 +20,7 @@ pub struct Export {
     /// File to write
     #[arg(long, short)]
     out: PathBuf,
-    /// What to write; a `.png` file is always a picture
+    /// Form to write; a `.png` file is always a picture
     #[arg(long = "as", value_enum, default_value = "centers")]
     form: Form,
     #[cfg(feature = "lab")]

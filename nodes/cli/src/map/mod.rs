@@ -24,7 +24,7 @@ pub enum Map {
     Export(export::Export),
     /// One map of the voxels of several with the same cells; of one, to write it in another form
     Merge(combine::Merge),
-    /// How many voxels are in one map, in the other, in both; writes those only in the first
+    /// Numbers of voxels in one map, in the other, in both; writes those only in the first
     Diff(combine::Diff),
     /// The voxels with their centre in a box
     Crop(combine::Crop),
@@ -48,7 +48,7 @@ impl Map {
 }
 
 /// Reads a map, and the bytes of its file, which bound the voxels.
-pub fn read(path: &Path) -> Result<(MapContents, u64), Box<dyn std::error::Error + Send + Sync>> {
+pub fn read(path: &Path) -> CliResult<(MapContents, u64)> {
     let here = |e: &dyn std::fmt::Display| format!("{}: {e}", path.display());
     let file = File::open(path).map_err(|e| here(&e))?;
     let bytes = file.metadata().map_err(|e| here(&e))?.len();

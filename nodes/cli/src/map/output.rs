@@ -1,6 +1,5 @@
 //! Map files that commands write.
 
-use std::error::Error;
 use std::fs::{self, File};
 use std::io::{BufWriter, Write};
 use std::path::Path;
@@ -8,6 +7,8 @@ use std::path::Path;
 use clap::Args;
 use lattice_core::voxels::file::{MapContents, WriteOptions};
 use serde::Serialize;
+
+use crate::CliResult;
 
 /// The form of a map file.
 #[derive(Args)]
@@ -23,7 +24,7 @@ pub struct Form {
     pub occupancy_only: bool,
 }
 
-/// What was written.
+/// Size of a map file that was written.
 #[derive(Serialize)]
 pub struct Written {
     voxels: usize,
@@ -33,12 +34,8 @@ pub struct Written {
 }
 
 impl Form {
-    /// Writes a map; readers see the whole file or what was there before.
-    pub fn write(
-        &self,
-        map: &MapContents,
-        out: &Path,
-    ) -> Result<Written, Box<dyn Error + Send + Sync>> {
+    /// Writes a map; readers see the whole file or the one before.
+    pub fn write(&self, map: &MapContents, out: &Path) -> CliResult<Written> {
         let options = WriteOptions {
             zstd_level: self.zstd,
             occupancy_only: self.occupancy_only,
@@ -49,7 +46,7 @@ impl Form {
         let mut partial = out.as_os_str().to_owned();
         partial.push(".partial");
         let path = if whole { Path::new(&partial) } else { out };
-        let write = || -> Result<u64, Box<dyn Error + Send + Sync>> {
+        let write = || -> CliResult<u64> {
             let mut file = Counted {
                 writer: BufWriter::new(File::create(path)?),
                 bytes: 0,
@@ -77,7 +74,7 @@ impl Form {
 }
 
 impl Written {
-    /// Shows what was written, as JSON if so wanted.
+    /// Prints the size, as JSON on request.
     pub fn print(&self, json: bool) -> Result<(), serde_json::Error> {
         if json {
             println!("{}", serde_json::to_string_pretty(self)?);

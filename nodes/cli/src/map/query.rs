@@ -23,7 +23,7 @@ pub struct Query {
     /// The occupied cells with centres nearest to a point, map frame, in m
     #[arg(long, num_args = 3, value_names = ["X", "Y", "Z"], allow_negative_numbers = true, group = "question")]
     nearest: Option<Vec<f64>>,
-    /// How many of them
+    /// Number of cells
     #[arg(short, default_value_t = 1, requires = "nearest")]
     k: usize,
     /// Distance from a point to the nearest occupied cell as the polyhedron that it is, and 0 in one
@@ -46,7 +46,7 @@ pub struct Query {
     json: bool,
 }
 
-/// An occupied cell and how far it is.
+/// An occupied cell and its distance.
 #[derive(Serialize)]
 struct Cell {
     key: u64,
@@ -75,7 +75,7 @@ impl Query {
     pub fn run(self) -> CliResult {
         let here = |e: &dyn std::fmt::Display| format!("{}: {e}", self.map.display());
         let file = File::open(&self.map).map_err(|e| here(&e))?;
-        // The size of the file bounds what it makes us hold.
+        // The size of the file bounds the memory.
         let store = read_occupancy(BufReader::new(file), usize::MAX).map_err(|e| here(&e))?;
         let answer = self.answer(&Questions::new(&store))?;
         if self.json {
@@ -86,10 +86,7 @@ impl Query {
         Ok(())
     }
 
-    fn answer(
-        &self,
-        questions: &Questions<impl VoxelStore>,
-    ) -> Result<Answer, Box<dyn std::error::Error + Send + Sync>> {
+    fn answer(&self, questions: &Questions<impl VoxelStore>) -> CliResult<Answer> {
         let cell = |key: MortonKey, distance_m| Cell {
             key: key.raw(),
             center_m: questions.store().center_m(key).into(),

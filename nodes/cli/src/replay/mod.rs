@@ -1,4 +1,4 @@
-//! `lattice replay`: a log becomes maps.
+//! `lattice replay`: maps of a log.
 
 mod node_process;
 mod processes;
@@ -42,7 +42,7 @@ pub struct Replay {
     /// Volume of one cell in m^3; of the parameters if not given (0.125)
     #[arg(long)]
     pub cell_volume: Option<f64>,
-    /// How the cells lie: paper, ground (flattest), or a crystal direction that points up, as
+    /// Orientation of the cells: paper, ground (flattest), or a crystal direction that points up, as
     /// 110-up; of the parameters if not given (paper)
     #[arg(long)]
     pub orientation: Option<Orientation>,
@@ -88,8 +88,8 @@ impl Replay {
         Ok(())
     }
 
-    /// Runs the replay and returns what came of it.
-    pub fn replay(&self) -> Result<RunReport, Box<dyn std::error::Error + Send + Sync>> {
+    /// Runs the replay and returns its report.
+    pub fn replay(&self) -> CliResult<RunReport> {
         if self.direct {
             return self.replay_direct();
         }
@@ -133,7 +133,7 @@ impl Replay {
         Ok(report)
     }
 
-    fn replay_direct(&self) -> Result<RunReport, Box<dyn std::error::Error + Send + Sync>> {
+    fn replay_direct(&self) -> CliResult<RunReport> {
         let bag = BagReader::open(&self.bag)?;
         let plan = replay::plan(&bag, &self.wishes()?)?;
         let mut transformer = TransformerOptions::from_params(&self.params_of("enu_transformer")?)?;
@@ -177,7 +177,7 @@ impl Replay {
     }
 
     /// Options of one mapper for each lattice.
-    fn maps(&self) -> Result<Vec<MapperOptions>, Box<dyn std::error::Error + Send + Sync>> {
+    fn maps(&self) -> CliResult<Vec<MapperOptions>> {
         let params = self.params_of("lattice_mapper")?;
         let given = MapperOptions::from_params(&params)?;
         let orientation = match self.orientation {
@@ -198,7 +198,7 @@ impl Replay {
         kinds.into_iter().map(map).collect()
     }
 
-    fn wishes(&self) -> Result<TopicWishes, Box<dyn std::error::Error + Send + Sync>> {
+    fn wishes(&self) -> CliResult<TopicWishes> {
         let params = self.params_of("enu_transformer")?;
         let mut points = self.points.clone();
         if points.is_empty() {
@@ -224,7 +224,7 @@ impl Replay {
         })
     }
 
-    fn params_of(&self, node: &str) -> Result<Params, Box<dyn std::error::Error + Send + Sync>> {
+    fn params_of(&self, node: &str) -> CliResult<Params> {
         let mut arguments = vec!["--ros-args".to_owned()];
         for file in &self.params {
             arguments.extend(["--params-file".to_owned(), file.display().to_string()]);

@@ -17,7 +17,7 @@ use lattice_nodes::report;
 const MAX_TEXTS: usize = 1000;
 /// Time for all nodes to find each other.
 pub const MATCH_TIME: Duration = Duration::from_secs(30);
-/// Time for a node to work off its inbox when told to end.
+/// Time for a node to work off its inbox at its end.
 pub const END_TIME: Duration = Duration::from_secs(60);
 
 /// A node in a process of its own, and what it logs.
@@ -113,11 +113,11 @@ impl NodeProcess {
         Ok(())
     }
 
-    /// Waits for the player's end and tells how far it is.
+    /// Waits for the player's end; reports its progress.
     pub fn played(mut self, progress: &mut dyn FnMut(f64)) -> Result<(), ProcessError> {
         while let Ok(line) = self.lines.recv() {
-            let told = line.rsplit_once("played ").map(|(_, share)| share);
-            let share = told.and_then(|share| share.trim_end_matches(" %").parse::<f64>().ok());
+            let share = line.rsplit_once("played ").map(|(_, share)| share);
+            let share = share.and_then(|share| share.trim_end_matches(" %").parse::<f64>().ok());
             if let Some(share) = share {
                 progress(share / 100.0);
             }
@@ -131,7 +131,7 @@ impl NodeProcess {
         }
     }
 
-    /// Tells the node to end, waits until it has, and reads its report.
+    /// Ends the node, waits for that, and reads its report.
     pub fn end<T: for<'de> serde::Deserialize<'de>>(mut self) -> Result<T, ProcessError> {
         interrupt(&self.child)?;
         let deadline = Instant::now() + END_TIME;
@@ -203,7 +203,7 @@ fn forward(
     })
 }
 
-/// Whether no process has logged this text before.
+/// True if no process has logged this text before.
 fn first_time(text: &str) -> bool {
     static SEEN: Mutex<BTreeSet<String>> = Mutex::new(BTreeSet::new());
     let mut seen = SEEN.lock().unwrap_or_else(PoisonError::into_inner);

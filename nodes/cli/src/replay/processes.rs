@@ -13,7 +13,7 @@ use lattice_bag::BagReader;
 use lattice_nodes::replay::{LatticeReport, Role, RunReport, TopicPlan};
 use lattice_runtime::LoopbackDomain;
 
-/// Why a replay over DDS failed.
+/// An error of a replay over DDS.
 #[derive(Debug, Error)]
 pub enum ProcessError {
     /// A process did not start.
@@ -42,7 +42,7 @@ pub enum ProcessError {
         /// Line waited for.
         waited: String,
     },
-    /// A node did not end when told to.
+    /// A node did not end on request.
     #[error("{what} did not end within {} s", END_TIME.as_secs())]
     Stuck {
         /// Node.
@@ -61,7 +61,7 @@ pub enum ProcessError {
     Io(#[from] io::Error),
 }
 
-/// What is to be replayed and how.
+/// Options of a replay over DDS.
 pub struct DdsReplay<'a> {
     /// The log.
     pub bag: &'a Path,
@@ -71,7 +71,7 @@ pub struct DdsReplay<'a> {
     pub plan: &'a TopicPlan,
     /// One map for each.
     pub lattices: Vec<Lattice>,
-    /// How they lie in the map, if it is not to be as the parameters say.
+    /// Orientation of the lattices, if not that of the parameters.
     pub orientation: Option<Orientation>,
     /// Parameter files of the nodes.
     pub params_files: &'a [PathBuf],
@@ -83,7 +83,7 @@ pub struct DdsReplay<'a> {
     pub domain: Option<LoopbackDomain>,
 }
 
-/// Plays the log through separate processes and collects what they report.
+/// Plays the log through separate processes and collects their reports.
 pub fn run(
     replay: &DdsReplay,
     progress: &mut dyn FnMut(f64, &str),

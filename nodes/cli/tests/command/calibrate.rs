@@ -77,7 +77,7 @@ fn truth() -> Isometry3<f64> {
     Isometry3::new(Vector3::new(2.6, 2.2, 1.5), Vector3::z() * 2.0)
 }
 
-/// What is in front of the headset, within 70 degrees.
+/// Points in front of the headset, within 70 degrees.
 fn seen(room: &Labelled) -> Labelled {
     let headset_from_map = truth().inverse();
     let in_view = |p: &Point3<f64>| p.x > 0.3 && p.y.abs() < 0.7 * p.x && p.z < 0.6 * p.x;
@@ -123,7 +123,7 @@ fn a_cloud_is_found_without_a_guess_whatever_its_axes_and_labels_are_learned() {
     assert!(wall["agreement"].as_f64().unwrap() > 0.8);
     assert_eq!(first["covariance"].as_array().unwrap().len(), 36);
 
-    // What was learned is read again.
+    // The learned confusion is read again.
     assert!(learned.exists());
     let axes = [
         "--map",

@@ -48,7 +48,7 @@ fn simulated(directory: &Path, storage: &str, seconds: &str) -> String {
 
 const PARAMS: &str = concat!(env!("CARGO_MANIFEST_DIR"), "/../../params/bobcat.yaml");
 
-/// What a map is, without the times and bytes that depend on the way it was made.
+/// Description of a map without the times and bytes that depend on the way it was made.
 fn figures(report: &Value) -> Vec<Value> {
     let keys = [
         "lattice",

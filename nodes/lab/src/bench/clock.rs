@@ -4,16 +4,16 @@ use std::time::Instant;
 
 use rustix::time::{ClockId, clock_gettime};
 
-/// What an operation took.
+/// Time that an operation took.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Spent {
-    /// By the clock on the wall, s.
+    /// Wall time, s.
     pub wall_s: f64,
-    /// On all threads of the process, s.
+    /// Processor time of all threads of the process, s.
     pub cpu_s: f64,
 }
 
-/// Runs an operation and tells what it took.
+/// Runs an operation and measures its time.
 pub fn timed<T>(operation: impl FnOnce() -> T) -> (T, Spent) {
     let (start, cpu_start_s) = (Instant::now(), process_cpu_s());
     let result = operation();

@@ -5,12 +5,12 @@ use lattice_core::voxels::file::{WriteOptions, read_occupancy, write_occupancy};
 
 use super::{Report, timed};
 
-/// Which way.
+/// Direction of the measurement.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum FileMethod {
-    /// From a store to the bytes of a file.
+    /// Store to the bytes of a file.
     Save,
-    /// From the bytes of a file to a store.
+    /// Bytes of a file to a store.
     Load,
 }
 

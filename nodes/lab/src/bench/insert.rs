@@ -11,7 +11,7 @@ use super::{Report, timed};
 /// Most voxels of a list: more than any benchmark makes.
 const MAX_VOXELS: usize = 1 << 31;
 
-/// Which store is measured.
+/// Store that is measured.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum Store {
     /// [`OccupancyList`]: one bit of each voxel.
@@ -44,7 +44,7 @@ fn empty(store: Store, lattice: &Lattice) -> Result<Box<dyn VoxelStore + Send>, 
     }
 }
 
-/// What to insert into.
+/// Options of an insertion.
 #[derive(Clone, Copy, Debug)]
 pub struct InsertOptions {
     /// The store.

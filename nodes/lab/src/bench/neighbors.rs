@@ -7,7 +7,7 @@ use rayon::prelude::*;
 use super::hash26::Cubes;
 use super::{Report, timed};
 
-/// How neighbours are found.
+/// Way to find neighbours.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum NeighborMethod {
     /// One pass over the blocks of the store's cells.

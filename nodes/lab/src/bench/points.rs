@@ -2,49 +2,17 @@
 
 use std::ffi::OsString;
 use std::fs::File;
-use std::io::{self, Read};
+use std::io::Read;
 use std::path::{Path, PathBuf};
 
 use nalgebra::Vector3;
-use thiserror::Error;
+
+use crate::{AnyError, at};
 
 /// Bytes of a point: x, y, z (m) and intensity as little-endian f32.
 const POINT_BYTES: usize = 16;
 /// Bytes of a scan's record: position of the scanner as three f64 (m), points as u64; little-endian.
 const SCAN_BYTES: usize = 32;
-
-/// Why a point file or its scans cannot be used.
-#[derive(Debug, Error)]
-pub enum PointFileError {
-    /// The operating system says no.
-    #[error("{}: {source}", path.display())]
-    Io {
-        /// The file.
-        path: PathBuf,
-        /// What it said.
-        source: io::Error,
-    },
-    /// The length is not a whole number of records.
-    #[error("{}: {bytes} bytes are not a whole number of {record}-byte records", path.display())]
-    Length {
-        /// The file.
-        path: PathBuf,
-        /// Its length.
-        bytes: usize,
-        /// Length of a record.
-        record: usize,
-    },
-    /// The scans do not hold as many points as the file.
-    #[error("{}: the scans hold {scanned} points, the point file {points}", path.display())]
-    Scans {
-        /// The file of scans.
-        path: PathBuf,
-        /// Sum of the scans' points.
-        scanned: u128,
-        /// Points in the point file.
-        points: usize,
-    },
-}
 
 /// One scan of a point file.
 #[derive(Clone, Copy, Debug, PartialEq)]
@@ -89,7 +57,7 @@ pub fn scans_path(points: &Path) -> PathBuf {
 }
 
 /// Reads the positions (m) of a point file, at most `max_points` from its start.
-pub fn read_points(path: &Path, max_points: usize) -> Result<Vec<[f32; 3]>, PointFileError> {
+pub fn read_points(path: &Path, max_points: usize) -> Result<Vec<[f32; 3]>, AnyError> {
     let bytes = read(path, POINT_BYTES, max_points)?;
     let points = bytes.chunks_exact(POINT_BYTES).map(|point| {
         let value = |i: usize| f32::from_bits(u32::from_le_bytes(array(point, 4 * i)));
@@ -99,7 +67,7 @@ pub fn read_points(path: &Path, max_points: usize) -> Result<Vec<[f32; 3]>, Poin
 }
 
 /// Reads the scans beside a point file of which `points` were read; the last scan is cut to fit.
-pub fn read_scans(points_path: &Path, points: usize) -> Result<Vec<ScanRecord>, PointFileError> {
+pub fn read_scans(points_path: &Path, points: usize) -> Result<Vec<ScanRecord>, AnyError> {
     let path = scans_path(points_path);
     let bytes = read(&path, SCAN_BYTES, usize::MAX)?;
     let (mut scans, mut left, mut scanned) = (Vec::new(), points, 0u128);
@@ -116,30 +84,25 @@ pub fn read_scans(points_path: &Path, points: usize) -> Result<Vec<ScanRecord>, 
         }
     }
     if left > 0 {
-        return Err(PointFileError::Scans {
-            path,
-            scanned,
-            points,
-        });
+        let path = path.display();
+        return Err(
+            format!("{path}: the scans hold {scanned} points, the point file {points}").into(),
+        );
     }
     Ok(scans)
 }
 
-fn read(path: &Path, record: usize, max_records: usize) -> Result<Vec<u8>, PointFileError> {
-    let io_error = |source| PointFileError::Io {
-        path: path.to_owned(),
-        source,
-    };
+fn read(path: &Path, record: usize, max_records: usize) -> Result<Vec<u8>, AnyError> {
     let limit = max_records.saturating_mul(record) as u64;
-    let file = File::open(path).map_err(io_error)?;
+    let file = File::open(path).map_err(at(path))?;
     let mut bytes = Vec::new();
-    file.take(limit).read_to_end(&mut bytes).map_err(io_error)?;
+    file.take(limit).read_to_end(&mut bytes).map_err(at(path))?;
     if bytes.len() % record != 0 {
-        return Err(PointFileError::Length {
-            path: path.to_owned(),
-            bytes: bytes.len(),
-            record,
-        });
+        let (path, bytes) = (path.display(), bytes.len());
+        return Err(format!(
+            "{path}: {bytes} bytes are not a whole number of {record}-byte records"
+        )
+        .into());
     }
     Ok(bytes)
 }

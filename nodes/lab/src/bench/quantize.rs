@@ -10,7 +10,7 @@ use super::{Report, timed};
 /// Points of one task.
 const CHUNK: usize = 1 << 14;
 
-/// How points become keys.
+/// Way to quantize points.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum QuantizeMethod {
     /// The batch quantizer with the best instructions of this machine.
@@ -117,10 +117,7 @@ mod tests {
             .map(|i| [0.01 * i as f32, 0.3 - 0.007 * i as f32, 2.0])
             .collect();
         let hash = |threads, method, points: &[[f32; 3]]| {
-            let pool = rayon::ThreadPoolBuilder::new()
-                .num_threads(threads)
-                .build()
-                .unwrap();
+            let pool = crate::pool(threads).unwrap();
             pool.install(|| quantize(method, &lattice, 0.1, points).hash)
         };
         let one = hash(1, QuantizeMethod::Scalar, &points);

@@ -1,7 +1,7 @@
 //! Registering one cloud to another.
 
 use lattice_core::registration::{
-    Method, PrepareOptions, PreparedCloud, RegisterOptions, RegistrationError, SemanticCloud,
+    PrepareOptions, PreparedCloud, RegisterOptions, RegistrationError, SemanticCloud,
     register as run, voxel_downsample,
 };
 use nalgebra::Isometry3;
@@ -9,12 +9,12 @@ use serde::Serialize;
 
 use super::timed;
 
-/// What is registered, and how often.
+/// Options of a registration benchmark.
 #[derive(Clone, Copy, Debug)]
 pub struct RegisterSetup<'a> {
     /// Method with its tolerances.
     pub options: RegisterOptions<'a>,
-    /// How the clouds are prepared.
+    /// Preparation of the clouds.
     pub prepare: PrepareOptions,
     /// Side of the cells whose means are taken while the clock runs, m; `None` takes all points.
     pub cell_m: Option<f64>,
@@ -24,7 +24,7 @@ pub struct RegisterSetup<'a> {
     pub rounds: usize,
 }
 
-/// What a registration took and where it ended.
+/// Times and result of a registration.
 #[derive(Clone, Debug, PartialEq, Serialize)]
 pub struct RegisterReport {
     /// System and variant.
@@ -41,7 +41,7 @@ pub struct RegisterReport {
     pub cpu: RegisterTimes,
     /// 4 x 4 rows of the transform.
     pub target_from_source: [[f64; 4]; 4],
-    /// Whether it converged.
+    /// True if it converged.
     pub converged: bool,
     /// Searches for pairs.
     pub iterations: usize,
@@ -51,7 +51,7 @@ pub struct RegisterReport {
     pub rmse_m: f64,
 }
 
-/// What each round took, s.
+/// Times of each round, s.
 #[derive(Clone, Debug, PartialEq, Default, Serialize)]
 pub struct RegisterTimes {
     /// Thinning, trees and covariances of both clouds.
@@ -113,16 +113,6 @@ pub fn register(
     })
 }
 
-/// The published options of a method with a gate.
-pub fn register_options(method: Method, gate_m: f64) -> RegisterOptions<'static> {
-    let options = match method {
-        Method::PointToPoint => RegisterOptions::point_to_point(gate_m),
-        Method::Gicp | Method::Semantic(_) | Method::ClassWise => RegisterOptions::gicp(gate_m),
-        Method::GicpSe3 => RegisterOptions::gicp_se3(),
-    };
-    RegisterOptions { gate_m, ..options }
-}
-
 #[cfg(test)]
 mod tests {
     use nalgebra::Point3;
@@ -146,7 +136,7 @@ mod tests {
             .map(|p| p + nalgebra::Vector3::new(0.02, 0.0, 0.01));
         let source = SemanticCloud::unlabelled(points_m.collect());
         let setup = RegisterSetup {
-            options: register_options(Method::Gicp, 1.0),
+            options: RegisterOptions::gicp(1.0),
             prepare: PrepareOptions::default(),
             cell_m: None,
             target_from_source: Isometry3::identity(),

@@ -1,17 +1,17 @@
-//! Writes the point file of a simulated survey.
+//! The point file of a simulated survey.
 
 use std::fmt;
 use std::fs::File;
-use std::io::{self, BufWriter, Write};
+use std::io::{BufWriter, Write};
 use std::path::{Path, PathBuf};
 
-use crate::simulate::{SimulationError, Survey, SurveyPattern};
+use crate::simulate::{Survey, SurveyPattern};
+use crate::{AnyError, at};
 use serde::Serialize;
-use thiserror::Error;
 
 use super::points::{ScanRecord, point_to_bytes, scans_path};
 
-/// What to simulate and where to write it.
+/// Options of a simulated survey.
 #[derive(Clone, Debug)]
 pub struct SiteOptions {
     /// Seed of all noise; the same seed gives the same bytes.
@@ -24,7 +24,7 @@ pub struct SiteOptions {
     pub out: PathBuf,
 }
 
-/// What was written.
+/// Summary of a written survey.
 #[derive(Clone, Debug, PartialEq, Serialize)]
 pub struct SiteSummary {
     /// The point file.
@@ -53,33 +53,11 @@ impl fmt::Display for SiteSummary {
     }
 }
 
-/// Why no point file was written.
-#[derive(Debug, Error)]
-pub enum SiteError {
-    /// The simulation refused its options.
-    #[error(transparent)]
-    Simulation(#[from] SimulationError),
-    /// The file cannot be written.
-    #[error("{}: {source}", path.display())]
-    Io {
-        /// The file.
-        path: PathBuf,
-        /// What the operating system said.
-        source: io::Error,
-    },
-    /// The longest simulation has fewer points.
-    #[error("only {points} points in the longest simulation; ask for no more")]
-    TooMany {
-        /// Points that there are.
-        points: u64,
-    },
-}
-
 /// Writes a survey; `progress` hears the share done, 0..1.
 pub fn write_site(
     options: &SiteOptions,
     progress: &mut dyn FnMut(f64),
-) -> Result<SiteSummary, SiteError> {
+) -> Result<SiteSummary, AnyError> {
     let survey = Survey::new(options.seed, options.pattern)?;
     let scans_out = scans_path(&options.out);
     let mut points_file = create(&options.out)?;
@@ -110,7 +88,9 @@ pub fn write_site(
     points_file.flush().map_err(at(&options.out))?;
     scans_file.flush().map_err(at(&scans_out))?;
     if points < options.points {
-        return Err(SiteError::TooMany { points });
+        return Err(
+            format!("only {points} points in the longest simulation; ask for no more").into(),
+        );
     }
     Ok(SiteSummary {
         out: options.out.clone(),
@@ -125,17 +105,9 @@ pub fn write_site(
     })
 }
 
-fn create(path: &Path) -> Result<BufWriter<File>, SiteError> {
+fn create(path: &Path) -> Result<BufWriter<File>, AnyError> {
     let file = File::create(path).map_err(at(path))?;
     Ok(BufWriter::with_capacity(1 << 20, file))
-}
-
-fn at(path: &Path) -> impl Fn(io::Error) -> SiteError {
-    let path = path.to_owned();
-    move |source| SiteError::Io {
-        path: path.clone(),
-        source,
-    }
 }
 
 #[cfg(test)]
@@ -152,10 +124,7 @@ mod tests {
             points: 40_000,
             out: out.clone(),
         };
-        let pool = rayon::ThreadPoolBuilder::new()
-            .num_threads(threads)
-            .build()
-            .unwrap();
+        let pool = crate::pool(threads).unwrap();
         let summary = pool.install(|| write_site(&options, &mut |_| ())).unwrap();
         assert_eq!(summary.points, 40_000);
         (fs::read(&out).unwrap(), fs::read(scans_path(&out)).unwrap())

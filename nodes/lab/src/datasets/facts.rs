@@ -1,4 +1,4 @@
-//! What a user of the simulated log has to know, as constants that parameter files are checked against.
+//! Facts of the simulated log, as constants that parameter files are checked against.
 
 use crate::simulate::Laser;
 use lattice_core::geodesy::{GeodesyError, Geodetic, utc_ns_from_gps};

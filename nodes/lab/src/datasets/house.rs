@@ -1,33 +1,29 @@
-//! Writes a simulated house: the robot's map, and what headsets see, with the truth.
+//! The simulated house as files: the robot's map, headset clouds, and the truth.
 
 use std::collections::BTreeMap;
 use std::fmt;
 use std::fs::{self, File};
-use std::io::{self, BufWriter, Write};
-use std::path::{Path, PathBuf};
+use std::io::{BufWriter, Write};
+use std::path::PathBuf;
 
 use crate::simulate::house::{
-    HeadsetOptions, HeadsetTrial, House, HouseError, LabelDraw, LabelModel, Scene, Survey,
-    SurveyOptions,
+    HeadsetOptions, HeadsetTrial, LabelDraw, Scene, Survey, SurveyOptions,
 };
-use lattice_core::lattice::{Lattice, LatticeError, LatticeKind};
+use lattice_core::lattice::{Lattice, LatticeKind};
 use lattice_core::pose::Axes;
 use lattice_core::registration::UNLABELED;
-use lattice_core::voxels::file::{FileError, write_map};
+use lattice_core::voxels::file::write_map;
 use nalgebra::{Isometry3, Point3};
 use serde::{Deserialize, Serialize};
-use thiserror::Error;
 
-use crate::mesh::{MeshFileError, read_mesh};
-use lattice_nodes::files::classes::{ClassesError, read_classes};
+use crate::evaluate::read_house;
+use crate::{AnyError, at};
 use lattice_nodes::files::export::write_labelled_ply;
 
 /// Name of the robot's map in the folder.
 pub const MAP_FILE: &str = "map.lattice";
 /// Name of the list of classes.
 pub const CLASSES_FILE: &str = "classes.yaml";
-/// Most triangles of a mesh that is read.
-const MAX_TRIANGLES: usize = 5_000_000;
 
 /// Axes of the headset's clouds.
 #[derive(Clone, Copy, PartialEq, Eq, Debug, Default, Serialize, Deserialize)]
@@ -40,16 +36,16 @@ pub enum HeadsetAxes {
     Unity,
 }
 
-/// What to simulate and where to write it.
+/// Options of a simulated house.
 #[derive(Clone, Debug)]
 pub struct HouseOptions {
     /// The folder.
     pub out: PathBuf,
-    /// Whether files of an earlier run are replaced.
+    /// True to replace files of an earlier run.
     pub overwrite: bool,
     /// A mesh instead of our own house, with the names of its classes.
     pub mesh: Option<(PathBuf, PathBuf)>,
-    /// Where the house stands in the map.
+    /// Pose of the house in the map.
     pub map_from_house: Isometry3<f64>,
     /// Seed of everything; the same seed gives the same bytes.
     pub seed: u64,
@@ -57,8 +53,8 @@ pub struct HouseOptions {
     pub survey: SurveyOptions,
     /// The headset.
     pub headset: HeadsetOptions,
-    /// How labels are wrong.
-    pub labels: LabelModel,
+    /// Share of the headset's view whose regions are labelled wrongly, 0 to 1.
+    pub flips: f64,
     /// Lattice of the map.
     pub lattice: LatticeKind,
     /// Side of a cube of the volume of its cells, m.
@@ -67,7 +63,7 @@ pub struct HouseOptions {
     pub axes: HeadsetAxes,
 }
 
-/// What was written.
+/// Summary of a written house.
 #[derive(Clone, Debug, PartialEq, Serialize)]
 pub struct HouseSummary {
     /// The folder.
@@ -103,7 +99,7 @@ impl fmt::Display for HouseSummary {
     }
 }
 
-/// What is written beside the clouds of a scene.
+/// Truth that is written beside the clouds of a scene.
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
 pub struct SceneTruth {
     /// Name of the scene.
@@ -149,70 +145,22 @@ impl From<Isometry3<f64>> for Pose {
     }
 }
 
-/// Why nothing, or not all, was written.
-#[derive(Debug, Error)]
-pub enum HouseFilesError {
-    /// The simulation refused.
-    #[error(transparent)]
-    House(#[from] HouseError),
-    /// The lattice was refused.
-    #[error(transparent)]
-    Lattice(#[from] LatticeError),
-    /// There are files already.
-    #[error("{}: there is a file already; choose another folder or allow to overwrite", path.display())]
-    Exists {
-        /// The file.
-        path: PathBuf,
-    },
-    /// The mesh was not read.
-    #[error("{}: {source}", path.display())]
-    Mesh {
-        /// The file.
-        path: PathBuf,
-        /// Why.
-        source: MeshFileError,
-    },
-    /// The classes were not read.
-    #[error("{}: {source}", path.display())]
-    Classes {
-        /// The file.
-        path: PathBuf,
-        /// Why.
-        source: ClassesError,
-    },
-    /// The map was not written.
-    #[error("{}: {source}", path.display())]
-    Map {
-        /// The file.
-        path: PathBuf,
-        /// Why.
-        source: FileError,
-    },
-    /// A file was not written.
-    #[error("{}: {source}; check permissions and free space", path.display())]
-    Io {
-        /// The file.
-        path: PathBuf,
-        /// The cause.
-        source: io::Error,
-    },
-}
-
 /// Simulates a house and writes it to a folder: [`MAP_FILE`], [`CLASSES_FILE`], and for each scene
 /// `NAME.ply` (further headset scans `NAME_2.ply` and so on) with `NAME.json`, a [`SceneTruth`], beside it.
 /// `progress` hears the share done, 0..1.
 pub fn write_house(
     options: &HouseOptions,
     progress: &mut dyn FnMut(f64),
-) -> Result<HouseSummary, HouseFilesError> {
+) -> Result<HouseSummary, AnyError> {
     let lattice = Lattice::new(options.lattice, options.cell_side_m.powi(3))?;
-    let house = match &options.mesh {
-        None => House::own(options.seed)?,
-        Some((mesh, classes)) => read_house(mesh, classes)?,
-    };
+    let mesh = options
+        .mesh
+        .as_ref()
+        .map(|(m, c)| (m.as_path(), c.as_path()));
+    let (house, _) = read_house(mesh, options.seed)?;
     let house = house.placed(options.map_from_house);
     progress(0.1);
-    fs::create_dir_all(&options.out).map_err(io_at(&options.out))?;
+    fs::create_dir_all(&options.out).map_err(at(&options.out))?;
     let mut trials = Vec::new();
     for scene in Scene::ALL {
         trials.push(HeadsetTrial::new(
@@ -223,7 +171,7 @@ pub fn write_house(
         )?);
         progress(0.1 + 0.1 * trials.len() as f64);
     }
-    let draw = options.labels.draw_all(&house, &trials, options.seed)?;
+    let draw = LabelDraw::new(&house, &trials, options.flips, options.seed)?;
     let mut summary = HouseSummary {
         out: options.out.clone(),
         triangles: house.mesh().len(),
@@ -241,41 +189,25 @@ pub fn write_house(
     summary.survey_points = survey.cloud.len();
     summary.voxels = list.len();
     let (path, file) = create(options, MAP_FILE)?;
-    write_map(&list, BufWriter::new(file))
-        .map_err(|source| HouseFilesError::Map { path, source })?;
+    write_map(&list, BufWriter::new(file)).map_err(at(&path))?;
     let classes = BTreeMap::from([("classes", house.class_names())]);
-    let text = serde_yaml::to_string(&classes).map_err(io::Error::other);
     let (path, mut file) = create(options, CLASSES_FILE)?;
-    let written = text.and_then(|text| file.write_all(text.as_bytes()));
-    written.map_err(io_at(&path))?;
+    let text = serde_yaml::to_string(&classes)?;
+    file.write_all(text.as_bytes()).map_err(at(&path))?;
     progress(1.0);
     Ok(summary)
 }
 
-fn io_at(path: &Path) -> impl FnOnce(io::Error) -> HouseFilesError + use<> {
-    let path = path.to_owned();
-    move |source| HouseFilesError::Io { path, source }
-}
-
-/// Reads a house from a mesh and the names of its classes.
-pub fn read_house(mesh: &Path, classes: &Path) -> Result<House, HouseFilesError> {
-    let names = read_classes(classes).map_err(|source| HouseFilesError::Classes {
-        path: classes.to_owned(),
-        source,
-    })?;
-    let mesh = read_mesh(mesh, MAX_TRIANGLES).map_err(|source| HouseFilesError::Mesh {
-        path: mesh.to_owned(),
-        source,
-    })?;
-    Ok(House::from_mesh(mesh, names)?)
-}
-
-fn create(options: &HouseOptions, name: &str) -> Result<(PathBuf, File), HouseFilesError> {
+fn create(options: &HouseOptions, name: &str) -> Result<(PathBuf, File), AnyError> {
     let path = options.out.join(name);
     if path.exists() && !options.overwrite {
-        return Err(HouseFilesError::Exists { path });
+        let path = path.display();
+        return Err(format!(
+            "{path}: there is a file already; choose another folder or allow to overwrite"
+        )
+        .into());
     }
-    let file = File::create(&path).map_err(io_at(&path))?;
+    let file = File::create(&path).map_err(at(&path))?;
     Ok((path, file))
 }
 
@@ -284,7 +216,7 @@ fn write_scene(
     trial: &HeadsetTrial,
     draw: &LabelDraw,
     summary: &mut HouseSummary,
-) -> Result<(), HouseFilesError> {
+) -> Result<(), AnyError> {
     let name = trial.scene.name();
     let turned = |point_m: &Point3<f64>| match options.axes {
         HeadsetAxes::Ros => *point_m,
@@ -305,8 +237,7 @@ fn write_scene(
             _ => format!("{name}_{number}.ply"),
         };
         let points: Vec<Point3<f64>> = headset_scan.points_m.iter().map(turned).collect();
-        let lane = trial.scene as u64 * 64 + number;
-        let cloud = draw.headset.cloud(&points, &headset_scan.regions, lane);
+        let cloud = draw.headset.cloud(&points, &headset_scan.regions);
         let labels = cloud
             .labels
             .iter()
@@ -317,7 +248,7 @@ fn write_scene(
             HeadsetAxes::Ros => "metres, headset_origin: x forward, y left, z up",
             HeadsetAxes::Unity => "metres, headset_origin: x right, y up, z forward (left-handed)",
         };
-        write_labelled_ply(&points, &labels, comment, file).map_err(io_at(&path))?;
+        write_labelled_ply(&points, &labels, comment, file).map_err(at(&path))?;
         summary
             .headset_points
             .insert(cloud_name.clone(), points.len());
@@ -328,5 +259,5 @@ fn write_scene(
     }
     let (path, file) = create(options, &format!("{name}.json"))?;
     let written = serde_json::to_writer_pretty(BufWriter::new(file), &truth);
-    written.map_err(io::Error::other).map_err(io_at(&path))
+    written.map_err(at(&path))
 }

@@ -9,13 +9,14 @@ use super::facts::{
     INSPVAX_TOPIC, ODOMETRY_TOPIC, TF_STATIC_TOPIC, TF_TOPIC, bobcat_origin, bobcat_start_ns,
     points_topic,
 };
-use super::{SimulateError, messages};
+use super::messages;
+use crate::AnyError;
 
 /// Length of log that is computed at a time, ns.
 const BLOCK_NS: i64 = 1_000_000_000;
-/// From the last beam of a scan to its arrival at the recorder, ns.
+/// Time from the last beam of a scan to its arrival at the recorder, ns.
 const CLOUD_DELAY_NS: i64 = 3_000_000;
-/// From a turntable's stamp to its arrival, ns.
+/// Time from a turntable's stamp to its arrival, ns.
 const TURNTABLE_DELAY_NS: i64 = 400_000;
 
 /// A message as it is recorded.
@@ -31,7 +32,7 @@ pub struct LogEntry {
     pub true_points_m: Vec<[f32; 3]>,
 }
 
-/// What one block of the log holds.
+/// One block of the log.
 #[derive(Debug)]
 pub(super) struct Block<'a> {
     /// Messages ordered by log time.
@@ -54,7 +55,7 @@ pub(super) struct Log<'a> {
 }
 
 impl<'a> Log<'a> {
-    pub(super) fn new(bobcat: &'a Bobcat) -> Result<Self, SimulateError> {
+    pub(super) fn new(bobcat: &'a Bobcat) -> Result<Self, AnyError> {
         let mounts = LogEntry {
             topic: TF_STATIC_TOPIC,
             log_time_ns: bobcat_start_ns(),
@@ -73,7 +74,7 @@ impl<'a> Log<'a> {
     }
 
     /// The next block, None after the last. Each block holds what arrives in it, wherever it was measured.
-    pub(super) fn next_block(&mut self) -> Result<Option<Block<'_>>, SimulateError> {
+    pub(super) fn next_block(&mut self) -> Result<Option<Block<'_>>, AnyError> {
         if self.begin_ns > self.bobcat.duration_ns() {
             return Ok(None);
         }
@@ -123,7 +124,7 @@ impl<'a> Log<'a> {
         scans
     }
 
-    fn cloud(&self, laser: Laser, index: u64) -> Result<LogEntry, SimulateError> {
+    fn cloud(&self, laser: Laser, index: u64) -> Result<LogEntry, AnyError> {
         let scan = self.bobcat.scan(laser, index);
         let arrival_ns = scan.start_ns + crate::simulate::SCAN_SPAN_NS + CLOUD_DELAY_NS;
         Ok(LogEntry {
@@ -139,7 +140,7 @@ impl<'a> Log<'a> {
     }
 
     /// Both forms of the INS pose, which arrive together, and the turntable.
-    fn epoch(&self, sample: &InsSample) -> Result<[LogEntry; 3], SimulateError> {
+    fn epoch(&self, sample: &InsSample) -> Result<[LogEntry; 3], AnyError> {
         let entry = |topic, delay_ns: i64, cdr| LogEntry {
             topic,
             log_time_ns: bobcat_start_ns()

@@ -1,4 +1,4 @@
-//! From the simulation to messages.
+//! Messages of the simulated sensors.
 
 use crate::simulate::{Bobcat, InsSample, Laser, Lms200Scan, base_from_imu};
 use lattice_core::geodesy::{EnuFrame, GeodesyError};
@@ -158,7 +158,7 @@ pub(super) fn odometry(sample: &InsSample) -> Odometry {
     odometry
 }
 
-/// Where the turntable is.
+/// Transform of the turntable.
 pub(super) fn turntable(bobcat: &Bobcat, time_ns: i64) -> TFMessage {
     TFMessage {
         transforms: vec![transform(

@@ -36,8 +36,8 @@ pub use facts::{
     TF_TOPIC, TURNTABLE_FRAME, bobcat_origin, bobcat_start_ns, points_topic,
 };
 pub use house::{
-    CLASSES_FILE, HeadsetAxes, HeadsetScanTruth, HouseFilesError, HouseOptions, HouseSummary,
-    MAP_FILE, Pose, SceneTruth, read_house, write_house,
+    CLASSES_FILE, HeadsetAxes, HeadsetScanTruth, HouseOptions, HouseSummary, MAP_FILE, Pose,
+    SceneTruth, write_house,
 };
 pub use log::LogEntry;
-pub use write::{BobcatOptions, BobcatSummary, SimulateError, write_bobcat};
+pub use write::{BobcatOptions, BobcatSummary, write_bobcat};

@@ -1,21 +1,23 @@
 //! The noise-free truth beside a log.
 
 use std::fs::File;
-use std::io::{self, BufWriter, Seek, SeekFrom, Write};
-use std::path::{Path, PathBuf};
+use std::io::{BufWriter, Seek, SeekFrom, Write};
+use std::path::PathBuf;
 
 use crate::simulate::{
     BASE_FROM_TURNTABLE_M, INS_POSITION_RMS_M, InsSample, Laser, MAX_RANGE_M, MIN_RANGE_M,
     RANGE_NOISE_M, TURNTABLE_PERIOD_NS, base_from_imu,
 };
+use lattice_nodes::files::export::ply_header;
 use nalgebra::{Isometry3, Vector3};
 use serde::Serialize;
 
+use super::BobcatOptions;
 use super::facts::{
     BASE_FRAME, BOBCAT_GPS_WEEK, BOBCAT_GPS_WEEK_MS, BOBCAT_LEAP_SECONDS, BOBCAT_ORIGIN,
     BOBCAT_UNDULATION_M, IMU_FRAME, TURNTABLE_FRAME, bobcat_start_ns,
 };
-use super::{BobcatOptions, SimulateError};
+use crate::{AnyError, at};
 
 /// The folder in the log's directory.
 pub(super) const FOLDER: &str = "truth";
@@ -36,29 +38,23 @@ pub(super) struct Truth {
 
 impl Truth {
     /// Makes the folder, writes the site's facts and opens the other files.
-    pub(super) fn create(options: &BobcatOptions) -> Result<Self, SimulateError> {
+    pub(super) fn create(options: &BobcatOptions) -> Result<Self, AnyError> {
         let folder = options.out.join(FOLDER);
-        let failed = |path: &Path| {
-            let path = path.to_owned();
-            move |source| SimulateError::Io { path, source }
-        };
-        std::fs::create_dir_all(&folder).map_err(failed(&folder))?;
+        std::fs::create_dir_all(&folder).map_err(at(&folder))?;
         let site = folder.join(SITE_FILE);
-        let facts = serde_yaml::to_string(&SiteFacts::new(options))
-            .map_err(io::Error::other)
-            .map_err(failed(&site))?;
-        std::fs::write(&site, facts).map_err(failed(&site))?;
+        let facts = serde_yaml::to_string(&SiteFacts::new(options)).map_err(at(&site))?;
+        std::fs::write(&site, facts).map_err(at(&site))?;
         let open = |name: &str| {
             let path = folder.join(name);
-            let file = File::create(&path).map_err(failed(&path))?;
-            Ok::<_, SimulateError>((path, BufWriter::new(file)))
+            let file = File::create(&path).map_err(at(&path))?;
+            Ok::<_, AnyError>((path, BufWriter::new(file)))
         };
         let (mut poses, mut points) = (open(POSES_FILE)?, open(POINTS_FILE)?);
-        writeln!(poses.1, "stamp_ns,x,y,z,qx,qy,qz,qw").map_err(failed(&poses.0))?;
+        writeln!(poses.1, "stamp_ns,x,y,z,qx,qy,qz,qw").map_err(at(&poses.0))?;
         points
             .1
-            .write_all(&ply_header(0))
-            .map_err(failed(&points.0))?;
+            .write_all(&padded_header(0))
+            .map_err(at(&points.0))?;
         Ok(Self {
             poses,
             points,
@@ -67,7 +63,7 @@ impl Truth {
     }
 
     /// Adds the true pose of `base_link` in the map.
-    pub(super) fn pose(&mut self, sample: &InsSample) -> Result<(), SimulateError> {
+    pub(super) fn pose(&mut self, sample: &InsSample) -> Result<(), AnyError> {
         let stamp_ns = bobcat_start_ns().saturating_add(sample.time_ns);
         let Isometry3 {
             rotation,
@@ -80,62 +76,49 @@ impl Truth {
             "{stamp_ns},{},{},{},{},{},{},{}",
             p.x, p.y, p.z, q.x, q.y, q.z, q.w
         )
-        .map_err(|source| SimulateError::Io {
-            path: path.clone(),
-            source,
-        })
+        .map_err(at(path))
     }
 
     /// Adds the true points of a cloud.
-    pub(super) fn points(&mut self, points_m: &[[f32; 3]]) -> Result<(), SimulateError> {
+    pub(super) fn points(&mut self, points_m: &[[f32; 3]]) -> Result<(), AnyError> {
         let bytes: Vec<u8> = points_m
             .iter()
             .flatten()
             .flat_map(|v| v.to_le_bytes())
             .collect();
         let (path, file) = &mut self.points;
-        file.write_all(&bytes).map_err(|source| SimulateError::Io {
-            path: path.clone(),
-            source,
-        })?;
+        file.write_all(&bytes).map_err(at(path))?;
         self.point_count = self.point_count.saturating_add(points_m.len() as u64);
         Ok(())
     }
 
     /// Completes the files.
-    pub(super) fn finish(self) -> Result<(), SimulateError> {
+    pub(super) fn finish(self) -> Result<(), AnyError> {
         let Self {
             poses: (poses_path, mut poses),
             points: (points_path, mut points),
             point_count,
         } = self;
-        poses.flush().map_err(|source| SimulateError::Io {
-            path: poses_path,
-            source,
-        })?;
+        poses.flush().map_err(at(&poses_path))?;
         points
             .seek(SeekFrom::Start(0))
-            .and_then(|_| points.write_all(&ply_header(point_count)))
+            .and_then(|_| points.write_all(&padded_header(point_count)))
             .and_then(|()| points.flush())
-            .map_err(|source| SimulateError::Io {
-                path: points_path,
-                source,
-            })
+            .map_err(at(&points_path))
     }
 }
 
 /// Header of a binary PLY of float points, padded by a comment.
-fn ply_header(points: u64) -> Vec<u8> {
-    let begin = format!(
-        "ply\nformat binary_little_endian 1.0\ncomment true points in the map frame, m, in the order of the log\n\
-         element vertex {points}\nproperty float x\nproperty float y\nproperty float z\ncomment "
-    );
-    let end = "\nend_header\n";
-    let padding = PLY_HEADER_BYTES.saturating_sub(begin.len() + end.len());
-    format!("{begin}{}{end}", "-".repeat(padding)).into_bytes()
+fn padded_header(points: u64) -> Vec<u8> {
+    let vertices = [("vertex", points, &["float x", "float y", "float z"][..])];
+    let comment = "true points in the map frame, m, in the order of the log ";
+    let bare = ply_header(comment, &vertices);
+    let padding = PLY_HEADER_BYTES.saturating_sub(bare.len());
+    let comment = format!("{comment}{}", "-".repeat(padding));
+    ply_header(&comment, &vertices).into_bytes()
 }
 
-/// What `site.yaml` tells.
+/// Contents of `site.yaml`.
 #[derive(Serialize)]
 struct SiteFacts {
     simulation: &'static str,
@@ -225,8 +208,8 @@ mod tests {
 
     #[test]
     fn the_header_keeps_its_length() {
-        assert_eq!(ply_header(0).len(), PLY_HEADER_BYTES);
-        assert_eq!(ply_header(u64::MAX).len(), PLY_HEADER_BYTES);
-        assert!(ply_header(12).ends_with(b"-\nend_header\n"));
+        assert_eq!(padded_header(0).len(), PLY_HEADER_BYTES);
+        assert_eq!(padded_header(u64::MAX).len(), PLY_HEADER_BYTES);
+        assert!(padded_header(12).ends_with(b"\nend_header\n"));
     }
 }

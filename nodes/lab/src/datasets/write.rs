@@ -1,28 +1,25 @@
-//! Writes a simulated log.
+//! The simulated log as a rosbag2 directory.
 
 use std::collections::HashMap;
 use std::fmt;
 use std::fs;
-use std::io;
 use std::path::{Path, PathBuf};
 
-use crate::simulate::{Bobcat, Laser, SimulationError};
-use lattice_core::geodesy::GeodesyError;
+use crate::simulate::{Bobcat, Laser};
+use crate::{AnyError, at};
 use lattice_msgs::RosMessage;
-use lattice_msgs::cdr::CdrError;
 use lattice_msgs::nav_msgs::Odometry;
 use lattice_msgs::novatel_oem7_msgs::INSPVAX;
 use lattice_msgs::sensor_msgs::PointCloud2;
 use lattice_msgs::tf2_msgs::TFMessage;
 use serde::Serialize;
-use thiserror::Error;
 
 use super::facts::{INSPVAX_TOPIC, ODOMETRY_TOPIC, TF_STATIC_TOPIC, TF_TOPIC, points_topic};
 use super::log::{Block, Log};
 use super::truth::{self, Truth};
-use lattice_bag::{BagDurability, BagError, BagQos, BagWriter, Storage, TopicSpec, WriterOptions};
+use lattice_bag::{BagQos, BagWriter, Storage, TopicSpec, WriterOptions};
 
-/// What to simulate and where to write it.
+/// Options of a simulated log.
 #[derive(Clone, Debug)]
 pub struct BobcatOptions {
     /// Seed of all noise; the same seed gives the same messages.
@@ -35,11 +32,11 @@ pub struct BobcatOptions {
     pub storage: Storage,
     /// Directory of the bag.
     pub out: PathBuf,
-    /// Whether an earlier log at `out` is replaced.
+    /// True to replace an earlier log at `out`.
     pub overwrite: bool,
 }
 
-/// What was written.
+/// Summary of a written log.
 #[derive(Clone, Debug, PartialEq, Serialize)]
 pub struct BobcatSummary {
     /// Directory of the bag.
@@ -71,54 +68,16 @@ impl fmt::Display for BobcatSummary {
     }
 }
 
-/// Why a log was not written.
-#[derive(Debug, Error)]
-pub enum SimulateError {
-    /// The simulation refused its options.
-    #[error(transparent)]
-    Simulation(#[from] SimulationError),
-    /// There is something at the place of the log.
-    #[error("{}: there is a log already; choose another directory or allow to overwrite it", path.display())]
-    Exists {
-        /// The directory.
-        path: PathBuf,
-    },
-    /// There is something that no simulation wrote.
-    #[error("{}: not written by a simulation and not overwritten; move it or choose another directory", path.display())]
-    Foreign {
-        /// The file.
-        path: PathBuf,
-    },
-    /// The bag was not written.
-    #[error(transparent)]
-    Bag(#[from] BagError),
-    /// A file of the truth was not written.
-    #[error("{}: {source}; check permissions and free space", path.display())]
-    Io {
-        /// The file or folder.
-        path: PathBuf,
-        /// The cause.
-        source: io::Error,
-    },
-    /// A message was not serialised.
-    #[error(transparent)]
-    Cdr(#[from] CdrError),
-    /// A position has no place on the earth.
-    #[error(transparent)]
-    Geodesy(#[from] GeodesyError),
-}
-
-/// Simulates the skid-steer loader and writes its log as a rosbag2 directory, the truth beside it. `progress` is told
-/// the fraction done, 0..1.
+/// Simulates the skid-steer loader and writes its log as a rosbag2 directory, the truth beside it. `progress` gets
+/// the share done.
 pub fn write_bobcat(
     options: &BobcatOptions,
     progress: &mut dyn FnMut(f64),
-) -> Result<BobcatSummary, SimulateError> {
+) -> Result<BobcatSummary, AnyError> {
     let bobcat = Bobcat::new(options.seed, options.duration_s)?.with_person(options.person);
     make_way(&options.out, options.overwrite)?;
     let writer = WriterOptions {
         overwrite: options.overwrite,
-        ..WriterOptions::default()
     };
     let mut bag = BagWriter::create(&options.out, options.storage, writer)?;
     let mut topics = HashMap::new();
@@ -151,7 +110,7 @@ fn write_block(
     topics: &HashMap<String, usize>,
     truth: &mut Truth,
     summary: &mut BobcatSummary,
-) -> Result<(), SimulateError> {
+) -> Result<(), AnyError> {
     for entry in &block.entries {
         let topic = topics.get(entry.topic).copied().unwrap_or(usize::MAX);
         bag.write(topic, entry.log_time_ns, &entry.cdr)?;
@@ -184,7 +143,7 @@ fn topic_specs() -> Vec<TopicSpec> {
     specs.push(spec::<Odometry>(ODOMETRY_TOPIC, reliable(100)));
     specs.push(spec::<TFMessage>(TF_TOPIC, reliable(100)));
     let latched = BagQos {
-        durability: BagDurability::TransientLocal,
+        latched: true,
         ..reliable(1)
     };
     specs.push(spec::<TFMessage>(TF_STATIC_TOPIC, latched));
@@ -201,33 +160,35 @@ fn spec<M: RosMessage>(name: &str, qos: BagQos) -> TopicSpec {
 }
 
 /// Removes the truth of an earlier log, file by file; the bag beside it is the writer's matter.
-fn make_way(out: &Path, overwrite: bool) -> Result<(), SimulateError> {
+fn make_way(out: &Path, overwrite: bool) -> Result<(), AnyError> {
     let folder = out.join(truth::FOLDER);
     if !folder.exists() {
         return Ok(());
     }
     if !overwrite {
-        return Err(SimulateError::Exists {
-            path: out.to_owned(),
-        });
+        return Err(format!(
+            "{}: there is a log already; choose another directory or allow to overwrite it",
+            out.display()
+        )
+        .into());
     }
-    let failed = |path: &Path| {
-        let path = path.to_owned();
-        move |source| SimulateError::Io { path, source }
-    };
     let mut files = Vec::new();
-    for entry in fs::read_dir(&folder).map_err(failed(&folder))? {
-        let path = entry.map_err(failed(&folder))?.path();
+    for entry in fs::read_dir(&folder).map_err(at(&folder))? {
+        let path = entry.map_err(at(&folder))?.path();
         if !truth::FILES
             .iter()
             .any(|&name| path.file_name() == Some(name.as_ref()))
         {
-            return Err(SimulateError::Foreign { path });
+            return Err(format!(
+                "{}: not written by a simulation and not overwritten; move it or choose another directory",
+                path.display()
+            )
+            .into());
         }
         files.push(path);
     }
     files
         .iter()
-        .try_for_each(|path| fs::remove_file(path).map_err(failed(path)))?;
-    fs::remove_dir(&folder).map_err(failed(&folder))
+        .try_for_each(|path| fs::remove_file(path).map_err(at(path)))?;
+    fs::remove_dir(&folder).map_err(at(&folder))
 }

@@ -1,91 +1,101 @@
-//! What ours is compared with.
+//! Competitors of the evaluations: registrations, the start itself and ours, with their colours.
 
-use lattice_core::registration::{
-    LabelUse, Method, PreparedCloud, RegisterOptions, SemanticVariant, register,
-};
+use lattice_core::registration::{Method, NamedMethod, PreparedCloud, register};
 use nalgebra::Isometry3;
+use plotters::style::RGBColor;
+
+use super::trial::{OURS, TIMED, TRACKED};
 
 /// Gate of the methods for which none is published, metres.
 const GATE_M: f64 = 1.0;
+/// Name of the start itself.
+pub const START: &str = "start";
+/// Title of ours in tables.
+pub const OURS_TITLE: &str = "ours";
+
+/// Name, letters below a method's dots, and colour; most eyes tell the colours apart (Wong 2011).
+const LOOKS: [(&str, &str, RGBColor); 9] = [
+    (START, "start", RGBColor(170, 170, 170)),
+    ("icp", "ICP", RGBColor(86, 180, 233)),
+    ("gicp", "GICP", RGBColor(0, 114, 178)),
+    ("gicp_se3", "GICP", RGBColor(0, 158, 115)),
+    ("semantic_hard", "S 2018", RGBColor(230, 159, 0)),
+    ("semantic_soft", "S soft", RGBColor(240, 228, 66)),
+    ("em_hard", "EM", RGBColor(204, 121, 167)),
+    ("class_wise", "CW 2017", RGBColor(213, 94, 0)),
+    ("class_wise_cauchy", "CW Cauchy", RGBColor(128, 56, 0)),
+];
+
+/// Title of a competitor in tables and keys.
+pub fn title(name: &str) -> &str {
+    match name {
+        OURS => OURS_TITLE,
+        TIMED => "ours, alone",
+        TRACKED => "tracking, alone",
+        _ => NamedMethod::named(name).map_or(name, |method| method.title),
+    }
+}
+
+/// Letters below a competitor's dots.
+pub fn letters(name: &str) -> &'static str {
+    let look = LOOKS.iter().find(|look| look.0 == name);
+    look.map_or(OURS_TITLE, |look| look.1)
+}
+
+/// Colour of a competitor; ours is black.
+pub fn color(name: &str) -> RGBColor {
+    let look = LOOKS.iter().find(|look| look.0 == name);
+    look.map_or(RGBColor(0, 0, 0), |look| look.2)
+}
+
+/// All competitors in the order of the tables, ours last.
+pub fn competitors() -> impl Iterator<Item = &'static str> {
+    Baseline::all()
+        .map(|baseline| baseline.name())
+        .chain([OURS])
+}
 
 /// A registration from a start, or the start as it is.
 #[derive(Clone, Copy, Debug)]
-pub struct Baseline {
-    /// Name in results.
-    pub name: &'static str,
-    /// Name in reports.
-    pub title: &'static str,
-    options: Option<RegisterOptions<'static>>,
-}
+pub struct Baseline(Option<&'static NamedMethod>);
 
 /// The points of the headset, made ready.
 pub struct Sources<'a> {
-    /// Thinned to the cells of the map.
+    /// Points thinned to the cells of the map.
     pub thinned: &'a PreparedCloud,
-    /// All of them, for the class-wise method of 2017: it leaves out classes of fewer than 400 points, which would
-    /// be nearly all of the thinned ones.
+    /// All points, for the class-wise method of 2017: it leaves out classes of fewer than 400 points, which
+    /// would be nearly all of the thinned ones.
     pub full: &'a PreparedCloud,
 }
 
 impl Baseline {
-    /// All of them, in the order of the tables.
-    pub fn all() -> Vec<Baseline> {
-        let of = |name, title, options| Baseline {
-            name,
-            title,
-            options,
-        };
-        let semantic = RegisterOptions::semantic;
-        let published = SemanticVariant::Published;
-        vec![
-            of("start", "start", None),
-            of("icp", "ICP", Some(RegisterOptions::point_to_point(GATE_M))),
-            of("gicp", "GICP", Some(RegisterOptions::gicp(GATE_M))),
-            of("gicp_se3", "GICP-SE(3)", Some(RegisterOptions::gicp_se3())),
-            of(
-                "semantic_hard",
-                "Semantic-ICP, hard",
-                Some(semantic(published, LabelUse::Hard)),
-            ),
-            of(
-                "semantic_soft",
-                "Semantic-ICP, soft",
-                Some(semantic(published, LabelUse::Soft)),
-            ),
-            of(
-                "em_hard",
-                "Semantic-ICP, EM",
-                Some(RegisterOptions::semantic_em(GATE_M, LabelUse::Hard)),
-            ),
-            of(
-                "class_wise",
-                "class-wise 2017",
-                Some(RegisterOptions::class_wise()),
-            ),
-            of(
-                "class_wise_cauchy",
-                "class-wise, Cauchy",
-                Some(RegisterOptions::class_wise_cauchy()),
-            ),
-        ]
+    /// All baselines, in the order of the tables.
+    pub fn all() -> impl Iterator<Item = Baseline> {
+        let methods = NamedMethod::ALL.iter().map(Some);
+        let all = std::iter::once(None).chain(methods).map(Baseline);
+        all.filter(|baseline| baseline.name() != "as_printed")
     }
 
-    /// Where it ends.
+    /// Name in results.
+    pub fn name(&self) -> &'static str {
+        self.0.map_or(START, |method| method.name)
+    }
+
+    /// The pose that it finds from a start.
     pub fn run(
         &self,
         sources: &Sources<'_>,
         target: &PreparedCloud,
         start: &Isometry3<f64>,
     ) -> Isometry3<f64> {
-        match &self.options {
-            Some(options) => {
-                let source = match options.method {
-                    Method::ClassWise if options.kernel_of_square => sources.full,
-                    _ => sources.thinned,
-                };
-                register(source, target, start, options).target_from_source
-            }
-            None => *start,
-        }
+        let Some(method) = self.0 else {
+            return *start;
+        };
+        let options = method.options(GATE_M);
+        let source = match options.method {
+            Method::ClassWise if options.kernel_of_square => sources.full,
+            _ => sources.thinned,
+        };
+        register(source, target, start, &options).target_from_source
     }
 }

@@ -7,51 +7,18 @@ use std::io::{self, Write};
 use std::path::{Path, PathBuf};
 
 use serde::{Deserialize, Serialize};
-use thiserror::Error;
 
 use super::settings::{Cell, Settings};
 use super::trial::Trial;
+use crate::{AnyError, at};
 
 /// Name of the file in its folder.
 pub const FILE: &str = "trials.jsonl";
 
-/// Why results cannot be continued.
-#[derive(Debug, Error)]
-pub enum ResultsError {
-    /// The system could not read or write the file.
-    #[error("{path}: {source}")]
-    Io {
-        /// The file.
-        path: PathBuf,
-        /// What the system said.
-        source: io::Error,
-    },
-    /// A line is not what it should be.
-    #[error("{path}, line {line}: {reason}")]
-    Line {
-        /// The file.
-        path: PathBuf,
-        /// Counted from 1.
-        line: usize,
-        /// What is wrong.
-        reason: String,
-    },
-    /// The results are of something else.
-    #[error(
-        "{path} has results of other settings: {found}; take another folder, or the same mesh and options"
-    )]
-    Settings {
-        /// The file.
-        path: PathBuf,
-        /// Its first line.
-        found: String,
-    },
-}
-
 /// Results that grow.
 #[derive(Debug, Default)]
 pub struct Results {
-    /// Where they are kept, if anywhere.
+    /// File of the results, if they are kept.
     file: Option<(PathBuf, File)>,
     trials: Vec<Trial>,
     done: HashSet<String>,
@@ -69,32 +36,22 @@ impl Results {
     }
 
     /// Reads the results in a folder and what they are of; a last line that was not finished is left out.
-    pub fn read(folder: &Path) -> Result<(Settings, Vec<Trial>), ResultsError> {
+    pub fn read(folder: &Path) -> Result<(Settings, Vec<Trial>), AnyError> {
         let path = folder.join(FILE);
-        let text = fs::read(&path).map_err(|source| ResultsError::Io {
-            path: path.clone(),
-            source,
-        })?;
+        let text = fs::read(&path).map_err(at(&path))?;
         let (text, _) = whole_lines(&text);
         let first = text.lines().next().unwrap_or_default();
-        let head: Head = serde_json::from_str(first).map_err(|e| ResultsError::Line {
-            path: path.clone(),
-            line: 1,
-            reason: e.to_string(),
-        })?;
+        let head: Head = serde_json::from_str(first).map_err(|e| damaged(&path, 1, &e))?;
         let trials = read(&path, &text, &head.settings)?;
         Ok((head.settings, sorted(trials)))
     }
 
     /// Opens the results in a folder, which is made if need be; a last line that was not finished is
     /// cut off.
-    pub fn open(folder: &Path, settings: &Settings) -> Result<Results, ResultsError> {
+    pub fn open(folder: &Path, settings: &Settings) -> Result<Results, AnyError> {
         let path = folder.join(FILE);
-        let io = |source| ResultsError::Io {
-            path: path.clone(),
-            source,
-        };
-        fs::create_dir_all(folder).map_err(io)?;
+        let io = at(&path);
+        fs::create_dir_all(folder).map_err(&io)?;
         let text = match fs::read(&path) {
             Ok(bytes) => bytes,
             Err(e) if e.kind() == io::ErrorKind::NotFound => Vec::new(),
@@ -103,13 +60,13 @@ impl Results {
         let (text, whole) = whole_lines(&text);
         let trials = read(&path, &text, settings)?;
         let mut file = OpenOptions::new();
-        let mut file = file.create(true).append(true).open(&path).map_err(io)?;
-        file.set_len(whole as u64).map_err(io)?;
+        let mut file = file.create(true).append(true).open(&path).map_err(&io)?;
+        file.set_len(whole as u64).map_err(&io)?;
         if whole == 0 {
             let head = Head {
                 settings: settings.clone(),
             };
-            write_line(&mut file, &head).map_err(io)?;
+            write_line(&mut file, &head).map_err(&io)?;
         }
         let done = trials.iter().map(|t| name(&t.cell, &t.method)).collect();
         Ok(Results {
@@ -119,18 +76,10 @@ impl Results {
         })
     }
 
-    /// Whether a trial is done.
-    pub fn has(&self, cell: &Cell, method: &str) -> bool {
-        self.done.contains(&name(cell, method))
-    }
-
     /// Keeps a trial, on the disk when this returns if it is kept there.
-    pub fn add(&mut self, trial: Trial) -> Result<(), ResultsError> {
+    pub fn add(&mut self, trial: Trial) -> Result<(), AnyError> {
         if let Some((path, file)) = &mut self.file {
-            write_line(file, &trial).map_err(|source| ResultsError::Io {
-                path: path.clone(),
-                source,
-            })?;
+            write_line(file, &trial).map_err(at(path))?;
         }
         self.done.insert(name(&trial.cell, &trial.method));
         self.trials.push(trial);
@@ -178,25 +127,26 @@ pub fn name(cell: &Cell, method: &str) -> String {
     format!("{scene} {seed} {q} {start} {method}")
 }
 
-fn read(path: &Path, text: &str, settings: &Settings) -> Result<Vec<Trial>, ResultsError> {
-    let fault = |line: usize, reason: String| ResultsError::Line {
-        path: path.to_owned(),
-        line,
-        reason,
-    };
+fn damaged(path: &Path, line: usize, reason: &serde_json::Error) -> AnyError {
+    format!("{}, line {line}: {reason}", path.display()).into()
+}
+
+fn read(path: &Path, text: &str, settings: &Settings) -> Result<Vec<Trial>, AnyError> {
     let mut lines = text.lines().enumerate();
     let Some((_, first)) = lines.next() else {
         return Ok(Vec::new());
     };
     let head: Result<Head, _> = serde_json::from_str(first);
     if !head.is_ok_and(|head| head.settings == *settings) {
-        return Err(ResultsError::Settings {
-            path: path.to_owned(),
-            found: first.chars().take(400).collect(),
-        });
+        let found: String = first.chars().take(400).collect();
+        return Err(format!(
+            "{} has results of other settings: {found}; take another folder, or the same mesh and options",
+            path.display()
+        )
+        .into());
     }
     lines
-        .map(|(i, line)| serde_json::from_str(line).map_err(|e| fault(i + 1, e.to_string())))
+        .map(|(i, line)| serde_json::from_str(line).map_err(|e| damaged(path, i + 1, &e)))
         .collect()
 }
 
@@ -236,8 +186,7 @@ mod tests {
         fs::write(&path, &whole[..whole.len() - 7]).unwrap();
 
         let mut results = Results::open(folder.path(), &settings).unwrap();
-        assert!(results.has(&trial(1).cell, "icp"));
-        assert!(!results.has(&trial(0).cell, "icp") && !results.has(&trial(1).cell, "gicp"));
+        assert_eq!(results.done(), [name(&trial(1).cell, "icp")].into());
         results.add(trial(0)).unwrap();
         assert_eq!(fs::read(&path).unwrap(), whole);
         assert_eq!(results.sorted(), [trial(0), trial(1)]);
@@ -246,11 +195,8 @@ mod tests {
 
         // Not even the settings were written.
         fs::write(&path, &whole[..20]).unwrap();
-        let fault = Results::read(folder.path()).unwrap_err();
-        assert!(
-            matches!(fault, ResultsError::Line { line: 1, .. }),
-            "{fault}"
-        );
+        let error = Results::read(folder.path()).unwrap_err().to_string();
+        assert!(error.contains("line 1"), "{error}");
         let results = Results::open(folder.path(), &settings).unwrap();
         assert_eq!(results.sorted(), []);
         let head = whole.iter().position(|b| *b == b'\n').unwrap() + 1;
@@ -262,7 +208,6 @@ mod tests {
         let mut results = Results::in_memory();
         results.add(trial(1)).unwrap();
         results.add(trial(0)).unwrap();
-        assert!(results.has(&trial(1).cell, "icp"));
         assert_eq!(results.sorted(), [trial(0), trial(1)]);
         let folder = tempfile::tempdir().unwrap();
         assert!(Results::read(folder.path()).is_err());
@@ -276,17 +221,18 @@ mod tests {
             headset_scans: 2,
             ..Settings::default()
         };
-        let fault = Results::open(folder.path(), &other).unwrap_err();
-        assert!(matches!(fault, ResultsError::Settings { .. }), "{fault}");
+        let error = Results::open(folder.path(), &other)
+            .unwrap_err()
+            .to_string();
+        assert!(error.contains("other settings"), "{error}");
 
         let path = folder.path().join(FILE);
         let mut text = fs::read_to_string(&path).unwrap();
         text.push_str("{\"scene\":\n");
         fs::write(&path, text).unwrap();
-        let fault = Results::open(folder.path(), &Settings::default()).unwrap_err();
-        assert!(
-            matches!(fault, ResultsError::Line { line: 2, .. }),
-            "{fault}"
-        );
+        let error = Results::open(folder.path(), &Settings::default())
+            .unwrap_err()
+            .to_string();
+        assert!(error.contains("line 2"), "{error}");
     }
 }

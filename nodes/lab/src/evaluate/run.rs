@@ -1,4 +1,4 @@
-//! Runs the trials.
+//! The run of all trials, side by side and timed.
 
 use std::collections::HashSet;
 use std::ops::ControlFlow;
@@ -10,17 +10,17 @@ use crate::simulate::house::Scene;
 use lattice_core::registration::{CalibrationOptions, CalibrationRequest, calibrate, track};
 use nalgebra::Isometry3;
 
-use super::EvaluateError;
+use super::initial_guess::{perturbed, seed_of};
 use super::methods::{Baseline, Sources};
 use super::results::{Results, name};
 use super::settings::{Cell, Plan, Start};
-use super::start::{off, seed_of};
+use super::testbed::{Scenario, Testbed, View};
 use super::trial::{OURS, TIMED, TRACKED, Trial, rounded};
-use super::world::{Scenario, View, World};
+use crate::{AnyError, pool};
 
-/// Purpose of the seeds of starts.
+/// Number of the seeds of starts.
 const START: u64 = 4;
-/// How far off the tracker starts.
+/// Error of the tracker's start, metres and degrees.
 const TRACKED_OFF: (f64, f64) = (0.03, 1.0);
 
 /// One method on one trial.
@@ -41,7 +41,7 @@ enum TaskMethod {
 impl TaskMethod {
     fn name(self) -> &'static str {
         match self {
-            TaskMethod::Baseline(baseline) => baseline.name,
+            TaskMethod::Baseline(baseline) => baseline.name(),
             TaskMethod::Ours => OURS,
             TaskMethod::Timed => TIMED,
             TaskMethod::Tracked => TRACKED,
@@ -49,7 +49,7 @@ impl TaskMethod {
     }
 }
 
-/// What is to be done in one view.
+/// The tasks of one view.
 struct Job {
     scene: Scene,
     seed: u64,
@@ -60,40 +60,40 @@ struct Job {
 ///
 /// `progress` hears of trials done, of all, and may end the run with `Break`; what is done stays.
 pub fn run(
-    world: &World,
+    testbed: &Testbed,
     plan: &Plan,
     results: &mut Results,
     threads: usize,
     progress: &mut dyn FnMut(usize, usize) -> ControlFlow<()>,
-) -> Result<(), EvaluateError> {
+) -> Result<(), AnyError> {
     let done = results.done();
     let jobs = jobs(plan, &done, false);
     let timed = self::jobs(plan, &done, true);
     let tasks = |jobs: &[Job]| jobs.iter().map(|job| job.tasks.len()).sum::<usize>();
     let total = tasks(&jobs) + tasks(&timed);
     let mut count = 0;
-    let mut keep = |trial: Trial| -> Result<ControlFlow<()>, EvaluateError> {
+    let mut keep = |trial: Trial| -> Result<ControlFlow<()>, AnyError> {
         results.add(trial)?;
         count += 1;
         Ok(progress(count, total))
     };
-    if side_by_side(world, &jobs, threads, &mut keep)?.is_break() {
-        return Err(EvaluateError::Ended);
+    if side_by_side(testbed, &jobs, threads, &mut keep)?.is_break() {
+        return Err("ended before all trials were done".into());
     }
     // Nothing else runs while times are taken.
     let pool = pool(threads)?;
     for job in &timed {
         let mut trials = Vec::new();
-        // Is never ended on the way.
+        // The callback never breaks.
         let _ = pool.install(|| {
-            run_job(world, job, &mut |trial| {
+            run_job(testbed, job, &mut |trial| {
                 trials.push(trial);
                 ControlFlow::Continue(())
             })
         })?;
         for trial in trials {
             if keep(trial)?.is_break() {
-                return Err(EvaluateError::Ended);
+                return Err("ended before all trials were done".into());
             }
         }
     }
@@ -102,34 +102,31 @@ pub fn run(
 
 /// Each job on one thread, several jobs at once.
 fn side_by_side(
-    world: &World,
+    testbed: &Testbed,
     jobs: &[Job],
     threads: usize,
-    keep: &mut dyn FnMut(Trial) -> Result<ControlFlow<()>, EvaluateError>,
-) -> Result<ControlFlow<()>, EvaluateError> {
+    keep: &mut dyn FnMut(Trial) -> Result<ControlFlow<()>, AnyError>,
+) -> Result<ControlFlow<()>, AnyError> {
     let (next, ended) = (AtomicUsize::new(0), AtomicBool::new(false));
-    let (sender, receiver) = mpsc::channel::<Result<Trial, EvaluateError>>();
+    let (sender, receiver) = mpsc::channel::<Result<Trial, AnyError>>();
     std::thread::scope(|scope| {
         for _ in 0..threads.max(1) {
             let (sender, next, ended) = (sender.clone(), &next, &ended);
             scope.spawn(move || {
-                let worked = pool(1).and_then(|pool| {
-                    pool.install(|| {
-                        work(
-                            world,
-                            jobs,
-                            next,
-                            &mut |trial| match ended.load(Ordering::Relaxed)
+                let worked =
+                    pool(1).and_then(|pool| {
+                        pool.install(|| {
+                            work(testbed, jobs, next, &mut |trial| match ended
+                                .load(Ordering::Relaxed)
                                 || sender.send(Ok(trial)).is_err()
                             {
                                 true => ControlFlow::Break(()),
                                 false => ControlFlow::Continue(()),
-                            },
-                        )
-                    })
-                });
+                            })
+                        })
+                    });
                 if let Err(fault) = worked {
-                    // Nobody listens any more only after another fault.
+                    // The receiver is gone only after another error.
                     let _ = sender.send(Err(fault));
                 }
             });
@@ -148,25 +145,20 @@ fn side_by_side(
 
 /// Takes one job after the other.
 fn work(
-    world: &World,
+    testbed: &Testbed,
     jobs: &[Job],
     next: &AtomicUsize,
     found: &mut dyn FnMut(Trial) -> ControlFlow<()>,
-) -> Result<(), EvaluateError> {
+) -> Result<(), AnyError> {
     while let Some(job) = jobs.get(next.fetch_add(1, Ordering::Relaxed)) {
-        if run_job(world, job, found)?.is_break() {
+        if run_job(testbed, job, found)?.is_break() {
             break;
         }
     }
     Ok(())
 }
 
-fn pool(threads: usize) -> Result<rayon::ThreadPool, EvaluateError> {
-    let pool = rayon::ThreadPoolBuilder::new().num_threads(threads.max(1));
-    Ok(pool.build()?)
-}
-
-/// All that is to be done; `timed` for what is measured alone.
+/// The jobs of a plan that are not done; `timed` for those that are measured alone.
 fn jobs(plan: &Plan, done: &HashSet<String>, timed: bool) -> Vec<Job> {
     let views = plan.views().into_iter();
     let job = |(seed, scene)| Job {
@@ -199,7 +191,7 @@ fn tasks(plan: &Plan, scene: Scene, seed: u64) -> Vec<Task> {
         for &start in &plan.starts {
             let mut methods = vec![TaskMethod::Ours];
             if start != Start::None {
-                methods.extend(Baseline::all().into_iter().map(TaskMethod::Baseline));
+                methods.extend(Baseline::all().map(TaskMethod::Baseline));
             }
             let task = |method| Task {
                 cell: cell(scene, seed, q, start),
@@ -212,7 +204,7 @@ fn tasks(plan: &Plan, scene: Scene, seed: u64) -> Vec<Task> {
     all
 }
 
-/// Without a start and by the tracker, in the middle of the flips.
+/// Timed tasks: without a start and by the tracker, at the middle share of wrong labels.
 fn timed_tasks(plan: &Plan, scene: Scene, seed: u64) -> Vec<Task> {
     let q = plan.flips.get(plan.flips.len() / 2).copied();
     let Some(q) = q.filter(|_| seed.wrapping_sub(plan.first_seed) < plan.timed_seeds) else {
@@ -235,18 +227,18 @@ fn timed_tasks(plan: &Plan, scene: Scene, seed: u64) -> Vec<Task> {
 }
 
 fn run_job(
-    world: &World,
+    testbed: &Testbed,
     job: &Job,
     found: &mut dyn FnMut(Trial) -> ControlFlow<()>,
-) -> Result<ControlFlow<()>, EvaluateError> {
-    let view: View = world.view(job.scene, job.seed)?;
+) -> Result<ControlFlow<()>, AnyError> {
+    let view: View = testbed.view(job.scene, job.seed)?;
     let mut scenario: Option<(f64, Scenario)> = None;
     for task in &job.tasks {
         let q = task.cell.q;
         if scenario.as_ref().is_none_or(|(of, _)| *of != q) {
             // Before the next one is made, which is as large.
             drop(scenario.take());
-            scenario = Some((q, world.scenario(&view, q)?));
+            scenario = Some((q, testbed.scenario(&view, q)?));
         }
         if let Some((_, scenario)) = &scenario {
             let trial = run_task(scenario, task, job);
@@ -264,7 +256,7 @@ fn run_task(scenario: &Scenario, task: &Task, job: &Job) -> Trial {
         Start::Off { m, deg } => {
             // The same for every q.
             let seed = seed_of(&[START, job.seed, job.scene as u64, m.to_bits()]);
-            Some(off(&scenario.truth, &scenario.pivot_m, m, deg, seed))
+            Some(perturbed(&scenario.truth, &scenario.pivot_m, m, deg, seed))
         }
     };
     let trial = |pose: &Isometry3<f64>, wall_ms| Trial {

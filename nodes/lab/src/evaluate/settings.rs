@@ -1,4 +1,4 @@
-//! What is evaluated.
+//! Settings of an evaluation and the plan of its trials.
 
 use std::fmt;
 use std::str::FromStr;
@@ -9,10 +9,10 @@ use serde::{Deserialize, Serialize};
 /// Version of trials and their seeds; old results are not continued with new ones.
 pub const FORMAT: u32 = 1;
 
-/// Which trials there are, and of what. Everything but the times depends on it alone.
+/// Settings that all results depend on, but for the times.
 #[derive(Clone, PartialEq, Debug, Serialize, Deserialize)]
 pub struct Settings {
-    /// Of this crate's trials.
+    /// Version of the trials, [`FORMAT`].
     pub format: u32,
     /// Checksum of the mesh, or None for the house of our own making.
     pub mesh_crc32: Option<u32>,
@@ -24,22 +24,18 @@ pub struct Settings {
     pub map_seeds: u64,
     /// Pictures that the headset takes.
     pub headset_scans: usize,
-    /// Whether a class is always taken for the same other one.
-    pub consistent: bool,
-    /// Share of single points with a random class.
-    pub iid: f64,
-    /// What starts are moved and turned at.
+    /// Point at which starts are moved and turned.
     pub pivot: Pivot,
 }
 
-/// What a start is moved and turned at.
+/// Point at which a start is moved and turned.
 #[derive(Clone, Copy, PartialEq, Eq, Debug, Default, Serialize, Deserialize)]
 #[serde(rename_all = "snake_case")]
 pub enum Pivot {
     /// The midst of the seen points.
     #[default]
     View,
-    /// The headset's place: what is seen then moves farther than is said.
+    /// The headset: the seen points then move farther than is said.
     Headset,
 }
 
@@ -52,14 +48,12 @@ impl Default for Settings {
             survey_views: 384,
             map_seeds: 3,
             headset_scans: 1,
-            consistent: false,
-            iid: 0.0,
             pivot: Pivot::default(),
         }
     }
 }
 
-/// What is known of the pose before.
+/// A start: what is known of the pose before.
 #[derive(Clone, Copy, PartialEq, Debug)]
 pub enum Start {
     /// The truth, moved by metres and turned about the vertical by degrees, both at the [`Pivot`].
@@ -69,7 +63,7 @@ pub enum Start {
         /// Degrees.
         deg: f64,
     },
-    /// Nothing.
+    /// No start.
     None,
 }
 
@@ -106,7 +100,7 @@ impl FromStr for Start {
 /// The trials of one run.
 #[derive(Clone, PartialEq, Debug)]
 pub struct Plan {
-    /// What is looked at.
+    /// Scenes that are looked at.
     pub scenes: Vec<Scene>,
     /// Seed of the first trial of a cell.
     pub first_seed: u64,
@@ -114,7 +108,7 @@ pub struct Plan {
     pub seeds: u64,
     /// Shares of the view that are labelled wrongly.
     pub flips: Vec<f64>,
-    /// What is known before.
+    /// Starts.
     pub starts: Vec<Start>,
     /// Names of the methods that are run; all of them if empty.
     pub methods: Vec<String>,
@@ -141,7 +135,7 @@ impl Default for Plan {
     }
 }
 
-/// What makes a trial, but for the method.
+/// A trial, but for the method.
 #[derive(Clone, PartialEq, Debug, Serialize, Deserialize)]
 pub struct Cell {
     /// Name of the scene.
@@ -150,12 +144,19 @@ pub struct Cell {
     pub seed: u64,
     /// Share of the view that is labelled wrongly.
     pub q: f64,
-    /// As [`Start`] is written.
+    /// Start, as [`Start`] is written.
     pub start: String,
 }
 
+impl Cell {
+    /// The cell as a key of maps.
+    pub fn key(&self) -> (&str, u64, u64, &str) {
+        (&self.scene, self.seed, self.q.to_bits(), &self.start)
+    }
+}
+
 impl Plan {
-    /// Whether a method is run.
+    /// True of a method that is run.
     pub fn wants(&self, method: &str) -> bool {
         self.methods.is_empty() || self.methods.iter().any(|name| name == method)
     }

@@ -1,27 +1,27 @@
-//! Small statistics.
+//! Shares, medians and quantiles with their intervals.
 
 use serde::Serialize;
 
 /// Normal quantile of a two-sided 95 % interval.
 const Z: f64 = 1.959_963_984_540_054;
 
-/// How many of how many, with the 95 % interval of Wilson (1927).
+/// A share of trials, with the 95 % interval of Wilson (1927).
 #[derive(Clone, Copy, PartialEq, Debug, Serialize)]
 pub struct Share {
-    /// How many.
+    /// Number of hits.
     pub k: usize,
-    /// Of how many.
+    /// Number of trials.
     pub n: usize,
-    /// k / n; None of none.
+    /// The share k / n; None of no trials.
     pub share: Option<f64>,
-    /// Lower end.
+    /// Lower end of the interval.
     pub low: f64,
-    /// Upper end.
+    /// Upper end of the interval.
     pub high: f64,
 }
 
 impl Share {
-    /// Of those for which something holds.
+    /// The share of those for which something holds.
     pub fn of(holds: impl IntoIterator<Item = bool>) -> Share {
         let (mut k, mut n) = (0, 0);
         for one in holds {
@@ -31,7 +31,19 @@ impl Share {
         Share::new(k, n)
     }
 
-    /// `k` of `n`.
+    /// "75.0 % of 4 [30.1, 95.4]", with so many digits; a dash for none of none.
+    pub fn text(&self, digits: usize) -> String {
+        let Some(share) = self.share else {
+            return "-".to_owned();
+        };
+        let [share, low, high] = [share, self.low, self.high].map(|value| 100.0 * value);
+        format!(
+            "{share:.digits$} % of {} [{low:.digits$}, {high:.digits$}]",
+            self.n
+        )
+    }
+
+    /// The share `k` of `n`.
     pub fn new(k: usize, n: usize) -> Share {
         if n == 0 {
             return Share {
@@ -62,7 +74,7 @@ pub const LEAST_FOR_INTERVAL: usize = 6;
 /// An interval that holds the median of what the values were drawn from in 95 % of all draws or more,
 /// whatever its distribution: ranks by the binomial of one half (Conover 1999, section 3.2).
 ///
-/// Of fewer than [`LEAST_FOR_INTERVAL`] values it is all of them, which hold it less often; None of nothing.
+/// For fewer than [`LEAST_FOR_INTERVAL`] values it spans all of them and holds less often; None of no values.
 pub fn median_interval(values: impl IntoIterator<Item = f64>) -> Option<[f64; 2]> {
     let mut values: Vec<f64> = values.into_iter().collect();
     values.sort_by(f64::total_cmp);
@@ -97,6 +109,13 @@ pub fn quantile(values: impl IntoIterator<Item = f64>, share: f64) -> Option<f64
         values.get(at.ceil() as usize)?,
     );
     Some(low + (high - low) * at.fract())
+}
+
+/// Least and greatest of some values; infinite of no values.
+pub fn extent(values: impl IntoIterator<Item = f64>) -> [f64; 2] {
+    let ends = [f64::INFINITY, f64::NEG_INFINITY];
+    let wider = |[low, high]: [f64; 2], value: f64| [low.min(value), high.max(value)];
+    values.into_iter().fold(ends, wider)
 }
 
 #[cfg(test)]

@@ -1,4 +1,4 @@
-//! What the trials say together. Nothing is left out: a pose that was refused counts as it is.
+//! The summary of all trials. Nothing is left out: a pose that was refused counts as it is.
 
 mod tables;
 
@@ -11,35 +11,35 @@ use super::statistics::{Share, median, quantile};
 use super::trial::{OURS, TIMED, TRACKED, Trial, WRONG, WRONG_TIGHT};
 pub use tables::{Accepted, Consistency, PRINTED, Paired, Printed, Row, TimeRow};
 
-/// Farther from the other by this is worse: metres and degrees.
+/// Tolerance of "not worse": metres and degrees.
 const TOLERANCE: (f64, f64) = (0.01, 0.2);
 
-/// All tables.
+/// All tables of an evaluation.
 #[derive(Clone, PartialEq, Debug, Serialize)]
 pub struct Summary {
-    /// Of what.
+    /// Settings of the trials.
     pub settings: Settings,
-    /// Threads that timed trials had; the others had one.
+    /// Threads of timed trials; the others had one.
     pub timed_threads: usize,
-    /// Lines of results.
+    /// Number of results.
     pub trials: usize,
-    /// What the paper prints.
+    /// Errors that the paper prints.
     pub printed: [Printed; 4],
-    /// By scene, start, share of wrong labels and method; and over all scenes.
+    /// Rows by scene, start, share of wrong labels and method; and over all scenes.
     pub rows: Vec<Row>,
-    /// Ours against the others.
+    /// Ours against the others, trial by trial.
     pub paired: Vec<Paired>,
-    /// What is accepted.
+    /// Accepted poses.
     pub accepted: Vec<Accepted>,
-    /// Whether the covariance is right.
+    /// Normalised errors of the stated covariance.
     pub consistency: Vec<Consistency>,
-    /// How long it takes.
+    /// Wall times.
     pub times: Vec<TimeRow>,
     /// Trials of ours that were refused, or accepted and wrong.
     pub failures: Vec<Trial>,
 }
 
-/// Scenes of a table: each, and all together.
+/// Distinct names in their order, and "all".
 fn with_all(trials: &[&Trial], of: impl Fn(&Trial) -> String) -> Vec<String> {
     let mut names: Vec<String> = trials.iter().map(|t| of(t)).collect();
     names.sort_unstable();
@@ -71,7 +71,7 @@ fn is_of(name: &str, wanted: &str) -> bool {
 }
 
 impl Summary {
-    /// Of trials in the order of [`Results::sorted`](super::Results::sorted).
+    /// A summary of trials in the order of [`Results::sorted`](super::Results::sorted).
     pub fn new(settings: &Settings, trials: &[Trial], timed_threads: usize) -> Summary {
         let (timed, plain): (Vec<&Trial>, Vec<&Trial>) =
             (trials.iter()).partition(|t| [TIMED, TRACKED].contains(&t.method.as_str()));
@@ -90,6 +90,35 @@ impl Summary {
             failures: ours.iter().filter(refused).map(|t| (**t).clone()).collect(),
         }
     }
+}
+
+impl Summary {
+    /// Distinct starts, in order.
+    pub(super) fn starts(&self) -> Vec<&str> {
+        sorted(self.rows.iter().map(|row| row.start.as_str()))
+    }
+
+    /// Distinct scenes, in order, without all of them together.
+    pub(super) fn scenes(&self) -> Vec<&str> {
+        let scenes = self.rows.iter().map(|row| row.scene.as_str());
+        sorted(scenes.filter(|scene| *scene != "all"))
+    }
+
+    /// Rows of a scene, start and method, in the order of their shares of wrong labels.
+    pub(super) fn of_method(&self, scene: &str, start: &str, method: &str) -> Vec<&Row> {
+        let of = |r: &&Row| r.scene == scene && r.start == start && r.method == method;
+        let mut rows: Vec<&Row> = self.rows.iter().filter(of).collect();
+        rows.sort_by(|a, b| a.q.total_cmp(&b.q));
+        rows
+    }
+}
+
+/// Distinct names, in order.
+pub(super) fn sorted<'a>(names: impl Iterator<Item = &'a str>) -> Vec<&'a str> {
+    let mut names: Vec<&str> = names.collect();
+    names.sort_unstable();
+    names.dedup();
+    names
 }
 
 fn rows(trials: &[&Trial]) -> Vec<Row> {
@@ -125,21 +154,13 @@ fn rows(trials: &[&Trial]) -> Vec<Row> {
 }
 
 fn paired(trials: &[&Trial], ours: &[&Trial]) -> Vec<Paired> {
-    let key = |t: &Trial| {
-        (
-            t.cell.scene.clone(),
-            t.cell.seed,
-            t.cell.q.to_bits(),
-            t.cell.start.clone(),
-        )
-    };
-    let mine: BTreeMap<_, &Trial> = ours.iter().map(|t| (key(t), *t)).collect();
+    let mine: BTreeMap<_, &Trial> = ours.iter().map(|t| (t.cell.key(), *t)).collect();
     let others = distinct(trials, |t| t.method.clone());
     let mut table = Vec::new();
     for against in others.into_iter().filter(|method| method != OURS) {
         let of_method = trials.iter().filter(|t| t.method == against);
         let pairs: Vec<(&Trial, &Trial)> = of_method
-            .filter_map(|other| Some((*mine.get(&key(other))?, *other)))
+            .filter_map(|other| Some((*mine.get(&other.cell.key())?, *other)))
             .collect();
         let others: Vec<&Trial> = pairs.iter().map(|(_, other)| *other).collect();
         for start in with_all(&others, |t| t.cell.start.clone()) {
@@ -323,8 +344,11 @@ mod tests {
             .unwrap();
         assert_eq!(counts(&row.success), (2, 4));
         assert!((row.translation_m.unwrap() - 0.16).abs() < 1e-6);
+        let report = super::super::report(&summary, &trials).unwrap();
+        let text = crate::report::markdown(&report);
         assert!(
-            super::super::markdown(&summary).contains("| GICP-SE(3) | all | all | 75.0 % of 4")
+            text.contains("| GICP-SE(3) | all | all | 75.0 % of 4"),
+            "{text}"
         );
     }
 
@@ -332,8 +356,7 @@ mod tests {
     fn no_trials_make_empty_tables() {
         let summary = Summary::new(&Settings::default(), &[], 2);
         assert!(summary.rows.is_empty() && summary.failures.is_empty());
-        assert!(super::super::markdown(&summary).contains("0 results"));
-        let folder = tempfile::tempdir().unwrap();
-        super::super::draw(folder.path(), &summary, &[]).unwrap();
+        let report = super::super::report(&summary, &[]).unwrap();
+        assert!(crate::report::markdown(&report).contains("0 results"));
     }
 }

@@ -1,4 +1,4 @@
-//! What one method made of one trial.
+//! The result of one method in one trial.
 
 use crate::metrics::PoseError;
 use lattice_core::registration::{Calibration, Verdict};
@@ -17,10 +17,10 @@ pub const TRACKED: &str = "tracking_timed";
 /// One line of the results.
 #[derive(Clone, PartialEq, Debug, Serialize, Deserialize)]
 pub struct Trial {
-    /// Which trial it is.
+    /// The trial.
     #[serde(flatten)]
     pub cell: Cell,
-    /// What was asked.
+    /// Name of the method.
     pub method: String,
     /// Share of the view whose labels differ between map and headset.
     pub different_share: f64,
@@ -28,29 +28,29 @@ pub struct Trial {
     pub translation_m: f64,
     /// Angle from the truth, degrees.
     pub rotation_deg: f64,
-    /// Of it, how far the vertical is off, degrees.
+    /// Tilt of the vertical, part of the angle, degrees.
     pub tilt_deg: f64,
-    /// ||log(T* T_GT^-1)||, as the paper prints it.
+    /// The error ||log(T* T_GT^-1)||, as the paper prints it.
     pub d_se3: f64,
-    /// ||log(T_GT^-1 T*)||.
+    /// Its left form ||log(T_GT^-1 T*)||.
     pub d_se3_left: f64,
     /// Mean distance of the seen points from where they should be, metres.
     pub view_m: f64,
     /// Wall time, milliseconds, on one thread but for those that are timed.
     pub wall_ms: f64,
-    /// What only a calibration says.
+    /// Judgement of a calibration.
     #[serde(skip_serializing_if = "Option::is_none", default)]
     pub judged: Option<Judged>,
 }
 
-/// What a calibration says of its pose.
+/// A calibration's judgement of its pose.
 #[derive(Clone, PartialEq, Debug, Serialize, Deserialize)]
 pub struct Judged {
-    /// As in `lattice_msgs/CalibrationResult`.
+    /// Verdict, as in `lattice_msgs/CalibrationResult`.
     pub verdict: String,
-    /// Why.
+    /// Reason of the verdict.
     pub reason: String,
-    /// Which candidate was chosen.
+    /// Candidate that was chosen.
     pub chosen: String,
     /// Log-likelihood above the best different pose; None if there was none.
     pub margin: Option<f64>,
@@ -69,9 +69,9 @@ pub struct Bounds {
     pub deg: f64,
 }
 
-/// Beyond it a pose is wrong.
+/// Bounds beyond which a pose is wrong.
 pub const WRONG: Bounds = Bounds { m: 0.15, deg: 3.0 };
-/// A tighter one.
+/// Tighter bounds.
 pub const WRONG_TIGHT: Bounds = Bounds { m: 0.10, deg: 3.0 };
 
 impl Trial {
@@ -108,7 +108,7 @@ impl Trial {
         }
     }
 
-    /// With what a calibration says.
+    /// The trial with the judgement of its calibration.
     pub fn with_judgement(self, calibration: &Calibration, truth: &Isometry3<f64>) -> Trial {
         let margin = calibration.log_margin;
         Trial {
@@ -124,24 +124,24 @@ impl Trial {
         }
     }
 
-    /// Whether the pose is within bounds.
+    /// True if the pose is within bounds.
     pub fn is_within(&self, bounds: Bounds) -> bool {
         self.translation_m <= bounds.m && self.rotation_deg <= bounds.deg
     }
 
-    /// The same of the seen points in place of the headset's origin, which may be metres away from them.
+    /// True if the seen points are within bounds, in place of the headset's origin, which may be metres away from them.
     pub fn is_within_in_view(&self, bounds: Bounds) -> bool {
         self.view_m <= bounds.m && self.rotation_deg <= bounds.deg
     }
 
-    /// Whether a calibration said that the pose holds.
+    /// True if a calibration accepted the pose.
     pub fn is_accepted(&self) -> bool {
         let judged = self.judged.as_ref();
         judged.is_some_and(|j| j.verdict == Verdict::Ok.name())
     }
 }
 
-/// As many digits as are read back exactly from a file.
+/// A value rounded to the digits that are read back exactly from a file.
 pub(super) fn rounded(value: f64) -> f64 {
     const UNIT: f64 = 1e6;
     if value.abs() < 1e9 {

@@ -2,21 +2,25 @@
 
 use nalgebra::{Isometry3, Point3, Translation3, UnitQuaternion, Vector3};
 
-use super::{AlignOptions, MAX_POINTS, MatchError, MultiResolutionList, sample};
+use super::{AlignOptions, MAX_POINTS, MultiResolutionList, sample};
+use crate::AnyError;
 use lattice_core::cloud::Cloud;
 use lattice_core::lattice::Lattice;
 use lattice_core::voxels::{OccupancyList, VoxelStore};
 
-/// A pose of a scan and how well it fits.
+/// Error of a map without a voxel.
+pub(super) const EMPTY_MAP: &str = "the map is empty";
+
+/// A pose of a scan and its fit.
 #[derive(Clone, Copy, PartialEq, Debug)]
 pub struct Alignment {
-    /// The pose.
+    /// Pose of the scan.
     pub map_from_cloud: Isometry3<f64>,
     /// Points of the sample in occupied cells of the finest level.
     pub hits: usize,
     /// Points of the sample.
     pub points: usize,
-    /// How many poses were tried to find it.
+    /// Poses that were tried.
     pub evaluations: usize,
 }
 
@@ -31,10 +35,9 @@ pub fn align(
     cloud: &Cloud,
     map_from_cloud: &Isometry3<f64>,
     options: &AlignOptions,
-) -> Result<Alignment, MatchError> {
-    options.check()?;
+) -> Result<Alignment, AnyError> {
     let mut pose = begin(map, cloud, map_from_cloud)?;
-    let finest = map.levels().first().ok_or(MatchError::EmptyMap)?;
+    let finest = map.levels().first().ok_or(EMPTY_MAP)?;
     let all = sample_of(&cloud.offsets_m, finest.lattice(), MAX_POINTS, 0)?;
     let mut evaluations = 0;
     for (level, list) in map.levels().iter().enumerate().rev() {
@@ -62,8 +65,7 @@ pub fn refine(
     cloud: &Cloud,
     map_from_cloud: &Isometry3<f64>,
     options: &AlignOptions,
-) -> Result<Alignment, MatchError> {
-    options.check()?;
+) -> Result<Alignment, AnyError> {
     let pose = begin(map, cloud, map_from_cloud)?;
     refine_from(map, cloud, &pose, options)
 }
@@ -73,8 +75,8 @@ fn refine_from(
     cloud: &Cloud,
     pose: &Isometry3<f64>,
     options: &AlignOptions,
-) -> Result<Alignment, MatchError> {
-    let list = map.levels().first().ok_or(MatchError::EmptyMap)?;
+) -> Result<Alignment, AnyError> {
+    let list = map.levels().first().ok_or(EMPTY_MAP)?;
     let points = sample_of(&cloud.offsets_m, list.lattice(), options.max_points, 1)?;
     let mut top = Top {
         pose: *pose,
@@ -107,17 +109,19 @@ pub(super) fn begin(
     map: &MultiResolutionList,
     cloud: &Cloud,
     map_from_cloud: &Isometry3<f64>,
-) -> Result<Isometry3<f64>, MatchError> {
+) -> Result<Isometry3<f64>, AnyError> {
     if map.is_empty() {
-        return Err(MatchError::EmptyMap);
+        return Err(EMPTY_MAP.into());
     }
     if cloud.len() > MAX_POINTS {
         let points = cloud.len();
-        return Err(MatchError::TooManyPoints { points });
+        return Err(format!("{points} points, at most {MAX_POINTS} are taken").into());
     }
     let pose = map_from_cloud * Translation3::from(cloud.datum_m);
     let finite = pose.to_homogeneous().iter().all(|entry| entry.is_finite());
-    finite.then_some(pose).ok_or(MatchError::Pose)
+    Ok(finite
+        .then_some(pose)
+        .ok_or("the pose to begin with is not finite")?)
 }
 
 /// The pose of a cloud from that of its offsets.
@@ -131,16 +135,18 @@ pub(super) fn sample_of(
     lattice: &Lattice,
     most: usize,
     round: u64,
-) -> Result<Vec<[f32; 3]>, MatchError> {
+) -> Result<Vec<[f32; 3]>, AnyError> {
     let points = sample(points_m, lattice, most, round);
     if points.is_empty() {
         let points = points_m.len();
-        return Err(MatchError::NoPoints { points });
+        return Err(
+            format!("none of {points} points is finite and near enough to its datum").into(),
+        );
     }
     Ok(points)
 }
 
-/// How far a step goes, and how many there are.
+/// Length and number of steps.
 struct Steps {
     metres: f64,
     radians: f64,

@@ -2,13 +2,13 @@
 
 use nalgebra::{Isometry3, Vector3};
 
-use super::MatchError;
+use crate::AnyError;
 use lattice_core::cloud::Cloud;
 use lattice_core::lattice::Lattice;
 use lattice_core::voxels::{InsertReport, OccupancyList, VoxelStore};
 
 /// Most levels of a list.
-pub const MAX_LEVELS: usize = 12;
+const MAX_LEVELS: usize = 12;
 
 /// Occupied cells of one lattice at several sizes: level 0 is the finest, each next one has cells of
 /// twice the side.
@@ -28,9 +28,9 @@ impl MultiResolutionList {
         datum_near_m: Vector3<f64>,
         levels: usize,
         max_bytes: usize,
-    ) -> Result<MultiResolutionList, MatchError> {
+    ) -> Result<MultiResolutionList, AnyError> {
         if !(1..=MAX_LEVELS).contains(&levels) {
-            return Err(MatchError::Levels { levels });
+            return Err(format!("{levels} levels, from 1 to {MAX_LEVELS} are taken").into());
         }
         let level = |level: usize| {
             let lattice = finest.scaled((1_u32 << level) as f64)?;
@@ -40,7 +40,7 @@ impl MultiResolutionList {
                 max_bytes / levels,
             )?)
         };
-        let levels: Result<_, MatchError> = (0..levels).map(level).collect();
+        let levels: Result<_, AnyError> = (0..levels).map(level).collect();
         Ok(MultiResolutionList { levels: levels? })
     }
 
@@ -62,8 +62,8 @@ impl MultiResolutionList {
         self.levels.iter().all(VoxelStore::is_empty)
     }
 
-    /// How many points `map_from_points` puts into occupied cells of a level; of a level that is not
-    /// there, none.
+    /// Number of points that `map_from_points` puts into occupied cells of a level; none of a level that
+    /// is not there.
     pub fn overlap(
         &self,
         level: usize,

@@ -1,4 +1,4 @@
-//! Where a scan lies in a map, by occupied cells alone: lists of several resolutions (Ryde & Hu, the
+//! Scan matching by occupied cells alone: lists of several resolutions (Ryde & Hu, the
 //! matcher behind Fig. 6 of Ryde & Brünig 2011).
 //!
 //! A [`MultiResolutionList`] holds the map once for each level, with cells of twice the side from one
@@ -7,7 +7,6 @@
 //! and divides the best ones, level by level. Both take any lattice.
 
 mod align;
-mod error;
 mod levels;
 mod options;
 mod sample;
@@ -16,8 +15,7 @@ mod search;
 mod tests;
 
 pub use align::{Alignment, align, refine};
-pub use error::MatchError;
-pub use levels::{MAX_LEVELS, MultiResolutionList};
+pub use levels::MultiResolutionList;
 pub use options::{AlignOptions, SearchOptions, Spread};
-pub use sample::{MAX_POINTS, sample};
+use sample::{MAX_POINTS, sample};
 pub use search::search;

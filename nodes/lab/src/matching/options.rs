@@ -1,23 +1,6 @@
-//! How a scan is matched.
+//! Options of the matching.
 
-use std::f64::consts::PI;
-
-use crate::options::{OutOfRange, within};
-
-/// Most iterations of one climb.
-const MOST_ITERATIONS: f64 = 1e5;
-/// Most climbs by shorter and shorter steps.
-const MOST_STAGES: f64 = 8.0;
-/// Most points of a sample.
-const MOST_SAMPLE: f64 = 1e7;
-/// Most poses of a grid.
-const MOST_POSES: f64 = 1e8;
-/// Most poses kept of a level.
-const MOST_KEPT: f64 = 1e4;
-/// Largest spread of a search, metres.
-const MOST_SPREAD_M: f64 = 1e5;
-
-/// How [`align`](super::align) climbs; by default the numbers of the original, with a second fine stage.
+/// Options of [`align`](super::align); by default the numbers of the original, with a second fine stage.
 #[derive(Clone, Copy, PartialEq, Debug)]
 pub struct AlignOptions {
     /// Most points of the scan that are looked at, one of a cell.
@@ -48,19 +31,6 @@ impl Default for AlignOptions {
     }
 }
 
-impl AlignOptions {
-    pub(super) fn check(&self) -> Result<(), OutOfRange> {
-        within("max_points", self.max_points as f64, 1.0, MOST_SAMPLE)?;
-        let iterations = self.level_iterations as f64;
-        within("level_iterations", iterations, 0.0, MOST_ITERATIONS)?;
-        within("fine_stages", self.fine_stages as f64, 1.0, MOST_STAGES)?;
-        let iterations = self.fine_iterations as f64;
-        within("fine_iterations", iterations, 0.0, MOST_ITERATIONS)?;
-        within("fine_step", self.fine_step, 1e-3, 1.0)?;
-        within("step_rad", self.step_rad, 1e-6, PI)
-    }
-}
-
 /// Half the widths of what is searched, about a pose; 0 keeps an axis as it is.
 #[derive(Clone, Copy, PartialEq, Debug, Default)]
 pub struct Spread {
@@ -71,26 +41,14 @@ pub struct Spread {
     pub rotation_rad: [f64; 3],
 }
 
-impl Spread {
-    pub(super) fn check(&self) -> Result<(), OutOfRange> {
-        for value in self.translation_m {
-            within("translation_m", value, 0.0, MOST_SPREAD_M)?;
-        }
-        for value in self.rotation_rad {
-            within("rotation_rad", value, 0.0, PI)?;
-        }
-        Ok(())
-    }
-}
-
-/// How [`search`](super::search) goes through its grid; the numbers of the original by default.
+/// Options of [`search`](super::search); by default the numbers of the original.
 #[derive(Clone, Copy, PartialEq, Debug)]
 pub struct SearchOptions {
     /// Most points of the scan that are looked at, one of a cell.
     pub max_points: usize,
     /// Poses kept of a level, and given in the end.
     pub keep: usize,
-    /// Where a turn moves a point as far as a shift does: distance of the features, metres.
+    /// Distance of the features, at which a turn moves a point as far as a shift does, metres.
     pub feature_range_m: f64,
     /// Most poses of the coarsest grid; it takes 8 bytes for each.
     pub max_poses: usize,
@@ -104,14 +62,5 @@ impl Default for SearchOptions {
             feature_range_m: 8.0,
             max_poses: 5_000_000,
         }
-    }
-}
-
-impl SearchOptions {
-    pub(super) fn check(&self) -> Result<(), OutOfRange> {
-        within("max_points", self.max_points as f64, 1.0, MOST_SAMPLE)?;
-        within("keep", self.keep as f64, 1.0, MOST_KEPT)?;
-        within("feature_range_m", self.feature_range_m, 1e-3, 1e6)?;
-        within("max_poses", self.max_poses as f64, 1.0, MOST_POSES)
     }
 }

@@ -9,7 +9,7 @@ pub const MAX_POINTS: usize = u32::MAX as usize;
 
 /// One point of each cell that the points (metres) lie in, at most `most`, in the order of the cells.
 ///
-/// Which point of a cell, and which cells if there are too many, is drawn by `round`: another round
+/// The point of a cell, and the cells if there are too many, are drawn by `round`: another round
 /// is another sample. Points without a cell, and those beyond [`MAX_POINTS`], are left out.
 pub fn sample(points_m: &[[f32; 3]], lattice: &Lattice, most: usize, round: u64) -> Vec<[f32; 3]> {
     let quantizer = BatchQuantizer::new(lattice, Isometry3::identity());

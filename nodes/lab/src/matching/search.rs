@@ -3,8 +3,9 @@
 use nalgebra::{Isometry3, Point3, Vector3};
 use rayon::prelude::*;
 
-use super::align::{begin, end, moved, sample_of};
-use super::{Alignment, MatchError, MultiResolutionList, SearchOptions, Spread};
+use super::align::{EMPTY_MAP, begin, end, moved, sample_of};
+use super::{Alignment, MultiResolutionList, SearchOptions, Spread};
+use crate::AnyError;
 use lattice_core::cloud::Cloud;
 use lattice_core::voxels::VoxelStore;
 
@@ -24,18 +25,17 @@ pub fn search(
     map_from_cloud: &Isometry3<f64>,
     spread: &Spread,
     options: &SearchOptions,
-) -> Result<Vec<Alignment>, MatchError> {
-    options.check()?;
-    spread.check()?;
+) -> Result<Vec<Alignment>, AnyError> {
     let middle = begin(map, cloud, map_from_cloud)?;
-    let coarsest = map.levels().last().ok_or(MatchError::EmptyMap)?;
+    let coarsest = map.levels().last().ok_or(EMPTY_MAP)?;
     let side_m = coarsest.lattice().cell_side_m();
     let grid = Grid::new(spread, side_m, side_m / options.feature_range_m);
-    if grid.poses() > options.max_poses as f64 {
-        return Err(MatchError::TooManyPoses {
-            poses: grid.poses(),
-            most: options.max_poses,
-        });
+    let mut spreads = spread.translation_m.iter().chain(&spread.rotation_rad);
+    if !spreads.all(|half| half.is_finite()) || grid.poses() > options.max_poses as f64 {
+        let (poses, most) = (grid.poses(), options.max_poses);
+        return Err(
+            format!("{poses} poses on the coarsest grid, at most {most} are allowed").into(),
+        );
     }
     let pose = |o: &Offset| {
         let [x, y, z, a, b, c] = *o;

@@ -7,35 +7,14 @@ use lattice_nodes::files::points::ply::header::{Element, Header, Property};
 use lattice_nodes::files::points::ply::{axes, number, record};
 use lattice_nodes::files::points::source::Source;
 use lattice_nodes::files::points::{self, PointFileError};
-use thiserror::Error;
 
-use super::{LabelledMesh, MAX_TRIANGLES, MeshError};
+use super::{LabelledMesh, MAX_TRIANGLES};
+use crate::AnyError;
 
 /// Most corners of a polygon.
 const MAX_CORNERS: usize = 1024;
 /// Room that is made on the word of a header alone.
 const TRUSTED: u64 = 1 << 16;
-
-/// Error of a mesh file.
-#[derive(Debug, Error)]
-pub enum MeshFileError {
-    /// The file cannot be read as PLY.
-    #[error(transparent)]
-    File(#[from] PointFileError),
-    /// The parts of the mesh do not fit together.
-    #[error("the file was read, but is no mesh: {0}")]
-    Mesh(#[from] MeshError),
-    /// More triangles than the caller allows.
-    #[error(
-        "the file has {triangles} triangles or more, but at most {max_triangles} are allowed: simplify the mesh"
-    )]
-    TooManyTriangles {
-        /// Promised by the header, or found so far.
-        triangles: u64,
-        /// Limit of the caller.
-        max_triangles: usize,
-    },
-}
 
 /// The parts of a mesh as they are read.
 #[derive(Default)]
@@ -46,14 +25,14 @@ struct Parts {
     instances: Vec<u16>,
 }
 
-/// Which properties of a face are what.
+/// Columns of the properties of a face.
 struct FaceColumns {
     corners: usize,
     label: Option<usize>,
     instance: Option<usize>,
 }
 
-/// What one record says.
+/// Values of one record.
 #[derive(Default)]
 struct Face {
     corners: Vec<f64>,
@@ -68,12 +47,12 @@ struct Face {
 /// PLY, also packed with bzip2: vertices with `x`, `y`, `z` (metres), faces with a list `vertex_indices`
 /// or `vertex_index` and numbers `label` and `instance`. Polygons become fans of triangles. Without
 /// labels all are [`UNLABELED`], without instances each label is one.
-pub fn read_mesh(path: &Path, max_triangles: usize) -> Result<LabelledMesh, MeshFileError> {
+pub fn read_mesh(path: &Path, max_triangles: usize) -> Result<LabelledMesh, AnyError> {
     let (reader, _) = points::open(path)?;
     read(&mut Source::new(reader), max_triangles.min(MAX_TRIANGLES))
 }
 
-fn read(source: &mut Source, max_triangles: usize) -> Result<LabelledMesh, MeshFileError> {
+fn read(source: &mut Source, max_triangles: usize) -> Result<LabelledMesh, AnyError> {
     let header = Header::read(source)?;
     let mut parts = Parts::default();
     for name in ["vertex", "face"] {
@@ -94,7 +73,8 @@ fn read(source: &mut Source, max_triangles: usize) -> Result<LabelledMesh, MeshF
         labels,
         instances,
     } = parts;
-    Ok(LabelledMesh::new(vertices_m, triangles, labels, instances)?)
+    LabelledMesh::new(vertices_m, triangles, labels, instances)
+        .map_err(|error| format!("the file was read, but is no mesh: {error}").into())
 }
 
 fn line(header: &Header, reason: String) -> PointFileError {
@@ -142,14 +122,15 @@ fn read_faces(
     element: &Element,
     max_triangles: usize,
     parts: &mut Parts,
-) -> Result<(), MeshFileError> {
+) -> Result<(), AnyError> {
     let columns = face_columns(element).map_err(|reason| line(header, reason))?;
-    let too_many = |triangles: u64| MeshFileError::TooManyTriangles {
-        triangles,
-        max_triangles,
+    let too_many = |triangles: u64| {
+        format!(
+            "the file has {triangles} triangles or more, but at most {max_triangles} are allowed: simplify the mesh"
+        )
     };
     if element.count > max_triangles as u64 {
-        return Err(too_many(element.count));
+        return Err(too_many(element.count).into());
     }
     parts.triangles.reserve(element.count.min(TRUSTED) as usize);
     let mut face = Face::default();
@@ -180,7 +161,7 @@ fn read_faces(
             reason: format!("{reason}, in {part}"),
         })?;
         if parts.triangles.len() > max_triangles {
-            return Err(too_many(parts.triangles.len() as u64));
+            return Err(too_many(parts.triangles.len() as u64).into());
         }
     }
     Ok(())

@@ -1,60 +1,11 @@
 //! A triangle mesh with a class and an instance for each triangle.
 
-use thiserror::Error;
+use crate::AnyError;
 
 /// Most triangles, and vertices, of a mesh.
 pub const MAX_TRIANGLES: usize = 20_000_000;
 /// Coordinates beyond this have no millimetres in f32.
 pub const MAX_COORDINATE_M: f32 = 1.0e4;
-
-/// What a mesh is refused for. Vertices and triangles count from 0.
-#[derive(Clone, Copy, PartialEq, Debug, Error)]
-pub enum MeshError {
-    /// A coordinate is NaN, infinite or too large.
-    #[error(
-        "vertex {vertex} is at {value} m, not within {MAX_COORDINATE_M} m; check the unit or move the mesh to its origin"
-    )]
-    Coordinate {
-        /// Which vertex.
-        vertex: usize,
-        /// The first coordinate at fault, metres.
-        value: f32,
-    },
-    /// A triangle names a vertex that is not there.
-    #[error("triangle {triangle} has vertex {vertex}, but there are {vertices}")]
-    Index {
-        /// Which triangle.
-        triangle: usize,
-        /// The vertex it names.
-        vertex: u32,
-        /// Number of vertices.
-        vertices: usize,
-    },
-    /// Not one value for each triangle.
-    #[error("{found} {what} for {triangles} triangles")]
-    Length {
-        /// What there is not one of each.
-        what: &'static str,
-        /// How many there are.
-        found: usize,
-        /// Number of triangles.
-        triangles: usize,
-    },
-    /// Triangles within triangles, over and over.
-    #[error("the triangles are nested {depth} levels deep; cut away what nobody sees")]
-    Depth {
-        /// Levels of the search tree.
-        depth: u32,
-    },
-    /// More than [`MAX_TRIANGLES`].
-    #[error("{found} {what}, but at most {MAX_TRIANGLES} are taken")]
-    TooMany {
-        /// Vertices or triangles.
-        what: &'static str,
-        /// How many there are.
-        found: usize,
-    },
-}
 
 /// Triangles with a class and an instance each, in a frame that the holder names.
 ///
@@ -75,39 +26,39 @@ impl LabelledMesh {
         triangles: Vec<[u32; 3]>,
         labels: Vec<u16>,
         instances: Vec<u16>,
-    ) -> Result<LabelledMesh, MeshError> {
+    ) -> Result<LabelledMesh, AnyError> {
         for (what, found) in [
             ("vertices", vertices_m.len()),
             ("triangles", triangles.len()),
         ] {
             if found > MAX_TRIANGLES {
-                return Err(MeshError::TooMany { what, found });
+                return Err(
+                    format!("{found} {what}, but at most {MAX_TRIANGLES} are taken").into(),
+                );
             }
         }
         for (what, found) in [("labels", labels.len()), ("instances", instances.len())] {
             if found != triangles.len() {
-                let triangles = triangles.len();
-                return Err(MeshError::Length {
-                    what,
-                    found,
-                    triangles,
-                });
+                return Err(format!("{found} {what} for {} triangles", triangles.len()).into());
             }
         }
         for (vertex, point) in vertices_m.iter().enumerate() {
-            let fault = |c: &&f32| !(-MAX_COORDINATE_M..=MAX_COORDINATE_M).contains(*c);
-            if let Some(&value) = point.iter().find(fault) {
-                return Err(MeshError::Coordinate { vertex, value });
+            let beyond = |c: &&f32| !(-MAX_COORDINATE_M..=MAX_COORDINATE_M).contains(*c);
+            if let Some(value) = point.iter().find(beyond) {
+                return Err(format!(
+                    "vertex {vertex} is at {value} m, not within {MAX_COORDINATE_M} m; check the unit or move the \
+                     mesh to its origin"
+                )
+                .into());
             }
         }
         let vertices = vertices_m.len();
         for (triangle, corners) in triangles.iter().enumerate() {
-            if let Some(&vertex) = corners.iter().find(|&&v| v as usize >= vertices) {
-                return Err(MeshError::Index {
-                    triangle,
-                    vertex,
-                    vertices,
-                });
+            if let Some(vertex) = corners.iter().find(|&&v| v as usize >= vertices) {
+                return Err(format!(
+                    "triangle {triangle} has vertex {vertex}, but there are {vertices}"
+                )
+                .into());
             }
         }
         Ok(LabelledMesh {
@@ -123,7 +74,7 @@ impl LabelledMesh {
         self.triangles.len()
     }
 
-    /// Whether there is no triangle.
+    /// True if there is no triangle.
     pub fn is_empty(&self) -> bool {
         self.triangles.is_empty()
     }
@@ -169,25 +120,17 @@ mod tests {
         };
         assert_eq!(mesh(&corners, &[[0, 1, 2]], 1).unwrap().len(), 1);
         assert!(mesh(&[], &[], 0).unwrap().is_empty());
-        let triangles = 1;
-        let (what, found) = ("labels", 2);
+        let error = mesh(&corners, &[[0, 1, 2]], 2).unwrap_err();
+        assert_eq!(error.to_string(), "2 labels for 1 triangles");
+        let error = mesh(&corners, &[[0, 1, 2], [2, 3, 0]], 2).unwrap_err();
         assert_eq!(
-            mesh(&corners, &[[0, 1, 2]], 2),
-            Err(MeshError::Length {
-                what,
-                found,
-                triangles
-            })
-        );
-        let fault = mesh(&corners, &[[0, 1, 2], [2, 3, 0]], 2).unwrap_err();
-        assert_eq!(
-            fault.to_string(),
+            error.to_string(),
             "triangle 1 has vertex 3, but there are 3"
         );
         for value in [f32::NAN, f32::NEG_INFINITY, 2.0e4] {
             let corners = [[0.0; 3], [0.0, value, 0.0]];
-            let fault = mesh(&corners, &[], 0).unwrap_err();
-            assert!(matches!(fault, MeshError::Coordinate { vertex: 1, .. }));
+            let error = mesh(&corners, &[], 0).unwrap_err();
+            assert!(error.to_string().starts_with("vertex 1 is at"), "{error}");
         }
     }
 }

@@ -4,6 +4,6 @@ mod file;
 mod labelled;
 mod scene;
 
-pub use file::{MeshFileError, read_mesh};
-pub use labelled::{LabelledMesh, MAX_COORDINATE_M, MAX_TRIANGLES, MeshError};
+pub use file::read_mesh;
+pub use labelled::{LabelledMesh, MAX_COORDINATE_M, MAX_TRIANGLES};
 pub use scene::{MeshHit, MeshScene};

@@ -1,4 +1,4 @@
-//! How far an estimate is from the truth.
+//! Errors of an estimate against the truth.
 
 mod pose_error;
 

@@ -1,6 +1,6 @@
 //! Means with their intervals.
 
-use super::report::Cell;
+use crate::report::Cell;
 
 /// A mean and half of its 95 % interval.
 #[derive(Clone, Copy, PartialEq, Debug)]
@@ -12,7 +12,7 @@ pub struct Estimate {
 }
 
 impl Estimate {
-    /// Of independent values, by Student's t.
+    /// The estimate from independent values, by Student's t.
     pub fn of(values: impl IntoIterator<Item = f64>) -> Estimate {
         let values: Vec<f64> = values.into_iter().collect();
         let n = values.len() as f64;
@@ -50,12 +50,12 @@ impl Estimate {
         }
     }
 
-    /// Whether all of the interval is below 0.
+    /// True if all of the interval is below 0.
     pub fn is_negative(&self) -> bool {
         self.mean + self.half < 0.0
     }
 
-    /// Whether all of the interval is above 0.
+    /// True if all of the interval is above 0.
     pub fn is_positive(&self) -> bool {
         self.mean - self.half > 0.0
     }

@@ -4,6 +4,5 @@
 pub mod calibration;
 mod estimate;
 mod parallel;
-pub mod report;
 mod streams;
 pub mod voxels;

@@ -5,7 +5,7 @@ use rayon::prelude::*;
 /// Tasks of each core between two words about progress.
 const GROUP: usize = 4;
 
-/// `task` of 0 to `n`, in that order; `progress` is told how much is done, from 0 to 1.
+/// Results of `task` of 0 to `n`, in that order; `progress` gets the share done.
 pub fn in_parallel<T: Send>(
     n: usize,
     progress: &mut dyn FnMut(f64),
@@ -28,10 +28,10 @@ mod tests {
 
     #[test]
     fn results_are_in_order_and_progress_ends_at_1() {
-        let mut told = Vec::new();
-        let squares = in_parallel(101, &mut |done| told.push(done), |i| i * i);
+        let mut shares = Vec::new();
+        let squares = in_parallel(101, &mut |done| shares.push(done), |i| i * i);
         assert_eq!(squares, (0..101).map(|i| i * i).collect::<Vec<_>>());
-        assert!(told.is_sorted() && told.last() == Some(&1.0));
+        assert!(shares.is_sorted() && shares.last() == Some(&1.0));
         assert!(in_parallel(0, &mut |_| {}, |i| i).is_empty());
     }
 }

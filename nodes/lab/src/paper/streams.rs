@@ -2,7 +2,7 @@
 
 use crate::random::Stream;
 
-/// What random numbers are for; streams of different purposes are independent.
+/// Purpose of random numbers; streams of different purposes are independent.
 #[derive(Clone, Copy, Debug)]
 #[repr(u64)]
 pub enum Purpose {
@@ -14,15 +14,15 @@ pub enum Purpose {
     Uniform = 258,
     /// Rotations and offsets of a cloud.
     Pose = 259,
-    /// Which points of a cloud are taken.
+    /// Choice of the points of a cloud.
     Thin = 260,
-    /// Where a lattice lies about a cloud.
+    /// Place of a lattice about a cloud.
     Offset = 261,
-    /// How lattices lie and where alignments start.
+    /// Poses of lattices and starts of alignments.
     Matching = 272,
     /// Resamples of trials.
     Bootstrap = 273,
-    /// Frames in which one calibration is told.
+    /// Frames in which one calibration is measured.
     Frames = 768,
 }
 

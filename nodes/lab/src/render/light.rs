@@ -5,9 +5,9 @@ use nalgebra::Vector3;
 use super::raster::{NOTHING, Scene, Screen};
 use super::view::View;
 
-/// Where the sun stands: degrees clockwise from the camera, seen from the map.
+/// Azimuth of the sun: degrees clockwise from the camera, seen from the map.
 const SUN_FROM_CAMERA_DEG: f64 = 62.0;
-/// How high the sun stands, degrees.
+/// Elevation of the sun, degrees.
 const SUN_ELEVATION_DEG: f64 = 48.0;
 /// Most samples of the shadow map along a side.
 const MAX_SHADOW_SIDE: usize = 8192;
@@ -15,7 +15,7 @@ const MAX_SHADOW_SIDE: usize = 8192;
 const DIRECTIONS: usize = 8;
 /// Distances at which it is looked for, parts of the reach.
 const STEPS: [f64; 4] = [0.1, 0.3, 0.6, 1.0];
-/// How far a place is dimmed by its surroundings, radii of a cell.
+/// Reach of the dimming by surroundings, radii of a cell.
 const REACH_CELLS: f64 = 5.0;
 /// Longest reach, samples.
 const MAX_REACH: f64 = 160.0;

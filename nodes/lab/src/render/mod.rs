@@ -3,7 +3,6 @@
 //! Cells are drawn in parallel projection, where all faces of one direction have one shape on the
 //! screen and one brightness. Sunlight casts shadows, and skylight is dimmed in narrow places.
 
-mod error;
 mod light;
 mod raster;
 mod shade;
@@ -15,7 +14,7 @@ use std::io::Write;
 use lattice_core::voxels::VoxelList;
 use nalgebra::Vector3;
 
-pub use error::RenderError;
+use crate::AnyError;
 use raster::Scene;
 use view::View;
 
@@ -26,40 +25,40 @@ const MAX_PIXELS: u64 = 1 << 24;
 /// Samples a pixel in each direction.
 const SAMPLES: usize = 2;
 
-/// What a picture of a map shows.
+/// Options of a picture of a map.
 #[derive(Clone, Copy, PartialEq, Debug)]
 pub struct RenderOptions {
-    /// Pixels.
+    /// Width, pixels.
     pub width: u32,
-    /// Pixels.
+    /// Height, pixels.
     pub height: u32,
-    /// Where the camera stands seen from the map: degrees clockwise from north.
+    /// Azimuth of the camera seen from the map: degrees clockwise from north.
     pub azimuth_deg: f64,
-    /// How high the camera stands over the map: degrees, 90 looks straight down.
+    /// Elevation of the camera over the map: degrees, 90 looks straight down.
     pub elevation_deg: f64,
     /// sRGB colour and opacity where there is no map.
     pub background: [u8; 4],
     /// 1 shows the whole map, 2 half of its width and height around where most cells are.
     pub zoom: f64,
-    /// How much light and shadow change the colours: 1 as outdoors, 0 not at all.
+    /// Contrast of light and shadow: 1 as outdoors, 0 none.
     pub contrast: f64,
     /// A place to show in place of the whole map, at the same size whatever else there is.
     pub focus: Option<Focus>,
 }
 
-/// What a picture is centred on.
+/// Place that a picture is centred on.
 #[derive(Clone, Copy, PartialEq, Debug)]
 pub struct Focus {
-    /// In the middle of the picture: map frame, metres.
+    /// Middle of the picture: map frame, metres.
     pub center_m: [f64; 3],
-    /// From the left to the right of the picture with a zoom of 1, metres.
+    /// Width of the picture with a zoom of 1, metres.
     pub width_m: f64,
 }
 
 /// sRGB colours of labels.
 pub type LabelColors = BTreeMap<u16, [u8; 3]>;
 
-/// What the colour of a cell tells.
+/// Meaning of the colours of cells.
 enum Paint<'a> {
     Height,
     Label(&'a LabelColors),
@@ -88,7 +87,7 @@ pub fn render_png(
     list: &VoxelList,
     options: &RenderOptions,
     writer: impl Write,
-) -> Result<(), RenderError> {
+) -> Result<(), AnyError> {
     render(list, &Paint::Height, options, writer)
 }
 
@@ -98,7 +97,7 @@ pub fn render_labels_png(
     colors: &LabelColors,
     options: &RenderOptions,
     writer: impl Write,
-) -> Result<(), RenderError> {
+) -> Result<(), AnyError> {
     render(list, &Paint::Label(colors), options, writer)
 }
 
@@ -107,7 +106,7 @@ fn render(
     paint: &Paint,
     options: &RenderOptions,
     writer: impl Write,
-) -> Result<(), RenderError> {
+) -> Result<(), AnyError> {
     check(options)?;
     let scene = Scene::new(list, paint);
     let size = [options.width, options.height].map(|side| side as usize * SAMPLES);
@@ -131,7 +130,7 @@ fn render(
     Ok(())
 }
 
-fn check(options: &RenderOptions) -> Result<(), RenderError> {
+fn check(options: &RenderOptions) -> Result<(), AnyError> {
     let RenderOptions {
         width,
         height,
@@ -143,25 +142,27 @@ fn check(options: &RenderOptions) -> Result<(), RenderError> {
     let sides = 1..=MAX_SIDE;
     let pixels = u64::from(width) * u64::from(height);
     if !sides.contains(&width) || !sides.contains(&height) || pixels > MAX_PIXELS {
-        return Err(RenderError::PictureSize {
-            width,
-            height,
-            max_side: MAX_SIDE,
-            max_pixels: MAX_PIXELS,
-        });
+        return Err(format!(
+            "a picture of {width} x {height} pixels: each side must be 1 to {MAX_SIDE}, and their product at \
+             most {MAX_PIXELS}"
+        )
+        .into());
     }
     let elevated = (-90.0..=90.0).contains(&elevation_deg);
     if !azimuth_deg.is_finite() || !elevated || !(0.01..=1000.0).contains(&zoom) {
-        return Err(RenderError::Camera {
-            azimuth_deg,
-            elevation_deg,
-            zoom,
-        });
+        return Err(format!(
+            "a camera at azimuth {azimuth_deg} and elevation {elevation_deg} degrees with zoom {zoom}: the \
+             azimuth must be finite, the elevation -90 to 90, the zoom 0.01 to 1000"
+        )
+        .into());
     }
     if let Some(Focus { center_m, width_m }) = options.focus
         && !(center_m.iter().all(|c| c.is_finite()) && (1e-3..=1e7).contains(&width_m))
     {
-        return Err(RenderError::Focus { center_m, width_m });
+        return Err(format!(
+            "a picture {width_m} m wide around {center_m:?}: both must be finite, the width 0.001 to 1e7"
+        )
+        .into());
     }
     Ok(())
 }

@@ -1,4 +1,4 @@
-//! Which face is seen at each sample of the screen.
+//! Rasterisation: the face that is seen at each sample of the screen.
 
 use lattice_core::lattice::{Lattice, MortonKey};
 use lattice_core::voxels::VoxelList;
@@ -113,10 +113,10 @@ impl Scene {
     }
 }
 
-/// What is seen at a sample.
+/// Surface that is seen at a sample.
 #[derive(Clone, Copy, Default, Debug)]
 pub(super) struct Surface {
-    /// Of the cell: place in the palette.
+    /// Place of the cell's colour in the palette.
     pub(super) tone: u8,
     /// Index of the face.
     pub(super) face: u8,
@@ -152,7 +152,7 @@ struct Stamp {
     edges: Vec<[f64; 3]>,
     /// Depth is `dx x + dy y + c`.
     plane: [f64; 3],
-    /// How far outside of an edge a sample may lie, samples.
+    /// Margin outside of an edge within which a sample may lie, samples.
     slack: f64,
 }
 

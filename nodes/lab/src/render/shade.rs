@@ -1,4 +1,4 @@
-//! From faces on the screen to colours.
+//! Shading: the colours of faces on the screen.
 
 use nalgebra::Vector3;
 use rayon::prelude::*;
@@ -15,7 +15,7 @@ const SUN: [f64; 3] = [1.02, 0.98, 0.90];
 const SKY: [f64; 3] = [0.50, 0.54, 0.60];
 /// Part of the skylight that comes from below.
 const FROM_BELOW: f64 = 0.45;
-/// How much darker edges are.
+/// Darkening of edges.
 const EDGE: f64 = 0.42;
 /// Cells smaller than the first have no visible edges, from the second on full ones: samples.
 const EDGES_FROM: [f64; 2] = [5.0, 16.0];
@@ -47,7 +47,7 @@ pub(super) fn picture(scene: &Scene, view: &View, options: &RenderOptions) -> Ve
     pixels
 }
 
-/// Where `value` is between two limits, 0 to 1.
+/// Place of `value` between two limits, 0 to 1.
 fn fraction(value: f64, [low, high]: [f64; 2]) -> f64 {
     ((value - low) / (high - low)).clamp(0.0, 1.0)
 }

@@ -249,7 +249,7 @@ fn impossible_pictures_are_refused() {
             height,
             ..options()
         });
-        assert!(matches!(error, RenderError::PictureSize { .. }));
+        assert!(error.to_string().contains("pixels"), "{error}");
     }
     for (azimuth_deg, elevation_deg, zoom) in
         [(f64::NAN, 0.0, 1.0), (0.0, 91.0, 1.0), (0.0, 0.0, 0.0)]
@@ -260,7 +260,7 @@ fn impossible_pictures_are_refused() {
             zoom,
             ..options()
         });
-        assert!(matches!(error, RenderError::Camera { .. }));
+        assert!(error.to_string().contains("azimuth"), "{error}");
     }
     for (x, width_m) in [(f64::NAN, 1.0), (0.0, 0.0), (0.0, f64::INFINITY)] {
         let center_m = [x, 0.0, 0.0];
@@ -268,6 +268,6 @@ fn impossible_pictures_are_refused() {
             focus: Some(Focus { center_m, width_m }),
             ..options()
         });
-        assert!(matches!(error, RenderError::Focus { .. }));
+        assert!(error.to_string().contains("m wide"), "{error}");
     }
 }

@@ -20,12 +20,12 @@ pub(super) struct View {
     pub(super) size: [usize; 2],
     /// Samples a metre.
     pub(super) scale: f64,
-    /// What is in the middle of the screen, along right, up and toward, metres.
+    /// Middle of the screen, along right, up and toward, metres.
     middle_m: [f64; 3],
 }
 
 impl View {
-    /// From a camera at this compass direction and height seen from the map.
+    /// A view from a camera at this compass direction and height seen from the map.
     pub(super) fn new(azimuth_deg: f64, elevation_deg: f64, size: [usize; 2]) -> View {
         let (sin_a, cos_a) = azimuth_deg.to_radians().sin_cos();
         let (sin_e, cos_e) = elevation_deg.to_radians().sin_cos();

@@ -39,7 +39,7 @@ pub struct InsSample {
     pub base_velocity_mps: Vector3<f64>,
     /// Turn rate of `base_link` about its own axes, without error, rad/s.
     pub base_turn_rate_radps: Vector3<f64>,
-    /// From validity to arrival at the driver, ns: some milliseconds, and less than an epoch.
+    /// Delay from validity to arrival at the driver, ns: some milliseconds, and less than an epoch.
     pub delay_ns: i64,
 }
 

@@ -1,11 +1,11 @@
-//! Where things stand on the earth-moving site.
+//! Obstacles of the earth-moving site.
 
 use nalgebra::{Vector2, Vector3};
 
 use super::ground::ground_height_m;
 use super::obstacles::{Block, Obstacle, Post};
 
-/// What stands on the site.
+/// All obstacles of the site.
 pub(super) fn earth_moving_obstacles() -> Vec<Obstacle> {
     let mut obstacles = Vec::new();
     // Building and lean-to, containers (two stacked), barriers, a water tank, pallets: x, y, yaw (deg), length, width,

@@ -9,7 +9,7 @@ use super::site::Hit;
 pub const BEAMS: u16 = 181;
 /// Scans per second.
 pub const SCAN_RATE_HZ: u64 = 75;
-/// From the first beam to the last, ns: half a turn of the mirror.
+/// Time from the first beam to the last, ns: half a turn of the mirror.
 pub const SCAN_SPAN_NS: i64 = beam_offset_ns(BEAMS - 1) as i64;
 /// Shortest range, m.
 pub const MIN_RANGE_M: f64 = 0.2;

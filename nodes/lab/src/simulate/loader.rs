@@ -36,11 +36,6 @@ impl Loader {
         }
     }
 
-    /// Duration of one round of the tour, s.
-    pub fn round_s(&self) -> f64 {
-        self.mission.duration_s()
-    }
-
     /// `map_from_base`: wheels on the smooth ground, plus vibration.
     pub fn map_from_base(&self, time_s: f64) -> Isometry3<f64> {
         let planar = self.mission.at(time_s);
@@ -110,7 +105,7 @@ mod tests {
     fn keeps_clear_of_obstacles_and_of_steep_ground() {
         let (site, loader) = (Site::earth_moving(), Loader::new(3));
         let (mut steepest, mut sloped) = (0.0f64, 0);
-        for i in 0..(loader.round_s() * 10.0) as i32 {
+        for i in 0..(loader.mission.duration_s() * 10.0) as i32 {
             let time_s = f64::from(i) * 0.1;
             let pose = loader.map_from_base(time_s);
             let position = pose.translation.vector;
@@ -143,7 +138,7 @@ mod tests {
     fn velocity_and_turn_rate_are_continuous() {
         let loader = Loader::new(1);
         let h = 2e-4;
-        for start_s in [0.0, 8.0, 17.0, 29.0, loader.round_s() - 1.0] {
+        for start_s in [0.0, 8.0, 17.0, 29.0, loader.mission.duration_s() - 1.0] {
             let (mut linear, mut angular) = (Vec::new(), Vec::new());
             for i in 0..10_000 {
                 let (a, b) = (

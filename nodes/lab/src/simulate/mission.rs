@@ -1,4 +1,4 @@
-//! What the loader does: a closed tour of drives and turns on the spot.
+//! The loader's tour: a closed sequence of drives and turns on the spot.
 
 use nalgebra::{Rotation2, Vector2};
 
@@ -209,6 +209,7 @@ impl Mission {
         PlanarPose { effort: 0.0, ..to }
     }
 
+    #[cfg(test)]
     /// Duration of one round, s.
     pub(super) fn duration_s(&self) -> f64 {
         self.duration_s

@@ -2,7 +2,7 @@
 
 pub(super) use crate::random::Stream;
 
-/// What a stream is for; streams of different purposes are independent.
+/// Purpose of a stream; streams of different purposes are independent.
 #[derive(Clone, Copy, Debug)]
 #[repr(u64)]
 pub(super) enum Purpose {
@@ -14,25 +14,23 @@ pub(super) enum Purpose {
     LaserRange = 16,
     /// Range noise of the 64-beam scanner of surveys; one stream per sweep.
     SpinRange = 32,
-    /// Where the robot of a house stops.
+    /// Stops of the robot of a house.
     RobotPath = 48,
     /// Pose and noise of a view of the robot; one stream per view.
     RobotView = 49,
-    /// Where one stands before an object; one stream per object.
+    /// Stand before an object; one stream per object.
     HeadsetStand = 50,
     /// Frame and headset scans of a headset.
     HeadsetFrame = 51,
     /// Depth views of a headset; one stream per view.
     HeadsetView = 52,
     /// Labels of a headset scan; one stream per headset scan.
-    HeadsetHeadsetScan = 53,
-    /// Which regions are labelled wrongly, and as what.
+    HeadsetScan = 53,
+    /// Regions that are labelled wrongly, and their wrong classes.
     LabelFlips = 54,
-    /// Labels of single points; one stream per block of points.
-    PointFlips = 55,
     /// Books and clutter of a house.
-    OwnHouse = 56,
-    /// Where a laser scanner stands.
+    GeneratedHouse = 56,
+    /// Stand of a laser scanner.
     LaserStand = 57,
     /// Range noise of a scan of the house; one stream per scan.
     LaserScan = 58,

@@ -17,7 +17,7 @@ const SQUARES_PER_CELL: usize = 16;
 const ROUGHNESS_M: f64 = 0.025;
 const SOIL_REFLECTIVITY: f64 = 0.3;
 
-/// Where a ray meets the site.
+/// Point at which a ray meets the site.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Hit {
     /// Distance along the ray, m.
@@ -107,7 +107,7 @@ impl Site {
         &self.ground
     }
 
-    /// What stands on the ground.
+    /// Obstacles on the ground.
     pub fn obstacles(&self) -> &[Obstacle] {
         &self.obstacles
     }

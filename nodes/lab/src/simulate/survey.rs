@@ -9,8 +9,8 @@ use nalgebra::{Isometry3, Point3, Translation3, UnitQuaternion, Vector3};
 use rayon::prelude::*;
 
 use super::bobcat::{Bobcat, Laser, MAX_DURATION_S, SimulationError};
+use super::ins_error::InsErrors;
 use super::lms200::{SCAN_RATE_HZ, SCAN_SPAN_NS};
-use super::pose_error::Errors;
 use super::random::{Purpose, Stream};
 use super::spin64::{self, COLUMNS, TURN_NS};
 
@@ -22,7 +22,7 @@ const SPIN64_START_NS: i64 = 150_000_000_000;
 const LMS200_BATCH: u64 = 3 * 1024;
 const SPIN64_BATCH: u64 = 16;
 
-/// What measures the site.
+/// Scanners that measure the site.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum SurveyPattern {
     /// Two SICK LMS200 at the sides and one on a turntable: 75 scans of 181 beams a second each.
@@ -69,7 +69,7 @@ impl Survey {
     pub fn scans(&self) -> SurveyScans<'_> {
         SurveyScans {
             survey: self,
-            errors: Errors::new(&self.bobcat),
+            errors: InsErrors::new(&self.bobcat),
             directions: spin64::directions(),
             next: 0,
             ready: VecDeque::new(),
@@ -106,7 +106,7 @@ impl Survey {
         }
     }
 
-    fn lms200(&self, index: u64, errors: &Errors) -> SurveyScan {
+    fn lms200(&self, index: u64, errors: &InsErrors) -> SurveyScan {
         let (laser, turn) = laser_of(index);
         let scan = self.bobcat.scan(laser, turn);
         let error = errors.at(scan.start_ns + SCAN_SPAN_NS / 2);
@@ -131,7 +131,12 @@ impl Survey {
         }
     }
 
-    fn spin64(&self, index: u64, directions: &[[Vector3<f64>; 64]], errors: &Errors) -> SurveyScan {
+    fn spin64(
+        &self,
+        index: u64,
+        directions: &[[Vector3<f64>; 64]],
+        errors: &InsErrors,
+    ) -> SurveyScan {
         let mut noise = Stream::new(self.bobcat.seed(), Purpose::SpinRange, 0, index);
         let mount = Isometry3::from_parts(
             Translation3::from(Vector3::from(BASE_FROM_SPIN64_M)),
@@ -180,7 +185,7 @@ fn laser_of(index: u64) -> (Laser, u64) {
 #[derive(Debug)]
 pub struct SurveyScans<'a> {
     survey: &'a Survey,
-    errors: Errors<'a>,
+    errors: InsErrors<'a>,
     directions: Vec<[Vector3<f64>; 64]>,
     next: u64,
     ready: VecDeque<SurveyScan>,
@@ -280,7 +285,7 @@ mod tests {
         );
         // A batch and a bit: the order of the scans is that of their numbers.
         let ahead: Vec<SurveyScan> = survey.scans().take(LMS200_BATCH as usize + 2).collect();
-        let mut errors = Errors::new(&survey.bobcat);
+        let mut errors = InsErrors::new(&survey.bobcat);
         let last = LMS200_BATCH + 1;
         errors.cover(0, survey.start_ns(last) + TURN_NS);
         assert_eq!(ahead.last(), Some(&survey.lms200(last, &errors)));

@@ -1,157 +1,95 @@
-//! Who is matched with whom: the status events of the participant, handed to our endpoints.
+//! Status events of the participant, as events of the port.
 //!
 //! The participant has one status queue, long enough that no event is lost; the queues of single
 //! readers and writers hold four.
 
-use std::collections::{BTreeMap, VecDeque};
-use std::sync::{Arc, Mutex, Weak};
+use std::sync::Arc;
 
 use futures::StreamExt;
+use futures::stream::BoxStream;
 use rustdds::policy::{Durability, Reliability};
 use rustdds::{
     DomainParticipant, DomainParticipantStatusEvent as Event, GUID, QosPolicies, RTPSEntity,
     StatusEvented,
 };
 
-use crate::peers::Peers;
-use crate::sync::lock;
+use super::endpoint_id;
+use super::probe::Probes;
+use crate::port::PortEvent;
 
-/// Events of endpoints that are not registered yet, kept at most.
-const MAX_EARLY_EVENTS: usize = 1024;
-
-/// Our endpoints by their DDS identity.
-pub(crate) struct Endpoints {
-    own: GUID,
-    inner: Mutex<Inner>,
+/// Events of all peers outside the participant; matches of probes go to `probes`.
+pub(super) fn events(
+    participant: &DomainParticipant,
+    probes: Arc<Probes>,
+) -> BoxStream<'static, PortEvent> {
+    let own = participant.guid();
+    let listener = participant.status_listener();
+    let events = futures::stream::unfold(listener, |listener| async move {
+        let event = listener.as_async_status_stream().next().await?;
+        Some((event, listener))
+    });
+    let events = events.filter_map(move |event| {
+        let event = port_event(event, own, &probes);
+        async move { event }
+    });
+    events.boxed()
 }
 
-#[derive(Default)]
-struct Inner {
-    peers: BTreeMap<GUID, Weak<Peers>>,
-    early: VecDeque<(GUID, Change)>,
-}
-
-#[derive(Clone)]
-enum Change {
-    Matched(GUID),
-    Incompatible(GUID, &'static str),
-}
-
-impl Endpoints {
-    pub(crate) fn new(participant: &DomainParticipant) -> Self {
-        Self {
-            own: participant.guid(),
-            inner: Mutex::default(),
+fn port_event(event: Event, own: GUID, probes: &Probes) -> Option<PortEvent> {
+    let (endpoint, peer, policy) = match event {
+        Event::RemoteReaderMatched {
+            local_writer,
+            remote_reader,
+        } => (local_writer, remote_reader, None),
+        Event::RemoteWriterMatched {
+            local_reader,
+            remote_writer,
+        } => (local_reader, remote_writer, None),
+        Event::RemoteReaderQosIncompatible {
+            local_writer,
+            remote_reader,
+            requested_qos,
+            offered_qos,
+        } => {
+            let policy = incompatible_policy(&offered_qos, &requested_qos);
+            (local_writer, remote_reader, Some(policy))
         }
-    }
-
-    /// From now on `peers` hears of everything that happens to the endpoint, and of what did.
-    pub(crate) fn register(&self, endpoint: GUID, peers: &Arc<Peers>) {
-        let early: Vec<Change> = {
-            let mut inner = lock(&self.inner);
-            inner.peers.retain(|_, peers| peers.strong_count() > 0);
-            inner.peers.insert(endpoint, Arc::downgrade(peers));
-            let (mine, others) = std::mem::take(&mut inner.early)
-                .into_iter()
-                .partition(|(guid, _)| *guid == endpoint);
-            inner.early = others;
-            VecDeque::into_iter(mine)
-                .map(|(_, change)| change)
-                .collect()
-        };
-        for change in early {
-            self.apply(peers, change);
+        Event::RemoteWriterQosIncompatible {
+            local_reader,
+            remote_writer,
+            requested_qos,
+            offered_qos,
+        } => {
+            let policy = incompatible_policy(&offered_qos, &requested_qos);
+            (local_reader, remote_writer, Some(policy))
         }
-    }
-
-    /// Hands events on until the task is dropped.
-    pub(crate) async fn watch(self: Arc<Self>, participant: DomainParticipant) {
-        let listener = participant.status_listener();
-        drop(participant);
-        let mut events = listener.as_async_status_stream();
-        while let Some(event) = events.next().await {
-            match event {
-                Event::RemoteReaderMatched {
-                    local_writer,
-                    remote_reader,
-                } => self.change(local_writer, Change::Matched(remote_reader)),
-                Event::RemoteWriterMatched {
-                    local_reader,
-                    remote_writer,
-                } => self.change(local_reader, Change::Matched(remote_writer)),
-                Event::RemoteReaderQosIncompatible {
-                    local_writer,
-                    remote_reader,
-                    requested_qos,
-                    offered_qos,
-                } => {
-                    let policy = incompatible_policy(&offered_qos, &requested_qos);
-                    self.change(local_writer, Change::Incompatible(remote_reader, policy));
-                }
-                Event::RemoteWriterQosIncompatible {
-                    local_reader,
-                    remote_writer,
-                    requested_qos,
-                    offered_qos,
-                } => {
-                    let policy = incompatible_policy(&offered_qos, &requested_qos);
-                    self.change(local_reader, Change::Incompatible(remote_writer, policy));
-                }
-                Event::ReaderLost { guid, .. } | Event::WriterLost { guid, .. } => {
-                    self.lost(|peer| *peer == guid);
-                }
-                Event::ParticipantLost { id, .. } if id != self.own.prefix => {
-                    self.lost(|peer| peer.prefix == id);
-                }
-                _ => {}
-            }
+        Event::ReaderLost { guid, .. } | Event::WriterLost { guid, .. } => {
+            let peer = endpoint_id(guid);
+            return Some(PortEvent::Lost { peer });
         }
-    }
-
-    fn change(&self, endpoint: GUID, change: Change) {
-        let peers = {
-            let mut inner = lock(&self.inner);
-            match inner.peers.get(&endpoint) {
-                Some(peers) => peers.upgrade(),
-                // Discovery's own endpoints are nobody's business here.
-                None if !endpoint.entity_id.kind().is_user_defined() => None,
-                None => {
-                    if inner.early.len() >= MAX_EARLY_EVENTS {
-                        inner.early.pop_front();
-                    }
-                    inner.early.push_back((endpoint, change.clone()));
-                    None
-                }
-            }
-        };
-        if let Some(peers) = peers {
-            self.apply(&peers, change);
+        Event::ParticipantLost { id, .. } if id != own.prefix => {
+            let any = endpoint_id(GUID::new(id, own.entity_id));
+            return Some(PortEvent::ParticipantLost { any });
         }
+        _ => return None,
+    };
+    // Nothing is delivered inside a participant, and discovery has endpoints of its own.
+    if peer.prefix == own.prefix {
+        probes.matched(endpoint);
+        return None;
     }
-
-    fn lost(&self, gone: impl Fn(&GUID) -> bool) {
-        let all: Vec<Arc<Peers>> = {
-            let mut inner = lock(&self.inner);
-            inner.early.retain(|(_, change)| match change {
-                Change::Matched(peer) | Change::Incompatible(peer, _) => !gone(peer),
-            });
-            inner.peers.values().filter_map(Weak::upgrade).collect()
-        };
-        for peers in all {
-            peers.remove(&gone);
-        }
+    if !endpoint.entity_id.kind().is_user_defined() {
+        return None;
     }
-
-    fn apply(&self, peers: &Peers, change: Change) {
-        match change {
-            Change::Matched(peer) if peer.prefix == self.own.prefix && !peers.hears_own() => {
-                log::debug!("{}: matched inside the participant", peers.topic());
-            }
-            Change::Matched(peer) => peers.add(peer),
-            Change::Incompatible(peer, _) if peer.prefix == self.own.prefix => {}
-            Change::Incompatible(peer, policy) => peers.incompatible(peer, policy),
-        }
-    }
+    let (endpoint, peer) = (endpoint_id(endpoint), endpoint_id(peer));
+    Some(match policy {
+        None => PortEvent::Matched { endpoint, peer },
+        Some(policy) => PortEvent::Incompatible {
+            endpoint,
+            peer,
+            policy,
+        },
+    })
 }
 
 /// First policy in which an offer is less than what is requested, in words for the operator.

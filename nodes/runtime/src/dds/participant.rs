@@ -1,19 +1,23 @@
 //! The participant of the process, and the endpoints made in it.
 
 use std::net::Ipv4Addr;
+use std::sync::Arc;
 
+use futures::future::BoxFuture;
+use futures::stream::BoxStream;
 use lattice_msgs::dds_type_name;
-use ros2_client::Context;
-use rustdds::no_key::SimpleDataReader;
 use rustdds::policy::{Durability, History, ResourceLimits};
 use rustdds::{
-    DomainParticipant, DomainParticipantBuilder, Duration, QosPolicies, QosPolicyBuilder, Topic,
-    TopicKind,
+    DomainParticipant, DomainParticipantBuilder, Duration, QosPolicies, QosPolicyBuilder,
+    RTPSEntity, Topic, TopicKind,
 };
 
-use super::payload::{PayloadDeserializer, Taken};
-use super::writer::RawWriter;
+use super::probe::Probes;
+use super::reader::DdsReader;
+use super::writer::{DdsWriter, RawWriter};
+use super::{endpoint_id, events};
 use crate::error::RuntimeError;
+use crate::port::{EndpointId, PortEvent, PortTopic, SampleReader, SampleWriter, Transport};
 use crate::qos::{Durability as RosDurability, Qos, Reliability};
 
 /// Asked of every socket, in bytes.
@@ -22,14 +26,18 @@ const RECEIVE_BUFFER_BYTES: usize = 32 << 20;
 /// Part of the QoS that is announced. How long we wait is decided by the publisher thread.
 const MAX_BLOCKING_TIME: Duration = Duration::from_millis(100);
 
-/// The DDS participant.
+/// Type of the topic of probes, which carries nothing.
+const PROBE_TYPE: &str = "std_msgs/msg/Empty";
+
+/// The DDS participant of a process.
 pub(crate) struct Dds {
-    // Owns the participant for ros2-client; no ros2-client node, whose spinner subscribes to /clock
-    // with a wrong type and takes the status events that we need.
-    _context: Context,
     participant: DomainParticipant,
     publisher: rustdds::Publisher,
     subscriber: rustdds::Subscriber,
+    probes: Arc<Probes>,
+    /// Name of the topic of probes. It has no ROS prefix, so ROS tools do not show it.
+    probe_topic: String,
+    _probe_reader: DdsReader,
 }
 
 impl Dds {
@@ -45,8 +53,6 @@ impl Dds {
             builder = builder.with_only_networks([Ipv4Addr::LOCALHOST]);
         }
         let participant = builder.build().map_err(|e| failed(&e))?;
-        let context =
-            Context::from_domain_participant(participant.clone()).map_err(|e| failed(&e))?;
         let none = QosPolicies::qos_none();
         let publisher = participant
             .create_publisher(&none)
@@ -54,62 +60,101 @@ impl Dds {
         let subscriber = participant
             .create_subscriber(&none)
             .map_err(|e| failed(&e))?;
+        let guid = participant.guid().to_bytes();
+        let name: String = guid.iter().map(|byte| format!("{byte:02x}")).collect();
+        let probe_topic = format!("lattice_probe_{name}");
+        let topic = topic(
+            &participant,
+            probe(&probe_topic),
+            &PROBE_QOS,
+            "subscription",
+        )?;
+        let reader = subscriber
+            .create_simple_datareader_no_key(&topic, None)
+            .map_err(|error| endpoint_error(&probe_topic, "subscription", &error))?;
         Ok(Self {
-            _context: context,
             participant,
             publisher,
             subscriber,
+            probes: Arc::default(),
+            probe_topic,
+            _probe_reader: DdsReader::new(reader, 0),
         })
     }
 
-    pub(crate) fn participant(&self) -> &DomainParticipant {
-        &self.participant
-    }
-
-    /// A writer on `dds_topic`; `name` is for messages.
-    pub(crate) fn writer(
-        &self,
-        name: &str,
-        dds_topic: String,
-        ros_type: &str,
-        qos: &Qos,
-    ) -> Result<RawWriter, RuntimeError> {
-        let topic = self.topic(name, dds_topic, ros_type, qos, "publisher")?;
+    fn raw_writer(&self, of: PortTopic<'_>, qos: &Qos) -> Result<RawWriter, RuntimeError> {
+        let topic = topic(&self.participant, of, qos, "publisher")?;
         self.publisher
             .create_datawriter_no_key(&topic, None)
-            .map_err(|error| endpoint_error(name, "publisher", &error))
+            .map_err(|error| endpoint_error(of.name, "publisher", &error))
+    }
+}
+
+impl Transport for Dds {
+    fn id(&self) -> EndpointId {
+        endpoint_id(self.participant.guid())
     }
 
-    /// A reader on `dds_topic`; `name` is for messages.
-    pub(crate) fn reader(
+    fn writer(
         &self,
-        name: &str,
-        dds_topic: String,
-        ros_type: &str,
+        topic: PortTopic<'_>,
         qos: &Qos,
-    ) -> Result<SimpleDataReader<Taken, PayloadDeserializer>, RuntimeError> {
-        let topic = self.topic(name, dds_topic, ros_type, qos, "subscription")?;
-        self.subscriber
+    ) -> Result<Arc<dyn SampleWriter>, RuntimeError> {
+        Ok(Arc::new(DdsWriter(self.raw_writer(topic, qos)?)))
+    }
+
+    fn reader(
+        &self,
+        of: PortTopic<'_>,
+        qos: &Qos,
+        max_bytes: usize,
+    ) -> Result<Box<dyn SampleReader>, RuntimeError> {
+        let topic = topic(&self.participant, of, qos, "subscription")?;
+        let reader = self
+            .subscriber
             .create_simple_datareader_no_key(&topic, None)
-            .map_err(|error| endpoint_error(name, "subscription", &error))
+            .map_err(|error| endpoint_error(of.name, "subscription", &error))?;
+        let reader = DdsReader::new(reader, max_bytes);
+        if qos.durability == RosDurability::Volatile {
+            reader.skip_old();
+        }
+        Ok(Box::new(reader))
     }
 
-    fn topic(
-        &self,
-        name: &str,
-        dds_topic: String,
-        ros_type: &str,
-        qos: &Qos,
-        endpoint: &'static str,
-    ) -> Result<Topic, RuntimeError> {
-        let type_name = dds_type_name(ros_type).ok_or_else(|| RuntimeError::TypeName {
-            topic: name.to_owned(),
-            type_name: ros_type.to_owned(),
-        })?;
-        self.participant
-            .create_topic(dds_topic, type_name, &policies(qos), TopicKind::NoKey)
-            .map_err(|error| endpoint_error(name, endpoint, &error))
+    fn events(&self) -> BoxStream<'static, PortEvent> {
+        events::events(&self.participant, Arc::clone(&self.probes))
     }
+
+    fn writers_known(&self) -> Result<BoxFuture<'static, ()>, RuntimeError> {
+        let writer = self.raw_writer(probe(&self.probe_topic), &PROBE_QOS)?;
+        Ok(Box::pin(Arc::clone(&self.probes).wait(writer)))
+    }
+}
+
+const PROBE_QOS: Qos = Qos::best_effort(1);
+
+fn probe(name: &str) -> PortTopic<'_> {
+    PortTopic {
+        name,
+        dds_name: name,
+        ros_type: PROBE_TYPE,
+    }
+}
+
+fn topic(
+    participant: &DomainParticipant,
+    of: PortTopic<'_>,
+    qos: &Qos,
+    endpoint: &'static str,
+) -> Result<Topic, RuntimeError> {
+    let type_name = dds_type_name(of.ros_type).ok_or_else(|| RuntimeError::TypeName {
+        topic: of.name.to_owned(),
+        type_name: of.ros_type.to_owned(),
+    })?;
+    let dds_name = of.dds_name.to_owned();
+    participant
+        .create_topic(dds_name, type_name, &policies(qos), TopicKind::NoKey)
+        .map_err(|error| endpoint_error(of.name, endpoint, &error))
 }
 
 fn endpoint_error(
@@ -145,7 +190,7 @@ fn policies(qos: &Qos) -> QosPolicies {
     .build()
 }
 
-/// Bytes that a receiving socket really gets, as the kernel tells. `None` if it does not.
+/// Receive buffer that the kernel grants a socket, in bytes. `None`: not known.
 pub(crate) fn effective_receive_buffer() -> Option<usize> {
     use socket2::{Domain, Socket, Type};
     let socket = Socket::new(Domain::IPV4, Type::DGRAM, None).ok()?;

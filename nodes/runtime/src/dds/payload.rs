@@ -7,17 +7,15 @@ use rustdds::RepresentationIdentifier;
 use rustdds::bytes::Bytes;
 use rustdds::no_key::{Decode, DeserializerAdapter, SerializerAdapter};
 
+use crate::port::ENCAPSULATION_BYTES;
 use crate::sync::lock;
-
-/// Length of the encapsulation header in front of every CDR sample.
-pub(crate) const ENCAPSULATION_BYTES: usize = 4;
 
 /// Body of a little-endian CDR sample, without its encapsulation header.
 #[derive(Clone, Debug)]
-pub(crate) struct Payload(pub Bytes);
+pub(super) struct Payload(pub Bytes);
 
 /// Hands a [`Payload`] to RustDDS as it is.
-pub(crate) struct PayloadSerializer;
+pub(super) struct PayloadSerializer;
 
 impl SerializerAdapter<Payload> for PayloadSerializer {
     type Error = Infallible;
@@ -31,9 +29,9 @@ impl SerializerAdapter<Payload> for PayloadSerializer {
     }
 }
 
-/// What became of a sample that RustDDS showed us.
+/// Outcome of copying a sample out of the cache of RustDDS.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
-pub(crate) enum Taken {
+pub(super) enum Taken {
     /// It lies in the buffer of the [`CopyInto`], encapsulation header first.
     Copied,
     /// Longer than allowed; not copied.
@@ -44,7 +42,7 @@ pub(crate) enum Taken {
 }
 
 /// Accepts samples of every encoding, so that RustDDS neither drops nor dumps a foreign one.
-pub(crate) struct PayloadDeserializer;
+pub(super) struct PayloadDeserializer;
 
 impl DeserializerAdapter<Taken> for PayloadDeserializer {
     type Error = Infallible;
@@ -83,7 +81,7 @@ impl DeserializerAdapter<Taken> for PayloadDeserializer {
 ///
 /// RustDDS calls it under the lock of its topic cache, where its event loop waits: it only copies.
 #[derive(Clone)]
-pub(crate) struct CopyInto<'a> {
+pub(super) struct CopyInto<'a> {
     pub buffer: &'a Mutex<Vec<u8>>,
     pub max_bytes: usize,
 }

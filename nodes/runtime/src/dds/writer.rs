@@ -1,318 +1,50 @@
-//! One DDS writer with its bounded queue, served by the publisher thread.
-//!
-//! Serialization, page faults and the wait for a full send window happen there, never at the caller;
-//! a writer that waits holds up nobody but its own queue.
+//! One DDS writer.
 
-use std::sync::atomic::{AtomicBool, AtomicU64, AtomicUsize, Ordering::Relaxed};
-use std::sync::{Arc, Mutex};
-use std::time::{Duration, Instant};
+use std::time::Duration;
 
-use futures::future::{Either, select};
-use lattice_msgs::cdr::CdrError;
-use rustdds::bytes::Bytes;
+use futures::future::BoxFuture;
 use rustdds::dds::WriteError;
 use rustdds::no_key::DataWriter;
-use rustdds::rpc::SampleIdentity;
-use rustdds::{GUID, RTPSEntity, Timestamp, WriteOptionsBuilder};
-use smol::Timer;
-use smol::channel::{Receiver, Sender, TrySendError, bounded};
+use rustdds::{RTPSEntity, Timestamp, WriteOptionsBuilder};
 
-use super::payload::{ENCAPSULATION_BYTES, Payload, PayloadSerializer};
-use super::queue::Budget;
-use crate::error::PublishError;
-use crate::logging::Throttle;
-use crate::sync::lock;
+use super::payload::{Payload, PayloadSerializer};
+use super::{endpoint_id, sample_identity};
+use crate::port::{Bytes, EndpointId, SampleId, SampleWriter, WriteRefusal};
 
-pub(crate) type RawWriter = DataWriter<Payload, PayloadSerializer>;
+pub(super) type RawWriter = DataWriter<Payload, PayloadSerializer>;
 
-/// How long a sample waits for a full send window before it is dropped.
-const PATIENCE: Duration = Duration::from_secs(1);
+/// Writes samples of one topic.
+pub(super) struct DdsWriter(pub RawWriter);
 
-/// The same, after a sample was dropped: a peer that hangs must not slow down the others.
-const PATIENCE_WITH_STUCK_PEER: Duration = Duration::from_millis(20);
-
-/// Between two warnings of dropped messages.
-const WARNING_PERIOD: Duration = Duration::from_secs(5);
-
-/// What a full send window does to a sample.
-#[derive(Clone, Copy, Debug, PartialEq, Eq)]
-pub(crate) enum WhenFull {
-    /// Dropped and counted after a short wait.
-    Drop,
-    /// Waits as long as it takes.
-    Wait,
-}
-
-/// Makes the bytes of a sample, encapsulation header included, on the publisher thread.
-pub(crate) type Serialize = Box<dyn FnOnce() -> Result<Vec<u8>, CdrError> + Send>;
-
-enum Job {
-    Sample {
-        content: Content,
-        reserved: usize,
-        related: Option<SampleIdentity>,
-    },
-    /// Answered when everything before it has been handed to DDS.
-    Flush(Sender<()>),
-}
-
-enum Content {
-    Body(Bytes),
-    Later(Serialize),
-}
-
-/// The caller's end.
-pub(crate) struct DdsWriter {
-    guid: GUID,
-    jobs: Sender<Job>,
-    shared: Arc<Shared>,
-}
-
-/// Both ends.
-struct Shared {
-    topic: String,
-    // Taken away at shutdown, when handles of the publisher may still be about.
-    writer: Mutex<Option<Arc<RawWriter>>>,
-    budget: Budget,
-    when_full: WhenFull,
-    last_bytes: AtomicUsize,
-    dropped: AtomicU64,
-    sent: AtomicU64,
-    stuck: AtomicBool,
-    warning: Throttle,
-}
-
-impl DdsWriter {
-    /// The writer, and the task that the publisher thread is to run.
-    pub(crate) fn new(
-        topic: &str,
-        writer: RawWriter,
-        when_full: WhenFull,
-        queue_messages: usize,
-        queue_bytes: usize,
-    ) -> (Self, impl Future<Output = ()> + Send + 'static) {
-        let guid = writer.guid();
-        let (jobs, queue) = bounded(queue_messages.max(1));
-        let shared = Arc::new(Shared {
-            topic: topic.to_owned(),
-            writer: Mutex::new(Some(Arc::new(writer))),
-            budget: Budget::new(queue_bytes),
-            when_full,
-            last_bytes: AtomicUsize::new(0),
-            dropped: AtomicU64::new(0),
-            sent: AtomicU64::new(0),
-            stuck: AtomicBool::new(false),
-            warning: Throttle::new(WARNING_PERIOD),
-        });
-        let task = serve(Arc::clone(&shared), queue);
-        (Self { guid, jobs, shared }, task)
+impl SampleWriter for DdsWriter {
+    fn id(&self) -> EndpointId {
+        endpoint_id(self.0.guid())
     }
 
-    pub(crate) fn guid(&self) -> GUID {
-        self.guid
-    }
-
-    pub(crate) fn topic(&self) -> &str {
-        &self.shared.topic
-    }
-
-    /// Samples that were not sent: queue or send window full, or not serializable.
-    pub(crate) fn dropped(&self) -> u64 {
-        self.shared.dropped.load(Relaxed)
-    }
-
-    /// Samples handed to DDS.
-    pub(crate) fn sent(&self) -> u64 {
-        self.shared.sent.load(Relaxed)
-    }
-
-    /// Queues a sample that is serialized later. Its size is taken to be that of the one before.
-    pub(crate) fn send(&self, serialize: Serialize) -> Result<(), PublishError> {
-        let bytes = self.shared.last_bytes.load(Relaxed);
-        self.try_queue(Content::Later(serialize), bytes, None)
-    }
-
-    /// Queues the body of a sample, as it is.
-    pub(crate) fn send_body(
+    fn write(
         &self,
         body: Bytes,
-        related: Option<SampleIdentity>,
-    ) -> Result<(), PublishError> {
-        let bytes = body.len();
-        self.try_queue(Content::Body(body), bytes, related)
-    }
-
-    /// Queues the body of a sample; waits while the queue is full. Not from the runtime's threads.
-    pub(crate) fn send_body_blocking(&self, body: Bytes) -> Result<(), PublishError> {
-        let reserved = body.len();
-        if !self.shared.budget.take_blocking(reserved) {
-            return Err(self.closed());
-        }
-        let job = Job::Sample {
-            content: Content::Body(body),
-            reserved,
-            related: None,
-        };
-        self.jobs.send_blocking(job).map_err(|_| self.closed())
-    }
-
-    /// Waits until the queue is empty and every reliable reader has acknowledged. False: not in time.
-    pub(crate) fn flush(&self, timeout: Duration) -> bool {
-        let start = Instant::now();
-        let in_time = smol::block_on(smol::future::or(self.flushed(), async {
-            Timer::after(timeout).await;
-            None
-        }));
-        let left = timeout.saturating_sub(start.elapsed());
-        let acknowledged = |writer: Arc<RawWriter>| writer.wait_for_acknowledgments(left).ok();
-        in_time.is_some() && self.shared.writer().and_then(acknowledged) == Some(true)
-    }
-
-    /// Completes when everything queued before has been handed to DDS; `None`: closed meanwhile.
-    pub(crate) async fn flushed(&self) -> Option<()> {
-        let (done, answer) = bounded(1);
-        self.jobs.send(Job::Flush(done)).await.ok()?;
-        answer.recv().await.ok()
-    }
-
-    /// Refuses further samples and leaves the topic.
-    pub(crate) fn close(&self) {
-        self.shared.budget.close();
-        self.jobs.close();
-        let writer = lock(&self.shared.writer).take();
-        drop(writer);
-    }
-
-    fn try_queue(
-        &self,
-        content: Content,
-        reserved: usize,
-        related: Option<SampleIdentity>,
-    ) -> Result<(), PublishError> {
-        if !self.shared.budget.try_take(reserved) {
-            return Err(self.full());
-        }
-        let job = Job::Sample {
-            content,
-            reserved,
-            related,
-        };
-        self.jobs.try_send(job).map_err(|error| {
-            self.shared.budget.give_back(reserved);
-            match error {
-                TrySendError::Full(_) => self.full(),
-                TrySendError::Closed(_) => self.closed(),
+        related: Option<SampleId>,
+        may_wait: bool,
+    ) -> BoxFuture<'_, Result<(), WriteRefusal>> {
+        let options = WriteOptionsBuilder::new()
+            .source_timestamp(Timestamp::now())
+            .related_sample_identity_opt(related.map(sample_identity))
+            .best_effort_may_block(may_wait)
+            .build();
+        Box::pin(async move {
+            let written = self.0.async_write_with_options(Payload(body), options);
+            match written.await {
+                Ok(_) => Ok(()),
+                Err(WriteError::WouldBlock { .. }) => Err(WriteRefusal::Full),
+                Err(error) => Err(WriteRefusal::Failed(format!("{error:?}"))),
             }
         })
     }
 
-    fn full(&self) -> PublishError {
-        self.shared.drop_one("the queue of the publisher is full");
-        PublishError::QueueFull {
-            topic: self.shared.topic.clone(),
-            dropped: self.dropped(),
-        }
-    }
-
-    fn closed(&self) -> PublishError {
-        PublishError::Closed {
-            topic: self.shared.topic.clone(),
-        }
-    }
-}
-
-impl Shared {
-    fn writer(&self) -> Option<Arc<RawWriter>> {
-        lock(&self.writer).clone()
-    }
-
-    fn drop_one(&self, why: &str) {
-        let dropped = self.dropped.fetch_add(1, Relaxed).saturating_add(1);
-        if self.warning.check().is_some() {
-            log::warn!("{}: message dropped ({dropped} so far): {why}", self.topic);
-        }
-    }
-
-    fn body(&self, content: Content) -> Option<Bytes> {
-        match content {
-            Content::Body(body) => Some(body),
-            Content::Later(serialize) => match serialize() {
-                Ok(bytes) => {
-                    self.last_bytes.store(bytes.len(), Relaxed);
-                    let mut body = Bytes::from(bytes);
-                    Some(body.split_off(ENCAPSULATION_BYTES.min(body.len())))
-                }
-                Err(error) => {
-                    self.drop_one(&error.to_string());
-                    None
-                }
-            },
-        }
-    }
-
-    async fn write(&self, body: Bytes, related: Option<SampleIdentity>) {
-        let start = Instant::now();
-        while let Some(writer) = self.writer() {
-            let options = WriteOptionsBuilder::new()
-                .source_timestamp(Timestamp::now())
-                .related_sample_identity_opt(related)
-                .best_effort_may_block(self.when_full == WhenFull::Wait)
-                .build();
-            let patience = match self.when_full {
-                WhenFull::Wait => None,
-                WhenFull::Drop if self.stuck.load(Relaxed) => Some(PATIENCE_WITH_STUCK_PEER),
-                WhenFull::Drop => Some(PATIENCE),
-            };
-            let write =
-                std::pin::pin!(writer.async_write_with_options(Payload(body.clone()), options));
-            let result = match patience {
-                None => write.await,
-                Some(patience) => {
-                    let left = patience.saturating_sub(start.elapsed());
-                    match select(write, Timer::after(left)).await {
-                        Either::Left((result, _)) => result,
-                        Either::Right(_) => {
-                            self.stuck.store(true, Relaxed);
-                            self.drop_one("a reliable subscriber does not keep up");
-                            return;
-                        }
-                    }
-                }
-            };
-            match result {
-                Ok(_) => {
-                    self.stuck.store(false, Relaxed);
-                    self.sent.fetch_add(1, Relaxed);
-                    return;
-                }
-                // RustDDS gave up waiting; whether we do is decided by our own patience.
-                Err(WriteError::WouldBlock { .. }) => {}
-                Err(error) => {
-                    self.drop_one(&format!("{error:?}"));
-                    return;
-                }
-            }
-        }
-    }
-}
-
-async fn serve(shared: Arc<Shared>, queue: Receiver<Job>) {
-    while let Ok(job) = queue.recv().await {
-        match job {
-            Job::Sample {
-                content,
-                reserved,
-                related,
-            } => {
-                if let Some(body) = shared.body(content) {
-                    shared.write(body, related).await;
-                }
-                shared.budget.give_back(reserved);
-            }
-            Job::Flush(done) => {
-                // Nobody may be waiting any more.
-                let _ = done.try_send(());
-            }
-        }
+    fn wait_for_acknowledgments(&self, patience: Duration) -> bool {
+        self.0
+            .wait_for_acknowledgments(patience)
+            .is_ok_and(|all| all)
     }
 }

@@ -1,65 +1,12 @@
-use super::value::ValueError;
-use crate::params_file::ScanError;
-use std::path::PathBuf;
+use crate::params_file::ParamFileError;
 use thiserror::Error;
 
-/// Why parameters are refused.
+/// Reason why parameters are refused.
 #[derive(Debug, Error)]
 pub enum ParamError {
-    /// The file cannot be read.
-    #[error("parameter file {path:?}: {source}")]
-    Read {
-        /// The file.
-        path: PathBuf,
-        /// What the system says.
-        source: std::io::Error,
-    },
-    /// The file is larger than any parameter file should be.
-    #[error("parameter file {path:?} is larger than {bytes_max} bytes")]
-    TooLarge {
-        /// The file.
-        path: PathBuf,
-        /// The limit, bytes.
-        bytes_max: u64,
-    },
-    /// The file is no YAML, or has a key twice.
-    #[error("parameter file {path:?}: {message}")]
-    Yaml {
-        /// The file.
-        path: PathBuf,
-        /// What the YAML reader says, with line and column.
-        message: String,
-    },
-    /// The file has an anchor, an alias, or too deep nesting.
-    #[error("parameter file {path:?}, {source}")]
-    Scan {
-        /// The file.
-        path: PathBuf,
-        /// What it has, and where.
-        source: ScanError,
-    },
-    /// The file is YAML of another shape.
-    #[error("parameter file {path:?}, at `{key}`: found {found}, expected {expected}")]
-    Shape {
-        /// The file.
-        path: PathBuf,
-        /// The keys that lead there.
-        key: String,
-        /// What is allowed.
-        expected: &'static str,
-        /// What is there.
-        found: String,
-    },
-    /// The file has a value of no parameter type.
-    #[error("parameter file {path:?}, at `{key}`: {source}")]
-    Value {
-        /// The file.
-        path: PathBuf,
-        /// The keys that lead there.
-        key: String,
-        /// What is wrong with it.
-        source: ValueError,
-    },
+    /// A parameter file is refused.
+    #[error(transparent)]
+    File(#[from] ParamFileError),
     /// The value has another type than the node asks for.
     #[error("parameter `{name}` of {node}: expected {expected}, found {found} ({origin})")]
     Type {

@@ -1,10 +1,10 @@
-//! A node's parameters: given by files and the command line, declared by the node as it reads them.
+//! Parameters of a node: given by files and the command line, declared by the node as it reads them.
 
 mod error;
-mod value;
+mod ranges;
 
+pub use crate::param_value::{ParamValue, ValueError};
 pub use error::ParamError;
-pub use value::{ParamValue, ValueError};
 
 use crate::{params_file, ros_args::RosArgs};
 use std::{
@@ -138,8 +138,7 @@ impl Params {
 
     /// A count: an integer from 0 on.
     pub fn usize(&self, name: &str, default: usize) -> Result<usize, ParamError> {
-        let value = self.i64(name, i64::try_from(default).unwrap_or(i64::MAX))?;
-        usize::try_from(value).map_err(|_| self.invalid(name, "expected 0 or more"))
+        self.usize_in(name, default, 0..=usize::MAX)
     }
 
     /// A float, never NaN; an integer counts, with a line in the log.
@@ -175,7 +174,7 @@ impl Params {
         }
     }
 
-    /// Whether a file or the command line gives the parameter.
+    /// True if a file or the command line gives the parameter.
     pub fn is_given(&self, name: &str) -> bool {
         self.given.contains_key(name)
     }

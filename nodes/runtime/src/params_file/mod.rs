@@ -2,14 +2,13 @@
 //!
 //! Stricter than rcl in one point: a key given twice is refused and does not override.
 
+mod error;
 mod pattern;
-mod scan;
 
+pub use error::ParamFileError;
 pub use pattern::NodePattern;
-pub use scan::ScanError;
-pub(crate) use scan::scan;
 
-use crate::params::{ParamError, ParamValue};
+use crate::param_value::{ParamValue, scan};
 use serde_yaml::{Mapping, Value};
 use std::{collections::HashSet, fs::File, io::Read, path::Path};
 
@@ -34,22 +33,28 @@ pub struct FileParam {
 }
 
 /// Reads a parameter file; entries in the order of the file.
-pub fn read(path: &Path) -> Result<Vec<FileParam>, ParamError> {
-    let failed = |source| ParamError::Read {
+pub fn read(path: &Path) -> Result<Vec<FileParam>, ParamFileError> {
+    let failed = |source| ParamFileError::Read {
         path: path.to_owned(),
         source,
     };
+    // To open a fifo would wait for a writer.
+    if !std::fs::metadata(path).map_err(failed)?.is_file() {
+        return Err(ParamFileError::NotAFile {
+            path: path.to_owned(),
+        });
+    }
     let mut bytes = Vec::new();
     let file = File::open(path).map_err(failed)?;
     let limit = FILE_BYTES_MAX.saturating_add(1);
     let length = file.take(limit).read_to_end(&mut bytes).map_err(failed)?;
     if u64::try_from(length).is_ok_and(|length| length >= limit) {
-        return Err(ParamError::TooLarge {
+        return Err(ParamFileError::TooLarge {
             path: path.to_owned(),
             bytes_max: FILE_BYTES_MAX,
         });
     }
-    let text = String::from_utf8(bytes).map_err(|error| ParamError::Yaml {
+    let text = String::from_utf8(bytes).map_err(|error| ParamFileError::Yaml {
         path: path.to_owned(),
         message: error.utf8_error().to_string(),
     })?;
@@ -57,12 +62,12 @@ pub fn read(path: &Path) -> Result<Vec<FileParam>, ParamError> {
 }
 
 /// Reads the text of a parameter file; `path` is for messages.
-pub fn parse(text: &str, path: &Path) -> Result<Vec<FileParam>, ParamError> {
-    scan(text).map_err(|source| ParamError::Scan {
+pub fn parse(text: &str, path: &Path) -> Result<Vec<FileParam>, ParamFileError> {
+    scan(text).map_err(|source| ParamFileError::Scan {
         path: path.to_owned(),
         source,
     })?;
-    let value: Value = serde_yaml::from_str(text).map_err(|error| ParamError::Yaml {
+    let value: Value = serde_yaml::from_str(text).map_err(|error| ParamFileError::Yaml {
         path: path.to_owned(),
         message: error.to_string(),
     })?;
@@ -84,7 +89,7 @@ struct Reader<'a> {
 
 impl Reader<'_> {
     /// A map of nodes and namespaces below `prefix`.
-    fn nodes(&mut self, value: Value, prefix: &str) -> Result<(), ParamError> {
+    fn nodes(&mut self, value: Value, prefix: &str) -> Result<(), ParamFileError> {
         const EXPECTED: &str = "a map of nodes, each with `ros__parameters` below it";
         let map = match value {
             Value::Null if prefix.is_empty() => return Ok(()),
@@ -121,7 +126,7 @@ impl Reader<'_> {
         nodes: &NodePattern,
         prefix: &str,
         names: &mut HashSet<String>,
-    ) -> Result<(), ParamError> {
+    ) -> Result<(), ParamFileError> {
         for (key, value) in self.map(value, "a map of parameters")? {
             let key = self.enter(key)?;
             let name = if prefix.is_empty() {
@@ -135,11 +140,12 @@ impl Reader<'_> {
                 if !names.insert(name.clone()) {
                     return Err(self.shape("each parameter once", format!("`{name}` again")));
                 }
-                let value = ParamValue::from_yaml(value).map_err(|source| ParamError::Value {
-                    path: self.path.to_owned(),
-                    key: self.keys.join("."),
-                    source,
-                })?;
+                let value =
+                    ParamValue::from_yaml(value).map_err(|source| ParamFileError::Value {
+                        path: self.path.to_owned(),
+                        key: self.keys.join("."),
+                        source,
+                    })?;
                 let key = self.keys.join(".");
                 self.params.push(FileParam {
                     nodes: nodes.clone(),
@@ -153,7 +159,7 @@ impl Reader<'_> {
         Ok(())
     }
 
-    fn map(&self, value: Value, expected: &'static str) -> Result<Mapping, ParamError> {
+    fn map(&self, value: Value, expected: &'static str) -> Result<Mapping, ParamFileError> {
         match value {
             Value::Mapping(map) => Ok(map),
             other => Err(self.shape(expected, found(&other))),
@@ -161,7 +167,7 @@ impl Reader<'_> {
     }
 
     /// Steps below a key, which is a text or counts as one.
-    fn enter(&mut self, key: Value) -> Result<String, ParamError> {
+    fn enter(&mut self, key: Value) -> Result<String, ParamFileError> {
         let key = match key {
             Value::String(key) if !key.is_empty() => key,
             Value::Number(key) => key.to_string(),
@@ -175,9 +181,9 @@ impl Reader<'_> {
         Ok(key)
     }
 
-    fn shape(&self, expected: &'static str, found: String) -> ParamError {
+    fn shape(&self, expected: &'static str, found: String) -> ParamFileError {
         let key = self.keys.join(".");
-        ParamError::Shape {
+        ParamFileError::Shape {
             path: self.path.to_owned(),
             key,
             expected,

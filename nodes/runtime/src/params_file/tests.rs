@@ -1,7 +1,7 @@
 use super::*;
 use proptest::prelude::*;
 
-fn read_text(text: &str) -> Result<Vec<FileParam>, ParamError> {
+fn read_text(text: &str) -> Result<Vec<FileParam>, ParamFileError> {
     parse(text, Path::new("test.yaml"))
 }
 
@@ -193,11 +193,11 @@ fn deep_files_are_refused() {
     assert_eq!(read_text(&deep(DEPTH_MAX)).unwrap().len(), 1);
     assert!(matches!(
         read_text(&deep(DEPTH_MAX + 1)),
-        Err(ParamError::Shape { .. })
+        Err(ParamFileError::Shape { .. })
     ));
     assert!(matches!(
         read_text(&deep(100_000)),
-        Err(ParamError::Scan { .. })
+        Err(ParamFileError::Scan { .. })
     ));
 }
 
@@ -210,14 +210,17 @@ fn large_files_are_refused() {
     std::fs::write(file.path(), " ".repeat(length + 1)).unwrap();
     assert!(matches!(
         read(file.path()),
-        Err(ParamError::TooLarge { .. })
+        Err(ParamFileError::TooLarge { .. })
     ));
     std::fs::write(file.path(), [0xff, 0xfe]).unwrap();
-    assert!(matches!(read(file.path()), Err(ParamError::Yaml { .. })));
+    assert!(matches!(
+        read(file.path()),
+        Err(ParamFileError::Yaml { .. })
+    ));
     let directory = tempfile::tempdir().unwrap();
     assert!(matches!(
         read(directory.path()),
-        Err(ParamError::Read { .. })
+        Err(ParamFileError::NotAFile { .. })
     ));
 }
 
@@ -227,4 +230,17 @@ proptest! {
         let _ = read_text(&text);
         let _ = read_text(&format!("m:\n  ros__parameters:\n    {text}"));
     }
+}
+
+#[test]
+fn a_fifo_is_refused_and_not_waited_for() {
+    let directory = tempfile::tempdir().unwrap();
+    let path = directory.path().join("params.yaml");
+    let made = std::process::Command::new("mkfifo").arg(&path).status();
+    assert!(made.unwrap().success());
+    let (sender, refused) = std::sync::mpsc::channel();
+    std::thread::spawn(move || sender.send(read(&path)));
+    let refused = refused.recv_timeout(std::time::Duration::from_secs(10));
+    let refused = refused.expect("reading waits for a writer");
+    assert!(matches!(refused, Err(ParamFileError::NotAFile { .. })));
 }

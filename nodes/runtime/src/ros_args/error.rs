@@ -1,8 +1,5 @@
 use thiserror::Error;
 
-/// Longest part of an argument that a message repeats, characters.
-const SHOWN_MAX: usize = 160;
-
 /// Why a command line was refused; every message shows the argument, what was expected and an example.
 #[derive(Clone, Debug, PartialEq, Eq, Error)]
 pub enum RosArgsError {
@@ -33,29 +30,4 @@ pub enum RosArgsError {
         /// A value that would be accepted.
         example: &'static str,
     },
-}
-
-/// `text` with control characters escaped, cut where it is too long for a message.
-pub(crate) fn shown(text: &str) -> String {
-    let mut chars = text.chars();
-    let mut out: String = chars
-        .by_ref()
-        .take(SHOWN_MAX)
-        .flat_map(char::escape_debug)
-        .collect();
-    if chars.next().is_some() {
-        out.push('…');
-    }
-    out
-}
-
-#[cfg(test)]
-mod tests {
-    use super::*;
-
-    #[test]
-    fn long_and_odd_arguments_stay_readable() {
-        assert_eq!(shown("a\nb"), "a\\nb");
-        assert_eq!(shown(&"x".repeat(1000)).chars().count(), SHOWN_MAX + 1);
-    }
 }

@@ -1,4 +1,4 @@
-use super::error::shown;
+use crate::names::shown;
 use std::{fmt, str::FromStr};
 
 /// rcutils severities, case does not matter.

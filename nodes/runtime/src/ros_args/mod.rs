@@ -4,12 +4,11 @@ mod error;
 mod log_level;
 mod param_override;
 mod parse;
-mod remap;
 
+pub use crate::names::{NameKind, RemapRule, RemapTarget};
 pub use error::RosArgsError;
 pub use log_level::{LogLevel, LogLevelRule};
 pub use param_override::ParamOverride;
-pub use remap::{NameKind, RemapRule, RemapTarget};
 
 use std::path::PathBuf;
 
@@ -40,7 +39,7 @@ pub struct RosArgs {
     pub user_args: Vec<String>,
     /// Arguments inside a ROS scope that no rule knows.
     pub unparsed: Vec<String>,
-    /// What the user should hear once logging is up.
+    /// Lines for the log once it is up.
     pub warnings: Vec<String>,
 }
 

@@ -1,5 +1,5 @@
-use super::{error::shown, remap::split_node};
-use crate::{names::is_identifier, params::ParamValue};
+use crate::names::{is_identifier, shown, split_node};
+use crate::param_value::ParamValue;
 use std::str::FromStr;
 
 /// `-p [node:]name:=value`, the value read as YAML.

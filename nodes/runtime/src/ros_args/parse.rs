@@ -1,4 +1,5 @@
-use super::{RemapRule, RosArgs, RosArgsError, error::shown};
+use super::{RemapRule, RosArgs, RosArgsError};
+use crate::names::shown;
 
 const SCOPE: &str = "--ros-args";
 const SCOPE_END: &str = "--";

@@ -26,10 +26,10 @@ const CHUNK_OVERHEAD_BYTES: usize = 1024;
 const PAYLOAD_BYTES: usize = 4 + 3 * 2;
 /// Label and label count of one voxel.
 const LABEL_BYTES: usize = 2 + 4;
-/// What a generator, a cell volume and a quaternion may be off, relative to their size.
+/// Tolerance of a generator, a cell volume and a quaternion, relative to their size.
 const TOLERANCE: f64 = 1e-9;
 
-/// Why a `LatticeMap` or `LatticeMapUpdate` cannot be used.
+/// Error of a `LatticeMap` or `LatticeMapUpdate` that cannot be used.
 #[derive(Debug, Error)]
 pub enum MapMessageError {
     /// The lattice or its cell volume means nothing here.
@@ -39,7 +39,7 @@ pub enum MapMessageError {
         lattice: String,
         /// Cell volume as sent.
         cell_volume_m3: f64,
-        /// What is wrong.
+        /// Problem in words.
         reason: String,
     },
     /// Keys in an encoding that this version does not read.
@@ -51,7 +51,7 @@ pub enum MapMessageError {
     /// Columns of different length.
     #[error("{column} has {found} entries for {voxels} voxels, expected {expected}")]
     Length {
-        /// Which column.
+        /// Name of the column.
         column: &'static str,
         /// Number of voxels that the keys give.
         voxels: usize,
@@ -73,7 +73,7 @@ pub enum MapMessageError {
     Frame,
 }
 
-/// What all messages of one map state share.
+/// Header and state that all messages of one map state share.
 pub struct MapStamp<'a> {
     /// Frame and time.
     pub header: Header,
@@ -226,7 +226,7 @@ fn keyframe_of_parts(
     (0..).zip(parts).map(chunk).collect()
 }
 
-/// What changed since `previous_sequence`, with the state of each changed voxel, in chunks.
+/// Changes since `previous_sequence`, with the state of each changed voxel, in chunks.
 pub fn update(
     list: &VoxelList,
     changes: &Changes,

@@ -23,7 +23,7 @@ pub struct VoxelState {
 /// The columns of the voxels of a message, empty where not kept.
 #[derive(Clone, Copy, Debug)]
 pub struct VoxelColumns<'a> {
-    /// How the keys are written.
+    /// Encoding of the keys.
     pub key_encoding: &'a str,
     /// Keys.
     pub keys: &'a [u8],

@@ -14,7 +14,7 @@ const COLORS: [[&str; 2]; 3] = [
     ["semantic_color3", "confidence3"],
 ];
 
-/// Where the labels of a cloud are.
+/// Field of a cloud that has the labels.
 ///
 /// In this order, the first that is there: `label_probs` (one element for each class), `p_0`, `p_1`,
 /// ... (one field for each class), `label` with `confidence` if given; with a palette
@@ -41,7 +41,7 @@ impl<'a> LabelReader<'a> {
         Some(Self { form, options })
     }
 
-    /// What is known of the class of point `i`.
+    /// Label or distribution of labels of point `i`.
     pub fn read(&self, view: &CloudView<'_>, i: usize) -> LabelDistribution {
         match &self.form {
             Form::Probabilities(field) => {

@@ -17,7 +17,7 @@ use thiserror::Error;
 
 use super::cloud;
 
-/// Why a cloud cannot be used.
+/// Error of a cloud that cannot be used.
 #[derive(Debug, Error)]
 pub enum SemanticError {
     /// The bytes are not what the header says, or there are too many points.
@@ -53,7 +53,7 @@ pub enum SemanticError {
     },
 }
 
-/// What was left out of a cloud.
+/// Numbers of points left out of a cloud.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
 pub struct SemanticReport {
     /// Points of the message.

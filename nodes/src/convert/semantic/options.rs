@@ -1,4 +1,4 @@
-//! How labels are read.
+//! Options for reading labelled clouds.
 
 use std::collections::{BTreeMap, BTreeSet};
 
@@ -9,10 +9,10 @@ use lattice_runtime::params::{ParamError, Params};
 /// Red, green and blue.
 pub type Color = [u8; 3];
 
-/// What labels and colours mean.
+/// Meaning of labels and colours.
 #[derive(Clone, Debug, PartialEq)]
 pub struct LabelOptions {
-    /// Whether only the low 16 bits of a label of 32 bits are the class (SemanticKITTI, where the
+    /// True if only the low 16 bits of a label of 32 bits are the class (SemanticKITTI, where the
     /// others are the instance).
     pub low_16_bits: bool,
     /// Classes that say nothing, as the 0 of SemanticKITTI.
@@ -62,7 +62,7 @@ fn palette_from(numbers: &[i64]) -> Option<BTreeMap<Color, u16>> {
     rest.is_empty().then(|| entries.collect()).flatten()
 }
 
-/// How the cloud of a headset is read.
+/// Options for reading the cloud of a headset.
 #[derive(Clone, Debug, PartialEq)]
 pub struct SemanticOptions {
     /// Most points of one cloud.
@@ -71,9 +71,9 @@ pub struct SemanticOptions {
     pub max_range_m: f64,
     /// Axes of the sender.
     pub axes: Axes,
-    /// Whether clouds without labels are refused.
+    /// True if clouds without labels are refused.
     pub require_labels: bool,
-    /// What labels mean.
+    /// Meaning of labels.
     pub labels: LabelOptions,
 }
 
@@ -95,13 +95,9 @@ impl SemanticOptions {
     pub fn from_params(params: &Params) -> Result<Self, ParamError> {
         let defaults = Self::default();
         let axes = params.string("headset_axes", defaults.axes.name())?;
-        let max_range_m = params.f64("max_range_m", defaults.max_range_m)?;
-        if !(max_range_m > 0.0 && max_range_m.is_finite()) {
-            return Err(params.invalid("max_range_m", "expected a number above 0"));
-        }
         Ok(Self {
-            max_points: params.usize("max_cloud_points", defaults.max_points)?,
-            max_range_m,
+            max_points: params.usize_in("max_cloud_points", defaults.max_points, 1..=usize::MAX)?,
+            max_range_m: params.f64_in("max_range_m", defaults.max_range_m, 1e-3..=1e9)?,
             axes: axes
                 .parse()
                 .map_err(|e| params.invalid("headset_axes", format!("{e}")))?,

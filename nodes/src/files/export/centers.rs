@@ -4,7 +4,7 @@ use std::io::Write;
 
 use lattice_core::voxels::VoxelList;
 
-use super::{ExportError, ply_comment};
+use super::{ExportError, ply_comment, ply_header};
 
 /// Writes the occupied cells in Morton order as vertices of a binary PLY file.
 ///
@@ -12,14 +12,17 @@ use super::{ExportError, ply_comment};
 /// points in it, and `offset_x`, `_y`, `_z` (float, metres) their mean minus the centre.
 pub fn write_centers_ply(list: &VoxelList, writer: impl Write) -> Result<(), ExportError> {
     let mut writer = std::io::BufWriter::new(writer);
-    write!(
-        writer,
-        "ply\nformat binary_little_endian 1.0\n{}element vertex {}\n\
-         property double x\nproperty double y\nproperty double z\nproperty uint count\n\
-         property float offset_x\nproperty float offset_y\nproperty float offset_z\nend_header\n",
-        ply_comment(list),
-        list.len()
-    )?;
+    let properties = [
+        "double x",
+        "double y",
+        "double z",
+        "uint count",
+        "float offset_x",
+        "float offset_y",
+        "float offset_z",
+    ];
+    let vertices = ("vertex", list.len() as u64, &properties[..]);
+    writer.write_all(ply_header(&ply_comment(list), &[vertices]).as_bytes())?;
     for (key, voxel) in list.sorted() {
         for coordinate in list.center_m(key).iter() {
             writer.write_all(&coordinate.to_le_bytes())?;

@@ -4,6 +4,8 @@ use std::io::{self, BufWriter, Write};
 
 use nalgebra::Point3;
 
+use super::ply_header;
+
 /// Writes points as vertices of a binary PLY file: `x`, `y`, `z` (double, metres) and `label`
 /// (ushort, 65535 for none, also for points beyond the labels). `comment` is one line that says in
 /// which frame they are.
@@ -14,14 +16,9 @@ pub fn write_labelled_ply(
     writer: impl Write,
 ) -> io::Result<()> {
     let mut writer = BufWriter::new(writer);
-    let comment = comment.replace(['\n', '\r'], " ");
-    write!(
-        writer,
-        "ply\nformat binary_little_endian 1.0\ncomment {comment}\nelement vertex {}\n\
-         property double x\nproperty double y\nproperty double z\nproperty ushort label\n\
-         end_header\n",
-        points_m.len()
-    )?;
+    let properties = ["double x", "double y", "double z", "ushort label"];
+    let vertices = ("vertex", points_m.len() as u64, &properties[..]);
+    writer.write_all(ply_header(comment, &[vertices]).as_bytes())?;
     let labels = labels.iter().copied().chain(std::iter::repeat(u16::MAX));
     for (point, label) in points_m.iter().zip(labels) {
         for coordinate in point.iter() {

@@ -4,7 +4,7 @@ use std::io;
 
 use thiserror::Error;
 
-/// Why a map was not exported.
+/// Reason for which a map was not exported.
 #[derive(Debug, Error)]
 pub enum ExportError {
     /// The system could not write.

@@ -7,7 +7,8 @@ use lattice_core::voxels::VoxelList;
 use nalgebra::Vector3;
 use rustc_hash::FxHashMap;
 
-use super::{ExportError, HeightRange, SharedVertices, color_at, ply_comment};
+use super::vertices::SharedVertices;
+use super::{ExportError, HeightRange, color_at, ply_comment, ply_header};
 
 /// Writes the faces between occupied and empty cells as a binary PLY mesh of convex polygons.
 ///
@@ -17,16 +18,18 @@ pub fn write_mesh_ply(list: &VoxelList, writer: impl Write) -> Result<(), Export
     let mesh = Mesh::of(list)?;
     let heights = HeightRange::of(mesh.vertices_m.iter().map(|v| v.z));
     let mut writer = BufWriter::new(writer);
-    write!(
-        writer,
-        "ply\nformat binary_little_endian 1.0\n{}element vertex {}\n\
-         property double x\nproperty double y\nproperty double z\n\
-         property uchar red\nproperty uchar green\nproperty uchar blue\n\
-         element face {}\nproperty list uchar int vertex_indices\nend_header\n",
-        ply_comment(list),
-        mesh.vertices_m.len(),
-        mesh.faces
-    )?;
+    let properties = [
+        "double x",
+        "double y",
+        "double z",
+        "uchar red",
+        "uchar green",
+        "uchar blue",
+    ];
+    let vertices = ("vertex", mesh.vertices_m.len() as u64, &properties[..]);
+    let indices = &["list uchar int vertex_indices"][..];
+    let faces = ("face", mesh.faces as u64, indices);
+    writer.write_all(ply_header(&ply_comment(list), &[vertices, faces]).as_bytes())?;
     for vertex in &mesh.vertices_m {
         for coordinate in vertex.iter() {
             writer.write_all(&coordinate.to_le_bytes())?;

@@ -5,6 +5,7 @@ mod cloud;
 mod error;
 mod mesh;
 pub mod palette;
+mod ply;
 mod vertices;
 
 pub use centers::write_centers_ply;
@@ -12,15 +13,15 @@ pub use cloud::write_labelled_ply;
 pub use error::ExportError;
 pub use mesh::write_mesh_ply;
 pub use palette::{HeightRange, category_color, color_at};
-pub use vertices::SharedVertices;
+pub use ply::{PlyElement, ply_header};
 
 use lattice_core::voxels::VoxelList;
 
-/// The line of a PLY header that says what the map is.
+/// The comment of a PLY header that says what the map is.
 fn ply_comment(list: &VoxelList) -> String {
     let lattice = list.lattice();
     format!(
-        "comment {} lattice, cell volume {} m^3, metres, map frame: x east, y north, z up\n",
+        "{} lattice, cell volume {} m^3, metres, map frame: x east, y north, z up",
         lattice.kind(),
         lattice.cell_volume_m3()
     )

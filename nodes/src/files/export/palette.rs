@@ -108,7 +108,7 @@ impl HeightRange {
         }
     }
 
-    /// Where a height is in the range, 0 to 1; 0.5 if all heights are one.
+    /// Place of a height in the range, 0 to 1; 0.5 if all heights are one.
     pub fn fraction(&self, height_m: f64) -> f64 {
         let span = self.high_m - self.low_m;
         if span > 0.0 {

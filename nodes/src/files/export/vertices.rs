@@ -1,4 +1,4 @@
-//! Which corners of neighbouring cells are one point, found once for a lattice and then exact.
+//! Corners that neighbouring cells share, found once for a lattice and then exact.
 
 use lattice_core::lattice::{Lattice, LatticeIndex};
 use nalgebra::Vector3;

@@ -1,4 +1,4 @@
-//! Why a point file could not be read.
+//! Error of a point file.
 
 use std::io;
 
@@ -6,7 +6,7 @@ use thiserror::Error;
 
 use super::PointFormat;
 
-/// Why a point file could not be read. Bytes count from 0, lines from 1, both after unpacking.
+/// Error of a point file. Bytes count from 0, lines from 1, both after unpacking.
 #[derive(Debug, Error)]
 pub enum PointFileError {
     /// The system could not open or read the file, or its bzip2 data is damaged.
@@ -14,7 +14,7 @@ pub enum PointFileError {
     Io {
         /// Bytes read before.
         byte: u64,
-        /// What the system said.
+        /// Error of the system.
         source: io::Error,
     },
     /// Neither the content nor the name tells what it is.
@@ -29,21 +29,21 @@ pub enum PointFileError {
     /// A line of a header or of text data is wrong.
     #[error("{format} file, line {line}: {reason}")]
     Line {
-        /// What the file was read as.
+        /// Kind that the file was read as.
         format: PointFormat,
         /// Line of the fault.
         line: u64,
-        /// What is wrong, and what was expected.
+        /// Problem, with what was expected.
         reason: String,
     },
     /// Binary data is wrong.
     #[error("{format} file, at byte {byte}: {reason}")]
     Data {
-        /// What the file was read as.
+        /// Kind that the file was read as.
         format: PointFormat,
-        /// Where the fault was noticed.
+        /// Place of the problem.
         byte: u64,
-        /// What is wrong, and what was expected.
+        /// Problem, with what was expected.
         reason: String,
     },
     /// The end comes too early.
@@ -51,7 +51,7 @@ pub enum PointFileError {
     Truncated {
         /// Length of the file.
         byte: u64,
-        /// What was being read.
+        /// Part that was being read.
         part: String,
     },
     /// Packed, where this build cannot unpack.
@@ -65,7 +65,7 @@ pub enum PointFileError {
     TooManyPoints {
         /// Points promised by a header, or found so far.
         points: u64,
-        /// What the caller allows.
+        /// Limit of the caller.
         max_points: usize,
     },
 }

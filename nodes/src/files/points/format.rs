@@ -1,4 +1,4 @@
-//! Which kind of point file it is.
+//! Kinds of point files, by name and by content.
 
 use std::fmt;
 use std::path::Path;

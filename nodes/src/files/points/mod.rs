@@ -27,7 +27,7 @@ use source::Source;
 /// Bytes read from the disk at once.
 const BUFFER: usize = 1 << 16;
 
-/// What a point file may ask for.
+/// Bounds of what a point file may ask for.
 #[derive(Clone, Copy, PartialEq, Eq, Debug)]
 pub struct PointFileLimits {
     /// Most points that are taken.
@@ -51,7 +51,7 @@ pub struct PointFile {
     /// Class of each point, [`UNLABELED`](lattice_core::registration::UNLABELED) where it has none;
     /// empty if the file has no `label`.
     pub labels: Vec<u16>,
-    /// What kind of file it was.
+    /// Kind of the file.
     pub format: PointFormat,
     /// Points left out because a coordinate was NaN or infinite.
     pub skipped_not_finite: usize,

@@ -60,7 +60,7 @@ fn fields(content: &str) -> impl Iterator<Item = &str> {
         .filter(move |field| separated || !field.is_empty())
 }
 
-/// Where the columns x, y and z are, if the line names them.
+/// Places of the columns x, y and z, if the line names them.
 fn names(content: &str) -> Option<[usize; 3]> {
     let column = |name: &str| column_named(content, name);
     Some([column("x")?, column("y")?, column("z")?])

@@ -1,7 +1,6 @@
 //! Queries against brute force, on every lattice, near and far from the map origin.
 
 mod clearance;
-mod field;
 mod nearest;
 mod path;
 mod polyhedra;

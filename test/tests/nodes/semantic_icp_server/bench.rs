@@ -30,6 +30,8 @@ pub struct Fake {
     pub headset_scans: Vec<usize>,
     pub starts: Vec<Option<Isometry3<f64>>>,
     pub refuse_map: bool,
+    /// Times that it was to forget the confusions of labels.
+    pub unlearned: usize,
 }
 
 pub fn found(verdict: Verdict, x: f64) -> Calibration {
@@ -40,6 +42,10 @@ pub fn found(verdict: Verdict, x: f64) -> Calibration {
 }
 
 impl Search for Fake {
+    fn unlearn(&mut self) {
+        self.unlearned += 1;
+    }
+
     fn prepare(&mut self, map: MapCloud) -> Result<(), String> {
         self.maps += 1;
         self.map_labelled = map.cloud.labels.len() == map.cloud.len();

@@ -1,10 +1,11 @@
-//! When it searches: the first cloud, another map, another session, several headset scans, other axes.
+//! Occasions of searches: the first cloud, another map, another session, several headset scans, other axes.
 
 use std::sync::atomic::Ordering::Relaxed;
 
 use lattice_core::pose::Axes;
 use lattice_core::registration::{CalibrationOptions, Verdict};
 use lattice_msgs::calibration::CalibrateGoal;
+use lattice_msgs::vision_msgs::{LabelInfo, VisionClass};
 use lattice_nodes::convert::geometry::isometry_from_transform;
 use lattice_nodes::semantic_icp_server::{End, LatticeSearch, SearchWhen, ServerOptions};
 use lattice_test::clouds::{SECOND_NS, labelled_cloud};
@@ -206,6 +207,43 @@ fn a_new_map_is_searched_anew() {
     );
     bench.cloud(&good());
     assert_eq!((bench.verdict(), bench.search.maps), (OK, 2));
+}
+
+#[test]
+fn confusions_of_labels_are_unlearned_with_session_classes_and_map() {
+    let mut bench = bench(ServerOptions::default());
+    let classes = |names: &[&str]| LabelInfo {
+        class_map: (1..)
+            .zip(names)
+            .map(|(class_id, name)| VisionClass {
+                class_id,
+                class_name: (*name).to_owned(),
+            })
+            .collect(),
+        ..LabelInfo::default()
+    };
+    bench.machine.on_label_info(&classes(&["wall", "floor"]));
+    bench.cloud(&good());
+    let begun = bench.search.unlearned;
+    bench.machine.on_label_info(&classes(&["wall", "floor"]));
+    bench.session("");
+    bench.cloud(&good());
+    assert_eq!(bench.search.unlearned, begun, "the same once more");
+    bench.machine.on_label_info(&classes(&["floor", "wall"]));
+    bench.cloud(&good());
+    assert_eq!(bench.search.unlearned, begun + 1, "another segmenter");
+    bench.session("b");
+    bench.cloud(&good());
+    assert_eq!(bench.search.unlearned, begun + 2, "another session");
+    let mut other = mapper(2);
+    other
+        .on_cloud(&labelled_cloud("map", 1, &[([0.0; 3], 3)]))
+        .unwrap();
+    bench.map(&mut other);
+    bench.cloud(&good());
+    assert_eq!(bench.search.unlearned, begun + 3, "another map");
+    bench.cloud(&good());
+    assert_eq!(bench.search.unlearned, begun + 3);
 }
 
 #[test]

@@ -1,5 +1,7 @@
 //! Files that are refused.
 
+use nalgebra::{Matrix3, Quaternion, UnitQuaternion};
+
 use super::*;
 
 #[test]
@@ -180,9 +182,11 @@ fn a_lattice_that_no_writer_writes_is_refused_with_its_place() {
             other => panic!("{other:?}"),
         }
     };
-    let [custom, turned, cubic, ..] = &lattices()[..] else {
-        panic!("a lattice is missing")
-    };
+    let turn = UnitQuaternion::from_euler_angles(0.3, -1.2, 2.5);
+    let skewed = Matrix3::new(0.5, 0.1, -0.0, 0.0, 0.4, 0.2, 0.1, -0.1, 0.6);
+    let custom = &Lattice::from_basis(skewed).unwrap();
+    let turned = &custom.clone().oriented(turn);
+    let cubic = &Lattice::new(LatticeKind::Cubic, 0.125).unwrap();
     for (lattice, at, value, position, words) in [
         (cubic, 32, f64::NAN, 32, "unit quaternion"),
         (cubic, 32, 1.001, 32, "unit quaternion"),
@@ -204,8 +208,7 @@ fn a_lattice_that_no_writer_writes_is_refused_with_its_place() {
         assert!(reason.contains(words), "{reason} instead of {words}");
         assert_eq!(found, position, "{reason}");
     }
-    let lost =
-        nalgebra::UnitQuaternion::new_unchecked(nalgebra::Quaternion::new(f64::NAN, 0.0, 0.0, 0.0));
+    let lost = UnitQuaternion::new_unchecked(Quaternion::new(f64::NAN, 0.0, 0.0, 0.0));
     let lost = VoxelList::at_datum(cubic.clone().oriented(lost), [0; 3], 1);
     let error = write_map(&lost, Vec::new()).unwrap_err();
     assert!(matches!(error, FileError::Lattice(_)), "{error}");

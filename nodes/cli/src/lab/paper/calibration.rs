@@ -6,6 +6,7 @@ use clap::Args;
 
 use super::{ReportOptions, make};
 use crate::CliResult;
+use crate::lab::processors;
 use lattice_lab::paper::calibration::{Options, run};
 
 /// Options of `lattice paper calibration`.
@@ -33,7 +34,6 @@ pub struct Calibration {
 impl Calibration {
     /// Runs the command.
     pub fn run(self) -> CliResult {
-        let processors = || std::thread::available_parallelism().map_or(1, usize::from);
         let options = Options {
             seed: self.report.seed,
             quick: self.quick,

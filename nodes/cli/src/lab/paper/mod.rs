@@ -9,7 +9,7 @@ use clap::{Args, Subcommand};
 
 use crate::progress::Progress;
 use crate::{CliResult, init_logging};
-use lattice_lab::paper::report::{self, Report};
+use lattice_lab::report::{self, Report};
 
 /// Compute every table and figure of a paper and set it beside what is printed
 #[derive(Subcommand)]
@@ -31,7 +31,7 @@ impl Paper {
     }
 }
 
-/// What both papers take.
+/// Options of both papers.
 #[derive(Args)]
 struct ReportOptions {
     /// Folder of the report: report.html, report.json, a CSV for each table, an SVG for each figure

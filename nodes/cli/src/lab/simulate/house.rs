@@ -2,12 +2,13 @@
 
 use std::path::PathBuf;
 
-use clap::{Args, ValueEnum};
+use clap::Args;
 use lattice_core::lattice::LatticeKind;
-use lattice_lab::simulate::house::{FlipSide, HeadsetOptions, LabelModel, SurveyOptions};
+use lattice_lab::simulate::house::{HeadsetOptions, SurveyOptions};
 use nalgebra::{Isometry3, Vector3};
 
 use crate::CliResult;
+use crate::lab::{choice, show};
 use crate::progress::Progress;
 use lattice_lab::datasets::{HeadsetAxes, HouseOptions, write_house};
 
@@ -27,21 +28,12 @@ pub struct House {
     /// The same seed gives the same bytes
     #[arg(long, default_value_t = 1)]
     seed: u64,
-    /// Where the house stands in the map, m and degrees
+    /// Place of the house in the map, m and degrees
     #[arg(long, num_args = 4, value_names = ["X", "Y", "Z", "YAW"], allow_negative_numbers = true)]
     place: Option<Vec<f64>>,
     /// Share of the headset's view whose regions are labelled wrongly, 0 to 1
     #[arg(long, value_name = "Q", default_value_t = 0.0)]
     flips: f64,
-    /// Which device has the wrong labels
-    #[arg(long, value_enum, default_value = "either")]
-    flips_side: Side,
-    /// Classes are always taken for the same other one
-    #[arg(long)]
-    flips_consistent: bool,
-    /// Share of single points with a random label, 0 to 1
-    #[arg(long, value_name = "SHARE", default_value_t = 0.0)]
-    label_noise: f64,
     /// Pictures of each scene; the further ones look to the sides
     #[arg(long, default_value_t = 1)]
     headset_scans: usize,
@@ -55,8 +47,8 @@ pub struct House {
     #[arg(long, default_value_t = 0.05)]
     cell_side: f64,
     /// Axes of the headset's clouds
-    #[arg(long, value_enum, default_value = "ros")]
-    axes: Axes,
+    #[arg(long, value_parser = choice(&AXES), default_value = "ros")]
+    axes: HeadsetAxes,
     /// Replace files that are already there
     #[arg(long)]
     overwrite: bool,
@@ -65,25 +57,15 @@ pub struct House {
     json: bool,
 }
 
-#[derive(Clone, Copy, Debug, ValueEnum)]
-enum Side {
-    /// One or the other, half of the view each
-    Either,
-    /// The robot
-    Map,
-    /// The headset
-    Headset,
-    /// Both
-    Both,
-}
-
-#[derive(Clone, Copy, Debug, ValueEnum)]
-enum Axes {
-    /// x forward, y left, z up
-    Ros,
-    /// x right, y up, z forward: left-handed
-    Unity,
-}
+/// Values of `--axes`.
+const AXES: [(&str, &str, HeadsetAxes); 2] = [
+    ("ros", "x forward, y left, z up", HeadsetAxes::Ros),
+    (
+        "unity",
+        "x right, y up, z forward: left-handed",
+        HeadsetAxes::Unity,
+    ),
+];
 
 impl House {
     pub(super) fn run(self) -> CliResult {
@@ -108,33 +90,14 @@ impl House {
                 headset_scans: self.headset_scans,
                 ..HeadsetOptions::default()
             },
-            labels: LabelModel {
-                region_flips: self.flips,
-                side: match self.flips_side {
-                    Side::Either => FlipSide::Either,
-                    Side::Map => FlipSide::Map,
-                    Side::Headset => FlipSide::Headset,
-                    Side::Both => FlipSide::Both,
-                },
-                consistent: self.flips_consistent,
-                iid: self.label_noise,
-                softness: 0.0,
-            },
+            flips: self.flips,
             lattice: self.lattice,
             cell_side_m: self.cell_side,
-            axes: match self.axes {
-                Axes::Ros => HeadsetAxes::Ros,
-                Axes::Unity => HeadsetAxes::Unity,
-            },
+            axes: self.axes,
         };
         let progress = Progress::new("simulate");
         let summary = write_house(&options, &mut |done| progress.set(done))?;
         progress.done();
-        if self.json {
-            println!("{}", serde_json::to_string_pretty(&summary)?);
-        } else {
-            println!("{summary}");
-        }
-        Ok(())
+        show(self.json, &summary)
     }
 }

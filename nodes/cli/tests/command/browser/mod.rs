@@ -33,16 +33,16 @@ pub fn chromium() -> Option<PathBuf> {
     found
 }
 
-/// What is known of a page that was opened.
+/// A page that was opened.
 #[derive(Debug)]
 pub struct Opened {
     /// Lines of its console: messages, errors, warnings.
     pub console: Vec<String>,
-    /// What was seen on it.
+    /// Sizes of its parts.
     pub seen: Seen,
 }
 
-/// What the page itself tells of its parts, pixels.
+/// Sizes of the page's parts, by its own script, pixels.
 #[derive(Debug, Deserialize)]
 pub struct Seen {
     /// Width of the window and of what is in it.
@@ -89,7 +89,7 @@ document.body.append(note);
 </script>
 "##;
 
-/// Opens a page as it is for its console, then a copy that tells what is on it.
+/// Opens a page as it is for its console, then a copy that notes the sizes of its parts.
 pub fn open(chromium: &Path, page: &Path) -> Opened {
     let (_, console) = dump(chromium, page);
     let html = fs::read_to_string(page).unwrap();
@@ -99,7 +99,7 @@ pub fn open(chromium: &Path, page: &Path) -> Opened {
     fs::remove_file(&copy).unwrap();
     let note = dom.split("id=\"seen-by-the-test\">").nth(1);
     let note = note.and_then(|rest| rest.split("</pre>").next());
-    let note = note.unwrap_or_else(|| panic!("the page has not told what is on it: {dom}"));
+    let note = note.unwrap_or_else(|| panic!("the page has no note of its parts: {dom}"));
     let note = note
         .replace("&lt;", "<")
         .replace("&gt;", ">")

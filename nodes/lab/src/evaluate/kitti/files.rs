@@ -5,13 +5,14 @@ use std::path::Path;
 
 use lattice_core::registration::{SemanticCloud, UNLABELED};
 
-use super::{KittiError, Prepared, cannot_write};
+use super::Prepared;
+use crate::{AnyError, at};
 use lattice_nodes::files::export::write_labelled_ply;
 
 /// Writes each scan as `scan_N.ply`, and thinned as `thinned_N.ply`: points with their most probable
 /// classes, sensor frame.
-pub fn write_scans(folder: &Path, names: &[String], scans: &[Prepared]) -> Result<(), KittiError> {
-    fs::create_dir_all(folder).map_err(cannot_write(folder))?;
+pub fn write_scans(folder: &Path, names: &[String], scans: &[Prepared]) -> Result<(), AnyError> {
+    fs::create_dir_all(folder).map_err(at(folder))?;
     for (number, (name, scan)) in names.iter().zip(scans).enumerate() {
         let write = |kind: &str, cloud: &SemanticCloud| {
             let path = folder.join(format!("{kind}_{number}.ply"));
@@ -19,9 +20,8 @@ pub fn write_scans(folder: &Path, names: &[String], scans: &[Prepared]) -> Resul
                 .map(|i| cloud.label(i).top().unwrap_or(UNLABELED))
                 .collect();
             let comment = format!("{kind} at {name}, metres, sensor frame");
-            let file = File::create(&path).map_err(cannot_write(&path))?;
-            write_labelled_ply(&cloud.points_m, &labels, &comment, file)
-                .map_err(cannot_write(&path))
+            let file = File::create(&path).map_err(at(&path))?;
+            write_labelled_ply(&cloud.points_m, &labels, &comment, file).map_err(at(&path))
         };
         write("scan", &scan.whole)?;
         write("thinned", &scan.thinned)?;

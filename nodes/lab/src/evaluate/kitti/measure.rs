@@ -1,4 +1,4 @@
-//! Pairs of scans, and what each method makes of them.
+//! Pairs of scans and the results of each method on them.
 
 use crate::metrics::PoseError;
 use lattice_core::registration::{
@@ -8,7 +8,8 @@ use lattice_core::registration::{
 use nalgebra::{Isometry3, Point3, UnitQuaternion, Vector3};
 use serde::Serialize;
 
-use super::{KittiError, KittiMethod, RIGHT, Scan};
+use super::{KittiMethod, RIGHT, Scan};
+use crate::AnyError;
 use crate::bench::timed;
 use crate::evaluate::trial::rounded;
 
@@ -19,11 +20,11 @@ pub struct Pair {
     pub source: usize,
     /// Number of the scan that stays.
     pub target: usize,
-    /// How far apart they were taken, metres.
+    /// Distance of their sensors, metres.
     pub distance_m: f64,
-    /// The truth, row by row.
+    /// True transform, row by row.
     pub target_from_source: [[f64; 4]; 4],
-    /// The start: no translation and the true heading.
+    /// Start: no translation and the true heading.
     pub start: [[f64; 4]; 4],
     #[serde(skip)]
     truth: Isometry3<f64>,
@@ -31,14 +32,14 @@ pub struct Pair {
     heading: Isometry3<f64>,
 }
 
-/// What a method made of a pair.
+/// Result of a method on a pair.
 #[derive(Clone, PartialEq, Debug, Serialize)]
 pub struct PairRow {
-    /// Its name.
+    /// Name of the method.
     pub method: String,
-    /// Its name in tables.
+    /// Name of the method in tables.
     pub title: String,
-    /// `heading` for a start with the true heading, `none` for none; methods that need one
+    /// Start: `heading` with the true heading, `none` for none; methods that need one
     /// start at the identity there.
     pub start: String,
     /// Number of the scan that is moved.
@@ -49,32 +50,32 @@ pub struct PairRow {
     pub translation_m: f64,
     /// Angle from the truth, degrees.
     pub rotation_deg: f64,
-    /// Whether both are within the bounds.
+    /// True if both are within the bounds.
     pub right: bool,
-    /// Where a method judges its own result: what it says.
+    /// Verdict of a method that judges its own result.
     #[serde(skip_serializing_if = "Option::is_none")]
     pub verdict: Option<String>,
     /// Log-likelihood above the best different pose, if it was asked and there was one.
     #[serde(skip_serializing_if = "Option::is_none")]
     pub margin: Option<f64>,
-    /// From thinned points in memory to all that is needed before the method, milliseconds of processor time.
+    /// Processor time from thinned points in memory to the start of the method, milliseconds.
     pub prepare_ms: f64,
-    /// From there to the result, milliseconds of processor time.
+    /// Processor time from there to the result, milliseconds.
     pub register_ms: f64,
 }
 
-/// Everything that was found.
+/// Results of all pairs and methods.
 #[derive(Clone, PartialEq, Debug, Serialize)]
 pub struct KittiReport {
     /// Side of the cells of the thinning, metres.
     pub cell_m: f64,
-    /// How the program was built, `release` or `dev`.
+    /// Profile that the program was built in, `release` or `dev`.
     pub build: String,
     /// Threads of all that is ours.
     pub threads: usize,
     /// Bounds of a right pose: metres.
     pub right_m: f64,
-    /// And degrees.
+    /// Bounds of a right pose: degrees.
     pub right_deg: f64,
     /// Names of the scans.
     pub scans: Vec<String>,
@@ -82,7 +83,7 @@ pub struct KittiReport {
     pub points: Vec<[usize; 2]>,
     /// All ordered pairs.
     pub pairs: Vec<Pair>,
-    /// What was made of them.
+    /// Results of all methods.
     pub rows: Vec<PairRow>,
 }
 
@@ -92,9 +93,9 @@ pub struct Prepared {
     pub whole: SemanticCloud,
     /// The means of the cells.
     pub thinned: SemanticCloud,
-    /// For single registrations.
+    /// Cloud of single registrations.
     pub cloud: PreparedCloud,
-    /// For ours.
+    /// Map of ours.
     pub map: CalibrationMap,
     cloud_ms: f64,
     map_ms: f64,
@@ -102,7 +103,7 @@ pub struct Prepared {
 
 impl Prepared {
     /// Thins to the means of cubes of side `cell_m`.
-    pub fn new(scan: &Scan, cell_m: f64) -> Result<Prepared, KittiError> {
+    pub fn new(scan: &Scan, cell_m: f64) -> Result<Prepared, AnyError> {
         let thinned = voxel_downsample(&scan.cloud, cell_m);
         let options = PrepareOptions::default();
         let (cloud, cloud_spent) = timed(|| PreparedCloud::new(thinned.clone(), &options));
@@ -148,7 +149,7 @@ impl Pair {
         }
     }
 
-    /// What a method makes of it; `scans` are those of the numbers. None without such scans.
+    /// Result of a method; `scans` are those of the numbers. None without such scans.
     pub fn run(&self, method: &KittiMethod, known: bool, scans: &[Prepared]) -> Option<PairRow> {
         let (source, target) = (scans.get(self.source)?, scans.get(self.target)?);
         let start = known.then_some(self.heading);
@@ -156,9 +157,10 @@ impl Pair {
         let row = |pose: &Isometry3<f64>, prepare_ms| self.row(method, known, pose, prepare_ms);
         Some(match method {
             KittiMethod::Start => row(&from, 0.0),
-            KittiMethod::Single { options, .. } => {
+            KittiMethod::Single(named, gate_m) => {
+                let options = named.options(*gate_m);
                 let (found, spent) =
-                    timed(|| register(&source.cloud, &target.cloud, &from, options));
+                    timed(|| register(&source.cloud, &target.cloud, &from, &options));
                 PairRow {
                     register_ms: 1e3 * spent.cpu_s,
                     ..row(&found.target_from_source, source.cloud_ms + target.cloud_ms)
@@ -203,8 +205,8 @@ impl Pair {
         let error = PoseError::between(pose, &self.truth);
         let rotation_deg = error.rotation_rad.to_degrees();
         PairRow {
-            method: method.name().to_owned(),
-            title: method.title().to_owned(),
+            method: method.name(),
+            title: method.title(),
             start: if known { "heading" } else { "none" }.to_owned(),
             source: self.source,
             target: self.target,

@@ -1,98 +1,83 @@
-//! What is compared.
+//! The methods that are compared on laser scans.
 
-use lattice_core::registration::{LabelUse, RegisterOptions, SemanticVariant};
+use lattice_core::registration::NamedMethod;
 
-/// Name of ours in reports.
-pub const OURS_TITLE: &str = "**ours**";
+use crate::evaluate::methods::START;
+use crate::evaluate::trial::OURS;
+
+/// Gates of the methods for which none is published, metres.
+const GATES_M: [f64; 2] = [1.0, 2.0];
 
 /// A way to register two scans.
 #[derive(Clone, Copy, Debug)]
 pub enum KittiMethod {
     /// The start as it is.
     Start,
-    /// One registration from the start.
-    Single {
-        /// Name in results.
-        name: &'static str,
-        /// Name in reports.
-        title: &'static str,
-        /// How.
-        options: RegisterOptions<'static>,
-    },
+    /// One registration from the start, with a gate in metres.
+    Single(&'static NamedMethod, f64),
     /// A calibration, the start being known or not.
     Ours {
-        /// Whether the moved scan is thinned before, as for all others; it is thinned in any case.
+        /// True to thin the moved scan before, as for all others; the calibration thins it in any case.
         thinned: bool,
     },
 }
 
 impl KittiMethod {
-    /// All of them, in the order of the table. Where no gate is published it is 1 m and 2 m.
-    ///
-    /// `thinned` is whether ours gets a thinned scan.
+    /// All methods in the order of the table; `thinned` is whether ours gets a thinned scan.
     pub fn all(thinned: bool) -> Vec<KittiMethod> {
-        let of = |name, title, options| KittiMethod::Single {
-            name,
-            title,
-            options,
-        };
-        let semantic = RegisterOptions::semantic;
-        let published = SemanticVariant::Published;
-        vec![
-            KittiMethod::Start,
-            of("icp_1", "ICP, 1 m", RegisterOptions::point_to_point(1.0)),
-            of("icp_2", "ICP, 2 m", RegisterOptions::point_to_point(2.0)),
-            of("gicp_1", "GICP, 1 m", RegisterOptions::gicp(1.0)),
-            of("gicp_2", "GICP, 2 m", RegisterOptions::gicp(2.0)),
-            of(
-                "gicp_se3",
-                "GICP-SE(3), 15.8 m",
-                RegisterOptions::gicp_se3(),
-            ),
-            of(
-                "semantic_hard",
-                "Semantic-ICP as published, hard labels",
-                semantic(published, LabelUse::Hard),
-            ),
-            of(
-                "semantic_soft",
-                "Semantic-ICP as published, soft labels",
-                semantic(published, LabelUse::Soft),
-            ),
-            of(
-                "as_printed",
-                "Semantic-ICP as printed, hard labels",
-                semantic(SemanticVariant::AsPrinted, LabelUse::Hard),
-            ),
-            of(
-                "em_hard",
-                "Semantic-ICP, EM, hard labels, 2 m",
-                RegisterOptions::semantic_em(2.0, LabelUse::Hard),
-            ),
-            of(
-                "class_wise",
-                "class-wise Semantic-ICP of 2017",
-                RegisterOptions::class_wise(),
-            ),
-            KittiMethod::Ours { thinned },
-        ]
+        let mut all = vec![KittiMethod::Start];
+        for method in &NamedMethod::ALL {
+            all.extend(GATES_M.into_iter().filter_map(|gate_m| match method.name {
+                "class_wise_cauchy" => None,
+                // Normalised weights are for wide gates.
+                "em_hard" if gate_m < 2.0 => None,
+                _ if !method.takes_gate && gate_m > GATES_M[0] => None,
+                _ => Some(KittiMethod::Single(method, gate_m)),
+            }));
+        }
+        all.push(KittiMethod::Ours { thinned });
+        all
     }
 
     /// Name in results.
-    pub fn name(&self) -> &'static str {
+    pub fn name(&self) -> String {
         match self {
-            KittiMethod::Start => "start",
-            KittiMethod::Single { name, .. } => name,
-            KittiMethod::Ours { .. } => "ours",
+            KittiMethod::Start => START.to_owned(),
+            KittiMethod::Single(method, gate_m) if method.takes_gate => {
+                format!("{}_{gate_m}", method.name)
+            }
+            KittiMethod::Single(method, _) => method.name.to_owned(),
+            KittiMethod::Ours { .. } => OURS.to_owned(),
         }
     }
 
-    /// Name in reports.
-    pub fn title(&self) -> &'static str {
+    /// Name in tables.
+    pub fn title(&self) -> String {
         match self {
-            KittiMethod::Start => "the start itself",
-            KittiMethod::Single { title, .. } => title,
-            KittiMethod::Ours { .. } => OURS_TITLE,
+            KittiMethod::Start => "the start itself".to_owned(),
+            KittiMethod::Single(method, gate_m) => {
+                let gate_m = method.options(*gate_m).gate_m;
+                format!("{}, {} m", method.title, (10.0 * gate_m).round() / 10.0)
+            }
+            KittiMethod::Ours { .. } => "**ours**".to_owned(),
         }
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn methods_without_a_published_gate_have_one_in_their_names() {
+        let names: Vec<String> = KittiMethod::all(false)
+            .iter()
+            .map(KittiMethod::name)
+            .collect();
+        assert_eq!(
+            names.join(" "),
+            "start icp_1 icp_2 gicp_1 gicp_2 gicp_se3 semantic_hard semantic_soft as_printed em_hard_2 \
+             class_wise ours"
+        );
     }
 }

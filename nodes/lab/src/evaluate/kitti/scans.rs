@@ -1,4 +1,4 @@
-//! Scans of a log and where they were taken.
+//! Scans of a log with their poses.
 
 use std::path::Path;
 
@@ -13,7 +13,7 @@ use lattice_msgs::tf2_msgs::TFMessage;
 use nalgebra::Isometry3;
 use serde::de::DeserializeOwned;
 
-use super::KittiError;
+use crate::AnyError;
 use lattice_bag::{BagReader, ReadOptions};
 use lattice_nodes::convert::geometry::{isometry_from_pose, isometry_from_transform};
 use lattice_nodes::convert::semantic::{SemanticOptions, semantic_from_message};
@@ -21,7 +21,7 @@ use lattice_nodes::convert::semantic::{SemanticOptions, semantic_from_message};
 /// Most scans of a log; their pairs grow as the square.
 const MAX_SCANS: usize = 32;
 
-/// Where things are in a log.
+/// Topics of a log.
 #[derive(Clone, PartialEq, Debug)]
 pub struct KittiTopics {
     /// Clouds with labels.
@@ -42,7 +42,7 @@ impl Default for KittiTopics {
     }
 }
 
-/// A scan and the truth of it.
+/// A scan and its true pose.
 #[derive(Clone, PartialEq, Debug)]
 pub struct Scan {
     /// Seconds after the first one, as a name.
@@ -54,7 +54,7 @@ pub struct Scan {
 }
 
 /// All scans of a log, in order of time; every one must have a label on some point, and a pose.
-pub fn read_scans(bag: &Path, topics: &KittiTopics) -> Result<Vec<Scan>, KittiError> {
+pub fn read_scans(bag: &Path, topics: &KittiTopics) -> Result<Vec<Scan>, AnyError> {
     let reader = BagReader::open(bag)?;
     let names = [&topics.cloud, &topics.odometry, &topics.tf_static].map(String::clone);
     let options = ReadOptions {
@@ -93,29 +93,21 @@ pub fn read_scans(bag: &Path, topics: &KittiTopics) -> Result<Vec<Scan>, KittiEr
         }
     }
     if !(2..=MAX_SCANS).contains(&clouds.len()) {
-        return Err(KittiError::Scans {
-            topic: topics.cloud.clone(),
-            scans: clouds.len(),
-            most: MAX_SCANS,
-        });
+        let (topic, scans) = (&topics.cloud, clouds.len());
+        return Err(format!("{topic} has {scans} scans, not 2 to {MAX_SCANS}").into());
     }
     let first_ns = clouds.first().map_or(0, |c| c.header.stamp.to_ns());
     let scan = |(number, message): (usize, &PointCloud2)| {
         let stamp_ns = message.header.stamp.to_ns();
-        let map_from_base = poses.at(stamp_ns).map_err(|source| KittiError::Pose {
-            scan: number,
-            source,
-        })?;
+        let pose = poses.at(stamp_ns);
+        let map_from_base = pose.map_err(|error| format!("scan {number}: {error}"))?;
         let base_from_sensor = frames.lookup(&machine, &message.header.frame_id, stamp_ns)?;
         let options = SemanticOptions {
             require_labels: true,
             ..SemanticOptions::default()
         };
-        let (cloud, _) =
-            semantic_from_message(message, &options).map_err(|source| KittiError::Cloud {
-                topic: topics.cloud.clone(),
-                source,
-            })?;
+        let (cloud, _) = semantic_from_message(message, &options)
+            .map_err(|error| format!("{}: {error}", topics.cloud))?;
         Ok(Scan {
             name: format!("{:.2} s", stamp_ns.saturating_sub(first_ns) as f64 * 1e-9),
             cloud,
@@ -125,7 +117,7 @@ pub fn read_scans(bag: &Path, topics: &KittiTopics) -> Result<Vec<Scan>, KittiEr
     clouds.iter().enumerate().map(scan).collect()
 }
 
-fn insert(frames: &mut TransformBuffer, message: &TFMessage) -> Result<(), KittiError> {
+fn insert(frames: &mut TransformBuffer, message: &TFMessage) -> Result<(), AnyError> {
     for t in &message.transforms {
         if let Some(parent_from_child) = isometry_from_transform(&t.transform) {
             let (parent, child) = (&t.header.frame_id, &t.child_frame_id);
@@ -135,9 +127,6 @@ fn insert(frames: &mut TransformBuffer, message: &TFMessage) -> Result<(), Kitti
     Ok(())
 }
 
-fn decode<M: DeserializeOwned>(topic: &str, data: &[u8]) -> Result<M, KittiError> {
-    cdr::from_slice(data).map_err(|source| KittiError::Message {
-        topic: topic.to_owned(),
-        source,
-    })
+fn decode<M: DeserializeOwned>(topic: &str, data: &[u8]) -> Result<M, AnyError> {
+    cdr::from_slice(data).map_err(|error| format!("{topic}: {error}").into())
 }

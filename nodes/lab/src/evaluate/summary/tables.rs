@@ -8,12 +8,12 @@ use crate::evaluate::statistics::Share;
 #[cfg(doc)]
 use crate::evaluate::trial::WRONG;
 
-/// What the paper prints for a scene (Nakamura et al. 2019, table 1).
+/// Printed errors of a scene (Nakamura et al. 2019, table 1).
 #[derive(Clone, Copy, PartialEq, Debug, Serialize)]
 pub struct Printed {
     /// Scene.
     pub scene: &'static str,
-    /// d_SE3 of GICP-SE(3).
+    /// Printed d_SE3 of GICP-SE(3).
     pub gicp_se3: f64,
     /// d_SE3 of Semantic-ICP.
     pub semantic_icp: f64,
@@ -48,40 +48,40 @@ pub struct Row {
     pub method: String,
     /// Poses within [`WRONG`].
     pub success: Share,
-    /// Medians: of d_SE3 as printed,
+    /// Median of d_SE3 as printed.
     pub d_se3: Option<f64>,
-    /// of its left form,
+    /// Median of its left form.
     pub d_se3_left: Option<f64>,
-    /// of the distance (m),
+    /// Median of the distance, metres.
     pub translation_m: Option<f64>,
-    /// of the angle (degrees),
+    /// Median of the angle, degrees.
     pub rotation_deg: Option<f64>,
-    /// of the mean distance of the seen points (m).
+    /// Median of the mean distance of the seen points, metres.
     pub view_m: Option<f64>,
 }
 
 /// Ours against another from the same starts.
 #[derive(Clone, PartialEq, Debug, Serialize)]
 pub struct Paired {
-    /// The other.
+    /// The other method.
     pub against: String,
     /// Start, or `all`.
     pub start: String,
     /// Share of wrong labels; None for all.
     pub q: Option<f64>,
-    /// Distance and angle both within 1 cm and 0.2 degrees of the other's, or smaller.
+    /// Share of trials with distance and angle both within 1 cm and 0.2 degrees of the other's, or smaller.
     pub not_worse: Share,
-    /// The same, or ours is right where the other is wrong.
+    /// Share of the same, or ours is right where the other is wrong.
     pub not_worse_or_saved: Share,
-    /// By the mean distance of the seen points alone, within 1 cm.
+    /// Share by the mean distance of the seen points alone, within 1 cm.
     pub not_worse_in_view: Share,
-    /// Ours is right and the other wrong.
+    /// Share in which ours is right and the other wrong.
     pub saved: Share,
-    /// Ours is wrong and the other right.
+    /// Share in which ours is wrong and the other right.
     pub spoiled: Share,
 }
 
-/// What is accepted, and how much of it is wrong.
+/// Share of accepted poses, and of wrong ones among them.
 #[derive(Clone, PartialEq, Debug, Serialize)]
 pub struct Accepted {
     /// Scene, or `all`.
@@ -90,17 +90,17 @@ pub struct Accepted {
     pub start: String,
     /// Share of wrong labels; None for all.
     pub q: Option<f64>,
-    /// Verdict OK.
+    /// Share with the verdict OK.
     pub accepted: Share,
-    /// Of these, beyond 0.15 m or 3 degrees.
+    /// Share of these beyond 0.15 m or 3 degrees.
     pub wrong: Share,
-    /// Of these, beyond 0.10 m or 3 degrees.
+    /// Share of these beyond 0.10 m or 3 degrees.
     pub wrong_tight: Share,
-    /// Of these, seen points that are on average beyond 0.15 m, or 3 degrees.
+    /// Share of these with seen points on average beyond 0.15 m, or beyond 3 degrees.
     pub wrong_in_view: Share,
-    /// Right before any verdict.
+    /// Share that is right before any verdict.
     pub right: Share,
-    /// How often each verdict.
+    /// Count of each verdict.
     pub verdicts: BTreeMap<String, usize>,
 }
 
@@ -126,8 +126,8 @@ pub struct TimeRow {
     pub start: String,
     /// Trials.
     pub n: usize,
-    /// Milliseconds.
+    /// Median, milliseconds.
     pub median_ms: Option<f64>,
-    /// Milliseconds.
+    /// 90 % quantile, milliseconds.
     pub p90_ms: Option<f64>,
 }

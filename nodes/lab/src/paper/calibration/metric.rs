@@ -7,17 +7,18 @@ use nalgebra::{Isometry3, Point3, Translation3, UnitQuaternion, Vector3};
 use plotters::prelude::*;
 
 use super::Context;
+use crate::AnyError;
 use crate::evaluate::{PRINTED, quantile};
-use crate::paper::report::plot::{Axes, Curve, Fault, Layout, curves, svg};
-use crate::paper::report::{Cell, Check, Figure, Section, Table, Verdict};
 use crate::paper::streams::{Purpose, stream};
+use crate::report::plot::{Axes, Curve, Layout, curves, svg};
+use crate::report::{Cell, Check, Figure, Section, Table, Verdict};
 
 /// The error that is looked at: turned about the vertical and moved, both at the scene.
 const TURN_DEG: f64 = 1.4;
 const MOVE_M: f64 = 0.03;
-/// How far the headset's origin is from the scene, metres.
+/// Distance of the headset's origin from the scene, metres.
 const HEADSET_M: f64 = 3.0;
-/// How far the map's origin is where it is not moved, metres.
+/// Distance of the map's origin from the scene where it is not moved, metres.
 const MAP_M: f64 = 5.0;
 /// Farthest origin, metres.
 const FAR_M: f64 = 20.0;
@@ -41,7 +42,7 @@ struct Errors {
     scene_m: f64,
 }
 
-/// A calibration that is off, with the frames it is told in.
+/// A calibration with an error, and the frames that it is measured in.
 struct Case {
     /// Distance of the map's origin from the scene, metres, and its direction, radians.
     map: (f64, f64),
@@ -112,7 +113,7 @@ fn headset_at(distance_m: f64) -> impl Fn(f64, f64) -> Case {
 }
 
 /// The section of eq. (9).
-pub(super) fn section(context: &Context) -> Result<Section, Fault> {
+pub(super) fn section(context: &Context) -> Result<Section, AnyError> {
     let [near, far] = [0.0, FAR_M].map(|m| range(map_at(m), |e| e.pose.d_se3));
     Ok(Section {
         id: "eq9".to_owned(),
@@ -171,12 +172,13 @@ fn checks(seed: u64) -> Vec<Check> {
         let read = se3::log(&(truth * truth).inverse()).norm();
         misread = misread.max((read / twice - 1.0).abs());
     }
-    let none = |name: &str, found: f64| Check {
-        name: format!("{name}, most of {FRAMES} random poses"),
-        printed: None,
-        expected: 0.0,
-        found,
-        tolerance: 1e-9,
+    let none = |name: &str, found: f64| {
+        Check::new(
+            format!("{name}, most of {FRAMES} random poses"),
+            0.0,
+            found,
+            1e-9,
+        )
     };
     let [left, translation, rotation, right, turned] = most;
     let lever = Case {
@@ -210,23 +212,21 @@ fn checks(seed: u64) -> Vec<Check> {
             "change of the rotation (rad) with the headset's frame",
             turned,
         ),
-        Check {
-            name: format!(
+        Check::new(
+            format!(
                 "d_SE(3) of {TURN_DEG} degrees and {MOVE_M} m with the map's origin 9 m away, least over directions; \
                  expected: sqrt((9 m angle - {MOVE_M} m)^2 + angle^2), to first order"
             ),
-            printed: None,
-            expected: (9.0 * turn - MOVE_M).hypot(turn),
-            found: range(map_at(9.0), |e| e.pose.d_se3)[0],
-            tolerance: 2e-3,
-        },
-        Check {
-            name: "of these, how much the direction of the motion alone changes d_SE(3)".to_owned(),
-            printed: None,
-            expected: 2.0 * MOVE_M,
-            found: (at(-std::f64::consts::FRAC_PI_2) - at(std::f64::consts::FRAC_PI_2)).abs(),
-            tolerance: 2e-3,
-        },
+            (9.0 * turn - MOVE_M).hypot(turn),
+            range(map_at(9.0), |e| e.pose.d_se3)[0],
+            2e-3,
+        ),
+        Check::new(
+            "of these, how much the direction of the motion alone changes d_SE(3)",
+            2.0 * MOVE_M,
+            (at(-std::f64::consts::FRAC_PI_2) - at(std::f64::consts::FRAC_PI_2)).abs(),
+            2e-3,
+        ),
     ]
 }
 
@@ -251,19 +251,19 @@ fn distances() -> Table {
         "rotation (rad)",
         "seen scene (m)",
     ];
-    Table {
-        name: "eq9_distances".to_owned(),
-        caption: format!(
-            "One error, {TURN_DEG} degrees about the vertical and {MOVE_M} m at the scene, told in maps with origins at \
+    Table::new(
+        "eq9_distances",
+        format!(
+            "One error, {TURN_DEG} degrees about the vertical and {MOVE_M} m at the scene, measured in maps with origins at \
              several distances; over {} directions",
             DIRECTIONS * DIRECTIONS
         ),
-        columns: columns.map(str::to_owned).into(),
-        rows: [0.0, 1.0, 2.0, 5.0, 9.0, 10.0, 15.0, 20.0].map(row).into(),
-    }
+        columns,
+        [0.0, 1.0, 2.0, 5.0, 9.0, 10.0, 15.0, 20.0].map(row),
+    )
 }
 
-/// What the printed errors can be.
+/// Bounds of rotation and translation that the printed errors allow.
 fn printed() -> Table {
     let numbers = PRINTED.iter().flat_map(|p| {
         let named = |method, d| (p.scene, method, d);
@@ -295,17 +295,16 @@ fn printed() -> Table {
         "heading error that alone makes it, origin 5 m away (deg)",
         "origin 10 m away (deg)",
     ];
-    Table {
-        name: "eq9_printed".to_owned(),
-        caption: "What the printed errors can be: the rotation is at most 180 degrees, so 5.42 and 8.68 are metres in \
-                  the main; and an unnoticed error of the true heading of half a degree is as large as the small ones"
-            .to_owned(),
-        columns: columns.map(str::to_owned).into(),
-        rows: numbers.map(row).collect(),
-    }
+    Table::new(
+        "eq9_printed",
+        "What the printed errors can be: the rotation is at most 180 degrees, so 5.42 and 8.68 are metres in \
+                  the main; and an unnoticed error of the true heading of half a degree is as large as the small ones",
+        columns,
+        numbers.map(row),
+    )
 }
 
-fn figure() -> Result<Figure, Fault> {
+fn figure() -> Result<Figure, AnyError> {
     let key: Vec<(RGBColor, &str)> = MEASURES.iter().map(|m| (m.0, m.1)).collect();
     let layout = Layout {
         panel: (430, 340),
@@ -333,7 +332,7 @@ fn figure() -> Result<Figure, Fault> {
         });
         measures.collect()
     };
-    let draw = |areas: &[crate::paper::report::plot::Area]| {
+    let draw = |areas: &[crate::report::plot::Area]| {
         let panels = [
             (
                 axes("map's origin moved away", "map's origin from the scene (m)"),
@@ -352,15 +351,15 @@ fn figure() -> Result<Figure, Fault> {
         }
         Ok(())
     };
-    Ok(Figure {
-        name: "eq9_origin".to_owned(),
-        caption: format!(
+    Ok(Figure::new(
+        "eq9_origin",
+        format!(
             "The same error, {TURN_DEG} degrees and {MOVE_M} m at the scene, by where the origins are: least and greatest \
              over directions. Left, d_SE(3) alone grows with the distance of the map's origin (the headset's is {HEADSET_M} m \
              from the scene). Right, the headset's origin is moved and the map's stays {MAP_M} m away."
         ),
-        svg: svg(&layout, draw)?,
-    })
+        svg(&layout, draw)?,
+    ))
 }
 
 #[cfg(test)]

@@ -10,11 +10,11 @@ use std::path::PathBuf;
 
 use crate::simulate::house::House;
 
-use super::report::{Head, Report, Section};
-use crate::evaluate::{Results, Settings, Trial, World, read_house};
-use crate::plot::Fault;
+use crate::AnyError;
+use crate::evaluate::{Results, Settings, Testbed, Trial, read_house};
+use crate::report::{Head, Report, Section};
 
-/// What to compute.
+/// Options of the report.
 #[derive(Clone, Debug)]
 pub struct Options {
     /// The same seed gives the same bytes.
@@ -34,9 +34,9 @@ const SEEDS_EACH: u64 = 1000;
 /// Views of the robot's survey in a quick run.
 const QUICK_VIEWS: usize = 192;
 
-/// What the sections share.
+/// Testbed and options that the sections share.
 struct Context {
-    world: World,
+    testbed: Testbed,
     seed: u64,
     /// Seed of the first trial.
     first_seed: u64,
@@ -46,21 +46,22 @@ struct Context {
     cell_side_m: f64,
 }
 
-/// Computes all sections; `progress` is told how much is done, from 0 to 1, and what comes next.
-pub fn run(options: &Options, progress: &mut dyn FnMut(f64, &str)) -> Result<Report, Fault> {
+/// Computes all sections; `progress` gets the share done and the name of the next section.
+pub fn run(options: &Options, progress: &mut dyn FnMut(f64, &str)) -> Result<Report, AnyError> {
     let sections = sections(options, progress)?;
-    let head = Head {
-        paper: "Nakamura, El Hafi, Hagiwara and Taniguchi 2019, Calibration System Using Semantic-ICP for Visualization of Robot \
-                Spatial Perception Through Mixed Reality"
-            .to_owned(),
-        command: command(options),
-        seed: options.seed,
-        quick: options.quick,
-    };
+    let head = Head::of_paper(
+        "Nakamura, El Hafi, Hagiwara and Taniguchi 2019, Calibration System Using Semantic-ICP for Visualization of Robot \
+         Spatial Perception Through Mixed Reality",
+        command(options),
+        options.quick,
+    );
     Ok(Report::new(head, sections))
 }
 
-fn sections(options: &Options, progress: &mut dyn FnMut(f64, &str)) -> Result<Vec<Section>, Fault> {
+fn sections(
+    options: &Options,
+    progress: &mut dyn FnMut(f64, &str),
+) -> Result<Vec<Section>, AnyError> {
     progress(0.0, "house");
     let mesh = options
         .mesh
@@ -79,9 +80,9 @@ fn sections(options: &Options, progress: &mut dyn FnMut(f64, &str)) -> Result<Ve
     Ok(sections)
 }
 
-fn context(options: &Options, house: House, settings: &Settings) -> Result<Context, Fault> {
+fn context(options: &Options, house: House, settings: &Settings) -> Result<Context, AnyError> {
     Ok(Context {
-        world: World::new(house, settings)?,
+        testbed: Testbed::new(house, settings)?,
         seed: options.seed,
         first_seed: options.seed.wrapping_sub(1).wrapping_mul(SEEDS_EACH),
         quick: options.quick,
@@ -94,7 +95,7 @@ fn context(options: &Options, house: House, settings: &Settings) -> Result<Conte
 fn evaluated(
     options: &Options,
     mesh_crc32: Option<u32>,
-) -> Result<(Settings, Option<Vec<Trial>>), Fault> {
+) -> Result<(Settings, Option<Vec<Trial>>), AnyError> {
     let Some(folder) = &options.results else {
         let default = Settings::default();
         let settings = Settings {

@@ -6,10 +6,12 @@ use lattice_core::lattice::{Lattice, LatticeKind};
 use nalgebra::Vector3;
 
 use super::{Options, unit};
-use crate::paper::report::plot::{Fault, color, title};
-use crate::paper::report::{Cell, Check, Figure, Section, Table, Verdict};
+use crate::AnyError;
+use crate::report::plot::{color, title};
+use crate::report::{Cell, Check, Figure, Section, Table, Verdict};
+use crate::theory::surface_m2;
 
-/// What the polyhedron of a name has.
+/// Corners and faces of a named polyhedron.
 struct Shape {
     kind: LatticeKind,
     name: &'static str,
@@ -65,7 +67,7 @@ const SCALE: f64 = 105.0;
 /// Room for its name, pixels.
 const NAME: f64 = 44.0;
 
-pub fn section(_: &Options, _: &mut dyn FnMut(f64)) -> Result<Section, Fault> {
+pub fn section(_: &Options, _: &mut dyn FnMut(f64)) -> Result<Section, AnyError> {
     let mut checks = Vec::new();
     let mut rows = Vec::new();
     for shape in SHAPES {
@@ -74,13 +76,12 @@ pub fn section(_: &Options, _: &mut dyn FnMut(f64)) -> Result<Section, Fault> {
         let cell = lattice.cell();
         let name = title(kind);
         let mut check = |what: String, expected: f64, found: f64, tolerance: f64| {
-            checks.push(Check {
-                name: format!("{name}: {what}"),
-                printed: None,
+            checks.push(Check::new(
+                format!("{name}: {what}"),
                 expected,
                 found,
                 tolerance,
-            });
+            ));
         };
         check("volume".into(), 1.0, cell.volume_m3(), 1e-12);
         check(
@@ -111,7 +112,7 @@ pub fn section(_: &Options, _: &mut dyn FnMut(f64)) -> Result<Section, Fault> {
             cell.faces.len().into(),
             Cell::Number(lattice.covering_radius_m(), 6),
             Cell::Number(lattice.packing_radius_m(), 6),
-            Cell::Number(lattice.surface_m2(), 5),
+            Cell::Number(surface_m2(&lattice), 5),
         ]);
     }
     let columns = [
@@ -134,23 +135,13 @@ pub fn section(_: &Options, _: &mut dyn FnMut(f64)) -> Result<Section, Fault> {
             .into(),
         verdict: Verdict::Reproduced,
         checks,
-        tables: vec![Table {
-            name: "fig1".into(),
-            caption: "The cells, of unit volume".into(),
-            columns: columns.map(String::from).into(),
-            rows,
-        }],
-        figures: vec![Figure {
-            name: "fig1".into(),
-            caption: "Voronoi cells of equal volume, seen from the same direction, axes as in eq. (8)-(12), z up."
-                .into(),
-            svg: draw()?,
-        }],
+        tables: vec![Table::new("fig1", "The cells, of unit volume", columns, rows)],
+        figures: vec![Figure::new("fig1", "Voronoi cells of equal volume, seen from the same direction, axes as in eq. (8)-(12), z up.", draw()?)],
     })
 }
 
 /// All cells beside each other, shaded by the light from the upper left.
-fn draw() -> Result<String, Fault> {
+fn draw() -> Result<String, AnyError> {
     let columns = 3;
     let rows = SHAPES.len().div_ceil(columns);
     let (width, height) = (TILE * columns as f64, (TILE + NAME) * rows as f64);
@@ -178,7 +169,7 @@ fn draw() -> Result<String, Fault> {
 }
 
 /// An orthographic view: the faces that look at the eye, edges on top.
-fn draw_cell(svg: &mut String, lattice: &Lattice, x: f64, y: f64) -> Result<(), Fault> {
+fn draw_cell(svg: &mut String, lattice: &Lattice, x: f64, y: f64) -> Result<(), AnyError> {
     let eye = Vector3::new(0.80, -0.52, 0.42).normalize();
     let right = Vector3::z().cross(&eye).normalize();
     let up = eye.cross(&right);

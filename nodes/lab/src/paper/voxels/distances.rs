@@ -6,10 +6,12 @@ use lattice_core::lattice::{Lattice, LatticeKind};
 use plotters::prelude::*;
 
 use super::{Options, unit};
-use crate::paper::report::plot::{Fault, LABELS, Layout, color, key, labels, svg, title};
-use crate::paper::report::{Cell, Check, Figure, Section, Table, Verdict};
+use crate::AnyError;
+use crate::report::plot::{LABELS, Layout, color, key, labels, svg, title};
+use crate::report::{Cell, Check, Figure, Section, Table, Verdict};
+use crate::theory::{clearance_stencil, distance_between_cells_m, touching_clearance_m};
 
-/// How many touching cells are how far away, unit volume.
+/// Numbers of touching cells and their distances, unit volume.
 const SHELLS: [(LatticeKind, &[(usize, f64)]); 5] = [
     (LatticeKind::Cubic, &[(6, 1.0), (12, SQRT_2), (8, 1.73205)]),
     (LatticeKind::Bcc, &[(8, 1.09112), (6, 1.25992)]),
@@ -30,7 +32,7 @@ const CLEARANCES: [(LatticeKind, f64); 5] = [
     (LatticeKind::Hex, 0.680),
 ];
 
-/// What the paper says of cubic and FCC.
+/// Numbers that the paper gives for cubic and FCC.
 fn printed(kind: LatticeKind, shell: usize) -> Option<f64> {
     match (kind, shell) {
         (LatticeKind::Cubic, 0) => Some(6.0),
@@ -61,7 +63,7 @@ fn shells(distances: &[(f64, bool)]) -> Vec<(usize, f64)> {
         .collect()
 }
 
-pub fn section(_: &Options, _: &mut dyn FnMut(f64)) -> Result<Section, Fault> {
+pub fn section(_: &Options, _: &mut dyn FnMut(f64)) -> Result<Section, AnyError> {
     let mut checks = Vec::new();
     let mut rows = Vec::new();
     for (kind, expected) in SHELLS {
@@ -70,28 +72,31 @@ pub fn section(_: &Options, _: &mut dyn FnMut(f64)) -> Result<Section, Fault> {
         let found = shells(&distances);
         for (i, &(count, distance)) in expected.iter().enumerate() {
             let (n, m) = found.get(i).copied().unwrap_or((0, f64::NAN));
-            checks.push(Check {
-                name: format!("{name}: lattice points at distance {}", i + 1),
-                printed: printed(kind, i),
-                expected: count as f64,
-                found: n as f64,
-                tolerance: 0.0,
-            });
-            checks.push(Check {
-                name: format!("{name}: distance {} (cell sides)", i + 1),
-                printed: (kind == LatticeKind::Cubic && i == 0).then_some(1.0),
-                expected: distance,
-                found: m,
-                tolerance: 1e-5,
-            });
+            checks.push(
+                Check::new(
+                    format!("{name}: lattice points at distance {}", i + 1),
+                    count as f64,
+                    n as f64,
+                    0.0,
+                )
+                .with_printed(printed(kind, i)),
+            );
+            checks.push(
+                Check::new(
+                    format!("{name}: distance {} (cell sides)", i + 1),
+                    distance,
+                    m,
+                    1e-5,
+                )
+                .with_printed((kind == LatticeKind::Cubic && i == 0).then_some(1.0)),
+            );
         }
-        checks.push(Check {
-            name: format!("{name}: number of distances"),
-            printed: None,
-            expected: expected.len() as f64,
-            found: found.len() as f64,
-            tolerance: 0.0,
-        });
+        checks.push(Check::new(
+            format!("{name}: number of distances"),
+            expected.len() as f64,
+            found.len() as f64,
+            0.0,
+        ));
         for (i, (distance, face)) in distances.into_iter().enumerate() {
             let shares = if face { "face" } else { "edge or vertex" };
             rows.push(vec![
@@ -105,20 +110,19 @@ pub fn section(_: &Options, _: &mut dyn FnMut(f64)) -> Result<Section, Fault> {
     let mut near = Vec::new();
     for (kind, expected) in CLEARANCES {
         let lattice = unit(kind)?;
-        let found = lattice.touching_clearance_m();
-        checks.push(Check {
-            name: format!(
+        let found = touching_clearance_m(&lattice);
+        checks.push(Check::new(
+            format!(
                 "{}: safe distance of the touching cells (cell sides)",
                 title(kind)
             ),
-            printed: None,
             expected,
             found,
-            tolerance: 6e-4,
-        });
+            6e-4,
+        ));
         let mut row = vec![title(kind).into(), Cell::Number(found, 3)];
         for radius in CLEARANCE_RADII {
-            let stencil = lattice.clearance_stencil(radius).map(|cells| cells.len());
+            let stencil = clearance_stencil(&lattice, radius).map(|cells| cells.len());
             row.push(stencil.map_or(Cell::Empty, Cell::from));
         }
         near.push(row);
@@ -129,14 +133,13 @@ pub fn section(_: &Options, _: &mut dyn FnMut(f64)) -> Result<Section, Fault> {
         .touching_neighbors()
         .iter()
         .skip(fcc.face_neighbors().len());
-    let gap = others.map(|&w| fcc.distance_between_cells_m(w));
-    checks.push(Check {
-        name: "FCC: safe distance of the 12 printed cells (cell sides)".into(),
-        printed: None,
-        expected: 0.0,
-        found: gap.fold(f64::INFINITY, f64::min),
-        tolerance: 1e-9,
-    });
+    let gap = others.map(|&w| distance_between_cells_m(&fcc, w));
+    checks.push(Check::new(
+        "FCC: safe distance of the 12 printed cells (cell sides)",
+        0.0,
+        gap.fold(f64::INFINITY, f64::min),
+        1e-9,
+    ));
     let mut columns = vec![
         "lattice".to_owned(),
         "safe with the touching cells".to_owned(),
@@ -161,36 +164,20 @@ pub fn section(_: &Options, _: &mut dyn FnMut(f64)) -> Result<Section, Fault> {
         ),
         checks,
         tables: vec![
-            Table {
-                name: "fig3_clearance".into(),
-                caption: "Distance (cell sides) up to which checking the touching cells misses no point, and \
-                          cells to check for other distances"
-                    .into(),
-                columns,
-                rows: near,
-            },
-            Table {
-                name: "fig3".into(),
-                caption: "Distances of the touching lattice points, cell sides".into(),
-                columns: ["lattice", "number", "distance", "shares"].map(String::from).into(),
-                rows,
-            },
+            Table::new("fig3_clearance", "Distance (cell sides) up to which checking the touching cells misses no point, and \
+                          cells to check for other distances", columns, near),
+            Table::new("fig3", "Distances of the touching lattice points, cell sides", ["lattice", "number", "distance", "shares"], rows),
         ],
-        figures: vec![Figure {
-            name: "fig3".into(),
-            caption: "Distances of the touching lattice points in order, cells of unit volume. Full: cells that \
+        figures: vec![Figure::new("fig3", "Distances of the touching lattice points in order, cells of unit volume. Full: cells that \
                       share a face. Hollow: cells that share an edge or a vertex only; those of FCC and two of hex \
-                      are not in the paper."
-                .into(),
-            svg: draw()?,
-        }],
+                      are not in the paper.", draw()?)],
     })
 }
 
 /// Distances for which cells are counted, cell sides.
 const CLEARANCE_RADII: [f64; 5] = [0.25, 0.5, 0.75, 1.0, 1.5];
 
-fn draw() -> Result<String, Fault> {
+fn draw() -> Result<String, AnyError> {
     let kinds = SHELLS.map(|(kind, _)| kind);
     let layout = Layout {
         panel: (760, 420),

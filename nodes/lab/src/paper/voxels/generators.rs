@@ -4,8 +4,9 @@ use crate::printed::printed_generator;
 use lattice_core::lattice::LatticeKind;
 
 use super::{Options, unit};
-use crate::paper::report::plot::{Fault, title};
-use crate::paper::report::{Cell, Check, Section, Table, Verdict};
+use crate::AnyError;
+use crate::report::plot::title;
+use crate::report::{Cell, Check, Section, Table, Verdict};
 
 /// Determinants of the printed digits, worked out elsewhere.
 const PRINTED_DETERMINANTS: [(LatticeKind, f64); 5] = [
@@ -16,7 +17,7 @@ const PRINTED_DETERMINANTS: [(LatticeKind, f64); 5] = [
     (LatticeKind::Hex, 1.0000032),
 ];
 
-pub fn section(_: &Options, _: &mut dyn FnMut(f64)) -> Result<Section, Fault> {
+pub fn section(_: &Options, _: &mut dyn FnMut(f64)) -> Result<Section, AnyError> {
     let mut checks = Vec::new();
     let mut rows = Vec::new();
     let mut worst_drift = (0.0, LatticeKind::Cubic);
@@ -33,28 +34,31 @@ pub fn section(_: &Options, _: &mut dyn FnMut(f64)) -> Result<Section, Fault> {
         if drift > worst_drift.0 {
             worst_drift = (drift, kind);
         }
-        checks.push(Check {
-            name: format!("{name}: volume of the exact cell"),
-            printed: Some(1.0),
-            expected: 1.0,
-            found: exact.determinant().abs(),
-            tolerance: 1e-12,
-        });
-        checks.push(Check {
-            name: format!("{name}: determinant of the printed digits"),
-            printed: Some(1.0),
-            expected: determinant,
-            found: printed.determinant().abs(),
-            tolerance: 1e-7,
-        });
-        checks.push(Check {
-            name: format!("{name}: printed digits less exact ones, largest entry"),
-            printed: None,
-            expected: 0.0,
-            found: off,
+        checks.push(
+            Check::new(
+                format!("{name}: volume of the exact cell"),
+                1.0,
+                exact.determinant().abs(),
+                1e-12,
+            )
+            .with_printed(Some(1.0)),
+        );
+        checks.push(
+            Check::new(
+                format!("{name}: determinant of the printed digits"),
+                determinant,
+                printed.determinant().abs(),
+                1e-7,
+            )
+            .with_printed(Some(1.0)),
+        );
+        checks.push(Check::new(
             // Half a digit, and what halving it adds.
-            tolerance: 0.5001e-4,
-        });
+            format!("{name}: printed digits less exact ones, largest entry"),
+            0.0,
+            off,
+            0.5001e-4,
+        ));
         let column = |i: usize| {
             let c = exact.column(i);
             Cell::Text(format!(
@@ -98,12 +102,7 @@ pub fn section(_: &Options, _: &mut dyn FnMut(f64)) -> Result<Section, Fault> {
         ),
         verdict: Verdict::Reproduced,
         checks,
-        tables: vec![Table {
-            name: "generators".into(),
-            caption: "Exact generators of unit volume, and how far the printed digits are from them".into(),
-            columns: columns.map(String::from).into(),
-            rows,
-        }],
+        tables: vec![Table::new("generators", "Exact generators of unit volume, and how far the printed digits are from them", columns, rows)],
         figures: Vec::new(),
     })
 }

@@ -19,10 +19,10 @@ use std::path::PathBuf;
 
 use lattice_core::lattice::{Lattice, LatticeIndex, LatticeKind};
 
-use super::report::plot::Fault;
-use super::report::{Head, Report, Section};
+use crate::AnyError;
+use crate::report::{Head, Report, Section};
 
-/// What to compute.
+/// Options of the report.
 #[derive(Clone, Debug)]
 pub struct Options {
     /// The same seed gives the same bytes.
@@ -37,7 +37,7 @@ pub struct Options {
     pub pairs: Option<PathBuf>,
 }
 
-type Make = fn(&Options, &mut dyn FnMut(f64)) -> Result<Section, Fault>;
+type Make = fn(&Options, &mut dyn FnMut(f64)) -> Result<Section, AnyError>;
 
 /// Name, share of the time, and what makes it; in the order of the paper.
 const SECTIONS: [(&str, f64, Make); 10] = [
@@ -53,8 +53,8 @@ const SECTIONS: [(&str, f64, Make); 10] = [
     ("Fig. 6", 150.0, matching::section),
 ];
 
-/// Computes all sections; `progress` is told how much is done, from 0 to 1, and what comes next.
-pub fn run(options: &Options, progress: &mut dyn FnMut(f64, &str)) -> Result<Report, Fault> {
+/// Computes all sections; `progress` gets the share done and the name of the next section.
+pub fn run(options: &Options, progress: &mut dyn FnMut(f64, &str)) -> Result<Report, AnyError> {
     // Before a minute of work.
     for path in options
         .scans
@@ -73,14 +73,11 @@ pub fn run(options: &Options, progress: &mut dyn FnMut(f64, &str)) -> Result<Rep
         sections.push(make(options, &mut tell)?);
         before += share;
     }
-    let head = Head {
-        paper: "Ryde and Brünig 2011, Lattice Occupied Voxel Lists for Representation of Spatial \
-                Occupancy"
-            .into(),
-        command: command(options),
-        seed: options.seed,
-        quick: options.quick,
-    };
+    let head = Head::of_paper(
+        "Ryde and Brünig 2011, Lattice Occupied Voxel Lists for Representation of Spatial Occupancy",
+        command(options),
+        options.quick,
+    );
     Ok(Report::new(head, sections))
 }
 
@@ -101,7 +98,7 @@ fn command(options: &Options) -> String {
 }
 
 /// The lattice with cells of 1 m^3.
-fn unit(kind: LatticeKind) -> Result<Lattice, Fault> {
+fn unit(kind: LatticeKind) -> Result<Lattice, AnyError> {
     Ok(Lattice::new(kind, 1.0)?)
 }
 

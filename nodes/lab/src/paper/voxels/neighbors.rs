@@ -6,8 +6,9 @@ use crate::printed::printed_delta;
 use lattice_core::lattice::{Lattice, LatticeIndex, LatticeKind};
 
 use super::{Options, pairs, unit};
-use crate::paper::report::plot::{Fault, title};
-use crate::paper::report::{Cell, Check, Section, Table, Verdict};
+use crate::AnyError;
+use crate::report::plot::title;
+use crate::report::{Cell, Check, Section, Table, Verdict};
 
 /// Printed columns without 0, cells that share a face, cells that touch.
 const COUNTS: [(LatticeKind, usize, usize, usize); 5] = [
@@ -18,7 +19,7 @@ const COUNTS: [(LatticeKind, usize, usize, usize); 5] = [
     (LatticeKind::Hex, 18, 8, 20),
 ];
 
-pub fn section(_: &Options, _: &mut dyn FnMut(f64)) -> Result<Section, Fault> {
+pub fn section(_: &Options, _: &mut dyn FnMut(f64)) -> Result<Section, AnyError> {
     let mut checks = Vec::new();
     let mut rows = Vec::new();
     for (kind, columns, faces, touching) in COUNTS {
@@ -30,12 +31,14 @@ pub fn section(_: &Options, _: &mut dyn FnMut(f64)) -> Result<Section, Fault> {
         // Once more from Voronoi's theorem, for the basis alone.
         let again = Lattice::from_basis(lattice.generator())?;
         let again: BTreeSet<_> = again.touching_neighbors().iter().copied().collect();
-        let count = |name: &str, printed: Option<f64>, expected: usize, found: usize| Check {
-            name: format!("{}: {name}", title(kind)),
-            printed,
-            expected: expected as f64,
-            found: found as f64,
-            tolerance: 0.0,
+        let count = |name: &str, printed: Option<f64>, expected: usize, found: usize| {
+            Check::new(
+                format!("{}: {name}", title(kind)),
+                expected as f64,
+                found as f64,
+                0.0,
+            )
+            .with_printed(printed)
         };
         let found = lattice.face_neighbors().len();
         checks.push(count("cells that share a face", None, faces, found));
@@ -93,12 +96,7 @@ pub fn section(_: &Options, _: &mut dyn FnMut(f64)) -> Result<Section, Fault> {
                 .into(),
         ),
         checks,
-        tables: vec![Table {
-            name: "deltas".into(),
-            caption: "Neighbours: as printed and as computed from the lattice".into(),
-            columns: columns.map(String::from).into(),
-            rows,
-        }],
+        tables: vec![Table::new("deltas", "Neighbours: as printed and as computed from the lattice", columns, rows)],
         figures: Vec::new(),
     })
 }

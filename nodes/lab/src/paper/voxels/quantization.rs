@@ -1,20 +1,21 @@
-//! Eq. (1) and (2): how often they miss the nearest lattice point.
+//! Eq. (1) and (2): the share of points for which they miss the nearest lattice point.
 
 use crate::printed::{PaperQuantizer, off_by_one, printed_delta};
 use lattice_core::lattice::{Lattice, LatticeIndex, LatticeKind};
 
 use super::{Options, unit};
+use crate::AnyError;
 use crate::evaluate::Share;
 use crate::paper::parallel::in_parallel;
-use crate::paper::report::plot::{Fault, title};
-use crate::paper::report::{Cell, Check, Section, Table, Verdict};
 use crate::paper::streams::{Purpose, stream};
+use crate::report::plot::title;
+use crate::report::{Cell, Check, Section, Table, Verdict};
 
 /// Points of a task.
 const BLOCK: usize = 20_000;
 /// Squared distances that differ by less are equal, in squared cell sides.
 const SAME: f64 = 1e-12;
-/// How many standard deviations a share may be off.
+/// Allowed error of a share, standard deviations.
 const SIGMAS: f64 = 4.0;
 
 /// Share of space for which eq. (1) is wrong, and eq. (2) with the printed columns and 0: volumes known
@@ -35,7 +36,7 @@ const WAYS: [&str; 4] = [
     "eq. (2) with all 27 off-by-one columns",
 ];
 
-pub fn section(options: &Options, progress: &mut dyn FnMut(f64)) -> Result<Section, Fault> {
+pub fn section(options: &Options, progress: &mut dyn FnMut(f64)) -> Result<Section, AnyError> {
     let blocks = if options.quick { 10 } else { 200 };
     let mut checks = Vec::new();
     let mut rows = Vec::new();
@@ -60,13 +61,12 @@ pub fn section(options: &Options, progress: &mut dyn FnMut(f64)) -> Result<Secti
         let expected = [rounding, printed, with_zero, 0.0];
         for ((way, share), expected) in WAYS.into_iter().zip(&shares).zip(expected) {
             let deviation = (expected * (1.0 - expected) / n as f64).sqrt();
-            checks.push(Check {
-                name: format!("{}: share wrong by {way}", title(kind)),
-                printed: None,
+            checks.push(Check::new(
+                format!("{}: share wrong by {way}", title(kind)),
                 expected,
-                found: share.share.unwrap_or(f64::NAN),
-                tolerance: SIGMAS * deviation,
-            });
+                share.share.unwrap_or(f64::NAN),
+                SIGMAS * deviation,
+            ));
         }
         let mut row = vec![Cell::from(title(kind))];
         for share in &shares {
@@ -105,21 +105,16 @@ pub fn section(options: &Options, progress: &mut dyn FnMut(f64)) -> Result<Secti
             "Δ needs the column 0 in eq. (4)-(7), and ±(1,0,0) in eq. (4).".into(),
         ),
         checks,
-        tables: vec![Table {
-            name: "quantization".into(),
-            caption: format!(
+        tables: vec![Table::new("quantization", format!(
                 "Share of points that get a lattice point which is not the nearest, of {} points for each lattice",
                 blocks * BLOCK
-            ),
-            columns,
-            rows,
-        }],
+            ), columns, rows)],
         figures: Vec::new(),
     })
 }
 
 /// Eq. (1), and eq. (2) with three sets.
-fn ways(lattice: &Lattice) -> Result<[PaperQuantizer; 4], Fault> {
+fn ways(lattice: &Lattice) -> Result<[PaperQuantizer; 4], AnyError> {
     let delta = printed_delta(lattice.kind());
     let with_zero = [delta.as_slice(), &[[0; 3]]].concat();
     let of = |delta: &[LatticeIndex]| {
@@ -133,7 +128,7 @@ fn ways(lattice: &Lattice) -> Result<[PaperQuantizer; 4], Fault> {
 #[derive(Clone, Copy, Default)]
 struct Wrong {
     ways: [usize; 4],
-    /// Of the third way: how much farther than the nearest, cell sides.
+    /// Largest excess of the third way over the nearest distance, cell sides.
     excess: f64,
 }
 

@@ -6,7 +6,7 @@ use nalgebra::Vector3;
 use super::Options;
 use crate::paper::streams::{Purpose, stream};
 
-/// How many points of a cell are taken, and in how many independent draws.
+/// Numbers of points of a cell and of independent draws.
 #[derive(Clone, Copy, Debug)]
 pub struct Samples {
     /// Draws, from which intervals come.

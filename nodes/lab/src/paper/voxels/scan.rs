@@ -6,7 +6,7 @@ use crate::simulate::house::{House, LaserOptions, LaserView};
 use crate::simulate::{RANGE_NOISE_M, Survey, SurveyPattern};
 
 use super::Options;
-use crate::paper::report::plot::Fault;
+use crate::AnyError;
 use crate::paper::streams::{Purpose, stream};
 use lattice_nodes::files::points::{PointFileLimits, read_points};
 
@@ -17,7 +17,7 @@ const FILE_POINTS: usize = 60_000;
 /// Side of the cube that evenly spread points fill, metres.
 const CUBE_M: f64 = 20.0;
 
-/// Where points come from.
+/// Source of points.
 #[derive(Clone, Copy, PartialEq, Eq, Debug)]
 pub enum Source {
     /// Evenly spread in a cube.
@@ -32,11 +32,11 @@ pub enum Source {
 pub struct Scan {
     /// Stem of names.
     pub id: String,
-    /// What it is.
+    /// Description.
     pub title: String,
-    /// Where it comes from.
+    /// Source of its points.
     pub source: Source,
-    /// Whether the ground is most of it.
+    /// True if the ground is most of it.
     pub outdoors: bool,
     /// The points.
     pub points: Vec<[f32; 3]>,
@@ -45,7 +45,7 @@ pub struct Scan {
 }
 
 /// All clouds of a run.
-pub fn scans(options: &Options) -> Result<Vec<Scan>, Fault> {
+pub fn scans(options: &Options) -> Result<Vec<Scan>, AnyError> {
     let mut scans = vec![uniform(options), room(options)?, site(options)?];
     for (number, path) in options.scans.iter().enumerate() {
         scans.push(file(path, number, options)?);
@@ -67,8 +67,8 @@ fn uniform(options: &Options) -> Scan {
 }
 
 /// A nodding laser scanner in a furnished house.
-fn room(options: &Options) -> Result<Scan, Fault> {
-    let house = House::own(options.seed)?;
+fn room(options: &Options) -> Result<Scan, AnyError> {
+    let house = House::generated(options.seed)?;
     let pairs = LaserView::pairs(&house, 1, &LaserOptions::default(), options.seed)?;
     let [view, _] = pairs.first().ok_or("no place for a scanner in the house")?;
     let points = view.scan(RANGE_NOISE_M, options.seed, 0);
@@ -83,7 +83,7 @@ fn room(options: &Options) -> Result<Scan, Fault> {
 }
 
 /// One turn of a scanner on a loader at an earth-moving site.
-fn site(options: &Options) -> Result<Scan, Fault> {
+fn site(options: &Options) -> Result<Scan, AnyError> {
     let survey = Survey::new(options.seed, SurveyPattern::Os64)?;
     let scan = survey.scans().next().ok_or("the survey has no scan")?;
     let about = |[x, y, z, _]: &[f32; 4]| {
@@ -102,7 +102,7 @@ fn site(options: &Options) -> Result<Scan, Fault> {
     })
 }
 
-fn file(path: &Path, number: usize, options: &Options) -> Result<Scan, Fault> {
+fn file(path: &Path, number: usize, options: &Options) -> Result<Scan, AnyError> {
     let here = |e: &dyn std::fmt::Display| format!("{}: {e}", path.display());
     let points_m = read_points(path, &PointFileLimits::default())
         .map_err(|e| here(&e))?
@@ -129,7 +129,7 @@ fn file(path: &Path, number: usize, options: &Options) -> Result<Scan, Fault> {
     })
 }
 
-/// At most so many of the points, drawn at random, in their order.
+/// Some of the points, at most so many, drawn at random, in their order.
 fn thinned(points: Vec<[f32; 3]>, most: usize, seed: u64, number: usize) -> Vec<[f32; 3]> {
     let mut stream = stream(seed, Purpose::Thin, number);
     let (mut left, mut wanted) = (points.len() as f64, most as f64);

@@ -4,12 +4,14 @@ use lattice_core::lattice::LatticeKind;
 
 use super::sample::Samples;
 use super::{Options, unit};
+use crate::AnyError;
 use crate::paper::estimate::Estimate;
 use crate::paper::parallel::in_parallel;
-use crate::paper::report::plot::{Fault, title};
-use crate::paper::report::{Cell, Check, Section, Table, Verdict};
+use crate::report::plot::title;
+use crate::report::{Cell, Check, Section, Table, Verdict};
+use crate::theory::{mean_distance_m, mean_width_m, second_moment, surface_m2};
 
-/// What is known of a cell of unit volume.
+/// Known figures of a cell of unit volume.
 struct Known {
     kind: LatticeKind,
     /// Mean squared error by dimension.
@@ -44,7 +46,7 @@ const fn known(kind: LatticeKind, figures: [f64; 7]) -> Known {
     }
 }
 
-/// Worked out elsewhere, from the polyhedra and from random points.
+/// Figures worked out elsewhere, from the polyhedra and from random points.
 #[rustfmt::skip]
 const KNOWN: [Known; 6] = [
     known(LatticeKind::Cubic, [0.0833333, 0.4802960, 0.5000000, 0.8660254, 0.5000000, 1.500000, 6.00000]),
@@ -55,7 +57,7 @@ const KNOWN: [Known; 6] = [
     known(LatticeKind::HexOptimal, [0.0812227, 0.4753937, 0.4936275, 0.7959505, 0.4936275, 1.430220, 5.72444]),
 ];
 
-/// How far a figure may be off, of itself.
+/// Allowed error of a figure, as a share of it.
 const TOLERANCE: f64 = 0.002;
 
 /// Mean squared error by dimension, mean distance and largest distance of one draw of points.
@@ -65,18 +67,18 @@ struct Draw {
     largest: f64,
 }
 
-pub fn section(options: &Options, progress: &mut dyn FnMut(f64)) -> Result<Section, Fault> {
+pub fn section(options: &Options, progress: &mut dyn FnMut(f64)) -> Result<Section, AnyError> {
     let samples = Samples::new(options);
     let mut checks = Vec::new();
     let (mut exact_rows, mut random_rows) = (Vec::new(), Vec::new());
     let cubic = unit(LatticeKind::Cubic)?;
-    let (cubic_mse, cubic_mean) = (cubic.second_moment(), cubic.mean_distance_m([0; 3]));
+    let (cubic_mse, cubic_mean) = (second_moment(&cubic), mean_distance_m(&cubic, [0; 3]));
     let mut gains = Vec::new();
     for (number, known) in KNOWN.iter().enumerate() {
         let lattice = unit(known.kind)?;
         let name = title(known.kind);
-        let mse = lattice.second_moment();
-        let mean = lattice.mean_distance_m([0; 3]);
+        let mse = second_moment(&lattice);
+        let mean = mean_distance_m(&lattice, [0; 3]);
         let mut tell = |done| progress((number as f64 + done) / KNOWN.len() as f64);
         let draws = in_parallel(samples.draws, &mut tell, |draw| {
             let (mut n, mut sum, mut squares, mut largest) = (0.0, 0.0, 0.0, 0.0_f64);
@@ -97,13 +99,12 @@ pub fn section(options: &Options, progress: &mut dyn FnMut(f64)) -> Result<Secti
         let random_mean = Estimate::of(draws.iter().map(|draw| draw.mean));
         let largest = draws.iter().map(|draw| draw.largest).fold(0.0, f64::max);
         let mut near = |what: &str, expected: f64, found: f64| {
-            checks.push(Check {
-                name: format!("{name}: {what}"),
-                printed: None,
+            checks.push(Check::new(
+                format!("{name}: {what}"),
                 expected,
                 found,
-                tolerance: TOLERANCE * expected,
-            });
+                TOLERANCE * expected,
+            ));
         };
         near("MSE by dimension, exact", known.mse, mse);
         near(
@@ -124,8 +125,8 @@ pub fn section(options: &Options, progress: &mut dyn FnMut(f64)) -> Result<Secti
             lattice.covering_radius_m(),
         );
         near("nearest face", known.packing, lattice.packing_radius_m());
-        near("mean width", known.mean_width, lattice.mean_width_m());
-        near("surface", known.surface, lattice.surface_m2());
+        near("mean width", known.mean_width, mean_width_m(&lattice));
+        near("surface", known.surface, surface_m2(&lattice));
         checks.push(Check::that(
             format!("{name}: no random point beyond the farthest corner"),
             largest <= lattice.covering_radius_m() * (1.0 + 1e-12),
@@ -140,9 +141,9 @@ pub fn section(options: &Options, progress: &mut dyn FnMut(f64)) -> Result<Secti
             Cell::Number((3.0 * mse).sqrt(), 7),
             Cell::Number(lattice.covering_radius_m(), 7),
             Cell::Number(lattice.packing_radius_m(), 7),
-            Cell::Number(lattice.mean_width_m(), 6),
-            change(lattice.mean_width_m(), cubic.mean_width_m()),
-            Cell::Number(lattice.surface_m2(), 5),
+            Cell::Number(mean_width_m(&lattice), 6),
+            change(mean_width_m(&lattice), mean_width_m(&cubic)),
+            Cell::Number(surface_m2(&lattice), 5),
         ]);
         let mut row = vec![name.into()];
         row.extend(random_mse.cells(1.0, 7));
@@ -152,7 +153,7 @@ pub fn section(options: &Options, progress: &mut dyn FnMut(f64)) -> Result<Secti
         gains.push([
             100.0 * (mse / cubic_mse - 1.0),
             100.0 * (mean / cubic_mean - 1.0),
-            100.0 * (lattice.mean_width_m() / cubic.mean_width_m() - 1.0),
+            100.0 * (mean_width_m(&lattice) / mean_width_m(&cubic) - 1.0),
         ]);
     }
     // Of cubic, BCC, FCC, MCC, hex and the best prisms.
@@ -215,21 +216,11 @@ pub fn section(options: &Options, progress: &mut dyn FnMut(f64)) -> Result<Secti
         )),
         checks,
         tables: vec![
-            Table {
-                name: "distortion_exact".into(),
-                caption: "Exact figures of cells of unit volume, lengths in cell sides".into(),
-                columns: exact_columns.map(String::from).into(),
-                rows: exact_rows,
-            },
-            Table {
-                name: "distortion_random".into(),
-                caption: format!(
+            Table::new("distortion_exact", "Exact figures of cells of unit volume, lengths in cell sides", exact_columns, exact_rows),
+            Table::new("distortion_random", format!(
                     "The same from {} random points for each lattice, with 95 % intervals",
                     samples.points()
-                ),
-                columns: random_columns.map(String::from).into(),
-                rows: random_rows,
-            },
+                ), random_columns, random_rows),
         ],
         figures: Vec::new(),
     })

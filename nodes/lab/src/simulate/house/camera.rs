@@ -57,7 +57,7 @@ pub(super) fn looking(position_m: Point3<f64>, yaw: f64, pitch: f64) -> Isometry
     Isometry3::from_parts(Translation3::from(position_m.coords), rotation)
 }
 
-/// What a camera sees: depth along its x axis (infinite where nothing is) and region of each pixel.
+/// A picture of a camera: depth along its x axis (infinite where nothing is) and region of each pixel.
 pub(super) struct Image {
     pub(super) camera: Camera,
     pub(super) depths_m: Vec<f64>,

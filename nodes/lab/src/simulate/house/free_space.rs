@@ -1,13 +1,15 @@
-//! Where one can stand.
+//! Free floor of a house, to stand on.
 
 use nalgebra::{Point3, Vector3};
 
-use super::HouseError;
+use crate::AnyError;
 use crate::mesh::{LabelledMesh, MeshScene};
 
 /// Side of a cell of the floor plan, metres.
 const CELL_M: f64 = 0.125;
-/// What is between these heights above the floor is in the way, metres.
+/// Error of a house without a place to stand.
+pub(super) const NO_FREE_SPACE: &str = "there is no free floor within walls; the mesh must have a floor, walls and room to stand between them";
+/// Heights above the floor between which things are in the way, metres.
 const BODY_M: [f64; 2] = [0.12, 2.0];
 /// A body keeps away from things by this, metres.
 const RADIUS_M: f64 = 0.3;
@@ -58,7 +60,7 @@ impl Plan {
 }
 
 impl FreeSpace {
-    pub(super) fn new(mesh: &LabelledMesh, scene: &MeshScene) -> Result<FreeSpace, HouseError> {
+    pub(super) fn new(mesh: &LabelledMesh, scene: &MeshScene) -> Result<FreeSpace, AnyError> {
         let mut low_m = [f64::INFINITY; 3];
         let mut high_m = [f64::NEG_INFINITY; 3];
         for point in mesh.corners_m().flatten() {
@@ -68,7 +70,7 @@ impl FreeSpace {
             }
         }
         if mesh.is_empty() {
-            return Err(HouseError::NoFreeSpace);
+            return Err(NO_FREE_SPACE.into());
         }
         let cells = |axis: usize| ((high_m[axis] - low_m[axis]) / CELL_M) as usize + 1;
         let plan = Plan {
@@ -92,7 +94,7 @@ impl FreeSpace {
         let cells = free.iter().enumerate().filter(|(_, free)| **free);
         let cells_m: Vec<_> = cells.map(|(cell, _)| plan.middle_m(cell)).collect();
         match cells_m.is_empty() {
-            true => Err(HouseError::NoFreeSpace),
+            true => Err(NO_FREE_SPACE.into()),
             false => Ok(FreeSpace { cells_m, floor_m }),
         }
     }
@@ -165,7 +167,7 @@ fn taken(mesh: &LabelledMesh, plan: &Plan, floor_m: f64) -> Vec<bool> {
     taken
 }
 
-/// Whether there is floor below and walls on nearly all sides.
+/// True with floor below and walls on nearly all sides.
 fn indoors(scene: &MeshScene, [x, y]: [f64; 2], floor_m: f64) -> bool {
     let knee = Point3::new(x, y, floor_m + 0.5);
     if scene.cast(&knee, &-Vector3::z(), 0.6).is_none() {

@@ -1,4 +1,4 @@
-//! What a headset sees of a scene, on its own mesh and in its own frame.
+//! The view of a headset on a scene, on its own mesh and in its own frame.
 
 use nalgebra::{Isometry3, Point3, Translation3, UnitQuaternion, Vector3};
 
@@ -6,9 +6,10 @@ use super::camera::{Camera, Image, looking};
 use super::headset_mesh::{DepthView, Volume};
 use super::scenes::{self, Stand};
 use super::warp::Warp;
-use super::{House, HouseError, Scene};
+use super::{House, Scene};
+use crate::AnyError;
 use crate::mesh::{LabelledMesh, MeshScene};
-use crate::options::{OutOfRange, within};
+use crate::options::within;
 use crate::simulate::random::{Purpose, Stream};
 
 /// Depth views fused for each headset scan, their pixels, field of view and noise.
@@ -21,7 +22,7 @@ const STROLL_M: f64 = 0.9;
 /// The mesh reaches beyond the picture by this, metres.
 const MARGIN_M: f64 = 0.25;
 
-/// How a headset sees. The default is one headset scan of a HoloLens: its camera of 48 degrees.
+/// Options of a headset. The default is one headset scan of a HoloLens: its camera of 48 degrees.
 #[derive(Clone, Copy, PartialEq, Debug)]
 pub struct HeadsetOptions {
     /// Number of headset scans from the place, 1 to 6: the second is turned to one side, the third to the other.
@@ -44,9 +45,9 @@ pub struct HeadsetOptions {
     pub scale_sigma: f64,
     /// Most that the headset's vertical is off, degrees.
     pub tilt_deg: f64,
-    /// How far the boundaries of labels waver in the image, pixels.
+    /// Wavering of the boundaries of labels in the image, pixels.
     pub bleed_px: f64,
-    /// How far further headset scans are turned, degrees; by the seed between the two.
+    /// Least and greatest turn of further headset scans, degrees; drawn by the seed.
     pub turn_deg: [f64; 2],
 }
 
@@ -71,7 +72,7 @@ impl Default for HeadsetOptions {
 
 /// The labelled points of one picture.
 #[derive(Clone, PartialEq, Debug)]
-pub struct HeadsetHeadsetScan {
+pub struct HouseScan {
     /// Points on the headset's mesh: headset_origin, ROS axes (x forward at the start, z up), metres.
     pub points_m: Vec<Point3<f64>>,
     /// Region of each point as seen in the image, see [`House::regions`]; `NO_REGION` where the
@@ -84,12 +85,12 @@ pub struct HeadsetHeadsetScan {
 /// A headset before a scene, with the truth.
 #[derive(Clone, Debug)]
 pub struct HeadsetTrial {
-    /// What is looked at.
+    /// Scene that is looked at.
     pub scene: Scene,
     /// Instance of the object in the house's mesh.
     pub instance: u16,
     /// One or several, all in the same frame.
-    pub headset_scans: Vec<HeadsetHeadsetScan>,
+    pub headset_scans: Vec<HouseScan>,
     /// The truth that a calibration looks for.
     pub map_from_headset: Isometry3<f64>,
     /// Side of a voxel of the headset's mesh, metres.
@@ -107,8 +108,8 @@ impl HeadsetTrial {
         scene: Scene,
         options: &HeadsetOptions,
         seed: u64,
-    ) -> Result<HeadsetTrial, HouseError> {
-        check(options)?;
+    ) -> Result<HeadsetTrial, AnyError> {
+        within("headset_scans", options.headset_scans as f64, 1.0, 6.0)?;
         let stand = scenes::stand(house, scene, options.eye_height_m, seed)?;
         let lane = scene as u64;
         let mut stream = Stream::new(seed, Purpose::HeadsetFrame, 0, lane);
@@ -134,7 +135,7 @@ impl HeadsetTrial {
         let headset_from_house = house_from_headset.inverse();
         let headset_scan = |(number, pose): (usize, &Isometry3<f64>)| {
             let index = lane * 64 + number as u64;
-            let mut stream = Stream::new(seed, Purpose::HeadsetHeadsetScan, 0, index);
+            let mut stream = Stream::new(seed, Purpose::HeadsetScan, 0, index);
             let image = Image::take(house, pose, camera, 4.0 * options.max_range_m);
             let regions = image.bled(options.bleed_px, &mut stream);
             look(
@@ -158,20 +159,7 @@ impl HeadsetTrial {
     }
 }
 
-fn check(options: &HeadsetOptions) -> Result<(), OutOfRange> {
-    within("headset_scans", options.headset_scans as f64, 1.0, 6.0)?;
-    let pixels = options.width.saturating_mul(options.height);
-    within("pixels", pixels as f64, 1.0, 1e7)?;
-    within("hfov_deg", options.hfov_deg, 1.0, 150.0)?;
-    within("eye_height_m", options.eye_height_m, 0.1, 3.0)?;
-    within("max_range_m", options.max_range_m, 0.5, 12.0)?;
-    within("voxel_m", options.voxel_m.unwrap_or(0.06), 0.01, 0.3)?;
-    within("warp_m", options.warp_m, 0.0, 0.2)?;
-    within("scale_sigma", options.scale_sigma, 0.0, 0.01)?;
-    within("tilt_deg", options.tilt_deg, 0.0, 10.0)
-}
-
-/// Where the app was started: some metres away at any heading, nearly upright.
+/// Pose at which the app was started: some metres away at any heading, nearly upright.
 fn frame(
     house: &House,
     stand: &Stand,
@@ -221,7 +209,7 @@ fn poses(
     poses
 }
 
-/// What the headset's depth camera saw on a stroll about the place.
+/// Depth views of the headset on a stroll about the place.
 fn depth_views(
     house: &House,
     stand: &Stand,
@@ -315,7 +303,7 @@ fn reach_m(
     (low_m, high_m)
 }
 
-/// Whether a point in the camera is in the picture or near its edge.
+/// True of a point in the camera's frame that is in the picture or near its edge.
 fn near_picture(camera: &Camera, in_camera: &Point3<f64>, range_m: f64) -> bool {
     let depth_m = in_camera.x;
     let up = camera.tan_half * camera.height as f64 / camera.width as f64;
@@ -333,9 +321,9 @@ fn look(
     regions: &[u16],
     options: &HeadsetOptions,
     headset_from_house: &Isometry3<f64>,
-) -> HeadsetHeadsetScan {
+) -> HouseScan {
     let origin_m = Point3::from(pose.translation.vector);
-    let mut headset_scan = HeadsetHeadsetScan {
+    let mut headset_scan = HouseScan {
         points_m: Vec::with_capacity(camera.pixels()),
         regions: Vec::with_capacity(camera.pixels()),
         sensor_m: headset_from_house * origin_m,

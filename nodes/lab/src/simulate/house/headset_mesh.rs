@@ -5,9 +5,9 @@ use fast_surface_nets::ndshape::{RuntimeShape, Shape};
 use fast_surface_nets::{SurfaceNetsBuffer, surface_nets};
 use nalgebra::{Isometry3, Point3, Vector3};
 
-use super::HouseError;
 use super::camera::Image;
 use super::warp::Warp;
+use crate::AnyError;
 use crate::mesh::LabelledMesh;
 use crate::options::within;
 
@@ -36,7 +36,7 @@ impl Volume {
         low_m: Point3<f64>,
         high_m: Point3<f64>,
         voxel_m: f64,
-    ) -> Result<Volume, HouseError> {
+    ) -> Result<Volume, AnyError> {
         let sides = (high_m - low_m).map(|size_m| (size_m / voxel_m).ceil().max(0.0) + 3.0);
         within("voxels along a side", sides.max(), 1.0, MAX_SIDE)?;
         within("voxels", sides.product(), 1.0, MAX_VOXELS)?;
@@ -58,7 +58,7 @@ impl Volume {
         views: &[DepthView],
         wanted: impl Fn(&Point3<f64>) -> bool,
         warp: &Warp,
-    ) -> Result<LabelledMesh, HouseError> {
+    ) -> Result<LabelledMesh, AnyError> {
         let shape = RuntimeShape::<u32, 3>::new(self.sides);
         let truncation_m = TRUNCATION_VOXELS * self.voxel_m;
         let cameras: Vec<_> = views
@@ -96,7 +96,7 @@ impl Volume {
         shape: &RuntimeShape<u32, 3>,
         seen: &[bool],
         warp: &Warp,
-    ) -> Result<LabelledMesh, HouseError> {
+    ) -> Result<LabelledMesh, AnyError> {
         let corner_seen =
             |corner: [u32; 3]| seen.get(shape.linearize(corner) as usize) == Some(&true);
         let whole = |[x, y, z]: &[u32; 3]| {

@@ -1,8 +1,8 @@
-//! What a segmenter sees as one: pieces of furniture, and patches of walls, floors and ceilings.
+//! Regions that a segmenter sees as one: pieces of furniture, and patches of walls, floors and ceilings.
 
 use std::collections::BTreeMap;
 
-use super::HouseError;
+use crate::AnyError;
 use crate::mesh::LabelledMesh;
 
 /// Region of a point of which nothing is known.
@@ -15,15 +15,13 @@ const PATCH_M: f64 = 2.0;
 /// Most patches along a side.
 const MAX_PATCHES: f64 = 48.0;
 
-/// One thing, or a patch of a structural one: what a segmenter would get wrong as a whole.
+/// A region that a segmenter gets wrong as a whole: one thing, or a patch of a structural one.
 #[derive(Clone, Copy, PartialEq, Eq, Debug)]
 pub struct Region {
     /// The true class.
     pub label: u16,
     /// Instance of the mesh.
     pub instance: u16,
-    /// Part of a wall, floor or ceiling.
-    pub structural: bool,
 }
 
 /// All triangles with one instance and class.
@@ -58,7 +56,7 @@ impl Regions {
     pub(super) fn new(
         mesh: &LabelledMesh,
         structural: impl Fn(u16) -> bool,
-    ) -> Result<Regions, HouseError> {
+    ) -> Result<Regions, AnyError> {
         let mut numbers: BTreeMap<(u16, u16), usize> = BTreeMap::new();
         let keys = || {
             mesh.instances()
@@ -98,9 +96,8 @@ impl Regions {
         let mut list = Vec::new();
         for thing in &mut things {
             thing.first_region = list.len();
-            let structural = structural(thing.label);
             let mut regions = 1;
-            if structural {
+            if structural(thing.label) {
                 let size_m = [0, 1].map(|axis| thing.high_m[axis] - thing.low_m[axis]);
                 let side_m = PATCH_M.max(size_m[0].max(size_m[1]) / MAX_PATCHES);
                 let [columns, rows] = size_m.map(|size_m| (size_m / side_m) as usize + 1);
@@ -114,12 +111,14 @@ impl Regions {
             let region = Region {
                 label: thing.label,
                 instance: thing.instance,
-                structural,
             };
             list.extend(std::iter::repeat_n(region, regions));
             if list.len() > MAX_REGIONS {
                 let regions = list.len();
-                return Err(HouseError::TooManyRegions { regions });
+                return Err(format!(
+                    "the mesh has {regions} instances and patches of walls, at most {MAX_REGIONS} are taken"
+                )
+                .into());
             }
         }
         Ok(Regions {

@@ -2,11 +2,12 @@
 
 use nalgebra::{Point3, Vector3};
 
+use super::House;
 use super::regions::Thing;
-use super::{House, HouseError};
+use crate::AnyError;
 use crate::simulate::random::{Purpose, Stream};
 
-/// How far from the object one stands, metres; the second is tried when nothing is found.
+/// Distances of a stand from the object, metres; the second is tried when nothing is found.
 const DISTANCES_M: [[f64; 2]; 2] = [[1.8, 3.2], [1.0, 4.5]];
 /// Places tried.
 const TRIES: usize = 80;
@@ -17,7 +18,7 @@ const SEEN: f64 = 0.12;
 /// Chairs this near to a table belong to it, metres.
 const CHAIR_M: f64 = 0.9;
 
-/// What a headset looks at (semantic_icp, table 1 of the paper).
+/// A scene that a headset looks at (semantic_icp, table 1 of the paper).
 #[derive(Clone, Copy, PartialEq, Eq, Hash, Debug)]
 pub enum Scene {
     /// A television.
@@ -31,7 +32,7 @@ pub enum Scene {
 }
 
 impl Scene {
-    /// All of them, in the order of the paper.
+    /// All scenes, in the order of the paper.
     pub const ALL: [Scene; 4] = [Scene::Tv, Scene::Desk, Scene::Bookshelf, Scene::Dining];
 
     /// Name in reports and files.
@@ -55,7 +56,7 @@ impl Scene {
     }
 }
 
-/// Where one stands and what one looks at, house frame, metres.
+/// A stand and the point that is looked at, house frame, metres.
 #[derive(Clone, Copy, PartialEq, Debug)]
 pub(super) struct Stand {
     pub(super) cell_m: [f64; 2],
@@ -69,7 +70,7 @@ pub(super) fn stand(
     scene: Scene,
     eye_height_m: f64,
     seed: u64,
-) -> Result<Stand, HouseError> {
+) -> Result<Stand, AnyError> {
     let objects = objects(house, scene);
     for distances_m in DISTANCES_M {
         for &number in &objects {
@@ -79,12 +80,13 @@ pub(super) fn stand(
             }
         }
     }
-    Err(HouseError::NoView {
-        scene,
-        object: scene.object(),
-        near_m: DISTANCES_M[1][0],
-        far_m: DISTANCES_M[1][1],
-    })
+    let [near_m, far_m] = DISTANCES_M[1];
+    Err(format!(
+        "no free place from {near_m} to {far_m} m away from which the {} of the scene is seen; does the mesh have \
+         one that is labelled so?",
+        scene.object()
+    )
+    .into())
 }
 
 /// Numbers of the things of the class, the most telling first: with many chairs, then large.
@@ -189,7 +191,7 @@ fn samples(house: &House, number: usize) -> Vec<Point3<f64>> {
     (0..SAMPLES).filter_map(sample).collect()
 }
 
-/// Whether a point of a thing is seen, or the thing right before it.
+/// True if a point of a thing is seen, or the thing right before it.
 fn sees(house: &House, eye: &Point3<f64>, point: &Point3<f64>, number: usize) -> bool {
     let ray = point - eye;
     let Some(hit) = house.cast(eye, &ray, ray.norm() + 0.01) else {

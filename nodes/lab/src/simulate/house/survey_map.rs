@@ -2,7 +2,8 @@
 
 use nalgebra::{Point3, Vector3};
 
-use super::{HouseError, RegionLabels, Survey};
+use super::{RegionLabels, Survey};
+use crate::AnyError;
 use lattice_core::lattice::Lattice;
 use lattice_core::registration::SemanticCloud;
 use lattice_core::voxels::{Payload, VoxelList};
@@ -11,14 +12,14 @@ use lattice_core::voxels::{Payload, VoxelList};
 #[derive(Clone, Debug)]
 pub struct SurveyMap {
     centroids_m: Vec<Point3<f64>>,
-    /// Where the regions of each voxel start, and the end.
+    /// Start of the regions of each voxel, and the end.
     starts: Vec<usize>,
     regions: Vec<(u16, u32)>,
 }
 
 impl SurveyMap {
     /// Inserts a survey into cells of a lattice.
-    pub fn new(survey: &Survey, lattice: &Lattice) -> Result<SurveyMap, HouseError> {
+    pub fn new(survey: &Survey, lattice: &Lattice) -> Result<SurveyMap, AnyError> {
         // Regions take the place of labels.
         let list = voxels(survey, lattice, &survey.regions)?;
         let mut map = SurveyMap {
@@ -42,7 +43,7 @@ impl SurveyMap {
         self.centroids_m.len()
     }
 
-    /// Whether there is no voxel.
+    /// True if there is no voxel.
     pub fn is_empty(&self) -> bool {
         self.centroids_m.is_empty()
     }
@@ -50,10 +51,9 @@ impl SurveyMap {
     /// The centroids with the shares of their labels, map frame, in the order of
     /// [`SemanticCloud::from_voxels`].
     pub fn cloud(&self, labels: &RegionLabels) -> SemanticCloud {
-        let mut draws = labels.draws(0);
         let voxel = |range: &[usize]| {
             let regions = self.regions.get(range[0]..range[1]).unwrap_or_default();
-            draws.of_counts(regions)
+            labels.of_counts(regions)
         };
         SemanticCloud {
             labels: self.starts.windows(2).map(voxel).collect(),
@@ -64,18 +64,13 @@ impl SurveyMap {
 
 impl Survey {
     /// The survey as a map of labelled voxels: label histograms as `lattice_mapper` keeps them.
-    pub fn voxels(
-        &self,
-        lattice: &Lattice,
-        labels: &RegionLabels,
-    ) -> Result<VoxelList, HouseError> {
-        let mut draws = labels.draws(0);
-        let labels = self.regions.iter().map(|&region| draws.class(region));
+    pub fn voxels(&self, lattice: &Lattice, labels: &RegionLabels) -> Result<VoxelList, AnyError> {
+        let labels = self.regions.iter().map(|&region| labels.class(region));
         voxels(self, lattice, &labels.collect::<Vec<u16>>())
     }
 }
 
-fn voxels(survey: &Survey, lattice: &Lattice, labels: &[u16]) -> Result<VoxelList, HouseError> {
+fn voxels(survey: &Survey, lattice: &Lattice, labels: &[u16]) -> Result<VoxelList, AnyError> {
     let payload = Payload {
         labels: true,
         ..Payload::default()

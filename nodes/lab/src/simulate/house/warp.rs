@@ -1,4 +1,4 @@
-//! How the shape of a headset's mesh is off.
+//! Smooth errors in the shape of a headset's mesh.
 
 use nalgebra::{Point3, Vector3};
 
@@ -33,7 +33,7 @@ impl Warp {
         }
     }
 
-    /// Where a point is put.
+    /// The warped point.
     pub(super) fn apply(&self, point_m: Point3<f64>) -> Point3<f64> {
         let scaled = self.about_m + (point_m - self.about_m) * self.scale;
         let shift = |axis: usize| {

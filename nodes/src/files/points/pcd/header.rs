@@ -9,7 +9,7 @@ const MAX_LINES: u64 = 1000;
 /// Most bytes of a point.
 const MAX_POINT_BYTES: u64 = 1 << 20;
 
-/// Where x, y and z are in the data.
+/// Places of x, y and z in the data.
 #[derive(Debug)]
 pub(super) struct Header {
     /// One of the PCD formats.
@@ -26,7 +26,7 @@ pub(super) struct Header {
     pub(super) label: Option<Axis>,
 }
 
-/// Where one number is.
+/// Place of one number.
 #[derive(Clone, Copy, Debug)]
 pub(super) struct Axis {
     pub(super) scalar: Scalar,
@@ -118,7 +118,7 @@ impl Lines {
         Ok(None)
     }
 
-    /// What the lines mean together.
+    /// Header that the lines make together.
     fn header(&self, format: PointFormat) -> Result<Header, String> {
         let fields = self.fields.len();
         let ones = vec![1; fields];

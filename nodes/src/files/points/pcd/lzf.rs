@@ -4,12 +4,12 @@
 //! three bits, plus the next byte if they are 7, plus 2, are the length of a copy; its lower five and
 //! the last byte are how far back before the previous byte it starts.
 
-/// What is wrong with compressed data, and where.
+/// Error in compressed data and its place.
 #[derive(Debug, PartialEq, Eq)]
 pub(super) struct Corrupt {
     /// Start of the piece that is wrong.
     pub(super) byte: usize,
-    /// What is wrong.
+    /// Problem in words.
     pub(super) reason: String,
 }
 

@@ -7,7 +7,7 @@ use crate::files::points::{PointFileError, PointFormat};
 /// Most lines of a header.
 const MAX_LINES: u64 = 10_000;
 
-/// What follows the header.
+/// Form of the data after the header.
 #[derive(Debug)]
 pub struct Header {
     /// One of the PLY formats.

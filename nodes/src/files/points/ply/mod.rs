@@ -63,7 +63,7 @@ pub(super) fn read(
     Err(fault("the header has no element vertex".to_owned()))
 }
 
-/// Which properties of the vertex are x, y and z.
+/// Places of x, y and z among the properties of the vertex.
 pub fn axes(vertex: &Element) -> Result<[usize; 3], String> {
     let find = |axis: &str| {
         let found = number(vertex, axis);
@@ -72,7 +72,7 @@ pub fn axes(vertex: &Element) -> Result<[usize; 3], String> {
     Ok([find("x")?, find("y")?, find("z")?])
 }
 
-/// Which property of an element is the number of a name.
+/// Place of the number of a name among the properties of an element.
 pub fn number(element: &Element, wanted: &str) -> Option<usize> {
     let is = |p: &Property| matches!(p, Property::Scalar { name, .. } if name == wanted);
     element.properties.iter().position(is)

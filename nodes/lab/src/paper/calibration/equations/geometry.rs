@@ -8,10 +8,10 @@ use plotters::prelude::*;
 
 use super::literal::{self, Pair};
 use super::{Bench, GATE_M, Slip, slips};
+use crate::AnyError;
 use crate::evaluate::median;
-use crate::paper::report::plot::{Area, Axes, Curve, Layout, curves, svg};
-use crate::paper::report::{Check, Figure, Section, Verdict};
-use crate::plot::Fault;
+use crate::report::plot::{Area, Axes, Curve, Layout, curves, svg};
+use crate::report::{Check, Figure, Section, Verdict};
 
 /// Slips of this part.
 const SLIPS: [Slip; 4] = [
@@ -41,7 +41,7 @@ const SLIPS: [Slip; 4] = [
     ],
 ];
 
-/// How far to each side, metres and radians.
+/// Reach to each side, metres and radians.
 const REACH_M: f64 = 1.0;
 const REACH_RAD: f64 = 0.5;
 /// Steps to each side.
@@ -60,12 +60,12 @@ impl Line {
         found.map_or(f64::NAN, |(at, _)| *at)
     }
 
-    /// Where it costs least, in the unit of the reach.
+    /// Offset of the least cost, in the unit of the reach.
     pub fn least_at(&self) -> f64 {
         self.end(|a, b| b.1.total_cmp(&a.1)) * self.reach
     }
 
-    /// Where it costs most, as a share of the reach.
+    /// Offset of the greatest cost, as a share of the reach.
     pub fn most_at(&self) -> f64 {
         self.end(|a, b| a.1.total_cmp(&b.1)).abs()
     }
@@ -109,24 +109,22 @@ pub(super) fn lines(bench: &Bench, cost: impl Fn(&Isometry3<f64>) -> f64) -> Vec
 pub(super) fn ends(name: &str, lines: &[Line]) -> Vec<Check> {
     let mut checks = Vec::new();
     for line in lines {
-        checks.push(Check {
-            name: format!("argmin of {name} {}", line.title),
-            printed: None,
-            expected: 0.0,
-            found: line.least_at(),
+        checks.push(Check::new(
             // The headset's mesh is off by centimetres.
-            tolerance: 0.08,
-        });
-        checks.push(Check {
-            name: format!(
+            format!("argmin of {name} {}", line.title),
+            0.0,
+            line.least_at(),
+            0.08,
+        ));
+        checks.push(Check::new(
+            format!(
                 "argmax of {name} {}: share of the way to the end that was tried",
                 line.title
             ),
-            printed: None,
-            expected: 1.0,
-            found: line.most_at(),
-            tolerance: 0.15,
-        });
+            1.0,
+            line.most_at(),
+            0.15,
+        ));
     }
     checks
 }
@@ -137,7 +135,7 @@ pub(super) fn figure(
     caption: String,
     key: &[(RGBColor, &str)],
     functions: &[Vec<Line>],
-) -> Result<Figure, Fault> {
+) -> Result<Figure, AnyError> {
     let layout = Layout {
         panel: (330, 290),
         columns: 3,
@@ -178,14 +176,10 @@ pub(super) fn figure(
         }
         Ok(())
     };
-    Ok(Figure {
-        name: name.to_owned(),
-        caption,
-        svg: svg(&layout, draw)?,
-    })
+    Ok(Figure::new(name, caption, svg(&layout, draw)?))
 }
 
-pub(super) fn section(bench: &Bench) -> Result<Section, Fault> {
+pub(super) fn section(bench: &Bench) -> Result<Section, AnyError> {
     let (source, target) = (bench.source(), bench.target());
     let truth = bench.scenario.truth;
     let start = bench.start();
@@ -220,20 +214,18 @@ pub(super) fn section(bench: &Bench) -> Result<Section, Fault> {
             literal::gicp(&far, &start),
         ),
         slope_check(&far, &start),
-        Check {
-            name: "slope of rho at alpha^2".to_owned(),
-            printed: None,
-            expected: 0.5,
-            found: literal::rho_slope(literal::ALPHA.powi(2), literal::ALPHA),
-            tolerance: 1e-12,
-        },
-        Check {
-            name: "gradient where argmin ends, as a share of that at the start".to_owned(),
-            printed: None,
-            expected: 0.0,
-            found: after / before,
-            tolerance: 0.01,
-        },
+        Check::new(
+            "slope of rho at alpha^2",
+            0.5,
+            literal::rho_slope(literal::ALPHA.powi(2), literal::ALPHA),
+            1e-12,
+        ),
+        Check::new(
+            "gradient where argmin ends, as a share of that at the start",
+            0.0,
+            after / before,
+            0.01,
+        ),
     ];
     checks.extend(ends("f_GICP", &lines));
     let [forth, back] = directions(bench);
@@ -270,29 +262,22 @@ pub(super) fn section(bench: &Bench) -> Result<Section, Fault> {
 
 /// Two numbers that should be one.
 pub(super) fn relative(name: &str, found: f64, expected: f64) -> Check {
-    Check {
-        name: format!("{name}: ratio"),
-        printed: None,
-        expected: 1.0,
-        found: found / expected,
-        tolerance: 1e-9,
-    }
+    Check::new(format!("{name}: ratio"), 1.0, found / expected, 1e-9)
 }
 
 pub(super) fn slope_check(pairs: &[Pair], pose: &Isometry3<f64>) -> Check {
     let analytic = literal::gradient(pairs, pose);
     let numeric = literal::numeric_gradient(pairs, pose);
-    Check {
-        name: "gradient on SE(3), by formula and by differences: share that is off".to_owned(),
-        printed: None,
-        expected: 0.0,
-        found: (analytic - numeric).norm() / analytic.norm(),
-        tolerance: 1e-6,
-    }
+    Check::new(
+        "gradient on SE(3), by formula and by differences: share that is off",
+        0.0,
+        (analytic - numeric).norm() / analytic.norm(),
+        1e-6,
+    )
 }
 
 /// Eq. (2): a cloud and itself, moved.
-fn known_motion(bench: &Bench) -> Result<Check, Fault> {
+fn known_motion(bench: &Bench) -> Result<Check, AnyError> {
     let known = Isometry3::new(Vector3::new(0.004, -0.003, 0.002), Vector3::z() * 0.002);
     let points_m = bench.source().points_m();
     let moved = points_m.iter().map(|p| known * p).collect();
@@ -307,13 +292,12 @@ fn known_motion(bench: &Bench) -> Result<Check, Fault> {
     let apart = points_m
         .iter()
         .map(|p| nalgebra::distance(&(found * p), &(known * p)));
-    Ok(Check {
-        name: "eq. (2) with argmin: a view and itself moved by 5 mm, farthest point from where it belongs (m)".to_owned(),
-        printed: None,
-        expected: 0.0,
-        found: apart.fold(0.0, f64::max),
-        tolerance: 1e-6,
-    })
+    Ok(Check::new(
+        "eq. (2) with argmin: a view and itself moved by 5 mm, farthest point from where it belongs (m)",
+        0.0,
+        apart.fold(0.0, f64::max),
+        1e-6,
+    ))
 }
 
 /// Median distances (m) of the nearest points at the truth: from headset to map, and from map to headset.

@@ -143,7 +143,7 @@ pub(super) fn numeric_gradient(pairs: &[Pair], pose: &Isometry3<f64>) -> Vector6
     Vector6::from_fn(|axis, _| (4.0 * slope(axis, 5e-5) - slope(axis, 1e-4)) / 3.0)
 }
 
-/// What the library says that a pose costs.
+/// Cost of a pose by the library.
 pub(super) fn of_library(
     source: &PreparedCloud,
     target: &PreparedCloud,

@@ -9,14 +9,14 @@ use lattice_core::registration::PreparedCloud;
 use nalgebra::{Isometry3, Point3, Translation3, UnitQuaternion, Vector3};
 
 use super::Context;
+use crate::AnyError;
 use crate::evaluate::Scenario;
-use crate::paper::report::{Cell, Section, Table};
-use crate::plot::Fault;
+use crate::report::{Cell, Section, Table};
 
 /// A correspondence search reaches as far as that of the published programs, metres.
 const GATE_M: f64 = 15.811_388_300_841_896;
 
-/// What the equations are tried on: a scene with right labels.
+/// A scene with right labels, on which the equations are tried.
 struct Bench {
     scenario: Scenario,
 }
@@ -55,10 +55,10 @@ impl Bench {
 pub(super) fn sections(
     context: &Context,
     progress: &mut dyn FnMut(f64),
-) -> Result<Vec<Section>, Fault> {
-    let view = context.world.view(Scene::Dining, context.first_seed)?;
+) -> Result<Vec<Section>, AnyError> {
+    let view = context.testbed.view(Scene::Dining, context.first_seed)?;
     let bench = Bench {
-        scenario: context.world.scenario(&view, 0.0)?,
+        scenario: context.testbed.scenario(&view, 0.0)?,
     };
     progress(0.3);
     let geometry = geometry::section(&bench)?;
@@ -70,15 +70,10 @@ pub(super) fn sections(
 type Slip = [&'static str; 4];
 
 fn slips(name: &str, slips: &[Slip]) -> Table {
-    Table {
-        name: name.to_owned(),
-        caption: "What is printed, and what we take".to_owned(),
-        columns: ["where", "printed", "what is wrong", "what we take"]
-            .map(str::to_owned)
-            .into(),
-        rows: slips
-            .iter()
-            .map(|slip| slip.map(Cell::from).into())
-            .collect(),
-    }
+    Table::new(
+        name,
+        "What is printed, and what we take",
+        ["where", "printed", "what is wrong", "what we take"],
+        slips.iter().map(|slip| slip.map(Cell::from).into()),
+    )
 }

@@ -8,10 +8,10 @@ use plotters::prelude::*;
 use super::geometry::{ends, figure, lines, relative, slope_check};
 use super::literal::{self, ALPHA, rho, rho_slope};
 use super::{Bench, Context, GATE_M, Slip, slips};
+use crate::AnyError;
 use crate::evaluate::{Bounds, WRONG, median};
-use crate::paper::report::plot::{Area, Axes, Curve, Layout, curves, svg};
-use crate::paper::report::{Cell, Check, Figure, Section, Table, Verdict};
-use crate::plot::Fault;
+use crate::report::plot::{Area, Axes, Curve, Layout, curves, svg};
+use crate::report::{Cell, Check, Figure, Section, Table, Verdict};
 
 const SLIPS: [Slip; 5] = [
     [
@@ -51,7 +51,7 @@ const MOST: usize = lattice_core::registration::MAX_CANDIDATES;
 /// Trials of each scene in the comparison of readings.
 const SEEDS: u64 = 4;
 
-pub(super) fn section(context: &Context, bench: &Bench) -> Result<Section, Fault> {
+pub(super) fn section(context: &Context, bench: &Bench) -> Result<Section, AnyError> {
     let (source, target) = (bench.source(), bench.target());
     let truth = bench.scenario.truth;
     let start = bench.start();
@@ -139,31 +139,27 @@ fn inside_is_wider() -> Check {
             most = most.max((rho(w * x, ALPHA) / wide - 1.0).abs());
         }
     }
-    Check {
-        name: "rho_alpha(w x) and w rho_(alpha / sqrt w)(x): greatest share that is off".to_owned(),
-        printed: None,
-        expected: 0.0,
-        found: most,
-        tolerance: 1e-12,
-    }
+    Check::new(
+        "rho_alpha(w x) and w rho_(alpha / sqrt w)(x): greatest share that is off",
+        0.0,
+        most,
+        1e-12,
+    )
 }
 
-/// How hard a pair of a small weight pulls from afar, as a share of one of weight 1.
+/// Pull of a far pair of a small weight, as a share of one of weight 1.
 fn far_pull(name: &str, expected: f64, pull: impl Fn(f64, f64) -> f64) -> Check {
     let afar = 1e8;
-    Check {
-        name: format!(
-            "pull of a far pair with w = {LIGHT} as a share of one with w = 1, weight {name}"
-        ),
-        printed: None,
+    Check::new(
+        format!("pull of a far pair with w = {LIGHT} as a share of one with w = 1, weight {name}"),
         expected,
-        found: pull(LIGHT, afar) / pull(1.0, afar),
-        tolerance: 1e-3,
-    }
+        pull(LIGHT, afar) / pull(1.0, afar),
+        1e-3,
+    )
 }
 
 /// The pull of a pair by its distance, for several weights.
-fn pulls() -> Result<Figure, Fault> {
+fn pulls() -> Result<Figure, AnyError> {
     let colors = [BLACK, RGBColor(0, 114, 178), RGBColor(213, 94, 0)];
     let weights = [1.0, 0.1, LIGHT];
     let key: Vec<(RGBColor, &str)> = colors
@@ -209,12 +205,11 @@ fn pulls() -> Result<Figure, Fault> {
         }
         Ok(())
     };
-    Ok(Figure {
-        name: "eq7_pull".to_owned(),
-        caption: "How hard a pair pulls, by its squared distance and its weight: inside the loss, weights do not matter from afar"
-            .to_owned(),
-        svg: svg(&layout, draw)?,
-    })
+    Ok(Figure::new(
+        "eq7_pull",
+        "How hard a pair pulls, by its squared distance and its weight: inside the loss, weights do not matter from afar",
+        svg(&layout, draw)?,
+    ))
 }
 
 /// A reading of the equations.
@@ -252,8 +247,8 @@ fn all_readings(labels: usize) -> Vec<Reading> {
 }
 
 /// Runs each reading on all scenes with right labels; also the number of trials of each.
-fn readings(context: &Context) -> Result<(Table, usize), Fault> {
-    let labels = context.world.house().class_names().len();
+fn readings(context: &Context) -> Result<(Table, usize), AnyError> {
+    let labels = context.testbed.house().class_names().len();
     let readings = all_readings(labels);
     let starts = [(0.3, 10.0), (0.8, 35.0)];
     let seeds = if context.quick { 1 } else { SEEDS };
@@ -263,8 +258,8 @@ fn readings(context: &Context) -> Result<(Table, usize), Fault> {
     for seed in 0..seeds {
         for scene in Scene::ALL {
             let seed = context.first_seed.wrapping_add(seed);
-            let view = context.world.view(scene, seed)?;
-            let scenario = context.world.scenario(&view, 0.0)?;
+            let view = context.testbed.view(scene, seed)?;
+            let scenario = context.testbed.scenario(&view, 0.0)?;
             let bench = Bench { scenario };
             count += 1;
             let heading = 2.4 * (count as f64);
@@ -307,13 +302,13 @@ fn readings(context: &Context) -> Result<(Table, usize), Fault> {
             format!("right of {count}"),
         ]);
     }
-    let table = Table {
-        name: "eq5-8_readings".to_owned(),
-        caption: format!(
+    let table = Table::new(
+        "eq5-8_readings",
+        format!(
             "Readings of eqs. (5) to (8) with right labels, {count} trials each, all scenes; few trials, to see what matters and what does not"
         ),
         columns,
-        rows: readings.iter().zip(&errors).map(row).collect(),
-    };
+        readings.iter().zip(&errors).map(row),
+    );
     Ok((table, count))
 }

@@ -1,4 +1,4 @@
-//! Figs. 3 and 4: what both devices call what the headset looks at.
+//! Figs. 3 and 4: the labels of both devices in the headset's view.
 
 mod picture;
 mod sheet;
@@ -9,10 +9,10 @@ use crate::simulate::house::{House, Scene};
 use lattice_core::registration::UNLABELED;
 
 use super::Context;
+use crate::AnyError;
 use crate::evaluate::Scenario;
-use crate::paper::report::{Cell, Check, Figure, Section, Table, Verdict};
-use crate::plot::Fault;
 use crate::render::LabelColors;
+use crate::report::{Cell, Check, Figure, Section, Table, Verdict};
 use lattice_nodes::files::export::category_color;
 use picture::Sides;
 use sheet::{Entry, sheet};
@@ -70,8 +70,8 @@ const KINDS: [Kind; 3] = [
 pub(super) fn sections(
     context: &Context,
     progress: &mut dyn FnMut(f64),
-) -> Result<Vec<Section>, Fault> {
-    let colors = Colors::of(context.world.house());
+) -> Result<Vec<Section>, AnyError> {
+    let colors = Colors::of(context.testbed.house());
     let mut sections = Vec::new();
     for (number, kind) in KINDS.iter().enumerate() {
         progress(number as f64 / KINDS.len() as f64);
@@ -80,7 +80,7 @@ pub(super) fn sections(
     Ok(sections)
 }
 
-fn section(context: &Context, kind: &Kind, colors: &Colors) -> Result<Section, Fault> {
+fn section(context: &Context, kind: &Kind, colors: &Colors) -> Result<Section, AnyError> {
     let mut section = Section {
         id: kind.id.to_owned(),
         title: kind.title.to_owned(),
@@ -96,8 +96,8 @@ fn section(context: &Context, kind: &Kind, colors: &Colors) -> Result<Section, F
         figures: Vec::new(),
     };
     for &(scene, q) in kind.scenes {
-        let view = context.world.view(scene, context.first_seed)?;
-        let scenario = context.world.scenario(&view, q)?;
+        let view = context.testbed.view(scene, context.first_seed)?;
+        let scenario = context.testbed.scenario(&view, q)?;
         let sides = Sides::new(&scenario, context.cell_side_m);
         section.figures.push(figure(scene, q, &sides, colors)?);
         let pairs = Pairs::of(&sides);
@@ -108,7 +108,7 @@ fn section(context: &Context, kind: &Kind, colors: &Colors) -> Result<Section, F
     Ok(section)
 }
 
-fn figure(scene: Scene, q: f64, sides: &Sides, colors: &Colors) -> Result<Figure, Fault> {
+fn figure(scene: Scene, q: f64, sides: &Sides, colors: &Colors) -> Result<Figure, AnyError> {
     let agreement: LabelColors = (0..).zip(AGREEMENT.map(|(color, _)| color)).collect();
     let pictures = [
         ("(a) headset", sides.headset_png(&colors.of_class)?),
@@ -119,8 +119,9 @@ fn figure(scene: Scene, q: f64, sides: &Sides, colors: &Colors) -> Result<Figure
     let mut key = colors.key(seen);
     key.extend(AGREEMENT.map(|(color, name)| (color, name.to_owned())));
     let name = format!("labels_{}", scene.name());
-    Ok(Figure {
-        caption: format!(
+    Ok(Figure::new(
+        name,
+        format!(
             "{}: (a) what the headset sees, placed at the true pose, (b) the voxels of the robot's map about it, \
              (c) the headset's points by whether any of the robot's voxels within 10 cm has the same class. {}",
             scene.name(),
@@ -132,9 +133,8 @@ fn figure(scene: Scene, q: f64, sides: &Sides, colors: &Colors) -> Result<Figure
                 false => "All labels are right.".to_owned(),
             }
         ),
-        svg: sheet(&pictures, &key),
-        name,
-    })
+        sheet(&pictures, &key),
+    ))
 }
 
 /// Colours of classes, the same in all pictures.
@@ -164,7 +164,7 @@ impl Colors {
         name.unwrap_or_else(|| "no label".to_owned())
     }
 
-    /// Of the classes among these, in their order.
+    /// Key of the classes among these, in their order.
     fn key<'a>(&self, classes: impl Iterator<Item = &'a u16>) -> Vec<Entry> {
         let mut classes: Vec<u16> = classes.copied().collect();
         classes.sort_unstable();
@@ -174,7 +174,7 @@ impl Colors {
     }
 }
 
-/// How often which class of the headset lies on which of the robot, the most frequent first.
+/// Counts of pairs of a class of the headset on one of the robot, the most frequent first.
 struct Pairs {
     counts: Vec<((u16, u16), usize)>,
     /// Points of the headset with a voxel of the robot.
@@ -237,19 +237,18 @@ fn finding(scene: Scene, pairs: &Pairs, colors: &Colors) -> String {
     )
 }
 
-/// What the clouds say of the labels, beside what was put in.
+/// Check of the clouds' labels against those that were put in.
 fn check(scene: Scene, scenario: &Scenario, pairs: &Pairs) -> Check {
-    Check {
-        name: format!(
+    Check::new(
+        // Labels bleed over the borders of objects.
+        format!(
             "{}: share of the view with different labels, as simulated and as seen in the clouds",
             scene.name()
         ),
-        printed: None,
-        expected: scenario.different_share,
-        found: pairs.differing_share(),
-        // Labels bleed over the borders of objects.
-        tolerance: 0.1,
-    }
+        scenario.different_share,
+        pairs.differing_share(),
+        0.1,
+    )
 }
 
 fn table(scene: Scene, pairs: &Pairs, colors: &Colors) -> Table {
@@ -261,20 +260,18 @@ fn table(scene: Scene, pairs: &Pairs, colors: &Colors) -> Table {
             Cell::Text(if mine == other { "yes" } else { "no" }.to_owned()),
         ]
     };
-    Table {
-        name: format!("labels_{}", scene.name()),
-        caption: format!(
+    Table::new(
+        format!("labels_{}", scene.name()),
+        format!(
             "{}: classes of the headset's points and of the robot's voxels there, the {LISTED} most frequent pairs",
             scene.name()
         ),
-        columns: [
+        [
             "headset",
             "robot",
             "share of the points on the map (%)",
             "same",
-        ]
-        .map(str::to_owned)
-        .into(),
-        rows: pairs.counts.iter().take(LISTED).map(row).collect(),
-    }
+        ],
+        pairs.counts.iter().take(LISTED).map(row),
+    )
 }

@@ -6,13 +6,13 @@ use lattice_core::registration::{MAX_NEIGHBORS, Neighbors, UNLABELED};
 use lattice_core::voxels::{Payload, VoxelList};
 use nalgebra::{Point3, Vector3};
 
+use crate::AnyError;
 use crate::evaluate::Scenario;
-use crate::plot::Fault;
 use crate::render::{Focus, LabelColors, RenderOptions, render_labels_png};
 
 /// Size of a picture, pixels.
 pub(super) const SIZE: [u32; 2] = [440, 330];
-/// How much light changes the colours: little, so that they are those of the key.
+/// Contrast of light and shadow: little, so that the colours are those of the key.
 const CONTRAST: f64 = 0.6;
 /// Steps between the levels of a channel that are kept, so that pictures are small.
 const LEVELS: u32 = 15;
@@ -20,7 +20,7 @@ const LEVELS: u32 = 15;
 const ELEVATION_DEG: f64 = 24.0;
 /// Side of the cubes that headset points are drawn as, metres: a little over their distances.
 const POINT_M: f64 = 0.035;
-/// How near a voxel is that counts as the same place, in sides of voxels.
+/// Distance up to which a voxel counts as the same place, in sides of voxels.
 const REACH_CELLS: f64 = 2.0;
 /// More of the map is shown on each side than the headset saw, metres.
 const MARGIN_M: f64 = 0.3;
@@ -39,11 +39,11 @@ impl Labelled {
     }
 }
 
-/// What both devices have of what the headset looks at.
+/// Labelled voxels of both devices in the headset's view.
 pub(super) struct Sides {
     /// The robot's voxels about it.
     pub robot: Labelled,
-    /// What the headset saw, placed where it truly was.
+    /// The headset's points at its true pose.
     pub headset: Labelled,
     /// The class of the robot's nearest voxel at each point of the headset, or the point's own if a voxel
     /// near it has that: labels bleed over the borders of objects.
@@ -110,7 +110,7 @@ impl Bounds {
 }
 
 impl Sides {
-    /// Of a scenario, whose map has cells with this side.
+    /// Both sides of a scenario, whose map has cells with this side.
     pub(super) fn new(scenario: &Scenario, cell_m: f64) -> Sides {
         let truth = &scenario.truth;
         let mut headset = Labelled::default();
@@ -157,12 +157,12 @@ impl Sides {
     }
 
     /// The robot's voxels as a PNG.
-    pub(super) fn robot_png(&self, colors: &LabelColors) -> Result<Vec<u8>, Fault> {
+    pub(super) fn robot_png(&self, colors: &LabelColors) -> Result<Vec<u8>, AnyError> {
         self.png(&self.robot, self.cell_m, colors)
     }
 
     /// The headset's points as a PNG.
-    pub(super) fn headset_png(&self, colors: &LabelColors) -> Result<Vec<u8>, Fault> {
+    pub(super) fn headset_png(&self, colors: &LabelColors) -> Result<Vec<u8>, AnyError> {
         self.png(&self.headset, POINT_M, colors)
     }
 
@@ -181,11 +181,11 @@ impl Sides {
     }
 
     /// [`Sides::agreement`] as a PNG.
-    pub(super) fn agreement_png(&self, colors: &LabelColors) -> Result<Vec<u8>, Fault> {
+    pub(super) fn agreement_png(&self, colors: &LabelColors) -> Result<Vec<u8>, AnyError> {
         self.png(&self.agreement(), POINT_M, colors)
     }
 
-    fn png(&self, side: &Labelled, cell_m: f64, colors: &LabelColors) -> Result<Vec<u8>, Fault> {
+    fn png(&self, side: &Labelled, cell_m: f64, colors: &LabelColors) -> Result<Vec<u8>, AnyError> {
         let lattice = Lattice::new(LatticeKind::Cubic, cell_m.powi(3))?;
         let list = VoxelList::new(lattice, Vector3::zeros(), usize::MAX)?;
         let mut list = list.with_payload(Payload {
@@ -215,7 +215,7 @@ impl Sides {
 }
 
 /// A picture with fewer colours, as indices of a palette where 256 do.
-fn smaller(png: &[u8]) -> Result<Vec<u8>, Fault> {
+fn smaller(png: &[u8]) -> Result<Vec<u8>, AnyError> {
     let mut reader = png::Decoder::new(std::io::Cursor::new(png)).read_info()?;
     let mut pixels = vec![0; reader.output_buffer_size().unwrap_or_default()];
     let info = reader.next_frame(&mut pixels)?;

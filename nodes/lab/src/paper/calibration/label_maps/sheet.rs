@@ -5,7 +5,7 @@ use std::fmt::Write;
 use base64::prelude::{BASE64_STANDARD, Engine};
 
 use super::picture::SIZE;
-use crate::paper::report::escaped;
+use crate::report::escaped;
 
 /// Height of the line above a picture, and of a line of the key, pixels.
 const LINE: u32 = 26;

@@ -1,11 +1,11 @@
-//! What the paper concludes: labels help where they agree, and harm where they do not.
+//! The conclusion of the paper: labels help where they agree, and harm where they do not.
 
-use super::{GICP, SEMANTIC, Trials, figures, in_words, methods, right, title};
-use crate::evaluate::OURS;
-use crate::paper::report::{Cell, Section, Table, Verdict};
-use crate::plot::Fault;
+use super::{GICP, SEMANTIC, Trials, figures, in_words, methods, right};
+use crate::AnyError;
+use crate::evaluate::{OURS, title};
+use crate::report::{Cell, Section, Table, Verdict};
 
-/// What is said of a method in comparison with GICP-SE(3).
+/// Judgement of a method in comparison with GICP-SE(3).
 #[derive(Clone, Copy, PartialEq, Eq, Debug)]
 enum Word {
     Better,
@@ -37,7 +37,7 @@ fn word(trials: &Trials, q: f64, start: &str, method: &str) -> Word {
     }
 }
 
-/// Whether right labels help from a bad start, and wrong ones harm from a good one.
+/// Judgements with right labels from a bad start, and with wrong ones from a good one.
 fn helps_and_harms(trials: &Trials, method: &str) -> [Word; 2] {
     let [good, poor] = &trials.starts;
     [
@@ -46,7 +46,7 @@ fn helps_and_harms(trials: &Trials, method: &str) -> [Word; 2] {
     ]
 }
 
-pub(super) fn section(trials: &Trials) -> Result<Section, Fault> {
+pub(super) fn section(trials: &Trials) -> Result<Section, AnyError> {
     Ok(Section {
         id: "claim".to_owned(),
         title: "Sections 4.5 to 6: when labels help".to_owned(),
@@ -153,12 +153,12 @@ fn ratios(trials: &Trials) -> Table {
         "to",
         "than GICP-SE(3)",
     ];
-    Table {
-        name: "claim_ratios".to_owned(),
-        caption: "Against GICP-SE(3) in the same trials, all scenes".to_owned(),
-        columns: columns.map(str::to_owned).into(),
+    Table::new(
+        "claim_ratios",
+        "Against GICP-SE(3) in the same trials, all scenes",
+        columns,
         rows,
-    }
+    )
 }
 
 /// Right poses.
@@ -174,23 +174,16 @@ fn shares(trials: &Trials) -> Table {
         row.extend(methods().into_iter().map(|method| {
             let share = right(trials.of_method(None, q, start, method));
             match share.share {
-                Some(value) => Cell::Text(format!(
-                    "{:.0} % of {} [{:.0}, {:.0}]",
-                    100.0 * value,
-                    share.n,
-                    100.0 * share.low,
-                    100.0 * share.high
-                )),
+                Some(_) => share.text(0).into(),
                 None => Cell::Empty,
             }
         }));
         row
     };
-    Table {
-        name: "claim_right".to_owned(),
-        caption: "Poses right within 0.15 m and 3 degrees, with 95 % intervals, all scenes"
-            .to_owned(),
+    Table::new(
+        "claim_right",
+        "Poses right within 0.15 m and 3 degrees, with 95 % intervals, all scenes",
         columns,
-        rows: cells.map(row).collect(),
-    }
+        cells.map(row),
+    )
 }

@@ -4,10 +4,11 @@ use crate::simulate::house::Scene;
 use plotters::prelude::*;
 
 use super::table1::{blamed, printed};
-use super::{GICP, Median, SEMANTIC, Trials, in_words, methods, title};
-use crate::evaluate::OURS;
-use crate::paper::report::Figure;
-use crate::plot::{Area, Fault, Layout, svg};
+use super::{GICP, Median, SEMANTIC, Trials, in_words, methods};
+use crate::AnyError;
+use crate::evaluate::{OURS, color, letters, title};
+use crate::report::Figure;
+use crate::report::plot::{Area, Layout, chart, svg};
 
 /// Range of errors that is shown; what is beyond lies on its ends.
 const ERRORS: std::ops::Range<f64> = 0.01..40.0;
@@ -17,33 +18,12 @@ const LABELS: [(RGBColor, &str); 2] = [
     (RGBColor(213, 94, 0), "labels wrong"),
 ];
 
-/// Letters below a method's dots.
-fn letters(method: &str) -> &'static str {
-    match method {
-        GICP => "GICP",
-        "semantic_hard" => "S 2018",
-        "class_wise" => "CW 2017",
-        "class_wise_cauchy" => "CW Cauchy",
-        _ => "ours",
-    }
-}
-
-fn color(method: &str) -> RGBColor {
-    match method {
-        GICP => RGBColor(0, 158, 115),
-        "semantic_hard" => RGBColor(230, 159, 0),
-        "class_wise" => RGBColor(213, 94, 0),
-        "class_wise_cauchy" => RGBColor(128, 56, 0),
-        _ => BLACK,
-    }
-}
-
 fn shown(error: f64) -> f64 {
     error.clamp(ERRORS.start, ERRORS.end)
 }
 
 /// All trials: a row for each scene, a column for each start.
-pub(super) fn dots(trials: &Trials) -> Result<Figure, Fault> {
+pub(super) fn dots(trials: &Trials) -> Result<Figure, AnyError> {
     let mut key = LABELS.to_vec();
     key.push((BLACK, "printed (diamond)"));
     let layout = Layout {
@@ -63,17 +43,16 @@ pub(super) fn dots(trials: &Trials) -> Result<Figure, Fault> {
         }
         Ok(())
     };
-    Ok(Figure {
-        name: "table1_trials".to_owned(),
-        caption: "Every simulated trial (dots), medians with their 95 % intervals (bars), and the printed errors of single runs (diamonds) \
+    Ok(Figure::new(
+        "table1_trials",
+        "Every simulated trial (dots), medians with their 95 % intervals (bars), and the printed errors of single runs (diamonds) \
                   on the side of the labels that the paper tells of. S 2018: Semantic-ICP as published in 2018; CW 2017: class by class, \
-                  as published in 2017; CW Cauchy: those pairs under the loss that the paper prints. GICP-SE(3) does not look at labels."
-            .to_owned(),
-        svg: svg(&layout, draw)?,
-    })
+                  as published in 2017; CW Cauchy: those pairs under the loss that the paper prints. GICP-SE(3) does not look at labels.",
+        svg(&layout, draw)?,
+    ))
 }
 
-fn dots_of(area: &Area, trials: &Trials, start: &str, scene: Scene) -> Result<(), Fault> {
+fn dots_of(area: &Area, trials: &Trials, start: &str, scene: Scene) -> Result<(), AnyError> {
     let methods = methods();
     let mut chart = ChartBuilder::on(area)
         .caption(
@@ -117,8 +96,8 @@ fn dots_of(area: &Area, trials: &Trials, start: &str, scene: Scene) -> Result<()
                 let line = |points| PathElement::new(points, color.stroke_width(2));
                 chart.draw_series(lines.into_iter().map(line))?;
             }
-            let told = printed(scene).filter(|_| blamed(scene) == (side == 1));
-            let value = told.and_then(|printed| match *method {
+            let known = printed(scene).filter(|_| blamed(scene) == (side == 1));
+            let value = known.and_then(|printed| match *method {
                 GICP => Some(printed.gicp_se3),
                 method if SEMANTIC.contains(&method) => Some(printed.semantic_icp),
                 _ => None,
@@ -134,7 +113,7 @@ fn dots_of(area: &Area, trials: &Trials, start: &str, scene: Scene) -> Result<()
 }
 
 /// Medians of all scenes by the share of wrong labels: a panel for each start.
-pub(super) fn by_flips(trials: &Trials) -> Result<Figure, Fault> {
+pub(super) fn by_flips(trials: &Trials) -> Result<Figure, AnyError> {
     let key: Vec<(RGBColor, &str)> = methods()
         .into_iter()
         .map(|method| (color(method), title(method)))
@@ -152,28 +131,20 @@ pub(super) fn by_flips(trials: &Trials) -> Result<Figure, Fault> {
         }
         Ok(())
     };
-    Ok(Figure {
-        name: "claim_by_labels".to_owned(),
-        caption: "Median d_SE(3) of all scenes with its 95 % interval, by the share of the view whose objects are labelled wrongly. \
-                  GICP-SE(3), which does not look at labels, is the level."
-            .to_owned(),
-        svg: svg(&layout, draw)?,
-    })
+    Ok(Figure::new(
+        "claim_by_labels",
+        "Median d_SE(3) of all scenes with its 95 % interval, by the share of the view whose objects are labelled wrongly. \
+                  GICP-SE(3), which does not look at labels, is the level.",
+        svg(&layout, draw)?,
+    ))
 }
 
-fn by_flips_from(area: &Area, trials: &Trials, start: &str) -> Result<(), Fault> {
-    let mut chart = ChartBuilder::on(area)
-        .caption(format!("starts {}", in_words(start)), ("sans-serif", 15))
-        .margin(8)
-        .x_label_area_size(36)
-        .y_label_area_size(56)
-        .build_cartesian_2d(-0.03..0.9, ERRORS.log_scale())?;
-    chart
-        .configure_mesh()
-        .x_desc("share of wrong labels")
-        .y_desc("median d_SE(3)")
-        .light_line_style(WHITE)
-        .draw()?;
+fn by_flips_from(area: &Area, trials: &Trials, start: &str) -> Result<(), AnyError> {
+    let (xs, ys) = (
+        ("share of wrong labels", -0.03..0.9),
+        ("median d_SE(3)", ERRORS.log_scale()),
+    );
+    let mut chart = chart(area, &format!("starts {}", in_words(start)), xs, ys)?;
     for method in methods() {
         let color = color(method);
         let points: Vec<(f64, Median)> = trials

@@ -1,4 +1,4 @@
-//! Table 1 and what the paper concludes from it, on many simulated trials in place of one real one.
+//! Table 1 and the conclusions of the paper, on many simulated trials in place of one real one.
 
 mod claim;
 mod figures;
@@ -11,14 +11,13 @@ use crate::simulate::house::Scene;
 
 use super::Context;
 use super::label_maps::BAD;
+use crate::AnyError;
 use crate::evaluate::{
-    Baseline, LEAST_FOR_INTERVAL, OURS, Plan, Results, Start, Trial, WRONG, median,
-    median_interval, run,
+    LEAST_FOR_INTERVAL, OURS, Plan, Results, Start, Trial, WRONG, median, median_interval, run,
 };
-use crate::paper::report::Section;
-use crate::plot::Fault;
+use crate::report::Section;
 
-/// What is compared, by its name in evaluations.
+/// Name of GICP-SE(3) in evaluations.
 const GICP: &str = "gicp_se3";
 /// Forms of Semantic-ICP: as published in 2018, class by class as published in 2017, and those pairs under the
 /// loss that the paper prints.
@@ -43,16 +42,6 @@ fn methods() -> Vec<&'static str> {
     methods
 }
 
-/// A method's name as people write it.
-fn title(method: &str) -> &'static str {
-    let all = Baseline::all();
-    let found = all.iter().find(|baseline| baseline.name == method);
-    found.map_or(OURS, |baseline| match baseline.name {
-        "semantic_hard" => "Semantic-ICP 2018",
-        _ => baseline.title,
-    })
-}
-
 /// Trials of all methods from two starts.
 struct Trials {
     all: Vec<Trial>,
@@ -63,8 +52,8 @@ struct Trials {
 }
 
 impl Trials {
-    /// Runs them; `progress` is told how much is done.
-    fn run(context: &Context, progress: &mut dyn FnMut(f64)) -> Result<Trials, Fault> {
+    /// Runs the trials; `progress` gets the share done.
+    fn run(context: &Context, progress: &mut dyn FnMut(f64)) -> Result<Trials, AnyError> {
         let names = |methods: Vec<&str>| methods.into_iter().map(str::to_owned).collect();
         let plan = Plan {
             scenes: Scene::ALL.to_vec(),
@@ -93,7 +82,7 @@ impl Trials {
                 ControlFlow::Continue(())
             };
             run(
-                &context.world,
+                &context.testbed,
                 plan,
                 &mut results,
                 context.threads,
@@ -103,9 +92,9 @@ impl Trials {
         Trials::of(results.sorted())
     }
 
-    /// Of an evaluation: the nearest start and the farthest, and the share of wrong labels nearest to
+    /// Trials of an evaluation: the nearest start and the farthest, and the share of wrong labels nearest to
     /// [`BAD`].
-    fn of(all: Vec<Trial>) -> Result<Trials, Fault> {
+    fn of(all: Vec<Trial>) -> Result<Trials, AnyError> {
         let off = |trial: &Trial| match trial.cell.start.parse() {
             Ok(Start::Off { m, .. }) => Some((m, trial.cell.start.clone())),
             _ => None,
@@ -126,7 +115,7 @@ impl Trials {
         }
     }
 
-    /// Of one method; of all scenes if `None`.
+    /// Trials of one method; of all scenes if `None`.
     fn of_method(
         &self,
         scene: Option<Scene>,
@@ -151,7 +140,7 @@ impl Trials {
         )
     }
 
-    /// How many times as large the d_SE(3) of a method is as that of GICP-SE(3) in the same trial.
+    /// The d_SE(3) of a method as a multiple of that of GICP-SE(3) in the same trial.
     fn ratio(&self, scene: Option<Scene>, q: f64, start: &str, method: &str) -> Option<Median> {
         let theirs: BTreeMap<(&str, u64), f64> = self
             .of_method(scene, q, start, GICP)
@@ -228,7 +217,7 @@ pub(super) fn sections(
     context: &Context,
     evaluated: Option<Vec<Trial>>,
     progress: &mut dyn FnMut(f64),
-) -> Result<Vec<Section>, Fault> {
+) -> Result<Vec<Section>, AnyError> {
     let trials = match evaluated {
         Some(trials) => Trials::of(trials)?,
         None => Trials::run(context, progress)?,
@@ -236,7 +225,7 @@ pub(super) fn sections(
     Ok(vec![table1::section(&trials)?, claim::section(&trials)?])
 }
 
-/// How many of the trials are right.
+/// Share of the trials that are right.
 fn right(trials: impl Iterator<Item = impl std::borrow::Borrow<Trial>>) -> crate::evaluate::Share {
     crate::evaluate::Share::of(trials.map(|trial| trial.borrow().is_within(WRONG)))
 }

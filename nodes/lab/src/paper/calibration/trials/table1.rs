@@ -2,22 +2,22 @@
 
 use crate::simulate::house::Scene;
 
-use super::{GICP, SEMANTIC, Trials, figures, in_words, methods, right, title};
-use crate::evaluate::{PRINTED, Printed};
-use crate::paper::report::{Cell, Section, Table, Verdict};
-use crate::plot::Fault;
+use super::{GICP, SEMANTIC, Trials, figures, in_words, methods, right};
+use crate::AnyError;
+use crate::evaluate::{PRINTED, Printed, title};
+use crate::report::{Cell, Section, Table, Verdict};
 
-/// What the paper prints of a scene.
+/// Printed errors of a scene.
 pub(super) fn printed(scene: Scene) -> Option<&'static Printed> {
     PRINTED.iter().find(|printed| printed.scene == scene.name())
 }
 
-/// Whether the paper finds the labels of a scene wrong (section 5, Figs. 3 and 4).
+/// True of a scene whose labels the paper finds wrong (section 5, Figs. 3 and 4).
 pub(super) fn blamed(scene: Scene) -> bool {
     matches!(scene, Scene::Tv | Scene::Bookshelf)
 }
 
-pub(super) fn section(trials: &Trials) -> Result<Section, Fault> {
+pub(super) fn section(trials: &Trials) -> Result<Section, AnyError> {
     let [good, poor] = &trials.starts;
     Ok(Section {
         id: "table1".to_owned(),
@@ -102,14 +102,14 @@ fn medians(trials: &Trials, name: &str, start: &str) -> Table {
         .into_iter()
         .flat_map(|scene| [0.0, trials.bad].map(|q| (scene, q)));
     let row = |(scene, q): (Scene, f64)| {
-        let told = printed(scene).filter(|_| labels_of(trials, scene) == q);
+        let known = printed(scene).filter(|_| labels_of(trials, scene) == q);
         let number = |value: Option<f64>| value.map_or(Cell::Empty, |v| Cell::Number(v, 2));
         let mut row = vec![
             scene.name().into(),
             format!("{:.0} %", 100.0 * q).into(),
             trials.of_method(Some(scene), q, start, GICP).count().into(),
-            number(told.map(|p| p.gicp_se3)),
-            number(told.map(|p| p.semantic_icp)),
+            number(known.map(|p| p.gicp_se3)),
+            number(known.map(|p| p.semantic_icp)),
         ];
         row.extend(methods().into_iter().map(|method| {
             let estimate = trials.d_se3(Some(scene), q, start, method);
@@ -117,18 +117,18 @@ fn medians(trials: &Trials, name: &str, start: &str) -> Table {
         }));
         row
     };
-    Table {
-        name: name.to_owned(),
-        caption: format!(
+    Table::new(
+        name,
+        format!(
             "Median d_SE(3) [95 % interval], starts {}; printed errors beside the labels that the paper tells of",
             in_words(start)
         ),
         columns,
-        rows: cells.map(row).collect(),
-    }
+        cells.map(row),
+    )
 }
 
-/// Where the printed errors are among ours.
+/// Ranks of the printed errors among ours.
 fn ranks(trials: &Trials) -> Table {
     let methods = |scene: Scene| {
         let printed = printed(scene);
@@ -158,10 +158,10 @@ fn ranks(trials: &Trials) -> Table {
         row
     };
     let [good, poor] = &trials.starts;
-    Table {
-        name: "table1_ranks".to_owned(),
-        caption: "How many of our trials are below the printed error, with labels as the paper finds them".to_owned(),
-        columns: vec![
+    Table::new(
+        "table1_ranks",
+        "How many of our trials are below the printed error, with labels as the paper finds them",
+        vec![
             "scene".to_owned(),
             "method".to_owned(),
             "wrong labels".to_owned(),
@@ -171,8 +171,8 @@ fn ranks(trials: &Trials) -> Table {
             format!("below it, {}", in_words(poor)),
             "of".to_owned(),
         ],
-        rows: Scene::ALL.into_iter().flat_map(methods).map(row).collect(),
-    }
+        Scene::ALL.into_iter().flat_map(methods).map(row),
+    )
 }
 
 /// Everything in numbers.
@@ -221,12 +221,10 @@ fn all(trials: &Trials) -> Table {
         "95 % of the share right from",
         "to",
     ];
-    Table {
-        name: "table1_all".to_owned(),
-        caption:
-            "All cells: medians with intervals by ranks, shares of right poses with those of Wilson"
-                .to_owned(),
-        columns: columns.map(str::to_owned).into(),
+    Table::new(
+        "table1_all",
+        "All cells: medians with intervals by ranks, shares of right poses with those of Wilson",
+        columns,
         rows,
-    }
+    )
 }

@@ -5,7 +5,7 @@ use nalgebra::Isometry3;
 
 use super::*;
 use crate::evaluate::Cell;
-use crate::paper::report::Verdict;
+use crate::report::Verdict;
 
 /// d_SE(3) by share of wrong labels, whether the start is good, and method.
 type Error = fn(f64, bool, &str) -> f64;
@@ -43,7 +43,7 @@ fn is_semantic(method: &str) -> bool {
     SEMANTIC.contains(&method)
 }
 
-/// As the paper says.
+/// Errors as the paper has them.
 fn as_said(q: f64, good: bool, method: &str) -> f64 {
     match (is_semantic(method), q > 0.5, good) {
         (true, true, _) => 9.0,
@@ -123,7 +123,7 @@ fn tables_have_all_cells_and_the_printed_errors_beside_their_labels() {
         let of = |row: &&Vec<_>| row[0] == scene.into() && row[1] == labels.into();
         good.rows.iter().find(of).unwrap()
     };
-    use crate::paper::report::Cell::{Empty, Number};
+    use crate::report::Cell::{Empty, Number};
     assert_eq!(row("tv", "60 %")[3..5], [Number(0.22, 2), Number(8.68, 2)]);
     assert_eq!(row("tv", "0 %")[3..5], [Empty, Empty]);
     assert_eq!(row("desk", "0 %")[3..5], [Number(5.42, 2), Number(0.05, 2)]);

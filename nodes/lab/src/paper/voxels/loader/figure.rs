@@ -2,13 +2,13 @@
 
 use lattice_core::lattice::LatticeKind;
 
-use super::{Placed, Printed, range, rms_m};
-use crate::paper::report::plot::{
-    Area, Axes, BoxStats, Fault, Layout, NamedBox, boxes_with_marks, color, svg,
-};
+use super::{Placed, Printed, rms_m};
+use crate::AnyError;
+use crate::evaluate::extent;
+use crate::report::plot::{Area, Axes, BoxStats, Layout, NamedBox, boxes_with_marks, color, svg};
 
 /// Voxels against the mean of cubic, and RMS: boxes over all places, crosses as printed.
-pub fn draw(all: &[Placed]) -> Result<String, Fault> {
+pub fn draw(all: &[Placed]) -> Result<String, AnyError> {
     let layout = Layout {
         panel: (500, 350),
         columns: 2,
@@ -42,7 +42,7 @@ fn panel(
     all: &[Placed],
     values: &dyn Fn(&Placed) -> Vec<f64>,
     mark: &dyn Fn(&Printed) -> f64,
-) -> Result<(), Fault> {
+) -> Result<(), AnyError> {
     let named = all.iter().filter_map(|placed| {
         let stats = BoxStats::of(&values(placed))?;
         let name = placed.name().to_owned();
@@ -54,7 +54,7 @@ fn panel(
         .iter()
         .flat_map(values)
         .chain(marks.iter().copied().flatten());
-    let [low, high] = range(&shown.collect::<Vec<_>>());
+    let [low, high] = extent(shown);
     let room = 0.06 * (high - low);
     let axes = Axes {
         title,

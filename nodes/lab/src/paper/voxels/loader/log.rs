@@ -6,7 +6,7 @@ use crate::simulate::{Survey, SurveyPattern};
 use lattice_core::lattice::{Lattice, LatticeKind};
 
 use super::{POINTS, VOLUME_M3};
-use crate::paper::report::plot::Fault;
+use crate::AnyError;
 use lattice_bag::BagReader;
 use lattice_nodes::enu_transformer::TransformerOptions;
 use lattice_nodes::lattice_mapper::MapperOptions;
@@ -19,7 +19,7 @@ use lattice_nodes::voxel_marker_publisher::MarkerOptions;
 pub const SPAN_S: f64 = 30.0;
 
 /// The log's points in the map as a mapper gets them, thinned evenly.
-pub fn simulated_log(seed: u64) -> Result<Vec<[f32; 3]>, Fault> {
+pub fn simulated_log(seed: u64) -> Result<Vec<[f32; 3]>, AnyError> {
     let pattern = SurveyPattern::Lms200;
     let survey = Survey::new(seed, pattern)?;
     let scans = (SPAN_S * pattern.scans_per_s()) as usize;
@@ -37,14 +37,14 @@ pub fn simulated_log(seed: u64) -> Result<Vec<[f32; 3]>, Fault> {
 }
 
 /// A whole log through the transformer and a mapper for each lattice.
-pub fn replayed(path: &Path, progress: &mut dyn FnMut(f64)) -> Result<RunReport, Fault> {
+pub fn replayed(path: &Path, progress: &mut dyn FnMut(f64)) -> Result<RunReport, AnyError> {
     let here = |e: &dyn std::fmt::Display| format!("{}: {e}", path.display());
     let bag = BagReader::open(path).map_err(|e| here(&e))?;
     let plan = replay::plan(&bag, &TopicWishes::default()).map_err(|e| here(&e))?;
     let maps: Vec<MapperOptions> = LatticeKind::ALL
         .into_iter()
         .map(|kind| Ok(MapperOptions::new(Lattice::new(kind, VOLUME_M3)?)))
-        .collect::<Result<_, Fault>>()?;
+        .collect::<Result<_, AnyError>>()?;
     let transformer = TransformerOptions::new(plan.source);
     let mut pipeline = Pipeline::new(transformer, maps, &MarkerOptions::default())?;
     let run = replay::run(&bag, &plan, &mut pipeline, "", progress);

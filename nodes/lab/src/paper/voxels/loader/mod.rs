@@ -9,11 +9,14 @@ use nalgebra::{Isometry3, Translation3, UnitQuaternion, Vector3};
 
 use super::Options;
 use super::rotations::{Quantized, quantized};
+use crate::AnyError;
+use crate::evaluate::extent;
 use crate::paper::estimate::Estimate;
 use crate::paper::parallel::in_parallel;
-use crate::paper::report::plot::{Fault, title};
-use crate::paper::report::{Check, Figure, Section, Verdict};
 use crate::paper::streams::{Purpose, stream};
+use crate::report::plot::title;
+use crate::report::{Check, Figure, Section, Verdict};
+use crate::theory::{mean_distance_m, second_moment};
 use figure::draw;
 use log::{SPAN_S, replayed, simulated_log};
 use tables::{compared, of_log, theory};
@@ -21,7 +24,7 @@ use tables::{compared, of_log, theory};
 /// Points of the log, and the volume of a cell, as in the paper.
 const POINTS: usize = 19_399;
 const VOLUME_M3: f64 = 0.125;
-/// How far a mean over all places of the lattice may be from theory, of itself: full and quick.
+/// Allowed error of a mean over all places of the lattice, as a share of theory: full and quick.
 const TOLERANCES: [f64; 2] = [0.002, 0.01];
 /// Half of the last printed digit.
 const DIGIT: f64 = 0.5e-4;
@@ -78,7 +81,7 @@ impl Placed {
 
     /// Mean squared error by dimension of evenly spread points, m^2.
     fn mse_of_theory(&self) -> f64 {
-        self.lattice.second_moment() * self.lattice.cell_side_m().powi(2)
+        second_moment(&self.lattice) * self.lattice.cell_side_m().powi(2)
     }
 }
 
@@ -86,16 +89,7 @@ fn rms_m(q: &Quantized) -> f64 {
     (3.0 * q.mse_m2).sqrt()
 }
 
-/// Least and greatest.
-fn range(values: &[f64]) -> [f64; 2] {
-    let low = values.iter().copied().fold(f64::INFINITY, f64::min);
-    [
-        low,
-        values.iter().copied().fold(f64::NEG_INFINITY, f64::max),
-    ]
-}
-
-pub fn section(options: &Options, progress: &mut dyn FnMut(f64)) -> Result<Section, Fault> {
+pub fn section(options: &Options, progress: &mut dyn FnMut(f64)) -> Result<Section, AnyError> {
     let bags = options.bags.len() as f64;
     let share = 1.0 / (1.0 + bags);
     let points = simulated_log(options.seed)?;
@@ -139,16 +133,12 @@ pub fn section(options: &Options, progress: &mut dyn FnMut(f64)) -> Result<Secti
         ),
         checks: checks(&all, TOLERANCES[usize::from(options.quick)]),
         tables,
-        figures: vec![Figure {
-            name: "table1".into(),
-            caption: format!(
+        figures: vec![Figure::new("table1", format!(
                 "{POINTS} points of {SPAN_S} s of a simulated loader's log, {} places of each lattice: voxels against cubic (left) and RMS \
                  (right). Boxes hold half of the places, whiskers reach 1.5 interquartile ranges. Crosses: Table I as \
                  printed, of the authors' log.",
                 side * side * side
-            ),
-            svg: draw(&all)?,
-        }],
+            ), draw(&all)?)],
     })
 }
 
@@ -167,16 +157,18 @@ fn checks(all: &[Placed], tolerance: f64) -> Vec<Check> {
     for row in &TABLE {
         // Both columns are rounded.
         let root = (3.0 * row.mse).sqrt();
-        checks.push(Check {
-            name: format!(
-                "{}: printed distance error is √(3 MSE) as printed (m)",
-                title(row.kind)
-            ),
-            printed: Some(row.distance_error),
-            expected: row.distance_error,
-            found: root,
-            tolerance: DIGIT + 1.5 * DIGIT / root,
-        });
+        checks.push(
+            Check::new(
+                format!(
+                    "{}: printed distance error is √(3 MSE) as printed (m)",
+                    title(row.kind)
+                ),
+                row.distance_error,
+                root,
+                DIGIT + 1.5 * DIGIT / root,
+            )
+            .with_printed(Some(row.distance_error)),
+        );
     }
     for placed in all {
         let name = placed.name();
@@ -189,17 +181,16 @@ fn checks(all: &[Placed], tolerance: f64) -> Vec<Check> {
             ),
             (
                 "mean distance over all places (m)",
-                placed.lattice.mean_distance_m([0; 3]),
+                mean_distance_m(&placed.lattice, [0; 3]),
                 placed.mean(|q| q.mean_m),
             ),
         ] {
-            checks.push(Check {
-                name: format!("{name}: {what}"),
-                printed: None,
+            checks.push(Check::new(
+                format!("{name}: {what}"),
                 expected,
-                found: found.mean,
-                tolerance: tolerance * expected,
-            });
+                found.mean,
+                tolerance * expected,
+            ));
         }
     }
     let voxels = |kind| {
@@ -242,16 +233,16 @@ fn finding(all: &[Placed]) -> String {
         };
         counts.iter().map(of).collect()
     };
-    let [low, high] = cubic.map_or([f64::NAN; 2], |placed| range(&placed.each(rms_m)));
+    let [low, high] = cubic.map_or([f64::NAN; 2], |placed| extent(placed.each(rms_m)));
     let less = all.iter().map(|placed| {
         let rms_m = (3.0 * placed.mse_of_theory()).sqrt();
-        100.0 * (1.0 - placed.lattice.mean_distance_m([0; 3]) / rms_m)
+        100.0 * (1.0 - mean_distance_m(&placed.lattice, [0; 3]) / rms_m)
     });
-    let [least, most] = range(&less.collect::<Vec<_>>());
+    let [least, most] = extent(less);
     let within: Vec<&str> = all
         .iter()
         .filter(|placed| {
-            let [low, high] = range(&placed.each(rms_m));
+            let [low, high] = extent(placed.each(rms_m));
             let printed = placed.printed.map_or(f64::NAN, |row| row.distance_error);
             (low..=high).contains(&printed)
         })
@@ -294,7 +285,7 @@ mod tests {
                 quantized(&[[3.1, -0.2, 7.7]], &lattice, pose).mse_m2
             });
             let mean = each.sum::<f64>() / 512.0;
-            let theory = lattice.second_moment() * 0.25;
+            let theory = second_moment(&lattice) * 0.25;
             assert!(
                 (mean / theory - 1.0).abs() < 0.03,
                 "{kind}: {mean}, not {theory}"

@@ -4,12 +4,14 @@ use std::path::Path;
 
 use lattice_core::lattice::LatticeKind;
 
-use super::{POINTS, Placed, Printed, VOLUME_M3, range, rms_m};
-use crate::paper::report::plot::title;
-use crate::paper::report::{Cell, Table};
+use super::{POINTS, Placed, Printed, VOLUME_M3, rms_m};
+use crate::evaluate::extent;
+use crate::report::plot::title;
+use crate::report::{Cell, Table};
+use crate::theory::mean_distance_m;
 use lattice_nodes::replay::RunReport;
 
-/// As printed and as simulated.
+/// Table I as printed and as simulated.
 pub fn compared(all: &[Placed]) -> Table {
     let columns = [
         "lattice",
@@ -41,8 +43,8 @@ pub fn compared(all: &[Placed]) -> Table {
             placed.printed.map_or(Cell::Empty, cell)
         };
         let voxels = placed.voxels();
-        let [least, most] = range(&placed.each(|q| q.voxels as f64));
-        let [low, high] = range(&placed.each(rms_m));
+        let [least, most] = extent(placed.each(|q| q.voxels as f64));
+        let [low, high] = extent(placed.each(rms_m));
         let to_cubic = placed.printed.map_or(Cell::Empty, |row| {
             Cell::Number(100.0 * (row.voxels / cubic_printed - 1.0), 1)
         });
@@ -64,18 +66,18 @@ pub fn compared(all: &[Placed]) -> Table {
             Cell::Number(high, 4),
         ]
     };
-    Table {
-        name: "table1".into(),
-        caption: format!(
+    Table::new(
+        "table1",
+        format!(
             "Table I as printed and {POINTS} points of a simulated loader's log in cells of {VOLUME_M3} m³: mean over all \
              places of the lattice with 95 % interval, least and most of any place"
         ),
-        columns: columns.map(String::from).into(),
-        rows: all.iter().map(row).collect(),
-    }
+        columns,
+        all.iter().map(row),
+    )
 }
 
-/// As printed and as theory has it.
+/// Table I as printed and as theory has it.
 pub fn theory(all: &[Placed]) -> Table {
     let columns = [
         "lattice",
@@ -92,7 +94,7 @@ pub fn theory(all: &[Placed]) -> Table {
         let mut row = vec![
             placed.name().into(),
             Cell::Number(mse, 6),
-            Cell::Number(placed.lattice.mean_distance_m([0; 3]), 5),
+            Cell::Number(mean_distance_m(&placed.lattice, [0; 3]), 5),
             Cell::Number((3.0 * mse).sqrt(), 5),
         ];
         row.extend(match placed.printed {
@@ -106,14 +108,12 @@ pub fn theory(all: &[Placed]) -> Table {
         });
         row
     };
-    Table {
-        name: "table1_theory".into(),
-        caption: format!(
-            "Table I against theory for evenly spread points, cells of {VOLUME_M3} m³"
-        ),
-        columns: columns.map(String::from).into(),
-        rows: all.iter().map(row).collect(),
-    }
+    Table::new(
+        "table1_theory",
+        format!("Table I against theory for evenly spread points, cells of {VOLUME_M3} m³"),
+        columns,
+        all.iter().map(row),
+    )
 }
 
 /// A log that was given.
@@ -147,10 +147,10 @@ pub fn of_log(run: &RunReport, path: &Path, number: usize) -> Table {
         ]
     });
     let name = path.file_name().unwrap_or_default().to_string_lossy();
-    Table {
-        name: format!("table1_log{}", number + 1),
-        caption: format!("The log {name} in cells of {VOLUME_M3} m³"),
-        columns: columns.map(String::from).into(),
-        rows: rows.collect(),
-    }
+    Table::new(
+        format!("table1_log{}", number + 1),
+        format!("The log {name} in cells of {VOLUME_M3} m³"),
+        columns,
+        rows,
+    )
 }

@@ -4,7 +4,7 @@ use super::trials::Trials;
 use crate::evaluate::quantile;
 use crate::paper::streams::{Purpose, stream};
 
-/// What of the errors is compared.
+/// Quantiles of the errors that are compared.
 pub(super) const SHARES: [f64; 2] = [0.5, 0.95];
 /// The lattice that others are compared with: cubic.
 const CUBIC: usize = 0;
@@ -36,7 +36,7 @@ pub(super) struct Quantiles {
 }
 
 impl Quantiles {
-    /// Of scene `number`, by `resamples`.
+    /// Quantiles of scene `number`, with so many resamples.
     pub(super) fn of(trials: &Trials, seed: u64, number: usize, resamples: usize) -> Quantiles {
         let errors = [0, 1, 2, 3, 4, 5].map(|lattice| trials.errors_m(lattice));
         let n = errors.first().map_or(0, Vec::len);
@@ -76,7 +76,7 @@ fn quantiles(errors: &[Vec<f64>; 6], places: &[usize]) -> [[f64; 6]; 2] {
     found
 }
 
-/// By how much a quantile of a lattice differs from that of cubic, %: the mean (of logarithms) over
+/// Change of a quantile of a lattice against that of cubic, %: the mean (of logarithms) over
 /// scenes, which are independent of each other.
 pub(super) fn change(scenes: &[&Quantiles], share: usize, lattice: usize) -> Estimate {
     let ratio = |q: &[[f64; 6]; 2]| (q[share][lattice] / q[share][CUBIC]).ln();

@@ -5,8 +5,9 @@ use plotters::prelude::*;
 
 use super::Played;
 use super::compare::{Estimate, change};
-use crate::paper::report::plot::{
-    Area, Axes, BoxStats, Fault, LABELS, Layout, NamedBox, boxes, color, svg, title,
+use crate::AnyError;
+use crate::report::plot::{
+    Area, Axes, BoxStats, LABELS, Layout, NamedBox, boxes, color, svg, title,
 };
 
 /// Changes up to this are shown, %.
@@ -25,7 +26,7 @@ fn layout(panels: usize) -> Layout<'static> {
 }
 
 /// Box plots of the errors, a panel a scene.
-pub(super) fn boxes_of(played: &[Played]) -> Result<String, Fault> {
+pub(super) fn boxes_of(played: &[Played]) -> Result<String, AnyError> {
     svg(&layout(played.len()), |areas| {
         for (area, Played { scene, trials, .. }) in areas.iter().zip(played) {
             let mut named: Vec<NamedBox> = Vec::new();
@@ -50,7 +51,7 @@ pub(super) fn boxes_of(played: &[Played]) -> Result<String, Fault> {
 }
 
 /// Changes against cubic with their intervals, a panel a scene.
-pub(super) fn changes_of(played: &[Played]) -> Result<String, Fault> {
+pub(super) fn changes_of(played: &[Played]) -> Result<String, AnyError> {
     svg(&layout(played.len()), |areas| {
         for (area, one) in areas.iter().zip(played) {
             panel(area, one)?;
@@ -59,7 +60,7 @@ pub(super) fn changes_of(played: &[Played]) -> Result<String, Fault> {
     })
 }
 
-fn panel(area: &Area, played: &Played) -> Result<(), Fault> {
+fn panel(area: &Area, played: &Played) -> Result<(), AnyError> {
     let others = || LatticeKind::ALL.into_iter().enumerate().skip(1);
     let name = |x: &f64| {
         let near = others().find(|(lattice, _)| (x - *lattice as f64).abs() < 1e-6);

@@ -1,7 +1,7 @@
-//! What the trials say of the claim.
+//! The verdict of the trials on the claim.
 
 use super::{BCC, BEST_HEX, FCC, Group, HEX, MCC, SHARE_NAMES, name};
-use crate::paper::report::{Check, Verdict};
+use crate::report::{Check, Verdict};
 
 /// Change of median and 95th percentile against cubic, %, in simulated rooms of another program with the
 /// same settings and 300 to 400 trials each; by lattice.
@@ -14,7 +14,7 @@ pub(super) const ELSEWHERE: [[f64; 2]; 6] = [
     [-18.3, -17.6],
 ];
 
-/// What the groups show, rooms first.
+/// Finding of the groups, rooms first.
 pub(super) fn finding(groups: &[(&str, Group)], trials: usize, doubt_m: Option<f64>) -> String {
     let mut words = format!(
         "{trials} alignments a lattice and setting, each from a random start and with a random heading and \
@@ -85,14 +85,15 @@ pub(super) fn verdict(groups: &[(&str, Group)]) -> Verdict {
     Verdict::Corrected(why.join("; "))
 }
 
-/// That lattices gain as they did elsewhere, and BCC as much more than FCC.
+/// Checks that lattices gain as they did elsewhere, and BCC as much more than FCC.
 pub(super) fn checks(rooms: &Group) -> Vec<Check> {
-    let check = |what: &str, share: usize, elsewhere: f64, found: f64| Check {
-        name: format!("{what} of the {} in rooms", SHARE_NAMES[share]),
-        printed: None,
-        expected: elsewhere.signum(),
-        found: found.signum(),
-        tolerance: 0.0,
+    let check = |what: &str, share: usize, elsewhere: f64, found: f64| {
+        Check::new(
+            format!("{what} of the {} in rooms", SHARE_NAMES[share]),
+            elsewhere.signum(),
+            found.signum(),
+            0.0,
+        )
     };
     let found = |lattice: usize, share: usize| rooms.change[share][lattice].value;
     let sign = |lattice: usize, share: usize| {

@@ -9,8 +9,9 @@ mod trials;
 use lattice_core::lattice::LatticeKind;
 
 use super::Options;
-use crate::paper::report::plot::{Fault, title};
-use crate::paper::report::{Cell, Figure, Section, Table};
+use crate::AnyError;
+use crate::report::plot::title;
+use crate::report::{Cell, Figure, Section, Table};
 use compare::{Estimate, Quantiles, SHARES, change};
 use judge::{ELSEWHERE, checks, finding, verdict};
 use scenes::{OFFICE, ROOMS, STREET, Scene, Source, scenes};
@@ -29,14 +30,14 @@ const MCC: usize = 3;
 const HEX: usize = 4;
 const BEST_HEX: usize = 5;
 
-/// A scene with what happened in it.
+/// A scene with its trials.
 struct Played {
     scene: Scene,
     trials: Trials,
     quantiles: Quantiles,
 }
 
-pub fn section(options: &Options, progress: &mut dyn FnMut(f64)) -> Result<Section, Fault> {
+pub fn section(options: &Options, progress: &mut dyn FnMut(f64)) -> Result<Section, AnyError> {
     let pick = |(full, quick): (usize, usize)| if options.quick { quick } else { full };
     let (sources, scenes) = scenes(options.seed, options.pairs.as_deref())?;
     let all = scenes.len() as f64;
@@ -77,23 +78,14 @@ pub fn section(options: &Options, progress: &mut dyn FnMut(f64)) -> Result<Secti
         },
         tables: vec![errors_table(&played), change_table(&played, &groups)],
         figures: vec![
-            Figure {
-                name: "fig6".into(),
-                caption: format!(
+            Figure::new("fig6", format!(
                     "Position errors of {} alignments a box. Whiskers: the last value within 1.5 \
                      interquartile ranges; dots: beyond; dark band: 95 % interval of the median. All lattices \
                      of a panel have the same scans, starts, and orientations.",
                     pick(TRIALS)
-                ),
-                svg: draw::boxes_of(&played)?,
-            },
-            Figure {
-                name: "fig6_change".into(),
-                caption: "Change of the error against cubic with 95 % intervals (paired bootstrap). Full: \
-                          median. Hollow: 95th percentile. Below 0 is better than cubic. A bar that reaches the border goes on."
-                    .into(),
-                svg: draw::changes_of(&played)?,
-            },
+                ), draw::boxes_of(&played)?),
+            Figure::new("fig6_change", "Change of the error against cubic with 95 % intervals (paired bootstrap). Full: \
+                          median. Hollow: 95th percentile. Below 0 is better than cubic. A bar that reaches the border goes on.", draw::changes_of(&played)?),
         ],
     })
 }
@@ -130,20 +122,20 @@ impl Group {
         shares.map(one).collect::<Vec<_>>().join(", ")
     }
 
-    /// Whether both shares are below cubic, and whether one of them is so with all of its interval.
+    /// True if both shares are below cubic, and true if one of them is so with all of its interval.
     fn better(&self, lattice: usize) -> (bool, bool) {
         let below = self.change.iter().all(|of| of[lattice].value < 0.0);
         let surely = self.change.iter().any(|of| of[lattice].high < 0.0);
         (below, below && surely)
     }
 
-    /// Whether no interval of a lattice leaves out 0.
+    /// True if no interval of a lattice leaves out 0.
     fn as_cubic(&self, lattice: usize) -> bool {
         let both = |e: &Estimate| e.low <= 0.0 && e.high >= 0.0;
         self.change.iter().all(|of| both(&of[lattice]))
     }
 
-    /// Whether a lattice has no larger error than FCC in either share.
+    /// True if a lattice has no larger error than FCC in either share.
     fn at_least_fcc(&self, lattice: usize) -> bool {
         let no_worse = |of: &[Estimate; 6]| of[lattice].value <= of[FCC].value;
         self.change.iter().all(no_worse)
@@ -205,12 +197,12 @@ fn errors_table(played: &[Played]) -> Table {
         "over one cell side",
         "poses tried",
     ];
-    Table {
-        name: "fig6".into(),
-        caption: "Position errors of the aligned scans; poses tried: on average".into(),
-        columns: columns.map(String::from).into(),
+    Table::new(
+        "fig6",
+        "Position errors of the aligned scans; poses tried: on average",
+        columns,
         rows,
-    }
+    )
 }
 
 fn change_table(played: &[Played], groups: &[(&str, Group)]) -> Table {
@@ -249,10 +241,10 @@ fn change_table(played: &[Played], groups: &[(&str, Group)]) -> Table {
         "in another simulation",
         "poses tried (%)",
     ];
-    Table {
-        name: "fig6_change".into(),
-        caption: "Change against cubic in the same trials; several settings: geometric mean".into(),
-        columns: columns.map(String::from).into(),
+    Table::new(
+        "fig6_change",
+        "Change against cubic in the same trials; several settings: geometric mean",
+        columns,
         rows,
-    }
+    )
 }

@@ -1,4 +1,4 @@
-//! What is matched: scans of a simulated house, and pairs of files.
+//! Scans that are matched: of a simulated house, and pairs of files.
 
 use std::path::Path;
 
@@ -12,7 +12,7 @@ use lattice_core::registration::{
 };
 use nalgebra::{Isometry3, Matrix3, Rotation3, Translation3, UnitQuaternion, Vector3};
 
-use crate::paper::report::plot::Fault;
+use crate::AnyError;
 use lattice_nodes::files::points::{PointFileLimits, read_points};
 
 /// Pairs of stands all over the house.
@@ -20,7 +20,7 @@ const STANDS: usize = 12;
 /// Most bytes of the lists of a trial.
 pub(super) const MAX_BYTES: usize = 1 << 28;
 
-/// Where scans come from.
+/// Source of scans.
 pub(super) enum Source {
     /// Views of the house, each trial with range noise of its own.
     Simulated(Vec<[LaserView; 2]>),
@@ -65,7 +65,7 @@ impl Source {
         }
     }
 
-    /// How far our own truth may be off, metres, if it is ours.
+    /// Doubt about our own truth, metres, if it is ours.
     pub(super) fn doubt_m(&self) -> Option<f64> {
         match self {
             Source::Simulated(_) => None,
@@ -78,7 +78,7 @@ impl Source {
 pub(super) struct Scene {
     /// "simulated rooms".
     pub(super) place: &'static str,
-    /// Which source.
+    /// Number of the source.
     pub(super) source: usize,
     /// Side of a cube of the finest cell's volume, metres.
     pub(super) side_m: f64,
@@ -107,8 +107,11 @@ pub(super) const STREET: &str = "street (small_gicp)";
 pub(super) const OFFICE: &str = "room (PCL)";
 
 /// All scenes, and what they are made of.
-pub(super) fn scenes(seed: u64, pairs: Option<&Path>) -> Result<(Vec<Source>, Vec<Scene>), Fault> {
-    let house = House::own(seed)?;
+pub(super) fn scenes(
+    seed: u64,
+    pairs: Option<&Path>,
+) -> Result<(Vec<Source>, Vec<Scene>), AnyError> {
+    let house = House::generated(seed)?;
     let views = LaserView::pairs(&house, STANDS, &LaserOptions::default(), seed)?;
     let mut sources = vec![Source::Simulated(views)];
     let mut scenes = Vec::new();
@@ -156,7 +159,7 @@ pub(super) fn scenes(seed: u64, pairs: Option<&Path>) -> Result<(Vec<Source>, Ve
     Ok((sources, scenes))
 }
 
-fn points(path: &Path) -> Result<Vec<[f32; 3]>, Fault> {
+fn points(path: &Path) -> Result<Vec<[f32; 3]>, AnyError> {
     let file = read_points(path, &PointFileLimits::default());
     let file = file.map_err(|e| format!("{}: {e}", path.display()))?;
     let narrow = |p: &[f64; 3]| p.map(|x| x as f32);
@@ -164,7 +167,7 @@ fn points(path: &Path) -> Result<Vec<[f32; 3]>, Fault> {
 }
 
 /// A transform from a file of 16 numbers, row by row.
-fn pose(path: &Path) -> Result<Isometry3<f64>, Fault> {
+fn pose(path: &Path) -> Result<Isometry3<f64>, AnyError> {
     let wrong = |why: &str| format!("{}: {why}", path.display());
     let text = std::fs::read_to_string(path).map_err(|e| wrong(&e.to_string()))?;
     parse_pose(&text).ok_or_else(|| wrong("is not a rigid transform of 4 x 4 numbers").into())
@@ -185,8 +188,8 @@ fn parse_pose(text: &str) -> Option<Isometry3<f64>> {
     })
 }
 
-/// Where a scan lies that comes without a pose: by our search for a heading and a place, then by GICP.
-fn registered(map: &[[f32; 3]], scan: &[[f32; 3]]) -> Result<Isometry3<f64>, Fault> {
+/// Pose of a scan that comes without one: by our search for a heading and a place, then by GICP.
+fn registered(map: &[[f32; 3]], scan: &[[f32; 3]]) -> Result<Isometry3<f64>, AnyError> {
     let cloud = |points: &[[f32; 3]]| Cloud {
         stamp_ns: 0,
         datum_m: Vector3::zeros(),

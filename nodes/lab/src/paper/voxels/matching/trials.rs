@@ -1,4 +1,4 @@
-//! One scan as a map, one to align, a lattice that lies anyhow, and a start that is off.
+//! Trials of scan matching: one scan as a map, one to align, a random lattice pose and a random start.
 
 use std::f64::consts::TAU;
 
@@ -8,8 +8,8 @@ use lattice_core::lattice::{Lattice, LatticeKind};
 use nalgebra::{Isometry3, Translation3, UnitQuaternion, Vector3};
 
 use super::scenes::{MAX_BYTES, Scene, Source};
+use crate::AnyError;
 use crate::paper::parallel::in_parallel;
-use crate::paper::report::plot::Fault;
 use crate::paper::streams::{Purpose, stream};
 
 /// Levels of a list: cells of one, two and four sides.
@@ -23,7 +23,7 @@ const OFFSET_M: f64 = 10.0;
 /// Numbers of streams apart for each scene.
 const SCENE: usize = 1 << 32;
 
-/// How an alignment ended.
+/// Outcome of an alignment.
 #[derive(Clone, Copy, PartialEq, Debug)]
 pub(super) struct Outcome {
     /// Distance from the true position of the scanner, metres.
@@ -32,7 +32,7 @@ pub(super) struct Outcome {
     pub(super) evaluations: usize,
 }
 
-/// What happened in a scene, by trial for each lattice of [`LatticeKind::ALL`].
+/// Outcomes in a scene, by trial for each lattice of [`LatticeKind::ALL`].
 pub(super) struct Trials {
     pub(super) by_lattice: [Vec<Outcome>; 6],
 }
@@ -60,7 +60,7 @@ pub(super) fn run(
     seed: u64,
     n: usize,
     progress: &mut dyn FnMut(f64),
-) -> Result<Trials, Fault> {
+) -> Result<Trials, AnyError> {
     let trial = |i: usize| trial(scene, number, source, seed, i);
     let mut trials = Trials {
         by_lattice: [(); 6].map(|()| Vec::with_capacity(n)),
@@ -79,7 +79,7 @@ fn trial(
     source: &Source,
     seed: u64,
     i: usize,
-) -> Result<[Outcome; 6], Fault> {
+) -> Result<[Outcome; 6], AnyError> {
     let pair = source.pair(seed, number, i).ok_or("there are no scans")?;
     let mut stream = stream(seed, Purpose::Matching, number * SCENE + i);
     let yaw = UnitQuaternion::from_axis_angle(&Vector3::z_axis(), TAU * stream.uniform());
@@ -135,9 +135,8 @@ mod tests {
         let (sources, scenes) = scenes(2, None).unwrap();
         let scene = &scenes[1];
         let on = |threads: usize| {
-            let pool = rayon::ThreadPoolBuilder::new().num_threads(threads);
             let go = || run(scene, 1, &sources[0], 2, 6, &mut |_| {}).unwrap();
-            pool.build().unwrap().install(go)
+            crate::pool(threads).unwrap().install(go)
         };
         let (one, two) = (on(1), on(2));
         for (lattice, kind) in LatticeKind::ALL.into_iter().enumerate() {

@@ -1,4 +1,4 @@
-//! Fig. 4: how far the points of the own and of adjacent cells are.
+//! Fig. 4: distances of the points of the own and of adjacent cells.
 
 mod spread;
 
@@ -8,14 +8,15 @@ use lattice_core::lattice::LatticeKind;
 
 use super::Options;
 use super::sample::Samples;
-use crate::paper::report::plot::{Axes, Fault, Layout, curves, key, svg, title};
-use crate::paper::report::{Cell, Check, Figure, Section, Table, Verdict};
+use crate::AnyError;
+use crate::report::plot::{Axes, Layout, curves, key, svg, title};
+use crate::report::{Cell, Check, Figure, Section, Table, Verdict};
 use spread::{Cells, Spread};
 
-/// How far a figure may be off, of itself, and half of its last digit.
+/// Allowed error of a figure: a share of it, and half of its last digit.
 const TOLERANCE: f64 = 0.002;
 const DIGIT: f64 = 0.5e-4;
-/// How far a change may be off, %: what its two figures may, and half of its last digit.
+/// Allowed error of a change, %: that of its two figures, and half of its last digit.
 const CHANGE_TOLERANCE: f64 = 0.25;
 
 /// A set and what is known of it: number of cells, mean, standard deviation, nearest and farthest.
@@ -41,7 +42,7 @@ const KNOWN: [Known; 16] = [
     (LatticeKind::Hex, Cells::Touching, 20, [1.3680, 0.3362, 0.4163, 2.1899]),
 ];
 
-pub fn section(options: &Options, progress: &mut dyn FnMut(f64)) -> Result<Section, Fault> {
+pub fn section(options: &Options, progress: &mut dyn FnMut(f64)) -> Result<Section, AnyError> {
     let samples = Samples::new(options);
     let mut spreads = Vec::new();
     let mut checks = Vec::new();
@@ -112,30 +113,15 @@ pub fn section(options: &Options, progress: &mut dyn FnMut(f64)) -> Result<Secti
         )),
         checks,
         tables: vec![
-            Table {
-                name: "fig4_compared".into(),
-                caption: "Spread of the distances of adjacent cells against cubic, with 95 % intervals".into(),
-                columns: compared.map(String::from).into(),
-                rows: changes.iter().map(Change::row).collect(),
-            },
-            Table {
-                name: "fig4".into(),
-                caption: format!(
+            Table::new("fig4_compared", "Spread of the distances of adjacent cells against cubic, with 95 % intervals", compared, changes.iter().map(Change::row)),
+            Table::new("fig4", format!(
                     "Distances from a lattice point, cell sides: exact, and of {} random points in each cell with \
                      95 % intervals",
                     samples.points()
-                ),
-                columns: columns.map(String::from).into(),
-                rows: spreads.iter().map(Spread::row).collect(),
-            },
+                ), columns, spreads.iter().map(Spread::row)),
         ],
-        figures: vec![Figure {
-            name: "fig4".into(),
-            caption: "Density of the distance of points from a lattice point, unit volume. Left peaks: own cell. Right: \
-                      adjacent cells; the sets of the paper (left panel) and all touching cells (right panel)."
-                .into(),
-            svg: draw(&spreads)?,
-        }],
+        figures: vec![Figure::new("fig4", "Density of the distance of points from a lattice point, unit volume. Left peaks: own cell. Right: \
+                      adjacent cells; the sets of the paper (left panel) and all touching cells (right panel).", draw(&spreads)?)],
     })
 }
 
@@ -181,10 +167,10 @@ const COMPARISONS: [Comparison; 4] = [
     },
 ];
 
-/// How the spread of one set differs from that of another, %.
+/// Change of the spread of one set against that of another, %.
 struct Change {
     name: &'static str,
-    /// Of the standard deviation, from random points, and half of its 95 % interval.
+    /// Change of the standard deviation, from random points, and half of its 95 % interval.
     std: f64,
     half: f64,
     exact_std: f64,
@@ -192,7 +178,7 @@ struct Change {
 }
 
 impl Change {
-    fn new(spreads: &[Spread], comparison: &Comparison) -> Result<Change, Fault> {
+    fn new(spreads: &[Spread], comparison: &Comparison) -> Result<Change, AnyError> {
         let find = |(kind, cells)| {
             let mut spreads = spreads.iter();
             let found = spreads.find(|spread| spread.kind == kind && spread.cells == cells);
@@ -213,12 +199,14 @@ impl Change {
     fn checks(&self, comparison: &Comparison) -> [Check; 3] {
         let [std, range] = comparison.known;
         let printed = comparison.printed;
-        let check = |what: &str, printed: Option<f64>, expected: f64, found: f64| Check {
-            name: format!("{}: {what} (%)", self.name),
-            printed,
-            expected,
-            found,
-            tolerance: CHANGE_TOLERANCE,
+        let check = |what: &str, printed: Option<f64>, expected: f64, found: f64| {
+            Check::new(
+                format!("{}: {what} (%)", self.name),
+                expected,
+                found,
+                CHANGE_TOLERANCE,
+            )
+            .with_printed(printed)
         };
         [
             check("std, random points", printed.map(|p| p[0]), std, self.std),
@@ -242,13 +230,8 @@ impl Change {
 fn against(spread: &Spread, known: &Known) -> Vec<Check> {
     let (_, _, n, [mean, std, nearest, farthest]) = *known;
     let name = format!("{}, {}", title(spread.kind), spread.cells.name());
-    let number = Check {
-        name: format!("{name}: cells"),
-        printed: (spread.cells == Cells::Printed).then_some(n as f64),
-        expected: n as f64,
-        found: spread.n as f64,
-        tolerance: 0.0,
-    };
+    let number = Check::new(format!("{name}: cells"), n as f64, spread.n as f64, 0.0)
+        .with_printed((spread.cells == Cells::Printed).then_some(n as f64));
     let figures = [
         ("mean, random points", mean, spread.mean.mean),
         ("mean, exact", mean, spread.exact_mean),
@@ -257,17 +240,18 @@ fn against(spread: &Spread, known: &Known) -> Vec<Check> {
         ("nearest", nearest, spread.nearest),
         ("farthest", farthest, spread.farthest),
     ];
-    let figures = figures.map(|(what, expected, found)| Check {
-        name: format!("{name}: {what}"),
-        printed: None,
-        expected,
-        found,
-        tolerance: TOLERANCE * expected + DIGIT,
+    let figures = figures.map(|(what, expected, found)| {
+        Check::new(
+            format!("{name}: {what}"),
+            expected,
+            found,
+            TOLERANCE * expected + DIGIT,
+        )
     });
     iter::once(number).chain(figures).collect()
 }
 
-fn draw(spreads: &[Spread]) -> Result<String, Fault> {
+fn draw(spreads: &[Spread]) -> Result<String, AnyError> {
     let layout = Layout {
         panel: (500, 380),
         columns: 2,

@@ -3,14 +3,16 @@
 use crate::printed::printed_delta;
 use lattice_core::lattice::{Lattice, LatticeIndex, LatticeKind};
 
+use crate::AnyError;
 use crate::paper::estimate::Estimate;
 use crate::paper::parallel::in_parallel;
-use crate::paper::report::Cell;
-use crate::paper::report::plot::{Curve, Fault, color, title};
 use crate::paper::voxels::sample::Samples;
 use crate::paper::voxels::unit;
+use crate::report::Cell;
+use crate::report::plot::{Curve, color, title};
+use crate::theory::{mean_distance_m, second_moment};
 
-/// Of the curves, cell sides.
+/// Bins of the curves, cell sides.
 const BIN: f64 = 0.02;
 const BINS: usize = 140;
 
@@ -18,7 +20,7 @@ const BINS: usize = 140;
 #[derive(Clone, Copy, PartialEq, Eq, Debug)]
 pub enum Cells {
     Own,
-    /// As printed in eq. (3)-(7), without 0.
+    /// Cells printed in eq. (3)-(7), without 0.
     Printed,
     Faces,
     Touching,
@@ -68,7 +70,7 @@ impl Spread {
         samples: &Samples,
         seed: u64,
         progress: &mut dyn FnMut(f64),
-    ) -> Result<Spread, Fault> {
+    ) -> Result<Spread, AnyError> {
         let lattice = unit(kind)?;
         let set = cells.of(&lattice);
         let centers: Vec<_> = set.iter().map(|&w| lattice.center(w)).collect();
@@ -97,9 +99,13 @@ impl Spread {
         }
         // Of all cells together: mean distances, and squares by the law of the parallel axis.
         let n = set.len() as f64;
-        let exact_mean = set.iter().map(|&w| lattice.mean_distance_m(w)).sum::<f64>() / n;
+        let exact_mean = set
+            .iter()
+            .map(|&w| mean_distance_m(&lattice, w))
+            .sum::<f64>()
+            / n;
         let of_centers = centers.iter().map(|c| c.norm_squared()).sum::<f64>() / n;
-        let square = 3.0 * lattice.second_moment() + of_centers;
+        let square = 3.0 * second_moment(&lattice) + of_centers;
         let corners = lattice.cell().vertices.iter();
         let far = corners.flat_map(|v| centers.iter().map(move |c| (v + c).norm()));
         Ok(Spread {
@@ -110,7 +116,7 @@ impl Spread {
             std: Estimate::of(draws.iter().map(|draw| draw.1)),
             exact_mean,
             exact_std: (square - exact_mean * exact_mean).sqrt(),
-            // The nearest point is in the midst of a face.
+            // The nearest point is in the middle of a face.
             nearest: match cells {
                 Cells::Own => 0.0,
                 _ => lattice.packing_radius_m(),

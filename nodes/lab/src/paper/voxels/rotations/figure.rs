@@ -2,13 +2,15 @@
 
 use lattice_core::lattice::LatticeKind;
 
-use super::{Run, ends};
-use crate::paper::report::Figure;
-use crate::paper::report::plot::{Axes, Curve, Fault, Layout, color, cumulative, curves, key, svg};
+use super::Run;
+use crate::AnyError;
+use crate::evaluate::extent;
 use crate::paper::voxels::scan::Scan;
+use crate::report::Figure;
+use crate::report::plot::{Axes, Curve, Layout, color, cumulative, curves, key, svg};
 
 /// Cumulative distributions of a cloud: a row for each kind of turns.
-pub fn figure(scan: &Scan, runs: &[&Run]) -> Result<Figure, Fault> {
+pub fn figure(scan: &Scan, runs: &[&Run]) -> Result<Figure, AnyError> {
     let layout = Layout {
         panel: (500, 310),
         columns: 2,
@@ -46,9 +48,9 @@ pub fn figure(scan: &Scan, runs: &[&Run]) -> Result<Figure, Fault> {
         }
         Ok(())
     })?;
-    Ok(Figure {
-        name: format!("fig5_{}", scan.id),
-        caption: format!(
+    Ok(Figure::new(
+        format!("fig5_{}", scan.id),
+        format!(
             "{} points, {}, cells of {} m³: share of {} poses with at most so much distortion (left) and so many voxels \
              (right).",
             scan.points.len(),
@@ -58,16 +60,16 @@ pub fn figure(scan: &Scan, runs: &[&Run]) -> Result<Figure, Fault> {
                 .and_then(|run| run.cubic())
                 .map_or(0, |m| m.counts.len()),
         ),
-        svg: picture,
-    })
+        picture,
+    ))
 }
 
-/// From the least to the greatest x of some lines, and a little more.
+/// Range of x of some lines, and a little more.
 fn reach(lines: &[Curve]) -> std::ops::Range<f64> {
     let xs = lines
         .iter()
         .flat_map(|(_, points)| points.iter().map(|p| p.0));
-    let (low, high) = ends(xs);
+    let [low, high] = extent(xs);
     let room = 0.04 * (high - low).max(1e-9);
     low - room..high + room
 }

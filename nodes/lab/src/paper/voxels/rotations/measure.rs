@@ -3,15 +3,16 @@
 use lattice_core::lattice::{BatchQuantizer, BlockKey, Lattice, LatticeKind, Orientation};
 use nalgebra::{Isometry3, Translation3, UnitQuaternion, Vector3};
 
+use crate::AnyError;
 use crate::paper::estimate::Estimate;
 use crate::paper::parallel::in_parallel;
-use crate::paper::report::plot::{Fault, title};
 use crate::paper::streams::{Purpose, stream};
+use crate::report::plot::title;
 
 /// Side of the cube that a cloud is moved in, metres.
 const REACH_M: f64 = 16.0;
 
-/// How a cloud is turned before it is quantized.
+/// Turns of a cloud before it is quantized.
 #[derive(Clone, Copy, PartialEq, Eq, Debug)]
 pub enum Turns {
     /// Uniform over all rotations, as in the paper.
@@ -21,7 +22,7 @@ pub enum Turns {
 }
 
 impl Turns {
-    /// In words.
+    /// Name in words.
     pub fn name(self) -> &'static str {
         match self {
             Self::Any => "any rotation",
@@ -54,7 +55,7 @@ pub struct Laid {
 }
 
 impl Laid {
-    /// In the axes of the paper.
+    /// A lattice in the axes of the paper.
     pub fn paper(kind: LatticeKind) -> Laid {
         Laid {
             kind,
@@ -62,7 +63,7 @@ impl Laid {
         }
     }
 
-    /// With the flattest cells.
+    /// A lattice with its flattest side down.
     pub fn flat(kind: LatticeKind) -> Laid {
         Laid {
             kind,
@@ -70,7 +71,7 @@ impl Laid {
         }
     }
 
-    /// In words.
+    /// Name in words.
     pub fn name(&self) -> String {
         match self.orientation {
             Orientation::Paper => title(self.kind).to_owned(),
@@ -79,7 +80,7 @@ impl Laid {
     }
 }
 
-/// What a lattice makes of a cloud at each pose.
+/// Counts and errors of a lattice for a cloud at each pose.
 pub struct Measured {
     /// The lattice.
     pub laid: Laid,
@@ -119,7 +120,7 @@ pub fn measure(
     laid: &[Laid],
     (turns, poses, seed): (Turns, usize, u64),
     progress: &mut dyn FnMut(f64),
-) -> Result<Vec<Measured>, Fault> {
+) -> Result<Vec<Measured>, AnyError> {
     let lattices: Vec<Lattice> = laid
         .iter()
         .map(|laid| Lattice::new(laid.kind, volume_m3)?.with_orientation(laid.orientation))

@@ -8,9 +8,12 @@ use lattice_core::lattice::LatticeKind;
 
 use super::scan::{Scan, Source, scans};
 use super::{Options, unit};
+use crate::AnyError;
+use crate::evaluate::extent;
 use crate::paper::estimate::Estimate;
-use crate::paper::report::plot::{Fault, title};
-use crate::paper::report::{Check, Section, Verdict};
+use crate::report::plot::title;
+use crate::report::{Check, Section, Verdict};
+use crate::theory::mean_distance_m;
 use figure::figure;
 use measure::{Laid, Measured, Turns, measure};
 pub use measure::{Quantized, quantized};
@@ -18,9 +21,9 @@ use tables::{details, summary};
 
 /// The lattices that are rounder than cubes.
 const ROUND: [LatticeKind; 3] = [LatticeKind::Bcc, LatticeKind::Fcc, LatticeKind::Mcc];
-/// How far a mean distance of evenly spread points may be off, of itself.
+/// Allowed error of a mean distance of evenly spread points, as a share of it.
 const TOLERANCE: f64 = 0.002;
-/// How far a count of evenly spread points may be off, of itself: the surface of their cube cuts a
+/// Allowed error of a count of evenly spread points, as a share of it: the surface of their cube cuts a
 /// different number of cells.
 const COUNT_TOLERANCE: f64 = 0.005;
 
@@ -59,7 +62,7 @@ impl Run<'_> {
     }
 }
 
-pub fn section(options: &Options, progress: &mut dyn FnMut(f64)) -> Result<Section, Fault> {
+pub fn section(options: &Options, progress: &mut dyn FnMut(f64)) -> Result<Section, AnyError> {
     let scans = scans(options)?;
     let poses = if options.quick { 100 } else { 500 };
     let tasks: Vec<(&Scan, f64, Turns)> = scans
@@ -94,19 +97,19 @@ pub fn section(options: &Options, progress: &mut dyn FnMut(f64)) -> Result<Secti
             .filter(|run| run.scan.id == scan.id && run.is_drawn());
         figure(scan, &of.collect::<Vec<_>>())
     });
-    let figures = figures.collect::<Result<Vec<_>, Fault>>()?;
+    let figures = figures.collect::<Result<Vec<_>, AnyError>>()?;
     let count = |turns, kind| {
-        let (low, high) = over_scans(&runs, turns, |run| Some(run.count_change(kind)?.mean));
+        let [low, high] = over_scans(&runs, turns, |run| Some(run.count_change(kind)?.mean));
         format!("{:+.1} to {:+.1} %", 100.0 * low, 100.0 * high)
     };
     let steadiness = |kind| {
-        let (low, high) = over_scans(&runs, Turns::Any, |run| {
+        let [low, high] = over_scans(&runs, Turns::Any, |run| {
             Some(spread(run.paper(kind)?).mean / spread(run.cubic()?).mean)
         });
         format!("{low:.2} to {high:.2}")
     };
     let mean = |kind| {
-        let (low, high) = over_scans(&runs, Turns::Any, |run| {
+        let [low, high] = over_scans(&runs, Turns::Any, |run| {
             Some(run.paper(kind)?.mean_to(run.cubic()?).mean)
         });
         format!("{:+.1} to {:+.1} %", 100.0 * low, 100.0 * high)
@@ -147,40 +150,38 @@ pub fn section(options: &Options, progress: &mut dyn FnMut(f64)) -> Result<Secti
 }
 
 /// Least and greatest value of the scans in their first cells.
-fn over_scans(runs: &[Run], turns: Turns, value: impl Fn(&Run) -> Option<f64>) -> (f64, f64) {
+fn over_scans(runs: &[Run], turns: Turns, value: impl Fn(&Run) -> Option<f64>) -> [f64; 2] {
     let drawn = runs
         .iter()
         .filter(|run| run.turns == turns && run.is_drawn());
     let scans = drawn.filter(|run| run.scan.source != Source::Uniform);
-    ends(scans.filter_map(value))
+    extent(scans.filter_map(value))
 }
 
-/// What theory and the paper say of a run.
-fn check(run: &Run) -> Result<Vec<Check>, Fault> {
+/// Checks of a run against theory and the paper.
+fn check(run: &Run) -> Result<Vec<Check>, AnyError> {
     let mut checks = Vec::new();
     let name = run.name();
     let Some(cubic) = run.cubic() else {
         return Ok(checks);
     };
     if run.scan.source == Source::Uniform {
-        let cube = unit(LatticeKind::Cubic)?.mean_distance_m([0; 3]);
+        let cube = mean_distance_m(&unit(LatticeKind::Cubic)?, [0; 3]);
         for measured in &run.measured {
             let kind = measured.laid.kind;
-            let of_theory = unit(kind)?.mean_distance_m([0; 3]) / cube - 1.0;
-            checks.push(Check {
-                name: format!("{name}: mean distance of {} to cubic (%)", title(kind)),
-                printed: None,
-                expected: 100.0 * of_theory,
-                found: 100.0 * measured.mean_to(cubic).mean,
-                tolerance: 100.0 * TOLERANCE,
-            });
-            checks.push(Check {
-                name: format!("{name}: count of {} to cubic (%)", title(kind)),
-                printed: None,
-                expected: 0.0,
-                found: 100.0 * measured.count_to(cubic).mean,
-                tolerance: 100.0 * COUNT_TOLERANCE,
-            });
+            let of_theory = mean_distance_m(&unit(kind)?, [0; 3]) / cube - 1.0;
+            checks.push(Check::new(
+                format!("{name}: mean distance of {} to cubic (%)", title(kind)),
+                100.0 * of_theory,
+                100.0 * measured.mean_to(cubic).mean,
+                100.0 * TOLERANCE,
+            ));
+            checks.push(Check::new(
+                format!("{name}: count of {} to cubic (%)", title(kind)),
+                0.0,
+                100.0 * measured.count_to(cubic).mean,
+                100.0 * COUNT_TOLERANCE,
+            ));
         }
         return Ok(checks);
     }
@@ -233,11 +234,4 @@ fn check(run: &Run) -> Result<Vec<Check>, Fault> {
 /// Standard deviation of the count.
 fn spread(measured: &Measured) -> Estimate {
     Estimate::deviation_of(&measured.counts)
-}
-
-/// Least and greatest.
-fn ends(values: impl Iterator<Item = f64>) -> (f64, f64) {
-    values.fold((f64::INFINITY, f64::NEG_INFINITY), |(low, high), x| {
-        (low.min(x), high.max(x))
-    })
 }

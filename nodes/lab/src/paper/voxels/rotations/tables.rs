@@ -6,7 +6,7 @@ use super::measure::Laid;
 use super::{ROUND, Run, spread};
 use crate::evaluate::Share;
 use crate::paper::estimate::Estimate;
-use crate::paper::report::{Cell, Table};
+use crate::report::{Cell, Table};
 
 /// "-5.0 ± 0.1".
 fn percent(change: Estimate) -> Cell {
@@ -44,12 +44,12 @@ pub fn summary(runs: &[Run]) -> Table {
         .map(String::from)
         .to_vec();
     columns.extend(laid.iter().map(|laid| format!("{} (%)", laid.name())));
-    Table {
-        name: "fig5_counts".into(),
-        caption: "Voxel count against cubic at the same poses, mean with 95 % interval".into(),
+    Table::new(
+        "fig5_counts",
+        "Voxel count against cubic at the same poses, mean with 95 % interval",
         columns,
-        rows: runs.iter().map(row).collect(),
-    }
+        runs.iter().map(row),
+    )
 }
 
 /// A row for each lattice of each run.
@@ -100,10 +100,10 @@ pub fn details(runs: &[Run]) -> Table {
             rows.push(row);
         }
     }
-    Table {
-        name: "fig5".into(),
-        caption: "All lattices on all clouds, with 95 % intervals".into(),
-        columns: columns.map(String::from).into(),
+    Table::new(
+        "fig5",
+        "All lattices on all clouds, with 95 % intervals",
+        columns,
         rows,
-    }
+    )
 }

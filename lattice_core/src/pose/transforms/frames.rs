@@ -1,0 +1,272 @@
+//! Table of frames with the parents that publishers gave them.
+
+use nalgebra::Isometry3;
+use rustc_hash::FxHashMap;
+
+use super::TfInsertError;
+use super::path::Path;
+use crate::pose::track::Track;
+
+/// Most parents of a frame, static and moving ones counted apart.
+const MAX_PARENTS: usize = 4;
+/// Most frames to keep.
+const MAX_KEPT: usize = 64;
+
+#[derive(Clone, Debug)]
+pub(super) enum Link {
+    Static(Isometry3<f64>),
+    Moving(Track),
+}
+
+/// A parent that a publisher gave to a frame.
+#[derive(Clone, Debug)]
+struct Claim {
+    parent: usize,
+    link: Link,
+    heard: u64,
+}
+
+#[derive(Clone, Debug)]
+struct Frame {
+    name: String,
+    /// Static ones first, then in the order in which they came.
+    claims: Vec<Claim>,
+    heard: u64,
+}
+
+/// Frames by number and by name; `heard` counts the transforms, the newest has the highest.
+#[derive(Clone, Debug)]
+pub(super) struct Frames {
+    frames: Vec<Frame>,
+    index: FxHashMap<String, usize>,
+    kept: Vec<String>,
+    max_frames: usize,
+    heard: u64,
+}
+
+impl Frames {
+    pub fn new(max_frames: usize) -> Self {
+        Self {
+            frames: Vec::new(),
+            index: FxHashMap::default(),
+            kept: Vec::new(),
+            max_frames,
+            heard: 0,
+        }
+    }
+
+    pub fn len(&self) -> usize {
+        self.frames.len()
+    }
+
+    pub fn find(&self, name: &str) -> Option<usize> {
+        self.index.get(name).copied()
+    }
+
+    pub fn name(&self, id: usize) -> &str {
+        self.frames.get(id).map_or("", |frame| &frame.name)
+    }
+
+    pub fn keep(&mut self, name: &str) {
+        let known = self.kept.iter().any(|kept| kept == name);
+        if !known && self.kept.len() < MAX_KEPT {
+            self.kept.push(name.to_owned());
+        }
+    }
+
+    /// Parents of a frame, those of static transforms first.
+    pub fn parents(&self, id: usize) -> impl Iterator<Item = usize> + '_ {
+        let frame = self.frames.get(id);
+        frame
+            .into_iter()
+            .flat_map(|frame| frame.claims.iter().map(|claim| claim.parent))
+    }
+
+    /// The transform of a frame in one of its parents, the static one if there are two.
+    pub fn claim(&self, id: usize, parent: usize) -> Option<&Link> {
+        let mut claims = self.frames.get(id)?.claims.iter();
+        let claim = claims.find(|claim| claim.parent == parent);
+        claim.map(|claim| &claim.link)
+    }
+
+    /// The shortest way from one frame to another by way of a common ancestor.
+    pub fn path(&self, target: usize, source: usize) -> Option<Path> {
+        Path::find(target, source, |id| self.parents(id))
+    }
+
+    pub fn tracks_mut(&mut self) -> impl Iterator<Item = &mut Track> {
+        let claims = self.frames.iter_mut().flat_map(|frame| &mut frame.claims);
+        claims.filter_map(|claim| match &mut claim.link {
+            Link::Static(_) => None,
+            Link::Moving(track) => Some(track),
+        })
+    }
+
+    /// The link from a child to a parent, new if need be; it takes the place of one the other way.
+    pub fn link(
+        &mut self,
+        parent: &str,
+        child: &str,
+        is_static: bool,
+    ) -> Result<&mut Link, TfInsertError> {
+        let itself = || TfInsertError::Itself(child.to_owned());
+        if parent == child {
+            return Err(itself());
+        }
+        self.make_room(parent, child)?;
+        self.heard += 1;
+        let parent = self.id(parent);
+        let child_id = self.id(child);
+        if let Some(frame) = self.frames.get_mut(parent) {
+            frame.claims.retain(|claim| claim.parent != child_id);
+        }
+        let is_it = |claim: &Claim| {
+            claim.parent == parent && matches!(claim.link, Link::Static(_)) == is_static
+        };
+        let heard = self.heard;
+        let claims = self
+            .frames
+            .get(child_id)
+            .map_or(&[][..], |frame| &frame.claims[..]);
+        let at = match claims.iter().position(is_it) {
+            Some(at) => at,
+            None => self.add_claim(child_id, parent, is_static),
+        };
+        let frame = self.frames.get_mut(child_id);
+        let claim = frame.and_then(|frame| frame.claims.get_mut(at));
+        let claim = claim.ok_or_else(itself)?;
+        claim.heard = heard;
+        Ok(&mut claim.link)
+    }
+
+    /// Adds a claim and gives its place; of too many, the one heard longest ago goes.
+    fn add_claim(&mut self, child: usize, parent: usize, is_static: bool) -> usize {
+        let protected = self.protected();
+        let Some(frame) = self.frames.get_mut(child) else {
+            return 0;
+        };
+        if frame.claims.len() >= MAX_PARENTS {
+            let in_use = |claim: &Claim| protected.contains(&(child, claim.parent));
+            let claims = frame.claims.iter().enumerate();
+            let idle = claims.filter(|(_, claim)| !in_use(claim));
+            if let Some((at, _)) = idle.min_by_key(|(_, claim)| claim.heard) {
+                frame.claims.remove(at);
+            }
+        }
+        let (at, link) = match is_static {
+            true => (0, Link::Static(Isometry3::identity())),
+            false => (frame.claims.len(), Link::Moving(Track::default())),
+        };
+        let heard = self.heard;
+        let claim = Claim {
+            parent,
+            link,
+            heard,
+        };
+        frame.claims.insert(at, claim);
+        at
+    }
+
+    /// Links from frame to parent between the first frame kept and the others.
+    fn protected(&self) -> Vec<(usize, usize)> {
+        let mut kept = self.kept.iter().filter_map(|name| self.find(name));
+        let Some(first) = kept.next() else {
+            return Vec::new();
+        };
+        let paths = kept.filter_map(|frame| self.path(first, frame));
+        paths
+            .flat_map(|path| {
+                path.from_target()
+                    .chain(path.from_source())
+                    .collect::<Vec<_>>()
+            })
+            .collect()
+    }
+
+    /// Forgets frames until there is room for two names.
+    fn make_room(&mut self, parent: &str, child: &str) -> Result<(), TfInsertError> {
+        let max_frames = self.max_frames;
+        let full = || TfInsertError::TooManyFrames {
+            parent: parent.to_owned(),
+            child: child.to_owned(),
+            max_frames,
+        };
+        let names = [parent, child];
+        let new = names.iter().filter(|name| self.find(name).is_none());
+        let most = max_frames.checked_sub(new.count()).ok_or_else(full)?;
+        while self.frames.len() > most {
+            let links = self.protected();
+            let on_path = |id| links.iter().any(|(a, b)| *a == id || *b == id);
+            let named = |name: &str| name == parent || name == child;
+            let idle = |(id, frame): &(usize, &Frame)| {
+                !(named(&frame.name) || self.kept.contains(&frame.name) || on_path(*id))
+            };
+            let frames = self.frames.iter().enumerate().filter(idle);
+            let oldest = frames.min_by_key(|(_, frame)| frame.heard);
+            let (id, _) = oldest.ok_or_else(full)?;
+            self.remove(id);
+        }
+        Ok(())
+    }
+
+    fn remove(&mut self, id: usize) {
+        let frame = self.frames.swap_remove(id);
+        self.index.remove(&frame.name);
+        let moved = self.frames.len();
+        for frame in &mut self.frames {
+            frame.claims.retain(|claim| claim.parent != id);
+            for claim in &mut frame.claims {
+                if claim.parent == moved {
+                    claim.parent = id;
+                }
+            }
+        }
+        if let Some(frame) = self.frames.get(id) {
+            self.index.insert(frame.name.clone(), id);
+        }
+    }
+
+    /// Number of a frame that is named now, new if need be.
+    fn id(&mut self, name: &str) -> usize {
+        let id = self.find(name).unwrap_or(self.frames.len());
+        let heard = self.heard;
+        match self.frames.get_mut(id) {
+            Some(frame) => frame.heard = heard,
+            None => {
+                self.index.insert(name.to_owned(), id);
+                self.frames.push(Frame {
+                    name: name.to_owned(),
+                    claims: Vec::new(),
+                    heard,
+                });
+            }
+        }
+        id
+    }
+
+    pub fn validate(&self, max_samples: usize) -> Result<(), String> {
+        let (frames, names, max) = (self.frames.len(), self.index.len(), self.max_frames);
+        if frames > max || frames != names {
+            return Err(format!("{frames} frames, {names} names, limit {max}"));
+        }
+        for (id, frame) in self.frames.iter().enumerate() {
+            let name = &frame.name;
+            if self.find(name) != Some(id) {
+                return Err(format!("frame '{name}' is not found by name"));
+            }
+            if frame.claims.len() > MAX_PARENTS {
+                return Err(format!("frame '{name}' has too many parents"));
+            }
+            for claim in &frame.claims {
+                if claim.parent >= frames || claim.parent == id {
+                    return Err(format!("frame '{name}' hangs below no other frame"));
+                }
+                if let Link::Moving(track) = &claim.link {
+                    let valid = track.validate(max_samples);
+                    valid.map_err(|e| format!("frame '{name}': {e}"))?;
+                }
+            }
+        }
+        Ok(())
+    }
+}

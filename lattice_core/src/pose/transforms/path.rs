@@ -1,0 +1,113 @@
+//! Ways through the frames, by way of a common ancestor.
+
+/// Most frames above a frame that are looked at.
+const MAX_ABOVE: usize = 32;
+
+#[derive(Clone, Copy, Debug, Default)]
+struct Step {
+    frame: usize,
+    /// Place of the frame below.
+    from: usize,
+    depth: usize,
+}
+
+/// A frame and those above it, the nearest first.
+#[derive(Clone, Debug)]
+struct Above {
+    steps: [Step; MAX_ABOVE],
+    len: usize,
+}
+
+impl Above {
+    fn of<P: Iterator<Item = usize>>(frame: usize, parents: impl Fn(usize) -> P) -> Self {
+        let mut above = Self {
+            steps: [Step::default(); MAX_ABOVE],
+            len: 0,
+        };
+        above.push(Step {
+            frame,
+            from: 0,
+            depth: 0,
+        });
+        let mut at = 0;
+        while let Some(step) = above.steps().get(at).copied() {
+            for frame in parents(step.frame) {
+                if above.place(frame).is_none() {
+                    above.push(Step {
+                        frame,
+                        from: at,
+                        depth: step.depth + 1,
+                    });
+                }
+            }
+            at += 1;
+        }
+        above
+    }
+
+    fn push(&mut self, step: Step) {
+        if let Some(slot) = self.steps.get_mut(self.len) {
+            *slot = step;
+            self.len += 1;
+        }
+    }
+
+    fn steps(&self) -> &[Step] {
+        self.steps.get(..self.len).unwrap_or(&[])
+    }
+
+    fn place(&self, frame: usize) -> Option<usize> {
+        self.steps().iter().position(|step| step.frame == frame)
+    }
+
+    /// Links as frame and parent, from a place down to the first frame.
+    fn down(&self, mut place: usize) -> impl Iterator<Item = (usize, usize)> + '_ {
+        std::iter::from_fn(move || {
+            let upper = self.steps().get(place).filter(|_| place > 0)?;
+            place = upper.from;
+            let lower = self.steps().get(place)?;
+            Some((lower.frame, upper.frame))
+        })
+    }
+}
+
+/// The way between two frames up to their common ancestor.
+#[derive(Clone, Debug)]
+pub(super) struct Path {
+    target: Above,
+    source: Above,
+    /// Places of the ancestor in both.
+    ancestor: [usize; 2],
+}
+
+impl Path {
+    /// The shortest way; of equally short ones that which climbs least from the source.
+    pub fn find<P: Iterator<Item = usize>>(
+        target: usize,
+        source: usize,
+        parents: impl Fn(usize) -> P,
+    ) -> Option<Self> {
+        let (target, source) = (Above::of(target, &parents), Above::of(source, &parents));
+        let common = source.steps().iter().enumerate().filter_map(|(at, step)| {
+            let place = target.place(step.frame)?;
+            let depth = target.steps().get(place)?.depth + step.depth;
+            Some((depth, [place, at]))
+        });
+        let (_, ancestor) = common.min_by_key(|(depth, _)| *depth)?;
+        Some(Self {
+            target,
+            source,
+            ancestor,
+        })
+    }
+
+    /// Links as frame and parent, from the ancestor down to the target.
+    pub fn from_target(&self) -> impl Iterator<Item = (usize, usize)> + '_ {
+        self.target.down(self.ancestor[0])
+    }
+
+    /// Links as frame and parent, from the ancestor down to the source.
+    pub fn from_source(&self) -> impl Iterator<Item = (usize, usize)> + '_ {
+        self.source.down(self.ancestor[1])
+    }
+}

@@ -1,0 +1,175 @@
+//! Levenberg-Marquardt on SE(3), between searches for pairs.
+//!
+//! To be read in this order: this file has the loop, [`pairs`] finds the pairs of a pose,
+//! [`pair_weights`] weighs them, [`pair`] measures one, [`robust_kernel`] limits its cost,
+//! [`normal_equations`] sums up their linear system.
+
+mod normal_equations;
+mod pair;
+mod pair_weights;
+mod pairs;
+mod robust_kernel;
+
+use nalgebra::{Isometry3, Matrix6, Vector6};
+
+use normal_equations::Sums;
+use pairs::Pairs;
+
+use super::{Method, PreparedCloud, RegisterOptions, SemanticVariant};
+use crate::pose::se3;
+
+/// Damping at the start as a share of the mean of the Hessian's diagonal, and its factor at each step.
+const LAMBDA: f64 = 1e-6;
+const LAMBDA_FACTOR: f64 = 10.0;
+/// Least damping, so that directions without information stay where they are.
+const LEAST_LAMBDA: f64 = 1e-12;
+/// Most dampings that are tried for one step.
+const TRIES: usize = 12;
+/// Share of the tolerances at which the steps between two searches end.
+const INNER_SHARE: f64 = 1e-3;
+
+/// Result of a registration.
+///
+/// `hessian`, `cost`, `inliers` and `rmse_m` are of the last pairs, before the last step.
+#[derive(Clone, PartialEq, Debug)]
+pub struct Registration {
+    /// Takes source points to the target frame.
+    pub target_from_source: Isometry3<f64>,
+    /// True if the last step was below the tolerances.
+    pub converged: bool,
+    /// Searches for pairs.
+    pub iterations: usize,
+    /// Half of the second derivative of the cost (Gauss-Newton) by the right perturbation (rho, phi):
+    /// the sum of J^T M J under the weights of the kernel.
+    pub hessian: Matrix6<f64>,
+    /// Value of the minimised cost.
+    pub cost: f64,
+    /// Source points with a pair.
+    pub inliers: usize,
+    /// Root of the weighted mean of the squared distances, metres.
+    pub rmse_m: f64,
+}
+
+/// Registers `source` to `target` from a start.
+///
+/// The same bytes on any number of threads. Without pairs, or from a start that is not finite, it ends
+/// where it began, not converged.
+pub fn register(
+    source: &PreparedCloud,
+    target: &PreparedCloud,
+    target_from_source_start: &Isometry3<f64>,
+    options: &RegisterOptions,
+) -> Registration {
+    let mut state = State {
+        pose: *target_from_source_start,
+        lambda: LAMBDA,
+        sums: Sums::default(),
+    };
+    let mut registration = Registration {
+        target_from_source: state.pose,
+        converged: false,
+        iterations: 0,
+        hessian: Matrix6::zeros(),
+        cost: 0.0,
+        inliers: 0,
+        rmse_m: 0.0,
+    };
+    let finite = |pose: &Isometry3<f64>| pose.to_homogeneous().iter().all(|v| v.is_finite());
+    if !finite(&state.pose) {
+        return registration;
+    }
+    let mut pairs = Pairs::new(source, target, options);
+    let mut scale = match options.method {
+        Method::Semantic(SemanticVariant::Em) if options.anneal < 1.0 => pairs.widest_scale(),
+        _ => 1.0,
+    };
+    while registration.iterations < options.max_iterations {
+        registration.iterations += 1;
+        state.sums = pairs.find(&state.pose, scale);
+        if state.sums.pairs == 0 || state.sums.weight <= 0.0 {
+            break;
+        }
+        let before = state.pose;
+        let moved = state.minimize(&pairs, options);
+        let step = se3::log(&(before.inverse() * state.pose));
+        if scale <= 1.0 {
+            registration.converged = moved && is_small(&step, options, 1.0);
+            if registration.converged || !moved {
+                break;
+            }
+        }
+        scale = (scale * options.anneal.max(0.0)).max(1.0);
+    }
+    let sums = &state.sums;
+    let (hessian, _) = sums.system(&state.pose);
+    registration.target_from_source = state.pose;
+    registration.hessian = hessian;
+    registration.cost = sums.cost;
+    registration.inliers = sums.inliers;
+    if sums.weight > 0.0 {
+        registration.rmse_m = (sums.squared_m2 / sums.weight).sqrt();
+    }
+    registration
+}
+
+struct State {
+    pose: Isometry3<f64>,
+    lambda: f64,
+    sums: Sums,
+}
+
+impl State {
+    /// Steps down the cost of these pairs; false if the first step went nowhere.
+    fn minimize(&mut self, pairs: &Pairs, options: &RegisterOptions) -> bool {
+        for inner in 0..options.inner_iterations.max(1) {
+            if inner > 0 {
+                self.sums = pairs.linearize(&self.pose);
+            }
+            let Some(step) = self.step(pairs, options) else {
+                return inner > 0;
+            };
+            if is_small(&step, options, INNER_SHARE) {
+                break;
+            }
+        }
+        true
+    }
+
+    /// A step that lowers the cost, or none at all where one below the tolerances does not; `None` if no
+    /// damping gives one.
+    fn step(&mut self, pairs: &Pairs, options: &RegisterOptions) -> Option<Vector6<f64>> {
+        let (h, b) = self.sums.system(&self.pose);
+        let size = h.trace() / 6.0;
+        for attempt in 0..TRIES {
+            let damped = h + Matrix6::from_diagonal_element(self.lambda * size);
+            let step = damped.cholesky().map(|c| -c.solve(&b));
+            let step = step.filter(|step| step.iter().all(|v| v.is_finite()));
+            if let Some(step) = step {
+                let pose = self.pose * se3::exp(&step);
+                if pairs.cost(&pose) < self.sums.cost {
+                    self.pose = renormalized(pose);
+                    self.lambda = (self.lambda / LAMBDA_FACTOR).max(LEAST_LAMBDA);
+                    return Some(step);
+                }
+                if attempt == 0 && is_small(&step, options, 1.0) {
+                    return Some(Vector6::zeros());
+                }
+            }
+            self.lambda *= LAMBDA_FACTOR;
+        }
+        None
+    }
+}
+
+fn is_small(step: &Vector6<f64>, options: &RegisterOptions, share: f64) -> bool {
+    step.fixed_rows::<3>(0).norm() <= share * options.translation_tolerance_m
+        && step.fixed_rows::<3>(3).norm() <= share * options.rotation_tolerance_rad
+}
+
+fn renormalized(mut pose: Isometry3<f64>) -> Isometry3<f64> {
+    pose.rotation.renormalize();
+    pose
+}
+
+#[cfg(test)]
+mod tests;

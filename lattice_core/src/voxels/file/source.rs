@@ -1,0 +1,180 @@
+//! Bytes of a map file with their place and their checksums.
+
+use std::io::{self, Read};
+use std::ops::Range;
+
+use super::FileError;
+use super::head::{
+    END_TAG, HEAD_BYTES, Head, MAGIC, OLD_MAGIC, SECTION_HEAD_BYTES, SECTION_TAG, SectionHead,
+    corrupt,
+};
+
+/// Bytes that are asked for before any has come.
+const FIRST_BYTES: u64 = 1 << 20;
+
+/// Hands out bytes and knows their place and checksum.
+pub(super) struct Source<R> {
+    reader: R,
+    crc: crc32fast::Hasher,
+    position: u64,
+}
+
+impl<R: Read> Source<R> {
+    pub(super) fn new(reader: R) -> Source<R> {
+        Source {
+            reader,
+            crc: crc32fast::Hasher::new(),
+            position: 0,
+        }
+    }
+
+    /// Bytes handed out so far.
+    pub(super) fn position(&self) -> u64 {
+        self.position
+    }
+
+    /// Fills as much of the buffer as there is.
+    fn fill(&mut self, buffer: &mut [u8], part: &str) -> Result<(), FileError> {
+        let mut filled = 0;
+        while let Some(rest) = buffer.get_mut(filled..).filter(|rest| !rest.is_empty()) {
+            match self.reader.read(rest) {
+                Ok(0) => {
+                    return Err(FileError::Truncated {
+                        position: self.position,
+                        part: part.to_owned(),
+                    });
+                }
+                Ok(bytes) => {
+                    filled += bytes;
+                    self.position += bytes as u64;
+                }
+                Err(error) if error.kind() == io::ErrorKind::Interrupted => {}
+                Err(source) => {
+                    return Err(FileError::Io {
+                        position: self.position,
+                        source,
+                    });
+                }
+            }
+        }
+        Ok(())
+    }
+
+    /// Bytes of which the last four are the checksum of those before; hands out those.
+    fn summed<const N: usize>(&mut self, begin: &[u8], part: &str) -> Result<Vec<u8>, FileError> {
+        let start = self.position - begin.len() as u64;
+        let mut bytes = vec![0; N - begin.len() - 4];
+        self.fill(&mut bytes, part)?;
+        let mut crc = crc32fast::Hasher::new();
+        crc.update(begin);
+        crc.update(&bytes);
+        self.crc.combine(&crc);
+        let end = self.position;
+        let saved = self.crc_value(part)?;
+        verify(start..end, part, saved, crc.finalize())?;
+        self.crc.update(&saved.to_le_bytes());
+        Ok(bytes)
+    }
+
+    fn crc_value(&mut self, part: &str) -> Result<u32, FileError> {
+        let mut saved = [0; 4];
+        self.fill(&mut saved, part)?;
+        Ok(u32::from_le_bytes(saved))
+    }
+
+    /// Reads the head of the file.
+    pub(super) fn head(&mut self) -> Result<Head, FileError> {
+        let mut magic = [0; 8];
+        self.fill(&mut magic, "head")?;
+        if magic == *OLD_MAGIC {
+            return Err(FileError::OldVersion);
+        }
+        if magic != *MAGIC {
+            return Err(FileError::Magic { found: magic });
+        }
+        Head::from_bytes(&self.summed::<HEAD_BYTES>(&magic, "head")?)
+    }
+
+    /// Reads the head of the next section.
+    pub(super) fn section_head(&mut self) -> Result<SectionHead, FileError> {
+        let start = self.position;
+        let mut tag = [0; 4];
+        self.fill(&mut tag, "head of a section")?;
+        if tag != *SECTION_TAG {
+            return Err(corrupt(start, "a section should begin here".to_owned()));
+        }
+        let bytes = self.summed::<SECTION_HEAD_BYTES>(&tag, "head of a section")?;
+        SectionHead::from_bytes(&bytes, start)
+    }
+
+    /// The stored bytes of a section, checked.
+    pub(super) fn stored(&mut self, section: &SectionHead) -> Result<Vec<u8>, FileError> {
+        let (start, part) = (self.position, format!("section {}", section.name));
+        let mut bytes = Vec::new();
+        let mut wanted = section.stored_bytes;
+        while wanted > 0 {
+            // Doubling: never more than twice of what has come, whatever the head promises.
+            let step = wanted.min((bytes.len() as u64).max(FIRST_BYTES));
+            let before = bytes.len();
+            let length = usize::try_from(step).unwrap_or(usize::MAX);
+            bytes.resize(before.saturating_add(length), 0);
+            self.fill(bytes.get_mut(before..).unwrap_or_default(), &part)?;
+            wanted -= step;
+        }
+        let mut crc = crc32fast::Hasher::new();
+        crc.update(&bytes);
+        self.crc.combine(&crc);
+        verify(start..self.position, &part, section.crc, crc.finalize())?;
+        Ok(bytes)
+    }
+
+    /// Passes over a section, in constant memory.
+    pub(super) fn skip(&mut self, section: &SectionHead) -> Result<(), FileError> {
+        let (start, part) = (self.position, format!("section {}", section.name));
+        let mut crc = crc32fast::Hasher::new();
+        let mut buffer = vec![0; section.stored_bytes.min(FIRST_BYTES) as usize];
+        let mut wanted = section.stored_bytes;
+        while wanted > 0 {
+            let step = wanted.min(FIRST_BYTES);
+            let bytes = buffer.get_mut(..step as usize).unwrap_or_default();
+            self.fill(bytes, &part)?;
+            crc.update(bytes);
+            wanted -= step;
+        }
+        self.crc.combine(&crc);
+        verify(start..self.position, &part, section.crc, crc.finalize())
+    }
+
+    /// Reads and checks the end marker, its checksum and the end.
+    pub(super) fn finish(&mut self) -> Result<(), FileError> {
+        let start = self.position;
+        let mut tag = [0; 4];
+        self.fill(&mut tag, "end marker")?;
+        if tag != *END_TAG {
+            return Err(corrupt(start, "the end marker should be here".to_owned()));
+        }
+        self.crc.update(&tag);
+        let end = self.position;
+        let saved = self.crc_value("end marker")?;
+        verify(0..end, "whole file", saved, self.crc.clone().finalize())?;
+        let position = self.position;
+        match self.fill(&mut [0], "end marker") {
+            Err(FileError::Truncated { .. }) => Ok(()),
+            Err(error) => Err(error),
+            Ok(()) => Err(FileError::TrailingBytes { position }),
+        }
+    }
+}
+
+fn verify(range: Range<u64>, part: &str, saved: u32, calculated: u32) -> Result<(), FileError> {
+    if saved == calculated {
+        return Ok(());
+    }
+    Err(FileError::Checksum {
+        start: range.start,
+        end: range.end,
+        part: part.to_owned(),
+        saved,
+        calculated,
+    })
+}

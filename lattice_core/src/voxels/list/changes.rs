@@ -1,0 +1,87 @@
+//! Changes of a list since they were asked for last.
+
+use super::VoxelList;
+use crate::lattice::{BlockKey, MortonKey};
+use crate::voxels::store::shard::Life;
+
+/// Keys that differ from an earlier state, sorted.
+#[derive(Clone, PartialEq, Eq, Debug, Default)]
+pub struct Changes {
+    /// Voxels that are new or have more points.
+    pub changed: Vec<MortonKey>,
+    /// Voxels of the earlier state that are no longer there.
+    pub removed: Vec<MortonKey>,
+}
+
+impl VoxelList {
+    /// Number of the state: every call that may change voxels makes the next one.
+    pub fn sequence(&self) -> u32 {
+        self.sequence
+    }
+
+    /// Changes since the call before (since the beginning for the first).
+    ///
+    /// The memory for this is bounded by the number of voxels that were there at that call.
+    pub fn take_changes(&mut self) -> Changes {
+        let changes = self.changes_since(self.taken);
+        self.taken = self.sequence;
+        for shard in &mut self.shards {
+            shard.removed.clear();
+        }
+        changes
+    }
+
+    fn changes_since(&self, sequence: u32) -> Changes {
+        let shards = || self.shards.iter();
+        let changed = shards().flat_map(|shard| shard.iter());
+        let changed = changed.filter(|(_, entry)| entry.life.touched > sequence);
+        let mut changed: Vec<MortonKey> = changed.filter_map(|(code, _)| code.key()).collect();
+        let known = |life: &Life| life.born <= sequence && life.touched > sequence;
+        let removed = shards().flat_map(|shard| shard.removed.iter());
+        let mut removed: Vec<MortonKey> = removed
+            .filter(|(_, life)| known(life))
+            .filter_map(|(code, _)| BlockKey::from_raw(*code)?.key())
+            .collect();
+        changed.sort_unstable();
+        removed.sort_unstable();
+        Changes { changed, removed }
+    }
+
+    /// Makes the next state and gives its number.
+    pub(crate) fn advance(&mut self) -> u32 {
+        if self.sequence == u32::MAX {
+            self.renumber();
+        }
+        self.sequence += 1;
+        self.sequence
+    }
+
+    /// Starts counting states anew; changes that were taken stay taken.
+    fn renumber(&mut self) {
+        let taken = self.taken;
+        let new = |state: u32| u32::from(state > taken);
+        for shard in &mut self.shards {
+            let lives = shard
+                .voxels
+                .rows_mut()
+                .iter_mut()
+                .map(|entry| &mut entry.life);
+            for life in lives.chain(shard.removed.values_mut()) {
+                (life.born, life.touched) = (new(life.born), new(life.touched));
+            }
+        }
+        (self.taken, self.sequence) = (0, 1);
+    }
+
+    /// Bounds the memory for removed voxels: of more than `max_voxels` only those are remembered
+    /// that were there at the last `take_changes`.
+    pub(crate) fn bound_removed(&mut self) {
+        let remembered: usize = self.shards.iter().map(|shard| shard.removed.len()).sum();
+        if remembered > self.max_voxels {
+            let taken = self.taken;
+            for shard in &mut self.shards {
+                shard.removed.retain(|_, life| life.born <= taken);
+            }
+        }
+    }
+}

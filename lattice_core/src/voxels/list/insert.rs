@@ -1,0 +1,316 @@
+//! Inserting clouds into a list, on one thread or many.
+
+use nalgebra::Translation3;
+use rayon::prelude::*;
+
+use super::VoxelList;
+use crate::cloud::Cloud;
+use crate::lattice::{BatchBlock, BatchQuantizer, BatchSums, BlockKey, Lattice};
+use crate::voxels::distortion::DistortionSums;
+use crate::voxels::store::fixed_point::{
+    FixedBlock, Point, moment_unit_m, moments_of, most_points, near_point, offsets_of,
+};
+use crate::voxels::store::payload_columns::{Details, LabelCount, Stamps};
+use crate::voxels::store::point_gather::{Gather, Partial};
+use crate::voxels::store::shard::{BATCH, SHARDS, Shard, shard_of};
+
+/// Fewer points are not worth gathering.
+const FEW: usize = 1 << 12;
+/// Fewest points that are worth a thread.
+const PART: usize = 1 << 13;
+/// Points between two merges; bounds the memory for what is not yet merged.
+const WAVE: usize = 1 << 18;
+
+/// Points of a cloud by outcome; the outcomes add up to `points`.
+#[derive(Clone, Copy, PartialEq, Eq, Debug, Default)]
+pub struct InsertReport {
+    /// Points in the cloud.
+    pub points: u64,
+    /// Points now in the list.
+    pub inserted: u64,
+    /// Points with a coordinate that is NaN or infinite.
+    pub not_finite: u64,
+    /// Points more than 2^20 cells from the datum.
+    pub out_of_range: u64,
+    /// Points whose cell would have been new when the list was full.
+    pub list_full: u64,
+    /// Voxels that were not in the list before.
+    pub new_voxels: u64,
+    /// Voxels that went to make room, see [`crate::voxels::WhenFull`].
+    pub forgotten_voxels: u64,
+}
+
+impl InsertReport {
+    /// Counts the points of a batch that have no cell, by reason.
+    #[inline]
+    pub(crate) fn count_rejects(
+        &mut self,
+        quantizer: &BatchQuantizer,
+        points: &[[f32; 3]],
+        codes: &[BlockKey],
+        sums: &BatchSums,
+    ) {
+        if sums.points < codes.len() as u64 {
+            self.count_each_reject(quantizer, points, codes);
+        }
+    }
+
+    #[cold]
+    fn count_each_reject(
+        &mut self,
+        quantizer: &BatchQuantizer,
+        points: &[[f32; 3]],
+        codes: &[BlockKey],
+    ) {
+        for (point, code) in points.iter().zip(codes) {
+            if *code == BlockKey::NONE {
+                let finite = quantizer.transform(*point).iter().all(|x| x.is_finite());
+                *(if finite {
+                    &mut self.out_of_range
+                } else {
+                    &mut self.not_finite
+                }) += 1;
+            }
+        }
+    }
+
+    /// Adds what became of other points.
+    pub(crate) fn add(&mut self, other: &InsertReport) {
+        self.points += other.points;
+        self.inserted += other.inserted;
+        self.not_finite += other.not_finite;
+        self.out_of_range += other.out_of_range;
+        self.list_full += other.list_full;
+        self.new_voxels += other.new_voxels;
+        self.forgotten_voxels += other.forgotten_voxels;
+    }
+}
+
+/// Labels of the points of a cloud, one each, and its stamp.
+#[derive(Clone, Copy)]
+struct Origin<'a> {
+    stamp_ns: i64,
+    labels: Option<&'a [u16]>,
+}
+
+/// The points of a chunk, quantized and gathered by cell, the cells by shard.
+struct Chunk {
+    gather: Gather,
+    by_shard: Vec<Vec<Partial>>,
+    report: InsertReport,
+    sums: DistortionSums,
+}
+
+impl VoxelList {
+    /// Adds every finite point in range to its cell, on the threads of the current rayon pool.
+    ///
+    /// In a full list, points in known cells still count; new cells are decided on in
+    /// the order of the points. The outcome does not depend on the number of threads.
+    pub fn insert(&mut self, cloud: &Cloud) -> InsertReport {
+        self.insert_labelled(cloud, &[])
+    }
+
+    /// [`VoxelList::insert`] with a label for each point; points beyond the labels have none.
+    pub fn insert_labelled(&mut self, cloud: &Cloud, labels: &[u16]) -> InsertReport {
+        let before = self.len();
+        let mut report = InsertReport {
+            points: cloud.offsets_m.len() as u64,
+            ..InsertReport::default()
+        };
+        let now = self.advance();
+        let shift = Translation3::from(cloud.datum_m - self.datum_m);
+        let quantizer = BatchQuantizer::new(&self.lattice, shift.into());
+        let mut chunks: Vec<Chunk> = Vec::new();
+        let mut labels = labels;
+        for wave in cloud.offsets_m.chunks(self.wave_points(WAVE)) {
+            report.forgotten_voxels += self.make_room(wave.len(), now) as u64;
+            let origin = Origin {
+                stamp_ns: cloud.stamp_ns,
+                labels: (!labels.is_empty()).then_some(labels),
+            };
+            labels = labels.get(wave.len()..).unwrap_or_default();
+            let may_fill = self.len().saturating_add(wave.len()) > self.max_voxels;
+            if may_fill || !self.payload.is_plain() || wave.len() < FEW {
+                self.insert_singly(&quantizer, wave, origin, now, &mut report);
+                continue;
+            }
+            // A part for each thread: which points are in which does not matter to the sums.
+            let parts = (wave.len() / PART).clamp(1, rayon::current_num_threads());
+            chunks.resize_with(parts.max(chunks.len()), Chunk::new);
+            let parts = chunks.get_mut(..parts).unwrap_or_default();
+            self.insert_wave(&quantizer, wave, now, parts);
+            for chunk in &mut chunks {
+                report.add(&std::mem::take(&mut chunk.report));
+                self.sums.add(&std::mem::take(&mut chunk.sums));
+            }
+        }
+        report.inserted =
+            report.points - report.not_finite - report.out_of_range - report.list_full;
+        report.new_voxels = self.len() as u64 + report.forgotten_voxels - before as u64;
+        report
+    }
+
+    /// Point by point: knows of each point whether it found room.
+    fn insert_singly(
+        &mut self,
+        quantizer: &BatchQuantizer,
+        offsets_m: &[[f32; 3]],
+        origin: Origin,
+        now: u32,
+        report: &mut InsertReport,
+    ) {
+        let mut room = self.max_voxels.saturating_sub(self.len());
+        let mut place = 0;
+        for_fixed_blocks(quantizer, offsets_m, |offsets_m, block, points| {
+            let (codes, sums) = (block.codes, block.sums);
+            report.count_rejects(quantizer, offsets_m, codes, sums);
+            let mut refused = false;
+            for (i, &code) in codes.iter().enumerate() {
+                let shard = self.shards.get_mut(shard_of(code));
+                let Some(shard) = shard.filter(|_| code != BlockKey::NONE) else {
+                    continue;
+                };
+                let known = shard.len();
+                let limit = known.saturating_add(room);
+                let Some(number) = shard.find_or_add(code, limit, now) else {
+                    report.list_full += 1;
+                    refused = true;
+                    continue;
+                };
+                room -= shard.len() - known;
+                let point = &points.point(i);
+                shard.add(number, point, now);
+                if !self.payload.is_plain() {
+                    let details = details(&self.lattice, code, point, origin, place + i);
+                    shard.columns.add(number as usize, &details);
+                }
+            }
+            place += codes.len();
+            if refused {
+                self.add_sums_of_known(quantizer, offsets_m, codes);
+            } else {
+                self.sums.add_batch(sums);
+            }
+        });
+    }
+
+    /// Adds the quantization errors of a block of which some points were refused.
+    #[cold]
+    fn add_sums_of_known(
+        &mut self,
+        quantizer: &BatchQuantizer,
+        offsets_m: &[[f32; 3]],
+        codes: &[BlockKey],
+    ) {
+        for (&offset, &code) in offsets_m.iter().zip(codes) {
+            let known = |shard: &Shard| shard.get(code).is_some();
+            if code != BlockKey::NONE && self.shard(code).is_some_and(known) {
+                self.sums.add_batch(&quantizer.sums_of(offset));
+            }
+        }
+    }
+
+    /// On the threads of the current pool: first by parts of the points, then by shards. There must be
+    /// room for a voxel for each point.
+    fn insert_wave(
+        &mut self,
+        quantizer: &BatchQuantizer,
+        wave: &[[f32; 3]],
+        now: u32,
+        chunks: &mut [Chunk],
+    ) {
+        let parts = wave.par_chunks(wave.len().div_ceil(chunks.len().max(1)).max(1));
+        let parts = parts.zip(chunks.par_iter_mut());
+        let most_points = most_points(&self.lattice);
+        parts.for_each(|(offsets_m, chunk)| chunk.sort(quantizer, offsets_m, most_points));
+        let shards = self.shards.par_iter_mut().enumerate();
+        shards.for_each(|(part, shard)| {
+            let lists = chunks.iter().filter_map(|chunk| chunk.by_shard.get(part));
+            for batch in lists.flat_map(|list| list.chunks(BATCH)) {
+                shard.add_batch(batch, now);
+            }
+        });
+    }
+}
+
+/// Visits up to a block of points at a time: offsets, cells and errors, fixed-point positions.
+#[inline(always)]
+fn for_fixed_blocks(
+    quantizer: &BatchQuantizer,
+    offsets_m: &[[f32; 3]],
+    mut visit: impl FnMut(&[[f32; 3]], &BatchBlock, &FixedBlock),
+) {
+    let base_m = quantizer.translation_m();
+    let mut place = 0;
+    quantizer.for_blocks_with_sums(offsets_m, |block| {
+        let end = place + block.codes.len();
+        let here = offsets_m.get(place..end).unwrap_or_default();
+        place = end;
+        visit(here, block, &FixedBlock::new(base_m, here, block));
+    });
+}
+
+/// Contribution of a point to the further columns.
+fn details(
+    lattice: &Lattice,
+    code: BlockKey,
+    point: &Point,
+    origin: Origin,
+    place: usize,
+) -> Details {
+    let label = origin.labels.and_then(|labels| labels.get(place).copied());
+    let [x, y, z, _] = offsets_of(lattice, code, point);
+    Details {
+        moments: moments_of([x, y, z], moment_unit_m(lattice)),
+        stamps: Some(Stamps {
+            first_ns: origin.stamp_ns,
+            last_ns: origin.stamp_ns,
+        }),
+        labels: label
+            .map(|label| LabelCount { label, count: 1 })
+            .into_iter()
+            .collect(),
+    }
+}
+
+impl Chunk {
+    fn new() -> Chunk {
+        Chunk {
+            gather: Gather::new(),
+            by_shard: vec![Vec::new(); SHARDS],
+            report: InsertReport::default(),
+            sums: DistortionSums::default(),
+        }
+    }
+
+    /// Gathers points by cell, up to `most_points`, and the cells by shard.
+    fn sort(&mut self, quantizer: &BatchQuantizer, offsets_m: &[[f32; 3]], most_points: u32) {
+        let Chunk {
+            gather,
+            by_shard,
+            report,
+            sums,
+        } = self;
+        by_shard.iter_mut().for_each(Vec::clear);
+        let mut take = |partial: Partial| {
+            if let Some(list) = by_shard.get_mut(shard_of(partial.code)) {
+                list.push(partial);
+            }
+        };
+        for_fixed_blocks(quantizer, offsets_m, |offsets_m, block, points| {
+            report.count_rejects(quantizer, offsets_m, block.codes, block.sums);
+            sums.add_batch(block.sums);
+            let moved = match points.near() {
+                Some((near, base)) => {
+                    gather.add(block.codes, |i| near_point(near, base, i), most_points)
+                }
+                None => gather.add(block.codes, |i| points.point(i), most_points),
+            };
+            let moved = moved.iter().copied();
+            moved
+                .filter(|partial| partial.code != BlockKey::NONE)
+                .for_each(&mut take);
+        });
+        gather.drain().for_each(take);
+    }
+}

@@ -1,0 +1,372 @@
+//! Voxel list: construction, look-up, invariants; each change of a list has a file of its own.
+
+mod changes;
+mod exposed_faces;
+mod forget_old;
+mod insert;
+mod merge;
+mod remove;
+mod when_full;
+
+use std::fmt;
+
+use nalgebra::{Matrix3, Vector3};
+use rayon::prelude::*;
+use thiserror::Error;
+
+use super::distortion::{Distortion, DistortionSums};
+use super::store::fixed_point::{moment_unit_m, reach};
+use super::store::growth;
+use super::store::payload_columns::{Columns, Details, LabelCount, Payload, Stamps};
+use super::store::shard::{Life, SHARDS, Shard, shard_of};
+use super::{Voxel, VoxelStore};
+use crate::cloud::Cloud;
+use crate::lattice::{BlockKey, Lattice, LatticeIndex, MortonKey};
+
+pub use changes::Changes;
+pub use forget_old::NoStamps;
+pub use insert::InsertReport;
+pub use merge::MergeError;
+pub use when_full::WhenFull;
+
+/// The datum is not finite or too many cells from the origin of the map frame.
+#[derive(Clone, Copy, PartialEq, Debug, Error)]
+#[error("datum ({x}, {y}, {z}) m is not finite or more than 2^48 cells from the map origin")]
+pub struct DatumError {
+    /// East, metres.
+    pub x: f64,
+    /// North, metres.
+    pub y: f64,
+    /// Up, metres.
+    pub z: f64,
+}
+
+/// Occupied voxels of a lattice whose indices count from a datum in the map frame.
+///
+/// The datum is a lattice point of the map frame, so that lists with one lattice and datum speak of
+/// the same cells, and points far from the map origin keep all their digits.
+#[derive(Clone)]
+pub struct VoxelList {
+    pub(super) lattice: Lattice,
+    pub(super) datum_index: [i64; 3],
+    pub(super) datum_m: Vector3<f64>,
+    pub(super) max_voxels: usize,
+    pub(super) when_full: WhenFull,
+    pub(super) payload: Payload,
+    pub(super) shards: Vec<Shard>,
+    pub(super) sums: DistortionSums,
+    /// Number of the state.
+    pub(super) sequence: u32,
+    /// State at the last `take_changes`.
+    pub(super) taken: u32,
+}
+
+impl VoxelList {
+    /// An empty list of at most `max_voxels`, with the datum at the lattice point nearest to
+    /// `datum_near_m` (map frame, metres).
+    pub fn new(
+        lattice: Lattice,
+        datum_near_m: Vector3<f64>,
+        max_voxels: usize,
+    ) -> Result<VoxelList, DatumError> {
+        let index = lattice.quantize_wide(&datum_near_m);
+        let [x, y, z] = datum_near_m.into();
+        let datum_index = index.ok_or(DatumError { x, y, z })?;
+        Ok(VoxelList::at_datum(lattice, datum_index, max_voxels))
+    }
+
+    pub(super) fn at_datum(
+        lattice: Lattice,
+        datum_index: [i64; 3],
+        max_voxels: usize,
+    ) -> VoxelList {
+        VoxelList {
+            datum_m: lattice.center_wide(datum_index),
+            shards: vec![Shard::new(&lattice, Columns::new(Payload::default())); SHARDS],
+            lattice,
+            datum_index,
+            max_voxels,
+            when_full: WhenFull::default(),
+            payload: Payload::default(),
+            sums: DistortionSums::default(),
+            sequence: 0,
+            taken: 0,
+        }
+    }
+
+    /// The same list with further columns, empty.
+    pub fn with_payload(self, payload: Payload) -> VoxelList {
+        let mut list = VoxelList::at_datum(self.lattice, self.datum_index, self.max_voxels);
+        list.payload = payload;
+        list.when_full = self.when_full;
+        list.shards = vec![Shard::new(&list.lattice, Columns::new(payload)); SHARDS];
+        list
+    }
+
+    /// Further columns that are kept.
+    pub fn payload(&self) -> Payload {
+        self.payload
+    }
+
+    /// Number of voxels of a payload that surely fit into `max_bytes`, to bound a list by.
+    ///
+    /// Each may be alone in its block and may be remembered as removed: some 350 bytes, where on
+    /// surfaces a voxel takes 46. Of labels a handful a voxel is assumed.
+    pub fn voxels_within(max_bytes: usize, payload: Payload) -> usize {
+        let columns = |kept: bool, bytes: usize| if kept { bytes } else { 0 };
+        let columns = columns(payload.moments, 48)
+            + columns(payload.stamps, 16)
+            + columns(payload.labels, 24 + 8 * 8);
+        // A hash map may be less than half full.
+        let removed = 5 * size_of::<(u64, Life)>() / 2;
+        let voxel = Shard::VOXEL_BYTES + columns + columns / 4 + removed;
+        let first = SHARDS * (Shard::FIRST_BYTES + growth::FIRST * columns);
+        max_bytes.saturating_sub(first) / voxel
+    }
+
+    pub(super) fn shard(&self, code: BlockKey) -> Option<&Shard> {
+        self.shards.get(shard_of(code))
+    }
+
+    /// The lattice.
+    pub fn lattice(&self) -> &Lattice {
+        &self.lattice
+    }
+
+    /// The lattice point that keys count from, map frame, metres.
+    pub fn datum_m(&self) -> Vector3<f64> {
+        self.datum_m
+    }
+
+    /// Index of the datum in the lattice of the map frame: `datum_m` is the generator times this.
+    pub fn datum_index(&self) -> [i64; 3] {
+        self.datum_index
+    }
+
+    /// Most voxels that the list takes.
+    pub fn max_voxels(&self) -> usize {
+        self.max_voxels
+    }
+
+    /// Number of occupied voxels.
+    pub fn len(&self) -> usize {
+        self.shards.iter().map(Shard::len).sum()
+    }
+
+    /// True if no voxel is occupied.
+    pub fn is_empty(&self) -> bool {
+        self.len() == 0
+    }
+
+    /// The voxel of a cell, if occupied.
+    pub fn get(&self, key: MortonKey) -> Option<Voxel> {
+        let code = BlockKey::from(key);
+        let shard = self.shard(code)?;
+        let (_, entry) = shard.get(code)?;
+        Some(shard.voxel(code, entry))
+    }
+
+    /// True if the cell is occupied.
+    pub fn contains(&self, key: MortonKey) -> bool {
+        let code = BlockKey::from(key);
+        self.shard(code)
+            .is_some_and(|shard| shard.get(code).is_some())
+    }
+
+    fn details(&self, key: MortonKey) -> Option<Details> {
+        let code = BlockKey::from(key);
+        let shard = self.shard(code)?;
+        let (number, _) = shard.get(code)?;
+        Some(shard.columns.get(number as usize))
+    }
+
+    /// Stamps of the first and last point in a cell; none if not kept.
+    pub fn stamps(&self, key: MortonKey) -> Option<Stamps> {
+        self.details(key)?.stamps
+    }
+
+    /// Labels of the points in a cell with their counts, by label; empty if not kept.
+    pub fn labels(&self, key: MortonKey) -> Vec<LabelCount> {
+        self.details(key)
+            .map(|details| details.labels)
+            .unwrap_or_default()
+    }
+
+    /// The most frequent label of a cell, the smallest of equals.
+    pub fn label(&self, key: MortonKey) -> Option<LabelCount> {
+        let labels = self.labels(key).into_iter();
+        labels.min_by_key(|counted| (std::cmp::Reverse(counted.count), counted.label))
+    }
+
+    /// Covariance of the points in a cell, m^2; none if not kept or for fewer than two points.
+    pub fn covariance_m2(&self, key: MortonKey) -> Option<Matrix3<f64>> {
+        if !self.payload.moments {
+            return None;
+        }
+        let voxel = self.get(key).filter(|voxel| voxel.count > 1)?;
+        let [xx, xy, xz, yy, yz, zz] = self.details(key)?.moments.map(|m| m as f64);
+        let unit_m = moment_unit_m(&self.lattice);
+        let count = f64::from(voxel.count);
+        let mean = Vector3::from(voxel.mean_offset_m());
+        let raw = Matrix3::new(xx, xy, xz, xy, yy, yz, xz, yz, zz) * (unit_m * unit_m / count);
+        Some((raw - mean * mean.transpose()) * (count / (count - 1.0)))
+    }
+
+    /// Centre of a cell, map frame, metres.
+    pub fn center_m(&self, key: MortonKey) -> Vector3<f64> {
+        self.datum_m + self.lattice.center(key.unpack())
+    }
+
+    /// All voxels in Morton order.
+    pub fn sorted(&self) -> Vec<(MortonKey, Voxel)> {
+        let mut voxels: Vec<_> = self
+            .shards
+            .par_iter()
+            .flat_map_iter(|shard| shard.iter().map(move |cell| (shard, cell)))
+            .filter_map(|(shard, (code, entry))| Some((code.key()?, shard.voxel(code, entry))))
+            .collect();
+        voxels.par_sort_unstable_by_key(|&(key, _)| key);
+        voxels
+    }
+
+    /// All voxels in Morton order, with the further columns.
+    pub(super) fn sorted_columns(&self) -> (Vec<MortonKey>, Vec<Voxel>, Columns) {
+        let mut columns = Columns::new(self.payload);
+        if self.payload.is_plain() {
+            let (keys, voxels) = self.sorted().into_iter().unzip();
+            return (keys, voxels, columns);
+        }
+        let rows = |shard| Shard::iter(shard).enumerate().map(move |row| (shard, row));
+        let mut rows: Vec<_> = (self.shards.iter().flat_map(rows))
+            .filter_map(|(shard, (number, (code, entry)))| {
+                let voxel = shard.voxel(code, entry);
+                Some((code.key()?, voxel, &shard.columns, number))
+            })
+            .collect();
+        rows.par_sort_unstable_by_key(|&(key, ..)| key);
+        let cells = rows.into_iter().map(|(key, voxel, theirs, number)| {
+            columns.push_row(theirs, number);
+            (key, voxel)
+        });
+        let (keys, voxels) = cells.unzip();
+        (keys, voxels, columns)
+    }
+
+    /// Quantization error over all points that were inserted, also of voxels removed since.
+    pub fn distortion(&self) -> Distortion {
+        self.sums.summary(&self.lattice)
+    }
+
+    /// Empties the list and its statistics; keeps lattice, datum and bound.
+    pub fn clear(&mut self) {
+        let now = self.advance();
+        self.shards.iter_mut().for_each(|shard| shard.clear(now));
+        self.sums = DistortionSums::default();
+        self.bound_removed();
+    }
+
+    /// Checks everything that must hold between calls; says what does not.
+    pub fn validate(&self) -> Result<(), String> {
+        let reach = reach(&self.lattice);
+        if self.len() > self.max_voxels {
+            return Err(format!(
+                "{} voxels, but at most {} allowed",
+                self.len(),
+                self.max_voxels
+            ));
+        }
+        let mut counted = 0_u64;
+        for shard in &self.shards {
+            shard.validate()?;
+            for (code, entry) in shard.iter() {
+                let voxel = shard.voxel(code, entry);
+                if let Some(reason) = voxel.contradiction(reach) {
+                    return Err(format!("voxel {:?}: {reason}", code.unpack()));
+                }
+                if entry.life.touched > self.sequence {
+                    return Err(format!("voxel {:?} is of a later state", code.unpack()));
+                }
+                counted = counted.saturating_add(voxel.count.into());
+            }
+        }
+        if let Some(reason) = self.sums.contradiction(&self.lattice) {
+            return Err(reason);
+        }
+        if counted > self.sums.points {
+            return Err(format!(
+                "voxels hold {counted} points, statistics {}",
+                self.sums.points
+            ));
+        }
+        Ok(())
+    }
+}
+
+impl VoxelStore for VoxelList {
+    fn lattice(&self) -> &Lattice {
+        &self.lattice
+    }
+
+    fn datum_index(&self) -> [i64; 3] {
+        self.datum_index
+    }
+
+    fn datum_m(&self) -> Vector3<f64> {
+        self.datum_m
+    }
+
+    fn len(&self) -> usize {
+        VoxelList::len(self)
+    }
+
+    fn contains(&self, key: MortonKey) -> bool {
+        VoxelList::contains(self, key)
+    }
+
+    fn sorted_keys(&self) -> Vec<MortonKey> {
+        let cells = self.shards.iter().flat_map(Shard::iter);
+        let mut keys: Vec<MortonKey> = cells.filter_map(|(code, _)| code.key()).collect();
+        keys.par_sort_unstable();
+        keys
+    }
+
+    fn insert(&mut self, cloud: &Cloud) -> InsertReport {
+        VoxelList::insert(self, cloud)
+    }
+
+    fn remove(&mut self, key: MortonKey) -> bool {
+        let now = self.advance();
+        let code = BlockKey::from(key);
+        let shard = self.shards.get_mut(shard_of(code));
+        let removed = shard.is_some_and(|shard| shard.remove(code, now));
+        self.bound_removed();
+        removed
+    }
+
+    fn retain_cells(
+        &mut self,
+        keep_block: &(dyn Fn(LatticeIndex) -> Option<bool> + Sync),
+        keep: &(dyn Fn(MortonKey) -> bool + Sync),
+    ) -> usize {
+        self.retain_in_blocks(keep_block, keep)
+    }
+
+    fn bytes(&self) -> usize {
+        self.shards.iter().map(Shard::bytes).sum()
+    }
+}
+
+impl fmt::Debug for VoxelList {
+    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
+        let datum: [f64; 3] = self.datum_m.into();
+        write!(
+            f,
+            "VoxelList({:?}, datum {datum:?} m, {} voxels)",
+            self.lattice,
+            self.len()
+        )
+    }
+}
+
+#[cfg(test)]
+mod tests;

@@ -1,0 +1,190 @@
+//! Positions in fixed point.
+
+use wide::u32x4;
+
+use crate::lattice::{BatchBlock, BatchQuantizer, BlockKey, Lattice, nearest_integer};
+use crate::voxels::{OFFSET_UNIT_M, Voxel};
+
+const PER_METRE: f64 = 1.0 / OFFSET_UNIT_M;
+
+/// Sums of positions from the datum in `OFFSET_UNIT_M`, modulo 2^32, and the number of points.
+///
+/// With the cell known, the sums of [`most_points`] are known from its centre.
+pub(crate) type Point = u32x4;
+
+/// Sums of offsets from the centre of a cell in `OFFSET_UNIT_M`, and the number of points.
+pub(crate) type Offsets = [i64; 4];
+
+/// No point is farther from its lattice point than this, in `OFFSET_UNIT_M`, roundings included.
+pub(crate) fn reach(lattice: &Lattice) -> u64 {
+    (lattice.covering_radius_m() * PER_METRE) as u64 + 2
+}
+
+/// The greatest number of points of a cell whose sums of offsets surely fit 32 bits: 1 at least, since
+/// no covering radius takes more.
+pub(crate) fn most_points(lattice: &Lattice) -> u32 {
+    (i32::MAX as u64 / reach(lattice)).max(1) as u32
+}
+
+/// A position (metres) in `OFFSET_UNIT_M`.
+#[inline(always)]
+pub(crate) fn fixed(metres: [f64; 3]) -> [i64; 3] {
+    metres.map(|m| nearest_integer(m * PER_METRE))
+}
+
+/// The points of a block in fixed point from the datum.
+///
+/// The base is rounded, then the offset, so that neither the other points of a cloud nor the way it
+/// is cut into blocks matters.
+#[derive(Clone, Copy)]
+pub(crate) struct FixedBlock<'a> {
+    base: Point,
+    offsets_m: &'a [[f32; 3]],
+    near: Option<&'a [[i32; BatchQuantizer::BLOCK]; 3]>,
+}
+
+impl FixedBlock<'_> {
+    /// Points at `base_m + offset`.
+    pub(crate) fn new<'a>(
+        base_m: [f64; 3],
+        offsets_m: &'a [[f32; 3]],
+        block: &BatchBlock<'a>,
+    ) -> FixedBlock<'a> {
+        FixedBlock {
+            base: point_at(fixed(base_m).map(low), 0),
+            offsets_m,
+            near: (!block.sums.far).then_some(block.fixed),
+        }
+    }
+
+    /// The coordinates from the base, unless some point is far.
+    #[inline(always)]
+    pub(crate) fn near(&self) -> Option<(&[[i32; BatchQuantizer::BLOCK]; 3], Point)> {
+        Some((self.near?, self.base))
+    }
+
+    /// Point number `i`.
+    #[inline(always)]
+    pub(crate) fn point(&self, i: usize) -> Point {
+        match self.near {
+            Some(near) => near_point(near, self.base, i),
+            None => self.base + point_at(self.far(i), 1),
+        }
+    }
+
+    #[cold]
+    fn far(&self, i: usize) -> [u32; 3] {
+        let offset = self.offsets_m.get(i).copied().unwrap_or_default();
+        fixed(offset.map(f64::from)).map(low)
+    }
+}
+
+/// Point number `i` of those whose coordinates from the base fit 32 bits.
+#[inline(always)]
+pub(crate) fn near_point(
+    [x, y, z]: &[[i32; BatchQuantizer::BLOCK]; 3],
+    base: Point,
+    i: usize,
+) -> Point {
+    let i = i % BatchQuantizer::BLOCK;
+    base + point_at([x[i], y[i], z[i]].map(|c| c as u32), 1)
+}
+
+#[inline(always)]
+fn point_at([x, y, z]: [u32; 3], count: u32) -> Point {
+    Point::new([x, y, z, count])
+}
+
+/// Modulo 2^32.
+#[inline(always)]
+fn low(value: i64) -> u32 {
+    value as u32
+}
+
+/// The centre of a cell from the datum, modulo 2^32.
+#[inline]
+fn low_center(lattice: &Lattice, code: BlockKey) -> [u32; 3] {
+    fixed(lattice.center(code.unpack()).into()).map(low)
+}
+
+/// At most [`most_points`] of a cell as offsets from its centre.
+#[inline]
+pub(crate) fn offsets_of(lattice: &Lattice, code: BlockKey, points: &Point) -> Offsets {
+    let center = low_center(lattice, code);
+    let [x, y, z, count] = points.to_array();
+    let offset = |sum: u32, center: u32| {
+        let rest = sum.wrapping_sub(center.wrapping_mul(count));
+        i64::from(rest as i32)
+    };
+    [
+        offset(x, center[0]),
+        offset(y, center[1]),
+        offset(z, center[2]),
+        i64::from(count),
+    ]
+}
+
+/// The inverse of [`offsets_of`].
+#[inline]
+pub(crate) fn points_of(lattice: &Lattice, code: BlockKey, offsets: &Offsets) -> Point {
+    let center = low_center(lattice, code);
+    let [.., count] = offsets.map(low);
+    let sum = |i: usize| low(offsets[i]).wrapping_add(center[i].wrapping_mul(count));
+    Point::new([sum(0), sum(1), sum(2), count])
+}
+
+/// A voxel of these points.
+#[inline]
+pub(crate) fn voxel_of([x, y, z, count]: Offsets) -> Voxel {
+    Voxel {
+        count: u32::try_from(count).unwrap_or(u32::MAX),
+        sum: [x, y, z],
+    }
+}
+
+/// The points of a voxel.
+#[inline]
+pub(crate) fn offsets_in(voxel: &Voxel) -> Offsets {
+    let [x, y, z] = voxel.sum;
+    [x, y, z, i64::from(voxel.count)]
+}
+
+/// Unit of second moments: offsets are counted in a 2^16th of the covering radius, so that the moments
+/// of 2^31 points fit.
+pub(crate) fn moment_unit_m(lattice: &Lattice) -> f64 {
+    lattice.covering_radius_m() / f64::from(1_u32 << 16)
+}
+
+/// Contribution to the moments of a point at `offset` from its cell's centre.
+pub(crate) fn moments_of(offset: [i64; 3], unit_m: f64) -> [i64; 6] {
+    let [x, y, z] = offset.map(|o| nearest_integer(o as f64 * OFFSET_UNIT_M / unit_m));
+    [x * x, x * y, x * z, y * y, y * z, z * z]
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::lattice::LatticeKind;
+    use proptest::prelude::*;
+
+    proptest! {
+        #[test]
+        fn sums_wrap_and_come_back(
+            kind in 0..5_usize,
+            log_side in -6.0..9.9_f64,
+            w in prop::array::uniform3(-1_000_000..1_000_000_i32),
+            share in 0.0..=1.0,
+            sum in prop::array::uniform3(-1.0..=1.0),
+        ) {
+            let lattice = Lattice::new(LatticeKind::ALL[kind], log_side.exp2().powi(3)).unwrap();
+            let code = BlockKey::pack(w).unwrap();
+            let most = i64::from(most_points(&lattice));
+            let count = ((most as f64 * share) as i64 + 1).min(most);
+            let reach = reach(&lattice) as i64;
+            let [x, y, z] = sum.map(|s: f64| (s * (count * reach) as f64) as i64);
+            let offsets = [x, y, z, count];
+            let points = points_of(&lattice, code, &offsets);
+            prop_assert_eq!(offsets_of(&lattice, code, &points), offsets);
+        }
+    }
+}

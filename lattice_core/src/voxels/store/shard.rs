@@ -1,0 +1,299 @@
+//! A part of a voxel list that one thread fills.
+
+use rustc_hash::FxHashMap;
+
+use super::cell_table::CellTable;
+use super::fixed_point::{Offsets, Point, most_points, offsets_of, points_of, voxel_of};
+use super::hash_table::Place;
+use super::payload_columns::Columns;
+use super::point_gather::Partial;
+use super::wide_sums::WideSums;
+use crate::lattice::{BlockKey, Lattice};
+use crate::voxels::Voxel;
+
+/// Number of parts of a list.
+pub(crate) const SHARDS: usize = 16;
+
+/// Cells that are searched together.
+pub(crate) const BATCH: usize = 128;
+
+/// States of the list in which a voxel came and last changed.
+#[derive(Clone, Copy, PartialEq, Eq, Debug)]
+pub(crate) struct Life {
+    pub(crate) born: u32,
+    pub(crate) touched: u32,
+}
+
+impl Life {
+    fn ended(self, now: u32) -> Life {
+        Life {
+            born: self.born,
+            touched: now,
+        }
+    }
+}
+
+/// A voxel.
+#[derive(Clone)]
+pub(crate) struct Entry {
+    pub(crate) code: u64,
+    /// Sums of up to [`most_points`]; of more the number of their [`WideSums`], and the count.
+    points: Point,
+    pub(crate) life: Life,
+}
+
+/// The voxels of some blocks, in the order of their arrival.
+#[derive(Clone)]
+pub(crate) struct Shard {
+    pub(crate) voxels: CellTable,
+    pub(crate) columns: Columns,
+    lattice: Lattice,
+    most_points: u32,
+    wide: WideSums,
+    /// Voxels that went: when they had come, and when they went.
+    pub(crate) removed: FxHashMap<u64, Life>,
+}
+
+impl Entry {
+    /// Number of points; stays at `u32::MAX` once there.
+    #[inline(always)]
+    pub(crate) fn count(&self) -> u32 {
+        self.points.as_array()[3]
+    }
+
+    /// Number of the sums of a voxel of many points.
+    fn wide(&self) -> u32 {
+        self.points.as_array()[0]
+    }
+}
+
+/// Number of the shard of a cell; all cells of a block belong to one.
+#[inline(always)]
+pub(crate) fn shard_of(code: BlockKey) -> usize {
+    (code.block().wrapping_mul(0x9e37_79b9_7f4a_7c15) >> 60) as usize
+}
+
+impl Shard {
+    /// Most bytes for a voxel, its columns and its memory once it is removed aside.
+    pub(crate) const VOXEL_BYTES: usize = CellTable::VOXEL_BYTES + WideSums::ROW_BYTES;
+    /// Most bytes besides those of voxels.
+    pub(crate) const FIRST_BYTES: usize = CellTable::FIRST_BYTES + WideSums::FIRST_BYTES;
+
+    pub(crate) fn new(lattice: &Lattice, columns: Columns) -> Shard {
+        Shard {
+            voxels: CellTable::new(),
+            columns,
+            lattice: lattice.clone(),
+            most_points: most_points(lattice),
+            wide: WideSums::new(),
+            removed: FxHashMap::default(),
+        }
+    }
+
+    pub(crate) fn len(&self) -> usize {
+        self.voxels.len()
+    }
+
+    pub(crate) fn bytes(&self) -> usize {
+        self.voxels.bytes()
+            + self.columns.bytes()
+            + self.wide.bytes()
+            + self.removed.capacity() * (size_of::<(u64, Life)>() + 1)
+    }
+
+    /// The voxel of a cell, with its number.
+    #[inline]
+    pub(crate) fn get(&self, code: BlockKey) -> Option<(u32, &Entry)> {
+        let number = self.voxels.find(code)?;
+        Some((number, self.voxels.rows().get(number as usize)?))
+    }
+
+    /// The number of a cell, which becomes a voxel if fewer than `limit` are there.
+    #[inline(always)]
+    pub(crate) fn find_or_add(&mut self, code: BlockKey, limit: usize, now: u32) -> Option<u32> {
+        let empty = || Entry {
+            code: code.raw(),
+            points: Point::ZERO,
+            life: Life {
+                born: now,
+                touched: now,
+            },
+        };
+        match self.voxels.find_or_add(code, limit, empty)? {
+            Place::Known(number) => Some(number),
+            Place::New(number) => {
+                if !self.columns.payload().is_plain() {
+                    self.columns.push();
+                }
+                self.remember(code.raw(), number);
+                Some(number)
+            }
+        }
+    }
+
+    /// Takes back the removal of a voxel that comes again, for consumers that know it still.
+    #[inline]
+    fn remember(&mut self, code: u64, number: u32) {
+        if self.removed.is_empty() {
+            return;
+        }
+        if let Some(before) = self.removed.remove(&code)
+            && let Some(entry) = self.voxels.row_mut(number)
+        {
+            entry.life.born = before.born;
+        }
+    }
+
+    /// Adds up to [`most_points`] to a voxel.
+    #[inline(always)]
+    pub(crate) fn add(&mut self, number: u32, points: &Point, now: u32) {
+        let Some(entry) = self.voxels.row_mut(number) else {
+            return;
+        };
+        entry.life.touched = now;
+        if entry.count().saturating_add(points.as_array()[3]) > self.most_points {
+            self.add_wide(number, |lattice, code| offsets_of(lattice, code, points));
+            return;
+        }
+        entry.points += *points;
+    }
+
+    /// Adds any number of points to a voxel.
+    pub(crate) fn add_offsets(&mut self, number: u32, offsets: &Offsets, now: u32) {
+        match self.voxels.row_mut(number) {
+            Some(entry) if offsets[3] <= i64::from(self.most_points) => {
+                let code = BlockKey::from_raw(entry.code).unwrap_or(BlockKey::NONE);
+                self.add(number, &points_of(&self.lattice, code, offsets), now);
+            }
+            Some(entry) => {
+                entry.life.touched = now;
+                self.add_wide(number, |_, _| *offsets);
+            }
+            None => {}
+        }
+    }
+
+    #[cold]
+    fn add_wide(&mut self, number: u32, more: impl FnOnce(&Lattice, BlockKey) -> Offsets) {
+        let Some(entry) = self.voxels.row_mut(number) else {
+            return;
+        };
+        let code = BlockKey::from_raw(entry.code).unwrap_or(BlockKey::NONE);
+        let wide = if entry.count() <= self.most_points {
+            self.wide
+                .put(offsets_of(&self.lattice, code, &entry.points))
+        } else {
+            entry.wide()
+        };
+        let count = self.wide.add(wide, &more(&self.lattice, code));
+        let count = u32::try_from(count).unwrap_or(u32::MAX);
+        entry.points = Point::new([wide, 0, 0, count]);
+    }
+
+    /// Offset sums of the points of a voxel.
+    #[inline]
+    pub(crate) fn offsets(&self, code: BlockKey, entry: &Entry) -> Offsets {
+        if entry.count() <= self.most_points {
+            offsets_of(&self.lattice, code, &entry.points)
+        } else {
+            self.wide.get(entry.wide())
+        }
+    }
+
+    /// A voxel as others see it.
+    #[inline]
+    pub(crate) fn voxel(&self, code: BlockKey, entry: &Entry) -> Voxel {
+        voxel_of(self.offsets(code, entry))
+    }
+
+    /// Adds the gathered points of cells of this shard in steps, so that the waits for memory of
+    /// one step overlap.
+    pub(crate) fn add_batch(&mut self, batch: &[Partial], now: u32) {
+        #[cfg(target_arch = "x86_64")]
+        if is_x86_feature_detected!("popcnt") {
+            // SAFETY: the machine has the instruction.
+            #[allow(unsafe_code)]
+            return unsafe { self.add_batch_popcnt(batch, now) };
+        }
+        self.add_batch_anywhere(batch, now);
+    }
+
+    /// With an instruction that counts bits, for the ranks of voxels in their blocks.
+    #[cfg(target_arch = "x86_64")]
+    #[target_feature(enable = "popcnt")]
+    fn add_batch_popcnt(&mut self, batch: &[Partial], now: u32) {
+        self.add_batch_anywhere(batch, now);
+    }
+
+    #[inline(always)]
+    fn add_batch_anywhere(&mut self, batch: &[Partial], now: u32) {
+        for partial in batch {
+            self.voxels.prefetch_block(partial.code);
+        }
+        let mut places = [None; BATCH];
+        for (place, partial) in places.iter_mut().zip(batch) {
+            *place = self.voxels.block_of(partial.code);
+        }
+        // From the numbers of blocks to those of voxels.
+        for (place, partial) in places.iter_mut().zip(batch) {
+            let known = place.and_then(|block| self.voxels.find_in(block, partial.code));
+            *place = match known {
+                Some(number) => Some(number),
+                None => self.find_or_add(partial.code, usize::MAX, now),
+            };
+        }
+        for (place, partial) in places.iter().zip(batch) {
+            if let Some(number) = *place {
+                self.add(number, &partial.points, now);
+            }
+        }
+    }
+
+    /// Removes a voxel; false if it was not there.
+    pub(crate) fn remove(&mut self, code: BlockKey, now: u32) -> bool {
+        let Some((number, entry)) = self.voxels.remove(code) else {
+            return false;
+        };
+        if entry.count() > self.most_points {
+            self.wide.free(entry.wide());
+        }
+        self.columns.swap_remove(number as usize);
+        self.removed.insert(code.raw(), entry.life.ended(now));
+        true
+    }
+
+    /// Removes all voxels.
+    pub(crate) fn clear(&mut self, now: u32) {
+        for entry in self.voxels.rows() {
+            self.removed.insert(entry.code, entry.life.ended(now));
+        }
+        self.voxels.clear();
+        self.wide.clear();
+        self.columns.clear();
+    }
+
+    /// Every voxel with its cell.
+    pub(crate) fn iter(&self) -> impl Iterator<Item = (BlockKey, &Entry)> {
+        let rows = self.voxels.rows().iter();
+        rows.filter_map(|entry| Some((BlockKey::from_raw(entry.code)?, entry)))
+    }
+
+    pub(crate) fn validate(&self) -> Result<(), String> {
+        self.voxels.validate()?;
+        if !self.columns.fits(self.len()) {
+            return Err("the columns of a shard differ in length".to_owned());
+        }
+        let rows = || self.voxels.rows().iter();
+        let is_wide = |entry: &&Entry| entry.count() > self.most_points;
+        if rows().filter(is_wide).count() != self.wide.used() {
+            return Err("sums of many points are lost or belong to no voxel".to_owned());
+        }
+        if rows().any(|entry| entry.life.born > entry.life.touched) {
+            return Err("a voxel changed before it came".to_owned());
+        }
+        match rows().find(|entry| self.removed.contains_key(&entry.code)) {
+            Some(entry) => Err(format!("removed voxel {:#x} is in the list", entry.code)),
+            None => Ok(()),
+        }
+    }
+}

@@ -1,0 +1,91 @@
+//! Interface of all stores of occupied voxels.
+
+use nalgebra::Vector3;
+
+use super::{InsertReport, MergeError, Region};
+use crate::cloud::Cloud;
+use crate::lattice::{Lattice, LatticeIndex, MortonKey};
+
+/// Occupied voxels of a lattice whose indices count from a datum in the map frame.
+///
+/// Two stores implement it: [`super::VoxelList`] keeps a payload for each voxel,
+/// `OccupancyList` keeps one bit. Queries, set operations and files are written against this trait.
+pub trait VoxelStore: Sync {
+    /// The lattice; its indices count from [`VoxelStore::datum_index`].
+    fn lattice(&self) -> &Lattice;
+
+    /// Index of the datum in the lattice of the map frame.
+    fn datum_index(&self) -> [i64; 3];
+
+    /// The lattice point that keys count from, map frame, metres.
+    fn datum_m(&self) -> Vector3<f64>;
+
+    /// Number of occupied voxels.
+    fn len(&self) -> usize;
+
+    /// True if the cell is occupied.
+    fn contains(&self, key: MortonKey) -> bool;
+
+    /// All occupied cells in ascending (Morton) order.
+    fn sorted_keys(&self) -> Vec<MortonKey>;
+
+    /// Adds every finite point in range to its cell.
+    fn insert(&mut self, cloud: &Cloud) -> InsertReport;
+
+    /// Removes a voxel; false if the cell was not occupied.
+    fn remove(&mut self, key: MortonKey) -> bool;
+
+    /// Removes the cells that `keep` denies; gives their number.
+    ///
+    /// A block of 8 x 8 x 8 indices, given by its lowest, is kept or removed as a whole if
+    /// `keep_block` says so; `keep` is asked about the cells of the others. Both are called in no
+    /// order and on many threads.
+    fn retain_cells(
+        &mut self,
+        keep_block: &(dyn Fn(LatticeIndex) -> Option<bool> + Sync),
+        keep: &(dyn Fn(MortonKey) -> bool + Sync),
+    ) -> usize;
+
+    /// Memory that the store holds, bytes.
+    fn bytes(&self) -> usize;
+
+    /// True if no voxel is occupied.
+    fn is_empty(&self) -> bool {
+        self.len() == 0
+    }
+
+    /// Centre of a cell, map frame, metres.
+    fn center_m(&self, key: MortonKey) -> Vector3<f64> {
+        self.datum_m() + self.lattice().center(key.unpack())
+    }
+
+    /// The cell of a point (map frame, metres), `None` if not finite or out of the range of keys.
+    fn key_of(&self, point_m: &Vector3<f64>) -> Option<MortonKey> {
+        let w = self.lattice().quantize(&(point_m - self.datum_m()))?;
+        MortonKey::pack(w)
+    }
+
+    /// Fails unless a key means the same cell in both stores.
+    fn expect_cells_of(&self, other: &dyn VoxelStore) -> Result<(), MergeError> {
+        if self.lattice() != other.lattice() {
+            return Err(MergeError::Lattice {
+                ours: format!("{:?}", self.lattice()),
+                theirs: format!("{:?}", other.lattice()),
+            });
+        }
+        if self.datum_index() != other.datum_index() {
+            let (ours, theirs) = (self.datum_m().into(), other.datum_m().into());
+            return Err(MergeError::Datum { ours, theirs });
+        }
+        Ok(())
+    }
+
+    /// Removes the cells with their centre in a region; gives their number.
+    fn remove_region(&mut self, region: &Region) -> usize {
+        let cells = region.of_cells(self.lattice(), self.datum_m());
+        self.retain_cells(
+            &|first| cells.block_is_inside(first).map(|inside| !inside),
+            &|key| !cells.is_inside(key),
+        )
+    }
+}

@@ -1,0 +1,147 @@
+//! The testbed of the trials: the house, the robot's maps of it and the views of the headset.
+
+use std::sync::OnceLock;
+use std::time::Instant;
+
+use crate::simulate::house::{
+    HeadsetOptions, HeadsetTrial, House, HouseScan, LabelDraw, Scene, Survey, SurveyMap,
+    SurveyOptions,
+};
+use lattice_core::lattice::{Lattice, LatticeKind};
+use lattice_core::registration::{
+    CalibrationMap, HeadsetScan, PrepareOptions, PreparedCloud, SemanticCloud, voxel_downsample,
+};
+use nalgebra::{Isometry3, Point3, Vector3};
+
+use super::initial_guess::seed_of;
+use super::settings::{Pivot, Settings};
+use crate::AnyError;
+
+/// Purposes of seeds.
+const LABELS: u64 = 1;
+const SURVEY: u64 = 2;
+const VIEW: u64 = 3;
+
+/// A house with the maps of several surveys, shared by all trials.
+pub struct Testbed {
+    house: House,
+    settings: Settings,
+    lattice: Lattice,
+    surveys: Vec<OnceLock<Result<SurveyMap, String>>>,
+}
+
+/// A view of the headset.
+pub struct View {
+    scene: Scene,
+    seed: u64,
+    trial: HeadsetTrial,
+}
+
+/// A view and a map with the labels of one draw.
+pub struct Scenario {
+    /// Prepared map; also the target of single registrations.
+    pub map: CalibrationMap,
+    /// Scans of the headset.
+    pub headset_scans: Vec<HeadsetScan>,
+    /// All points of the headset as one cloud.
+    pub full: PreparedCloud,
+    /// The cloud thinned to the cells of the map: the source of single registrations.
+    pub source: PreparedCloud,
+    /// Point at which starts are moved and turned, in the headset's frame.
+    pub pivot_m: Point3<f64>,
+    /// `map_from_headset`.
+    pub truth: Isometry3<f64>,
+    /// Share of the view whose labels differ between map and headset.
+    pub different_share: f64,
+    /// Time to prepare the map, milliseconds.
+    pub map_ms: f64,
+}
+
+impl Testbed {
+    /// A testbed in a house.
+    pub fn new(house: House, settings: &Settings) -> Result<Testbed, AnyError> {
+        let cell_volume_m3 = settings.cell_side_m.powi(3);
+        Ok(Testbed {
+            lattice: Lattice::new(LatticeKind::Cubic, cell_volume_m3)?,
+            surveys: (0..settings.map_seeds.clamp(1, 1000))
+                .map(|_| OnceLock::new())
+                .collect(),
+            settings: settings.clone(),
+            house,
+        })
+    }
+
+    /// The house.
+    pub fn house(&self) -> &House {
+        &self.house
+    }
+
+    /// The headset's view of a scene.
+    pub fn view(&self, scene: Scene, seed: u64) -> Result<View, AnyError> {
+        let options = HeadsetOptions {
+            headset_scans: self.settings.headset_scans,
+            ..HeadsetOptions::default()
+        };
+        let trial = HeadsetTrial::new(&self.house, scene, &options, seed_of(&[VIEW, seed]))?;
+        Ok(View { scene, seed, trial })
+    }
+
+    /// The view and the map with a share `q` of the view labelled wrongly.
+    pub fn scenario(&self, view: &View, q: f64) -> Result<Scenario, AnyError> {
+        // The same for every q, so that the wrong regions of a small q are wrong at a larger one too.
+        let seed = seed_of(&[LABELS, view.seed, view.scene as u64]);
+        let draw = LabelDraw::new(&self.house, std::slice::from_ref(&view.trial), q, seed)?;
+        let map = self.survey(view.seed)?.cloud(&draw.map);
+        let scan = |scan: &HouseScan| HeadsetScan {
+            cloud: draw.headset.cloud(&scan.points_m, &scan.regions),
+            sensor_m: Some(scan.sensor_m),
+        };
+        let headset_scans: Vec<HeadsetScan> = view.trial.headset_scans.iter().map(scan).collect();
+        let mut all = SemanticCloud::default();
+        for headset_scan in &headset_scans {
+            all.points_m.extend_from_slice(&headset_scan.cloud.points_m);
+            all.labels.extend_from_slice(&headset_scan.cloud.labels);
+        }
+        let middle = all.points_m.iter().map(|p| p.coords).sum::<Vector3<f64>>();
+        let pivot_m = match self.settings.pivot {
+            Pivot::View => Some((middle / all.len().max(1) as f64).into()),
+            Pivot::Headset => view
+                .trial
+                .headset_scans
+                .first()
+                .map(|headset_scan| headset_scan.sensor_m),
+        };
+        let thinned = voxel_downsample(&all, self.settings.cell_side_m);
+        let started = Instant::now();
+        let map = CalibrationMap::new(map, self.settings.cell_side_m)?;
+        Ok(Scenario {
+            map_ms: started.elapsed().as_secs_f64() * 1e3,
+            map,
+            headset_scans,
+            source: PreparedCloud::new(thinned, &PrepareOptions::default())?,
+            full: PreparedCloud::new(all, &PrepareOptions::default())?,
+            pivot_m: pivot_m.unwrap_or_default(),
+            truth: view.trial.map_from_headset,
+            different_share: draw.different_share,
+        })
+    }
+
+    /// The robot's map for a seed, surveyed when it is first needed.
+    fn survey(&self, seed: u64) -> Result<&SurveyMap, AnyError> {
+        let number = seed % self.surveys.len() as u64;
+        let make = || -> Result<SurveyMap, AnyError> {
+            let options = SurveyOptions {
+                views: self.settings.survey_views,
+                ..SurveyOptions::default()
+            };
+            let survey = Survey::new(&self.house, &options, seed_of(&[SURVEY, number]))?;
+            SurveyMap::new(&survey, &self.lattice)
+        };
+        let slot = self
+            .surveys
+            .get(number as usize)
+            .ok_or("no map of that number")?;
+        let made = slot.get_or_init(|| make().map_err(|error| error.to_string()));
+        made.as_ref().map_err(|error| error.clone().into())
+    }
+}

@@ -1,0 +1,354 @@
+//! Reports of papers and evaluations: sections with tables, pictures and, for a paper, a claim and a verdict.
+//!
+//! A report holds no time, no path and no count of threads, so that the same seed gives the same bytes.
+
+mod files;
+mod html;
+mod markdown;
+mod picture;
+pub mod plot;
+
+use serde::ser::SerializeStruct;
+use serde::{Serialize, Serializer};
+
+pub use files::write;
+pub use html::escaped;
+pub use markdown::markdown;
+
+/// A report of one paper or one evaluation.
+#[derive(Clone, PartialEq, Debug, Serialize)]
+pub struct Report {
+    title: String,
+    lead: String,
+    command: String,
+    version: &'static str,
+    sections: Vec<Section>,
+}
+
+/// The head of a report.
+#[derive(Clone, PartialEq, Debug)]
+pub struct Head {
+    /// Title; for a paper with its authors.
+    pub title: String,
+    /// A paragraph on the whole.
+    pub lead: String,
+    /// Command line, without the folder that it was written to.
+    pub command: String,
+}
+
+impl Head {
+    /// The head of a paper's report.
+    pub fn of_paper(title: &str, command: String, quick: bool) -> Head {
+        let lead = match quick {
+            true => {
+                "Each table and figure computed anew. A quick run: fewer samples and trials than a full report."
+            }
+            false => "Each table and figure computed anew.",
+        };
+        Head {
+            title: title.to_owned(),
+            lead: lead.to_owned(),
+            command,
+        }
+    }
+}
+
+impl Report {
+    /// A report of sections in their order. One that claims to be reproduced, corrected or not, while a
+    /// check of it fails becomes one that is not.
+    pub fn new(head: Head, sections: Vec<Section>) -> Report {
+        Report {
+            title: head.title,
+            lead: head.lead,
+            command: head.command,
+            version: env!("CARGO_PKG_VERSION"),
+            sections: sections.into_iter().map(Section::settled).collect(),
+        }
+    }
+
+    /// Sections in their order.
+    pub fn sections(&self) -> &[Section] {
+        &self.sections
+    }
+
+    /// Checks that fail, each with its section.
+    pub fn failing(&self) -> impl Iterator<Item = (&Section, &Check)> {
+        let sections = self.sections.iter();
+        sections.flat_map(|section| section.failing().map(move |check| (section, check)))
+    }
+}
+
+/// One equation, table or figure of a paper, or one question of an evaluation.
+#[derive(Clone, PartialEq, Debug, Serialize)]
+pub struct Section {
+    /// Anchor and stem of its files: `fig5`, `table1`.
+    pub id: String,
+    /// Heading: "Fig. 5: distortion and voxel count under rotation".
+    pub title: String,
+    /// Claim of the paper in our words; empty for an evaluation.
+    pub claim: String,
+    /// Our finding.
+    pub finding: String,
+    /// Verdict on the claim.
+    pub verdict: Verdict,
+    /// Numbers with a value to meet.
+    pub checks: Vec<Check>,
+    /// Tables with all numbers.
+    pub tables: Vec<Table>,
+    /// Pictures.
+    pub figures: Vec<Figure>,
+}
+
+impl Section {
+    /// A section of an evaluation.
+    pub fn measured(id: &str, title: &str, finding: impl Into<String>) -> Section {
+        Section {
+            id: id.to_owned(),
+            title: title.to_owned(),
+            claim: String::new(),
+            finding: finding.into(),
+            verdict: Verdict::Measured,
+            checks: Vec::new(),
+            tables: Vec::new(),
+            figures: Vec::new(),
+        }
+    }
+
+    /// Checks that do not hold.
+    pub fn failing(&self) -> impl Iterator<Item = &Check> {
+        self.checks.iter().filter(|check| !check.holds())
+    }
+
+    /// The section with a verdict that its checks allow.
+    fn settled(mut self) -> Section {
+        let claims = matches!(self.verdict, Verdict::Reproduced | Verdict::Corrected(_));
+        let names: Vec<&str> = self.failing().map(|check| check.name.as_str()).collect();
+        if claims && !names.is_empty() {
+            self.verdict = Verdict::NotReproduced(format!("checks fail: {}", names.join("; ")));
+        }
+        self
+    }
+}
+
+/// Verdict on a claim.
+#[derive(Clone, PartialEq, Debug, Serialize)]
+#[serde(tag = "verdict", content = "why", rename_all = "snake_case")]
+pub enum Verdict {
+    /// Result as in the paper.
+    Reproduced,
+    /// Result as in the paper once this is corrected.
+    Corrected(String),
+    /// Not to be settled without these data, which we do not have.
+    DependsOnData(String),
+    /// Not as the paper says.
+    NotReproduced(String),
+    /// Measured, without a claim.
+    Measured,
+}
+
+impl Verdict {
+    /// Name in a few words.
+    pub fn name(&self) -> &'static str {
+        match self {
+            Self::Reproduced => "reproduced",
+            Self::Corrected(_) => "reproduced, corrected",
+            Self::DependsOnData(_) => "depends on data we do not have",
+            Self::NotReproduced(_) => "not reproduced",
+            Self::Measured => "measured",
+        }
+    }
+
+    /// Correction, data or reason.
+    pub fn why(&self) -> &str {
+        match self {
+            Self::Reproduced | Self::Measured => "",
+            Self::Corrected(why) | Self::DependsOnData(why) | Self::NotReproduced(why) => why,
+        }
+    }
+}
+
+/// A number beside the one that it should be.
+#[derive(Clone, PartialEq, Debug)]
+pub struct Check {
+    /// Name with its unit: "RMS of FCC (m)".
+    pub name: String,
+    /// Number printed in the paper, if it is.
+    pub printed: Option<f64>,
+    /// Number from theory or a measurement made elsewhere.
+    pub expected: f64,
+    /// Our number.
+    pub found: f64,
+    /// Greatest allowed difference, in the same unit.
+    pub tolerance: f64,
+}
+
+impl Check {
+    /// A number that is not printed in the paper.
+    pub fn new(name: impl Into<String>, expected: f64, found: f64, tolerance: f64) -> Check {
+        Check {
+            name: name.into(),
+            printed: None,
+            expected,
+            found,
+            tolerance,
+        }
+    }
+
+    /// The same with the number printed in the paper.
+    pub fn with_printed(self, printed: Option<f64>) -> Check {
+        Check { printed, ..self }
+    }
+
+    /// A statement that must be true: 1 if it is, 0 if not.
+    pub fn that(name: impl Into<String>, is_so: bool) -> Check {
+        let name = format!("{} (1: yes)", name.into());
+        Check::new(name, 1.0, f64::from(u8::from(is_so)), 0.0)
+    }
+
+    /// True of a number that is near enough; never of NaN.
+    pub fn holds(&self) -> bool {
+        (self.found - self.expected).abs() <= self.tolerance
+    }
+}
+
+impl Serialize for Check {
+    fn serialize<S: Serializer>(&self, to: S) -> Result<S::Ok, S::Error> {
+        let mut fields = to.serialize_struct("Check", 6)?;
+        fields.serialize_field("name", &self.name)?;
+        fields.serialize_field("printed", &self.printed)?;
+        fields.serialize_field("expected", &self.expected)?;
+        fields.serialize_field("found", &self.found)?;
+        fields.serialize_field("tolerance", &self.tolerance)?;
+        fields.serialize_field("holds", &self.holds())?;
+        fields.end()
+    }
+}
+
+/// A table; also a file `<name>.csv`.
+#[derive(Clone, PartialEq, Debug, Serialize)]
+pub struct Table {
+    /// Stem of its file, unique in the report.
+    pub name: String,
+    /// Caption above it.
+    pub caption: String,
+    /// Names of its columns, with units.
+    pub columns: Vec<String>,
+    /// Rows with a cell for each column.
+    pub rows: Vec<Vec<Cell>>,
+}
+
+impl Table {
+    /// A table of rows.
+    pub fn new<N: Into<String>>(
+        name: impl Into<String>,
+        caption: impl Into<String>,
+        columns: impl IntoIterator<Item = N>,
+        rows: impl IntoIterator<Item = Vec<Cell>>,
+    ) -> Table {
+        Table {
+            name: name.into(),
+            caption: caption.into(),
+            columns: columns.into_iter().map(Into::into).collect(),
+            rows: rows.into_iter().collect(),
+        }
+    }
+}
+
+/// A cell of a table.
+#[derive(Clone, PartialEq, Debug)]
+pub enum Cell {
+    /// Text.
+    Text(String),
+    /// A number and its digits after the point on the page; files hold all of them.
+    Number(f64, usize),
+    /// A count.
+    Count(u64),
+    /// No value.
+    Empty,
+}
+
+impl Cell {
+    /// A number, or no value.
+    pub fn number(value: Option<f64>, digits: usize) -> Cell {
+        value.map_or(Cell::Empty, |value| Cell::Number(value, digits))
+    }
+
+    /// Text of the cell on a page.
+    fn shown(&self) -> String {
+        match self {
+            Self::Text(text) => text.clone(),
+            Self::Number(value, digits) => number(*value, *digits),
+            Self::Count(count) => count.to_string(),
+            Self::Empty => String::new(),
+        }
+    }
+}
+
+/// A number with so many digits after the point; a dash for what is no number.
+fn number(value: f64, digits: usize) -> String {
+    if !value.is_finite() {
+        return "–".to_owned();
+    }
+    let text = format!("{value:.digits$}");
+    // No -0.00.
+    let magnitude = text.trim_start_matches('-');
+    match magnitude.bytes().all(|b| b == b'0' || b == b'.') {
+        true => magnitude.to_owned(),
+        false => text,
+    }
+}
+
+impl Serialize for Cell {
+    fn serialize<S: Serializer>(&self, to: S) -> Result<S::Ok, S::Error> {
+        match self {
+            Self::Text(text) => to.serialize_str(text),
+            Self::Number(value, _) => to.serialize_f64(*value),
+            Self::Count(count) => to.serialize_u64(*count),
+            Self::Empty => to.serialize_none(),
+        }
+    }
+}
+
+impl From<&str> for Cell {
+    fn from(text: &str) -> Cell {
+        Cell::Text(text.to_owned())
+    }
+}
+
+impl From<String> for Cell {
+    fn from(text: String) -> Cell {
+        Cell::Text(text)
+    }
+}
+
+impl From<usize> for Cell {
+    fn from(count: usize) -> Cell {
+        Cell::Count(count as u64)
+    }
+}
+
+/// A picture.
+#[derive(Clone, PartialEq, Debug, Serialize)]
+pub struct Figure {
+    /// Stem of its file, unique in the report.
+    pub name: String,
+    /// Caption below it.
+    pub caption: String,
+    /// The drawing: an `<svg>` element, no scripts and no links to other files.
+    #[serde(skip)]
+    pub svg: String,
+}
+
+impl Figure {
+    /// A picture of an `<svg>` element.
+    pub fn new(name: impl Into<String>, caption: impl Into<String>, svg: String) -> Figure {
+        Figure {
+            name: name.into(),
+            caption: caption.into(),
+            svg,
+        }
+    }
+}
+
+#[cfg(test)]
+mod tests;

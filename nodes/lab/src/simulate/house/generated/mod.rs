@@ -1,0 +1,73 @@
+//! The generated house: eight rooms, 20 x 12 m.
+
+mod builder;
+mod furniture;
+mod rooms;
+mod walls;
+
+use std::collections::BTreeMap;
+
+use super::House;
+use crate::AnyError;
+use crate::simulate::random::{Purpose, Stream};
+use builder::Builder;
+
+/// The classes, by number.
+const CLASSES: [&str; 18] = [
+    "wall",
+    "floor",
+    "ceiling",
+    "tv",
+    "cabinet",
+    "desk",
+    "table",
+    "chair",
+    "sofa",
+    "bookshelf",
+    "counter",
+    "fridge",
+    "bed",
+    "door",
+    "window",
+    "curtain",
+    "picture",
+    "other",
+];
+
+const WALL: u16 = 0;
+const FLOOR: u16 = 1;
+const CEILING: u16 = 2;
+const TV: u16 = 3;
+const CABINET: u16 = 4;
+const DESK: u16 = 5;
+const TABLE: u16 = 6;
+const CHAIR: u16 = 7;
+const SOFA: u16 = 8;
+const BOOKSHELF: u16 = 9;
+const COUNTER: u16 = 10;
+const FRIDGE: u16 = 11;
+const BED: u16 = 12;
+const DOOR: u16 = 13;
+const WINDOW: u16 = 14;
+const CURTAIN: u16 = 15;
+const PICTURE: u16 = 16;
+const OTHER: u16 = 17;
+
+impl House {
+    /// A furnished house of boxes and drums, 20 x 12 x 2.8 m from the origin on, no two rooms alike.
+    /// Books, clutter and how chairs stand are up to the seed.
+    pub fn generated(seed: u64) -> Result<House, AnyError> {
+        let mut builder = Builder::default();
+        let mut stream = Stream::new(seed, Purpose::GeneratedHouse, 0, 0);
+        walls::build(&mut builder);
+        rooms::furnish(&mut builder, &mut stream);
+        let names = CLASSES.map(str::to_owned);
+        let names: BTreeMap<u16, String> = (0..).zip(names).collect();
+        House::from_mesh(builder.build()?, names)
+    }
+}
+
+/// A number from the stream.
+fn between(stream: &mut Stream, low: f32, high: f32) -> f32 {
+    low + (high - low) * stream.uniform() as f32
+}

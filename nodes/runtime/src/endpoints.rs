@@ -1,0 +1,121 @@
+//! Endpoints of this process by identity: each hears of the peers it is matched with.
+
+use std::collections::{BTreeMap, VecDeque};
+use std::sync::{Arc, Mutex, Weak};
+
+use futures::StreamExt;
+use futures::stream::BoxStream;
+
+use super::peers::Peers;
+use super::port::{EndpointId, PortEvent};
+use super::sync::lock;
+
+/// Events of endpoints that are not registered yet, kept at most.
+const MAX_EARLY_EVENTS: usize = 1024;
+
+/// Peers of all endpoints of a process.
+#[derive(Default)]
+pub(crate) struct Endpoints {
+    inner: Mutex<Inner>,
+}
+
+#[derive(Default)]
+struct Inner {
+    peers: BTreeMap<EndpointId, Weak<Peers>>,
+    early: VecDeque<(EndpointId, Change)>,
+}
+
+#[derive(Clone, Copy)]
+struct Change {
+    peer: EndpointId,
+    /// The policy in which the peer's QoS does not go with ours; none: it matches.
+    incompatible: Option<&'static str>,
+}
+
+impl Endpoints {
+    /// From now on `peers` hears of everything that happens to the endpoint, and of what did.
+    pub(crate) fn register(&self, endpoint: EndpointId, peers: &Arc<Peers>) {
+        let mut inner = lock(&self.inner);
+        inner.peers.retain(|_, peers| peers.strong_count() > 0);
+        inner.peers.insert(endpoint, Arc::downgrade(peers));
+        let early = std::mem::take(&mut inner.early);
+        let (mine, others): (VecDeque<_>, _) =
+            early.into_iter().partition(|(id, _)| *id == endpoint);
+        inner.early = others;
+        drop(inner);
+        for (_, change) in mine {
+            apply(peers, change);
+        }
+    }
+
+    /// Hands events on until the task is dropped.
+    pub(crate) async fn watch(self: Arc<Self>, mut events: BoxStream<'static, PortEvent>) {
+        while let Some(event) = events.next().await {
+            self.hear(event);
+        }
+    }
+
+    fn hear(&self, event: PortEvent) {
+        let (endpoint, peer, incompatible) = match event {
+            PortEvent::Matched { endpoint, peer } => (endpoint, peer, None),
+            PortEvent::Incompatible {
+                endpoint,
+                peer,
+                policy,
+            } => (endpoint, peer, Some(policy)),
+            PortEvent::Lost { peer: lost } => return self.lost(|peer| *peer == lost),
+            PortEvent::ParticipantLost { any } => return self.lost(|peer| peer.is_beside(&any)),
+        };
+        let change = Change { peer, incompatible };
+        let mut inner = lock(&self.inner);
+        let Some(peers) = inner.peers.get(&endpoint) else {
+            if inner.early.len() >= MAX_EARLY_EVENTS {
+                inner.early.pop_front();
+            }
+            inner.early.push_back((endpoint, change));
+            return;
+        };
+        let peers = peers.upgrade();
+        drop(inner);
+        if let Some(peers) = peers {
+            apply(&peers, change);
+        }
+    }
+
+    fn lost(&self, gone: impl Fn(&EndpointId) -> bool) {
+        let mut inner = lock(&self.inner);
+        inner.early.retain(|(_, change)| !gone(&change.peer));
+        let all: Vec<Arc<Peers>> = inner.peers.values().filter_map(Weak::upgrade).collect();
+        drop(inner);
+        for peers in all {
+            peers.remove(&gone);
+        }
+    }
+}
+
+fn apply(peers: &Peers, change: Change) {
+    match change.incompatible {
+        None => peers.add(change.peer),
+        Some(policy) => peers.incompatible(change.peer, policy),
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn events_before_registration_are_kept_until_the_peer_goes() {
+        let endpoints = Endpoints::default();
+        let [endpoint, peer, other] = [1, 2, 3].map(|byte| EndpointId([byte; 16]));
+        for peer in [peer, other] {
+            endpoints.hear(PortEvent::Matched { endpoint, peer });
+        }
+        endpoints.hear(PortEvent::Lost { peer: other });
+        let peers = Arc::new(Peers::of_publisher("/map"));
+        endpoints.register(endpoint, &peers);
+        assert_eq!(peers.count(), 1);
+        endpoints.hear(PortEvent::ParticipantLost { any: peer });
+        assert_eq!(peers.count(), 0);
+    }
+}

@@ -1,0 +1,280 @@
+//! ROS names: expansion, remapping and validity as in rcl and rmw, and their names in DDS.
+
+mod remap;
+mod shown;
+
+pub(crate) use remap::split_node;
+pub use remap::{NameKind, RemapRule, RemapTarget};
+pub(crate) use shown::shown;
+
+use thiserror::Error;
+
+/// rmw's limit of a full topic or service name, bytes.
+pub const TOPIC_LENGTH_MAX: usize = 247;
+/// rmw's limit of a namespace, bytes.
+pub const NAMESPACE_LENGTH_MAX: usize = 245;
+/// rmw's limit of a node's name, bytes.
+pub const NODE_NAME_LENGTH_MAX: usize = 255;
+
+/// Why a name is refused.
+#[derive(Clone, Debug, PartialEq, Eq, Error)]
+pub enum NameError {
+    /// The name breaks one of the rules.
+    #[error("the {what} {name:?} {problem}")]
+    Invalid {
+        /// What the name should be: a topic, a node, a namespace.
+        what: &'static str,
+        /// The name, cut to a readable length.
+        name: String,
+        /// The rule it breaks.
+        problem: &'static str,
+    },
+    /// `{…}` with something else than `node`, `ns` or `namespace`.
+    #[error(
+        "the topic {name:?} has the unknown substitution {{{key}}}; known are {{node}}, {{ns}} and {{namespace}}"
+    )]
+    UnknownSubstitution {
+        /// The name.
+        name: String,
+        /// What stands between the braces.
+        key: String,
+    },
+    /// The name is longer than rmw allows.
+    #[error("the {what} {name:?} has {length} bytes, {length_max} are allowed")]
+    TooLong {
+        /// What the name should be.
+        what: &'static str,
+        /// The name, cut to a readable length.
+        name: String,
+        /// Its length, bytes.
+        length: usize,
+        /// The limit, bytes.
+        length_max: usize,
+    },
+}
+
+/// True if `text` is one token of a remap rule: an identifier with single underscores.
+pub fn is_token(text: &str) -> bool {
+    is_identifier(text) && !text.contains("__")
+}
+
+/// True if `text` is one part of a name: letters, digits and underscores, no digit first.
+pub fn is_identifier(text: &str) -> bool {
+    text.bytes().all(is_word) && !text.starts_with(|c: char| c.is_ascii_digit()) && !text.is_empty()
+}
+
+/// The full name of a topic of the node, after the first remap rule that matches.
+///
+/// Knows `/absolute`, `relative`, `~/private`, `{node}`, `{ns}` and `{namespace}`.
+pub fn resolve_topic(
+    name: &str,
+    node_name: &str,
+    namespace: &str,
+    remaps: &[RemapRule],
+) -> Result<String, NameError> {
+    resolve(name, node_name, namespace, remaps, NameKind::Topic)
+}
+
+/// The full name of a service of the node, by the same rules.
+pub fn resolve_service(
+    name: &str,
+    node_name: &str,
+    namespace: &str,
+    remaps: &[RemapRule],
+) -> Result<String, NameError> {
+    resolve(name, node_name, namespace, remaps, NameKind::Service)
+}
+
+fn resolve(
+    name: &str,
+    node_name: &str,
+    namespace: &str,
+    remaps: &[RemapRule],
+    kind: NameKind,
+) -> Result<String, NameError> {
+    let mut full = expand(name, node_name, namespace)?;
+    for rule in remaps.iter().filter(|rule| rule.applies_to(node_name)) {
+        let RemapTarget::Name { kind: of, from, to } = &rule.target else {
+            continue;
+        };
+        if (*of == NameKind::Any || *of == kind) && expand(from, node_name, namespace)? == full {
+            full = expand(to, node_name, namespace)?;
+            break;
+        }
+    }
+    validate_full_name(&full)?;
+    Ok(full)
+}
+
+/// The full name of a topic before remapping; `//` and lengths are not checked yet.
+pub fn expand(name: &str, node_name: &str, namespace: &str) -> Result<String, NameError> {
+    validate_node_name(node_name)?;
+    validate_namespace(namespace)?;
+    validate_unexpanded(name)?;
+    let node = fully_qualified(node_name, namespace);
+    let mut text = match name.strip_prefix('~') {
+        Some(rest) => format!("{node}{rest}"),
+        None => name.to_owned(),
+    };
+    while let Some((head, tail)) = text.split_once('{') {
+        let (key, tail) = tail.split_once('}').unwrap_or((tail, ""));
+        let value = match key {
+            "node" => node_name,
+            "ns" | "namespace" => namespace,
+            _ => {
+                let (name, key) = (cut(name), cut(key));
+                return Err(NameError::UnknownSubstitution { name, key });
+            }
+        };
+        text = format!("{head}{value}{tail}");
+    }
+    Ok(if text.starts_with('/') {
+        text
+    } else {
+        join(namespace, &text)
+    })
+}
+
+/// A node's full name, for example `/robot/mapper`.
+pub fn fully_qualified(node_name: &str, namespace: &str) -> String {
+    join(namespace, node_name)
+}
+
+fn join(namespace: &str, name: &str) -> String {
+    format!("{}/{name}", namespace.trim_end_matches('/'))
+}
+
+/// rmw's rules for a node's name.
+pub fn validate_node_name(name: &str) -> Result<(), NameError> {
+    let invalid = |problem| invalid("node name", name, problem);
+    if name.is_empty() {
+        Err(invalid("is empty"))
+    } else if !name.bytes().all(is_word) {
+        Err(invalid("may have letters, digits and underscores only"))
+    } else if name.starts_with(|c: char| c.is_ascii_digit()) {
+        Err(invalid("must not start with a digit"))
+    } else {
+        length("node name", name, NODE_NAME_LENGTH_MAX)
+    }
+}
+
+/// rmw's rules for a namespace: `/`, or a full name.
+pub fn validate_namespace(namespace: &str) -> Result<(), NameError> {
+    if namespace == "/" {
+        return Ok(());
+    }
+    full("namespace", namespace, NAMESPACE_LENGTH_MAX)
+}
+
+/// rmw's rules for the full name of a topic or service.
+pub fn validate_full_name(name: &str) -> Result<(), NameError> {
+    full("topic", name, TOPIC_LENGTH_MAX)
+}
+
+fn full(what: &'static str, name: &str, length_max: usize) -> Result<(), NameError> {
+    let invalid = |problem| Err(invalid(what, name, problem));
+    let Some(tokens) = name.strip_prefix('/') else {
+        return invalid("must start with `/`");
+    };
+    if tokens.is_empty() || tokens.ends_with('/') {
+        return invalid("must not end with `/`");
+    }
+    for token in tokens.split('/') {
+        match token.bytes().next() {
+            None => return invalid("must not have `//`"),
+            Some(b'0'..=b'9') => return invalid("has a part that starts with a digit"),
+            _ if !token.bytes().all(is_word) => {
+                return invalid("may have letters, digits, underscores and `/` only");
+            }
+            _ => {}
+        }
+    }
+    length(what, name, length_max)
+}
+
+/// rcl's rules for a name before expansion.
+fn validate_unexpanded(name: &str) -> Result<(), NameError> {
+    let invalid = |problem| Err(invalid("topic", name, problem));
+    if name.is_empty() {
+        return invalid("is empty");
+    }
+    if name.ends_with('/') {
+        return invalid("must not end with `/`");
+    }
+    let rest = name.strip_prefix('~').unwrap_or(name);
+    if rest.contains('~') || (rest != name && !rest.is_empty() && !rest.starts_with('/')) {
+        return invalid("may have `~` only in front, alone or before `/`");
+    }
+    let mut key_length = None;
+    let mut before = '/';
+    for c in rest.chars() {
+        let starts = key_length.map_or(before == '/', |length: usize| length == 0);
+        match (c, key_length) {
+            ('{', None) => key_length = Some(0),
+            ('}', Some(1..)) => key_length = None,
+            ('{' | '}', _) => return invalid("has braces that do not pair as `{name}`"),
+            ('0'..='9', _) if starts => return invalid("has a part that starts with a digit"),
+            ('/', None) => {}
+            ('_' | '0'..='9' | 'a'..='z' | 'A'..='Z', None) => {}
+            ('_' | '0'..='9' | 'a'..='z' | 'A'..='Z', Some(length)) => {
+                key_length = Some(length.saturating_add(1));
+            }
+            _ => {
+                return invalid("may have letters, digits, `_`, `/`, a leading `~` and `{…}` only");
+            }
+        }
+        before = c;
+    }
+    if key_length.is_some() {
+        return invalid("has braces that do not pair as `{name}`");
+    }
+    Ok(())
+}
+
+/// The DDS topic of a ROS topic: `/points` is `rt/points`.
+pub fn dds_topic(full_name: &str) -> String {
+    format!("rt{full_name}")
+}
+
+/// The DDS topic of a service's requests: `/reset` is `rq/resetRequest`.
+pub fn dds_request(full_name: &str) -> String {
+    format!("rq{full_name}Request")
+}
+
+/// The DDS topic of a service's replies: `/reset` is `rr/resetReply`.
+pub fn dds_reply(full_name: &str) -> String {
+    format!("rr{full_name}Reply")
+}
+
+fn is_word(byte: u8) -> bool {
+    byte.is_ascii_alphanumeric() || byte == b'_'
+}
+
+fn length(what: &'static str, name: &str, length_max: usize) -> Result<(), NameError> {
+    let length = name.len();
+    if length <= length_max {
+        return Ok(());
+    }
+    Err(NameError::TooLong {
+        what,
+        name: cut(name),
+        length,
+        length_max,
+    })
+}
+
+fn invalid(what: &'static str, name: &str, problem: &'static str) -> NameError {
+    NameError::Invalid {
+        what,
+        name: cut(name),
+        problem,
+    }
+}
+
+/// Enough of a name to recognise it.
+fn cut(name: &str) -> String {
+    name.chars().take(NODE_NAME_LENGTH_MAX).collect()
+}
+
+#[cfg(test)]
+mod tests;

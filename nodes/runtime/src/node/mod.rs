@@ -1,0 +1,212 @@
+//! A logical node: name, parameters, remaps, and the endpoints made under them.
+
+mod services;
+
+use std::sync::Arc;
+
+use lattice_msgs::RosMessage;
+
+use super::clock::Clock;
+use super::diagnostics::Diagnostics;
+use super::error::RuntimeError;
+use super::graph::NodeId;
+use super::names;
+use super::params::Params;
+use super::publisher::{Publisher, RawPublisher};
+use super::qos::Qos;
+use super::ros_args::RosArgs;
+use super::shared::{DEFAULT_MAX_MESSAGE_BYTES, Shared};
+use super::subscription::{Load, Sample, Stats, Subscription, Undecoded};
+
+/// A node of the process. Clones are the same node.
+#[derive(Clone)]
+pub struct Node {
+    inner: Arc<Inner>,
+}
+
+struct Inner {
+    shared: Arc<Shared>,
+    args: Arc<RosArgs>,
+    name: String,
+    namespace: String,
+    fqn: String,
+    id: NodeId,
+    params: Arc<Params>,
+    clock: Clock,
+    max_message_bytes: usize,
+}
+
+impl Node {
+    pub(crate) fn new(
+        shared: &Arc<Shared>,
+        args: &Arc<RosArgs>,
+        default_name: &str,
+    ) -> Result<Self, RuntimeError> {
+        let name = args.node_name(default_name);
+        let namespace = args.namespace(default_name);
+        names::validate_node_name(&name)?;
+        names::validate_namespace(&namespace)?;
+        let fqn = names::fully_qualified(&name, &namespace);
+        let params = Arc::new(Params::load(args, &fqn)?);
+        let max_message_bytes = params.usize_in(
+            "max_message_bytes",
+            DEFAULT_MAX_MESSAGE_BYTES,
+            1..=u32::MAX as usize,
+        )?;
+        let id = shared.graph.add_node(&namespace, &name);
+        let about = "go by the time on /clock instead of the system's";
+        let clock = if params.about(about).bool("use_sim_time", false)? {
+            let topic = names::resolve_topic("/clock", &name, &namespace, &args.remaps)?;
+            shared.sim_clock(id, &topic)?
+        } else {
+            Clock::default()
+        };
+        let inner = Inner {
+            shared: Arc::clone(shared),
+            args: Arc::clone(args),
+            name,
+            namespace,
+            fqn,
+            id,
+            params,
+            clock,
+            max_message_bytes,
+        };
+        Ok(Self {
+            inner: Arc::new(inner),
+        })
+    }
+
+    pub(crate) fn shared(&self) -> &Arc<Shared> {
+        &self.inner.shared
+    }
+
+    pub(crate) fn id(&self) -> NodeId {
+        self.inner.id
+    }
+
+    /// Name without namespace.
+    pub fn name(&self) -> &str {
+        &self.inner.name
+    }
+
+    /// Namespace, `/` if there is none.
+    pub fn namespace(&self) -> &str {
+        &self.inner.namespace
+    }
+
+    /// Full name, such as `/robot/mapper`.
+    pub fn fqn(&self) -> &str {
+        &self.inner.fqn
+    }
+
+    /// Parameters.
+    pub fn params(&self) -> &Arc<Params> {
+        &self.inner.params
+    }
+
+    /// Full name of a topic, remapped.
+    pub fn resolve(&self, topic: &str) -> Result<String, RuntimeError> {
+        let inner = &self.inner;
+        let remaps = &inner.args.remaps;
+        Ok(names::resolve_topic(
+            topic,
+            &inner.name,
+            &inner.namespace,
+            remaps,
+        )?)
+    }
+
+    /// Full name of a service, remapped.
+    pub fn resolve_service(&self, service: &str) -> Result<String, RuntimeError> {
+        let inner = &self.inner;
+        let remaps = &inner.args.remaps;
+        Ok(names::resolve_service(
+            service,
+            &inner.name,
+            &inner.namespace,
+            remaps,
+        )?)
+    }
+
+    /// The clock this node goes by.
+    pub fn clock(&self) -> Clock {
+        self.inner.clock.clone()
+    }
+
+    /// States of this node's tasks, for `/diagnostics`.
+    pub fn diagnostics(&self) -> Diagnostics {
+        Diagnostics::new(&self.inner.fqn, &self.inner.shared.tasks)
+    }
+
+    /// A publisher; the parameters `qos.<topic>.*` override the QoS.
+    pub fn publisher<M: RosMessage>(
+        &self,
+        topic: &str,
+        qos: Qos,
+    ) -> Result<Publisher<M>, RuntimeError> {
+        let resolved = self.resolve(topic)?;
+        let qos = qos.with_overrides(&self.inner.params, &resolved, topic)?;
+        self.inner.shared.publisher(self.id(), &resolved, &qos)
+    }
+
+    /// A publisher of CDR bytes of the type, such as `sensor_msgs/msg/Imu`, on a full topic name.
+    pub fn raw_publisher(
+        &self,
+        resolved_topic: &str,
+        type_name: &str,
+        qos: Qos,
+    ) -> Result<RawPublisher, RuntimeError> {
+        names::validate_full_name(resolved_topic)?;
+        self.inner
+            .shared
+            .raw_publisher(self.id(), resolved_topic, type_name, &qos)
+    }
+
+    /// Gives every message on a topic to `handler`; `qos.<topic>.*` override the QoS.
+    ///
+    /// The handler runs on a thread of the runtime and must return at once: hand work over. It may
+    /// publish; it must not flush, nor publish raw messages, nor end the runtime.
+    pub fn subscribe<M: RosMessage>(
+        &self,
+        topic: &str,
+        qos: Qos,
+        load: Load,
+        mut handler: impl FnMut(Arc<M>) + Send + 'static,
+    ) -> Result<Subscription, RuntimeError> {
+        self.subscribe_samples(topic, qos, load, move |sample, stats| {
+            if let Some(message) = stats.decode(sample) {
+                handler(message);
+            }
+        })
+    }
+
+    /// Gives every message on a topic to `handler` as it came, to be decoded by who works on it; else
+    /// as [`Node::subscribe`]. For large messages of which one thread must keep the order.
+    pub fn subscribe_undecoded<M: RosMessage>(
+        &self,
+        topic: &str,
+        qos: Qos,
+        load: Load,
+        mut handler: impl FnMut(Undecoded<M>) + Send + 'static,
+    ) -> Result<Subscription, RuntimeError> {
+        self.subscribe_samples(topic, qos, load, move |sample, stats| {
+            handler(Undecoded::new(sample, stats));
+        })
+    }
+
+    fn subscribe_samples<M: RosMessage>(
+        &self,
+        topic: &str,
+        qos: Qos,
+        load: Load,
+        handler: impl FnMut(Sample<'_, M>, &Arc<Stats>) + Send + 'static,
+    ) -> Result<Subscription, RuntimeError> {
+        let resolved = self.resolve(topic)?;
+        let qos = qos.with_overrides(&self.inner.params, &resolved, topic)?;
+        let max = self.inner.max_message_bytes;
+        self.inner
+            .shared
+            .subscribe(self.id(), &resolved, &qos, load, max, handler)
+    }
+}

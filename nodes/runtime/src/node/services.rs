@@ -1,0 +1,54 @@
+//! Services of a node.
+
+use lattice_msgs::RosService;
+use lattice_msgs::std_srvs::{Trigger, TriggerRequest, TriggerResponse};
+
+use super::Node;
+use crate::error::RuntimeError;
+use crate::service::{Reply, Server};
+
+impl Node {
+    /// Serves `S`; the handler runs on the io thread and must return at once.
+    pub fn service<S: RosService + 'static>(
+        &self,
+        name: &str,
+        mut handler: impl FnMut(S::Request) -> S::Response + Send + 'static,
+    ) -> Result<Server, RuntimeError> {
+        self.service_later::<S>(name, move |request, reply| reply.send(handler(request)))
+    }
+
+    /// Serves `S` with answers that may take their time: the handler runs on the io thread and must
+    /// return at once, the reply may be sent later. The next request waits until then.
+    pub fn service_later<S: RosService + 'static>(
+        &self,
+        name: &str,
+        handler: impl FnMut(S::Request, Reply<S::Response>) + Send + 'static,
+    ) -> Result<Server, RuntimeError> {
+        self.service_concurrent::<S>(name, 1, handler)
+    }
+
+    /// Serves `S` with answers that may take their time, up to `max_pending` of them at a time; further
+    /// requests wait.
+    pub fn service_concurrent<S: RosService + 'static>(
+        &self,
+        name: &str,
+        max_pending: usize,
+        handler: impl FnMut(S::Request, Reply<S::Response>) + Send + 'static,
+    ) -> Result<Server, RuntimeError> {
+        let name = self.resolve_service(name)?;
+        self.shared()
+            .serve::<S>(self.id(), &name, max_pending, handler)
+    }
+
+    /// Serves `std_srvs/srv/Trigger`; the handler answers success and what came of it.
+    pub fn service_trigger(
+        &self,
+        name: &str,
+        mut handler: impl FnMut() -> (bool, String) + Send + 'static,
+    ) -> Result<Server, RuntimeError> {
+        self.service::<Trigger>(name, move |_: TriggerRequest| {
+            let (success, message) = handler();
+            TriggerResponse { success, message }
+        })
+    }
+}

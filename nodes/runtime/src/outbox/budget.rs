@@ -1,0 +1,99 @@
+//! Budget of the bytes that wait in the queue of one publisher.
+
+use std::sync::Mutex;
+
+use crate::sync::{Changed, lock};
+
+/// Counts bytes against a limit. One message always fits, however long.
+pub(crate) struct Budget {
+    limit: usize,
+    state: Mutex<State>,
+    freed: Changed,
+}
+
+#[derive(Default)]
+struct State {
+    used: usize,
+    closed: bool,
+}
+
+impl State {
+    fn fits(&self, bytes: usize, limit: usize) -> bool {
+        self.used == 0 || self.used.saturating_add(bytes) <= limit
+    }
+}
+
+impl Budget {
+    /// `limit` in bytes.
+    pub(crate) fn new(limit: usize) -> Self {
+        Self {
+            limit,
+            state: Mutex::default(),
+            freed: Changed::default(),
+        }
+    }
+
+    /// Takes `bytes` if they fit.
+    pub(crate) fn try_take(&self, bytes: usize) -> bool {
+        let mut state = lock(&self.state);
+        let fits = state.fits(bytes, self.limit);
+        if fits {
+            state.used = state.used.saturating_add(bytes);
+        }
+        fits
+    }
+
+    /// Completes when `bytes` fit and are taken. False: closed meanwhile.
+    pub(crate) async fn take(&self, bytes: usize) -> bool {
+        let taken = || {
+            let closed = lock(&self.state).closed;
+            (closed || self.try_take(bytes)).then_some(!closed)
+        };
+        self.freed.until(taken).await
+    }
+
+    /// Gives `bytes` back.
+    pub(crate) fn give_back(&self, bytes: usize) {
+        let mut state = lock(&self.state);
+        state.used = state.used.saturating_sub(bytes);
+        self.freed.notify();
+    }
+
+    /// Refuses further bytes; everyone who waits for room is refused.
+    pub(crate) fn close(&self) {
+        lock(&self.state).closed = true;
+        self.freed.notify();
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use std::sync::Arc;
+
+    use super::*;
+
+    #[test]
+    fn one_long_message_fits_but_no_two() {
+        let budget = Budget::new(10);
+        assert!(budget.try_take(50));
+        assert!(!budget.try_take(1));
+        budget.give_back(50);
+        assert!(budget.try_take(6));
+        assert!(!budget.try_take(5));
+        assert!(budget.try_take(4));
+    }
+
+    #[test]
+    fn waiting_ends_with_room_or_closing() {
+        let budget = Arc::new(Budget::new(10));
+        assert!(budget.try_take(10));
+        let waiting = Arc::clone(&budget);
+        let thread = std::thread::spawn(move || smol::block_on(waiting.take(5)));
+        budget.give_back(10);
+        assert!(thread.join().unwrap());
+        let waiting = Arc::clone(&budget);
+        let thread = std::thread::spawn(move || smol::block_on(waiting.take(6)));
+        budget.close();
+        assert!(!thread.join().unwrap());
+    }
+}

@@ -1,0 +1,379 @@
+//! The bounded queue in front of one writer, served by the publisher thread.
+//!
+//! Serialization, page faults and the wait for a full send window happen there, never at the caller;
+//! a writer that waits holds up nobody but its own queue.
+
+mod budget;
+
+use std::sync::atomic::{AtomicBool, AtomicU64, AtomicUsize, Ordering::Relaxed};
+use std::sync::{Arc, Mutex};
+use std::time::{Duration, Instant};
+
+use futures::future::{Either, select};
+use lattice_msgs::cdr::CdrError;
+use smol::Timer;
+use smol::channel::{Receiver, Sender, TrySendError, bounded};
+use smol::future::or;
+
+use self::budget::Budget;
+use crate::error::PublishError;
+use crate::logging::Throttle;
+use crate::port::{Bytes, ENCAPSULATION_BYTES, EndpointId, SampleId, SampleWriter, WriteRefusal};
+use crate::shutdown::Shutdown;
+use crate::sync::lock;
+
+/// How long a sample waits for a full send window before it is dropped.
+const PATIENCE: Duration = Duration::from_secs(1);
+
+/// The same, after a sample was dropped: a peer that hangs must not slow down the others.
+const PATIENCE_WITH_STUCK_PEER: Duration = Duration::from_millis(20);
+
+/// Between two warnings of dropped messages.
+const WARNING_PERIOD: Duration = Duration::from_secs(5);
+
+/// Fate of a sample that finds the send window full.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub(crate) enum WhenFull {
+    /// Dropped and counted after a short wait.
+    Drop,
+    /// Waits as long as it takes.
+    Wait,
+}
+
+/// Makes the bytes of a sample, encapsulation header included, on the publisher thread.
+pub(crate) type Serialize = Box<dyn FnOnce() -> Result<Vec<u8>, CdrError> + Send>;
+
+enum Job {
+    Sample {
+        content: Content,
+        reserved: usize,
+        related: Option<SampleId>,
+    },
+    /// Answered when everything before it has been handed to DDS.
+    Flush(Sender<()>),
+}
+
+enum Content {
+    Body(Bytes),
+    Later(Serialize),
+}
+
+/// The queue of one writer, at its caller.
+pub(crate) struct Outbox {
+    id: EndpointId,
+    jobs: Sender<Job>,
+    shared: Arc<Shared>,
+}
+
+/// Both ends.
+struct Shared {
+    topic: String,
+    // Taken away at shutdown, when handles of the publisher may still be about.
+    writer: Mutex<Option<Arc<dyn SampleWriter>>>,
+    budget: Budget,
+    when_full: WhenFull,
+    last_bytes: AtomicUsize,
+    dropped: AtomicU64,
+    sent: AtomicU64,
+    sent_bytes: AtomicU64,
+    stuck: AtomicBool,
+    warning: Throttle,
+}
+
+impl Outbox {
+    /// The writer, and the task that the publisher thread is to run.
+    pub(crate) fn new(
+        topic: &str,
+        writer: Arc<dyn SampleWriter>,
+        when_full: WhenFull,
+        queue_messages: usize,
+        queue_bytes: usize,
+    ) -> (Self, impl Future<Output = ()> + Send + 'static) {
+        let id = writer.id();
+        let (jobs, queue) = bounded(queue_messages.max(1));
+        let shared = Arc::new(Shared {
+            topic: topic.to_owned(),
+            writer: Mutex::new(Some(writer)),
+            budget: Budget::new(queue_bytes),
+            when_full,
+            last_bytes: AtomicUsize::new(0),
+            dropped: AtomicU64::new(0),
+            sent: AtomicU64::new(0),
+            sent_bytes: AtomicU64::new(0),
+            stuck: AtomicBool::new(false),
+            warning: Throttle::new(WARNING_PERIOD),
+        });
+        let task = serve(Arc::clone(&shared), queue);
+        (Self { id, jobs, shared }, task)
+    }
+
+    /// Identity of the writer.
+    pub(crate) fn id(&self) -> EndpointId {
+        self.id
+    }
+
+    /// Resolved topic or service, for messages.
+    pub(crate) fn topic(&self) -> &str {
+        &self.shared.topic
+    }
+
+    /// Samples that were not sent: queue or send window full, or not serializable.
+    pub(crate) fn dropped(&self) -> u64 {
+        self.shared.dropped.load(Relaxed)
+    }
+
+    /// Samples handed to DDS.
+    pub(crate) fn sent(&self) -> u64 {
+        self.shared.sent.load(Relaxed)
+    }
+
+    /// Bytes of them, without their encapsulation headers.
+    pub(crate) fn sent_bytes(&self) -> u64 {
+        self.shared.sent_bytes.load(Relaxed)
+    }
+
+    /// Queues a sample that is serialized later. Its size is taken to be that of the one before.
+    pub(crate) fn send(&self, serialize: Serialize) -> Result<(), PublishError> {
+        let bytes = self.shared.last_bytes.load(Relaxed);
+        self.try_queue(Content::Later(serialize), bytes, None)
+    }
+
+    /// Queues the body of a sample, as it is.
+    pub(crate) fn send_body(
+        &self,
+        body: Bytes,
+        related: Option<SampleId>,
+    ) -> Result<(), PublishError> {
+        let bytes = body.len();
+        self.try_queue(Content::Body(body), bytes, related)
+    }
+
+    /// Queues the body of a sample; waits while the queue is full, but not beyond a request to end.
+    /// Not from the runtime's threads.
+    pub(crate) fn send_body_blocking(
+        &self,
+        body: Bytes,
+        shutdown: &Shutdown,
+    ) -> Result<(), PublishError> {
+        let reserved = body.len();
+        let queued = async {
+            if !self.shared.budget.take(reserved).await {
+                return false;
+            }
+            let job = Job::Sample {
+                content: Content::Body(body),
+                reserved,
+                related: None,
+            };
+            self.jobs.send(job).await.is_ok()
+        };
+        let ended = async {
+            shutdown.requested().await;
+            false
+        };
+        match smol::block_on(or(queued, ended)) {
+            true => Ok(()),
+            false => Err(self.closed()),
+        }
+    }
+
+    /// Waits until the queue is empty and every reliable reader has acknowledged. False: not in time.
+    pub(crate) fn flush(&self, timeout: Duration) -> bool {
+        let start = Instant::now();
+        let in_time = smol::block_on(smol::future::or(self.flushed(), async {
+            Timer::after(timeout).await;
+            None
+        }));
+        let left = timeout.saturating_sub(start.elapsed());
+        let acknowledged = |writer: Arc<dyn SampleWriter>| writer.wait_for_acknowledgments(left);
+        in_time.is_some() && self.shared.writer().is_some_and(acknowledged)
+    }
+
+    /// Completes when everything queued before has been handed to DDS; `None`: closed meanwhile.
+    pub(crate) async fn flushed(&self) -> Option<()> {
+        let (done, answer) = bounded(1);
+        self.jobs.send(Job::Flush(done)).await.ok()?;
+        answer.recv().await.ok()
+    }
+
+    /// Refuses further samples and leaves the topic.
+    pub(crate) fn close(&self) {
+        self.shared.budget.close();
+        self.jobs.close();
+        let writer = lock(&self.shared.writer).take();
+        drop(writer);
+    }
+
+    fn try_queue(
+        &self,
+        content: Content,
+        reserved: usize,
+        related: Option<SampleId>,
+    ) -> Result<(), PublishError> {
+        if !self.shared.budget.try_take(reserved) {
+            return Err(self.full());
+        }
+        let job = Job::Sample {
+            content,
+            reserved,
+            related,
+        };
+        self.jobs.try_send(job).map_err(|error| {
+            self.shared.budget.give_back(reserved);
+            match error {
+                TrySendError::Full(_) => self.full(),
+                TrySendError::Closed(_) => self.closed(),
+            }
+        })
+    }
+
+    fn full(&self) -> PublishError {
+        self.shared.drop_one("the queue of the publisher is full");
+        PublishError::QueueFull {
+            topic: self.shared.topic.clone(),
+            dropped: self.dropped(),
+        }
+    }
+
+    fn closed(&self) -> PublishError {
+        PublishError::Closed {
+            topic: self.shared.topic.clone(),
+        }
+    }
+}
+
+impl Shared {
+    fn writer(&self) -> Option<Arc<dyn SampleWriter>> {
+        lock(&self.writer).clone()
+    }
+
+    fn drop_one(&self, why: &str) {
+        let dropped = self.dropped.fetch_add(1, Relaxed).saturating_add(1);
+        if self.warning.check().is_some() {
+            log::warn!("{}: message dropped ({dropped} so far): {why}", self.topic);
+        }
+    }
+
+    fn body(&self, content: Content) -> Option<Bytes> {
+        match content {
+            Content::Body(body) => Some(body),
+            Content::Later(serialize) => match serialize() {
+                Ok(bytes) => {
+                    self.last_bytes.store(bytes.len(), Relaxed);
+                    let mut body = Bytes::from(bytes);
+                    Some(body.split_off(ENCAPSULATION_BYTES.min(body.len())))
+                }
+                Err(error) => {
+                    self.drop_one(&error.to_string());
+                    None
+                }
+            },
+        }
+    }
+
+    async fn write(&self, body: Bytes, related: Option<SampleId>) {
+        let start = Instant::now();
+        while let Some(writer) = self.writer() {
+            let patience = match self.when_full {
+                WhenFull::Wait => None,
+                WhenFull::Drop if self.stuck.load(Relaxed) => Some(PATIENCE_WITH_STUCK_PEER),
+                WhenFull::Drop => Some(PATIENCE),
+            };
+            let may_wait = self.when_full == WhenFull::Wait;
+            let write = writer.write(body.clone(), related, may_wait);
+            let result = match patience {
+                None => write.await,
+                Some(patience) => {
+                    let left = patience.saturating_sub(start.elapsed());
+                    match select(write, Timer::after(left)).await {
+                        Either::Left((result, _)) => result,
+                        Either::Right(_) => {
+                            self.stuck.store(true, Relaxed);
+                            self.drop_one("a reliable subscriber does not keep up");
+                            return;
+                        }
+                    }
+                }
+            };
+            match result {
+                Ok(_) => {
+                    self.stuck.store(false, Relaxed);
+                    self.sent.fetch_add(1, Relaxed);
+                    self.sent_bytes.fetch_add(body.len() as u64, Relaxed);
+                    return;
+                }
+                // The transport gave up waiting; whether we do is decided by our own patience.
+                Err(WriteRefusal::Full) => {}
+                Err(WriteRefusal::Failed(why)) => {
+                    self.drop_one(&why);
+                    return;
+                }
+            }
+        }
+    }
+}
+
+async fn serve(shared: Arc<Shared>, queue: Receiver<Job>) {
+    while let Ok(job) = queue.recv().await {
+        match job {
+            Job::Sample {
+                content,
+                reserved,
+                related,
+            } => {
+                if let Some(body) = shared.body(content) {
+                    shared.write(body, related).await;
+                }
+                shared.budget.give_back(reserved);
+            }
+            Job::Flush(done) => {
+                // Nobody may be waiting any more.
+                let _ = done.try_send(());
+            }
+        }
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use futures::future::BoxFuture;
+
+    use super::*;
+
+    /// A writer whose reader is stuck.
+    struct Stuck;
+
+    impl SampleWriter for Stuck {
+        fn id(&self) -> EndpointId {
+            EndpointId([7; 16])
+        }
+
+        fn write(
+            &self,
+            _: Bytes,
+            _: Option<SampleId>,
+            _: bool,
+        ) -> BoxFuture<'_, Result<(), WriteRefusal>> {
+            Box::pin(smol::future::pending())
+        }
+
+        fn wait_for_acknowledgments(&self, _: Duration) -> bool {
+            false
+        }
+    }
+
+    #[test]
+    fn a_request_to_end_frees_who_waits_for_a_full_queue() {
+        let (outbox, _task) =
+            Outbox::new("/chatter", Arc::new(Stuck), WhenFull::Wait, 1, usize::MAX);
+        let (shutdown, body) = (Shutdown::default(), Bytes::from_static(b"body"));
+        outbox.send_body_blocking(body.clone(), &shutdown).unwrap();
+        let asked = shutdown.clone();
+        let (waiting, result) = std::sync::mpsc::channel();
+        std::thread::spawn(move || waiting.send(outbox.send_body_blocking(body, &asked)));
+        shutdown.request();
+        let result = result.recv_timeout(Duration::from_secs(10));
+        let result = result.expect("waits for room until a second request");
+        assert!(matches!(result, Err(PublishError::Closed { .. })));
+    }
+}

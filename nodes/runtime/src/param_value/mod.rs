@@ -1,0 +1,283 @@
+//! Values of parameters, and the YAML that they are written in.
+
+mod scan;
+
+pub use scan::ScanError;
+pub(crate) use scan::scan;
+
+use serde_yaml::Value;
+use std::fmt;
+use thiserror::Error;
+
+/// A parameter's value, of the types ROS has.
+#[derive(Clone, Debug, PartialEq)]
+pub enum ParamValue {
+    /// `true`
+    Bool(bool),
+    /// `1`
+    I64(i64),
+    /// `1.0`
+    F64(f64),
+    /// `text`
+    String(String),
+    /// `[true, false]`
+    BoolArray(Vec<bool>),
+    /// `[1, 2]`
+    I64Array(Vec<i64>),
+    /// `[1.0, 2.0]`
+    F64Array(Vec<f64>),
+    /// `[a, b]`, and `[]`, which is an empty array of any type.
+    StringArray(Vec<String>),
+}
+
+/// Why a YAML value is no parameter value.
+#[derive(Clone, Debug, PartialEq, Eq, Error)]
+pub enum ValueError {
+    /// Nothing, or `null`.
+    #[error("there is no value; write '' for an empty text")]
+    Missing,
+    /// A map, a list of lists, or a tag.
+    #[error("found {0}, expected a bool, an integer, a float, a text or a list of one of them")]
+    Shape(&'static str),
+    /// A list of several types.
+    #[error("found a list with {0} and {1}, expected one type (write 1.0 for 1 among floats)")]
+    Mixed(&'static str, &'static str),
+    /// Anchors, aliases, or too deep nesting.
+    #[error(transparent)]
+    Scan(#[from] ScanError),
+    /// No YAML at all.
+    #[error("it is no YAML: {0}")]
+    Yaml(String),
+}
+
+impl ParamValue {
+    /// Reads the value of `-p name:=value`.
+    pub fn from_yaml_text(text: &str) -> Result<ParamValue, ValueError> {
+        scan(text)?;
+        let value = serde_yaml::from_str(text).map_err(|e| ValueError::Yaml(e.to_string()))?;
+        match (value, text.trim()) {
+            // For rcl these are texts, and an empty value is none.
+            (Value::Null, text @ ("~" | "null" | "Null" | "NULL")) => {
+                Ok(ParamValue::String(text.to_owned()))
+            }
+            (value, _) => Self::from_yaml(value),
+        }
+    }
+
+    /// Takes a YAML value over.
+    pub(crate) fn from_yaml(value: Value) -> Result<ParamValue, ValueError> {
+        match value {
+            Value::Null => Err(ValueError::Missing),
+            Value::Bool(value) => Ok(ParamValue::Bool(value)),
+            Value::Number(number) => match (number.as_i64(), number.as_f64()) {
+                (Some(value), _) => Ok(ParamValue::I64(value)),
+                // Beyond an i64 rcl reads a double, too.
+                (None, Some(value)) => Ok(ParamValue::F64(value)),
+                (None, None) => Err(ValueError::Shape("a number out of range")),
+            },
+            Value::String(text) => Ok(ParamValue::String(text)),
+            Value::Sequence(items) => Self::array(items),
+            Value::Mapping(_) => Err(ValueError::Shape("a map")),
+            Value::Tagged(_) => Err(ValueError::Shape("a tagged value")),
+        }
+    }
+
+    fn array(items: Vec<Value>) -> Result<ParamValue, ValueError> {
+        let mut values = Vec::with_capacity(items.len());
+        for item in items {
+            let value = Self::from_yaml(item)?;
+            if value.is_array() {
+                return Err(ValueError::Shape("a list in a list"));
+            }
+            values.push(value);
+        }
+        // A list of `true` and `yes`, or of `8` and `010`, has one type for rcl and two for YAML 1.2.
+        let lead = values
+            .iter()
+            .find(|value| !matches!(value, ParamValue::String(_)))
+            .or_else(|| values.first());
+        let all = match lead {
+            None | Some(ParamValue::String(_)) => values
+                .iter()
+                .map(|v| v.as_str().map(str::to_owned))
+                .collect::<Option<_>>()
+                .map(ParamValue::StringArray),
+            Some(ParamValue::Bool(_)) => values
+                .iter()
+                .map(Self::as_bool)
+                .collect::<Option<_>>()
+                .map(ParamValue::BoolArray),
+            Some(ParamValue::I64(_)) => values
+                .iter()
+                .map(Self::as_i64)
+                .collect::<Option<_>>()
+                .map(ParamValue::I64Array),
+            Some(_) => values
+                .iter()
+                .map(|v| {
+                    if matches!(v, ParamValue::I64(_)) {
+                        None
+                    } else {
+                        v.as_f64()
+                    }
+                })
+                .collect::<Option<_>>()
+                .map(ParamValue::F64Array),
+        };
+        all.ok_or_else(|| {
+            let first = lead.map_or("nothing", Self::type_name);
+            let other = values
+                .iter()
+                .map(Self::type_name)
+                .find(|name| *name != first);
+            ValueError::Mixed(first, other.unwrap_or("something else"))
+        })
+    }
+
+    /// The name of the type, as messages print it.
+    pub fn type_name(&self) -> &'static str {
+        match self {
+            ParamValue::Bool(_) => "a bool",
+            ParamValue::I64(_) => "an integer",
+            ParamValue::F64(_) => "a float",
+            ParamValue::String(_) => "a text",
+            ParamValue::BoolArray(_) => "a list of bools",
+            ParamValue::I64Array(_) => "a list of integers",
+            ParamValue::F64Array(_) => "a list of floats",
+            ParamValue::StringArray(items) if items.is_empty() => "an empty list",
+            ParamValue::StringArray(_) => "a list of texts",
+        }
+    }
+
+    /// The code of the type in `rcl_interfaces/msg/ParameterType`.
+    pub fn type_code(&self) -> u8 {
+        match self {
+            ParamValue::Bool(_) => 1,
+            ParamValue::I64(_) => 2,
+            ParamValue::F64(_) => 3,
+            ParamValue::String(_) => 4,
+            ParamValue::BoolArray(_) => 6,
+            ParamValue::I64Array(_) => 7,
+            ParamValue::F64Array(_) => 8,
+            ParamValue::StringArray(_) => 9,
+        }
+    }
+
+    fn is_array(&self) -> bool {
+        self.type_code() > 5
+    }
+
+    /// The value as rcl would read it where a bool is wanted.
+    pub(crate) fn as_bool(&self) -> Option<bool> {
+        match self {
+            ParamValue::Bool(value) => Some(*value),
+            ParamValue::String(text) => match text.as_str() {
+                "y" | "Y" | "yes" | "Yes" | "YES" | "on" | "On" | "ON" => Some(true),
+                "n" | "N" | "no" | "No" | "NO" | "off" | "Off" | "OFF" => Some(false),
+                _ => None,
+            },
+            _ => None,
+        }
+    }
+
+    /// The value as rcl would read it where an integer is wanted.
+    pub(crate) fn as_i64(&self) -> Option<i64> {
+        match self {
+            ParamValue::I64(value) => Some(*value),
+            ParamValue::String(text) if may_be_plain(text) => c_integer(text),
+            _ => None,
+        }
+    }
+
+    /// The value where a float is wanted; integers count.
+    pub(crate) fn as_f64(&self) -> Option<f64> {
+        match self {
+            ParamValue::F64(value) => Some(*value),
+            ParamValue::I64(value) => Some(*value as f64),
+            ParamValue::String(text) if may_be_plain(text) => c_integer(text)
+                .map(|value| value as f64)
+                .or_else(|| c_float(text)),
+            _ => None,
+        }
+    }
+
+    /// The value where a text is wanted.
+    pub(crate) fn as_str(&self) -> Option<&str> {
+        match self {
+            ParamValue::String(text) => Some(text),
+            _ => None,
+        }
+    }
+
+    /// The items of a list, each as a value.
+    pub(crate) fn items(&self) -> Option<Vec<ParamValue>> {
+        match self {
+            ParamValue::BoolArray(items) => Some(items.iter().copied().map(Self::Bool).collect()),
+            ParamValue::I64Array(items) => Some(items.iter().copied().map(Self::I64).collect()),
+            ParamValue::F64Array(items) => Some(items.iter().copied().map(Self::F64).collect()),
+            ParamValue::StringArray(items) => {
+                Some(items.iter().cloned().map(Self::String).collect())
+            }
+            _ => None,
+        }
+    }
+}
+
+/// True if the text can have stood without quotes: YAML itself does not read it as something else.
+fn may_be_plain(text: &str) -> bool {
+    matches!(serde_yaml::from_str(text), Ok(Value::String(plain)) if plain == text)
+}
+
+/// An integer as strtol reads it with base 0: decimal, `0x` hexadecimal, `0` octal.
+fn c_integer(text: &str) -> Option<i64> {
+    let (negative, digits) = match text.strip_prefix('-') {
+        Some(digits) => (true, digits),
+        None => (false, text.strip_prefix('+').unwrap_or(text)),
+    };
+    let hexadecimal = digits
+        .strip_prefix("0x")
+        .or_else(|| digits.strip_prefix("0X"));
+    let (digits, radix) = match (hexadecimal, digits.strip_prefix('0')) {
+        (Some(digits), _) => (digits, 16),
+        (None, Some(octal)) if !octal.is_empty() => (octal, 8),
+        _ => (digits, 10),
+    };
+    if !digits.bytes().next()?.is_ascii_hexdigit() {
+        return None;
+    }
+    let magnitude = i128::from(u64::from_str_radix(digits, radix).ok()?);
+    i64::try_from(if negative {
+        magnitude.checked_neg()?
+    } else {
+        magnitude
+    })
+    .ok()
+}
+
+/// A decimal float that YAML 1.2 leaves a text, for example `08.5`.
+fn c_float(text: &str) -> Option<f64> {
+    let decimal = text
+        .bytes()
+        .all(|byte| byte.is_ascii_digit() || b"+-.eE".contains(&byte));
+    text.parse()
+        .ok()
+        .filter(|value: &f64| decimal && value.is_finite())
+}
+
+impl fmt::Display for ParamValue {
+    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
+        match self {
+            ParamValue::Bool(value) => write!(f, "{value}"),
+            ParamValue::I64(value) => write!(f, "{value}"),
+            ParamValue::F64(value) => write!(f, "{value:?}"),
+            ParamValue::String(value) => write!(f, "{value:?}"),
+            ParamValue::BoolArray(items) => write!(f, "{items:?}"),
+            ParamValue::I64Array(items) => write!(f, "{items:?}"),
+            ParamValue::F64Array(items) => write!(f, "{items:?}"),
+            ParamValue::StringArray(items) => write!(f, "{items:?}"),
+        }
+    }
+}
+
+#[cfg(test)]
+mod tests;

@@ -1,0 +1,160 @@
+//! The port of the transport: everything that the runtime asks of DDS, in terms of no implementation.
+
+use std::future::poll_fn;
+use std::sync::{Arc, MutexGuard};
+use std::task::{Context, Poll};
+use std::time::Duration;
+
+use futures::future::BoxFuture;
+use futures::stream::BoxStream;
+
+use super::error::RuntimeError;
+use super::qos::Qos;
+
+/// Buffer of a sample that writers share.
+pub(crate) use rustdds::bytes::Bytes;
+
+/// Length of the encapsulation header in front of every CDR sample.
+pub(crate) const ENCAPSULATION_BYTES: usize = 4;
+
+/// Identity of a reader or writer, the GUID of DDS: twelve bytes name the participant.
+#[derive(Clone, Copy, Debug, PartialEq, Eq, PartialOrd, Ord)]
+pub(crate) struct EndpointId(pub [u8; 16]);
+
+impl EndpointId {
+    /// First two bytes, which the vendor of the implementation has been given.
+    pub(crate) fn vendor(&self) -> [u8; 2] {
+        let [first, second, ..] = self.0;
+        [first, second]
+    }
+
+    /// True for two endpoints of one participant.
+    pub(crate) fn is_beside(&self, other: &Self) -> bool {
+        self.0.first_chunk::<12>() == other.0.first_chunk()
+    }
+}
+
+/// One sample among all samples.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub(crate) struct SampleId {
+    /// The writer that sent it, or what the sender names in its place.
+    pub writer: EndpointId,
+    /// Its number there; not above 0 where the sender does not say.
+    pub number: i64,
+}
+
+/// Origin of a sample that was received.
+#[derive(Clone, Copy, Debug)]
+pub(crate) struct Origin {
+    /// The sample itself.
+    pub sample: SampleId,
+    /// The request it belongs to, where the sender said so.
+    pub related: Option<SampleId>,
+}
+
+/// Topic of an endpoint.
+#[derive(Clone, Copy, Debug)]
+pub(crate) struct PortTopic<'a> {
+    /// Name in ROS, for messages.
+    pub name: &'a str,
+    /// Name in DDS.
+    pub dds_name: &'a str,
+    /// Type, such as `sensor_msgs/msg/Imu`.
+    pub ros_type: &'a str,
+}
+
+/// A change of the other ends of our endpoints.
+#[derive(Clone, Copy, Debug)]
+pub(crate) enum PortEvent {
+    /// An endpoint of ours and a peer have found each other.
+    Matched {
+        endpoint: EndpointId,
+        peer: EndpointId,
+    },
+    /// A peer has a QoS that does not go with ours, in this policy.
+    Incompatible {
+        endpoint: EndpointId,
+        peer: EndpointId,
+        policy: &'static str,
+    },
+    /// A peer has gone.
+    Lost { peer: EndpointId },
+    /// All peers of the participant of this endpoint have gone.
+    ParticipantLost { any: EndpointId },
+}
+
+/// A participant on a network.
+pub(crate) trait Transport: Send + Sync {
+    /// Identity of the participant.
+    fn id(&self) -> EndpointId;
+
+    /// Makes a writer.
+    fn writer(
+        &self,
+        topic: PortTopic<'_>,
+        qos: &Qos,
+    ) -> Result<Arc<dyn SampleWriter>, RuntimeError>;
+
+    /// Makes a reader that refuses samples longer than `max_bytes`, header included.
+    fn reader(
+        &self,
+        topic: PortTopic<'_>,
+        qos: &Qos,
+        max_bytes: usize,
+    ) -> Result<Box<dyn SampleReader>, RuntimeError>;
+
+    /// Changes of peers. Only one stream hears them.
+    fn events(&self) -> BoxStream<'static, PortEvent>;
+
+    /// Begins to wait until discovery knows every writer made so far: a reader of the same topic in the
+    /// same participant must not be made before.
+    fn writers_known(&self) -> Result<BoxFuture<'static, ()>, RuntimeError>;
+}
+
+/// Reason why a sample was not written.
+#[derive(Debug)]
+pub(crate) enum WriteRefusal {
+    /// The send window is full.
+    Full,
+    /// In the words of the transport.
+    Failed(String),
+}
+
+/// The sending end of a topic.
+pub(crate) trait SampleWriter: Send + Sync {
+    /// Its identity.
+    fn id(&self) -> EndpointId;
+
+    /// Writes the body of a little-endian CDR sample. `may_wait`: also best-effort samples wait for a full
+    /// send window.
+    fn write(
+        &self,
+        body: Bytes,
+        related: Option<SampleId>,
+        may_wait: bool,
+    ) -> BoxFuture<'_, Result<(), WriteRefusal>>;
+
+    /// Waits until every reliable reader has acknowledged. False: not in time.
+    fn wait_for_acknowledgments(&self, patience: Duration) -> bool;
+}
+
+/// The receiving end of a topic.
+pub(crate) trait SampleReader: Send + Sync {
+    /// Its identity.
+    fn id(&self) -> EndpointId;
+
+    /// The next sample; see [`SampleReader::next`].
+    fn poll_next(&self, context: &mut Context<'_>) -> Poll<Result<Origin, String>>;
+
+    /// Bytes of the last sample, encapsulation header first.
+    fn bytes(&self) -> MutexGuard<'_, Vec<u8>>;
+}
+
+impl dyn SampleReader + '_ {
+    /// The next sample; its bytes are in [`SampleReader::bytes`] until the next call.
+    ///
+    /// The error is a sample that cannot be had, in words; the one after it can.
+    pub(crate) async fn next(&self) -> Result<Origin, String> {
+        poll_fn(|context| self.poll_next(context)).await
+    }
+}

@@ -1,0 +1,168 @@
+//! The runtime of a process: one participant, its threads, and the nodes on it.
+
+use std::sync::Arc;
+use std::time::{Duration, Instant};
+
+use lattice_msgs::diagnostic_msgs::DiagnosticArray;
+use smol::Timer;
+
+use super::env::Transport;
+use super::error::RuntimeError;
+use super::node::Node;
+use super::param_services;
+use super::qos::Qos;
+use super::ros_args::RosArgs;
+use super::rosout;
+use super::shared::{Shared, deadline};
+use super::shutdown::{Shutdown, SignalWatch};
+
+/// Between two messages on `/diagnostics`.
+const DIAGNOSTICS_PERIOD: Duration = Duration::from_secs(1);
+
+/// Shortest period of a timer.
+const MIN_TIMER_PERIOD: Duration = Duration::from_millis(1);
+
+/// Runs the nodes of a process. Dropping it closes the participant, and peers see it go at once.
+///
+/// SIGINT and SIGTERM ask for shutdown while it lives. Not to be dropped on one of its own threads.
+pub struct Runtime {
+    shared: Arc<Shared>,
+    args: Arc<RosArgs>,
+    main: Node,
+    main_default_name: String,
+    _signals: SignalWatch,
+    _rosout: Option<Arc<rosout::Listener>>,
+}
+
+impl Runtime {
+    /// Starts the runtime and its main node, on the network that the environment names.
+    pub fn start(default_node_name: &str, args: RosArgs) -> Result<Self, RuntimeError> {
+        Self::with_transport(default_node_name, args, &Transport::from_env()?)
+    }
+
+    /// The same on a network that is given.
+    pub fn with_transport(
+        default_node_name: &str,
+        args: RosArgs,
+        transport: &Transport,
+    ) -> Result<Self, RuntimeError> {
+        for warning in &transport.warnings {
+            log::warn!("{warning}");
+        }
+        let shared = Shared::start(transport.domain_id, transport.localhost_only)?;
+        shared.receive_buffer.warn_if_short();
+        let signals = SignalWatch::start(shared.shutdown.clone())?;
+        let args = Arc::new(args);
+        let main = node(&shared, &args, default_node_name)?;
+        let mut runtime = Self {
+            shared,
+            args,
+            main,
+            main_default_name: default_node_name.to_owned(),
+            _signals: signals,
+            _rosout: None,
+        };
+        runtime.publish_diagnostics()?;
+        if runtime.args.rosout_logs {
+            runtime._rosout = Some(runtime.publish_log()?);
+        }
+        Ok(runtime)
+    }
+
+    /// The node called `default_name` in the code; the main node if it is that.
+    pub fn node(&self, default_name: &str) -> Result<Node, RuntimeError> {
+        if default_name == self.main_default_name {
+            return Ok(self.main.clone());
+        }
+        node(&self.shared, &self.args, default_name)
+    }
+
+    /// Calls `callback` in every period of the system's steady clock, 1 ms at least, until shutdown.
+    ///
+    /// It runs on the io thread and must return at once. Periods that were missed are left out.
+    pub fn timer(&self, period: Duration, mut callback: impl FnMut() + Send + 'static) {
+        let period = period.max(MIN_TIMER_PERIOD);
+        let task = self.shared.io.spawn(async move {
+            let mut due = Instant::now().checked_add(period);
+            while let Some(at) = due {
+                let _ = Timer::at(at).await;
+                callback();
+                let now = Instant::now();
+                due = at.checked_add(period).map(|next| next.max(now));
+            }
+        });
+        if let Some(task) = task {
+            task.detach();
+        }
+    }
+
+    /// A handle to ask for shutdown.
+    pub fn shutdown_handle(&self) -> Shutdown {
+        self.shared.shutdown.clone()
+    }
+
+    /// Blocks until shutdown is asked for, then ends timers, sends what is queued, and leaves.
+    ///
+    /// The error is a thread that panicked.
+    pub fn spin(&self) -> Result<(), RuntimeError> {
+        self.shared.shutdown.wait();
+        self.shared.close();
+        match self.shared.shutdown.failed_thread() {
+            Some(thread) => Err(RuntimeError::Panicked { thread }),
+            None => Ok(()),
+        }
+    }
+
+    /// Waits until the handlers have had every message that waits in this process, for two seconds at
+    /// most. Not from a handler, callback or timer.
+    pub fn work_off(&self) {
+        self.shared.work_off(deadline());
+    }
+
+    fn publish_log(&self) -> Result<Arc<rosout::Listener>, RuntimeError> {
+        let topic = self.main.resolve("/rosout")?;
+        let publisher = self
+            .shared
+            .publisher(self.main.id(), &topic, &Qos::ROSOUT)?;
+        let (listener, records) = rosout::listen();
+        if let Some(task) = self.shared.io.spawn(rosout::publish(records, publisher)) {
+            task.detach();
+        }
+        Ok(listener)
+    }
+
+    fn publish_diagnostics(&self) -> Result<(), RuntimeError> {
+        let topic = self.main.resolve("/diagnostics")?;
+        let publisher =
+            self.shared
+                .publisher::<DiagnosticArray>(self.main.id(), &topic, &Qos::DIAGNOSTICS)?;
+        let shared = Arc::downgrade(&self.shared);
+        let (clock, fqn) = (self.main.clock(), self.main.fqn().to_owned());
+        self.timer(DIAGNOSTICS_PERIOD, move || {
+            if let Some(shared) = shared.upgrade() {
+                let transport = shared.transport_status(&fqn);
+                let message = shared.tasks.message(clock.now_ns(), transport);
+                // A full queue is counted, and stated in the next message.
+                let _ = publisher.publish(message);
+            }
+        });
+        Ok(())
+    }
+}
+
+/// A node with its parameter services.
+fn node(
+    shared: &Arc<Shared>,
+    args: &Arc<RosArgs>,
+    default_name: &str,
+) -> Result<Node, RuntimeError> {
+    let node = Node::new(shared, args, default_name)?;
+    shared.keep(param_services::serve(&node, node.params())?);
+    Ok(node)
+}
+
+impl Drop for Runtime {
+    fn drop(&mut self) {
+        self.shared.close();
+    }
+}

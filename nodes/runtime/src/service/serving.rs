@@ -1,0 +1,131 @@
+//! The task of a server: takes requests, and sends each answer when its client can hear it.
+
+use std::sync::Arc;
+use std::time::Duration;
+
+use futures::StreamExt;
+use futures::stream::FuturesUnordered;
+use lattice_msgs::{RosMessage, RosService};
+use smol::Timer;
+use smol::channel::{Receiver, Sender};
+use smol::future::{self, or};
+
+use super::Reply;
+use super::wire::{ReplyTo, read_request, write_reply};
+use crate::logging::Throttle;
+use crate::outbox::Outbox;
+use crate::peers::Peers;
+use crate::port::{EndpointId, Origin, SampleReader};
+
+/// A client may ask before its reply reader is known here; a reply sent then would be lost.
+const WAIT_FOR_CLIENT: Duration = Duration::from_secs(1);
+
+/// A server at work.
+pub(crate) struct Serving {
+    pub name: String,
+    pub requests: Box<dyn SampleReader>,
+    pub replies: Arc<Outbox>,
+    /// The other ends of the replies.
+    pub readers: Arc<Peers>,
+    pub ending: Receiver<Sender<()>>,
+    /// Requests that wait for their answers at a time, at most.
+    pub max_pending: usize,
+    pub warning: Throttle,
+}
+
+/// A request that waits for its answer.
+struct Asked<R> {
+    answered: Receiver<R>,
+    reply_to: ReplyTo,
+    client: EndpointId,
+}
+
+/// Next event of a server.
+enum Step {
+    Take(Result<Origin, String>),
+    Answered(Result<(), String>),
+    End(Sender<()>),
+}
+
+impl Serving {
+    /// Serves until the task is dropped or the end is asked for and everything answered.
+    pub(crate) async fn run<S: RosService>(
+        self,
+        mut handler: impl FnMut(S::Request, Reply<S::Response>),
+    ) {
+        let mut pending = FuturesUnordered::new();
+        let mut ended = None;
+        while ended.is_none() || !pending.is_empty() {
+            let takes = ended.is_none() && pending.len() < self.max_pending;
+            let take = async {
+                match takes {
+                    true => Step::Take(self.requests.next().await),
+                    false => future::pending().await,
+                }
+            };
+            let answered = async {
+                match pending.next().await {
+                    Some(result) => Step::Answered(result),
+                    None => future::pending().await,
+                }
+            };
+            let end = async {
+                match self.ending.recv().await {
+                    Ok(done) => Step::End(done),
+                    Err(_) => future::pending().await,
+                }
+            };
+            let outcome = match or(end, or(answered, take)).await {
+                Step::Take(sample) => self
+                    .ask::<S>(sample, &mut handler)
+                    .map(|asked| pending.push(self.answer(asked))),
+                Step::Answered(result) => result,
+                Step::End(done) => {
+                    ended = Some(done);
+                    Ok(())
+                }
+            };
+            if let Err(why) = outcome
+                && self.warning.check().is_some()
+            {
+                log::warn!("{}: request not answered: {why}", self.name);
+            }
+            future::yield_now().await;
+        }
+    }
+
+    fn ask<S: RosService>(
+        &self,
+        sample: Result<Origin, String>,
+        handler: &mut impl FnMut(S::Request, Reply<S::Response>),
+    ) -> Result<Asked<S::Response>, String> {
+        let origin = sample?;
+        let (request, reply_to) = read_request::<S::Request>(&self.requests.bytes(), &origin)
+            .map_err(|e| e.to_string())?;
+        let (reply, answered) = Reply::channel();
+        handler(request, reply);
+        Ok(Asked {
+            answered,
+            reply_to,
+            client: origin.sample.writer,
+        })
+    }
+
+    async fn answer<R: RosMessage>(&self, asked: Asked<R>) -> Result<(), String> {
+        let answer = asked.answered.recv().await;
+        let reply = answer.map_err(|_| "nobody answered it".to_owned())?;
+        let (body, related) = write_reply(&reply, &asked.reply_to).map_err(|e| e.to_string())?;
+        self.wait_for_reader(&asked.client).await;
+        self.replies
+            .send_body(body, related)
+            .map_err(|e| e.to_string())
+    }
+
+    async fn wait_for_reader(&self, client: &EndpointId) {
+        let known = self.readers.known(|reader| reader.is_beside(client));
+        let timeout = async {
+            Timer::after(WAIT_FOR_CLIENT).await;
+        };
+        or(known, timeout).await;
+    }
+}

@@ -1,0 +1,293 @@
+//! The parts that the nodes of a process share: the participant, the threads, the local bus.
+
+mod publishing;
+mod readers;
+mod serving;
+mod status;
+mod subscribing;
+
+use std::sync::atomic::{AtomicI64, AtomicU64, Ordering::Relaxed};
+use std::sync::{Arc, Mutex, Weak};
+use std::thread::JoinHandle;
+use std::time::{Duration, Instant};
+
+use futures::future::BoxFuture;
+use lattice_msgs::rosgraph_msgs;
+use smol::Task;
+use smol::channel::Sender;
+
+use self::status::ReceiveBuffer;
+use super::clock::Clock;
+use super::dds::Dds;
+use super::diagnostics::Tasks;
+use super::endpoints::Endpoints;
+use super::error::RuntimeError;
+use super::graph::{self, Graph, NodeId};
+use super::local_bus::LocalBus;
+use super::outbox::{Outbox, WhenFull};
+use super::port::{PortTopic, SampleReader, Transport};
+use super::publisher::PublisherParts;
+use super::qos::Qos;
+use super::service::{Answers, Server};
+use super::shutdown::Shutdown;
+use super::subscription::{Command, Intake, Load, Sample, Stats, Subscription};
+use super::sync::{lock, wait_for};
+use super::task_thread::TaskThread;
+
+/// Messages that wait in the queue of one publisher, at most.
+const QUEUE_MESSAGES: usize = 1024;
+
+/// Bytes that wait in the queue of one publisher, at most.
+const QUEUE_BYTES: usize = 128 << 20;
+
+/// Time for each of three at the end: handlers, answers, and what is queued to be sent.
+const DRAIN_TIME: Duration = Duration::from_secs(2);
+
+/// Length of a message that is accepted unless a parameter says otherwise.
+pub(crate) const DEFAULT_MAX_MESSAGE_BYTES: usize = 64 << 20;
+
+/// The participant, threads and local bus of a process.
+pub(crate) struct Shared {
+    pub bus: LocalBus,
+    pub shutdown: Shutdown,
+    pub io: TaskThread,
+    pub tasks: Arc<Tasks>,
+    pub receive_buffer: ReceiveBuffer,
+    sim_time: Mutex<Option<SimTime>>,
+    publishing: TaskThread,
+    answers: Answers,
+    endpoints: Arc<Endpoints>,
+    pub graph: Arc<Graph>,
+    /// Held while a writer is made, or a reader that a writer must not meet.
+    writer_order: Mutex<()>,
+    writers_made: AtomicU64,
+    open: Mutex<Option<Open>>,
+}
+
+/// Simulated time, one for all nodes of a process.
+struct SimTime {
+    clock: Clock,
+    _subscription: Subscription,
+}
+
+/// Everything that goes at shutdown.
+struct Open {
+    transport: Box<dyn Transport>,
+    _watch: Option<Task<()>>,
+    publishers: Vec<Weak<PublisherParts>>,
+    intakes: Vec<Weak<Intake>>,
+    readers: Vec<(Sender<()>, JoinHandle<()>)>,
+    servers: Vec<Server>,
+    graph: Option<Task<()>>,
+}
+
+impl Shared {
+    pub(crate) fn start(domain: u16, localhost_only: bool) -> Result<Arc<Self>, RuntimeError> {
+        let shutdown = Shutdown::default();
+        let io = TaskThread::start("io", shutdown.clone())?;
+        let publishing = TaskThread::start("publisher", shutdown.clone())?;
+        let dds = Dds::join(domain, localhost_only)?;
+        let endpoints = Arc::new(Endpoints::default());
+        let watch = io.spawn(Arc::clone(&endpoints).watch(dds.events()));
+        let shared = Arc::new(Self {
+            bus: LocalBus::default(),
+            shutdown,
+            io,
+            tasks: Arc::default(),
+            receive_buffer: ReceiveBuffer::probe(),
+            sim_time: Mutex::default(),
+            publishing,
+            answers: Answers::default(),
+            endpoints,
+            graph: Graph::new(),
+            writer_order: Mutex::default(),
+            writers_made: AtomicU64::new(0),
+            open: Mutex::new(Some(Open {
+                transport: Box::new(dds),
+                _watch: watch,
+                publishers: Vec::new(),
+                intakes: Vec::new(),
+                readers: Vec::new(),
+                servers: Vec::new(),
+                graph: None,
+            })),
+        });
+        shared.publish_graph()?;
+        Ok(shared)
+    }
+
+    fn publish_graph(&self) -> Result<(), RuntimeError> {
+        let qos = Qos::latched(1);
+        let outbox = self.outbox(
+            graph::TOPIC,
+            graph::TOPIC,
+            graph::TYPE,
+            &qos,
+            WhenFull::Wait,
+        )?;
+        if let Some(open) = lock(&self.open).as_mut() {
+            let participant = open.transport.id();
+            open.graph = self
+                .io
+                .spawn(Arc::clone(&self.graph).publish(participant, outbox));
+        }
+        Ok(())
+    }
+
+    /// Keeps servers until shutdown.
+    pub(crate) fn keep(&self, servers: Vec<Server>) {
+        if let Some(open) = lock(&self.open).as_mut() {
+            open.servers.extend(servers);
+        }
+    }
+
+    /// A queue that the publisher thread serves, until the last handle of it goes.
+    fn outbox(
+        &self,
+        name: &str,
+        dds_name: &str,
+        ros_type: &str,
+        qos: &Qos,
+        when_full: WhenFull,
+    ) -> Result<Arc<Outbox>, RuntimeError> {
+        let topic = PortTopic {
+            name,
+            dds_name,
+            ros_type,
+        };
+        let mut guard = lock(&self.open);
+        let open = guard.as_mut().ok_or_else(|| closed(name))?;
+        let writer = open.transport.writer(topic, qos)?;
+        let (outbox, task) = Outbox::new(name, writer, when_full, QUEUE_MESSAGES, QUEUE_BYTES);
+        self.publishing
+            .spawn(task)
+            .ok_or_else(|| closed(name))?
+            .detach();
+        Ok(Arc::new(outbox))
+    }
+
+    /// A reader of samples up to `max_bytes`.
+    fn reader(
+        &self,
+        topic: PortTopic<'_>,
+        qos: &Qos,
+        max_bytes: usize,
+    ) -> Result<Box<dyn SampleReader>, RuntimeError> {
+        let guard = lock(&self.open);
+        let open = guard.as_ref().ok_or_else(|| closed(topic.name))?;
+        open.transport.reader(topic, qos, max_bytes)
+    }
+
+    /// The clock on `topic`, subscribed to at the first call.
+    pub(crate) fn sim_clock(
+        self: &Arc<Self>,
+        node: NodeId,
+        topic: &str,
+    ) -> Result<Clock, RuntimeError> {
+        let mut sim = lock(&self.sim_time);
+        if let Some(sim) = sim.as_ref() {
+            return Ok(sim.clock.clone());
+        }
+        let now_ns = Arc::new(AtomicI64::new(0));
+        let clock = Clock::simulated(Arc::clone(&now_ns));
+        let handler = move |sample: Sample<'_, rosgraph_msgs::Clock>, stats: &Arc<Stats>| {
+            if let Some(message) = stats.decode(sample) {
+                now_ns.store(message.clock.to_ns(), Relaxed);
+            }
+        };
+        let subscription =
+            self.subscribe(node, topic, &Qos::CLOCK, Load::Small, 1 << 10, handler)?;
+        *sim = Some(SimTime {
+            clock: clock.clone(),
+            _subscription: subscription,
+        });
+        Ok(clock)
+    }
+
+    /// Publishers that are in use.
+    pub(crate) fn publishers(&self) -> Vec<Arc<PublisherParts>> {
+        let open = lock(&self.open);
+        let all = open.iter().flat_map(|open| &open.publishers);
+        all.filter_map(Weak::upgrade).collect()
+    }
+
+    /// Subscriptions that are in use.
+    pub(crate) fn intakes(&self) -> Vec<Arc<Intake>> {
+        let open = lock(&self.open);
+        let all = open.iter().flat_map(|open| &open.intakes);
+        all.filter_map(Weak::upgrade).collect()
+    }
+
+    /// Begins to wait until discovery knows the writers made so far. `None` after shutdown.
+    fn writers_known(&self) -> Option<BoxFuture<'static, ()>> {
+        let open = lock(&self.open);
+        open.as_ref()?.transport.writers_known().ok()
+    }
+
+    /// Has all subscriptions give their handlers what waits in this process. Not from a thread of the
+    /// runtime.
+    pub(crate) fn work_off(&self, deadline: Instant) {
+        let orders: Vec<_> = (self.intakes().into_iter())
+            .filter_map(|intake| Some((intake.order(Command::WorkOff)?, intake)))
+            .collect();
+        for (order, intake) in orders {
+            if !wait_for(&order, deadline.saturating_duration_since(Instant::now())) {
+                log::warn!(
+                    "{}: messages of this process were not handled",
+                    intake.topic
+                );
+            }
+        }
+    }
+
+    /// Ends everything: what waits for handlers and clients first, then timers and readers, then what
+    /// is queued goes out, then we leave.
+    ///
+    /// Not from a thread of the runtime.
+    pub(crate) fn close(&self) {
+        self.shutdown.request();
+        if lock(&self.open).is_some() {
+            self.work_off(deadline());
+        }
+        let answers = self.answers.end(deadline());
+        let Some(open) = lock(&self.open).take() else {
+            return;
+        };
+        self.io.stop();
+        for (stop, thread) in open.readers {
+            stop.close();
+            // Its panic has been reported by the thread itself.
+            let _ = thread.join();
+        }
+        let publishers = open.publishers.iter().filter_map(Weak::upgrade);
+        let writers = publishers.map(|publisher| Arc::clone(&publisher.writer));
+        let deadline = deadline();
+        for writer in answers.into_iter().chain(writers) {
+            if !writer.flush(deadline.saturating_duration_since(Instant::now())) {
+                log::warn!("{}: not everything was delivered", writer.topic());
+            }
+            writer.close();
+        }
+        self.publishing.stop();
+        drop(open.servers);
+        drop(open.transport);
+    }
+}
+
+/// End of a phase of the shutdown that begins now.
+pub(crate) fn deadline() -> Instant {
+    let now = Instant::now();
+    now.checked_add(DRAIN_TIME).unwrap_or(now)
+}
+
+impl Drop for Shared {
+    fn drop(&mut self) {
+        self.close();
+    }
+}
+
+fn closed(topic: &str) -> RuntimeError {
+    RuntimeError::Closed {
+        topic: topic.to_owned(),
+    }
+}

@@ -1,0 +1,76 @@
+//! Servers of the process.
+
+use std::sync::Arc;
+use std::time::Duration;
+
+use lattice_msgs::{RosMessage, RosService};
+use smol::channel::bounded;
+
+use super::{Shared, closed};
+use crate::error::RuntimeError;
+use crate::graph::{EndpointKind, NodeId};
+use crate::logging::Throttle;
+use crate::names;
+use crate::outbox::WhenFull;
+use crate::peers::Peers;
+use crate::port::PortTopic;
+use crate::qos::Qos;
+use crate::service::{Reply, Server, Serving};
+
+/// Requests are short.
+const MAX_REQUEST_BYTES: usize = 4 << 20;
+
+/// Between two warnings of unreadable requests.
+const WARNING_PERIOD: Duration = Duration::from_secs(5);
+
+impl Shared {
+    /// Serves `S` under a full name, up to `max_pending` requests at a time.
+    pub(crate) fn serve<S: RosService + 'static>(
+        &self,
+        node: NodeId,
+        name: &str,
+        max_pending: usize,
+        handler: impl FnMut(S::Request, Reply<S::Response>) + Send + 'static,
+    ) -> Result<Server, RuntimeError> {
+        let clients = Arc::new(Peers::of_server(name));
+        let requests = self.reader(
+            PortTopic {
+                name,
+                dds_name: &names::dds_request(name),
+                ros_type: S::Request::TYPE,
+            },
+            &Qos::SERVICES,
+            MAX_REQUEST_BYTES,
+        )?;
+        let readers = Arc::new(Peers::of_replies(name));
+        let replies = self.outbox(
+            name,
+            &names::dds_reply(name),
+            S::Response::TYPE,
+            &Qos::SERVICES,
+            WhenFull::Drop,
+        )?;
+        let graph = [
+            self.graph.join(node, EndpointKind::Reader, requests.id()),
+            self.graph.join(node, EndpointKind::Writer, replies.id()),
+        ];
+        self.endpoints.register(requests.id(), &clients);
+        self.endpoints.register(replies.id(), &readers);
+        let (end, ending) = bounded(1);
+        self.answers.add(end, &replies);
+        let serving = Serving {
+            name: name.to_owned(),
+            requests,
+            replies,
+            readers,
+            ending,
+            max_pending: max_pending.max(1),
+            warning: Throttle::new(WARNING_PERIOD),
+        };
+        let task = self
+            .io
+            .spawn(serving.run::<S>(handler))
+            .ok_or_else(|| closed(name))?;
+        Ok(Server::new(name, clients, task, graph))
+    }
+}

@@ -1,0 +1,90 @@
+//! Subscriptions of the process.
+
+use std::sync::Arc;
+use std::sync::Mutex;
+use std::sync::atomic::AtomicBool;
+
+use lattice_msgs::RosMessage;
+use smol::channel::{bounded, unbounded};
+
+use super::{Shared, closed};
+use crate::error::RuntimeError;
+use crate::graph::NodeId;
+use crate::peers::Peers;
+use crate::qos::{Durability, Qos};
+use crate::subscription::{
+    Intake, Load, Running, Sample, Source, Stats, Subscription, spawn_reader,
+};
+use crate::sync::lock;
+
+/// Small messages of a publisher in this process that wait for a subscription, at least. They are
+/// shared, not copied, and the handler that they wait for returns at once.
+const LOCAL_SMALL_MESSAGES: usize = 1024;
+
+/// The same for large ones: several bursts of line scans, and not too much of 4 MB clouds.
+const LOCAL_LARGE_MESSAGES: usize = 128;
+
+impl Shared {
+    pub(crate) fn subscribe<M: RosMessage>(
+        self: &Arc<Self>,
+        node: NodeId,
+        topic: &str,
+        qos: &Qos,
+        load: Load,
+        max_bytes: usize,
+        mut handler: impl FnMut(Sample<'_, M>, &Arc<Stats>) + Send + 'static,
+    ) -> Result<Subscription, RuntimeError> {
+        let peers = Arc::new(Peers::of_subscription(topic));
+        let stats = Arc::new(Stats::new(Arc::clone(&peers)));
+        let (sender, local) = bounded(qos.depth.max(match load {
+            Load::Small => LOCAL_SMALL_MESSAGES,
+            Load::Large => LOCAL_LARGE_MESSAGES,
+        }));
+        let latched = qos.durability == Durability::TransientLocal;
+        let place = self.bus.topic(topic).join_subscriber::<M>(
+            &peers,
+            sender,
+            stats.lost_counter(),
+            latched,
+        )?;
+        let (commands, orders) = unbounded();
+        let intake = Arc::new(Intake {
+            node,
+            topic: topic.to_owned(),
+            type_name: M::TYPE,
+            qos: *qos,
+            max_bytes,
+            peers,
+            stats: Arc::clone(&stats),
+            commands,
+            is_open: AtomicBool::new(false),
+            graph: Mutex::default(),
+        });
+        let source = Source {
+            commands: orders,
+            local,
+            _local: place,
+            stats: Arc::clone(&stats),
+        };
+        let task = source.run(move |sample: Sample<'_, M>| handler(sample, &stats));
+        let running = match load {
+            Load::Small => Running::OnIoThread {
+                _task: self.io.spawn(task).ok_or_else(|| closed(topic))?,
+            },
+            Load::Large => {
+                let (stop, thread) = spawn_reader(&self.shutdown, task)?;
+                if let Some(open) = lock(&self.open).as_mut() {
+                    open.readers.retain(|(_, thread)| !thread.is_finished());
+                    open.readers.push((stop.clone(), thread));
+                }
+                Running::OnOwnThread { _stop: stop }
+            }
+        };
+        if let Some(open) = lock(&self.open).as_mut() {
+            open.intakes.retain(|intake| intake.strong_count() > 0);
+            open.intakes.push(Arc::downgrade(&intake));
+        }
+        self.open_intake(&intake)?;
+        Ok(Subscription::new(intake, running))
+    }
+}

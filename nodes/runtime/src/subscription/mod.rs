@@ -1,0 +1,224 @@
+//! Subscriptions: their handles, counters and messages.
+
+mod intake;
+mod source;
+
+pub(crate) use intake::{Command, Intake};
+pub(crate) use source::Source;
+
+use std::sync::Arc;
+use std::sync::atomic::{AtomicU64, Ordering::Relaxed};
+use std::thread::JoinHandle;
+use std::time::Duration;
+
+use lattice_msgs::{RosMessage, cdr};
+use smol::Task;
+use smol::channel::{Sender, bounded};
+
+use super::error::RuntimeError;
+use super::logging::Throttle;
+use super::peers::Peers;
+use super::shutdown::Shutdown;
+use super::task_thread::guarded;
+
+/// Between two warnings of undecodable samples.
+const WARNING_PERIOD: Duration = Duration::from_secs(5);
+
+/// Size of the messages of a subscription, which decides the thread that takes them.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub enum Load {
+    /// Poses, transforms, clocks: taken on the io thread.
+    Small,
+    /// Clouds, images, maps: taken on a thread of their own.
+    Large,
+}
+
+/// A subscription; dropping it ends it.
+#[must_use = "dropping a subscription ends it"]
+pub struct Subscription {
+    intake: Arc<Intake>,
+    _running: Running,
+}
+
+pub(crate) enum Running {
+    /// Ends when dropped.
+    OnIoThread { _task: Task<()> },
+    /// Ends when the sender is dropped.
+    OnOwnThread { _stop: Sender<()> },
+}
+
+/// Counters of a subscription.
+pub(crate) struct Stats {
+    peers: Arc<Peers>,
+    received: AtomicU64,
+    undecodable: AtomicU64,
+    lost: Arc<AtomicU64>,
+    warning: Throttle,
+}
+
+impl Subscription {
+    pub(crate) fn new(intake: Arc<Intake>, running: Running) -> Self {
+        Self {
+            intake,
+            _running: running,
+        }
+    }
+
+    fn stats(&self) -> &Stats {
+        &self.intake.stats
+    }
+
+    /// Resolved topic.
+    pub fn topic(&self) -> &str {
+        self.stats().peers.topic()
+    }
+
+    /// Matched publishers, here and in other processes.
+    pub fn publisher_count(&self) -> usize {
+        self.stats().peers.count()
+    }
+
+    /// Messages given to the handler.
+    pub fn received(&self) -> u64 {
+        self.stats().received.load(Relaxed)
+    }
+
+    /// Calls `callback` for every publisher that joins, and now if there is one already.
+    ///
+    /// It runs on a thread of the runtime and must return at once.
+    pub fn on_publisher_joined(&self, callback: impl FnMut() + Send + 'static) {
+        self.stats().peers.on_joined(Box::new(callback));
+    }
+
+    /// Messages that were sent and did not get here: gaps in the numbers of a publisher.
+    pub fn lost(&self) -> u64 {
+        self.stats().lost()
+    }
+
+    /// Samples that were no message of this type, or too long, and were left out.
+    pub fn undecodable(&self) -> u64 {
+        self.stats().undecodable.load(Relaxed)
+    }
+}
+
+impl Stats {
+    pub(crate) fn new(peers: Arc<Peers>) -> Self {
+        Self {
+            peers,
+            received: AtomicU64::new(0),
+            undecodable: AtomicU64::new(0),
+            lost: Arc::default(),
+            warning: Throttle::new(WARNING_PERIOD),
+        }
+    }
+
+    pub(crate) fn peers(&self) -> &Peers {
+        &self.peers
+    }
+
+    pub(crate) fn undecodable(&self) -> u64 {
+        self.undecodable.load(Relaxed)
+    }
+
+    pub(crate) fn lost(&self) -> u64 {
+        self.lost.load(Relaxed)
+    }
+
+    /// The counter behind [`Stats::lost`].
+    pub(crate) fn lost_counter(&self) -> Arc<AtomicU64> {
+        Arc::clone(&self.lost)
+    }
+
+    /// Decodes a sample and counts what comes of it.
+    pub(crate) fn decode<M: RosMessage>(&self, sample: Sample<'_, M>) -> Option<Arc<M>> {
+        let message = match sample {
+            Sample::Shared(message) => Some(message),
+            Sample::Cdr(bytes) => cdr::from_slice::<M>(bytes)
+                .inspect_err(|why| self.not_decodable(why))
+                .ok()
+                .map(Arc::new),
+        };
+        if message.is_some() {
+            self.received.fetch_add(1, Relaxed);
+        }
+        message
+    }
+
+    fn not_decodable(&self, why: &dyn std::fmt::Display) {
+        let count = self.undecodable.fetch_add(1, Relaxed).saturating_add(1);
+        if self.warning.check().is_some() {
+            log::warn!(
+                "{}: undecodable sample ({count} so far): {why}",
+                self.peers.topic()
+            );
+        }
+    }
+}
+
+/// A message as a subscription gets it.
+pub(crate) enum Sample<'a, M> {
+    /// From this process.
+    Shared(Arc<M>),
+    /// From another process, encapsulation header first. The buffer may be taken.
+    Cdr(&'a mut Vec<u8>),
+}
+
+/// A message that is decoded on the thread that needs it, not on the one that received it.
+pub struct Undecoded<M> {
+    content: Content<M>,
+    stats: Arc<Stats>,
+}
+
+enum Content<M> {
+    Shared(Arc<M>),
+    Cdr(Vec<u8>),
+}
+
+impl<M: RosMessage> Undecoded<M> {
+    pub(crate) fn new(sample: Sample<'_, M>, stats: &Arc<Stats>) -> Self {
+        Self {
+            content: match sample {
+                Sample::Shared(message) => Content::Shared(message),
+                Sample::Cdr(bytes) => Content::Cdr(std::mem::take(bytes)),
+            },
+            stats: Arc::clone(stats),
+        }
+    }
+
+    /// Length in bytes; `shared` measures a message that comes from this process.
+    pub fn bytes(&self, shared: impl FnOnce(&M) -> usize) -> usize {
+        match &self.content {
+            Content::Shared(message) => shared(message),
+            Content::Cdr(bytes) => bytes.len(),
+        }
+    }
+
+    /// The message. `None`: the bytes are no message of the type, which is counted and logged.
+    pub fn decode(self) -> Option<Arc<M>> {
+        let Self { content, stats } = self;
+        match content {
+            Content::Shared(message) => stats.decode(Sample::Shared(message)),
+            Content::Cdr(mut bytes) => stats.decode(Sample::Cdr(&mut bytes)),
+        }
+    }
+}
+
+/// Runs a subscription on a thread of its own until the sender is dropped.
+pub(crate) fn spawn_reader(
+    shutdown: &Shutdown,
+    task: impl Future<Output = ()> + Send + 'static,
+) -> Result<(Sender<()>, JoinHandle<()>), RuntimeError> {
+    let (stop, stopped) = bounded::<()>(1);
+    let shutdown = shutdown.clone();
+    let thread = std::thread::Builder::new()
+        .name("reader".to_owned())
+        .spawn(move || {
+            guarded("reader", &shutdown, || {
+                smol::future::block_on(smol::future::or(task, async {
+                    // Ends when the sender closes.
+                    let _ = stopped.recv().await;
+                }));
+            });
+        })?;
+    Ok((stop, thread))
+}

@@ -1,0 +1,115 @@
+//! A thread that runs tasks until it is stopped.
+
+use std::panic::{AssertUnwindSafe, catch_unwind};
+use std::sync::{Arc, Mutex};
+use std::thread::JoinHandle;
+
+use futures::FutureExt;
+use smol::channel::{Receiver, Sender, bounded};
+use smol::{Executor, Task};
+
+use super::shutdown::Shutdown;
+use super::sync::lock;
+
+/// One thread with its tasks. A task that panics ends the process in good order, with a message.
+pub(crate) struct TaskThread {
+    name: &'static str,
+    shutdown: Shutdown,
+    executor: Mutex<Option<Arc<Executor<'static>>>>,
+    stop: Sender<()>,
+    thread: Mutex<Option<JoinHandle<()>>>,
+}
+
+impl TaskThread {
+    pub(crate) fn start(name: &'static str, shutdown: Shutdown) -> std::io::Result<Self> {
+        let executor = Arc::new(Executor::new());
+        let (stop, stopped) = bounded(1);
+        let runner = Arc::clone(&executor);
+        let for_thread = shutdown.clone();
+        let thread = std::thread::Builder::new()
+            .name(name.to_owned())
+            .spawn(move || {
+                guarded(name, &for_thread, || run(&runner, &stopped));
+            })?;
+        Ok(Self {
+            name,
+            shutdown,
+            executor: Mutex::new(Some(executor)),
+            stop,
+            thread: Mutex::new(Some(thread)),
+        })
+    }
+
+    /// Runs a task on this thread. Dropping the handle ends the task. `None`: stopped already.
+    pub(crate) fn spawn(
+        &self,
+        task: impl Future<Output = ()> + Send + 'static,
+    ) -> Option<Task<()>> {
+        let (name, shutdown) = (self.name, self.shutdown.clone());
+        // The executor would keep a panic for whoever awaits the task, and nobody does.
+        let task = AssertUnwindSafe(task).catch_unwind().map(move |result| {
+            if result.is_err() {
+                report_panic(name, &shutdown);
+            }
+        });
+        let executor = lock(&self.executor);
+        executor.as_ref().map(|executor| executor.spawn(task))
+    }
+
+    /// Stops the thread and drops its tasks. Not from one of them.
+    pub(crate) fn stop(&self) {
+        self.stop.close();
+        if let Some(thread) = lock(&self.thread).take() {
+            // Its panic has been reported by the thread itself.
+            let _ = thread.join();
+        }
+        let executor = lock(&self.executor).take();
+        drop(executor);
+    }
+}
+
+impl Drop for TaskThread {
+    fn drop(&mut self) {
+        self.stop();
+    }
+}
+
+fn run(executor: &Executor<'static>, stopped: &Receiver<()>) {
+    smol::block_on(executor.run(async {
+        // Ends when the sender closes.
+        let _ = stopped.recv().await;
+    }));
+}
+
+/// Runs the body of a thread; a panic asks the process to shut down instead of passing unseen.
+pub fn guarded(name: &'static str, shutdown: &Shutdown, body: impl FnOnce()) {
+    if catch_unwind(AssertUnwindSafe(body)).is_err() {
+        report_panic(name, shutdown);
+    }
+}
+
+fn report_panic(name: &'static str, shutdown: &Shutdown) {
+    log::error!("thread {name} panicked; shutting down");
+    shutdown.fail(name);
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn tasks_run_and_a_panic_asks_for_shutdown() {
+        let shutdown = Shutdown::default();
+        let worker = TaskThread::start("test", shutdown.clone()).unwrap();
+        let (sender, receiver) = bounded(1);
+        let task = worker.spawn(async move { sender.send(42).await.unwrap() });
+        assert_eq!(receiver.recv_blocking(), Ok(42));
+        assert!(task.is_some());
+        let task = worker.spawn(async { panic!("on purpose") }).unwrap();
+        task.detach();
+        shutdown.wait();
+        assert_eq!(shutdown.failed_thread(), Some("test"));
+        worker.stop();
+        assert!(worker.spawn(async {}).is_none());
+    }
+}

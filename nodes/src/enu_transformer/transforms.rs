@@ -1,0 +1,127 @@
+//! Transforms that the transformer takes and gives.
+
+use lattice_core::pose::{StampedPose, TfMiss};
+use lattice_msgs::geographic_msgs::{GeoPoint, GeoPointStamped};
+use lattice_msgs::geometry_msgs::TransformStamped;
+use lattice_msgs::tf2_msgs::TFMessage;
+use nalgebra::Isometry3;
+
+use super::{EnuOutput, EnuTransformer};
+use crate::convert::geometry;
+
+impl EnuTransformer {
+    /// Takes transforms of the mounts, or of `odom_frame` -> `base_frame`.
+    pub fn on_tf(&mut self, message: &TFMessage, is_static: bool, now_ns: i64) -> Vec<EnuOutput> {
+        let mut out = Vec::new();
+        self.advance(now_ns);
+        for transform in &message.transforms {
+            if self.is_own(transform) {
+                continue;
+            }
+            let inserted = geometry::isometry_from_transform(&transform.transform).is_some_and(
+                |parent_from_child| {
+                    let parent = &transform.header.frame_id;
+                    let child = &transform.child_frame_id;
+                    let stamp_ns = transform.header.stamp.to_ns();
+                    self.mounts
+                        .insert(parent, child, stamp_ns, parent_from_child, is_static)
+                        .is_ok()
+                },
+            );
+            if !inserted {
+                self.counts.transforms_refused += 1;
+            }
+        }
+        self.announce_odom(&mut out);
+        self.serve(now_ns, &mut out);
+        out
+    }
+
+    /// `map` -> `base_frame` of a pose, or the newest `map` -> `odom_frame` where one is set.
+    pub(super) fn announce_pose(&mut self, pose: &StampedPose, out: &mut Vec<EnuOutput>) {
+        if !self.options.publish_tf {
+            return;
+        }
+        if self.options.odom_frame.is_some() {
+            self.announce_odom(out);
+            return;
+        }
+        let (map, base) = (&self.options.map_frame, &self.options.base_frame);
+        let transform = geometry::transform_stamped(map, base, pose.stamp_ns, &pose.map_from_base);
+        out.push(EnuOutput::Transform(transform));
+    }
+
+    /// `map` -> `odom_frame` at the newest time that both the poses and the odometry cover, once for
+    /// each such time: the pose mostly comes before the odometry of its stamp.
+    fn announce_odom(&mut self, out: &mut Vec<EnuOutput>) {
+        let (Some(odom), true) = (&self.options.odom_frame, self.options.publish_tf) else {
+            return;
+        };
+        let Some(mut stamp_ns) = self.poses.newest_ns() else {
+            return;
+        };
+        let base = &self.options.base_frame;
+        let base_from_odom = loop {
+            match self.mounts.lookup(base, odom, stamp_ns) {
+                Ok(transform) => break transform,
+                Err(TfMiss::TooNew { by_ns, .. }) if by_ns > 0 => {
+                    stamp_ns = stamp_ns.saturating_sub(by_ns);
+                }
+                Err(_) => return,
+            }
+        };
+        if self.odom_ns.is_some_and(|last_ns| stamp_ns <= last_ns) {
+            return;
+        }
+        let Ok(map_from_base) = self.poses.at(stamp_ns) else {
+            return;
+        };
+        let map_from_odom = map_from_base * base_from_odom;
+        let map = &self.options.map_frame;
+        let transform = geometry::transform_stamped(map, odom, stamp_ns, &map_from_odom);
+        out.push(EnuOutput::Transform(transform));
+        self.odom_ns = Some(stamp_ns);
+    }
+
+    /// Says once where the map frame lies on the earth.
+    pub(super) fn announce_origin(&mut self, out: &mut Vec<EnuOutput>) {
+        let (false, Some(frame)) = (self.announced, self.ins.frame()) else {
+            return;
+        };
+        self.announced = true;
+        let stamp_ns = self.poses.newest_ns().unwrap_or(0);
+        let origin = frame.origin();
+        let position = GeoPoint {
+            latitude: origin.latitude_deg(),
+            longitude: origin.longitude_deg(),
+            altitude: origin.height_m,
+        };
+        out.push(EnuOutput::Origin(GeoPointStamped {
+            header: geometry::header(&self.options.map_frame, stamp_ns),
+            position,
+        }));
+        if self.options.publish_tf {
+            out.push(EnuOutput::StaticTransform(geometry::transform_stamped(
+                &self.options.earth_frame,
+                &self.options.map_frame,
+                stamp_ns,
+                &frame.ecef_from_enu(),
+            )));
+        }
+    }
+
+    /// True for a transform that this node publishes itself.
+    fn is_own(&self, transform: &TransformStamped) -> bool {
+        let parent = transform.header.frame_id.trim_start_matches('/');
+        parent == self.options.map_frame || parent == self.options.earth_frame
+    }
+
+    /// `base_from_sensor` at a stamp.
+    pub(super) fn mount(&self, frame: &str, stamp_ns: i64) -> Result<Isometry3<f64>, TfMiss> {
+        if frame == self.options.base_frame {
+            return Ok(Isometry3::identity());
+        }
+        self.mounts
+            .lookup(&self.options.base_frame, frame, stamp_ns)
+    }
+}

@@ -1,0 +1,166 @@
+//! Operations that services ask for: load, clear a box, query.
+
+use std::sync::Arc;
+
+use lattice_core::query::{Query, QueryError, Shells};
+use lattice_core::voxels::file::{MapContents, OperationError};
+use lattice_core::voxels::{MergeError, Region, VoxelStore};
+use lattice_msgs::geometry_msgs::Point;
+use lattice_msgs::lattice::{ClearBoxRequest, ClearBoxResponse, QueryMapRequest, QueryMapResponse};
+use nalgebra::Vector3;
+use thiserror::Error;
+
+use super::LatticeMapper;
+
+/// Reason for which a map was not loaded. The mapper's is as it was before.
+#[derive(Debug, Error)]
+pub enum LoadRefusal {
+    /// Of other cells than those of the parameters.
+    #[error(
+        "the file is of {theirs}, this node maps on {ours}: set `lattice` and `cell_volume_m3`"
+    )]
+    Lattice {
+        /// The lattice of the mapper.
+        ours: String,
+        /// The lattice of the file.
+        theirs: String,
+    },
+    /// A cell is too far from the mapper's datum.
+    #[error(transparent)]
+    Datum(#[from] OperationError),
+    /// Old voxels are to be forgotten, but these have no stamps.
+    #[error("the file has no stamps, which `forget_after_s` needs: save it where that is set")]
+    Stamps,
+    /// More voxels than the mapper may keep.
+    #[error("the file has {voxels} voxels, but at most {max_voxels} are allowed")]
+    TooMany {
+        /// Voxels of the file.
+        voxels: usize,
+        /// Limit of the parameters.
+        max_voxels: usize,
+    },
+    /// Lists that cannot be merged for another reason.
+    #[error(transparent)]
+    Merge(#[from] MergeError),
+}
+
+impl LatticeMapper {
+    /// A copy of the map as a file holds it.
+    pub fn contents(&self) -> MapContents {
+        match &self.occupancy {
+            Some(occupancy) => MapContents::from_store(occupancy),
+            None => MapContents::from_list(&self.list),
+        }
+    }
+
+    /// Replaces the map and begins a new epoch, as [`LatticeMapper::reset`] does; gives the number
+    /// of voxels. The lattice must be the mapper's; keys are counted anew from its datum.
+    pub fn load(&mut self, contents: MapContents, epoch: u64) -> Result<usize, LoadRefusal> {
+        let (lattice, payload) = (&self.options.lattice, self.options.payload());
+        if contents.lattice() != lattice {
+            return Err(LoadRefusal::Lattice {
+                ours: format!("{lattice:?}"),
+                theirs: format!("{:?}", contents.lattice()),
+            });
+        }
+        if payload.stamps && !contents.payload().stamps {
+            return Err(LoadRefusal::Stamps);
+        }
+        let (voxels, max_voxels) = (contents.keys().len(), self.list.max_voxels());
+        if voxels > max_voxels {
+            return Err(LoadRefusal::TooMany { voxels, max_voxels });
+        }
+        let contents = contents.with_datum(self.list.datum_index())?;
+        if let Some(occupancy) = &mut self.occupancy {
+            let loaded = contents.into_occupancy(occupancy.max_bytes());
+            if loaded.len() < voxels {
+                let max_voxels = loaded.len();
+                return Err(LoadRefusal::TooMany { voxels, max_voxels });
+            }
+            occupancy.replace(loaded);
+            self.begin(epoch);
+            return Ok(voxels);
+        }
+        let mut loaded = contents.into_list(max_voxels);
+        if loaded.payload() != payload {
+            let mut list = loaded.clone().with_payload(payload);
+            list.merge(&loaded)?;
+            loaded = list;
+        }
+        self.list = loaded.with_when_full(self.options.when_full);
+        self.begin(epoch);
+        Ok(voxels)
+    }
+
+    /// Removes the voxels in a box.
+    pub fn clear_box(&mut self, request: &ClearBoxRequest) -> ClearBoxResponse {
+        let region = Region::cuboid(vector(&request.min), vector(&request.max));
+        let removed = region.map(|region| match &mut self.occupancy {
+            Some(occupancy) => occupancy.remove_region(&region),
+            None => self.list.remove_region(&region),
+        });
+        match removed {
+            Ok(removed) => ClearBoxResponse {
+                success: true,
+                message: format!("{removed} voxels removed"),
+                removed: removed as u64,
+            },
+            Err(error) => ClearBoxResponse {
+                message: error.to_string(),
+                ..ClearBoxResponse::default()
+            },
+        }
+    }
+
+    /// Says what is occupied around a point.
+    pub fn query(&self, request: &QueryMapRequest) -> QueryMapResponse {
+        self.ask(&vector(&request.point))
+            .unwrap_or_else(|error| QueryMapResponse {
+                message: error.to_string(),
+                ..QueryMapResponse::default()
+            })
+    }
+
+    fn ask(&self, point_m: &Vector3<f64>) -> Result<QueryMapResponse, QueryError> {
+        match &self.occupancy {
+            Some(occupancy) => self.ask_store(occupancy, point_m),
+            None => self.ask_store(&self.list, point_m),
+        }
+    }
+
+    fn ask_store(
+        &self,
+        store: &impl VoxelStore,
+        point_m: &Vector3<f64>,
+    ) -> Result<QueryMapResponse, QueryError> {
+        let shells = self
+            .shells
+            .get_or_init(|| Arc::new(Shells::new(store.lattice())));
+        let query = Query::with_shells(store, Arc::clone(shells));
+        let key = query.occupied(point_m);
+        let mut answer = QueryMapResponse {
+            success: true,
+            message: "the map is empty".to_owned(),
+            occupied: key.is_some(),
+            points: key
+                .and_then(|key| self.list.get(key))
+                .map_or(0, |voxel| voxel.count),
+            ..QueryMapResponse::default()
+        };
+        let clearance = query.clearance(point_m, f64::INFINITY)?;
+        let nearest = query.nearest(point_m, 1)?;
+        if let (Some(clearance), Some(nearest)) = (clearance, nearest.first()) {
+            let [x, y, z] = nearest.center_m.into();
+            answer.message = format!("{:.3} m to the nearest voxel", clearance.distance_m);
+            answer.has_nearest = true;
+            answer.clearance_m = clearance.distance_m;
+            answer.nearest = Point { x, y, z };
+            answer.nearest_distance_m = nearest.distance_m;
+        }
+        Ok(answer)
+    }
+}
+
+fn vector(point: &Point) -> Vector3<f64> {
+    Vector3::new(point.x, point.y, point.z)
+}

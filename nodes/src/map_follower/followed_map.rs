@@ -1,0 +1,153 @@
+//! Lattice and voxels of a map that is being followed.
+
+use std::collections::HashMap;
+
+use lattice_core::lattice::{Lattice, MortonKey};
+use lattice_core::registration::{LabelDistribution, SemanticCloud, UNLABELED};
+use lattice_msgs::lattice::{LatticeInfo, LatticeMapUpdate};
+use nalgebra::Vector3;
+use rustc_hash::{FxBuildHasher, FxHashMap, FxHashSet};
+
+use super::FollowError;
+use crate::convert::map::{self, MapMessageError, VoxelState};
+
+/// The lattice and voxels of a map that is being followed.
+pub struct FollowedMap {
+    /// Description as received.
+    pub info: LatticeInfo,
+    /// The lattice it names.
+    pub lattice: Lattice,
+    /// Its datum in the map frame, in metres.
+    pub datum_m: Vector3<f64>,
+    /// Frame of the map.
+    pub frame_id: String,
+    /// Stamp of the newest message.
+    pub stamp_ns: i64,
+    /// Unit of mean offsets, in metres.
+    pub offset_unit_m: f64,
+    voxels: FxHashMap<MortonKey, VoxelState>,
+}
+
+/// The content of one update chunk, decoded.
+pub(super) struct Changes {
+    pub sequence: u64,
+    stamp_ns: i64,
+    voxels: Vec<(MortonKey, VoxelState)>,
+    removed: Vec<MortonKey>,
+}
+
+impl Changes {
+    pub fn of(message: &LatticeMapUpdate, max_voxels: usize) -> Result<Self, MapMessageError> {
+        Ok(Self {
+            sequence: message.sequence,
+            stamp_ns: message.header.stamp.to_ns(),
+            voxels: map::voxels_from(message.into(), max_voxels)?,
+            removed: map::keys_from(&message.key_encoding, &message.removed_keys, max_voxels)?,
+        })
+    }
+
+    /// Voxels that it changes or removes.
+    pub fn len(&self) -> usize {
+        self.voxels.len() + self.removed.len()
+    }
+}
+
+impl FollowedMap {
+    /// A map without voxels.
+    pub(super) fn empty(info: &LatticeInfo, offset_unit_m: f64) -> Result<Self, MapMessageError> {
+        let (lattice, datum_m) = map::lattice_from(info)?;
+        Ok(Self {
+            info: info.clone(),
+            lattice,
+            datum_m,
+            frame_id: String::new(),
+            stamp_ns: 0,
+            offset_unit_m,
+            voxels: FxHashMap::default(),
+        })
+    }
+
+    /// Voxels in no order.
+    pub fn voxels(&self) -> &HashMap<MortonKey, VoxelState, FxBuildHasher> {
+        &self.voxels
+    }
+
+    /// Centre of a cell in the map frame, in metres.
+    pub fn center_m(&self, key: MortonKey) -> Vector3<f64> {
+        self.datum_m + self.lattice.center(key.unpack())
+    }
+
+    /// The mean point of each voxel with the share of its most frequent label, in the map frame and
+    /// in the order of the keys; without labels if the map has none.
+    pub fn semantic_cloud(&self) -> SemanticCloud {
+        let mut voxels: Vec<(&MortonKey, &VoxelState)> = self.voxels.iter().collect();
+        voxels.sort_unstable_by_key(|(key, _)| **key);
+        let mut cloud = SemanticCloud::default();
+        for (key, voxel) in &voxels {
+            let offset = Vector3::from(voxel.mean_offset.map(f64::from)) * self.offset_unit_m;
+            cloud.points_m.push((self.center_m(**key) + offset).into());
+        }
+        if voxels.iter().any(|(_, voxel)| voxel.label_count > 0) {
+            cloud.labels.extend(voxels.iter().map(|(_, voxel)| {
+                let rest = voxel.count.saturating_sub(voxel.label_count);
+                let weights = [(voxel.label, voxel.label_count), (UNLABELED, rest)];
+                LabelDistribution::from_weights(weights.map(|(label, n)| (label, n as f32)))
+            }));
+        }
+        cloud
+    }
+
+    /// True if messages of `info` are about this map, and not about a new one.
+    pub(super) fn is_of(&self, info: &LatticeInfo) -> bool {
+        self.info.epoch == info.epoch
+            && self.info.lattice == info.lattice
+            && self.info.cell_volume_m3 == info.cell_volume_m3
+            && self.info.generator == info.generator
+            && self.info.map_from_lattice == info.map_from_lattice
+    }
+
+    /// Replaces all voxels; keys that came, changed or went are added to `touched`.
+    pub(super) fn replace(
+        &mut self,
+        voxels: FxHashMap<MortonKey, VoxelState>,
+        touched: &mut FxHashSet<MortonKey>,
+    ) {
+        let old = std::mem::replace(&mut self.voxels, voxels);
+        let new = &self.voxels;
+        touched.extend(old.keys().filter(|key| !new.contains_key(key)));
+        let changed = new
+            .iter()
+            .filter(|(key, state)| old.get(key) != Some(state));
+        touched.extend(changed.map(|(key, _)| *key));
+    }
+
+    /// Puts the states of an update chunk into the map; doing it twice changes nothing.
+    pub(super) fn apply(
+        &mut self,
+        changes: &Changes,
+        limit: usize,
+        touched: &mut FxHashSet<MortonKey>,
+    ) -> Result<(), FollowError> {
+        if self.voxels.len() + changes.voxels.len() > limit {
+            let new = changes.voxels.iter();
+            let new = new.filter(|(key, _)| !self.voxels.contains_key(key));
+            let found = self.voxels.len() + new.count();
+            if found > limit {
+                let found = found as u64;
+                return Err(FollowError::TooLarge { found, limit });
+            }
+        }
+        self.stamp_ns = changes.stamp_ns;
+        for key in &changes.removed {
+            if self.voxels.remove(key).is_some() {
+                touched.insert(*key);
+            }
+        }
+        for (key, state) in &changes.voxels {
+            if self.voxels.insert(*key, *state) != Some(*state) {
+                touched.insert(*key);
+            }
+        }
+        Ok(())
+    }
+}

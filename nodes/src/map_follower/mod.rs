@@ -1,0 +1,317 @@
+//! The consumer's side of `map` and `map_updates`: keyframes, deltas, gaps and late joining.
+
+mod followed_map;
+mod incomplete;
+
+pub use followed_map::FollowedMap;
+
+use std::collections::BTreeMap;
+
+use lattice_core::lattice::MortonKey;
+use lattice_msgs::lattice::{LatticeMap, LatticeMapUpdate};
+use rustc_hash::FxHashSet;
+use thiserror::Error;
+
+use self::followed_map::Changes;
+use self::incomplete::{Chunks, MAX_WAITING_UPDATES, OpenUpdate, Staging};
+use crate::convert::map::{self, MapMessageError, VoxelState};
+
+/// Most chunks that one keyframe or update may have.
+const MAX_CHUNKS: u32 = 1 << 16;
+/// Updates without a chunk after which the rest of a keyframe is taken for lost.
+const MAX_STAGING_UPDATES: u64 = 10;
+/// Quiet seconds after which the rest of a keyframe is taken for lost, at first and at most: a
+/// mapper with a long update period must not be asked again and again.
+const PATIENCE_S: [u32; 2] = [2, 64];
+
+/// Error of a message of the map. The map is as it was before.
+#[derive(Debug, Error)]
+pub enum FollowError {
+    /// Malformed.
+    #[error(transparent)]
+    Message(#[from] MapMessageError),
+    /// More voxels than allowed.
+    #[error("the map has {found} voxels, at most {limit} are kept (`max_voxels`)")]
+    TooLarge {
+        /// Voxels that there would be.
+        found: u64,
+        /// The limit.
+        limit: usize,
+    },
+}
+
+/// Effect of a message.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub enum Followed {
+    /// Applied, or kept until the rest of its keyframe has come.
+    Applied,
+    /// Of the state at hand or an older one, or of a map that is too large; ignored.
+    Old,
+    /// Something before it was lost or never received: ask for a keyframe.
+    NeedKeyframe,
+}
+
+/// Follows one map from its two topics.
+pub struct MapFollower {
+    max_voxels: usize,
+    map: Option<FollowedMap>,
+    /// State of the voxels; none until the first keyframe of an epoch is complete.
+    sequence: Option<u64>,
+    /// Newest sequence of any message of the epoch.
+    newest: u64,
+    staging: Option<Staging>,
+    open_updates: BTreeMap<u64, OpenUpdate>,
+    touched: FxHashSet<MortonKey>,
+    replaced: bool,
+    /// A keyframe is needed, and none has come since.
+    keyframe_needed: bool,
+    /// Epoch of a map that was refused for its size: to ask for it again is of no use.
+    too_large: Option<u64>,
+    quiet_s: u32,
+    patience_s: u32,
+}
+
+impl MapFollower {
+    /// Follows nothing yet; keeps at most `max_voxels`.
+    pub fn new(max_voxels: usize) -> Self {
+        Self {
+            max_voxels,
+            map: None,
+            sequence: None,
+            newest: 0,
+            staging: None,
+            open_updates: BTreeMap::new(),
+            touched: FxHashSet::default(),
+            replaced: false,
+            keyframe_needed: false,
+            too_large: None,
+            quiet_s: 0,
+            patience_s: PATIENCE_S[0],
+        }
+    }
+
+    /// The map as far as it is complete.
+    pub fn map(&self) -> Option<&FollowedMap> {
+        self.map.as_ref()
+    }
+
+    /// Sequence that the map is at; none before the first keyframe of an epoch is complete.
+    pub fn sequence(&self) -> Option<u64> {
+        self.sequence
+    }
+
+    /// Keys whose voxels came, changed or went since the call before, and whether the lattice,
+    /// epoch or datum is a new one (then nothing of the old map holds).
+    pub fn take_touched(&mut self) -> (FxHashSet<MortonKey>, bool) {
+        (
+            std::mem::take(&mut self.touched),
+            std::mem::take(&mut self.replaced),
+        )
+    }
+
+    /// Takes one chunk of a keyframe.
+    pub fn on_map(&mut self, message: &LatticeMap) -> Result<Followed, FollowError> {
+        check_chunk(message.chunk, message.chunks)?;
+        if message.voxels_total > self.max_voxels as u64 {
+            self.too_large = Some(message.info.epoch);
+            self.patience_s = PATIENCE_S[1];
+            return Err(FollowError::TooLarge {
+                found: message.voxels_total,
+                limit: self.max_voxels,
+            });
+        }
+        let voxels = map::voxels_from(message.into(), self.max_voxels)?;
+        self.too_large = None;
+        if self
+            .map
+            .as_ref()
+            .is_some_and(|map| map.is_of(&message.info))
+        {
+            // Also the rest of one that a repeated chunk has completed: it would never be whole.
+            if self.sequence.is_some_and(|at| message.sequence <= at) {
+                return Ok(Followed::Old);
+            }
+        } else {
+            self.begin_epoch(FollowedMap::empty(&message.info, message.offset_unit_m)?);
+        }
+        if let Some(map) = &mut self.map {
+            map.frame_id.clone_from(&message.header.frame_id);
+            map.stamp_ns = message.header.stamp.to_ns();
+        }
+        let staging = match self.staging.take() {
+            None => {
+                // Updates that wait for a lost one were not kept for it: they must come again.
+                self.open_updates.clear();
+                Staging::new(message.sequence, message.chunks)
+            }
+            Some(staging)
+                if (staging.sequence, staging.chunks.expected)
+                    == (message.sequence, message.chunks) =>
+            {
+                staging
+            }
+            Some(other) => other.restart(message.sequence, message.chunks),
+        };
+        self.stage(staging, message.chunk, voxels)
+    }
+
+    /// Takes one chunk of an update.
+    pub fn on_update(&mut self, message: &LatticeMapUpdate) -> Result<Followed, FollowError> {
+        check_chunk(message.chunk, message.chunks)?;
+        let info = &message.info;
+        let is_known =
+            |map: &FollowedMap| map.info.epoch == info.epoch && map.info.lattice == info.lattice;
+        let begun = self.sequence.is_some() || self.staging.is_some();
+        let Some(map) = self.map.as_mut().filter(|map| begun && is_known(map)) else {
+            return Ok(match self.too_large == Some(info.epoch) {
+                true => Followed::Old,
+                false => self.need_keyframe(),
+            });
+        };
+        if self.sequence.is_some_and(|at| message.sequence <= at) {
+            return Ok(Followed::Old);
+        }
+        let lost = self
+            .sequence
+            .is_none_or(|at| message.previous_sequence > at)
+            && !self.open_updates.contains_key(&message.sequence)
+            && self.staging.is_none();
+        let changes = Changes::of(message, self.max_voxels)?;
+        // Half a map is none: before its first keyframe is complete, nothing is put into it.
+        if self.sequence.is_some() {
+            map.apply(&changes, self.max_voxels, &mut self.touched)?;
+        }
+        if let Some(staging) = &mut self.staging
+            && !staging.keep(changes, self.max_voxels)
+        {
+            self.staging = None;
+            return Ok(self.need_keyframe());
+        }
+        self.newest = self.newest.max(message.sequence);
+        let open = self
+            .open_updates
+            .entry(message.sequence)
+            .or_insert_with(|| OpenUpdate {
+                previous: message.previous_sequence,
+                chunks: Chunks::new(message.chunks),
+            });
+        open.chunks.insert(message.chunk);
+        self.quiet_s = 0;
+        self.advance();
+        if let Some(staging) = &self.staging {
+            // A keyframe that the updates have overtaken is of no more use.
+            if self.sequence.is_some_and(|at| staging.sequence <= at) {
+                self.staging = None;
+            } else if self.newest.saturating_sub(staging.heard_at) > MAX_STAGING_UPDATES {
+                return Ok(self.need_keyframe());
+            }
+        }
+        if self.open_updates.len() > MAX_WAITING_UPDATES {
+            self.open_updates.clear();
+            return Ok(self.need_keyframe());
+        }
+        Ok(if lost {
+            self.need_keyframe()
+        } else {
+            Followed::Applied
+        })
+    }
+
+    /// Waits one second more for what is incomplete; true if a keyframe is to be asked for, since
+    /// nothing more has come of it. To be called once a second.
+    pub fn wait_a_second(&mut self) -> bool {
+        let incomplete = self.staging.is_some() || !self.open_updates.is_empty();
+        if !incomplete && !self.keyframe_needed {
+            return false;
+        }
+        self.quiet_s += 1;
+        let overdue = self.quiet_s > self.patience_s;
+        if overdue {
+            self.quiet_s = 0;
+            self.patience_s = (2 * self.patience_s).min(PATIENCE_S[1]);
+        }
+        overdue
+    }
+
+    fn need_keyframe(&mut self) -> Followed {
+        self.keyframe_needed = true;
+        Followed::NeedKeyframe
+    }
+
+    /// Moves the sequence over every update whose chunks are all here and follow on.
+    fn advance(&mut self) {
+        let Some(at) = &mut self.sequence else {
+            return;
+        };
+        while let Some(entry) = self.open_updates.first_entry() {
+            let open = entry.get();
+            let sequence = *entry.key();
+            let follows = open.previous <= *at && open.chunks.complete();
+            if sequence > *at && !follows {
+                break;
+            }
+            entry.remove();
+            *at = sequence.max(*at);
+        }
+    }
+
+    fn begin_epoch(&mut self, map: FollowedMap) {
+        self.map = Some(map);
+        self.sequence = None;
+        self.newest = 0;
+        self.staging = None;
+        self.open_updates.clear();
+        self.touched.clear();
+        self.replaced = true;
+    }
+
+    fn stage(
+        &mut self,
+        mut staging: Staging,
+        chunk: u32,
+        voxels: Vec<(MortonKey, VoxelState)>,
+    ) -> Result<Followed, FollowError> {
+        if staging.chunks.insert(chunk) {
+            staging.voxels.extend(voxels);
+        }
+        if staging.voxels.len() > self.max_voxels {
+            return Err(FollowError::TooLarge {
+                found: staging.voxels.len() as u64,
+                limit: self.max_voxels,
+            });
+        }
+        self.newest = self.newest.max(staging.sequence);
+        staging.heard_at = self.newest;
+        self.quiet_s = 0;
+        if staging.chunks.complete() {
+            self.adopt(staging)?;
+        } else {
+            self.staging = Some(staging);
+        }
+        Ok(Followed::Applied)
+    }
+
+    /// Puts a complete keyframe in place of the voxels, then what came after it.
+    fn adopt(&mut self, done: Staging) -> Result<(), FollowError> {
+        let Some(map) = &mut self.map else {
+            return Ok(());
+        };
+        map.replace(done.voxels, &mut self.touched);
+        self.sequence = self.sequence.max(Some(done.sequence));
+        self.keyframe_needed = false;
+        self.patience_s = PATIENCE_S[0];
+        for changes in done.later.iter().filter(|c| c.sequence > done.sequence) {
+            map.apply(changes, self.max_voxels, &mut self.touched)?;
+        }
+        self.advance();
+        Ok(())
+    }
+}
+
+fn check_chunk(chunk: u32, chunks: u32) -> Result<(), MapMessageError> {
+    if chunk < chunks && chunks <= MAX_CHUNKS {
+        Ok(())
+    } else {
+        Err(MapMessageError::Chunk { chunk, chunks })
+    }
+}

@@ -1,0 +1,107 @@
+//! Parameters that several nodes read alike: frames, words, bounds of threads and inboxes.
+
+use lattice_runtime::params::{ParamError, Params};
+
+/// Most events of an inbox that a parameter may ask for: room is made for all of them at once.
+const MAX_EVENTS: usize = 1 << 18;
+/// Most threads of a pool that a parameter may ask for.
+const MAX_THREADS: usize = 256;
+/// Smallest chunks of a message that hold their header and some voxels.
+const MIN_CHUNK_BYTES: usize = 2048;
+
+/// The name of a frame, without leading slashes.
+pub fn frame(params: &Params, name: &str, default: &str) -> Result<String, ParamError> {
+    let frame = params.string(name, default)?;
+    match frame.trim_start_matches('/') {
+        "" => Err(params.invalid(name, "expected the name of a frame")),
+        frame => Ok(frame.to_owned()),
+    }
+}
+
+/// One of several words; the first is the default.
+pub fn one_of<T: Copy>(params: &Params, name: &str, words: &[(&str, T)]) -> Result<T, ParamError> {
+    let word = params.string(name, words.first().map_or("", |(word, _)| word))?;
+    let found = words.iter().find(|(known, _)| *known == word);
+    found.map(|(_, value)| *value).ok_or_else(|| {
+        let known: Vec<&str> = words.iter().map(|(word, _)| *word).collect();
+        params.invalid(name, format!("{word:?}, expected {}", known.join(" or ")))
+    })
+}
+
+/// `inbox_events`: most events that wait for a node.
+pub fn inbox_events(params: &Params, default: usize) -> Result<usize, ParamError> {
+    params.usize_in("inbox_events", default, 1..=MAX_EVENTS)
+}
+
+/// `inbox_bytes`: most bytes of messages that wait for a node.
+pub fn inbox_bytes(params: &Params, default: usize) -> Result<usize, ParamError> {
+    params.usize_in("inbox_bytes", default, 1..=usize::MAX)
+}
+
+/// `threads`: threads of a pool; 0: one less than the machine has.
+pub fn threads(params: &Params, default: usize) -> Result<usize, ParamError> {
+    params.usize_in("threads", default, 0..=MAX_THREADS)
+}
+
+/// `chunk_bytes`: largest serialised message.
+pub fn chunk_bytes(params: &Params, default: usize) -> Result<usize, ParamError> {
+    params.usize_in("chunk_bytes", default, MIN_CHUNK_BYTES..=1 << 26)
+}
+
+#[cfg(test)]
+mod tests {
+    use lattice_runtime::params::ParamValue;
+
+    use super::*;
+    use crate::enu_transformer::TransformerOptions;
+    use crate::lattice_mapper::MapperOptions;
+    use crate::semantic_icp_server::ServerOptions;
+    use crate::voxel_marker_publisher::MarkerOptions;
+
+    type Read = fn(&Params) -> Result<(), ParamError>;
+
+    #[test]
+    fn parameters_out_of_their_range_are_refused_by_name_and_range() {
+        let transformer: Read = |params| TransformerOptions::from_params(params).map(drop);
+        let mapper: Read = |params| MapperOptions::from_params(params).map(drop);
+        let markers: Read = |params| MarkerOptions::from_params(params).map(drop);
+        let server: Read = |params| ServerOptions::from_params(params).map(drop);
+        let events: Read = |params| inbox_events(params, 4096).map(drop);
+        let bytes: Read = |params| inbox_bytes(params, 4096).map(drop);
+        let threads: Read = |params| threads(params, 0).map(drop);
+        for (read, name, value, expected) in [
+            (events, "inbox_events", "0", "1 to 262144"),
+            (events, "inbox_events", "1000000000000", "1 to 262144"),
+            (bytes, "inbox_bytes", "0", "1 or more"),
+            (threads, "threads", "100000", "0 to 256"),
+            (transformer, "min_range_m", "60.0", "at most `max_range_m`"),
+            (transformer, "min_range_m", ".nan", "0.0 or more"),
+            (transformer, "map_frame", "''", "the name of a frame"),
+            (transformer, "base_frame", "'/'", "the name of a frame"),
+            (transformer, "max_cloud_points", "0", "1 or more"),
+            (transformer, "max_waiting_clouds", "0", "1 or more"),
+            (transformer, "precision", "half", "float32 or float64"),
+            (mapper, "map_frame", "''", "the name of a frame"),
+            (mapper, "max_voxels", "0", "1 or more"),
+            (mapper, "max_cloud_points", "0", "1 or more"),
+            (mapper, "chunk_bytes", "0", "2048 to 67108864"),
+            (markers, "chunk_bytes", "0", "2048 to 67108864"),
+            (markers, "max_voxels", "0", "1 or more"),
+            (markers, "block_bits", "11", "1 to 10"),
+            (markers, "alpha", "7.0", "0.01 to 1.0"),
+            (server, "map_frame", "''", "the name of a frame"),
+            (server, "max_map_voxels", "0", "1 or more"),
+            (server, "max_cloud_points", "0", "1 or more"),
+            (server, "max_headset_scans", "0", "1 or more"),
+        ] {
+            let value = ParamValue::from_yaml_text(value).unwrap();
+            let range = ("max_range_m", ParamValue::F64(50.0));
+            let params = Params::from_values("/node", [(name, value), range]);
+            let error = read(&params).unwrap_err().to_string();
+            assert!(
+                error.contains(name) && error.contains(expected),
+                "{name}: {error}"
+            );
+        }
+    }
+}

@@ -1,0 +1,199 @@
+//! Results of searches and of tracking.
+
+use super::*;
+
+/// Poses that differ by less are published as one, m and rad.
+const SAME_POSE: (f64, f64) = (0.005, 0.002);
+/// Poses that differ by more are of another origin, m and rad.
+const MOVED: (f64, f64) = (0.3, 0.1);
+/// After a doubt that was not confirmed there is none for this time, ns.
+const DOUBT_AGAIN_NS: i64 = 10_000_000_000;
+/// A tracked pose is published again after this time though nothing has changed, ns.
+const PUBLISH_AGAIN_NS: i64 = 5_000_000_000;
+
+impl SemanticIcpServer {
+    /// A search has ended.
+    pub(super) fn searched(
+        &mut self,
+        running: &Running,
+        found: &Calibration,
+        now_ns: i64,
+        out: &mut Vec<Output>,
+    ) {
+        if running.outdated || found.cancelled {
+            self.counts.searches_ended_early += 1;
+            self.answer_failed(running.caller, "ended early", out);
+            return;
+        }
+        let mut result = result_from(found);
+        self.describe(&mut result, running.stamp_ns);
+        result.duration_s = now_ns.saturating_sub(running.begun_ns) as f64 * 1e-9;
+        result.gazes = running.headset_scans.len() as u32;
+        result.points = running
+            .headset_scans
+            .iter()
+            .map(|g| g.cloud.len() as u64)
+            .sum();
+        let counts = &mut self.counts;
+        *match found.verdict {
+            Verdict::Ok => &mut counts.searches_ok,
+            Verdict::Ambiguous => &mut counts.searches_ambiguous,
+            Verdict::Degenerate => &mut counts.searches_degenerate,
+            Verdict::NoOverlap => &mut counts.searches_no_overlap,
+            Verdict::RejectedInput => &mut counts.searches_rejected,
+        } += 1;
+        let rejected = found.verdict == Verdict::RejectedInput;
+        if running.doubted.is_some() && !rejected {
+            self.doubt_again_ns = now_ns.saturating_add(DOUBT_AGAIN_NS);
+        }
+        if let Some(update) = running.doubted
+            && !rejected
+            && found.verdict != Verdict::Ok
+        {
+            // The look alone does not tell more than that it fits.
+            self.hold(running, update, now_ns, out);
+            return;
+        }
+        match found.verdict {
+            Verdict::Ok => {
+                self.misses = 0;
+                let before = self.known.as_ref().map(|known| known.map_from_headset);
+                if before.is_some_and(|before| !is_near(&before, &found.map_from_headset, MOVED)) {
+                    // The headset has another origin than for the looks before.
+                    self.headset_scans.clear();
+                }
+                self.headset_scans.remove(&running.headset_scans);
+                for headset_scan in &running.headset_scans {
+                    self.headset_scans
+                        .add(Arc::clone(headset_scan), running.stamp_ns, now_ns);
+                }
+                let known = Known {
+                    map_from_headset: found.map_from_headset,
+                    result: result.clone(),
+                };
+                out.push(Output::Transform(self.transform(&known, now_ns)));
+                self.known = Some(known);
+            }
+            // These looks say nothing, and would spoil the next search.
+            Verdict::RejectedInput => self.headset_scans.remove(&running.headset_scans),
+            Verdict::NoOverlap => {
+                self.headset_scans.remove(&running.headset_scans);
+                self.missed();
+            }
+            // A further look may tell.
+            Verdict::Ambiguous | Verdict::Degenerate => self.missed(),
+        }
+        if let Some(caller) = running.caller {
+            let end = match found.verdict {
+                Verdict::Ok => End::Found,
+                _ => End::Failed,
+            };
+            out.push(answer(caller.call, end, result.clone()));
+        }
+        self.publish(result, now_ns, out);
+    }
+
+    fn missed(&mut self) {
+        self.misses += 1;
+        if self.misses >= self.options.lost_after && self.known.take().is_some() {
+            self.counts.tracking_lost += 1;
+        }
+    }
+
+    /// The map cannot be used.
+    pub(super) fn no_map(
+        &mut self,
+        running: &Running,
+        why: &str,
+        now_ns: i64,
+        out: &mut Vec<Output>,
+    ) {
+        self.prepared = None;
+        if running.outdated {
+            return;
+        }
+        self.counts.searches_rejected += 1;
+        let reason = format!("the map cannot be used: {why}");
+        let result = self.result(CalibrationResult::REJECTED_INPUT, &reason);
+        if let Some(caller) = running.caller {
+            out.push(answer(caller.call, End::Failed, result.clone()));
+        }
+        self.publish(result, now_ns, out);
+    }
+
+    /// The known pose was refined, or did not fit.
+    pub(super) fn tracked(
+        &mut self,
+        running: &Running,
+        update: Option<TrackUpdate>,
+        now_ns: i64,
+        out: &mut Vec<Output>,
+    ) {
+        let Some(known) = self.known.as_ref().filter(|_| !running.outdated) else {
+            return;
+        };
+        let inliers = known.result.inlier_fraction;
+        let update = update.filter(|update| update.fits);
+        // A mirrored cloud has the same floor: it fits somewhat.
+        let in_doubt = |u: &TrackUpdate| {
+            let too_few = u.inlier_fraction < self.options.doubt_below * inliers;
+            too_few && now_ns >= self.doubt_again_ns
+        };
+        if let Some(update) = update.filter(|u| !in_doubt(u)) {
+            self.hold(running, update, now_ns, out);
+            return;
+        }
+        self.counts.tracking_misses += u64::from(update.is_none());
+        self.counts.tracking_doubts += u64::from(update.is_some());
+        // Is the cloud not what it should be, or the headset not where it was?
+        let (headset_scans, stamp_ns) = (running.headset_scans.clone(), running.stamp_ns);
+        self.begin_search(Wanted::default(), headset_scans, stamp_ns, now_ns, out);
+        if let Some(running) = &mut self.running {
+            running.doubted = update;
+        }
+    }
+
+    /// A look fits the known pose, which it has refined.
+    fn hold(&mut self, running: &Running, update: TrackUpdate, now_ns: i64, out: &mut Vec<Output>) {
+        let Some(known) = &mut self.known else {
+            return;
+        };
+        self.misses = 0;
+        known.map_from_headset = update.map_from_headset;
+        let mut result = known.result.clone();
+        set_pose_only(&mut result, &update.map_from_headset);
+        result.inlier_fraction = update.inlier_fraction;
+        result.rmse_m = update.rmse_m;
+        result.method = "tracking".into();
+        result.reason = "the look fits where the headset is".into();
+        result.gazes = 1;
+        result.points = running
+            .headset_scans
+            .iter()
+            .map(|g| g.cloud.len() as u64)
+            .sum();
+        result.duration_s = now_ns.saturating_sub(running.begun_ns) as f64 * 1e-9;
+        self.describe(&mut result, running.stamp_ns);
+        for headset_scan in &running.headset_scans {
+            (self.headset_scans).push(Arc::clone(headset_scan), running.stamp_ns, now_ns);
+        }
+        let published = geometry::isometry_from_transform(&self.last.transform);
+        let same =
+            published.is_some_and(|last| is_near(&last, &update.map_from_headset, SAME_POSE));
+        let recent = now_ns.saturating_sub(self.published_ns) < PUBLISH_AGAIN_NS;
+        if !(same && recent && self.last.verdict == CalibrationResult::OK) {
+            self.publish(result, now_ns, out);
+        }
+    }
+}
+
+/// True if two poses differ by less than a distance (m) and an angle (rad).
+fn is_near(a: &Isometry3<f64>, b: &Isometry3<f64>, (distance_m, angle_rad): (f64, f64)) -> bool {
+    let moved = a.inverse() * b;
+    moved.translation.vector.norm() < distance_m && moved.rotation.angle() < angle_rad
+}
+
+fn set_pose_only(result: &mut CalibrationResult, map_from_headset: &Isometry3<f64>) {
+    let covariance = nalgebra::Matrix6::from_row_slice(&result.covariance);
+    set_pose(result, map_from_headset, &covariance);
+}

@@ -1,0 +1,65 @@
+//! Pages for newcomers name only what is there.
+
+use std::fs;
+
+use super::root;
+
+const PAGES: [&str; 2] = ["docs/architecture.md", "CONTRIBUTING.md"];
+
+/// Texts in backticks of a line.
+fn quoted(line: &str) -> Vec<&str> {
+    line.split('`').skip(1).step_by(2).collect()
+}
+
+/// True for a file or folder of the repository, as its name tells; a file that each node has goes without one.
+fn is_path(text: &str) -> bool {
+    let of_each_node = ["mod.rs", "node.rs", "options.rs"];
+    if of_each_node.contains(&text) {
+        return false;
+    }
+    let plain = text
+        .chars()
+        .all(|c| c.is_alphanumeric() || "/._-".contains(c));
+    let ending = [
+        ".rs", ".md", ".yaml", ".toml", ".py", ".msg", ".srv", ".action", ".xml", ".txt",
+    ];
+    plain && (ending.iter().any(|ending| text.ends_with(ending)) || text.ends_with('/'))
+}
+
+/// True if a file defines or names this: each word of `Type::function` or `function`.
+fn names(text: &str, item: &str) -> bool {
+    item.split("::")
+        .all(|part| text.contains(part.trim_end_matches("()")))
+}
+
+#[test]
+fn every_path_and_name_in_the_pages_exists() {
+    for page in PAGES {
+        let text = fs::read_to_string(root().join(page)).unwrap();
+        let mut paths = 0;
+        for (number, line) in (1..).zip(text.lines()) {
+            let quoted = quoted(line);
+            let mut file: Option<&str> = None;
+            for item in quoted {
+                if is_path(item) {
+                    let path = root().join(item);
+                    assert!(path.exists(), "{page}:{number}: there is no {item}");
+                    file = path.is_file().then_some(item);
+                    paths += 1;
+                } else if let Some(file) = file
+                    && line
+                        .trim_start()
+                        .starts_with(['-', '1', '2', '3', '4', '5', '6', '7', '8', '9'])
+                {
+                    // A step of a journey: a file, then what happens in it.
+                    let content = fs::read_to_string(root().join(file)).unwrap();
+                    assert!(
+                        names(&content, item),
+                        "{page}:{number}: {file} has no {item}"
+                    );
+                }
+            }
+        }
+        assert!(paths > 10, "{page} names {paths} paths");
+    }
+}
