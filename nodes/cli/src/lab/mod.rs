@@ -56,7 +56,7 @@ impl Lab {
 /// Draws a map as a PNG file.
 pub fn picture(list: &VoxelList, options: &RenderOptions, out: &Path) -> CliResult {
     let file = File::create(out).map_err(|e| format!("{}: {e}", out.display()))?;
-    Ok(render_png(list, options, BufWriter::new(file))?)
+    render_png(list, options, BufWriter::new(file))
 }
 
 /// Parser of an option that takes one of some names, each with its help and its value.
