@@ -231,12 +231,6 @@ impl FreeSpaceMap {
         log_odds_of(self.cells.get(Packed::new(key.unpack())?))
     }
 
-    /// The probability that a cell of the lattice is occupied, `None` if nothing is known of it.
-    pub fn probability(&self, key: MortonKey) -> Option<f64> {
-        let odds = self.log_odds(key)?.exp();
-        Some(odds / (1.0 + odds))
-    }
-
     /// All occupied cells in ascending order.
     pub fn occupied_keys(&self) -> Vec<MortonKey> {
         self.sorted(|value| value >= self.steps.threshold)

@@ -8,7 +8,6 @@ use lattice_core::raycast::{
     CellState, Evidence, FreeSpaceMap, FreeSpaceOptions, MIN_MAP_BYTES, RayBundle, ScanReport,
     Traversal,
 };
-use lattice_core::voxels::{OccupancyList, VoxelStore};
 use nalgebra::{Matrix3, UnitQuaternion, Vector3};
 use proptest::prelude::*;
 
@@ -142,31 +141,6 @@ proptest! {
         let counted = map.counts();
         prop_assert_eq!((counted.occupied as usize, counted.free as usize), counts);
         prop_assert_eq!(map.state(MortonKey::pack([900_000; 3]).unwrap()), CellState::Unknown);
-    }
-
-    /// A scan in parts from different places is one scan: one hit or miss for each cell.
-    #[test]
-    fn bundles_of_one_scan_count_once(
-        kind in any_kind(),
-        offsets in prop::array::uniform2(prop::array::uniform3(-1.0..1.0_f64)),
-        points in prop::collection::vec(prop::array::uniform3(-4.0..4.0_f32), 1..40),
-    ) {
-        let mut map = map(kind, FreeSpaceOptions::default());
-        let clouds = [cloud(points[..points.len() / 2].to_vec()), cloud(points)];
-        let scan: Vec<RayBundle> = offsets
-            .iter()
-            .zip(&clouds)
-            .map(|(offset, ends)| RayBundle { origin_m: origin(*offset), ends })
-            .collect();
-        let report = map.insert_scan(&scan);
-        prop_assert_eq!(report.hits, map.occupied_keys().len() as u64);
-        prop_assert_eq!(report.rays, report.hits, "one ray for each cell");
-        for key in map.occupied_keys() {
-            prop_assert_eq!(map.log_odds(key), Some(27.0 / 32.0));
-        }
-        for key in map.free_keys() {
-            prop_assert_eq!(map.log_odds(key), Some(-13.0 / 32.0));
-        }
     }
 
     #[test]
@@ -343,63 +317,6 @@ fn the_limit_of_memory_holds_and_what_it_refuses_is_counted() {
         }
         assert!(refused > 0);
     }
-}
-
-/// A store holds what the evidence says is occupied, whatever free cells the map keeps.
-#[test]
-fn a_store_is_cleared_to_what_the_evidence_says() {
-    for free_level in [None, Some(0), Some(2)] {
-        let options = FreeSpaceOptions {
-            free_level,
-            ..FreeSpaceOptions::default()
-        };
-        let mut map = map(LatticeKind::Fcc, options);
-        let lattice = map.lattice().clone();
-        let mut store = OccupancyList::new(lattice, map.datum_m(), usize::MAX).unwrap();
-        let wall = |x: f32| {
-            let grid = (-20..21).flat_map(|i| (-20..21).map(move |k| (i as f32, k as f32)));
-            cloud(grid.map(|(y, z)| [x, y * 0.02 * x, z * 0.02 * x]).collect())
-        };
-        let mut see = |x: f32| {
-            let ends = wall(x);
-            store.insert(&ends);
-            let origin_m = origin([0.0; 3]);
-            let report = map.clear(
-                &mut store,
-                &[RayBundle {
-                    origin_m,
-                    ends: &ends,
-                }],
-            );
-            store.validate().unwrap();
-            assert_eq!(
-                store.sorted_keys(),
-                map.occupied_keys(),
-                "{free_level:?} {x} m"
-            );
-            report.removed.len()
-        };
-        assert_eq!([see(4.0), see(4.0), see(9.0), see(9.0), see(9.0)], [0; 5]);
-        let gone: usize = (0..5).map(|_| see(9.0)).sum();
-        assert!(gone > 50, "{free_level:?}: {gone}");
-        assert!(see(4.0) > 50, "one hit is not enough after many misses");
-    }
-}
-
-/// A loaded map has no scans: its cells count as hit once, so that rays can clear them.
-#[test]
-fn cells_that_were_loaded_can_be_cleared() {
-    let options = FreeSpaceOptions {
-        free_level: None,
-        ..FreeSpaceOptions::default()
-    };
-    let mut map = map(LatticeKind::Bcc, options);
-    let key = map.key_of(&origin([2.0, 0.1, 0.1])).unwrap();
-    map.insert_occupied(&[key]);
-    assert_eq!(map.occupied_keys(), [key]);
-    assert_eq!(map.log_odds(key), Some(27.0 / 32.0));
-    map.reset();
-    assert_eq!(map.state(key), CellState::Unknown);
 }
 
 #[test]

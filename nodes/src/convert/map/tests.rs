@@ -1,3 +1,5 @@
+use lattice_core::voxels::VoxelList;
+
 use super::*;
 
 fn list(lattice: &Lattice) -> VoxelList {
