@@ -148,7 +148,8 @@ mod tests {
             latched: true,
         };
         for text in [numbers, names] {
-            assert_eq!(BagQos::parse_list(text).unwrap(), [expected.clone()]);
+            let parsed = BagQos::parse_list(text).unwrap();
+            assert_eq!(parsed.as_slice(), std::slice::from_ref(&expected));
         }
     }
 

@@ -1,6 +1,6 @@
 //! The quantizers of Ryde & Brünig 2011 as printed: to show their errata, and to measure against.
 //!
-//! Nothing else uses them: [`Lattice::quantize`](super::Lattice::quantize) is exact and many times
+//! Nothing else uses them: [`Lattice::quantize`](lattice_core::lattice::Lattice::quantize) is exact and many times
 //! faster. What is wrong as printed: eq. (1) misses the nearest point of a sixth to 7/16 of space;
 //! eq. (2) needs the column 0, which eq. (4)-(7) lack; eq. (4) lacks ±(1,0,0), so that even with 0 it
 //! misses 1/96 of space, and lists faces only, not all touching cells; eq. (7) lacks ±(1,1,1).

@@ -301,7 +301,7 @@ impl EnuTransformer {
             max_range_m: self.options.max_range_m,
         };
         let times = waiting.times.as_deref();
-        let moved = transform_points(&view, waiting.stamp_ns, times, &range, &map_from_sensor)?;
+        let moved = transform_points(&view, waiting.stamp_ns, times, &range, map_from_sensor)?;
         let mut header = message.header.clone();
         header.stamp = Time::from_ns(waiting.stamp_ns);
         header.frame_id.clone_from(&self.options.map_frame);

@@ -63,7 +63,7 @@ fn parameter_files_name_only_what_nodes_read() {
 #[test]
 fn every_parameter_is_in_the_file_for_the_simulated_loader() {
     let declared = |params: &Params| {
-        let names = params.declared().into_iter().map(|(name, _)| name);
+        let names = params.declared().into_keys();
         names
             .filter(|name| !params.is_given(name))
             .collect::<Vec<_>>()
@@ -95,7 +95,7 @@ fn the_file_for_a_headset_has_every_parameter_and_its_default() {
         "threads",
     ];
     assert_eq!(params.unused(), shell);
-    let declared = params.declared().into_iter().map(|(name, _)| name);
+    let declared = params.declared().into_keys();
     let missing: Vec<_> = declared.filter(|name| !params.is_given(name)).collect();
     assert_eq!(missing, Vec::<String>::new());
     let params = self::params("semantic_icp.yaml", "/lattice_mapper");

@@ -175,11 +175,7 @@ impl Frames {
         };
         let paths = kept.filter_map(|frame| self.path(first, frame));
         paths
-            .flat_map(|path| {
-                path.from_target()
-                    .chain(path.from_source())
-                    .collect::<Vec<_>>()
-            })
+            .flat_map(|path| path.to_target().chain(path.to_source()).collect::<Vec<_>>())
             .collect()
     }
 

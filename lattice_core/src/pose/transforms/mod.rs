@@ -137,8 +137,8 @@ impl TransformBuffer {
             from: shown(source),
             to: shown(target),
         })?;
-        let by_target = self.compose(path.from_target(), stamp_ns);
-        let by_source = self.compose(path.from_source(), stamp_ns);
+        let by_target = self.compose(path.to_target(), stamp_ns);
+        let by_source = self.compose(path.to_source(), stamp_ns);
         match (by_target, by_source) {
             (Ok(ancestor_from_target), Ok(ancestor_from_source)) => {
                 Ok(ancestor_from_target.inv_mul(&ancestor_from_source))

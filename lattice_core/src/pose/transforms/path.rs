@@ -98,12 +98,12 @@ impl Path {
     }
 
     /// Links as frame and parent, from the ancestor down to the target.
-    pub fn from_target(&self) -> impl Iterator<Item = (usize, usize)> + '_ {
+    pub fn to_target(&self) -> impl Iterator<Item = (usize, usize)> + '_ {
         self.target.down(self.ancestor[0])
     }
 
     /// Links as frame and parent, from the ancestor down to the source.
-    pub fn from_source(&self) -> impl Iterator<Item = (usize, usize)> + '_ {
+    pub fn to_source(&self) -> impl Iterator<Item = (usize, usize)> + '_ {
         self.source.down(self.ancestor[1])
     }
 }

@@ -121,6 +121,9 @@ impl RecordError {
 /// Takes a record's place, opcode and body.
 type Visit<'a> = dyn FnMut(Place, u8, &[u8]) -> Result<ControlFlow<()>, RecordError> + 'a;
 
+/// The same for a record in a chunk, after which the next one always comes.
+type VisitInChunk<'a> = dyn FnMut(Place, u8, &[u8]) -> Result<(), RecordError> + 'a;
+
 /// Calls `visit` with each record in `source`, the `len` bytes of a file from byte `start` on, until
 /// it breaks. Chunks come whole.
 pub(super) fn visit_records(
@@ -141,7 +144,7 @@ pub(super) fn visit_records(
 pub(super) fn visit_chunk(
     byte: u64,
     body: &[u8],
-    visit: &mut dyn FnMut(Place, u8, &[u8]) -> Result<(), RecordError>,
+    visit: &mut VisitInChunk<'_>,
 ) -> Result<ChunkHeader, RecordError> {
     let header = match mcap::parse_record(op::CHUNK, body) {
         Ok(Record::Chunk { header, .. }) => header,

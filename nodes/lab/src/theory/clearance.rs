@@ -14,7 +14,7 @@ const MAX_STENCIL_CELLS: usize = 1 << 20;
 /// Index differences to all cells with a point nearer than `radius_m` to some point of the own
 /// cell, without 0; in the order of the indices.
 ///
-/// `None` if the radius is NaN or there could be more than [`MAX_STENCIL_CELLS`].
+/// `None` if the radius is NaN or there could be more than a million cells.
 pub fn clearance_stencil(lattice: &Lattice, radius_m: f64) -> Option<Vec<LatticeIndex>> {
     let near = cells_within(lattice, radius_m)?;
     Some(near.into_keys().filter(|w| *w != [0; 3]).collect())

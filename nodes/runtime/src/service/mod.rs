@@ -73,12 +73,15 @@ impl<R> Reply<R> {
 /// The servers of a process, for its end.
 #[derive(Default)]
 pub(crate) struct Answers {
-    servers: Mutex<Vec<(Sender<Sender<()>>, Weak<Outbox>)>>,
+    servers: Mutex<Vec<(EndOrder, Weak<Outbox>)>>,
 }
+
+/// Asks a server to end; it drops what it is sent once its answers are queued.
+type EndOrder = Sender<Sender<()>>;
 
 impl Answers {
     /// Adds a server that ends when asked through `end`.
-    pub(crate) fn add(&self, end: Sender<Sender<()>>, replies: &Arc<Outbox>) {
+    pub(crate) fn add(&self, end: EndOrder, replies: &Arc<Outbox>) {
         let mut servers = lock(&self.servers);
         servers.retain(|(end, _)| !end.is_closed());
         servers.push((end, Arc::downgrade(replies)));
