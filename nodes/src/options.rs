@@ -85,6 +85,17 @@ mod tests {
             (mapper, "max_voxels", "0", "1 or more"),
             (mapper, "max_cloud_points", "0", "1 or more"),
             (mapper, "chunk_bytes", "0", "2048 to 67108864"),
+            (
+                mapper,
+                "free_space",
+                "'yes, please'",
+                "off or clear or evidence",
+            ),
+            (mapper, "payload", "bits", "centroid or occupancy"),
+            (mapper, "rays.misses", "0", "1 to 4294967295"),
+            (mapper, "rays.keep_ratio", "2.0", "0.0 to 1.0"),
+            (mapper, "rays.max_bytes", "0", "or more"),
+            (mapper, "free_level", "1", "evidence"),
             (markers, "chunk_bytes", "0", "2048 to 67108864"),
             (markers, "max_voxels", "0", "1 or more"),
             (markers, "block_bits", "11", "1 to 10"),
@@ -103,5 +114,8 @@ mod tests {
                 "{name}: {error}"
             );
         }
+        // As it is typed in a file: not a bool.
+        let off = ParamValue::from_yaml_text("off").unwrap();
+        mapper(&Params::from_values("/node", [("free_space", off)])).unwrap();
     }
 }

@@ -1,8 +1,11 @@
 //! Parameters of free space in the mapper.
 
+use crate::options::one_of;
 use lattice_core::raycast::{ClearOptions, Evidence, MAX_FREE_LEVEL, MIN_MAP_BYTES};
 use lattice_runtime::params::{ParamError, Params};
 
+/// Longest ray and kept end, m.
+const MAX_LENGTH_M: f64 = 1e6;
 /// Longest sweep, s.
 const MAX_SWEEP_S: f64 = 60.0;
 
@@ -49,41 +52,31 @@ impl MappedFreeSpace {
     /// Reads the parameters `free_space`, `rays.*`, `evidence.*` and `free_level`.
     pub(super) fn from_params(params: &Params) -> Result<Self, ParamError> {
         let defaults = Self::default();
-        let method = match params.string("free_space", "off")?.as_str() {
-            "off" => FreeSpaceMethod::Off,
-            "clear" => FreeSpaceMethod::Clear,
-            "evidence" => FreeSpaceMethod::Evidence,
-            other => {
-                let problem = format!("{other:?}, expected off, clear or evidence");
-                return Err(params.invalid("free_space", problem));
-            }
-        };
-        let sweep_s = within(params, "rays.sweep_s", 0.0, [0.0, MAX_SWEEP_S])?;
-        let max_range_m = within(params, "rays.max_range_m", 0.0, [0.0, 1e6])?;
-        let misses = params.usize("rays.misses", defaults.clear.misses as usize)?;
-        let misses = u32::try_from(misses).ok().filter(|misses| *misses > 0);
-        let misses = misses.ok_or_else(|| params.invalid("rays.misses", "expected 1 or more"))?;
+        let methods = [
+            ("off", FreeSpaceMethod::Off),
+            ("clear", FreeSpaceMethod::Clear),
+            ("evidence", FreeSpaceMethod::Evidence),
+        ];
+        let method = one_of(params, "free_space", &methods)?;
+        let sweep_s = params.f64_in("rays.sweep_s", 0.0, 0.0..=MAX_SWEEP_S)?;
+        let max_range_m = params.f64_in("rays.max_range_m", 0.0, 0.0..=MAX_LENGTH_M)?;
+        let misses = clear_misses(params, defaults.clear.misses)?;
         let clear = ClearOptions {
             misses,
-            keep_m: within(params, "rays.keep_m", defaults.clear.keep_m, [0.0, 1e6])?,
-            keep_ratio: within(
-                params,
-                "rays.keep_ratio",
-                defaults.clear.keep_ratio,
-                [0.0, 1.0],
-            )?,
+            keep_m: params.f64_in("rays.keep_m", defaults.clear.keep_m, 0.0..=MAX_LENGTH_M)?,
+            keep_ratio: params.f64_in("rays.keep_ratio", defaults.clear.keep_ratio, 0.0..=1.0)?,
             spare_touching: params.bool("rays.spare_touching", defaults.clear.spare_touching)?,
             max_range_m: if max_range_m > 0.0 {
                 max_range_m
             } else {
                 f64::INFINITY
             },
-            max_bytes: params.usize("rays.max_bytes", defaults.clear.max_bytes)?,
+            max_bytes: params.usize_in(
+                "rays.max_bytes",
+                defaults.clear.max_bytes,
+                MIN_MAP_BYTES..=usize::MAX,
+            )?,
         };
-        if clear.max_bytes < MIN_MAP_BYTES {
-            let problem = format!("{}, expected {MIN_MAP_BYTES} or more", clear.max_bytes);
-            return Err(params.invalid("rays.max_bytes", problem));
-        }
         let evidence = Evidence {
             hit: params.f64("evidence.hit", defaults.evidence.hit)?,
             miss: params.f64("evidence.miss", defaults.evidence.miss)?,
@@ -94,12 +87,7 @@ impl MappedFreeSpace {
         evidence
             .check()
             .map_err(|error| params.invalid("evidence", error.to_string()))?;
-        let free_level = params.usize("free_level", 0)?;
-        let free_level = u32::try_from(free_level).unwrap_or(u32::MAX);
-        if free_level > MAX_FREE_LEVEL {
-            let problem = format!("{free_level}, expected 0 (none) to {MAX_FREE_LEVEL}");
-            return Err(params.invalid("free_level", problem));
-        }
+        let free_level = params.usize_in("free_level", 0, 0..=MAX_FREE_LEVEL as usize)?;
         if free_level > 0 && method != FreeSpaceMethod::Evidence {
             return Err(params.invalid("free_level", "needs free_space: evidence"));
         }
@@ -108,20 +96,12 @@ impl MappedFreeSpace {
             sweep_ns: (sweep_s * 1e9) as i64,
             clear,
             evidence,
-            free_level,
+            free_level: free_level as u32,
         })
     }
 }
 
-fn within(
-    params: &Params,
-    name: &str,
-    default: f64,
-    [least, most]: [f64; 2],
-) -> Result<f64, ParamError> {
-    let value = params.f64(name, default)?;
-    if (least..=most).contains(&value) {
-        return Ok(value);
-    }
-    Err(params.invalid(name, format!("{value}, expected {least} to {most}")))
+fn clear_misses(params: &Params, default: u32) -> Result<u32, ParamError> {
+    let misses = params.usize_in("rays.misses", default as usize, 1..=u32::MAX as usize)?;
+    Ok(u32::try_from(misses).unwrap_or(default))
 }

@@ -48,6 +48,12 @@ pub enum MapPayload {
     Occupancy,
 }
 
+/// Values of the parameter `payload`.
+const PAYLOADS: [(&str, MapPayload); 2] = [
+    ("centroid", MapPayload::Centroid),
+    ("occupancy", MapPayload::Occupancy),
+];
+
 impl MapperOptions {
     /// Defaults for a lattice: frame `map`, datum at its origin.
     pub fn new(lattice: Lattice) -> Self {
@@ -97,7 +103,7 @@ impl MapperOptions {
             )?,
             labels: Self::labels_from(params)?,
             chunk_bytes: options::chunk_bytes(params, defaults.chunk_bytes)?,
-            payload: map_payload(params)?,
+            payload: options::one_of(params, "payload", &PAYLOADS)?,
             free_space: MappedFreeSpace::from_params(params)?,
             ..defaults
         };
@@ -158,17 +164,6 @@ fn when_full(params: &Params) -> Result<WhenFull, ParamError> {
         other => {
             let problem = format!("{other:?}, expected refuse or forget_oldest");
             Err(params.invalid("when_full", problem))
-        }
-    }
-}
-
-fn map_payload(params: &Params) -> Result<MapPayload, ParamError> {
-    match params.string("payload", "centroid")?.as_str() {
-        "centroid" => Ok(MapPayload::Centroid),
-        "occupancy" => Ok(MapPayload::Occupancy),
-        other => {
-            let problem = format!("{other:?}, expected centroid or occupancy");
-            Err(params.invalid("payload", problem))
         }
     }
 }
