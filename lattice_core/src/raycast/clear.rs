@@ -21,7 +21,7 @@ pub struct ClearOptions {
     /// The same as a fraction of the ray, 0 to 1: ground seen at a flat angle from a height is passed
     /// over, within its own cells, on a part of the way that grows with the distance.
     pub keep_ratio: f64,
-    /// Whether voxels that touch a cell which the scan hit are spared.
+    /// True: voxels that touch a cell which the scan hit are spared.
     pub spare_touching: bool,
     /// Rays are followed to this range, metres.
     pub max_range_m: f64,

@@ -66,7 +66,7 @@ impl World {
     }
 }
 
-/// What one search found.
+/// Result of one search.
 struct Found {
     length_m: f64,
     shortened_m: f64,

@@ -1,4 +1,4 @@
-//! What the fuzz targets do with their bytes, and the seeds they start from.
+//! Bodies of the fuzz targets, and the seeds they start from.
 //!
 //! Everything here panics where the library breaks a promise. The tests of the workspace include
 //! this file, so that it holds without a fuzzer too.

@@ -26,7 +26,7 @@ pub struct BobcatOptions {
     pub seed: u64,
     /// Length of the log, s.
     pub duration_s: f64,
-    /// Whether a person walks through the yard.
+    /// A person who walks through the yard.
     pub person: bool,
     /// Storage of the bag.
     pub storage: Storage,

@@ -88,7 +88,7 @@ pub fn base_from_imu() -> Isometry3<f64> {
     )
 }
 
-/// Why a simulation was refused.
+/// Reason why a simulation is refused.
 #[derive(Clone, Copy, Debug, PartialEq, Error)]
 pub enum SimulationError {
     /// The duration is out of bounds or not a number.
@@ -96,7 +96,7 @@ pub enum SimulationError {
         "cannot simulate {duration_s} s; give a duration between {MIN_DURATION_S} s and {MAX_DURATION_S} s"
     )]
     Duration {
-        /// What was asked for, s.
+        /// Duration asked for, s.
         duration_s: f64,
     },
 }
@@ -150,7 +150,7 @@ impl Bobcat {
         self.duration_ns
     }
 
-    /// Where the loader works.
+    /// Site of the work.
     pub fn site(&self) -> &Site {
         &self.site
     }
