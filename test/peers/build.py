@@ -14,7 +14,7 @@ def programs(root, build_all):
     source = root / "test/peers"
     lattice = root / "target/release/lattice"
     if build_all:
-        subprocess.run(["cargo", "build", "--release", "-p", "lattice_nodes", "--bin", "lattice"], cwd=root, check=True)
+        subprocess.run(["cargo", "build", "--release", "-p", "lattice", "--bin", "lattice"], cwd=root, check=True)
     pcl = pathlib.Path("/usr/include/pcl-1.13")
     pcl = pcl if pcl.exists() else out / "pcl/usr/include/pcl-1.13"
     recipes = {
