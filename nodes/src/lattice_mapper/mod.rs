@@ -26,6 +26,7 @@ use lattice_core::voxels::{Changes, Distortion, VoxelList, VoxelStore};
 use lattice_msgs::geographic_msgs::{GeoPoint, GeoPointStamped};
 use lattice_msgs::lattice::{LatticeMap, LatticeMapUpdate};
 use lattice_msgs::sensor_msgs::{PointCloud2, PointField};
+use nalgebra::Vector3;
 use std::sync::{Arc, OnceLock};
 use thiserror::Error;
 
@@ -124,22 +125,54 @@ impl LatticeMapper {
         };
         let cloud = cloud::cloud_from_message(message, &limits, &self.list.datum_m())
             .inspect_err(|_| self.counts.clouds_malformed += 1)?;
+        // All that can be refused is read before anything of the map changes.
+        let labels = self.labels_of(message)?;
+        let viewpoints = self.viewpoints_of(message, &limits)?;
         self.end_sweep(cloud.stamp_ns);
-        let report = match (&mut self.occupancy, &self.options.labels) {
+        let report = match (&mut self.occupancy, labels) {
             (Some(occupancy), _) => occupancy.insert(&cloud),
             (None, None) => self.list.insert(&cloud),
-            (None, Some(options)) => {
-                let most = self.options.max_cloud_points;
-                let labels = semantic::labels_from_message(message, most, options)?;
-                self.counts.clouds_unlabelled += u64::from(labels.is_none());
-                self.list
-                    .insert_labelled(&cloud, &labels.unwrap_or_default())
-            }
+            (None, Some(labels)) => self.list.insert_labelled(&cloud, &labels),
         };
         self.counts.add(&report);
         self.last_stamp_ns = cloud.stamp_ns;
         self.forget_old();
-        self.add_rays(message, &cloud, &limits)
+        if let Some(viewpoints) = viewpoints {
+            self.add_rays(&cloud, &viewpoints);
+        }
+        Ok(())
+    }
+
+    /// Labels of the points, none at all for a cloud without them; `None` where labels are not kept.
+    fn labels_of(&mut self, message: &PointCloud2) -> Result<Option<Vec<u16>>, CloudRefusal> {
+        let Some(options) = self
+            .options
+            .labels
+            .as_ref()
+            .filter(|_| self.occupancy.is_none())
+        else {
+            return Ok(None);
+        };
+        let most = self.options.max_cloud_points;
+        let labels = semantic::labels_from_message(message, most, options)
+            .inspect_err(|_| self.counts.clouds_malformed += 1)?;
+        self.counts.clouds_unlabelled += u64::from(labels.is_none());
+        Ok(Some(labels.unwrap_or_default()))
+    }
+
+    /// Places of the sensor for each point; `None` where free space is off or the cloud has none.
+    fn viewpoints_of(
+        &mut self,
+        message: &PointCloud2,
+        limits: &CloudLimits,
+    ) -> Result<Option<Vec<Vector3<f64>>>, CloudRefusal> {
+        if self.free_space.is_none() {
+            return Ok(None);
+        }
+        let viewpoints = viewpoint::viewpoints_from_message(message, limits)
+            .inspect_err(|_| self.counts.clouds_malformed += 1)?;
+        self.counts.clouds_no_viewpoint += u64::from(viewpoints.is_none());
+        Ok(viewpoints)
     }
 
     /// Clears along the rays of a sweep that a cloud of this time does not belong to.
@@ -161,27 +194,17 @@ impl LatticeMapper {
         }
     }
 
-    fn add_rays(
-        &mut self,
-        message: &PointCloud2,
-        cloud: &Cloud,
-        limits: &CloudLimits,
-    ) -> Result<(), CloudRefusal> {
+    fn add_rays(&mut self, cloud: &Cloud, viewpoints: &[Vector3<f64>]) {
         let Some(free_space) = &mut self.free_space else {
-            return Ok(());
-        };
-        let Some(viewpoints) = viewpoint::viewpoints_from_message(message, limits)? else {
-            self.counts.clouds_no_viewpoint += 1;
-            return Ok(());
+            return;
         };
         match &self.occupancy {
-            Some(occupancy) => free_space.add(occupancy, cloud, &viewpoints),
-            None => free_space.add(&self.list, cloud, &viewpoints),
+            Some(occupancy) => free_space.add(occupancy, cloud, viewpoints),
+            None => free_space.add(&self.list, cloud, viewpoints),
         }
         if free_space.is_cloud_by_cloud() {
             self.clear_rays();
         }
-        Ok(())
     }
 
     /// Removes the voxels that are too old, whenever a sixteenth of their age has passed.
