@@ -156,6 +156,16 @@ impl BagError {
         }
     }
 
+    pub(crate) fn invalid(name: &'static str, reason: impl ToString) -> BagError {
+        let reason = reason.to_string();
+        BagError::Invalid { name, reason }
+    }
+
+    pub(crate) fn unsupported(path: &Path, what: String, remedy: &'static str) -> BagError {
+        let path = path.to_path_buf();
+        BagError::Unsupported { path, what, remedy }
+    }
+
     pub(crate) fn sqlite(
         path: &Path,
         position: impl ToString,

@@ -65,7 +65,6 @@ pub(super) struct SqliteStream {
     page_keys: usize,
     messages_read: u64,
     damage: Option<BagError>,
-    ended: bool,
 }
 
 impl SqliteStream {
@@ -85,7 +84,6 @@ impl SqliteStream {
             },
             messages_read: 0,
             damage: file.info.damage.clone(),
-            ended: false,
         };
         if let Some(rescued) = &file.rescued {
             stream.keys = rescued
@@ -178,23 +176,14 @@ impl Iterator for SqliteStream {
     type Item = Result<StorageMessage, BagError>;
 
     fn next(&mut self) -> Option<Self::Item> {
-        if self.ended {
-            return None;
-        }
         let next = match self.fetch_keys() {
             Ok(()) => self.keys.pop_front().map(|key| self.read(key)),
             Err(error) => Some(Err(error)),
         };
         match next {
-            Some(Ok(message)) => Some(Ok(message)),
-            Some(Err(error)) => {
-                self.ended = true;
-                Some(Err(self.damage.take().unwrap_or(error)))
-            }
-            None => {
-                self.ended = true;
-                self.damage.take().map(Err)
-            }
+            Some(Err(error)) => Some(Err(self.damage.take().unwrap_or(error))),
+            Some(message) => Some(message),
+            None => self.damage.take().map(Err),
         }
     }
 }
