@@ -110,16 +110,6 @@ mod tests {
     use super::*;
 
     #[test]
-    fn storage_files_are_known() {
-        assert_eq!(identify_bytes(b"\x89MCAP0\r\n\x01"), Ok(FileKind::Mcap));
-        assert_eq!(
-            identify_bytes(b"SQLite format 3\0\x10\0"),
-            Ok(FileKind::Sqlite3)
-        );
-        assert_eq!(identify_bytes(b"\x28\xb5\x2f\xfd\x04"), Ok(FileKind::Zstd));
-    }
-
-    #[test]
     fn foreign_files_are_named() {
         for (bytes, expected) in [
             (&b"#ROSBAG V2.0\n"[..], "a ROS 1 bag"),

@@ -112,13 +112,8 @@ impl SqliteStream {
         while self.keys.is_empty() && self.page_keys > 0 {
             let position = format!("message {}", self.messages_read);
             let wrong = |e| BagError::sqlite(&self.path, &position, e);
-            let last_ns = match self.filter.end_ns {
-                None => i64::MAX,
-                Some(end_ns) => match end_ns.checked_sub(1) {
-                    Some(last_ns) => last_ns,
-                    None => return Ok(()),
-                },
-            };
+            let end_ns = self.filter.end_ns;
+            let last_ns = end_ns.map_or(i64::MAX, |end_ns| end_ns.saturating_sub(1));
             let page: Vec<Key> = {
                 let mut statement = self.connection.prepare_cached(&select).map_err(wrong)?;
                 // Before the first page every row of the start time is due, whatever its id.
