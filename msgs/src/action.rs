@@ -1,8 +1,15 @@
-//! Actions: the services and topics that ROS makes of an `.action` file.
+//! Actions: the services and topics that ROS makes of an `.action` file, which is `Calibrate`.
+
+use serde::{Deserialize, Serialize};
 
 use crate::builtin_interfaces::Time;
+use crate::calibration::{
+    CalibrateAction, CalibrateFeedback, CalibrateGoal, CalibrateResult, CalibrationResult,
+};
+use crate::geometry_msgs::Pose;
+use crate::interface::{request_text, response_text};
 use crate::unique_identifier_msgs::UUID;
-use crate::{RosMessage, RosService};
+use crate::{MessageVisitor, RosMessage, RosService, Schema};
 
 /// An action: a goal that takes its time, with feedback meanwhile and a result at the end.
 pub trait RosAction: Send + 'static {
@@ -33,187 +40,133 @@ pub trait RosAction: Send + 'static {
     fn feedback(goal_id: UUID, feedback: Self::Feedback) -> Self::FeedbackMessage;
 }
 
-/// States the actions of a package: the three parts like messages in `messages!`, and the names for
-/// the services and the message that ROS makes of them.
-macro_rules! actions {
-    ($package:literal in $dir:literal; $($action:ident $name:literal:
-        $goal:ident [$($goal_dependency:ident),*],
-        $result:ident [$($result_dependency:ident),*],
-        $feedback:ident [$($feedback_dependency:ident),*];
-        with $send_goal:ident: $send_request:ident, $send_response:ident;
-        with $get_result:ident: $get_request:ident, $get_response:ident;
-        with $feedback_message:ident;)*) => {
-        $(
-        $crate::action::message! {
-            $goal, concat!($package, "/action/", $name, "_Goal"),
-            $crate::interface::request_text(include_str!(concat!($dir, $name, ".action"))),
-            [$($goal_dependency),*]
-        }
-        $crate::action::message! {
-            $result, concat!($package, "/action/", $name, "_Result"),
-            $crate::interface::request_text($crate::interface::response_text(
-                include_str!(concat!($dir, $name, ".action")))),
-            [$($result_dependency),*]
-        }
-        $crate::action::message! {
-            $feedback, concat!($package, "/action/", $name, "_Feedback"),
-            $crate::interface::response_text($crate::interface::response_text(
-                include_str!(concat!($dir, $name, ".action")))),
-            [$($feedback_dependency),*]
-        }
+/// The service `_action/send_goal` of [`CalibrateAction`].
+#[derive(Clone, Copy, Debug)]
+pub struct CalibrateSendGoal;
 
-        #[doc = concat!("The service `_action/send_goal` of [`", stringify!($action), "`].")]
-        #[derive(Clone, Copy, Debug)]
-        pub struct $send_goal;
+/// Request of [`CalibrateSendGoal`].
+#[derive(Clone, Debug, Default, PartialEq, Serialize, Deserialize)]
+pub struct CalibrateSendGoalRequest {
+    /// Chosen by the client.
+    pub goal_id: UUID,
+    /// The goal itself.
+    pub goal: CalibrateGoal,
+}
 
-        #[doc = concat!("Request of [`", stringify!($send_goal), "`].")]
-        #[derive(Clone, Debug, Default, PartialEq, serde::Serialize, serde::Deserialize)]
-        pub struct $send_request {
-            /// Chosen by the client.
-            pub goal_id: $crate::unique_identifier_msgs::UUID,
-            /// The goal itself.
-            pub goal: $goal,
-        }
+/// Response of [`CalibrateSendGoal`].
+#[derive(Clone, Debug, Default, PartialEq, Serialize, Deserialize)]
+pub struct CalibrateSendGoalResponse {
+    /// True if the server takes the goal.
+    pub accepted: bool,
+    /// Time of the decision.
+    pub stamp: Time,
+}
 
-        #[doc = concat!("Response of [`", stringify!($send_goal), "`].")]
-        #[derive(Clone, Debug, Default, PartialEq, serde::Serialize, serde::Deserialize)]
-        pub struct $send_response {
-            /// True if the server takes the goal.
-            pub accepted: bool,
-            /// Time of the decision.
-            pub stamp: $crate::builtin_interfaces::Time,
-        }
+/// The service `_action/get_result` of [`CalibrateAction`].
+#[derive(Clone, Copy, Debug)]
+pub struct CalibrateGetResult;
 
-        #[doc = concat!("The service `_action/get_result` of [`", stringify!($action), "`].")]
-        #[derive(Clone, Copy, Debug)]
-        pub struct $get_result;
+/// Request of [`CalibrateGetResult`].
+#[derive(Clone, Debug, Default, PartialEq, Serialize, Deserialize)]
+pub struct CalibrateGetResultRequest {
+    /// Number of the goal.
+    pub goal_id: UUID,
+}
 
-        #[doc = concat!("Request of [`", stringify!($get_result), "`].")]
-        #[derive(Clone, Debug, Default, PartialEq, serde::Serialize, serde::Deserialize)]
-        pub struct $get_request {
-            /// Number of the goal.
-            pub goal_id: $crate::unique_identifier_msgs::UUID,
-        }
+/// Response of [`CalibrateGetResult`].
+#[derive(Clone, Debug, Default, PartialEq, Serialize, Deserialize)]
+pub struct CalibrateGetResultResponse {
+    /// One of `action_msgs/msg/GoalStatus`.
+    pub status: i8,
+    /// Outcome of the goal.
+    pub result: CalibrateResult,
+}
 
-        #[doc = concat!("Response of [`", stringify!($get_result), "`].")]
-        #[derive(Clone, Debug, Default, PartialEq, serde::Serialize, serde::Deserialize)]
-        pub struct $get_response {
-            /// One of `action_msgs/msg/GoalStatus`.
-            pub status: i8,
-            /// Outcome of the goal.
-            pub result: $result,
-        }
+/// The message of `_action/feedback` of [`CalibrateAction`].
+#[derive(Clone, Debug, Default, PartialEq, Serialize, Deserialize)]
+pub struct CalibrateFeedbackMessage {
+    /// Number of the goal.
+    pub goal_id: UUID,
+    /// Progress of the goal.
+    pub feedback: CalibrateFeedback,
+}
 
-        #[doc = concat!("The message of `_action/feedback` of [`", stringify!($action), "`].")]
-        #[derive(Clone, Debug, Default, PartialEq, serde::Serialize, serde::Deserialize)]
-        pub struct $feedback_message {
-            /// Number of the goal.
-            pub goal_id: $crate::unique_identifier_msgs::UUID,
-            /// Progress of a goal.
-            pub feedback: $feedback,
-        }
+const TEXT: &str = include_str!("../action/Calibrate.action");
 
-        $crate::action::message! {
-            $send_request, concat!($package, "/action/", $name, "_SendGoal_Request"),
-            concat!("unique_identifier_msgs/UUID goal_id\n", $package, "/", $name, "_Goal goal\n"),
-            [$goal, $crate::unique_identifier_msgs::UUID]
-        }
-        $crate::action::message! {
-            $send_response, concat!($package, "/action/", $name, "_SendGoal_Response"),
-            "bool accepted\nbuiltin_interfaces/Time stamp\n",
-            [$crate::builtin_interfaces::Time]
-        }
-        $crate::action::message! {
-            $get_request, concat!($package, "/action/", $name, "_GetResult_Request"),
-            "unique_identifier_msgs/UUID goal_id\n",
-            [$crate::unique_identifier_msgs::UUID]
-        }
-        $crate::action::message! {
-            $get_response, concat!($package, "/action/", $name, "_GetResult_Response"),
-            concat!("int8 status\n", $package, "/", $name, "_Result result\n"),
-            [$result]
-        }
-        $crate::action::message! {
-            $feedback_message, concat!($package, "/action/", $name, "_FeedbackMessage"),
-            concat!("unique_identifier_msgs/UUID goal_id\n", $package, "/", $name,
-                "_Feedback feedback\n"),
-            [$feedback, $crate::unique_identifier_msgs::UUID]
-        }
-
-        impl $crate::RosService for $send_goal {
-            const TYPE: &'static str = concat!($package, "/action/", $name, "_SendGoal");
-            type Request = $send_request;
-            type Response = $send_response;
-        }
-
-        impl $crate::RosService for $get_result {
-            const TYPE: &'static str = concat!($package, "/action/", $name, "_GetResult");
-            type Request = $get_request;
-            type Response = $get_response;
-        }
-
-        impl $crate::RosAction for $action {
-            const TYPE: &'static str = concat!($package, "/action/", $name);
-            type Goal = $goal;
-            type Result = $result;
-            type Feedback = $feedback;
-            type SendGoal = $send_goal;
-            type GetResult = $get_result;
-            type FeedbackMessage = $feedback_message;
-
-            fn goal(request: $send_request) -> ($crate::unique_identifier_msgs::UUID, $goal) {
-                (request.goal_id, request.goal)
-            }
-
-            fn accepted(
-                accepted: bool,
-                stamp: $crate::builtin_interfaces::Time,
-            ) -> $send_response {
-                $send_response { accepted, stamp }
-            }
-
-            fn wanted(request: &$get_request) -> $crate::unique_identifier_msgs::UUID {
-                request.goal_id
-            }
-
-            fn result(status: i8, result: $result) -> $get_response {
-                $get_response { status, result }
-            }
-
-            fn feedback(
-                goal_id: $crate::unique_identifier_msgs::UUID,
-                feedback: $feedback,
-            ) -> $feedback_message {
-                $feedback_message { goal_id, feedback }
-            }
+/// States parts of the action: what follows `Calibrate_` in the name, the text, and the messages
+/// that the fields refer to.
+macro_rules! parts {
+    ($($part:ident $name:literal $text:expr, [$($dependency:ty),*];)*) => {
+        $(impl RosMessage for $part {
+            const SCHEMA: &'static Schema = &Schema {
+                type_name: concat!("lattice_msgs/action/Calibrate_", $name),
+                text: $text,
+                dependencies: &[$(<$dependency as RosMessage>::SCHEMA),*],
+            };
         })*
 
-        pub(crate) fn visit_actions(visitor: &mut impl $crate::MessageVisitor) {
-            $(
-                visitor.visit::<$goal>();
-                visitor.visit::<$result>();
-                visitor.visit::<$feedback>();
-                visitor.visit::<$send_request>();
-                visitor.visit::<$send_response>();
-                visitor.visit::<$get_request>();
-                visitor.visit::<$get_response>();
-                visitor.visit::<$feedback_message>();
-            )*
+        pub(crate) fn visit_parts(visitor: &mut impl MessageVisitor) {
+            $(visitor.visit::<$part>();)*
         }
     };
 }
 
-/// States one part of an action.
-macro_rules! message {
-    ($name:ident, $type_name:expr, $text:expr, [$($dependency:ty),*]) => {
-        impl $crate::RosMessage for $name {
-            const SCHEMA: &'static $crate::Schema = &$crate::Schema {
-                type_name: $type_name,
-                text: $text,
-                dependencies: &[$(<$dependency as $crate::RosMessage>::SCHEMA),*],
-            };
-        }
-    };
+parts! {
+    CalibrateGoal "Goal" request_text(TEXT), [Pose];
+    CalibrateResult "Result" request_text(response_text(TEXT)), [CalibrationResult];
+    CalibrateFeedback "Feedback" response_text(response_text(TEXT)), [];
+    CalibrateSendGoalRequest "SendGoal_Request"
+        "unique_identifier_msgs/UUID goal_id\nlattice_msgs/Calibrate_Goal goal\n",
+        [CalibrateGoal, UUID];
+    CalibrateSendGoalResponse "SendGoal_Response"
+        "bool accepted\nbuiltin_interfaces/Time stamp\n", [Time];
+    CalibrateGetResultRequest "GetResult_Request"
+        "unique_identifier_msgs/UUID goal_id\n", [UUID];
+    CalibrateGetResultResponse "GetResult_Response"
+        "int8 status\nlattice_msgs/Calibrate_Result result\n", [CalibrateResult];
+    CalibrateFeedbackMessage "FeedbackMessage"
+        "unique_identifier_msgs/UUID goal_id\nlattice_msgs/Calibrate_Feedback feedback\n",
+        [CalibrateFeedback, UUID];
 }
 
-pub(crate) use {actions, message};
+impl RosService for CalibrateSendGoal {
+    const TYPE: &'static str = "lattice_msgs/action/Calibrate_SendGoal";
+    type Request = CalibrateSendGoalRequest;
+    type Response = CalibrateSendGoalResponse;
+}
+
+impl RosService for CalibrateGetResult {
+    const TYPE: &'static str = "lattice_msgs/action/Calibrate_GetResult";
+    type Request = CalibrateGetResultRequest;
+    type Response = CalibrateGetResultResponse;
+}
+
+impl RosAction for CalibrateAction {
+    const TYPE: &'static str = "lattice_msgs/action/Calibrate";
+    type Goal = CalibrateGoal;
+    type Result = CalibrateResult;
+    type Feedback = CalibrateFeedback;
+    type SendGoal = CalibrateSendGoal;
+    type GetResult = CalibrateGetResult;
+    type FeedbackMessage = CalibrateFeedbackMessage;
+
+    fn goal(request: CalibrateSendGoalRequest) -> (UUID, CalibrateGoal) {
+        (request.goal_id, request.goal)
+    }
+
+    fn accepted(accepted: bool, stamp: Time) -> CalibrateSendGoalResponse {
+        CalibrateSendGoalResponse { accepted, stamp }
+    }
+
+    fn wanted(request: &CalibrateGetResultRequest) -> UUID {
+        request.goal_id
+    }
+
+    fn result(status: i8, result: CalibrateResult) -> CalibrateGetResultResponse {
+        CalibrateGetResultResponse { status, result }
+    }
+
+    fn feedback(goal_id: UUID, feedback: CalibrateFeedback) -> CalibrateFeedbackMessage {
+        CalibrateFeedbackMessage { goal_id, feedback }
+    }
+}

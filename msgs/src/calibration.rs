@@ -4,7 +4,7 @@ use serde::{Deserialize, Serialize};
 use serde_big_array::BigArray;
 
 use crate::geometry_msgs::{Pose, Transform, Vector3};
-use crate::interface::{actions, messages, services};
+use crate::interface::{messages, services};
 use crate::std_msgs::Header;
 
 messages! {
@@ -17,15 +17,6 @@ messages! {
 services! {
     "lattice_msgs" in "../srv/";
     Calibrate: CalibrateRequest [Pose], CalibrateResponse [CalibrationResult];
-}
-
-actions! {
-    "lattice_msgs" in "../action/";
-    CalibrateAction "Calibrate": CalibrateGoal [Pose], CalibrateResult [CalibrationResult],
-        CalibrateFeedback [];
-    with CalibrateSendGoal: CalibrateSendGoalRequest, CalibrateSendGoalResponse;
-    with CalibrateGetResult: CalibrateGetResultRequest, CalibrateGetResultResponse;
-    with CalibrateFeedbackMessage;
 }
 
 /// Pose of a headset in the map, or the reason that there is none.

@@ -158,7 +158,6 @@ macro_rules! services {
     };
 }
 
-pub(crate) use crate::action::actions;
 pub(crate) use {messages, services};
 
 #[cfg(test)]

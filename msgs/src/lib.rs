@@ -5,7 +5,7 @@
 //! [`cdr`] reads and writes the bytes that are on the wire and in bags.
 #![forbid(unsafe_code)]
 
-mod action;
+pub mod action;
 pub mod action_msgs;
 pub mod builtin_interfaces;
 pub mod calibration;

@@ -2,9 +2,10 @@
 
 use crate::interface::RosMessage;
 use crate::{
-    action_msgs, builtin_interfaces, calibration, diagnostic_msgs, geographic_msgs, geometry_msgs,
-    lattice, nav_msgs, novatel_oem7_msgs, rcl_interfaces, rosgraph_msgs, sensor_msgs, std_msgs,
-    std_srvs, tf2_msgs, unique_identifier_msgs, vision_msgs, visualization_msgs,
+    action, action_msgs, builtin_interfaces, calibration, diagnostic_msgs, geographic_msgs,
+    geometry_msgs, lattice, nav_msgs, novatel_oem7_msgs, rcl_interfaces, rosgraph_msgs,
+    sensor_msgs, std_msgs, std_srvs, tf2_msgs, unique_identifier_msgs, vision_msgs,
+    visualization_msgs,
 };
 
 /// Visitor of every message type; see [`visit_messages`].
@@ -20,7 +21,7 @@ pub fn visit_messages(visitor: &mut impl MessageVisitor) {
     builtin_interfaces::visit_messages(visitor);
     calibration::visit_messages(visitor);
     calibration::visit_services(visitor);
-    calibration::visit_actions(visitor);
+    action::visit_parts(visitor);
     diagnostic_msgs::visit_messages(visitor);
     geographic_msgs::visit_messages(visitor);
     geometry_msgs::visit_messages(visitor);

@@ -50,69 +50,26 @@ mod tests {
     use super::*;
 
     #[test]
-    fn negative_times_keep_a_positive_nanosec() {
-        assert_eq!(
-            Time::from_ns(-1),
-            Time {
-                sec: -1,
-                nanosec: 999_999_999
-            }
-        );
-        assert_eq!(
-            Duration::from_ns(-1_500_000_000),
-            Duration {
-                sec: -2,
-                nanosec: 500_000_000
-            }
-        );
-    }
-
-    #[test]
-    fn round_trip_within_range() {
-        for ns in [
-            0,
-            1,
-            -1,
-            1_700_000_000_123_456_789,
-            join(i32::MIN, 0),
-            join(i32::MAX, 999_999_999),
+    fn seconds_may_be_negative_and_nanoseconds_not() {
+        for (ns, sec, nanosec) in [
+            (0, 0, 0),
+            (-1, -1, 999_999_999),
+            (-1_500_000_000, -2, 500_000_000),
+            (1_700_000_000_123_456_789, 1_700_000_000, 123_456_789),
+            (-2_147_483_648_000_000_000, i32::MIN, 0),
+            (2_147_483_647_999_999_999, i32::MAX, 999_999_999),
         ] {
-            assert_eq!(Time::from_ns(ns).to_ns(), ns);
-            assert_eq!(Duration::from_ns(ns).to_ns(), ns);
+            assert_eq!(Time::from_ns(ns), Time { sec, nanosec });
+            assert_eq!(Duration::from_ns(ns), Duration { sec, nanosec });
+            assert_eq!(Time { sec, nanosec }.to_ns(), ns);
+            assert_eq!(Duration { sec, nanosec }.to_ns(), ns);
         }
     }
 
     #[test]
-    fn saturates() {
-        assert_eq!(
-            Time::from_ns(i64::MAX),
-            Time {
-                sec: i32::MAX,
-                nanosec: 999_999_999
-            }
-        );
-        assert_eq!(
-            Time::from_ns(i64::MIN),
-            Time {
-                sec: i32::MIN,
-                nanosec: 0
-            }
-        );
-        assert_eq!(
-            Time {
-                sec: i32::MAX,
-                nanosec: u32::MAX
-            }
-            .to_ns(),
-            2_147_483_651_294_967_295
-        );
-        assert_eq!(
-            Time {
-                sec: i32::MIN,
-                nanosec: 0
-            }
-            .to_ns(),
-            -2_147_483_648_000_000_000
-        );
+    fn times_out_of_range_are_the_nearest() {
+        assert_eq!(split(i64::MAX), (i32::MAX, 999_999_999));
+        assert_eq!(split(i64::MIN), (i32::MIN, 0));
+        assert_eq!(join(i32::MAX, u32::MAX), 2_147_483_651_294_967_295);
     }
 }

@@ -2,24 +2,19 @@
 
 #![allow(clippy::unwrap_used)]
 
-use crate::shape::{Shape, filled};
+use std::collections::BTreeSet;
+
+use crate::shape::filled;
 use lattice_msgs::{
     MessageVisitor, RosMessage, Schema, geometry_msgs, sensor_msgs, visit_messages,
 };
 
-/// A line of a definition.
-#[derive(Debug, PartialEq)]
-enum Line<'a> {
-    Field {
-        kind: &'a str,
-        name: &'a str,
-        default: Option<&'a str>,
-    },
-    Constant {
-        kind: &'a str,
-        name: &'a str,
-        value: &'a str,
-    },
+/// A line of a definition: a constant, or a field that may have a default.
+struct Line<'a> {
+    kind: &'a str,
+    name: &'a str,
+    default: Option<&'a str>,
+    constant: Option<&'a str>,
 }
 
 fn lines(text: &str) -> impl Iterator<Item = Line<'_>> {
@@ -28,21 +23,18 @@ fn lines(text: &str) -> impl Iterator<Item = Line<'_>> {
         .map(|line| line.split('#').next().unwrap_or_default().trim());
     bodies.filter(|body| !body.is_empty()).map(|body| {
         let (kind, rest) = body.split_once(' ').unwrap();
-        if let Some((name, value)) = rest.split_once('=') {
-            Line::Constant {
-                kind,
-                name: name.trim(),
-                value: value.trim(),
-            }
-        } else {
-            let mut words = rest.split_whitespace();
-            let (name, default) = (words.next().unwrap(), words.next());
-            assert_eq!(words.next(), None, "{body}");
-            Line::Field {
-                kind,
-                name,
-                default,
-            }
+        let (field, constant) = match rest.split_once('=') {
+            Some((field, value)) => (field, Some(value.trim())),
+            None => (rest, None),
+        };
+        let mut words = field.split_whitespace();
+        let (name, default) = (words.next().unwrap(), words.next());
+        assert_eq!(words.next(), None, "{body}");
+        Line {
+            kind,
+            name,
+            default,
+            constant,
         }
     })
 }
@@ -73,33 +65,17 @@ struct FieldsAgree(usize);
 
 impl MessageVisitor for FieldsAgree {
     fn visit<M: RosMessage>(&mut self) {
-        let Shape::Message(struct_name, in_rust) = filled::<M>(1).1 else {
-            panic!("{} is not a struct", M::TYPE);
-        };
-        let (package, name) = (
-            M::TYPE.split('/').next().unwrap(),
-            M::TYPE.rsplit('/').next().unwrap().replace('_', ""),
-        );
+        let (_, struct_name, in_rust) = filled::<M>(1);
+        let (package, name) = M::TYPE.split_once('/').unwrap();
+        let name = name.rsplit('/').next().unwrap().replace('_', "");
         assert_eq!(struct_name, name);
 
-        let mut in_text = Vec::new();
-        let mut used = Vec::new();
-        for line in lines(M::SCHEMA.text) {
-            if let Line::Field { kind, name, .. } = line {
-                in_text.push((name.to_owned(), as_rust_shows(kind)));
-                used.extend(full_name(kind, package));
-            }
-        }
+        let fields = || lines(M::SCHEMA.text).filter(|line| line.constant.is_none());
+        let in_text = fields().map(|field| (field.name, as_rust_shows(field.kind)));
+        let mut in_text: Vec<_> = in_text.collect();
         if in_text.is_empty() {
-            in_text.push((
-                "structure_needs_at_least_one_member".to_owned(),
-                "uint8".to_owned(),
-            ));
+            in_text.push(("structure_needs_at_least_one_member", "uint8".to_owned()));
         }
-        let in_rust: Vec<_> = in_rust
-            .into_iter()
-            .map(|(name, shape)| (name.to_owned(), shape.to_string()))
-            .collect();
         assert_eq!(in_rust, in_text, "{}", M::TYPE);
 
         // Fields name a part of an action as if it were a message.
@@ -108,9 +84,10 @@ impl MessageVisitor for FieldsAgree {
             .map(|d| d.type_name.replace("/action/", "/msg/"))
             .collect();
         stated.sort_unstable();
-        used.sort_unstable();
-        used.dedup();
-        assert_eq!(stated, used, "dependencies of {}", M::TYPE);
+        let used: BTreeSet<_> = fields()
+            .filter_map(|f| full_name(f.kind, package))
+            .collect();
+        assert_eq!(stated, Vec::from_iter(used), "dependencies of {}", M::TYPE);
         self.0 += 1;
     }
 }
@@ -147,13 +124,9 @@ fn constants_in_text(schema: &Schema) -> Vec<[String; 4]> {
         .next()
         .unwrap()
         .replace('_', "");
-    let constants = lines(schema.text).filter_map(|line| match line {
-        Line::Constant { kind, name, value } => Some((kind, name, value)),
-        Line::Field { .. } => None,
-    });
-    constants
-        .map(|(kind, constant, value)| {
-            let kind = match kind {
+    lines(schema.text)
+        .filter_map(|line| {
+            let kind = match line.kind {
                 "byte" | "uint8" => "u8",
                 "int8" => "i8",
                 "uint16" => "u16",
@@ -161,9 +134,9 @@ fn constants_in_text(schema: &Schema) -> Vec<[String; 4]> {
                 "uint32" => "u32",
                 "uint64" => "u64",
                 "string" => "&'static str",
-                other => panic!("constants of type {other} are new: say how they show in Rust"),
+                other => other,
             };
-            [name.as_str(), kind, constant, value].map(str::to_owned)
+            Some([name.as_str(), kind, line.name, line.constant?].map(str::to_owned))
         })
         .collect()
 }
@@ -182,18 +155,10 @@ fn constants_agree() {
     let mut in_text = Constants::default();
     visit_messages(&mut in_text);
     let mut in_text = in_text.0;
-    let packages = [
-        "action_msgs",
-        "calibration",
-        "diagnostic_msgs",
-        "lattice",
-        "novatel_oem7_msgs",
-        "rcl_interfaces",
-    ];
     let mut in_rust = Vec::new();
-    for package in packages
-        .iter()
-        .chain(&["sensor_msgs", "visualization_msgs"])
+    for package in "action_msgs calibration diagnostic_msgs lattice novatel_oem7_msgs \
+                    rcl_interfaces sensor_msgs visualization_msgs"
+        .split_whitespace()
     {
         let path = format!("{}/src/{package}.rs", env!("CARGO_MANIFEST_DIR"));
         in_rust.extend(constants_in_rust(&std::fs::read_to_string(path).unwrap()));
@@ -204,21 +169,13 @@ fn constants_agree() {
 }
 
 #[derive(Default)]
-struct Defaults(Vec<(&'static str, String, String)>);
+struct Defaults(Vec<[&'static str; 3]>);
 
 impl MessageVisitor for Defaults {
     fn visit<M: RosMessage>(&mut self) {
-        for line in lines(M::SCHEMA.text) {
-            if let Line::Field {
-                name,
-                default: Some(value),
-                ..
-            } = line
-                && !["0", "false"].contains(&value)
-            {
-                self.0.push((M::TYPE, name.to_owned(), value.to_owned()));
-            }
-        }
+        let defaults = lines(M::SCHEMA.text).filter_map(|l| Some([M::TYPE, l.name, l.default?]));
+        self.0
+            .extend(defaults.filter(|[_, _, value]| !["0", "false"].contains(value)));
     }
 }
 
@@ -226,16 +183,11 @@ impl MessageVisitor for Defaults {
 fn defaults_agree() {
     let mut defaults = Defaults::default();
     visit_messages(&mut defaults);
-    let names: Vec<_> = defaults
-        .0
-        .iter()
-        .map(|(message, field, value)| (*message, &**field, &**value))
-        .collect();
     assert_eq!(
-        names,
+        defaults.0,
         [
-            ("geometry_msgs/msg/Quaternion", "w", "1"),
-            ("sensor_msgs/msg/NavSatStatus", "status", "-2"),
+            ["geometry_msgs/msg/Quaternion", "w", "1"],
+            ["sensor_msgs/msg/NavSatStatus", "status", "-2"],
         ]
     );
     assert_eq!(geometry_msgs::Quaternion::default().w, 1.0);

@@ -150,7 +150,7 @@ struct RoundTrip(usize);
 impl MessageVisitor for RoundTrip {
     fn visit<M: RosMessage>(&mut self) {
         for length in [0, 1, 2, 17] {
-            let (message, _) = filled::<M>(length);
+            let message = filled::<M>(length).0;
             let bytes = cdr::to_vec(&message).unwrap();
             assert_eq!(
                 cdr::from_slice::<M>(&bytes).unwrap(),

@@ -6,26 +6,21 @@ use thiserror::Error;
 
 /// An error of reading, writing or playing a bag.
 #[derive(Clone, Debug, Error)]
+#[expect(missing_docs, reason = "the messages say what the fields are")]
 pub enum BagError {
     /// The operating system refused.
     #[error("{}: cannot {doing}: {source}; check that the path exists, its permissions and the free space", path.display())]
     Io {
-        /// The file or folder.
         path: PathBuf,
-        /// The attempt, such as "open".
         doing: &'static str,
-        /// The cause.
         #[source]
         source: Arc<io::Error>,
     },
     /// The file is none that a rosbag2 bag holds.
     #[error("{}: not a ROS 2 bag file: it is {found}; {remedy}", path.display())]
     Foreign {
-        /// The file.
         path: PathBuf,
-        /// The kind of the file.
         found: String,
-        /// The remedy.
         remedy: &'static str,
     },
     /// The file ends early, as after a crash of the recorder.
@@ -36,73 +31,51 @@ pub enum BagError {
         path.display()
     )]
     Truncated {
-        /// The file.
         path: PathBuf,
-        /// End of the file, bytes.
         size_bytes: u64,
         /// The cut part, with its own offset.
         inside: String,
-        /// Number of whole messages before the cut.
         readable_messages: u64,
     },
     /// The bytes contradict the format.
     #[error("{}: damaged at {position}: {reason}; {remedy}", path.display())]
     Corrupt {
-        /// The file.
         path: PathBuf,
-        /// The byte offset, row or message.
         position: String,
         /// The contradiction, with the numbers.
         reason: String,
-        /// The remedy.
         remedy: &'static str,
     },
     /// `metadata.yaml` cannot be used.
     #[error("{}: {reason}; move the file away to have it rebuilt from the storage files", path.display())]
     Metadata {
-        /// The metadata file.
         path: PathBuf,
         /// The reason, with line and column where known.
         reason: String,
     },
     /// `metadata.yaml` points outside the bag.
     #[error("{}: relative_file_paths names {entry:?}, which leaves the bag folder; such a bag is refused, correct the entry", path.display())]
-    PathTraversal {
-        /// The metadata file.
-        path: PathBuf,
-        /// The refused entry.
-        entry: String,
-    },
+    PathTraversal { path: PathBuf, entry: String },
     /// Something is larger than the limits allow.
     #[error("{}: {what} at {position} takes {size_bytes} bytes, more than the limit of {limit_bytes}; {remedy}", path.display())]
     TooLarge {
-        /// The file.
         path: PathBuf,
-        /// The part that is too large.
         what: &'static str,
-        /// The byte offset, row or message.
         position: String,
-        /// Its size, bytes.
         size_bytes: u64,
-        /// The limit, bytes.
         limit_bytes: u64,
-        /// The remedy.
         remedy: &'static str,
     },
     /// The bag uses something that is not implemented.
     #[error("{}: {what} is not supported; {remedy}", path.display())]
     Unsupported {
-        /// The file.
         path: PathBuf,
-        /// The feature.
         what: String,
-        /// The remedy.
         remedy: &'static str,
     },
     /// The target of a writer is taken.
     #[error("{}: exists already{why}; choose another path{or_overwrite}", path.display())]
     Exists {
-        /// The target.
         path: PathBuf,
         /// The reason to keep it, after a separator, or nothing.
         why: String,
@@ -112,7 +85,6 @@ pub enum BagError {
     /// An argument of the caller is out of range.
     #[error("{name}: {reason}")]
     Invalid {
-        /// The argument.
         name: &'static str,
         /// The value, and what is accepted.
         reason: String,
@@ -154,6 +126,16 @@ impl BagError {
             reason: reason.to_string(),
             remedy,
         }
+    }
+
+    pub(crate) fn invalid(name: &'static str, reason: impl ToString) -> BagError {
+        let reason = reason.to_string();
+        BagError::Invalid { name, reason }
+    }
+
+    pub(crate) fn unsupported(path: &Path, what: String, remedy: &'static str) -> BagError {
+        let path = path.to_path_buf();
+        BagError::Unsupported { path, what, remedy }
     }
 
     pub(crate) fn sqlite(

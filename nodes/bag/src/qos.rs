@@ -1,6 +1,7 @@
 //! Quality of service in bags: integers up to metadata version 8, names from 9 on.
 
 use serde::{Deserialize, Serialize};
+use serde_yaml::Value;
 
 /// The quality of service that one recorded publisher offered, as far as playing needs it.
 #[derive(Clone, PartialEq, Eq, Hash, Debug, Serialize, Deserialize)]
@@ -28,52 +29,30 @@ impl Default for BagQos {
     }
 }
 
-/// The policies that are read; the others of a bag are passed over.
+/// The policies that are read, by number or name; the others of a bag are passed over.
 #[derive(Deserialize)]
-#[serde(default)]
 struct RecordedQos {
-    history: Policy,
-    depth: u64,
-    reliability: Policy,
-    durability: Policy,
+    #[serde(default)]
+    history: Value,
+    depth: Option<u64>,
+    #[serde(default)]
+    reliability: Value,
+    #[serde(default)]
+    durability: Value,
 }
 
-/// A policy in either of its two spellings.
-#[derive(Deserialize)]
-#[serde(untagged)]
-enum Policy {
-    Number(i64),
-    Name(String),
-}
-
-impl Policy {
-    fn is(&self, number: i64, name: &str) -> bool {
-        match self {
-            Policy::Number(found) => *found == number,
-            Policy::Name(found) => found.eq_ignore_ascii_case(name),
-        }
-    }
-}
-
-impl Default for RecordedQos {
-    fn default() -> Self {
-        let unknown = || Policy::Name(String::new());
-        RecordedQos {
-            history: unknown(),
-            depth: BagQos::default().depth,
-            reliability: unknown(),
-            durability: unknown(),
-        }
-    }
+fn is(policy: &Value, number: i64, name: &str) -> bool {
+    let found = policy.as_str();
+    policy.as_i64() == Some(number) || found.is_some_and(|f| f.eq_ignore_ascii_case(name))
 }
 
 impl From<RecordedQos> for BagQos {
     fn from(recorded: RecordedQos) -> Self {
         BagQos {
-            keep_all: recorded.history.is(2, "keep_all"),
-            depth: recorded.depth,
-            reliable: !recorded.reliability.is(2, "best_effort"),
-            latched: recorded.durability.is(1, "transient_local"),
+            keep_all: is(&recorded.history, 2, "keep_all"),
+            depth: recorded.depth.unwrap_or(BagQos::default().depth),
+            reliable: !is(&recorded.reliability, 2, "best_effort"),
+            latched: is(&recorded.durability, 1, "transient_local"),
         }
     }
 }

@@ -12,7 +12,7 @@ use super::{
     metadata::{CompressionMode, Metadata},
     split::Split,
     split_list::{in_order_of_time, listed_splits, splits_in},
-    storage::{Filter, full_type_name},
+    storage::{Filter, full_type_name, merge_topic},
 };
 
 /// Selection of messages by topic and time; the default is all.
@@ -79,42 +79,35 @@ impl BagReader {
     ///
     /// A damaged bag yields what precedes the damage, then the error. Unknown topics are an error.
     pub fn messages(&self, options: &ReadOptions) -> Result<Messages, BagError> {
-        let wanted = match &options.topics {
-            None => vec![true; self.topics.len()],
-            Some(names) => self.select(names)?,
-        };
-        Ok(Messages::new(
-            self.splits.clone(),
-            self.topics.clone(),
-            Filter {
-                topics: wanted,
-                start_ns: options.start_ns.unwrap_or(i64::MIN),
-                end_ns: options.end_ns,
-            },
-            self.compression,
-        ))
+        let names = options.topics.as_deref();
+        self.expect_topics(names.unwrap_or_default())?;
+        let is_wanted = |topic: &TopicInfo| names.is_none_or(|n| n.contains(&topic.name));
+        Ok(self.filtered(Filter {
+            topics: self.topics.iter().map(is_wanted).collect(),
+            start_ns: options.start_ns.unwrap_or(i64::MIN),
+            end_ns: options.end_ns,
+        }))
     }
 
-    fn select(&self, names: &[String]) -> Result<Vec<bool>, BagError> {
-        if let Some(unknown) = names
-            .iter()
-            .find(|name| !self.topics.iter().any(|t| t.name == **name))
-        {
-            let known: Vec<&str> = self.topics.iter().map(|t| t.name.as_str()).collect();
-            return Err(BagError::Invalid {
-                name: "topics",
-                reason: format!(
+    pub(crate) fn filtered(&self, filter: Filter) -> Messages {
+        let (splits, topics) = (self.splits.clone(), self.topics.clone());
+        Messages::new(splits, topics, filter, self.compression)
+    }
+
+    /// Refuses names of topics that the bag lacks.
+    pub(crate) fn expect_topics(&self, names: &[String]) -> Result<(), BagError> {
+        let known: Vec<&str> = self.topics.iter().map(|t| t.name.as_str()).collect();
+        match names.iter().find(|name| !known.contains(&name.as_str())) {
+            None => Ok(()),
+            Some(unknown) => Err(BagError::invalid(
+                "topics",
+                format!(
                     "{unknown} is not in {}, which has {}",
                     self.path.display(),
                     known.join(", ")
                 ),
-            });
+            )),
         }
-        Ok(self
-            .topics
-            .iter()
-            .map(|topic| names.contains(&topic.name))
-            .collect())
     }
 
     fn assemble(
@@ -123,12 +116,6 @@ impl BagReader {
         splits: Vec<Split>,
     ) -> Result<BagReader, BagError> {
         let splits = in_order_of_time(splits);
-        let infos = || {
-            splits
-                .iter()
-                .filter_map(|s| s.open.as_ref())
-                .map(|open| open.info())
-        };
         let compression = match &metadata {
             None => MessageCompression::Detect,
             Some(metadata) => match metadata.compression(path)? {
@@ -138,10 +125,10 @@ impl BagReader {
         };
         let mut topics = listed_topics(metadata.as_ref());
         let counted = metadata.is_none();
-        for info in infos() {
-            info.topics
-                .iter()
-                .for_each(|topic| merge_topic(&mut topics, topic, counted));
+        for open in splits.iter().filter_map(|split| split.open.as_ref()) {
+            for topic in &open.info().topics {
+                merge_topic(&mut topics, topic, counted);
+            }
         }
         for damage in splits.iter().filter_map(Split::damage) {
             log::warn!("{damage}");
@@ -187,25 +174,4 @@ fn listed_topics(metadata: Option<&Metadata>) -> Vec<TopicInfo> {
         }
     };
     listed.iter().map(topic).collect()
-}
-
-/// Completes a topic from a storage file; counts only where there is no `metadata.yaml`.
-fn merge_topic(topics: &mut Vec<TopicInfo>, topic: &TopicInfo, counted: bool) {
-    let Some(known) = topics
-        .iter_mut()
-        .find(|t| t.is_same(&topic.name, &topic.type_name))
-    else {
-        topics.push(topic.clone());
-        return;
-    };
-    if known.type_name.is_empty() {
-        known.type_name.clone_from(&topic.type_name);
-    }
-    if known.offered_qos.is_empty() {
-        known.offered_qos.clone_from(&topic.offered_qos);
-    }
-    known.definition = known.definition.take().or_else(|| topic.definition.clone());
-    if counted {
-        known.message_count = known.message_count.saturating_add(topic.message_count);
-    }
 }

@@ -19,14 +19,13 @@ pub(crate) enum FileKind {
 }
 
 const NO_BAG: &str = "give a rosbag2 folder, or an .mcap or .db3 file of one";
+const ROS_1: &str = "convert it with `rosbags-convert --src FILE --dst FOLDER`";
+const CAPTURE: &str = "replay it through the sensor's ROS 2 driver and record that";
+const METADATA: &str = "give the folder that holds it";
 
 /// Kinds of file that people give for a bag: first bytes, name, remedy.
 const FOREIGN: &[(&[u8], &str, &str)] = &[
-    (
-        b"#ROSBAG V",
-        "a ROS 1 bag",
-        "convert it with `rosbags-convert --src FILE --dst FOLDER`",
-    ),
+    (b"#ROSBAG V", "a ROS 1 bag", ROS_1),
     (b"\x89PNG", "a PNG image", NO_BAG),
     (b"\xff\xd8\xff", "a JPEG image", NO_BAG),
     (b"%PDF", "a PDF document", NO_BAG),
@@ -40,21 +39,13 @@ const FOREIGN: &[(&[u8], &str, &str)] = &[
     (b"\xfd7zXZ\0", "an xz archive", "unpack it with `unxz`"),
     (b"PK\x03\x04", "a zip archive", "unpack it"),
     (b"\x7fELF", "a program", NO_BAG),
-    (
-        b"\xd4\xc3\xb2\xa1",
-        "a packet capture (pcap)",
-        "replay it through the sensor's ROS 2 driver and record that",
-    ),
-    (
-        b"\x0a\x0d\x0d\x0a",
-        "a packet capture (pcapng)",
-        "replay it through the sensor's ROS 2 driver and record that",
-    ),
+    (b"\xd4\xc3\xb2\xa1", "a packet capture (pcap)", CAPTURE),
+    (b"\n\r\r\n", "a packet capture (pcapng)", CAPTURE),
     (b"\x89HDF", "an HDF5 file", NO_BAG),
     (
         b"rosbag2_bagfile_information",
         "the metadata of a bag",
-        "give the folder that holds it",
+        METADATA,
     ),
     (b"# .PCD", "a PCD point cloud", NO_BAG),
     (b"ply\n", "a PLY file", NO_BAG),
@@ -91,49 +82,32 @@ fn identify_bytes(head: &[u8]) -> Result<FileKind, (String, &'static str)> {
     if let Some((_, kind)) = kinds.iter().find(|(magic, _)| head.starts_with(magic)) {
         return Ok(*kind);
     }
-    if head.is_empty() {
-        return Err((
-            "empty (0 bytes)".into(),
-            "the recorder wrote nothing; record again",
-        ));
-    }
-    if kinds.iter().any(|(magic, _)| magic.starts_with(head)) {
-        return Err(("cut".into(), ""));
-    }
-    if let Some((_, found, remedy)) = FOREIGN.iter().find(|(magic, _, _)| head.starts_with(magic)) {
-        return Err(((*found).into(), remedy));
-    }
-    if head.iter().all(|&b| b == 0) {
-        return Err((
-            "filled with zeros".into(),
-            "the recorder's machine crashed; take another copy",
-        ));
-    }
-    let shown: Vec<String> = head.iter().take(8).map(|b| format!("{b:02x}")).collect();
-    let text = head
-        .iter()
-        .all(|b| b.is_ascii_graphic() || b.is_ascii_whitespace());
-    let kind = if text {
-        "a text file"
+    let is_text = |b: &u8| b.is_ascii_graphic() || b.is_ascii_whitespace();
+    let (found, remedy) = if head.is_empty() {
+        let remedy = "the recorder wrote nothing; record again";
+        ("empty (0 bytes)", remedy)
+    } else if kinds.iter().any(|(magic, _)| magic.starts_with(head)) {
+        ("cut", "")
+    } else if let Some((_, found, remedy)) = FOREIGN.iter().find(|f| head.starts_with(f.0)) {
+        (*found, *remedy)
+    } else if head.iter().all(|&b| b == 0) {
+        let remedy = "the recorder's machine crashed; take another copy";
+        ("filled with zeros", remedy)
     } else {
-        "of unknown kind"
+        let shown: Vec<String> = head.iter().take(8).map(|b| format!("{b:02x}")).collect();
+        let kind = match head.iter().all(is_text) {
+            true => "a text file",
+            false => "of unknown kind",
+        };
+        let found = format!("{kind} (first bytes {})", shown.join(" "));
+        return Err((found, NO_BAG));
     };
-    Err((format!("{kind} (first bytes {})", shown.join(" ")), NO_BAG))
+    Err((found.to_owned(), remedy))
 }
 
 #[cfg(test)]
 mod tests {
     use super::*;
-
-    #[test]
-    fn storage_files_are_known() {
-        assert_eq!(identify_bytes(b"\x89MCAP0\r\n\x01"), Ok(FileKind::Mcap));
-        assert_eq!(
-            identify_bytes(b"SQLite format 3\0\x10\0"),
-            Ok(FileKind::Sqlite3)
-        );
-        assert_eq!(identify_bytes(b"\x28\xb5\x2f\xfd\x04"), Ok(FileKind::Zstd));
-    }
 
     #[test]
     fn foreign_files_are_named() {

@@ -32,11 +32,11 @@ impl OpenFile {
         match identify(&copy)? {
             FileKind::Mcap => McapFile::open(&copy, Some(copy.clone())).map(OpenFile::Mcap),
             FileKind::Sqlite3 => SqliteFile::open(&copy, Some(copy.clone())).map(OpenFile::Sqlite),
-            FileKind::Zstd => Err(BagError::Unsupported {
-                path: path.to_path_buf(),
-                what: "a storage file compressed twice".into(),
-                remedy: "decompress it with `zstd -d`",
-            }),
+            FileKind::Zstd => Err(BagError::unsupported(
+                path,
+                "a storage file compressed twice".into(),
+                "decompress it with `zstd -d`",
+            )),
         }
     }
 
@@ -61,26 +61,17 @@ impl OpenFile {
         topics: &[TopicInfo],
         wanted: &Filter,
     ) -> Result<(StorageStream, Vec<usize>), BagError> {
-        let find = |name: &str, type_name: &str| {
-            topics
-                .iter()
-                .position(|t| t.is_same(name, type_name))
-                .ok_or_else(|| {
-                    BagError::corrupt(
-                        path,
-                        "its list of topics",
-                        format!("topic {name} of type {type_name} is not in metadata.yaml"),
-                        "move metadata.yaml away to have it rebuilt",
-                    )
-                })
+        let find = |topic: &TopicInfo| {
+            let same = |t: &TopicInfo| t.is_same(&topic.name, &topic.type_name);
+            topics.iter().position(same).ok_or_else(|| {
+                let (name, type_name) = (&topic.name, &topic.type_name);
+                let reason = format!("topic {name} of type {type_name} is not in metadata.yaml");
+                let remedy = "move metadata.yaml away to have it rebuilt";
+                BagError::corrupt(path, "its list of topics", reason, remedy)
+            })
         };
-        let mapped: Result<Vec<usize>, _> = self
-            .info()
-            .topics
-            .iter()
-            .map(|t| find(&t.name, &t.type_name))
-            .collect();
-        let mapped = mapped?;
+        let mapped = self.info().topics.iter().map(find);
+        let mapped: Vec<usize> = mapped.collect::<Result<_, _>>()?;
         let by_file = mapped
             .iter()
             .map(|index| wanted.wants_topic(*index))

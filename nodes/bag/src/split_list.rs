@@ -7,7 +7,7 @@ use std::{
 
 use super::{BagError, metadata::Metadata, split::Split};
 
-/// More storage files than this are refused.
+/// Folders of more files than this are refused.
 const MAX_FILES: usize = 100_000;
 
 /// The storage files that the metadata lists, in its order.
@@ -17,11 +17,11 @@ pub(crate) fn listed_splits(
     metadata_path: &Path,
 ) -> Result<Vec<Split>, BagError> {
     if !matches!(metadata.storage_identifier.as_str(), "mcap" | "sqlite3") {
-        return Err(BagError::Unsupported {
-            path: metadata_path.to_path_buf(),
-            what: format!("storage plugin {:?}", metadata.storage_identifier),
-            remedy: "mcap and sqlite3 are known; convert with `ros2 bag convert`",
-        });
+        return Err(BagError::unsupported(
+            metadata_path,
+            format!("storage plugin {:?}", metadata.storage_identifier),
+            "mcap and sqlite3 are known; convert with `ros2 bag convert`",
+        ));
     }
     let mut splits = Vec::new();
     for (entry, file) in metadata.storage_paths(folder, metadata_path)? {
@@ -47,26 +47,12 @@ pub(crate) fn listed_splits(
 
 /// The storage files of a bag without `metadata.yaml`, in the order of their numbers.
 pub(crate) fn splits_in(folder: &Path) -> Result<Vec<Split>, BagError> {
-    let mut files: Vec<PathBuf> = Vec::new();
-    for entry in fs::read_dir(folder).map_err(BagError::io(folder, "list"))? {
-        let path = entry.map_err(BagError::io(folder, "list"))?.path();
-        let name = path
-            .file_name()
-            .unwrap_or_default()
-            .to_string_lossy()
-            .into_owned();
-        let bare = name.strip_suffix(".zstd").unwrap_or(&name);
-        if bare.ends_with(".mcap") || bare.ends_with(".db3") {
-            files.push(path);
-        }
-        if files.len() > MAX_FILES {
-            return Err(BagError::Unsupported {
-                path: folder.to_path_buf(),
-                what: format!("a bag of more than {MAX_FILES} files"),
-                remedy: "open the files one by one",
-            });
-        }
-    }
+    let is_storage = |name: &str| {
+        let bare = name.strip_suffix(".zstd").unwrap_or(name);
+        bare.ends_with(".mcap") || bare.ends_with(".db3")
+    };
+    let mut files = list(folder)?;
+    files.retain(|(_, name)| is_storage(name));
     if files.is_empty() {
         return Err(BagError::Foreign {
             path: folder.to_path_buf(),
@@ -74,11 +60,29 @@ pub(crate) fn splits_in(folder: &Path) -> Result<Vec<Split>, BagError> {
             remedy: "give the folder that `ros2 bag record` made",
         });
     }
-    files.sort_by_key(|path| (path.as_os_str().len(), path.clone()));
+    files.sort_by_key(|(path, _)| (path.as_os_str().len(), path.clone()));
     files
         .into_iter()
-        .map(|file| Split::new(file, false))
+        .map(|(file, _)| Split::new(file, false))
         .collect()
+}
+
+/// What is in a folder, each with its name.
+pub(crate) fn list(folder: &Path) -> Result<Vec<(PathBuf, String)>, BagError> {
+    let mut found = Vec::new();
+    for entry in fs::read_dir(folder).map_err(BagError::io(folder, "list"))? {
+        let entry = entry.map_err(BagError::io(folder, "list"))?;
+        if found.len() >= MAX_FILES {
+            let what = format!("a folder of more than {MAX_FILES} files");
+            let remedy = "open the files one by one";
+            return Err(BagError::unsupported(folder, what, remedy));
+        }
+        found.push((
+            entry.path(),
+            entry.file_name().to_string_lossy().into_owned(),
+        ));
+    }
+    Ok(found)
 }
 
 /// Sorts by start; files of unknown time keep their place behind the one before.

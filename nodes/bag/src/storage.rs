@@ -20,7 +20,7 @@ pub(crate) struct StorageMessage {
     pub data: Vec<u8>,
 }
 
-/// Messages in order of log time; ends after the first error.
+/// Messages in order of log time; nothing behind the first error counts.
 pub(crate) type StorageStream = Box<dyn Iterator<Item = Result<StorageMessage, BagError>> + Send>;
 
 /// Selection of messages by topic and time.
@@ -49,6 +49,27 @@ impl Filter {
     pub(crate) fn overlaps(&self, (first_ns, last_ns): (i64, i64)) -> bool {
         last_ns >= self.start_ns && self.end_ns.is_none_or(|end_ns| first_ns < end_ns)
     }
+}
+
+/// Adds a topic to those known, or completes the same one; the result is its index.
+pub(crate) fn merge_topic(topics: &mut Vec<TopicInfo>, topic: &TopicInfo, counted: bool) -> usize {
+    let same = |known: &TopicInfo| known.is_same(&topic.name, &topic.type_name);
+    let found = topics.iter().position(same);
+    let Some((index, known)) = found.and_then(|index| Some((index, topics.get_mut(index)?))) else {
+        topics.push(topic.clone());
+        return topics.len() - 1;
+    };
+    if known.type_name.is_empty() {
+        known.type_name.clone_from(&topic.type_name);
+    }
+    if known.offered_qos.is_empty() {
+        known.offered_qos.clone_from(&topic.offered_qos);
+    }
+    known.definition = known.definition.take().or_else(|| topic.definition.clone());
+    if counted {
+        known.message_count = known.message_count.saturating_add(topic.message_count);
+    }
+    index
 }
 
 /// Offered profiles embedded in a storage file; unusable text counts as unknown.

@@ -29,19 +29,10 @@ fn read_and_write(bytes: &[u8]) {
     };
     assert!(map.keys().is_sorted_by(|a, b| a < b));
     for zstd_level in [None, Some(1)] {
-        let options = WriteOptions {
-            zstd_level,
-            occupancy_only: map.voxels().is_none(),
-        };
-        let write = |map: &MapContents| {
-            let mut file = Vec::new();
-            map.write(&mut file, &options).unwrap();
-            file
-        };
-        let file = write(&map);
+        let file = written(&map, zstd_level, map.voxels().is_none());
         let back = MapContents::read(&file[..], map.keys().len()).unwrap();
         assert_eq!(back, map);
-        assert_eq!(write(&back), file);
+        assert_eq!(written(&back, zstd_level, map.voxels().is_none()), file);
     }
     let cells = read_occupancy(bytes, usize::MAX).unwrap();
     cells.validate().unwrap();
@@ -52,6 +43,17 @@ fn read_and_write(bytes: &[u8]) {
         assert_eq!(MapContents::from_list(&list), map);
     }
     assert!(MapContents::read(&bytes[..bytes.len() - 1], most).is_err());
+}
+
+/// The map as a file.
+fn written(map: &MapContents, zstd_level: Option<i32>, occupancy_only: bool) -> Vec<u8> {
+    let options = WriteOptions {
+        zstd_level,
+        occupancy_only,
+    };
+    let mut file = Vec::new();
+    map.write(&mut file, &options).unwrap();
+    file
 }
 
 /// CRC-32 of zip, bit by bit.
@@ -236,16 +238,8 @@ fn detailed_maps() -> Vec<Vec<u8>> {
             let labels: Vec<u16> = (0..25).map(|i| i % 3 * 30_000).collect();
             list.insert_labelled(&cloud, &labels);
         }
-        for zstd_level in [None, Some(3)] {
-            let options = WriteOptions {
-                zstd_level,
-                occupancy_only: false,
-            };
-            let mut file = Vec::new();
-            let map = MapContents::from_list(&list);
-            map.write(&mut file, &options).unwrap();
-            files.push(file);
-        }
+        let map = MapContents::from_list(&list);
+        files.extend([None, Some(3)].map(|zstd_level| written(&map, zstd_level, false)));
     }
     files
 }
@@ -267,34 +261,23 @@ pub fn seeds() -> BTreeMap<&'static str, Vec<Vec<u8>>> {
         });
         let map = MapContents::from_list(&list);
         for (zstd_level, occupancy_only) in [(None, true), (None, false), (Some(3), false)] {
-            let options = WriteOptions {
-                zstd_level,
-                occupancy_only,
-            };
-            let mut file = Vec::new();
-            map.write(&mut file, &options).unwrap();
-            maps.push(file);
+            maps.push(written(&map, zstd_level, occupancy_only));
         }
         // Kind, volume, bound, repeats, six coordinates (one kind of each), form and points.
         let head = [number, 27, 0, number, 1, 0, 8, 2, 1, 2, 3, 4, 3, 1, 9, 9];
         let small: Vec<u8> = (0..90_u8).map(|i| i.wrapping_mul(37)).collect();
         clouds.push([&head[..], &[3, 3, 1], &small].concat());
         clouds.push([&[number, 20, 5, 250, 3, 3, 3, 3, 3, 3, 1][..], &small].concat());
-        let hostile = [
-            0.0,
-            -0.0,
+        let special = [
             f32::NAN,
             f32::INFINITY,
             f32::MIN,
             f32::MAX,
             f32::MIN_POSITIVE,
-            1e-45,
-            0.25,
-            1048575.5,
-            -3e7,
-            1.0,
         ];
-        let floats: Vec<u8> = hostile.iter().flat_map(|x| x.to_le_bytes()).collect();
+        let plain = [0.0, -0.0, 1e-45, 0.25, 1048575.5, -3e7, 1.0];
+        let floats = special.into_iter().chain(plain);
+        let floats: Vec<u8> = floats.flat_map(f32::to_le_bytes).collect();
         clouds.push([&[number, 30, 0, 0, 3, 3, 3, 3, 3, 3, 0][..], &floats].concat());
         let far = [&[0][..], &1e300_f64.to_le_bytes()].concat();
         clouds.push([&[number, 30, 0, 0, 3, 3, 3][..], &far, &[3, 3, 0], &floats].concat());

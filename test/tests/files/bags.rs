@@ -1,13 +1,11 @@
 //! rosbag2 directories against the independent `rosbags` package and on real data.
 
-use std::{
-    path::{Path, PathBuf},
-    process::Command,
-};
+use std::{path::Path, process::Command};
 
 use lattice_bag::{
     BagMessage, BagQos, BagReader, BagWriter, ReadOptions, Storage, TopicSpec, WriterOptions,
 };
+use lattice_test::data::shared;
 use lattice_test::python::{python, script};
 use serde_json::{Value, json};
 
@@ -34,12 +32,13 @@ fn hash(data: &[u8]) -> u64 {
     u64::try_from(hash).unwrap()
 }
 
+fn read(reader: &BagReader, options: &ReadOptions) -> Vec<BagMessage> {
+    let messages = reader.messages(options).unwrap();
+    messages.map(Result::unwrap).collect()
+}
+
 fn read_all(reader: &BagReader) -> Vec<BagMessage> {
-    reader
-        .messages(&ReadOptions::default())
-        .unwrap()
-        .map(Result::unwrap)
-        .collect()
+    read(reader, &ReadOptions::default())
 }
 
 /// The same description by our reader.
@@ -72,38 +71,28 @@ fn described(reader: &BagReader) -> Value {
 #[test]
 fn bags_of_rosbags_read_equal() {
     let folder = tempfile::tempdir().unwrap();
-    for storage in ["mcap", "sqlite3"] {
-        for version in ["8", "9"] {
-            for compression in ["none", "file", "message", "storage"] {
-                if (storage, compression) == ("sqlite3", "storage") {
-                    continue;
-                }
-                let bag = folder
-                    .path()
-                    .join(format!("{storage}_{version}_{compression}"));
-                let arguments = [
-                    "write",
-                    bag.to_str().unwrap(),
-                    storage,
-                    version,
-                    compression,
-                ];
-                let Some(peer) = run_peer(&arguments) else {
-                    return;
-                };
-                let reader = BagReader::open(&bag).unwrap();
-                assert_eq!(described(&reader), peer, "{}", bag.display());
+    let storages = [
+        ("mcap", &["none", "file", "message", "storage"][..]),
+        ("sqlite3", &["none", "file", "message"]),
+    ];
+    for (storage, compressions) in storages {
+        for (version, compression) in ["8", "9"]
+            .into_iter()
+            .flat_map(|version| compressions.iter().map(move |c| (version, *c)))
+        {
+            let name = format!("{storage}_{version}_{compression}");
+            let bag = folder.path().join(&name);
+            let path = bag.to_str().unwrap();
+            let Some(peer) = run_peer(&["write", path, storage, version, compression]) else {
+                return;
+            };
+            let reader = BagReader::open(&bag).unwrap();
+            assert_eq!(described(&reader), peer, "{name}");
 
-                // The same from the storage file alone, by its own marks of compression.
-                std::fs::remove_file(bag.join("metadata.yaml")).unwrap();
-                let reader = BagReader::open(&bag).unwrap();
-                assert_eq!(
-                    described(&reader)["messages"],
-                    peer["messages"],
-                    "{}",
-                    bag.display()
-                );
-            }
+            // The same from the storage file alone, by its own marks of compression.
+            std::fs::remove_file(bag.join("metadata.yaml")).unwrap();
+            let bare = described(&BagReader::open(&bag).unwrap());
+            assert_eq!(bare["messages"], peer["messages"], "{name}");
         }
     }
 }
@@ -125,6 +114,16 @@ fn our_bags_open_in_rosbags() {
 }
 
 fn write_bag(bag: &Path, storage: Storage) {
+    let mut writer = BagWriter::create(bag, storage, WriterOptions::default()).unwrap();
+    let mut add = |name: &str, offered_qos: Vec<BagQos>| {
+        let topic = TopicSpec {
+            name: name.into(),
+            type_name: "std_msgs/msg/String".into(),
+            definition: Some("string data\n".into()),
+            offered_qos,
+        };
+        writer.add_topic(topic).unwrap();
+    };
     let latched = BagQos {
         depth: 1,
         latched: true,
@@ -134,23 +133,9 @@ fn write_bag(bag: &Path, storage: Storage) {
         reliable: false,
         ..BagQos::default()
     };
-    let topics = [
-        ("/latched", vec![latched.clone(), latched]),
-        ("/sensor", vec![sensor]),
-        ("/silent", vec![]),
-    ];
-    let mut writer = BagWriter::create(bag, storage, WriterOptions::default()).unwrap();
-    for (name, offered_qos) in topics {
-        let (type_name, definition) = ("std_msgs/msg/String".into(), Some("string data\n".into()));
-        writer
-            .add_topic(TopicSpec {
-                name: name.into(),
-                type_name,
-                definition,
-                offered_qos,
-            })
-            .unwrap();
-    }
+    add("/latched", vec![latched.clone(), latched]);
+    add("/sensor", vec![sensor]);
+    add("/silent", vec![]);
     for i in 0..500_i64 {
         let content = (0..i * 7).map(|k| u8::try_from((k * k + i) % 256).unwrap());
         let data: Vec<u8> = [0, 1, 0, 0].into_iter().chain(content).collect();
@@ -162,18 +147,11 @@ fn write_bag(bag: &Path, storage: Storage) {
     writer.finish().unwrap();
 }
 
-fn kitti() -> Option<PathBuf> {
-    let data = Path::new(env!("CARGO_MANIFEST_DIR")).join("../../shared/data/kitti00");
-    if !data.is_dir() {
-        println!("skipped: {} is not there", data.display());
-        return None;
-    }
-    Some(data)
-}
-
 #[test]
 fn kitti_mcap_has_all_messages_and_sqlite3_the_first_three_scans() {
-    let Some(data) = kitti() else { return };
+    let Some(data) = shared("kitti00") else {
+        return;
+    };
     let mcap = BagReader::open(&data.join("bag_mcap")).unwrap();
     let sqlite = BagReader::open(&data.join("bag_sqlite3")).unwrap();
     assert_eq!(mcap.message_count(), 1182);
@@ -192,6 +170,22 @@ fn kitti_mcap_has_all_messages_and_sqlite3_the_first_three_scans() {
     };
     assert_eq!(points(&b, &sqlite), points(&a, &mcap)[..3]);
 
+    // Bare files, without the metadata.
+    let counts = |reader: &BagReader| -> Vec<(String, u64)> {
+        let topics = reader.topics().iter();
+        topics.map(|t| (t.name.clone(), t.message_count)).collect()
+    };
+    for (file, whole, all) in [
+        ("bag_mcap/bag_mcap.mcap", &mcap, &a),
+        ("bag_sqlite3/bag_sqlite3.db3", &sqlite, &b),
+    ] {
+        let bare = BagReader::open(&data.join(file)).unwrap();
+        assert_eq!(&read_all(&bare), all);
+        assert_eq!(counts(&bare), counts(whole));
+        let mut topics = bare.topics().iter();
+        assert!(topics.all(|t| t.definition.is_some() && !t.offered_qos.is_empty()));
+    }
+
     // A time window of one topic, against the whole.
     let (start_ns, end_ns) = (a[300].log_time_ns, a[900].log_time_ns);
     let options = ReadOptions {
@@ -200,11 +194,7 @@ fn kitti_mcap_has_all_messages_and_sqlite3_the_first_three_scans() {
         end_ns: Some(end_ns),
     };
     for (reader, all) in [(&mcap, &a), (&sqlite, &b)] {
-        let some: Vec<BagMessage> = reader
-            .messages(&options)
-            .unwrap()
-            .map(Result::unwrap)
-            .collect();
+        let some = read(reader, &options);
         let wanted = |m: &&BagMessage| {
             reader.topics()[m.topic].name == "/ins/imu"
                 && (start_ns..end_ns).contains(&m.log_time_ns)
@@ -212,30 +202,5 @@ fn kitti_mcap_has_all_messages_and_sqlite3_the_first_three_scans() {
         let expected: Vec<BagMessage> = all.iter().filter(wanted).cloned().collect();
         assert!(expected.len() > 100);
         assert_eq!(some, expected);
-    }
-}
-
-#[test]
-fn kitti_opens_without_metadata_and_as_bare_files() {
-    let Some(data) = kitti() else { return };
-    for (bag, file) in [
-        ("bag_mcap", "bag_mcap.mcap"),
-        ("bag_sqlite3", "bag_sqlite3.db3"),
-    ] {
-        let whole = BagReader::open(&data.join(bag)).unwrap();
-        let bare = BagReader::open(&data.join(bag).join(file)).unwrap();
-        assert_eq!(read_all(&whole).len(), read_all(&bare).len());
-        let counts = |r: &BagReader| -> Vec<(String, u64)> {
-            r.topics()
-                .iter()
-                .map(|t| (t.name.clone(), t.message_count))
-                .collect()
-        };
-        assert_eq!(counts(&whole), counts(&bare));
-        assert!(
-            bare.topics()
-                .iter()
-                .all(|t| t.definition.is_some() && !t.offered_qos.is_empty())
-        );
     }
 }

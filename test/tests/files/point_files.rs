@@ -1,30 +1,19 @@
 //! Point files that others wrote, and maps of them. Skipped where the files are absent.
 
-use std::path::{Path, PathBuf};
-
 use lattice_core::cloud::Cloud;
 use lattice_core::lattice::{Lattice, LatticeKind};
 use lattice_core::voxels::VoxelList;
 use lattice_lab::render::{RenderOptions, render_png};
 use lattice_nodes::files::export::{write_centers_ply, write_mesh_ply};
 use lattice_nodes::files::points::{PointFile, PointFileLimits, PointFormat, read_points};
+use lattice_test::data::shared;
 use nalgebra::Vector3;
-
-fn data(name: &str) -> Option<PathBuf> {
-    let root = Path::new(env!("CARGO_MANIFEST_DIR")).join("../../shared/data");
-    let path = root.join(name);
-    let present = path.exists();
-    if !present {
-        eprintln!("skipped: {} is absent", path.display());
-    }
-    present.then_some(path)
-}
 
 fn read(name: &str) -> Option<PointFile> {
     let limits = PointFileLimits {
         max_points: 200_000,
     };
-    data(name).map(|path| read_points(&path, &limits).unwrap())
+    shared(name).map(|path| read_points(&path, &limits).unwrap())
 }
 
 /// Lowest and highest of each coordinate, to the millimetre.

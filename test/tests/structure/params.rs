@@ -16,67 +16,41 @@ fn params(file: &str, node: &str) -> Params {
     Params::load(&RosArgs::parse(arguments).unwrap(), node).unwrap()
 }
 
-#[test]
-fn parameter_files_name_only_what_nodes_read() {
-    for namespace in ["", "/robot"] {
-        let params = params("bobcat.yaml", &format!("{namespace}/enu_transformer"));
-        TransformerOptions::from_params(&params).unwrap();
-        let shell = [
-            "inbox_events",
-            "ins.imu_topic",
-            "ins.topic",
-            "points_topics",
-            "report_file",
-            "threads",
-        ];
-        assert_eq!(params.unused(), shell);
-        let params = self::params("bobcat.yaml", &format!("{namespace}/lattice_mapper"));
-        MapperOptions::from_params(&params).unwrap();
-        let shell = [
-            "centers_period_s",
-            "free_period_s",
-            "inbox_bytes",
-            "inbox_events",
-            "report_file",
-            "threads",
-            "update_period_s",
-        ];
-        assert_eq!(params.unused(), shell);
-        let params = self::params(
-            "bobcat.yaml",
-            &format!("{namespace}/voxel_marker_publisher"),
-        );
-        MarkerOptions::from_params(&params).unwrap();
-        let shell = [
-            "inbox_bytes",
-            "inbox_events",
-            "mapper",
-            "max_bytes_per_s",
-            "rate_hz",
-            "report_file",
-            "threads",
-        ];
-        assert_eq!(params.unused(), shell);
-    }
+/// A node of the loader, what reads its options, and the parameters that its shell reads.
+const NODES: [(&str, fn(&Params), &str); 3] = [
+    (
+        "enu_transformer",
+        |params| drop(TransformerOptions::from_params(params).unwrap()),
+        "inbox_events ins.imu_topic ins.topic points_topics report_file threads",
+    ),
+    (
+        "lattice_mapper",
+        |params| drop(MapperOptions::from_params(params).unwrap()),
+        "centers_period_s free_period_s inbox_bytes inbox_events report_file threads \
+         update_period_s",
+    ),
+    (
+        "voxel_marker_publisher",
+        |params| drop(MarkerOptions::from_params(params).unwrap()),
+        "inbox_bytes inbox_events mapper max_bytes_per_s rate_hz report_file threads",
+    ),
+];
+
+fn missing(params: &Params) -> Vec<String> {
+    let declared = params.declared().into_keys();
+    declared.filter(|name| !params.is_given(name)).collect()
 }
 
 #[test]
-fn every_parameter_is_in_the_file_for_the_simulated_loader() {
-    let declared = |params: &Params| {
-        let names = params.declared().into_keys();
-        names
-            .filter(|name| !params.is_given(name))
-            .collect::<Vec<_>>()
-    };
-    let params = params("bobcat.yaml", "/enu_transformer");
-    TransformerOptions::from_params(&params).unwrap();
-    assert_eq!(declared(&params), Vec::<String>::new());
-    let params = self::params("bobcat.yaml", "/lattice_mapper");
-    MapperOptions::from_params(&params).unwrap();
-    assert_eq!(declared(&params), Vec::<String>::new());
-    let params = self::params("bobcat.yaml", "/voxel_marker_publisher");
-    MarkerOptions::from_params(&params).unwrap();
-    assert_eq!(declared(&params), Vec::<String>::new());
+fn the_file_for_the_simulated_loader_has_every_parameter_and_no_other() {
+    for (node, read, shell) in NODES {
+        for namespace in ["", "/robot"] {
+            let params = params("bobcat.yaml", &format!("{namespace}/{node}"));
+            read(&params);
+            assert_eq!(params.unused().join(" "), shell);
+            assert_eq!(missing(&params), Vec::<String>::new());
+        }
+    }
 }
 
 #[test]
@@ -95,9 +69,7 @@ fn the_file_for_a_headset_has_every_parameter_and_its_default() {
         "threads",
     ];
     assert_eq!(params.unused(), shell);
-    let declared = params.declared().into_keys();
-    let missing: Vec<_> = declared.filter(|name| !params.is_given(name)).collect();
-    assert_eq!(missing, Vec::<String>::new());
+    assert_eq!(missing(&params), Vec::<String>::new());
     let params = self::params("semantic_icp.yaml", "/lattice_mapper");
     let options = MapperOptions::from_params(&params).unwrap();
     assert!(options.labels.is_some() && params.unused().is_empty());

@@ -1,12 +1,15 @@
 //! Index of an MCAP file: schemas, channels, stretches of messages and counts.
 
-use std::{collections::BTreeMap, path::Path};
+use std::{
+    collections::{BTreeMap, BTreeSet},
+    path::Path,
+};
 
 use mcap::records::{Channel, Record};
 
 use crate::{
     BagError, TopicInfo,
-    storage::{StorageInfo, full_type_name, lenient_qos},
+    storage::{StorageInfo, full_type_name, lenient_qos, merge_topic},
 };
 
 /// A stretch of the file that is read as one: a chunk, or messages outside of chunks.
@@ -112,13 +115,8 @@ impl Contents {
     ) -> Result<(StorageInfo, BTreeMap<u16, usize>), BagError> {
         let is_cdr = |channel: &Channel| channel.message_encoding == "cdr";
         if !self.channels.is_empty() && !self.channels.values().any(is_cdr) {
-            let mut encodings: Vec<_> = self
-                .channels
-                .values()
-                .map(|c| c.message_encoding.as_str())
-                .collect();
-            encodings.sort_unstable();
-            encodings.dedup();
+            let encodings = self.channels.values().map(|c| c.message_encoding.as_str());
+            let encodings = Vec::from_iter(encodings.collect::<BTreeSet<_>>());
             return Err(BagError::Foreign {
                 path: path.to_path_buf(),
                 found: format!(
@@ -135,21 +133,8 @@ impl Contents {
         };
         let mut topic_of = BTreeMap::new();
         for (id, channel) in &self.channels {
-            let topic = self.topic(*id, channel);
-            let same = |t: &TopicInfo| t.is_same(&topic.name, &topic.type_name);
-            match info.topics.iter().position(same) {
-                Some(index) => {
-                    if let Some(known) = info.topics.get_mut(index) {
-                        known.message_count =
-                            known.message_count.saturating_add(topic.message_count);
-                    }
-                    topic_of.insert(*id, index);
-                }
-                None => {
-                    topic_of.insert(*id, info.topics.len());
-                    info.topics.push(topic);
-                }
-            }
+            let index = merge_topic(&mut info.topics, &self.topic(*id, channel), true);
+            topic_of.insert(*id, index);
         }
         Ok((info, topic_of))
     }

@@ -22,6 +22,8 @@ pub(super) const RECORD_HEADER_BYTES: u64 = 9;
 const MAX_RECORD_BYTES: usize = 2 << 30;
 /// Longest record in a chunk, bytes: a message with its 22-byte header.
 const MAX_CHUNK_RECORD_BYTES: u64 = MAX_MESSAGE_BYTES + 22;
+/// Bytes that one of a compressed chunk can become at most: zstd repeats a byte 128 KiB long in 4.
+const MAX_CHUNK_RATIO: u64 = 1 << 15;
 /// A chunk's record without the name of its compression and its content, bytes.
 const CHUNK_HEADER_BYTES: usize = 40;
 /// Bytes asked of a file at once; memory grows by what is there, not by what a record claims.
@@ -159,8 +161,10 @@ pub(super) fn visit_chunk(
     let body = body.get(..unpadded).unwrap_or(body);
     let len = (body.len() as u64).to_le_bytes();
     let framed = (&[op::CHUNK][..]).chain(&len[..]).chain(body);
-    let limit = header
-        .uncompressed_size
+    // The claimed size bounds nothing, but the bytes that are there do.
+    let limit = (body.len() as u64)
+        .saturating_mul(MAX_CHUNK_RATIO)
+        .min(header.uncompressed_size)
         .clamp(READ_BYTES as u64, MAX_CHUNK_RECORD_BYTES);
     let options = LinearReaderOptions::default()
         .with_skip_end_magic(true)

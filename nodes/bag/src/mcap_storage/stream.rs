@@ -39,7 +39,6 @@ pub(super) struct McapStream {
     waiting: BinaryHeap<Reverse<Waiting>>,
     waiting_bytes: u64,
     damage: Option<BagError>,
-    ended: bool,
 }
 
 /// A message that was read; sorts by time, then by place in the file.
@@ -78,7 +77,6 @@ impl McapStream {
             waiting: BinaryHeap::new(),
             waiting_bytes: 0,
             damage: file.info.damage.clone(),
-            ended: false,
         })
     }
 
@@ -173,9 +171,6 @@ impl Iterator for McapStream {
     type Item = Result<StorageMessage, BagError>;
 
     fn next(&mut self) -> Option<Self::Item> {
-        if self.ended {
-            return None;
-        }
         while self.needs_block() {
             let block = self.blocks.pop_front()?;
             if let Err(error) = self.read_block(&block) {
@@ -198,7 +193,6 @@ impl Iterator for McapStream {
                 data,
             }));
         }
-        self.ended = true;
         self.damage.take().map(Err)
     }
 }

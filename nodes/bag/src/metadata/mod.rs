@@ -18,7 +18,7 @@ pub(crate) const METADATA_VERSION: u32 = 9;
 /// Larger metadata files are refused, bytes.
 const MAX_METADATA_BYTES: u64 = 16 << 20;
 /// Start of an empty bag, ns.
-const EMPTY_START_NS: i64 = i64::MAX;
+pub(crate) const EMPTY_START_NS: i64 = i64::MAX;
 
 /// Compression of storage files or messages outside the storage's own means.
 #[derive(Clone, Copy, PartialEq, Eq, Debug, Default)]
@@ -188,21 +188,21 @@ impl Metadata {
             "file" => CompressionMode::File,
             "message" => CompressionMode::Message,
             _ => {
-                return Err(BagError::Unsupported {
-                    path: path.to_path_buf(),
-                    what: format!("compression mode {:?}", self.compression_mode),
-                    remedy: "none, file and message are known; convert with `ros2 bag convert`",
-                });
+                return Err(BagError::unsupported(
+                    path,
+                    format!("compression mode {:?}", self.compression_mode),
+                    "none, file and message are known; convert with `ros2 bag convert`",
+                ));
             }
         };
         if self.compression_format.eq_ignore_ascii_case("zstd") {
             return Ok(mode);
         }
-        Err(BagError::Unsupported {
-            path: path.to_path_buf(),
-            what: format!("compression format {:?}", self.compression_format),
-            remedy: "zstd is known; decompress the files, or convert with `ros2 bag convert`",
-        })
+        Err(BagError::unsupported(
+            path,
+            format!("compression format {:?}", self.compression_format),
+            "zstd is known; decompress the files, or convert with `ros2 bag convert`",
+        ))
     }
 
     /// The storage files below `bag`, each with its name in the metadata. Leaving `bag` is refused.

@@ -2,8 +2,8 @@
 
 use std::collections::VecDeque;
 
-use super::PlayedTopic;
-use crate::{BagError, BagMessage, BagQos, BagReader, ReadOptions};
+use super::{PlayedTopic, wanted};
+use crate::{BagError, BagMessage, BagQos, BagReader, storage::Filter};
 
 /// Messages kept of one topic.
 const MAX_PER_TOPIC: u64 = 1000;
@@ -41,19 +41,14 @@ pub(super) fn latched_before(
     {
         return Ok(VecDeque::new());
     }
-    let options = ReadOptions {
-        topics: Some(
-            latched
-                .iter()
-                .map(|topic| topic.info.name.clone())
-                .collect(),
-        ),
-        start_ns: None,
+    let filter = Filter {
+        topics: wanted(reader, latched.iter().copied()),
+        start_ns: i64::MIN,
         end_ns: Some(before_ns),
     };
     let mut kept_messages: VecDeque<BagMessage> = VecDeque::new();
     let mut bytes = 0_usize;
-    for message in reader.messages(&options)? {
+    for message in reader.filtered(filter) {
         let message = message?;
         let Some(topic) = latched
             .iter()

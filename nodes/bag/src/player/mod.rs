@@ -11,7 +11,7 @@ mod timeline;
 
 use std::collections::VecDeque;
 
-use super::{BagError, BagMessage, BagReader, Messages, ReadOptions};
+use super::{BagError, BagMessage, BagReader, Messages, storage::Filter};
 use latched::latched_before;
 use options::ns_from_s;
 pub use options::{PlayedTopic, PlayerOptions};
@@ -72,13 +72,11 @@ impl Player {
         let start_ns = first_ns.saturating_add(ns_from_s(options.start_offset_s));
         if let Some(last_ns) = reader.end_ns().filter(|last_ns| start_ns > *last_ns) {
             let length_s = last_ns.saturating_sub(first_ns) as f64 / 1e9;
-            return Err(BagError::Invalid {
-                name: "start_offset_s",
-                reason: format!(
-                    "{} s is beyond the end of the bag, which takes {length_s} s",
-                    options.start_offset_s
-                ),
-            });
+            let reason = format!(
+                "{} s is beyond the end of the bag, which takes {length_s} s",
+                options.start_offset_s
+            );
+            return Err(BagError::invalid("start_offset_s", reason));
         }
         let mut player = Player {
             topics,
@@ -163,31 +161,17 @@ impl Player {
         self.last_ns = None;
         self.pass_start_ns = from_ns;
         self.latched = latched_before(&self.reader, &self.topics, from_ns)?;
-        let options = ReadOptions {
-            topics: Some(
-                self.topics
-                    .iter()
-                    .map(|topic| topic.info.name.clone())
-                    .collect(),
-            ),
-            start_ns: Some(from_ns),
+        self.messages = Some(self.reader.filtered(Filter {
+            topics: wanted(&self.reader, &self.topics),
+            start_ns: from_ns,
             end_ns: self.end_ns,
-        };
-        self.messages = Some(self.reader.messages(&options)?);
+        }));
         self.read_head();
         Ok(())
     }
 
     fn read_head(&mut self) {
-        // A name may belong to several topics of the bag, of which not all are played.
-        let topics = &self.topics;
-        let is_played = |m: &BagMessage| topics.iter().any(|t| t.bag_topic == m.topic);
-        let next = self
-            .messages
-            .iter_mut()
-            .flatten()
-            .find(|m| m.as_ref().map_or(true, is_played));
-        match next.transpose() {
+        match self.messages.iter_mut().flatten().next().transpose() {
             Ok(head) => self.head = head,
             Err(error) => (self.head, self.failed) = (None, Some(error)),
         }
@@ -231,4 +215,15 @@ impl Player {
         self.start_pass(self.start_ns)?;
         Ok(Step::Looped)
     }
+}
+
+/// The played topics, by index of the reader's.
+fn wanted<'a>(reader: &BagReader, played: impl IntoIterator<Item = &'a PlayedTopic>) -> Vec<bool> {
+    let mut wanted = vec![false; reader.topics().len()];
+    for topic in played {
+        if let Some(wanted) = wanted.get_mut(topic.bag_topic) {
+            *wanted = true;
+        }
+    }
+    wanted
 }

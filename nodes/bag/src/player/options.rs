@@ -52,44 +52,32 @@ pub struct PlayedTopic {
 impl PlayerOptions {
     pub(super) fn check(&self) -> Result<(), BagError> {
         if !RATES.contains(&self.rate) {
-            return Err(BagError::Invalid {
-                name: "rate",
-                reason: format!("{}; 0.001 to 1000 is accepted", self.rate),
-            });
+            let reason = format!("{}; 0.001 to 1000 is accepted", self.rate);
+            return Err(BagError::invalid("rate", reason));
         }
         let seconds = |name, value: f64| match value.is_finite() && (0.0..=1e9).contains(&value) {
             true => Ok(()),
-            false => Err(BagError::Invalid {
-                name,
-                reason: format!("{value} s; 0 to 1e9 s are accepted"),
-            }),
+            false => {
+                let reason = format!("{value} s; 0 to 1e9 s are accepted");
+                Err(BagError::invalid(name, reason))
+            }
         };
         seconds("start_offset_s", self.start_offset_s)?;
         self.duration_s
             .map_or(Ok(()), |duration_s| seconds("duration_s", duration_s))?;
         match self.clock_hz {
-            Some(hz) if !(hz > 0.0 && hz <= MAX_CLOCK_HZ) => Err(BagError::Invalid {
-                name: "clock_hz",
-                reason: format!("{hz} Hz; more than 0 and at most {MAX_CLOCK_HZ} Hz are accepted"),
-            }),
+            Some(hz) if !(hz > 0.0 && hz <= MAX_CLOCK_HZ) => Err(BagError::invalid(
+                "clock_hz",
+                format!("{hz} Hz; more than 0 and at most {MAX_CLOCK_HZ} Hz are accepted"),
+            )),
             _ => Ok(()),
         }
     }
 
     /// The topics to play; those that are not in CDR of a known type are left out.
     pub(super) fn topics(&self, reader: &BagReader) -> Result<Vec<PlayedTopic>, BagError> {
-        let mut named = self.include.iter().flatten().chain(&self.exclude);
-        if let Some(unknown) = named.find(|name| !reader.topics().iter().any(|t| t.name == **name))
-        {
-            let known: Vec<&str> = reader.topics().iter().map(|t| t.name.as_str()).collect();
-            return Err(BagError::Invalid {
-                name: "topics",
-                reason: format!(
-                    "{unknown} is not in the bag, which has {}",
-                    known.join(", ")
-                ),
-            });
-        }
+        reader.expect_topics(self.include.as_deref().unwrap_or_default())?;
+        reader.expect_topics(&self.exclude)?;
         let mut played = Vec::new();
         for (bag_topic, info) in reader.topics().iter().enumerate() {
             let is_included = self

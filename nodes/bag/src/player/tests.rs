@@ -52,63 +52,57 @@ fn play(player: &mut Player, count: usize) -> Vec<String> {
     steps
 }
 
+/// Steps of a bag of these messages, up to `count`.
+fn played(messages: &[(&str, i64)], options: PlayerOptions, count: usize) -> Vec<String> {
+    let folder = tempfile::tempdir().unwrap();
+    let mut player = Player::new(bag(folder.path(), messages), options).unwrap();
+    let steps = play(&mut player, count);
+    if steps.last().is_some_and(|step| step == "end") {
+        assert_eq!(player.next().unwrap(), Step::End);
+    }
+    steps
+}
+
 fn options() -> PlayerOptions {
     PlayerOptions::default()
 }
 
 #[test]
 fn messages_are_due_at_the_rate() {
-    let folder = tempfile::tempdir().unwrap();
-    let reader = bag(folder.path(), &[("/a", 0), ("/b", 1), ("/a", 4)]);
-    let mut player = Player::new(
-        reader,
-        PlayerOptions {
-            rate: 2.0,
-            ..options()
-        },
-    )
-    .unwrap();
-    assert_eq!(player.due_ns(), 0);
-    assert_eq!(play(&mut player, 9), ["/a 0", "/b 0.5", "/a 2", "end"]);
-    assert_eq!(player.next().unwrap(), Step::End);
+    let twice = PlayerOptions {
+        rate: 2.0,
+        ..options()
+    };
+    let steps = played(&[("/a", 0), ("/b", 1), ("/a", 4)], twice, 9);
+    assert_eq!(steps, ["/a 0", "/b 0.5", "/a 2", "end"]);
 }
 
 #[test]
 fn latched_messages_before_the_start_come_first() {
-    let folder = tempfile::tempdir().unwrap();
-    let reader = bag(
-        folder.path(),
-        &[
-            ("/l!", 0),
-            ("/m!", 0),
-            ("/a", 1),
-            ("/l!", 2),
-            ("/a", 3),
-            ("/a", 5),
-            ("/l!", 6),
-        ],
-    );
-    let mut player = Player::new(
-        reader.clone(),
-        PlayerOptions {
-            start_offset_s: 3.0,
-            ..options()
-        },
-    )
-    .unwrap();
+    let messages = [
+        ("/l!", 0),
+        ("/m!", 0),
+        ("/a", 1),
+        ("/l!", 2),
+        ("/a", 3),
+        ("/a", 5),
+        ("/l!", 6),
+    ];
+    let late = PlayerOptions {
+        start_offset_s: 3.0,
+        ..options()
+    };
     // Of /l only the last one before the start: its publisher kept one.
     assert_eq!(
-        play(&mut player, 9),
+        played(&messages, late.clone(), 9),
         ["/m 0", "/l 0", "/a 0", "/a 2", "/l 3", "end"]
     );
     let only = PlayerOptions {
-        start_offset_s: 3.0,
         exclude: vec!["/m".into()],
         duration_s: Some(2.0),
-        ..options()
+        ..late
     };
-    let mut player = Player::new(reader, only).unwrap();
-    assert_eq!(play(&mut player, 9), ["/l 0", "/a 0", "end"]);
+    assert_eq!(played(&messages, only, 9), ["/l 0", "/a 0", "end"]);
 }
 
 #[test]
@@ -120,12 +114,10 @@ fn all_publishers_of_a_latched_topic_are_heard() {
     latched.offered_qos.extend(latched.offered_qos.clone());
     writer.add_topic(latched).unwrap();
     writer.add_topic(spec("/a", false)).unwrap();
-    for second in 0..4 {
-        writer
-            .write(0, T0_NS + second * S, &cdr(second, 2))
-            .unwrap();
+    for (topic, second) in [(0, 0), (0, 1), (0, 2), (0, 3), (1, 9)] {
+        let data = cdr(second, 2);
+        writer.write(topic, T0_NS + second * S, &data).unwrap();
     }
-    writer.write(1, T0_NS + 9 * S, &cdr(9, 2)).unwrap();
     writer.finish().unwrap();
     let options = PlayerOptions {
         start_offset_s: 8.0,
@@ -141,68 +133,33 @@ fn all_publishers_of_a_latched_topic_are_heard() {
 
 #[test]
 fn loops_go_on_in_playback_time() {
-    let folder = tempfile::tempdir().unwrap();
-    let reader = bag(folder.path(), &[("/a", 0), ("/a", 2)]);
-    let mut player = Player::new(
-        reader,
-        PlayerOptions {
+    let looped = |messages: &[(&str, i64)], count| {
+        let options = PlayerOptions {
             loop_: true,
             ..options()
-        },
-    )
-    .unwrap();
+        };
+        played(messages, options, count)
+    };
     assert_eq!(
-        play(&mut player, 7),
+        looped(&[("/a", 0), ("/a", 2)], 7),
         ["/a 0", "/a 2", "looped", "/a 2", "/a 4", "looped", "/a 4"]
     );
-    // A single message does not spin.
-    let reader = bag(folder.path(), &[("/a", 0)]);
-    let mut player = Player::new(
-        reader,
-        PlayerOptions {
-            loop_: true,
-            ..options()
-        },
-    )
-    .unwrap();
-    assert_eq!(play(&mut player, 4), ["/a 0", "looped", "/a 0.1", "looped"]);
-    // Nothing at all does not loop.
-    let reader = bag(folder.path(), &[]);
-    let mut player = Player::new(
-        reader,
-        PlayerOptions {
-            loop_: true,
-            ..options()
-        },
-    )
-    .unwrap();
-    assert_eq!(play(&mut player, 4), ["end"]);
+    // A single message does not spin, and nothing at all does not loop.
+    let single = ["/a 0", "looped", "/a 0.1", "looped"];
+    assert_eq!(looped(&[("/a", 0)], 4), single);
+    assert_eq!(looped(&[], 4), ["end"]);
 }
 
 #[test]
 fn the_clock_ticks_between_messages() {
-    let folder = tempfile::tempdir().unwrap();
-    let reader = bag(folder.path(), &[("/a", 0), ("/a", 2)]);
-    let mut player = Player::new(
-        reader,
-        PlayerOptions {
-            clock_hz: Some(1.0),
-            rate: 0.5,
-            ..options()
-        },
-    )
-    .unwrap();
-    let expected = [
-        "clock 0",
-        "/a 0",
-        "clock 0.5",
-        "clock 1",
-        "clock 1.5",
-        "clock 2",
-        "/a 4",
-        "end",
-    ];
-    assert_eq!(play(&mut player, 20), expected);
+    let slow = PlayerOptions {
+        clock_hz: Some(1.0),
+        rate: 0.5,
+        ..options()
+    };
+    let steps = played(&[("/a", 0), ("/a", 2)], slow, 20).join(", ");
+    let expected = "clock 0, /a 0, clock 0.5, clock 1, clock 1.5, clock 2, /a 4, end";
+    assert_eq!(steps, expected);
 }
 
 #[test]
@@ -216,44 +173,22 @@ fn topics_are_chosen_and_wrong_options_refused() {
     };
     let mut player = Player::new(reader.clone(), chosen).unwrap();
     assert_eq!(play(&mut player, 9), ["/a 0", "end"]);
-    for wrong in [
-        PlayerOptions {
-            include: Some(vec!["/x".into()]),
-            ..options()
-        },
-        PlayerOptions {
-            exclude: vec!["/x".into()],
-            ..options()
-        },
-        PlayerOptions {
-            rate: 0.0,
-            ..options()
-        },
-        PlayerOptions {
-            rate: f64::NAN,
-            ..options()
-        },
-        PlayerOptions {
-            start_offset_s: 3.0,
-            ..options()
-        },
-        PlayerOptions {
-            start_offset_s: -1.0,
-            ..options()
-        },
-        PlayerOptions {
-            duration_s: Some(f64::INFINITY),
-            ..options()
-        },
-        PlayerOptions {
-            clock_hz: Some(0.0),
-            ..options()
-        },
-    ] {
-        assert!(matches!(
-            Player::new(reader.clone(), wrong),
-            Err(BagError::Invalid { .. })
-        ));
+    let wrong: [fn(&mut PlayerOptions); 8] = [
+        |o| o.include = Some(vec!["/x".into()]),
+        |o| o.exclude = vec!["/x".into()],
+        |o| o.rate = 0.0,
+        |o| o.rate = f64::NAN,
+        |o| o.start_offset_s = 3.0,
+        |o| o.start_offset_s = -1.0,
+        |o| o.duration_s = Some(f64::INFINITY),
+        |o| o.clock_hz = Some(0.0),
+    ];
+    for (number, set) in wrong.iter().enumerate() {
+        let mut options = options();
+        set(&mut options);
+        let refused = Player::new(reader.clone(), options);
+        let is_refused = matches!(refused, Err(BagError::Invalid { .. }));
+        assert!(is_refused, "{number}");
     }
 }
 

@@ -51,14 +51,6 @@ mod tests {
     use super::*;
 
     #[test]
-    fn the_rate_is_the_slope_and_an_anchor_moves_the_line() {
-        let mut line = Timeline::new(1_000, 2.0);
-        assert_eq!((line.playback_at(1_200), line.bag_at(100)), (100, 1_200));
-        line.anchor(100, 1_000);
-        assert_eq!((line.playback_at(1_200), line.bag_at(100)), (200, 1_000));
-    }
-
-    #[test]
     fn nanoseconds_since_1970_stay_exact_at_rate_1() {
         let line = Timeline::new(1_299_999_999_950_000_128, 1.0);
         assert_eq!(line.playback_at(1_300_000_000_000_000_129), 50_000_001);

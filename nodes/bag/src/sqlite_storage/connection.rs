@@ -1,7 +1,6 @@
 //! Connections to SQLite files that write nothing beside them, and a check of the file's size.
 
 use std::{
-    fmt::Write,
     fs::File,
     io::Read,
     path::{Path, PathBuf},
@@ -34,18 +33,14 @@ pub(super) fn connect(path: &Path) -> Result<Connection, BagError> {
         BagError::corrupt(path, "its start", e, remedy)
     };
     let connection = Connection::open_with_flags(uri, flags).map_err(wrong)?;
-    connection
-        .set_db_config(DbConfig::SQLITE_DBCONFIG_DEFENSIVE, true)
-        .map_err(wrong)?;
-    connection
-        .set_db_config(DbConfig::SQLITE_DBCONFIG_TRUSTED_SCHEMA, false)
-        .map_err(wrong)?;
-    connection
-        .set_db_config(DbConfig::SQLITE_DBCONFIG_ENABLE_TRIGGER, false)
-        .map_err(wrong)?;
-    connection
-        .set_db_config(DbConfig::SQLITE_DBCONFIG_ENABLE_VIEW, false)
-        .map_err(wrong)?;
+    for (setting, on) in [
+        (DbConfig::SQLITE_DBCONFIG_DEFENSIVE, true),
+        (DbConfig::SQLITE_DBCONFIG_TRUSTED_SCHEMA, false),
+        (DbConfig::SQLITE_DBCONFIG_ENABLE_TRIGGER, false),
+        (DbConfig::SQLITE_DBCONFIG_ENABLE_VIEW, false),
+    ] {
+        connection.set_db_config(setting, on).map_err(wrong)?;
+    }
     connection
         .execute_batch("PRAGMA cell_size_check = ON; PRAGMA mmap_size = 0;")
         .map_err(wrong)?;
@@ -60,17 +55,15 @@ fn wal_path(path: &Path) -> PathBuf {
 }
 
 fn percent_encode(path: &Path) -> String {
-    let mut encoded = String::new();
-    for byte in path.as_os_str().as_encoded_bytes() {
-        match byte {
-            b'a'..=b'z' | b'A'..=b'Z' | b'0'..=b'9' | b'/' | b'.' | b'-' | b'_' | b'~' => {
-                encoded.push(char::from(*byte));
-            }
-            // Writing to a string cannot fail.
-            _ => drop(write!(encoded, "%{byte:02X}")),
-        }
-    }
-    encoded
+    let encoded = |byte: &u8| match byte {
+        b'a'..=b'z' | b'A'..=b'Z' | b'0'..=b'9' | b'/' | b'.' => char::from(*byte).to_string(),
+        _ => format!("%{byte:02X}"),
+    };
+    path.as_os_str()
+        .as_encoded_bytes()
+        .iter()
+        .map(encoded)
+        .collect()
 }
 
 /// Compares the size in the database header with the file's (https://www.sqlite.org/fileformat.html, 1.3).
@@ -98,11 +91,9 @@ pub(super) fn missing_pages(path: &Path) -> Result<Option<BagError>, BagError> {
             .and_then(|b| b.try_into().ok())
             .map_or(0, u32::from_be_bytes)
     };
-    let page_bytes = match header {
-        [_, _, _, _, _, _, _, _, _, _, _, _, _, _, _, _, 0, 1, ..] => 65_536,
-        [_, _, _, _, _, _, _, _, _, _, _, _, _, _, _, _, a, b, ..] => {
-            u64::from(u16::from_be_bytes([a, b]))
-        }
+    let page_bytes = match word(16) >> 16 {
+        1 => 65_536,
+        bytes => u64::from(bytes),
     };
     // The count holds only where the version it is valid for equals the change counter.
     let pages = if word(24) == word(92) {

@@ -53,8 +53,8 @@ impl SqliteFile {
         file.read_topics(&connection).map_err(cut)?;
         match (missing_pages.clone(), file.read_range(&connection)) {
             (None, Ok(())) => {}
-            (None, Err(error)) => file.rescue(&connection, error)?,
-            (Some(damage), _) => file.rescue(&connection, damage)?,
+            (None, Err(error)) => file.rescue(&connection, error),
+            (Some(damage), _) => file.rescue(&connection, damage),
         }
         Ok(file)
     }
@@ -94,30 +94,24 @@ impl SqliteFile {
         let mut statement = connection.prepare(&select).map_err(wrong)?;
         let rows = statement.query_map([], |row| {
             let text = |i: usize| {
-                row.get::<_, Option<String>>(i)
-                    .map(Option::unwrap_or_default)
+                let text = row.get::<_, Option<String>>(i);
+                text.map(Option::unwrap_or_default)
             };
-            Ok((
-                row.get::<_, i64>(0)?,
-                text(1)?,
-                text(2)?,
-                text(3)?,
-                text(4)?,
-            ))
+            let topic = TopicInfo {
+                name: text(1)?,
+                type_name: full_type_name(&text(2)?),
+                serialization_format: text(3)?,
+                ..TopicInfo::default()
+            };
+            Ok((row.get::<_, i64>(0)?, topic, text(4)?))
         });
         let mut topic_of = BTreeMap::new();
         for row in rows.map_err(wrong)? {
-            let (id, name, type_name, serialization_format, qos) = row.map_err(wrong)?;
-            let type_name = full_type_name(&type_name);
+            let (id, mut topic, qos) = row.map_err(wrong)?;
+            topic.offered_qos = lenient_qos(&topic.name, &qos);
+            topic.definition = definitions.get(&topic.type_name).cloned();
             topic_of.insert(id, self.info.topics.len());
-            self.info.topics.push(TopicInfo {
-                offered_qos: lenient_qos(&name, &qos),
-                definition: definitions.get(&type_name).cloned(),
-                name,
-                type_name,
-                serialization_format,
-                message_count: 0,
-            });
+            self.info.topics.push(topic);
         }
         self.topic_of = Arc::new(topic_of);
         let indexed = "SELECT l.name FROM pragma_index_list('messages') AS l, pragma_index_info(l.name) AS i \
@@ -152,17 +146,12 @@ impl SqliteFile {
     fn read_range(&mut self, connection: &Connection) -> Result<(), BagError> {
         let path = self.path.clone();
         let wrong = |e| BagError::sqlite(&path, "table messages", e);
-        let range = connection
-            .query_row(
-                "SELECT MIN(timestamp), (SELECT MAX(timestamp) FROM messages) FROM messages",
-                [],
-                |row| Ok((row.get::<_, Option<i64>>(0)?, row.get::<_, Option<i64>>(1)?)),
-            )
-            .map_err(wrong)?;
-        self.info.range_ns = match range {
-            (Some(first), Some(last)) => Some((first, last)),
-            _ => None,
-        };
+        let select = "SELECT MIN(timestamp), (SELECT MAX(timestamp) FROM messages) FROM messages";
+        let range = connection.query_row(select, [], |row| {
+            let (first, last) = (row.get::<_, Option<i64>>(0)?, row.get::<_, Option<i64>>(1)?);
+            Ok(first.zip(last))
+        });
+        self.info.range_ns = range.map_err(wrong)?;
         let mut statement = connection
             .prepare("SELECT topic_id, COUNT(*) FROM messages GROUP BY topic_id")
             .map_err(wrong)?;
@@ -184,7 +173,7 @@ impl SqliteFile {
     }
 
     /// Lists the messages up to the damage, in the order they were written.
-    fn rescue(&mut self, connection: &Connection, damage: BagError) -> Result<(), BagError> {
+    fn rescue(&mut self, connection: &Connection, mut damage: BagError) {
         for topic in &mut self.info.topics {
             topic.message_count = 0;
         }
@@ -198,22 +187,14 @@ impl SqliteFile {
         for key in &keys {
             self.count(key.topic_id, 1);
         }
-        self.info.damage = Some(match damage {
-            BagError::Truncated {
-                path,
-                size_bytes,
-                inside,
-                ..
-            } => BagError::Truncated {
-                path,
-                size_bytes,
-                inside,
-                readable_messages: keys.len() as u64,
-            },
-            other => other,
-        });
+        if let BagError::Truncated {
+            readable_messages, ..
+        } = &mut damage
+        {
+            *readable_messages = keys.len() as u64;
+        }
+        self.info.damage = Some(damage);
         self.rescued = Some(Arc::new(keys));
-        Ok(())
     }
 }
 

@@ -65,7 +65,6 @@ pub(super) struct SqliteStream {
     page_keys: usize,
     messages_read: u64,
     damage: Option<BagError>,
-    ended: bool,
 }
 
 impl SqliteStream {
@@ -85,7 +84,6 @@ impl SqliteStream {
             },
             messages_read: 0,
             damage: file.info.damage.clone(),
-            ended: false,
         };
         if let Some(rescued) = &file.rescued {
             stream.keys = rescued
@@ -114,13 +112,8 @@ impl SqliteStream {
         while self.keys.is_empty() && self.page_keys > 0 {
             let position = format!("message {}", self.messages_read);
             let wrong = |e| BagError::sqlite(&self.path, &position, e);
-            let last_ns = match self.filter.end_ns {
-                None => i64::MAX,
-                Some(end_ns) => match end_ns.checked_sub(1) {
-                    Some(last_ns) => last_ns,
-                    None => return Ok(()),
-                },
-            };
+            let end_ns = self.filter.end_ns;
+            let last_ns = end_ns.map_or(i64::MAX, |end_ns| end_ns.saturating_sub(1));
             let page: Vec<Key> = {
                 let mut statement = self.connection.prepare_cached(&select).map_err(wrong)?;
                 // Before the first page every row of the start time is due, whatever its id.
@@ -178,23 +171,14 @@ impl Iterator for SqliteStream {
     type Item = Result<StorageMessage, BagError>;
 
     fn next(&mut self) -> Option<Self::Item> {
-        if self.ended {
-            return None;
-        }
         let next = match self.fetch_keys() {
             Ok(()) => self.keys.pop_front().map(|key| self.read(key)),
             Err(error) => Some(Err(error)),
         };
         match next {
-            Some(Ok(message)) => Some(Ok(message)),
-            Some(Err(error)) => {
-                self.ended = true;
-                Some(Err(self.damage.take().unwrap_or(error)))
-            }
-            None => {
-                self.ended = true;
-                self.damage.take().map(Err)
-            }
+            Some(Err(error)) => Some(Err(self.damage.take().unwrap_or(error))),
+            Some(message) => Some(message),
+            None => self.damage.take().map(Err),
         }
     }
 }

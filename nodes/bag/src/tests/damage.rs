@@ -1,5 +1,7 @@
 //! Cut and bent files: what precedes the damage is read, and nothing panics.
 
+use std::sync::OnceLock;
+
 use proptest::prelude::*;
 
 use super::{foreign::write_foreign, *};
@@ -49,6 +51,34 @@ fn an_mcap_file_cut_at_any_byte_yields_what_precedes_the_cut() {
     }
 }
 
+/// A bag of one storage file.
+struct Made {
+    name: String,
+    metadata: String,
+    whole: Vec<u8>,
+    written: Vec<BagMessage>,
+}
+
+/// A bag of each storage and compression.
+fn bags() -> &'static [Made] {
+    static BAGS: OnceLock<Vec<Made>> = OnceLock::new();
+    BAGS.get_or_init(|| {
+        let folder = tempfile::tempdir().unwrap();
+        let bag = folder.path().join("bag");
+        let made = ALL.map(|(storage, packing)| {
+            let written = write(&bag, storage, packing, 60, 0);
+            let file = storage_file(&bag);
+            Made {
+                name: file.file_name().unwrap().to_str().unwrap().to_owned(),
+                metadata: fs::read_to_string(bag.join("metadata.yaml")).unwrap(),
+                whole: fs::read(file).unwrap(),
+                written,
+            }
+        });
+        made.into()
+    })
+}
+
 proptest! {
     #![proptest_config(ProptestConfig::with_cases(300))]
 
@@ -59,21 +89,20 @@ proptest! {
         value in any::<u8>(),
         bend in any::<bool>(),
     ) {
-        let (storage, packing) = ALL[kind];
+        let Made { name, metadata, whole, written } = &bags()[kind];
         let folder = tempfile::tempdir().unwrap();
-        let bag = folder.path().join("bag");
-        let written = write(&bag, storage, packing, 60, 0);
-        let file = storage_file(&bag);
-        let mut whole = fs::read(&file).unwrap();
+        fs::write(folder.path().join("metadata.yaml"), metadata).unwrap();
+        let file = folder.path().join(name);
         let place = (whole.len() as f64 * at) as usize;
         if bend {
-            whole[place] = value;
-            fs::write(&file, &whole).unwrap();
-            let _ = read_some(&bag);
+            let mut bent = whole.clone();
+            bent[place] = value;
+            fs::write(&file, &bent).unwrap();
+            let _ = read_some(folder.path());
             let (some, error) = read_some(&file);
             prop_assert!(some.len() <= written.len() || error.is_some());
         } else {
-            check_cut(&file, &whole, place, &written);
+            check_cut(&file, whole, place, written);
         }
     }
 }
@@ -197,4 +226,36 @@ fn a_record_does_not_reach_into_the_padding_of_its_chunk() {
     fs::write(&path, &bytes).unwrap();
     let (some, error) = read_some(&path);
     assert!(some.is_empty() && error.is_some());
+}
+
+#[test]
+fn a_claimed_length_takes_no_more_memory_than_the_chunk_can_hold() {
+    let folder = tempfile::tempdir().unwrap();
+    let path = folder.path().join("lying.mcap");
+    let record = |opcode: u8, len: u64| [&[opcode][..], &len.to_le_bytes()].concat();
+    let claimed = 1_u64 << 29;
+    let content = zstd::encode_all(&record(5, claimed)[..], 0).unwrap();
+    // Times, size of the content, no CRC, compression, content.
+    let mut chunk = [0; 16].to_vec();
+    chunk.extend((claimed + 9).to_le_bytes());
+    chunk.extend([0, 0, 0, 0, 4, 0, 0, 0]);
+    chunk.extend(b"zstd");
+    chunk.extend((content.len() as u64).to_le_bytes());
+    chunk.extend(content);
+    let mut bytes = [mcap::MAGIC, &record(1, 8), &[0; 8]].concat();
+    bytes.extend(record(6, chunk.len() as u64));
+    bytes.extend(chunk);
+    fs::write(&path, bytes).unwrap();
+    let (some, error) = read_some(&path);
+    assert!(some.is_empty());
+    let Some(BagError::TooLarge {
+        size_bytes,
+        limit_bytes,
+        ..
+    }) = error
+    else {
+        panic!("{error:?}")
+    };
+    assert_eq!(size_bytes, claimed);
+    assert!(limit_bytes < 4 << 20, "{limit_bytes}");
 }

@@ -92,44 +92,36 @@ fn foreign_files_are_named() {
     assert!(refused("empty.db3", b"").contains("empty"));
     let (protobuf, _) = write_foreign(folder.path(), mcap::WriteOptions::new(), "protobuf");
     let error = read(&protobuf).unwrap_err().to_string();
-    assert!(
-        error.contains("an MCAP file of protobuf messages"),
-        "{error}"
-    );
+    let expected = "an MCAP file of protobuf messages";
+    assert!(error.contains(expected), "{error}");
 
-    let other = folder.path().join("other.db3");
-    Connection::open(&other)
-        .unwrap()
-        .execute_batch("CREATE TABLE people(name TEXT);")
-        .unwrap();
-    assert!(read(&other).unwrap_err().to_string().contains("people"));
+    let database = |name: &str, sql: &str| {
+        let path = folder.path().join(name);
+        Connection::open(&path).unwrap().execute_batch(sql).unwrap();
+        read(&path).unwrap_err()
+    };
+    let other = database("other.db3", "CREATE TABLE people(name TEXT);");
+    assert!(other.to_string().contains("people"));
     // A view could hide an endless query.
-    let view = folder.path().join("view.db3");
-    let sql = "CREATE TABLE topics(id, name, type, serialization_format); CREATE VIEW messages AS SELECT 1;";
-    Connection::open(&view).unwrap().execute_batch(sql).unwrap();
-    assert!(matches!(read(&view), Err(BagError::Foreign { .. })));
+    let sql = "CREATE TABLE topics(id, name, type, serialization_format); \
+               CREATE VIEW messages AS SELECT 1;";
+    assert!(matches!(
+        database("view.db3", sql),
+        BagError::Foreign { .. }
+    ));
 
     let nothing = folder.path().join("nothing");
     fs::create_dir(&nothing).unwrap();
-    assert!(
-        read(&nothing)
-            .unwrap_err()
-            .to_string()
-            .contains("without metadata.yaml")
-    );
-    assert!(matches!(
-        read(&folder.path().join("missing")),
-        Err(BagError::Io { .. })
-    ));
+    let error = read(&nothing).unwrap_err().to_string();
+    assert!(error.contains("without metadata.yaml"));
+    let missing = read(&folder.path().join("missing"));
+    assert!(matches!(missing, Err(BagError::Io { .. })));
 }
 
 #[test]
 fn metadata_cannot_lead_out_of_the_bag() {
     let folder = tempfile::tempdir().unwrap();
-    let (bag, outside) = (
-        folder.path().join("bag"),
-        folder.path().join("outside.mcap"),
-    );
+    let [bag, outside] = ["bag", "outside.mcap"].map(|name| folder.path().join(name));
     write(&bag, Storage::Mcap, Packing::None, 3, 0);
     fs::rename(storage_file(&bag), &outside).unwrap();
     let path = bag.join("metadata.yaml");
@@ -147,42 +139,30 @@ fn metadata_cannot_lead_out_of_the_bag() {
 fn write_old(folder: &TempDir, has_qos: bool, has_index: bool) -> PathBuf {
     let path = folder.path().join(format!("old_{has_qos}_{has_index}.db3"));
     let connection = Connection::open(&path).unwrap();
-    let qos = if has_qos {
-        ", offered_qos_profiles TEXT NOT NULL"
-    } else {
-        ""
+    let (column, value) = match has_qos {
+        true => (
+            ", offered_qos_profiles TEXT NOT NULL",
+            ", '- {durability: 1, depth: 3}'",
+        ),
+        false => ("", ""),
     };
-    let index = if has_index {
-        "CREATE INDEX timestamp_idx ON messages(timestamp ASC);"
-    } else {
-        ""
+    let index = match has_index {
+        true => "CREATE INDEX timestamp_idx ON messages(timestamp ASC);",
+        false => "",
     };
     let sql = format!(
         "CREATE TABLE topics(id INTEGER PRIMARY KEY, name TEXT NOT NULL, type TEXT NOT NULL, \
-         serialization_format TEXT NOT NULL{qos}); \
+         serialization_format TEXT NOT NULL{column}); \
          CREATE TABLE messages(id INTEGER PRIMARY KEY, topic_id INTEGER NOT NULL, timestamp INTEGER NOT NULL, \
-         data BLOB NOT NULL); {index}"
+         data BLOB NOT NULL); {index} \
+         INSERT INTO topics VALUES (7, '/tf_static', 'tf2_msgs/msg/TFMessage', 'cdr'{value}); BEGIN;"
     );
     connection.execute_batch(&sql).unwrap();
-    let qos = if has_qos {
-        ", '- {durability: 1, depth: 3}'"
-    } else {
-        ""
-    };
-    let insert = format!(
-        "INSERT INTO topics VALUES (7, '/tf_static', 'tf2_msgs/msg/TFMessage', 'cdr'{qos})"
-    );
-    connection.execute(&insert, []).unwrap();
-    connection.execute_batch("BEGIN").unwrap();
+    let insert = "INSERT INTO messages(topic_id, timestamp, data) VALUES (7, ?1, ?2)";
     for i in 0..9000_i64 {
         // Every time comes three times, across the pages of keys.
         let time_ns = T0_NS + (8999 - i) / 3;
-        connection
-            .execute(
-                "INSERT INTO messages(topic_id, timestamp, data) VALUES (7, ?1, ?2)",
-                (time_ns, cdr(i, 3)),
-            )
-            .unwrap();
+        connection.execute(insert, (time_ns, cdr(i, 3))).unwrap();
     }
     connection.execute_batch("COMMIT").unwrap();
     path

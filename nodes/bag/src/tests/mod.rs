@@ -8,7 +8,7 @@ use std::{
     path::{Path, PathBuf},
 };
 
-use super::*;
+use super::{metadata::Metadata, *};
 
 const SECOND_NS: i64 = 1_000_000_000;
 const T0_NS: i64 = 1_700_000_000 * SECOND_NS;
@@ -36,7 +36,7 @@ pub(super) fn cdr(seed: i64, len: usize) -> Vec<u8> {
 #[derive(Clone, Copy, PartialEq, Debug)]
 enum Packing {
     None,
-    Messages,
+    Message,
     File,
 }
 
@@ -57,7 +57,7 @@ fn write(
         let data = cdr(i, 40 + (i % 13) as usize * 20);
         let (topic, log_time_ns) = ((i % 2) as usize, T0_NS + i * SECOND_NS / 10);
         let written = match packing {
-            Packing::Messages => zstd::encode_all(&data[..], 0).unwrap(),
+            Packing::Message => zstd::encode_all(&data[..], 0).unwrap(),
             _ => data.clone(),
         };
         writer.write(topic, log_time_ns, &written).unwrap();
@@ -76,27 +76,26 @@ fn write(
 
 /// Notes the compression in the metadata, and compresses the storage file.
 fn pack(folder: &Path, packing: Packing) {
-    let metadata = folder.join("metadata.yaml");
-    let mut text = fs::read_to_string(&metadata)
-        .unwrap()
-        .replace("compression_format: ''", "compression_format: zstd");
-    if packing == Packing::Messages {
-        text = text.replace("compression_mode: ''", "compression_mode: message");
-    } else {
-        let file = storage_file(folder);
-        let packed = format!("{}.zstd", file.display());
-        fs::write(
-            &packed,
-            zstd::encode_all(&fs::read(&file).unwrap()[..], 0).unwrap(),
-        )
-        .unwrap();
-        fs::remove_file(&file).unwrap();
-        let name = file.file_name().unwrap().to_str().unwrap();
-        text = text
-            .replace("compression_mode: ''", "compression_mode: file")
-            .replace(name, &format!("{name}.zstd"));
-    }
-    fs::write(&metadata, text).unwrap();
+    change_metadata(folder, folder, |metadata| {
+        metadata.compression_format = "zstd".into();
+        metadata.compression_mode = format!("{packing:?}");
+        if packing == Packing::File {
+            let file = storage_file(folder);
+            let whole = fs::read(&file).unwrap();
+            let packed = zstd::encode_all(&whole[..], 0).unwrap();
+            fs::write(format!("{}.zstd", file.display()), packed).unwrap();
+            fs::remove_file(&file).unwrap();
+            metadata.relative_file_paths[0] += ".zstd";
+            metadata.files[0].path += ".zstd";
+        }
+    });
+}
+
+/// Writes the changed metadata of one bag into another.
+fn change_metadata(from: &Path, to: &Path, change: impl FnOnce(&mut Metadata)) {
+    let mut metadata = Metadata::read(&from.join("metadata.yaml")).unwrap();
+    change(&mut metadata);
+    fs::write(to.join("metadata.yaml"), metadata.to_text().unwrap()).unwrap();
 }
 
 fn storage_file(folder: &Path) -> PathBuf {
@@ -133,10 +132,10 @@ fn read_some(path: &Path) -> (Vec<BagMessage>, Option<BagError>) {
 
 const ALL: [(Storage, Packing); 6] = [
     (Storage::Mcap, Packing::None),
-    (Storage::Mcap, Packing::Messages),
+    (Storage::Mcap, Packing::Message),
     (Storage::Mcap, Packing::File),
     (Storage::Sqlite3, Packing::None),
-    (Storage::Sqlite3, Packing::Messages),
+    (Storage::Sqlite3, Packing::Message),
     (Storage::Sqlite3, Packing::File),
 ];
 
@@ -179,12 +178,9 @@ fn messages_written_out_of_order_come_in_order() {
                 .unwrap();
         }
         writer.finish().unwrap();
-        let times: Vec<i64> = read(&bag)
-            .unwrap()
-            .iter()
-            .map(|m| m.log_time_ns - T0_NS)
-            .collect();
-        assert_eq!(times, (0..20).collect::<Vec<_>>());
+        let messages = read(&bag).unwrap();
+        let times = messages.iter().map(|m| m.log_time_ns - T0_NS);
+        assert!(times.eq(0..20));
     }
 }
 
@@ -195,14 +191,8 @@ fn an_empty_bag_is_no_error() {
         let bag = folder.path().join("bag");
         assert_eq!(write(&bag, storage, packing, 0, 0), vec![]);
         let reader = BagReader::open(&bag).unwrap();
-        assert_eq!(
-            (
-                reader.start_ns(),
-                reader.message_count(),
-                reader.topics().len()
-            ),
-            (None, 0, 2)
-        );
+        assert_eq!((reader.start_ns(), reader.message_count()), (None, 0));
+        assert_eq!(reader.topics().len(), 2);
         assert_eq!(read(&bag).unwrap(), vec![]);
     }
 }
@@ -219,54 +209,30 @@ fn splits_merge_by_time_whether_compressed_or_not() {
         let mut expected = write(&one, storage, packing, 30, 0);
         // The second starts before the first ends.
         expected.extend(write(&two, storage, packing, 30, 25));
-        expected.sort_by_key(|m| m.log_time_ns);
         fs::create_dir(&both).unwrap();
-        let mut lists = String::new();
-        let mut files = String::new();
-        for (bag, first) in [(&two, 25), (&one, 0)] {
-            let file = storage_file(bag);
-            let name = file.file_name().unwrap().to_str().unwrap().to_owned();
-            fs::copy(&file, both.join(&name)).unwrap();
-            lists.push_str(&format!("  - {name}\n"));
-            files.push_str(&format!(
-                "  - path: {name}\n    starting_time: {{nanoseconds_since_epoch: {}}}\n    \
-                 duration: {{nanoseconds: 2900000000}}\n    message_count: 30\n",
-                T0_NS + first * SECOND_NS / 10
-            ));
-        }
-        let text = fs::read_to_string(one.join("metadata.yaml")).unwrap();
-        let single = storage_file(&one)
-            .file_name()
-            .unwrap()
-            .to_str()
-            .unwrap()
-            .to_owned();
-        let (head, tail) = text.split_once("  relative_file_paths:\n").unwrap();
-        let custom = tail.find("  custom_data").unwrap();
-        assert!(tail[..custom].contains(&single));
-        let text = format!(
-            "{head}  relative_file_paths:\n{lists}  files:\n{files}{}",
-            &tail[custom..]
-        );
-        fs::write(both.join("metadata.yaml"), text).unwrap();
-        let by_time = |path: &Path| -> Vec<(i64, Vec<u8>)> {
-            read(path)
-                .unwrap()
-                .into_iter()
-                .map(|m| (m.log_time_ns, m.data))
-                .collect()
+        change_metadata(&one, &both, |metadata| {
+            metadata.relative_file_paths.clear();
+            metadata.files.clear();
+            for bag in [&two, &one] {
+                let listed = Metadata::read(&bag.join("metadata.yaml")).unwrap();
+                for name in listed.relative_file_paths {
+                    fs::copy(bag.join(&name), both.join(&name)).unwrap();
+                    metadata.relative_file_paths.push(name);
+                }
+                metadata.files.extend(listed.files);
+            }
+        });
+        let by_time = |messages: Vec<BagMessage>| {
+            let pairs = messages.into_iter().map(|m| (m.log_time_ns, m.data));
+            pairs.collect::<Vec<_>>()
         };
-        let mut found = by_time(&both);
+        let (mut found, mut wanted) = (by_time(read(&both).unwrap()), by_time(expected));
         assert!(found.is_sorted_by_key(|m| m.0), "{storage:?} {packing:?}");
-        let mut wanted: Vec<_> = expected
-            .iter()
-            .map(|m| (m.log_time_ns, m.data.clone()))
-            .collect();
         found.sort();
         wanted.sort();
         assert_eq!(found, wanted, "{storage:?} {packing:?}");
         fs::remove_file(both.join("metadata.yaml")).unwrap();
-        assert_eq!(by_time(&both).len(), 60);
+        assert_eq!(read(&both).unwrap().len(), 60);
         fs::remove_dir_all(&both).unwrap();
     }
 }
@@ -280,12 +246,8 @@ fn topics_not_in_the_bag_are_an_error_that_lists_them() {
         topics: Some(vec!["/c".into()]),
         ..ReadOptions::default()
     };
-    let error = BagReader::open(&bag)
-        .unwrap()
-        .messages(&options)
-        .err()
-        .unwrap()
-        .to_string();
+    let messages = BagReader::open(&bag).unwrap().messages(&options);
+    let error = messages.err().unwrap().to_string();
     assert!(error.contains("/c") && error.contains("/a, /b"), "{error}");
 }
 
@@ -293,53 +255,46 @@ fn topics_not_in_the_bag_are_an_error_that_lists_them() {
 fn only_bags_are_overwritten() {
     let folder = tempfile::tempdir().unwrap();
     let bag = folder.path().join("bag");
-    let create = |overwrite| {
-        BagWriter::create(&bag, Storage::Sqlite3, WriterOptions { overwrite })
+    let create = |path: &Path, overwrite| {
+        BagWriter::create(path, Storage::Sqlite3, WriterOptions { overwrite })
             .and_then(BagWriter::finish)
     };
-    create(false).unwrap();
-    assert!(
-        create(false)
-            .unwrap_err()
-            .to_string()
-            .contains("allow to overwrite")
-    );
-    create(true).unwrap();
+    let refused = |path: &Path, overwrite| match create(path, overwrite) {
+        Err(error @ BagError::Exists { .. }) => error.to_string(),
+        other => panic!("{other:?}"),
+    };
+    create(&bag, false).unwrap();
+    assert!(refused(&bag, false).contains("allow to overwrite"));
+    create(&bag, true).unwrap();
     fs::write(bag.join("thesis.tex"), "years of work").unwrap();
-    assert!(create(true).unwrap_err().to_string().contains("thesis.tex"));
+    assert!(refused(&bag, true).contains("thesis.tex"));
     assert!(bag.join("thesis.tex").exists() && bag.join("metadata.yaml").exists());
     let file = folder.path().join("file");
     fs::write(&file, "x").unwrap();
-    let options = WriterOptions { overwrite: true };
-    assert!(matches!(
-        BagWriter::create(&file, Storage::Mcap, options),
-        Err(BagError::Exists { .. })
-    ));
+    refused(&file, true);
 }
 
 #[test]
 fn the_writer_refuses_what_no_reader_could_use() {
     let folder = tempfile::tempdir().unwrap();
-    let mut writer = BagWriter::create(
-        &folder.path().join("m"),
-        Storage::Mcap,
-        WriterOptions::default(),
-    )
-    .unwrap();
-    let named = |name: &str, type_name: &str| TopicSpec {
-        type_name: type_name.into(),
-        ..spec(name, false)
+    let path = folder.path().join("m");
+    let mut writer = BagWriter::create(&path, Storage::Mcap, WriterOptions::default()).unwrap();
+    let mut add = |name: &str, type_name: &str| {
+        writer.add_topic(TopicSpec {
+            type_name: type_name.into(),
+            ..spec(name, false)
+        })
     };
-    assert!(
-        writer
-            .add_topic(named("relative", "std_msgs/msg/String"))
-            .is_err()
-    );
-    assert!(writer.add_topic(named("/a", "std_msgs/String")).is_err());
-    assert_eq!(writer.add_topic(spec("/a", false)).unwrap(), 0);
-    assert!(writer.add_topic(spec("/a", false)).is_err());
-    assert!(writer.write(0, -1, &cdr(0, 4)).is_err());
-    assert!(writer.write(1, 0, &cdr(0, 4)).is_err());
-    assert!(writer.write(0, 0, b"abc").is_err());
+    assert!(add("relative", "std_msgs/msg/String").is_err());
+    assert!(add("/a", "std_msgs/String").is_err());
+    assert_eq!(add("/a", "std_msgs/msg/String").unwrap(), 0);
+    assert!(add("/a", "std_msgs/msg/String").is_err());
+    for (topic, time_ns, cdr) in [
+        (0, -1, cdr(0, 4)),
+        (1, 0, cdr(0, 4)),
+        (0, 0, b"abc".to_vec()),
+    ] {
+        assert!(writer.write(topic, time_ns, &cdr).is_err());
+    }
     writer.finish().unwrap();
 }

@@ -4,16 +4,19 @@ mod mcap_sink;
 mod sqlite_sink;
 
 use std::{
-    fs,
+    error::Error,
+    fs::{self, File},
+    io,
     path::{Path, PathBuf},
 };
 
 use super::{
     BagError, BagQos, MAX_MESSAGE_BYTES, Storage, TopicInfo,
     metadata::{
-        CountedTopic, FileInformation, METADATA_VERSION, Metadata, Nanoseconds, StartingTime,
-        TopicMetadata,
+        CountedTopic, EMPTY_START_NS, FileInformation, METADATA_VERSION, Metadata, Nanoseconds,
+        StartingTime, TopicMetadata,
     },
+    split_list::list,
 };
 use mcap_sink::McapSink;
 use sqlite_sink::SqliteSink;
@@ -43,9 +46,17 @@ pub struct TopicSpec {
     pub offered_qos: Vec<BagQos>,
 }
 
-enum Sink {
-    Mcap(Box<McapSink>),
-    Sqlite(SqliteSink),
+type SinkError = Box<dyn Error + Send + Sync>;
+
+/// A storage file being written; topics count from 0 in the order they are added.
+trait Sink: Send {
+    fn add_topic(&mut self, topic: &TopicInfo, qos: &str) -> Result<(), SinkError>;
+    fn write(&mut self, topic: usize, log_time_ns: i64, data: &[u8]) -> Result<(), SinkError>;
+    fn finish(self: Box<Self>, metadata: &str) -> Result<(), SinkError>;
+}
+
+fn failed(path: &Path, doing: &'static str) -> impl FnOnce(SinkError) -> BagError {
+    move |error| BagError::io(path, doing)(io::Error::other(error))
 }
 
 /// A bag being written. Without [`BagWriter::finish`] it lacks `metadata.yaml`.
@@ -53,7 +64,7 @@ pub struct BagWriter {
     folder: PathBuf,
     file: PathBuf,
     storage: Storage,
-    sink: Sink,
+    sink: Box<dyn Sink>,
     topics: Vec<TopicInfo>,
     message_count: u64,
     range_ns: Option<(i64, i64)>,
@@ -66,9 +77,9 @@ impl BagWriter {
         storage: Storage,
         options: WriterOptions,
     ) -> Result<BagWriter, BagError> {
-        let name = path.file_name().ok_or_else(|| BagError::Invalid {
-            name: "path",
-            reason: format!("{} does not end in the name of a folder", path.display()),
+        let name = path.file_name().ok_or_else(|| {
+            let reason = format!("{} does not end in the name of a folder", path.display());
+            BagError::invalid("path", reason)
         })?;
         make_way(path, options.overwrite)?;
         fs::create_dir_all(path).map_err(BagError::io(path, "create"))?;
@@ -77,10 +88,12 @@ impl BagWriter {
             name.to_string_lossy(),
             storage.extension()
         ));
-        let sink = match storage {
-            Storage::Mcap => Sink::Mcap(Box::new(McapSink::create(&file)?)),
-            Storage::Sqlite3 => Sink::Sqlite(SqliteSink::create(&file, ROS_DISTRO)?),
+        let created = File::create_new(&file).map_err(BagError::io(&file, "create"))?;
+        let sink: Result<Box<dyn Sink>, SinkError> = match storage {
+            Storage::Mcap => McapSink::create(created).map(|sink| Box::new(sink) as _),
+            Storage::Sqlite3 => SqliteSink::create(&file).map(|sink| Box::new(sink) as _),
         };
+        let sink = sink.map_err(failed(&file, "create"))?;
         Ok(BagWriter {
             folder: path.to_path_buf(),
             file,
@@ -94,12 +107,7 @@ impl BagWriter {
 
     /// Announces a topic; the result is what [`BagWriter::write`] takes.
     pub fn add_topic(&mut self, topic: TopicSpec) -> Result<usize, BagError> {
-        let wrong = |reason: String| {
-            Err(BagError::Invalid {
-                name: "topic",
-                reason,
-            })
-        };
+        let wrong = |reason: String| Err(BagError::invalid("topic", reason));
         if !topic.name.starts_with('/') || topic.name.len() < 2 {
             return wrong(format!(
                 "{:?} is not a full topic name; it starts with '/'",
@@ -124,21 +132,17 @@ impl BagWriter {
             definition: topic.definition,
             message_count: 0,
         };
-        let qos = BagQos::to_text(&info.offered_qos).map_err(|e| BagError::Invalid {
-            name: "offered_qos",
-            reason: e.to_string(),
-        })?;
-        match &mut self.sink {
-            Sink::Mcap(sink) => sink.add_topic(&info, &qos)?,
-            Sink::Sqlite(sink) => sink.add_topic(&info, &qos)?,
-        }
+        let qos =
+            BagQos::to_text(&info.offered_qos).map_err(|e| BagError::invalid("offered_qos", e))?;
+        let added = self.sink.add_topic(&info, &qos);
+        added.map_err(failed(&self.file, "add a topic to"))?;
         self.topics.push(info);
         Ok(self.topics.len() - 1)
     }
 
     /// Writes a message: CDR with encapsulation header. Times need not be in order.
     pub fn write(&mut self, topic: usize, log_time_ns: i64, cdr: &[u8]) -> Result<(), BagError> {
-        let wrong = |name, reason: String| Err(BagError::Invalid { name, reason });
+        let wrong = |name, reason: String| Err(BagError::invalid(name, reason));
         let Some(info) = self.topics.get_mut(topic) else {
             return wrong(
                 "topic",
@@ -161,10 +165,8 @@ impl BagWriter {
                 ),
             );
         }
-        match &mut self.sink {
-            Sink::Mcap(sink) => sink.write(topic, log_time_ns, cdr)?,
-            Sink::Sqlite(sink) => sink.write(topic, log_time_ns, cdr)?,
-        }
+        let written = self.sink.write(topic, log_time_ns, cdr);
+        written.map_err(failed(&self.file, "write"))?;
         info.message_count += 1;
         self.message_count += 1;
         let (first_ns, last_ns) = self.range_ns.unwrap_or((log_time_ns, log_time_ns));
@@ -175,16 +177,11 @@ impl BagWriter {
     /// Completes the storage file and writes `metadata.yaml`.
     pub fn finish(self) -> Result<(), BagError> {
         let metadata = self.metadata();
-        let unfit = |e: serde_yaml::Error| BagError::Invalid {
-            name: "metadata",
-            reason: e.to_string(),
-        };
+        let unfit = |e: serde_yaml::Error| BagError::invalid("metadata", e);
         let embedded = metadata.to_embedded_text().map_err(unfit)?;
         let text = metadata.to_text().map_err(unfit)?;
-        match self.sink {
-            Sink::Mcap(sink) => sink.finish(&embedded)?,
-            Sink::Sqlite(sink) => sink.finish(METADATA_VERSION, &embedded)?,
-        }
+        let finished = self.sink.finish(&embedded);
+        finished.map_err(failed(&self.file, "finish"))?;
         // Renamed into place, so that a crash leaves no half metadata.
         let (path, unfinished) = (
             self.folder.join("metadata.yaml"),
@@ -197,15 +194,12 @@ impl BagWriter {
     fn metadata(&self) -> Metadata {
         let file_name = self.file.file_name().unwrap_or_default();
         let name = file_name.to_string_lossy().into_owned();
-        let starting_time = self
-            .range_ns
-            .map_or_else(StartingTime::default, |(first_ns, _)| StartingTime {
-                nanoseconds_since_epoch: first_ns,
-            });
+        let (first_ns, last_ns) = self.range_ns.unwrap_or((EMPTY_START_NS, EMPTY_START_NS));
+        let starting_time = StartingTime {
+            nanoseconds_since_epoch: first_ns,
+        };
         let duration = Nanoseconds {
-            nanoseconds: self
-                .range_ns
-                .map_or(0, |(first_ns, last_ns)| last_ns.saturating_sub(first_ns)),
+            nanoseconds: last_ns.saturating_sub(first_ns),
         };
         let counted = |topic: &TopicInfo| CountedTopic {
             topic_metadata: TopicMetadata {
@@ -224,8 +218,6 @@ impl BagWriter {
             starting_time,
             message_count: self.message_count,
             topics_with_message_count: self.topics.iter().map(counted).collect(),
-            compression_format: String::new(),
-            compression_mode: String::new(),
             relative_file_paths: vec![name.clone()],
             files: vec![FileInformation {
                 path: name,
@@ -233,8 +225,8 @@ impl BagWriter {
                 duration,
                 message_count: self.message_count,
             }],
-            custom_data: (),
             ros_distro: ROS_DISTRO,
+            ..Metadata::default()
         }
     }
 }
@@ -254,37 +246,21 @@ fn make_way(path: &Path, overwrite: bool) -> Result<(), BagError> {
     if !path.is_dir() {
         return refuse(" and is not a folder".into(), "");
     }
-    let mut files = Vec::new();
-    for entry in fs::read_dir(path).map_err(BagError::io(path, "list"))? {
-        let file = entry.map_err(BagError::io(path, "list"))?.path();
-        let name = file
-            .file_name()
-            .unwrap_or_default()
-            .to_string_lossy()
-            .into_owned();
-        let endings = [
-            ".mcap",
-            ".db3",
-            ".mcap.zstd",
-            ".db3.zstd",
-            ".db3-wal",
-            ".db3-shm",
-            ".db3-journal",
-        ];
+    let files = list(path)?;
+    for (file, name) in &files {
+        let bare = name.strip_suffix(".zstd").unwrap_or(name);
+        let endings = [".mcap", ".db3", ".db3-wal", ".db3-shm", ".db3-journal"];
         let is_ours =
-            name == "metadata.yaml" || endings.iter().any(|ending| name.ends_with(ending));
+            name == "metadata.yaml" || endings.iter().any(|ending| bare.ends_with(ending));
         if !is_ours || file.is_dir() {
-            return refuse(
-                format!(" and holds {name:?}, which is no part of a bag"),
-                "",
-            );
+            let why = format!(" and holds {name:?}, which is no part of a bag");
+            return refuse(why, "");
         }
-        files.push(file);
     }
     if !files.is_empty() && !overwrite {
         return refuse(String::new(), " or allow to overwrite");
     }
     files
         .iter()
-        .try_for_each(|file| fs::remove_file(file).map_err(BagError::io(file, "remove")))
+        .try_for_each(|(file, _)| fs::remove_file(file).map_err(BagError::io(file, "remove")))
 }

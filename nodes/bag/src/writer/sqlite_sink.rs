@@ -1,14 +1,11 @@
 //! Writes SQLite files of schema version 4 (ROS 2 Iron and later).
 
-use std::{
-    collections::BTreeSet,
-    io,
-    path::{Path, PathBuf},
-};
+use std::{collections::BTreeSet, path::Path};
 
 use rusqlite::{Connection, params};
 
-use crate::{BagError, TopicInfo, storage::definition_encoding};
+use super::{ROS_DISTRO, Sink, SinkError};
+use crate::{TopicInfo, metadata::METADATA_VERSION, storage::definition_encoding};
 
 /// A transaction is committed when it holds this much, bytes.
 const TRANSACTION_BYTES: usize = 32 << 20;
@@ -32,93 +29,60 @@ const TABLES: &str = "
 ";
 
 pub(super) struct SqliteSink {
-    path: PathBuf,
     connection: Connection,
-    /// Row by topic.
-    topic_ids: Vec<i64>,
     defined: BTreeSet<String>,
     open_bytes: usize,
 }
 
 impl SqliteSink {
-    pub(super) fn create(path: &Path, ros_distro: &str) -> Result<SqliteSink, BagError> {
-        let wrong = |e| failed(path, "create", e);
-        let connection = Connection::open(path).map_err(wrong)?;
-        connection.execute_batch(TABLES).map_err(wrong)?;
-        connection
-            .execute("INSERT INTO schema VALUES (4, ?1)", [ros_distro])
-            .map_err(wrong)?;
+    pub(super) fn create(path: &Path) -> Result<SqliteSink, SinkError> {
+        let connection = Connection::open(path)?;
+        connection.execute_batch(TABLES)?;
+        connection.execute("INSERT INTO schema VALUES (4, ?1)", [ROS_DISTRO])?;
         Ok(SqliteSink {
-            path: path.to_path_buf(),
             connection,
-            topic_ids: Vec::new(),
             defined: BTreeSet::new(),
             open_bytes: 0,
         })
     }
+}
 
-    pub(super) fn add_topic(&mut self, topic: &TopicInfo, qos: &str) -> Result<(), BagError> {
-        let wrong = |e| failed(&self.path, "add a topic to", e);
+impl Sink for SqliteSink {
+    fn add_topic(&mut self, topic: &TopicInfo, qos: &str) -> Result<(), SinkError> {
         if let Some(text) = &topic.definition
             && self.defined.insert(topic.type_name.clone())
         {
-            let encoding = definition_encoding(text);
             let insert = "INSERT INTO message_definitions(topic_type, encoding, encoded_message_definition, \
                           type_description_hash) VALUES (?1, ?2, ?3, '')";
-            self.connection
-                .execute(insert, params![topic.type_name, encoding, text])
-                .map_err(wrong)?;
+            let values = params![topic.type_name, definition_encoding(text), text];
+            self.connection.execute(insert, values)?;
         }
         let insert = "INSERT INTO topics(name, type, serialization_format, offered_qos_profiles, \
                       type_description_hash) VALUES (?1, ?2, ?3, ?4, '')";
         let values = params![topic.name, topic.type_name, topic.serialization_format, qos];
-        self.connection.execute(insert, values).map_err(wrong)?;
-        self.topic_ids.push(self.connection.last_insert_rowid());
+        self.connection.execute(insert, values)?;
         Ok(())
     }
 
-    pub(super) fn write(
-        &mut self,
-        topic: usize,
-        log_time_ns: i64,
-        data: &[u8],
-    ) -> Result<(), BagError> {
-        let unknown = || BagError::Invalid {
-            name: "topic",
-            reason: format!("{topic} was not added"),
-        };
-        let id = self.topic_ids.get(topic).ok_or_else(unknown)?;
-        let wrong = |e| failed(&self.path, "write", e);
+    fn write(&mut self, topic: usize, log_time_ns: i64, data: &[u8]) -> Result<(), SinkError> {
+        // SQLite numbers the rows of an empty table from 1.
+        let id = i64::try_from(topic)? + 1;
         let insert = "INSERT INTO messages(topic_id, timestamp, data) VALUES (?1, ?2, ?3)";
-        let mut statement = self.connection.prepare_cached(insert).map_err(wrong)?;
-        statement
-            .execute(params![id, log_time_ns, data])
-            .map_err(wrong)?;
+        let mut statement = self.connection.prepare_cached(insert)?;
+        statement.execute(params![id, log_time_ns, data])?;
         self.open_bytes = self.open_bytes.saturating_add(data.len());
         if self.open_bytes >= TRANSACTION_BYTES {
-            self.connection
-                .execute_batch("COMMIT; BEGIN")
-                .map_err(wrong)?;
+            self.connection.execute_batch("COMMIT; BEGIN")?;
             self.open_bytes = 0;
         }
         Ok(())
     }
 
-    pub(super) fn finish(self, version: u32, metadata: &str) -> Result<(), BagError> {
-        let wrong = |e| failed(&self.path, "finish", e);
+    fn finish(self: Box<Self>, metadata: &str) -> Result<(), SinkError> {
         let insert = "INSERT INTO metadata(metadata_version, metadata) VALUES (?1, ?2)";
-        self.connection
-            .execute(insert, params![version, metadata])
-            .map_err(wrong)?;
-        self.connection
-            .execute_batch("COMMIT; PRAGMA optimize")
-            .map_err(wrong)?;
-        self.connection
-            .close()
-            .map_err(|(_, e)| failed(&self.path, "close", e))
+        let values = params![METADATA_VERSION, metadata];
+        self.connection.execute(insert, values)?;
+        self.connection.execute_batch("COMMIT; PRAGMA optimize")?;
+        Ok(self.connection.close().map_err(|(_, error)| error)?)
     }
-}
-
-fn failed(path: &Path, doing: &'static str, error: rusqlite::Error) -> BagError {
-    BagError::io(path, doing)(io::Error::other(error))
 }

@@ -9,7 +9,7 @@ use serde::Serialize;
 use std::collections::BTreeMap;
 
 /// An answer for people and programs.
-#[derive(Serialize)]
+#[derive(Default, Serialize)]
 pub struct Answer {
     /// None for a single registration, which judges nothing.
     verdict: Option<&'static str>,
@@ -27,12 +27,12 @@ pub struct Answer {
     rmse_m: f64,
     weak_directions: Vec<Weak>,
     classes: Vec<Class>,
-    points: usize,
-    map_points: usize,
-    times: Times,
+    pub points: usize,
+    pub map_points: usize,
+    pub times: Times,
 }
 
-#[derive(Serialize)]
+#[derive(Default, Serialize)]
 struct Pose {
     translation_m: [f64; 3],
     rotation_xyzw: [f64; 4],
@@ -88,7 +88,6 @@ impl Answer {
             verdict: Some(calibration.verdict.name()),
             reason: calibration.reason.clone(),
             method: calibration.method.to_owned(),
-            converged: None,
             map_from_cloud: Pose::of(&calibration.map_from_headset),
             // Symmetric, so that the order of columns is that of rows.
             covariance: Some(covariance.iter().copied().collect()),
@@ -99,44 +98,24 @@ impl Answer {
             rmse_m: calibration.rmse_m,
             weak_directions: weak.collect(),
             classes: classes.collect(),
-            points: 0,
-            map_points: 0,
-            times: Times::default(),
+            ..Answer::default()
         }
     }
 
     /// Of a single registration of a cloud with so many points.
     pub fn of_registration(method: &str, (registration, points): &(Registration, usize)) -> Answer {
+        let state = match registration.converged {
+            true => "converged",
+            false => "not converged",
+        };
         Answer {
-            verdict: None,
-            reason: match registration.converged {
-                true => format!("converged after {} searches", registration.iterations),
-                false => format!("not converged after {} searches", registration.iterations),
-            },
+            reason: format!("{state} after {} searches", registration.iterations),
             method: method.to_owned(),
             converged: Some(registration.converged),
             map_from_cloud: Pose::of(&registration.target_from_source),
-            covariance: None,
-            sigma_m: None,
-            sigma_deg: None,
-            log_margin: None,
             inlier_fraction: registration.inliers as f64 / (*points).max(1) as f64,
             rmse_m: registration.rmse_m,
-            weak_directions: Vec::new(),
-            classes: Vec::new(),
-            points: 0,
-            map_points: 0,
-            times: Times::default(),
-        }
-    }
-
-    /// Adds the sizes of the clouds and the times.
-    pub fn with_counts(self, points: usize, map_points: usize, times: Times) -> Answer {
-        Answer {
-            points,
-            map_points,
-            times,
-            ..self
+            ..Answer::default()
         }
     }
 

@@ -111,14 +111,14 @@ pub fn headset_scans(
     sensor_m: Option<Point3<f64>>,
     max_points: usize,
 ) -> CliResult<Vec<HeadsetScan>> {
-    let headset_scan = |path: &PathBuf| {
+    let read = |path: &PathBuf| {
         let mut cloud = read_semantic(path, max_points)?.cloud;
         for point in &mut cloud.points_m {
             *point = axes.point_to_ros(point);
         }
         Ok(HeadsetScan { cloud, sensor_m })
     };
-    paths.iter().map(headset_scan).collect()
+    paths.iter().map(read).collect()
 }
 
 /// The confusion that earlier calibrations learned, if there is a file.

@@ -33,52 +33,37 @@ impl MethodName {
         self.0.map_or("auto", |method| method.option)
     }
 
-    /// The registration, if it is a single one.
-    pub fn single(self) -> Option<RegisterOptions<'static>> {
-        self.0.map(|method| method.options(GATE_M))
+    /// The registration, if it is a single one, with a gate in place of its own if given.
+    pub fn single(self, gate_m: Option<f64>) -> Option<RegisterOptions<'static>> {
+        let mut options = self.0?.options(GATE_M);
+        options.gate_m = gate_m.unwrap_or(options.gate_m);
+        Some(options)
     }
 }
 
-/// One registration of a cloud that is thinned to the cells of the map.
-pub struct Single {
-    /// Options of the registration.
-    pub method: RegisterOptions<'static>,
-    /// Gate in place of the method's own, metres.
-    pub gate_m: Option<f64>,
-    pub cell_side_m: f64,
-}
-
-impl Single {
-    /// Prepares both clouds and registers; also the number of points left of the cloud.
-    pub fn register(
-        &self,
-        map: SemanticCloud,
-        headset_scans: Vec<HeadsetScan>,
-        start: &Isometry3<f64>,
-        times: &mut Times,
-    ) -> Result<(Registration, usize), String> {
-        let started = Instant::now();
-        let prepare = PrepareOptions::default();
-        let map = PreparedCloud::new(map, &prepare).map_err(|e| format!("the map: {e}"))?;
-        times.map_ms = milliseconds(started);
-        let started = Instant::now();
-        let cloud = voxel_downsample(&together(headset_scans), self.cell_side_m);
-        let cloud = PreparedCloud::new(cloud, &prepare).map_err(|e| format!("the cloud: {e}"))?;
-        let options = RegisterOptions {
-            gate_m: self.gate_m.unwrap_or(self.method.gate_m),
-            ..self.method
-        };
-        let registration = register(&cloud, &map, start, &options);
-        times.calibrate_ms = milliseconds(started);
-        Ok((registration, cloud.len()))
-    }
+/// Registers the cloud, thinned to the cells of the map; also the number of points left of it.
+pub fn register_once(
+    method: &RegisterOptions,
+    (map, cell_side_m): (SemanticCloud, f64),
+    headset_scans: Vec<HeadsetScan>,
+    start: &Isometry3<f64>,
+    times: &mut Times,
+) -> Result<(Registration, usize), String> {
+    let started = Instant::now();
+    let prepare = PrepareOptions::default();
+    let map = PreparedCloud::new(map, &prepare).map_err(|e| format!("the map: {e}"))?;
+    times.map_ms = milliseconds(started);
+    let started = Instant::now();
+    let cloud = voxel_downsample(&together(headset_scans), cell_side_m);
+    let cloud = PreparedCloud::new(cloud, &prepare).map_err(|e| format!("the cloud: {e}"))?;
+    let registration = register(&cloud, &map, start, method);
+    times.calibrate_ms = milliseconds(started);
+    Ok((registration, cloud.len()))
 }
 
 /// All headset scans as one cloud; points of headset scans without labels are unlabelled.
 fn together(headset_scans: Vec<HeadsetScan>) -> SemanticCloud {
-    let labelled = headset_scans
-        .iter()
-        .any(|headset_scan| !headset_scan.cloud.labels.is_empty());
+    let labelled = headset_scans.iter().any(|s| !s.cloud.labels.is_empty());
     let mut all = SemanticCloud::default();
     for HeadsetScan { cloud, .. } in headset_scans {
         if labelled {

@@ -20,7 +20,7 @@ use super::{CliResult, init_logging};
 use answer::{Answer, Times};
 use input::{Guess, Place};
 use lattice_nodes::files::classes::read_classes;
-use methods::MethodName;
+use methods::{MethodName, register_once};
 
 /// Options of `lattice calibrate`.
 ///
@@ -112,25 +112,18 @@ impl Calibrate {
             read_ms: milliseconds(started),
             ..Times::default()
         };
-        let points = headset_scans
-            .iter()
-            .map(|headset_scan| headset_scan.cloud.len())
-            .sum();
+        let points = headset_scans.iter().map(|scan| scan.cloud.len()).sum();
         let map_points = map.len();
-        let answer = match self.method.single() {
+        let mut answer = match self.method.single(self.gate) {
             Some(method) => {
                 let start = self.guess.as_ref().map(|g| g.0).unwrap_or_default();
-                let single = methods::Single {
-                    method,
-                    gate_m: self.gate,
-                    cell_side_m,
-                };
-                let registration = single.register(map, headset_scans, &start, &mut times)?;
+                let map = (map, cell_side_m);
+                let registration = register_once(&method, map, headset_scans, &start, &mut times)?;
                 Answer::of_registration(self.method.name(), &registration)
             }
             None => self.search(map, cell_side_m, &headset_scans, &names, &mut times)?,
         };
-        let answer = answer.with_counts(points, map_points, times);
+        (answer.points, answer.map_points, answer.times) = (points, map_points, times);
         if self.json {
             println!("{}", serde_json::to_string_pretty(&answer)?);
         } else {

@@ -99,38 +99,25 @@ impl Replay {
         let bag = BagReader::open(&self.bag)?;
         let plan = replay::plan(&bag, &self.wishes()?)?;
         let lattices: Vec<_> = self.maps()?.into_iter().map(|map| map.lattice).collect();
-        let count = lattices.len();
-        let progress = Progress::new("play");
-        let report = processes::run(
-            &DdsReplay {
-                bag: &self.bag,
-                reader: &bag,
-                plan: &plan,
-                lattices,
-                params_files: &self.params,
-                params: &self.param,
-                orientation: self.orientation,
-                rate: self.rate,
-                // Apart from a robot on domain 0, and from other replays.
-                domain: match std::env::var_os("ROS_DOMAIN_ID") {
-                    Some(_) => None,
-                    None if count > MAX_LOOPBACK_LATTICES => {
-                        return Err(format!(
-                            "{count} lattices over DDS on loopback: at most \
-                             {MAX_LOOPBACK_LATTICES} find each other; use --direct"
-                        )
-                        .into());
-                    }
-                    None => Some(LoopbackDomain::take()?),
-                },
-            },
-            &mut |done, what| {
-                progress.set(done);
-                progress.say(what);
-            },
-        )?;
-        progress.done();
-        Ok(report)
+        // Apart from a robot on domain 0, and from other replays.
+        let domain = match (std::env::var_os("ROS_DOMAIN_ID"), lattices.len()) {
+            (Some(_), _) => None,
+            (None, ..=MAX_LOOPBACK_LATTICES) => Some(LoopbackDomain::take()?),
+            (None, count) => {
+                return Err(format!(
+                    "{count} lattices over DDS on loopback: at most \
+                     {MAX_LOOPBACK_LATTICES} find each other; use --direct"
+                )
+                .into());
+            }
+        };
+        processes::run(&DdsReplay {
+            options: self,
+            reader: &bag,
+            plan: &plan,
+            lattices,
+            domain,
+        })
     }
 
     fn replay_direct(&self) -> CliResult<RunReport> {

@@ -1,6 +1,7 @@
 //! One node in a process of its own: started, listened to, ended.
 
 use std::collections::BTreeSet;
+use std::error::Error;
 use std::io::{self, BufRead, BufReader};
 use std::path::{Path, PathBuf};
 use std::process::{Child, Command, ExitStatus, Stdio};
@@ -10,15 +11,16 @@ use std::time::{Duration, Instant};
 
 use crossbeam_channel::{Receiver, Sender, unbounded};
 
-use super::processes::{DdsReplay, ProcessError, param, yaml_text};
+use super::processes::{DdsReplay, param, yaml_text};
+use crate::CliResult;
 use lattice_nodes::report;
 
 /// Texts of warnings that are remembered.
 const MAX_TEXTS: usize = 1000;
 /// Time for all nodes to find each other.
-pub const MATCH_TIME: Duration = Duration::from_secs(30);
+const MATCH_TIME: Duration = Duration::from_secs(30);
 /// Time for a node to work off its inbox at its end.
-pub const END_TIME: Duration = Duration::from_secs(60);
+const END_TIME: Duration = Duration::from_secs(60);
 
 /// A node in a process of its own, and what it logs.
 pub struct NodeProcess {
@@ -33,23 +35,14 @@ pub struct NodeProcess {
 impl NodeProcess {
     pub fn start(
         node: &str,
-        params: &[String],
-        replay: &DdsReplay,
-        report: &Path,
-    ) -> Result<Self, ProcessError> {
-        Self::start_in(node, None, params, replay, report)
-    }
-
-    pub fn start_in(
-        node: &str,
         namespace: Option<&str>,
         params: &[String],
         replay: &DdsReplay,
         report: &Path,
-    ) -> Result<Self, ProcessError> {
+    ) -> CliResult<Self> {
         let mut command = Command::new(std::env::current_exe()?);
         command.args(["node", node, "--ros-args", "--log-level", "info"]);
-        for file in replay.params_files {
+        for file in &replay.options.params {
             command.arg("--params-file").arg(file);
         }
         if let Some(namespace) = namespace {
@@ -59,7 +52,13 @@ impl NodeProcess {
             }
         }
         let report_file = param("report_file", &yaml_text(report));
-        for param in replay.params.iter().chain(params).chain([&report_file]) {
+        for param in replay
+            .options
+            .param
+            .iter()
+            .chain(params)
+            .chain([&report_file])
+        {
             command.args(["-p", param]);
         }
         if let Some(domain) = &replay.domain {
@@ -75,11 +74,8 @@ impl NodeProcess {
             Some(namespace) => format!("{namespace}/{node}"),
             None => node.to_owned(),
         };
-        let start = |error| ProcessError::Start {
-            what: what.clone(),
-            error,
-        };
-        let mut child = command.spawn().map_err(start)?;
+        let spawned = command.spawn();
+        let mut child = spawned.map_err(|error| format!("cannot start {what}: {error}"))?;
         let (sender, lines) = unbounded();
         let stderr = child.stderr.take();
         let reader = stderr.map(|stderr| forward(stderr, what.clone(), sender));
@@ -94,7 +90,7 @@ impl NodeProcess {
     }
 
     /// Waits until the node has logged a line with this text.
-    pub fn expect(&mut self, text: &str) -> Result<(), ProcessError> {
+    pub fn expect(&mut self, text: &str) -> CliResult {
         let deadline = Instant::now() + MATCH_TIME;
         while !self.seen.iter().any(|line| line.contains(text)) {
             match self.lines.recv_deadline(deadline) {
@@ -103,10 +99,13 @@ impl NodeProcess {
                     if let Some(status) = self.child.try_wait()? {
                         return Err(self.ended(status));
                     }
-                    return Err(ProcessError::NotMatched {
-                        what: self.name.clone(),
-                        waited: text.to_owned(),
-                    });
+                    return Err(format!(
+                        "{} did not log '{text}' within {} s: is the loopback interface up, and \
+                         its domain used by nothing else?",
+                        self.name,
+                        MATCH_TIME.as_secs()
+                    )
+                    .into());
                 }
             }
         }
@@ -114,7 +113,7 @@ impl NodeProcess {
     }
 
     /// Waits for the player's end; reports its progress.
-    pub fn played(mut self, progress: &mut dyn FnMut(f64)) -> Result<(), ProcessError> {
+    pub fn played(mut self, progress: &mut dyn FnMut(f64)) -> CliResult {
         while let Ok(line) = self.lines.recv() {
             let share = line.rsplit_once("played ").map(|(_, share)| share);
             let share = share.and_then(|share| share.trim_end_matches(" %").parse::<f64>().ok());
@@ -132,7 +131,7 @@ impl NodeProcess {
     }
 
     /// Ends the node, waits for that, and reads its report.
-    pub fn end<T: for<'de> serde::Deserialize<'de>>(mut self) -> Result<T, ProcessError> {
+    pub fn end<T: for<'de> serde::Deserialize<'de>>(mut self) -> CliResult<T> {
         interrupt(&self.child)?;
         let deadline = Instant::now() + END_TIME;
         // The log ends when the process does.
@@ -140,9 +139,8 @@ impl NodeProcess {
             match self.lines.recv_deadline(deadline) {
                 Ok(line) => self.seen.push(line),
                 Err(error) if error.is_timeout() => {
-                    return Err(ProcessError::Stuck {
-                        what: self.name.clone(),
-                    });
+                    let limit_s = END_TIME.as_secs();
+                    return Err(format!("{} did not end within {limit_s} s", self.name).into());
                 }
                 Err(_) => break,
             }
@@ -151,19 +149,14 @@ impl NodeProcess {
         if !status.success() {
             return Err(self.ended(status));
         }
-        report::read(&self.report).map_err(|error| ProcessError::NoReport {
-            what: self.name.clone(),
-            error,
-        })
+        let read = report::read(&self.report);
+        read.map_err(|error| format!("no report of {}: {error}", self.name).into())
     }
 
-    fn ended(&mut self, status: ExitStatus) -> ProcessError {
+    fn ended(&mut self, status: ExitStatus) -> Box<dyn Error + Send + Sync> {
         self.seen.extend(self.lines.try_iter());
-        ProcessError::Ended {
-            what: self.name.clone(),
-            status,
-            words: self.seen.last().cloned().unwrap_or_default(),
-        }
+        let words = self.seen.last().map_or("", String::as_str);
+        format!("{} ended with {status}; its last words: {words}", self.name).into()
     }
 }
 

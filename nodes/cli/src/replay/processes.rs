@@ -1,102 +1,45 @@
 //! Replay over DDS: the player and one process for each node, on a loopback domain of their own.
 
-use std::io;
-use std::path::{Path, PathBuf};
-use std::process::ExitStatus;
+use std::path::Path;
 use std::time::Instant;
 
-use lattice_core::lattice::{Lattice, Orientation};
-use thiserror::Error;
+use lattice_core::lattice::Lattice;
 
-use super::node_process::{END_TIME, MATCH_TIME, NodeProcess};
+use super::Replay;
+use super::node_process::NodeProcess;
+use crate::CliResult;
+use crate::progress::Progress;
 use lattice_bag::BagReader;
 use lattice_nodes::replay::{LatticeReport, Role, RunReport, TopicPlan};
 use lattice_runtime::LoopbackDomain;
 
-/// An error of a replay over DDS.
-#[derive(Debug, Error)]
-pub enum ProcessError {
-    /// A process did not start.
-    #[error("cannot start {what}: {error}")]
-    Start {
-        /// Node.
-        what: String,
-        /// Reason.
-        error: io::Error,
-    },
-    /// A process ended by itself.
-    #[error("{what} ended with {status}; its last words: {words}")]
-    Ended {
-        /// Node.
-        what: String,
-        /// Status.
-        status: ExitStatus,
-        /// Last line of its log.
-        words: String,
-    },
-    /// The nodes did not find each other.
-    #[error("{what} did not log '{waited}' within {} s: is the loopback interface up, and its domain used by nothing else?", MATCH_TIME.as_secs())]
-    NotMatched {
-        /// Node.
-        what: String,
-        /// Line waited for.
-        waited: String,
-    },
-    /// A node did not end on request.
-    #[error("{what} did not end within {} s", END_TIME.as_secs())]
-    Stuck {
-        /// Node.
-        what: String,
-    },
-    /// A node left no report.
-    #[error("no report of {what}: {error}")]
-    NoReport {
-        /// Node.
-        what: String,
-        /// Reason.
-        error: io::Error,
-    },
-    /// Files.
-    #[error("{0}")]
-    Io(#[from] io::Error),
-}
-
-/// Options of a replay over DDS.
+/// A replay over DDS.
 pub struct DdsReplay<'a> {
+    /// Options of the command.
+    pub options: &'a Replay,
     /// The log.
-    pub bag: &'a Path,
-    /// The same, open.
     pub reader: &'a BagReader,
     /// Roles of its topics.
     pub plan: &'a TopicPlan,
     /// One map for each.
     pub lattices: Vec<Lattice>,
-    /// Orientation of the lattices, if not that of the parameters.
-    pub orientation: Option<Orientation>,
-    /// Parameter files of the nodes.
-    pub params_files: &'a [PathBuf],
-    /// Further parameters, `name:=value`.
-    pub params: &'a [String],
-    /// Speed, 1 is real time.
-    pub rate: f64,
     /// Domain of the processes; `None`: that of `ROS_DOMAIN_ID`.
     pub domain: Option<LoopbackDomain>,
 }
 
 /// Plays the log through separate processes and collects their reports.
-pub fn run(
-    replay: &DdsReplay,
-    progress: &mut dyn FnMut(f64, &str),
-) -> Result<RunReport, ProcessError> {
+pub fn run(replay: &DdsReplay) -> CliResult<RunReport> {
+    let progress = Progress::new("play");
     let scratch = tempfile::tempdir()?;
     let begin = Instant::now();
-    progress(0.0, "nodes find each other");
+    progress.say("nodes find each other");
     let mut branches = Vec::new();
     for lattice in &replay.lattices {
         branches.push(Branch::start(replay, lattice, scratch.path())?);
     }
     let mut transformer = NodeProcess::start(
         "enu_transformer",
+        None,
         &replay.transformer_arguments(),
         replay,
         &scratch.path().join("enu_transformer.json"),
@@ -110,21 +53,25 @@ pub fn run(
     ))?;
     let player = NodeProcess::start(
         "bag_player",
+        None,
         &replay.player_arguments(),
         replay,
         &scratch.path().join("bag_player.json"),
     )?;
-    player.played(&mut |done| progress(done, ""))?;
-    progress(1.0, "nodes end");
+    progress.say("");
+    player.played(&mut |done| progress.set(done))?;
+    progress.say("nodes end");
     let transformer = transformer.end()?;
     let lattices = branches.into_iter().map(Branch::end);
-    Ok(RunReport {
-        source: replay.bag.display().to_string(),
+    let report = RunReport {
+        source: replay.options.bag.display().to_string(),
         clouds_in_log: replay.plan.clouds(replay.reader),
         transformer,
         lattices: lattices.collect::<Result<_, _>>()?,
         wall_s: begin.elapsed().as_secs_f64(),
-    })
+    };
+    progress.done();
+    Ok(report)
 }
 
 impl DdsReplay<'_> {
@@ -166,8 +113,8 @@ impl DdsReplay<'_> {
         let wanted = self.topic(|_| true);
         let waited = self.topic(|role| !matches!(role, Role::Transforms(_)));
         let mut arguments = vec![
-            param("bag", &yaml_text(self.bag)),
-            param("rate", &format!("{:?}", self.rate)),
+            param("bag", &yaml_text(&self.options.bag)),
+            param("rate", &format!("{:?}", self.options.rate)),
             param("topics", &quoted(&wanted)),
             param("wait_for_subscribers", &quoted(&waited)),
         ];
@@ -201,15 +148,14 @@ struct Branch {
 }
 
 impl Branch {
-    fn start(replay: &DdsReplay, lattice: &Lattice, scratch: &Path) -> Result<Self, ProcessError> {
+    fn start(replay: &DdsReplay, lattice: &Lattice, scratch: &Path) -> CliResult<Self> {
         let name = lattice.kind().name();
         let start = |node: &str, params: Vec<String>| {
             let report = scratch.join(format!("{name}_{node}.json"));
-            NodeProcess::start_in(node, Some(name), &params, replay, &report)
+            NodeProcess::start(node, Some(name), &params, replay, &report)
         };
-        let orientation = replay
-            .orientation
-            .map(|o| param("lattice_orientation", &o.to_string()));
+        let orientation = replay.options.orientation;
+        let orientation = orientation.map(|o| param("lattice_orientation", &o.to_string()));
         let mut params = vec![
             param("lattice", name),
             param("cell_volume_m3", &format!("{:?}", lattice.cell_volume_m3())),
@@ -226,7 +172,7 @@ impl Branch {
         })
     }
 
-    fn matched(&mut self) -> Result<(), ProcessError> {
+    fn matched(&mut self) -> CliResult {
         for topic in ["map", "map_updates"] {
             let line = format!("{}/{topic}: subscriber matched (1)", self.namespace);
             self.mapper.expect(&line)?;
@@ -236,7 +182,7 @@ impl Branch {
         self.mapper.expect("/points_enu: publisher matched (1)")
     }
 
-    fn end(self) -> Result<LatticeReport, ProcessError> {
+    fn end(self) -> CliResult<LatticeReport> {
         Ok(LatticeReport {
             map: self.mapper.end()?,
             markers: self.markers.end()?,

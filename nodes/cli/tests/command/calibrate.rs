@@ -1,29 +1,20 @@
 //! `lattice calibrate` as a user runs it.
 
 use std::path::Path;
-use std::process::{Command, Output};
+use std::process::Output;
 
 use nalgebra::{Isometry3, Point3, Vector3};
 use serde_json::Value;
 
-fn lattice(arguments: &[&str]) -> Output {
-    Command::new(env!("CARGO_BIN_EXE_lattice"))
-        .arg("calibrate")
-        .args(arguments)
-        .output()
-        .unwrap()
+use crate::{error, lattice};
+
+fn calibrate(arguments: &[&str]) -> Output {
+    lattice(&[&["calibrate"], arguments].concat())
 }
 
 fn answer(output: &Output) -> Value {
     let errors = String::from_utf8_lossy(&output.stderr);
     serde_json::from_slice(&output.stdout).unwrap_or_else(|_| panic!("{errors}"))
-}
-
-fn fault(output: &Output) -> String {
-    assert!(!output.status.success());
-    let text = String::from_utf8(output.stderr.clone()).unwrap();
-    assert_eq!(text.lines().count(), 1, "{text}");
-    text
 }
 
 struct Labelled(Vec<(Point3<f64>, u16)>);
@@ -112,7 +103,7 @@ fn a_cloud_is_found_without_a_guess_whatever_its_axes_and_labels_are_learned() {
 
     let arguments = ["--map", &map, "--cloud", &ros, "--labels", &names];
     let more = ["--sensor", "0 0 0", "--confusion", &learned_name, "--json"];
-    let output = lattice(&[&arguments[..], &more].concat());
+    let output = calibrate(&[&arguments[..], &more].concat());
     let first = answer(&output);
     assert!(output.status.success(), "{first}");
     assert_eq!(first["verdict"], "OK");
@@ -125,20 +116,13 @@ fn a_cloud_is_found_without_a_guess_whatever_its_axes_and_labels_are_learned() {
 
     // The learned confusion is read again.
     assert!(learned.exists());
-    let axes = [
-        "--map",
-        &map,
-        "--cloud",
-        &unity,
-        "--axes",
-        "unity_ruf",
-        "--json",
-    ];
-    let output = lattice(&[&axes[..], &["--confusion", &learned_name]].concat());
+    let axes = ["--map", &map, "--cloud", &unity, "--axes", "unity_ruf"];
+    let more = ["--confusion", &learned_name, "--json"];
+    let output = calibrate(&[&axes[..], &more].concat());
     assert!(output.status.success());
     check_pose(&answer(&output));
 
-    let text = lattice(&["--map", &map, "--cloud", &ros, "--guess", "2.5 2.1 1.5 110"]);
+    let text = calibrate(&["--map", &map, "--cloud", &ros, "--guess", "2.5 2.1 1.5 110"]);
     let text = String::from_utf8(text.stdout).unwrap();
     for line in [
         "verdict        OK",
@@ -163,10 +147,12 @@ fn what_is_not_ok_fails_and_is_printed_all_the_same() {
         .filter(|(p, _)| p.z == 0.0 && p.x < 1.0 && p.y < 1.0);
     let floor = Labelled(of_floor.copied().collect());
     let floor = floor.write(folder.path(), "floor.ply", |p| p.coords.into());
-    let output = lattice(&["--map", &map, "--cloud", &floor, "--json"]);
+    let output = calibrate(&["--map", &map, "--cloud", &floor, "--json"]);
     let verdict = answer(&output)["verdict"].as_str().unwrap().to_owned();
     assert_ne!(verdict, "OK");
-    assert!(fault(&output).contains(&verdict));
+    let errors = String::from_utf8(output.stderr).unwrap();
+    assert!(!output.status.success() && errors.lines().count() == 1);
+    assert!(errors.contains(&verdict), "{errors}");
 }
 
 #[test]
@@ -175,17 +161,10 @@ fn single_registrations_start_from_the_guess() {
     let room = Labelled::room();
     let map = room.write(folder.path(), "map.ply", |p| p.coords.into());
     let cloud = seen(&room).write(folder.path(), "cloud.ply", |p| p.coords.into());
-    let common = [
-        "--map",
-        &map,
-        "--cloud",
-        &cloud,
-        "--guess",
-        "2.65 2.15 1.5 116",
-        "--json",
-    ];
+    let guess = "2.65 2.15 1.5 116";
+    let common = ["--map", &map, "--cloud", &cloud, "--guess", guess];
     for method in ["gicp", "gicp-se3", "semantic-published", "class-wise"] {
-        let output = lattice(&[&common[..], &["--method", method]].concat());
+        let output = calibrate(&[&common[..], &["--json", "--method", method]].concat());
         let answer = answer(&output);
         assert!(output.status.success(), "{answer}");
         assert_eq!(
@@ -217,11 +196,11 @@ fn faults_are_one_line() {
             "--cell 0 is no length over 0",
         ),
     ] {
-        let text = fault(&lattice(&arguments));
+        let text = error(&[&["calibrate"], &arguments[..]].concat());
         assert!(text.contains(message), "{text}");
     }
     // Those of the command line itself come with the usage.
-    let output = lattice(&[&common[..], &["--guess", "1 2 3"]].concat());
+    let output = calibrate(&[&common[..], &["--guess", "1 2 3"]].concat());
     let text = String::from_utf8(output.stderr).unwrap();
     assert!(text.contains("3 numbers instead of 4 or 7"), "{text}");
 }

@@ -1,24 +1,14 @@
 //! `lattice evaluate` as a user runs it.
 
 use std::path::Path;
-use std::process::{Command, Output};
 
 use serde_json::Value;
 
-fn evaluate(folder: &Path, more: &[&str]) -> Output {
-    Command::new(env!("CARGO_BIN_EXE_lattice"))
-        .args([
-            "evaluate",
-            "calibration",
-            "--quick",
-            "--scenes",
-            "desk",
-            "--out",
-        ])
-        .arg(folder)
-        .args(more)
-        .output()
-        .unwrap()
+use crate::{error, json, text};
+
+fn evaluate<'a>(folder: &'a Path, more: &[&'a str]) -> Vec<&'a str> {
+    let quick = ["evaluate", "calibration", "--quick", "--scenes", "desk"];
+    [&quick[..], &["--out", folder.to_str().unwrap()], more].concat()
 }
 
 /// The lines of the results in an order of their own, without the times.
@@ -37,16 +27,10 @@ fn trials(folder: &Path) -> Vec<String> {
 #[test]
 fn an_evaluation_is_continued_and_does_not_depend_on_threads() {
     let folder = tempfile::tempdir().unwrap();
-    let output = evaluate(folder.path(), &["--threads", "2"]);
-    assert!(
-        output.status.success(),
-        "{}",
-        String::from_utf8_lossy(&output.stderr)
-    );
+    let report = text(&evaluate(folder.path(), &["--threads", "2"]));
     let all = trials(folder.path());
     // Settings; two shares of wrong labels, from a start by ten methods and without by ours; two timed.
     assert_eq!(all.len(), 1 + 2 * (10 + 1) + 2);
-    let report = String::from_utf8(output.stdout).unwrap();
     for part in [
         "## Table 1 of the paper",
         "| desk | 5.42 | 0.05 |",
@@ -63,17 +47,11 @@ fn an_evaluation_is_continued_and_does_not_depend_on_threads() {
     // Ended in the middle of a line.
     let path = folder.path().join("trials.jsonl");
     let text = std::fs::read_to_string(&path).unwrap();
-    std::fs::write(&path, &text[..text.len() / 2]).unwrap();
-    let output = evaluate(folder.path(), &["--threads", "1", "--json"]);
-    let summary: Value = serde_json::from_slice(&output.stdout).unwrap();
+    std::fs::write(&path, &text[..text.len() * 3 / 4]).unwrap();
+    let summary = json(&evaluate(folder.path(), &["--threads", "1"]));
     assert_eq!(summary["trials"], all.len() as u64 - 1);
     assert_eq!(trials(folder.path()), all);
 
-    let output = evaluate(folder.path(), &["--headset-scans", "2"]);
-    assert!(!output.status.success());
-    let fault = String::from_utf8(output.stderr).unwrap();
-    assert!(
-        fault.contains("other settings") && fault.lines().count() == 1,
-        "{fault}"
-    );
+    let other = error(&evaluate(folder.path(), &["--headset-scans", "2"]));
+    assert!(other.contains("other settings"), "{other}");
 }

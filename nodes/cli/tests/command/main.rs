@@ -7,3 +7,39 @@ mod evaluate;
 mod map;
 mod nodes;
 mod paper;
+
+use std::process::{Command, Output};
+
+use serde_json::Value;
+
+fn lattice(arguments: &[&str]) -> Output {
+    Command::new(env!("CARGO_BIN_EXE_lattice"))
+        .args(arguments)
+        // Each replay takes a domain of its own.
+        .env_remove("ROS_DOMAIN_ID")
+        .env("RAYON_NUM_THREADS", "3")
+        .output()
+        .unwrap()
+}
+
+/// What it prints when it succeeds.
+fn text(arguments: &[&str]) -> String {
+    let output = lattice(arguments);
+    let errors = String::from_utf8_lossy(&output.stderr);
+    assert!(output.status.success(), "{arguments:?}: {errors}");
+    String::from_utf8(output.stdout).unwrap()
+}
+
+fn json(arguments: &[&str]) -> Value {
+    serde_json::from_str(&text(&[arguments, &["--json"]].concat())).unwrap()
+}
+
+/// The one line of an error.
+fn error(arguments: &[&str]) -> String {
+    let output = lattice(arguments);
+    assert!(!output.status.success(), "{arguments:?} should fail");
+    assert!(output.stdout.is_empty());
+    let text = String::from_utf8(output.stderr).unwrap();
+    assert_eq!(text.lines().count(), 1, "{text}");
+    text
+}

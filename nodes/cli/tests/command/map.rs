@@ -1,38 +1,14 @@
 //! `lattice map merge`, `diff`, `crop` and `query` as a user runs them.
 
 use std::path::Path;
-use std::process::{Command, Output};
 
 use lattice_core::cloud::Cloud;
 use lattice_core::lattice::{Lattice, LatticeKind};
 use lattice_core::voxels::VoxelList;
 use lattice_core::voxels::file::{MapContents, write_map};
 use nalgebra::Vector3;
-use serde_json::Value;
 
-fn lattice(arguments: &[&str]) -> Output {
-    Command::new(env!("CARGO_BIN_EXE_lattice"))
-        .args(arguments)
-        .output()
-        .unwrap()
-}
-
-fn json(arguments: &[&str]) -> Value {
-    let output = lattice(&[arguments, &["--json"]].concat());
-    let errors = String::from_utf8_lossy(&output.stderr);
-    assert!(output.status.success(), "{arguments:?}: {errors}");
-    serde_json::from_slice(&output.stdout).unwrap()
-}
-
-/// The one line of an error.
-fn error(arguments: &[&str]) -> String {
-    let output = lattice(arguments);
-    assert!(!output.status.success(), "{arguments:?} should fail");
-    assert!(output.stdout.is_empty());
-    let text = String::from_utf8(output.stderr).unwrap();
-    assert_eq!(text.lines().count(), 1, "{text}");
-    text
-}
+use crate::{error, json, lattice, text};
 
 /// The map of points in the map frame, with the datum near a place.
 fn map(kind: LatticeKind, datum_m: [f64; 3], points_m: &[[f32; 3]]) -> VoxelList {
@@ -66,18 +42,11 @@ fn maps_merge_differ_and_are_cut() {
     let directory = tempfile::tempdir().unwrap();
     let at = |name: &str| directory.path().join(name).display().to_string();
     let (first, second) = (points(-50..120), points(80..200));
-    let a = save(
-        directory.path(),
-        "a",
-        &map(LatticeKind::Fcc, [0.0; 3], &first),
-    );
+    let save = |name: &str, list: &VoxelList| save(directory.path(), name, list);
+    let a = save("a", &map(LatticeKind::Fcc, [0.0; 3], &first));
     // The same cells counted from elsewhere.
     let far_m = [300.0, -20.0, 7.0];
-    let b = save(
-        directory.path(),
-        "b",
-        &map(LatticeKind::Fcc, far_m, &second),
-    );
+    let b = save("b", &map(LatticeKind::Fcc, far_m, &second));
     let whole = map(LatticeKind::Fcc, [0.0; 3], &[&first[..], &second].concat());
     let (a_keys, whole_keys) = (load(&a), MapContents::from_list(&whole));
 
@@ -102,25 +71,13 @@ fn maps_merge_differ_and_are_cut() {
     assert_eq!(json(&["map", "diff", &b, &rest])["only_b"], 0);
     assert_eq!(json(&["map", "diff", &a, &rest])["both"], 0);
     let again = at("again");
-    json(&[
-        "map",
-        "merge",
-        &a,
-        &rest,
-        "-o",
-        &again,
-        "--occupancy-only",
-        "--zstd=19",
-    ]);
+    let small = ["-o", &again, "--occupancy-only", "--zstd=19"];
+    json(&[&["map", "merge", &a, &rest], &small[..]].concat());
     assert_eq!(load(&again).keys(), whole_keys.keys());
     assert!(load(&again).voxels().is_none());
     let info = json(&["map", "info", &again]);
     assert_eq!(info["counts"], false);
-    assert!(
-        lattice(&["map", "export", &again, "-o", &at("again.ply")])
-            .status
-            .success()
-    );
+    text(&["map", "export", &again, "-o", &at("again.ply")]);
 
     let (left, right) = (at("left"), at("right"));
     let (low, high) = (["-1e3", "-1e3", "-2"], ["1e3", "1e3", "2"]);
@@ -143,26 +100,18 @@ fn maps_merge_differ_and_are_cut() {
 fn what_does_not_go_together_is_refused_in_a_line() {
     let directory = tempfile::tempdir().unwrap();
     let at = |name: &str| directory.path().join(name).display().to_string();
-    let fcc = save(
-        directory.path(),
-        "fcc",
-        &map(LatticeKind::Fcc, [0.0; 3], &points(0..9)),
-    );
-    let hex = save(
-        directory.path(),
-        "hex",
-        &map(LatticeKind::Hex, [0.0; 3], &points(0..9)),
-    );
-    let far_m = [1e7, 0.0, 0.0];
-    let far = save(directory.path(), "far", &{
-        let mut list = map(LatticeKind::Fcc, far_m, &[]);
+    let saved = |name: &str, kind, datum_m: [f64; 3]| {
+        let mut list = map(kind, datum_m, &[]);
         list.insert(&Cloud {
             stamp_ns: 0,
-            datum_m: far_m.into(),
+            datum_m: datum_m.into(),
             offsets_m: points(0..9),
         });
-        list
-    });
+        save(directory.path(), name, &list)
+    };
+    let fcc = saved("fcc", LatticeKind::Fcc, [0.0; 3]);
+    let hex = saved("hex", LatticeKind::Hex, [0.0; 3]);
+    let far = saved("far", LatticeKind::Fcc, [1e7, 0.0, 0.0]);
     let out = at("out");
     for command in [
         vec!["merge", &fcc, &hex, "-o", &out],
@@ -221,8 +170,7 @@ fn maps_answer_questions() {
         &serde_json::json!([0.0, 0.0, 0.0])
     );
     assert_eq!(centers.last().unwrap(), &serde_json::json!([4.0, 0.0, 0.0]));
-    let plain = lattice(&["map", "query", &path, "--nearest", "1", "0", "0"]);
-    let plain = String::from_utf8(plain.stdout).unwrap();
+    let plain = text(&["map", "query", &path, "--nearest", "1", "0", "0"]);
     assert_eq!(plain, "1.000 m to the cell at 2.000 0.000 0.000\n");
     let blocked = [
         "map", "query", &path, "--path", "2", "0", "0", "4", "0", "0", "--radius", "0",

@@ -2,46 +2,15 @@
 
 use std::io::{Write, stderr};
 use std::path::Path;
-use std::process::{Command, Output};
 
 use serde_json::Value;
 
-fn lattice(arguments: &[&str]) -> Output {
-    Command::new(env!("CARGO_BIN_EXE_lattice"))
-        .args(arguments)
-        // Each replay takes a domain of its own.
-        .env_remove("ROS_DOMAIN_ID")
-        .output()
-        .unwrap()
-}
-
-fn json(arguments: &[&str]) -> Value {
-    let output = lattice(arguments);
-    let errors = String::from_utf8_lossy(&output.stderr);
-    assert!(output.status.success(), "{arguments:?}: {errors}");
-    serde_json::from_slice(&output.stdout).unwrap()
-}
-
-fn error(arguments: &[&str]) -> String {
-    let output = lattice(arguments);
-    assert!(!output.status.success(), "{arguments:?} should fail");
-    assert!(output.stdout.is_empty());
-    String::from_utf8(output.stderr).unwrap()
-}
+use crate::{error, json, lattice, text};
 
 fn simulated(directory: &Path, storage: &str, seconds: &str) -> String {
     let log = directory.join(storage).display().to_string();
-    let summary = json(&[
-        "simulate",
-        "bobcat",
-        "--out",
-        &log,
-        "--duration",
-        seconds,
-        "--storage",
-        storage,
-        "--json",
-    ]);
+    let bobcat = ["simulate", "bobcat", "--out", &log, "--duration", seconds];
+    let summary = json(&[&bobcat[..], &["--storage", storage]].concat());
     assert!(summary["clouds"].as_u64().unwrap() > 100);
     log
 }
@@ -67,7 +36,7 @@ fn figures(report: &Value) -> Vec<Value> {
 fn a_log_played_through_node_processes_gives_the_map_of_the_direct_replay() {
     let directory = tempfile::tempdir().unwrap();
     let log = simulated(directory.path(), "mcap", "3");
-    let given = [&*log, "--params", PARAMS, "--lattice", "fcc,mcc", "--json"];
+    let given = [&*log, "--params", PARAMS, "--lattice", "fcc,mcc"];
     let common = [&given[..], &["--orientation", "ground"]].concat();
     let direct = json(&[&["replay", "--direct"], &common[..]].concat());
     let by_param = [&given[..], &["-p", "lattice_orientation:=ground"]].concat();
@@ -76,15 +45,13 @@ fn a_log_played_through_node_processes_gives_the_map_of_the_direct_replay() {
     let paper = json(&[&["replay", "--direct"], &given[..]].concat());
     assert_ne!(figures(&paper), figures(&direct));
     let played = json(&[&["replay"], &common[..]].concat());
-    assert_eq!(
-        direct["transformer"]["counts"]["clouds_dropped"],
-        Value::Null
-    );
     for report in [&direct, &played] {
         let counts = &report["transformer"]["counts"];
         assert_eq!(counts["clouds_in"], report["clouds_in_log"]);
         assert_eq!(counts["clouds_out"], report["clouds_in_log"]);
-        assert_eq!(report["transformer"]["clouds_inbox_full"], 0);
+        for lost in ["clouds_inbox_full", "clouds_not_published"] {
+            assert_eq!(report["transformer"][lost], 0, "{lost}");
+        }
     }
     assert_eq!(figures(&direct), figures(&played));
     for branch in played["lattices"].as_array().unwrap() {
@@ -110,8 +77,8 @@ fn no_cloud_of_a_real_log_is_lost_on_the_way_through_node_processes() {
         );
         return;
     }
-    let direct = json(&["replay", "--direct", log, "--lattice", "bcc", "--json"]);
-    let played = json(&["replay", log, "--lattice", "bcc", "--json"]);
+    let direct = json(&["replay", "--direct", log, "--lattice", "bcc"]);
+    let played = json(&["replay", log, "--lattice", "bcc"]);
     assert_eq!(played["transformer"]["counts"]["clouds_out"], 8);
     assert_eq!(played["lattices"][0]["map"]["points"], 994_498);
     assert_eq!(figures(&direct), figures(&played));
@@ -120,11 +87,11 @@ fn no_cloud_of_a_real_log_is_lost_on_the_way_through_node_processes() {
 #[test]
 fn both_storages_give_the_same_map() {
     let directory = tempfile::tempdir().unwrap();
-    let reports = ["mcap", "sqlite3"].map(|storage| {
+    let [mcap, sqlite3] = ["mcap", "sqlite3"].map(|storage| {
         let log = simulated(directory.path(), storage, "2");
-        json(&["replay", "--direct", &log, "--params", PARAMS, "--json"])
+        figures(&json(&["replay", "--direct", &log, "--params", PARAMS]))
     });
-    assert_eq!(figures(&reports[0]), figures(&reports[1]));
+    assert_eq!(mcap, sqlite3);
 }
 
 #[test]
@@ -134,26 +101,18 @@ fn a_map_file_can_be_looked_into_and_exported() {
     std::fs::write(&cloud, "0 0 0\n0.01 0 0\n5 0 0\nnan 1 2\n").unwrap();
     let map = directory.path().join("cloud.lattice").display().to_string();
     let cloud = cloud.display().to_string();
-    let rows = json(&[
-        "quantize",
-        &cloud,
-        "--lattice",
-        "fcc,cubic",
-        "--map-out",
-        &map,
-        "--json",
-    ]);
+    let quantize = ["quantize", &cloud, "--lattice", "fcc,cubic"];
+    let rows = json(&[&quantize[..], &["--map-out", &map]].concat());
     assert_eq!(rows[0]["voxels"], 2);
     assert_eq!(rows[1]["lattice"], "cubic");
     assert_eq!(rows[1]["refused_not_finite"], 1);
-    let info = json(&["map", "info", &map, "--json"]);
+    let info = json(&["map", "info", &map]);
     assert_eq!(info["voxels"], 2);
     assert_eq!(info["points"], 3);
     for (form, begin) in [("centers", "ply"), ("mesh", "ply"), ("png", "\u{fffd}PNG")] {
         let out = directory.path().join(form);
         let name = out.display().to_string();
-        let output = lattice(&["map", "export", &map, "--out", &name, "--as", form]);
-        assert!(output.status.success());
+        text(&["map", "export", &map, "--out", &name, "--as", form]);
         let bytes = std::fs::read(&out).unwrap();
         assert!(String::from_utf8_lossy(&bytes).starts_with(begin), "{form}");
     }
@@ -166,7 +125,8 @@ fn errors_say_what_was_wrong_where_and_what_to_do() {
     assert!(error(&["replay", "--direct", &nothing]).contains(&nothing));
     assert!(error(&["map", "info", &nothing]).contains(&nothing));
     assert!(error(&["quantize", &nothing]).contains(&nothing));
-    assert!(error(&["quantize", &nothing, "--lattice", "penrose"]).contains("fcc"));
+    let usage = lattice(&["quantize", &nothing, "--lattice", "penrose"]);
+    assert!(String::from_utf8_lossy(&usage.stderr).contains("fcc"));
     assert!(error(&["node", "nobody"]).contains("lattice_mapper"));
     assert!(error(&["run", &nothing]).contains(&nothing));
     let log = simulated(directory.path(), "mcap", "2");
@@ -183,8 +143,6 @@ fn errors_say_what_was_wrong_where_and_what_to_do() {
 #[test]
 fn every_command_has_help() {
     for command in ["demo", "run", "replay", "simulate", "quantize", "map"] {
-        let output = lattice(&[command, "--help"]);
-        assert!(output.status.success());
-        assert!(String::from_utf8(output.stdout).unwrap().contains("Usage"));
+        assert!(text(&[command, "--help"]).contains("Usage"));
     }
 }

@@ -121,12 +121,12 @@ mod tests {
         let options = SiteOptions {
             seed,
             pattern,
-            points: 40_000,
+            points: 10_000,
             out: out.clone(),
         };
         let pool = crate::pool(threads).unwrap();
         let summary = pool.install(|| write_site(&options, &mut |_| ())).unwrap();
-        assert_eq!(summary.points, 40_000);
+        assert_eq!(summary.points, 10_000);
         (fs::read(&out).unwrap(), fs::read(scans_path(&out)).unwrap())
     }
 
@@ -134,7 +134,7 @@ mod tests {
     fn any_number_of_threads_writes_the_same_bytes() {
         for pattern in [SurveyPattern::Lms200, SurveyPattern::Os64] {
             let one = written(1, 3, pattern);
-            assert_eq!(one.0.len(), 640_000);
+            assert_eq!(one.0.len(), 160_000);
             assert!(one == written(3, 3, pattern), "{pattern:?}");
             assert!(one != written(1, 4, pattern), "{pattern:?}");
         }

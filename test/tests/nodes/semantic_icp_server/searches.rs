@@ -293,7 +293,7 @@ fn a_left_handed_headset_is_found_and_a_mirrored_one_is_not() {
     bench.cloud(&headset_cloud(&look, 1, mirrored));
     assert_eq!(bench.verdict(), REJECTED, "{}", bench.reason());
     assert!(bench.reason().contains("mirrored"), "{}", bench.reason());
-    for turn in 0..3 {
+    for turn in 0..2 {
         bench.cloud(&headset_cloud(&look, 2, unity));
         assert_eq!(bench.verdict(), OK, "{turn}: {}", bench.reason());
         let found = isometry_from_transform(&bench.results.last().unwrap().transform).unwrap();
@@ -305,5 +305,5 @@ fn a_left_handed_headset_is_found_and_a_mirrored_one_is_not() {
         assert_eq!(bench.verdict(), REJECTED, "{turn}: {}", bench.reason());
     }
     let counts = bench.machine.counts();
-    assert_eq!(counts.tracking_misses + counts.tracking_doubts, 3);
+    assert_eq!(counts.tracking_misses + counts.tracking_doubts, 2);
 }

@@ -110,3 +110,29 @@ fn pairs(differences: impl IntoIterator<Item = LatticeIndex>) -> String {
     let words = half.iter().map(|[a, b, c]| format!("±({a},{b},{c})"));
     words.collect::<Vec<_>>().join(" ")
 }
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn sections_do_not_depend_on_threads() {
+        let options = Options {
+            seed: 1,
+            quick: true,
+            scans: Vec::new(),
+            bags: Vec::new(),
+            pairs: None,
+        };
+        // Figs. 5 and 6 take most of the time and go through the same loops.
+        let (sections, _) = SECTIONS.split_at(7);
+        let make = |(_, _, make): &(&str, f64, Make)| {
+            serde_json::to_string(&make(&options, &mut |_| {}).unwrap()).unwrap()
+        };
+        let on = |threads: usize| {
+            let all = || sections.iter().map(make).collect::<Vec<_>>();
+            crate::pool(threads).unwrap().install(all)
+        };
+        assert_eq!(on(1), on(3));
+    }
+}

@@ -1,56 +1,35 @@
-//! Shape of a message as serde sees it, and values that fill every field.
-
-use std::fmt;
+//! Fields of a message as serde sees them, and values that fill every field.
 
 use serde::de::value::Error;
 use serde::de::{DeserializeOwned, DeserializeSeed, Deserializer, Error as _, SeqAccess, Visitor};
 use serde::forward_to_deserialize_any;
 
-/// Type of a field, as ROS writes it: `uint8`, `string`, `Point[]`, `float64[36]`.
-#[derive(Clone, Debug, PartialEq)]
-pub enum Shape {
-    /// A number, a truth value or a text.
-    Primitive(&'static str),
-    /// A block of bytes.
-    Bytes,
-    /// Any number of elements.
-    Sequence(Box<Shape>),
-    /// A fixed number of elements.
-    Array(usize, Box<Shape>),
-    /// A message: its name and fields in order.
-    Message(&'static str, Vec<(&'static str, Shape)>),
-}
+/// Names and types of fields in order, as ROS writes them: `uint8`, `string`, `Point[]`, `float64[36]`.
+pub type Fields = Vec<(&'static str, String)>;
 
-impl fmt::Display for Shape {
-    fn fmt(&self, f: &mut fmt::Formatter) -> fmt::Result {
-        match self {
-            Self::Primitive(name) | Self::Message(name, _) => f.write_str(name),
-            Self::Bytes => f.write_str("uint8[]"),
-            Self::Sequence(element) => write!(f, "{element}[]"),
-            Self::Array(length, element) => write!(f, "{element}[{length}]"),
-        }
-    }
-}
-
-/// A value with every field set and `length` elements in every sequence, and its shape.
-/// With no elements the shape of sequences is unknown and shows as `?[]`.
-pub fn filled<T: DeserializeOwned>(length: usize) -> (T, Shape) {
+/// A value with every field set and `length` elements in every sequence, and the name and fields of
+/// its struct. With no elements the type of sequences is unknown and shows as `?[]`.
+pub fn filled<T: DeserializeOwned>(length: usize) -> (T, &'static str, Fields) {
     let mut filler = Filler {
         length,
         count: 0,
-        shape: Shape::Primitive("?"),
+        last: String::new(),
+        message: ("", Vec::new()),
     };
     let value = T::deserialize(&mut filler)
         .unwrap_or_else(|error| panic!("{error}: messages hold only what the filler knows"));
-    (value, filler.shape)
+    let (name, fields) = filler.message;
+    (value, name, fields)
 }
 
 /// Gives each field the next value of a count, and notes what was asked for.
 struct Filler {
     length: usize,
     count: u8,
-    /// Shape of the value read last.
-    shape: Shape,
+    /// Type of the value read last.
+    last: String,
+    /// Name and fields of the struct read last.
+    message: (&'static str, Fields),
 }
 
 impl Filler {
@@ -58,13 +37,28 @@ impl Filler {
         self.count = self.count % 100 + 1;
         self.count
     }
+
+    /// Visits so many values; also their types.
+    fn visit<'de, V: Visitor<'de>>(
+        &mut self,
+        count: usize,
+        visitor: V,
+    ) -> Result<(V::Value, Vec<String>), Error> {
+        let mut values = Values {
+            left: count,
+            types: Vec::new(),
+            filler: self,
+        };
+        let value = visitor.visit_seq(&mut values)?;
+        Ok((value, values.types))
+    }
 }
 
 macro_rules! numbers {
     ($($method:ident $visit:ident $name:literal $value:expr;)*) => {
         $(fn $method<V: Visitor<'de>>(self, visitor: V) -> Result<V::Value, Error> {
             let count = self.next();
-            self.shape = Shape::Primitive($name);
+            self.last = $name.to_owned();
             visitor.$visit($value(count))
         })*
     };
@@ -90,17 +84,13 @@ impl<'de> Deserializer<'de> for &mut Filler {
 
     fn deserialize_byte_buf<V: Visitor<'de>>(self, visitor: V) -> Result<V::Value, Error> {
         let first = self.next();
-        self.shape = Shape::Bytes;
+        self.last = "uint8[]".to_owned();
         visitor.visit_byte_buf((first..).take(self.length).collect())
     }
 
     fn deserialize_seq<V: Visitor<'de>>(self, visitor: V) -> Result<V::Value, Error> {
-        self.shape = Shape::Primitive("?");
-        let value = visitor.visit_seq(Elements {
-            left: self.length,
-            filler: self,
-        })?;
-        self.shape = Shape::Sequence(Box::new(self.shape.clone()));
+        let (value, types) = self.visit(self.length, visitor)?;
+        self.last = format!("{}[]", types.last().map_or("?", String::as_str));
         Ok(value)
     }
 
@@ -109,11 +99,8 @@ impl<'de> Deserializer<'de> for &mut Filler {
         length: usize,
         visitor: V,
     ) -> Result<V::Value, Error> {
-        let value = visitor.visit_seq(Elements {
-            left: length,
-            filler: self,
-        })?;
-        self.shape = Shape::Array(length, Box::new(self.shape.clone()));
+        let (value, _) = self.visit(length, visitor)?;
+        self.last += &format!("[{length}]");
         Ok(value)
     }
 
@@ -123,13 +110,9 @@ impl<'de> Deserializer<'de> for &mut Filler {
         names: &'static [&'static str],
         visitor: V,
     ) -> Result<V::Value, Error> {
-        let mut fields = Vec::new();
-        let value = visitor.visit_seq(Fields {
-            names,
-            fields: &mut fields,
-            filler: self,
-        })?;
-        self.shape = Shape::Message(name, fields);
+        let (value, types) = self.visit(names.len(), visitor)?;
+        self.last = name.to_owned();
+        self.message = (name, names.iter().copied().zip(types).collect());
         Ok(value)
     }
 
@@ -143,12 +126,13 @@ impl<'de> Deserializer<'de> for &mut Filler {
     }
 }
 
-struct Elements<'a> {
+struct Values<'a> {
     left: usize,
+    types: Vec<String>,
     filler: &'a mut Filler,
 }
 
-impl<'de> SeqAccess<'de> for Elements<'_> {
+impl<'de> SeqAccess<'de> for Values<'_> {
     type Error = Error;
 
     fn next_element_seed<T: DeserializeSeed<'de>>(
@@ -159,29 +143,8 @@ impl<'de> SeqAccess<'de> for Elements<'_> {
             return Ok(None);
         };
         self.left = left;
-        seed.deserialize(&mut *self.filler).map(Some)
-    }
-}
-
-struct Fields<'a> {
-    names: &'static [&'static str],
-    fields: &'a mut Vec<(&'static str, Shape)>,
-    filler: &'a mut Filler,
-}
-
-impl<'de> SeqAccess<'de> for Fields<'_> {
-    type Error = Error;
-
-    fn next_element_seed<T: DeserializeSeed<'de>>(
-        &mut self,
-        seed: T,
-    ) -> Result<Option<T::Value>, Error> {
-        let Some((name, rest)) = self.names.split_first() else {
-            return Ok(None);
-        };
-        self.names = rest;
         let value = seed.deserialize(&mut *self.filler)?;
-        self.fields.push((name, self.filler.shape.clone()));
+        self.types.push(self.filler.last.clone());
         Ok(Some(value))
     }
 }
