@@ -54,34 +54,24 @@ pub enum PushOutcome {
 
 /// A pose that is not available.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, Error)]
+#[allow(missing_docs)] // The messages name the fields.
 pub enum PoseMiss {
     /// No pose came yet.
     #[error("no pose came yet")]
     Empty,
     /// The time is before the oldest pose kept.
     #[error("time is {:.6} s before the oldest pose kept", seconds(by_ns))]
-    BeforeStart {
-        /// Nanoseconds before it.
-        by_ns: i64,
-    },
+    BeforeStart { by_ns: i64 },
     /// The time is after the newest pose: it may still be covered.
     #[error("time is {:.6} s after the newest pose", seconds(by_ns))]
-    AfterEnd {
-        /// Nanoseconds after it.
-        by_ns: i64,
-    },
+    AfterEnd { by_ns: i64 },
     /// The poses around the time are too far apart.
     #[error(
         "poses around the time are {:.6} s apart, over {:.6} s",
         seconds(gap_ns),
         seconds(max_gap_ns)
     )]
-    Gap {
-        /// Nanoseconds between the poses.
-        gap_ns: i64,
-        /// The limit, nanoseconds.
-        max_gap_ns: i64,
-    },
+    Gap { gap_ns: i64, max_gap_ns: i64 },
 }
 
 pub(super) fn seconds(ns: &i64) -> f64 {
