@@ -86,6 +86,7 @@ pub struct Path {
 
 /// Failure of a search for a path.
 #[derive(Clone, PartialEq, Debug, Error)]
+#[allow(missing_docs)] // The messages name the fields.
 pub enum PathError {
     /// The question makes no sense.
     #[error(transparent)]
@@ -94,57 +95,39 @@ pub enum PathError {
     #[error(
         "radius {radius_m} m covers some {cells:.0} cells, at most {MAX_ROBOT_CELLS}: use larger cells"
     )]
-    Radius {
-        /// Radius asked for, metres.
-        radius_m: f64,
-        /// Cells that it covers, about.
-        cells: f64,
-    },
+    Radius { radius_m: f64, cells: f64 },
     /// The start or goal is out of the bounds or of the range of keys.
     #[error("the cell of {end} {point_m:?} m is out of bounds")]
     OutOfBounds {
-        /// "start" or "goal".
         end: &'static str,
-        /// Its place, map frame, metres.
         point_m: [f64; 3],
     },
     /// The ball does not fit at the start or goal.
     #[error("the cell of {end} {point_m:?} m is not passable with radius {radius_m} m")]
     Blocked {
-        /// "start" or "goal".
         end: &'static str,
-        /// Its place, map frame, metres.
         point_m: [f64; 3],
-        /// Radius asked for, metres.
         radius_m: f64,
     },
     /// Every cell that can be reached was looked at.
     #[error("no path: the goal is not among the {expanded} cells that can be reached")]
-    NoPath {
-        /// Cells looked around from.
-        expanded: usize,
-    },
+    NoPath { expanded: usize },
     /// The search gave up.
     #[error("no path found among {expanded} cells: allow more, or set tighter bounds")]
-    Limit {
-        /// Cells looked around from.
-        expanded: usize,
-    },
+    Limit { expanded: usize },
 }
 
 impl<S: VoxelStore> Query<'_, S> {
     /// The shortest path along centres of cells on which a ball touches no occupied cell, neither at
     /// the centres nor between them.
     ///
-    /// `start_m` and `goal_m` (map frame) stand for the cells that hold them. `passable` can forbid
-    /// more, such as unknown space; it is asked at most once a cell. Paths of equal length are
-    /// chosen between by key, so that the same map gives the same path.
+    /// `start_m` and `goal_m` (map frame) stand for the cells that hold them. Paths of equal length
+    /// are chosen between by key, so that the same map gives the same path.
     pub fn shortest_path(
         &self,
         start_m: &Vector3<f64>,
         goal_m: &Vector3<f64>,
         options: &PathOptions,
-        mut passable: impl FnMut(MortonKey) -> bool,
     ) -> Result<Path, PathError> {
         super::error::check_distance(options.radius_m)?;
         if let Some(bounds) = &options.bounds {
@@ -159,9 +142,8 @@ impl<S: VoxelStore> Query<'_, S> {
         let bounds = options.bounds.map(|b| b.moved(&-self.store.datum_m()));
         let inside =
             |key: MortonKey| bounds.is_none_or(|b| b.contains(&lattice.center(key.unpack())));
-        let mut is_open =
-            |key: MortonKey| corridor.is_clear(self.store, key.unpack()) && passable(key);
-        let mut end_cell = |end: &'static str, point: &Vector3<f64>| {
+        let is_open = |key: MortonKey| corridor.is_clear(self.store, key.unpack());
+        let end_cell = |end: &'static str, point: &Vector3<f64>| {
             let _ = self.local(point)?;
             let point_m = (*point).into();
             let key = self.store.key_of(point).filter(|&key| inside(key));
