@@ -2,7 +2,7 @@
 
 use nalgebra::Vector3;
 
-use super::{InsertReport, MergeError, Region};
+use super::{InsertReport, Region};
 use crate::cloud::Cloud;
 use crate::lattice::{Lattice, LatticeIndex, MortonKey};
 
@@ -63,21 +63,6 @@ pub trait VoxelStore: Sync {
     fn key_of(&self, point_m: &Vector3<f64>) -> Option<MortonKey> {
         let w = self.lattice().quantize(&(point_m - self.datum_m()))?;
         MortonKey::pack(w)
-    }
-
-    /// Fails unless a key means the same cell in both stores.
-    fn expect_cells_of(&self, other: &dyn VoxelStore) -> Result<(), MergeError> {
-        if self.lattice() != other.lattice() {
-            return Err(MergeError::Lattice {
-                ours: format!("{:?}", self.lattice()),
-                theirs: format!("{:?}", other.lattice()),
-            });
-        }
-        if self.datum_index() != other.datum_index() {
-            let (ours, theirs) = (self.datum_m().into(), other.datum_m().into());
-            return Err(MergeError::Datum { ours, theirs });
-        }
-        Ok(())
     }
 
     /// Removes the cells with their centre in a region; gives their number.

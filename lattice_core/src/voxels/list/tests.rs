@@ -212,29 +212,6 @@ fn clearing_removes_what_was_taken_and_only_that() {
 }
 
 #[test]
-fn lists_of_different_cells_do_not_merge() {
-    let mut map = list(LatticeKind::Cubic, [0.0; 3], 1);
-    map.insert(&cloud([0.0; 3], &[[0.0; 3]]));
-    let before = bytes(&map);
-    let error = map.merge(&list(LatticeKind::Bcc, [0.0; 3], 1)).unwrap_err();
-    assert!(matches!(error, MergeError::Lattice { .. }));
-    let error = map
-        .merge(&list(LatticeKind::Cubic, [1.0, 0.0, 0.0], 1))
-        .unwrap_err();
-    assert!(matches!(error, MergeError::Datum { .. }), "{error}");
-    let mut other = list(LatticeKind::Cubic, [0.0; 3], 1);
-    other.insert(&cloud([0.0; 3], &[[1.0; 3]]));
-    assert_eq!(
-        map.merge(&other),
-        Err(MergeError::Full {
-            voxels: 2,
-            max_voxels: 1
-        })
-    );
-    assert_eq!(bytes(&map), before);
-}
-
-#[test]
 fn points_fill_a_list_alike_in_one_cloud_or_in_many() {
     for kind in LatticeKind::ALL {
         let at =
@@ -304,7 +281,7 @@ fn sums_of_any_number_of_points_are_exact() {
         }
 
         let twice: Vec<_> = offsets.iter().chain(&offsets).copied().collect();
-        singly.merge(&gathered).unwrap();
+        singly.insert(&cloud([0.0; 3], &offsets));
         singly.validate().unwrap();
         assert_eq!(singly.sorted(), voxels_of(&empty, &twice));
 
@@ -312,7 +289,7 @@ fn sums_of_any_number_of_points_are_exact() {
         let (first, voxel) = expected[0];
         assert!(singly.remove(first) && singly.remove(expected[1].0));
         singly.validate().unwrap();
-        singly.merge(&gathered).unwrap();
+        singly.insert(&cloud([0.0; 3], &offsets));
         assert_eq!(singly.get(first), Some(voxel));
         singly.validate().unwrap();
 

@@ -293,7 +293,6 @@ impl fmt::Debug for OccupancyList {
 }
 
 mod insert;
-mod merge;
 mod neighbors;
 mod overlap;
 mod recent_cells;
