@@ -1,6 +1,6 @@
 //! Shortest paths of a ball through free cells: A* (Hart, Nilsson & Raphael 1968).
 
-use std::cmp::Ordering;
+use std::cmp::Reverse;
 use std::collections::BinaryHeap;
 
 use nalgebra::Vector3;
@@ -162,30 +162,42 @@ impl<S: VoxelStore> Query<'_, S> {
         let goal_center_m = lattice.center(goal.unpack());
         let to_goal_m = |key: MortonKey| (lattice.center(key.unpack()) - goal_center_m).norm();
         let mut cells = FxHashMap::default();
+        // Shortest in total first, then nearest to the goal, then lowest key, and with it the length
+        // on the way there; the bits of a distance order as it does.
         let mut waiting = BinaryHeap::new();
+        let entry = |key: MortonKey, length_m: f64| {
+            let to_goal_m = to_goal_m(key);
+            let total_m = length_m + to_goal_m;
+            Reverse((
+                total_m.to_bits(),
+                to_goal_m.to_bits(),
+                key,
+                length_m.to_bits(),
+            ))
+        };
         cells.insert(goal, Cell::Open);
         let reached = Reached {
             from: start,
             length_m: 0.0,
         };
         cells.insert(start, Cell::Reached(reached));
-        waiting.push(Waiting::new(start, 0.0, to_goal_m(start)));
+        waiting.push(entry(start, 0.0));
         let mut expanded = 0;
-        while let Some(next) = waiting.pop() {
-            let Some(Cell::Reached(reached)) = cells.get(&next.key).copied() else {
+        while let Some(Reverse((_, _, at, length_bits))) = waiting.pop() {
+            let Some(Cell::Reached(reached)) = cells.get(&at).copied() else {
                 continue;
             };
-            if next.length_m > reached.length_m {
+            if f64::from_bits(length_bits) > reached.length_m {
                 continue;
             }
-            if next.key == goal {
-                return Ok(self.path_to(goal, next.length_m, &cells, expanded));
+            if at == goal {
+                return Ok(self.path_to(goal, reached.length_m, &cells, expanded));
             }
             if expanded == options.max_expanded {
                 return Err(PathError::Limit { expanded });
             }
             expanded += 1;
-            let w = next.key.unpack();
+            let w = at.unpack();
             for (i, &(by, step_m)) in corridor.steps.iter().enumerate() {
                 let Some(key) = MortonKey::pack(add(w, by)).filter(|&key| inside(key)) else {
                     continue;
@@ -204,11 +216,8 @@ impl<S: VoxelStore> Query<'_, S> {
                     Cell::Reached(known) => length_m < known.length_m,
                 };
                 if better && corridor.is_way_clear(self.store, w, i) {
-                    *cell = Cell::Reached(Reached {
-                        from: next.key,
-                        length_m,
-                    });
-                    waiting.push(Waiting::new(key, length_m, to_goal_m(key)));
+                    *cell = Cell::Reached(Reached { from: at, length_m });
+                    waiting.push(entry(key, length_m));
                 }
             }
         }
@@ -282,46 +291,3 @@ struct Reached {
     from: MortonKey,
     length_m: f64,
 }
-
-/// A cell to look around from; the greatest is the next.
-#[derive(Clone, Copy)]
-struct Waiting {
-    key: MortonKey,
-    length_m: f64,
-    to_goal_m: f64,
-    total_m: f64,
-}
-
-impl Waiting {
-    fn new(key: MortonKey, length_m: f64, to_goal_m: f64) -> Waiting {
-        Waiting {
-            key,
-            length_m,
-            to_goal_m,
-            total_m: length_m + to_goal_m,
-        }
-    }
-}
-
-impl Ord for Waiting {
-    /// Shortest in total first, then nearest to the goal, then lowest key.
-    fn cmp(&self, other: &Waiting) -> Ordering {
-        let total = other.total_m.total_cmp(&self.total_m);
-        let to_goal = other.to_goal_m.total_cmp(&self.to_goal_m);
-        total.then(to_goal).then(other.key.cmp(&self.key))
-    }
-}
-
-impl PartialOrd for Waiting {
-    fn partial_cmp(&self, other: &Waiting) -> Option<Ordering> {
-        Some(self.cmp(other))
-    }
-}
-
-impl PartialEq for Waiting {
-    fn eq(&self, other: &Waiting) -> bool {
-        self.cmp(other).is_eq()
-    }
-}
-
-impl Eq for Waiting {}

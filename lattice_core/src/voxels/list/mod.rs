@@ -18,10 +18,10 @@ use super::distortion::{Distortion, DistortionSums};
 use super::store::fixed_point::reach;
 use super::store::growth;
 use super::store::payload_columns::{Columns, Details, LabelCount, Payload, Stamps};
-use super::store::shard::{Life, SHARDS, Shard, shard_of};
+use super::store::shard::{Entry, Life, SHARDS, Shard, shard_of};
 use super::{Voxel, VoxelStore};
 use crate::cloud::Cloud;
-use crate::lattice::{BlockKey, Lattice, LatticeIndex, MortonKey};
+use crate::lattice::{BlockKey, Lattice, MortonKey};
 
 pub use changes::Changes;
 pub use forget_old::NoStamps;
@@ -324,12 +324,9 @@ impl VoxelStore for VoxelList {
         removed
     }
 
-    fn retain_cells(
-        &mut self,
-        keep_block: &(dyn Fn(LatticeIndex) -> Option<bool> + Sync),
-        keep: &(dyn Fn(MortonKey) -> bool + Sync),
-    ) -> usize {
-        self.retain_in_blocks(keep_block, keep)
+    fn retain_cells(&mut self, keep: &(dyn Fn(MortonKey) -> bool + Sync)) -> usize {
+        let key = |entry: &Entry| BlockKey::from_raw(entry.code)?.key();
+        self.remove_where(|_, _, entry| key(entry).is_some_and(|key| !keep(key)))
     }
 
     fn bytes(&self) -> usize {
