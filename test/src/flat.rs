@@ -58,20 +58,34 @@ impl Flat {
         self.0.push((corner.into(), u.into(), v.into(), label));
     }
 
-    /// Points every 3 cm on all surfaces, in `map`, as a robot sends them to the mapper.
-    pub fn map_cloud(&self, stamp_ns: i64) -> PointCloud2 {
+    /// Points every `step_m` on all surfaces, with their classes.
+    fn points(&self, step_m: f64) -> Vec<(Vector3<f64>, u16)> {
         let mut points = Vec::new();
         for (corner, u, v, label) in &self.0 {
-            let steps = |side: &Vector3<f64>| (side.norm() / 0.03).ceil() as usize;
+            let steps = |side: &Vector3<f64>| (side.norm() / step_m).ceil() as usize;
             for i in 0..steps(u) {
                 for j in 0..steps(v) {
                     let s = (i as f64 + 0.5) / steps(u) as f64;
                     let t = (j as f64 + 0.5) / steps(v) as f64;
-                    let p = corner + u * s + v * t;
-                    points.push(([p.x as f32, p.y as f32, p.z as f32], *label));
+                    points.push((corner + u * s + v * t, *label));
                 }
             }
         }
+        points
+    }
+
+    /// The flat as a map of cells of 5 cm has it.
+    pub fn map(&self) -> SemanticCloud {
+        let (points_m, labels) = (self.points(0.05).into_iter())
+            .map(|(p, label)| (Point3::from(p), LabelDistribution::hard(label)))
+            .unzip();
+        SemanticCloud { points_m, labels }
+    }
+
+    /// Points every 3 cm on all surfaces, in `map`, as a robot sends them to the mapper.
+    pub fn map_cloud(&self, stamp_ns: i64) -> PointCloud2 {
+        let points = self.points(0.03).into_iter();
+        let points: Vec<_> = points.map(|(p, label)| (p.cast().into(), label)).collect();
         labelled_cloud("map", stamp_ns, &points)
     }
 

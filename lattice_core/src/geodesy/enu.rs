@@ -78,46 +78,11 @@ fn quaternion(rotation: Matrix3<f64>) -> UnitQuaternion<f64> {
 mod tests {
     use super::*;
 
-    fn karlsruhe() -> Geodetic {
-        Geodetic::from_degrees(49.011, 8.416, 115.0).unwrap()
-    }
-
-    #[test]
-    fn north_east_and_up_of_the_origin() {
-        let frame = EnuFrame::new(karlsruhe());
-        assert_eq!(frame.enu_from_geodetic(frame.origin()), Vector3::zeros());
-        let mut north = karlsruhe();
-        north.latitude_rad += 1.0e-6;
-        let mut east = karlsruhe();
-        east.longitude_rad += 1.0e-6;
-        let mut up = karlsruhe();
-        up.height_m += 1.0;
-        let north_m = frame.enu_from_geodetic(&north);
-        let east_m = frame.enu_from_geodetic(&east);
-        let up_m = frame.enu_from_geodetic(&up);
-        assert!(north_m.y > 6.3 && north_m.x.abs() < 1.0e-4 && north_m.z.abs() < 1.0e-4);
-        assert!(east_m.x > 4.1 && east_m.y.abs() < 1.0e-4 && east_m.z.abs() < 1.0e-4);
-        assert!((up_m - Vector3::z()).norm() < 1.0e-8);
-    }
-
-    #[test]
-    fn the_isometry_agrees_with_the_coordinates() {
-        let frame = EnuFrame::new(karlsruhe());
-        let place = Geodetic::from_degrees(49.2, 8.1, 300.0).unwrap();
-        let enu = frame.enu_from_geodetic(&place);
-        let ecef = frame.ecef_from_enu() * nalgebra::Point3::from(enu);
-        assert!((ecef.coords - ecef_from_geodetic(&place)).norm() < 1.0e-7);
-    }
-
-    #[test]
-    fn local_level_at_the_origin_is_the_frame() {
-        let frame = EnuFrame::new(karlsruhe());
-        assert!(frame.enu_from_local_level(frame.origin()).angle() < 1.0e-15);
-    }
-
     #[test]
     fn local_up_leans_away_from_the_origin() {
-        let frame = EnuFrame::new(karlsruhe());
+        let karlsruhe = Geodetic::from_degrees(49.011, 8.416, 115.0).unwrap();
+        let frame = EnuFrame::new(karlsruhe);
+        assert!(frame.enu_from_local_level(frame.origin()).angle() < 1.0e-15);
         let east = frame
             .geodetic_from_enu(&Vector3::new(50_000.0, 0.0, 0.0))
             .unwrap();

@@ -1,7 +1,7 @@
 //! GPS time to UTC.
 
 /// Start of GPS time, 1980-01-06 00:00:00 UTC, seconds since the Unix epoch.
-pub const GPS_EPOCH_UNIX_S: i64 = 315_964_800;
+const GPS_EPOCH_UNIX_S: i64 = 315_964_800;
 
 const WEEK_S: i64 = 604_800;
 

@@ -64,14 +64,15 @@ mod tests {
     use super::*;
     use proptest::prelude::*;
 
+    fn raw(w: LatticeIndex) -> Option<u64> {
+        MortonKey::pack(w).map(MortonKey::raw)
+    }
+
     #[test]
     fn the_range_is_21_bits_a_side() {
         let (low, high) = (-(1 << 20), (1 << 20) - 1);
-        assert_eq!(MortonKey::pack([low; 3]).map(MortonKey::raw), Some(0));
-        assert_eq!(
-            MortonKey::pack([high; 3]).map(MortonKey::raw),
-            Some((1 << 63) - 1)
-        );
+        assert_eq!(raw([low; 3]), Some(0));
+        assert_eq!(raw([high; 3]), Some((1 << 63) - 1));
         for axis in 0..3 {
             for outside in [low - 1, high + 1, i32::MIN, i32::MAX] {
                 let mut w = [0; 3];
@@ -85,18 +86,9 @@ mod tests {
     #[test]
     fn bits_interleave_with_the_first_axis_lowest() {
         let low = -(1 << 20);
-        assert_eq!(
-            MortonKey::pack([low + 1, low, low]).map(MortonKey::raw),
-            Some(0b001)
-        );
-        assert_eq!(
-            MortonKey::pack([low, low + 1, low]).map(MortonKey::raw),
-            Some(0b010)
-        );
-        assert_eq!(
-            MortonKey::pack([low + 2, low, low + 1]).map(MortonKey::raw),
-            Some(0b001_100)
-        );
+        assert_eq!(raw([low + 1, low, low]), Some(0b001));
+        assert_eq!(raw([low, low + 1, low]), Some(0b010));
+        assert_eq!(raw([low + 2, low, low + 1]), Some(0b001_100));
     }
 
     proptest! {

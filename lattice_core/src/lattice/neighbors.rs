@@ -130,11 +130,8 @@ mod tests {
         assert!(classes.remove(&[0; 3]).is_some());
         let shortest = |members: &Vec<(f64, LatticeIndex)>| {
             let least = members.iter().map(|m| m.0).fold(f64::MAX, f64::min);
-            members
-                .iter()
-                .filter(|m| m.0 < least + 1e-9)
-                .map(|m| m.1)
-                .collect()
+            let nearest = members.iter().filter(|m| m.0 < least + 1e-9);
+            nearest.map(|m| m.1).collect()
         };
         classes.values().map(shortest).collect()
     }
@@ -150,54 +147,33 @@ mod tests {
             (LatticeKind::HexOptimal, 8, 20),
         ] {
             let classes = shortest_of_each_class(kind);
-            let relevant: BTreeSet<_> = classes
-                .iter()
-                .filter(|c| c.len() == 2)
-                .flatten()
-                .copied()
-                .collect();
+            let pairs = classes.iter().filter(|c| c.len() == 2).flatten();
+            let relevant: BTreeSet<_> = pairs.copied().collect();
             let all: BTreeSet<_> = classes.iter().flatten().copied().collect();
-            assert_eq!(
-                faces(kind).iter().copied().collect::<BTreeSet<_>>(),
-                relevant,
-                "{kind}"
-            );
-            assert_eq!(
-                touching(kind).iter().copied().collect::<BTreeSet<_>>(),
-                all,
-                "{kind}"
-            );
-            assert_eq!(
-                (faces(kind).len(), touching(kind).len()),
-                (faces_expected, touching_expected)
-            );
+            let set = |table: &[LatticeIndex]| table.iter().copied().collect::<BTreeSet<_>>();
+            assert_eq!(set(faces(kind)), relevant, "{kind}");
+            assert_eq!(set(touching(kind)), all, "{kind}");
+            let counts = (faces(kind).len(), touching(kind).len());
+            assert_eq!(counts, (faces_expected, touching_expected));
             assert!(touching(kind).starts_with(faces(kind)));
         }
     }
 
     #[test]
     fn distances_are_those_of_the_theory() {
-        let counted = |kind| {
+        let check = |kind, expected: &[(u64, usize)]| {
             let mut counts: BTreeMap<u64, usize> = BTreeMap::new();
             for w in touching(kind) {
                 let length = (unit_generator(kind) * Vector3::from(w.map(f64::from))).norm();
                 *counts.entry((length * 1e5).round() as u64).or_default() += 1;
             }
-            counts.into_iter().collect::<Vec<_>>()
+            assert!(counts.into_iter().eq(expected.iter().copied()), "{kind}");
         };
-        assert_eq!(
-            counted(LatticeKind::Cubic),
-            [(100_000, 6), (141_421, 12), (173_205, 8)]
-        );
-        assert_eq!(counted(LatticeKind::Bcc), [(109_112, 8), (125_992, 6)]);
-        assert_eq!(counted(LatticeKind::Fcc), [(112_246, 12), (158_740, 6)]);
-        assert_eq!(
-            counted(LatticeKind::Mcc),
-            [(109_868, 8), (118_921, 4), (141_421, 2)]
-        );
-        assert_eq!(
-            counted(LatticeKind::Hex),
-            [(83_268, 2), (117_759, 6), (144_225, 12)]
-        );
+        use LatticeKind::{Bcc, Cubic, Fcc, Hex, Mcc};
+        check(Cubic, &[(100_000, 6), (141_421, 12), (173_205, 8)]);
+        check(Bcc, &[(109_112, 8), (125_992, 6)]);
+        check(Fcc, &[(112_246, 12), (158_740, 6)]);
+        check(Mcc, &[(109_868, 8), (118_921, 4), (141_421, 2)]);
+        check(Hex, &[(83_268, 2), (117_759, 6), (144_225, 12)]);
     }
 }

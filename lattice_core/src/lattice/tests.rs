@@ -10,14 +10,6 @@ fn any_lattice() -> impl Strategy<Value = Lattice> {
 }
 
 #[test]
-fn every_generator_is_upper_triangular() {
-    for kind in LatticeKind::ALL {
-        let g = Lattice::new(kind, 1.0).unwrap().generator();
-        assert_eq!((g.m21, g.m31, g.m32), (0.0, 0.0, 0.0), "{kind}");
-    }
-}
-
-#[test]
 fn without_a_rotation_every_bit_is_that_of_the_triangular_product() {
     for kind in LatticeKind::ALL {
         let lattice = Lattice::new(kind, 0.3).unwrap();
@@ -56,9 +48,8 @@ fn a_turned_lattice_is_the_lattice_seen_from_elsewhere() {
         assert_eq!(turned, own.clone().oriented(opposite));
         assert_eq!(turned, turned.clone().oriented(turned.orientation()));
         assert_eq!(turned.unoriented_generator(), own.generator());
-        assert!(
-            (turned.generator() - rotation.to_rotation_matrix() * own.generator()).amax() < 1e-15
-        );
+        let expected = rotation.to_rotation_matrix() * own.generator();
+        assert!((turned.generator() - expected).amax() < 1e-15);
         assert!((turned.cell().volume_m3() - 0.125).abs() < 1e-12);
         for (face, w) in turned.cell().faces.iter().zip(turned.face_neighbors()) {
             let normal = turned.center(*w);
@@ -72,11 +63,8 @@ fn a_turned_lattice_is_the_lattice_seen_from_elsewhere() {
             let p = Vector3::new(code % 10, code / 10 % 10, code / 100).cast::<f64>() * 0.137;
             // Away from the borders.
             let p = p + Vector3::new(0.011, 0.023, 0.037);
-            assert_eq!(
-                turned.quantize(&(rotation * p)),
-                own.quantize(&p),
-                "{kind} {p}"
-            );
+            let found = turned.quantize(&(rotation * p));
+            assert_eq!(found, own.quantize(&p), "{kind} {p}");
             points.push((rotation * p).into());
         }
         turned.quantize_each(points, |p, w| assert_eq!(w, turned.quantize(&p.into())));
@@ -150,11 +138,8 @@ fn the_index_range_ends_at_2_to_the_20() {
                 w[axis] += sign;
                 assert_eq!(lattice.quantize(&lattice.center(w)), None, "{kind}");
                 let wide = w.map(i64::from);
-                assert_eq!(
-                    lattice.quantize_wide(&lattice.center(w)),
-                    Some(wide),
-                    "{kind}"
-                );
+                let found = lattice.quantize_wide(&lattice.center(w));
+                assert_eq!(found, Some(wide), "{kind}");
             }
         }
     }
@@ -190,11 +175,6 @@ fn zero_and_its_mirror_image_share_a_cell() {
 }
 
 proptest! {
-    #[test]
-    fn the_centre_of_a_cell_is_in_it(lattice in any_lattice(), w in prop::array::uniform3(-1_000_000..1_000_000_i32)) {
-        prop_assert_eq!(lattice.quantize(&lattice.center(w)), Some(w));
-    }
-
     #[test]
     fn the_batch_equals_the_single_point(lattice in any_lattice(), points in prop::collection::vec(prop::array::uniform3(-1e3..1e3_f64), 0..50)) {
         let mut answers = Vec::new();

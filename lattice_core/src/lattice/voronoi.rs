@@ -200,11 +200,8 @@ mod tests {
                 }
             }
             assert!(edges.values().all(|&n| n == 1), "{}", lattice.kind());
-            assert!(
-                edges.keys().all(|&(a, b)| edges.contains_key(&(b, a))),
-                "{}",
-                lattice.kind()
-            );
+            let twice = edges.keys().all(|&(a, b)| edges.contains_key(&(b, a)));
+            assert!(twice, "{}", lattice.kind());
             let euler = cell.vertices.len() + cell.faces.len() - edges.len() / 2;
             assert_eq!(euler, 2, "{}", lattice.kind());
         }
@@ -238,14 +235,10 @@ mod tests {
             (LatticeKind::HexOptimal, 0.7959505, 0.4936275),
         ] {
             let lattice = Lattice::new(kind, 8.0).unwrap();
-            assert!(
-                (lattice.covering_radius_m() - 2.0 * covering).abs() < 1.1e-7,
-                "{kind}"
-            );
-            assert!(
-                (lattice.packing_radius_m() - 2.0 * packing).abs() < 1.1e-7,
-                "{kind}"
-            );
+            let off = lattice.covering_radius_m() - 2.0 * covering;
+            assert!(off.abs() < 1.1e-7, "{kind}");
+            let off = lattice.packing_radius_m() - 2.0 * packing;
+            assert!(off.abs() < 1.1e-7, "{kind}");
         }
     }
 }

@@ -6,43 +6,26 @@ use super::buffer::seconds;
 
 /// A transform that is refused.
 #[derive(Clone, Debug, PartialEq, Eq, Error)]
+#[allow(missing_docs)] // The messages name the fields.
 pub enum TfInsertError {
     /// A frame has no name.
     #[error("transform from '{child}' to '{parent}' has a frame without a name")]
-    NoName {
-        /// Parent frame.
-        parent: String,
-        /// Child frame.
-        child: String,
-    },
+    NoName { parent: String, child: String },
     /// A name is too long to be one.
     #[error("frame name has {bytes} bytes, over {max_bytes}")]
-    LongName {
-        /// Bytes of the name.
-        bytes: usize,
-        /// The limit.
-        max_bytes: usize,
-    },
+    LongName { bytes: usize, max_bytes: usize },
     /// A number is NaN or infinite, or the rotation is none.
     #[error(
         "transform of '{child}' in '{parent}' is not finite, or its quaternion not of length 1"
     )]
-    NotFinite {
-        /// Parent frame.
-        parent: String,
-        /// Child frame.
-        child: String,
-    },
+    NotFinite { parent: String, child: String },
     /// More frames than the limit, all of them in use.
     #[error(
         "transform of '{child}' in '{parent}' would exceed {max_frames} frames; raise the limit or find who publishes so many"
     )]
     TooManyFrames {
-        /// Parent frame.
         parent: String,
-        /// Child frame.
         child: String,
-        /// The limit.
         max_frames: usize,
     },
     /// A frame is given as its own parent.
@@ -52,45 +35,28 @@ pub enum TfInsertError {
 
 /// A transform that is not available.
 #[derive(Clone, Debug, PartialEq, Eq, Error)]
+#[allow(missing_docs)] // The messages name the fields.
 pub enum TfMiss {
     /// No transform ever named the frame.
     #[error("frame '{frame}' is not known: nobody published it on tf or tf_static")]
-    UnknownFrame {
-        /// The frame.
-        frame: String,
-    },
+    UnknownFrame { frame: String },
     /// The frames are in two trees.
     #[error(
         "no path from frame '{from}' to '{to}': a transform between their trees is not published"
     )]
-    Disconnected {
-        /// Source frame.
-        from: String,
-        /// Target frame.
-        to: String,
-    },
+    Disconnected { from: String, to: String },
     /// The time is before what is kept of a frame on the path.
     #[error(
         "time is {:.6} s before what is kept of frame '{frame}'",
         seconds(by_ns)
     )]
-    TooOld {
-        /// The moving frame.
-        frame: String,
-        /// Nanoseconds before its oldest transform.
-        by_ns: i64,
-    },
+    TooOld { frame: String, by_ns: i64 },
     /// The time is after what came of a frame on the path: it may still come.
     #[error(
         "time is {:.6} s after the newest transform of frame '{frame}'",
         seconds(by_ns)
     )]
-    TooNew {
-        /// The moving frame.
-        frame: String,
-        /// Nanoseconds after its newest transform.
-        by_ns: i64,
-    },
+    TooNew { frame: String, by_ns: i64 },
     /// The transforms around the time are too far apart.
     #[error(
         "transforms of frame '{frame}' are {:.6} s apart, over {:.6} s",
@@ -98,11 +64,8 @@ pub enum TfMiss {
         seconds(max_gap_ns)
     )]
     Gap {
-        /// The moving frame.
         frame: String,
-        /// Nanoseconds between its transforms.
         gap_ns: i64,
-        /// The limit, nanoseconds.
         max_gap_ns: i64,
     },
 }

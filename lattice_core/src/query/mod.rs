@@ -15,7 +15,7 @@ mod gjk;
 mod nearest;
 mod path;
 mod search;
-mod shape;
+mod segment;
 mod shells;
 mod tree;
 
@@ -24,14 +24,14 @@ use std::sync::{Arc, OnceLock};
 use nalgebra::Vector3;
 
 use crate::lattice::MortonKey;
-use crate::voxels::{LabelCount, VoxelList, VoxelStore};
+use crate::voxels::VoxelStore;
 
 pub use clearance::Clearance;
 pub use corridor::MAX_ROBOT_CELLS;
 pub use error::QueryError;
 pub use nearest::Neighbor;
 pub use path::{Bounds, Path, PathError, PathOptions, Steps};
-pub use shape::{ConvexShape, Segment};
+pub use segment::Segment;
 pub use shells::Shells;
 
 use search::Search;
@@ -105,13 +105,5 @@ impl<'a, S: VoxelStore> Query<'a, S> {
         let local = point_m - self.store.datum_m();
         error::check_point(point_m)?;
         Ok(local)
-    }
-}
-
-impl Query<'_, VoxelList> {
-    /// The most frequent label of a cell, the smallest of equals; `None` if the cell has no labels
-    /// or the list keeps none.
-    pub fn label(&self, key: MortonKey) -> Option<LabelCount> {
-        self.store.label(key)
     }
 }

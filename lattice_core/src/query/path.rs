@@ -1,6 +1,6 @@
 //! Shortest paths of a ball through free cells: A* (Hart, Nilsson & Raphael 1968).
 
-use std::cmp::Ordering;
+use std::cmp::Reverse;
 use std::collections::BinaryHeap;
 
 use nalgebra::Vector3;
@@ -86,6 +86,7 @@ pub struct Path {
 
 /// Failure of a search for a path.
 #[derive(Clone, PartialEq, Debug, Error)]
+#[allow(missing_docs)] // The messages name the fields.
 pub enum PathError {
     /// The question makes no sense.
     #[error(transparent)]
@@ -94,57 +95,39 @@ pub enum PathError {
     #[error(
         "radius {radius_m} m covers some {cells:.0} cells, at most {MAX_ROBOT_CELLS}: use larger cells"
     )]
-    Radius {
-        /// Radius asked for, metres.
-        radius_m: f64,
-        /// Cells that it covers, about.
-        cells: f64,
-    },
+    Radius { radius_m: f64, cells: f64 },
     /// The start or goal is out of the bounds or of the range of keys.
     #[error("the cell of {end} {point_m:?} m is out of bounds")]
     OutOfBounds {
-        /// "start" or "goal".
         end: &'static str,
-        /// Its place, map frame, metres.
         point_m: [f64; 3],
     },
     /// The ball does not fit at the start or goal.
     #[error("the cell of {end} {point_m:?} m is not passable with radius {radius_m} m")]
     Blocked {
-        /// "start" or "goal".
         end: &'static str,
-        /// Its place, map frame, metres.
         point_m: [f64; 3],
-        /// Radius asked for, metres.
         radius_m: f64,
     },
     /// Every cell that can be reached was looked at.
     #[error("no path: the goal is not among the {expanded} cells that can be reached")]
-    NoPath {
-        /// Cells looked around from.
-        expanded: usize,
-    },
+    NoPath { expanded: usize },
     /// The search gave up.
     #[error("no path found among {expanded} cells: allow more, or set tighter bounds")]
-    Limit {
-        /// Cells looked around from.
-        expanded: usize,
-    },
+    Limit { expanded: usize },
 }
 
 impl<S: VoxelStore> Query<'_, S> {
     /// The shortest path along centres of cells on which a ball touches no occupied cell, neither at
     /// the centres nor between them.
     ///
-    /// `start_m` and `goal_m` (map frame) stand for the cells that hold them. `passable` can forbid
-    /// more, such as unknown space; it is asked at most once a cell. Paths of equal length are
-    /// chosen between by key, so that the same map gives the same path.
+    /// `start_m` and `goal_m` (map frame) stand for the cells that hold them. Paths of equal length
+    /// are chosen between by key, so that the same map gives the same path.
     pub fn shortest_path(
         &self,
         start_m: &Vector3<f64>,
         goal_m: &Vector3<f64>,
         options: &PathOptions,
-        mut passable: impl FnMut(MortonKey) -> bool,
     ) -> Result<Path, PathError> {
         super::error::check_distance(options.radius_m)?;
         if let Some(bounds) = &options.bounds {
@@ -159,9 +142,8 @@ impl<S: VoxelStore> Query<'_, S> {
         let bounds = options.bounds.map(|b| b.moved(&-self.store.datum_m()));
         let inside =
             |key: MortonKey| bounds.is_none_or(|b| b.contains(&lattice.center(key.unpack())));
-        let mut is_open =
-            |key: MortonKey| corridor.is_clear(self.store, key.unpack()) && passable(key);
-        let mut end_cell = |end: &'static str, point: &Vector3<f64>| {
+        let is_open = |key: MortonKey| corridor.is_clear(self.store, key.unpack());
+        let end_cell = |end: &'static str, point: &Vector3<f64>| {
             let _ = self.local(point)?;
             let point_m = (*point).into();
             let key = self.store.key_of(point).filter(|&key| inside(key));
@@ -180,30 +162,42 @@ impl<S: VoxelStore> Query<'_, S> {
         let goal_center_m = lattice.center(goal.unpack());
         let to_goal_m = |key: MortonKey| (lattice.center(key.unpack()) - goal_center_m).norm();
         let mut cells = FxHashMap::default();
+        // Shortest in total first, then nearest to the goal, then lowest key, and with it the length
+        // on the way there; the bits of a distance order as it does.
         let mut waiting = BinaryHeap::new();
+        let entry = |key: MortonKey, length_m: f64| {
+            let to_goal_m = to_goal_m(key);
+            let total_m = length_m + to_goal_m;
+            Reverse((
+                total_m.to_bits(),
+                to_goal_m.to_bits(),
+                key,
+                length_m.to_bits(),
+            ))
+        };
         cells.insert(goal, Cell::Open);
         let reached = Reached {
             from: start,
             length_m: 0.0,
         };
         cells.insert(start, Cell::Reached(reached));
-        waiting.push(Waiting::new(start, 0.0, to_goal_m(start)));
+        waiting.push(entry(start, 0.0));
         let mut expanded = 0;
-        while let Some(next) = waiting.pop() {
-            let Some(Cell::Reached(reached)) = cells.get(&next.key).copied() else {
+        while let Some(Reverse((_, _, at, length_bits))) = waiting.pop() {
+            let Some(Cell::Reached(reached)) = cells.get(&at).copied() else {
                 continue;
             };
-            if next.length_m > reached.length_m {
+            if f64::from_bits(length_bits) > reached.length_m {
                 continue;
             }
-            if next.key == goal {
-                return Ok(self.path_to(goal, next.length_m, &cells, expanded));
+            if at == goal {
+                return Ok(self.path_to(goal, reached.length_m, &cells, expanded));
             }
             if expanded == options.max_expanded {
                 return Err(PathError::Limit { expanded });
             }
             expanded += 1;
-            let w = next.key.unpack();
+            let w = at.unpack();
             for (i, &(by, step_m)) in corridor.steps.iter().enumerate() {
                 let Some(key) = MortonKey::pack(add(w, by)).filter(|&key| inside(key)) else {
                     continue;
@@ -222,11 +216,8 @@ impl<S: VoxelStore> Query<'_, S> {
                     Cell::Reached(known) => length_m < known.length_m,
                 };
                 if better && corridor.is_way_clear(self.store, w, i) {
-                    *cell = Cell::Reached(Reached {
-                        from: next.key,
-                        length_m,
-                    });
-                    waiting.push(Waiting::new(key, length_m, to_goal_m(key)));
+                    *cell = Cell::Reached(Reached { from: at, length_m });
+                    waiting.push(entry(key, length_m));
                 }
             }
         }
@@ -300,46 +291,3 @@ struct Reached {
     from: MortonKey,
     length_m: f64,
 }
-
-/// A cell to look around from; the greatest is the next.
-#[derive(Clone, Copy)]
-struct Waiting {
-    key: MortonKey,
-    length_m: f64,
-    to_goal_m: f64,
-    total_m: f64,
-}
-
-impl Waiting {
-    fn new(key: MortonKey, length_m: f64, to_goal_m: f64) -> Waiting {
-        Waiting {
-            key,
-            length_m,
-            to_goal_m,
-            total_m: length_m + to_goal_m,
-        }
-    }
-}
-
-impl Ord for Waiting {
-    /// Shortest in total first, then nearest to the goal, then lowest key.
-    fn cmp(&self, other: &Waiting) -> Ordering {
-        let total = other.total_m.total_cmp(&self.total_m);
-        let to_goal = other.to_goal_m.total_cmp(&self.to_goal_m);
-        total.then(to_goal).then(other.key.cmp(&self.key))
-    }
-}
-
-impl PartialOrd for Waiting {
-    fn partial_cmp(&self, other: &Waiting) -> Option<Ordering> {
-        Some(self.cmp(other))
-    }
-}
-
-impl PartialEq for Waiting {
-    fn eq(&self, other: &Waiting) -> bool {
-        self.cmp(other).is_eq()
-    }
-}
-
-impl Eq for Waiting {}

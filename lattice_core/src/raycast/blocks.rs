@@ -1,54 +1,46 @@
 //! Cells of known evidence, in blocks of 8 x 8 x 8 lattice indices.
 
 use super::evidence::{Steps, UNKNOWN};
-use super::masks::{Mask, ScanMasks, random_multiplier, spread};
+use super::masks::{Mask, ScanMasks};
 use super::packed::Packed;
+use crate::voxels::store::hash_table::{Row, Table};
 
 /// Cells of a block.
 pub(super) const CELLS: usize = 512;
 /// Blocks that are allocated at once.
 const PAGE: usize = 64;
+/// In place of the slot of a block that is not there.
+const NONE: u32 = u32::MAX;
 
-/// No block is at this place of the table: the low bits of a block are zero.
-const EMPTY: u64 = 1;
+/// The packed index of the first cell of a block.
+#[derive(Clone, Copy)]
+struct Block(u64);
 
-#[derive(Clone, Copy, Debug)]
-struct Entry {
-    block: u64,
-    slot: u32,
+impl Row for Block {
+    #[inline(always)]
+    fn code(&self) -> u64 {
+        self.0
+    }
 }
 
-/// Log-odds of cells, found by block through an open table.
-#[derive(Clone, Debug)]
+/// Log-odds of cells, found by block.
+#[derive(Clone)]
 pub(super) struct Blocks {
-    table: Vec<Entry>,
-    bits: u32,
-    multiplier: u64,
-    blocks: Vec<u64>,
+    table: Table<Block>,
     pages: Vec<Box<[[i8; CELLS]]>>,
     most: usize,
     /// The slots of the blocks of a scan; kept to save the allocation.
     slots: Vec<u32>,
 }
 
-/// In place of the slot of a block that is not there.
-const NONE: u32 = u32::MAX;
-
 impl Blocks {
+    /// Most memory for a block, bytes: cells, row, and slot of a scan twice for the growth of vectors.
+    pub(super) const BYTES_PER_BLOCK: usize = CELLS + Table::<Block>::ROW_BYTES + 2 * 4;
+
     /// At most `most` blocks.
     pub(super) fn new(most: usize) -> Blocks {
-        let bits = 4;
         Blocks {
-            table: vec![
-                Entry {
-                    block: EMPTY,
-                    slot: 0
-                };
-                1 << bits
-            ],
-            bits,
-            multiplier: random_multiplier(),
-            blocks: Vec::new(),
+            table: Table::new(),
             pages: Vec::new(),
             // Whole pages, so that the last one is not half in vain.
             most: (most / PAGE * PAGE).min(NONE as usize),
@@ -56,44 +48,28 @@ impl Blocks {
         }
     }
 
-    /// Most memory for a block, bytes: cells, block and slot of a scan twice for the growth of
-    /// vectors, and a table filled to at least 3/8 beside the one that it grew from.
-    pub(super) const BYTES_PER_BLOCK: usize = CELLS + 2 * (8 + 4) + 4 * 16;
-
     pub(super) fn bytes(&self) -> usize {
-        self.table.capacity() * size_of::<Entry>()
-            + self.blocks.capacity() * 8
-            + self.slots.capacity() * 4
+        self.table.bytes()
+            + self.slots.capacity() * size_of::<u32>()
             + self.pages.capacity() * size_of::<Box<[[i8; CELLS]]>>()
             + self.pages.len() * PAGE * CELLS
     }
 
-    pub(super) fn len(&self) -> usize {
-        self.blocks.len()
-    }
-
-    pub(super) fn get(&self, cell: Packed) -> i8 {
-        let slot = self.find(cell.block());
-        let cells = self.cells(slot);
-        cells
-            .and_then(|c| c.get(cell.place()))
-            .copied()
-            .unwrap_or(UNKNOWN)
-    }
-
     /// The cells of a block, `None` if nothing is known of it.
     pub(super) fn block(&self, block: u64) -> Option<&[i8; CELLS]> {
-        self.cells(self.find(block))
+        self.cells(self.table.find(block)?)
     }
 
     /// All cells that are known.
     pub(super) fn known(&self) -> impl Iterator<Item = (Packed, i8)> {
-        (0..).zip(&self.blocks).flat_map(|(slot, &block)| {
-            let cells = self.cells(slot).into_iter().flatten().enumerate();
-            cells
-                .filter(|(_, value)| **value != UNKNOWN)
-                .map(move |(place, value)| (Packed::at(block, place), *value))
-        })
+        (0..)
+            .zip(self.table.rows())
+            .flat_map(|(slot, &Block(block))| {
+                let cells = self.cells(slot).into_iter().flatten().enumerate();
+                cells
+                    .filter(|(_, value)| **value != UNKNOWN)
+                    .map(move |(place, value)| (Packed::at(block, place), *value))
+            })
     }
 
     fn cells(&self, slot: u32) -> Option<&[i8; CELLS]> {
@@ -106,60 +82,15 @@ impl Blocks {
         self.pages.get_mut(slot / PAGE)?.get_mut(slot % PAGE)
     }
 
-    /// The slot of a block, or `NONE`.
-    fn find(&self, block: u64) -> u32 {
-        let mask = self.table.len() - 1;
-        let mut at = spread(block, self.multiplier, self.bits);
-        while let Some(entry) = self.table.get(at) {
-            if entry.block == block {
-                return entry.slot;
-            }
-            if entry.block == EMPTY {
-                break;
-            }
-            at = (at + 1) & mask;
-        }
-        NONE
-    }
-
     /// Adds a block that is not there, within the limit.
     fn add(&mut self, block: u64) -> u32 {
-        let slot = self.blocks.len() as u32;
-        self.blocks.push(block);
-        if self.pages.len() * PAGE < self.blocks.len() {
+        let slot = self.table.len() as u32;
+        let _ = self.table.find_or_add(block, self.most, || Block(block));
+        if self.pages.len() * PAGE < self.table.len() {
             self.pages
                 .push(vec![[UNKNOWN; CELLS]; PAGE].into_boxed_slice());
         }
-        if self.blocks.len() * 2 > self.table.len() {
-            self.bits += 1;
-            let empty = Entry {
-                block: EMPTY,
-                slot: 0,
-            };
-            self.table.clear();
-            self.table.resize(1 << self.bits, empty);
-            for slot in 0..self.blocks.len() as u32 {
-                self.list(slot);
-            }
-        } else {
-            self.list(slot);
-        }
         slot
-    }
-
-    /// Enters a block into the table.
-    fn list(&mut self, slot: u32) {
-        let Some(&block) = self.blocks.get(slot as usize) else {
-            return;
-        };
-        let mask = self.table.len() - 1;
-        let mut at = spread(block, self.multiplier, self.bits);
-        while self.table.get(at).is_some_and(|e| e.block != EMPTY) {
-            at = (at + 1) & mask;
-        }
-        if let Some(entry) = self.table.get_mut(at) {
-            *entry = Entry { block, slot };
-        }
     }
 
     /// Gives `update` the cells of each block with its masks. Blocks that are not there are added if
@@ -175,8 +106,9 @@ impl Blocks {
         // together.
         let mut slots = std::mem::take(&mut self.slots);
         slots.clear();
-        slots.extend(scan.clone().map(|(block, ..)| self.find(block)));
-        let room = self.most.saturating_sub(self.len());
+        let slot = |block: u64| self.table.find(block).unwrap_or(NONE);
+        slots.extend(scan.clone().map(|(block, ..)| slot(block)));
+        let room = self.most.saturating_sub(self.table.len());
         let wanted_new = scan
             .clone()
             .zip(&slots)
@@ -240,7 +172,7 @@ pub(super) fn add_evidence(steps: &Steps, cells: &mut [i8; CELLS], passed: &Mask
 
 /// Calls `visit` with the number of each bit that is set, below 64.
 #[inline(always)]
-pub(super) fn each_bit(mut word: u64, mut visit: impl FnMut(usize)) {
+fn each_bit(mut word: u64, mut visit: impl FnMut(usize)) {
     while word != 0 {
         visit(word.trailing_zeros() as usize & 63);
         word &= word - 1;

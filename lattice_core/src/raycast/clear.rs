@@ -2,7 +2,6 @@
 
 use rustc_hash::FxHashMap;
 
-use super::blocks::each_bit;
 use super::masks::ScanMasks;
 use super::packed::{Packed, difference};
 use super::scan::{self, RayBundle, Reach, ScanReport};
@@ -15,16 +14,10 @@ use crate::voxels::VoxelStore;
 pub struct ClearOptions {
     /// Scans that must pass through a voxel, with none between that hits it, to remove it.
     pub misses: u32,
-    /// The last part of each ray that removes nothing, metres: rays that graze a surface pass
-    /// through the voxels before the one that they end in.
-    pub keep_m: f64,
-    /// The same as a fraction of the ray, 0 to 1: ground seen at a flat angle from a height is passed
-    /// over, within its own cells, on a part of the way that grows with the distance.
-    pub keep_ratio: f64,
+    /// Parts of rays that remove voxels.
+    pub reach: Reach,
     /// True: voxels that touch a cell which the scan hit are spared.
     pub spare_touching: bool,
-    /// Rays are followed to this range, metres.
-    pub max_range_m: f64,
     /// Most memory for the marks of a scan, bytes; cells beyond it are not cleared.
     pub max_bytes: usize,
 }
@@ -33,10 +26,8 @@ impl Default for ClearOptions {
     fn default() -> ClearOptions {
         ClearOptions {
             misses: 1,
-            keep_m: 0.0,
-            keep_ratio: 0.0,
+            reach: Reach::default(),
             spare_touching: true,
-            max_range_m: f64::INFINITY,
             max_bytes: 1 << 28,
         }
     }
@@ -58,7 +49,7 @@ pub struct ClearReport {
 /// Removes from a store what rays pass through, for scenes in which things move.
 ///
 /// A voxel is passed through if a ray to the lattice point of a cell with a point crosses it more
-/// than `keep_m` before that end. Voxels that the scan hits and, with `spare_touching`, those that
+/// than [`Reach::keep_m`] before that end. Voxels that the scan hits and, with `spare_touching`, those that
 /// touch one in at least a vertex are safe from it: a surface seen at a flat angle does not clear
 /// itself.
 #[derive(Clone, Debug)]
@@ -89,31 +80,25 @@ impl RayClearer {
     /// store of another lattice than that of the clearer.
     pub fn clear(&mut self, store: &mut dyn VoxelStore, scan: &[RayBundle]) -> ClearReport {
         let mut report = ClearReport::default();
-        if store.lattice() != self.traversal.lattice() {
+        if *store.lattice() != self.traversal.lattice {
             return report;
         }
-        let reach = Reach {
-            max_range_m: self.options.max_range_m,
-            keep_m: self.options.keep_m,
-            keep_ratio: self.options.keep_ratio,
-        };
+        let reach = self.options.reach;
         let datum_m = store.datum_m();
         report.scan = scan::mark(&self.traversal, &mut self.masks, &datum_m, scan, reach);
         self.forget_hits(store);
         let mut keys: Vec<MortonKey> = Vec::new();
         for (block, passed, hit) in self.masks.blocks() {
-            for (word, (passed, hit)) in passed.0.iter().zip(&hit.0).enumerate() {
-                each_bit(passed & !hit, |i| {
-                    let cell = Packed::at(block, 64 * word + i);
-                    let Some(key) = cell.key().filter(|key| store.contains(*key)) else {
-                        return;
-                    };
-                    if self.options.spare_touching && self.touches_hit(cell) {
-                        report.kept += 1;
-                    } else {
-                        keys.push(key);
-                    }
-                });
+            for place in passed.without(hit).places() {
+                let cell = Packed::at(block, place);
+                let Some(key) = cell.key().filter(|key| store.contains(*key)) else {
+                    continue;
+                };
+                if self.options.spare_touching && self.touches_hit(cell) {
+                    report.kept += 1;
+                } else {
+                    keys.push(key);
+                }
             }
         }
         keys.sort_unstable();
@@ -148,12 +133,8 @@ impl RayClearer {
             return;
         }
         for (block, _, hit) in self.masks.blocks() {
-            for (word, hit) in hit.0.iter().enumerate() {
-                each_bit(*hit, |i| {
-                    if let Some(key) = Packed::at(block, 64 * word + i).key() {
-                        self.missed.remove(&key);
-                    }
-                });
+            for key in hit.places().filter_map(|i| Packed::at(block, i).key()) {
+                self.missed.remove(&key);
             }
         }
         if self.missed.len() > store.len() {

@@ -5,8 +5,8 @@ use std::collections::BTreeSet;
 use nalgebra::Vector3;
 use rustc_hash::FxHashSet;
 
-use super::blocks::{Blocks, CELLS, add_evidence, apply_to_hit, each_bit};
-use super::evidence::{Steps, UNKNOWN};
+use super::blocks::{Blocks, CELLS, add_evidence, apply_to_hit};
+use super::evidence::Steps;
 use super::masks::{Cursor, Mask, ScanMasks};
 use super::packed::{Packed, difference};
 use crate::lattice::{Lattice, LatticeError, LatticeIndex, MortonKey};
@@ -18,7 +18,7 @@ const SLACK: f64 = 1e-9;
 ///
 /// A lattice is its own sublattice of level 1, so that the coarse cell of a fine index `8 b + r` is
 /// that of `r` plus `8 b / 2^level`.
-#[derive(Clone, Debug)]
+#[derive(Clone)]
 pub(super) struct Coarse {
     lattice: Lattice,
     level: u32,
@@ -26,8 +26,6 @@ pub(super) struct Coarse {
     belongs: Vec<LatticeIndex>,
     /// For each place of a fine block: all coarse cells that its cell may overlap.
     overlaps: Vec<Vec<LatticeIndex>>,
-    /// All fine cells that may overlap the coarse cell 0.
-    within: Vec<LatticeIndex>,
     masks: ScanMasks,
     cells: Blocks,
 }
@@ -38,25 +36,18 @@ impl Coarse {
         let lattice = fine.scaled(f64::from(1 << level))?;
         let places = (0..CELLS as i32).map(|p| [p & 7, p >> 3 & 7, p >> 6]);
         let (mut belongs, mut overlaps) = (Vec::new(), Vec::new());
-        let mut within = BTreeSet::new();
         for place in places {
             let p = fine.center(place);
             let home = lattice.quantize(&p).unwrap_or_default();
-            let around = overlapping(&lattice, home, &p, fine.covering_radius_m());
-            within.extend(
-                around
-                    .iter()
-                    .map(|w| offset(place, w.map(|i| -(i << level)))),
-            );
             belongs.push(home);
-            overlaps.push(around);
+            let radius_m = fine.covering_radius_m();
+            overlaps.push(overlapping(&lattice, home, &p, radius_m));
         }
         Ok(Coarse {
             lattice,
             level,
             belongs,
             overlaps,
-            within: within.into_iter().collect(),
             masks: ScanMasks::new(bytes / 4 / ScanMasks::BYTES_PER_BLOCK),
             cells: Blocks::new(bytes / 4 * 3 / Blocks::BYTES_PER_BLOCK),
         })
@@ -68,13 +59,6 @@ impl Coarse {
 
     pub(super) fn bytes(&self) -> usize {
         self.masks.bytes() + self.cells.bytes()
-    }
-
-    /// The coarse cell that a fine cell belongs to.
-    pub(super) fn cell_of(&self, fine: Packed) -> Option<Packed> {
-        let base = self.base(fine.block());
-        let home = self.belongs.get(fine.place())?;
-        Packed::new(offset(base, *home))
     }
 
     /// The coarse index of the first cell of a fine block.
@@ -95,13 +79,9 @@ impl Coarse {
         let fine_refused = apply_to_hit(steps, scan, fine);
         let coarse_refused = self.cells.apply(
             self.masks.blocks(),
-            |passed, hit| passed.0.iter().zip(&hit.0).any(|(p, h)| p & !h != 0),
+            |passed, hit| passed.without(hit) != Mask::default(),
             |cells, passed, hit| {
-                let mut free = *passed;
-                for (free, hit) in free.0.iter_mut().zip(&hit.0) {
-                    *free &= !hit;
-                }
-                add_evidence(steps, cells, &free, &Mask::default());
+                add_evidence(steps, cells, &passed.without(hit), &Mask::default());
             },
         );
         fine_refused + coarse_refused
@@ -114,45 +94,22 @@ impl Coarse {
         blocks.sort_unstable_by_key(|(block, ..)| *block);
         let mut cursor = Cursor::NONE;
         for &(block, _, hit) in &blocks {
-            for (word, hit) in hit.0.iter().enumerate() {
-                each_bit(*hit, |i| {
-                    let fine = Packed::at(block, 64 * word + i);
-                    let base = Packed(block).unpack().map(|i| i >> self.level);
-                    for w in self.overlaps.get(fine.place()).into_iter().flatten() {
-                        if let Some(cell) = Packed::new(offset(base, *w)) {
-                            self.masks.hit(cell, &mut cursor);
-                        }
-                    }
-                });
+            let base = self.base(block);
+            for w in (hit.places()).flat_map(|place| self.overlaps.get(place).into_iter().flatten())
+            {
+                if let Some(cell) = Packed::new(offset(base, *w)) {
+                    self.masks.hit(cell, &mut cursor);
+                }
             }
         }
         for &(block, passed, _) in &blocks {
             let Some(base) = Packed::new(self.base(block)) else {
                 continue;
             };
-            for (word, passed) in passed.0.iter().enumerate() {
-                each_bit(*passed, |i| {
-                    if let Some(home) = self.belongs.get(64 * word + i) {
-                        self.masks.pass(base.plus(difference(*home)), &mut cursor);
-                    }
-                });
+            for home in passed.places().filter_map(|place| self.belongs.get(place)) {
+                self.masks.pass(base.plus(difference(*home)), &mut cursor);
             }
         }
-    }
-
-    /// True if rays passed through the coarse cell and no occupied fine cell may overlap it.
-    pub(super) fn is_free(&self, steps: &Steps, fine: &Blocks, cell: Option<Packed>) -> bool {
-        let Some(cell) = cell else { return false };
-        let value = self.cells.get(cell);
-        if value == UNKNOWN || value >= steps.threshold {
-            return false;
-        }
-        let first = cell.unpack().map(|i| i << self.level);
-        let mut within = self.within.iter();
-        !within.any(|w| {
-            let value = Packed::new(offset(first, *w)).map_or(UNKNOWN, |w| fine.get(w));
-            value != UNKNOWN && value >= steps.threshold
-        })
     }
 
     /// All free coarse cells in ascending order.

@@ -48,22 +48,11 @@ impl Evidence {
 /// Probabilities that do not go together.
 #[derive(Clone, Copy, PartialEq, Debug, Error)]
 #[error(
-    "hit {hit}, miss {miss}, least {least}, most {most}, threshold {threshold}: all must be between \
-     0.02 and 0.98, miss < 0.5 < hit, least < threshold <= most and least < 0.5 < most, each by a \
-     log-odds of 1/32 or more"
+    "hit {}, miss {}, least {}, most {}, threshold {}: all must be between 0.02 and 0.98, miss < 0.5 \
+     < hit, least < threshold <= most and least < 0.5 < most, each by a log-odds of 1/32 or more",
+    .0.hit, .0.miss, .0.least, .0.most, .0.threshold
 )]
-pub struct EvidenceError {
-    /// Probability after a hit.
-    pub hit: f64,
-    /// Probability after a miss.
-    pub miss: f64,
-    /// Lower clamp.
-    pub least: f64,
-    /// Upper clamp.
-    pub most: f64,
-    /// Threshold of occupied cells.
-    pub threshold: f64,
-}
+pub struct EvidenceError(pub Evidence);
 
 /// The next value of a cell for each value that it may have.
 #[derive(Clone, Debug)]
@@ -75,27 +64,15 @@ pub(super) struct Steps {
 
 impl Steps {
     pub(super) fn new(evidence: &Evidence) -> Result<Steps, EvidenceError> {
-        let Evidence {
-            hit,
-            miss,
-            least,
-            most,
-            threshold,
-        } = *evidence;
-        let error = EvidenceError {
-            hit,
-            miss,
-            least,
-            most,
-            threshold,
-        };
+        let error = EvidenceError(*evidence);
         let in_units = |p: f64| {
             let fits = (0.02..=0.98).contains(&p);
             let rounded = fits.then(|| (log_odds(p) / UNIT).round() as i32);
             rounded.ok_or(error)
         };
-        let (up, down) = (in_units(hit)?, in_units(miss)?);
-        let (low, high, threshold) = (in_units(least)?, in_units(most)?, in_units(threshold)?);
+        let (up, down) = (in_units(evidence.hit)?, in_units(evidence.miss)?);
+        let (low, high) = (in_units(evidence.least)?, in_units(evidence.most)?);
+        let threshold = in_units(evidence.threshold)?;
         if up < 1 || down > -1 || low > -1 || high < 1 || low >= threshold || threshold > high {
             return Err(error);
         }
@@ -137,11 +114,6 @@ fn log_odds(p: f64) -> f64 {
     2.0 * sum
 }
 
-/// The log-odds of a known cell.
-pub(super) fn log_odds_of(cell: i8) -> Option<f64> {
-    (cell != UNKNOWN).then(|| f64::from(cell) * UNIT)
-}
-
 #[cfg(test)]
 mod tests {
     use super::*;
@@ -158,19 +130,15 @@ mod tests {
     fn the_defaults_are_those_of_octomap_within_the_rounding() {
         let steps = Steps::new(&Evidence::default()).unwrap();
         let mut cell = UNKNOWN;
-        steps.hit(&mut cell);
-        assert!((log_odds_of(cell).unwrap() - 0.8473).abs() < 0.5 * UNIT);
-        for _ in 0..10 {
-            steps.hit(&mut cell);
-        }
-        assert!((log_odds_of(cell).unwrap() - 3.5110).abs() < 0.5 * UNIT);
-        let before = log_odds_of(cell).unwrap();
-        steps.miss(&mut cell);
-        assert!((before - log_odds_of(cell).unwrap() - 0.4055).abs() < 0.5 * UNIT);
-        for _ in 0..20 {
-            steps.miss(&mut cell);
-        }
-        assert!((log_odds_of(cell).unwrap() + 2.0).abs() < 0.5 * UNIT);
+        let mut after = |step: fn(&Steps, &mut i8), times: usize, expected: f64| {
+            (0..times).for_each(|_| step(&steps, &mut cell));
+            let found = f64::from(cell) * UNIT;
+            assert!((found - expected).abs() <= UNIT, "{found} {expected}");
+        };
+        after(Steps::hit, 1, 0.8473);
+        after(Steps::hit, 10, 3.5110);
+        after(Steps::miss, 1, 3.5110 - 0.4055);
+        after(Steps::miss, 20, -2.0);
         assert_eq!(steps.threshold, 0);
     }
 
@@ -180,22 +148,18 @@ mod tests {
         for bad in [
             Evidence { hit: 0.5, ..good },
             Evidence { miss: 0.51, ..good },
-            Evidence {
-                hit: f64::NAN,
-                ..good
-            },
             Evidence { most: 1.0, ..good },
             Evidence { least: 0.6, ..good },
-            Evidence {
-                threshold: 0.99,
-                ..good
-            },
-            Evidence {
-                threshold: 0.1,
-                ..good
-            },
         ] {
             assert!(Steps::new(&bad).is_err(), "{bad:?}");
+        }
+        for bad in [f64::NAN, 0.99, 0.1] {
+            let (hit, threshold) = (bad, bad);
+            assert!(Steps::new(&Evidence { hit, ..good }).is_err(), "{bad}");
+            assert!(
+                Steps::new(&Evidence { threshold, ..good }).is_err(),
+                "{bad}"
+            );
         }
     }
 }

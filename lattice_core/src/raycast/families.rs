@@ -105,34 +105,9 @@ impl<const P: usize> Families<P> {
         walk
     }
 
-    /// Calls `visit` with each cell that the ray leaves before `t = 1`, at most `limit`, until it
-    /// answers false; the cell after these is in `walk`. Returns the number of steps.
-    #[inline(always)]
-    pub(super) fn run(
-        &self,
-        origin: &Origin<P>,
-        walk: &mut Walk<P>,
-        limit: u64,
-        mut visit: impl FnMut(Packed) -> bool,
-    ) -> u64 {
-        let mut done = 0;
-        while done < limit {
-            let until = limit.min(done + ANCHOR_STEPS);
-            while done < until {
-                let t = walk.next_exit();
-                if t >= LAST || !visit(walk.cell) {
-                    return done;
-                }
-                self.cross(walk, t);
-                done += 1;
-            }
-            self.anchor(origin, walk);
-        }
-        done
-    }
-
-    /// One step of a ray that [`Families::run`] would follow; false at its end. Several rays that
-    /// take turns are faster than one after the other: a step of one waits for the step before.
+    /// One step of a ray: visits the cell that it leaves before `t = 1`; false at its end. Several
+    /// rays that take turns are faster than one after the other: a step of one waits for the step
+    /// before.
     #[inline(always)]
     pub(super) fn step(
         &self,

@@ -1,34 +1,21 @@
 //! The map of free space.
 
-use std::fmt;
-
 use nalgebra::Vector3;
 
-use super::blocks::{Blocks, add_evidence, apply_to_hit, each_bit};
+use super::blocks::{Blocks, add_evidence, apply_to_hit};
 use super::clear::ClearReport;
 use super::coarse::Coarse;
-use super::evidence::{Steps, UNKNOWN, log_odds_of};
+use super::evidence::{Steps, UNKNOWN};
 use super::masks::{Cursor, Mask, ScanMasks};
 use super::options::{FreeSpaceError, FreeSpaceOptions};
 use super::packed::Packed;
-use super::scan::{self, RayBundle, Reach, ScanReport};
+use super::scan::{self, RayBundle, ScanReport};
 use super::traversal::Traversal;
 use crate::lattice::{Lattice, MortonKey};
 use crate::voxels::{DatumError, VoxelStore};
 
 /// Cells that are marked at once where many are known to be occupied; bounds the memory for it.
 const SEED_CELLS: usize = 1 << 14;
-
-/// Occupied, free or unknown.
-#[derive(Clone, Copy, PartialEq, Eq, PartialOrd, Ord, Hash, Debug)]
-pub enum CellState {
-    /// No ray came here, or too few to say.
-    Unknown,
-    /// Rays passed through.
-    Free,
-    /// Points were seen here.
-    Occupied,
-}
 
 /// The occupied, free and unknown cells of a lattice, from scans with their origins.
 ///
@@ -63,15 +50,6 @@ enum Free {
     Fine,
     /// Wider ones.
     Coarse(Box<Coarse>),
-}
-
-/// Numbers of known cells.
-#[derive(Clone, Copy, PartialEq, Eq, Debug, Default)]
-pub struct CellCounts {
-    /// Occupied cells.
-    pub occupied: u64,
-    /// Free cells, of the coarse lattice if the free level is not 0.
-    pub free: u64,
 }
 
 impl FreeSpaceMap {
@@ -123,17 +101,11 @@ impl FreeSpaceMap {
             &mut self.masks,
             &self.datum_m,
             scan,
-            Reach {
-                max_range_m: self.options.max_range_m,
-                keep_m: self.options.keep_m,
-                keep_ratio: self.options.keep_ratio,
-            },
+            self.options.reach,
         );
-        let missed = |(_, passed, hit): (u64, &Mask, &Mask)| {
-            let words = passed.0.iter().zip(&hit.0);
-            words
-                .map(|(p, h)| u64::from((p & !h).count_ones()))
-                .sum::<u64>()
+        let missed = |(_, passed, hit): (u64, &Mask, &Mask)| -> u64 {
+            let words = passed.without(hit).0;
+            words.iter().map(|word| u64::from(word.count_ones())).sum()
         };
         report.misses = self.masks.blocks().map(missed).sum();
         report.blocks_refused = self.apply_marks();
@@ -169,13 +141,10 @@ impl FreeSpaceMap {
             let Some(cells) = self.cells.block(block) else {
                 continue;
             };
-            for (word, (passed, hit)) in passed.0.iter().zip(&hit.0).enumerate() {
-                each_bit(passed | hit, |i| {
-                    let place = 64 * word + i;
-                    if cells.get(place).is_some_and(|value| is_free(*value)) {
-                        report.removed.extend(Packed::at(block, place).key());
-                    }
-                });
+            for place in passed.without(hit).places().chain(hit.places()) {
+                if cells.get(place).is_some_and(|value| is_free(*value)) {
+                    report.removed.extend(Packed::at(block, place).key());
+                }
             }
         }
         report.removed.sort_unstable();
@@ -205,32 +174,6 @@ impl FreeSpaceMap {
         }
     }
 
-    /// State of a cell of the lattice.
-    ///
-    /// With a free level, a cell that was never hit is free if the coarse cell that it belongs to is.
-    pub fn state(&self, key: MortonKey) -> CellState {
-        let Some(cell) = Packed::new(key.unpack()) else {
-            return CellState::Unknown;
-        };
-        match (self.cells.get(cell), &self.free) {
-            (UNKNOWN, Free::Hit | Free::Fine) => CellState::Unknown,
-            (UNKNOWN, Free::Coarse(coarse)) => {
-                if coarse.is_free(&self.steps, &self.cells, coarse.cell_of(cell)) {
-                    CellState::Free
-                } else {
-                    CellState::Unknown
-                }
-            }
-            (value, _) if value >= self.steps.threshold => CellState::Occupied,
-            _ => CellState::Free,
-        }
-    }
-
-    /// The log-odds of a cell of the lattice, `None` if it has none.
-    pub fn log_odds(&self, key: MortonKey) -> Option<f64> {
-        log_odds_of(self.cells.get(Packed::new(key.unpack())?))
-    }
-
     /// All occupied cells in ascending order.
     pub fn occupied_keys(&self) -> Vec<MortonKey> {
         self.sorted(|value| value >= self.steps.threshold)
@@ -253,26 +196,9 @@ impl FreeSpaceMap {
         keys
     }
 
-    /// Numbers of occupied and free cells; goes through the whole map.
-    pub fn counts(&self) -> CellCounts {
-        let threshold = self.steps.threshold;
-        let (mut occupied, mut free) = (0, 0);
-        for (_, value) in self.cells.known() {
-            *(if value >= threshold {
-                &mut occupied
-            } else {
-                &mut free
-            }) += 1;
-        }
-        if matches!(self.free, Free::Coarse(_)) {
-            free = self.free_keys().len() as u64;
-        }
-        CellCounts { occupied, free }
-    }
-
     /// The lattice.
     pub fn lattice(&self) -> &Lattice {
-        self.traversal.lattice()
+        &self.traversal.lattice
     }
 
     /// The lattice of the free cells; its lattice point 0 is the datum, too.
@@ -288,19 +214,9 @@ impl FreeSpaceMap {
         self.datum_m
     }
 
-    /// Index of the datum in the lattice of the map frame.
-    pub fn datum_index(&self) -> [i64; 3] {
-        self.datum_index
-    }
-
     /// The options.
     pub fn options(&self) -> &FreeSpaceOptions {
         &self.options
-    }
-
-    /// The cell of a point (map frame, metres), `None` if not finite or out of the range of keys.
-    pub fn key_of(&self, point_m: &Vector3<f64>) -> Option<MortonKey> {
-        MortonKey::pack(self.lattice().quantize(&(point_m - self.datum_m))?)
     }
 
     /// Memory that the map holds, with what it keeps for the next scan, bytes; at most `max_bytes`.
@@ -310,17 +226,5 @@ impl FreeSpaceMap {
             Free::Coarse(coarse) => coarse.bytes(),
         };
         self.cells.bytes() + self.masks.bytes() + coarse
-    }
-}
-
-impl fmt::Debug for FreeSpaceMap {
-    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
-        let datum: [f64; 3] = self.datum_m.into();
-        write!(
-            f,
-            "FreeSpaceMap({:?}, datum {datum:?} m, {} blocks)",
-            self.lattice(),
-            self.cells.len()
-        )
     }
 }

@@ -3,6 +3,7 @@
 use std::hash::{BuildHasher, RandomState};
 
 use super::packed::Packed;
+use crate::voxels::store::block_mask::places;
 
 /// One bit for each cell of a block, a cache line.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
@@ -18,16 +19,30 @@ impl Mask {
         *word |= bit;
         new
     }
+
+    /// The cells that are not in another mask.
+    pub(super) fn without(&self, other: &Mask) -> Mask {
+        let mut left = *self;
+        for (left, other) in left.0.iter_mut().zip(&other.0) {
+            *left &= !other;
+        }
+        left
+    }
+
+    /// Places of the cells.
+    pub(super) fn places(&self) -> impl Iterator<Item = usize> + '_ {
+        places(&self.0)
+    }
 }
 
 /// An odd multiplier, unknown to senders of points.
-pub(super) fn random_multiplier() -> u64 {
+fn random_multiplier() -> u64 {
     RandomState::new().hash_one(0) | 1
 }
 
 /// The place of a hash in a table of a power of two.
 #[inline(always)]
-pub(super) fn spread(block: u64, multiplier: u64, bits: u32) -> usize {
+fn spread(block: u64, multiplier: u64, bits: u32) -> usize {
     // The low three bits of a block are zero, so that both halves need a turn.
     let mixed = (block ^ block >> 32).wrapping_mul(multiplier);
     (mixed >> (64 - bits)) as usize

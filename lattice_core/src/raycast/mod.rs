@@ -1,8 +1,7 @@
 //! Free space: which cells a ray passes through, and what scans say about them.
 //!
-//! [`Traversal`] follows a segment through the cells of any lattice, exactly. [`FreeSpaceMap`] adds
-//! up scans to occupied, free and unknown cells, [`RayClearer`] removes from a voxel store what rays
-//! pass through.
+//! Rays are followed through the cells of any lattice, exactly. [`FreeSpaceMap`] adds up scans to
+//! occupied, free and unknown cells, [`RayClearer`] removes from a voxel store what rays pass through.
 
 mod blocks;
 mod clear;
@@ -18,7 +17,6 @@ mod traversal;
 
 pub use clear::{ClearOptions, ClearReport, RayClearer};
 pub use evidence::{Evidence, EvidenceError};
-pub use map::{CellCounts, CellState, FreeSpaceMap};
+pub use map::FreeSpaceMap;
 pub use options::{FreeSpaceError, FreeSpaceOptions, MAX_FREE_LEVEL, MIN_MAP_BYTES};
-pub use scan::{RayBundle, ScanReport};
-pub use traversal::{Traversal, TraversalError};
+pub use scan::{RayBundle, Reach, ScanReport};

@@ -3,6 +3,7 @@
 use thiserror::Error;
 
 use super::evidence::{Evidence, EvidenceError};
+use super::scan::Reach;
 use crate::lattice::LatticeError;
 use crate::voxels::DatumError;
 
@@ -16,14 +17,8 @@ pub const MIN_MAP_BYTES: usize = 1 << 20;
 pub struct FreeSpaceOptions {
     /// Weights of hits and misses.
     pub evidence: Evidence,
-    /// Rays of points that are farther than this are followed to this range, metres, and give no
-    /// hit; infinite for no limit.
-    pub max_range_m: f64,
-    /// The last part of each ray that gives no miss, metres, and as a fraction of the ray: rays that
-    /// graze a surface pass through its cells.
-    pub keep_m: f64,
-    /// See `keep_m`; the longer of the two counts.
-    pub keep_ratio: f64,
+    /// Parts of rays that count.
+    pub reach: Reach,
     /// Free cells are kept in cells `2^free_level` as wide, at most [`MAX_FREE_LEVEL`]; `None`: only
     /// cells that were hit are kept.
     pub free_level: Option<u32>,
@@ -36,9 +31,7 @@ impl Default for FreeSpaceOptions {
     fn default() -> FreeSpaceOptions {
         FreeSpaceOptions {
             evidence: Evidence::default(),
-            max_range_m: f64::INFINITY,
-            keep_m: 0.0,
-            keep_ratio: 0.0,
+            reach: Reach::default(),
             free_level: Some(0),
             max_bytes: 1 << 30,
         }
@@ -70,8 +63,9 @@ pub enum FreeSpaceError {
 
 impl FreeSpaceOptions {
     pub(super) fn check(&self) -> Result<(), FreeSpaceError> {
-        if self.max_range_m.is_nan() || self.max_range_m <= 0.0 {
-            return Err(FreeSpaceError::Range(self.max_range_m));
+        let max_range_m = self.reach.max_range_m;
+        if max_range_m.is_nan() || max_range_m <= 0.0 {
+            return Err(FreeSpaceError::Range(max_range_m));
         }
         if let Some(level) = self.free_level.filter(|level| *level > MAX_FREE_LEVEL) {
             return Err(FreeSpaceError::FreeLevel(level));

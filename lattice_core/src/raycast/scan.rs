@@ -6,7 +6,7 @@ use rustc_hash::FxHashSet;
 use super::families::{Families, Ray};
 use super::masks::{Cursor, ScanMasks};
 use super::packed::Packed;
-use super::traversal::{Kernel, Traversal, TraversalError, with_families};
+use super::traversal::{Kernel, Outside, Traversal};
 use crate::cloud::Cloud;
 use crate::lattice::Simd;
 
@@ -48,14 +48,28 @@ pub struct ScanReport {
 }
 
 /// Parts of rays that count.
-#[derive(Clone, Copy, Debug)]
-pub(super) struct Reach {
-    /// Points beyond this give no hit, and their rays end here.
-    pub(super) max_range_m: f64,
-    /// The last part of each ray, which passes through nothing: at least this,
-    pub(super) keep_m: f64,
-    /// and at least this fraction of the ray.
-    pub(super) keep_ratio: f64,
+#[derive(Clone, Copy, PartialEq, Debug)]
+pub struct Reach {
+    /// Rays of points that are farther than this are followed to this range, metres, and give no
+    /// hit; infinite for no limit.
+    pub max_range_m: f64,
+    /// The last part of each ray, which passes through nothing, metres: rays that graze a surface
+    /// pass through the cells before the one that they end in.
+    pub keep_m: f64,
+    /// The same as a fraction of the ray, 0 to 1; the longer of the two counts. Ground seen at a flat
+    /// angle from a height is passed over, within its own cells, on a part of the way that grows with
+    /// the distance.
+    pub keep_ratio: f64,
+}
+
+impl Default for Reach {
+    fn default() -> Reach {
+        Reach {
+            max_range_m: f64::INFINITY,
+            keep_m: 0.0,
+            keep_ratio: 0.0,
+        }
+    }
 }
 
 /// Cells where rays end, each once.
@@ -85,8 +99,8 @@ pub(super) fn mark(
         report.points += points;
         let origin_m = bundle.origin_m - datum_m;
         match traversal.cell_of(&origin_m) {
-            Err(TraversalError::NotFinite) => report.not_finite += points,
-            Err(TraversalError::OutOfRange(_)) => report.out_of_range += points,
+            Err(Outside::NotFinite) => report.not_finite += points,
+            Err(Outside::OutOfRange) => report.out_of_range += points,
             Ok(start) => bundles.push(Rays {
                 traversal,
                 origin_m,
@@ -190,7 +204,7 @@ impl Rays<'_> {
         let offsets = self.points.offsets_m.iter();
         let points =
             offsets.map(|&[x, y, z]| [bx + f64::from(x), by + f64::from(y), bz + f64::from(z)]);
-        self.traversal.lattice().quantize_each(points, |p, w| {
+        self.traversal.lattice.quantize_each(points, |p, w| {
             let cell = w.and_then(|w| self.traversal.in_range(w));
             visit(Vector3::from(p), cell);
         });
@@ -215,7 +229,11 @@ impl Rays<'_> {
 
     #[inline(always)]
     fn follow_all_portably(&self, masks: &mut ScanMasks, ends: &Ends) -> u64 {
-        with_families!(&self.traversal.kernel, families => self.follow(families, masks, ends))
+        match &self.traversal.kernel {
+            Kernel::Four(families) => self.follow(families, masks, ends),
+            Kernel::Six(families) => self.follow(families, masks, ends),
+            Kernel::Eight(families) => self.follow(families, masks, ends),
+        }
     }
 
     /// Marks the cells from the origin to each end, without the end.
@@ -226,7 +244,7 @@ impl Rays<'_> {
         masks: &mut ScanMasks,
         ends: &Ends,
     ) -> u64 {
-        let lattice = self.traversal.lattice();
+        let lattice = &self.traversal.lattice;
         let from_center = self.origin_m - lattice.center(self.start.unpack());
         let origin = families.origin(from_center, self.start);
         let ends = ends.hits.iter().chain(&ends.open);

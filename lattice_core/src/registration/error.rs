@@ -4,58 +4,30 @@ use thiserror::Error;
 
 /// A cloud that cannot be prepared for registration.
 #[derive(Clone, Debug, PartialEq, Error)]
+#[allow(missing_docs)] // The messages name the fields.
 pub enum RegistrationError {
     /// Too few points for the neighbourhoods asked for.
     #[error("{points} points, at least {least} are needed")]
-    TooFewPoints {
-        /// Points of the cloud.
-        points: usize,
-        /// Points needed.
-        least: usize,
-    },
+    TooFewPoints { points: usize, least: usize },
     /// More points than can be numbered.
     #[error("{points} points, at most {most} are taken")]
-    TooManyPoints {
-        /// Points of the cloud.
-        points: usize,
-        /// Points taken at most.
-        most: usize,
-    },
+    TooManyPoints { points: usize, most: usize },
     /// A coordinate is not a number or beyond [`MAX_COORDINATE_M`](super::MAX_COORDINATE_M).
     #[error("point {index} is not finite or too far away")]
-    NotFinite {
-        /// Its place in the cloud.
-        index: usize,
-    },
+    NotFinite { index: usize },
     /// All points are equal or on one line, up to rounding.
     #[error("all points are on one line")]
     Collinear,
     /// There must be a label for each point or none at all.
     #[error("{labels} labels for {points} points")]
-    LabelCount {
-        /// Labels of the cloud.
-        labels: usize,
-        /// Points of the cloud.
-        points: usize,
-    },
+    LabelCount { labels: usize, points: usize },
     /// Neighbours of a neighbourhood out of range.
     #[error("{neighbors} neighbours, from 3 to {most} are taken")]
-    Neighbors {
-        /// Neighbours asked for.
-        neighbors: usize,
-        /// Neighbours at most.
-        most: usize,
-    },
+    Neighbors { neighbors: usize, most: usize },
     /// The plane regularisation must be over 0 and at most 1.
     #[error("a plane epsilon of {plane_epsilon} is not in (0, 1]")]
-    PlaneEpsilon {
-        /// Number asked for.
-        plane_epsilon: f64,
-    },
+    PlaneEpsilon { plane_epsilon: f64 },
     /// The side of a map's cells is not a length.
     #[error("a cell side of {cell_side_m} m is not a positive length")]
-    CellSide {
-        /// Value given, metres.
-        cell_side_m: f64,
-    },
+    CellSide { cell_side_m: f64 },
 }

@@ -13,8 +13,6 @@ mod options;
 mod prepared;
 mod search;
 mod solver;
-#[cfg(test)]
-mod testing;
 
 pub use calibrate::{
     Calibration, CalibrationMap, CalibrationOptions, CalibrationRequest, ClassReliability,
@@ -22,12 +20,12 @@ pub use calibrate::{
     track,
 };
 pub use cloud::SemanticCloud;
-pub use confusion::Confusion;
+pub use confusion::{Confusion, Lift};
 pub use downsample::voxel_downsample;
 pub use error::RegistrationError;
 pub use labels::{LabelDistribution, UNLABELED};
 pub use named::NamedMethod;
-pub use options::{LabelUse, MAX_CANDIDATES, Method, PairWeight, RegisterOptions, SemanticVariant};
+pub use options::{LabelUse, MAX_CANDIDATES, Method, RegisterOptions, SemanticVariant};
 pub use prepared::kd_tree::{MAX_NEIGHBORS, Neighbors};
 pub use prepared::{MAX_COORDINATE_M, PrepareOptions, PreparedCloud};
 pub use solver::{Registration, register};

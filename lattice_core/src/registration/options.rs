@@ -1,8 +1,6 @@
 //! Options of a registration: method, kernel, labels, and when to stop.
 
-use std::fmt;
-
-use super::LabelDistribution;
+use super::Lift;
 
 /// Cost that a registration minimises.
 #[derive(Clone, Copy, PartialEq, Eq, Debug)]
@@ -40,16 +38,10 @@ pub enum LabelUse {
     Soft,
 }
 
-/// Weight of a pair by the labels of its points, in place of their equality.
-pub trait PairWeight: Sync {
-    /// Not negative; 1 says nothing, less speaks against one place, more for it.
-    fn weight(&self, source: &LabelDistribution, target: &LabelDistribution) -> f64;
-}
-
 /// Options of a registration.
 ///
 /// Tolerances are for the step of one iteration; both must hold.
-#[derive(Clone, Copy)]
+#[derive(Clone, Copy, Debug)]
 pub struct RegisterOptions<'a> {
     /// Method: the cost that is minimised.
     pub method: Method,
@@ -71,10 +63,8 @@ pub struct RegisterOptions<'a> {
     pub source_stride: usize,
     /// Hard or soft labels.
     pub labels: LabelUse,
-    /// In place of the equality of labels, for [`Method::Semantic`].
-    pub pair_weight: Option<&'a dyn PairWeight>,
-    /// Squared Mahalanobis distance at which a pair is as likely an outlier, for [`SemanticVariant::Em`].
-    pub outlier_squared: f64,
+    /// Weight of a pair by its labels in place of their equality, for [`Method::Semantic`].
+    pub pair_weight: Option<&'a Lift>,
     /// Factor a search on the variances, from a third of the gate across planes down to the true ones, for
     /// [`SemanticVariant::Em`]; 1 or more for none.
     pub anneal: f64,
@@ -83,19 +73,6 @@ pub struct RegisterOptions<'a> {
     pub kernel_of_square: bool,
     /// Fewest source points of a class for [`Method::ClassWise`].
     pub min_class_points: usize,
-    /// True if the gradient follows the source covariance as it turns. The step does in no case.
-    pub turn_covariance: bool,
-}
-
-impl fmt::Debug for RegisterOptions<'_> {
-    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
-        f.debug_struct("RegisterOptions")
-            .field("method", &self.method)
-            .field("gate_m", &self.gate_m)
-            .field("labels", &self.labels)
-            .field("source_stride", &self.source_stride)
-            .finish_non_exhaustive()
-    }
 }
 
 /// Most candidates of a source point.
@@ -125,11 +102,9 @@ impl RegisterOptions<'_> {
             source_stride: 1,
             labels: LabelUse::Hard,
             pair_weight: None,
-            outlier_squared: 9.0,
             anneal: 1.0,
             kernel_of_square: false,
             min_class_points: 0,
-            turn_covariance: false,
         }
     }
 
@@ -144,7 +119,6 @@ impl RegisterOptions<'_> {
             inner_iterations: 50,
             rotation_tolerance_rad: tolerance,
             translation_tolerance_m: tolerance,
-            turn_covariance: true,
             ..Self::gicp(250.0_f64.sqrt())
         }
     }

@@ -9,33 +9,20 @@ use crate::lattice::MortonKey;
 
 /// Error in encoded keys; positions are bytes from the start of the keys.
 #[derive(Clone, Copy, PartialEq, Eq, Debug, Error)]
+#[allow(missing_docs)] // The messages name the fields.
 pub enum CodecError {
     /// The bytes end within a varint.
-    #[error("the keys end at byte {position} within a number: the message or file is cut short")]
-    Truncated {
-        /// Length of the input.
-        position: usize,
-    },
+    #[error("the bytes end at byte {position} within a number: the message or file is cut short")]
+    Truncated { position: usize },
     /// A varint is longer than it must be or does not fit 64 bits.
     #[error("the number that ends at byte {position} is not a shortest 64-bit varint")]
-    Varint {
-        /// The offending byte.
-        position: usize,
-    },
+    Varint { position: usize },
     /// A key repeats or reaches 2^63.
     #[error("key {index}, before byte {position}, does not ascend or is not below 2^63")]
-    Key {
-        /// Number of the key, from 0.
-        index: usize,
-        /// The byte after it.
-        position: usize,
-    },
+    Key { index: usize, position: usize },
     /// More keys than allowed.
     #[error("more than {max} keys")]
-    TooMany {
-        /// Limit set by the caller.
-        max: usize,
-    },
+    TooMany { max: usize },
 }
 
 /// Encodes keys, which must ascend strictly; others do not decode.

@@ -111,23 +111,14 @@ mod tests {
             largest_square: 1 << 18,
         };
         let d = sums.summary(&lattice());
-        assert_eq!(
-            (d.points, d.mean_distance_m, d.max_distance_m),
-            (2, 0.75, 1.0)
-        );
-        assert_eq!(
-            (d.mse_per_dimension_m2, d.rms_m),
-            (0.625 / 3.0, 0.625_f64.sqrt())
-        );
+        assert_eq!((d.points, d.mean_distance_m), (2, 0.75));
+        assert_eq!((d.rms_m, d.max_distance_m), (0.625_f64.sqrt(), 1.0));
+        assert_eq!(d.mse_per_dimension_m2, 0.625 / 3.0);
         assert_eq!(sums.contradiction(&lattice()), None);
-    }
-
-    #[test]
-    fn no_points_have_no_distortion() {
-        let d = DistortionSums::default().summary(&lattice());
+        let none = DistortionSums::default().summary(&lattice());
         assert_eq!(
-            (d.points, d.mean_distance_m, d.rms_m, d.max_distance_m),
-            (0, 0.0, 0.0, 0.0)
+            (none.points, none.mean_distance_m, none.rms_m),
+            (0, 0.0, 0.0)
         );
     }
 
@@ -148,24 +139,16 @@ mod tests {
             distances: 21_894,
             largest_square: 114,
         }));
-        assert!(contradicts(DistortionSums {
-            squares: 19 << 10,
-            ..good
-        }));
-        assert!(contradicts(DistortionSums {
-            squares: 8 << 10,
-            ..good
-        }));
+        let squares = |squares| DistortionSums { squares, ..good };
+        assert!(contradicts(squares(19 << 10)));
+        assert!(contradicts(squares(8 << 10)));
         assert!(contradicts(DistortionSums { points: 0, ..good }));
+        let distances = 1 << 20;
+        assert!(contradicts(DistortionSums { distances, ..good }));
+        let largest_square = 1 << 20;
         assert!(contradicts(DistortionSums {
-            distances: 1 << 20,
-            ..good
-        }));
-        let far = 1 << 20;
-        assert!(contradicts(DistortionSums {
-            largest_square: far,
-            squares: far.into(),
-            ..good
+            largest_square,
+            ..squares(1 << 20)
         }));
     }
 }

@@ -11,12 +11,12 @@ mod distortion;
 mod list;
 mod occupancy;
 mod region;
-mod store;
+pub(crate) mod store;
 mod voxel;
 mod voxel_store;
 
 pub use distortion::Distortion;
-pub use list::{Changes, DatumError, InsertReport, MergeError, NoStamps, VoxelList, WhenFull};
+pub use list::{Changes, DatumError, InsertReport, NoStamps, VoxelList, WhenFull};
 pub use occupancy::OccupancyList;
 pub use region::{Region, RegionError};
 pub use store::payload_columns::{LabelCount, Payload, Stamps};

@@ -2,9 +2,9 @@
 
 use nalgebra::Vector3;
 
-use super::{InsertReport, MergeError, Region};
+use super::{InsertReport, Region};
 use crate::cloud::Cloud;
-use crate::lattice::{Lattice, LatticeIndex, MortonKey};
+use crate::lattice::{Lattice, MortonKey};
 
 /// Occupied voxels of a lattice whose indices count from a datum in the map frame.
 ///
@@ -35,16 +35,9 @@ pub trait VoxelStore: Sync {
     /// Removes a voxel; false if the cell was not occupied.
     fn remove(&mut self, key: MortonKey) -> bool;
 
-    /// Removes the cells that `keep` denies; gives their number.
-    ///
-    /// A block of 8 x 8 x 8 indices, given by its lowest, is kept or removed as a whole if
-    /// `keep_block` says so; `keep` is asked about the cells of the others. Both are called in no
-    /// order and on many threads.
-    fn retain_cells(
-        &mut self,
-        keep_block: &(dyn Fn(LatticeIndex) -> Option<bool> + Sync),
-        keep: &(dyn Fn(MortonKey) -> bool + Sync),
-    ) -> usize;
+    /// Removes the cells that `keep` denies, which is asked in no order and on many threads; gives
+    /// their number.
+    fn retain_cells(&mut self, keep: &(dyn Fn(MortonKey) -> bool + Sync)) -> usize;
 
     /// Memory that the store holds, bytes.
     fn bytes(&self) -> usize;
@@ -65,27 +58,9 @@ pub trait VoxelStore: Sync {
         MortonKey::pack(w)
     }
 
-    /// Fails unless a key means the same cell in both stores.
-    fn expect_cells_of(&self, other: &dyn VoxelStore) -> Result<(), MergeError> {
-        if self.lattice() != other.lattice() {
-            return Err(MergeError::Lattice {
-                ours: format!("{:?}", self.lattice()),
-                theirs: format!("{:?}", other.lattice()),
-            });
-        }
-        if self.datum_index() != other.datum_index() {
-            let (ours, theirs) = (self.datum_m().into(), other.datum_m().into());
-            return Err(MergeError::Datum { ours, theirs });
-        }
-        Ok(())
-    }
-
     /// Removes the cells with their centre in a region; gives their number.
     fn remove_region(&mut self, region: &Region) -> usize {
-        let cells = region.of_cells(self.lattice(), self.datum_m());
-        self.retain_cells(
-            &|first| cells.block_is_inside(first).map(|inside| !inside),
-            &|key| !cells.is_inside(key),
-        )
+        let (lattice, datum_m) = (self.lattice().clone(), self.datum_m());
+        self.retain_cells(&|key| !region.contains(&(datum_m + lattice.center(key.unpack()))))
     }
 }

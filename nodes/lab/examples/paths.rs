@@ -90,7 +90,7 @@ fn search(world: &World, kind: LatticeKind, steps: Steps) -> Option<Found> {
         max_expanded: 1_000_000,
     };
     let begin = Instant::now();
-    let path = match query.shortest_path(&world.start_m, &world.goal_m, &options, |_| true) {
+    let path = match query.shortest_path(&world.start_m, &world.goal_m, &options) {
         Ok(path) => path,
         Err(PathError::NoPath { .. } | PathError::Blocked { .. }) => return None,
         Err(error) => panic!("{error}"),

@@ -1,7 +1,7 @@
 //! Parameters of free space in the mapper.
 
 use crate::options::one_of;
-use lattice_core::raycast::{ClearOptions, Evidence, MAX_FREE_LEVEL, MIN_MAP_BYTES};
+use lattice_core::raycast::{ClearOptions, Evidence, MAX_FREE_LEVEL, MIN_MAP_BYTES, Reach};
 use lattice_runtime::params::{ParamError, Params};
 
 /// Longest ray and kept end, m.
@@ -61,16 +61,20 @@ impl MappedFreeSpace {
         let sweep_s = params.f64_in("rays.sweep_s", 0.0, 0.0..=MAX_SWEEP_S)?;
         let max_range_m = params.f64_in("rays.max_range_m", 0.0, 0.0..=MAX_LENGTH_M)?;
         let misses = clear_misses(params, defaults.clear.misses)?;
-        let clear = ClearOptions {
-            misses,
-            keep_m: params.f64_in("rays.keep_m", defaults.clear.keep_m, 0.0..=MAX_LENGTH_M)?,
-            keep_ratio: params.f64_in("rays.keep_ratio", defaults.clear.keep_ratio, 0.0..=1.0)?,
-            spare_touching: params.bool("rays.spare_touching", defaults.clear.spare_touching)?,
+        let kept = defaults.clear.reach;
+        let reach = Reach {
             max_range_m: if max_range_m > 0.0 {
                 max_range_m
             } else {
                 f64::INFINITY
             },
+            keep_m: params.f64_in("rays.keep_m", kept.keep_m, 0.0..=MAX_LENGTH_M)?,
+            keep_ratio: params.f64_in("rays.keep_ratio", kept.keep_ratio, 0.0..=1.0)?,
+        };
+        let clear = ClearOptions {
+            misses,
+            reach,
+            spare_touching: params.bool("rays.spare_touching", defaults.clear.spare_touching)?,
             max_bytes: params.usize_in(
                 "rays.max_bytes",
                 defaults.clear.max_bytes,

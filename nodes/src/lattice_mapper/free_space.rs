@@ -56,9 +56,7 @@ impl FreeSpace {
             FreeSpaceMethod::Evidence => {
                 let options = FreeSpaceOptions {
                     evidence: options.evidence,
-                    max_range_m: options.clear.max_range_m,
-                    keep_m: options.clear.keep_m,
-                    keep_ratio: options.clear.keep_ratio,
+                    reach: options.clear.reach,
                     free_level: Some(options.free_level).filter(|level| *level > 0),
                     max_bytes: options.clear.max_bytes,
                 };

@@ -3,7 +3,7 @@
 use std::collections::hash_map::Entry;
 
 use lattice_core::cloud::Cloud;
-use lattice_core::lattice::{Lattice, LatticeIndex, MortonKey};
+use lattice_core::lattice::{Lattice, MortonKey};
 use lattice_core::voxels::{Changes, InsertReport, OccupancyList, VoxelStore};
 use nalgebra::Vector3;
 use rustc_hash::FxHashMap;
@@ -147,13 +147,9 @@ impl VoxelStore for OccupancyMap {
         removed
     }
 
-    fn retain_cells(
-        &mut self,
-        keep_block: &(dyn Fn(LatticeIndex) -> Option<bool> + Sync),
-        keep: &(dyn Fn(MortonKey) -> bool + Sync),
-    ) -> usize {
+    fn retain_cells(&mut self, keep: &(dyn Fn(MortonKey) -> bool + Sync)) -> usize {
         let before = self.list.sorted_keys();
-        let removed = self.list.retain_cells(keep_block, keep);
+        let removed = self.list.retain_cells(keep);
         for key in before {
             if !self.list.contains(key) {
                 self.note(key, false);
@@ -203,7 +199,7 @@ mod tests {
                 removed: vec![]
             }
         );
-        map.retain_cells(&|_| None, &|key| key == keys[0]);
+        map.retain_cells(&|key| key == keys[0]);
         assert_eq!(map.take_changes().removed, [keys[1]]);
         assert_eq!(map.take_changes(), Changes::default());
     }

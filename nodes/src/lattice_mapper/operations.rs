@@ -2,9 +2,9 @@
 
 use std::sync::Arc;
 
-use lattice_core::query::{Query, QueryError, Shells};
+use lattice_core::query::{Query, QueryError, Segment, Shells};
 use lattice_core::voxels::file::{MapContents, OperationError};
-use lattice_core::voxels::{MergeError, Region, VoxelStore};
+use lattice_core::voxels::{Region, VoxelStore};
 use lattice_msgs::geometry_msgs::Point;
 use lattice_msgs::lattice::{ClearBoxRequest, ClearBoxResponse, QueryMapRequest, QueryMapResponse};
 use nalgebra::Vector3;
@@ -39,9 +39,6 @@ pub enum LoadRefusal {
         /// Limit of the parameters.
         max_voxels: usize,
     },
-    /// Lists that cannot be merged for another reason.
-    #[error(transparent)]
-    Merge(#[from] MergeError),
 }
 
 impl LatticeMapper {
@@ -81,13 +78,8 @@ impl LatticeMapper {
             self.begin(epoch);
             return Ok(voxels);
         }
-        let mut loaded = contents.into_list(max_voxels);
-        if loaded.payload() != payload {
-            let mut list = loaded.clone().with_payload(payload);
-            list.merge(&loaded)?;
-            loaded = list;
-        }
-        self.list = loaded.with_when_full(self.options.when_full);
+        let list = contents.into_list_with(payload, max_voxels);
+        self.list = list.with_when_full(self.options.when_full);
         self.begin(epoch);
         Ok(voxels)
     }
@@ -147,7 +139,7 @@ impl LatticeMapper {
                 .map_or(0, |voxel| voxel.count),
             ..QueryMapResponse::default()
         };
-        let clearance = query.clearance(point_m, f64::INFINITY)?;
+        let clearance = query.clearance(&Segment::point(*point_m), f64::INFINITY)?;
         let nearest = query.nearest(point_m, 1)?;
         if let (Some(clearance), Some(nearest)) = (clearance, nearest.first()) {
             let [x, y, z] = nearest.center_m.into();

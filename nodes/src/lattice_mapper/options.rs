@@ -141,7 +141,6 @@ impl MapperOptions {
         Payload {
             stamps: self.forget_after_ns > 0,
             labels: self.labels.is_some(),
-            ..Payload::default()
         }
     }
 

@@ -225,7 +225,6 @@ fn detailed_maps() -> Vec<Vec<u8>> {
     for lattice in [custom.clone(), custom.oriented(turn), fcc.oriented(turn)] {
         let list = VoxelList::new(lattice, Vector3::zeros(), usize::MAX).unwrap();
         let mut list = list.with_payload(Payload {
-            moments: true,
             stamps: true,
             labels: true,
         });

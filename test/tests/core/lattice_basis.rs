@@ -71,11 +71,8 @@ impl Exhaustive {
 
 fn check_nearest(lattice: &Lattice, random: &mut Random) {
     let volume = lattice.cell().volume_m3() / lattice.cell_volume_m3() - 1.0;
-    assert!(
-        volume.abs() < 1e-9,
-        "{}: volume {volume}",
-        lattice.generator()
-    );
+    let generator = lattice.generator();
+    assert!(volume.abs() < 1e-9, "{generator}: volume {volume}");
     let search = Exhaustive::new(lattice.generator(), lattice.covering_radius_m());
     let side = lattice.cell_volume_m3().cbrt();
     // The search is long where the basis is skewed.
@@ -84,10 +81,10 @@ fn check_nearest(lattice: &Lattice, random: &mut Random) {
         let w = lattice.quantize(&p).unwrap();
         let square = (p - lattice.center(w)).norm_squared();
         let nearest = search.square(&p);
+        let excess = square - nearest;
         assert!(
-            square <= nearest + 1e-11 * side * side,
-            "{} {p} {w:?}: {square}, not {nearest}",
-            lattice.generator()
+            excess <= 1e-11 * side * side,
+            "{generator} {p} {w:?}: {excess}"
         );
         assert!(square.sqrt() <= lattice.covering_radius_m() * (1.0 + 1e-12));
     }
@@ -112,31 +109,21 @@ fn other_bases_of_a_lattice_give_its_cells() {
             let change = unimodular(&mut random, 8);
             let other = Lattice::from_basis(own.generator() * change).unwrap();
             assert!((other.cell_volume_m3() - 0.125).abs() < 1e-12);
-            assert!(
-                (other.covering_radius_m() - own.covering_radius_m()).abs() < 1e-9,
-                "{kind}"
-            );
-            assert!(
-                (other.packing_radius_m() - own.packing_radius_m()).abs() < 1e-9,
-                "{kind}"
-            );
+            let covering = other.covering_radius_m() - own.covering_radius_m();
+            let packing = other.packing_radius_m() - own.packing_radius_m();
+            assert!(covering.abs() < 1e-9 && packing.abs() < 1e-9, "{kind}");
             // Index of the own basis: change * w, exactly.
             let own_index = |w: &LatticeIndex| {
                 let v = change * Vector3::from(w.map(f64::from));
                 [v.x as i32, v.y as i32, v.z as i32]
             };
-            let set = |list: &[LatticeIndex]| list.iter().copied().collect::<BTreeSet<_>>();
-            let moved = |list: &[LatticeIndex]| list.iter().map(own_index).collect::<BTreeSet<_>>();
-            assert_eq!(
-                moved(other.face_neighbors()),
-                set(own.face_neighbors()),
-                "{kind}"
-            );
-            assert_eq!(
-                moved(other.touching_neighbors()),
-                set(own.touching_neighbors()),
-                "{kind}"
-            );
+            for (other, own) in [
+                (other.face_neighbors(), own.face_neighbors()),
+                (other.touching_neighbors(), own.touching_neighbors()),
+            ] {
+                let moved: BTreeSet<_> = other.iter().map(own_index).collect();
+                assert_eq!(moved, own.iter().copied().collect(), "{kind}");
+            }
             for _ in 0..500 {
                 let p = random.point(4.0);
                 let (a, b) = (own.quantize(&p).unwrap(), other.quantize(&p).unwrap());
@@ -152,11 +139,8 @@ fn neighbours_are_symmetric_pairs_and_share_the_faces_of_the_cell() {
     let mut random = Random(13);
     for _ in 0..200 {
         let lattice = random_lattice(&mut random);
-        assert_eq!(
-            lattice.face_neighbors().len(),
-            14,
-            "a random lattice is in general position"
-        );
+        // A random lattice is in general position.
+        assert_eq!(lattice.face_neighbors().len(), 14);
         assert_eq!(lattice.touching_neighbors(), lattice.face_neighbors());
         for pair in lattice.touching_neighbors().chunks(2) {
             assert_eq!(pair[0].map(|i| -i), pair[1]);

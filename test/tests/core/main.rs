@@ -1,5 +1,6 @@
 //! The library against independent arithmetic, brute force and its own invariants.
 
+mod calibration;
 mod cloud;
 #[path = "../../fuzz/src/lib.rs"]
 mod fuzz;
@@ -10,9 +11,7 @@ mod map_file;
 mod map_file_fuzz;
 mod pose;
 mod query;
-mod raycast_clear;
-mod raycast_map;
-mod raycast_traversal;
+mod raycast;
 mod registration_pair;
 mod voxels_operations;
 mod voxels_properties;

@@ -68,7 +68,6 @@ fn maps() -> Vec<MapContents> {
         let datum_m = Vector3::new(-4321.0, 98765.4, 12.0);
         let list = VoxelList::new(lattice, datum_m, usize::MAX).unwrap();
         let mut list = list.with_payload(Payload {
-            moments: true,
             stamps: true,
             labels: true,
         });

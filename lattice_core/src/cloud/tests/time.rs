@@ -4,19 +4,19 @@ use crate::cloud::{CloudError, CloudLimits, NO_TIME_NS, TimeOptions, TimeReferen
 const STAMP_NS: i64 = 1_700_000_000_123_456_789;
 const STAMP_S: f64 = 1_700_000_000.0;
 
+type Times = Result<Option<Vec<i64>>, CloudError>;
+
 fn read(
     name: &str,
     datatype: u8,
     times: &[Vec<u8>],
     stamp_ns: i64,
     options: &TimeOptions,
-) -> Result<Option<Vec<i64>>, CloudError> {
+) -> Times {
     let points = vec![[1.0, 2.0, 3.0]; times.len()];
     let (layout, data) = timed(name, datatype, &points, times);
-    layout
-        .view(&data, &CloudLimits::default())
-        .unwrap()
-        .point_times(stamp_ns, options)
+    let view = layout.view(&data, &CloudLimits::default()).unwrap();
+    view.point_times(stamp_ns, options)
 }
 
 fn f32s(values: &[f32]) -> Vec<Vec<u8>> {
@@ -39,220 +39,143 @@ fn with(unit: Option<TimeUnit>, reference: Option<TimeReference>) -> TimeOptions
     }
 }
 
-fn after_stamp(offsets_ns: &[i64]) -> Result<Option<Vec<i64>>, CloudError> {
+fn named(name: &str) -> TimeOptions {
+    TimeOptions {
+        field: Some(name.to_owned()),
+        ..TimeOptions::default()
+    }
+}
+
+fn spanning(max_span_s: f64) -> TimeOptions {
+    TimeOptions {
+        max_span_s,
+        ..TimeOptions::default()
+    }
+}
+
+fn after(offsets_ns: &[i64]) -> Times {
     Ok(Some(offsets_ns.iter().map(|o| STAMP_NS + o).collect()))
 }
 
+/// Velodyne, Ouster, Hesai, Livox, and seconds from the stamp in f64.
 #[test]
-fn velodyne_seconds_before_the_stamp() {
-    let times = f32s(&[-0.5, -0.25, 0.0]);
-    assert_eq!(
-        read("time", F32, &times, STAMP_NS, &TimeOptions::default()),
-        after_stamp(&[-500_000_000, -250_000_000, 0])
-    );
-}
-
-#[test]
-fn ouster_nanoseconds_after_the_stamp() {
-    let times = u32s(&[0, 99_999_999, 17]);
-    assert_eq!(
-        read("t", U32, &times, STAMP_NS, &TimeOptions::default()),
-        after_stamp(&[0, 99_999_999, 17])
-    );
-}
-
-#[test]
-fn hesai_absolute_seconds() {
-    let times = f64s(&[STAMP_S, STAMP_S + 0.0625]);
-    assert_eq!(
-        read("timestamp", F64, &times, STAMP_NS, &TimeOptions::default()),
-        Ok(Some(vec![
-            1_700_000_000_000_000_000,
-            1_700_000_000_062_500_000
-        ]))
-    );
-}
-
-#[test]
-fn livox_absolute_nanoseconds() {
-    let times = f64s(&[1.7e18, 1.7e18 + 102_400.0]);
-    assert_eq!(
-        read("timestamp", F64, &times, STAMP_NS, &TimeOptions::default()),
-        Ok(Some(vec![
-            1_700_000_000_000_000_000,
-            1_700_000_000_000_102_400
-        ]))
-    );
-}
-
-#[test]
-fn f64_seconds_from_the_stamp() {
-    let times = f64s(&[0.0, 0.0625, -0.0625]);
-    assert_eq!(
-        read("time_stamp", F64, &times, STAMP_NS, &TimeOptions::default()),
-        after_stamp(&[0, 62_500_000, -62_500_000])
-    );
-}
-
-#[test]
-fn no_field_no_time() {
-    let times = f32s(&[0.0]);
-    let options = TimeOptions::default();
-    assert_eq!(read("intensity", F32, &times, 0, &options), Ok(None));
-    // Of a type that is no time.
-    assert_eq!(read("t", 3, &[vec![0, 0]], 0, &options), Ok(None));
-    let off = TimeOptions {
-        field: Some(String::new()),
-        ..TimeOptions::default()
+fn sensors_are_known_by_name_type_and_size() {
+    let whole_ns = 1_700_000_000_000_000_000;
+    let absolute = |offset_ns| Ok(Some(vec![whole_ns, whole_ns + offset_ns]));
+    let check = |name: &str, datatype, times: &[Vec<u8>], expected: Times| {
+        let found = read(name, datatype, times, STAMP_NS, &TimeOptions::default());
+        assert_eq!(found, expected, "{name}");
     };
-    assert_eq!(read("time", F32, &times, 0, &off), Ok(None));
+    check("time", F32, &f32s(&[-0.5, 0.0]), after(&[-500_000_000, 0]));
+    check("t", U32, &u32s(&[0, 99_999, 17]), after(&[0, 99_999, 17]));
+    let seconds = [STAMP_S, STAMP_S + 0.0625];
+    check("timestamp", F64, &f64s(&seconds), absolute(62_500_000));
+    let nanoseconds = [1.7e18, 1.7e18 + 102_400.0];
+    check("timestamp", F64, &f64s(&nanoseconds), absolute(102_400));
+    check("time_stamp", F64, &f64s(&[-0.0625]), after(&[-62_500_000]));
+    check("intensity", F32, &f32s(&[0.0]), Ok(None));
+    // Of a type that is no time.
+    check("t", 3, &[vec![0, 0]], Ok(None));
+    assert_eq!(read("time", F32, &f32s(&[0.0]), 0, &named("")), Ok(None));
 }
 
 #[test]
 fn overrides_are_obeyed() {
-    let micros = with(Some(TimeUnit::Microseconds), None);
-    assert_eq!(
-        read("t", U32, &u32s(&[0, 100_000]), STAMP_NS, &micros),
-        after_stamp(&[0, 100_000_000])
-    );
-    let end = with(None, Some(TimeReference::StampEnd));
-    assert_eq!(
-        read("t", U32, &u32s(&[10, 110]), STAMP_NS, &end),
-        after_stamp(&[-100, 0])
-    );
-    let named = TimeOptions {
-        field: Some("when".to_owned()),
-        unit: Some(TimeUnit::Milliseconds),
-        ..TimeOptions::default()
+    let check = |name, datatype, times: &[Vec<u8>], options, expected: Times| {
+        assert_eq!(read(name, datatype, times, STAMP_NS, &options), expected);
     };
-    assert_eq!(
-        read("when", 4, &[vec![7, 0], vec![0, 0]], STAMP_NS, &named),
-        after_stamp(&[7_000_000, 0])
-    );
+    let micros = with(Some(TimeUnit::Microseconds), None);
+    check("t", U32, &u32s(&[0, 9]), micros, after(&[0, 9_000]));
+    let times = u32s(&[10, 110]);
+    let end = with(None, Some(TimeReference::StampEnd));
+    check("t", U32, &times, end, after(&[-100, 0]));
     let absolute = with(None, Some(TimeReference::Absolute));
-    assert_eq!(
-        read("t", U32, &u32s(&[10, 110]), STAMP_NS, &absolute),
-        Ok(Some(vec![10, 110]))
-    );
+    check("t", U32, &times, absolute, Ok(Some(vec![10, 110])));
+    let millis = TimeOptions {
+        unit: Some(TimeUnit::Milliseconds),
+        ..named("when")
+    };
+    let times = [vec![7, 0], vec![0, 0]];
+    check("when", 4, &times, millis, after(&[7_000_000, 0]));
 }
 
 #[test]
 fn a_free_running_clock_needs_and_takes_an_override() {
     let times = f64s(&[523.5, 523.25]);
+    let read = |options| read("timestamp", F64, &times, STAMP_NS, &options);
+    let refused = read(TimeOptions::default());
     assert!(matches!(
-        read("timestamp", F64, &times, STAMP_NS, &TimeOptions::default()),
-        Err(CloudError::TimeOffset { offset_s, .. }) if offset_s == 523.5
+        refused,
+        Err(CloudError::TimeOffset {
+            offset_s: 523.5,
+            ..
+        })
     ));
     let start = with(None, Some(TimeReference::StampStart));
-    assert_eq!(
-        read("timestamp", F64, &times, STAMP_NS, &start),
-        after_stamp(&[250_000_000, 0])
-    );
+    assert_eq!(read(start), after(&[250_000_000, 0]));
 }
 
 #[test]
 fn tai_is_distinguished_from_utc_unless_insisted_on() {
     let times = f64s(&[STAMP_S + 37.0, STAMP_S + 37.0625]);
     let stamp_ns = 1_700_000_000_000_000_000;
-    match read("timestamp", F64, &times, stamp_ns, &TimeOptions::default()) {
-        Err(CloudError::TimeClock { distance_s, .. }) => assert!((distance_s - 37.0).abs() < 1e-6),
-        other => panic!("{other:?}"),
-    }
-    let insist = with(None, Some(TimeReference::Absolute));
-    assert_eq!(
-        read("timestamp", F64, &times, stamp_ns, &insist),
-        Ok(Some(vec![
-            stamp_ns + 37_000_000_000,
-            stamp_ns + 37_062_500_000
-        ]))
+    let read = |options| read("timestamp", F64, &times, stamp_ns, &options);
+    let error = read(TimeOptions::default()).unwrap_err().to_string();
+    assert!(
+        error.contains("absolute s are 37 s from the stamp"),
+        "{error}"
     );
+    let insist = with(None, Some(TimeReference::Absolute));
+    let expected = [37_000_000_000, 37_062_500_000].map(|ns| stamp_ns + ns);
+    assert_eq!(read(insist), Ok(Some(expected.to_vec())));
 }
 
 #[test]
 fn a_span_of_a_second_is_refused() {
-    let options = TimeOptions::default();
-    let almost = u32s(&[0, 999_999_999]);
-    assert!(read("t", U32, &almost, 0, &options).is_ok());
-    let second = u32s(&[0, 1_000_000_000]);
-    assert!(matches!(
-        read("t", U32, &second, 0, &options),
-        Err(CloudError::TimeSpan {
-            span_s: 1.0,
-            max_span_s: 1.0,
-            ..
-        })
-    ));
-    let longer = TimeOptions {
-        max_span_s: 2.0,
-        ..TimeOptions::default()
-    };
-    assert!(read("t", U32, &second, 0, &longer).is_ok());
-    let nonsense = TimeOptions {
-        max_span_s: f64::NAN,
-        ..TimeOptions::default()
-    };
-    assert!(read("t", U32, &almost, 0, &nonsense).is_err());
+    let (almost, second) = (u32s(&[0, 999_999_999]), u32s(&[0, 1_000_000_000]));
+    let read = |times: &[Vec<u8>], max_span_s| read("t", U32, times, 0, &spanning(max_span_s));
+    assert!(read(&almost, TimeOptions::default().max_span_s).is_ok());
+    let error = read(&second, TimeOptions::default().max_span_s).unwrap_err();
+    assert!(
+        error.to_string().contains("span 1 s, not within 0..1 s"),
+        "{error}"
+    );
+    assert!(read(&second, 2.0).is_ok());
+    assert!(read(&almost, f64::NAN).is_err());
 }
 
 #[test]
 fn named_fields_must_be_there_and_have_a_unit() {
-    let named = |name: &str| TimeOptions {
-        field: Some(name.to_owned()),
-        ..TimeOptions::default()
-    };
-    assert!(matches!(
-        read("t", U32, &u32s(&[0]), 0, &named("when")),
-        Err(CloudError::MissingTimeField { .. })
-    ));
-    assert!(matches!(
-        read("t", 4, &[vec![0, 0]], 0, &named("t")),
-        Err(CloudError::TimeType {
-            datatype: "UINT16",
-            ..
-        })
-    ));
+    let missing = read("t", U32, &u32s(&[0]), 0, &named("when"));
+    assert!(matches!(missing, Err(CloudError::MissingTimeField { .. })));
+    let error = read("t", 4, &[vec![0, 0]], 0, &named("t")).unwrap_err();
+    assert!(error.to_string().contains("'t' is UINT16[1]"), "{error}");
 }
 
 #[test]
 fn points_that_are_no_returns_have_no_say() {
-    let points = [
-        [1.0, 0.0, 0.0],
-        [f32::NAN, 0.0, 0.0],
-        [0.0, 0.0, 0.0],
-        [2.0, 0.0, 0.0],
-        [3.0, 0.0, 0.0],
-    ];
+    let x = [1.0, f32::NAN, 0.0, 2.0, 3.0];
     let times = f64s(&[STAMP_S, 0.0, 0.0, f64::NAN, STAMP_S + 0.25]);
-    let (layout, data) = timed("timestamp", F64, &points, &times);
+    let (layout, data) = timed("timestamp", F64, &x.map(|x| [x, 0.0, 0.0]), &times);
     let view = layout.view(&data, &CloudLimits::default()).unwrap();
+    let found = view.point_times(STAMP_NS, &TimeOptions::default());
+    let (first, last) = (1_700_000_000_000_000_000, 1_700_000_000_250_000_000);
     assert_eq!(
-        view.point_times(STAMP_NS, &TimeOptions::default()),
-        Ok(Some(vec![
-            1_700_000_000_000_000_000,
-            NO_TIME_NS,
-            NO_TIME_NS,
-            NO_TIME_NS,
-            1_700_000_000_250_000_000
-        ]))
+        found,
+        Ok(Some(vec![first, NO_TIME_NS, NO_TIME_NS, NO_TIME_NS, last]))
     );
 }
 
 #[test]
 fn extreme_values_do_not_overflow() {
+    use TimeReference::{Absolute, StampEnd, StampStart};
     for value in [f64::MAX, f64::MIN, 1.0e300, -1.0e300, f64::MIN_POSITIVE] {
         for stamp_ns in [i64::MIN, 0, i64::MAX] {
-            for reference in [
-                None,
-                Some(TimeReference::StampStart),
-                Some(TimeReference::StampEnd),
-                Some(TimeReference::Absolute),
-            ] {
-                let times = f64s(&[value, value]);
-                if let Ok(Some(found)) =
-                    read("timestamp", F64, &times, stamp_ns, &with(None, reference))
-                {
-                    assert_eq!(found.len(), 2);
-                    assert_eq!(found[0], found[1]);
+            for reference in [None, Some(StampStart), Some(StampEnd), Some(Absolute)] {
+                let options = with(None, reference);
+                let found = read("timestamp", F64, &f64s(&[value; 2]), stamp_ns, &options);
+                if let Ok(Some(found)) = found {
+                    assert_eq!((found.len(), found[0]), (2, found[1]));
                 }
             }
         }

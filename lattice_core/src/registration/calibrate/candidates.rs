@@ -3,12 +3,10 @@
 use nalgebra::{Isometry3, Point3, Vector3};
 use rayon::prelude::*;
 
-use super::super::confusion::{Lift, shares};
+use super::super::confusion::shares;
 use super::super::likelihood::{Fit, Likelihood, Partners};
 use super::super::search::Hypothesis;
-use super::super::{
-    Confusion, LabelDistribution, LabelUse, PairWeight, PreparedCloud, RegisterOptions, register,
-};
+use super::super::{Confusion, LabelUse, PreparedCloud, RegisterOptions, register};
 use super::input::Input;
 use super::map::CalibrationMap;
 use super::rays::blocked_fraction;
@@ -211,11 +209,5 @@ impl<'a> Workbench<'a> {
         let points = self.input.few.points_m();
         let sum: Vector3<f64> = points.iter().map(|p| p.coords).sum();
         (sum / points.len().max(1) as f64).into()
-    }
-}
-
-impl PairWeight for Lift {
-    fn weight(&self, source: &LabelDistribution, target: &LabelDistribution) -> f64 {
-        self.expected(source, target)
     }
 }

@@ -207,6 +207,3 @@ fn from_start(bench: &Workbench<'_>, start: &Isometry3<f64>) -> Vec<Candidate> {
     }
     all
 }
-
-#[cfg(test)]
-mod tests;

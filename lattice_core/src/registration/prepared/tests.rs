@@ -100,13 +100,8 @@ fn clouds_that_cannot_be_registered_are_refused() {
         PreparedCloud::new(SemanticCloud::unlabelled(points_m), &options(10)).err()
     };
     use RegistrationError as E;
-    assert_eq!(
-        refused(vec![]),
-        Some(E::TooFewPoints {
-            points: 0,
-            least: 3
-        })
-    );
+    let (points, least) = (0, 3);
+    assert_eq!(refused(vec![]), Some(E::TooFewPoints { points, least }));
     let with = |x: f64| {
         let mut points_m = corner(50);
         points_m[41].y = x;
@@ -123,13 +118,8 @@ fn clouds_that_cannot_be_registered_are_refused() {
     let mut cloud = SemanticCloud::unlabelled(corner(50));
     cloud.labels = vec![LabelDistribution::hard(1); 49];
     let error = PreparedCloud::new(cloud, &options(10)).err();
-    assert_eq!(
-        error,
-        Some(E::LabelCount {
-            labels: 49,
-            points: 50
-        })
-    );
+    let (labels, points) = (49, 50);
+    assert_eq!(error, Some(E::LabelCount { labels, points }));
     let asked = |options| PreparedCloud::new(SemanticCloud::unlabelled(corner(50)), &options).err();
     assert!(matches!(asked(options(2)), Some(E::Neighbors { .. })));
     assert!(matches!(asked(options(65)), Some(E::Neighbors { .. })));
@@ -146,10 +136,6 @@ fn repeated_points_are_fine() {
     let mut points_m = corner(60);
     points_m.extend(vec![points_m[7]; 500]);
     let prepared = PreparedCloud::new(SemanticCloud::unlabelled(points_m), &options(20)).unwrap();
-    assert!(
-        prepared
-            .normals()
-            .iter()
-            .all(|n| (n.norm() - 1.0).abs() < 1e-12)
-    );
+    let unit = |n: &Vector3<f64>| (n.norm() - 1.0).abs() < 1e-12;
+    assert!(prepared.normals().iter().all(unit));
 }

@@ -286,6 +286,3 @@ fn axis_moves(step: f64) -> [Vector3<f64>; 6] {
     let axes = [Vector3::x(), Vector3::y(), Vector3::z()];
     std::array::from_fn(|i| axes[i / 2] * if i % 2 == 0 { step } else { -step })
 }
-
-#[cfg(test)]
-mod tests;

@@ -30,7 +30,7 @@ const INNER_SHARE: f64 = 1e-3;
 
 /// Result of a registration.
 ///
-/// `hessian`, `cost`, `inliers` and `rmse_m` are of the last pairs, before the last step.
+/// `cost`, `inliers` and `rmse_m` are of the last pairs, before the last step.
 #[derive(Clone, PartialEq, Debug)]
 pub struct Registration {
     /// Takes source points to the target frame.
@@ -39,9 +39,6 @@ pub struct Registration {
     pub converged: bool,
     /// Searches for pairs.
     pub iterations: usize,
-    /// Half of the second derivative of the cost (Gauss-Newton) by the right perturbation (rho, phi):
-    /// the sum of J^T M J under the weights of the kernel.
-    pub hessian: Matrix6<f64>,
     /// Value of the minimised cost.
     pub cost: f64,
     /// Source points with a pair.
@@ -69,7 +66,6 @@ pub fn register(
         target_from_source: state.pose,
         converged: false,
         iterations: 0,
-        hessian: Matrix6::zeros(),
         cost: 0.0,
         inliers: 0,
         rmse_m: 0.0,
@@ -101,9 +97,7 @@ pub fn register(
         scale = (scale * options.anneal.max(0.0)).max(1.0);
     }
     let sums = &state.sums;
-    let (hessian, _) = sums.system(&state.pose);
     registration.target_from_source = state.pose;
-    registration.hessian = hessian;
     registration.cost = sums.cost;
     registration.inliers = sums.inliers;
     if sums.weight > 0.0 {

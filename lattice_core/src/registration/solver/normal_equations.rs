@@ -272,25 +272,5 @@ mod tests {
             let expected = slope * j.transpose() * m * r;
             prop_assert!((b - expected).norm() < 1e-9 * (1.0 + expected.norm()));
         }
-
-        #[test]
-        fn jacobians_of_the_residual_are_the_numeric_ones(raw in raw()) {
-            let h = 1e-4;
-            for axis in 0..6 {
-                let residual = |by: f64| {
-                    let mut step = Vector6::zeros();
-                    step[axis] = by;
-                    raw.y - (raw.pose * se3::exp(&step)) * raw.x
-                };
-                let slope = |h: f64| (residual(h) - residual(-h)) / (2.0 * h);
-                let numeric = (4.0 * slope(h / 2.0) - slope(h)) / 3.0;
-                let r = raw.pose.rotation.to_rotation_matrix().into_inner();
-                let analytic = match axis {
-                    0..3 => -r.column(axis).into_owned(),
-                    _ => (r * raw.x.coords.cross_matrix()).column(axis - 3).into_owned(),
-                };
-                prop_assert!((numeric - analytic).norm() < 1e-7);
-            }
-        }
     }
 }

@@ -7,6 +7,9 @@ use crate::registration::{
     LabelDistribution, LabelUse, Method, PreparedCloud, RegisterOptions, SemanticVariant,
 };
 
+/// Squared Mahalanobis distance at which a pair is as likely an outlier.
+const OUTLIER_SQUARED: f64 = 9.0;
+
 /// Labels of both clouds, by place in the order of the tree.
 pub(super) struct Labels<'a> {
     pub source: &'a [LabelDistribution],
@@ -41,7 +44,7 @@ impl Pairs<'_> {
             };
             total += slot.weight;
         }
-        let outlier = (-0.5 * self.options.outlier_squared).exp();
+        let outlier = (-0.5 * OUTLIER_SQUARED).exp();
         for slot in slots {
             if variant == SemanticVariant::Em {
                 slot.weight /= total + outlier;
@@ -60,12 +63,7 @@ impl Pairs<'_> {
         target: &LabelDistribution,
     ) -> f64 {
         if let Some(pair_weight) = self.options.pair_weight {
-            let weight = pair_weight.weight(source, target);
-            return if weight.is_finite() {
-                weight.max(0.0)
-            } else {
-                0.0
-            };
+            return pair_weight.expected(source, target);
         }
         let equal: f64 = match self.options.labels {
             LabelUse::Hard => match (source.top(), target.top()) {

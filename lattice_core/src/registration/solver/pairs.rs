@@ -39,7 +39,8 @@ pub(super) struct Pairs<'a> {
     pub(super) options: &'a RegisterOptions<'a>,
     pub(super) metric: Metric,
     kernel: Kernel,
-    /// Flatness of the source's covariances if the gradient follows them, else 0.
+    /// Flatness of the source's covariances if the gradient follows them as they turn, else 0. The
+    /// step does in no case.
     turn: f64,
     /// Variances are taken as so many times as large.
     pub(super) scale: f64,
@@ -92,7 +93,7 @@ impl<'a> Pairs<'a> {
                 source: flat(source),
             },
         };
-        let turns = options.turn_covariance && options.method != Method::PointToPoint;
+        let turns = !matches!(options.method, Method::PointToPoint | Method::Gicp);
         let stride = options.source_stride.max(1);
         let candidates = match options.method {
             Method::Semantic(_) => options.neighbors.clamp(1, MAX_CANDIDATES),

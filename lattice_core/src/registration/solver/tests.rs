@@ -3,8 +3,15 @@
 use nalgebra::{Point3, Vector3};
 
 use super::*;
-use crate::registration::testing::distance;
-use crate::registration::{LabelDistribution, LabelUse, PairWeight, PrepareOptions, SemanticCloud};
+use crate::registration::{
+    LabelDistribution, LabelUse, Lift, NamedMethod, PrepareOptions, SemanticCloud,
+};
+
+/// Distance between two poses, metres, and the angle between them, radians.
+fn distance(a: &Isometry3<f64>, b: &Isometry3<f64>) -> (f64, f64) {
+    let apart = (a.translation.vector - b.translation.vector).norm();
+    (apart, a.rotation.angle_to(&b.rotation))
+}
 
 /// A room's corner with a box and a round pillar, unevenly sampled; each surface is a class.
 fn room(n: usize) -> SemanticCloud {
@@ -65,28 +72,15 @@ fn precise(options: RegisterOptions<'static>) -> RegisterOptions<'static> {
     }
 }
 
+/// All methods, for a cloud of some thousand points.
 fn all_methods() -> Vec<RegisterOptions<'static>> {
-    let mut all = vec![
-        RegisterOptions::point_to_point(1.0),
-        RegisterOptions::gicp(1.0),
-        RegisterOptions::gicp_se3(),
-        RegisterOptions {
-            min_class_points: 50,
-            ..RegisterOptions::class_wise()
-        },
-    ];
-    for labels in [LabelUse::Hard, LabelUse::Soft] {
-        all.push(RegisterOptions::semantic(
-            SemanticVariant::AsPrinted,
-            labels,
-        ));
-        all.push(RegisterOptions::semantic(
-            SemanticVariant::Published,
-            labels,
-        ));
-        all.push(RegisterOptions::semantic_em(1.0, labels));
-    }
-    all
+    let named = NamedMethod::ALL.iter().map(|method| method.options(1.0));
+    let all = named.chain([RegisterOptions::semantic_em(1.0, LabelUse::Soft)]);
+    all.map(|options| RegisterOptions {
+        min_class_points: options.min_class_points.min(50),
+        ..options
+    })
+    .collect()
 }
 
 #[test]
@@ -151,19 +145,14 @@ fn wrong_labels_drag_the_class_wise_variant_and_not_the_normalised_one() {
 
 #[test]
 fn a_weight_of_one_makes_labels_count_for_nothing() {
-    struct One;
-    impl PairWeight for One {
-        fn weight(&self, _: &LabelDistribution, _: &LabelDistribution) -> f64 {
-            1.0
-        }
-    }
     let (source, target, truth) = pair(3000);
     let mut bare = room(3000);
     bare.labels.clear();
     let bare_source = prepare(moved(&bare, &truth.inverse()));
     let options = RegisterOptions::semantic_em(1.0, LabelUse::Soft);
     let lift = RegisterOptions {
-        pair_weight: Some(&One),
+        // Of no classes: each pair of them weighs 1.
+        pair_weight: Some(&Lift::default()),
         ..options
     };
     let start = off(&truth, 0.1, 0.03);
@@ -232,7 +221,6 @@ fn options_beyond_reason_do_no_harm() {
                 gate_m: bad,
                 cauchy_alpha: bad,
                 anneal: bad,
-                outlier_squared: bad,
                 neighbors: 10_000,
                 source_stride: 0,
                 inner_iterations: 0,

@@ -1,51 +1,9 @@
-//! The further columns of a list as bytes: moments, stamps and labels.
+//! The further columns of a list as bytes: stamps and labels.
 
 use super::read::ColumnError;
-use crate::lattice::Lattice;
 use crate::voxels::codec::{Varints, push_varint, unzigzag, zigzag};
-use crate::voxels::store::fixed_point::moment_unit_m;
-use crate::voxels::store::payload_columns::{Columns, Moments};
-use crate::voxels::{LabelCount, OFFSET_UNIT_M, Stamps, Voxel};
-
-/// Moments of more points may have wrapped.
-const MAX_MOMENT_POINTS: u32 = 1 << 31;
-
-/// Six values a voxel.
-pub(super) fn encode_moments(columns: &Columns) -> Vec<u8> {
-    let mut bytes = Vec::with_capacity(columns.moments.len().saturating_mul(24));
-    let values = columns.moments.iter().flatten();
-    values.for_each(|&value| push_varint(&mut bytes, zigzag(value)));
-    bytes
-}
-
-/// The inverse of [`encode_moments`], for points of which none is more than `reach` off a centre.
-pub(super) fn decode_moments(
-    bytes: &[u8],
-    voxels: &[Voxel],
-    lattice: &Lattice,
-    reach: u64,
-) -> Result<Vec<Moments>, ColumnError> {
-    let reach = reach as f64 * OFFSET_UNIT_M / moment_unit_m(lattice) + 2.0;
-    let limit_of_one = (reach * reach) as u128;
-    let mut values = Varints::new(bytes);
-    let mut column = Vec::with_capacity(voxels.len());
-    for voxel in voxels {
-        let mut moments: Moments = [0; 6];
-        for value in &mut moments {
-            *value = unzigzag(expect(&mut values)?);
-        }
-        let limit = limit_of_one.saturating_mul(voxel.count.into());
-        let beyond = moments.iter().any(|m| u128::from(m.unsigned_abs()) > limit);
-        let [xx, _, _, yy, _, zz] = moments;
-        if voxel.count < MAX_MOMENT_POINTS && (beyond || xx < 0 || yy < 0 || zz < 0) {
-            let count = voxel.count;
-            return Err(values.error(format!("no {count} points in a cell have {moments:?}")));
-        }
-        column.push(moments);
-    }
-    expect_end(&mut values)?;
-    Ok(column)
-}
+use crate::voxels::store::payload_columns::Columns;
+use crate::voxels::{LabelCount, Stamps};
 
 /// First and last stamp, each as difference to the voxel before.
 pub(super) fn encode_stamps(columns: &Columns) -> Vec<u8> {

@@ -1,17 +1,11 @@
 //! Contents of a map file, in the order of the keys.
 
 use nalgebra::Vector3;
-use thiserror::Error;
 
 use crate::lattice::{Lattice, MortonKey};
 use crate::voxels::distortion::DistortionSums;
 use crate::voxels::store::payload_columns::Columns;
 use crate::voxels::{Distortion, OccupancyList, Payload, Voxel, VoxelList, VoxelStore};
-
-/// Parts that do not make a map.
-#[derive(Clone, PartialEq, Eq, Debug, Error)]
-#[error("these do not make a map: {0}")]
-pub struct ContentsError(String);
 
 /// A map as sorted columns: what a file holds, and what set operations on files work with.
 ///
@@ -28,28 +22,6 @@ pub struct MapContents {
 }
 
 impl MapContents {
-    /// A map without payload and statistics. Fails if keys do not ascend or the datum is more than
-    /// 2^48 cells from the map origin.
-    pub fn occupancy(
-        lattice: Lattice,
-        datum_index: [i64; 3],
-        keys: Vec<MortonKey>,
-    ) -> Result<MapContents, ContentsError> {
-        let contents = MapContents {
-            lattice,
-            datum_index,
-            keys,
-            voxels: None,
-            columns: no_columns(),
-            sums: DistortionSums::default(),
-        };
-        contents.check_datum().map_err(ContentsError)?;
-        match contents.keys.is_sorted_by(|a, b| a < b) {
-            true => Ok(contents),
-            false => Err(ContentsError("the keys do not ascend".to_owned())),
-        }
-    }
-
     /// Copies a list.
     pub fn from_list(list: &VoxelList) -> MapContents {
         let (keys, voxels, columns) = list.sorted_columns();
@@ -79,8 +51,14 @@ impl MapContents {
     ///
     /// A map without payload becomes one of a point at each centre, with statistics to match.
     pub fn into_list(self, max_voxels: usize) -> VoxelList {
+        let payload = self.payload();
+        self.into_list_with(payload, max_voxels)
+    }
+
+    /// [`MapContents::into_list`] with other further columns, empty where the map has none.
+    pub fn into_list_with(self, payload: Payload, max_voxels: usize) -> VoxelList {
         let list = VoxelList::at_datum(self.lattice, self.datum_index, max_voxels);
-        let mut list = list.with_payload(self.columns.payload());
+        let mut list = list.with_payload(payload);
         let keys = self.keys.iter().copied();
         match self.voxels {
             Some(voxels) => {

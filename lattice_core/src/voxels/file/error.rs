@@ -6,82 +6,47 @@ use thiserror::Error;
 
 /// A map that was not written or read; positions are bytes from the start of the file.
 #[derive(Debug, Error)]
+#[allow(missing_docs)] // The messages name the fields.
 pub enum FileError {
     /// The system could not read or write.
     #[error("input or output of the map file failed at byte {position}: {source}")]
-    Io {
-        /// Bytes read or written before.
-        position: u64,
-        /// Error of the system.
-        source: io::Error,
-    },
+    Io { position: u64, source: io::Error },
     /// Not a map file.
     #[error("not a map file: it starts with {:?} instead of \"LATTICE2\"", found.escape_ascii().to_string())]
-    Magic {
-        /// The first eight bytes.
-        found: [u8; 8],
-    },
+    Magic { found: [u8; 8] },
     /// The format of before 2026-11, without sections.
     #[error("the map file has format 1, which is no longer read: make the map again from its log")]
     OldVersion,
     /// The end comes too early.
     #[error("the map file is cut short: it ends at byte {position}, within the {part}")]
-    Truncated {
-        /// Length of the file.
-        position: u64,
-        /// The part that is cut off.
-        part: String,
-    },
+    Truncated { position: u64, part: String },
     /// More voxels than the caller allows.
     #[error(
         "the map file has {voxels} voxels, but at most {max_voxels} are allowed: raise max_voxels"
     )]
-    TooManyVoxels {
-        /// Voxels in the file.
-        voxels: u64,
-        /// Limit set by the caller.
-        max_voxels: usize,
-    },
+    TooManyVoxels { voxels: u64, max_voxels: usize },
     /// More than the caller allows to be held.
     #[error(
         "the {voxels} voxels of the map file take more than {max_bytes} bytes: raise max_bytes"
     )]
-    TooLarge {
-        /// Voxels in the file.
-        voxels: u64,
-        /// Limit set by the caller.
-        max_bytes: usize,
-    },
+    TooLarge { voxels: u64, max_bytes: usize },
     /// The bytes cannot be a map.
     #[error("the map file is damaged at byte {position}: {reason}")]
-    Corrupt {
-        /// Place of the impossible bytes; for a number of a column the byte after it.
-        position: u64,
-        /// The contradiction.
-        reason: String,
-    },
+    Corrupt { position: u64, reason: String },
     /// A checksum does not match.
     #[error(
         "the map file is damaged between bytes {start} and {end}, the {part}: their CRC should be {saved:08x}, but is {calculated:08x}"
     )]
     Checksum {
-        /// First byte that the checksum is of.
         start: u64,
-        /// The byte after the last.
         end: u64,
-        /// Name of the part.
         part: String,
-        /// In the file.
         saved: u32,
-        /// From the content.
         calculated: u32,
     },
     /// Something follows the end marker.
     #[error("the map ends at byte {position}, but the file goes on")]
-    TrailingBytes {
-        /// Length that the file should have.
-        position: u64,
-    },
+    TrailingBytes { position: u64 },
     /// No reader would take the lattice of the map.
     #[error("the lattice cannot be written: {0}")]
     Lattice(String),

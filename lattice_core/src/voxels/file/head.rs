@@ -197,13 +197,12 @@ impl Column {
 pub(super) const KEYS: Column = Column::new("keys", Encoding::Steps, 1, 9);
 pub(super) const COUNT: Column = Column::new("count", Encoding::Unsigned, 1, 5);
 pub(super) const OFFSET_SUM: Column = Column::new("offset_sum", Encoding::Signed, 3, 10);
-pub(super) const MOMENTS: Column = Column::new("moments", Encoding::Signed, 6, 10);
 pub(super) const STAMPS: Column = Column::new("stamps", Encoding::SignedSteps, 2, 10);
 /// Longest: the number of labels, and each label with its count.
 pub(super) const LABELS: Column = Column::new("labels", Encoding::Rows, 1, 3 + 65_536 * 8);
 
-/// The columns in their order: the first, two that come together, and three of which each may lack.
-pub(super) const COLUMNS: [Column; 6] = [KEYS, COUNT, OFFSET_SUM, MOMENTS, STAMPS, LABELS];
+/// The columns in their order: the first, two that come together, and two of which each may lack.
+pub(super) const COLUMNS: [Column; 5] = [KEYS, COUNT, OFFSET_SUM, STAMPS, LABELS];
 
 /// The head of a section; columns of later versions have other names, encodings and codecs.
 #[derive(Clone, PartialEq, Eq, Debug)]

@@ -18,7 +18,7 @@ use std::io::{Read, Write};
 
 use super::{OccupancyList, VoxelList, VoxelStore};
 
-pub use contents::{ContentsError, MapContents};
+pub use contents::MapContents;
 pub use error::FileError;
 pub use operations::OperationError;
 
@@ -47,15 +47,6 @@ pub struct WriteOptions {
 /// Writes a list with its payload, not packed; equal maps give equal bytes.
 pub fn write_map(list: &VoxelList, writer: impl Write) -> Result<(), FileError> {
     MapContents::from_list(list).write(writer, &WriteOptions::default())
-}
-
-/// Writes the occupied cells of any store, with empty statistics.
-pub fn write_occupancy(
-    store: &(impl VoxelStore + ?Sized),
-    writer: impl Write,
-    options: &WriteOptions,
-) -> Result<(), FileError> {
-    MapContents::from_store(store).write(writer, options)
 }
 
 /// Reads a map of at most `max_voxels`, which becomes its bound; all voxels count as changed.

@@ -11,23 +11,17 @@ use crate::voxels::{Voxel, set_ops};
 
 /// Two maps that do not go together. The receiving map is as before.
 #[derive(Clone, PartialEq, Eq, Debug, Error)]
+#[allow(missing_docs)] // The messages name the fields.
 pub enum OperationError {
     /// The cells are different.
     #[error("one map is of {ours}, the other of {theirs}: only maps of the same cells go together")]
-    Lattice {
-        /// The lattice of the receiving map.
-        ours: String,
-        /// The lattice of the other map.
-        theirs: String,
-    },
+    Lattice { ours: String, theirs: String },
     /// A cell of the other map cannot be counted from the datum of the receiving one.
     #[error(
         "cell {cell:?} of the other map is more than 2^20 cells from datum index {datum_index:?}: give both maps datums near each other"
     )]
     OutOfRange {
-        /// Index of the cell in the lattice of the map frame.
         cell: [i64; 3],
-        /// The datum of the receiving map.
         datum_index: [i64; 3],
     },
     /// One map has counts and offsets, or a further column, that the other has not.
@@ -150,7 +144,6 @@ impl MapContents {
                 "point counts",
                 self.voxels.is_some() != other.voxels.is_some(),
             ),
-            ("moments", ours.moments != theirs.moments),
             ("stamps", ours.stamps != theirs.stamps),
             ("labels", ours.labels != theirs.labels),
         ] {

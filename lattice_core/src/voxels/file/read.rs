@@ -2,11 +2,11 @@
 
 use std::io::{self, Read};
 
-use super::column_values::{decode_labels, decode_moments, decode_stamps, expect, expect_end};
+use super::column_values::{decode_labels, decode_stamps, expect, expect_end};
 use super::contents::no_columns;
 use super::head::{
-    COLUMNS, COUNT, Codec, Column, KEYS, MOMENTS, OFFSET_SUM, SECTION_HEAD_BYTES, STAMPS,
-    SectionHead, corrupt,
+    COLUMNS, COUNT, Codec, Column, KEYS, OFFSET_SUM, SECTION_HEAD_BYTES, STAMPS, SectionHead,
+    corrupt,
 };
 use super::source::Source;
 use super::{FileError, MAX_EXPANSION, MAX_WINDOW_LOG, MapContents};
@@ -135,21 +135,6 @@ impl MapContents {
         }
         expect_end(&mut values)
     }
-
-    /// A column behind the payload.
-    fn set_further(&mut self, column: &Column, bytes: &[u8]) -> Result<(), ColumnError> {
-        let voxels = self.voxels.as_deref().unwrap_or_default();
-        let (reach, len) = (reach(&self.lattice), voxels.len());
-        match *column {
-            MOMENTS => {
-                let moments = decode_moments(bytes, voxels, &self.lattice, reach)?;
-                self.columns.set_moments(moments);
-            }
-            STAMPS => self.columns.set_stamps(decode_stamps(bytes, len)?),
-            _ => self.columns.set_labels(decode_labels(bytes, len)?),
-        }
-        Ok(())
-    }
 }
 
 /// Error in the values of a column, with the byte behind it.
@@ -160,22 +145,13 @@ pub(super) struct ColumnError {
 
 impl From<CodecError> for ColumnError {
     fn from(error: CodecError) -> ColumnError {
-        let (CodecError::Truncated { position: offset }
-        | CodecError::Varint { position: offset }
-        | CodecError::Key {
-            position: offset, ..
-        }) = error
-        else {
-            let (offset, reason) = (0, "it has too many values".to_owned());
-            return ColumnError { offset, reason };
+        let offset = match error {
+            CodecError::Truncated { position }
+            | CodecError::Varint { position }
+            | CodecError::Key { position, .. } => position,
+            CodecError::TooMany { .. } => 0,
         };
-        let reason = match error {
-            CodecError::Truncated { .. } => "it ends within a number".to_owned(),
-            CodecError::Key { index, .. } => {
-                format!("key {index} does not ascend or is not below 2^63")
-            }
-            _ => "a number is not a shortest 64-bit varint".to_owned(),
-        };
+        let reason = error.to_string();
         ColumnError { offset, reason }
     }
 }
@@ -240,7 +216,10 @@ impl<R: Read> Source<R> {
             KEYS => contents.set_keys(&bytes, voxels),
             COUNT => contents.set_counts(&bytes),
             OFFSET_SUM => contents.set_sums(&bytes),
-            _ => contents.set_further(column, &bytes),
+            STAMPS => decode_stamps(&bytes, contents.keys.len())
+                .map(|stamps| contents.columns.set_stamps(stamps)),
+            _ => decode_labels(&bytes, contents.keys.len())
+                .map(|labels| contents.columns.set_labels(labels)),
         };
         done.map_err(|ColumnError { offset, reason }| {
             let (place, unpacked) = if packed {

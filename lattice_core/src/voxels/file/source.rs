@@ -9,8 +9,8 @@ use super::head::{
     corrupt,
 };
 
-/// Bytes that are asked for before any has come.
-const FIRST_BYTES: u64 = 1 << 20;
+/// Bytes of a section that are read at once.
+const PART_BYTES: u64 = 1 << 20;
 
 /// Hands out bytes and knows their place and checksum.
 pub(super) struct Source<R> {
@@ -109,40 +109,37 @@ impl<R: Read> Source<R> {
 
     /// The stored bytes of a section, checked.
     pub(super) fn stored(&mut self, section: &SectionHead) -> Result<Vec<u8>, FileError> {
-        let (start, part) = (self.position, format!("section {}", section.name));
+        // Grows as the bytes come, whatever the head promises.
         let mut bytes = Vec::new();
-        let mut wanted = section.stored_bytes;
-        while wanted > 0 {
-            // Doubling: never more than twice of what has come, whatever the head promises.
-            let step = wanted.min((bytes.len() as u64).max(FIRST_BYTES));
-            let before = bytes.len();
-            let length = usize::try_from(step).unwrap_or(usize::MAX);
-            bytes.resize(before.saturating_add(length), 0);
-            self.fill(bytes.get_mut(before..).unwrap_or_default(), &part)?;
-            wanted -= step;
-        }
-        let mut crc = crc32fast::Hasher::new();
-        crc.update(&bytes);
-        self.crc.combine(&crc);
-        verify(start..self.position, &part, section.crc, crc.finalize())?;
+        self.each_part(section, |part| bytes.extend_from_slice(part))?;
         Ok(bytes)
     }
 
     /// Passes over a section, in constant memory.
     pub(super) fn skip(&mut self, section: &SectionHead) -> Result<(), FileError> {
-        let (start, part) = (self.position, format!("section {}", section.name));
+        self.each_part(section, |_| {})
+    }
+
+    /// Hands out the stored bytes of a section part by part; fails at the end if they are damaged.
+    fn each_part(
+        &mut self,
+        section: &SectionHead,
+        mut take: impl FnMut(&[u8]),
+    ) -> Result<(), FileError> {
+        let (start, name) = (self.position, format!("section {}", section.name));
         let mut crc = crc32fast::Hasher::new();
-        let mut buffer = vec![0; section.stored_bytes.min(FIRST_BYTES) as usize];
+        let mut buffer = vec![0; section.stored_bytes.min(PART_BYTES) as usize];
         let mut wanted = section.stored_bytes;
         while wanted > 0 {
-            let step = wanted.min(FIRST_BYTES);
-            let bytes = buffer.get_mut(..step as usize).unwrap_or_default();
-            self.fill(bytes, &part)?;
-            crc.update(bytes);
+            let step = wanted.min(PART_BYTES);
+            let part = buffer.get_mut(..step as usize).unwrap_or_default();
+            self.fill(part, &name)?;
+            crc.update(part);
+            take(part);
             wanted -= step;
         }
         self.crc.combine(&crc);
-        verify(start..self.position, &part, section.crc, crc.finalize())
+        verify(start..self.position, &name, section.crc, crc.finalize())
     }
 
     /// Reads and checks the end marker, its checksum and the end.

@@ -2,9 +2,9 @@
 
 use std::io::Write;
 
-use super::column_values::{encode_labels, encode_moments, encode_stamps};
+use super::column_values::{encode_labels, encode_stamps};
 use super::head::{
-    COUNT, Codec, Column, END_TAG, Head, KEYS, LABELS, MOMENTS, OFFSET_SUM, STAMPS, SectionHead,
+    COUNT, Codec, Column, END_TAG, Head, KEYS, LABELS, OFFSET_SUM, STAMPS, SectionHead,
     orientation_error,
 };
 use super::{FileError, MAX_EXPANSION, MapContents, WriteOptions};
@@ -22,8 +22,7 @@ impl MapContents {
         }
         let voxels = self.voxels.as_ref().filter(|_| !options.occupancy_only);
         let payload = self.columns.payload();
-        let further = [payload.moments, payload.stamps, payload.labels];
-        let further = further.iter().map(|&kept| u32::from(kept)).sum::<u32>();
+        let further = u32::from(payload.stamps) + u32::from(payload.labels);
         let head = Head {
             lattice: self.lattice.clone(),
             datum_index: self.datum_index,
@@ -50,9 +49,6 @@ impl MapContents {
                 .flat_map(|voxel| voxel.sum)
                 .for_each(|sum| push_varint(&mut bytes, zigzag(sum)));
             sink.section(&OFFSET_SUM, bytes, level)?;
-            if payload.moments {
-                sink.section(&MOMENTS, encode_moments(&self.columns), level)?;
-            }
             if payload.stamps {
                 sink.section(&STAMPS, encode_stamps(&self.columns), level)?;
             }

@@ -67,18 +67,6 @@ mod tests {
     }
 
     #[test]
-    fn a_cell_within_its_neighbours_shows_nothing() {
-        for kind in LatticeKind::ALL {
-            let mut cells = Lattice::new(kind, 1.0).unwrap().face_neighbors().to_vec();
-            cells.push([0; 3]);
-            let exposed = list(kind, &cells).exposed_faces();
-            let inner = MortonKey::pack([0; 3]).unwrap();
-            assert!(exposed.iter().all(|&(key, _)| key != inner), "{kind}");
-            assert!(exposed.is_sorted());
-        }
-    }
-
-    #[test]
     fn the_border_of_the_key_range_is_exposed() {
         let corner = MortonKey::pack([(1 << 20) - 1; 3]).unwrap();
         let list = list(LatticeKind::Cubic, &[]);

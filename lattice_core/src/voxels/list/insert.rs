@@ -5,11 +5,9 @@ use rayon::prelude::*;
 
 use super::VoxelList;
 use crate::cloud::Cloud;
-use crate::lattice::{BatchBlock, BatchQuantizer, BatchSums, BlockKey, Lattice};
+use crate::lattice::{BatchBlock, BatchQuantizer, BatchSums, BlockKey};
 use crate::voxels::distortion::DistortionSums;
-use crate::voxels::store::fixed_point::{
-    FixedBlock, Point, moment_unit_m, moments_of, most_points, near_point, offsets_of,
-};
+use crate::voxels::store::fixed_point::{FixedBlock, most_points, near_point};
 use crate::voxels::store::payload_columns::{Details, LabelCount, Stamps};
 use crate::voxels::store::point_gather::{Gather, Partial};
 use crate::voxels::store::shard::{BATCH, SHARDS, Shard, shard_of};
@@ -178,11 +176,11 @@ impl VoxelList {
                     continue;
                 };
                 room -= shard.len() - known;
-                let point = &points.point(i);
-                shard.add(number, point, now);
+                shard.add(number, &points.point(i), now);
                 if !self.payload.is_plain() {
-                    let details = details(&self.lattice, code, point, origin, place + i);
-                    shard.columns.add(number as usize, &details);
+                    shard
+                        .columns
+                        .add(number as usize, &details(origin, place + i));
                 }
             }
             place += codes.len();
@@ -251,17 +249,9 @@ fn for_fixed_blocks(
 }
 
 /// Contribution of a point to the further columns.
-fn details(
-    lattice: &Lattice,
-    code: BlockKey,
-    point: &Point,
-    origin: Origin,
-    place: usize,
-) -> Details {
+fn details(origin: Origin, place: usize) -> Details {
     let label = origin.labels.and_then(|labels| labels.get(place).copied());
-    let [x, y, z, _] = offsets_of(lattice, code, point);
     Details {
-        moments: moments_of([x, y, z], moment_unit_m(lattice)),
         stamps: Some(Stamps {
             first_ns: origin.stamp_ns,
             last_ns: origin.stamp_ns,

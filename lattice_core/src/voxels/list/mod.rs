@@ -2,42 +2,39 @@
 
 mod changes;
 mod exposed_faces;
+mod fill;
 mod forget_old;
 mod insert;
-mod merge;
 mod remove;
 mod when_full;
 
 use std::fmt;
 
-use nalgebra::{Matrix3, Vector3};
+use nalgebra::Vector3;
 use rayon::prelude::*;
 use thiserror::Error;
 
 use super::distortion::{Distortion, DistortionSums};
-use super::store::fixed_point::{moment_unit_m, reach};
+use super::store::fixed_point::reach;
 use super::store::growth;
 use super::store::payload_columns::{Columns, Details, LabelCount, Payload, Stamps};
-use super::store::shard::{Life, SHARDS, Shard, shard_of};
+use super::store::shard::{Entry, Life, SHARDS, Shard, shard_of};
 use super::{Voxel, VoxelStore};
 use crate::cloud::Cloud;
-use crate::lattice::{BlockKey, Lattice, LatticeIndex, MortonKey};
+use crate::lattice::{BlockKey, Lattice, MortonKey};
 
 pub use changes::Changes;
 pub use forget_old::NoStamps;
 pub use insert::InsertReport;
-pub use merge::MergeError;
 pub use when_full::WhenFull;
 
 /// The datum is not finite or too many cells from the origin of the map frame.
 #[derive(Clone, Copy, PartialEq, Debug, Error)]
 #[error("datum ({x}, {y}, {z}) m is not finite or more than 2^48 cells from the map origin")]
+#[allow(missing_docs)] // The messages name the fields.
 pub struct DatumError {
-    /// East, metres.
     pub x: f64,
-    /// North, metres.
     pub y: f64,
-    /// Up, metres.
     pub z: f64,
 }
 
@@ -114,9 +111,7 @@ impl VoxelList {
     /// surfaces a voxel takes 46. Of labels a handful a voxel is assumed.
     pub fn voxels_within(max_bytes: usize, payload: Payload) -> usize {
         let columns = |kept: bool, bytes: usize| if kept { bytes } else { 0 };
-        let columns = columns(payload.moments, 48)
-            + columns(payload.stamps, 16)
-            + columns(payload.labels, 24 + 8 * 8);
+        let columns = columns(payload.stamps, 16) + columns(payload.labels, 24 + 8 * 8);
         // A hash map may be less than half full.
         let removed = 5 * size_of::<(u64, Life)>() / 2;
         let voxel = Shard::VOXEL_BYTES + columns + columns / 4 + removed;
@@ -196,20 +191,6 @@ impl VoxelList {
     pub fn label(&self, key: MortonKey) -> Option<LabelCount> {
         let labels = self.labels(key).into_iter();
         labels.min_by_key(|counted| (std::cmp::Reverse(counted.count), counted.label))
-    }
-
-    /// Covariance of the points in a cell, m^2; none if not kept or for fewer than two points.
-    pub fn covariance_m2(&self, key: MortonKey) -> Option<Matrix3<f64>> {
-        if !self.payload.moments {
-            return None;
-        }
-        let voxel = self.get(key).filter(|voxel| voxel.count > 1)?;
-        let [xx, xy, xz, yy, yz, zz] = self.details(key)?.moments.map(|m| m as f64);
-        let unit_m = moment_unit_m(&self.lattice);
-        let count = f64::from(voxel.count);
-        let mean = Vector3::from(voxel.mean_offset_m());
-        let raw = Matrix3::new(xx, xy, xz, xy, yy, yz, xz, yz, zz) * (unit_m * unit_m / count);
-        Some((raw - mean * mean.transpose()) * (count / (count - 1.0)))
     }
 
     /// Centre of a cell, map frame, metres.
@@ -343,12 +324,9 @@ impl VoxelStore for VoxelList {
         removed
     }
 
-    fn retain_cells(
-        &mut self,
-        keep_block: &(dyn Fn(LatticeIndex) -> Option<bool> + Sync),
-        keep: &(dyn Fn(MortonKey) -> bool + Sync),
-    ) -> usize {
-        self.retain_in_blocks(keep_block, keep)
+    fn retain_cells(&mut self, keep: &(dyn Fn(MortonKey) -> bool + Sync)) -> usize {
+        let key = |entry: &Entry| BlockKey::from_raw(entry.code)?.key();
+        self.remove_where(|_, _, entry| key(entry).is_some_and(|key| !keep(key)))
     }
 
     fn bytes(&self) -> usize {

@@ -3,7 +3,7 @@
 use super::*;
 use crate::lattice::LatticeKind;
 use crate::voxels::OFFSET_UNIT_M;
-use crate::voxels::file::{read_map, write_map};
+use crate::voxels::file::MapContents;
 
 fn list(kind: LatticeKind, datum: [f64; 3], max_voxels: usize) -> VoxelList {
     VoxelList::new(Lattice::new(kind, 0.125).unwrap(), datum.into(), max_voxels).unwrap()
@@ -21,19 +21,18 @@ fn key(w: [i32; 3]) -> MortonKey {
     MortonKey::pack(w).unwrap()
 }
 
-fn bytes(list: &VoxelList) -> Vec<u8> {
-    let mut bytes = Vec::new();
-    write_map(list, &mut bytes).unwrap();
-    bytes
+fn changes(changed: &[MortonKey], removed: &[MortonKey]) -> Changes {
+    Changes {
+        changed: changed.to_vec(),
+        removed: removed.to_vec(),
+    }
 }
 
 #[test]
 fn a_cloud_becomes_voxels_with_counts_and_mean_offsets() {
     let mut map = list(LatticeKind::Cubic, [0.0; 3], 10);
-    let report = map.insert(&cloud(
-        [0.0; 3],
-        &[[0.125, 0.0, 0.0], [-0.0625, 0.25, 0.0], [0.5, 0.5, 0.5]],
-    ));
+    let offsets = [[0.125, 0.0, 0.0], [-0.0625, 0.25, 0.0], [0.5, 0.5, 0.5]];
+    let report = map.insert(&cloud([0.0; 3], &offsets));
     let expected = InsertReport {
         points: 3,
         inserted: 3,
@@ -41,19 +40,13 @@ fn a_cloud_becomes_voxels_with_counts_and_mean_offsets() {
         ..Default::default()
     };
     assert_eq!(report, expected);
-    let voxel = map.get(key([0; 3])).unwrap();
-    assert_eq!(
-        (voxel.count, voxel.mean_offset_m()),
-        (2, [0.03125, 0.125, 0.0])
-    );
-    assert_eq!(
-        map.get(key([1; 3])),
-        Some(Voxel {
-            count: 1,
-            sum: [0; 3]
-        })
-    );
-    assert_eq!(map.get(key([2; 3])), None);
+    let mean = |w| {
+        map.get(key(w))
+            .map(|voxel| (voxel.count, voxel.mean_offset_m()))
+    };
+    assert_eq!(mean([0; 3]), Some((2, [0.03125, 0.125, 0.0])));
+    assert_eq!(mean([1; 3]), Some((1, [0.0; 3])));
+    assert_eq!(mean([2; 3]), None);
     assert_eq!(map.center_m(key([1, 2, 3])), Vector3::new(0.5, 1.0, 1.5));
     map.validate().unwrap();
 }
@@ -62,17 +55,13 @@ fn a_cloud_becomes_voxels_with_counts_and_mean_offsets() {
 fn points_are_counted_by_reason() {
     let far = (1 << 20) as f32;
     let mut map = list(LatticeKind::Bcc, [0.0; 3], 1);
-    let report = map.insert(&cloud(
-        [0.0; 3],
-        &[
-            [0.0; 3],
-            [f32::NAN, 0.0, 0.0],
-            [0.0, f32::NEG_INFINITY, 0.0],
-            [0.0, 0.0, far],
-            [5.0; 3],
-            [0.01; 3],
-        ],
-    ));
+    let lost = [
+        [f32::NAN, 0.0, 0.0],
+        [0.0, f32::NEG_INFINITY, 0.0],
+        [0.0, 0.0, far],
+    ];
+    let offsets = [&lost[..], &[[0.0; 3], [5.0; 3], [0.01; 3]]].concat();
+    let report = map.insert(&cloud([0.0; 3], &offsets));
     let expected = InsertReport {
         points: 6,
         inserted: 2,
@@ -86,14 +75,6 @@ fn points_are_counted_by_reason() {
     assert_eq!(map.distortion().points, 2);
     let report = map.insert(&cloud([f64::NAN, 0.0, 0.0], &[[0.0; 3]]));
     assert_eq!((report.not_finite, report.inserted), (1, 0));
-    map.validate().unwrap();
-}
-
-#[test]
-fn a_list_for_no_voxels_takes_none() {
-    let mut map = list(LatticeKind::Fcc, [0.0; 3], 0);
-    assert_eq!(map.insert(&cloud([0.0; 3], &[[0.0; 3]])).list_full, 1);
-    assert!(map.is_empty());
     map.validate().unwrap();
 }
 
@@ -121,10 +102,8 @@ fn a_far_datum_keeps_the_offsets_exact() {
                 let local = Vector3::from(offset.map(f64::from));
                 let w = map.lattice().quantize(&local).unwrap();
                 let mean = Vector3::from(map.get(key(w)).unwrap().mean_offset_m());
-                assert!(
-                    (mean + map.lattice().center(w) - local).amax() <= 1.01 * OFFSET_UNIT_M,
-                    "{kind}"
-                );
+                let off = mean + map.lattice().center(w) - local;
+                assert!(off.amax() <= 1.01 * OFFSET_UNIT_M, "{kind}");
             }
             map.validate().unwrap();
         }
@@ -141,21 +120,11 @@ fn the_datum_is_part_of_the_lattice_of_the_map_frame() {
         here.insert(&points);
         there.insert(&points);
         let shift = there.datum_index().map(|i| i as i32);
-        let moved: std::collections::BTreeSet<_> = there
-            .sorted()
-            .iter()
-            .map(|(k, v)| {
-                let w = k.unpack();
-                ([w[0] + shift[0], w[1] + shift[1], w[2] + shift[2]], v.count)
-            })
-            .collect();
-        assert_eq!(
-            moved,
-            here.sorted()
-                .iter()
-                .map(|(k, v)| (k.unpack(), v.count))
-                .collect()
-        );
+        let moved = there.sorted_keys().into_iter().map(|key| {
+            let w = key.unpack();
+            self::key([w[0] + shift[0], w[1] + shift[1], w[2] + shift[2]])
+        });
+        assert!(moved.map(|key| here.get(key).unwrap().count).eq([1, 1]));
     }
 }
 
@@ -163,23 +132,11 @@ fn the_datum_is_part_of_the_lattice_of_the_map_frame() {
 fn changes_are_taken_once() {
     let mut map = list(LatticeKind::Cubic, [0.0; 3], 10);
     map.insert(&cloud([0.0; 3], &[[0.5, 0.0, 0.0], [0.0; 3], [0.0; 3]]));
-    let both = vec![key([0; 3]), key([1, 0, 0])];
-    assert_eq!(
-        map.take_changes(),
-        Changes {
-            changed: both,
-            removed: vec![]
-        }
-    );
+    let (first, second) = (key([0; 3]), key([1, 0, 0]));
+    assert_eq!(map.take_changes(), changes(&[first, second], &[]));
     assert_eq!(map.take_changes(), Changes::default());
     map.insert(&cloud([0.0; 3], &[[0.5, 0.0, 0.0]]));
-    assert_eq!(
-        map.take_changes(),
-        Changes {
-            changed: vec![key([1, 0, 0])],
-            removed: vec![]
-        }
-    );
+    assert_eq!(map.take_changes(), changes(&[second], &[]));
     map.validate().unwrap();
 }
 
@@ -196,42 +153,10 @@ fn clearing_removes_what_was_taken_and_only_that() {
     map.clear();
     map.insert(&cloud([0.0; 3], &[[0.0; 3]]));
     map.validate().unwrap();
-    let expected = Changes {
-        changed: vec![key([0; 3])],
-        removed: vec![key([1, 0, 0])],
-    };
-    assert_eq!(map.take_changes(), expected);
+    let first = key([0; 3]);
+    assert_eq!(map.take_changes(), changes(&[first], &[key([1, 0, 0])]));
     map.clear();
-    assert_eq!(
-        map.take_changes(),
-        Changes {
-            changed: vec![],
-            removed: vec![key([0; 3])]
-        }
-    );
-}
-
-#[test]
-fn lists_of_different_cells_do_not_merge() {
-    let mut map = list(LatticeKind::Cubic, [0.0; 3], 1);
-    map.insert(&cloud([0.0; 3], &[[0.0; 3]]));
-    let before = bytes(&map);
-    let error = map.merge(&list(LatticeKind::Bcc, [0.0; 3], 1)).unwrap_err();
-    assert!(matches!(error, MergeError::Lattice { .. }));
-    let error = map
-        .merge(&list(LatticeKind::Cubic, [1.0, 0.0, 0.0], 1))
-        .unwrap_err();
-    assert!(matches!(error, MergeError::Datum { .. }), "{error}");
-    let mut other = list(LatticeKind::Cubic, [0.0; 3], 1);
-    other.insert(&cloud([0.0; 3], &[[1.0; 3]]));
-    assert_eq!(
-        map.merge(&other),
-        Err(MergeError::Full {
-            voxels: 2,
-            max_voxels: 1
-        })
-    );
-    assert_eq!(bytes(&map), before);
+    assert_eq!(map.take_changes(), changes(&[], &[first]));
 }
 
 #[test]
@@ -304,7 +229,7 @@ fn sums_of_any_number_of_points_are_exact() {
         }
 
         let twice: Vec<_> = offsets.iter().chain(&offsets).copied().collect();
-        singly.merge(&gathered).unwrap();
+        singly.insert(&cloud([0.0; 3], &offsets));
         singly.validate().unwrap();
         assert_eq!(singly.sorted(), voxels_of(&empty, &twice));
 
@@ -312,11 +237,11 @@ fn sums_of_any_number_of_points_are_exact() {
         let (first, voxel) = expected[0];
         assert!(singly.remove(first) && singly.remove(expected[1].0));
         singly.validate().unwrap();
-        singly.merge(&gathered).unwrap();
+        singly.insert(&cloud([0.0; 3], &offsets));
         assert_eq!(singly.get(first), Some(voxel));
         singly.validate().unwrap();
 
-        let read = read_map(&*bytes(&singly), 1000).unwrap();
+        let read = MapContents::from_list(&singly).into_list(1000);
         assert_eq!(read.sorted(), singly.sorted());
         singly.clear();
         singly.insert(&cloud([0.0; 3], &offsets));

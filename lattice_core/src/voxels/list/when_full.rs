@@ -20,8 +20,7 @@ pub enum WhenFull {
 }
 
 impl VoxelList {
-    /// The same list with another policy for [`VoxelList::insert`]; merging and reading refuse what
-    /// does not fit under any.
+    /// The same list with another policy for [`VoxelList::insert`].
     pub fn with_when_full(mut self, when_full: WhenFull) -> VoxelList {
         self.when_full = when_full;
         self

@@ -3,6 +3,7 @@
 use std::fmt;
 
 use nalgebra::Vector3;
+use rayon::prelude::*;
 
 use recent_cells::Recent;
 
@@ -10,7 +11,7 @@ use super::store::block_mask::{self, BlockMask};
 use super::store::hash_table::{Place, Row, Table};
 use super::{DatumError, InsertReport, VoxelStore};
 use crate::cloud::Cloud;
-use crate::lattice::{BlockKey, Lattice, LatticeIndex, MortonKey};
+use crate::lattice::{BlockKey, Lattice, MortonKey};
 
 /// Memory for a block, growth of the vectors and of the table included.
 const BLOCK_BYTES: usize = Table::<Block>::ROW_BYTES;
@@ -268,12 +269,10 @@ impl VoxelStore for OccupancyList {
         true
     }
 
-    fn retain_cells(
-        &mut self,
-        keep_block: &(dyn Fn(LatticeIndex) -> Option<bool> + Sync),
-        keep: &(dyn Fn(MortonKey) -> bool + Sync),
-    ) -> usize {
-        self.retain_in_blocks(keep_block, keep)
+    fn retain_cells(&mut self, keep: &(dyn Fn(MortonKey) -> bool + Sync)) -> usize {
+        let denied = |key: &MortonKey| !keep(*key);
+        let gone: Vec<MortonKey> = self.sorted_keys().into_par_iter().filter(denied).collect();
+        gone.iter().filter(|key| self.remove(**key)).count()
     }
 
     fn bytes(&self) -> usize {
@@ -293,10 +292,8 @@ impl fmt::Debug for OccupancyList {
 }
 
 mod insert;
-mod merge;
 mod neighbors;
 mod overlap;
 mod recent_cells;
-mod remove;
 #[cfg(test)]
 mod tests;

@@ -2,7 +2,7 @@
 
 use rayon::slice::ParallelSliceMut;
 
-use crate::lattice::{BlockKey, LatticeIndex, MortonKey};
+use crate::lattice::{BlockKey, MortonKey};
 
 /// The cells of a block, one bit each, by their place.
 pub(crate) type BlockMask = [u64; 8];
@@ -41,11 +41,6 @@ static PLACE_OF_MORTON: [u16; BlockKey::BLOCK_CELLS] = {
 pub(crate) fn set(leaf: &mut BlockMask, key: MortonKey) {
     let place = usize::from(PLACE_OF_MORTON[key.raw() as usize % BlockKey::BLOCK_CELLS]);
     leaf[place >> 6 & 7] |= 1 << (place & 63);
-}
-
-/// The lowest index of a block.
-pub(crate) fn first_index(block: u64) -> Option<LatticeIndex> {
-    BlockKey::from_raw(block << 9).map(BlockKey::unpack)
 }
 
 /// True if the cell at `place` of the block is occupied.

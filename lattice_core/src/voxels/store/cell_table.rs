@@ -155,14 +155,6 @@ impl CellTable {
         self.rows.get_mut(number as usize)
     }
 
-    /// The blocks, each with one bit for each of its voxels.
-    pub(crate) fn blocks(&self) -> impl Iterator<Item = (u64, &BlockMask)> {
-        self.blocks
-            .rows()
-            .iter()
-            .map(|block| (block.code, &block.leaf))
-    }
-
     pub(crate) fn bytes(&self) -> usize {
         self.blocks.bytes() + self.number_bytes + self.rows.capacity() * size_of::<Entry>()
     }

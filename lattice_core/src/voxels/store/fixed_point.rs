@@ -149,18 +149,6 @@ pub(crate) fn offsets_in(voxel: &Voxel) -> Offsets {
     [x, y, z, i64::from(voxel.count)]
 }
 
-/// Unit of second moments: offsets are counted in a 2^16th of the covering radius, so that the moments
-/// of 2^31 points fit.
-pub(crate) fn moment_unit_m(lattice: &Lattice) -> f64 {
-    lattice.covering_radius_m() / f64::from(1_u32 << 16)
-}
-
-/// Contribution to the moments of a point at `offset` from its cell's centre.
-pub(crate) fn moments_of(offset: [i64; 3], unit_m: f64) -> [i64; 6] {
-    let [x, y, z] = offset.map(|o| nearest_integer(o as f64 * OFFSET_UNIT_M / unit_m));
-    [x * x, x * y, x * z, y * y, y * z, z * z]
-}
-
 #[cfg(test)]
 mod tests {
     use super::*;

@@ -6,11 +6,11 @@
 //! [`hash_table`] finds the block), [`payload_columns`] holds what is kept besides count and sum,
 //! [`wide_sums`] the sums that a row has no room for, [`growth`] how vectors grow.
 
-pub(super) mod block_mask;
+pub(crate) mod block_mask;
 mod cell_table;
 pub(super) mod fixed_point;
 pub(super) mod growth;
-pub(super) mod hash_table;
+pub(crate) mod hash_table;
 pub(super) mod payload_columns;
 pub(super) mod point_gather;
 pub(super) mod shard;

@@ -1,12 +1,10 @@
-//! Further columns of voxels: second moments, stamps, labels.
+//! Further columns of voxels: stamps and labels.
 
 use super::growth;
 
 /// Further columns that a list keeps; each costs memory and time.
 #[derive(Clone, Copy, PartialEq, Eq, Debug, Default)]
 pub struct Payload {
-    /// Second moments of the points, for a covariance: 48 bytes a voxel.
-    pub moments: bool,
     /// Stamps of the first and the last point: 16 bytes a voxel.
     pub stamps: bool,
     /// Number of points of each label: 24 bytes a voxel and 8 for each label.
@@ -51,14 +49,10 @@ impl Stamps {
     }
 }
 
-/// Sums of products of offsets from the cell centre: xx, xy, xz, yy, yz, zz, in units of the list.
-pub(crate) type Moments = [i64; 6];
-
 /// The further columns of a shard; those that are not kept are empty.
 #[derive(Clone, PartialEq, Debug)]
 pub(crate) struct Columns {
     payload: Payload,
-    pub(crate) moments: Vec<Moments>,
     pub(crate) stamps: Vec<Stamps>,
     pub(crate) labels: Vec<Vec<LabelCount>>,
 }
@@ -66,7 +60,6 @@ pub(crate) struct Columns {
 /// Contribution of points to the further columns of a voxel.
 #[derive(Clone, Debug, Default)]
 pub(crate) struct Details {
-    pub(crate) moments: Moments,
     pub(crate) stamps: Option<Stamps>,
     pub(crate) labels: Vec<LabelCount>,
 }
@@ -75,7 +68,6 @@ impl Columns {
     pub(crate) fn new(payload: Payload) -> Columns {
         Columns {
             payload,
-            moments: Vec::new(),
             stamps: Vec::new(),
             labels: Vec::new(),
         }
@@ -84,12 +76,6 @@ impl Columns {
     /// Columns that are kept.
     pub(crate) fn payload(&self) -> Payload {
         self.payload
-    }
-
-    /// Keeps these moments, a row for each voxel.
-    pub(crate) fn set_moments(&mut self, moments: Vec<Moments>) {
-        self.payload.moments = true;
-        self.moments = moments;
     }
 
     /// Keeps these stamps, a row for each voxel.
@@ -106,7 +92,6 @@ impl Columns {
 
     /// Appends row `number` of columns of the same payload.
     pub(crate) fn push_row(&mut self, other: &Columns, number: usize) {
-        self.moments.extend(other.moments.get(number));
         self.stamps.extend(other.stamps.get(number));
         self.labels.extend(other.labels.get(number).cloned());
     }
@@ -121,9 +106,6 @@ impl Columns {
     }
 
     pub(crate) fn push(&mut self) {
-        if self.payload.moments {
-            growth::push(&mut self.moments, [0; 6]);
-        }
         if self.payload.stamps {
             growth::push(&mut self.stamps, Stamps::NONE);
         }
@@ -134,11 +116,6 @@ impl Columns {
 
     /// Adds to the columns of voxel `number` that are kept.
     pub(crate) fn add(&mut self, number: usize, details: &Details) {
-        if let Some(moments) = self.moments.get_mut(number) {
-            for (sum, term) in moments.iter_mut().zip(details.moments) {
-                *sum = sum.wrapping_add(term);
-            }
-        }
         if let (Some(stamps), Some(more)) = (self.stamps.get_mut(number), details.stamps) {
             stamps.add(&more);
         }
@@ -159,16 +136,12 @@ impl Columns {
     /// Row of voxel `number`.
     pub(crate) fn get(&self, number: usize) -> Details {
         Details {
-            moments: self.moments.get(number).copied().unwrap_or_default(),
             stamps: self.stamps.get(number).copied(),
             labels: self.labels.get(number).cloned().unwrap_or_default(),
         }
     }
 
     pub(crate) fn swap_remove(&mut self, number: usize) {
-        if self.payload.moments {
-            self.moments.swap_remove(number);
-        }
         if self.payload.stamps {
             self.stamps.swap_remove(number);
         }
@@ -186,8 +159,7 @@ impl Columns {
             .labels
             .iter()
             .map(|l| l.capacity() * size_of::<LabelCount>());
-        self.moments.capacity() * size_of::<Moments>()
-            + self.stamps.capacity() * size_of::<Stamps>()
+        self.stamps.capacity() * size_of::<Stamps>()
             + self.labels.capacity() * size_of::<Vec<LabelCount>>()
             + labels.sum::<usize>()
     }
@@ -195,8 +167,7 @@ impl Columns {
     /// True if every column that is kept has `len` rows and no other has any.
     pub(crate) fn fits(&self, len: usize) -> bool {
         let expected = |kept: bool| if kept { len } else { 0 };
-        self.moments.len() == expected(self.payload.moments)
-            && self.stamps.len() == expected(self.payload.stamps)
+        self.stamps.len() == expected(self.payload.stamps)
             && self.labels.len() == expected(self.payload.labels)
     }
 }

@@ -6,7 +6,7 @@ use std::path::PathBuf;
 
 use clap::Args;
 use lattice_core::lattice::MortonKey;
-use lattice_core::query::{PathOptions, Query as Questions, Steps};
+use lattice_core::query::{PathOptions, Query as Questions, Segment, Steps};
 use lattice_core::voxels::VoxelStore;
 use lattice_core::voxels::file::read_occupancy;
 use nalgebra::Vector3;
@@ -99,7 +99,7 @@ impl Query {
             ));
         }
         if let Some(point) = self.clearance.as_deref().and_then(first_point) {
-            let found = questions.clearance(&point, f64::INFINITY)?;
+            let found = questions.clearance(&Segment::point(point), f64::INFINITY)?;
             let found = found.map(|clearance| cell(clearance.key, clearance.distance_m));
             return Ok(Answer::Clearance(found));
         }
@@ -116,7 +116,7 @@ impl Query {
             bounds: None,
             max_expanded: self.max_cells,
         };
-        let path = questions.shortest_path(&start, &goal, &options, |_| true)?;
+        let path = questions.shortest_path(&start, &goal, &options)?;
         Ok(Answer::Path(Way {
             length_m: path.length_m,
             expanded: path.expanded,

@@ -1,7 +1,7 @@
 //! Maps to files and back, in memory.
 
 use lattice_core::voxels::VoxelStore;
-use lattice_core::voxels::file::{WriteOptions, read_occupancy, write_occupancy};
+use lattice_core::voxels::file::{MapContents, WriteOptions, read_occupancy};
 
 use super::{Report, timed};
 
@@ -26,7 +26,7 @@ pub fn file(
         occupancy_only: true,
     };
     let mut bytes = Vec::new();
-    let (saved, saving) = timed(|| write_occupancy(store, &mut bytes, &options));
+    let (saved, saving) = timed(|| MapContents::from_store(store).write(&mut bytes, &options));
     saved?;
     let (loaded, loading) = timed(|| read_occupancy(&bytes[..], usize::MAX));
     let loaded = loaded?;

@@ -89,11 +89,11 @@ fn map<'a>(
         refused.sum::<u64>()
     });
     debug_assert_eq!(refused, 0);
-    let counts = map.counts();
+    let occupied = map.occupied_keys().len() as u64;
     let mut report = Report::new("lattice-free-space", lattice.kind().name(), res_m, spent);
-    report.voxels = counts.occupied;
+    report.voxels = occupied;
     report.bytes = map.bytes() as u64;
-    report.count = Some(counts.occupied + counts.free);
+    report.count = Some(occupied + map.free_keys().len() as u64);
     Ok(report)
 }
 

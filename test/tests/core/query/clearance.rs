@@ -2,23 +2,17 @@
 
 use lattice_core::lattice::{LatticeKind, MortonKey};
 use lattice_core::query::{Clearance, Query, QueryError, Segment};
-use lattice_core::voxels::VoxelList;
+use lattice_core::voxels::{VoxelList, VoxelStore};
 use nalgebra::Vector3;
 use proptest::prelude::*;
 
-use super::polyhedra::Body;
+use super::polyhedra::distance;
 use super::worlds::{any_offset, any_world, cells, ground};
 
-fn cell_body(voxels: &VoxelList, center: &Vector3<f64>) -> Body {
-    let cell = voxels.lattice().cell();
-    let triangles = cell.faces.iter().flat_map(|face| cell.triangles(face));
-    Body::solid(triangles.map(|t| t.map(|p| p + center)).collect())
-}
-
-/// Distance to every occupied cell.
-fn distances(voxels: &VoxelList, body: &Body) -> Vec<(MortonKey, f64)> {
-    let distance = |(key, center)| (key, body.distance(&cell_body(voxels, &center)));
-    cells(voxels).into_iter().map(distance).collect()
+/// Distance to every occupied cell of a line in the frame of the datum.
+fn distances(voxels: &VoxelList, line: [Vector3<f64>; 2]) -> Vec<(MortonKey, f64)> {
+    let distance = |key: MortonKey| (key, distance(voxels.lattice(), key.unpack(), &line));
+    voxels.sorted_keys().into_iter().map(distance).collect()
 }
 
 /// Checks that the answer is the least of all distances, belongs to its cell, and obeys the bound.
@@ -75,15 +69,15 @@ proptest! {
         let [a, b] = [p, q].map(|x| x - voxels.datum_m());
         let line = Segment { from_m: p, to_m: q };
         let found = query.clearance(&line, max_m).unwrap();
-        let all = distances(&voxels, &Body::line(a, b));
+        let all = distances(&voxels, [a, b]);
         check(&all, found, max_m, tolerance_m(&b))?;
         prop_assert_eq!(query.is_free(&line, 0.3).unwrap(),
             query.clearance(&line, 0.3).unwrap().is_none());
 
-        let found = query.clearance(&p, max_m).unwrap();
-        let all = distances(&voxels, &Body::line(a, a));
+        let found = query.clearance(&Segment::point(p), max_m).unwrap();
+        let all = distances(&voxels, [a, a]);
         check(&all, found, max_m, tolerance_m(&a))?;
-        let exact = query.clearance(&p, f64::INFINITY).unwrap();
+        let exact = query.clearance(&Segment::point(p), f64::INFINITY).unwrap();
         if let Some(key) = query.occupied(&p) {
             prop_assert_eq!(exact, Some(Clearance { distance_m: 0.0, key }));
         }
@@ -110,11 +104,11 @@ fn large_stores_answer_the_same_before_and_after_sorting() {
                 warm.clearance(&line, 0.5).unwrap()
             );
             // Least of all by brute force on the cells around.
-            let body = Body::line(line.from_m - voxels.datum_m(), line.to_m - voxels.datum_m());
-            let near = |(_, c): &(MortonKey, Vector3<f64>)| (c - body.corners[0]).norm() < 4.0;
+            let ends = [line.from_m, line.to_m].map(|p| p - voxels.datum_m());
+            let near = |(_, c): &(MortonKey, Vector3<f64>)| (c - ends[0]).norm() < 4.0;
             let around = cells(&voxels).into_iter().filter(near);
             let least = around
-                .map(|(_, c)| body.distance(&cell_body(&voxels, &c)))
+                .map(|(key, _)| distance(voxels.lattice(), key.unpack(), &ends))
                 .fold(f64::INFINITY, f64::min);
             let found = fresh.clearance(&line, f64::INFINITY).unwrap().unwrap();
             assert!(
@@ -132,13 +126,13 @@ fn senseless_shapes_are_refused() {
     let from_m = Vector3::zeros();
     for bad in [f64::NAN, f64::INFINITY, -1e13] {
         let to_m = Vector3::new(bad, 0.0, 0.0);
-        let error = query.clearance(&to_m, 1.0);
+        let error = query.clearance(&Segment::point(to_m), 1.0);
         assert!(matches!(error, Err(QueryError::Point(_))));
         let error = query.clearance(&Segment { from_m, to_m }, 1.0);
         assert!(matches!(error, Err(QueryError::Point(_))));
     }
     for bad in [f64::NAN, -1.0] {
-        let error = query.is_free(&from_m, bad);
+        let error = query.is_free(&Segment::point(from_m), bad);
         assert!(matches!(error, Err(QueryError::Distance(_))));
     }
 }

@@ -1,9 +1,8 @@
 //! k nearest occupied cells.
 
-use lattice_core::cloud::Cloud;
 use lattice_core::lattice::{Lattice, LatticeKind, MortonKey};
 use lattice_core::query::{Query, QueryError};
-use lattice_core::voxels::{LabelCount, Payload, VoxelList, VoxelStore};
+use lattice_core::voxels::{VoxelList, VoxelStore};
 use nalgebra::Vector3;
 use proptest::prelude::*;
 
@@ -112,25 +111,4 @@ fn senseless_questions_are_refused() {
         assert_eq!(query.nearest(&far, 0).unwrap(), []);
         assert_eq!(query.occupied(&Vector3::zeros()).is_some(), filled);
     }
-}
-
-#[test]
-fn the_label_of_a_cell_is_the_most_frequent_one() {
-    let lattice = Lattice::new(LatticeKind::Fcc, 1.0).unwrap();
-    let list = VoxelList::new(lattice, Vector3::zeros(), 10).unwrap();
-    let mut list = list.with_payload(Payload {
-        labels: true,
-        ..Payload::default()
-    });
-    let cloud = Cloud {
-        stamp_ns: 0,
-        datum_m: Vector3::zeros(),
-        offsets_m: vec![[0.0, 0.1, 0.0]; 5],
-    };
-    list.insert_labelled(&cloud, &[9, 4, 9, 4, 70]);
-    let query = Query::new(&list);
-    let (label, count) = (4, 2);
-    let key = query.occupied(&Vector3::zeros()).unwrap();
-    assert_eq!(query.label(key), Some(LabelCount { label, count }));
-    assert_eq!(query.label(MortonKey::pack([5; 3]).unwrap()), None);
 }

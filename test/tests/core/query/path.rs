@@ -51,7 +51,9 @@ fn shortest_by_relaxation(
     let mut open = BTreeSet::new();
     for (x, y, z) in (0..41 * 41 * 41).map(|i| (i % 41 - 20, i / 41 % 41 - 20, i / 1681 - 20)) {
         let key = MortonKey::pack([x, y, z]).unwrap();
-        if bounds.contains(&center(key)) && query.is_free(&center(key), radius).unwrap() {
+        if bounds.contains(&center(key))
+            && query.is_free(&Segment::point(center(key)), radius).unwrap()
+        {
             open.insert(key);
         }
     }
@@ -134,13 +136,13 @@ proptest! {
         let options = PathOptions { radius_m, steps, bounds: Some(bounds), max_expanded: 100_000 };
         let start = world.datum_m + Vector3::new(-1.1, -1.0, -1.2);
         let goal = world.datum_m + Vector3::new(1.1, 1.2, 1.0);
-        let found = query.shortest_path(&start, &goal, &options, |_| true);
+        let found = query.shortest_path(&start, &goal, &options);
         let ends = [start, goal].map(|p| voxels.key_of(&p).unwrap());
         match found {
             Err(PathError::Blocked { end, .. }) => {
                 let key = if end == "start" { ends[0] } else { ends[1] };
                 let center = VoxelStore::center_m(&voxels, key);
-                prop_assert!(!query.is_free(&center, radius_m + 1e-8).unwrap());
+                prop_assert!(!query.is_free(&Segment::point(center), radius_m + 1e-8).unwrap());
             }
             Err(PathError::NoPath { .. }) => {
                 let expected = shortest_by_relaxation(&voxels, ends[0], ends[1], &options);
@@ -158,7 +160,7 @@ proptest! {
                 prop_assert_eq!(short.first(), path.centers_m.first());
                 prop_assert_eq!(short.last(), path.centers_m.last());
                 prop_assert!(is_clear(&query, &short, (radius_m - 1e-7).max(0.0)));
-                let again = query.shortest_path(&start, &goal, &options, |_| true);
+                let again = query.shortest_path(&start, &goal, &options);
                 prop_assert_eq!(again, Ok(path));
             }
         }
@@ -173,7 +175,7 @@ proptest! {
         let length = |radius_m: f64, steps: Steps| {
             let bounds = Some(around(&world));
             let options = PathOptions { radius_m, steps, bounds, max_expanded: 100_000 };
-            let path = query.shortest_path(&start, &goal, &options, |_| true);
+            let path = query.shortest_path(&start, &goal, &options);
             path.map_or(f64::INFINITY, |path| path.length_m)
         };
         let mut last = 0.0;
@@ -222,7 +224,7 @@ fn a_gap_lets_through_what_fits_and_nothing_else() {
                 bounds,
                 max_expanded: 200_000,
             };
-            query.shortest_path(&start, &goal, &options, |_| true)
+            query.shortest_path(&start, &goal, &options)
         };
         let path = find(0.3).unwrap();
         assert!(path.length_m > 4.4, "{kind} {}", path.length_m);
@@ -240,7 +242,7 @@ fn a_gap_lets_through_what_fits_and_nothing_else() {
 }
 
 #[test]
-fn the_closure_and_the_limits_are_obeyed_and_errors_say_what() {
+fn limits_are_obeyed_and_errors_say_what() {
     let voxels = wall_with_a_gap(LatticeKind::Bcc, 0.8).voxels();
     let query = Query::new(&voxels);
     let options = PathOptions {
@@ -250,17 +252,8 @@ fn the_closure_and_the_limits_are_obeyed_and_errors_say_what() {
         max_expanded: 50_000,
     };
     let (start, goal) = (Vector3::new(-2.0, 1.0, 0.0), Vector3::new(2.0, 1.0, 0.0));
-    let find = |options: &PathOptions| query.shortest_path(&start, &goal, options, |_| true);
+    let find = |options: &PathOptions| query.shortest_path(&start, &goal, options);
     assert!(find(&options).is_ok());
-    let below = |key: MortonKey| VoxelStore::center_m(&voxels, key).x < 0.0;
-    let blocked = query.shortest_path(&start, &goal, &options, below);
-    assert!(matches!(
-        blocked,
-        Err(PathError::Blocked { end: "goal", .. })
-    ));
-    let mut asked = BTreeSet::new();
-    let once = query.shortest_path(&start, &goal, &options, |key| asked.insert(key));
-    assert!(once.is_ok() && !asked.is_empty());
     let limited = find(&PathOptions {
         max_expanded: 3,
         ..options
@@ -273,9 +266,7 @@ fn the_closure_and_the_limits_are_obeyed_and_errors_say_what() {
     let outside = find(&PathOptions { bounds, ..options });
     assert!(matches!(outside, Err(PathError::OutOfBounds { .. })));
     let wall = Vector3::new(0.0, -2.0, 0.0);
-    let error = query
-        .shortest_path(&start, &wall, &options, |_| true)
-        .unwrap_err();
+    let error = query.shortest_path(&start, &wall, &options).unwrap_err();
     assert!(error.to_string().contains("goal") && error.to_string().contains("0.1 m"));
     for bad in [f64::NAN, -1.0] {
         assert!(matches!(
@@ -294,20 +285,14 @@ fn the_closure_and_the_limits_are_obeyed_and_errors_say_what() {
         assert!(matches!(error, Err(PathError::Radius { .. })));
     }
     let nowhere = Vector3::new(f64::NAN, 0.0, 0.0);
-    assert!(
-        query
-            .shortest_path(&nowhere, &goal, &options, |_| true)
-            .is_err()
-    );
+    assert!(query.shortest_path(&nowhere, &goal, &options).is_err());
     let far = Vector3::new(1e9, 0.0, 0.0);
-    let error = query.shortest_path(&start, &far, &options, |_| true);
+    let error = query.shortest_path(&start, &far, &options);
     assert!(matches!(
         error,
         Err(PathError::OutOfBounds { end: "goal", .. })
     ));
-    let same = query
-        .shortest_path(&start, &start, &options, |_| true)
-        .unwrap();
+    let same = query.shortest_path(&start, &start, &options).unwrap();
     assert_eq!((same.keys.len(), same.length_m, same.expanded), (1, 0.0, 0));
     assert_eq!(query.shorten(&same.centers_m, 0.1).unwrap(), same.centers_m);
 }

@@ -1,84 +1,27 @@
-//! Distance between polyhedra by trying every pair of corners, edges and triangles.
+//! Distance between a line and a cell by trying every pair of corners, edges and triangles.
 
+use lattice_core::lattice::{Lattice, LatticeIndex};
 use nalgebra::Vector3;
+
+use crate::raycast::crosses;
 
 type Point = Vector3<f64>;
 
-/// A convex body as triangles, or as a point or line.
-#[derive(Clone, Debug)]
-pub struct Body {
-    pub corners: Vec<Point>,
-    pub edges: Vec<[Point; 2]>,
-    pub triangles: Vec<[Point; 3]>,
-}
-
-impl Body {
-    /// From triangles that turn counter-clockwise seen from outside.
-    pub fn solid(triangles: Vec<[Point; 3]>) -> Body {
-        let edges = triangles
-            .iter()
-            .flat_map(|&[a, b, c]| [[a, b], [b, c], [c, a]]);
-        Body {
-            corners: triangles.iter().flatten().copied().collect(),
-            edges: edges.collect(),
-            triangles,
-        }
+/// Distance of a line (or a point: a line of equal ends) to a cell, 0 if they touch or overlap.
+pub fn distance(lattice: &Lattice, w: LatticeIndex, line: &[Point; 2]) -> f64 {
+    let [from, to] = line;
+    if crosses(lattice, w, [from, to], 0.0) {
+        return 0.0;
     }
-
-    /// A line or, with equal ends, a point.
-    pub fn line(a: Point, b: Point) -> Body {
-        Body {
-            corners: vec![a, b],
-            edges: vec![[a, b]],
-            triangles: Vec::new(),
-        }
-    }
-
-    fn contains(&self, p: &Point) -> bool {
-        let below = |[a, b, c]: &[Point; 3]| (b - a).cross(&(c - a)).dot(&(p - a)) <= 0.0;
-        !self.triangles.is_empty() && self.triangles.iter().all(below)
-    }
-
-    /// Distance to another body, 0 if they touch or overlap.
-    pub fn distance(&self, other: &Body) -> f64 {
-        let inside = |a: &Body, b: &Body| a.corners.iter().any(|p| b.contains(p));
-        let pierced = |a: &Body, b: &Body| {
-            let hit = |e: &[Point; 2]| b.triangles.iter().any(|t| pierces(e, t));
-            a.edges.iter().any(hit)
-        };
-        if inside(self, other)
-            || inside(other, self)
-            || pierced(self, other)
-            || pierced(other, self)
-        {
-            return 0.0;
-        }
-        let mut least = f64::MAX;
-        for (a, b) in [(self, other), (other, self)] {
-            for p in &a.corners {
-                for t in &b.triangles {
-                    least = least.min(to_triangle(p, t));
-                }
-            }
-        }
-        for e in &self.edges {
-            for f in &other.edges {
-                least = least.min(between_lines(e, f));
-            }
-        }
-        least
-    }
-}
-
-fn pierces([p, q]: &[Point; 2], [a, b, c]: &[Point; 3]) -> bool {
-    let normal = (b - a).cross(&(c - a));
-    let (above, below) = (normal.dot(&(p - a)), normal.dot(&(q - a)));
-    if above * below >= 0.0 {
-        return false;
-    }
-    let hit = p + (q - p) * (above / (above - below));
-    let left = |s: &Point, t: &Point| (t - s).cross(&(hit - s)).dot(&normal) >= 0.0;
-    left(a, b) && left(b, c) && left(c, a)
+    let (cell, center) = (lattice.cell(), lattice.center(w));
+    let triangles = cell.faces.iter().flat_map(|face| cell.triangles(face));
+    let least = triangles.map(|triangle| {
+        let [a, b, c] = triangle.map(|p| p + center);
+        let inner = line.map(|p| to_triangle(&p, &[a, b, c]));
+        let edges = [[a, b], [b, c], [c, a]].map(|edge| between_lines(&edge, line));
+        inner.into_iter().chain(edges).fold(f64::MAX, f64::min)
+    });
+    least.fold(f64::MAX, f64::min)
 }
 
 /// To the inside of a triangle; its border is left to the edges.
@@ -102,12 +45,8 @@ fn to_line(p: &Point, [a, b]: &[Point; 2]) -> f64 {
 
 /// Either the feet of the common perpendicular are on both lines, or an end is nearest.
 fn between_lines(e: &[Point; 2], f: &[Point; 2]) -> f64 {
-    let ends = [
-        to_line(&e[0], f),
-        to_line(&e[1], f),
-        to_line(&f[0], e),
-        to_line(&f[1], e),
-    ];
+    let ends = [(&e[0], f), (&e[1], f), (&f[0], e), (&f[1], e)];
+    let ends = ends.map(|(p, line)| to_line(p, line));
     let least = ends.into_iter().fold(f64::MAX, f64::min);
     let (u, v, w) = (e[1] - e[0], f[1] - f[0], f[0] - e[0]);
     let n = u.cross(&v);

@@ -5,17 +5,12 @@ use std::collections::{BTreeMap, BTreeSet};
 use lattice_core::cloud::Cloud;
 use lattice_core::lattice::{Lattice, LatticeIndex, LatticeKind, MortonKey};
 use lattice_core::raycast::{
-    CellState, Evidence, FreeSpaceMap, FreeSpaceOptions, MIN_MAP_BYTES, RayBundle, ScanReport,
-    Traversal,
+    Evidence, FreeSpaceMap, FreeSpaceOptions, MIN_MAP_BYTES, RayBundle, Reach, ScanReport,
 };
 use nalgebra::{Matrix3, UnitQuaternion, Vector3};
 use proptest::prelude::*;
 
-const DATUM_M: [f64; 3] = [4e5, -3e5, 200.0];
-
-fn any_kind() -> impl Strategy<Value = LatticeKind> {
-    prop::sample::select(&LatticeKind::ALL[..])
-}
+use super::{any_kind, at, cloud, crossed, key_of, map, map_of, wall, with_level};
 
 /// Origins and offsets from the datum, some in one cell, some that are no points.
 fn any_scans() -> impl Strategy<Value = Vec<([f64; 3], Vec<[f32; 3]>)>> {
@@ -29,22 +24,6 @@ fn any_scans() -> impl Strategy<Value = Vec<([f64; 3], Vec<[f32; 3]>)>> {
     prop::collection::vec(scan, 1..5)
 }
 
-fn origin(offset: [f64; 3]) -> Vector3<f64> {
-    Vector3::from(DATUM_M) + Vector3::from(offset)
-}
-
-fn cloud(offsets_m: Vec<[f32; 3]>) -> Cloud {
-    Cloud {
-        stamp_ns: 0,
-        datum_m: Vector3::from(DATUM_M),
-        offsets_m,
-    }
-}
-
-fn map(kind: LatticeKind, options: FreeSpaceOptions) -> FreeSpaceMap {
-    map_of(Lattice::new(kind, 0.027).unwrap(), options)
-}
-
 /// As printed, turned, and of a basis that has no name.
 fn any_lattice() -> impl Strategy<Value = Lattice> {
     let skew = Matrix3::new(0.3, 0.1, 0.0, 0.0, 0.25, 0.1, 0.1, 0.0, 0.35);
@@ -56,8 +35,11 @@ fn any_lattice() -> impl Strategy<Value = Lattice> {
     prop::sample::select(lattices)
 }
 
-fn map_of(lattice: Lattice, options: FreeSpaceOptions) -> FreeSpaceMap {
-    FreeSpaceMap::new(lattice, origin([0.3, 0.2, 0.1]), options).unwrap()
+fn to(max_range_m: f64) -> Reach {
+    Reach {
+        max_range_m,
+        ..Reach::default()
+    }
 }
 
 fn insert(map: &mut FreeSpaceMap, origin_m: Vector3<f64>, ends: &Cloud) -> ScanReport {
@@ -72,7 +54,6 @@ struct Reference {
 
 impl Reference {
     fn insert(&mut self, map: &FreeSpaceMap, origin_m: Vector3<f64>, scan: &Cloud) -> ScanReport {
-        let traversal = Traversal::new(map.lattice());
         let from = origin_m - map.datum_m();
         let mut report = ScanReport {
             points: scan.len() as u64,
@@ -80,7 +61,7 @@ impl Reference {
         };
         let mut ends = BTreeSet::new();
         for p in scan.points_m() {
-            match map.key_of(&p) {
+            match key_of(map, &p) {
                 Some(key) => drop(ends.insert(key.unpack())),
                 None if p.iter().all(|x| x.is_finite()) => report.out_of_range += 1,
                 None => report.not_finite += 1,
@@ -89,7 +70,7 @@ impl Reference {
         let mut passed = BTreeSet::new();
         for end in &ends {
             let to = map.lattice().center(*end);
-            let cells = traversal.cells(&from, &to).unwrap();
+            let cells = crossed(map.lattice(), &from, &to);
             report.visits += cells.len() as u64 - 1;
             passed.extend(cells);
         }
@@ -105,42 +86,34 @@ impl Reference {
     }
 }
 
-/// All answers of a map.
-fn contents(map: &FreeSpaceMap) -> Vec<(MortonKey, CellState, Option<f64>)> {
-    let mut keys = map.occupied_keys();
-    keys.extend(map.free_keys());
-    keys.sort_unstable();
-    let answers = |key| (key, map.state(key), map.log_odds(key));
-    keys.into_iter().map(answers).collect()
+/// Occupied and free cells.
+fn contents(map: &FreeSpaceMap) -> [Vec<MortonKey>; 2] {
+    [map.occupied_keys(), map.free_keys()]
 }
 
 proptest! {
     #![proptest_config(ProptestConfig::with_cases(60))]
 
     #[test]
-    fn a_map_is_what_its_rays_say_one_by_one(kind in any_kind(), scans in any_scans()) {
-        let mut map = map(kind, FreeSpaceOptions::default());
+    fn a_map_is_what_its_rays_say_one_by_one(
+        kind in any_kind(),
+        scans in any_scans(),
+        (threshold, steps) in prop::sample::select(vec![(0.5, 0), (0.4, -13), (0.8, 44)]),
+    ) {
+        let evidence = Evidence { threshold, ..Evidence::default() };
+        let mut map = map(kind, FreeSpaceOptions { evidence, ..FreeSpaceOptions::default() });
         let mut reference = Reference::default();
         for (offset, points) in scans {
-            let (origin_m, scan) = (origin(offset), cloud(points));
+            let (origin_m, scan) = (at(offset), cloud(points));
             let report = insert(&mut map, origin_m, &scan);
             prop_assert_eq!(report, reference.insert(&map, origin_m, &scan));
+            let keys = |occupied: bool| {
+                let cells = reference.cells.iter().filter(|(_, v)| (**v >= steps) == occupied);
+                let keys: BTreeSet<_> = cells.map(|(w, _)| MortonKey::pack(*w).unwrap()).collect();
+                keys.into_iter().collect::<Vec<_>>()
+            };
+            prop_assert_eq!(contents(&map), [true, false].map(keys));
         }
-        let mut counts = (0, 0);
-        for (w, value) in &reference.cells {
-            let key = MortonKey::pack(*w).unwrap();
-            prop_assert_eq!(map.log_odds(key), Some(f64::from(*value) / 32.0));
-            let occupied = *value >= 0;
-            let state = if occupied { CellState::Occupied } else { CellState::Free };
-            prop_assert_eq!(map.state(key), state);
-            *(if occupied { &mut counts.0 } else { &mut counts.1 }) += 1;
-        }
-        let (occupied, free) = (map.occupied_keys(), map.free_keys());
-        prop_assert_eq!((occupied.len(), free.len()), counts);
-        prop_assert!(occupied.is_sorted() && free.is_sorted());
-        let counted = map.counts();
-        prop_assert_eq!((counted.occupied as usize, counted.free as usize), counts);
-        prop_assert_eq!(map.state(MortonKey::pack([900_000; 3]).unwrap()), CellState::Unknown);
     }
 
     #[test]
@@ -150,14 +123,14 @@ proptest! {
         free_level in prop::option::of(0..3_u32),
         max_range_m in prop::sample::select(vec![2.5, f64::INFINITY]),
     ) {
-        let options = FreeSpaceOptions { free_level, max_range_m, ..FreeSpaceOptions::default() };
+        let options = FreeSpaceOptions { reach: to(max_range_m), ..with_level(free_level) };
         let (mut one, mut other) = (map(kind, options), map(kind, options));
         for (offset, mut points) in scans {
-            let first = insert(&mut one, origin(offset), &cloud(points.clone()));
+            let first = insert(&mut one, at(offset), &cloud(points.clone()));
             points.reverse();
             let half = points.len() / 2;
             points.rotate_left(half);
-            prop_assert_eq!(first, insert(&mut other, origin(offset), &cloud(points)));
+            prop_assert_eq!(first, insert(&mut other, at(offset), &cloud(points)));
         }
         prop_assert_eq!(contents(&one), contents(&other));
         prop_assert!(one.bytes() <= options.max_bytes);
@@ -173,9 +146,9 @@ proptest! {
         inside in prop::array::uniform3(-0.5..0.5_f64),
     ) {
         let mut fine = map_of(lattice.clone(), FreeSpaceOptions::default());
-        let mut coarse = map_of(lattice, FreeSpaceOptions { free_level: Some(free_level), ..FreeSpaceOptions::default() });
+        let mut coarse = map_of(lattice, with_level(Some(free_level)));
         for (offset, points) in scans {
-            let (origin_m, scan) = (origin(offset), cloud(points));
+            let (origin_m, scan) = (at(offset), cloud(points));
             let report = insert(&mut fine, origin_m, &scan);
             prop_assert_eq!(report, insert(&mut coarse, origin_m, &scan));
         }
@@ -192,7 +165,6 @@ proptest! {
         };
         let free: BTreeSet<MortonKey> = coarse.free_keys().into_iter().collect();
         let occupied = coarse.occupied_keys();
-        prop_assert!(occupied.iter().all(|key| coarse.state(*key) == CellState::Occupied));
         for key in &occupied {
             let center = coarse.lattice().center(key.unpack());
             prop_assert!(homes(center).iter().all(|key| !free.contains(key)));
@@ -211,12 +183,6 @@ proptest! {
             .flat_map(|key| homes(fine.lattice().center(key.unpack())))
             .collect();
         prop_assert!(free.is_subset(&passed));
-        for key in fine.free_keys() {
-            let homes = homes(fine.lattice().center(key.unpack()));
-            let known = coarse.log_odds(key).is_some();
-            let is_free = coarse.state(key) == CellState::Free;
-            prop_assert!(known || homes.iter().any(|home| free.contains(home) == is_free));
-        }
     }
 }
 
@@ -225,32 +191,31 @@ proptest! {
 fn a_wall_that_goes_away_is_freed() {
     for kind in LatticeKind::ALL {
         for free_level in [0, 1, 2] {
-            let options = FreeSpaceOptions {
-                free_level: Some(free_level),
-                ..FreeSpaceOptions::default()
-            };
-            let mut map = map(kind, options);
-            let wall = |x: f32| {
-                let grid = (-30..31).flat_map(|i| (-30..31).map(move |k| (i as f32, k as f32)));
-                cloud(grid.map(|(y, z)| [x, y * 0.02 * x, z * 0.02 * x]).collect())
-            };
+            let mut map = map(kind, with_level(Some(free_level)));
             for _ in 0..3 {
-                insert(&mut map, origin([0.0; 3]), &wall(4.0));
+                insert(&mut map, at([0.0; 3]), &wall(4.0, 30));
             }
-            let near = map.key_of(&origin([4.0, 0.0, 0.0])).unwrap();
-            let before = map.key_of(&origin([1.0, 0.0, 0.0])).unwrap();
-            let behind = map.key_of(&origin([5.5, 0.0, 0.0])).unwrap();
-            let state = |map: &FreeSpaceMap| [before, near, behind].map(|key| map.state(key));
-            use CellState::{Free, Occupied, Unknown};
+            // Before, on and behind the wall.
+            let places = [1.0, 4.0, 5.5].map(|x| at([x, 0.0, 0.0]));
+            let state = |map: &FreeSpaceMap| {
+                let coarse = |p| map.free_lattice().quantize(&(p - map.datum_m())).unwrap();
+                let free = |p| {
+                    map.free_keys()
+                        .contains(&MortonKey::pack(coarse(p)).unwrap())
+                };
+                let occupied = |p| map.occupied_keys().contains(&key_of(map, &p).unwrap());
+                places.map(|p| (occupied(p), free(p)))
+            };
+            let (occupied, free, unknown) = ((true, false), (false, true), (false, false));
             assert_eq!(
                 state(&map),
-                [Free, Occupied, Unknown],
+                [free, occupied, unknown],
                 "{kind} {free_level}"
             );
             for _ in 0..20 {
-                insert(&mut map, origin([0.0; 3]), &wall(9.0));
+                insert(&mut map, at([0.0; 3]), &wall(9.0, 30));
             }
-            assert_eq!(state(&map), [Free, Free, Free], "{kind} {free_level}");
+            assert_eq!(state(&map), [free; 3], "{kind} {free_level}");
         }
     }
 }
@@ -259,23 +224,25 @@ fn a_wall_that_goes_away_is_freed() {
 fn points_beyond_the_range_free_the_way_there_and_hit_nothing() {
     for kind in LatticeKind::ALL {
         let options = FreeSpaceOptions {
-            max_range_m: 5.0,
+            reach: to(5.0),
             ..FreeSpaceOptions::default()
         };
         let mut map = map(kind, options);
         let report = insert(
             &mut map,
-            origin([0.0; 3]),
+            at([0.0; 3]),
             &cloud(vec![[80.0, 0.0, 0.0], [3e38, 0.0, 0.0], [0.0, 2.0, 0.0]]),
         );
         assert_eq!(
             (report.beyond_max_range, report.hits, report.rays),
             (2, 1, 2)
         );
-        let state = |x| map.state(map.key_of(&origin([x, 0.0, 0.0])).unwrap());
+        let is_free = |x| {
+            let key = key_of(&map, &at([x, 0.0, 0.0])).unwrap();
+            map.free_keys().contains(&key)
+        };
         assert_eq!(map.occupied_keys().len(), 1);
-        assert_eq!(state(4.3), CellState::Free);
-        assert_eq!(state(5.7), CellState::Unknown);
+        assert!(is_free(4.3) && !is_free(5.7));
     }
 }
 
@@ -292,26 +259,25 @@ fn the_limit_of_memory_holds_and_what_it_refuses_is_counted() {
     };
     for free_level in [0, 2] {
         let options = FreeSpaceOptions {
-            free_level: Some(free_level),
             max_bytes: MIN_MAP_BYTES,
-            ..FreeSpaceOptions::default()
+            ..with_level(Some(free_level))
         };
         let (mut one, mut other) = (
             map(LatticeKind::Fcc, options),
             map(LatticeKind::Fcc, options),
         );
         let mut points = sphere(3000);
-        let first = insert(&mut one, origin([0.0; 3]), &cloud(points.clone()));
+        let first = insert(&mut one, at([0.0; 3]), &cloud(points.clone()));
         assert!(one.bytes() <= MIN_MAP_BYTES, "{}", one.bytes());
         assert!(first.entries_refused > 0, "{first:?}");
         points.reverse();
-        let second = insert(&mut other, origin([0.0; 3]), &cloud(points));
+        let second = insert(&mut other, at([0.0; 3]), &cloud(points));
         assert_eq!(first, second);
         assert_eq!(contents(&one), contents(&other));
         assert!(!one.free_keys().is_empty());
         let mut refused = 0;
         for i in 0..20 {
-            let from = origin([f64::from(i), 0.0, 0.0]);
+            let from = at([f64::from(i), 0.0, 0.0]);
             refused += insert(&mut one, from, &cloud(sphere(500))).blocks_refused;
             assert!(one.bytes() <= MIN_MAP_BYTES, "{}", one.bytes());
         }
@@ -327,54 +293,32 @@ fn a_scan_from_nowhere_changes_nothing() {
     assert_eq!((report.points, report.not_finite), (7, 7));
     let report = insert(&mut map, Vector3::new(1e9, 0.0, 0.0), &scan);
     assert_eq!((report.points, report.out_of_range), (7, 7));
-    assert!(contents(&map).is_empty());
+    assert!(contents(&map).iter().all(Vec::is_empty));
 }
 
 #[test]
 fn options_that_cannot_be_are_refused() {
     let good = FreeSpaceOptions::default();
+    let range = |range_m| FreeSpaceOptions {
+        reach: to(range_m),
+        ..good
+    };
+    let (hit, max_bytes) = (0.4, 1000);
+    let evidence = Evidence {
+        hit,
+        ..good.evidence
+    };
     for (bad, expected) in [
-        (
-            FreeSpaceOptions {
-                max_range_m: 0.0,
-                ..good
-            },
-            "max_range_m 0",
-        ),
-        (
-            FreeSpaceOptions {
-                max_range_m: f64::NAN,
-                ..good
-            },
-            "max_range_m NaN",
-        ),
-        (
-            FreeSpaceOptions {
-                free_level: Some(4),
-                ..good
-            },
-            "free_level 4",
-        ),
-        (
-            FreeSpaceOptions {
-                max_bytes: 1000,
-                ..good
-            },
-            "max_bytes 1000",
-        ),
-        (
-            FreeSpaceOptions {
-                evidence: Evidence {
-                    hit: 0.4,
-                    ..Evidence::default()
-                },
-                ..good
-            },
-            "hit 0.4",
-        ),
+        (range(0.0), "max_range_m 0"),
+        (range(f64::NAN), "max_range_m NaN"),
+        (with_level(Some(4)), "free_level 4"),
+        (FreeSpaceOptions { max_bytes, ..good }, "max_bytes 1000"),
+        (FreeSpaceOptions { evidence, ..good }, "hit 0.4"),
     ] {
         let lattice = Lattice::new(LatticeKind::Fcc, 1.0).unwrap();
-        let error = FreeSpaceMap::new(lattice, Vector3::zeros(), bad).unwrap_err();
+        let error = FreeSpaceMap::new(lattice, Vector3::zeros(), bad)
+            .err()
+            .unwrap();
         assert!(error.to_string().starts_with(expected), "{error}");
     }
     let far = Vector3::new(f64::NAN, 0.0, 0.0);

@@ -5,26 +5,13 @@ use std::collections::BTreeSet;
 use lattice_core::cloud::Cloud;
 use lattice_core::lattice::{Lattice, LatticeKind, MortonKey};
 use lattice_core::raycast::{
-    CellState, ClearOptions, ClearReport, FreeSpaceMap, FreeSpaceOptions, RayBundle, RayClearer,
-    Traversal,
+    ClearOptions, ClearReport, Evidence, FreeSpaceOptions, RayBundle, RayClearer, Reach,
 };
 use lattice_core::voxels::{OccupancyList, VoxelList, VoxelStore};
 use nalgebra::Vector3;
 use proptest::prelude::*;
 
-const DATUM_M: [f64; 3] = [4e5, -3e5, 200.0];
-
-fn at(offset: [f64; 3]) -> Vector3<f64> {
-    Vector3::from(DATUM_M) + Vector3::from(offset)
-}
-
-fn cloud(offsets_m: Vec<[f32; 3]>) -> Cloud {
-    Cloud {
-        stamp_ns: 0,
-        datum_m: Vector3::from(DATUM_M),
-        offsets_m,
-    }
-}
+use super::{any_kind, at, cloud, crossed, key_of, map, wall, with_level};
 
 fn list(kind: LatticeKind, points: &[[f32; 3]]) -> VoxelList {
     let lattice = Lattice::new(kind, 0.027).unwrap();
@@ -45,7 +32,10 @@ fn clear_rays(
     keep_m: f64,
 ) -> ClearReport {
     let options = ClearOptions {
-        keep_m,
+        reach: Reach {
+            keep_m,
+            ..Reach::default()
+        },
         ..ClearOptions::default()
     };
     let mut clearer = RayClearer::new(&store.lattice().clone(), options);
@@ -62,37 +52,38 @@ proptest! {
     /// A scan in parts from different places is one scan: one hit or miss for each cell.
     #[test]
     fn bundles_of_one_scan_count_once(
-        kind in prop::sample::select(&LatticeKind::ALL[..]),
+        kind in any_kind(),
         offsets in prop::array::uniform2(prop::array::uniform3(-1.0..1.0_f64)),
         points in prop::collection::vec(prop::array::uniform3(-4.0..4.0_f32), 1..40),
     ) {
-        let mut map = map(kind, FreeSpaceOptions::default());
         let clouds = [cloud(points[..points.len() / 2].to_vec()), cloud(points)];
-        let scan: Vec<RayBundle> = offsets
-            .iter()
-            .zip(&clouds)
-            .map(|(offset, ends)| RayBundle { origin_m: at(*offset), ends })
-            .collect();
-        let report = map.insert_scan(&scan);
-        prop_assert_eq!(report.hits, map.occupied_keys().len() as u64);
+        let bundles = offsets.iter().zip(&clouds).map(|(offset, ends)| bundle(at(*offset), ends));
+        let scan: Vec<RayBundle> = bundles.collect();
+        let insert = |threshold: f64| {
+            let evidence = Evidence { threshold, ..Evidence::default() };
+            let mut map = map(kind, FreeSpaceOptions { evidence, ..FreeSpaceOptions::default() });
+            (map.insert_scan(&scan), map)
+        };
+        let (report, even) = insert(0.5);
+        prop_assert_eq!(report.hits, even.occupied_keys().len() as u64);
+        prop_assert_eq!(report.misses, even.free_keys().len() as u64);
         prop_assert_eq!(report.rays, report.hits, "one ray for each cell");
-        for key in map.occupied_keys() {
-            prop_assert_eq!(map.log_odds(key), Some(27.0 / 32.0));
-        }
-        for key in map.free_keys() {
-            prop_assert_eq!(map.log_odds(key), Some(-13.0 / 32.0));
-        }
+        // Two misses would make a cell free at the first threshold, two hits occupied at the second.
+        prop_assert_eq!(insert(0.38).1.free_keys(), []);
+        prop_assert_eq!(insert(0.8).1.occupied_keys(), []);
     }
 
     #[test]
     fn what_is_removed_is_what_rays_cross_away_from_hits(
-        kind in prop::sample::select(&LatticeKind::ALL[..]),
+        kind in any_kind(),
         (stored, mut scan) in (any_points(800), any_points(40)),
     ) {
         let mut store = list(kind, &stored);
         let (lattice, datum_m) = (store.lattice().clone(), store.datum_m());
         let before: BTreeSet<MortonKey> = store.sorted_keys().into_iter().collect();
-        let from = at([0.1, 0.0, 0.2]) - datum_m;
+        // No ray from here to a lattice point meets an edge.
+        let origin_m = at([0.1013, 0.0207, 0.1991]);
+        let from = origin_m - datum_m;
         let ends: BTreeSet<MortonKey> = cloud(scan.clone())
             .points_m()
             .map(|p| store.key_of(&p).unwrap())
@@ -105,21 +96,20 @@ proptest! {
                 ends.contains(&key)
             })
         };
-        let traversal = Traversal::new(&lattice);
         let mut expected = BTreeSet::new();
         for end in &ends {
-            let cells = traversal.cells(&from, &lattice.center(end.unpack())).unwrap();
+            let cells = crossed(&lattice, &from, &lattice.center(end.unpack()));
             expected.extend(cells.into_iter().map(|w| MortonKey::pack(w).unwrap()));
         }
         expected.retain(|key| before.contains(key) && !touches(key));
         let mut again = list(kind, &stored);
-        let report = clear_rays(&mut store, at([0.1, 0.0, 0.2]), &cloud(scan.clone()), 0.0);
+        let report = clear_rays(&mut store, origin_m, &cloud(scan.clone()), 0.0);
         prop_assert_eq!(&report.removed, &expected.iter().copied().collect::<Vec<_>>());
         prop_assert_eq!(report.missed as usize, expected.len());
         let left: Vec<MortonKey> = before.difference(&expected).copied().collect();
         prop_assert_eq!(store.sorted_keys(), left);
         scan.reverse();
-        prop_assert_eq!(report, clear_rays(&mut again, at([0.1, 0.0, 0.2]), &cloud(scan), 0.0));
+        prop_assert_eq!(report, clear_rays(&mut again, origin_m, &cloud(scan), 0.0));
     }
 }
 
@@ -197,37 +187,17 @@ fn the_last_part_of_a_ray_clears_nothing() {
     }
 }
 
-fn map(kind: LatticeKind, options: FreeSpaceOptions) -> FreeSpaceMap {
-    let lattice = Lattice::new(kind, 0.027).unwrap();
-    FreeSpaceMap::new(lattice, at([0.3, 0.2, 0.1]), options).unwrap()
-}
-
 /// A store holds what the evidence says is occupied, whatever free cells the map keeps.
 #[test]
 fn a_store_is_cleared_to_what_the_evidence_says() {
     for free_level in [None, Some(0), Some(2)] {
-        let options = FreeSpaceOptions {
-            free_level,
-            ..FreeSpaceOptions::default()
-        };
-        let mut map = map(LatticeKind::Fcc, options);
+        let mut map = map(LatticeKind::Fcc, with_level(free_level));
         let lattice = map.lattice().clone();
         let mut store = OccupancyList::new(lattice, map.datum_m(), usize::MAX).unwrap();
-        let wall = |x: f32| {
-            let grid = (-20..21).flat_map(|i| (-20..21).map(move |k| (i as f32, k as f32)));
-            cloud(grid.map(|(y, z)| [x, y * 0.02 * x, z * 0.02 * x]).collect())
-        };
         let mut see = |x: f32| {
-            let ends = wall(x);
+            let ends = wall(x, 20);
             store.insert(&ends);
-            let origin_m = at([0.0; 3]);
-            let report = map.clear(
-                &mut store,
-                &[RayBundle {
-                    origin_m,
-                    ends: &ends,
-                }],
-            );
+            let report = map.clear(&mut store, &[bundle(at([0.0; 3]), &ends)]);
             store.validate().unwrap();
             assert_eq!(
                 store.sorted_keys(),
@@ -246,15 +216,10 @@ fn a_store_is_cleared_to_what_the_evidence_says() {
 /// A loaded map has no scans: its cells count as hit once, so that rays can clear them.
 #[test]
 fn cells_that_were_loaded_can_be_cleared() {
-    let options = FreeSpaceOptions {
-        free_level: None,
-        ..FreeSpaceOptions::default()
-    };
-    let mut map = map(LatticeKind::Bcc, options);
-    let key = map.key_of(&at([2.0, 0.1, 0.1])).unwrap();
+    let mut map = map(LatticeKind::Bcc, with_level(None));
+    let key = key_of(&map, &at([2.0, 0.1, 0.1])).unwrap();
     map.insert_occupied(&[key]);
     assert_eq!(map.occupied_keys(), [key]);
-    assert_eq!(map.log_odds(key), Some(27.0 / 32.0));
     map.reset();
-    assert_eq!(map.state(key), CellState::Unknown);
+    assert!(map.occupied_keys().is_empty() && map.free_keys().is_empty());
 }
