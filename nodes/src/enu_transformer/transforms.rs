@@ -21,11 +21,11 @@ impl EnuTransformer {
             let (parent, child) = (&transform.header.frame_id, &transform.child_frame_id);
             let stamp_ns = transform.header.stamp.to_ns();
             let pose = geometry::isometry_from_transform(&transform.transform);
-            let mut insert = |pose| {
+            let insert = |pose| {
                 let inserted = self.mounts.insert(parent, child, stamp_ns, pose, is_static);
                 inserted.is_ok()
             };
-            let refused = !pose.is_some_and(&mut insert);
+            let refused = !pose.is_some_and(insert);
             self.counts.transforms_refused += u64::from(refused);
         }
         self.announce_odom(&mut out);

@@ -92,20 +92,15 @@ fn expand(name: &str, node_name: &str, namespace: &str) -> Result<String, NameEr
         };
         text = format!("{head}{value}{tail}");
     }
-    Ok(if text.starts_with('/') {
-        text
-    } else {
-        join(namespace, &text)
+    Ok(match text.starts_with('/') {
+        true => text,
+        false => fully_qualified(&text, namespace),
     })
 }
 
 /// A node's full name, for example `/robot/mapper`.
 pub(crate) fn fully_qualified(node_name: &str, namespace: &str) -> String {
-    join(namespace, node_name)
-}
-
-fn join(namespace: &str, name: &str) -> String {
-    format!("{}/{name}", namespace.trim_end_matches('/'))
+    format!("{}/{node_name}", namespace.trim_end_matches('/'))
 }
 
 /// rmw's rules for a node's name.

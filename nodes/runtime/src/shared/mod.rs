@@ -53,7 +53,8 @@ pub(crate) struct Shared {
     pub io: TaskThread,
     pub tasks: Arc<Tasks>,
     pub receive_buffer: ReceiveBuffer,
-    sim_time: Mutex<Option<SimTime>>,
+    /// Simulated time, one for all nodes of a process.
+    sim_time: Mutex<Option<(Clock, Subscription)>>,
     publishing: TaskThread,
     answers: Answers,
     endpoints: Arc<Endpoints>,
@@ -62,12 +63,6 @@ pub(crate) struct Shared {
     writer_order: Mutex<()>,
     writers_made: AtomicU64,
     open: Mutex<Option<Open>>,
-}
-
-/// Simulated time, one for all nodes of a process.
-struct SimTime {
-    clock: Clock,
-    _subscription: Subscription,
 }
 
 /// Everything that goes at shutdown.
@@ -168,8 +163,8 @@ impl Shared {
         topic: &str,
     ) -> Result<Clock, RuntimeError> {
         let mut sim = lock(&self.sim_time);
-        if let Some(sim) = sim.as_ref() {
-            return Ok(sim.clock.clone());
+        if let Some((clock, _)) = sim.as_ref() {
+            return Ok(clock.clone());
         }
         let now_ns = Arc::new(AtomicI64::new(0));
         let clock = Clock::simulated(Arc::clone(&now_ns));
@@ -180,10 +175,7 @@ impl Shared {
         };
         let subscription =
             self.subscribe(node, topic, &Qos::CLOCK, Load::Small, 1 << 10, handler)?;
-        *sim = Some(SimTime {
-            clock: clock.clone(),
-            _subscription: subscription,
-        });
+        *sim = Some((clock.clone(), subscription));
         Ok(clock)
     }
 

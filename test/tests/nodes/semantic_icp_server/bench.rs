@@ -3,7 +3,7 @@
 use std::collections::VecDeque;
 use std::ops::ControlFlow;
 
-use lattice_core::lattice::{Lattice, LatticeKind};
+use lattice_core::lattice::LatticeKind;
 use lattice_core::registration::{
     Calibration, CalibrationOptions, HeadsetScan, Progress, Stage, TrackUpdate, Verdict,
 };
@@ -17,6 +17,7 @@ use lattice_nodes::semantic_icp_server::{
     CallId, End, Job, MapCloud, Output, Search, SemanticIcpServer, ServerOptions,
 };
 use lattice_test::clouds::{SECOND_NS, labelled_cloud};
+use lattice_test::maps;
 use nalgebra::Isometry3;
 
 /// Answers as it is told.
@@ -192,8 +193,10 @@ impl<S: Search> Bench<S> {
 }
 
 pub fn mapper(epoch: u64) -> LatticeMapper {
-    let mut options = MapperOptions::new(Lattice::new(LatticeKind::Cubic, 0.000_125).unwrap());
-    options.labels = Some(LabelOptions::default());
+    let options = MapperOptions {
+        labels: Some(LabelOptions::default()),
+        ..maps::options(LatticeKind::Cubic, 0.000_125)
+    };
     LatticeMapper::new(options, epoch).unwrap()
 }
 
