@@ -4,7 +4,7 @@
 
 use std::io;
 use std::sync::Arc;
-use std::sync::atomic::{AtomicUsize, Ordering};
+use std::sync::atomic::{AtomicU64, AtomicUsize, Ordering};
 use std::thread::{self, JoinHandle};
 
 use crossbeam_channel::{Sender, bounded};
@@ -122,6 +122,22 @@ impl<E> Inbox<E> {
         }
         self.bytes.fetch_sub(bytes, Ordering::Relaxed);
         false
+    }
+
+    /// A handler that hands each message over as an event of so many bytes, and counts those that
+    /// find no room.
+    pub fn counting<M>(
+        &self,
+        lost: &Arc<AtomicU64>,
+        event: fn(M) -> E,
+        bytes: fn(&M) -> usize,
+    ) -> impl FnMut(M) + use<E, M> {
+        let (inbox, lost) = (self.clone(), Arc::clone(lost));
+        move |message| {
+            let bytes = bytes(&message);
+            let sent = inbox.send(event(message), bytes);
+            lost.fetch_add(u64::from(!sent), Ordering::Relaxed);
+        }
     }
 }
 

@@ -35,7 +35,7 @@ pub fn inbox_events(params: &Params, default: usize) -> Result<usize, ParamError
 
 /// `inbox_bytes`: most bytes of messages that wait for a node.
 pub fn inbox_bytes(params: &Params, default: usize) -> Result<usize, ParamError> {
-    params.usize_in("inbox_bytes", default, 1..=usize::MAX)
+    params.positive("inbox_bytes", default)
 }
 
 /// `threads`: threads of a pool; 0: one less than the machine has.
@@ -85,12 +85,7 @@ mod tests {
             (mapper, "max_voxels", "0", "1 or more"),
             (mapper, "max_cloud_points", "0", "1 or more"),
             (mapper, "chunk_bytes", "0", "2048 to 67108864"),
-            (
-                mapper,
-                "free_space",
-                "'yes, please'",
-                "off or clear or evidence",
-            ),
+            (mapper, "free_space", "yes, sir", "off or clear or"),
             (mapper, "payload", "bits", "centroid or occupancy"),
             (mapper, "rays.misses", "0", "1 to 4294967295"),
             (mapper, "rays.keep_ratio", "2.0", "0.0 to 1.0"),
@@ -109,10 +104,7 @@ mod tests {
             let range = ("max_range_m", ParamValue::F64(50.0));
             let params = Params::from_values("/node", [(name, value), range]);
             let error = read(&params).unwrap_err().to_string();
-            assert!(
-                error.contains(name) && error.contains(expected),
-                "{name}: {error}"
-            );
+            assert!(error.contains(name) && error.contains(expected), "{error}");
         }
         // As it is typed in a file: not a bool.
         let off = ParamValue::from_yaml_text("off").unwrap();

@@ -4,5 +4,6 @@ pub mod clouds;
 pub mod data;
 pub mod domain;
 pub mod flat;
+pub mod maps;
 pub mod python;
 pub mod random;

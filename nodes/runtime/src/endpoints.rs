@@ -112,7 +112,7 @@ mod tests {
             endpoints.hear(PortEvent::Matched { endpoint, peer });
         }
         endpoints.hear(PortEvent::Lost { peer: other });
-        let peers = Arc::new(Peers::of_publisher("/map"));
+        let peers = Arc::new(Peers::new("/map", "subscriber", log::Level::Info));
         endpoints.register(endpoint, &peers);
         assert_eq!(peers.count(), 1);
         endpoints.hear(PortEvent::ParticipantLost { any: peer });

@@ -3,7 +3,7 @@
 use thiserror::Error;
 
 /// Highest DDS domain whose ports fit below 65536.
-pub const DOMAIN_ID_MAX: u16 = 232;
+const DOMAIN_ID_MAX: u16 = 232;
 /// Domains whose ports lie among those that Linux gives to outgoing connections.
 const EPHEMERAL_DOMAINS: std::ops::RangeInclusive<u16> = 102..=214;
 
@@ -23,16 +23,10 @@ pub struct Network {
     pub warnings: Vec<String>,
 }
 
-/// Reason why the environment is refused.
-#[derive(Clone, Debug, PartialEq, Eq, Error)]
-pub enum EnvError {
-    /// `ROS_DOMAIN_ID` is no domain.
-    #[error("ROS_DOMAIN_ID={value:?} is no DDS domain; expected a number from 0 to 232")]
-    DomainId {
-        /// The value given.
-        value: String,
-    },
-}
+/// `ROS_DOMAIN_ID` is no domain but this.
+#[derive(Debug, Error)]
+#[error("ROS_DOMAIN_ID={0:?} is no DDS domain; expected a number from 0 to 232")]
+pub struct EnvError(String);
 
 impl Network {
     /// Reads the environment of the process.
@@ -43,12 +37,12 @@ impl Network {
     }
 
     /// Reads an environment given as a function; an empty variable counts as unset.
-    pub fn from_lookup(lookup: impl Fn(&str) -> Option<String>) -> Result<Network, EnvError> {
+    fn from_lookup(lookup: impl Fn(&str) -> Option<String>) -> Result<Network, EnvError> {
         let get = |name| lookup(name).filter(|value| !value.is_empty());
         let mut warnings = Vec::new();
         let domain_id = match get(DOMAIN_ID) {
             None => 0,
-            Some(value) => domain_id(&value).ok_or(EnvError::DomainId { value })?,
+            Some(value) => domain_id(&value).ok_or(EnvError(value))?,
         };
         if EPHEMERAL_DOMAINS.contains(&domain_id) {
             warnings.push(format!(
@@ -121,84 +115,54 @@ mod tests {
 
     fn read(variables: &[(&str, &str)]) -> Result<Network, EnvError> {
         Network::from_lookup(|name| {
-            variables
-                .iter()
-                .find(|(key, _)| *key == name)
-                .map(|(_, value)| (*value).to_owned())
+            let found = variables.iter().find(|(key, _)| *key == name);
+            found.map(|(_, value)| (*value).to_owned())
         })
+    }
+
+    /// Domain, locality and number of warnings.
+    fn network(variables: &[(&str, &str)]) -> (u16, bool, usize) {
+        let network = read(variables).unwrap();
+        let warnings = network.warnings.len();
+        (network.domain_id, network.localhost_only, warnings)
     }
 
     #[test]
     fn an_empty_environment_has_the_defaults_of_ros() {
-        let expected = Network {
-            domain_id: 0,
-            localhost_only: false,
-            warnings: vec![],
-        };
-        assert_eq!(read(&[]).unwrap(), expected);
-        let empty =
-            [DOMAIN_ID, LOCALHOST_ONLY, DISCOVERY_RANGE, STATIC_PEERS].map(|name| (name, ""));
-        assert_eq!(read(&empty).unwrap(), expected);
+        assert_eq!(network(&[]), (0, false, 0));
+        let names = [DOMAIN_ID, LOCALHOST_ONLY, DISCOVERY_RANGE, STATIC_PEERS];
+        assert_eq!(network(&names.map(|name| (name, ""))), (0, false, 0));
     }
 
     #[test]
     fn domains_end_at_232() {
-        for (value, id, warnings) in [
-            ("0", 0, 0),
-            ("101", 101, 0),
-            ("102", 102, 1),
-            ("214", 214, 1),
-            ("215", 215, 0),
-            ("232", 232, 0),
-        ] {
-            let network = read(&[(DOMAIN_ID, value)]).unwrap();
-            assert_eq!(
-                (network.domain_id, network.warnings.len()),
-                (id, warnings),
-                "{value}"
-            );
+        for (id, warnings) in [(0, 0), (101, 0), (102, 1), (214, 1), (215, 0), (232, 0)] {
+            let found = network(&[(DOMAIN_ID, &id.to_string())]);
+            assert_eq!(found, (id, false, warnings));
         }
         for value in ["233", "-1", "x", "1.0", "99999999999999999999"] {
             let error = read(&[(DOMAIN_ID, value)]).unwrap_err();
-            assert_eq!(
-                error,
-                EnvError::DomainId {
-                    value: value.to_owned()
-                }
-            );
             assert!(error.to_string().contains(value), "{error}");
         }
     }
 
     #[test]
-    fn discovery_ranges_follow_the_variable() {
-        for (value, local, warnings) in [
-            ("OFF", true, 0),
-            ("LOCALHOST", true, 0),
-            ("SUBNET", false, 0),
-            ("SYSTEM_DEFAULT", false, 0),
-            ("subnet", true, 1),
+    fn ranges_and_localhost_only_decide_what_leaves_the_machine() {
+        let (range, only) = (DISCOVERY_RANGE, LOCALHOST_ONLY);
+        let both = [(only, "1"), (range, "SUBNET")];
+        for (variables, local, warnings) in [
+            (&[(range, "OFF")][..], true, 0),
+            (&[(range, "LOCALHOST")], true, 0),
+            (&[(range, "SUBNET")], false, 0),
+            (&[(range, "SYSTEM_DEFAULT")], false, 0),
+            (&[(range, "subnet")], true, 1),
+            // Deprecated, and the range is ignored.
+            (&both, true, 2),
+            (&[(only, "0")], false, 0),
+            (&[(only, "true")], false, 1),
+            (&[(STATIC_PEERS, "10.0.0.1; robot ;")], false, 1),
         ] {
-            let network = read(&[(DISCOVERY_RANGE, value)]).unwrap();
-            let found = (network.localhost_only, network.warnings.len());
-            assert_eq!(found, (local, warnings), "{value}");
+            assert_eq!(network(variables), (0, local, warnings), "{variables:?}");
         }
-    }
-
-    #[test]
-    fn localhost_only_overrides_the_range() {
-        let network = read(&[(LOCALHOST_ONLY, "1"), (DISCOVERY_RANGE, "SUBNET")]).unwrap();
-        assert!(network.localhost_only);
-        let warnings = network.warnings.len();
-        assert_eq!(warnings, 2, "deprecated, and the range ignored");
-        assert!(!read(&[(LOCALHOST_ONLY, "0")]).unwrap().localhost_only);
-        let odd = read(&[(LOCALHOST_ONLY, "true")]).unwrap();
-        assert_eq!((odd.localhost_only, odd.warnings.len()), (false, 1));
-    }
-
-    #[test]
-    fn static_peers_are_warned_about() {
-        let network = read(&[(STATIC_PEERS, "10.0.0.1; robot ;")]).unwrap();
-        assert_eq!(network.warnings.len(), 1);
     }
 }

@@ -3,7 +3,7 @@
 //! ROS 2 nodes are no DDS entities: every participant says on `ros_discovery_info` which nodes it
 //! holds, with the readers and writers of each (rmw_dds_common).
 
-use std::collections::{BTreeMap, BTreeSet};
+use std::collections::BTreeSet;
 use std::sync::{Arc, Mutex};
 use std::time::Duration;
 
@@ -13,21 +13,22 @@ use smol::Timer;
 use smol::channel::{Receiver, Sender, bounded};
 
 use super::outbox::Outbox;
-use super::port::EndpointId;
+use super::port::{EndpointId, PortTopic};
 use super::sync::lock;
 
-/// DDS topic, not mangled.
-pub(crate) const TOPIC: &str = "ros_discovery_info";
-
-/// Its type.
-pub(crate) const TYPE: &str = "rmw_dds_common/msg/ParticipantEntitiesInfo";
+/// DDS topic, whose name is not mangled.
+pub(crate) const TOPIC: PortTopic<'static> = PortTopic {
+    name: "ros_discovery_info",
+    dds_name: "ros_discovery_info",
+    ros_type: "rmw_dds_common/msg/ParticipantEntitiesInfo",
+};
 
 /// Time between a change and the message that names it.
 const SETTLE_TIME: Duration = Duration::from_millis(50);
 
-/// A node of this process.
-#[derive(Clone, Copy, Debug, PartialEq, Eq, PartialOrd, Ord)]
-pub(crate) struct NodeId(u64);
+/// A node of this process, by its place in the graph.
+#[derive(Clone, Copy, Debug)]
+pub(crate) struct NodeId(usize);
 
 /// Kind of an endpoint of a node.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
@@ -38,12 +39,12 @@ pub(crate) enum EndpointKind {
 
 /// The nodes of this process.
 pub(crate) struct Graph {
-    nodes: Mutex<BTreeMap<NodeId, Entry>>,
+    nodes: Mutex<Vec<Entry>>,
     changed: Sender<()>,
     changes: Receiver<()>,
 }
 
-#[derive(Clone, Default)]
+#[derive(Default)]
 struct Entry {
     namespace: String,
     name: String,
@@ -56,7 +57,7 @@ pub(crate) struct NodeEndpoint {
     graph: Arc<Graph>,
     node: NodeId,
     kind: EndpointKind,
-    guid: Option<EndpointId>,
+    guid: EndpointId,
 }
 
 impl Graph {
@@ -72,19 +73,12 @@ impl Graph {
     /// Adds a node; it stays until the process ends.
     pub(crate) fn add_node(&self, namespace: &str, name: &str) -> NodeId {
         let mut nodes = lock(&self.nodes);
-        let id = NodeId(
-            nodes
-                .last_key_value()
-                .map_or(0, |(id, _)| id.0.wrapping_add(1)),
-        );
-        nodes.insert(
-            id,
-            Entry {
-                namespace: namespace.to_owned(),
-                name: name.to_owned(),
-                ..Entry::default()
-            },
-        );
+        let id = NodeId(nodes.len());
+        nodes.push(Entry {
+            namespace: namespace.to_owned(),
+            name: name.to_owned(),
+            ..Entry::default()
+        });
         drop(nodes);
         self.note_change();
         id
@@ -95,12 +89,9 @@ impl Graph {
         self: &Arc<Self>,
         node: NodeId,
         kind: EndpointKind,
-        guid: impl Into<Option<EndpointId>>,
+        guid: EndpointId,
     ) -> NodeEndpoint {
-        let guid = guid.into();
-        self.edit(node, kind, |set| {
-            set.extend(guid);
-        });
+        self.edit(node, kind, |set| set.insert(guid));
         NodeEndpoint {
             graph: Arc::clone(self),
             node,
@@ -113,9 +104,9 @@ impl Graph {
         &self,
         node: NodeId,
         kind: EndpointKind,
-        change: impl FnOnce(&mut BTreeSet<EndpointId>),
+        change: impl FnOnce(&mut BTreeSet<EndpointId>) -> bool,
     ) {
-        if let Some(entry) = lock(&self.nodes).get_mut(&node) {
+        if let Some(entry) = lock(&self.nodes).get_mut(node.0) {
             change(match kind {
                 EndpointKind::Reader => &mut entry.readers,
                 EndpointKind::Writer => &mut entry.writers,
@@ -129,6 +120,21 @@ impl Graph {
         let _ = self.changed.try_send(());
     }
 
+    fn message(&self, participant: EndpointId, gid_bytes: usize) -> ParticipantEntitiesInfo {
+        let gid = |id: EndpointId| Gid::new(id, gid_bytes);
+        let gids = |set: &BTreeSet<EndpointId>| set.iter().copied().map(gid).collect();
+        let node = |entry: &Entry| NodeEntitiesInfo {
+            namespace: entry.namespace.clone(),
+            name: entry.name.clone(),
+            readers: gids(&entry.readers),
+            writers: gids(&entry.writers),
+        };
+        ParticipantEntitiesInfo {
+            gid: gid(participant),
+            nodes: lock(&self.nodes).iter().map(node).collect(),
+        }
+    }
+
     /// Publishes the graph after every change, until the task is dropped.
     pub(crate) async fn publish(self: Arc<Self>, participant: EndpointId, writer: Arc<Outbox>) {
         let gid_bytes = gid_bytes(std::env::var("ROS_DISTRO").ok().as_deref());
@@ -136,13 +142,7 @@ impl Graph {
             // Endpoints come in bursts, and each message stays in the history for late joiners.
             Timer::after(SETTLE_TIME).await;
             let _ = self.changes.try_recv();
-            let message = ParticipantEntitiesInfo {
-                gid: Gid::new(participant, gid_bytes),
-                nodes: lock(&self.nodes)
-                    .values()
-                    .map(|entry| NodeEntitiesInfo::new(entry, gid_bytes))
-                    .collect(),
-            };
+            let message = self.message(participant, gid_bytes);
             if let Err(error) = writer.send(Box::new(move || cdr::to_vec(&message))) {
                 log::debug!("{error}");
             }
@@ -154,11 +154,8 @@ impl Graph {
 
 impl Drop for NodeEndpoint {
     fn drop(&mut self) {
-        if let Some(guid) = self.guid {
-            self.graph.edit(self.node, self.kind, |set| {
-                set.remove(&guid);
-            });
-        }
+        let remove = |set: &mut BTreeSet<_>| set.remove(&self.guid);
+        self.graph.edit(self.node, self.kind, remove);
     }
 }
 
@@ -183,19 +180,6 @@ struct NodeEntitiesInfo {
     name: String,
     readers: Vec<Gid>,
     writers: Vec<Gid>,
-}
-
-impl NodeEntitiesInfo {
-    fn new(entry: &Entry, gid_bytes: usize) -> Self {
-        let gids =
-            |set: &BTreeSet<EndpointId>| set.iter().map(|g| Gid::new(*g, gid_bytes)).collect();
-        Self {
-            namespace: entry.namespace.clone(),
-            name: entry.name.clone(),
-            readers: gids(&entry.readers),
-            writers: gids(&entry.writers),
-        }
-    }
 }
 
 /// Identity of an endpoint, padded to the length of the distribution.
@@ -232,40 +216,22 @@ mod tests {
         let node = graph.add_node("/", "n");
         let reader = graph.join(node, EndpointKind::Reader, guid(2));
         let writer = graph.join(node, EndpointKind::Writer, guid(3));
-        let entry = lock(&graph.nodes)[&node].clone();
-        let message = |gid_bytes| ParticipantEntitiesInfo {
-            gid: Gid::new(guid(1), gid_bytes),
-            nodes: vec![NodeEntitiesInfo::new(&entry, gid_bytes)],
-        };
-        let mut expected = vec![0, 1, 0, 0];
-        expected.extend([1; 16]);
-        expected.extend([
-            1, 0, 0, 0, 2, 0, 0, 0, b'/', 0, 0, 0, 2, 0, 0, 0, b'n', 0, 0, 0,
-        ]);
-        expected.extend([1, 0, 0, 0]);
-        expected.extend([2; 16]);
-        expected.extend([1, 0, 0, 0]);
-        expected.extend([3; 16]);
-        assert_eq!(cdr::to_vec(&message(16)).unwrap(), expected);
-        assert_eq!(
-            cdr::to_vec(&message(24)).unwrap().len(),
-            expected.len() + 3 * 8
-        );
+        let message = |gid_bytes| cdr::to_vec(&graph.message(guid(1), gid_bytes)).unwrap();
+        let one = [1, 0, 0, 0];
+        let slash = [2, 0, 0, 0, b'/', 0, 0, 0];
+        let name = [2, 0, 0, 0, b'n', 0, 0, 0];
+        let head = [&[0, 1, 0, 0][..], &[1; 16], &one, &slash, &name].concat();
+        let expected = [&head[..], &one, &[2; 16], &one, &[3; 16]].concat();
+        assert_eq!(message(16), expected);
+        assert_eq!(message(24).len(), expected.len() + 3 * 8);
         drop((reader, writer));
-        let entry = &lock(&graph.nodes)[&node];
+        let entry = &lock(&graph.nodes)[0];
         assert!(entry.readers.is_empty() && entry.writers.is_empty());
     }
 
     #[test]
     fn humble_has_longer_gids() {
-        let cases = [
-            (None, 16),
-            (Some("humble"), 24),
-            (Some("iron"), 16),
-            (Some("jazzy"), 16),
-        ];
-        for (distro, bytes) in cases {
-            assert_eq!(gid_bytes(distro), bytes, "{distro:?}");
-        }
+        let distros = [None, Some("humble"), Some("iron"), Some("jazzy")];
+        assert_eq!(distros.map(gid_bytes), [16, 24, 16, 16]);
     }
 }

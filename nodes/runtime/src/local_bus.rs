@@ -228,18 +228,12 @@ impl Drop for LocalEndpoint {
 impl Inner {
     fn count(&mut self) -> Counts {
         self.change = self.change.wrapping_add(1);
+        let publishers = self.publishers.iter().map(|p| Arc::clone(&p.peers));
+        let subscribers = self.subscribers.iter().map(|s| Arc::clone(&s.peers));
         Counts {
             change: self.change,
-            publishers: self
-                .publishers
-                .iter()
-                .map(|p| Arc::clone(&p.peers))
-                .collect(),
-            subscribers: self
-                .subscribers
-                .iter()
-                .map(|s| Arc::clone(&s.peers))
-                .collect(),
+            publishers: publishers.collect(),
+            subscribers: subscribers.collect(),
         }
     }
 
@@ -319,7 +313,7 @@ impl Inner {
 #[cfg(test)]
 mod tests {
     use lattice_msgs::std_msgs::{Header, String as RosString};
-    use smol::channel::bounded;
+    use smol::channel::{Receiver, bounded};
 
     use super::*;
 
@@ -327,37 +321,58 @@ mod tests {
         Arc::new(RosString { data: s.to_owned() })
     }
 
+    fn peers() -> Arc<Peers> {
+        Arc::new(Peers::new("/a", "peer", log::Level::Info))
+    }
+
     fn publisher(bus: &LocalBus, latch: usize) -> (LocalEndpoint, Arc<Peers>) {
-        let peers = Arc::new(Peers::of_publisher("/a"));
+        let peers = peers();
         let joined = bus.topic("/a").join_publisher::<RosString>(&peers, latch);
         (joined.unwrap(), peers)
     }
 
-    fn next(queue: &smol::channel::Receiver<AnyMessage>) -> Option<Arc<RosString>> {
-        queue.try_recv().ok()?.downcast::<RosString>().ok()
+    /// A subscriber with its queue, its peers and what it lost.
+    struct Subscriber {
+        endpoint: LocalEndpoint,
+        queue: Receiver<AnyMessage>,
+        peers: Arc<Peers>,
+        lost: Arc<AtomicU64>,
+    }
+
+    impl Subscriber {
+        fn new(bus: &LocalBus, depth: usize) -> Self {
+            let ((sender, queue), peers, lost) = (bounded(depth), peers(), Arc::default());
+            let topic = bus.topic("/a");
+            let joined =
+                topic.join_subscriber::<RosString>(&peers, sender, Arc::clone(&lost), true);
+            Self {
+                endpoint: joined.unwrap(),
+                queue,
+                peers,
+                lost,
+            }
+        }
+
+        fn next(&self) -> Option<Arc<RosString>> {
+            self.queue.try_recv().ok()?.downcast::<RosString>().ok()
+        }
     }
 
     #[test]
     fn the_same_message_arrives_and_counts_follow() {
         let bus = LocalBus::default();
         let (publisher, peers) = publisher(&bus, 0);
-        let (sender, queue) = bounded(2);
-        let lost = Arc::new(AtomicU64::new(0));
-        let theirs = Arc::new(Peers::of_subscription("/a"));
-        let subscriber = bus
-            .topic("/a")
-            .join_subscriber::<RosString>(&theirs, sender, lost.clone(), true)
-            .unwrap();
-        assert_eq!((peers.count(), theirs.count()), (1, 1));
+        let subscriber = Subscriber::new(&bus, 2);
+        assert_eq!((peers.count(), subscriber.peers.count()), (1, 1));
         let message = text("x");
         publisher.publish(&(message.clone() as _));
-        assert!(Arc::ptr_eq(&next(&queue).unwrap(), &message));
+        assert!(Arc::ptr_eq(&subscriber.next().unwrap(), &message));
         for s in ["1", "2", "3"] {
             publisher.publish(&(text(s) as _));
         }
-        assert_eq!(next(&queue).unwrap().data, "2", "the oldest gives way");
-        assert_eq!(lost.load(Relaxed), 1);
-        drop(subscriber);
+        assert_eq!(subscriber.next().unwrap().data, "2", "the oldest gives way");
+        assert_eq!(subscriber.lost.load(Relaxed), 1);
+        drop(subscriber.endpoint);
         assert_eq!(peers.count(), 0);
     }
 
@@ -368,22 +383,15 @@ mod tests {
         for s in ["1", "2", "3"] {
             publisher.publish(&(text(s) as _));
         }
-        let raw_peers = Arc::new(Peers::of_publisher("/a"));
         let raw = bus
             .topic("/a")
-            .join_raw_publisher(RosString::TYPE, &raw_peers, 1)
-            .unwrap();
+            .join_raw_publisher(RosString::TYPE, &peers(), 1);
+        let raw = raw.unwrap();
         raw.publish_cdr(&cdr::to_vec(&*text("raw")).unwrap().into())
             .unwrap();
-        let (sender, queue) = bounded(5);
-        let lost = Arc::new(AtomicU64::new(0));
-        let theirs = Arc::new(Peers::of_subscription("/a"));
-        let _subscriber =
-            bus.topic("/a")
-                .join_subscriber::<RosString>(&theirs, sender, lost.clone(), true);
-        let heard: Vec<_> = std::iter::from_fn(|| next(&queue))
-            .map(|m| m.data.clone())
-            .collect();
+        let subscriber = Subscriber::new(&bus, 5);
+        let heard = std::iter::from_fn(|| subscriber.next());
+        let heard: Vec<_> = heard.map(|m| m.data.clone()).collect();
         assert_eq!(heard, ["2", "3", "raw"]);
     }
 
@@ -391,9 +399,9 @@ mod tests {
     fn two_types_on_one_topic_are_refused() {
         let bus = LocalBus::default();
         let (publisher, peers) = publisher(&bus, 0);
-        let refused = bus.topic("/a").join_publisher::<Header>(&peers, 0);
-        assert!(matches!(refused, Err(RuntimeError::TypeMismatch { .. })));
+        let join = || bus.topic("/a").join_publisher::<Header>(&peers, 0);
+        assert!(matches!(join(), Err(RuntimeError::TypeMismatch { .. })));
         drop(publisher);
-        assert!(bus.topic("/a").join_publisher::<Header>(&peers, 0).is_ok());
+        assert!(join().is_ok());
     }
 }

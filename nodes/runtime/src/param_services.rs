@@ -4,6 +4,7 @@
 use std::collections::BTreeSet;
 use std::sync::Arc;
 
+use lattice_msgs::RosService;
 use lattice_msgs::rcl_interfaces::{
     DescribeParameters, DescribeParametersRequest, DescribeParametersResponse, GetParameterTypes,
     GetParameterTypesRequest, GetParameterTypesResponse, GetParameters, GetParametersRequest,
@@ -20,24 +21,24 @@ use super::service::Server;
 
 /// Serves the six parameter services of `node` for as long as the servers live.
 pub(crate) fn serve(node: &Node, params: &Arc<Params>) -> Result<Vec<Server>, RuntimeError> {
-    let with = || Arc::clone(params);
-    let (get, types, list, describe) = (with(), with(), with(), with());
     Ok(vec![
-        node.service::<GetParameters>("~/get_parameters", move |request| {
-            get_values(&get, &request)
-        })?,
-        node.service::<GetParameterTypes>("~/get_parameter_types", move |request| {
-            get_types(&types, &request)
-        })?,
-        node.service::<ListParameters>("~/list_parameters", move |request| {
-            list_names(&list, &request)
-        })?,
-        node.service::<DescribeParameters>("~/describe_parameters", move |request| {
-            describe_all(&describe, &request)
-        })?,
+        answer::<GetParameters>(node, "~/get_parameters", params, get_values)?,
+        answer::<GetParameterTypes>(node, "~/get_parameter_types", params, get_types)?,
+        answer::<ListParameters>(node, "~/list_parameters", params, list_names)?,
+        answer::<DescribeParameters>(node, "~/describe_parameters", params, describe_all)?,
         node.service::<SetParameters>("~/set_parameters", |request| refuse_each(&request))?,
         node.service::<SetParametersAtomically>("~/set_parameters_atomically", |_| refuse_all())?,
     ])
+}
+
+fn answer<S: RosService + 'static>(
+    node: &Node,
+    name: &str,
+    params: &Arc<Params>,
+    answer: fn(&Params, &S::Request) -> S::Response,
+) -> Result<Server, RuntimeError> {
+    let params = Arc::clone(params);
+    node.service::<S>(name, move |request| answer(&params, &request))
 }
 
 fn get_values(params: &Params, request: &GetParametersRequest) -> GetParametersResponse {
@@ -84,21 +85,15 @@ fn list_names(params: &Params, request: &ListParametersRequest) -> ListParameter
             Some(rest) => rest.strip_prefix('.').is_some_and(levels_allow),
             None => false,
         };
-        if request.prefixes.is_empty() {
-            levels_allow(name)
-        } else {
-            request.prefixes.iter().any(below)
+        match request.prefixes.is_empty() {
+            true => levels_allow(name),
+            false => request.prefixes.iter().any(below),
         }
     };
-    let names: Vec<String> = params
-        .declared()
-        .into_keys()
-        .filter(|name| wanted(name))
-        .collect();
-    let prefixes: BTreeSet<String> = names
-        .iter()
-        .filter_map(|name| Some(name.rsplit_once('.')?.0.to_owned()))
-        .collect();
+    let mut names: Vec<String> = params.declared().into_keys().collect();
+    names.retain(|name| wanted(name));
+    let prefix = |name: &String| Some(name.rsplit_once('.')?.0.to_owned());
+    let prefixes: BTreeSet<String> = names.iter().filter_map(prefix).collect();
     ListParametersResponse {
         result: ListParametersResult {
             names,
@@ -170,38 +165,33 @@ mod tests {
 
     #[test]
     fn values_and_types_are_given() {
-        let names: Vec<String> = ["lattice", "cell_volume_m3", "none"]
-            .map(str::to_owned)
-            .into();
+        let names = || ["lattice", "cell_volume_m3", "none"].map(str::to_owned);
         let request = GetParametersRequest {
-            names: names.clone(),
+            names: names().into(),
         };
         let values = get_values(&params(), &request).values;
         assert_eq!(values[0].string_value, "fcc");
         assert_eq!(values[1].double_value, 0.125);
         assert_eq!(values[2], ParameterValue::default());
         let request = GetParameterTypesRequest {
-            names: names.clone(),
+            names: names().into(),
         };
         assert_eq!(get_types(&params(), &request).types.as_slice(), [4, 3, 0]);
+        let names = names().into();
         let descriptors = describe_all(&params(), &DescribeParametersRequest { names }).descriptors;
         assert!(descriptors[0].read_only && descriptors[2].type_ == 0);
     }
 
     #[test]
     fn lists_follow_prefix_and_depth() {
-        assert_eq!(
-            list(&[], 0).names,
-            ["cell_volume_m3", "lattice", "qos.map.depth"]
-        );
+        let all = ["cell_volume_m3", "lattice", "qos.map.depth"];
+        assert_eq!(list(&[], 0).names, all);
         assert_eq!(list(&[], 0).prefixes, ["qos.map"]);
         assert_eq!(list(&[], 1).names, ["cell_volume_m3", "lattice"]);
         assert_eq!(list(&["qos"], 0).names, ["qos.map.depth"]);
         assert_eq!(list(&["qos"], 1).names, [""; 0]);
-        assert_eq!(
-            list(&["qos.map", "lattice"], 1).names,
-            ["lattice", "qos.map.depth"]
-        );
+        let both = list(&["qos.map", "lattice"], 1);
+        assert_eq!(both.names, ["lattice", "qos.map.depth"]);
         assert_eq!(list(&["latt"], 0).names, [""; 0]);
     }
 

@@ -33,27 +33,8 @@ struct State {
 }
 
 impl Peers {
-    /// For a publisher, whose peers are subscribers.
-    pub(crate) fn of_publisher(topic: &str) -> Self {
-        Self::new(topic, "subscriber", log::Level::Info)
-    }
-
-    /// For a subscription, whose peers are publishers.
-    pub(crate) fn of_subscription(topic: &str) -> Self {
-        Self::new(topic, "publisher", log::Level::Info)
-    }
-
-    /// For the requests of a server, whose peers are clients.
-    pub(crate) fn of_server(service: &str) -> Self {
-        Self::new(service, "client", log::Level::Debug)
-    }
-
-    /// For the replies of a server, whose peers are the other ends of clients.
-    pub(crate) fn of_replies(service: &str) -> Self {
-        Self::new(service, "reply reader", log::Level::Debug)
-    }
-
-    fn new(topic: &str, peer_kind: &'static str, joins: log::Level) -> Self {
+    /// Of an endpoint whose peers are called so; those of services are told of at `Debug` only.
+    pub(crate) fn new(topic: &str, peer_kind: &'static str, joins: log::Level) -> Self {
         Self {
             topic: topic.to_owned(),
             peer_kind,
@@ -149,22 +130,17 @@ impl Peers {
         }
         if state.warned.insert(policy) {
             drop(state);
+            let (topic, kind) = (&self.topic, self.peer_kind);
             log::warn!(
-                "{}: a {} is not heard because of its QoS: {policy}; set qos.{}.* or the other side's QoS",
-                self.topic,
-                self.peer_kind,
-                self.topic,
+                "{topic}: a {kind} is not heard because of its QoS: {policy}; set qos.{topic}.* or \
+                 the other side's QoS"
             );
         }
     }
 
     fn joined(&self, count: usize) {
-        log::log!(
-            self.joins,
-            "{}: {} matched ({count})",
-            self.topic,
-            self.peer_kind
-        );
+        let (topic, kind) = (&self.topic, self.peer_kind);
+        log::log!(self.joins, "{topic}: {kind} matched ({count})");
         self.joined.notify();
         // A callback may register another: not called under the lock.
         let callbacks = lock(&self.on_joined).clone();
@@ -189,7 +165,7 @@ mod tests {
 
     #[test]
     fn joins_are_counted_and_called_once() {
-        let peers = Peers::of_publisher("/map");
+        let peers = Peers::new("/map", "subscriber", log::Level::Info);
         let calls = Arc::new(AtomicUsize::new(0));
         peers.add(peer(1));
         let seen = Arc::clone(&calls);
@@ -209,7 +185,7 @@ mod tests {
 
     #[test]
     fn a_count_that_comes_late_is_not_believed() {
-        let peers = Peers::of_publisher("/map");
+        let peers = Peers::new("/map", "subscriber", log::Level::Info);
         peers.set_local(2, 2);
         peers.set_local(1, 1);
         assert_eq!(peers.count(), 2);
@@ -217,7 +193,7 @@ mod tests {
 
     #[test]
     fn each_who_waits_for_a_peer_hears_of_it() {
-        let peers = Peers::of_replies("/save_map");
+        let peers = Peers::new("/save_map", "reply reader", log::Level::Debug);
         let mut first = Box::pin(peers.known(|p| *p == peer(1)));
         let mut second = Box::pin(peers.known(|p| *p == peer(2)));
         assert!((&mut first).now_or_never().is_none());
@@ -229,7 +205,7 @@ mod tests {
 
     #[test]
     fn a_callback_may_register_another() {
-        let peers = Arc::new(Peers::of_publisher("/map"));
+        let peers = Arc::new(Peers::new("/map", "subscriber", log::Level::Info));
         let again = Arc::clone(&peers);
         peers.on_joined(Box::new(move || again.on_joined(Box::new(|| {}))));
         peers.add(peer(1));
@@ -238,7 +214,7 @@ mod tests {
 
     #[test]
     fn incompatible_peers_are_counted_until_they_go() {
-        let peers = Peers::of_subscription("/points");
+        let peers = Peers::new("/points", "publisher", log::Level::Info);
         peers.incompatible(peer(1), "reliability");
         peers.incompatible(peer(1), "reliability");
         assert_eq!(peers.incompatible_count(), 1);

@@ -63,7 +63,7 @@ impl Runtime {
             _rosout: None,
         };
         runtime.publish_diagnostics()?;
-        if runtime.args.rosout_logs {
+        if !runtime.args.no_rosout_logs {
             runtime._rosout = Some(runtime.publish_log()?);
         }
         Ok(runtime)

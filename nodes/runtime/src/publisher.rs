@@ -88,8 +88,8 @@ impl PublisherParts {
 
 /// Publishes messages of one type on one topic. Clones share the publisher.
 pub struct Publisher<M> {
-    parts: Arc<PublisherParts>,
-    message: PhantomData<fn(M)>,
+    pub(crate) parts: Arc<PublisherParts>,
+    pub(crate) message: PhantomData<fn(M)>,
 }
 
 impl<M> Clone for Publisher<M> {
@@ -102,13 +102,6 @@ impl<M> Clone for Publisher<M> {
 }
 
 impl<M: RosMessage> Publisher<M> {
-    pub(crate) fn new(parts: Arc<PublisherParts>) -> Self {
-        Self {
-            parts,
-            message: PhantomData,
-        }
-    }
-
     /// Publishes a message; returns at once.
     ///
     /// Subscriptions in this runtime get the same `Arc`. For others it is queued, to be serialized
@@ -124,14 +117,10 @@ impl<M: RosMessage> Publisher<M> {
 /// Publishes messages that are CDR bytes already, as a bag player has them.
 #[derive(Clone)]
 pub struct RawPublisher {
-    parts: Arc<PublisherParts>,
+    pub(crate) parts: Arc<PublisherParts>,
 }
 
 impl RawPublisher {
-    pub(crate) fn new(parts: Arc<PublisherParts>) -> Self {
-        Self { parts }
-    }
-
     /// Publishes a message of plain little-endian CDR, encapsulation header included, as it is.
     ///
     /// Waits while the queue is full, so nothing is lost on this side; a request to shut down ends the
@@ -146,18 +135,15 @@ impl RawPublisher {
             });
         }
         if let Err(error) = self.parts.local.publish_cdr(&body) {
-            log::warn!(
-                "{}: message not given to this process: {error}",
-                self.topic()
-            );
+            let topic = self.topic();
+            log::warn!("{topic}: message not given to this process: {error}");
         }
         if self.parts.latch.is_none() && self.parts.peers.remote() == 0 {
             return Ok(());
         }
         let body = body.split_off(ENCAPSULATION_BYTES);
-        self.parts
-            .writer
-            .send_body_blocking(body, &self.parts.shutdown)
+        let shutdown = &self.parts.shutdown;
+        self.parts.writer.send_body_blocking(body, shutdown)
     }
 }
 

@@ -3,7 +3,7 @@
 use crate::params::{ParamError, Params};
 
 /// Deepest history a parameter may ask for, samples.
-pub const DEPTH_MAX: usize = 10_000;
+const DEPTH_MAX: usize = 10_000;
 
 /// Reliability: samples that were lost are sent again, or not.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, Hash)]
@@ -106,98 +106,49 @@ impl Qos {
         resolved_topic: &str,
         relative_topic: &str,
     ) -> Result<Qos, ParamError> {
-        let keys = Keys {
-            params,
-            resolved_topic,
-            relative_topic,
-        };
-        let reliability = keys.choose(
-            "reliability",
-            self.reliability,
-            &[
-                ("best_effort", Reliability::BestEffort),
-                ("reliable", Reliability::Reliable),
-            ],
-        )?;
-        let durability = keys.choose(
-            "durability",
-            self.durability,
-            &[
-                ("volatile", Durability::Volatile),
-                ("transient_local", Durability::TransientLocal),
-            ],
-        )?;
-        Ok(Qos {
-            reliability,
-            durability,
-            depth: keys.depth(self.depth)?,
-        })
-    }
-}
-
-/// The two names of a topic's parameters.
-struct Keys<'a> {
-    params: &'a Params,
-    resolved_topic: &'a str,
-    relative_topic: &'a str,
-}
-
-impl Keys<'_> {
-    /// Reads a quality by the relative name, then by the full name if that is given.
-    fn each<T>(
-        &self,
-        quality: &str,
-        default: T,
-        read: impl Fn(&str, T) -> Result<T, ParamError>,
-    ) -> Result<T, ParamError> {
-        let relative = format!("qos.{}.{quality}", self.relative_topic);
-        let full = format!("qos.{}.{quality}", self.resolved_topic);
-        let value = read(&relative, default)?;
-        if self.params.is_given(&full) {
-            read(&full, value)
-        } else {
-            Ok(value)
+        let mut qos = self;
+        for (topic, always) in [(relative_topic, true), (resolved_topic, false)] {
+            let key = |quality: &str| {
+                let key = format!("qos.{topic}.{quality}");
+                (always || params.is_given(&key)).then_some(key)
+            };
+            if let Some(key) = key("reliability") {
+                qos.reliability = choose(params, &key, qos.reliability, RELIABILITIES)?;
+            }
+            if let Some(key) = key("durability") {
+                qos.durability = choose(params, &key, qos.durability, DURABILITIES)?;
+            }
+            if let Some(key) = key("depth") {
+                qos.depth = params.usize_in(&key, qos.depth, 1..=DEPTH_MAX)?;
+            }
         }
+        Ok(qos)
     }
+}
 
-    fn choose<T: Copy + PartialEq>(
-        &self,
-        quality: &str,
-        default: T,
-        choices: &[(&str, T)],
-    ) -> Result<T, ParamError> {
-        self.each(quality, default, |key, default| {
-            let word = choices
-                .iter()
-                .find(|(_, value)| *value == default)
-                .map_or("", |(w, _)| w);
-            let word = self.params.string(key, word)?;
-            choices
-                .iter()
-                .find(|(choice, _)| *choice == word)
-                .map(|(_, value)| *value)
-                .ok_or_else(|| {
-                    let words: Vec<&str> = choices.iter().map(|(word, _)| *word).collect();
-                    self.params
-                        .invalid(key, format!("expected {}", words.join(" or ")))
-                })
-        })
-    }
+const RELIABILITIES: [(&str, Reliability); 2] = [
+    ("best_effort", Reliability::BestEffort),
+    ("reliable", Reliability::Reliable),
+];
+const DURABILITIES: [(&str, Durability); 2] = [
+    ("volatile", Durability::Volatile),
+    ("transient_local", Durability::TransientLocal),
+];
 
-    fn depth(&self, default: usize) -> Result<usize, ParamError> {
-        self.each("depth", default, |key, default| {
-            let depth = self
-                .params
-                .i64(key, i64::try_from(default).unwrap_or(i64::MAX))?;
-            usize::try_from(depth)
-                .ok()
-                .filter(|depth| (1..=DEPTH_MAX).contains(depth))
-                .ok_or_else(|| {
-                    self.params
-                        .invalid(key, format!("expected a number from 1 to {DEPTH_MAX}"))
-                })
-        })
-    }
+/// One of two words, whose default is a value.
+fn choose<T: Copy + PartialEq>(
+    params: &Params,
+    key: &str,
+    default: T,
+    choices: [(&str, T); 2],
+) -> Result<T, ParamError> {
+    let default = choices.iter().find(|(_, value)| *value == default);
+    let word = params.string(key, default.map_or("", |(word, _)| word))?;
+    let chosen = choices.iter().find(|(choice, _)| *choice == word);
+    chosen.map(|(_, value)| *value).ok_or_else(|| {
+        let [(first, _), (second, _)] = choices;
+        params.invalid(key, format!("expected {first} or {second}"))
+    })
 }
 
 #[cfg(test)]
@@ -206,13 +157,9 @@ mod tests {
     use crate::params::ParamValue;
 
     fn params(values: &[(&str, &str)]) -> Params {
-        let read = |(name, text): &(&str, &str)| {
-            (
-                (*name).to_owned(),
-                ParamValue::from_yaml_text(text).unwrap(),
-            )
-        };
-        Params::from_values("/robot/mapper", values.iter().map(read))
+        let read = |text| ParamValue::from_yaml_text(text).unwrap();
+        let values = values.iter().map(|(name, text)| (*name, read(text)));
+        Params::from_values("/robot/mapper", values)
     }
 
     fn map_qos(values: &[(&str, &str)]) -> Result<Qos, ParamError> {
@@ -220,38 +167,23 @@ mod tests {
     }
 
     #[test]
-    fn nothing_given_changes_nothing() {
-        for qos in [Qos::SCANS, Qos::MAP, Qos::TF_STATIC, Qos::CLOCK] {
-            assert_eq!(
-                qos.with_overrides(&params(&[]), "/robot/map", "map")
-                    .unwrap(),
-                qos
-            );
-        }
-    }
-
-    #[test]
     fn both_names_count_and_the_full_one_wins() {
         let relative = ("qos.map.depth", "7");
         let full = ("qos./robot/map.depth", "8");
+        assert_eq!(map_qos(&[]).unwrap(), Qos::MAP);
         assert_eq!(map_qos(&[relative]).unwrap().depth, 7);
         assert_eq!(map_qos(&[full]).unwrap().depth, 8);
         assert_eq!(map_qos(&[relative, full]).unwrap().depth, 8);
-        let qos = map_qos(&[
-            ("qos.map.reliability", "best_effort"),
-            ("qos.map.durability", "volatile"),
-        ]);
+        let reliability = ("qos.map.reliability", "best_effort");
+        let qos = map_qos(&[reliability, ("qos.map.durability", "volatile")]);
         assert_eq!(qos.unwrap(), Qos::best_effort(Qos::MAP.depth));
     }
 
     #[test]
     fn overrides_are_declared_and_so_not_unused() {
-        let params = params(&[
-            ("qos.map.depth", "7"),
-            ("qos./robot/map.depth", "8"),
-            ("qos.mop.depth", "9"),
-        ]);
-        let _ = Qos::MAP
+        let names = ["qos.map.depth", "qos./robot/map.depth", "qos.mop.depth"];
+        let params = params(&names.map(|name| (name, "7")));
+        Qos::MAP
             .with_overrides(&params, "/robot/map", "map")
             .unwrap();
         assert_eq!(params.unused(), ["qos.mop.depth"]);
@@ -260,13 +192,10 @@ mod tests {
 
     #[test]
     fn wrong_values_say_what_is_expected() {
+        let full = "qos./robot/map.durability";
         for (name, value, part) in [
             ("qos.map.reliability", "maybe", "best_effort or reliable"),
-            (
-                "qos./robot/map.durability",
-                "latched",
-                "volatile or transient_local",
-            ),
+            (full, "latched", "volatile or transient_local"),
             ("qos.map.depth", "0", "1 to 10000"),
             ("qos.map.depth", "-1", "1 to 10000"),
             ("qos.map.depth", "10001", "1 to 10000"),
@@ -274,10 +203,7 @@ mod tests {
             ("qos.map.reliability", "1", "a text"),
         ] {
             let error = map_qos(&[(name, value)]).unwrap_err().to_string();
-            assert!(
-                error.contains(part) && error.contains(name),
-                "{name}: {error}"
-            );
+            assert!(error.contains(part) && error.contains(name), "{error}");
         }
     }
 }

@@ -67,12 +67,7 @@ fn message(record: &Record<'_>, node: &str) -> Log {
         .duration_since(UNIX_EPOCH)
         .unwrap_or_default();
     let mut msg = record.args().to_string();
-    if let Some((end, _)) = msg
-        .char_indices()
-        .find(|(i, c)| i + c.len_utf8() > MAX_TEXT_BYTES)
-    {
-        msg.truncate(end);
-    }
+    msg.truncate(msg.floor_char_boundary(MAX_TEXT_BYTES));
     Log {
         stamp: Time::from_ns(i64::try_from(elapsed.as_nanos()).unwrap_or(i64::MAX)),
         level: match record.level() {
@@ -96,42 +91,30 @@ mod tests {
     #[test]
     fn records_become_messages_and_long_ones_are_cut() {
         let long = "ä".repeat(MAX_TEXT_BYTES);
-        let heard = message(
-            &Record::builder()
-                .level(Level::Warn)
-                .args(format_args!("{long}"))
-                .line(Some(7))
-                .build(),
-            "mapper",
-        );
-        assert_eq!(
-            (heard.level, heard.line, heard.name.as_str()),
-            (Log::WARN, 7, "mapper")
-        );
+        let mut record = Record::builder();
+        record.level(Level::Warn).line(Some(7));
+        let heard = message(&record.args(format_args!("{long}")).build(), "mapper");
+        assert_eq!((heard.level, heard.line), (Log::WARN, 7));
+        assert_eq!(heard.name, "mapper");
         assert_eq!(heard.msg.len(), MAX_TEXT_BYTES);
         assert!(heard.stamp.to_ns() > 0);
     }
 
     #[test]
     fn the_oldest_record_gives_way_and_a_listener_that_went_is_forgotten() {
+        const NAME: &str = "a test of rosout";
         let (listener, receiver) = listen();
         for i in 0..=QUEUE_RECORDS {
-            hear(
-                &Record::builder().args(format_args!("{i}")).build(),
-                "a test of rosout",
-            );
+            hear(&Record::builder().args(format_args!("{i}")).build(), NAME);
         }
-        let texts: Vec<_> = std::iter::from_fn(|| receiver.try_recv().ok())
-            .filter(|log| log.name == "a test of rosout")
-            .map(|log| log.msg)
-            .collect();
+        let logs = std::iter::from_fn(|| receiver.try_recv().ok());
+        let logs = logs.filter(|log| log.name == NAME);
+        let texts: Vec<_> = logs.map(|log| log.msg).collect();
         assert_eq!(texts.last(), Some(&QUEUE_RECORDS.to_string()));
         assert!(!texts.contains(&"0".to_owned()));
         drop(listener);
-        hear(
-            &Record::builder().args(format_args!("nobody")).build(),
-            "a test of rosout",
-        );
+        let nobody = format_args!("nobody");
+        hear(&Record::builder().args(nobody).build(), NAME);
         assert!(receiver.is_closed());
     }
 }

@@ -1,14 +1,14 @@
 //! Locks and waiting, shared by all modules.
 
 use std::sync::{Mutex, MutexGuard, PoisonError};
-use std::time::Duration;
+use std::time::Instant;
 
 use smol::Timer;
 use smol::channel::{Receiver, Sender, bounded};
 use smol::future::or;
 
 /// Locks, poisoned or not: what is protected here is valid at every step.
-pub(crate) fn lock<T: ?Sized>(mutex: &Mutex<T>) -> MutexGuard<'_, T> {
+pub fn lock<T: ?Sized>(mutex: &Mutex<T>) -> MutexGuard<'_, T> {
     mutex.lock().unwrap_or_else(PoisonError::into_inner)
 }
 
@@ -49,9 +49,9 @@ impl Changed {
 }
 
 /// Waits until all senders of a channel are dropped. False: not in time.
-pub(crate) fn wait_for(dropped: &Receiver<()>, patience: Duration) -> bool {
+pub(crate) fn wait_for(dropped: &Receiver<()>, deadline: Instant) -> bool {
     let late = async {
-        Timer::after(patience).await;
+        Timer::at(deadline).await;
         false
     };
     smol::block_on(or(async { dropped.recv().await.is_err() }, late))
@@ -78,10 +78,7 @@ mod tests {
         assert_eq!(second.now_or_never(), Some(1));
         drop(first);
         drop(changed.register());
-        assert_eq!(
-            lock(&changed.waiting).len(),
-            1,
-            "those that went are forgotten"
-        );
+        let waiting = lock(&changed.waiting).len();
+        assert_eq!(waiting, 1, "those that went are forgotten");
     }
 }

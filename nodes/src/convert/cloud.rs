@@ -20,22 +20,19 @@ pub enum Precision {
 
 /// The layout that a message declares. Nothing is believed until [`CloudLayout::view`].
 pub fn layout_of(cloud: &PointCloud2) -> CloudLayout {
+    let field = |field: &sensor_msgs::PointField| PointField {
+        name: field.name.clone(),
+        offset: field.offset,
+        datatype: field.datatype,
+        count: field.count,
+    };
     CloudLayout {
         width: cloud.width,
         height: cloud.height,
         point_step: cloud.point_step,
         row_step: cloud.row_step,
         is_bigendian: cloud.is_bigendian,
-        fields: cloud
-            .fields
-            .iter()
-            .map(|field| PointField {
-                name: field.name.clone(),
-                offset: field.offset,
-                datatype: field.datatype,
-                count: field.count,
-            })
-            .collect(),
+        fields: cloud.fields.iter().map(field).collect(),
     }
 }
 
@@ -119,16 +116,20 @@ pub fn dense_cloud(
 
 /// Fields `x`, `y`, `z` one behind the other.
 pub fn xyz_fields(datatype: u8, size: u32) -> Vec<sensor_msgs::PointField> {
-    ["x", "y", "z"]
-        .into_iter()
-        .zip(0..)
-        .map(|(name, i)| sensor_msgs::PointField {
-            name: name.to_owned(),
-            offset: i * size,
-            datatype,
-            count: 1,
-        })
-        .collect()
+    let places = [("x", 0), ("y", size), ("z", 2 * size)];
+    places
+        .map(|(name, offset)| field(name, offset, datatype))
+        .into()
+}
+
+/// A field of one element.
+pub fn field(name: &str, offset: u32, datatype: u8) -> sensor_msgs::PointField {
+    sensor_msgs::PointField {
+        name: name.to_owned(),
+        offset,
+        datatype,
+        count: 1,
+    }
 }
 
 /// A cloud that is already in the map frame, as f32 offsets from a datum.
@@ -144,29 +145,20 @@ pub fn cloud_from_message(
     let layout = layout_of(cloud);
     let view = layout.view(&cloud.data, limits)?;
     let points = (0..view.len()).map(|i| view.xyz(i));
-    let wide = cloud
-        .fields
-        .iter()
-        .any(|field| field.name == "x" && field.datatype == sensor_msgs::PointField::FLOAT64);
-    let datum_m = match wide {
-        true => points
-            .clone()
-            .filter(|p| p.iter().all(|v| v.is_finite()))
-            .min_by(|a, b| {
-                let distances = [a, b].map(|p| (p - near_m).norm_squared());
-                distances[0].total_cmp(&distances[1])
-            })
-            .map_or_else(Vector3::zeros, |p| {
-                p.map(|v| (v / DATUM_TILE_M).round() * DATUM_TILE_M)
-            }),
-        false => Vector3::zeros(),
-    };
-    let offsets_m = points
-        .map(|p| {
-            let offset = p - datum_m;
-            [offset.x as f32, offset.y as f32, offset.z as f32]
-        })
-        .collect();
+    let is_double = sensor_msgs::PointField::FLOAT64;
+    let mut fields = cloud.fields.iter();
+    let wide = fields.any(|field| field.name == "x" && field.datatype == is_double);
+    let finite = points
+        .clone()
+        .filter(|p| wide && p.iter().all(|v| v.is_finite()));
+    let nearest = finite.min_by(|a, b| {
+        let [a, b] = [a, b].map(|p| (p - near_m).norm_squared());
+        a.total_cmp(&b)
+    });
+    let tile = |v: f64| (v / DATUM_TILE_M).round() * DATUM_TILE_M;
+    let datum_m = nearest.map_or_else(Vector3::zeros, |p| p.map(tile));
+    let offset = |p: Vector3<f64>| -> [f32; 3] { (p - datum_m).map(|v| v as f32).into() };
+    let offsets_m = points.map(offset).collect();
     Ok(Cloud {
         stamp_ns: cloud.header.stamp.to_ns(),
         datum_m,

@@ -1,4 +1,6 @@
-//! Counters of the transformer: clouds, points, poses, transforms.
+//! Counters of the transformer, and its report at the end.
+
+use std::collections::BTreeMap;
 
 use serde::{Deserialize, Serialize};
 
@@ -48,17 +50,37 @@ pub struct TransformerCounts {
     pub transforms_refused: u64,
 }
 
-impl TransformerCounts {
-    /// Dropped clouds by reason.
-    pub fn reasons(&self) -> [(&'static str, u64); 7] {
-        [
-            ("malformed", self.clouds_malformed),
-            ("before_poses", self.clouds_before_poses),
-            ("pose_gap", self.clouds_pose_gap),
-            ("pose_late", self.clouds_pose_late),
-            ("no_mount", self.clouds_no_mount),
-            ("queue_full", self.clouds_queue_full),
-            ("time_jump", self.clouds_time_jump),
-        ]
+/// The end of an `enu_transformer`.
+#[derive(Clone, Debug, Default, PartialEq, Serialize, Deserialize)]
+pub struct TransformerReport {
+    /// Everything counted by the state machine.
+    pub counts: TransformerCounts,
+    /// Clouds that were sent and lost on the way, or that found the inbox full.
+    pub clouds_inbox_full: u64,
+    /// Samples that did not decode.
+    pub undecodable: u64,
+    /// Clouds that could not be given to the publisher.
+    pub clouds_not_published: u64,
+}
+
+impl TransformerReport {
+    /// Clouds lost by reason, zeros left out.
+    pub fn dropped(&self) -> BTreeMap<String, u64> {
+        let counts = &self.counts;
+        let reasons = [
+            ("malformed", counts.clouds_malformed),
+            ("before_poses", counts.clouds_before_poses),
+            ("pose_gap", counts.clouds_pose_gap),
+            ("pose_late", counts.clouds_pose_late),
+            ("no_mount", counts.clouds_no_mount),
+            ("queue_full", counts.clouds_queue_full),
+            ("time_jump", counts.clouds_time_jump),
+            ("inbox_full", self.clouds_inbox_full),
+            ("undecodable", self.undecodable),
+            ("not_published", self.clouds_not_published),
+        ];
+        let lost = reasons.into_iter().filter(|(_, count)| *count > 0);
+        lost.map(|(reason, count)| (reason.to_owned(), count))
+            .collect()
     }
 }

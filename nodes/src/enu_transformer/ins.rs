@@ -68,11 +68,8 @@ impl FromStr for InsSource {
     fn from_str(text: &str) -> Result<Self, String> {
         let found = Self::ALL.iter().find(|(_, name)| *name == text);
         found.map(|(source, _)| *source).ok_or_else(|| {
-            let names: Vec<&str> = Self::ALL.iter().map(|(_, name)| *name).collect();
-            format!(
-                "'{text}' is not a source, expected one of {}",
-                names.join(", ")
-            )
+            let names = Self::ALL.map(|(_, name)| name).join(", ");
+            format!("'{text}' is not a source, expected one of {names}")
         })
     }
 }
@@ -199,11 +196,10 @@ impl InsDecoder {
             InsMessage::Odometry(m)
                 if m.child_frame_id.trim_start_matches('/') == self.options.base_frame =>
             {
-                let map_from_base =
-                    geometry::isometry_from_pose(&m.pose.pose).ok_or(InsRefusal::Invalid)?;
+                let pose = geometry::isometry_from_pose(&m.pose.pose);
                 Ok(vec![StampedPose {
                     stamp_ns: m.header.stamp.to_ns(),
-                    map_from_base,
+                    map_from_base: pose.ok_or(InsRefusal::Invalid)?,
                 }])
             }
             InsMessage::Odometry(m) => self.pose_in_map(&m.header, &m.pose.pose),
@@ -237,13 +233,11 @@ impl InsDecoder {
     }
 
     fn stamped(&self, stamp_ns: i64, map_from_ins: &Isometry3<f64>) -> StampedPose {
-        let position_m = map_from_ins.translation.vector;
+        let (position, rotation) = (&map_from_ins.translation, &map_from_ins.rotation);
+        let mount = &self.options.mount;
         StampedPose {
             stamp_ns,
-            map_from_base: self
-                .options
-                .mount
-                .map_from_base(&position_m, &map_from_ins.rotation),
+            map_from_base: mount.map_from_base(&position.vector, rotation),
         }
     }
 

@@ -6,13 +6,11 @@ mod counts;
 pub mod ins;
 pub mod node;
 mod options;
-mod report;
 mod transforms;
 mod waiting;
 
-pub use counts::TransformerCounts;
+pub use counts::{TransformerCounts, TransformerReport};
 pub use options::TransformerOptions;
-pub use report::TransformerReport;
 
 use std::sync::Arc;
 
@@ -256,10 +254,9 @@ impl EnuTransformer {
     fn verdict(&self, cloud: &WaitingCloud, now_ns: i64) -> Verdict {
         let wait = |reason| {
             let waited_s = now_ns.saturating_sub(cloud.arrived_ns) as f64 * 1e-9;
-            if waited_s > self.options.max_wait_s {
-                Verdict::Drop(reason)
-            } else {
-                Verdict::Wait
+            match waited_s > self.options.max_wait_s {
+                true => Verdict::Drop(reason),
+                false => Verdict::Wait,
             }
         };
         for stamp_ns in [cloud.first_ns, cloud.last_ns] {
@@ -291,10 +288,8 @@ impl EnuTransformer {
             .map_err(|_| Drop::Malformed)?;
         let map_from_sensor = |stamp_ns: i64| -> Result<Isometry3<f64>, Drop> {
             let map_from_base = self.poses.at(stamp_ns).map_err(|_| Drop::PoseGap)?;
-            let base_from_sensor = self
-                .mount(&waiting.frame, stamp_ns)
-                .map_err(|_| Drop::NoMount)?;
-            Ok(map_from_base * base_from_sensor)
+            let mount = self.mount(&waiting.frame, stamp_ns);
+            Ok(map_from_base * mount.map_err(|_| Drop::NoMount)?)
         };
         let range = RangeLimits {
             min_range_m: self.options.min_range_m,
@@ -312,10 +307,7 @@ impl EnuTransformer {
         let seen_from = |i: usize| {
             let times = times.and_then(|times| times.get(i).copied());
             let pose = map_from_sensor(times.unwrap_or(waiting.stamp_ns));
-            pose.map_or_else(
-                |_| Vector3::repeat(f64::NAN),
-                |pose| pose.translation.vector,
-            )
+            pose.map_or(Vector3::repeat(f64::NAN), |pose| pose.translation.vector)
         };
         if self.options.viewpoints {
             fields.extend(viewpoint::viewpoint_fields(precision));
@@ -324,9 +316,9 @@ impl EnuTransformer {
         let mut kept = (0..view.len()).filter(|i| left_out.next_if_eq(i).is_none());
         let append = |_, data: &mut Vec<u8>| {
             let i = kept.next().unwrap_or(view.len());
-            passed
-                .iter()
-                .for_each(|field| view.copy_field(field, i, data));
+            for field in &passed {
+                view.copy_field(field, i, data);
+            }
             if self.options.viewpoints {
                 viewpoint::append_viewpoint(&seen_from(i), precision, data);
             }

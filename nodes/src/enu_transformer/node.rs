@@ -71,13 +71,7 @@ pub fn start(runtime: &Runtime, name: &str) -> Result<Finish, NodeError> {
     let mut clouds = Vec::new();
     let mut inputs = subscribe_ins(&node, source, &inbox)?;
     for topic in params.string_array("points_topics", &["points"])? {
-        let (inbox, lost) = (inbox.clone(), Arc::clone(&lost));
-        let hand_over = move |cloud: Arc<PointCloud2>| {
-            let bytes = cloud::bytes_of(&cloud);
-            if !inbox.send(Event::Cloud(cloud), bytes) {
-                lost.fetch_add(1, Ordering::Relaxed);
-            }
-        };
+        let hand_over = inbox.counting(&lost, Event::Cloud, |cloud| cloud::bytes_of(cloud));
         clouds.push(node.subscribe(&topic, Qos::SCANS, Load::Large, hand_over)?);
     }
     let transforms = |m| Event::Transforms(m, false);
@@ -114,10 +108,8 @@ fn subscribe_ins(
         InsSource::Pose => subscribe(node, &topic, Qos::INS, inbox, Event::Pose),
         InsSource::NavsatfixImu => {
             let fix = subscribe(node, &topic, Qos::INS, inbox, Event::Fix)?;
-            return Ok(vec![
-                fix,
-                subscribe(node, &imu, Qos::INS, inbox, Event::Imu)?,
-            ]);
+            let imu = subscribe(node, &imu, Qos::INS, inbox, Event::Imu)?;
+            return Ok(vec![fix, imu]);
         }
     };
     Ok(vec![ins?])
@@ -236,10 +228,8 @@ impl Shell {
             (Level::Ok, "transforming".to_owned())
         } else {
             let reasons: Vec<String> = dropped.iter().map(|(r, n)| format!("{n} {r}")).collect();
-            (
-                Level::Warn,
-                format!("clouds dropped: {}", reasons.join(", ")),
-            )
+            let reasons = reasons.join(", ");
+            (Level::Warn, format!("clouds dropped: {reasons}"))
         };
         let mut values = report::key_values(&report);
         values.push(("clouds_waiting".into(), self.machine.waiting().to_string()));
@@ -253,13 +243,9 @@ impl Shell {
             undecodable,
             ..self.report()
         };
-        let counts = &report.counts;
-        log::info!(
-            "{} clouds in, {} out, dropped: {:?}",
-            counts.clouds_in,
-            counts.clouds_out,
-            report.dropped()
-        );
+        let (clouds_in, clouds_out) = (report.counts.clouds_in, report.counts.clouds_out);
+        let dropped = report.dropped();
+        log::info!("{clouds_in} clouds in, {clouds_out} out, dropped: {dropped:?}");
         self.outputs.points.flush(Duration::from_secs(2));
         if let Err(error) = report::write(&self.report_file, &report) {
             log::error!("{}: {error}", self.report_file);

@@ -112,8 +112,8 @@ impl TransformerOptions {
             false => Some(frame(params, "odom_frame", "")?),
         };
         options.publish_tf = params.bool("publish_tf", options.publish_tf)?;
-        options.min_range_m = positive(params, "min_range_m", 0.0)?;
-        let max_range_m = positive(params, "max_range_m", 0.0)?;
+        options.min_range_m = not_negative(params, "min_range_m", 0.0)?;
+        let max_range_m = not_negative(params, "max_range_m", 0.0)?;
         if max_range_m > 0.0 {
             options.max_range_m = max_range_m;
         }
@@ -121,23 +121,17 @@ impl TransformerOptions {
             let problem = format!("expected at most `max_range_m`, {max_range_m}");
             return Err(params.invalid("min_range_m", problem));
         }
-        options.max_cloud_points =
-            params.usize_in("max_cloud_points", options.max_cloud_points, 1..=usize::MAX)?;
+        options.max_cloud_points = params.positive("max_cloud_points", options.max_cloud_points)?;
         options.deskew = params.bool("deskew", options.deskew)?;
         options.time = time_options(params)?;
-        options.max_wait_s = positive(params, "max_wait_s", options.max_wait_s)?;
-        options.max_pose_gap_s = positive(params, "max_pose_gap_s", options.max_pose_gap_s)?;
-        options.pose_span_s = positive(params, "pose_span_s", options.pose_span_s)?;
-        let waiting = options.max_waiting_clouds;
-        options.max_waiting_clouds =
-            params.usize_in("max_waiting_clouds", waiting, 1..=usize::MAX)?;
-        let waiting = options.max_waiting_bytes;
-        options.max_waiting_bytes =
-            params.usize_in("max_waiting_bytes", waiting, 1..=usize::MAX)?;
-        let precisions = [
-            ("float32", Precision::Float32),
-            ("float64", Precision::Float64),
-        ];
+        options.max_wait_s = not_negative(params, "max_wait_s", options.max_wait_s)?;
+        options.max_pose_gap_s = not_negative(params, "max_pose_gap_s", options.max_pose_gap_s)?;
+        options.pose_span_s = not_negative(params, "pose_span_s", options.pose_span_s)?;
+        let (clouds, bytes) = (options.max_waiting_clouds, options.max_waiting_bytes);
+        options.max_waiting_clouds = params.positive("max_waiting_clouds", clouds)?;
+        options.max_waiting_bytes = params.positive("max_waiting_bytes", bytes)?;
+        let (single, double) = (Precision::Float32, Precision::Float64);
+        let precisions = [("float32", single), ("float64", double)];
         options.precision = one_of(params, "precision", &precisions)?;
         options.pass_fields = params.string_array("pass_fields", &LABEL_FIELDS)?;
         if options.pass_fields.len() > MAX_PASS_FIELDS {
@@ -158,76 +152,55 @@ impl TransformerOptions {
 }
 
 fn ins_options(params: &Params, defaults: InsOptions) -> Result<InsOptions, ParamError> {
-    let is_fixed = one_of(
-        params,
-        "origin.mode",
-        &[("first_fix", false), ("fixed", true)],
-    )?;
+    let modes = [("first_fix", false), ("fixed", true)];
+    let is_fixed = one_of(params, "origin.mode", &modes)?;
     let latitude = params.f64("origin.latitude_deg", 0.0)?;
     let longitude = params.f64("origin.longitude_deg", 0.0)?;
     let height_m = params.f64("origin.height_m", 0.0)?;
-    let origin = if is_fixed {
-        let place = Geodetic::from_degrees(latitude, longitude, height_m)
-            .map_err(|e| params.invalid("origin", e.to_string()))?;
-        Some(place)
-    } else {
-        None
-    };
+    let place = Geodetic::from_degrees(latitude, longitude, height_m)
+        .map_err(|e| params.invalid("origin", e.to_string()));
+    let stamps = [("gps", InsStamp::Gps), ("header", InsStamp::Header)];
+    let (geoid, ellipsoid) = (HeightDatum::Geoid, HeightDatum::Ellipsoid);
+    let heights = [("geoid", geoid), ("ellipsoid", ellipsoid)];
     let leap_seconds = params.i64("ins.leap_seconds", i64::from(defaults.leap_seconds))?;
     Ok(InsOptions {
-        stamp: one_of(
-            params,
-            "ins.stamp",
-            &[("gps", InsStamp::Gps), ("header", InsStamp::Header)],
-        )?,
+        stamp: one_of(params, "ins.stamp", &stamps)?,
         leap_seconds: i32::try_from(leap_seconds)
             .map_err(|_| params.invalid("ins.leap_seconds", "expected a small number, 18"))?,
-        inspvax_height: one_of(
-            params,
-            "ins.inspvax_height",
-            &[
-                ("geoid", HeightDatum::Geoid),
-                ("ellipsoid", HeightDatum::Ellipsoid),
-            ],
-        )?,
+        inspvax_height: one_of(params, "ins.inspvax_height", &heights)?,
         mount: InsMount::new(
             Vector3::from(triple(params, "ins.lever_arm_m")?),
             triple(params, "ins.boresight_rpy_rad")?,
         ),
-        origin,
-        max_imu_gap_s: positive(params, "ins.max_imu_gap_s", defaults.max_imu_gap_s)?,
+        origin: is_fixed.then_some(place).transpose()?,
+        max_imu_gap_s: not_negative(params, "ins.max_imu_gap_s", defaults.max_imu_gap_s)?,
         ..defaults
     })
 }
 
 fn time_options(params: &Params) -> Result<TimeOptions, ParamError> {
     let field = params.string("time.field", "")?;
+    let units = [
+        ("auto", None),
+        ("s", Some(TimeUnit::Seconds)),
+        ("ns", Some(TimeUnit::Nanoseconds)),
+    ];
+    let references = [
+        ("auto", None),
+        ("stamp_start", Some(TimeReference::StampStart)),
+        ("stamp_end", Some(TimeReference::StampEnd)),
+        ("absolute", Some(TimeReference::Absolute)),
+    ];
+    let max_span_s = TimeOptions::default().max_span_s;
     Ok(TimeOptions {
         field: Some(field).filter(|f| !f.is_empty()),
-        unit: one_of(
-            params,
-            "time.unit",
-            &[
-                ("auto", None),
-                ("s", Some(TimeUnit::Seconds)),
-                ("ns", Some(TimeUnit::Nanoseconds)),
-            ],
-        )?,
-        reference: one_of(
-            params,
-            "time.reference",
-            &[
-                ("auto", None),
-                ("stamp_start", Some(TimeReference::StampStart)),
-                ("stamp_end", Some(TimeReference::StampEnd)),
-                ("absolute", Some(TimeReference::Absolute)),
-            ],
-        )?,
-        max_span_s: positive(params, "time.max_span_s", TimeOptions::default().max_span_s)?,
+        unit: one_of(params, "time.unit", &units)?,
+        reference: one_of(params, "time.reference", &references)?,
+        max_span_s: not_negative(params, "time.max_span_s", max_span_s)?,
     })
 }
 
-fn positive(params: &Params, name: &str, default: f64) -> Result<f64, ParamError> {
+fn not_negative(params: &Params, name: &str, default: f64) -> Result<f64, ParamError> {
     params.f64_in(name, default, 0.0..=f64::MAX)
 }
 

@@ -18,19 +18,15 @@ impl EnuTransformer {
             if self.is_own(transform) {
                 continue;
             }
-            let inserted = geometry::isometry_from_transform(&transform.transform).is_some_and(
-                |parent_from_child| {
-                    let parent = &transform.header.frame_id;
-                    let child = &transform.child_frame_id;
-                    let stamp_ns = transform.header.stamp.to_ns();
-                    self.mounts
-                        .insert(parent, child, stamp_ns, parent_from_child, is_static)
-                        .is_ok()
-                },
-            );
-            if !inserted {
-                self.counts.transforms_refused += 1;
-            }
+            let (parent, child) = (&transform.header.frame_id, &transform.child_frame_id);
+            let stamp_ns = transform.header.stamp.to_ns();
+            let pose = geometry::isometry_from_transform(&transform.transform);
+            let insert = |pose| {
+                let inserted = self.mounts.insert(parent, child, stamp_ns, pose, is_static);
+                inserted.is_ok()
+            };
+            let refused = !pose.is_some_and(insert);
+            self.counts.transforms_refused += u64::from(refused);
         }
         self.announce_odom(&mut out);
         self.serve(now_ns, &mut out);

@@ -36,20 +36,13 @@ impl WaitingCloud {
         let stamp_ns = message.header.stamp.to_ns();
         let layout = cloud::layout_of(&message);
         let view = layout.view(&message.data, &limits)?;
-        let times = if options.deskew {
-            view.point_times(stamp_ns, &options.time)?
-        } else {
-            None
+        let times = match options.deskew {
+            true => view.point_times(stamp_ns, &options.time)?,
+            false => None,
         };
-        let (first_ns, last_ns) = times
-            .iter()
-            .flatten()
-            .filter(|t| **t != NO_TIME_NS)
-            .fold(None, |span, &t| match span {
-                None => Some((t, t)),
-                Some((first, last)) => Some((t.min(first), t.max(last))),
-            })
-            .unwrap_or((stamp_ns, stamp_ns));
+        let known = || times.iter().flatten().copied().filter(|t| *t != NO_TIME_NS);
+        let first_ns = known().min().unwrap_or(stamp_ns);
+        let last_ns = known().max().unwrap_or(stamp_ns);
         Ok(Self {
             frame: message.header.frame_id.trim_start_matches('/').to_owned(),
             stamp_ns,

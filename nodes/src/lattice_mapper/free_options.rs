@@ -22,7 +22,7 @@ pub enum FreeSpaceMethod {
 }
 
 /// Options of free space in a map.
-#[derive(Clone, Copy, PartialEq, Debug)]
+#[derive(Clone, Copy, PartialEq, Debug, Default)]
 pub struct MappedFreeSpace {
     /// Use of the rays.
     pub method: FreeSpaceMethod,
@@ -36,22 +36,12 @@ pub struct MappedFreeSpace {
     pub free_level: u32,
 }
 
-impl Default for MappedFreeSpace {
-    fn default() -> Self {
-        Self {
-            method: FreeSpaceMethod::Off,
-            sweep_ns: 0,
-            clear: ClearOptions::default(),
-            evidence: Evidence::default(),
-            free_level: 0,
-        }
-    }
-}
-
 impl MappedFreeSpace {
     /// Reads the parameters `free_space`, `rays.*`, `evidence.*` and `free_level`.
     pub(super) fn from_params(params: &Params) -> Result<Self, ParamError> {
-        let defaults = Self::default();
+        let Self {
+            clear, evidence, ..
+        } = Self::default();
         let methods = [
             ("off", FreeSpaceMethod::Off),
             ("clear", FreeSpaceMethod::Clear),
@@ -60,33 +50,25 @@ impl MappedFreeSpace {
         let method = one_of(params, "free_space", &methods)?;
         let sweep_s = params.f64_in("rays.sweep_s", 0.0, 0.0..=MAX_SWEEP_S)?;
         let max_range_m = params.f64_in("rays.max_range_m", 0.0, 0.0..=MAX_LENGTH_M)?;
-        let misses = clear_misses(params, defaults.clear.misses)?;
-        let kept = defaults.clear.reach;
+        let endless = max_range_m == 0.0;
+        let bytes = MIN_MAP_BYTES..=usize::MAX;
         let reach = Reach {
-            max_range_m: if max_range_m > 0.0 {
-                max_range_m
-            } else {
-                f64::INFINITY
-            },
-            keep_m: params.f64_in("rays.keep_m", kept.keep_m, 0.0..=MAX_LENGTH_M)?,
-            keep_ratio: params.f64_in("rays.keep_ratio", kept.keep_ratio, 0.0..=1.0)?,
+            max_range_m: if endless { f64::INFINITY } else { max_range_m },
+            keep_m: params.f64_in("rays.keep_m", clear.reach.keep_m, 0.0..=MAX_LENGTH_M)?,
+            keep_ratio: params.f64_in("rays.keep_ratio", clear.reach.keep_ratio, 0.0..=1.0)?,
         };
         let clear = ClearOptions {
-            misses,
+            misses: clear_misses(params, clear.misses)?,
             reach,
-            spare_touching: params.bool("rays.spare_touching", defaults.clear.spare_touching)?,
-            max_bytes: params.usize_in(
-                "rays.max_bytes",
-                defaults.clear.max_bytes,
-                MIN_MAP_BYTES..=usize::MAX,
-            )?,
+            spare_touching: params.bool("rays.spare_touching", clear.spare_touching)?,
+            max_bytes: params.usize_in("rays.max_bytes", clear.max_bytes, bytes)?,
         };
         let evidence = Evidence {
-            hit: params.f64("evidence.hit", defaults.evidence.hit)?,
-            miss: params.f64("evidence.miss", defaults.evidence.miss)?,
-            least: params.f64("evidence.least", defaults.evidence.least)?,
-            most: params.f64("evidence.most", defaults.evidence.most)?,
-            threshold: params.f64("evidence.threshold", defaults.evidence.threshold)?,
+            hit: params.f64("evidence.hit", evidence.hit)?,
+            miss: params.f64("evidence.miss", evidence.miss)?,
+            least: params.f64("evidence.least", evidence.least)?,
+            most: params.f64("evidence.most", evidence.most)?,
+            threshold: params.f64("evidence.threshold", evidence.threshold)?,
         };
         evidence
             .check()

@@ -78,12 +78,8 @@ impl LatticeMapper {
     pub fn new(options: MapperOptions, epoch: u64) -> Result<Self, FreeSpaceError> {
         let (lattice, near_m) = (options.lattice.clone(), options.datum_near_m);
         let max_voxels = options.voxel_limit();
-        let free_space = FreeSpace::new(
-            &options.free_space,
-            &lattice,
-            near_m,
-            options.max_cloud_points,
-        )?;
+        let max_points = options.max_cloud_points;
+        let free_space = FreeSpace::new(&options.free_space, &lattice, near_m, max_points)?;
         let list = VoxelList::new(lattice, near_m, max_voxels)?
             .with_payload(options.payload())
             .with_when_full(options.when_full);
@@ -128,7 +124,9 @@ impl LatticeMapper {
         // All that can be refused is read before anything of the map changes.
         let labels = self.labels_of(message)?;
         let viewpoints = self.viewpoints_of(message, &limits)?;
-        self.end_sweep(cloud.stamp_ns);
+        if (self.free_space.as_ref()).is_some_and(|free| free.is_complete(cloud.stamp_ns)) {
+            self.clear_rays();
+        }
         let report = match (&mut self.occupancy, labels) {
             (Some(occupancy), _) => occupancy.insert(&cloud),
             (None, None) => self.list.insert(&cloud),
@@ -145,12 +143,7 @@ impl LatticeMapper {
 
     /// Labels of the points, none at all for a cloud without them; `None` where labels are not kept.
     fn labels_of(&mut self, message: &PointCloud2) -> Result<Option<Vec<u16>>, CloudRefusal> {
-        let Some(options) = self
-            .options
-            .labels
-            .as_ref()
-            .filter(|_| self.occupancy.is_none())
-        else {
+        let (Some(options), None) = (&self.options.labels, &self.occupancy) else {
             return Ok(None);
         };
         let most = self.options.max_cloud_points;
@@ -175,15 +168,7 @@ impl LatticeMapper {
         Ok(viewpoints)
     }
 
-    /// Clears along the rays of a sweep that a cloud of this time does not belong to.
-    fn end_sweep(&mut self, stamp_ns: i64) {
-        if let Some(free_space) = &self.free_space
-            && free_space.is_complete(stamp_ns)
-        {
-            self.clear_rays();
-        }
-    }
-
+    /// Clears along the rays of the sweep.
     fn clear_rays(&mut self) {
         if let Some(free_space) = &mut self.free_space {
             let report = match &mut self.occupancy {
@@ -298,40 +283,27 @@ impl LatticeMapper {
     pub fn free(&self) -> Option<Vec<LatticeMap>> {
         let (lattice, keys) = self.free_space.as_ref()?.free_cells()?;
         let datum_m = self.list.datum_m();
-        Some(map::keyframe_of_cells(
-            lattice,
-            datum_m,
-            &keys,
-            &self.stamp(),
-        ))
+        let stamp = self.stamp();
+        Some(map::keyframe_of_cells(lattice, datum_m, &keys, &stamp))
     }
 
     /// Cell centres in the map frame, with the number of points (1 if not kept) as `intensity` and,
     /// where labels are kept, the most frequent one as `label`.
     pub fn centers(&self) -> PointCloud2 {
         let voxels: Vec<(MortonKey, u32)> = match &self.occupancy {
-            Some(cells) => cells
-                .sorted_keys()
-                .into_iter()
+            Some(cells) => (cells.sorted_keys().into_iter())
                 .map(|key| (key, 1))
                 .collect(),
-            None => {
-                let voxels = self.list.sorted().into_iter();
-                voxels.map(|(key, voxel)| (key, voxel.count)).collect()
-            }
+            None => (self.list.sorted().into_iter())
+                .map(|(key, voxel)| (key, voxel.count))
+                .collect(),
         };
-        let mut further = vec![("intensity", PointField::FLOAT32)];
         let labelled = self.list.payload().labels;
-        if labelled {
-            further.push(("label", PointField::UINT16));
-        }
         let mut fields = cloud::xyz_fields(PointField::FLOAT32, 4);
-        fields.extend((3..).zip(further).map(|(i, (name, datatype))| PointField {
-            name: name.to_owned(),
-            offset: 4 * i,
-            datatype,
-            count: 1,
-        }));
+        fields.push(cloud::field("intensity", 12, PointField::FLOAT32));
+        if labelled {
+            fields.push(cloud::field("label", 16, PointField::UINT16));
+        }
         let point_step = 4 * fields.len() as u32;
         let mut data = Vec::with_capacity(voxels.len() * point_step as usize);
         for (key, count) in &voxels {

@@ -2,7 +2,7 @@
 
 use std::collections::VecDeque;
 use std::sync::atomic::{AtomicBool, AtomicU64, Ordering};
-use std::sync::{Arc, Mutex, MutexGuard, Once, PoisonError};
+use std::sync::{Arc, Mutex, Once};
 use std::thread::JoinHandle;
 use std::time::{Duration, SystemTime, UNIX_EPOCH};
 
@@ -19,7 +19,7 @@ use crate::start::{Finish, NodeError, warn_unused};
 use crate::{options, report};
 use lattice_runtime::logging::Throttle;
 use lattice_runtime::qos::Qos;
-use lattice_runtime::{Diagnostics, Level, Load, Node, Publisher, Runtime};
+use lattice_runtime::{Diagnostics, Level, Load, Node, Publisher, Runtime, lock};
 
 /// Chunks of a keyframe published in one update period: 3 MB.
 const CHUNKS_PER_ROUND: usize = 50;
@@ -78,13 +78,7 @@ pub fn start(runtime: &Runtime, name: &str) -> Result<Finish, NodeError> {
         shell.on(event)
     })?;
     let inbox = compute.inbox();
-    let clouds = inbox.clone();
-    let hand_over = move |cloud: Arc<PointCloud2>| {
-        let bytes = cloud::bytes_of(&cloud);
-        if !clouds.send(Event::Cloud(cloud), bytes) {
-            lost.fetch_add(1, Ordering::Relaxed);
-        }
-    };
+    let hand_over = inbox.counting(&lost, Event::Cloud, |cloud| cloud::bytes_of(cloud));
     let points = node.subscribe("points_enu", Qos::SCANS, Load::Large, hand_over)?;
     let origins = Arc::clone(&wishes);
     let take = move |origin| *lock(&origins.origin) = Some(origin);
@@ -102,17 +96,9 @@ pub fn start(runtime: &Runtime, name: &str) -> Result<Finish, NodeError> {
         (true, "keyframe follows".into())
     })?;
     let services = inbox.clone();
-    let reset = node.service_trigger("~/reset", move || {
-        let sent = services.send(Event::Reset, 0);
-        (
-            sent,
-            if sent {
-                "map emptied"
-            } else {
-                "busy, ask again"
-            }
-            .into(),
-        )
+    let reset = node.service_trigger("~/reset", move || match services.send(Event::Reset, 0) {
+        true => (true, "map emptied".into()),
+        false => (false, "busy, ask again".into()),
     })?;
     let calls = services::serve(&node, &inbox, Event::Call, max_voxels)?;
     let updates = inbox.clone();
@@ -137,10 +123,6 @@ struct Wishes {
     keyframe: AtomicBool,
     centers: AtomicBool,
     origin: Mutex<Option<Arc<GeoPointStamped>>>,
-}
-
-fn lock<T>(mutex: &Mutex<T>) -> MutexGuard<'_, T> {
-    mutex.lock().unwrap_or_else(PoisonError::into_inner)
 }
 
 /// Hands over a timer's event; one that finds no room comes again with the next.
@@ -318,10 +300,8 @@ impl Shell {
             let problem = "rays have no room (`rays.max_bytes`): not all voxels are cleared";
             (Level::Warn, problem.to_owned())
         } else if refused + lost > 0 {
-            (
-                Level::Warn,
-                format!("{refused} clouds refused, {lost} lost"),
-            )
+            let message = format!("{refused} clouds refused, {lost} lost");
+            (Level::Warn, message)
         } else {
             (Level::Ok, "mapping".to_owned())
         };
@@ -353,11 +333,10 @@ impl Shell {
             undecodable,
             ..self.report()
         };
+        let (clouds, voxels) = (report.counts.clouds_in, report.voxels);
         log::info!(
-            "{} clouds, {} points in {} voxels",
-            report.counts.clouds_in,
-            report.points,
-            report.voxels
+            "{clouds} clouds, {} points in {voxels} voxels",
+            report.points
         );
         self.outputs.map.flush(Duration::from_secs(2));
         self.outputs.updates.flush(Duration::from_secs(2));

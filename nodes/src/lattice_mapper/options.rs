@@ -54,6 +54,12 @@ const PAYLOADS: [(&str, MapPayload); 2] = [
     ("occupancy", MapPayload::Occupancy),
 ];
 
+/// Values of the parameter `when_full`.
+const WHEN_FULL: [(&str, WhenFull); 2] = [
+    ("refuse", WhenFull::Refuse),
+    ("forget_oldest", WhenFull::ForgetOldest),
+];
+
 impl MapperOptions {
     /// Defaults for a lattice: frame `map`, datum at its origin.
     pub fn new(lattice: Lattice) -> Self {
@@ -92,23 +98,19 @@ impl MapperOptions {
         let read = Self {
             map_frame: options::frame(params, "map_frame", &defaults.map_frame)?,
             datum_near_m: Vector3::new(x, y, z),
-            max_voxels: params.usize_in("max_voxels", defaults.max_voxels, 1..=usize::MAX)?,
+            max_voxels: params.positive("max_voxels", defaults.max_voxels)?,
             max_map_bytes: params.usize("max_map_bytes", defaults.max_map_bytes)?,
-            when_full: when_full(params)?,
+            when_full: options::one_of(params, "when_full", &WHEN_FULL)?,
             forget_after_ns: forget_after_ns(params)?,
-            max_cloud_points: params.usize_in(
-                "max_cloud_points",
-                defaults.max_cloud_points,
-                1..=usize::MAX,
-            )?,
+            max_cloud_points: params.positive("max_cloud_points", defaults.max_cloud_points)?,
             labels: Self::labels_from(params)?,
             chunk_bytes: options::chunk_bytes(params, defaults.chunk_bytes)?,
             payload: options::one_of(params, "payload", &PAYLOADS)?,
             free_space: MappedFreeSpace::from_params(params)?,
             ..defaults
         };
-        if read.payload == MapPayload::Occupancy && (read.payload().stamps || read.payload().labels)
-        {
+        let has_columns = read.payload().stamps || read.payload().labels;
+        if read.payload == MapPayload::Occupancy && has_columns {
             let problem = "occupancy has neither stamps nor labels: needs centroid with \
                            forget_after_s or keep_labels";
             return Err(params.invalid("payload", problem));
@@ -152,17 +154,6 @@ impl MapperOptions {
                 (self.max_voxels).min(OccupancyList::max_voxels_within(bytes))
             }
             bytes => (self.max_voxels).min(VoxelList::voxels_within(bytes, self.payload())),
-        }
-    }
-}
-
-fn when_full(params: &Params) -> Result<WhenFull, ParamError> {
-    match params.string("when_full", "refuse")?.as_str() {
-        "refuse" => Ok(WhenFull::Refuse),
-        "forget_oldest" => Ok(WhenFull::ForgetOldest),
-        other => {
-            let problem = format!("{other:?}, expected refuse or forget_oldest");
-            Err(params.invalid("when_full", problem))
         }
     }
 }

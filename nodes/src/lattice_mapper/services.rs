@@ -6,6 +6,7 @@ use std::path::{Path, PathBuf};
 use std::thread::{self, JoinHandle};
 
 use lattice_core::voxels::file::{FileError, MapContents, WriteOptions};
+use lattice_msgs::RosService;
 use lattice_msgs::lattice::{
     ClearBox, ClearBoxRequest, ClearBoxResponse, LoadMap, LoadMapRequest, LoadMapResponse,
     QueryMap, QueryMapRequest, QueryMapResponse, SaveMap, SaveMapRequest, SaveMapResponse,
@@ -51,13 +52,6 @@ pub(super) fn serve<E: Send + 'static>(
     max_voxels: usize,
 ) -> Result<[Server; 4], NodeError> {
     let to = inbox.clone();
-    let save = node.service_later::<SaveMap>("~/save_map", move |request, reply| {
-        let busy = reply.clone();
-        if !to.send(wrap(Call::Save(request, reply)), 0) {
-            busy.send(save_failed(BUSY));
-        }
-    })?;
-    let to = inbox.clone();
     let load = node.service_later::<LoadMap>("~/load_map", move |request, reply| {
         let (to, late) = (to.clone(), reply.clone());
         let read = move || load(&request, max_voxels, reply, |call| to.send(wrap(call), 0));
@@ -65,29 +59,41 @@ pub(super) fn serve<E: Send + 'static>(
             late.send(load_failed(error));
         }
     })?;
-    let to = inbox.clone();
-    let clear_box = node.service_later::<ClearBox>("~/clear_box", move |request, reply| {
-        let busy = reply.clone();
-        if !to.send(wrap(Call::ClearBox(request, reply)), 0) {
-            let message = BUSY.to_owned();
-            busy.send(ClearBoxResponse {
+    let save = move |request, reply| wrap(Call::Save(request, reply));
+    let clear_box = move |request, reply| wrap(Call::ClearBox(request, reply));
+    let query = move |request, reply| wrap(Call::Query(request, reply));
+    Ok([
+        ask::<SaveMap, E>(node, "~/save_map", inbox, save, save_failed)?,
+        load,
+        ask::<ClearBox, E>(node, "~/clear_box", inbox, clear_box, |message| {
+            ClearBoxResponse {
                 message,
                 ..Default::default()
-            });
-        }
-    })?;
+            }
+        })?,
+        ask::<QueryMap, E>(node, "~/query", inbox, query, |message| QueryMapResponse {
+            message,
+            ..Default::default()
+        })?,
+    ])
+}
+
+/// Serves requests that become events; the answer of a full inbox is `failed`.
+fn ask<S: RosService + 'static, E: Send + 'static>(
+    node: &Node,
+    name: &str,
+    inbox: &Inbox<E>,
+    event: impl Fn(S::Request, Reply<S::Response>) -> E + Send + 'static,
+    failed: fn(String) -> S::Response,
+) -> Result<Server, NodeError> {
     let to = inbox.clone();
-    let query = node.service_later::<QueryMap>("~/query", move |request, reply| {
+    let server = node.service_later::<S>(name, move |request, reply| {
         let busy = reply.clone();
-        if !to.send(wrap(Call::Query(request, reply)), 0) {
-            let message = BUSY.to_owned();
-            busy.send(QueryMapResponse {
-                message,
-                ..Default::default()
-            });
+        if !to.send(event(request, reply), 0) {
+            busy.send(failed(BUSY.to_owned()));
         }
-    })?;
-    Ok([save, load, clear_box, query])
+    });
+    Ok(server?)
 }
 
 /// Outcome of a call.
@@ -107,7 +113,7 @@ pub(super) fn answer(machine: &mut LatticeMapper, call: Call, epoch: u64) -> Don
             let (contents, late) = (machine.contents(), reply.clone());
             match spawn("save map", move || reply.send(save(&request, &contents))) {
                 Ok(thread) => done.writing = Some(thread),
-                Err(error) => late.send(save_failed(error)),
+                Err(error) => late.send(save_failed(error.to_string())),
             }
         }
         Call::Load(contents, reply) => match machine.load(*contents, epoch) {
@@ -131,9 +137,9 @@ fn spawn(name: &str, work: impl FnOnce() + Send + 'static) -> std::io::Result<Jo
     thread::Builder::new().name(name.to_owned()).spawn(work)
 }
 
-fn save_failed(why: impl ToString) -> SaveMapResponse {
+fn save_failed(message: String) -> SaveMapResponse {
     SaveMapResponse {
-        message: why.to_string(),
+        message,
         ..SaveMapResponse::default()
     }
 }
@@ -180,7 +186,7 @@ fn save(request: &SaveMapRequest, contents: &MapContents) -> SaveMapResponse {
             message: format!("saved to {:?}", request.path),
             voxels: contents.keys().len() as u64,
         },
-        Err(refusal) => save_failed(refusal),
+        Err(refusal) => save_failed(refusal.to_string()),
     }
 }
 
@@ -193,8 +199,8 @@ fn write(path: &Path, contents: &MapContents) -> Result<(), IoRefusal> {
     }
     name.push(".part");
     let part = path.with_file_name(name);
-    let written =
-        write_to(&part, path, contents).and_then(|()| fs::rename(&part, path).map_err(io));
+    let renamed = || fs::rename(&part, path).map_err(io);
+    let written = write_to(&part, path, contents).and_then(|()| renamed());
     if written.is_err() {
         // What is there is of no use; that it stays does no harm.
         let _ = fs::remove_file(&part);
@@ -219,7 +225,6 @@ fn write_to(part: &Path, path: &Path, contents: &MapContents) -> Result<(), IoRe
 mod tests {
     use lattice_core::lattice::{Lattice, LatticeKind};
     use lattice_core::voxels::VoxelList;
-    use lattice_msgs::geometry_msgs::Point;
     use nalgebra::Vector3;
 
     use super::*;
@@ -269,26 +274,13 @@ mod tests {
         let mut first = with_points();
         for _ in 0..2 {
             let saved = save_to(&mut first, &path);
-            assert_eq!(
-                (saved.success, saved.voxels),
-                (true, 100),
-                "{}",
-                saved.message
-            );
+            assert!(saved.success && saved.voxels == 100, "{}", saved.message);
         }
-        assert_eq!(
-            fs::read_dir(dir.path()).unwrap().count(),
-            1,
-            "nothing but the map is left"
-        );
+        let files = fs::read_dir(dir.path()).unwrap().count();
+        assert_eq!(files, 1, "nothing but the map is left");
         let mut second = machine();
         let loaded = load_from(&mut second, &path);
-        assert_eq!(
-            (loaded.success, loaded.voxels),
-            (true, 100),
-            "{}",
-            loaded.message
-        );
+        assert!(loaded.success && loaded.voxels == 100, "{}", loaded.message);
         assert_eq!(second.list().sorted(), first.list().sorted());
     }
 
@@ -301,17 +293,14 @@ mod tests {
         let good = fs::read(&path).unwrap();
         let mut flipped = good.clone();
         flipped[good.len() / 2] ^= 4;
-        for hostile in [
-            &b""[..],
-            b"not a map at all",
-            &good[..good.len() - 3],
-            &flipped,
-        ] {
+        let cut = &good[..good.len() - 3];
+        for hostile in [&b"not a map at all"[..], b"", cut, &flipped] {
             fs::write(&path, hostile).unwrap();
             let refused = load_from(&mut machine, &path);
+            let message = &refused.message;
             assert!(
-                !refused.success && refused.message.contains("site.lattice"),
-                "{refused:?}"
+                !refused.success && message.contains("site.lattice"),
+                "{message}"
             );
         }
         for nowhere in [dir.path(), &dir.path().join("absent"), Path::new("")] {
@@ -319,10 +308,7 @@ mod tests {
         }
         for nowhere in [dir.path(), &dir.path().join("absent/map"), Path::new("")] {
             let refused = save_to(&mut machine, nowhere);
-            assert!(
-                !refused.success && !refused.message.is_empty(),
-                "{refused:?}"
-            );
+            assert!(!refused.success && !refused.message.is_empty());
         }
         assert_eq!(machine.list().len(), 100);
     }
@@ -337,29 +323,5 @@ mod tests {
         let path = path.display().to_string();
         load(&LoadMapRequest { path }, 1000, reply, |_| false);
         assert_eq!(answered.try_recv().unwrap().message, BUSY);
-    }
-
-    #[test]
-    fn boxes_and_queries_are_answered() {
-        let mut machine = with_points();
-        let (reply, answered) = Reply::channel();
-        let [min, max] = [-0.5, 9.5].map(|x| Point { x, y: x, z: x });
-        answer(
-            &mut machine,
-            Call::ClearBox(ClearBoxRequest { min, max }, reply),
-            9,
-        );
-        assert_eq!(answered.try_recv().unwrap().removed, 10);
-        let (reply, answered) = Reply::channel();
-        let point = Point {
-            x: 20.0,
-            ..Point::default()
-        };
-        answer(
-            &mut machine,
-            Call::Query(QueryMapRequest { point }, reply),
-            9,
-        );
-        assert!(answered.try_recv().unwrap().occupied);
     }
 }

@@ -18,9 +18,7 @@ use lattice_msgs::cdr::{self, CdrError};
 use lattice_msgs::geometry_msgs::PoseStamped;
 use lattice_msgs::nav_msgs::Odometry;
 use lattice_msgs::novatel_oem7_msgs::{INSPVA, INSPVAX};
-use lattice_msgs::sensor_msgs::{Imu, NavSatFix, PointCloud2};
-use lattice_msgs::tf2_msgs::TFMessage;
-use serde::de::DeserializeOwned;
+use lattice_msgs::sensor_msgs::{Imu, NavSatFix};
 
 use crate::enu_transformer::ins::InsMessage;
 use crate::enu_transformer::{EnuOutput, EnuTransformer, TransformerOptions, TransformerReport};
@@ -118,21 +116,18 @@ impl Pipeline {
         let now_ns = message.log_time_ns;
         let data = &message.data;
         let machine = &mut self.transformer;
+        let mut ins = |message: InsMessage| machine.on_ins(message, now_ns);
         Ok(match role {
-            Role::Cloud => machine.on_cloud(Arc::new(decode::<PointCloud2>(data)?), now_ns),
+            Role::Cloud => machine.on_cloud(Arc::new(cdr::from_slice(data)?), now_ns),
             Role::Transforms(is_static) => {
-                machine.on_tf(&decode::<TFMessage>(data)?, is_static, now_ns)
+                machine.on_tf(&cdr::from_slice(data)?, is_static, now_ns)
             }
-            Role::Ins(INSPVA::TYPE) => machine.on_ins(InsMessage::Inspva(&decode(data)?), now_ns),
-            Role::Ins(INSPVAX::TYPE) => machine.on_ins(InsMessage::Inspvax(&decode(data)?), now_ns),
-            Role::Ins(NavSatFix::TYPE) => machine.on_ins(InsMessage::Fix(&decode(data)?), now_ns),
-            Role::Ins(Imu::TYPE) => machine.on_ins(InsMessage::Imu(&decode(data)?), now_ns),
-            Role::Ins(PoseStamped::TYPE) => {
-                machine.on_ins(InsMessage::Pose(&decode(data)?), now_ns)
-            }
-            Role::Ins(Odometry::TYPE) => {
-                machine.on_ins(InsMessage::Odometry(&decode(data)?), now_ns)
-            }
+            Role::Ins(INSPVA::TYPE) => ins(InsMessage::Inspva(&cdr::from_slice(data)?)),
+            Role::Ins(INSPVAX::TYPE) => ins(InsMessage::Inspvax(&cdr::from_slice(data)?)),
+            Role::Ins(NavSatFix::TYPE) => ins(InsMessage::Fix(&cdr::from_slice(data)?)),
+            Role::Ins(Imu::TYPE) => ins(InsMessage::Imu(&cdr::from_slice(data)?)),
+            Role::Ins(PoseStamped::TYPE) => ins(InsMessage::Pose(&cdr::from_slice(data)?)),
+            Role::Ins(Odometry::TYPE) => ins(InsMessage::Odometry(&cdr::from_slice(data)?)),
             Role::Ins(_) => Vec::new(),
         })
     }
@@ -188,10 +183,6 @@ impl Branch {
             markers: self.report.clone(),
         }
     }
-}
-
-fn decode<T: DeserializeOwned>(data: &[u8]) -> Result<T, CdrError> {
-    cdr::from_slice(data)
 }
 
 /// Replays a whole log; `progress` gets the part that has passed, from 0 to 1.

@@ -38,63 +38,51 @@ impl RunReport {
         let mut lines = Vec::new();
         let counts = &self.transformer.counts;
         let refused = self.transformer.clouds_inbox_full + self.transformer.undecodable;
-        let missing = self
-            .clouds_in_log
-            .saturating_sub(counts.clouds_in + refused);
+        let arrived = counts.clouds_in + refused;
+        let missing = self.clouds_in_log.saturating_sub(arrived);
         if missing > 0 {
+            let all = self.clouds_in_log;
             lines.push(format!(
-                "{missing} of {} clouds of the log did not reach the transformer",
-                self.clouds_in_log
+                "{missing} of {all} clouds of the log did not reach the transformer"
             ));
         }
         for (reason, count) in self.transformer.dropped() {
             lines.push(format!("{count} of {} clouds: {reason}", counts.clouds_in));
         }
         for LatticeReport { map, .. } in &self.lattices {
-            let arrived = map.counts.clouds_in;
-            if arrived < counts.clouds_out {
-                let lost = counts.clouds_out - arrived;
+            let (name, mapped, out) = (&map.lattice, &map.counts, counts.clouds_out);
+            let lost = out.saturating_sub(mapped.clouds_in);
+            if lost > 0 {
                 lines.push(format!(
-                    "{lost} of {} transformed clouds did not reach the {} map",
-                    counts.clouds_out, map.lattice
+                    "{lost} of {out} transformed clouds did not reach the {name} map"
                 ));
             }
-            let lost = [
-                (
-                    "clouds",
-                    "not in the map frame",
-                    map.counts.clouds_wrong_frame,
-                ),
-                ("clouds", "malformed", map.counts.clouds_malformed),
-                (
-                    "clouds",
-                    "without sensor positions, so that they clear nothing",
-                    map.counts.clouds_no_viewpoint,
-                ),
-                (
-                    "clouds",
-                    "lost on the way or inbox full",
-                    map.clouds_inbox_full,
-                ),
-                ("samples", "undecodable", map.undecodable),
-                ("points", "not finite", map.counts.points_not_finite),
-                (
-                    "points",
-                    "beyond the reach of keys",
-                    map.counts.points_out_of_range,
-                ),
-                (
-                    "points",
-                    "more voxels than max_voxels",
-                    map.counts.points_list_full,
-                ),
-            ];
-            for (what, reason, count) in lost.into_iter().filter(|(_, _, count)| *count > 0) {
-                lines.push(format!(
-                    "{count} {what} of the {} map: {reason}",
-                    map.lattice
-                ));
-            }
+            let mut add = |what: &str, count: u64, reason: &str| {
+                if count > 0 {
+                    lines.push(format!("{count} {what} of the {name} map: {reason}"));
+                }
+            };
+            let blind = "without sensor positions, so that they clear nothing";
+            add("clouds", mapped.clouds_wrong_frame, "not in the map frame");
+            add("clouds", mapped.clouds_malformed, "malformed");
+            add("clouds", mapped.clouds_no_viewpoint, blind);
+            add(
+                "clouds",
+                map.clouds_inbox_full,
+                "lost on the way or inbox full",
+            );
+            add("samples", map.undecodable, "undecodable");
+            add("points", mapped.points_not_finite, "not finite");
+            add(
+                "points",
+                mapped.points_out_of_range,
+                "beyond the reach of keys",
+            );
+            add(
+                "points",
+                mapped.points_list_full,
+                "more voxels than max_voxels",
+            );
         }
         lines
     }
@@ -181,35 +169,29 @@ mod tests {
         report
     }
 
+    fn map(report: &mut RunReport) -> &mut MapperReport {
+        &mut report.lattices[0].map
+    }
+
     #[test]
     fn every_kind_of_loss_is_shown() {
         assert!(report().losses().is_empty());
         assert!(report().to_string().contains("dropped: none"));
-        type Change<'a> = (&'a str, &'a dyn Fn(&mut RunReport));
+        type Change = (&'static str, fn(&mut RunReport) -> &mut u64);
         let changes: [Change; 9] = [
-            ("reach the transformer", &|r| {
-                r.transformer.counts.clouds_in = 9
-            }),
-            ("pose_gap", &|r| r.transformer.counts.clouds_pose_gap = 1),
-            ("inbox_full", &|r| r.transformer.clouds_inbox_full = 1),
-            ("undecodable", &|r| r.transformer.undecodable = 1),
-            ("reach the fcc map", &|r| {
-                r.lattices[0].map.counts.clouds_in = 9
-            }),
-            ("malformed", &|r| {
-                r.lattices[0].map.counts.clouds_malformed = 1
-            }),
-            ("inbox full", &|r| r.lattices[0].map.clouds_inbox_full = 1),
-            ("max_voxels", &|r| {
-                r.lattices[0].map.counts.points_list_full = 1
-            }),
-            ("reach of keys", &|r| {
-                r.lattices[0].map.counts.points_out_of_range = 1
-            }),
+            ("reach the transformer", |r| &mut r.clouds_in_log),
+            ("pose_gap", |r| &mut r.transformer.counts.clouds_pose_gap),
+            ("inbox_full", |r| &mut r.transformer.clouds_inbox_full),
+            ("undecodable", |r| &mut r.transformer.undecodable),
+            ("reach the fcc", |r| &mut r.transformer.counts.clouds_out),
+            ("malformed", |r| &mut map(r).counts.clouds_malformed),
+            ("inbox full", |r| &mut map(r).clouds_inbox_full),
+            ("max_voxels", |r| &mut map(r).counts.points_list_full),
+            ("of keys", |r| &mut map(r).counts.points_out_of_range),
         ];
         for (words, change) in changes {
             let mut report = report();
-            change(&mut report);
+            *change(&mut report) += 1;
             let shown = report.to_string();
             assert!(shown.contains(words), "{words}: {shown}");
             assert!(!shown.contains("dropped: none"), "{words}");

@@ -108,18 +108,11 @@ pub fn plan(bag: &BagReader, wishes: &TopicWishes) -> Result<TopicPlan, TopicErr
         topics.position(|topic| topic.type_name == type_name && topic.message_count > 0)
     };
     let complete = |source: &InsSource| {
-        source
-            .type_names()
-            .iter()
-            .all(|name| first_of(name).is_some())
+        let mut names = source.type_names().iter();
+        names.all(|name| first_of(name).is_some())
     };
-    let source = match wishes.source {
-        Some(source) => source,
-        None => PREFERRED
-            .into_iter()
-            .find(complete)
-            .ok_or_else(|| TopicError::NoIns { has: listing(bag) })?,
-    };
+    let source = wishes.source.or(PREFERRED.into_iter().find(complete));
+    let source = source.ok_or_else(|| TopicError::NoIns { has: listing(bag) })?;
     for (i, type_name) in source.type_names().iter().enumerate() {
         let topic = match (&wishes.ins, i) {
             (Some(name), 0) => find(bag, name, type_name)?,
@@ -187,12 +180,10 @@ fn find(bag: &BagReader, name: &str, type_name: &'static str) -> Result<usize, T
 
 fn listing(bag: &BagReader) -> String {
     let topics = bag.topics().iter();
-    let names: Vec<String> = topics
-        .map(|topic| format!("{} ({})", topic.name, topic.type_name))
-        .collect();
-    if names.is_empty() {
-        "no topics".into()
-    } else {
-        names.join(", ")
+    let names = topics.map(|topic| format!("{} ({})", topic.name, topic.type_name));
+    let names: Vec<String> = names.collect();
+    match names.is_empty() {
+        true => "no topics".into(),
+        false => names.join(", "),
     }
 }

@@ -32,7 +32,7 @@ use lattice_msgs::vision_msgs::LabelInfo;
 use nalgebra::Isometry3;
 
 use self::headset_scans::HeadsetScans;
-use self::state::{Caller, Known, Running, Wanted};
+use self::state::{Known, Running, Wanted};
 use crate::convert::calibration::{result_from, set_pose};
 use crate::convert::geometry;
 use crate::map_follower::{FollowError, Followed, MapFollower};
@@ -200,12 +200,7 @@ impl SemanticIcpServer {
         if let Some(wanted) = self.wanted.take() {
             self.answer_failed(wanted.caller, why, out);
         }
-        if let Some(running) = &mut self.running {
-            running.canceled.store(true, Relaxed);
-            running.outdated = true;
-            let caller = running.caller.take();
-            self.answer_failed(caller, why, out);
-        }
+        self.end_running(why, out);
         let result = self.result(CalibrationResult::NONE, why);
         self.publish(result, now_ns, out);
     }
@@ -223,7 +218,7 @@ impl SemanticIcpServer {
                 return out;
             }
         };
-        let caller = Some(Caller { call });
+        let caller = Some(call);
         let asked = self.running.as_ref().is_some_and(|r| r.caller.is_some());
         if asked || self.wanted.is_some() {
             if self.options.when_busy == WhenBusy::Reject {
@@ -236,7 +231,7 @@ impl SemanticIcpServer {
             let wanted = self.wanted.take().and_then(|wanted| wanted.caller);
             self.answer_failed(wanted, why, &mut out);
             self.end_running(why, &mut out);
-        } else if let Some(running) = self.running.as_mut().filter(|r| r.is_search()) {
+        } else if let Some(running) = self.running.as_mut().filter(|r| !r.tracking) {
             if start.is_none() && !running.outdated {
                 // It is at work already.
                 running.caller = caller;
@@ -277,13 +272,9 @@ impl SemanticIcpServer {
     /// A client does not want its request any more.
     pub fn cancel(&mut self, call: CallId) -> Vec<Output> {
         let mut out = Vec::new();
-        let is_it = |caller: &Option<Caller>| caller.as_ref().is_some_and(|c| c.call == call);
-        let mut was_asked = false;
-        if self.wanted.as_ref().is_some_and(|w| is_it(&w.caller)) {
-            self.wanted = None;
-            was_asked = true;
-        }
-        if let Some(running) = self.running.as_mut().filter(|r| is_it(&r.caller)) {
+        let mut was_asked = self.wanted.take_if(|w| w.caller == Some(call)).is_some();
+        let running = self.running.as_mut();
+        if let Some(running) = running.filter(|r| r.caller == Some(call)) {
             running.canceled.store(true, Relaxed);
             running.outdated = true;
             running.caller = None;
@@ -299,7 +290,7 @@ impl SemanticIcpServer {
     /// Takes the progress of a job.
     pub fn on_progress(&self, job: u64, stage: Stage, fraction: f64) -> Option<Output> {
         let running = self.running.as_ref().filter(|r| r.job == job)?;
-        let caller = running.caller.as_ref()?;
+        let call = running.caller?;
         let stage = match stage {
             Stage::Prepare => "prepare",
             Stage::Search => "search",
@@ -310,7 +301,7 @@ impl SemanticIcpServer {
             stage: stage.to_owned(),
             fraction: fraction as f32,
         };
-        Some(Output::Feedback(caller.call, feedback))
+        Some(Output::Feedback(call, feedback))
     }
 
     /// Takes the result of a job.

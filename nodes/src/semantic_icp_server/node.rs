@@ -114,24 +114,11 @@ pub fn start(runtime: &Runtime, name: &str) -> Result<Finish, NodeError> {
         }
     };
     let updates = node.subscribe_undecoded("map_updates", Qos::DELTAS, Load::Small, on_update)?;
-    let to = inbox.clone();
-    let missed = Arc::clone(&lost);
-    let on_cloud = move |message: Arc<PointCloud2>| {
-        let bytes = cloud::bytes_of(&message);
-        let _ = hand_over(&to, Event::Cloud(message), bytes, &missed);
-    };
+    let on_cloud = inbox.counting(&lost, Event::Cloud, |cloud| cloud::bytes_of(cloud));
     let clouds = node.subscribe("headset/points", Qos::SENSOR, Load::Large, on_cloud)?;
-    let to = inbox.clone();
-    let missed = Arc::clone(&lost);
-    let on_session = move |message| {
-        let _ = hand_over(&to, Event::Session(message), 0, &missed);
-    };
+    let on_session = inbox.counting(&lost, Event::Session, |_| 0);
     let sessions = node.subscribe("headset/session", Qos::LATCHED, Load::Small, on_session)?;
-    let to = inbox.clone();
-    let missed = Arc::clone(&lost);
-    let on_info = move |message| {
-        let _ = hand_over(&to, Event::LabelInfo(message), 0, &missed);
-    };
+    let on_info = inbox.counting(&lost, Event::LabelInfo, |_| 0);
     let infos = node.subscribe("headset/label_info", Qos::LATCHED, Load::Small, on_info)?;
 
     let to = inbox.clone();

@@ -82,36 +82,20 @@ impl ServerOptions {
         let defaults = Self::default();
         let semantic = SemanticOptions::from_params(params)?;
         let calibration = calibration_from(params, &semantic)?;
-        let lost_after =
-            params.usize_in("lost_after", defaults.lost_after as usize, 1..=1 << 20)?;
+        let lost_after = defaults.lost_after as usize;
+        let lost_after = params.usize_in("lost_after", lost_after, 1..=1 << 20)?;
+        let scan_period_s = params.f64_in("headset_scan_period_s", 1.0, 0.0..=1e6)?;
+        let searches = [("lost", SearchWhen::Lost), ("asked", SearchWhen::Asked)];
+        let (reject, supersede) = (WhenBusy::Reject, WhenBusy::Supersede);
+        let busy = [("reject", reject), ("supersede", supersede)];
         Ok(Self {
             map_frame: frame(params, "map_frame", &defaults.map_frame)?,
             headset_frame: frame(params, "headset_frame", &defaults.headset_frame)?,
-            max_map_voxels: params.usize_in(
-                "max_map_voxels",
-                defaults.max_map_voxels,
-                1..=usize::MAX,
-            )?,
-            search: one_of(
-                params,
-                "search",
-                &[("lost", SearchWhen::Lost), ("asked", SearchWhen::Asked)],
-            )?,
-            when_busy: one_of(
-                params,
-                "when_busy",
-                &[
-                    ("reject", WhenBusy::Reject),
-                    ("supersede", WhenBusy::Supersede),
-                ],
-            )?,
-            max_headset_scans: params.usize_in(
-                "max_headset_scans",
-                defaults.max_headset_scans,
-                1..=usize::MAX,
-            )?,
-            headset_scan_period_ns: (params.f64_in("headset_scan_period_s", 1.0, 0.0..=1e6)? * 1e9)
-                as i64,
+            max_map_voxels: params.positive("max_map_voxels", defaults.max_map_voxels)?,
+            search: one_of(params, "search", &searches)?,
+            when_busy: one_of(params, "when_busy", &busy)?,
+            max_headset_scans: params.positive("max_headset_scans", defaults.max_headset_scans)?,
+            headset_scan_period_ns: (scan_period_s * 1e9) as i64,
             track: params.bool("track", defaults.track)?,
             lost_after: u32::try_from(lost_after).unwrap_or(u32::MAX),
             doubt_below: params.f64_in("doubt_below", defaults.doubt_below, 0.0..=1.0)?,
@@ -131,11 +115,7 @@ fn calibration_from(
     Ok(CalibrationOptions {
         min_points: params.usize("min_points", d.min_points)?,
         max_points: semantic.max_points,
-        registered_points: params.usize_in(
-            "registered_points",
-            d.registered_points,
-            1..=usize::MAX,
-        )?,
+        registered_points: params.positive("registered_points", d.registered_points)?,
         noise_m: params.f64_in("noise_m", d.noise_m, meters.clone())?,
         region_m: params.f64_in("region_m", d.region_m, 1e-3..=1e4)?,
         scale_sigma: params.f64_in("scale_sigma", d.scale_sigma, 0.0..=0.5)?,

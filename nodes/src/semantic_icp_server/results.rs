@@ -28,12 +28,7 @@ impl SemanticIcpServer {
         let mut result = result_from(found);
         self.describe(&mut result, running.stamp_ns);
         result.duration_s = now_ns.saturating_sub(running.begun_ns) as f64 * 1e-9;
-        result.gazes = running.headset_scans.len() as u32;
-        result.points = running
-            .headset_scans
-            .iter()
-            .map(|g| g.cloud.len() as u64)
-            .sum();
+        (result.gazes, result.points) = running.gazes_and_points();
         let counts = &mut self.counts;
         *match found.verdict {
             Verdict::Ok => &mut counts.searches_ok,
@@ -83,12 +78,12 @@ impl SemanticIcpServer {
             // A further look may tell.
             Verdict::Ambiguous | Verdict::Degenerate => self.missed(),
         }
-        if let Some(caller) = running.caller {
+        if let Some(call) = running.caller {
             let end = match found.verdict {
                 Verdict::Ok => End::Found,
                 _ => End::Failed,
             };
-            out.push(answer(caller.call, end, result.clone()));
+            out.push(answer(call, end, result.clone()));
         }
         self.publish(result, now_ns, out);
     }
@@ -115,8 +110,8 @@ impl SemanticIcpServer {
         self.counts.searches_rejected += 1;
         let reason = format!("the map cannot be used: {why}");
         let result = self.result(CalibrationResult::REJECTED_INPUT, &reason);
-        if let Some(caller) = running.caller {
-            out.push(answer(caller.call, End::Failed, result.clone()));
+        if let Some(call) = running.caller {
+            out.push(answer(call, End::Failed, result.clone()));
         }
         self.publish(result, now_ns, out);
     }
@@ -146,8 +141,11 @@ impl SemanticIcpServer {
         self.counts.tracking_misses += u64::from(update.is_none());
         self.counts.tracking_doubts += u64::from(update.is_some());
         // Is the cloud not what it should be, or the headset not where it was?
-        let (headset_scans, stamp_ns) = (running.headset_scans.clone(), running.stamp_ns);
-        self.begin_search(Wanted::default(), headset_scans, stamp_ns, now_ns, out);
+        let work = Work::Calibrate {
+            headset_scans: running.headset_scans.clone(),
+            start: None,
+        };
+        self.begin(work, None, running.stamp_ns, now_ns, out);
         if let Some(running) = &mut self.running {
             running.doubted = update;
         }
@@ -161,17 +159,13 @@ impl SemanticIcpServer {
         self.misses = 0;
         known.map_from_headset = update.map_from_headset;
         let mut result = known.result.clone();
-        set_pose_only(&mut result, &update.map_from_headset);
+        let covariance = nalgebra::Matrix6::from_row_slice(&result.covariance);
+        set_pose(&mut result, &update.map_from_headset, &covariance);
         result.inlier_fraction = update.inlier_fraction;
         result.rmse_m = update.rmse_m;
         result.method = "tracking".into();
         result.reason = "the look fits where the headset is".into();
-        result.gazes = 1;
-        result.points = running
-            .headset_scans
-            .iter()
-            .map(|g| g.cloud.len() as u64)
-            .sum();
+        (result.gazes, result.points) = running.gazes_and_points();
         result.duration_s = now_ns.saturating_sub(running.begun_ns) as f64 * 1e-9;
         self.describe(&mut result, running.stamp_ns);
         for headset_scan in &running.headset_scans {
@@ -191,9 +185,4 @@ impl SemanticIcpServer {
 fn is_near(a: &Isometry3<f64>, b: &Isometry3<f64>, (distance_m, angle_rad): (f64, f64)) -> bool {
     let moved = a.inverse() * b;
     moved.translation.vector.norm() < distance_m && moved.rotation.angle() < angle_rad
-}
-
-fn set_pose_only(result: &mut CalibrationResult, map_from_headset: &Isometry3<f64>) {
-    let covariance = nalgebra::Matrix6::from_row_slice(&result.covariance);
-    set_pose(result, map_from_headset, &covariance);
 }

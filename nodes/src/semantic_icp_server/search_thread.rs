@@ -1,13 +1,13 @@
 //! Thread that searches, and the way back of what it finds.
 
 use std::io;
-use std::sync::{Arc, Mutex, MutexGuard, PoisonError};
+use std::sync::{Arc, Mutex};
 
 use lattice_core::registration::Stage;
 
 use super::search::{Done, Job, Search};
 use crate::compute::{Compute, ComputeLimits, Inbox};
-use lattice_runtime::Shutdown;
+use lattice_runtime::{Shutdown, lock};
 
 /// News of the searching thread.
 #[derive(Default)]
@@ -26,10 +26,6 @@ pub(super) struct SearchThread {
 pub(super) struct SearchPort {
     inbox: Inbox<Option<Job>>,
     news: Arc<Mutex<News>>,
-}
-
-fn lock<T>(mutex: &Mutex<T>) -> MutexGuard<'_, T> {
-    mutex.lock().unwrap_or_else(PoisonError::into_inner)
 }
 
 impl SearchThread {

@@ -2,16 +2,10 @@
 
 use super::*;
 
-/// Client that waits for an answer.
-#[derive(Clone, Copy, Debug)]
-pub(super) struct Caller {
-    pub call: CallId,
-}
-
-/// A search that is to begin as soon as it can.
+/// A search that is to begin as soon as it can, and who waits for it.
 #[derive(Default)]
 pub(super) struct Wanted {
-    pub caller: Option<Caller>,
+    pub caller: Option<CallId>,
     pub start: Option<Isometry3<f64>>,
 }
 
@@ -25,7 +19,7 @@ pub(super) struct Known {
 /// A job that is being calculated.
 pub(super) struct Running {
     pub job: u64,
-    pub caller: Option<Caller>,
+    pub caller: Option<CallId>,
     pub canceled: Arc<AtomicBool>,
     /// Its outcome is to be ignored.
     pub outdated: bool,
@@ -39,8 +33,13 @@ pub(super) struct Running {
 }
 
 impl Running {
-    pub fn is_search(&self) -> bool {
-        !self.tracking
+    /// Number of looks, and of points in them.
+    pub fn gazes_and_points(&self) -> (u32, u64) {
+        let points = self
+            .headset_scans
+            .iter()
+            .map(|scan| scan.cloud.len() as u64);
+        (self.headset_scans.len() as u32, points.sum())
     }
 }
 
@@ -51,22 +50,17 @@ impl SemanticIcpServer {
             return;
         }
         if let Some(wanted) = self.wanted.take() {
-            self.fresh_cloud = false;
-            let headset_scans = self.headset_scans.all();
-            self.begin_search(
-                wanted,
-                headset_scans,
-                self.headset_scans.stamp_ns(),
-                now_ns,
-                out,
-            );
+            self.search_all(wanted, now_ns, out);
             return;
         }
         if let Some((headset_scan, stamp_ns)) = self.look.take() {
             if let Some(known) = &self.known {
-                let map_from_headset = known.map_from_headset;
                 self.counts.clouds_tracked += 1;
-                self.begin_tracking(headset_scan, map_from_headset, stamp_ns, now_ns, out);
+                let work = Work::Track {
+                    headset_scan,
+                    map_from_headset: known.map_from_headset,
+                };
+                self.begin(work, None, stamp_ns, now_ns, out);
                 return;
             }
             self.headset_scans.push(headset_scan, stamp_ns, now_ns);
@@ -74,90 +68,57 @@ impl SemanticIcpServer {
         }
         let due = self.fresh_cloud && self.known.is_none() && !self.headset_scans.is_empty();
         if due && self.options.search == SearchWhen::Lost && self.has_map() {
-            self.fresh_cloud = false;
             self.counts.clouds_searched += 1;
-            let headset_scans = self.headset_scans.all();
-            let wanted = Wanted::default();
-            self.begin_search(
-                wanted,
-                headset_scans,
-                self.headset_scans.stamp_ns(),
-                now_ns,
-                out,
-            );
+            self.search_all(Wanted::default(), now_ns, out);
         }
     }
 
-    pub(super) fn begin_search(
+    /// Begins a search with all clouds that are kept.
+    fn search_all(&mut self, wanted: Wanted, now_ns: i64, out: &mut Vec<Output>) {
+        self.fresh_cloud = false;
+        let work = Work::Calibrate {
+            headset_scans: self.headset_scans.all(),
+            start: wanted.start,
+        };
+        let stamp_ns = self.headset_scans.stamp_ns();
+        self.begin(work, wanted.caller, stamp_ns, now_ns, out);
+    }
+
+    /// Makes a job of the work, with the map if the searcher has an old one.
+    pub(super) fn begin(
         &mut self,
-        wanted: Wanted,
-        headset_scans: Vec<Arc<HeadsetScan>>,
+        work: Work,
+        caller: Option<CallId>,
         stamp_ns: i64,
         now_ns: i64,
         out: &mut Vec<Output>,
     ) {
-        let work = Work::Calibrate {
-            headset_scans: headset_scans.clone(),
-            start: wanted.start,
+        let (headset_scans, map_age_ns) = match &work {
+            Work::Calibrate { headset_scans, .. } => (headset_scans.clone(), 0),
+            Work::Track { headset_scan, .. } => {
+                (vec![Arc::clone(headset_scan)], self.options.map_refresh_ns)
+            }
         };
-        let map = self.map_to_prepare(now_ns, 0);
-        let canceled = self.begin(work, map, out);
-        self.running = Some(Running {
+        self.next_job += 1;
+        let running = Running {
             job: self.next_job,
-            caller: wanted.caller,
-            canceled,
+            caller,
+            canceled: Arc::default(),
             outdated: false,
             begun_ns: now_ns,
             stamp_ns,
             headset_scans,
-            tracking: false,
+            tracking: matches!(work, Work::Track { .. }),
             doubted: None,
-        });
-    }
-
-    fn begin_tracking(
-        &mut self,
-        headset_scan: Arc<HeadsetScan>,
-        map_from_headset: Isometry3<f64>,
-        stamp_ns: i64,
-        now_ns: i64,
-        out: &mut Vec<Output>,
-    ) {
-        let work = Work::Track {
-            headset_scan: Arc::clone(&headset_scan),
-            map_from_headset,
         };
-        let map = self.map_to_prepare(now_ns, self.options.map_refresh_ns);
-        let canceled = self.begin(work, map, out);
-        self.running = Some(Running {
-            job: self.next_job,
-            caller: None,
-            canceled,
-            outdated: false,
-            begun_ns: now_ns,
-            stamp_ns,
-            headset_scans: vec![headset_scan],
-            tracking: true,
-            doubted: None,
-        });
-    }
-
-    fn begin(
-        &mut self,
-        work: Work,
-        map: Option<MapCloud>,
-        out: &mut Vec<Output>,
-    ) -> Arc<AtomicBool> {
-        self.next_job += 1;
-        let canceled = Arc::new(AtomicBool::new(false));
         out.push(Output::Job(Job {
             id: self.next_job,
             unlearn: std::mem::take(&mut self.unlearn),
-            map,
+            map: self.map_to_prepare(now_ns, map_age_ns),
             work,
-            canceled: Arc::clone(&canceled),
+            canceled: Arc::clone(&running.canceled),
         }));
-        canceled
+        self.running = Some(running);
     }
 
     /// The map, if it has changed since the searcher got it and that was `age_ns` ago.
@@ -188,10 +149,10 @@ impl SemanticIcpServer {
         self.answer_failed(caller, why, out);
     }
 
-    pub(super) fn answer_failed(&self, caller: Option<Caller>, why: &str, out: &mut Vec<Output>) {
-        if let Some(caller) = caller {
+    pub(super) fn answer_failed(&self, caller: Option<CallId>, why: &str, out: &mut Vec<Output>) {
+        if let Some(call) = caller {
             let result = self.result(CalibrationResult::NONE, why);
-            out.push(answer(caller.call, End::Failed, result));
+            out.push(answer(call, End::Failed, result));
         }
     }
 

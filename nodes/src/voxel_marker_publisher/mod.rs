@@ -6,11 +6,9 @@ mod blocks;
 mod color;
 pub mod node;
 mod options;
-mod report;
 mod shape;
 
 pub use options::{ColorBy, MarkerOptions, MarkerStyle};
-pub use report::MarkerReport;
 
 use std::collections::BTreeSet;
 
@@ -44,6 +42,21 @@ pub struct MarkerCounts {
     pub markers_added: u64,
     /// Markers deleted.
     pub markers_deleted: u64,
+}
+
+/// The end of a `voxel_marker_publisher`.
+#[derive(Clone, Debug, Default, PartialEq, Serialize, Deserialize)]
+pub struct MarkerReport {
+    /// Everything counted by the state machine.
+    pub counts: MarkerCounts,
+    /// Voxels of the map that it followed.
+    pub voxels: usize,
+    /// Bytes of all current markers as CDR: what a viewer that joins now receives.
+    pub marker_bytes: usize,
+    /// Bytes given out over the whole run.
+    pub published_bytes: u64,
+    /// Arrays that could not be given to the publisher.
+    pub arrays_not_published: u64,
 }
 
 /// Follows a map and keeps the markers of its blocks up to date.

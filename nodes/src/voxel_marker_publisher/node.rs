@@ -40,7 +40,7 @@ pub fn start(runtime: &Runtime, name: &str) -> Result<Finish, NodeError> {
         threads: options::threads(params, 1)?,
     };
     let rate_hz = params.f64_in("rate_hz", 5.0, 0.1..=100.0)?;
-    let bytes_per_s = params.usize_in("max_bytes_per_s", 20_000_000, 1..=usize::MAX)?;
+    let bytes_per_s = params.positive("max_bytes_per_s", 20_000_000)?;
     let mapper = params.string("mapper", "lattice_mapper")?;
     let publisher = node.publisher("voxel_markers", Qos::MARKERS)?;
     let lost = Arc::new(AtomicBool::new(false));

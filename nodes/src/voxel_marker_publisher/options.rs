@@ -69,20 +69,17 @@ impl MarkerOptions {
             ("points", MarkerStyle::Points),
         ];
         let colors = [("height", ColorBy::Height), ("flat", ColorBy::Flat)];
+        let period_m = defaults.height_period_m;
         let block_bits = params.usize_in("block_bits", defaults.block_bits as usize, 1..=10)?;
         Ok(Self {
             style: one_of(params, "style", &styles)?,
             color_by: one_of(params, "color_by", &colors)?,
-            height_period_m: params.f64_in(
-                "height_period_m",
-                defaults.height_period_m,
-                1e-3..=1e9,
-            )?,
+            height_period_m: params.f64_in("height_period_m", period_m, 1e-3..=1e9)?,
             alpha: params.f64_in("alpha", f64::from(defaults.alpha), 0.01..=1.0)? as f32,
             block_bits: block_bits as u32,
             chunk_bytes: chunk_bytes(params, defaults.chunk_bytes)?,
             max_marker_voxels: params.usize("max_marker_voxels", defaults.max_marker_voxels)?,
-            max_voxels: params.usize_in("max_voxels", defaults.max_voxels, 1..=usize::MAX)?,
+            max_voxels: params.positive("max_voxels", defaults.max_voxels)?,
         })
     }
 }

@@ -1,13 +1,14 @@
 //! The markers of one block: true cells, cubes or points.
 
-use lattice_msgs::geometry_msgs::{Point, Pose, Quaternion, Vector3 as ScaleVector};
+use lattice_msgs::geometry_msgs::{Point, Vector3 as ScaleVector};
 use lattice_msgs::std_msgs::ColorRGBA;
 use lattice_msgs::visualization_msgs::Marker;
-use nalgebra::{UnitQuaternion, Vector3};
+use nalgebra::{Isometry3, UnitQuaternion, Vector3};
 
 use super::blocks::{BlockId, Blocks, offset};
 use super::options::{ColorBy, MarkerOptions, MarkerStyle};
 use super::{OVERHEAD_BYTES, color};
+use crate::convert::geometry;
 use crate::map_follower::FollowedMap;
 
 /// Markers of a block, without header and ids; none when nothing of it is exposed.
@@ -34,12 +35,8 @@ pub fn of_block(
         });
         if style == MarkerStyle::Cells {
             for face in exposed {
-                let corners: Vec<Vector3<f64>> = face
-                    .vertices
-                    .iter()
-                    .filter_map(|&i| cell.vertices.get(usize::from(i)))
-                    .map(|corner| center_m + corner)
-                    .collect();
+                let corner = |&i: &u16| Some(center_m + cell.vertices.get(usize::from(i))?);
+                let corners: Vec<_> = face.vertices.iter().filter_map(corner).collect();
                 builder.polygon(&corners);
             }
         } else if exposed.next().is_some() {
@@ -114,10 +111,12 @@ impl<'a> Builder<'a> {
             z: p.z,
         });
         if self.options.color_by == ColorBy::Height {
-            let period_m = self.options.height_period_m;
-            let color = color::of_height(at_m.z, period_m, self.options.alpha);
-            self.colors.push(color);
+            self.colors.push(self.color(at_m.z));
         }
+    }
+
+    fn color(&self, z_m: f64) -> ColorRGBA {
+        color::of_height(z_m, self.options.height_period_m, self.options.alpha)
     }
 
     fn close(&mut self) {
@@ -129,30 +128,17 @@ impl<'a> Builder<'a> {
             MarkerStyle::Cubes => (Marker::CUBE_LIST, self.side_m),
             MarkerStyle::Points => (Marker::POINTS, 0.5 * self.side_m),
         };
-        let mut pose = Pose::default();
-        pose.position.x = self.origin_m.x;
-        pose.position.y = self.origin_m.y;
-        pose.position.z = self.origin_m.z;
-        pose.orientation = Quaternion {
-            x: self.rotation.i,
-            y: self.rotation.j,
-            z: self.rotation.k,
-            w: self.rotation.w,
-        };
+        let place = Isometry3::from_parts(self.origin_m.into(), self.rotation);
         self.markers.push(Marker {
             type_,
             action: Marker::ADD,
-            pose,
+            pose: geometry::pose_from(&place),
             scale: ScaleVector {
                 x: scale,
                 y: scale,
                 z: scale,
             },
-            color: color::of_height(
-                self.origin_m.z,
-                self.options.height_period_m,
-                self.options.alpha,
-            ),
+            color: self.color(self.origin_m.z),
             points: std::mem::take(&mut self.points),
             colors: std::mem::take(&mut self.colors),
             ..Marker::default()

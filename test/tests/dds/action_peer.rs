@@ -13,16 +13,10 @@ use lattice_test::domain::TestDomain;
 use ros2_client::action::{ActionClientQosPolicies, GoalId};
 use ros2_client::action_msgs::{CancelGoalResponseEnum, GoalStatusEnum};
 use ros2_client::builtin_interfaces::Time;
-use ros2_client::qos::WhenFull;
-use ros2_client::{
-    ActionClient, ActionTypeName, Context, Message, Name, Node, NodeName, NodeOptions, QosProfile,
-    ServiceMapping,
-};
-use rustdds::DomainParticipantBuilder;
-use serde::{Deserialize, Serialize};
+use ros2_client::{ActionClient, ActionTypeName, Name, Node, ServiceMapping};
 
-/// Long enough for a loaded machine; a test that passes does not wait for it.
-const PATIENCE: Duration = Duration::from_secs(60);
+use super::client::{Foreign, PATIENCE, peer, reliable};
+
 const LIMITS: ActionLimits = ActionLimits {
     max_live: 2,
     max_results: 4,
@@ -30,39 +24,17 @@ const LIMITS: ActionLimits = ActionLimits {
     keep_results: PATIENCE,
 };
 
-/// Gives one of our messages to ros2-client.
-#[derive(Clone, Debug, Serialize, Deserialize)]
-#[serde(transparent)]
-struct Foreign<M>(M);
-
-impl<M: Serialize + serde::de::DeserializeOwned> Message for Foreign<M> {}
-
 type Client =
     ActionClient<Foreign<CalibrateGoal>, Foreign<CalibrateResult>, Foreign<CalibrateFeedback>>;
 type Goals = Receiver<(CalibrateGoal, GoalHandle<CalibrateAction>)>;
 
-fn peer(domain: &TestDomain) -> Node {
-    let participant = DomainParticipantBuilder::new(domain.id())
-        .with_only_networks([std::net::Ipv4Addr::LOCALHOST])
-        .build()
-        .unwrap();
-    let context = Context::from_domain_participant(participant).unwrap();
-    let options = NodeOptions::new().start_parameter_services(false);
-    let name = NodeName::new("/", "peer").unwrap();
-    let mut node = context.new_node(name, options).unwrap();
-    let spinner = node.spinner().unwrap();
-    smol::spawn(spinner.spin()).detach();
-    node
-}
-
 fn client(peer: &mut Node, mapping: ServiceMapping) -> Client {
-    let qos = || QosProfile::publisher_default().reliability_reliable(WhenFull::Fail);
     let policies = ActionClientQosPolicies {
-        goal_service: qos(),
-        result_service: qos(),
-        cancel_service: qos(),
-        feedback_subscription: qos(),
-        status_subscription: qos(),
+        goal_service: reliable(),
+        result_service: reliable(),
+        cancel_service: reliable(),
+        feedback_subscription: reliable(),
+        status_subscription: reliable(),
     };
     let name = Name::parse("/mapper/find").unwrap();
     let type_name = ActionTypeName::new("lattice_msgs", "Calibrate");

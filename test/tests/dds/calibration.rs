@@ -3,18 +3,16 @@
 //! Loopback only, no multicast. The headset is `python/calibration_peer.py`.
 
 use std::fs;
-use std::process::{Command, Stdio};
 
 use lattice_core::pose::Axes;
-use lattice_nodes::executables;
-use lattice_runtime::Runtime;
-use lattice_runtime::ros_args::RosArgs;
 use lattice_test::clouds::{cloud, labelled_cloud};
 use lattice_test::domain::TestDomain;
 use lattice_test::flat::{Flat, headset_cloud};
-use lattice_test::python::{python, script};
+use lattice_test::python::python;
 use nalgebra::{Isometry3, Point3, Quaternion, Translation3, UnitQuaternion, Vector3};
 use serde_json::{Value, json};
+
+use super::peer::{self, Nodes, params};
 
 /// More than `max_cloud_points`.
 const TOO_MANY: usize = 600_000;
@@ -68,44 +66,16 @@ fn a_cyclone_headset_is_found_and_every_bad_cloud_refused() {
     let scenario = json!({"domain": domain.id()});
     fs::write(path.join("scenario.json"), scenario.to_string()).unwrap();
 
-    let start = |name: &str, params: &[&str]| {
-        let args = params.iter().flat_map(|param| ["-p", param]);
-        let args = ["--ros-args"].into_iter().chain(args).map(str::to_owned);
-        let args = RosArgs::parse(args).unwrap();
-        let runtime = Runtime::with_transport(name, args, &domain.transport()).unwrap();
-        let finish = executables::find(name).unwrap()(&runtime, name).unwrap();
-        (runtime, finish)
-    };
+    let mapper = "cell_volume_m3:=0.000125 keep_labels:=true qos.points_enu.reliability:=reliable";
+    let server = "headset_axes:=unity_ruf require_labels:=true \
+                  qos.headset/points.reliability:=reliable";
     let nodes = [
-        start(
-            "lattice_mapper",
-            &[
-                "cell_volume_m3:=0.000125",
-                "keep_labels:=true",
-                "qos.points_enu.reliability:=reliable",
-            ],
-        ),
-        start(
-            "semantic_icp_server",
-            &[
-                "headset_axes:=unity_ruf",
-                "require_labels:=true",
-                "qos.headset/points.reliability:=reliable",
-            ],
-        ),
+        ("lattice_mapper", params(mapper)),
+        ("semantic_icp_server", params(server)),
     ];
-    let output = Command::new(python)
-        .arg(script("calibration_peer.py"))
-        .arg(path)
-        .stderr(Stdio::inherit())
-        .output()
-        .unwrap();
-    for (runtime, finish) in nodes {
-        finish();
-        drop(runtime);
-    }
-    assert!(output.status.success(), "the peer: {}", output.status);
-    let found: Value = serde_json::from_slice(&output.stdout).unwrap();
+    let nodes = Nodes::start(&domain, &nodes);
+    let found = peer::run(&python, "calibration_peer.py", &[path]);
+    nodes.finish();
 
     eprintln!("searched, then tracked, s: {}", found["duration_s"]);
     assert_eq!(found["no_map"], "there is no map yet");
@@ -131,10 +101,8 @@ fn a_cyclone_headset_is_found_and_every_bad_cloud_refused() {
     assert_eq!(found["tf"][1], "headset_origin");
     assert_true(&found["tf"][2]);
 
-    assert_eq!(
-        (&found["service"][0], &found["service"][1]),
-        (&json!(true), &json!(1))
-    );
+    assert_eq!(found["service"][0], true);
+    assert_eq!(found["service"][1], 1);
     assert_true(&found["service"][2]);
     assert_eq!(found["other_session"][0], false);
     let message = found["other_session"][1].as_str().unwrap();
@@ -144,24 +112,16 @@ fn a_cyclone_headset_is_found_and_every_bad_cloud_refused() {
     assert_eq!(found["busy"][0], 6);
     let message = found["busy"][1].as_str().unwrap();
     assert!(message.contains("busy"), "{message}");
-    assert_eq!(
-        (&found["action"][0], &found["action"][1]),
-        (&json!(4), &json!(true))
-    );
+    assert_eq!(found["action"][0], 4);
+    assert_eq!(found["action"][1], true);
     assert_true(&found["action"][2]);
     assert_eq!(found["again"], 4, "the result is kept");
     let fractions: Vec<f64> = serde_json::from_value(found["fractions"].clone()).unwrap();
-    assert!(
-        !fractions.is_empty() && fractions.is_sorted(),
-        "{fractions:?}"
-    );
+    assert!(!fractions.is_empty() && fractions.is_sorted());
     assert_eq!(found["unknown"], json!([0, 2]));
     assert_eq!(found["terminated"], 3);
-    assert_eq!(
-        found["canceling"],
-        json!([true]),
-        "no search was long enough to be canceled"
-    );
+    let short = "no search was long enough to be canceled";
+    assert_eq!(found["canceling"], json!([true]), "{short}");
     assert_eq!(found["canceled"], json!([5, false, 0]));
 
     let counts = &found["diagnostics"];

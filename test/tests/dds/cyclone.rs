@@ -4,7 +4,6 @@
 
 use std::fs;
 use std::path::Path;
-use std::process::{Command, Stdio};
 use std::sync::Arc;
 
 use lattice_core::lattice::{Lattice, LatticeKind};
@@ -12,21 +11,19 @@ use lattice_msgs::sensor_msgs::{PointCloud2, PointField};
 use lattice_nodes::enu_transformer::TransformerReport;
 use lattice_nodes::enu_transformer::ins::{InsMessage, InsSource};
 use lattice_nodes::enu_transformer::{EnuOutput, EnuTransformer, TransformerOptions};
-use lattice_nodes::executables;
 use lattice_nodes::lattice_mapper::MapperReport;
 use lattice_nodes::lattice_mapper::{LatticeMapper, MapperOptions};
 use lattice_nodes::report;
-use lattice_nodes::start::Finish;
 use lattice_nodes::voxel_marker_publisher::MarkerReport;
-use lattice_runtime::Runtime;
-use lattice_runtime::ros_args::RosArgs;
 use lattice_test::clouds::{field, header, odometry};
 use lattice_test::domain::TestDomain;
-use lattice_test::python::{python, script};
+use lattice_test::python::python;
 use nalgebra::{Isometry3, Translation3, UnitQuaternion};
 use serde::Deserialize;
 use serde_bytes::ByteBuf;
 use serde_json::{Value, json};
+
+use super::peer::{self, Nodes, params};
 
 const CELL_VOLUME_M3: f64 = 0.125;
 /// 100 Hz.
@@ -97,63 +94,23 @@ fn pose_rows(poses: usize) -> Vec<Value> {
     (0..poses).map(row).collect()
 }
 
-/// The three nodes, each with a participant of its own.
-struct Nodes(Vec<(Runtime, Finish)>);
-
-impl Nodes {
-    fn start(domain: &TestDomain, reports: &Path) -> Self {
-        let start = |name: &str, params: &[&str]| {
-            let file = format!("report_file:={}", reports.join(name).display());
-            let params = params.iter().copied().chain([file.as_str()]);
-            let args = params.flat_map(|param| ["-p".to_owned(), param.to_owned()]);
-            let args = ["--ros-args".to_owned()].into_iter().chain(args);
-            let args = RosArgs::parse(args).unwrap();
-            let runtime = Runtime::with_transport(name, args, &domain.transport()).unwrap();
-            let finish = executables::find(name).unwrap()(&runtime, name).unwrap();
-            (runtime, finish)
-        };
-        Self(vec![
-            start(
-                "enu_transformer",
-                &[
-                    "ins.source:=odometry",
-                    "ins.topic:=/ins/odometry",
-                    "points_topics:=['/points']",
-                    "qos./ins/odometry.reliability:=reliable",
-                    "qos./points.reliability:=reliable",
-                    "qos.points_enu.reliability:=reliable",
-                ],
-            ),
-            start(
-                "lattice_mapper",
-                &[
-                    "lattice:=fcc",
-                    "cell_volume_m3:=0.125",
-                    "qos.points_enu.reliability:=reliable",
-                ],
-            ),
-            start("voxel_marker_publisher", &["color_by:=flat"]),
-        ])
-    }
-
-    fn finish(self) {
-        for (runtime, finish) in self.0 {
-            finish();
-            drop(runtime);
-        }
-    }
-}
-
-/// Runs the peer to its end and reads the line that it prints.
-fn peer(python: &Path, command: &str, directory: &Path) -> Value {
-    let output = Command::new(python)
-        .arg(script("dds_peer.py"))
-        .args([command.as_ref(), directory.as_os_str()])
-        .stderr(Stdio::inherit())
-        .output()
-        .unwrap();
-    assert!(output.status.success(), "dds_peer.py: {}", output.status);
-    serde_json::from_slice(&output.stdout).unwrap()
+/// The three nodes, which write reports.
+fn start(domain: &TestDomain, reports: &Path) -> Nodes {
+    let transformer = "ins.source:=odometry ins.topic:=/ins/odometry points_topics:=['/points'] \
+                       qos./ins/odometry.reliability:=reliable qos./points.reliability:=reliable \
+                       qos.points_enu.reliability:=reliable";
+    let mapper = "lattice:=fcc cell_volume_m3:=0.125 qos.points_enu.reliability:=reliable";
+    let nodes = [
+        ("enu_transformer", transformer),
+        ("lattice_mapper", mapper),
+        ("voxel_marker_publisher", "color_by:=flat"),
+    ];
+    let nodes = nodes.map(|(name, line)| {
+        let mut params = params(line);
+        params.push(format!("report_file:={}", reports.join(name).display()));
+        (name, params)
+    });
+    Nodes::start(domain, &nodes)
 }
 
 /// Voxels of a map, in the order of their keys.
@@ -213,8 +170,8 @@ fn a_cyclone_peer_feeds_the_nodes_and_rebuilds_the_map() {
         "clouds": files,
     });
     fs::write(path.join("scenario.json"), scenario.to_string()).unwrap();
-    let nodes = Nodes::start(&domain, path);
-    let found = peer(&python, "map", path);
+    let nodes = start(&domain, path);
+    let found = peer::run(&python, "dds_peer.py", &[Path::new("map"), path]);
     nodes.finish();
 
     let direct = mapped_directly(&clouds);
@@ -222,10 +179,7 @@ fn a_cyclone_peer_feeds_the_nodes_and_rebuilds_the_map() {
     let rebuilt: Voxels = serde_json::from_slice(&rebuilt).unwrap();
     assert!(direct.keys.len() > 3000, "{} voxels", direct.keys.len());
     // Not assert_eq: it would print all voxels.
-    assert!(
-        rebuilt == direct,
-        "rebuilt over DDS, and directly: not the same voxels"
-    );
+    assert!(rebuilt == direct, "over DDS, and directly: other voxels");
 
     let empty = json!([]);
     assert_eq!(found["cloud_bytes"], 2_080_000);
@@ -234,10 +188,8 @@ fn a_cyclone_peer_feeds_the_nodes_and_rebuilds_the_map() {
     assert_eq!(found["centers_equal_map"], true);
     assert_eq!(found["centers_frame"], "map");
     assert_eq!(found["frame"], "map");
-    assert_eq!(
-        (&found["lattice"], &found["cell_volume_m3"]),
-        (&json!("fcc"), &json!(0.125))
-    );
+    assert_eq!(found["lattice"], "fcc");
+    assert_eq!(found["cell_volume_m3"], 0.125);
     assert_eq!(found["datum_m"], json!([0.0, 0.0, 0.0]));
     assert_eq!(found["marker_kinds"], json!([["map", 11]]));
     assert_eq!(found["wrong_triangles"], 0);
@@ -245,33 +197,21 @@ fn a_cyclone_peer_feeds_the_nodes_and_rebuilds_the_map() {
     assert!(found["triangles"].as_u64() > Some(10_000), "{found}");
     assert!(found["generator_error_m"].as_f64() < Some(1e-12), "{found}");
     // Single precision, up to 32 m from the datum.
-    assert!(
-        found["centers_off_lattice_m"].as_f64() < Some(2e-6),
-        "{found}"
-    );
+    let off_m = found["centers_off_lattice_m"].as_f64();
+    assert!(off_m < Some(2e-6), "{off_m:?}");
     // A border takes a point in ten thousand: the comparison leaves out next to nothing.
     assert!(found["on_borders"].as_u64() < Some(200), "{found}");
 
     let transformer: TransformerReport = report::read(&path.join("enu_transformer")).unwrap();
-    assert_eq!(
-        (transformer.counts.clouds_in, transformer.counts.clouds_out),
-        (3, 3)
-    );
-    assert!(
-        transformer.dropped().is_empty(),
-        "{:?}",
-        transformer.dropped()
-    );
+    let (counts, dropped) = (&transformer.counts, transformer.dropped());
+    assert_eq!((counts.clouds_in, counts.clouds_out), (3, 3));
+    assert!(dropped.is_empty(), "{dropped:?}");
     let mapper: MapperReport = report::read(&path.join("lattice_mapper")).unwrap();
-    assert_eq!(
-        (mapper.counts.clouds_in, mapper.voxels),
-        (3, direct.keys.len())
-    );
+    assert_eq!(mapper.counts.clouds_in, 3);
+    assert_eq!(mapper.voxels, direct.keys.len());
     let markers: MarkerReport = report::read(&path.join("voxel_marker_publisher")).unwrap();
-    assert_eq!(
-        (markers.voxels, markers.arrays_not_published),
-        (direct.keys.len(), 0)
-    );
+    assert_eq!(markers.arrays_not_published, 0);
+    assert_eq!(markers.voxels, direct.keys.len());
 }
 
 #[test]
@@ -282,8 +222,8 @@ fn a_cyclone_peer_hears_transforms_and_diagnostics_and_calls_a_service() {
     let domain = TestDomain::take();
     let scenario = json!({"domain": domain.id(), "odometry": pose_rows(20)});
     fs::write(path.join("scenario.json"), scenario.to_string()).unwrap();
-    let nodes = Nodes::start(&domain, path);
-    let found = peer(&python, "graph", path);
+    let nodes = start(&domain, path);
+    let found = peer::run(&python, "dds_peer.py", &[Path::new("graph"), path]);
     nodes.finish();
 
     assert_eq!(found["replies"], json!([[true, true, true]]), "{found}");

@@ -3,7 +3,8 @@
 
 mod action_peer;
 mod calibration;
+mod client;
 mod cyclone;
+mod peer;
 mod ros2_client_peer;
-mod ros_args_grammar;
 mod transport;

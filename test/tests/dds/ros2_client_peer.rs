@@ -1,7 +1,6 @@
 //! The runtime against ros2-client as a peer: services by both rmw mappings, parameters, the graph.
 
 use std::sync::mpsc::channel;
-use std::time::Duration;
 
 use futures::StreamExt;
 use lattice_msgs::rcl_interfaces::{GetParametersRequest, GetParametersResponse};
@@ -9,23 +8,13 @@ use lattice_msgs::std_srvs::{Trigger, TriggerRequest, TriggerResponse};
 use lattice_runtime::Runtime;
 use lattice_runtime::ros_args::RosArgs;
 use lattice_test::domain::TestDomain;
-use ros2_client::qos::WhenFull;
-use ros2_client::{
-    Context, Message, Name, Node, NodeEvent, NodeName, NodeOptions, QosProfile, ServiceMapping,
-    ServiceTypeName,
-};
-use rustdds::DomainParticipantBuilder;
-use serde::{Deserialize, Serialize};
+use ros2_client::{Message, Name, Node, NodeEvent, ServiceMapping, ServiceTypeName};
 
-/// Long enough for a loaded machine; a test that passes does not wait for it.
-const PATIENCE: Duration = Duration::from_secs(60);
+use super::client::{Foreign, PATIENCE, peer, reliable};
 
-/// Gives one of our messages to ros2-client.
-#[derive(Clone, Debug, Serialize, Deserialize)]
-#[serde(transparent)]
-struct Foreign<M>(M);
+const MAPPINGS: [ServiceMapping; 2] = [ServiceMapping::Enhanced, ServiceMapping::Cyclone];
 
-impl<M: Serialize + serde::de::DeserializeOwned> Message for Foreign<M> {}
+const TRIGGER: (&str, &str) = ("std_srvs", "Trigger");
 
 fn runtime(domain: &TestDomain, args: &[&str]) -> Runtime {
     let args = args.iter().map(|&arg| arg.to_owned());
@@ -33,38 +22,18 @@ fn runtime(domain: &TestDomain, args: &[&str]) -> Runtime {
     Runtime::with_transport("mapper", args, &domain.transport()).unwrap()
 }
 
-/// A node of ros2-client with its spinner running.
-fn peer(domain: &TestDomain) -> Node {
-    let participant = DomainParticipantBuilder::new(domain.id())
-        .with_only_networks([std::net::Ipv4Addr::LOCALHOST])
-        .build()
-        .unwrap();
-    let context = Context::from_domain_participant(participant).unwrap();
-    let options = NodeOptions::new().start_parameter_services(false);
-    let mut node = context
-        .new_node(NodeName::new("/", "peer").unwrap(), options)
-        .unwrap();
-    let spinner = node.spinner().unwrap();
-    smol::spawn(spinner.spin()).detach();
-    node
-}
-
 /// Calls a service, again until the endpoints on both sides know each other.
-fn call<Q, R>(
+fn call<Q: Message + Clone + 'static, R: Message + 'static>(
     peer: &mut Node,
     mapping: ServiceMapping,
     service: &str,
-    type_name: &ServiceTypeName,
+    type_name: (&str, &str),
     request: Q,
-) -> R
-where
-    Q: Message + Clone + 'static,
-    R: Message + 'static,
-{
-    let qos = QosProfile::publisher_default().reliability_reliable(WhenFull::Fail);
+) -> R {
     let name = Name::parse(service).unwrap();
+    let type_name = ServiceTypeName::new(type_name.0, type_name.1);
     let client = peer
-        .create_client::<Q, R>(mapping, &name, type_name, qos.clone(), qos)
+        .create_client::<Q, R>(mapping, &name, &type_name, reliable(), reliable())
         .unwrap();
     let answer = async {
         client.wait_for_service(peer).await;
@@ -91,16 +60,12 @@ fn a_trigger_answers_clients_of_both_rmw() {
         })
         .unwrap();
     assert_eq!(server.name(), "/mapper/reset");
-    let type_name = ServiceTypeName::new("std_srvs", "Trigger");
-    for (i, mapping) in [ServiceMapping::Enhanced, ServiceMapping::Cyclone]
-        .into_iter()
-        .enumerate()
-    {
+    for (i, mapping) in MAPPINGS.into_iter().enumerate() {
         // Two clients of one participant would see each other's replies.
         let mut peer = peer(&domain);
         let request = Foreign(TriggerRequest::default());
         let reply: Foreign<TriggerResponse> =
-            call(&mut peer, mapping, "/mapper/reset", &type_name, request);
+            call(&mut peer, mapping, "/mapper/reset", TRIGGER, request);
         let expected = TriggerResponse {
             success: true,
             message: format!("call {}", i + 1),
@@ -126,9 +91,8 @@ fn an_answer_given_at_the_end_reaches_its_client() {
         .unwrap();
     let mut peer = peer(&domain);
     let client = std::thread::spawn(move || {
-        let type_name = ServiceTypeName::new("std_srvs", "Trigger");
         let (mapping, request) = (ServiceMapping::Enhanced, Foreign(TriggerRequest::default()));
-        call(&mut peer, mapping, "/mapper/save_map", &type_name, request)
+        call(&mut peer, mapping, "/mapper/save_map", TRIGGER, request)
     });
     let saved = TriggerResponse {
         success: true,
@@ -145,19 +109,15 @@ fn an_answer_given_at_the_end_reaches_its_client() {
 fn parameters_are_served_to_clients_of_both_rmw() {
     let domain = TestDomain::take();
     let runtime = runtime(&domain, &["--ros-args", "-p", "max_message_bytes:=5000"]);
-    let type_name = ServiceTypeName::new("rcl_interfaces", "GetParameters");
-    for mapping in [ServiceMapping::Enhanced, ServiceMapping::Cyclone] {
+    let type_name = ("rcl_interfaces", "GetParameters");
+    for mapping in MAPPINGS {
         let mut peer = peer(&domain);
         let request = Foreign(GetParametersRequest {
             names: vec!["max_message_bytes".to_owned(), "none".to_owned()],
         });
-        let reply: Foreign<GetParametersResponse> = call(
-            &mut peer,
-            mapping,
-            "/mapper/get_parameters",
-            &type_name,
-            request,
-        );
+        let service = "/mapper/get_parameters";
+        let reply: Foreign<GetParametersResponse> =
+            call(&mut peer, mapping, service, type_name, request);
         let values: Vec<_> = reply.0.values.iter().map(|v| v.integer_value).collect();
         assert_eq!(values, [5000, 0], "{mapping:?}");
     }

@@ -2,9 +2,10 @@
 
 use std::sync::Arc;
 
-use lattice_core::lattice::{Lattice, LatticeKind};
+use lattice_core::lattice::LatticeKind;
 use lattice_core::raycast::Evidence;
 use lattice_core::voxels::file::{MapContents, WriteOptions};
+use lattice_msgs::geometry_msgs::Point;
 use lattice_msgs::lattice::{ClearBoxRequest, QueryMapRequest};
 use lattice_msgs::sensor_msgs::PointCloud2;
 use lattice_nodes::convert::map::lattice_from;
@@ -14,8 +15,9 @@ use lattice_nodes::enu_transformer::{EnuOutput, EnuTransformer, TransformerOptio
 use lattice_nodes::lattice_mapper::{
     FreeSpaceMethod, LatticeMapper, MapPayload, MappedFreeSpace, MapperOptions,
 };
-use lattice_nodes::map_follower::{Followed, MapFollower};
+use lattice_nodes::map_follower::MapFollower;
 use lattice_test::clouds::{SECOND_NS, cloud, odometry, timed_cloud};
+use lattice_test::maps::{self, follow_update, follower};
 use nalgebra::{Isometry3, Vector3};
 
 const STEP_NS: i64 = SECOND_NS / 100;
@@ -42,10 +44,8 @@ impl Machine {
 
     fn drive(&mut self) -> Vec<EnuOutput> {
         let east_m = self.step as f64 * 0.01;
-        let pose = odometry(
-            self.step * STEP_NS,
-            &Isometry3::translation(east_m, 0.0, 0.0),
-        );
+        let place = Isometry3::translation(east_m, 0.0, 0.0);
+        let pose = odometry(self.step * STEP_NS, &place);
         self.step += 1;
         let now_ns = pose.header.stamp.to_ns();
         self.transformer.on_ins(InsMessage::Odometry(&pose), now_ns)
@@ -81,17 +81,16 @@ fn options(method: FreeSpaceMethod, payload: MapPayload) -> MapperOptions {
             free_level: u32::from(method == FreeSpaceMethod::Evidence),
             ..MappedFreeSpace::default()
         },
-        ..MapperOptions::new(Lattice::new(LatticeKind::Fcc, 0.027).unwrap())
+        ..maps::options(LatticeKind::Fcc, 0.027)
     }
 }
 
 fn each_mapper() -> impl Iterator<Item = LatticeMapper> {
     let methods = [FreeSpaceMethod::Clear, FreeSpaceMethod::Evidence];
     let payloads = [MapPayload::Centroid, MapPayload::Occupancy];
-    let all = methods
-        .into_iter()
-        .flat_map(move |m| payloads.map(|p| (m, p)));
-    all.map(|(method, payload)| LatticeMapper::new(options(method, payload), 7).unwrap())
+    let methods = methods.into_iter();
+    let all = methods.flat_map(move |m| payloads.map(|p| options(m, p)));
+    all.map(maps::mapper)
 }
 
 /// The follower has exactly the mapper's cells, at their places.
@@ -132,18 +131,13 @@ fn the_sensor_is_where_it_was_at_the_time_of_each_point() {
 fn what_stood_in_the_way_goes_from_the_map_and_from_its_followers() {
     for mut mapper in each_mapper() {
         let mut machine = Machine::new();
-        let mut follower = MapFollower::new(1_000_000);
-        for chunk in mapper.keyframe() {
-            assert_eq!(follower.on_map(&chunk).unwrap(), Followed::Applied);
-        }
+        let mut follower = follower(&mut mapper);
         let is_near =
             |p: &Vector3<f64>| (2.0..=4.5).contains(&p.x) && p.y.abs() <= 1.0 && p.z.abs() <= 1.0;
         let mut stood = 0;
         for ahead_m in [3.0, 3.0, 9.0, 9.0, 9.0, 9.0, 9.0] {
             mapper.on_cloud(&machine.wall(ahead_m)).unwrap();
-            for chunk in mapper.take_update() {
-                assert_eq!(follower.on_update(&chunk).unwrap(), Followed::Applied);
-            }
+            follow_update(&mut follower, &mut mapper);
             assert_same(&follower, &mapper);
             let keys = mapper.cells().sorted_keys().into_iter();
             let centers = keys.map(|key| mapper.cells().center_m(key));
@@ -151,10 +145,8 @@ fn what_stood_in_the_way_goes_from_the_map_and_from_its_followers() {
             if ahead_m < 5.0 {
                 stood = left;
             } else if mapper.counts().clouds_in == 7 {
-                assert!(
-                    stood > 30 && left * 20 <= stood,
-                    "{left} of {stood} are left"
-                );
+                let gone = stood > 30 && left * 20 <= stood;
+                assert!(gone, "{left} of {stood} are left");
             }
         }
         assert!(mapper.counts().voxels_cleared as usize >= stood * 19 / 20);
@@ -165,12 +157,9 @@ fn what_stood_in_the_way_goes_from_the_map_and_from_its_followers() {
 #[test]
 fn clouds_without_the_place_of_the_sensor_clear_nothing_and_are_counted() {
     for mut mapper in each_mapper() {
-        mapper
-            .on_cloud(&cloud("map", 1, &[[3.0, 0.0, 0.0]]))
-            .unwrap();
-        mapper
-            .on_cloud(&cloud("map", 2, &[[9.0, 0.0, 0.0]]))
-            .unwrap();
+        for x in [3.0, 9.0] {
+            maps::insert(&mut mapper, &[[x, 0.0, 0.0]]);
+        }
         assert_eq!(mapper.counts().clouds_no_viewpoint, 2);
         assert_eq!((mapper.cells().len(), mapper.counts().rays), (2, 0));
     }
@@ -180,7 +169,7 @@ fn clouds_without_the_place_of_the_sensor_clear_nothing_and_are_counted() {
 #[test]
 fn free_cells_are_published_as_a_map_of_their_own() {
     let options = options(FreeSpaceMethod::Evidence, MapPayload::Centroid);
-    let mut mapper = LatticeMapper::new(options, 7).unwrap();
+    let mut mapper = maps::mapper(options);
     mapper.on_cloud(&Machine::new().wall(5.0)).unwrap();
     let chunks = mapper.free().unwrap();
     let (lattice, datum_m) = lattice_from(&chunks[0].info).unwrap();
@@ -193,9 +182,8 @@ fn free_cells_are_published_as_a_map_of_their_own() {
     }
     let free = follower.map().unwrap().voxels();
     let at = |x: f64| {
-        let w = lattice
-            .quantize(&(Vector3::new(x, 0.0, 0.0) - datum_m))
-            .unwrap();
+        let offset_m = Vector3::new(x, 0.0, 0.0) - datum_m;
+        let w = lattice.quantize(&offset_m).unwrap();
         free.keys().any(|key| key.unpack() == w)
     };
     assert!(at(1.0) && at(3.0) && !at(5.0) && !at(7.0));
@@ -205,7 +193,7 @@ fn free_cells_are_published_as_a_map_of_their_own() {
 #[test]
 fn a_map_of_occupancy_is_saved_and_loaded() {
     for method in [FreeSpaceMethod::Clear, FreeSpaceMethod::Evidence] {
-        let new = || LatticeMapper::new(options(method, MapPayload::Occupancy), 7).unwrap();
+        let new = || maps::mapper(options(method, MapPayload::Occupancy));
         let (mut first, mut second) = (new(), new());
         let mut machine = Machine::new();
         first.on_cloud(&machine.wall(3.0)).unwrap();
@@ -215,11 +203,7 @@ fn a_map_of_occupancy_is_saved_and_loaded() {
         let contents = MapContents::read(file.as_slice(), 1_000_000).unwrap();
         assert_eq!(second.load(contents, 9).unwrap(), first.cells().len());
         assert_eq!(second.cells().sorted_keys(), first.cells().sorted_keys());
-        let mut follower = MapFollower::new(1_000_000);
-        for chunk in second.keyframe() {
-            follower.on_map(&chunk).unwrap();
-        }
-        assert_same(&follower, &second);
+        assert_same(&follower(&mut second), &second);
         for _ in 0..4 {
             second.on_cloud(&machine.wall(9.0)).unwrap();
         }
@@ -230,19 +214,16 @@ fn a_map_of_occupancy_is_saved_and_loaded() {
 #[test]
 fn boxes_queries_and_centres_work_without_payload() {
     let options = options(FreeSpaceMethod::Off, MapPayload::Occupancy);
-    let mut mapper = LatticeMapper::new(options, 7).unwrap();
-    let cloud = cloud("map", 1, &[[0.1, 0.0, 0.0], [5.0, 0.0, 0.0]]);
-    mapper.on_cloud(&cloud).unwrap();
+    let mut mapper = maps::mapper(options);
+    maps::insert(&mut mapper, &[[0.1, 0.0, 0.0], [5.0, 0.0, 0.0]]);
     let centers = mapper.centers();
     assert_eq!((centers.width, centers.point_step), (2, 16));
-    let at = |x: f64| lattice_msgs::geometry_msgs::Point {
-        x,
-        ..Default::default()
-    };
-    let answer = mapper.query(&QueryMapRequest { point: at(5.0) });
+    let (y, z) = (0.0, 0.0);
+    let point = Point { x: 5.0, y, z };
+    let answer = mapper.query(&QueryMapRequest { point });
     assert!(answer.success && answer.occupied, "{}", answer.message);
     mapper.take_update();
-    let [min, max] = [-1.0, 1.0].map(|x| lattice_msgs::geometry_msgs::Point { x, y: x, z: x });
+    let [min, max] = [-1.0, 1.0].map(|x| Point { x, y: x, z: x });
     assert_eq!(mapper.clear_box(&ClearBoxRequest { min, max }).removed, 1);
     let update = mapper.take_update();
     assert_eq!((update.len(), update[0].removed), (1, 1));
@@ -266,7 +247,7 @@ fn what_a_sweep_hits_it_does_not_clear() {
     let seen = |sweep_ns| {
         let mut options = options(FreeSpaceMethod::Clear, MapPayload::Occupancy);
         options.free_space.sweep_ns = sweep_ns;
-        let mut mapper = LatticeMapper::new(options, 7).unwrap();
+        let mut mapper = maps::mapper(options);
         let mut machine = Machine::new();
         for ahead_m in [3.0, 9.0] {
             mapper.on_cloud(&machine.wall(ahead_m)).unwrap();

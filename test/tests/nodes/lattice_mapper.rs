@@ -1,12 +1,14 @@
 //! The mapper: chunks, what it refuses, and its datum.
 
-use lattice_core::lattice::{Lattice, LatticeKind};
+use lattice_core::lattice::LatticeKind;
 use lattice_msgs::cdr;
-use lattice_nodes::lattice_mapper::{LatticeMapper, MapperOptions};
-use lattice_nodes::map_follower::MapFollower;
-use lattice_test::clouds::cloud;
+use lattice_nodes::convert::cloud::{Precision, message_from_points};
+use lattice_nodes::lattice_mapper::MapperOptions;
+use lattice_test::clouds::{cloud, header};
+use lattice_test::maps::{self, insert};
+use nalgebra::Vector3;
 
-use super::map_follower::{MAX_VOXELS, assert_same, follow_keyframe, insert, mapper, scatter};
+use super::map_follower::{assert_same, mapper, scatter};
 
 #[test]
 fn every_chunk_is_small_enough_not_to_be_fragmented() {
@@ -15,17 +17,13 @@ fn every_chunk_is_small_enough_not_to_be_fragmented() {
     let updates = mapper.take_update();
     let keyframe = mapper.keyframe();
     assert!(updates.len() > 5 && keyframe.len() > 5);
-    for bytes in updates.iter().map(|m| cdr::to_vec(m).unwrap().len()) {
+    let updates = updates.iter().map(|m| cdr::to_vec(m).unwrap().len());
+    let chunks = keyframe.iter().map(|m| cdr::to_vec(m).unwrap().len());
+    for bytes in updates.chain(chunks) {
         assert!(bytes <= 60_000, "{bytes}");
     }
-    for bytes in keyframe.iter().map(|m| cdr::to_vec(m).unwrap().len()) {
-        assert!(bytes <= 60_000, "{bytes}");
-    }
-    assert!(
-        keyframe
-            .iter()
-            .all(|chunk| chunk.chunks == keyframe.len() as u32)
-    );
+    let chunks = keyframe.len() as u32;
+    assert!(keyframe.iter().all(|chunk| chunk.chunks == chunks));
 }
 
 #[test]
@@ -35,15 +33,12 @@ fn one_stray_point_does_not_move_the_others() {
     insert(&mut clean, &points);
     for stray in [1e5, 1e7, 1e30_f32] {
         let mut with_stray = mapper(LatticeKind::Mcc);
-        insert(
-            &mut with_stray,
-            &[&[[stray, 0.0, 0.0]], &points[..]].concat(),
-        );
+        let strayed = [&[[stray, 0.0, 0.0]], &points[..]].concat();
+        insert(&mut with_stray, &strayed);
         let near = |list: &lattice_core::voxels::VoxelList| {
-            let voxels = list.sorted().into_iter();
+            let mut voxels = list.sorted();
+            voxels.retain(|(key, _)| list.center_m(*key).norm() < 1000.0);
             voxels
-                .filter(|(key, _)| list.center_m(*key).norm() < 1000.0)
-                .collect::<Vec<_>>()
         };
         assert_eq!(near(with_stray.list()), near(clean.list()), "{stray}");
     }
@@ -58,27 +53,21 @@ fn refused_clouds_leave_the_map_as_it_is() {
     let mut lie = cloud("map", 1, &[[1.0; 3]]);
     lie.width = 1 << 30;
     assert!(mapper.on_cloud(&lie).is_err());
-    insert(
-        &mut mapper,
-        &[[f32::NAN; 3], [f32::INFINITY, 0.0, 0.0], [1e30, 0.0, 0.0]],
-    );
+    let outside = [[f32::NAN; 3], [f32::INFINITY, 0.0, 0.0], [1e30, 0.0, 0.0]];
+    insert(&mut mapper, &outside);
     assert_eq!(mapper.list().sorted(), before);
     let counts = mapper.counts();
     assert_eq!((counts.clouds_wrong_frame, counts.clouds_malformed), (1, 1));
-    assert_eq!(
-        (counts.points_not_finite, counts.points_out_of_range),
-        (2, 1)
-    );
+    let points = (counts.points_not_finite, counts.points_out_of_range);
+    assert_eq!(points, (2, 1));
 }
 
 #[test]
 fn a_full_list_refuses_new_voxels_and_says_so() {
-    let lattice = Lattice::new(LatticeKind::Cubic, 0.125).unwrap();
-    let options = MapperOptions {
+    let mut mapper = maps::mapper(MapperOptions {
         max_voxels: 100,
-        ..MapperOptions::new(lattice)
-    };
-    let mut mapper = LatticeMapper::new(options, 1).unwrap();
+        ..maps::options(LatticeKind::Cubic, 0.125)
+    });
     insert(&mut mapper, &scatter(1, 5000, [0.0; 3], 50.0));
     assert_eq!(mapper.list().len(), 100);
     assert!(mapper.counts().points_list_full > 4000);
@@ -86,31 +75,21 @@ fn a_full_list_refuses_new_voxels_and_says_so() {
 
 #[test]
 fn a_datum_far_away_loses_no_digit() {
-    let lattice = Lattice::new(LatticeKind::Fcc, 0.001).unwrap();
-    let far = nalgebra::Vector3::new(5_000_000.0, -3_000_000.0, 2_000_000.0);
-    let options = MapperOptions {
+    let options = || maps::options(LatticeKind::Fcc, 0.001);
+    let far = Vector3::new(5_000_000.0, -3_000_000.0, 2_000_000.0);
+    let mut mapper = maps::mapper(MapperOptions {
         datum_near_m: far,
-        ..MapperOptions::new(lattice)
-    };
-    let mut mapper = LatticeMapper::new(options, 1).unwrap();
-    let header = lattice_test::clouds::header("map", 1);
-    let points: Vec<_> = (0..100)
-        .map(|i| far + nalgebra::Vector3::x() * f64::from(i))
-        .collect();
-    let message = lattice_nodes::convert::cloud::message_from_points(
-        header,
-        &points,
-        lattice_nodes::convert::cloud::Precision::Float64,
-    );
+        ..options()
+    });
+    let points = (0..100).map(|i| far + Vector3::x() * f64::from(i));
+    let points: Vec<_> = points.collect();
+    let message = message_from_points(header("map", 1), &points, Precision::Float64);
     mapper.on_cloud(&message).unwrap();
     assert_eq!(mapper.list().len(), 100);
     assert!(mapper.distortion().max_distance_m <= 0.0795);
-    let mut follower = MapFollower::new(MAX_VOXELS);
-    follow_keyframe(&mut follower, &mapper.keyframe());
-    assert_same(&follower, &mapper);
+    assert_same(&maps::follower(&mut mapper), &mapper);
     // The same cloud on a map about the origin is out of the reach of its keys.
-    let lattice = Lattice::new(LatticeKind::Fcc, 0.001).unwrap();
-    let mut near = LatticeMapper::new(MapperOptions::new(lattice), 1).unwrap();
+    let mut near = maps::mapper(options());
     near.on_cloud(&message).unwrap();
     assert_eq!(near.counts().points_out_of_range, 100);
 }

@@ -1,28 +1,24 @@
 //! Limits, ageing and services of the mapper: followers see what goes and what is loaded.
 
-use lattice_core::lattice::{Lattice, LatticeKind};
+use lattice_core::lattice::LatticeKind;
 use lattice_core::voxels::WhenFull;
 use lattice_core::voxels::file::{MapContents, WriteOptions};
 use lattice_msgs::geometry_msgs::Point;
 use lattice_msgs::lattice::{ClearBoxRequest, QueryMapRequest};
 use lattice_nodes::lattice_mapper::{LatticeMapper, LoadRefusal, MapperOptions};
 use lattice_nodes::map_follower::MapFollower;
-use lattice_test::clouds::cloud;
+use lattice_test::clouds::{SECOND_NS, cloud};
+use lattice_test::maps;
 use nalgebra::Vector3;
 
 fn options(kind: LatticeKind) -> MapperOptions {
-    MapperOptions::new(Lattice::new(kind, 0.125).unwrap())
-}
-
-fn mapper(options: MapperOptions) -> LatticeMapper {
-    LatticeMapper::new(options, 7).unwrap()
+    maps::options(kind, 0.125)
 }
 
 /// A row of points 1 m apart, from `first` on.
 fn row(first: i32, count: i32) -> Vec<[f32; 3]> {
-    (first..first + count)
-        .map(|x| [x as f32, 0.0, 0.0])
-        .collect()
+    let row = first..first + count;
+    row.map(|x| [x as f32, 0.0, 0.0]).collect()
 }
 
 /// A mapper and one who follows its updates only.
@@ -33,39 +29,29 @@ struct Pair {
 
 impl Pair {
     fn new(options: MapperOptions) -> Pair {
-        let mut mapper = mapper(options);
-        let mut follower = MapFollower::new(100_000);
-        for chunk in mapper.keyframe() {
-            follower.on_map(&chunk).unwrap();
-        }
+        let mut mapper = maps::mapper(options);
+        let follower = maps::follower(&mut mapper);
         Pair { mapper, follower }
     }
 
     fn insert(&mut self, stamp_s: i32, points: &[[f32; 3]]) {
-        self.mapper
-            .on_cloud(&cloud("map", i64::from(stamp_s) * 1_000_000_000, points))
-            .unwrap();
+        let cloud = cloud("map", i64::from(stamp_s) * SECOND_NS, points);
+        self.mapper.on_cloud(&cloud).unwrap();
         self.follow();
     }
 
     fn follow(&mut self) {
-        for chunk in self.mapper.take_update() {
-            self.follower.on_update(&chunk).unwrap();
-        }
-        let mut keys: Vec<_> = self
-            .follower
-            .map()
-            .unwrap()
-            .voxels()
-            .keys()
-            .copied()
-            .collect();
+        maps::follow_update(&mut self.follower, &mut self.mapper);
+        let voxels = self.follower.map().unwrap().voxels();
+        let mut keys: Vec<_> = voxels.keys().copied().collect();
         keys.sort();
-        assert!(
-            keys.iter()
-                .eq(self.mapper.list().sorted().iter().map(|(key, _)| key))
-        );
+        assert_eq!(keys, self.mapper.cells().sorted_keys());
         self.mapper.list().validate().unwrap();
+    }
+
+    /// Which of these places on the x axis are occupied.
+    fn occupied<const N: usize>(&self, places: [f64; N]) -> [bool; N] {
+        places.map(|x| self.has(x))
     }
 
     fn has(&self, x: f64) -> bool {
@@ -76,31 +62,29 @@ impl Pair {
 }
 
 fn at(x: f64, y: f64, z: f64) -> QueryMapRequest {
-    QueryMapRequest {
-        point: Point { x, y, z },
-    }
+    let point = Point { x, y, z };
+    QueryMapRequest { point }
 }
 
 #[test]
 fn a_full_map_refuses_or_forgets_the_oldest() {
     for kind in LatticeKind::ALL {
-        let mut refusing = Pair::new(MapperOptions {
-            max_voxels: 40,
-            ..options(kind)
-        });
-        let when_full = WhenFull::ForgetOldest;
-        let mut forgetting = Pair::new(MapperOptions {
-            max_voxels: 40,
-            when_full,
-            ..options(kind)
-        });
+        let pair = |when_full| {
+            Pair::new(MapperOptions {
+                max_voxels: 40,
+                when_full,
+                ..options(kind)
+            })
+        };
+        let mut refusing = pair(WhenFull::Refuse);
+        let mut forgetting = pair(WhenFull::ForgetOldest);
         for step in 0..20 {
             refusing.insert(step, &row(step * 4, 4));
             forgetting.insert(step, &row(step * 4, 4));
         }
-        assert_eq!((refusing.has(0.0), refusing.has(79.0)), (true, false));
+        assert_eq!(refusing.occupied([0.0, 79.0]), [true, false]);
         assert_eq!(refusing.mapper.counts().points_list_full, 40);
-        assert_eq!((forgetting.has(0.0), forgetting.has(79.0)), (false, true));
+        assert_eq!(forgetting.occupied([0.0, 79.0]), [false, true]);
         assert_eq!(forgetting.mapper.counts().points_list_full, 0);
         let len = forgetting.mapper.list().len() as u64;
         assert_eq!(forgetting.mapper.counts().voxels_forgotten, 80 - len);
@@ -110,24 +94,21 @@ fn a_full_map_refuses_or_forgets_the_oldest() {
 
 #[test]
 fn memory_bounds_the_map() {
-    let max_map_bytes = 1_000_000;
-    let mapper = mapper(MapperOptions {
-        max_map_bytes,
-        ..options(LatticeKind::Bcc)
-    });
-    let limit = mapper.list().max_voxels();
-    assert!((500..3000).contains(&limit), "{limit}");
-    let aged = MapperOptions {
-        max_map_bytes,
-        forget_after_ns: 1,
-        ..options(LatticeKind::Bcc)
+    let limit = |forget_after_ns| {
+        let mapper = maps::mapper(MapperOptions {
+            max_map_bytes: 1_000_000,
+            forget_after_ns,
+            ..options(LatticeKind::Bcc)
+        });
+        mapper.list().max_voxels()
     };
-    assert!(self::mapper(aged).list().max_voxels() < limit);
+    assert!((500..3000).contains(&limit(0)), "{}", limit(0));
+    assert!(limit(1) < limit(0));
 }
 
 #[test]
 fn old_voxels_go_by_the_time_of_the_clouds() {
-    let forget_after_ns = 10_000_000_000;
+    let forget_after_ns = 10 * SECOND_NS;
     let mut pair = Pair::new(MapperOptions {
         forget_after_ns,
         ..options(LatticeKind::Hex)
@@ -136,10 +117,8 @@ fn old_voxels_go_by_the_time_of_the_clouds() {
     pair.insert(105, &row(3, 5));
     assert!(pair.has(0.0));
     pair.insert(111, &row(20, 1));
-    assert_eq!(
-        [0.0, 2.0, 3.0, 7.0, 20.0].map(|x| pair.has(x)),
-        [false, false, true, true, true]
-    );
+    let found = pair.occupied([0.0, 2.0, 3.0, 7.0, 20.0]);
+    assert_eq!(found, [false, false, true, true, true]);
     pair.insert(130, &[]);
     assert!(pair.mapper.list().is_empty());
     assert_eq!(pair.mapper.counts().voxels_forgotten, 9);
@@ -152,41 +131,25 @@ fn old_voxels_go_by_the_time_of_the_clouds() {
 fn a_cleared_box_is_gone_for_followers_too() {
     let mut pair = Pair::new(options(LatticeKind::Cubic));
     pair.insert(1, &row(0, 10));
-    let corner = |x| Point {
+    let corner = |x, side| Point {
         x,
-        y: -1.0,
-        z: -1.0,
+        y: side,
+        z: side,
     };
-    let request = ClearBoxRequest {
-        min: corner(1.5),
-        max: Point {
-            x: 4.5,
-            y: 1.0,
-            z: 1.0,
-        },
-    };
+    let (min, max) = (corner(1.5, -1.0), corner(4.5, 1.0));
+    let request = ClearBoxRequest { min, max };
     let before = pair.mapper.state();
     let answer = pair.mapper.clear_box(&request);
     assert!(answer.success && answer.removed == 3, "{answer:?}");
     assert_ne!(pair.mapper.state(), before);
     pair.follow();
-    assert_eq!(
-        [1.0, 2.0, 4.0, 5.0].map(|x| pair.has(x)),
-        [true, false, false, true]
-    );
+    let found = pair.occupied([1.0, 2.0, 4.0, 5.0]);
+    assert_eq!(found, [true, false, false, true]);
     for bad in [f64::NAN, -5.0] {
-        let max = Point {
-            x: bad,
-            ..request.max
-        };
-        let answer = pair.mapper.clear_box(&ClearBoxRequest {
-            max,
-            ..request.clone()
-        });
-        assert!(
-            !answer.success && answer.message.contains("corner"),
-            "{answer:?}"
-        );
+        let (min, max) = (corner(1.5, -1.0), corner(bad, 1.0));
+        let answer = pair.mapper.clear_box(&ClearBoxRequest { min, max });
+        let message = &answer.message;
+        assert!(!answer.success && message.contains("corner"), "{message}");
     }
     assert_eq!(pair.mapper.list().len(), 7);
 }
@@ -213,11 +176,8 @@ fn a_loaded_map_replaces_all() {
     let mut source = Pair::new(options(LatticeKind::Fcc));
     source.insert(1, &row(0, 30));
     let mut bytes = Vec::new();
-    source
-        .mapper
-        .contents()
-        .write(&mut bytes, &WriteOptions::default())
-        .unwrap();
+    let written = source.mapper.contents();
+    written.write(&mut bytes, &WriteOptions::default()).unwrap();
     let contents = || MapContents::read(&bytes[..], 1000).unwrap();
 
     // Counted from another datum; what was there before is gone.
@@ -233,14 +193,10 @@ fn a_loaded_map_replaces_all() {
         pair.follower.on_map(&chunk).unwrap();
     }
     pair.follow();
-    assert_eq!([0.0, 29.0, 500.0].map(|x| pair.has(x)), [true, true, false]);
+    assert_eq!(pair.occupied([0.0, 29.0, 500.0]), [true, true, false]);
     let counts = |pair: &Pair| {
-        pair.mapper
-            .list()
-            .sorted()
-            .iter()
-            .map(|(_, v)| v.count)
-            .sum::<u32>()
+        let voxels = pair.mapper.list().sorted().into_iter();
+        voxels.map(|(_, v)| v.count).sum::<u32>()
     };
     assert_eq!(counts(&pair), counts(&source));
     // And the map goes on.
@@ -261,12 +217,10 @@ fn a_loaded_map_replaces_all() {
         max_voxels: 29,
         ..options(LatticeKind::Fcc)
     });
-    assert!(
-        matches!(refusal, LoadRefusal::TooMany { voxels: 30, .. }),
-        "{refusal}"
-    );
+    let too_many = matches!(refusal, LoadRefusal::TooMany { voxels: 30, .. });
+    assert!(too_many, "{refusal}");
     let aged = MapperOptions {
-        forget_after_ns: 1_000_000_000,
+        forget_after_ns: SECOND_NS,
         ..options(LatticeKind::Fcc)
     };
     assert!(matches!(refused(aged.clone()), LoadRefusal::Stamps));
@@ -279,8 +233,7 @@ fn a_loaded_map_replaces_all() {
     assert!(pair.mapper.list().payload().is_plain());
     let mut pair = Pair::new(aged);
     assert_eq!(pair.mapper.load(source.mapper.contents(), 8).unwrap(), 30);
-    pair.mapper
-        .on_cloud(&cloud("map", 9_000_000_000, &row(50, 1)))
-        .unwrap();
+    let late = cloud("map", 9 * SECOND_NS, &row(50, 1));
+    pair.mapper.on_cloud(&late).unwrap();
     assert_eq!(pair.mapper.list().len(), 1);
 }

@@ -1,17 +1,18 @@
 //! Those who follow a map: deltas, keyframes, late joining, gaps, hostile input.
 
-use lattice_core::lattice::{Lattice, LatticeKind};
+use lattice_core::lattice::LatticeKind;
 use lattice_msgs::lattice::{LatticeMap, LatticeMapUpdate};
 use lattice_nodes::lattice_mapper::{LatticeMapper, MapperOptions};
 use lattice_nodes::map_follower::{Followed, MapFollower};
-use lattice_test::clouds::cloud;
+use lattice_test::maps::{self, follow_keyframe, follow_update, insert};
 use proptest::prelude::*;
 
-pub const MAX_VOXELS: usize = 1_000_000;
-
 pub fn mapper(kind: LatticeKind) -> LatticeMapper {
-    let lattice = Lattice::new(kind, 0.125).unwrap();
-    LatticeMapper::new(MapperOptions::new(lattice), 7).unwrap()
+    maps::mapper(maps::options(kind, 0.125))
+}
+
+fn new() -> MapFollower {
+    MapFollower::new(1_000_000)
 }
 
 /// A deterministic cloud of `n` points about `at`, `size` metres wide.
@@ -26,14 +27,17 @@ pub fn scatter(seed: u64, n: usize, at: [f32; 3], size: f32) -> Vec<[f32; 3]> {
     (0..n).map(|_| at.map(|v| v + next())).collect()
 }
 
-pub fn insert(mapper: &mut LatticeMapper, points: &[[f32; 3]]) {
-    mapper.on_cloud(&cloud("map", 1, points)).unwrap();
-}
-
-pub fn follow_keyframe(follower: &mut MapFollower, chunks: &[LatticeMap]) {
+/// Gives a follower chunks of a keyframe.
+fn follow(follower: &mut MapFollower, chunks: &[LatticeMap]) {
     for chunk in chunks {
         assert_eq!(follower.on_map(chunk).unwrap(), Followed::Applied);
     }
+}
+
+/// The first chunk of an update shows that something was lost.
+fn assert_asks(follower: &mut MapFollower, update: &[LatticeMapUpdate]) {
+    let followed = follower.on_update(&update[0]).unwrap();
+    assert_eq!(followed, Followed::NeedKeyframe);
 }
 
 /// The follower has exactly the mapper's voxels.
@@ -57,16 +61,11 @@ pub fn assert_same(follower: &MapFollower, mapper: &LatticeMapper) {
 fn a_follower_of_deltas_has_the_same_voxels() {
     for kind in LatticeKind::ALL {
         let mut mapper = mapper(kind);
-        let mut follower = MapFollower::new(MAX_VOXELS);
-        follow_keyframe(&mut follower, &mapper.keyframe());
+        let mut follower = maps::follower(&mut mapper);
         for step in 0..10 {
-            insert(
-                &mut mapper,
-                &scatter(step, 2000, [step as f32, 0.0, 0.0], 8.0),
-            );
-            for chunk in mapper.take_update() {
-                assert_eq!(follower.on_update(&chunk).unwrap(), Followed::Applied);
-            }
+            let points = scatter(step, 2000, [step as f32, 0.0, 0.0], 8.0);
+            insert(&mut mapper, &points);
+            follow_update(&mut follower, &mut mapper);
             assert_same(&follower, &mapper);
         }
         assert_eq!(follower.sequence(), Some(10));
@@ -78,47 +77,36 @@ fn a_late_joiner_takes_the_keyframe_and_then_deltas() {
     let mut mapper = mapper(LatticeKind::Bcc);
     insert(&mut mapper, &scatter(1, 20_000, [0.0; 3], 100.0));
     mapper.take_update();
-    let mut follower = MapFollower::new(MAX_VOXELS);
+    let mut follower = new();
     insert(&mut mapper, &scatter(2, 500, [0.0; 3], 10.0));
     let early = mapper.take_update();
-    assert_eq!(
-        follower.on_update(&early[0]).unwrap(),
-        Followed::NeedKeyframe
-    );
+    assert_asks(&mut follower, &early);
     let keyframe = mapper.keyframe();
     let (first, rest) = keyframe.split_at(2);
-    follow_keyframe(&mut follower, first);
-    assert!(
-        follower.map().unwrap().voxels().is_empty(),
-        "half a map is no map"
-    );
+    follow(&mut follower, first);
+    let voxels = follower.map().unwrap().voxels();
+    assert!(voxels.is_empty(), "half a map is no map");
     insert(&mut mapper, &scatter(3, 500, [20.0, 0.0, 0.0], 10.0));
     for chunk in mapper.take_update() {
         follower.on_update(&chunk).unwrap();
     }
-    follow_keyframe(&mut follower, rest);
+    follow(&mut follower, rest);
     assert_same(&follower, &mapper);
 }
 
 #[test]
 fn a_lost_update_is_noticed_and_a_keyframe_heals_it() {
     let mut mapper = mapper(LatticeKind::Mcc);
-    let mut follower = MapFollower::new(MAX_VOXELS);
-    follow_keyframe(&mut follower, &mapper.keyframe());
+    let mut follower = maps::follower(&mut mapper);
     insert(&mut mapper, &scatter(1, 100, [0.0; 3], 5.0));
     mapper.take_update();
     insert(&mut mapper, &scatter(2, 100, [50.0, 0.0, 0.0], 5.0));
     let next = mapper.take_update();
-    assert_eq!(
-        follower.on_update(&next[0]).unwrap(),
-        Followed::NeedKeyframe
-    );
-    follow_keyframe(&mut follower, &mapper.keyframe());
+    assert_asks(&mut follower, &next);
+    follow_keyframe(&mut follower, &mut mapper);
     assert_same(&follower, &mapper);
     insert(&mut mapper, &scatter(3, 100, [0.0; 3], 5.0));
-    for chunk in mapper.take_update() {
-        assert_eq!(follower.on_update(&chunk).unwrap(), Followed::Applied);
-    }
+    follow_update(&mut follower, &mut mapper);
     assert_same(&follower, &mapper);
 }
 
@@ -127,17 +115,14 @@ fn followed() -> (LatticeMapper, MapFollower) {
     let mut mapper = mapper(LatticeKind::Fcc);
     insert(&mut mapper, &scatter(1, 20_000, [0.0; 3], 100.0));
     mapper.take_update();
-    let mut follower = MapFollower::new(MAX_VOXELS);
-    follow_keyframe(&mut follower, &mapper.keyframe());
+    let follower = maps::follower(&mut mapper);
     assert_same(&follower, &mapper);
     (mapper, follower)
 }
 
 fn grown(mapper: &mut LatticeMapper, seed: u64) -> Vec<LatticeMapUpdate> {
-    insert(
-        mapper,
-        &scatter(seed, 50, [200.0 + seed as f32, 0.0, 0.0], 5.0),
-    );
+    let at = [200.0 + seed as f32, 0.0, 0.0];
+    insert(mapper, &scatter(seed, 50, at, 5.0));
     mapper.take_update()
 }
 
@@ -147,7 +132,7 @@ fn a_keyframe_that_updates_overtake_does_not_hide_later_losses() {
     let update = grown(&mut mapper, 2);
     let keyframe = mapper.keyframe();
     assert!(keyframe.len() > 1);
-    follow_keyframe(&mut follower, &keyframe[..1]);
+    follow(&mut follower, &keyframe[..1]);
     for chunk in update {
         assert_eq!(follower.on_update(&chunk).unwrap(), Followed::Applied);
     }
@@ -157,10 +142,7 @@ fn a_keyframe_that_updates_overtake_does_not_hide_later_losses() {
     assert_same(&follower, &mapper);
     grown(&mut mapper, 3);
     let after_a_loss = grown(&mut mapper, 4);
-    assert_eq!(
-        follower.on_update(&after_a_loss[0]).unwrap(),
-        Followed::NeedKeyframe
-    );
+    assert_asks(&mut follower, &after_a_loss);
 }
 
 #[test]
@@ -169,16 +151,12 @@ fn an_update_before_the_keyframe_that_heals_is_not_taken_for_done() {
     grown(&mut mapper, 2);
     let keyframe = mapper.keyframe();
     let early = grown(&mut mapper, 3);
-    assert_eq!(
-        follower.on_update(&early[0]).unwrap(),
-        Followed::NeedKeyframe
-    );
-    follow_keyframe(&mut follower, &keyframe);
+    assert_asks(&mut follower, &early);
+    follow(&mut follower, &keyframe);
     // The update came before the keyframe was begun, so it must come again.
     let after = grown(&mut mapper, 4);
-    let followed = follower.on_update(&after[0]).unwrap();
-    assert_eq!(followed, Followed::NeedKeyframe);
-    follow_keyframe(&mut follower, &mapper.keyframe());
+    assert_asks(&mut follower, &after);
+    follow_keyframe(&mut follower, &mut mapper);
     assert_same(&follower, &mapper);
 }
 
@@ -187,8 +165,8 @@ fn a_keyframe_of_which_a_chunk_was_lost_is_asked_for_again() {
     let mut mapper = mapper(LatticeKind::Fcc);
     insert(&mut mapper, &scatter(1, 20_000, [0.0; 3], 100.0));
     mapper.take_update();
-    let mut follower = MapFollower::new(MAX_VOXELS);
-    follow_keyframe(&mut follower, &mapper.keyframe()[1..]);
+    let mut follower = new();
+    follow(&mut follower, &mapper.keyframe()[1..]);
     let mut asked = false;
     for seed in 2..20 {
         for chunk in grown(&mut mapper, seed) {
@@ -196,30 +174,28 @@ fn a_keyframe_of_which_a_chunk_was_lost_is_asked_for_again() {
         }
     }
     assert!(asked);
-    follow_keyframe(&mut follower, &mapper.keyframe());
+    follow_keyframe(&mut follower, &mut mapper);
     assert_same(&follower, &mapper);
 }
 
 #[test]
 fn a_reset_map_replaces_the_old_one() {
     let mut mapper = mapper(LatticeKind::Hex);
-    let mut follower = MapFollower::new(MAX_VOXELS);
+    let mut follower = new();
     insert(&mut mapper, &scatter(1, 1000, [0.0; 3], 20.0));
-    follow_keyframe(&mut follower, &mapper.keyframe());
+    follow_keyframe(&mut follower, &mut mapper);
     mapper.reset(8);
     insert(&mut mapper, &scatter(2, 10, [0.0; 3], 2.0));
-    follow_keyframe(&mut follower, &mapper.keyframe());
+    follow_keyframe(&mut follower, &mut mapper);
     assert_same(&follower, &mapper);
 }
 
 /// A mapper of small chunks, with a map of about forty of them.
 fn in_many_chunks() -> LatticeMapper {
-    let lattice = Lattice::new(LatticeKind::Fcc, 0.125).unwrap();
-    let options = MapperOptions {
+    let mut mapper = maps::mapper(MapperOptions {
         chunk_bytes: 4096,
-        ..MapperOptions::new(lattice)
-    };
-    let mut mapper = LatticeMapper::new(options, 7).unwrap();
+        ..maps::options(LatticeKind::Fcc, 0.125)
+    });
     insert(&mut mapper, &scatter(1, 10_000, [0.0; 3], 100.0));
     mapper.take_update();
     mapper
@@ -228,20 +204,17 @@ fn in_many_chunks() -> LatticeMapper {
 #[test]
 fn a_loaded_map_arrives_though_updates_come_between_its_chunks() {
     let mut mapper = in_many_chunks();
-    let mut follower = MapFollower::new(MAX_VOXELS);
-    follow_keyframe(&mut follower, &mapper.keyframe());
+    let mut follower = maps::follower(&mut mapper);
     let contents = mapper.contents();
     mapper.load(contents, 8).unwrap();
     let keyframe = mapper.keyframe();
-    follow_keyframe(&mut follower, &keyframe[..1]);
+    follow(&mut follower, &keyframe[..1]);
     for chunk in grown(&mut mapper, 2) {
         assert_eq!(follower.on_update(&chunk).unwrap(), Followed::Applied);
     }
-    assert!(
-        follower.map().unwrap().voxels().is_empty(),
-        "half a map is no map"
-    );
-    follow_keyframe(&mut follower, &keyframe[1..]);
+    let voxels = follower.map().unwrap().voxels();
+    assert!(voxels.is_empty(), "half a map is no map");
+    follow(&mut follower, &keyframe[1..]);
     assert_same(&follower, &mapper);
     assert_eq!(follower.sequence(), Some(1));
 }
@@ -251,7 +224,7 @@ fn a_keyframe_of_many_rounds_is_taken_without_asking_for_another() {
     let mut mapper = in_many_chunks();
     let keyframe = mapper.keyframe();
     assert!(keyframe.len() > 20, "{}", keyframe.len());
-    let mut follower = MapFollower::new(MAX_VOXELS);
+    let mut follower = new();
     for (seed, chunk) in (2..).zip(&keyframe) {
         assert_eq!(follower.on_map(chunk).unwrap(), Followed::Applied);
         assert!(!follower.wait_a_second());
@@ -271,9 +244,9 @@ fn seconds_until_asked(follower: &mut MapFollower) -> Option<usize> {
 fn what_is_incomplete_on_an_idle_map_is_asked_for_again_and_ever_more_rarely() {
     let mut mapper = in_many_chunks();
     let keyframe = mapper.keyframe();
-    let mut follower = MapFollower::new(MAX_VOXELS);
+    let mut follower = new();
     assert_eq!(seconds_until_asked(&mut follower), None, "nothing has come");
-    follow_keyframe(&mut follower, &keyframe[1..]);
+    follow(&mut follower, &keyframe[1..]);
     for seconds in [3, 5, 9, 17, 33, 65, 65] {
         assert_eq!(seconds_until_asked(&mut follower), Some(seconds));
     }
@@ -289,7 +262,7 @@ fn what_is_incomplete_on_an_idle_map_is_asked_for_again_and_ever_more_rarely() {
     assert!(update.len() > 1);
     follower.on_update(&update[0]).unwrap();
     assert_eq!(seconds_until_asked(&mut follower), Some(3));
-    follow_keyframe(&mut follower, &mapper.keyframe());
+    follow_keyframe(&mut follower, &mut mapper);
     assert_same(&follower, &mapper);
     assert_eq!(seconds_until_asked(&mut follower), None);
 }
@@ -351,7 +324,7 @@ proptest! {
         let mut mapper = mapper(LatticeKind::Fcc);
         insert(&mut mapper, &scatter(1, 300, [0.0; 3], 10.0));
         let mut follower = MapFollower::new(10_000);
-        follow_keyframe(&mut follower, &mapper.keyframe());
+        follow_keyframe(&mut follower, &mut mapper);
         let _ = follower.on_map(&map);
         let _ = follower.on_update(&update);
         prop_assert!(follower.map().unwrap().voxels().len() <= 10_000);

@@ -3,9 +3,10 @@
 use std::sync::Arc;
 
 use lattice_bag::BagReader;
-use lattice_core::lattice::{Lattice, LatticeKind};
+use lattice_core::lattice::LatticeKind;
 use lattice_core::registration::{SemanticCloud, UNLABELED};
 use lattice_core::voxels::LabelCount;
+use lattice_msgs::lattice::LatticeMap;
 use lattice_msgs::sensor_msgs::PointCloud2;
 use lattice_nodes::convert::semantic::LabelOptions;
 use lattice_nodes::enu_transformer::ins::{InsMessage, InsSource};
@@ -14,20 +15,24 @@ use lattice_nodes::lattice_mapper::{LatticeMapper, MapperOptions};
 use lattice_nodes::map_follower::MapFollower;
 use lattice_nodes::replay::{self, Pipeline, TopicWishes};
 use lattice_nodes::voxel_marker_publisher::MarkerOptions;
-use lattice_test::clouds::{SECOND_NS, cloud, labelled_cloud, odometry};
+use lattice_test::clouds::{SECOND_NS, cloud, field, labelled_cloud, odometry};
 use lattice_test::data::shared;
+use lattice_test::maps::{self, follow_update, follower};
 use nalgebra::Isometry3;
 
-const MAX_VOXELS: usize = 1_000_000;
-
-fn options() -> MapperOptions {
-    let mut options = MapperOptions::new(Lattice::new(LatticeKind::Cubic, 1.0).unwrap());
-    options.labels = Some(LabelOptions::default());
-    options
+/// A mapper of cubes of 1 m3 that keeps labels.
+fn mapper() -> LatticeMapper {
+    maps::mapper(MapperOptions {
+        labels: Some(LabelOptions::default()),
+        ..maps::options(LatticeKind::Cubic, 1.0)
+    })
 }
 
-fn mapper() -> LatticeMapper {
-    LatticeMapper::new(options(), 7).unwrap()
+/// The same with the three cells.
+fn mapped() -> LatticeMapper {
+    let mut mapper = mapper();
+    mapper.on_cloud(&three_cells()).unwrap();
+    mapper
 }
 
 /// Three cells: one of several labels, one without, one of a single label.
@@ -60,18 +65,10 @@ fn labels_of(follower: &MapFollower) -> Vec<(u16, u32)> {
 #[test]
 fn keyframes_and_updates_tell_the_most_frequent_label() {
     let mut mapper = mapper();
+    let mut early = follower(&mut mapper);
     mapper.on_cloud(&three_cells()).unwrap();
-    let mut late = MapFollower::new(MAX_VOXELS);
-    let mut early = MapFollower::new(MAX_VOXELS);
-    for chunk in self::mapper().keyframe() {
-        early.on_map(&chunk).unwrap();
-    }
-    for chunk in mapper.take_update() {
-        early.on_update(&chunk).unwrap();
-    }
-    for chunk in mapper.keyframe() {
-        late.on_map(&chunk).unwrap();
-    }
+    follow_update(&mut early, &mut mapper);
+    let mut late = follower(&mut mapper);
     assert_eq!(labels_of(&early), EXPECTED);
     assert_eq!(labels_of(&late), EXPECTED);
 
@@ -79,62 +76,43 @@ fn keyframes_and_updates_tell_the_most_frequent_label() {
     late.take_touched();
     let five = [([0.1, 0.0, 0.0], 5), ([0.1, 0.0, 0.0], 5)];
     mapper.on_cloud(&labelled_cloud("map", 2, &five)).unwrap();
-    for chunk in mapper.take_update() {
-        late.on_update(&chunk).unwrap();
-    }
+    follow_update(&mut late, &mut mapper);
     assert_eq!(labels_of(&late)[0], (5, 3));
     assert_eq!(late.take_touched().0.len(), 1);
 }
 
 #[test]
 fn a_followed_map_is_a_cloud_with_shares_of_labels() {
-    let mut mapper = mapper();
-    mapper.on_cloud(&three_cells()).unwrap();
-    let mut follower = MapFollower::new(MAX_VOXELS);
-    for chunk in mapper.keyframe() {
-        follower.on_map(&chunk).unwrap();
-    }
-    let map = follower.map().unwrap();
-    let (ours, direct) = (
-        map.semantic_cloud(),
-        SemanticCloud::from_voxels(mapper.list()),
-    );
+    let mut mapper = mapped();
+    let labelled = follower(&mut mapper);
+    let map = labelled.map().unwrap();
+    let direct = SemanticCloud::from_voxels(mapper.list());
+    let ours = map.semantic_cloud();
     assert_eq!(ours.len(), 3);
     for i in 0..3 {
         assert!((ours.points_m[i] - direct.points_m[i]).norm() <= 2.0 * map.offset_unit_m);
         assert_eq!(ours.label(i).top(), direct.label(i).top());
     }
     let found: Vec<_> = ours.label(0).iter().collect();
-    assert_eq!(
-        found,
-        [(8, 2.0 / 6.0)],
-        "the share of the points of the cell"
-    );
+    let share = "the share of the points of the cell";
+    assert_eq!(found, [(8, 2.0 / 6.0)], "{share}");
 
-    let mut plain = MapperOptions::new(Lattice::new(LatticeKind::Cubic, 1.0).unwrap());
-    plain.chunk_bytes = 2000;
-    let mut plain = LatticeMapper::new(plain, 7).unwrap();
+    let mut plain = maps::mapper(maps::options(LatticeKind::Cubic, 1.0));
     plain.on_cloud(&three_cells()).unwrap();
     let chunks = plain.keyframe();
-    assert!(
-        chunks
-            .iter()
-            .all(|c| c.labels.is_empty() && c.label_counts.is_empty())
-    );
-    let mut follower = MapFollower::new(MAX_VOXELS);
-    follower.on_map(&chunks[0]).unwrap();
-    assert!(follower.map().unwrap().semantic_cloud().labels.is_empty());
+    let unlabelled = |c: &LatticeMap| c.labels.is_empty() && c.label_counts.is_empty();
+    assert!(chunks.iter().all(unlabelled));
+    let plain = follower(&mut plain);
+    assert!(plain.map().unwrap().semantic_cloud().labels.is_empty());
 }
 
 #[test]
 fn columns_of_different_length_are_refused() {
-    let mut mapper = mapper();
-    mapper.on_cloud(&three_cells()).unwrap();
-    let good = mapper.keyframe();
-    let refused = |change: &dyn Fn(&mut lattice_msgs::lattice::LatticeMap), part: &str| {
+    let good = mapped().keyframe();
+    let refused = |change: &dyn Fn(&mut LatticeMap), part: &str| {
         let mut chunk = good[0].clone();
         change(&mut chunk);
-        let error = MapFollower::new(MAX_VOXELS).on_map(&chunk).unwrap_err();
+        let error = MapFollower::new(1_000_000).on_map(&chunk).unwrap_err();
         assert!(error.to_string().contains(part), "{error}");
     };
     refused(
@@ -162,9 +140,7 @@ fn labelled_chunks_are_small_enough_too() {
 
 #[test]
 fn centers_have_the_label() {
-    let mut mapper = mapper();
-    mapper.on_cloud(&three_cells()).unwrap();
-    let centers = mapper.centers();
+    let centers = mapped().centers();
     let names: Vec<_> = centers.fields.iter().map(|f| &*f.name).collect();
     assert_eq!(names, ["x", "y", "z", "intensity", "label"]);
     let rows = centers.data.chunks_exact(centers.point_step as usize);
@@ -176,8 +152,7 @@ fn centers_have_the_label() {
 
 #[test]
 fn a_map_file_keeps_labels_and_one_without_them_can_be_loaded() {
-    let mut mapper = mapper();
-    mapper.on_cloud(&three_cells()).unwrap();
+    let mapper = mapped();
     let mut other = self::mapper();
     other.load(mapper.contents(), 8).unwrap();
     let key = mapper.list().sorted()[0].0;
@@ -185,8 +160,7 @@ fn a_map_file_keeps_labels_and_one_without_them_can_be_loaded() {
     let expected = [count(5, 1), count(8, 2), count(UNLABELED, 3)];
     assert_eq!(other.list().labels(key), expected);
 
-    let plain = MapperOptions::new(Lattice::new(LatticeKind::Cubic, 1.0).unwrap());
-    let mut plain = LatticeMapper::new(plain, 7).unwrap();
+    let mut plain = maps::mapper(maps::options(LatticeKind::Cubic, 1.0));
     plain.load(mapper.contents(), 8).unwrap();
     assert!(!plain.list().payload().labels);
     other.load(plain.contents(), 9).unwrap();
@@ -215,9 +189,7 @@ fn the_transformer_passes_labels_of_the_points_it_keeps() {
         ([3.0, 0.0, 0.0], 4),
     ];
     let mut message = labelled_cloud("base_link", start_ns + SECOND_NS / 100, &points);
-    message
-        .fields
-        .push(lattice_test::clouds::field("other", 12, 2));
+    message.fields.push(field("other", 12, 2));
     let outputs = transformer.on_cloud(Arc::new(message), start_ns);
     let Some(EnuOutput::Points(out)) = outputs.last() else {
         panic!("{outputs:?}");
@@ -239,7 +211,7 @@ fn replaying_labelled_scans_gives_a_labelled_map() {
         ..TopicWishes::default()
     };
     let plan = replay::plan(&reader, &wishes).unwrap();
-    let mut map = MapperOptions::new(Lattice::new(LatticeKind::Fcc, 0.125).unwrap());
+    let mut map = maps::options(LatticeKind::Fcc, 0.125);
     let mut labels = LabelOptions::default();
     labels.ignored.insert(0);
     map.labels = Some(labels);
@@ -251,18 +223,13 @@ fn replaying_labelled_scans_gives_a_labelled_map() {
     let cloud = SemanticCloud::from_voxels(mapper.list());
     let labelled = (0..cloud.len()).filter(|&i| cloud.label(i).top().is_some());
     let share = labelled.count() as f64 / cloud.len() as f64;
-    assert!(
-        cloud.len() > 10_000 && share > 0.9,
-        "{} voxels, {share}",
-        cloud.len()
-    );
+    let voxels = cloud.len();
+    assert!(voxels > 10_000 && share > 0.9, "{voxels} voxels, {share}");
     // The classes of the network are 1 to 18; what lies on the ground by its label does so.
     let road = (0..cloud.len()).filter(|&i| cloud.label(i).top() == Some(9));
     let heights: Vec<f64> = road.map(|i| cloud.points_m[i].z).collect();
     let mean_m = heights.iter().sum::<f64>() / heights.len() as f64;
     let all_m = cloud.points_m.iter().map(|p| p.z).sum::<f64>() / cloud.len() as f64;
-    assert!(
-        heights.len() > 500 && mean_m < all_m - 0.3,
-        "{mean_m} m, all {all_m} m"
-    );
+    let low = mean_m < all_m - 0.3;
+    assert!(heights.len() > 500 && low, "{mean_m} m, all {all_m} m");
 }

@@ -10,46 +10,30 @@ use lattice_nodes::convert::semantic::{
     semantic_from_message,
 };
 use lattice_nodes::semantic_icp_server::{SemanticIcpServer, ServerOptions};
-use lattice_test::clouds::header;
+use lattice_test::clouds::{field, header};
 use proptest::prelude::*;
 use serde_bytes::ByteBuf;
 
-const NAMES: [&str; 14] = [
-    "x",
-    "y",
-    "z",
-    "label",
-    "confidence",
-    "label_probs",
-    "p_0",
-    "p_1",
-    "rgb",
-    "semantic_color",
-    "semantic_color1",
-    "confidence1",
-    "semantic_color2",
-    "time",
-];
+/// Names of fields, not all of which mean something.
+const NAMES: &str = "label confidence label_probs p_0 p_1 rgb semantic_color semantic_color1 \
+                     confidence1 semantic_color2 time";
 
 fn fields() -> impl Strategy<Value = Vec<PointField>> {
     let count = prop_oneof![8 => Just(1_u32), 2 => 0..6_u32, 1 => any::<u32>()];
     let offset = prop_oneof![9 => 0..24_u32, 1 => any::<u32>()];
     let datatype = prop_oneof![12 => 1..9_u8, 1 => any::<u8>()];
-    let field = (prop::sample::select(&NAMES[3..]), offset, datatype, count);
-    let field = field.prop_map(|(name, offset, datatype, count)| PointField {
+    let names: Vec<&str> = NAMES.split(' ').collect();
+    let further = (prop::sample::select(names), offset, datatype, count);
+    let further = further.prop_map(|(name, offset, datatype, count)| PointField {
         name: name.to_owned(),
         offset,
         datatype,
         count,
     });
     let place = (0..10_u8).prop_map(|n| if n == 0 { 8 } else { 7 });
-    (prop::collection::vec(field, 0..5), place).prop_map(|(fields, datatype)| {
-        let places = (0..).zip(&NAMES[..3]).map(|(i, name)| PointField {
-            name: (*name).to_owned(),
-            offset: 4 * i,
-            datatype,
-            count: 1,
-        });
+    (prop::collection::vec(further, 0..5), place).prop_map(|(fields, datatype)| {
+        let places = ["x", "y", "z"].into_iter().zip([0, 4, 8]);
+        let places = places.map(|(name, offset)| field(name, offset, datatype));
         places.chain(fields).collect()
     })
 }

@@ -2,23 +2,22 @@
 
 use std::sync::{Arc, Mutex};
 
-use lattice_core::lattice::{Lattice, LatticeKind};
+use lattice_core::lattice::LatticeKind;
 use lattice_msgs::lattice::LatticeMap;
 use lattice_msgs::visualization_msgs::{Marker, MarkerArray};
-use lattice_nodes::lattice_mapper::{LatticeMapper, MapperOptions};
+use lattice_nodes::lattice_mapper::LatticeMapper;
 use lattice_nodes::voxel_marker_publisher::{MarkerOptions, VoxelMarkers, node};
 use lattice_runtime::qos::Qos;
 use lattice_runtime::ros_args::RosArgs;
 use lattice_runtime::{Load, Publisher, Runtime};
-use lattice_test::clouds::cloud;
 use lattice_test::domain::TestDomain;
+use lattice_test::maps;
 
 /// A line of voxels in many blocks.
 fn mapper() -> LatticeMapper {
-    let lattice = Lattice::new(LatticeKind::Fcc, 0.125).unwrap();
-    let mut mapper = LatticeMapper::new(MapperOptions::new(lattice), 1).unwrap();
+    let mut mapper = maps::mapper(maps::options(LatticeKind::Fcc, 0.125));
     let points: Vec<_> = (0..400).map(|i| [i as f32 * 0.2, 0.1, 0.2]).collect();
-    mapper.on_cloud(&cloud("map", 1, &points)).unwrap();
+    maps::insert(&mut mapper, &points);
     mapper
 }
 
@@ -36,14 +35,8 @@ fn all_budgets_of_markers_are_drawn_at_the_end() {
 
     let domain = TestDomain::take();
     // One block a budget, and none before the end.
-    let args = [
-        "--ros-args",
-        "-p",
-        "rate_hz:=0.1",
-        "-p",
-        "max_bytes_per_s:=1",
-    ];
-    let args = RosArgs::parse(args.map(str::to_owned)).unwrap();
+    let args = "--ros-args -p rate_hz:=0.1 -p max_bytes_per_s:=1";
+    let args = RosArgs::parse(args.split(' ').map(str::to_owned)).unwrap();
     let runtime = Runtime::with_transport("markers", args, &domain.transport()).unwrap();
     let viewer = runtime.node("viewer").unwrap();
     let shown = Arc::<Mutex<Vec<MarkerArray>>>::default();

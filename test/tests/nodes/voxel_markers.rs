@@ -1,10 +1,11 @@
 //! The marker publisher's logic: cell shapes, exposed faces, chunks, ADD and DELETE.
 
-use std::collections::BTreeMap;
+use std::collections::{BTreeMap, BTreeSet};
 
 use lattice_core::lattice::{Lattice, LatticeKind};
 use lattice_core::voxels::VoxelStore;
 use lattice_msgs::cdr;
+use lattice_msgs::geometry_msgs::Point;
 use lattice_msgs::visualization_msgs::{Marker, MarkerArray};
 use lattice_nodes::lattice_mapper::{LatticeMapper, MapperOptions};
 use lattice_nodes::voxel_marker_publisher::{MarkerOptions, MarkerStyle, VoxelMarkers};
@@ -57,11 +58,9 @@ impl Bench {
                     let q = &marker.pose.orientation;
                     let square = q.w * q.w + q.x * q.x + q.y * q.y + q.z * q.z;
                     assert!((square - 1.0).abs() < 1e-12);
-                    assert!(
-                        !marker.points.is_empty(),
-                        "an empty ADD is an error in Foxglove"
-                    );
-                    assert!(marker.colors.is_empty() || marker.colors.len() == marker.points.len());
+                    let (points, colors) = (marker.points.len(), marker.colors.len());
+                    assert!(points > 0, "an empty ADD is an error in Foxglove");
+                    assert!(colors == 0 || colors == points);
                     self.shown.insert(identity, marker.clone());
                 }
                 Marker::DELETE => {
@@ -85,12 +84,9 @@ impl Bench {
             assert_eq!(marker.type_, Marker::TRIANGLE_LIST);
             let p = &marker.pose.position;
             let origin = Vector3::new(p.x, p.y, p.z);
-            let points: Vec<_> = marker
-                .points
-                .iter()
-                .map(|p| origin + Vector3::new(p.x, p.y, p.z))
-                .collect();
-            triangles.extend(points.chunks_exact(3).map(|t| [t[0], t[1], t[2]]));
+            let point = |p: &Point| origin + Vector3::new(p.x, p.y, p.z);
+            let corners = marker.points.chunks_exact(3);
+            triangles.extend(corners.map(|t| [point(&t[0]), point(&t[1]), point(&t[2])]));
         }
         triangles
     }
@@ -159,8 +155,8 @@ fn cubes_are_turned_and_stand_on_the_centres() {
             let turn = UnitQuaternion::new_unchecked(Quaternion::new(q.w, q.x, q.y, q.z));
             assert_eq!(turn, lattice.orientation());
             for point in &marker.points {
-                let at =
-                    Vector3::new(p.x, p.y, p.z) + turn * Vector3::new(point.x, point.y, point.z);
+                let offset = turn * Vector3::new(point.x, point.y, point.z);
+                let at = Vector3::new(p.x, p.y, p.z) + offset;
                 let key = bench.mapper.list().key_of(&at).unwrap();
                 assert!((bench.mapper.list().center_m(key) - at).norm() < 1e-12);
                 assert!(bench.mapper.list().get(key).is_some());
@@ -184,17 +180,12 @@ fn only_exposed_faces_are_drawn_across_blocks_too() {
             let voxels = bench.mapper.list().len();
             let triangles = bench.triangles();
             // Closed, so its volume is that of the voxels, and no face is there from both sides.
-            assert!(
-                (volume(&triangles) - 0.125 * voxels as f64).abs() < 1e-9,
-                "{kind}"
-            );
-            let mut centers: Vec<_> = triangles
-                .iter()
-                .map(|t| ((t[0] + t[1] + t[2]) * 1e6).map(|v| v.round() as i64))
-                .map(|c| [c.x, c.y, c.z])
-                .collect();
-            centers.sort_unstable();
-            assert!(centers.windows(2).all(|pair| pair[0] != pair[1]), "{kind}");
+            let off_m3 = volume(&triangles) - 0.125 * voxels as f64;
+            assert!(off_m3.abs() < 1e-9, "{kind}");
+            let round = |v: f64| (v * 1e6).round() as i64;
+            let centers = triangles.iter().map(|t| (t[0] + t[1] + t[2]).map(round));
+            let different: BTreeSet<[i64; 3]> = centers.map(Into::into).collect();
+            assert_eq!(different.len(), triangles.len(), "{kind}");
         }
     }
 }
@@ -220,10 +211,7 @@ fn only_what_changed_is_published_again() {
     let markers = bench.shown.len();
     assert!(markers > 10);
     let again = bench.insert(&line(400, 0.2));
-    assert!(
-        again.is_empty(),
-        "more points in the same voxels change no face"
-    );
+    assert!(again.is_empty(), "more points in voxels change no face");
     let far = bench.insert(&[[40.0, 0.1, 6.0]]);
     let touched: usize = far.iter().map(|array| array.markers.len()).sum();
     assert!(touched <= 2, "{touched} of {markers} markers for one voxel");
@@ -238,9 +226,8 @@ fn arrays_are_small_enough_not_to_be_fragmented() {
             ..MarkerOptions::default()
         };
         let mut bench = Bench::new(LatticeKind::Bcc, options);
-        let points: Vec<_> = (0..10_000)
-            .map(|i| [(i % 100) as f32 * 0.3, (i / 100) as f32 * 0.3, 0.0])
-            .collect();
+        let point = |i: i32| [(i % 100) as f32 * 0.3, (i / 100) as f32 * 0.3, 0.0];
+        let points: Vec<_> = (0..10_000).map(point).collect();
         for array in bench.insert(&points) {
             let bytes = cdr::to_vec(&array).unwrap().len();
             assert!(bytes <= 60_000, "{style:?}: {bytes}");
@@ -258,12 +245,8 @@ fn cubes_are_deleted_before_they_are_replaced() {
     let mut bench = Bench::new(LatticeKind::Mcc, options);
     bench.insert(&line(3, 1.0));
     let again = bench.insert(&line(4, 1.0));
-    let actions: Vec<i32> = again[0]
-        .markers
-        .iter()
-        .map(|marker| marker.action)
-        .collect();
-    assert_eq!(&actions[..2], [Marker::DELETE, Marker::ADD]);
+    let actions = again[0].markers.iter().map(|marker| marker.action);
+    assert!(actions.take(2).eq([Marker::DELETE, Marker::ADD]));
     assert_eq!(bench.shown_points(), 4);
     let side = bench.shown.values().next().unwrap().scale.x;
     assert!((side - 0.5).abs() < 1e-12);

@@ -13,6 +13,7 @@ use lattice_msgs::{RosAction, RosService};
 
 use self::goals::Goals;
 use super::error::RuntimeError;
+use super::names::NameKind;
 use super::node::Node;
 use super::publisher::Publisher;
 use super::qos::Qos;
@@ -182,7 +183,7 @@ impl Node {
     ) -> Result<ActionServer<A>, RuntimeError> {
         let clock = self.clock();
         let shared = Arc::new(Shared::<A> {
-            name: self.resolve_service(name)?,
+            name: self.full_name(NameKind::Service, name)?,
             goals: Mutex::new(Goals::new(limits)),
             status: self.publisher(&format!("{name}/_action/status"), Qos::latched(1))?,
             feedback: self.publisher(&format!("{name}/_action/feedback"), Qos::DEFAULT)?,

@@ -54,31 +54,22 @@ impl Dds {
         }
         let participant = builder.build().map_err(|e| failed(&e))?;
         let none = QosPolicies::qos_none();
-        let publisher = participant
-            .create_publisher(&none)
-            .map_err(|e| failed(&e))?;
-        let subscriber = participant
-            .create_subscriber(&none)
-            .map_err(|e| failed(&e))?;
+        let publisher = participant.create_publisher(&none);
+        let publisher = publisher.map_err(|e| failed(&e))?;
+        let subscriber = participant.create_subscriber(&none);
+        let subscriber = subscriber.map_err(|e| failed(&e))?;
         let guid = participant.guid().to_bytes();
         let name: String = guid.iter().map(|byte| format!("{byte:02x}")).collect();
         let probe_topic = format!("lattice_probe_{name}");
-        let topic = topic(
-            &participant,
-            probe(&probe_topic),
-            &PROBE_QOS,
-            "subscription",
-        )?;
-        let reader = subscriber
-            .create_simple_datareader_no_key(&topic, None)
-            .map_err(|error| endpoint_error(&probe_topic, "subscription", &error))?;
+        let probes = probe(&probe_topic);
+        let reader = reader(&participant, &subscriber, probes, &PROBE_QOS, 0)?;
         Ok(Self {
             participant,
             publisher,
             subscriber,
             probes: Arc::default(),
             probe_topic,
-            _probe_reader: DdsReader::new(reader, 0),
+            _probe_reader: reader,
         })
     }
 
@@ -109,12 +100,7 @@ impl Transport for Dds {
         qos: &Qos,
         max_bytes: usize,
     ) -> Result<Box<dyn SampleReader>, RuntimeError> {
-        let topic = topic(&self.participant, of, qos, "subscription")?;
-        let reader = self
-            .subscriber
-            .create_simple_datareader_no_key(&topic, None)
-            .map_err(|error| endpoint_error(of.name, "subscription", &error))?;
-        let reader = DdsReader::new(reader, max_bytes);
+        let reader = reader(&self.participant, &self.subscriber, of, qos, max_bytes)?;
         if qos.durability == RosDurability::Volatile {
             reader.skip_old();
         }
@@ -139,6 +125,19 @@ fn probe(name: &str) -> PortTopic<'_> {
         dds_name: name,
         ros_type: PROBE_TYPE,
     }
+}
+
+fn reader(
+    participant: &DomainParticipant,
+    subscriber: &rustdds::Subscriber,
+    of: PortTopic<'_>,
+    qos: &Qos,
+    max_bytes: usize,
+) -> Result<DdsReader, RuntimeError> {
+    let topic = topic(participant, of, qos, "subscription")?;
+    let reader = subscriber.create_simple_datareader_no_key(&topic, None);
+    let reader = reader.map_err(|error| endpoint_error(of.name, "subscription", &error))?;
+    Ok(DdsReader::new(reader, max_bytes))
 }
 
 fn topic(

@@ -54,7 +54,7 @@ pub fn init(args: &RosArgs, node_name: &str) -> Result<(), SetLoggerError> {
     let level = console.filter();
     let logger = Tee {
         console,
-        to_console: args.stdout_logs,
+        to_console: !args.no_stdout_logs,
         node_name: node_name.to_owned(),
     };
     log::set_boxed_logger(Box::new(logger))?;
@@ -129,16 +129,11 @@ mod tests {
 
     #[test]
     fn lines_look_like_those_of_rcutils() {
-        let record = |text| Record::builder().level(Level::Warn).args(text).build();
-        let text = line(
-            &record(format_args!("no points for {} s", 5)),
-            1_700_000_000_000_000_042,
-            "mapper",
-        );
-        assert_eq!(
-            text,
-            "[WARN] [1700000000.000000042] [mapper]: no points for 5 s"
-        );
+        let text = format_args!("no points for 5 s");
+        let record = Record::builder().level(Level::Warn).args(text).build();
+        let text = line(&record, 1_700_000_000_000_000_042, "mapper");
+        let expected = "[WARN] [1700000000.000000042] [mapper]: no points for 5 s";
+        assert_eq!(text, expected);
     }
 
     #[test]
@@ -154,20 +149,19 @@ mod tests {
         static TEE: OnceLock<Tee> = OnceLock::new();
         static HEARD: Mutex<Vec<String>> = Mutex::new(Vec::new());
         let console = Builder::new().filter_level(log::LevelFilter::Info).build();
-        let node_name = "front".to_owned();
         let log = TEE.get_or_init(|| Tee {
             console,
             to_console: false,
-            node_name,
+            node_name: "front".to_owned(),
         });
         let heard = |record: &Record<'_>, node: &str| {
-            HEARD
-                .lock()
-                .unwrap()
-                .push(format!("{node}: {}", record.args()));
-            let _ = TEE
-                .get()
-                .map(|log| send(log, Level::Error, format_args!("from the sink")));
+            let line = format!("{node}: {}", record.args());
+            HEARD.lock().unwrap().push(line);
+            send(
+                TEE.get().unwrap(),
+                Level::Error,
+                format_args!("from the sink"),
+            );
         };
         assert!(tee(Box::new(heard)));
         assert!(!tee(Box::new(|_, _| {})), "there is one already");
@@ -178,12 +172,8 @@ mod tests {
     }
 
     fn send(log: &Tee, level: Level, text: std::fmt::Arguments<'_>) {
-        log.log(
-            &Record::builder()
-                .level(level)
-                .target("lattice_nodes")
-                .args(text)
-                .build(),
-        );
+        let mut record = Record::builder();
+        record.level(level).target("lattice_nodes");
+        log.log(&record.args(text).build());
     }
 }

@@ -1,4 +1,4 @@
-use crate::ros_args::{LogLevel, RosArgs};
+use crate::ros_args::RosArgs;
 use env_logger::WriteStyle;
 use log::LevelFilter;
 
@@ -37,7 +37,7 @@ impl Plan {
         let mut filters = vec![(None, LevelFilter::Info)];
         filters.extend(CHATTY.map(|name| (Some(name.to_owned()), LevelFilter::Off)));
         for rule in &args.log_levels {
-            let level = filter(rule.level);
+            let level = rule.level;
             match rule.logger.as_deref() {
                 None => {
                     filters.push((None, level));
@@ -70,33 +70,24 @@ impl Plan {
     }
 }
 
-fn filter(level: LogLevel) -> LevelFilter {
-    match level {
-        LogLevel::Debug => LevelFilter::Debug,
-        LogLevel::Unset | LogLevel::Info => LevelFilter::Info,
-        LogLevel::Warn => LevelFilter::Warn,
-        LogLevel::Error | LogLevel::Fatal => LevelFilter::Error,
-    }
-}
-
 #[cfg(test)]
 mod tests {
     use super::*;
     use log::{Level, Log, Metadata};
 
-    /// True if a plan lets a record through, by env_logger's own rules.
-    fn shows(rules: &[&str], rust_log: Option<&str>, level: Level, target: &str) -> bool {
-        let log_levels = rules.iter().map(|rule| rule.parse().unwrap()).collect();
+    /// A plan by the rules of `--log-level` and one variable of the environment.
+    fn plan(rules: &str, variable: (&str, &str)) -> Plan {
+        let rules = rules.split_whitespace().map(|rule| rule.parse().unwrap());
         let args = RosArgs {
-            log_levels,
+            log_levels: rules.collect(),
             ..RosArgs::default()
         };
-        let lookup = |name: &str| {
-            (name == "RUST_LOG")
-                .then(|| rust_log.map(str::to_owned))
-                .flatten()
-        };
-        let plan = Plan::new(&args, "mapper", lookup);
+        let lookup = |name: &str| (name == variable.0).then(|| variable.1.to_owned());
+        Plan::new(&args, "mapper", lookup)
+    }
+
+    /// True if a plan lets a record through, by env_logger's own rules.
+    fn shows(plan: &Plan, level: Level, target: &str) -> bool {
         let mut builder = env_logger::Builder::new();
         for (target, level) in &plan.filters {
             builder.filter(target.as_deref(), *level);
@@ -104,104 +95,52 @@ mod tests {
         if let Some(text) = &plan.rust_log {
             builder.parse_filters(text);
         }
-        builder
-            .build()
-            .enabled(&Metadata::builder().level(level).target(target).build())
+        let record = Metadata::builder().level(level).target(target).build();
+        builder.build().enabled(&record)
     }
 
     #[test]
-    fn info_is_the_default_and_libraries_are_silent() {
-        assert!(shows(&[], None, Level::Info, "lattice_nodes::runtime"));
-        assert!(!shows(&[], None, Level::Debug, "lattice_nodes::runtime"));
-        assert!(!shows(&[], None, Level::Info, "rustdds::network"));
-        assert!(!shows(&[], None, Level::Error, "rustdds::network"));
-        assert!(shows(&["debug"], None, Level::Warn, "rustdds::network"));
-    }
-
-    #[test]
-    fn the_last_level_wins() {
-        assert!(shows(
-            &["warn", "debug"],
-            None,
-            Level::Debug,
-            "lattice_nodes"
-        ));
-        assert!(!shows(
-            &["debug", "warn"],
-            None,
-            Level::Info,
-            "lattice_nodes"
-        ));
-        assert!(!shows(&["fatal"], None, Level::Warn, "rustdds"));
-        assert!(!shows(&["debug"], None, Level::Info, "rustdds"));
-        assert!(shows(
-            &["warn", "unset"],
-            None,
-            Level::Info,
-            "lattice_nodes"
-        ));
-    }
-
-    #[test]
-    fn a_logger_can_be_named() {
-        assert!(shows(
-            &["mapper:=debug"],
-            None,
-            Level::Debug,
-            "lattice_nodes::mapper"
-        ));
-        assert!(shows(
-            &["robot.mapper:=debug"],
-            None,
-            Level::Debug,
-            "mapper"
-        ));
-        assert!(!shows(
-            &["other:=debug"],
-            None,
-            Level::Debug,
-            "lattice_nodes::mapper"
-        ));
-        assert!(shows(
-            &["rustdds:=debug"],
-            None,
-            Level::Debug,
-            "rustdds::network"
-        ));
+    fn the_last_level_of_a_logger_counts_and_libraries_are_silent() {
+        use Level::{Debug, Error, Info, Warn};
+        for (rules, level, target, shown) in [
+            ("", Info, "lattice_nodes::runtime", true),
+            ("", Debug, "lattice_nodes::runtime", false),
+            ("", Error, "rustdds::network", false),
+            ("debug", Warn, "rustdds::network", true),
+            ("debug", Info, "rustdds", false),
+            ("fatal", Warn, "rustdds", false),
+            ("warn debug", Debug, "lattice_nodes", true),
+            ("debug warn", Info, "lattice_nodes", false),
+            ("warn unset", Info, "lattice_nodes", true),
+            ("mapper:=debug", Debug, "lattice_nodes::mapper", true),
+            ("robot.mapper:=debug", Debug, "mapper", true),
+            ("other:=debug", Debug, "lattice_nodes::mapper", false),
+            ("rustdds:=debug", Debug, "rustdds::network", true),
+        ] {
+            let found = shows(&plan(rules, ("", "")), level, target);
+            assert_eq!(found, shown, "{rules}: {level} of {target}");
+        }
     }
 
     #[test]
     fn rust_log_counts_without_log_level() {
-        assert!(shows(
-            &[],
-            Some("lattice_nodes=debug"),
-            Level::Debug,
-            "lattice_nodes"
-        ));
-        assert!(!shows(
-            &["info"],
-            Some("debug"),
-            Level::Debug,
-            "lattice_nodes"
-        ));
+        let by = |rules, text| {
+            shows(
+                &plan(rules, ("RUST_LOG", text)),
+                Level::Debug,
+                "lattice_nodes",
+            )
+        };
+        assert!(by("", "lattice_nodes=debug") && !by("info", "debug"));
     }
 
     #[test]
     fn colours_follow_rcutils() {
-        for (value, style) in [
-            (Some("1"), WriteStyle::Always),
-            (Some("0"), WriteStyle::Never),
-            (None, WriteStyle::Auto),
-        ] {
-            let lookup = |name: &str| {
-                (name == "RCUTILS_COLORIZED_OUTPUT")
-                    .then(|| value.map(str::to_owned))
-                    .flatten()
-            };
-            assert_eq!(
-                Plan::new(&RosArgs::default(), "mapper", lookup).style,
-                style
-            );
-        }
+        let style = |value| plan("", ("RCUTILS_COLORIZED_OUTPUT", value)).style;
+        let found = ["1", "0", ""].map(style);
+        assert_eq!(
+            found,
+            [WriteStyle::Always, WriteStyle::Never, WriteStyle::Auto]
+        );
     }
 }

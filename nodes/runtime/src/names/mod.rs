@@ -3,94 +3,58 @@
 mod remap;
 mod shown;
 
-pub(crate) use remap::split_node;
-pub use remap::{NameKind, RemapRule, RemapTarget};
+pub(crate) use remap::{NameKind, RemapRule, RemapTarget, split_node};
 pub(crate) use shown::shown;
 
 use thiserror::Error;
 
-/// rmw's limit of a full topic or service name, bytes.
-pub const TOPIC_LENGTH_MAX: usize = 247;
-/// rmw's limit of a namespace, bytes.
-pub const NAMESPACE_LENGTH_MAX: usize = 245;
-/// rmw's limit of a node's name, bytes.
-pub const NODE_NAME_LENGTH_MAX: usize = 255;
+/// rmw's limits of a full topic or service name, of a namespace and of a node's name, bytes.
+const TOPIC_LENGTH_MAX: usize = 247;
+const NAMESPACE_LENGTH_MAX: usize = 245;
+const NODE_NAME_LENGTH_MAX: usize = 255;
 
-/// Reason why a name is refused.
+/// Reason why a name is refused. Names are cut to a readable length.
 #[derive(Clone, Debug, PartialEq, Eq, Error)]
 pub enum NameError {
-    /// The name breaks one of the rules.
     #[error("the {what} {name:?} {problem}")]
     Invalid {
-        /// Kind of name: a topic, a node, a namespace.
         what: &'static str,
-        /// The name, cut to a readable length.
         name: String,
-        /// The rule it breaks.
         problem: &'static str,
     },
-    /// `{…}` with something else than `node`, `ns` or `namespace`.
     #[error(
         "the topic {name:?} has the unknown substitution {{{key}}}; known are {{node}}, {{ns}} and {{namespace}}"
     )]
-    UnknownSubstitution {
-        /// The name.
-        name: String,
-        /// Text between the braces.
-        key: String,
-    },
-    /// The name is longer than rmw allows.
+    UnknownSubstitution { name: String, key: String },
+    /// Longer than rmw allows, bytes.
     #[error("the {what} {name:?} has {length} bytes, {length_max} are allowed")]
     TooLong {
-        /// Kind of name.
         what: &'static str,
-        /// The name, cut to a readable length.
         name: String,
-        /// Its length, bytes.
         length: usize,
-        /// The limit, bytes.
         length_max: usize,
     },
 }
 
 /// True if `text` is one token of a remap rule: an identifier with single underscores.
-pub fn is_token(text: &str) -> bool {
+pub(crate) fn is_token(text: &str) -> bool {
     is_identifier(text) && !text.contains("__")
 }
 
 /// True if `text` is one part of a name: letters, digits and underscores, no digit first.
-pub fn is_identifier(text: &str) -> bool {
+pub(crate) fn is_identifier(text: &str) -> bool {
     text.bytes().all(is_word) && !text.starts_with(|c: char| c.is_ascii_digit()) && !text.is_empty()
 }
 
-/// The full name of a topic of the node, after the first remap rule that matches.
+/// The full name of a topic or service of the node, after the first remap rule that matches.
 ///
 /// Knows `/absolute`, `relative`, `~/private`, `{node}`, `{ns}` and `{namespace}`.
-pub fn resolve_topic(
-    name: &str,
-    node_name: &str,
-    namespace: &str,
-    remaps: &[RemapRule],
-) -> Result<String, NameError> {
-    resolve(name, node_name, namespace, remaps, NameKind::Topic)
-}
-
-/// The full name of a service of the node, by the same rules.
-pub fn resolve_service(
-    name: &str,
-    node_name: &str,
-    namespace: &str,
-    remaps: &[RemapRule],
-) -> Result<String, NameError> {
-    resolve(name, node_name, namespace, remaps, NameKind::Service)
-}
-
-fn resolve(
-    name: &str,
-    node_name: &str,
-    namespace: &str,
-    remaps: &[RemapRule],
+pub(crate) fn resolve(
     kind: NameKind,
+    name: &str,
+    node_name: &str,
+    namespace: &str,
+    remaps: &[RemapRule],
 ) -> Result<String, NameError> {
     let mut full = expand(name, node_name, namespace)?;
     for rule in remaps.iter().filter(|rule| rule.applies_to(node_name)) {
@@ -107,7 +71,7 @@ fn resolve(
 }
 
 /// The full name of a topic before remapping; `//` and lengths are not checked yet.
-pub fn expand(name: &str, node_name: &str, namespace: &str) -> Result<String, NameError> {
+fn expand(name: &str, node_name: &str, namespace: &str) -> Result<String, NameError> {
     validate_node_name(node_name)?;
     validate_namespace(namespace)?;
     validate_unexpanded(name)?;
@@ -128,24 +92,19 @@ pub fn expand(name: &str, node_name: &str, namespace: &str) -> Result<String, Na
         };
         text = format!("{head}{value}{tail}");
     }
-    Ok(if text.starts_with('/') {
-        text
-    } else {
-        join(namespace, &text)
+    Ok(match text.starts_with('/') {
+        true => text,
+        false => fully_qualified(&text, namespace),
     })
 }
 
 /// A node's full name, for example `/robot/mapper`.
-pub fn fully_qualified(node_name: &str, namespace: &str) -> String {
-    join(namespace, node_name)
-}
-
-fn join(namespace: &str, name: &str) -> String {
-    format!("{}/{name}", namespace.trim_end_matches('/'))
+pub(crate) fn fully_qualified(node_name: &str, namespace: &str) -> String {
+    format!("{}/{node_name}", namespace.trim_end_matches('/'))
 }
 
 /// rmw's rules for a node's name.
-pub fn validate_node_name(name: &str) -> Result<(), NameError> {
+pub(crate) fn validate_node_name(name: &str) -> Result<(), NameError> {
     let invalid = |problem| invalid("node name", name, problem);
     if name.is_empty() {
         Err(invalid("is empty"))
@@ -159,7 +118,7 @@ pub fn validate_node_name(name: &str) -> Result<(), NameError> {
 }
 
 /// rmw's rules for a namespace: `/`, or a full name.
-pub fn validate_namespace(namespace: &str) -> Result<(), NameError> {
+pub(crate) fn validate_namespace(namespace: &str) -> Result<(), NameError> {
     if namespace == "/" {
         return Ok(());
     }
@@ -167,7 +126,7 @@ pub fn validate_namespace(namespace: &str) -> Result<(), NameError> {
 }
 
 /// rmw's rules for the full name of a topic or service.
-pub fn validate_full_name(name: &str) -> Result<(), NameError> {
+pub(crate) fn validate_full_name(name: &str) -> Result<(), NameError> {
     full("topic", name, TOPIC_LENGTH_MAX)
 }
 
@@ -232,17 +191,17 @@ fn validate_unexpanded(name: &str) -> Result<(), NameError> {
 }
 
 /// The DDS topic of a ROS topic: `/points` is `rt/points`.
-pub fn dds_topic(full_name: &str) -> String {
+pub(crate) fn dds_topic(full_name: &str) -> String {
     format!("rt{full_name}")
 }
 
 /// The DDS topic of a service's requests: `/reset` is `rq/resetRequest`.
-pub fn dds_request(full_name: &str) -> String {
+pub(crate) fn dds_request(full_name: &str) -> String {
     format!("rq{full_name}Request")
 }
 
 /// The DDS topic of a service's replies: `/reset` is `rr/resetReply`.
-pub fn dds_reply(full_name: &str) -> String {
+pub(crate) fn dds_reply(full_name: &str) -> String {
     format!("rr{full_name}Reply")
 }
 

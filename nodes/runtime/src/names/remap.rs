@@ -1,47 +1,40 @@
 use super::{is_token, shown, validate_namespace};
 use std::str::FromStr;
 
-/// Kind of names that a rule applies to.
-#[derive(Clone, Copy, Debug, PartialEq, Eq, Hash)]
-pub enum NameKind {
-    /// Topics and services.
+/// Kind of names that a rule applies to: `rostopic://`, `rosservice://` or both.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub(crate) enum NameKind {
     Any,
-    /// `rostopic://`: topics only.
     Topic,
-    /// `rosservice://`: services only.
     Service,
 }
 
 /// Replacement that a rule makes.
 #[derive(Clone, Debug, PartialEq, Eq)]
-pub enum RemapTarget {
+pub(crate) enum RemapTarget {
     /// `__node:=name`.
     NodeName(String),
     /// `__ns:=/namespace`.
     Namespace(String),
     /// `from:=to`, both sides still relative to the node.
     Name {
-        /// Topics, services or both.
         kind: NameKind,
-        /// The name to replace.
         from: String,
-        /// The name in its place.
         to: String,
     },
 }
 
 /// One `-r` rule.
 #[derive(Clone, Debug, PartialEq, Eq)]
-pub struct RemapRule {
+pub(crate) struct RemapRule {
     /// The only node the rule is for, or all of them.
     pub node: Option<String>,
-    /// The name or namespace that it replaces.
     pub target: RemapTarget,
 }
 
 impl RemapRule {
     /// True if the rule is for the node of this name.
-    pub fn applies_to(&self, node_name: &str) -> bool {
+    pub(crate) fn applies_to(&self, node_name: &str) -> bool {
         self.node.as_deref().is_none_or(|node| node == node_name)
     }
 }
@@ -83,12 +76,12 @@ pub(crate) fn split_node(text: &str) -> (Option<&str>, &str) {
 }
 
 fn name_rule(from: &str, to: &str) -> Result<RemapTarget, String> {
-    let (kind, from) = if let Some(rest) = from.strip_prefix("rostopic://") {
-        (NameKind::Topic, rest)
-    } else if let Some(rest) = from.strip_prefix("rosservice://") {
-        (NameKind::Service, rest)
-    } else {
-        (NameKind::Any, from)
+    let topic = from.strip_prefix("rostopic://");
+    let service = from.strip_prefix("rosservice://");
+    let (kind, from) = match (topic, service) {
+        (Some(rest), _) => (NameKind::Topic, rest),
+        (_, Some(rest)) => (NameKind::Service, rest),
+        _ => (NameKind::Any, from),
     };
     check_name(from)?;
     check_name(to)?;
@@ -101,44 +94,16 @@ fn name_rule(from: &str, to: &str) -> Result<RemapTarget, String> {
 
 /// `[~/ or /] token (/ token)*`
 fn check_name(name: &str) -> Result<(), String> {
-    let tokens = name
-        .strip_prefix("~/")
-        .or_else(|| name.strip_prefix('/'))
-        .unwrap_or(name);
-    if tokens.split('/').all(is_token) {
+    let rooted = name.strip_prefix("~/").or(name.strip_prefix('/'));
+    if rooted.unwrap_or(name).split('/').all(is_token) {
         return Ok(());
     }
-    Err(if name.is_empty() {
-        "one side of `:=` is empty".to_owned()
-    } else if name.contains('*') {
-        format!(
-            "`{}` has a wildcard, which ROS remap rules do not know",
-            shown(name)
-        )
-    } else {
-        format!("`{}` is no name", shown(name))
+    let shown = shown(name);
+    Err(match name {
+        "" => "one side of `:=` is empty".to_owned(),
+        _ if name.contains('*') => {
+            format!("`{shown}` has a wildcard, which ROS remap rules do not know")
+        }
+        _ => format!("`{shown}` is no name"),
     })
-}
-
-#[cfg(test)]
-mod tests {
-    use super::*;
-
-    #[test]
-    fn node_prefixes_are_not_urls() {
-        assert_eq!(split_node("mapper:a:=b"), (Some("mapper"), "a:=b"));
-        assert_eq!(split_node("rostopic:///a:=b"), (None, "rostopic:///a:=b"));
-        assert_eq!(split_node("rostopic:/a:=b"), (Some("rostopic"), "/a:=b"));
-        assert_eq!(split_node("a:=b"), (None, "a:=b"));
-    }
-
-    #[test]
-    fn problems_say_what_is_wrong() {
-        let problem = |text: &str| text.parse::<RemapRule>().unwrap_err();
-        assert_eq!(problem("points"), "there is no `:=`");
-        assert_eq!(problem("points:="), "one side of `:=` is empty");
-        assert!(problem("/**:=points").contains("wildcard"));
-        assert!(problem("__node:=/a/b").contains("`/a/b` is no node name"));
-        assert!(problem("__ns:=robot").contains("robot"));
-    }
 }

@@ -14,14 +14,3 @@ pub(crate) fn shown(text: &str) -> String {
     }
     out
 }
-
-#[cfg(test)]
-mod tests {
-    use super::*;
-
-    #[test]
-    fn long_and_odd_arguments_stay_readable() {
-        assert_eq!(shown("a\nb"), "a\\nb");
-        assert_eq!(shown(&"x".repeat(1000)).chars().count(), SHOWN_MAX + 1);
-    }
-}

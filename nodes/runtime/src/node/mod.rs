@@ -10,7 +10,7 @@ use super::clock::Clock;
 use super::diagnostics::Diagnostics;
 use super::error::RuntimeError;
 use super::graph::NodeId;
-use super::names;
+use super::names::{self, NameKind};
 use super::params::Params;
 use super::publisher::{Publisher, RawPublisher};
 use super::qos::Qos;
@@ -55,7 +55,7 @@ impl Node {
         )?;
         let id = shared.graph.add_node(&namespace, &name);
         let clock = if params.bool("use_sim_time", false)? {
-            let topic = names::resolve_topic("/clock", &name, &namespace, &args.remaps)?;
+            let topic = names::resolve(NameKind::Topic, "/clock", &name, &namespace, &args.remaps)?;
             shared.sim_clock(id, &topic)?
         } else {
             Clock::default()
@@ -89,13 +89,8 @@ impl Node {
         &self.inner.name
     }
 
-    /// Namespace, `/` if there is none.
-    pub fn namespace(&self) -> &str {
-        &self.inner.namespace
-    }
-
     /// Full name, such as `/robot/mapper`.
-    pub fn fqn(&self) -> &str {
+    pub(crate) fn fqn(&self) -> &str {
         &self.inner.fqn
     }
 
@@ -106,26 +101,18 @@ impl Node {
 
     /// Full name of a topic, remapped.
     pub fn resolve(&self, topic: &str) -> Result<String, RuntimeError> {
-        let inner = &self.inner;
-        let remaps = &inner.args.remaps;
-        Ok(names::resolve_topic(
-            topic,
-            &inner.name,
-            &inner.namespace,
-            remaps,
-        )?)
+        self.full_name(NameKind::Topic, topic)
     }
 
-    /// Full name of a service, remapped.
-    pub fn resolve_service(&self, service: &str) -> Result<String, RuntimeError> {
-        let inner = &self.inner;
-        let remaps = &inner.args.remaps;
-        Ok(names::resolve_service(
-            service,
-            &inner.name,
-            &inner.namespace,
-            remaps,
-        )?)
+    pub(crate) fn full_name(&self, kind: NameKind, name: &str) -> Result<String, RuntimeError> {
+        let Inner {
+            name: node,
+            namespace,
+            args,
+            ..
+        } = &*self.inner;
+        let remaps = &args.remaps;
+        Ok(names::resolve(kind, name, node, namespace, remaps)?)
     }
 
     /// The clock this node goes by.

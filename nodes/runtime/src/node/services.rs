@@ -5,6 +5,7 @@ use lattice_msgs::std_srvs::{Trigger, TriggerRequest, TriggerResponse};
 
 use super::Node;
 use crate::error::RuntimeError;
+use crate::names::NameKind;
 use crate::service::{Reply, Server};
 
 impl Node {
@@ -35,7 +36,7 @@ impl Node {
         max_pending: usize,
         handler: impl FnMut(S::Request, Reply<S::Response>) + Send + 'static,
     ) -> Result<Server, RuntimeError> {
-        let name = self.resolve_service(name)?;
+        let name = self.full_name(NameKind::Service, name)?;
         self.shared()
             .serve::<S>(self.id(), &name, max_pending, handler)
     }

@@ -92,44 +92,24 @@ impl ParamValue {
             values.push(value);
         }
         // A list of `true` and `yes`, or of `8` and `010`, has one type for rcl and two for YAML 1.2.
-        let lead = values
-            .iter()
-            .find(|value| !matches!(value, ParamValue::String(_)))
-            .or_else(|| values.first());
+        let is_text = |value: &&ParamValue| value.as_str().is_some();
+        let typed = values.iter().find(|value| !is_text(value));
+        let lead = typed.or(values.first());
+        let float = |v: &ParamValue| match v {
+            ParamValue::I64(_) => None,
+            v => v.as_f64(),
+        };
+        let text = |v: &ParamValue| v.as_str().map(str::to_owned);
         let all = match lead {
-            None | Some(ParamValue::String(_)) => values
-                .iter()
-                .map(|v| v.as_str().map(str::to_owned))
-                .collect::<Option<_>>()
-                .map(ParamValue::StringArray),
-            Some(ParamValue::Bool(_)) => values
-                .iter()
-                .map(Self::as_bool)
-                .collect::<Option<_>>()
-                .map(ParamValue::BoolArray),
-            Some(ParamValue::I64(_)) => values
-                .iter()
-                .map(Self::as_i64)
-                .collect::<Option<_>>()
-                .map(ParamValue::I64Array),
-            Some(_) => values
-                .iter()
-                .map(|v| {
-                    if matches!(v, ParamValue::I64(_)) {
-                        None
-                    } else {
-                        v.as_f64()
-                    }
-                })
-                .collect::<Option<_>>()
-                .map(ParamValue::F64Array),
+            None | Some(ParamValue::String(_)) => each(&values, text).map(Self::StringArray),
+            Some(ParamValue::Bool(_)) => each(&values, Self::as_bool).map(Self::BoolArray),
+            Some(ParamValue::I64(_)) => each(&values, Self::as_i64).map(Self::I64Array),
+            Some(_) => each(&values, float).map(Self::F64Array),
         };
         all.ok_or_else(|| {
             let first = lead.map_or("nothing", Self::type_name);
-            let other = values
-                .iter()
-                .map(Self::type_name)
-                .find(|name| *name != first);
+            let mut others = values.iter().map(Self::type_name);
+            let other = others.find(|name| *name != first);
             ValueError::Mixed(first, other.unwrap_or("something else"))
         })
     }
@@ -194,9 +174,9 @@ impl ParamValue {
         match self {
             ParamValue::F64(value) => Some(*value),
             ParamValue::I64(value) => Some(*value as f64),
-            ParamValue::String(text) if may_be_plain(text) => c_integer(text)
-                .map(|value| value as f64)
-                .or_else(|| c_float(text)),
+            ParamValue::String(text) if may_be_plain(text) => {
+                c_integer(text).map_or_else(|| c_float(text), |value| Some(value as f64))
+            }
             _ => None,
         }
     }
@@ -211,16 +191,22 @@ impl ParamValue {
 
     /// The items of a list, each as a value.
     pub(crate) fn items(&self) -> Option<Vec<ParamValue>> {
+        fn each<T: Clone>(items: &[T], wrap: fn(T) -> ParamValue) -> Option<Vec<ParamValue>> {
+            Some(items.iter().cloned().map(wrap).collect())
+        }
         match self {
-            ParamValue::BoolArray(items) => Some(items.iter().copied().map(Self::Bool).collect()),
-            ParamValue::I64Array(items) => Some(items.iter().copied().map(Self::I64).collect()),
-            ParamValue::F64Array(items) => Some(items.iter().copied().map(Self::F64).collect()),
-            ParamValue::StringArray(items) => {
-                Some(items.iter().cloned().map(Self::String).collect())
-            }
+            ParamValue::BoolArray(items) => each(items, Self::Bool),
+            ParamValue::I64Array(items) => each(items, Self::I64),
+            ParamValue::F64Array(items) => each(items, Self::F64),
+            ParamValue::StringArray(items) => each(items, Self::String),
             _ => None,
         }
     }
+}
+
+/// All values read alike; `None` if one of them cannot be.
+fn each<T>(values: &[ParamValue], read: impl Fn(&ParamValue) -> Option<T>) -> Option<Vec<T>> {
+    values.iter().map(read).collect()
 }
 
 /// True if the text can have stood without quotes: YAML itself does not read it as something else.
@@ -230,13 +216,9 @@ fn may_be_plain(text: &str) -> bool {
 
 /// An integer as strtol reads it with base 0: decimal, `0x` hexadecimal, `0` octal.
 fn c_integer(text: &str) -> Option<i64> {
-    let (negative, digits) = match text.strip_prefix('-') {
-        Some(digits) => (true, digits),
-        None => (false, text.strip_prefix('+').unwrap_or(text)),
-    };
-    let hexadecimal = digits
-        .strip_prefix("0x")
-        .or_else(|| digits.strip_prefix("0X"));
+    let negative = text.starts_with('-');
+    let digits = text.strip_prefix(['-', '+']).unwrap_or(text);
+    let hexadecimal = digits.strip_prefix("0x").or(digits.strip_prefix("0X"));
     let (digits, radix) = match (hexadecimal, digits.strip_prefix('0')) {
         (Some(digits), _) => (digits, 16),
         (None, Some(octal)) if !octal.is_empty() => (octal, 8),
@@ -246,22 +228,14 @@ fn c_integer(text: &str) -> Option<i64> {
         return None;
     }
     let magnitude = i128::from(u64::from_str_radix(digits, radix).ok()?);
-    i64::try_from(if negative {
-        magnitude.checked_neg()?
-    } else {
-        magnitude
-    })
-    .ok()
+    i64::try_from(if negative { -magnitude } else { magnitude }).ok()
 }
 
 /// A decimal float that YAML 1.2 leaves a text, for example `08.5`.
 fn c_float(text: &str) -> Option<f64> {
-    let decimal = text
-        .bytes()
-        .all(|byte| byte.is_ascii_digit() || b"+-.eE".contains(&byte));
-    text.parse()
-        .ok()
-        .filter(|value: &f64| decimal && value.is_finite())
+    let is_decimal = |byte: u8| byte.is_ascii_digit() || b"+-.eE".contains(&byte);
+    let value: f64 = text.parse().ok()?;
+    (text.bytes().all(is_decimal) && value.is_finite()).then_some(value)
 }
 
 impl fmt::Display for ParamValue {

@@ -7,82 +7,70 @@ fn read(text: &str) -> ParamValue {
 
 #[test]
 fn plain_scalars_have_the_types_of_rcl() {
-    assert_eq!(read("true"), ParamValue::Bool(true));
-    assert_eq!(read("1"), ParamValue::I64(1));
-    assert_eq!(read("0x1F"), ParamValue::I64(31));
-    assert_eq!(read("-3"), ParamValue::I64(-3));
-    assert_eq!(read("1.0"), ParamValue::F64(1.0));
-    assert_eq!(read("1e3"), ParamValue::F64(1000.0));
-    assert_eq!(read("-.inf"), ParamValue::F64(f64::NEG_INFINITY));
-    assert_eq!(
-        read("18446744073709551615"),
-        ParamValue::F64(18446744073709551615.0)
-    );
-    assert_eq!(read("~/bar"), ParamValue::String("~/bar".into()));
-    assert_eq!(read("null"), ParamValue::String("null".into()));
-    assert_eq!(read("''"), ParamValue::String(String::new()));
-    assert_eq!(
-        read("hello world"),
-        ParamValue::String("hello world".into())
-    );
+    let text = |text: &str| ParamValue::String(text.to_owned());
+    for (yaml, value) in [
+        ("true", ParamValue::Bool(true)),
+        ("1", ParamValue::I64(1)),
+        ("0x1F", ParamValue::I64(31)),
+        ("-3", ParamValue::I64(-3)),
+        ("1.0", ParamValue::F64(1.0)),
+        ("1e3", ParamValue::F64(1000.0)),
+        ("-.inf", ParamValue::F64(f64::NEG_INFINITY)),
+        ("18446744073709551615", ParamValue::F64(u64::MAX as f64)),
+        ("~/bar", text("~/bar")),
+        ("null", text("null")),
+        ("''", text("")),
+        ("hello world", text("hello world")),
+    ] {
+        assert_eq!(read(yaml), value, "{yaml}");
+    }
 }
 
 #[test]
 fn words_and_octals_become_what_is_wanted() {
-    for yes in [
-        "y", "Y", "yes", "Yes", "YES", "on", "On", "ON", "true", "True", "TRUE",
-    ] {
+    for yes in "y Y yes Yes YES on On ON true True TRUE".split(' ') {
         assert_eq!(read(yes).as_bool(), Some(true), "{yes}");
     }
-    for no in [
-        "n", "N", "no", "No", "NO", "off", "Off", "OFF", "false", "False", "FALSE",
-    ] {
+    for no in "n N no No NO off Off OFF false False FALSE".split(' ') {
         assert_eq!(read(no).as_bool(), Some(false), "{no}");
     }
-    for (text, value) in [
-        ("010", 8),
-        ("-017", -15),
-        ("+7", 7),
-        ("0", 0),
-        ("0X1f", 31),
-        ("-0x10", -16),
-    ] {
+    let octal = [("010", 8), ("-017", -15), ("+7", 7), ("0", 0)];
+    for (text, value) in octal.into_iter().chain([("0X1f", 31), ("-0x10", -16)]) {
         assert_eq!(read(text).as_i64(), Some(value), "{text}");
         assert_eq!(read(text).as_f64(), Some(value as f64), "{text}");
     }
     assert_eq!(read("08.5").as_f64(), Some(8.5));
     assert_eq!(read("oN").as_bool(), None);
-    assert_eq!(read("08").as_i64(), None);
-    assert_eq!(read("0x").as_i64(), None);
-    assert_eq!(read("9223372036854775808").as_i64(), None);
+    for none in ["08", "0x", "9223372036854775808"] {
+        assert_eq!(read(none).as_i64(), None, "{none}");
+    }
 }
 
 #[test]
 fn quotes_make_a_text() {
     for text in ["'5'", "\"true\"", "'1.5'", "'0x10'"] {
         let value = read(text);
-        assert_eq!(
-            (value.as_bool(), value.as_i64(), value.as_f64()),
-            (None, None, None),
-            "{text}"
-        );
+        let read = (value.as_bool(), value.as_i64(), value.as_f64());
+        assert_eq!(read, (None, None, None), "{text}");
         assert!(value.as_str().is_some(), "{text}");
     }
 }
 
 #[test]
 fn lists_have_one_type() {
-    assert_eq!(read("[1, 010]"), ParamValue::I64Array(vec![1, 8]));
-    assert_eq!(read("[yes, true]"), ParamValue::BoolArray(vec![true, true]));
-    assert_eq!(
-        read("[1.0, .inf]"),
-        ParamValue::F64Array(vec![1.0, f64::INFINITY])
-    );
-    assert_eq!(
-        read("[a, b]"),
-        ParamValue::StringArray(vec!["a".into(), "b".into()])
-    );
-    assert_eq!(read("[]"), ParamValue::StringArray(vec![]));
+    let texts = ["a", "b"].map(str::to_owned);
+    for (yaml, list) in [
+        ("[1, 010]", ParamValue::I64Array(vec![1, 8])),
+        ("[yes, true]", ParamValue::BoolArray(vec![true, true])),
+        (
+            "[1.0, .inf]",
+            ParamValue::F64Array(vec![1.0, f64::INFINITY]),
+        ),
+        ("[a, b]", ParamValue::StringArray(texts.into())),
+        ("[]", ParamValue::StringArray(vec![])),
+    ] {
+        assert_eq!(read(yaml), list, "{yaml}");
+    }
     for mixed in ["[1, 2.0]", "[2.0, 1]", "[1, a]", "[true, 1]", "[a, 1.5]"] {
         let error = ParamValue::from_yaml_text(mixed).unwrap_err();
         assert!(matches!(error, ValueError::Mixed(..)), "{mixed}: {error}");
@@ -103,15 +91,10 @@ fn everything_else_is_refused() {
     ] {
         assert_eq!(ParamValue::from_yaml_text(text), Err(error), "{text}");
     }
-    assert!(matches!(
-        ParamValue::from_yaml_text("[1"),
-        Err(ValueError::Yaml(_))
-    ));
-    let deep = "[".repeat(100_000);
-    assert!(matches!(
-        ParamValue::from_yaml_text(&deep),
-        Err(ValueError::Scan(_))
-    ));
+    let cut = ParamValue::from_yaml_text("[1");
+    assert!(matches!(cut, Err(ValueError::Yaml(_))));
+    let deep = ParamValue::from_yaml_text(&"[".repeat(100_000));
+    assert!(matches!(deep, Err(ValueError::Scan(_))));
 }
 
 proptest! {

@@ -6,12 +6,12 @@ mod ranges;
 pub use crate::param_value::{ParamValue, ValueError};
 pub use error::ParamError;
 
+use std::collections::BTreeMap;
+use std::path::{Path, PathBuf};
+use std::sync::Mutex;
+
+use crate::sync::lock;
 use crate::{params_file, ros_args::RosArgs};
-use std::{
-    collections::BTreeMap,
-    path::{Path, PathBuf},
-    sync::{Mutex, MutexGuard, PoisonError},
-};
 
 /// The parameters of one node.
 ///
@@ -62,11 +62,7 @@ impl Params {
         let node_name = node_fqn.rsplit('/').next().unwrap_or(node_fqn);
         for rule in &args.param_overrides {
             if rule.node.as_deref().is_none_or(|node| node == node_name) {
-                let given = Given {
-                    value: rule.value.clone(),
-                    origin: Origin::CommandLine,
-                };
-                params.given.insert(rule.name.clone(), given);
+                params.give(rule.name.clone(), rule.value.clone(), Origin::CommandLine);
             }
         }
         Ok(params)
@@ -77,92 +73,56 @@ impl Params {
         node_fqn: &str,
         values: impl IntoIterator<Item = (N, ParamValue)>,
     ) -> Params {
-        let given = values
-            .into_iter()
-            .map(|(name, value)| {
-                (
-                    name.into(),
-                    Given {
-                        value,
-                        origin: Origin::CommandLine,
-                    },
-                )
-            })
-            .collect();
-        Params {
+        let mut params = Params {
             node: node_fqn.to_owned(),
-            given,
             ..Params::default()
+        };
+        for (name, value) in values {
+            params.give(name.into(), value, Origin::CommandLine);
         }
+        params
     }
 
     fn add_file(&mut self, path: &Path) -> Result<(), ParamError> {
         for entry in params_file::read(path)? {
             if entry.nodes.matches(&self.node) {
-                let origin = Origin::File {
-                    path: path.to_owned(),
-                    key: entry.key,
-                };
-                self.given.insert(
-                    entry.name,
-                    Given {
-                        value: entry.value,
-                        origin,
-                    },
-                );
+                let (path, key) = (path.to_owned(), entry.key);
+                self.give(entry.name, entry.value, Origin::File { path, key });
             }
         }
         Ok(())
     }
 
+    fn give(&mut self, name: String, value: ParamValue, origin: Origin) {
+        self.given.insert(name, Given { value, origin });
+    }
+
     /// A bool; `yes`, `on`, `no`, `off` count.
     pub fn bool(&self, name: &str, default: bool) -> Result<bool, ParamError> {
-        self.read(
-            name,
-            default,
-            "a bool (true or false)",
-            ParamValue::as_bool,
-            ParamValue::Bool,
-        )
+        let expected = "a bool (true or false)";
+        let read = ParamValue::as_bool;
+        self.read(name, default, expected, read, ParamValue::Bool)
     }
 
     /// An integer; `0x1F` and the octal `010` count.
     pub fn i64(&self, name: &str, default: i64) -> Result<i64, ParamError> {
-        self.read(
-            name,
-            default,
-            "an integer (no point, no exponent, no quotes)",
-            ParamValue::as_i64,
-            ParamValue::I64,
-        )
-    }
-
-    /// A count: an integer from 0 on.
-    pub fn usize(&self, name: &str, default: usize) -> Result<usize, ParamError> {
-        self.usize_in(name, default, 0..=usize::MAX)
+        let expected = "an integer (no point, no exponent, no quotes)";
+        let read = ParamValue::as_i64;
+        self.read(name, default, expected, read, ParamValue::I64)
     }
 
     /// A float, never NaN; an integer counts, with a line in the log.
     pub fn f64(&self, name: &str, default: f64) -> Result<f64, ParamError> {
-        self.read(
-            name,
-            default,
-            "a float (with a point, no quotes)",
-            |value| self.float(name, value),
-            ParamValue::F64,
-        )
+        let expected = "a float (with a point, no quotes)";
+        let read = |value: &ParamValue| self.float(name, value);
+        self.read(name, default, expected, read, ParamValue::F64)
     }
 
     /// A text.
     pub fn string(&self, name: &str, default: &str) -> Result<String, ParamError> {
-        let text = |value: &ParamValue| value.as_str().map(str::to_owned);
-        self.read(
-            name,
-            default.to_owned(),
-            "a text (in quotes)",
-            text,
-            ParamValue::String,
-        )
+        let expected = "a text (in quotes)";
+        let read = |value: &ParamValue| value.as_str().map(str::to_owned);
+        self.read(name, default.to_owned(), expected, read, ParamValue::String)
     }
 
     /// A list of integers.
@@ -214,9 +174,9 @@ impl Params {
             })?,
         };
         let declared = || wrap(value.clone());
-        self.declared_lock()
-            .entry(name.to_owned())
-            .or_insert_with(declared);
+        let mut all = lock(&self.declared);
+        all.entry(name.to_owned()).or_insert_with(declared);
+        drop(all);
         Ok(value)
     }
 
@@ -227,38 +187,30 @@ impl Params {
 
     /// An error for a value of the right type that cannot be used.
     pub fn invalid(&self, name: &str, problem: impl Into<String>) -> ParamError {
-        let value = self.declared_lock().get(name).map(brief);
+        let declared = lock(&self.declared);
         let given = self.given.get(name);
+        let value = declared.get(name).or(given.map(|given| &given.value));
+        let origin = given.map_or(&Origin::Default, |given| &given.origin);
         ParamError::Invalid {
             node: self.node.clone(),
             name: name.to_owned(),
-            value: value
-                .or_else(|| given.map(|given| brief(&given.value)))
-                .unwrap_or_default(),
-            origin: given
-                .map_or(&Origin::Default, |given| &given.origin)
-                .to_string(),
+            value: value.map(brief).unwrap_or_default(),
+            origin: origin.to_string(),
             problem: problem.into(),
         }
     }
 
     /// Parameters given and never read by the node, sorted: typing errors, mostly.
     pub fn unused(&self) -> Vec<String> {
-        let declared = self.declared_lock();
-        self.given
-            .keys()
-            .filter(|name| !declared.contains_key(*name))
-            .cloned()
-            .collect()
+        let declared = lock(&self.declared);
+        let names = self.given.keys();
+        let unused = names.filter(|name| !declared.contains_key(*name));
+        unused.cloned().collect()
     }
 
     /// Parameters the node has read, with the values in use.
     pub fn declared(&self) -> BTreeMap<String, ParamValue> {
-        self.declared_lock().clone()
-    }
-
-    fn declared_lock(&self) -> MutexGuard<'_, BTreeMap<String, ParamValue>> {
-        self.declared.lock().unwrap_or_else(PoisonError::into_inner)
+        lock(&self.declared).clone()
     }
 }
 

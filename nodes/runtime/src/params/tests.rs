@@ -2,17 +2,17 @@ use super::*;
 use std::io::Write;
 
 fn load(yaml: &[&str], rules: &[&str]) -> Result<Params, ParamError> {
-    let mut args = RosArgs::default();
-    let files: Vec<_> = yaml
-        .iter()
-        .map(|text| {
-            let mut file = tempfile::NamedTempFile::new().unwrap();
-            file.write_all(text.as_bytes()).unwrap();
-            file
-        })
-        .collect();
-    args.params_files = files.iter().map(|file| file.path().to_owned()).collect();
-    args.param_overrides = rules.iter().map(|rule| rule.parse().unwrap()).collect();
+    let files = yaml.iter().map(|text| {
+        let mut file = tempfile::NamedTempFile::new().unwrap();
+        file.write_all(text.as_bytes()).unwrap();
+        file
+    });
+    let files: Vec<_> = files.collect();
+    let args = RosArgs {
+        params_files: files.iter().map(|file| file.path().to_owned()).collect(),
+        param_overrides: rules.iter().map(|rule| rule.parse().unwrap()).collect(),
+        ..RosArgs::default()
+    };
     Params::load(&args, "/robot/mapper")
 }
 
@@ -49,31 +49,43 @@ fn readers_convert_as_rcl_does() {
 
 #[test]
 fn wrong_types_name_the_place() {
-    let params = load(
-        &["/**: {ros__parameters: {grid: {cell: 1.5, name: 7}}}"],
-        &["x:=.nan"],
-    )
-    .unwrap();
-    let error = params.i64("grid.cell", 0).unwrap_err().to_string();
-    for part in [
-        "`grid.cell` of /robot/mapper",
-        "an integer",
-        "a float 1.5",
-        "/**.ros__parameters.grid.cell",
-    ] {
+    fn says<T: std::fmt::Debug>(refused: Result<T, ParamError>, part: &str) {
+        let error = refused.unwrap_err().to_string();
         assert!(error.contains(part), "{part}: {error}");
     }
-    let error = params.string("grid.name", "").unwrap_err().to_string();
-    assert!(error.contains("quotes"), "{error}");
-    let error = params.f64("x", 0.0).unwrap_err().to_string();
-    assert!(error.contains("command line"), "{error}");
-    assert!(params.bool("grid.cell", true).is_err());
-    assert!(params.f64_array("grid.cell", &[]).is_err());
-    assert!(params.string_array("grid.name", &[]).is_err());
-    assert!(
-        params.declared().is_empty(),
-        "a refused parameter is not declared"
+    let yaml = "/**: {ros__parameters: {grid: {cell: 1.5, name: 7}}}";
+    let params = load(&[yaml], &["x:=.nan"]).unwrap();
+    let expected = "`grid.cell` of /robot/mapper: expected an integer";
+    for part in [expected, "a float 1.5", "/**.ros__parameters.grid.cell"] {
+        says(params.i64("grid.cell", 0), part);
+    }
+    says(params.string("grid.name", ""), "quotes");
+    says(params.f64("x", 0.0), "command line");
+    says(params.bool("grid.cell", true), "a bool");
+    says(params.f64_array("grid.cell", &[]), "a list of floats");
+    says(params.string_array("grid.name", &[]), "a list of texts");
+    assert!(params.declared().is_empty(), "the refused are not declared");
+}
+
+#[test]
+fn a_launch_file_configures_a_node() {
+    let directory = tempfile::tempdir().unwrap();
+    let file = directory.path().join("params.yaml");
+    let yaml = "/**:\n  ros__parameters:\n    use_sim_time: true\n    rate: 1.0\n\
+                /robot/front:\n  ros__parameters:\n    rate: 2.0\n    qos: {map: {depth: 7}}\n";
+    std::fs::write(&file, yaml).unwrap();
+    let line = format!(
+        "mapper --ros-args -r __node:=front -r __ns:=/robot --params-file {} \
+         -p front:frame:=earth",
+        file.display()
     );
+    let args = RosArgs::parse(line.split(' ').map(str::to_owned)).unwrap();
+    let fqn = crate::names::fully_qualified(&args.node_name("mapper"), &args.namespace("mapper"));
+    let params = Params::load(&args, &fqn).unwrap();
+    assert!(params.bool("use_sim_time", false).unwrap());
+    assert_eq!(params.f64("rate", 0.0).unwrap(), 2.0);
+    assert_eq!(params.string("frame", "map").unwrap(), "earth");
+    assert_eq!(params.unused(), ["qos.map.depth"]);
 }
 
 #[test]
@@ -90,21 +102,13 @@ fn what_is_read_is_declared_and_the_rest_is_unused() {
 
 #[test]
 fn invalid_values_say_where_they_come_from() {
-    let params = Params::from_values("/mapper", [("cell_volume_m3", ParamValue::F64(-1.0))]);
-    let _ = params.f64("cell_volume_m3", 0.1).unwrap();
-    let error = params
-        .invalid("cell_volume_m3", "expected more than 0")
-        .to_string();
-    assert_eq!(
-        error,
-        "parameter `cell_volume_m3` of /mapper = -1.0 (from the command line): expected more than 0"
-    );
-    let _ = params.f64("span_s", 2.0).unwrap();
-    let error = params.invalid("span_s", "too short").to_string();
-    assert!(
-        error.contains("span_s` of /mapper = 2.0 (the default)"),
-        "{error}"
-    );
+    let params = Params::from_values("/mapper", [("volume", ParamValue::F64(-1.0))]);
+    let given = "parameter `volume` of /mapper = -1.0 (from the command line): too low";
+    let default = "parameter `span_s` of /mapper = 2.0 (the default): too low";
+    for (name, expected) in [("volume", given), ("span_s", default)] {
+        params.f64(name, 2.0).unwrap();
+        assert_eq!(params.invalid(name, "too low").to_string(), expected);
+    }
 }
 
 #[test]

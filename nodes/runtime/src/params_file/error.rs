@@ -10,61 +10,34 @@ pub enum ParamFileError {
     /// The file cannot be read.
     #[error("parameter file {path:?}: {source}")]
     Read {
-        /// The file.
         path: PathBuf,
-        /// Answer of the system.
         source: std::io::Error,
     },
     /// The path leads to a fifo, a directory or a device.
     #[error("parameter file {path:?} is no regular file")]
-    NotAFile {
-        /// The path.
-        path: PathBuf,
-    },
+    NotAFile { path: PathBuf },
     /// The file is larger than any parameter file should be.
     #[error("parameter file {path:?} is larger than {bytes_max} bytes")]
-    TooLarge {
-        /// The file.
-        path: PathBuf,
-        /// The limit, bytes.
-        bytes_max: u64,
-    },
+    TooLarge { path: PathBuf, bytes_max: u64 },
     /// The file is no YAML, or has a key twice.
     #[error("parameter file {path:?}: {message}")]
-    Yaml {
-        /// The file.
-        path: PathBuf,
-        /// Message of the YAML reader, with line and column.
-        message: String,
-    },
+    Yaml { path: PathBuf, message: String },
     /// The file has an anchor, an alias, or too deep nesting.
     #[error("parameter file {path:?}, {source}")]
-    Scan {
-        /// The file.
-        path: PathBuf,
-        /// The construct, and its line.
-        source: ScanError,
-    },
+    Scan { path: PathBuf, source: ScanError },
     /// The file is YAML of another shape.
     #[error("parameter file {path:?}, at `{key}`: found {found}, expected {expected}")]
     Shape {
-        /// The file.
         path: PathBuf,
-        /// The keys that lead there.
         key: String,
-        /// Allowed form.
         expected: &'static str,
-        /// Form in the file.
         found: String,
     },
     /// The file has a value of no parameter type.
     #[error("parameter file {path:?}, at `{key}`: {source}")]
     Value {
-        /// The file.
         path: PathBuf,
-        /// The keys that lead there.
         key: String,
-        /// The problem with it.
         source: ValueError,
     },
 }

@@ -5,7 +5,7 @@
 mod error;
 mod pattern;
 
-pub use error::ParamFileError;
+pub(crate) use error::ParamFileError;
 pub use pattern::NodePattern;
 
 use crate::param_value::{ParamValue, scan};
@@ -13,9 +13,9 @@ use serde_yaml::{Mapping, Value};
 use std::{collections::HashSet, fs::File, io::Read, path::Path};
 
 /// Longest parameter file, bytes.
-pub const FILE_BYTES_MAX: u64 = 1 << 20;
+const FILE_BYTES_MAX: u64 = 1 << 20;
 /// Most levels of maps above or below `ros__parameters`.
-pub const DEPTH_MAX: usize = 16;
+const DEPTH_MAX: usize = 16;
 
 const PARAMETERS: &str = "ros__parameters";
 
@@ -62,7 +62,7 @@ pub fn read(path: &Path) -> Result<Vec<FileParam>, ParamFileError> {
 }
 
 /// Reads the text of a parameter file; `path` is for messages.
-pub fn parse(text: &str, path: &Path) -> Result<Vec<FileParam>, ParamFileError> {
+fn parse(text: &str, path: &Path) -> Result<Vec<FileParam>, ParamFileError> {
     scan(text).map_err(|source| ParamFileError::Scan {
         path: path.to_owned(),
         source,
@@ -106,11 +106,8 @@ impl Reader<'_> {
                     value => self.parameters(value, &nodes, "", &mut names)?,
                 }
             } else {
-                let slash = if prefix.ends_with('/') || key.starts_with('/') {
-                    ""
-                } else {
-                    "/"
-                };
+                let has_slash = prefix.ends_with('/') || key.starts_with('/');
+                let slash = if has_slash { "" } else { "/" };
                 let prefix = format!("{prefix}{slash}{key}");
                 self.nodes(value, &prefix)?;
             }
@@ -129,10 +126,9 @@ impl Reader<'_> {
     ) -> Result<(), ParamFileError> {
         for (key, value) in self.map(value, "a map of parameters")? {
             let key = self.enter(key)?;
-            let name = if prefix.is_empty() {
-                key
-            } else {
-                format!("{prefix}.{key}")
+            let name = match prefix {
+                "" => key,
+                prefix => format!("{prefix}.{key}"),
             };
             if value.is_mapping() {
                 self.parameters(value, nodes, &name, names)?;
@@ -140,13 +136,14 @@ impl Reader<'_> {
                 if !names.insert(name.clone()) {
                     return Err(self.shape("each parameter once", format!("`{name}` again")));
                 }
-                let value =
-                    ParamValue::from_yaml(value).map_err(|source| ParamFileError::Value {
-                        path: self.path.to_owned(),
-                        key: self.keys.join("."),
-                        source,
-                    })?;
                 let key = self.keys.join(".");
+                let value = match ParamValue::from_yaml(value) {
+                    Ok(value) => value,
+                    Err(source) => {
+                        let path = self.path.to_owned();
+                        return Err(ParamFileError::Value { path, key, source });
+                    }
+                };
                 self.params.push(FileParam {
                     nodes: nodes.clone(),
                     name,
@@ -193,16 +190,17 @@ impl Reader<'_> {
 }
 
 fn found(value: &Value) -> String {
-    match value {
-        Value::Null => "nothing".to_owned(),
-        Value::String(text) if text.is_empty() => "an empty text".to_owned(),
-        Value::Sequence(_) => "a list".to_owned(),
-        Value::Mapping(_) => "a map".to_owned(),
-        Value::Tagged(_) => "a tagged value".to_owned(),
-        Value::Bool(_) => "a bool".to_owned(),
-        Value::Number(_) => "a number".to_owned(),
-        Value::String(_) => "a text".to_owned(),
-    }
+    let found = match value {
+        Value::Null => "nothing",
+        Value::String(text) if text.is_empty() => "an empty text",
+        Value::Sequence(_) => "a list",
+        Value::Mapping(_) => "a map",
+        Value::Tagged(_) => "a tagged value",
+        Value::Bool(_) => "a bool",
+        Value::Number(_) => "a number",
+        Value::String(_) => "a text",
+    };
+    found.to_owned()
 }
 
 #[cfg(test)]

@@ -46,33 +46,22 @@ impl NodePattern {
             .filter(|part| !part.is_empty())
             .collect();
         // reached[i]: the parts so far can cover the first i parts of the name.
-        let mut reached = vec![false; name.len().saturating_add(1)];
-        if let Some(start) = reached.first_mut() {
-            *start = true;
-        }
+        let mut reached: Vec<bool> = (0..=name.len()).map(|i| i == 0).collect();
         for part in &self.parts {
+            let covers = |name: &str| match part {
+                Part::Name(text) => text == name,
+                _ => true,
+            };
+            let before = std::mem::take(&mut reached);
+            let steps = before.iter().zip(&name).map(|(&r, name)| r && covers(name));
             reached = match part {
-                Part::Any => {
-                    let mut any = false;
-                    reached
-                        .iter()
-                        .map(|&r| {
-                            any |= r;
-                            any
-                        })
-                        .collect()
-                }
-                _ => {
-                    let covers = |part_of_name: &str| match part {
-                        Part::Name(text) => text == part_of_name,
-                        _ => true,
-                    };
-                    let steps = reached
-                        .iter()
-                        .zip(&name)
-                        .map(|(&r, part)| r && covers(part));
-                    std::iter::once(false).chain(steps).collect()
-                }
+                Part::Any => (before.iter())
+                    .scan(false, |any, &r| {
+                        *any |= r;
+                        Some(*any)
+                    })
+                    .collect(),
+                _ => std::iter::once(false).chain(steps).collect(),
             };
         }
         reached.last().copied().unwrap_or(false)

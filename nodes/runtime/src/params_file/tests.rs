@@ -42,143 +42,68 @@ mapper:
 
 #[test]
 fn namespaces_and_wildcards_join_to_patterns() {
+    let a = "ros__parameters: {a: 1}";
     for (text, node) in [
-        ("/**: {ros__parameters: {a: 1}}", "/x/y/mapper"),
-        ("/*: {ros__parameters: {a: 1}}", "/mapper"),
-        ("/**/mapper: {ros__parameters: {a: 1}}", "/x/mapper"),
-        ("/**: {mapper: {ros__parameters: {a: 1}}}", "/x/mapper"),
-        (
-            "/x/**/bar: {b1/b2/**: {ros__parameters: {a: 1}}}",
-            "/x/y/bar/b1/b2/mapper",
-        ),
-        (
-            "robot: {mapper: {ros__parameters: {a: 1}}}",
-            "/robot/mapper",
-        ),
-        (
-            "/robot: {\"*\": {ros__parameters: {a: 1}}}",
-            "/robot/mapper",
-        ),
-        (
-            "/robot/: {mapper: {ros__parameters: {a: 1}}}",
-            "/robot/mapper",
-        ),
-        ("/: {mapper: {ros__parameters: {a: 1}}}", "/mapper"),
-        (
-            "/**: {ros__parameters: {a: 1}, mapper: {ros__parameters: {a: 2}}}",
-            "/x/mapper",
-        ),
+        (format!("/**: {{{a}}}"), "/x/y/mapper"),
+        (format!("/*: {{{a}}}"), "/mapper"),
+        (format!("/**/mapper: {{{a}}}"), "/x/mapper"),
+        (format!("/**: {{mapper: {{{a}}}}}"), "/x/mapper"),
+        (format!("/x/**/b: {{c/d/**: {{{a}}}}}"), "/x/y/b/c/d/m"),
+        (format!("robot: {{mapper: {{{a}}}}}"), "/robot/mapper"),
+        (format!("/robot: {{\"*\": {{{a}}}}}"), "/robot/mapper"),
+        (format!("/robot/: {{mapper: {{{a}}}}}"), "/robot/mapper"),
+        (format!("/: {{mapper: {{{a}}}}}"), "/mapper"),
+        (format!("/**: {{{a}, mapper: {{{a}}}}}"), "/x/mapper"),
     ] {
-        let params = read_text(text).unwrap();
-        assert!(
-            params.iter().all(|param| param.nodes.matches(node)),
-            "{text}"
-        );
-        assert!(!params.is_empty());
+        let params = read_text(&text).unwrap();
+        let covered = |param: &FileParam| param.nodes.matches(node);
+        assert!(params.iter().all(covered) && !params.is_empty(), "{text}");
     }
 }
 
 #[test]
 fn empty_files_and_sections_have_no_parameters() {
-    for text in [
-        "",
-        "# nothing\n",
-        "---\n",
-        "mapper: {ros__parameters: }",
-        "mapper: {ros__parameters: {}}",
-        "{}",
-    ] {
+    let sections = ["m: {ros__parameters: }", "m: {ros__parameters: {}}"];
+    for text in ["", "# nothing\n", "---\n", "{}"].iter().chain(&sections) {
         assert_eq!(read_text(text).unwrap(), vec![], "{text}");
     }
 }
 
+/// Whole files, or parameters of the node `m`, and what their error says; `;` is a new line.
+const WRONG: &str = r#"
+    m: 5                          | `m`, a number, ros__parameters
+    m: {ros: {a: 1}}              | `m.ros.a`, a number, ros__parameters
+    m: [1]                        | `m`, a list, ros__parameters
+    [1]                           | ``, a list, a map of nodes
+    m:                            | `m`, nothing, ros__parameters
+    ros__parameters: {a: 1}       | `ros__parameters`, without a node, a node name
+    m p: {ros__parameters: {}}    | `m p.ros__parameters`, characters, a node name
+    a//b: {ros__parameters: {}}   | `a//b.ros__parameters`, empty part, a node name
+    a: {ros__parameters: };---;b: | more than one document
+    = 5                           | `m.ros__parameters`, a number, a map of parameters
+    = {a: }                       | `m.ros__parameters.a`, no value, ''
+    = {a: [1, b]}                 | `m.ros__parameters.a`, an integer, a text
+    = {a: [[1]]}                  | `m.ros__parameters.a`, a list in a list, expected
+    = {a: [{b: 1}]}               | `m.ros__parameters.a`, a map, expected
+    = {a: !x 1}                   | `m.ros__parameters.a`, a tagged value, expected
+    = {'': 1}                     | `m.ros__parameters`, an empty text, a name
+    = {[1]: 1}                    | `m.ros__parameters`, a list, a name
+    = {a.b: 1, a: {b: 2}}         | `m.ros__parameters.a.b`, again, once
+    = {a: 1, a: 2}                | duplicate, "a"
+    = {a: &x 1}                   | line 1, anchors
+    = {a: *x}                     | line 1, anchors
+    = {a: 1                       | line, column"#;
+
 #[test]
 fn wrong_shapes_say_where_and_what() {
-    for (text, parts) in [
-        ("mapper: 5", ["`mapper`", "a number", "ros__parameters"]),
-        (
-            "mapper: {ros_parameters: {a: 1}}",
-            ["`mapper.ros_parameters.a`", "a number", "ros__parameters"],
-        ),
-        ("mapper: [1]", ["`mapper`", "a list", "ros__parameters"]),
-        ("[1]", ["``", "a list", "a map of nodes"]),
-        ("mapper:", ["`mapper`", "nothing", "ros__parameters"]),
-        (
-            "ros__parameters: {a: 1}",
-            ["`ros__parameters`", "without a node", "a node name"],
-        ),
-        (
-            "ma pper: {ros__parameters: {a: 1}}",
-            ["`ma pper.ros__parameters`", "characters", "a node name"],
-        ),
-        (
-            "a//b: {ros__parameters: {a: 1}}",
-            ["`a//b.ros__parameters`", "empty part", "a node name"],
-        ),
-        (
-            "mapper: {ros__parameters: 5}",
-            [
-                "`mapper.ros__parameters`",
-                "a number",
-                "a map of parameters",
-            ],
-        ),
-        (
-            "m: {ros__parameters: {a: }}",
-            ["`m.ros__parameters.a`", "no value", "''"],
-        ),
-        (
-            "m: {ros__parameters: {a: [1, b]}}",
-            ["`m.ros__parameters.a`", "an integer", "a text"],
-        ),
-        (
-            "m: {ros__parameters: {a: [[1]]}}",
-            ["`m.ros__parameters.a`", "a list in a list", "expected"],
-        ),
-        (
-            "m: {ros__parameters: {a: [{b: 1}]}}",
-            ["`m.ros__parameters.a`", "a map", "expected"],
-        ),
-        (
-            "m: {ros__parameters: {a: !x 1}}",
-            ["`m.ros__parameters.a`", "a tagged value", "expected"],
-        ),
-        (
-            "m: {ros__parameters: {'': 1}}",
-            ["`m.ros__parameters`", "an empty text", "a name"],
-        ),
-        (
-            "m: {ros__parameters: {[1]: 1}}",
-            ["`m.ros__parameters`", "a list", "a name"],
-        ),
-        (
-            "m: {ros__parameters: {a.b: 1, a: {b: 2}}}",
-            ["`m.ros__parameters.a.b`", "again", "once"],
-        ),
-        (
-            "m: {ros__parameters: {a: 1, a: 2}}",
-            ["duplicate", "\"a\"", "test.yaml"],
-        ),
-        (
-            "m: {ros__parameters: {a: &x 1}}",
-            ["line 1", "anchors", "test.yaml"],
-        ),
-        (
-            "m: {ros__parameters: {a: *x}}",
-            ["line 1", "anchors", "test.yaml"],
-        ),
-        (
-            "m: {ros__parameters: {a: 1}",
-            ["line", "column", "test.yaml"],
-        ),
-        (
-            "a: {ros__parameters: {a: 1}}\n---\nb: {ros__parameters: {a: 1}}",
-            ["more than one document", "", ""],
-        ),
-    ] {
-        let error = read_text(text).unwrap_err().to_string();
-        assert!(error.contains("test.yaml"), "{text}: {error}");
-        for part in parts {
+    for row in WRONG.trim().lines() {
+        let (text, parts) = row.split_once('|').unwrap();
+        let text = match text.trim().strip_prefix('=') {
+            Some(params) => format!("m: {{ros__parameters: {params}}}"),
+            None => text.trim().replace(';', "\n"),
+        };
+        let error = read_text(&text).unwrap_err().to_string();
+        for part in parts.trim().split(", ").chain(["test.yaml"]) {
             assert!(error.contains(part), "{text}: `{part}` is not in: {error}");
         }
     }
@@ -188,40 +113,33 @@ fn wrong_shapes_say_where_and_what() {
 fn deep_files_are_refused() {
     let deep = |levels: usize| {
         let maps = "{a: ".repeat(levels - 2);
-        format!("m: {{ros__parameters: {maps}1{}}}", "}".repeat(levels - 2))
+        read_text(&format!(
+            "m: {{ros__parameters: {maps}1{}}}",
+            "}".repeat(levels - 2)
+        ))
     };
-    assert_eq!(read_text(&deep(DEPTH_MAX)).unwrap().len(), 1);
-    assert!(matches!(
-        read_text(&deep(DEPTH_MAX + 1)),
-        Err(ParamFileError::Shape { .. })
-    ));
-    assert!(matches!(
-        read_text(&deep(100_000)),
-        Err(ParamFileError::Scan { .. })
-    ));
+    assert_eq!(deep(DEPTH_MAX).unwrap().len(), 1);
+    let one_more = deep(DEPTH_MAX + 1);
+    assert!(matches!(one_more, Err(ParamFileError::Shape { .. })));
+    assert!(matches!(deep(100_000), Err(ParamFileError::Scan { .. })));
 }
 
 #[test]
-fn large_files_are_refused() {
-    let file = tempfile::NamedTempFile::new().unwrap();
-    let length = usize::try_from(FILE_BYTES_MAX).unwrap();
-    std::fs::write(file.path(), " ".repeat(length)).unwrap();
-    assert_eq!(read(file.path()).unwrap(), vec![]);
-    std::fs::write(file.path(), " ".repeat(length + 1)).unwrap();
-    assert!(matches!(
-        read(file.path()),
-        Err(ParamFileError::TooLarge { .. })
-    ));
-    std::fs::write(file.path(), [0xff, 0xfe]).unwrap();
-    assert!(matches!(
-        read(file.path()),
-        Err(ParamFileError::Yaml { .. })
-    ));
+fn large_files_and_other_things_are_refused() {
     let directory = tempfile::tempdir().unwrap();
-    assert!(matches!(
-        read(directory.path()),
-        Err(ParamFileError::NotAFile { .. })
-    ));
+    let path = directory.path().join("params.yaml");
+    let of = |bytes: &[u8]| {
+        std::fs::write(&path, bytes).unwrap();
+        read(&path)
+    };
+    let length = usize::try_from(FILE_BYTES_MAX).unwrap();
+    assert_eq!(of(&vec![b' '; length]).unwrap(), vec![]);
+    let large = of(&vec![b' '; length + 1]);
+    assert!(matches!(large, Err(ParamFileError::TooLarge { .. })));
+    let binary = of(&[0xff, 0xfe]);
+    assert!(matches!(binary, Err(ParamFileError::Yaml { .. })));
+    let no_file = read(directory.path());
+    assert!(matches!(no_file, Err(ParamFileError::NotAFile { .. })));
 }
 
 proptest! {

@@ -1,10 +1,11 @@
-use super::{RemapRule, RosArgs, RosArgsError};
-use crate::names::shown;
+use super::{RosArgs, RosArgsError};
+use crate::names::{RemapRule, shown, validate_namespace};
 
 const SCOPE: &str = "--ros-args";
 const SCOPE_END: &str = "--";
 
 /// Form of the value of a flag, and an example.
+#[derive(Clone, Copy)]
 struct Value {
     expected: &'static str,
     example: &'static str,
@@ -35,91 +36,67 @@ const LOG_FILE: Value = Value {
     example: "mapper",
 };
 
-/// The values still to read and the flag they belong to.
-struct Arguments<I> {
-    rest: I,
-}
-
-impl<I: Iterator<Item = String>> Arguments<I> {
-    /// The parsed value of `flag`.
-    fn value<T>(
-        &mut self,
-        flag: &str,
-        value: &Value,
-        read: impl FnOnce(&str) -> Result<T, String>,
-    ) -> Result<T, RosArgsError> {
-        let Value { expected, example } = *value;
-        let Some(argument) = self.rest.next() else {
-            return Err(RosArgsError::MissingValue {
-                flag: flag.to_owned(),
-                expected,
-                example,
-            });
-        };
-        read(&argument).map_err(|problem| RosArgsError::Malformed {
-            flag: flag.to_owned(),
-            argument: shown(&argument),
-            problem,
+/// The value that follows `flag`, parsed.
+fn value<T>(
+    rest: &mut impl Iterator<Item = String>,
+    flag: &str,
+    Value { expected, example }: Value,
+    read: impl FnOnce(&str) -> Result<T, String>,
+) -> Result<T, RosArgsError> {
+    let flag = flag.to_owned();
+    let Some(argument) = rest.next() else {
+        return Err(RosArgsError::MissingValue {
+            flag,
             expected,
             example,
-        })
-    }
+        });
+    };
+    read(&argument).map_err(|problem| RosArgsError::Malformed {
+        flag,
+        argument: shown(&argument),
+        problem,
+        expected,
+        example,
+    })
 }
 
 pub(super) fn parse(argv: impl IntoIterator<Item = String>) -> Result<RosArgs, RosArgsError> {
     let mut args = RosArgs::default();
-    let mut arguments = Arguments {
-        rest: argv.into_iter(),
-    };
+    let mut rest = argv.into_iter();
     let mut in_scope = false;
-    while let Some(argument) = arguments.rest.next() {
+    while let Some(argument) = rest.next() {
         match (in_scope, argument.as_str()) {
             (_, SCOPE) => in_scope = true,
             (true, SCOPE_END) => in_scope = false,
-            (true, _) => ros_argument(&mut args, argument, &mut arguments)?,
+            (true, flag) => ros_argument(&mut args, flag, &mut rest)?,
             (false, _) => user_argument(&mut args, argument),
         }
     }
     Ok(args)
 }
 
-fn ros_argument<I: Iterator<Item = String>>(
+fn ros_argument(
     args: &mut RosArgs,
-    flag: String,
-    next: &mut Arguments<I>,
+    flag: &str,
+    rest: &mut impl Iterator<Item = String>,
 ) -> Result<(), RosArgsError> {
-    match flag.as_str() {
-        "-r" | "--remap" => args.remaps.push(next.value(&flag, &REMAP, str::parse)?),
-        "-p" | "--param" => args
-            .param_overrides
-            .push(next.value(&flag, &PARAM, str::parse)?),
-        "--params-file" => args
-            .params_files
-            .push(next.value(&flag, &PARAMS_FILE, not_empty)?),
-        "-e" | "--enclave" => args.enclave = Some(next.value(&flag, &ENCLAVE, enclave)?),
-        "--log-level" => args
-            .log_levels
-            .push(next.value(&flag, &LOG_LEVEL, str::parse)?),
-        "--log-config-file" => {
-            args.log_config_file = Some(next.value(&flag, &LOG_FILE, not_empty)?);
-            args.warnings
-                .push(format!("{flag} is accepted and has no effect"));
+    match flag {
+        "-r" | "--remap" => args.remaps.push(value(rest, flag, REMAP, str::parse)?),
+        "-p" | "--param" => (args.param_overrides).push(value(rest, flag, PARAM, str::parse)?),
+        "--params-file" => (args.params_files).push(value(rest, flag, PARAMS_FILE, not_empty)?),
+        "-e" | "--enclave" => value(rest, flag, ENCLAVE, enclave)?,
+        "--log-level" => (args.log_levels).push(value(rest, flag, LOG_LEVEL, str::parse)?),
+        "--log-config-file" | "--log-file-name" => {
+            let _: String = value(rest, flag, LOG_FILE, not_empty)?;
+            let warning = format!("{flag} is accepted and has no effect");
+            args.warnings.push(warning);
         }
-        "--log-file-name" => {
-            args.log_file_name = Some(next.value(&flag, &LOG_FILE, not_empty)?);
-            args.warnings
-                .push(format!("{flag} is accepted and has no effect"));
-        }
-        "--enable-stdout-logs" => args.stdout_logs = true,
-        "--disable-stdout-logs" => args.stdout_logs = false,
-        "--enable-rosout-logs" => args.rosout_logs = true,
-        "--disable-rosout-logs" => args.rosout_logs = false,
-        "--enable-external-lib-logs" => args.external_lib_logs = true,
-        "--disable-external-lib-logs" => args.external_lib_logs = false,
-        _ => {
-            args.warnings.push(unknown(&flag));
-            args.unparsed.push(flag);
-        }
+        "--enable-stdout-logs" => args.no_stdout_logs = false,
+        "--disable-stdout-logs" => args.no_stdout_logs = true,
+        "--enable-rosout-logs" => args.no_rosout_logs = false,
+        "--disable-rosout-logs" => args.no_rosout_logs = true,
+        "--enable-external-lib-logs" | "--disable-external-lib-logs" => {}
+        _ => args.warnings.push(unknown(flag)),
     }
     Ok(())
 }
@@ -149,15 +126,13 @@ fn unknown(argument: &str) -> String {
 }
 
 fn not_empty<T: From<String>>(text: &str) -> Result<T, String> {
-    if text.is_empty() {
-        Err("it is empty".to_owned())
-    } else {
-        Ok(text.to_owned().into())
+    match text.is_empty() {
+        true => Err("it is empty".to_owned()),
+        false => Ok(text.to_owned().into()),
     }
 }
 
-/// rcl's rule for enclaves: the tokens of a node's full name.
-fn enclave(text: &str) -> Result<String, String> {
-    crate::names::validate_namespace(text).map_err(|error| error.to_string())?;
-    Ok(text.to_owned())
+/// rcl's rule for enclaves: the tokens of a node's full name. Security is not supported.
+fn enclave(text: &str) -> Result<(), String> {
+    validate_namespace(text).map_err(|error| error.to_string())
 }

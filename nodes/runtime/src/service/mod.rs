@@ -19,28 +19,14 @@ use super::sync::{lock, wait_for};
 /// A server of a service; dropping it ends it.
 #[must_use = "dropping a server ends it"]
 pub struct Server {
-    name: String,
+    pub(crate) name: String,
     /// Hear of matches.
-    _clients: Arc<Peers>,
-    _task: Task<()>,
-    _graph: [NodeEndpoint; 2],
+    pub(crate) _clients: Arc<Peers>,
+    pub(crate) _task: Task<()>,
+    pub(crate) _graph: [NodeEndpoint; 2],
 }
 
 impl Server {
-    pub(crate) fn new(
-        name: &str,
-        clients: Arc<Peers>,
-        task: Task<()>,
-        graph: [NodeEndpoint; 2],
-    ) -> Self {
-        Self {
-            name: name.to_owned(),
-            _clients: clients,
-            _task: task,
-            _graph: graph,
-        }
-    }
-
     /// Full name of the service.
     pub fn name(&self) -> &str {
         &self.name
@@ -99,10 +85,7 @@ impl Answers {
             writers.extend(replies.upgrade());
         }
         drop(done);
-        if !wait_for(
-            &all_done,
-            deadline.saturating_duration_since(Instant::now()),
-        ) {
+        if !wait_for(&all_done, deadline) {
             log::warn!("not every request was answered");
         }
         writers

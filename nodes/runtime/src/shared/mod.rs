@@ -53,7 +53,8 @@ pub(crate) struct Shared {
     pub io: TaskThread,
     pub tasks: Arc<Tasks>,
     pub receive_buffer: ReceiveBuffer,
-    sim_time: Mutex<Option<SimTime>>,
+    /// Simulated time, one for all nodes of a process.
+    sim_time: Mutex<Option<(Clock, Subscription)>>,
     publishing: TaskThread,
     answers: Answers,
     endpoints: Arc<Endpoints>,
@@ -62,12 +63,6 @@ pub(crate) struct Shared {
     writer_order: Mutex<()>,
     writers_made: AtomicU64,
     open: Mutex<Option<Open>>,
-}
-
-/// Simulated time, one for all nodes of a process.
-struct SimTime {
-    clock: Clock,
-    _subscription: Subscription,
 }
 
 /// Everything that goes at shutdown.
@@ -117,19 +112,10 @@ impl Shared {
     }
 
     fn publish_graph(&self) -> Result<(), RuntimeError> {
-        let qos = Qos::latched(1);
-        let outbox = self.outbox(
-            graph::TOPIC,
-            graph::TOPIC,
-            graph::TYPE,
-            &qos,
-            WhenFull::Wait,
-        )?;
+        let outbox = self.outbox(graph::TOPIC, &Qos::latched(1), WhenFull::Wait)?;
         if let Some(open) = lock(&self.open).as_mut() {
-            let participant = open.transport.id();
-            open.graph = self
-                .io
-                .spawn(Arc::clone(&self.graph).publish(participant, outbox));
+            let graph = Arc::clone(&self.graph);
+            open.graph = self.io.spawn(graph.publish(open.transport.id(), outbox));
         }
         Ok(())
     }
@@ -144,25 +130,17 @@ impl Shared {
     /// A queue that the publisher thread serves, until the last handle of it goes.
     fn outbox(
         &self,
-        name: &str,
-        dds_name: &str,
-        ros_type: &str,
+        topic: PortTopic<'_>,
         qos: &Qos,
         when_full: WhenFull,
     ) -> Result<Arc<Outbox>, RuntimeError> {
-        let topic = PortTopic {
-            name,
-            dds_name,
-            ros_type,
-        };
-        let mut guard = lock(&self.open);
-        let open = guard.as_mut().ok_or_else(|| closed(name))?;
+        let name = topic.name;
+        let guard = lock(&self.open);
+        let open = guard.as_ref().ok_or_else(|| closed(name))?;
         let writer = open.transport.writer(topic, qos)?;
         let (outbox, task) = Outbox::new(name, writer, when_full, QUEUE_MESSAGES, QUEUE_BYTES);
-        self.publishing
-            .spawn(task)
-            .ok_or_else(|| closed(name))?
-            .detach();
+        let task = self.publishing.spawn(task);
+        task.ok_or_else(|| closed(name))?.detach();
         Ok(Arc::new(outbox))
     }
 
@@ -185,8 +163,8 @@ impl Shared {
         topic: &str,
     ) -> Result<Clock, RuntimeError> {
         let mut sim = lock(&self.sim_time);
-        if let Some(sim) = sim.as_ref() {
-            return Ok(sim.clock.clone());
+        if let Some((clock, _)) = sim.as_ref() {
+            return Ok(clock.clone());
         }
         let now_ns = Arc::new(AtomicI64::new(0));
         let clock = Clock::simulated(Arc::clone(&now_ns));
@@ -197,10 +175,7 @@ impl Shared {
         };
         let subscription =
             self.subscribe(node, topic, &Qos::CLOCK, Load::Small, 1 << 10, handler)?;
-        *sim = Some(SimTime {
-            clock: clock.clone(),
-            _subscription: subscription,
-        });
+        *sim = Some((clock.clone(), subscription));
         Ok(clock)
     }
 
@@ -230,11 +205,9 @@ impl Shared {
             .filter_map(|intake| Some((intake.order(Command::WorkOff)?, intake)))
             .collect();
         for (order, intake) in orders {
-            if !wait_for(&order, deadline.saturating_duration_since(Instant::now())) {
-                log::warn!(
-                    "{}: messages of this process were not handled",
-                    intake.topic
-                );
+            if !wait_for(&order, deadline) {
+                let topic = &intake.topic;
+                log::warn!("{topic}: messages of this process were not handled");
             }
         }
     }

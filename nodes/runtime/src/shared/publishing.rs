@@ -1,5 +1,6 @@
 //! Publishers of the process.
 
+use std::marker::PhantomData;
 use std::sync::{Arc, Mutex};
 
 use lattice_msgs::RosMessage;
@@ -11,6 +12,7 @@ use crate::local_bus::LocalEndpoint;
 use crate::names;
 use crate::outbox::WhenFull;
 use crate::peers::Peers;
+use crate::port::PortTopic;
 use crate::publisher::{Latch, Publisher, PublisherParts, RawPublisher};
 use crate::qos::{Durability, Qos};
 use crate::sync::lock;
@@ -26,7 +28,10 @@ impl Shared {
             let topic = self.bus.topic(topic);
             topic.join_publisher::<M>(peers, latch_depth(qos))
         })?;
-        Ok(Publisher::new(parts))
+        Ok(Publisher {
+            parts,
+            message: PhantomData,
+        })
     }
 
     pub(crate) fn raw_publisher(
@@ -40,7 +45,7 @@ impl Shared {
             let topic = self.bus.topic(topic);
             topic.join_raw_publisher(type_name, peers, latch_depth(qos))
         })?;
-        Ok(RawPublisher::new(parts))
+        Ok(RawPublisher { parts })
     }
 
     fn publisher_parts(
@@ -52,11 +57,15 @@ impl Shared {
         when_full: WhenFull,
         join: impl FnOnce(&Arc<Peers>) -> Result<LocalEndpoint, RuntimeError>,
     ) -> Result<Arc<PublisherParts>, RuntimeError> {
-        let peers = Arc::new(Peers::of_publisher(topic));
+        let peers = Arc::new(Peers::new(topic, "subscriber", log::Level::Info));
         let local = join(&peers)?;
-        let writer = self.with_readers_closed(topic, || {
-            self.outbox(topic, &names::dds_topic(topic), type_name, qos, when_full)
-        })?;
+        let port_topic = PortTopic {
+            name: topic,
+            dds_name: &names::dds_topic(topic),
+            ros_type: type_name,
+        };
+        let make = || self.outbox(port_topic, qos, when_full);
+        let writer = self.with_readers_closed(topic, make)?;
         let id = writer.id();
         let parts = Arc::new(PublisherParts {
             writer,

@@ -32,24 +32,20 @@ impl Shared {
         max_pending: usize,
         handler: impl FnMut(S::Request, Reply<S::Response>) + Send + 'static,
     ) -> Result<Server, RuntimeError> {
-        let clients = Arc::new(Peers::of_server(name));
-        let requests = self.reader(
-            PortTopic {
-                name,
-                dds_name: &names::dds_request(name),
-                ros_type: S::Request::TYPE,
-            },
-            &Qos::SERVICES,
-            MAX_REQUEST_BYTES,
-        )?;
-        let readers = Arc::new(Peers::of_replies(name));
-        let replies = self.outbox(
+        let clients = Arc::new(Peers::new(name, "client", log::Level::Debug));
+        let topic = PortTopic {
             name,
-            &names::dds_reply(name),
-            S::Response::TYPE,
-            &Qos::SERVICES,
-            WhenFull::Drop,
-        )?;
+            dds_name: &names::dds_request(name),
+            ros_type: S::Request::TYPE,
+        };
+        let requests = self.reader(topic, &Qos::SERVICES, MAX_REQUEST_BYTES)?;
+        let readers = Arc::new(Peers::new(name, "reply reader", log::Level::Debug));
+        let topic = PortTopic {
+            name,
+            dds_name: &names::dds_reply(name),
+            ros_type: S::Response::TYPE,
+        };
+        let replies = self.outbox(topic, &Qos::SERVICES, WhenFull::Drop)?;
         let graph = [
             self.graph.join(node, EndpointKind::Reader, requests.id()),
             self.graph.join(node, EndpointKind::Writer, replies.id()),
@@ -71,6 +67,11 @@ impl Shared {
             .io
             .spawn(serving.run::<S>(handler))
             .ok_or_else(|| closed(name))?;
-        Ok(Server::new(name, clients, task, graph))
+        Ok(Server {
+            name: name.to_owned(),
+            _clients: clients,
+            _task: task,
+            _graph: graph,
+        })
     }
 }

@@ -1,5 +1,7 @@
 //! The runtime's own diagnostics: buffers, drops, peers that do not match.
 
+use std::sync::atomic::Ordering::Relaxed;
+
 use lattice_msgs::diagnostic_msgs::DiagnosticStatus;
 
 use super::Shared;
@@ -41,17 +43,14 @@ impl ReceiveBuffer {
 impl Shared {
     /// State of the transport of this process, as a task of `node`.
     pub(crate) fn transport_status(&self, node: &str) -> DiagnosticStatus {
-        let mut values = vec![(
-            "socket_receive_buffer_bytes".to_owned(),
-            self.receive_buffer
-                .bytes
-                .map_or_else(|| "unknown".to_owned(), |bytes| bytes.to_string()),
-        )];
+        let bytes = self.receive_buffer.bytes;
+        let bytes = bytes.map_or_else(|| "unknown".to_owned(), |bytes| bytes.to_string());
+        let mut values = vec![("socket_receive_buffer_bytes".to_owned(), bytes)];
         let mut problems = Vec::new();
         if self.receive_buffer.is_short() {
             problems.push("receive buffer short, raise net.core.rmem_max");
         }
-        let mut add = |what: &'static str, problem: &'static str, topic: &str, count: u64| {
+        let mut add = |topic: &str, what: &str, count: u64, problem: &'static str| {
             if count > 0 {
                 values.push((format!("{topic} {what}"), count.to_string()));
                 if !problems.contains(&problem) {
@@ -59,44 +58,25 @@ impl Shared {
                 }
             }
         };
+        const QOS: &str = "QoS does not match";
         for publisher in self.publishers() {
             let topic = publisher.peers.topic();
-            add(
-                "dropped",
-                "messages dropped",
-                topic,
-                publisher.writer.dropped(),
-            );
-            let incompatible = publisher.peers.incompatible_count();
-            add(
-                "incompatible_subscribers",
-                "QoS does not match",
-                topic,
-                incompatible as u64,
-            );
+            let dropped = publisher.writer.dropped();
+            add(topic, "dropped", dropped, "messages dropped");
+            let incompatible = publisher.peers.incompatible_count() as u64;
+            add(topic, "incompatible_subscribers", incompatible, QOS);
         }
         for intake in self.intakes() {
-            let subscription = &intake.stats;
-            let topic = subscription.peers().topic();
-            add(
-                "undecodable",
-                "undecodable samples",
-                topic,
-                subscription.undecodable(),
-            );
-            add("lost", "messages lost", topic, subscription.lost());
-            let incompatible = subscription.peers().incompatible_count();
-            add(
-                "incompatible_publishers",
-                "QoS does not match",
-                topic,
-                incompatible as u64,
-            );
+            let (topic, stats) = (&intake.topic, &intake.stats);
+            let undecodable = stats.undecodable.load(Relaxed);
+            add(topic, "undecodable", undecodable, "undecodable samples");
+            add(topic, "lost", stats.lost.load(Relaxed), "messages lost");
+            let incompatible = intake.peers.incompatible_count() as u64;
+            add(topic, "incompatible_publishers", incompatible, QOS);
         }
-        let (level, message) = if problems.is_empty() {
-            (Level::Ok, "running".to_owned())
-        } else {
-            (Level::Warn, problems.join("; "))
+        let (level, message) = match problems.is_empty() {
+            true => (Level::Ok, "running".to_owned()),
+            false => (Level::Warn, problems.join("; ")),
         };
         status(node, "transport", level, message, values)
     }

@@ -1,8 +1,7 @@
 //! Subscriptions of the process.
 
-use std::sync::Arc;
-use std::sync::Mutex;
 use std::sync::atomic::AtomicBool;
+use std::sync::{Arc, Mutex};
 
 use lattice_msgs::RosMessage;
 use smol::channel::{bounded, unbounded};
@@ -34,19 +33,15 @@ impl Shared {
         max_bytes: usize,
         mut handler: impl FnMut(Sample<'_, M>, &Arc<Stats>) + Send + 'static,
     ) -> Result<Subscription, RuntimeError> {
-        let peers = Arc::new(Peers::of_subscription(topic));
+        let peers = Arc::new(Peers::new(topic, "publisher", log::Level::Info));
         let stats = Arc::new(Stats::new(Arc::clone(&peers)));
         let (sender, local) = bounded(qos.depth.max(match load {
             Load::Small => LOCAL_SMALL_MESSAGES,
             Load::Large => LOCAL_LARGE_MESSAGES,
         }));
         let latched = qos.durability == Durability::TransientLocal;
-        let place = self.bus.topic(topic).join_subscriber::<M>(
-            &peers,
-            sender,
-            stats.lost_counter(),
-            latched,
-        )?;
+        let (place, lost) = (self.bus.topic(topic), Arc::clone(&stats.lost));
+        let place = place.join_subscriber::<M>(&peers, sender, lost, latched)?;
         let (commands, orders) = unbounded();
         let intake = Arc::new(Intake {
             node,
@@ -85,6 +80,9 @@ impl Shared {
             open.intakes.push(Arc::downgrade(&intake));
         }
         self.open_intake(&intake)?;
-        Ok(Subscription::new(intake, running))
+        Ok(Subscription {
+            intake,
+            _running: running,
+        })
     }
 }

@@ -7,7 +7,7 @@
 
 use std::sync::atomic::{AtomicBool, Ordering::Relaxed};
 use std::sync::{Arc, Mutex};
-use std::time::Duration;
+use std::time::{Duration, Instant};
 
 use smol::channel::{Receiver, Sender, bounded};
 
@@ -66,8 +66,8 @@ impl Intake {
         let Some(closed) = self.order(Command::Close) else {
             return;
         };
-        let closed = wait_for(&closed, PATIENCE);
-        if !closed {
+        let now = Instant::now();
+        if !wait_for(&closed, now.checked_add(PATIENCE).unwrap_or(now)) {
             log::warn!(
                 "{}: a publisher was made while the subscription of this process was busy; make \
                  publishers outside handlers, timers and callbacks",

@@ -36,8 +36,8 @@ pub enum Load {
 /// A subscription; dropping it ends it.
 #[must_use = "dropping a subscription ends it"]
 pub struct Subscription {
-    intake: Arc<Intake>,
-    _running: Running,
+    pub(crate) intake: Arc<Intake>,
+    pub(crate) _running: Running,
 }
 
 pub(crate) enum Running {
@@ -49,21 +49,15 @@ pub(crate) enum Running {
 
 /// Counters of a subscription.
 pub(crate) struct Stats {
-    peers: Arc<Peers>,
+    pub peers: Arc<Peers>,
     received: AtomicU64,
-    undecodable: AtomicU64,
-    lost: Arc<AtomicU64>,
+    pub undecodable: AtomicU64,
+    /// Messages that gave way to newer ones, or that a writer numbered and we never saw.
+    pub lost: Arc<AtomicU64>,
     warning: Throttle,
 }
 
 impl Subscription {
-    pub(crate) fn new(intake: Arc<Intake>, running: Running) -> Self {
-        Self {
-            intake,
-            _running: running,
-        }
-    }
-
     fn stats(&self) -> &Stats {
         &self.intake.stats
     }
@@ -92,7 +86,7 @@ impl Subscription {
 
     /// Messages that were sent and did not get here: gaps in the numbers of a publisher.
     pub fn lost(&self) -> u64 {
-        self.stats().lost()
+        self.stats().lost.load(Relaxed)
     }
 
     /// Samples that were no message of this type, or too long, and were left out.
@@ -110,23 +104,6 @@ impl Stats {
             lost: Arc::default(),
             warning: Throttle::new(WARNING_PERIOD),
         }
-    }
-
-    pub(crate) fn peers(&self) -> &Peers {
-        &self.peers
-    }
-
-    pub(crate) fn undecodable(&self) -> u64 {
-        self.undecodable.load(Relaxed)
-    }
-
-    pub(crate) fn lost(&self) -> u64 {
-        self.lost.load(Relaxed)
-    }
-
-    /// The counter behind [`Stats::lost`].
-    pub(crate) fn lost_counter(&self) -> Arc<AtomicU64> {
-        Arc::clone(&self.lost)
     }
 
     /// Decodes a sample and counts what comes of it.
@@ -147,10 +124,8 @@ impl Stats {
     fn not_decodable(&self, why: &dyn std::fmt::Display) {
         let count = self.undecodable.fetch_add(1, Relaxed).saturating_add(1);
         if self.warning.check().is_some() {
-            log::warn!(
-                "{}: undecodable sample ({count} so far): {why}",
-                self.peers.topic()
-            );
+            let topic = self.peers.topic();
+            log::warn!("{topic}: undecodable sample ({count} so far): {why}");
         }
     }
 }

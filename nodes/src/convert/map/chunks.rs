@@ -103,20 +103,13 @@ pub fn update(
     previous_sequence: u64,
     stamp: &MapStamp,
 ) -> Vec<LatticeMapUpdate> {
-    let place = (list.lattice(), list.datum_m());
-    let payload_bytes = payload_bytes(list);
-    update_of_parts(
-        place,
-        changes,
-        payload_bytes,
-        previous_sequence,
-        stamp,
-        |keys| {
-            let voxel = |key: &MortonKey| list.get(*key).unwrap_or_default();
-            let voxels: Vec<Voxel> = keys.iter().map(voxel).collect();
-            Payloads::of(list, keys, voxels.iter())
-        },
-    )
+    let (place, bytes) = ((list.lattice(), list.datum_m()), payload_bytes(list));
+    let payloads = |keys: &[MortonKey]| {
+        let voxel = |key: &MortonKey| list.get(*key).unwrap_or_default();
+        let voxels: Vec<Voxel> = keys.iter().map(voxel).collect();
+        Payloads::of(list, keys, voxels.iter())
+    };
+    update_of_parts(place, changes, bytes, previous_sequence, stamp, payloads)
 }
 
 /// The same of cells without payload.
@@ -127,15 +120,8 @@ pub fn update_of_cells(
     previous_sequence: u64,
     stamp: &MapStamp,
 ) -> Vec<LatticeMapUpdate> {
-    let none = |_: &[MortonKey]| Payloads::default();
-    update_of_parts(
-        (lattice, datum_m),
-        changes,
-        0,
-        previous_sequence,
-        stamp,
-        none,
-    )
+    let (place, none) = ((lattice, datum_m), |_: &[MortonKey]| Payloads::default());
+    update_of_parts(place, changes, 0, previous_sequence, stamp, none)
 }
 
 fn update_of_parts(
@@ -156,28 +142,26 @@ fn update_of_parts(
         ..LatticeMapUpdate::default()
     };
     let mut out = Vec::new();
-    if !changes.changed.is_empty() {
-        for keys in split(&changes.changed, payload_bytes, stamp.chunk_bytes) {
-            let payloads = payloads(keys);
-            out.push(LatticeMapUpdate {
-                voxels: keys.len() as u32,
-                keys: ByteBuf::from(codec::encode_keys(keys)),
-                counts: payloads.counts,
-                mean_offsets: payloads.mean_offsets,
-                labels: payloads.labels,
-                label_counts: payloads.label_counts,
-                ..template.clone()
-            });
-        }
+    let changed = split(&changes.changed, payload_bytes, stamp.chunk_bytes);
+    for keys in changed.into_iter().filter(|keys| !keys.is_empty()) {
+        let payloads = payloads(keys);
+        out.push(LatticeMapUpdate {
+            voxels: keys.len() as u32,
+            keys: ByteBuf::from(codec::encode_keys(keys)),
+            counts: payloads.counts,
+            mean_offsets: payloads.mean_offsets,
+            labels: payloads.labels,
+            label_counts: payloads.label_counts,
+            ..template.clone()
+        });
     }
-    if !changes.removed.is_empty() {
-        for keys in split(&changes.removed, 0, stamp.chunk_bytes) {
-            out.push(LatticeMapUpdate {
-                removed: keys.len() as u32,
-                removed_keys: ByteBuf::from(codec::encode_keys(keys)),
-                ..template.clone()
-            });
-        }
+    let removed = split(&changes.removed, 0, stamp.chunk_bytes);
+    for keys in removed.into_iter().filter(|keys| !keys.is_empty()) {
+        out.push(LatticeMapUpdate {
+            removed: keys.len() as u32,
+            removed_keys: ByteBuf::from(codec::encode_keys(keys)),
+            ..template.clone()
+        });
     }
     let chunks = out.len() as u32;
     for (chunk, message) in (0..).zip(&mut out) {
@@ -201,12 +185,10 @@ fn mean_offsets<'a>(voxels: impl Iterator<Item = &'a Voxel>, unit_m: f64) -> Vec
 
 /// Bytes of a voxel besides its key.
 fn payload_bytes(list: &VoxelList) -> usize {
-    PAYLOAD_BYTES
-        + if list.payload().labels {
-            LABEL_BYTES
-        } else {
-            0
-        }
+    match list.payload().labels {
+        true => PAYLOAD_BYTES + LABEL_BYTES,
+        false => PAYLOAD_BYTES,
+    }
 }
 
 /// Cuts sorted keys so that each part fits `chunk_bytes`; at least one part, of at least one key.
@@ -219,12 +201,8 @@ fn split(keys: &[MortonKey], payload_bytes: usize, chunk_bytes: usize) -> Vec<&[
     let mut used = 0;
     let mut previous = 0;
     for (i, key) in keys.iter().enumerate() {
-        let difference = if i == start {
-            key.raw()
-        } else {
-            key.raw() - previous
-        };
-        let bytes = varint_len(difference) + payload_bytes;
+        let before = if i == start { 0 } else { previous };
+        let bytes = varint_len(key.raw() - before) + payload_bytes;
         if i > start && used + bytes > room {
             parts.push(&keys[start..i]);
             start = i;

@@ -96,7 +96,7 @@ impl SemanticOptions {
         let defaults = Self::default();
         let axes = params.string("headset_axes", defaults.axes.name())?;
         Ok(Self {
-            max_points: params.usize_in("max_cloud_points", defaults.max_points, 1..=usize::MAX)?,
+            max_points: params.positive("max_cloud_points", defaults.max_points)?,
             max_range_m: params.f64_in("max_range_m", defaults.max_range_m, 1e-3..=1e9)?,
             axes: axes
                 .parse()

@@ -14,12 +14,7 @@ fn message(fields: &[(&str, u8)], rows: &[([f32; 3], Vec<u8>)]) -> PointCloud2 {
     let mut all = cloud::xyz_fields(PointField::FLOAT32, 4);
     let mut offset = 12;
     for (name, datatype) in fields {
-        all.push(PointField {
-            name: (*name).to_owned(),
-            offset,
-            datatype: *datatype,
-            count: 1,
-        });
+        all.push(cloud::field(name, offset, *datatype));
         offset += size(*datatype);
     }
     let mut data = Vec::new();
@@ -83,10 +78,8 @@ fn a_confidence_is_a_probability_and_ignored_classes_are_none() {
         let rest = [&label.to_le_bytes()[..], &c.to_le_bytes()].concat();
         ([0.0; 3], rest)
     };
-    let fields = [
-        ("label", PointField::UINT16),
-        ("confidence", PointField::FLOAT32),
-    ];
+    let (label, confidence) = (PointField::UINT16, PointField::FLOAT32);
+    let fields = [("label", label), ("confidence", confidence)];
     let rows = [row(5, 0.25), row(5, f32::NAN), row(0, 0.5), row(6, 1.0)];
     let mut options = SemanticOptions::default();
     options.labels.ignored = BTreeSet::from([0]);
@@ -114,20 +107,18 @@ fn colours_are_classes_by_the_palette() {
     let c = |v: f32| v.to_le_bytes().to_vec();
     let red = packed([128, 0, 0]);
     let rows = [([0.0; 3], [red.clone(), c(0.75)].concat())];
-    let names = [
-        ("semantic_color", PointField::FLOAT32),
-        ("confidence", PointField::FLOAT32),
-    ];
-    let one = message(&names, &rows);
+    let names = ["semantic_color", "confidence"];
+    let one = message(&names.map(|name| (name, PointField::FLOAT32)), &rows);
     assert_eq!(read(&one, &with_palette()), [vec![(3, 0.75)]]);
 
     let greens = [packed([0, 128, 0]), packed([0, 128, 1])];
     let rest = [&greens[0], &red, &greens[1], &c(0.25), &c(0.375), &c(0.25)];
-    let names = ["semantic_color1", "semantic_color2", "semantic_color3"];
-    let names = names
-        .into_iter()
-        .chain(["confidence1", "confidence2", "confidence3"]);
-    let names: Vec<_> = names.map(|name| (name, PointField::FLOAT32)).collect();
+    let names =
+        "semantic_color1 semantic_color2 semantic_color3 confidence1 confidence2 confidence3";
+    let names: Vec<_> = names
+        .split(' ')
+        .map(|name| (name, PointField::FLOAT32))
+        .collect();
     let three = message(&names, &[([0.0; 3], rest.map(Clone::clone).concat())]);
     // Two colours of one class are one label.
     assert_eq!(read(&three, &with_palette()), [vec![(4, 0.5), (3, 0.375)]]);

@@ -5,7 +5,7 @@ use lattice_msgs::sensor_msgs::{PointCloud2, PointField};
 use lattice_msgs::std_msgs::Header;
 
 use super::Color;
-use crate::convert::cloud::{dense_cloud, xyz_fields};
+use crate::convert::cloud::{dense_cloud, field, xyz_fields};
 
 /// x, y, z, rgb, label, confidence.
 const POINT_STEP: u32 = 22;
@@ -14,17 +14,11 @@ const POINT_STEP: u32 = 22;
 /// probability as `confidence`, and a colour of the class as `rgb`.
 pub fn message_from_semantic(header: Header, cloud: &SemanticCloud) -> PointCloud2 {
     let mut fields = xyz_fields(PointField::FLOAT32, 4);
-    let further = [
-        ("rgb", 12, PointField::FLOAT32),
-        ("label", 16, PointField::UINT16),
-        ("confidence", 18, PointField::FLOAT32),
-    ];
-    fields.extend(further.map(|(name, offset, datatype)| PointField {
-        name: name.to_owned(),
-        offset,
-        datatype,
-        count: 1,
-    }));
+    fields.extend([
+        field("rgb", 12, PointField::FLOAT32),
+        field("label", 16, PointField::UINT16),
+        field("confidence", 18, PointField::FLOAT32),
+    ]);
     let mut data = Vec::with_capacity(cloud.len() * POINT_STEP as usize);
     for (i, point) in cloud.points_m.iter().enumerate() {
         let label = cloud.label(i).iter().next();

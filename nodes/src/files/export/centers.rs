@@ -12,15 +12,9 @@ use super::{ExportError, ply_comment, ply_header};
 /// points in it, and `offset_x`, `_y`, `_z` (float, metres) their mean minus the centre.
 pub fn write_centers_ply(list: &VoxelList, writer: impl Write) -> Result<(), ExportError> {
     let mut writer = std::io::BufWriter::new(writer);
-    let properties = [
-        "double x",
-        "double y",
-        "double z",
-        "uint count",
-        "float offset_x",
-        "float offset_y",
-        "float offset_z",
-    ];
+    let [x, y, z] = ["double x", "double y", "double z"];
+    let [ox, oy, oz] = ["float offset_x", "float offset_y", "float offset_z"];
+    let properties = [x, y, z, "uint count", ox, oy, oz];
     let vertices = ("vertex", list.len() as u64, &properties[..]);
     writer.write_all(ply_header(&ply_comment(list), &[vertices]).as_bytes())?;
     for (key, voxel) in list.sorted() {
@@ -59,19 +53,11 @@ mod tests {
         let end = b"end_header\n";
         let start = bytes.windows(end.len()).position(|w| w == end).unwrap() + end.len();
         let header = std::str::from_utf8(&bytes[..start]).unwrap();
-        assert!(
-            header.contains("comment cubic lattice, cell volume 1 m^3"),
-            "{header}"
-        );
+        assert!(header.contains("comment cubic lattice, cell volume 1 m^3"));
         assert!(header.contains("element vertex 2\n"), "{header}");
         let row = |x: [f64; 3], count: u32, offset: [f32; 3]| {
-            let x = x.map(f64::to_le_bytes).concat();
-            [
-                x,
-                count.to_le_bytes().to_vec(),
-                offset.map(f32::to_le_bytes).concat(),
-            ]
-            .concat()
+            let (x, offset) = (x.map(f64::to_le_bytes), offset.map(f32::to_le_bytes));
+            [&x.concat()[..], &count.to_le_bytes(), &offset.concat()].concat()
         };
         let expected = [
             row([4e6, -3.0, 0.0], 2, [0.0, 0.125, 0.0]),

@@ -18,14 +18,8 @@ pub fn write_mesh_ply(list: &VoxelList, writer: impl Write) -> Result<(), Export
     let mesh = Mesh::of(list)?;
     let heights = HeightRange::of(mesh.vertices_m.iter().map(|v| v.z));
     let mut writer = BufWriter::new(writer);
-    let properties = [
-        "double x",
-        "double y",
-        "double z",
-        "uchar red",
-        "uchar green",
-        "uchar blue",
-    ];
+    let [x, y, z] = ["double x", "double y", "double z"];
+    let properties = [x, y, z, "uchar red", "uchar green", "uchar blue"];
     let vertices = ("vertex", mesh.vertices_m.len() as u64, &properties[..]);
     let indices = &["list uchar int vertex_indices"][..];
     let faces = ("face", mesh.faces as u64, indices);

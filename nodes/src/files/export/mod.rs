@@ -2,20 +2,47 @@
 
 mod centers;
 mod cloud;
-mod error;
 mod mesh;
 pub mod palette;
-mod ply;
 mod vertices;
 
 pub use centers::write_centers_ply;
 pub use cloud::write_labelled_ply;
-pub use error::ExportError;
 pub use mesh::write_mesh_ply;
 pub use palette::{HeightRange, category_color, color_at};
-pub use ply::{PlyElement, ply_header};
 
 use lattice_core::voxels::VoxelList;
+use thiserror::Error;
+
+/// Reason for which a map was not exported.
+#[derive(Debug, Error)]
+pub enum ExportError {
+    /// The system could not write.
+    #[error("writing failed: {0}")]
+    Io(#[from] std::io::Error),
+    /// PLY counts vertices in 32 bits with sign.
+    #[error(
+        "the mesh has more than {} vertices: export the centres, or take larger cells",
+        i32::MAX
+    )]
+    TooManyVertices,
+}
+
+/// An element: its name, how many there are, and the type and name of each property.
+type PlyElement<'a> = (&'a str, u64, &'a [&'a str]);
+
+/// The header of a binary little-endian PLY file, with one line of comment.
+pub fn ply_header(comment: &str, elements: &[PlyElement]) -> String {
+    let comment = comment.replace(['\n', '\r'], " ");
+    let mut header = format!("ply\nformat binary_little_endian 1.0\ncomment {comment}\n");
+    for (name, count, properties) in elements {
+        header += &format!("element {name} {count}\n");
+        for property in *properties {
+            header += &format!("property {property}\n");
+        }
+    }
+    header + "end_header\n"
+}
 
 /// The comment of a PLY header that says what the map is.
 fn ply_comment(list: &VoxelList) -> String {

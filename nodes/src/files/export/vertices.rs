@@ -21,16 +21,15 @@ impl SharedVertices {
         let limit_m = SAME * lattice.covering_radius_m();
         let cells = || std::iter::once([0; 3]).chain(lattice.touching_neighbors().iter().copied());
         let owner = |corner: &Vector3<f64>| {
-            cells()
-                .flat_map(|w| {
-                    (0..)
-                        .zip(corners)
-                        .map(move |(number, other)| (w, number, other))
-                })
-                .filter(|&(w, _, other)| (lattice.center(w) + other - corner).norm() <= limit_m)
-                .map(|(w, number, _)| (w, number))
-                .min()
-                .unwrap_or_default()
+            let is_same =
+                |w, other: &Vector3<f64>| (lattice.center(w) + other - corner).norm() <= limit_m;
+            let same = cells().flat_map(|w| {
+                let numbered = (0..)
+                    .zip(corners)
+                    .filter(move |(_, other)| is_same(w, other));
+                numbered.map(move |(number, _)| (w, number))
+            });
+            same.min().unwrap_or_default()
         };
         SharedVertices {
             owners: corners.iter().map(owner).collect(),
@@ -76,14 +75,8 @@ mod tests {
 
     #[test]
     fn a_corner_is_shared_by_as_many_cells_as_the_theory_says() {
-        for (kind, per_cell) in [
-            (LatticeKind::Cubic, 1),
-            (LatticeKind::Bcc, 6),
-            (LatticeKind::Fcc, 3),
-            (LatticeKind::Mcc, 6),
-            (LatticeKind::Hex, 2),
-            (LatticeKind::HexOptimal, 2),
-        ] {
+        // Cubic, BCC, FCC, MCC and both hexagonal ones.
+        for (kind, per_cell) in LatticeKind::ALL.into_iter().zip([1, 6, 3, 6, 2, 2]) {
             let lattice = Lattice::new(kind, 1.0).unwrap();
             let shared = SharedVertices::new(&lattice);
             // Corners that a cell owns: all corners of space by the number of cells.

@@ -9,9 +9,10 @@ const TRUSTED: u64 = 1 << 16;
 
 /// Takes points up to a limit, and leaves out those that are not finite.
 pub(super) struct Collector {
-    points_m: Vec<[f64; 3]>,
-    labels: Vec<u16>,
-    skipped: usize,
+    pub(super) points_m: Vec<[f64; 3]>,
+    /// One for each point, or none at all.
+    pub(super) labels: Vec<u16>,
+    pub(super) skipped: usize,
     max_points: usize,
 }
 
@@ -80,19 +81,5 @@ impl Collector {
             }
             None => self.push(point_m),
         }
-    }
-
-    pub(super) fn skipped_not_finite(&self) -> usize {
-        self.skipped
-    }
-
-    /// Points, and labels if there are any.
-    pub(super) fn into_parts(self) -> (Vec<[f64; 3]>, Vec<u16>) {
-        (self.points_m, self.labels)
-    }
-
-    #[cfg(test)]
-    pub(super) fn into_points(self) -> Vec<[f64; 3]> {
-        self.points_m
     }
 }

@@ -104,13 +104,11 @@ fn read_stream(
         format::Family::Text => text::read(&mut source, &mut points)?,
         format::Family::Kitti => kitti::read(&mut source, &mut points)?,
     };
-    let skipped_not_finite = points.skipped_not_finite();
-    let (points_m, labels) = points.into_parts();
     Ok(PointFile {
-        points_m,
-        labels,
+        points_m: points.points_m,
+        labels: points.labels,
         format,
-        skipped_not_finite,
+        skipped_not_finite: points.skipped,
     })
 }
 

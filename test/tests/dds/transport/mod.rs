@@ -8,26 +8,86 @@ use lattice_msgs::RosMessage;
 use lattice_msgs::std_msgs::String as RosString;
 use lattice_runtime::qos::Qos;
 use lattice_runtime::ros_args::RosArgs;
-use lattice_runtime::{Load, Node, Runtime, Subscription};
+use lattice_runtime::{Load, Node, Publisher, Runtime, Subscription};
 use lattice_test::domain::TestDomain;
 
 /// Long enough for a loaded machine; a test that passes does not wait for it.
 const PATIENCE: Duration = Duration::from_secs(60);
 
-fn runtime(domain: &TestDomain, name: &str) -> Runtime {
-    with_args(domain, name, &[])
+/// Two processes with a node each, as if on two machines.
+struct Two {
+    a: Runtime,
+    b: Runtime,
+    from: Node,
+    to: Node,
+    _domain: TestDomain,
 }
 
-fn with_args(domain: &TestDomain, name: &str, args: &[&str]) -> Runtime {
+impl Two {
+    fn start() -> Self {
+        Self::with_args(&[])
+    }
+
+    /// The second one with ROS arguments.
+    fn with_args(args: &[&str]) -> Self {
+        let domain = TestDomain::take();
+        let (a, b) = (runtime(&domain, "a", &[]), runtime(&domain, "b", args));
+        let (from, to) = (a.node("a").unwrap(), b.node("b").unwrap());
+        Self {
+            a,
+            b,
+            from,
+            to,
+            _domain: domain,
+        }
+    }
+
+    /// A publisher of the first process.
+    fn publisher<M: RosMessage>(&self, topic: &str, qos: Qos) -> Publisher<M> {
+        self.from.publisher(topic, qos).unwrap()
+    }
+
+    /// Messages that the second process hears.
+    fn hear<M: RosMessage>(
+        &self,
+        topic: &str,
+        qos: Qos,
+        load: Load,
+    ) -> (Subscription, Receiver<Arc<M>>) {
+        hear(&self.to, topic, qos, load)
+    }
+}
+
+fn runtime(domain: &TestDomain, name: &str, args: &[&str]) -> Runtime {
     let args = ["--ros-args"].iter().chain(args).map(|&arg| arg.to_owned());
     let args = RosArgs::parse(args).unwrap();
     Runtime::with_transport(name, args, &domain.transport()).unwrap()
 }
 
-fn text(data: &str) -> RosString {
+fn text(data: impl ToString) -> RosString {
     RosString {
-        data: data.to_owned(),
+        data: data.to_string(),
     }
+}
+
+/// Publishes the numbers below `n`.
+fn count_to(n: i32, publisher: &Publisher<RosString>) {
+    for i in 0..n {
+        publisher.publish(text(i)).unwrap();
+    }
+}
+
+/// The next messages are the numbers below `n`.
+#[track_caller]
+fn assert_counted(n: i32, heard: &Receiver<Arc<RosString>>) {
+    for i in 0..n {
+        assert_heard(heard, &i.to_string());
+    }
+}
+
+#[track_caller]
+fn assert_heard(heard: &Receiver<Arc<RosString>>, data: &str) {
+    assert_eq!(heard.recv_timeout(PATIENCE).unwrap().data, data);
 }
 
 /// Messages of a topic, in a channel.

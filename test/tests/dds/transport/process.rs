@@ -16,13 +16,12 @@ use lattice_runtime::ros_args::RosArgs;
 use lattice_runtime::{Load, PublishError, RuntimeError, StaticTfBroadcaster, logging};
 use lattice_test::domain::TestDomain;
 
-use super::{PATIENCE, hear, runtime, text, wait_until, with_args};
+use super::{PATIENCE, Two, assert_counted, count_to, runtime, text, wait_until};
 
 #[test]
 fn static_transforms_go_in_one_message() {
-    let domain = TestDomain::take();
-    let (a, b) = (runtime(&domain, "a"), runtime(&domain, "b"));
-    let broadcaster = StaticTfBroadcaster::new(&a.node("a").unwrap()).unwrap();
+    let two = Two::start();
+    let broadcaster = StaticTfBroadcaster::new(&two.from).unwrap();
     for (child, x) in [("laser", 1.0), ("ins", 2.0), ("laser", 3.0)] {
         let mut transform = TransformStamped {
             child_frame_id: child.to_owned(),
@@ -31,9 +30,8 @@ fn static_transforms_go_in_one_message() {
         transform.transform.translation.x = x;
         broadcaster.send([transform]).unwrap();
     }
-    let node = b.node("b").unwrap();
     let qos = Qos::TF_STATIC_LISTENER;
-    let (_subscription, heard) = hear::<TFMessage>(&node, "/tf_static", qos, Load::Small);
+    let (_subscription, heard) = two.hear::<TFMessage>("/tf_static", qos, Load::Small);
     let frames = loop {
         let message = heard.recv_timeout(PATIENCE).unwrap();
         let frame = |t: &TransformStamped| (t.child_frame_id.clone(), t.transform.translation.x);
@@ -47,13 +45,11 @@ fn static_transforms_go_in_one_message() {
 
 #[test]
 fn a_qos_that_does_not_match_shows_in_diagnostics() {
-    let domain = TestDomain::take();
-    let (a, b) = (runtime(&domain, "a"), runtime(&domain, "b"));
-    let (from, to) = (a.node("a").unwrap(), b.node("b").unwrap());
-    let _publisher = from.publisher::<Imu>("imu", Qos::INS).unwrap();
-    let (_subscription, _heard) = hear::<Imu>(&to, "imu", Qos::reliable(200), Load::Small);
+    let two = Two::start();
+    let _publisher = two.publisher::<Imu>("imu", Qos::INS);
+    let (_subscription, _heard) = two.hear::<Imu>("imu", Qos::reliable(200), Load::Small);
     let (_diagnostics, heard) =
-        hear::<DiagnosticArray>(&to, "/diagnostics", Qos::DIAGNOSTICS, Load::Small);
+        two.hear::<DiagnosticArray>("/diagnostics", Qos::DIAGNOSTICS, Load::Small);
     let mut missing = vec![
         ("a: transport", "/imu incompatible_subscribers"),
         ("b: transport", "/imu incompatible_publishers"),
@@ -75,16 +71,9 @@ fn a_qos_that_does_not_match_shows_in_diagnostics() {
 
 #[test]
 fn qos_parameters_override_the_code() {
-    let domain = TestDomain::take();
-    let a = runtime(&domain, "a");
-    let b = with_args(&domain, "b", &["-p", "qos.imu.reliability:=best_effort"]);
-    let publisher = a
-        .node("a")
-        .unwrap()
-        .publisher::<Imu>("imu", Qos::INS)
-        .unwrap();
-    let to = b.node("b").unwrap();
-    let (subscription, heard) = hear::<Imu>(&to, "imu", Qos::reliable(200), Load::Small);
+    let two = Two::with_args(&["-p", "qos.imu.reliability:=best_effort"]);
+    let publisher = two.publisher::<Imu>("imu", Qos::INS);
+    let (subscription, heard) = two.hear::<Imu>("imu", Qos::reliable(200), Load::Small);
     wait_for_match!(publisher, subscription);
     publisher.publish(Imu::default()).unwrap();
     heard.recv_timeout(PATIENCE).unwrap();
@@ -92,33 +81,24 @@ fn qos_parameters_override_the_code() {
 
 #[test]
 fn simulated_time_follows_the_clock() {
-    let domain = TestDomain::take();
-    let a = runtime(&domain, "a");
-    let b = with_args(&domain, "b", &["-p", "use_sim_time:=true"]);
-    let publisher = a
-        .node("a")
-        .unwrap()
-        .publisher::<Clock>("/clock", Qos::CLOCK_PLAYER)
-        .unwrap();
-    let clock = b.node("b").unwrap().clock();
-    assert!(clock.is_sim());
+    let two = Two::with_args(&["-p", "use_sim_time:=true"]);
+    let publisher = two.publisher::<Clock>("/clock", Qos::CLOCK_PLAYER);
+    let clock = two.to.clock();
     assert_eq!(clock.now_ns(), 0);
     let stamp_ns = 1_234_567_890_123;
     // Best effort: what is sent before both sides know each other is lost.
-    a.timer(Duration::from_millis(5), move || {
+    two.a.timer(Duration::from_millis(5), move || {
         let clock = Time::from_ns(stamp_ns);
         let _ = publisher.publish(Clock { clock });
     });
-    wait_until(&b, move || clock.now_ns() == stamp_ns);
+    wait_until(&two.b, move || clock.now_ns() == stamp_ns);
 }
 
 #[test]
 fn the_log_of_the_process_is_on_rosout() {
-    let domain = TestDomain::take();
     logging::init(&RosArgs::default(), "logger").unwrap();
-    let (a, b) = (runtime(&domain, "a"), runtime(&domain, "b"));
-    let to = b.node("b").unwrap();
-    let (_subscription, heard) = hear::<Log>(&to, "/rosout", Qos::ROSOUT, Load::Small);
+    let two = Two::start();
+    let (_subscription, heard) = two.hear::<Log>("/rosout", Qos::ROSOUT, Load::Small);
     log::warn!(target: "lattice_nodes::test", "of interest");
     let line = loop {
         let line = heard.recv_timeout(PATIENCE).unwrap();
@@ -128,39 +108,30 @@ fn the_log_of_the_process_is_on_rosout() {
     };
     assert_eq!((line.level, line.name.as_str()), (Log::WARN, "logger"));
     assert!(line.file.ends_with("process.rs"));
-    drop(a);
 }
 
 #[test]
 fn shutdown_stops_timers_sends_what_is_queued_and_leaves_at_once() {
-    let domain = TestDomain::take();
-    let (a, b) = (runtime(&domain, "a"), runtime(&domain, "b"));
-    let (from, to) = (a.node("a").unwrap(), b.node("b").unwrap());
-    let publisher = from.publisher::<RosString>("last", Qos::DEFAULT).unwrap();
-    let (subscription, heard) = hear::<RosString>(&to, "last", Qos::DEFAULT, Load::Large);
+    let two = Two::start();
+    let publisher = two.publisher("last", Qos::DEFAULT);
+    let (subscription, heard) = two.hear("last", Qos::DEFAULT, Load::Large);
     wait_for_subscriber!(publisher);
     let (ticks, ticked) = channel();
-    a.timer(Duration::from_millis(1), move || {
+    two.a.timer(Duration::from_millis(1), move || {
         let _ = ticks.send(());
     });
     ticked.recv_timeout(PATIENCE).unwrap();
-    for i in 0..20 {
-        publisher.publish(text(&i.to_string())).unwrap();
-    }
-    let shutdown = a.shutdown_handle();
+    count_to(20, &publisher);
+    let shutdown = two.a.shutdown_handle();
     assert!(!shutdown.is_requested());
     std::thread::spawn(move || shutdown.request());
-    a.spin().unwrap();
+    two.a.spin().unwrap();
     while ticked.recv_timeout(PATIENCE).is_ok() {}
-    for i in 0..20 {
-        assert_eq!(heard.recv_timeout(PATIENCE).unwrap().data, i.to_string());
-    }
-    wait_until(&b, move || subscription.publisher_count() == 0);
-    assert!(matches!(
-        publisher.publish(text("late")),
-        Ok(()) | Err(PublishError::Closed { .. })
-    ));
-    let late = from.publisher::<RosString>("late", Qos::DEFAULT);
+    assert_counted(20, &heard);
+    wait_until(&two.b, move || subscription.publisher_count() == 0);
+    let late = publisher.publish(text("late"));
+    assert!(matches!(late, Ok(()) | Err(PublishError::Closed { .. })));
+    let late = two.from.publisher::<RosString>("late", Qos::DEFAULT);
     assert!(matches!(late, Err(RuntimeError::Closed { .. })));
 }
 
@@ -168,7 +139,7 @@ fn shutdown_stops_timers_sends_what_is_queued_and_leaves_at_once() {
 fn the_last_messages_of_the_process_reach_their_handlers() {
     let domain = TestDomain::take();
     for load in [Load::Small, Load::Large] {
-        let runtime = runtime(&domain, "a");
+        let runtime = runtime(&domain, "a", &[]);
         let node = runtime.node("a").unwrap();
         let publisher = node.publisher::<RosString>("last", Qos::DEFAULT).unwrap();
         let (shutdown, (sender, heard)) = (runtime.shutdown_handle(), channel());
@@ -179,9 +150,7 @@ fn the_last_messages_of_the_process_reach_their_handlers() {
                 let _ = sender.send(message);
             })
             .unwrap();
-        for i in 0..100 {
-            publisher.publish(text(&i.to_string())).unwrap();
-        }
+        count_to(100, &publisher);
         runtime.shutdown_handle().request();
         runtime.spin().unwrap();
         assert_eq!(heard.try_iter().count(), 100, "{load:?}");
@@ -192,7 +161,7 @@ fn the_last_messages_of_the_process_reach_their_handlers() {
 fn a_handler_that_panics_ends_the_process_in_good_order() {
     let domain = TestDomain::take();
     for load in [Load::Small, Load::Large] {
-        let runtime = runtime(&domain, "a");
+        let runtime = runtime(&domain, "a", &[]);
         let node = runtime.node("a").unwrap();
         let publisher = node.publisher::<RosString>("bomb", Qos::DEFAULT).unwrap();
         let _subscription = node

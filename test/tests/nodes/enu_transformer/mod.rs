@@ -50,8 +50,7 @@ impl Bench {
     /// A pose received at its own time.
     fn pose(&mut self, message: &Odometry) {
         let now_ns = message.header.stamp.to_ns();
-        let outputs = self.machine.on_ins(InsMessage::Odometry(message), now_ns);
-        self.take(outputs);
+        self.ins(InsMessage::Odometry(message), now_ns);
     }
 
     /// Poses of a machine that drives east at 1 m/s, from `from` steps to `to` steps.
@@ -59,6 +58,17 @@ impl Bench {
         for step in from..to {
             self.pose(&odometry(START_NS + step * STEP_NS, &driven(step)));
         }
+    }
+
+    /// Any message of an INS.
+    fn ins(&mut self, message: InsMessage, now_ns: i64) {
+        let outputs = self.machine.on_ins(message, now_ns);
+        self.take(outputs);
+    }
+
+    fn tick(&mut self, now_ns: i64) {
+        let outputs = self.machine.tick(now_ns);
+        self.take(outputs);
     }
 
     fn cloud(&mut self, message: PointCloud2, now_ns: i64) {

@@ -3,7 +3,7 @@
 use std::collections::VecDeque;
 use std::ops::ControlFlow;
 
-use lattice_core::lattice::{Lattice, LatticeKind};
+use lattice_core::lattice::LatticeKind;
 use lattice_core::registration::{
     Calibration, CalibrationOptions, HeadsetScan, Progress, Stage, TrackUpdate, Verdict,
 };
@@ -17,6 +17,7 @@ use lattice_nodes::semantic_icp_server::{
     CallId, End, Job, MapCloud, Output, Search, SemanticIcpServer, ServerOptions,
 };
 use lattice_test::clouds::{SECOND_NS, labelled_cloud};
+use lattice_test::maps;
 use nalgebra::Isometry3;
 
 /// Answers as it is told.
@@ -167,14 +168,23 @@ impl<S: Search> Bench<S> {
 
     pub fn session(&mut self, name: &str) {
         let data = name.to_owned();
-        let outputs = self
-            .machine
-            .on_session(&StringMessage { data }, self.now_ns);
+        let message = StringMessage { data };
+        let outputs = self.machine.on_session(&message, self.now_ns);
         self.put(outputs);
     }
 
     pub fn verdict(&self) -> u8 {
         self.results.last().unwrap().verdict
+    }
+
+    /// Who was answered, and how.
+    pub fn answered(&self, i: usize) -> (CallId, End) {
+        (self.answers[i].0, self.answers[i].1)
+    }
+
+    /// What the answer says.
+    pub fn message(&self, i: usize) -> &str {
+        &self.answers[i].2.message
     }
 
     pub fn reason(&self) -> &str {
@@ -183,26 +193,52 @@ impl<S: Search> Bench<S> {
 }
 
 pub fn mapper(epoch: u64) -> LatticeMapper {
-    let mut options = MapperOptions::new(Lattice::new(LatticeKind::Cubic, 0.000_125).unwrap());
-    options.labels = Some(LabelOptions::default());
+    let options = MapperOptions {
+        labels: Some(LabelOptions::default()),
+        ..maps::options(LatticeKind::Cubic, 0.000_125)
+    };
     LatticeMapper::new(options, epoch).unwrap()
+}
+
+impl Bench<Fake> {
+    /// Shows a good look that fits so well, and whose search by itself would end so.
+    pub fn look(&mut self, fit: f64, verdict: Verdict, x: f64) {
+        self.search.fits.push_back(fit);
+        self.search.verdicts.push_back(found(verdict, x));
+        self.cloud(&good());
+    }
+
+    /// Shows a good look whose search ends so.
+    pub fn searched(&mut self, verdict: Verdict) {
+        self.search.verdicts.push_back(found(verdict, 9.0));
+        self.cloud(&good());
+    }
+
+    /// Shows another map.
+    pub fn other_map(&mut self) {
+        let mut other = mapper(2);
+        map_point(&mut other, 0.0);
+        self.map(&mut other);
+    }
 }
 
 pub fn bench(options: ServerOptions) -> Bench<Fake> {
     let mut mapper = mapper(1);
-    let points = [([0.0; 3], 3), ([1.0, 0.0, 0.0], 4)];
-    mapper.on_cloud(&labelled_cloud("map", 1, &points)).unwrap();
+    map_point(&mut mapper, 1.0);
     let mut bench = Bench::new(options, Fake::default());
     bench.map(&mut mapper);
     bench
 }
 
+/// Maps a point at the origin, and one on the x axis.
+pub fn map_point(mapper: &mut LatticeMapper, x: f32) {
+    let points = [([0.0; 3], 3), ([x, 0.0, 0.0], 4)];
+    mapper.on_cloud(&labelled_cloud("map", 1, &points)).unwrap();
+}
+
 pub fn good() -> PointCloud2 {
-    labelled_cloud(
-        "headset_origin",
-        5,
-        &[([1.0, 2.0, 3.0], 7), ([1.0, 2.0, 4.0], 8)],
-    )
+    let points = [([1.0, 2.0, 3.0], 7), ([1.0, 2.0, 4.0], 8)];
+    labelled_cloud("headset_origin", 5, &points)
 }
 
 pub const OK: u8 = CalibrationResult::OK;

@@ -5,7 +5,7 @@ use lattice_msgs::calibration::CalibrateGoal;
 use lattice_nodes::semantic_icp_server::ServerOptions;
 use lattice_test::clouds::{SECOND_NS, cloud, labelled_cloud};
 
-use super::bench::{NONE, OK, REJECTED, bench, found, good};
+use super::bench::{NONE, OK, REJECTED, bench, good};
 
 #[test]
 fn every_refusal_has_its_reason_and_the_next_good_cloud_succeeds() {
@@ -59,40 +59,24 @@ fn a_look_that_does_not_fit_is_searched_with_alone() {
     let mut bench = bench(ServerOptions::default());
     bench.cloud(&good());
     // Rejected, as a mirrored one is: the pose stands, and the next good one is tracked.
-    bench.search.fits.push_back(0.1);
-    bench
-        .search
-        .verdicts
-        .push_back(found(Verdict::RejectedInput, 0.0));
-    bench.cloud(&good());
-    assert_eq!(
-        (bench.verdict(), bench.search.headset_scans.last()),
-        (REJECTED, Some(&1))
-    );
+    bench.look(0.1, Verdict::RejectedInput, 0.0);
+    assert_eq!(bench.verdict(), REJECTED);
+    assert_eq!(bench.search.headset_scans.last(), Some(&1));
     assert!(bench.machine.map_from_headset().is_some());
     bench.cloud(&good());
     assert_eq!(bench.verdict(), OK);
 
     // Recentred without a word: the looks from before are of another origin.
-    bench.search.fits.push_back(0.1);
-    bench.search.verdicts.push_back(found(Verdict::Ok, 50.0));
-    bench.cloud(&good());
-    assert_eq!(
-        bench.machine.map_from_headset().unwrap().translation.x,
-        50.0
-    );
+    bench.look(0.1, Verdict::Ok, 50.0);
+    let pose = bench.machine.map_from_headset().unwrap();
+    assert_eq!(pose.translation.x, 50.0);
     bench.ask(1, &CalibrateGoal::default());
     bench.work();
     assert_eq!(bench.search.headset_scans.last(), Some(&1));
 
     // Lost after three searches in vain.
     for left in (0..3).rev() {
-        bench.search.fits.push_back(0.1);
-        bench
-            .search
-            .verdicts
-            .push_back(found(Verdict::NoOverlap, 0.0));
-        bench.cloud(&good());
+        bench.look(0.1, Verdict::NoOverlap, 0.0);
         assert_eq!(bench.machine.map_from_headset().is_some(), left > 0);
     }
     assert_eq!(bench.machine.counts().tracking_lost, 1);
@@ -106,44 +90,22 @@ fn a_look_that_fits_somewhat_is_doubted() {
     bench.cloud(&good());
     // What is to be refused is, as often as it comes.
     for _ in 0..2 {
-        bench.search.fits.push_back(0.5);
-        bench
-            .search
-            .verdicts
-            .push_back(found(Verdict::RejectedInput, 0.0));
-        bench.cloud(&good());
+        bench.look(0.5, Verdict::RejectedInput, 0.0);
         assert_eq!(bench.verdict(), REJECTED);
     }
     // But one that tells nothing alone is held against nobody, and there is no doubt for a while.
     for verdict in [Verdict::NoOverlap, Verdict::Ambiguous, Verdict::Degenerate] {
-        bench.search.fits.extend([0.5, 0.5]);
-        bench.search.verdicts.push_back(found(verdict, 0.0));
         let searches = bench.search.headset_scans.len();
+        bench.look(0.5, verdict, 0.0);
+        bench.search.fits.push_back(0.5);
         bench.cloud(&good());
-        bench.cloud(&good());
-        assert_eq!(
-            (bench.verdict(), bench.search.headset_scans.len()),
-            (OK, searches + 1)
-        );
+        assert_eq!(bench.verdict(), OK);
+        assert_eq!(bench.search.headset_scans.len(), searches + 1);
         bench.now_ns += 10 * SECOND_NS;
     }
     let counts = bench.machine.counts();
-    assert_eq!(
-        (
-            counts.tracking_doubts,
-            counts.tracking_misses,
-            counts.tracking_lost
-        ),
-        (5, 0, 0)
-    );
-    assert_eq!(
-        bench
-            .machine
-            .map_from_headset()
-            .unwrap()
-            .translation
-            .x
-            .round(),
-        1.0
-    );
+    assert_eq!(counts.tracking_doubts, 5);
+    assert_eq!((counts.tracking_misses, counts.tracking_lost), (0, 0));
+    let pose = bench.machine.map_from_headset().unwrap();
+    assert_eq!(pose.translation.x.round(), 1.0);
 }

@@ -8,11 +8,11 @@ use lattice_msgs::calibration::CalibrateGoal;
 use lattice_msgs::vision_msgs::{LabelInfo, VisionClass};
 use lattice_nodes::convert::geometry::isometry_from_transform;
 use lattice_nodes::semantic_icp_server::{End, LatticeSearch, SearchWhen, ServerOptions};
-use lattice_test::clouds::{SECOND_NS, labelled_cloud};
+use lattice_test::clouds::SECOND_NS;
 use lattice_test::flat::{Flat, headset_cloud};
 use nalgebra::{Isometry3, Point3, Translation3, UnitQuaternion, Vector3};
 
-use super::bench::{Bench, Fake, NONE, OK, REJECTED, bench, found, good, mapper};
+use super::bench::{Bench, Fake, NONE, OK, REJECTED, bench, found, good, map_point, mapper};
 
 #[test]
 fn the_first_cloud_is_searched_and_the_next_are_tracked() {
@@ -20,14 +20,10 @@ fn the_first_cloud_is_searched_and_the_next_are_tracked() {
     bench.cloud(&good());
     assert_eq!(bench.verdict(), OK);
     let result = bench.results.last().unwrap().clone();
-    assert_eq!(
-        (&*result.header.frame_id, &*result.child_frame_id),
-        ("map", "headset_origin")
-    );
-    assert_eq!(
-        (result.header.stamp.to_ns(), result.gazes, result.points),
-        (5, 1, 2)
-    );
+    let frames = (&*result.header.frame_id, &*result.child_frame_id);
+    assert_eq!(frames, ("map", "headset_origin"));
+    assert_eq!(result.header.stamp.to_ns(), 5);
+    assert_eq!((result.gazes, result.points), (1, 2));
     assert_eq!(result.duration_s, 0.25);
     assert_eq!(bench.transforms.len(), 1);
     assert!(bench.search.map_labelled);
@@ -35,20 +31,11 @@ fn the_first_cloud_is_searched_and_the_next_are_tracked() {
     for _ in 0..3 {
         bench.cloud(&good());
     }
-    assert_eq!(
-        (bench.search.maps, bench.search.headset_scans.len()),
-        (1, 1),
-        "no more searches"
-    );
+    assert_eq!(bench.search.headset_scans, [1], "no more searches");
+    assert_eq!(bench.search.maps, 1);
     let counts = bench.machine.counts();
-    assert_eq!(
-        (
-            counts.clouds_in,
-            counts.clouds_searched,
-            counts.clouds_tracked
-        ),
-        (4, 1, 3)
-    );
+    assert_eq!((counts.clouds_in, counts.clouds_searched), (4, 1));
+    assert_eq!(counts.clouds_tracked, 3);
     // A millimetre is no news; but what is published on is the refined pose.
     assert_eq!(bench.results.len(), 2, "told again after five seconds");
     assert_eq!(bench.results[1].method, "tracking");
@@ -58,81 +45,55 @@ fn the_first_cloud_is_searched_and_the_next_are_tracked() {
     let pose = isometry_from_transform(&last.transform).unwrap();
     assert!((pose.translation.x - 1.003).abs() < 1e-9, "{pose}");
     assert_eq!(last.header.stamp.to_ns(), bench.now_ns);
-    assert_eq!(
-        (&*last.header.frame_id, &*last.child_frame_id),
-        ("map", "headset_origin")
-    );
+    let frames = (&*last.header.frame_id, &*last.child_frame_id);
+    assert_eq!(frames, ("map", "headset_origin"));
 }
 
 #[test]
 fn without_a_map_clouds_are_refused_and_kept() {
     let mut bench = Bench::new(ServerOptions::default(), Fake::default());
     bench.cloud(&good());
-    assert_eq!(
-        (bench.verdict(), bench.reason()),
-        (REJECTED, "there is no map yet")
-    );
+    assert_eq!(bench.verdict(), REJECTED);
+    assert_eq!(bench.reason(), "there is no map yet");
     bench.ask(1, &CalibrateGoal::default());
-    assert_eq!(bench.answers[0].1, End::Failed);
-    assert_eq!(bench.answers[0].2.message, "there is no map yet");
+    assert_eq!(bench.answered(0), (1, End::Failed));
+    assert_eq!(bench.message(0), "there is no map yet");
     bench.map(&mut mapper(1));
     bench.ask(2, &CalibrateGoal::default());
-    assert_eq!(
-        bench.answers[1].2.message, "there is no map yet",
-        "it is empty"
-    );
+    assert_eq!(bench.message(1), "there is no map yet", "it is empty");
 
     let mut mapper = mapper(2);
-    mapper
-        .on_cloud(&labelled_cloud("map", 1, &[([0.0; 3], 3)]))
-        .unwrap();
+    map_point(&mut mapper, 0.0);
     bench.map(&mut mapper);
     bench.ask(3, &CalibrateGoal::default());
     bench.work();
-    assert_eq!((bench.answers[2].0, bench.answers[2].1), (3, End::Found));
+    assert_eq!(bench.answered(2), (3, End::Found));
     assert!(bench.answers[2].2.success);
 
     bench.search.refuse_map = true;
-    mapper
-        .on_cloud(&labelled_cloud("map", 1, &[([5.0; 3], 3)]))
-        .unwrap();
+    map_point(&mut mapper, 5.0);
     bench.map(&mut mapper);
     bench.ask(4, &CalibrateGoal::default());
     bench.work();
-    assert_eq!(
-        bench.answers[3].2.message,
-        "the map cannot be used: too small"
-    );
+    assert_eq!(bench.message(3), "the map cannot be used: too small");
     assert_eq!(bench.search.maps, 2, "made ready once for each state");
 }
 
 #[test]
 fn several_headset_scans_are_searched_together_and_bad_ones_dropped() {
     let mut bench = bench(ServerOptions::default());
-    for verdict in [
-        Verdict::Ambiguous,
-        Verdict::Degenerate,
-        Verdict::Ambiguous,
-        Verdict::Ambiguous,
-    ] {
-        bench.search.verdicts.push_back(found(verdict, 9.0));
-        bench.cloud(&good());
+    use Verdict::{Ambiguous, Degenerate, NoOverlap, RejectedInput};
+    for verdict in [Ambiguous, Degenerate, Ambiguous, Ambiguous] {
+        bench.searched(verdict);
         assert_ne!(bench.verdict(), OK);
     }
     assert_eq!(bench.search.headset_scans, [1, 2, 3, 3], "at most three");
-    assert!(
-        bench.transforms.is_empty(),
-        "no pose is told that does not hold"
-    );
-    for verdict in [Verdict::NoOverlap, Verdict::RejectedInput] {
-        bench.search.verdicts.push_back(found(verdict, 9.0));
-        bench.cloud(&good());
+    assert!(bench.transforms.is_empty(), "a pose that does not hold");
+    for verdict in [NoOverlap, RejectedInput] {
+        bench.searched(verdict);
     }
-    assert_eq!(
-        bench.search.headset_scans[4..],
-        [3, 1],
-        "those said nothing"
-    );
+    let scans = &bench.search.headset_scans[4..];
+    assert_eq!(scans, [3, 1], "those said nothing");
     bench.cloud(&good());
     assert_eq!((bench.verdict(), bench.search.headset_scans[6]), (OK, 1));
 
@@ -159,19 +120,13 @@ fn a_new_session_is_searched_anew() {
     bench.session("a");
     assert_eq!(bench.verdict(), OK, "the same once more");
     bench.session("b");
-    assert_eq!(
-        (bench.verdict(), bench.reason()),
-        (NONE, "the headset has begun a new session")
-    );
-    assert!(
-        bench.machine.tick(bench.now_ns).is_none(),
-        "no transform of the old origin"
-    );
+    assert_eq!(bench.verdict(), NONE);
+    assert_eq!(bench.reason(), "the headset has begun a new session");
+    let tick = bench.machine.tick(bench.now_ns);
+    assert!(tick.is_none(), "no transform of the old origin");
     bench.cloud(&good());
-    assert_eq!(
-        (bench.verdict(), bench.search.headset_scans.last()),
-        (OK, Some(&1))
-    );
+    assert_eq!(bench.verdict(), OK);
+    assert_eq!(bench.search.headset_scans.last(), Some(&1));
 
     // While a search is at work: what it finds is of the old origin.
     bench.session("c");
@@ -180,13 +135,11 @@ fn a_new_session_is_searched_anew() {
     let canceled = bench.jobs[0].canceled.clone();
     bench.session("d");
     assert!(canceled.load(Relaxed));
-    assert_eq!(bench.answers[0].1, End::Failed);
-    assert!(bench.answers[0].2.message.contains("new session"));
+    assert_eq!(bench.answered(0), (7, End::Failed));
+    assert!(bench.message(0).contains("new session"));
     bench.work();
-    assert_eq!(
-        (bench.verdict(), bench.machine.map_from_headset()),
-        (NONE, None)
-    );
+    assert_eq!(bench.verdict(), NONE);
+    assert_eq!(bench.machine.map_from_headset(), None);
     bench.cloud(&good());
     assert_eq!(bench.verdict(), OK);
     assert_eq!(bench.machine.counts().sessions, 4);
@@ -196,15 +149,9 @@ fn a_new_session_is_searched_anew() {
 fn a_new_map_is_searched_anew() {
     let mut bench = bench(ServerOptions::default());
     bench.cloud(&good());
-    let mut other = mapper(2);
-    other
-        .on_cloud(&labelled_cloud("map", 1, &[([0.0; 3], 3)]))
-        .unwrap();
-    bench.map(&mut other);
-    assert_eq!(
-        (bench.verdict(), bench.reason()),
-        (NONE, "the map is a new one")
-    );
+    bench.other_map();
+    assert_eq!(bench.verdict(), NONE);
+    assert_eq!(bench.reason(), "the map is a new one");
     bench.cloud(&good());
     assert_eq!((bench.verdict(), bench.search.maps), (OK, 2));
 }
@@ -212,34 +159,30 @@ fn a_new_map_is_searched_anew() {
 #[test]
 fn confusions_of_labels_are_unlearned_with_session_classes_and_map() {
     let mut bench = bench(ServerOptions::default());
-    let classes = |names: &[&str]| LabelInfo {
-        class_map: (1..)
-            .zip(names)
-            .map(|(class_id, name)| VisionClass {
-                class_id,
-                class_name: (*name).to_owned(),
-            })
-            .collect(),
-        ..LabelInfo::default()
+    let classes = |names: [&str; 2]| {
+        let class = |(class_id, name): (u16, &str)| VisionClass {
+            class_id,
+            class_name: name.to_owned(),
+        };
+        LabelInfo {
+            class_map: (1..).zip(names).map(class).collect(),
+            ..LabelInfo::default()
+        }
     };
-    bench.machine.on_label_info(&classes(&["wall", "floor"]));
+    bench.machine.on_label_info(&classes(["wall", "floor"]));
     bench.cloud(&good());
     let begun = bench.search.unlearned;
-    bench.machine.on_label_info(&classes(&["wall", "floor"]));
+    bench.machine.on_label_info(&classes(["wall", "floor"]));
     bench.session("");
     bench.cloud(&good());
     assert_eq!(bench.search.unlearned, begun, "the same once more");
-    bench.machine.on_label_info(&classes(&["floor", "wall"]));
+    bench.machine.on_label_info(&classes(["floor", "wall"]));
     bench.cloud(&good());
     assert_eq!(bench.search.unlearned, begun + 1, "another segmenter");
     bench.session("b");
     bench.cloud(&good());
     assert_eq!(bench.search.unlearned, begun + 2, "another session");
-    let mut other = mapper(2);
-    other
-        .on_cloud(&labelled_cloud("map", 1, &[([0.0; 3], 3)]))
-        .unwrap();
-    bench.map(&mut other);
+    bench.other_map();
     bench.cloud(&good());
     assert_eq!(bench.search.unlearned, begun + 3, "another map");
     bench.cloud(&good());
@@ -249,18 +192,14 @@ fn confusions_of_labels_are_unlearned_with_session_classes_and_map() {
 #[test]
 fn clouds_that_come_while_it_is_busy_are_not_lost_but_the_newest_counts() {
     let mut bench = bench(ServerOptions::default());
-    bench
-        .search
-        .verdicts
-        .push_back(found(Verdict::Ambiguous, 0.0));
+    let ambiguous = found(Verdict::Ambiguous, 0.0);
+    bench.search.verdicts.push_back(ambiguous);
     for _ in 0..5 {
         bench.send(&good());
     }
     bench.work();
-    assert_eq!(
-        (bench.search.headset_scans.clone(), bench.verdict()),
-        (vec![1, 3], OK)
-    );
+    assert_eq!(bench.search.headset_scans, [1, 3]);
+    assert_eq!(bench.verdict(), OK);
     for _ in 0..5 {
         bench.send(&good());
     }
@@ -276,7 +215,6 @@ fn truth() -> Isometry3<f64> {
 }
 
 /// The whole way with the true search: a left-handed headset in a flat.
-
 #[test]
 fn a_left_handed_headset_is_found_and_a_mirrored_one_is_not() {
     let flat = Flat::default();

@@ -87,23 +87,9 @@ impl Lines {
             ("VERSION", ["0.7" | ".7"]) | ("", _) | ("VIEWPOINT", _) => {}
             _ if keyword.starts_with('#') => {}
             ("FIELDS", names) => self.fields = names.iter().map(|&name| name.to_owned()).collect(),
-            ("SIZE", sizes) => {
-                self.size = sizes
-                    .iter()
-                    .copied()
-                    .map(integer)
-                    .collect::<Result<_, _>>()?
-            }
+            ("SIZE", sizes) => self.size = integers(sizes)?,
             ("TYPE", types) => self.kind = types.iter().map(|&of| of.to_owned()).collect(),
-            ("COUNT", counts) => {
-                self.count = Some(
-                    counts
-                        .iter()
-                        .copied()
-                        .map(integer)
-                        .collect::<Result<_, _>>()?,
-                );
-            }
+            ("COUNT", counts) => self.count = Some(integers(counts)?),
             ("WIDTH", [width]) => self.width = Some(integer(width)?),
             ("HEIGHT", [height]) => self.height = Some(integer(height)?),
             ("POINTS", [points]) => self.points = Some(integer(points)?),
@@ -133,43 +119,33 @@ impl Lines {
         }
         let (mut offset, mut column) = (0_u64, 0_u64);
         let (mut axes, mut label) = ([None; 3], None);
-        for (((name, &size), kind), &count) in self
-            .fields
-            .iter()
-            .zip(&self.size)
-            .zip(&self.kind)
-            .zip(count)
-        {
-            if let Some(axis) = ["x", "y", "z"].iter().position(|axis| axis == name) {
-                let scalar = coordinate(name, kind, size, count)?;
-                if let Some(axis) = axes.get_mut(axis) {
-                    *axis = Some(Axis {
-                        scalar,
-                        offset,
-                        column,
-                    });
-                }
+        let sizes = self.size.iter().zip(&self.kind).zip(count);
+        for (name, ((&size, kind), &count)) in self.fields.iter().zip(sizes) {
+            let place = |scalar| Axis {
+                scalar,
+                offset,
+                column,
+            };
+            for (axis, _) in axes
+                .iter_mut()
+                .zip(["x", "y", "z"])
+                .filter(|(_, axis)| *axis == name.as_str())
+            {
+                *axis = Some(place(coordinate(name, kind, size, count)?));
             }
             if let ("label", Some(scalar), 1) = (name.as_str(), number_kind(kind, size), count) {
-                label = Some(Axis {
-                    scalar,
-                    offset,
-                    column,
-                });
+                label = Some(place(scalar));
             }
             column = column.saturating_add(count);
             offset = offset.saturating_add(size.saturating_mul(count));
         }
         let [Some(x), Some(y), Some(z)] = axes else {
-            return Err(format!(
-                "FIELDS are {:?}, without all of x, y and z",
-                self.fields
-            ));
+            let fields = &self.fields;
+            return Err(format!("FIELDS are {fields:?}, without all of x, y and z"));
         };
         if offset > MAX_POINT_BYTES || column > MAX_POINT_BYTES {
-            return Err(format!(
-                "a point has {offset} bytes, more than {MAX_POINT_BYTES}"
-            ));
+            let most = MAX_POINT_BYTES;
+            return Err(format!("a point has {offset} bytes, more than {most}"));
         }
         Ok(Header {
             format,
@@ -182,10 +158,8 @@ impl Lines {
     }
 
     fn points(&self) -> Result<u64, String> {
-        let product = match (self.width, self.height) {
-            (Some(width), Some(height)) => Some(width.saturating_mul(height)),
-            _ => None,
-        };
+        let size = self.width.zip(self.height);
+        let product = size.map(|(width, height)| width.saturating_mul(height));
         match (self.points, product) {
             (Some(points), Some(product)) if points != product => Err(format!(
                 "POINTS is {points}, but WIDTH times HEIGHT is {product}"
@@ -194,6 +168,10 @@ impl Lines {
             (None, None) => Err("neither POINTS nor WIDTH and HEIGHT are given".to_owned()),
         }
     }
+}
+
+fn integers(words: &[&str]) -> Result<Vec<u64>, String> {
+    words.iter().copied().map(integer).collect()
 }
 
 fn integer(word: &str) -> Result<u64, String> {

@@ -1,0 +1,40 @@
+//! Nodes and messages of ros2-client, as a peer of the runtime.
+
+use std::time::Duration;
+
+use lattice_test::domain::TestDomain;
+use ros2_client::qos::WhenFull;
+use ros2_client::{Context, Message, Node, NodeName, NodeOptions, QosProfile};
+use rustdds::DomainParticipantBuilder;
+use serde::de::DeserializeOwned;
+use serde::{Deserialize, Serialize};
+
+/// Long enough for a loaded machine; a test that passes does not wait for it.
+pub const PATIENCE: Duration = Duration::from_secs(60);
+
+/// Gives one of our messages to ros2-client.
+#[derive(Clone, Debug, Serialize, Deserialize)]
+#[serde(transparent)]
+pub struct Foreign<M>(pub M);
+
+impl<M: Serialize + DeserializeOwned> Message for Foreign<M> {}
+
+/// A node of ros2-client with its spinner running.
+pub fn peer(domain: &TestDomain) -> Node {
+    let participant = DomainParticipantBuilder::new(domain.id())
+        .with_only_networks([std::net::Ipv4Addr::LOCALHOST])
+        .build()
+        .unwrap();
+    let context = Context::from_domain_participant(participant).unwrap();
+    let options = NodeOptions::new().start_parameter_services(false);
+    let name = NodeName::new("/", "peer").unwrap();
+    let mut node = context.new_node(name, options).unwrap();
+    let spinner = node.spinner().unwrap();
+    smol::spawn(spinner.spin()).detach();
+    node
+}
+
+/// Quality of service of clients.
+pub fn reliable() -> QosProfile {
+    QosProfile::publisher_default().reliability_reliable(WhenFull::Fail)
+}

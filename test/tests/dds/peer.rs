@@ -1,0 +1,54 @@
+//! Nodes of ours, each in a process of its own, and a peer in Python of CycloneDDS.
+
+use std::path::Path;
+use std::process::{Command, Stdio};
+
+use lattice_nodes::executables;
+use lattice_nodes::start::Finish;
+use lattice_runtime::Runtime;
+use lattice_runtime::ros_args::RosArgs;
+use lattice_test::domain::TestDomain;
+use lattice_test::python::script;
+use serde_json::Value;
+
+/// Nodes at work, in the order in which data flows.
+pub struct Nodes(Vec<(Runtime, Finish)>);
+
+impl Nodes {
+    /// Starts nodes with their parameters, each with a participant of its own.
+    pub fn start(domain: &TestDomain, nodes: &[(&str, Vec<String>)]) -> Self {
+        let start = |(name, params): &(&str, Vec<String>)| {
+            let params = params.iter().flat_map(|param| ["-p", param]);
+            let args = ["--ros-args"].into_iter().chain(params).map(str::to_owned);
+            let args = RosArgs::parse(args).unwrap();
+            let runtime = Runtime::with_transport(name, args, &domain.transport()).unwrap();
+            let finish = executables::find(name).unwrap()(&runtime, name).unwrap();
+            (runtime, finish)
+        };
+        Self(nodes.iter().map(start).collect())
+    }
+
+    pub fn finish(self) {
+        for (runtime, finish) in self.0 {
+            finish();
+            drop(runtime);
+        }
+    }
+}
+
+/// Parameters separated by blanks.
+pub fn params(line: &str) -> Vec<String> {
+    line.split_whitespace().map(str::to_owned).collect()
+}
+
+/// Runs a script of the peer to its end and reads the line that it prints.
+pub fn run(python: &Path, name: &str, args: &[&Path]) -> Value {
+    let mut command = Command::new(python);
+    command
+        .arg(script(name))
+        .args(args)
+        .stderr(Stdio::inherit());
+    let output = command.output().unwrap();
+    assert!(output.status.success(), "{name}: {}", output.status);
+    serde_json::from_slice(&output.stdout).unwrap()
+}
