@@ -4,13 +4,12 @@
 //! paper27, occupancy or list, and FILE holds little-endian f32 `x y z i`; prints the number of points.
 #![allow(clippy::unwrap_used)]
 
-use std::hint::black_box;
-
 use lattice_core::cloud::Cloud;
 use lattice_core::lattice::{BatchQuantizer, BlockKey, Lattice, LatticeKind, Simd};
 use lattice_core::voxels::{OccupancyList, VoxelList, VoxelStore};
 use lattice_lab::printed::Search27;
 use nalgebra::{Isometry3, Vector3};
+use std::hint::black_box;
 
 fn main() {
     let arguments: Vec<String> = std::env::args().skip(1).collect();

@@ -3,8 +3,6 @@
 //! `cargo run -p lattice_lab --example paths [WORLDS]`
 #![allow(clippy::unwrap_used)]
 
-use std::time::Instant;
-
 use lattice_core::cloud::Cloud;
 use lattice_core::lattice::{Lattice, LatticeKind};
 use lattice_core::query::{Bounds, PathError, PathOptions, Query, Steps};
@@ -12,6 +10,7 @@ use lattice_core::voxels::VoxelList;
 use nalgebra::Vector3;
 use rand_chacha::ChaCha8Rng;
 use rand_chacha::rand_core::{Rng, SeedableRng};
+use std::time::Instant;
 
 const SIDE_M: f64 = 10.0;
 const CELL_VOLUME_M3: f64 = 0.015625;

@@ -9,7 +9,7 @@ use std::path::Path;
 pub mod bench;
 pub mod datasets;
 pub mod evaluate;
-pub mod matching;
+mod matching;
 pub mod mesh;
 pub mod metrics;
 mod options;
@@ -17,9 +17,11 @@ pub mod paper;
 pub mod printed;
 pub mod random;
 pub mod render;
-pub mod report;
+mod report;
 pub mod simulate;
 pub mod theory;
+
+pub use report::{Report, markdown, write_report};
 
 /// Any error on its way to the user.
 pub type AnyError = Box<dyn Error + Send + Sync>;

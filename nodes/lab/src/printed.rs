@@ -7,10 +7,8 @@
 
 mod search27;
 
-use nalgebra::{Matrix3, Vector3};
-
 use lattice_core::lattice::{LatticeIndex, LatticeKind};
-
+use nalgebra::{Matrix3, Vector3};
 pub use search27::Search27;
 
 /// The generator matrix of eq. (8)-(12), with the four digits that are printed; `None` for a lattice
@@ -116,9 +114,8 @@ impl PaperQuantizer {
 
 #[cfg(test)]
 mod tests {
-    use lattice_core::lattice::Lattice;
-
     use super::*;
+    use lattice_core::lattice::Lattice;
 
     #[test]
     fn rounds_to_the_digits_the_paper_prints() {

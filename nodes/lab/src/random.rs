@@ -1,10 +1,9 @@
 //! Streams of random numbers that depend on nothing but a seed and a number, and uniform rotations.
 
-use std::f64::consts::TAU;
-
 use nalgebra::{Quaternion, UnitQuaternion, Vector3};
 use rand_chacha::ChaCha8Rng;
 use rand_chacha::rand_core::{Rng, SeedableRng};
+use std::f64::consts::TAU;
 
 /// A stream of uniform and normal numbers.
 #[derive(Clone, Debug)]
@@ -87,18 +86,13 @@ mod tests {
         }
         assert!(pole.norm() / f64::from(n) < 0.015 && side.norm() / f64::from(n) < 0.015);
         // Archimedes: heights on a sphere are uniform.
-        assert!(
-            heights.iter().all(|h| (3760..4240).contains(h)),
-            "{heights:?}"
-        );
+        let even = heights.iter().all(|h| (3760..4240).contains(h));
+        assert!(even, "{heights:?}");
         // The angle of a uniform rotation has the density (1 - cos) / pi.
         for (count, angle) in beyond.iter().zip([0.8_f64, 1.6, 2.4, 3.0]) {
             let share = 1.0 - (angle - angle.sin()) / std::f64::consts::PI;
             let found = *count as f64 / f64::from(n);
-            assert!(
-                (found - share).abs() < 0.01,
-                "{angle}: {found}, not {share}"
-            );
+            assert!((found - share).abs() < 0.01, "{angle}: {found}");
         }
     }
 }

@@ -1,8 +1,5 @@
 //! Free space on a log with a person: the person goes from the map, the yard stays.
 
-use std::collections::BTreeSet;
-use std::path::{Path, PathBuf};
-
 use lattice_bag::{BagReader, Storage};
 use lattice_core::lattice::MortonKey;
 use lattice_lab::datasets::{BobcatOptions, write_bobcat};
@@ -12,6 +9,8 @@ use lattice_nodes::replay::{self, Pipeline, TopicWishes};
 use lattice_nodes::voxel_marker_publisher::MarkerOptions;
 use lattice_runtime::params::Params;
 use lattice_runtime::ros_args::RosArgs;
+use std::collections::BTreeSet;
+use std::path::{Path, PathBuf};
 
 /// The person is gone after half of it.
 const DURATION_S: f64 = 30.0;

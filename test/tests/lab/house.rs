@@ -1,9 +1,5 @@
 //! The simulated house: on the mesh of a real one, and as files.
 
-use std::fs;
-use std::path::Path;
-use std::time::Instant;
-
 use lattice_core::lattice::{Lattice, LatticeKind, MortonKey};
 use lattice_core::registration::SemanticCloud;
 use lattice_core::voxels::file::read_map;
@@ -12,13 +8,14 @@ use lattice_lab::datasets::{
 };
 use lattice_lab::mesh::read_mesh;
 use lattice_lab::simulate::house::{
-    HeadsetOptions, HeadsetTrial, House, LabelDraw, RegionLabels, Scene, Survey, SurveyMap,
-    SurveyOptions,
+    HeadsetTrial, House, RegionLabels, Scene, Survey, SurveyMap, SurveyOptions,
 };
 use lattice_nodes::files::classes::read_classes;
 use lattice_nodes::files::points::{PointFileLimits, read_points};
 use lattice_test::data::shared;
 use nalgebra::{Isometry3, Point3, Quaternion, Translation3, UnitQuaternion, Vector3};
+use std::fs;
+use std::path::Path;
 
 fn real_house() -> Option<House> {
     let mesh = read_mesh(&shared("house/small_house.ply")?, 1_000_000).unwrap();
@@ -42,45 +39,21 @@ fn near_m(house: &House, p: &Point3<f64>) -> f64 {
 
 #[test]
 fn a_robot_and_headsets_see_the_real_house() {
-    let start = Instant::now();
     let Some(house) = real_house() else { return };
-    println!(
-        "house read and sorted in {:?}, {} regions",
-        start.elapsed(),
-        house.regions().len()
-    );
-
-    let start = Instant::now();
     let survey = Survey::new(&house, &SurveyOptions::default(), 1).unwrap();
-    println!(
-        "survey of {} points in {:?}",
-        survey.cloud.len(),
-        start.elapsed()
-    );
     assert!(survey.cloud.len() > 1_000_000);
     let lattice = Lattice::new(LatticeKind::Cubic, 0.05_f64.powi(3)).unwrap();
-    let start = Instant::now();
     let map = SurveyMap::new(&survey, &lattice).unwrap();
-    println!("{} voxels in {:?}", map.len(), start.elapsed());
     assert!((100_000..400_000).contains(&map.len()));
-    let start = Instant::now();
     let cloud = map.cloud(&RegionLabels::truth(&house));
-    println!("relabelled in {:?}", start.elapsed());
-    let near = cloud
-        .points_m
-        .iter()
-        .step_by(101)
-        .filter(|p| near_m(&house, p) < 0.06);
+    let some = cloud.points_m.iter().step_by(101);
+    let near = some.filter(|p| near_m(&house, p) < 0.06);
     let share = near.count() as f64 / (cloud.len() as f64 / 101.0);
-    println!("{share:.3} of the map within 6 cm of a surface");
-    assert!(share > 0.95);
+    assert!(share > 0.95, "{share}");
 
     for scene in Scene::ALL {
         for seed in 0..3 {
-            let start = Instant::now();
-            let options = HeadsetOptions::default();
-            let trial = HeadsetTrial::new(&house, scene, &options, seed).unwrap();
-            let took = start.elapsed();
+            let trial = HeadsetTrial::new(&house, scene, 1, seed).unwrap();
             let headset_scan = &trial.headset_scans[0];
             let points = headset_scan.points_m.iter().step_by(7);
             let off = points.map(|p| near_m(&house, &(trial.map_from_headset * p)));
@@ -89,26 +62,11 @@ fn a_robot_and_headsets_see_the_real_house() {
             let within = off_m.partition_point(|d| *d < 0.1) as f64 / off_m.len() as f64;
             let object = house.class(scene.object());
             let label = |r: &u16| house.regions().get(usize::from(*r)).map(|r| r.label);
-            let of_object = headset_scan
-                .regions
-                .iter()
-                .filter(|r| label(r) == object)
-                .count();
-            let draw = LabelDraw::new(&house, std::slice::from_ref(&trial), 0.5, seed).unwrap();
-            println!(
-                "{} {seed}: {} points, {:.2} of the object, {within:.3} within 10 cm, median {:.3} m, 90 % {:.3} m, {} triangles, q 0.5 -> {:.2}, {took:?}",
-                scene.name(),
-                off_m.len() * 7,
-                of_object as f64 / headset_scan.regions.len() as f64,
-                off_m[off_m.len() / 2],
-                off_m[off_m.len() * 9 / 10],
-                trial.mesh.len(),
-                draw.different_share,
-            );
+            let of_object = headset_scan.regions.iter().filter(|r| label(r) == object);
             assert!(headset_scan.points_m.len() > 4000);
             assert!(within > 0.9);
             assert!(off_m[off_m.len() / 2] < 0.04);
-            assert!(of_object > 200);
+            assert!(of_object.count() > 200);
         }
     }
 }
@@ -126,10 +84,7 @@ fn options(out: &Path, overwrite: bool) -> HouseOptions {
             height: 48,
             ..SurveyOptions::default()
         },
-        headset: HeadsetOptions {
-            headset_scans: 2,
-            ..HeadsetOptions::default()
-        },
+        headset_scans: 2,
         flips: 0.4,
         lattice: LatticeKind::Fcc,
         cell_side_m: 0.05,
@@ -188,11 +143,6 @@ fn the_folder_of_a_house_holds_a_map_and_clouds_that_the_truth_brings_together()
                 })
             });
             let share = hit.count() as f64 / sampled.len() as f64;
-            println!(
-                "{}: {share:.3} of {} points on the map",
-                headset_scan.cloud,
-                file.points_m.len()
-            );
             assert!(share > 0.6, "{}: {share}", headset_scan.cloud);
             let sensor = in_map(headset_scan.sensor_m);
             assert!((sensor.z - 5.0 - 1.62).abs() < 0.2, "{sensor}");

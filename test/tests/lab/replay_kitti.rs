@@ -1,7 +1,5 @@
 //! Direct replay of real scans against an exhaustive nearest-point search made elsewhere.
 
-use std::path::Path;
-
 use lattice_bag::BagReader;
 use lattice_core::geodesy::Geodetic;
 use lattice_core::lattice::{Lattice, LatticeKind};
@@ -13,34 +11,16 @@ use lattice_nodes::replay::RunReport;
 use lattice_nodes::replay::{self, Pipeline, TopicWishes};
 use lattice_nodes::voxel_marker_publisher::MarkerOptions;
 use lattice_test::data::shared;
+use std::path::Path;
 
-/// Voxels, MSE per dimension, mean distance, RMS, largest distance; cells of 0.125 m^3, f64.
-const EXPECTED: [(LatticeKind, f64, [f64; 4]); 5] = [
-    (
-        LatticeKind::Cubic,
-        26353.0,
-        [0.020679, 0.23923, 0.24907, 0.4295],
-    ),
-    (
-        LatticeKind::Bcc,
-        27515.0,
-        [0.019616, 0.23456, 0.24259, 0.3514],
-    ),
-    (
-        LatticeKind::Fcc,
-        28175.0,
-        [0.019670, 0.23464, 0.24292, 0.3947],
-    ),
-    (
-        LatticeKind::Mcc,
-        27178.0,
-        [0.019646, 0.23446, 0.24277, 0.3631],
-    ),
-    (
-        LatticeKind::Hex,
-        25311.0,
-        [0.020907, 0.24097, 0.25044, 0.3974],
-    ),
+/// Of each lattice of the paper: voxels, MSE per dimension, mean distance, RMS, largest distance; cells
+/// of 0.125 m^3, f64.
+const EXPECTED: [[f64; 5]; 5] = [
+    [26353.0, 0.020679, 0.23923, 0.24907, 0.4295],
+    [27515.0, 0.019616, 0.23456, 0.24259, 0.3514],
+    [28175.0, 0.019670, 0.23464, 0.24292, 0.3947],
+    [27178.0, 0.019646, 0.23446, 0.24277, 0.3631],
+    [25311.0, 0.020907, 0.24097, 0.25044, 0.3974],
 ];
 
 fn on_threads<T: Send>(threads: usize, work: impl FnOnce() -> T + Send) -> T {
@@ -69,17 +49,13 @@ fn all_lattices_agree_with_an_exhaustive_search() {
     let report = replayed(&bag).0;
     assert_eq!(report.transformer.counts.clouds_in, 8);
     assert_eq!(report.losses(), Vec::<String>::new());
-    for (kind, voxels, figures) in EXPECTED {
-        let found = report.lattices.iter().map(|branch| &branch.map);
-        let map = found
-            .clone()
-            .find(|map| map.lattice == kind.name())
-            .unwrap();
+    for (branch, [voxels, figures @ ..]) in report.lattices.iter().zip(EXPECTED) {
+        let (map, kind) = (&branch.map, &branch.map.lattice);
         assert_eq!(map.points, 994_498);
+        let found = map.voxels;
         assert!(
-            (map.voxels as f64 / voxels - 1.0).abs() < 5e-4,
-            "{kind}: {}",
-            map.voxels
+            (found as f64 / voxels - 1.0).abs() < 5e-4,
+            "{kind}: {found}"
         );
         let ours = [
             map.mse_per_dimension_m2,
@@ -88,10 +64,8 @@ fn all_lattices_agree_with_an_exhaustive_search() {
             map.max_distance_m,
         ];
         for (ours, expected) in ours.into_iter().zip(figures) {
-            assert!(
-                (ours / expected - 1.0).abs() < 2e-4,
-                "{kind}: {ours}, expected {expected}"
-            );
+            let off = (ours / expected - 1.0).abs();
+            assert!(off < 2e-4, "{kind}: {ours}, expected {expected}");
         }
     }
 }

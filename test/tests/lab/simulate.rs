@@ -1,9 +1,5 @@
 //! The simulated log as its readers see it.
 
-use std::collections::BTreeMap;
-use std::fs;
-use std::path::Path;
-
 use lattice_bag::{BagReader, ReadOptions, Storage};
 use lattice_core::geodesy::{EnuFrame, Geodetic, enu_from_flu, utc_ns_from_gps};
 use lattice_lab::datasets::{
@@ -16,36 +12,35 @@ use lattice_msgs::sensor_msgs::PointCloud2;
 use lattice_msgs::tf2_msgs::TFMessage;
 use lattice_msgs::{RosMessage, cdr};
 use nalgebra::{Isometry3, Point3, Quaternion, Translation3, UnitQuaternion, Vector3};
+use std::collections::BTreeMap;
+use std::fs;
+use std::path::Path;
 
 const DURATION_S: f64 = 3.0;
 
-fn write(out: &Path, storage: Storage, seed: u64) -> BobcatSummary {
-    let options = BobcatOptions {
+fn options(out: &Path, storage: Storage, seed: u64) -> BobcatOptions {
+    BobcatOptions {
         seed,
         duration_s: DURATION_S,
         person: false,
         storage,
         out: out.to_owned(),
         overwrite: false,
-    };
-    write_bobcat(&options, &mut |_| {}).unwrap()
+    }
+}
+
+fn write(out: &Path, storage: Storage, seed: u64) -> BobcatSummary {
+    write_bobcat(&options(out, storage, seed), &mut |_| {}).unwrap()
 }
 
 /// All messages: topic, log time and bytes, in order.
 fn read(bag: &Path) -> Vec<(String, i64, Vec<u8>)> {
     let reader = BagReader::open(bag).unwrap();
-    let names: Vec<_> = reader
-        .topics()
-        .iter()
-        .map(|topic| topic.name.clone())
-        .collect();
-    let messages = reader
-        .messages(&ReadOptions::default())
-        .unwrap()
-        .map(Result::unwrap);
-    messages
-        .map(|m| (names[m.topic].clone(), m.log_time_ns, m.data))
-        .collect()
+    let names: Vec<_> = reader.topics().iter().map(|t| t.name.clone()).collect();
+    let messages = reader.messages(&ReadOptions::default()).unwrap();
+    let messages = messages.map(Result::unwrap);
+    let messages = messages.map(|m| (names[m.topic].clone(), m.log_time_ns, m.data));
+    messages.collect()
 }
 
 fn decode<M: RosMessage>(bag: &Path, topic: &str) -> Vec<M> {
@@ -73,23 +68,13 @@ fn true_poses(bag: &Path) -> Vec<(i64, Isometry3<f64>)> {
 /// Points of `points.ply`.
 fn true_points(bag: &Path) -> Vec<[f32; 3]> {
     let bytes = fs::read(bag.join("truth/points.ply")).unwrap();
-    let end = bytes
-        .windows(11)
-        .position(|w| w == b"end_header\n")
-        .unwrap()
-        + 11;
-    let header = std::str::from_utf8(&bytes[..end]).unwrap();
-    let count = header
-        .lines()
-        .find_map(|line| line.strip_prefix("element vertex "))
-        .unwrap();
+    let end = bytes.windows(11).position(|w| w == b"end_header\n");
+    let end = end.unwrap() + 11;
     let value = |b: &[u8]| f32::from_le_bytes(b.try_into().unwrap());
-    let points: Vec<_> = bytes[end..]
-        .chunks_exact(12)
-        .map(|p| [value(&p[..4]), value(&p[4..8]), value(&p[8..])])
-        .collect();
-    assert_eq!(points.len(), count.parse::<usize>().unwrap());
+    let points = bytes[end..].chunks_exact(12);
     points
+        .map(|p| [value(&p[..4]), value(&p[4..8]), value(&p[8..])])
+        .collect()
 }
 
 #[test]
@@ -100,11 +85,8 @@ fn the_bag_has_the_topics_rates_and_qos_of_the_machine() {
         let summary = write(&bag, storage, 1);
         let reader = BagReader::open(&bag).unwrap();
         assert_eq!(reader.message_count(), summary.messages);
-        let topics: BTreeMap<_, _> = reader
-            .topics()
-            .iter()
-            .map(|topic| (topic.name.as_str(), topic))
-            .collect();
+        let topics = reader.topics().iter();
+        let topics: BTreeMap<_, _> = topics.map(|topic| (topic.name.as_str(), topic)).collect();
         let expected = [
             ("/ins/odometry", Odometry::TYPE, 100.0, false),
             ("/left/points", PointCloud2::TYPE, 75.0, false),
@@ -114,33 +96,17 @@ fn the_bag_has_the_topics_rates_and_qos_of_the_machine() {
             ("/tf_static", TFMessage::TYPE, 0.0, true),
             ("/top/points", PointCloud2::TYPE, 75.0, false),
         ];
-        assert!(
-            topics
-                .keys()
-                .copied()
-                .eq(expected.iter().map(|&(name, ..)| name))
-        );
+        assert!(topics.keys().copied().eq(expected.map(|(name, ..)| name)));
         for (name, type_name, rate_hz, latched) in expected {
             let topic = topics[name];
-            assert_eq!(
-                (topic.type_name.as_str(), topic.is_latched()),
-                (type_name, latched)
-            );
+            assert_eq!(topic.type_name, type_name);
+            assert_eq!(topic.is_latched(), latched);
             assert_eq!(topic.offered_qos.len(), 1, "{name}");
             let count = topic.message_count as f64;
-            let missing = if latched {
-                count - 1.0
-            } else {
-                rate_hz * DURATION_S - count
-            };
+            let expected = if latched { 1.0 } else { rate_hz * DURATION_S };
+            let missing = expected - count;
             assert!(missing.abs() <= 4.0, "{count} messages on {name}");
-            assert!(
-                topic
-                    .definition
-                    .as_deref()
-                    .is_some_and(|text| !text.is_empty()),
-                "{name} has no definition"
-            );
+            assert_ne!(topic.definition.as_deref().unwrap_or(""), "", "{name}");
         }
     }
 }
@@ -150,26 +116,16 @@ fn the_same_seed_gives_the_same_messages_whatever_the_threads_and_the_storage() 
     let folder = tempfile::tempdir().unwrap();
     let with = |threads: usize, name: &str, storage, seed| {
         let bag = folder.path().join(name);
-        let pool = rayon::ThreadPoolBuilder::new()
-            .num_threads(threads)
-            .build()
-            .unwrap();
+        let pool = lattice_lab::pool(threads).unwrap();
         pool.install(|| write(&bag, storage, seed));
         bag
     };
     let one = with(1, "a/log", Storage::Mcap, 7);
     let two = with(2, "b/log", Storage::Mcap, 7);
-    for file in [
-        "log_0.mcap",
-        "metadata.yaml",
-        "truth/points.ply",
-        "truth/poses.csv",
-        "truth/site.yaml",
-    ] {
-        assert!(
-            fs::read(one.join(file)).unwrap() == fs::read(two.join(file)).unwrap(),
-            "{file} differs"
-        );
+    let truth = ["truth/points.ply", "truth/poses.csv", "truth/site.yaml"];
+    for file in ["log_0.mcap", "metadata.yaml"].into_iter().chain(truth) {
+        let [one, two] = [&one, &two].map(|bag| fs::read(bag.join(file)).unwrap());
+        assert!(one == two, "{file} differs");
     }
     let other_storage = with(3, "c/log", Storage::Sqlite3, 7);
     assert!(read(&one) == read(&other_storage));
@@ -217,10 +173,7 @@ fn every_true_point_belongs_to_a_measured_one() {
             let expected = Point3::from(truth[next]).cast::<f64>();
             next += 1;
             squares += (measured - expected).norm_squared();
-            assert!(
-                (measured - expected).norm() < 0.1,
-                "{measured} against {expected} on {topic}"
-            );
+            assert!((measured - expected).norm() < 0.1, "{measured} on {topic}");
         }
         clouds += 1;
     }
@@ -239,36 +192,28 @@ fn inspvax_with_lever_arm_and_undulation_is_the_odometry() {
     let odometry = decode::<Odometry>(&bag, "/ins/odometry");
     let inspvax = decode::<INSPVAX>(&bag, "/novatel/oem7/inspvax");
     let poses = true_poses(&bag);
-    assert_eq!(
-        (odometry.len(), poses.len()),
-        (inspvax.len(), inspvax.len())
-    );
+    assert_eq!([odometry.len(), poses.len()], [inspvax.len(); 2]);
     let mut error_squares = 0.0;
     for ((odometry, ins), (stamp_ns, truth)) in odometry.iter().zip(&inspvax).zip(&poses) {
-        let week = u32::from(ins.nov_header.gps_week_number);
-        let valid_ns = utc_ns_from_gps(
-            week,
-            ins.nov_header.gps_week_milliseconds,
-            BOBCAT_LEAP_SECONDS,
+        let header = &ins.nov_header;
+        let (week, ms) = (
+            u32::from(header.gps_week_number),
+            header.gps_week_milliseconds,
         );
-        assert_eq!(
-            (valid_ns, odometry.header.stamp.to_ns()),
-            (*stamp_ns, *stamp_ns)
-        );
+        let valid_ns = utc_ns_from_gps(week, ms, BOBCAT_LEAP_SECONDS);
+        assert_eq!([valid_ns, odometry.header.stamp.to_ns()], [*stamp_ns; 2]);
         let height_m = ins.height + f64::from(ins.undulation);
         let place = Geodetic::from_degrees(ins.latitude, ins.longitude, height_m).unwrap();
-        let rotation =
-            map.enu_from_local_level(&place) * enu_from_flu(ins.roll, ins.pitch, ins.azimuth);
+        let in_place = enu_from_flu(ins.roll, ins.pitch, ins.azimuth);
+        let rotation = map.enu_from_local_level(&place) * in_place;
         let base = map.enu_from_geodetic(&place) - rotation * Vector3::from(BASE_FROM_IMU_M);
         let p = &odometry.pose.pose.position;
         assert!((base - Vector3::new(p.x, p.y, p.z)).norm() < 1e-3);
         error_squares += (base - truth.translation.vector).norm_squared();
     }
     let rms_m = (error_squares / poses.len() as f64).sqrt();
-    assert!(
-        (0.2..2.5).contains(&(rms_m / INS_POSITION_RMS_M)),
-        "{rms_m} m over a log far shorter than the wander"
-    );
+    // The log is far shorter than the wander.
+    assert!((0.2..2.5).contains(&(rms_m / INS_POSITION_RMS_M)));
     assert_eq!(poses[0].0, bobcat_start_ns());
 }
 
@@ -280,17 +225,11 @@ fn an_earlier_log_is_replaced_only_when_allowed() {
     let again = |overwrite| {
         let mut fractions = Vec::new();
         let options = BobcatOptions {
-            seed: 2,
-            duration_s: 1.5,
-            person: false,
-            storage: Storage::Sqlite3,
-            out: out.clone(),
             overwrite,
+            ..options(&out, Storage::Sqlite3, 2)
         };
-        (
-            write_bobcat(&options, &mut |fraction| fractions.push(fraction)),
-            fractions,
-        )
+        let written = write_bobcat(&options, &mut |fraction| fractions.push(fraction));
+        (written, fractions)
     };
     let refused = again(false).0.unwrap_err().to_string();
     assert!(refused.contains("there is a log already"), "{refused}");
@@ -311,12 +250,8 @@ fn foreign_files_are_never_removed() {
     let notes = out.join("truth/notes.txt");
     fs::write(&notes, "mine").unwrap();
     let options = BobcatOptions {
-        seed: 2,
-        duration_s: 1.0,
-        person: false,
-        storage: Storage::Mcap,
-        out: out.clone(),
         overwrite: true,
+        ..options(&out, Storage::Mcap, 2)
     };
     assert!(write_bobcat(&options, &mut |_| {}).is_err());
     assert_eq!(fs::read_to_string(&notes).unwrap(), "mine");

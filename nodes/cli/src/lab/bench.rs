@@ -1,15 +1,19 @@
 //! `lattice bench`: one measurement a call, one line of JSON.
 
-use std::path::PathBuf;
-
+use super::{Choice, choice};
+use crate::{CliResult, init_logging};
 use clap::{Args, Subcommand};
 use lattice_core::lattice::{Lattice, LatticeKind};
-
-use super::choice;
-use crate::{CliResult, init_logging};
+use lattice_lab::AnyError;
+use lattice_lab::bench::FileMethod::{Load, Save};
+use lattice_lab::bench::NeighborMethod::{Hash26, Pass, Probe};
+use lattice_lab::bench::QuantizeMethod::{Batch, Paper27, Portable, Scalar};
+use lattice_lab::bench::RaycastMethod::{Clear, Evidence, Map};
+use lattice_lab::bench::Store::List;
 use lattice_lab::bench::{
-    self, FileMethod, InsertOptions, NeighborMethod, QuantizeMethod, RaycastMethod, Report, Store,
+    self, FileMethod, NeighborMethod, QuantizeMethod, RaycastMethod, Report, Store,
 };
+use std::path::PathBuf;
 
 /// Measure operations on a raw point file (f32 `x y z i`; see `lattice simulate site`)
 ///
@@ -113,90 +117,51 @@ pub struct MapFile {
 }
 
 /// Values of `--method` of `lattice bench file`.
-const FILES: [(&str, &str, FileMethod); 2] = [
-    (
-        "save",
-        "From a store to the bytes of a file",
-        FileMethod::Save,
-    ),
-    (
-        "load",
-        "From the bytes of a file to a store",
-        FileMethod::Load,
-    ),
+const FILES: [Choice<FileMethod>; 2] = [
+    ("save", "From a store to the bytes of a file", Save),
+    ("load", "From the bytes of a file to a store", Load),
 ];
 
 /// Values of `--method` of `lattice bench raycast`.
-const RAYCASTS: [(&str, &str, RaycastMethod); 3] = [
-    (
-        "map",
-        "Log-odds of all cells, free ones too",
-        RaycastMethod::Map,
-    ),
-    (
-        "clear",
-        "Voxels, without those that rays pass through: `free_space: clear` of the mapper",
-        RaycastMethod::Clear,
-    ),
-    (
-        "evidence",
-        "Voxels, without those that are free by the log-odds: `free_space: evidence`",
-        RaycastMethod::Evidence,
-    ),
+const RAYCASTS: [Choice<RaycastMethod>; 3] = [
+    ("map", "Log-odds of all cells, free ones too", Map),
+    ("clear", CLEAR, Clear),
+    ("evidence", EVIDENCE, Evidence),
 ];
+const CLEAR: &str =
+    "Voxels, without those that rays pass through: `free_space: clear` of the mapper";
+const EVIDENCE: &str =
+    "Voxels, without those that are free by the log-odds: `free_space: evidence`";
 
 /// Values of `--method` of `lattice bench quantize`.
-const QUANTIZERS: [(&str, &str, QuantizeMethod); 4] = [
-    (
-        "batch",
-        "The batch quantizer with the best instructions of this machine",
-        QuantizeMethod::Batch,
-    ),
-    (
-        "portable",
-        "The batch quantizer with what every machine of the target has",
-        QuantizeMethod::Portable,
-    ),
-    (
-        "scalar",
-        "One point at a time in f64",
-        QuantizeMethod::Scalar,
-    ),
-    (
-        "paper27",
-        "The nearest of 27 candidates, as Ryde & Brünig 2011 do it",
-        QuantizeMethod::Paper27,
-    ),
+const QUANTIZERS: [Choice<QuantizeMethod>; 4] = [
+    ("batch", BATCH, Batch),
+    ("portable", PORTABLE, Portable),
+    ("scalar", "One point at a time in f64", Scalar),
+    ("paper27", PAPER27, Paper27),
 ];
+const BATCH: &str = "The batch quantizer with the best instructions of this machine";
+const PORTABLE: &str = "The batch quantizer with what every machine of the target has";
+const PAPER27: &str = "The nearest of 27 candidates, as Ryde & Brünig 2011 do it";
 
 /// Values of `--store`.
-const STORES: [(&str, &str, Store); 2] = [
+const STORES: [Choice<Store>; 2] = [
     ("occupancy", "One bit of each voxel", Store::Occupancy),
-    (
-        "list",
-        "Count and sum of offsets of each voxel",
-        Store::List,
-    ),
+    ("list", "Count and sum of offsets of each voxel", List),
 ];
 
 /// Values of `--method` of `lattice bench neighbors`.
-const NEIGHBORS: [(&str, &str, NeighborMethod); 3] = [
+const NEIGHBORS: [Choice<NeighborMethod>; 3] = [
     (
         "pass",
         "One pass over the blocks of the store's cells",
-        NeighborMethod::Pass,
+        Pass,
     ),
-    (
-        "probe",
-        "One look-up in the store for each touching neighbour",
-        NeighborMethod::Probe,
-    ),
-    (
-        "hash26",
-        "The measure: 26 probes of a hash set for each voxel of the cubic lattice",
-        NeighborMethod::Hash26,
-    ),
+    ("probe", PROBE, Probe),
+    ("hash26", HASH26, Hash26),
 ];
+const PROBE: &str = "One look-up in the store for each touching neighbour";
+const HASH26: &str = "The measure: 26 probes of a hash set for each voxel of the cubic lattice";
 
 impl Bench {
     /// Runs the command.
@@ -215,95 +180,62 @@ impl Bench {
 
 impl Quantize {
     fn run(self) -> CliResult {
-        let lattice = self.common.lattice()?;
-        let points = self.common.points()?;
-        let method = self.method;
-        let cell = self.common.cell;
-        let report = lattice_lab::pool(self.common.threads)?
-            .install(|| bench::quantize(method, &lattice, cell, &points));
-        self.common.print(&report)
+        self.common
+            .measure(|lattice, points| Ok(bench::quantize(self.method, lattice, &points)))
     }
 }
 
 impl Insert {
     fn run(self) -> CliResult {
-        let lattice = self.common.lattice()?;
-        let points = self.common.points()?;
-        let scans = match self.scans {
-            true => Some(bench::read_scans(&self.common.points, points.len())?),
-            false => None,
-        };
-        let options = self.common.insert_options(self.store);
-        let (report, _) = lattice_lab::pool(self.common.threads)?
-            .install(|| bench::insert(options, &lattice, points, scans.as_deref()))?;
-        self.common.print(&report)
+        self.common.measure(|lattice, points| {
+            let scans = self.scans.then(|| self.common.scans(&points)).transpose()?;
+            Ok(bench::insert(self.store, lattice, points, scans.as_deref())?.0)
+        })
     }
 }
 
 impl Neighbors {
     fn run(self) -> CliResult {
-        let lattice = self.common.lattice()?;
-        let points = self.common.points()?;
-        let options = self.common.insert_options(self.store);
-        let method = self.method;
-        let (name, cell) = (self.store.name(), self.common.cell);
-        let report = lattice_lab::pool(self.common.threads)?.install(|| {
-            let (_, store) = bench::insert(options, &lattice, points, None)?;
-            Ok::<_, lattice_core::voxels::DatumError>(bench::neighbors(
-                method,
-                store.as_ref(),
-                name,
-                cell,
-            ))
-        })?;
-        let report = report.ok_or("--method hash26 is the measure for --lattice cubic only")?;
-        self.common.print(&report)
+        self.common.measure(|lattice, points| {
+            let (_, store) = bench::insert(self.store, lattice, points, None)?;
+            let report = bench::neighbors(self.method, store.as_ref(), self.store.name());
+            Ok(report.ok_or("--method hash26 is the measure for --lattice cubic only")?)
+        })
     }
 }
 
 impl Raycast {
     fn run(self) -> CliResult {
-        let lattice = self.common.lattice()?;
-        let points = self.common.points()?;
-        let scans = bench::read_scans(&self.common.points, points.len())?;
-        let cell = self.common.cell;
-        let report = lattice_lab::pool(self.common.threads)?
-            .install(|| bench::raycast(self.method, &lattice, cell, points, &scans))?;
-        self.common.print(&report)
+        self.common.measure(|lattice, points| {
+            let scans = self.common.scans(&points)?;
+            Ok(bench::raycast(self.method, lattice, points, &scans)?)
+        })
     }
 }
 
 impl MapFile {
     fn run(self) -> CliResult {
-        let lattice = self.common.lattice()?;
-        let points = self.common.points()?;
-        let method = self.method;
-        let (options, cell) = (
-            self.common.insert_options(Store::Occupancy),
-            self.common.cell,
-        );
-        let report = lattice_lab::pool(self.common.threads)?.install(|| {
-            let (_, store) = bench::insert(options, &lattice, points, None)?;
-            bench::file(method, store.as_ref(), self.zstd, cell)
-        })?;
-        self.common.print(&report)
+        self.common.measure(|lattice, points| {
+            let (_, store) = bench::insert(Store::Occupancy, lattice, points, None)?;
+            bench::file(self.method, store.as_ref(), self.zstd)
+        })
     }
 }
 
 impl Common {
-    fn lattice(&self) -> Result<Lattice, lattice_core::lattice::LatticeError> {
-        Lattice::new(self.lattice, self.cell * self.cell * self.cell)
+    /// Measures an operation on the points, on a pool of the threads, and prints the report.
+    fn measure(
+        &self,
+        operation: impl FnOnce(&Lattice, Vec<[f32; 3]>) -> Result<Report, AnyError> + Send,
+    ) -> CliResult {
+        let lattice = Lattice::new(self.lattice, self.cell * self.cell * self.cell)?;
+        let points = bench::read_points(&self.points, self.max_points)?;
+        let report = lattice_lab::pool(self.threads)?.install(|| operation(&lattice, points))?;
+        self.print(&report)
     }
 
-    fn points(&self) -> Result<Vec<[f32; 3]>, lattice_lab::AnyError> {
-        bench::read_points(&self.points, self.max_points)
-    }
-
-    fn insert_options(&self, store: Store) -> InsertOptions {
-        InsertOptions {
-            store,
-            res_m: self.cell,
-        }
+    fn scans(&self, points: &[[f32; 3]]) -> Result<Vec<bench::ScanRecord>, AnyError> {
+        bench::read_scans(&self.points, points.len())
     }
 
     fn print(&self, report: &Report) -> CliResult {

@@ -1,15 +1,12 @@
 //! `lattice bench register`.
 
-use std::path::{Path, PathBuf};
-
+use crate::CliResult;
 use clap::Args;
 use clap::builder::{PossibleValuesParser, TypedValueParser};
 use lattice_core::registration::{NamedMethod, PrepareOptions, RegisterOptions, SemanticCloud};
-use nalgebra::Isometry3;
-
-use crate::CliResult;
 use lattice_lab::bench::{self, RegisterSetup};
 use lattice_nodes::files::points::{PointFileLimits, read_points};
+use std::path::{Path, PathBuf};
 
 /// Options of `lattice bench register`.
 #[derive(Args)]
@@ -66,7 +63,6 @@ impl Register {
                 ..PrepareOptions::default()
             },
             cell_m: self.cell,
-            target_from_source: Isometry3::identity(),
             rounds: self.rounds,
         };
         let pool = lattice_lab::pool(self.threads)?;

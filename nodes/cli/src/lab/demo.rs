@@ -1,17 +1,15 @@
 //! `lattice demo`: from a simulated log to maps of all lattices, through real nodes.
 
-use std::fs;
-use std::path::PathBuf;
-
-use clap::Args;
-
 use super::{picture, simulate};
 use crate::replay::Replay;
 use crate::{CliResult, Lattices, init_logging};
+use clap::Args;
 use lattice_bag::Storage;
 use lattice_core::lattice::LatticeKind;
 use lattice_lab::datasets::BobcatOptions;
 use lattice_lab::render::RenderOptions;
+use std::fs;
+use std::path::PathBuf;
 
 /// Parameters of the simulated machine, for users to copy.
 const BOBCAT_PARAMS: &str = include_str!("../../../../params/bobcat.yaml");

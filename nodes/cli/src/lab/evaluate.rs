@@ -1,21 +1,18 @@
 //! `lattice evaluate`: calibration and registration, measured.
 
-use std::ops::ControlFlow;
-use std::path::PathBuf;
-use std::time::{Duration, Instant};
-
-use clap::{Args, Subcommand};
-use lattice_lab::simulate::house::Scene;
-
 use super::evaluate_kitti::Kitti;
-use super::{choice, processors};
+use super::{Choice, choice, processors};
 use crate::progress::Progress;
 use crate::{CliResult, init_logging};
+use clap::{Args, Subcommand};
 use lattice_lab::evaluate::{
     Pivot, Plan, Results, Settings, Start, Summary, TIMED, TRACKED, Testbed, competitors,
     read_house, report, run,
 };
-use lattice_lab::report::markdown;
+use lattice_lab::simulate::house::Scene;
+use lattice_lab::{markdown, write_report};
+use std::path::PathBuf;
+use std::time::{Duration, Instant};
 
 /// Measure calibration and registration
 #[derive(Subcommand)]
@@ -86,7 +83,7 @@ fn method(name: &str) -> Result<String, String> {
 }
 
 /// Values of `--scenes`.
-const SCENES: [(&str, &str, Scene); 4] = [
+const SCENES: [Choice<Scene>; 4] = [
     ("tv", "A television", Scene::Tv),
     ("desk", "A desk", Scene::Desk),
     ("bookshelf", "A bookshelf", Scene::Bookshelf),
@@ -94,7 +91,7 @@ const SCENES: [(&str, &str, Scene); 4] = [
 ];
 
 /// Values of `--pivot`.
-const PIVOTS: [(&str, &str, Pivot); 2] = [
+const PIVOTS: [Choice<Pivot>; 2] = [
     ("view", "The midst of what is seen", Pivot::View),
     ("headset", "The headset", Pivot::Headset),
 ];
@@ -112,8 +109,8 @@ impl Evaluate {
 
 impl Calibration {
     fn run(self) -> CliResult {
-        let mesh = self.mesh.as_deref().zip(self.classes.as_deref());
-        let (house, mesh_crc32) = read_house(mesh, 1)?;
+        let mesh = self.mesh.clone().zip(self.classes.clone());
+        let (house, mesh_crc32) = read_house(mesh.as_ref(), 1)?;
         let settings = Settings {
             mesh_crc32,
             cell_side_m: self.cell,
@@ -128,26 +125,19 @@ impl Calibration {
         let mut results = Results::open(&self.out, &settings)?;
         let bar = Progress::new("evaluate");
         let started = Instant::now();
-        let ran = run(
-            &testbed,
-            &plan,
-            &mut results,
-            threads,
-            &mut |done, total| {
-                bar.set(done as f64 / total.max(1) as f64);
-                let left = started
-                    .elapsed()
-                    .mul_f64((total - done) as f64 / done.max(1) as f64);
-                bar.say(&format!("{done} of {total}, {} left", clock(left)));
-                ControlFlow::Continue(())
-            },
-        );
+        let mut tell = |done: usize, total: usize| {
+            bar.set(done as f64 / total.max(1) as f64);
+            let share = (total - done) as f64 / done.max(1) as f64;
+            let left = clock(started.elapsed().mul_f64(share));
+            bar.say(&format!("{done} of {total}, {left} left"));
+        };
+        let ran = run(&testbed, &plan, &mut results, threads, &mut tell);
         bar.done();
         ran?;
         let trials = results.sorted();
         let summary = Summary::new(&settings, &trials, threads);
         let report = report(&summary, &trials)?;
-        lattice_lab::report::write(&report, &self.out)?;
+        write_report(&report, &self.out)?;
         let json = serde_json::to_string_pretty(&summary)?;
         super::write(&self.out.join("summary.json"), &json)?;
         if self.json {
@@ -160,34 +150,29 @@ impl Calibration {
     }
 
     fn plan(&self) -> Plan {
-        if self.quick {
-            return Plan {
-                scenes: self.scenes.clone(),
-                first_seed: 0,
-                seeds: 1,
-                flips: vec![0.0, 0.6],
-                starts: vec![Start::Off { m: 0.3, deg: 10.0 }, Start::None],
-                methods: self.methods.clone(),
-                timed_seeds: 1,
-            };
-        }
-        Plan {
+        let plan = Plan {
             scenes: self.scenes.clone(),
             seeds: self.seeds,
             flips: self.flips.clone(),
             starts: self.starts.clone(),
             methods: self.methods.clone(),
             ..Plan::default()
+        };
+        if !self.quick {
+            return plan;
+        }
+        Plan {
+            seeds: 1,
+            flips: vec![0.0, 0.6],
+            starts: vec![Start::Off { m: 0.3, deg: 10.0 }, Start::None],
+            timed_seeds: 1,
+            ..plan
         }
     }
 }
 
 fn clock(time: Duration) -> String {
     let seconds = time.as_secs();
-    format!(
-        "{}:{:02}:{:02}",
-        seconds / 3600,
-        seconds / 60 % 60,
-        seconds % 60
-    )
+    let (hours, minutes) = (seconds / 3600, seconds / 60 % 60);
+    format!("{hours}:{minutes:02}:{:02}", seconds % 60)
 }

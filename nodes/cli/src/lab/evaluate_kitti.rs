@@ -1,16 +1,14 @@
 //! `lattice evaluate kitti`.
 
-use std::path::PathBuf;
-
-use clap::Args;
-
 use crate::CliResult;
 use crate::progress::Progress;
+use clap::Args;
 use lattice_lab::evaluate::kitti::{
     KittiMethod, KittiReport, KittiTopics, PairRow, Prepared, RIGHT, kitti_report, pairs_of,
     read_scans, write_scans,
 };
-use lattice_lab::report::markdown;
+use lattice_lab::{markdown, write_report};
+use std::path::PathBuf;
 
 /// Options of `lattice evaluate kitti`.
 #[derive(Args)]
@@ -47,7 +45,7 @@ impl Kitti {
         let report = lattice_lab::pool(self.threads)?.install(|| self.measure())?;
         let json = serde_json::to_string_pretty(&report)?;
         let table = kitti_report(&report);
-        lattice_lab::report::write(&table, &self.out)?;
+        write_report(&table, &self.out)?;
         super::write(&self.out.join("kitti.json"), &json)?;
         match self.json {
             true => println!("{json}"),

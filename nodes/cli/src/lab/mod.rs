@@ -8,18 +8,16 @@ mod evaluate_kitti;
 mod paper;
 mod simulate;
 
-use std::fmt::Display;
-use std::fs::File;
-use std::io::BufWriter;
-use std::path::Path;
-
+use crate::CliResult;
 use clap::Subcommand;
 use clap::builder::{PossibleValue, PossibleValuesParser, TypedValueParser};
 use lattice_core::voxels::VoxelList;
 use lattice_lab::render::{RenderOptions, render_png};
 use serde::Serialize;
-
-use crate::CliResult;
+use std::fmt::Display;
+use std::fs::File;
+use std::io::BufWriter;
+use std::path::Path;
 
 /// Commands of the laboratory.
 #[derive(Subcommand)]
@@ -59,18 +57,18 @@ pub fn picture(list: &VoxelList, options: &RenderOptions, out: &Path) -> CliResu
     render_png(list, options, BufWriter::new(file))
 }
 
+/// A value of an option with its name and help.
+type Choice<T> = (&'static str, &'static str, T);
+
 /// Parser of an option that takes one of some names, each with its help and its value.
 fn choice<T: Clone + Send + Sync + 'static>(
-    choices: &'static [(&'static str, &'static str, T)],
+    choices: &'static [Choice<T>],
 ) -> impl TypedValueParser<Value = T> {
-    let names = choices
-        .iter()
-        .map(|(name, help, _)| PossibleValue::new(*name).help(*help));
+    let names = choices.iter();
+    let names = names.map(|(name, help, _)| PossibleValue::new(*name).help(*help));
     PossibleValuesParser::new(names).try_map(|chosen: String| {
-        let found = choices.iter().find(|(name, _, _)| *name == chosen);
-        found
-            .map(|(_, _, value)| value.clone())
-            .ok_or("no such choice")
+        let found = choices.iter().find(|(name, ..)| *name == chosen);
+        found.map(|choice| choice.2.clone()).ok_or("no such choice")
     })
 }
 

@@ -2,18 +2,15 @@
 
 mod house;
 
-use std::path::PathBuf;
-
-use clap::{Args, Subcommand};
-
-use lattice_lab::simulate::SurveyPattern;
-
-use super::{choice, show};
+use super::{Choice, choice, show};
 use crate::progress::Progress;
 use crate::{CliResult, init_logging};
+use clap::{Args, Subcommand};
 use lattice_bag::Storage;
 use lattice_lab::bench::{SiteOptions, write_site};
 use lattice_lab::datasets::{BobcatOptions, BobcatSummary, write_bobcat};
+use lattice_lab::simulate::SurveyPattern;
+use std::path::PathBuf;
 
 /// Write the log, the points or the map of a simulated machine
 #[derive(Subcommand)]
@@ -28,24 +25,21 @@ pub enum Simulate {
 }
 
 /// Values of `--storage`.
-const STORAGES: [(&str, &str, Storage); 2] = [
+const STORAGES: [Choice<Storage>; 2] = [
     ("mcap", "MCAP", Storage::Mcap),
     ("sqlite3", "SQLite", Storage::Sqlite3),
 ];
 
 /// Values of `--pattern`.
-const PATTERNS: [(&str, &str, SurveyPattern); 2] = [
-    (
-        "lms200",
-        "Three SICK LMS200, one of them on a turntable",
-        SurveyPattern::Lms200,
-    ),
+const PATTERNS: [Choice<SurveyPattern>; 2] = [
+    ("lms200", LMS200, SurveyPattern::Lms200),
     (
         "os64",
         "One spinning scanner of 64 beams",
         SurveyPattern::Os64,
     ),
 ];
+const LMS200: &str = "Three SICK LMS200, one of them on a turntable";
 
 /// Options of `lattice simulate bobcat`.
 #[derive(Args)]

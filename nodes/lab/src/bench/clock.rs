@@ -1,8 +1,7 @@
 //! Wall and processor time of one operation.
 
-use std::time::Instant;
-
 use rustix::time::{ClockId, clock_gettime};
+use std::time::Instant;
 
 /// Time that an operation took.
 #[derive(Clone, Copy, Debug, PartialEq)]

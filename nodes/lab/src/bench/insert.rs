@@ -1,12 +1,11 @@
 //! Inserting a cloud into a store.
 
+use super::points::ScanRecord;
+use super::{Report, timed};
 use lattice_core::cloud::Cloud;
 use lattice_core::lattice::Lattice;
 use lattice_core::voxels::{DatumError, OccupancyList, VoxelList, VoxelStore};
 use nalgebra::Vector3;
-
-use super::points::ScanRecord;
-use super::{Report, timed};
 
 /// Most voxels of a list: more than any benchmark makes.
 const MAX_VOXELS: usize = 1 << 31;
@@ -30,55 +29,37 @@ impl Store {
     }
 }
 
-/// An empty store about the origin.
 fn empty(store: Store, lattice: &Lattice) -> Result<Box<dyn VoxelStore + Send>, DatumError> {
-    match store {
-        Store::Occupancy => {
-            let list = OccupancyList::new(lattice.clone(), Vector3::zeros(), usize::MAX)?;
-            Ok(Box::new(list))
-        }
-        Store::List => {
-            let list = VoxelList::new(lattice.clone(), Vector3::zeros(), MAX_VOXELS)?;
-            Ok(Box::new(list))
-        }
-    }
-}
-
-/// Options of an insertion.
-#[derive(Clone, Copy, Debug)]
-pub struct InsertOptions {
-    /// The store.
-    pub store: Store,
-    /// Side of a cube of the cells' volume, m; for the report.
-    pub res_m: f64,
+    let (lattice, datum_m) = (lattice.clone(), Vector3::zeros());
+    Ok(match store {
+        Store::Occupancy => Box::new(OccupancyList::new(lattice, datum_m, usize::MAX)?),
+        Store::List => Box::new(VoxelList::new(lattice, datum_m, MAX_VOXELS)?),
+    })
 }
 
 /// Inserts `points_m`, scan by scan where scans are given; only the insertions are timed.
 ///
 /// Runs on the threads of the current rayon pool. Also returns the filled store.
 pub fn insert(
-    options: InsertOptions,
+    kind: Store,
     lattice: &Lattice,
     points_m: Vec<[f32; 3]>,
     scans: Option<&[ScanRecord]>,
 ) -> Result<(Report, Box<dyn VoxelStore + Send>), DatumError> {
-    let n = points_m.len();
+    let n = points_m.len() as u64;
     let clouds = clouds(points_m, scans);
-    let mut store = empty(options.store, lattice)?;
+    let mut store = empty(kind, lattice)?;
     let (inserted, spent) = timed(|| {
         let reports = clouds.iter().map(|cloud| store.insert(cloud).inserted);
         reports.sum::<u64>()
     });
-    let mut report = Report::new(
-        options.store.name(),
-        lattice.kind().name(),
-        options.res_m,
-        spent,
-    );
-    report.n = n as u64;
-    report.voxels = store.len() as u64;
-    report.bytes = store.bytes() as u64;
-    report.count = (inserted != n as u64).then_some(inserted);
+    let report = Report {
+        n,
+        voxels: store.len() as u64,
+        bytes: store.bytes() as u64,
+        count: (inserted != n).then_some(inserted),
+        ..Report::new(kind.name(), lattice, spent)
+    };
     Ok((report, store))
 }
 
@@ -117,13 +98,10 @@ mod tests {
         };
         let scans = [scan(300), scan(1), scan(699)];
         for store in [Store::Occupancy, Store::List] {
-            let options = InsertOptions { store, res_m: 0.1 };
-            let (whole, _) = insert(options, &lattice, points.clone(), None).unwrap();
-            let (parts, store) = insert(options, &lattice, points.clone(), Some(&scans)).unwrap();
-            assert_eq!(whole.voxels, 301);
-            assert_eq!(parts.voxels, 301);
-            assert_eq!(store.len(), 301);
-            assert_eq!((parts.n, parts.count), (1000, None));
+            let (whole, _) = insert(store, &lattice, points.clone(), None).unwrap();
+            let (parts, store) = insert(store, &lattice, points.clone(), Some(&scans)).unwrap();
+            assert_eq!([whole.voxels, parts.voxels, store.len() as u64], [301; 3]);
+            assert_eq!((parts.n, parts.count, parts.res), (1000, None, 0.1));
         }
     }
 }

@@ -15,13 +15,14 @@ mod register;
 mod report;
 mod site;
 
-pub use clock::{Spent, timed};
+use clock::Spent;
+pub(crate) use clock::timed;
 pub use file::{FileMethod, file};
-pub use insert::{InsertOptions, Store, insert};
+pub use insert::{Store, insert};
 pub use neighbors::{NeighborMethod, neighbors};
-pub use points::{ScanRecord, read_points, read_scans, scans_path};
+pub use points::{ScanRecord, read_points, read_scans};
 pub use quantize::{QuantizeMethod, quantize};
 pub use raycast::{RaycastMethod, raycast};
-pub use register::{RegisterReport, RegisterSetup, RegisterTimes, register};
+pub use register::{RegisterSetup, register};
 pub use report::Report;
 pub use site::{SiteOptions, SiteSummary, write_site};

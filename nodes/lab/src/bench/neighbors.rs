@@ -1,11 +1,10 @@
 //! Counting the occupied neighbours of all voxels.
 
+use super::hash26::Cubes;
+use super::{Report, timed};
 use lattice_core::lattice::{Lattice, LatticeKind, MortonKey};
 use lattice_core::voxels::{OccupancyList, VoxelStore};
 use rayon::prelude::*;
-
-use super::hash26::Cubes;
-use super::{Report, timed};
 
 /// Way to find neighbours.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
@@ -21,12 +20,7 @@ pub enum NeighborMethod {
 /// Counts pairs of a voxel and an occupied touching neighbour; `count` is that number.
 ///
 /// `None` if the method is for cubes and the lattice is another.
-pub fn neighbors(
-    method: NeighborMethod,
-    store: &dyn VoxelStore,
-    name: &str,
-    res_m: f64,
-) -> Option<Report> {
+pub fn neighbors(method: NeighborMethod, store: &dyn VoxelStore, name: &str) -> Option<Report> {
     let lattice = store.lattice();
     let (sys, (count, spent), bytes) = match method {
         NeighborMethod::Pass => {
@@ -58,12 +52,13 @@ pub fn neighbors(
             ("hash26".to_owned(), result, cubes.bytes())
         }
     };
-    let mut report = Report::new(sys, lattice.kind().name(), res_m, spent);
-    report.n = store.len() as u64;
-    report.voxels = store.len() as u64;
-    report.bytes = bytes as u64;
-    report.count = Some(count);
-    Some(report)
+    Some(Report {
+        n: store.len() as u64,
+        voxels: store.len() as u64,
+        bytes: bytes as u64,
+        count: Some(count),
+        ..Report::new(sys, lattice, spent)
+    })
 }
 
 fn probe(store: &dyn VoxelStore, lattice: &Lattice) -> u64 {
@@ -82,7 +77,7 @@ fn probe(store: &dyn VoxelStore, lattice: &Lattice) -> u64 {
 #[cfg(test)]
 mod tests {
     use super::*;
-    use crate::bench::{InsertOptions, Store, insert};
+    use crate::bench::{Store, insert};
 
     #[test]
     fn all_methods_count_the_same_pairs() {
@@ -92,17 +87,10 @@ mod tests {
             .map(|i| [(i % 3) as f32, (i / 3 % 3) as f32, (i / 9) as f32])
             .collect();
         points.push([50.0, 0.0, -7.0]);
-        let options = InsertOptions {
-            store: Store::List,
-            res_m: 1.0,
-        };
-        let (_, store) = insert(options, &lattice, points, None).unwrap();
-        for method in [
-            NeighborMethod::Pass,
-            NeighborMethod::Probe,
-            NeighborMethod::Hash26,
-        ] {
-            let report = neighbors(method, store.as_ref(), "x", 1.0).unwrap();
+        let (_, store) = insert(Store::List, &lattice, points, None).unwrap();
+        use NeighborMethod::{Hash26, Pass, Probe};
+        for method in [Pass, Probe, Hash26] {
+            let report = neighbors(method, store.as_ref(), "x").unwrap();
             assert_eq!(report.count, Some(7 * 7 * 7 - 27), "{method:?}");
             assert_eq!(report.n, 28);
         }
@@ -111,11 +99,7 @@ mod tests {
     #[test]
     fn the_measure_is_for_cubes_only() {
         let lattice = Lattice::new(LatticeKind::Fcc, 1.0).unwrap();
-        let options = InsertOptions {
-            store: Store::List,
-            res_m: 1.0,
-        };
-        let (_, store) = insert(options, &lattice, vec![[0.0; 3]], None).unwrap();
-        assert!(neighbors(NeighborMethod::Hash26, store.as_ref(), "x", 1.0).is_none());
+        let (_, store) = insert(Store::List, &lattice, vec![[0.0; 3]], None).unwrap();
+        assert!(neighbors(NeighborMethod::Hash26, store.as_ref(), "x").is_none());
     }
 }

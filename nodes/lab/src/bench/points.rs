@@ -1,13 +1,11 @@
 //! Raw point files and their scans.
 
+use crate::{AnyError, at};
+use nalgebra::Vector3;
 use std::ffi::OsString;
 use std::fs::File;
 use std::io::Read;
 use std::path::{Path, PathBuf};
-
-use nalgebra::Vector3;
-
-use crate::{AnyError, at};
 
 /// Bytes of a point: x, y, z (m) and intensity as little-endian f32.
 const POINT_BYTES: usize = 16;
@@ -24,15 +22,10 @@ pub struct ScanRecord {
 }
 
 impl ScanRecord {
-    /// The record as it is in the file.
-    pub fn to_bytes(self) -> [u8; 32] {
+    pub(super) fn to_bytes(self) -> [u8; 32] {
         let mut bytes = [0; 32];
-        let words = [
-            self.origin_m.x.to_bits(),
-            self.origin_m.y.to_bits(),
-            self.origin_m.z.to_bits(),
-            self.points as u64,
-        ];
+        let [x, y, z] = <[f64; 3]>::from(self.origin_m).map(f64::to_bits);
+        let words = [x, y, z, self.points as u64];
         for (to, word) in bytes.chunks_exact_mut(8).zip(words) {
             to.copy_from_slice(&word.to_le_bytes());
         }
@@ -124,18 +117,12 @@ mod tests {
     fn file_of(points: usize, scans: &[usize]) -> (tempfile::TempDir, PathBuf) {
         let dir = tempfile::tempdir().unwrap();
         let path = dir.path().join("p.xyzi");
-        let bytes: Vec<u8> = (0..points)
-            .flat_map(|i| point_to_bytes([i as f32, 0.5, -1.25, 7.0]))
-            .collect();
-        fs::write(&path, bytes).unwrap();
-        let records: Vec<u8> = scans
-            .iter()
-            .flat_map(|&points| {
-                let origin_m = Vector3::new(1.0, -2.0, 3.5);
-                ScanRecord { origin_m, points }.to_bytes()
-            })
-            .collect();
-        fs::write(scans_path(&path), records).unwrap();
+        let bytes = (0..points).flat_map(|i| point_to_bytes([i as f32, 0.5, -1.25, 7.0]));
+        fs::write(&path, bytes.collect::<Vec<u8>>()).unwrap();
+        let origin_m = Vector3::new(1.0, -2.0, 3.5);
+        let record = |&points: &usize| ScanRecord { origin_m, points }.to_bytes();
+        let records = scans.iter().flat_map(record);
+        fs::write(scans_path(&path), records.collect::<Vec<u8>>()).unwrap();
         (dir, path)
     }
 

@@ -1,11 +1,10 @@
 //! Quantizing and packing keys, without a store.
 
+use super::{Report, timed};
 use crate::printed::Search27;
 use lattice_core::lattice::{BatchQuantizer, BlockKey, Lattice, Simd};
 use nalgebra::Isometry3;
 use rayon::prelude::*;
-
-use super::{Report, timed};
 
 /// Points of one task.
 const CHUNK: usize = 1 << 14;
@@ -36,12 +35,7 @@ impl QuantizeMethod {
 }
 
 /// Quantizes all points into a stream of keys ([`BlockKey`]) in memory; the report has its digest.
-pub fn quantize(
-    method: QuantizeMethod,
-    lattice: &Lattice,
-    res_m: f64,
-    points_m: &[[f32; 3]],
-) -> Report {
+pub fn quantize(method: QuantizeMethod, lattice: &Lattice, points_m: &[[f32; 3]]) -> Report {
     // Written once before, so that no page is first touched while the clock runs.
     let mut keys = vec![BlockKey::NONE; points_m.len()];
     let batch = |simd| BatchQuantizer::with_simd(lattice, Isometry3::identity(), simd);
@@ -60,10 +54,11 @@ pub fn quantize(
             }
         });
     });
-    let mut report = Report::new(method.name(), lattice.kind().name(), res_m, spent);
-    report.n = points_m.len() as u64;
-    report.hash = Some(format!("{:016x}", digest(&keys)));
-    report
+    Report {
+        n: points_m.len() as u64,
+        hash: Some(format!("{:016x}", digest(&keys))),
+        ..Report::new(method.name(), lattice, spent)
+    }
 }
 
 fn blocks(quantizer: &BatchQuantizer, points_m: &[[f32; 3]], mut keys: &mut [BlockKey]) {
@@ -104,10 +99,8 @@ mod tests {
         let key = BlockKey::from_raw(u64::from_le_bytes(*b"foobar\0\0")).unwrap();
         let foobar: u64 = 0x8594_4171_f739_67e8;
         let prime: u64 = 0x100_0000_01b3;
-        assert_eq!(
-            digest(&[key]),
-            foobar.wrapping_mul(prime).wrapping_mul(prime)
-        );
+        let expected = foobar.wrapping_mul(prime).wrapping_mul(prime);
+        assert_eq!(digest(&[key]), expected);
     }
 
     #[test]
@@ -118,27 +111,19 @@ mod tests {
             .collect();
         let hash = |threads, method, points: &[[f32; 3]]| {
             let pool = crate::pool(threads).unwrap();
-            pool.install(|| quantize(method, &lattice, 0.1, points).hash)
+            pool.install(|| quantize(method, &lattice, points).hash)
         };
-        let one = hash(1, QuantizeMethod::Scalar, &points);
-        for method in [
-            QuantizeMethod::Scalar,
-            QuantizeMethod::Batch,
-            QuantizeMethod::Portable,
-        ] {
+        let one = hash(1, Scalar, &points);
+        use QuantizeMethod::{Batch, Portable, Scalar};
+        for method in [Scalar, Batch, Portable] {
             assert_eq!(hash(3, method, &points), one, "{method:?}");
             assert_ne!(hash(1, method, &points[1..]), one, "{method:?}");
         }
         let paper = |points| hash(2, QuantizeMethod::Paper27, points);
         // Its keys are the exact ones where single precision is enough.
-        let near: Vec<[f32; 3]> = points
-            .iter()
-            .map(|p| p.map(|x| x.rem_euclid(1.7)))
-            .collect();
-        assert_eq!(
-            paper(&near[..500]),
-            hash(1, QuantizeMethod::Scalar, &near[..500])
-        );
+        let near = points[..500].iter().map(|p| p.map(|x| x.rem_euclid(1.7)));
+        let near: Vec<[f32; 3]> = near.collect();
+        assert_eq!(paper(&near), hash(1, Scalar, &near));
         assert_ne!(paper(&points[1..]), paper(&points));
     }
 }

@@ -1,5 +1,8 @@
 //! Free space along the rays of scans.
 
+use super::insert::clouds;
+use super::points::ScanRecord;
+use super::{Report, timed};
 use lattice_core::cloud::Cloud;
 use lattice_core::lattice::Lattice;
 use lattice_core::raycast::{
@@ -7,10 +10,6 @@ use lattice_core::raycast::{
 };
 use lattice_core::voxels::{OccupancyList, VoxelStore};
 use nalgebra::Vector3;
-
-use super::insert::clouds;
-use super::points::ScanRecord;
-use super::{Report, timed};
 
 /// Most memory of a map, bytes: more than any benchmark makes.
 const MAX_BYTES: usize = 1 << 40;
@@ -32,7 +31,6 @@ pub enum RaycastMethod {
 pub fn raycast(
     method: RaycastMethod,
     lattice: &Lattice,
-    res_m: f64,
     points_m: Vec<[f32; 3]>,
     scans: &[ScanRecord],
 ) -> Result<Report, FreeSpaceError> {
@@ -43,7 +41,7 @@ pub fn raycast(
         ends,
     });
     let report = match method {
-        RaycastMethod::Map => map(lattice, res_m, bundles)?,
+        RaycastMethod::Map => map(lattice, bundles)?,
         RaycastMethod::Clear => {
             let options = ClearOptions {
                 max_bytes: MAX_BYTES,
@@ -53,7 +51,7 @@ pub fn raycast(
             let clear = |store: &mut OccupancyList, scan: &[RayBundle]| {
                 clearer.clear(store, scan).removed.len()
             };
-            store("lattice-clear", lattice, res_m, bundles, clear)?
+            store("lattice-clear", lattice, bundles, clear)?
         }
         RaycastMethod::Evidence => {
             let options = FreeSpaceOptions {
@@ -65,7 +63,7 @@ pub fn raycast(
             let clear = |store: &mut OccupancyList, scan: &[RayBundle]| {
                 map.clear(store, scan).removed.len()
             };
-            store("lattice-evidence", lattice, res_m, bundles, clear)?
+            store("lattice-evidence", lattice, bundles, clear)?
         }
     };
     Ok(Report { n, ..report })
@@ -73,7 +71,6 @@ pub fn raycast(
 
 fn map<'a>(
     lattice: &Lattice,
-    res_m: f64,
     bundles: impl Iterator<Item = RayBundle<'a>>,
 ) -> Result<Report, FreeSpaceError> {
     let options = FreeSpaceOptions {
@@ -90,17 +87,17 @@ fn map<'a>(
     });
     debug_assert_eq!(refused, 0);
     let occupied = map.occupied_keys().len() as u64;
-    let mut report = Report::new("lattice-free-space", lattice.kind().name(), res_m, spent);
-    report.voxels = occupied;
-    report.bytes = map.bytes() as u64;
-    report.count = Some(occupied + map.free_keys().len() as u64);
-    Ok(report)
+    Ok(Report {
+        voxels: occupied,
+        bytes: map.bytes() as u64,
+        count: Some(occupied + map.free_keys().len() as u64),
+        ..Report::new("lattice-free-space", lattice, spent)
+    })
 }
 
 fn store<'a>(
     name: &str,
     lattice: &Lattice,
-    res_m: f64,
     bundles: impl Iterator<Item = RayBundle<'a>>,
     mut clear: impl FnMut(&mut OccupancyList, &[RayBundle]) -> usize,
 ) -> Result<Report, FreeSpaceError> {
@@ -113,11 +110,12 @@ fn store<'a>(
         });
         removed.sum::<usize>()
     });
-    let mut report = Report::new(name, lattice.kind().name(), res_m, spent);
-    report.voxels = store.len() as u64;
-    report.bytes = store.bytes() as u64;
-    report.count = Some(removed as u64);
-    Ok(report)
+    Ok(Report {
+        voxels: store.len() as u64,
+        bytes: store.bytes() as u64,
+        count: Some(removed as u64),
+        ..Report::new(name, lattice, spent)
+    })
 }
 
 #[cfg(test)]
@@ -135,7 +133,7 @@ mod tests {
         let points = vec![[5.0, 0.1, 0.1], [10.0, 0.1, 0.1]];
         let run = |method| {
             let scans = [scan, scan];
-            raycast(method, &lattice, 1.0, points.clone(), &scans).unwrap()
+            raycast(method, &lattice, points.clone(), &scans).unwrap()
         };
         let map = run(RaycastMethod::Map);
         assert_eq!((map.n, map.voxels, map.count), (2, 2, Some(11)));

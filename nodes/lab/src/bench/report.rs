@@ -1,8 +1,8 @@
 //! The one line that every benchmark prints, here and in the peers.
 
-use serde::Serialize;
-
 use super::Spent;
+use lattice_core::lattice::Lattice;
+use serde::Serialize;
 
 /// Result of one run of one system.
 #[derive(Clone, Debug, PartialEq, Serialize)]
@@ -35,11 +35,12 @@ pub struct Report {
 
 impl Report {
     /// A report without digest or count.
-    pub fn new(sys: impl Into<String>, lattice: &'static str, res: f64, spent: Spent) -> Self {
+    pub(super) fn new(sys: impl Into<String>, lattice: &Lattice, spent: Spent) -> Self {
         Self {
             sys: sys.into(),
-            lattice,
-            res,
+            lattice: lattice.kind().name(),
+            // As it was asked for, before it was a volume.
+            res: (lattice.cell_side_m() * 1e9).round() / 1e9,
             threads: rayon::current_num_threads(),
             n: 0,
             wall_s: spent.wall_s,

@@ -1,15 +1,13 @@
 //! The point file of a simulated survey.
 
+use super::points::{ScanRecord, point_to_bytes, scans_path};
+use crate::simulate::{Survey, SurveyPattern};
+use crate::{AnyError, at};
+use serde::Serialize;
 use std::fmt;
 use std::fs::File;
 use std::io::{BufWriter, Write};
 use std::path::{Path, PathBuf};
-
-use crate::simulate::{Survey, SurveyPattern};
-use crate::{AnyError, at};
-use serde::Serialize;
-
-use super::points::{ScanRecord, point_to_bytes, scans_path};
 
 /// Options of a simulated survey.
 #[derive(Clone, Debug)]

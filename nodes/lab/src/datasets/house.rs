@@ -1,24 +1,20 @@
 //! The simulated house as files: the robot's map, headset clouds, and the truth.
 
+use crate::evaluate::read_house;
+use crate::simulate::house::{HeadsetTrial, LabelDraw, Scene, Survey, SurveyOptions};
+use crate::{AnyError, at};
+use lattice_core::lattice::{Lattice, LatticeKind};
+use lattice_core::pose::Axes;
+use lattice_core::registration::UNLABELED;
+use lattice_core::voxels::file::write_map;
+use lattice_nodes::files::export::write_labelled_ply;
+use nalgebra::{Isometry3, Point3};
+use serde::{Deserialize, Serialize};
 use std::collections::BTreeMap;
 use std::fmt;
 use std::fs::{self, File};
 use std::io::{BufWriter, Write};
 use std::path::PathBuf;
-
-use crate::simulate::house::{
-    HeadsetOptions, HeadsetTrial, LabelDraw, Scene, Survey, SurveyOptions,
-};
-use lattice_core::lattice::{Lattice, LatticeKind};
-use lattice_core::pose::Axes;
-use lattice_core::registration::UNLABELED;
-use lattice_core::voxels::file::write_map;
-use nalgebra::{Isometry3, Point3};
-use serde::{Deserialize, Serialize};
-
-use crate::evaluate::read_house;
-use crate::{AnyError, at};
-use lattice_nodes::files::export::write_labelled_ply;
 
 /// Name of the robot's map in the folder.
 pub const MAP_FILE: &str = "map.lattice";
@@ -51,8 +47,8 @@ pub struct HouseOptions {
     pub seed: u64,
     /// The robot.
     pub survey: SurveyOptions,
-    /// The headset.
-    pub headset: HeadsetOptions,
+    /// Pictures of each scene, 1 to 6.
+    pub headset_scans: usize,
     /// Share of the headset's view whose regions are labelled wrongly, 0 to 1.
     pub flips: f64,
     /// Lattice of the map.
@@ -64,7 +60,7 @@ pub struct HouseOptions {
 }
 
 /// Summary of a written house.
-#[derive(Clone, Debug, PartialEq, Serialize)]
+#[derive(Clone, Debug, PartialEq, Default, Serialize)]
 pub struct HouseSummary {
     /// The folder.
     pub out: PathBuf,
@@ -92,9 +88,8 @@ impl fmt::Display for HouseSummary {
             100.0 * self.different_share
         )?;
         let clouds = self.headset_points.iter();
-        let clouds: Vec<_> = clouds
-            .map(|(name, points)| format!("{name} {points}"))
-            .collect();
+        let clouds = clouds.map(|(name, points)| format!("{name} {points}"));
+        let clouds: Vec<_> = clouds.collect();
         write!(f, "points: {}", clouds.join(", "))
     }
 }
@@ -153,32 +148,22 @@ pub fn write_house(
     progress: &mut dyn FnMut(f64),
 ) -> Result<HouseSummary, AnyError> {
     let lattice = Lattice::new(options.lattice, options.cell_side_m.powi(3))?;
-    let mesh = options
-        .mesh
-        .as_ref()
-        .map(|(m, c)| (m.as_path(), c.as_path()));
-    let (house, _) = read_house(mesh, options.seed)?;
+    let (house, _) = read_house(options.mesh.as_ref(), options.seed)?;
     let house = house.placed(options.map_from_house);
     progress(0.1);
     fs::create_dir_all(&options.out).map_err(at(&options.out))?;
     let mut trials = Vec::new();
     for scene in Scene::ALL {
-        trials.push(HeadsetTrial::new(
-            &house,
-            scene,
-            &options.headset,
-            options.seed,
-        )?);
+        let scans = options.headset_scans;
+        trials.push(HeadsetTrial::new(&house, scene, scans, options.seed)?);
         progress(0.1 + 0.1 * trials.len() as f64);
     }
     let draw = LabelDraw::new(&house, &trials, options.flips, options.seed)?;
     let mut summary = HouseSummary {
         out: options.out.clone(),
         triangles: house.mesh().len(),
-        survey_points: 0,
-        voxels: 0,
-        headset_points: BTreeMap::new(),
         different_share: draw.different_share,
+        ..HouseSummary::default()
     };
     for trial in &trials {
         write_scene(options, trial, &draw, &mut summary)?;
@@ -202,10 +187,8 @@ fn create(options: &HouseOptions, name: &str) -> Result<(PathBuf, File), AnyErro
     let path = options.out.join(name);
     if path.exists() && !options.overwrite {
         let path = path.display();
-        return Err(format!(
-            "{path}: there is a file already; choose another folder or allow to overwrite"
-        )
-        .into());
+        let words = "there is a file already; choose another folder or allow to overwrite";
+        return Err(format!("{path}: {words}").into());
     }
     let file = File::create(&path).map_err(at(&path))?;
     Ok((path, file))
@@ -238,10 +221,8 @@ fn write_scene(
         };
         let points: Vec<Point3<f64>> = headset_scan.points_m.iter().map(turned).collect();
         let cloud = draw.headset.cloud(&points, &headset_scan.regions);
-        let labels = cloud
-            .labels
-            .iter()
-            .map(|label| label.top().unwrap_or(UNLABELED));
+        let labels = cloud.labels.iter();
+        let labels = labels.map(|label| label.top().unwrap_or(UNLABELED));
         let labels: Vec<u16> = labels.collect();
         let (path, file) = create(options, &cloud_name)?;
         let comment = match options.axes {
@@ -249,9 +230,8 @@ fn write_scene(
             HeadsetAxes::Unity => "metres, headset_origin: x right, y up, z forward (left-handed)",
         };
         write_labelled_ply(&points, &labels, comment, file).map_err(at(&path))?;
-        summary
-            .headset_points
-            .insert(cloud_name.clone(), points.len());
+        let counts = &mut summary.headset_points;
+        counts.insert(cloud_name.clone(), points.len());
         truth.headset_scans.push(HeadsetScanTruth {
             cloud: cloud_name,
             sensor_m: turned(&headset_scan.sensor_m).into(),

@@ -1,16 +1,15 @@
 //! The messages of a log in the order in which a recorder receives them.
 
-use crate::simulate::{Bobcat, InsSample, InsSamples, Laser};
-use lattice_core::geodesy::EnuFrame;
-use lattice_msgs::cdr;
-use rayon::prelude::*;
-
 use super::facts::{
     INSPVAX_TOPIC, ODOMETRY_TOPIC, TF_STATIC_TOPIC, TF_TOPIC, bobcat_origin, bobcat_start_ns,
     points_topic,
 };
 use super::messages;
 use crate::AnyError;
+use crate::simulate::{Bobcat, InsSample, InsSamples, Laser};
+use lattice_core::geodesy::EnuFrame;
+use lattice_msgs::cdr;
+use rayon::prelude::*;
 
 /// Length of log that is computed at a time, ns.
 const BLOCK_NS: i64 = 1_000_000_000;
@@ -22,11 +21,9 @@ const TURNTABLE_DELAY_NS: i64 = 400_000;
 /// A message as it is recorded.
 #[derive(Clone, Debug, PartialEq)]
 pub struct LogEntry {
-    /// Topic, absolute.
     pub topic: &'static str,
     /// Time of arrival at the recorder, UTC, ns since the Unix epoch.
     pub log_time_ns: i64,
-    /// The message as CDR with its header.
     pub cdr: Vec<u8>,
     /// For a cloud its points without noise, in the map frame (m), in the order of the cloud.
     pub true_points_m: Vec<[f32; 3]>,
@@ -80,11 +77,10 @@ impl<'a> Log<'a> {
         }
         let end_ns = self.begin_ns.saturating_add(BLOCK_NS);
         let scans = self.scans_before(end_ns);
-        let clouds = scans
-            .into_par_iter()
-            .map(|(laser, index)| self.cloud(laser, index));
-        let clouds = clouds.collect::<Result<Vec<_>, _>>()?;
-        self.pending.extend(clouds);
+        let scans = scans.into_par_iter();
+        let clouds = scans.map(|(laser, index)| self.cloud(laser, index));
+        let clouds: Result<Vec<_>, _> = clouds.collect();
+        self.pending.extend(clouds?);
         self.epochs.clear();
         while let Some(sample) = self.samples.next_if(|sample| sample.time_ns < end_ns) {
             self.epochs.push(sample);
@@ -127,15 +123,13 @@ impl<'a> Log<'a> {
     fn cloud(&self, laser: Laser, index: u64) -> Result<LogEntry, AnyError> {
         let scan = self.bobcat.scan(laser, index);
         let arrival_ns = scan.start_ns + crate::simulate::SCAN_SPAN_NS + CLOUD_DELAY_NS;
+        let returns = scan.returns.iter();
+        let truth = returns.map(|hit| hit.truth_m.cast::<f32>().into());
         Ok(LogEntry {
             topic: points_topic(laser),
             log_time_ns: bobcat_start_ns().saturating_add(arrival_ns),
             cdr: cdr::to_vec(&messages::cloud(laser, &scan))?,
-            true_points_m: scan
-                .returns
-                .iter()
-                .map(|hit| hit.truth_m.map(|v| v as f32).into())
-                .collect(),
+            true_points_m: truth.collect(),
         })
     }
 
@@ -143,25 +137,17 @@ impl<'a> Log<'a> {
     fn epoch(&self, sample: &InsSample) -> Result<[LogEntry; 3], AnyError> {
         let entry = |topic, delay_ns: i64, cdr| LogEntry {
             topic,
-            log_time_ns: bobcat_start_ns()
-                .saturating_add(sample.time_ns)
-                .saturating_add(delay_ns),
+            log_time_ns: (bobcat_start_ns() + sample.time_ns).saturating_add(delay_ns),
             cdr,
             true_points_m: Vec::new(),
         };
-        let inspvax = messages::inspvax(&self.map, sample)?;
+        let inspvax = cdr::to_vec(&messages::inspvax(&self.map, sample)?)?;
+        let odometry = cdr::to_vec(&messages::odometry(sample))?;
+        let turntable = cdr::to_vec(&messages::turntable(self.bobcat, sample.time_ns))?;
         Ok([
-            entry(INSPVAX_TOPIC, sample.delay_ns, cdr::to_vec(&inspvax)?),
-            entry(
-                ODOMETRY_TOPIC,
-                sample.delay_ns,
-                cdr::to_vec(&messages::odometry(sample))?,
-            ),
-            entry(
-                TF_TOPIC,
-                TURNTABLE_DELAY_NS,
-                cdr::to_vec(&messages::turntable(self.bobcat, sample.time_ns))?,
-            ),
+            entry(INSPVAX_TOPIC, sample.delay_ns, inspvax),
+            entry(ODOMETRY_TOPIC, sample.delay_ns, odometry),
+            entry(TF_TOPIC, TURNTABLE_DELAY_NS, turntable),
         ])
     }
 }
@@ -183,11 +169,7 @@ mod tests {
     #[test]
     fn messages_come_in_the_order_of_arrival_and_none_is_lost() {
         let entries = entries(1, 3.0);
-        assert!(
-            entries
-                .windows(2)
-                .all(|pair| pair[0].log_time_ns <= pair[1].log_time_ns)
-        );
+        assert!(entries.is_sorted_by_key(|entry| entry.log_time_ns));
         let count = |topic| entries.iter().filter(|e| e.topic == topic).count();
         assert_eq!(count(TF_STATIC_TOPIC), 1);
         assert_eq!(entries[0].topic, TF_STATIC_TOPIC);

@@ -1,23 +1,20 @@
 //! Messages of the simulated sensors.
 
+use super::facts::{
+    BASE_FRAME, BOBCAT_GPS_WEEK, BOBCAT_GPS_WEEK_MS, BOBCAT_UNDULATION_M, IMU_FRAME, MAP_FRAME,
+    TURNTABLE_FRAME, bobcat_start_ns,
+};
 use crate::simulate::{Bobcat, InsSample, Laser, Lms200Scan, base_from_imu};
 use lattice_core::geodesy::{EnuFrame, GeodesyError};
-use lattice_msgs::builtin_interfaces::Time;
-use lattice_msgs::geometry_msgs::{Point, Pose, Quaternion, Transform, TransformStamped, Vector3};
+use lattice_msgs::geometry_msgs::Vector3;
 use lattice_msgs::nav_msgs::Odometry;
 use lattice_msgs::novatel_oem7_msgs::{
     INSExtendedSolutionStatus, INSPVAX, InertialSolutionStatus, Oem7Header, PositionOrVelocityType,
 };
 use lattice_msgs::sensor_msgs::{PointCloud2, PointField};
-use lattice_msgs::std_msgs::Header;
 use lattice_msgs::tf2_msgs::TFMessage;
-use nalgebra::Isometry3;
-use serde_bytes::ByteBuf;
-
-use super::facts::{
-    BASE_FRAME, BOBCAT_GPS_WEEK, BOBCAT_GPS_WEEK_MS, BOBCAT_UNDULATION_M, IMU_FRAME, MAP_FRAME,
-    TURNTABLE_FRAME, bobcat_start_ns,
-};
+use lattice_nodes::convert::cloud::{dense_cloud, xyz_fields};
+use lattice_nodes::convert::geometry::{header, pose_from, transform_stamped};
 
 /// x, y, z, intensity (f32) and t (u32).
 const POINT_STEP: u32 = 20;
@@ -27,11 +24,9 @@ const INSPVAX_ID: u16 = 1465;
 /// Time status "fine steering" in the receiver's manual.
 const FINE_STEERING: u8 = 180;
 
-fn header(time_ns: i64, frame_id: &str) -> Header {
-    Header {
-        stamp: Time::from_ns(bobcat_start_ns().saturating_add(time_ns)),
-        frame_id: frame_id.to_owned(),
-    }
+/// Time in the log as UTC, ns.
+fn utc_ns(time_ns: i64) -> i64 {
+    bobcat_start_ns().saturating_add(time_ns)
 }
 
 /// A scan in its laser's frame; the stamp is the first beam's time and `t` (ns) counts from it.
@@ -42,6 +37,9 @@ pub(super) fn cloud(laser: Laser, scan: &Lms200Scan) -> PointCloud2 {
         datatype,
         count: 1,
     };
+    let mut fields = xyz_fields(PointField::FLOAT32, 4);
+    fields.push(field("intensity", 12, PointField::FLOAT32));
+    fields.push(field("t", 16, PointField::UINT32));
     let mut data = Vec::with_capacity(scan.returns.len() * POINT_STEP as usize);
     for hit in &scan.returns {
         for value in hit.point_m {
@@ -50,24 +48,8 @@ pub(super) fn cloud(laser: Laser, scan: &Lms200Scan) -> PointCloud2 {
         data.extend_from_slice(&hit.intensity.to_le_bytes());
         data.extend_from_slice(&hit.offset_ns.to_le_bytes());
     }
-    let width = u32::try_from(scan.returns.len()).unwrap_or(u32::MAX);
-    PointCloud2 {
-        header: header(scan.start_ns, laser.frame()),
-        height: 1,
-        width,
-        fields: vec![
-            field("x", 0, PointField::FLOAT32),
-            field("y", 4, PointField::FLOAT32),
-            field("z", 8, PointField::FLOAT32),
-            field("intensity", 12, PointField::FLOAT32),
-            field("t", 16, PointField::UINT32),
-        ],
-        is_bigendian: false,
-        point_step: POINT_STEP,
-        row_step: width.saturating_mul(POINT_STEP),
-        data: ByteBuf::from(data),
-        is_dense: true,
-    }
+    let header = header(laser.frame(), utc_ns(scan.start_ns));
+    dense_cloud(header, fields, POINT_STEP, scan.returns.len(), data)
 }
 
 /// The IMU's pose as the NovAtel driver reports it: stamped on arrival, GPS time of validity in `nov_header`.
@@ -85,7 +67,10 @@ pub(super) fn inspvax(map: &EnuFrame, sample: &InsSample) -> Result<INSPVAX, Geo
         InsSample::ATTITUDE_SIGMA_DEG.map(|sigma_deg| sigma_deg as f32);
     let speed_mps = InsSample::VELOCITY_SIGMA_MPS as f32;
     Ok(INSPVAX {
-        header: header(sample.time_ns.saturating_add(sample.delay_ns), IMU_FRAME),
+        header: header(
+            IMU_FRAME,
+            utc_ns(sample.time_ns.saturating_add(sample.delay_ns)),
+        ),
         nov_header: Oem7Header {
             message_name: "INSPVAX".to_owned(),
             message_id: INSPVAX_ID,
@@ -134,20 +119,15 @@ pub(super) fn inspvax(map: &EnuFrame, sample: &InsSample) -> Result<INSPVAX, Geo
 /// The same measured pose, carried to `base_link`, stamped with its time of validity.
 pub(super) fn odometry(sample: &InsSample) -> Odometry {
     let mut odometry = Odometry {
-        header: header(sample.time_ns, MAP_FRAME),
+        header: header(MAP_FRAME, utc_ns(sample.time_ns)),
         child_frame_id: BASE_FRAME.to_owned(),
         ..Odometry::default()
     };
-    odometry.pose.pose = pose(&sample.map_from_base);
+    odometry.pose.pose = pose_from(&sample.map_from_base);
     let attitude_rad = InsSample::ATTITUDE_SIGMA_DEG.map(f64::to_radians);
     let pose_sigmas = InsSample::POSITION_SIGMA_M.into_iter().chain(attitude_rad);
-    for (diagonal, sigma) in odometry
-        .pose
-        .covariance
-        .iter_mut()
-        .step_by(7)
-        .zip(pose_sigmas)
-    {
+    let diagonal = odometry.pose.covariance.iter_mut().step_by(7);
+    for (diagonal, sigma) in diagonal.zip(pose_sigmas) {
         *diagonal = sigma * sigma;
     }
     odometry.twist.twist.linear = vector(&sample.base_velocity_mps);
@@ -158,116 +138,37 @@ pub(super) fn odometry(sample: &InsSample) -> Odometry {
     odometry
 }
 
-/// Transform of the turntable.
 pub(super) fn turntable(bobcat: &Bobcat, time_ns: i64) -> TFMessage {
+    let pose = bobcat.base_from_turntable(time_ns);
+    let transform = transform_stamped(BASE_FRAME, TURNTABLE_FRAME, utc_ns(time_ns), &pose);
     TFMessage {
-        transforms: vec![transform(
-            time_ns,
-            BASE_FRAME,
-            TURNTABLE_FRAME,
-            &bobcat.base_from_turntable(time_ns),
-        )],
+        transforms: vec![transform],
     }
 }
 
-/// All fixed mounts.
 pub(super) fn mounts() -> TFMessage {
-    let laser = |parent, laser: Laser| transform(0, parent, laser.frame(), &laser.mount());
+    let mount = |parent, child, pose| transform_stamped(parent, child, bobcat_start_ns(), &pose);
+    let laser = |parent, laser: Laser| mount(parent, laser.frame(), laser.mount());
     TFMessage {
         transforms: vec![
             laser(BASE_FRAME, Laser::Left),
             laser(BASE_FRAME, Laser::Right),
             laser(TURNTABLE_FRAME, Laser::Top),
-            transform(0, BASE_FRAME, IMU_FRAME, &base_from_imu()),
+            mount(BASE_FRAME, IMU_FRAME, base_from_imu()),
         ],
     }
 }
 
-fn transform(
-    time_ns: i64,
-    parent: &str,
-    child: &str,
-    parent_from_child: &Isometry3<f64>,
-) -> TransformStamped {
-    let Pose {
-        position,
-        orientation,
-    } = pose(parent_from_child);
-    TransformStamped {
-        header: header(time_ns, parent),
-        child_frame_id: child.to_owned(),
-        transform: Transform {
-            translation: Vector3 {
-                x: position.x,
-                y: position.y,
-                z: position.z,
-            },
-            rotation: orientation,
-        },
-    }
-}
-
-fn pose(isometry: &Isometry3<f64>) -> Pose {
-    let (position, rotation) = (&isometry.translation, isometry.rotation.coords);
-    Pose {
-        position: Point {
-            x: position.x,
-            y: position.y,
-            z: position.z,
-        },
-        orientation: Quaternion {
-            x: rotation.x,
-            y: rotation.y,
-            z: rotation.z,
-            w: rotation.w,
-        },
-    }
-}
-
 fn vector(v: &nalgebra::Vector3<f64>) -> Vector3 {
-    Vector3 {
-        x: v.x,
-        y: v.y,
-        z: v.z,
-    }
+    let [x, y, z] = (*v).into();
+    Vector3 { x, y, z }
 }
 
 #[cfg(test)]
 mod tests {
     use super::*;
     use crate::datasets::bobcat_origin;
-    use crate::simulate::BASE_FROM_IMU_M;
-    use lattice_core::geodesy::{Geodetic, InsMount, enu_from_flu, utc_ns_from_gps};
-
-    #[test]
-    fn inspvax_and_odometry_tell_the_same_pose() {
-        let bobcat = Bobcat::new(3, 60.0).unwrap();
-        let map = EnuFrame::new(bobcat_origin().unwrap());
-        let mount = InsMount::new(nalgebra::Vector3::from(BASE_FROM_IMU_M), [0.0; 3]);
-        for sample in bobcat.ins().step_by(100) {
-            let ins = inspvax(&map, &sample).unwrap();
-            let height_m = ins.height + f64::from(ins.undulation);
-            let place = Geodetic::from_degrees(ins.latitude, ins.longitude, height_m).unwrap();
-            let rotation =
-                map.enu_from_local_level(&place) * enu_from_flu(ins.roll, ins.pitch, ins.azimuth);
-            let imu = Isometry3::from_parts(map.enu_from_geodetic(&place).into(), rotation);
-            let base = imu
-                * Isometry3::from_parts(mount.lever_arm_m.into(), mount.base_from_ins).inverse();
-            let pose = odometry(&sample).pose.pose;
-            let position =
-                nalgebra::Vector3::new(pose.position.x, pose.position.y, pose.position.z);
-            assert!(
-                (base.translation.vector - position).norm() < 1e-6,
-                "{position:?}"
-            );
-            let q = pose.orientation;
-            let orientation = nalgebra::Quaternion::new(q.w, q.x, q.y, q.z);
-            let angle = base
-                .rotation
-                .angle_to(&nalgebra::UnitQuaternion::from_quaternion(orientation));
-            assert!(angle < 1e-7, "{angle} rad");
-        }
-    }
+    use lattice_core::geodesy::utc_ns_from_gps;
 
     #[test]
     fn inspvax_carries_exact_gps_time_and_a_late_stamp() {
@@ -290,47 +191,22 @@ mod tests {
         sample.time_ns =
             i64::try_from(WEEK_MS - u64::from(BOBCAT_GPS_WEEK_MS) + 10).unwrap() * 1_000_000;
         let header = inspvax(&map, &sample).unwrap().nov_header;
-        assert_eq!(
-            (header.gps_week_number, header.gps_week_milliseconds),
-            (2401, 10)
-        );
-    }
-
-    #[test]
-    fn clouds_have_a_point_per_return() {
-        let bobcat = Bobcat::new(3, 2.0).unwrap();
-        let scan = bobcat.scan(Laser::Top, 20);
-        let cloud = cloud(Laser::Top, &scan);
-        assert_eq!(cloud.width as usize, scan.returns.len());
-        assert_eq!(cloud.data.len(), 20 * scan.returns.len());
-        let (last, hit) = (
-            cloud.data.rchunks(20).next().unwrap(),
-            scan.returns.last().unwrap(),
-        );
-        assert_eq!(last[..4], hit.point_m[0].to_le_bytes());
-        assert_eq!(last[16..], hit.offset_ns.to_le_bytes());
+        assert_eq!(header.gps_week_number, 2401);
+        assert_eq!(header.gps_week_milliseconds, 10);
     }
 
     #[test]
     fn each_frame_has_one_parent() {
         let bobcat = Bobcat::new(3, 2.0).unwrap();
-        let mut children: Vec<_> = mounts()
-            .transforms
-            .into_iter()
-            .chain(turntable(&bobcat, 0).transforms)
-            .collect();
+        let mut children = mounts().transforms;
+        children.extend(turntable(&bobcat, 0).transforms);
         children.sort_by(|a, b| a.child_frame_id.cmp(&b.child_frame_id));
-        let names: Vec<_> = children
-            .iter()
-            .map(|t| (t.header.frame_id.as_str(), t.child_frame_id.as_str()))
-            .collect();
-        let expected = [
-            ("base_link", "imu"),
-            ("base_link", "left_laser"),
-            ("base_link", "right_laser"),
-            ("top_turntable", "top_laser"),
-            ("base_link", "top_turntable"),
-        ];
-        assert_eq!(names, expected);
+        let names = children.iter();
+        let names = names.map(|t| format!("{}/{}", t.header.frame_id, t.child_frame_id));
+        let names: Vec<String> = names.collect();
+        assert_eq!(
+            names.join(" "),
+            "base_link/imu base_link/left_laser base_link/right_laser top_turntable/top_laser base_link/top_turntable"
+        );
     }
 }

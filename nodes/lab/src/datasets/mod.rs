@@ -36,8 +36,6 @@ pub use facts::{
     TF_TOPIC, TURNTABLE_FRAME, bobcat_origin, bobcat_start_ns, points_topic,
 };
 pub use house::{
-    CLASSES_FILE, HeadsetAxes, HeadsetScanTruth, HouseOptions, HouseSummary, MAP_FILE, Pose,
-    SceneTruth, write_house,
+    CLASSES_FILE, HeadsetAxes, HouseOptions, HouseSummary, MAP_FILE, SceneTruth, write_house,
 };
-pub use log::LogEntry;
 pub use write::{BobcatOptions, BobcatSummary, write_bobcat};

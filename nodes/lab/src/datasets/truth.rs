@@ -1,27 +1,23 @@
 //! The noise-free truth beside a log.
 
-use std::fs::File;
-use std::io::{BufWriter, Seek, SeekFrom, Write};
-use std::path::PathBuf;
-
-use crate::simulate::{
-    BASE_FROM_TURNTABLE_M, INS_POSITION_RMS_M, InsSample, Laser, MAX_RANGE_M, MIN_RANGE_M,
-    RANGE_NOISE_M, TURNTABLE_PERIOD_NS, base_from_imu,
-};
-use lattice_nodes::files::export::ply_header;
-use nalgebra::{Isometry3, Vector3};
-use serde::Serialize;
-
 use super::BobcatOptions;
 use super::facts::{
     BASE_FRAME, BOBCAT_GPS_WEEK, BOBCAT_GPS_WEEK_MS, BOBCAT_LEAP_SECONDS, BOBCAT_ORIGIN,
     BOBCAT_UNDULATION_M, IMU_FRAME, TURNTABLE_FRAME, bobcat_start_ns,
 };
+use crate::simulate::{
+    BASE_FROM_TURNTABLE_M, INS_POSITION_RMS_M, InsSample, Laser, MAX_RANGE_M, MIN_RANGE_M,
+    RANGE_NOISE_M, TURNTABLE_PERIOD_NS, base_from_imu,
+};
 use crate::{AnyError, at};
+use lattice_nodes::files::export::ply_header;
+use nalgebra::{Isometry3, Vector3};
+use serde_json::{Value, json};
+use std::fs::File;
+use std::io::{BufWriter, Seek, SeekFrom, Write};
+use std::path::PathBuf;
 
-/// The folder in the log's directory.
 pub(super) const FOLDER: &str = "truth";
-/// The files in it.
 pub(super) const FILES: [&str; 3] = [SITE_FILE, POSES_FILE, POINTS_FILE];
 const SITE_FILE: &str = "site.yaml";
 const POSES_FILE: &str = "poses.csv";
@@ -42,7 +38,7 @@ impl Truth {
         let folder = options.out.join(FOLDER);
         std::fs::create_dir_all(&folder).map_err(at(&folder))?;
         let site = folder.join(SITE_FILE);
-        let facts = serde_yaml::to_string(&SiteFacts::new(options)).map_err(at(&site))?;
+        let facts = serde_yaml::to_string(&site_facts(options)).map_err(at(&site))?;
         std::fs::write(&site, facts).map_err(at(&site))?;
         let open = |name: &str| {
             let path = folder.join(name);
@@ -51,10 +47,8 @@ impl Truth {
         };
         let (mut poses, mut points) = (open(POSES_FILE)?, open(POINTS_FILE)?);
         writeln!(poses.1, "stamp_ns,x,y,z,qx,qy,qz,qw").map_err(at(&poses.0))?;
-        points
-            .1
-            .write_all(&padded_header(0))
-            .map_err(at(&points.0))?;
+        let written = points.1.write_all(&padded_header(0));
+        written.map_err(at(&points.0))?;
         Ok(Self {
             poses,
             points,
@@ -65,34 +59,23 @@ impl Truth {
     /// Adds the true pose of `base_link` in the map.
     pub(super) fn pose(&mut self, sample: &InsSample) -> Result<(), AnyError> {
         let stamp_ns = bobcat_start_ns().saturating_add(sample.time_ns);
-        let Isometry3 {
-            rotation,
-            translation,
-        } = sample.true_map_from_base;
-        let (p, q) = (translation.vector, rotation.coords);
+        let pose = sample.true_map_from_base;
+        let (p, q) = (pose.translation.vector, pose.rotation.coords);
         let (path, file) = &mut self.poses;
-        writeln!(
-            file,
-            "{stamp_ns},{},{},{},{},{},{},{}",
-            p.x, p.y, p.z, q.x, q.y, q.z, q.w
-        )
-        .map_err(at(path))
+        let words = p.iter().chain(&q).map(|value| format!(",{value}"));
+        writeln!(file, "{stamp_ns}{}", words.collect::<String>()).map_err(at(path))
     }
 
     /// Adds the true points of a cloud.
     pub(super) fn points(&mut self, points_m: &[[f32; 3]]) -> Result<(), AnyError> {
-        let bytes: Vec<u8> = points_m
-            .iter()
-            .flatten()
-            .flat_map(|v| v.to_le_bytes())
-            .collect();
+        let coordinates = points_m.iter().flatten();
+        let bytes: Vec<u8> = coordinates.flat_map(|v| v.to_le_bytes()).collect();
         let (path, file) = &mut self.points;
         file.write_all(&bytes).map_err(at(path))?;
         self.point_count = self.point_count.saturating_add(points_m.len() as u64);
         Ok(())
     }
 
-    /// Completes the files.
     pub(super) fn finish(self) -> Result<(), AnyError> {
         let Self {
             poses: (poses_path, mut poses),
@@ -118,88 +101,45 @@ fn padded_header(points: u64) -> Vec<u8> {
     ply_header(&comment, &vertices).into_bytes()
 }
 
-/// Contents of `site.yaml`.
-#[derive(Serialize)]
-struct SiteFacts {
-    simulation: &'static str,
-    seed: u64,
-    duration_s: f64,
-    start_utc_ns: i64,
-    start_gps_week: u32,
-    start_gps_week_ms: u32,
-    leap_seconds: i32,
-    origin: Origin,
-    mounts: Vec<Mount>,
-    turntable_period_s: f64,
-    range_noise_m: f64,
-    min_range_m: f64,
-    max_range_m: f64,
-    ins_position_rms_m: f64,
-}
-
-/// The map's origin.
-#[derive(Serialize)]
-struct Origin {
-    latitude_deg: f64,
-    longitude_deg: f64,
-    ellipsoidal_height_m: f64,
-    undulation_m: f32,
-}
-
-/// `parent_from_child`; the turntable's is that at angle zero.
-#[derive(Serialize)]
-struct Mount {
-    parent: &'static str,
-    child: &'static str,
-    translation_m: [f64; 3],
-    rotation_xyzw: [f64; 4],
-}
-
-impl Mount {
-    fn new(parent: &'static str, child: &'static str, parent_from_child: &Isometry3<f64>) -> Self {
-        let translation_m = parent_from_child.translation.vector.into();
-        let rotation_xyzw = parent_from_child.rotation.coords.into();
-        Self {
-            parent,
-            child,
-            translation_m,
-            rotation_xyzw,
-        }
-    }
-}
-
-impl SiteFacts {
-    fn new(options: &BobcatOptions) -> Self {
-        let [latitude_deg, longitude_deg, ellipsoidal_height_m] = BOBCAT_ORIGIN;
-        let turntable = Isometry3::from(Vector3::from(BASE_FROM_TURNTABLE_M));
-        Self {
-            simulation: "bobcat",
-            seed: options.seed,
-            duration_s: options.duration_s,
-            start_utc_ns: bobcat_start_ns(),
-            start_gps_week: BOBCAT_GPS_WEEK,
-            start_gps_week_ms: BOBCAT_GPS_WEEK_MS,
-            leap_seconds: BOBCAT_LEAP_SECONDS,
-            origin: Origin {
-                latitude_deg,
-                longitude_deg,
-                ellipsoidal_height_m,
-                undulation_m: BOBCAT_UNDULATION_M,
-            },
-            mounts: vec![
-                Mount::new(BASE_FRAME, IMU_FRAME, &base_from_imu()),
-                Mount::new(BASE_FRAME, Laser::Left.frame(), &Laser::Left.mount()),
-                Mount::new(BASE_FRAME, Laser::Right.frame(), &Laser::Right.mount()),
-                Mount::new(BASE_FRAME, TURNTABLE_FRAME, &turntable),
-                Mount::new(TURNTABLE_FRAME, Laser::Top.frame(), &Laser::Top.mount()),
-            ],
-            turntable_period_s: TURNTABLE_PERIOD_NS as f64 * 1e-9,
-            range_noise_m: RANGE_NOISE_M,
-            min_range_m: MIN_RANGE_M,
-            max_range_m: MAX_RANGE_M,
-            ins_position_rms_m: INS_POSITION_RMS_M,
-        }
-    }
+/// Contents of `site.yaml`. A mount is `parent_from_child`; the turntable's is that at angle zero.
+fn site_facts(options: &BobcatOptions) -> Value {
+    let [latitude_deg, longitude_deg, ellipsoidal_height_m] = BOBCAT_ORIGIN;
+    let turntable = Isometry3::from(Vector3::from(BASE_FROM_TURNTABLE_M));
+    let mount = |parent: &str, child: &str, pose: &Isometry3<f64>| {
+        json!({
+            "parent": parent,
+            "child": child,
+            "translation_m": <[f64; 3]>::from(pose.translation.vector),
+            "rotation_xyzw": <[f64; 4]>::from(pose.rotation.coords),
+        })
+    };
+    json!({
+        "simulation": "bobcat",
+        "seed": options.seed,
+        "duration_s": options.duration_s,
+        "start_utc_ns": bobcat_start_ns(),
+        "start_gps_week": BOBCAT_GPS_WEEK,
+        "start_gps_week_ms": BOBCAT_GPS_WEEK_MS,
+        "leap_seconds": BOBCAT_LEAP_SECONDS,
+        "origin": {
+            "latitude_deg": latitude_deg,
+            "longitude_deg": longitude_deg,
+            "ellipsoidal_height_m": ellipsoidal_height_m,
+            "undulation_m": BOBCAT_UNDULATION_M,
+        },
+        "mounts": [
+            mount(BASE_FRAME, IMU_FRAME, &base_from_imu()),
+            mount(BASE_FRAME, Laser::Left.frame(), &Laser::Left.mount()),
+            mount(BASE_FRAME, Laser::Right.frame(), &Laser::Right.mount()),
+            mount(BASE_FRAME, TURNTABLE_FRAME, &turntable),
+            mount(TURNTABLE_FRAME, Laser::Top.frame(), &Laser::Top.mount()),
+        ],
+        "turntable_period_s": TURNTABLE_PERIOD_NS as f64 * 1e-9,
+        "range_noise_m": RANGE_NOISE_M,
+        "min_range_m": MIN_RANGE_M,
+        "max_range_m": MAX_RANGE_M,
+        "ins_position_rms_m": INS_POSITION_RMS_M,
+    })
 }
 
 #[cfg(test)]

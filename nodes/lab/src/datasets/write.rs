@@ -1,23 +1,21 @@
 //! The simulated log as a rosbag2 directory.
 
-use std::collections::HashMap;
-use std::fmt;
-use std::fs;
-use std::path::{Path, PathBuf};
-
+use super::facts::{INSPVAX_TOPIC, ODOMETRY_TOPIC, TF_STATIC_TOPIC, TF_TOPIC, points_topic};
+use super::log::{Block, Log};
+use super::truth::{self, Truth};
 use crate::simulate::{Bobcat, Laser};
 use crate::{AnyError, at};
+use lattice_bag::{BagQos, BagWriter, Storage, TopicSpec, WriterOptions};
 use lattice_msgs::RosMessage;
 use lattice_msgs::nav_msgs::Odometry;
 use lattice_msgs::novatel_oem7_msgs::INSPVAX;
 use lattice_msgs::sensor_msgs::PointCloud2;
 use lattice_msgs::tf2_msgs::TFMessage;
 use serde::Serialize;
-
-use super::facts::{INSPVAX_TOPIC, ODOMETRY_TOPIC, TF_STATIC_TOPIC, TF_TOPIC, points_topic};
-use super::log::{Block, Log};
-use super::truth::{self, Truth};
-use lattice_bag::{BagQos, BagWriter, Storage, TopicSpec, WriterOptions};
+use std::collections::HashMap;
+use std::fmt;
+use std::fs;
+use std::path::{Path, PathBuf};
 
 /// Options of a simulated log.
 #[derive(Clone, Debug)]
@@ -37,7 +35,7 @@ pub struct BobcatOptions {
 }
 
 /// Summary of a written log.
-#[derive(Clone, Debug, PartialEq, Serialize)]
+#[derive(Clone, Debug, PartialEq, Default, Serialize)]
 pub struct BobcatSummary {
     /// Directory of the bag.
     pub out: PathBuf,
@@ -89,10 +87,7 @@ pub fn write_bobcat(
     let mut summary = BobcatSummary {
         out: options.out.clone(),
         duration_s: options.duration_s,
-        messages: 0,
-        clouds: 0,
-        points: 0,
-        ins_epochs: 0,
+        ..BobcatSummary::default()
     };
     let mut log = Log::new(&bobcat)?;
     while let Some(block) = log.next_block()? {
@@ -117,11 +112,8 @@ fn write_block(
         truth.points(&entry.true_points_m)?;
         summary.messages += 1;
         summary.points += entry.true_points_m.len() as u64;
-        summary.clouds += u64::from(
-            Laser::ALL
-                .iter()
-                .any(|&laser| points_topic(laser) == entry.topic),
-        );
+        let is_cloud = Laser::ALL.map(points_topic).contains(&entry.topic);
+        summary.clouds += u64::from(is_cloud);
     }
     for sample in block.epochs {
         truth.pose(sample)?;
@@ -166,29 +158,21 @@ fn make_way(out: &Path, overwrite: bool) -> Result<(), AnyError> {
         return Ok(());
     }
     if !overwrite {
-        return Err(format!(
-            "{}: there is a log already; choose another directory or allow to overwrite it",
-            out.display()
-        )
-        .into());
+        let words = "there is a log already; choose another directory or allow to overwrite it";
+        return Err(at(out)(words));
     }
     let mut files = Vec::new();
     for entry in fs::read_dir(&folder).map_err(at(&folder))? {
         let path = entry.map_err(at(&folder))?.path();
-        if !truth::FILES
-            .iter()
-            .any(|&name| path.file_name() == Some(name.as_ref()))
-        {
-            return Err(format!(
-                "{}: not written by a simulation and not overwritten; move it or choose another directory",
-                path.display()
-            )
-            .into());
+        let mut known = truth::FILES.iter();
+        if !known.any(|&name| path.file_name() == Some(name.as_ref())) {
+            let words = "not written by a simulation and not overwritten; move it or choose another directory";
+            return Err(at(&path)(words));
         }
         files.push(path);
     }
-    files
-        .iter()
-        .try_for_each(|path| fs::remove_file(path).map_err(at(path)))?;
+    for path in &files {
+        fs::remove_file(path).map_err(at(path))?;
+    }
     fs::remove_dir(&folder).map_err(at(&folder))
 }

@@ -1,40 +1,36 @@
 //! The pictures of a calibration evaluation.
 
-use std::collections::BTreeMap;
-
-use plotters::prelude::*;
-
 use super::methods::{color, competitors, title};
 use super::summary::{Summary, sorted};
 use super::trial::{OURS, Trial, WRONG};
 use crate::AnyError;
 use crate::report::Figure;
-use crate::report::plot::{Area, Layout, chart, svg};
+use crate::report::plot::{Area, Key, Layout, chart, svg};
+use plotters::prelude::*;
+use std::collections::BTreeMap;
 
 /// Range of errors that is shown.
 const ERRORS: std::ops::Range<f64> = 0.005..30.0;
 /// Range of shares of wrong labels that is shown.
-const FLIPS: std::ops::Range<f64> = -0.02..0.85;
+const QS: (&str, std::ops::Range<f64>) = ("share of wrong labels q", -0.02..0.85);
 /// Colours of accepted and refused poses.
 const ACCEPTED: RGBColor = RGBColor(0, 114, 178);
 const REFUSED: RGBColor = RGBColor(213, 94, 0);
 
 fn picture(
-    (columns, rows): (usize, usize),
-    key: &[(RGBColor, &str)],
+    name: &str,
+    caption: &str,
+    grid: [usize; 2],
+    key: &[Key],
     draw: impl FnOnce(&[Area]) -> Result<(), AnyError>,
-) -> Result<String, AnyError> {
-    let layout = Layout {
-        panel: (430, 330),
-        columns,
-        rows,
-        key_width: 170,
-        key,
-    };
-    svg(&layout, draw)
+) -> Result<Figure, AnyError> {
+    let picture = svg(&Layout::new((430, 330), grid, 170, key), draw)?;
+    Ok(Figure::new(name, caption, picture))
 }
 
-fn key_of_methods() -> Vec<(RGBColor, &'static str)> {
+const VERDICTS: [Key; 2] = [(ACCEPTED, "accepted"), (REFUSED, "refused")];
+
+fn key_of_methods() -> Vec<Key<'static>> {
     competitors()
         .map(|name| (color(name), title(name)))
         .collect()
@@ -55,16 +51,12 @@ fn shown(error: f64) -> f64 {
 pub fn d_se3(summary: &Summary) -> Result<Figure, AnyError> {
     let starts = summary.starts();
     let scenes = summary.scenes();
-    let cells = starts
-        .iter()
-        .flat_map(|start| scenes.iter().map(move |scene| (*start, *scene)));
+    let cells = starts.iter();
+    let cells = cells.flat_map(|start| scenes.iter().map(move |scene| (*start, *scene)));
     let draw = |areas: &[Area]| {
         for ((start, scene), area) in cells.zip(areas) {
-            let (xs, ys) = (
-                ("share of wrong labels q", FLIPS),
-                ("median d_SE3", ERRORS.log_scale()),
-            );
-            let mut chart = chart(area, &format!("{scene}, start {start}"), xs, ys)?;
+            let y = ("median d_SE3", ERRORS.log_scale());
+            let mut chart = chart(area, &format!("{scene}, start {start}"), QS, y, &[])?;
             for method in competitors() {
                 let (color, rows) = (color(method), summary.of_method(scene, start, method));
                 let points = rows.iter().filter_map(|r| Some((r.q, shown(r.d_se3?))));
@@ -74,12 +66,14 @@ pub fn d_se3(summary: &Summary) -> Result<Figure, AnyError> {
         }
         Ok(())
     };
-    let picture = picture((scenes.len(), starts.len()), &key_of_methods(), draw)?;
-    Ok(Figure::new(
+    let caption = "Median d_SE3 by the share of wrong labels";
+    picture(
         "d_se3",
-        "Median d_SE3 by the share of wrong labels",
-        picture,
-    ))
+        caption,
+        [scenes.len(), starts.len()],
+        &key_of_methods(),
+        draw,
+    )
 }
 
 /// Right poses by q, all scenes: a panel for each start.
@@ -87,9 +81,8 @@ pub fn success(summary: &Summary) -> Result<Figure, AnyError> {
     let starts = summary.starts();
     let draw = |areas: &[Area]| {
         for (start, area) in starts.iter().zip(areas) {
-            let xs = ("share of wrong labels q", FLIPS);
-            let ys = ("right within 0.15 m and 3 deg", 0.0..1.02);
-            let mut chart = chart(area, &format!("all scenes, start {start}"), xs, ys)?;
+            let y = ("right within 0.15 m and 3 deg", 0.0..1.02);
+            let mut chart = chart(area, &format!("all scenes, start {start}"), QS, y, &[])?;
             for method in competitors() {
                 let (color, rows) = (color(method), summary.of_method("all", start, method));
                 let points = rows.iter().filter_map(|r| Some((r.q, r.success.share?)));
@@ -102,12 +95,14 @@ pub fn success(summary: &Summary) -> Result<Figure, AnyError> {
         }
         Ok(())
     };
-    let picture = picture((starts.len(), 1), &key_of_methods(), draw)?;
-    Ok(Figure::new(
+    let caption = "Right poses by the share of wrong labels";
+    picture(
         "success",
-        "Right poses by the share of wrong labels",
-        picture,
-    ))
+        caption,
+        [starts.len(), 1],
+        &key_of_methods(),
+        draw,
+    )
 }
 
 /// Mean distance of the seen points, ours over GICP-SE(3), one dot a trial.
@@ -118,11 +113,8 @@ pub fn paired(trials: &[Trial]) -> Result<Figure, AnyError> {
     let draw = |areas: &[Area]| {
         for (start, area) in starts.iter().zip(areas) {
             let title = format!("mean distance in the view (m), start {start}");
-            let (xs, ys) = (
-                ("GICP-SE(3)", ERRORS.log_scale()),
-                ("ours", ERRORS.log_scale()),
-            );
-            let mut chart = chart(area, &title, xs, ys)?;
+            let [x, y] = ["GICP-SE(3)", "ours"].map(|name| (name, ERRORS.log_scale()));
+            let mut chart = chart(area, &title, x, y, &[])?;
             let ends = [ERRORS.start, ERRORS.end].map(|e| (e, e));
             chart.draw_series(LineSeries::new(ends, BLACK.mix(0.4)))?;
             let ours = of(OURS).filter(|t| t.cell.start == *start);
@@ -134,16 +126,8 @@ pub fn paired(trials: &[Trial]) -> Result<Figure, AnyError> {
         }
         Ok(())
     };
-    let picture = picture(
-        (starts.len(), 1),
-        &[(ACCEPTED, "accepted"), (REFUSED, "refused")],
-        draw,
-    )?;
-    Ok(Figure::new(
-        "paired",
-        "Ours against GICP-SE(3), trial by trial",
-        picture,
-    ))
+    let caption = "Ours against GICP-SE(3), trial by trial";
+    picture("paired", caption, [starts.len(), 1], &VERDICTS, draw)
 }
 
 /// Log-margin over the error, without a start.
@@ -151,37 +135,21 @@ pub fn margins(trials: &[Trial]) -> Result<Figure, AnyError> {
     let margins = 0.1..100_000.0;
     let draw = |areas: &[Area]| {
         for area in areas {
-            let xs = ("distance from the truth (m)", ERRORS.log_scale());
-            let mut chart = chart(
-                area,
-                "no start",
-                xs,
-                ("log-margin", margins.clone().log_scale()),
-            )?;
+            let x = ("distance from the truth (m)", ERRORS.log_scale());
+            let y = ("log-margin", margins.clone().log_scale());
+            let mut chart = chart(area, "no start", x, y, &[])?;
             let bound = [margins.start, margins.end].map(|m| (WRONG.m, m));
             chart.draw_series(LineSeries::new(bound, BLACK.mix(0.4)))?;
-            let ours = trials
-                .iter()
-                .filter(|t| t.method == OURS && t.cell.start == "none");
-            chart.draw_series(ours.filter_map(|t| {
+            let ours = |t: &&Trial| t.method == OURS && t.cell.start == "none";
+            chart.draw_series(trials.iter().filter(ours).filter_map(|t| {
                 let margin = t.judged.as_ref()?.margin.unwrap_or(margins.end);
-                let at = (
-                    shown(t.translation_m),
-                    margin.clamp(margins.start, margins.end),
-                );
+                let margin = margin.clamp(margins.start, margins.end);
+                let at = (shown(t.translation_m), margin);
                 Some(Circle::new(at, 3, verdict_color(t).mix(0.6).filled()))
             }))?;
         }
         Ok(())
     };
-    let picture = picture(
-        (1, 1),
-        &[(ACCEPTED, "accepted"), (REFUSED, "refused")],
-        draw,
-    )?;
-    Ok(Figure::new(
-        "margins",
-        "Margins of right and wrong poses without a start",
-        picture,
-    ))
+    let caption = "Margins of right and wrong poses without a start";
+    picture("margins", caption, [1, 1], &VERDICTS, draw)
 }

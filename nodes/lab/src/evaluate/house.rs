@@ -1,11 +1,10 @@
 //! The house of an evaluation or a data set.
 
-use std::path::Path;
-
 use crate::mesh::read_mesh;
 use crate::simulate::house::House;
 use crate::{AnyError, at};
 use lattice_nodes::files::classes::read_classes;
+use std::path::PathBuf;
 
 /// Most triangles of a mesh that is read.
 const MAX_TRIANGLES: usize = 5_000_000;
@@ -13,7 +12,7 @@ const MAX_TRIANGLES: usize = 5_000_000;
 /// The house of a PLY mesh and a YAML file with the names of its classes, or else the generated one of a
 /// seed; with the checksum of the mesh.
 pub fn read_house(
-    mesh: Option<(&Path, &Path)>,
+    mesh: Option<&(PathBuf, PathBuf)>,
     seed: u64,
 ) -> Result<(House, Option<u32>), AnyError> {
     let Some((mesh, classes)) = mesh else {

@@ -1,16 +1,14 @@
 //! Competitors of the evaluations: registrations, the start itself and ours, with their colours.
 
-use lattice_core::registration::{Method, NamedMethod, PreparedCloud, register};
+use super::testbed::Scenario;
+use super::trial::{OURS, TIMED, TRACKED};
+use lattice_core::registration::{Method, NamedMethod, register};
 use nalgebra::Isometry3;
 use plotters::style::RGBColor;
 
-use super::trial::{OURS, TIMED, TRACKED};
-
 /// Gate of the methods for which none is published, metres.
 const GATE_M: f64 = 1.0;
-/// Name of the start itself.
 pub const START: &str = "start";
-/// Title of ours in tables.
 pub const OURS_TITLE: &str = "ours";
 
 /// Name, letters below a method's dots, and colour; most eyes tell the colours apart (Wong 2011).
@@ -59,43 +57,30 @@ pub fn competitors() -> impl Iterator<Item = &'static str> {
 #[derive(Clone, Copy, Debug)]
 pub struct Baseline(Option<&'static NamedMethod>);
 
-/// The points of the headset, made ready.
-pub struct Sources<'a> {
-    /// Points thinned to the cells of the map.
-    pub thinned: &'a PreparedCloud,
-    /// All points, for the class-wise method of 2017: it leaves out classes of fewer than 400 points, which
-    /// would be nearly all of the thinned ones.
-    pub full: &'a PreparedCloud,
-}
-
 impl Baseline {
-    /// All baselines, in the order of the tables.
     pub fn all() -> impl Iterator<Item = Baseline> {
         let methods = NamedMethod::ALL.iter().map(Some);
         let all = std::iter::once(None).chain(methods).map(Baseline);
         all.filter(|baseline| baseline.name() != "as_printed")
     }
 
-    /// Name in results.
     pub fn name(&self) -> &'static str {
         self.0.map_or(START, |method| method.name)
     }
 
     /// The pose that it finds from a start.
-    pub fn run(
-        &self,
-        sources: &Sources<'_>,
-        target: &PreparedCloud,
-        start: &Isometry3<f64>,
-    ) -> Isometry3<f64> {
+    ///
+    /// The class-wise method of 2017 gets all points: it leaves out classes of fewer than 400, which would
+    /// be nearly all of the thinned ones.
+    pub fn run(&self, scenario: &Scenario, start: &Isometry3<f64>) -> Isometry3<f64> {
         let Some(method) = self.0 else {
             return *start;
         };
         let options = method.options(GATE_M);
         let source = match options.method {
-            Method::ClassWise if options.kernel_of_square => sources.full,
-            _ => sources.thinned,
+            Method::ClassWise if options.kernel_of_square => &scenario.full,
+            _ => &scenario.source,
         };
-        register(source, target, start, &options).target_from_source
+        register(source, scenario.map.cloud(), start, &options).target_from_source
     }
 }

@@ -20,14 +20,20 @@ mod testbed;
 mod trial;
 
 pub use house::read_house;
-pub use methods::{color, competitors, letters, title};
+pub use methods::competitors;
+pub(crate) use methods::{color, letters, title};
 pub use report::report;
-pub use results::{FILE, Results};
+pub use results::Results;
 pub use run::run;
-pub use settings::{Cell, FORMAT, Pivot, Plan, Settings, Start};
-pub use statistics::{
+#[cfg(test)]
+pub(crate) use settings::Cell;
+pub use settings::{Pivot, Plan, Settings, Start};
+pub(crate) use statistics::{
     LEAST_FOR_INTERVAL, Share, distinct, extent, median, median_interval, quantile,
 };
-pub use summary::{PRINTED, Printed, Summary};
-pub use testbed::{Scenario, Testbed, View};
-pub use trial::{Bounds, Judged, OURS, TIMED, TRACKED, Trial, WRONG, WRONG_TIGHT};
+pub use summary::Summary;
+pub(crate) use summary::{PRINTED, Printed};
+pub(crate) use testbed::Scenario;
+pub use testbed::Testbed;
+pub(crate) use trial::{Bounds, OURS, Trial, WRONG};
+pub use trial::{TIMED, TRACKED};

@@ -5,7 +5,7 @@ use super::methods::{competitors, title};
 use super::summary::{Accepted, Row, Summary};
 use super::trial::Trial;
 use crate::AnyError;
-use crate::report::{Cell, Head, Report, Section, Table};
+use crate::report::{Cell, Report, Section, Table};
 
 /// Failures that are listed; all are in summary.json.
 const LISTED: usize = 60;
@@ -13,25 +13,18 @@ const LISTED: usize = 60;
 /// The report of a summary, with pictures of its trials.
 pub fn report(summary: &Summary, trials: &[Trial]) -> Result<Report, AnyError> {
     let settings = &summary.settings;
-    let house = match settings.mesh_crc32 {
-        Some(crc) => format!("mesh with CRC-32 {crc:08x}"),
-        None => "the house of our own making".to_owned(),
-    };
-    let head = Head {
-        title: "Calibration, measured in simulation".to_owned(),
-        lead: format!(
-            "{} results; map cells of {} m, {} surveys of {} views, {} picture(s) of the headset; {house}. \
-             docs/calibration.md says how it is done. A pose is right within 0.15 m and 3 degrees; q is the \
-             share of the view whose objects are labelled wrongly in the map or in the headset. \
-             Brackets are 95 % intervals (Wilson).",
-            summary.trials,
-            settings.cell_side_m,
-            settings.map_seeds,
-            settings.survey_views,
-            settings.headset_scans,
-        ),
-        command: "lattice evaluate calibration".to_owned(),
-    };
+    let lead = format!(
+        "{} results; map cells of {} m, {} surveys of {} views, {} picture(s) of the headset; {}. \
+         docs/calibration.md says how it is done. A pose is right within 0.15 m and 3 degrees; q is the \
+         share of the view whose objects are labelled wrongly in the map or in the headset. \
+         Brackets are 95 % intervals (Wilson).",
+        summary.trials,
+        settings.cell_side_m,
+        settings.map_seeds,
+        settings.survey_views,
+        settings.headset_scans,
+        settings.mesh_name(),
+    );
     let sections = vec![
         printed(summary)?,
         by_start(summary)?,
@@ -41,7 +34,9 @@ pub fn report(summary: &Summary, trials: &[Trial]) -> Result<Report, AnyError> {
         times(summary),
         failures(summary),
     ];
-    Ok(Report::new(head, sections))
+    let title = "Calibration, measured in simulation";
+    let command = "lattice evaluate calibration".to_owned();
+    Ok(Report::new(title, lead, command, sections))
 }
 
 fn find<'a>(
@@ -51,10 +46,8 @@ fn find<'a>(
     q: f64,
     method: &str,
 ) -> Option<&'a Row> {
-    summary
-        .rows
-        .iter()
-        .find(|r| r.scene == scene && r.start == start && r.q == q && r.method == method)
+    let of = |r: &&Row| r.scene == scene && r.start == start && r.q == q && r.method == method;
+    summary.rows.iter().find(of)
 }
 
 /// A share of wrong labels, or all of them.
@@ -80,17 +73,15 @@ fn printed(summary: &Summary) -> Result<Section, AnyError> {
             }
             row
         };
-        let mut columns: Vec<String> = ["scene", "paper: GICP-SE(3)", "paper: Semantic-ICP"]
-            .map(String::from)
-            .into();
+        let mut columns = "scene|paper: GICP-SE(3)|paper: Semantic-ICP".to_owned();
         for method in competitors() {
-            let of = |q: Option<f64>| format!("{}, q = {}", title(method), q.unwrap_or_default());
+            let of = |q: Option<f64>| format!("|{}, q = {}", title(method), q.unwrap_or_default());
             columns.extend([of(low), of(high)]);
         }
         Table::new(
             format!("d_se3_{number}"),
             format!("Median d_SE3, start {start} (metres/degrees off)"),
-            columns,
+            &columns,
             summary.printed.iter().map(row),
         )
     };
@@ -114,18 +105,17 @@ fn by_start(summary: &Summary) -> Result<Section, AnyError> {
     let table = |(number, start): (usize, &str)| {
         let row = |method: &'static str| {
             let of = |q: &f64| find(summary, "all", start, *q, method);
-            let cells: Vec<Cell> = flips
-                .iter()
-                .map(|q| of(q).map_or(Cell::Empty, |r| r.success.text(1).into()))
-                .collect();
+            let cell = |q| of(q).map_or(Cell::Empty, |r| r.success.text(1).into());
+            let cells: Vec<Cell> = flips.iter().map(cell).collect();
             let any = cells.iter().any(|cell| *cell != Cell::Empty);
             any.then(|| std::iter::once(title(method).into()).chain(cells).collect())
         };
-        let columns = std::iter::once("method".to_owned());
+        let mut columns = "method".to_owned();
+        columns.extend(flips.iter().map(|q| format!("|q = {q}")));
         Table::new(
             format!("right_{number}"),
             format!("Right poses, start {start}"),
-            columns.chain(flips.iter().map(|q| format!("q = {q}"))),
+            &columns,
             competitors().filter_map(row),
         )
     };
@@ -142,16 +132,8 @@ fn by_start(summary: &Summary) -> Result<Section, AnyError> {
 }
 
 fn paired(summary: &Summary, trials: &[Trial]) -> Result<Section, AnyError> {
-    let columns = [
-        "against",
-        "start",
-        "q",
-        "not worse",
-        "not worse or saved",
-        "not worse in the view",
-        "saved",
-        "spoiled",
-    ];
+    let columns =
+        "against|start|q|not worse|not worse or saved|not worse in the view|saved|spoiled";
     let rows = competitors().flat_map(|method| {
         let detailed = ["gicp", "gicp_se3"].contains(&method);
         let of = summary.paired.iter().filter(move |p| p.against == method);
@@ -183,17 +165,8 @@ fn paired(summary: &Summary, trials: &[Trial]) -> Result<Section, AnyError> {
 }
 
 fn accepted(summary: &Summary, trials: &[Trial]) -> Result<Section, AnyError> {
-    let columns = [
-        "start",
-        "scene",
-        "q",
-        "right before any verdict",
-        "accepted",
-        "wrong of these, 0.15 m",
-        "wrong of these, 0.10 m",
-        "wrong of these, 0.15 m in the view",
-        "verdicts",
-    ];
+    let columns = "start|scene|q|right before any verdict|accepted|wrong of these, 0.15 m|\
+        wrong of these, 0.10 m|wrong of these, 0.15 m in the view|verdicts";
     let shown = |a: &&Accepted| a.q.is_none() || a.scene == "all";
     let rows = summary.accepted.iter().filter(shown).map(|row| {
         let verdicts = row.verdicts.iter().map(|(name, n)| format!("{name} {n}"));
@@ -225,7 +198,7 @@ fn consistency(summary: &Summary) -> Section {
             Cell::number(row.median_over_expected, 2),
         ]
     });
-    let columns = ["start", "poses", "mean / 6", "median / 5.35"];
+    let columns = "start|poses|mean / 6|median / 5.35";
     Section {
         tables: vec![Table::new(
             "covariance",
@@ -242,10 +215,8 @@ fn consistency(summary: &Summary) -> Section {
 }
 
 fn times(summary: &Summary) -> Section {
-    let timed = summary
-        .times
-        .iter()
-        .filter(|row| row.method != super::methods::START);
+    let timed = summary.times.iter();
+    let timed = timed.filter(|row| row.method != super::methods::START);
     let rows = timed.map(|row| {
         vec![
             title(&row.method).into(),
@@ -255,13 +226,7 @@ fn times(summary: &Summary) -> Section {
             Cell::number(row.p90_ms, 0),
         ]
     });
-    let columns = [
-        "method",
-        "start",
-        "trials",
-        "median (ms)",
-        "90 % below (ms)",
-    ];
+    let columns = "method|start|trials|median (ms)|90 % below (ms)";
     Section {
         tables: vec![Table::new("times", "Wall times", columns, rows)],
         ..Section::measured(
@@ -276,19 +241,7 @@ fn times(summary: &Summary) -> Section {
 }
 
 fn failures(summary: &Summary) -> Section {
-    let columns = [
-        "scene",
-        "seed",
-        "q",
-        "start",
-        "verdict",
-        "margin",
-        "on the map",
-        "m",
-        "degrees",
-        "chosen",
-        "reason",
-    ];
+    let columns = "scene|seed|q|start|verdict|margin|on the map|m|degrees|chosen|reason";
     // Accepted and wrong ones first.
     let mut listed: Vec<_> = summary.failures.iter().collect();
     listed.sort_by_key(|t| !t.is_accepted());

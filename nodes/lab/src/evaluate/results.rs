@@ -1,18 +1,15 @@
 //! The file of results: a line of settings, then a line for each trial, as it is done.
 
+use super::settings::{Cell, Settings};
+use super::trial::Trial;
+use crate::{AnyError, at};
+use serde::{Deserialize, Serialize};
 use std::borrow::Cow;
 use std::collections::HashSet;
 use std::fs::{self, File, OpenOptions};
 use std::io::{self, Write};
 use std::path::{Path, PathBuf};
 
-use serde::{Deserialize, Serialize};
-
-use super::settings::{Cell, Settings};
-use super::trial::Trial;
-use crate::{AnyError, at};
-
-/// Name of the file in its folder.
 pub const FILE: &str = "trials.jsonl";
 
 /// Results that grow.
@@ -30,8 +27,7 @@ struct Head {
 }
 
 impl Results {
-    /// Results that are not kept.
-    pub fn in_memory() -> Results {
+    pub(crate) fn in_memory() -> Results {
         Results::default()
     }
 
@@ -91,7 +87,7 @@ impl Results {
         sorted(self.trials)
     }
 
-    /// Names of all trials that are done.
+    /// Names of the trials that need not be run again.
     pub fn done(&self) -> HashSet<String> {
         self.done.clone()
     }
@@ -116,15 +112,11 @@ fn whole_lines(bytes: &[u8]) -> (Cow<'_, str>, usize) {
     (String::from_utf8_lossy(lines), whole)
 }
 
-/// One name for each trial and method.
 pub fn name(cell: &Cell, method: &str) -> String {
-    let Cell {
-        scene,
-        seed,
-        q,
-        start,
-    } = cell;
-    format!("{scene} {seed} {q} {start} {method}")
+    format!(
+        "{} {} {} {} {method}",
+        cell.scene, cell.seed, cell.q, cell.start
+    )
 }
 
 fn damaged(path: &Path, line: usize, reason: &serde_json::Error) -> AnyError {
@@ -158,9 +150,8 @@ fn write_line(file: &mut File, value: &impl Serialize) -> io::Result<()> {
 
 #[cfg(test)]
 mod tests {
-    use nalgebra::Isometry3;
-
     use super::*;
+    use nalgebra::Isometry3;
 
     fn trial(seed: u64) -> Trial {
         let cell = Cell {
@@ -221,18 +212,17 @@ mod tests {
             headset_scans: 2,
             ..Settings::default()
         };
-        let error = Results::open(folder.path(), &other)
-            .unwrap_err()
-            .to_string();
-        assert!(error.contains("other settings"), "{error}");
+        let fault = |settings| {
+            Results::open(folder.path(), settings)
+                .unwrap_err()
+                .to_string()
+        };
+        assert!(fault(&other).contains("other settings"));
 
         let path = folder.path().join(FILE);
         let mut text = fs::read_to_string(&path).unwrap();
         text.push_str("{\"scene\":\n");
         fs::write(&path, text).unwrap();
-        let error = Results::open(folder.path(), &Settings::default())
-            .unwrap_err()
-            .to_string();
-        assert!(error.contains("line 2"), "{error}");
+        assert!(fault(&Settings::default()).contains("line 2"));
     }
 }

@@ -1,29 +1,25 @@
 //! The run of all trials, side by side and timed.
 
-use std::collections::HashSet;
-use std::ops::ControlFlow;
-use std::sync::atomic::{AtomicBool, AtomicUsize, Ordering};
-use std::sync::mpsc;
-use std::time::Instant;
-
-use crate::simulate::house::Scene;
-use lattice_core::registration::{CalibrationOptions, CalibrationRequest, calibrate, track};
-use nalgebra::Isometry3;
-
 use super::initial_guess::{perturbed, seed_of};
-use super::methods::{Baseline, Sources};
+use super::methods::Baseline;
 use super::results::{Results, name};
 use super::settings::{Cell, Plan, Start};
-use super::testbed::{Scenario, Testbed, View};
+use super::testbed::{Scenario, Testbed};
 use super::trial::{OURS, TIMED, TRACKED, Trial, rounded};
+use crate::simulate::house::Scene;
 use crate::{AnyError, pool};
+use lattice_core::registration::{CalibrationOptions, CalibrationRequest, calibrate, track};
+use nalgebra::Isometry3;
+use std::collections::HashSet;
+use std::sync::atomic::{AtomicUsize, Ordering};
+use std::sync::mpsc;
+use std::time::Instant;
 
 /// Number of the seeds of starts.
 const START: u64 = 4;
 /// Error of the tracker's start, metres and degrees.
 const TRACKED_OFF: (f64, f64) = (0.03, 1.0);
 
-/// One method on one trial.
 struct Task {
     cell: Cell,
     start: Start,
@@ -49,7 +45,6 @@ impl TaskMethod {
     }
 }
 
-/// The tasks of one view.
 struct Job {
     scene: Scene,
     seed: u64,
@@ -58,44 +53,35 @@ struct Job {
 
 /// Runs all trials of a plan that the results do not have yet, on `threads` threads.
 ///
-/// `progress` hears of trials done, of all, and may end the run with `Break`; what is done stays.
+/// `progress` hears of trials done, of all.
 pub fn run(
     testbed: &Testbed,
     plan: &Plan,
     results: &mut Results,
     threads: usize,
-    progress: &mut dyn FnMut(usize, usize) -> ControlFlow<()>,
+    progress: &mut dyn FnMut(usize, usize),
 ) -> Result<(), AnyError> {
     let done = results.done();
-    let jobs = jobs(plan, &done, false);
-    let timed = self::jobs(plan, &done, true);
-    let tasks = |jobs: &[Job]| jobs.iter().map(|job| job.tasks.len()).sum::<usize>();
-    let total = tasks(&jobs) + tasks(&timed);
+    let [jobs, timed] = [false, true].map(|timed| jobs(plan, &done, timed));
+    let total = jobs.iter().chain(&timed).map(|job| job.tasks.len()).sum();
     let mut count = 0;
-    let mut keep = |trial: Trial| -> Result<ControlFlow<()>, AnyError> {
+    let mut keep = |trial: Trial| -> Result<(), AnyError> {
         results.add(trial)?;
         count += 1;
-        Ok(progress(count, total))
+        progress(count, total);
+        Ok(())
     };
-    if side_by_side(testbed, &jobs, threads, &mut keep)?.is_break() {
-        return Err("ended before all trials were done".into());
-    }
+    side_by_side(testbed, &jobs, threads, &mut keep)?;
     // Nothing else runs while times are taken.
     let pool = pool(threads)?;
     for job in &timed {
         let mut trials = Vec::new();
-        // The callback never breaks.
-        let _ = pool.install(|| {
-            run_job(testbed, job, &mut |trial| {
-                trials.push(trial);
-                ControlFlow::Continue(())
-            })
-        })?;
-        for trial in trials {
-            if keep(trial)?.is_break() {
-                return Err("ended before all trials were done".into());
-            }
-        }
+        let mut found = |trial| {
+            trials.push(trial);
+            Ok(())
+        };
+        pool.install(|| run_job(testbed, job, &mut found))?;
+        trials.into_iter().try_for_each(&mut keep)?;
     }
     Ok(())
 }
@@ -105,83 +91,63 @@ fn side_by_side(
     testbed: &Testbed,
     jobs: &[Job],
     threads: usize,
-    keep: &mut dyn FnMut(Trial) -> Result<ControlFlow<()>, AnyError>,
-) -> Result<ControlFlow<()>, AnyError> {
-    let (next, ended) = (AtomicUsize::new(0), AtomicBool::new(false));
+    keep: &mut dyn FnMut(Trial) -> Result<(), AnyError>,
+) -> Result<(), AnyError> {
+    let next = AtomicUsize::new(0);
     let (sender, receiver) = mpsc::channel::<Result<Trial, AnyError>>();
     std::thread::scope(|scope| {
         for _ in 0..threads.max(1) {
-            let (sender, next, ended) = (sender.clone(), &next, &ended);
+            let (sender, next) = (sender.clone(), &next);
             scope.spawn(move || {
-                let worked =
-                    pool(1).and_then(|pool| {
-                        pool.install(|| {
-                            work(testbed, jobs, next, &mut |trial| match ended
-                                .load(Ordering::Relaxed)
-                                || sender.send(Ok(trial)).is_err()
-                            {
-                                true => ControlFlow::Break(()),
-                                false => ControlFlow::Continue(()),
-                            })
-                        })
-                    });
-                if let Err(fault) = worked {
+                let mut found = |trial| {
+                    let sent = sender.send(Ok(trial));
+                    Ok(sent.map_err(|_| "nobody takes the trials any more")?)
+                };
+                let mut work = || {
+                    while let Some(job) = jobs.get(next.fetch_add(1, Ordering::Relaxed)) {
+                        run_job(testbed, job, &mut found)?;
+                    }
+                    Ok(())
+                };
+                if let Err(error) = pool(1).and_then(|pool| pool.install(&mut work)) {
                     // The receiver is gone only after another error.
-                    let _ = sender.send(Err(fault));
+                    let _ = sender.send(Err(error));
                 }
             });
         }
         drop(sender);
-        for trial in receiver {
-            let kept = trial.and_then(&mut *keep);
-            if !matches!(kept, Ok(ControlFlow::Continue(()))) {
-                ended.store(true, Ordering::Relaxed);
-                return kept;
-            }
-        }
-        Ok(ControlFlow::Continue(()))
+        receiver.into_iter().try_for_each(|trial| keep(trial?))
     })
-}
-
-/// Takes one job after the other.
-fn work(
-    testbed: &Testbed,
-    jobs: &[Job],
-    next: &AtomicUsize,
-    found: &mut dyn FnMut(Trial) -> ControlFlow<()>,
-) -> Result<(), AnyError> {
-    while let Some(job) = jobs.get(next.fetch_add(1, Ordering::Relaxed)) {
-        if run_job(testbed, job, found)?.is_break() {
-            break;
-        }
-    }
-    Ok(())
 }
 
 /// The jobs of a plan that are not done; `timed` for those that are measured alone.
 fn jobs(plan: &Plan, done: &HashSet<String>, timed: bool) -> Vec<Job> {
-    let views = plan.views().into_iter();
-    let job = |(seed, scene)| Job {
-        scene,
-        seed,
-        tasks: match timed {
+    let job = |(seed, scene)| {
+        let mut tasks = match timed {
             true => timed_tasks(plan, scene, seed),
             false => tasks(plan, scene, seed),
-        }
-        .into_iter()
-        .filter(|task| plan.wants(task.method.name()))
-        .filter(|task| !done.contains(&name(&task.cell, task.method.name())))
-        .collect(),
+        };
+        tasks.retain(|Task { cell, method, .. }| {
+            plan.wants(method.name()) && !done.contains(&name(cell, method.name()))
+        });
+        (!tasks.is_empty()).then_some(Job { scene, seed, tasks })
     };
-    views.map(job).filter(|job| !job.tasks.is_empty()).collect()
+    plan.views().into_iter().filter_map(job).collect()
 }
 
-fn cell(scene: Scene, seed: u64, q: f64, start: Start) -> Cell {
-    Cell {
-        scene: scene.name().to_owned(),
-        seed,
-        q,
-        start: start.to_string(),
+impl Task {
+    fn new(scene: Scene, seed: u64, q: f64, start: Start, method: TaskMethod) -> Task {
+        let cell = Cell {
+            scene: scene.name().to_owned(),
+            seed,
+            q,
+            start: start.to_string(),
+        };
+        Task {
+            cell,
+            start,
+            method,
+        }
     }
 }
 
@@ -193,11 +159,7 @@ fn tasks(plan: &Plan, scene: Scene, seed: u64) -> Vec<Task> {
             if start != Start::None {
                 methods.extend(Baseline::all().map(TaskMethod::Baseline));
             }
-            let task = |method| Task {
-                cell: cell(scene, seed, q, start),
-                start,
-                method,
-            };
+            let task = |method| Task::new(scene, seed, q, start, method);
             all.extend(methods.into_iter().map(task));
         }
     }
@@ -218,36 +180,24 @@ fn timed_tasks(plan: &Plan, scene: Scene, seed: u64) -> Vec<Task> {
         (TaskMethod::Timed, Start::None),
         (TaskMethod::Tracked, tracked),
     ];
-    let task = |(method, start)| Task {
-        cell: cell(scene, seed, q, start),
-        start,
-        method,
-    };
+    let task = |(method, start)| Task::new(scene, seed, q, start, method);
     pairs.map(task).into()
 }
 
 fn run_job(
     testbed: &Testbed,
     job: &Job,
-    found: &mut dyn FnMut(Trial) -> ControlFlow<()>,
-) -> Result<ControlFlow<()>, AnyError> {
-    let view: View = testbed.view(job.scene, job.seed)?;
-    let mut scenario: Option<(f64, Scenario)> = None;
-    for task in &job.tasks {
-        let q = task.cell.q;
-        if scenario.as_ref().is_none_or(|(of, _)| *of != q) {
-            // Before the next one is made, which is as large.
-            drop(scenario.take());
-            scenario = Some((q, testbed.scenario(&view, q)?));
-        }
-        if let Some((_, scenario)) = &scenario {
-            let trial = run_task(scenario, task, job);
-            if found(trial).is_break() {
-                return Ok(ControlFlow::Break(()));
-            }
+    found: &mut (dyn FnMut(Trial) -> Result<(), AnyError> + Send),
+) -> Result<(), AnyError> {
+    let view = testbed.view(job.scene, job.seed)?;
+    for tasks in job.tasks.chunk_by(|a, b| a.cell.q == b.cell.q) {
+        let q = tasks.first().map_or(0.0, |task| task.cell.q);
+        let scenario = testbed.scenario(&view, q)?;
+        for task in tasks {
+            found(run_task(&scenario, task, job))?;
         }
     }
-    Ok(ControlFlow::Continue(()))
+    Ok(())
 }
 
 fn run_task(scenario: &Scenario, task: &Task, job: &Job) -> Trial {
@@ -275,12 +225,7 @@ fn run_task(scenario: &Scenario, task: &Task, job: &Job) -> Trial {
     let ms = |started: Instant| started.elapsed().as_secs_f64() * 1e3;
     match task.method {
         TaskMethod::Baseline(baseline) => {
-            let start = start.unwrap_or_default();
-            let sources = Sources {
-                thinned: &scenario.source,
-                full: &scenario.full,
-            };
-            let pose = baseline.run(&sources, scenario.map.cloud(), &start);
+            let pose = baseline.run(scenario, &start.unwrap_or_default());
             trial(&pose, ms(started))
         }
         TaskMethod::Ours | TaskMethod::Timed => {
@@ -296,8 +241,8 @@ fn run_task(scenario: &Scenario, task: &Task, job: &Job) -> Trial {
         }
         TaskMethod::Tracked => {
             let start = start.unwrap_or_default();
-            let update = (scenario.headset_scans.first())
-                .map(|headset_scan| track(&scenario.map, headset_scan, &start, &options));
+            let scan = scenario.headset_scans.first();
+            let update = scan.map(|scan| track(&scenario.map, scan, &start, &options));
             let wall_ms = ms(started);
             trial(&update.map_or(start, |u| u.map_from_headset), wall_ms)
         }

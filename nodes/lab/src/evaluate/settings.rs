@@ -1,10 +1,9 @@
 //! Settings of an evaluation and the plan of its trials.
 
-use std::fmt;
-use std::str::FromStr;
-
 use crate::simulate::house::Scene;
 use serde::{Deserialize, Serialize};
+use std::fmt;
+use std::str::FromStr;
 
 /// Version of trials and their seeds; old results are not continued with new ones.
 pub const FORMAT: u32 = 1;
@@ -37,6 +36,16 @@ pub enum Pivot {
     View,
     /// The headset: the seen points then move farther than is said.
     Headset,
+}
+
+impl Settings {
+    /// The mesh in words.
+    pub(crate) fn mesh_name(&self) -> String {
+        match self.mesh_crc32 {
+            Some(crc) => format!("mesh with CRC-32 {crc:08x}"),
+            None => "the house of our own making".to_owned(),
+        }
+    }
 }
 
 impl Default for Settings {
@@ -135,10 +144,8 @@ impl Default for Plan {
     }
 }
 
-/// A trial, but for the method.
 #[derive(Clone, PartialEq, Debug, Serialize, Deserialize)]
 pub struct Cell {
-    /// Name of the scene.
     pub scene: String,
     /// Seed of view, start and labels.
     pub seed: u64,
@@ -149,15 +156,13 @@ pub struct Cell {
 }
 
 impl Cell {
-    /// The cell as a key of maps.
     pub fn key(&self) -> (&str, u64, u64, &str) {
         (&self.scene, self.seed, self.q.to_bits(), &self.start)
     }
 }
 
 impl Plan {
-    /// True of a method that is run.
-    pub fn wants(&self, method: &str) -> bool {
+    pub(super) fn wants(&self, method: &str) -> bool {
         self.methods.is_empty() || self.methods.iter().any(|name| name == method)
     }
 

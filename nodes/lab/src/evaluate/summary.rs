@@ -2,13 +2,11 @@
 
 mod tables;
 
-use std::collections::BTreeMap;
-
-use serde::Serialize;
-
 use super::settings::Settings;
 use super::statistics::{Share, distinct, median, quantile};
 use super::trial::{OURS, TIMED, TRACKED, Trial, WRONG, WRONG_TIGHT};
+use serde::Serialize;
+use std::collections::BTreeMap;
 pub use tables::{Accepted, Consistency, PRINTED, Paired, Printed, Row, TimeRow};
 
 /// Tolerance of "not worse": metres and degrees.
@@ -17,26 +15,20 @@ const TOLERANCE: (f64, f64) = (0.01, 0.2);
 /// All tables of an evaluation.
 #[derive(Clone, PartialEq, Debug, Serialize)]
 pub struct Summary {
-    /// Settings of the trials.
-    pub settings: Settings,
+    pub(super) settings: Settings,
     /// Threads of timed trials; the others had one.
-    pub timed_threads: usize,
-    /// Number of results.
-    pub trials: usize,
-    /// Errors that the paper prints.
-    pub printed: [Printed; 4],
+    pub(super) timed_threads: usize,
+    pub(super) trials: usize,
+    pub(super) printed: [Printed; 4],
     /// Rows by scene, start, share of wrong labels and method; and over all scenes.
-    pub rows: Vec<Row>,
+    pub(super) rows: Vec<Row>,
     /// Ours against the others, trial by trial.
-    pub paired: Vec<Paired>,
-    /// Accepted poses.
-    pub accepted: Vec<Accepted>,
-    /// Normalised errors of the stated covariance.
-    pub consistency: Vec<Consistency>,
-    /// Wall times.
-    pub times: Vec<TimeRow>,
+    pub(super) paired: Vec<Paired>,
+    pub(super) accepted: Vec<Accepted>,
+    pub(super) consistency: Vec<Consistency>,
+    pub(super) times: Vec<TimeRow>,
     /// Trials of ours that were refused, or accepted and wrong.
-    pub failures: Vec<Trial>,
+    pub(super) failures: Vec<Trial>,
 }
 
 /// Distinct names in their order, and "all".
@@ -75,15 +67,11 @@ impl Summary {
             failures: ours.iter().filter(refused).map(|t| (**t).clone()).collect(),
         }
     }
-}
 
-impl Summary {
-    /// Distinct starts, in order.
     pub(super) fn starts(&self) -> Vec<&str> {
         sorted(self.rows.iter().map(|row| row.start.as_str()))
     }
 
-    /// Distinct shares of wrong labels, in order.
     pub(super) fn flips(&self) -> Vec<f64> {
         distinct(self.rows.iter().map(|row| row.q))
     }
@@ -103,7 +91,6 @@ impl Summary {
     }
 }
 
-/// Distinct names, in order.
 pub(super) fn sorted<'a>(names: impl Iterator<Item = &'a str>) -> Vec<&'a str> {
     let mut names: Vec<&str> = names.collect();
     names.sort_unstable();
@@ -116,12 +103,8 @@ fn rows(trials: &[&Trial]) -> Vec<Row> {
     for trial in trials {
         for scene in [trial.cell.scene.as_str(), "all"] {
             // Shares are not negative, so that their bits are in their order.
-            let key = (
-                scene.to_owned(),
-                trial.cell.start.clone(),
-                trial.cell.q.to_bits(),
-            );
-            let key = (key.0, key.1, key.2, trial.method.clone());
+            let (start, q) = (trial.cell.start.clone(), trial.cell.q.to_bits());
+            let key = (scene.to_owned(), start, q, trial.method.clone());
             cells.entry(key).or_default().push(trial);
         }
     }
@@ -171,6 +154,7 @@ fn compare(against: &str, start: &str, q: Option<f64>, pairs: &[(&Trial, &Trial)
         a.translation_m <= b.translation_m + TOLERANCE.0
             && a.rotation_deg <= b.rotation_deg + TOLERANCE.1
     };
+    let in_view = |(a, b): &(&Trial, &Trial)| a.view_m <= b.view_m + TOLERANCE.0;
     let saved = |(a, b): &(&Trial, &Trial)| a.is_within(WRONG) && !b.is_within(WRONG);
     let spoiled = |(a, b): &(&Trial, &Trial)| !a.is_within(WRONG) && b.is_within(WRONG);
     Paired {
@@ -179,11 +163,7 @@ fn compare(against: &str, start: &str, q: Option<f64>, pairs: &[(&Trial, &Trial)
         q,
         not_worse: Share::of(pairs.iter().map(not_worse)),
         not_worse_or_saved: Share::of(pairs.iter().map(|p| not_worse(p) || saved(p))),
-        not_worse_in_view: Share::of(
-            pairs
-                .iter()
-                .map(|(a, b)| a.view_m <= b.view_m + TOLERANCE.0),
-        ),
+        not_worse_in_view: Share::of(pairs.iter().map(in_view)),
         saved: Share::of(pairs.iter().map(saved)),
         spoiled: Share::of(pairs.iter().map(spoiled)),
     }
@@ -258,11 +238,10 @@ fn times(plain: &[&Trial], timed: &[&Trial]) -> Vec<TimeRow> {
 
 #[cfg(test)]
 mod tests {
-    use lattice_core::registration::{Calibration, Verdict};
-    use nalgebra::{Isometry3, Matrix6, Vector3};
-
     use super::super::settings::Cell;
     use super::*;
+    use lattice_core::registration::{Calibration, Verdict};
+    use nalgebra::{Isometry3, Matrix6, Vector3};
 
     /// Off by metres and by degrees about the vertical.
     fn trial(seed: u64, method: &str, m: f64, deg: f64, verdict: Verdict) -> Trial {
@@ -299,17 +278,11 @@ mod tests {
             trial(3, "gicp_se3", 0.02, 0.1, Verdict::Ok),
         ];
         let summary = Summary::new(&Settings::default(), &trials, 2);
-        let paired = summary
-            .paired
-            .iter()
-            .find(|p| p.start == "all" && p.q.is_none())
-            .unwrap();
+        let mut paired = summary.paired.iter();
+        let paired = paired.find(|p| p.start == "all" && p.q.is_none()).unwrap();
         let counts = |share: &Share| (share.k, share.n);
         assert_eq!(counts(&paired.not_worse), (3, 4));
-        assert_eq!(
-            (counts(&paired.saved), counts(&paired.spoiled)),
-            ((1, 4), (1, 4))
-        );
+        assert_eq!([&paired.saved, &paired.spoiled].map(counts), [(1, 4); 2]);
 
         let of_all = |a: &&Accepted| a.scene == "all" && a.q.is_none();
         let accepted = summary.accepted.iter().find(of_all).unwrap();
@@ -319,27 +292,20 @@ mod tests {
         assert_eq!(summary.failures.len(), 3);
 
         // (0.02^2 + 0.1 deg^2) / 1e-4 and 0.3^2 / 1e-4.
-        let both = summary
-            .consistency
-            .iter()
-            .find(|c| c.start == "all")
-            .unwrap();
+        let mut both = summary.consistency.iter();
+        let both = both.find(|c| c.start == "all").unwrap();
         let expected = (4.0 + 0.1_f64.to_radians().powi(2) / 1e-4 + 900.0) / 2.0 / 6.0;
         assert!((both.mean_over_6.unwrap() - expected).abs() < 1e-6);
 
-        let row = summary
-            .rows
-            .iter()
-            .find(|r| r.scene == "all" && r.method == OURS)
-            .unwrap();
+        let [row] = summary.of_method("all", "0.3/10", OURS)[..] else {
+            panic!("not one row");
+        };
         assert_eq!(counts(&row.success), (2, 4));
         assert!((row.translation_m.unwrap() - 0.16).abs() < 1e-6);
         let report = super::super::report(&summary, &trials).unwrap();
         let text = crate::report::markdown(&report);
-        assert!(
-            text.contains("| GICP-SE(3) | all | all | 75.0 % of 4"),
-            "{text}"
-        );
+        let line = "| GICP-SE(3) | all | all | 75.0 % of 4";
+        assert!(text.contains(line), "{text}");
     }
 
     #[test]

@@ -1,20 +1,17 @@
 //! The testbed of the trials: the house, the robot's maps of it and the views of the headset.
 
-use std::sync::OnceLock;
-
+use super::initial_guess::seed_of;
+use super::settings::{Pivot, Settings};
+use crate::AnyError;
 use crate::simulate::house::{
-    HeadsetOptions, HeadsetTrial, House, HouseScan, LabelDraw, Scene, Survey, SurveyMap,
-    SurveyOptions,
+    HeadsetTrial, House, HouseScan, LabelDraw, Scene, Survey, SurveyMap, SurveyOptions,
 };
 use lattice_core::lattice::{Lattice, LatticeKind};
 use lattice_core::registration::{
     CalibrationMap, HeadsetScan, PrepareOptions, PreparedCloud, SemanticCloud, voxel_downsample,
 };
 use nalgebra::{Isometry3, Point3, Vector3};
-
-use super::initial_guess::seed_of;
-use super::settings::{Pivot, Settings};
-use crate::AnyError;
+use std::sync::OnceLock;
 
 /// Purposes of seeds.
 const LABELS: u64 = 1;
@@ -29,7 +26,6 @@ pub struct Testbed {
     surveys: Vec<OnceLock<Result<SurveyMap, String>>>,
 }
 
-/// A view of the headset.
 pub struct View {
     scene: Scene,
     seed: u64,
@@ -40,7 +36,6 @@ pub struct View {
 pub struct Scenario {
     /// Prepared map; also the target of single registrations.
     pub map: CalibrationMap,
-    /// Scans of the headset.
     pub headset_scans: Vec<HeadsetScan>,
     /// All points of the headset as one cloud.
     pub full: PreparedCloud,
@@ -48,7 +43,6 @@ pub struct Scenario {
     pub source: PreparedCloud,
     /// Point at which starts are moved and turned, in the headset's frame.
     pub pivot_m: Point3<f64>,
-    /// `map_from_headset`.
     pub truth: Isometry3<f64>,
     /// Share of the view whose labels differ between map and headset.
     pub different_share: f64,
@@ -68,23 +62,18 @@ impl Testbed {
         })
     }
 
-    /// The house.
-    pub fn house(&self) -> &House {
+    pub(crate) fn house(&self) -> &House {
         &self.house
     }
 
-    /// The headset's view of a scene.
-    pub fn view(&self, scene: Scene, seed: u64) -> Result<View, AnyError> {
-        let options = HeadsetOptions {
-            headset_scans: self.settings.headset_scans,
-            ..HeadsetOptions::default()
-        };
-        let trial = HeadsetTrial::new(&self.house, scene, &options, seed_of(&[VIEW, seed]))?;
+    pub(crate) fn view(&self, scene: Scene, seed: u64) -> Result<View, AnyError> {
+        let scans = self.settings.headset_scans;
+        let trial = HeadsetTrial::new(&self.house, scene, scans, seed_of(&[VIEW, seed]))?;
         Ok(View { scene, seed, trial })
     }
 
     /// The view and the map with a share `q` of the view labelled wrongly.
-    pub fn scenario(&self, view: &View, q: f64) -> Result<Scenario, AnyError> {
+    pub(crate) fn scenario(&self, view: &View, q: f64) -> Result<Scenario, AnyError> {
         // The same for every q, so that the wrong regions of a small q are wrong at a larger one too.
         let seed = seed_of(&[LABELS, view.seed, view.scene as u64]);
         let draw = LabelDraw::new(&self.house, std::slice::from_ref(&view.trial), q, seed)?;
@@ -102,11 +91,7 @@ impl Testbed {
         let middle = all.points_m.iter().map(|p| p.coords).sum::<Vector3<f64>>();
         let pivot_m = match self.settings.pivot {
             Pivot::View => Some((middle / all.len().max(1) as f64).into()),
-            Pivot::Headset => view
-                .trial
-                .headset_scans
-                .first()
-                .map(|headset_scan| headset_scan.sensor_m),
+            Pivot::Headset => view.trial.headset_scans.first().map(|scan| scan.sensor_m),
         };
         let thinned = voxel_downsample(&all, self.settings.cell_side_m);
         let map = CalibrationMap::new(map, self.settings.cell_side_m)?;
@@ -132,10 +117,8 @@ impl Testbed {
             let survey = Survey::new(&self.house, &options, seed_of(&[SURVEY, number]))?;
             SurveyMap::new(&survey, &self.lattice)
         };
-        let slot = self
-            .surveys
-            .get(number as usize)
-            .ok_or("no map of that number")?;
+        let slot = self.surveys.get(number as usize);
+        let slot = slot.ok_or("no map of that number")?;
         let made = slot.get_or_init(|| make().map_err(|error| error.to_string()));
         made.as_ref().map_err(|error| error.clone().into())
     }

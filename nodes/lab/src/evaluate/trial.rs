@@ -1,11 +1,10 @@
 //! The result of one method in one trial.
 
+use super::settings::Cell;
 use crate::metrics::PoseError;
 use lattice_core::registration::{Calibration, Verdict};
 use nalgebra::{Isometry3, Point3, Vector3, Vector6};
 use serde::{Deserialize, Serialize};
-
-use super::settings::Cell;
 
 /// The method whose results are ours.
 pub const OURS: &str = "ours";
@@ -17,10 +16,8 @@ pub const TRACKED: &str = "tracking_timed";
 /// One line of the results.
 #[derive(Clone, PartialEq, Debug, Serialize, Deserialize)]
 pub struct Trial {
-    /// The trial.
     #[serde(flatten)]
     pub cell: Cell,
-    /// Name of the method.
     pub method: String,
     /// Share of the view whose labels differ between map and headset.
     pub different_share: f64,
@@ -38,7 +35,6 @@ pub struct Trial {
     pub view_m: f64,
     /// Wall time, milliseconds, on one thread but for those that are timed.
     pub wall_ms: f64,
-    /// Judgement of a calibration.
     #[serde(skip_serializing_if = "Option::is_none", default)]
     pub judged: Option<Judged>,
 }
@@ -48,13 +44,10 @@ pub struct Trial {
 pub struct Judged {
     /// Verdict, as in `lattice_msgs/CalibrationResult`.
     pub verdict: String,
-    /// Reason of the verdict.
     pub reason: String,
-    /// Candidate that was chosen.
     pub chosen: String,
     /// Log-likelihood above the best different pose; None if there was none.
     pub margin: Option<f64>,
-    /// Share of the points on the map.
     pub inliers: f64,
     /// Normalised squared error of the stated covariance, 6 degrees of freedom; None without a covariance.
     pub nees: Option<f64>,
@@ -63,9 +56,7 @@ pub struct Judged {
 /// Bounds of a right pose: metres and degrees.
 #[derive(Clone, Copy, PartialEq, Debug)]
 pub struct Bounds {
-    /// Metres.
     pub m: f64,
-    /// Degrees.
     pub deg: f64,
 }
 
@@ -108,7 +99,6 @@ impl Trial {
         }
     }
 
-    /// The trial with the judgement of its calibration.
     pub fn with_judgement(self, calibration: &Calibration, truth: &Isometry3<f64>) -> Trial {
         let margin = calibration.log_margin;
         Trial {
@@ -124,7 +114,6 @@ impl Trial {
         }
     }
 
-    /// True if the pose is within bounds.
     pub fn is_within(&self, bounds: Bounds) -> bool {
         self.translation_m <= bounds.m && self.rotation_deg <= bounds.deg
     }
@@ -134,7 +123,6 @@ impl Trial {
         self.view_m <= bounds.m && self.rotation_deg <= bounds.deg
     }
 
-    /// True if a calibration accepted the pose.
     pub fn is_accepted(&self) -> bool {
         let judged = self.judged.as_ref();
         judged.is_some_and(|j| j.verdict == Verdict::Ok.name())
@@ -164,9 +152,8 @@ fn nees(calibration: &Calibration, truth: &Isometry3<f64>) -> Option<f64> {
 
 #[cfg(test)]
 mod tests {
-    use nalgebra::Matrix6;
-
     use super::*;
+    use nalgebra::Matrix6;
 
     fn cell() -> Cell {
         Cell {

@@ -1,12 +1,11 @@
 //! Climbing from a guess.
 
-use nalgebra::{Isometry3, Point3, Translation3, UnitQuaternion, Vector3};
-
-use super::{AlignOptions, MAX_POINTS, MultiResolutionList, sample};
+use super::{MAX_POINTS, MultiResolutionList, sample};
 use crate::AnyError;
 use lattice_core::cloud::Cloud;
 use lattice_core::lattice::Lattice;
 use lattice_core::voxels::{OccupancyList, VoxelStore};
+use nalgebra::{Isometry3, Point3, Translation3, UnitQuaternion, Vector3};
 
 /// Error of a map without a voxel.
 pub(super) const EMPTY_MAP: &str = "the map is empty";
@@ -14,18 +13,24 @@ pub(super) const EMPTY_MAP: &str = "the map is empty";
 /// A pose of a scan and its fit.
 #[derive(Clone, Copy, PartialEq, Debug)]
 pub struct Alignment {
-    /// Pose of the scan.
     pub map_from_cloud: Isometry3<f64>,
     /// Points of the sample in occupied cells of the finest level.
     pub hits: usize,
-    /// Points of the sample.
     pub points: usize,
-    /// Poses that were tried.
     pub evaluations: usize,
 }
 
+/// Most steps on one level, and of each of the last climbs, on the finest level; the numbers of the original.
+const LEVEL_STEPS: usize = 20;
+const FINE_STEPS: usize = 100;
+/// Last climbs, each by shorter steps than the one before by this factor; the original has one.
+const FINE_STAGES: usize = 2;
+const FINE_STEP: f64 = 0.25;
+/// Turn of one step on the finest level, degrees; twice as much from one level to the next.
+const STEP_DEG: f64 = 0.5;
+
 /// Aligns a scan with a map from a guess: climbs on every level, the coarsest first, by steps of a
-/// cell side, then refines on the finest.
+/// cell side, then refines on the finest by a fraction of its steps, on another sample of the scan.
 ///
 /// Each level looks at one point of a cell of its own size, drawn from one of each finest cell. A step goes along or about one axis of the
 /// map; turns are about the middle of those points, so that they do not shift the scan as well. Fails
@@ -34,67 +39,26 @@ pub fn align(
     map: &MultiResolutionList,
     cloud: &Cloud,
     map_from_cloud: &Isometry3<f64>,
-    options: &AlignOptions,
-) -> Result<Alignment, AnyError> {
-    let mut pose = begin(map, cloud, map_from_cloud)?;
-    let finest = map.levels().first().ok_or(EMPTY_MAP)?;
-    let all = sample_of(&cloud.offsets_m, finest.lattice(), MAX_POINTS, 0)?;
-    let mut evaluations = 0;
-    for (level, list) in map.levels().iter().enumerate().rev() {
-        let points = sample_of(&all, list.lattice(), options.max_points, 0)?;
-        let steps = Steps {
-            metres: list.lattice().cell_side_m(),
-            radians: options.step_rad * (1_u32 << level) as f64,
-            most: options.level_iterations,
-        };
-        let top = climb(pose, list, &points, &steps);
-        pose = top.pose;
-        evaluations += top.evaluations;
-    }
-    let refined = refine_from(map, cloud, &pose, options)?;
-    Ok(Alignment {
-        evaluations: refined.evaluations + evaluations,
-        ..refined
-    })
-}
-
-/// The last part of [`align`] alone: climbs on the finest level by a fraction of its steps, and by a
-/// fraction of that in each further stage, on another sample of the scan.
-#[cfg(test)]
-pub(super) fn refine(
-    map: &MultiResolutionList,
-    cloud: &Cloud,
-    map_from_cloud: &Isometry3<f64>,
-    options: &AlignOptions,
 ) -> Result<Alignment, AnyError> {
     let pose = begin(map, cloud, map_from_cloud)?;
-    refine_from(map, cloud, &pose, options)
-}
-
-fn refine_from(
-    map: &MultiResolutionList,
-    cloud: &Cloud,
-    pose: &Isometry3<f64>,
-    options: &AlignOptions,
-) -> Result<Alignment, AnyError> {
-    let list = map.levels().first().ok_or(EMPTY_MAP)?;
-    let points = sample_of(&cloud.offsets_m, list.lattice(), options.max_points, 1)?;
+    let finest = map.levels().first().ok_or(EMPTY_MAP)?;
+    let all = sample_of(&cloud.offsets_m, finest.lattice(), MAX_POINTS, 0)?;
     let mut top = Top {
-        pose: *pose,
+        pose,
         hits: 0,
         evaluations: 0,
     };
+    for (level, list) in map.levels().iter().enumerate().rev() {
+        let points = sample_of(&all, list.lattice(), MAX_POINTS, 0)?;
+        let turn_deg = STEP_DEG * (1_u32 << level) as f64;
+        top = climb(top, list, &points, (1.0, turn_deg, LEVEL_STEPS));
+    }
+    let points = sample_of(&cloud.offsets_m, finest.lattice(), MAX_POINTS, 1)?;
     let mut fraction = 1.0;
-    for _ in 0..options.fine_stages {
-        fraction *= options.fine_step;
-        let steps = Steps {
-            metres: fraction * list.lattice().cell_side_m(),
-            radians: fraction * options.step_rad,
-            most: options.fine_iterations,
-        };
-        let before = top.evaluations;
-        top = climb(top.pose, list, &points, &steps);
-        top.evaluations += before;
+    for _ in 0..FINE_STAGES {
+        fraction *= FINE_STEP;
+        let steps = (fraction, fraction * STEP_DEG, FINE_STEPS);
+        top = climb(top, finest, &points, steps);
     }
     Ok(Alignment {
         map_from_cloud: end(cloud, &top.pose),
@@ -125,7 +89,6 @@ pub(super) fn begin(
         .ok_or("the pose to begin with is not finite")?)
 }
 
-/// The pose of a cloud from that of its offsets.
 pub(super) fn end(cloud: &Cloud, pose: &Isometry3<f64>) -> Isometry3<f64> {
     pose * Translation3::from(-cloud.datum_m)
 }
@@ -147,13 +110,6 @@ pub(super) fn sample_of(
     Ok(points)
 }
 
-/// Length and number of steps.
-struct Steps {
-    metres: f64,
-    radians: f64,
-    most: usize,
-}
-
 struct Top {
     pose: Isometry3<f64>,
     hits: usize,
@@ -161,23 +117,25 @@ struct Top {
 }
 
 /// Goes to the best of the twelve poses one step away as long as it is better; of equally good ones to
-/// the first.
+/// the first. Steps are so many cell sides and degrees, and at most so many.
 fn climb(
-    mut pose: Isometry3<f64>,
+    top: Top,
     list: &OccupancyList,
     points_m: &[[f32; 3]],
-    steps: &Steps,
+    (sides, turn_deg, most): (f64, f64, usize),
 ) -> Top {
+    let (metres, radians) = (sides * list.lattice().cell_side_m(), turn_deg.to_radians());
+    let mut pose = top.pose;
     let about_m = middle_m(points_m);
     let mut hits = list.overlap(&pose, points_m);
-    let mut evaluations = 1;
+    let mut evaluations = top.evaluations + 1;
     let axes = [Vector3::x(), Vector3::y(), Vector3::z()];
-    for _ in 0..steps.most {
+    for _ in 0..most {
         let mut best = None;
         for axis in axes {
             for sign in [-1.0, 1.0] {
-                let shift = Vector3::from(axis * (sign * steps.metres));
-                let turn = Vector3::from(axis * (sign * steps.radians));
+                let shift = Vector3::from(axis * (sign * metres));
+                let turn = Vector3::from(axis * (sign * radians));
                 for (shift, turn) in [(shift, Vector3::zeros()), (Vector3::zeros(), turn)] {
                     let near = moved(&pose, &about_m, &shift, &turn);
                     let found = list.overlap(&near, points_m);

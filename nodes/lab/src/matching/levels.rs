@@ -1,11 +1,10 @@
 //! A map at several resolutions.
 
-use nalgebra::Vector3;
-
 use crate::AnyError;
 use lattice_core::cloud::Cloud;
 use lattice_core::lattice::Lattice;
 use lattice_core::voxels::{InsertReport, OccupancyList, VoxelStore};
+use nalgebra::Vector3;
 
 /// Most levels of a list.
 const MAX_LEVELS: usize = 12;

@@ -8,16 +8,12 @@
 
 mod align;
 mod levels;
-mod options;
 mod sample;
 mod search;
 #[cfg(test)]
 mod tests;
 
-#[cfg(test)]
-use align::refine;
 pub use align::{Alignment, align};
 pub use levels::MultiResolutionList;
-pub use options::{AlignOptions, SearchOptions, Spread};
 use sample::{MAX_POINTS, sample};
-pub use search::search;
+pub use search::{Spread, search};

@@ -1,8 +1,7 @@
 //! Fewer points of a scan, spread evenly: one of each cell.
 
-use nalgebra::Isometry3;
-
 use lattice_core::lattice::{BatchQuantizer, BlockKey, Lattice};
+use nalgebra::Isometry3;
 
 /// Most points of a scan.
 pub const MAX_POINTS: usize = u32::MAX as usize;
@@ -45,13 +44,11 @@ fn mix(number: u64, round: u64) -> u64 {
 
 #[cfg(test)]
 mod tests {
-    use std::collections::BTreeSet;
-
-    use nalgebra::Vector3;
-    use proptest::prelude::*;
-
     use super::*;
     use lattice_core::lattice::LatticeKind;
+    use nalgebra::Vector3;
+    use proptest::prelude::*;
+    use std::collections::BTreeSet;
 
     fn cell(lattice: &Lattice, p: &[f32; 3]) -> Option<[i32; 3]> {
         lattice.quantize(&Vector3::from(p.map(f64::from)))
@@ -80,18 +77,11 @@ mod tests {
     #[test]
     fn points_without_a_cell_are_left_out_and_rounds_differ() {
         let lattice = Lattice::new(LatticeKind::Fcc, 1e-3).unwrap();
-        let hostile = [
-            [f32::NAN; 3],
-            [f32::INFINITY, 0.0, 0.0],
-            [1e30; 3],
-            [0.5; 3],
-        ];
+        let hostile = [f32::NAN, f32::INFINITY, 1e30, 0.5].map(|x| [x; 3]);
         assert_eq!(sample(&hostile, &lattice, 10, 0), [[0.5; 3]]);
         assert!(sample(&[], &lattice, 10, 0).is_empty());
         let many: Vec<[f32; 3]> = (0..500).map(|i| [i as f32 * 0.01, 0.0, 0.0]).collect();
-        assert_ne!(
-            sample(&many, &lattice, 20, 0),
-            sample(&many, &lattice, 20, 1)
-        );
+        let [first, second] = [0, 1].map(|round| sample(&many, &lattice, 20, round));
+        assert_ne!(first, second);
     }
 }

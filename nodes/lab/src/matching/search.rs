@@ -1,18 +1,36 @@
 //! Trying all poses about a guess.
 
-use nalgebra::{Isometry3, Point3, Vector3};
-use rayon::prelude::*;
-
 use super::align::{EMPTY_MAP, begin, end, moved, sample_of};
-use super::{Alignment, MultiResolutionList, SearchOptions, Spread};
+use super::{Alignment, MultiResolutionList};
 use crate::AnyError;
 use lattice_core::cloud::Cloud;
 use lattice_core::voxels::VoxelStore;
+use nalgebra::{Isometry3, Point3, Vector3};
+use rayon::prelude::*;
+
+/// Half the widths of what is searched, about a pose; 0 keeps an axis as it is.
+#[derive(Clone, Copy, PartialEq, Debug, Default)]
+pub struct Spread {
+    /// Along the axes of the map, metres.
+    pub translation_m: [f64; 3],
+    /// About the axes of the map through the datum of the scan, which should be where the scanner
+    /// was (a rotation vector), radians, at most pi.
+    pub rotation_rad: [f64; 3],
+}
+
+/// Most points of the scan that are looked at, one of a cell; the numbers of the original.
+const SEARCHED_POINTS: usize = 2000;
+/// Poses kept of a level, and given in the end.
+pub(super) const KEEP: usize = 100;
+/// Distance of the features, at which a turn moves a point as far as a shift does, metres.
+const FEATURE_RANGE_M: f64 = 8.0;
+/// Most poses of the coarsest grid; it takes 8 bytes for each.
+const MAX_POSES: f64 = 5e6;
 
 /// Poses about a middle: three shifts (metres), then a rotation vector (radians).
 type Offset = [f64; 6];
 
-/// The best poses of a scan within a spread about a guess, the best first, at most `keep`.
+/// The best poses of a scan within a spread about a guess, the best first, at most [`KEEP`].
 ///
 /// On the coarsest level the poses of a grid are tried, one cell side apart and, in turn, a cell side
 /// over the range of the features. The best are kept and divided in two along every axis that is
@@ -24,18 +42,16 @@ pub fn search(
     cloud: &Cloud,
     map_from_cloud: &Isometry3<f64>,
     spread: &Spread,
-    options: &SearchOptions,
 ) -> Result<Vec<Alignment>, AnyError> {
     let middle = begin(map, cloud, map_from_cloud)?;
     let coarsest = map.levels().last().ok_or(EMPTY_MAP)?;
     let side_m = coarsest.lattice().cell_side_m();
-    let grid = Grid::new(spread, side_m, side_m / options.feature_range_m);
+    let grid = Grid::new(spread, side_m, side_m / FEATURE_RANGE_M);
     let mut spreads = spread.translation_m.iter().chain(&spread.rotation_rad);
-    if !spreads.all(|half| half.is_finite()) || grid.poses() > options.max_poses as f64 {
-        let (poses, most) = (grid.poses(), options.max_poses);
-        return Err(
-            format!("{poses} poses on the coarsest grid, at most {most} are allowed").into(),
-        );
+    if !spreads.all(|half| half.is_finite()) || grid.poses() > MAX_POSES {
+        let poses = grid.poses();
+        let words = format!("{poses} poses on the coarsest grid, at most {MAX_POSES} are allowed");
+        return Err(words.into());
     }
     let pose = |o: &Offset| {
         let [x, y, z, a, b, c] = *o;
@@ -46,19 +62,19 @@ pub fn search(
     let (mut evaluations, mut sampled) = (0, 0);
     let mut spacing = grid.spacing;
     for (number, list) in map.levels().iter().rev().enumerate() {
-        let points = sample_of(&cloud.offsets_m, list.lattice(), options.max_points, 0)?;
+        let points = sample_of(&cloud.offsets_m, list.lattice(), SEARCHED_POINTS, 0)?;
         let score = |offset: &Offset| list.overlap(&pose(offset), &points);
         let (tried, best) = if number == 0 {
             let all = grid.poses() as usize;
             let at = |place: usize| grid.at(place);
-            (all, best_of(all, at, score, options.keep))
+            (all, best_of(all, at, score, KEEP))
         } else {
             spacing = spacing.map(|s| s / 2.0);
             let children: Vec<Offset> = (kept.iter())
                 .flat_map(|(_, parent)| divided(parent, &spacing))
                 .collect();
             let at = |place: usize| children.get(place).copied().unwrap_or([0.0; 6]);
-            let best = best_of(children.len(), at, score, options.keep);
+            let best = best_of(children.len(), at, score, KEEP);
             (children.len(), best)
         };
         evaluations += tried;
@@ -192,10 +208,8 @@ mod tests {
         let at = |place: usize| [place as f64, 0.0, 0.0, 0.0, 0.0, 0.0];
         let score = |o: &Offset| (o[0] as usize * 7) % 5;
         let best = best_of(20, at, score, 6);
-        let scores: Vec<_> = best
-            .iter()
-            .map(|(hits, o)| (*hits, o[0] as usize))
-            .collect();
+        let scores = best.iter().map(|(hits, o)| (*hits, o[0] as usize));
+        let scores: Vec<_> = scores.collect();
         assert_eq!(scores, [(4, 2), (4, 7), (4, 12), (4, 17), (3, 4), (3, 9)]);
         assert_eq!(best_of(0, at, score, 6), []);
     }

@@ -1,14 +1,13 @@
 //! A synthetic room.
 
-use nalgebra::{Isometry3, Vector3};
-use proptest::prelude::*;
-use rand::{RngExt, SeedableRng};
-use rand_chacha::ChaCha8Rng;
-
 use super::*;
 use lattice_core::cloud::Cloud;
 use lattice_core::lattice::{Lattice, LatticeKind};
 use lattice_core::voxels::VoxelStore;
+use nalgebra::{Isometry3, Vector3};
+use proptest::prelude::*;
+use rand::{RngExt, SeedableRng};
+use rand_chacha::ChaCha8Rng;
 
 const PLENTY: usize = 1 << 28;
 
@@ -103,20 +102,15 @@ fn a_known_pose_is_found_from_nearby() {
     for kind in LatticeKind::ALL {
         let map = list(kind, 0.1, 3, &points);
         let start = Isometry3::new(Vector3::new(2.6, 1.75, 1.2), Vector3::new(0.03, 0.0, 0.65));
-        let found = align(&map, &scan, &start, &AlignOptions::default()).unwrap();
+        let found = align(&map, &scan, &start).unwrap();
         let off_m = apart_m(&found.map_from_cloud, &truth);
         assert!(
             off_m < 0.075,
             "{kind}: {off_m} m from {} m",
             apart_m(&start, &truth)
         );
-        let none = AlignOptions {
-            fine_iterations: 0,
-            ..AlignOptions::default()
-        };
-        let before = refine(&map, &scan, &start, &none).unwrap();
-        assert!(found.hits > before.hits && found.points == before.points);
-        assert!(before.evaluations == 2 && found.evaluations > 13 * 5);
+        assert!(found.points > 1000 && found.hits > found.points / 2);
+        assert!(found.evaluations > 13 * 5);
     }
 }
 
@@ -131,20 +125,10 @@ fn a_search_needs_no_guess_of_place_and_heading() {
         translation_m: [1.2, 1.2, 0.3],
         rotation_rad: [0.0, 0.0, std::f64::consts::PI],
     };
-    let options = SearchOptions {
-        max_points: 500,
-        ..SearchOptions::default()
-    };
-    let found = search(&map, &scan, &about, &spread, &options).unwrap();
-    assert_eq!(found.len(), 100);
+    let found = search(&map, &scan, &about, &spread).unwrap();
+    assert_eq!(found.len(), search::KEEP);
     assert!(found.windows(2).all(|pair| pair[0].hits >= pair[1].hits));
-    let best = refine(
-        &map,
-        &scan,
-        &found[0].map_from_cloud,
-        &AlignOptions::default(),
-    )
-    .unwrap();
+    let best = align(&map, &scan, &found[0].map_from_cloud).unwrap();
     let off_m = apart_m(&best.map_from_cloud, &truth);
     assert!(off_m < 0.06, "{off_m} m");
 }
@@ -160,12 +144,8 @@ fn the_answer_is_the_same_on_any_number_of_threads() {
                 translation_m: [0.4; 3],
                 rotation_rad: [0.0, 0.0, 0.2],
             };
-            let options = AlignOptions::default();
-            let aligned = align(&map, &scan, &start, &options).unwrap();
-            (
-                aligned,
-                search(&map, &scan, &start, &spread, &SearchOptions::default()).unwrap(),
-            )
+            let aligned = align(&map, &scan, &start).unwrap();
+            (aligned, search(&map, &scan, &start, &spread).unwrap())
         })
     };
     assert!(on(1) == on(3));
@@ -182,9 +162,8 @@ fn a_datum_far_away_changes_nothing() {
     };
     let start = Isometry3::new(Vector3::new(2.5, 1.8, 1.2), Vector3::new(0.0, 0.0, 0.55));
     let from_moved = start * nalgebra::Translation3::from(-moved.datum_m);
-    let options = AlignOptions::default();
-    let a = align(&map, &scan, &start, &options).unwrap();
-    let b = align(&map, &moved, &from_moved, &options).unwrap();
+    let a = align(&map, &scan, &start).unwrap();
+    let b = align(&map, &moved, &from_moved).unwrap();
     let b_pose = b.map_from_cloud * nalgebra::Translation3::from(moved.datum_m);
     assert!(apart_m(&a.map_from_cloud, &b_pose) < 1e-3);
 }
@@ -193,7 +172,7 @@ fn a_datum_far_away_changes_nothing() {
 fn bad_input_is_refused() {
     let map = list(LatticeKind::Fcc, 0.1, 3, &room(1000, 8));
     let scan = seen_from(&viewpoint(), &room(1000, 8));
-    let (start, options) = (viewpoint(), AlignOptions::default());
+    let start = viewpoint();
     let lattice = Lattice::new(LatticeKind::Fcc, 1e-3).unwrap();
     for levels in [0, 13] {
         let made = MultiResolutionList::new(&lattice, Vector3::zeros(), levels, PLENTY);
@@ -201,8 +180,8 @@ fn bad_input_is_refused() {
     }
     let refused = |map: &MultiResolutionList, cloud: &Cloud, pose: &Isometry3<f64>| {
         let spread = Spread::default();
-        let aligned = align(map, cloud, pose, &options).unwrap_err().to_string();
-        let found = search(map, cloud, pose, &spread, &SearchOptions::default());
+        let aligned = align(map, cloud, pose).unwrap_err().to_string();
+        let found = search(map, cloud, pose, &spread);
         assert_eq!(found.unwrap_err().to_string(), aligned);
         aligned
     };
@@ -222,7 +201,7 @@ fn bad_input_is_refused() {
             translation_m: [wide; 3],
             rotation_rad: [3.0; 3],
         };
-        let found = search(&map, &scan, &start, &spread, &SearchOptions::default());
+        let found = search(&map, &scan, &start, &spread);
         assert!(found.is_err(), "{wide}");
     }
 }
@@ -276,21 +255,4 @@ proptest! {
         prop_assert_eq!(level.overlap(&pose, &points), expected);
     }
 
-    #[test]
-    fn climbing_never_loses_hits(seed in 0..1000_u64, shift in prop::array::uniform3(-0.2..0.2_f64)) {
-        let points = room(3000, seed);
-        let map = list(LatticeKind::Bcc, 0.2, 1, &points);
-        let scan = Cloud::from_points(0, Vector3::zeros(), &points);
-        let start = Isometry3::translation(shift[0], shift[1], shift[2]);
-        let options = AlignOptions { fine_iterations: 0, ..AlignOptions::default() };
-        let before = refine(&map, &scan, &start, &options).unwrap();
-        prop_assert_eq!(before.map_from_cloud, start);
-        let options = AlignOptions { level_iterations: 0, ..AlignOptions::default() };
-        let after = align(&map, &scan, &start, &options).unwrap();
-        prop_assert!(after.hits >= before.hits && after.points == before.points);
-        let options = AlignOptions { fine_stages: 1, ..AlignOptions::default() };
-        let coarser = refine(&map, &scan, &start, &options).unwrap();
-        let finer = refine(&map, &scan, &start, &AlignOptions::default()).unwrap();
-        prop_assert!(finer.hits >= coarser.hits && coarser.hits >= before.hits);
-    }
 }

@@ -1,15 +1,13 @@
 //! Meshes from PLY files: the elements `vertex` and `face`.
 
-use std::path::Path;
-
+use super::{LabelledMesh, MAX_TRIANGLES};
+use crate::AnyError;
 use lattice_core::registration::UNLABELED;
 use lattice_nodes::files::points::ply::header::{Element, Header, Property};
 use lattice_nodes::files::points::ply::{axes, number, record};
 use lattice_nodes::files::points::source::Source;
 use lattice_nodes::files::points::{self, PointFileError};
-
-use super::{LabelledMesh, MAX_TRIANGLES};
-use crate::AnyError;
+use std::path::Path;
 
 /// Most corners of a polygon.
 const MAX_CORNERS: usize = 1024;
@@ -247,12 +245,9 @@ mod tests {
         for c in expected.vertices_m().iter().flatten() {
             bytes.extend(c.to_le_bytes());
         }
-        for (corners, label, instance) in [(vec![0, 1, 2], 7, 300_u16), (vec![0, 1, 2, 3], 9, 301)]
-        {
-            bytes.push(corners.len() as u8);
-            corners
-                .iter()
-                .for_each(|c: &i32| bytes.extend(c.to_le_bytes()));
+        for (corners, label, instance) in [(3, 7, 300_u16), (4, 9, 301)] {
+            bytes.push(corners as u8);
+            (0..corners).for_each(|c: i32| bytes.extend(c.to_le_bytes()));
             bytes.push(label);
             bytes.extend(instance.to_le_bytes());
         }
@@ -273,61 +268,38 @@ mod tests {
 
     #[test]
     fn what_is_no_mesh_is_refused_with_the_place() {
-        for (properties, faces, message) in [
-            (
-                "",
-                "3 0 1 4\n3 0 1 2\n",
-                "triangle 0 has vertex 4, but there are 4",
-            ),
-            (
-                "",
-                "3 0 1 2\n2 0 1\n",
-                "a polygon of 2 corners, not 3 to 1024, in face 2 of 2",
-            ),
-            ("", "3 0 1 -1\n3 0 1 2\n", "vertex -1 is no whole number"),
-            ("", "3 0 1 2\n3 0 1 x\n", "vertex NaN is no whole number"),
-            (
-                "property float label\n",
-                "3 0 1 2 0.5\n3 0 1 2 1\n",
-                "label 0.5 is no whole",
-            ),
-            (
-                "property int label\n",
-                "3 0 1 2 65536\n3 0 1 2 1\n",
-                "label 65536 is no whole",
-            ),
-            (
-                "property int instance\n",
-                "3 0 1 2 -3\n3 0 1 2 1\n",
-                "instance -3 is no whole",
-            ),
-        ] {
-            let fault = text(properties, faces).unwrap_err();
+        let faults = "\
+            : 3 0 1 4; 3 0 1 2: triangle 0 has vertex 4, but there are 4
+            : 3 0 1 2; 2 0 1: a polygon of 2 corners, not 3 to 1024, in face 2 of 2
+            : 3 0 1 -1; 3 0 1 2: vertex -1 is no whole number
+            : 3 0 1 2; 3 0 1 x: vertex NaN is no whole number
+            property float label: 3 0 1 2 0.5; 3 0 1 2 1: label 0.5 is no whole
+            property int label: 3 0 1 2 65536; 3 0 1 2 1: label 65536 is no whole
+            property int instance: 3 0 1 2 -3; 3 0 1 2 1: instance -3 is no whole";
+        for row in faults.lines() {
+            let [properties, faces, message] = [0, 1, 2].map(|i| row.split(": ").nth(i).unwrap());
+            let properties = format!("{}\n", properties.trim()).trim_start().to_owned();
+            let faces = format!("{}\n", faces.replace("; ", "\n"));
+            let fault = text(&properties, &faces).unwrap_err();
             assert!(fault.contains(message), "{fault}");
         }
-        let of = |elements: &str| mesh(format!("ply\nformat ascii 1.0\n{elements}end_header\n"));
-        let fault = of(VERTICES).unwrap_err();
-        assert!(fault.contains("the header has no element face"), "{fault}");
-        let faces = "element face 1\nproperty list uchar int corners\n";
-        let fault = of(&format!(
-            "element vertex 0\nproperty float x\nproperty float y\nproperty float z\n{faces}"
-        ))
-        .unwrap_err();
-        assert!(fault.contains("no list named vertex_indices"), "{fault}");
-        let fault = of(&VERTICES.replace(" 4", " 99999999999")).unwrap_err();
-        assert!(fault.contains("no element face"), "{fault}");
-        let many = VERTICES.replace(" 4", " 99999999999");
-        let fault = of(&format!("{many}{FACES}")).unwrap_err();
-        assert!(
-            fault.contains("99999999999 points or more, but at most 100"),
-            "{fault}"
-        );
+        let of = |elements: String| mesh(format!("ply\nformat ascii 1.0\n{elements}end_header\n"));
         let none = VERTICES.replace(" 4", " 0");
-        let many = FACES.replace(" 2", " 101");
-        let fault = of(&format!("{none}{many}")).unwrap_err();
-        assert!(
-            fault.contains("101 triangles or more, but at most 100"),
-            "{fault}"
-        );
+        let many = VERTICES.replace(" 4", " 99999999999");
+        for (elements, message) in [
+            (VERTICES.to_owned(), "the header has no element face"),
+            (
+                none.clone() + &FACES.replace("vertex_indices", "corners"),
+                "no list named vertex_indices",
+            ),
+            (many + FACES, "99999999999 points or more, but at most 100"),
+            (
+                none + &FACES.replace(" 2", " 101"),
+                "101 triangles or more, but at most 100",
+            ),
+        ] {
+            let fault = of(elements).unwrap_err();
+            assert!(fault.contains(message), "{fault}");
+        }
     }
 }

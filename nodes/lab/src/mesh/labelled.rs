@@ -69,17 +69,14 @@ impl LabelledMesh {
         })
     }
 
-    /// Number of triangles.
     pub fn len(&self) -> usize {
         self.triangles.len()
     }
 
-    /// True if there is no triangle.
     pub fn is_empty(&self) -> bool {
         self.triangles.is_empty()
     }
 
-    /// The vertices, metres.
     #[cfg(test)]
     pub fn vertices_m(&self) -> &[[f32; 3]] {
         &self.vertices_m
@@ -91,12 +88,10 @@ impl LabelledMesh {
         &self.triangles
     }
 
-    /// The class of each triangle.
     pub fn labels(&self) -> &[u16] {
         &self.labels
     }
 
-    /// The instance of each triangle.
     pub fn instances(&self) -> &[u16] {
         &self.instances
     }

@@ -5,5 +5,5 @@ mod labelled;
 mod scene;
 
 pub use file::read_mesh;
-pub use labelled::{LabelledMesh, MAX_COORDINATE_M, MAX_TRIANGLES};
-pub use scene::{MeshHit, MeshScene};
+pub(crate) use labelled::{LabelledMesh, MAX_TRIANGLES};
+pub(crate) use scene::MeshScene;

@@ -1,5 +1,7 @@
 //! Rays against a mesh.
 
+use super::LabelledMesh;
+use crate::AnyError;
 use nalgebra::{Point3, Vector3};
 use obvhs::BvhBuildParams;
 use obvhs::bvh2::reinsertion::ReinsertionOptimizer;
@@ -10,18 +12,13 @@ use obvhs::ray::{Ray, RayHit};
 use obvhs::triangle::Triangle;
 use rustc_hash::FxHashSet;
 
-use super::LabelledMesh;
-use crate::AnyError;
-
 /// Levels that the traversal has room for.
 const MAX_DEPTH: u32 = 31;
 
 /// The first triangle that a ray hits.
 #[derive(Clone, Copy, PartialEq, Debug)]
 pub struct MeshHit {
-    /// Distance from the origin of the ray, metres.
     pub distance_m: f64,
-    /// Number of the triangle in the mesh.
     pub triangle: usize,
 }
 
@@ -141,9 +138,8 @@ impl std::fmt::Debug for MeshScene {
 
 #[cfg(test)]
 mod tests {
-    use proptest::prelude::*;
-
     use super::*;
+    use proptest::prelude::*;
 
     /// Distance at which a ray hits a triangle: the plane in f64, then the sides.
     fn oracle_m(
@@ -155,9 +151,10 @@ mod tests {
         let normal = (b - a).cross(&(c - a));
         let distance_m = normal.dot(&(a - origin)) / normal.dot(direction);
         let at = origin + direction * distance_m;
-        let inside = [(a, b), (b, c), (c, a)]
-            .iter()
-            .all(|(from, to)| (to - from).cross(&(at - from)).dot(&normal) >= 0.0);
+        let within = |(from, to): (Point3<f64>, Point3<f64>)| {
+            (to - from).cross(&(at - from)).dot(&normal) >= 0.0
+        };
+        let inside = [(a, b), (b, c), (c, a)].into_iter().all(within);
         (inside && distance_m >= 0.0).then_some(distance_m)
     }
 
@@ -198,27 +195,14 @@ mod tests {
 
     #[test]
     fn both_sides_are_seen_and_nothing_beyond_the_end() {
-        let scene = MeshScene::new(&mesh(&[[
-            [0.0, -1.0, -1.0],
-            [0.0, 1.0, -1.0],
-            [0.0, 0.0, 1.0],
-        ]]))
-        .unwrap();
+        let triangle = [[0.0, -1.0, -1.0], [0.0, 1.0, -1.0], [0.0, 0.0, 1.0]];
+        let scene = MeshScene::new(&mesh(&[triangle])).unwrap();
         for (x, step) in [(-2.0, 3.0), (2.0, -0.1)] {
-            let hit = scene.cast(
-                &Point3::new(x, 0.0, 0.0),
-                &Vector3::new(step, 0.0, 0.0),
-                5.0,
-            );
-            let hit = hit.unwrap();
+            let (origin, direction) = (Point3::new(x, 0.0, 0.0), Vector3::x() * step);
+            let hit = scene.cast(&origin, &direction, 5.0).unwrap();
             assert!((hit.distance_m - 2.0).abs() < 1e-6);
             assert_eq!(hit.triangle, 0);
-            let short = scene.cast(
-                &Point3::new(x, 0.0, 0.0),
-                &Vector3::new(step, 0.0, 0.0),
-                1.9,
-            );
-            assert_eq!(short, None);
+            assert_eq!(scene.cast(&origin, &direction, 1.9), None);
         }
     }
 
@@ -241,10 +225,7 @@ mod tests {
                 let direction = Vector3::from_fn(|i, _| if i == axis { 1.0 } else { 0.0 }) * sign;
                 let hit = scene.cast(&origin, &direction, 9.0).unwrap();
                 let expected = (far - origin[axis]) * sign;
-                assert!(
-                    (hit.distance_m - expected).abs() < 1e-5,
-                    "{direction:?} {hit:?}"
-                );
+                assert!((hit.distance_m - expected).abs() < 1e-5, "{hit:?}");
             }
         }
     }

@@ -1,8 +1,7 @@
 //! Error of a pose.
 
-use nalgebra::Isometry3;
-
 use lattice_core::pose::se3;
+use nalgebra::Isometry3;
 
 /// Error of an estimated transform T* against the truth T_GT, in four measures.
 ///
@@ -35,9 +34,8 @@ impl PoseError {
 
 #[cfg(test)]
 mod tests {
-    use nalgebra::{Translation3, UnitQuaternion, Vector3};
-
     use super::*;
+    use nalgebra::{Translation3, UnitQuaternion, Vector3};
 
     fn pose(t: [f64; 3], rotation: [f64; 3]) -> Isometry3<f64> {
         Isometry3::new(Vector3::from(t), Vector3::from(rotation))

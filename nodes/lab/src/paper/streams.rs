@@ -6,23 +6,14 @@ use crate::random::Stream;
 #[derive(Clone, Copy, Debug)]
 #[repr(u64)]
 pub enum Purpose {
-    /// Points whose nearest lattice point is sought.
     Quantize = 256,
-    /// Points of a cell.
     Cell = 257,
-    /// Points that are spread evenly in space.
     Uniform = 258,
-    /// Rotations and offsets of a cloud.
     Pose = 259,
-    /// Choice of the points of a cloud.
     Thin = 260,
-    /// Place of a lattice about a cloud.
     Offset = 261,
-    /// Poses of lattices and starts of alignments.
     Matching = 272,
-    /// Resamples of trials.
     Bootstrap = 273,
-    /// Frames in which one calibration is measured.
     Frames = 768,
 }
 

@@ -4,11 +4,9 @@
 //! Made as fast as the method allows: single precision, squared distances, vectors of the
 //! differences made once, loops that the compiler vectorises for the same instruction sets.
 
-use nalgebra::Matrix3;
-
 use super::off_by_one;
-
 use lattice_core::lattice::{BlockKey, Lattice, Simd};
+use nalgebra::Matrix3;
 
 /// Points that are quantized together.
 const BLOCK: usize = 128;
@@ -168,12 +166,11 @@ fn block(c: &Constants, points: &[[f32; 3]; BLOCK], codes: &mut [BlockKey; BLOCK
 
 #[cfg(test)]
 mod tests {
+    use super::*;
+    use lattice_core::lattice::LatticeKind;
     use nalgebra::Vector3;
     use rand::{RngExt, SeedableRng};
     use rand_chacha::ChaCha8Rng;
-
-    use super::*;
-    use lattice_core::lattice::LatticeKind;
 
     fn points(half_side_m: f32) -> Vec<[f32; 3]> {
         let mut random = ChaCha8Rng::seed_from_u64(1);

@@ -1,9 +1,8 @@
 //! Sunlight with shadows, and skylight.
 
-use nalgebra::Vector3;
-
 use super::raster::{NOTHING, Scene, Screen};
 use super::view::View;
+use nalgebra::Vector3;
 
 /// Azimuth of the sun: degrees clockwise from the camera, seen from the map.
 const SUN_FROM_CAMERA_DEG: f64 = 62.0;
@@ -31,7 +30,7 @@ impl Sun {
     pub(super) fn new(scene: &Scene, camera_azimuth_deg: f64, size: [usize; 2]) -> Sun {
         let side = size[0].max(size[1]).min(MAX_SHADOW_SIDE);
         let azimuth_deg = camera_azimuth_deg + SUN_FROM_CAMERA_DEG;
-        let view = View::new(azimuth_deg, SUN_ELEVATION_DEG, [side; 2]).fit(scene, 1.0);
+        let view = View::new(azimuth_deg, SUN_ELEVATION_DEG, [side; 2]).fit(scene);
         Sun {
             screen: scene.draw(&view),
             view,
@@ -39,7 +38,6 @@ impl Sun {
         }
     }
 
-    /// Towards the sun.
     pub(super) fn direction(&self) -> Vector3<f64> {
         self.view.toward
     }

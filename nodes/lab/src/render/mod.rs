@@ -8,14 +8,12 @@ mod raster;
 mod shade;
 mod view;
 
-use std::collections::BTreeMap;
-use std::io::Write;
-
+use crate::AnyError;
 use lattice_core::voxels::VoxelList;
 use nalgebra::Vector3;
-
-use crate::AnyError;
 use raster::Scene;
+use std::collections::BTreeMap;
+use std::io::Write;
 use view::View;
 
 /// Longest side of a picture, pixels.
@@ -36,10 +34,6 @@ pub struct RenderOptions {
     pub azimuth_deg: f64,
     /// Elevation of the camera over the map: degrees, 90 looks straight down.
     pub elevation_deg: f64,
-    /// sRGB colour and opacity where there is no map.
-    pub background: [u8; 4],
-    /// 1 shows the whole map, 2 half of its width and height around where most cells are.
-    pub zoom: f64,
     /// Contrast of light and shadow: 1 as outdoors, 0 none.
     pub contrast: f64,
     /// A place to show in place of the whole map, at the same size whatever else there is.
@@ -51,7 +45,7 @@ pub struct RenderOptions {
 pub struct Focus {
     /// Middle of the picture: map frame, metres.
     pub center_m: [f64; 3],
-    /// Width of the picture with a zoom of 1, metres.
+    /// Width of the picture, metres.
     pub width_m: f64,
 }
 
@@ -65,15 +59,13 @@ enum Paint<'a> {
 }
 
 impl Default for RenderOptions {
-    /// Full HD from the south-west on white.
+    /// Full HD from the south-west.
     fn default() -> RenderOptions {
         RenderOptions {
             width: 1920,
             height: 1080,
             azimuth_deg: 215.0,
             elevation_deg: 35.0,
-            background: [255; 4],
-            zoom: 1.0,
             contrast: 1.0,
             focus: None,
         }
@@ -114,9 +106,9 @@ fn render(
     let view = match options.focus {
         Some(focus) => {
             let center_m = Vector3::from(focus.center_m) - list.datum_m();
-            view.at(&center_m, focus.width_m / options.zoom)
+            view.at(&center_m, focus.width_m)
         }
-        None => view.fit(&scene, options.zoom),
+        None => view.fit(&scene),
     };
     let pixels = shade::picture(&scene, &view, options);
 
@@ -136,7 +128,6 @@ fn check(options: &RenderOptions) -> Result<(), AnyError> {
         height,
         azimuth_deg,
         elevation_deg,
-        zoom,
         ..
     } = *options;
     let sides = 1..=MAX_SIDE;
@@ -149,10 +140,10 @@ fn check(options: &RenderOptions) -> Result<(), AnyError> {
         .into());
     }
     let elevated = (-90.0..=90.0).contains(&elevation_deg);
-    if !azimuth_deg.is_finite() || !elevated || !(0.01..=1000.0).contains(&zoom) {
+    if !azimuth_deg.is_finite() || !elevated {
         return Err(format!(
-            "a camera at azimuth {azimuth_deg} and elevation {elevation_deg} degrees with zoom {zoom}: the \
-             azimuth must be finite, the elevation -90 to 90, the zoom 0.01 to 1000"
+            "a camera at azimuth {azimuth_deg} and elevation {elevation_deg} degrees: the azimuth must be finite, \
+             the elevation -90 to 90"
         )
         .into());
     }

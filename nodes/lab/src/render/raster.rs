@@ -1,13 +1,12 @@
 //! Rasterisation: the face that is seen at each sample of the screen.
 
-use lattice_core::lattice::{Lattice, MortonKey};
-use lattice_core::voxels::VoxelList;
-use nalgebra::Vector3;
-
 use super::Paint;
 use super::view::View;
+use lattice_core::lattice::{Lattice, MortonKey};
+use lattice_core::voxels::VoxelList;
 use lattice_nodes::files::export::HeightRange;
 use lattice_nodes::files::export::palette::{linear, linear_at};
+use nalgebra::Vector3;
 
 /// Depth where there is nothing.
 pub(super) const NOTHING: f32 = f32::NEG_INFINITY;
@@ -80,7 +79,6 @@ impl Scene {
         new.map(|key| self.lattice.center(key.unpack()))
     }
 
-    /// Unit normals of the faces, by index.
     pub(super) fn normals(&self) -> Vec<Vector3<f64>> {
         let neighbors = self.lattice.face_neighbors().iter();
         neighbors
@@ -118,7 +116,6 @@ impl Scene {
 pub(super) struct Surface {
     /// Place of the cell's colour in the palette.
     pub(super) tone: u8,
-    /// Index of the face.
     pub(super) face: u8,
     /// Distance from the nearest edge of the face, in sixteenths of a sample.
     pub(super) inset: u8,

@@ -1,13 +1,12 @@
 //! Shading: the colours of faces on the screen.
 
-use nalgebra::Vector3;
-use rayon::prelude::*;
-
 use super::light::{Sun, openness};
 use super::raster::{NOTHING, Scene, Screen};
 use super::view::View;
 use super::{RenderOptions, SAMPLES};
-use lattice_nodes::files::export::palette::{linear, srgb};
+use lattice_nodes::files::export::palette::srgb;
+use nalgebra::Vector3;
+use rayon::prelude::*;
 
 /// Linear light of the sun, a little warm.
 const SUN: [f64; 3] = [1.02, 0.98, 0.90];
@@ -42,7 +41,7 @@ pub(super) fn picture(scene: &Scene, view: &View, options: &RenderOptions) -> Ve
             let [column, row] = [index % width * SAMPLES, index / width * SAMPLES];
             let samples = (0..SAMPLES * SAMPLES).map(|i| [column + i % SAMPLES, row + i / SAMPLES]);
             let colors = samples.map(|at| shader.color(at));
-            pixel.copy_from_slice(&mean(colors, options.background));
+            pixel.copy_from_slice(&mean(colors));
         });
     pixels
 }
@@ -94,23 +93,13 @@ impl Shader<'_> {
     }
 }
 
-/// Mean of the samples of a pixel over the background, as sRGB and opacity.
-fn mean(samples: impl Iterator<Item = Option<[f64; 3]>>, background: [u8; 4]) -> [u8; 4] {
-    let [r, g, b, opacity] = background;
-    let behind = [r, g, b].map(linear);
-    let opacity = f64::from(opacity) / 255.0;
-    let (mut sum, mut weight, mut count) = ([0.0; 3], 0.0, 0.0);
+/// Mean of the samples of a pixel over white, as sRGB and opacity.
+fn mean(samples: impl Iterator<Item = Option<[f64; 3]>>) -> [u8; 4] {
+    let mut sum = [0.0; 3];
     for sample in samples {
-        let (color, opacity) = sample.map_or((behind, opacity), |color| (color, 1.0));
-        sum.iter_mut()
-            .zip(color)
-            .for_each(|(sum, c)| *sum += c * opacity);
-        weight += opacity;
-        count += 1.0;
+        let color = sample.unwrap_or([1.0; 3]);
+        sum.iter_mut().zip(color).for_each(|(sum, c)| *sum += c);
     }
-    if weight <= 0.0 {
-        return [r, g, b, 0];
-    }
-    let [r, g, b] = sum.map(|c| srgb(c / weight));
-    [r, g, b, (weight / count * 255.0_f64).round() as u8]
+    let [r, g, b] = sum.map(|c| srgb(c / (SAMPLES * SAMPLES) as f64));
+    [r, g, b, 255]
 }

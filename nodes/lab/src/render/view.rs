@@ -1,8 +1,8 @@
 //! Parallel projection.
 
-use nalgebra::Vector3;
-
 use super::raster::Scene;
+use crate::evaluate::extent;
+use nalgebra::Vector3;
 
 /// Part of the picture that stays free around the map.
 const MARGIN: f64 = 0.03;
@@ -42,33 +42,20 @@ impl View {
     }
 
     /// Moves and scales so that the whole scene is seen.
-    ///
-    /// With a `zoom` above 1 a part of it, which never leaves the bounds of the scene and closes in
-    /// on the median of its cells.
-    pub(super) fn fit(mut self, scene: &Scene, zoom: f64) -> View {
+    pub(super) fn fit(mut self, scene: &Scene) -> View {
         let centers: Vec<[f64; 3]> = scene.centers().map(|c| self.along(&c)).collect();
-        let axes = [(0, self.size[0]), (1, self.size[1]), (2, usize::MAX)];
-        let mut scale = f64::MAX;
-        for ((axis, side), middle) in axes.into_iter().zip(&mut self.middle_m) {
-            let mut along: Vec<f64> = centers
-                .iter()
-                .filter_map(|c| c.get(axis).copied())
-                .collect();
-            let half = along.len() / 2;
-            let (Some(low), Some(high), true) = (
-                along.iter().copied().reduce(f64::min),
-                along.iter().copied().reduce(f64::max),
-                half < along.len(),
-            ) else {
-                return self;
-            };
-            let median = *along.select_nth_unstable_by(half, f64::total_cmp).1;
-            let center = 0.5 * (low + high);
-            *middle = center + (median - center) * (1.0 - 1.0 / zoom).max(0.0);
-            let extent = high - low + 2.0 * scene.radius_m;
-            scale = scale.min(side as f64 * (1.0 - 2.0 * MARGIN) / extent);
+        if centers.is_empty() {
+            return self;
         }
-        self.scale = scale * zoom;
+        let sides = [self.size[0], self.size[1], usize::MAX];
+        self.scale = f64::MAX;
+        for (axis, side) in sides.into_iter().enumerate() {
+            let [low, high] = extent(centers.iter().map(|c| c[axis]));
+            self.middle_m[axis] = 0.5 * (low + high);
+            let extent = high - low + 2.0 * scene.radius_m;
+            let scale = side as f64 * (1.0 - 2.0 * MARGIN) / extent;
+            self.scale = self.scale.min(scale);
+        }
         self
     }
 

@@ -1,14 +1,13 @@
 //! The files of a report: `report.html`, `report.json`, a `.csv` for each table, an `.svg` for each figure.
 
-use std::fs;
-use std::path::Path;
-
 use super::html::html;
 use super::{Cell, Report, Table};
 use crate::{AnyError, at};
+use std::fs;
+use std::path::Path;
 
 /// Writes a report into a folder, which is made where it is missing; its files are replaced.
-pub fn write(report: &Report, folder: &Path) -> Result<(), AnyError> {
+pub fn write_report(report: &Report, folder: &Path) -> Result<(), AnyError> {
     fs::create_dir_all(folder).map_err(at(folder))?;
     let put = |name: &str, text: &str| {
         let path = folder.join(name);
@@ -68,7 +67,7 @@ mod tests {
     fn the_files_hold_all_numbers() {
         let folder = tempfile::tempdir().unwrap();
         let into = folder.path().join("new");
-        write(&report(), &into).unwrap();
+        write_report(&report(), &into).unwrap();
         let read = |name: &str| fs::read_to_string(into.join(name)).unwrap();
         assert_eq!(
             read("sides.csv"),
@@ -86,7 +85,7 @@ mod tests {
     #[test]
     fn a_folder_that_cannot_be_made_is_named() {
         let file = tempfile::NamedTempFile::new().unwrap();
-        let error = write(&report(), &file.path().join("in")).unwrap_err();
+        let error = write_report(&report(), &file.path().join("in")).unwrap_err();
         assert!(error.to_string().contains("/in: "), "{error}");
     }
 }

@@ -5,15 +5,12 @@
 mod files;
 mod html;
 mod markdown;
-mod picture;
 pub mod plot;
 
-use serde::ser::SerializeStruct;
-use serde::{Serialize, Serializer};
-
-pub use files::write;
+pub use files::write_report;
 pub use html::escaped;
 pub use markdown::markdown;
+use serde::{Serialize, Serializer};
 
 /// A report of one paper or one evaluation.
 #[derive(Clone, PartialEq, Debug, Serialize)]
@@ -25,45 +22,28 @@ pub struct Report {
     sections: Vec<Section>,
 }
 
-/// The head of a report.
-#[derive(Clone, PartialEq, Debug)]
-pub struct Head {
-    /// Title; for a paper with its authors.
-    pub title: String,
-    /// A paragraph on the whole.
-    pub lead: String,
-    /// Command line, without the folder that it was written to.
-    pub command: String,
-}
-
-impl Head {
-    /// The head of a paper's report.
-    pub fn of_paper(title: &str, command: String, quick: bool) -> Head {
-        let lead = match quick {
-            true => {
-                "Each table and figure computed anew. A quick run: fewer samples and trials than a full report."
-            }
-            false => "Each table and figure computed anew.",
-        };
-        Head {
-            title: title.to_owned(),
-            lead: lead.to_owned(),
-            command,
-        }
-    }
-}
-
 impl Report {
     /// A report of sections in their order. One that claims to be reproduced, corrected or not, while a
     /// check of it fails becomes one that is not.
-    pub fn new(head: Head, sections: Vec<Section>) -> Report {
+    ///
+    /// The command line is without the folder that the report was written to.
+    pub fn new(title: &str, lead: String, command: String, sections: Vec<Section>) -> Report {
         Report {
-            title: head.title,
-            lead: head.lead,
-            command: head.command,
+            title: title.to_owned(),
+            lead,
+            command,
             version: env!("CARGO_PKG_VERSION"),
             sections: sections.into_iter().map(Section::settled).collect(),
         }
+    }
+
+    /// A report of a paper, whose title has its authors.
+    pub fn of_paper(title: &str, command: String, quick: bool, sections: Vec<Section>) -> Report {
+        let mut lead = "Each table and figure computed anew.".to_owned();
+        if quick {
+            lead.push_str(" A quick run: fewer samples and trials than a full report.");
+        }
+        Report::new(title, lead, command, sections)
     }
 
     /// Sections in their order.
@@ -89,13 +69,11 @@ pub struct Section {
     pub claim: String,
     /// Our finding.
     pub finding: String,
-    /// Verdict on the claim.
     pub verdict: Verdict,
     /// Numbers with a value to meet.
     pub checks: Vec<Check>,
     /// Tables with all numbers.
     pub tables: Vec<Table>,
-    /// Pictures.
     pub figures: Vec<Figure>,
 }
 
@@ -114,9 +92,8 @@ impl Section {
         }
     }
 
-    /// Checks that do not hold.
     pub fn failing(&self) -> impl Iterator<Item = &Check> {
-        self.checks.iter().filter(|check| !check.holds())
+        self.checks.iter().filter(|check| !check.holds)
     }
 
     /// The section with a verdict that its checks allow.
@@ -134,7 +111,6 @@ impl Section {
 #[derive(Clone, PartialEq, Debug, Serialize)]
 #[serde(tag = "verdict", content = "why", rename_all = "snake_case")]
 pub enum Verdict {
-    /// Result as in the paper.
     Reproduced,
     /// Result as in the paper once this is corrected.
     Corrected(String),
@@ -147,7 +123,6 @@ pub enum Verdict {
 }
 
 impl Verdict {
-    /// Name in a few words.
     pub fn name(&self) -> &'static str {
         match self {
             Self::Reproduced => "reproduced",
@@ -158,7 +133,6 @@ impl Verdict {
         }
     }
 
-    /// Correction, data or reason.
     pub fn why(&self) -> &str {
         match self {
             Self::Reproduced | Self::Measured => "",
@@ -167,8 +141,8 @@ impl Verdict {
     }
 }
 
-/// A number beside the one that it should be.
-#[derive(Clone, PartialEq, Debug)]
+/// A number beside the one that it should be; none is near enough to NaN.
+#[derive(Clone, PartialEq, Debug, Serialize)]
 pub struct Check {
     /// Name with its unit: "RMS of FCC (m)".
     pub name: String,
@@ -176,10 +150,10 @@ pub struct Check {
     pub printed: Option<f64>,
     /// Number from theory or a measurement made elsewhere.
     pub expected: f64,
-    /// Our number.
     pub found: f64,
     /// Greatest allowed difference, in the same unit.
     pub tolerance: f64,
+    pub holds: bool,
 }
 
 impl Check {
@@ -191,6 +165,7 @@ impl Check {
             expected,
             found,
             tolerance,
+            holds: (found - expected).abs() <= tolerance,
         }
     }
 
@@ -199,28 +174,14 @@ impl Check {
         Check { printed, ..self }
     }
 
+    /// A count that must be met.
+    pub fn count(name: impl Into<String>, expected: usize, found: usize) -> Check {
+        Check::new(name, expected as f64, found as f64, 0.0)
+    }
+
     /// A statement that must be true: 1 if it is, 0 if not.
     pub fn that(name: impl Into<String>, is_so: bool) -> Check {
-        let name = format!("{} (1: yes)", name.into());
-        Check::new(name, 1.0, f64::from(u8::from(is_so)), 0.0)
-    }
-
-    /// True of a number that is near enough; never of NaN.
-    pub fn holds(&self) -> bool {
-        (self.found - self.expected).abs() <= self.tolerance
-    }
-}
-
-impl Serialize for Check {
-    fn serialize<S: Serializer>(&self, to: S) -> Result<S::Ok, S::Error> {
-        let mut fields = to.serialize_struct("Check", 6)?;
-        fields.serialize_field("name", &self.name)?;
-        fields.serialize_field("printed", &self.printed)?;
-        fields.serialize_field("expected", &self.expected)?;
-        fields.serialize_field("found", &self.found)?;
-        fields.serialize_field("tolerance", &self.tolerance)?;
-        fields.serialize_field("holds", &self.holds())?;
-        fields.end()
+        Check::count(format!("{} (1: yes)", name.into()), 1, usize::from(is_so))
     }
 }
 
@@ -238,17 +199,17 @@ pub struct Table {
 }
 
 impl Table {
-    /// A table of rows.
-    pub fn new<N: Into<String>>(
+    /// A table of rows; the names of its columns have bars between them.
+    pub fn new(
         name: impl Into<String>,
         caption: impl Into<String>,
-        columns: impl IntoIterator<Item = N>,
+        columns: &str,
         rows: impl IntoIterator<Item = Vec<Cell>>,
     ) -> Table {
         Table {
             name: name.into(),
             caption: caption.into(),
-            columns: columns.into_iter().map(Into::into).collect(),
+            columns: columns.split('|').map(str::to_owned).collect(),
             rows: rows.into_iter().collect(),
         }
     }
@@ -257,14 +218,16 @@ impl Table {
 /// A cell of a table.
 #[derive(Clone, PartialEq, Debug)]
 pub enum Cell {
-    /// Text.
     Text(String),
     /// A number and its digits after the point on the page; files hold all of them.
     Number(f64, usize),
-    /// A count.
     Count(u64),
-    /// No value.
     Empty,
+}
+
+/// Numbers with so many digits after the point.
+pub fn numbers<const N: usize>(digits: usize, values: [f64; N]) -> [Cell; N] {
+    values.map(|value| Cell::Number(value, digits))
 }
 
 impl Cell {
@@ -327,12 +290,10 @@ impl From<usize> for Cell {
     }
 }
 
-/// A picture.
 #[derive(Clone, PartialEq, Debug, Serialize)]
 pub struct Figure {
     /// Stem of its file, unique in the report.
     pub name: String,
-    /// Caption below it.
     pub caption: String,
     /// The drawing: an `<svg>` element, no scripts and no links to other files.
     #[serde(skip)]
@@ -340,13 +301,9 @@ pub struct Figure {
 }
 
 impl Figure {
-    /// A picture of an `<svg>` element.
     pub fn new(name: impl Into<String>, caption: impl Into<String>, svg: String) -> Figure {
-        Figure {
-            name: name.into(),
-            caption: caption.into(),
-            svg,
-        }
+        let (name, caption) = (name.into(), caption.into());
+        Figure { name, caption, svg }
     }
 }
 

@@ -1,14 +1,111 @@
-//! Colours of the lattices, curves, and box plots.
+//! Pictures of reports: panels beside a key of the colours, charts, curves and box plots in them.
 
 use lattice_core::lattice::LatticeKind;
+use plotters::coord::Shift;
+use plotters::coord::ranged1d::{AsRangedCoord, ValueFormatter};
 use plotters::prelude::*;
+use std::ops::Range;
 
-pub use super::picture::{Area, Layout, chart, svg};
 use crate::AnyError;
 use crate::evaluate::{median_interval, quantile};
 
-/// Font at axes.
-pub const LABELS: (&str, u32) = ("sans-serif", 13);
+/// An area of a picture.
+pub type Area<'a> = DrawingArea<SVGBackend<'a>, Shift>;
+/// A chart whose axes are of `X` and `Y`.
+pub type Chart<'a, X, Y> = ChartContext<
+    'a,
+    SVGBackend<'a>,
+    Cartesian2d<<X as AsRangedCoord>::CoordDescType, <Y as AsRangedCoord>::CoordDescType>,
+>;
+/// A colour and its meaning.
+pub type Key<'a> = (RGBColor, &'a str);
+
+/// Panels of a size (pixels) in columns and rows, and a key so wide on their right.
+#[derive(Clone, Copy, Debug)]
+pub struct Layout<'a> {
+    panel: (u32, u32),
+    grid: [usize; 2],
+    key_width: u32,
+    key: &'a [Key<'a>],
+}
+
+impl<'a> Layout<'a> {
+    pub fn new(panel: (u32, u32), grid: [usize; 2], key_width: u32, key: &'a [Key<'a>]) -> Self {
+        let grid = grid.map(|panels| panels.max(1));
+        Layout {
+            panel,
+            grid,
+            key_width,
+            key,
+        }
+    }
+}
+
+/// The picture as an `<svg>` element; `draw` gets its panels row by row.
+pub fn svg(
+    layout: &Layout,
+    draw: impl FnOnce(&[Area]) -> Result<(), AnyError>,
+) -> Result<String, AnyError> {
+    let [columns, rows] = layout.grid;
+    let width = layout.panel.0 * columns as u32;
+    let size = (width + layout.key_width, layout.panel.1 * rows as u32);
+    let mut text = String::new();
+    {
+        let root = SVGBackend::with_string(&mut text, size).into_drawing_area();
+        root.fill(&WHITE)?;
+        let (left, right) = root.split_horizontally(width);
+        for (row, (color, title)) in (0..).zip(layout.key) {
+            let y = 40 + 18 * row;
+            right.draw(&PathElement::new([(4, y), (24, y)], color.stroke_width(3)))?;
+            right.draw(&Text::new(*title, (32, y - 6), ("sans-serif", 14)))?;
+        }
+        draw(&left.split_evenly((rows, columns)))?;
+        root.present()?;
+    }
+    Ok(text)
+}
+
+/// A chart with a title and named axes that fills a panel; below it numbers, or names of 0, 1, 2 and so on.
+pub fn chart<'a, X, Y>(
+    area: &Area<'a>,
+    title: &str,
+    (x, xs): (&str, X),
+    (y, ys): (&str, Y),
+    names: &[&str],
+) -> Result<Chart<'a, X, Y>, AnyError>
+where
+    X: AsRangedCoord<Value = f64>,
+    Y: AsRangedCoord<Value = f64>,
+    X::CoordDescType: ValueFormatter<f64>,
+    Y::CoordDescType: ValueFormatter<f64>,
+{
+    let name = |at: &f64| {
+        let on = (at - at.round()).abs() < 1e-6 && *at > -0.5;
+        let name = names.get(at.round().max(0.0) as usize).filter(|_| on);
+        name.map_or(String::new(), |name| (*name).to_owned())
+    };
+    let mut chart = ChartBuilder::on(area)
+        .caption(title, ("sans-serif", 15))
+        .margin(8)
+        .x_label_area_size(36)
+        .y_label_area_size(56)
+        .build_cartesian_2d(xs, ys)?;
+    let mut mesh = chart.configure_mesh();
+    mesh.x_desc(x).y_desc(y).y_label_formatter(&label);
+    match names.len() {
+        0 => mesh.x_labels(7).x_label_formatter(&label),
+        n => (mesh.disable_x_mesh().x_labels(n + 1)).x_label_formatter(&name),
+    };
+    mesh.light_line_style(WHITE).label_style(("sans-serif", 13));
+    mesh.draw()?;
+    Ok(chart)
+}
+
+/// A number at an axis, to a millionth.
+fn label(value: &f64) -> String {
+    // No -0.
+    ((value * 1e6).round() / 1e6 + 0.0).to_string()
+}
 
 /// A lattice's colour, told apart by most eyes (Wong 2011).
 pub fn color(kind: LatticeKind) -> RGBColor {
@@ -36,73 +133,27 @@ pub fn title(kind: LatticeKind) -> &'static str {
     }
 }
 
-/// Colours and names of lattices, for [`Layout::key`].
-pub fn key(kinds: &[LatticeKind]) -> Vec<(RGBColor, &'static str)> {
-    kinds
-        .iter()
-        .map(|&kind| (color(kind), title(kind)))
-        .collect()
-}
-
-/// Title, axes and ranges of a panel.
-#[derive(Clone, Debug)]
-pub struct Axes<'a> {
-    /// Title above it.
-    pub title: &'a str,
-    /// Name of x below it, with a unit.
-    pub x: &'a str,
-    /// Name of y at its left, with a unit.
-    pub y: &'a str,
-    /// Range of x.
-    pub xs: std::ops::Range<f64>,
-    /// Range of y.
-    pub ys: std::ops::Range<f64>,
-}
-
-/// Number of labels at an axis, about.
-const TICKS: usize = 7;
-
-/// Labels of an axis that shows a range, with as many digits as they need.
-pub fn labels(range: &std::ops::Range<f64>) -> impl Fn(&f64) -> String + use<> {
-    let step = (range.end - range.start) / TICKS as f64;
-    let digits = (-step.log10()).ceil().clamp(0.0, 9.0) as usize;
-    move |value| {
-        // No -0.
-        let value = if value.abs() < step / 1e6 {
-            0.0
-        } else {
-            *value
-        };
-        format!("{value:.digits$}")
-    }
+/// Colours and names of lattices.
+pub fn key(kinds: &[LatticeKind]) -> Vec<Key<'static>> {
+    let of = |&kind: &LatticeKind| (color(kind), title(kind));
+    kinds.iter().map(of).collect()
 }
 
 /// A line of a colour.
 pub type Curve = (RGBColor, Vec<(f64, f64)>);
 
 /// Lines in one panel.
-pub fn curves(area: &Area, axes: &Axes, curves: &[Curve]) -> Result<(), AnyError> {
-    let mut chart = ChartBuilder::on(area)
-        .caption(axes.title, ("sans-serif", 15))
-        .margin(8)
-        .x_label_area_size(36)
-        .y_label_area_size(56)
-        .build_cartesian_2d(axes.xs.clone(), axes.ys.clone())?;
-    chart
-        .configure_mesh()
-        .x_desc(axes.x)
-        .y_desc(axes.y)
-        .x_labels(TICKS)
-        .x_label_formatter(&labels(&axes.xs))
-        .y_label_formatter(&labels(&axes.ys))
-        .light_line_style(WHITE)
-        .label_style(LABELS)
-        .draw()?;
+pub fn curves(
+    area: &Area,
+    title: &str,
+    x: (&str, Range<f64>),
+    y: (&str, Range<f64>),
+    curves: &[Curve],
+) -> Result<(), AnyError> {
+    let mut chart = chart(area, title, x, y, &[])?;
     for (color, points) in curves {
-        chart.draw_series(LineSeries::new(
-            points.iter().copied(),
-            color.stroke_width(2),
-        ))?;
+        let points = points.iter().copied();
+        chart.draw_series(LineSeries::new(points, color.stroke_width(2)))?;
     }
     Ok(())
 }
@@ -132,15 +183,10 @@ pub fn cumulative(values: &[f64]) -> Vec<(f64, f64)> {
 /// Numbers of a box plot (Tukey 1977).
 #[derive(Clone, PartialEq, Debug)]
 pub struct BoxStats {
-    /// Number of values.
-    pub n: usize,
-    /// Lower quartile.
     pub lower: f64,
-    /// Median.
     pub median: f64,
     /// 95 % interval of the median.
     pub median_interval: [f64; 2],
-    /// Upper quartile.
     pub upper: f64,
     /// The last values within 1.5 interquartile ranges of the box.
     pub whiskers: [f64; 2],
@@ -160,7 +206,6 @@ impl BoxStats {
         let mut inside = sorted.iter().copied().filter(within);
         let low = inside.next().unwrap_or(lower);
         Some(BoxStats {
-            n: sorted.len(),
             lower,
             median,
             median_interval: median_interval(sorted.iter().copied())?,
@@ -172,47 +217,23 @@ impl BoxStats {
 }
 
 /// A box with its name and colour.
-pub type NamedBox = (String, RGBColor, BoxStats);
+pub type NamedBox = (&'static str, RGBColor, BoxStats);
 
 /// Boxes beside each other: whiskers at 1.5 interquartile ranges, outliers as dots, the interval of the
-/// median as a darker band. What lies above the panel is counted there. `axes.xs` is not used.
-pub fn boxes(area: &Area, axes: &Axes, boxes: &[NamedBox]) -> Result<(), AnyError> {
-    boxes_with_marks(area, axes, boxes, &[])
-}
-
-/// [`boxes`] with a cross at a value of each box, in their order.
-pub fn boxes_with_marks(
+/// median as a darker band, a cross at the mark of a box. What lies above the panel is counted there.
+pub fn boxes(
     area: &Area,
-    axes: &Axes,
+    title: &str,
+    (y, ys): (&str, Range<f64>),
     boxes: &[NamedBox],
     marks: &[Option<f64>],
 ) -> Result<(), AnyError> {
-    let last = boxes.len() as f64 - 0.4;
-    let mut chart = ChartBuilder::on(area)
-        .caption(axes.title, ("sans-serif", 15))
-        .margin(8)
-        .x_label_area_size(36)
-        .y_label_area_size(56)
-        .build_cartesian_2d(-0.6..last, axes.ys.clone())?;
-    let name = |x: &f64| {
-        let named = boxes.get(x.round().max(0.0) as usize);
-        let on = (x - x.round()).abs() < 1e-6 && *x > -0.5;
-        named.filter(|_| on).map_or(String::new(), |b| b.0.clone())
-    };
-    chart
-        .configure_mesh()
-        .disable_x_mesh()
-        .x_labels(boxes.len() + 1)
-        .x_label_formatter(&name)
-        .y_label_formatter(&labels(&axes.ys))
-        .x_desc(axes.x)
-        .y_desc(axes.y)
-        .light_line_style(WHITE)
-        .label_style(LABELS)
-        .draw()?;
+    let names: Vec<&str> = boxes.iter().map(|(name, ..)| *name).collect();
+    let xs = -0.6..boxes.len() as f64 - 0.4;
+    let mut chart = chart(area, title, ("", xs), (y, ys.clone()), &names)?;
     for (i, (_, color, stats)) in boxes.iter().enumerate() {
         let x = i as f64;
-        let line = |points: Vec<(f64, f64)>| PathElement::new(points, color.stroke_width(2));
+        let line = |from, to| PathElement::new(vec![from, to], color.stroke_width(2));
         let rectangle = |[low, high]: [f64; 2], fill: ShapeStyle| {
             Rectangle::new([(x - 0.28, low), (x + 0.28, high)], fill)
         };
@@ -224,20 +245,20 @@ pub fn boxes_with_marks(
         ])?;
         let [low, high] = stats.whiskers;
         chart.draw_series([
-            line(vec![(x - 0.28, stats.median), (x + 0.28, stats.median)]),
-            line(vec![(x, stats.upper), (x, high)]),
-            line(vec![(x, stats.lower), (x, low)]),
-            line(vec![(x - 0.14, high), (x + 0.14, high)]),
-            line(vec![(x - 0.14, low), (x + 0.14, low)]),
+            line((x - 0.28, stats.median), (x + 0.28, stats.median)),
+            line((x, stats.upper), (x, high)),
+            line((x, stats.lower), (x, low)),
+            line((x - 0.14, high), (x + 0.14, high)),
+            line((x - 0.14, low), (x + 0.14, low)),
         ])?;
-        let top = axes.ys.end;
-        let (shown, above): (Vec<f64>, Vec<f64>) = stats.outliers.iter().partition(|v| **v <= top);
-        let dots = shown.into_iter().filter(|v| *v >= axes.ys.start);
+        let (shown, above): (Vec<f64>, Vec<f64>) =
+            stats.outliers.iter().partition(|v| **v <= ys.end);
+        let dots = shown.into_iter().filter(|v| *v >= ys.start);
         chart.draw_series(dots.map(|v| Circle::new((x, v), 2, color.mix(0.5).filled())))?;
         if !above.is_empty() {
             let words = format!("{} above", above.len());
             let style = ("sans-serif", 12).into_font().color(color);
-            chart.draw_series([Text::new(words, (x - 0.3, top), style)])?;
+            chart.draw_series([Text::new(words, (x - 0.3, ys.end), style)])?;
         }
     }
     let crosses = marks.iter().enumerate();
@@ -251,24 +272,25 @@ mod tests {
     use super::*;
 
     #[test]
+    fn a_picture_is_one_element_without_ids() {
+        let layout = Layout::new((100, 50), [2, 3], 70, &[(BLUE, "a < b")]);
+        let picture = svg(&layout, |areas| {
+            assert_eq!(areas.len(), 6);
+            curves(&areas[5], "", ("", 0.0..1.0), ("", 0.0..1.0), &[])
+        });
+        let picture = picture.unwrap();
+        let size = "<svg width=\"270\" height=\"150\"";
+        assert!(picture.starts_with(size), "{picture}");
+        assert!(picture.trim_end().ends_with("</svg>") && picture.contains("a &lt; b"));
+        assert!(!picture.contains(" id=") && !picture.contains("url("));
+    }
+
+    #[test]
     fn boxes_are_those_of_tukey() {
-        let values = [
-            1.0,
-            2.0,
-            3.0,
-            4.0,
-            5.0,
-            6.0,
-            7.0,
-            8.0,
-            9.0,
-            30.0,
-            -20.0,
-            f64::NAN,
-        ];
+        let mut values: Vec<f64> = (1..10).map(f64::from).collect();
+        values.extend([30.0, -20.0, f64::NAN]);
         let stats = BoxStats::of(&values).unwrap();
-        assert_eq!((stats.n, stats.median), (11, 5.0));
-        assert_eq!((stats.lower, stats.upper), (2.5, 7.5));
+        assert_eq!((stats.lower, stats.median, stats.upper), (2.5, 5.0, 7.5));
         assert_eq!(stats.whiskers, [1.0, 9.0]);
         assert_eq!(stats.outliers, [-20.0, 30.0]);
         assert!(stats.median_interval[0] <= 5.0 && stats.median_interval[1] >= 5.0);
@@ -279,13 +301,8 @@ mod tests {
 
     #[test]
     fn labels_have_the_digits_that_they_need() {
-        let said = |range, value: f64| labels(&range)(&value);
-        assert_eq!(said(17_000.0..17_300.0, 17_100.0), "17100");
-        assert_eq!(said(0.23..0.242, 0.234), "0.234");
-        assert_eq!(
-            (said(0.0..2.6, 0.5), said(-1.0..2.6, -1e-17)),
-            ("0.5".into(), "0.0".into())
-        );
+        let found = [17_100.0, 0.3 - 0.1, 0.005, -1e-17].map(|value| label(&value));
+        assert_eq!(found, ["17100", "0.2", "0.005", "0"]);
     }
 
     #[test]
@@ -299,26 +316,13 @@ mod tests {
 
     #[test]
     fn boxes_have_their_names_and_count_what_is_not_shown() {
-        let layout = Layout {
-            panel: (500, 300),
-            columns: 1,
-            rows: 1,
-            key_width: 0,
-            key: &[],
-        };
-        let axes = Axes {
-            title: "errors",
-            x: "lattice",
-            y: "error (m)",
-            xs: 0.0..1.0,
-            ys: 0.0..10.0,
-        };
         let mut values: Vec<f64> = (0..20).map(f64::from).map(|v| v / 10.0).collect();
         values.extend([9.0, 50.0, 60.0]);
         let stats = BoxStats::of(&values).unwrap();
-        let named =
-            LatticeKind::ALL.map(|kind| (title(kind).to_owned(), color(kind), stats.clone()));
-        let picture = svg(&layout, |areas| boxes(&areas[0], &axes, &named)).unwrap();
+        let named = LatticeKind::ALL.map(|kind| (title(kind), color(kind), stats.clone()));
+        let layout = Layout::new((500, 300), [1, 1], 0, &[]);
+        let draw = |areas: &[Area]| boxes(&areas[0], "", ("error (m)", 0.0..10.0), &named, &[]);
+        let picture = svg(&layout, draw).unwrap();
         for kind in LatticeKind::ALL {
             let name = format!("\n{}\n", title(kind));
             assert_eq!(picture.matches(&name).count(), 1, "{name} in {picture}");

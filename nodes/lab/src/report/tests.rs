@@ -15,21 +15,12 @@ pub(super) fn section(verdict: Verdict, found: f64) -> Section {
         tables: vec![Table::new(
             "sides",
             "Sides",
-            ["lattice", "side (m)", "cells", "a, b"],
-            vec![
-                vec![
-                    "cubic".into(),
-                    Cell::Number(0.1234567, 3),
-                    6_usize.into(),
-                    Cell::Empty,
-                ],
-                vec![
-                    "a \"b\"".into(),
-                    Cell::Number(f64::NAN, 3),
-                    7_usize.into(),
-                    "<i>".into(),
-                ],
-            ],
+            "lattice|side (m)|cells|a, b",
+            [
+                ("cubic", 0.1234567, 6, Cell::Empty),
+                ("a \"b\"", f64::NAN, 7, "<i>".into()),
+            ]
+            .map(|(a, b, c, d)| vec![a.into(), Cell::Number(b, 3), Cell::Count(c), d]),
         )],
         figures: vec![Figure::new(
             "sketch",
@@ -44,8 +35,7 @@ pub(super) fn report() -> Report {
 }
 
 pub(super) fn report_of(sections: Vec<Section>) -> Report {
-    let head = Head::of_paper("A paper", "lattice paper".into(), true);
-    Report::new(head, sections)
+    Report::of_paper("A paper", "lattice paper".into(), true, sections)
 }
 
 #[test]

@@ -1,11 +1,5 @@
 //! The machine: mounts, timing and the simulation itself.
 
-use std::f64::consts::{FRAC_PI_2, TAU};
-
-use nalgebra::{Isometry3, Translation3, UnitQuaternion, Vector3};
-use rayon::prelude::*;
-use thiserror::Error;
-
 use super::ins::InsSamples;
 use super::lms200::{self, Lms200Scan, MAX_RANGE_M, SCAN_RATE_HZ, SCAN_SPAN_NS};
 use super::loader::Loader;
@@ -13,6 +7,9 @@ use super::obstacles::Block;
 use super::person::Person;
 use super::random::{Purpose, Stream};
 use super::site::Site;
+use nalgebra::{Isometry3, Translation3, UnitQuaternion, Vector3};
+use std::f64::consts::{FRAC_PI_2, TAU};
+use thiserror::Error;
 
 /// From `base_link` to the IMU, in `base_link`'s axes (the lever arm), m. The IMU's axes are those of `base_link`.
 pub const BASE_FROM_IMU_M: [f64; 3] = [-0.35, 0.12, 1.25];
@@ -42,8 +39,7 @@ impl Laser {
     /// All of them.
     pub const ALL: [Self; 3] = [Self::Left, Self::Right, Self::Top];
 
-    /// Frame of the returns.
-    pub fn frame(self) -> &'static str {
+    pub(crate) fn frame(self) -> &'static str {
         match self {
             Self::Left => "left_laser",
             Self::Right => "right_laser",
@@ -52,7 +48,7 @@ impl Laser {
     }
 
     /// The fixed mount: `base_from_laser` at the sides, `turntable_from_laser` for the top.
-    pub fn mount(self) -> Isometry3<f64> {
+    pub(crate) fn mount(self) -> Isometry3<f64> {
         let about = |axis, angle: f64| UnitQuaternion::from_axis_angle(&axis, angle);
         let (x, y, z) = (Vector3::x_axis(), Vector3::y_axis(), Vector3::z_axis());
         let side = |sign: f64| {
@@ -140,22 +136,18 @@ impl Bobcat {
         Self { person, ..self }
     }
 
-    /// Seed of the noise.
     pub fn seed(&self) -> u64 {
         self.seed
     }
 
-    /// Duration of the log, ns.
     pub fn duration_ns(&self) -> i64 {
         self.duration_ns
     }
 
-    /// Site of the work.
     pub fn site(&self) -> &Site {
         &self.site
     }
 
-    /// The loader's motion.
     pub fn loader(&self) -> &Loader {
         &self.loader
     }
@@ -187,27 +179,26 @@ impl Bobcat {
     pub fn scan_start_ns(&self, laser: Laser, index: u64) -> i64 {
         let rate = i128::from(SCAN_RATE_HZ);
         let since_first = (i128::from(index) * 1_000_000_000 + rate / 2) / rate;
-        laser
-            .first_scan_ns()
-            .saturating_add(i64::try_from(since_first).unwrap_or(i64::MAX))
+        let since_first = i64::try_from(since_first).unwrap_or(i64::MAX);
+        laser.first_scan_ns().saturating_add(since_first)
     }
 
     /// Number of scans that end before the last INS epoch.
     pub fn scan_count(&self, laser: Laser) -> u64 {
         let last_epoch_ns = self.duration_ns / INS_PERIOD_NS * INS_PERIOD_NS;
         let room_ns = last_epoch_ns - laser.first_scan_ns() - SCAN_SPAN_NS - 1;
-        u64::try_from(i128::from(room_ns) * i128::from(SCAN_RATE_HZ) / 1_000_000_000)
-            .map_or(0, |n| n + 1)
+        let scans = i128::from(room_ns) * i128::from(SCAN_RATE_HZ) / 1_000_000_000;
+        u64::try_from(scans).map_or(0, |n| n + 1)
     }
 
     /// One scan: a function of the seed, the scanner and the index alone.
     pub fn scan(&self, laser: Laser, index: u64) -> Lms200Scan {
         let mut noise = Stream::new(self.seed, Purpose::LaserRange, laser as u64, index);
+        let base_from_laser = |time_ns: i64| self.base_from_laser(laser, time_ns);
+        let map_from_laser = |time_ns: i64| self.map_from_base(time_ns) * base_from_laser(time_ns);
         let own_body_m = |time_ns: i64, in_laser: &Vector3<f64>| {
-            self.own_body_m(&self.base_from_laser(laser, time_ns), in_laser)
+            self.own_body_m(&base_from_laser(time_ns), in_laser)
         };
-        let map_from_laser =
-            |time_ns: i64| self.map_from_base(time_ns) * self.base_from_laser(laser, time_ns);
         let cast = |time_ns: i64, origin: &Vector3<f64>, direction: &Vector3<f64>| {
             let hit = self.site.cast(origin, direction, MAX_RANGE_M);
             match self.person {
@@ -215,13 +206,8 @@ impl Bobcat {
                 false => hit,
             }
         };
-        lms200::scan(
-            cast,
-            self.scan_start_ns(laser, index),
-            &mut noise,
-            map_from_laser,
-            own_body_m,
-        )
+        let start_ns = self.scan_start_ns(laser, index);
+        lms200::scan(cast, start_ns, &mut noise, map_from_laser, own_body_m)
     }
 
     /// Distance along a ray in a sensor's frame at which it meets the machine itself, m.
@@ -232,18 +218,9 @@ impl Bobcat {
     ) -> Option<f64> {
         let origin = base_from_sensor.translation.vector;
         let direction = base_from_sensor.rotation * in_sensor;
-        let distances = self.body.iter().filter_map(|b| b.cast(&origin, &direction));
-        distances
-            .map(|(distance_m, _)| distance_m)
+        let hits = self.body.iter().filter_map(|b| b.cast(&origin, &direction));
+        hits.map(|(distance_m, _)| distance_m)
             .min_by(f64::total_cmp)
-    }
-
-    /// Scans `range` of a scanner, in order, computed in parallel.
-    pub fn scans(&self, laser: Laser, range: std::ops::Range<u64>) -> Vec<Lms200Scan> {
-        range
-            .into_par_iter()
-            .map(|index| self.scan(laser, index))
-            .collect()
     }
 
     /// The INS epochs from the start of the log to its end.

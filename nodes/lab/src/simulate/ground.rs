@@ -33,23 +33,17 @@ const RIDGES: [([f64; 2], [f64; 2], f64, f64); 3] = [
 
 /// Height of the smooth ground at map coordinates (m), twice differentiable where the loader drives.
 pub fn ground_height_m(x_m: f64, y_m: f64) -> f64 {
-    let waves: f64 = WAVES
-        .iter()
-        .map(|&(a, kx, ky, phase)| a * (kx * x_m + ky * y_m + phase).sin())
-        .sum();
-    let heaps: f64 = HEAPS
-        .iter()
-        .map(|&(cx, cy, height, sx, sy)| {
-            let (u, v) = ((x_m - cx) / sx, (y_m - cy) / sy);
-            height * bell(u * u + v * v)
-        })
-        .sum();
-    let ridges: f64 = RIDGES
-        .iter()
-        .map(|&(from, to, height, spread)| {
-            height * bell(squared_distance_to_segment(x_m, y_m, from, to) / (spread * spread))
-        })
-        .sum();
+    let wave = |&(a, kx, ky, phase): &(f64, f64, f64, f64)| a * (kx * x_m + ky * y_m + phase).sin();
+    let waves: f64 = WAVES.iter().map(wave).sum();
+    let heap = |&(cx, cy, height, sx, sy): &(f64, f64, f64, f64, f64)| {
+        let (u, v) = ((x_m - cx) / sx, (y_m - cy) / sy);
+        height * bell(u * u + v * v)
+    };
+    let heaps: f64 = HEAPS.iter().map(heap).sum();
+    let ridge = |&(from, to, height, spread): &([f64; 2], [f64; 2], f64, f64)| {
+        height * bell(squared_distance_to_segment(x_m, y_m, from, to) / (spread * spread))
+    };
+    let ridges: f64 = RIDGES.iter().map(ridge).sum();
     waves + heaps + ridges - pit_depth_m(x_m, y_m)
 }
 

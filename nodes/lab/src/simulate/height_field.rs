@@ -37,12 +37,10 @@ impl HeightField {
         }
     }
 
-    /// Squares along x and y.
     pub fn squares(&self) -> [usize; 2] {
         [self.columns, self.rows]
     }
 
-    /// Side of a square, m.
     pub fn spacing_m(&self) -> f64 {
         self.spacing_m
     }
@@ -53,36 +51,31 @@ impl HeightField {
     }
 
     /// Height of the surface, None outside the grid.
+    #[cfg(test)]
     pub fn height_m(&self, x_m: f64, y_m: f64) -> Option<f64> {
-        let u = (x_m - self.origin_m.x) / self.spacing_m;
-        let v = (y_m - self.origin_m.y) / self.spacing_m;
-        let inside = u >= 0.0 && v >= 0.0 && u <= self.columns as f64 && v <= self.rows as f64;
-        inside.then(|| {
-            let column = (u as usize).min(self.columns - 1);
-            let row = (v as usize).min(self.rows - 1);
-            self.height_in_square(column, row, u - column as f64, v - row as f64)
-        })
+        let ([column, row], u, v) = self.square_at(x_m, y_m)?;
+        Some(self.height_in_square(column, row, u, v))
     }
 
     /// Upward unit normal of the triangle at a point, None outside the grid.
     pub fn normal(&self, x_m: f64, y_m: f64) -> Option<Vector3<f64>> {
-        let u = (x_m - self.origin_m.x) / self.spacing_m;
-        let v = (y_m - self.origin_m.y) / self.spacing_m;
-        if !(u >= 0.0 && v >= 0.0 && u <= self.columns as f64 && v <= self.rows as f64) {
-            return None;
-        }
-        let (column, row) = (
-            (u as usize).min(self.columns - 1),
-            (v as usize).min(self.rows - 1),
-        );
+        let ([column, row], u, v) = self.square_at(x_m, y_m)?;
         let [low, right, left, high] = self.corners(column, row);
-        let lower = u - column as f64 >= v - row as f64;
-        let (du, dv) = if lower {
-            (right - low, high - right)
-        } else {
-            (high - left, left - low)
+        let (du, dv) = match u >= v {
+            true => (right - low, high - right),
+            false => (high - left, left - low),
         };
         Some(Vector3::new(-du, -dv, self.spacing_m).normalize())
+    }
+
+    /// The square of a point and its place in it, None outside the grid.
+    fn square_at(&self, x_m: f64, y_m: f64) -> Option<([usize; 2], f64, f64)> {
+        let u = (x_m - self.origin_m.x) / self.spacing_m;
+        let v = (y_m - self.origin_m.y) / self.spacing_m;
+        let inside = u >= 0.0 && v >= 0.0 && u <= self.columns as f64 && v <= self.rows as f64;
+        let column = (u as usize).min(self.columns - 1);
+        let row = (v as usize).min(self.rows - 1);
+        inside.then(|| ([column, row], u - column as f64, v - row as f64))
     }
 
     /// Highest corner in the squares `from` to `to` (exclusive).
@@ -118,15 +111,11 @@ impl HeightField {
             let leave_x = leave(start.x, step.x, column);
             let leave_y = leave(start.y, step.y, row);
             let leave_m = leave_x.min(leave_y).min(to_m).max(at_m);
-            if let Some(hit) = self.cast_in_square(
-                origin,
-                direction,
-                (start, step),
-                [column, row],
-                [at_m, leave_m],
-                &mut above,
-            ) {
-                return Some(hit);
+            let (ray, span_m) = ((start, step), [at_m, leave_m]);
+            let hit =
+                self.cast_in_square(origin, direction, ray, [column, row], span_m, &mut above);
+            if hit.is_some() {
+                return hit;
             }
             if leave_m >= to_m {
                 return None;
@@ -196,10 +185,8 @@ impl HeightField {
     }
 
     fn corner(&self, column: usize, row: usize) -> f64 {
-        self.heights_m
-            .get(row * (self.columns + 1) + column)
-            .copied()
-            .unwrap_or(f64::NEG_INFINITY)
+        let height = self.heights_m.get(row * (self.columns + 1) + column);
+        height.copied().unwrap_or(f64::NEG_INFINITY)
     }
 }
 
@@ -281,9 +268,8 @@ mod tests {
     #[test]
     fn a_vertical_ray_falls_on_the_surface_below() {
         let field = hills();
-        let hit = field
-            .cast(&Vector3::new(1.3, 0.4, 3.0), &-Vector3::z(), 0.0, 10.0)
-            .unwrap();
+        let above = Vector3::new(1.3, 0.4, 3.0);
+        let hit = field.cast(&above, &-Vector3::z(), 0.0, 10.0).unwrap();
         assert!((3.0 - hit - field.height_m(1.3, 0.4).unwrap()).abs() < 1e-12);
     }
 

@@ -1,9 +1,8 @@
 //! Errors of a SPAN-CPT-like INS with RTK: slowly wandering (first-order Gauss-Markov) plus white.
 
-use nalgebra::{Isometry3, Translation3, UnitQuaternion, Vector3};
-
 use super::bobcat::{Bobcat, INS_PERIOD_NS, base_from_imu};
 use super::random::{Purpose, Stream};
+use nalgebra::{Isometry3, Translation3, UnitQuaternion, Vector3};
 
 /// Root mean square of the position error in three dimensions, m (Ryde & Brünig 2011, III.B).
 pub const INS_POSITION_RMS_M: f64 = 0.03;
@@ -25,7 +24,6 @@ const DERIVATIVE_STEP_S: f64 = 5e-4;
 /// One INS epoch. Errors are in the pose and velocity of the IMU; the base's pose follows through the mount.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct InsSample {
-    /// Time of validity, ns since the start of the log.
     pub time_ns: i64,
     /// Pose of the IMU as measured.
     pub map_from_imu: Isometry3<f64>,
@@ -76,17 +74,11 @@ impl<'a> InsSamples<'a> {
         let mount = base_from_imu();
         let truth = self.bobcat.map_from_base(time_ns);
         let true_imu = truth * mount;
-        let before = self
-            .bobcat
-            .loader()
-            .map_from_base(time_s - DERIVATIVE_STEP_S);
-        let after = self
-            .bobcat
-            .loader()
-            .map_from_base(time_s + DERIVATIVE_STEP_S);
+        let [before, after] = [-DERIVATIVE_STEP_S, DERIVATIVE_STEP_S]
+            .map(|step_s| self.bobcat.loader().map_from_base(time_s + step_s));
         let per_s = 0.5 / DERIVATIVE_STEP_S;
-        let imu_velocity =
-            ((after * mount).translation.vector - (before * mount).translation.vector) * per_s;
+        let [from, to] = [before, after].map(|base| (base * mount).translation.vector);
+        let imu_velocity = (to - from) * per_s;
         let map_from_imu = Isometry3::from_parts(
             Translation3::from(true_imu.translation.vector + position_m),
             UnitQuaternion::from_scaled_axis(attitude_rad) * true_imu.rotation,
@@ -121,17 +113,10 @@ impl Iterator for InsSamples<'_> {
 }
 
 /// State of the error process.
+#[derive(Debug)]
 struct Errors {
     stream: Stream,
     wander: Option<[Vector3<f64>; 2]>,
-}
-
-impl std::fmt::Debug for Errors {
-    fn fmt(&self, f: &mut std::fmt::Formatter<'_>) -> std::fmt::Result {
-        f.debug_struct("Errors")
-            .field("wander", &self.wander)
-            .finish_non_exhaustive()
-    }
 }
 
 impl Errors {
@@ -208,20 +193,8 @@ mod tests {
             late += last.norm_squared();
         }
         let rms = |sum: f64| (sum / n as f64).sqrt();
-        assert!(
-            (rms(late) / INS_POSITION_RMS_M - 1.0).abs() < 0.1,
-            "after 30 s {}",
-            rms(late)
-        );
-        assert!(
-            rms(steps) < 0.4 * INS_POSITION_RMS_M,
-            "between epochs {}",
-            rms(steps)
-        );
-        assert!(
-            rms(steps) > 0.2 * INS_POSITION_RMS_M,
-            "no white part: {}",
-            rms(steps)
-        );
+        let [late, steps] = [rms(late), rms(steps)].map(|rms| rms / INS_POSITION_RMS_M);
+        assert!((late - 1.0).abs() < 0.1, "{late} after 30 s");
+        assert!((0.2..0.4).contains(&steps), "{steps} between epochs");
     }
 }

@@ -1,9 +1,8 @@
 //! Errors of the measured poses at any time.
 
-use nalgebra::{Isometry3, Translation3, UnitQuaternion, Vector3};
-
 use super::bobcat::{Bobcat, INS_PERIOD_NS};
 use super::ins::{InsSample, InsSamples};
+use nalgebra::{Isometry3, Translation3, UnitQuaternion, Vector3};
 
 /// Share of the log's INS errors: 1 cm level and 1.4 cm in height, as after post-processing.
 const POSITION_SHARE: f64 = 2.0 / 3.0;
@@ -66,11 +65,8 @@ impl<'a> InsErrors<'a> {
     pub(super) fn at(&self, time_ns: i64) -> InsError {
         let at = (time_ns / INS_PERIOD_NS - self.first_epoch).max(0) as usize;
         let share = time_ns.rem_euclid(INS_PERIOD_NS) as f64 / INS_PERIOD_NS as f64;
-        match (
-            self.known.get(at),
-            self.known.get(at + 1),
-            self.known.last(),
-        ) {
+        let (a, b) = (self.known.get(at), self.known.get(at + 1));
+        match (a, b, self.known.last()) {
             (Some(a), Some(b), _) => InsError {
                 position_m: a.position_m.lerp(&b.position_m, share),
                 rotation: a.rotation.nlerp(&b.rotation, share),

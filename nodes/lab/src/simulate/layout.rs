@@ -1,9 +1,8 @@
 //! Obstacles of the earth-moving site.
 
-use nalgebra::{Vector2, Vector3};
-
 use super::ground::ground_height_m;
 use super::obstacles::{Block, Obstacle, Post};
+use nalgebra::{Vector2, Vector3};
 
 /// All obstacles of the site.
 pub(super) fn earth_moving_obstacles() -> Vec<Obstacle> {
@@ -28,39 +27,15 @@ pub(super) fn earth_moving_obstacles() -> Vec<Obstacle> {
         (14.0, -52.0, -15.0, 7.5, 2.5, 3.1, 0.0, 0.35),
     ];
     for (x, y, yaw_deg, length, width, height, foot, reflectivity) in blocks {
-        let yaw: f64 = yaw_deg;
-        obstacles.push(standing(
-            x,
-            y,
-            yaw.to_radians(),
-            [length, width, height],
-            foot,
-            reflectivity,
-        ));
+        let yaw = f64::to_radians(yaw_deg);
+        let size = [length, width, height];
+        obstacles.push(standing(x, y, yaw, size, foot, reflectivity));
     }
     fence(&mut obstacles);
-    // Lamp posts and survey stakes.
-    for (x, y) in [
-        (-62.0, -20.0),
-        (-62.0, 40.0),
-        (0.0, 76.0),
-        (60.0, 20.0),
-        (60.0, -30.0),
-        (0.0, -60.0),
-        (-2.5, 20.0),
-    ] {
+    for (x, y) in LAMPS_M {
         obstacles.push(post(x, y, 0.11, 6.5, 0.4));
     }
-    for (x, y) in [
-        (-37.5, 9.0),
-        (-37.5, 31.0),
-        (-11.5, 31.5),
-        (0.5, -4.5),
-        (15.5, -4.0),
-        (18.0, 9.5),
-        (-31.0, 33.0),
-        (3.0, 14.0),
-    ] {
+    for (x, y) in STAKES_M {
         obstacles.push(post(x, y, 0.03, 1.5, 0.6));
     }
     obstacles
@@ -69,17 +44,13 @@ pub(super) fn earth_moving_obstacles() -> Vec<Obstacle> {
 /// A hoarding of 10 m panels around the site, two of them open as a gate, and a post at every joint.
 fn fence(obstacles: &mut Vec<Obstacle>) {
     let (east, north) = (66.0_f64, 80.0_f64);
-    let corners = [
-        (-east, -north),
-        (east, -north),
-        (east, north),
-        (-east, north),
-    ];
-    for (side, (&(x0, y0), &(x1, y1))) in corners
-        .iter()
-        .zip(corners.iter().cycle().skip(1))
-        .enumerate()
-    {
+    let (south, north) = (
+        [(-east, -north), (east, -north)],
+        [(east, north), (-east, north)],
+    );
+    let corners = [south, north].concat();
+    let sides = corners.iter().zip(corners.iter().cycle().skip(1));
+    for (side, (&(x0, y0), &(x1, y1))) in sides.enumerate() {
         let (from, along) = (Vector2::new(x0, y0), Vector2::new(x1 - x0, y1 - y0));
         let panels = (along.norm() / 10.0).round();
         let yaw = along.y.atan2(along.x);
@@ -109,10 +80,8 @@ fn standing(
     let foot = ground_height_m(x, y) + foot_m - bury_m;
     let tall = height + bury_m;
     let center = Vector3::new(x, y, foot + 0.5 * tall);
-    Obstacle::Block(
-        Block::new(center, Vector3::new(length, width, tall), yaw_rad),
-        reflectivity,
-    )
+    let size = Vector3::new(length, width, tall);
+    Obstacle::Block(Block::new(center, size, yaw_rad), reflectivity)
 }
 
 fn post(x: f64, y: f64, radius_m: f64, height_m: f64, reflectivity: f64) -> Obstacle {
@@ -124,3 +93,24 @@ fn post(x: f64, y: f64, radius_m: f64, height_m: f64, reflectivity: f64) -> Obst
     };
     Obstacle::Post(post, reflectivity)
 }
+
+/// Lamp posts and survey stakes.
+const LAMPS_M: [(f64, f64); 7] = [
+    (-62.0, -20.0),
+    (-62.0, 40.0),
+    (0.0, 76.0),
+    (60.0, 20.0),
+    (60.0, -30.0),
+    (0.0, -60.0),
+    (-2.5, 20.0),
+];
+const STAKES_M: [(f64, f64); 8] = [
+    (-37.5, 9.0),
+    (-37.5, 31.0),
+    (-11.5, 31.5),
+    (0.5, -4.5),
+    (15.5, -4.0),
+    (18.0, 9.5),
+    (-31.0, 33.0),
+    (3.0, 14.0),
+];

@@ -1,29 +1,23 @@
 //! SICK LMS200: one turn of the mirror every 1/75 s, of which half a turn measures 181 beams, 1 degree apart.
 
-use nalgebra::{Isometry3, Vector3};
-
 use super::random::Stream;
 use super::site::Hit;
+use nalgebra::{Isometry3, Vector3};
 
 /// Beams of a scan, from -90 to +90 degrees about the scanner's z axis.
 pub const BEAMS: u16 = 181;
-/// Scans per second.
 pub const SCAN_RATE_HZ: u64 = 75;
 /// Time from the first beam to the last, ns: half a turn of the mirror.
 pub const SCAN_SPAN_NS: i64 = beam_offset_ns(BEAMS - 1) as i64;
-/// Shortest range, m.
 pub const MIN_RANGE_M: f64 = 0.2;
-/// Longest range, m.
 pub const MAX_RANGE_M: f64 = 80.0;
 /// Standard deviation of a range, m.
 pub const RANGE_NOISE_M: f64 = 0.012;
 /// Least `reflectivity cos(incidence) / range^2` (1/m^2) that gives a return: a target of 10 % is seen to 20 m.
 const SENSITIVITY_PER_M2: f64 = 0.1 / (25.0 * 25.0);
 
-/// One return.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Lms200Return {
-    /// Beam, 0..181.
     pub beam: u16,
     /// Time since the start of the scan, ns.
     pub offset_ns: u32,

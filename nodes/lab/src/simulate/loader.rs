@@ -1,10 +1,9 @@
 //! Pose of the loader on the ground.
 
-use nalgebra::{Isometry3, Matrix3, Rotation3, Translation3, UnitQuaternion, Vector2, Vector3};
-
 use super::ground::ground_height_m;
 use super::mission::Mission;
 use super::random::{Purpose, Stream};
+use nalgebra::{Isometry3, Matrix3, Rotation3, Translation3, UnitQuaternion, Vector2, Vector3};
 
 /// Half of wheel base and track, m.
 const HALF_WHEELS_M: [f64; 2] = [0.55, 0.75];
@@ -53,13 +52,10 @@ impl Loader {
         for ((hertz, heave_m, roll_rad, pitch_rad), phases) in
             MODES.into_iter().zip(&self.phases_rad)
         {
-            for ((sum, amplitude), phase) in sums
-                .iter_mut()
-                .zip([heave_m, roll_rad, pitch_rad])
-                .zip(phases)
-            {
-                *sum +=
-                    strength * amplitude * (std::f64::consts::TAU * hertz * time_s + phase).sin();
+            let amplitudes = [heave_m, roll_rad, pitch_rad];
+            for ((sum, amplitude), phase) in sums.iter_mut().zip(amplitudes).zip(phases) {
+                let angle = std::f64::consts::TAU * hertz * time_s + phase;
+                *sum += strength * amplitude * angle.sin();
             }
         }
         sums
@@ -99,7 +95,7 @@ fn stand(position_m: Vector2<f64>, yaw_rad: f64) -> (Isometry3<f64>, Rotation3<f
 #[cfg(test)]
 mod tests {
     use super::*;
-    use crate::simulate::Site;
+    use crate::simulate::site::Site;
 
     #[test]
     fn keeps_clear_of_obstacles_and_of_steep_ground() {
@@ -111,27 +107,17 @@ mod tests {
             let position = pose.translation.vector;
             for obstacle in site.obstacles() {
                 let clearance_m = obstacle.ground_clearance_m(&position.xy());
-                assert!(
-                    clearance_m > 1.8,
-                    "{clearance_m} m from {obstacle:?} at {time_s} s"
-                );
+                assert!(clearance_m > 1.8, "{clearance_m} m at {time_s} s");
             }
             let tilt_deg = (pose.rotation * Vector3::z()).z.acos().to_degrees();
             steepest = steepest.max(tilt_deg);
             sloped += i32::from(tilt_deg > 3.0);
             let ground = site.ground().height_m(position.x, position.y).unwrap();
-            assert!(
-                (position.z - ground).abs() < 0.25,
-                "{} m off the ground at {time_s} s",
-                position.z - ground
-            );
+            let off_m = position.z - ground;
+            assert!(off_m.abs() < 0.25, "{off_m} m off the ground at {time_s} s");
         }
         assert!((8.0..22.0).contains(&steepest), "steepest {steepest} deg");
-        assert!(
-            sloped > 300,
-            "on sloped ground for {} s",
-            f64::from(sloped) * 0.1
-        );
+        assert!(sloped > 300, "{sloped} tenths of a second on a slope");
     }
 
     #[test]
@@ -141,27 +127,14 @@ mod tests {
         for start_s in [0.0, 8.0, 17.0, 29.0, loader.mission.duration_s() - 1.0] {
             let (mut linear, mut angular) = (Vec::new(), Vec::new());
             for i in 0..10_000 {
-                let (a, b) = (
-                    loader.map_from_base(start_s + f64::from(i) * h),
-                    loader.map_from_base(start_s + f64::from(i + 1) * h),
-                );
+                let [a, b] = [i, i + 1].map(|i| loader.map_from_base(start_s + f64::from(i) * h));
                 linear.push((b.translation.vector - a.translation.vector) / h);
                 angular.push((a.rotation.inverse() * b.rotation).scaled_axis() / h);
             }
-            for (values, limit) in [(&linear, 30.0), (&angular, 30.0)] {
-                for pair in values.windows(2) {
-                    let jump = (pair[1] - pair[0]).norm();
-                    assert!(jump < limit * h, "jump of {jump} after {start_s} s");
-                }
+            for pair in linear.windows(2).chain(angular.windows(2)) {
+                let jump = (pair[1] - pair[0]).norm();
+                assert!(jump < 30.0 * h, "jump of {jump} after {start_s} s");
             }
         }
-    }
-
-    #[test]
-    fn the_rotation_stays_a_rotation() {
-        let loader = Loader::new(1);
-        let pose = loader.map_from_base(12.3);
-        assert!((pose.rotation.norm() - 1.0).abs() < 1e-12);
-        assert_ne!(pose, Loader::new(2).map_from_base(12.3));
     }
 }

@@ -1,9 +1,8 @@
 //! The loader's tour: a closed sequence of drives and turns on the spot.
 
-use nalgebra::{Rotation2, Vector2};
-
 use super::profile::SpeedProfile;
 use super::spline::PlanarSpline;
+use nalgebra::{Rotation2, Vector2};
 
 /// Fastest speed over ground, m/s.
 pub(super) const MAX_SPEED_MPS: f64 = 1.5;
@@ -119,18 +118,9 @@ impl Mission {
         at = mission.turn(at, 95.0);
         at = mission.drive(at, &ROUND_SOUTH, 98.0, false);
         at = mission.turn(at, -100.0);
-        at = mission.drive(
-            at,
-            &[(-34.0, 1.0), (-12.0, 6.0), (-6.5, 14.0), (-14.0, 20.0)],
-            180.0,
-            false,
-        );
-        mission.drive(
-            at,
-            &[(start.position_m.x, start.position_m.y)],
-            180.0,
-            false,
-        );
+        let home = [(-34.0, 1.0), (-12.0, 6.0), (-6.5, 14.0), (-14.0, 20.0)];
+        at = mission.drive(at, &home, 180.0, false);
+        mission.drive(at, &[(-24.0, 20.0)], 180.0, false);
         mission
     }
 
@@ -153,13 +143,8 @@ impl Mission {
     fn turn(&mut self, from: PlanarPose, angle_deg: f64) -> PlanarPose {
         let angle_rad = angle_deg.to_radians();
         let profile = SpeedProfile::new(angle_rad.abs(), TURN_RATE_RADPS, TURN_RAMP_S);
-        self.push(
-            from,
-            Movement::Turn {
-                profile,
-                sign: angle_rad.signum(),
-            },
-        )
+        let sign = angle_rad.signum();
+        self.push(from, Movement::Turn { profile, sign })
     }
 
     /// Drives through waypoints (m) and arrives with a heading (deg, counter-clockwise from east).
@@ -180,21 +165,15 @@ impl Mission {
             return from;
         };
         let max_derivative = spline.max_derivative();
-        let speed = if reverse {
-            REVERSE_SPEED_MPS
-        } else {
-            MAX_SPEED_MPS
-        } / max_derivative;
-        let profile = SpeedProfile::new(spline.length(), speed, RAMP_S);
-        self.push(
-            from,
-            Movement::Drive {
-                spline,
-                profile,
-                max_derivative,
-                reverse,
-            },
-        )
+        let speed_mps = [MAX_SPEED_MPS, REVERSE_SPEED_MPS][usize::from(reverse)];
+        let profile = SpeedProfile::new(spline.length(), speed_mps / max_derivative, RAMP_S);
+        let drive = Movement::Drive {
+            spline,
+            profile,
+            max_derivative,
+            reverse,
+        };
+        self.push(from, drive)
     }
 
     fn push(&mut self, from: PlanarPose, movement: Movement) -> PlanarPose {
@@ -263,26 +242,12 @@ mod tests {
         let (mut before, mut velocity, mut rate) = (mission.at(0.0), Vector2::zeros(), 0.0);
         for i in 1..=steps + 10 {
             let now = mission.at(i as f64 * h);
-            let (v, w) = (
-                (now.position_m - before.position_m) / h,
-                turn(before.yaw_rad, now.yaw_rad),
-            );
-            assert!(
-                v.norm() <= MAX_SPEED_MPS + 1e-3,
-                "{} m/s at {i} ms",
-                v.norm()
-            );
+            let v = (now.position_m - before.position_m) / h;
+            let w = turn(before.yaw_rad, now.yaw_rad);
+            assert!(v.norm() <= MAX_SPEED_MPS + 1e-3, "{v} m/s at {i} ms");
             assert!(w.abs() < 1.0, "{w} rad/s at {i} ms");
-            assert!(
-                (v - velocity).norm() < 3.0 * h,
-                "velocity jumps by {} at {i} ms",
-                (v - velocity).norm()
-            );
-            assert!(
-                (w - rate).abs() < 4.0 * h,
-                "turn rate jumps by {} at {i} ms",
-                w - rate
-            );
+            assert!((v - velocity).norm() < 3.0 * h, "velocity jumps at {i} ms");
+            assert!((w - rate).abs() < 4.0 * h, "turn rate jumps at {i} ms");
             assert!((-1e-9..=1.001).contains(&now.effort));
             (before, velocity, rate) = (now, v, w);
         }
@@ -291,16 +256,10 @@ mod tests {
     #[test]
     fn a_round_takes_minutes_and_turns_on_the_spot() {
         let mission = Mission::earth_moving();
-        assert!(
-            (300.0..700.0).contains(&mission.duration_s()),
-            "{} s",
-            mission.duration_s()
-        );
-        let turns = mission
-            .legs
-            .iter()
-            .filter(|l| matches!(l.movement, Movement::Turn { .. }))
-            .count();
+        let duration_s = mission.duration_s();
+        assert!((300.0..700.0).contains(&duration_s), "{duration_s} s");
+        let is_turn = |leg: &&Leg| matches!(leg.movement, Movement::Turn { .. });
+        let turns = mission.legs.iter().filter(is_turn).count();
         assert!(turns >= 6);
     }
 }

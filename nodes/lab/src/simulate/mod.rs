@@ -30,19 +30,10 @@ mod survey;
 #[cfg(test)]
 mod tests;
 
-pub use bobcat::{
-    BASE_FROM_IMU_M, BASE_FROM_TURNTABLE_M, Bobcat, INS_PERIOD_NS, Laser, MAX_DURATION_S,
-    SimulationError, TURNTABLE_PERIOD_NS, base_from_imu,
-};
-pub use ground::ground_height_m;
-pub use height_field::HeightField;
-pub use ins::{INS_POSITION_RMS_M, InsSample, InsSamples};
-pub use lms200::{
-    BEAMS, Lms200Return, Lms200Scan, MAX_RANGE_M, MIN_RANGE_M, RANGE_NOISE_M, SCAN_RATE_HZ,
-    SCAN_SPAN_NS,
-};
-pub use loader::Loader;
-pub use obstacles::{Block, Obstacle, Post};
-pub use person::Person;
-pub use site::{Hit, Site};
-pub use survey::{Survey, SurveyPattern, SurveyScan, SurveyScans};
+pub use bobcat::{BASE_FROM_IMU_M, Laser};
+pub(crate) use bobcat::{BASE_FROM_TURNTABLE_M, Bobcat, TURNTABLE_PERIOD_NS, base_from_imu};
+pub use ins::INS_POSITION_RMS_M;
+pub(crate) use ins::{InsSample, InsSamples};
+pub(crate) use lms200::{Lms200Scan, MAX_RANGE_M, MIN_RANGE_M, RANGE_NOISE_M, SCAN_SPAN_NS};
+pub(crate) use survey::Survey;
+pub use survey::SurveyPattern;

@@ -53,6 +53,7 @@ impl Block {
     }
 
     /// Distance from a point to the surface, m.
+    #[cfg(test)]
     pub fn surface_distance_m(&self, point: &Vector3<f64>) -> f64 {
         let excess = self.turn_in(&(point - self.center_m)).abs() - self.half_m;
         let outside = excess.map(|e| e.max(0.0)).norm();
@@ -64,6 +65,7 @@ impl Block {
     }
 
     /// Distance on the ground from a point to the footprint, zero inside, m.
+    #[cfg(test)]
     pub fn ground_clearance_m(&self, point: &Vector2<f64>) -> f64 {
         let offset = Vector3::new(point.x - self.center_m.x, point.y - self.center_m.y, 0.0);
         let excess = self.turn_in(&offset).xy().abs() - self.half_m.xy();
@@ -103,7 +105,6 @@ impl Block {
 pub struct Post {
     /// Middle of the axis on the ground plan, m.
     pub center_m: Vector2<f64>,
-    /// Radius, m.
     pub radius_m: f64,
     /// Heights of foot and top in the map, m.
     pub span_m: [f64; 2],
@@ -137,6 +138,7 @@ impl Post {
     }
 
     /// Distance from a point to the mantle, m.
+    #[cfg(test)]
     pub fn surface_distance_m(&self, point: &Vector3<f64>) -> f64 {
         let radial = (point.xy() - self.center_m).norm() - self.radius_m;
         let axial = (self.span_m[0] - point.z)
@@ -149,9 +151,7 @@ impl Post {
 /// Something that rays hit.
 #[derive(Clone, Copy, Debug)]
 pub enum Obstacle {
-    /// A box, with its reflectivity.
     Block(Block, f64),
-    /// A cylinder, with its reflectivity.
     Post(Post, f64),
 }
 
@@ -170,6 +170,7 @@ impl Obstacle {
     }
 
     /// Distance from a point to the surface, m.
+    #[cfg(test)]
     pub fn surface_distance_m(&self, point: &Vector3<f64>) -> f64 {
         match self {
             Self::Block(block, _) => block.surface_distance_m(point),
@@ -178,6 +179,7 @@ impl Obstacle {
     }
 
     /// Distance on the ground plan from a point to the footprint, zero inside, m.
+    #[cfg(test)]
     pub fn ground_clearance_m(&self, point: &Vector2<f64>) -> f64 {
         match self {
             Self::Block(block, _) => block.ground_clearance_m(point),
@@ -239,50 +241,19 @@ mod tests {
 
     #[test]
     fn rays_towards_the_middle_hit_and_rays_away_miss() {
-        let block = Block::new(
-            Vector3::new(5.0, 0.0, 1.0),
-            Vector3::new(2.0, 2.0, 2.0),
-            0.0,
-        );
-        let (distance_m, normal) = block
-            .cast(&Vector3::new(0.0, 0.0, 1.0), &Vector3::x())
-            .unwrap();
-        assert_eq!((distance_m, normal), (4.0, -Vector3::x()));
-        assert!(
-            block
-                .cast(&Vector3::new(0.0, 0.0, 1.0), &-Vector3::x())
-                .is_none()
-        );
-        assert!(
-            block
-                .cast(&Vector3::new(5.0, 0.0, 1.0), &Vector3::x())
-                .is_none()
-        );
+        let from = |x: f64, z: f64| Vector3::new(x, 0.0, z);
+        let block = Block::new(from(5.0, 1.0), Vector3::repeat(2.0), 0.0);
+        let hit = block.cast(&from(0.0, 1.0), &Vector3::x());
+        assert_eq!(hit, Some((4.0, -Vector3::x())));
+        assert_eq!(block.cast(&from(0.0, 1.0), &-Vector3::x()), None);
+        assert_eq!(block.cast(&from(5.0, 1.0), &Vector3::x()), None);
         let post = Post {
             center_m: Vector2::new(5.0, 0.0),
             radius_m: 0.5,
             span_m: [0.0, 2.0],
         };
-        assert_eq!(
-            post.cast(&Vector3::new(0.0, 0.0, 1.0), &Vector3::x())
-                .unwrap()
-                .0,
-            4.5
-        );
-        assert!(
-            post.cast(&Vector3::new(0.0, 0.0, 3.0), &Vector3::x())
-                .is_none()
-        );
-    }
-
-    #[test]
-    fn footprints_give_the_clearance_on_the_ground() {
-        let block = Block::new(
-            Vector3::new(0.0, 0.0, 1.0),
-            Vector3::new(4.0, 2.0, 2.0),
-            std::f64::consts::FRAC_PI_2,
-        );
-        assert!((block.ground_clearance_m(&Vector2::new(3.0, 0.0)) - 2.0).abs() < 1e-12);
-        assert_eq!(block.ground_clearance_m(&Vector2::new(0.5, 1.5)), 0.0);
+        let hit = post.cast(&from(0.0, 1.0), &Vector3::x());
+        assert_eq!(hit.unwrap().0, 4.5);
+        assert_eq!(post.cast(&from(0.0, 3.0), &Vector3::x()), None);
     }
 }

@@ -1,10 +1,9 @@
 //! A person who walks over the site, for maps that must forget what moves.
 
-use nalgebra::{Vector2, Vector3};
-
 use super::ground::ground_height_m;
 use super::obstacles::Post;
 use super::site::Hit;
+use nalgebra::{Vector2, Vector3};
 
 /// Way over the ground east of the pit, in sight of the loader, m.
 const WAY_M: [[f64; 2]; 4] = [[-5.0, 26.5], [-6.5, 19.0], [-3.0, 12.0], [0.0, 9.5]];
@@ -21,6 +20,7 @@ pub struct Person;
 
 impl Person {
     /// Times of the first and last step, s.
+    #[cfg(test)]
     pub fn span_s() -> [f64; 2] {
         let legs = WAY_M.windows(2).map(|leg| match leg {
             [from, to] => (Vector2::from(*to) - Vector2::from(*from)).norm(),
@@ -77,7 +77,7 @@ impl Person {
 #[cfg(test)]
 mod tests {
     use super::*;
-    use crate::simulate::{Loader, Site};
+    use crate::simulate::{loader::Loader, site::Site};
 
     #[test]
     fn walks_on_the_ground_clear_of_the_loader_and_of_what_stands_there() {

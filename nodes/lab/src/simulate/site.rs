@@ -1,11 +1,10 @@
 //! The earth-moving site: ground, obstacles and an index over both.
 
-use nalgebra::{Vector2, Vector3};
-
 use super::ground::ground_height_m;
 use super::height_field::{HeightField, leave};
 use super::layout::earth_moving_obstacles;
 use super::obstacles::Obstacle;
+use nalgebra::{Vector2, Vector3};
 
 /// Extent of the site along east and north, m; the map's origin is its middle.
 const EXTENT_M: [f64; 2] = [140.0, 170.0];
@@ -20,7 +19,6 @@ const SOIL_REFLECTIVITY: f64 = 0.3;
 /// Point at which a ray meets the site.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Hit {
-    /// Distance along the ray, m.
     pub range_m: f64,
     /// Cosine of the angle between ray and surface normal, 0..1.
     pub cos_incidence: f64,
@@ -102,12 +100,12 @@ impl Site {
         }
     }
 
-    /// The triangulated ground.
+    #[cfg(test)]
     pub fn ground(&self) -> &HeightField {
         &self.ground
     }
 
-    /// Obstacles on the ground.
+    #[cfg(test)]
     pub fn obstacles(&self) -> &[Obstacle] {
         &self.obstacles
     }
@@ -165,11 +163,9 @@ impl Site {
         // A face on the border belongs to both cells: a hit a hair beyond this one is as good here.
         let mut limit_m = to_m + 1e-9;
         for &id in &cell.obstacles {
-            let hit = self
-                .obstacles
-                .get(id as usize)
-                .and_then(|o| o.cast(origin, direction));
-            if let Some((range_m, normal, reflectivity)) = hit
+            let obstacle = self.obstacles.get(id as usize);
+            if let Some((range_m, normal, reflectivity)) =
+                obstacle.and_then(|o| o.cast(origin, direction))
                 && range_m <= limit_m
             {
                 limit_m = range_m;
@@ -186,14 +182,11 @@ impl Site {
                 .cast(origin, direction, from_m, limit_m.min(to_m))
         {
             let point = origin + direction * range_m;
-            let normal = self
-                .ground
-                .normal(point.x, point.y)
-                .unwrap_or_else(Vector3::z);
-            let cos_incidence = (-normal.dot(direction)).max(0.0);
+            let normal = self.ground.normal(point.x, point.y);
+            let normal = normal.unwrap_or_else(Vector3::z);
             nearest = Some(Hit {
                 range_m,
-                cos_incidence,
+                cos_incidence: (-normal.dot(direction)).max(0.0),
                 reflectivity: SOIL_REFLECTIVITY,
             });
         }
@@ -201,6 +194,7 @@ impl Site {
     }
 
     /// Distance from a point to the nearest surface (ground: vertically), m.
+    #[cfg(test)]
     pub fn surface_distance_m(&self, point: &Vector3<f64>) -> f64 {
         let ground = self
             .ground
@@ -243,15 +237,10 @@ mod tests {
         max_range_m: f64,
     ) -> Option<f64> {
         let ground = site.ground.cast(origin, direction, 0.0, max_range_m);
-        let others = site
-            .obstacles
-            .iter()
-            .filter_map(|o| o.cast(origin, direction))
-            .map(|(range_m, ..)| range_m);
-        others
-            .chain(ground)
-            .filter(|&range_m| range_m <= max_range_m)
-            .min_by(f64::total_cmp)
+        let others = site.obstacles.iter();
+        let others = others.filter_map(|o| Some(o.cast(origin, direction)?.0));
+        let all = others.chain(ground).filter(|&m| m <= max_range_m);
+        all.min_by(f64::total_cmp)
     }
 
     proptest! {
@@ -281,19 +270,16 @@ mod tests {
         let origin = Vector3::new(0.0, 0.0, 10.0);
         assert!(SITE.cast(&origin, &-Vector3::z(), 80.0).is_some());
         assert_eq!(SITE.cast(&origin, &Vector3::z(), 80.0), None);
-        assert_eq!(
-            SITE.cast(&Vector3::new(500.0, 0.0, 1.0), &-Vector3::x(), 80.0),
-            None
-        );
+        let outside = Vector3::new(500.0, 0.0, 1.0);
+        assert_eq!(SITE.cast(&outside, &-Vector3::x(), 80.0), None);
     }
 
     #[test]
     fn the_fence_stops_a_level_ray() {
         let y = 75.0;
         let z = SITE.ground.height_m(65.0, y).unwrap() + 1.0;
-        let hit = SITE
-            .cast(&Vector3::new(60.0, y, z), &Vector3::x(), 80.0)
-            .unwrap();
+        let hit = SITE.cast(&Vector3::new(60.0, y, z), &Vector3::x(), 80.0);
+        let hit = hit.unwrap();
         assert!((hit.range_m - 5.98).abs() < 0.05, "{}", hit.range_m);
     }
 }

@@ -1,11 +1,9 @@
 //! A spinning scanner of 64 beams, like an Ouster OS1-64: 1024 columns ten times a second.
 
-use std::f64::consts::TAU;
-
-use nalgebra::{Isometry3, Vector3};
-
 use super::random::Stream;
 use super::site::{Hit, Site};
+use nalgebra::{Isometry3, Vector3};
+use std::f64::consts::TAU;
 
 /// Columns of one turn.
 pub(super) const COLUMNS: usize = 1024;

@@ -110,13 +110,9 @@ mod tests {
     use super::*;
 
     fn bend() -> PlanarSpline {
-        let points = [(0.0, 0.0), (10.0, 1.0), (14.0, 9.0), (5.0, 20.0)];
-        PlanarSpline::new(
-            points.iter().map(|&(x, y)| Vector2::new(x, y)).collect(),
-            Vector2::x(),
-            -Vector2::y(),
-        )
-        .unwrap()
+        let points = [[0.0, 0.0], [10.0, 1.0], [14.0, 9.0], [5.0, 20.0]];
+        let points = points.map(Vector2::from).to_vec();
+        PlanarSpline::new(points, Vector2::x(), -Vector2::y()).unwrap()
     }
 
     #[test]
@@ -134,11 +130,7 @@ mod tests {
         let spline = bend();
         let h = 1e-5;
         for knot in &spline.knots[1..3] {
-            let (before, at, after) = (
-                spline.at(knot - h).1,
-                spline.at(*knot).1,
-                spline.at(knot + h).1,
-            );
+            let [before, at, after] = [-h, 0.0, h].map(|h| spline.at(knot + h).1);
             assert!((after - before).norm() < 1e-4);
             assert!(((after - at) / h - (at - before) / h).norm() < 1e-3);
         }
@@ -146,14 +138,9 @@ mod tests {
 
     #[test]
     fn refuses_equal_neighbours() {
-        assert!(
-            PlanarSpline::new(
-                vec![Vector2::zeros(), Vector2::zeros()],
-                Vector2::x(),
-                Vector2::x()
-            )
-            .is_none()
-        );
-        assert!(PlanarSpline::new(vec![Vector2::zeros()], Vector2::x(), Vector2::x()).is_none());
+        let x = Vector2::x;
+        for n in [1, 2] {
+            assert!(PlanarSpline::new(vec![x(); n], x(), x()).is_none());
+        }
     }
 }

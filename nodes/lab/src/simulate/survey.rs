@@ -3,16 +3,14 @@
 //! The points carry range noise and the pose errors of the INS; the pose between two epochs of the INS has
 //! their interpolated errors. Each scan says where its scanner was, for free space.
 
-use std::collections::VecDeque;
-
-use nalgebra::{Isometry3, Point3, Translation3, UnitQuaternion, Vector3};
-use rayon::prelude::*;
-
 use super::bobcat::{Bobcat, Laser, MAX_DURATION_S, SimulationError};
 use super::ins_error::InsErrors;
 use super::lms200::{SCAN_RATE_HZ, SCAN_SPAN_NS};
 use super::random::{Purpose, Stream};
 use super::spin64::{self, COLUMNS, TURN_NS};
+use nalgebra::{Isometry3, Point3, Translation3, UnitQuaternion, Vector3};
+use rayon::prelude::*;
+use std::collections::VecDeque;
 
 /// The 64-beam scanner stands on the roof, level, m.
 const BASE_FROM_SPIN64_M: [f64; 3] = [-0.20, 0.0, 2.45];
@@ -265,10 +263,7 @@ mod tests {
             (SurveyPattern::Os64, 27, 15.0..24.0),
         ] {
             let (distance_m, mean_m) = distance_and_range_m(pattern, scans);
-            assert!(
-                (0.005..0.03).contains(&distance_m),
-                "{pattern:?}: {distance_m} m"
-            );
+            assert!((0.005..0.03).contains(&distance_m), "{distance_m}");
             assert!(range_m.contains(&mean_m), "{pattern:?}: {mean_m} m");
         }
     }
@@ -277,12 +272,8 @@ mod tests {
     fn scans_follow_each_other_without_gaps() {
         let survey = Survey::new(1, SurveyPattern::Lms200).unwrap();
         let starts: Vec<i64> = (0..300).map(|i| survey.start_ns(i)).collect();
-        let steps = starts.windows(2).map(|pair| pair[1] - pair[0]);
-        assert!(
-            steps
-                .clone()
-                .all(|step| (4_000_000..5_000_000).contains(&step))
-        );
+        let mut steps = starts.windows(2).map(|pair| pair[1] - pair[0]);
+        assert!(steps.all(|step| (4_000_000..5_000_000).contains(&step)));
         // A batch and a bit: the order of the scans is that of their numbers.
         let ahead: Vec<SurveyScan> = survey.scans().take(LMS200_BATCH as usize + 2).collect();
         let mut errors = InsErrors::new(&survey.bobcat);

@@ -1,9 +1,8 @@
 //! Stencils of cells that may hold a point nearer than a distance to some point of the own cell.
 
-use std::collections::BTreeMap;
-
 use lattice_core::lattice::{Lattice, LatticeIndex};
 use nalgebra::Vector3;
+use std::collections::BTreeMap;
 
 /// Distances within this share of the cell side are equal.
 const SLACK: f64 = 1e-9;
@@ -104,10 +103,9 @@ fn square_from_triangle(p: &Vector3<f64>, [a, b, c]: &[Vector3<f64>; 3]) -> f64 
 
 #[cfg(test)]
 mod tests {
+    use super::*;
     use lattice_core::lattice::LatticeKind;
     use nalgebra::Matrix3;
-
-    use super::*;
 
     #[test]
     fn stencils_have_as_many_cells_as_the_theory_says() {

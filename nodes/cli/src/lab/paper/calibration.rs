@@ -1,13 +1,11 @@
 //! `lattice paper calibration`: Nakamura et al., computed anew.
 
-use std::path::PathBuf;
-
-use clap::Args;
-
 use super::{ReportOptions, make};
 use crate::CliResult;
 use crate::lab::processors;
+use clap::Args;
 use lattice_lab::paper::calibration::{Options, run};
+use std::path::PathBuf;
 
 /// Options of `lattice paper calibration`.
 #[derive(Args)]

@@ -3,13 +3,11 @@
 mod calibration;
 mod voxels;
 
-use std::path::PathBuf;
-
-use clap::{Args, Subcommand};
-
 use crate::progress::Progress;
 use crate::{CliResult, init_logging};
-use lattice_lab::report::{self, Report};
+use clap::{Args, Subcommand};
+use lattice_lab::{Report, write_report};
+use std::path::PathBuf;
 
 /// Compute every table and figure of a paper and set it beside what is printed
 #[derive(Subcommand)]
@@ -57,7 +55,7 @@ fn make<E: std::fmt::Display>(
     });
     bar.done();
     let report = report.map_err(|e| e.to_string())?;
-    report::write(&report, &options.out)?;
+    write_report(&report, &options.out)?;
     if options.json {
         println!("{}", serde_json::to_string_pretty(&report)?);
         return Ok(());

@@ -1,12 +1,10 @@
 //! `lattice paper voxels`: Ryde & Brünig 2011, computed anew.
 
-use std::path::PathBuf;
-
-use clap::Args;
-
 use super::{ReportOptions, make};
 use crate::CliResult;
+use clap::Args;
 use lattice_lab::paper::voxels::{Options, run};
+use std::path::PathBuf;
 
 /// Options of `lattice paper voxels`.
 #[derive(Args)]

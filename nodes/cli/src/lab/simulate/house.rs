@@ -1,16 +1,14 @@
 //! `lattice simulate house`: a robot's map and headset clouds with the truth.
 
-use std::path::PathBuf;
-
+use crate::CliResult;
+use crate::lab::{Choice, choice, show};
+use crate::progress::Progress;
 use clap::Args;
 use lattice_core::lattice::LatticeKind;
-use lattice_lab::simulate::house::{HeadsetOptions, SurveyOptions};
-use nalgebra::{Isometry3, Vector3};
-
-use crate::CliResult;
-use crate::lab::{choice, show};
-use crate::progress::Progress;
 use lattice_lab::datasets::{HeadsetAxes, HouseOptions, write_house};
+use lattice_lab::simulate::house::SurveyOptions;
+use nalgebra::{Isometry3, Vector3};
+use std::path::PathBuf;
 
 /// Options of `lattice simulate house`.
 #[derive(Args)]
@@ -58,14 +56,11 @@ pub struct House {
 }
 
 /// Values of `--axes`.
-const AXES: [(&str, &str, HeadsetAxes); 2] = [
+const AXES: [Choice<HeadsetAxes>; 2] = [
     ("ros", "x forward, y left, z up", HeadsetAxes::Ros),
-    (
-        "unity",
-        "x right, y up, z forward: left-handed",
-        HeadsetAxes::Unity,
-    ),
+    ("unity", LEFT_HANDED, HeadsetAxes::Unity),
 ];
+const LEFT_HANDED: &str = "x right, y up, z forward: left-handed";
 
 impl House {
     pub(super) fn run(self) -> CliResult {
@@ -86,10 +81,7 @@ impl House {
                 views: self.views,
                 ..SurveyOptions::default()
             },
-            headset: HeadsetOptions {
-                headset_scans: self.headset_scans,
-                ..HeadsetOptions::default()
-            },
+            headset_scans: self.headset_scans,
             flips: self.flips,
             lattice: self.lattice,
             cell_side_m: self.cell_side,

@@ -1,13 +1,11 @@
 //! Scans for other programs.
 
-use std::fs::{self, File};
-use std::path::Path;
-
-use lattice_core::registration::{SemanticCloud, UNLABELED};
-
 use super::Prepared;
 use crate::{AnyError, at};
+use lattice_core::registration::{SemanticCloud, UNLABELED};
 use lattice_nodes::files::export::write_labelled_ply;
+use std::fs::{self, File};
+use std::path::Path;
 
 /// Writes each scan as `scan_N.ply`, and thinned as `thinned_N.ply`: points with their most probable
 /// classes, sensor frame.

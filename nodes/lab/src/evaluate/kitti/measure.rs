@@ -1,5 +1,9 @@
 //! Pairs of scans and the results of each method on them.
 
+use super::{KittiMethod, RIGHT, Scan};
+use crate::AnyError;
+use crate::bench::timed;
+use crate::evaluate::trial::rounded;
 use crate::metrics::PoseError;
 use lattice_core::registration::{
     CalibrationMap, CalibrationOptions, CalibrationRequest, HeadsetScan, PrepareOptions,
@@ -7,11 +11,6 @@ use lattice_core::registration::{
 };
 use nalgebra::{Isometry3, Point3, UnitQuaternion, Vector3};
 use serde::Serialize;
-
-use super::{KittiMethod, RIGHT, Scan};
-use crate::AnyError;
-use crate::bench::timed;
-use crate::evaluate::trial::rounded;
 
 /// Two scans, of which the first is moved.
 #[derive(Clone, PartialEq, Debug, Serialize)]
@@ -65,7 +64,7 @@ pub struct PairRow {
 }
 
 /// Results of all pairs and methods.
-#[derive(Clone, PartialEq, Debug, Serialize)]
+#[derive(Clone, Default, PartialEq, Debug, Serialize)]
 pub struct KittiReport {
     /// Side of the cells of the thinning, metres.
     pub cell_m: f64,
@@ -185,10 +184,7 @@ impl Pair {
                 PairRow {
                     register_ms: 1e3 * spent.cpu_s,
                     verdict: Some(found.verdict.name().to_owned()),
-                    margin: found
-                        .log_margin
-                        .is_finite()
-                        .then_some(rounded(found.log_margin)),
+                    margin: Some(rounded(found.log_margin)).filter(|m| m.is_finite()),
                     ..row(&found.map_from_headset, target.map_ms)
                 }
             }
@@ -254,15 +250,12 @@ mod tests {
         let row = pair.row(&KittiMethod::Start, true, &pair.heading, 0.0);
         assert!((row.translation_m - 4.0).abs() < 1e-6 && row.rotation_deg < 1e-6 && !row.right);
         let close = Isometry3::translation(0.1, 0.0, 0.1) * step;
-        assert!(
-            pair.row(&KittiMethod::Ours { thinned: false }, false, &close, 0.0)
+        let right = |pose| {
+            pair.row(&KittiMethod::Ours { thinned: false }, false, pose, 0.0)
                 .right
-        );
+        };
+        assert!(right(&close));
         let turned = step * Isometry3::rotation(Vector3::x() * 0.31_f64.to_radians());
-        assert!(
-            !pair
-                .row(&KittiMethod::Ours { thinned: false }, false, &turned, 0.0)
-                .right
-        );
+        assert!(!right(&turned));
     }
 }

@@ -1,9 +1,8 @@
 //! The methods that are compared on laser scans.
 
-use lattice_core::registration::NamedMethod;
-
 use crate::evaluate::methods::START;
 use crate::evaluate::trial::OURS;
+use lattice_core::registration::NamedMethod;
 
 /// Gates of the methods for which none is published, metres.
 const GATES_M: [f64; 2] = [1.0, 2.0];
@@ -70,10 +69,8 @@ mod tests {
 
     #[test]
     fn methods_without_a_published_gate_have_one_in_their_names() {
-        let names: Vec<String> = KittiMethod::all(false)
-            .iter()
-            .map(KittiMethod::name)
-            .collect();
+        let all = KittiMethod::all(false);
+        let names: Vec<String> = all.iter().map(KittiMethod::name).collect();
         assert_eq!(
             names.join(" "),
             "start icp_1 icp_2 gicp_1 gicp_2 gicp_se3 semantic_hard semantic_soft as_printed em_hard_2 \

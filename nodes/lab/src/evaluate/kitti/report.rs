@@ -2,7 +2,7 @@
 
 use super::{KittiReport, PairRow};
 use crate::evaluate::median;
-use crate::report::{Cell, Head, Report, Section, Table};
+use crate::report::{Cell, Report, Section, Table};
 
 /// A table with one line for each method and start. A refused pose is neither right nor wrong.
 pub fn kitti_report(report: &KittiReport) -> Report {
@@ -13,38 +13,26 @@ pub fn kitti_report(report: &KittiReport) -> Report {
         if !done.contains(&key) {
             done.push(key);
             let of = |r: &&PairRow| (r.method.as_str(), r.start.as_str()) == key;
-            rows.push(line(
-                row,
-                &report.rows.iter().filter(of).collect::<Vec<_>>(),
-            ));
+            let same: Vec<_> = report.rows.iter().filter(of).collect();
+            rows.push(line(row, &same));
         }
     }
-    let columns = [
-        "method",
-        "start",
-        "right",
-        "wrong",
-        "refused",
-        "median error",
-        "largest error",
-        "prepare + register, processor ms",
-    ];
-    let head = Head {
-        title: "Registration of labelled laser scans".to_owned(),
-        lead: format!(
-            "{} ordered pairs of scans, thinned to the means of cells of {} m; a pose is right within {} m and {} degrees.",
-            report.pairs.len(),
-            report.cell_m,
-            report.right_m,
-            report.right_deg
-        ),
-        command: format!("lattice evaluate kitti --cell {}", report.cell_m),
-    };
+    let columns = "method|start|right|wrong|refused|median error|largest error|\
+        prepare + register, processor ms";
+    let lead = format!(
+        "{} ordered pairs of scans, thinned to the means of cells of {} m; a pose is right within {} m and {} degrees.",
+        report.pairs.len(),
+        report.cell_m,
+        report.right_m,
+        report.right_deg
+    );
+    let title = "Registration of labelled laser scans";
+    let command = format!("lattice evaluate kitti --cell {}", report.cell_m);
     let section = Section {
         tables: vec![Table::new("kitti", "All methods and starts", columns, rows)],
         ..Section::measured("kitti", "Methods against the truth of an INS", "")
     };
-    Report::new(head, vec![section])
+    Report::new(title, lead, command, vec![section])
 }
 
 fn line(first: &PairRow, rows: &[&PairRow]) -> Vec<Cell> {
@@ -53,6 +41,7 @@ fn line(first: &PairRow, rows: &[&PairRow]) -> Vec<Cell> {
     let right = rows.iter().filter(accepted).filter(|row| row.right).count();
     let middle = |of: fn(&PairRow) -> f64| median(rows.iter().map(|r| of(r))).unwrap_or(f64::NAN);
     let most = |of: fn(&PairRow) -> f64| rows.iter().map(|r| of(r)).fold(0.0, f64::max);
+    let [prepare, register] = [middle(|r| r.prepare_ms), middle(|r| r.register_ms)];
     let error = |m: f64, deg: f64| Cell::Text(format!("{m:.3} m, {deg:.3} deg"));
     vec![
         first.title.as_str().into(),
@@ -65,12 +54,7 @@ fn line(first: &PairRow, rows: &[&PairRow]) -> Vec<Cell> {
         },
         error(middle(|r| r.translation_m), middle(|r| r.rotation_deg)),
         error(most(|r| r.translation_m), most(|r| r.rotation_deg)),
-        format!(
-            "{:.0} + {:.0}",
-            middle(|r| r.prepare_ms),
-            middle(|r| r.register_ms)
-        )
-        .into(),
+        format!("{prepare:.0} + {register:.0}").into(),
     ]
 }
 
@@ -99,19 +83,12 @@ mod tests {
     #[test]
     fn a_refused_pose_is_not_a_right_one() {
         let report = KittiReport {
-            cell_m: 0.3,
-            build: "dev".to_owned(),
-            threads: 1,
-            right_m: 0.15,
-            right_deg: 0.3,
-            scans: Vec::new(),
-            points: Vec::new(),
-            pairs: Vec::new(),
             rows: vec![
                 row(true, "OK", 0.1),
                 row(true, "AMBIGUOUS", 0.12),
                 row(false, "OK", 5.0),
             ],
+            ..KittiReport::default()
         };
         let table = markdown(&kitti_report(&report));
         let line =

@@ -1,7 +1,7 @@
 //! Scans of a log with their poses.
 
-use std::path::Path;
-
+use crate::AnyError;
+use lattice_bag::{BagReader, ReadOptions};
 use lattice_core::pose::{
     PoseBuffer, PoseBufferOptions, StampedPose, TransformBuffer, TransformBufferOptions,
 };
@@ -10,13 +10,11 @@ use lattice_msgs::cdr;
 use lattice_msgs::nav_msgs::Odometry;
 use lattice_msgs::sensor_msgs::PointCloud2;
 use lattice_msgs::tf2_msgs::TFMessage;
-use nalgebra::Isometry3;
-use serde::de::DeserializeOwned;
-
-use crate::AnyError;
-use lattice_bag::{BagReader, ReadOptions};
 use lattice_nodes::convert::geometry::{isometry_from_pose, isometry_from_transform};
 use lattice_nodes::convert::semantic::{SemanticOptions, semantic_from_message};
+use nalgebra::Isometry3;
+use serde::de::DeserializeOwned;
+use std::path::Path;
 
 /// Most scans of a log; their pairs grow as the square.
 const MAX_SCANS: usize = 32;

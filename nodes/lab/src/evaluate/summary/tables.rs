@@ -1,17 +1,14 @@
 //! The rows of the tables.
 
-use std::collections::BTreeMap;
-
-use serde::Serialize;
-
 use crate::evaluate::statistics::Share;
 #[cfg(doc)]
 use crate::evaluate::trial::WRONG;
+use serde::Serialize;
+use std::collections::BTreeMap;
 
 /// Printed errors of a scene (Nakamura et al. 2019, table 1).
 #[derive(Clone, Copy, PartialEq, Debug, Serialize)]
 pub struct Printed {
-    /// Scene.
     pub scene: &'static str,
     /// Printed d_SE3 of GICP-SE(3).
     pub gicp_se3: f64,
@@ -38,23 +35,15 @@ const fn printed(scene: &'static str, gicp_se3: f64, semantic_icp: f64) -> Print
 /// One method on one scene with one share of wrong labels from one start.
 #[derive(Clone, PartialEq, Debug, Serialize)]
 pub struct Row {
-    /// Scene, or `all`.
     pub scene: String,
-    /// Start.
     pub start: String,
-    /// Share of the view that is labelled wrongly.
     pub q: f64,
-    /// Method.
     pub method: String,
     /// Poses within [`WRONG`].
     pub success: Share,
-    /// Median of d_SE3 as printed.
     pub d_se3: Option<f64>,
-    /// Median of its left form.
     pub d_se3_left: Option<f64>,
-    /// Median of the distance, metres.
     pub translation_m: Option<f64>,
-    /// Median of the angle, degrees.
     pub rotation_deg: Option<f64>,
     /// Median of the mean distance of the seen points, metres.
     pub view_m: Option<f64>,
@@ -63,11 +52,8 @@ pub struct Row {
 /// Ours against another from the same starts.
 #[derive(Clone, PartialEq, Debug, Serialize)]
 pub struct Paired {
-    /// The other method.
     pub against: String,
-    /// Start, or `all`.
     pub start: String,
-    /// Share of wrong labels; None for all.
     pub q: Option<f64>,
     /// Share of trials with distance and angle both within 1 cm and 0.2 degrees of the other's, or smaller.
     pub not_worse: Share,
@@ -84,13 +70,9 @@ pub struct Paired {
 /// Share of accepted poses, and of wrong ones among them.
 #[derive(Clone, PartialEq, Debug, Serialize)]
 pub struct Accepted {
-    /// Scene, or `all`.
     pub scene: String,
-    /// Start.
     pub start: String,
-    /// Share of wrong labels; None for all.
     pub q: Option<f64>,
-    /// Share with the verdict OK.
     pub accepted: Share,
     /// Share of these beyond 0.15 m or 3 degrees.
     pub wrong: Share,
@@ -98,18 +80,14 @@ pub struct Accepted {
     pub wrong_tight: Share,
     /// Share of these with seen points on average beyond 0.15 m, or beyond 3 degrees.
     pub wrong_in_view: Share,
-    /// Share that is right before any verdict.
     pub right: Share,
-    /// Count of each verdict.
     pub verdicts: BTreeMap<String, usize>,
 }
 
 /// Normalised squared errors of accepted poses.
 #[derive(Clone, PartialEq, Debug, Serialize)]
 pub struct Consistency {
-    /// Start, or `all`.
     pub start: String,
-    /// Accepted poses with a covariance.
     pub n: usize,
     /// Mean over 6, where 1 is right.
     pub mean_over_6: Option<f64>,
@@ -120,13 +98,9 @@ pub struct Consistency {
 /// Wall times of a method.
 #[derive(Clone, PartialEq, Debug, Serialize)]
 pub struct TimeRow {
-    /// Method.
     pub method: String,
-    /// Start.
     pub start: String,
-    /// Trials.
     pub n: usize,
-    /// Median, milliseconds.
     pub median_ms: Option<f64>,
     /// 90 % quantile, milliseconds.
     pub p90_ms: Option<f64>,

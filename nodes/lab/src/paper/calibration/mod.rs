@@ -6,13 +6,11 @@ mod label_maps;
 mod metric;
 mod trials;
 
-use std::path::PathBuf;
-
-use crate::simulate::house::House;
-
-use crate::AnyError;
 use crate::evaluate::{Results, Settings, Testbed, Trial, read_house};
-use crate::report::{Head, Report, Section};
+use crate::report::{Report, Section};
+use crate::simulate::house::House;
+use crate::{AnyError, at};
+use std::path::PathBuf;
 
 /// Options of the report.
 #[derive(Clone, Debug)]
@@ -49,13 +47,10 @@ struct Context {
 /// Computes all sections; `progress` gets the share done and the name of the next section.
 pub fn run(options: &Options, progress: &mut dyn FnMut(f64, &str)) -> Result<Report, AnyError> {
     let sections = sections(options, progress)?;
-    let head = Head::of_paper(
-        "Nakamura, El Hafi, Hagiwara and Taniguchi 2019, Calibration System Using Semantic-ICP for Visualization of Robot \
-         Spatial Perception Through Mixed Reality",
-        command(options),
-        options.quick,
-    );
-    Ok(Report::new(head, sections))
+    let title = "Nakamura, El Hafi, Hagiwara and Taniguchi 2019, Calibration System Using Semantic-ICP for Visualization of Robot \
+                 Spatial Perception Through Mixed Reality";
+    let command = command(options);
+    Ok(Report::of_paper(title, command, options.quick, sections))
 }
 
 fn sections(
@@ -63,11 +58,7 @@ fn sections(
     progress: &mut dyn FnMut(f64, &str),
 ) -> Result<Vec<Section>, AnyError> {
     progress(0.0, "house");
-    let mesh = options
-        .mesh
-        .as_ref()
-        .map(|(m, c)| (m.as_path(), c.as_path()));
-    let (house, mesh_crc32) = read_house(mesh, options.seed)?;
+    let (house, mesh_crc32) = read_house(options.mesh.as_ref(), options.seed)?;
     let (settings, trials) = evaluated(options, mesh_crc32)?;
     let context = context(options, house, &settings)?;
     let mut tell = |done: f64| progress(0.02 + 0.08 * done, "equations");
@@ -98,29 +89,25 @@ fn evaluated(
 ) -> Result<(Settings, Option<Vec<Trial>>), AnyError> {
     let Some(folder) = &options.results else {
         let default = Settings::default();
+        let (map_seeds, survey_views) = match options.quick {
+            true => (1, QUICK_VIEWS),
+            false => (default.map_seeds, default.survey_views),
+        };
         let settings = Settings {
             mesh_crc32,
-            map_seeds: if options.quick { 1 } else { default.map_seeds },
-            survey_views: if options.quick {
-                QUICK_VIEWS
-            } else {
-                default.survey_views
-            },
+            map_seeds,
+            survey_views,
             ..default
         };
         return Ok((settings, None));
     };
     let (settings, trials) = Results::read(folder)?;
     if settings.mesh_crc32 != mesh_crc32 {
-        return Err(format!(
-            "{}: these trials are of {}; give the same --mesh and --classes, if any",
-            folder.display(),
-            match settings.mesh_crc32 {
-                Some(crc) => format!("a mesh with CRC-32 {crc:08x}"),
-                None => "the house of our own making".to_owned(),
-            }
-        )
-        .into());
+        let mesh = settings.mesh_name();
+        let words = "give the same --mesh and --classes, if any";
+        return Err(at(folder)(format!(
+            "these trials are of another house, {mesh}; {words}"
+        )));
     }
     Ok((settings, Some(trials)))
 }

@@ -1,64 +1,32 @@
 //! Fig. 1: the Voronoi cells, drawn.
 
-use std::fmt::Write;
-
-use lattice_core::lattice::{Lattice, LatticeKind};
-use nalgebra::Vector3;
-
 use super::{Options, unit};
 use crate::AnyError;
 use crate::report::plot::{color, title};
-use crate::report::{Cell, Check, Figure, Section, Table, Verdict};
+use crate::report::{Cell, Check, Figure, Section, Table, Verdict, numbers};
 use crate::theory::surface_m2;
+use lattice_core::lattice::{Lattice, LatticeKind};
+use nalgebra::Vector3;
+use plotters::style::RGBColor;
+use std::fmt::Write;
 
-/// Corners and faces of a named polyhedron.
-struct Shape {
-    kind: LatticeKind,
-    name: &'static str,
-    corners: usize,
-    /// Numbers of corners, and how many faces have them.
-    faces: &'static [(usize, usize)],
-}
+/// A polyhedron: its lattice, number of corners, numbers of corners of a face and how many faces have
+/// them, and its name.
+type Shape = (LatticeKind, usize, &'static [(usize, usize)], &'static str);
 
 /// The polyhedra that the paper names, and ours.
 const SHAPES: [Shape; 6] = [
-    Shape {
-        kind: LatticeKind::Cubic,
-        name: "cube",
-        corners: 8,
-        faces: &[(4, 6)],
-    },
-    Shape {
-        kind: LatticeKind::Bcc,
-        name: "truncated octahedron",
-        corners: 24,
-        faces: &[(4, 6), (6, 8)],
-    },
-    Shape {
-        kind: LatticeKind::Fcc,
-        name: "rhombic dodecahedron",
-        corners: 14,
-        faces: &[(4, 12)],
-    },
-    Shape {
-        kind: LatticeKind::Mcc,
-        name: "MCC cell, a stretched truncated octahedron",
-        corners: 24,
-        faces: &[(4, 6), (6, 8)],
-    },
-    Shape {
-        kind: LatticeKind::Hex,
-        name: "hexagonal prism",
-        corners: 12,
-        faces: &[(4, 6), (6, 2)],
-    },
-    Shape {
-        kind: LatticeKind::HexOptimal,
-        name: "hexagonal prism of least squared error",
-        corners: 12,
-        faces: &[(4, 6), (6, 2)],
-    },
+    (LatticeKind::Cubic, 8, &[(4, 6)], "cube"),
+    (LatticeKind::Bcc, 24, CUT, "truncated octahedron"),
+    (LatticeKind::Fcc, 14, &[(4, 12)], "rhombic dodecahedron"),
+    (LatticeKind::Mcc, 24, CUT, STRETCHED),
+    (LatticeKind::Hex, 12, PRISM, "hexagonal prism"),
+    (LatticeKind::HexOptimal, 12, PRISM, BEST_PRISM),
 ];
+const CUT: &[(usize, usize)] = &[(4, 6), (6, 8)];
+const PRISM: &[(usize, usize)] = &[(4, 6), (6, 2)];
+const STRETCHED: &str = "MCC cell, a stretched truncated octahedron";
+const BEST_PRISM: &str = "hexagonal prism of least squared error";
 
 /// Size of a picture of one cell, pixels.
 const TILE: f64 = 240.0;
@@ -70,60 +38,31 @@ const NAME: f64 = 44.0;
 pub fn section(_: &Options, _: &mut dyn FnMut(f64)) -> Result<Section, AnyError> {
     let mut checks = Vec::new();
     let mut rows = Vec::new();
-    for shape in SHAPES {
-        let kind = shape.kind;
+    for (kind, corners, faces, shape) in SHAPES {
         let lattice = unit(kind)?;
         let cell = lattice.cell();
         let name = title(kind);
-        let mut check = |what: String, expected: f64, found: f64, tolerance: f64| {
-            checks.push(Check::new(
-                format!("{name}: {what}"),
-                expected,
-                found,
-                tolerance,
-            ));
+        let volume = format!("{name}: volume");
+        checks.push(Check::new(volume, 1.0, cell.volume_m3(), 1e-12));
+        let mut count = |what: String, expected: usize, found: usize| {
+            checks.push(Check::count(format!("{name}: {what}"), expected, found));
         };
-        check("volume".into(), 1.0, cell.volume_m3(), 1e-12);
-        check(
-            "corners".into(),
-            shape.corners as f64,
-            cell.vertices.len() as f64,
-            0.0,
-        );
-        let all: usize = shape.faces.iter().map(|(_, count)| count).sum();
-        check("faces".into(), all as f64, cell.faces.len() as f64, 0.0);
-        for &(sides, count) in shape.faces {
-            let found = cell
-                .faces
-                .iter()
-                .filter(|f| f.vertices.len() == sides)
-                .count();
-            check(
-                format!("faces of {sides} corners"),
-                count as f64,
-                found as f64,
-                0.0,
-            );
+        count("corners".into(), corners, cell.vertices.len());
+        let all = faces.iter().map(|(_, count)| count).sum();
+        count("faces".into(), all, cell.faces.len());
+        for &(sides, expected) in faces {
+            let of = cell.faces.iter().filter(|f| f.vertices.len() == sides);
+            count(format!("faces of {sides} corners"), expected, of.count());
         }
-        rows.push(vec![
-            name.into(),
-            shape.name.into(),
-            cell.vertices.len().into(),
-            cell.faces.len().into(),
-            Cell::Number(lattice.covering_radius_m(), 6),
-            Cell::Number(lattice.packing_radius_m(), 6),
-            Cell::Number(surface_m2(&lattice), 5),
-        ]);
+        let radii = [lattice.covering_radius_m(), lattice.packing_radius_m()];
+        let mut row = vec![name.into(), shape.into()];
+        row.extend([cell.vertices.len(), cell.faces.len()].map(Cell::from));
+        row.extend(numbers(6, radii));
+        row.push(Cell::Number(surface_m2(&lattice), 5));
+        rows.push(row);
     }
-    let columns = [
-        "lattice",
-        "cell",
-        "corners",
-        "faces",
-        "farthest point (cell sides)",
-        "nearest face (cell sides)",
-        "surface (sides²)",
-    ];
+    let columns = "lattice|cell|corners|faces|farthest point (cell sides)|nearest face (cell sides)|\
+        surface (sides²)";
     Ok(Section {
         id: "fig1".into(),
         title: "Fig. 1: Voronoi cells".into(),
@@ -149,18 +88,18 @@ fn draw() -> Result<String, AnyError> {
         "<svg width=\"{width}\" height=\"{height}\" viewBox=\"0 0 {width} {height}\" \
          xmlns=\"http://www.w3.org/2000/svg\">\n"
     );
-    for (i, shape) in SHAPES.into_iter().enumerate() {
+    for (i, (kind, _, _, shape)) in SHAPES.into_iter().enumerate() {
         let x = TILE * ((i % columns) as f64 + 0.5);
         let y = (TILE + NAME) * (i / columns) as f64 + TILE / 2.0;
-        draw_cell(&mut svg, &unit(shape.kind)?, x, y)?;
-        let short = shape.name.split(',').next().unwrap_or(shape.name);
+        draw_cell(&mut svg, &unit(kind)?, x, y)?;
+        let short = shape.split(',').next().unwrap_or(shape);
         writeln!(
             svg,
             "<text x=\"{x}\" y=\"{}\" font-family=\"sans-serif\" font-size=\"15\" font-weight=\"bold\" \
              text-anchor=\"middle\">{}</text>\n<text x=\"{x}\" y=\"{}\" font-family=\"sans-serif\" \
              font-size=\"12\" text-anchor=\"middle\" fill=\"#444\">{short}</text>",
             y + TILE / 2.0 + 8.0,
-            title(shape.kind),
+            title(kind),
             y + TILE / 2.0 + 26.0,
         )?;
     }
@@ -174,7 +113,7 @@ fn draw_cell(svg: &mut String, lattice: &Lattice, x: f64, y: f64) -> Result<(), 
     let right = Vector3::z().cross(&eye).normalize();
     let up = eye.cross(&right);
     let light = (eye * 0.35 - right * 0.45 + up * 0.75).normalize();
-    let base = color(lattice.kind());
+    let RGBColor(r, g, b) = color(lattice.kind());
     for face in &lattice.cell().faces {
         let normal = lattice.center(face.neighbor).normalize();
         if normal.dot(&eye) <= 1e-9 {
@@ -182,25 +121,17 @@ fn draw_cell(svg: &mut String, lattice: &Lattice, x: f64, y: f64) -> Result<(), 
         }
         let shade = 0.2 + 0.75 * normal.dot(&light).max(0.0);
         // From a dark tone of the colour to a light one.
-        let tone = |channel: u8| {
-            let channel = f64::from(channel);
-            (0.35 * channel + 45.0) * (1.0 - shade) + (0.35 * channel + 165.0) * shade
-        };
+        let fill = [r, g, b].map(|c| format!("{:.0}", 0.35 * f64::from(c) + 45.0 + 120.0 * shade));
+        let fill = fill.join(",");
         let corners = lattice.cell().polygon(face).map(|corner| {
             let (across, high) = (corner.dot(&right), corner.dot(&up));
             format!("{:.2},{:.2}", x + SCALE * across, y - SCALE * high)
         });
         writeln!(
             svg,
-            "<polygon points=\"{}\" fill=\"rgb({:.0},{:.0},{:.0})\" stroke=\"rgb({},{},{})\" \
+            "<polygon points=\"{}\" fill=\"rgb({fill})\" stroke=\"rgb({r},{g},{b})\" \
              stroke-width=\"1.6\" stroke-linejoin=\"round\"/>",
-            corners.collect::<Vec<_>>().join(" "),
-            tone(base.0),
-            tone(base.1),
-            tone(base.2),
-            base.0,
-            base.1,
-            base.2
+            corners.collect::<Vec<_>>().join(" ")
         )?;
     }
     Ok(())

@@ -1,15 +1,13 @@
 //! Fig. 3: the ordered distances of the adjacent lattice points.
 
-use std::f64::consts::SQRT_2;
-
-use lattice_core::lattice::{Lattice, LatticeKind};
-use plotters::prelude::*;
-
 use super::{Options, unit};
 use crate::AnyError;
-use crate::report::plot::{LABELS, Layout, color, key, labels, svg, title};
+use crate::report::plot::{Layout, chart, color, key, svg, title};
 use crate::report::{Cell, Check, Figure, Section, Table, Verdict};
 use crate::theory::{clearance_stencil, distance_between_cells_m, touching_clearance_m};
+use lattice_core::lattice::{Lattice, LatticeKind};
+use plotters::prelude::*;
+use std::f64::consts::SQRT_2;
 
 /// Numbers of touching cells and their distances, unit volume.
 const SHELLS: [(LatticeKind, &[(usize, f64)]); 5] = [
@@ -72,54 +70,27 @@ pub fn section(_: &Options, _: &mut dyn FnMut(f64)) -> Result<Section, AnyError>
         let found = shells(&distances);
         for (i, &(count, distance)) in expected.iter().enumerate() {
             let (n, m) = found.get(i).copied().unwrap_or((0, f64::NAN));
-            checks.push(
-                Check::new(
-                    format!("{name}: lattice points at distance {}", i + 1),
-                    count as f64,
-                    n as f64,
-                    0.0,
-                )
-                .with_printed(printed(kind, i)),
-            );
-            checks.push(
-                Check::new(
-                    format!("{name}: distance {} (cell sides)", i + 1),
-                    distance,
-                    m,
-                    1e-5,
-                )
-                .with_printed((kind == LatticeKind::Cubic && i == 0).then_some(1.0)),
-            );
+            let points = format!("{name}: lattice points at distance {}", i + 1);
+            checks.push(Check::count(points, count, n).with_printed(printed(kind, i)));
+            let first = (kind == LatticeKind::Cubic && i == 0).then_some(1.0);
+            let apart = format!("{name}: distance {} (cell sides)", i + 1);
+            checks.push(Check::new(apart, distance, m, 1e-5).with_printed(first));
         }
-        checks.push(Check::new(
-            format!("{name}: number of distances"),
-            expected.len() as f64,
-            found.len() as f64,
-            0.0,
-        ));
+        let number = format!("{name}: number of distances");
+        checks.push(Check::count(number, expected.len(), found.len()));
         for (i, (distance, face)) in distances.into_iter().enumerate() {
             let shares = if face { "face" } else { "edge or vertex" };
-            rows.push(vec![
-                name.into(),
-                (i + 1).into(),
-                Cell::Number(distance, 5),
-                shares.into(),
-            ]);
+            let distance = Cell::Number(distance, 5);
+            rows.push(vec![name.into(), (i + 1).into(), distance, shares.into()]);
         }
     }
     let mut near = Vec::new();
     for (kind, expected) in CLEARANCES {
         let lattice = unit(kind)?;
         let found = touching_clearance_m(&lattice);
-        checks.push(Check::new(
-            format!(
-                "{}: safe distance of the touching cells (cell sides)",
-                title(kind)
-            ),
-            expected,
-            found,
-            6e-4,
-        ));
+        let what = "safe distance of the touching cells (cell sides)";
+        let what = format!("{}: {what}", title(kind));
+        checks.push(Check::new(what, expected, found, 6e-4));
         let mut row = vec![title(kind).into(), Cell::Number(found, 3)];
         for radius in CLEARANCE_RADII {
             let stencil = clearance_stencil(&lattice, radius).map(|cells| cells.len());
@@ -129,22 +100,17 @@ pub fn section(_: &Options, _: &mut dyn FnMut(f64)) -> Result<Section, AnyError>
     }
     // A vertex neighbour of FCC is at distance 0 and not in the printed set.
     let fcc = unit(LatticeKind::Fcc)?;
-    let others = fcc
-        .touching_neighbors()
-        .iter()
-        .skip(fcc.face_neighbors().len());
+    let others = fcc.touching_neighbors().iter();
+    let others = others.skip(fcc.face_neighbors().len());
     let gap = others.map(|&w| distance_between_cells_m(&fcc, w));
-    checks.push(Check::new(
-        "FCC: safe distance of the 12 printed cells (cell sides)",
-        0.0,
-        gap.fold(f64::INFINITY, f64::min),
-        1e-9,
-    ));
-    let mut columns = vec![
-        "lattice".to_owned(),
-        "safe with the touching cells".to_owned(),
-    ];
-    columns.extend(CLEARANCE_RADII.map(|radius| format!("cells to check for {radius}")));
+    let gap = gap.fold(f64::INFINITY, f64::min);
+    let what = "FCC: safe distance of the 12 printed cells (cell sides)";
+    checks.push(Check::new(what, 0.0, gap, 1e-9));
+    let near_columns = CLEARANCE_RADII.map(|radius| format!("|cells to check for {radius}"));
+    let near_columns = format!(
+        "lattice|safe with the touching cells{}",
+        near_columns.concat()
+    );
     Ok(Section {
         id: "fig3".into(),
         title: "Fig. 3: ordered distances of adjacent lattice points".into(),
@@ -165,8 +131,8 @@ pub fn section(_: &Options, _: &mut dyn FnMut(f64)) -> Result<Section, AnyError>
         checks,
         tables: vec![
             Table::new("fig3_clearance", "Distance (cell sides) up to which checking the touching cells misses no point, and \
-                          cells to check for other distances", columns, near),
-            Table::new("fig3", "Distances of the touching lattice points, cell sides", ["lattice", "number", "distance", "shares"], rows),
+                          cells to check for other distances", &near_columns, near),
+            Table::new("fig3", "Distances of the touching lattice points, cell sides", "lattice|number|distance|shares", rows),
         ],
         figures: vec![Figure::new("fig3", "Distances of the touching lattice points in order, cells of unit volume. Full: cells that \
                       share a face. Hollow: cells that share an edge or a vertex only; those of FCC and two of hex \
@@ -179,32 +145,14 @@ const CLEARANCE_RADII: [f64; 5] = [0.25, 0.5, 0.75, 1.0, 1.5];
 
 fn draw() -> Result<String, AnyError> {
     let kinds = SHELLS.map(|(kind, _)| kind);
-    let layout = Layout {
-        panel: (760, 420),
-        columns: 1,
-        rows: 1,
-        key_width: 150,
-        key: &key(&kinds),
-    };
+    let key = key(&kinds);
+    let layout = Layout::new((760, 420), [1, 1], 150, &key);
     svg(&layout, |areas| {
         let Some(area) = areas.first() else {
             return Ok(());
         };
-        let mut chart = ChartBuilder::on(area)
-            .margin(8)
-            .x_label_area_size(36)
-            .y_label_area_size(56)
-            .build_cartesian_2d(0.0..27.0, 0.75..1.85)?;
-        chart
-            .configure_mesh()
-            .x_desc("lattice point, by distance")
-            .y_desc("distance (cell sides)")
-            .x_labels(14)
-            .x_label_formatter(&labels(&(0.0..27.0)))
-            .y_label_formatter(&labels(&(0.75..1.85)))
-            .light_line_style(WHITE)
-            .label_style(LABELS)
-            .draw()?;
+        let x = ("lattice point, by distance", 0.0..27.0);
+        let mut chart = chart(area, "", x, ("distance (cell sides)", 0.75..1.85), &[])?;
         for kind in kinds {
             let color = color(kind);
             let distances = ordered(&unit(kind)?);

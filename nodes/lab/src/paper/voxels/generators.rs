@@ -1,12 +1,11 @@
 //! Eq. (8)-(12): the generator matrices.
 
-use crate::printed::printed_generator;
-use lattice_core::lattice::LatticeKind;
-
 use super::{Options, unit};
 use crate::AnyError;
+use crate::printed::printed_generator;
 use crate::report::plot::title;
 use crate::report::{Cell, Check, Section, Table, Verdict};
+use lattice_core::lattice::LatticeKind;
 
 /// Determinants of the printed digits, worked out elsewhere.
 const PRINTED_DETERMINANTS: [(LatticeKind, f64); 5] = [
@@ -34,59 +33,25 @@ pub fn section(_: &Options, _: &mut dyn FnMut(f64)) -> Result<Section, AnyError>
         if drift > worst_drift.0 {
             worst_drift = (drift, kind);
         }
-        checks.push(
-            Check::new(
-                format!("{name}: volume of the exact cell"),
-                1.0,
-                exact.determinant().abs(),
-                1e-12,
-            )
-            .with_printed(Some(1.0)),
-        );
-        checks.push(
-            Check::new(
-                format!("{name}: determinant of the printed digits"),
-                determinant,
-                printed.determinant().abs(),
-                1e-7,
-            )
-            .with_printed(Some(1.0)),
-        );
-        checks.push(Check::new(
-            // Half a digit, and what halving it adds.
-            format!("{name}: printed digits less exact ones, largest entry"),
-            0.0,
-            off,
-            0.5001e-4,
-        ));
-        let column = |i: usize| {
-            let c = exact.column(i);
-            Cell::Text(format!(
-                "({:.6}, {:.6}, {:.6})",
-                c.x + 0.0,
-                c.y + 0.0,
-                c.z + 0.0
-            ))
-        };
-        rows.push(vec![
-            name.into(),
-            column(0),
-            column(1),
-            column(2),
-            Cell::Number(printed.determinant().abs(), 7),
-            Cell::Number(off, 6),
-            Cell::Number(drift * 1e3, 3),
-        ]);
+        let volume = exact.determinant().abs();
+        let what = format!("{name}: volume of the exact cell");
+        checks.push(Check::new(what, 1.0, volume, 1e-12).with_printed(Some(1.0)));
+        let digits = printed.determinant().abs();
+        let what = format!("{name}: determinant of the printed digits");
+        checks.push(Check::new(what, determinant, digits, 1e-7).with_printed(Some(1.0)));
+        // Half a digit, and what halving it adds.
+        let what = format!("{name}: printed digits less exact ones, largest entry");
+        checks.push(Check::new(what, 0.0, off, 0.5001e-4));
+        let mut row = vec![name.into()];
+        row.extend([0, 1, 2].map(|i| {
+            let [x, y, z] = [0, 1, 2].map(|j| exact[(j, i)] + 0.0);
+            Cell::Text(format!("({x:.6}, {y:.6}, {z:.6})"))
+        }));
+        row.extend([(digits, 7), (off, 6), (drift * 1e3, 3)].map(|(v, n)| Cell::Number(v, n)));
+        rows.push(row);
     }
-    let columns = [
-        "lattice",
-        "exact first column",
-        "second",
-        "third",
-        "determinant of the printed digits",
-        "largest error of an entry",
-        "drift (mm/m)",
-    ];
+    let columns = "lattice|exact first column|second|third|determinant of the printed digits|\
+        largest error of an entry|drift (mm/m)";
     Ok(Section {
         id: "generators".into(),
         title: "Eq. (8)-(12): generator matrices".into(),

@@ -14,13 +14,11 @@ mod sample;
 mod scan;
 mod theory;
 
+use crate::AnyError;
+use crate::report::{Report, Section};
+use lattice_core::lattice::{Lattice, LatticeIndex, LatticeKind};
 use std::fs;
 use std::path::PathBuf;
-
-use lattice_core::lattice::{Lattice, LatticeIndex, LatticeKind};
-
-use crate::AnyError;
-use crate::report::{Head, Report, Section};
 
 /// Options of the report.
 #[derive(Clone, Debug)]
@@ -56,12 +54,8 @@ const SECTIONS: [(&str, f64, Make); 10] = [
 /// Computes all sections; `progress` gets the share done and the name of the next section.
 pub fn run(options: &Options, progress: &mut dyn FnMut(f64, &str)) -> Result<Report, AnyError> {
     // Before a minute of work.
-    for path in options
-        .scans
-        .iter()
-        .chain(&options.bags)
-        .chain(&options.pairs)
-    {
+    let files = options.scans.iter().chain(&options.bags);
+    for path in files.chain(&options.pairs) {
         fs::metadata(path).map_err(|e| format!("{}: {e}", path.display()))?;
     }
     let all: f64 = SECTIONS.iter().map(|(_, share, _)| share).sum();
@@ -73,12 +67,9 @@ pub fn run(options: &Options, progress: &mut dyn FnMut(f64, &str)) -> Result<Rep
         sections.push(make(options, &mut tell)?);
         before += share;
     }
-    let head = Head::of_paper(
-        "Ryde and Brünig 2011, Lattice Occupied Voxel Lists for Representation of Spatial Occupancy",
-        command(options),
-        options.quick,
-    );
-    Ok(Report::new(head, sections))
+    let title = "Ryde and Brünig 2011, Lattice Occupied Voxel Lists for Representation of Spatial Occupancy";
+    let command = command(options);
+    Ok(Report::of_paper(title, command, options.quick, sections))
 }
 
 /// The command line, with the names of files but not where they lie.

@@ -1,14 +1,12 @@
 //! Eq. (3)-(7): the printed sets of differences against the cells that share a face or touch.
 
-use std::collections::BTreeSet;
-
-use crate::printed::printed_delta;
-use lattice_core::lattice::{Lattice, LatticeIndex, LatticeKind};
-
 use super::{Options, pairs, unit};
 use crate::AnyError;
+use crate::printed::printed_delta;
 use crate::report::plot::title;
 use crate::report::{Cell, Check, Section, Table, Verdict};
+use lattice_core::lattice::{Lattice, LatticeIndex, LatticeKind};
+use std::collections::BTreeSet;
 
 /// Printed columns without 0, cells that share a face, cells that touch.
 const COUNTS: [(LatticeKind, usize, usize, usize); 5] = [
@@ -18,6 +16,10 @@ const COUNTS: [(LatticeKind, usize, usize, usize); 5] = [
     (LatticeKind::Mcc, 14, 14, 14),
     (LatticeKind::Hex, 18, 8, 20),
 ];
+
+const UNSHARED: &str = "cells that the two ways to find them do not share";
+const FOREIGN: &str = "printed cells that do not touch";
+const MISSING: &str = "touching cells that are not printed";
 
 pub fn section(_: &Options, _: &mut dyn FnMut(f64)) -> Result<Section, AnyError> {
     let mut checks = Vec::new();
@@ -31,36 +33,19 @@ pub fn section(_: &Options, _: &mut dyn FnMut(f64)) -> Result<Section, AnyError>
         // Once more from Voronoi's theorem, for the basis alone.
         let again = Lattice::from_basis(lattice.generator())?;
         let again: BTreeSet<_> = again.touching_neighbors().iter().copied().collect();
-        let count = |name: &str, printed: Option<f64>, expected: usize, found: usize| {
-            Check::new(
-                format!("{}: {name}", title(kind)),
-                expected as f64,
-                found as f64,
-                0.0,
-            )
-            .with_printed(printed)
-        };
         let found = lattice.face_neighbors().len();
-        checks.push(count("cells that share a face", None, faces, found));
-        let of_paper = Some(columns as f64);
-        checks.push(count("cells that touch", of_paper, touching, touch.len()));
-        let other = touch.symmetric_difference(&again).count();
-        checks.push(count(
-            "cells that the two ways to find them do not share",
-            None,
-            0,
-            other,
-        ));
-        let beyond = printed.difference(&touch).count();
-        checks.push(count("printed cells that do not touch", None, 0, beyond));
         let missing: Vec<_> = touch.difference(&printed).copied().collect();
-        let expected = touching - columns;
-        checks.push(count(
-            "touching cells that are not printed",
-            None,
-            expected,
-            missing.len(),
-        ));
+        for (what, expected, found) in [
+            ("cells that share a face", faces, found),
+            ("cells that touch", touching, touch.len()),
+            (UNSHARED, 0, touch.symmetric_difference(&again).count()),
+            (FOREIGN, 0, printed.difference(&touch).count()),
+            (MISSING, touching - columns, missing.len()),
+        ] {
+            let of_paper = (what == "cells that touch").then_some(columns as f64);
+            let check = Check::count(format!("{name}: {what}"), expected, found);
+            checks.push(check.with_printed(of_paper));
+        }
         rows.push(vec![
             name.into(),
             columns.into(),
@@ -72,13 +57,7 @@ pub fn section(_: &Options, _: &mut dyn FnMut(f64)) -> Result<Section, AnyError>
             },
         ]);
     }
-    let columns = [
-        "lattice",
-        "printed",
-        "share a face",
-        "touch",
-        "missing in print",
-    ];
+    let columns = "lattice|printed|share a face|touch|missing in print";
     Ok(Section {
         id: "deltas".into(),
         title: "Eq. (3)-(7): displacement vectors of the adjacent voxels".into(),

@@ -1,15 +1,14 @@
 //! Eq. (1) and (2): the share of points for which they miss the nearest lattice point.
 
-use crate::printed::{PaperQuantizer, off_by_one, printed_delta};
-use lattice_core::lattice::{Lattice, LatticeIndex, LatticeKind};
-
 use super::{Options, unit};
 use crate::AnyError;
 use crate::evaluate::Share;
 use crate::paper::parallel::in_parallel;
 use crate::paper::streams::{Purpose, stream};
+use crate::printed::{PaperQuantizer, off_by_one, printed_delta};
 use crate::report::plot::title;
 use crate::report::{Cell, Check, Section, Table, Verdict};
+use lattice_core::lattice::{Lattice, LatticeIndex, LatticeKind};
 
 /// Points of a task.
 const BLOCK: usize = 20_000;
@@ -60,13 +59,10 @@ pub fn section(options: &Options, progress: &mut dyn FnMut(f64)) -> Result<Secti
         };
         let expected = [rounding, printed, with_zero, 0.0];
         for ((way, share), expected) in WAYS.into_iter().zip(&shares).zip(expected) {
-            let deviation = (expected * (1.0 - expected) / n as f64).sqrt();
-            checks.push(Check::new(
-                format!("{}: share wrong by {way}", title(kind)),
-                expected,
-                share.share.unwrap_or(f64::NAN),
-                SIGMAS * deviation,
-            ));
+            let tolerance = SIGMAS * (expected * (1.0 - expected) / n as f64).sqrt();
+            let what = format!("{}: share wrong by {way}", title(kind));
+            let found = share.share.unwrap_or(f64::NAN);
+            checks.push(Check::new(what, expected, found, tolerance));
         }
         let mut row = vec![Cell::from(title(kind))];
         for share in &shares {
@@ -82,10 +78,8 @@ pub fn section(options: &Options, progress: &mut dyn FnMut(f64)) -> Result<Secti
         }
     }
     let missed = missed.unwrap_or_default();
-    let mut columns = vec!["lattice".to_owned()];
-    for way in WAYS {
-        columns.extend([format!("wrong by {way} (%)"), "95 % interval".to_owned()]);
-    }
+    let columns = WAYS.map(|way| format!("|wrong by {way} (%)|95 % interval"));
+    let columns = format!("lattice{}", columns.concat());
     Ok(Section {
         id: "quantization".into(),
         title: "Eq. (1) and (2): quantization".into(),
@@ -108,7 +102,7 @@ pub fn section(options: &Options, progress: &mut dyn FnMut(f64)) -> Result<Secti
         tables: vec![Table::new("quantization", format!(
                 "Share of points that get a lattice point which is not the nearest, of {} points for each lattice",
                 blocks * BLOCK
-            ), columns, rows)],
+            ), &columns, rows)],
         figures: Vec::new(),
     })
 }

@@ -1,10 +1,9 @@
 //! Evenly spread points of a cell.
 
-use lattice_core::lattice::Lattice;
-use nalgebra::Vector3;
-
 use super::Options;
 use crate::paper::streams::{Purpose, stream};
+use lattice_core::lattice::Lattice;
+use nalgebra::Vector3;
 
 /// Numbers of points of a cell and of independent draws.
 #[derive(Clone, Copy, Debug)]
@@ -18,13 +17,8 @@ pub struct Samples {
 impl Samples {
     /// Three million points, or 110 000 in a quick run.
     pub fn new(options: &Options) -> Samples {
-        match options.quick {
-            true => Samples { draws: 8, side: 24 },
-            false => Samples {
-                draws: 24,
-                side: 50,
-            },
-        }
+        let (draws, side) = if options.quick { (8, 24) } else { (24, 50) };
+        Samples { draws, side }
     }
 
     /// Number of points of all draws.

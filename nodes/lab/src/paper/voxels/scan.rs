@@ -1,14 +1,12 @@
 //! Point clouds that are quantized: evenly spread, of simulated scanners, of files.
 
-use std::path::Path;
-
-use crate::simulate::house::{House, LaserOptions, LaserView};
-use crate::simulate::{RANGE_NOISE_M, Survey, SurveyPattern};
-
 use super::Options;
-use crate::AnyError;
 use crate::paper::streams::{Purpose, stream};
+use crate::simulate::house::{House, LaserView};
+use crate::simulate::{RANGE_NOISE_M, Survey, SurveyPattern};
+use crate::{AnyError, at};
 use lattice_nodes::files::points::{PointFileLimits, read_points};
+use std::path::Path;
 
 /// Points of a simulated scan.
 const POINTS: usize = 20_000;
@@ -69,7 +67,7 @@ fn uniform(options: &Options) -> Scan {
 /// A nodding laser scanner in a furnished house.
 fn room(options: &Options) -> Result<Scan, AnyError> {
     let house = House::generated(options.seed)?;
-    let pairs = LaserView::pairs(&house, 1, &LaserOptions::default(), options.seed)?;
+    let pairs = LaserView::pairs(&house, 1, options.seed)?;
     let [view, _] = pairs.first().ok_or("no place for a scanner in the house")?;
     let points = view.scan(RANGE_NOISE_M, options.seed, 0);
     Ok(Scan {
@@ -103,12 +101,10 @@ fn site(options: &Options) -> Result<Scan, AnyError> {
 }
 
 fn file(path: &Path, number: usize, options: &Options) -> Result<Scan, AnyError> {
-    let here = |e: &dyn std::fmt::Display| format!("{}: {e}", path.display());
-    let points_m = read_points(path, &PointFileLimits::default())
-        .map_err(|e| here(&e))?
-        .points_m;
+    let file = read_points(path, &PointFileLimits::default());
+    let points_m = file.map_err(at(path))?.points_m;
     if points_m.is_empty() {
-        return Err(here(&"no points").into());
+        return Err(at(path)("no points"));
     }
     // About the middle, so that single precision is enough.
     let mean = |axis: usize| {

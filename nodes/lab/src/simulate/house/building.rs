@@ -1,13 +1,11 @@
 //! The house: a labelled mesh at a pose in the map.
 
-use std::collections::BTreeMap;
-
-use nalgebra::{Isometry3, Point3, Vector3};
-
 use super::free_space::FreeSpace;
 use super::regions::{Region, Regions};
 use crate::AnyError;
 use crate::mesh::{LabelledMesh, MeshScene};
+use nalgebra::{Isometry3, Point3, Vector3};
+use std::collections::BTreeMap;
 
 /// Longest house, metres.
 const MAX_SIZE_M: f64 = 200.0;
@@ -17,11 +15,8 @@ const STRUCTURAL: [&str; 3] = ["wall", "floor", "ceiling"];
 /// The first surface that a ray hits.
 #[derive(Clone, Copy, PartialEq, Debug)]
 pub struct SurfaceHit {
-    /// Distance from the origin of the ray, metres.
     pub distance_m: f64,
-    /// Number of the triangle in the mesh.
     pub triangle: usize,
-    /// Number of the region, see [`House::regions`].
     pub region: u16,
 }
 

@@ -1,10 +1,9 @@
 //! A pinhole camera in the house, and its image of regions.
 
-use nalgebra::{Isometry3, Point3, Translation3, UnitQuaternion, Vector3};
-
 use super::House;
 use super::regions::NO_REGION;
 use crate::simulate::random::Stream;
+use nalgebra::{Isometry3, Point3, Translation3, UnitQuaternion, Vector3};
 
 /// Width and height in pixels and the tangent of half the horizontal field of view.
 #[derive(Clone, Copy, PartialEq, Debug)]

@@ -1,9 +1,8 @@
 //! Free floor of a house, to stand on.
 
-use nalgebra::{Point3, Vector3};
-
 use crate::AnyError;
 use crate::mesh::{LabelledMesh, MeshScene};
+use nalgebra::{Point3, Vector3};
 
 /// Side of a cell of the floor plan, metres.
 const CELL_M: f64 = 0.125;

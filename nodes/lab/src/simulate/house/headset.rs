@@ -1,7 +1,5 @@
 //! The view of a headset on a scene, on its own mesh and in its own frame.
 
-use nalgebra::{Isometry3, Point3, Translation3, UnitQuaternion, Vector3};
-
 use super::camera::{Camera, Image, looking};
 use super::headset_mesh::{DepthView, Volume};
 use super::scenes::{self, Stand};
@@ -11,6 +9,7 @@ use crate::AnyError;
 use crate::mesh::{LabelledMesh, MeshScene};
 use crate::options::within;
 use crate::simulate::random::{Purpose, Stream};
+use nalgebra::{Isometry3, Point3, Translation3, UnitQuaternion, Vector3};
 
 /// Depth views fused for each headset scan, their pixels, field of view and noise.
 const DEPTH_VIEWS: usize = 8;
@@ -22,53 +21,23 @@ const STROLL_M: f64 = 0.9;
 /// The mesh reaches beyond the picture by this, metres.
 const MARGIN_M: f64 = 0.25;
 
-/// Options of a headset. The default is one headset scan of a HoloLens: its camera of 48 degrees.
-#[derive(Clone, Copy, PartialEq, Debug)]
-pub struct HeadsetOptions {
-    /// Number of headset scans from the place, 1 to 6: the second is turned to one side, the third to the other.
-    pub headset_scans: usize,
-    /// Pixels in a row.
-    pub width: usize,
-    /// Rows.
-    pub height: usize,
-    /// Horizontal field of view, degrees.
-    pub hfov_deg: f64,
-    /// Height of the eyes above the floor, metres.
-    pub eye_height_m: f64,
-    /// Greatest distance of the mesh, metres.
-    pub max_range_m: f64,
-    /// Side of a voxel of the headset's mesh, metres; 0.06 to 0.09 by the seed if `None`.
-    pub voxel_m: Option<f64>,
-    /// Most that the mesh is shifted along each axis, slowly over space, metres.
-    pub warp_m: f64,
-    /// Standard deviation of the scale of distances from the headset; never beyond 1 %.
-    pub scale_sigma: f64,
-    /// Most that the headset's vertical is off, degrees.
-    pub tilt_deg: f64,
-    /// Wavering of the boundaries of labels in the image, pixels.
-    pub bleed_px: f64,
-    /// Least and greatest turn of further headset scans, degrees; drawn by the seed.
-    pub turn_deg: [f64; 2],
-}
-
-impl Default for HeadsetOptions {
-    fn default() -> HeadsetOptions {
-        HeadsetOptions {
-            headset_scans: 1,
-            width: 144,
-            height: 81,
-            hfov_deg: 48.0,
-            eye_height_m: 1.62,
-            max_range_m: 4.2,
-            voxel_m: None,
-            warp_m: 0.012,
-            scale_sigma: 0.004,
-            tilt_deg: 0.5,
-            bleed_px: 2.0,
-            turn_deg: [60.0, 90.0],
-        }
-    }
-}
+/// The camera of a HoloLens: pixels in a row, rows, horizontal field of view.
+const PIXELS: [usize; 2] = [144, 81];
+const HFOV_DEG: f64 = 48.0;
+/// Height of the eyes above the floor, metres.
+const EYE_HEIGHT_M: f64 = 1.62;
+/// Greatest distance of the mesh, metres.
+const MAX_RANGE_M: f64 = 4.2;
+/// Most that the mesh is shifted along each axis, slowly over space, metres.
+const WARP_M: f64 = 0.012;
+/// Standard deviation of the scale of distances from the headset; never beyond 1 %.
+const SCALE_SIGMA: f64 = 0.004;
+/// Most that the headset's vertical is off, degrees.
+const TILT_DEG: f64 = 0.5;
+/// Wavering of the boundaries of labels in the image, pixels.
+const BLEED_PX: f64 = 2.0;
+/// Least and greatest turn of further headset scans, degrees; drawn by the seed.
+const TURN_DEG: [f64; 2] = [60.0, 90.0];
 
 /// The labelled points of one picture.
 #[derive(Clone, PartialEq, Debug)]
@@ -103,32 +72,34 @@ pub struct HeadsetTrial {
 
 impl HeadsetTrial {
     /// Stands before the object of a scene and looks at it; single-threaded, by the seed alone.
+    ///
+    /// Of 1 to 6 headset scans the second is turned to one side, the third to the other.
     pub fn new(
         house: &House,
         scene: Scene,
-        options: &HeadsetOptions,
+        headset_scans: usize,
         seed: u64,
     ) -> Result<HeadsetTrial, AnyError> {
-        within("headset_scans", options.headset_scans as f64, 1.0, 6.0)?;
-        let stand = scenes::stand(house, scene, options.eye_height_m, seed)?;
+        within("headset_scans", headset_scans as f64, 1.0, 6.0)?;
+        let stand = scenes::stand(house, scene, EYE_HEIGHT_M, seed)?;
         let lane = scene as u64;
         let mut stream = Stream::new(seed, Purpose::HeadsetFrame, 0, lane);
-        let voxel_m = options.voxel_m.unwrap_or(0.06 + 0.03 * stream.uniform());
-        let scale = 1.0 + (options.scale_sigma * stream.normal()).clamp(-0.01, 0.01);
-        let house_from_headset = frame(house, &stand, options, &mut stream);
-        let poses = poses(house, &stand, options, &mut stream);
-        let eye_m = house.free.above_m(stand.cell_m, options.eye_height_m);
-        let warp = Warp::new(options.warp_m, scale, eye_m, &mut stream);
-        let camera = Camera::new(options.width, options.height, options.hfov_deg);
+        let voxel_m = 0.06 + 0.03 * stream.uniform();
+        let scale = 1.0 + (SCALE_SIGMA * stream.normal()).clamp(-0.01, 0.01);
+        let house_from_headset = frame(house, &stand, &mut stream);
+        let poses = poses(house, &stand, headset_scans, &mut stream);
+        let eye_m = house.free.above_m(stand.cell_m, EYE_HEIGHT_M);
+        let warp = Warp::new(WARP_M, scale, eye_m, &mut stream);
+        let [width, height] = PIXELS;
+        let camera = Camera::new(width, height, HFOV_DEG);
 
-        let views = depth_views(house, &stand, &poses, options, seed, lane);
-        let (low_m, high_m) = reach_m(house, &poses, &camera, options.max_range_m);
+        let views = depth_views(house, &stand, &poses, seed, lane);
+        let (low_m, high_m) = reach_m(house, &poses, &camera);
         let volume = Volume::new(low_m, high_m, voxel_m)?;
         let cameras: Vec<_> = poses.iter().map(Isometry3::inverse).collect();
         let wanted = |point_m: &Point3<f64>| {
-            cameras
-                .iter()
-                .any(|c| near_picture(&camera, &(c * point_m), options.max_range_m))
+            let mut cameras = cameras.iter();
+            cameras.any(|c| near_picture(&camera, &(c * point_m)))
         };
         let mesh = volume.fuse(&views, wanted, &warp)?;
         let mesh_scene = MeshScene::new_fast(&mesh)?;
@@ -136,16 +107,9 @@ impl HeadsetTrial {
         let headset_scan = |(number, pose): (usize, &Isometry3<f64>)| {
             let index = lane * 64 + number as u64;
             let mut stream = Stream::new(seed, Purpose::HeadsetScan, 0, index);
-            let image = Image::take(house, pose, camera, 4.0 * options.max_range_m);
-            let regions = image.bled(options.bleed_px, &mut stream);
-            look(
-                &mesh_scene,
-                pose,
-                camera,
-                &regions,
-                options,
-                &headset_from_house,
-            )
+            let image = Image::take(house, pose, camera, 4.0 * MAX_RANGE_M);
+            let regions = image.bled(BLEED_PX, &mut stream);
+            look(&mesh_scene, pose, camera, &regions, &headset_from_house)
         };
         Ok(HeadsetTrial {
             scene,
@@ -160,21 +124,16 @@ impl HeadsetTrial {
 }
 
 /// Pose at which the app was started: some metres away at any heading, nearly upright.
-fn frame(
-    house: &House,
-    stand: &Stand,
-    options: &HeadsetOptions,
-    stream: &mut Stream,
-) -> Isometry3<f64> {
+fn frame(house: &House, stand: &Stand, stream: &mut Stream) -> Isometry3<f64> {
     let [x, y] = stand.cell_m;
     let far = |cell: &&[f64; 2]| (1.5..6.0).contains(&(cell[0] - x).hypot(cell[1] - y));
     let cells: Vec<[f64; 2]> = house.free.cells_m.iter().filter(far).copied().collect();
     let choice = (stream.uniform() * cells.len() as f64) as usize;
     let cell_m = cells.get(choice).copied().unwrap_or(stand.cell_m);
-    let height_m = options.eye_height_m + 0.05 * (2.0 * stream.uniform() - 1.0);
+    let height_m = EYE_HEIGHT_M + 0.05 * (2.0 * stream.uniform() - 1.0);
     let yaw = std::f64::consts::TAU * stream.uniform();
     let axis = std::f64::consts::TAU * stream.uniform();
-    let tilt = options.tilt_deg.to_radians() * stream.uniform();
+    let tilt = TILT_DEG.to_radians() * stream.uniform();
     let tilt = Vector3::new(axis.cos(), axis.sin(), 0.0) * tilt;
     let rotation = UnitQuaternion::from_axis_angle(&Vector3::z_axis(), yaw)
         * UnitQuaternion::from_scaled_axis(tilt);
@@ -186,10 +145,10 @@ fn frame(
 fn poses(
     house: &House,
     stand: &Stand,
-    options: &HeadsetOptions,
+    headset_scans: usize,
     stream: &mut Stream,
 ) -> Vec<Isometry3<f64>> {
-    let eye_m = house.free.above_m(stand.cell_m, options.eye_height_m);
+    let eye_m = house.free.above_m(stand.cell_m, EYE_HEIGHT_M);
     let ray = stand.target_m - eye_m;
     let jitter =
         |stream: &mut Stream, degrees: f64| (degrees * (2.0 * stream.uniform() - 1.0)).to_radians();
@@ -197,8 +156,8 @@ fn poses(
     let pitch = ray.z.atan2(ray.x.hypot(ray.y)) + jitter(stream, 3.0);
     let mut poses = vec![looking(eye_m, yaw, pitch)];
     let side = if stream.uniform() < 0.5 { -1.0 } else { 1.0 };
-    for number in 1..options.headset_scans {
-        let [low, high] = options.turn_deg;
+    for number in 1..headset_scans {
+        let [low, high] = TURN_DEG;
         let turn = (low + (high - low) * stream.uniform()).to_radians();
         let times = number.div_ceil(2) as f64;
         let side = if number % 2 == 1 { side } else { -side };
@@ -214,7 +173,6 @@ fn depth_views(
     house: &House,
     stand: &Stand,
     poses: &[Isometry3<f64>],
-    options: &HeadsetOptions,
     seed: u64,
     lane: u64,
 ) -> Vec<DepthView> {
@@ -233,7 +191,7 @@ fn depth_views(
         let first = number % DEPTH_VIEWS == 0;
         let choice = (between(0.0, 1.0) * cells.len() as f64) as usize;
         let cell_m = cells.get(choice).copied().filter(|_| !first);
-        let height_m = options.eye_height_m + between(-0.2, 0.1);
+        let height_m = EYE_HEIGHT_M + between(-0.2, 0.1);
         let forward = pose.rotation * Vector3::x();
         let mut yaw = forward.y.atan2(forward.x);
         let mut pitch = forward.z.asin();
@@ -243,7 +201,7 @@ fn depth_views(
         }
         let place = cell_m.unwrap_or(stand.cell_m);
         let house_from_camera = looking(house.free.above_m(place, height_m), yaw, pitch);
-        let depths_m = depths_m(house, &house_from_camera, camera, options, &mut stream);
+        let depths_m = depths_m(house, &house_from_camera, camera, &mut stream);
         views.push(DepthView {
             house_from_camera,
             image: Image {
@@ -260,7 +218,6 @@ fn depths_m(
     house: &House,
     house_from_camera: &Isometry3<f64>,
     camera: Camera,
-    options: &HeadsetOptions,
     stream: &mut Stream,
 ) -> Vec<f64> {
     let origin_m = Point3::from(house_from_camera.translation.vector);
@@ -268,25 +225,20 @@ fn depths_m(
         let ray = camera.direction(pixel);
         let noise_m = DEPTH_NOISE_M * stream.normal();
         let direction = house_from_camera.rotation * ray;
-        let hit_m = house.depth_m(&origin_m, &direction, options.max_range_m + 0.5);
+        let hit_m = house.depth_m(&origin_m, &direction, MAX_RANGE_M + 0.5);
         hit_m.map_or(f64::INFINITY, |hit_m| hit_m / ray.norm() + noise_m)
     };
     (0..camera.pixels()).map(depth).collect()
 }
 
 /// The box about all pictures, cut to the house, with some margin, house frame, metres.
-fn reach_m(
-    house: &House,
-    poses: &[Isometry3<f64>],
-    camera: &Camera,
-    range_m: f64,
-) -> (Point3<f64>, Point3<f64>) {
+fn reach_m(house: &House, poses: &[Isometry3<f64>], camera: &Camera) -> (Point3<f64>, Point3<f64>) {
     let mut low_m = Point3::from([f64::INFINITY; 3]);
     let mut high_m = Point3::from([f64::NEG_INFINITY; 3]);
     let last = camera.pixels() - 1;
     let corners = [0, camera.width - 1, last + 1 - camera.width, last];
     for pose in poses {
-        let rays = corners.map(|corner| camera.direction(corner) * range_m);
+        let rays = corners.map(|corner| camera.direction(corner) * MAX_RANGE_M);
         for end in rays.into_iter().chain([Vector3::zeros()]) {
             let end = pose * Point3::from(end);
             low_m = low_m.inf(&end);
@@ -304,11 +256,11 @@ fn reach_m(
 }
 
 /// True of a point in the camera's frame that is in the picture or near its edge.
-fn near_picture(camera: &Camera, in_camera: &Point3<f64>, range_m: f64) -> bool {
+fn near_picture(camera: &Camera, in_camera: &Point3<f64>) -> bool {
     let depth_m = in_camera.x;
     let up = camera.tan_half * camera.height as f64 / camera.width as f64;
     depth_m > 0.0
-        && depth_m < range_m
+        && depth_m < MAX_RANGE_M
         && in_camera.y.abs() < camera.tan_half * depth_m + MARGIN_M
         && in_camera.z.abs() < up * depth_m + MARGIN_M
 }
@@ -319,7 +271,6 @@ fn look(
     pose: &Isometry3<f64>,
     camera: Camera,
     regions: &[u16],
-    options: &HeadsetOptions,
     headset_from_house: &Isometry3<f64>,
 ) -> HouseScan {
     let origin_m = Point3::from(pose.translation.vector);
@@ -330,7 +281,7 @@ fn look(
     };
     for (pixel, region) in regions.iter().enumerate() {
         let direction = (pose.rotation * camera.direction(pixel)).normalize();
-        if let Some(hit) = mesh.cast(&origin_m, &direction, options.max_range_m) {
+        if let Some(hit) = mesh.cast(&origin_m, &direction, MAX_RANGE_M) {
             let point_m = origin_m + direction * hit.distance_m;
             headset_scan.points_m.push(headset_from_house * point_m);
             headset_scan.regions.push(*region);

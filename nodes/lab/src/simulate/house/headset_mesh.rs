@@ -1,15 +1,14 @@
 //! The mesh that a headset makes of its surroundings: a truncated signed distance (Curless & Levoy
 //! 1996) of depth views on coarse voxels, and the surface in it.
 
-use fast_surface_nets::ndshape::{RuntimeShape, Shape};
-use fast_surface_nets::{SurfaceNetsBuffer, surface_nets};
-use nalgebra::{Isometry3, Point3, Vector3};
-
 use super::camera::Image;
 use super::warp::Warp;
 use crate::AnyError;
 use crate::mesh::LabelledMesh;
 use crate::options::within;
+use fast_surface_nets::ndshape::{RuntimeShape, Shape};
+use fast_surface_nets::{SurfaceNetsBuffer, surface_nets};
+use nalgebra::{Isometry3, Point3, Vector3};
 
 /// Truncation of the distance in voxels.
 const TRUNCATION_VOXELS: f64 = 2.5;

@@ -1,48 +1,26 @@
 //! A laser scanner that stands in the house and looks all around.
 
-use std::f64::consts::TAU;
-
-use nalgebra::{Isometry3, Point3, Vector3};
-use rayon::prelude::*;
-
 use super::House;
 use super::free_space::NO_FREE_SPACE;
 use crate::AnyError;
 use crate::simulate::random::{Purpose, Stream};
+use nalgebra::{Isometry3, Point3, Vector3};
+use rayon::prelude::*;
+use std::f64::consts::TAU;
 
-/// Options of a scanner and of the distance of its two stands.
-#[derive(Clone, Copy, PartialEq, Debug)]
-pub struct LaserOptions {
-    /// Directions all around.
-    pub columns: usize,
-    /// Directions up and down.
-    pub rows: usize,
-    /// Elevation of the outermost rows, degrees.
-    pub elevation_deg: f64,
-    /// Height above the floor, metres.
-    pub height_m: f64,
-    /// Farthest return, metres.
-    pub max_range_m: f64,
-    /// Least and greatest distance between the stands of a pair, metres.
-    pub apart_m: [f64; 2],
-    /// Largest turn of the heading within a pair, degrees.
-    pub turn_deg: f64,
-}
-
-impl Default for LaserOptions {
-    /// A nodding scanner on a robot that stops every half metre or so.
-    fn default() -> LaserOptions {
-        LaserOptions {
-            columns: 480,
-            rows: 96,
-            elevation_deg: 45.0,
-            height_m: 1.0,
-            max_range_m: 30.0,
-            apart_m: [0.4, 0.9],
-            turn_deg: 30.0,
-        }
-    }
-}
+/// Directions all around, and up and down: a nodding scanner on a robot that stops every half metre or so.
+const COLUMNS: usize = 480;
+const ROWS: usize = 96;
+/// Elevation of the outermost rows, degrees.
+const ELEVATION_DEG: f64 = 45.0;
+/// Height above the floor, metres.
+const HEIGHT_M: f64 = 1.0;
+/// Farthest return, metres.
+const MAX_RANGE_M: f64 = 30.0;
+/// Distances between the stands of a pair, metres.
+const APART_M: std::ops::RangeInclusive<f64> = 0.4..=0.9;
+/// Largest turn of the heading within a pair, degrees.
+const TURN_DEG: f64 = 30.0;
 
 /// A scanner's view from a stand, without errors.
 #[derive(Clone, PartialEq, Debug)]
@@ -55,24 +33,20 @@ pub struct LaserView {
 
 impl LaserView {
     /// Looks around from a pose in the house; the x axis of the scanner is forward, z up.
-    pub fn new(
-        house: &House,
-        house_from_laser: &Isometry3<f64>,
-        options: &LaserOptions,
-    ) -> LaserView {
+    fn new(house: &House, house_from_laser: &Isometry3<f64>) -> LaserView {
         let origin_m = Point3::from(house_from_laser.translation.vector);
         let ray = |number: usize| {
-            let (column, row) = (number / options.rows, number % options.rows);
-            let azimuth = TAU * column as f64 / options.columns as f64;
-            let height = 2.0 * (row as f64 + 0.5) / options.rows as f64 - 1.0;
-            let elevation = (options.elevation_deg * height).to_radians();
+            let (column, row) = (number / ROWS, number % ROWS);
+            let azimuth = TAU * column as f64 / COLUMNS as f64;
+            let height = 2.0 * (row as f64 + 0.5) / ROWS as f64 - 1.0;
+            let elevation = (ELEVATION_DEG * height).to_radians();
             let ((sin, cos), (up, along)) = (azimuth.sin_cos(), elevation.sin_cos());
             let ray = Vector3::new(cos * along, sin * along, up);
             let direction = house_from_laser.rotation * ray;
-            let range_m = house.depth_m(&origin_m, &direction, options.max_range_m)?;
+            let range_m = house.depth_m(&origin_m, &direction, MAX_RANGE_M)?;
             Some((ray, range_m))
         };
-        let rays = (0..options.columns * options.rows).into_par_iter();
+        let rays = (0..COLUMNS * ROWS).into_par_iter();
         LaserView {
             house_from_laser: *house_from_laser,
             rays: rays.filter_map(ray).collect(),
@@ -80,27 +54,22 @@ impl LaserView {
     }
 
     /// Views from pairs of stands all over the house, both of a pair in sight of each other.
-    pub fn pairs(
-        house: &House,
-        pairs: usize,
-        options: &LaserOptions,
-        seed: u64,
-    ) -> Result<Vec<[LaserView; 2]>, AnyError> {
+    pub fn pairs(house: &House, pairs: usize, seed: u64) -> Result<Vec<[LaserView; 2]>, AnyError> {
         let mut stream = Stream::new(seed, Purpose::LaserStand, 0, 0);
         let firsts = house.free.spread_m(pairs, || stream.uniform());
         let pair = |first_m: [f64; 2]| {
             let yaw = TAU * stream.uniform();
-            let turn = (options.turn_deg * (2.0 * stream.uniform() - 1.0)).to_radians();
-            let from = house.free.above_m(first_m, options.height_m);
+            let turn = (TURN_DEG * (2.0 * stream.uniform() - 1.0)).to_radians();
+            let from = house.free.above_m(first_m, HEIGHT_M);
             let seconds: Vec<Point3<f64>> = (house.free.cells_m.iter())
-                .map(|&cell| house.free.above_m(cell, options.height_m))
-                .filter(|to| in_reach(house, &from, to, options.apart_m))
+                .map(|&cell| house.free.above_m(cell, HEIGHT_M))
+                .filter(|to| in_reach(house, &from, to))
                 .collect();
             let drawn = (stream.uniform() * seconds.len() as f64) as usize;
             let to = seconds.get(drawn)?;
             let first = super::camera::looking(from, yaw, 0.0);
             let second = super::camera::looking(*to, yaw + turn, 0.0);
-            let view = |pose| LaserView::new(house, &pose, options);
+            let view = |pose| LaserView::new(house, &pose);
             Some([view(first), view(second)])
         };
         let made: Vec<_> = firsts.into_iter().filter_map(pair).collect();
@@ -122,11 +91,10 @@ impl LaserView {
     }
 }
 
-fn in_reach(house: &House, from: &Point3<f64>, to: &Point3<f64>, apart_m: [f64; 2]) -> bool {
+fn in_reach(house: &House, from: &Point3<f64>, to: &Point3<f64>) -> bool {
     let way = to - from;
     let apart = way.norm();
-    let [least, most] = apart_m;
-    (least..=most).contains(&apart) && house.depth_m(from, &way, apart).is_none()
+    APART_M.contains(&apart) && house.depth_m(from, &way, apart).is_none()
 }
 
 #[cfg(test)]
@@ -136,13 +104,8 @@ mod tests {
     #[test]
     fn scans_of_a_pair_show_one_place() {
         let house = House::generated(3).unwrap();
-        let options = LaserOptions {
-            columns: 90,
-            rows: 20,
-            ..LaserOptions::default()
-        };
-        let pairs = LaserView::pairs(&house, 5, &options, 4).unwrap();
-        assert_eq!(pairs, LaserView::pairs(&house, 5, &options, 4).unwrap());
+        let pairs = LaserView::pairs(&house, 5, 4).unwrap();
+        assert_eq!(pairs, LaserView::pairs(&house, 5, 4).unwrap());
         assert_eq!(pairs.len(), 5);
         for (number, [first, second]) in (0..).zip(&pairs) {
             let between = first.house_from_laser.inverse() * second.house_from_laser;
@@ -150,7 +113,7 @@ mod tests {
             assert!((0.4..=0.9).contains(&apart) && between.rotation.angle() <= 0.53);
             for view in [first, second] {
                 let exact = view.scan(0.0, 1, number);
-                assert_eq!(exact.len(), 90 * 20);
+                assert_eq!(exact.len(), COLUMNS * ROWS);
                 for p in exact.iter().step_by(7) {
                     let p = view.house_from_laser * Point3::from(p.map(f64::from));
                     assert!((-0.2..20.2).contains(&p.x) && (-0.2..12.2).contains(&p.y));

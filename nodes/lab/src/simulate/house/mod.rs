@@ -25,11 +25,11 @@ mod survey_map;
 mod tests;
 mod warp;
 
-pub use building::{House, SurfaceHit};
-pub use headset::{HeadsetOptions, HeadsetTrial, HouseScan};
+pub use building::House;
+pub use headset::HeadsetTrial;
+pub(crate) use headset::HouseScan;
 pub use labels::{LabelDraw, RegionLabels};
-pub use laser::{LaserOptions, LaserView};
-pub use regions::{NO_REGION, Region};
+pub(crate) use laser::LaserView;
 pub use robot::{Survey, SurveyOptions};
 pub use scenes::Scene;
 pub use survey_map::SurveyMap;

@@ -1,9 +1,8 @@
 //! Regions that a segmenter sees as one: pieces of furniture, and patches of walls, floors and ceilings.
 
-use std::collections::BTreeMap;
-
 use crate::AnyError;
 use crate::mesh::LabelledMesh;
+use std::collections::BTreeMap;
 
 /// Region of a point of which nothing is known.
 pub const NO_REGION: u16 = u16::MAX;
@@ -18,9 +17,7 @@ const MAX_PATCHES: f64 = 48.0;
 /// A region that a segmenter gets wrong as a whole: one thing, or a patch of a structural one.
 #[derive(Clone, Copy, PartialEq, Eq, Debug)]
 pub struct Region {
-    /// The true class.
     pub label: u16,
-    /// Instance of the mesh.
     pub instance: u16,
 }
 

@@ -1,8 +1,5 @@
 //! The survey of a robot with a depth camera on a walk through the house.
 
-use nalgebra::{Isometry3, Point3, Translation3, UnitQuaternion, Vector3};
-use rayon::prelude::*;
-
 use super::House;
 use super::camera::{Camera, Image, looking};
 use super::regions::NO_REGION;
@@ -10,11 +7,13 @@ use crate::AnyError;
 use crate::options::within;
 use crate::simulate::random::{Purpose, Stream};
 use lattice_core::cloud::Cloud;
+use nalgebra::{Isometry3, Point3, Translation3, UnitQuaternion, Vector3};
+use rayon::prelude::*;
 
 /// Views from one place.
 const VIEWS_A_STOP: usize = 8;
 
-/// Options of the robot's survey. The default is an Asus Xtion at 1 m.
+/// Options of the robot's survey.
 #[derive(Clone, Copy, PartialEq, Debug)]
 pub struct SurveyOptions {
     /// Number of views, eight from each stop.
@@ -23,20 +22,6 @@ pub struct SurveyOptions {
     pub width: usize,
     /// Rows.
     pub height: usize,
-    /// Horizontal field of view, degrees.
-    pub hfov_deg: f64,
-    /// Height of the camera above the floor, metres.
-    pub height_m: f64,
-    /// Least depth that is measured, metres.
-    pub min_range_m: f64,
-    /// Greatest depth that is measured, metres.
-    pub max_range_m: f64,
-    /// Standard deviation of the measured position of a view, each axis, metres.
-    pub position_noise_m: f64,
-    /// Standard deviation of its measured rotation, each axis, degrees.
-    pub rotation_noise_deg: f64,
-    /// Wavering of the boundaries of labels in the image, pixels.
-    pub bleed_px: f64,
 }
 
 impl Default for SurveyOptions {
@@ -45,16 +30,21 @@ impl Default for SurveyOptions {
             views: 384,
             width: 96,
             height: 72,
-            hfov_deg: 58.0,
-            height_m: 1.0,
-            min_range_m: 0.4,
-            max_range_m: 4.5,
-            position_noise_m: 0.008,
-            rotation_noise_deg: 0.15,
-            bleed_px: 1.0,
         }
     }
 }
+
+/// Horizontal field of view of an Asus Xtion, degrees.
+const HFOV_DEG: f64 = 58.0;
+/// Height of the camera above the floor, metres.
+const HEIGHT_M: f64 = 1.0;
+/// Depths that are measured, metres.
+const RANGE_M: std::ops::RangeInclusive<f64> = 0.4..=4.5;
+/// Standard deviations of the measured position (metres) and rotation (degrees) of a view, each axis.
+const POSITION_NOISE_M: f64 = 0.008;
+const ROTATION_NOISE_DEG: f64 = 0.15;
+/// Wavering of the boundaries of labels in the image, pixels.
+const BLEED_PX: f64 = 1.0;
 
 /// Points in the map frame, each with its region.
 #[derive(Clone, PartialEq, Debug)]
@@ -120,16 +110,16 @@ fn view_from(
     let turn = (view % VIEWS_A_STOP) as f64 + stream.uniform();
     let yaw = turn * std::f64::consts::TAU / VIEWS_A_STOP as f64;
     let pitch = (-18.0 + 30.0 * stream.uniform()).to_radians();
-    let truth = looking(house.free.above_m(stop_m, options.height_m), yaw, pitch);
+    let truth = looking(house.free.above_m(stop_m, HEIGHT_M), yaw, pitch);
     let mut normal = |sigma: f64| Vector3::from_fn(|_, _| sigma * stream.normal());
     let error = Isometry3::from_parts(
-        Translation3::from(normal(options.position_noise_m)),
-        UnitQuaternion::from_scaled_axis(normal(options.rotation_noise_deg.to_radians())),
+        Translation3::from(normal(POSITION_NOISE_M)),
+        UnitQuaternion::from_scaled_axis(normal(ROTATION_NOISE_DEG.to_radians())),
     );
     let measured = truth * error;
-    let camera = Camera::new(options.width, options.height, options.hfov_deg);
-    let image = Image::take(house, &truth, camera, options.max_range_m * 2.5);
-    let regions = image.bled(options.bleed_px, &mut stream);
+    let camera = Camera::new(options.width, options.height, HFOV_DEG);
+    let image = Image::take(house, &truth, camera, RANGE_M.end() * 2.5);
+    let regions = image.bled(BLEED_PX, &mut stream);
     let map_from_house = house.map_from_house();
     let mut made = View {
         offsets_m: Vec::with_capacity(camera.pixels()),
@@ -138,7 +128,7 @@ fn view_from(
     };
     for (pixel, (depth_m, region)) in image.depths_m.iter().zip(regions).enumerate() {
         let noise = stream.normal();
-        let seen = (options.min_range_m..=options.max_range_m).contains(depth_m);
+        let seen = RANGE_M.contains(depth_m);
         if !seen || region == NO_REGION {
             continue;
         }

@@ -1,11 +1,10 @@
 //! The four scenes of the paper: what is looked at, and from where.
 
-use nalgebra::{Point3, Vector3};
-
 use super::House;
 use super::regions::Thing;
 use crate::AnyError;
 use crate::simulate::random::{Purpose, Stream};
+use nalgebra::{Point3, Vector3};
 
 /// Distances of a stand from the object, metres; the second is tried when nothing is found.
 const DISTANCES_M: [[f64; 2]; 2] = [[1.8, 3.2], [1.0, 4.5]];

@@ -1,12 +1,11 @@
 //! The robot's map of a survey, whose labels can be changed without another survey.
 
-use nalgebra::{Point3, Vector3};
-
 use super::{RegionLabels, Survey};
 use crate::AnyError;
 use lattice_core::lattice::Lattice;
 use lattice_core::registration::SemanticCloud;
 use lattice_core::voxels::{Payload, VoxelList};
+use nalgebra::{Point3, Vector3};
 
 /// The voxels of a survey, each with its centroid and how many points of which region are in it.
 #[derive(Clone, Debug)]

@@ -1,8 +1,7 @@
 //! Smooth errors in the shape of a headset's mesh.
 
-use nalgebra::{Point3, Vector3};
-
 use crate::simulate::random::Stream;
+use nalgebra::{Point3, Vector3};
 
 /// Waves a coordinate is shifted by.
 const WAVES: usize = 3;

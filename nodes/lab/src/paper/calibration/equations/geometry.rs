@@ -1,19 +1,17 @@
 //! Eqs. (1) to (4): ICP and GICP-SE(3).
 
-use lattice_core::registration::{
-    PrepareOptions, PreparedCloud, RegisterOptions, SemanticCloud, register,
-};
-use nalgebra::{Isometry3, Point3, Vector3};
-use plotters::prelude::*;
-
 use super::literal::{self, Pair};
 use super::{Bench, GATE_M, Slip, slips};
 use crate::AnyError;
 use crate::evaluate::median;
-use crate::report::plot::{Area, Axes, Curve, Layout, curves, svg};
+use crate::report::plot::{Area, Curve, Layout, curves, svg};
 use crate::report::{Check, Figure, Section, Verdict};
+use lattice_core::registration::{
+    PrepareOptions, PreparedCloud, RegisterOptions, SemanticCloud, register,
+};
+use nalgebra::{Isometry3, Point3, Vector3};
+use plotters::style::RGBColor;
 
-/// Slips of this part.
 const SLIPS: [Slip; 4] = [
     [
         "section 2.2",
@@ -44,7 +42,6 @@ const SLIPS: [Slip; 4] = [
 /// Reach to each side, metres and radians.
 const REACH_M: f64 = 1.0;
 const REACH_RAD: f64 = 0.5;
-/// Steps to each side.
 const STEPS: i32 = 25;
 
 /// Costs of poses on a line through the truth, the place as a share of its reach from -1 to 1.
@@ -75,33 +72,26 @@ impl Line {
 pub(super) fn lines(bench: &Bench, cost: impl Fn(&Isometry3<f64>) -> f64) -> Vec<Line> {
     let truth = &bench.scenario.truth;
     let seen_m = truth * bench.scenario.pivot_m;
-    let eye_m = bench
-        .scenario
-        .headset_scans
-        .first()
-        .and_then(|headset_scan| headset_scan.sensor_m);
+    let scan = bench.scenario.headset_scans.first();
+    let eye_m = scan.and_then(|scan| scan.sensor_m);
     let sight = seen_m - truth * eye_m.unwrap_or(Point3::origin());
     let level = Vector3::new(sight.x, sight.y, 0.0);
     let along = level.try_normalize(0.0).unwrap_or_else(Vector3::x);
     let across = Vector3::z().cross(&along);
-    let line = |title, reach, pose: &dyn Fn(f64) -> Isometry3<f64>| Line {
-        title,
-        reach,
-        points: (-STEPS..=STEPS)
-            .map(|i| f64::from(i) / f64::from(STEPS))
-            .map(|at| (at, cost(&pose(at))))
-            .collect(),
+    let line = |title, reach, pose: &dyn Fn(f64) -> Isometry3<f64>| {
+        let places = (-STEPS..=STEPS).map(|i| f64::from(i) / f64::from(STEPS));
+        Line {
+            title,
+            reach,
+            points: places.map(|at| (at, cost(&pose(at * reach)))).collect(),
+        }
     };
+    let moved = |axis: Vector3<f64>| move |m| bench.off(axis * m, 0.0);
+    let turned = |rad| bench.off(Vector3::zeros(), rad);
     vec![
-        line("along the line of sight (m)", REACH_M, &|at| {
-            bench.off(along * (at * REACH_M), 0.0)
-        }),
-        line("across it (m)", REACH_M, &|at| {
-            bench.off(across * (at * REACH_M), 0.0)
-        }),
-        line("about the vertical (rad)", REACH_RAD, &|at| {
-            bench.off(Vector3::zeros(), at * REACH_RAD)
-        }),
+        line("along the line of sight (m)", REACH_M, &moved(along)),
+        line("across it (m)", REACH_M, &moved(across)),
+        line("about the vertical (rad)", REACH_RAD, &turned),
     ]
 }
 
@@ -109,22 +99,12 @@ pub(super) fn lines(bench: &Bench, cost: impl Fn(&Isometry3<f64>) -> f64) -> Vec
 pub(super) fn ends(name: &str, lines: &[Line]) -> Vec<Check> {
     let mut checks = Vec::new();
     for line in lines {
-        checks.push(Check::new(
-            // The headset's mesh is off by centimetres.
-            format!("argmin of {name} {}", line.title),
-            0.0,
-            line.least_at(),
-            0.08,
-        ));
-        checks.push(Check::new(
-            format!(
-                "argmax of {name} {}: share of the way to the end that was tried",
-                line.title
-            ),
-            1.0,
-            line.most_at(),
-            0.15,
-        ));
+        // The headset's mesh is off by centimetres.
+        let what = format!("argmin of {name} {}", line.title);
+        checks.push(Check::new(what, 0.0, line.least_at(), 0.08));
+        let what = "share of the way to the end that was tried";
+        let what = format!("argmax of {name} {}: {what}", line.title);
+        checks.push(Check::new(what, 1.0, line.most_at(), 0.15));
     }
     checks
 }
@@ -136,18 +116,9 @@ pub(super) fn figure(
     key: &[(RGBColor, &str)],
     functions: &[Vec<Line>],
 ) -> Result<Figure, AnyError> {
-    let layout = Layout {
-        panel: (330, 290),
-        columns: 3,
-        rows: 1,
-        key_width: 210,
-        key,
-    };
+    let layout = Layout::new((330, 290), [3, 1], 210, key);
     let relative = |line: &Line| -> Vec<(f64, f64)> {
-        let truth = line
-            .points
-            .get(STEPS as usize)
-            .map_or(1.0, |(_, cost)| *cost);
+        let truth = line.points.get(STEPS as usize).map_or(1.0, |p| p.1);
         let points = line.points.iter();
         points
             .map(|(at, cost)| (at * line.reach, cost / truth))
@@ -156,23 +127,14 @@ pub(super) fn figure(
     let draw = |areas: &[Area]| {
         for (panel, area) in areas.iter().enumerate() {
             let lines = functions.iter().filter_map(|lines| lines.get(panel));
-            let shown: Vec<Curve> = key
-                .iter()
-                .zip(lines.clone())
-                .map(|((color, _), line)| (*color, relative(line)))
-                .collect();
+            let shown = key.iter().zip(lines.clone());
+            let shown: Vec<Curve> = shown.map(|(key, line)| (key.0, relative(line))).collect();
             let most = shown.iter().flat_map(|(_, points)| points);
             let most = most.map(|(_, cost)| *cost).fold(1.0, f64::max);
             let first = lines.clone().next();
-            let reach = first.map_or(1.0, |line| line.reach);
-            let axes = Axes {
-                title: "",
-                x: first.map_or("", |line| line.title),
-                y: "cost, 1 at the truth",
-                xs: -reach..reach,
-                ys: 0.0..1.05 * most,
-            };
-            curves(area, &axes, &shown)?;
+            let (title, reach) = first.map_or(("", 1.0), |line| (line.title, line.reach));
+            let y = ("cost, 1 at the truth", 0.0..1.05 * most);
+            curves(area, "", (title, -reach..reach), y, &shown)?;
         }
         Ok(())
     };
@@ -214,19 +176,11 @@ pub(super) fn section(bench: &Bench) -> Result<Section, AnyError> {
             literal::gicp(&far, &start),
         ),
         slope_check(&far, &start),
-        Check::new(
-            "slope of rho at alpha^2",
-            0.5,
-            literal::rho_slope(literal::ALPHA.powi(2), literal::ALPHA),
-            1e-12,
-        ),
-        Check::new(
-            "gradient where argmin ends, as a share of that at the start",
-            0.0,
-            after / before,
-            0.01,
-        ),
     ];
+    let slope = literal::rho_slope(literal::ALPHA.powi(2), literal::ALPHA);
+    checks.push(Check::new("slope of rho at alpha^2", 0.5, slope, 1e-12));
+    let what = "gradient where argmin ends, as a share of that at the start";
+    checks.push(Check::new(what, 0.0, after / before, 0.01));
     checks.extend(ends("f_GICP", &lines));
     let [forth, back] = directions(bench);
     Ok(Section {
@@ -268,12 +222,9 @@ pub(super) fn relative(name: &str, found: f64, expected: f64) -> Check {
 pub(super) fn slope_check(pairs: &[Pair], pose: &Isometry3<f64>) -> Check {
     let analytic = literal::gradient(pairs, pose);
     let numeric = literal::numeric_gradient(pairs, pose);
-    Check::new(
-        "gradient on SE(3), by formula and by differences: share that is off",
-        0.0,
-        (analytic - numeric).norm() / analytic.norm(),
-        1e-6,
-    )
+    let off = (analytic - numeric).norm() / analytic.norm();
+    let what = "gradient on SE(3), by formula and by differences: share that is off";
+    Check::new(what, 0.0, off, 1e-6)
 }
 
 /// Eq. (2): a cloud and itself, moved.
@@ -289,15 +240,11 @@ fn known_motion(bench: &Bench) -> Result<Check, AnyError> {
     };
     let found = register(bench.source(), &moved, &Isometry3::identity(), &options);
     let found = found.target_from_source;
-    let apart = points_m
-        .iter()
-        .map(|p| nalgebra::distance(&(found * p), &(known * p)));
-    Ok(Check::new(
-        "eq. (2) with argmin: a view and itself moved by 5 mm, farthest point from where it belongs (m)",
-        0.0,
-        apart.fold(0.0, f64::max),
-        1e-6,
-    ))
+    let points = points_m.iter();
+    let apart = points.map(|p| nalgebra::distance(&(found * p), &(known * p)));
+    let apart_m = apart.fold(0.0, f64::max);
+    let what = "eq. (2) with argmin: a view and itself moved by 5 mm, farthest point from where it belongs (m)";
+    Ok(Check::new(what, 0.0, apart_m, 1e-6))
 }
 
 /// Median distances (m) of the nearest points at the truth: from headset to map, and from map to headset.

@@ -4,14 +4,13 @@ mod geometry;
 mod literal;
 mod semantic;
 
-use crate::simulate::house::Scene;
-use lattice_core::registration::PreparedCloud;
-use nalgebra::{Isometry3, Point3, Translation3, UnitQuaternion, Vector3};
-
 use super::Context;
 use crate::AnyError;
 use crate::evaluate::Scenario;
 use crate::report::{Cell, Section, Table};
+use crate::simulate::house::Scene;
+use lattice_core::registration::PreparedCloud;
+use nalgebra::{Isometry3, Point3, Translation3, UnitQuaternion, Vector3};
 
 /// A correspondence search reaches as far as that of the published programs, metres.
 const GATE_M: f64 = 15.811_388_300_841_896;
@@ -51,7 +50,6 @@ impl Bench {
     }
 }
 
-/// The sections of the equations.
 pub(super) fn sections(
     context: &Context,
     progress: &mut dyn FnMut(f64),
@@ -73,7 +71,7 @@ fn slips(name: &str, slips: &[Slip]) -> Table {
     Table::new(
         name,
         "What is printed, and what we take",
-        ["where", "printed", "what is wrong", "what we take"],
+        "where|printed|what is wrong|what we take",
         slips.iter().map(|slip| slip.map(Cell::from).into()),
     )
 }

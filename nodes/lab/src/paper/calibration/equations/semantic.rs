@@ -1,17 +1,17 @@
 //! Eqs. (5) to (8): Semantic-ICP.
 
-use crate::simulate::house::Scene;
-use lattice_core::registration::{LabelUse, RegisterOptions, SemanticVariant, register};
-use nalgebra::Vector3;
-use plotters::prelude::*;
-
 use super::geometry::{ends, figure, lines, relative, slope_check};
 use super::literal::{self, ALPHA, rho, rho_slope};
 use super::{Bench, Context, GATE_M, Slip, slips};
 use crate::AnyError;
 use crate::evaluate::{Bounds, WRONG, median};
-use crate::report::plot::{Area, Axes, Curve, Layout, curves, svg};
+use crate::metrics::PoseError;
+use crate::report::plot::{Area, Curve, Layout, curves, svg};
 use crate::report::{Cell, Check, Figure, Section, Table, Verdict};
+use crate::simulate::house::Scene;
+use lattice_core::registration::{LabelUse, RegisterOptions, SemanticVariant, register};
+use nalgebra::Vector3;
+use plotters::prelude::*;
 
 const SLIPS: [Slip; 5] = [
     [
@@ -139,69 +139,43 @@ fn inside_is_wider() -> Check {
             most = most.max((rho(w * x, ALPHA) / wide - 1.0).abs());
         }
     }
-    Check::new(
-        "rho_alpha(w x) and w rho_(alpha / sqrt w)(x): greatest share that is off",
-        0.0,
-        most,
-        1e-12,
-    )
+    let what = "rho_alpha(w x) and w rho_(alpha / sqrt w)(x): greatest share that is off";
+    Check::new(what, 0.0, most, 1e-12)
 }
 
 /// Pull of a far pair of a small weight, as a share of one of weight 1.
 fn far_pull(name: &str, expected: f64, pull: impl Fn(f64, f64) -> f64) -> Check {
+    let what =
+        format!("pull of a far pair with w = {LIGHT} as a share of one with w = 1, weight {name}");
     let afar = 1e8;
-    Check::new(
-        format!("pull of a far pair with w = {LIGHT} as a share of one with w = 1, weight {name}"),
-        expected,
-        pull(LIGHT, afar) / pull(1.0, afar),
-        1e-3,
-    )
+    Check::new(what, expected, pull(LIGHT, afar) / pull(1.0, afar), 1e-3)
 }
 
 /// The pull of a pair by its distance, for several weights.
 fn pulls() -> Result<Figure, AnyError> {
     let colors = [BLACK, RGBColor(0, 114, 178), RGBColor(213, 94, 0)];
     let weights = [1.0, 0.1, LIGHT];
-    let key: Vec<(RGBColor, &str)> = colors
-        .into_iter()
-        .zip(["w = 1", "w = 0.1", "w = 0.01"])
-        .collect();
-    let layout = Layout {
-        panel: (400, 300),
-        columns: 2,
-        rows: 1,
-        key_width: 110,
-        key: &key,
-    };
-    let axes = |title| Axes {
-        title,
-        x: "log10 of d^2",
-        y: "log10 of the slope by d^2",
-        xs: -1.0..6.0,
-        ys: -6.0..0.3,
-    };
+    let names = ["w = 1", "w = 0.1", "w = 0.01"];
+    let key: Vec<_> = colors.into_iter().zip(names).collect();
+    let layout = Layout::new((400, 300), [2, 1], 110, &key);
     let lines = |pull: fn(f64, f64) -> f64| -> Vec<Curve> {
         let line = |w: f64| {
-            (-20..=120)
-                .map(|i| f64::from(i) / 20.0)
-                .map(move |x| (x, pull(w, 10_f64.powf(x)).log10()))
+            let xs = (-20..=120).map(|i| f64::from(i) / 20.0);
+            xs.map(move |x| (x, pull(w, 10_f64.powf(x)).log10()))
         };
         let lines = colors.into_iter().zip(weights);
         lines.map(|(color, w)| (color, line(w).collect())).collect()
     };
+    let outside = lines(|w, x| w * rho_slope(x, ALPHA));
+    let inside = lines(|w, x| w * rho_slope(w * x, ALPHA));
+    let panels = [
+        ("outside: w rho(d^2)", outside),
+        ("inside, as printed: rho(w d^2)", inside),
+    ];
     let draw = |areas: &[Area]| {
-        let panels = [
-            (
-                axes("outside: w rho(d^2)"),
-                lines(|w, x| w * rho_slope(x, ALPHA)),
-            ),
-            (
-                axes("inside, as printed: rho(w d^2)"),
-                lines(|w, x| w * rho_slope(w * x, ALPHA)),
-            ),
-        ];
-        for (area, (axes, lines)) in areas.iter().zip(&panels) {
-            curves(area, axes, lines)?;
+        for (area, (title, lines)) in areas.iter().zip(&panels) {
+            let y = ("log10 of the slope by d^2", -6.0..0.3);
+            curves(area, title, ("log10 of d^2", -1.0..6.0), y, lines)?;
         }
         Ok(())
     };
@@ -212,37 +186,34 @@ fn pulls() -> Result<Figure, AnyError> {
     ))
 }
 
-/// A reading of the equations.
-struct Reading {
-    name: String,
-    options: RegisterOptions<'static>,
-}
-
-fn all_readings(labels: usize) -> Vec<Reading> {
+/// Readings of the equations with their names.
+fn all_readings(labels: usize) -> Vec<(String, RegisterOptions<'static>)> {
     let options = |variant| RegisterOptions::semantic(variant, LabelUse::Hard);
     let published = options(SemanticVariant::Published);
-    let with = |neighbors: usize, what: &str| Reading {
-        name: format!("weight outside, no density, N = {neighbors}{what}"),
-        options: RegisterOptions {
-            neighbors,
-            ..published
-        },
+    let with = |neighbors: usize, what: &str| {
+        let name = format!("weight outside, no density, N = {neighbors}{what}");
+        (
+            name,
+            RegisterOptions {
+                neighbors,
+                ..published
+            },
+        )
     };
+    let normalised = "normalised over candidates and outliers, N = 4, gate 1 m";
+    let semantic_em = RegisterOptions::semantic_em(1.0, LabelUse::Hard);
     vec![
-        Reading {
-            name: "as printed, N = 4".to_owned(),
-            options: options(SemanticVariant::AsPrinted),
-        },
+        (
+            "as printed, N = 4".to_owned(),
+            options(SemanticVariant::AsPrinted),
+        ),
         with(4, ", as published"),
         with(1, ""),
         match labels <= MOST {
             true => with(labels, ", the number of labels"),
             false => with(MOST, ", nearly the number of labels"),
         },
-        Reading {
-            name: "normalised over candidates and outliers, N = 4, gate 1 m".to_owned(),
-            options: RegisterOptions::semantic_em(1.0, LabelUse::Hard),
-        },
+        (normalised.to_owned(), semantic_em),
     ]
 }
 
@@ -263,51 +234,44 @@ fn readings(context: &Context) -> Result<(Table, usize), AnyError> {
             let bench = Bench { scenario };
             count += 1;
             let heading = 2.4 * (count as f64);
-            for (reading, errors) in readings.iter().zip(&mut errors) {
+            for ((_, options), errors) in readings.iter().zip(&mut errors) {
                 for ((m, deg), errors) in starts.iter().zip(errors) {
                     let moved = Vector3::new(heading.cos(), heading.sin(), 0.0) * *m;
                     let side = if count % 2 == 0 { 1.0_f64 } else { -1.0 };
                     let start = bench.off(moved, side * f64::to_radians(*deg));
-                    let found = register(bench.source(), bench.target(), &start, &reading.options);
+                    let found = register(bench.source(), bench.target(), &start, options);
                     let pose = found.target_from_source;
-                    let error = crate::metrics::PoseError::between(&pose, &bench.scenario.truth);
+                    let error = PoseError::between(&pose, &bench.scenario.truth);
                     errors.push((error, bench.seen_m(&pose)));
                 }
             }
         }
     }
     let Bounds { m, deg } = WRONG;
-    let row = |(reading, errors): (&Reading, &Vec<Vec<(crate::metrics::PoseError, f64)>>)| {
-        let mut row = vec![Cell::from(reading.name.as_str())];
+    let row = |((name, _), errors): (&(String, _), &Vec<Vec<(PoseError, f64)>>)| {
+        let mut row = vec![Cell::from(name.as_str())];
         for errors in errors {
-            let right = |(error, _): &&(crate::metrics::PoseError, f64)| {
+            let right = |(error, _): &&(PoseError, f64)| {
                 error.translation_m <= m && error.rotation_rad.to_degrees() <= deg
             };
             let seen = median(errors.iter().map(|(_, seen_m)| *seen_m));
             let d = median(errors.iter().map(|(error, _)| error.d_se3));
-            row.extend([
-                d.map_or(Cell::Empty, |d| Cell::Number(d, 3)),
-                seen.map_or(Cell::Empty, |seen| Cell::Number(seen, 3)),
-                errors.iter().filter(right).count().into(),
-            ]);
+            row.extend([d, seen].map(|value| Cell::number(value, 3)));
+            row.push(errors.iter().filter(right).count().into());
         }
         row
     };
-    let mut columns = vec!["reading".to_owned()];
-    for (m, deg) in starts {
+    let columns = starts.map(|(m, deg)| {
         let from = format!("from {m} m, {deg} degrees");
-        columns.extend([
-            format!("median d_SE(3), {from}"),
-            format!("median of the seen points (m), {from}"),
-            format!("right of {count}"),
-        ]);
-    }
+        format!("|median d_SE(3), {from}|median of the seen points (m), {from}|right of {count}")
+    });
+    let columns = format!("reading{}", columns.concat());
     let table = Table::new(
         "eq5-8_readings",
         format!(
             "Readings of eqs. (5) to (8) with right labels, {count} trials each, all scenes; few trials, to see what matters and what does not"
         ),
-        columns,
+        &columns,
         readings.iter().zip(&errors).map(row),
     );
     Ok((table, count))

@@ -3,19 +3,17 @@
 mod picture;
 mod sheet;
 
-use std::collections::BTreeMap;
-
-use crate::simulate::house::{House, Scene};
-use lattice_core::registration::UNLABELED;
-
 use super::Context;
 use crate::AnyError;
 use crate::evaluate::Scenario;
 use crate::render::LabelColors;
 use crate::report::{Cell, Check, Figure, Section, Table, Verdict};
+use crate::simulate::house::{House, Scene};
+use lattice_core::registration::UNLABELED;
 use lattice_nodes::files::export::category_color;
 use picture::Sides;
 use sheet::{Entry, sheet};
+use std::collections::BTreeMap;
 
 /// Share of the view that is labelled wrongly where the paper blames the labels.
 pub(super) const BAD: f64 = 0.6;
@@ -239,16 +237,10 @@ fn finding(scene: Scene, pairs: &Pairs, colors: &Colors) -> String {
 
 /// Check of the clouds' labels against those that were put in.
 fn check(scene: Scene, scenario: &Scenario, pairs: &Pairs) -> Check {
-    Check::new(
-        // Labels bleed over the borders of objects.
-        format!(
-            "{}: share of the view with different labels, as simulated and as seen in the clouds",
-            scene.name()
-        ),
-        scenario.different_share,
-        pairs.differing_share(),
-        0.1,
-    )
+    // Labels bleed over the borders of objects.
+    let what = "share of the view with different labels, as simulated and as seen in the clouds";
+    let what = format!("{}: {what}", scene.name());
+    Check::new(what, scenario.different_share, pairs.differing_share(), 0.1)
 }
 
 fn table(scene: Scene, pairs: &Pairs, colors: &Colors) -> Table {
@@ -266,12 +258,7 @@ fn table(scene: Scene, pairs: &Pairs, colors: &Colors) -> Table {
             "{}: classes of the headset's points and of the robot's voxels there, the {LISTED} most frequent pairs",
             scene.name()
         ),
-        [
-            "headset",
-            "robot",
-            "share of the points on the map (%)",
-            "same",
-        ],
+        "headset|robot|share of the points on the map (%)|same",
         pairs.counts.iter().take(LISTED).map(row),
     )
 }

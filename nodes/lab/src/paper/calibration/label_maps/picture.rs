@@ -1,14 +1,13 @@
 //! A scene from both sides, drawn alike: the robot's voxel map and the headset's points, by their labels.
 
+use crate::AnyError;
+use crate::evaluate::{Scenario, extent};
+use crate::render::{Focus, LabelColors, RenderOptions, render_labels_png};
 use lattice_core::cloud::Cloud;
 use lattice_core::lattice::{Lattice, LatticeKind};
 use lattice_core::registration::{MAX_NEIGHBORS, Neighbors, UNLABELED};
 use lattice_core::voxels::{Payload, VoxelList};
 use nalgebra::{Point3, Vector3};
-
-use crate::AnyError;
-use crate::evaluate::Scenario;
-use crate::render::{Focus, LabelColors, RenderOptions, render_labels_png};
 
 /// Size of a picture, pixels.
 pub(super) const SIZE: [u32; 2] = [440, 330];
@@ -70,13 +69,9 @@ impl Bounds {
             low_m: [f64::INFINITY; 3],
             high_m: [f64::NEG_INFINITY; 3],
         };
-        for point in points_m {
-            let ends = bounds.low_m.iter_mut().zip(&mut bounds.high_m);
-            for (axis, (low, high)) in bounds.axes.iter().zip(ends) {
-                let along = axis.dot(&point.coords);
-                *low = low.min(along);
-                *high = high.max(along);
-            }
+        for (i, axis) in bounds.axes.into_iter().enumerate() {
+            let along = points_m.iter().map(|point| axis.dot(&point.coords));
+            [bounds.low_m[i], bounds.high_m[i]] = extent(along);
         }
         bounds
     }
@@ -167,22 +162,18 @@ impl Sides {
     }
 
     /// The headset's points by whether the robot's voxel there has the same class (0), another (1) or there
-    /// is none (2).
-    pub(super) fn agreement(&self) -> Labelled {
+    /// is none (2), as a PNG.
+    pub(super) fn agreement_png(&self, colors: &LabelColors) -> Result<Vec<u8>, AnyError> {
         let pairs = self.headset.classes.iter().zip(&self.partners);
         let kind = |(mine, other): (&u16, &u16)| match *other {
             UNLABELED => 2,
             _ => u16::from(mine != other),
         };
-        Labelled {
+        let agreement = Labelled {
             points_m: self.headset.points_m.clone(),
             classes: pairs.map(kind).collect(),
-        }
-    }
-
-    /// [`Sides::agreement`] as a PNG.
-    pub(super) fn agreement_png(&self, colors: &LabelColors) -> Result<Vec<u8>, AnyError> {
-        self.png(&self.agreement(), POINT_M, colors)
+        };
+        self.png(&agreement, POINT_M, colors)
     }
 
     fn png(&self, side: &Labelled, cell_m: f64, colors: &LabelColors) -> Result<Vec<u8>, AnyError> {

@@ -1,11 +1,9 @@
 //! PNG pictures beside each other in one SVG, with a key below.
 
-use std::fmt::Write;
-
-use base64::prelude::{BASE64_STANDARD, Engine};
-
 use super::picture::SIZE;
 use crate::report::escaped;
+use base64::prelude::{BASE64_STANDARD, Engine};
+use std::fmt::Write;
 
 /// Height of the line above a picture, and of a line of the key, pixels.
 const LINE: u32 = 26;

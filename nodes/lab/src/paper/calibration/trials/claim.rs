@@ -127,9 +127,7 @@ fn ratios(trials: &Trials) -> Table {
                 let Some(ratio) = trials.ratio(None, q, start, method) else {
                     continue;
                 };
-                let [low, high] = ratio.interval.map_or([Cell::Empty, Cell::Empty], |ends| {
-                    ends.map(|end| Cell::Number(end, 3))
-                });
+                let [low, high] = ratio.ends(3);
                 rows.push(vec![
                     in_words(start).into(),
                     format!("{:.0} %", 100.0 * q).into(),
@@ -143,16 +141,8 @@ fn ratios(trials: &Trials) -> Table {
             }
         }
     }
-    let columns = [
-        "start",
-        "wrong labels",
-        "method",
-        "trials",
-        "d_SE(3) as a multiple of GICP-SE(3)'s, median",
-        "95 % from",
-        "to",
-        "than GICP-SE(3)",
-    ];
+    let columns = "start|wrong labels|method|trials|d_SE(3) as a multiple of GICP-SE(3)'s, median|\
+        95 % from|to|than GICP-SE(3)";
     Table::new(
         "claim_ratios",
         "Against GICP-SE(3) in the same trials, all scenes",
@@ -163,27 +153,22 @@ fn ratios(trials: &Trials) -> Table {
 
 /// Right poses.
 fn shares(trials: &Trials) -> Table {
-    let mut columns = vec!["start".to_owned(), "wrong labels".to_owned()];
-    columns.extend(methods().into_iter().map(|method| title(method).to_owned()));
-    let cells = trials
-        .starts
-        .iter()
-        .flat_map(|start| trials.flips().into_iter().map(move |q| (start, q)));
+    let columns = methods().map(|method| format!("|{}", title(method)));
+    let columns = format!("start|wrong labels{}", columns.concat());
+    let starts = trials.starts.iter();
+    let cells = starts.flat_map(|start| trials.flips().into_iter().map(move |q| (start, q)));
     let row = |(start, q): (&String, f64)| {
         let mut row = vec![in_words(start).into(), format!("{:.0} %", 100.0 * q).into()];
         row.extend(methods().into_iter().map(|method| {
             let share = right(trials.of_method(None, q, start, method));
-            match share.share {
-                Some(_) => share.text(0).into(),
-                None => Cell::Empty,
-            }
+            share.share.map_or(Cell::Empty, |_| share.text(0).into())
         }));
         row
     };
     Table::new(
         "claim_right",
         "Poses right within 0.15 m and 3 degrees, with 95 % intervals, all scenes",
-        columns,
+        &columns,
         cells.map(row),
     )
 }

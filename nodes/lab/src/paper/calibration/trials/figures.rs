@@ -1,14 +1,13 @@
 //! Every trial beside the printed errors, and medians by the share of wrong labels.
 
-use crate::simulate::house::Scene;
-use plotters::prelude::*;
-
 use super::table1::{blamed, printed};
 use super::{GICP, Median, SEMANTIC, Trials, in_words, methods};
 use crate::AnyError;
 use crate::evaluate::{OURS, color, letters, title};
 use crate::report::Figure;
 use crate::report::plot::{Area, Layout, chart, svg};
+use crate::simulate::house::Scene;
+use plotters::prelude::*;
 
 /// Range of errors that is shown; what is beyond lies on its ends.
 const ERRORS: std::ops::Range<f64> = 0.01..40.0;
@@ -26,20 +25,17 @@ fn shown(error: f64) -> f64 {
 pub(super) fn dots(trials: &Trials) -> Result<Figure, AnyError> {
     let mut key = LABELS.to_vec();
     key.push((BLACK, "printed (diamond)"));
-    let layout = Layout {
-        panel: (450, 270),
-        columns: trials.starts.len(),
-        rows: Scene::ALL.len(),
-        key_width: 150,
-        key: &key,
-    };
-    let panels: Vec<(&String, Scene)> = Scene::ALL
-        .into_iter()
-        .flat_map(|scene| trials.starts.iter().map(move |start| (start, scene)))
-        .collect();
+    let layout = Layout::new(
+        (450, 270),
+        [trials.starts.len(), Scene::ALL.len()],
+        150,
+        &key,
+    );
+    let scenes = Scene::ALL.into_iter();
+    let panels = scenes.flat_map(|scene| trials.starts.iter().map(move |start| (start, scene)));
     let draw = |areas: &[Area]| {
-        for (area, (start, scene)) in areas.iter().zip(&panels) {
-            dots_of(area, trials, start, *scene)?;
+        for (area, (start, scene)) in areas.iter().zip(panels) {
+            dots_of(area, trials, start, scene)?;
         }
         Ok(())
     };
@@ -54,28 +50,16 @@ pub(super) fn dots(trials: &Trials) -> Result<Figure, AnyError> {
 
 fn dots_of(area: &Area, trials: &Trials, start: &str, scene: Scene) -> Result<(), AnyError> {
     let methods = methods();
-    let mut chart = ChartBuilder::on(area)
-        .caption(
-            format!("{}, {}", scene.name(), in_words(start)),
-            ("sans-serif", 15),
-        )
-        .margin(8)
-        .x_label_area_size(26)
-        .y_label_area_size(48)
-        .build_cartesian_2d(-0.6..methods.len() as f64 - 0.4, ERRORS.log_scale())?;
-    let name = |x: &f64| {
-        let on = (x - x.round()).abs() < 1e-6 && *x > -0.5;
-        let method = methods.get(x.round().max(0.0) as usize).filter(|_| on);
-        method.map_or(String::new(), |method| letters(method).to_owned())
-    };
-    chart
-        .configure_mesh()
-        .disable_x_mesh()
-        .x_labels(methods.len() + 1)
-        .x_label_formatter(&name)
-        .y_desc("d_SE(3)")
-        .light_line_style(WHITE)
-        .draw()?;
+    let title = format!("{}, {}", scene.name(), in_words(start));
+    let names: Vec<&str> = methods.iter().map(|method| letters(method)).collect();
+    let xs = -0.6..methods.len() as f64 - 0.4;
+    let mut chart = chart(
+        area,
+        &title,
+        ("", xs),
+        ("d_SE(3)", ERRORS.log_scale()),
+        &names,
+    )?;
     for (at, method) in methods.iter().enumerate() {
         for (side, (color, _)) in LABELS.into_iter().enumerate() {
             let q = if side == 0 { 0.0 } else { trials.bad };
@@ -114,17 +98,11 @@ fn dots_of(area: &Area, trials: &Trials, start: &str, scene: Scene) -> Result<()
 
 /// Medians of all scenes by the share of wrong labels: a panel for each start.
 pub(super) fn by_flips(trials: &Trials) -> Result<Figure, AnyError> {
-    let key: Vec<(RGBColor, &str)> = methods()
+    let key: Vec<_> = methods()
         .into_iter()
         .map(|method| (color(method), title(method)))
         .collect();
-    let layout = Layout {
-        panel: (430, 330),
-        columns: trials.starts.len(),
-        rows: 1,
-        key_width: 220,
-        key: &key,
-    };
+    let layout = Layout::new((430, 330), [trials.starts.len(), 1], 220, &key);
     let draw = |areas: &[Area]| {
         for (area, start) in areas.iter().zip(&trials.starts) {
             by_flips_from(area, trials, start)?;
@@ -140,18 +118,13 @@ pub(super) fn by_flips(trials: &Trials) -> Result<Figure, AnyError> {
 }
 
 fn by_flips_from(area: &Area, trials: &Trials, start: &str) -> Result<(), AnyError> {
-    let (xs, ys) = (
-        ("share of wrong labels", -0.03..0.9),
-        ("median d_SE(3)", ERRORS.log_scale()),
-    );
-    let mut chart = chart(area, &format!("starts {}", in_words(start)), xs, ys)?;
+    let y = ("median d_SE(3)", ERRORS.log_scale());
+    let title = format!("starts {}", in_words(start));
+    let mut chart = chart(area, &title, ("share of wrong labels", -0.03..0.9), y, &[])?;
     for method in methods() {
         let color = color(method);
-        let points: Vec<(f64, Median)> = trials
-            .flips()
-            .into_iter()
-            .filter_map(|q| Some((q, trials.d_se3(None, q, start, method)?)))
-            .collect();
+        let of = |q| Some((q, trials.d_se3(None, q, start, method)?));
+        let points: Vec<(f64, Median)> = trials.flips().into_iter().filter_map(of).collect();
         let line = points.iter().map(|(q, e)| (*q, shown(e.value)));
         let width = if method == OURS { 3 } else { 2 };
         chart.draw_series(LineSeries::new(line.clone(), color.stroke_width(width)))?;

@@ -4,11 +4,6 @@ mod claim;
 mod figures;
 mod table1;
 
-use std::collections::BTreeMap;
-use std::ops::ControlFlow;
-
-use crate::simulate::house::Scene;
-
 use super::Context;
 use super::label_maps::BAD;
 use crate::AnyError;
@@ -16,7 +11,9 @@ use crate::evaluate::{
     LEAST_FOR_INTERVAL, OURS, Plan, Results, Start, Trial, WRONG, distinct, median,
     median_interval, run,
 };
-use crate::report::Section;
+use crate::report::{Cell, Section, numbers};
+use crate::simulate::house::Scene;
+use std::collections::BTreeMap;
 
 /// Name of GICP-SE(3) in evaluations.
 const GICP: &str = "gicp_se3";
@@ -36,11 +33,9 @@ const SEEDS: u64 = 15;
 const QUICK_SEEDS: u64 = 1;
 
 /// All methods in the order of the tables.
-fn methods() -> Vec<&'static str> {
-    let mut methods = vec![GICP];
-    methods.extend(SEMANTIC);
-    methods.push(OURS);
-    methods
+fn methods() -> [&'static str; 5] {
+    let [a, b, c] = SEMANTIC;
+    [GICP, a, b, c, OURS]
 }
 
 /// Trials of all methods from two starts.
@@ -55,20 +50,19 @@ struct Trials {
 impl Trials {
     /// Runs the trials; `progress` gets the share done.
     fn run(context: &Context, progress: &mut dyn FnMut(f64)) -> Result<Trials, AnyError> {
-        let names = |methods: Vec<&str>| methods.into_iter().map(str::to_owned).collect();
+        let names = |methods: &[&str]| methods.iter().map(|name| (*name).to_owned()).collect();
         let plan = Plan {
             scenes: Scene::ALL.to_vec(),
             first_seed: context.first_seed,
             seeds: if context.quick { QUICK_SEEDS } else { SEEDS },
             flips: FLIPS.to_vec(),
             starts: STARTS.to_vec(),
-            methods: names(methods()),
+            methods: names(&methods()),
             timed_seeds: 0,
         };
-        let fast = methods().into_iter().filter(|method| *method != OURS);
         let between = Plan {
             flips: vec![BETWEEN],
-            methods: names(fast.collect()),
+            methods: names(&methods()[..4]),
             ..plan.clone()
         };
         // Ours takes most of the time.
@@ -80,15 +74,11 @@ impl Trials {
         for (plan, [from, to]) in parts {
             let mut tell = |done: usize, all: usize| {
                 progress(from + (to - from) * done as f64 / all.max(1) as f64);
-                ControlFlow::Continue(())
             };
-            run(
-                &context.testbed,
-                plan,
-                &mut results,
-                context.threads,
-                &mut tell,
-            )?;
+            let Context {
+                testbed, threads, ..
+            } = context;
+            run(testbed, plan, &mut results, *threads, &mut tell)?;
         }
         Trials::of(results.sorted())
     }
@@ -135,20 +125,16 @@ impl Trials {
 
     /// The median d_SE(3) of a method, if there are trials.
     fn d_se3(&self, scene: Option<Scene>, q: f64, start: &str, method: &str) -> Option<Median> {
-        Median::of(
-            self.of_method(scene, q, start, method)
-                .map(|trial| trial.d_se3),
-        )
+        let trials = self.of_method(scene, q, start, method);
+        Median::of(trials.map(|trial| trial.d_se3))
     }
 
     /// The d_SE(3) of a method as a multiple of that of GICP-SE(3) in the same trial.
     fn ratio(&self, scene: Option<Scene>, q: f64, start: &str, method: &str) -> Option<Median> {
-        let theirs: BTreeMap<(&str, u64), f64> = self
-            .of_method(scene, q, start, GICP)
-            .map(|trial| ((trial.cell.scene.as_str(), trial.cell.seed), trial.d_se3))
-            .collect();
+        let theirs = self.of_method(scene, q, start, GICP);
+        let theirs: BTreeMap<_, f64> = theirs.map(|t| (t.cell.key(), t.d_se3)).collect();
         let ratios = self.of_method(scene, q, start, method).filter_map(|trial| {
-            let theirs = theirs.get(&(trial.cell.scene.as_str(), trial.cell.seed))?;
+            let theirs = theirs.get(&trial.cell.key())?;
             // Trials keep six digits; no error is nothing.
             Some(trial.d_se3.max(1e-6) / theirs.max(1e-6))
         });
@@ -181,11 +167,18 @@ impl Median {
         })
     }
 
+    /// Ends of the interval as cells.
+    fn ends(&self, digits: usize) -> [Cell; 2] {
+        let ends = self.interval.map(|ends| numbers(digits, ends));
+        ends.unwrap_or([Cell::Empty, Cell::Empty])
+    }
+
     /// "0.06 [0.05, 0.08]".
     fn text(&self) -> String {
         match self.interval {
-            Some([low, high]) => {
-                format!("{} [{}, {}]", short(self.value), short(low), short(high))
+            Some(ends) => {
+                let [low, high] = ends.map(short);
+                format!("{} [{low}, {high}]", short(self.value))
             }
             None => short(self.value),
         }

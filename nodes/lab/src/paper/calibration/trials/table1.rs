@@ -1,11 +1,10 @@
 //! Table 1: eight errors of one run each, beside the errors of many.
 
-use crate::simulate::house::Scene;
-
 use super::{GICP, SEMANTIC, Trials, figures, in_words, methods, right};
 use crate::AnyError;
-use crate::evaluate::{PRINTED, Printed, title};
+use crate::evaluate::{PRINTED, Printed, Share, title};
 use crate::report::{Cell, Section, Table, Verdict};
+use crate::simulate::house::Scene;
 
 /// Printed errors of a scene.
 pub(super) fn printed(scene: Scene) -> Option<&'static Printed> {
@@ -62,8 +61,7 @@ fn finding(trials: &Trials) -> String {
             let semantic = SEMANTIC
                 .iter()
                 .any(|method| d(method, printed.semantic_icp));
-            let both = [(GICP, d(GICP, printed.gicp_se3)), ("S", semantic)];
-            let word = match both.map(|(_, within)| within) {
+            let word = match [d(GICP, printed.gicp_se3), semantic] {
                 [true, true] => "both printed errors lie",
                 [true, false] => "only that of GICP-SE(3) lies",
                 [false, true] => "only that of Semantic-ICP lies",
@@ -88,28 +86,19 @@ fn labels_of(trials: &Trials, scene: Scene) -> f64 {
 
 /// Medians from one start, in words.
 fn medians(trials: &Trials, name: &str, start: &str) -> Table {
-    let mut columns: Vec<String> = [
-        "scene",
-        "wrong labels",
-        "n",
-        "paper: GICP-SE(3)",
-        "paper: Semantic-ICP",
-    ]
-    .map(str::to_owned)
-    .into();
-    columns.extend(methods().into_iter().map(|method| title(method).to_owned()));
-    let cells = Scene::ALL
-        .into_iter()
-        .flat_map(|scene| [0.0, trials.bad].map(|q| (scene, q)));
+    let columns = methods().map(|method| format!("|{}", title(method)));
+    let printed_columns = "scene|wrong labels|n|paper: GICP-SE(3)|paper: Semantic-ICP";
+    let columns = format!("{printed_columns}{}", columns.concat());
+    let scenes = Scene::ALL.into_iter();
+    let cells = scenes.flat_map(|scene| [0.0, trials.bad].map(|q| (scene, q)));
     let row = |(scene, q): (Scene, f64)| {
         let known = printed(scene).filter(|_| labels_of(trials, scene) == q);
-        let number = |value: Option<f64>| value.map_or(Cell::Empty, |v| Cell::Number(v, 2));
         let mut row = vec![
             scene.name().into(),
             format!("{:.0} %", 100.0 * q).into(),
             trials.of_method(Some(scene), q, start, GICP).count().into(),
-            number(known.map(|p| p.gicp_se3)),
-            number(known.map(|p| p.semantic_icp)),
+            Cell::number(known.map(|p| p.gicp_se3), 2),
+            Cell::number(known.map(|p| p.semantic_icp), 2),
         ];
         row.extend(methods().into_iter().map(|method| {
             let estimate = trials.d_se3(Some(scene), q, start, method);
@@ -123,7 +112,7 @@ fn medians(trials: &Trials, name: &str, start: &str) -> Table {
             "Median d_SE(3) [95 % interval], starts {}; printed errors beside the labels that the paper tells of",
             in_words(start)
         ),
-        columns,
+        &columns,
         cells.map(row),
     )
 }
@@ -132,10 +121,10 @@ fn medians(trials: &Trials, name: &str, start: &str) -> Table {
 fn ranks(trials: &Trials) -> Table {
     let methods = |scene: Scene| {
         let printed = printed(scene);
-        let semantic = SEMANTIC.map(|method| (method, printed.map(|p| p.semantic_icp)));
-        let mut methods = vec![(GICP, printed.map(|p| p.gicp_se3))];
-        methods.extend(semantic);
-        methods.into_iter().map(move |(m, value)| (scene, m, value))
+        let gicp = (scene, GICP, printed.map(|p| p.gicp_se3));
+        let semantic = printed.map(|p| p.semantic_icp);
+        let semantic = SEMANTIC.map(|method| (scene, method, semantic));
+        std::iter::once(gicp).chain(semantic)
     };
     let row = |(scene, method, value): (Scene, &str, Option<f64>)| {
         let value = value.unwrap_or(f64::NAN);
@@ -147,30 +136,17 @@ fn ranks(trials: &Trials) -> Table {
             Cell::Number(value, 2),
         ];
         for start in &trials.starts {
-            let mut below = 0;
-            let mut n = 0;
-            for trial in trials.of_method(Some(scene), q, start, method) {
-                below += usize::from(trial.d_se3 < value);
-                n += 1;
-            }
-            row.extend([below.into(), n.into()]);
+            let of = trials.of_method(Some(scene), q, start, method);
+            let below = Share::of(of.map(|trial| trial.d_se3 < value));
+            row.extend([below.k, below.n].map(Cell::from));
         }
         row
     };
-    let [good, poor] = &trials.starts;
+    let [good, poor] = trials.starts.each_ref().map(|start| in_words(start));
     Table::new(
         "table1_ranks",
         "How many of our trials are below the printed error, with labels as the paper finds them",
-        vec![
-            "scene".to_owned(),
-            "method".to_owned(),
-            "wrong labels".to_owned(),
-            "printed".to_owned(),
-            format!("below it, {}", in_words(good)),
-            "of".to_owned(),
-            format!("below it, {}", in_words(poor)),
-            "of".to_owned(),
-        ],
+        &format!("scene|method|wrong labels|printed|below it, {good}|of|below it, {poor}|of"),
         Scene::ALL.into_iter().flat_map(methods).map(row),
     )
 }
@@ -185,11 +161,7 @@ fn all(trials: &Trials) -> Table {
                     let Some(estimate) = trials.d_se3(Some(scene), q, start, method) else {
                         continue;
                     };
-                    let [low, high] = estimate
-                        .interval
-                        .map_or([Cell::Empty, Cell::Empty], |ends| {
-                            ends.map(|end| Cell::Number(end, 4))
-                        });
+                    let [low, high] = estimate.ends(4);
                     let right = right(trials.of_method(Some(scene), q, start, method));
                     rows.push(vec![
                         scene.name().into(),
@@ -208,19 +180,8 @@ fn all(trials: &Trials) -> Table {
             }
         }
     }
-    let columns = [
-        "scene",
-        "start (m/deg)",
-        "share of wrong labels",
-        "method",
-        "trials",
-        "median d_SE(3)",
-        "95 % from",
-        "to",
-        "right (0.15 m, 3 deg)",
-        "95 % of the share right from",
-        "to",
-    ];
+    let columns = "scene|start (m/deg)|share of wrong labels|method|trials|median d_SE(3)|95 % from|to|\
+        right (0.15 m, 3 deg)|95 % of the share right from|to";
     Table::new(
         "table1_all",
         "All cells: medians with intervals by ranks, shares of right poses with those of Wilson",

@@ -1,11 +1,10 @@
 //! Verdicts on made-up trials.
 
-use crate::simulate::house::Scene;
-use nalgebra::Isometry3;
-
 use super::*;
 use crate::evaluate::Cell;
 use crate::report::Verdict;
+use crate::simulate::house::Scene;
+use nalgebra::Isometry3;
 
 /// d_SE(3) by share of wrong labels, whether the start is good, and method.
 type Error = fn(f64, bool, &str) -> f64;

@@ -1,23 +1,15 @@
 //! Table I as a picture.
 
-use lattice_core::lattice::LatticeKind;
-
-use super::{Placed, Printed, rms_m};
+use super::{Placed, Printed, find, rms_m};
 use crate::AnyError;
 use crate::evaluate::extent;
-use crate::report::plot::{Area, Axes, BoxStats, Layout, NamedBox, boxes_with_marks, color, svg};
+use crate::report::plot::{Area, BoxStats, Layout, NamedBox, boxes, color, svg};
+use lattice_core::lattice::LatticeKind;
 
 /// Voxels against the mean of cubic, and RMS: boxes over all places, crosses as printed.
 pub fn draw(all: &[Placed]) -> Result<String, AnyError> {
-    let layout = Layout {
-        panel: (500, 350),
-        columns: 2,
-        rows: 1,
-        key_width: 0,
-        key: &[],
-    };
-    let mut cubic = all.iter();
-    let cubic = cubic.find(|placed| placed.lattice.kind() == LatticeKind::Cubic);
+    let layout = Layout::new((500, 350), [2, 1], 0, &[]);
+    let cubic = find(all, LatticeKind::Cubic);
     let voxels = cubic.map_or(f64::NAN, |placed| placed.voxels().mean);
     let printed = cubic.and_then(|placed| placed.printed);
     let printed_voxels = printed.map_or(f64::NAN, |row| row.voxels);
@@ -45,23 +37,13 @@ fn panel(
 ) -> Result<(), AnyError> {
     let named = all.iter().filter_map(|placed| {
         let stats = BoxStats::of(&values(placed))?;
-        let name = placed.name().to_owned();
-        Some((name, color(placed.lattice.kind()), stats))
+        Some((placed.name(), color(placed.lattice.kind()), stats))
     });
     let named: Vec<NamedBox> = named.collect();
-    let marks: Vec<Option<f64>> = all.iter().map(|placed| placed.printed.map(mark)).collect();
-    let shown = all
-        .iter()
-        .flat_map(values)
-        .chain(marks.iter().copied().flatten());
-    let [low, high] = extent(shown);
+    let marks = all.iter().map(|placed| placed.printed.as_ref().map(mark));
+    let marks: Vec<Option<f64>> = marks.collect();
+    let shown = all.iter().flat_map(values);
+    let [low, high] = extent(shown.chain(marks.iter().copied().flatten()));
     let room = 0.06 * (high - low);
-    let axes = Axes {
-        title,
-        x: "",
-        y,
-        xs: 0.0..1.0,
-        ys: low - room..high + room,
-    };
-    boxes_with_marks(area, &axes, &named, &marks)
+    boxes(area, title, (y, low - room..high + room), &named, &marks)
 }

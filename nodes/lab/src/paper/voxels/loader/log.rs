@@ -1,18 +1,16 @@
 //! The logs that Table I is made of.
 
-use std::path::Path;
-
-use crate::simulate::{Survey, SurveyPattern};
-use lattice_core::lattice::{Lattice, LatticeKind};
-
 use super::{POINTS, VOLUME_M3};
-use crate::AnyError;
+use crate::simulate::{Survey, SurveyPattern};
+use crate::{AnyError, at};
 use lattice_bag::BagReader;
+use lattice_core::lattice::{Lattice, LatticeKind};
 use lattice_nodes::enu_transformer::TransformerOptions;
 use lattice_nodes::lattice_mapper::MapperOptions;
 use lattice_nodes::replay::RunReport;
 use lattice_nodes::replay::{self, Pipeline, TopicWishes};
 use lattice_nodes::voxel_marker_publisher::MarkerOptions;
+use std::path::Path;
 
 /// Length of the simulated log, s: that of `lattice simulate bobcat`. The paper does not say how long
 /// its own is.
@@ -23,12 +21,8 @@ pub fn simulated_log(seed: u64) -> Result<Vec<[f32; 3]>, AnyError> {
     let pattern = SurveyPattern::Lms200;
     let survey = Survey::new(seed, pattern)?;
     let scans = (SPAN_S * pattern.scans_per_s()) as usize;
-    let points: Vec<[f32; 3]> = survey
-        .scans()
-        .take(scans)
-        .flat_map(|scan| scan.points)
-        .map(|[x, y, z, _]| [x, y, z])
-        .collect();
+    let points = survey.scans().take(scans).flat_map(|scan| scan.points);
+    let points: Vec<[f32; 3]> = points.map(|[x, y, z, _]| [x, y, z]).collect();
     if points.len() < POINTS {
         return Err(format!("only {} points in {SPAN_S} s of the log", points.len()).into());
     }
@@ -38,15 +32,12 @@ pub fn simulated_log(seed: u64) -> Result<Vec<[f32; 3]>, AnyError> {
 
 /// A whole log through the transformer and a mapper for each lattice.
 pub fn replayed(path: &Path, progress: &mut dyn FnMut(f64)) -> Result<RunReport, AnyError> {
-    let here = |e: &dyn std::fmt::Display| format!("{}: {e}", path.display());
-    let bag = BagReader::open(path).map_err(|e| here(&e))?;
-    let plan = replay::plan(&bag, &TopicWishes::default()).map_err(|e| here(&e))?;
-    let maps: Vec<MapperOptions> = LatticeKind::ALL
-        .into_iter()
-        .map(|kind| Ok(MapperOptions::new(Lattice::new(kind, VOLUME_M3)?)))
-        .collect::<Result<_, AnyError>>()?;
+    let bag = BagReader::open(path).map_err(at(path))?;
+    let plan = replay::plan(&bag, &TopicWishes::default()).map_err(at(path))?;
+    let map = |kind| Ok(MapperOptions::new(Lattice::new(kind, VOLUME_M3)?));
+    let maps: Result<Vec<_>, AnyError> = LatticeKind::ALL.into_iter().map(map).collect();
     let transformer = TransformerOptions::new(plan.source);
-    let mut pipeline = Pipeline::new(transformer, maps, &MarkerOptions::default())?;
+    let mut pipeline = Pipeline::new(transformer, maps?, &MarkerOptions::default())?;
     let run = replay::run(&bag, &plan, &mut pipeline, "", progress);
-    Ok(run.map_err(|e| here(&e))?)
+    run.map_err(at(path))
 }

@@ -1,53 +1,29 @@
 //! The tables beside Table I.
 
-use std::path::Path;
-
-use lattice_core::lattice::LatticeKind;
-
-use super::{POINTS, Placed, Printed, VOLUME_M3, rms_m};
+use super::{POINTS, Placed, Printed, VOLUME_M3, find, rms_m};
 use crate::evaluate::extent;
 use crate::report::plot::title;
 use crate::report::{Cell, Table};
 use crate::theory::mean_distance_m;
+use lattice_core::lattice::LatticeKind;
 use lattice_nodes::replay::RunReport;
+use std::path::Path;
 
 /// Table I as printed and as simulated.
 pub fn compared(all: &[Placed]) -> Table {
-    let columns = [
-        "lattice",
-        "voxels, printed",
-        "voxels",
-        "±",
-        "least",
-        "most",
-        "to cubic, printed (%)",
-        "to cubic (%)",
-        "MSE/dim, printed (m²)",
-        "MSE/dim (m²)",
-        "mean distance (m)",
-        "RMS, printed (m)",
-        "RMS (m)",
-        "least",
-        "most",
-    ];
-    let cubic = |of: fn(&Placed) -> f64| {
-        let mut all = all.iter();
-        all.find(|placed| placed.lattice.kind() == LatticeKind::Cubic)
-            .map_or(f64::NAN, of)
-    };
+    let columns = "lattice|voxels, printed|voxels|±|least|most|to cubic, printed (%)|to cubic (%)|\
+        MSE/dim, printed (m²)|MSE/dim (m²)|mean distance (m)|RMS, printed (m)|RMS (m)|least|\
+        most";
+    let cubic = |of: fn(&Placed) -> f64| find(all, LatticeKind::Cubic).map_or(f64::NAN, of);
     let cubic_printed = cubic(|placed| placed.printed.map_or(f64::NAN, |row| row.voxels));
     let cubic_voxels = cubic(|placed| placed.voxels().mean);
     let row = |placed: &Placed| {
-        let of_paper = |of: fn(&Printed) -> f64, digits| {
-            let cell = |row| Cell::Number(of(row), digits);
-            placed.printed.map_or(Cell::Empty, cell)
-        };
+        let of_paper =
+            |of: fn(&Printed) -> f64, digits| Cell::number(placed.printed.as_ref().map(of), digits);
         let voxels = placed.voxels();
         let [least, most] = extent(placed.each(|q| q.voxels as f64));
         let [low, high] = extent(placed.each(rms_m));
-        let to_cubic = placed.printed.map_or(Cell::Empty, |row| {
-            Cell::Number(100.0 * (row.voxels / cubic_printed - 1.0), 1)
-        });
+        let to_cubic = |row: Printed| 100.0 * (row.voxels / cubic_printed - 1.0);
         vec![
             placed.name().into(),
             of_paper(|row| row.voxels, 0),
@@ -55,7 +31,7 @@ pub fn compared(all: &[Placed]) -> Table {
             Cell::Number(voxels.half, 1),
             Cell::Number(least, 0),
             Cell::Number(most, 0),
-            to_cubic,
+            Cell::number(placed.printed.map(to_cubic), 1),
             Cell::Number(100.0 * (voxels.mean / cubic_voxels - 1.0), 1),
             of_paper(|row| row.mse, 4),
             Cell::Number(placed.mean(|q| q.mse_m2).mean, 6),
@@ -79,34 +55,22 @@ pub fn compared(all: &[Placed]) -> Table {
 
 /// Table I as printed and as theory has it.
 pub fn theory(all: &[Placed]) -> Table {
-    let columns = [
-        "lattice",
-        "theory: MSE/dim (m²)",
-        "theory: mean distance (m)",
-        "theory: RMS (m)",
-        "printed MSE/dim (m²)",
-        "to theory (%)",
-        "√(3 printed MSE) (m)",
-        "printed \"distance error\" (m)",
-    ];
+    let columns = "lattice|theory: MSE/dim (m²)|theory: mean distance (m)|theory: RMS (m)|\
+        printed MSE/dim (m²)|to theory (%)|√(3 printed MSE) (m)|printed \"distance error\" (m)";
     let row = |placed: &Placed| {
         let mse = placed.mse_of_theory();
-        let mut row = vec![
+        let printed =
+            |of: &dyn Fn(Printed) -> f64, digits| Cell::number(placed.printed.map(of), digits);
+        vec![
             placed.name().into(),
             Cell::Number(mse, 6),
             Cell::Number(mean_distance_m(&placed.lattice, [0; 3]), 5),
             Cell::Number((3.0 * mse).sqrt(), 5),
-        ];
-        row.extend(match placed.printed {
-            Some(printed) => [
-                Cell::Number(printed.mse, 4),
-                Cell::Number(100.0 * (printed.mse / mse - 1.0), 1),
-                Cell::Number((3.0 * printed.mse).sqrt(), 4),
-                Cell::Number(printed.distance_error, 4),
-            ],
-            None => [Cell::Empty, Cell::Empty, Cell::Empty, Cell::Empty],
-        });
-        row
+            printed(&|row| row.mse, 4),
+            printed(&|row| 100.0 * (row.mse / mse - 1.0), 1),
+            printed(&|row| (3.0 * row.mse).sqrt(), 4),
+            printed(&|row| row.distance_error, 4),
+        ]
     };
     Table::new(
         "table1_theory",
@@ -118,20 +82,10 @@ pub fn theory(all: &[Placed]) -> Table {
 
 /// A log that was given.
 pub fn of_log(run: &RunReport, path: &Path, number: usize) -> Table {
-    let columns = [
-        "lattice",
-        "points",
-        "voxels",
-        "to cubic (%)",
-        "MSE/dim (m²)",
-        "mean distance (m)",
-        "RMS (m)",
-        "largest distance (m)",
-    ];
-    let cubic = run
-        .lattices
-        .first()
-        .map_or(f64::NAN, |l| l.map.voxels as f64);
+    let columns = "lattice|points|voxels|to cubic (%)|MSE/dim (m²)|mean distance (m)|RMS (m)|\
+        largest distance (m)";
+    let cubic = run.lattices.first();
+    let cubic = cubic.map_or(f64::NAN, |l| l.map.voxels as f64);
     let lattices = LatticeKind::ALL.into_iter().zip(&run.lattices);
     let rows = lattices.map(|(kind, lattice)| {
         let map = &lattice.map;

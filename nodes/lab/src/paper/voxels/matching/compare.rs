@@ -41,16 +41,13 @@ impl Quantiles {
         let errors = [0, 1, 2, 3, 4, 5].map(|lattice| trials.errors_m(lattice));
         let n = errors.first().map_or(0, Vec::len);
         let mut stream = stream(seed, Purpose::Bootstrap, number);
-        let mut resample = || -> Vec<usize> {
+        let mut resample = |_| {
             let drawn = (0..n).map(|_| (stream.uniform() * n as f64) as usize);
-            drawn.collect()
+            quantiles(&errors, drawn)
         };
-        let all: Vec<usize> = (0..n).collect();
         Quantiles {
-            found: quantiles(&errors, &all),
-            drawn: (0..resamples)
-                .map(|_| quantiles(&errors, &resample()))
-                .collect(),
+            found: quantiles(&errors, 0..n),
+            drawn: (0..resamples).map(&mut resample).collect(),
         }
     }
 
@@ -61,13 +58,12 @@ impl Quantiles {
     }
 }
 
-fn quantiles(errors: &[Vec<f64>; 6], places: &[usize]) -> [[f64; 6]; 2] {
+fn quantiles(errors: &[Vec<f64>; 6], places: impl Iterator<Item = usize>) -> [[f64; 6]; 2] {
+    let places: Vec<usize> = places.collect();
     let mut found = [[f64::NAN; 6]; 2];
     for (lattice, errors) in errors.iter().enumerate() {
-        let mut taken: Vec<f64> = places
-            .iter()
-            .filter_map(|&i| errors.get(i).copied())
-            .collect();
+        let taken = places.iter().filter_map(|&i| errors.get(i).copied());
+        let mut taken: Vec<f64> = taken.collect();
         taken.sort_by(f64::total_cmp);
         for (share, found) in SHARES.into_iter().zip(&mut found) {
             found[lattice] = quantile(taken.iter().copied(), share).unwrap_or(f64::NAN);
@@ -83,12 +79,11 @@ pub(super) fn change(scenes: &[&Quantiles], share: usize, lattice: usize) -> Est
     let percent = |sum: f64| 100.0 * ((sum / scenes.len() as f64).exp() - 1.0);
     let found = scenes.iter().map(|scene| ratio(&scene.found)).sum();
     let resamples = scenes.iter().map(|scene| scene.drawn.len()).min();
-    let drawn: Vec<f64> = (0..resamples.unwrap_or(0))
-        .map(|i| {
-            let ratios = scenes.iter().filter_map(|scene| scene.drawn.get(i));
-            percent(ratios.map(ratio).sum())
-        })
-        .collect();
+    let resample = |i| {
+        let ratios = scenes.iter().filter_map(|scene| scene.drawn.get(i));
+        percent(ratios.map(ratio).sum())
+    };
+    let drawn: Vec<f64> = (0..resamples.unwrap_or(0)).map(resample).collect();
     Estimate::new(percent(found), &drawn)
 }
 

@@ -1,14 +1,11 @@
 //! The pictures of Fig. 6.
 
-use lattice_core::lattice::LatticeKind;
-use plotters::prelude::*;
-
 use super::Played;
 use super::compare::{Estimate, change};
 use crate::AnyError;
-use crate::report::plot::{
-    Area, Axes, BoxStats, LABELS, Layout, NamedBox, boxes, color, svg, title,
-};
+use crate::report::plot::{Area, BoxStats, Layout, NamedBox, boxes, chart, color, svg, title};
+use lattice_core::lattice::LatticeKind;
+use plotters::prelude::*;
 
 /// Changes up to this are shown, %.
 const REACH: f64 = 45.0;
@@ -16,13 +13,7 @@ const REACH: f64 = 45.0;
 const COLUMNS: usize = 2;
 
 fn layout(panels: usize) -> Layout<'static> {
-    Layout {
-        panel: (560, 330),
-        columns: COLUMNS,
-        rows: panels.div_ceil(COLUMNS),
-        key_width: 0,
-        key: &[],
-    }
+    Layout::new((560, 330), [COLUMNS, panels.div_ceil(COLUMNS)], 0, &[])
 }
 
 /// Box plots of the errors, a panel a scene.
@@ -32,19 +23,13 @@ pub(super) fn boxes_of(played: &[Played]) -> Result<String, AnyError> {
             let mut named: Vec<NamedBox> = Vec::new();
             for (lattice, kind) in LatticeKind::ALL.into_iter().enumerate() {
                 if let Some(stats) = BoxStats::of(&trials.errors_m(lattice)) {
-                    named.push((title(kind).to_owned(), color(kind), stats));
+                    named.push((title(kind), color(kind), stats));
                 }
             }
             let whiskers = named.iter().map(|(_, _, stats)| stats.whiskers[1]);
             let top = 1.8 * whiskers.fold(0.0, f64::max);
-            let axes = Axes {
-                title: &scene.title(),
-                x: "",
-                y: "position error (m)",
-                xs: 0.0..1.0,
-                ys: 0.0..top.max(1e-6),
-            };
-            boxes(area, &axes, &named)?;
+            let y = ("position error (m)", 0.0..top.max(1e-6));
+            boxes(area, &scene.title(), y, &named, &[])?;
         }
         Ok(())
     })
@@ -61,31 +46,13 @@ pub(super) fn changes_of(played: &[Played]) -> Result<String, AnyError> {
 }
 
 fn panel(area: &Area, played: &Played) -> Result<(), AnyError> {
-    let others = || LatticeKind::ALL.into_iter().enumerate().skip(1);
-    let name = |x: &f64| {
-        let near = others().find(|(lattice, _)| (x - *lattice as f64).abs() < 1e-6);
-        near.map_or(String::new(), |(_, kind)| title(kind).to_owned())
-    };
     let of = |share: usize, lattice: usize| change(&[&played.quantiles], share, lattice);
-    let mut chart = ChartBuilder::on(area)
-        .caption(played.scene.title(), ("sans-serif", 15))
-        .margin(8)
-        .x_label_area_size(36)
-        .y_label_area_size(56)
-        .build_cartesian_2d(0.4..5.6, -REACH..REACH)?;
-    chart
-        .configure_mesh()
-        .disable_x_mesh()
-        .x_labels(7)
-        .x_label_formatter(&name)
-        .y_label_formatter(&|percent| format!("{percent:+.0}"))
-        .y_desc("change against cubic (%)")
-        .light_line_style(WHITE)
-        .label_style(LABELS)
-        .draw()?;
+    let y = ("change against cubic (%)", -REACH..REACH);
+    let names = LatticeKind::ALL.map(title);
+    let mut chart = chart(area, &played.scene.title(), ("", 0.4..5.6), y, &names)?;
     let zero = PathElement::new(vec![(0.4, 0.0), (5.6, 0.0)], BLACK.stroke_width(1));
     chart.draw_series([zero])?;
-    for (lattice, kind) in others() {
+    for (lattice, kind) in LatticeKind::ALL.into_iter().enumerate().skip(1) {
         for share in [0, 1] {
             let Estimate { value, low, high } = of(share, lattice);
             let [value, low, high] = [value, low, high].map(|v| v.clamp(-REACH, REACH));

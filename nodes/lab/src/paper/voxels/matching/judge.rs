@@ -88,31 +88,23 @@ pub(super) fn verdict(groups: &[(&str, Group)]) -> Verdict {
 /// Checks that lattices gain as they did elsewhere, and BCC as much more than FCC.
 pub(super) fn checks(rooms: &Group) -> Vec<Check> {
     let check = |what: &str, share: usize, elsewhere: f64, found: f64| {
-        Check::new(
-            format!("{what} of the {} in rooms", SHARE_NAMES[share]),
-            elsewhere.signum(),
-            found.signum(),
-            0.0,
-        )
+        let what = format!("{what} of the {} in rooms", SHARE_NAMES[share]);
+        Check::new(what, elsewhere.signum(), found.signum(), 0.0)
     };
     let found = |lattice: usize, share: usize| rooms.change[share][lattice].value;
     let sign = |lattice: usize, share: usize| {
         let what = format!("{}: sign of the change against cubic", name(lattice));
-        check(
-            &what,
-            share,
-            ELSEWHERE[lattice][share],
-            found(lattice, share),
-        )
+        let elsewhere = ELSEWHERE[lattice][share];
+        check(&what, share, elsewhere, found(lattice, share))
     };
     let order = |share: usize| {
+        let what = "BCC less FCC: sign of the difference of their changes";
         let elsewhere = ELSEWHERE[BCC][share] - ELSEWHERE[FCC][share];
-        let found = found(BCC, share) - found(FCC, share);
         check(
-            "BCC less FCC: sign of the difference of their changes",
+            what,
             share,
             elsewhere,
-            found,
+            found(BCC, share) - found(FCC, share),
         )
     };
     let both = [BCC, FCC, MCC].map(|lattice| [sign(lattice, 0), sign(lattice, 1)]);
@@ -146,21 +138,21 @@ mod tests {
         let gain = [0.0, -14.0, -12.0, -10.0, -5.0, -3.0];
         let none = [0.0, 2.0, 1.0, 1.0, 1.0, 1.0];
         let rooms = (ROOMS, group(gain, 4.0));
-        let Verdict::Corrected(why) = verdict(&[rooms.clone(), (STREET, group(none, 4.0))]) else {
-            panic!("it gains");
-        };
-        assert!(
-            why.contains("BCC is at least") && why.contains("equals cubic"),
-            "{why}"
-        );
-        let Verdict::Corrected(why) = verdict(&[rooms.clone(), (OFFICE, group(gain, 4.0))]) else {
-            panic!("it gains");
-        };
-        assert!(why.contains("better than cubic too"), "{why}");
-        let Verdict::Corrected(why) = verdict(&[rooms, (OFFICE, group(none, 0.1))]) else {
-            panic!("it gains");
-        };
-        assert!(why.contains("not better"), "{why}");
+        for (place, percent, half, words) in [
+            (STREET, none, 4.0, ["BCC is at least", "equals cubic"]),
+            (
+                OFFICE,
+                gain,
+                4.0,
+                ["FCC has lower", "better than cubic too"],
+            ),
+            (OFFICE, none, 0.1, ["FCC has lower", "not better"]),
+        ] {
+            let found = verdict(&[rooms.clone(), (place, group(percent, half))]);
+            assert!(matches!(found, Verdict::Corrected(_)), "{found:?}");
+            let why = found.why();
+            assert!(words.iter().all(|word| why.contains(word)), "{why}");
+        }
         let unsure = verdict(&[(ROOMS, group(gain, 20.0))]);
         assert!(matches!(unsure, Verdict::DependsOnData(_)), "{unsure:?}");
         let few = verdict(&[(ROOMS, group(none, 20.0))]);
@@ -172,10 +164,8 @@ mod tests {
     #[test]
     fn checks_fail_for_a_change_of_sign() {
         let holding = |percent| {
-            checks(&group(percent, 1.0))
-                .iter()
-                .filter(|c| c.holds())
-                .count()
+            let checks = checks(&group(percent, 1.0));
+            checks.iter().filter(|check| check.holds).count()
         };
         assert_eq!(holding([0.0, -3.0, -2.0, -1.0, -1.0, -1.0]), 10);
         assert_eq!(holding([0.0, 1.0, -2.0, 3.0, -1.0, 1.0]), 3);

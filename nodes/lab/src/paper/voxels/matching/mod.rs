@@ -6,14 +6,13 @@ mod judge;
 mod scenes;
 mod trials;
 
-use lattice_core::lattice::LatticeKind;
-
 use super::Options;
 use crate::AnyError;
 use crate::report::plot::title;
 use crate::report::{Cell, Figure, Section, Table};
 use compare::{Estimate, Quantiles, SHARES, change};
 use judge::{ELSEWHERE, checks, finding, verdict};
+use lattice_core::lattice::LatticeKind;
 use scenes::{OFFICE, ROOMS, STREET, Scene, Source, scenes};
 use trials::Trials;
 
@@ -54,13 +53,12 @@ pub fn section(options: &Options, progress: &mut dyn FnMut(f64)) -> Result<Secti
             quantiles,
         });
     }
-    let groups: Vec<(&str, Group)> = [ROOMS, STREET, OFFICE]
-        .into_iter()
-        .filter_map(|place| {
-            let members = played.iter().filter(|p| p.scene.place == place);
-            Some((place, Group::of(&members.collect::<Vec<_>>())?))
-        })
-        .collect();
+    let group = |place| {
+        let members = played.iter().filter(|p| p.scene.place == place);
+        Some((place, Group::of(&members.collect::<Vec<_>>())?))
+    };
+    let groups = [ROOMS, STREET, OFFICE].into_iter().filter_map(group);
+    let groups: Vec<(&str, Group)> = groups.collect();
     let (_, rooms) = groups.first().ok_or("there are no rooms")?;
     let doubt_m = sources.iter().find_map(Source::doubt_m);
     Ok(Section {
@@ -72,10 +70,7 @@ pub fn section(options: &Options, progress: &mut dyn FnMut(f64)) -> Result<Secti
             .into(),
         finding: finding(&groups, pick(TRIALS), doubt_m),
         verdict: verdict(&groups),
-        checks: match options.quick {
-            true => Vec::new(),
-            false => checks(rooms),
-        },
+        checks: if options.quick { Vec::new() } else { checks(rooms) },
         tables: vec![errors_table(&played), change_table(&played, &groups)],
         figures: vec![
             Figure::new("fig6", format!(
@@ -144,9 +139,8 @@ impl Group {
 
 /// A lattice's name, by its place.
 fn name(lattice: usize) -> &'static str {
-    LatticeKind::ALL
-        .get(lattice)
-        .map_or("", |kind| title(*kind))
+    let kind = LatticeKind::ALL.get(lattice);
+    kind.map_or("", |kind| title(*kind))
 }
 
 fn between(low: f64, high: f64, digits: usize) -> Cell {
@@ -164,39 +158,23 @@ fn errors_table(played: &[Played]) -> Table {
         for (lattice, kind) in LatticeKind::ALL.into_iter().enumerate() {
             let errors_m = trials.errors_m(lattice);
             let far = errors_m.iter().filter(|e| **e > scene.side_m).count();
-            let mut row: Vec<Cell> = vec![scene.place.into()];
-            row.push(Cell::Number(scene.side_m, 2));
-            row.push(Cell::Number(scene.start_m, 1));
-            row.push(title(kind).into());
-            row.push(errors_m.len().into());
+            let [side, start] = [(scene.side_m, 2), (scene.start_m, 1)];
+            let [side, start] = [side, start].map(|(value, digits)| Cell::Number(value, digits));
+            let kind = title(kind).into();
+            let mut row = vec![scene.place.into(), side, start, kind, errors_m.len().into()];
             for share in 0..SHARES.len() {
                 let Estimate { value, low, high } = quantiles.estimate(share, lattice);
                 row.push(Cell::Number(value, 4));
                 row.push(between(low, high, 4));
             }
-            row.push(Cell::Number(
-                errors_m.iter().copied().fold(0.0, f64::max),
-                3,
-            ));
-            row.push(far.into());
+            let largest = errors_m.iter().copied().fold(0.0, f64::max);
+            row.extend([Cell::Number(largest, 3), far.into()]);
             row.push(Cell::Number(trials.evaluations(lattice), 0));
             rows.push(row);
         }
     }
-    let columns = [
-        "scans",
-        "cells (m)",
-        "start ± (m)",
-        "lattice",
-        "trials",
-        "median (m)",
-        "95 % interval",
-        "95th percentile (m)",
-        "95 % interval",
-        "largest (m)",
-        "over one cell side",
-        "poses tried",
-    ];
+    let columns = "scans|cells (m)|start ± (m)|lattice|trials|median (m)|95 % interval|\
+        95th percentile (m)|95 % interval|largest (m)|over one cell side|poses tried";
     Table::new(
         "fig6",
         "Position errors of the aligned scans; poses tried: on average",
@@ -206,41 +184,31 @@ fn errors_table(played: &[Played]) -> Table {
 }
 
 fn change_table(played: &[Played], groups: &[(&str, Group)]) -> Table {
-    let alone = |p: &Played| Some((p.scene.title(), Group::of(&[p])?));
-    let mut all: Vec<(String, Group)> = played.iter().filter_map(alone).collect();
-    let together = |(place, group): &(&str, Group)| (format!("{place}, all"), group.clone());
-    all.extend(groups.iter().map(together));
+    let alone = |p: &Played| Some((p.scene.title(), Group::of(&[p])?, false));
+    let mut all: Vec<(String, Group, bool)> = played.iter().filter_map(alone).collect();
+    all.extend(
+        groups
+            .iter()
+            .enumerate()
+            .map(|(number, (place, group))| (format!("{place}, all"), group.clone(), number == 0)),
+    );
     let mut rows = Vec::new();
-    for (place, group) in all {
-        let rooms = groups
-            .first()
-            .is_some_and(|(rooms, _)| place == format!("{rooms}, all"));
+    for (place, group, rooms) in all {
         for (lattice, kind) in LatticeKind::ALL.into_iter().enumerate().skip(1) {
             let mut row: Vec<Cell> = vec![place.clone().into(), title(kind).into()];
             for (share, of) in group.change.iter().enumerate() {
                 let Estimate { value, low, high } = of[lattice];
                 row.push(Cell::Number(value, 1));
                 row.push(between(low, high, 1));
-                row.push(match rooms {
-                    true => Cell::Number(ELSEWHERE[lattice][share], 1),
-                    false => Cell::Empty,
-                });
+                let elsewhere = rooms.then_some(ELSEWHERE[lattice][share]);
+                row.push(Cell::number(elsewhere, 1));
             }
             row.push(Cell::Number(group.evaluations[lattice], 1));
             rows.push(row);
         }
     }
-    let columns = [
-        "scans",
-        "lattice",
-        "median (%)",
-        "95 % interval",
-        "in another simulation",
-        "95th percentile (%)",
-        "95 % interval",
-        "in another simulation",
-        "poses tried (%)",
-    ];
+    let columns = "scans|lattice|median (%)|95 % interval|in another simulation|95th percentile (%)|\
+        95 % interval|in another simulation|poses tried (%)";
     Table::new(
         "fig6_change",
         "Change against cubic in the same trials; several settings: geometric mean",

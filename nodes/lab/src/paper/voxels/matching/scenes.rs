@@ -1,19 +1,17 @@
 //! Scans that are matched: of a simulated house, and pairs of files.
 
-use std::path::Path;
-
-use crate::matching::{MultiResolutionList, SearchOptions, Spread, search};
+use crate::matching::{MultiResolutionList, Spread, search};
 use crate::simulate::RANGE_NOISE_M;
-use crate::simulate::house::{House, LaserOptions, LaserView};
+use crate::simulate::house::{House, LaserView};
+use crate::{AnyError, at};
 use lattice_core::cloud::Cloud;
 use lattice_core::lattice::{Lattice, LatticeKind};
 use lattice_core::registration::{
     PrepareOptions, PreparedCloud, RegisterOptions, SemanticCloud, register, voxel_downsample,
 };
-use nalgebra::{Isometry3, Matrix3, Rotation3, Translation3, UnitQuaternion, Vector3};
-
-use crate::AnyError;
 use lattice_nodes::files::points::{PointFileLimits, read_points};
+use nalgebra::{Isometry3, Matrix3, Rotation3, Translation3, UnitQuaternion, Vector3};
+use std::path::Path;
 
 /// Pairs of stands all over the house.
 const STANDS: usize = 12;
@@ -112,7 +110,7 @@ pub(super) fn scenes(
     pairs: Option<&Path>,
 ) -> Result<(Vec<Source>, Vec<Scene>), AnyError> {
     let house = House::generated(seed)?;
-    let views = LaserView::pairs(&house, STANDS, &LaserOptions::default(), seed)?;
+    let views = LaserView::pairs(&house, STANDS, seed)?;
     let mut sources = vec![Source::Simulated(views)];
     let mut scenes = Vec::new();
     let mut add = |place, source, cases: &[(f64, f64)]| {
@@ -127,20 +125,22 @@ pub(super) fn scenes(
     let Some(folder) = pairs else {
         return Ok((sources, scenes));
     };
+    let both = |names: [&str; 2]| -> Result<[Vec<[f32; 3]>; 2], AnyError> {
+        let [map, scan] = names.map(|name| points(&folder.join(name)));
+        Ok([map?, scan?])
+    };
     let truth = folder.join("small_gicp/T_target_source.txt");
     if truth.is_file() {
-        let scans = ["target.ply", "source.ply"].map(|name| folder.join("small_gicp").join(name));
-        let [map, scan] = [points(&scans[0])?, points(&scans[1])?];
         add(STREET, sources.len(), &[(0.5, 1.0), (0.25, 0.5)]);
         sources.push(Source::Files {
-            scans: [map, scan],
+            scans: both(["small_gicp/target.ply", "small_gicp/source.ply"])?,
             map_from_scan: pose(&truth)?,
             doubt_m: None,
         });
     }
-    let scans = ["room_scan1.pcd", "room_scan2.pcd"].map(|name| folder.join(name));
-    if scans.iter().all(|path| path.is_file()) {
-        let [map, scan] = [points(&scans[0])?, points(&scans[1])?];
+    let scans = ["room_scan1.pcd", "room_scan2.pcd"];
+    if scans.iter().all(|name| folder.join(name).is_file()) {
+        let [map, scan] = both(scans)?;
         let truth = registered(&map, &scan)?;
         let back = registered(&scan, &map)?.inverse();
         let apart = truth.translation.vector - back.translation.vector;
@@ -161,7 +161,7 @@ pub(super) fn scenes(
 
 fn points(path: &Path) -> Result<Vec<[f32; 3]>, AnyError> {
     let file = read_points(path, &PointFileLimits::default());
-    let file = file.map_err(|e| format!("{}: {e}", path.display()))?;
+    let file = file.map_err(at(path))?;
     let narrow = |p: &[f64; 3]| p.map(|x| x as f32);
     Ok(file.points_m.iter().map(narrow).collect())
 }
@@ -202,8 +202,7 @@ fn registered(map: &[[f32; 3]], scan: &[[f32; 3]]) -> Result<Isometry3<f64>, Any
         translation_m: [4.0, 4.0, 0.4],
         rotation_rad: [0.0, 0.0, std::f64::consts::PI],
     };
-    let (start, options) = (Isometry3::identity(), SearchOptions::default());
-    let found = search(&list, &cloud(scan), &start, &spread, &options)?;
+    let found = search(&list, &cloud(scan), &Isometry3::identity(), &spread)?;
     let best = found.first().ok_or("the search found nothing")?;
     let prepare = |points: &[[f32; 3]]| {
         let wide = |p: &[f32; 3]| p.map(f64::from).into();

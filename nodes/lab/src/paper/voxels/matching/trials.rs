@@ -1,21 +1,17 @@
 //! Trials of scan matching: one scan as a map, one to align, a random lattice pose and a random start.
 
-use std::f64::consts::TAU;
-
-use crate::matching::{AlignOptions, MultiResolutionList, align};
+use super::scenes::{MAX_BYTES, Scene, Source};
+use crate::AnyError;
+use crate::matching::{MultiResolutionList, align};
+use crate::paper::parallel::in_parallel;
+use crate::paper::streams::{Purpose, stream};
 use lattice_core::cloud::Cloud;
 use lattice_core::lattice::{Lattice, LatticeKind};
 use nalgebra::{Isometry3, Translation3, UnitQuaternion, Vector3};
-
-use super::scenes::{MAX_BYTES, Scene, Source};
-use crate::AnyError;
-use crate::paper::parallel::in_parallel;
-use crate::paper::streams::{Purpose, stream};
+use std::f64::consts::TAU;
 
 /// Levels of a list: cells of one, two and four sides.
 const LEVELS: usize = 3;
-/// All points of a scan, one of each cell.
-const ALL: usize = 1_000_000;
 /// A start is turned by up to this for each metre that it may be off, about each axis, degrees.
 const TURN_DEG_PER_M: f64 = 10.0;
 /// The lattice is moved by up to this along each axis, metres.
@@ -24,7 +20,7 @@ const OFFSET_M: f64 = 10.0;
 const SCENE: usize = 1 << 32;
 
 /// Outcome of an alignment.
-#[derive(Clone, Copy, PartialEq, Debug)]
+#[derive(Clone, Copy, PartialEq, Debug, Default)]
 pub(super) struct Outcome {
     /// Distance from the true position of the scanner, metres.
     pub(super) error_m: f64,
@@ -61,7 +57,7 @@ pub(super) fn run(
     n: usize,
     progress: &mut dyn FnMut(f64),
 ) -> Result<Trials, AnyError> {
-    let trial = |i: usize| trial(scene, number, source, seed, i);
+    let trial = |i: usize| trial(scene, source, seed, (number, i));
     let mut trials = Trials {
         by_lattice: [(); 6].map(|()| Vec::with_capacity(n)),
     };
@@ -75,10 +71,9 @@ pub(super) fn run(
 
 fn trial(
     scene: &Scene,
-    number: usize,
     source: &Source,
     seed: u64,
-    i: usize,
+    (number, i): (usize, usize),
 ) -> Result<[Outcome; 6], AnyError> {
     let pair = source.pair(seed, number, i).ok_or("there are no scans")?;
     let mut stream = stream(seed, Purpose::Matching, number * SCENE + i);
@@ -93,29 +88,19 @@ fn trial(
         Translation3::from(truth.translation.vector + shift_m),
         UnitQuaternion::from_scaled_axis(turn_rad) * truth.rotation,
     );
-    let map = Cloud {
+    let cloud = |datum_m, offsets_m| Cloud {
         stamp_ns: 0,
-        datum_m: offset_m,
-        offsets_m: pair.map,
+        datum_m,
+        offsets_m,
     };
-    let scan = Cloud {
-        stamp_ns: 0,
-        datum_m: Vector3::zeros(),
-        offsets_m: pair.scan,
-    };
-    let options = AlignOptions {
-        max_points: ALL,
-        ..AlignOptions::default()
-    };
-    let mut outcomes = [Outcome {
-        error_m: f64::NAN,
-        evaluations: 0,
-    }; 6];
+    let map = cloud(offset_m, pair.map);
+    let scan = cloud(Vector3::zeros(), pair.scan);
+    let mut outcomes = [Outcome::default(); 6];
     for (kind, outcome) in LatticeKind::ALL.into_iter().zip(&mut outcomes) {
         let lattice = Lattice::new(kind, scene.side_m.powi(3))?.oriented(yaw);
         let mut list = MultiResolutionList::new(&lattice, offset_m, LEVELS, MAX_BYTES)?;
         list.insert(&map);
-        let found = align(&list, &scan, &start, &options)?;
+        let found = align(&list, &scan, &start)?;
         let off = found.map_from_cloud.translation.vector - truth.translation.vector;
         *outcome = Outcome {
             error_m: off.norm(),

@@ -2,16 +2,14 @@
 
 mod spread;
 
-use std::iter;
-
-use lattice_core::lattice::LatticeKind;
-
 use super::Options;
 use super::sample::Samples;
 use crate::AnyError;
-use crate::report::plot::{Axes, Layout, curves, key, svg, title};
-use crate::report::{Cell, Check, Figure, Section, Table, Verdict};
+use crate::report::plot::{Layout, curves, key, svg, title};
+use crate::report::{Cell, Check, Figure, Section, Table, Verdict, numbers};
+use lattice_core::lattice::LatticeKind;
 use spread::{Cells, Spread};
+use std::iter;
 
 /// Allowed error of a figure: a share of it, and half of its last digit.
 const TOLERANCE: f64 = 0.002;
@@ -63,35 +61,17 @@ pub fn section(options: &Options, progress: &mut dyn FnMut(f64)) -> Result<Secti
         spreads.push(spread);
     }
     let mut changes = Vec::new();
-    for comparison in &COMPARISONS {
-        let change = Change::new(&spreads, comparison)?;
-        checks.extend(change.checks(comparison));
+    for (name, comparison) in NAMES.into_iter().zip(COMPARISONS) {
+        let (change, checked) = compared(&spreads, name, comparison)?;
+        checks.extend(checked);
         changes.push(change);
     }
     let said = |number: usize, words: fn(&Change) -> String| {
         changes.get(number).map_or(String::new(), words)
     };
-    let columns = [
-        "lattice",
-        "cells",
-        "number",
-        "mean",
-        "mean, random",
-        "±",
-        "std",
-        "std, random",
-        "±",
-        "nearest",
-        "farthest",
-        "range",
-    ];
-    let compared = [
-        "compared",
-        "std (%)",
-        "±",
-        "std, exact (%)",
-        "range, exact (%)",
-    ];
+    let columns =
+        "lattice|cells|number|mean|mean, random|±|std|std, random|±|nearest|farthest|range";
+    let compared = "compared|std (%)|±|std, exact (%)|range, exact (%)";
     Ok(Section {
         id: "fig4".into(),
         title: "Fig. 4: distances of points in the own and in adjacent cells".into(),
@@ -125,47 +105,28 @@ pub fn section(options: &Options, progress: &mut dyn FnMut(f64)) -> Result<Secti
     })
 }
 
-/// Two sets of cells, of which the second is that of cubes.
-struct Comparison {
-    name: &'static str,
-    ours: (LatticeKind, Cells),
-    cubic: Cells,
-    /// Change of standard deviation and range as printed, %.
-    printed: Option<[f64; 2]>,
-    /// The same as known, %.
-    known: [f64; 2],
-}
+/// A set of cells of a lattice.
+type Set = (LatticeKind, Cells);
 
-const COMPARISONS: [Comparison; 4] = [
-    Comparison {
-        name: "FCC 12 to cubic 26, as the paper",
-        ours: (LatticeKind::Fcc, Cells::Printed),
-        cubic: Cells::Printed,
-        printed: Some([-30.0, -40.0]),
-        known: [-28.4, -42.2],
-    },
-    Comparison {
-        name: "touching: FCC 18 to cubic 26",
-        ours: (LatticeKind::Fcc, Cells::Touching),
-        cubic: Cells::Touching,
-        printed: None,
-        known: [-9.0, -13.3],
-    },
-    Comparison {
-        name: "touching: BCC 14 to cubic 26",
-        ours: (LatticeKind::Bcc, Cells::Touching),
-        cubic: Cells::Touching,
-        printed: None,
-        known: [-25.2, -34.7],
-    },
-    Comparison {
-        name: "faces: FCC 12 to cubic 6",
-        ours: (LatticeKind::Fcc, Cells::Printed),
-        cubic: Cells::Faces,
-        printed: None,
-        known: [0.1, 4.8],
-    },
+const FCC_12: Set = (LatticeKind::Fcc, Cells::Printed);
+const FCC_18: Set = (LatticeKind::Fcc, Cells::Touching);
+const BCC_14: Set = (LatticeKind::Bcc, Cells::Touching);
+
+/// A set, that of cubes, and the change of standard deviation and range as known, %.
+const COMPARISONS: [(Set, Cells, [f64; 2]); 4] = [
+    (FCC_12, Cells::Printed, [-28.4, -42.2]),
+    (FCC_18, Cells::Touching, [-9.0, -13.3]),
+    (BCC_14, Cells::Touching, [-25.2, -34.7]),
+    (FCC_12, Cells::Faces, [0.1, 4.8]),
 ];
+const NAMES: [&str; 4] = [
+    "FCC 12 to cubic 26, as the paper",
+    "touching: FCC 18 to cubic 26",
+    "touching: BCC 14 to cubic 26",
+    "faces: FCC 12 to cubic 6",
+];
+/// The first as printed.
+const PRINTED: [f64; 2] = [-30.0, -40.0];
 
 /// Change of the spread of one set against that of another, %.
 struct Change {
@@ -177,47 +138,42 @@ struct Change {
     range: f64,
 }
 
+/// A comparison made, and its checks.
+fn compared(
+    spreads: &[Spread],
+    name: &'static str,
+    (ours, cubic, [std, range]): (Set, Cells, [f64; 2]),
+) -> Result<(Change, [Check; 3]), AnyError> {
+    let find = |(kind, cells)| {
+        let mut spreads = spreads.iter();
+        let found = spreads.find(|spread| spread.kind == kind && spread.cells == cells);
+        found.ok_or("a set of cells is compared that is not computed")
+    };
+    let (a, b) = (find(ours)?, find((LatticeKind::Cubic, cubic))?);
+    let ratio = a.std.over(&b.std);
+    let change = Change {
+        name,
+        std: 100.0 * (ratio.mean - 1.0),
+        half: 100.0 * ratio.half,
+        exact_std: 100.0 * (a.exact_std / b.exact_std - 1.0),
+        range: 100.0 * (a.range() / b.range() - 1.0),
+    };
+    let checks = [
+        ("std, random points", 0, std, change.std),
+        ("std, exact", 0, std, change.exact_std),
+        ("range", 1, range, change.range),
+    ];
+    let checks = checks.map(|(what, number, expected, found)| {
+        let what = format!("{name}: {what} (%)");
+        let check = Check::new(what, expected, found, CHANGE_TOLERANCE);
+        check.with_printed((name == NAMES[0]).then_some(PRINTED[number]))
+    });
+    Ok((change, checks))
+}
+
 impl Change {
-    fn new(spreads: &[Spread], comparison: &Comparison) -> Result<Change, AnyError> {
-        let find = |(kind, cells)| {
-            let mut spreads = spreads.iter();
-            let found = spreads.find(|spread| spread.kind == kind && spread.cells == cells);
-            found.ok_or("a set of cells is compared that is not computed")
-        };
-        let a = find(comparison.ours)?;
-        let b = find((LatticeKind::Cubic, comparison.cubic))?;
-        let ratio = a.std.over(&b.std);
-        Ok(Change {
-            name: comparison.name,
-            std: 100.0 * (ratio.mean - 1.0),
-            half: 100.0 * ratio.half,
-            exact_std: 100.0 * (a.exact_std / b.exact_std - 1.0),
-            range: 100.0 * (a.range() / b.range() - 1.0),
-        })
-    }
-
-    fn checks(&self, comparison: &Comparison) -> [Check; 3] {
-        let [std, range] = comparison.known;
-        let printed = comparison.printed;
-        let check = |what: &str, printed: Option<f64>, expected: f64, found: f64| {
-            Check::new(
-                format!("{}: {what} (%)", self.name),
-                expected,
-                found,
-                CHANGE_TOLERANCE,
-            )
-            .with_printed(printed)
-        };
-        [
-            check("std, random points", printed.map(|p| p[0]), std, self.std),
-            check("std, exact", printed.map(|p| p[0]), std, self.exact_std),
-            check("range", printed.map(|p| p[1]), range, self.range),
-        ]
-    }
-
     fn row(&self) -> Vec<Cell> {
-        let figures = [self.std, self.half, self.exact_std, self.range];
-        let figures = figures.map(|value| Cell::Number(value, 3));
+        let figures = numbers(3, [self.std, self.half, self.exact_std, self.range]);
         iter::once(self.name.into()).chain(figures).collect()
     }
 
@@ -230,7 +186,7 @@ impl Change {
 fn against(spread: &Spread, known: &Known) -> Vec<Check> {
     let (_, _, n, [mean, std, nearest, farthest]) = *known;
     let name = format!("{}, {}", title(spread.kind), spread.cells.name());
-    let number = Check::new(format!("{name}: cells"), n as f64, spread.n as f64, 0.0)
+    let number = Check::count(format!("{name}: cells"), n, spread.n)
         .with_printed((spread.cells == Cells::Printed).then_some(n as f64));
     let figures = [
         ("mean, random points", mean, spread.mean.mean),
@@ -241,41 +197,25 @@ fn against(spread: &Spread, known: &Known) -> Vec<Check> {
         ("farthest", farthest, spread.farthest),
     ];
     let figures = figures.map(|(what, expected, found)| {
-        Check::new(
-            format!("{name}: {what}"),
-            expected,
-            found,
-            TOLERANCE * expected + DIGIT,
-        )
+        let tolerance = TOLERANCE * expected + DIGIT;
+        Check::new(format!("{name}: {what}"), expected, found, tolerance)
     });
     iter::once(number).chain(figures).collect()
 }
 
 fn draw(spreads: &[Spread]) -> Result<String, AnyError> {
-    let layout = Layout {
-        panel: (500, 380),
-        columns: 2,
-        rows: 1,
-        key_width: 130,
-        key: &key(&LatticeKind::ALL),
-    };
+    let key = key(&LatticeKind::ALL);
+    let layout = Layout::new((500, 380), [2, 1], 130, &key);
     svg(&layout, |areas| {
         let panels = [
             (Cells::Printed, "sets of the paper"),
             (Cells::Touching, "all touching cells"),
         ];
         for (area, (cells, title)) in areas.iter().zip(panels) {
-            let axes = Axes {
-                title,
-                x: "distance (cell sides)",
-                y: "density",
-                xs: 0.0..2.6,
-                ys: 0.0..4.0,
-            };
-            let shown = spreads
-                .iter()
-                .filter(|s| s.cells == cells || s.cells == Cells::Own);
-            curves(area, &axes, &shown.map(Spread::curve).collect::<Vec<_>>())?;
+            let shown = |s: &&Spread| s.cells == cells || s.cells == Cells::Own;
+            let shown: Vec<_> = spreads.iter().filter(shown).map(Spread::curve).collect();
+            let x = ("distance (cell sides)", 0.0..2.6);
+            curves(area, title, x, ("density", 0.0..4.0), &shown)?;
         }
         Ok(())
     })

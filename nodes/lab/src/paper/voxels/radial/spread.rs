@@ -1,16 +1,15 @@
 //! The spread of distances over a set of cells.
 
-use crate::printed::printed_delta;
-use lattice_core::lattice::{Lattice, LatticeIndex, LatticeKind};
-
 use crate::AnyError;
 use crate::paper::estimate::Estimate;
 use crate::paper::parallel::in_parallel;
 use crate::paper::voxels::sample::Samples;
 use crate::paper::voxels::unit;
-use crate::report::Cell;
+use crate::printed::printed_delta;
 use crate::report::plot::{Curve, color, title};
+use crate::report::{Cell, numbers};
 use crate::theory::{mean_distance_m, second_moment};
+use lattice_core::lattice::{Lattice, LatticeIndex, LatticeKind};
 
 /// Bins of the curves, cell sides.
 const BIN: f64 = 0.02;
@@ -99,11 +98,8 @@ impl Spread {
         }
         // Of all cells together: mean distances, and squares by the law of the parallel axis.
         let n = set.len() as f64;
-        let exact_mean = set
-            .iter()
-            .map(|&w| mean_distance_m(&lattice, w))
-            .sum::<f64>()
-            / n;
+        let means = set.iter().map(|&w| mean_distance_m(&lattice, w));
+        let exact_mean = means.sum::<f64>() / n;
         let of_centers = centers.iter().map(|c| c.norm_squared()).sum::<f64>() / n;
         let square = 3.0 * second_moment(&lattice) + of_centers;
         let corners = lattice.cell().vertices.iter();
@@ -131,17 +127,14 @@ impl Spread {
     }
 
     pub fn row(&self) -> Vec<Cell> {
-        let mut row = vec![
-            title(self.kind).into(),
-            self.cells.name().into(),
-            self.n.into(),
-        ];
+        let names = [title(self.kind), self.cells.name()].map(Cell::from);
+        let mut row = names.to_vec();
+        row.push(self.n.into());
         row.push(Cell::Number(self.exact_mean, 4));
         row.extend(self.mean.cells(1.0, 5));
         row.push(Cell::Number(self.exact_std, 4));
         row.extend(self.std.cells(1.0, 5));
-        let rest = [self.nearest, self.farthest, self.range()];
-        row.extend(rest.map(|value| Cell::Number(value, 4)));
+        row.extend(numbers(4, [self.nearest, self.farthest, self.range()]));
         row
     }
 

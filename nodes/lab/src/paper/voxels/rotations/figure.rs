@@ -1,50 +1,36 @@
 //! Fig. 5 itself.
 
-use lattice_core::lattice::LatticeKind;
-
 use super::Run;
 use crate::AnyError;
 use crate::evaluate::extent;
 use crate::paper::voxels::scan::Scan;
 use crate::report::Figure;
-use crate::report::plot::{Axes, Curve, Layout, color, cumulative, curves, key, svg};
+use crate::report::plot::{Curve, Layout, color, cumulative, curves, key, svg};
+use lattice_core::lattice::LatticeKind;
 
 /// Cumulative distributions of a cloud: a row for each kind of turns.
 pub fn figure(scan: &Scan, runs: &[&Run]) -> Result<Figure, AnyError> {
-    let layout = Layout {
-        panel: (500, 310),
-        columns: 2,
-        rows: runs.len(),
-        key_width: 130,
-        key: &key(&LatticeKind::ALL),
-    };
+    let key = key(&LatticeKind::ALL);
+    let layout = Layout::new((500, 310), [2, runs.len()], 130, &key);
     let picture = svg(&layout, |areas| {
         let panels = runs.iter().flat_map(|run| [(run, false), (run, true)]);
         for (area, (run, counts)) in areas.iter().zip(panels) {
-            let lines: Vec<Curve> = LatticeKind::ALL
-                .into_iter()
-                .filter_map(|kind| {
-                    let measured = run.paper(kind)?;
-                    let values = match counts {
-                        true => &measured.counts,
-                        false => &measured.means_m,
-                    };
-                    Some((color(kind), cumulative(values)))
-                })
-                .collect();
+            let line = |kind| {
+                let measured = run.paper(kind)?;
+                let values = match counts {
+                    true => &measured.counts,
+                    false => &measured.means_m,
+                };
+                Some((color(kind), cumulative(values)))
+            };
+            let lines: Vec<Curve> = LatticeKind::ALL.into_iter().filter_map(line).collect();
             let (what, x) = match counts {
                 true => ("voxel count", "voxels"),
                 false => ("distortion", "mean distance (m)"),
             };
             let name = format!("{what}, {}", run.turns.name());
-            let axes = Axes {
-                title: &name,
-                x,
-                y: "share of poses",
-                xs: reach(&lines),
-                ys: 0.0..1.0,
-            };
-            curves(area, &axes, &lines)?;
+            let y = ("share of poses", 0.0..1.0);
+            curves(area, &name, (x, reach(&lines)), y, &lines)?;
         }
         Ok(())
     })?;

@@ -1,13 +1,12 @@
 //! A cloud at many poses, quantized to several lattices.
 
-use lattice_core::lattice::{BatchQuantizer, BlockKey, Lattice, LatticeKind, Orientation};
-use nalgebra::{Isometry3, Translation3, UnitQuaternion, Vector3};
-
 use crate::AnyError;
 use crate::paper::estimate::Estimate;
 use crate::paper::parallel::in_parallel;
 use crate::paper::streams::{Purpose, stream};
 use crate::report::plot::title;
+use lattice_core::lattice::{BatchQuantizer, BlockKey, Lattice, LatticeKind, Orientation};
+use nalgebra::{Isometry3, Translation3, UnitQuaternion, Vector3};
 
 /// Side of the cube that a cloud is moved in, metres.
 const REACH_M: f64 = 16.0;
@@ -48,14 +47,12 @@ impl Turns {
 /// A lattice and how it lies.
 #[derive(Clone, Copy, PartialEq, Debug)]
 pub struct Laid {
-    /// The lattice.
     pub kind: LatticeKind,
     /// Its axes in the map.
     pub orientation: Orientation,
 }
 
 impl Laid {
-    /// A lattice in the axes of the paper.
     pub fn paper(kind: LatticeKind) -> Laid {
         Laid {
             kind,
@@ -63,7 +60,6 @@ impl Laid {
         }
     }
 
-    /// A lattice with its flattest side down.
     pub fn flat(kind: LatticeKind) -> Laid {
         Laid {
             kind,
@@ -71,7 +67,6 @@ impl Laid {
         }
     }
 
-    /// Name in words.
     pub fn name(&self) -> String {
         match self.orientation {
             Orientation::Paper => title(self.kind).to_owned(),
@@ -82,9 +77,7 @@ impl Laid {
 
 /// Counts and errors of a lattice for a cloud at each pose.
 pub struct Measured {
-    /// The lattice.
     pub laid: Laid,
-    /// Occupied voxels at each pose.
     pub counts: Vec<f64>,
     /// Mean distance of eq. (13) at each pose, metres.
     pub means_m: Vec<f64>,
@@ -130,11 +123,11 @@ pub fn measure(
         let of = |lattice| quantized(points, lattice, pose);
         lattices.iter().map(of).collect::<Vec<_>>()
     });
-    let of = |(i, laid): (usize, &Laid)| {
+    let of = |(i, &laid): (usize, &Laid)| {
         let own = trials.iter().filter_map(|trial| trial.get(i));
         let (counts, means_m) = own.map(|q| (q.voxels as f64, q.mean_m)).unzip();
         Measured {
-            laid: *laid,
+            laid,
             counts,
             means_m,
         }
@@ -142,12 +135,9 @@ pub fn measure(
     Ok(laid.iter().enumerate().map(of).collect())
 }
 
-/// A cloud in a lattice.
 #[derive(Clone, Copy, Debug)]
 pub struct Quantized {
-    /// Occupied voxels.
     pub voxels: usize,
-    /// Mean distance of eq. (13), metres.
     pub mean_m: f64,
     /// Mean squared error by dimension, m^2.
     pub mse_m2: f64,

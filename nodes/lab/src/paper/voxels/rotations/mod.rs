@@ -4,8 +4,6 @@ mod figure;
 mod measure;
 mod tables;
 
-use lattice_core::lattice::LatticeKind;
-
 use super::scan::{Scan, Source, scans};
 use super::{Options, unit};
 use crate::AnyError;
@@ -15,6 +13,7 @@ use crate::report::plot::title;
 use crate::report::{Check, Section, Verdict};
 use crate::theory::mean_distance_m;
 use figure::figure;
+use lattice_core::lattice::LatticeKind;
 use measure::{Laid, Measured, Turns, measure};
 pub use measure::{Quantized, quantized};
 use tables::{details, summary};
@@ -114,6 +113,11 @@ pub fn section(options: &Options, progress: &mut dyn FnMut(f64)) -> Result<Secti
         });
         format!("{:+.1} to {:+.1} %", 100.0 * low, 100.0 * high)
     };
+    let (any, yaw) = (
+        |kind| count(Turns::Any, kind),
+        |kind| count(Turns::Yaw, kind),
+    );
+    let (bcc, fcc) = (LatticeKind::Bcc, LatticeKind::Fcc);
     Ok(Section {
         id: "fig5".into(),
         title: "Fig. 5: distortion and voxel count under random rotations".into(),
@@ -127,16 +131,8 @@ pub fn section(options: &Options, progress: &mut dyn FnMut(f64)) -> Result<Secti
              {} (BCC) and {} (FCC), as theory says. But a robot knows where down is. Turned about the vertical alone, \
              level ground decides: FCC changes by {}, BCC by {}, the flat prisms by {}. Laying FCC and BCC on their \
              flat side gives back most of that.",
-            count(Turns::Any, LatticeKind::Bcc),
-            count(Turns::Any, LatticeKind::Fcc),
-            count(Turns::Any, LatticeKind::Mcc),
-            steadiness(LatticeKind::Bcc),
-            steadiness(LatticeKind::Fcc),
-            mean(LatticeKind::Bcc),
-            mean(LatticeKind::Fcc),
-            count(Turns::Yaw, LatticeKind::Fcc),
-            count(Turns::Yaw, LatticeKind::Bcc),
-            count(Turns::Yaw, LatticeKind::Hex),
+            any(bcc), any(fcc), any(LatticeKind::Mcc), steadiness(bcc), steadiness(fcc), mean(bcc), mean(fcc),
+            yaw(fcc), yaw(bcc), yaw(LatticeKind::Hex),
         ),
         verdict: Verdict::Corrected(
             "It holds for rotations in all directions. In maps whose vertical is known FCC and BCC in the paper's axes \
@@ -151,10 +147,9 @@ pub fn section(options: &Options, progress: &mut dyn FnMut(f64)) -> Result<Secti
 
 /// Least and greatest value of the scans in their first cells.
 fn over_scans(runs: &[Run], turns: Turns, value: impl Fn(&Run) -> Option<f64>) -> [f64; 2] {
-    let drawn = runs
-        .iter()
-        .filter(|run| run.turns == turns && run.is_drawn());
-    let scans = drawn.filter(|run| run.scan.source != Source::Uniform);
+    let shown = |run: &&Run| run.turns == turns && run.is_drawn();
+    let scans = runs.iter().filter(shown);
+    let scans = scans.filter(|run| run.scan.source != Source::Uniform);
     extent(scans.filter_map(value))
 }
 
@@ -170,18 +165,17 @@ fn check(run: &Run) -> Result<Vec<Check>, AnyError> {
         for measured in &run.measured {
             let kind = measured.laid.kind;
             let of_theory = mean_distance_m(&unit(kind)?, [0; 3]) / cube - 1.0;
+            let what = format!("{name}: mean distance of {} to cubic (%)", title(kind));
+            let found = 100.0 * measured.mean_to(cubic).mean;
             checks.push(Check::new(
-                format!("{name}: mean distance of {} to cubic (%)", title(kind)),
+                what,
                 100.0 * of_theory,
-                100.0 * measured.mean_to(cubic).mean,
+                found,
                 100.0 * TOLERANCE,
             ));
-            checks.push(Check::new(
-                format!("{name}: count of {} to cubic (%)", title(kind)),
-                0.0,
-                100.0 * measured.count_to(cubic).mean,
-                100.0 * COUNT_TOLERANCE,
-            ));
+            let what = format!("{name}: count of {} to cubic (%)", title(kind));
+            let found = 100.0 * measured.count_to(cubic).mean;
+            checks.push(Check::new(what, 0.0, found, 100.0 * COUNT_TOLERANCE));
         }
         return Ok(checks);
     }
@@ -190,34 +184,36 @@ fn check(run: &Run) -> Result<Vec<Check>, AnyError> {
             let Some(measured) = run.paper(kind) else {
                 continue;
             };
-            let lattice = title(kind);
-            let mean = measured.mean_to(cubic);
+            let mut that = |what: &str, is_so: bool| {
+                let what = format!("{name}: {} {what}", title(kind));
+                checks.push(Check::that(what, is_so));
+            };
             let count = measured.count_to(cubic);
-            let what = format!("{name}: {lattice} has less distortion than cubic");
-            checks.push(Check::that(what, mean.is_negative()));
+            that(
+                "has less distortion than cubic",
+                measured.mean_to(cubic).is_negative(),
+            );
             if run.scan.source == Source::File {
-                let what = format!("{name}: {lattice} takes no more voxels than cubic");
-                checks.push(Check::that(what, !count.is_positive()));
+                that("takes no more voxels than cubic", !count.is_positive());
                 continue;
             }
-            let what = format!("{name}: {lattice} takes fewer voxels than cubic");
-            checks.push(Check::that(what, count.is_negative()));
-            let what = format!("{name}: {lattice} takes a steadier number than cubic");
+            that("takes fewer voxels than cubic", count.is_negative());
             let steadiness = spread(measured).over(&spread(cubic));
-            checks.push(Check::that(what, steadiness.mean + steadiness.half < 1.0));
+            let steadier = steadiness.mean + steadiness.half < 1.0;
+            that("takes a steadier number than cubic", steadier);
             if let Some(hex) = run.paper(LatticeKind::Hex) {
-                let what = format!("{name}: {lattice} takes fewer voxels than hex");
-                checks.push(Check::that(what, measured.count_to(hex).is_negative()));
+                that(
+                    "takes fewer voxels than hex",
+                    measured.count_to(hex).is_negative(),
+                );
             }
         }
     }
     if run.turns == Turns::Yaw && run.scan.source == Source::Simulated && run.is_drawn() {
         // Between walls the flat prisms gain little.
         let kinds = [(LatticeKind::Fcc, true), (LatticeKind::Hex, false)];
-        let kinds = kinds
-            .into_iter()
-            .take(if run.scan.outdoors { 2 } else { 1 });
-        for (kind, more) in kinds {
+        let shown = if run.scan.outdoors { 2 } else { 1 };
+        for (kind, more) in kinds.into_iter().take(shown) {
             if let Some(change) = run.count_change(kind) {
                 let (words, holds) = match more {
                     true => ("more", change.is_positive()),

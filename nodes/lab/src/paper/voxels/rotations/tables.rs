@@ -1,30 +1,22 @@
 //! The numbers of Fig. 5.
 
-use lattice_core::lattice::LatticeKind;
-
 use super::measure::Laid;
 use super::{ROUND, Run, spread};
 use crate::evaluate::Share;
 use crate::paper::estimate::Estimate;
 use crate::report::{Cell, Table};
+use lattice_core::lattice::LatticeKind;
 
 /// "-5.0 ± 0.1".
 fn percent(change: Estimate) -> Cell {
-    Cell::Text(format!(
-        "{:+.2} ± {:.2}",
-        100.0 * change.mean,
-        100.0 * change.half
-    ))
+    let [mean, half] = [change.mean, change.half].map(|value| 100.0 * value);
+    Cell::Text(format!("{mean:+.2} ± {half:.2}"))
 }
 
 /// A row for each run: the change of the count, lattice by lattice.
 pub fn summary(runs: &[Run]) -> Table {
-    let laid: Vec<Laid> = LatticeKind::ALL
-        .into_iter()
-        .skip(1)
-        .map(Laid::paper)
-        .chain(ROUND.map(Laid::flat))
-        .collect();
+    let others = LatticeKind::ALL.into_iter().skip(1).map(Laid::paper);
+    let laid: Vec<Laid> = others.chain(ROUND.map(Laid::flat)).collect();
     let row = |run: &Run| {
         let cubic = run.cubic();
         let count = cubic.map(|cubic| Estimate::of(cubic.counts.iter().copied()).mean);
@@ -40,39 +32,21 @@ pub fn summary(runs: &[Run]) -> Table {
         }));
         row
     };
-    let mut columns = ["points", "turned by", "cell volume (m³)", "voxels, cubic"]
-        .map(String::from)
-        .to_vec();
-    columns.extend(laid.iter().map(|laid| format!("{} (%)", laid.name())));
+    let mut columns = "points|turned by|cell volume (m³)|voxels, cubic".to_owned();
+    columns.extend(laid.iter().map(|laid| format!("|{} (%)", laid.name())));
     Table::new(
         "fig5_counts",
         "Voxel count against cubic at the same poses, mean with 95 % interval",
-        columns,
+        &columns,
         runs.iter().map(row),
     )
 }
 
 /// A row for each lattice of each run.
 pub fn details(runs: &[Run]) -> Table {
-    let columns = [
-        "points",
-        "turned by",
-        "cell volume (m³)",
-        "lattice",
-        "poses",
-        "voxels",
-        "±",
-        "to cubic (%)",
-        "±",
-        "std of voxels",
-        "±",
-        "std to cubic",
-        "mean distance (m)",
-        "to cubic (%)",
-        "±",
-        "poses at which cubic takes fewer (%)",
-        "95 % interval",
-    ];
+    let columns = "points|turned by|cell volume (m³)|lattice|poses|voxels|±|to cubic (%)|±|std of voxels|\
+        ±|std to cubic|mean distance (m)|to cubic (%)|±|poses at which cubic takes fewer (%)|\
+        95 % interval";
     let mut rows = Vec::new();
     for run in runs {
         let Some(cubic) = run.cubic() else {

@@ -1,15 +1,14 @@
 //! Boxes and drums that become a labelled mesh.
 
-use std::f32::consts::TAU;
-
 use crate::AnyError;
 use crate::mesh::LabelledMesh;
+use std::f32::consts::TAU;
 
 /// Sides of a drum.
 const SIDES: u32 = 14;
 
 /// Place of a piece of furniture: its back against a wall, its front along y turned by `yaw`.
-#[derive(Clone, Copy, Debug)]
+#[derive(Clone, Copy, Default, Debug)]
 pub(super) struct Spot {
     pub(super) x: f32,
     pub(super) y: f32,
@@ -25,7 +24,7 @@ pub(super) struct Builder {
     instances: Vec<u16>,
     label: u16,
     instance: u16,
-    spot: Option<Spot>,
+    spot: Spot,
 }
 
 impl Builder {
@@ -33,34 +32,21 @@ impl Builder {
     pub(super) fn thing(&mut self, label: u16, spot: Spot) -> &mut Builder {
         self.instance += 1;
         self.label = label;
-        self.spot = Some(spot);
+        self.spot = spot;
         self
     }
 
     /// Starts a thing whose parts are given in the axes of the house.
     pub(super) fn fixed(&mut self, label: u16) -> &mut Builder {
-        self.thing(
-            label,
-            Spot {
-                x: 0.0,
-                y: 0.0,
-                yaw_deg: 0.0,
-            },
-        )
+        self.thing(label, Spot::default())
     }
 
     /// A box from its lowest to its highest corner.
     pub(super) fn block(&mut self, low: [f32; 3], high: [f32; 3]) -> &mut Builder {
         let first = self.vertices_m.len() as u32;
         for corner in 0..8 {
-            let of = |axis: usize| {
-                if corner >> axis & 1 == 0 {
-                    low[axis]
-                } else {
-                    high[axis]
-                }
-            };
-            self.vertex([of(0), of(1), of(2)]);
+            let of = |axis: usize| [low, high][corner >> axis & 1][axis];
+            self.vertex([0, 1, 2].map(of));
         }
         for [a, b, c, d] in [
             [0, 2, 3, 1],
@@ -98,11 +84,7 @@ impl Builder {
     }
 
     fn vertex(&mut self, [x, y, z]: [f32; 3]) {
-        let spot = self.spot.unwrap_or(Spot {
-            x: 0.0,
-            y: 0.0,
-            yaw_deg: 0.0,
-        });
+        let spot = self.spot;
         let (sin, cos) = spot.yaw_deg.to_radians().sin_cos();
         let turned = [spot.x + cos * x - sin * y, spot.y + sin * x + cos * y, z];
         self.vertices_m.push(turned);

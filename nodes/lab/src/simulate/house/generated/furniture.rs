@@ -45,7 +45,6 @@ fn plate(b: &mut Builder, label: u16, spot: Spot, [width, depth, height]: [f32; 
     }
 }
 
-/// A table.
 pub(super) fn table(b: &mut Builder, spot: Spot, size: [f32; 3]) {
     plate(b, TABLE, spot, size);
 }
@@ -156,7 +155,6 @@ pub(super) fn counter(b: &mut Builder, spot: Spot, width: f32) {
         .drum([-half * 0.75, 0.25], [0.9, 1.15], [0.08, 0.1]);
 }
 
-/// A fridge.
 pub(super) fn fridge(b: &mut Builder, spot: Spot) {
     b.thing(FRIDGE, spot)
         .block([-0.34, 0.0, 0.03], [0.34, 0.64, 1.92])

@@ -5,34 +5,15 @@ mod furniture;
 mod rooms;
 mod walls;
 
-use std::collections::BTreeMap;
-
 use super::House;
 use crate::AnyError;
 use crate::simulate::random::{Purpose, Stream};
 use builder::Builder;
+use std::collections::BTreeMap;
 
 /// The classes, by number.
-const CLASSES: [&str; 18] = [
-    "wall",
-    "floor",
-    "ceiling",
-    "tv",
-    "cabinet",
-    "desk",
-    "table",
-    "chair",
-    "sofa",
-    "bookshelf",
-    "counter",
-    "fridge",
-    "bed",
-    "door",
-    "window",
-    "curtain",
-    "picture",
-    "other",
-];
+const CLASSES: &str = "wall floor ceiling tv cabinet desk table chair sofa bookshelf counter fridge \
+                       bed door window curtain picture other";
 
 const WALL: u16 = 0;
 const FLOOR: u16 = 1;
@@ -59,15 +40,30 @@ impl House {
     pub fn generated(seed: u64) -> Result<House, AnyError> {
         let mut builder = Builder::default();
         let mut stream = Stream::new(seed, Purpose::GeneratedHouse, 0, 0);
-        walls::build(&mut builder);
-        rooms::furnish(&mut builder, &mut stream);
-        let names = CLASSES.map(str::to_owned);
+        walls::build(&mut builder)?;
+        rooms::furnish(&mut builder, &mut stream)?;
+        let names = CLASSES.split_whitespace().map(str::to_owned);
         let names: BTreeMap<u16, String> = (0..).zip(names).collect();
         House::from_mesh(builder.build()?, names)
     }
 }
 
-/// A number from the stream.
 fn between(stream: &mut Stream, low: f32, high: f32) -> f32 {
     low + (high - low) * stream.uniform() as f32
+}
+
+/// A line with its words and the numbers after them.
+type Line<'a> = (&'a str, Vec<&'a str>, Vec<f32>);
+
+/// The lines of a text, without comments.
+fn lines(text: &str) -> impl Iterator<Item = Result<Line<'_>, AnyError>> {
+    let lines = text
+        .lines()
+        .filter(|line| !line.is_empty() && !line.starts_with('#'));
+    lines.map(|line| {
+        let is_word = |word: &&str| word.starts_with(|c: char| c.is_ascii_alphabetic());
+        let words: Vec<&str> = line.split_whitespace().take_while(is_word).collect();
+        let numbers = line.split_whitespace().skip(words.len()).map(str::parse);
+        Ok((line, words, numbers.collect::<Result<_, _>>()?))
+    })
 }

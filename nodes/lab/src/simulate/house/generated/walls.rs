@@ -1,7 +1,8 @@
 //! Floor, walls, doors and windows.
 
 use super::builder::{Builder, Spot};
-use super::{CEILING, CURTAIN, DOOR, FLOOR, WALL, WINDOW};
+use super::{CEILING, CURTAIN, DOOR, FLOOR, WALL, WINDOW, lines};
+use crate::AnyError;
 
 /// Height of the rooms, m.
 const HEIGHT: f32 = 2.8;
@@ -19,143 +20,73 @@ enum Opening {
 
 use Opening::{Door, Window};
 
-/// Walls along x: their y, from and to, openings in order.
-const ALONG_X: [(f32, f32, f32, &[Opening]); 5] = [
-    (
-        0.0,
-        0.0,
-        20.0,
-        &[
-            Window(1.0, 2.6, 0.9, 2.2),
-            Window(9.4, 12.4, 1.1, 2.1),
-            Window(16.4, 18.2, 0.8, 2.3),
-        ],
-    ),
-    (
-        6.5,
-        0.0,
-        20.0,
-        &[
-            Door(5.8, 7.4, None),
-            Door(9.0, 10.0, Some(75.0)),
-            Door(15.2, 16.1, Some(60.0)),
-        ],
-    ),
-    (
-        7.9,
-        0.0,
-        20.0,
-        &[
-            Door(4.2, 5.1, Some(-80.0)),
-            Door(7.4, 8.2, Some(-50.0)),
-            Door(11.6, 12.6, None),
-            Door(17.8, 18.7, Some(-70.0)),
-        ],
-    ),
-    (
-        12.0,
-        0.0,
-        15.6,
-        &[
-            Window(1.2, 3.0, 0.9, 2.2),
-            Window(7.6, 8.3, 1.5, 2.2),
-            Window(10.6, 13.8, 0.5, 2.2),
-        ],
-    ),
-    // The store in the corner is set back.
-    (11.0, 15.6, 20.0, &[Window(17.0, 18.0, 1.4, 2.1)]),
-];
+/// A wall: its spot, from and to, openings in order.
+type Wall = (Spot, f32, f32, Vec<Opening>);
 
-/// Walls along y: their x, from and to, openings in order.
-const ALONG_Y: [(f32, f32, f32, &[Opening]); 8] = [
-    (
-        0.0,
-        0.0,
-        12.0,
-        &[Window(3.2, 5.6, 0.4, 2.3), Window(9.0, 10.2, 0.9, 2.2)],
-    ),
-    (
-        20.0,
-        0.0,
-        11.0,
-        &[Window(1.6, 3.9, 0.9, 2.2), Window(6.9, 7.5, 0.2, 2.2)],
-    ),
-    (8.0, 0.0, 6.5, &[Door(2.2, 4.4, None)]),
-    (14.2, 0.0, 6.5, &[Door(5.3, 6.2, None)]),
-    (6.3, 7.9, 12.0, &[]),
-    (9.4, 7.9, 12.0, &[]),
-    (15.6, 7.9, 12.0, &[]),
-    // A stub that makes the kitchen a corner of its own.
-    (11.0, 5.0, 6.5, &[]),
-];
-
-pub(super) fn build(builder: &mut Builder) {
-    builder
-        .fixed(FLOOR)
-        .block([0.0, 0.0, -0.1], [20.0, 12.0, 0.0]);
-    builder
-        .fixed(CEILING)
-        .block([0.0, 0.0, HEIGHT], [20.0, 12.0, HEIGHT + 0.1]);
-    for (y, from, to, openings) in ALONG_X {
-        wall(
-            builder,
-            Spot {
-                x: from,
-                y,
-                yaw_deg: 0.0,
-            },
-            from,
-            to,
-            openings,
-        );
+/// The walls that `walls.txt` lists.
+fn walls() -> Result<Vec<Wall>, AnyError> {
+    let mut walls: Vec<Wall> = Vec::new();
+    for line in lines(include_str!("walls.txt")) {
+        let (line, words, n) = line?;
+        let opening = match (words.as_slice(), n.as_slice()) {
+            (["window"], &[from, to, sill, lintel]) => Window(from, to, sill, lintel),
+            (["door"], &[from, to]) => Door(from, to, None),
+            (["door"], &[from, to, open_deg]) => Door(from, to, Some(open_deg)),
+            (["along_x"], &[y, from, to]) => {
+                walls.push((
+                    Spot {
+                        x: from,
+                        y,
+                        yaw_deg: 0.0,
+                    },
+                    from,
+                    to,
+                    Vec::new(),
+                ));
+                continue;
+            }
+            (["along_y"], &[x, from, to]) => {
+                walls.push((
+                    Spot {
+                        x,
+                        y: from,
+                        yaw_deg: 90.0,
+                    },
+                    from,
+                    to,
+                    Vec::new(),
+                ));
+                continue;
+            }
+            _ => return Err(format!("walls.txt: {line}").into()),
+        };
+        let wall = walls.last_mut().ok_or("walls.txt begins with an opening")?;
+        wall.3.push(opening);
     }
-    for (x, from, to, openings) in ALONG_Y {
-        wall(
-            builder,
-            Spot {
-                x,
-                y: from,
-                yaw_deg: 90.0,
-            },
-            from,
-            to,
-            openings,
-        );
+    Ok(walls)
+}
+
+pub(super) fn build(builder: &mut Builder) -> Result<(), AnyError> {
+    let floor = builder.fixed(FLOOR);
+    floor.block([0.0, 0.0, -0.1], [20.0, 12.0, 0.0]);
+    let ceiling = builder.fixed(CEILING);
+    ceiling.block([0.0, 0.0, HEIGHT], [20.0, 12.0, HEIGHT + 0.1]);
+    for (spot, from, to, openings) in walls()? {
+        wall(builder, spot, from, to, &openings);
     }
     // A chimney and a column.
-    builder
-        .fixed(WALL)
-        .block([7.3, 5.7, 0.0], [8.0, 6.5, HEIGHT]);
-    builder
-        .fixed(WALL)
-        .drum([13.4, 9.6], [0.0, HEIGHT], [0.16, 0.16]);
-    curtain(
-        builder,
-        Spot {
-            x: 0.18,
-            y: 3.0,
-            yaw_deg: 90.0,
-        },
-        1.1,
-    );
-    curtain(
-        builder,
-        Spot {
-            x: 0.18,
-            y: 5.0,
-            yaw_deg: 90.0,
-        },
-        0.8,
-    );
-    curtain(
-        builder,
-        Spot {
-            x: 10.3,
-            y: 11.82,
-            yaw_deg: 0.0,
-        },
-        0.9,
-    );
+    let chimney = builder.fixed(WALL);
+    chimney.block([7.3, 5.7, 0.0], [8.0, 6.5, HEIGHT]);
+    let column = builder.fixed(WALL);
+    column.drum([13.4, 9.6], [0.0, HEIGHT], [0.16, 0.16]);
+    for (x, y, yaw_deg, width) in [
+        (0.18, 3.0, 90.0, 1.1),
+        (0.18, 5.0, 90.0, 0.8),
+        (10.3, 11.82, 0.0, 0.9),
+    ] {
+        curtain(builder, Spot { x, y, yaw_deg }, width);
+    }
+    Ok(())
 }
 
 /// A wall along the x axis of its spot, which stands at `from`.

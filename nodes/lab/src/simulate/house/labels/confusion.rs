@@ -1,11 +1,9 @@
 //! Classes that segmenters confuse.
 
-use std::collections::{BTreeMap, BTreeSet};
-
-use lattice_core::registration::UNLABELED;
-
 use crate::simulate::house::House;
 use crate::simulate::random::Stream;
+use lattice_core::registration::UNLABELED;
+use std::collections::{BTreeMap, BTreeSet};
 
 /// Classes that segmenters take for each other, the most usual first.
 const CONFUSIONS: [(&str, &[&str]); 18] = [

@@ -3,15 +3,14 @@
 mod confusion;
 mod flips;
 
-use lattice_core::registration::{LabelDistribution, SemanticCloud, UNLABELED};
-use nalgebra::Point3;
-
 use super::{HeadsetTrial, House};
 use crate::AnyError;
 use crate::options::within;
 use crate::simulate::random::{Purpose, Stream};
 use confusion::Confusion;
 use flips::flipped;
+use lattice_core::registration::{LabelDistribution, SemanticCloud, UNLABELED};
+use nalgebra::Point3;
 
 /// The labels of one device, region by region.
 #[derive(Clone, PartialEq, Debug)]
