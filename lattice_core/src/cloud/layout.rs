@@ -3,7 +3,6 @@
 use super::view::Coordinates;
 use super::{CloudError, CloudView};
 
-/// More fields than any sensor declares.
 const MAX_FIELDS: usize = 256;
 /// Longest part of a foreign name, and most names, repeated in an error.
 const SHOWN_CHARS: usize = 48;

@@ -33,7 +33,6 @@ struct Step {
     index: Wide,
 }
 
-/// The quantizer for a basis.
 #[derive(Clone, Debug)]
 pub(super) struct Basis {
     /// Rows that take a point (metres) to coordinates in the reduced basis.

@@ -11,7 +11,6 @@ use crate::voxels::VoxelStore;
 /// Most cells that a robot may cover.
 pub const MAX_ROBOT_CELLS: usize = 1 << 16;
 
-/// Occupied cells that touch a ball.
 pub(super) struct Corridor {
     /// Cells that touch the ball in the middle of cell 0, nearest first.
     at: Vec<LatticeIndex>,

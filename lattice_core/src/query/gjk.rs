@@ -39,7 +39,6 @@ pub(super) fn distance_m(support: impl Fn(&Vector3<f64>) -> Vector3<f64>) -> f64
     nearest.norm()
 }
 
-/// Up to four points.
 #[derive(Clone, Copy, Default)]
 struct Simplex {
     points: [Vector3<f64>; 4],

@@ -275,7 +275,6 @@ impl<S: VoxelStore> Query<'_, S> {
     }
 }
 
-/// State of a cell in the search.
 #[derive(Clone, Copy)]
 enum Cell {
     /// The ball does not fit.
@@ -285,7 +284,6 @@ enum Cell {
     Reached(Reached),
 }
 
-/// The shortest way known.
 #[derive(Clone, Copy)]
 struct Reached {
     from: MortonKey,

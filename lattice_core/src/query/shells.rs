@@ -16,10 +16,8 @@ pub struct Shells {
     steps: Vec<Step>,
 }
 
-/// A cell relative to another.
 #[derive(Clone, Copy, Debug)]
 pub(super) struct Step {
-    /// Between the centres.
     pub(super) distance_m: f64,
     pub(super) by: LatticeIndex,
 }

@@ -17,7 +17,6 @@ pub(super) struct Tree {
     half_diagonal_m: f64,
 }
 
-/// A run of keys and what they span.
 #[derive(Clone, Copy)]
 struct Node<'a> {
     keys: &'a [MortonKey],

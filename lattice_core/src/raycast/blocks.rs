@@ -5,7 +5,6 @@ use super::masks::{Mask, ScanMasks};
 use super::packed::Packed;
 use crate::voxels::store::hash_table::{Row, Table};
 
-/// Cells of a block.
 pub(super) const CELLS: usize = 512;
 /// Blocks that are allocated at once.
 const PAGE: usize = 64;
@@ -37,7 +36,6 @@ impl Blocks {
     /// Most memory for a block, bytes: cells, row, and slot of a scan twice for the growth of vectors.
     pub(super) const BYTES_PER_BLOCK: usize = CELLS + Table::<Block>::ROW_BYTES + 2 * 4;
 
-    /// At most `most` blocks.
     pub(super) fn new(most: usize) -> Blocks {
         Blocks {
             table: Table::new(),
@@ -60,7 +58,6 @@ impl Blocks {
         self.cells(self.table.find(block)?)
     }
 
-    /// All cells that are known.
     pub(super) fn known(&self) -> impl Iterator<Item = (Packed, i8)> {
         (0..)
             .zip(self.table.rows())

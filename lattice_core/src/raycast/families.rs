@@ -165,7 +165,6 @@ pub(super) struct Origin<const P: usize> {
     along: [f64; P],
 }
 
-/// Position of a ray.
 #[derive(Clone, Copy, Debug)]
 pub(super) struct Walk<const P: usize> {
     q: [f64; P],
@@ -178,7 +177,6 @@ pub(super) struct Walk<const P: usize> {
 #[derive(Clone, Copy, Debug)]
 pub(super) struct Ray<const P: usize> {
     pub(super) walk: Walk<P>,
-    /// Steps taken.
     pub(super) steps: u64,
     /// Steps that are surely enough.
     pub(super) limit: u64,

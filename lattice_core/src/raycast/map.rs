@@ -41,7 +41,6 @@ pub struct FreeSpaceMap {
     free: Free,
 }
 
-/// Cells in which free space is kept.
 #[derive(Clone)]
 enum Free {
     /// None but those that were hit.

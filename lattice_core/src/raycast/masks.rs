@@ -29,7 +29,6 @@ impl Mask {
         left
     }
 
-    /// Places of the cells.
     pub(super) fn places(&self) -> impl Iterator<Item = usize> + '_ {
         places(&self.0)
     }
@@ -84,7 +83,6 @@ impl Cursor {
 }
 
 impl ScanMasks {
-    /// At most `most` blocks in a scan.
     pub(super) fn new(most: usize) -> ScanMasks {
         let bits = 8;
         ScanMasks {
@@ -134,7 +132,6 @@ impl ScanMasks {
         blocks.map(|(block, (passed, hit))| (*block, passed, hit))
     }
 
-    /// Marks a cell as passed through.
     #[inline(always)]
     pub(super) fn pass(&mut self, cell: Packed, cursor: &mut Cursor) {
         if cell.block() != cursor.block {
@@ -155,7 +152,6 @@ impl ScanMasks {
         new.is_some_and(|mask| mask.set(cell.place())) || cursor.slot == 0
     }
 
-    /// True if the cell was hit.
     pub(super) fn is_hit(&self, cell: Packed) -> bool {
         let mask = self.find(cell.block()).and_then(|slot| self.hit.get(slot));
         let place = cell.place();

@@ -52,7 +52,6 @@ impl Packed {
         Packed(block | (p & 7) | (p & 0o70) << (BITS - 3) | (p & 0o700) << (2 * BITS - 6))
     }
 
-    /// The Morton key of the index.
     #[inline]
     pub(super) fn key(self) -> Option<MortonKey> {
         MortonKey::pack(self.unpack())

@@ -10,7 +10,6 @@ use super::traversal::{Kernel, Outside, Traversal};
 use crate::cloud::Cloud;
 use crate::lattice::Simd;
 
-/// Rays that take turns.
 const LANES: usize = 4;
 
 /// Points that were seen from one place, in the map frame: a scan is one or more of these.
@@ -74,7 +73,6 @@ impl Default for Reach {
 
 /// Cells where rays end, each once.
 pub(super) struct Ends {
-    /// Cells that were hit.
     hits: Vec<Packed>,
     /// Cells where the range limit cuts rays.
     open: Vec<Packed>,

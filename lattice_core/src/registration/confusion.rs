@@ -144,7 +144,6 @@ fn shares_of(labels: impl Iterator<Item = LabelDistribution>) -> Vec<(u16, f64)>
     shares
 }
 
-/// Shares of rows and columns.
 fn marginals(joint: &[f64], rows: usize, columns: usize, n: f64) -> (Vec<f64>, Vec<f64>) {
     let mut p = vec![0.0; rows];
     let mut q = vec![0.0; columns];
@@ -155,7 +154,6 @@ fn marginals(joint: &[f64], rows: usize, columns: usize, n: f64) -> (Vec<f64>, V
     (p, q)
 }
 
-/// Sums of observations.
 #[derive(Clone, Debug, Default)]
 pub(super) struct Counts(BTreeMap<(u16, u16), f64>);
 

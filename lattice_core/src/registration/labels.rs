@@ -3,7 +3,6 @@
 /// Class number of a point without a label, as in `vision_msgs/LabelInfo`.
 pub const UNLABELED: u16 = u16::MAX;
 
-/// Classes that a distribution keeps.
 const KEPT: usize = 4;
 
 /// Probabilities of the most probable classes of a point; what is missing to one is unknown.

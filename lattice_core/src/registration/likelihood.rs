@@ -62,7 +62,6 @@ const CLOSENESS: [f64; 5] = [
     0.25,
 ];
 
-/// A partner of a source point.
 #[derive(Clone, Copy, Debug)]
 struct Partner {
     target: u32,
@@ -275,7 +274,6 @@ impl<'a> Fit<'a> {
         self.weights.get(i).copied().unwrap_or(0.0)
     }
 
-    /// Log-likelihood without labels.
     fn by_surfaces(&self, partners: &Partners, closeness: f64) -> f64 {
         let of_point = partners.of_point.iter().enumerate().map(|(i, near)| {
             let plain: f64 = near.iter().map(|p| p.nearness(closeness)).sum();

@@ -75,7 +75,6 @@ fn next_key(before: Option<MortonKey>, step: u64) -> Option<MortonKey> {
     }
 }
 
-/// Appends a varint.
 pub(super) fn push_varint(bytes: &mut Vec<u8>, mut value: u64) {
     while value >= 0x80 {
         bytes.push(value as u8 | 0x80);
@@ -84,13 +83,11 @@ pub(super) fn push_varint(bytes: &mut Vec<u8>, mut value: u64) {
     bytes.push(value as u8);
 }
 
-/// Takes varints off bytes.
 pub(super) struct Varints<'a> {
     bytes: &'a [u8],
     position: usize,
 }
 
-/// The top bits of eight bytes.
 const TOP_BITS: u64 = 0x8080_8080_8080_8080;
 
 impl<'a> Varints<'a> {
@@ -98,7 +95,6 @@ impl<'a> Varints<'a> {
         Varints { bytes, position: 0 }
     }
 
-    /// Bytes taken.
     pub(super) fn position(&self) -> usize {
         self.position
     }

@@ -36,7 +36,6 @@ pub(super) struct DistortionSums {
 }
 
 impl DistortionSums {
-    /// Adds the points of a batch.
     #[inline]
     pub(super) fn add_batch(&mut self, batch: &BatchSums) {
         self.add(&DistortionSums {
@@ -47,7 +46,6 @@ impl DistortionSums {
         });
     }
 
-    /// Adds other points.
     pub(super) fn add(&mut self, other: &DistortionSums) {
         self.points = self.points.saturating_add(other.points);
         self.squares = self.squares.saturating_add(other.squares);

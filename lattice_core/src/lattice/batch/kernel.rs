@@ -19,7 +19,6 @@ const ROUND: f32 = 1.5 * (1_u32 << 23) as f32;
 /// Statistics count in this fraction of a cell side (and of its square).
 pub(crate) const STEPS: f32 = (1_u32 << 20) as f32;
 
-/// Constants of the kernel.
 #[derive(Clone, Copy, Debug)]
 pub(super) struct Constants {
     /// `M`, row by row: cuboid sides per metre.
@@ -42,7 +41,6 @@ pub(super) struct Constants {
     pub(super) reach_m: f32,
 }
 
-/// Answer of the kernel for a point.
 #[derive(Clone, Copy)]
 pub(super) struct Lane {
     /// Low and high half.

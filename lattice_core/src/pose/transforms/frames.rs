@@ -9,7 +9,6 @@ use crate::pose::track::Track;
 
 /// Most parents of a frame, static and moving ones counted apart.
 const MAX_PARENTS: usize = 4;
-/// Most frames to keep.
 const MAX_KEPT: usize = 64;
 
 #[derive(Clone, Debug)]

@@ -26,7 +26,6 @@ pub(super) struct PoseCovariance {
     pub at_source: Matrix6<f64>,
 }
 
-/// Errors of the source.
 pub(super) struct ErrorModel {
     /// Side of a region that errs as one, metres.
     pub region_m: f64,
@@ -42,9 +41,7 @@ pub(super) struct ErrorModel {
 
 /// Pull of the points of a region on the pose.
 struct Pull {
-    /// By their residuals.
     residual: Vector6<f64>,
-    /// By a motion of the region.
     motion: Matrix6x3<f64>,
 }
 

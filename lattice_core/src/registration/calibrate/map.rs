@@ -11,7 +11,6 @@ pub struct CalibrationMap {
     pub(super) surfaces: SearchMap,
     pub(super) occupied: OccupiedGrid,
     pub(super) spacing_m: f64,
-    /// Shares of the classes.
     pub(super) classes: Vec<(u16, f64)>,
 }
 

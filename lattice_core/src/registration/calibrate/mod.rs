@@ -34,9 +34,7 @@ pub use types::{
 
 /// Hypotheses of the search by surfaces: a piece of wall fits many walls.
 const BY_SURFACES: usize = 128;
-/// Hypotheses of the search by labels.
 const BY_LABELS: usize = 64;
-/// Candidates that are refined to the end.
 const FINALISTS: usize = 4;
 /// Log-likelihood of an observation that refining a candidate may still win it.
 const HOPE: f64 = 0.5;
@@ -141,7 +139,6 @@ fn step(progress: &dyn Progress, stage: Stage, fraction: f64) -> Result<(), Refu
     }
 }
 
-/// Poses that the surfaces fit.
 fn by_surfaces(bench: &Workbench<'_>, region: Option<&Region>) -> Vec<Hypothesis> {
     let source = SearchSource::by_surface(&bench.input.few, bench.input.sensor_m);
     search(&bench.map.surfaces, &source, region, BY_SURFACES)
@@ -175,7 +172,6 @@ fn by_labels(bench: &Workbench<'_>, region: Option<&Region>) -> Vec<Hypothesis> 
     search(&labels, &source, region, BY_LABELS)
 }
 
-/// The classes of most points.
 fn frequent_classes(cloud: &PreparedCloud) -> Vec<u16> {
     let mut counts = std::collections::BTreeMap::new();
     for class in (0..cloud.len()).filter_map(|i| cloud.label(i).top()) {

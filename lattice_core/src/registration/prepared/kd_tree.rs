@@ -6,7 +6,6 @@
 
 use nalgebra::Point3;
 
-/// Points of a leaf.
 pub(crate) const BLOCK: usize = 8;
 /// Smallest number of points whose halves are built in parallel.
 const PARALLEL: usize = 4096;
@@ -153,7 +152,6 @@ fn widest_axis(items: &[Item]) -> usize {
     if width(2) > width(wider) { 2 } else { wider }
 }
 
-/// Keeps the nearest point.
 pub(crate) struct Nearest {
     pub index: u32,
     pub squared: f64,
@@ -231,7 +229,6 @@ impl Neighbors {
         (self.len == k && k > 0).then(|| self.squared[k - 1])
     }
 
-    /// Indices of what was found.
     pub(crate) fn indices(&self) -> &[u32] {
         &self.index[..self.len]
     }

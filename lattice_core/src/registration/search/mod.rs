@@ -23,7 +23,6 @@ use super::PreparedCloud;
 
 pub use occupied::OccupiedGrid;
 
-/// Places kept of each heading.
 const PLACES: usize = 24;
 /// Peaks that are climbed for each hypothesis that is wanted.
 const CLIMBED: usize = 3;
@@ -281,7 +280,6 @@ fn climb(
     (probe.score(field, yaw, &place, 1), yaw, place)
 }
 
-/// Steps both ways along the axes.
 fn axis_moves(step: f64) -> [Vector3<f64>; 6] {
     let axes = [Vector3::x(), Vector3::y(), Vector3::z()];
     std::array::from_fn(|i| axes[i / 2] * if i % 2 == 0 { step } else { -step })

@@ -4,7 +4,6 @@ use nalgebra::{Point3, Vector3};
 
 use super::grid::Grid;
 
-/// Fewest points of a facet.
 const MIN_POINTS: u32 = 3;
 /// Length of the mean of unit normals below which a cell holds an edge or clutter.
 const FLAT: f32 = 0.8;
@@ -22,10 +21,8 @@ pub struct OccupiedGrid {
     facets: Vec<Facet>,
 }
 
-/// The piece of surface in a cell.
 #[derive(Clone, Copy, Debug)]
 struct Facet {
-    /// Mean of the points.
     middle_m: Point3<f32>,
     /// Mean of the normals, all on one side.
     normal: Vector3<f32>,

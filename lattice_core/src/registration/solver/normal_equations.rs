@@ -9,7 +9,6 @@ use nalgebra::{Isometry3, Matrix3, Matrix6, Vector3, Vector6};
 use super::pair::Pair;
 use super::robust_kernel::Kernel;
 
-/// Sums over pairs.
 #[derive(Clone, Copy, Debug, Default)]
 pub(super) struct Sums {
     pub cost: f64,

@@ -4,7 +4,6 @@
 
 use nalgebra::{Point3, Vector3};
 
-/// Measure of the distance of a pair.
 #[derive(Clone, Copy, Debug)]
 pub(super) enum Metric {
     /// |r|^2.

@@ -16,10 +16,8 @@ use crate::registration::{
 
 /// Source points of one piece of parallel work.
 const CHUNK: usize = 256;
-/// Slot without a pair.
 pub(super) const NONE: u32 = u32::MAX;
 
-/// A candidate of a source point.
 #[derive(Clone, Copy)]
 pub(super) struct Slot {
     pub target: u32,
@@ -32,7 +30,6 @@ pub(super) struct Layer<'a> {
     pub target: &'a Surface,
 }
 
-/// Pairs of all layers.
 pub(super) struct Pairs<'a> {
     layers: Vec<Layer<'a>>,
     pub(super) labels: Labels<'a>,

@@ -86,7 +86,6 @@ pub(super) fn expect(values: &mut Varints) -> Result<u64, ColumnError> {
     value.ok_or_else(|| values.error("it has too few values".into()))
 }
 
-/// Fails if there are more values.
 pub(super) fn expect_end(values: &mut Varints) -> Result<(), ColumnError> {
     match values.next_value()? {
         Some(_) => Err(values.error("it has too many values".into())),

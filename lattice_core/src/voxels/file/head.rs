@@ -15,7 +15,6 @@ pub(super) const HEAD_BYTES: usize = 224;
 /// Bytes of the head of a section, its checksum included.
 pub(super) const SECTION_HEAD_BYTES: usize = 48;
 
-/// Places in the head.
 const VOLUME_AT: u64 = 24;
 const ORIENTATION_AT: u64 = 32;
 const GENERATOR_AT: u64 = 64;
@@ -98,7 +97,6 @@ fn orientation(lattice: &Lattice) -> [f64; 4] {
     [q.w, q.i, q.j, q.k]
 }
 
-/// Error in a rotation.
 pub(super) fn orientation_error(map_from_lattice: &UnitQuaternion<f64>) -> Option<String> {
     let square = map_from_lattice.coords.norm_squared();
     // Not a number is refused too.
@@ -148,7 +146,6 @@ fn lattice(
     Ok(lattice)
 }
 
-/// Encoding of the values of a section.
 #[derive(Clone, Copy, PartialEq, Eq, Debug)]
 #[repr(u8)]
 pub(super) enum Encoding {
@@ -164,7 +161,6 @@ pub(super) enum Encoding {
     Rows = 4,
 }
 
-/// Compression of the bytes of a section.
 #[derive(Clone, Copy, PartialEq, Eq, Debug)]
 #[repr(u8)]
 pub(super) enum Codec {

@@ -92,7 +92,6 @@ impl MapContents {
         Ok(contents)
     }
 
-    /// The keys, which are the first column.
     fn set_keys(&mut self, bytes: &[u8], voxels: u64) -> Result<(), ColumnError> {
         let max = usize::try_from(voxels).unwrap_or(usize::MAX);
         self.keys = decode_keys(bytes, max)?;
@@ -104,7 +103,6 @@ impl MapContents {
         Ok(())
     }
 
-    /// The point counts, one for each key.
     fn set_counts(&mut self, bytes: &[u8]) -> Result<(), ColumnError> {
         let mut values = Varints::new(bytes);
         let mut voxels = Vec::with_capacity(self.keys.len());
@@ -121,7 +119,6 @@ impl MapContents {
         Ok(())
     }
 
-    /// The offset sums, three for each key.
     fn set_sums(&mut self, bytes: &[u8]) -> Result<(), ColumnError> {
         let mut values = Varints::new(bytes);
         let reach = reach(&self.lattice);

@@ -28,7 +28,6 @@ impl<R: Read> Source<R> {
         }
     }
 
-    /// Bytes handed out so far.
     pub(super) fn position(&self) -> u64 {
         self.position
     }
@@ -82,7 +81,6 @@ impl<R: Read> Source<R> {
         Ok(u32::from_le_bytes(saved))
     }
 
-    /// Reads the head of the file.
     pub(super) fn head(&mut self) -> Result<Head, FileError> {
         let mut magic = [0; 8];
         self.fill(&mut magic, "head")?;
@@ -95,7 +93,6 @@ impl<R: Read> Source<R> {
         Head::from_bytes(&self.summed::<HEAD_BYTES>(&magic, "head")?)
     }
 
-    /// Reads the head of the next section.
     pub(super) fn section_head(&mut self) -> Result<SectionHead, FileError> {
         let start = self.position;
         let mut tag = [0; 4];

@@ -66,7 +66,6 @@ impl MapContents {
     }
 }
 
-/// Writes bytes and sums them up.
 struct Sink<W> {
     writer: W,
     crc: crc32fast::Hasher,

@@ -3,7 +3,6 @@
 mod changes;
 mod exposed_faces;
 mod fill;
-mod forget_old;
 mod insert;
 mod remove;
 mod when_full;
@@ -24,8 +23,8 @@ use crate::cloud::Cloud;
 use crate::lattice::{BlockKey, Lattice, MortonKey};
 
 pub use changes::Changes;
-pub use forget_old::NoStamps;
 pub use insert::InsertReport;
+pub use remove::NoStamps;
 pub use when_full::WhenFull;
 
 /// The datum is not finite or too many cells from the origin of the map frame.

@@ -1,14 +1,34 @@
 //! Removing many voxels at once.
 
 use rayon::prelude::*;
+use thiserror::Error;
 
 use super::VoxelList;
 use crate::lattice::BlockKey;
 use crate::voxels::store::shard::{Entry, Shard};
 
+/// The list does not know when its points were seen.
+#[derive(Clone, Copy, PartialEq, Eq, Debug, Error)]
+#[error("the map keeps no stamps: make it with_payload(Payload {{ stamps: true, .. }})")]
+pub struct NoStamps;
+
 impl VoxelList {
+    /// Removes the voxels whose last point is older than `stamp_ns`; gives their number.
+    ///
+    /// Voxels without a stamp, from lists that kept none, go too. Fails, changing nothing, if this
+    /// list keeps no stamps.
+    pub fn forget_before(&mut self, stamp_ns: i64) -> Result<usize, NoStamps> {
+        if !self.payload.stamps {
+            return Err(NoStamps);
+        }
+        Ok(self.remove_where(|shard, number, _| {
+            let stamps = shard.columns.stamps.get(number);
+            stamps.is_some_and(|stamps| stamps.last_ns < stamp_ns)
+        }))
+    }
+
     /// Removes the voxels that `goes` wants, by shard, number in the shard and row.
-    pub(crate) fn remove_where(
+    pub(super) fn remove_where(
         &mut self,
         goes: impl Fn(&Shard, usize, &Entry) -> bool + Sync,
     ) -> usize {
@@ -23,7 +43,7 @@ impl VoxelList {
     }
 
     /// Removes the voxels of these cells, listed by shard, as part of state `now`.
-    pub(crate) fn remove_at(&mut self, gone: Vec<Vec<BlockKey>>, now: u32) -> usize {
+    pub(super) fn remove_at(&mut self, gone: Vec<Vec<BlockKey>>, now: u32) -> usize {
         let shards = self.shards.par_iter_mut().zip(gone);
         let removed = shards.map(|(shard, gone)| {
             let cells = gone.into_iter();

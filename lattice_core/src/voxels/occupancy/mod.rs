@@ -18,7 +18,6 @@ const BLOCK_BYTES: usize = Table::<Block>::ROW_BYTES;
 /// Most memory besides that of blocks.
 const FIRST_BYTES: usize = Table::<Block>::FIRST_BYTES + Recent::BYTES;
 
-/// A block with occupied cells.
 #[derive(Clone)]
 pub(super) struct Block {
     pub(super) code: u64,
