@@ -40,7 +40,7 @@ struct Active {
     path: PathBuf,
     stream: StorageStream,
     topic_of: Vec<usize>,
-    head: Result<StorageMessage, BagError>,
+    head: Option<Result<StorageMessage, BagError>>,
     /// Log time of the head, or of the message before an error.
     head_ns: i64,
     order: usize,
@@ -103,72 +103,71 @@ impl Messages {
                 }
             };
             let (mut stream, topic_of) = open.wanted(&split.path, &self.topics, &self.filter)?;
-            if let Some(head) = stream.next() {
-                let head_ns = head.as_ref().map_or(i64::MAX, |m| m.log_time_ns);
-                let path = split.path.clone();
-                self.active.push(Active {
-                    path,
-                    stream,
-                    topic_of,
-                    head,
-                    head_ns,
-                    order: index,
-                });
-            }
+            let head = stream.next();
+            let head_ns = match &head {
+                Some(Ok(message)) => message.log_time_ns,
+                Some(Err(_)) => i64::MAX,
+                None => continue,
+            };
+            self.active.push(Active {
+                path: split.path.clone(),
+                stream,
+                topic_of,
+                head,
+                head_ns,
+                order: index,
+            });
         }
         Ok(())
     }
 
     fn take_first(&mut self) -> Option<Result<BagMessage, BagError>> {
-        let first = self
-            .active
-            .iter()
-            .enumerate()
-            .min_by_key(|(_, a)| (a.head_ns, a.order));
-        let (index, _) = first?;
+        let files = self.active.iter().enumerate();
+        let (index, _) = files.min_by_key(|(_, a)| (a.head_ns, a.order))?;
         let active = self.active.get_mut(index)?;
-        let (topic_of, path) = (active.topic_of.clone(), active.path.clone());
-        let head = match active.stream.next() {
-            Some(next) => {
-                // An error keeps its place behind the last message.
-                active.head_ns = next.as_ref().map_or(active.head_ns, |m| m.log_time_ns);
-                std::mem::replace(&mut active.head, next)
-            }
-            None => self.active.swap_remove(index).head,
-        };
-        let number = self.messages_read;
+        let next = active.stream.next();
+        // An error keeps its place behind the last message.
+        if let Some(Ok(message)) = &next {
+            active.head_ns = message.log_time_ns;
+        }
+        let head = std::mem::replace(&mut active.head, next)?;
+        let message = active.of_bag(head, self.compression, self.messages_read);
         self.messages_read += 1;
-        Some(head.map_err(|e| e.in_file(&path)).and_then(|message| {
-            let StorageMessage {
-                topic,
-                log_time_ns,
-                data,
-            } = message;
-            let wrong = |reason: String| {
-                BagError::corrupt(
-                    &path,
-                    format!("message {number}"),
-                    reason,
-                    "take another copy of the file",
-                )
-            };
-            let topic = topic_of
-                .get(topic)
-                .copied()
-                .ok_or_else(|| wrong("its topic is not listed".into()))?;
-            let data = match self.compression {
-                MessageCompression::Zstd => decompress_message(&data).map_err(wrong)?,
-                MessageCompression::Detect if data.starts_with(ZSTD_MAGIC) => {
-                    decompress_message(&data).map_err(wrong)?
-                }
-                _ => data,
-            };
-            Ok(BagMessage {
-                topic,
-                log_time_ns,
-                data,
-            })
-        }))
+        if active.head.is_none() {
+            self.active.swap_remove(index);
+        }
+        Some(message)
+    }
+}
+
+impl Active {
+    /// The message of this file as the bag's, decompressed.
+    fn of_bag(
+        &self,
+        message: Result<StorageMessage, BagError>,
+        compression: MessageCompression,
+        number: u64,
+    ) -> Result<BagMessage, BagError> {
+        let message = message.map_err(|e| e.in_file(&self.path))?;
+        let wrong = |reason: String| {
+            let remedy = "take another copy of the file";
+            BagError::corrupt(&self.path, format!("message {number}"), reason, remedy)
+        };
+        let topic = self.topic_of.get(message.topic).copied();
+        let mut data = message.data;
+        let is_packed = match compression {
+            MessageCompression::None => false,
+            MessageCompression::Zstd => true,
+            MessageCompression::Detect => data.starts_with(ZSTD_MAGIC),
+        };
+        if is_packed {
+            data = decompress_message(&data).map_err(wrong)?;
+        }
+        Ok(BagMessage {
+            topic: topic.ok_or_else(|| wrong("its topic is not listed".into()))?,
+            log_time_ns: message.log_time_ns,
+            data,
+        })
     }
 }
 

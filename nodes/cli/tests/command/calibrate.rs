@@ -124,13 +124,8 @@ fn a_cloud_is_found_without_a_guess_whatever_its_axes_and_labels_are_learned() {
 
     let text = calibrate(&["--map", &map, "--cloud", &ros, "--guess", "2.5 2.1 1.5 110"]);
     let text = String::from_utf8(text.stdout).unwrap();
-    for line in [
-        "verdict        OK",
-        "translation    2.",
-        "sigma ",
-        "log-margin ",
-        "time ",
-    ] {
+    let lines = "verdict        OK|translation    2.|sigma |log-margin |time ";
+    for line in lines.split('|') {
         assert!(text.contains(line), "{text}");
     }
 }

@@ -79,17 +79,7 @@ impl Made {
             }
         }
         let html = self.file("report.html");
-        for word in [
-            "<script",
-            "src=",
-            "@import",
-            "url(",
-            "href=\"http",
-            ">NaN",
-            " NaN",
-            ">inf",
-            " inf ",
-        ] {
+        for word in "<script|src=|@import|url(|href=\"http|>NaN| NaN|>inf| inf ".split('|') {
             assert!(!html.contains(word), "{word} in the page");
         }
     }
@@ -129,18 +119,8 @@ fn a_quick_report_of_the_voxel_paper_holds_and_opens() {
     let more = ["--scan", scan.to_str().unwrap()];
     let made = Made::new("voxels", folder.path(), if has_scan { &more } else { &[] });
     let ids = made.ids();
-    for id in [
-        "fig1",
-        "quantization",
-        "deltas",
-        "generators",
-        "distortion",
-        "fig3",
-        "fig4",
-        "fig5",
-        "table1",
-        "fig6",
-    ] {
+    let expected = "fig1 quantization deltas generators distortion fig3 fig4 fig5 table1 fig6";
+    for id in expected.split(' ') {
         assert!(ids.contains(&id), "{id}");
     }
     assert!(made.all("checks").count() > 300);
@@ -183,12 +163,8 @@ fn a_real_scan_saves_voxels_when_it_is_turned_anyhow(rows: &str) {
 fn a_quick_report_of_the_calibration_paper_holds_and_opens() {
     let folder = tempfile::tempdir().unwrap();
     let made = Made::new("calibration", folder.path(), &["--threads", "3"]);
-    assert_eq!(
-        made.ids(),
-        [
-            "eq1-4", "eq5-8", "eq9", "table1", "claim", "fig3", "fig4", "fig2"
-        ]
-    );
+    let expected = "eq1-4 eq5-8 eq9 table1 claim fig3 fig4 fig2";
+    assert_eq!(made.ids().join(" "), expected);
     for section in &made.sections()[..3] {
         assert_eq!(Made::verdict(section), "corrected", "{section}");
     }

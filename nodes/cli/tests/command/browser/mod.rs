@@ -9,6 +9,10 @@ use std::time::Duration;
 use serde::Deserialize;
 use wait_timeout::ChildExt;
 
+const OPTIONS: &str = "--headless --no-sandbox --disable-gpu --disable-quic --no-first-run \
+    --disable-background-networking --disable-component-update --disable-sync \
+    --window-size=1400,1000 --enable-logging=stderr --dump-dom";
+
 /// A page that is not there by then never will be.
 const PATIENCE: Duration = Duration::from_secs(120);
 
@@ -115,19 +119,7 @@ fn dump(chromium: &Path, page: &Path) -> (String, Vec<String>) {
     let folder = tempfile::tempdir().unwrap();
     let [dom, log] = ["dom", "log"].map(|name| folder.path().join(name));
     let mut browser = Command::new(chromium)
-        .args([
-            "--headless",
-            "--no-sandbox",
-            "--disable-gpu",
-            "--disable-quic",
-        ])
-        .args(["--no-first-run", "--disable-background-networking"])
-        .args(["--disable-component-update", "--disable-sync"])
-        .args([
-            "--window-size=1400,1000",
-            "--enable-logging=stderr",
-            "--dump-dom",
-        ])
+        .args(OPTIONS.split_whitespace())
         .arg(format!(
             "--user-data-dir={}",
             folder.path().join("user").display()
