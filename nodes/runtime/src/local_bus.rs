@@ -92,10 +92,7 @@ impl Topic {
         latch_depth: usize,
     ) -> Result<LocalEndpoint, RuntimeError> {
         self.join(
-            |inner| {
-                inner.claim_type(&self.name, M::TYPE)?;
-                inner.claim_rust_type::<M>(&self.name)
-            },
+            |inner| inner.claim_rust_type::<M>(&self.name),
             |inner, id| inner.add_publisher(id, peers, latch_depth),
         )
     }
@@ -123,10 +120,7 @@ impl Topic {
         latched: bool,
     ) -> Result<LocalEndpoint, RuntimeError> {
         self.join(
-            |inner| {
-                inner.claim_type(&self.name, M::TYPE)?;
-                inner.claim_rust_type::<M>(&self.name)
-            },
+            |inner| inner.claim_rust_type::<M>(&self.name),
             |inner, id| {
                 if latched {
                     for message in inner.latched() {
@@ -216,8 +210,7 @@ impl Drop for LocalEndpoint {
         inner.publishers.retain(|p| p.id != self.id);
         inner.subscribers.retain(|s| s.id != self.id);
         if inner.publishers.is_empty() && inner.subscribers.is_empty() {
-            inner.type_name = None;
-            inner.rust_type = None;
+            (inner.type_name, inner.rust_type) = (None, None);
         }
         let counts = inner.count();
         drop(inner);
@@ -252,6 +245,7 @@ impl Inner {
     }
 
     fn claim_rust_type<M: RosMessage>(&mut self, topic: &str) -> Result<(), RuntimeError> {
+        self.claim_type(topic, M::TYPE)?;
         match self.rust_type {
             Some((have, _)) if have != TypeId::of::<M>() => Err(RuntimeError::TypeMismatch {
                 topic: topic.to_owned(),
@@ -342,9 +336,8 @@ mod tests {
     impl Subscriber {
         fn new(bus: &LocalBus, depth: usize) -> Self {
             let ((sender, queue), peers, lost) = (bounded(depth), peers(), Arc::default());
-            let topic = bus.topic("/a");
-            let joined =
-                topic.join_subscriber::<RosString>(&peers, sender, Arc::clone(&lost), true);
+            let (topic, lost_here) = (bus.topic("/a"), Arc::clone(&lost));
+            let joined = topic.join_subscriber::<RosString>(&peers, sender, lost_here, true);
             Self {
                 endpoint: joined.unwrap(),
                 queue,
@@ -383,9 +376,8 @@ mod tests {
         for s in ["1", "2", "3"] {
             publisher.publish(&(text(s) as _));
         }
-        let raw = bus
-            .topic("/a")
-            .join_raw_publisher(RosString::TYPE, &peers(), 1);
+        let topic = bus.topic("/a");
+        let raw = topic.join_raw_publisher(RosString::TYPE, &peers(), 1);
         let raw = raw.unwrap();
         raw.publish_cdr(&cdr::to_vec(&*text("raw")).unwrap().into())
             .unwrap();
