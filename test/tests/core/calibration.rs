@@ -53,17 +53,20 @@ fn ask(
 }
 
 /// Places to look from, and headings.
-const LOOKS: [([f64; 3], f64); 3] = [
+const LOOKS: [([f64; 3], f64); 6] = [
     ([3.5, 3.8, 1.6], -2.2),
     ([1.0, 3.9, 1.6], -0.6),
     ([7.5, 3.0, 1.6], 2.2),
+    ([6.5, 3.0, 1.6], -0.4),
+    ([4.2, 4.3, 1.6], 3.0),
+    ([3.5, 3.0, 1.6], 1.6),
 ];
 
 #[test]
 fn every_place_is_found_without_a_start() {
     let flat = Flat::default();
     let map = map(&flat);
-    for look in 0..5 {
+    for look in 0..3 {
         let truth = truth(look as u64);
         let found = ask(&map, &[scan(&flat, look, &truth)], None);
         let error = distance(&found.map_from_headset, &truth);
