@@ -29,7 +29,7 @@ const WARNING_PERIOD: Duration = Duration::from_secs(5);
 pub enum Load {
     /// Poses, transforms, clocks: taken on the io thread.
     Small,
-    /// Clouds, images, maps: taken on a thread of their own.
+    /// Clouds, images: taken on a thread of their own.
     Large,
 }
 
