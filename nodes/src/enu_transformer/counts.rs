@@ -57,6 +57,8 @@ pub struct TransformerReport {
     pub counts: TransformerCounts,
     /// Clouds that were sent and lost on the way, or that found the inbox full.
     pub clouds_inbox_full: u64,
+    /// Poses and transforms that found the inbox full.
+    pub poses_inbox_full: u64,
     /// Samples that did not decode.
     pub undecodable: u64,
     /// Clouds that could not be given to the publisher.

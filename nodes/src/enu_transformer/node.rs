@@ -54,13 +54,14 @@ pub fn start(runtime: &Runtime, name: &str) -> Result<Finish, NodeError> {
         bytes: transformer.max_waiting_bytes,
         threads: options::threads(params, 0)?,
     };
-    let lost = Arc::new(AtomicU64::new(0));
+    let [lost, lost_poses] = [(); 2].map(|()| Arc::new(AtomicU64::new(0)));
     let mut shell = Shell {
         machine: EnuTransformer::new(transformer),
         outputs: Outputs::open(&node)?,
         clock: node.clock(),
         diagnostics: node.diagnostics(),
         lost: Arc::clone(&lost),
+        lost_poses: Arc::clone(&lost_poses),
         not_published: 0,
         report_file: params.string("report_file", "")?,
     };
@@ -69,15 +70,19 @@ pub fn start(runtime: &Runtime, name: &str) -> Result<Finish, NodeError> {
     })?;
     let inbox = compute.inbox();
     let mut clouds = Vec::new();
-    let mut inputs = subscribe_ins(&node, source, &inbox)?;
+    let poses = PoseInbox {
+        inbox: inbox.clone(),
+        lost: lost_poses,
+    };
+    let mut inputs = poses.subscribe_ins(&node, source)?;
     for topic in params.string_array("points_topics", &["points"])? {
         let hand_over = inbox.counting(&lost, Event::Cloud, |cloud| cloud::bytes_of(cloud));
         clouds.push(node.subscribe(&topic, Qos::SCANS, Load::Large, hand_over)?);
     }
     let transforms = |m| Event::Transforms(m, false);
-    inputs.push(subscribe(&node, "/tf", Qos::TF, &inbox, transforms)?);
+    inputs.push(poses.subscribe(&node, "/tf", Qos::TF, transforms)?);
     let (latched, transforms) = (Qos::TF_STATIC_LISTENER, |m| Event::Transforms(m, true));
-    inputs.push(subscribe(&node, "/tf_static", latched, &inbox, transforms)?);
+    inputs.push(poses.subscribe(&node, "/tf_static", latched, transforms)?);
     runtime.timer(Duration::from_millis(200), move || {
         // A full inbox is busy enough to look at its queue anyway.
         let _ = inbox.send(Event::Tick, 0);
@@ -93,46 +98,57 @@ pub fn start(runtime: &Runtime, name: &str) -> Result<Finish, NodeError> {
     }))
 }
 
-fn subscribe_ins(
-    node: &Node,
-    source: InsSource,
-    inbox: &Inbox<Event>,
-) -> Result<Vec<Subscription>, NodeError> {
-    let params = node.params();
-    let topic = params.string("ins.topic", "ins")?;
-    let imu = params.string("ins.imu_topic", "imu")?;
-    let ins = match source {
-        InsSource::Inspva => subscribe(node, &topic, Qos::INS, inbox, Event::Inspva),
-        InsSource::Inspvax => subscribe(node, &topic, Qos::INS, inbox, Event::Inspvax),
-        InsSource::Odometry => subscribe(node, &topic, Qos::INS, inbox, Event::Odometry),
-        InsSource::Pose => subscribe(node, &topic, Qos::INS, inbox, Event::Pose),
-        InsSource::NavsatfixImu => {
-            let fix = subscribe(node, &topic, Qos::INS, inbox, Event::Fix)?;
-            let imu = subscribe(node, &imu, Qos::INS, inbox, Event::Imu)?;
-            return Ok(vec![fix, imu]);
-        }
-    };
-    Ok(vec![ins?])
+/// The inbox for poses and transforms, with the count of those that found it full.
+struct PoseInbox {
+    inbox: Inbox<Event>,
+    lost: Arc<AtomicU64>,
 }
 
-fn subscribe<M: RosMessage>(
-    node: &Node,
-    topic: &str,
-    qos: Qos,
-    inbox: &Inbox<Event>,
-    event: impl Fn(Arc<M>) -> Event + Send + 'static,
-) -> Result<Subscription, NodeError> {
-    let inbox = inbox.clone();
-    let warnings = Throttle::new(Duration::from_secs(5));
-    let subscription = node.subscribe(topic, qos, Load::Small, move |message: Arc<M>| {
+impl PoseInbox {
+    fn subscribe_ins(
+        &self,
+        node: &Node,
+        source: InsSource,
+    ) -> Result<Vec<Subscription>, NodeError> {
+        let params = node.params();
+        let topic = params.string("ins.topic", "ins")?;
+        let imu = params.string("ins.imu_topic", "imu")?;
+        let ins = match source {
+            InsSource::Inspva => self.subscribe(node, &topic, Qos::INS, Event::Inspva),
+            InsSource::Inspvax => self.subscribe(node, &topic, Qos::INS, Event::Inspvax),
+            InsSource::Odometry => self.subscribe(node, &topic, Qos::INS, Event::Odometry),
+            InsSource::Pose => self.subscribe(node, &topic, Qos::INS, Event::Pose),
+            InsSource::NavsatfixImu => {
+                let fix = self.subscribe(node, &topic, Qos::INS, Event::Fix)?;
+                let imu = self.subscribe(node, &imu, Qos::INS, Event::Imu)?;
+                return Ok(vec![fix, imu]);
+            }
+        };
+        Ok(vec![ins?])
+    }
+
+    fn subscribe<M: RosMessage>(
+        &self,
+        node: &Node,
+        topic: &str,
+        qos: Qos,
+        event: fn(Arc<M>) -> Event,
+    ) -> Result<Subscription, NodeError> {
         // Poses count no bytes: clouds must not keep them out.
-        if !inbox.send(event(message), 0)
-            && let Some(more) = warnings.check()
-        {
-            log::warn!("the inbox is full: a pose or transform is lost ({more} more like it)");
-        }
-    })?;
-    Ok(subscription)
+        let mut hand_over = self.inbox.counting(&self.lost, event, |_| 0);
+        let lost = Arc::clone(&self.lost);
+        let warnings = Throttle::new(Duration::from_secs(5));
+        let mut seen = 0;
+        let handler = move |message: Arc<M>| {
+            hand_over(message);
+            let all = lost.load(Ordering::Relaxed);
+            if all > seen && warnings.check().is_some() {
+                log::warn!("the inbox is full: {all} poses and transforms are lost so far");
+                seen = all;
+            }
+        };
+        Ok(node.subscribe(topic, qos, Load::Small, handler)?)
+    }
 }
 
 /// The topics that the node speaks on.
@@ -160,7 +176,10 @@ struct Shell {
     outputs: Outputs,
     clock: Clock,
     diagnostics: Diagnostics,
+    /// Clouds lost before the inbox or at it.
     lost: Arc<AtomicU64>,
+    /// Poses and transforms that found the inbox full.
+    lost_poses: Arc<AtomicU64>,
     not_published: u64,
     report_file: String,
 }
@@ -213,6 +232,7 @@ impl Shell {
         TransformerReport {
             counts: self.machine.counts().clone(),
             clouds_inbox_full: self.lost.load(Ordering::Relaxed),
+            poses_inbox_full: self.lost_poses.load(Ordering::Relaxed),
             undecodable: 0,
             clouds_not_published: self.not_published,
         }

@@ -49,6 +49,10 @@ impl RunReport {
         for (reason, count) in self.transformer.dropped() {
             lines.push(format!("{count} of {} clouds: {reason}", counts.clouds_in));
         }
+        let poses = self.transformer.poses_inbox_full;
+        if poses > 0 {
+            lines.push(format!("{poses} poses and transforms: inbox_full"));
+        }
         for LatticeReport { map, .. } in &self.lattices {
             let (name, mapped, out) = (&map.lattice, &map.counts, counts.clouds_out);
             let lost = out.saturating_sub(mapped.clouds_in);
@@ -178,10 +182,11 @@ mod tests {
         assert!(report().losses().is_empty());
         assert!(report().to_string().contains("dropped: none"));
         type Change = (&'static str, fn(&mut RunReport) -> &mut u64);
-        let changes: [Change; 9] = [
+        let changes: [Change; 10] = [
             ("reach the transformer", |r| &mut r.clouds_in_log),
             ("pose_gap", |r| &mut r.transformer.counts.clouds_pose_gap),
             ("inbox_full", |r| &mut r.transformer.clouds_inbox_full),
+            ("poses and", |r| &mut r.transformer.poses_inbox_full),
             ("undecodable", |r| &mut r.transformer.undecodable),
             ("reach the fcc", |r| &mut r.transformer.counts.clouds_out),
             ("malformed", |r| &mut map(r).counts.clouds_malformed),

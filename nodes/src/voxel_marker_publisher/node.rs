@@ -1,7 +1,7 @@
 //! The marker publisher as a ROS node: a thin shell around [`VoxelMarkers`].
 
 use std::sync::Arc;
-use std::sync::atomic::{AtomicBool, Ordering};
+use std::sync::atomic::{AtomicU64, Ordering};
 use std::time::Duration;
 
 use lattice_msgs::lattice::{LatticeMap, LatticeMapUpdate};
@@ -43,9 +43,10 @@ pub fn start(runtime: &Runtime, name: &str) -> Result<Finish, NodeError> {
     let bytes_per_s = params.positive("max_bytes_per_s", 20_000_000)?;
     let mapper = params.string("mapper", "lattice_mapper")?;
     let publisher = node.publisher("voxel_markers", Qos::MARKERS)?;
-    let lost = Arc::new(AtomicBool::new(false));
+    let lost = Arc::new(AtomicU64::new(0));
     let mut shell = Shell {
         lost: Arc::clone(&lost),
+        lost_seen: 0,
         machine: VoxelMarkers::new(markers),
         markers: publisher.clone(),
         request: node.publisher(&format!("{mapper}/request_keyframe"), Qos::DEFAULT)?,
@@ -69,7 +70,7 @@ pub fn start(runtime: &Runtime, name: &str) -> Result<Finish, NodeError> {
     let on_map = move |map: Undecoded<LatticeMap>| {
         let bytes = map.bytes(|map| map.keys.len() + map.counts.len() * 10);
         if !maps.send(Event::Map(map), bytes) {
-            lost_map.store(true, Ordering::Relaxed);
+            lost_map.fetch_add(1, Ordering::Relaxed);
         }
     };
     let maps = node.subscribe_undecoded("map", Qos::MAP, Load::Small, on_map)?;
@@ -77,7 +78,7 @@ pub fn start(runtime: &Runtime, name: &str) -> Result<Finish, NodeError> {
     let on_update = move |update: Undecoded<LatticeMapUpdate>| {
         let bytes = update.bytes(|update| update.keys.len() + update.counts.len() * 10);
         if !updates.send(Event::Update(update), bytes) {
-            lost_update.store(true, Ordering::Relaxed);
+            lost_update.fetch_add(1, Ordering::Relaxed);
         }
     };
     let updates = node.subscribe_undecoded("map_updates", Qos::DELTAS, Load::Small, on_update)?;
@@ -97,8 +98,10 @@ pub fn start(runtime: &Runtime, name: &str) -> Result<Finish, NodeError> {
 
 /// State of the compute thread.
 struct Shell {
-    /// A part of the map found the inbox full.
-    lost: Arc<AtomicBool>,
+    /// Chunks of the map that found the inbox full.
+    lost: Arc<AtomicU64>,
+    /// Those that a keyframe was asked for.
+    lost_seen: u64,
     machine: VoxelMarkers,
     markers: Publisher<MarkerArray>,
     request: Publisher<Empty>,
@@ -130,7 +133,9 @@ impl Shell {
             }
             Event::Redraw => self.machine.redraw(),
             Event::Draw => {
-                if self.lost.swap(false, Ordering::Relaxed) {
+                let lost = self.lost.load(Ordering::Relaxed);
+                if lost != self.lost_seen {
+                    self.lost_seen = lost;
                     self.ask_for_keyframe();
                 }
                 if self.seconds.check().is_some() && self.machine.wait_a_second() {
@@ -192,6 +197,8 @@ impl Shell {
             (_, refused) => (Level::Warn, format!("{refused} messages refused")),
         };
         let mut values = report::key_values(counts);
+        let lost = self.lost.load(Ordering::Relaxed);
+        values.push(("inbox_full".into(), lost.to_string()));
         values.push(("voxels".into(), self.machine.voxels().to_string()));
         self.diagnostics.set("markers", level, message, values);
     }
