@@ -4,7 +4,7 @@ use thiserror::Error;
 
 /// A cloud whose layout or times cannot be read.
 #[derive(Clone, Debug, PartialEq, Error)]
-#[allow(missing_docs)] // The messages name the fields.
+#[expect(missing_docs, reason = "the messages name the fields")]
 pub enum CloudError {
     /// More points than the limit.
     #[error(

@@ -56,7 +56,7 @@ impl Default for CloudLimits {
 /// Types of `sensor_msgs/PointField`.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 #[repr(u8)]
-#[allow(missing_docs)]
+#[expect(missing_docs, reason = "the names say the types")]
 pub enum Datatype {
     Int8 = 1,
     Uint8 = 2,

@@ -4,7 +4,7 @@ use thiserror::Error;
 
 /// A position that is not a place on or near the Earth.
 #[derive(Clone, Copy, Debug, PartialEq, Error)]
-#[allow(missing_docs)] // The messages name the fields.
+#[expect(missing_docs, reason = "the messages name the fields")]
 pub enum GeodesyError {
     /// A coordinate is NaN or infinite.
     #[error("{name} is {value}; drop the position until the receiver has a fix")]

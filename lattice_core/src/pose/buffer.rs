@@ -54,7 +54,7 @@ pub enum PushOutcome {
 
 /// A pose that is not available.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, Error)]
-#[allow(missing_docs)] // The messages name the fields.
+#[expect(missing_docs, reason = "the messages name the fields")]
 pub enum PoseMiss {
     /// No pose came yet.
     #[error("no pose came yet")]

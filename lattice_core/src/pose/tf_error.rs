@@ -6,7 +6,7 @@ use super::buffer::seconds;
 
 /// A transform that is refused.
 #[derive(Clone, Debug, PartialEq, Eq, Error)]
-#[allow(missing_docs)] // The messages name the fields.
+#[expect(missing_docs, reason = "the messages name the fields")]
 pub enum TfInsertError {
     /// A frame has no name.
     #[error("transform from '{child}' to '{parent}' has a frame without a name")]
@@ -35,7 +35,7 @@ pub enum TfInsertError {
 
 /// A transform that is not available.
 #[derive(Clone, Debug, PartialEq, Eq, Error)]
-#[allow(missing_docs)] // The messages name the fields.
+#[expect(missing_docs, reason = "the messages name the fields")]
 pub enum TfMiss {
     /// No transform ever named the frame.
     #[error("frame '{frame}' is not known: nobody published it on tf or tf_static")]

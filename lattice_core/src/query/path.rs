@@ -86,7 +86,7 @@ pub struct Path {
 
 /// Failure of a search for a path.
 #[derive(Clone, PartialEq, Debug, Error)]
-#[allow(missing_docs)] // The messages name the fields.
+#[expect(missing_docs, reason = "the messages name the fields")]
 pub enum PathError {
     /// The question makes no sense.
     #[error(transparent)]

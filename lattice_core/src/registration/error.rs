@@ -4,7 +4,7 @@ use thiserror::Error;
 
 /// A cloud that cannot be prepared for registration.
 #[derive(Clone, Debug, PartialEq, Error)]
-#[allow(missing_docs)] // The messages name the fields.
+#[expect(missing_docs, reason = "the messages name the fields")]
 pub enum RegistrationError {
     /// Too few points for the neighbourhoods asked for.
     #[error("{points} points, at least {least} are needed")]

@@ -9,7 +9,7 @@ use crate::lattice::MortonKey;
 
 /// Error in encoded keys; positions are bytes from the start of the keys.
 #[derive(Clone, Copy, PartialEq, Eq, Debug, Error)]
-#[allow(missing_docs)] // The messages name the fields.
+#[expect(missing_docs, reason = "the messages name the fields")]
 pub enum CodecError {
     /// The bytes end within a varint.
     #[error("the bytes end at byte {position} within a number: the message or file is cut short")]

@@ -6,7 +6,7 @@ use thiserror::Error;
 /// Corners that do not bound a region: one is NaN, or the lower is above the upper.
 #[derive(Clone, PartialEq, Debug, Error)]
 #[error("corners {min_m:?} and {max_m:?} m do not bound a box: give the lower one first")]
-#[allow(missing_docs)] // The message names the fields.
+#[expect(missing_docs, reason = "the messages name the fields")]
 pub struct RegionError {
     pub min_m: [f64; 3],
     pub max_m: [f64; 3],

@@ -6,7 +6,7 @@ use thiserror::Error;
 
 /// An error of reading, writing or playing a bag.
 #[derive(Clone, Debug, Error)]
-#[expect(missing_docs, reason = "the messages say what the fields are")]
+#[expect(missing_docs, reason = "the messages name the fields")]
 pub enum BagError {
     /// The operating system refused.
     #[error("{}: cannot {doing}: {source}; check that the path exists, its permissions and the free space", path.display())]

@@ -6,7 +6,7 @@ use thiserror::Error;
 
 /// A map that was not written or read; positions are bytes from the start of the file.
 #[derive(Debug, Error)]
-#[allow(missing_docs)] // The messages name the fields.
+#[expect(missing_docs, reason = "the messages name the fields")]
 pub enum FileError {
     /// The system could not read or write.
     #[error("input or output of the map file failed at byte {position}: {source}")]

@@ -11,7 +11,7 @@ use crate::voxels::{Voxel, set_ops};
 
 /// Two maps that do not go together. The receiving map is as before.
 #[derive(Clone, PartialEq, Eq, Debug, Error)]
-#[allow(missing_docs)] // The messages name the fields.
+#[expect(missing_docs, reason = "the messages name the fields")]
 pub enum OperationError {
     /// The cells are different.
     #[error("one map is of {ours}, the other of {theirs}: only maps of the same cells go together")]

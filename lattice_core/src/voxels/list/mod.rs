@@ -30,7 +30,7 @@ pub use when_full::WhenFull;
 /// The datum is not finite or too many cells from the origin of the map frame.
 #[derive(Clone, Copy, PartialEq, Debug, Error)]
 #[error("datum ({x}, {y}, {z}) m is not finite or more than 2^48 cells from the map origin")]
-#[allow(missing_docs)] // The messages name the fields.
+#[expect(missing_docs, reason = "the messages name the fields")]
 pub struct DatumError {
     pub x: f64,
     pub y: f64,

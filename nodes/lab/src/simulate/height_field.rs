@@ -75,7 +75,7 @@ impl HeightField {
         let inside = u >= 0.0 && v >= 0.0 && u <= self.columns as f64 && v <= self.rows as f64;
         let column = (u as usize).min(self.columns - 1);
         let row = (v as usize).min(self.rows - 1);
-        inside.then(|| ([column, row], u - column as f64, v - row as f64))
+        inside.then_some(([column, row], u - column as f64, v - row as f64))
     }
 
     /// Highest corner in the squares `from` to `to` (exclusive).

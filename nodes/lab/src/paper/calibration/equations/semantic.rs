@@ -217,14 +217,16 @@ fn all_readings(labels: usize) -> Vec<(String, RegisterOptions<'static>)> {
     ]
 }
 
+/// Errors of a reading for each start: of the pose, and of the seen points, m.
+type ErrorsByStart = Vec<Vec<(PoseError, f64)>>;
+
 /// Runs each reading on all scenes with right labels; also the number of trials of each.
 fn readings(context: &Context) -> Result<(Table, usize), AnyError> {
     let labels = context.testbed.house().class_names().len();
     let readings = all_readings(labels);
     let starts = [(0.3, 10.0), (0.8, 35.0)];
     let seeds = if context.quick { 1 } else { SEEDS };
-    // Errors by reading and start.
-    let mut errors = vec![vec![Vec::new(); starts.len()]; readings.len()];
+    let mut errors: Vec<ErrorsByStart> = vec![vec![Vec::new(); starts.len()]; readings.len()];
     let mut count = 0;
     for seed in 0..seeds {
         for scene in Scene::ALL {
@@ -248,7 +250,7 @@ fn readings(context: &Context) -> Result<(Table, usize), AnyError> {
         }
     }
     let Bounds { m, deg } = WRONG;
-    let row = |((name, _), errors): (&(String, _), &Vec<Vec<(PoseError, f64)>>)| {
+    let row = |((name, _), errors): (&(String, _), &ErrorsByStart)| {
         let mut row = vec![Cell::from(name.as_str())];
         for errors in errors {
             let right = |(error, _): &&(PoseError, f64)| {

@@ -197,7 +197,6 @@ impl Sides {
             elevation_deg: ELEVATION_DEG,
             contrast: CONTRAST,
             focus: Some(self.view.focus()),
-            ..RenderOptions::default()
         };
         let mut png = Vec::new();
         render_labels_png(&list, colors, &options, &mut png)?;
