@@ -16,22 +16,25 @@ fn params(file: &str, node: &str) -> Params {
     Params::load(&RosArgs::parse(arguments).unwrap(), node).unwrap()
 }
 
+/// Reader of the options of a node.
+type ReadOptions = fn(&Params);
+
 /// A node of the loader, what reads its options, and the parameters that its shell reads.
-const NODES: [(&str, fn(&Params), &str); 3] = [
+const NODES: [(&str, ReadOptions, &str); 3] = [
     (
         "enu_transformer",
-        |params| drop(TransformerOptions::from_params(params).unwrap()),
+        |params| _ = TransformerOptions::from_params(params).unwrap(),
         "inbox_events ins.imu_topic ins.topic points_topics report_file threads",
     ),
     (
         "lattice_mapper",
-        |params| drop(MapperOptions::from_params(params).unwrap()),
+        |params| _ = MapperOptions::from_params(params).unwrap(),
         "centers_period_s free_period_s inbox_bytes inbox_events report_file threads \
          update_period_s",
     ),
     (
         "voxel_marker_publisher",
-        |params| drop(MarkerOptions::from_params(params).unwrap()),
+        |params| _ = MarkerOptions::from_params(params).unwrap(),
         "inbox_bytes inbox_events mapper max_bytes_per_s rate_hz report_file threads",
     ),
 ];

@@ -106,7 +106,6 @@ fn small() -> SurveyOptions {
         views: 64,
         width: 48,
         height: 36,
-        ..SurveyOptions::default()
     }
 }
 
