@@ -15,8 +15,11 @@ fn layout() -> CloudLayout {
     }
 }
 
+/// Change of a layout.
+type Change = fn(&mut CloudLayout);
+
 /// Checks that changes of the honest layout are refused with the words that follow.
-fn check_refused(cases: &[(fn(&mut CloudLayout), &str)]) {
+fn check_refused(cases: &[(Change, &str)]) {
     for (change, words) in cases {
         let mut changed = layout();
         change(&mut changed);
