@@ -11,7 +11,7 @@ pub const FORMAT: u32 = 1;
 /// Settings that all results depend on, but for the times.
 #[derive(Clone, PartialEq, Debug, Serialize, Deserialize)]
 pub struct Settings {
-    /// Version of the trials, [`FORMAT`].
+    /// Version of the trials and their seeds.
     pub format: u32,
     /// Checksum of the mesh, or None for the house of our own making.
     pub mesh_crc32: Option<u32>,

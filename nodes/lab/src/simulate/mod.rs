@@ -1,7 +1,7 @@
 //! Simulated machines and sites with a noise-free truth.
 //!
-//! [`Bobcat`] is the skid-steer loader of Ryde & Brünig 2011, section III.B: three SICK LMS200, one of
-//! them on a turntable, and a SPAN-CPT-like INS, on an earth-moving [`Site`]. Everything is a pure function
+//! `Bobcat` is the skid-steer loader of Ryde & Brünig 2011, section III.B: three SICK LMS200, one of
+//! them on a turntable, and a SPAN-CPT-like INS, on an earth-moving `Site`. Everything is a pure function
 //! of a seed and a time, so that any number of threads gives the same bytes.
 //!
 //! [`house`] is another world: a furnished house, a robot that maps it and a headset.
