@@ -13,7 +13,7 @@ pub(super) enum Outside {
     OutOfRange,
 }
 
-/// What it takes to follow rays through the cells of a lattice, exactly.
+/// Face neighbours of a lattice by which rays are followed through its cells, exactly.
 ///
 /// Within a cell the next face is the one that the ray reaches first, among the planes halfway to the
 /// face neighbours; there are at most 7 pairs. The numerators are sums of Gram products that are

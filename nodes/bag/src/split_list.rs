@@ -67,7 +67,7 @@ pub(crate) fn splits_in(folder: &Path) -> Result<Vec<Split>, BagError> {
         .collect()
 }
 
-/// What is in a folder, each with its name.
+/// Paths and names of the entries of a folder.
 pub(crate) fn list(folder: &Path) -> Result<Vec<(PathBuf, String)>, BagError> {
     let mut found = Vec::new();
     for entry in fs::read_dir(folder).map_err(BagError::io(folder, "list"))? {

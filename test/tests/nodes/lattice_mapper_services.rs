@@ -49,7 +49,7 @@ impl Pair {
         self.mapper.list().validate().unwrap();
     }
 
-    /// Which of these places on the x axis are occupied.
+    /// Occupancy of places on the x axis, each true if a voxel is there.
     fn occupied<const N: usize>(&self, places: [f64; N]) -> [bool; N] {
         places.map(|x| self.has(x))
     }

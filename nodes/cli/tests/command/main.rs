@@ -22,7 +22,7 @@ fn lattice(arguments: &[&str]) -> Output {
         .unwrap()
 }
 
-/// What it prints when it succeeds.
+/// Standard output of a call that must succeed.
 fn text(arguments: &[&str]) -> String {
     let output = lattice(arguments);
     let errors = String::from_utf8_lossy(&output.stderr);

@@ -177,12 +177,12 @@ impl<S: Search> Bench<S> {
         self.results.last().unwrap().verdict
     }
 
-    /// Who was answered, and how.
+    /// Caller and end of an answer.
     pub fn answered(&self, i: usize) -> (CallId, End) {
         (self.answers[i].0, self.answers[i].1)
     }
 
-    /// What the answer says.
+    /// Message of an answer.
     pub fn message(&self, i: usize) -> &str {
         &self.answers[i].2.message
     }
