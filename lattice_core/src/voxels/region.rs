@@ -3,6 +3,9 @@
 use nalgebra::Vector3;
 use thiserror::Error;
 
+use super::store::block_mask::{BlockMask, places};
+use crate::lattice::{BlockKey, Lattice};
+
 /// Corners that do not bound a region: one is NaN, or the lower is above the upper.
 #[derive(Clone, PartialEq, Debug, Error)]
 #[error("corners {min_m:?} and {max_m:?} m do not bound a box: give the lower one first")]
@@ -30,8 +33,64 @@ impl Region {
     }
 
     /// True if the point (map frame, metres) is inside or on the border.
-    pub(super) fn contains(&self, p: &Vector3<f64>) -> bool {
-        (0..3).all(|i| self.min_m[i] <= p[i] && p[i] <= self.max_m[i])
+    fn contains(&self, p: &Vector3<f64>) -> bool {
+        self.contains_ball(p, 0.0) == Some(true)
+    }
+
+    /// True if all of a ball is inside, false if all is outside; `None` if neither is sure.
+    fn contains_ball(&self, center_m: &Vector3<f64>, radius_m: f64) -> Option<bool> {
+        let (low, high) = (
+            center_m.add_scalar(-radius_m),
+            center_m.add_scalar(radius_m),
+        );
+        let inside = (0..3).all(|i| self.min_m[i] <= low[i] && high[i] <= self.max_m[i]);
+        let outside = (0..3).any(|i| high[i] < self.min_m[i] || self.max_m[i] < low[i]);
+        (inside || outside).then_some(inside)
+    }
+}
+
+/// Cells of a lattice that have their centre in a region, chosen by blocks of 8 x 8 x 8 indices.
+pub(super) struct CellsInside {
+    region: Region,
+    lattice: Lattice,
+    datum_m: Vector3<f64>,
+    /// From the lowest lattice point of a block to its middle.
+    middle_m: Vector3<f64>,
+    /// Radius about its middle that holds all lattice points of a block.
+    radius_m: f64,
+}
+
+impl CellsInside {
+    pub(super) fn new(region: &Region, lattice: &Lattice, datum_m: Vector3<f64>) -> CellsInside {
+        let generator = lattice.generator();
+        let corner_m = |i: i32| {
+            let sign = |bit: i32| if i >> bit & 1 == 0 { 3.5 } else { -3.5 };
+            (generator * Vector3::new(sign(0), sign(1), sign(2))).norm()
+        };
+        CellsInside {
+            region: *region,
+            lattice: lattice.clone(),
+            datum_m,
+            middle_m: generator * Vector3::repeat(3.5),
+            // The covering radius is far above all roundings.
+            radius_m: (0..4).map(corner_m).fold(0.0, f64::max) + lattice.covering_radius_m(),
+        }
+    }
+
+    /// Cells of a block's mask that are in the region.
+    pub(super) fn of_block(&self, block: u64, leaf: &BlockMask) -> Vec<BlockKey> {
+        let center_m = |cell: BlockKey| self.datum_m + self.lattice.center(cell.unpack());
+        let first_m = BlockKey::from_raw(block << 9).map(center_m);
+        let all = first_m.and_then(|first_m| {
+            self.region
+                .contains_ball(&(first_m + self.middle_m), self.radius_m)
+        });
+        if all == Some(false) {
+            return Vec::new();
+        }
+        let cells = places(leaf).filter_map(|place| BlockKey::from_raw(block << 9 | place as u64));
+        let inside = |cell: &BlockKey| all.is_some() || self.region.contains(&center_m(*cell));
+        cells.filter(inside).collect()
     }
 }
 
@@ -52,6 +111,10 @@ mod tests {
         let high = Vector3::new(f64::INFINITY, f64::INFINITY, 2.0);
         let below = Region::cuboid(-Vector3::repeat(f64::INFINITY), high).unwrap();
         assert!(below.contains(&Vector3::new(1e9, -1e9, 2.0)));
+        for (z, answer) in [(-9.0, Some(true)), (9.0, None), (13.0, Some(false))] {
+            let center_m = Vector3::new(0.0, 0.0, z);
+            assert_eq!(below.contains_ball(&center_m, 10.0), answer);
+        }
         let nan = Vector3::new(0.0, f64::NAN, 0.0);
         assert!(Region::cuboid(nan, high).is_err());
         assert!(Region::cuboid(high, Vector3::zeros()).is_err());

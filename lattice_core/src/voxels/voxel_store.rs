@@ -35,9 +35,8 @@ pub trait VoxelStore: Sync {
     /// Removes a voxel; false if the cell was not occupied.
     fn remove(&mut self, key: MortonKey) -> bool;
 
-    /// Removes the cells that `keep` denies, which is asked in no order and on many threads; gives
-    /// their number.
-    fn retain_cells(&mut self, keep: &(dyn Fn(MortonKey) -> bool + Sync)) -> usize;
+    /// Keys of the voxels with their centre in a region, in no order.
+    fn keys_in(&self, region: &Region) -> Vec<MortonKey>;
 
     /// Memory that the store holds, bytes.
     fn bytes(&self) -> usize;
@@ -58,9 +57,9 @@ pub trait VoxelStore: Sync {
         MortonKey::pack(w)
     }
 
-    /// Removes the cells with their centre in a region; gives their number.
+    /// Removes the voxels with their centre in a region; gives their number.
     fn remove_region(&mut self, region: &Region) -> usize {
-        let (lattice, datum_m) = (self.lattice().clone(), self.datum_m());
-        self.retain_cells(&|key| !region.contains(&(datum_m + lattice.center(key.unpack()))))
+        let keys = self.keys_in(region);
+        keys.into_iter().filter(|key| self.remove(*key)).count()
     }
 }

@@ -4,7 +4,7 @@ use std::collections::hash_map::Entry;
 
 use lattice_core::cloud::Cloud;
 use lattice_core::lattice::{Lattice, MortonKey};
-use lattice_core::voxels::{Changes, InsertReport, OccupancyList, VoxelStore};
+use lattice_core::voxels::{Changes, InsertReport, OccupancyList, Region, VoxelStore};
 use nalgebra::Vector3;
 use rustc_hash::FxHashMap;
 
@@ -147,15 +147,8 @@ impl VoxelStore for OccupancyMap {
         removed
     }
 
-    fn retain_cells(&mut self, keep: &(dyn Fn(MortonKey) -> bool + Sync)) -> usize {
-        let before = self.list.sorted_keys();
-        let removed = self.list.retain_cells(keep);
-        for key in before {
-            if !self.list.contains(key) {
-                self.note(key, false);
-            }
-        }
-        removed
+    fn keys_in(&self, region: &Region) -> Vec<MortonKey> {
+        self.list.keys_in(region)
     }
 
     fn bytes(&self) -> usize {
@@ -199,7 +192,8 @@ mod tests {
                 removed: vec![]
             }
         );
-        map.retain_cells(&|key| key == keys[0]);
+        let (low, high) = (Vector3::new(1.0, -1.0, -1.0), Vector3::repeat(9.0));
+        assert_eq!(map.remove_region(&Region::cuboid(low, high).unwrap()), 1);
         assert_eq!(map.take_changes().removed, [keys[1]]);
         assert_eq!(map.take_changes(), Changes::default());
     }

@@ -17,8 +17,8 @@ use super::distortion::{Distortion, DistortionSums};
 use super::store::fixed_point::reach;
 use super::store::growth;
 use super::store::payload_columns::{Columns, Details, LabelCount, Payload, Stamps};
-use super::store::shard::{Entry, Life, SHARDS, Shard, shard_of};
-use super::{Voxel, VoxelStore};
+use super::store::shard::{Life, SHARDS, Shard, shard_of};
+use super::{Region, Voxel, VoxelStore};
 use crate::cloud::Cloud;
 use crate::lattice::{BlockKey, Lattice, MortonKey};
 
@@ -323,9 +323,15 @@ impl VoxelStore for VoxelList {
         removed
     }
 
-    fn retain_cells(&mut self, keep: &(dyn Fn(MortonKey) -> bool + Sync)) -> usize {
-        let key = |entry: &Entry| BlockKey::from_raw(entry.code)?.key();
-        self.remove_where(|_, _, entry| key(entry).is_some_and(|key| !keep(key)))
+    fn keys_in(&self, region: &Region) -> Vec<MortonKey> {
+        let cells = self.cells_in(region).into_iter().flatten();
+        cells.filter_map(BlockKey::key).collect()
+    }
+
+    fn remove_region(&mut self, region: &Region) -> usize {
+        let gone = self.cells_in(region);
+        let now = self.advance();
+        self.remove_at(gone, now)
     }
 
     fn bytes(&self) -> usize {

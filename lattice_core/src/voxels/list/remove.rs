@@ -5,6 +5,7 @@ use thiserror::Error;
 
 use super::VoxelList;
 use crate::lattice::BlockKey;
+use crate::voxels::region::{CellsInside, Region};
 use crate::voxels::store::shard::{Entry, Shard};
 
 /// The list does not know when its points were seen.
@@ -40,6 +41,18 @@ impl VoxelList {
         let gone = self.shards.par_iter().map(select).collect();
         let now = self.advance();
         self.remove_at(gone, now)
+    }
+
+    /// Cells with their centre in a region, listed by shard.
+    pub(super) fn cells_in(&self, region: &Region) -> Vec<Vec<BlockKey>> {
+        let inside = CellsInside::new(region, &self.lattice, self.datum_m);
+        let select = |shard: &Shard| {
+            let blocks = shard.voxels.blocks();
+            blocks
+                .flat_map(|(block, leaf)| inside.of_block(block, leaf))
+                .collect()
+        };
+        self.shards.par_iter().map(select).collect()
     }
 
     /// Removes the voxels of these cells, listed by shard, as part of state `now`.

@@ -7,6 +7,7 @@ use rayon::prelude::*;
 
 use recent_cells::Recent;
 
+use super::region::{CellsInside, Region};
 use super::store::block_mask::{self, BlockMask};
 use super::store::hash_table::{Place, Row, Table};
 use super::{DatumError, InsertReport, VoxelStore};
@@ -268,10 +269,11 @@ impl VoxelStore for OccupancyList {
         true
     }
 
-    fn retain_cells(&mut self, keep: &(dyn Fn(MortonKey) -> bool + Sync)) -> usize {
-        let denied = |key: &MortonKey| !keep(*key);
-        let gone: Vec<MortonKey> = self.sorted_keys().into_par_iter().filter(denied).collect();
-        gone.iter().filter(|key| self.remove(**key)).count()
+    fn keys_in(&self, region: &Region) -> Vec<MortonKey> {
+        let inside = CellsInside::new(region, &self.lattice, self.datum_m);
+        let of_block = |block: &Block| inside.of_block(block.code, &block.leaf);
+        let cells = self.blocks.rows().par_iter().flat_map_iter(of_block);
+        cells.filter_map(BlockKey::key).collect()
     }
 
     fn bytes(&self) -> usize {

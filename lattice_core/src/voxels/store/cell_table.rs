@@ -155,6 +155,12 @@ impl CellTable {
         self.rows.get_mut(number as usize)
     }
 
+    /// Blocks with voxels, each with one bit for each of its voxels.
+    pub(crate) fn blocks(&self) -> impl Iterator<Item = (u64, &BlockMask)> {
+        let blocks = self.blocks.rows().iter();
+        blocks.map(|block| (block.code, &block.leaf))
+    }
+
     pub(crate) fn bytes(&self) -> usize {
         self.blocks.bytes() + self.number_bytes + self.rows.capacity() * size_of::<Entry>()
     }
