@@ -15,7 +15,7 @@ use ros2_client::action_msgs::{CancelGoalResponseEnum, GoalStatusEnum};
 use ros2_client::builtin_interfaces::Time;
 use ros2_client::{ActionClient, ActionTypeName, Name, Node, ServiceMapping};
 
-use super::client::{Foreign, PATIENCE, peer, reliable};
+use super::client::{Foreign, PATIENCE, mappings, peer, reliable};
 
 const LIMITS: ActionLimits = ActionLimits {
     max_live: 2,
@@ -128,7 +128,7 @@ async fn talk(peer: &Node, client: &Client, goals: &Goals) {
 
 #[test]
 fn goals_go_their_way_with_clients_of_both_rmw() {
-    for mapping in [ServiceMapping::Enhanced, ServiceMapping::Cyclone] {
+    for &mapping in mappings() {
         let domain = TestDomain::take();
         let args = RosArgs::parse(["--ros-args".to_owned()]).unwrap();
         let runtime = Runtime::with_transport("mapper", args, &domain.transport()).unwrap();

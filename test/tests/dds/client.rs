@@ -2,9 +2,10 @@
 
 use std::time::Duration;
 
+use lattice_runtime::env::{Network, TransportKind};
 use lattice_test::domain::TestDomain;
 use ros2_client::qos::WhenFull;
-use ros2_client::{Context, Message, Node, NodeName, NodeOptions, QosProfile};
+use ros2_client::{Context, Message, Node, NodeName, NodeOptions, QosProfile, ServiceMapping};
 use rustdds::DomainParticipantBuilder;
 use serde::de::DeserializeOwned;
 use serde::{Deserialize, Serialize};
@@ -37,4 +38,12 @@ pub fn peer(domain: &TestDomain) -> Node {
 /// Quality of service of clients.
 pub fn reliable() -> QosProfile {
     QosProfile::publisher_default().reliability_reliable(WhenFull::Fail)
+}
+
+/// Forms of requests that the transport under test can answer.
+pub fn mappings() -> &'static [ServiceMapping] {
+    match Network::from_env().unwrap().transport {
+        TransportKind::RustDds => &[ServiceMapping::Enhanced, ServiceMapping::Cyclone],
+        TransportKind::Cyclone => &[ServiceMapping::Cyclone],
+    }
 }
