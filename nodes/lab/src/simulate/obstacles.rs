@@ -247,6 +247,8 @@ mod tests {
         assert_eq!(hit, Some((4.0, -Vector3::x())));
         assert_eq!(block.cast(&from(0.0, 1.0), &-Vector3::x()), None);
         assert_eq!(block.cast(&from(5.0, 1.0), &Vector3::x()), None);
+        let wide = Block::new(from(0.0, 1.0), Vector3::new(4.0, 2.0, 2.0), 0.0);
+        assert_eq!(wide.ground_clearance_m(&Vector2::new(5.0, 0.0)), 3.0);
         let post = Post {
             center_m: Vector2::new(5.0, 0.0),
             radius_m: 0.5,
