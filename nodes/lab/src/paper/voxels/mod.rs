@@ -14,8 +14,8 @@ mod sample;
 mod scan;
 mod theory;
 
-use crate::AnyError;
 use crate::report::{Report, Section};
+use crate::{AnyError, at};
 use lattice_core::lattice::{Lattice, LatticeIndex, LatticeKind};
 use std::fs;
 use std::path::PathBuf;
@@ -56,7 +56,7 @@ pub fn run(options: &Options, progress: &mut dyn FnMut(f64, &str)) -> Result<Rep
     // Before a minute of work.
     let files = options.scans.iter().chain(&options.bags);
     for path in files.chain(&options.pairs) {
-        fs::metadata(path).map_err(|e| format!("{}: {e}", path.display()))?;
+        fs::metadata(path).map_err(at(path))?;
     }
     let all: f64 = SECTIONS.iter().map(|(_, share, _)| share).sum();
     let mut before = 0.0;
