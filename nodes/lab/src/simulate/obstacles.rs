@@ -129,12 +129,8 @@ impl Post {
         let distance = (-b - discriminant.sqrt()) / a;
         let z = origin.z + direction.z * distance;
         let hit = distance > 0.0 && z >= self.span_m[0] && z <= self.span_m[1];
-        hit.then(|| {
-            (
-                distance,
-                ((from + along * distance) / self.radius_m).push(0.0),
-            )
-        })
+        let normal = (from + along * distance) / self.radius_m;
+        hit.then(|| (distance, normal.push(0.0)))
     }
 
     /// Distance from a point to the mantle, m.
