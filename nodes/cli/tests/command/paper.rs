@@ -155,6 +155,14 @@ fn a_real_scan_saves_voxels_when_it_is_turned_anyhow(rows: &str) {
             "{lattice}: {found:?}"
         );
     }
+    for lattice in ["FCC", "BCC"] {
+        let found = row("any rotation", lattice);
+        let (spread, mean) = (found[7], found[9]);
+        assert!(
+            (0.3..0.6).contains(&spread) && (-3.2..-1.5).contains(&mean),
+            "{found:?}"
+        );
+    }
     let fcc = row("yaw only", "FCC");
     assert!(fcc[3] - fcc[4] > 0.0, "{fcc:?}");
 }
