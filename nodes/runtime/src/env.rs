@@ -23,7 +23,7 @@ pub struct Network {
     pub warnings: Vec<String>,
 }
 
-/// `ROS_DOMAIN_ID` is no domain but this.
+/// `ROS_DOMAIN_ID` holds this text, which is no DDS domain.
 #[derive(Debug, Error)]
 #[error("ROS_DOMAIN_ID={0:?} is no DDS domain; expected a number from 0 to 232")]
 pub struct EnvError(String);
