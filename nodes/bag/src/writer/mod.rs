@@ -288,9 +288,10 @@ mod tests {
     fn a_full_disk_is_named() {
         let path = Path::new("/dev/full");
         let file = File::options().write(true).open(path).unwrap();
-        let mut sink = McapSink::create(file).unwrap();
-        sink.add_topic(&TopicInfo::default(), "").unwrap();
-        let written = sink.write(0, 0, &[0; 1 << 16]);
+        let written = McapSink::create(file).and_then(|mut sink| {
+            sink.add_topic(&TopicInfo::default(), "")?;
+            sink.write(0, 0, &[0; 1 << 16])
+        });
         let error = failed(path, "write")(written.unwrap_err()).to_string();
         assert!(error.contains("No space left on device"), "{error}");
     }
