@@ -30,8 +30,10 @@ impl Made {
         let report = fs::read(folder.join("report.json")).unwrap();
         let report: Value = serde_json::from_slice(&report).unwrap();
         let command = report["command"].as_str().unwrap();
-        let expected = format!("lattice paper {paper} --seed 1 --quick");
-        assert!(command.starts_with(&expected), "{command}");
+        let scanned = more.contains(&"--scan");
+        let scan = if scanned { " --scan target.ply" } else { "" };
+        let expected = format!("lattice paper {paper} --seed 1 --quick{scan}");
+        assert_eq!(command, expected);
         let folder = folder.to_owned();
         let made = Made { folder, report };
         let checks = made.all("checks");
