@@ -47,3 +47,17 @@ pub fn mappings() -> &'static [ServiceMapping] {
         TransportKind::Cyclone => &[ServiceMapping::Cyclone],
     }
 }
+
+/// Repeats a call until it is answered. The first sample of a RustDDS writer is history to a volatile
+/// reader of Cyclone, since its heartbeat comes after it.
+pub async fn insist<T>(call: impl AsyncFn() -> T) -> T {
+    loop {
+        let late = async {
+            smol::Timer::after(Duration::from_secs(2)).await;
+            None
+        };
+        if let Some(answer) = smol::future::or(async { Some(call().await) }, late).await {
+            return answer;
+        }
+    }
+}

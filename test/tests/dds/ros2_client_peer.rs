@@ -10,7 +10,7 @@ use lattice_runtime::ros_args::RosArgs;
 use lattice_test::domain::TestDomain;
 use ros2_client::{Message, Name, Node, NodeEvent, ServiceMapping, ServiceTypeName};
 
-use super::client::{Foreign, PATIENCE, mappings, peer, reliable};
+use super::client::{Foreign, PATIENCE, insist, mappings, peer, reliable};
 
 const TRIGGER: (&str, &str) = ("std_srvs", "Trigger");
 
@@ -35,7 +35,7 @@ fn call<Q: Message + Clone + 'static, R: Message + 'static>(
         .unwrap();
     let answer = async {
         client.wait_for_service(peer).await;
-        client.async_call_service(request).await.unwrap()
+        insist(async || client.async_call_service(request.clone()).await.unwrap()).await
     };
     let timeout = async {
         smol::Timer::after(PATIENCE).await;
