@@ -24,7 +24,7 @@ pub enum TransportKind {
 
 impl TransportKind {
     /// The transports built in, by their names in `RMW_IMPLEMENTATION`; the first is the default.
-    const BUILT_IN: &[(&str, TransportKind)] = &[
+    pub const BUILT_IN: &[(&str, TransportKind)] = &[
         #[cfg(feature = "cyclone")]
         ("rmw_cyclonedds_cpp", TransportKind::Cyclone),
         ("rustdds", TransportKind::RustDds),

@@ -4,6 +4,7 @@
 mod action_peer;
 mod calibration;
 mod client;
+mod conformance;
 mod cyclone;
 mod peer;
 mod ros2_client_peer;

@@ -4,6 +4,7 @@
 //! Endpoints are of "blob" topics: any type name, samples as serialised bytes.
 
 mod arrivals;
+mod blob;
 mod config;
 mod discovery;
 mod domain;

@@ -4,13 +4,14 @@ use std::ffi::CString;
 use std::ptr;
 use std::sync::Arc;
 
-use cyclors::{cdds_create_blob_topic, dds_create_participant};
+use cyclors::dds_create_participant;
 use futures::StreamExt;
 use futures::future::BoxFuture;
 use futures::stream::BoxStream;
 use lattice_msgs::dds_type_name;
 use smol::channel::{Receiver, Sender, unbounded};
 
+use super::blob;
 use super::discovery::Discovery;
 use super::domain::Domain;
 use super::endpoint::{Description, Side};
@@ -63,12 +64,7 @@ impl Cyclone {
     fn topic(&self, name: &str, dds_type: &str) -> Result<Entity, String> {
         let text = |text: &str| CString::new(text).map_err(|_| "a name has a zero byte".to_owned());
         let (name, dds_type) = (text(name)?, text(dds_type)?);
-        // SAFETY: strings that end with 0 and are copied.
-        let made = unsafe {
-            let (name, dds_type) = (name.as_ptr().cast_mut(), dds_type.as_ptr().cast_mut());
-            cdds_create_blob_topic(self.participant.handle(), name, dds_type, true)
-        };
-        Entity::new(made)
+        blob::topic(&self.participant, &name, &dds_type)
     }
 
     /// Topic, QoS and description of an endpoint to be made.

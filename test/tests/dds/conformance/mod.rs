@@ -1,0 +1,152 @@
+//! One suite for every transport that is built in, each against itself and against every other.
+//!
+//! The ends are in processes of their own where one is killed or stopped: an [`Echo`] is this test program
+//! once more, as the test `echo`.
+
+mod crowd;
+mod matching;
+mod recovery;
+mod services;
+
+use std::process::{Child, Command, Stdio};
+use std::sync::mpsc::{Receiver, RecvTimeoutError, channel};
+use std::time::{Duration, Instant};
+
+use lattice_msgs::std_msgs::String as RosString;
+use lattice_runtime::env::{Network, TransportKind};
+use lattice_runtime::qos::Qos;
+use lattice_runtime::ros_args::RosArgs;
+use lattice_runtime::{Load, Publisher, Runtime, Subscription};
+use lattice_test::domain::TestDomain;
+
+/// Long enough for a loaded machine; a test that passes does not wait for it.
+const PATIENCE: Duration = Duration::from_secs(60);
+
+/// Longest time to recovery after a peer was stopped or killed.
+const RECOVERY: Duration = Duration::from_secs(12);
+
+/// Between two messages of a talk.
+const PERIOD: Duration = Duration::from_millis(50);
+
+/// Messages both ways, however many are on the way.
+const QOS: Qos = Qos::reliable(100);
+
+/// Domain of an echo.
+const DOMAIN: &str = "LATTICE_TEST_ECHO_DOMAIN";
+
+type Transport = (&'static str, TransportKind);
+
+/// Every transport with every other, itself included.
+fn pairs() -> impl Iterator<Item = (Transport, Transport)> {
+    let all = TransportKind::BUILT_IN;
+    all.iter().flat_map(|a| all.iter().map(|b| (*a, *b)))
+}
+
+fn runtime(domain: &TestDomain, transport: Transport, name: &str) -> Runtime {
+    let args = RosArgs::parse(["--ros-args".to_owned()]).unwrap();
+    let network = Network {
+        transport: transport.1,
+        ..domain.transport()
+    };
+    Runtime::with_transport(name, args, &network).unwrap()
+}
+
+/// A process that says again on `out` what it hears on `in`.
+struct Echo(Child);
+
+impl Echo {
+    fn start(domain: &TestDomain, transport: Transport) -> Self {
+        let program = std::env::current_exe().unwrap();
+        let child = Command::new(program)
+            .args(["--exact", "conformance::echo", "--ignored", "--nocapture"])
+            .env(DOMAIN, domain.id().to_string())
+            .env("RMW_IMPLEMENTATION", transport.0)
+            .stdout(Stdio::null())
+            .spawn();
+        Self(child.unwrap())
+    }
+
+    fn signal(&self, name: &str) {
+        let id = self.0.id().to_string();
+        let done = Command::new("kill").args(["-s", name, &id]).status();
+        assert!(done.unwrap().success());
+    }
+}
+
+impl Drop for Echo {
+    fn drop(&mut self) {
+        let _ = self.0.kill();
+        let _ = self.0.wait();
+    }
+}
+
+#[test]
+#[ignore = "the other end of the tests here, not one itself"]
+fn echo() {
+    let Ok(id) = std::env::var(DOMAIN) else {
+        return;
+    };
+    let network = Network {
+        domain_id: id.parse().unwrap(),
+        localhost_only: true,
+        ..Network::from_env().unwrap()
+    };
+    let args = RosArgs::parse(["--ros-args".to_owned()]).unwrap();
+    let runtime = Runtime::with_transport("echo", args, &network).unwrap();
+    let node = runtime.node("echo").unwrap();
+    let out = node.publisher::<RosString>("/out", QOS).unwrap();
+    let say_again = move |message| {
+        let _ = out.publish(message);
+    };
+    let _heard = node
+        .subscribe::<RosString>("/in", QOS, Load::Small, say_again)
+        .unwrap();
+    runtime.spin().unwrap();
+}
+
+/// Our end of a talk with an echo.
+struct Talk {
+    publisher: Publisher<RosString>,
+    heard: Receiver<String>,
+    _subscription: Subscription,
+    _runtime: Runtime,
+}
+
+impl Talk {
+    fn start(domain: &TestDomain, transport: Transport) -> Self {
+        let runtime = runtime(domain, transport, "talk");
+        let node = runtime.node("talk").unwrap();
+        let publisher = node.publisher("/in", QOS).unwrap();
+        let (sender, heard) = channel();
+        let handler = move |message: std::sync::Arc<RosString>| {
+            let _ = sender.send(message.data.clone());
+        };
+        let subscription = node.subscribe("/out", QOS, Load::Small, handler).unwrap();
+        Self {
+            publisher,
+            heard,
+            _subscription: subscription,
+            _runtime: runtime,
+        }
+    }
+
+    /// Says a word until it comes back; the time that took.
+    #[track_caller]
+    fn until_echoed(&self, word: &str, within: Duration) -> Duration {
+        let start = Instant::now();
+        loop {
+            let data = word.to_owned();
+            // A full queue shows in the time.
+            let _ = self.publisher.publish(RosString { data });
+            loop {
+                match self.heard.recv_timeout(PERIOD) {
+                    Ok(heard) if heard == word => return start.elapsed(),
+                    Ok(_) => {}
+                    Err(RecvTimeoutError::Timeout) => break,
+                    Err(error) => panic!("{error}"),
+                }
+            }
+            assert!(start.elapsed() < within, "{word} was not heard again");
+        }
+    }
+}
