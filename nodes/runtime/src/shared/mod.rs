@@ -67,7 +67,7 @@ pub(crate) struct Shared {
 
 /// Everything that goes at shutdown.
 struct Open {
-    transport: Box<dyn Transport>,
+    transport: Arc<dyn Transport>,
     _watch: Option<Task<()>>,
     publishers: Vec<Weak<PublisherParts>>,
     intakes: Vec<Weak<Intake>>,
@@ -81,9 +81,11 @@ impl Shared {
         let shutdown = Shutdown::default();
         let io = TaskThread::start("io", shutdown.clone())?;
         let publishing = TaskThread::start("publisher", shutdown.clone())?;
-        let dds = Dds::join(domain, localhost_only)?;
+        let dds = Dds::join(domain, localhost_only, &shutdown)?;
         let endpoints = Arc::new(Endpoints::default());
-        let watch = io.spawn(Arc::clone(&endpoints).watch(dds.events()));
+        let graph = Graph::new();
+        let watch = Arc::clone(&endpoints).watch(dds.events(), Arc::clone(&graph));
+        let watch = io.spawn(watch);
         let shared = Arc::new(Self {
             bus: LocalBus::default(),
             shutdown,
@@ -94,11 +96,11 @@ impl Shared {
             publishing,
             answers: Answers::default(),
             endpoints,
-            graph: Graph::new(),
+            graph,
             writer_order: Mutex::default(),
             writers_made: AtomicU64::new(0),
             open: Mutex::new(Some(Open {
-                transport: Box::new(dds),
+                transport: Arc::new(dds),
                 _watch: watch,
                 publishers: Vec::new(),
                 intakes: Vec::new(),
@@ -115,7 +117,8 @@ impl Shared {
         let outbox = self.outbox(graph::TOPIC, &Qos::latched(1), WhenFull::Wait)?;
         if let Some(open) = lock(&self.open).as_mut() {
             let graph = Arc::clone(&self.graph);
-            open.graph = self.io.spawn(graph.publish(open.transport.id(), outbox));
+            let transport = Arc::downgrade(&open.transport);
+            open.graph = self.io.spawn(graph.publish(transport, outbox));
         }
         Ok(())
     }
@@ -191,6 +194,12 @@ impl Shared {
         let open = lock(&self.open);
         let all = open.iter().flat_map(|open| &open.intakes);
         all.filter_map(Weak::upgrade).collect()
+    }
+
+    /// How often the participant was made anew.
+    pub(crate) fn renewals(&self) -> u64 {
+        let open = lock(&self.open);
+        open.as_ref().map_or(0, |open| open.transport.renewals())
     }
 
     /// A wait for discovery to know all writers made so far. `None` after shutdown.
