@@ -187,7 +187,9 @@ mod tests {
             assert!(threads.all_run());
         }
         drop(stop);
-        handles.map(|handle| handle.join().unwrap().unwrap_err());
+        for handle in handles {
+            assert!(handle.join().unwrap().is_err());
+        }
         assert!(threads.0.is_empty() || !threads.all_run());
     }
 
@@ -216,6 +218,7 @@ mod tests {
             }
         }
         assert_eq!(due, [0, 5, 15, 35, 75, 135, 195, 255]);
+        returns.renewed();
         returns.found(GUID::new_participant_guid());
         assert!(
             !returns.due(start + Duration::from_secs(1000)),

@@ -5,6 +5,7 @@ use std::sync::{Arc, Mutex, Weak};
 
 use futures::future::BoxFuture;
 
+use super::goodbye;
 use super::participant::{Participant, Recipe};
 use super::reader::{DdsReader, ReaderSource};
 use super::writer::DdsWriter;
@@ -114,7 +115,13 @@ impl Lives {
         let mut now = lock(&self.now);
         now.writers().for_each(|writer| writer.leave());
         now.readers().for_each(|reader| reader.leave());
-        drop(now.participant.take());
+        if let Some(participant) = now.participant.take() {
+            let is_mute = !participant.is_alive();
+            drop(participant);
+            if is_mute {
+                goodbye::say(self.domain, self.localhost_only, now.wire_id);
+            }
+        }
     }
 
     /// Makes a participant with all writers, which write there what they have kept.

@@ -1,6 +1,7 @@
 //! The transport over RustDDS. All that names a RustDDS type is here.
 
 mod events;
+mod goodbye;
 mod health;
 mod lives;
 mod participant;

@@ -13,7 +13,7 @@ use lattice_runtime::qos::Qos;
 use lattice_runtime::ros_args::RosArgs;
 use lattice_test::domain::TestDomain;
 
-use super::{PATIENCE, assert_heard, hear, runtime, text};
+use super::{PATIENCE, assert_heard, hear, runtime, text, wait_until};
 
 /// Names the domain to the process of [`echo`].
 const DOMAIN: &str = "LATTICE_TEST_ECHO_DOMAIN";
@@ -109,6 +109,10 @@ fn a_process_that_was_stopped_hears_and_is_heard_again() {
     echo.signal("CONT");
     let continued = Instant::now();
     round("after");
+    // The participant that was has taken its leave.
+    wait_until(&us, move || {
+        talk.subscriber_count() == 1 && said.publisher_count() == 1
+    });
     let took = continued.elapsed();
     assert!(took < Duration::from_secs(12), "{took:?}");
 }
