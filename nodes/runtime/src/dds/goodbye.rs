@@ -30,18 +30,28 @@ const STATUS: [u8; 4] = [0, 0, 0, 3];
 /// Tells this machine and, unless confined to it, the network that a participant has gone.
 pub(super) fn say(domain: u16, localhost_only: bool, participant: EndpointId) {
     let message = message(participant);
-    let ports = 7400_u16.checked_add(domain.saturating_mul(250));
-    let (Some(multicast), Ok(socket)) = (ports, UdpSocket::bind((Ipv4Addr::UNSPECIFIED, 0))) else {
+    let Ok(socket) = UdpSocket::bind((Ipv4Addr::UNSPECIFIED, 0)) else {
         return;
     };
-    let local = (0..LOCAL_PARTICIPANTS).filter_map(|i| multicast.checked_add(10 + 2 * i));
+    let local = (0..LOCAL_PARTICIPANTS).filter_map(|place| unicast_port(domain, place));
     let local = local.map(|port| SocketAddrV4::new(Ipv4Addr::LOCALHOST, port));
-    let network = (!localhost_only).then_some(SocketAddrV4::new(GROUP, multicast));
+    let network = multicast_port(domain).filter(|_| !localhost_only);
+    let network = network.map(|port| SocketAddrV4::new(GROUP, port));
     for address in local.chain(network) {
         if let Err(error) = socket.send_to(&message, address) {
             log::debug!("{address}: {error}");
         }
     }
+}
+
+/// Port of the announcements that all participants of a domain hear.
+fn multicast_port(domain: u16) -> Option<u16> {
+    domain.checked_mul(250)?.checked_add(7400)
+}
+
+/// Port of the announcements to one participant of a machine, by its place there.
+fn unicast_port(domain: u16, place: u16) -> Option<u16> {
+    multicast_port(domain)?.checked_add(place.checked_mul(2)?.checked_add(10)?)
 }
 
 fn message(participant: EndpointId) -> Vec<u8> {

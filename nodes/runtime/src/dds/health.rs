@@ -9,7 +9,7 @@ use std::fs;
 use std::sync::Mutex;
 use std::time::{Duration, Instant};
 
-use rustdds::{DomainParticipantStatusEvent as Event, GUID, LostReason};
+use rustdds::{DomainParticipantStatusEvent as Event, LostReason};
 
 use crate::sync::lock;
 
@@ -28,6 +28,9 @@ const LONGEST_PAUSE: Duration = Duration::from_secs(60);
 
 /// Names of the threads of RustDDS begin with this.
 const THREAD_NAME: &str = "RustDDS ";
+
+/// A peer is waited for so long. Then the participant is made anew, so that none is needed to hear it.
+const SCOUT_TIME: Duration = Duration::from_secs(600);
 
 /// Threads of a participant: its event loop and its discovery.
 const THREADS: usize = 2;
@@ -96,15 +99,17 @@ impl Gap {
     }
 }
 
-/// What the endpoints of a participant have in common.
-fn prefix(bytes: &[u8]) -> Option<[u8; 12]> {
-    bytes.try_into().ok()
-}
-
 /// Finds peers that time out and come back, and says when that is worth a renewal.
+///
+/// RustDDS takes the announcement of a peer that comes back for one it has had, and does not tell. A
+/// second participant, made after the loss, hears it as new: a scout.
 pub(super) struct Returns {
-    lost: VecDeque<[u8; 12]>,
+    /// Prefixes of GUIDs, each with the time of the loss.
+    lost: VecDeque<([u8; 12], Instant)>,
     returned: bool,
+    scout_made: Option<Instant>,
+    /// True if a peer was lost since the scout was made.
+    scout_is_stale: bool,
     pause: Duration,
     last: Option<Instant>,
 }
@@ -114,38 +119,72 @@ impl Returns {
         Self {
             lost: VecDeque::new(),
             returned: false,
+            scout_made: None,
+            scout_is_stale: false,
             pause: FIRST_PAUSE,
             last: None,
         }
     }
 
+    /// An event of the participant.
     pub(super) fn hear(&mut self, event: &Event) {
+        if let Event::ParticipantLost {
+            id,
+            reason: LostReason::Timeout { .. },
+        } = event
+            && let Ok(peer) = id.as_ref().try_into()
+        {
+            self.lost(peer, Instant::now());
+        }
+    }
+
+    /// An event of the scout.
+    pub(super) fn hear_scout(&mut self, event: &Event) {
         match event {
-            Event::ParticipantLost {
-                id,
-                reason: LostReason::Timeout { .. },
-            } => {
-                if self.lost.len() >= MAX_LOST {
-                    self.lost.pop_front();
-                }
-                self.lost.extend(prefix(id.as_ref()));
-            }
-            Event::ParticipantDiscovered { dpd } => self.found(dpd.guid),
+            Event::ParticipantLost { .. } => self.scout_is_stale = true,
+            Event::ParticipantDiscovered { dpd } => self.sighted(dpd.guid.prefix.as_ref()),
             _ => {}
         }
     }
 
-    fn found(&mut self, peer: GUID) {
-        let before = self.lost.len();
-        self.lost.retain(|lost| *lost != peer.prefix.as_ref());
-        self.returned |= self.lost.len() < before;
+    fn lost(&mut self, peer: [u8; 12], now: Instant) {
+        if self.lost.len() >= MAX_LOST {
+            self.lost.pop_front();
+        }
+        self.lost.push_back((peer, now));
+        self.scout_is_stale = true;
     }
 
-    /// True if a peer is back and the last renewal for that reason long enough ago. Who flaps cannot keep
-    /// us at it.
+    fn sighted(&mut self, peer: &[u8]) {
+        self.returned |= self.lost.iter().any(|(lost, _)| lost == peer);
+    }
+
+    /// True if the scout is to be made, or made anew.
+    pub(super) fn scout_due(&mut self, now: Instant) -> bool {
+        let young = |made| now.saturating_duration_since(made) < FIRST_PAUSE;
+        let due = !self.lost.is_empty()
+            && (self.scout_is_stale || self.scout_made.is_none())
+            && !self.scout_made.is_some_and(young);
+        if due {
+            self.scout_made = Some(now);
+            self.scout_is_stale = false;
+        }
+        due
+    }
+
+    /// True if the scout knows no peer that is away.
+    pub(super) fn scout_is_fresh(&self) -> bool {
+        !self.scout_is_stale
+    }
+
+    /// True if a peer is back, or one has been away for long, and the last renewal for that reason was
+    /// long enough ago. Who flaps cannot keep us at it.
     pub(super) fn due(&mut self, now: Instant) -> bool {
         let quiet = self.last.map(|last| now.saturating_duration_since(last));
-        if !self.returned || quiet.is_some_and(|quiet| quiet < self.pause) {
+        let away = |lost: &([u8; 12], Instant)| now.saturating_duration_since(lost.1) > SCOUT_TIME;
+        if !(self.returned || self.lost.front().is_some_and(away))
+            || quiet.is_some_and(|quiet| quiet < self.pause)
+        {
             return false;
         }
         self.pause = match quiet {
@@ -162,6 +201,8 @@ impl Returns {
     pub(super) fn renewed(&mut self) {
         self.lost.clear();
         self.returned = false;
+        self.scout_made = None;
+        self.scout_is_stale = false;
     }
 }
 
@@ -204,22 +245,39 @@ mod tests {
     }
 
     #[test]
+    fn a_scout_is_younger_than_every_loss() {
+        let start = Instant::now();
+        let at = |seconds| start + Duration::from_secs(seconds);
+        let mut returns = Returns::new();
+        assert!(!returns.scout_due(start), "nobody is missed");
+        returns.lost([1; 12], start);
+        assert!(returns.scout_due(start) && returns.scout_is_fresh());
+        returns.lost([2; 12], at(1));
+        assert!(
+            !returns.scout_is_fresh() && !returns.scout_due(at(4)),
+            "too soon"
+        );
+        assert!(returns.scout_due(at(5)) && returns.scout_is_fresh());
+        assert!(!returns.scout_due(at(100)));
+    }
+
+    #[test]
     fn who_flaps_is_answered_less_and_less() {
         let start = Instant::now();
         let mut returns = Returns::new();
         let mut due: Vec<u64> = Vec::new();
         for second in 0..300 {
-            let peer = GUID::new_participant_guid();
-            returns.lost.extend(prefix(peer.prefix.as_ref()));
-            returns.found(peer);
-            if returns.due(start + Duration::from_secs(second)) {
+            let now = start + Duration::from_secs(second);
+            returns.lost([7; 12], now);
+            returns.sighted(&[7; 12]);
+            if returns.due(now) {
                 due.push(second);
                 returns.renewed();
             }
         }
         assert_eq!(due, [0, 5, 15, 35, 75, 135, 195, 255]);
         returns.renewed();
-        returns.found(GUID::new_participant_guid());
+        returns.sighted(&[8; 12]);
         assert!(
             !returns.due(start + Duration::from_secs(1000)),
             "new, not back"

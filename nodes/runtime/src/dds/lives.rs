@@ -124,10 +124,22 @@ impl Lives {
         }
     }
 
-    /// Makes a participant with all writers, which write there what they have kept.
-    pub(super) fn renew(&self) -> Result<Arc<Participant>, RuntimeError> {
+    /// Makes a participant without endpoints of ours.
+    pub(super) fn spare(&self) -> Result<Participant, RuntimeError> {
+        Participant::join(self.domain, self.localhost_only)
+    }
+
+    /// Makes all writers in a new participant, `spare` if there is one. They write there what they
+    /// have kept.
+    pub(super) fn renew(
+        &self,
+        spare: Option<Arc<Participant>>,
+    ) -> Result<Arc<Participant>, RuntimeError> {
         let mut now = lock(&self.now);
-        let participant = Arc::new(Participant::join(self.domain, self.localhost_only)?);
+        let participant = match spare {
+            Some(participant) => participant,
+            None => Arc::new(self.spare()?),
+        };
         now.writers()
             .try_for_each(|writer| writer.join(&participant))?;
         now.wire_id = participant.id();

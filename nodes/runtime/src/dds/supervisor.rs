@@ -24,10 +24,26 @@ const PERIOD: Duration = Duration::from_millis(500);
 pub(super) struct Supervisor {
     lives: Arc<Lives>,
     returns: Returns,
+    /// See [`Returns`].
+    scout: Option<(Arc<Participant>, Events)>,
     out: Sender<PortEvent>,
 }
 
 type Events = BoxStream<'static, DomainParticipantStatusEvent>;
+
+/// Next thing to do.
+enum Turn {
+    Look,
+    Event(DomainParticipantStatusEvent),
+    Scouted(DomainParticipantStatusEvent),
+}
+
+async fn next(events: &mut Events) -> DomainParticipantStatusEvent {
+    match events.next().await {
+        Some(event) => event,
+        None => pending().await,
+    }
+}
 
 impl Supervisor {
     /// Events go to `out`.
@@ -35,6 +51,7 @@ impl Supervisor {
         Self {
             lives,
             returns: Returns::new(),
+            scout: None,
             out,
         }
     }
@@ -53,7 +70,6 @@ impl Supervisor {
             self.lives.end();
             // No peer of the old participant is one of the new.
             self.tell(PortEvent::AllLost).await;
-            self.returns.renewed();
             match self.renew().await {
                 Ok((participant, events)) => {
                     self.tell(PortEvent::Renewed).await;
@@ -80,29 +96,56 @@ impl Supervisor {
         loop {
             let look = async {
                 looks.next().await;
-                None
+                Turn::Look
             };
-            let event = async {
-                match events.next().await {
-                    Some(event) => Some(event),
+            let event = async { Turn::Event(next(&mut events).await) };
+            let scouted = async {
+                match &mut self.scout {
+                    Some((_, events)) => Turn::Scouted(next(events).await),
                     None => pending().await,
                 }
             };
-            if let Some(event) = or(look, event).await {
-                self.hear(&participant, event).await;
-            } else if !participant.is_alive() {
+            match or(look, or(event, scouted)).await {
+                Turn::Event(event) => {
+                    self.hear(&participant, event).await;
+                    continue;
+                }
+                Turn::Scouted(event) => {
+                    self.returns.hear_scout(&event);
+                    continue;
+                }
+                Turn::Look => self.send_scout(),
+            }
+            if !participant.is_alive() {
                 return "a thread of RustDDS has ended".to_owned();
             } else if let Some(gap) = gap.look() {
                 return format!("the process was stopped or the machine asleep for {gap:.0?}");
             } else if self.returns.due(Instant::now()) {
-                return "a peer that had timed out is back".to_owned();
+                return "a peer that had timed out is back, or away for long".to_owned();
+            }
+        }
+    }
+
+    /// Makes a scout if one is needed.
+    fn send_scout(&mut self) {
+        if self.returns.scout_due(Instant::now()) {
+            self.scout = None;
+            match self.lives.spare() {
+                Ok(scout) => {
+                    let events = scout.events();
+                    self.scout = Some((Arc::new(scout), events));
+                }
+                Err(error) => log::debug!("no scout: {error}"),
             }
         }
     }
 
     /// Makes a participant with all endpoints, writers first: see [`super::probe`].
     async fn renew(&mut self) -> Result<(Arc<Participant>, Events), RuntimeError> {
-        let participant = self.lives.renew()?;
+        let scout = self.scout.take().filter(|_| self.returns.scout_is_fresh());
+        let scout = scout.map(|(scout, _)| scout);
+        self.returns.renewed();
+        let participant = self.lives.renew(scout.filter(|scout| scout.is_alive()))?;
         let mut events = participant.events();
         loop {
             let (writers_made, known) = self.lives.writers_known()?;
@@ -126,7 +169,7 @@ impl Supervisor {
         }
     }
 
-    async fn tell(&self, event: PortEvent) {
+    async fn tell(&mut self, event: PortEvent) {
         // Nobody listens at the end.
         let _ = self.out.send(event).await;
     }

@@ -1,8 +1,9 @@
-//! A process that was stopped, as by Ctrl-Z, a debugger or a lid that was closed.
+//! Processes that are stopped for a while, as by Ctrl-Z or a debugger.
 
 use std::io::{BufRead, BufReader};
 use std::process::{Child, Command, Stdio};
 use std::sync::mpsc::channel;
+use std::sync::{Arc, Mutex};
 use std::time::{Duration, Instant};
 
 use lattice_msgs::std_msgs::String as RosString;
@@ -12,6 +13,7 @@ use lattice_runtime::env::Network;
 use lattice_runtime::qos::Qos;
 use lattice_runtime::ros_args::RosArgs;
 use lattice_test::domain::TestDomain;
+use lattice_test::python::{python, script};
 
 use super::{PATIENCE, assert_heard, hear, runtime, text, wait_until};
 
@@ -71,7 +73,7 @@ fn echo() {
     let said = node
         .publisher::<RosString>("/said", Qos::reliable(10))
         .unwrap();
-    let repeat = move |heard: std::sync::Arc<RosString>| said.publish(heard).unwrap();
+    let repeat = move |heard: Arc<RosString>| said.publish(heard).unwrap();
     let _subscription = node
         .subscribe("/heard", Qos::reliable(10), Load::Small, repeat)
         .unwrap();
@@ -82,6 +84,25 @@ fn echo() {
 
 #[test]
 fn a_process_that_was_stopped_hears_and_is_heard_again() {
+    // Long enough for every thread of it to be interrupted.
+    stop_and_go(Echo::start, Duration::from_secs(1));
+}
+
+#[test]
+fn a_cyclone_peer_that_stalled_beyond_its_lease_hears_and_is_heard_again() {
+    let Some(python) = python() else { return };
+    let start = |domain: &TestDomain| {
+        let mut command = Command::new(python);
+        command
+            .arg(script("echo_peer.py"))
+            .arg(domain.id().to_string());
+        Echo(command.spawn().unwrap())
+    };
+    // Its lease is 10 s.
+    stop_and_go(start, Duration::from_secs(15));
+}
+
+fn stop_and_go(start: impl FnOnce(&TestDomain) -> Echo, stop: Duration) {
     let domain = TestDomain::take();
     let us = runtime(&domain, "us", &[]);
     let node = us.node("us").unwrap();
@@ -94,18 +115,23 @@ fn a_process_that_was_stopped_hears_and_is_heard_again() {
     let (again, back) = channel();
     said.on_publisher_joined(move || again.send(()).unwrap());
     let (_map, maps) = hear::<RosString>(&node, "/map", Qos::latched(1), Load::Small);
-    let echo = Echo::start(&domain);
+    let phrase = Arc::new(Mutex::new(String::new()));
+    let (spoken, speaker) = (Arc::clone(&phrase), talk.clone());
+    us.timer(Duration::from_millis(50), move || {
+        speaker.publish(text(spoken.lock().unwrap())).unwrap();
+    });
+    let echo = start(&domain);
     let round = |data: &str| {
         joins.recv_timeout(PATIENCE).expect("a subscriber");
         back.recv_timeout(PATIENCE).expect("a publisher");
-        talk.publish(text(data)).unwrap();
-        assert_heard(&repeated, data);
+        // The other side may not know of us yet, so it is told again and again.
+        data.clone_into(&mut phrase.lock().unwrap());
+        while repeated.recv_timeout(PATIENCE).unwrap().data != data {}
         assert_heard(&maps, "map");
     };
     round("before");
     echo.signal("STOP");
-    // Long enough for every thread of it to be interrupted.
-    std::thread::sleep(Duration::from_secs(1));
+    std::thread::sleep(stop);
     echo.signal("CONT");
     let continued = Instant::now();
     round("after");
