@@ -6,6 +6,7 @@ use std::sync::{Arc, Mutex, Weak};
 use futures::StreamExt;
 use futures::stream::BoxStream;
 
+use super::graph::Graph;
 use super::peers::Peers;
 use super::port::{EndpointId, PortEvent};
 use super::sync::lock;
@@ -49,9 +50,16 @@ impl Endpoints {
     }
 
     /// Hands events on until the task is dropped.
-    pub(crate) async fn watch(self: Arc<Self>, mut events: BoxStream<'static, PortEvent>) {
+    pub(crate) async fn watch(
+        self: Arc<Self>,
+        mut events: BoxStream<'static, PortEvent>,
+        graph: Arc<Graph>,
+    ) {
         while let Some(event) = events.next().await {
-            self.hear(event);
+            match event {
+                PortEvent::Renewed => graph.note_change(),
+                event => self.hear(event),
+            }
         }
     }
 
@@ -65,6 +73,8 @@ impl Endpoints {
             } => (endpoint, peer, Some(policy)),
             PortEvent::Lost { peer: lost } => return self.lost(|peer| *peer == lost),
             PortEvent::ParticipantLost { any } => return self.lost(|peer| peer.is_beside(&any)),
+            PortEvent::AllLost => return self.lost(|_| true),
+            PortEvent::Renewed => return,
         };
         let change = Change { peer, incompatible };
         let mut inner = lock(&self.inner);

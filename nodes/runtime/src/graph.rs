@@ -4,7 +4,7 @@
 //! holds, with the readers and writers of each (rmw_dds_common).
 
 use std::collections::BTreeSet;
-use std::sync::{Arc, Mutex};
+use std::sync::{Arc, Mutex, Weak};
 use std::time::Duration;
 
 use lattice_msgs::cdr;
@@ -13,7 +13,7 @@ use smol::Timer;
 use smol::channel::{Receiver, Sender, bounded};
 
 use super::outbox::Outbox;
-use super::port::{EndpointId, PortTopic};
+use super::port::{EndpointId, PortTopic, Transport};
 use super::sync::lock;
 
 /// DDS topic, whose name is not mangled.
@@ -115,13 +115,20 @@ impl Graph {
         self.note_change();
     }
 
-    fn note_change(&self) {
+    /// Has the graph published again.
+    pub(crate) fn note_change(&self) {
         // One note that something has changed is enough.
         let _ = self.changed.try_send(());
     }
 
-    fn message(&self, participant: EndpointId, gid_bytes: usize) -> ParticipantEntitiesInfo {
-        let gid = |id: EndpointId| Gid::new(id, gid_bytes);
+    /// `wire_id` tells the identity that others know an endpoint by.
+    fn message(
+        &self,
+        participant: EndpointId,
+        gid_bytes: usize,
+        wire_id: impl Fn(EndpointId) -> EndpointId,
+    ) -> ParticipantEntitiesInfo {
+        let gid = |id: EndpointId| Gid::new(wire_id(id), gid_bytes);
         let gids = |set: &BTreeSet<EndpointId>| set.iter().copied().map(gid).collect();
         let node = |entry: &Entry| NodeEntitiesInfo {
             namespace: entry.namespace.clone(),
@@ -136,13 +143,15 @@ impl Graph {
     }
 
     /// Publishes the graph after every change, until the task is dropped.
-    pub(crate) async fn publish(self: Arc<Self>, participant: EndpointId, writer: Arc<Outbox>) {
+    pub(crate) async fn publish(self: Arc<Self>, of: Weak<dyn Transport>, writer: Arc<Outbox>) {
         let gid_bytes = gid_bytes(std::env::var("ROS_DISTRO").ok().as_deref());
         while self.changes.recv().await.is_ok() {
             // Endpoints come in bursts, and each message stays in the history for late joiners.
             Timer::after(SETTLE_TIME).await;
             let _ = self.changes.try_recv();
-            let message = self.message(participant, gid_bytes);
+            let Some(of) = of.upgrade() else { return };
+            let message = self.message(of.id(), gid_bytes, |id| of.wire_id(id));
+            drop(of);
             if let Err(error) = writer.send(Box::new(move || cdr::to_vec(&message))) {
                 log::debug!("{error}");
             }
@@ -216,7 +225,7 @@ mod tests {
         let node = graph.add_node("/", "n");
         let reader = graph.join(node, EndpointKind::Reader, guid(2));
         let writer = graph.join(node, EndpointKind::Writer, guid(3));
-        let message = |gid_bytes| cdr::to_vec(&graph.message(guid(1), gid_bytes)).unwrap();
+        let message = |gid_bytes| cdr::to_vec(&graph.message(guid(1), gid_bytes, |id| id)).unwrap();
         let one = [1, 0, 0, 0];
         let slash = [2, 0, 0, 0, b'/', 0, 0, 0];
         let name = [2, 0, 0, 0, b'n', 0, 0, 0];

@@ -81,12 +81,26 @@ pub(crate) enum PortEvent {
     Lost { peer: EndpointId },
     /// All peers of the participant of this endpoint have gone.
     ParticipantLost { any: EndpointId },
+    /// All peers have gone; they are found again.
+    AllLost,
+    /// Endpoints of ours have new identities on the wire.
+    Renewed,
 }
 
 /// A participant on a network.
 pub(crate) trait Transport: Send + Sync {
-    /// Identity of the participant.
+    /// Identity of the participant. Here it and its endpoints keep their identities for ever.
     fn id(&self) -> EndpointId;
+
+    /// The identity that the participant, or an endpoint of it, has on the wire now.
+    fn wire_id(&self, id: EndpointId) -> EndpointId {
+        id
+    }
+
+    /// How often the participant was made anew because it no longer worked.
+    fn renewals(&self) -> u64 {
+        0
+    }
 
     /// Makes a writer.
     fn writer(

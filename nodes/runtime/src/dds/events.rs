@@ -3,39 +3,21 @@
 //! The participant has one status queue, long enough that no event is lost; the queues of single
 //! readers and writers hold four.
 
-use std::sync::Arc;
-
-use futures::StreamExt;
-use futures::stream::BoxStream;
 use rustdds::policy::{Durability, Reliability};
-use rustdds::{
-    DomainParticipant, DomainParticipantStatusEvent as Event, GUID, QosPolicies, RTPSEntity,
-    StatusEvented,
-};
+use rustdds::{DomainParticipantStatusEvent as Event, GUID, QosPolicies};
 
 use super::endpoint_id;
 use super::probe::Probes;
-use crate::port::PortEvent;
+use crate::port::{EndpointId, PortEvent};
 
-/// Events of all peers outside the participant; matches of probes go to `probes`.
-pub(super) fn events(
-    participant: &DomainParticipant,
-    probes: Arc<Probes>,
-) -> BoxStream<'static, PortEvent> {
-    let own = participant.guid();
-    let listener = participant.status_listener();
-    let events = futures::stream::unfold(listener, |listener| async move {
-        let event = listener.as_async_status_stream().next().await?;
-        Some((event, listener))
-    });
-    let events = events.filter_map(move |event| {
-        let event = port_event(event, own, &probes);
-        async move { event }
-    });
-    events.boxed()
-}
-
-fn port_event(event: Event, own: GUID, probes: &Probes) -> Option<PortEvent> {
+/// The event as one of the port, if it is about peers outside the participant `own`; matches of probes
+/// go to `probes`.
+pub(super) fn port_event(
+    event: Event,
+    own: GUID,
+    probes: &Probes,
+    known_id: impl FnOnce(EndpointId) -> EndpointId,
+) -> Option<PortEvent> {
     let (endpoint, peer, policy) = match event {
         Event::RemoteReaderMatched {
             local_writer,
@@ -81,7 +63,7 @@ fn port_event(event: Event, own: GUID, probes: &Probes) -> Option<PortEvent> {
     if !endpoint.entity_id.kind().is_user_defined() {
         return None;
     }
-    let (endpoint, peer) = (endpoint_id(endpoint), endpoint_id(peer));
+    let (endpoint, peer) = (known_id(endpoint_id(endpoint)), endpoint_id(peer));
     Some(match policy {
         None => PortEvent::Matched { endpoint, peer },
         Some(policy) => PortEvent::Incompatible {

@@ -1,23 +1,25 @@
-//! The participant of the process, and the endpoints made in it.
+//! A participant of RustDDS, and the endpoints made in it.
 
 use std::net::Ipv4Addr;
 use std::sync::Arc;
 
+use futures::StreamExt;
 use futures::future::BoxFuture;
 use futures::stream::BoxStream;
 use lattice_msgs::dds_type_name;
 use rustdds::policy::{Durability, History, ResourceLimits};
 use rustdds::{
-    DomainParticipant, DomainParticipantBuilder, Duration, QosPolicies, QosPolicyBuilder,
-    RTPSEntity, Topic, TopicKind,
+    DomainParticipant, DomainParticipantBuilder, DomainParticipantStatusEvent, Duration, GUID,
+    QosPolicies, QosPolicyBuilder, RTPSEntity, StatusEvented, Topic, TopicKind,
 };
 
+use super::health::Threads;
 use super::probe::Probes;
-use super::reader::DdsReader;
-use super::writer::{DdsWriter, RawWriter};
+use super::reader::RawReader;
+use super::writer::RawWriter;
 use super::{endpoint_id, events};
 use crate::error::RuntimeError;
-use crate::port::{EndpointId, PortEvent, PortTopic, SampleReader, SampleWriter, Transport};
+use crate::port::{EndpointId, PortEvent, PortTopic};
 use crate::qos::{Durability as RosDurability, Qos, Reliability};
 
 /// Asked of every socket, in bytes.
@@ -29,20 +31,24 @@ const MAX_BLOCKING_TIME: Duration = Duration::from_millis(100);
 /// Type of the topic of probes, which carries nothing.
 const PROBE_TYPE: &str = "std_msgs/msg/Empty";
 
-/// The DDS participant of a process.
-pub(crate) struct Dds {
+/// A participant of RustDDS. [`Dds`] has one after the other.
+///
+/// [`Dds`]: super::Dds
+pub(super) struct Participant {
+    guid: GUID,
     participant: DomainParticipant,
     publisher: rustdds::Publisher,
     subscriber: rustdds::Subscriber,
     probes: Arc<Probes>,
-    /// Name of the topic of probes. It has no ROS prefix, so ROS tools do not show it.
-    probe_topic: String,
-    _probe_reader: DdsReader,
+    /// Topic of probes. Its name has no ROS prefix, so ROS tools do not show it.
+    probe: Recipe,
+    _probe_reader: RawReader,
+    threads: Threads,
 }
 
-impl Dds {
+impl Participant {
     /// Joins a domain, on the loopback interface only if asked.
-    pub(crate) fn join(domain: u16, localhost_only: bool) -> Result<Self, RuntimeError> {
+    pub(super) fn join(domain: u16, localhost_only: bool) -> Result<Self, RuntimeError> {
         let failed = |reason: &dyn std::fmt::Debug| RuntimeError::Participant {
             domain,
             reason: format!("{reason:?}"),
@@ -52,112 +58,128 @@ impl Dds {
         if localhost_only {
             builder = builder.with_only_networks([Ipv4Addr::LOCALHOST]);
         }
-        let participant = builder.build().map_err(|e| failed(&e))?;
+        let (participant, threads) = Threads::of(|| builder.build());
+        let participant = participant.map_err(|e| failed(&e))?;
         let none = QosPolicies::qos_none();
         let publisher = participant.create_publisher(&none);
         let publisher = publisher.map_err(|e| failed(&e))?;
         let subscriber = participant.create_subscriber(&none);
         let subscriber = subscriber.map_err(|e| failed(&e))?;
-        let guid = participant.guid().to_bytes();
-        let name: String = guid.iter().map(|byte| format!("{byte:02x}")).collect();
-        let probe_topic = format!("lattice_probe_{name}");
-        let probes = probe(&probe_topic);
-        let reader = reader(&participant, &subscriber, probes, &PROBE_QOS, 0)?;
+        let guid = participant.guid();
+        let name: String = (guid.to_bytes().iter())
+            .map(|byte| format!("{byte:02x}"))
+            .collect();
+        let name = format!("lattice_probe_{name}");
+        let topic = PortTopic {
+            name: &name,
+            dds_name: &name,
+            ros_type: PROBE_TYPE,
+        };
+        let probe = Recipe::new(topic, &Qos::best_effort(1));
+        let reader = raw_reader(&participant, &subscriber, &probe)?;
         Ok(Self {
+            guid,
             participant,
             publisher,
             subscriber,
             probes: Arc::default(),
-            probe_topic,
+            probe,
             _probe_reader: reader,
+            threads,
         })
     }
 
-    fn raw_writer(&self, of: PortTopic<'_>, qos: &Qos) -> Result<RawWriter, RuntimeError> {
-        let topic = topic(&self.participant, of, qos, "publisher")?;
+    pub(super) fn id(&self) -> EndpointId {
+        endpoint_id(self.guid)
+    }
+
+    pub(super) fn writer(&self, of: &Recipe) -> Result<RawWriter, RuntimeError> {
+        let topic = topic(&self.participant, of, "publisher")?;
         self.publisher
             .create_datawriter_no_key(&topic, None)
-            .map_err(|error| endpoint_error(of.name, "publisher", &error))
-    }
-}
-
-impl Transport for Dds {
-    fn id(&self) -> EndpointId {
-        endpoint_id(self.participant.guid())
+            .map_err(|error| endpoint_error(&of.name, "publisher", &error))
     }
 
-    fn writer(
+    pub(super) fn reader(&self, of: &Recipe) -> Result<RawReader, RuntimeError> {
+        raw_reader(&self.participant, &self.subscriber, of)
+    }
+
+    /// What happens to it, own endpoints and their matches with each other included.
+    pub(super) fn events(&self) -> BoxStream<'static, DomainParticipantStatusEvent> {
+        let listener = self.participant.status_listener();
+        let events = futures::stream::unfold(listener, |listener| async move {
+            let event = listener.as_async_status_stream().next().await?;
+            Some((event, listener))
+        });
+        events.boxed()
+    }
+
+    /// The event as one of the port; `known_id` tells how an endpoint of ours is known there.
+    pub(super) fn port_event(
         &self,
-        topic: PortTopic<'_>,
-        qos: &Qos,
-    ) -> Result<Arc<dyn SampleWriter>, RuntimeError> {
-        Ok(Arc::new(DdsWriter(self.raw_writer(topic, qos)?)))
+        event: DomainParticipantStatusEvent,
+        known_id: impl FnOnce(EndpointId) -> EndpointId,
+    ) -> Option<PortEvent> {
+        events::port_event(event, self.guid, &self.probes, known_id)
     }
 
-    fn reader(
-        &self,
-        of: PortTopic<'_>,
-        qos: &Qos,
-        max_bytes: usize,
-    ) -> Result<Box<dyn SampleReader>, RuntimeError> {
-        let reader = reader(&self.participant, &self.subscriber, of, qos, max_bytes)?;
-        if qos.durability == RosDurability::Volatile {
-            reader.skip_old();
-        }
-        Ok(Box::new(reader))
-    }
-
-    fn events(&self) -> BoxStream<'static, PortEvent> {
-        events::events(&self.participant, Arc::clone(&self.probes))
-    }
-
-    fn pairs_own_endpoints(&self) -> bool {
-        true
-    }
-
-    fn writers_known(&self) -> Result<BoxFuture<'static, ()>, RuntimeError> {
-        let writer = self.raw_writer(probe(&self.probe_topic), &PROBE_QOS)?;
+    /// A wait for discovery to know all writers made so far.
+    pub(super) fn writers_known(&self) -> Result<BoxFuture<'static, ()>, RuntimeError> {
+        let writer = self.writer(&self.probe)?;
         Ok(Box::pin(Arc::clone(&self.probes).wait(writer)))
     }
-}
 
-const PROBE_QOS: Qos = Qos::best_effort(1);
-
-fn probe(name: &str) -> PortTopic<'_> {
-    PortTopic {
-        name,
-        dds_name: name,
-        ros_type: PROBE_TYPE,
+    /// True while the threads of RustDDS run.
+    pub(super) fn is_alive(&self) -> bool {
+        // Fails where the thread of discovery has ended.
+        self.threads.all_run() && self.participant.assert_liveliness().is_ok()
     }
 }
 
-fn reader(
+/// Everything that an endpoint is made from, and made anew from.
+#[derive(Clone)]
+pub(super) struct Recipe {
+    pub name: String,
+    dds_name: String,
+    ros_type: String,
+    pub qos: Qos,
+}
+
+impl Recipe {
+    pub(super) fn new(topic: PortTopic<'_>, qos: &Qos) -> Self {
+        Self {
+            name: topic.name.to_owned(),
+            dds_name: topic.dds_name.to_owned(),
+            ros_type: topic.ros_type.to_owned(),
+            qos: *qos,
+        }
+    }
+}
+
+fn raw_reader(
     participant: &DomainParticipant,
     subscriber: &rustdds::Subscriber,
-    of: PortTopic<'_>,
-    qos: &Qos,
-    max_bytes: usize,
-) -> Result<DdsReader, RuntimeError> {
-    let topic = topic(participant, of, qos, "subscription")?;
-    let reader = subscriber.create_simple_datareader_no_key(&topic, None);
-    let reader = reader.map_err(|error| endpoint_error(of.name, "subscription", &error))?;
-    Ok(DdsReader::new(reader, max_bytes))
+    of: &Recipe,
+) -> Result<RawReader, RuntimeError> {
+    let topic = topic(participant, of, "subscription")?;
+    subscriber
+        .create_simple_datareader_no_key(&topic, None)
+        .map_err(|error| endpoint_error(&of.name, "subscription", &error))
 }
 
 fn topic(
     participant: &DomainParticipant,
-    of: PortTopic<'_>,
-    qos: &Qos,
+    of: &Recipe,
     endpoint: &'static str,
 ) -> Result<Topic, RuntimeError> {
-    let type_name = dds_type_name(of.ros_type).ok_or_else(|| RuntimeError::TypeName {
-        topic: of.name.to_owned(),
-        type_name: of.ros_type.to_owned(),
+    let type_name = dds_type_name(&of.ros_type).ok_or_else(|| RuntimeError::TypeName {
+        topic: of.name.clone(),
+        type_name: of.ros_type.clone(),
     })?;
-    let dds_name = of.dds_name.to_owned();
+    let (dds_name, policies) = (of.dds_name.clone(), policies(&of.qos));
     participant
-        .create_topic(dds_name, type_name, &policies(qos), TopicKind::NoKey)
-        .map_err(|error| endpoint_error(of.name, endpoint, &error))
+        .create_topic(dds_name, type_name, &policies, TopicKind::NoKey)
+        .map_err(|error| endpoint_error(&of.name, endpoint, &error))
 }
 
 fn endpoint_error(

@@ -1,54 +1,139 @@
-//! One DDS reader: the next sample as CDR bytes, awaited without polling.
+//! One reader, over the participants that come one after the other: the next sample as CDR bytes,
+//! awaited without polling.
 
-use std::sync::{Mutex, MutexGuard};
-use std::task::{Context, Poll};
+use std::sync::{Arc, Mutex, MutexGuard};
+use std::task::{Context, Poll, Waker};
 
 use rustdds::no_key::SimpleDataReader;
 use rustdds::rpc::SampleIdentity;
 
+use super::participant::{Participant, Recipe};
 use super::payload::{CopyInto, PayloadDeserializer, Taken};
 use super::{endpoint_id, sample_id};
+use crate::error::RuntimeError;
 use crate::port::{EndpointId, Origin, SampleReader};
+use crate::qos::Durability;
 use crate::sync::lock;
+
+pub(super) type RawReader = SimpleDataReader<Taken, PayloadDeserializer>;
 
 /// Takes samples of one topic.
 pub(super) struct DdsReader {
-    reader: SimpleDataReader<Taken, PayloadDeserializer>,
+    id: EndpointId,
+    source: Arc<ReaderSource>,
     buffer: Mutex<Vec<u8>>,
     max_bytes: usize,
+}
+
+/// The reader in the participant that is now.
+pub(super) struct ReaderSource {
+    id: EndpointId,
+    recipe: Recipe,
+    state: Mutex<State>,
+}
+
+struct State {
+    /// Identity on the wire.
+    wire_id: EndpointId,
+    /// None between two participants.
+    raw: Option<Arc<RawReader>>,
+    waker: Option<Waker>,
+}
+
+impl ReaderSource {
+    pub(super) fn id(&self) -> EndpointId {
+        self.id
+    }
+
+    pub(super) fn wire_id(&self) -> EndpointId {
+        lock(&self.state).wire_id
+    }
+
+    /// Leaves a participant that ends.
+    pub(super) fn leave(&self) {
+        let raw = lock(&self.state).raw.take();
+        drop(raw);
+    }
+
+    /// Joins a participant, unless it was made there.
+    pub(super) fn join(&self, participant: &Participant) -> Result<(), RuntimeError> {
+        let mut state = lock(&self.state);
+        if state.raw.is_some() {
+            return Ok(());
+        }
+        let raw = raw_reader(participant, &self.recipe)?;
+        state.wire_id = endpoint_id(raw.guid());
+        state.raw = Some(Arc::new(raw));
+        if let Some(waker) = state.waker.take() {
+            waker.wake();
+        }
+        Ok(())
+    }
+
+    /// The reader that is now, with `waker` put where the next sample or reader wakes it.
+    fn raw(&self, waker: &Waker) -> Option<Arc<RawReader>> {
+        let mut state = lock(&self.state);
+        match &mut state.waker {
+            Some(before) => before.clone_from(waker),
+            before @ None => *before = Some(waker.clone()),
+        }
+        state.raw.clone()
+    }
+}
+
+/// A new reader that steps over what it must not see.
+fn raw_reader(participant: &Participant, recipe: &Recipe) -> Result<RawReader, RuntimeError> {
+    let raw = participant.reader(recipe)?;
+    // The readers of a participant share one cache for each topic, so a new reader finds the samples
+    // of those before it, which a volatile reader must not see.
+    if recipe.qos.durability == Durability::Volatile {
+        let buffer = Mutex::default();
+        let look = CopyInto {
+            buffer: &buffer,
+            max_bytes: 0,
+        };
+        while !matches!(raw.try_take_one_with(look.clone()), Ok(None)) {}
+    }
+    Ok(raw)
 }
 
 impl DdsReader {
     /// Samples longer than `max_bytes`, header included, are refused.
     pub(super) fn new(
-        reader: SimpleDataReader<Taken, PayloadDeserializer>,
+        participant: &Participant,
+        recipe: Recipe,
         max_bytes: usize,
-    ) -> Self {
-        Self {
-            reader,
+    ) -> Result<Self, RuntimeError> {
+        let raw = raw_reader(participant, &recipe)?;
+        let id = endpoint_id(raw.guid());
+        let state = State {
+            wire_id: id,
+            raw: Some(Arc::new(raw)),
+            waker: None,
+        };
+        Ok(Self {
+            id,
+            source: Arc::new(ReaderSource {
+                id,
+                recipe,
+                state: Mutex::new(state),
+            }),
             buffer: Mutex::new(Vec::new()),
             max_bytes,
-        }
+        })
     }
 
-    /// Steps over what is there already.
-    ///
-    /// The readers of a participant share one cache for each topic, so a new reader finds the samples
-    /// of those before it, which a volatile reader must not see.
-    pub(super) fn skip_old(&self) {
-        let look = CopyInto {
-            buffer: &self.buffer,
-            max_bytes: 0,
-        };
-        while !matches!(self.reader.try_take_one_with(look.clone()), Ok(None)) {}
+    /// The part that goes from one participant to the next.
+    pub(super) fn source(&self) -> &Arc<ReaderSource> {
+        &self.source
     }
 
-    fn try_take(&self) -> Option<Result<Origin, String>> {
+    fn try_take(&self, raw: &RawReader) -> Option<Result<Origin, String>> {
         let copy = CopyInto {
             buffer: &self.buffer,
             max_bytes: self.max_bytes,
         };
-        let change = match self.reader.try_take_one_with(copy) {
+        let change = match raw.try_take_one_with(copy) {
             Ok(change) => change?,
             Err(error) => return Some(Err(error.to_string())),
         };
@@ -70,18 +155,21 @@ impl DdsReader {
 
 impl SampleReader for DdsReader {
     fn id(&self) -> EndpointId {
-        endpoint_id(self.reader.guid())
+        self.id
     }
 
     fn poll_next(&self, context: &mut Context<'_>) -> Poll<Result<Origin, String>> {
+        let Some(raw) = self.source.raw(context.waker()) else {
+            return Poll::Pending;
+        };
         // Undrained, the notifications fill their socket and every sample logs a line.
-        self.reader.drain_read_notifications();
-        if let Some(sample) = self.try_take() {
+        raw.drain_read_notifications();
+        if let Some(sample) = self.try_take(&raw) {
             return Poll::Ready(sample);
         }
-        self.reader.set_waker(Some(context.waker().clone()));
+        raw.set_waker(Some(context.waker().clone()));
         // Something may have arrived before the waker was in place.
-        self.try_take().map_or(Poll::Pending, Poll::Ready)
+        self.try_take(&raw).map_or(Poll::Pending, Poll::Ready)
     }
 
     fn bytes(&self) -> MutexGuard<'_, Vec<u8>> {

@@ -1,24 +1,168 @@
-//! One DDS writer.
+//! One writer, over the participants that come one after the other.
 
+use std::collections::VecDeque;
+use std::pin::pin;
+use std::sync::{Arc, Mutex};
 use std::time::Duration;
 
 use futures::future::BoxFuture;
 use rustdds::dds::WriteError;
 use rustdds::no_key::DataWriter;
 use rustdds::{RTPSEntity, Timestamp, WriteOptionsBuilder};
+use smol::future::{or, poll_once};
 
+use super::participant::{Participant, Recipe};
 use super::payload::{Payload, PayloadSerializer};
 use super::{endpoint_id, sample_identity};
+use crate::error::RuntimeError;
+use crate::graph;
 use crate::port::{Bytes, EndpointId, SampleId, SampleWriter, WriteRefusal};
+use crate::qos::Durability;
+use crate::sync::{Changed, lock};
 
 pub(super) type RawWriter = DataWriter<Payload, PayloadSerializer>;
 
 /// Writes samples of one topic.
-pub(super) struct DdsWriter(pub RawWriter);
+pub(super) struct DdsWriter {
+    id: EndpointId,
+    recipe: Recipe,
+    /// Samples kept for the next participant, at most.
+    depth: usize,
+    state: Mutex<State>,
+    changed: Changed,
+}
+
+struct State {
+    /// Identity on the wire.
+    wire_id: EndpointId,
+    /// None between two participants.
+    raw: Option<Arc<RawWriter>>,
+    /// Last samples of a latched topic. Their bytes are shared with RustDDS.
+    kept: VecDeque<Sample>,
+}
+
+#[derive(Clone)]
+struct Sample {
+    body: Bytes,
+    related: Option<SampleId>,
+    stamp: Timestamp,
+}
+
+impl DdsWriter {
+    pub(super) fn new(participant: &Participant, recipe: Recipe) -> Result<Self, RuntimeError> {
+        let raw = participant.writer(&recipe)?;
+        let id = endpoint_id(raw.guid());
+        // The graph names endpoints of a participant, and is written anew for the next.
+        let keeps =
+            recipe.qos.durability == Durability::TransientLocal && recipe.name != graph::TOPIC.name;
+        Ok(Self {
+            id,
+            depth: if keeps { recipe.qos.depth.max(1) } else { 0 },
+            recipe,
+            state: Mutex::new(State {
+                wire_id: id,
+                raw: Some(Arc::new(raw)),
+                kept: VecDeque::new(),
+            }),
+            changed: Changed::default(),
+        })
+    }
+
+    pub(super) fn wire_id(&self) -> EndpointId {
+        lock(&self.state).wire_id
+    }
+
+    /// Leaves a participant that ends.
+    pub(super) fn leave(&self) {
+        let raw = lock(&self.state).raw.take();
+        drop(raw);
+        self.changed.notify();
+    }
+
+    /// Joins a participant and writes there what it has kept.
+    pub(super) fn join(&self, participant: &Participant) -> Result<(), RuntimeError> {
+        let raw = participant.writer(&self.recipe)?;
+        let mut state = lock(&self.state);
+        for sample in &state.kept {
+            let options = options(sample).build();
+            let payload = Payload(sample.body.clone());
+            if let Err(error) = raw.write_with_options(payload, options) {
+                log::warn!(
+                    "{}: a latched message was lost: {error:?}",
+                    self.recipe.name
+                );
+            }
+        }
+        state.wire_id = endpoint_id(raw.guid());
+        state.raw = Some(Arc::new(raw));
+        drop(state);
+        self.changed.notify();
+        Ok(())
+    }
+
+    fn raw(&self) -> Option<Arc<RawWriter>> {
+        lock(&self.state).raw.clone()
+    }
+
+    fn is_now(&self, raw: &Arc<RawWriter>) -> bool {
+        (lock(&self.state).raw.as_ref()).is_some_and(|now| Arc::ptr_eq(now, raw))
+    }
+
+    /// Keeps a sample that `raw` has taken. False: another writer has come, which has not got it.
+    fn keep(&self, raw: &Arc<RawWriter>, sample: &Sample) -> bool {
+        if self.depth == 0 {
+            return true;
+        }
+        let mut state = lock(&self.state);
+        if (state.raw.as_ref()).is_some_and(|now| !Arc::ptr_eq(now, raw)) {
+            return false;
+        }
+        while state.kept.len() >= self.depth {
+            state.kept.pop_front();
+        }
+        state.kept.push_back(sample.clone());
+        true
+    }
+
+    async fn write_sample(&self, sample: &Sample, may_wait: bool) -> Result<(), WriteRefusal> {
+        loop {
+            let raw = match self.raw() {
+                Some(raw) => raw,
+                None => self.changed.until(|| self.raw()).await,
+            };
+            let options = options(sample).best_effort_may_block(may_wait).build();
+            let write = raw.async_write_with_options(Payload(sample.body.clone()), options);
+            let mut write = pin!(async { Some(write.await) });
+            // Nearly always done at once.
+            let written = match poll_once(&mut write).await {
+                Some(written) => written,
+                None => {
+                    or(
+                        write,
+                        self.changed.until(|| (!self.is_now(&raw)).then_some(None)),
+                    )
+                    .await
+                }
+            };
+            match written {
+                Some(Ok(_)) if self.keep(&raw, sample) => return Ok(()),
+                Some(Ok(_)) | None => {}
+                Some(Err(WriteError::WouldBlock { .. })) => return Err(WriteRefusal::Full),
+                Some(Err(error)) => return Err(WriteRefusal::Failed(format!("{error:?}"))),
+            }
+        }
+    }
+}
+
+fn options(sample: &Sample) -> WriteOptionsBuilder {
+    WriteOptionsBuilder::new()
+        .source_timestamp(sample.stamp)
+        .related_sample_identity_opt(sample.related.map(sample_identity))
+}
 
 impl SampleWriter for DdsWriter {
     fn id(&self) -> EndpointId {
-        endpoint_id(self.0.guid())
+        self.id
     }
 
     fn write(
@@ -27,24 +171,16 @@ impl SampleWriter for DdsWriter {
         related: Option<SampleId>,
         may_wait: bool,
     ) -> BoxFuture<'_, Result<(), WriteRefusal>> {
-        let options = WriteOptionsBuilder::new()
-            .source_timestamp(Timestamp::now())
-            .related_sample_identity_opt(related.map(sample_identity))
-            .best_effort_may_block(may_wait)
-            .build();
-        Box::pin(async move {
-            let written = self.0.async_write_with_options(Payload(body), options);
-            match written.await {
-                Ok(_) => Ok(()),
-                Err(WriteError::WouldBlock { .. }) => Err(WriteRefusal::Full),
-                Err(error) => Err(WriteRefusal::Failed(format!("{error:?}"))),
-            }
-        })
+        let sample = Sample {
+            body,
+            related,
+            stamp: Timestamp::now(),
+        };
+        Box::pin(async move { self.write_sample(&sample, may_wait).await })
     }
 
     fn wait_for_acknowledgments(&self, patience: Duration) -> bool {
-        self.0
-            .wait_for_acknowledgments(patience)
-            .is_ok_and(|all| all)
+        let all = |raw: Arc<RawWriter>| raw.wait_for_acknowledgments(patience);
+        self.raw().is_some_and(|raw| all(raw).is_ok_and(|all| all))
     }
 }

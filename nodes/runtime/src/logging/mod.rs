@@ -7,17 +7,20 @@ pub use throttle::Throttle;
 
 use crate::ros_args::RosArgs;
 use env_logger::{Builder, Logger};
-use log::{Log, Metadata, Record, SetLoggerError};
+use log::{Level, Log, Metadata, Record, SetLoggerError};
 use plan::Plan;
 use std::{
     cell::Cell,
     io::Write,
     sync::OnceLock,
-    time::{SystemTime, UNIX_EPOCH},
+    time::{Duration, SystemTime, UNIX_EPOCH},
 };
 
 /// Takes every record that passes the log level; the text is the name of the node it is from.
 pub type Sink = Box<dyn Fn(&Record<'_>, &str) + Send + Sync>;
+
+/// Between two errors of RustDDS that are shown.
+const RUSTDDS_PERIOD: Duration = Duration::from_secs(2);
 
 static SINK: OnceLock<Sink> = OnceLock::new();
 
@@ -56,6 +59,7 @@ pub fn init(args: &RosArgs, node_name: &str) -> Result<(), SetLoggerError> {
         console,
         to_console: !args.no_stdout_logs,
         node_name: node_name.to_owned(),
+        rustdds: Throttle::new(RUSTDDS_PERIOD),
     };
     log::set_boxed_logger(Box::new(logger))?;
     log::set_max_level(level);
@@ -74,6 +78,7 @@ struct Tee {
     console: Logger,
     to_console: bool,
     node_name: String,
+    rustdds: Throttle,
 }
 
 impl Log for Tee {
@@ -83,6 +88,9 @@ impl Log for Tee {
 
     fn log(&self, record: &Record<'_>) {
         if !self.console.matches(record) {
+            return;
+        }
+        if self.is_flood(record) {
             return;
         }
         if self.to_console {
@@ -98,6 +106,26 @@ impl Log for Tee {
 
     fn flush(&self) {
         self.console.flush();
+    }
+}
+
+impl Tee {
+    /// True for an error of RustDDS soon after another, unless its warnings are asked for too.
+    fn is_flood(&self, record: &Record<'_>) -> bool {
+        let target = record.target();
+        let warning = Metadata::builder()
+            .level(Level::Warn)
+            .target(target)
+            .build();
+        if !target.starts_with(plan::RUSTDDS) || self.console.enabled(&warning) {
+            return false;
+        }
+        match self.rustdds.check() {
+            Some(more @ 1..) => log::warn!("{more} more errors of {}", plan::RUSTDDS),
+            Some(0) => {}
+            None => return true,
+        }
+        false
     }
 }
 
@@ -124,7 +152,6 @@ fn line(record: &Record<'_>, now_ns: u128, source: &str) -> String {
 #[cfg(test)]
 mod tests {
     use super::*;
-    use log::Level;
     use std::sync::Mutex;
 
     #[test]
@@ -148,11 +175,15 @@ mod tests {
     fn the_sink_gets_what_passes_and_not_its_own_messages() {
         static TEE: OnceLock<Tee> = OnceLock::new();
         static HEARD: Mutex<Vec<String>> = Mutex::new(Vec::new());
-        let console = Builder::new().filter_level(log::LevelFilter::Info).build();
+        let console = Builder::new()
+            .filter_level(log::LevelFilter::Info)
+            .filter_module("rustdds", log::LevelFilter::Error)
+            .build();
         let log = TEE.get_or_init(|| Tee {
             console,
             to_console: false,
             node_name: "front".to_owned(),
+            rustdds: Throttle::new(RUSTDDS_PERIOD),
         });
         let heard = |record: &Record<'_>, node: &str| {
             let line = format!("{node}: {}", record.args());
@@ -168,6 +199,12 @@ mod tests {
         send(log, Level::Info, format_args!("one"));
         send(log, Level::Debug, format_args!("two"));
         send(log, Level::Warn, format_args!("three"));
+        let error = Record::builder()
+            .level(Level::Error)
+            .target("rustdds::discovery")
+            .build();
+        assert!(!log.is_flood(&error));
+        assert!(log.is_flood(&error), "the second at once");
         assert_eq!(*HEARD.lock().unwrap(), ["front: one", "front: three"]);
     }
 

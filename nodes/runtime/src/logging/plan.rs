@@ -5,10 +5,8 @@ use log::LevelFilter;
 /// Our own crates; their targets begin with it.
 const OURS: &str = "lattice_";
 /// Libraries whose chatter would hide ours: silent unless named by `--log-level` or `RUST_LOG`, and
-/// warnings only with `--log-level debug`. RustDDS warns of every datagram on loopback; what
-/// matters of it is in our own log and diagnostics.
-const CHATTY: [&str; 7] = [
-    "rustdds",
+/// warnings only with `--log-level debug`.
+const CHATTY: [&str; 6] = [
     "ros2_client",
     "mio",
     "polling",
@@ -16,6 +14,9 @@ const CHATTY: [&str; 7] = [
     "async_std",
     "cdr_encoding",
 ];
+
+/// RustDDS warns of every datagram on loopback; its errors are shown, a few at a time.
+pub(super) const RUSTDDS: &str = "rustdds";
 
 /// Settings of the console log, from the arguments and the environment.
 #[derive(Debug, PartialEq, Eq)]
@@ -35,17 +36,13 @@ impl Plan {
         lookup: impl Fn(&str) -> Option<String>,
     ) -> Plan {
         let mut filters = vec![(None, LevelFilter::Info)];
-        filters.extend(CHATTY.map(|name| (Some(name.to_owned()), LevelFilter::Off)));
+        filters.extend(libraries(LevelFilter::Info));
         for rule in &args.log_levels {
             let level = rule.level;
             match rule.logger.as_deref() {
                 None => {
                     filters.push((None, level));
-                    let chatty = match level {
-                        LevelFilter::Debug | LevelFilter::Trace => LevelFilter::Warn,
-                        _ => LevelFilter::Off,
-                    };
-                    filters.extend(CHATTY.map(|name| (Some(name.to_owned()), chatty)));
+                    filters.extend(libraries(level));
                 }
                 Some(logger) => {
                     let node = logger.rsplit(['.', '/']).next().unwrap_or(logger);
@@ -68,6 +65,17 @@ impl Plan {
             style,
         }
     }
+}
+
+/// Levels of libraries where ours is `level`.
+fn libraries(level: LevelFilter) -> impl Iterator<Item = (Option<String>, LevelFilter)> {
+    let (chatty, rustdds) = match level {
+        LevelFilter::Debug | LevelFilter::Trace => (LevelFilter::Warn, LevelFilter::Warn),
+        level => (LevelFilter::Off, level.min(LevelFilter::Error)),
+    };
+    let chatty = CHATTY.map(|name| (name, chatty));
+    let all = chatty.into_iter().chain([(RUSTDDS, rustdds)]);
+    all.map(|(name, level)| (Some(name.to_owned()), level))
 }
 
 #[cfg(test)]
@@ -105,7 +113,10 @@ mod tests {
         for (rules, level, target, shown) in [
             ("", Info, "lattice_nodes::runtime", true),
             ("", Debug, "lattice_nodes::runtime", false),
-            ("", Error, "rustdds::network", false),
+            ("", Error, "rustdds::network", true),
+            ("", Warn, "rustdds::network", false),
+            ("", Error, "mio::poll", false),
+            ("warn", Error, "rustdds", true),
             ("debug", Warn, "rustdds::network", true),
             ("debug", Info, "rustdds", false),
             ("fatal", Warn, "rustdds", false),

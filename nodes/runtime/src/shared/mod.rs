@@ -70,7 +70,7 @@ pub(crate) struct Shared {
 
 /// Everything that goes at shutdown.
 struct Open {
-    transport: Box<dyn Transport>,
+    transport: Arc<dyn Transport>,
     _watch: Option<Task<()>>,
     publishers: Vec<Weak<PublisherParts>>,
     intakes: Vec<Weak<Intake>>,
@@ -84,9 +84,11 @@ impl Shared {
         let shutdown = Shutdown::default();
         let io = TaskThread::start("io", shutdown.clone())?;
         let publishing = TaskThread::start("publisher", shutdown.clone())?;
-        let transport = join(network)?;
+        let transport = join(network, &shutdown)?;
         let endpoints = Arc::new(Endpoints::default());
-        let watch = io.spawn(Arc::clone(&endpoints).watch(transport.events()));
+        let graph = Graph::new();
+        let watch = Arc::clone(&endpoints).watch(transport.events(), Arc::clone(&graph));
+        let watch = io.spawn(watch);
         let shared = Arc::new(Self {
             bus: LocalBus::default(),
             shutdown,
@@ -97,7 +99,7 @@ impl Shared {
             publishing,
             answers: Answers::default(),
             endpoints,
-            graph: Graph::new(),
+            graph,
             writer_order: Mutex::default(),
             writers_made: AtomicU64::new(0),
             open: Mutex::new(Some(Open {
@@ -118,7 +120,8 @@ impl Shared {
         let outbox = self.outbox(graph::TOPIC, &Qos::latched(1), WhenFull::Wait)?;
         if let Some(open) = lock(&self.open).as_mut() {
             let graph = Arc::clone(&self.graph);
-            open.graph = self.io.spawn(graph.publish(open.transport.id(), outbox));
+            let transport = Arc::downgrade(&open.transport);
+            open.graph = self.io.spawn(graph.publish(transport, outbox));
         }
         Ok(())
     }
@@ -203,6 +206,12 @@ impl Shared {
             .is_some_and(|open| open.transport.pairs_own_endpoints())
     }
 
+    /// How often the participant was made anew.
+    pub(crate) fn renewals(&self) -> u64 {
+        let open = lock(&self.open);
+        open.as_ref().map_or(0, |open| open.transport.renewals())
+    }
+
     /// A wait for discovery to know all writers made so far. `None` after shutdown.
     fn writers_known(&self) -> Option<BoxFuture<'static, ()>> {
         let open = lock(&self.open);
@@ -257,14 +266,14 @@ impl Shared {
 }
 
 /// The participant of the process, over the transport that the environment names.
-fn join(network: &Network) -> Result<Box<dyn Transport>, RuntimeError> {
+fn join(network: &Network, shutdown: &Shutdown) -> Result<Arc<dyn Transport>, RuntimeError> {
     match network.transport {
         #[cfg(feature = "cyclone")]
-        TransportKind::Cyclone => Ok(Box::new(Cyclone::join(network)?)),
-        _ => Ok(Box::new(Dds::join(
-            network.domain_id,
-            network.localhost_only,
-        )?)),
+        TransportKind::Cyclone => Ok(Arc::new(Cyclone::join(network)?)),
+        _ => {
+            let (domain, localhost_only) = (network.domain_id, network.localhost_only);
+            Ok(Arc::new(Dds::join(domain, localhost_only, shutdown)?))
+        }
     }
 }
 

@@ -45,7 +45,13 @@ impl Shared {
     pub(crate) fn transport_status(&self, node: &str) -> DiagnosticStatus {
         let bytes = self.receive_buffer.bytes;
         let bytes = bytes.map_or_else(|| "unknown".to_owned(), |bytes| bytes.to_string());
-        let mut values = vec![("socket_receive_buffer_bytes".to_owned(), bytes)];
+        let mut values = vec![
+            ("socket_receive_buffer_bytes".to_owned(), bytes),
+            (
+                "participant_renewals".to_owned(),
+                self.renewals().to_string(),
+            ),
+        ];
         let mut problems = Vec::new();
         if self.receive_buffer.is_short() {
             problems.push("receive buffer short, raise net.core.rmem_max");

@@ -1,0 +1,144 @@
+//! Processes that are stopped for a while, as by Ctrl-Z or a debugger.
+
+use std::io::{BufRead, BufReader};
+use std::process::{Child, Command, Stdio};
+use std::sync::mpsc::channel;
+use std::sync::{Arc, Mutex};
+use std::time::{Duration, Instant};
+
+use lattice_msgs::std_msgs::String as RosString;
+use lattice_runtime::Load;
+use lattice_runtime::Runtime;
+use lattice_runtime::env::Network;
+use lattice_runtime::qos::Qos;
+use lattice_runtime::ros_args::RosArgs;
+use lattice_test::domain::TestDomain;
+use lattice_test::python::{python, script};
+
+use super::{PATIENCE, assert_heard, hear, runtime, text, wait_until};
+
+/// Names the domain to the process of [`echo`].
+const DOMAIN: &str = "LATTICE_TEST_ECHO_DOMAIN";
+
+/// A child that must not outlive the test.
+struct Echo(Child);
+
+impl Echo {
+    /// Starts this very test program with [`echo`] as its only test.
+    fn start(domain: &TestDomain) -> Self {
+        let child = Command::new(std::env::current_exe().unwrap())
+            .args([
+                "transport::renewal::echo",
+                "--exact",
+                "--ignored",
+                "--nocapture",
+            ])
+            .env(DOMAIN, domain.id().to_string())
+            .stdin(Stdio::piped())
+            .spawn();
+        Self(child.unwrap())
+    }
+
+    fn signal(&self, name: &str) {
+        let id = self.0.id().to_string();
+        let status = Command::new("kill").args(["-s", name, &id]).status();
+        assert!(status.unwrap().success(), "kill -s {name}");
+    }
+}
+
+impl Drop for Echo {
+    fn drop(&mut self) {
+        self.0.kill().unwrap();
+        self.0.wait().unwrap();
+    }
+}
+
+/// The process that is stopped: has a latched map, and repeats what it hears until its input ends.
+#[test]
+#[ignore = "a process of another test"]
+fn echo() {
+    let Ok(domain) = std::env::var(DOMAIN) else {
+        return;
+    };
+    let network = Network {
+        domain_id: domain.parse().unwrap(),
+        localhost_only: true,
+        ..Network::from_env().unwrap()
+    };
+    let args = RosArgs::parse(["--ros-args".to_owned()]).unwrap();
+    let runtime = Runtime::with_transport("echo", args, &network).unwrap();
+    let node = runtime.node("echo").unwrap();
+    let map = node.publisher("/map", Qos::latched(1)).unwrap();
+    map.publish(text("map")).unwrap();
+    let said = node
+        .publisher::<RosString>("/said", Qos::reliable(10))
+        .unwrap();
+    let repeat = move |heard: Arc<RosString>| said.publish(heard).unwrap();
+    let _subscription = node
+        .subscribe("/heard", Qos::reliable(10), Load::Small, repeat)
+        .unwrap();
+    // Ends with the test.
+    let lines = BufReader::new(std::io::stdin()).lines();
+    lines.for_each(drop);
+}
+
+#[test]
+fn a_process_that_was_stopped_hears_and_is_heard_again() {
+    // Long enough for every thread of it to be interrupted.
+    stop_and_go(Echo::start, Duration::from_secs(1));
+}
+
+#[test]
+fn a_cyclone_peer_that_stalled_beyond_its_lease_hears_and_is_heard_again() {
+    let Some(python) = python() else { return };
+    let start = |domain: &TestDomain| {
+        let mut command = Command::new(python);
+        command
+            .arg(script("echo_peer.py"))
+            .arg(domain.id().to_string());
+        Echo(command.spawn().unwrap())
+    };
+    // Its lease is 10 s.
+    stop_and_go(start, Duration::from_secs(15));
+}
+
+fn stop_and_go(start: impl FnOnce(&TestDomain) -> Echo, stop: Duration) {
+    let domain = TestDomain::take();
+    let us = runtime(&domain, "us", &[]);
+    let node = us.node("us").unwrap();
+    let talk = node
+        .publisher::<RosString>("/heard", Qos::reliable(10))
+        .unwrap();
+    let (joined, joins) = channel();
+    talk.on_subscriber_joined(move || joined.send(()).unwrap());
+    let (said, repeated) = hear::<RosString>(&node, "/said", Qos::reliable(10), Load::Small);
+    let (again, back) = channel();
+    said.on_publisher_joined(move || again.send(()).unwrap());
+    let (_map, maps) = hear::<RosString>(&node, "/map", Qos::latched(1), Load::Small);
+    let phrase = Arc::new(Mutex::new(String::new()));
+    let (spoken, speaker) = (Arc::clone(&phrase), talk.clone());
+    us.timer(Duration::from_millis(50), move || {
+        speaker.publish(text(spoken.lock().unwrap())).unwrap();
+    });
+    let echo = start(&domain);
+    let round = |data: &str| {
+        joins.recv_timeout(PATIENCE).expect("a subscriber");
+        back.recv_timeout(PATIENCE).expect("a publisher");
+        // The other side may not know of us yet, so it is told again and again.
+        data.clone_into(&mut phrase.lock().unwrap());
+        while repeated.recv_timeout(PATIENCE).unwrap().data != data {}
+        assert_heard(&maps, "map");
+    };
+    round("before");
+    echo.signal("STOP");
+    std::thread::sleep(stop);
+    echo.signal("CONT");
+    let continued = Instant::now();
+    round("after");
+    // The participant that was has taken its leave.
+    wait_until(&us, move || {
+        talk.subscriber_count() == 1 && said.publisher_count() == 1
+    });
+    let took = continued.elapsed();
+    assert!(took < Duration::from_secs(12), "{took:?}");
+}
