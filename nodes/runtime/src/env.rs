@@ -29,6 +29,12 @@ impl TransportKind {
         ("rmw_cyclonedds_cpp", TransportKind::Cyclone),
         ("rustdds", TransportKind::RustDds),
     ];
+
+    /// Name in `RMW_IMPLEMENTATION`.
+    pub fn name(self) -> &'static str {
+        let found = Self::BUILT_IN.iter().find(|(_, kind)| *kind == self);
+        found.map_or("", |(name, _)| name)
+    }
 }
 
 /// The network settings of a process.

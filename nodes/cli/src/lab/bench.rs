@@ -32,6 +32,8 @@ pub enum Bench {
     File(MapFile),
     /// Prepare two point files of any format and register one to the other
     Register(super::bench_register::Register),
+    /// Send clouds to another process over the DDS of the nodes: loss, latency, processor time
+    Transport(super::bench_transport::Transport),
 }
 
 /// Options of every measurement.
@@ -174,6 +176,7 @@ impl Bench {
             Self::Raycast(command) => command.run(),
             Self::File(command) => command.run(),
             Self::Register(command) => command.run(),
+            Self::Transport(command) => command.run(),
         }
     }
 }

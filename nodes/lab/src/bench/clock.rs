@@ -23,7 +23,8 @@ pub fn timed<T>(operation: impl FnOnce() -> T) -> (T, Spent) {
     (result, spent)
 }
 
-fn process_cpu_s() -> f64 {
+/// Processor time of all threads of the process so far, s.
+pub(super) fn process_cpu_s() -> f64 {
     let time = clock_gettime(ClockId::ProcessCPUTime);
     time.tv_sec as f64 + time.tv_nsec as f64 * 1e-9
 }

@@ -14,6 +14,7 @@ mod raycast;
 mod register;
 mod report;
 mod site;
+mod transport;
 
 use clock::Spent;
 pub(crate) use clock::timed;
@@ -26,3 +27,4 @@ pub use raycast::{RaycastMethod, raycast};
 pub use register::{RegisterSetup, register};
 pub use report::Report;
 pub use site::{SiteOptions, SiteSummary, write_site};
+pub use transport::{Received, TransportReport, TransportSetup, listen, send};
