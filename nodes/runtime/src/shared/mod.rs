@@ -84,7 +84,8 @@ impl Shared {
         let dds = Dds::join(domain, localhost_only, &shutdown)?;
         let endpoints = Arc::new(Endpoints::default());
         let graph = Graph::new();
-        let watch = Arc::clone(&endpoints).watch(dds.events(), Arc::clone(&graph));
+        let renewed = Arc::clone(&graph);
+        let watch = Arc::clone(&endpoints).watch(dds.events(), move || renewed.note_change());
         let watch = io.spawn(watch);
         let shared = Arc::new(Self {
             bus: LocalBus::default(),
