@@ -1,12 +1,12 @@
 //! Endpoints of this process by identity: each hears of the peers it is matched with.
 
+use std::borrow::Cow;
 use std::collections::{BTreeMap, VecDeque};
 use std::sync::{Arc, Mutex, Weak};
 
 use futures::StreamExt;
 use futures::stream::BoxStream;
 
-use super::graph::Graph;
 use super::peers::Peers;
 use super::port::{EndpointId, PortEvent};
 use super::sync::lock;
@@ -26,11 +26,10 @@ struct Inner {
     early: VecDeque<(EndpointId, Change)>,
 }
 
-#[derive(Clone, Copy)]
 struct Change {
     peer: EndpointId,
-    /// The policy in which the peer's QoS does not go with ours; none: it matches.
-    incompatible: Option<&'static str>,
+    /// The policy in which the peer does not go with ours; none: it matches.
+    incompatible: Option<Cow<'static, str>>,
 }
 
 impl Endpoints {
@@ -49,15 +48,15 @@ impl Endpoints {
         }
     }
 
-    /// Hands events on until the task is dropped.
+    /// Hands events on until the task is dropped; `renewed` is called for new identities.
     pub(crate) async fn watch(
         self: Arc<Self>,
         mut events: BoxStream<'static, PortEvent>,
-        graph: Arc<Graph>,
+        renewed: impl Fn() + Send,
     ) {
         while let Some(event) = events.next().await {
             match event {
-                PortEvent::Renewed => graph.note_change(),
+                PortEvent::Renewed => renewed(),
                 event => self.hear(event),
             }
         }
@@ -106,7 +105,7 @@ impl Endpoints {
 fn apply(peers: &Peers, change: Change) {
     match change.incompatible {
         None => peers.add(change.peer),
-        Some(policy) => peers.incompatible(change.peer, policy),
+        Some(policy) => peers.incompatible(change.peer, &policy),
     }
 }
 

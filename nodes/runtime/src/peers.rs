@@ -9,6 +9,9 @@ use super::sync::{Changed, lock};
 /// Peers of one endpoint that are remembered, at most.
 const MAX_PEERS: usize = 4096;
 
+/// Reasons that are told of one endpoint, at most: others name their types as they like.
+const MAX_WARNINGS: usize = 16;
+
 /// Called when a peer joins; must return at once.
 pub(crate) type OnJoined = Box<dyn FnMut() + Send>;
 
@@ -29,7 +32,7 @@ struct State {
     /// Number of the change that `local` was counted at.
     local_change: u64,
     incompatible: BTreeSet<EndpointId>,
-    warned: BTreeSet<&'static str>,
+    warned: BTreeSet<String>,
 }
 
 impl Peers {
@@ -122,19 +125,22 @@ impl Peers {
         }
     }
 
-    /// A peer asks for, or offers, a QoS that does not go with ours.
-    pub(crate) fn incompatible(&self, peer: EndpointId, policy: &'static str) {
+    /// A peer asks for, or offers, a QoS or a type that does not go with ours.
+    pub(crate) fn incompatible(&self, peer: EndpointId, policy: &str) {
         let mut state = lock(&self.state);
         if state.incompatible.len() < MAX_PEERS {
             state.incompatible.insert(peer);
         }
-        if state.warned.insert(policy) {
+        if state.warned.len() < MAX_WARNINGS && state.warned.insert(policy.to_owned()) {
             drop(state);
             let (topic, kind) = (&self.topic, self.peer_kind);
-            log::warn!(
-                "{topic}: a {kind} is not heard because of its QoS: {policy}; set qos.{topic}.* or \
-                 the other side's QoS"
-            );
+            match policy.starts_with("type") {
+                true => log::warn!("{topic}: a {kind} does not match: {policy}; remap one of them"),
+                false => log::warn!(
+                    "{topic}: a {kind} is not heard because of its QoS: {policy}; set \
+                     qos.{topic}.* or the other side's QoS"
+                ),
+            }
         }
     }
 

@@ -1,5 +1,6 @@
 //! The port of the transport: everything that the runtime asks of DDS, in terms of no implementation.
 
+use std::borrow::Cow;
 use std::future::poll_fn;
 use std::sync::{Arc, MutexGuard};
 use std::task::{Context, Poll};
@@ -64,18 +65,18 @@ pub(crate) struct PortTopic<'a> {
 }
 
 /// A change of the other ends of our endpoints.
-#[derive(Clone, Copy, Debug)]
+#[derive(Clone, Debug)]
 pub(crate) enum PortEvent {
     /// An endpoint of ours and a peer have found each other.
     Matched {
         endpoint: EndpointId,
         peer: EndpointId,
     },
-    /// A peer has a QoS that does not go with ours, in this policy.
+    /// A peer does not go with ours, in this policy of its QoS or in its type.
     Incompatible {
         endpoint: EndpointId,
         peer: EndpointId,
-        policy: &'static str,
+        policy: Cow<'static, str>,
     },
     /// A peer has gone.
     Lost { peer: EndpointId },

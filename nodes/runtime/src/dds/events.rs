@@ -3,75 +3,107 @@
 //! The participant has one status queue, long enough that no event is lost; the queues of single
 //! readers and writers hold four.
 
+use std::borrow::Cow;
+use std::sync::{Arc, Mutex};
+
 use rustdds::policy::{Durability, Reliability};
 use rustdds::{DomainParticipantStatusEvent as Event, GUID, QosPolicies};
 
 use super::endpoint_id;
+use super::lives::Lives;
 use super::probe::Probes;
-use crate::port::{EndpointId, PortEvent};
+use crate::port::PortEvent;
+use crate::sync::lock;
 
-/// The event as one of the port, if it is about peers outside the participant `own`; matches of probes
-/// go to `probes`.
-pub(super) fn port_event(
-    event: Event,
+/// Translates the events of one participant.
+pub(super) struct Events {
     own: GUID,
-    probes: &Probes,
-    known_id: impl FnOnce(EndpointId) -> EndpointId,
-) -> Option<PortEvent> {
-    let (endpoint, peer, policy) = match event {
-        Event::RemoteReaderMatched {
-            local_writer,
-            remote_reader,
-        } => (local_writer, remote_reader, None),
-        Event::RemoteWriterMatched {
-            local_reader,
-            remote_writer,
-        } => (local_reader, remote_writer, None),
-        Event::RemoteReaderQosIncompatible {
-            local_writer,
-            remote_reader,
-            requested_qos,
-            offered_qos,
-        } => {
-            let policy = incompatible_policy(&offered_qos, &requested_qos);
-            (local_writer, remote_reader, Some(policy))
+    pub probes: Arc<Probes>,
+    /// The endpoint that was found last, with its type: its matches follow.
+    found: Mutex<Option<(GUID, String)>>,
+}
+
+impl Events {
+    /// Of this participant.
+    pub(super) fn of(own: GUID) -> Self {
+        Self {
+            own,
+            probes: Arc::default(),
+            found: Mutex::default(),
         }
-        Event::RemoteWriterQosIncompatible {
-            local_reader,
-            remote_writer,
-            requested_qos,
-            offered_qos,
-        } => {
-            let policy = incompatible_policy(&offered_qos, &requested_qos);
-            (local_reader, remote_writer, Some(policy))
-        }
-        Event::ReaderLost { guid, .. } | Event::WriterLost { guid, .. } => {
-            let peer = endpoint_id(guid);
-            return Some(PortEvent::Lost { peer });
-        }
-        Event::ParticipantLost { id, .. } if id != own.prefix => {
-            let any = endpoint_id(GUID::new(id, own.entity_id));
-            return Some(PortEvent::ParticipantLost { any });
-        }
-        _ => return None,
-    };
-    // Nothing is delivered inside a participant, and discovery has endpoints of its own.
-    if peer.prefix == own.prefix {
-        probes.matched(endpoint);
-        return None;
     }
-    if !endpoint.entity_id.kind().is_user_defined() {
-        return None;
+
+    /// The event as one of the port, if it is about peers outside the participant; matches of probes
+    /// go to them.
+    pub(super) fn translate(&self, event: Event, lives: &Lives) -> Option<PortEvent> {
+        let own = self.own;
+        let (endpoint, peer, policy) = match event {
+            Event::ReaderDetected { reader: found } | Event::WriterDetected { writer: found } => {
+                lock(&self.found).replace((found.guid, found.type_name));
+                return None;
+            }
+            Event::RemoteReaderMatched {
+                local_writer,
+                remote_reader,
+            } => (local_writer, remote_reader, None),
+            Event::RemoteWriterMatched {
+                local_reader,
+                remote_writer,
+            } => (local_reader, remote_writer, None),
+            Event::RemoteReaderQosIncompatible {
+                local_writer,
+                remote_reader,
+                requested_qos,
+                offered_qos,
+            } => {
+                let policy = incompatible_policy(&offered_qos, &requested_qos);
+                (local_writer, remote_reader, Some(policy))
+            }
+            Event::RemoteWriterQosIncompatible {
+                local_reader,
+                remote_writer,
+                requested_qos,
+                offered_qos,
+            } => {
+                let policy = incompatible_policy(&offered_qos, &requested_qos);
+                (local_reader, remote_writer, Some(policy))
+            }
+            Event::ReaderLost { guid, .. } | Event::WriterLost { guid, .. } => {
+                let peer = endpoint_id(guid);
+                return Some(PortEvent::Lost { peer });
+            }
+            Event::ParticipantLost { id, .. } if id != own.prefix => {
+                let any = endpoint_id(GUID::new(id, own.entity_id));
+                return Some(PortEvent::ParticipantLost { any });
+            }
+            _ => return None,
+        };
+        // Nothing is delivered inside a participant, and discovery has endpoints of its own.
+        if peer.prefix == own.prefix {
+            self.probes.matched(endpoint);
+            return None;
+        }
+        if !endpoint.entity_id.kind().is_user_defined() {
+            return None;
+        }
+        let found = lock(&self.found).take().filter(|(guid, _)| *guid == peer);
+        let (endpoint, peer) = (endpoint_id(endpoint), endpoint_id(peer));
+        let other_type = found
+            .as_ref()
+            .and_then(|(_, theirs)| lives.other_type(endpoint, peer, theirs));
+        *lock(&self.found) = found;
+        let endpoint = lives.known_id(endpoint);
+        Some(
+            match policy.map(Cow::Borrowed).or(other_type.map(Cow::Owned)) {
+                None => PortEvent::Matched { endpoint, peer },
+                Some(policy) => PortEvent::Incompatible {
+                    endpoint,
+                    peer,
+                    policy,
+                },
+            },
+        )
     }
-    let (endpoint, peer) = (known_id(endpoint_id(endpoint)), endpoint_id(peer));
-    Some(match policy {
-        None => PortEvent::Matched { endpoint, peer },
-        Some(policy) => PortEvent::Incompatible {
-            endpoint,
-            peer,
-            policy,
-        },
-    })
 }
 
 /// First policy in which an offer is less than what is requested, in words for the operator.

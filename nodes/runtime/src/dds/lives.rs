@@ -103,6 +103,29 @@ impl Lives {
         known.map_or(wire_id, |ids| ids.0)
     }
 
+    /// The types, in words, if a peer on the wire has another than our endpoint there. A reader refuses
+    /// the samples of such a peer.
+    pub(super) fn other_type(
+        &self,
+        wire_id: EndpointId,
+        peer: EndpointId,
+        theirs: &str,
+    ) -> Option<String> {
+        let now = lock(&self.now);
+        if let Some(writer) = now.writers().find(|writer| writer.wire_id() == wire_id) {
+            let (ours, theirs) = writer.recipe.other_type(theirs)?;
+            return Some(format!(
+                "type (the publisher has {ours}, the subscription {theirs})"
+            ));
+        }
+        let reader = now.readers().find(|reader| reader.wire_id() == wire_id)?;
+        let (ours, theirs) = reader.recipe.other_type(theirs)?;
+        reader.refuse(peer);
+        Some(format!(
+            "type (the publisher has {theirs}, the subscription {ours})"
+        ))
+    }
+
     /// A wait for discovery to know the writers made so far, with their number.
     pub(super) fn writers_known(&self) -> Result<(u64, BoxFuture<'static, ()>), RuntimeError> {
         let now = lock(&self.now);

@@ -13,11 +13,12 @@ use rustdds::{
     QosPolicies, QosPolicyBuilder, RTPSEntity, StatusEvented, Topic, TopicKind,
 };
 
+use super::endpoint_id;
+use super::events::Events;
 use super::health::Threads;
-use super::probe::Probes;
+use super::lives::Lives;
 use super::reader::RawReader;
 use super::writer::RawWriter;
-use super::{endpoint_id, events};
 use crate::error::RuntimeError;
 use crate::port::{EndpointId, PortEvent, PortTopic};
 use crate::qos::{Durability as RosDurability, Qos, Reliability};
@@ -35,14 +36,15 @@ const PROBE_TYPE: &str = "std_msgs/msg/Empty";
 ///
 /// [`Dds`]: super::Dds
 pub(super) struct Participant {
+    // Goes before what it is in.
+    _probe_reader: RawReader,
     guid: GUID,
     participant: DomainParticipant,
     publisher: rustdds::Publisher,
     subscriber: rustdds::Subscriber,
-    probes: Arc<Probes>,
+    translator: Events,
     /// Topic of probes. Its name has no ROS prefix, so ROS tools do not show it.
     probe: Recipe,
-    _probe_reader: RawReader,
     threads: Threads,
 }
 
@@ -82,7 +84,7 @@ impl Participant {
             participant,
             publisher,
             subscriber,
-            probes: Arc::default(),
+            translator: Events::of(guid),
             probe,
             _probe_reader: reader,
             threads,
@@ -114,19 +116,19 @@ impl Participant {
         events.boxed()
     }
 
-    /// The event as one of the port; `known_id` tells how an endpoint of ours is known there.
+    /// The event as one of the port.
     pub(super) fn port_event(
         &self,
         event: DomainParticipantStatusEvent,
-        known_id: impl FnOnce(EndpointId) -> EndpointId,
+        lives: &Lives,
     ) -> Option<PortEvent> {
-        events::port_event(event, self.guid, &self.probes, known_id)
+        self.translator.translate(event, lives)
     }
 
     /// A wait for discovery to know all writers made so far.
     pub(super) fn writers_known(&self) -> Result<BoxFuture<'static, ()>, RuntimeError> {
         let writer = self.writer(&self.probe)?;
-        Ok(Box::pin(Arc::clone(&self.probes).wait(writer)))
+        Ok(Box::pin(Arc::clone(&self.translator.probes).wait(writer)))
     }
 
     /// True while the threads of RustDDS run.
@@ -153,6 +155,19 @@ impl Recipe {
             ros_type: topic.ros_type.to_owned(),
             qos: *qos,
         }
+    }
+
+    pub(super) fn is_ros_topic(&self) -> bool {
+        self.dds_name.starts_with("rt/")
+    }
+
+    /// Our type as ROS writes it, and `theirs` likewise, if that is another.
+    pub(super) fn other_type(&self, theirs: &str) -> Option<(&str, String)> {
+        if dds_type_name(&self.ros_type).is_none_or(|ours| ours == theirs) {
+            return None;
+        }
+        let name = theirs.replace("::dds_::", "/").replace("::", "/");
+        Some((&self.ros_type, name.trim_end_matches('_').to_owned()))
     }
 }
 

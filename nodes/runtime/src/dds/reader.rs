@@ -1,6 +1,7 @@
 //! One reader, over the participants that come one after the other: the next sample as CDR bytes,
 //! awaited without polling.
 
+use std::collections::BTreeSet;
 use std::sync::{Arc, Mutex, MutexGuard};
 use std::task::{Context, Poll, Waker};
 
@@ -17,6 +18,9 @@ use crate::sync::lock;
 
 pub(super) type RawReader = SimpleDataReader<Taken, PayloadDeserializer>;
 
+/// Writers of another type that are remembered, at most.
+const MAX_REFUSED: usize = 1024;
+
 /// Takes samples of one topic.
 pub(super) struct DdsReader {
     id: EndpointId,
@@ -28,7 +32,7 @@ pub(super) struct DdsReader {
 /// The reader in the participant that is now.
 pub(super) struct ReaderSource {
     id: EndpointId,
-    recipe: Recipe,
+    pub recipe: Recipe,
     state: Mutex<State>,
 }
 
@@ -38,6 +42,8 @@ struct State {
     /// None between two participants.
     raw: Option<Arc<RawReader>>,
     waker: Option<Waker>,
+    /// Writers of another type.
+    refused: BTreeSet<EndpointId>,
 }
 
 impl ReaderSource {
@@ -49,10 +55,23 @@ impl ReaderSource {
         lock(&self.state).wire_id
     }
 
+    /// Takes no samples of a writer.
+    pub(super) fn refuse(&self, writer: EndpointId) {
+        let mut state = lock(&self.state);
+        if state.refused.len() < MAX_REFUSED {
+            state.refused.insert(writer);
+        }
+    }
+
+    fn refuses(&self, writer: EndpointId) -> bool {
+        lock(&self.state).refused.contains(&writer)
+    }
+
     /// Leaves a participant that ends.
     pub(super) fn leave(&self) {
-        let raw = lock(&self.state).raw.take();
-        drop(raw);
+        let mut state = lock(&self.state);
+        state.refused.clear();
+        drop(state.raw.take());
     }
 
     /// Joins a participant, unless it was made there.
@@ -110,6 +129,7 @@ impl DdsReader {
             wire_id: id,
             raw: Some(Arc::new(raw)),
             waker: None,
+            refused: BTreeSet::new(),
         };
         Ok(Self {
             id,
@@ -133,9 +153,12 @@ impl DdsReader {
             buffer: &self.buffer,
             max_bytes: self.max_bytes,
         };
-        let change = match raw.try_take_one_with(copy) {
-            Ok(change) => change?,
-            Err(error) => return Some(Err(error.to_string())),
+        let change = loop {
+            match raw.try_take_one_with(copy.clone()) {
+                Ok(Some(change)) if self.source.refuses(endpoint_id(change.writer_guid)) => {}
+                Ok(change) => break change?,
+                Err(error) => return Some(Err(error.to_string())),
+            }
         };
         Some(match change.sample {
             Taken::Copied => Ok(Origin {

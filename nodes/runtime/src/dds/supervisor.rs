@@ -163,8 +163,7 @@ impl Supervisor {
 
     async fn hear(&mut self, participant: &Participant, event: DomainParticipantStatusEvent) {
         self.returns.hear(&event);
-        let event = participant.port_event(event, |id| self.lives.known_id(id));
-        if let Some(event) = event {
+        if let Some(event) = participant.port_event(event, &self.lives) {
             self.tell(event).await;
         }
     }

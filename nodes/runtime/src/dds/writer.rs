@@ -15,7 +15,6 @@ use super::participant::{Participant, Recipe};
 use super::payload::{Payload, PayloadSerializer};
 use super::{endpoint_id, sample_identity};
 use crate::error::RuntimeError;
-use crate::graph;
 use crate::port::{Bytes, EndpointId, SampleId, SampleWriter, WriteRefusal};
 use crate::qos::Durability;
 use crate::sync::{Changed, lock};
@@ -25,7 +24,7 @@ pub(super) type RawWriter = DataWriter<Payload, PayloadSerializer>;
 /// Writes samples of one topic.
 pub(super) struct DdsWriter {
     id: EndpointId,
-    recipe: Recipe,
+    pub recipe: Recipe,
     /// Samples kept for the next participant, at most.
     depth: usize,
     state: Mutex<State>,
@@ -52,9 +51,8 @@ impl DdsWriter {
     pub(super) fn new(participant: &Participant, recipe: Recipe) -> Result<Self, RuntimeError> {
         let raw = participant.writer(&recipe)?;
         let id = endpoint_id(raw.guid());
-        // The graph names endpoints of a participant, and is written anew for the next.
-        let keeps =
-            recipe.qos.durability == Durability::TransientLocal && recipe.name != graph::TOPIC.name;
+        // What is no ROS topic is the graph, which names endpoints of one participant.
+        let keeps = recipe.qos.durability == Durability::TransientLocal && recipe.is_ros_topic();
         Ok(Self {
             id,
             depth: if keeps { recipe.qos.depth.max(1) } else { 0 },

@@ -18,6 +18,9 @@ const CHATTY: [&str; 6] = [
 /// RustDDS warns of every datagram on loopback; its errors are shown, a few at a time.
 pub(super) const RUSTDDS: &str = "rustdds";
 
+/// Its only error is that a socket cannot leave a group of which it is no member, at every end.
+const RUSTDDS_LISTENER: &str = "rustdds::network::udp_listener";
+
 /// Settings of the console log, from the arguments and the environment.
 #[derive(Debug, PartialEq, Eq)]
 pub(super) struct Plan {
@@ -69,12 +72,14 @@ impl Plan {
 
 /// Levels of libraries where ours is `level`.
 fn libraries(level: LevelFilter) -> impl Iterator<Item = (Option<String>, LevelFilter)> {
-    let (chatty, rustdds) = match level {
+    let (chatty_level, rustdds) = match level {
         LevelFilter::Debug | LevelFilter::Trace => (LevelFilter::Warn, LevelFilter::Warn),
         level => (LevelFilter::Off, level.min(LevelFilter::Error)),
     };
-    let chatty = CHATTY.map(|name| (name, chatty));
-    let all = chatty.into_iter().chain([(RUSTDDS, rustdds)]);
+    let chatty = CHATTY.map(|name| (name, chatty_level));
+    let all = chatty
+        .into_iter()
+        .chain([(RUSTDDS, rustdds), (RUSTDDS_LISTENER, chatty_level)]);
     all.map(|(name, level)| (Some(name.to_owned()), level))
 }
 
@@ -113,7 +118,8 @@ mod tests {
         for (rules, level, target, shown) in [
             ("", Info, "lattice_nodes::runtime", true),
             ("", Debug, "lattice_nodes::runtime", false),
-            ("", Error, "rustdds::network", true),
+            ("", Error, "rustdds::rtps", true),
+            ("", Error, "rustdds::network::udp_listener", false),
             ("", Warn, "rustdds::network", false),
             ("", Error, "mio::poll", false),
             ("warn", Error, "rustdds", true),

@@ -87,7 +87,8 @@ impl Shared {
         let transport = join(network, &shutdown)?;
         let endpoints = Arc::new(Endpoints::default());
         let graph = Graph::new();
-        let watch = Arc::clone(&endpoints).watch(transport.events(), Arc::clone(&graph));
+        let renewed = Arc::clone(&graph);
+        let watch = Arc::clone(&endpoints).watch(transport.events(), move || renewed.note_change());
         let watch = io.spawn(watch);
         let shared = Arc::new(Self {
             bus: LocalBus::default(),

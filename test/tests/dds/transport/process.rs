@@ -70,6 +70,31 @@ fn a_qos_that_does_not_match_shows_in_diagnostics() {
 }
 
 #[test]
+fn another_type_on_a_topic_is_no_match() {
+    let two = Two::start();
+    let publisher = two.publisher::<RosString>("imu", Qos::reliable(10));
+    let (subscription, _heard) = two.hear::<Imu>("imu", Qos::reliable(10), Load::Small);
+    let (_diagnostics, heard) =
+        two.hear::<DiagnosticArray>("/diagnostics", Qos::DIAGNOSTICS, Load::Small);
+    let mut missing = vec![
+        ("a: transport", "/imu incompatible_subscribers"),
+        ("b: transport", "/imu incompatible_publishers"),
+    ];
+    while !missing.is_empty() {
+        count_to(1, &publisher);
+        for status in &heard.recv_timeout(PATIENCE).unwrap().status {
+            let has = |key: &str| status.values.iter().any(|value| value.key == key);
+            missing.retain(|(name, key)| status.name != *name || !has(key));
+        }
+    }
+    assert_eq!((publisher.subscriber_count(), publisher.sent()), (0, 0));
+    assert_eq!(
+        (subscription.publisher_count(), subscription.undecodable()),
+        (0, 0)
+    );
+}
+
+#[test]
 fn qos_parameters_override_the_code() {
     let two = Two::with_args(&["-p", "qos.imu.reliability:=best_effort"]);
     let publisher = two.publisher::<Imu>("imu", Qos::INS);
