@@ -48,9 +48,11 @@ fn described(reader: &BagReader) -> Value {
         .iter()
         .map(|t| {
             let latched: Vec<bool> = t.offered_qos.iter().map(|q| q.latched).collect();
+            let definition = t.definition.as_deref().unwrap_or("");
             json!({"name": t.name, "type": t.type_name, "count": t.message_count, "latched": latched,
                    "depths": t.offered_qos.iter().map(|q| q.depth).collect::<Vec<_>>(),
-                   "definition": hash(t.definition.as_deref().unwrap_or("").as_bytes())})
+                   "definition": hash(definition.as_bytes()),
+                   "type_hash": lattice_msgs::type_hash(&t.type_name, definition)})
         })
         .collect();
     let messages: Vec<Value> = read_all(reader)

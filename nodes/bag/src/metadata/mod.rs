@@ -91,7 +91,7 @@ pub(crate) struct TopicMetadata {
     #[serde(default, deserialize_with = "qos_profiles")]
     pub offered_qos_profiles: Vec<BagQos>,
     #[serde(skip_deserializing)]
-    pub type_description_hash: &'static str,
+    pub type_description_hash: String,
 }
 
 #[derive(Clone, Debug, Serialize, Deserialize)]

@@ -165,6 +165,22 @@ fn every_storage_and_compression_round_trips() {
 }
 
 #[test]
+fn type_hashes_are_noted_where_rosbag2_looks() {
+    let folder = tempfile::tempdir().unwrap();
+    for storage in [Storage::Mcap, Storage::Sqlite3] {
+        let bag = folder.path().join(storage.identifier());
+        write(&bag, storage, Packing::None, 0, 0);
+        // Once for each of two topics; storage files also embed the metadata.
+        for (file, times) in [(bag.join("metadata.yaml"), 2), (storage_file(&bag), 4)] {
+            let bytes = fs::read(&file).unwrap();
+            let hash = b"RIHS01_df668c740482bbd48fb39d76a70dfd4bd59db1288021743503259e948f6b1a18";
+            let found = bytes.windows(hash.len()).filter(|window| window == hash);
+            assert!(found.count() >= times, "{}", file.display());
+        }
+    }
+}
+
+#[test]
 fn messages_written_out_of_order_come_in_order() {
     let folder = tempfile::tempdir().unwrap();
     for storage in [Storage::Mcap, Storage::Sqlite3] {

@@ -59,6 +59,13 @@ fn failed(path: &Path, doing: &'static str) -> impl FnOnce(SinkError) -> BagErro
     move |error| BagError::io(path, doing)(io::Error::other(error))
 }
 
+/// Type hash by the topic's definition; empty where that is unknown, as rosbag2 has it.
+fn type_hash(topic: &TopicInfo) -> String {
+    let text = topic.definition.as_deref();
+    text.and_then(|text| lattice_msgs::type_hash(&topic.type_name, text))
+        .unwrap_or_default()
+}
+
 /// A bag being written. Without [`BagWriter::finish`] it lacks `metadata.yaml`.
 pub struct BagWriter {
     folder: PathBuf,
@@ -207,7 +214,7 @@ impl BagWriter {
                 type_name: topic.type_name.clone(),
                 serialization_format: topic.serialization_format.clone(),
                 offered_qos_profiles: topic.offered_qos.clone(),
-                type_description_hash: "",
+                type_description_hash: type_hash(topic),
             },
             message_count: topic.message_count,
         };
