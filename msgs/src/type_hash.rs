@@ -24,10 +24,11 @@ pub fn type_hash(ros_type: &str, definition: &str) -> Option<String> {
     let mut described = BTreeMap::new();
     let mut wanted = vec![ros_type.to_owned()];
     while let Some(name) = wanted.pop() {
-        if !described.contains_key(&name) {
-            let json = describe(&name, parts.get(&name)?, kind, &mut wanted)?;
-            described.insert(name, json);
+        if described.contains_key(&name) {
+            continue;
         }
+        let json = describe(&name, parts.get(&name)?, kind, &mut wanted)?;
+        described.insert(name, json);
     }
     let main = described.remove(ros_type)?;
     let referenced = Vec::from_iter(described.into_values()).join(", ");
