@@ -1,4 +1,4 @@
-//! Actions: the services and topics that ROS makes of an `.action` file, which is `Calibrate`.
+//! The services and topics that ROS makes of `Calibrate.action`.
 
 use serde::{Deserialize, Serialize};
 

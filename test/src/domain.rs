@@ -17,12 +17,12 @@ impl TestDomain {
         self.0.id()
     }
 
-    /// The domain on loopback only.
+    /// The domain on loopback only, over the transport that `RMW_IMPLEMENTATION` names.
     pub fn transport(&self) -> Network {
         Network {
             domain_id: self.id(),
             localhost_only: true,
-            warnings: Vec::new(),
+            ..Network::from_env().unwrap()
         }
     }
 }

@@ -3,6 +3,7 @@
 use super::evidence::{Steps, UNKNOWN};
 use super::masks::{Mask, ScanMasks};
 use super::packed::Packed;
+use crate::voxels::store::block_mask::bits;
 use crate::voxels::store::hash_table::{Row, Table};
 
 pub(super) const CELLS: usize = 512;
@@ -162,16 +163,7 @@ pub(super) fn add_evidence(steps: &Steps, cells: &mut [i8; CELLS], passed: &Mask
         let Some(cells) = cells.get_mut(64 * word..64 * word + 64) else {
             return;
         };
-        each_bit(passed & !hit, |i| steps.miss(&mut cells[i]));
-        each_bit(hit, |i| steps.hit(&mut cells[i]));
-    }
-}
-
-/// Calls `visit` with the number of each bit that is set, below 64.
-#[inline(always)]
-fn each_bit(mut word: u64, mut visit: impl FnMut(usize)) {
-    while word != 0 {
-        visit(word.trailing_zeros() as usize & 63);
-        word &= word - 1;
+        bits(passed & !hit).for_each(|i| steps.miss(&mut cells[i]));
+        bits(hit).for_each(|i| steps.hit(&mut cells[i]));
     }
 }

@@ -140,7 +140,7 @@ impl FreeSpaceMap {
             let Some(cells) = self.cells.block(block) else {
                 continue;
             };
-            for place in passed.without(hit).places().chain(hit.places()) {
+            for place in passed.or(hit).places() {
                 if cells.get(place).is_some_and(|value| is_free(*value)) {
                     report.removed.extend(Packed::at(block, place).key());
                 }

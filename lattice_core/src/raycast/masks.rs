@@ -22,11 +22,12 @@ impl Mask {
 
     /// The cells that are not in another mask.
     pub(super) fn without(&self, other: &Mask) -> Mask {
-        let mut left = *self;
-        for (left, other) in left.0.iter_mut().zip(&other.0) {
-            *left &= !other;
-        }
-        left
+        Mask(std::array::from_fn(|word| self.0[word] & !other.0[word]))
+    }
+
+    /// The cells of either mask.
+    pub(super) fn or(&self, other: &Mask) -> Mask {
+        Mask(std::array::from_fn(|word| self.0[word] | other.0[word]))
     }
 
     pub(super) fn places(&self) -> impl Iterator<Item = usize> + '_ {

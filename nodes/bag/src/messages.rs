@@ -125,7 +125,11 @@ impl Messages {
         let files = self.active.iter().enumerate();
         let (index, _) = files.min_by_key(|(_, a)| (a.head_ns, a.order))?;
         let active = self.active.get_mut(index)?;
-        let next = active.stream.next();
+        // Nothing is asked for behind an error.
+        let next = match &active.head {
+            Some(Err(_)) => None,
+            _ => active.stream.next(),
+        };
         // An error keeps its place behind the last message.
         if let Some(Ok(message)) = &next {
             active.head_ns = message.log_time_ns;
@@ -154,6 +158,7 @@ impl Active {
             BagError::corrupt(&self.path, format!("message {number}"), reason, remedy)
         };
         let topic = self.topic_of.get(message.topic).copied();
+        let topic = topic.ok_or_else(|| wrong("its topic is not listed".into()))?;
         let mut data = message.data;
         let is_packed = match compression {
             MessageCompression::None => false,
@@ -164,7 +169,7 @@ impl Active {
             data = decompress_message(&data).map_err(wrong)?;
         }
         Ok(BagMessage {
-            topic: topic.ok_or_else(|| wrong("its topic is not listed".into()))?,
+            topic,
             log_time_ns: message.log_time_ns,
             data,
         })

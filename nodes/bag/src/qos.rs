@@ -29,7 +29,8 @@ impl Default for BagQos {
     }
 }
 
-/// The policies that are read, by number or name; the others of a bag are passed over.
+/// The policies that are read, by number or name; the others of a bag are passed over. One that is
+/// missing, null or of another type is that of most publishers.
 #[derive(Deserialize)]
 struct RecordedQos {
     #[serde(default)]
@@ -150,7 +151,8 @@ mod tests {
 
     #[test]
     fn strange_policies_are_those_of_most_publishers() {
-        let parsed = BagQos::parse_list("- {history: 77, reliability: maybe}").unwrap();
+        let text = "- {history: 77, depth: null, reliability: maybe, durability: [1]}";
+        let parsed = BagQos::parse_list(text).unwrap();
         assert_eq!(parsed, [BagQos::default()]);
         assert!(BagQos::parse_list("{not: [a, list").is_err());
     }

@@ -7,7 +7,7 @@ use std::{
 
 use super::{BagError, metadata::Metadata, split::Split};
 
-/// Folders of more files than this are refused.
+/// Bags of more storage files than this are refused.
 const MAX_FILES: usize = 100_000;
 
 /// The storage files that the metadata lists, in its order.
@@ -47,12 +47,18 @@ pub(crate) fn listed_splits(
 
 /// The storage files of a bag without `metadata.yaml`, in the order of their numbers.
 pub(crate) fn splits_in(folder: &Path) -> Result<Vec<Split>, BagError> {
-    let is_storage = |name: &str| {
-        let bare = name.strip_suffix(".zstd").unwrap_or(name);
-        bare.ends_with(".mcap") || bare.ends_with(".db3")
-    };
-    let mut files = list(folder)?;
-    files.retain(|(_, name)| is_storage(name));
+    let mut files = Vec::new();
+    for entry in list(folder)? {
+        let (file, name) = entry?;
+        if is_storage(&name) {
+            files.push(file);
+        }
+        if files.len() > MAX_FILES {
+            let what = format!("a bag of more than {MAX_FILES} files");
+            let remedy = "open the files one by one";
+            return Err(BagError::unsupported(folder, what, remedy));
+        }
+    }
     if files.is_empty() {
         return Err(BagError::Foreign {
             path: folder.to_path_buf(),
@@ -60,29 +66,29 @@ pub(crate) fn splits_in(folder: &Path) -> Result<Vec<Split>, BagError> {
             remedy: "give the folder that `ros2 bag record` made",
         });
     }
-    files.sort_by_key(|(path, _)| (path.as_os_str().len(), path.clone()));
+    files.sort_by_key(|path| (path.as_os_str().len(), path.clone()));
     files
         .into_iter()
-        .map(|(file, _)| Split::new(file, false))
+        .map(|file| Split::new(file, false))
         .collect()
 }
 
+/// True for the name of a storage file, compressed or not.
+pub(crate) fn is_storage(name: &str) -> bool {
+    let bare = name.strip_suffix(".zstd").unwrap_or(name);
+    bare.ends_with(".mcap") || bare.ends_with(".db3")
+}
+
 /// Paths and names of the entries of a folder.
-pub(crate) fn list(folder: &Path) -> Result<Vec<(PathBuf, String)>, BagError> {
-    let mut found = Vec::new();
-    for entry in fs::read_dir(folder).map_err(BagError::io(folder, "list"))? {
+pub(crate) fn list(
+    folder: &Path,
+) -> Result<impl Iterator<Item = Result<(PathBuf, String), BagError>>, BagError> {
+    let entries = fs::read_dir(folder).map_err(BagError::io(folder, "list"))?;
+    Ok(entries.map(move |entry| {
         let entry = entry.map_err(BagError::io(folder, "list"))?;
-        if found.len() >= MAX_FILES {
-            let what = format!("a folder of more than {MAX_FILES} files");
-            let remedy = "open the files one by one";
-            return Err(BagError::unsupported(folder, what, remedy));
-        }
-        found.push((
-            entry.path(),
-            entry.file_name().to_string_lossy().into_owned(),
-        ));
-    }
-    Ok(found)
+        let name = entry.file_name().to_string_lossy().into_owned();
+        Ok((entry.path(), name))
+    }))
 }
 
 /// Sorts by start; files of unknown time keep their place behind the one before.

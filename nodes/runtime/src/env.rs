@@ -11,6 +11,25 @@ const DOMAIN_ID: &str = "ROS_DOMAIN_ID";
 const LOCALHOST_ONLY: &str = "ROS_LOCALHOST_ONLY";
 const DISCOVERY_RANGE: &str = "ROS_AUTOMATIC_DISCOVERY_RANGE";
 const STATIC_PEERS: &str = "ROS_STATIC_PEERS";
+const IMPLEMENTATION: &str = "RMW_IMPLEMENTATION";
+
+/// The DDS under the nodes.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub enum TransportKind {
+    /// RustDDS, always there.
+    RustDds,
+    /// Eclipse Cyclone DDS; only with the feature `cyclone`.
+    Cyclone,
+}
+
+impl TransportKind {
+    /// The transports built in, by their names in `RMW_IMPLEMENTATION`; the first is the default.
+    const BUILT_IN: &[(&str, TransportKind)] = &[
+        #[cfg(feature = "cyclone")]
+        ("rmw_cyclonedds_cpp", TransportKind::Cyclone),
+        ("rustdds", TransportKind::RustDds),
+    ];
+}
 
 /// The network settings of a process.
 #[derive(Clone, Debug, PartialEq, Eq)]
@@ -19,14 +38,31 @@ pub struct Network {
     pub domain_id: u16,
     /// True where nothing may leave this machine.
     pub localhost_only: bool,
+    /// Addresses of machines where participants are looked for besides multicast.
+    pub static_peers: Vec<String>,
+    /// The DDS to use.
+    pub transport: TransportKind,
     /// Lines for the log.
     pub warnings: Vec<String>,
 }
 
-/// `ROS_DOMAIN_ID` is no domain but this.
+/// A variable has a value that nothing can be made of.
 #[derive(Debug, Error)]
-#[error("ROS_DOMAIN_ID={0:?} is no DDS domain; expected a number from 0 to 232")]
-pub struct EnvError(String);
+pub enum EnvError {
+    /// `ROS_DOMAIN_ID` holds this text, which is no DDS domain.
+    #[error("ROS_DOMAIN_ID={0:?} is no DDS domain; expected a number from 0 to 232")]
+    Domain(String),
+    /// `RMW_IMPLEMENTATION` names a transport that is not built in.
+    #[error(
+        "RMW_IMPLEMENTATION={given:?} is not built in; possible are {possible}, or leave it unset"
+    )]
+    Transport {
+        /// The name given.
+        given: String,
+        /// Names of those built in.
+        possible: String,
+    },
+}
 
 impl Network {
     /// Reads the environment of the process.
@@ -42,7 +78,7 @@ impl Network {
         let mut warnings = Vec::new();
         let domain_id = match get(DOMAIN_ID) {
             None => 0,
-            Some(value) => domain_id(&value).ok_or(EnvError(value))?,
+            Some(value) => domain_id(&value).ok_or(EnvError::Domain(value))?,
         };
         if EPHEMERAL_DOMAINS.contains(&domain_id) {
             warnings.push(format!(
@@ -60,14 +96,13 @@ impl Network {
                 "{DISCOVERY_RANGE} is ignored since {LOCALHOST_ONLY} is 1"
             ));
         }
-        if get(STATIC_PEERS).is_some() {
-            warnings.push(format!(
-                "{STATIC_PEERS} is ignored: this transport finds others by multicast only"
-            ));
-        }
+        let transport = transport(get(IMPLEMENTATION))?;
+        let static_peers = static_peers(get(STATIC_PEERS), transport, &mut warnings);
         Ok(Network {
             domain_id,
             localhost_only: localhost_only || local_range,
+            static_peers,
+            transport,
             warnings,
         })
     }
@@ -75,6 +110,48 @@ impl Network {
 
 fn domain_id(value: &str) -> Option<u16> {
     value.trim().parse().ok().filter(|id| *id <= DOMAIN_ID_MAX)
+}
+
+fn transport(name: Option<String>) -> Result<TransportKind, EnvError> {
+    let built_in = TransportKind::BUILT_IN;
+    let found = match &name {
+        None => built_in.first(),
+        Some(name) => built_in.iter().find(|(known, _)| known == name),
+    };
+    found.map(|(_, kind)| *kind).ok_or_else(|| {
+        let names: Vec<_> = built_in.iter().map(|(name, _)| *name).collect();
+        EnvError::Transport {
+            given: name.unwrap_or_default(),
+            possible: names.join(" and "),
+        }
+    })
+}
+
+/// Addresses separated by `;`.
+fn static_peers(
+    value: Option<String>,
+    transport: TransportKind,
+    warnings: &mut Vec<String>,
+) -> Vec<String> {
+    let Some(value) = value else {
+        return Vec::new();
+    };
+    if transport == TransportKind::RustDds {
+        warnings.push(format!(
+            "{STATIC_PEERS} is ignored: RustDDS finds others by multicast only"
+        ));
+        return Vec::new();
+    }
+    let addresses = value.split(';').map(str::trim).filter(|a| !a.is_empty());
+    let is_address = |text: &&str| {
+        let allowed = |c: char| c.is_ascii_alphanumeric() || ".:-_%[]".contains(c);
+        text.chars().all(allowed)
+    };
+    let (good, bad): (Vec<_>, Vec<_>) = addresses.partition(is_address);
+    if !bad.is_empty() {
+        warnings.push(format!("{STATIC_PEERS}: {bad:?} are no addresses"));
+    }
+    good.into_iter().map(str::to_owned).collect()
 }
 
 /// True for a discovery range that stays on this machine.
@@ -135,6 +212,31 @@ mod tests {
     }
 
     #[test]
+    fn only_transports_that_are_built_in_can_be_chosen() {
+        for (name, kind) in TransportKind::BUILT_IN {
+            assert_eq!(read(&[(IMPLEMENTATION, name)]).unwrap().transport, *kind);
+        }
+        let (_, first) = TransportKind::BUILT_IN[0];
+        assert_eq!(read(&[]).unwrap().transport, first);
+        let error = read(&[(IMPLEMENTATION, "rmw_fastrtps_cpp")]).unwrap_err();
+        let words = "\"rmw_fastrtps_cpp\" is not built in; possible are";
+        assert!(error.to_string().contains(words), "{error}");
+    }
+
+    #[test]
+    fn static_peers_are_for_transports_that_can_look_for_them() {
+        for (name, kind) in TransportKind::BUILT_IN {
+            let peers = (STATIC_PEERS, "10.0.0.1; robot ;<x/>");
+            let network = read(&[(IMPLEMENTATION, name), peers]).unwrap();
+            let used: Vec<String> = match kind {
+                TransportKind::RustDds => vec![],
+                TransportKind::Cyclone => vec!["10.0.0.1".to_owned(), "robot".to_owned()],
+            };
+            assert_eq!((network.static_peers, network.warnings.len()), (used, 1));
+        }
+    }
+
+    #[test]
     fn domains_end_at_232() {
         for (id, warnings) in [(0, 0), (101, 0), (102, 1), (214, 1), (215, 0), (232, 0)] {
             let found = network(&[(DOMAIN_ID, &id.to_string())]);
@@ -160,7 +262,6 @@ mod tests {
             (&both, true, 2),
             (&[(only, "0")], false, 0),
             (&[(only, "true")], false, 1),
-            (&[(STATIC_PEERS, "10.0.0.1; robot ;")], false, 1),
         ] {
             assert_eq!(network(variables), (0, local, warnings), "{variables:?}");
         }

@@ -1,9 +1,12 @@
 //! A ROS 2 client library for nodes: arguments, names, parameters, topics, services, actions, time and
 //! log, over a transport behind one port.
-#![forbid(unsafe_code)]
+#![deny(unsafe_code)]
 
 mod action;
 mod clock;
+#[cfg(feature = "cyclone")]
+#[expect(unsafe_code, reason = "Cyclone DDS has an interface in C")]
+mod cyclone;
 mod dds;
 mod diagnostics;
 mod endpoints;

@@ -33,7 +33,7 @@ struct State {
 }
 
 impl Peers {
-    /// Of an endpoint whose peers are called so; those of services are told of at `Debug` only.
+    /// Peers of an endpoint: `peer_kind` names them in the log, `joins` is the level of match lines.
     pub(crate) fn new(topic: &str, peer_kind: &'static str, joins: log::Level) -> Self {
         Self {
             topic: topic.to_owned(),

@@ -106,8 +106,11 @@ pub(crate) trait Transport: Send + Sync {
     /// Changes of peers. Only one stream hears them.
     fn events(&self) -> BoxStream<'static, PortEvent>;
 
-    /// A wait for discovery to know all writers made so far: a reader of the same topic in the same
-    /// participant must not be made before.
+    /// True if a writer is matched with the readers of its own participant, which nothing reaches: then a
+    /// reader must not be made before its participant's writers of the topic are known.
+    fn pairs_own_endpoints(&self) -> bool;
+
+    /// A wait for discovery to know all writers made so far.
     fn writers_known(&self) -> Result<BoxFuture<'static, ()>, RuntimeError>;
 }
 
@@ -148,6 +151,11 @@ pub(crate) trait SampleReader: Send + Sync {
 
     /// Bytes of the last sample, encapsulation header first.
     fn bytes(&self) -> MutexGuard<'_, Vec<u8>>;
+
+    /// Samples that the transport says it has missed since the last call, besides gaps in their numbers.
+    fn missed(&self) -> u64 {
+        0
+    }
 }
 
 impl dyn SampleReader + '_ {

@@ -49,7 +49,7 @@ impl Runtime {
         for warning in &network.warnings {
             log::warn!("{warning}");
         }
-        let shared = Shared::start(network.domain_id, network.localhost_only)?;
+        let shared = Shared::start(network)?;
         shared.receive_buffer.warn_if_short();
         let signals = SignalWatch::start(shared.shutdown.clone())?;
         let args = Arc::new(args);

@@ -196,9 +196,9 @@ mod tests {
         for (name, value, part) in [
             ("qos.map.reliability", "maybe", "best_effort or reliable"),
             (full, "latched", "volatile or transient_local"),
-            ("qos.map.depth", "0", "1 to 10000"),
-            ("qos.map.depth", "-1", "1 to 10000"),
-            ("qos.map.depth", "10001", "1 to 10000"),
+            ("qos.map.depth", "0", "a number from 1 to 10000"),
+            ("qos.map.depth", "-1", "a number from 1 to 10000"),
+            ("qos.map.depth", "10001", "a number from 1 to 10000"),
             ("qos.map.depth", "many", "an integer"),
             ("qos.map.reliability", "1", "a text"),
         ] {

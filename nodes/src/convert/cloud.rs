@@ -148,13 +148,12 @@ pub fn cloud_from_message(
     let is_double = sensor_msgs::PointField::FLOAT64;
     let mut fields = cloud.fields.iter();
     let wide = fields.any(|field| field.name == "x" && field.datatype == is_double);
-    let finite = points
-        .clone()
-        .filter(|p| wide && p.iter().all(|v| v.is_finite()));
-    let nearest = finite.min_by(|a, b| {
+    let finite = points.clone().filter(|p| p.iter().all(|v| v.is_finite()));
+    let by_distance = |a: &Vector3<f64>, b: &Vector3<f64>| {
         let [a, b] = [a, b].map(|p| (p - near_m).norm_squared());
         a.total_cmp(&b)
-    });
+    };
+    let nearest = wide.then(|| finite.min_by(by_distance)).flatten();
     let tile = |v: f64| (v / DATUM_TILE_M).round() * DATUM_TILE_M;
     let datum_m = nearest.map_or_else(Vector3::zeros, |p| p.map(tile));
     let offset = |p: Vector3<f64>| -> [f32; 3] { (p - datum_m).map(|v| v as f32).into() };

@@ -135,16 +135,14 @@ impl PoseInbox {
         event: fn(Arc<M>) -> Event,
     ) -> Result<Subscription, NodeError> {
         // Poses count no bytes: clouds must not keep them out.
-        let mut hand_over = self.inbox.counting(&self.lost, event, |_| 0);
-        let lost = Arc::clone(&self.lost);
+        let (inbox, lost) = (self.inbox.clone(), Arc::clone(&self.lost));
         let warnings = Throttle::new(Duration::from_secs(5));
-        let mut seen = 0;
         let handler = move |message: Arc<M>| {
-            hand_over(message);
-            let all = lost.load(Ordering::Relaxed);
-            if all > seen && warnings.check().is_some() {
-                log::warn!("the inbox is full: {all} poses and transforms are lost so far");
-                seen = all;
+            if !inbox.send(event(message), 0) {
+                let all = lost.fetch_add(1, Ordering::Relaxed) + 1;
+                if warnings.check().is_some() {
+                    log::warn!("the inbox is full: {all} poses and transforms are lost so far");
+                }
             }
         };
         Ok(node.subscribe(topic, qos, Load::Small, handler)?)

@@ -40,9 +40,12 @@ impl WaitingCloud {
             true => view.point_times(stamp_ns, &options.time)?,
             false => None,
         };
-        let known = || times.iter().flatten().copied().filter(|t| *t != NO_TIME_NS);
-        let first_ns = known().min().unwrap_or(stamp_ns);
-        let last_ns = known().max().unwrap_or(stamp_ns);
+        let known = times.iter().flatten().filter(|t| **t != NO_TIME_NS);
+        let span = known.fold(None, |span, &t| {
+            let (first, last) = span.unwrap_or((t, t));
+            Some((t.min(first), t.max(last)))
+        });
+        let (first_ns, last_ns) = span.unwrap_or((stamp_ns, stamp_ns));
         Ok(Self {
             frame: message.header.frame_id.trim_start_matches('/').to_owned(),
             stamp_ns,

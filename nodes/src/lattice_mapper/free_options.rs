@@ -58,7 +58,8 @@ impl MappedFreeSpace {
             keep_ratio: params.f64_in("rays.keep_ratio", clear.reach.keep_ratio, 0.0..=1.0)?,
         };
         let clear = ClearOptions {
-            misses: clear_misses(params, clear.misses)?,
+            misses: params.usize_in("rays.misses", clear.misses as usize, 1..=u32::MAX as usize)?
+                as u32,
             reach,
             spare_touching: params.bool("rays.spare_touching", clear.spare_touching)?,
             max_bytes: params.usize_in("rays.max_bytes", clear.max_bytes, bytes)?,
@@ -85,9 +86,4 @@ impl MappedFreeSpace {
             free_level: free_level as u32,
         })
     }
-}
-
-fn clear_misses(params: &Params, default: u32) -> Result<u32, ParamError> {
-    let misses = params.usize_in("rays.misses", default as usize, 1..=u32::MAX as usize)?;
-    Ok(u32::try_from(misses).unwrap_or(default))
 }

@@ -15,7 +15,7 @@ use ros2_client::action_msgs::{CancelGoalResponseEnum, GoalStatusEnum};
 use ros2_client::builtin_interfaces::Time;
 use ros2_client::{ActionClient, ActionTypeName, Name, Node, ServiceMapping};
 
-use super::client::{Foreign, PATIENCE, peer, reliable};
+use super::client::{Foreign, PATIENCE, insist, mappings, peer, reliable};
 
 const LIMITS: ActionLimits = ActionLimits {
     max_live: 2,
@@ -70,7 +70,8 @@ async fn talk(peer: &Node, client: &Client, goals: &Goals) {
     client.cancel_client().wait_for_service(peer).await;
     client.result_client().wait_for_service(peer).await;
 
-    let (_, response) = client.async_send_goal(goal("rejected")).await.unwrap();
+    let rejected = insist(async || client.async_send_goal(goal("rejected")).await.unwrap());
+    let (_, response) = rejected.await;
     assert!(!response.accepted);
 
     // Feedback, until it is heard; then the result, which was asked for before.
@@ -94,7 +95,8 @@ async fn talk(peer: &Node, client: &Client, goals: &Goals) {
         smol::Timer::after(Duration::from_millis(100)).await;
         handle.succeed(result("found"));
     });
-    let (status, found) = client.async_request_result(id).await.unwrap();
+    let ended = insist(async || client.async_request_result(id).await.unwrap());
+    let (status, found) = ended.await;
     assert_eq!(
         (status, &*found.0.message),
         (GoalStatusEnum::Succeeded, "found")
@@ -106,7 +108,8 @@ async fn talk(peer: &Node, client: &Client, goals: &Goals) {
     let (second, going_on) = send(client, goals).await;
     let (_, response) = client.async_send_goal(goal("a")).await.unwrap();
     assert!(!response.accepted, "at most {} at work", LIMITS.max_live);
-    let answer = client.async_cancel_goal(first, Time::ZERO).await.unwrap();
+    let cancel = async || client.async_cancel_goal(first, Time::ZERO).await.unwrap();
+    let answer = insist(cancel).await;
     assert!(matches!(answer.return_code, CancelGoalResponseEnum::None));
     let ids: Vec<_> = answer.goals_canceling.iter().map(|g| g.goal_id).collect();
     assert!(ids == [first]);
@@ -128,7 +131,7 @@ async fn talk(peer: &Node, client: &Client, goals: &Goals) {
 
 #[test]
 fn goals_go_their_way_with_clients_of_both_rmw() {
-    for mapping in [ServiceMapping::Enhanced, ServiceMapping::Cyclone] {
+    for &mapping in mappings() {
         let domain = TestDomain::take();
         let args = RosArgs::parse(["--ros-args".to_owned()]).unwrap();
         let runtime = Runtime::with_transport("mapper", args, &domain.transport()).unwrap();

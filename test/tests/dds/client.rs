@@ -2,9 +2,10 @@
 
 use std::time::Duration;
 
+use lattice_runtime::env::{Network, TransportKind};
 use lattice_test::domain::TestDomain;
 use ros2_client::qos::WhenFull;
-use ros2_client::{Context, Message, Node, NodeName, NodeOptions, QosProfile};
+use ros2_client::{Context, Message, Node, NodeName, NodeOptions, QosProfile, ServiceMapping};
 use rustdds::DomainParticipantBuilder;
 use serde::de::DeserializeOwned;
 use serde::{Deserialize, Serialize};
@@ -37,4 +38,26 @@ pub fn peer(domain: &TestDomain) -> Node {
 /// Quality of service of clients.
 pub fn reliable() -> QosProfile {
     QosProfile::publisher_default().reliability_reliable(WhenFull::Fail)
+}
+
+/// Forms of requests that the transport under test can answer.
+pub fn mappings() -> &'static [ServiceMapping] {
+    match Network::from_env().unwrap().transport {
+        TransportKind::RustDds => &[ServiceMapping::Enhanced, ServiceMapping::Cyclone],
+        TransportKind::Cyclone => &[ServiceMapping::Cyclone],
+    }
+}
+
+/// Repeats a call until it is answered. The first sample of a RustDDS writer is history to a volatile
+/// reader of Cyclone, since its heartbeat comes after it.
+pub async fn insist<T>(call: impl AsyncFn() -> T) -> T {
+    loop {
+        let late = async {
+            smol::Timer::after(Duration::from_secs(2)).await;
+            None
+        };
+        if let Some(answer) = smol::future::or(async { Some(call().await) }, late).await {
+            return answer;
+        }
+    }
 }

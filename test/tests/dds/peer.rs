@@ -1,4 +1,4 @@
-//! Nodes of ours, each in a process of its own, and a peer in Python of CycloneDDS.
+//! Nodes of ours, each with a participant of its own, and a peer in Python of CycloneDDS.
 
 use std::path::Path;
 use std::process::{Command, Stdio};

@@ -10,9 +10,7 @@ use lattice_runtime::ros_args::RosArgs;
 use lattice_test::domain::TestDomain;
 use ros2_client::{Message, Name, Node, NodeEvent, ServiceMapping, ServiceTypeName};
 
-use super::client::{Foreign, PATIENCE, peer, reliable};
-
-const MAPPINGS: [ServiceMapping; 2] = [ServiceMapping::Enhanced, ServiceMapping::Cyclone];
+use super::client::{Foreign, PATIENCE, insist, mappings, peer, reliable};
 
 const TRIGGER: (&str, &str) = ("std_srvs", "Trigger");
 
@@ -37,7 +35,7 @@ fn call<Q: Message + Clone + 'static, R: Message + 'static>(
         .unwrap();
     let answer = async {
         client.wait_for_service(peer).await;
-        client.async_call_service(request).await.unwrap()
+        insist(async || client.async_call_service(request.clone()).await.unwrap()).await
     };
     let timeout = async {
         smol::Timer::after(PATIENCE).await;
@@ -60,7 +58,7 @@ fn a_trigger_answers_clients_of_both_rmw() {
         })
         .unwrap();
     assert_eq!(server.name(), "/mapper/reset");
-    for (i, mapping) in MAPPINGS.into_iter().enumerate() {
+    for (i, &mapping) in mappings().iter().enumerate() {
         // Two clients of one participant would see each other's replies.
         let mut peer = peer(&domain);
         let request = Foreign(TriggerRequest::default());
@@ -91,8 +89,14 @@ fn an_answer_given_at_the_end_reaches_its_client() {
         .unwrap();
     let mut peer = peer(&domain);
     let client = std::thread::spawn(move || {
-        let (mapping, request) = (ServiceMapping::Enhanced, Foreign(TriggerRequest::default()));
-        call(&mut peer, mapping, "/mapper/save_map", TRIGGER, request)
+        let request = Foreign(TriggerRequest::default());
+        call(
+            &mut peer,
+            mappings()[0],
+            "/mapper/save_map",
+            TRIGGER,
+            request,
+        )
     });
     let saved = TriggerResponse {
         success: true,
@@ -110,7 +114,7 @@ fn parameters_are_served_to_clients_of_both_rmw() {
     let domain = TestDomain::take();
     let runtime = runtime(&domain, &["--ros-args", "-p", "max_message_bytes:=5000"]);
     let type_name = ("rcl_interfaces", "GetParameters");
-    for mapping in MAPPINGS {
+    for &mapping in mappings() {
         let mut peer = peer(&domain);
         let request = Foreign(GetParametersRequest {
             names: vec!["max_message_bytes".to_owned(), "none".to_owned()],

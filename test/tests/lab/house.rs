@@ -8,7 +8,7 @@ use lattice_lab::datasets::{
 };
 use lattice_lab::mesh::read_mesh;
 use lattice_lab::simulate::house::{
-    HeadsetTrial, House, RegionLabels, Scene, Survey, SurveyMap, SurveyOptions,
+    HeadsetTrial, House, LabelDraw, RegionLabels, Scene, Survey, SurveyMap, SurveyOptions,
 };
 use lattice_nodes::files::classes::read_classes;
 use lattice_nodes::files::points::{PointFileLimits, read_points};
@@ -67,6 +67,7 @@ fn a_robot_and_headsets_see_the_real_house() {
             assert!(within > 0.9);
             assert!(off_m[off_m.len() / 2] < 0.04);
             assert!(of_object.count() > 200);
+            LabelDraw::new(&house, std::slice::from_ref(&trial), 0.5, seed).unwrap();
         }
     }
 }

@@ -1,5 +1,5 @@
-//! Formulas of the first paper as printed that its report does not check (`lattice paper voxels`; the tests of
-//! the command want all of its checks to hold).
+//! Formulas of the first paper as printed that its report does not check (`lattice paper voxels`;
+//! the tests of the command want all of its checks to hold).
 
 use lattice_core::lattice::{BatchQuantizer, BlockKey, Lattice, LatticeIndex, LatticeKind, Simd};
 use lattice_lab::printed::{PaperQuantizer, Search27, off_by_one, printed_delta};

@@ -13,8 +13,8 @@ use lattice_nodes::voxel_marker_publisher::MarkerOptions;
 use lattice_test::data::shared;
 use std::path::Path;
 
-/// Of each lattice of the paper: voxels, MSE per dimension, mean distance, RMS, largest distance; cells
-/// of 0.125 m^3, f64.
+/// Of each lattice of the paper: voxels, MSE per dimension, mean distance, RMS, largest distance;
+/// cells of 0.125 m^3, f64.
 const EXPECTED: [[f64; 5]; 5] = [
     [26353.0, 0.020679, 0.23923, 0.24907, 0.4295],
     [27515.0, 0.019616, 0.23456, 0.24259, 0.3514],
@@ -49,6 +49,8 @@ fn all_lattices_agree_with_an_exhaustive_search() {
     let report = replayed(&bag).0;
     assert_eq!(report.transformer.counts.clouds_in, 8);
     assert_eq!(report.losses(), Vec::<String>::new());
+    let kinds = report.lattices.iter().map(|branch| &*branch.map.lattice);
+    assert!(kinds.eq(LatticeKind::PAPER.map(LatticeKind::name)));
     for (branch, [voxels, figures @ ..]) in report.lattices.iter().zip(EXPECTED) {
         let (map, kind) = (&branch.map, &branch.map.lattice);
         assert_eq!(map.points, 994_498);

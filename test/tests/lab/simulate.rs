@@ -11,6 +11,7 @@ use lattice_msgs::novatel_oem7_msgs::INSPVAX;
 use lattice_msgs::sensor_msgs::PointCloud2;
 use lattice_msgs::tf2_msgs::TFMessage;
 use lattice_msgs::{RosMessage, cdr};
+use lattice_nodes::files::points::{PointFileLimits, read_points};
 use nalgebra::{Isometry3, Point3, Quaternion, Translation3, UnitQuaternion, Vector3};
 use std::collections::BTreeMap;
 use std::fs;
@@ -66,15 +67,10 @@ fn true_poses(bag: &Path) -> Vec<(i64, Isometry3<f64>)> {
 }
 
 /// Points of `points.ply`.
-fn true_points(bag: &Path) -> Vec<[f32; 3]> {
-    let bytes = fs::read(bag.join("truth/points.ply")).unwrap();
-    let end = bytes.windows(11).position(|w| w == b"end_header\n");
-    let end = end.unwrap() + 11;
-    let value = |b: &[u8]| f32::from_le_bytes(b.try_into().unwrap());
-    let points = bytes[end..].chunks_exact(12);
-    points
-        .map(|p| [value(&p[..4]), value(&p[4..8]), value(&p[8..])])
-        .collect()
+fn true_points(bag: &Path) -> Vec<[f64; 3]> {
+    let path = bag.join("truth/points.ply");
+    let file = read_points(&path, &PointFileLimits::default());
+    file.unwrap().points_m
 }
 
 #[test]
@@ -170,7 +166,7 @@ fn every_true_point_belongs_to_a_measured_one() {
             }
             map_from_laser *= mounts[&cloud.header.frame_id];
             let measured = map_from_laser * Point3::new(value(0), value(4), value(8)).cast::<f64>();
-            let expected = Point3::from(truth[next]).cast::<f64>();
+            let expected = Point3::from(truth[next]);
             next += 1;
             squares += (measured - expected).norm_squared();
             assert!((measured - expected).norm() < 0.1, "{measured} on {topic}");
@@ -208,7 +204,10 @@ fn inspvax_with_lever_arm_and_undulation_is_the_odometry() {
         let rotation = map.enu_from_local_level(&place) * in_place;
         let base = map.enu_from_geodetic(&place) - rotation * Vector3::from(BASE_FROM_IMU_M);
         let p = &odometry.pose.pose.position;
-        assert!((base - Vector3::new(p.x, p.y, p.z)).norm() < 1e-3);
+        assert!((base - Vector3::new(p.x, p.y, p.z)).norm() < 1e-6);
+        let q = &odometry.pose.pose.orientation;
+        let turned = UnitQuaternion::from_quaternion(Quaternion::new(q.w, q.x, q.y, q.z));
+        assert!(turned.angle_to(&rotation) < 1e-6);
         error_squares += (base - truth.translation.vector).norm_squared();
     }
     let rms_m = (error_squares / poses.len() as f64).sqrt();

@@ -1,5 +1,5 @@
 use super::{F32, F64, field};
-use crate::cloud::{CloudLayout, CloudLimits};
+use crate::cloud::{CloudLayout, CloudLimits, PointField};
 
 const LIMITS: CloudLimits = CloudLimits { max_points: 1000 };
 
@@ -91,6 +91,10 @@ fn lies_about_the_extent_are_refused() {
         // width * point_step and height * row_step overflow 32 bits.
         (|l| l.point_step = u32::MAX, "= 8589934590"),
         (|l| l.row_step = u32::MAX, "needs 8589934590"),
+        (
+            |l| (l.height, l.row_step) = (1, 65),
+            "64 bytes, height 1 * row_step 65 needs 65",
+        ),
     ]);
 }
 
@@ -109,6 +113,20 @@ fn lies_about_the_fields_are_refused() {
             "'y' is declared twice",
         ),
         (|l| l.fields = vec![field("x", 0, F32); 300], "300 fields"),
+        // Of fields that nobody asks for, too.
+        (|l| l.fields.push(field("a", 0, 9)), "'a' has datatype 9"),
+        (
+            |l| l.fields.push(field("a", 13, F32)),
+            "'a' ends at byte 17",
+        ),
+        (
+            |l| {
+                let far = field("a", u32::MAX, F64);
+                let count = u32::MAX;
+                l.fields.push(PointField { count, ..far });
+            },
+            "'a' ends",
+        ),
     ]);
 }
 

@@ -75,7 +75,10 @@ fn precise(options: RegisterOptions<'static>) -> RegisterOptions<'static> {
 /// All methods, for a cloud of some thousand points.
 fn all_methods() -> Vec<RegisterOptions<'static>> {
     let named = NamedMethod::ALL.iter().map(|method| method.options(1.0));
-    let all = named.chain([RegisterOptions::semantic_em(1.0, LabelUse::Soft)]);
+    let all = named.chain([
+        RegisterOptions::semantic_em(1.0, LabelUse::Soft),
+        RegisterOptions::semantic(SemanticVariant::AsPrinted, LabelUse::Soft),
+    ]);
     all.map(|options| RegisterOptions {
         min_class_points: options.min_class_points.min(50),
         ..options

@@ -142,13 +142,19 @@ pub(super) struct ColumnError {
 
 impl From<CodecError> for ColumnError {
     fn from(error: CodecError) -> ColumnError {
-        let offset = match error {
-            CodecError::Truncated { position }
-            | CodecError::Varint { position }
-            | CodecError::Key { position, .. } => position,
-            CodecError::TooMany { .. } => 0,
+        // The bytes have the right CRC: what is wrong was written so.
+        let (offset, reason) = match error {
+            CodecError::Truncated { position } => (position, "it ends within a number".to_owned()),
+            CodecError::Varint { position } => (
+                position,
+                "a number is not a shortest 64-bit varint".to_owned(),
+            ),
+            CodecError::Key { index, position } => (
+                position,
+                format!("key {index} does not ascend or is not below 2^63"),
+            ),
+            CodecError::TooMany { .. } => (0, "it has too many values".to_owned()),
         };
-        let reason = error.to_string();
         ColumnError { offset, reason }
     }
 }

@@ -166,11 +166,15 @@ fn maps_with_other_datums_merge_to_the_same_cells() {
     merged.merge(moved.clone()).unwrap();
     assert_eq!(merged, whole);
     let before = merged.clone();
-    let hex = MapContents::from_list(&map(LatticeKind::Hex, b));
-    assert!(matches!(
-        merged.merge(hex),
-        Err(OperationError::Lattice { .. })
-    ));
+    let turn = nalgebra::UnitQuaternion::from_euler_angles(0.3, -1.2, 2.5);
+    let turned = Lattice::new(LatticeKind::Fcc, 0.125)
+        .unwrap()
+        .oriented(turn);
+    let turned = VoxelList::at_datum(turned, [0; 3], 1);
+    for other in [map(LatticeKind::Hex, b), turned] {
+        let refused = merged.merge(MapContents::from_list(&other));
+        assert!(matches!(refused, Err(OperationError::Lattice { .. })));
+    }
     let mut bare = other.clone();
     bare.drop_payload();
     let refused = merged.merge(bare.clone());
@@ -239,6 +243,15 @@ fn further_columns_go_with_their_voxels() {
     merged.merge(far).unwrap();
     assert_eq!(merged.columns, whole.columns);
     assert_eq!(merged.voxels, whole.voxels);
+    let mut both = whole.clone();
+    both.merge(whole.clone()).unwrap();
+    let (both, list) = (both.into_list(10_000), &list);
+    for key in list.sorted_keys() {
+        assert_eq!(both.stamps(key), list.stamps(key));
+        let twice = |l: LabelCount| (l.label, 2 * l.count);
+        let label = both.label(key).map(|l| (l.label, l.count));
+        assert_eq!(label, list.label(key).map(twice));
+    }
     let mut plain = whole.clone();
     plain.columns = Columns::new(Payload::default());
     assert_eq!(plain.merge(whole), Err(OperationError::Payload("stamps")));

@@ -61,7 +61,9 @@ mod tests {
             assert_eq!(alone, expected, "{kind}");
             for &other in faces {
                 let pair = list(kind, &[[0, 0, 0], other]);
-                assert_eq!(pair.exposed_faces().len(), 2 * faces.len() - 2, "{kind}");
+                let exposed = pair.exposed_faces();
+                assert_eq!(exposed.len(), 2 * faces.len() - 2, "{kind}");
+                assert!(exposed.is_sorted());
             }
         }
     }

@@ -6,6 +6,7 @@ use crate::voxels::store::block_mask::{BlockMask, places};
 
 /// Blocks around a block, itself included.
 const AROUND: usize = 27;
+
 /// Places of the neighbours of a block's cells in the blocks around it: for each place of the block as
 /// many as there are differences, as block of `AROUND` * 512 + place.
 fn targets(stencil: &[LatticeIndex]) -> Vec<u16> {
@@ -31,6 +32,7 @@ impl OccupancyList {
     /// A block and those around it are fetched once for all of their cells, so that a neighbour
     /// costs a bit test, not a search.
     pub fn count_neighbors(&self, stencil: &[LatticeIndex], mut visit: impl FnMut(BlockKey, u32)) {
+        debug_assert!(stencil.iter().flatten().all(|i| (-8..=8).contains(i)));
         let targets = targets(stencil);
         let mut around = [0_u64; AROUND * 8];
         for block in self.blocks.rows() {

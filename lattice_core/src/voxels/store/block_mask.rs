@@ -53,13 +53,17 @@ pub(crate) fn is_set(leaf: &BlockMask, place: usize) -> bool {
 /// Positions of the bits that are set.
 #[inline]
 pub(crate) fn places(leaf: &BlockMask) -> impl Iterator<Item = usize> + '_ {
-    leaf.iter().enumerate().flat_map(|(word, &bits)| {
-        let mut bits = bits;
-        std::iter::from_fn(move || {
-            let bit = (bits != 0).then(|| bits.trailing_zeros() as usize)?;
-            bits &= bits - 1;
-            Some(64 * word + bit)
-        })
+    let words = leaf.iter().enumerate();
+    words.flat_map(|(word, &left)| bits(left).map(move |bit| 64 * word + bit))
+}
+
+/// The numbers of the bits of a word that are set, below 64.
+#[inline(always)]
+pub(crate) fn bits(mut left: u64) -> impl Iterator<Item = usize> {
+    std::iter::from_fn(move || {
+        let bit = (left != 0).then(|| left.trailing_zeros() as usize & 63)?;
+        left &= left - 1;
+        Some(bit)
     })
 }
 

@@ -282,9 +282,13 @@ fn only_bags_are_overwritten() {
     create(&bag, false).unwrap();
     assert!(refused(&bag, false).contains("allow to overwrite"));
     create(&bag, true).unwrap();
-    fs::write(bag.join("thesis.tex"), "years of work").unwrap();
-    assert!(refused(&bag, true).contains("thesis.tex"));
-    assert!(bag.join("thesis.tex").exists() && bag.join("metadata.yaml").exists());
+    for name in ["thesis.tex", "bag_0.db3-wal.zstd"] {
+        let foreign = bag.join(name);
+        fs::write(&foreign, "years of work").unwrap();
+        assert!(refused(&bag, true).contains(name));
+        assert!(foreign.exists() && bag.join("metadata.yaml").exists());
+        fs::remove_file(foreign).unwrap();
+    }
     let file = folder.path().join("file");
     fs::write(&file, "x").unwrap();
     refused(&file, true);

@@ -16,8 +16,9 @@ use super::{
         CountedTopic, EMPTY_START_NS, FileInformation, METADATA_VERSION, Metadata, Nanoseconds,
         StartingTime, TopicMetadata,
     },
-    split_list::list,
+    split_list::{is_storage, list},
 };
+use mcap::McapError;
 use mcap_sink::McapSink;
 use sqlite_sink::SqliteSink;
 
@@ -56,7 +57,13 @@ trait Sink: Send {
 }
 
 fn failed(path: &Path, doing: &'static str) -> impl FnOnce(SinkError) -> BagError {
-    move |error| BagError::io(path, doing)(io::Error::other(error))
+    // The system's own error tells of a full disk.
+    let system = |error: SinkError| match error.downcast().map(|error| *error) {
+        Ok(McapError::Io(error)) => error,
+        Ok(other) => io::Error::other(other),
+        Err(error) => io::Error::other(error),
+    };
+    move |error| BagError::io(path, doing)(system(error))
 }
 
 /// Type hash by the topic's definition; empty where that is unknown, as rosbag2 has it.
@@ -98,7 +105,11 @@ impl BagWriter {
         let created = File::create_new(&file).map_err(BagError::io(&file, "create"))?;
         let sink: Result<Box<dyn Sink>, SinkError> = match storage {
             Storage::Mcap => McapSink::create(created).map(|sink| Box::new(sink) as _),
-            Storage::Sqlite3 => SqliteSink::create(&file).map(|sink| Box::new(sink) as _),
+            Storage::Sqlite3 => {
+                // Closing it later would drop the locks that SQLite takes on the file.
+                drop(created);
+                SqliteSink::create(&file).map(|sink| Box::new(sink) as _)
+            }
         };
         let sink = sink.map_err(failed(&file, "create"))?;
         Ok(BagWriter {
@@ -253,21 +264,42 @@ fn make_way(path: &Path, overwrite: bool) -> Result<(), BagError> {
     if !path.is_dir() {
         return refuse(" and is not a folder".into(), "");
     }
-    let files = list(path)?;
-    for (file, name) in &files {
-        let bare = name.strip_suffix(".zstd").unwrap_or(name);
-        let endings = [".mcap", ".db3", ".db3-wal", ".db3-shm", ".db3-journal"];
-        let is_ours =
-            name == "metadata.yaml" || endings.iter().any(|ending| bare.ends_with(ending));
-        if !is_ours || file.is_dir() {
+    let endings = [".db3-wal", ".db3-shm", ".db3-journal"];
+    let is_ours = |name: &str| {
+        name == "metadata.yaml"
+            || is_storage(name)
+            || endings.iter().any(|ending| name.ends_with(ending))
+    };
+    let mut files = Vec::new();
+    for entry in list(path)? {
+        let (file, name) = entry?;
+        if !is_ours(&name) || file.is_dir() {
             let why = format!(" and holds {name:?}, which is no part of a bag");
             return refuse(why, "");
         }
+        files.push(file);
     }
     if !files.is_empty() && !overwrite {
         return refuse(String::new(), " or allow to overwrite");
     }
     files
         .iter()
-        .try_for_each(|(file, _)| fs::remove_file(file).map_err(BagError::io(file, "remove")))
+        .try_for_each(|file| fs::remove_file(file).map_err(BagError::io(file, "remove")))
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn a_full_disk_is_named() {
+        let path = Path::new("/dev/full");
+        let file = File::options().write(true).open(path).unwrap();
+        let written = McapSink::create(file).and_then(|mut sink| {
+            sink.add_topic(&TopicInfo::default(), "")?;
+            sink.write(0, 0, &[0; 1 << 16])
+        });
+        let error = failed(path, "write")(written.unwrap_err()).to_string();
+        assert!(error.contains("No space left on device"), "{error}");
+    }
 }

@@ -60,6 +60,7 @@ pub fn run(replay: &DdsReplay) -> CliResult<RunReport> {
     )?;
     progress.say("");
     player.played(&mut |done| progress.set(done))?;
+    progress.set(1.0);
     progress.say("nodes end");
     let transformer = transformer.end()?;
     let lattices = branches.into_iter().map(Branch::end);

@@ -125,6 +125,7 @@ fn errors_say_what_was_wrong_where_and_what_to_do() {
     assert!(error(&["quantize", &nothing]).contains(&nothing));
     let usage = lattice(&["quantize", &nothing, "--lattice", "penrose"]);
     assert!(String::from_utf8_lossy(&usage.stderr).contains("fcc"));
+    assert!(!usage.status.success() && usage.stdout.is_empty());
     assert!(error(&["node", "nobody"]).contains("lattice_mapper"));
     assert!(error(&["run", &nothing]).contains(&nothing));
     let log = simulated(directory.path(), "mcap", "2");

@@ -30,8 +30,10 @@ impl Made {
         let report = fs::read(folder.join("report.json")).unwrap();
         let report: Value = serde_json::from_slice(&report).unwrap();
         let command = report["command"].as_str().unwrap();
-        let expected = format!("lattice paper {paper} --seed 1 --quick");
-        assert!(command.starts_with(&expected), "{command}");
+        let scanned = more.contains(&"--scan");
+        let scan = if scanned { " --scan target.ply" } else { "" };
+        let expected = format!("lattice paper {paper} --seed 1 --quick{scan}");
+        assert_eq!(command, expected);
         let folder = folder.to_owned();
         let made = Made { folder, report };
         let checks = made.all("checks");
@@ -153,6 +155,14 @@ fn a_real_scan_saves_voxels_when_it_is_turned_anyhow(rows: &str) {
         assert!(
             (found[3] - change).abs() < found[4] + 0.3,
             "{lattice}: {found:?}"
+        );
+    }
+    for lattice in ["FCC", "BCC"] {
+        let found = row("any rotation", lattice);
+        let (spread, mean) = (found[7], found[9]);
+        assert!(
+            (0.3..0.6).contains(&spread) && (-3.2..-1.5).contains(&mean),
+            "{found:?}"
         );
     }
     let fcc = row("yaw only", "FCC");

@@ -22,24 +22,10 @@ pub struct ScanRecord {
 }
 
 impl ScanRecord {
-    pub(super) fn to_bytes(self) -> [u8; 32] {
-        let mut bytes = [0; 32];
-        let [x, y, z] = <[f64; 3]>::from(self.origin_m).map(f64::to_bits);
-        let words = [x, y, z, self.points as u64];
-        for (to, word) in bytes.chunks_exact_mut(8).zip(words) {
-            to.copy_from_slice(&word.to_le_bytes());
-        }
-        bytes
+    pub(super) fn to_bytes(self) -> [[u8; 8]; 4] {
+        let [x, y, z] = <[f64; 3]>::from(self.origin_m).map(f64::to_le_bytes);
+        [x, y, z, (self.points as u64).to_le_bytes()]
     }
-}
-
-/// A point as it is in the file.
-pub(super) fn point_to_bytes(point: [f32; 4]) -> [u8; POINT_BYTES] {
-    let mut bytes = [0; POINT_BYTES];
-    for (to, value) in bytes.chunks_exact_mut(4).zip(point) {
-        to.copy_from_slice(&value.to_le_bytes());
-    }
-    bytes
 }
 
 /// Place of the scans of a point file: `.scans` added to its name.
@@ -52,11 +38,9 @@ pub fn scans_path(points: &Path) -> PathBuf {
 /// Reads the positions (m) of a point file, at most `max_points` from its start.
 pub fn read_points(path: &Path, max_points: usize) -> Result<Vec<[f32; 3]>, AnyError> {
     let bytes = read(path, POINT_BYTES, max_points)?;
-    let points = bytes.chunks_exact(POINT_BYTES).map(|point| {
-        let value = |i: usize| f32::from_bits(u32::from_le_bytes(array(point, 4 * i)));
-        [value(0), value(1), value(2)]
-    });
-    Ok(points.collect())
+    let points = bytes.as_chunks::<4>().0.as_chunks::<4>().0.iter();
+    let position = |&[x, y, z, _]: &[[u8; 4]; 4]| [x, y, z].map(f32::from_le_bytes);
+    Ok(points.map(position).collect())
 }
 
 /// Reads the scans beside a point file of which `points` were read; the last scan is cut to fit.
@@ -64,15 +48,13 @@ pub fn read_scans(points_path: &Path, points: usize) -> Result<Vec<ScanRecord>, 
     let path = scans_path(points_path);
     let bytes = read(&path, SCAN_BYTES, usize::MAX)?;
     let (mut scans, mut left, mut scanned) = (Vec::new(), points, 0u128);
-    for record in bytes.chunks_exact(SCAN_BYTES) {
-        let word = |i: usize| u64::from_le_bytes(array(record, 8 * i));
-        let claimed = word(3);
+    for &[x, y, z, claimed] in bytes.as_chunks::<8>().0.as_chunks::<4>().0 {
+        let claimed = u64::from_le_bytes(claimed);
         scanned += u128::from(claimed);
         let points = usize::try_from(claimed).unwrap_or(usize::MAX).min(left);
         left -= points;
         if points > 0 {
-            let [x, y, z] = [word(0), word(1), word(2)].map(f64::from_bits);
-            let origin_m = Vector3::new(x, y, z);
+            let origin_m = Vector3::from([x, y, z].map(f64::from_le_bytes));
             scans.push(ScanRecord { origin_m, points });
         }
     }
@@ -100,15 +82,6 @@ fn read(path: &Path, record: usize, max_records: usize) -> Result<Vec<u8>, AnyEr
     Ok(bytes)
 }
 
-/// `N` bytes from `at`; zeros beyond the end.
-fn array<const N: usize>(bytes: &[u8], at: usize) -> [u8; N] {
-    let mut out = [0; N];
-    if let Some(from) = bytes.get(at..at + N) {
-        out.copy_from_slice(from);
-    }
-    out
-}
-
 #[cfg(test)]
 mod tests {
     use super::*;
@@ -117,12 +90,13 @@ mod tests {
     fn file_of(points: usize, scans: &[usize]) -> (tempfile::TempDir, PathBuf) {
         let dir = tempfile::tempdir().unwrap();
         let path = dir.path().join("p.xyzi");
-        let bytes = (0..points).flat_map(|i| point_to_bytes([i as f32, 0.5, -1.25, 7.0]));
-        fs::write(&path, bytes.collect::<Vec<u8>>()).unwrap();
+        let point = |i: usize| [i as f32, 0.5, -1.25, 7.0].map(f32::to_le_bytes);
+        let bytes: Vec<_> = (0..points).flat_map(point).collect();
+        fs::write(&path, bytes.as_flattened()).unwrap();
         let origin_m = Vector3::new(1.0, -2.0, 3.5);
         let record = |&points: &usize| ScanRecord { origin_m, points }.to_bytes();
-        let records = scans.iter().flat_map(record);
-        fs::write(scans_path(&path), records.collect::<Vec<u8>>()).unwrap();
+        let records: Vec<_> = scans.iter().flat_map(record).collect();
+        fs::write(scans_path(&path), records.as_flattened()).unwrap();
         (dir, path)
     }
 

@@ -1,6 +1,6 @@
 //! The point file of a simulated survey.
 
-use super::points::{ScanRecord, point_to_bytes, scans_path};
+use super::points::{ScanRecord, scans_path};
 use crate::simulate::{Survey, SurveyPattern};
 use crate::{AnyError, at};
 use serde::Serialize;
@@ -70,14 +70,14 @@ pub fn write_site(
         for &point in kept {
             let [x, y, z, _] = point.map(f64::from);
             sum_m += (nalgebra::Vector3::new(x, y, z) - scan.origin_m).norm();
-            let written = points_file.write_all(&point_to_bytes(point));
+            let written = points_file.write_all(point.map(f32::to_le_bytes).as_flattened());
             written.map_err(at(&options.out))?;
         }
         let record = ScanRecord {
             origin_m: scan.origin_m,
             points: kept.len(),
         };
-        let written = scans_file.write_all(&record.to_bytes());
+        let written = scans_file.write_all(record.to_bytes().as_flattened());
         written.map_err(at(&scans_out))?;
         points += kept.len() as u64;
         scans += 1;
@@ -95,11 +95,7 @@ pub fn write_site(
         points,
         scans,
         duration_s: scans as f64 / options.pattern.scans_per_s(),
-        mean_range_m: if points > 0 {
-            sum_m / points as f64
-        } else {
-            0.0
-        },
+        mean_range_m: sum_m / points.max(1) as f64,
     })
 }
 

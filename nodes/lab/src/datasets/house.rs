@@ -186,9 +186,8 @@ pub fn write_house(
 fn create(options: &HouseOptions, name: &str) -> Result<(PathBuf, File), AnyError> {
     let path = options.out.join(name);
     if path.exists() && !options.overwrite {
-        let path = path.display();
         let words = "there is a file already; choose another folder or allow to overwrite";
-        return Err(format!("{path}: {words}").into());
+        return Err(at(&path)(words));
     }
     let file = File::create(&path).map_err(at(&path))?;
     Ok((path, file))

@@ -135,9 +135,10 @@ impl<'a> Log<'a> {
 
     /// Both forms of the INS pose, which arrive together, and the turntable.
     fn epoch(&self, sample: &InsSample) -> Result<[LogEntry; 3], AnyError> {
+        let stamp_ns = bobcat_start_ns().saturating_add(sample.time_ns);
         let entry = |topic, delay_ns: i64, cdr| LogEntry {
             topic,
-            log_time_ns: (bobcat_start_ns() + sample.time_ns).saturating_add(delay_ns),
+            log_time_ns: stamp_ns.saturating_add(delay_ns),
             cdr,
             true_points_m: Vec::new(),
         };

@@ -52,7 +52,8 @@ pub(super) fn cloud(laser: Laser, scan: &Lms200Scan) -> PointCloud2 {
     dense_cloud(header, fields, POINT_STEP, scan.returns.len(), data)
 }
 
-/// The IMU's pose as the NovAtel driver reports it: stamped on arrival, GPS time of validity in `nov_header`.
+/// The IMU's pose as the NovAtel driver reports it: stamped on arrival, GPS time of validity in
+/// `nov_header`.
 pub(super) fn inspvax(map: &EnuFrame, sample: &InsSample) -> Result<INSPVAX, GeodesyError> {
     let place = map.geodetic_from_enu(&sample.map_from_imu.translation.vector)?;
     let local_from_map = map.enu_from_local_level(&place).inverse();
@@ -206,7 +207,8 @@ mod tests {
         let names: Vec<String> = names.collect();
         assert_eq!(
             names.join(" "),
-            "base_link/imu base_link/left_laser base_link/right_laser top_turntable/top_laser base_link/top_turntable"
+            "base_link/imu base_link/left_laser base_link/right_laser \
+             top_turntable/top_laser base_link/top_turntable"
         );
     }
 }

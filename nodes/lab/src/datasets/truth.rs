@@ -12,7 +12,7 @@ use crate::simulate::{
 use crate::{AnyError, at};
 use lattice_nodes::files::export::ply_header;
 use nalgebra::{Isometry3, Vector3};
-use serde_json::{Value, json};
+use serde_yaml::{Mapping, Value};
 use std::fs::File;
 use std::io::{BufWriter, Seek, SeekFrom, Write};
 use std::path::PathBuf;
@@ -101,45 +101,56 @@ fn padded_header(points: u64) -> Vec<u8> {
     ply_header(&comment, &vertices).into_bytes()
 }
 
+/// A mapping in the order given.
+fn mapping<const N: usize>(entries: [(&str, Value); N]) -> Value {
+    let entries = entries.map(|(key, value)| (key.into(), value));
+    Value::Mapping(Mapping::from_iter(entries))
+}
+
 /// Contents of `site.yaml`. A mount is `parent_from_child`; the turntable's is that at angle zero.
 fn site_facts(options: &BobcatOptions) -> Value {
     let [latitude_deg, longitude_deg, ellipsoidal_height_m] = BOBCAT_ORIGIN;
     let turntable = Isometry3::from(Vector3::from(BASE_FROM_TURNTABLE_M));
     let mount = |parent: &str, child: &str, pose: &Isometry3<f64>| {
-        json!({
-            "parent": parent,
-            "child": child,
-            "translation_m": <[f64; 3]>::from(pose.translation.vector),
-            "rotation_xyzw": <[f64; 4]>::from(pose.rotation.coords),
-        })
+        mapping([
+            ("parent", parent.into()),
+            ("child", child.into()),
+            ("translation_m", pose.translation.vector.as_slice().into()),
+            ("rotation_xyzw", pose.rotation.coords.as_slice().into()),
+        ])
     };
-    json!({
-        "simulation": "bobcat",
-        "seed": options.seed,
-        "duration_s": options.duration_s,
-        "start_utc_ns": bobcat_start_ns(),
-        "start_gps_week": BOBCAT_GPS_WEEK,
-        "start_gps_week_ms": BOBCAT_GPS_WEEK_MS,
-        "leap_seconds": BOBCAT_LEAP_SECONDS,
-        "origin": {
-            "latitude_deg": latitude_deg,
-            "longitude_deg": longitude_deg,
-            "ellipsoidal_height_m": ellipsoidal_height_m,
-            "undulation_m": BOBCAT_UNDULATION_M,
-        },
-        "mounts": [
-            mount(BASE_FRAME, IMU_FRAME, &base_from_imu()),
-            mount(BASE_FRAME, Laser::Left.frame(), &Laser::Left.mount()),
-            mount(BASE_FRAME, Laser::Right.frame(), &Laser::Right.mount()),
-            mount(BASE_FRAME, TURNTABLE_FRAME, &turntable),
-            mount(TURNTABLE_FRAME, Laser::Top.frame(), &Laser::Top.mount()),
-        ],
-        "turntable_period_s": TURNTABLE_PERIOD_NS as f64 * 1e-9,
-        "range_noise_m": RANGE_NOISE_M,
-        "min_range_m": MIN_RANGE_M,
-        "max_range_m": MAX_RANGE_M,
-        "ins_position_rms_m": INS_POSITION_RMS_M,
-    })
+    let mounts = [
+        mount(BASE_FRAME, IMU_FRAME, &base_from_imu()),
+        mount(BASE_FRAME, Laser::Left.frame(), &Laser::Left.mount()),
+        mount(BASE_FRAME, Laser::Right.frame(), &Laser::Right.mount()),
+        mount(BASE_FRAME, TURNTABLE_FRAME, &turntable),
+        mount(TURNTABLE_FRAME, Laser::Top.frame(), &Laser::Top.mount()),
+    ];
+    let origin = mapping([
+        ("latitude_deg", latitude_deg.into()),
+        ("longitude_deg", longitude_deg.into()),
+        ("ellipsoidal_height_m", ellipsoidal_height_m.into()),
+        ("undulation_m", BOBCAT_UNDULATION_M.into()),
+    ]);
+    mapping([
+        ("simulation", "bobcat".into()),
+        ("seed", options.seed.into()),
+        ("duration_s", options.duration_s.into()),
+        ("start_utc_ns", bobcat_start_ns().into()),
+        ("start_gps_week", BOBCAT_GPS_WEEK.into()),
+        ("start_gps_week_ms", BOBCAT_GPS_WEEK_MS.into()),
+        ("leap_seconds", BOBCAT_LEAP_SECONDS.into()),
+        ("origin", origin),
+        ("mounts", mounts.to_vec().into()),
+        (
+            "turntable_period_s",
+            (TURNTABLE_PERIOD_NS as f64 * 1e-9).into(),
+        ),
+        ("range_noise_m", RANGE_NOISE_M.into()),
+        ("min_range_m", MIN_RANGE_M.into()),
+        ("max_range_m", MAX_RANGE_M.into()),
+        ("ins_position_rms_m", INS_POSITION_RMS_M.into()),
+    ])
 }
 
 #[cfg(test)]

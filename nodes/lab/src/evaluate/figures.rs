@@ -11,8 +11,8 @@ use std::collections::BTreeMap;
 
 /// Range of errors that is shown.
 const ERRORS: std::ops::Range<f64> = 0.005..30.0;
-/// Range of shares of wrong labels that is shown.
-const QS: (&str, std::ops::Range<f64>) = ("share of wrong labels q", -0.02..0.85);
+/// Title and range of the axis of wrong labels.
+const Q_AXIS: (&str, std::ops::Range<f64>) = ("share of wrong labels q", -0.02..0.85);
 /// Colours of accepted and refused poses.
 const ACCEPTED: RGBColor = RGBColor(0, 114, 178);
 const REFUSED: RGBColor = RGBColor(213, 94, 0);
@@ -56,7 +56,7 @@ pub fn d_se3(summary: &Summary) -> Result<Figure, AnyError> {
     let draw = |areas: &[Area]| {
         for ((start, scene), area) in cells.zip(areas) {
             let y = ("median d_SE3", ERRORS.log_scale());
-            let mut chart = chart(area, &format!("{scene}, start {start}"), QS, y, &[])?;
+            let mut chart = chart(area, &format!("{scene}, start {start}"), Q_AXIS, y, &[])?;
             for method in competitors() {
                 let (color, rows) = (color(method), summary.of_method(scene, start, method));
                 let points = rows.iter().filter_map(|r| Some((r.q, shown(r.d_se3?))));
@@ -82,7 +82,7 @@ pub fn success(summary: &Summary) -> Result<Figure, AnyError> {
     let draw = |areas: &[Area]| {
         for (start, area) in starts.iter().zip(areas) {
             let y = ("right within 0.15 m and 3 deg", 0.0..1.02);
-            let mut chart = chart(area, &format!("all scenes, start {start}"), QS, y, &[])?;
+            let mut chart = chart(area, &format!("all scenes, start {start}"), Q_AXIS, y, &[])?;
             for method in competitors() {
                 let (color, rows) = (color(method), summary.of_method("all", start, method));
                 let points = rows.iter().filter_map(|r| Some((r.q, r.success.share?)));

@@ -39,25 +39,25 @@ impl Share {
     }
 
     pub fn new(k: usize, n: usize) -> Share {
+        let unknown = Share {
+            k,
+            n,
+            share: None,
+            low: 0.0,
+            high: 1.0,
+        };
         if n == 0 {
-            return Share {
-                k,
-                n,
-                share: None,
-                low: 0.0,
-                high: 1.0,
-            };
+            return unknown;
         }
         let (count, share) = (n as f64, k as f64 / n as f64);
         let z2 = Z * Z / count;
         let middle = (share + z2 / 2.0) / (1.0 + z2);
         let half = Z * (share * (1.0 - share) / count + z2 / (4.0 * count)).sqrt() / (1.0 + z2);
         Share {
-            k,
-            n,
             share: Some(share),
             low: (middle - half).max(0.0),
             high: (middle + half).min(1.0),
+            ..unknown
         }
     }
 }
@@ -70,8 +70,7 @@ pub const LEAST_FOR_INTERVAL: usize = 6;
 ///
 /// For fewer than [`LEAST_FOR_INTERVAL`] values it spans all of them and holds less often; None of no values.
 pub fn median_interval(values: impl IntoIterator<Item = f64>) -> Option<[f64; 2]> {
-    let mut values: Vec<f64> = values.into_iter().collect();
-    values.sort_by(f64::total_cmp);
+    let values = sorted(values);
     let n = values.len();
     // Logarithm of the chance that k of n lie below the median, from k = 0 on.
     let mut chance = n as f64 * 0.5_f64.ln();
@@ -94,20 +93,21 @@ pub fn median(values: impl IntoIterator<Item = f64>) -> Option<f64> {
 
 /// A quantile from 0 to 1, linear between the values; None of nothing.
 pub fn quantile(values: impl IntoIterator<Item = f64>, share: f64) -> Option<f64> {
-    let mut values: Vec<f64> = values.into_iter().collect();
-    values.sort_by(f64::total_cmp);
+    let values = sorted(values);
     let at = share.clamp(0.0, 1.0) * values.len().checked_sub(1)? as f64;
-    let (low, high) = (
-        values.get(at.floor() as usize)?,
-        values.get(at.ceil() as usize)?,
-    );
+    let (low, high) = (values.get(at as usize)?, values.get(at.ceil() as usize)?);
     Some(low + (high - low) * at.fract())
 }
 
 pub fn distinct(values: impl IntoIterator<Item = f64>) -> Vec<f64> {
+    let mut values = sorted(values);
+    values.dedup();
+    values
+}
+
+fn sorted(values: impl IntoIterator<Item = f64>) -> Vec<f64> {
     let mut values: Vec<f64> = values.into_iter().collect();
     values.sort_by(f64::total_cmp);
-    values.dedup();
     values
 }
 

@@ -77,20 +77,16 @@ impl Trial {
     ) -> Trial {
         let up = Vector3::z();
         let error = PoseError::between(pose, truth);
-        let apart_m = seen_m
-            .iter()
-            .map(|p| nalgebra::distance(&(pose * p), &(truth * p)));
+        let tilt_rad = (pose.rotation * up).angle(&(truth.rotation * up));
+        let apart = |p: &Point3<f64>| nalgebra::distance(&(pose * p), &(truth * p));
+        let apart_m = seen_m.iter().map(apart);
         Trial {
             cell: cell.clone(),
             method: method.to_owned(),
             different_share: 0.0,
             translation_m: rounded(error.translation_m),
             rotation_deg: rounded(error.rotation_rad.to_degrees()),
-            tilt_deg: rounded(
-                (pose.rotation * up)
-                    .angle(&(truth.rotation * up))
-                    .to_degrees(),
-            ),
+            tilt_deg: rounded(tilt_rad.to_degrees()),
             d_se3: rounded(error.d_se3),
             d_se3_left: rounded(error.d_se3_left),
             view_m: rounded(apart_m.sum::<f64>() / seen_m.len().max(1) as f64),

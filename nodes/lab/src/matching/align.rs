@@ -117,7 +117,7 @@ struct Top {
 }
 
 /// Goes to the best of the twelve poses one step away as long as it is better; of equally good ones to
-/// the first. Steps are so many cell sides and degrees, and at most so many.
+/// the first. `(sides, turn_deg, most)`: step length in cell sides, turn in degrees, most steps.
 fn climb(
     top: Top,
     list: &OccupancyList,

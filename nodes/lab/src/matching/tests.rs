@@ -110,6 +110,8 @@ fn a_known_pose_is_found_from_nearby() {
             apart_m(&start, &truth)
         );
         assert!(found.points > 1000 && found.hits > found.points / 2);
+        let hits = |pose| map.levels()[0].overlap(pose, &scan.offsets_m);
+        assert!(hits(&found.map_from_cloud) > hits(&start));
         assert!(found.evaluations > 13 * 5);
     }
 }
@@ -128,6 +130,9 @@ fn a_search_needs_no_guess_of_place_and_heading() {
     let found = search(&map, &scan, &about, &spread).unwrap();
     assert_eq!(found.len(), search::KEEP);
     assert!(found.windows(2).all(|pair| pair[0].hits >= pair[1].hits));
+    // Before it is refined.
+    let off_m = apart_m(&found[0].map_from_cloud, &truth);
+    assert!(off_m < 0.2, "{off_m} m");
     let best = align(&map, &scan, &found[0].map_from_cloud).unwrap();
     let off_m = apart_m(&best.map_from_cloud, &truth);
     assert!(off_m < 0.06, "{off_m} m");

@@ -288,6 +288,7 @@ mod tests {
         let many = VERTICES.replace(" 4", " 99999999999");
         for (elements, message) in [
             (VERTICES.to_owned(), "the header has no element face"),
+            (many.clone(), "the header has no element face"),
             (
                 none.clone() + &FACES.replace("vertex_indices", "corners"),
                 "no list named vertex_indices",

@@ -147,13 +147,13 @@ pub struct Check {
     /// Name with its unit: "RMS of FCC (m)".
     pub name: String,
     /// Number printed in the paper, if it is.
-    pub printed: Option<f64>,
+    printed: Option<f64>,
     /// Number from theory or a measurement made elsewhere.
-    pub expected: f64,
-    pub found: f64,
+    expected: f64,
+    found: f64,
     /// Greatest allowed difference, in the same unit.
-    pub tolerance: f64,
-    pub holds: bool,
+    tolerance: f64,
+    holds: bool,
 }
 
 impl Check {
@@ -167,6 +167,11 @@ impl Check {
             tolerance,
             holds: (found - expected).abs() <= tolerance,
         }
+    }
+
+    /// Whether the difference is allowed.
+    pub fn holds(&self) -> bool {
+        self.holds
     }
 
     /// The same with the number printed in the paper.

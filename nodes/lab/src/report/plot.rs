@@ -20,7 +20,7 @@ pub type Chart<'a, X, Y> = ChartContext<
 /// A colour and its meaning.
 pub type Key<'a> = (RGBColor, &'a str);
 
-/// Panels of a size (pixels) in columns and rows, and a key so wide on their right.
+/// Panels of a size (pixels) in columns and rows, and on their right a key of `key_width` pixels.
 #[derive(Clone, Copy, Debug)]
 pub struct Layout<'a> {
     panel: (u32, u32),
@@ -90,10 +90,12 @@ where
         .x_label_area_size(36)
         .y_label_area_size(56)
         .build_cartesian_2d(xs, ys)?;
+    let axes = chart.as_coord_spec();
+    let (x_label, y_label) = (labels(axes.x_spec()), labels(axes.y_spec()));
     let mut mesh = chart.configure_mesh();
-    mesh.x_desc(x).y_desc(y).y_label_formatter(&label);
+    mesh.x_desc(x).y_desc(y).y_label_formatter(&y_label);
     match names.len() {
-        0 => mesh.x_labels(7).x_label_formatter(&label),
+        0 => mesh.x_labels(TICKS).x_label_formatter(&x_label),
         n => (mesh.disable_x_mesh().x_labels(n + 1)).x_label_formatter(&name),
     };
     mesh.light_line_style(WHITE).label_style(("sans-serif", 13));
@@ -101,10 +103,25 @@ where
     Ok(chart)
 }
 
-/// A number at an axis, to a millionth.
-fn label(value: &f64) -> String {
-    // No -0.
-    ((value * 1e6).round() / 1e6 + 0.0).to_string()
+/// Labels at an axis, about.
+const TICKS: usize = 7;
+
+/// Numbers at an axis: all with as many digits as they need, or each with its own if it is logarithmic. An
+/// axis with zero in the middle is one of changes, with signs.
+fn labels<A: Ranged<ValueType = f64>>(axis: &A) -> impl Fn(&f64) -> String + use<A> {
+    let Range { start, end } = axis.range();
+    let even = axis.map(&f64::midpoint(start, end), (0, 1000)) == 500;
+    let step = (end - start) / TICKS as f64;
+    let digits = (-step.log10()).ceil().clamp(0.0, 9.0) as usize;
+    move |value| {
+        // No -0.
+        let value = (value * 1e6).round() / 1e6 + 0.0;
+        match even {
+            true if start == -end => format!("{value:+.digits$}"),
+            true => format!("{value:.digits$}"),
+            false => value.to_string(),
+        }
+    }
 }
 
 /// A lattice's colour, told apart by most eyes (Wong 2011).
@@ -270,6 +287,7 @@ pub fn boxes(
 #[cfg(test)]
 mod tests {
     use super::*;
+    use plotters::coord::types::RangedCoordf64;
 
     #[test]
     fn a_picture_is_one_element_without_ids() {
@@ -301,8 +319,15 @@ mod tests {
 
     #[test]
     fn labels_have_the_digits_that_they_need() {
-        let found = [17_100.0, 0.3 - 0.1, 0.005, -1e-17].map(|value| label(&value));
-        assert_eq!(found, ["17100", "0.2", "0.005", "0"]);
+        let of = |range: Range<f64>, value| labels(&RangedCoordf64::from(range))(&value);
+        assert_eq!(of(0.0..1.0, 0.0) + &of(0.0..1.0, 0.3 - 0.1), "0.00.2");
+        assert_eq!(of(17_100.0..18_300.0, 17_100.0), "17100");
+        assert_eq!(
+            [0.0, -1e-17, 10.0].map(|value| of(-45.0..45.0, value)),
+            ["+0", "+0", "+10"]
+        );
+        let errors = labels(&LogCoord::<f64>::from((0.005..30.0).log_scale()));
+        assert_eq!([0.01, 10.0].map(|value| errors(&value)), ["0.01", "10"]);
     }
 
     #[test]

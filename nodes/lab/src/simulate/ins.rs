@@ -12,8 +12,6 @@ const WHITE_SHARE: f64 = 0.04;
 /// Correlation times of position and attitude errors, s.
 const POSITION_TIME_S: f64 = 30.0;
 const ATTITUDE_TIME_S: f64 = 90.0;
-/// White velocity error, m/s per axis.
-const VELOCITY_SIGMA_MPS: f64 = 0.02;
 /// Delay of the INS messages, ns.
 const MIN_DELAY_NS: f64 = 2e6;
 const MEAN_MORE_DELAY_NS: f64 = 1.5e6;
@@ -46,8 +44,8 @@ impl InsSample {
     pub const POSITION_SIGMA_M: [f64; 3] = [0.015, 0.015, 0.0212];
     /// Standard deviations of the attitude error about east, north and up, degrees.
     pub const ATTITUDE_SIGMA_DEG: [f64; 3] = [0.02, 0.02, 0.06];
-    /// Standard deviation of the velocity, m/s per axis.
-    pub const VELOCITY_SIGMA_MPS: f64 = VELOCITY_SIGMA_MPS;
+    /// Standard deviation of the velocity, white, m/s per axis.
+    pub const VELOCITY_SIGMA_MPS: f64 = 0.02;
 }
 
 /// The epochs of a log in order.
@@ -156,7 +154,8 @@ impl Errors {
             unit.component_mul(&sigmas[i])
         };
         let (position, attitude) = (error(0), error(1));
-        let velocity = Vector3::from_fn(|_, _| VELOCITY_SIGMA_MPS * self.stream.normal());
+        let velocity =
+            Vector3::from_fn(|_, _| InsSample::VELOCITY_SIGMA_MPS * self.stream.normal());
         [position, attitude, velocity]
     }
 

@@ -44,11 +44,8 @@ pub(super) fn earth_moving_obstacles() -> Vec<Obstacle> {
 /// A hoarding of 10 m panels around the site, two of them open as a gate, and a post at every joint.
 fn fence(obstacles: &mut Vec<Obstacle>) {
     let (east, north) = (66.0_f64, 80.0_f64);
-    let (south, north) = (
-        [(-east, -north), (east, -north)],
-        [(east, north), (-east, north)],
-    );
-    let corners = [south, north].concat();
+    let [south, north] = [-north, north].map(|y| [(-east, y), (east, y)]);
+    let corners = [south[0], south[1], north[1], north[0]];
     let sides = corners.iter().zip(corners.iter().cycle().skip(1));
     for (side, (&(x0, y0), &(x1, y1))) in sides.enumerate() {
         let (from, along) = (Vector2::new(x0, y0), Vector2::new(x1 - x0, y1 - y0));

@@ -129,12 +129,8 @@ impl Post {
         let distance = (-b - discriminant.sqrt()) / a;
         let z = origin.z + direction.z * distance;
         let hit = distance > 0.0 && z >= self.span_m[0] && z <= self.span_m[1];
-        hit.then(|| {
-            (
-                distance,
-                ((from + along * distance) / self.radius_m).push(0.0),
-            )
-        })
+        let normal = (from + along * distance) / self.radius_m;
+        hit.then(|| (distance, normal.push(0.0)))
     }
 
     /// Distance from a point to the mantle, m.
@@ -247,6 +243,8 @@ mod tests {
         assert_eq!(hit, Some((4.0, -Vector3::x())));
         assert_eq!(block.cast(&from(0.0, 1.0), &-Vector3::x()), None);
         assert_eq!(block.cast(&from(5.0, 1.0), &Vector3::x()), None);
+        let wide = Block::new(from(0.0, 1.0), Vector3::new(4.0, 2.0, 2.0), 0.0);
+        assert_eq!(wide.ground_clearance_m(&Vector2::new(5.0, 0.0)), 3.0);
         let post = Post {
             center_m: Vector2::new(5.0, 0.0),
             radius_m: 0.5,

@@ -35,8 +35,7 @@ impl SpeedProfile {
         } else if time_s >= duration_s {
             (self.length, 0.0)
         } else if time_s < self.ramp_s {
-            let (covered, speed) = self.ramp(time_s / self.ramp_s);
-            (covered, speed)
+            self.ramp(time_s / self.ramp_s)
         } else if time_s > duration_s - self.ramp_s {
             let (covered, speed) = self.ramp((duration_s - time_s) / self.ramp_s);
             (self.length - covered, speed)
@@ -47,11 +46,8 @@ impl SpeedProfile {
 
     /// The ramp up at `u` in 0..1 of its duration: speed is the smoothstep 3u^2 - 2u^3, length its integral.
     fn ramp(&self, u: f64) -> (f64, f64) {
-        let speed = self.speed * u * u * (3.0 - 2.0 * u);
-        (
-            self.speed * self.ramp_s * u * u * u * (1.0 - 0.5 * u),
-            speed,
-        )
+        let covered = self.speed * self.ramp_s * u * u * u * (1.0 - 0.5 * u);
+        (covered, self.speed * u * u * (3.0 - 2.0 * u))
     }
 }
 

@@ -8,7 +8,7 @@ use super::ins_error::InsErrors;
 use super::lms200::{SCAN_RATE_HZ, SCAN_SPAN_NS};
 use super::random::{Purpose, Stream};
 use super::spin64::{self, COLUMNS, TURN_NS};
-use nalgebra::{Isometry3, Point3, Translation3, UnitQuaternion, Vector3};
+use nalgebra::{Isometry3, Point3, Translation3, Vector3};
 use rayon::prelude::*;
 use std::collections::VecDeque;
 
@@ -113,10 +113,8 @@ impl Survey {
             .map(|time_ns| error.apply(&self.bobcat.map_from_base(time_ns)));
         let map_from_laser = |offset_ns: i64| {
             let share = offset_ns as f64 / SCAN_SPAN_NS as f64;
-            between(&ends, share)
-                * self
-                    .bobcat
-                    .base_from_laser(laser, scan.start_ns + offset_ns)
+            let time_ns = scan.start_ns + offset_ns;
+            between(&ends, share) * self.bobcat.base_from_laser(laser, time_ns)
         };
         let points = scan.returns.iter().map(|r| {
             let in_laser = Point3::from(r.point_m.map(f64::from));
@@ -136,10 +134,7 @@ impl Survey {
         errors: &InsErrors,
     ) -> SurveyScan {
         let mut noise = Stream::new(self.bobcat.seed(), Purpose::SpinRange, 0, index);
-        let mount = Isometry3::from_parts(
-            Translation3::from(Vector3::from(BASE_FROM_SPIN64_M)),
-            UnitQuaternion::identity(),
-        );
+        let mount = Isometry3::from(Vector3::from(BASE_FROM_SPIN64_M));
         let start_ns = self.start_ns(index);
         let mut points = Vec::with_capacity(COLUMNS * 40);
         for (column, directions) in directions.iter().enumerate() {

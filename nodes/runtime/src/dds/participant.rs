@@ -111,6 +111,10 @@ impl Transport for Dds {
         events::events(&self.participant, Arc::clone(&self.probes))
     }
 
+    fn pairs_own_endpoints(&self) -> bool {
+        true
+    }
+
     fn writers_known(&self) -> Result<BoxFuture<'static, ()>, RuntimeError> {
         let writer = self.raw_writer(probe(&self.probe_topic), &PROBE_QOS)?;
         Ok(Box::pin(Arc::clone(&self.probes).wait(writer)))

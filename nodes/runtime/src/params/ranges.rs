@@ -53,7 +53,7 @@ impl Params {
         let (first, last) = (range.start(), range.end());
         let problem = match endless {
             true => format!("expected {first:?} or more"),
-            false => format!("expected {first:?} to {last:?}"),
+            false => format!("expected a number from {first:?} to {last:?}"),
         };
         self.invalid(name, problem)
     }
@@ -78,19 +78,23 @@ mod tests {
             let error = given.usize_in(name, 1, range).unwrap_err().to_string();
             assert!(error.ends_with(end), "{error}");
         };
-        let origin = "of /mapper = 100000 (from the command line): expected 0 to 256";
+        let origin = "of /mapper = 100000 (from the command line): expected a number from 0 to 256";
         count("threads", 0..=256, &format!("parameter `threads` {origin}"));
         count(
             "inbox_events",
             1..=1 << 20,
-            "= 0 (from the command line): expected 1 to 1048576",
+            "= 0 (from the command line): expected a number from 1 to 1048576",
         );
         count("max_voxels", 1..=usize::MAX, "expected 1 or more");
         let float = |name, range, end: &str| {
             let error = given.f64_in(name, 1.0, range).unwrap_err().to_string();
             assert!(error.ends_with(end), "{error}");
         };
-        float("min_range_m", 0.0..=120.0, "expected 0.0 to 120.0");
+        float(
+            "min_range_m",
+            0.0..=120.0,
+            "expected a number from 0.0 to 120.0",
+        );
         float("rate_hz", 0.1..=f64::INFINITY, "expected 0.1 or more");
         let chunk_bytes = given.usize_in("chunk_bytes", 60_000, 1..=60_000);
         assert_eq!(chunk_bytes.unwrap(), 60_000);

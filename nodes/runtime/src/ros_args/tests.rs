@@ -107,6 +107,9 @@ fn node_and_namespace_rules() {
         assert_eq!(args.node_name("mapper"), name, "{rules}");
         assert_eq!(args.namespace("mapper"), namespace, "{rules}");
     }
+    let two_scopes = parse("mapper --ros-args -r __node:=a -- --ros-args -r __ns:=/b");
+    assert_eq!(two_scopes.node_name("mapper"), "a");
+    assert_eq!(two_scopes.namespace("mapper"), "/b");
 }
 
 #[test]
@@ -191,21 +194,26 @@ fn malformed_values_fail_at_once() {
     let spaced = [("-r", "f oo:=/bar"), ("-r", "foo:=/b ar"), ("-e", "/a b")];
     let others = [("-e", ""), ("-e", "robot"), ("-e", "/robot/"), ("-e", "//")];
     let others = spaced.into_iter().chain(others);
-    let others = others.chain([("--params-file", ""), ("--log-level", "a b:=info")]);
+    let empty = [("--params-file", ""), ("--log-level", "")];
+    let others = others.chain(empty).chain([("--log-level", "a b:=info")]);
     let others = others.map(|(flag, value)| (flag, value.to_owned()));
     for (flag, value) in values.chain(others) {
         let argv = ["--ros-args", flag, &value].map(str::to_owned);
         let error = RosArgs::parse(argv).expect_err(&value);
         let text = error.to_string();
         let RosArgsError::Malformed {
-            problem, example, ..
+            argument,
+            problem,
+            expected,
+            example,
+            ..
         } = error
         else {
             panic!("{flag} {value}: {text}");
         };
-        assert!(text.starts_with(&format!("`{flag} ")), "{text}");
+        assert!(text.starts_with(&format!("`{flag} {argument}`")), "{text}");
         assert!(text.contains(&format!("`{flag} {example}`")), "{text}");
-        assert!(!problem.is_empty());
+        assert!(text.contains(expected) && !problem.is_empty(), "{text}");
     }
 }
 

@@ -5,6 +5,7 @@
 
 use lattice_msgs::RosMessage;
 use lattice_msgs::cdr::{self, CdrError};
+use thiserror::Error;
 
 use crate::port::{Bytes, ENCAPSULATION_BYTES, Origin, SampleId};
 
@@ -28,16 +29,38 @@ enum Mapping {
     Cyclone,
 }
 
+/// Reason why a request is not read.
+#[derive(Debug, Error)]
+pub(crate) enum RequestError {
+    /// It is no message of its type.
+    #[error(transparent)]
+    Cdr(#[from] CdrError),
+    /// The transport does not show the number that the answer must name.
+    #[error(
+        "clients over Fast DDS cannot be answered over Cyclone DDS, which does not show the numbers of \
+         their requests; RMW_IMPLEMENTATION=rustdds answers both"
+    )]
+    Numberless,
+}
+
 /// Reads a request, its encapsulation header first. The error is that of the likelier mapping.
 pub(crate) fn read_request<Q: RosMessage>(
     bytes: &[u8],
     origin: &Origin,
-) -> Result<(Q, ReplyTo), CdrError> {
+) -> Result<(Q, ReplyTo), RequestError> {
+    if origin.sample.number <= 0 && origin.related.is_none() {
+        // The transport does not show numbers: only the form that carries its own can be answered.
+        return match origin.sample.writer.vendor() {
+            CYCLONE_VENDOR | RUSTDDS_VENDOR => Ok(read_as(bytes, origin, Mapping::Cyclone)?),
+            _ => Err(RequestError::Numberless),
+        };
+    }
     let (first, second) = match likely_mapping(origin) {
         Mapping::Enhanced => (Mapping::Enhanced, Mapping::Cyclone),
         Mapping::Cyclone => (Mapping::Cyclone, Mapping::Enhanced),
     };
-    read_as(bytes, origin, first).or_else(|error| read_as(bytes, origin, second).map_err(|_| error))
+    let read = read_as(bytes, origin, first);
+    Ok(read.or_else(|error| read_as(bytes, origin, second).map_err(|_| error))?)
 }
 
 /// The body of a reply, and what the inline QoS has to say.
@@ -165,6 +188,20 @@ mod tests {
         let (_, to) = read_request::<SetBoolRequest>(&big, &origin(CYCLONE_VENDOR, None)).unwrap();
         let swapped = [7, 6, 5, 4, 3, 2, 1, 0, 15, 14, 13, 12, 11, 10, 9, 8];
         assert_eq!(to, ReplyTo::Cyclone(swapped));
+    }
+
+    #[test]
+    fn without_numbers_only_requests_that_carry_their_own_are_read() {
+        let bytes = [&[0, 1, 0, 0][..], &[3; 16], &[1]].concat();
+        let read = |vendor| {
+            let mut origin = origin(vendor, None);
+            origin.sample.number = 0;
+            read_request::<SetBoolRequest>(&bytes, &origin)
+        };
+        for vendor in [CYCLONE_VENDOR, RUSTDDS_VENDOR] {
+            assert_eq!(read(vendor).unwrap().1, ReplyTo::Cyclone([3; 16]));
+        }
+        assert!(read([0x01, 0x0f]).is_err());
     }
 
     #[test]

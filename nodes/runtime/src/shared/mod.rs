@@ -18,9 +18,12 @@ use smol::channel::Sender;
 
 use self::status::ReceiveBuffer;
 use super::clock::Clock;
+#[cfg(feature = "cyclone")]
+use super::cyclone::Cyclone;
 use super::dds::Dds;
 use super::diagnostics::Tasks;
 use super::endpoints::Endpoints;
+use super::env::{Network, TransportKind};
 use super::error::RuntimeError;
 use super::graph::{self, Graph, NodeId};
 use super::local_bus::LocalBus;
@@ -77,13 +80,13 @@ struct Open {
 }
 
 impl Shared {
-    pub(crate) fn start(domain: u16, localhost_only: bool) -> Result<Arc<Self>, RuntimeError> {
+    pub(crate) fn start(network: &Network) -> Result<Arc<Self>, RuntimeError> {
         let shutdown = Shutdown::default();
         let io = TaskThread::start("io", shutdown.clone())?;
         let publishing = TaskThread::start("publisher", shutdown.clone())?;
-        let dds = Dds::join(domain, localhost_only)?;
+        let transport = join(network)?;
         let endpoints = Arc::new(Endpoints::default());
-        let watch = io.spawn(Arc::clone(&endpoints).watch(dds.events()));
+        let watch = io.spawn(Arc::clone(&endpoints).watch(transport.events()));
         let shared = Arc::new(Self {
             bus: LocalBus::default(),
             shutdown,
@@ -98,7 +101,7 @@ impl Shared {
             writer_order: Mutex::default(),
             writers_made: AtomicU64::new(0),
             open: Mutex::new(Some(Open {
-                transport: Box::new(dds),
+                transport,
                 _watch: watch,
                 publishers: Vec::new(),
                 intakes: Vec::new(),
@@ -193,6 +196,13 @@ impl Shared {
         all.filter_map(Weak::upgrade).collect()
     }
 
+    /// True if readers must be closed while a writer of their topic is made.
+    fn pairs_own_endpoints(&self) -> bool {
+        let open = lock(&self.open);
+        open.as_ref()
+            .is_some_and(|open| open.transport.pairs_own_endpoints())
+    }
+
     /// A wait for discovery to know all writers made so far. `None` after shutdown.
     fn writers_known(&self) -> Option<BoxFuture<'static, ()>> {
         let open = lock(&self.open);
@@ -243,6 +253,18 @@ impl Shared {
         self.publishing.stop();
         drop(open.servers);
         drop(open.transport);
+    }
+}
+
+/// The participant of the process, over the transport that the environment names.
+fn join(network: &Network) -> Result<Box<dyn Transport>, RuntimeError> {
+    match network.transport {
+        #[cfg(feature = "cyclone")]
+        TransportKind::Cyclone => Ok(Box::new(Cyclone::join(network)?)),
+        _ => Ok(Box::new(Dds::join(
+            network.domain_id,
+            network.localhost_only,
+        )?)),
     }
 }
 

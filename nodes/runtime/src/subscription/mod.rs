@@ -49,7 +49,7 @@ pub(crate) enum Running {
 
 /// Counters of a subscription.
 pub(crate) struct Stats {
-    pub peers: Arc<Peers>,
+    peers: Arc<Peers>,
     received: AtomicU64,
     pub undecodable: AtomicU64,
     /// Messages that gave way to newer ones, or that a writer numbered and we never saw.

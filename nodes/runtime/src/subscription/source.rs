@@ -44,6 +44,7 @@ impl Source {
                     let gap = gaps.before(origin.sample);
                     self.stats.lost.fetch_add(gap, Relaxed);
                     if let Some(reader) = &reader {
+                        self.stats.lost.fetch_add(reader.missed(), Relaxed);
                         handler(Sample::Cdr(&mut reader.bytes()));
                     }
                 }

@@ -98,8 +98,12 @@ proptest! {
     fn a_map_is_what_its_rays_say_one_by_one(
         kind in any_kind(),
         scans in any_scans(),
-        (threshold, steps) in prop::sample::select(vec![(0.5, 0), (0.4, -13), (0.8, 44)]),
+        steps in prop::sample::select(
+            vec![-26, -25, -13, -12, 0, 1, 14, 15, 27, 28, 41, 42, 54, 55]
+        ),
     ) {
+        // A step from values that cells take.
+        let threshold = 1.0 / (1.0 + (-f64::from(steps) / 32.0).exp());
         let evidence = Evidence { threshold, ..Evidence::default() };
         let mut map = map(kind, FreeSpaceOptions { evidence, ..FreeSpaceOptions::default() });
         let mut reference = Reference::default();
@@ -287,13 +291,17 @@ fn the_limit_of_memory_holds_and_what_it_refuses_is_counted() {
 
 #[test]
 fn a_scan_from_nowhere_changes_nothing() {
-    let mut map = map(LatticeKind::Fcc, FreeSpaceOptions::default());
     let scan = cloud(vec![[1.0, 2.0, 3.0]; 7]);
-    let report = insert(&mut map, Vector3::new(f64::NAN, 0.0, 0.0), &scan);
-    assert_eq!((report.points, report.not_finite), (7, 7));
-    let report = insert(&mut map, Vector3::new(1e9, 0.0, 0.0), &scan);
-    assert_eq!((report.points, report.out_of_range), (7, 7));
-    assert!(contents(&map).iter().all(Vec::is_empty));
+    for kind in LatticeKind::ALL {
+        let mut map = map(kind, FreeSpaceOptions::default());
+        for x in [f64::NAN, f64::INFINITY, f64::NEG_INFINITY, 1e300, 1e6, -1e6] {
+            let report = insert(&mut map, Vector3::new(0.0, x, 0.0), &scan);
+            let not_finite = if x.is_finite() { 0 } else { 7 };
+            assert_eq!((report.points, report.not_finite), (7, not_finite));
+            assert_eq!(report.out_of_range, 7 - not_finite);
+        }
+        assert!(contents(&map).iter().all(Vec::is_empty));
+    }
 }
 
 #[test]

@@ -23,8 +23,9 @@ fn cloud(bytes: usize) -> Arc<PointCloud2> {
 #[test]
 fn small_messages_arrive_in_order() {
     let two = Two::start();
-    let publisher = two.publisher("chatter", Qos::DEFAULT);
-    let (subscription, heard) = two.hear("chatter", Qos::DEFAULT, Load::Small);
+    let qos = Qos::reliable(50);
+    let publisher = two.publisher("chatter", qos);
+    let (subscription, heard) = two.hear("chatter", qos, Load::Small);
     wait_for_subscriber!(publisher);
     count_to(50, &publisher);
     assert_counted(50, &heard);

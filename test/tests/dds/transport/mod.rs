@@ -14,7 +14,7 @@ use lattice_test::domain::TestDomain;
 /// Long enough for a loaded machine; a test that passes does not wait for it.
 const PATIENCE: Duration = Duration::from_secs(60);
 
-/// Two processes with a node each, as if on two machines.
+/// Two runtimes with a node each, as if on two machines.
 struct Two {
     a: Runtime,
     b: Runtime,

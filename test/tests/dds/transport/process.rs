@@ -113,8 +113,9 @@ fn the_log_of_the_process_is_on_rosout() {
 #[test]
 fn shutdown_stops_timers_sends_what_is_queued_and_leaves_at_once() {
     let two = Two::start();
-    let publisher = two.publisher("last", Qos::DEFAULT);
-    let (subscription, heard) = two.hear("last", Qos::DEFAULT, Load::Large);
+    let qos = Qos::reliable(20);
+    let publisher = two.publisher("last", qos);
+    let (subscription, heard) = two.hear("last", qos, Load::Large);
     wait_for_subscriber!(publisher);
     let (ticks, ticked) = channel();
     two.a.timer(Duration::from_millis(1), move || {

@@ -330,7 +330,7 @@ mod tests {
     #[test]
     fn all_checks_hold_and_would_not_for_another_metric() {
         let checks = checks(3);
-        let failing: Vec<_> = checks.iter().filter(|check| !check.holds).collect();
+        let failing: Vec<_> = checks.iter().filter(|check| !check.holds()).collect();
         assert!(failing.is_empty(), "{failing:?}");
         // d_SE(3) does change with the map's frame: what the left form is checked for can fail.
         let [near, far] = [0.0, 20.0].map(|m| range(map_at(m), |e| e.pose.d_se3)[0]);

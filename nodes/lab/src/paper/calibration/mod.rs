@@ -103,11 +103,11 @@ fn evaluated(
     };
     let (settings, trials) = Results::read(folder)?;
     if settings.mesh_crc32 != mesh_crc32 {
+        let article = settings.mesh_crc32.map_or("", |_| "a ");
         let mesh = settings.mesh_name();
         let words = "give the same --mesh and --classes, if any";
-        return Err(at(folder)(format!(
-            "these trials are of another house, {mesh}; {words}"
-        )));
+        let words = format!("these trials are of {article}{mesh}; {words}");
+        return Err(at(folder)(words));
     }
     Ok((settings, Some(trials)))
 }
@@ -155,6 +155,28 @@ mod tests {
     }
 
     #[test]
+    fn sections_do_not_depend_on_threads() {
+        let options = Options {
+            mesh: None,
+            ..options(None)
+        };
+        let on = |threads: usize| {
+            let all = || {
+                let (house, mesh_crc32) = read_house(None, options.seed).unwrap();
+                let (settings, _) = evaluated(&options, mesh_crc32).unwrap();
+                let context = context(&options, house, &settings).unwrap();
+                let mut sections = equations::sections(&context, &mut |_| {}).unwrap();
+                sections.push(metric::section(&context).unwrap());
+                sections.extend(label_maps::sections(&context, &mut |_| {}).unwrap());
+                // With the pictures, which JSON leaves out.
+                format!("{sections:?}")
+            };
+            crate::pool(threads).unwrap().install(all)
+        };
+        assert!(on(1) == on(3));
+    }
+
+    #[test]
     fn trials_of_another_house_are_refused() {
         let folder = tempfile::tempdir().unwrap();
         let settings = Settings {
@@ -166,6 +188,7 @@ mod tests {
         let (found, trials) = evaluated(&options, Some(7)).unwrap();
         assert_eq!((found, trials), (settings, Some(Vec::new())));
         let fault = evaluated(&options, None).unwrap_err().to_string();
-        assert!(fault.contains("CRC-32 00000007"), "{fault}");
+        let words = "these trials are of a mesh with CRC-32 00000007; give";
+        assert!(fault.contains(words), "{fault}");
     }
 }

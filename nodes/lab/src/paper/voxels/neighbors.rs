@@ -35,16 +35,16 @@ pub fn section(_: &Options, _: &mut dyn FnMut(f64)) -> Result<Section, AnyError>
         let again: BTreeSet<_> = again.touching_neighbors().iter().copied().collect();
         let found = lattice.face_neighbors().len();
         let missing: Vec<_> = touch.difference(&printed).copied().collect();
-        for (what, expected, found) in [
-            ("cells that share a face", faces, found),
-            ("cells that touch", touching, touch.len()),
-            (UNSHARED, 0, touch.symmetric_difference(&again).count()),
-            (FOREIGN, 0, printed.difference(&touch).count()),
-            (MISSING, touching - columns, missing.len()),
+        let (of_paper, unshared) = (Some(columns as f64), touch.symmetric_difference(&again));
+        for (what, expected, found, printed) in [
+            ("cells that share a face", faces, found, None),
+            ("cells that touch", touching, touch.len(), of_paper),
+            (UNSHARED, 0, unshared.count(), None),
+            (FOREIGN, 0, printed.difference(&touch).count(), None),
+            (MISSING, touching - columns, missing.len(), None),
         ] {
-            let of_paper = (what == "cells that touch").then_some(columns as f64);
             let check = Check::count(format!("{name}: {what}"), expected, found);
-            checks.push(check.with_printed(of_paper));
+            checks.push(check.with_printed(printed));
         }
         rows.push(vec![
             name.into(),

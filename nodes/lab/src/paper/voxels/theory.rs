@@ -88,12 +88,8 @@ pub fn section(options: &Options, progress: &mut dyn FnMut(f64)) -> Result<Secti
         let found = found.chain([rms, covering, packing, width, surface]);
         for (what, (expected, found)) in WHAT.into_iter().zip(both.chain(others).zip(found)) {
             let tolerance = TOLERANCE * expected;
-            checks.push(Check::new(
-                format!("{name}: {what}"),
-                expected,
-                found,
-                tolerance,
-            ));
+            let what = format!("{name}: {what}");
+            checks.push(Check::new(what, expected, found, tolerance));
         }
         let what = format!("{name}: no random point beyond the farthest corner");
         checks.push(Check::that(what, largest <= covering * (1.0 + 1e-12)));

@@ -236,7 +236,7 @@ fn our_own_house_has_rooms_and_all_four_scenes() {
     let outside = |[x, y]: &[f64; 2]| *x > 15.6 && *y > 11.0;
     assert!(!house.free.cells_m.iter().any(outside));
     for scene in Scene::ALL {
-        for seed in 0..2 {
+        for seed in 0..4 {
             let trial = HeadsetTrial::new(&house, scene, 1, seed).unwrap();
             let headset_scan = &trial.headset_scans[0];
             let object = house.class(scene.object());

@@ -126,12 +126,10 @@ impl Lines {
                 offset,
                 column,
             };
-            for (axis, _) in axes
-                .iter_mut()
-                .zip(["x", "y", "z"])
-                .filter(|(_, axis)| *axis == name.as_str())
-            {
-                *axis = Some(place(coordinate(name, kind, size, count)?));
+            for (axis, letter) in axes.iter_mut().zip(["x", "y", "z"]) {
+                if name == letter {
+                    *axis = Some(place(coordinate(name, kind, size, count)?));
+                }
             }
             if let ("label", Some(scalar), 1) = (name.as_str(), number_kind(kind, size), count) {
                 label = Some(place(scalar));

@@ -64,16 +64,14 @@ impl Bounds {
     /// About points, with the horizontal direction of sight.
     fn about(forward: Vector3<f64>, points_m: &[Point3<f64>]) -> Bounds {
         let left = Vector3::z().cross(&forward);
-        let mut bounds = Bounds {
-            axes: [forward, left, Vector3::z()],
-            low_m: [f64::INFINITY; 3],
-            high_m: [f64::NEG_INFINITY; 3],
-        };
-        for (i, axis) in bounds.axes.into_iter().enumerate() {
-            let along = points_m.iter().map(|point| axis.dot(&point.coords));
-            [bounds.low_m[i], bounds.high_m[i]] = extent(along);
+        let axes = [forward, left, Vector3::z()];
+        let ends = axes.map(|axis| extent(points_m.iter().map(|p| axis.dot(&p.coords))));
+        let [low_m, high_m] = [0, 1].map(|end| ends.map(|ends| ends[end]));
+        Bounds {
+            axes,
+            low_m,
+            high_m,
         }
-        bounds
     }
 
     fn holds(&self, point: &Point3<f64>) -> bool {

@@ -165,7 +165,7 @@ mod tests {
     fn checks_fail_for_a_change_of_sign() {
         let holding = |percent| {
             let checks = checks(&group(percent, 1.0));
-            checks.iter().filter(|check| check.holds).count()
+            checks.iter().filter(|check| check.holds()).count()
         };
         assert_eq!(holding([0.0, -3.0, -2.0, -1.0, -1.0, -1.0]), 10);
         assert_eq!(holding([0.0, 1.0, -2.0, 3.0, -1.0, 1.0]), 3);

@@ -20,7 +20,7 @@ const OFFSET_M: f64 = 10.0;
 const SCENE: usize = 1 << 32;
 
 /// Outcome of an alignment.
-#[derive(Clone, Copy, PartialEq, Debug, Default)]
+#[derive(Clone, Copy, PartialEq, Debug)]
 pub(super) struct Outcome {
     /// Distance from the true position of the scanner, metres.
     pub(super) error_m: f64,
@@ -95,7 +95,11 @@ fn trial(
     };
     let map = cloud(offset_m, pair.map);
     let scan = cloud(Vector3::zeros(), pair.scan);
-    let mut outcomes = [Outcome::default(); 6];
+    let unknown = Outcome {
+        error_m: f64::NAN,
+        evaluations: 0,
+    };
+    let mut outcomes = [unknown; 6];
     for (kind, outcome) in LatticeKind::ALL.into_iter().zip(&mut outcomes) {
         let lattice = Lattice::new(kind, scene.side_m.powi(3))?.oriented(yaw);
         let mut list = MultiResolutionList::new(&lattice, offset_m, LEVELS, MAX_BYTES)?;

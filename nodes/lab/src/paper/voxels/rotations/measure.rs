@@ -194,6 +194,21 @@ mod tests {
     }
 
     #[test]
+    fn counts_and_errors_do_not_depend_on_threads() {
+        let points: Vec<[f32; 3]> = (0..500)
+            .map(|i| [0.37, 0.11, 0.05].map(|s| s * i as f32))
+            .collect();
+        let laid = LatticeKind::ALL.map(Laid::paper);
+        let on = |threads: usize| {
+            let go = || measure(&points, 0.125, &laid, (Turns::Any, 20, 1), &mut |_| {});
+            let measured = crate::pool(threads).unwrap().install(go).unwrap();
+            let numbers = measured.into_iter().map(|m| (m.counts, m.means_m));
+            numbers.collect::<Vec<_>>()
+        };
+        assert_eq!(on(1), on(3));
+    }
+
+    #[test]
     fn yaw_leaves_the_vertical_where_it_is() {
         for number in 0..20 {
             let up = Turns::Yaw.pose(1, number) * Vector3::z();

@@ -26,6 +26,7 @@ type Wall = (Spot, f32, f32, Vec<Opening>);
 /// The walls that `walls.txt` lists.
 fn walls() -> Result<Vec<Wall>, AnyError> {
     let mut walls: Vec<Wall> = Vec::new();
+    let spot = |x, y, yaw_deg| Spot { x, y, yaw_deg };
     for line in lines(include_str!("walls.txt")) {
         let (line, words, n) = line?;
         let opening = match (words.as_slice(), n.as_slice()) {
@@ -33,29 +34,11 @@ fn walls() -> Result<Vec<Wall>, AnyError> {
             (["door"], &[from, to]) => Door(from, to, None),
             (["door"], &[from, to, open_deg]) => Door(from, to, Some(open_deg)),
             (["along_x"], &[y, from, to]) => {
-                walls.push((
-                    Spot {
-                        x: from,
-                        y,
-                        yaw_deg: 0.0,
-                    },
-                    from,
-                    to,
-                    Vec::new(),
-                ));
+                walls.push((spot(from, y, 0.0), from, to, Vec::new()));
                 continue;
             }
             (["along_y"], &[x, from, to]) => {
-                walls.push((
-                    Spot {
-                        x,
-                        y: from,
-                        yaw_deg: 90.0,
-                    },
-                    from,
-                    to,
-                    Vec::new(),
-                ));
+                walls.push((spot(x, from, 90.0), from, to, Vec::new()));
                 continue;
             }
             _ => return Err(format!("walls.txt: {line}").into()),

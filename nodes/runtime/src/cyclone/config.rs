@@ -1,0 +1,66 @@
+//! Configuration of Cyclone from the settings of ROS, with what `CYCLONEDDS_URI` adds.
+
+use crate::env::Network;
+
+/// Participants that are looked for on a machine where multicast does not reach them. RustDDS and others
+/// look for fewer, but answer whoever finds them.
+const MAX_PARTICIPANTS: u32 = 120;
+
+/// Asked of every socket; the kernel may grant less.
+const RECEIVE_BUFFER: &str = "32MiB";
+
+/// Between two announcements of the participant: who was stopped for longer than its lease is known
+/// again so soon.
+const ANNOUNCEMENT_PERIOD: &str = "2s";
+
+/// The text for `dds_create_domain`: fragments separated by commas, of which the later ones win.
+pub(super) fn config(network: &Network, cyclonedds_uri: Option<&str>) -> String {
+    let (general, mut peers) = match network.localhost_only {
+        true => (
+            "<General><Interfaces><NetworkInterface address=\"127.0.0.1\" multicast=\"false\"/>\
+             </Interfaces><AllowMulticast>false</AllowMulticast></General>",
+            vec!["127.0.0.1"],
+        ),
+        false => ("", Vec::new()),
+    };
+    peers.extend(network.static_peers.iter().map(String::as_str));
+    let peers: String = peers
+        .iter()
+        .map(|peer| format!("<Peer Address=\"{peer}\"/>"))
+        .collect();
+    let ours = format!(
+        "<CycloneDDS><Domain id=\"any\">{general}<Discovery>\
+         <ParticipantIndex>auto</ParticipantIndex>\
+         <MaxAutoParticipantIndex>{}</MaxAutoParticipantIndex>\
+         <SPDPInterval>{ANNOUNCEMENT_PERIOD}</SPDPInterval><Peers>{peers}</Peers></Discovery>\
+         <Internal><SocketReceiveBufferSize max=\"{RECEIVE_BUFFER}\"/></Internal>\
+         </Domain></CycloneDDS>",
+        MAX_PARTICIPANTS - 1
+    );
+    match cyclonedds_uri.filter(|uri| !uri.is_empty()) {
+        Some(uri) => format!("{ours},{uri}"),
+        None => ours,
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::env::TransportKind;
+
+    #[test]
+    fn the_environment_decides_on_interfaces_and_peers() {
+        let network = |localhost_only, static_peers: &[&str]| Network {
+            domain_id: 0,
+            localhost_only,
+            static_peers: static_peers.iter().map(ToString::to_string).collect(),
+            transport: TransportKind::Cyclone,
+            warnings: vec![],
+        };
+        let local = config(&network(true, &[]), None);
+        assert!(local.contains("address=\"127.0.0.1\"") && local.contains("Address=\"127.0.0.1\""));
+        let subnet = config(&network(false, &["10.0.0.7"]), Some("file:///robot.xml"));
+        assert!(!subnet.contains("127.0.0.1") && subnet.contains("Address=\"10.0.0.7\""));
+        assert!(subnet.ends_with("</CycloneDDS>,file:///robot.xml"));
+    }
+}

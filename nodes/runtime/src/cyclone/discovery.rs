@@ -1,0 +1,245 @@
+//! Endpoints of other participants that do not go with ours, which Cyclone passes over in silence where
+//! the types differ.
+
+use std::ffi::{CStr, c_char, c_void};
+use std::mem::MaybeUninit;
+use std::ptr;
+use std::sync::{Arc, Mutex, Weak};
+
+use cyclors::{
+    DDS_ALIVE_INSTANCE_STATE, DDS_ANY_STATE, DDS_BUILTIN_TOPIC_DCPSPUBLICATION,
+    DDS_BUILTIN_TOPIC_DCPSSUBSCRIPTION, dds_builtintopic_endpoint_t, dds_create_listener,
+    dds_create_reader, dds_delete_listener, dds_entity_t, dds_lset_data_available_arg,
+    dds_return_loan, dds_sample_info_t, dds_take_mask,
+};
+use smol::channel::Sender;
+
+use super::endpoint::{Description, Endpoint, Side};
+use super::entity::{Entity, endpoint_id};
+use super::qos::announced;
+use crate::port::{EndpointId, PortEvent};
+use crate::qos::{Durability, Reliability};
+use crate::sync::lock;
+
+/// Endpoints taken at a time.
+const BATCH: usize = 64;
+
+/// Our endpoints, and the readers of Cyclone's built-in topics that compare others with them.
+pub(super) struct Discovery {
+    // Deleted before what their listeners point to.
+    readers: Mutex<Vec<Entity>>,
+    participant: EndpointId,
+    ours: Mutex<Vec<Weak<Endpoint>>>,
+    events: Sender<PortEvent>,
+}
+
+/// An endpoint of another participant.
+struct Other<'a> {
+    id: EndpointId,
+    name: &'a CStr,
+    type_name: &'a CStr,
+    qos: Option<(Reliability, Durability)>,
+}
+
+impl Discovery {
+    pub(super) fn start(
+        participant: &Entity,
+        events: Sender<PortEvent>,
+    ) -> Result<Arc<Self>, String> {
+        let this = Arc::new(Self {
+            readers: Mutex::default(),
+            participant: participant.id()?,
+            ours: Mutex::default(),
+            events,
+        });
+        for (topic, listener) in [
+            (DDS_BUILTIN_TOPIC_DCPSPUBLICATION, on_writers as Listener),
+            (DDS_BUILTIN_TOPIC_DCPSSUBSCRIPTION, on_readers),
+        ] {
+            let arg = Arc::as_ptr(&this).cast_mut().cast::<c_void>();
+            // SAFETY: handles; the listener is made, copied and deleted here; `this` outlives the
+            // readers, which it owns.
+            let made = unsafe {
+                let heard = dds_create_listener(ptr::null_mut());
+                let _ = dds_lset_data_available_arg(heard, Some(listener), arg, true);
+                let made = dds_create_reader(participant.handle(), topic, ptr::null(), heard);
+                dds_delete_listener(heard);
+                made
+            };
+            lock(&this.readers).push(Entity::new(made)?);
+        }
+        Ok(this)
+    }
+
+    /// Compares an endpoint of ours with those that are there, and with those to come.
+    pub(super) fn announce(&self, participant: &Entity, ours: &Arc<Endpoint>) {
+        let mut all = lock(&self.ours);
+        all.retain(|ours| ours.strong_count() > 0);
+        all.push(Arc::downgrade(ours));
+        drop(all);
+        let (topic, side) = match ours.description.side {
+            Side::Writer => (DDS_BUILTIN_TOPIC_DCPSSUBSCRIPTION, Side::Reader),
+            Side::Reader => (DDS_BUILTIN_TOPIC_DCPSPUBLICATION, Side::Writer),
+        };
+        // SAFETY: handles; a new reader of a built-in topic finds all that are known.
+        let made =
+            unsafe { dds_create_reader(participant.handle(), topic, ptr::null(), ptr::null()) };
+        if let Ok(reader) = Entity::new(made) {
+            self.take(reader.handle(), &mut |other| {
+                self.compare(ours, side, other)
+            });
+        }
+    }
+
+    fn heard(&self, reader: dds_entity_t, side: Side) {
+        self.take(reader, &mut |other| {
+            let all: Vec<_> = lock(&self.ours).iter().filter_map(Weak::upgrade).collect();
+            all.iter().for_each(|ours| self.compare(ours, side, other));
+        });
+    }
+
+    fn compare(&self, ours: &Endpoint, side: Side, other: &Other<'_>) {
+        let description = &ours.description;
+        let name = description.dds_name.as_bytes();
+        if description.side == side || other.name.to_bytes() != name {
+            return;
+        }
+        if let Some(policy) = conflict(description, other) {
+            let (endpoint, peer) = (ours.id(), other.id);
+            let event = PortEvent::Incompatible {
+                endpoint,
+                peer,
+                policy,
+            };
+            let _ = self.events.try_send(event);
+        }
+    }
+
+    /// Gives all new endpoints of other participants to `each`; those that have gone become events.
+    fn take(&self, reader: dds_entity_t, each: &mut dyn FnMut(&Other<'_>)) {
+        loop {
+            let mut found = [ptr::null_mut::<c_void>(); BATCH];
+            let mut infos = [MaybeUninit::<dds_sample_info_t>::uninit(); BATCH];
+            // SAFETY: room for a batch; the first place is null, so that samples are lent.
+            let count = unsafe {
+                let infos = infos.as_mut_ptr().cast();
+                let most = BATCH as u32;
+                dds_take_mask(
+                    reader,
+                    found.as_mut_ptr(),
+                    infos,
+                    BATCH,
+                    most,
+                    DDS_ANY_STATE,
+                )
+            };
+            let taken = usize::try_from(count).unwrap_or(0).min(BATCH);
+            for (sample, info) in found.iter().zip(&infos).take(taken) {
+                // SAFETY: so many were given; they are ours until they are given back below.
+                unsafe {
+                    let endpoint = sample.cast::<dds_builtintopic_endpoint_t>().as_ref();
+                    let alive = info.assume_init_ref().instance_state == DDS_ALIVE_INSTANCE_STATE;
+                    if let Some(endpoint) = endpoint {
+                        self.sort(endpoint, alive, each);
+                    }
+                }
+            }
+            if taken == 0 {
+                return;
+            }
+            // SAFETY: gives back what was lent by the call above.
+            let _ = unsafe { dds_return_loan(reader, found.as_mut_ptr(), count) };
+        }
+    }
+
+    /// # Safety
+    ///
+    /// The endpoint is one that Cyclone has lent.
+    unsafe fn sort(
+        &self,
+        endpoint: &dds_builtintopic_endpoint_t,
+        alive: bool,
+        each: &mut dyn FnMut(&Other<'_>),
+    ) {
+        let id = endpoint_id(endpoint.key);
+        if id.is_beside(&self.participant) {
+            return;
+        }
+        if !alive {
+            let _ = self.events.try_send(PortEvent::Lost { peer: id });
+            return;
+        }
+        // SAFETY: strings and QoS are null or live as long as the endpoint.
+        let (name, type_name, qos) = unsafe {
+            let (name, type_name) = (text(endpoint.topic_name), text(endpoint.type_name));
+            (name, type_name, announced(endpoint.qos))
+        };
+        each(&Other {
+            id,
+            name,
+            type_name,
+            qos,
+        });
+    }
+}
+
+impl Drop for Discovery {
+    fn drop(&mut self) {
+        // Their listeners use the rest.
+        lock(&self.readers).clear();
+    }
+}
+
+/// First thing in which two endpoints of one topic do not go together, in words for the operator.
+fn conflict(ours: &Description, other: &Other<'_>) -> Option<&'static str> {
+    if other.type_name.to_bytes() != ours.dds_type.as_bytes() {
+        return Some("type (the publisher and the subscription have different ones)");
+    }
+    let our_qos = (ours.qos.reliability, ours.qos.durability);
+    let (offered, requested) = match ours.side {
+        Side::Writer => (our_qos, other.qos?),
+        Side::Reader => (other.qos?, our_qos),
+    };
+    if requested.0 == Reliability::Reliable && offered.0 == Reliability::BestEffort {
+        Some("reliability (the subscription asks for reliable, the publisher offers best_effort)")
+    } else if requested.1 == Durability::TransientLocal && offered.1 == Durability::Volatile {
+        Some(
+            "durability (the subscription asks for transient_local, the publisher offers volatile)",
+        )
+    } else {
+        None
+    }
+}
+
+/// # Safety
+///
+/// Null, or a string that ends with 0 and lives for `'a`.
+unsafe fn text<'a>(text: *const c_char) -> &'a CStr {
+    match text.is_null() {
+        true => c"",
+        // SAFETY: see above.
+        false => unsafe { CStr::from_ptr(text) },
+    }
+}
+
+type Listener = unsafe extern "C" fn(dds_entity_t, *mut c_void);
+
+/// # Safety
+///
+/// `this` points to the [`Discovery`] that the listener was made with.
+unsafe extern "C" fn on_writers(reader: dds_entity_t, this: *mut c_void) {
+    // SAFETY: see above.
+    if let Some(discovery) = unsafe { this.cast::<Discovery>().as_ref() } {
+        discovery.heard(reader, Side::Writer);
+    }
+}
+
+/// # Safety
+///
+/// As of [`on_writers`].
+unsafe extern "C" fn on_readers(reader: dds_entity_t, this: *mut c_void) {
+    // SAFETY: see above.
+    if let Some(discovery) = unsafe { this.cast::<Discovery>().as_ref() } {
+        discovery.heard(reader, Side::Reader);
+    }
+}

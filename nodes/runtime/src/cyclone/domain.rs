@@ -1,0 +1,64 @@
+//! Domains of the process: Cyclone has one of each number, with one configuration.
+
+use std::collections::BTreeMap;
+use std::ffi::CString;
+use std::sync::Mutex;
+
+use cyclors::dds_create_domain;
+
+use super::config::config;
+use super::entity::Entity;
+use crate::env::Network;
+use crate::sync::lock;
+
+static DOMAINS: Mutex<BTreeMap<u16, Shared>> = Mutex::new(BTreeMap::new());
+
+struct Shared {
+    users: usize,
+    _domain: Entity,
+}
+
+/// A share in a domain; the last one ends it.
+#[derive(Debug)]
+pub(super) struct Domain(u16);
+
+impl Domain {
+    /// Takes part in the domain of the network. The settings of who comes first hold for all.
+    pub(super) fn join(network: &Network) -> Result<Self, String> {
+        let id = network.domain_id;
+        let mut domains = lock(&DOMAINS);
+        if let Some(shared) = domains.get_mut(&id) {
+            shared.users += 1;
+            return Ok(Self(id));
+        }
+        let uri = std::env::var("CYCLONEDDS_URI").ok();
+        let config = CString::new(config(network, uri.as_deref()));
+        let config = config.map_err(|_| "CYCLONEDDS_URI has a zero byte".to_owned())?;
+        // SAFETY: a string that ends with 0 and is read during the call.
+        let made = unsafe { dds_create_domain(u32::from(id), config.as_ptr()) };
+        let shared = Shared {
+            users: 1,
+            _domain: Entity::new(made)?,
+        };
+        let _ = domains.insert(id, shared);
+        Ok(Self(id))
+    }
+
+    pub(super) fn id(&self) -> u32 {
+        u32::from(self.0)
+    }
+}
+
+impl Drop for Domain {
+    fn drop(&mut self) {
+        // Ended under the lock: Cyclone refuses a domain that another thread is still ending.
+        let mut domains = lock(&DOMAINS);
+        let Some(shared) = domains.get_mut(&self.0) else {
+            return;
+        };
+        shared.users -= 1;
+        if shared.users == 0 {
+            let _ = domains.remove(&self.0);
+        }
+    }
+}

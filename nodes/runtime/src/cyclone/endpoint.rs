@@ -1,0 +1,219 @@
+//! An endpoint of ours: its description, and its peers as Cyclone's listeners tell of them.
+
+use std::collections::BTreeMap;
+use std::ffi::c_void;
+use std::ptr;
+use std::sync::{Arc, Mutex};
+
+use cyclors::{
+    dds_builtintopic_endpoint_t, dds_builtintopic_free_endpoint, dds_create_listener,
+    dds_delete_listener, dds_entity_t, dds_get_matched_publication_data,
+    dds_get_matched_publications, dds_get_matched_subscription_data, dds_get_matched_subscriptions,
+    dds_instance_handle_t, dds_lset_data_available_arg, dds_lset_publication_matched_arg,
+    dds_lset_subscription_matched_arg, dds_publication_matched_status_t, dds_set_listener,
+    dds_subscription_matched_status_t,
+};
+use smol::channel::Sender;
+
+use super::arrivals::Arrivals;
+use super::entity::{Entity, check, endpoint_id};
+use crate::port::{EndpointId, PortEvent};
+use crate::qos::Qos;
+use crate::sync::lock;
+
+/// Peers that were there before the listener was, at most.
+const MAX_FIRST_PEERS: usize = 4096;
+
+/// Side of a topic.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub(super) enum Side {
+    Writer,
+    Reader,
+}
+
+/// Description of an endpoint as it is announced.
+#[derive(Clone, Debug)]
+pub(super) struct Description {
+    pub side: Side,
+    pub dds_name: String,
+    pub dds_type: String,
+    pub qos: Qos,
+}
+
+/// A reader or writer of ours. Listeners point to it: it outlives the entity that they are of.
+pub(super) struct Endpoint {
+    id: EndpointId,
+    pub description: Description,
+    events: Sender<PortEvent>,
+    /// By the handles that Cyclone gives them.
+    peers: Mutex<BTreeMap<dds_instance_handle_t, EndpointId>>,
+    arrivals: Arrivals,
+}
+
+/// Function of Cyclone that describes a matched peer.
+type Describe =
+    unsafe extern "C" fn(dds_entity_t, dds_instance_handle_t) -> *mut dds_builtintopic_endpoint_t;
+
+const READERS: Describe = dds_get_matched_subscription_data;
+const WRITERS: Describe = dds_get_matched_publication_data;
+
+/// Function of Cyclone that lists matched peers.
+type List = unsafe extern "C" fn(dds_entity_t, *mut dds_instance_handle_t, usize) -> i32;
+
+impl Endpoint {
+    /// Hears of the entity's peers, and of samples, from now on, and of the peers that are there.
+    pub(super) fn watch(
+        entity: &Entity,
+        description: Description,
+        events: Sender<PortEvent>,
+    ) -> Result<Arc<Self>, String> {
+        let side = description.side;
+        let this = Arc::new(Self {
+            id: entity.id()?,
+            arrivals: Arrivals::new(description.qos.depth),
+            description,
+            events,
+            peers: Mutex::default(),
+        });
+        this.listen(entity)?;
+        let (list, describe) = match side {
+            Side::Writer => (dds_get_matched_subscriptions as List, READERS),
+            Side::Reader => (dds_get_matched_publications as List, WRITERS),
+        };
+        this.add_first(entity, list, describe);
+        if side == Side::Reader {
+            this.arrivals.take_from(entity.handle());
+        }
+        Ok(this)
+    }
+
+    pub(super) fn id(&self) -> EndpointId {
+        self.id
+    }
+
+    /// Samples that have come, of a reader.
+    pub(super) fn arrivals(&self) -> &Arrivals {
+        &self.arrivals
+    }
+
+    /// GUID of the writer of a sample; zeros if it has gone.
+    pub(super) fn writer(&self, reader: &Entity, handle: dds_instance_handle_t) -> EndpointId {
+        if let Some(known) = lock(&self.peers).get(&handle) {
+            return *known;
+        }
+        let found = guid(reader.handle(), handle, WRITERS);
+        found.unwrap_or(EndpointId([0; 16]))
+    }
+
+    fn listen(self: &Arc<Self>, entity: &Entity) -> Result<(), String> {
+        let this = Arc::as_ptr(self).cast_mut().cast::<c_void>();
+        // SAFETY: the listener is made, copied into the entity and deleted here; `self` outlives the
+        // entity, whose owner holds it.
+        let code = unsafe {
+            let listener = dds_create_listener(ptr::null_mut());
+            let _ = match self.description.side {
+                Side::Writer => {
+                    dds_lset_publication_matched_arg(listener, Some(on_reader), this, true)
+                }
+                Side::Reader => {
+                    let _ = dds_lset_data_available_arg(listener, Some(on_data), this, true);
+                    dds_lset_subscription_matched_arg(listener, Some(on_writer), this, true)
+                }
+            };
+            let code = dds_set_listener(entity.handle(), listener);
+            dds_delete_listener(listener);
+            code
+        };
+        check(code).map(drop)
+    }
+
+    fn add_first(&self, entity: &Entity, list: List, describe: Describe) {
+        let mut handles = [0; MAX_FIRST_PEERS];
+        // SAFETY: room for as many handles as it says.
+        let found = unsafe { list(entity.handle(), handles.as_mut_ptr(), handles.len()) };
+        let found = usize::try_from(found).unwrap_or(0);
+        for handle in handles.iter().take(found) {
+            self.matched(entity.handle(), *handle, 1, describe);
+        }
+    }
+
+    fn matched(
+        &self,
+        entity: dds_entity_t,
+        handle: dds_instance_handle_t,
+        change: i32,
+        describe: Describe,
+    ) {
+        let event = if change < 0 {
+            let gone = lock(&self.peers).remove(&handle);
+            gone.map(|peer| PortEvent::Lost { peer })
+        } else {
+            guid(entity, handle, describe).map(|peer| {
+                let _ = lock(&self.peers).insert(handle, peer);
+                let endpoint = self.id;
+                PortEvent::Matched { endpoint, peer }
+            })
+        };
+        if let Some(event) = event {
+            // Nobody listens after the end.
+            let _ = self.events.try_send(event);
+        }
+    }
+}
+
+/// GUID of a matched peer; none if it has gone.
+fn guid(
+    entity: dds_entity_t,
+    handle: dds_instance_handle_t,
+    describe: Describe,
+) -> Option<EndpointId> {
+    // SAFETY: handles; what is given is ours until we free it, once.
+    unsafe {
+        let found = describe(entity, handle);
+        let id = found.as_ref().map(|found| endpoint_id(found.key));
+        if !found.is_null() {
+            dds_builtintopic_free_endpoint(found);
+        }
+        id
+    }
+}
+
+/// # Safety
+///
+/// `this` points to the [`Endpoint`] that the listener was made with.
+unsafe extern "C" fn on_reader(
+    writer: dds_entity_t,
+    status: dds_publication_matched_status_t,
+    this: *mut c_void,
+) {
+    // SAFETY: see above.
+    if let Some(endpoint) = unsafe { this.cast::<Endpoint>().as_ref() } {
+        let (handle, change) = (status.last_subscription_handle, status.current_count_change);
+        endpoint.matched(writer, handle, change, READERS);
+    }
+}
+
+/// # Safety
+///
+/// As of [`on_reader`].
+unsafe extern "C" fn on_writer(
+    reader: dds_entity_t,
+    status: dds_subscription_matched_status_t,
+    this: *mut c_void,
+) {
+    // SAFETY: see above.
+    if let Some(endpoint) = unsafe { this.cast::<Endpoint>().as_ref() } {
+        let (handle, change) = (status.last_publication_handle, status.current_count_change);
+        endpoint.matched(reader, handle, change, WRITERS);
+    }
+}
+
+/// # Safety
+///
+/// As of [`on_reader`].
+unsafe extern "C" fn on_data(reader: dds_entity_t, this: *mut c_void) {
+    // SAFETY: see above.
+    if let Some(endpoint) = unsafe { this.cast::<Endpoint>().as_ref() } {
+        endpoint.arrivals.take_from(reader);
+    }
+}

@@ -1,0 +1,18 @@
+//! The transport over Eclipse Cyclone DDS, whose C interface is the crate `cyclors`. All unsafe code of
+//! the project is here.
+//!
+//! Endpoints are of "blob" topics: any type name, samples as serialised bytes.
+
+mod arrivals;
+mod config;
+mod discovery;
+mod domain;
+mod endpoint;
+mod entity;
+mod participant;
+mod qos;
+mod reader;
+mod sample;
+mod writer;
+
+pub(crate) use participant::Cyclone;

@@ -1,0 +1,147 @@
+//! The participant of the process, and the endpoints made in it.
+
+use std::ffi::CString;
+use std::ptr;
+use std::sync::Arc;
+
+use cyclors::{cdds_create_blob_topic, dds_create_participant};
+use futures::StreamExt;
+use futures::future::BoxFuture;
+use futures::stream::BoxStream;
+use lattice_msgs::dds_type_name;
+use smol::channel::{Receiver, Sender, unbounded};
+
+use super::discovery::Discovery;
+use super::domain::Domain;
+use super::endpoint::{Description, Side};
+use super::entity::Entity;
+use super::qos::NativeQos;
+use super::reader::CycloneReader;
+use super::writer::CycloneWriter;
+use crate::env::Network;
+use crate::error::RuntimeError;
+use crate::port::{EndpointId, PortEvent, PortTopic, SampleReader, SampleWriter, Transport};
+use crate::qos::Qos;
+
+/// The Cyclone participant of a process.
+pub(crate) struct Cyclone {
+    // In this order: Cyclone's entities end from the inside out.
+    discovery: Arc<Discovery>,
+    participant: Entity,
+    _domain: Domain,
+    id: EndpointId,
+    sender: Sender<PortEvent>,
+    events: Receiver<PortEvent>,
+}
+
+impl Cyclone {
+    /// Joins the domain of the network.
+    pub(crate) fn join(network: &Network) -> Result<Self, RuntimeError> {
+        Self::try_join(network).map_err(|reason| RuntimeError::Participant {
+            domain: network.domain_id,
+            reason,
+        })
+    }
+
+    fn try_join(network: &Network) -> Result<Self, String> {
+        let domain = Domain::join(network)?;
+        let qos = NativeQos::of_participant("enclave=/;", &[]);
+        // SAFETY: a number, and a QoS that is alive and copied; no listener.
+        let made = unsafe { dds_create_participant(domain.id(), qos.as_ptr(), ptr::null()) };
+        let participant = Entity::new(made)?;
+        let (sender, events) = unbounded();
+        Ok(Self {
+            discovery: Discovery::start(&participant, sender.clone())?,
+            id: participant.id()?,
+            participant,
+            _domain: domain,
+            sender,
+            events,
+        })
+    }
+
+    fn topic(&self, name: &str, dds_type: &str) -> Result<Entity, String> {
+        let text = |text: &str| CString::new(text).map_err(|_| "a name has a zero byte".to_owned());
+        let (name, dds_type) = (text(name)?, text(dds_type)?);
+        // SAFETY: strings that end with 0 and are copied.
+        let made = unsafe {
+            let (name, dds_type) = (name.as_ptr().cast_mut(), dds_type.as_ptr().cast_mut());
+            cdds_create_blob_topic(self.participant.handle(), name, dds_type, true)
+        };
+        Entity::new(made)
+    }
+
+    /// Topic, QoS and description of an endpoint to be made.
+    fn prepare(
+        &self,
+        of: PortTopic<'_>,
+        qos: &Qos,
+        side: Side,
+    ) -> Result<(Entity, NativeQos, Description), RuntimeError> {
+        let dds_type = dds_type_name(of.ros_type).ok_or_else(|| RuntimeError::TypeName {
+            topic: of.name.to_owned(),
+            type_name: of.ros_type.to_owned(),
+        })?;
+        let topic = self.topic(of.dds_name, &dds_type);
+        let topic = topic.map_err(|reason| failed(of, side, reason))?;
+        let description = Description {
+            side,
+            dds_name: of.dds_name.to_owned(),
+            dds_type,
+            qos: *qos,
+        };
+        Ok((topic, NativeQos::of_endpoint(qos, ""), description))
+    }
+}
+
+impl Transport for Cyclone {
+    fn id(&self) -> EndpointId {
+        self.id
+    }
+
+    fn writer(&self, of: PortTopic<'_>, qos: &Qos) -> Result<Arc<dyn SampleWriter>, RuntimeError> {
+        let (topic, native, description) = self.prepare(of, qos, Side::Writer)?;
+        let (parent, events) = (&self.participant, self.sender.clone());
+        let writer = CycloneWriter::new(parent, topic, &native, description, events);
+        let writer = writer.map_err(|reason| failed(of, Side::Writer, reason))?;
+        self.discovery.announce(parent, writer.endpoint());
+        Ok(Arc::new(writer))
+    }
+
+    fn reader(
+        &self,
+        of: PortTopic<'_>,
+        qos: &Qos,
+        max_bytes: usize,
+    ) -> Result<Box<dyn SampleReader>, RuntimeError> {
+        let (topic, native, description) = self.prepare(of, qos, Side::Reader)?;
+        let (parent, events) = (&self.participant, self.sender.clone());
+        let reader = CycloneReader::new(parent, topic, &native, max_bytes, description, events);
+        let reader = reader.map_err(|reason| failed(of, Side::Reader, reason))?;
+        self.discovery.announce(parent, reader.endpoint());
+        Ok(Box::new(reader))
+    }
+
+    fn events(&self) -> BoxStream<'static, PortEvent> {
+        self.events.clone().boxed()
+    }
+
+    fn writers_known(&self) -> Result<BoxFuture<'static, ()>, RuntimeError> {
+        Ok(Box::pin(std::future::ready(())))
+    }
+
+    fn pairs_own_endpoints(&self) -> bool {
+        false
+    }
+}
+
+fn failed(of: PortTopic<'_>, side: Side, reason: String) -> RuntimeError {
+    RuntimeError::Endpoint {
+        topic: of.name.to_owned(),
+        endpoint: match side {
+            Side::Writer => "publisher",
+            Side::Reader => "subscription",
+        },
+        reason,
+    }
+}

@@ -1,0 +1,113 @@
+//! Qualities of service in Cyclone's form.
+
+use std::ffi::CString;
+
+use cyclors::{
+    dds_create_qos, dds_delete_qos, dds_durability_kind_DDS_DURABILITY_TRANSIENT_LOCAL,
+    dds_durability_kind_DDS_DURABILITY_VOLATILE, dds_history_kind_DDS_HISTORY_KEEP_LAST,
+    dds_ignorelocal_kind_DDS_IGNORELOCAL_PARTICIPANT, dds_qget_durability, dds_qget_reliability,
+    dds_qos_t, dds_qset_durability, dds_qset_durability_service, dds_qset_history,
+    dds_qset_ignorelocal, dds_qset_prop, dds_qset_reliability, dds_qset_userdata,
+    dds_qset_writer_data_lifecycle, dds_reliability_kind_DDS_RELIABILITY_BEST_EFFORT,
+    dds_reliability_kind_DDS_RELIABILITY_RELIABLE,
+};
+
+use crate::qos::{Durability, Qos, Reliability};
+
+/// Longest time that a writer of Cyclone blocks for a full send window, ns: [`super::writer`] waits for it
+/// without holding up the publisher thread.
+const MAX_BLOCKING_NS: i64 = 0;
+
+/// "As much as it takes", for limits of resources.
+const UNLIMITED: i32 = -1;
+
+/// A QoS object of Cyclone.
+pub(super) struct NativeQos(*mut dds_qos_t);
+
+impl NativeQos {
+    fn new() -> Self {
+        // SAFETY: no arguments; aborts if there is no memory.
+        Self(unsafe { dds_create_qos() })
+    }
+
+    /// Of a participant with its USER_DATA and properties, such as those of security.
+    pub(super) fn of_participant(user_data: &str, properties: &[(CString, CString)]) -> Self {
+        let qos = Self::new();
+        qos.set_user_data(user_data);
+        for (name, value) in properties {
+            // SAFETY: `qos` is alive; both strings end with 0 and are copied.
+            unsafe { dds_qset_prop(qos.0, name.as_ptr(), value.as_ptr()) };
+        }
+        qos
+    }
+
+    /// Of a reader or writer with its USER_DATA. Nothing is delivered inside the participant.
+    pub(super) fn of_endpoint(qos: &Qos, user_data: &str) -> Self {
+        let depth = i32::try_from(qos.depth).unwrap_or(i32::MAX).max(1);
+        let keep_last = dds_history_kind_DDS_HISTORY_KEEP_LAST;
+        let reliability = match qos.reliability {
+            Reliability::BestEffort => dds_reliability_kind_DDS_RELIABILITY_BEST_EFFORT,
+            Reliability::Reliable => dds_reliability_kind_DDS_RELIABILITY_RELIABLE,
+        };
+        let durability = match qos.durability {
+            Durability::Volatile => dds_durability_kind_DDS_DURABILITY_VOLATILE,
+            Durability::TransientLocal => dds_durability_kind_DDS_DURABILITY_TRANSIENT_LOCAL,
+        };
+        let native = Self::new();
+        native.set_user_data(user_data);
+        // SAFETY: all of them set a value of `native`, which is alive.
+        unsafe {
+            dds_qset_history(native.0, keep_last, depth);
+            dds_qset_reliability(native.0, reliability, MAX_BLOCKING_NS);
+            dds_qset_durability(native.0, durability);
+            // The history for late joiners is another one, of one sample if nothing is said.
+            let (samples, instances, each) = (UNLIMITED, UNLIMITED, UNLIMITED);
+            dds_qset_durability_service(native.0, 0, keep_last, depth, samples, instances, each);
+            dds_qset_writer_data_lifecycle(native.0, false);
+            dds_qset_ignorelocal(native.0, dds_ignorelocal_kind_DDS_IGNORELOCAL_PARTICIPANT);
+        }
+        native
+    }
+
+    fn set_user_data(&self, text: &str) {
+        // SAFETY: `self` is alive; so many bytes are copied.
+        unsafe { dds_qset_userdata(self.0, text.as_ptr().cast(), text.len()) };
+    }
+
+    pub(super) fn as_ptr(&self) -> *const dds_qos_t {
+        self.0
+    }
+}
+
+impl Drop for NativeQos {
+    fn drop(&mut self) {
+        // SAFETY: made by `dds_create_qos`, deleted once.
+        unsafe { dds_delete_qos(self.0) };
+    }
+}
+
+/// Reliability and durability of a peer; none where it does not say.
+///
+/// # Safety
+///
+/// `qos` is null or a QoS of Cyclone's that lives during the call.
+pub(super) unsafe fn announced(qos: *const dds_qos_t) -> Option<(Reliability, Durability)> {
+    if qos.is_null() {
+        return None;
+    }
+    let (mut reliability, mut blocking_ns, mut durability) = (0, 0, 0);
+    // SAFETY: the caller says that `qos` is alive; the others are local.
+    let known = unsafe {
+        dds_qget_reliability(qos, &mut reliability, &mut blocking_ns)
+            && dds_qget_durability(qos, &mut durability)
+    };
+    let reliability = match reliability == dds_reliability_kind_DDS_RELIABILITY_RELIABLE {
+        true => Reliability::Reliable,
+        false => Reliability::BestEffort,
+    };
+    let durability = match durability == dds_durability_kind_DDS_DURABILITY_VOLATILE {
+        true => Durability::Volatile,
+        false => Durability::TransientLocal,
+    };
+    known.then_some((reliability, durability))
+}

@@ -1,0 +1,99 @@
+//! One reader of Cyclone: the next sample as CDR bytes, awaited without polling.
+
+use std::ptr;
+use std::sync::{Arc, Mutex, MutexGuard};
+use std::task::{Context, Poll};
+
+use cyclors::{dds_create_reader, dds_get_sample_lost_status, dds_sample_lost_status_t};
+use smol::channel::Sender;
+
+use super::arrivals::Arrival;
+use super::endpoint::{Description, Endpoint};
+use super::entity::{Entity, check};
+use super::qos::NativeQos;
+use crate::port::{EndpointId, Origin, PortEvent, SampleId, SampleReader};
+use crate::sync::lock;
+
+/// Takes samples of one topic.
+pub(super) struct CycloneReader {
+    // In this order: the topic outlives the reader, what listeners use outlives both.
+    reader: Entity,
+    _topic: Entity,
+    endpoint: Arc<Endpoint>,
+    buffer: Mutex<Vec<u8>>,
+    max_bytes: usize,
+}
+
+impl CycloneReader {
+    /// Samples longer than `max_bytes`, header included, are refused.
+    pub(super) fn new(
+        participant: &Entity,
+        topic: Entity,
+        qos: &NativeQos,
+        max_bytes: usize,
+        description: Description,
+        events: Sender<PortEvent>,
+    ) -> Result<Self, String> {
+        let (parent, of) = (participant.handle(), topic.handle());
+        // SAFETY: handles, and a QoS that is alive and copied; no listener.
+        let made = unsafe { dds_create_reader(parent, of, qos.as_ptr(), ptr::null()) };
+        let reader = Entity::new(made)?;
+        Ok(Self {
+            endpoint: Endpoint::watch(&reader, description, events)?,
+            reader,
+            _topic: topic,
+            buffer: Mutex::default(),
+            max_bytes,
+        })
+    }
+
+    pub(super) fn endpoint(&self) -> &Arc<Endpoint> {
+        &self.endpoint
+    }
+
+    fn try_take(&self) -> Option<Result<Origin, String>> {
+        let Arrival { sample, writer } = self.endpoint.arrivals().pop()?;
+        let (bytes, max) = (sample.len(), self.max_bytes);
+        if bytes > max {
+            let words = format!("{bytes} bytes are more than max_message_bytes = {max}");
+            return Some(Err(words));
+        }
+        sample.copy_into(&mut lock(&self.buffer));
+        let writer = self.endpoint.writer(&self.reader, writer);
+        Some(Ok(Origin {
+            sample: SampleId { writer, number: 0 },
+            related: None,
+        }))
+    }
+}
+
+impl SampleReader for CycloneReader {
+    fn id(&self) -> EndpointId {
+        self.endpoint.id()
+    }
+
+    fn poll_next(&self, context: &mut Context<'_>) -> Poll<Result<Origin, String>> {
+        if let Some(sample) = self.try_take() {
+            return Poll::Ready(sample);
+        }
+        self.endpoint.arrivals().register(context.waker());
+        // Something may have arrived before the waker was in place.
+        self.try_take().map_or(Poll::Pending, Poll::Ready)
+    }
+
+    fn bytes(&self) -> MutexGuard<'_, Vec<u8>> {
+        lock(&self.buffer)
+    }
+
+    fn missed(&self) -> u64 {
+        let mut status = dds_sample_lost_status_t {
+            total_count: 0,
+            total_count_change: 0,
+        };
+        // SAFETY: writes to `status`.
+        let code = unsafe { dds_get_sample_lost_status(self.reader.handle(), &mut status) };
+        let lost = check(code).map_or(0, |_| status.total_count_change);
+        let lost = u64::try_from(lost).unwrap_or(0);
+        lost.saturating_add(self.endpoint.arrivals().overwritten())
+    }
+}
