@@ -4,7 +4,7 @@ use std::collections::{BTreeMap, HashMap};
 use std::fmt::Write as _;
 use std::sync::LazyLock;
 
-use sha2::{Digest, Sha256};
+use hmac_sha256::Hash;
 
 use crate::{MessageVisitor, RosMessage, visit_messages};
 
@@ -36,7 +36,7 @@ pub fn type_hash(ros_type: &str, definition: &str) -> Option<String> {
         r#"{{"type_description": {main}, "referenced_type_descriptions": [{referenced}]}}"#
     );
     let mut hash = "RIHS01_".to_owned();
-    for byte in Sha256::digest(json) {
+    for byte in Hash::hash(json.as_bytes()) {
         let _ = write!(hash, "{byte:02x}");
     }
     Some(hash)
