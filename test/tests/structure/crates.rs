@@ -10,7 +10,7 @@ use super::root;
 const EDGES: [(&str, &str); 8] = [
     ("lattice_core", ""),
     ("lattice_msgs", ""),
-    ("lattice_bag", "lattice_msgs"),
+    ("lattice_bag", ""),
     ("lattice_runtime", "lattice_msgs"),
     (
         "lattice_nodes",

@@ -11,7 +11,7 @@ use mcap::{
     records::{MessageHeader, Metadata as MetadataRecord},
 };
 
-use super::{Sink, SinkError, type_hash};
+use super::{Sink, SinkError};
 use crate::{TopicInfo, storage::definition_encoding};
 
 pub(super) struct McapSink {
@@ -39,7 +39,7 @@ impl Sink for McapSink {
         let text = topic.definition.as_deref().unwrap_or_default();
         let metadata = BTreeMap::from([
             ("offered_qos_profiles".to_owned(), qos.to_owned()),
-            ("topic_type_hash".to_owned(), type_hash(topic)),
+            ("topic_type_hash".to_owned(), topic.type_hash.clone()),
         ]);
         let encoding = definition_encoding(text);
         let writer = &mut self.writer;

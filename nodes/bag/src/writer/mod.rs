@@ -41,6 +41,8 @@ pub struct TopicSpec {
     pub name: String,
     /// The type, such as "tf2_msgs/msg/TFMessage".
     pub type_name: String,
+    /// Hash of the type, such as "RIHS01_..."; empty where it is unknown.
+    pub type_hash: String,
     /// The message definition with all it depends on (ros2msg or ros2idl text).
     pub definition: Option<String>,
     /// QoS of the publishers.
@@ -64,13 +66,6 @@ fn failed(path: &Path, doing: &'static str) -> impl FnOnce(SinkError) -> BagErro
         Err(error) => io::Error::other(error),
     };
     move |error| BagError::io(path, doing)(system(error))
-}
-
-/// Type hash by the topic's definition; empty where that is unknown, as rosbag2 has it.
-fn type_hash(topic: &TopicInfo) -> String {
-    let text = topic.definition.as_deref();
-    text.and_then(|text| lattice_msgs::type_hash(&topic.type_name, text))
-        .unwrap_or_default()
 }
 
 /// A bag being written. Without [`BagWriter::finish`] it lacks `metadata.yaml`.
@@ -145,6 +140,7 @@ impl BagWriter {
         let info = TopicInfo {
             name: topic.name,
             type_name: topic.type_name,
+            type_hash: topic.type_hash,
             serialization_format: "cdr".into(),
             offered_qos: topic.offered_qos,
             definition: topic.definition,
@@ -225,7 +221,7 @@ impl BagWriter {
                 type_name: topic.type_name.clone(),
                 serialization_format: topic.serialization_format.clone(),
                 offered_qos_profiles: topic.offered_qos.clone(),
-                type_description_hash: type_hash(topic),
+                type_description_hash: topic.type_hash.clone(),
             },
             message_count: topic.message_count,
         };

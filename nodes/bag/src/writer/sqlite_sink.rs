@@ -4,7 +4,7 @@ use std::{collections::BTreeSet, path::Path};
 
 use rusqlite::{Connection, params};
 
-use super::{ROS_DISTRO, Sink, SinkError, type_hash};
+use super::{ROS_DISTRO, Sink, SinkError};
 use crate::{TopicInfo, metadata::METADATA_VERSION, storage::definition_encoding};
 
 /// A transaction is committed when it holds this much, bytes.
@@ -49,7 +49,7 @@ impl SqliteSink {
 
 impl Sink for SqliteSink {
     fn add_topic(&mut self, topic: &TopicInfo, qos: &str) -> Result<(), SinkError> {
-        let hash = type_hash(topic);
+        let hash = &topic.type_hash;
         if let Some(text) = &topic.definition
             && self.defined.insert(topic.type_name.clone())
         {
