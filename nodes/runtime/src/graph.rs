@@ -22,6 +22,7 @@ pub(crate) const TOPIC: PortTopic<'static> = PortTopic {
     name: "ros_discovery_info",
     dds_name: "ros_discovery_info",
     ros_type: <ParticipantEntitiesInfo as RosMessage>::TYPE,
+    type_hash: None,
 };
 
 /// Time between a change and the message that names it.

@@ -61,6 +61,8 @@ pub(crate) struct PortTopic<'a> {
     pub dds_name: &'a str,
     /// Type, such as `sensor_msgs/msg/Imu`.
     pub ros_type: &'a str,
+    /// Hash of the type where it may be another than that of our message of this name.
+    pub type_hash: Option<&'a str>,
 }
 
 /// A change of the other ends of our endpoints.

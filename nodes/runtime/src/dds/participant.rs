@@ -128,6 +128,7 @@ fn probe(name: &str) -> PortTopic<'_> {
         name,
         dds_name: name,
         ros_type: PROBE_TYPE,
+        type_hash: None,
     }
 }
 
