@@ -62,6 +62,7 @@ pub(crate) struct PortTopic<'a> {
     /// Type, such as `sensor_msgs/msg/Imu`.
     pub ros_type: &'a str,
     /// Hash of the type where it may be another than that of our message of this name.
+    #[cfg_attr(not(feature = "cyclone"), expect(dead_code))]
     pub type_hash: Option<&'a str>,
 }
 
