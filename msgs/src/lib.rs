@@ -2,7 +2,8 @@
 //!
 //! One module per ROS package, with the names of ROS; a field named `type` is `type_` here.
 //! The layout is that of Jazzy. [`RosMessage`] knows each message's type name and schema text,
-//! [`cdr`] reads and writes the bytes that are on the wire and in bags.
+//! [`cdr`] reads and writes the bytes that are on the wire and in bags. [`hash_of`] is the type hash
+//! (RIHS01) that ROS 2 gives a message of this crate, [`type_hash`] that of any definition.
 #![forbid(unsafe_code)]
 
 pub mod action;
@@ -19,12 +20,14 @@ pub mod nav_msgs;
 pub mod novatel_oem7_msgs;
 pub mod rcl_interfaces;
 mod registry;
+pub mod rmw_dds_common;
 pub mod rosgraph_msgs;
 pub mod sensor_msgs;
 pub mod std_msgs;
 pub mod std_srvs;
 pub mod tf2_msgs;
 mod time;
+mod type_hash;
 pub mod unique_identifier_msgs;
 pub mod vision_msgs;
 pub mod visualization_msgs;
@@ -32,3 +35,4 @@ pub mod visualization_msgs;
 pub use action::RosAction;
 pub use interface::{RosMessage, RosService, Schema, dds_type_name};
 pub use registry::{MessageVisitor, visit_messages};
+pub use type_hash::{hash_of, type_hash};

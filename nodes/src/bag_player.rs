@@ -115,9 +115,19 @@ fn open_topics(node: &Node, player: &Player) -> Result<Vec<RawPublisher>, NodeEr
         let info = &topic.info;
         let resolved = node.resolve(&info.name)?;
         let qos = offered(info).with_overrides(node.params(), &resolved, &info.name)?;
-        publishers.push(node.raw_publisher(&resolved, &info.type_name, qos)?);
+        let hash = type_hash(info);
+        publishers.push(node.raw_publisher(&resolved, &info.type_name, hash.as_deref(), qos)?);
     }
     Ok(publishers)
+}
+
+/// Type hash that the bag notes, or that of its definition.
+fn type_hash(topic: &TopicInfo) -> Option<String> {
+    let text = topic.definition.as_deref();
+    match topic.type_hash.as_str() {
+        "" => text.and_then(|text| lattice_msgs::type_hash(&topic.type_name, text)),
+        noted => Some(noted.to_owned()),
+    }
 }
 
 /// One publisher in place of all that were recorded: the weakest of each policy, so that every

@@ -84,6 +84,7 @@ def read(folder):
                 ],
                 "depths": [q.depth for q in c.ext.offered_qos_profiles],
                 "definition": number(c.msgdef.data.encode()),
+                "type_hash": c.digest,
             }
             for c in reader.connections
         ]

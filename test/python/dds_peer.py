@@ -1,6 +1,6 @@
 """Peer of dds_cyclone.rs: a CycloneDDS participant that knows of Lattice only the ROS messages.
 
-    dds_peer.py map|graph DIRECTORY     reads DIRECTORY/scenario.json, prints one line of JSON
+    dds_peer.py map|graph|endpoints DIRECTORY     reads DIRECTORY/scenario.json, prints a line of JSON
 """
 
 import faulthandler
@@ -20,6 +20,11 @@ os.environ["CYCLONEDDS_URI"] = """<CycloneDDS><Domain Id="any">
 
 import numpy
 import ros_idl as ros
+from cyclonedds.builtin import (
+    BuiltinDataReader,
+    BuiltinTopicDcpsPublication,
+    BuiltinTopicDcpsSubscription,
+)
 from cyclonedds.core import DDSStatus, WaitSet
 from cyclonedds.domain import DomainParticipant
 from cyclonedds.pub import DataWriter
@@ -63,6 +68,9 @@ class Peer:
 
     def reader(self, topic, message, qos, handler):
         reader = DataReader(self.participant, Topic(self.participant, topic, message), qos)
+        return self.attach(topic, reader, handler)
+
+    def attach(self, topic, reader, handler):
         reader.set_status_mask(DDSStatus.DataAvailable | DDSStatus.SubscriptionMatched)
         self.waits.attach(reader)
         self.readers[topic] = (reader, handler)
@@ -362,12 +370,31 @@ def run_graph(scenario, _directory):
     }
 
 
+def run_endpoints(scenario, _directory):
+    """Topic, type and USER_DATA of all endpoints of others."""
+    peer, found = Peer(scenario["domain"]), {}
+
+    def on_endpoint(endpoint):
+        if endpoint.participant_key != peer.participant.guid:
+            data = endpoint.qos[Policy.Userdata]
+            text = data.data.decode() if data else ""
+            found[endpoint.key] = [endpoint.topic_name, endpoint.type_name, text]
+
+    for topic in (BuiltinTopicDcpsPublication, BuiltinTopicDcpsSubscription):
+        peer.attach(topic, BuiltinDataReader(peer.participant, topic), on_endpoint)
+    peer.until(
+        lambda: {topic for topic, _, _ in found.values()}.issuperset(scenario["topics"]),
+        lambda: f"endpoints {sorted(found.values())}",
+    )
+    return sorted(found.values())
+
+
 def main():
     # Whatever hangs, the test ends.
     faulthandler.dump_traceback_later(4 * PATIENCE_S, exit=True)
     command, directory = sys.argv[1], Path(sys.argv[2])
     scenario = json.loads((directory / "scenario.json").read_text())
-    run = {"map": run_map, "graph": run_graph}[command]
+    run = {"map": run_map, "graph": run_graph, "endpoints": run_endpoints}[command]
     print(json.dumps(run(scenario, directory)), flush=True)
 
 

@@ -52,11 +52,13 @@ fn full_name(kind: &str, package: &str) -> Option<String> {
 /// Type of such a field in Rust.
 fn as_rust_shows(kind: &str) -> String {
     let mut name = kind.rsplit('/').next().unwrap().replace("byte", "uint8");
+    name = name.replace("char", "uint8");
     if name.starts_with(char::is_uppercase) {
         name = name.replace('_', "");
     }
-    match name.split_once("[<=") {
-        Some((element, _)) => format!("{element}[]"),
+    match name.split_once("<=") {
+        Some((element, _)) if name.ends_with(']') => element.replace('[', "[]"),
+        Some((element, _)) => element.to_owned(),
         None => name,
     }
 }

@@ -167,6 +167,7 @@ fn listed_topics(metadata: Option<&Metadata>) -> Vec<TopicInfo> {
         TopicInfo {
             name: topic.name,
             type_name: full_type_name(&topic.type_name),
+            type_hash: topic.type_description_hash,
             serialization_format: topic.serialization_format,
             offered_qos: topic.offered_qos_profiles,
             definition: None,

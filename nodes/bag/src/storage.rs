@@ -62,6 +62,9 @@ pub(crate) fn merge_topic(topics: &mut Vec<TopicInfo>, topic: &TopicInfo, counte
     if known.type_name.is_empty() {
         known.type_name.clone_from(&topic.type_name);
     }
+    if known.type_hash.is_empty() {
+        known.type_hash.clone_from(&topic.type_hash);
+    }
     if known.offered_qos.is_empty() {
         known.offered_qos.clone_from(&topic.offered_qos);
     }

@@ -39,6 +39,8 @@ pub struct TopicInfo {
     pub name: String,
     /// The type, such as "sensor_msgs/msg/PointCloud2"; empty where the bag lacks it.
     pub type_name: String,
+    /// Hash of the type, such as "RIHS01_..."; empty where the bag lacks it.
+    pub type_hash: String,
     /// Serialisation of its messages; "cdr" for ROS 2.
     pub serialization_format: String,
     /// QoS that each recorded publisher offered; empty where the bag lacks it.

@@ -7,7 +7,8 @@ use std::collections::BTreeSet;
 use std::sync::{Arc, Mutex, Weak};
 use std::time::Duration;
 
-use lattice_msgs::cdr;
+use lattice_msgs::rmw_dds_common::{NodeEntitiesInfo, ParticipantEntitiesInfo};
+use lattice_msgs::{RosMessage, cdr};
 use serde::ser::{Serialize, SerializeTuple, Serializer};
 use smol::Timer;
 use smol::channel::{Receiver, Sender, bounded};
@@ -20,7 +21,8 @@ use super::sync::lock;
 pub(crate) const TOPIC: PortTopic<'static> = PortTopic {
     name: "ros_discovery_info",
     dds_name: "ros_discovery_info",
-    ros_type: "rmw_dds_common/msg/ParticipantEntitiesInfo",
+    ros_type: <ParticipantEntitiesInfo as RosMessage>::TYPE,
+    type_hash: None,
 };
 
 /// Time between a change and the message that names it.
@@ -127,18 +129,18 @@ impl Graph {
         participant: EndpointId,
         gid_bytes: usize,
         wire_id: impl Fn(EndpointId) -> EndpointId,
-    ) -> ParticipantEntitiesInfo {
+    ) -> ParticipantEntitiesInfo<Gid> {
         let gid = |id: EndpointId| Gid::new(wire_id(id), gid_bytes);
         let gids = |set: &BTreeSet<EndpointId>| set.iter().copied().map(gid).collect();
         let node = |entry: &Entry| NodeEntitiesInfo {
-            namespace: entry.namespace.clone(),
-            name: entry.name.clone(),
-            readers: gids(&entry.readers),
-            writers: gids(&entry.writers),
+            node_namespace: entry.namespace.clone(),
+            node_name: entry.name.clone(),
+            reader_gid_seq: gids(&entry.readers),
+            writer_gid_seq: gids(&entry.writers),
         };
         ParticipantEntitiesInfo {
             gid: gid(participant),
-            nodes: lock(&self.nodes).iter().map(node).collect(),
+            node_entities_info_seq: lock(&self.nodes).iter().map(node).collect(),
         }
     }
 
@@ -174,21 +176,6 @@ fn gid_bytes(distro: Option<&str>) -> usize {
         Some("dashing" | "eloquent" | "foxy" | "galactic" | "humble") => 24,
         _ => 16,
     }
-}
-
-/// `rmw_dds_common/msg/ParticipantEntitiesInfo`.
-#[derive(serde::Serialize)]
-struct ParticipantEntitiesInfo {
-    gid: Gid,
-    nodes: Vec<NodeEntitiesInfo>,
-}
-
-#[derive(serde::Serialize)]
-struct NodeEntitiesInfo {
-    namespace: String,
-    name: String,
-    readers: Vec<Gid>,
-    writers: Vec<Gid>,
 }
 
 /// Identity of an endpoint, padded to the length of the distribution.

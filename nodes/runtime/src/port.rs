@@ -62,7 +62,16 @@ pub(crate) struct PortTopic<'a> {
     pub dds_name: &'a str,
     /// Type, such as `sensor_msgs/msg/Imu`.
     pub ros_type: &'a str,
+    /// Hash of the type where it may be another than that of our message of this name.
+    #[cfg_attr(not(feature = "cyclone"), expect(dead_code))]
+    pub type_hash: Option<&'a str>,
 }
+
+/// Policies of a peer that does not go with ours, in words for the operator.
+pub(crate) const RELIABILITY_CONFLICT: &str =
+    "reliability (the subscription asks for reliable, the publisher offers best_effort)";
+pub(crate) const DURABILITY_CONFLICT: &str =
+    "durability (the subscription asks for transient_local, the publisher offers volatile)";
 
 /// A change of the other ends of our endpoints.
 #[derive(Clone, Debug)]

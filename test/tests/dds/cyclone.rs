@@ -3,10 +3,12 @@
 //! Loopback only, no multicast. The peer is `python/dds_peer.py`.
 
 use std::fs;
+use std::io::{Write, stderr};
 use std::path::Path;
 use std::sync::Arc;
 
 use lattice_core::lattice::{Lattice, LatticeKind};
+use lattice_msgs::hash_of;
 use lattice_msgs::sensor_msgs::{PointCloud2, PointField};
 use lattice_nodes::enu_transformer::TransformerReport;
 use lattice_nodes::enu_transformer::ins::{InsMessage, InsSource};
@@ -15,7 +17,12 @@ use lattice_nodes::lattice_mapper::MapperReport;
 use lattice_nodes::lattice_mapper::{LatticeMapper, MapperOptions};
 use lattice_nodes::report;
 use lattice_nodes::voxel_marker_publisher::MarkerReport;
+use lattice_runtime::Runtime;
+use lattice_runtime::env::TransportKind;
+use lattice_runtime::qos::Qos;
+use lattice_runtime::ros_args::RosArgs;
 use lattice_test::clouds::{field, header, odometry};
+use lattice_test::data::shared;
 use lattice_test::domain::TestDomain;
 use lattice_test::python::python;
 use nalgebra::{Isometry3, Translation3, UnitQuaternion};
@@ -232,5 +239,58 @@ fn a_cyclone_peer_hears_transforms_and_diagnostics_and_calls_a_service() {
     let tasks = found["tasks"].as_array().unwrap();
     for task in ["enu_transformer: clouds", "lattice_mapper: map"] {
         assert!(tasks.contains(&json!(task)), "{tasks:?}");
+    }
+}
+
+#[test]
+fn a_cyclone_peer_sees_the_type_hash_of_every_endpoint() {
+    let Some(python) = python() else { return };
+    let domain = TestDomain::take();
+    if domain.transport().transport != TransportKind::Cyclone {
+        let _ = writeln!(stderr(), "SKIPPED: RustDDS announces no type hashes");
+        return;
+    }
+    let directory = tempfile::tempdir().unwrap();
+    let nodes = Nodes::start(&domain, &[("lattice_mapper", vec![])]);
+    let args = RosArgs::parse([]).unwrap();
+    let runtime = Runtime::with_transport("player", args, &domain.transport()).unwrap();
+    let node = runtime.node("player").unwrap();
+    let noted = format!("RIHS01_{}", "5".repeat(64));
+    let raw = |topic, hash| node.raw_publisher(topic, "odd/msg/Odd", Some(hash), Qos::DEFAULT);
+    let raw = [raw("/noted", &noted), raw("/wrong", "RIHS01_;enclave=/")];
+    assert!(raw.iter().all(Result::is_ok));
+    let topics = [
+        "ros_discovery_info",
+        "rt/map",
+        "rt/points_enu",
+        "rt/wrong",
+        "rq/lattice_mapper/queryRequest",
+        "rr/lattice_mapper/queryReply",
+        "rq/lattice_mapper/set_parametersRequest",
+    ];
+    let scenario = json!({"domain": domain.id(), "topics": topics});
+    fs::write(directory.path().join("scenario.json"), scenario.to_string()).unwrap();
+    let arguments = [Path::new("endpoints"), directory.path()];
+    let found = peer::run(&python, "dds_peer.py", &arguments);
+    nodes.finish();
+
+    let jazzy = shared("ros2/type_hashes_jazzy.json").map(|path| fs::read(path).unwrap());
+    let jazzy = jazzy.unwrap_or_else(|| br#"{"hashes": {}}"#.to_vec());
+    let jazzy: Value = serde_json::from_slice(&jazzy).unwrap();
+    let jazzy = jazzy["hashes"].as_object().unwrap();
+    let found: Vec<[String; 3]> = serde_json::from_value(found).unwrap();
+    for [topic, dds_type, user_data] in &found {
+        let ros_type = dds_type.replace("dds_::", "").replace("::", "/");
+        let ros_type = ros_type.strip_suffix('_').unwrap();
+        let hash = match topic.as_str() {
+            "rt/noted" => Some(&*noted),
+            _ => hash_of(ros_type),
+        };
+        let expected = hash.map_or(String::new(), |hash| format!("typehash={hash};"));
+        assert_eq!(*user_data, expected, "{topic}");
+        assert_eq!(hash.is_none(), topic == "rt/wrong", "{topic}");
+        if let Some(theirs) = jazzy.get(ros_type) {
+            assert_eq!(theirs.as_str(), hash, "{ros_type}");
+        }
     }
 }

@@ -5,6 +5,7 @@ use std::{path::Path, process::Command};
 use lattice_bag::{
     BagMessage, BagQos, BagReader, BagWriter, ReadOptions, Storage, TopicSpec, WriterOptions,
 };
+use lattice_msgs::hash_of;
 use lattice_test::data::shared;
 use lattice_test::python::{python, script};
 use serde_json::{Value, json};
@@ -50,7 +51,8 @@ fn described(reader: &BagReader) -> Value {
             let latched: Vec<bool> = t.offered_qos.iter().map(|q| q.latched).collect();
             json!({"name": t.name, "type": t.type_name, "count": t.message_count, "latched": latched,
                    "depths": t.offered_qos.iter().map(|q| q.depth).collect::<Vec<_>>(),
-                   "definition": hash(t.definition.as_deref().unwrap_or("").as_bytes())})
+                   "definition": hash(t.definition.as_deref().unwrap_or("").as_bytes()),
+                   "type_hash": t.type_hash})
         })
         .collect();
     let messages: Vec<Value> = read_all(reader)
@@ -119,6 +121,7 @@ fn write_bag(bag: &Path, storage: Storage) {
         let topic = TopicSpec {
             name: name.into(),
             type_name: "std_msgs/msg/String".into(),
+            type_hash: hash_of("std_msgs/msg/String").unwrap().into(),
             definition: Some("string data\n".into()),
             offered_qos,
         };

@@ -4,7 +4,8 @@ use std::fmt::Write as _;
 use std::io::Write as _;
 use std::process::{Command, Stdio};
 
-use lattice_msgs::{MessageVisitor, RosMessage, cdr, visit_messages};
+use lattice_msgs::{MessageVisitor, RosMessage, cdr, hash_of, visit_messages};
+use lattice_test::data::shared;
 use lattice_test::python::{python, script};
 use serde_json::{Value, json};
 
@@ -111,4 +112,20 @@ fn bytes_and_values_agree_with_rosbags() {
         "only {} types are in Jazzy",
         compare.in_jazzy
     );
+}
+
+#[test]
+fn type_hashes_agree_with_jazzy() {
+    let Some(path) = shared("ros2/type_hashes_jazzy.json") else {
+        return;
+    };
+    let data: Value = serde_json::from_slice(&std::fs::read(path).unwrap()).unwrap();
+    let mut compared = 0;
+    for (ros_type, expected) in data["hashes"].as_object().unwrap() {
+        if let Some(hash) = hash_of(ros_type) {
+            assert_eq!(expected, hash, "{ros_type}");
+            compared += 1;
+        }
+    }
+    assert!(compared > 80, "only {compared} hashes compared");
 }

@@ -143,9 +143,11 @@ impl Contents {
         let schema = self.schemas.get(&channel.schema_id);
         let is_text = |s: &&Schema| matches!(s.encoding.as_str(), "ros2msg" | "ros2idl" | "omgidl");
         let qos = channel.metadata.get("offered_qos_profiles");
+        let hash = channel.metadata.get("topic_type_hash");
         TopicInfo {
             name: channel.topic.clone(),
             type_name: schema.map(|s| full_type_name(&s.name)).unwrap_or_default(),
+            type_hash: hash.cloned().unwrap_or_default(),
             serialization_format: channel.message_encoding.clone(),
             offered_qos: qos
                 .map(|text| lenient_qos(&channel.topic, text))

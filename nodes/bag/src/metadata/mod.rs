@@ -90,8 +90,8 @@ pub(crate) struct TopicMetadata {
     pub serialization_format: String,
     #[serde(default, deserialize_with = "qos_profiles")]
     pub offered_qos_profiles: Vec<BagQos>,
-    #[serde(skip_deserializing)]
-    pub type_description_hash: &'static str,
+    #[serde(default, deserialize_with = "null_is_default")]
+    pub type_description_hash: String,
 }
 
 #[derive(Clone, Debug, Serialize, Deserialize)]

@@ -84,12 +84,17 @@ impl SqliteFile {
         let wrong = |e| BagError::sqlite(&self.path, "table topics", e);
         let columns =
             names(connection, "SELECT name FROM pragma_table_info('topics')").map_err(wrong)?;
-        let qos = match columns.contains("offered_qos_profiles") {
-            true => "offered_qos_profiles",
+        let column = |name| match columns.contains(name) {
+            true => name,
             false => "''",
         };
+        let (qos, hash) = (
+            column("offered_qos_profiles"),
+            column("type_description_hash"),
+        );
         let select = format!(
-            "SELECT id, name, type, serialization_format, {qos} FROM topics ORDER BY id LIMIT {MAX_TOPICS}"
+            "SELECT id, name, type, serialization_format, {qos}, {hash} FROM topics \
+             ORDER BY id LIMIT {MAX_TOPICS}"
         );
         let mut statement = connection.prepare(&select).map_err(wrong)?;
         let rows = statement.query_map([], |row| {
@@ -101,6 +106,7 @@ impl SqliteFile {
                 name: text(1)?,
                 type_name: full_type_name(&text(2)?),
                 serialization_format: text(3)?,
+                type_hash: text(5)?,
                 ..TopicInfo::default()
             };
             Ok((row.get::<_, i64>(0)?, topic, text(4)?))

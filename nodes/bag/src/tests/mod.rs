@@ -13,10 +13,13 @@ use super::{metadata::Metadata, *};
 const SECOND_NS: i64 = 1_000_000_000;
 const T0_NS: i64 = 1_700_000_000 * SECOND_NS;
 
+const HASH: &str = "RIHS01_df668c740482bbd48fb39d76a70dfd4bd59db1288021743503259e948f6b1a18";
+
 pub(super) fn spec(name: &str, latched: bool) -> TopicSpec {
     TopicSpec {
         name: name.into(),
         type_name: "std_msgs/msg/String".into(),
+        type_hash: HASH.into(),
         definition: Some("string data\n".into()),
         offered_qos: vec![BagQos {
             depth: 1,
@@ -161,6 +164,8 @@ fn every_storage_and_compression_round_trips() {
             Some("string data\n")
         );
         assert_eq!(reader.topics()[0].message_count, 100);
+        let bare = BagReader::open(&storage_file(&bag)).unwrap();
+        assert!(reader.topics()[0].type_hash == HASH && bare.topics()[1].type_hash == HASH);
     }
 }
 

@@ -37,7 +37,10 @@ impl McapSink {
 impl Sink for McapSink {
     fn add_topic(&mut self, topic: &TopicInfo, qos: &str) -> Result<(), SinkError> {
         let text = topic.definition.as_deref().unwrap_or_default();
-        let metadata = BTreeMap::from([("offered_qos_profiles".to_owned(), qos.to_owned())]);
+        let metadata = BTreeMap::from([
+            ("offered_qos_profiles".to_owned(), qos.to_owned()),
+            ("topic_type_hash".to_owned(), topic.type_hash.clone()),
+        ]);
         let encoding = definition_encoding(text);
         let writer = &mut self.writer;
         let schema = writer.add_schema(&topic.type_name, encoding, text.as_bytes())?;

@@ -41,6 +41,8 @@ pub struct TopicSpec {
     pub name: String,
     /// The type, such as "tf2_msgs/msg/TFMessage".
     pub type_name: String,
+    /// Hash of the type, such as "RIHS01_..."; empty where it is unknown.
+    pub type_hash: String,
     /// The message definition with all it depends on (ros2msg or ros2idl text).
     pub definition: Option<String>,
     /// QoS of the publishers.
@@ -138,6 +140,7 @@ impl BagWriter {
         let info = TopicInfo {
             name: topic.name,
             type_name: topic.type_name,
+            type_hash: topic.type_hash,
             serialization_format: "cdr".into(),
             offered_qos: topic.offered_qos,
             definition: topic.definition,
@@ -218,7 +221,7 @@ impl BagWriter {
                 type_name: topic.type_name.clone(),
                 serialization_format: topic.serialization_format.clone(),
                 offered_qos_profiles: topic.offered_qos.clone(),
-                type_description_hash: "",
+                type_description_hash: topic.type_hash.clone(),
             },
             message_count: topic.message_count,
         };

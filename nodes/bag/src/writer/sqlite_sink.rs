@@ -49,17 +49,24 @@ impl SqliteSink {
 
 impl Sink for SqliteSink {
     fn add_topic(&mut self, topic: &TopicInfo, qos: &str) -> Result<(), SinkError> {
+        let hash = &topic.type_hash;
         if let Some(text) = &topic.definition
             && self.defined.insert(topic.type_name.clone())
         {
             let insert = "INSERT INTO message_definitions(topic_type, encoding, encoded_message_definition, \
-                          type_description_hash) VALUES (?1, ?2, ?3, '')";
-            let values = params![topic.type_name, definition_encoding(text), text];
+                          type_description_hash) VALUES (?1, ?2, ?3, ?4)";
+            let values = params![topic.type_name, definition_encoding(text), text, hash];
             self.connection.execute(insert, values)?;
         }
         let insert = "INSERT INTO topics(name, type, serialization_format, offered_qos_profiles, \
-                      type_description_hash) VALUES (?1, ?2, ?3, ?4, '')";
-        let values = params![topic.name, topic.type_name, topic.serialization_format, qos];
+                      type_description_hash) VALUES (?1, ?2, ?3, ?4, ?5)";
+        let values = params![
+            topic.name,
+            topic.type_name,
+            topic.serialization_format,
+            qos,
+            hash
+        ];
         self.connection.execute(insert, values)?;
         Ok(())
     }

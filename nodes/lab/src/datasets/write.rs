@@ -6,11 +6,11 @@ use super::truth::{self, Truth};
 use crate::simulate::{Bobcat, Laser};
 use crate::{AnyError, at};
 use lattice_bag::{BagQos, BagWriter, Storage, TopicSpec, WriterOptions};
-use lattice_msgs::RosMessage;
 use lattice_msgs::nav_msgs::Odometry;
 use lattice_msgs::novatel_oem7_msgs::INSPVAX;
 use lattice_msgs::sensor_msgs::PointCloud2;
 use lattice_msgs::tf2_msgs::TFMessage;
+use lattice_msgs::{RosMessage, hash_of};
 use serde::Serialize;
 use std::collections::HashMap;
 use std::fmt;
@@ -146,6 +146,7 @@ fn spec<M: RosMessage>(name: &str, qos: BagQos) -> TopicSpec {
     TopicSpec {
         name: name.to_owned(),
         type_name: M::TYPE.to_owned(),
+        type_hash: hash_of(M::TYPE).unwrap_or_default().to_owned(),
         definition: Some(M::definition()),
         offered_qos: vec![qos],
     }

@@ -1,6 +1,7 @@
 //! Endpoints of other participants that do not go with ours, which Cyclone passes over in silence where
 //! the types differ.
 
+use std::borrow::Cow;
 use std::ffi::{CStr, c_char, c_void};
 use std::mem::MaybeUninit;
 use std::ptr;
@@ -17,7 +18,7 @@ use smol::channel::Sender;
 use super::endpoint::{Description, Endpoint, Side};
 use super::entity::{Entity, endpoint_id};
 use super::qos::announced;
-use crate::port::{EndpointId, PortEvent};
+use crate::port::{DURABILITY_CONFLICT, EndpointId, PortEvent, RELIABILITY_CONFLICT};
 use crate::qos::{Durability, Reliability};
 use crate::sync::lock;
 
@@ -191,9 +192,10 @@ impl Drop for Discovery {
 }
 
 /// First thing in which two endpoints of one topic do not go together, in words for the operator.
-fn conflict(ours: &Description, other: &Other<'_>) -> Option<&'static str> {
+fn conflict(ours: &Description, other: &Other<'_>) -> Option<Cow<'static, str>> {
     if other.type_name.to_bytes() != ours.dds_type.as_bytes() {
-        return Some("type (the publisher and the subscription have different ones)");
+        let theirs = other.type_name.to_string_lossy();
+        return Some(format!("type {theirs}, not {}", ours.dds_type).into());
     }
     let our_qos = (ours.qos.reliability, ours.qos.durability);
     let (offered, requested) = match ours.side {
@@ -201,11 +203,9 @@ fn conflict(ours: &Description, other: &Other<'_>) -> Option<&'static str> {
         Side::Reader => (other.qos?, our_qos),
     };
     if requested.0 == Reliability::Reliable && offered.0 == Reliability::BestEffort {
-        Some("reliability (the subscription asks for reliable, the publisher offers best_effort)")
+        Some(RELIABILITY_CONFLICT.into())
     } else if requested.1 == Durability::TransientLocal && offered.1 == Durability::Volatile {
-        Some(
-            "durability (the subscription asks for transient_local, the publisher offers volatile)",
-        )
+        Some(DURABILITY_CONFLICT.into())
     } else {
         None
     }

@@ -8,7 +8,7 @@ use cyclors::dds_create_participant;
 use futures::StreamExt;
 use futures::future::BoxFuture;
 use futures::stream::BoxStream;
-use lattice_msgs::dds_type_name;
+use lattice_msgs::{dds_type_name, hash_of};
 use smol::channel::{Receiver, Sender, unbounded};
 
 use super::blob;
@@ -86,8 +86,20 @@ impl Cyclone {
             dds_type,
             qos: *qos,
         };
-        Ok((topic, NativeQos::of_endpoint(qos, ""), description))
+        let native = NativeQos::of_endpoint(qos, &user_data(of));
+        Ok((topic, native, description))
     }
+}
+
+/// USER_DATA of an endpoint, as rmw_dds_common reads it; nothing where the type's hash is unknown.
+fn user_data(of: PortTopic<'_>) -> String {
+    let is_hash = |text: &&str| {
+        let digits = text.strip_prefix("RIHS01_").unwrap_or_default();
+        digits.len() == 64 && digits.bytes().all(|digit| digit.is_ascii_hexdigit())
+    };
+    let hash = of.type_hash.filter(is_hash);
+    let hash = hash.or_else(|| hash_of(of.ros_type));
+    hash.map_or_else(String::new, |hash| format!("typehash={hash};"))
 }
 
 impl Transport for Cyclone {

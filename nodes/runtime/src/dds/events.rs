@@ -12,7 +12,7 @@ use rustdds::{DomainParticipantStatusEvent as Event, GUID, QosPolicies};
 use super::endpoint_id;
 use super::lives::Lives;
 use super::probe::Probes;
-use crate::port::PortEvent;
+use crate::port::{DURABILITY_CONFLICT, PortEvent, RELIABILITY_CONFLICT};
 use crate::sync::lock;
 
 /// Translates the events of one participant.
@@ -112,9 +112,9 @@ fn incompatible_policy(offered: &QosPolicies, requested: &QosPolicies) -> &'stat
         |qos: &QosPolicies| matches!(qos.reliability(), Some(Reliability::Reliable { .. }));
     let rank = |qos: &QosPolicies| qos.durability().unwrap_or(Durability::Volatile);
     if reliable(requested) && !reliable(offered) {
-        "reliability (the subscription asks for reliable, the publisher offers best_effort)"
+        RELIABILITY_CONFLICT
     } else if rank(requested) > rank(offered) {
-        "durability (the subscription asks for transient_local, the publisher offers volatile)"
+        DURABILITY_CONFLICT
     } else if requested.deadline() != offered.deadline() {
         "deadline"
     } else {

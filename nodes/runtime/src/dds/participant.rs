@@ -76,6 +76,7 @@ impl Participant {
             name: &name,
             dds_name: &name,
             ros_type: PROBE_TYPE,
+            type_hash: None,
         };
         let probe = Recipe::new(topic, &Qos::best_effort(1));
         let reader = raw_reader(&participant, &subscriber, &probe)?;

@@ -137,16 +137,19 @@ impl Node {
     }
 
     /// A publisher of CDR bytes of the type, such as `sensor_msgs/msg/Imu`, on a full topic name.
+    ///
+    /// `type_hash` is announced, where it is one (`RIHS01_...`); else that of our message of this type.
     pub fn raw_publisher(
         &self,
         resolved_topic: &str,
         type_name: &str,
+        type_hash: Option<&str>,
         qos: Qos,
     ) -> Result<RawPublisher, RuntimeError> {
         names::validate_full_name(resolved_topic)?;
         self.inner
             .shared
-            .raw_publisher(self.id(), resolved_topic, type_name, &qos)
+            .raw_publisher(self.id(), resolved_topic, type_name, type_hash, &qos)
     }
 
     /// Gives every message on a topic to `handler`; `qos.<topic>.*` override the QoS.

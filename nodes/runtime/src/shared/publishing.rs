@@ -24,7 +24,8 @@ impl Shared {
         topic: &str,
         qos: &Qos,
     ) -> Result<Publisher<M>, RuntimeError> {
-        let parts = self.publisher_parts(node, topic, M::TYPE, qos, WhenFull::Drop, |peers| {
+        let of = (M::TYPE, None);
+        let parts = self.publisher_parts(node, topic, of, qos, WhenFull::Drop, |peers| {
             let topic = self.bus.topic(topic);
             topic.join_publisher::<M>(peers, latch_depth(qos))
         })?;
@@ -39,9 +40,11 @@ impl Shared {
         node: NodeId,
         topic: &str,
         type_name: &str,
+        type_hash: Option<&str>,
         qos: &Qos,
     ) -> Result<RawPublisher, RuntimeError> {
-        let parts = self.publisher_parts(node, topic, type_name, qos, WhenFull::Wait, |peers| {
+        let of = (type_name, type_hash);
+        let parts = self.publisher_parts(node, topic, of, qos, WhenFull::Wait, |peers| {
             let topic = self.bus.topic(topic);
             topic.join_raw_publisher(type_name, peers, latch_depth(qos))
         })?;
@@ -52,7 +55,7 @@ impl Shared {
         self: &Arc<Self>,
         node: NodeId,
         topic: &str,
-        type_name: &str,
+        (ros_type, type_hash): (&str, Option<&str>),
         qos: &Qos,
         when_full: WhenFull,
         join: impl FnOnce(&Arc<Peers>) -> Result<LocalEndpoint, RuntimeError>,
@@ -62,7 +65,8 @@ impl Shared {
         let port_topic = PortTopic {
             name: topic,
             dds_name: &names::dds_topic(topic),
-            ros_type: type_name,
+            ros_type,
+            type_hash,
         };
         let make = || self.outbox(port_topic, qos, when_full);
         let writer = self.with_readers_closed(topic, make)?;

@@ -37,6 +37,7 @@ impl Shared {
             name,
             dds_name: &names::dds_request(name),
             ros_type: S::Request::TYPE,
+            type_hash: None,
         };
         let requests = self.reader(topic, &Qos::SERVICES, MAX_REQUEST_BYTES)?;
         let readers = Arc::new(Peers::new(name, "reply reader", log::Level::Debug));
@@ -44,6 +45,7 @@ impl Shared {
             name,
             dds_name: &names::dds_reply(name),
             ros_type: S::Response::TYPE,
+            type_hash: None,
         };
         let replies = self.outbox(topic, &Qos::SERVICES, WhenFull::Drop)?;
         let graph = [

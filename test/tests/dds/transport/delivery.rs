@@ -157,7 +157,7 @@ fn a_second_subscription_hears_only_what_comes_after_it() {
 fn raw_messages_arrive_as_they_are() {
     let two = Two::start();
     let qos = Qos::reliable(100);
-    let raw = |topic, type_name| two.from.raw_publisher(topic, type_name, qos);
+    let raw = |topic, type_name| two.from.raw_publisher(topic, type_name, None, qos);
     let publisher = raw("/chatter", RosString::TYPE).unwrap();
     let (_there, heard) = two.hear("chatter", qos, Load::Small);
     wait_for_subscriber!(publisher);
@@ -183,7 +183,7 @@ fn undecodable_and_long_samples_are_counted_and_the_next_arrives() {
         ("best_effort", Qos::INS, Load::Large),
     ] {
         let name = format!("/{topic}");
-        let publisher = two.from.raw_publisher(&name, RosString::TYPE, qos);
+        let publisher = two.from.raw_publisher(&name, RosString::TYPE, None, qos);
         let publisher = publisher.unwrap();
         let (subscription, heard) = two.hear(topic, qos, load);
         wait_for_match!(publisher, subscription);
@@ -213,7 +213,9 @@ fn a_message_is_decoded_by_who_works_on_it() {
     let subscription = subscription.unwrap();
     let counts = || (subscription.received(), subscription.undecodable());
     let next = || heard.recv_timeout(PATIENCE).unwrap();
-    let there = two.from.raw_publisher("/chatter", RosString::TYPE, qos);
+    let there = two
+        .from
+        .raw_publisher("/chatter", RosString::TYPE, None, qos);
     let there = there.unwrap();
     wait_for_match!(there, subscription);
     let outside = cdr::to_vec(&text("outside")).unwrap();

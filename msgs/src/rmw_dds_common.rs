@@ -1,0 +1,43 @@
+//! The graph of nodes, as each participant publishes its part of it.
+//!
+//! `G` is the identity: [`Gid`], or one of another length, which distributions before Iron have.
+
+use serde::{Deserialize, Serialize};
+
+use crate::interface::messages;
+
+messages! {
+    "rmw_dds_common" in "../definitions/rmw_dds_common/";
+    Gid [];
+    NodeEntitiesInfo [Gid];
+    ParticipantEntitiesInfo [Gid, NodeEntitiesInfo];
+}
+
+/// Identity of an endpoint or a participant.
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Serialize, Deserialize)]
+pub struct Gid {
+    /// Its GUID.
+    pub data: [u8; 16],
+}
+
+/// A node and its endpoints.
+#[derive(Clone, Debug, Default, PartialEq, Serialize, Deserialize)]
+pub struct NodeEntitiesInfo<G = Gid> {
+    /// With the first slash.
+    pub node_namespace: String,
+    /// Without the namespace.
+    pub node_name: String,
+    /// Its subscriptions.
+    pub reader_gid_seq: Vec<G>,
+    /// Its publishers.
+    pub writer_gid_seq: Vec<G>,
+}
+
+/// The nodes of a participant.
+#[derive(Clone, Debug, Default, PartialEq, Serialize, Deserialize)]
+pub struct ParticipantEntitiesInfo<G = Gid> {
+    /// The participant.
+    pub gid: G,
+    /// Its nodes.
+    pub node_entities_info_seq: Vec<NodeEntitiesInfo<G>>,
+}

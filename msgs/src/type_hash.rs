@@ -1,0 +1,250 @@
+//! Type hashes of ROS 2 (RIHS01 of REP 2016), which endpoints announce beside the type's name.
+
+use std::collections::{BTreeMap, HashMap};
+use std::fmt::Write as _;
+use std::sync::LazyLock;
+
+use hmac_sha256::Hash;
+
+use crate::{MessageVisitor, RosMessage, visit_messages};
+
+/// Type hash (`RIHS01_...`) of a message by its definition with all dependencies (`ros2msg` text).
+///
+/// `None` where the text is not of that kind, or lacks a message that a field refers to.
+pub fn type_hash(ros_type: &str, definition: &str) -> Option<String> {
+    let [_, kind, _] = ros_type.split('/').collect::<Vec<_>>()[..] else {
+        return None;
+    };
+    let text = format!("{ros_type}\n{definition}");
+    let parts = text.split("\nMSG: ").map(|part| {
+        let (name, body) = part.split_once('\n').unwrap_or((part, ""));
+        (full_name(name.trim(), "", kind), body)
+    });
+    let parts: HashMap<_, _> = parts.collect();
+    let mut described = BTreeMap::new();
+    let mut wanted = vec![ros_type.to_owned()];
+    while let Some(name) = wanted.pop() {
+        if described.contains_key(&name) {
+            continue;
+        }
+        let json = describe(&name, parts.get(&name)?, kind, &mut wanted)?;
+        described.insert(name, json);
+    }
+    let main = described.remove(ros_type)?;
+    let referenced = Vec::from_iter(described.into_values()).join(", ");
+    let json = format!(
+        r#"{{"type_description": {main}, "referenced_type_descriptions": [{referenced}]}}"#
+    );
+    let mut hash = "RIHS01_".to_owned();
+    for byte in Hash::hash(json.as_bytes()) {
+        let _ = write!(hash, "{byte:02x}");
+    }
+    Some(hash)
+}
+
+/// Type hash of a message of this crate, or of a part of a service or an action.
+pub fn hash_of(ros_type: &str) -> Option<&'static str> {
+    static HASHES: LazyLock<Hashes> = LazyLock::new(|| {
+        let mut hashes = Hashes::default();
+        visit_messages(&mut hashes);
+        hashes
+    });
+    HASHES.0.get(ros_type).map(String::as_str)
+}
+
+#[derive(Default)]
+struct Hashes(HashMap<&'static str, String>);
+
+impl MessageVisitor for Hashes {
+    fn visit<M: RosMessage>(&mut self) {
+        let hash = type_hash(M::TYPE, &M::definition());
+        self.0.extend(hash.map(|hash| (M::TYPE, hash)));
+    }
+}
+
+/// Full name of a message that a definition calls `Name` or `package/Name`.
+///
+/// Parts of services and actions, whose names alone hold a `_`, are of the `kind` of what holds them.
+fn full_name(name: &str, package: &str, kind: &str) -> String {
+    let (package, last) = name.split_once('/').unwrap_or((package, name));
+    match last {
+        _ if last.contains('/') => name.to_owned(),
+        _ if last.contains('_') => format!("{package}/{kind}/{last}"),
+        _ => format!("{package}/msg/{last}"),
+    }
+}
+
+/// Canonical JSON of one message; the names of those that it holds are added to `nested`.
+fn describe(type_name: &str, text: &str, kind: &str, nested: &mut Vec<String>) -> Option<String> {
+    let (package, _) = type_name.split_once('/')?;
+    let mut fields = Vec::new();
+    for line in text.lines().filter(|line| !line.starts_with("====")) {
+        let line = line.split('#').next().unwrap_or_default().trim();
+        if line.is_empty() {
+            continue;
+        }
+        let (field_type, rest) = line.split_once(char::is_whitespace)?;
+        let rest = rest.trim_start();
+        let end = rest.find(|c: char| c == '=' || c.is_whitespace());
+        let (name, value) = rest.split_at(end.unwrap_or(rest.len()));
+        let is_constant = value.trim_start().starts_with('=');
+        if !is_constant {
+            fields.push(field(name, field_type, package, kind, nested)?);
+        }
+    }
+    if fields.is_empty() {
+        let padding = "structure_needs_at_least_one_member";
+        fields.push(field(padding, "uint8", package, kind, nested)?);
+    }
+    let fields = fields.join(", ");
+    is_plain(type_name).then(|| format!(r#"{{"type_name": "{type_name}", "fields": [{fields}]}}"#))
+}
+
+/// Canonical JSON of a field.
+fn field(
+    name: &str,
+    field_type: &str,
+    package: &str,
+    kind: &str,
+    nested: &mut Vec<String>,
+) -> Option<String> {
+    // The numbers are those of type_description_interfaces/msg/FieldType.
+    let (element, array) = match field_type.split_once('[') {
+        Some((element, array)) => (element, Some(array.strip_suffix(']')?)),
+        None => (field_type, None),
+    };
+    let (array_id, capacity) = match array {
+        None => (0, 0),
+        Some("") => (144, 0),
+        Some(length) => match length.strip_prefix("<=") {
+            Some(bound) => (96, bound.parse::<u64>().ok()?),
+            None => (48, length.parse().ok()?),
+        },
+    };
+    let (element, bound) = element.split_once("<=").unwrap_or((element, "0"));
+    let string_capacity: u64 = bound.parse().ok()?;
+    let mut nested_type_name = String::new();
+    let element_id = match element {
+        "int8" => 2,
+        "uint8" | "char" => 3,
+        "int16" => 4,
+        "uint16" => 5,
+        "int32" => 6,
+        "uint32" => 7,
+        "int64" => 8,
+        "uint64" => 9,
+        "float32" => 10,
+        "float64" => 11,
+        "bool" => 15,
+        "byte" => 16,
+        "string" if string_capacity == 0 => 17,
+        "wstring" if string_capacity == 0 => 18,
+        "string" => 21,
+        "wstring" => 22,
+        _ => {
+            nested_type_name = full_name(element, package, kind);
+            nested.push(nested_type_name.clone());
+            1
+        }
+    };
+    let type_id = array_id + element_id;
+    is_plain(name).then(|| {
+        format!(
+            "{{\"name\": \"{name}\", \"type\": {{\"type_id\": {type_id}, \"capacity\": {capacity}, \
+             \"string_capacity\": {string_capacity}, \"nested_type_name\": \"{nested_type_name}\"}}}}"
+        )
+    })
+}
+
+/// True if JSON holds the name as it is.
+fn is_plain(name: &str) -> bool {
+    let plain = |c: char| c.is_ascii_alphanumeric() || c == '_' || c == '/';
+    !name.is_empty() && name.chars().all(plain)
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn hashes_are_those_of_jazzy() {
+        for (ros_type, hash) in [
+            (
+                "std_msgs/msg/Empty",
+                "20b625256f32d5dbc0d04fee44f43c41e51c70d3502f84b4a08e7a9c26a96312",
+            ),
+            (
+                "sensor_msgs/msg/PointCloud2",
+                "9198cabf7da3796ae6fe19c4cb3bdd3525492988c70522628af5daa124bae2b5",
+            ),
+            (
+                "std_srvs/srv/Trigger_Request",
+                "d010825374ce8918e72bfd826c82603e60f45419e932ea976f807b74a863a199",
+            ),
+            (
+                "lattice_msgs/action/Calibrate_SendGoal_Request",
+                "633ff632cf5fce07a9ad82ca5b69b512e6bc981c9789c5001c7e490213e9e1a3",
+            ),
+            (
+                "rmw_dds_common/msg/ParticipantEntitiesInfo",
+                "91a0593bacdcc50ea9bdcf849a938b128412cc1ea821245c663bcd26f83c295e",
+            ),
+        ] {
+            let expected = format!("RIHS01_{hash}");
+            assert_eq!(hash_of(ros_type), Some(expected.as_str()), "{ros_type}");
+        }
+        assert_eq!(hash_of("std_msgs/msg/Nothing"), None);
+    }
+
+    #[test]
+    fn every_message_has_a_hash() {
+        struct Known;
+        impl MessageVisitor for Known {
+            fn visit<M: RosMessage>(&mut self) {
+                assert!(hash_of(M::TYPE).is_some(), "{}", M::TYPE);
+            }
+        }
+        visit_messages(&mut Known);
+    }
+
+    #[test]
+    fn definitions_of_other_writers_are_read() {
+        // Bounded sequences, parts of a service, a full name, line ends of Windows.
+        let event = "service_msgs/ServiceEventInfo info\r\nTrigger_Request[<=1] request\r\n\
+                     Trigger_Response[<=1] response\r\n====\r\nMSG: std_srvs/srv/Trigger_Request\r\n\
+                     ====\r\nMSG: std_srvs/Trigger_Response\r\nbool success\r\nstring message\r\n\
+                     ====\r\nMSG: service_msgs/ServiceEventInfo\r\nuint8 REQUEST_SENT = 0\r\n\
+                     uint8 event_type 0 # a default\r\nbuiltin_interfaces/Time stamp\r\n\
+                     char[16] client_gid\r\nint64 sequence_number\r\n====\r\n\
+                     MSG: builtin_interfaces/msg/Time\r\nint32 sec\r\nuint32 nanosec\r\n";
+        let hash = type_hash("std_srvs/srv/Trigger_Event", event);
+        assert_eq!(
+            hash.as_deref(),
+            Some("RIHS01_ec4a1d26b0575e61906890342aba9523a2360e9845857c5590fa6e23bc39e1c2")
+        );
+        // The main definition has a head, too; a part that nobody needs does not count.
+        let string = "====\nMSG: std_msgs/msg/String\nstring data\n====\nMSG: a/B\nstring";
+        let hash = type_hash("std_msgs/msg/String", string);
+        assert_eq!(hash.as_deref(), hash_of("std_msgs/msg/String"));
+    }
+
+    #[test]
+    fn what_is_no_definition_has_no_hash() {
+        for wrong in [
+            "string",
+            "Missing x",
+            "int32[ x",
+            "int32[<=x] x",
+            "int32 x\"y",
+            "---",
+            "====\nIDL: a/msg/B\nmodule a {};",
+        ] {
+            assert_eq!(
+                type_hash("a/msg/A", &format!("int32 a\n{wrong}\n")),
+                None,
+                "{wrong}"
+            );
+        }
+        assert_eq!(type_hash("String", "string data\n"), None);
+    }
+}
