@@ -23,7 +23,7 @@ use super::cyclone::Cyclone;
 use super::dds::Dds;
 use super::diagnostics::Tasks;
 use super::endpoints::Endpoints;
-use super::env::{Network, TransportKind};
+use super::env::Network;
 use super::error::RuntimeError;
 use super::graph::{self, Graph, NodeId};
 use super::local_bus::LocalBus;
@@ -270,7 +270,7 @@ impl Shared {
 fn join(network: &Network, shutdown: &Shutdown) -> Result<Arc<dyn Transport>, RuntimeError> {
     match network.transport {
         #[cfg(feature = "cyclone")]
-        TransportKind::Cyclone => Ok(Arc::new(Cyclone::join(network)?)),
+        super::env::TransportKind::Cyclone => Ok(Arc::new(Cyclone::join(network)?)),
         _ => {
             let (domain, localhost_only) = (network.domain_id, network.localhost_only);
             Ok(Arc::new(Dds::join(domain, localhost_only, shutdown)?))
