@@ -24,6 +24,9 @@ pub const NAME: &str = "bag_player";
 const FLUSH_TIME: Duration = Duration::from_secs(20);
 /// The same after a signal.
 const HURRIED_FLUSH_TIME: Duration = Duration::from_secs(2);
+/// A player that is later than this goes on from there: what it missed would come in one burst, too fast
+/// for those who listen.
+const MOST_LATE: Duration = Duration::from_secs(1);
 /// Longest sleep between two looks at the shutdown flag.
 const NAP: Duration = Duration::from_millis(100);
 /// Largest depth of a publisher whose recorder kept all samples.
@@ -162,6 +165,15 @@ fn offered(topic: &TopicInfo) -> Qos {
     }
 }
 
+/// The part of a delay by which all that follows is late too.
+fn not_made_up(late: Duration) -> Duration {
+    if late <= MOST_LATE {
+        return Duration::ZERO;
+    }
+    log::warn!("{late:.1?} late; so is all that follows");
+    late
+}
+
 struct Shell {
     player: Player,
     /// First and last time of the log.
@@ -196,7 +208,7 @@ impl Shell {
     }
 
     fn play(&mut self) -> Result<(), NodeError> {
-        let begin = Instant::now();
+        let mut begin = Instant::now();
         let (first_ns, last_ns) = self.span_ns;
         let span_ns = last_ns.saturating_sub(first_ns).max(1);
         let mut percent = 0;
@@ -208,9 +220,11 @@ impl Shell {
                 std::thread::sleep((due - now).min(NAP));
                 continue;
             }
+            let late = now - due;
+            begin += not_made_up(late);
             match self.player.next()? {
                 Step::Publish { topic, data } => {
-                    let late_ms = (now - due).as_millis() as u64;
+                    let late_ms = late.as_millis() as u64;
                     self.report.latest_ms = self.report.latest_ms.max(late_ms);
                     self.publish(topic, data);
                 }
@@ -269,5 +283,17 @@ impl Shell {
             self.report.messages,
             self.report.latest_ms
         );
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn a_long_delay_is_not_made_up_in_a_burst() {
+        let long = Duration::from_secs(39);
+        assert_eq!(not_made_up(long), long);
+        assert_eq!(not_made_up(MOST_LATE), Duration::ZERO);
     }
 }

@@ -274,25 +274,26 @@ impl Shared {
     async fn write(&self, body: Bytes, related: Option<SampleId>) {
         let start = Instant::now();
         while let Some(writer) = self.writer() {
-            let patience = match self.when_full {
-                WhenFull::Wait => None,
-                WhenFull::Drop if self.stuck.load(Relaxed) => Some(PATIENCE_WITH_STUCK_PEER),
-                WhenFull::Drop => Some(PATIENCE),
-            };
             let may_wait = self.when_full == WhenFull::Wait;
+            let left = match self.when_full {
+                WhenFull::Wait => WARNING_PERIOD,
+                WhenFull::Drop if self.stuck.load(Relaxed) => {
+                    PATIENCE_WITH_STUCK_PEER.saturating_sub(start.elapsed())
+                }
+                WhenFull::Drop => PATIENCE.saturating_sub(start.elapsed()),
+            };
             let write = writer.write(body.clone(), related, may_wait);
-            let result = match patience {
-                None => write.await,
-                Some(patience) => {
-                    let left = patience.saturating_sub(start.elapsed());
-                    match select(write, Timer::after(left)).await {
-                        Either::Left((result, _)) => result,
-                        Either::Right(_) => {
-                            self.stuck.store(true, Relaxed);
-                            self.drop_one("a reliable subscriber does not keep up");
-                            return;
-                        }
-                    }
+            let result = match select(write, Timer::after(left)).await {
+                Either::Left((result, _)) => result,
+                Either::Right(_) if may_wait => {
+                    let topic = &self.topic;
+                    log::warn!("{topic}: waits for a reliable subscriber that does not answer");
+                    continue;
+                }
+                Either::Right(_) => {
+                    self.stuck.store(true, Relaxed);
+                    self.drop_one("a reliable subscriber does not keep up");
+                    return;
                 }
             };
             match result {
