@@ -1,8 +1,7 @@
 //! The other ends of one publisher or subscription, in this process and outside.
 
-use std::collections::{BTreeMap, BTreeSet};
+use std::collections::BTreeSet;
 use std::sync::{Arc, Mutex};
-use std::time::Instant;
 
 use super::port::EndpointId;
 use super::sync::{Changed, lock};
@@ -28,8 +27,7 @@ pub(crate) struct Peers {
 
 #[derive(Default)]
 struct State {
-    /// Each with the time of its match.
-    remote: BTreeMap<EndpointId, Instant>,
+    remote: BTreeSet<EndpointId>,
     local: usize,
     /// Number of the change that `local` was counted at.
     local_change: u64,
@@ -59,16 +57,10 @@ impl Peers {
         lock(&self.state).remote.len()
     }
 
-    /// Completes when such a peer in another process is known, with the time of its match.
-    pub(crate) async fn known(&self, wanted: impl Fn(&EndpointId) -> bool) -> Instant {
-        let known = || {
-            let state = lock(&self.state);
-            let mut peers = state.remote.iter();
-            peers
-                .find(|(peer, _)| wanted(peer))
-                .map(|(_, since)| *since)
-        };
-        self.joined.until(known).await
+    /// Completes when such a peer in another process is known.
+    pub(crate) async fn known(&self, wanted: impl Fn(&EndpointId) -> bool) {
+        let known = || lock(&self.state).remote.iter().any(&wanted).then_some(());
+        self.joined.until(known).await;
     }
 
     /// Peers here and elsewhere.
@@ -96,10 +88,9 @@ impl Peers {
     pub(crate) fn add(&self, peer: EndpointId) {
         let mut state = lock(&self.state);
         state.incompatible.remove(&peer);
-        if state.remote.len() >= MAX_PEERS || state.remote.contains_key(&peer) {
+        if state.remote.len() >= MAX_PEERS || !state.remote.insert(peer) {
             return;
         }
-        state.remote.insert(peer, Instant::now());
         let count = state.remote.len().saturating_add(state.local);
         drop(state);
         self.joined(count);
@@ -109,7 +100,7 @@ impl Peers {
     pub(crate) fn remove(&self, gone: impl Fn(&EndpointId) -> bool) {
         let mut state = lock(&self.state);
         let before = state.remote.len();
-        state.remote.retain(|peer, _| !gone(peer));
+        state.remote.retain(|peer| !gone(peer));
         state.incompatible.retain(|peer| !gone(peer));
         if state.remote.len() < before {
             let count = state.remote.len().saturating_add(state.local);

@@ -14,12 +14,14 @@ mod writer;
 pub(crate) use participant::effective_receive_buffer;
 
 use std::sync::Arc;
+use std::time::Instant;
 
 use futures::StreamExt;
 use futures::future::BoxFuture;
 use futures::stream::BoxStream;
 use rustdds::rpc::SampleIdentity;
 use rustdds::{GUID, SequenceNumber};
+use smol::Timer;
 use smol::channel::{Receiver, bounded};
 
 use self::lives::Lives;
@@ -39,7 +41,8 @@ const MAX_EVENTS: usize = 2048;
 /// The DDS participant of a process: made anew, with its endpoints, when it no longer works.
 pub(crate) struct Dds {
     lives: Arc<Lives>,
-    events: Receiver<PortEvent>,
+    /// Each with the time at which it is passed on.
+    events: Receiver<(Instant, PortEvent)>,
     _thread: TaskThread,
 }
 
@@ -96,7 +99,11 @@ impl Transport for Dds {
     }
 
     fn events(&self) -> BoxStream<'static, PortEvent> {
-        self.events.clone().boxed()
+        let events = self.events.clone().then(|(due, event)| async move {
+            Timer::at(due).await;
+            event
+        });
+        events.boxed()
     }
 
     fn pairs_own_endpoints(&self) -> bool {

@@ -20,13 +20,17 @@ use crate::port::PortEvent;
 /// Between two looks at the participant, and between two attempts to make one.
 const PERIOD: Duration = Duration::from_millis(500);
 
+/// Between an event and its news. RustDDS reports a match before it tells the reader where the numbers of
+/// the writer begin; a sample that was written by then is history to a volatile reader of Cyclone.
+const SETTLE_TIME: Duration = Duration::from_millis(20);
+
 /// Looks after the participants of a process.
 pub(super) struct Supervisor {
     lives: Arc<Lives>,
     returns: Returns,
     /// See [`Returns`].
     scout: Option<(Arc<Participant>, Events)>,
-    out: Sender<PortEvent>,
+    out: Sender<(Instant, PortEvent)>,
 }
 
 type Events = BoxStream<'static, DomainParticipantStatusEvent>;
@@ -47,7 +51,7 @@ async fn next(events: &mut Events) -> DomainParticipantStatusEvent {
 
 impl Supervisor {
     /// Events go to `out`.
-    pub(super) fn new(lives: Arc<Lives>, out: Sender<PortEvent>) -> Self {
+    pub(super) fn new(lives: Arc<Lives>, out: Sender<(Instant, PortEvent)>) -> Self {
         Self {
             lives,
             returns: Returns::new(),
@@ -169,7 +173,9 @@ impl Supervisor {
     }
 
     async fn tell(&mut self, event: PortEvent) {
+        let now = Instant::now();
+        let due = now.checked_add(SETTLE_TIME).unwrap_or(now);
         // Nobody listens at the end.
-        let _ = self.out.send(event).await;
+        let _ = self.out.send((due, event)).await;
     }
 }

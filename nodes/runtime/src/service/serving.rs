@@ -20,10 +20,6 @@ use crate::port::{EndpointId, Origin, SampleReader};
 /// A client may ask before its reply reader is known here; a reply sent then would be lost.
 const WAIT_FOR_CLIENT: Duration = Duration::from_secs(1);
 
-/// A reader that is matched is told where our numbers begin. A reply before that is history to it, which
-/// a volatile reader of Cyclone does not take.
-const SETTLE_TIME: Duration = Duration::from_millis(20);
-
 /// A server at work.
 pub(crate) struct Serving {
     pub name: String,
@@ -126,12 +122,7 @@ impl Serving {
     }
 
     async fn wait_for_reader(&self, client: &EndpointId) {
-        let known = async {
-            let since = self.readers.known(|reader| reader.is_beside(client)).await;
-            if let Some(settled) = since.checked_add(SETTLE_TIME) {
-                Timer::at(settled).await;
-            }
-        };
+        let known = self.readers.known(|reader| reader.is_beside(client));
         let timeout = async {
             Timer::after(WAIT_FOR_CLIENT).await;
         };
