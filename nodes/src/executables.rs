@@ -53,7 +53,8 @@ pub fn answers_help(name: &str, args: &RosArgs) -> bool {
              [--log-level LEVEL] ...]\n\n\
              Topics and services are in README.md; every parameter, with its unit and meaning, is in\n\
              params/bobcat.yaml and params/semantic_icp.yaml.\n\n\
-             Environment: ROS_DOMAIN_ID, ROS_AUTOMATIC_DISCOVERY_RANGE (LOCALHOST or SUBNET), RUST_LOG."
+             Environment: ROS_DOMAIN_ID, ROS_AUTOMATIC_DISCOVERY_RANGE (LOCALHOST or SUBNET),\n\
+             RMW_IMPLEMENTATION (rmw_cyclonedds_cpp where built in, or rustdds), RUST_LOG."
         );
     }
     asked

@@ -2,8 +2,8 @@
 
     service_clients.py DOMAIN SERVICE COUNT     prints one line of JSON
 
-A client sends its request as soon as it knows the server's reader, so that the request overtakes the
-discovery of the reader for the reply.
+A client makes the reader of the reply once it knows the server, and asks at once: the request overtakes
+the discovery of that reader.
 """
 
 import json
@@ -31,11 +31,11 @@ def wait(peer, reached):
 def call(domain, service, number):
     """Time to the reply, s; none if there was none."""
     peer, replies = Peer(domain), []
-    peer.reader(f"rr/{service}Reply", ros.TriggerResponse, qos(10), replies.append)
     request = f"rq/{service}Request"
     writer = peer.writer(request, ros.TriggerRequest, qos(10))
     if not wait(peer, lambda: peer.matched.get(request)):
         sys.exit(f"client {number} does not find the server")
+    peer.reader(f"rr/{service}Reply", ros.TriggerResponse, qos(10), replies.append)
     start = time.monotonic()
     writer.write(ros.TriggerRequest(number, 1, 0))
     answered = wait(peer, lambda: any(reply.client == number for reply in replies))

@@ -29,12 +29,12 @@ fn a_crowd_of_participants_hears_the_last_one() {
             .collect();
         let last = runtime(&domain, *transport, "last");
         let node = last.node("last").unwrap();
-        let publisher = node.publisher("/in", QOS).unwrap();
+        let publisher = node.publisher("/heard", QOS).unwrap();
         let (sender, heard) = channel();
         let handler = move |_: std::sync::Arc<RosString>| {
             let _ = sender.send(());
         };
-        let _out = node.subscribe("/out", QOS, Load::Small, handler).unwrap();
+        let _out = node.subscribe("/said", QOS, Load::Small, handler).unwrap();
         let (sender, joined) = channel();
         publisher.on_subscriber_joined(move || {
             let _ = sender.send(());

@@ -34,7 +34,8 @@ const QOS: Qos = Qos::reliable(100);
 /// Domain of an echo.
 const DOMAIN: &str = "LATTICE_TEST_ECHO_DOMAIN";
 
-type Transport = (&'static str, TransportKind);
+/// Name in `RMW_IMPLEMENTATION`, and what it names.
+pub type Transport = (&'static str, TransportKind);
 
 /// Every transport with every other, itself included.
 fn pairs() -> impl Iterator<Item = (Transport, Transport)> {
@@ -51,11 +52,11 @@ fn runtime(domain: &TestDomain, transport: Transport, name: &str) -> Runtime {
     Runtime::with_transport(name, args, &network).unwrap()
 }
 
-/// A process that says again on `out` what it hears on `in`.
-struct Echo(Child);
+/// A process that says again on `/said` what it hears on `/heard`, and has a latched `/map`.
+pub struct Echo(pub Child);
 
 impl Echo {
-    fn start(domain: &TestDomain, transport: Transport) -> Self {
+    pub fn start(domain: &TestDomain, transport: Transport) -> Self {
         let program = std::env::current_exe().unwrap();
         let child = Command::new(program)
             .args(["--exact", "conformance::echo", "--ignored", "--nocapture"])
@@ -66,7 +67,7 @@ impl Echo {
         Self(child.unwrap())
     }
 
-    fn signal(&self, name: &str) {
+    pub fn signal(&self, name: &str) {
         let id = self.0.id().to_string();
         let done = Command::new("kill").args(["-s", name, &id]).status();
         assert!(done.unwrap().success());
@@ -94,12 +95,17 @@ fn echo() {
     let args = RosArgs::parse(["--ros-args".to_owned()]).unwrap();
     let runtime = Runtime::with_transport("echo", args, &network).unwrap();
     let node = runtime.node("echo").unwrap();
-    let out = node.publisher::<RosString>("/out", QOS).unwrap();
+    let out = node.publisher::<RosString>("/said", QOS).unwrap();
+    let map = node.publisher("/map", Qos::latched(1)).unwrap();
+    map.publish(RosString {
+        data: "map".to_owned(),
+    })
+    .unwrap();
     let say_again = move |message| {
         let _ = out.publish(message);
     };
     let _heard = node
-        .subscribe::<RosString>("/in", QOS, Load::Small, say_again)
+        .subscribe::<RosString>("/heard", QOS, Load::Small, say_again)
         .unwrap();
     runtime.spin().unwrap();
 }
@@ -116,12 +122,12 @@ impl Talk {
     fn start(domain: &TestDomain, transport: Transport) -> Self {
         let runtime = runtime(domain, transport, "talk");
         let node = runtime.node("talk").unwrap();
-        let publisher = node.publisher("/in", QOS).unwrap();
+        let publisher = node.publisher("/heard", QOS).unwrap();
         let (sender, heard) = channel();
         let handler = move |message: std::sync::Arc<RosString>| {
             let _ = sender.send(message.data.clone());
         };
-        let subscription = node.subscribe("/out", QOS, Load::Small, handler).unwrap();
+        let subscription = node.subscribe("/said", QOS, Load::Small, handler).unwrap();
         Self {
             publisher,
             heard,

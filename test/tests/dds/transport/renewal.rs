@@ -1,86 +1,19 @@
 //! Processes that are stopped for a while, as by Ctrl-Z or a debugger.
 
-use std::io::{BufRead, BufReader};
-use std::process::{Child, Command, Stdio};
+use std::process::Command;
 use std::sync::mpsc::channel;
 use std::sync::{Arc, Mutex};
 use std::time::{Duration, Instant};
 
 use lattice_msgs::std_msgs::String as RosString;
 use lattice_runtime::Load;
-use lattice_runtime::Runtime;
 use lattice_runtime::env::{Network, TransportKind};
 use lattice_runtime::qos::Qos;
-use lattice_runtime::ros_args::RosArgs;
 use lattice_test::domain::TestDomain;
 use lattice_test::python::{python, script};
 
 use super::{PATIENCE, assert_heard, hear, runtime, text, wait_until};
-
-/// Names the domain to the process of [`echo`].
-const DOMAIN: &str = "LATTICE_TEST_ECHO_DOMAIN";
-
-/// A child that must not outlive the test.
-struct Echo(Child);
-
-impl Echo {
-    /// Starts this very test program with [`echo`] as its only test.
-    fn start(domain: &TestDomain) -> Self {
-        let child = Command::new(std::env::current_exe().unwrap())
-            .args([
-                "transport::renewal::echo",
-                "--exact",
-                "--ignored",
-                "--nocapture",
-            ])
-            .env(DOMAIN, domain.id().to_string())
-            .stdin(Stdio::piped())
-            .spawn();
-        Self(child.unwrap())
-    }
-
-    fn signal(&self, name: &str) {
-        let id = self.0.id().to_string();
-        let status = Command::new("kill").args(["-s", name, &id]).status();
-        assert!(status.unwrap().success(), "kill -s {name}");
-    }
-}
-
-impl Drop for Echo {
-    fn drop(&mut self) {
-        self.0.kill().unwrap();
-        self.0.wait().unwrap();
-    }
-}
-
-/// The process that is stopped: has a latched map, and repeats what it hears until its input ends.
-#[test]
-#[ignore = "a process of another test"]
-fn echo() {
-    let Ok(domain) = std::env::var(DOMAIN) else {
-        return;
-    };
-    let network = Network {
-        domain_id: domain.parse().unwrap(),
-        localhost_only: true,
-        ..Network::from_env().unwrap()
-    };
-    let args = RosArgs::parse(["--ros-args".to_owned()]).unwrap();
-    let runtime = Runtime::with_transport("echo", args, &network).unwrap();
-    let node = runtime.node("echo").unwrap();
-    let map = node.publisher("/map", Qos::latched(1)).unwrap();
-    map.publish(text("map")).unwrap();
-    let said = node
-        .publisher::<RosString>("/said", Qos::reliable(10))
-        .unwrap();
-    let repeat = move |heard: Arc<RosString>| said.publish(heard).unwrap();
-    let _subscription = node
-        .subscribe("/heard", Qos::reliable(10), Load::Small, repeat)
-        .unwrap();
-    // Ends with the test.
-    let lines = BufReader::new(std::io::stdin()).lines();
-    lines.for_each(drop);
-}
+use crate::conformance::Echo;
 
 #[test]
 fn a_process_that_was_stopped_hears_and_is_heard_again() {
@@ -89,7 +22,9 @@ fn a_process_that_was_stopped_hears_and_is_heard_again() {
         return;
     }
     // Long enough for every thread of it to be interrupted.
-    stop_and_go(Echo::start, Duration::from_secs(1));
+    let transport = ("rustdds", TransportKind::RustDds);
+    let start = |domain: &TestDomain| Echo::start(domain, transport);
+    stop_and_go(start, Duration::from_secs(1));
 }
 
 #[test]
