@@ -26,7 +26,7 @@ fn small_messages_arrive_in_order() {
     let qos = Qos::reliable(50);
     let publisher = two.publisher("chatter", qos);
     let (subscription, heard) = two.hear("chatter", qos, Load::Small);
-    wait_for_subscriber!(publisher);
+    wait_for_match!(publisher, subscription);
     count_to(50, &publisher);
     assert_counted(50, &heard);
     let counts = (subscription.publisher_count(), publisher.subscriber_count());
