@@ -9,8 +9,8 @@ use cyclors::{
 
 use crate::port::ENCAPSULATION_BYTES;
 
-/// Encapsulation header of little-endian CDR without options.
-const CDR_LE: [u8; ENCAPSULATION_BYTES] = [0, 1, 0, 0];
+/// Samples on the wire are multiples of this, bytes. Cyclone reads so far also where a sample ends before.
+const WORD_BYTES: usize = 4;
 
 /// A reference to a serialised sample, encapsulation header first.
 pub(super) struct Serialised(NonNull<ddsi_serdata>);
@@ -19,13 +19,20 @@ pub(super) struct Serialised(NonNull<ddsi_serdata>);
 unsafe impl Send for Serialised {}
 
 impl Serialised {
-    /// A copy of the body of a little-endian CDR sample. None: longer than Cyclone takes.
+    /// A copy of the body of a little-endian CDR sample, padded with zeros. None: longer than Cyclone
+    /// takes.
     ///
     /// # Safety
     ///
     /// `sertype` is that of an entity that lives during the call.
     pub(super) unsafe fn from_body(sertype: *const ddsi_sertype, body: &[u8]) -> Option<Self> {
+        let padding = body.len().wrapping_neg() % WORD_BYTES;
+        let zeros = [0; WORD_BYTES];
+        let zeros = zeros.get(..padding)?;
+        // Little-endian CDR; the last two bits of the options count the padding (XTypes 1.3, 7.6.3.1.2).
+        let header: [u8; ENCAPSULATION_BYTES] = [0, 1, 0, u8::try_from(padding).ok()?];
         let bytes = ENCAPSULATION_BYTES.checked_add(body.len())?;
+        let bytes = bytes.checked_add(padding)?;
         if i32::try_from(bytes).is_err() {
             return None;
         }
@@ -33,7 +40,7 @@ impl Serialised {
             iov_base: part.as_ptr().cast_mut().cast(),
             iov_len: part.len(),
         };
-        let parts = [part(&CDR_LE), part(body)];
+        let parts = [part(&header), part(body), part(zeros)];
         // SAFETY: the caller says that `sertype` is alive; the parts are read, `bytes` in all, and copied.
         let made = unsafe {
             let (count, first) = (parts.len(), parts.as_ptr());
