@@ -7,6 +7,7 @@ use std::sync::Mutex;
 use cyclors::dds_create_domain;
 
 use super::config::config;
+use super::confine::to_loopback;
 use super::entity::Entity;
 use crate::env::Network;
 use crate::sync::lock;
@@ -35,7 +36,11 @@ impl Domain {
         let config = CString::new(config(network, uri.as_deref()));
         let config = config.map_err(|_| "CYCLONEDDS_URI has a zero byte".to_owned())?;
         // SAFETY: a string that ends with 0 and is read during the call.
-        let made = unsafe { dds_create_domain(u32::from(id), config.as_ptr()) };
+        let make = || unsafe { dds_create_domain(u32::from(id), config.as_ptr()) };
+        let made = match network.localhost_only {
+            true => to_loopback(make),
+            false => make(),
+        };
         let shared = Shared {
             users: 1,
             _domain: Entity::new(made)?,

@@ -6,6 +6,7 @@
 mod arrivals;
 mod blob;
 mod config;
+mod confine;
 mod discovery;
 mod domain;
 mod endpoint;
