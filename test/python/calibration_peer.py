@@ -8,7 +8,7 @@ import json
 import sys
 from pathlib import Path
 
-from dds_peer import FLOAT32, PATIENCE_S, Peer, header, qos
+from cyclone_peer import FLOAT32, PATIENCE_S, Peer, header, qos
 import ros_idl as ros
 
 UINT16 = 4

@@ -5,109 +5,26 @@
 
 import faulthandler
 import json
-import os
 import sys
 import time
 from pathlib import Path
 
-# Loopback only and without multicast, which loopback has not on most machines.
-os.environ["CYCLONEDDS_URI"] = """<CycloneDDS><Domain Id="any">
-<General><Interfaces><NetworkInterface name="lo" multicast="false"/></Interfaces>
-<AllowMulticast>false</AllowMulticast></General>
-<Discovery><ParticipantIndex>auto</ParticipantIndex>
-<MaxAutoParticipantIndex>20</MaxAutoParticipantIndex>
-<Peers><Peer Address="127.0.0.1"/></Peers></Discovery></Domain></CycloneDDS>"""
-
 import numpy
+# First: it sets what Cyclone reads when it is loaded.
+from cyclone_peer import FLOAT32, PATIENCE_S, Peer, header, qos
 import ros_idl as ros
 from cyclonedds.builtin import (
     BuiltinDataReader,
     BuiltinTopicDcpsPublication,
     BuiltinTopicDcpsSubscription,
 )
-from cyclonedds.core import DDSStatus, WaitSet
-from cyclonedds.domain import DomainParticipant
-from cyclonedds.pub import DataWriter
-from cyclonedds.qos import Policy, Qos
-from cyclonedds.sub import DataReader
-from cyclonedds.topic import Topic
+from cyclonedds.qos import Policy
 from cyclonedds.util import duration
 from lattice_by_search import Expected, decode_keys, exposed_faces, fcc, keys_of, nearest
 
-# A test that passes does not wait for it.
-PATIENCE_S = 120
 # Poses that are sent until the first transform is heard, at most.
 MOST_AHEAD = 100
-FLOAT32, TRIANGLE_LIST, ADD, DELETE, DELETEALL = 7, 11, 0, 2, 3
-
-
-def qos(depth, latched=False):
-    durability = Policy.Durability.TransientLocal if latched else Policy.Durability.Volatile
-    return Qos(
-        Policy.Reliability.Reliable(duration(seconds=10)),
-        Policy.History.KeepLast(depth),
-        durability,
-        Policy.DataRepresentation(use_cdrv0_representation=True),
-    )
-
-
-class Peer:
-    """A participant that waits for what happens at its endpoints."""
-
-    def __init__(self, domain):
-        self.participant = DomainParticipant(domain)
-        self.waits = WaitSet(self.participant)
-        self.readers, self.writers, self.matched = {}, {}, {}
-
-    def writer(self, topic, message, qos):
-        writer = DataWriter(self.participant, Topic(self.participant, topic, message), qos)
-        writer.set_status_mask(DDSStatus.PublicationMatched)
-        self.waits.attach(writer)
-        self.writers[topic] = writer
-        return writer
-
-    def reader(self, topic, message, qos, handler):
-        reader = DataReader(self.participant, Topic(self.participant, topic, message), qos)
-        return self.attach(topic, reader, handler)
-
-    def attach(self, topic, reader, handler):
-        reader.set_status_mask(DDSStatus.DataAvailable | DDSStatus.SubscriptionMatched)
-        self.waits.attach(reader)
-        self.readers[topic] = (reader, handler)
-        return reader
-
-    def turn(self):
-        """Takes everything that is there; what was looked at no longer wakes the waitset."""
-        for topic, (reader, handler) in self.readers.items():
-            self.matched[topic] = reader.get_subscription_matched_status().current_count
-            # Taking resets the status even where it leaves samples.
-            while samples := reader.take(N=50):
-                for sample in samples:
-                    if sample.sample_info.valid_data:
-                        handler(sample)
-        for topic, writer in self.writers.items():
-            self.matched[topic] = writer.get_publication_matched_status().current_count
-
-    def until(self, reached, state):
-        """Waits for events until `reached`; else dies with what `state` says."""
-        end = time.monotonic() + PATIENCE_S
-        self.turn()
-        while not reached():
-            left = end - time.monotonic()
-            if left <= 0:
-                sys.exit(f"dds_peer.py waited {PATIENCE_S} s in vain: {state()}")
-            self.waits.wait(duration(seconds=left))
-            self.turn()
-
-    def until_matched(self):
-        self.until(
-            lambda: len(self.matched) > 0 and all(self.matched.values()),
-            lambda: f"endpoints matched: {self.matched}",
-        )
-
-
-def header(stamp_ns, frame):
-    return ros.Header(ros.Time(stamp_ns // 10**9, stamp_ns % 10**9), frame)
+TRIANGLE_LIST, ADD, DELETE, DELETEALL = 11, 0, 2, 3
 
 
 def odometry(row):

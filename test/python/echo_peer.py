@@ -5,8 +5,8 @@
 
 import sys
 
+from cyclone_peer import PATIENCE_S, Peer, qos
 from cyclonedds.util import duration
-from dds_peer import PATIENCE_S, Peer, qos
 import ros_idl as ros
 
 String = ros.ros("std_msgs/msg/String", data=str)

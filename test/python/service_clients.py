@@ -11,9 +11,9 @@ import statistics
 import sys
 import time
 
+from cyclone_peer import Peer, qos
 import ros_idl as ros
 from cyclonedds.util import duration
-from dds_peer import Peer, qos
 
 # For a match, and for a reply: one that takes longer is lost.
 PATIENCE_S = 10
