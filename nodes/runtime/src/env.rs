@@ -70,6 +70,19 @@ pub enum EnvError {
     },
 }
 
+impl EnvError {
+    pub(crate) fn not_built_in(given: &str) -> Self {
+        let names: Vec<_> = TransportKind::BUILT_IN
+            .iter()
+            .map(|(name, _)| *name)
+            .collect();
+        Self::Transport {
+            given: given.to_owned(),
+            possible: names.join(" and "),
+        }
+    }
+}
+
 impl Network {
     /// Reads the environment of the process.
     pub fn from_env() -> Result<Network, EnvError> {
@@ -124,13 +137,9 @@ fn transport(name: Option<String>) -> Result<TransportKind, EnvError> {
         None => built_in.first(),
         Some(name) => built_in.iter().find(|(known, _)| known == name),
     };
-    found.map(|(_, kind)| *kind).ok_or_else(|| {
-        let names: Vec<_> = built_in.iter().map(|(name, _)| *name).collect();
-        EnvError::Transport {
-            given: name.unwrap_or_default(),
-            possible: names.join(" and "),
-        }
-    })
+    let given = name.as_deref().unwrap_or_default();
+    let kind = found.map(|(_, kind)| *kind);
+    kind.ok_or_else(|| EnvError::not_built_in(given))
 }
 
 /// Addresses separated by `;`.

@@ -107,7 +107,7 @@ pub(crate) trait Transport: Send + Sync {
         id
     }
 
-    /// How often the participant was made anew because it no longer worked.
+    /// Number of times that the participant was made anew because it no longer worked.
     fn renewals(&self) -> u64 {
         0
     }

@@ -169,7 +169,7 @@ impl Check {
         }
     }
 
-    /// Whether the difference is allowed.
+    /// True if the difference is within the tolerance.
     pub fn holds(&self) -> bool {
         self.holds
     }

@@ -107,7 +107,7 @@ impl Participant {
         raw_reader(&self.participant, &self.subscriber, of)
     }
 
-    /// What happens to it, own endpoints and their matches with each other included.
+    /// Status events of the participant, its own endpoints and their matches with each other included.
     pub(super) fn events(&self) -> BoxStream<'static, DomainParticipantStatusEvent> {
         let listener = self.participant.status_listener();
         let events = futures::stream::unfold(listener, |listener| async move {

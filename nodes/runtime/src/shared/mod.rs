@@ -23,7 +23,9 @@ use super::cyclone::Cyclone;
 use super::dds::Dds;
 use super::diagnostics::Tasks;
 use super::endpoints::Endpoints;
-use super::env::Network;
+#[cfg(not(feature = "cyclone"))]
+use super::env::EnvError;
+use super::env::{Network, TransportKind};
 use super::error::RuntimeError;
 use super::graph::{self, Graph, NodeId};
 use super::local_bus::LocalBus;
@@ -207,7 +209,7 @@ impl Shared {
             .is_some_and(|open| open.transport.pairs_own_endpoints())
     }
 
-    /// How often the participant was made anew.
+    /// Number of times that the participant was made anew.
     pub(crate) fn renewals(&self) -> u64 {
         let open = lock(&self.open);
         open.as_ref().map_or(0, |open| open.transport.renewals())
@@ -269,12 +271,14 @@ impl Shared {
 /// The participant of the process, over the transport that the environment names.
 fn join(network: &Network, shutdown: &Shutdown) -> Result<Arc<dyn Transport>, RuntimeError> {
     match network.transport {
-        #[cfg(feature = "cyclone")]
-        super::env::TransportKind::Cyclone => Ok(Arc::new(Cyclone::join(network)?)),
-        _ => {
+        TransportKind::RustDds => {
             let (domain, localhost_only) = (network.domain_id, network.localhost_only);
             Ok(Arc::new(Dds::join(domain, localhost_only, shutdown)?))
         }
+        #[cfg(feature = "cyclone")]
+        TransportKind::Cyclone => Ok(Arc::new(Cyclone::join(network)?)),
+        #[cfg(not(feature = "cyclone"))]
+        TransportKind::Cyclone => Err(EnvError::not_built_in("rmw_cyclonedds_cpp").into()),
     }
 }
 

@@ -43,6 +43,12 @@ fn static_transforms_go_in_one_message() {
     assert_eq!(frames, [("ins".to_owned(), 2.0), ("laser".to_owned(), 3.0)]);
 }
 
+/// Diagnostics of both ends of `/imu` where they do not go together.
+const INCOMPATIBLE: [(&str, &str); 2] = [
+    ("a: transport", "/imu incompatible_subscribers"),
+    ("b: transport", "/imu incompatible_publishers"),
+];
+
 #[test]
 fn a_qos_that_does_not_match_shows_in_diagnostics() {
     let two = Two::start();
@@ -50,10 +56,7 @@ fn a_qos_that_does_not_match_shows_in_diagnostics() {
     let (_subscription, _heard) = two.hear::<Imu>("imu", Qos::reliable(200), Load::Small);
     let (_diagnostics, heard) =
         two.hear::<DiagnosticArray>("/diagnostics", Qos::DIAGNOSTICS, Load::Small);
-    let mut missing = vec![
-        ("a: transport", "/imu incompatible_subscribers"),
-        ("b: transport", "/imu incompatible_publishers"),
-    ];
+    let mut missing = INCOMPATIBLE.to_vec();
     while !missing.is_empty() {
         let message = heard.recv_timeout(PATIENCE).unwrap();
         assert!(message.header.stamp.to_ns() > 0);
@@ -76,10 +79,7 @@ fn another_type_on_a_topic_is_no_match() {
     let (subscription, _heard) = two.hear::<Imu>("imu", Qos::reliable(10), Load::Small);
     let (_diagnostics, heard) =
         two.hear::<DiagnosticArray>("/diagnostics", Qos::DIAGNOSTICS, Load::Small);
-    let mut missing = vec![
-        ("a: transport", "/imu incompatible_subscribers"),
-        ("b: transport", "/imu incompatible_publishers"),
-    ];
+    let mut missing = INCOMPATIBLE.to_vec();
     while !missing.is_empty() {
         count_to(1, &publisher);
         for status in &heard.recv_timeout(PATIENCE).unwrap().status {
