@@ -19,6 +19,7 @@ fn size(kind: TransportKind) -> usize {
 }
 
 #[test]
+#[ignore = "starts forty processes, which starve the tests beside it"]
 fn a_crowd_of_participants_hears_the_last_one() {
     for transport in TransportKind::BUILT_IN {
         let (domain, start) = (TestDomain::take(), Instant::now());
