@@ -3,6 +3,14 @@
 use lattice_runtime::LoopbackDomain;
 use lattice_runtime::env::Network;
 
+/// Where it is set, tests leave it to multicast to find peers: for a network namespace of their own.
+const MULTICAST: &str = "LATTICE_TEST_MULTICAST";
+
+/// True unless the tests run in a network of their own that has multicast.
+pub fn localhost_only() -> bool {
+    std::env::var_os(MULTICAST).is_none()
+}
+
 /// A domain that no other test uses while this lives.
 pub struct TestDomain(LoopbackDomain);
 
@@ -17,11 +25,12 @@ impl TestDomain {
         self.0.id()
     }
 
-    /// The domain on loopback only, over the transport that `RMW_IMPLEMENTATION` names.
+    /// The domain, on loopback only unless told otherwise, over the transport that `RMW_IMPLEMENTATION`
+    /// names.
     pub fn transport(&self) -> Network {
         Network {
             domain_id: self.id(),
-            localhost_only: true,
+            localhost_only: localhost_only(),
             ..Network::from_env().unwrap()
         }
     }

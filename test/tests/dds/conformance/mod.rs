@@ -4,6 +4,7 @@
 //! once more, as the test `echo`.
 
 mod crowd;
+mod fastdds;
 mod matching;
 mod recovery;
 mod services;
@@ -17,7 +18,7 @@ use lattice_runtime::env::{Network, TransportKind};
 use lattice_runtime::qos::Qos;
 use lattice_runtime::ros_args::RosArgs;
 use lattice_runtime::{Load, Publisher, Runtime, Subscription};
-use lattice_test::domain::TestDomain;
+use lattice_test::domain::{TestDomain, localhost_only};
 
 /// Long enough for a loaded machine; a test that passes does not wait for it.
 const PATIENCE: Duration = Duration::from_secs(60);
@@ -89,7 +90,7 @@ fn echo() {
     };
     let network = Network {
         domain_id: id.parse().unwrap(),
-        localhost_only: true,
+        localhost_only: localhost_only(),
         ..Network::from_env().unwrap()
     };
     let args = RosArgs::parse(["--ros-args".to_owned()]).unwrap();

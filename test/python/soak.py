@@ -1,0 +1,182 @@
+"""The nodes in processes of their own, for hours: one log again and again, a new player each time.
+
+    soak.py LATTICE DIRECTORY MINUTES     RMW_IMPLEMENTATION and ROS_DOMAIN_ID as the nodes take them
+
+After each loop every cloud must have been counted, and the map must be that of the loop before, at last
+that of `lattice replay --direct`; then the mapper is reset. Memory, descriptors and threads of each process are written to
+DIRECTORY/soak.csv and must be flat from the second quarter to the last one, but for what the transport is
+known to keep of each player.
+"""
+
+import atexit
+import json
+import os
+import signal
+import statistics
+import subprocess
+import sys
+import time
+from pathlib import Path
+
+from cyclone_peer import Peer, qos
+import ros_idl as ros
+
+PARAMS = Path(__file__).parents[2] / "params/bobcat.yaml"
+LOG_S = 20
+CLOUDS = [f"/{place}/points" for place in ("left", "right", "top")]
+INS = "/novatel/oem7/inspvax"
+# Topics on which nothing may be lost, with their depths: the last clouds wait for the last pose.
+RELIABLE = {topic: 64 for topic in CLOUDS} | {INS: 200}
+NODES = {
+    "enu_transformer": RELIABLE | {"/points_enu": 512},
+    "lattice_mapper": {"/points_enu": 512},
+    "voxel_marker_publisher": {},
+    "bag_player": RELIABLE,
+}
+# Growth of the resident memory that is no leak: pages that an allocator keeps, and buffers.
+FLAT = 1.05
+SLACK_KB = 2048
+# RustDDS never forgets a topic of a participant that it has discovered: so much for each player.
+PER_PLAYER_KB = 60 if os.environ.get("RMW_IMPLEMENTATION") == "rustdds" else 0
+
+SaveMapRequest = ros.ros("lattice_msgs/srv/SaveMap_Request", **ros.ASKED, path=str)
+SaveMapResponse = ros.ros(
+    "lattice_msgs/srv/SaveMap_Response", **ros.ASKED, success=bool, message=str, voxels=ros.uint64
+)
+
+
+class Node:
+    """A node in a process of its own."""
+
+    def __init__(self, lattice, name, directory, **params):
+        self.name, self.report = name, directory / f"{name}.json"
+        self.log = open(directory / f"{name}.log", "a")
+        options = {"report_file": self.report} | params
+        for topic, depth in NODES[name].items():
+            options |= {f"qos.{topic}.reliability": "reliable", f"qos.{topic}.depth": depth}
+        arguments = [lattice, "node", name, "--ros-args", "--params-file", PARAMS]
+        for option in options.items():
+            arguments += ["-p", "{}:={}".format(*option)]
+        # The configuration of the observer's Cyclone is none of theirs.
+        environment = {key: os.environ[key] for key in os.environ if key != "CYCLONEDDS_URI"}
+        self.process = subprocess.Popen(arguments, stderr=self.log, env=environment)
+        atexit.register(self.process.kill)
+
+    def sizes(self):
+        """Resident memory in kB, threads, descriptors."""
+        root = Path(f"/proc/{self.process.pid}")
+        lines = (line.split(":") for line in (root / "status").read_text().splitlines())
+        status = {key: value.split() for key, value in lines}
+        descriptors = len(list((root / "fd").iterdir()))
+        return int(status["VmRSS"][0]), int(status["Threads"][0]), descriptors
+
+    def ended(self, sent=None):
+        """Report of the node at its end."""
+        if sent:
+            self.process.send_signal(sent)
+        code = self.process.wait(timeout=180)
+        assert code == 0, f"{self.name} ended with {code}"
+        return json.loads(self.report.read_text())
+
+
+class Observer:
+    """A foreign peer that counts, saves and resets the map."""
+
+    def __init__(self):
+        self.peer, self.values, self.number = Peer(int(os.environ["ROS_DOMAIN_ID"])), {}, 0
+        self.replies = {}
+        self.peer.reader("rt/diagnostics", ros.DiagnosticArray, qos(100), self.diagnosed)
+        self.save = self.client("save_map", SaveMapRequest, SaveMapResponse)
+        self.reset = self.client("reset", ros.TriggerRequest, ros.TriggerResponse)
+        self.peer.until_matched()
+
+    def client(self, service, request, response):
+        service = f"lattice_mapper/{service}"
+
+        def answered(reply):
+            self.replies[reply.number] = reply
+
+        writer = self.peer.writer(f"rq/{service}Request", request, qos(10))
+        self.peer.reader(f"rr/{service}Reply", response, qos(10), answered)
+        return lambda argument: self.ask(writer, request, argument)
+
+    def diagnosed(self, message):
+        for status in message.status:
+            self.values[status.name] = {value.key: value.value for value in status.values}
+
+    def clouds(self):
+        """Clouds that the mapper has counted."""
+        return int(self.values.get("lattice_mapper: map", {}).get("clouds_in", 0))
+
+    def ask(self, writer, request, argument):
+        self.number += 1
+        number = self.number
+        writer.write(request(1, number, argument))
+        self.peer.until(lambda: number in self.replies, lambda: "no reply")
+        reply = self.replies.pop(number)
+        assert reply.success, reply.message
+
+
+def prepare(lattice, directory):
+    """The log, and what the mapper should report of it."""
+    log = directory / "log"
+    simulate = [lattice, "simulate", "bobcat", "--out", log, "--duration", str(LOG_S), "--overwrite"]
+    subprocess.run(simulate, check=True, stdout=subprocess.DEVNULL)
+    direct = [lattice, "replay", log, "--direct", "--json", "--params", PARAMS]
+    report = json.loads(subprocess.run(direct, check=True, stdout=subprocess.PIPE).stdout)
+    return log, report["lattices"][0]["map"]
+
+
+def grown(sizes):
+    """In words, which size of a process is larger in the last quarter than in the second."""
+    quarter = len(sizes) // 4
+    # The middle: a map that is being saved has a thread.
+    middle = lambda part: [statistics.median(column) for column in zip(*part)]
+    then, last = (middle(sizes[n * quarter :][:quarter]) for n in (1, 3))
+    memory = last[0] > FLAT * then[0] + SLACK_KB + 2 * quarter * PER_PLAYER_KB
+    return f"{then} -> {last}" if memory or last[1:] > then[1:] else ""
+
+
+def main():
+    lattice, directory, minutes = sys.argv[1], Path(sys.argv[2]), float(sys.argv[3])
+    directory.mkdir(parents=True, exist_ok=True)
+    log, wanted = prepare(lattice, directory)
+    clouds, first = wanted["counts"]["clouds_in"], None
+    nodes = [Node(lattice, name, directory) for name in NODES if name != "bag_player"]
+    observer, saved = Observer(), directory / "saved.lattice"
+    sizes, end, loops = {node.name: [] for node in nodes}, time.monotonic() + 60 * minutes, 0
+    with open(directory / "soak.csv", "w") as table:
+        print("loop,node,resident_kb,threads,descriptors", file=table)
+        while True:
+            waited = json.dumps(CLOUDS + [INS])
+            player = Node(lattice, "bag_player", directory, bag=log, wait_for_subscribers=waited)
+            played = player.ended()
+            assert played["acknowledged"] and played["failed"] == 0, played
+            loops += 1
+            observer.peer.until(
+                lambda: observer.clouds() >= loops * clouds,
+                lambda: f"loop {loops}: {loops * clouds} clouds went in, {observer.values}",
+            )
+            observer.save(str(saved.absolute()))
+            first = first or saved.read_bytes()
+            assert saved.read_bytes() == first, f"loop {loops} made another map: {saved}"
+            for node in nodes:
+                sizes[node.name].append(node.sizes())
+                print(loops, node.name, *sizes[node.name][-1], sep=",", file=table, flush=True)
+            if time.monotonic() > end:
+                break
+            observer.reset(0)
+    reports = {node.name: node.ended(signal.SIGINT) for node in nodes}
+    report = reports["lattice_mapper"]
+    assert report["counts"]["clouds_in"] == loops * clouds, report
+    assert [report[key] for key in ("voxels", "points", "map_crc32")] == [
+        wanted[key] for key in ("voxels", "points", "map_crc32")
+    ], f"{report} is not the map of the log, {wanted}"
+    leaks = {name: grown(of) for name, of in sizes.items() if grown(of)}
+    ends = {name: {"second loop": of[1], "last": of[-1]} for name, of in sizes.items()}
+    print(json.dumps({"loops": loops, "clouds": loops * clouds, "sizes": ends, "grown": leaks}))
+    sys.exit(1 if leaks else 0)
+
+
+if __name__ == "__main__":
+    main()
