@@ -11,6 +11,7 @@ use std::time::{Duration, Instant};
 use cyclors::{
     DDS_LC_ERROR, DDS_LC_FATAL, DDS_LC_WARNING, dds_entity_t, dds_log_data_t, dds_set_log_sink,
 };
+use log::Level;
 
 use super::entity::Entity;
 use crate::sync::lock;
@@ -64,15 +65,20 @@ unsafe extern "C" fn on_line(_: *mut c_void, line: *const dds_log_data_t) {
         }
         _ => false,
     });
-    if kept || !is_news(text, Instant::now()) {
-        return;
+    let level = match priority {
+        DDS_LC_WARNING => Level::Warn,
+        _ if is_error => Level::Error,
+        _ => Level::Info,
+    };
+    if !kept {
+        tell(level, text);
     }
-    if is_error {
-        log::error!("Cyclone DDS: {text}");
-    } else if priority & DDS_LC_WARNING != 0 {
-        log::warn!("Cyclone DDS: {text}");
-    } else {
-        log::info!("Cyclone DDS: {text}");
+}
+
+/// Logs what was not logged in the last minute.
+pub(super) fn tell(level: Level, text: &str) {
+    if is_news(text, Instant::now()) {
+        log::log!(level, "Cyclone DDS: {text}");
     }
 }
 

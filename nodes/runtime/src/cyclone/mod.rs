@@ -17,6 +17,7 @@ mod qos;
 mod reader;
 mod sample;
 mod security;
+mod strangers;
 mod writer;
 
 pub(crate) use participant::Cyclone;

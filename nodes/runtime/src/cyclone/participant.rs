@@ -65,7 +65,7 @@ impl Cyclone {
         let participant = explained(make)?;
         let (sender, events) = unbounded();
         Ok(Self {
-            discovery: Discovery::start(&participant, sender.clone())?,
+            discovery: Discovery::start(&participant, sender.clone(), enclave.secrets.is_some())?,
             id: participant.id()?,
             participant,
             _domain: domain,
@@ -149,6 +149,10 @@ impl Transport for Cyclone {
 
     fn writers_known(&self) -> Result<BoxFuture<'static, ()>, RuntimeError> {
         Ok(Box::pin(std::future::ready(())))
+    }
+
+    fn strangers(&self) -> usize {
+        self.discovery.strangers()
     }
 
     fn pairs_own_endpoints(&self) -> bool {

@@ -216,6 +216,12 @@ impl Shared {
         open.as_ref().map_or(0, |open| open.transport.renewals())
     }
 
+    /// Participants that security keeps out.
+    fn strangers(&self) -> usize {
+        let open = lock(&self.open);
+        open.as_ref().map_or(0, |open| open.transport.strangers())
+    }
+
     /// A wait for discovery to know all writers made so far. `None` after shutdown.
     fn writers_known(&self) -> Option<BoxFuture<'static, ()>> {
         let open = lock(&self.open);

@@ -22,8 +22,9 @@ pub const OF_A_NODE: [&str; 5] = [
     "rr/*Reply",
 ];
 
-/// Time in which permissions hold.
+/// Begin and end of permissions that hold, and of some that did.
 pub const NOW: [&str; 2] = ["2020-01-01T00:00:00", "2120-01-01T00:00:00"];
+pub const PAST: [&str; 2] = ["2020-01-01T00:00:00", "2021-01-01T00:00:00"];
 
 /// A keystore with its authorities; dropped, it is gone.
 pub struct Keystore(TempDir);
