@@ -51,7 +51,7 @@ pub(crate) struct Enclave {
 
 /// Files of an enclave, all of which can be read.
 #[derive(Debug, PartialEq)]
-#[cfg_attr(not(feature = "cyclone"), expect(dead_code))]
+#[cfg_attr(not(any(feature = "cyclone", test)), expect(dead_code))]
 pub(crate) struct Secrets {
     /// Identity CA, certificate, key, permissions CA, governance, permissions.
     pub files: [PathBuf; 6],
@@ -112,7 +112,12 @@ impl Security {
         enclave: &str,
         over_cyclone: bool,
     ) -> Result<Option<Secrets>, SecurityError> {
-        match self.find(enclave, over_cyclone) {
+        let found = match over_cyclone {
+            true if BUILT_IN => self.find(enclave),
+            true => Err(SecurityError::NotBuiltIn),
+            false => Err(SecurityError::Transport),
+        };
+        match found {
             Ok(secrets) => Ok(Some(secrets)),
             Err(error) if self.enforced => Err(error),
             Err(error) => {
@@ -122,13 +127,7 @@ impl Security {
         }
     }
 
-    fn find(&self, enclave: &str, over_cyclone: bool) -> Result<Secrets, SecurityError> {
-        if !over_cyclone {
-            return Err(SecurityError::Transport);
-        }
-        if !BUILT_IN {
-            return Err(SecurityError::NotBuiltIn);
-        }
+    fn find(&self, enclave: &str) -> Result<Secrets, SecurityError> {
         let keystore = self.keystore.as_deref().ok_or(SecurityError::NoKeystore)?;
         let enclave = self.enclave.as_deref().unwrap_or(enclave);
         // Words and slashes only: no way out of the keystore.
@@ -162,7 +161,7 @@ impl Secrets {
     }
 
     /// The folder that they are in.
-    #[cfg_attr(not(feature = "cyclone"), expect(dead_code))]
+    #[cfg_attr(not(any(feature = "cyclone", test)), expect(dead_code))]
     pub(crate) fn folder(&self) -> &Path {
         self.files[0].parent().unwrap_or(Path::new(""))
     }
@@ -229,11 +228,10 @@ mod tests {
     }
 
     #[test]
-    #[cfg(feature = "security")]
     fn every_file_must_be_there_and_no_name_leads_out_of_the_keystore() {
         let keystore = tempfile::tempdir().unwrap();
         let find = |enclave: &str, instead: Option<&str>| {
-            wish(Some(keystore.path()), instead, true).secrets(enclave, true)
+            wish(Some(keystore.path()), instead, true).find(enclave)
         };
         let folder = keystore.path().join("enclaves/robot/mapper");
         fs::create_dir_all(&folder).unwrap();
@@ -243,14 +241,14 @@ mod tests {
             assert!(error.contains(&format!("{path}, which")), "{error}");
             fs::write(folder.join(name), "").unwrap();
         }
-        let secrets = find("/robot/mapper", None).unwrap().unwrap();
+        let secrets = find("/robot/mapper", None).unwrap();
         assert_eq!(
             (secrets.folder(), &secrets.revoked),
             (folder.as_path(), &None)
         );
         assert_eq!(
             find("/", Some("/robot/mapper")).unwrap(),
-            Some(secrets),
+            secrets,
             "the override wins"
         );
         for name in ["..", "/..", "/../robot", "robot/mapper", "/robot/", "/a\0b"] {
@@ -268,8 +266,7 @@ mod tests {
             Path::new("/a\0b"),
             Path::new(""),
         ] {
-            let secrets = wish(Some(keystore), None, true).secrets("/", true);
-            let error = secrets.unwrap_err();
+            let error = wish(Some(keystore), None, true).find("/").unwrap_err();
             assert!(
                 matches!(&error, SecurityError::File { path, .. } if path.ends_with(FILES[0])),
                 "{error}"

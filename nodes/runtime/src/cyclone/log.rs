@@ -40,6 +40,9 @@ pub(super) fn explained(make: impl FnOnce() -> dds_entity_t) -> Result<Entity, S
     REASONS.set(Some(Vec::new()));
     let made = Entity::new(make());
     let reasons = REASONS.take().unwrap_or_default();
+    if made.is_ok() {
+        reasons.iter().for_each(|text| tell(Level::Error, text));
+    }
     made.map_err(|code| match reasons.is_empty() {
         true => code,
         false => format!("{code} ({})", reasons.join("; ")),

@@ -108,6 +108,20 @@ impl Keystore {
         ));
     }
 
+    /// Gives an enclave a list by which its own certificate is revoked.
+    pub fn revoke(&self, name: &str) {
+        let config = "[ca]\ndefault_ca = d\n[d]\ndatabase = private/index.txt\n\
+                      crlnumber = private/number\ndefault_md = sha256\ndefault_crl_days = 30\n";
+        for (file, text) in [("ca.cnf", config), ("index.txt", ""), ("number", "01\n")] {
+            fs::write(self.path("private").join(file), text).unwrap();
+        }
+        let ca = "ca -config private/ca.cnf -keyfile private/identity.key.pem \
+                  -cert public/identity_ca.cert.pem";
+        let folder = format!("enclaves/{name}");
+        self.openssl(&format!("{ca} -revoke {folder}/cert.pem"));
+        self.openssl(&format!("{ca} -gencrl -out {folder}/crl.pem"));
+    }
+
     fn sign(&self, text: &str, to: &str) {
         fs::write(self.path("private/text.xml"), text).unwrap();
         self.openssl(&format!(

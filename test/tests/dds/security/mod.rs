@@ -1,39 +1,30 @@
 //! DDS Security: who has a key and a permission is heard, nobody else is, and nothing can be read.
-//!
-//! Peers are processes: this test program once more, as the test `peer`.
 
+mod foreign;
 mod keystore;
+mod peers;
 
 use std::collections::BTreeSet;
 use std::fs;
 use std::io::{BufRead, BufReader, Write};
-use std::process::{Child, Command, Stdio};
-use std::sync::mpsc::{Receiver, RecvTimeoutError, Sender, channel};
-use std::sync::{Arc, Mutex};
-use std::time::{Duration, Instant};
+use std::process::{Command, Stdio};
+use std::sync::Arc;
+use std::sync::mpsc::channel;
 
 use lattice_msgs::std_msgs::String as RosString;
 use lattice_nodes::executables;
 use lattice_runtime::env::{Network, TransportKind};
-use lattice_runtime::qos::Qos;
 use lattice_runtime::ros_args::RosArgs;
 use lattice_runtime::security::{self, Security};
-use lattice_runtime::{Load, Runtime, RuntimeError, Subscription, lock, logging};
+use lattice_runtime::{Load, Runtime, RuntimeError, lock};
 use lattice_test::domain::TestDomain;
 use lattice_test::python::{python, script};
 
 use self::keystore::{Keystore, NOW, OF_A_NODE, PAST, openssl_is_there};
+use self::peers::{Peer, QOS, talk, topic, until};
 
-/// Long enough for a loaded machine; a test that passes does not wait for it.
-const PATIENCE: Duration = Duration::from_secs(60);
-/// Between two words of a peer.
-const PERIOD: Duration = Duration::from_millis(100);
 /// Words that are heard from a friend while strangers are heard not once: 5 s.
 const WORDS: usize = 50;
-const QOS: Qos = Qos::reliable(100);
-
-const DOMAIN: &str = "LATTICE_TEST_PEER_DOMAIN";
-const WORD: &str = "LATTICE_TEST_PEER_WORD";
 
 /// False, with a line on standard error, where there is nothing to test.
 fn can_run() -> bool {
@@ -61,140 +52,6 @@ fn runtime(
     Runtime::with_transport(name, RosArgs::parse(args).unwrap(), &network)
 }
 
-/// Topic of the talks in a domain, which no other test has.
-fn topic(domain: u16) -> String {
-    format!("/domain{domain}/talk")
-}
-
-/// Says a word again and again; others' words come to `heard`.
-fn talk(
-    runtime: &Runtime,
-    (name, domain): (&str, u16),
-    word: &str,
-    heard: Sender<String>,
-) -> Subscription {
-    let node = runtime.node(name).unwrap();
-    let out = node.publisher(&topic(domain), QOS).unwrap();
-    let own = word.to_owned();
-    let handler = move |message: Arc<RosString>| {
-        if message.data != own {
-            let _ = heard.send(message.data.clone());
-        }
-    };
-    let subscription = node
-        .subscribe(&topic(domain), QOS, Load::Small, handler)
-        .unwrap();
-    let data = word.to_owned();
-    runtime.timer(PERIOD, move || {
-        let _ = out.publish(RosString { data: data.clone() });
-    });
-    subscription
-}
-
-#[test]
-#[ignore = "the other end of the tests here, not one itself"]
-fn peer() {
-    let (Ok(id), Ok(word)) = (std::env::var(DOMAIN), std::env::var(WORD)) else {
-        return;
-    };
-    let network = Network {
-        domain_id: id.parse().unwrap(),
-        localhost_only: true,
-        ..Network::from_env().unwrap()
-    };
-    let args = ["--ros-args", "--enclave", &format!("/{word}")].map(str::to_owned);
-    let args = RosArgs::parse(args).unwrap();
-    logging::init(&args, "peer").unwrap();
-    let runtime = Runtime::with_transport("peer", args, &network).unwrap();
-    let (sender, heard) = channel();
-    let _talk = talk(&runtime, ("peer", network.domain_id), &word, sender);
-    for word in heard {
-        println!("heard {word}");
-    }
-}
-
-/// A process that talks, and writes down what it hears.
-struct Peer {
-    child: Child,
-    heard: Arc<Mutex<Vec<String>>>,
-    log: Arc<Mutex<Vec<String>>>,
-}
-
-impl Peer {
-    fn start(domain: &TestDomain, word: &str, keystore: Option<&Keystore>) -> Self {
-        let mut command = Command::new(std::env::current_exe().unwrap());
-        command
-            .args(["--exact", "security::peer", "--ignored", "--nocapture"])
-            .env(DOMAIN, domain.id().to_string())
-            .env(WORD, word)
-            .env("RMW_IMPLEMENTATION", "rmw_cyclonedds_cpp")
-            .stdout(Stdio::piped())
-            .stderr(Stdio::piped());
-        if let Some(keystore) = keystore {
-            command
-                .env("ROS_SECURITY_ENABLE", "true")
-                .env("ROS_SECURITY_STRATEGY", "Enforce")
-                .env("ROS_SECURITY_KEYSTORE", keystore.path(""));
-        }
-        let mut child = command.spawn().unwrap();
-        Self {
-            heard: lines(child.stdout.take().unwrap(), "heard "),
-            log: lines(child.stderr.take().unwrap(), ""),
-            child,
-        }
-    }
-
-    fn count(&self, word: &str) -> usize {
-        lock(&self.heard)
-            .iter()
-            .filter(|heard| *heard == word)
-            .count()
-    }
-
-    fn all(&self) -> BTreeSet<String> {
-        lock(&self.heard).iter().cloned().collect()
-    }
-}
-
-impl Drop for Peer {
-    fn drop(&mut self) {
-        let _ = self.child.kill();
-        let _ = self.child.wait();
-    }
-}
-
-/// Rests of lines that begin with `start`, as they come.
-fn lines(
-    from: impl std::io::Read + Send + 'static,
-    start: &'static str,
-) -> Arc<Mutex<Vec<String>>> {
-    let lines = Arc::new(Mutex::new(Vec::new()));
-    let out = Arc::clone(&lines);
-    std::thread::spawn(move || {
-        for line in BufReader::new(from).lines().map_while(Result::ok) {
-            if let Some(rest) = line.strip_prefix(start) {
-                lock(&out).push(rest.to_owned());
-            }
-        }
-    });
-    lines
-}
-
-/// Takes words until `enough` of them are there, and gives the last ones.
-fn until(heard: &Receiver<String>, what: &str, mut enough: impl FnMut(&str) -> bool) {
-    let start = Instant::now();
-    loop {
-        assert!(start.elapsed() < PATIENCE, "{what}: in vain");
-        match heard.recv_timeout(PERIOD) {
-            Ok(word) if enough(&word) => return,
-            Ok(_) => {}
-            Err(RecvTimeoutError::Timeout) if enough("") => return,
-            Err(RecvTimeoutError::Timeout) => {}
-            Err(error) => panic!("{error}"),
-        }
-    }
-}
-
 #[test]
 fn permitted_peers_hear_each_other_and_nobody_else() {
     if !can_run() {
@@ -208,7 +65,6 @@ fn permitted_peers_hear_each_other_and_nobody_else() {
         others.add(name, &topics, NOW);
     }
     let domain = TestDomain::take();
-    let start = Instant::now();
     let talker = runtime(&domain, "talk", "/ours", Some(ours.enforced())).unwrap();
     let (sender, heard) = channel();
     let _talk = talk(&talker, ("talk", domain.id()), "ours", sender);
@@ -233,7 +89,6 @@ fn permitted_peers_hear_each_other_and_nobody_else() {
         words.insert(word.to_owned());
         expected.iter().all(|(peer, word)| peer.count(word) > 0)
     });
-    println!("all talk after {:?}", start.elapsed());
     let before = expected.map(|(peer, word)| peer.count(word));
     let kept_out = || {
         let log = lock(&friend.log);
@@ -258,7 +113,8 @@ fn permitted_peers_hear_each_other_and_nobody_else() {
     words.remove("");
     assert_eq!(words, BTreeSet::from(["friend".to_owned()]));
     for (peer, word) in expected {
-        assert_eq!(peer.all(), BTreeSet::from([word.to_owned()]));
+        let heard: BTreeSet<_> = peer.heard().into_iter().collect();
+        assert_eq!(heard, BTreeSet::from([word.to_owned()]));
     }
     assert_eq!(kept_out().len(), 4, "one line for each: {:#?}", kept_out());
 }
@@ -269,11 +125,12 @@ fn what_cannot_be_secured_is_refused_with_its_reason() {
         return;
     }
     let (ours, others) = (Keystore::make(), Keystore::make());
-    for name in ["good", "unsigned", "alien", "locked"] {
+    for name in ["good", "unsigned", "alien", "locked", "revoked"] {
         ours.add(name, &OF_A_NODE, NOW);
     }
     ours.add("expired", &OF_A_NODE, PAST);
     ours.certify("alien", &others);
+    ours.revoke("revoked");
     let unsigned = ours.path("enclaves/unsigned/permissions.p7s");
     fs::write(
         &unsigned,
@@ -289,6 +146,7 @@ fn what_cannot_be_secured_is_refused_with_its_reason() {
         ("/alien", "certificate signature failure"),
         ("/expired", "expired"),
         ("/unsigned", "PKCS7"),
+        ("/revoked", "certificate revoked"),
         (
             "/locked",
             "locked/key.pem, which security needs, cannot be read",
