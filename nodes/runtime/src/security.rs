@@ -51,7 +51,6 @@ pub(crate) struct Enclave {
 
 /// Files of an enclave, all of which can be read.
 #[derive(Debug, PartialEq)]
-#[cfg_attr(not(any(feature = "cyclone", test)), expect(dead_code))]
 pub(crate) struct Secrets {
     /// Identity CA, certificate, key, permissions CA, governance, permissions.
     pub files: [PathBuf; 6],

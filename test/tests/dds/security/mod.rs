@@ -234,6 +234,7 @@ fn what_is_said_cannot_be_read_on_the_wire() {
         .unwrap();
     let mut found = BufReader::new(capture.stdout.take().unwrap()).lines();
     if found.next().unwrap().unwrap() != "ready" {
+        let _ = capture.wait();
         let _ = writeln!(
             std::io::stderr(),
             "SKIPPED: this user may not capture datagrams"
