@@ -18,7 +18,7 @@ use lattice_test::domain::TestDomain;
 use super::keystore::Keystore;
 
 /// Long enough for a loaded machine; a test that passes does not wait for it.
-const PATIENCE: Duration = Duration::from_secs(60);
+const PATIENCE: Duration = Duration::from_secs(120);
 /// Between two words of a peer.
 const PERIOD: Duration = Duration::from_millis(100);
 pub const QOS: Qos = Qos::reliable(100);
