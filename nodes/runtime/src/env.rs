@@ -2,6 +2,8 @@
 
 use thiserror::Error;
 
+use crate::security::Security;
+
 /// Highest DDS domain whose ports fit below 65536.
 const DOMAIN_ID_MAX: u16 = 232;
 /// Domains whose ports lie among those that Linux gives to outgoing connections.
@@ -48,6 +50,8 @@ pub struct Network {
     pub static_peers: Vec<String>,
     /// The DDS to use.
     pub transport: TransportKind,
+    /// DDS Security, where it is switched on.
+    pub security: Option<Security>,
     /// Lines for the log.
     pub warnings: Vec<String>,
 }
@@ -122,6 +126,7 @@ impl Network {
             localhost_only: localhost_only || local_range,
             static_peers,
             transport,
+            security: Security::from_lookup(lookup),
             warnings,
         })
     }

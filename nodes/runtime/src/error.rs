@@ -5,6 +5,7 @@ use thiserror::Error;
 use super::env::EnvError;
 use super::names::NameError;
 use super::params::ParamError;
+use super::security::SecurityError;
 
 /// Reason why a runtime, a node or an endpoint cannot be made.
 #[derive(Debug, Error)]
@@ -58,6 +59,9 @@ pub enum RuntimeError {
     /// The environment is not valid.
     #[error(transparent)]
     Env(#[from] EnvError),
+    /// Security is enforced and cannot be had, or refuses.
+    #[error(transparent)]
+    Security(#[from] SecurityError),
     /// No thread.
     #[error("cannot start a thread: {0}")]
     Thread(#[from] std::io::Error),

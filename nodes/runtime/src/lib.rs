@@ -30,6 +30,7 @@ mod publisher;
 pub mod qos;
 pub mod ros_args;
 mod rosout;
+pub mod security;
 mod service;
 mod shared;
 mod shutdown;

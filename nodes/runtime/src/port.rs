@@ -112,6 +112,11 @@ pub(crate) trait Transport: Send + Sync {
         0
     }
 
+    /// Participants that security keeps out. Each is a warning in the log; to be asked once a second.
+    fn strangers(&self) -> usize {
+        0
+    }
+
     /// Makes a writer.
     fn writer(
         &self,

@@ -6,13 +6,14 @@ use std::time::{Duration, Instant};
 use lattice_msgs::diagnostic_msgs::DiagnosticArray;
 use smol::Timer;
 
-use super::env::Network;
+use super::env::{Network, TransportKind};
 use super::error::RuntimeError;
 use super::node::Node;
 use super::param_services;
 use super::qos::Qos;
 use super::ros_args::RosArgs;
 use super::rosout;
+use super::security::Enclave;
 use super::shared::{Shared, deadline};
 use super::shutdown::{Shutdown, SignalWatch};
 
@@ -49,7 +50,14 @@ impl Runtime {
         for warning in &network.warnings {
             log::warn!("{warning}");
         }
-        let shared = Shared::start(network)?;
+        let name = args.enclave.clone().unwrap_or_else(|| "/".to_owned());
+        let secrets = match &network.security {
+            Some(security) => {
+                security.secrets(&name, network.transport == TransportKind::Cyclone)?
+            }
+            None => None,
+        };
+        let shared = Shared::start(network, &Enclave { name, secrets })?;
         shared.receive_buffer.warn_if_short();
         let signals = SignalWatch::start(shared.shutdown.clone())?;
         let args = Arc::new(args);

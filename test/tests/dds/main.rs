@@ -8,4 +8,5 @@ mod conformance;
 mod cyclone;
 mod peer;
 mod ros2_client_peer;
+mod security;
 mod transport;

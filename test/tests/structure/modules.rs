@@ -20,7 +20,7 @@ const LAYERS: [(&str, &str); 3] = [
     ),
     (
         "nodes/runtime/src",
-        "sync names param_value params_file ros_args params env logging qos error shutdown \
+        "sync names param_value params_file ros_args params security env logging qos error shutdown \
          task_thread clock diagnostics loopback_domain port dds cyclone peers endpoints outbox graph \
          local_bus publisher subscription service rosout shared node param_services action tf \
          process",

@@ -12,6 +12,7 @@ use cyclors::{
 };
 
 use super::entity::{Entity, check};
+use super::log::explained;
 
 /// Functions of blob topics, which live as long as the process.
 struct BlobOps {
@@ -31,7 +32,7 @@ pub(super) fn topic(participant: &Entity, name: &CStr, dds_type: &CStr) -> Resul
     let ops = match OPS.get() {
         Some(ops) => ops,
         None => {
-            let ops = blob_ops(participant)?;
+            let ops = blob_ops(participant, name, dds_type)?;
             OPS.get_or_init(|| ops)
         }
     };
@@ -45,27 +46,23 @@ pub(super) fn topic(participant: &Entity, name: &CStr, dds_type: &CStr) -> Resul
         let flags = DDSI_SERTYPE_FLAG_TOPICKIND_NO_KEY;
         ddsi_sertype_init_flags(sertype, dds_type.as_ptr(), ops.sertype, &ops.serdata, flags);
         let (parent, none) = (participant.handle(), ptr::null());
-        let made = dds_create_topic_sertype(
-            parent,
-            name.as_ptr(),
-            &mut sertype,
-            none,
-            ptr::null(),
-            ptr::null(),
-        );
-        Entity::new(made).inspect_err(|_| ddsi_sertype_unref(sertype))
+        let made = explained(|| {
+            let (name, place) = (name.as_ptr(), &mut sertype);
+            dds_create_topic_sertype(parent, name, place, none, ptr::null(), ptr::null())
+        });
+        made.inspect_err(|_| ddsi_sertype_unref(sertype))
     }
 }
 
 /// The functions of a blob topic of `cyclors`, with the one that it lacks: Cyclone calls it to trace samples.
-fn blob_ops(participant: &Entity) -> Result<BlobOps, String> {
-    let (name, dds_type) = (c"lattice_blob", c"lattice_blob");
+/// The topic is one that is wanted anyway: permissions would have to allow any other.
+fn blob_ops(participant: &Entity, name: &CStr, dds_type: &CStr) -> Result<BlobOps, String> {
     let mut sertype: *const ddsi_sertype = ptr::null();
     // SAFETY: strings that end with 0 and are copied; the type is that of a topic that is alive.
     unsafe {
         let (name, dds_type) = (name.as_ptr().cast_mut(), dds_type.as_ptr().cast_mut());
-        let made = cdds_create_blob_topic(participant.handle(), name, dds_type, true);
-        let topic = Entity::new(made)?;
+        let parent = participant.handle();
+        let topic = explained(|| cdds_create_blob_topic(parent, name, dds_type, true))?;
         let _ = check(dds_get_entity_sertype(topic.handle(), &mut sertype))?;
         let found = sertype.as_ref().and_then(|sertype| {
             Some(BlobOps {

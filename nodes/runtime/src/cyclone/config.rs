@@ -55,6 +55,7 @@ mod tests {
             localhost_only,
             static_peers: static_peers.iter().map(ToString::to_string).collect(),
             transport: TransportKind::Cyclone,
+            security: None,
             warnings: vec![],
         };
         let local = config(&network(true, &[]), None);

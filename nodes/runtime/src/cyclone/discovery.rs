@@ -18,6 +18,7 @@ use smol::channel::Sender;
 use super::endpoint::{Description, Endpoint, Side};
 use super::entity::{Entity, endpoint_id};
 use super::qos::announced;
+use super::strangers::Strangers;
 use crate::port::{DURABILITY_CONFLICT, EndpointId, PortEvent, RELIABILITY_CONFLICT};
 use crate::qos::{Durability, Reliability};
 use crate::sync::lock;
@@ -32,6 +33,7 @@ pub(super) struct Discovery {
     participant: EndpointId,
     ours: Mutex<Vec<Weak<Endpoint>>>,
     events: Sender<PortEvent>,
+    strangers: Option<Strangers>,
 }
 
 /// An endpoint of another participant.
@@ -43,15 +45,19 @@ struct Other<'a> {
 }
 
 impl Discovery {
+    /// `secured`: not everybody is let in.
     pub(super) fn start(
         participant: &Entity,
         events: Sender<PortEvent>,
+        secured: bool,
     ) -> Result<Arc<Self>, String> {
+        let strangers = secured.then(|| Strangers::watch(participant)).transpose()?;
         let this = Arc::new(Self {
             readers: Mutex::default(),
             participant: participant.id()?,
             ours: Mutex::default(),
             events,
+            strangers,
         });
         for (topic, listener) in [
             (DDS_BUILTIN_TOPIC_DCPSPUBLICATION, on_writers as Listener),
@@ -70,6 +76,11 @@ impl Discovery {
             lock(&this.readers).push(Entity::new(made)?);
         }
         Ok(this)
+    }
+
+    /// Participants that are not let in.
+    pub(super) fn strangers(&self) -> usize {
+        self.strangers.as_ref().map_or(0, Strangers::count)
     }
 
     /// Compares an endpoint of ours with those that are there, and with those to come.
@@ -118,39 +129,14 @@ impl Discovery {
 
     /// Gives all new endpoints of other participants to `each`; those that have gone become events.
     fn take(&self, reader: dds_entity_t, each: &mut dyn FnMut(&Other<'_>)) {
-        loop {
-            let mut found = [ptr::null_mut::<c_void>(); BATCH];
-            let mut infos = [MaybeUninit::<dds_sample_info_t>::uninit(); BATCH];
-            // SAFETY: room for a batch; the first place is null, so that samples are lent.
-            let count = unsafe {
-                let infos = infos.as_mut_ptr().cast();
-                let most = BATCH as u32;
-                dds_take_mask(
-                    reader,
-                    found.as_mut_ptr(),
-                    infos,
-                    BATCH,
-                    most,
-                    DDS_ANY_STATE,
-                )
-            };
-            let taken = usize::try_from(count).unwrap_or(0).min(BATCH);
-            for (sample, info) in found.iter().zip(&infos).take(taken) {
-                // SAFETY: so many were given; they are ours until they are given back below.
-                unsafe {
-                    let endpoint = sample.cast::<dds_builtintopic_endpoint_t>().as_ref();
-                    let alive = info.assume_init_ref().instance_state == DDS_ALIVE_INSTANCE_STATE;
-                    if let Some(endpoint) = endpoint {
-                        self.sort(endpoint, alive, each);
-                    }
+        take_all(reader, &mut |sample, alive| {
+            // SAFETY: the readers here are of endpoints; this one is lent during the call.
+            unsafe {
+                if let Some(endpoint) = sample.cast::<dds_builtintopic_endpoint_t>().as_ref() {
+                    self.sort(endpoint, alive, each);
                 }
             }
-            if taken == 0 {
-                return;
-            }
-            // SAFETY: gives back what was lent by the call above.
-            let _ = unsafe { dds_return_loan(reader, found.as_mut_ptr(), count) };
-        }
+        });
     }
 
     /// # Safety
@@ -170,6 +156,9 @@ impl Discovery {
             let _ = self.events.try_send(PortEvent::Lost { peer: id });
             return;
         }
+        if let Some(strangers) = &self.strangers {
+            strangers.shows_itself(id);
+        }
         // SAFETY: strings and QoS are null or live as long as the endpoint.
         let (name, type_name, qos) = unsafe {
             let (name, type_name) = (text(endpoint.topic_name), text(endpoint.type_name));
@@ -188,6 +177,31 @@ impl Drop for Discovery {
     fn drop(&mut self) {
         // Their listeners use the rest.
         lock(&self.readers).clear();
+    }
+}
+
+/// Takes all samples of a reader of a built-in topic. Each is lent to `each`, with whether it is alive.
+pub(super) fn take_all(reader: dds_entity_t, each: &mut dyn FnMut(*const c_void, bool)) {
+    loop {
+        let mut found = [ptr::null_mut::<c_void>(); BATCH];
+        let mut infos = [MaybeUninit::<dds_sample_info_t>::uninit(); BATCH];
+        let places = (found.as_mut_ptr(), infos.as_mut_ptr().cast());
+        // SAFETY: room for a batch; the first place is null, so that samples are lent.
+        let count = unsafe {
+            let most = BATCH as u32;
+            dds_take_mask(reader, places.0, places.1, BATCH, most, DDS_ANY_STATE)
+        };
+        let taken = usize::try_from(count).unwrap_or(0).min(BATCH);
+        for (sample, info) in found.iter().zip(&infos).take(taken) {
+            // SAFETY: so many were given.
+            let state = unsafe { info.assume_init_ref() }.instance_state;
+            each(sample.cast_const(), state == DDS_ALIVE_INSTANCE_STATE);
+        }
+        if taken == 0 {
+            return;
+        }
+        // SAFETY: gives back what was lent by the call above.
+        let _ = unsafe { dds_return_loan(reader, found.as_mut_ptr(), count) };
     }
 }
 

@@ -9,6 +9,7 @@ use cyclors::dds_create_domain;
 use super::config::config;
 use super::confine::to_loopback;
 use super::entity::Entity;
+use super::log::{self, explained};
 use crate::env::Network;
 use crate::sync::lock;
 
@@ -26,6 +27,7 @@ pub(super) struct Domain(u16);
 impl Domain {
     /// Takes part in the domain of the network. The settings of who comes first hold for all.
     pub(super) fn join(network: &Network) -> Result<Self, String> {
+        log::take_over();
         let id = network.domain_id;
         let mut domains = lock(&DOMAINS);
         if let Some(shared) = domains.get_mut(&id) {
@@ -37,13 +39,13 @@ impl Domain {
         let config = config.map_err(|_| "CYCLONEDDS_URI has a zero byte".to_owned())?;
         // SAFETY: a string that ends with 0 and is read during the call.
         let make = || unsafe { dds_create_domain(u32::from(id), config.as_ptr()) };
-        let made = match network.localhost_only {
+        let domain = explained(|| match network.localhost_only {
             true => to_loopback(make),
             false => make(),
-        };
+        })?;
         let shared = Shared {
             users: 1,
-            _domain: Entity::new(made)?,
+            _domain: domain,
         };
         let _ = domains.insert(id, shared);
         Ok(Self(id))

@@ -11,10 +11,13 @@ mod discovery;
 mod domain;
 mod endpoint;
 mod entity;
+mod log;
 mod participant;
 mod qos;
 mod reader;
 mod sample;
+mod security;
+mod strangers;
 mod writer;
 
 pub(crate) use participant::Cyclone;

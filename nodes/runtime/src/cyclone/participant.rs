@@ -16,13 +16,16 @@ use super::discovery::Discovery;
 use super::domain::Domain;
 use super::endpoint::{Description, Side};
 use super::entity::Entity;
+use super::log::explained;
 use super::qos::NativeQos;
 use super::reader::CycloneReader;
+use super::security::properties;
 use super::writer::CycloneWriter;
 use crate::env::Network;
 use crate::error::RuntimeError;
 use crate::port::{EndpointId, PortEvent, PortTopic, SampleReader, SampleWriter, Transport};
 use crate::qos::Qos;
+use crate::security::{Enclave, SecurityError};
 
 /// The Cyclone participant of a process.
 pub(crate) struct Cyclone {
@@ -37,22 +40,32 @@ pub(crate) struct Cyclone {
 
 impl Cyclone {
     /// Joins the domain of the network.
-    pub(crate) fn join(network: &Network) -> Result<Self, RuntimeError> {
-        Self::try_join(network).map_err(|reason| RuntimeError::Participant {
+    pub(crate) fn join(network: &Network, enclave: &Enclave) -> Result<Self, RuntimeError> {
+        let failed = |reason| RuntimeError::Participant {
             domain: network.domain_id,
             reason,
+        };
+        let domain = Domain::join(network).map_err(failed)?;
+        let made = Self::in_domain(domain, enclave);
+        made.map_err(|reason| match &enclave.secrets {
+            None => failed(reason),
+            Some(secrets) => RuntimeError::Security(SecurityError::Refused {
+                enclave: secrets.folder().to_owned(),
+                reason,
+            }),
         })
     }
 
-    fn try_join(network: &Network) -> Result<Self, String> {
-        let domain = Domain::join(network)?;
-        let qos = NativeQos::of_participant("enclave=/;", &[]);
+    fn in_domain(domain: Domain, enclave: &Enclave) -> Result<Self, String> {
+        let properties = enclave.secrets.as_ref().map(properties).transpose()?;
+        let user_data = format!("enclave={};", enclave.name);
+        let qos = NativeQos::of_participant(&user_data, &properties.unwrap_or_default());
         // SAFETY: a number, and a QoS that is alive and copied; no listener.
-        let made = unsafe { dds_create_participant(domain.id(), qos.as_ptr(), ptr::null()) };
-        let participant = Entity::new(made)?;
+        let make = || unsafe { dds_create_participant(domain.id(), qos.as_ptr(), ptr::null()) };
+        let participant = explained(make)?;
         let (sender, events) = unbounded();
         Ok(Self {
-            discovery: Discovery::start(&participant, sender.clone())?,
+            discovery: Discovery::start(&participant, sender.clone(), enclave.secrets.is_some())?,
             id: participant.id()?,
             participant,
             _domain: domain,
@@ -136,6 +149,10 @@ impl Transport for Cyclone {
 
     fn writers_known(&self) -> Result<BoxFuture<'static, ()>, RuntimeError> {
         Ok(Box::pin(std::future::ready(())))
+    }
+
+    fn strangers(&self) -> usize {
+        self.discovery.strangers()
     }
 
     fn pairs_own_endpoints(&self) -> bool {

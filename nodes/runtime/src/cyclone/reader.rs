@@ -10,6 +10,7 @@ use smol::channel::Sender;
 use super::arrivals::Arrival;
 use super::endpoint::{Description, Endpoint};
 use super::entity::{Entity, check};
+use super::log::explained;
 use super::qos::NativeQos;
 use crate::port::{EndpointId, Origin, PortEvent, SampleId, SampleReader};
 use crate::sync::lock;
@@ -36,8 +37,8 @@ impl CycloneReader {
     ) -> Result<Self, String> {
         let (parent, of) = (participant.handle(), topic.handle());
         // SAFETY: handles, and a QoS that is alive and copied; no listener.
-        let made = unsafe { dds_create_reader(parent, of, qos.as_ptr(), ptr::null()) };
-        let reader = Entity::new(made)?;
+        let make = || unsafe { dds_create_reader(parent, of, qos.as_ptr(), ptr::null()) };
+        let reader = explained(make)?;
         Ok(Self {
             endpoint: Endpoint::watch(&reader, description, events)?,
             reader,

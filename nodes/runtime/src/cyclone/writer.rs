@@ -13,6 +13,7 @@ use smol::channel::Sender;
 
 use super::endpoint::{Description, Endpoint};
 use super::entity::{Entity, check};
+use super::log::explained;
 use super::qos::NativeQos;
 use super::sample::Serialised;
 use crate::port::{Bytes, EndpointId, PortEvent, SampleId, SampleWriter, WriteRefusal};
@@ -38,8 +39,8 @@ impl CycloneWriter {
     ) -> Result<Self, String> {
         let (parent, of) = (participant.handle(), topic.handle());
         // SAFETY: handles, and a QoS that is alive and copied; no listener.
-        let made = unsafe { dds_create_writer(parent, of, qos.as_ptr(), ptr::null()) };
-        let writer = Entity::new(made)?;
+        let make = || unsafe { dds_create_writer(parent, of, qos.as_ptr(), ptr::null()) };
+        let writer = explained(make)?;
         Ok(Self {
             endpoint: Endpoint::watch(&writer, description, events)?,
             writer,

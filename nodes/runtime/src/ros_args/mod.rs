@@ -22,6 +22,8 @@ pub struct RosArgs {
     pub(crate) param_overrides: Vec<ParamOverride>,
     /// `--params-file` in the order given; the last one wins.
     pub(crate) params_files: Vec<PathBuf>,
+    /// `--enclave`; the last one wins.
+    pub(crate) enclave: Option<String>,
     /// `--log-level` in the order given; the last one for a logger wins.
     pub(crate) log_levels: Vec<LogLevelRule>,
     /// True after `--disable-stdout-logs`.

@@ -84,7 +84,7 @@ fn ros_argument(
         "-r" | "--remap" => args.remaps.push(value(rest, flag, REMAP, str::parse)?),
         "-p" | "--param" => (args.param_overrides).push(value(rest, flag, PARAM, str::parse)?),
         "--params-file" => (args.params_files).push(value(rest, flag, PARAMS_FILE, not_empty)?),
-        "-e" | "--enclave" => value(rest, flag, ENCLAVE, enclave)?,
+        "-e" | "--enclave" => args.enclave = Some(value(rest, flag, ENCLAVE, enclave)?),
         "--log-level" => (args.log_levels).push(value(rest, flag, LOG_LEVEL, str::parse)?),
         "--log-config-file" | "--log-file-name" => {
             let _: String = value(rest, flag, LOG_FILE, not_empty)?;
@@ -132,7 +132,8 @@ fn not_empty<T: From<String>>(text: &str) -> Result<T, String> {
     }
 }
 
-/// rcl's rule for enclaves: the tokens of a node's full name. Security is not supported.
-fn enclave(text: &str) -> Result<(), String> {
-    validate_namespace(text).map_err(|error| error.to_string())
+/// rcl's rule for enclaves: the tokens of a node's full name.
+fn enclave(text: &str) -> Result<String, String> {
+    validate_namespace(text).map_err(|error| error.to_string())?;
+    Ok(text.to_owned())
 }

@@ -129,6 +129,7 @@ fn parameters_files_and_logs() {
     ];
     assert!(overrides.eq(expected));
     assert_eq!(args.params_files, ["one.yaml", "two.yaml"].map(Path::new));
+    assert_eq!(args.enclave.as_deref(), Some("/new/one"));
     let levels = args.log_levels.iter();
     let levels = levels.map(|rule| (rule.logger.as_deref(), rule.level));
     assert!(levels.eq([

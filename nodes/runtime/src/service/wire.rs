@@ -13,6 +13,10 @@ use crate::port::{Bytes, ENCAPSULATION_BYTES, Origin, SampleId};
 const CYCLONE_VENDOR: [u8; 2] = [0x01, 0x10];
 const RUSTDDS_VENDOR: [u8; 2] = [0x01, 0x12];
 
+/// Set in the first byte of the GUID of a secured participant, which comes from its certificate and so
+/// names no vendor.
+const SECURED: u8 = 0x80;
+
 /// Eight bytes of the client's GUID and eight of the request's number.
 const CYCLONE_HEADER_BYTES: usize = 16;
 
@@ -51,7 +55,9 @@ pub(crate) fn read_request<Q: RosMessage>(
     if origin.sample.number <= 0 && origin.related.is_none() {
         // The transport does not show numbers: only the form that carries its own can be answered.
         return match origin.sample.writer.vendor() {
-            CYCLONE_VENDOR | RUSTDDS_VENDOR => Ok(read_as(bytes, origin, Mapping::Cyclone)?),
+            CYCLONE_VENDOR | RUSTDDS_VENDOR | [SECURED..=0xff, _] => {
+                Ok(read_as(bytes, origin, Mapping::Cyclone)?)
+            }
             _ => Err(RequestError::Numberless),
         };
     }
@@ -198,7 +204,7 @@ mod tests {
             origin.sample.number = 0;
             read_request::<SetBoolRequest>(&bytes, &origin)
         };
-        for vendor in [CYCLONE_VENDOR, RUSTDDS_VENDOR] {
+        for vendor in [CYCLONE_VENDOR, RUSTDDS_VENDOR, [0x9c, 0x0f]] {
             assert_eq!(read(vendor).unwrap().1, ReplyTo::Cyclone([3; 16]));
         }
         assert!(read([0x01, 0x0f]).is_err());

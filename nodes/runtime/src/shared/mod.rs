@@ -33,6 +33,7 @@ use super::outbox::{Outbox, WhenFull};
 use super::port::{PortTopic, SampleReader, Transport};
 use super::publisher::PublisherParts;
 use super::qos::Qos;
+use super::security::Enclave;
 use super::service::{Answers, Server};
 use super::shutdown::Shutdown;
 use super::subscription::{Command, Intake, Load, Sample, Stats, Subscription};
@@ -82,11 +83,11 @@ struct Open {
 }
 
 impl Shared {
-    pub(crate) fn start(network: &Network) -> Result<Arc<Self>, RuntimeError> {
+    pub(crate) fn start(network: &Network, enclave: &Enclave) -> Result<Arc<Self>, RuntimeError> {
         let shutdown = Shutdown::default();
         let io = TaskThread::start("io", shutdown.clone())?;
         let publishing = TaskThread::start("publisher", shutdown.clone())?;
-        let transport = join(network, &shutdown)?;
+        let transport = join(network, enclave, &shutdown)?;
         let endpoints = Arc::new(Endpoints::default());
         let graph = Graph::new();
         let renewed = Arc::clone(&graph);
@@ -215,6 +216,12 @@ impl Shared {
         open.as_ref().map_or(0, |open| open.transport.renewals())
     }
 
+    /// Participants that security keeps out.
+    fn strangers(&self) -> usize {
+        let open = lock(&self.open);
+        open.as_ref().map_or(0, |open| open.transport.strangers())
+    }
+
     /// A wait for discovery to know all writers made so far. `None` after shutdown.
     fn writers_known(&self) -> Option<BoxFuture<'static, ()>> {
         let open = lock(&self.open);
@@ -269,14 +276,18 @@ impl Shared {
 }
 
 /// The participant of the process, over the transport that the environment names.
-fn join(network: &Network, shutdown: &Shutdown) -> Result<Arc<dyn Transport>, RuntimeError> {
+fn join(
+    network: &Network,
+    #[cfg_attr(not(feature = "cyclone"), expect(unused_variables))] enclave: &Enclave,
+    shutdown: &Shutdown,
+) -> Result<Arc<dyn Transport>, RuntimeError> {
     match network.transport {
         TransportKind::RustDds => {
             let (domain, localhost_only) = (network.domain_id, network.localhost_only);
             Ok(Arc::new(Dds::join(domain, localhost_only, shutdown)?))
         }
         #[cfg(feature = "cyclone")]
-        TransportKind::Cyclone => Ok(Arc::new(Cyclone::join(network)?)),
+        TransportKind::Cyclone => Ok(Arc::new(Cyclone::join(network, enclave)?)),
         #[cfg(not(feature = "cyclone"))]
         TransportKind::Cyclone => Err(EnvError::not_built_in("rmw_cyclonedds_cpp").into()),
     }

@@ -51,6 +51,10 @@ impl Shared {
                 "participant_renewals".to_owned(),
                 self.renewals().to_string(),
             ),
+            (
+                "participants_kept_out".to_owned(),
+                self.strangers().to_string(),
+            ),
         ];
         let mut problems = Vec::new();
         if self.receive_buffer.is_short() {

@@ -1,0 +1,111 @@
+//! The log of Cyclone, passed on to ours, and the errors in it as reasons.
+
+use std::cell::RefCell;
+use std::collections::BTreeMap;
+use std::ffi::c_void;
+use std::ptr;
+use std::slice;
+use std::sync::{Mutex, Once};
+use std::time::{Duration, Instant};
+
+use cyclors::{
+    DDS_LC_ERROR, DDS_LC_FATAL, DDS_LC_WARNING, dds_entity_t, dds_log_data_t, dds_set_log_sink,
+};
+use log::Level;
+
+use super::entity::Entity;
+use crate::sync::lock;
+
+/// After this a line is told again: Cyclone refuses a stranger once a second.
+const AGAIN: Duration = Duration::from_secs(60);
+
+/// Different lines in that time, at most: strangers may name themselves anew each time.
+const MAX_LINES: usize = 100;
+
+thread_local! {
+    /// Errors of the call that this thread is in, if they are wanted.
+    static REASONS: RefCell<Option<Vec<String>>> = const { RefCell::new(None) };
+}
+
+/// Takes over Cyclone's log of this process.
+pub(super) fn take_over() {
+    static ONCE: Once = Once::new();
+    // SAFETY: a function that lives as long as the process and needs no argument.
+    ONCE.call_once(|| unsafe { dds_set_log_sink(Some(on_line), ptr::null_mut()) });
+}
+
+/// An entity made by a function of Cyclone. The error is its return code, with the errors that Cyclone
+/// logs meanwhile on this thread instead of in the log.
+pub(super) fn explained(make: impl FnOnce() -> dds_entity_t) -> Result<Entity, String> {
+    REASONS.set(Some(Vec::new()));
+    let made = Entity::new(make());
+    let reasons = REASONS.take().unwrap_or_default();
+    if made.is_ok() {
+        reasons.iter().for_each(|text| tell(Level::Error, text));
+    }
+    made.map_err(|code| match reasons.is_empty() {
+        true => code,
+        false => format!("{code} ({})", reasons.join("; ")),
+    })
+}
+
+/// # Safety
+///
+/// A line that lives during the call.
+unsafe extern "C" fn on_line(_: *mut c_void, line: *const dds_log_data_t) {
+    // SAFETY: see above; `message` has `size` bytes.
+    let (text, priority) = unsafe {
+        let Some(line) = line.as_ref() else { return };
+        let text = slice::from_raw_parts(line.message.cast::<u8>(), line.size);
+        (String::from_utf8_lossy(text), line.priority)
+    };
+    let text = text.trim();
+    let is_error = priority & (DDS_LC_FATAL | DDS_LC_ERROR) != 0;
+    let kept = REASONS.with_borrow_mut(|reasons| match reasons {
+        Some(reasons) if is_error => {
+            reasons.push(text.to_owned());
+            true
+        }
+        _ => false,
+    });
+    let level = match priority {
+        DDS_LC_WARNING => Level::Warn,
+        _ if is_error => Level::Error,
+        _ => Level::Info,
+    };
+    if !kept {
+        tell(level, text);
+    }
+}
+
+/// Logs what was not logged in the last minute.
+pub(super) fn tell(level: Level, text: &str) {
+    if is_news(text, Instant::now()) {
+        log::log!(level, "Cyclone DDS: {text}");
+    }
+}
+
+fn is_news(text: &str, now: Instant) -> bool {
+    static TOLD: Mutex<BTreeMap<String, Instant>> = Mutex::new(BTreeMap::new());
+    let mut told = lock(&TOLD);
+    told.retain(|_, at| now.saturating_duration_since(*at) < AGAIN);
+    let news = told.len() < MAX_LINES && !told.contains_key(text);
+    if news {
+        let _ = told.insert(text.to_owned(), now);
+    }
+    news
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn a_line_is_told_again_after_a_while_and_many_are_not() {
+        let start = Instant::now();
+        assert!(is_news("refused", start) && !is_news("refused", start));
+        assert!(is_news("refused", start + AGAIN) && !is_news("refused", start + AGAIN));
+        let told = (0..1000).filter(|number| is_news(&number.to_string(), start + AGAIN));
+        assert_eq!(told.count(), MAX_LINES - 1);
+    }
+}

@@ -1,0 +1,275 @@
+//! DDS Security as ROS 2 asks for it: what the environment says, and the files of an enclave in a keystore
+//! of SROS2's layout.
+
+use std::fs::{self, File};
+use std::io;
+use std::path::{Path, PathBuf};
+
+use thiserror::Error;
+
+use crate::names::{NameError, validate_namespace};
+
+/// True if this build can secure participants, over Cyclone.
+pub const BUILT_IN: bool = cfg!(feature = "security");
+
+const ENABLE: &str = "ROS_SECURITY_ENABLE";
+const STRATEGY: &str = "ROS_SECURITY_STRATEGY";
+const KEYSTORE: &str = "ROS_SECURITY_KEYSTORE";
+const ENCLAVE: &str = "ROS_SECURITY_ENCLAVE_OVERRIDE";
+
+/// Files that an enclave must have, in the order of [`Secrets::files`].
+const FILES: [&str; 6] = [
+    "identity_ca.cert.pem",
+    "cert.pem",
+    "key.pem",
+    "permissions_ca.cert.pem",
+    "governance.p7s",
+    "permissions.p7s",
+];
+/// Certificates that no longer hold; this one may be missing.
+const REVOKED: &str = "crl.pem";
+
+/// The wish for a secured participant.
+#[derive(Clone, Debug, PartialEq, Eq)]
+pub struct Security {
+    /// `ROS_SECURITY_KEYSTORE`.
+    pub keystore: Option<PathBuf>,
+    /// `ROS_SECURITY_ENCLAVE_OVERRIDE`: the enclave whose files are taken, whatever the arguments say.
+    pub enclave: Option<String>,
+    /// True if there is to be no participant rather than one without security.
+    pub enforced: bool,
+}
+
+/// The enclave of a process.
+#[cfg_attr(not(feature = "cyclone"), expect(dead_code))]
+pub(crate) struct Enclave {
+    /// Its name, which is announced.
+    pub name: String,
+    /// Its files, unless the process is without security.
+    pub secrets: Option<Secrets>,
+}
+
+/// Files of an enclave, all of which can be read.
+#[derive(Debug, PartialEq)]
+pub(crate) struct Secrets {
+    /// Identity CA, certificate, key, permissions CA, governance, permissions.
+    pub files: [PathBuf; 6],
+    /// Certificates that were revoked.
+    pub revoked: Option<PathBuf>,
+}
+
+/// Reason why a participant cannot be secured.
+#[derive(Debug, Error)]
+pub enum SecurityError {
+    /// No keystore is named.
+    #[error("{ENABLE} is true, but {KEYSTORE} names no keystore")]
+    NoKeystore,
+    /// Not the name of an enclave.
+    #[error("{ENCLAVE}: {0}")]
+    Enclave(#[from] NameError),
+    /// A file of the enclave is not there or cannot be read.
+    #[error("{ENABLE} is true, but {path}, which security needs, cannot be read: {error}")]
+    File {
+        /// The file.
+        path: PathBuf,
+        /// What the system says.
+        error: io::Error,
+    },
+    /// RustDDS was chosen.
+    #[error(
+        "{ENABLE} is true, but RustDDS has no security; RMW_IMPLEMENTATION=rmw_cyclonedds_cpp has"
+    )]
+    Transport,
+    /// Built without it.
+    #[error("{ENABLE} is true, but this program was built without the feature `security`")]
+    NotBuiltIn,
+    /// Keys or permissions do not do.
+    #[error("security refuses the participant of {enclave}: {reason}")]
+    Refused {
+        /// Folder of the enclave.
+        enclave: PathBuf,
+        /// In the words of the transport.
+        reason: String,
+    },
+}
+
+impl Security {
+    /// Reads an environment; none where security is not switched on. Empty variables count as unset.
+    pub(crate) fn from_lookup(lookup: impl Fn(&str) -> Option<String>) -> Option<Self> {
+        let get = |name| lookup(name).filter(|value| !value.is_empty());
+        (get(ENABLE)? == "true").then(|| Self {
+            keystore: get(KEYSTORE).map(PathBuf::from),
+            enclave: get(ENCLAVE),
+            enforced: get(STRATEGY).is_some_and(|strategy| strategy == "Enforce"),
+        })
+    }
+
+    /// The files for an enclave; without them, or a transport that can use them, an error, or a warning
+    /// where security is not enforced.
+    pub(crate) fn secrets(
+        &self,
+        enclave: &str,
+        over_cyclone: bool,
+    ) -> Result<Option<Secrets>, SecurityError> {
+        let found = match over_cyclone {
+            true if BUILT_IN => self.find(enclave),
+            true => Err(SecurityError::NotBuiltIn),
+            false => Err(SecurityError::Transport),
+        };
+        match found {
+            Ok(secrets) => Ok(Some(secrets)),
+            Err(error) if self.enforced => Err(error),
+            Err(error) => {
+                log::warn!("going on WITHOUT security, since {STRATEGY} is not Enforce: {error}");
+                Ok(None)
+            }
+        }
+    }
+
+    fn find(&self, enclave: &str) -> Result<Secrets, SecurityError> {
+        let keystore = self.keystore.as_deref().ok_or(SecurityError::NoKeystore)?;
+        let enclave = self.enclave.as_deref().unwrap_or(enclave);
+        // Words and slashes only: no way out of the keystore.
+        validate_namespace(enclave)?;
+        Secrets::find(
+            &keystore
+                .join("enclaves")
+                .join(enclave.trim_start_matches('/')),
+        )
+    }
+}
+
+impl Secrets {
+    fn find(folder: &Path) -> Result<Self, SecurityError> {
+        let folder = std::path::absolute(folder).map_err(|error| SecurityError::File {
+            path: folder.to_owned(),
+            error,
+        })?;
+        let files = FILES.map(|name| folder.join(name));
+        for path in &files {
+            readable(path)?;
+        }
+        let revoked = match readable(&folder.join(REVOKED)) {
+            Ok(()) => Some(folder.join(REVOKED)),
+            Err(SecurityError::File { error, .. }) if error.kind() == io::ErrorKind::NotFound => {
+                None
+            }
+            Err(error) => return Err(error),
+        };
+        Ok(Self { files, revoked })
+    }
+
+    /// The folder that they are in.
+    #[cfg_attr(not(any(feature = "cyclone", test)), expect(dead_code))]
+    pub(crate) fn folder(&self) -> &Path {
+        self.files[0].parent().unwrap_or(Path::new(""))
+    }
+}
+
+/// An error unless it is a file that this process may read.
+fn readable(path: &Path) -> Result<(), SecurityError> {
+    // Asked first: to open a pipe is to wait.
+    let opened = fs::metadata(path).and_then(|found| match found.is_file() {
+        true => File::open(path).map(drop),
+        false => Err(io::Error::other("it is no regular file")),
+    });
+    opened.map_err(|error| SecurityError::File {
+        path: path.to_owned(),
+        error,
+    })
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    fn read(variables: &[(&str, &str)]) -> Option<Security> {
+        Security::from_lookup(|name| {
+            let found = variables.iter().find(|(key, _)| *key == name);
+            found.map(|(_, value)| (*value).to_owned())
+        })
+    }
+
+    #[test]
+    fn only_true_switches_on_and_only_enforce_enforces() {
+        for value in ["", "True", "TRUE", "1", "true ", "false"] {
+            assert_eq!(read(&[(ENABLE, value), (STRATEGY, "Enforce")]), None);
+        }
+        assert_eq!(read(&[(STRATEGY, "Enforce"), (KEYSTORE, "/k")]), None);
+        for (value, enforced) in [("Enforce", true), ("enforce", false), ("Permissive", false)] {
+            let security = read(&[(ENABLE, "true"), (STRATEGY, value), (KEYSTORE, "")]).unwrap();
+            assert_eq!((security.enforced, security.keystore), (enforced, None));
+        }
+    }
+
+    fn wish(keystore: Option<&Path>, enclave: Option<&str>, enforced: bool) -> Security {
+        Security {
+            keystore: keystore.map(Path::to_owned),
+            enclave: enclave.map(str::to_owned),
+            enforced,
+        }
+    }
+
+    #[test]
+    fn who_cannot_secure_refuses_or_says_so() {
+        let words = match BUILT_IN {
+            true => "names no keystore",
+            false => "built without the feature `security`",
+        };
+        for (over_cyclone, words) in [(false, "RustDDS has no security"), (true, words)] {
+            let error = wish(None, None, true)
+                .secrets("/", over_cyclone)
+                .unwrap_err();
+            assert!(error.to_string().contains(words), "{error}");
+            let open = wish(None, None, false).secrets("/", over_cyclone);
+            assert_eq!(open.unwrap(), None);
+        }
+    }
+
+    #[test]
+    fn every_file_must_be_there_and_no_name_leads_out_of_the_keystore() {
+        let keystore = tempfile::tempdir().unwrap();
+        let find = |enclave: &str, instead: Option<&str>| {
+            wish(Some(keystore.path()), instead, true).find(enclave)
+        };
+        let folder = keystore.path().join("enclaves/robot/mapper");
+        fs::create_dir_all(&folder).unwrap();
+        for name in FILES {
+            let error = find("/robot/mapper", None).unwrap_err().to_string();
+            let path = folder.join(name).display().to_string();
+            assert!(error.contains(&format!("{path}, which")), "{error}");
+            fs::write(folder.join(name), "").unwrap();
+        }
+        let secrets = find("/robot/mapper", None).unwrap();
+        assert_eq!(
+            (secrets.folder(), &secrets.revoked),
+            (folder.as_path(), &None)
+        );
+        assert_eq!(
+            find("/", Some("/robot/mapper")).unwrap(),
+            secrets,
+            "the override wins"
+        );
+        for name in ["..", "/..", "/../robot", "robot/mapper", "/robot/", "/a\0b"] {
+            let error = find("/robot/mapper", Some(name)).unwrap_err().to_string();
+            assert!(error.starts_with(ENCLAVE), "{error}");
+        }
+        // A list of what was revoked that cannot be read is none to pass over.
+        fs::create_dir(folder.join(REVOKED)).unwrap();
+        let error = find("/robot/mapper", None).unwrap_err().to_string();
+        assert!(error.contains("crl.pem"), "{error}");
+        let file = folder.join("cert.pem");
+        for keystore in [
+            file.as_path(),
+            Path::new("missing"),
+            Path::new("/a\0b"),
+            Path::new(""),
+        ] {
+            let error = wish(Some(keystore), None, true).find("/").unwrap_err();
+            assert!(
+                matches!(&error, SecurityError::File { path, .. } if path.ends_with(FILES[0])),
+                "{error}"
+            );
+        }
+    }
+}
