@@ -63,7 +63,7 @@ pub fn start(runtime: &Runtime, name: &str) -> Result<Finish, NodeError> {
         lost: Arc::clone(&lost),
         lost_poses: Arc::clone(&lost_poses),
         not_published: 0,
-        report_file: params.string("report_file", "")?,
+        report_file: report::file(params)?,
     };
     let compute = Compute::spawn(name, limits, runtime.shutdown_handle(), move |event| {
         shell.on(event)
@@ -266,7 +266,7 @@ impl Shell {
         log::info!("{clouds_in} clouds in, {clouds_out} out, dropped: {dropped:?}");
         self.outputs.points.flush(Duration::from_secs(2));
         if let Err(error) = report::write(&self.report_file, &report) {
-            log::error!("{}: {error}", self.report_file);
+            log::error!("{error}");
         }
     }
 }

@@ -71,7 +71,7 @@ pub fn start(runtime: &Runtime, name: &str) -> Result<Finish, NodeError> {
         not_published: 0,
         writing: None,
         centers_of: None,
-        report_file: params.string("report_file", "")?,
+        report_file: report::file(params)?,
     };
     let (map, centers) = (shell.outputs.map.clone(), shell.outputs.centers.clone());
     let compute = Compute::spawn(name, limits, runtime.shutdown_handle(), move |event| {
@@ -341,7 +341,7 @@ impl Shell {
         self.outputs.map.flush(Duration::from_secs(2));
         self.outputs.updates.flush(Duration::from_secs(2));
         if let Err(error) = report::write(&self.report_file, &report) {
-            log::error!("{}: {error}", self.report_file);
+            log::error!("{error}");
         }
     }
 }

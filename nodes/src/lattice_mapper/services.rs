@@ -1,7 +1,7 @@
 //! The services of the node: requests become events, files are read and written on threads of their own.
 
 use std::fs::{self, File};
-use std::io::{BufReader, BufWriter, Write};
+use std::io::BufReader;
 use std::path::{Path, PathBuf};
 use std::thread::{self, JoinHandle};
 
@@ -15,6 +15,7 @@ use thiserror::Error;
 
 use super::LatticeMapper;
 use crate::compute::Inbox;
+use crate::files::whole;
 use crate::start::NodeError;
 use lattice_runtime::{Node, Reply, Server};
 
@@ -40,8 +41,6 @@ enum IoRefusal {
     Io(PathBuf, std::io::Error),
     #[error("{0:?}: {1}")]
     Format(PathBuf, FileError),
-    #[error("no path is given")]
-    NoPath,
 }
 
 /// Serves all calls; `wrap` makes an event of one.
@@ -190,35 +189,15 @@ fn save(request: &SaveMapRequest, contents: &MapContents) -> SaveMapResponse {
     }
 }
 
-/// Beside the place first, so that a broken file never takes that of a good one.
-fn write(path: &Path, contents: &MapContents) -> Result<(), IoRefusal> {
-    let io = |error| IoRefusal::Io(path.to_owned(), error);
-    let mut name = path.file_name().ok_or(IoRefusal::NoPath)?.to_owned();
+fn write(path: &Path, contents: &MapContents) -> Result<(), NodeError> {
     if path.exists() && !path.is_file() {
-        return Err(IoRefusal::NotAFile(path.to_owned()));
+        return Err(IoRefusal::NotAFile(path.to_owned()).into());
     }
-    name.push(".part");
-    let part = path.with_file_name(name);
-    let renamed = || fs::rename(&part, path).map_err(io);
-    let written = write_to(&part, path, contents).and_then(|()| renamed());
-    if written.is_err() {
-        // What is there is of no use; that it stays does no harm.
-        let _ = fs::remove_file(&part);
-    }
-    written
-}
-
-fn write_to(part: &Path, path: &Path, contents: &MapContents) -> Result<(), IoRefusal> {
-    let io = |error| IoRefusal::Io(path.to_owned(), error);
-    let mut file = BufWriter::new(File::create(part).map_err(io)?);
     let options = WriteOptions {
         zstd_level: Some(ZSTD_LEVEL),
         ..WriteOptions::default()
     };
-    let written = contents.write(&mut file, &options);
-    written.map_err(|error| IoRefusal::Format(path.to_owned(), error))?;
-    file.flush().map_err(io)?;
-    file.get_ref().sync_all().map_err(io)
+    whole::write(path, |file| contents.write(file, &options))
 }
 
 #[cfg(test)]

@@ -58,7 +58,7 @@ pub fn start(runtime: &Runtime, name: &str) -> Result<Finish, NodeError> {
         not_published: 0,
         incomplete: false,
         repairs: Throttle::new(Duration::from_secs(5)),
-        report_file: params.string("report_file", "")?,
+        report_file: report::file(params)?,
     };
     let compute = Compute::spawn(name, limits, runtime.shutdown_handle(), move |event| {
         shell.on(event)
@@ -222,7 +222,7 @@ impl Shell {
             arrays_not_published: self.not_published,
         };
         if let Err(error) = report::write(&self.report_file, &report) {
-            log::error!("{}: {error}", self.report_file);
+            log::error!("{error}");
         }
     }
 }
