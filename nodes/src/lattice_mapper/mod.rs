@@ -5,6 +5,7 @@
 mod counts;
 mod free_options;
 mod free_space;
+mod map_folder;
 pub mod node;
 mod occupancy;
 mod operations;

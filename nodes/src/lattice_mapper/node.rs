@@ -11,6 +11,7 @@ use lattice_msgs::lattice::{LatticeMap, LatticeMapUpdate};
 use lattice_msgs::sensor_msgs::PointCloud2;
 use lattice_msgs::std_msgs::Empty;
 
+use super::map_folder::MapFolder;
 use super::services::{self, Call};
 use super::{LatticeMapper, MapperOptions, MapperReport};
 use crate::compute::{Compute, ComputeLimits, Inbox};
@@ -59,6 +60,7 @@ pub fn start(runtime: &Runtime, name: &str) -> Result<Finish, NodeError> {
     let lost = Arc::new(AtomicU64::new(0));
     let wishes = Arc::new(Wishes::default());
     let max_voxels = mapper.voxel_limit();
+    let maps = MapFolder::from_params(params)?;
     let mut shell = Shell {
         machine: LatticeMapper::new(mapper, epoch())?,
         outputs: Outputs::open(&node, has_free)?,
@@ -70,6 +72,7 @@ pub fn start(runtime: &Runtime, name: &str) -> Result<Finish, NodeError> {
         pending: VecDeque::new(),
         not_published: 0,
         writing: None,
+        maps: maps.clone(),
         centers_of: None,
         report_file: report::file(params)?,
     };
@@ -100,7 +103,7 @@ pub fn start(runtime: &Runtime, name: &str) -> Result<Finish, NodeError> {
         true => (true, "map emptied".into()),
         false => (false, "busy, ask again".into()),
     })?;
-    let calls = services::serve(&node, &inbox, Event::Call, max_voxels)?;
+    let calls = services::serve(&node, &inbox, Event::Call, maps, max_voxels)?;
     let updates = inbox.clone();
     runtime.timer(update_period, move || notify(&updates, Event::Update));
     if has_free {
@@ -177,6 +180,8 @@ struct Shell {
     not_published: u64,
     /// A map file on its way to the disk.
     writing: Option<JoinHandle<()>>,
+    /// Place of map files.
+    maps: MapFolder,
     /// State of the map that the last centres are of.
     centers_of: Option<(u64, u64)>,
     report_file: String,
@@ -204,7 +209,7 @@ impl Shell {
                 self.replaced();
             }
             Event::Call(call) => {
-                let done = services::answer(&mut self.machine, call, epoch());
+                let done = services::answer(&mut self.machine, call, epoch(), &self.maps);
                 if done.replaced {
                     self.replaced();
                 }
