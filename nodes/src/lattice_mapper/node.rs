@@ -292,7 +292,8 @@ impl Shell {
     fn diagnose(&self) {
         let counts = self.machine.counts();
         let lost = self.lost.load(Ordering::Relaxed);
-        let refused = counts.clouds_malformed + counts.clouds_wrong_frame;
+        let refused =
+            counts.clouds_malformed + counts.clouds_wrong_frame + counts.clouds_stamp_jump;
         let (level, message) = if counts.clouds_in == 0 {
             (Level::Warn, "no cloud yet".to_owned())
         } else if counts.points_list_full > 0 {
