@@ -65,7 +65,7 @@ pub fn run(arguments: impl IntoIterator<Item = String>) -> Result<(), NodeError>
     let waited = params.string_array("wait_for_subscribers", &[])?;
     let wait = seconds(params, "wait_timeout_s", 30.0)?;
     let settle = seconds(params, "settle_s", 0.5)?;
-    let report_file = params.string("report_file", "")?;
+    let report_file = report::file(params)?;
     let mut shell = Shell {
         topics: open_topics(&node, &player)?,
         clock: match params.f64("clock_hz", 0.0)? > 0.0 {

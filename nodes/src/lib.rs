@@ -15,5 +15,6 @@ mod options;
 pub mod replay;
 pub mod report;
 pub mod semantic_icp_server;
+mod stamps;
 pub mod start;
 pub mod voxel_marker_publisher;

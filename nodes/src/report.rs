@@ -6,6 +6,10 @@ use std::path::Path;
 
 use serde::{Deserialize, Serialize};
 
+use crate::files::whole::{self, WholeFile};
+use crate::start::NodeError;
+use lattice_runtime::params::{ParamError, Params};
+
 /// The numbers of a report as diagnostics show them, one level.
 pub fn key_values(report: &impl Serialize) -> Vec<(String, String)> {
     fn walk(name: &str, value: &serde_json::Value, out: &mut Vec<(String, String)>) {
@@ -25,16 +29,26 @@ pub fn key_values(report: &impl Serialize) -> Vec<(String, String)> {
     out
 }
 
+/// `report_file`: path of a report; one that cannot be written is refused.
+pub fn file(params: &Params) -> Result<String, ParamError> {
+    let name = "report_file";
+    let path = params.string(name, "")?;
+    if path.is_empty() {
+        return Ok(path);
+    }
+    match WholeFile::create(Path::new(&path)) {
+        Ok(_) => Ok(path),
+        Err(error) => Err(params.invalid(name, format!("{path:?}: {error}"))),
+    }
+}
+
 /// Writes a report as JSON where a path is given.
-pub fn write(path: &str, report: &impl Serialize) -> io::Result<()> {
+pub fn write(path: &str, report: &impl Serialize) -> Result<(), NodeError> {
     if path.is_empty() {
         return Ok(());
     }
-    let text = serde_json::to_string_pretty(report).map_err(io::Error::other)?;
-    // Readers see the whole report or none.
-    let partial = format!("{path}.partial");
-    fs::write(&partial, text + "\n")?;
-    fs::rename(partial, path)
+    let text = serde_json::to_string_pretty(report)?;
+    whole::write_text(Path::new(path), &(text + "\n"))
 }
 
 /// Reads a report that [`write()`] wrote.

@@ -1,7 +1,5 @@
 //! `lattice quantize`: statistics of a point file on each lattice.
 
-use std::fs::File;
-use std::io::BufWriter;
 use std::path::PathBuf;
 
 use clap::Args;
@@ -14,6 +12,7 @@ use serde::Serialize;
 
 use super::{CliResult, Lattices, init_logging};
 use lattice_nodes::files::points::{PointFileLimits, read_points};
+use lattice_nodes::files::whole;
 
 /// Quantize a point file
 #[derive(Args)]
@@ -94,8 +93,7 @@ impl Quantize {
                 max_distance_m: distortion.max_distance_m,
             });
             if let (0, Some(path)) = (i, &self.map_out) {
-                let out = File::create(path).map_err(|e| format!("{}: {e}", path.display()))?;
-                write_map(&list, BufWriter::new(out))?;
+                whole::write(path, |out| write_map(&list, out))?;
             }
         }
         if self.json {

@@ -49,7 +49,7 @@ pub use process::Runtime;
 pub use publisher::{Publisher, RawPublisher};
 pub use service::{Reply, Server};
 pub use shutdown::Shutdown;
-pub use subscription::{Load, Subscription, Undecoded};
+pub use subscription::{Load, Losses, Subscription, Undecoded};
 pub use sync::lock;
 pub use task_thread::guarded;
 pub use tf::{StaticTfBroadcaster, TfBroadcaster};

@@ -66,6 +66,8 @@ impl Qos {
     pub const ROSOUT: Qos = Qos::latched(1000);
     /// Services.
     pub const SERVICES: Qos = Qos::reliable(10);
+    /// Requests of a server: those that come while it is at work wait for it.
+    pub const REQUESTS: Qos = Qos::reliable(256);
     /// The default of ROS.
     pub const DEFAULT: Qos = Qos::reliable(10);
 

@@ -44,6 +44,9 @@ pub struct TransformerCounts {
     pub poses_not_good: u64,
     /// Poses refused: not newer than the pose before.
     pub poses_out_of_order: u64,
+    /// Poses refused: of another time than those before, unless several in a row agree on it.
+    #[serde(default)]
+    pub poses_stamp_jump: u64,
     /// Times that the stamps of the poses jumped back (a log that loops).
     pub time_jumps: u64,
     /// Transforms of `/tf` and `/tf_static` refused.

@@ -28,9 +28,12 @@ use nalgebra::{Isometry3, Vector3};
 use self::ins::{InsDecoder, InsMessage, InsRefusal};
 use self::waiting::{Waiting, WaitingCloud};
 use crate::convert::{cloud, viewpoint};
+use crate::stamps::StampGate;
 
 /// A step back of the receiving clock by more than this is a log that loops.
 const CLOCK_JUMP_NS: i64 = 1_000_000_000;
+/// Poses in a row that agree on another time before it is believed.
+const AGREEING_POSES: u32 = 3;
 
 /// Output of the transformer.
 #[derive(Clone, Debug)]
@@ -72,6 +75,7 @@ pub struct EnuTransformer {
     options: TransformerOptions,
     ins: InsDecoder,
     poses: PoseBuffer,
+    stamps: StampGate,
     mounts: TransformBuffer,
     waiting: Waiting,
     announced: bool,
@@ -95,9 +99,11 @@ impl EnuTransformer {
         });
         mounts.keep(&options.base_frame);
         options.odom_frame.iter().for_each(|odom| mounts.keep(odom));
+        let span_ns = (options.pose_span_s * 1e9) as i64;
         Self {
             ins: InsDecoder::new(options.ins.clone()),
             poses,
+            stamps: StampGate::new(CLOCK_JUMP_NS, span_ns.max(CLOCK_JUMP_NS), AGREEING_POSES),
             mounts,
             waiting: Waiting::new(options.max_waiting_clouds, options.max_waiting_bytes),
             announced: false,
@@ -181,6 +187,10 @@ impl EnuTransformer {
     }
 
     fn on_pose(&mut self, pose: StampedPose, out: &mut Vec<EnuOutput>) {
+        if !self.stamps.passes(pose.stamp_ns) {
+            self.counts.poses_stamp_jump += 1;
+            return;
+        }
         match self.poses.push(pose) {
             PushOutcome::Accepted => self.counts.poses_in += 1,
             PushOutcome::JumpedBack => {

@@ -21,8 +21,8 @@ use crate::{options, report};
 use lattice_runtime::logging::Throttle;
 use lattice_runtime::qos::Qos;
 use lattice_runtime::{
-    Clock, Diagnostics, Level, Load, Node, Publisher, Runtime, StaticTfBroadcaster, Subscription,
-    TfBroadcaster,
+    Clock, Diagnostics, Level, Load, Losses, Node, Publisher, Runtime, StaticTfBroadcaster,
+    Subscription, TfBroadcaster,
 };
 
 /// Event for the compute thread.
@@ -36,11 +36,7 @@ enum Event {
     Odometry(Arc<Odometry>),
     Pose(Arc<PoseStamped>),
     Tick,
-    /// Ends, with the samples that did not decode and the clouds that were lost before the inbox.
-    Finish {
-        undecodable: u64,
-        lost: u64,
-    },
+    Finish,
 }
 
 /// Starts the node.
@@ -55,15 +51,17 @@ pub fn start(runtime: &Runtime, name: &str) -> Result<Finish, NodeError> {
         threads: options::threads(params, 0)?,
     };
     let [lost, lost_poses] = [(); 2].map(|()| Arc::new(AtomicU64::new(0)));
+    let (lost_clouds, losses) = (Losses::default(), Losses::default());
     let mut shell = Shell {
+        lost_clouds: lost_clouds.clone(),
+        losses: losses.clone(),
         machine: EnuTransformer::new(transformer),
         outputs: Outputs::open(&node)?,
         clock: node.clock(),
         diagnostics: node.diagnostics(),
         lost: Arc::clone(&lost),
         lost_poses: Arc::clone(&lost_poses),
-        not_published: 0,
-        report_file: params.string("report_file", "")?,
+        report_file: report::file(params)?,
     };
     let compute = Compute::spawn(name, limits, runtime.shutdown_handle(), move |event| {
         shell.on(event)
@@ -79,10 +77,12 @@ pub fn start(runtime: &Runtime, name: &str) -> Result<Finish, NodeError> {
         let hand_over = inbox.counting(&lost, Event::Cloud, |cloud| cloud::bytes_of(cloud));
         clouds.push(node.subscribe(&topic, Qos::SCANS, Load::Large, hand_over)?);
     }
+    lost_clouds.watch(&clouds);
     let transforms = |m| Event::Transforms(m, false);
     inputs.push(poses.subscribe(&node, "/tf", Qos::TF, transforms)?);
     let (latched, transforms) = (Qos::TF_STATIC_LISTENER, |m| Event::Transforms(m, true));
     inputs.push(poses.subscribe(&node, "/tf_static", latched, transforms)?);
+    losses.watch(inputs.iter().chain(&clouds));
     runtime.timer(Duration::from_millis(200), move || {
         // A full inbox is busy enough to look at its queue anyway.
         let _ = inbox.send(Event::Tick, 0);
@@ -90,11 +90,8 @@ pub fn start(runtime: &Runtime, name: &str) -> Result<Finish, NodeError> {
     log::info!("INS source {source}; azimuth 90 deg is yaw 0 (east)");
     warn_unused(params);
     Ok(Box::new(move || {
-        let undecodable = inputs.iter().chain(&clouds).map(Subscription::undecodable);
-        let undecodable = undecodable.sum();
-        let lost = clouds.iter().map(Subscription::lost).sum();
         drop((inputs, clouds));
-        compute.finish_with(Event::Finish { undecodable, lost });
+        compute.finish_with(Event::Finish);
     }))
 }
 
@@ -174,11 +171,13 @@ struct Shell {
     outputs: Outputs,
     clock: Clock,
     diagnostics: Diagnostics,
-    /// Clouds lost before the inbox or at it.
+    /// Clouds that found the inbox full.
     lost: Arc<AtomicU64>,
+    /// Losses before it: of clouds, and of all inputs.
+    lost_clouds: Losses,
+    losses: Losses,
     /// Poses and transforms that found the inbox full.
     lost_poses: Arc<AtomicU64>,
-    not_published: u64,
     report_file: String,
 }
 
@@ -200,8 +199,8 @@ impl Shell {
                 self.diagnose();
                 outputs
             }
-            Event::Finish { undecodable, lost } => {
-                self.finish(undecodable, lost);
+            Event::Finish => {
+                self.finish();
                 return;
             }
         };
@@ -212,11 +211,7 @@ impl Shell {
 
     fn publish(&mut self, output: EnuOutput) {
         let published = match output {
-            EnuOutput::Points(points) => {
-                let published = self.outputs.points.publish(points);
-                self.not_published += u64::from(published.is_err());
-                published
-            }
+            EnuOutput::Points(points) => self.outputs.points.publish(points),
             EnuOutput::Transform(transform) => self.outputs.tf.send(vec![transform]),
             EnuOutput::StaticTransform(transform) => self.outputs.tf_static.send([transform]),
             EnuOutput::Origin(origin) => self.outputs.origin.publish(Arc::new(origin)),
@@ -229,10 +224,10 @@ impl Shell {
     fn report(&self) -> TransformerReport {
         TransformerReport {
             counts: self.machine.counts().clone(),
-            clouds_inbox_full: self.lost.load(Ordering::Relaxed),
+            clouds_inbox_full: self.lost.load(Ordering::Relaxed) + self.lost_clouds.lost(),
             poses_inbox_full: self.lost_poses.load(Ordering::Relaxed),
-            undecodable: 0,
-            clouds_not_published: self.not_published,
+            undecodable: self.losses.undecodable(),
+            clouds_not_published: self.outputs.points.dropped(),
         }
     }
 
@@ -254,19 +249,15 @@ impl Shell {
         self.diagnostics.set("clouds", level, message, values);
     }
 
-    fn finish(&mut self, undecodable: u64, lost: u64) {
-        self.lost.fetch_add(lost, Ordering::Relaxed);
+    fn finish(&mut self) {
         self.machine.finish();
-        let report = TransformerReport {
-            undecodable,
-            ..self.report()
-        };
+        self.outputs.points.flush(Duration::from_secs(2));
+        let report = self.report();
         let (clouds_in, clouds_out) = (report.counts.clouds_in, report.counts.clouds_out);
         let dropped = report.dropped();
         log::info!("{clouds_in} clouds in, {clouds_out} out, dropped: {dropped:?}");
-        self.outputs.points.flush(Duration::from_secs(2));
         if let Err(error) = report::write(&self.report_file, &report) {
-            log::error!("{}: {error}", self.report_file);
+            log::error!("{error}");
         }
     }
 }

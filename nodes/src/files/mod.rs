@@ -4,3 +4,4 @@ pub mod classes;
 pub mod export;
 pub mod points;
 pub mod semantic;
+pub mod whole;

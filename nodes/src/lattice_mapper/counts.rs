@@ -13,6 +13,9 @@ pub struct MapperCounts {
     pub clouds_wrong_frame: u64,
     /// Clouds refused: the bytes are not what the header says.
     pub clouds_malformed: u64,
+    /// Clouds refused: of another time than those before, by which voxels grow old.
+    #[serde(default)]
+    pub clouds_stamp_jump: u64,
     /// Clouds taken without labels, where those are kept.
     #[serde(default)]
     pub clouds_unlabelled: u64,

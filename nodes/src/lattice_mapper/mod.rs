@@ -5,6 +5,7 @@
 mod counts;
 mod free_options;
 mod free_space;
+mod map_folder;
 pub mod node;
 mod occupancy;
 mod operations;
@@ -33,6 +34,11 @@ use thiserror::Error;
 use self::free_space::FreeSpace;
 use self::occupancy::OccupancyMap;
 use crate::convert::{cloud, geometry, map, semantic, viewpoint};
+use crate::stamps::StampGate;
+
+const SECOND_NS: i64 = 1_000_000_000;
+/// Clouds in a row whose stamps agree on another time before it is believed.
+const AGREEING_CLOUDS: u32 = 5;
 
 /// Reason for which a cloud was not mapped. The map is as it was before.
 #[derive(Debug, Error)]
@@ -50,6 +56,17 @@ pub enum CloudRefusal {
     /// The bytes are not what the header says.
     #[error("malformed cloud: {0}")]
     Malformed(#[from] lattice_core::cloud::CloudError),
+    /// Of another time than the clouds before, by which voxels grow old.
+    #[error(
+        "cloud of {stamp_ns} ns, {:.1} s from the one before: is a clock wrong?",
+        *step_ns as f64 * 1e-9
+    )]
+    Stamp {
+        /// As sent.
+        stamp_ns: i64,
+        /// From the stamp of the cloud before.
+        step_ns: i64,
+    },
 }
 
 /// Builds one occupied voxel list, with its changes for followers.
@@ -63,6 +80,8 @@ pub struct LatticeMapper {
     sequence: u64,
     origin: Option<GeoPoint>,
     last_stamp_ns: i64,
+    /// Where voxels grow old.
+    stamps: Option<StampGate>,
     /// Stamp at which old voxels were last looked for.
     forgot_at_ns: i64,
     counts: MapperCounts,
@@ -85,7 +104,10 @@ impl LatticeMapper {
             .with_when_full(options.when_full);
         let occupancy = (options.payload == MapPayload::Occupancy)
             .then(|| OccupancyMap::new(&list, max_voxels, options.max_map_bytes));
+        let age_ns = options.forget_after_ns;
+        let step_ns = (age_ns / 2).max(SECOND_NS);
         Ok(Self {
+            stamps: (age_ns > 0).then(|| StampGate::new(step_ns, step_ns, AGREEING_CLOUDS)),
             options,
             list,
             occupancy,
@@ -124,6 +146,16 @@ impl LatticeMapper {
         // All that can be refused is read before anything of the map changes.
         let labels = self.labels_of(message)?;
         let viewpoints = self.viewpoints_of(message, &limits)?;
+        // The first stamp is held against nothing: by that alone nothing grows old.
+        let ages = (self.stamps.as_ref()).is_some_and(|stamps| !stamps.is_new());
+        let stamp_ns = cloud.stamp_ns;
+        if (self.stamps.as_mut()).is_some_and(|stamps| !stamps.passes(stamp_ns)) {
+            self.counts.clouds_stamp_jump += 1;
+            return Err(CloudRefusal::Stamp {
+                stamp_ns,
+                step_ns: stamp_ns.saturating_sub(self.last_stamp_ns),
+            });
+        }
         if (self.free_space.as_ref()).is_some_and(|free| free.is_complete(cloud.stamp_ns)) {
             self.clear_rays();
         }
@@ -134,7 +166,9 @@ impl LatticeMapper {
         };
         self.counts.add(&report);
         self.last_stamp_ns = cloud.stamp_ns;
-        self.forget_old();
+        if ages {
+            self.forget_old();
+        }
         if let Some(viewpoints) = viewpoints {
             self.add_rays(&cloud, &viewpoints);
         }
@@ -225,6 +259,7 @@ impl LatticeMapper {
         self.epoch = epoch;
         self.sequence = 0;
         self.last_stamp_ns = 0;
+        self.stamps.as_mut().map(StampGate::clear);
         self.forgot_at_ns = 0;
     }
 

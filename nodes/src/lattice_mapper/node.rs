@@ -11,6 +11,7 @@ use lattice_msgs::lattice::{LatticeMap, LatticeMapUpdate};
 use lattice_msgs::sensor_msgs::PointCloud2;
 use lattice_msgs::std_msgs::Empty;
 
+use super::map_folder::MapFolder;
 use super::services::{self, Call};
 use super::{LatticeMapper, MapperOptions, MapperReport};
 use crate::compute::{Compute, ComputeLimits, Inbox};
@@ -19,7 +20,7 @@ use crate::start::{Finish, NodeError, warn_unused};
 use crate::{options, report};
 use lattice_runtime::logging::Throttle;
 use lattice_runtime::qos::Qos;
-use lattice_runtime::{Diagnostics, Level, Load, Node, Publisher, Runtime, lock};
+use lattice_runtime::{Diagnostics, Level, Load, Losses, Node, Publisher, Runtime, lock};
 
 /// Chunks of a keyframe published in one update period: 3 MB.
 const CHUNKS_PER_ROUND: usize = 50;
@@ -35,11 +36,7 @@ enum Event {
     Free,
     Reset,
     Call(Call),
-    /// Ends, with the samples that did not decode and the clouds that were lost before the inbox.
-    Finish {
-        undecodable: u64,
-        lost: u64,
-    },
+    Finish,
 }
 
 /// Starts the node.
@@ -57,21 +54,27 @@ pub fn start(runtime: &Runtime, name: &str) -> Result<Finish, NodeError> {
     let free_period = period(&node, "free_period_s", 1.0)?;
     let has_free = mapper.free_space.free_level > 0;
     let lost = Arc::new(AtomicU64::new(0));
+    let (clouds, inputs) = (Losses::default(), Losses::default());
     let wishes = Arc::new(Wishes::default());
     let max_voxels = mapper.voxel_limit();
+    let maps = MapFolder::from_params(params)?;
     let mut shell = Shell {
         machine: LatticeMapper::new(mapper, epoch())?,
         outputs: Outputs::open(&node, has_free)?,
         diagnostics: node.diagnostics(),
         lost: Arc::clone(&lost),
+        clouds: clouds.clone(),
+        inputs: inputs.clone(),
         refusals: Throttle::new(Duration::from_secs(5)),
         no_viewpoints: Once::new(),
         wishes: Arc::clone(&wishes),
         pending: VecDeque::new(),
-        not_published: 0,
+        updates_lost: 0,
+        chunks_waited: 0,
         writing: None,
+        maps: maps.clone(),
         centers_of: None,
-        report_file: params.string("report_file", "")?,
+        report_file: report::file(params)?,
     };
     let (map, centers) = (shell.outputs.map.clone(), shell.outputs.centers.clone());
     let compute = Compute::spawn(name, limits, runtime.shutdown_handle(), move |event| {
@@ -100,7 +103,9 @@ pub fn start(runtime: &Runtime, name: &str) -> Result<Finish, NodeError> {
         true => (true, "map emptied".into()),
         false => (false, "busy, ask again".into()),
     })?;
-    let calls = services::serve(&node, &inbox, Event::Call, max_voxels)?;
+    clouds.watch([&points]);
+    inputs.watch([&points, &origins, &asked]);
+    let calls = services::serve(&node, &inbox, Event::Call, maps, max_voxels)?;
     let updates = inbox.clone();
     runtime.timer(update_period, move || notify(&updates, Event::Update));
     if has_free {
@@ -110,10 +115,8 @@ pub fn start(runtime: &Runtime, name: &str) -> Result<Finish, NodeError> {
     runtime.timer(centers_period, move || notify(&inbox, Event::Centers));
     warn_unused(params);
     Ok(Box::new(move || {
-        let undecodable = points.undecodable() + origins.undecodable();
-        let lost = points.lost();
         drop((points, origins, asked, request_keyframe, reset, calls));
-        compute.finish_with(Event::Finish { undecodable, lost });
+        compute.finish_with(Event::Finish);
     }))
 }
 
@@ -168,15 +171,24 @@ struct Shell {
     machine: LatticeMapper,
     outputs: Outputs,
     diagnostics: Diagnostics,
+    /// Clouds that found the inbox full.
     lost: Arc<AtomicU64>,
+    /// Losses before it: of clouds, and of all inputs.
+    clouds: Losses,
+    inputs: Losses,
     refusals: Throttle,
     no_viewpoints: Once,
     wishes: Arc<Wishes>,
     /// Chunks of a keyframe that are still to be published.
     pending: VecDeque<Arc<LatticeMap>>,
-    not_published: u64,
+    /// Updates lost by the publisher that a keyframe was asked for.
+    updates_lost: u64,
+    /// Times that a chunk of a keyframe found the publisher full, and waited.
+    chunks_waited: u64,
     /// A map file on its way to the disk.
     writing: Option<JoinHandle<()>>,
+    /// Place of map files.
+    maps: MapFolder,
     /// State of the map that the last centres are of.
     centers_of: Option<(u64, u64)>,
     report_file: String,
@@ -204,13 +216,13 @@ impl Shell {
                 self.replaced();
             }
             Event::Call(call) => {
-                let done = services::answer(&mut self.machine, call, epoch());
+                let done = services::answer(&mut self.machine, call, epoch(), &self.maps);
                 if done.replaced {
                     self.replaced();
                 }
                 self.writing = done.writing.or(self.writing.take());
             }
-            Event::Finish { undecodable, lost } => self.finish(undecodable, lost),
+            Event::Finish => self.finish(),
         }
     }
 
@@ -226,10 +238,15 @@ impl Shell {
             self.machine.on_origin(&origin);
         }
         for chunk in self.machine.take_update() {
-            if self.outputs.updates.publish(Arc::new(chunk)).is_err() {
-                self.not_published += 1;
-                self.wishes.keyframe.store(true, Ordering::Relaxed);
+            if let Err(error) = self.outputs.updates.publish(Arc::new(chunk)) {
+                log::debug!("update not published: {error}");
             }
+        }
+        // Also those that were taken and then found no reader that keeps up.
+        let lost = self.outputs.updates.dropped();
+        if lost != self.updates_lost {
+            self.updates_lost = lost;
+            self.wishes.keyframe.store(true, Ordering::Relaxed);
         }
         if self.pending.is_empty() && self.wishes.keyframe.swap(false, Ordering::Relaxed) {
             self.pending = self.machine.keyframe().into_iter().map(Arc::new).collect();
@@ -240,6 +257,7 @@ impl Shell {
                 break;
             };
             if self.outputs.map.publish(Arc::clone(chunk)).is_err() {
+                self.chunks_waited += 1;
                 break;
             }
             self.pending.pop_front();
@@ -278,16 +296,32 @@ impl Shell {
 
     fn report(&mut self) -> MapperReport {
         MapperReport {
-            clouds_inbox_full: self.lost.load(Ordering::Relaxed),
-            updates_not_published: self.not_published,
+            clouds_inbox_full: self.clouds_lost(),
+            undecodable: self.inputs.undecodable(),
+            updates_not_published: self.outputs.updates.dropped(),
+            chunks_not_published: self.chunks_lost(),
             ..MapperReport::of(&mut self.machine)
         }
     }
 
+    /// Clouds lost on the way or at the inbox.
+    fn clouds_lost(&self) -> u64 {
+        self.lost.load(Ordering::Relaxed) + self.clouds.lost()
+    }
+
+    /// Chunks of keyframes that the publisher took and did not send.
+    fn chunks_lost(&self) -> u64 {
+        let dropped = self.outputs.map.dropped();
+        dropped.saturating_sub(self.chunks_waited)
+    }
+
     fn diagnose(&self) {
         let counts = self.machine.counts();
-        let lost = self.lost.load(Ordering::Relaxed);
-        let refused = counts.clouds_malformed + counts.clouds_wrong_frame;
+        let lost = self.clouds_lost();
+        let updates = self.outputs.updates.dropped();
+        let not_published = updates + self.chunks_lost();
+        let refused =
+            counts.clouds_malformed + counts.clouds_wrong_frame + counts.clouds_stamp_jump;
         let (level, message) = if counts.clouds_in == 0 {
             (Level::Warn, "no cloud yet".to_owned())
         } else if counts.points_list_full > 0 {
@@ -302,6 +336,9 @@ impl Shell {
         } else if refused + lost > 0 {
             let message = format!("{refused} clouds refused, {lost} lost");
             (Level::Warn, message)
+        } else if not_published > 0 {
+            let message = format!("{not_published} parts of the map not published");
+            (Level::Warn, message)
         } else {
             (Level::Ok, "mapping".to_owned())
         };
@@ -309,14 +346,19 @@ impl Shell {
         let distortion = self.machine.distortion();
         values.extend([
             ("clouds_inbox_full".into(), lost.to_string()),
+            ("undecodable".into(), self.inputs.undecodable().to_string()),
+            ("updates_not_published".into(), updates.to_string()),
+            (
+                "chunks_not_published".into(),
+                self.chunks_lost().to_string(),
+            ),
             ("voxels".into(), self.machine.cells().len().to_string()),
             ("rms_m".into(), format!("{:.5}", distortion.rms_m)),
         ]);
         self.diagnostics.set("map", level, message, values);
     }
 
-    fn finish(&mut self, undecodable: u64, lost: u64) {
-        self.lost.fetch_add(lost, Ordering::Relaxed);
+    fn finish(&mut self) {
         if let Some(writing) = self.writing.take()
             && writing.join().is_err()
         {
@@ -329,19 +371,17 @@ impl Shell {
             self.update();
         }
         self.centers();
-        let report = MapperReport {
-            undecodable,
-            ..self.report()
-        };
+        // What is not sent by then counts.
+        self.outputs.map.flush(Duration::from_secs(2));
+        self.outputs.updates.flush(Duration::from_secs(2));
+        let report = self.report();
         let (clouds, voxels) = (report.counts.clouds_in, report.voxels);
         log::info!(
             "{clouds} clouds, {} points in {voxels} voxels",
             report.points
         );
-        self.outputs.map.flush(Duration::from_secs(2));
-        self.outputs.updates.flush(Duration::from_secs(2));
         if let Err(error) = report::write(&self.report_file, &report) {
-            log::error!("{}: {error}", self.report_file);
+            log::error!("{error}");
         }
     }
 }

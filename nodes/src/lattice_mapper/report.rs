@@ -19,8 +19,11 @@ pub struct MapperReport {
     pub clouds_inbox_full: u64,
     /// Samples that did not decode.
     pub undecodable: u64,
-    /// Updates that could not be given to the publisher; a keyframe followed.
+    /// Updates that the publisher did not take or could not send; a keyframe followed.
     pub updates_not_published: u64,
+    /// Chunks of keyframes that it took and could not send.
+    #[serde(default)]
+    pub chunks_not_published: u64,
     /// Voxels in the map.
     pub voxels: usize,
     /// Points that the statistics are of.
@@ -71,6 +74,7 @@ impl MapperReport {
             clouds_inbox_full: 0,
             undecodable: 0,
             updates_not_published: 0,
+            chunks_not_published: 0,
             voxels: cells.len(),
             points,
             mse_per_dimension_m2,

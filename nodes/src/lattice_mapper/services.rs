@@ -1,25 +1,20 @@
 //! The services of the node: requests become events, files are read and written on threads of their own.
 
-use std::fs::{self, File};
-use std::io::{BufReader, BufWriter, Write};
-use std::path::{Path, PathBuf};
 use std::thread::{self, JoinHandle};
 
-use lattice_core::voxels::file::{FileError, MapContents, WriteOptions};
+use lattice_core::voxels::file::MapContents;
 use lattice_msgs::RosService;
 use lattice_msgs::lattice::{
     ClearBox, ClearBoxRequest, ClearBoxResponse, LoadMap, LoadMapRequest, LoadMapResponse,
     QueryMap, QueryMapRequest, QueryMapResponse, SaveMap, SaveMapRequest, SaveMapResponse,
 };
-use thiserror::Error;
 
 use super::LatticeMapper;
+use super::map_folder::MapFolder;
 use crate::compute::Inbox;
 use crate::start::NodeError;
 use lattice_runtime::{Node, Reply, Server};
 
-/// Level that costs little time.
-const ZSTD_LEVEL: i32 = 3;
 const BUSY: &str = "busy, ask again";
 
 /// A request that the compute thread answers.
@@ -31,30 +26,22 @@ pub(super) enum Call {
     Query(QueryMapRequest, Reply<QueryMapResponse>),
 }
 
-/// Error of reading or writing a map file.
-#[derive(Debug, Error)]
-enum IoRefusal {
-    #[error("{0:?} is not a regular file")]
-    NotAFile(PathBuf),
-    #[error("{0:?}: {1}")]
-    Io(PathBuf, std::io::Error),
-    #[error("{0:?}: {1}")]
-    Format(PathBuf, FileError),
-    #[error("no path is given")]
-    NoPath,
-}
-
 /// Serves all calls; `wrap` makes an event of one.
 pub(super) fn serve<E: Send + 'static>(
     node: &Node,
     inbox: &Inbox<E>,
     wrap: fn(Call) -> E,
+    maps: MapFolder,
     max_voxels: usize,
 ) -> Result<[Server; 4], NodeError> {
     let to = inbox.clone();
     let load = node.service_later::<LoadMap>("~/load_map", move |request, reply| {
-        let (to, late) = (to.clone(), reply.clone());
-        let read = move || load(&request, max_voxels, reply, |call| to.send(wrap(call), 0));
+        let (to, late, maps) = (to.clone(), reply.clone(), maps.clone());
+        let read = move || {
+            load(&maps, &request, max_voxels, reply, |call| {
+                to.send(wrap(call), 0)
+            });
+        };
         if let Err(error) = spawn("load map", read) {
             late.send(load_failed(error));
         }
@@ -106,12 +93,19 @@ pub(super) struct Done {
 }
 
 /// Answers a call on the compute thread.
-pub(super) fn answer(machine: &mut LatticeMapper, call: Call, epoch: u64) -> Done {
+pub(super) fn answer(
+    machine: &mut LatticeMapper,
+    call: Call,
+    epoch: u64,
+    maps: &MapFolder,
+) -> Done {
     let mut done = Done::default();
     match call {
         Call::Save(request, reply) => {
-            let (contents, late) = (machine.contents(), reply.clone());
-            match spawn("save map", move || reply.send(save(&request, &contents))) {
+            let (contents, late, maps) = (machine.contents(), reply.clone(), maps.clone());
+            match spawn("save map", move || {
+                reply.send(save(&maps, &request, &contents))
+            }) {
                 Ok(thread) => done.writing = Some(thread),
                 Err(error) => late.send(save_failed(error.to_string())),
             }
@@ -152,12 +146,13 @@ fn load_failed(why: impl ToString) -> LoadMapResponse {
 }
 
 fn load(
+    maps: &MapFolder,
     request: &LoadMapRequest,
     max_voxels: usize,
     reply: Reply<LoadMapResponse>,
     send: impl FnOnce(Call) -> bool,
 ) {
-    match read(Path::new(&request.path), max_voxels) {
+    match maps.read(&request.path, max_voxels) {
         Ok(contents) => {
             let busy = reply.clone();
             if !send(Call::Load(Box::new(contents), reply)) {
@@ -168,19 +163,8 @@ fn load(
     }
 }
 
-fn read(path: &Path, max_voxels: usize) -> Result<MapContents, IoRefusal> {
-    let io = |error| IoRefusal::Io(path.to_owned(), error);
-    // A pipe would keep the thread for ever.
-    if !fs::metadata(path).map_err(io)?.is_file() {
-        return Err(IoRefusal::NotAFile(path.to_owned()));
-    }
-    let file = BufReader::new(File::open(path).map_err(io)?);
-    let contents = MapContents::read(file, max_voxels);
-    contents.map_err(|error| IoRefusal::Format(path.to_owned(), error))
-}
-
-fn save(request: &SaveMapRequest, contents: &MapContents) -> SaveMapResponse {
-    match write(Path::new(&request.path), contents) {
+fn save(maps: &MapFolder, request: &SaveMapRequest, contents: &MapContents) -> SaveMapResponse {
+    match maps.write(&request.path, contents) {
         Ok(()) => SaveMapResponse {
             success: true,
             message: format!("saved to {:?}", request.path),
@@ -190,39 +174,11 @@ fn save(request: &SaveMapRequest, contents: &MapContents) -> SaveMapResponse {
     }
 }
 
-/// Beside the place first, so that a broken file never takes that of a good one.
-fn write(path: &Path, contents: &MapContents) -> Result<(), IoRefusal> {
-    let io = |error| IoRefusal::Io(path.to_owned(), error);
-    let mut name = path.file_name().ok_or(IoRefusal::NoPath)?.to_owned();
-    if path.exists() && !path.is_file() {
-        return Err(IoRefusal::NotAFile(path.to_owned()));
-    }
-    name.push(".part");
-    let part = path.with_file_name(name);
-    let renamed = || fs::rename(&part, path).map_err(io);
-    let written = write_to(&part, path, contents).and_then(|()| renamed());
-    if written.is_err() {
-        // What is there is of no use; that it stays does no harm.
-        let _ = fs::remove_file(&part);
-    }
-    written
-}
-
-fn write_to(part: &Path, path: &Path, contents: &MapContents) -> Result<(), IoRefusal> {
-    let io = |error| IoRefusal::Io(path.to_owned(), error);
-    let mut file = BufWriter::new(File::create(part).map_err(io)?);
-    let options = WriteOptions {
-        zstd_level: Some(ZSTD_LEVEL),
-        ..WriteOptions::default()
-    };
-    let written = contents.write(&mut file, &options);
-    written.map_err(|error| IoRefusal::Format(path.to_owned(), error))?;
-    file.flush().map_err(io)?;
-    file.get_ref().sync_all().map_err(io)
-}
-
 #[cfg(test)]
 mod tests {
+    use std::fs;
+    use std::path::Path;
+
     use lattice_core::lattice::{Lattice, LatticeKind};
     use lattice_core::voxels::VoxelList;
     use nalgebra::Vector3;
@@ -249,19 +205,23 @@ mod tests {
         machine
     }
 
-    fn save_to(machine: &mut LatticeMapper, path: &Path) -> SaveMapResponse {
+    fn maps(folder: &Path) -> MapFolder {
+        MapFolder::new(&folder.display().to_string()).unwrap()
+    }
+
+    fn save_to(machine: &mut LatticeMapper, maps: &MapFolder, path: &str) -> SaveMapResponse {
         let (reply, answered) = Reply::channel();
-        let path = path.display().to_string();
-        let done = answer(machine, Call::Save(SaveMapRequest { path }, reply), 9);
+        let path = path.to_owned();
+        let done = answer(machine, Call::Save(SaveMapRequest { path }, reply), 9, maps);
         done.writing.unwrap().join().unwrap();
         answered.try_recv().unwrap()
     }
 
-    fn load_from(machine: &mut LatticeMapper, path: &Path) -> LoadMapResponse {
+    fn load_from(machine: &mut LatticeMapper, maps: &MapFolder, path: &str) -> LoadMapResponse {
         let (reply, answered) = Reply::channel();
-        let path = path.display().to_string();
-        load(&LoadMapRequest { path }, 1000, reply, |call| {
-            answer(machine, call, 9);
+        let path = path.to_owned();
+        load(maps, &LoadMapRequest { path }, 1000, reply, |call| {
+            answer(machine, call, 9, maps);
             true
         });
         answered.try_recv().unwrap()
@@ -270,16 +230,16 @@ mod tests {
     #[test]
     fn a_saved_map_is_loaded_by_another_node() {
         let dir = tempfile::tempdir().unwrap();
-        let path = dir.path().join("site.lattice");
+        let (maps, path) = (maps(dir.path()), "site.lattice");
         let mut first = with_points();
         for _ in 0..2 {
-            let saved = save_to(&mut first, &path);
+            let saved = save_to(&mut first, &maps, path);
             assert!(saved.success && saved.voxels == 100, "{}", saved.message);
         }
         let files = fs::read_dir(dir.path()).unwrap().count();
         assert_eq!(files, 1, "nothing but the map is left");
         let mut second = machine();
-        let loaded = load_from(&mut second, &path);
+        let loaded = load_from(&mut second, &maps, path);
         assert!(loaded.success && loaded.voxels == 100, "{}", loaded.message);
         assert_eq!(second.list().sorted(), first.list().sorted());
     }
@@ -287,27 +247,28 @@ mod tests {
     #[test]
     fn what_is_no_map_is_refused_with_the_reason() {
         let dir = tempfile::tempdir().unwrap();
-        let path = dir.path().join("site.lattice");
+        let (maps, name) = (maps(dir.path()), "site.lattice");
+        let path = dir.path().join(name);
         let mut machine = with_points();
-        save_to(&mut machine, &path);
+        save_to(&mut machine, &maps, name);
         let good = fs::read(&path).unwrap();
         let mut flipped = good.clone();
         flipped[good.len() / 2] ^= 4;
         let cut = &good[..good.len() - 3];
         for hostile in [&b"not a map at all"[..], b"", cut, &flipped] {
             fs::write(&path, hostile).unwrap();
-            let refused = load_from(&mut machine, &path);
+            let refused = load_from(&mut machine, &maps, name);
             let message = &refused.message;
             assert!(
                 !refused.success && message.contains("site.lattice"),
                 "{message}"
             );
         }
-        for nowhere in [dir.path(), &dir.path().join("absent"), Path::new("")] {
-            assert!(!load_from(&mut machine, nowhere).success);
+        for nowhere in ["absent", "", "/etc/passwd", "../site.lattice"] {
+            assert!(!load_from(&mut machine, &maps, nowhere).success);
         }
-        for nowhere in [dir.path(), &dir.path().join("absent/map"), Path::new("")] {
-            let refused = save_to(&mut machine, nowhere);
+        for nowhere in ["absent/map", "", "/tmp/map", "../map"] {
+            let refused = save_to(&mut machine, &maps, nowhere);
             assert!(!refused.success && !refused.message.is_empty());
         }
         assert_eq!(machine.list().len(), 100);
@@ -316,12 +277,11 @@ mod tests {
     #[test]
     fn a_full_inbox_or_an_ended_node_is_told() {
         let dir = tempfile::tempdir().unwrap();
-        let path = dir.path().join("site.lattice");
+        let (maps, path) = (maps(dir.path()), "site.lattice".to_owned());
         let mut machine = with_points();
-        save_to(&mut machine, &path);
+        save_to(&mut machine, &maps, &path);
         let (reply, answered) = Reply::channel();
-        let path = path.display().to_string();
-        load(&LoadMapRequest { path }, 1000, reply, |_| false);
+        load(&maps, &LoadMapRequest { path }, 1000, reply, |_| false);
         assert_eq!(answered.try_recv().unwrap().message, BUSY);
     }
 }

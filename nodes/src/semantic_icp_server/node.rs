@@ -23,8 +23,8 @@ use crate::{options, report};
 use lattice_runtime::logging::Throttle;
 use lattice_runtime::qos::Qos;
 use lattice_runtime::{
-    ActionLimits, Clock, Diagnostics, Feedback, GoalHandle, Level, Load, Publisher, Reply, Runtime,
-    TfBroadcaster, Undecoded,
+    ActionLimits, Clock, Diagnostics, Feedback, GoalHandle, Level, Load, Losses, Publisher, Reply,
+    Runtime, TfBroadcaster, Undecoded,
 };
 
 /// Between two messages on diagnostics.
@@ -68,7 +68,9 @@ pub fn start(runtime: &Runtime, name: &str) -> Result<Finish, NodeError> {
         tf: TfBroadcaster::new(&node)?,
         request: node.publisher(&format!("{mapper}/request_keyframe"), Qos::DEFAULT)?,
     };
+    let losses = Losses::default();
     let mut shell = Shell {
+        losses: losses.clone(),
         machine: SemanticIcpServer::new(server),
         search: None,
         outputs,
@@ -121,6 +123,7 @@ pub fn start(runtime: &Runtime, name: &str) -> Result<Finish, NodeError> {
     let on_info = inbox.counting(&lost, Event::LabelInfo, |_| 0);
     let infos = node.subscribe("headset/label_info", Qos::LATCHED, Load::Small, on_info)?;
 
+    losses.watch([&maps, &updates, &clouds, &sessions, &infos]);
     let to = inbox.clone();
     // One answer does not wait for another: a busy server says so at once.
     let service =
@@ -192,6 +195,8 @@ struct Shell {
     clock: Clock,
     /// Messages that found the inbox full.
     lost: Arc<AtomicU64>,
+    /// Losses before it.
+    losses: Losses,
     /// A part of the map is one of them.
     map_lost: Arc<AtomicBool>,
     calls: BTreeMap<CallId, Client>,
@@ -347,7 +352,7 @@ impl Shell {
 
     fn diagnose(&self) {
         let counts = self.machine.counts();
-        let lost = self.lost.load(Ordering::Relaxed);
+        let lost = self.lost.load(Ordering::Relaxed) + self.losses.lost();
         let last = self.machine.last_result();
         let (level, message) = if self.machine.map_voxels() == 0 {
             (Level::Warn, "no map yet".to_owned())
@@ -361,6 +366,7 @@ impl Shell {
         let mut values = report::key_values(counts);
         values.extend([
             ("inbox_full".into(), lost.to_string()),
+            ("undecodable".into(), self.losses.undecodable().to_string()),
             ("map_voxels".into(), self.machine.map_voxels().to_string()),
             ("session".into(), last.session.clone()),
             ("last_reason".into(), last.reason.clone()),

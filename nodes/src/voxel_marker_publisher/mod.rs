@@ -55,8 +55,14 @@ pub struct MarkerReport {
     pub marker_bytes: usize,
     /// Bytes given out over the whole run.
     pub published_bytes: u64,
-    /// Arrays that could not be given to the publisher.
+    /// Arrays that the publisher did not take or could not send.
     pub arrays_not_published: u64,
+    /// Chunks of the map that were sent and lost on the way, or that found the inbox full.
+    #[serde(default)]
+    pub inbox_full: u64,
+    /// Samples that did not decode.
+    #[serde(default)]
+    pub undecodable: u64,
 }
 
 /// Follows a map and keeps the markers of its blocks up to date.

@@ -15,7 +15,7 @@ use crate::start::{Finish, NodeError, warn_unused};
 use crate::{options, report};
 use lattice_runtime::logging::Throttle;
 use lattice_runtime::qos::Qos;
-use lattice_runtime::{Diagnostics, Level, Load, Publisher, Runtime, Undecoded};
+use lattice_runtime::{Diagnostics, Level, Load, Losses, Publisher, Runtime, Undecoded};
 
 /// Longest wait for readers at the end, between two budgets of markers.
 const FLUSH: Duration = Duration::from_secs(2);
@@ -44,7 +44,9 @@ pub fn start(runtime: &Runtime, name: &str) -> Result<Finish, NodeError> {
     let mapper = params.string("mapper", "lattice_mapper")?;
     let publisher = node.publisher("voxel_markers", Qos::MARKERS)?;
     let lost = Arc::new(AtomicU64::new(0));
+    let losses = Losses::default();
     let mut shell = Shell {
+        losses: losses.clone(),
         lost: Arc::clone(&lost),
         lost_seen: 0,
         machine: VoxelMarkers::new(markers),
@@ -55,10 +57,10 @@ pub fn start(runtime: &Runtime, name: &str) -> Result<Finish, NodeError> {
         requests: Throttle::new(Duration::from_secs(1)),
         seconds: Throttle::new(Duration::from_secs(1)),
         budget_bytes: (bytes_per_s as f64 / rate_hz) as usize,
-        not_published: 0,
+        arrays_lost: 0,
         incomplete: false,
         repairs: Throttle::new(Duration::from_secs(5)),
-        report_file: params.string("report_file", "")?,
+        report_file: report::file(params)?,
     };
     let compute = Compute::spawn(name, limits, runtime.shutdown_handle(), move |event| {
         shell.on(event)
@@ -82,6 +84,7 @@ pub fn start(runtime: &Runtime, name: &str) -> Result<Finish, NodeError> {
         }
     };
     let updates = node.subscribe_undecoded("map_updates", Qos::DELTAS, Load::Small, on_update)?;
+    losses.watch([&maps, &updates]);
     let joined = inbox.clone();
     publisher.on_subscriber_joined(move || {
         let _ = joined.send(Event::Redraw, 0);
@@ -100,6 +103,8 @@ pub fn start(runtime: &Runtime, name: &str) -> Result<Finish, NodeError> {
 struct Shell {
     /// Chunks of the map that found the inbox full.
     lost: Arc<AtomicU64>,
+    /// Chunks lost before it.
+    losses: Losses,
     /// Those that a keyframe was asked for.
     lost_seen: u64,
     machine: VoxelMarkers,
@@ -110,7 +115,8 @@ struct Shell {
     requests: Throttle,
     seconds: Throttle,
     budget_bytes: usize,
-    not_published: u64,
+    /// Arrays lost by the publisher after which all is drawn again.
+    arrays_lost: u64,
     incomplete: bool,
     repairs: Throttle,
     report_file: String,
@@ -133,7 +139,7 @@ impl Shell {
             }
             Event::Redraw => self.machine.redraw(),
             Event::Draw => {
-                let lost = self.lost.load(Ordering::Relaxed);
+                let lost = self.chunks_lost();
                 if lost != self.lost_seen {
                     self.lost_seen = lost;
                     self.ask_for_keyframe();
@@ -169,20 +175,27 @@ impl Shell {
         }
     }
 
+    /// Chunks lost on the way or at the inbox.
+    fn chunks_lost(&self) -> u64 {
+        self.lost.load(Ordering::Relaxed) + self.losses.lost()
+    }
+
     fn draw(&mut self) {
         if !self.machine.is_dirty() {
             return;
         }
         for array in self.machine.take_arrays(self.budget_bytes) {
-            if self.markers.publish(Arc::new(array)).is_err() {
-                self.not_published += 1;
-                self.incomplete = true;
+            if let Err(error) = self.markers.publish(Arc::new(array)) {
+                log::debug!("markers not published: {error}");
             }
         }
     }
 
     /// Draws again after a loss, but not as fast as arrays are lost.
     fn repair(&mut self) {
+        let lost = self.markers.dropped();
+        self.incomplete |= lost != self.arrays_lost;
+        self.arrays_lost = lost;
         if self.incomplete && self.repairs.check().is_some() {
             self.incomplete = false;
             self.machine.wipe();
@@ -197,8 +210,10 @@ impl Shell {
             (_, refused) => (Level::Warn, format!("{refused} messages refused")),
         };
         let mut values = report::key_values(counts);
-        let lost = self.lost.load(Ordering::Relaxed);
-        values.push(("inbox_full".into(), lost.to_string()));
+        let (undecodable, arrays) = (self.losses.undecodable(), self.markers.dropped());
+        values.push(("inbox_full".into(), self.chunks_lost().to_string()));
+        values.push(("undecodable".into(), undecodable.to_string()));
+        values.push(("arrays_not_published".into(), arrays.to_string()));
         values.push(("voxels".into(), self.machine.voxels().to_string()));
         self.diagnostics.set("markers", level, message, values);
     }
@@ -219,10 +234,12 @@ impl Shell {
             voxels: self.machine.voxels(),
             marker_bytes: self.machine.take_bytes(),
             published_bytes: self.markers.sent_bytes(),
-            arrays_not_published: self.not_published,
+            arrays_not_published: self.markers.dropped(),
+            inbox_full: self.chunks_lost(),
+            undecodable: self.losses.undecodable(),
         };
         if let Err(error) = report::write(&self.report_file, &report) {
-            log::error!("{}: {error}", self.report_file);
+            log::error!("{error}");
         }
     }
 }

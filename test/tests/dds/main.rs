@@ -6,6 +6,7 @@ mod calibration;
 mod client;
 mod conformance;
 mod cyclone;
+mod losses;
 mod peer;
 mod ros2_client_peer;
 mod security;

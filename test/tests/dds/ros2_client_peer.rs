@@ -8,6 +8,7 @@ use lattice_msgs::std_srvs::{Trigger, TriggerRequest, TriggerResponse};
 use lattice_runtime::Runtime;
 use lattice_runtime::ros_args::RosArgs;
 use lattice_test::domain::TestDomain;
+use ros2_client::qos::History;
 use ros2_client::{Message, Name, Node, NodeEvent, ServiceMapping, ServiceTypeName};
 
 use super::client::{Foreign, PATIENCE, insist, mappings, peer, reliable};
@@ -107,6 +108,57 @@ fn an_answer_given_at_the_end_reaches_its_client() {
     runtime.spin().unwrap();
     let reply: Foreign<TriggerResponse> = client.join().unwrap();
     assert_eq!(reply.0, saved);
+}
+
+#[test]
+fn many_requests_at_once_are_all_answered() {
+    const REQUESTS: usize = 150;
+    let domain = TestDomain::take();
+    let runtime = runtime(&domain, &[]);
+    let (sender, asked) = channel();
+    let _server = runtime
+        .node("mapper")
+        .unwrap()
+        .service_later::<Trigger>("~/reset", move |_, reply| sender.send(reply).unwrap())
+        .unwrap();
+    let mut peer = peer(&domain);
+    let type_name = ServiceTypeName::new(TRIGGER.0, TRIGGER.1);
+    let name = Name::parse("/mapper/reset").unwrap();
+    let depth = 2 * REQUESTS;
+    let qos = || reliable().history(History::KeepLast { depth });
+    let client = peer
+        .create_client::<Foreign<TriggerRequest>, Foreign<TriggerResponse>>(
+            mappings()[0],
+            &name,
+            &type_name,
+            qos(),
+            qos(),
+        )
+        .unwrap();
+    let (done, answers) = channel();
+    let calls = std::thread::spawn(move || {
+        smol::block_on(async {
+            client.wait_for_service(&peer).await;
+            for _ in 0..REQUESTS {
+                let request = Foreign(TriggerRequest::default());
+                client.async_send_request(request).await.unwrap();
+            }
+        });
+        done.send(()).unwrap();
+        // They send again what is lost.
+        (client, peer)
+    });
+    // All have been sent before the first is answered.
+    let first = asked.recv_timeout(PATIENCE).unwrap();
+    answers.recv_timeout(PATIENCE).unwrap();
+    std::thread::sleep(std::time::Duration::from_millis(500));
+    first.send(TriggerResponse::default());
+    for i in 1..REQUESTS {
+        let reply = asked.recv_timeout(PATIENCE);
+        let reply = reply.unwrap_or_else(|_| panic!("{i} requests of {REQUESTS} came"));
+        reply.send(TriggerResponse::default());
+    }
+    drop(calls.join().unwrap());
 }
 
 #[test]

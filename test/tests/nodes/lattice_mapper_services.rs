@@ -40,6 +40,15 @@ impl Pair {
         self.follow();
     }
 
+    /// A cloud of another time, which is believed when it comes the fifth time.
+    fn insert_at_last(&mut self, stamp_s: i32, points: &[[f32; 3]]) {
+        let cloud = cloud("map", i64::from(stamp_s) * SECOND_NS, points);
+        for _ in 0..4 {
+            self.mapper.on_cloud(&cloud).unwrap_err();
+        }
+        self.insert(stamp_s, points);
+    }
+
     fn follow(&mut self) {
         maps::follow_update(&mut self.follower, &mut self.mapper);
         let voxels = self.follower.map().unwrap().voxels();
@@ -116,15 +125,46 @@ fn old_voxels_go_by_the_time_of_the_clouds() {
     pair.insert(100, &row(0, 5));
     pair.insert(105, &row(3, 5));
     assert!(pair.has(0.0));
+    pair.insert(108, &[]);
     pair.insert(111, &row(20, 1));
     let found = pair.occupied([0.0, 2.0, 3.0, 7.0, 20.0]);
     assert_eq!(found, [false, false, true, true, true]);
-    pair.insert(130, &[]);
+    // Time goes on after a pause once several clouds agree; then the log begins again.
+    pair.insert_at_last(130, &[]);
     assert!(pair.mapper.list().is_empty());
     assert_eq!(pair.mapper.counts().voxels_forgotten, 9);
-    // The log begins again.
-    pair.insert(100, &row(0, 5));
+    pair.insert_at_last(100, &row(0, 5));
     assert!(pair.has(0.0));
+    assert_eq!(pair.mapper.counts().clouds_stamp_jump, 8);
+}
+
+#[test]
+fn a_cloud_from_another_year_makes_no_voxel_old() {
+    let mut pair = Pair::new(MapperOptions {
+        forget_after_ns: 10 * SECOND_NS,
+        ..options(LatticeKind::Fcc)
+    });
+    let year_s = 31_557_600;
+    for stamp_s in 100..110 {
+        pair.insert(stamp_s, &row(stamp_s, 1));
+        for wrong_s in [year_s, stamp_s - 90] {
+            let wrong = cloud("map", i64::from(wrong_s) * SECOND_NS, &row(0, 1));
+            let refusal = pair.mapper.on_cloud(&wrong).unwrap_err().to_string();
+            assert!(refusal.contains("clock"), "{refusal}");
+            pair.insert(stamp_s, &[]);
+        }
+    }
+    assert_eq!(pair.mapper.list().len(), 10);
+    assert_eq!(pair.mapper.counts().clouds_stamp_jump, 20);
+    // One that comes first is held against nothing, and does no harm either.
+    let mut loaded = maps::mapper(MapperOptions {
+        forget_after_ns: 10 * SECOND_NS,
+        ..options(LatticeKind::Fcc)
+    });
+    loaded.load(pair.mapper.contents(), 8).unwrap();
+    let wrong = cloud("map", i64::from(year_s) * SECOND_NS, &[]);
+    loaded.on_cloud(&wrong).unwrap();
+    assert_eq!(loaded.list().len(), 10);
 }
 
 #[test]
@@ -234,6 +274,8 @@ fn a_loaded_map_replaces_all() {
     let mut pair = Pair::new(aged);
     assert_eq!(pair.mapper.load(source.mapper.contents(), 8).unwrap(), 30);
     let late = cloud("map", 9 * SECOND_NS, &row(50, 1));
-    pair.mapper.on_cloud(&late).unwrap();
+    for _ in 0..2 {
+        pair.mapper.on_cloud(&late).unwrap();
+    }
     assert_eq!(pair.mapper.list().len(), 1);
 }

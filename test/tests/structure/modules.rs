@@ -15,7 +15,7 @@ const LAYERS: [(&str, &str); 3] = [
     ),
     (
         "nodes/src",
-        "files convert report start compute options map_follower enu_transformer lattice_mapper \
+        "files convert stamps start report compute options map_follower enu_transformer lattice_mapper \
          voxel_marker_publisher semantic_icp_server replay executables bag_player",
     ),
     (

@@ -29,7 +29,7 @@ const NODES: [(&str, ReadOptions, &str); 3] = [
     (
         "lattice_mapper",
         |params| _ = MapperOptions::from_params(params).unwrap(),
-        "centers_period_s free_period_s inbox_bytes inbox_events report_file threads \
+        "centers_period_s free_period_s inbox_bytes inbox_events map_dir report_file threads \
          update_period_s",
     ),
     (

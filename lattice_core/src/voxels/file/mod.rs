@@ -49,6 +49,12 @@ pub fn write_map(list: &VoxelList, writer: impl Write) -> Result<(), FileError> 
     MapContents::from_list(list).write(writer, &WriteOptions::default())
 }
 
+/// True for what begins as a map file does, of whatever version.
+pub fn is_map(mut reader: impl Read) -> bool {
+    let mut magic = [0; 8];
+    reader.read_exact(&mut magic).is_ok() && [head::MAGIC, head::OLD_MAGIC].contains(&&magic)
+}
+
 /// Reads a map of at most `max_voxels`, which becomes its bound; all voxels count as changed.
 ///
 /// A map without payload becomes one of a point at each centre. See [`MapContents::read`].

@@ -8,6 +8,7 @@ use lattice_bag::Storage;
 use lattice_core::lattice::LatticeKind;
 use lattice_lab::datasets::BobcatOptions;
 use lattice_lab::render::RenderOptions;
+use lattice_nodes::files::whole::write_text;
 use std::fs;
 use std::path::PathBuf;
 
@@ -44,7 +45,7 @@ impl Demo {
         let bag = self.out.join("log");
         let params = self.out.join("bobcat.yaml");
         fs::create_dir_all(&self.out).map_err(|e| format!("{}: {e}", self.out.display()))?;
-        fs::write(&params, BOBCAT_PARAMS).map_err(|e| format!("{}: {e}", params.display()))?;
+        write_text(&params, BOBCAT_PARAMS)?;
         let summary = simulate::bobcat(&BobcatOptions {
             seed: self.seed,
             duration_s: self.duration,

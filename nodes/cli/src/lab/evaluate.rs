@@ -11,6 +11,7 @@ use lattice_lab::evaluate::{
 };
 use lattice_lab::simulate::house::Scene;
 use lattice_lab::{markdown, write_report};
+use lattice_nodes::files::whole::write_text;
 use std::path::PathBuf;
 use std::time::{Duration, Instant};
 
@@ -139,7 +140,7 @@ impl Calibration {
         let report = report(&summary, &trials)?;
         write_report(&report, &self.out)?;
         let json = serde_json::to_string_pretty(&summary)?;
-        super::write(&self.out.join("summary.json"), &json)?;
+        write_text(&self.out.join("summary.json"), &json)?;
         if self.json {
             println!("{json}");
         } else {

@@ -8,6 +8,7 @@ use lattice_lab::evaluate::kitti::{
     read_scans, write_scans,
 };
 use lattice_lab::{markdown, write_report};
+use lattice_nodes::files::whole::write_text;
 use std::path::PathBuf;
 
 /// Options of `lattice evaluate kitti`.
@@ -46,7 +47,7 @@ impl Kitti {
         let json = serde_json::to_string_pretty(&report)?;
         let table = kitti_report(&report);
         write_report(&table, &self.out)?;
-        super::write(&self.out.join("kitti.json"), &json)?;
+        write_text(&self.out.join("kitti.json"), &json)?;
         match self.json {
             true => println!("{json}"),
             false => print!("{}", markdown(&table)),

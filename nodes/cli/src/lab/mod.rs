@@ -14,10 +14,9 @@ use clap::Subcommand;
 use clap::builder::{PossibleValue, PossibleValuesParser, TypedValueParser};
 use lattice_core::voxels::VoxelList;
 use lattice_lab::render::{RenderOptions, render_png};
+use lattice_nodes::files::whole;
 use serde::Serialize;
 use std::fmt::Display;
-use std::fs::File;
-use std::io::BufWriter;
 use std::path::Path;
 
 /// Commands of the laboratory.
@@ -54,8 +53,7 @@ impl Lab {
 
 /// Draws a map as a PNG file.
 pub fn picture(list: &VoxelList, options: &RenderOptions, out: &Path) -> CliResult {
-    let file = File::create(out).map_err(|e| format!("{}: {e}", out.display()))?;
-    render_png(list, options, BufWriter::new(file))
+    whole::write(out, |file| render_png(list, options, file))
 }
 
 /// A value of an option with its name and help.
@@ -85,9 +83,4 @@ fn show(json: bool, summary: &(impl Serialize + Display)) -> CliResult {
 /// Number of processors.
 fn processors() -> usize {
     std::thread::available_parallelism().map_or(1, usize::from)
-}
-
-/// Writes a text file.
-fn write(path: &Path, text: &str) -> Result<(), String> {
-    std::fs::write(path, text).map_err(|e| format!("{}: {e}", path.display()))
 }

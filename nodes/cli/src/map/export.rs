@@ -1,7 +1,5 @@
 //! `lattice map export`.
 
-use std::fs::File;
-use std::io::BufWriter;
 use std::path::PathBuf;
 
 use clap::{Args, ValueEnum};
@@ -11,6 +9,7 @@ use crate::CliResult;
 #[cfg(feature = "lab")]
 use lattice_lab::render::RenderOptions;
 use lattice_nodes::files::export::{write_centers_ply, write_mesh_ply};
+use lattice_nodes::files::whole;
 
 /// Options of `lattice map export`.
 #[derive(Args)]
@@ -66,15 +65,12 @@ impl Export {
         if self.form == Form::Png || self.out.extension().is_some_and(|ending| ending == "png") {
             return crate::lab::picture(&list, &self.picture.options(), &self.out);
         }
-        let file = File::create(&self.out).map_err(|e| format!("{}: {e}", self.out.display()))?;
-        let out = BufWriter::new(file);
-        match self.form {
-            Form::Centers => write_centers_ply(&list, out)?,
-            Form::Mesh => write_mesh_ply(&list, out)?,
+        whole::write(&self.out, |out| match self.form {
+            Form::Centers => write_centers_ply(&list, out),
+            Form::Mesh => write_mesh_ply(&list, out),
             #[cfg(feature = "lab")]
-            Form::Png => {}
-        }
-        Ok(())
+            Form::Png => Ok(()),
+        })
     }
 }
 

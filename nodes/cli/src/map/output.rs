@@ -1,11 +1,11 @@
 //! Map files that commands write.
 
-use std::fs::{self, File};
-use std::io::{BufWriter, Write};
+use std::io::Write;
 use std::path::Path;
 
 use clap::Args;
 use lattice_core::voxels::file::{MapContents, WriteOptions};
+use lattice_nodes::files::whole;
 use serde::Serialize;
 
 use crate::CliResult;
@@ -40,28 +40,9 @@ impl Form {
             zstd_level: self.zstd,
             occupancy_only: self.occupancy_only,
         };
-        let here = |e: &dyn std::fmt::Display| format!("{}: {e}", out.display());
-        // A pipe or device is no file that another could take the place of.
-        let whole = fs::metadata(out).map_or(true, |at| at.is_file());
-        let mut partial = out.as_os_str().to_owned();
-        partial.push(".partial");
-        let path = if whole { Path::new(&partial) } else { out };
-        let write = || -> CliResult<u64> {
-            let mut file = Counted {
-                writer: BufWriter::new(File::create(path)?),
-                bytes: 0,
-            };
-            map.write(&mut file, &options)?;
-            if whole {
-                fs::rename(path, out)?;
-            }
-            Ok(file.bytes)
-        };
-        let file_bytes = write().map_err(|e| {
-            if whole {
-                let _ = fs::remove_file(path);
-            }
-            here(&e)
+        let file_bytes = whole::write(out, |writer| {
+            let mut file = Counted { writer, bytes: 0 };
+            map.write(&mut file, &options).map(|()| file.bytes)
         })?;
         let voxels = map.keys().len();
         Ok(Written {

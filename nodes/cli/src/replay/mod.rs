@@ -3,8 +3,6 @@
 mod node_process;
 mod processes;
 
-use std::fs::File;
-use std::io::BufWriter;
 use std::path::PathBuf;
 
 use clap::Args;
@@ -16,6 +14,7 @@ use super::{CliResult, Lattices, init_logging};
 use lattice_bag::BagReader;
 use lattice_nodes::enu_transformer::TransformerOptions;
 use lattice_nodes::enu_transformer::ins::InsSource;
+use lattice_nodes::files::whole;
 use lattice_nodes::lattice_mapper::MapperOptions;
 use lattice_nodes::replay::{self, Pipeline, RunReport, TopicWishes};
 use lattice_nodes::voxel_marker_publisher::MarkerOptions;
@@ -155,10 +154,8 @@ impl Replay {
                 path.as_mut_os_string().push(".");
                 path.as_mut_os_string().push(ending);
             }
-            let file = File::create(&path).map_err(|e| format!("{}: {e}", path.display()))?;
-            mapper
-                .contents()
-                .write(BufWriter::new(file), &WriteOptions::default())?;
+            let map = mapper.contents();
+            whole::write(&path, |file| map.write(file, &WriteOptions::default()))?;
         }
         Ok(())
     }

@@ -4,6 +4,7 @@
 mod browser;
 mod calibrate;
 mod evaluate;
+mod files;
 mod map;
 mod nodes;
 mod paper;

@@ -3,11 +3,11 @@
 use super::points::{ScanRecord, scans_path};
 use crate::simulate::{Survey, SurveyPattern};
 use crate::{AnyError, at};
+use lattice_nodes::files::whole::WholeFile;
 use serde::Serialize;
 use std::fmt;
-use std::fs::File;
-use std::io::{BufWriter, Write};
-use std::path::{Path, PathBuf};
+use std::io::Write;
+use std::path::PathBuf;
 
 /// Options of a simulated survey.
 #[derive(Clone, Debug)]
@@ -58,8 +58,8 @@ pub fn write_site(
 ) -> Result<SiteSummary, AnyError> {
     let survey = Survey::new(options.seed, options.pattern)?;
     let scans_out = scans_path(&options.out);
-    let mut points_file = create(&options.out)?;
-    let mut scans_file = create(&scans_out)?;
+    let mut points_file = WholeFile::create(&options.out).map_err(at(&options.out))?;
+    let mut scans_file = WholeFile::create(&scans_out).map_err(at(&scans_out))?;
     let (mut points, mut scans, mut sum_m) = (0u64, 0u64, 0.0);
     for scan in survey.scans() {
         if points >= options.points {
@@ -83,13 +83,13 @@ pub fn write_site(
         scans += 1;
         progress(points as f64 / options.points as f64);
     }
-    points_file.flush().map_err(at(&options.out))?;
-    scans_file.flush().map_err(at(&scans_out))?;
     if points < options.points {
         return Err(
             format!("only {points} points in the longest simulation; ask for no more").into(),
         );
     }
+    points_file.finish().map_err(at(&options.out))?;
+    scans_file.finish().map_err(at(&scans_out))?;
     Ok(SiteSummary {
         out: options.out.clone(),
         points,
@@ -97,11 +97,6 @@ pub fn write_site(
         duration_s: scans as f64 / options.pattern.scans_per_s(),
         mean_range_m: sum_m / points.max(1) as f64,
     })
-}
-
-fn create(path: &Path) -> Result<BufWriter<File>, AnyError> {
-    let file = File::create(path).map_err(at(path))?;
-    Ok(BufWriter::with_capacity(1 << 20, file))
 }
 
 #[cfg(test)]

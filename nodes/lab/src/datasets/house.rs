@@ -8,12 +8,12 @@ use lattice_core::pose::Axes;
 use lattice_core::registration::UNLABELED;
 use lattice_core::voxels::file::write_map;
 use lattice_nodes::files::export::write_labelled_ply;
+use lattice_nodes::files::whole;
 use nalgebra::{Isometry3, Point3};
 use serde::{Deserialize, Serialize};
 use std::collections::BTreeMap;
 use std::fmt;
-use std::fs::{self, File};
-use std::io::{BufWriter, Write};
+use std::fs;
 use std::path::PathBuf;
 
 /// Name of the robot's map in the folder.
@@ -173,24 +173,21 @@ pub fn write_house(
     let list = survey.voxels(&lattice, &draw.map)?;
     summary.survey_points = survey.cloud.len();
     summary.voxels = list.len();
-    let (path, file) = create(options, MAP_FILE)?;
-    write_map(&list, BufWriter::new(file)).map_err(at(&path))?;
+    whole::write(&place(options, MAP_FILE)?, |file| write_map(&list, file))?;
     let classes = BTreeMap::from([("classes", house.class_names())]);
-    let (path, mut file) = create(options, CLASSES_FILE)?;
     let text = serde_yaml::to_string(&classes)?;
-    file.write_all(text.as_bytes()).map_err(at(&path))?;
+    whole::write_text(&place(options, CLASSES_FILE)?, &text)?;
     progress(1.0);
     Ok(summary)
 }
 
-fn create(options: &HouseOptions, name: &str) -> Result<(PathBuf, File), AnyError> {
+fn place(options: &HouseOptions, name: &str) -> Result<PathBuf, AnyError> {
     let path = options.out.join(name);
     if path.exists() && !options.overwrite {
         let words = "there is a file already; choose another folder or allow to overwrite";
         return Err(at(&path)(words));
     }
-    let file = File::create(&path).map_err(at(&path))?;
-    Ok((path, file))
+    Ok(path)
 }
 
 fn write_scene(
@@ -223,12 +220,14 @@ fn write_scene(
         let labels = cloud.labels.iter();
         let labels = labels.map(|label| label.top().unwrap_or(UNLABELED));
         let labels: Vec<u16> = labels.collect();
-        let (path, file) = create(options, &cloud_name)?;
+        let path = place(options, &cloud_name)?;
         let comment = match options.axes {
             HeadsetAxes::Ros => "metres, headset_origin: x forward, y left, z up",
             HeadsetAxes::Unity => "metres, headset_origin: x right, y up, z forward (left-handed)",
         };
-        write_labelled_ply(&points, &labels, comment, file).map_err(at(&path))?;
+        whole::write(&path, |file| {
+            write_labelled_ply(&points, &labels, comment, file)
+        })?;
         let counts = &mut summary.headset_points;
         counts.insert(cloud_name.clone(), points.len());
         truth.headset_scans.push(HeadsetScanTruth {
@@ -236,7 +235,6 @@ fn write_scene(
             sensor_m: turned(&headset_scan.sensor_m).into(),
         });
     }
-    let (path, file) = create(options, &format!("{name}.json"))?;
-    let written = serde_json::to_writer_pretty(BufWriter::new(file), &truth);
-    written.map_err(at(&path))
+    let path = place(options, &format!("{name}.json"))?;
+    whole::write(&path, |file| serde_json::to_writer_pretty(file, &truth))
 }

@@ -11,10 +11,10 @@ use crate::simulate::{
 };
 use crate::{AnyError, at};
 use lattice_nodes::files::export::ply_header;
+use lattice_nodes::files::whole::{self, WholeFile};
 use nalgebra::{Isometry3, Vector3};
 use serde_yaml::{Mapping, Value};
-use std::fs::File;
-use std::io::{BufWriter, Seek, SeekFrom, Write};
+use std::io::{Seek, SeekFrom, Write};
 use std::path::PathBuf;
 
 pub(super) const FOLDER: &str = "truth";
@@ -27,8 +27,8 @@ const PLY_HEADER_BYTES: usize = 256;
 
 /// The open files of a truth folder.
 pub(super) struct Truth {
-    poses: (PathBuf, BufWriter<File>),
-    points: (PathBuf, BufWriter<File>),
+    poses: (PathBuf, WholeFile),
+    points: (PathBuf, WholeFile),
     point_count: u64,
 }
 
@@ -39,11 +39,11 @@ impl Truth {
         std::fs::create_dir_all(&folder).map_err(at(&folder))?;
         let site = folder.join(SITE_FILE);
         let facts = serde_yaml::to_string(&site_facts(options)).map_err(at(&site))?;
-        std::fs::write(&site, facts).map_err(at(&site))?;
+        whole::write_text(&site, &facts)?;
         let open = |name: &str| {
             let path = folder.join(name);
-            let file = File::create(&path).map_err(at(&path))?;
-            Ok::<_, AnyError>((path, BufWriter::new(file)))
+            let file = WholeFile::create(&path).map_err(at(&path))?;
+            Ok::<_, AnyError>((path, file))
         };
         let (mut poses, mut points) = (open(POSES_FILE)?, open(POINTS_FILE)?);
         writeln!(poses.1, "stamp_ns,x,y,z,qx,qy,qz,qw").map_err(at(&poses.0))?;
@@ -78,15 +78,15 @@ impl Truth {
 
     pub(super) fn finish(self) -> Result<(), AnyError> {
         let Self {
-            poses: (poses_path, mut poses),
+            poses: (poses_path, poses),
             points: (points_path, mut points),
             point_count,
         } = self;
-        poses.flush().map_err(at(&poses_path))?;
+        poses.finish().map_err(at(&poses_path))?;
         points
             .seek(SeekFrom::Start(0))
             .and_then(|_| points.write_all(&padded_header(point_count)))
-            .and_then(|()| points.flush())
+            .and_then(|()| points.finish())
             .map_err(at(&points_path))
     }
 }

@@ -3,16 +3,14 @@
 use super::html::html;
 use super::{Cell, Report, Table};
 use crate::{AnyError, at};
+use lattice_nodes::files::whole;
 use std::fs;
 use std::path::Path;
 
 /// Writes a report into a folder, which is made where it is missing; its files are replaced.
 pub fn write_report(report: &Report, folder: &Path) -> Result<(), AnyError> {
     fs::create_dir_all(folder).map_err(at(folder))?;
-    let put = |name: &str, text: &str| {
-        let path = folder.join(name);
-        fs::write(&path, text).map_err(at(&path))
-    };
+    let put = |name: &str, text: &str| whole::write_text(&folder.join(name), text);
     put(
         "report.json",
         &(serde_json::to_string_pretty(report)? + "\n"),

@@ -39,7 +39,7 @@ impl Shared {
             ros_type: S::Request::TYPE,
             type_hash: None,
         };
-        let requests = self.reader(topic, &Qos::SERVICES, MAX_REQUEST_BYTES)?;
+        let requests = self.reader(topic, &Qos::REQUESTS, MAX_REQUEST_BYTES)?;
         let readers = Arc::new(Peers::new(name, "reply reader", log::Level::Debug));
         let topic = PortTopic {
             name,

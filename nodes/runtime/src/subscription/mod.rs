@@ -6,8 +6,8 @@ mod source;
 pub(crate) use intake::{Command, Intake};
 pub(crate) use source::Source;
 
-use std::sync::Arc;
 use std::sync::atomic::{AtomicU64, Ordering::Relaxed};
+use std::sync::{Arc, Mutex};
 use std::thread::JoinHandle;
 use std::time::Duration;
 
@@ -19,6 +19,7 @@ use super::error::RuntimeError;
 use super::logging::Throttle;
 use super::peers::Peers;
 use super::shutdown::Shutdown;
+use super::sync::lock;
 use super::task_thread::guarded;
 
 /// Between two warnings of undecodable samples.
@@ -92,6 +93,31 @@ impl Subscription {
     /// Samples that were no message of this type, or too long, and were left out.
     pub fn undecodable(&self) -> u64 {
         self.stats().undecodable.load(Relaxed)
+    }
+}
+
+/// Losses of some subscriptions, summed up; clones share them, and outlive the subscriptions.
+#[derive(Clone, Default)]
+pub struct Losses(Arc<Mutex<Vec<Arc<Stats>>>>);
+
+impl Losses {
+    /// Adds the losses of subscriptions.
+    pub fn watch<'a>(&self, subscriptions: impl IntoIterator<Item = &'a Subscription>) {
+        let stats = |of: &Subscription| Arc::clone(&of.intake.stats);
+        lock(&self.0).extend(subscriptions.into_iter().map(stats));
+    }
+
+    /// Sum of [`Subscription::lost`].
+    pub fn lost(&self) -> u64 {
+        let stats = lock(&self.0);
+        stats.iter().map(|stats| stats.lost.load(Relaxed)).sum()
+    }
+
+    /// Sum of [`Subscription::undecodable`].
+    pub fn undecodable(&self) -> u64 {
+        let stats = lock(&self.0);
+        let of = |stats: &Arc<Stats>| stats.undecodable.load(Relaxed);
+        stats.iter().map(of).sum()
     }
 }
 

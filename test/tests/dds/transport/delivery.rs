@@ -8,7 +8,7 @@ use lattice_msgs::sensor_msgs::PointCloud2;
 use lattice_msgs::std_msgs::String as RosString;
 use lattice_msgs::{RosMessage, cdr};
 use lattice_runtime::qos::Qos;
-use lattice_runtime::{Load, PublishError, RuntimeError};
+use lattice_runtime::{Load, Losses, PublishError, RuntimeError};
 
 use super::{PATIENCE, Two, assert_counted, assert_heard, count_to, hear, text, wait_until};
 
@@ -257,6 +257,10 @@ fn what_a_slow_subscriber_misses_is_counted() {
         assert!(publisher.flush(PATIENCE));
         gate.send(()).unwrap();
     }
+    let losses = Losses::default();
+    losses.watch([&subscription]);
+    let lost = subscription.lost();
+    assert!((lost..=subscription.lost()).contains(&losses.lost()));
     assert!(subscription.lost() + subscription.received() <= publisher.sent());
     drop(gate);
 }

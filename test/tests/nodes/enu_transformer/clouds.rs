@@ -2,12 +2,12 @@
 
 use lattice_msgs::sensor_msgs::PointCloud2;
 use lattice_nodes::enu_transformer::TransformerOptions;
-use lattice_nodes::enu_transformer::ins::InsSource;
-use lattice_test::clouds::{SECOND_NS, cloud, field, points, timed_cloud};
+use lattice_nodes::enu_transformer::ins::{InsMessage, InsSource};
+use lattice_test::clouds::{SECOND_NS, cloud, field, odometry, points, timed_cloud};
 use nalgebra::Vector3;
 use serde_bytes::ByteBuf;
 
-use super::{Bench, START_NS, STEP_NS, base_cloud};
+use super::{Bench, START_NS, STEP_NS, base_cloud, driven};
 
 #[test]
 fn a_cloud_between_two_poses_is_interpolated() {
@@ -77,6 +77,20 @@ fn a_log_that_loops_is_noticed_and_goes_on() {
     }
     assert_eq!(bench.clouds.len(), 3);
     assert_eq!(bench.machine.counts().time_jumps, 2);
+}
+
+#[test]
+fn a_pose_from_another_year_costs_no_cloud() {
+    let mut bench = Bench::odometry();
+    bench.drive(0, 10);
+    for wrong_ns in [START_NS + 31_557_600 * SECOND_NS, 0] {
+        let wrong = odometry(wrong_ns, &driven(0));
+        bench.ins(InsMessage::Odometry(&wrong), START_NS + 9 * STEP_NS);
+        bench.cloud(base_cloud(START_NS + 5 * STEP_NS), START_NS + 9 * STEP_NS);
+    }
+    let counts = bench.machine.counts();
+    assert_eq!((bench.clouds.len(), counts.poses_stamp_jump), (2, 2));
+    assert_eq!((bench.transforms.len(), counts.time_jumps), (10, 0));
 }
 
 #[test]

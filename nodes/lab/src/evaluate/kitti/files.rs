@@ -4,7 +4,8 @@ use super::Prepared;
 use crate::{AnyError, at};
 use lattice_core::registration::{SemanticCloud, UNLABELED};
 use lattice_nodes::files::export::write_labelled_ply;
-use std::fs::{self, File};
+use lattice_nodes::files::whole;
+use std::fs;
 use std::path::Path;
 
 /// Writes each scan as `scan_N.ply`, and thinned as `thinned_N.ply`: points with their most probable
@@ -18,8 +19,9 @@ pub fn write_scans(folder: &Path, names: &[String], scans: &[Prepared]) -> Resul
                 .map(|i| cloud.label(i).top().unwrap_or(UNLABELED))
                 .collect();
             let comment = format!("{kind} at {name}, metres, sensor frame");
-            let file = File::create(&path).map_err(at(&path))?;
-            write_labelled_ply(&cloud.points_m, &labels, &comment, file).map_err(at(&path))
+            whole::write(&path, |file| {
+                write_labelled_ply(&cloud.points_m, &labels, &comment, file)
+            })
         };
         write("scan", &scan.whole)?;
         write("thinned", &scan.thinned)?;

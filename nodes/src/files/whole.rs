@@ -1,0 +1,204 @@
+//! Files that take their place whole: on a full disk, at an error or a kill the one before stays.
+
+use std::error::Error;
+use std::fs::{self, File};
+use std::io::{self, BufWriter, ErrorKind, Seek, SeekFrom, Write};
+use std::os::unix::fs::PermissionsExt;
+use std::path::{Path, PathBuf};
+
+use rustix::fs::{AtFlags, CWD, Mode, OFlags, linkat, open};
+use tempfile::{Builder, NamedTempFile, TempPath};
+
+/// Any error on its way to the user.
+type AnyError = Box<dyn Error + Send + Sync>;
+
+/// A file that is being written; dropped before [`WholeFile::finish`] it leaves nothing.
+pub struct WholeFile {
+    out: BufWriter<File>,
+    place: Place,
+}
+
+/// Way of a file to its path.
+enum Place {
+    /// A pipe or device, which no file takes the place of, is written at once.
+    There,
+    /// No name yet, so that a kill leaves nothing.
+    Unnamed(PathBuf),
+    /// A name of its own in the folder, where files need one.
+    Beside(TempPath, PathBuf),
+}
+
+impl WholeFile {
+    /// Begins a file for a path; a folder that is not there or not writable is noticed here.
+    pub fn create(path: &Path) -> io::Result<Self> {
+        let (file, place) = match fs::metadata(path) {
+            Ok(found) if found.is_dir() => return Err(ErrorKind::IsADirectory.into()),
+            Ok(found) if !found.is_file() => {
+                (File::options().write(true).open(path)?, Place::There)
+            }
+            found => {
+                let to = path.to_owned();
+                let (file, place) = match unnamed(&folder(path)?) {
+                    Ok(file) => (file, Place::Unnamed(to)),
+                    Err(_) => {
+                        let everybody = fs::Permissions::from_mode(0o666);
+                        let mut named = Builder::new();
+                        let named = named.prefix(".").permissions(everybody);
+                        let (file, at) = named.tempfile_in(folder(path)?)?.into_parts();
+                        (file, Place::Beside(at, to))
+                    }
+                };
+                if let Ok(found) = found {
+                    file.set_permissions(found.permissions())?;
+                }
+                (file, place)
+            }
+        };
+        Ok(Self {
+            out: BufWriter::with_capacity(1 << 16, file),
+            place,
+        })
+    }
+
+    /// Brings everything to the disk, then takes the place.
+    pub fn finish(self) -> io::Result<()> {
+        let file = self.out.into_inner().map_err(|error| error.into_error())?;
+        let (named, to) = match self.place {
+            Place::There => return Ok(()),
+            Place::Unnamed(to) => {
+                file.sync_all()?;
+                (named(&file, &folder(&to)?)?.into_temp_path(), to)
+            }
+            Place::Beside(named, to) => {
+                file.sync_all()?;
+                (named, to)
+            }
+        };
+        named.persist(&to).map_err(|error| error.error)?;
+        // The file is there; not every file system can bring its name to the disk.
+        let _ = File::open(folder(&to)?).and_then(|folder| folder.sync_all());
+        Ok(())
+    }
+}
+
+/// The folder of a file.
+fn folder(path: &Path) -> io::Result<PathBuf> {
+    let no_name = || io::Error::new(ErrorKind::InvalidInput, "not the name of a file");
+    path.file_name().ok_or_else(no_name)?;
+    let parent = path.parent().filter(|folder| *folder != Path::new(""));
+    Ok(parent.unwrap_or(Path::new(".")).to_owned())
+}
+
+fn unnamed(folder: &Path) -> io::Result<File> {
+    let flags = OFlags::TMPFILE | OFlags::WRONLY | OFlags::CLOEXEC;
+    Ok(open(folder, flags, Mode::from_raw_mode(0o666))?.into())
+}
+
+/// Gives a file without a name one that nothing has.
+fn named(file: &File, folder: &Path) -> io::Result<NamedTempFile<()>> {
+    use std::os::fd::AsRawFd;
+    let open = format!("/proc/self/fd/{}", file.as_raw_fd());
+    let link = |path: &Path| {
+        let follow = AtFlags::SYMLINK_FOLLOW;
+        Ok(linkat(CWD, open.as_str(), CWD, path, follow)?)
+    };
+    Builder::new().prefix(".").make_in(folder, link)
+}
+
+impl Write for WholeFile {
+    fn write(&mut self, bytes: &[u8]) -> io::Result<usize> {
+        self.out.write(bytes)
+    }
+
+    fn flush(&mut self) -> io::Result<()> {
+        self.out.flush()
+    }
+}
+
+impl Seek for WholeFile {
+    fn seek(&mut self, to: SeekFrom) -> io::Result<u64> {
+        self.out.seek(to)
+    }
+}
+
+/// Writes a file by what fills it; errors begin with its path.
+pub fn write<T, E: Into<AnyError>>(
+    path: &Path,
+    fill: impl FnOnce(&mut WholeFile) -> Result<T, E>,
+) -> Result<T, AnyError> {
+    let named = |error: AnyError| -> AnyError { format!("{}: {error}", path.display()).into() };
+    let mut file = WholeFile::create(path).map_err(|error| named(error.into()))?;
+    let filled = fill(&mut file).map_err(|error| named(error.into()))?;
+    let finished = file.finish();
+    finished.map_err(|error| named(error.into()))?;
+    Ok(filled)
+}
+
+/// Writes a file of text.
+pub fn write_text(path: &Path, text: &str) -> Result<(), AnyError> {
+    write(path, |file| file.write_all(text.as_bytes()))
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    /// Names of the files in a folder.
+    fn names(folder: &Path) -> Vec<String> {
+        let name = |entry: io::Result<fs::DirEntry>| entry.unwrap().file_name().into_string();
+        let entries = fs::read_dir(folder).unwrap();
+        entries.map(|entry| name(entry).unwrap()).collect()
+    }
+
+    #[test]
+    fn a_writer_that_fails_leaves_the_file_before_and_nothing_else() {
+        let folder = tempfile::tempdir().unwrap();
+        let path = folder.path().join("map");
+        for old in [None, Some("old")] {
+            old.map(|text| fs::write(&path, text).unwrap());
+            let failed = write(&path, |file| {
+                file.write_all(&[7; 1 << 20])?;
+                Err::<(), _>(io::Error::other("full"))
+            });
+            let error = failed.unwrap_err().to_string();
+            assert!(error.ends_with("map: full"), "{error}");
+            assert_eq!(fs::read_to_string(&path).ok().as_deref(), old);
+            assert_eq!(names(folder.path()).len(), usize::from(old.is_some()));
+        }
+        write_text(&path, "new").unwrap();
+        assert_eq!(fs::read_to_string(&path).unwrap(), "new");
+        assert_eq!(names(folder.path()), ["map"]);
+    }
+
+    #[test]
+    fn a_link_gives_way_and_what_it_leads_to_stays() {
+        let folder = tempfile::tempdir().unwrap();
+        let (precious, link) = (folder.path().join("precious"), folder.path().join("link"));
+        fs::write(&precious, "gold").unwrap();
+        std::os::unix::fs::symlink(&precious, &link).unwrap();
+        write_text(&link, "lead").unwrap();
+        assert_eq!(fs::read_to_string(&precious).unwrap(), "gold");
+        assert_eq!(fs::read_to_string(&link).unwrap(), "lead");
+        assert!(!fs::symlink_metadata(&link).unwrap().is_symlink());
+    }
+
+    #[test]
+    fn modes_are_kept_and_folders_refused() {
+        let folder = tempfile::tempdir().unwrap();
+        let path = folder.path().join("script");
+        fs::write(&path, "old").unwrap();
+        fs::set_permissions(&path, fs::Permissions::from_mode(0o750)).unwrap();
+        write_text(&path, "new").unwrap();
+        let mode = fs::metadata(&path).unwrap().permissions().mode();
+        assert_eq!(mode & 0o777, 0o750);
+        for nowhere in [
+            folder.path(),
+            &path.join("in"),
+            Path::new(""),
+            Path::new("/dev/full"),
+        ] {
+            assert!(write_text(nowhere, "text").is_err(), "{nowhere:?}");
+        }
+        write_text(Path::new("/dev/null"), "text").unwrap();
+    }
+}
