@@ -142,7 +142,12 @@ def main():
     directory.mkdir(parents=True, exist_ok=True)
     log, wanted = prepare(lattice, directory)
     clouds, first = wanted["counts"]["clouds_in"], None
-    nodes = [Node(lattice, name, directory) for name in NODES if name != "bag_player"]
+    options = {"lattice_mapper": {"map_dir": directory.absolute()}}
+    nodes = [
+        Node(lattice, name, directory, **options.get(name, {}))
+        for name in NODES
+        if name != "bag_player"
+    ]
     observer, saved = Observer(), directory / "saved.lattice"
     sizes, end, loops = {node.name: [] for node in nodes}, time.monotonic() + 60 * minutes, 0
     with open(directory / "soak.csv", "w") as table:
@@ -157,7 +162,7 @@ def main():
                 lambda: observer.clouds() >= loops * clouds,
                 lambda: f"loop {loops}: {loops * clouds} clouds went in, {observer.values}",
             )
-            observer.save(str(saved.absolute()))
+            observer.save(saved.name)
             first = first or saved.read_bytes()
             assert saved.read_bytes() == first, f"loop {loops} made another map: {saved}"
             for node in nodes:

@@ -1,5 +1,5 @@
-//! Sockets of Cyclone kept on the loopback interface: it binds those that receive to all addresses,
-//! whatever its interfaces are.
+//! Sockets of a transport kept on the loopback interface: Cyclone and RustDDS bind those that receive to
+//! all addresses, whatever their interfaces are.
 
 use std::collections::BTreeSet;
 use std::fs;
@@ -11,7 +11,7 @@ use socket2::{SockRef, Type};
 const LOOPBACK: &[u8] = b"lo";
 
 /// Runs `make` and binds the datagram sockets that it opens to the loopback interface.
-pub(super) fn to_loopback<T>(make: impl FnOnce() -> T) -> T {
+pub(crate) fn to_loopback<T>(make: impl FnOnce() -> T) -> T {
     let before = open_files();
     let made = make();
     for (file, _) in open_files().difference(&before) {

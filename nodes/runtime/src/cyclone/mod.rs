@@ -20,4 +20,5 @@ mod security;
 mod strangers;
 mod writer;
 
+pub(crate) use confine::to_loopback;
 pub(crate) use participant::Cyclone;

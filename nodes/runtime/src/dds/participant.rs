@@ -48,6 +48,15 @@ pub(super) struct Participant {
     threads: Threads,
 }
 
+/// Makes a participant whose sockets listen on the loopback interface alone, where the code that can do
+/// so, which is unsafe, is built in.
+fn on_loopback<T>(make: impl FnOnce() -> T) -> T {
+    #[cfg(feature = "cyclone")]
+    return crate::cyclone::to_loopback(make);
+    #[cfg(not(feature = "cyclone"))]
+    make()
+}
+
 impl Participant {
     /// Joins a domain, on the loopback interface only if asked.
     pub(super) fn join(domain: u16, localhost_only: bool) -> Result<Self, RuntimeError> {
@@ -60,7 +69,11 @@ impl Participant {
         if localhost_only {
             builder = builder.with_only_networks([Ipv4Addr::LOCALHOST]);
         }
-        let (participant, threads) = Threads::of(|| builder.build());
+        let build = || match localhost_only {
+            true => on_loopback(|| builder.build()),
+            false => builder.build(),
+        };
+        let (participant, threads) = Threads::of(build);
         let participant = participant.map_err(|e| failed(&e))?;
         let none = QosPolicies::qos_none();
         let publisher = participant.create_publisher(&none);
