@@ -21,6 +21,7 @@ pub mod novatel_oem7_msgs;
 pub mod rcl_interfaces;
 mod registry;
 pub mod rmw_dds_common;
+pub mod rosbag2_interfaces;
 pub mod rosgraph_msgs;
 pub mod sensor_msgs;
 pub mod std_msgs;

@@ -4,8 +4,8 @@ use crate::interface::RosMessage;
 use crate::{
     action, action_msgs, builtin_interfaces, calibration, diagnostic_msgs, geographic_msgs,
     geometry_msgs, lattice, nav_msgs, novatel_oem7_msgs, rcl_interfaces, rmw_dds_common,
-    rosgraph_msgs, sensor_msgs, std_msgs, std_srvs, tf2_msgs, unique_identifier_msgs, vision_msgs,
-    visualization_msgs,
+    rosbag2_interfaces, rosgraph_msgs, sensor_msgs, std_msgs, std_srvs, tf2_msgs,
+    unique_identifier_msgs, vision_msgs, visualization_msgs,
 };
 
 /// Visitor of every message type; see [`visit_messages`].
@@ -32,6 +32,7 @@ pub fn visit_messages(visitor: &mut impl MessageVisitor) {
     rcl_interfaces::visit_messages(visitor);
     rcl_interfaces::visit_services(visitor);
     rmw_dds_common::visit_messages(visitor);
+    rosbag2_interfaces::visit_services(visitor);
     rosgraph_msgs::visit_messages(visitor);
     sensor_msgs::visit_messages(visitor);
     std_msgs::visit_messages(visitor);

@@ -13,8 +13,8 @@ use std::collections::VecDeque;
 
 use super::{BagError, BagMessage, BagReader, Messages, storage::Filter};
 use latched::latched_before;
-use options::ns_from_s;
 pub use options::{PlayedTopic, PlayerOptions};
+use options::{RATES, ns_from_s};
 use timeline::Timeline;
 
 /// The shortest time from one start to the next in a loop, ns; a bag may hold a single message.
@@ -155,6 +155,55 @@ impl Player {
             .position(|t| t.bag_topic == topic)
             .unwrap_or(0);
         Ok(Step::Publish { topic, data })
+    }
+
+    /// Bag seconds per second.
+    pub fn rate(&self) -> f64 {
+        self.timeline.rate()
+    }
+
+    /// Goes on at another rate from playback time `now_ns`. False: not from 0.001 to 1000.
+    pub fn set_rate(&mut self, now_ns: i64, rate: f64) -> bool {
+        let possible = RATES.contains(&rate);
+        if possible {
+            self.timeline.set_rate(now_ns, rate);
+        }
+        possible
+    }
+
+    /// Goes on at another time of the bag, with what its latched topics published before. False: not
+    /// a time that is played.
+    pub fn seek(&mut self, now_ns: i64, bag_ns: i64) -> Result<bool, BagError> {
+        let (first_ns, last_ns) = (self.reader.start_ns(), self.reader.end_ns());
+        let last_ns = last_ns.into_iter().chain(self.end_ns).min();
+        let is_played = first_ns.is_some_and(|first_ns| first_ns <= bag_ns)
+            && last_ns.is_some_and(|last_ns| bag_ns <= last_ns);
+        if is_played {
+            self.timeline.anchor(now_ns, bag_ns);
+            self.clock_due_ns = now_ns;
+            (self.ended, self.failed) = (false, None);
+            self.start_pass(bag_ns)?;
+        }
+        Ok(is_played)
+    }
+
+    /// The next message, index of its topic and data, ahead of its time: the bag's time jumps there.
+    /// None: nothing is left.
+    pub fn skip_to_next(&mut self, now_ns: i64) -> Result<Option<(usize, Vec<u8>)>, BagError> {
+        loop {
+            let latched_ns = self.latched.front().map(|_| self.pass_start_ns);
+            let next_ns = latched_ns.or(self.head.as_ref().map(|head| head.log_time_ns));
+            if let Some(next_ns) = next_ns {
+                self.timeline.anchor(now_ns, next_ns);
+                // The clock is due after the message.
+                self.clock_due_ns = now_ns.saturating_add(1);
+            }
+            match self.next()? {
+                Step::Publish { topic, data } => return Ok(Some((topic, data))),
+                Step::Clock(_) | Step::Looped => {}
+                Step::End => return Ok(None),
+            }
+        }
     }
 
     fn start_pass(&mut self, from_ns: i64) -> Result<(), BagError> {

@@ -3,7 +3,7 @@
 use crate::{BagError, BagReader, TopicInfo};
 
 /// Slowest and fastest playback.
-const RATES: std::ops::RangeInclusive<f64> = 1e-3..=1e3;
+pub(super) const RATES: std::ops::RangeInclusive<f64> = 1e-3..=1e3;
 /// Highest frequency of `/clock`, Hz.
 const MAX_CLOCK_HZ: f64 = 10_000.0;
 

@@ -212,3 +212,62 @@ fn a_truncated_bag_plays_up_to_the_cut_and_then_tells() {
     ));
     assert_eq!(player.next().unwrap(), Step::End);
 }
+
+#[test]
+fn the_rate_changes_from_now_on() {
+    let folder = tempfile::tempdir().unwrap();
+    let bag = bag(folder.path(), &[("/a", 0), ("/a", 2), ("/a", 6)]);
+    let mut player = Player::new(bag, options()).unwrap();
+    player.next().unwrap();
+    assert!(player.set_rate(S, 2.0));
+    assert_eq!(player.rate(), 2.0);
+    // One of two seconds has passed.
+    assert_eq!(play(&mut player, 3), ["/a 1.5", "/a 3.5", "end"]);
+    for rate in [0.0, -1.0, f64::NAN, f64::INFINITY, 1e4] {
+        assert!(!player.set_rate(4 * S, rate));
+    }
+    assert_eq!(player.rate(), 2.0);
+}
+
+#[test]
+fn a_sought_time_is_played_from_with_what_was_latched() {
+    let folder = tempfile::tempdir().unwrap();
+    let bag = bag(
+        folder.path(),
+        &[("/map!", 0), ("/a", 1), ("/a", 3), ("/a", 4)],
+    );
+    let clock = PlayerOptions {
+        clock_hz: Some(1.0),
+        ..options()
+    };
+    let mut player = Player::new(bag, clock).unwrap();
+    assert_eq!(play(&mut player, 20).last().unwrap(), "end");
+    // From after the end back, and on.
+    assert!(player.seek(10 * S, T0_NS + 2 * S).unwrap());
+    let steps = [
+        "clock 2", "/map 10", "clock 3", "/a 11", "clock 4", "/a 12", "end",
+    ];
+    assert_eq!(play(&mut player, 20), steps);
+    for second in [-1, 5] {
+        assert!(!player.seek(20 * S, T0_NS + second * S).unwrap());
+    }
+    assert_eq!(player.next().unwrap(), Step::End);
+}
+
+#[test]
+fn a_message_ahead_of_its_time_takes_the_time_along() {
+    let folder = tempfile::tempdir().unwrap();
+    let bag = bag(folder.path(), &[("/a", 0), ("/a", 5), ("/a", 6)]);
+    let clock = PlayerOptions {
+        clock_hz: Some(10.0),
+        ..options()
+    };
+    let mut player = Player::new(bag, clock).unwrap();
+    for second in [0, 5] {
+        assert!(player.skip_to_next(S).unwrap().is_some());
+        assert_eq!(player.bag_time_ns(S), T0_NS + second * S);
+    }
+    let last = play(&mut player, 20);
+    assert_eq!(last[last.len() - 2..], ["/a 2", "end"]);
+    assert_eq!(player.skip_to_next(3 * S).unwrap(), None);
+}

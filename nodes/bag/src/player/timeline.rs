@@ -30,6 +30,16 @@ impl Timeline {
         self.bag_ns.saturating_add(scaled(ahead_ns, self.rate))
     }
 
+    pub(super) fn rate(&self) -> f64 {
+        self.rate
+    }
+
+    /// Goes on at another rate from `playback_ns`.
+    pub(super) fn set_rate(&mut self, playback_ns: i64, rate: f64) {
+        self.anchor(playback_ns, self.bag_at(playback_ns));
+        self.rate = rate;
+    }
+
     /// Lays the line anew through this pair.
     pub(super) fn anchor(&mut self, playback_ns: i64, bag_ns: i64) {
         self.playback_ns = playback_ns;

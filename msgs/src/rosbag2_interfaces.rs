@@ -1,0 +1,149 @@
+//! Calls of a player of bags, as rosbag2 has them.
+
+use serde::{Deserialize, Serialize};
+
+use crate::builtin_interfaces::Time;
+use crate::interface::services;
+
+services! {
+    "rosbag2_interfaces" in "../definitions/rosbag2_interfaces/";
+    Pause: PauseRequest [], PauseResponse [];
+    Resume: ResumeRequest [], ResumeResponse [];
+    TogglePaused: TogglePausedRequest [], TogglePausedResponse [];
+    Stop: StopRequest [], StopResponse [];
+    IsPaused: IsPausedRequest [], IsPausedResponse [];
+    GetRate: GetRateRequest [], GetRateResponse [];
+    SetRate: SetRateRequest [], SetRateResponse [];
+    PlayNext: PlayNextRequest [], PlayNextResponse [];
+    Burst: BurstRequest [], BurstResponse [];
+    Seek: SeekRequest [Time], SeekResponse [];
+}
+
+/// States requests and responses without a field.
+macro_rules! empty {
+    ($($of:literal $name:ident),*) => {$(
+        #[doc = $of]
+        #[derive(Clone, Debug, Default, PartialEq, Serialize, Deserialize)]
+        pub struct $name {
+            /// Padding: a structure on the wire has at least one byte.
+            pub structure_needs_at_least_one_member: u8,
+        }
+    )*};
+}
+
+empty! {
+    "Request of [`Pause`]." PauseRequest,
+    "Response of [`Pause`]." PauseResponse,
+    "Request of [`Resume`]." ResumeRequest,
+    "Response of [`Resume`]." ResumeResponse,
+    "Request of [`TogglePaused`]." TogglePausedRequest,
+    "Response of [`TogglePaused`]." TogglePausedResponse,
+    "Request of [`Stop`]." StopRequest,
+    "Response of [`Stop`]." StopResponse,
+    "Request of [`IsPaused`]." IsPausedRequest,
+    "Request of [`GetRate`]." GetRateRequest,
+    "Request of [`PlayNext`]." PlayNextRequest
+}
+
+/// Holds the log.
+#[derive(Clone, Copy, Debug)]
+pub struct Pause;
+
+/// Goes on with the log.
+#[derive(Clone, Copy, Debug)]
+pub struct Resume;
+
+/// Holds the log, or goes on with it.
+#[derive(Clone, Copy, Debug)]
+pub struct TogglePaused;
+
+/// Ends the playback.
+#[derive(Clone, Copy, Debug)]
+pub struct Stop;
+
+/// Asks whether the log is held.
+#[derive(Clone, Copy, Debug)]
+pub struct IsPaused;
+
+/// Response of [`IsPaused`].
+#[derive(Clone, Debug, Default, PartialEq, Serialize, Deserialize)]
+pub struct IsPausedResponse {
+    /// True: nothing is played until it is resumed.
+    pub paused: bool,
+}
+
+/// Asks for the rate.
+#[derive(Clone, Copy, Debug)]
+pub struct GetRate;
+
+/// Response of [`GetRate`].
+#[derive(Clone, Debug, Default, PartialEq, Serialize, Deserialize)]
+pub struct GetRateResponse {
+    /// Log seconds per second.
+    pub rate: f64,
+}
+
+/// Sets the rate.
+#[derive(Clone, Copy, Debug)]
+pub struct SetRate;
+
+/// Request of [`SetRate`].
+#[derive(Clone, Debug, Default, PartialEq, Serialize, Deserialize)]
+pub struct SetRateRequest {
+    /// Log seconds per second.
+    pub rate: f64,
+}
+
+/// Response of [`SetRate`].
+#[derive(Clone, Debug, Default, PartialEq, Serialize, Deserialize)]
+pub struct SetRateResponse {
+    /// False: not a rate that can be played.
+    pub success: bool,
+}
+
+/// Plays one message of a log that is held.
+#[derive(Clone, Copy, Debug)]
+pub struct PlayNext;
+
+/// Response of [`PlayNext`].
+#[derive(Clone, Debug, Default, PartialEq, Serialize, Deserialize)]
+pub struct PlayNextResponse {
+    /// False: not paused, or at the end.
+    pub success: bool,
+}
+
+/// Plays several messages of a log that is held, at once.
+#[derive(Clone, Copy, Debug)]
+pub struct Burst;
+
+/// Request of [`Burst`].
+#[derive(Clone, Debug, Default, PartialEq, Serialize, Deserialize)]
+pub struct BurstRequest {
+    /// How many; 0: all.
+    pub num_messages: u64,
+}
+
+/// Response of [`Burst`].
+#[derive(Clone, Debug, Default, PartialEq, Serialize, Deserialize)]
+pub struct BurstResponse {
+    /// How many were played.
+    pub actually_burst: u64,
+}
+
+/// Goes on at another time of the log.
+#[derive(Clone, Copy, Debug)]
+pub struct Seek;
+
+/// Request of [`Seek`].
+#[derive(Clone, Debug, Default, PartialEq, Serialize, Deserialize)]
+pub struct SeekRequest {
+    /// Time of the log.
+    pub time: Time,
+}
+
+/// Response of [`Seek`].
+#[derive(Clone, Debug, Default, PartialEq, Serialize, Deserialize)]
+pub struct SeekResponse {
+    /// False: not a time of the log.
+    pub success: bool,
+}
