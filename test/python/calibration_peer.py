@@ -8,14 +8,13 @@ import json
 import sys
 from pathlib import Path
 
-from cyclone_peer import FLOAT32, PATIENCE_S, Peer, header, qos
+from cyclone_peer import CLIENT, FLOAT32, PATIENCE_S, Calls, Peer, header, qos
 import ros_idl as ros
 
 UINT16 = 4
 NONE, OK, REJECTED = 0, 1, 5
 SUCCEEDED, CANCELED, ABORTED = 4, 5, 6
 SERVER = "semantic_icp_server"
-CLIENT = 0x0123_4567_89AB_CDEF
 
 
 def cloud(stamp_ns, frame, data, labelled=True):
@@ -29,33 +28,6 @@ def cloud(stamp_ns, frame, data, labelled=True):
     return ros.PointCloud2(
         header(stamp_ns, frame), 1, width, fields, False, step, len(data), data, False
     )
-
-
-class Calls:
-    """Requests of one service and the answers that have come, by number."""
-
-    def __init__(self, peer, name, request, response):
-        self.peer, self.request, self.number, self.answers = peer, request, 0, {}
-        self.name = name
-        self.writer = peer.writer(f"rq/{name}Request", request, qos(10))
-        peer.reader(f"rr/{name}Reply", response, qos(10), self.hear)
-
-    def hear(self, answer):
-        if answer.client == CLIENT:
-            assert answer.number not in self.answers, f"{self.name}: answered twice"
-            self.answers[answer.number] = answer
-
-    def begin(self, *fields):
-        self.number += 1
-        self.writer.write(self.request(CLIENT, self.number, *fields))
-        return self.number
-
-    def wait(self, number):
-        self.peer.until(lambda: number in self.answers, lambda: f"no answer of {self.name}")
-        return self.answers[number]
-
-    def call(self, *fields):
-        return self.wait(self.begin(*fields))
 
 
 class Headset:

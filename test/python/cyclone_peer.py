@@ -24,6 +24,7 @@ from cyclonedds.util import duration
 # A test that passes does not wait for it.
 PATIENCE_S = 120
 FLOAT32 = 7
+CLIENT = 0x0123_4567_89AB_CDEF
 
 
 def qos(depth, latched=False):
@@ -89,6 +90,33 @@ class Peer:
             lambda: len(self.matched) > 0 and all(self.matched.values()),
             lambda: f"endpoints matched: {self.matched}",
         )
+
+
+class Calls:
+    """Requests of one service and the answers that have come, by number."""
+
+    def __init__(self, peer, name, request, response):
+        self.peer, self.request, self.number, self.answers = peer, request, 0, {}
+        self.name = name
+        self.writer = peer.writer(f"rq/{name}Request", request, qos(10))
+        peer.reader(f"rr/{name}Reply", response, qos(10), self.hear)
+
+    def hear(self, answer):
+        if answer.client == CLIENT:
+            assert answer.number not in self.answers, f"{self.name}: answered twice"
+            self.answers[answer.number] = answer
+
+    def begin(self, *fields):
+        self.number += 1
+        self.writer.write(self.request(CLIENT, self.number, *fields))
+        return self.number
+
+    def wait(self, number):
+        self.peer.until(lambda: number in self.answers, lambda: f"no answer of {self.name}")
+        return self.answers[number]
+
+    def call(self, *fields):
+        return self.wait(self.begin(*fields))
 
 
 def header(stamp_ns, frame):

@@ -137,6 +137,19 @@ ASKED = {"client": uint64, "number": int64}
 TriggerRequest = ros("std_srvs/srv/Trigger_Request", **ASKED, structure_needs_at_least_one_member=uint8)
 TriggerResponse = ros("std_srvs/srv/Trigger_Response", **ASKED, success=bool, message=str)
 
+Clock = ros("rosgraph_msgs/msg/Clock", clock=Time)
+
+
+def rosbag2(name, request=None, response=None):
+    """Both halves of a service of a player; one without fields has a byte."""
+    halves = {"Request": request, "Response": response}
+    empty = {"structure_needs_at_least_one_member": uint8}
+    return [
+        ros(f"rosbag2_interfaces/srv/{name}_{half}", **ASKED, **(fields or empty))
+        for half, fields in halves.items()
+    ]
+
+
 String = ros("std_msgs/msg/String", data=str)
 VisionClass = ros("vision_msgs/msg/VisionClass", class_id=uint16, class_name=str)
 LabelInfo = ros(

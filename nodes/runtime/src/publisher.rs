@@ -123,9 +123,9 @@ pub struct RawPublisher {
 impl RawPublisher {
     /// Publishes a message of plain little-endian CDR, encapsulation header included, as it is.
     ///
-    /// Waits while the queue is full, so nothing is lost on this side; a request to shut down ends the
-    /// wait with an error. Not to be called from a handler, callback or timer.
-    pub fn publish_blocking(&self, cdr: Vec<u8>) -> Result<(), PublishError> {
+    /// Waits while the queue is full, so nothing is lost on this side; the end of that time and a request
+    /// to shut down end the wait with an error. Not to be called from a handler, callback or timer.
+    pub fn publish_within(&self, cdr: Vec<u8>, patience: Duration) -> Result<(), PublishError> {
         let mut body = Bytes::from(cdr);
         if body.get(..2) != Some(&[0, 1]) || body.len() < ENCAPSULATION_BYTES {
             return Err(PublishError::NotLittleEndianCdr {
@@ -143,7 +143,7 @@ impl RawPublisher {
         }
         let body = body.split_off(ENCAPSULATION_BYTES);
         let shutdown = &self.parts.shutdown;
-        self.parts.writer.send_body_blocking(body, shutdown)
+        self.parts.writer.send_body_within(body, patience, shutdown)
     }
 }
 

@@ -56,7 +56,7 @@ fn what_does_not_decode_is_in_diagnostics_and_report() {
     while !missing.is_empty() {
         for input in &inputs {
             let lie = vec![0, 1, 0, 0, 255, 255, 255, 255];
-            input.publish_blocking(lie).unwrap();
+            input.publish_within(lie, PATIENCE).unwrap();
         }
         let message = heard.recv_timeout(PATIENCE).unwrap();
         for status in &message.status {

@@ -135,25 +135,33 @@ fn many_requests_at_once_are_all_answered() {
             qos(),
         )
         .unwrap();
-    let (done, answers) = channel();
+    let (done, sent) = channel();
+    let (came, heard) = channel();
     let calls = std::thread::spawn(move || {
-        smol::block_on(async {
-            client.wait_for_service(&peer).await;
-            for _ in 0..REQUESTS {
-                let request = Foreign(TriggerRequest::default());
-                client.async_send_request(request).await.unwrap();
-            }
-        });
+        let ask = || {
+            let request = Foreign(TriggerRequest::default());
+            smol::block_on(client.async_send_request(request)).unwrap();
+        };
+        smol::block_on(client.wait_for_service(&peer));
+        // The first ones are history to a reader of Cyclone.
+        ask();
+        while heard
+            .recv_timeout(std::time::Duration::from_secs(2))
+            .is_err()
+        {
+            ask();
+        }
+        (0..REQUESTS).for_each(|_| ask());
         done.send(()).unwrap();
         // They send again what is lost.
         (client, peer)
     });
-    // All have been sent before the first is answered.
     let first = asked.recv_timeout(PATIENCE).unwrap();
-    answers.recv_timeout(PATIENCE).unwrap();
-    std::thread::sleep(std::time::Duration::from_millis(500));
+    came.send(()).unwrap();
+    // All have been sent before the first is answered.
+    sent.recv_timeout(PATIENCE).unwrap();
     first.send(TriggerResponse::default());
-    for i in 1..REQUESTS {
+    for i in 0..REQUESTS {
         let reply = asked.recv_timeout(PATIENCE);
         let reply = reply.unwrap_or_else(|_| panic!("{i} requests of {REQUESTS} came"));
         reply.send(TriggerResponse::default());

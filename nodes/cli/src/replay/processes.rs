@@ -116,6 +116,9 @@ impl DdsReplay<'_> {
         let mut arguments = vec![
             param("bag", &yaml_text(&self.options.bag)),
             param("rate", &format!("{:?}", self.options.rate)),
+            // Nothing may be lost.
+            param("max_wait_s", "600.0"),
+            param("keyboard", "false"),
             param("topics", &quoted(&wanted)),
             param("wait_for_subscribers", &quoted(&waited)),
         ];

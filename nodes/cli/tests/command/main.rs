@@ -8,6 +8,7 @@ mod files;
 mod map;
 mod nodes;
 mod paper;
+mod player;
 
 use std::process::{Command, Output};
 

@@ -7,7 +7,8 @@ use serde_json::Value;
 
 use crate::{error, json, lattice, text};
 
-fn simulated(directory: &Path, storage: &str, seconds: &str) -> String {
+/// A log of the simulated loader in `directory`.
+pub fn simulated(directory: &Path, storage: &str, seconds: &str) -> String {
     let log = directory.join(storage).display().to_string();
     let bobcat = ["simulate", "bobcat", "--out", &log, "--duration", seconds];
     let summary = json(&[&bobcat[..], &["--storage", storage]].concat());

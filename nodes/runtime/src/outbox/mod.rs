@@ -5,6 +5,7 @@
 
 mod budget;
 
+use std::cell::Cell;
 use std::sync::atomic::{AtomicBool, AtomicU64, AtomicUsize, Ordering::Relaxed};
 use std::sync::{Arc, Mutex};
 use std::time::{Duration, Instant};
@@ -148,33 +149,41 @@ impl Outbox {
         self.try_queue(Content::Body(body), bytes, related)
     }
 
-    /// Queues the body of a sample; waits while the queue is full, but not beyond a request to end.
-    /// Not from the runtime's threads.
-    pub(crate) fn send_body_blocking(
+    /// Queues the body of a sample; waits while the queue is full, but no longer than `patience` and not
+    /// beyond a request to end. Not from the runtime's threads.
+    pub(crate) fn send_body_within(
         &self,
         body: Bytes,
+        patience: Duration,
         shutdown: &Shutdown,
     ) -> Result<(), PublishError> {
         let reserved = body.len();
+        let taken = Cell::new(false);
         let queued = async {
             if !self.shared.budget.take(reserved).await {
-                return false;
+                return Err(self.closed());
             }
+            taken.set(true);
             let job = Job::Sample {
                 content: Content::Body(body),
                 reserved,
                 related: None,
             };
-            self.jobs.send(job).await.is_ok()
+            self.jobs.send(job).await.map_err(|_| self.closed())
         };
         let ended = async {
             shutdown.requested().await;
-            false
+            Err(self.closed())
         };
-        match smol::block_on(or(queued, ended)) {
-            true => Ok(()),
-            false => Err(self.closed()),
+        let too_long = async {
+            Timer::after(patience).await;
+            Err(self.full())
+        };
+        let outcome = smol::block_on(or(queued, or(ended, too_long)));
+        if outcome.is_err() && taken.get() {
+            self.shared.budget.give_back(reserved);
         }
+        outcome
     }
 
     /// Waits until the queue is empty and every reliable reader has acknowledged. False: not in time.
@@ -364,17 +373,24 @@ mod tests {
     }
 
     #[test]
-    fn a_request_to_end_frees_who_waits_for_a_full_queue() {
+    fn who_waits_for_a_full_queue_goes_on_in_time_and_at_the_end() {
         let (outbox, _task) =
             Outbox::new("/chatter", Arc::new(Stuck), WhenFull::Wait, 1, usize::MAX);
-        let (shutdown, body) = (Shutdown::default(), Bytes::from_static(b"body"));
-        outbox.send_body_blocking(body.clone(), &shutdown).unwrap();
-        let asked = shutdown.clone();
-        let (waiting, result) = std::sync::mpsc::channel();
-        std::thread::spawn(move || waiting.send(outbox.send_body_blocking(body, &asked)));
-        shutdown.request();
-        let result = result.recv_timeout(Duration::from_secs(10));
-        let result = result.expect("waits for room until a second request");
-        assert!(matches!(result, Err(PublishError::Closed { .. })));
+        let (shutdown, long) = (Shutdown::default(), Duration::from_secs(600));
+        let body = Bytes::from_static(b"body");
+        let send = |patience, shutdown| outbox.send_body_within(body.clone(), patience, shutdown);
+        send(long, &shutdown).unwrap();
+        for dropped in 1..=2 {
+            let refused = send(Duration::from_millis(1), &shutdown);
+            let full =
+                matches!(refused, Err(PublishError::QueueFull { dropped: n, .. }) if n == dropped);
+            assert!(full, "{refused:?}");
+        }
+        std::thread::scope(|scope| {
+            let waiting = scope.spawn(|| send(long, &shutdown));
+            shutdown.request();
+            let result = waiting.join().unwrap();
+            assert!(matches!(result, Err(PublishError::Closed { .. })));
+        });
     }
 }

@@ -39,8 +39,9 @@ fn echo(domain: &TestDomain, transport: Transport) -> Echo {
     let runtime = runtime(domain, transport, "witness");
     let node = runtime.node("witness").unwrap();
     let said = node.subscribe("/said", QOS, Load::Small, |_: std::sync::Arc<RosString>| {});
+    let said = said.unwrap();
     let (sender, joined) = channel();
-    let _ = said.as_ref().unwrap().on_publisher_joined(move || {
+    said.on_publisher_joined(move || {
         let _ = sender.send(());
     });
     joined.recv_timeout(PATIENCE).unwrap();

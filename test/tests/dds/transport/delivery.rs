@@ -163,12 +163,14 @@ fn raw_messages_arrive_as_they_are() {
     wait_for_subscriber!(publisher);
     for i in 0..100 {
         let bytes = cdr::to_vec(&text(i)).unwrap();
-        publisher.publish_blocking(bytes).unwrap();
+        publisher.publish_within(bytes, PATIENCE).unwrap();
     }
     assert!(publisher.flush(PATIENCE));
     assert_counted(100, &heard);
     for bad in [&[][..], &[0, 1, 0], &[0, 0, 0, 0, 1], &[0, 7, 0, 0, 1]] {
-        let refused = publisher.publish_blocking(bad.to_vec()).unwrap_err();
+        let refused = publisher
+            .publish_within(bad.to_vec(), PATIENCE)
+            .unwrap_err();
         assert!(matches!(refused, PublishError::NotLittleEndianCdr { .. }));
     }
     let refused = raw("/x", "std_msgs/String/x/y");
@@ -192,7 +194,7 @@ fn undecodable_and_long_samples_are_counted_and_the_next_arrives() {
         let too_long = cdr::to_vec(&text("x".repeat(1000))).unwrap();
         let good = cdr::to_vec(&text("good")).unwrap();
         for bytes in [length_lies, not_utf8, too_long, good] {
-            publisher.publish_blocking(bytes).unwrap();
+            publisher.publish_within(bytes, PATIENCE).unwrap();
         }
         assert_heard(&heard, "good");
         let counts = (subscription.undecodable(), subscription.received());
@@ -220,7 +222,7 @@ fn a_message_is_decoded_by_who_works_on_it() {
     wait_for_match!(there, subscription);
     let outside = cdr::to_vec(&text("outside")).unwrap();
     for message in [&[0, 1, 0, 0, 9, 0, 0, 0], &outside[..]] {
-        there.publish_blocking(message.to_vec()).unwrap();
+        there.publish_within(message.to_vec(), PATIENCE).unwrap();
     }
     let (bad, good) = (next(), next());
     assert_eq!(counts(), (0, 0));

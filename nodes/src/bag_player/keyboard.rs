@@ -1,0 +1,109 @@
+//! Keys of a player in a terminal, as `ros2 bag play` has them.
+
+use std::io::{IsTerminal, Read, stdin};
+use std::sync::mpsc::Sender;
+use std::thread;
+
+use rustix::process::getpgrp;
+use rustix::termios::{LocalModes, OptionalActions, Termios, tcgetattr, tcgetpgrp, tcsetattr};
+
+use super::controls::Control;
+use super::playback::Playback;
+
+/// Change of the rate by a key.
+const RATE_STEP: f64 = 1.1;
+
+/// Keys without echo and return; the terminal is as it was once this has gone.
+pub(super) struct Keyboard(Termios);
+
+impl Keyboard {
+    /// Takes the keys of the terminal, if we are before it; none otherwise.
+    pub(super) fn start(controls: Sender<Control>) -> Option<Self> {
+        if !stdin().is_terminal() || !is_foreground() {
+            return None;
+        }
+        let before = tcgetattr(stdin()).ok()?;
+        let mut modes = before.clone();
+        modes.local_modes -= LocalModes::ICANON | LocalModes::ECHO;
+        tcsetattr(stdin(), OptionalActions::Now, &modes).ok()?;
+        let this = Self(before);
+        let thread = thread::Builder::new().name("keyboard".to_owned());
+        // It waits for a key when the process ends.
+        let _ = thread.spawn(move || read_keys(&controls)).ok()?;
+        log::info!("space: pause; arrows: right next message, up faster, down slower");
+        Some(this)
+    }
+}
+
+impl Drop for Keyboard {
+    fn drop(&mut self) {
+        // To change a terminal from behind it would stop the process.
+        if is_foreground() {
+            let _ = tcsetattr(stdin(), OptionalActions::Now, &self.0);
+        }
+    }
+}
+
+fn is_foreground() -> bool {
+    tcgetpgrp(stdin()).is_ok_and(|foreground| foreground == getpgrp())
+}
+
+fn read_keys(controls: &Sender<Control>) {
+    let mut keys = Keys::default();
+    for byte in stdin().lock().bytes().map_while(Result::ok) {
+        if let Some(press) = keys.press(byte)
+            && controls.send(Box::new(press)).is_err()
+        {
+            return;
+        }
+    }
+}
+
+/// Bytes of a key so far.
+#[derive(Default)]
+struct Keys {
+    escape: u8,
+}
+
+impl Keys {
+    /// What a byte completes.
+    fn press(&mut self, byte: u8) -> Option<fn(&mut Playback)> {
+        let before = std::mem::take(&mut self.escape);
+        match (before, byte) {
+            (_, 0x1b) => self.escape = 1,
+            (1, b'[' | b'O') => self.escape = 2,
+            (2, b'A') => return Some(|playback| turn(playback, RATE_STEP)),
+            (2, b'B') => return Some(|playback| turn(playback, 1.0 / RATE_STEP)),
+            (2, b'C') => {
+                return Some(|playback| {
+                    playback.play_next();
+                });
+            }
+            (0, b' ') => return Some(Playback::toggle),
+            _ => {}
+        }
+        None
+    }
+}
+
+fn turn(playback: &mut Playback, factor: f64) {
+    let rate = playback.player.rate() * factor;
+    playback.set_rate(rate);
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn keys_are_told_apart() {
+        let pressed = |bytes: &[u8]| {
+            let mut keys = Keys::default();
+            bytes.iter().filter_map(|byte| keys.press(*byte)).count()
+        };
+        assert_eq!(pressed(b" x "), 2);
+        assert_eq!(pressed(b"\x1b[A\x1bOB\x1b[C"), 3);
+        // The left arrow, a lone escape, letters of arrows without one.
+        assert_eq!(pressed(b"\x1b[D\x1b\x1b[AABC\x1b "), 1);
+    }
+}

@@ -1,0 +1,327 @@
+//! Playback against the clock: what is due is published, and controls are obeyed between two messages.
+
+use std::sync::mpsc;
+use std::time::{Duration, Instant};
+
+use lattice_bag::{Player, Step};
+use lattice_msgs::builtin_interfaces::Time;
+use lattice_msgs::rosgraph_msgs::Clock;
+use lattice_runtime::{Publisher, RawPublisher, Shutdown};
+
+use super::PlayerReport;
+use super::controls::Controls;
+use crate::start::NodeError;
+
+/// Time that what is queued at the end has to reach its readers.
+const FLUSH_TIME: Duration = Duration::from_secs(20);
+/// The same after a signal.
+const HURRIED_FLUSH_TIME: Duration = Duration::from_secs(2);
+/// A player that is later than this goes on from there: what it missed would come in one burst, too fast
+/// for those who listen.
+const MOST_LATE: Duration = Duration::from_secs(1);
+/// Longest sleep between two looks at the shutdown flag, and between two times on `/clock` while held.
+const NAP: Duration = Duration::from_millis(100);
+
+/// The player's own clock, which stands while the log is held.
+pub(super) struct Playhead {
+    begin: Instant,
+    held: Option<Instant>,
+}
+
+impl Playhead {
+    pub(super) fn new(held: bool) -> Self {
+        let begin = Instant::now();
+        Self {
+            begin,
+            held: held.then_some(begin),
+        }
+    }
+
+    /// Begins anew, held or not as before.
+    fn restart(&mut self) {
+        *self = Self::new(self.is_held());
+    }
+
+    pub(super) fn is_held(&self) -> bool {
+        self.held.is_some()
+    }
+
+    pub(super) fn now_ns(&self) -> i64 {
+        let elapsed = self.held.map_or_else(
+            || self.begin.elapsed(),
+            |held| held.saturating_duration_since(self.begin),
+        );
+        i64::try_from(elapsed.as_nanos()).unwrap_or(i64::MAX)
+    }
+
+    pub(super) fn hold(&mut self) {
+        let _ = self.held.get_or_insert_with(Instant::now);
+    }
+
+    pub(super) fn go_on(&mut self) {
+        if let Some(held) = self.held.take() {
+            self.begin += held.elapsed();
+        }
+    }
+}
+
+/// The part of a delay by which all that follows is late too.
+fn not_made_up(late: Duration) -> Duration {
+    if late <= MOST_LATE {
+        return Duration::ZERO;
+    }
+    log::warn!("{late:.1?} late; so is all that follows");
+    late
+}
+
+/// A log being played.
+pub(super) struct Playback {
+    pub player: Player,
+    /// First and last time of the log.
+    pub span_ns: (i64, i64),
+    pub topics: Vec<RawPublisher>,
+    /// Topics whose queue a subscriber holds up.
+    pub stuck: Vec<bool>,
+    /// Time that such a subscriber is waited for.
+    pub most_wait: Duration,
+    pub clock: Option<Publisher<Clock>>,
+    pub head: Playhead,
+    /// True after a call of `stop`.
+    pub stopped: bool,
+    pub shutdown: Shutdown,
+    pub report: PlayerReport,
+}
+
+impl Playback {
+    /// Waits until each of these topics has a subscriber, or goes on without after the time.
+    pub(super) fn wait_for(&self, names: &[String], timeout: Duration) {
+        let deadline = Instant::now() + timeout;
+        for (publisher, topic) in self.topics.iter().zip(self.player.topics()) {
+            if !names.contains(&topic.info.name) {
+                continue;
+            }
+            let (joined, join) = mpsc::channel();
+            publisher.on_subscriber_joined(move || {
+                let _ = joined.send(());
+            });
+            while publisher.subscriber_count() == 0 && !self.shutdown.is_requested() {
+                let left = deadline.saturating_duration_since(Instant::now());
+                if left.is_zero() {
+                    log::warn!("{}: nobody listens, playing all the same", topic.info.name);
+                    break;
+                }
+                let _ = join.recv_timeout(left.min(NAP));
+            }
+        }
+    }
+
+    /// Plays to the end, a call of `stop` or a signal.
+    pub(super) fn play(&mut self, controls: &Controls) -> Result<(), NodeError> {
+        self.head.restart();
+        let mut percent = 0;
+        while !self.shutdown.is_requested() && !self.stopped {
+            let due_ns = self.player.due_ns();
+            let left_ns = due_ns.saturating_sub(self.head.now_ns());
+            let left = Duration::from_nanos(u64::try_from(left_ns).unwrap_or(0));
+            let is_held = self.head.is_held();
+            if let Some(control) = controls.next(if is_held { NAP } else { left.min(NAP) }) {
+                control(self);
+                continue;
+            }
+            if is_held {
+                // Time stands, and those who have just come hear of it.
+                self.publish_clock(self.player.bag_time_ns(self.head.now_ns()));
+                continue;
+            }
+            let late_ns = self.head.now_ns().saturating_sub(due_ns);
+            let Ok(late_ns) = u64::try_from(late_ns) else {
+                continue;
+            };
+            let late = Duration::from_nanos(late_ns);
+            self.head.begin += not_made_up(late);
+            if !self.step(late)? {
+                break;
+            }
+            self.tell_progress(&mut percent);
+        }
+        Ok(())
+    }
+
+    /// Takes one step; false at the end.
+    fn step(&mut self, late: Duration) -> Result<bool, NodeError> {
+        match self.player.next()? {
+            Step::Publish { topic, data } => {
+                let late_ms = late.as_millis() as u64;
+                self.report.latest_ms = self.report.latest_ms.max(late_ms);
+                self.publish(topic, data);
+            }
+            Step::Clock(now_ns) => self.publish_clock(now_ns),
+            Step::Looped => log::info!("the log starts again"),
+            Step::End => return Ok(false),
+        }
+        Ok(true)
+    }
+
+    /// Holds the log, or goes on with it.
+    pub(super) fn hold(&mut self, held: bool) {
+        if self.head.is_held() == held {
+            return;
+        }
+        match held {
+            true => self.head.hold(),
+            false => self.head.go_on(),
+        }
+        log::info!("{}", if held { "paused" } else { "goes on" });
+    }
+
+    pub(super) fn toggle(&mut self) {
+        self.hold(!self.head.is_held());
+    }
+
+    pub(super) fn stop(&mut self) {
+        self.stopped = true;
+    }
+
+    /// Goes on at another rate; false if that cannot be played.
+    pub(super) fn set_rate(&mut self, rate: f64) -> bool {
+        let possible = self.player.set_rate(self.head.now_ns(), rate);
+        match possible {
+            true => log::info!("rate {rate}"),
+            false => log::warn!("rate {rate} is refused; 0.001 to 1000 can be played"),
+        }
+        possible
+    }
+
+    /// Goes on at another time of the log; false if it has none such.
+    pub(super) fn seek(&mut self, bag_ns: i64) -> bool {
+        let sought = self.player.seek(self.head.now_ns(), bag_ns);
+        sought.unwrap_or_else(|error| {
+            log::error!("{error}");
+            false
+        })
+    }
+
+    /// Plays the next messages of a log that is held, all for 0; how many there were.
+    pub(super) fn burst(&mut self, messages: u64) -> u64 {
+        let mut played = 0;
+        while (messages == 0 || played < messages)
+            && !self.shutdown.is_requested()
+            && self.play_next()
+        {
+            played += 1;
+        }
+        played
+    }
+
+    /// Plays the next message at once, if the log is held; false where it is not, and at the end.
+    pub(super) fn play_next(&mut self) -> bool {
+        if !self.head.is_held() {
+            return false;
+        }
+        match self.player.skip_to_next(self.head.now_ns()) {
+            Ok(Some((topic, data))) => {
+                self.publish(topic, data);
+                true
+            }
+            Ok(None) => false,
+            Err(error) => {
+                log::error!("{error}");
+                false
+            }
+        }
+    }
+
+    fn tell_progress(&self, percent: &mut i64) {
+        let (first_ns, last_ns) = self.span_ns;
+        let span_ns = last_ns.saturating_sub(first_ns).max(1);
+        let played_ns = self.player.bag_time_ns(self.head.now_ns());
+        let played_ns = played_ns.saturating_sub(first_ns);
+        let share = (100.0 * played_ns as f64 / span_ns as f64) as i64;
+        if share != *percent && (0..=100).contains(&share) {
+            *percent = share;
+            log::info!("played {share} %");
+        }
+    }
+
+    fn publish_clock(&self, now_ns: i64) {
+        let message = Clock {
+            clock: Time::from_ns(now_ns),
+        };
+        let publish = |clock: &Publisher<Clock>| clock.publish(message);
+        if let Some(Err(error)) = self.clock.as_ref().map(publish) {
+            log::debug!("/clock: {error}");
+        }
+    }
+
+    /// Publishes a message; a subscriber that does not acknowledge is waited for once.
+    fn publish(&mut self, topic: usize, data: Vec<u8>) {
+        let (Some(publisher), Some(stuck)) = (self.topics.get(topic), self.stuck.get_mut(topic))
+        else {
+            return;
+        };
+        self.report.messages += 1;
+        let patience = if *stuck {
+            Duration::ZERO
+        } else {
+            self.most_wait
+        };
+        let published = publisher.publish_within(data, patience);
+        if let Err(error) = &published {
+            self.report.failed += 1;
+            if !*stuck {
+                log::warn!("{error}; skipped until its subscribers acknowledge");
+            }
+        } else if *stuck {
+            log::info!("{}: goes on", publisher.topic());
+        }
+        *stuck = published.is_err();
+    }
+
+    /// Gives readers time to have everything.
+    pub(super) fn flush(&mut self) {
+        let patience = match self.shutdown.is_requested() {
+            true => HURRIED_FLUSH_TIME,
+            false => FLUSH_TIME,
+        };
+        let deadline = Instant::now() + patience;
+        self.report.acknowledged = true;
+        for publisher in &self.topics {
+            let left = deadline.saturating_duration_since(Instant::now());
+            if !publisher.flush(left) {
+                self.report.acknowledged = false;
+                log::warn!("{}: not everything was acknowledged", publisher.topic());
+            }
+        }
+        log::info!(
+            "{} messages played, at most {} ms late",
+            self.report.messages,
+            self.report.latest_ms
+        );
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn a_long_delay_is_not_made_up_in_a_burst() {
+        let long = Duration::from_secs(39);
+        assert_eq!(not_made_up(long), long);
+        assert_eq!(not_made_up(MOST_LATE), Duration::ZERO);
+    }
+
+    #[test]
+    fn time_stands_while_the_log_is_held() {
+        let mut head = Playhead::new(true);
+        assert_eq!(head.now_ns(), 0);
+        head.go_on();
+        let begin_ns = head.now_ns();
+        head.hold();
+        let held_ns = head.now_ns();
+        head.hold();
+        assert!(begin_ns <= held_ns && head.now_ns() == held_ns);
+        head.go_on();
+        assert!(!head.is_held() && head.now_ns() >= held_ns);
+    }
+}
