@@ -73,6 +73,8 @@ pub struct LatticeMap {
     pub labels: Vec<u16>,
     /// Points with that label in each voxel; empty: not kept.
     pub label_counts: Vec<u32>,
+    /// Of all updates of the epoch up to the sequence; the text of LatticeMapUpdate says how.
+    pub history_checksum: u64,
 }
 
 impl LatticeMap {
@@ -117,6 +119,10 @@ pub struct LatticeMapUpdate {
     pub removed: u32,
     /// Their keys, written as in keys.
     pub removed_keys: ByteBuf,
+    /// Voxels of the map after all chunks are applied.
+    pub voxels_total: u64,
+    /// Of all updates of the epoch, this one included.
+    pub history_checksum: u64,
 }
 
 impl LatticeMapUpdate {
@@ -124,14 +130,14 @@ impl LatticeMapUpdate {
     pub const KEY_ENCODING_MORTON21: &'static str = "morton21_delta_leb128";
 }
 
-/// Writes the map to a file of the machine that the node runs on.
+/// Writes the map to a file below the folder `map_dir` of the node.
 #[derive(Clone, Copy, Debug)]
 pub struct SaveMap;
 
 /// Request of [`SaveMap`].
 #[derive(Clone, Debug, Default, PartialEq, Serialize, Deserialize)]
 pub struct SaveMapRequest {
-    /// File to write; an older one is replaced once the new one is complete.
+    /// Name below `map_dir`; a map that is there is replaced once the new one is complete.
     pub path: String,
 }
 
@@ -153,7 +159,7 @@ pub struct LoadMap;
 /// Request of [`LoadMap`].
 #[derive(Clone, Debug, Default, PartialEq, Serialize, Deserialize)]
 pub struct LoadMapRequest {
-    /// A map file of the machine that the node runs on.
+    /// Name of a map file below `map_dir`.
     pub path: String,
 }
 

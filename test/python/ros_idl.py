@@ -130,6 +130,7 @@ LatticeMap = ros(
     mean_offsets=sequence[int16],
     labels=sequence[uint16],
     label_counts=sequence[uint32],
+    history_checksum=uint64,
 )
 
 # rmw_cyclonedds puts who asks and the number of the request in front of both.

@@ -27,7 +27,7 @@ pub enum BagError {
     #[error(
         "{}: truncated: the file ends at byte {size_bytes} inside {inside}; \
          {readable_messages} messages before it can be read; \
-         rewrite the file with `ros2 bag reindex`, `mcap recover` or sqlite3's `.recover`",
+         rewrite it with `lattice bag recover`",
         path.display()
     )]
     Truncated {

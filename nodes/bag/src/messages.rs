@@ -127,7 +127,7 @@ impl Messages {
         let active = self.active.get_mut(index)?;
         // Nothing is asked for behind an error.
         let next = match &active.head {
-            Some(Err(_)) => None,
+            Some(Err(_)) if !self.filter.past_damage => None,
             _ => active.stream.next(),
         };
         // An error keeps its place behind the last message.
@@ -187,7 +187,11 @@ impl Iterator for Messages {
             Ok(()) => self.take_first(),
             Err(error) => Some(Err(error)),
         };
-        self.ended = !matches!(next, Some(Ok(_)));
+        self.ended = match &next {
+            None => true,
+            Some(Err(_)) => !self.filter.past_damage,
+            Some(Ok(_)) => false,
+        };
         next
     }
 }

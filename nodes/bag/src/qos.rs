@@ -104,7 +104,7 @@ impl From<BagQos> for WrittenQos {
 impl BagQos {
     /// Parses the YAML list that storage files and metadata up to version 8 carry as text.
     pub(crate) fn parse_list(text: &str) -> Result<Vec<BagQos>, serde_yaml::Error> {
-        Ok(serde_yaml::from_str::<Option<Vec<BagQos>>>(text)?.unwrap_or_default())
+        Ok(crate::yaml::from_text::<Option<Vec<BagQos>>>(text)?.unwrap_or_default())
     }
 
     /// The YAML list as storage files of metadata version 9 carry it.

@@ -10,9 +10,10 @@ use super::{
     BagError, Messages, TopicInfo,
     messages::MessageCompression,
     metadata::{CompressionMode, Metadata},
+    recover::is_sqlite,
     split::Split,
     split_list::{in_order_of_time, listed_splits, splits_in},
-    storage::{Filter, full_type_name, merge_topic},
+    storage::{Filter, TopicIndex, full_type_name, merge_topic},
 };
 
 /// Selection of messages by topic and time; the default is all.
@@ -24,6 +25,8 @@ pub struct ReadOptions {
     pub start_ns: Option<i64>,
     /// The first log time no longer wanted, ns since the Unix epoch.
     pub end_ns: Option<i64>,
+    /// True to go on behind damage, each of which is an error among the messages.
+    pub past_damage: bool,
 }
 
 /// A bag opened for reading. Cheap to clone.
@@ -75,6 +78,17 @@ impl BagReader {
         self.message_count
     }
 
+    /// Rows of SQLite files that are no messages and are left out: of no topic, without time or content.
+    pub fn implausible_rows(&self) -> u64 {
+        let open = self.splits.iter().filter_map(|split| split.open.as_ref());
+        open.map(|open| open.info().implausible).sum()
+    }
+
+    /// True if all storage files are of SQLite.
+    pub(crate) fn is_sqlite(&self) -> bool {
+        self.splits.iter().all(|split| is_sqlite(&split.path))
+    }
+
     /// The wanted messages in order of log time across all files, with bounded memory.
     ///
     /// A damaged bag yields what precedes the damage, then the error. Unknown topics are an error.
@@ -86,6 +100,7 @@ impl BagReader {
             topics: self.topics.iter().map(is_wanted).collect(),
             start_ns: options.start_ns.unwrap_or(i64::MIN),
             end_ns: options.end_ns,
+            past_damage: options.past_damage,
         }))
     }
 
@@ -124,14 +139,25 @@ impl BagReader {
             },
         };
         let mut topics = listed_topics(metadata.as_ref());
+        let mut places = TopicIndex::new(&topics);
         let counted = metadata.is_none();
         for open in splits.iter().filter_map(|split| split.open.as_ref()) {
             for topic in &open.info().topics {
-                merge_topic(&mut topics, topic, counted);
+                merge_topic(&mut topics, &mut places, topic, counted);
             }
         }
         for damage in splits.iter().filter_map(Split::damage) {
             log::warn!("{damage}");
+        }
+        for split in &splits {
+            let rows = split
+                .open
+                .as_ref()
+                .map_or(0, |open| open.info().implausible);
+            if rows > 0 {
+                let path = split.path.display();
+                log::warn!("{path}: {rows} rows are no messages and left out");
+            }
         }
         let all_open = splits.iter().all(|split| split.open.is_some());
         let listed = metadata.as_ref().and_then(Metadata::range_ns);
@@ -143,6 +169,13 @@ impl BagReader {
             .iter()
             .filter_map(|split| split.message_count)
             .fold(0, u64::saturating_add);
+        if let Some(claimed) = metadata.as_ref().map(|m| m.message_count)
+            && all_open
+            && claimed != count
+        {
+            let path = path.display();
+            log::warn!("{path}: metadata.yaml counts {claimed} messages, but there are {count}");
+        }
         Ok(BagReader {
             path: path.to_path_buf(),
             message_count: match &metadata {

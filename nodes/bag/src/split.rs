@@ -7,7 +7,7 @@ use super::{
     mcap_storage::McapFile,
     sniff::{FileKind, identify},
     sqlite_storage::SqliteFile,
-    storage::{Filter, StorageInfo, StorageStream},
+    storage::{Filter, StorageInfo, StorageStream, TopicIndex},
     zstd_files::decompress_file,
 };
 
@@ -61,9 +61,10 @@ impl OpenFile {
         topics: &[TopicInfo],
         wanted: &Filter,
     ) -> Result<(StorageStream, Vec<usize>), BagError> {
+        let places = TopicIndex::new(topics);
         let find = |topic: &TopicInfo| {
-            let same = |t: &TopicInfo| t.is_same(&topic.name, &topic.type_name);
-            topics.iter().position(same).ok_or_else(|| {
+            let found = places.find(&topic.name, &topic.type_name);
+            found.ok_or_else(|| {
                 let (name, type_name) = (&topic.name, &topic.type_name);
                 let reason = format!("topic {name} of type {type_name} is not in metadata.yaml");
                 let remedy = "move metadata.yaml away to have it rebuilt";

@@ -23,6 +23,7 @@ pub(crate) fn listed_splits(
             "mcap and sqlite3 are known; convert with `ros2 bag convert`",
         ));
     }
+    too_many(folder, metadata.relative_file_paths.len())?;
     let mut splits = Vec::new();
     for (entry, file) in metadata.storage_paths(folder, metadata_path)? {
         // Some versions of rosbag2 list compressed files by their names before compression.
@@ -53,11 +54,7 @@ pub(crate) fn splits_in(folder: &Path) -> Result<Vec<Split>, BagError> {
         if is_storage(&name) {
             files.push(file);
         }
-        if files.len() > MAX_FILES {
-            let what = format!("a bag of more than {MAX_FILES} files");
-            let remedy = "open the files one by one";
-            return Err(BagError::unsupported(folder, what, remedy));
-        }
+        too_many(folder, files.len())?;
     }
     if files.is_empty() {
         return Err(BagError::Foreign {
@@ -71,6 +68,15 @@ pub(crate) fn splits_in(folder: &Path) -> Result<Vec<Split>, BagError> {
         .into_iter()
         .map(|file| Split::new(file, false))
         .collect()
+}
+
+fn too_many(folder: &Path, files: usize) -> Result<(), BagError> {
+    if files <= MAX_FILES {
+        return Ok(());
+    }
+    let what = format!("a bag of more than {MAX_FILES} files");
+    let remedy = "open the files one by one";
+    Err(BagError::unsupported(folder, what, remedy))
 }
 
 /// True for the name of a storage file, compressed or not.

@@ -1,5 +1,7 @@
 //! Parts common to the readers of the storage files.
 
+use std::collections::HashMap;
+
 use super::{BagError, BagQos, TopicInfo};
 
 /// Index of a storage file after opening it.
@@ -9,6 +11,8 @@ pub(crate) struct StorageInfo {
     pub message_count: u64,
     /// First and last log time.
     pub range_ns: Option<(i64, i64)>,
+    /// Rows that are no messages: of no topic or time, or without content.
+    pub implausible: u64,
     pub damage: Option<BagError>,
 }
 
@@ -32,6 +36,8 @@ pub(crate) struct Filter {
     pub start_ns: i64,
     /// The first log time no longer wanted.
     pub end_ns: Option<i64>,
+    /// True to go on behind damage.
+    pub past_damage: bool,
 }
 
 impl Filter {
@@ -51,16 +57,64 @@ impl Filter {
     }
 }
 
+/// Topics by name and type; an empty type is any.
+#[derive(Default)]
+pub(crate) struct TopicIndex {
+    by_type: HashMap<(String, String), usize>,
+    /// The first of each name.
+    by_name: HashMap<String, usize>,
+}
+
+impl TopicIndex {
+    pub(crate) fn new(topics: &[TopicInfo]) -> TopicIndex {
+        let mut index = TopicIndex::default();
+        for (at, topic) in topics.iter().enumerate() {
+            index.add(at, &topic.name, &topic.type_name);
+        }
+        index
+    }
+
+    fn add(&mut self, at: usize, name: &str, type_name: &str) {
+        let key = (name.to_owned(), type_name.to_owned());
+        self.by_type.entry(key).or_insert(at);
+        self.by_name.entry(name.to_owned()).or_insert(at);
+    }
+
+    /// The first topic of this name and type.
+    pub(crate) fn find(&self, name: &str, type_name: &str) -> Option<usize> {
+        if type_name.is_empty() {
+            return self.by_name.get(name).copied();
+        }
+        let of = |type_name: &str| {
+            let key = (name.to_owned(), type_name.to_owned());
+            self.by_type.get(&key).copied()
+        };
+        of(type_name).into_iter().chain(of("")).min()
+    }
+
+    /// The topic has its type now.
+    fn complete(&mut self, at: usize, name: &str, type_name: &str) {
+        self.by_type.remove(&(name.to_owned(), String::new()));
+        self.add(at, name, type_name);
+    }
+}
+
 /// Adds a topic to those known, or completes the same one; the result is its index.
-pub(crate) fn merge_topic(topics: &mut Vec<TopicInfo>, topic: &TopicInfo, counted: bool) -> usize {
-    let same = |known: &TopicInfo| known.is_same(&topic.name, &topic.type_name);
-    let found = topics.iter().position(same);
+pub(crate) fn merge_topic(
+    topics: &mut Vec<TopicInfo>,
+    places: &mut TopicIndex,
+    topic: &TopicInfo,
+    counted: bool,
+) -> usize {
+    let found = places.find(&topic.name, &topic.type_name);
     let Some((index, known)) = found.and_then(|index| Some((index, topics.get_mut(index)?))) else {
+        places.add(topics.len(), &topic.name, &topic.type_name);
         topics.push(topic.clone());
         return topics.len() - 1;
     };
-    if known.type_name.is_empty() {
+    if known.type_name.is_empty() && !topic.type_name.is_empty() {
         known.type_name.clone_from(&topic.type_name);
+        places.complete(index, &topic.name, &topic.type_name);
     }
     if known.type_hash.is_empty() {
         known.type_hash.clone_from(&topic.type_hash);
@@ -133,6 +187,7 @@ mod tests {
             topics: vec![true, false],
             start_ns: 10,
             end_ns: Some(20),
+            past_damage: false,
         };
         assert!(filter.wants(0, 10) && filter.wants(0, 19));
         assert!(

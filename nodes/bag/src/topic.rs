@@ -52,12 +52,6 @@ pub struct TopicInfo {
 }
 
 impl TopicInfo {
-    /// Same name and type; an empty type is any.
-    pub(crate) fn is_same(&self, name: &str, type_name: &str) -> bool {
-        self.name == name
-            && (self.type_name == type_name || self.type_name.is_empty() || type_name.is_empty())
-    }
-
     /// True if late joiners expect the last messages of this topic.
     pub fn is_latched(&self) -> bool {
         match self.offered_qos.as_slice() {

@@ -1,5 +1,7 @@
 //! The `lattice` command, and every node by its name.
 
+#[cfg(feature = "bags")]
+mod bag;
 mod calibrate;
 #[cfg(feature = "lab")]
 mod lab;
@@ -40,6 +42,10 @@ enum Command {
     /// Map a rosbag2 log: directly, or played through separate node processes
     #[cfg(feature = "bags")]
     Replay(replay::Replay),
+    /// Look after rosbag2 logs
+    #[cfg(feature = "bags")]
+    #[command(subcommand)]
+    Bag(bag::Bag),
     /// Quantize a point file (ply, pcd, xyz, KITTI bin) and show what each lattice makes of it
     Quantize(quantize::Quantize),
     /// Find where a cloud lies in a map, without a guess, and whether the answer holds
@@ -77,6 +83,8 @@ impl Command {
             Command::Link(command) => command.run(),
             #[cfg(feature = "bags")]
             Command::Replay(command) => command.run(),
+            #[cfg(feature = "bags")]
+            Command::Bag(command) => command.run(),
             Command::Quantize(command) => command.run(),
             Command::Calibrate(command) => command.run(),
             Command::Map(command) => command.run(),

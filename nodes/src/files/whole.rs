@@ -155,9 +155,8 @@ mod tests {
         let folder = tempfile::tempdir().unwrap();
         let path = folder.path().join("map");
         for old in [None, Some("old")] {
-            if let Some(text) = old {
-                fs::write(&path, text).unwrap();
-            }
+            old.into_iter()
+                .for_each(|text| fs::write(&path, text).unwrap());
             let failed = write(&path, |file| {
                 file.write_all(&[7; 1 << 20])?;
                 Err::<(), _>(io::Error::other("full"))

@@ -10,6 +10,7 @@ pub mod node;
 mod occupancy;
 mod operations;
 mod options;
+mod refusal;
 mod report;
 mod services;
 
@@ -17,6 +18,7 @@ pub use counts::MapperCounts;
 pub use free_options::{FreeSpaceMethod, MappedFreeSpace};
 pub use operations::LoadRefusal;
 pub use options::{MapPayload, MapperOptions};
+pub use refusal::CloudRefusal;
 pub use report::MapperReport;
 
 use lattice_core::cloud::{Cloud, CloudLimits};
@@ -29,7 +31,6 @@ use lattice_msgs::lattice::{LatticeMap, LatticeMapUpdate};
 use lattice_msgs::sensor_msgs::{PointCloud2, PointField};
 use nalgebra::Vector3;
 use std::sync::{Arc, OnceLock};
-use thiserror::Error;
 
 use self::free_space::FreeSpace;
 use self::occupancy::OccupancyMap;
@@ -40,35 +41,6 @@ const SECOND_NS: i64 = 1_000_000_000;
 /// Clouds in a row whose stamps agree on another time before it is believed.
 const AGREEING_CLOUDS: u32 = 5;
 
-/// Reason for which a cloud was not mapped. The map is as it was before.
-#[derive(Debug, Error)]
-pub enum CloudRefusal {
-    /// In another frame than the map's.
-    #[error(
-        "cloud in frame '{found}', expected '{expected}': is enu_transformer between the sensor and the mapper?"
-    )]
-    Frame {
-        /// As sent.
-        found: String,
-        /// The mapper's `map_frame`.
-        expected: String,
-    },
-    /// The bytes are not what the header says.
-    #[error("malformed cloud: {0}")]
-    Malformed(#[from] lattice_core::cloud::CloudError),
-    /// Of another time than the clouds before, by which voxels grow old.
-    #[error(
-        "cloud of {stamp_ns} ns, {:.1} s from the one before: is a clock wrong?",
-        *step_ns as f64 * 1e-9
-    )]
-    Stamp {
-        /// As sent.
-        stamp_ns: i64,
-        /// From the stamp of the cloud before.
-        step_ns: i64,
-    },
-}
-
 /// Builds one occupied voxel list, with its changes for followers.
 pub struct LatticeMapper {
     options: MapperOptions,
@@ -78,6 +50,8 @@ pub struct LatticeMapper {
     free_space: Option<FreeSpace>,
     epoch: u64,
     sequence: u64,
+    /// Checksum of the updates of this epoch.
+    history: map::History,
     origin: Option<GeoPoint>,
     last_stamp_ns: i64,
     /// Where voxels grow old.
@@ -114,6 +88,7 @@ impl LatticeMapper {
             free_space,
             epoch,
             sequence: 0,
+            history: map::History::default(),
             origin: None,
             last_stamp_ns: 0,
             forgot_at_ns: 0,
@@ -258,6 +233,7 @@ impl LatticeMapper {
         }
         self.epoch = epoch;
         self.sequence = 0;
+        self.history = map::History::default();
         self.last_stamp_ns = 0;
         self.stamps.as_mut().map(StampGate::clear);
         self.forgot_at_ns = 0;
@@ -288,12 +264,14 @@ impl LatticeMapper {
         let previous = self.sequence;
         self.sequence += 1;
         let (stamp, list) = (self.stamp(), &self.list);
-        let messages = match &self.occupancy {
+        let mut messages = match &self.occupancy {
             Some(_) => {
                 map::update_of_cells(list.lattice(), list.datum_m(), &changes, previous, &stamp)
             }
             None => map::update(list, &changes, previous, &stamp),
         };
+        let voxels = self.cells().len();
+        self.history = map::sign(&mut messages, self.history, self.sequence, voxels);
         self.counts.updates += 1;
         messages
     }
@@ -387,6 +365,7 @@ impl LatticeMapper {
             header: self.header(),
             epoch: self.epoch,
             sequence: self.sequence,
+            history: self.history,
             origin: self.origin.as_ref(),
             chunk_bytes: self.options.chunk_bytes,
         }

@@ -34,15 +34,20 @@ pub(super) struct Changes {
     stamp_ns: i64,
     voxels: Vec<(MortonKey, VoxelState)>,
     removed: Vec<MortonKey>,
+    /// For the checksum.
+    pub sum: u64,
 }
 
 impl Changes {
     pub fn of(message: &LatticeMapUpdate, max_voxels: usize) -> Result<Self, MapMessageError> {
+        let voxels = map::voxels_from(message.into(), max_voxels)?;
+        let removed = map::keys_from(&message.key_encoding, &message.removed_keys, max_voxels)?;
         Ok(Self {
             sequence: message.sequence,
             stamp_ns: message.header.stamp.to_ns(),
-            voxels: map::voxels_from(message.into(), max_voxels)?,
-            removed: map::keys_from(&message.key_encoding, &message.removed_keys, max_voxels)?,
+            sum: map::changes_sum(&voxels, &removed),
+            voxels,
+            removed,
         })
     }
 

@@ -6,7 +6,7 @@ use lattice_core::lattice::MortonKey;
 use rustc_hash::FxHashMap;
 
 use super::followed_map::Changes;
-use crate::convert::map::VoxelState;
+use crate::convert::map::{History, VoxelState};
 
 /// Most updates remembered while a keyframe comes in.
 pub(super) const MAX_WAITING_UPDATES: usize = 4096;
@@ -39,11 +39,17 @@ impl Chunks {
 pub(super) struct OpenUpdate {
     pub previous: u64,
     pub chunks: Chunks,
+    /// Over the chunks that have come.
+    pub sum: u64,
+    /// What the map is to be after it.
+    pub history: History,
+    pub voxels_total: u64,
 }
 
 /// A keyframe of which not all chunks have come, with the updates that came meanwhile.
 pub(super) struct Staging {
     pub sequence: u64,
+    pub history: History,
     pub chunks: Chunks,
     pub voxels: FxHashMap<MortonKey, VoxelState>,
     /// Newest sequence of the map when the last chunk came.
@@ -53,9 +59,10 @@ pub(super) struct Staging {
 }
 
 impl Staging {
-    pub fn new(sequence: u64, chunks: u32) -> Self {
+    pub fn new(sequence: u64, history: History, chunks: u32) -> Self {
         Self {
             sequence,
+            history,
             chunks: Chunks::new(chunks),
             voxels: FxHashMap::default(),
             heard_at: sequence,
@@ -65,11 +72,11 @@ impl Staging {
     }
 
     /// Begins a further keyframe, which the updates at hand are also for.
-    pub fn restart(self, sequence: u64, chunks: u32) -> Self {
+    pub fn restart(self, sequence: u64, history: History, chunks: u32) -> Self {
         Self {
             later: self.later,
             later_voxels: self.later_voxels,
-            ..Self::new(sequence, chunks)
+            ..Self::new(sequence, history, chunks)
         }
     }
 

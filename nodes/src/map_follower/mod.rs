@@ -14,12 +14,15 @@ use thiserror::Error;
 
 use self::followed_map::Changes;
 use self::incomplete::{Chunks, MAX_WAITING_UPDATES, OpenUpdate, Staging};
-use crate::convert::map::{self, MapMessageError, VoxelState};
+use crate::convert::map::{self, History, MapMessageError, VoxelState};
 
 /// Most chunks that one keyframe or update may have.
 const MAX_CHUNKS: u32 = 1 << 16;
 /// Updates without a chunk after which the rest of a keyframe is taken for lost.
 const MAX_STAGING_UPDATES: u64 = 10;
+/// Updates in a row that are older than the map before it is taken for another's: more than wait while a
+/// keyframe is worked on.
+const MAX_OLD_UPDATES: u32 = 128;
 /// Quiet seconds after which the rest of a keyframe is taken for lost, at first and at most: a
 /// mapper with a long update period must not be asked again and again.
 const PATIENCE_S: [u32; 2] = [2, 64];
@@ -57,6 +60,12 @@ pub struct MapFollower {
     map: Option<FollowedMap>,
     /// State of the voxels; none until the first keyframe of an epoch is complete.
     sequence: Option<u64>,
+    /// Checksum of the updates up to there.
+    history: History,
+    /// Times that the map was found to be another than its mapper's.
+    differences: u64,
+    /// Old updates in a row.
+    old_updates: u32,
     /// Newest sequence of any message of the epoch.
     newest: u64,
     staging: Option<Staging>,
@@ -78,6 +87,9 @@ impl MapFollower {
             max_voxels,
             map: None,
             sequence: None,
+            history: History::default(),
+            differences: 0,
+            old_updates: 0,
             newest: 0,
             staging: None,
             open_updates: BTreeMap::new(),
@@ -98,6 +110,11 @@ impl MapFollower {
     /// Sequence that the map is at; none before the first keyframe of an epoch is complete.
     pub fn sequence(&self) -> Option<u64> {
         self.sequence
+    }
+
+    /// Times that the map was found to be another than its mapper's, and a keyframe was asked for.
+    pub fn differences(&self) -> u64 {
+        self.differences
     }
 
     /// Keys whose voxels came, changed or went since the call before, and whether the lattice,
@@ -138,19 +155,20 @@ impl MapFollower {
             map.frame_id.clone_from(&message.header.frame_id);
             map.stamp_ns = message.header.stamp.to_ns();
         }
+        let history = History(message.history_checksum);
         let staging = match self.staging.take() {
             None => {
                 // Updates that wait for a lost one were not kept for it: they must come again.
                 self.open_updates.clear();
-                Staging::new(message.sequence, message.chunks)
+                Staging::new(message.sequence, history, message.chunks)
             }
             Some(staging)
-                if (staging.sequence, staging.chunks.expected)
-                    == (message.sequence, message.chunks) =>
+                if (staging.sequence, staging.history, staging.chunks.expected)
+                    == (message.sequence, history, message.chunks) =>
             {
                 staging
             }
-            Some(other) => other.restart(message.sequence, message.chunks),
+            Some(other) => other.restart(message.sequence, history, message.chunks),
         };
         self.stage(staging, message.chunk, voxels)
     }
@@ -168,15 +186,25 @@ impl MapFollower {
                 false => self.need_keyframe(),
             });
         };
-        if self.sequence.is_some_and(|at| message.sequence <= at) {
-            return Ok(Followed::Old);
+        let history = History(message.history_checksum);
+        if let Some(at) = self.sequence.filter(|at| message.sequence <= *at) {
+            // One of the same number and other content, or many in a row, of which none can be new:
+            // somebody else has taken the map to where it is.
+            self.old_updates += 1;
+            let is_other = message.sequence == at && history != self.history;
+            return Ok(match is_other || self.old_updates > MAX_OLD_UPDATES {
+                true => self.differ("an update of another history"),
+                false => Followed::Old,
+            });
         }
+        self.old_updates = 0;
         let lost = self
             .sequence
             .is_none_or(|at| message.previous_sequence > at)
             && !self.open_updates.contains_key(&message.sequence)
             && self.staging.is_none();
         let changes = Changes::of(message, self.max_voxels)?;
+        let sum = changes.sum;
         // Half a map is none: before its first keyframe is complete, nothing is put into it.
         if self.sequence.is_some() {
             map.apply(&changes, self.max_voxels, &mut self.touched)?;
@@ -194,10 +222,17 @@ impl MapFollower {
             .or_insert_with(|| OpenUpdate {
                 previous: message.previous_sequence,
                 chunks: Chunks::new(message.chunks),
+                sum: 0,
+                history,
+                voxels_total: message.voxels_total,
             });
-        open.chunks.insert(message.chunk);
+        if open.chunks.insert(message.chunk) {
+            open.sum = open.sum.wrapping_add(sum);
+        }
         self.quiet_s = 0;
-        self.advance();
+        if let Err(why) = self.advance() {
+            return Ok(self.differ(why));
+        }
         if let Some(staging) = &self.staging {
             // A keyframe that the updates have overtaken is of no more use.
             if self.sequence.is_some_and(|at| staging.sequence <= at) {
@@ -238,10 +273,23 @@ impl MapFollower {
         Followed::NeedKeyframe
     }
 
-    /// Moves the sequence over every update whose chunks are all here and follow on.
-    fn advance(&mut self) {
+    /// Begins anew, since the map is not its mapper's; it is shown until a keyframe has come.
+    fn differ(&mut self, why: &str) -> Followed {
+        self.differences += 1;
+        log::warn!("the map differs from its mapper's ({why}): it is asked for again");
+        self.sequence = None;
+        self.newest = 0;
+        self.old_updates = 0;
+        self.staging = None;
+        self.open_updates.clear();
+        self.need_keyframe()
+    }
+
+    /// Moves the sequence over every update whose chunks are all here and follow on; an error where
+    /// the map is not what the update says.
+    fn advance(&mut self) -> Result<(), &'static str> {
         let Some(at) = &mut self.sequence else {
-            return;
+            return Ok(());
         };
         while let Some(entry) = self.open_updates.first_entry() {
             let open = entry.get();
@@ -250,9 +298,22 @@ impl MapFollower {
             if sequence > *at && !follows {
                 break;
             }
-            entry.remove();
-            *at = sequence.max(*at);
+            let open = entry.remove();
+            if sequence <= *at {
+                continue;
+            }
+            self.history = self.history.then(sequence, open.sum);
+            *at = sequence;
+            if self.history != open.history {
+                return Err("other updates");
+            }
+            // Those behind it have been applied already.
+            let voxels = self.map.as_ref().map_or(0, |map| map.voxels().len()) as u64;
+            if self.open_updates.is_empty() && voxels != open.voxels_total {
+                return Err("other voxels");
+            }
         }
+        Ok(())
     }
 
     fn begin_epoch(&mut self, map: FollowedMap) {
@@ -284,7 +345,9 @@ impl MapFollower {
         staging.heard_at = self.newest;
         self.quiet_s = 0;
         if staging.chunks.complete() {
-            self.adopt(staging)?;
+            if let Err(why) = self.adopt(staging)? {
+                return Ok(self.differ(why));
+            }
         } else {
             self.staging = Some(staging);
         }
@@ -292,19 +355,20 @@ impl MapFollower {
     }
 
     /// Puts a complete keyframe in place of the voxels, then what came after it.
-    fn adopt(&mut self, done: Staging) -> Result<(), FollowError> {
+    fn adopt(&mut self, done: Staging) -> Result<Result<(), &'static str>, FollowError> {
         let Some(map) = &mut self.map else {
-            return Ok(());
+            return Ok(Ok(()));
         };
         map.replace(done.voxels, &mut self.touched);
-        self.sequence = self.sequence.max(Some(done.sequence));
+        if self.sequence.is_none_or(|at| done.sequence > at) {
+            (self.sequence, self.history) = (Some(done.sequence), done.history);
+        }
         self.keyframe_needed = false;
         self.patience_s = PATIENCE_S[0];
         for changes in done.later.iter().filter(|c| c.sequence > done.sequence) {
             map.apply(changes, self.max_voxels, &mut self.touched)?;
         }
-        self.advance();
-        Ok(())
+        Ok(self.advance())
     }
 }
 

@@ -98,6 +98,7 @@ impl Pipeline {
                 ..TransformerReport::default()
             },
             lattices,
+            implausible_rows: 0,
             wall_s: 0.0,
         }
     }
@@ -212,6 +213,7 @@ pub fn run(
     Ok(RunReport {
         source: source.to_owned(),
         clouds_in_log: plan.clouds(bag),
+        implausible_rows: bag.implausible_rows(),
         wall_s: begin.elapsed().as_secs_f64(),
         ..pipeline.finish()
     })

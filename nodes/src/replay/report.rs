@@ -28,6 +28,9 @@ pub struct RunReport {
     pub transformer: TransformerReport,
     /// One for each lattice.
     pub lattices: Vec<LatticeReport>,
+    /// Rows of the log that are no messages and were left out.
+    #[serde(default)]
+    pub implausible_rows: u64,
     /// Wall time.
     pub wall_s: f64,
 }
@@ -49,6 +52,14 @@ impl RunReport {
         for (reason, count) in self.transformer.dropped() {
             lines.push(format!("{count} of {} clouds: {reason}", counts.clouds_in));
         }
+        if self.implausible_rows > 0 {
+            let rows = self.implausible_rows;
+            lines.push(format!("{rows} rows of the log are no messages"));
+        }
+        let jumped = counts.poses_stamp_jump;
+        if jumped > 0 {
+            lines.push(format!("{jumped} poses: of another time than those around"));
+        }
         let poses = self.transformer.poses_inbox_full;
         if poses > 0 {
             lines.push(format!("{poses} poses and transforms: inbox_full"));
@@ -69,6 +80,8 @@ impl RunReport {
             let blind = "without sensor positions, so that they clear nothing";
             add("clouds", mapped.clouds_wrong_frame, "not in the map frame");
             add("clouds", mapped.clouds_malformed, "malformed");
+            let jump = "of another time than those before";
+            add("clouds", mapped.clouds_stamp_jump, jump);
             add("clouds", mapped.clouds_no_viewpoint, blind);
             add(
                 "clouds",
@@ -165,6 +178,7 @@ mod tests {
                 map: MapperReport::of(&mut mapper),
                 markers: MarkerReport::default(),
             }],
+            implausible_rows: 0,
             wall_s: 1.0,
         };
         let counts = &mut report.transformer.counts;

@@ -355,6 +355,11 @@ impl SemanticIcpServer {
         self.names.get(&class).map(String::as_str)
     }
 
+    /// Times that the map was found to be another than its mapper's.
+    pub fn map_differences(&self) -> u64 {
+        self.follower.differences()
+    }
+
     /// Voxels of the map that is followed.
     pub fn map_voxels(&self) -> usize {
         self.follower.map().map_or(0, |map| map.voxels().len())

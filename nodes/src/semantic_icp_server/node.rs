@@ -368,6 +368,10 @@ impl Shell {
             ("inbox_full".into(), lost.to_string()),
             ("undecodable".into(), self.losses.undecodable().to_string()),
             ("map_voxels".into(), self.machine.map_voxels().to_string()),
+            (
+                "map_differences".into(),
+                self.machine.map_differences().to_string(),
+            ),
             ("session".into(), last.session.clone()),
             ("last_reason".into(), last.reason.clone()),
             ("method".into(), last.method.clone()),

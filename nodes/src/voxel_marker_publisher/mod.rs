@@ -77,6 +77,11 @@ pub struct VoxelMarkers {
 }
 
 impl VoxelMarkers {
+    /// Times that the map was found to be another than its mapper's.
+    pub fn map_differences(&self) -> u64 {
+        self.follower.differences()
+    }
+
     /// Markers of no map yet.
     pub fn new(options: MarkerOptions) -> Self {
         Self {

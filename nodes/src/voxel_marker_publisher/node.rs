@@ -214,6 +214,8 @@ impl Shell {
         values.push(("inbox_full".into(), self.chunks_lost().to_string()));
         values.push(("undecodable".into(), undecodable.to_string()));
         values.push(("arrays_not_published".into(), arrays.to_string()));
+        let differences = self.machine.map_differences();
+        values.push(("map_differences".into(), differences.to_string()));
         values.push(("voxels".into(), self.machine.voxels().to_string()));
         self.diagnostics.set("markers", level, message, values);
     }

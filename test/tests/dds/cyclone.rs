@@ -289,7 +289,8 @@ fn a_cyclone_peer_sees_the_type_hash_of_every_endpoint() {
         let expected = hash.map_or(String::new(), |hash| format!("typehash={hash};"));
         assert_eq!(*user_data, expected, "{topic}");
         assert_eq!(hash.is_none(), topic == "rt/wrong", "{topic}");
-        if let Some(theirs) = jazzy.get(ros_type) {
+        // `LatticeMap` has got a field since the list was made.
+        if let Some(theirs) = jazzy.get(ros_type).filter(|_| topic != "rt/map") {
             assert_eq!(theirs.as_str(), hash, "{ros_type}");
         }
     }

@@ -195,6 +195,7 @@ fn kitti_mcap_has_all_messages_and_sqlite3_the_first_three_scans() {
         topics: Some(vec!["/ins/imu".into()]),
         start_ns: Some(start_ns),
         end_ns: Some(end_ns),
+        ..ReadOptions::default()
     };
     for (reader, all) in [(&mcap, &a), (&sqlite, &b)] {
         let some = read(reader, &options);

@@ -73,6 +73,55 @@ fn a_follower_of_deltas_has_the_same_voxels() {
 }
 
 #[test]
+fn a_forged_update_is_noticed_and_the_map_healed() {
+    let mut mapper = mapper(LatticeKind::Fcc);
+    let mut follower = maps::follower(&mut mapper);
+    insert(&mut mapper, &scatter(1, 500, [0.0; 3], 9.0));
+    follow_update(&mut follower, &mut mapper);
+    let heal = |follower: &mut MapFollower, mapper: &mut LatticeMapper, differences| {
+        assert_eq!(follower.differences(), differences);
+        follow_keyframe(follower, mapper);
+        insert(mapper, &scatter(differences, 500, [7.0; 3], 9.0));
+        follow_update(follower, mapper);
+        assert_same(follower, mapper);
+        assert_eq!(follower.differences(), differences);
+    };
+    insert(&mut mapper, &scatter(2, 500, [3.0; 3], 9.0));
+    let genuine = mapper.take_update();
+    // Another content under the next number.
+    let mut forged = genuine[0].clone();
+    forged.counts[0] += 1;
+    assert_eq!(follower.on_update(&forged).unwrap(), Followed::NeedKeyframe);
+    heal(&mut follower, &mut mapper, 1);
+    // The last number there is, with and without its checksum.
+    forged.previous_sequence = follower.sequence().unwrap();
+    forged.sequence = u64::MAX;
+    assert_eq!(follower.on_update(&forged).unwrap(), Followed::NeedKeyframe);
+    heal(&mut follower, &mut mapper, 2);
+    let mut keyframe = mapper.keyframe();
+    keyframe
+        .iter_mut()
+        .for_each(|chunk| chunk.sequence = u64::MAX);
+    follow(&mut follower, &keyframe);
+    let mut asked = 0;
+    while follower.differences() == 2 {
+        insert(&mut mapper, &scatter(3, 5, [3.0; 3], 9.0));
+        for chunk in mapper.take_update() {
+            follower.on_update(&chunk).unwrap();
+        }
+        asked += 1;
+        assert!(asked < 1000, "frozen");
+    }
+    heal(&mut follower, &mut mapper, 3);
+    // A number of voxels that is not the mapper's.
+    insert(&mut mapper, &scatter(4, 50, [30.0; 3], 9.0));
+    let mut update = mapper.take_update();
+    update[0].voxels_total += 1;
+    assert_asks(&mut follower, &update);
+    heal(&mut follower, &mut mapper, 4);
+}
+
+#[test]
 fn a_late_joiner_takes_the_keyframe_and_then_deltas() {
     let mut mapper = mapper(LatticeKind::Bcc);
     insert(&mut mapper, &scatter(1, 20_000, [0.0; 3], 100.0));

@@ -9,7 +9,7 @@ use mcap::records::{Channel, Record};
 
 use crate::{
     BagError, TopicInfo,
-    storage::{StorageInfo, full_type_name, lenient_qos, merge_topic},
+    storage::{StorageInfo, TopicIndex, full_type_name, lenient_qos, merge_topic},
 };
 
 /// A stretch of the file that is read as one: a chunk, or messages outside of chunks.
@@ -131,9 +131,10 @@ impl Contents {
             damage: self.damage.take(),
             ..StorageInfo::default()
         };
-        let mut topic_of = BTreeMap::new();
+        let (mut topic_of, mut places) = (BTreeMap::new(), TopicIndex::default());
         for (id, channel) in &self.channels {
-            let index = merge_topic(&mut info.topics, &self.topic(*id, channel), true);
+            let topic = self.topic(*id, channel);
+            let index = merge_topic(&mut info.topics, &mut places, &topic, true);
             topic_of.insert(*id, index);
         }
         Ok((info, topic_of))

@@ -102,7 +102,7 @@ impl RecordError {
                 path,
                 position: self.place.to_string(),
                 reason,
-                remedy: "take another copy, or rescue the rest with `mcap recover`",
+                remedy: "take another copy, or rescue the rest with `lattice bag recover`",
             },
             Cause::TooLarge {
                 what,

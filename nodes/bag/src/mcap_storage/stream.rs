@@ -174,9 +174,13 @@ impl Iterator for McapStream {
         while self.needs_block() {
             let block = self.blocks.pop_front()?;
             if let Err(error) = self.read_block(&block) {
+                let error = error.in_file(&self.path, 0, 0);
+                if self.filter.past_damage {
+                    return Some(Err(error));
+                }
                 // The waiting messages are whole, and earlier or close by: the error follows them.
                 self.blocks.clear();
-                self.damage = Some(error.in_file(&self.path, 0, 0));
+                self.damage = Some(error);
             }
         }
         if let Some(Reverse(message)) = self.waiting.pop() {

@@ -11,7 +11,7 @@ use std::{
 
 use serde::{Deserialize, Serialize};
 
-use super::{BagError, BagQos};
+use super::{BagError, BagQos, yaml};
 
 /// The version written, and the newest read.
 pub(crate) const METADATA_VERSION: u32 = 9;
@@ -150,7 +150,7 @@ impl Metadata {
             reason,
         };
         let document: Document =
-            serde_yaml::from_str(text).map_err(|e| wrong(format!("not rosbag2 metadata: {e}")))?;
+            yaml::from_text(text).map_err(|e| wrong(format!("not rosbag2 metadata: {e}")))?;
         let metadata = document.rosbag2_bagfile_information;
         match metadata.version {
             1..=METADATA_VERSION => {}

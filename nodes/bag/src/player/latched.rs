@@ -45,6 +45,7 @@ pub(super) fn latched_before(
         topics: wanted(reader, latched.iter().copied()),
         start_ns: i64::MIN,
         end_ns: Some(before_ns),
+        past_damage: false,
     };
     let mut kept_messages: VecDeque<BagMessage> = VecDeque::new();
     let mut bytes = 0_usize;

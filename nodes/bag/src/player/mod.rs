@@ -214,6 +214,7 @@ impl Player {
             topics: wanted(&self.reader, &self.topics),
             start_ns: from_ns,
             end_ns: self.end_ns,
+            past_damage: false,
         }));
         self.read_head();
         Ok(())

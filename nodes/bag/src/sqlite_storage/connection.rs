@@ -2,17 +2,21 @@
 
 use std::{
     fs::File,
-    io::Read,
+    io::{self, Read},
     path::{Path, PathBuf},
+    sync::Arc,
 };
 
 use rusqlite::{Connection, OpenFlags, config::DbConfig};
+use tempfile::{Builder, TempPath};
 
 use crate::BagError;
 
 /// Opens read-only. `immutable` keeps SQLite from creating files beside the database, so that a
 /// read-only folder works; it would hide rows still in a write-ahead log, so not where one exists.
-pub(super) fn connect(path: &Path) -> Result<Connection, BagError> {
+///
+/// Of a database that is `cut` the pages that are there are read.
+pub(super) fn connect(path: &Path, cut: bool) -> Result<Connection, BagError> {
     let path = &std::path::absolute(path).map_err(BagError::io(path, "locate"))?;
     let has_wal = wal_path(path).metadata().is_ok_and(|wal| wal.len() > 0);
     let parameters = if has_wal {
@@ -34,7 +38,10 @@ pub(super) fn connect(path: &Path) -> Result<Connection, BagError> {
     };
     let connection = Connection::open_with_flags(uri, flags).map_err(wrong)?;
     for (setting, on) in [
-        (DbConfig::SQLITE_DBCONFIG_DEFENSIVE, true),
+        // SQLite refuses a database that is shorter than its header says, unless its schema may be
+        // written, which does not go with the other; read-only it is anyway.
+        (DbConfig::SQLITE_DBCONFIG_DEFENSIVE, !cut),
+        (DbConfig::SQLITE_DBCONFIG_WRITABLE_SCHEMA, cut),
         (DbConfig::SQLITE_DBCONFIG_TRUSTED_SCHEMA, false),
         (DbConfig::SQLITE_DBCONFIG_ENABLE_TRIGGER, false),
         (DbConfig::SQLITE_DBCONFIG_ENABLE_VIEW, false),
@@ -66,8 +73,30 @@ fn percent_encode(path: &Path) -> String {
         .collect()
 }
 
+/// A database of which pages are missing.
+pub(super) struct Cut {
+    pub damage: BagError,
+    /// Bytes of the pages that are whole; of another one SQLite would read what is missing as zeros.
+    pub whole_bytes: u64,
+}
+
+impl Cut {
+    /// A copy of the whole pages.
+    pub(super) fn whole_pages(&self, path: &Path) -> Result<Arc<TempPath>, BagError> {
+        let copy = || -> io::Result<TempPath> {
+            let mut copy = Builder::new().prefix("lattice_bag_").tempfile()?;
+            let mut whole = File::open(path)?.take(self.whole_bytes);
+            io::copy(&mut whole, copy.as_file_mut())?;
+            Ok(copy.into_temp_path())
+        };
+        copy()
+            .map(Arc::new)
+            .map_err(BagError::io(path, "copy the whole pages of"))
+    }
+}
+
 /// Compares the size in the database header with the file's (https://www.sqlite.org/fileformat.html, 1.3).
-pub(super) fn missing_pages(path: &Path) -> Result<Option<BagError>, BagError> {
+pub(super) fn missing_pages(path: &Path) -> Result<Option<Cut>, BagError> {
     let mut file = File::open(path).map_err(BagError::io(path, "open"))?;
     let size_bytes = file
         .metadata()
@@ -102,9 +131,9 @@ pub(super) fn missing_pages(path: &Path) -> Result<Option<BagError>, BagError> {
         0
     };
     let cut = pages * page_bytes > size_bytes;
-    Ok(cut.then(|| {
-        truncated(format!(
-            "the database, whose header counts {pages} pages of {page_bytes} bytes"
-        ))
+    let inside = format!("the database, whose header counts {pages} pages of {page_bytes} bytes");
+    Ok(cut.then(|| Cut {
+        damage: truncated(inside),
+        whole_bytes: size_bytes - size_bytes % page_bytes,
     }))
 }

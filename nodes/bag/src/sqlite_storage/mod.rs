@@ -17,7 +17,7 @@ use super::{
     storage::{Filter, StorageInfo, StorageStream, full_type_name, lenient_qos},
 };
 use connection::{connect, missing_pages};
-use stream::{Key, SqliteStream};
+use stream::{IMPLAUSIBLE, Key, SqliteStream};
 
 /// More topics than this are refused.
 const MAX_TOPICS: usize = 65_536;
@@ -30,6 +30,8 @@ pub(crate) struct SqliteFile {
     /// The readable messages in order of time, where damage keeps the database from ordering them.
     rescued: Option<Arc<Vec<Key>>>,
     has_time_index: bool,
+    /// The file is shorter than its header says.
+    cut: bool,
     pub(crate) info: StorageInfo,
 }
 
@@ -39,14 +41,22 @@ impl SqliteFile {
         path: &Path,
         temporary: Option<Arc<TempPath>>,
     ) -> Result<SqliteFile, BagError> {
-        let missing_pages = missing_pages(path)?;
-        let connection = connect(path)?;
+        let (mut path, mut temporary) = (path, temporary);
+        let cut = missing_pages(path)?;
+        if let Some(cut) = &cut {
+            temporary = Some(cut.whole_pages(path)?);
+        }
+        let copied = temporary.clone().filter(|_| cut.is_some());
+        path = copied.as_deref().map_or(path, |copy| copy);
+        let missing_pages = cut.map(|cut| cut.damage);
+        let connection = connect(path, missing_pages.is_some())?;
         let mut file = SqliteFile {
             path: path.to_path_buf(),
             temporary,
             topic_of: Arc::default(),
             rescued: None,
             has_time_index: false,
+            cut: missing_pages.is_some(),
             info: StorageInfo::default(),
         };
         let cut = |error: BagError| missing_pages.clone().unwrap_or(error);
@@ -152,20 +162,28 @@ impl SqliteFile {
     fn read_range(&mut self, connection: &Connection) -> Result<(), BagError> {
         let path = self.path.clone();
         let wrong = |e| BagError::sqlite(&path, "table messages", e);
-        let select = "SELECT MIN(timestamp), (SELECT MAX(timestamp) FROM messages) FROM messages";
+        let select = "SELECT MIN(timestamp), (SELECT MAX(timestamp) FROM messages \
+                      WHERE timestamp <= 9223372036854775807) FROM messages WHERE timestamp >= 0";
         let range = connection.query_row(select, [], |row| {
             let (first, last) = (row.get::<_, Option<i64>>(0)?, row.get::<_, Option<i64>>(1)?);
             Ok(first.zip(last))
         });
         self.info.range_ns = range.map_err(wrong)?;
-        let mut statement = connection
-            .prepare("SELECT topic_id, COUNT(*) FROM messages GROUP BY topic_id")
-            .map_err(wrong)?;
-        let rows =
-            statement.query_map([], |row| Ok((row.get::<_, i64>(0)?, row.get::<_, i64>(1)?)));
+        let select = format!(
+            "SELECT COALESCE(CAST(topic_id AS INTEGER), -1), COUNT(*), SUM({IMPLAUSIBLE}) \
+             FROM messages GROUP BY 1"
+        );
+        let mut statement = connection.prepare(&select).map_err(wrong)?;
+        let rows = statement.query_map([], |row| {
+            Ok((row.get::<_, i64>(0)?, row.get(1)?, row.get(2)?))
+        });
         for row in rows.map_err(wrong)? {
-            let (id, count) = row.map_err(wrong)?;
-            self.count(id, u64::try_from(count).unwrap_or(0));
+            let (id, count, implausible): (i64, i64, i64) = row.map_err(wrong)?;
+            let [count, implausible] = [count, implausible].map(i64::unsigned_abs);
+            let is_topic = self.topic_of.contains_key(&id);
+            let implausible = if is_topic { implausible } else { count };
+            self.info.implausible += implausible;
+            self.count(id, count.saturating_sub(implausible));
         }
         Ok(())
     }

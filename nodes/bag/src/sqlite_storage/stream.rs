@@ -26,7 +26,11 @@ pub(super) struct Key {
     size_bytes: u64,
 }
 
-const KEY_COLUMNS: &str = "SELECT timestamp, id, topic_id, octet_length(data)";
+/// A topic that is no number is none.
+const KEY_COLUMNS: &str =
+    "SELECT timestamp, id, COALESCE(CAST(topic_id AS INTEGER), -1), octet_length(data)";
+/// Condition of a row that is no message; shorter than a CDR header none is.
+pub(super) const IMPLAUSIBLE: &str = "typeof(timestamp) <> 'integer' OR timestamp < 0 OR octet_length(data) IS NULL OR octet_length(data) < 4";
 
 fn key(row: &rusqlite::Row<'_>) -> Result<Key, rusqlite::Error> {
     Ok(Key {
@@ -70,7 +74,7 @@ pub(super) struct SqliteStream {
 impl SqliteStream {
     pub(super) fn new(file: &SqliteFile, filter: Filter) -> Result<SqliteStream, BagError> {
         let mut stream = SqliteStream {
-            connection: connect(&file.path)?,
+            connection: connect(&file.path, file.cut)?,
             path: file.path.clone(),
             _temporary: file.temporary.clone(),
             topic_of: file.topic_of.clone(),
@@ -98,9 +102,9 @@ impl SqliteStream {
     }
 
     fn wants(&self, key: &Key) -> bool {
-        self.topic_of
-            .get(&key.topic_id)
-            .is_some_and(|topic| self.filter.wants(*topic, key.timestamp_ns))
+        let is_message = key.timestamp_ns >= 0 && key.size_bytes >= 4;
+        let topic = self.topic_of.get(&key.topic_id).filter(|_| is_message);
+        topic.is_some_and(|topic| self.filter.wants(*topic, key.timestamp_ns))
     }
 
     /// Fetches keys until some are wanted or none are left.
@@ -173,7 +177,10 @@ impl Iterator for SqliteStream {
     fn next(&mut self) -> Option<Self::Item> {
         let next = match self.fetch_keys() {
             Ok(()) => self.keys.pop_front().map(|key| self.read(key)),
-            Err(error) => Some(Err(error)),
+            Err(error) => {
+                self.page_keys = 0;
+                Some(Err(error))
+            }
         };
         match next {
             Some(Err(error)) => Some(Err(self.damage.take().unwrap_or(error))),

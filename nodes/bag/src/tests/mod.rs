@@ -2,6 +2,7 @@
 
 mod damage;
 mod foreign;
+mod recover;
 
 use std::{
     fs,

@@ -4,9 +4,10 @@ mod mcap_sink;
 mod sqlite_sink;
 
 use std::{
+    collections::HashSet,
     error::Error,
     fs::{self, File},
-    io,
+    io::{self, Write},
     path::{Path, PathBuf},
 };
 
@@ -75,6 +76,7 @@ pub struct BagWriter {
     storage: Storage,
     sink: Box<dyn Sink>,
     topics: Vec<TopicInfo>,
+    names: HashSet<String>,
     message_count: u64,
     range_ns: Option<(i64, i64)>,
 }
@@ -113,6 +115,7 @@ impl BagWriter {
             storage,
             sink,
             topics: Vec::new(),
+            names: HashSet::new(),
             message_count: 0,
             range_ns: None,
         })
@@ -134,7 +137,7 @@ impl BagWriter {
                 topic.type_name
             ));
         }
-        if self.topics.iter().any(|known| known.name == topic.name) {
+        if self.names.contains(&topic.name) {
             return wrong(format!("{} was added before", topic.name));
         }
         let info = TopicInfo {
@@ -150,6 +153,7 @@ impl BagWriter {
             BagQos::to_text(&info.offered_qos).map_err(|e| BagError::invalid("offered_qos", e))?;
         let added = self.sink.add_topic(&info, &qos);
         added.map_err(failed(&self.file, "add a topic to"))?;
+        self.names.insert(info.name.clone());
         self.topics.push(info);
         Ok(self.topics.len() - 1)
     }
@@ -196,13 +200,21 @@ impl BagWriter {
         let text = metadata.to_text().map_err(unfit)?;
         let finished = self.sink.finish(&embedded);
         finished.map_err(failed(&self.file, "finish"))?;
-        // Renamed into place, so that a crash leaves no half metadata.
-        let (path, unfinished) = (
-            self.folder.join("metadata.yaml"),
-            self.folder.join("metadata.yaml.tmp"),
-        );
-        fs::write(&unfinished, text).map_err(BagError::io(&unfinished, "write"))?;
-        fs::rename(&unfinished, &path).map_err(BagError::io(&path, "rename to"))
+        // The messages first, then whole metadata: a crash leaves neither without the other.
+        let path = self.folder.join("metadata.yaml");
+        let write = || -> io::Result<()> {
+            File::open(&self.file)?.sync_all()?;
+            let mut unfinished = tempfile::NamedTempFile::new_in(&self.folder)?;
+            unfinished.write_all(text.as_bytes())?;
+            unfinished.as_file().sync_all()?;
+            let readable = fs::metadata(&self.file)?.permissions();
+            unfinished.as_file().set_permissions(readable)?;
+            unfinished
+                .persist(&path)
+                .map(drop)
+                .map_err(|error| error.error)
+        };
+        write().map_err(BagError::io(&path, "write"))
     }
 
     fn metadata(&self) -> Metadata {

@@ -3,7 +3,9 @@
 use std::fs;
 use std::process::{Command, Output};
 
-use crate::{error, lattice, text};
+use crate::{error, json, lattice, text};
+
+const PARAMS: &str = concat!(env!("CARGO_MANIFEST_DIR"), "/../../params/bobcat.yaml");
 
 /// A call that may write files of a few kilobytes; `shell` sets what happens beyond.
 fn confined(shell: &str, arguments: &[&str]) -> Output {
@@ -69,4 +71,23 @@ fn a_report_that_cannot_be_written_is_refused_at_the_start() {
     }
     assert_eq!(fs::read_dir(directory.path()).unwrap().count(), 0);
     assert!(error(&["map", "info", "nowhere"]).contains("nowhere"));
+}
+
+#[test]
+fn a_cut_log_is_recovered() {
+    let directory = tempfile::tempdir().unwrap();
+    let at = |name: &str| directory.path().join(name).display().to_string();
+    let (log, out) = (at("log"), at("sound"));
+    json(&["simulate", "bobcat", "--out", &log, "--duration", "8"]);
+    let file = directory.path().join("log/log_0.mcap");
+    let whole = fs::read(&file).unwrap();
+    fs::write(&file, &whole[..whole.len() * 3 / 4]).unwrap();
+    let refused = lattice(&["replay", "--direct", &log, "--params", PARAMS]);
+    let errors = String::from_utf8_lossy(&refused.stderr);
+    assert!(errors.contains("truncated") && errors.contains("lattice bag recover"));
+    let recovered = json(&["bag", "recover", &log, "--out", &out]);
+    assert!(recovered["messages"].as_u64() > Some(10), "{recovered}");
+    assert!(recovered["told"][0].as_str().unwrap().contains("truncated"));
+    let report = json(&["replay", "--direct", &out, "--params", PARAMS]);
+    assert!(report["clouds_in_log"].as_u64() > Some(1), "{report}");
 }

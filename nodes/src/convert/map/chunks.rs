@@ -91,6 +91,7 @@ fn keyframe_of_parts(
             mean_offsets: payloads.mean_offsets,
             labels: payloads.labels,
             label_counts: payloads.label_counts,
+            history_checksum: stamp.history.0,
         }
     };
     (0..).zip(parts).map(chunk).collect()

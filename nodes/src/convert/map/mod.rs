@@ -8,9 +8,11 @@ use lattice_msgs::std_msgs::Header;
 use nalgebra::{Isometry3, Matrix3, Quaternion, Translation3, UnitQuaternion, Vector3};
 use thiserror::Error;
 
+mod checksum;
 mod chunks;
 mod voxels;
 
+pub use checksum::{History, changes_sum, sign};
 pub use chunks::{keyframe, keyframe_of_cells, update, update_of_cells};
 pub use voxels::{VoxelColumns, VoxelState, keys_from, main_label, voxels_from};
 
@@ -74,6 +76,8 @@ pub struct MapStamp<'a> {
     pub epoch: u64,
     /// State that the message describes.
     pub sequence: u64,
+    /// Checksum of the updates that led to it.
+    pub history: History,
     /// Geodetic origin of the map frame, where known.
     pub origin: Option<&'a GeoPoint>,
     /// Largest serialised chunk.

@@ -11,6 +11,7 @@ fn info(list: &VoxelList) -> LatticeInfo {
         header: Header::default(),
         epoch: 1,
         sequence: 0,
+        history: History::default(),
         origin: None,
         chunk_bytes: 60_000,
     };

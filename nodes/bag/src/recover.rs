@@ -1,0 +1,158 @@
+//! A damaged bag as a sound one: all that can be read of it, and what is lost.
+
+use std::collections::HashMap;
+use std::fs;
+use std::path::Path;
+
+use serde::Serialize;
+
+use super::{
+    BagError, BagReader, BagWriter, ReadOptions, Storage, TopicInfo, TopicSpec, WriterOptions,
+    metadata::Metadata,
+    sniff::{FileKind, identify},
+    split_list::{is_storage, list},
+};
+
+/// Damages that are told one by one.
+const MAX_TOLD: usize = 100;
+
+/// Outcome of a recovery.
+#[derive(Clone, Debug, Default, Serialize)]
+pub struct Recovered {
+    /// Messages of the new bag.
+    pub messages: u64,
+    /// Messages that the index or the metadata of the damaged one count, where either can be read; what
+    /// they claim is not checked.
+    pub claimed: Option<u64>,
+    /// Messages that were read and that no bag can hold.
+    pub refused: u64,
+    /// Damages, the first hundred in words.
+    pub damages: u64,
+    /// Words for them.
+    pub told: Vec<String>,
+}
+
+impl Recovered {
+    fn damage(&mut self, damage: impl ToString) {
+        self.damages += 1;
+        if self.told.len() < MAX_TOLD {
+            self.told.push(damage.to_string());
+        }
+    }
+}
+
+/// Writes what can be read of a bag as another one at `out`, which must not be there yet.
+///
+/// Chunks of MCAP and rows of SQLite that are damaged are left out; of MCAP without a summary, and
+/// of SQLite whose pages are, what precedes the damage is read.
+pub fn recover(bag: &Path, out: &Path) -> Result<Recovered, BagError> {
+    let mut recovered = Recovered::default();
+    let readers = readers(bag, &mut recovered)?;
+    let storage = match readers.iter().all(|reader| reader.is_sqlite()) {
+        true => Storage::Sqlite3,
+        false => Storage::Mcap,
+    };
+    let mut writer = BagWriter::create(out, storage, WriterOptions::default())?;
+    let mut known = HashMap::new();
+    for reader in &readers {
+        let mut place = |topic: &TopicInfo| add(&mut writer, &mut known, topic);
+        let places: Vec<Result<usize, BagError>> = reader.topics().iter().map(&mut place).collect();
+        for error in places.iter().filter_map(|place| place.as_ref().err()) {
+            recovered.damage(error);
+        }
+        let options = ReadOptions {
+            past_damage: true,
+            ..ReadOptions::default()
+        };
+        for message in reader.messages(&options)? {
+            let message = match message {
+                Ok(message) => message,
+                Err(damage) => {
+                    recovered.damage(damage);
+                    continue;
+                }
+            };
+            let Some(Ok(topic)) = places.get(message.topic) else {
+                recovered.refused += 1;
+                continue;
+            };
+            match writer.write(*topic, message.log_time_ns, &message.data) {
+                Ok(()) => recovered.messages += 1,
+                Err(BagError::Invalid { .. }) => recovered.refused += 1,
+                Err(error) => return Err(error),
+            }
+        }
+        recovered.refused += reader.implausible_rows();
+    }
+    writer.finish()?;
+    Ok(recovered)
+}
+
+/// Readers of the bag: one, or one of each storage file where the whole does not open.
+fn readers(bag: &Path, recovered: &mut Recovered) -> Result<Vec<BagReader>, BagError> {
+    let whole = match BagReader::open(bag) {
+        Ok(reader) => {
+            recovered.claimed = Some(reader.message_count());
+            return Ok(vec![reader]);
+        }
+        Err(error) if !fs::metadata(bag).is_ok_and(|found| found.is_dir()) => return Err(error),
+        Err(error) => error,
+    };
+    recovered.damage(&whole);
+    let metadata = Metadata::read(&bag.join("metadata.yaml")).ok();
+    recovered.claimed = metadata.map(|metadata| metadata.message_count);
+    let mut files = Vec::new();
+    for entry in list(bag)? {
+        let (file, name) = entry?;
+        if is_storage(&name) {
+            files.push(file);
+        }
+    }
+    files.sort();
+    let mut readers = Vec::new();
+    for file in files {
+        match BagReader::open(&file) {
+            Ok(reader) => readers.push(reader),
+            Err(error) => recovered.damage(error),
+        }
+    }
+    match readers.is_empty() {
+        true => Err(whole),
+        false => Ok(readers),
+    }
+}
+
+/// The topic of the new bag, added where it is not there yet.
+fn add(
+    writer: &mut BagWriter,
+    known: &mut HashMap<(String, String), usize>,
+    topic: &TopicInfo,
+) -> Result<usize, BagError> {
+    let key = (topic.name.clone(), topic.type_name.clone());
+    if let Some(place) = known.get(&key) {
+        return Ok(*place);
+    }
+    if topic.serialization_format != "cdr" {
+        let reason = format!("{} is in {:?}", topic.name, topic.serialization_format);
+        return Err(BagError::invalid("topic", reason));
+    }
+    let place = writer.add_topic(TopicSpec {
+        name: topic.name.clone(),
+        type_name: topic.type_name.clone(),
+        type_hash: topic.type_hash.clone(),
+        definition: topic.definition.clone(),
+        offered_qos: topic.offered_qos.clone(),
+    })?;
+    known.insert(key, place);
+    Ok(place)
+}
+
+/// True for a file of SQLite, packed or not.
+pub(crate) fn is_sqlite(path: &Path) -> bool {
+    let named = path.to_string_lossy().contains(".db3");
+    identify(path).map_or(named, |kind| match kind {
+        FileKind::Sqlite3 => true,
+        FileKind::Mcap => false,
+        FileKind::Zstd => named,
+    })
+}

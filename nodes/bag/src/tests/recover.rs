@@ -1,0 +1,122 @@
+//! Damaged and hostile bags: recovered, counted, and opened in little time.
+
+use std::collections::BTreeMap;
+use std::time::Instant;
+
+use rusqlite::Connection;
+
+use super::{foreign::write_foreign, *};
+
+#[test]
+fn a_damaged_chunk_costs_its_messages_and_no_others() {
+    let folder = tempfile::tempdir().unwrap();
+    let options = mcap::WriteOptions::new().compression(None);
+    let (path, written) = write_foreign(folder.path(), options, "cdr");
+    let mut bytes = fs::read(&path).unwrap();
+    let needle = &written[5].data[50..80];
+    let place = bytes.windows(30).position(|window| window == needle);
+    bytes[place.unwrap()] ^= 0x10;
+    fs::write(&path, &bytes).unwrap();
+    assert!(read_some(&path).1.is_some());
+    let out = folder.path().join("sound");
+    let recovered = recover(&path, &out).unwrap();
+    let sound = read(&out).unwrap();
+    assert_eq!(recovered.messages, sound.len() as u64);
+    assert_eq!((recovered.claimed, recovered.damages), (Some(12), 1));
+    assert!((9..12).contains(&sound.len()), "{}", sound.len());
+    assert!(sound.iter().all(|message| written.contains(message)));
+    assert_eq!(sound.last(), written.last(), "what follows the damage too");
+    assert!(recover(&path, &out).is_err(), "nothing is replaced");
+}
+
+#[test]
+fn cut_bags_of_either_storage_give_what_precedes_the_cut() {
+    let folder = tempfile::tempdir().unwrap();
+    for (storage, packing) in ALL {
+        let bag = folder.path().join("bag");
+        let written = write(&bag, storage, packing, 1000, 0);
+        if packing == Packing::File {
+            continue;
+        }
+        let file = storage_file(&bag);
+        let whole = fs::read(&file).unwrap();
+        fs::write(&file, &whole[..whole.len() * 2 / 3]).unwrap();
+        fs::write(bag.join("metadata.yaml"), "[".repeat(40_000)).unwrap();
+        assert!(read(&bag).is_err());
+        let out = folder.path().join(format!("{storage:?}{packing:?}"));
+        let start = Instant::now();
+        let recovered = recover(&bag, &out).unwrap();
+        assert!(start.elapsed().as_secs() < 10);
+        assert!(recovered.damages > 1, "{:?}", recovered.told);
+        let sound = read(&out).unwrap();
+        assert_eq!(sound, written[..sound.len()], "{storage:?} {packing:?}");
+        assert_eq!(recovered.messages, sound.len() as u64);
+        // The messages of an MCAP file are all in one chunk here.
+        assert!(storage == Storage::Mcap || sound.len() > 400);
+        let name = file.extension().unwrap();
+        assert_eq!(storage_file(&out).extension().unwrap(), name);
+    }
+}
+
+#[test]
+fn rows_that_are_no_messages_are_left_out_and_counted() {
+    let folder = tempfile::tempdir().unwrap();
+    let bag = folder.path().join("bag");
+    let written = write(&bag, Storage::Sqlite3, Packing::None, 60, 0);
+    let connection = Connection::open(storage_file(&bag)).unwrap();
+    let flips = "UPDATE messages SET topic_id = 4711 WHERE id = 3; \
+                 UPDATE messages SET timestamp = -timestamp WHERE id = 7; \
+                 UPDATE messages SET timestamp = 'soon' WHERE id = 9; \
+                 UPDATE messages SET topic_id = 'x' WHERE id = 11; \
+                 UPDATE messages SET data = x'00' WHERE id = 20;";
+    connection.execute_batch(flips).unwrap();
+    connection.close().unwrap();
+    let reader = BagReader::open(&bag).unwrap();
+    assert_eq!((reader.message_count(), reader.implausible_rows()), (55, 5));
+    assert_eq!(reader.start_ns(), Some(T0_NS));
+    let found = read(&bag).unwrap();
+    assert!(found.len() == 55 && found.iter().all(|message| written.contains(message)));
+    let out = folder.path().join("sound");
+    let recovered = recover(&bag, &out).unwrap();
+    assert_eq!((recovered.messages, recovered.refused), (55, 5));
+}
+
+#[test]
+fn counts_that_metadata_claim_are_not_believed() {
+    let folder = tempfile::tempdir().unwrap();
+    let bag = folder.path().join("bag");
+    let written = write(&bag, Storage::Mcap, Packing::None, 30, 0);
+    change_metadata(&bag, &bag, |metadata| {
+        metadata.message_count = u64::MAX;
+        metadata.files[0].message_count = u64::MAX;
+        metadata.topics_with_message_count[0].message_count = u64::MAX;
+    });
+    assert_eq!(BagReader::open(&bag).unwrap().message_count(), 30);
+    assert_eq!(read(&bag).unwrap(), written);
+}
+
+#[test]
+fn many_channels_take_little_time() {
+    let folder = tempfile::tempdir().unwrap();
+    let path = folder.path().join("many.mcap");
+    let file = std::io::BufWriter::new(fs::File::create(&path).unwrap());
+    let mut writer = mcap::WriteOptions::new().create(file).unwrap();
+    let schema = writer.add_schema("std_msgs/String", "ros2msg", b"string data");
+    let schema = schema.unwrap();
+    for i in 0..32_000 {
+        let topic = format!("/a_long_common_beginning_of_the_name_of_a_topic/{i}");
+        let channel = writer.add_channel(schema, &topic, "cdr", &BTreeMap::new());
+        let header = mcap::records::MessageHeader {
+            channel_id: channel.unwrap(),
+            sequence: 0,
+            log_time: i,
+            publish_time: i,
+        };
+        writer.write_to_known_channel(&header, &cdr(0, 4)).unwrap();
+    }
+    writer.finish().unwrap();
+    let start = Instant::now();
+    assert_eq!(read(&path).unwrap().len(), 32_000);
+    let taken = start.elapsed();
+    assert!(taken.as_secs() < 10, "{taken:?}");
+}

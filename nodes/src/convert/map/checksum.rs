@@ -1,0 +1,59 @@
+//! Checksum of the updates of an epoch, by which a follower knows that it has had them all and no others;
+//! `msgs/msg/LatticeMapUpdate.msg` says how it is made.
+
+use lattice_core::lattice::MortonKey;
+use lattice_msgs::lattice::LatticeMapUpdate;
+
+use super::{VoxelColumns, VoxelState, keys_from, voxels_from};
+
+/// Checksum of all updates up to a state.
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
+pub struct History(pub u64);
+
+impl History {
+    /// The checksum after one more update, whose chunks sum up to `sum`.
+    pub fn then(self, sequence: u64, sum: u64) -> History {
+        History(mix(self.0.wrapping_add(sequence).wrapping_add(sum)))
+    }
+}
+
+/// Sum over a chunk of an update; that of all its chunks does not depend on their order.
+pub fn changes_sum(voxels: &[(MortonKey, VoxelState)], removed: &[MortonKey]) -> u64 {
+    let voxels = voxels.iter().map(|(key, state)| {
+        let [x, y, z] = state.mean_offset.map(|v| u64::from(v.cast_unsigned()));
+        let mean = u64::from(state.count) | x << 32 | y << 48;
+        let label = z | u64::from(state.label) << 16 | u64::from(state.label_count) << 32;
+        mix(mix(mix(key.raw()) ^ mean) ^ label)
+    });
+    let removed = removed.iter().map(|key| mix(!key.raw()));
+    voxels.chain(removed).fold(0, u64::wrapping_add)
+}
+
+/// Notes in all chunks of an update what the map is after it; gives its checksum.
+pub fn sign(
+    chunks: &mut [LatticeMapUpdate],
+    before: History,
+    sequence: u64,
+    voxels: usize,
+) -> History {
+    let sum = |chunk: &LatticeMapUpdate| {
+        let columns = VoxelColumns::from(chunk);
+        let voxels = voxels_from(columns, usize::MAX).unwrap_or_default();
+        let removed = keys_from(columns.key_encoding, &chunk.removed_keys, usize::MAX);
+        changes_sum(&voxels, &removed.unwrap_or_default())
+    };
+    let sum = chunks.iter().map(sum).fold(0, u64::wrapping_add);
+    let history = before.then(sequence, sum);
+    for chunk in chunks {
+        chunk.voxels_total = voxels as u64;
+        chunk.history_checksum = history.0;
+    }
+    history
+}
+
+/// The finalizer of splitmix64 (Steele, Lea & Flood 2014).
+fn mix(z: u64) -> u64 {
+    let z = (z ^ z >> 30).wrapping_mul(0xbf58_476d_1ce4_e5b9);
+    let z = (z ^ z >> 27).wrapping_mul(0x94d0_49bb_1331_11eb);
+    z ^ z >> 31
+}
