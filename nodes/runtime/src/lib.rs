@@ -5,6 +5,9 @@
 mod action;
 mod clock;
 #[cfg(feature = "cyclone")]
+#[expect(unsafe_code, reason = "sockets of others are borrowed")]
+mod confine;
+#[cfg(feature = "cyclone")]
 #[expect(unsafe_code, reason = "Cyclone DDS has an interface in C")]
 mod cyclone;
 mod dds;

@@ -7,9 +7,9 @@ use std::sync::Mutex;
 use cyclors::dds_create_domain;
 
 use super::config::config;
-use super::confine::to_loopback;
 use super::entity::Entity;
 use super::log::{self, explained};
+use crate::confine::to_loopback;
 use crate::env::Network;
 use crate::sync::lock;
 

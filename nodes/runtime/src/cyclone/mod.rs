@@ -1,12 +1,11 @@
 //! The transport over Eclipse Cyclone DDS, whose C interface is the crate `cyclors`. All unsafe code of
-//! the project is here.
+//! the project is here and in `confine`.
 //!
 //! Endpoints are of "blob" topics: any type name, samples as serialised bytes.
 
 mod arrivals;
 mod blob;
 mod config;
-mod confine;
 mod discovery;
 mod domain;
 mod endpoint;
@@ -20,5 +19,4 @@ mod security;
 mod strangers;
 mod writer;
 
-pub(crate) use confine::to_loopback;
 pub(crate) use participant::Cyclone;

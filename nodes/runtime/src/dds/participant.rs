@@ -52,7 +52,7 @@ pub(super) struct Participant {
 /// so, which is unsafe, is built in.
 fn on_loopback<T>(make: impl FnOnce() -> T) -> T {
     #[cfg(feature = "cyclone")]
-    return crate::cyclone::to_loopback(make);
+    return crate::confine::to_loopback(make);
     #[cfg(not(feature = "cyclone"))]
     make()
 }
