@@ -2,6 +2,7 @@
 //!
 //! [`LatticeMapper`] is a state machine without I/O; [`node`] runs it behind DDS.
 
+mod autosave;
 mod counts;
 mod free_options;
 mod free_space;
@@ -10,6 +11,7 @@ pub mod node;
 mod occupancy;
 mod operations;
 mod options;
+mod outputs;
 mod refusal;
 mod report;
 mod services;

@@ -7,11 +7,13 @@ use std::thread::JoinHandle;
 use std::time::{Duration, SystemTime, UNIX_EPOCH};
 
 use lattice_msgs::geographic_msgs::GeoPointStamped;
-use lattice_msgs::lattice::{LatticeMap, LatticeMapUpdate};
+use lattice_msgs::lattice::LatticeMap;
 use lattice_msgs::sensor_msgs::PointCloud2;
 use lattice_msgs::std_msgs::Empty;
 
+use super::autosave::Autosave;
 use super::map_folder::MapFolder;
+use super::outputs::Outputs;
 use super::services::{self, Call};
 use super::{LatticeMapper, MapperOptions, MapperReport};
 use crate::compute::{Compute, ComputeLimits, Inbox};
@@ -20,7 +22,7 @@ use crate::start::{Finish, NodeError, warn_unused};
 use crate::{options, report};
 use lattice_runtime::logging::Throttle;
 use lattice_runtime::qos::Qos;
-use lattice_runtime::{Diagnostics, Level, Load, Losses, Node, Publisher, Runtime, lock};
+use lattice_runtime::{Diagnostics, Level, Load, Losses, Node, Runtime, lock};
 
 /// Chunks of a keyframe published in one update period: 3 MB.
 const CHUNKS_PER_ROUND: usize = 50;
@@ -34,6 +36,7 @@ enum Event {
     Update,
     Centers,
     Free,
+    Autosave,
     Reset,
     Call(Call),
     Finish,
@@ -58,8 +61,12 @@ pub fn start(runtime: &Runtime, name: &str) -> Result<Finish, NodeError> {
     let wishes = Arc::new(Wishes::default());
     let max_voxels = mapper.voxel_limit();
     let maps = MapFolder::from_params(params)?;
+    let mut machine = LatticeMapper::new(mapper, epoch())?;
+    let autosave = Autosave::start(params, &maps, &mut machine, max_voxels)?;
+    let autosave_period = autosave.period;
     let mut shell = Shell {
-        machine: LatticeMapper::new(mapper, epoch())?,
+        machine,
+        autosave,
         outputs: Outputs::open(&node, has_free)?,
         diagnostics: node.diagnostics(),
         lost: Arc::clone(&lost),
@@ -112,6 +119,10 @@ pub fn start(runtime: &Runtime, name: &str) -> Result<Finish, NodeError> {
         let free = inbox.clone();
         runtime.timer(free_period, move || notify(&free, Event::Free));
     }
+    if !autosave_period.is_zero() {
+        let autosave = inbox.clone();
+        runtime.timer(autosave_period, move || notify(&autosave, Event::Autosave));
+    }
     runtime.timer(centers_period, move || notify(&inbox, Event::Centers));
     warn_unused(params);
     Ok(Box::new(move || {
@@ -146,29 +157,10 @@ fn period(node: &Node, name: &str, default_s: f64) -> Result<Duration, NodeError
     Ok(Duration::from_secs_f64(seconds))
 }
 
-/// The topics that the node speaks on.
-struct Outputs {
-    map: Publisher<LatticeMap>,
-    updates: Publisher<LatticeMapUpdate>,
-    centers: Publisher<PointCloud2>,
-    free: Option<Publisher<LatticeMap>>,
-}
-
-impl Outputs {
-    fn open(node: &Node, has_free: bool) -> Result<Self, NodeError> {
-        let free = has_free.then(|| node.publisher("free", Qos::MAP));
-        Ok(Self {
-            map: node.publisher("map", Qos::MAP)?,
-            updates: node.publisher("map_updates", Qos::DELTAS)?,
-            centers: node.publisher("map_centers", Qos::LATCHED)?,
-            free: free.transpose()?,
-        })
-    }
-}
-
 /// State of the compute thread.
 struct Shell {
     machine: LatticeMapper,
+    autosave: Autosave,
     outputs: Outputs,
     diagnostics: Diagnostics,
     /// Clouds that found the inbox full.
@@ -211,6 +203,7 @@ impl Shell {
             Event::Update => self.update(),
             Event::Centers => self.centers(),
             Event::Free => self.free(),
+            Event::Autosave => self.autosave.save(&self.machine),
             Event::Reset => {
                 self.machine.reset(epoch());
                 self.replaced();
@@ -322,7 +315,9 @@ impl Shell {
         let not_published = updates + self.chunks_lost();
         let refused =
             counts.clouds_malformed + counts.clouds_wrong_frame + counts.clouds_stamp_jump;
-        let (level, message) = if counts.clouds_in == 0 {
+        let (level, message) = if let Some(problem) = self.autosave.problem() {
+            (Level::Error, problem)
+        } else if counts.clouds_in == 0 {
             (Level::Warn, "no cloud yet".to_owned())
         } else if counts.points_list_full > 0 {
             let limits = "`max_voxels` or `max_map_bytes`";
@@ -364,6 +359,7 @@ impl Shell {
         {
             log::error!("a map file was not completed");
         }
+        self.autosave.finish(&self.machine);
         self.update();
         let mut left = usize::MAX;
         while !self.pending.is_empty() && self.pending.len() < left {
