@@ -90,17 +90,17 @@ pub fn recover(bag: &Path, out: &Path) -> Result<Recovered, BagError> {
 
 /// Readers of the bag: one, or one of each storage file where the whole does not open.
 fn readers(bag: &Path, recovered: &mut Recovered) -> Result<Vec<BagReader>, BagError> {
+    let metadata = Metadata::read(&bag.join("metadata.yaml")).ok();
+    recovered.claimed = metadata.map(|metadata| metadata.message_count);
     let whole = match BagReader::open(bag) {
         Ok(reader) => {
-            recovered.claimed = Some(reader.message_count());
+            recovered.claimed = recovered.claimed.max(Some(reader.message_count()));
             return Ok(vec![reader]);
         }
         Err(error) if !fs::metadata(bag).is_ok_and(|found| found.is_dir()) => return Err(error),
         Err(error) => error,
     };
     recovered.damage(&whole);
-    let metadata = Metadata::read(&bag.join("metadata.yaml")).ok();
-    recovered.claimed = metadata.map(|metadata| metadata.message_count);
     let mut files = Vec::new();
     for entry in list(bag)? {
         let (file, name) = entry?;

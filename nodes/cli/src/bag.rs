@@ -46,7 +46,7 @@ fn print(recovered: &Recovered) {
     println!("{} messages recovered", recovered.messages);
     if let Some(claimed) = recovered.claimed {
         let lost = claimed.saturating_sub(recovered.messages);
-        println!("{lost} lost of {claimed} that its index counts");
+        println!("{lost} lost of {claimed} that its index or metadata count");
     }
     if recovered.refused > 0 {
         let refused = recovered.refused;

