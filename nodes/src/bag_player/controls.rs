@@ -64,6 +64,13 @@ impl Controls {
         self.sender.clone()
     }
 
+    /// Answers what waits at the end.
+    pub(super) fn obey_all(&self, playback: &mut Playback) {
+        while let Some(control) = self.next(Duration::ZERO) {
+            control(playback);
+        }
+    }
+
     /// The next one, waited for at most so long.
     pub(super) fn next(&self, patience: Duration) -> Option<Control> {
         self.waiting.recv_timeout(patience).ok()

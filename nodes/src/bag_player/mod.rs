@@ -89,8 +89,12 @@ pub fn run(arguments: impl IntoIterator<Item = String>) -> Result<(), NodeError>
     }
     log::info!("playing {bag}");
     let result = playback.play(&controls);
+    controls.obey_all(&mut playback);
     playback.flush();
     report::write(&report_file, &playback.report)?;
+    // Sends the last answers, for which the servers must still be there.
+    drop(runtime);
+    drop(controls);
     result
 }
 
