@@ -32,6 +32,8 @@ pub struct Qos {
     pub durability: Durability,
     /// Samples kept, at least 1.
     pub depth: usize,
+    /// Samples of a transient-local writer that readers which join late get; `depth` if none is given.
+    pub kept: Option<usize>,
 }
 
 impl Qos {
@@ -42,10 +44,11 @@ impl Qos {
     pub const SCANS: Qos = Qos::best_effort(20);
     /// INS, IMU and GNSS in: 2 s at 100 Hz, for interpolation.
     pub const INS: Qos = Qos::best_effort(200);
-    /// The map: room for the chunks of a keyframe, at most 60 kB each.
-    pub const MAP: Qos = Qos::latched(500);
-    /// Markers and cell centres: room for all chunks, at most 60 kB each.
-    pub const MARKERS: Qos = Qos::latched(500);
+    /// The map: room for the chunks of a keyframe, at most 60 kB each. Late joiners match as with every
+    /// latched topic, and get a new keyframe, not a history of old ones.
+    pub const MAP: Qos = Qos::latched(500).keeping(1);
+    /// Markers: room for all chunks, at most 60 kB each; all are drawn anew for late joiners.
+    pub const MARKERS: Qos = Qos::latched(500).keeping(1);
     /// Small results of which the last one counts: origin, calibration.
     pub const LATCHED: Qos = Qos::latched(1);
     /// Changes of the map since a keyframe.
@@ -77,6 +80,7 @@ impl Qos {
             reliability: Reliability::BestEffort,
             durability: Durability::Volatile,
             depth,
+            kept: None,
         }
     }
 
@@ -86,6 +90,7 @@ impl Qos {
             reliability: Reliability::Reliable,
             durability: Durability::Volatile,
             depth,
+            kept: None,
         }
     }
 
@@ -95,6 +100,25 @@ impl Qos {
             reliability: Reliability::Reliable,
             durability: Durability::TransientLocal,
             depth,
+            kept: None,
+        }
+    }
+
+    /// The same with fewer samples for late joiners.
+    pub const fn keeping(self, samples: usize) -> Qos {
+        Qos {
+            kept: Some(samples),
+            ..self
+        }
+    }
+
+    /// Samples that late joiners get: none of a volatile writer, else at least 1.
+    pub fn kept(&self) -> usize {
+        match self.durability {
+            Durability::Volatile => 0,
+            Durability::TransientLocal => {
+                self.kept.unwrap_or(self.depth).clamp(1, self.depth.max(1))
+            }
         }
     }
 
@@ -178,7 +202,15 @@ mod tests {
         assert_eq!(map_qos(&[relative, full]).unwrap().depth, 8);
         let reliability = ("qos.map.reliability", "best_effort");
         let qos = map_qos(&[reliability, ("qos.map.durability", "volatile")]);
-        assert_eq!(qos.unwrap(), Qos::best_effort(Qos::MAP.depth));
+        assert_eq!(qos.unwrap(), Qos::best_effort(Qos::MAP.depth).keeping(1));
+        assert_eq!(map_qos(&[]).unwrap().kept(), 1);
+        assert_eq!(
+            map_qos(&[("qos.map.durability", "volatile")])
+                .unwrap()
+                .kept(),
+            0
+        );
+        assert_eq!(Qos::latched(7).kept(), 7);
     }
 
     #[test]

@@ -170,5 +170,6 @@ fn offered(topic: &TopicInfo) -> Qos {
             false => Durability::Volatile,
         },
         depth: depth.clamp(1, MAX_DEPTH) as usize,
+        kept: None,
     }
 }

@@ -43,7 +43,8 @@ impl NativeQos {
 
     /// Of a reader or writer with its USER_DATA. Nothing is delivered inside the participant.
     pub(super) fn of_endpoint(qos: &Qos, user_data: &str) -> Self {
-        let depth = i32::try_from(qos.depth).unwrap_or(i32::MAX).max(1);
+        let count = |samples: usize| i32::try_from(samples).unwrap_or(i32::MAX).max(1);
+        let (depth, kept) = (count(qos.depth), count(qos.kept()));
         let keep_last = dds_history_kind_DDS_HISTORY_KEEP_LAST;
         let reliability = match qos.reliability {
             Reliability::BestEffort => dds_reliability_kind_DDS_RELIABILITY_BEST_EFFORT,
@@ -62,7 +63,7 @@ impl NativeQos {
             dds_qset_durability(native.0, durability);
             // The history for late joiners is another one, of one sample if nothing is said.
             let (samples, instances, each) = (UNLIMITED, UNLIMITED, UNLIMITED);
-            dds_qset_durability_service(native.0, 0, keep_last, depth, samples, instances, each);
+            dds_qset_durability_service(native.0, 0, keep_last, kept, samples, instances, each);
             dds_qset_writer_data_lifecycle(native.0, false);
             dds_qset_ignorelocal(native.0, dds_ignorelocal_kind_DDS_IGNORELOCAL_PARTICIPANT);
         }

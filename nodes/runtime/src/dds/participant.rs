@@ -110,7 +110,11 @@ impl Participant {
     }
 
     pub(super) fn writer(&self, of: &Recipe) -> Result<RawWriter, RuntimeError> {
-        let topic = topic(&self.participant, of, "publisher")?;
+        let history = match of.qos.kept() {
+            0 => of.qos.depth,
+            kept => kept,
+        };
+        let topic = topic(&self.participant, of, "publisher", history)?;
         self.publisher
             .create_datawriter_no_key(&topic, None)
             .map_err(|error| endpoint_error(&of.name, "publisher", &error))
@@ -190,7 +194,7 @@ fn raw_reader(
     subscriber: &rustdds::Subscriber,
     of: &Recipe,
 ) -> Result<RawReader, RuntimeError> {
-    let topic = topic(participant, of, "subscription")?;
+    let topic = topic(participant, of, "subscription", of.qos.depth)?;
     subscriber
         .create_simple_datareader_no_key(&topic, None)
         .map_err(|error| endpoint_error(&of.name, "subscription", &error))
@@ -200,12 +204,13 @@ fn topic(
     participant: &DomainParticipant,
     of: &Recipe,
     endpoint: &'static str,
+    history: usize,
 ) -> Result<Topic, RuntimeError> {
     let type_name = dds_type_name(&of.ros_type).ok_or_else(|| RuntimeError::TypeName {
         topic: of.name.clone(),
         type_name: of.ros_type.clone(),
     })?;
-    let (dds_name, policies) = (of.dds_name.clone(), policies(&of.qos));
+    let (dds_name, policies) = (of.dds_name.clone(), policies(&of.qos, history));
     participant
         .create_topic(dds_name, type_name, &policies, TopicKind::NoKey)
         .map_err(|error| endpoint_error(&of.name, endpoint, &error))
@@ -224,10 +229,13 @@ fn endpoint_error(
 }
 
 /// The resource limits are what bounds memory: RustDDS keeps 64 samples and more without them.
-fn policies(qos: &Qos) -> QosPolicies {
-    let depth = i32::try_from(qos.depth).unwrap_or(i32::MAX).max(1);
+///
+/// `history` is what a writer keeps of what has been acknowledged.
+fn policies(qos: &Qos, history: usize) -> QosPolicies {
+    let count = |samples: usize| i32::try_from(samples).unwrap_or(i32::MAX).max(1);
+    let (depth, history) = (count(qos.depth), count(history));
     let builder = QosPolicyBuilder::new()
-        .history(History::KeepLast { depth })
+        .history(History::KeepLast { depth: history })
         .resource_limits(ResourceLimits {
             max_samples: depth,
             max_instances: 1,

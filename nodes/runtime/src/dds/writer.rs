@@ -16,7 +16,6 @@ use super::payload::{Payload, PayloadSerializer};
 use super::{endpoint_id, sample_identity};
 use crate::error::RuntimeError;
 use crate::port::{Bytes, EndpointId, SampleId, SampleWriter, WriteRefusal};
-use crate::qos::Durability;
 use crate::sync::{Changed, lock};
 
 pub(super) type RawWriter = DataWriter<Payload, PayloadSerializer>;
@@ -26,7 +25,7 @@ pub(super) struct DdsWriter {
     id: EndpointId,
     pub recipe: Recipe,
     /// Samples kept for the next participant, at most.
-    depth: usize,
+    kept: usize,
     state: Mutex<State>,
     changed: Changed,
 }
@@ -52,10 +51,13 @@ impl DdsWriter {
         let raw = participant.writer(&recipe)?;
         let id = endpoint_id(raw.guid());
         // What is no ROS topic is the graph, which names endpoints of one participant.
-        let keeps = recipe.qos.durability == Durability::TransientLocal && recipe.is_ros_topic();
         Ok(Self {
             id,
-            depth: if keeps { recipe.qos.depth.max(1) } else { 0 },
+            kept: if recipe.is_ros_topic() {
+                recipe.qos.kept()
+            } else {
+                0
+            },
             recipe,
             state: Mutex::new(State {
                 wire_id: id,
@@ -108,14 +110,14 @@ impl DdsWriter {
 
     /// Keeps a sample that `raw` has taken. False: another writer has come, which has not got it.
     fn keep(&self, raw: &Arc<RawWriter>, sample: &Sample) -> bool {
-        if self.depth == 0 {
+        if self.kept == 0 {
             return true;
         }
         let mut state = lock(&self.state);
         if (state.raw.as_ref()).is_some_and(|now| !Arc::ptr_eq(now, raw)) {
             return false;
         }
-        while state.kept.len() >= self.depth {
+        while state.kept.len() >= self.kept {
             state.kept.pop_front();
         }
         state.kept.push_back(sample.clone());
