@@ -16,6 +16,7 @@ pub mod geographic_msgs;
 pub mod geometry_msgs;
 mod interface;
 pub mod lattice;
+pub mod lifecycle_msgs;
 pub mod nav_msgs;
 pub mod novatel_oem7_msgs;
 pub mod rcl_interfaces;

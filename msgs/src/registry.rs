@@ -3,8 +3,8 @@
 use crate::interface::RosMessage;
 use crate::{
     action, action_msgs, builtin_interfaces, calibration, diagnostic_msgs, geographic_msgs,
-    geometry_msgs, lattice, nav_msgs, novatel_oem7_msgs, rcl_interfaces, rmw_dds_common,
-    rosbag2_interfaces, rosgraph_msgs, sensor_msgs, std_msgs, std_srvs, tf2_msgs,
+    geometry_msgs, lattice, lifecycle_msgs, nav_msgs, novatel_oem7_msgs, rcl_interfaces,
+    rmw_dds_common, rosbag2_interfaces, rosgraph_msgs, sensor_msgs, std_msgs, std_srvs, tf2_msgs,
     unique_identifier_msgs, vision_msgs, visualization_msgs,
 };
 
@@ -27,6 +27,8 @@ pub fn visit_messages(visitor: &mut impl MessageVisitor) {
     geometry_msgs::visit_messages(visitor);
     lattice::visit_messages(visitor);
     lattice::visit_services(visitor);
+    lifecycle_msgs::visit_messages(visitor);
+    lifecycle_msgs::visit_services(visitor);
     nav_msgs::visit_messages(visitor);
     novatel_oem7_msgs::visit_messages(visitor);
     rcl_interfaces::visit_messages(visitor);

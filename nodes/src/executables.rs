@@ -2,7 +2,8 @@
 
 use std::process::ExitCode;
 
-use crate::start::{Finish, NodeError, Start};
+use crate::running::Running;
+use crate::start::{NodeError, Start};
 use crate::{enu_transformer, lattice_mapper, semantic_icp_server, voxel_marker_publisher};
 use lattice_runtime::Runtime;
 use lattice_runtime::logging;
@@ -37,8 +38,9 @@ pub fn run(
     }
     let name = args.node_name(name);
     let runtime = start_runtime(&name, args)?;
-    let finish = start(&runtime, &name)?;
-    run_until_stopped(&runtime, vec![finish])
+    let mut running = Running::default();
+    running.start(&runtime, &name, start)?;
+    running.until_stopped(&runtime)
 }
 
 /// Prints how an executable is used if its arguments ask for it.
@@ -71,17 +73,6 @@ pub fn start_runtime(name: &str, args: RosArgs) -> Result<Runtime, NodeError> {
         log::warn!("argument '{unknown}' has no meaning here; ROS arguments follow --ros-args");
     }
     Ok(Runtime::start(name, args)?)
-}
-
-/// Waits for the end, lets each node work off its inbox and publish the rest, and leaves.
-pub fn run_until_stopped(runtime: &Runtime, running: Vec<Finish>) -> Result<(), NodeError> {
-    runtime.shutdown_handle().wait();
-    // In the order in which data flows, so that each still gets what the one before publishes.
-    for finish in running {
-        runtime.work_off();
-        finish();
-    }
-    Ok(runtime.spin()?)
 }
 
 /// The whole `main` of an executable that is one node.

@@ -14,6 +14,7 @@ mod options;
 #[cfg(feature = "bags")]
 pub mod replay;
 pub mod report;
+pub mod running;
 pub mod semantic_icp_server;
 mod stamps;
 pub mod start;

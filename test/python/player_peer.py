@@ -11,18 +11,24 @@ from cyclone_peer import PATIENCE_S, Calls, Peer, qos
 import ros_idl as ros
 from cyclonedds.idl.types import float64, uint64
 
+
+
+def service(name, *fields):
+    return ros.service(f"rosbag2_interfaces/srv/{name}", *fields)
+
+
 SUCCESS = {"success": bool}
 SERVICES = {
-    "pause": ros.rosbag2("Pause"),
-    "resume": ros.rosbag2("Resume"),
-    "toggle_paused": ros.rosbag2("TogglePaused"),
-    "stop": ros.rosbag2("Stop"),
-    "is_paused": ros.rosbag2("IsPaused", None, {"paused": bool}),
-    "get_rate": ros.rosbag2("GetRate", None, {"rate": float64}),
-    "set_rate": ros.rosbag2("SetRate", {"rate": float64}, SUCCESS),
-    "play_next": ros.rosbag2("PlayNext", None, SUCCESS),
-    "burst": ros.rosbag2("Burst", {"num_messages": uint64}, {"actually_burst": uint64}),
-    "seek": ros.rosbag2("Seek", {"time": ros.Time}, SUCCESS),
+    "pause": service("Pause"),
+    "resume": service("Resume"),
+    "toggle_paused": service("TogglePaused"),
+    "stop": service("Stop"),
+    "is_paused": service("IsPaused", None, {"paused": bool}),
+    "get_rate": service("GetRate", None, {"rate": float64}),
+    "set_rate": service("SetRate", {"rate": float64}, SUCCESS),
+    "play_next": service("PlayNext", None, SUCCESS),
+    "burst": service("Burst", {"num_messages": uint64}, {"actually_burst": uint64}),
+    "seek": service("Seek", {"time": ros.Time}, SUCCESS),
 }
 
 

@@ -141,14 +141,28 @@ TriggerResponse = ros("std_srvs/srv/Trigger_Response", **ASKED, success=bool, me
 Clock = ros("rosgraph_msgs/msg/Clock", clock=Time)
 
 
-def rosbag2(name, request=None, response=None):
-    """Both halves of a service of a player; one without fields has a byte."""
+def service(name, request=None, response=None):
+    """Both halves of a service; one without fields has a byte."""
     halves = {"Request": request, "Response": response}
     empty = {"structure_needs_at_least_one_member": uint8}
-    return [
-        ros(f"rosbag2_interfaces/srv/{name}_{half}", **ASKED, **(fields or empty))
-        for half, fields in halves.items()
-    ]
+    return [ros(f"{name}_{half}", **ASKED, **(fields or empty)) for half, fields in halves.items()]
+
+
+State = ros("lifecycle_msgs/msg/State", id=uint8, label=str)
+Transition = ros("lifecycle_msgs/msg/Transition", id=uint8, label=str)
+TransitionDescription = ros(
+    "lifecycle_msgs/msg/TransitionDescription",
+    transition=Transition,
+    start_state=State,
+    goal_state=State,
+)
+TransitionEvent = ros(
+    "lifecycle_msgs/msg/TransitionEvent",
+    timestamp=uint64,
+    transition=Transition,
+    start_state=State,
+    goal_state=State,
+)
 
 
 String = ros("std_msgs/msg/String", data=str)

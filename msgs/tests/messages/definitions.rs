@@ -158,8 +158,8 @@ fn constants_agree() {
     visit_messages(&mut in_text);
     let mut in_text = in_text.0;
     let mut in_rust = Vec::new();
-    for package in "action_msgs calibration diagnostic_msgs lattice novatel_oem7_msgs \
-                    rcl_interfaces sensor_msgs visualization_msgs"
+    for package in "action_msgs calibration diagnostic_msgs lattice lifecycle_msgs \
+                    novatel_oem7_msgs rcl_interfaces sensor_msgs visualization_msgs"
         .split_whitespace()
     {
         let path = format!("{}/src/{package}.rs", env!("CARGO_MANIFEST_DIR"));

@@ -6,6 +6,7 @@ use clap::Args;
 
 use super::CliResult;
 use lattice_nodes::executables;
+use lattice_nodes::running::Running;
 use lattice_runtime::params_file;
 use lattice_runtime::ros_args::RosArgs;
 
@@ -55,10 +56,10 @@ impl Run {
             .into());
         }
         let runtime = executables::start_runtime("lattice", RosArgs::parse(arguments)?)?;
-        let mut running = Vec::new();
+        let mut running = Running::default();
         for (name, start) in nodes {
-            running.push(start(&runtime, name)?);
+            running.start(&runtime, name, *start)?;
         }
-        executables::run_until_stopped(&runtime, running)
+        running.until_stopped(&runtime)
     }
 }

@@ -148,6 +148,17 @@ impl Peers {
         let (topic, kind) = (&self.topic, self.peer_kind);
         log::log!(self.joins, "{topic}: {kind} matched ({count})");
         self.joined.notify();
+        self.call_back();
+    }
+
+    /// Calls for peers that are there as if one had joined.
+    pub(crate) fn meet_again(&self) {
+        if self.count() > 0 {
+            self.call_back();
+        }
+    }
+
+    fn call_back(&self) {
         // A callback may register another: not called under the lock.
         let callbacks = lock(&self.on_joined).clone();
         for callback in &callbacks {

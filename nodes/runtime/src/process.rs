@@ -1,10 +1,10 @@
 //! The runtime of a process: one participant, its threads, and the nodes on it.
 
-use std::sync::Arc;
+use std::sync::{Arc, Mutex};
 use std::time::{Duration, Instant};
 
 use lattice_msgs::diagnostic_msgs::DiagnosticArray;
-use smol::Timer;
+use smol::Task;
 
 use super::env::{Network, TransportKind};
 use super::error::RuntimeError;
@@ -16,6 +16,7 @@ use super::rosout;
 use super::security::Enclave;
 use super::shared::{Shared, deadline};
 use super::shutdown::{Shutdown, SignalWatch};
+use super::sync::lock;
 
 /// Between two messages on `/diagnostics`.
 const DIAGNOSTICS_PERIOD: Duration = Duration::from_secs(1);
@@ -30,9 +31,23 @@ pub struct Runtime {
     shared: Arc<Shared>,
     args: Arc<RosArgs>,
     main: Node,
-    main_default_name: String,
+    /// All nodes, by their names in the code.
+    nodes: Mutex<Vec<(String, Node)>>,
     _signals: SignalWatch,
     _rosout: Option<Arc<rosout::Listener>>,
+}
+
+/// A timer; dropping it ends it. None where the process ends already.
+#[must_use = "dropping a timer ends it"]
+pub struct Timer(Option<Task<()>>);
+
+impl Timer {
+    /// Lets it run until shutdown.
+    pub fn detach(self) {
+        if let Some(task) = self.0 {
+            task.detach();
+        }
+    }
 }
 
 impl Runtime {
@@ -65,8 +80,8 @@ impl Runtime {
         let mut runtime = Self {
             shared,
             args,
+            nodes: Mutex::new(vec![(default_node_name.to_owned(), main.clone())]),
             main,
-            main_default_name: default_node_name.to_owned(),
             _signals: signals,
             _rosout: None,
         };
@@ -77,31 +92,33 @@ impl Runtime {
         Ok(runtime)
     }
 
-    /// The node called `default_name` in the code; the main node if it is that.
+    /// The node called `default_name` in the code, made when it is first asked for.
     pub fn node(&self, default_name: &str) -> Result<Node, RuntimeError> {
-        if default_name == self.main_default_name {
-            return Ok(self.main.clone());
+        let mut nodes = lock(&self.nodes);
+        if let Some((_, node)) = nodes.iter().find(|(name, _)| name == default_name) {
+            return Ok(node.clone());
         }
-        node(&self.shared, &self.args, default_name)
+        let node = node(&self.shared, &self.args, default_name)?;
+        nodes.push((default_name.to_owned(), node.clone()));
+        Ok(node)
     }
 
-    /// Calls `callback` in every period of the system's steady clock, 1 ms at least, until shutdown.
+    /// Calls `callback` in every period of the system's steady clock, 1 ms at least, until shutdown or until
+    /// the timer is dropped.
     ///
     /// It runs on the io thread and must return at once. Periods that were missed are left out.
-    pub fn timer(&self, period: Duration, mut callback: impl FnMut() + Send + 'static) {
+    pub fn timer(&self, period: Duration, mut callback: impl FnMut() + Send + 'static) -> Timer {
         let period = period.max(MIN_TIMER_PERIOD);
         let task = self.shared.io.spawn(async move {
             let mut due = Instant::now().checked_add(period);
             while let Some(at) = due {
-                let _ = Timer::at(at).await;
+                let _ = smol::Timer::at(at).await;
                 callback();
                 let now = Instant::now();
                 due = at.checked_add(period).map(|next| next.max(now));
             }
         });
-        if let Some(task) = task {
-            task.detach();
-        }
+        Timer(task)
     }
 
     /// A handle to ask for shutdown.
@@ -146,7 +163,7 @@ impl Runtime {
                 .publisher::<DiagnosticArray>(self.main.id(), &topic, &Qos::DIAGNOSTICS)?;
         let shared = Arc::downgrade(&self.shared);
         let (clock, fqn) = (self.main.clock(), self.main.fqn().to_owned());
-        self.timer(DIAGNOSTICS_PERIOD, move || {
+        let timer = self.timer(DIAGNOSTICS_PERIOD, move || {
             if let Some(shared) = shared.upgrade() {
                 let transport = shared.transport_status(&fqn);
                 let message = shared.tasks.message(clock.now_ns(), transport);
@@ -154,6 +171,7 @@ impl Runtime {
                 let _ = publisher.publish(message);
             }
         });
+        timer.detach();
         Ok(())
     }
 }

@@ -9,6 +9,7 @@ use lattice_msgs::RosMessage;
 use lattice_msgs::cdr;
 
 use super::error::PublishError;
+use super::gate::Gate;
 use super::graph::NodeEndpoint;
 use super::local_bus::LocalEndpoint;
 use super::outbox::{Outbox, Serialize};
@@ -28,12 +29,11 @@ pub(crate) struct PublisherParts {
     pub _graph: NodeEndpoint,
 }
 
-/// The last messages of a latched publisher that no other process has listened to yet. They are
-/// serialised when the first one does; from then on DDS keeps them.
+/// The last messages of a latched publisher from while no other process listened. They are serialised
+/// when one does.
 pub(crate) struct Latch {
     kept: VecDeque<Serialize>,
     depth: usize,
-    heard: bool,
 }
 
 impl Latch {
@@ -42,7 +42,6 @@ impl Latch {
         Self {
             kept: VecDeque::new(),
             depth,
-            heard: false,
         }
     }
 }
@@ -57,7 +56,7 @@ impl PublisherParts {
             };
         };
         let mut latch = lock(latch);
-        if remote || latch.heard {
+        if remote {
             self.release(&mut latch);
             return self.writer.send(message);
         }
@@ -78,7 +77,6 @@ impl PublisherParts {
     }
 
     fn release(&self, latch: &mut Latch) {
-        latch.heard = true;
         for message in latch.kept.drain(..) {
             // A full queue is counted as a drop.
             let _ = self.writer.send(message);
@@ -89,6 +87,8 @@ impl PublisherParts {
 /// Publishes messages of one type on one topic. Clones share the publisher.
 pub struct Publisher<M> {
     pub(crate) parts: Arc<PublisherParts>,
+    /// The gate of a managed node.
+    pub(crate) gate: Option<Arc<Gate>>,
     pub(crate) message: PhantomData<fn(M)>,
 }
 
@@ -96,6 +96,7 @@ impl<M> Clone for Publisher<M> {
     fn clone(&self) -> Self {
         Self {
             parts: Arc::clone(&self.parts),
+            gate: self.gate.clone(),
             message: PhantomData,
         }
     }
@@ -105,8 +106,12 @@ impl<M: RosMessage> Publisher<M> {
     /// Publishes a message; returns at once.
     ///
     /// Subscriptions in this runtime get the same `Arc`. For others it is queued, to be serialized
-    /// on the publisher thread; a full queue is an error, and counted.
+    /// on the publisher thread; a full queue is an error, and counted. A managed node that is not
+    /// active publishes nothing.
     pub fn publish(&self, message: impl Into<Arc<M>>) -> Result<(), PublishError> {
+        if self.gate.as_ref().is_some_and(|gate| !gate.is_open()) {
+            return Ok(());
+        }
         let message: Arc<M> = message.into();
         self.parts.local.publish(&(Arc::clone(&message) as _));
         self.parts

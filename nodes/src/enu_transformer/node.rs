@@ -83,15 +83,16 @@ pub fn start(runtime: &Runtime, name: &str) -> Result<Finish, NodeError> {
     let (latched, transforms) = (Qos::TF_STATIC_LISTENER, |m| Event::Transforms(m, true));
     inputs.push(poses.subscribe(&node, "/tf_static", latched, transforms)?);
     losses.watch(inputs.iter().chain(&clouds));
-    runtime.timer(Duration::from_millis(200), move || {
+    let ticks = runtime.timer(Duration::from_millis(200), move || {
         // A full inbox is busy enough to look at its queue anyway.
         let _ = inbox.send(Event::Tick, 0);
     });
     log::info!("INS source {source}; azimuth 90 deg is yaw 0 (east)");
     warn_unused(params);
     Ok(Box::new(move || {
-        drop((inputs, clouds));
+        drop((inputs, clouds, ticks));
         compute.finish_with(Event::Finish);
+        Box::new(())
     }))
 }
 

@@ -114,20 +114,21 @@ pub fn start(runtime: &Runtime, name: &str) -> Result<Finish, NodeError> {
     inputs.watch([&points, &origins, &asked]);
     let calls = services::serve(&node, &inbox, Event::Call, maps, max_voxels)?;
     let updates = inbox.clone();
-    runtime.timer(update_period, move || notify(&updates, Event::Update));
+    let mut timers = vec![runtime.timer(update_period, move || notify(&updates, Event::Update))];
     if has_free {
         let free = inbox.clone();
-        runtime.timer(free_period, move || notify(&free, Event::Free));
+        timers.push(runtime.timer(free_period, move || notify(&free, Event::Free)));
     }
     if !autosave_period.is_zero() {
         let autosave = inbox.clone();
-        runtime.timer(autosave_period, move || notify(&autosave, Event::Autosave));
+        timers.push(runtime.timer(autosave_period, move || notify(&autosave, Event::Autosave)));
     }
-    runtime.timer(centers_period, move || notify(&inbox, Event::Centers));
+    timers.push(runtime.timer(centers_period, move || notify(&inbox, Event::Centers)));
     warn_unused(params);
     Ok(Box::new(move || {
-        drop((points, origins, asked, request_keyframe, reset, calls));
+        drop((points, origins, asked, timers));
         compute.finish_with(Event::Finish);
+        Box::new((request_keyframe, reset, calls))
     }))
 }
 

@@ -137,25 +137,28 @@ pub fn start(runtime: &Runtime, name: &str) -> Result<Finish, NodeError> {
             }
         })?;
     let (to, look) = (inbox.clone(), inbox.clone());
-    let action = node.action_server::<CalibrateAction>(
+    let action = Arc::new(node.action_server::<CalibrateAction>(
         "~/calibrate",
         ActionLimits::default(),
         move |goal, handle| to.send(Event::Goal(Box::new(goal), handle), 0),
         move |_| notify(&look, Event::Look),
-    )?;
+    )?);
+    let goals = Arc::clone(&action);
     let ticks = inbox.clone();
-    runtime.timer(Duration::from_secs_f64(1.0 / rate_hz), move || {
+    let ticks = runtime.timer(Duration::from_secs_f64(1.0 / rate_hz), move || {
         notify(&ticks, Event::Tick);
     });
-    runtime.timer(DIAGNOSE, move || {
-        action.expire();
+    let seconds = runtime.timer(DIAGNOSE, move || {
+        goals.expire();
         notify(&inbox, Event::Diagnose);
     });
     warn_unused(params);
     Ok(Box::new(move || {
-        drop((maps, updates, clouds, sessions, infos, service));
+        drop((maps, updates, clouds, sessions, infos, ticks));
         compute.finish_with(Event::Finish);
         thread.finish();
+        drop(seconds);
+        Box::new((service, action))
     }))
 }
 

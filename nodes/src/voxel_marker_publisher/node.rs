@@ -89,13 +89,14 @@ pub fn start(runtime: &Runtime, name: &str) -> Result<Finish, NodeError> {
     publisher.on_subscriber_joined(move || {
         let _ = joined.send(Event::Redraw, 0);
     });
-    runtime.timer(Duration::from_secs_f64(1.0 / rate_hz), move || {
+    let draws = runtime.timer(Duration::from_secs_f64(1.0 / rate_hz), move || {
         let _ = inbox.send(Event::Draw, 0);
     });
     warn_unused(params);
     Ok(Box::new(move || {
-        drop((maps, updates));
+        drop((maps, updates, draws));
         compute.finish_with(Event::Finish);
+        Box::new(())
     }))
 }
 

@@ -16,14 +16,14 @@ const LAYERS: [(&str, &str); 3] = [
     (
         "nodes/src",
         "files convert stamps start report compute options map_follower enu_transformer lattice_mapper \
-         voxel_marker_publisher semantic_icp_server replay executables bag_player",
+         voxel_marker_publisher semantic_icp_server replay running executables bag_player",
     ),
     (
         "nodes/runtime/src",
         "sync names param_value params_file ros_args params security env logging qos error shutdown \
-         task_thread clock diagnostics loopback_domain port confine dds cyclone peers endpoints outbox graph \
+         task_thread clock diagnostics loopback_domain port confine dds cyclone peers gate endpoints outbox graph \
          local_bus publisher subscription service rosout shared node param_services action tf \
-         process",
+         lifecycle process",
     ),
 ];
 

@@ -5,6 +5,7 @@ mod browser;
 mod calibrate;
 mod evaluate;
 mod files;
+mod lifecycle;
 mod map;
 mod nodes;
 mod paper;

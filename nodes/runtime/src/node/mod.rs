@@ -9,6 +9,7 @@ use lattice_msgs::RosMessage;
 use super::clock::Clock;
 use super::diagnostics::Diagnostics;
 use super::error::RuntimeError;
+use super::gate::Gate;
 use super::graph::NodeId;
 use super::names::{self, NameKind};
 use super::params::Params;
@@ -34,6 +35,7 @@ struct Inner {
     params: Arc<Params>,
     clock: Clock,
     max_message_bytes: usize,
+    gate: Arc<Gate>,
 }
 
 impl Node {
@@ -70,6 +72,7 @@ impl Node {
             params,
             clock,
             max_message_bytes,
+            gate: Arc::default(),
         };
         Ok(Self {
             inner: Arc::new(inner),
@@ -82,6 +85,11 @@ impl Node {
 
     pub(crate) fn id(&self) -> NodeId {
         self.inner.id
+    }
+
+    /// The gate in front of its topics.
+    pub(crate) fn gate(&self) -> &Gate {
+        &self.inner.gate
     }
 
     /// Name without namespace.
@@ -133,7 +141,10 @@ impl Node {
     ) -> Result<Publisher<M>, RuntimeError> {
         let resolved = self.resolve(topic)?;
         let qos = qos.with_overrides(&self.inner.params, &resolved, topic)?;
-        self.inner.shared.publisher(self.id(), &resolved, &qos)
+        let mut publisher = self.inner.shared.publisher(self.id(), &resolved, &qos)?;
+        self.inner.gate.watch(&publisher.parts.peers);
+        publisher.gate = Some(Arc::clone(&self.inner.gate));
+        Ok(publisher)
     }
 
     /// A publisher of CDR bytes of the type, such as `sensor_msgs/msg/Imu`, on a full topic name.
@@ -189,11 +200,17 @@ impl Node {
         topic: &str,
         qos: Qos,
         load: Load,
-        handler: impl FnMut(Sample<'_, M>, &Arc<Stats>) + Send + 'static,
+        mut handler: impl FnMut(Sample<'_, M>, &Arc<Stats>) + Send + 'static,
     ) -> Result<Subscription, RuntimeError> {
         let resolved = self.resolve(topic)?;
         let qos = qos.with_overrides(&self.inner.params, &resolved, topic)?;
         let max = self.inner.max_message_bytes;
+        let gate = Arc::clone(&self.inner.gate);
+        let handler = move |sample: Sample<'_, M>, stats: &Arc<Stats>| {
+            if gate.is_open() {
+                handler(sample, stats);
+            }
+        };
         self.inner
             .shared
             .subscribe(self.id(), &resolved, &qos, load, max, handler)

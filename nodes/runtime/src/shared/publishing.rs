@@ -14,7 +14,7 @@ use crate::outbox::WhenFull;
 use crate::peers::Peers;
 use crate::port::PortTopic;
 use crate::publisher::{Latch, Publisher, PublisherParts, RawPublisher};
-use crate::qos::{Durability, Qos};
+use crate::qos::Qos;
 use crate::sync::lock;
 
 impl Shared {
@@ -27,10 +27,11 @@ impl Shared {
         let of = (M::TYPE, None);
         let parts = self.publisher_parts(node, topic, of, qos, WhenFull::Drop, |peers| {
             let topic = self.bus.topic(topic);
-            topic.join_publisher::<M>(peers, latch_depth(qos))
+            topic.join_publisher::<M>(peers, qos.kept())
         })?;
         Ok(Publisher {
             parts,
+            gate: None,
             message: PhantomData,
         })
     }
@@ -46,7 +47,7 @@ impl Shared {
         let of = (type_name, type_hash);
         let parts = self.publisher_parts(node, topic, of, qos, WhenFull::Wait, |peers| {
             let topic = self.bus.topic(topic);
-            topic.join_raw_publisher(type_name, peers, latch_depth(qos))
+            topic.join_raw_publisher(type_name, peers, qos.kept())
         })?;
         Ok(RawPublisher { parts })
     }
@@ -75,8 +76,7 @@ impl Shared {
             writer,
             peers: Arc::clone(&peers),
             local,
-            latch: (qos.durability == Durability::TransientLocal)
-                .then(|| Mutex::new(Latch::new(latch_depth(qos)))),
+            latch: (qos.kept() > 0).then(|| Mutex::new(Latch::new(qos.kept()))),
             shutdown: self.shutdown.clone(),
             _graph: self.graph.join(node, EndpointKind::Writer, id),
         });
@@ -92,12 +92,5 @@ impl Shared {
         }));
         self.endpoints.register(id, &peers);
         Ok(parts)
-    }
-}
-
-fn latch_depth(qos: &Qos) -> usize {
-    match qos.durability {
-        Durability::TransientLocal => qos.depth.max(1),
-        Durability::Volatile => 0,
     }
 }

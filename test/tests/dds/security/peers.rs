@@ -50,9 +50,10 @@ pub fn talk(
         .subscribe(&topic(domain), QOS, Load::Small, handler)
         .unwrap();
     let data = word.to_owned();
-    runtime.timer(PERIOD, move || {
+    let timer = runtime.timer(PERIOD, move || {
         let _ = out.publish(RosString { data: data.clone() });
     });
+    timer.detach();
     subscription
 }
 

@@ -116,7 +116,9 @@ fn a_subscription_hears_this_process_and_others() {
     let (here, heard) = two.hear("chatter", Qos::DEFAULT, Load::Small);
     let inside = two.to.publisher("chatter", Qos::DEFAULT).unwrap();
     let outside = two.publisher("chatter", Qos::DEFAULT);
-    wait_until(&two.b, move || here.publisher_count() == 2);
+    let here = Arc::new(here);
+    let counted = Arc::clone(&here);
+    wait_until(&two.b, move || counted.publisher_count() == 2);
     wait_for_subscriber!(outside);
     for publisher in [inside, outside] {
         publisher.publish(text("once")).unwrap();

@@ -136,7 +136,7 @@ mod renewal;
 /// Waits until `reached` is true, asked on a timer of the runtime.
 fn wait_until(runtime: &Runtime, mut reached: impl FnMut() -> bool + Send + 'static) {
     let (sender, done) = channel();
-    runtime.timer(Duration::from_millis(5), move || {
+    let _timer = runtime.timer(Duration::from_millis(5), move || {
         if reached() {
             let _ = sender.send(());
         }

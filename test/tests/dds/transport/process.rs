@@ -112,7 +112,7 @@ fn simulated_time_follows_the_clock() {
     assert_eq!(clock.now_ns(), 0);
     let stamp_ns = 1_234_567_890_123;
     // Best effort: what is sent before both sides know each other is lost.
-    two.a.timer(Duration::from_millis(5), move || {
+    let _timer = two.a.timer(Duration::from_millis(5), move || {
         let clock = Time::from_ns(stamp_ns);
         let _ = publisher.publish(Clock { clock });
     });
@@ -143,7 +143,7 @@ fn shutdown_stops_timers_sends_what_is_queued_and_leaves_at_once() {
     let (subscription, heard) = two.hear("last", qos, Load::Large);
     wait_for_subscriber!(publisher);
     let (ticks, ticked) = channel();
-    two.a.timer(Duration::from_millis(1), move || {
+    let _timer = two.a.timer(Duration::from_millis(1), move || {
         let _ = ticks.send(());
     });
     ticked.recv_timeout(PATIENCE).unwrap();

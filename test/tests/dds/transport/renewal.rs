@@ -56,7 +56,7 @@ fn stop_and_go(start: impl FnOnce(&TestDomain) -> Echo, stop: Duration) {
     let (_map, maps) = hear::<RosString>(&node, "/map", Qos::latched(1), Load::Small);
     let phrase = Arc::new(Mutex::new(String::new()));
     let (spoken, speaker) = (Arc::clone(&phrase), talk.clone());
-    us.timer(Duration::from_millis(50), move || {
+    let _timer = us.timer(Duration::from_millis(50), move || {
         speaker.publish(text(spoken.lock().unwrap())).unwrap();
     });
     let echo = start(&domain);

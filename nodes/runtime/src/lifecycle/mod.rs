@@ -1,0 +1,166 @@
+//! Managed nodes: services and events as `rclcpp_lifecycle` has them.
+
+mod machine;
+
+pub use machine::Step;
+
+use std::sync::{Arc, Mutex};
+use std::time::{SystemTime, UNIX_EPOCH};
+
+use lattice_msgs::lifecycle_msgs::{
+    ChangeState, ChangeStateRequest, ChangeStateResponse, GetAvailableStates,
+    GetAvailableStatesResponse, GetAvailableTransitions, GetAvailableTransitionsResponse, GetState,
+    GetStateResponse, TransitionEvent,
+};
+use smol::channel::{Receiver, Sender, unbounded};
+use smol::future::{block_on, or};
+
+use crate::error::RuntimeError;
+use crate::node::Node;
+use crate::publisher::Publisher;
+use crate::qos::Qos;
+use crate::service::{Reply, Server};
+use crate::shutdown::Shutdown;
+use crate::sync::lock;
+use machine::{Edge, Machine};
+
+/// A request to change the state of one of the managed nodes of a process.
+pub struct ChangeRequest {
+    /// Index of the node, as it was given to [`Lifecycle::serve`].
+    pub node: usize,
+    request: ChangeStateRequest,
+    reply: Reply<ChangeStateResponse>,
+}
+
+/// Requests to the managed nodes of a process. Each node has one under way at a time.
+pub struct ChangeRequests {
+    sender: Sender<ChangeRequest>,
+    waiting: Receiver<ChangeRequest>,
+}
+
+impl Default for ChangeRequests {
+    fn default() -> Self {
+        let (sender, waiting) = unbounded();
+        Self { sender, waiting }
+    }
+}
+
+impl ChangeRequests {
+    /// Blocks until the next one; none once the end is asked for.
+    pub fn next(&self, shutdown: &Shutdown) -> Option<ChangeRequest> {
+        let ended = async {
+            shutdown.requested().await;
+            None
+        };
+        block_on(or(ended, async { self.waiting.recv().await.ok() }))
+    }
+}
+
+/// A managed node: it begins unconfigured, and others take it from state to state.
+pub struct Lifecycle {
+    node: Node,
+    machine: Arc<Mutex<Machine>>,
+    events: Publisher<TransitionEvent>,
+    _servers: Vec<Server>,
+}
+
+impl Lifecycle {
+    /// Serves the five services of the node, which is silent and deaf until it is activated; requests to
+    /// change its state go to `requests` under the number `index`.
+    pub fn serve(
+        node: &Node,
+        index: usize,
+        requests: &ChangeRequests,
+    ) -> Result<Self, RuntimeError> {
+        let machine = Arc::new(Mutex::new(Machine::new()));
+        let events = node.publisher("~/transition_event", Qos::DEFAULT)?;
+        let events = Publisher {
+            gate: None,
+            ..events
+        };
+        node.gate().set(false);
+        let sender = requests.sender.clone();
+        let change = move |request, reply| {
+            // The other end lives as long as the process hears requests.
+            let _ = sender.try_send(ChangeRequest {
+                node: index,
+                request,
+                reply,
+            });
+        };
+        let state = Arc::clone(&machine);
+        let edges = Arc::clone(&machine);
+        let servers = vec![
+            node.service_later::<ChangeState>("~/change_state", change)?,
+            node.service::<GetState>("~/get_state", move |_| GetStateResponse {
+                current_state: lock(&state).state(),
+            })?,
+            node.service::<GetAvailableStates>("~/get_available_states", |_| {
+                GetAvailableStatesResponse {
+                    available_states: machine::states(),
+                }
+            })?,
+            node.service::<GetAvailableTransitions>("~/get_available_transitions", move |_| {
+                let available = lock(&edges).available().map(Edge::message).collect();
+                GetAvailableTransitionsResponse {
+                    available_transitions: available,
+                }
+            })?,
+            node.service::<GetAvailableTransitions>("~/get_transition_graph", |_| {
+                GetAvailableTransitionsResponse {
+                    available_transitions: machine::graph(),
+                }
+            })?,
+        ];
+        Ok(Self {
+            node: node.clone(),
+            machine,
+            events,
+            _servers: servers,
+        })
+    }
+
+    /// Does what a request asks: `work` takes the step, and says what failed.
+    pub fn change(&self, change: ChangeRequest, work: impl FnOnce(Step) -> Result<(), String>) {
+        let wanted = &change.request.transition;
+        let begun = lock(&self.machine).begin(wanted);
+        let name = self.node.fqn();
+        let (Some(edge), Some(step)) = (begun, begun.and_then(Edge::step)) else {
+            let state = lock(&self.machine).state().label;
+            log::error!("{name}: no transition {wanted:?} from the state {state}");
+            change.reply.send(ChangeStateResponse { success: false });
+            return;
+        };
+        self.tell(edge);
+        if matches!(step, Step::Deactivate | Step::Shutdown) {
+            self.node.gate().set(false);
+        }
+        let result = work(step);
+        if let Err(problem) = &result {
+            log::error!("{name}: {problem}");
+        }
+        let success = result.is_ok();
+        if let Some(edge) = lock(&self.machine).end(success) {
+            self.tell(edge);
+        }
+        if success && step == Step::Activate {
+            self.node.gate().set(true);
+        }
+        log::info!("{name}: {}", lock(&self.machine).state().label);
+        change.reply.send(ChangeStateResponse { success });
+    }
+
+    fn tell(&self, edge: Edge) {
+        let since = SystemTime::now().duration_since(UNIX_EPOCH);
+        let edge = edge.message();
+        let event = TransitionEvent {
+            timestamp: since.map_or(0, |since| since.as_nanos() as u64),
+            transition: edge.transition,
+            start_state: edge.start_state,
+            goal_state: edge.goal_state,
+        };
+        if let Err(error) = self.events.publish(event) {
+            log::debug!("transition not told of: {error}");
+        }
+    }
+}
