@@ -5,9 +5,12 @@ use std::time::{Duration, Instant};
 
 use lattice_msgs::diagnostic_msgs::DiagnosticArray;
 use smol::Timer;
+use smol::channel::{Receiver, Sender, unbounded};
+use smol::future;
 
 use super::env::{Network, TransportKind};
 use super::error::RuntimeError;
+use super::logger_services;
 use super::node::Node;
 use super::param_services;
 use super::qos::Qos;
@@ -16,6 +19,7 @@ use super::rosout;
 use super::security::Enclave;
 use super::shared::{Shared, deadline};
 use super::shutdown::{Shutdown, SignalWatch};
+use super::type_description;
 
 /// Between two messages on `/diagnostics`.
 const DIAGNOSTICS_PERIOD: Duration = Duration::from_secs(1);
@@ -85,23 +89,16 @@ impl Runtime {
         node(&self.shared, &self.args, default_name)
     }
 
-    /// Calls `callback` in every period of the system's steady clock, 1 ms at least, until shutdown.
+    /// Calls `callback` in every period of the system's steady clock, 1 ms at least, until shutdown; never
+    /// with a period of zero. The period can be changed by what is returned.
     ///
     /// It runs on the io thread and must return at once. Periods that were missed are left out.
-    pub fn timer(&self, period: Duration, mut callback: impl FnMut() + Send + 'static) {
-        let period = period.max(MIN_TIMER_PERIOD);
-        let task = self.shared.io.spawn(async move {
-            let mut due = Instant::now().checked_add(period);
-            while let Some(at) = due {
-                let _ = Timer::at(at).await;
-                callback();
-                let now = Instant::now();
-                due = at.checked_add(period).map(|next| next.max(now));
-            }
-        });
-        if let Some(task) = task {
+    pub fn timer(&self, period: Duration, callback: impl FnMut() + Send + 'static) -> Period {
+        let (sender, changes) = unbounded();
+        if let Some(task) = self.shared.io.spawn(tick(period, changes, callback)) {
             task.detach();
         }
+        Period(sender)
     }
 
     /// A handle to ask for shutdown.
@@ -146,7 +143,7 @@ impl Runtime {
                 .publisher::<DiagnosticArray>(self.main.id(), &topic, &Qos::DIAGNOSTICS)?;
         let shared = Arc::downgrade(&self.shared);
         let (clock, fqn) = (self.main.clock(), self.main.fqn().to_owned());
-        self.timer(DIAGNOSTICS_PERIOD, move || {
+        let _ = self.timer(DIAGNOSTICS_PERIOD, move || {
             if let Some(shared) = shared.upgrade() {
                 let transport = shared.transport_status(&fqn);
                 let message = shared.tasks.message(clock.now_ns(), transport);
@@ -158,6 +155,53 @@ impl Runtime {
     }
 }
 
+/// The period of a timer. The timer goes on when it is dropped.
+#[derive(Clone)]
+pub struct Period(Sender<Duration>);
+
+impl Period {
+    /// Begins another period now; zero: none.
+    pub fn set(&self, period: Duration) {
+        // It ends with the runtime only.
+        let _ = self.0.try_send(period);
+    }
+}
+
+async fn tick(mut period: Duration, changes: Receiver<Duration>, mut callback: impl FnMut()) {
+    let next = |at: Instant, period: Duration| match period.is_zero() {
+        true => None,
+        false => at.checked_add(period.max(MIN_TIMER_PERIOD)),
+    };
+    let mut due = next(Instant::now(), period);
+    loop {
+        let timer = async {
+            match due {
+                Some(at) => drop(Timer::at(at).await),
+                None => future::pending().await,
+            }
+            None
+        };
+        let change = async {
+            match changes.recv().await {
+                Ok(period) => Some(period),
+                Err(_) => future::pending().await,
+            }
+        };
+        let now = Instant::now;
+        due = match (future::or(change, timer).await, due) {
+            (Some(changed), _) => {
+                period = changed;
+                next(now(), period)
+            }
+            (None, at) => {
+                callback();
+                at.and_then(|at| next(at, period))
+                    .map(|next| next.max(now()))
+            }
+        };
+    }
+}
+
 /// A node with its parameter services.
 fn node(
     shared: &Arc<Shared>,
@@ -165,6 +209,8 @@ fn node(
     default_name: &str,
 ) -> Result<Node, RuntimeError> {
     let node = Node::new(shared, args, default_name)?;
+    shared.keep(type_description::serve(&node)?.into_iter().collect());
+    shared.keep(logger_services::serve(&node)?.into());
     shared.keep(param_services::serve(&node, node.params())?);
     Ok(node)
 }

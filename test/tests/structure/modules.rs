@@ -22,8 +22,8 @@ const LAYERS: [(&str, &str); 3] = [
         "nodes/runtime/src",
         "sync names param_value params_file ros_args params security env logging qos error shutdown \
          task_thread clock diagnostics loopback_domain port confine dds cyclone peers endpoints outbox graph \
-         local_bus publisher subscription service rosout shared node param_services action tf \
-         process",
+         local_bus publisher subscription service rosout shared node param_services \
+         logger_services type_description action tf process",
     ),
 ];
 
