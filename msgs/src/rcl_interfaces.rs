@@ -364,7 +364,7 @@ pub struct GetLoggerLevels;
 /// Loggers whose levels are asked for.
 #[derive(Clone, Debug, Default, PartialEq, Serialize, Deserialize)]
 pub struct GetLoggerLevelsRequest {
-    /// Which loggers.
+    /// Names of loggers.
     pub names: Vec<String>,
 }
 

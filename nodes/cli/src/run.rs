@@ -55,6 +55,8 @@ impl Run {
             .into());
         }
         let runtime = executables::start_runtime("lattice", RosArgs::parse(arguments)?)?;
+        // The node of the process itself has only the parameters of every node.
+        runtime.node("lattice")?.params().open(|_| Ok(()));
         let mut running = Vec::new();
         for (name, start) in nodes {
             running.push(start(&runtime, name)?);

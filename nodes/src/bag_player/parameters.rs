@@ -26,7 +26,7 @@ const ABOUT: &[About] = about! {
 
 const START: &str = "the log is opened with it";
 
-/// What the parameters say.
+/// Settings of the node by its parameters.
 pub(super) struct Settings {
     pub bag: String,
     pub player: PlayerOptions,

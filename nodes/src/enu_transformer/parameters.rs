@@ -47,7 +47,7 @@ const ABOUT: &[About] = about! {
 
 const POSES: &str = "poses are read and kept with it";
 
-/// What the parameters say.
+/// Settings of the node by its parameters.
 pub(super) struct Settings {
     pub transformer: TransformerOptions,
     pub limits: ComputeLimits,

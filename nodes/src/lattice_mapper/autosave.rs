@@ -13,7 +13,7 @@ use crate::start::NodeError;
 /// Longest time between two saves.
 const MAX_PERIOD_S: f64 = 86_400.0;
 
-/// Where and how often a map is saved, and if the node goes on from there.
+/// Place and period of the saves of a map, and if the node goes on from there.
 pub(super) struct AutosaveOptions {
     file: String,
     /// Zero: never.

@@ -49,7 +49,7 @@ const ABOUT: &[About] = about! {
 
 const MAP: &str = "the map is made with it";
 
-/// What the parameters say.
+/// Settings of the node by its parameters.
 pub(super) struct Settings {
     pub mapper: MapperOptions,
     pub limits: ComputeLimits,

@@ -41,7 +41,7 @@ const ABOUT: &[About] = about! {
     "threads" fixed("the pool is made with it"): "Threads that search; 0: one less than the machine has.";
 };
 
-/// What the parameters say.
+/// Settings of the node by its parameters.
 pub(super) struct Settings {
     pub server: ServerOptions,
     pub limits: ComputeLimits,

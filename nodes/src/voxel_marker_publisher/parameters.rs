@@ -21,7 +21,7 @@ const ABOUT: &[About] = about! {
     "max_bytes_per_s": "Most bytes a second that are published.";
 };
 
-/// What the parameters say.
+/// Settings of the node by its parameters.
 pub(super) struct Settings {
     pub markers: MarkerOptions,
     pub limits: ComputeLimits,
