@@ -22,7 +22,7 @@ const ABOUT: &[About] = about! {
     "headset_scan_period_s": "A cloud replaces the one before unless it is later by this.";
     "track": "Whether the pose is refined by each cloud once it is known.";
     "lost_after": "Searches that must fail in a row before a known pose is given up.";
-    "doubt_below": "A cloud is searched with alone if its share of points on the map is below this share of that of the calibration: is it mirrored, or the headset elsewhere?";
+    "doubt_below": "A cloud is searched with alone if its share of points on the map is below this share of that of the calibration: it may be mirrored, or the headset elsewhere.";
     "map_refresh_s": "How long clouds are compared with an old state of a map that changes.";
     "min_points": "Fewest points of a search.";
     "registered_points": "About how many points are registered; more are thinned.";

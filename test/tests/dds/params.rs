@@ -136,7 +136,7 @@ fn a_cyclone_peer_describes_dumps_edits_and_loads_parameters() {
 
     let types = &found["types"];
     assert_eq!(types[0][0], true);
-    assert_eq!(types[0][2][1], json!(["height", 6]));
+    assert_eq!(types[0][2][1], json!(["height", 7]));
     assert_eq!(types[0][3][2], "std_msgs/msg/Header");
     assert!(
         types[1][1]

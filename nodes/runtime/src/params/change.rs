@@ -80,9 +80,13 @@ impl Params {
     /// Takes note of a value that the node has changed itself.
     pub fn note(&self, name: &str, value: ParamValue) {
         let mut changes = lock(&self.changes);
-        if let Some(declared) = lock(&self.state).declared.get_mut(name) {
+        let mut state = lock(&self.state);
+        if let Some(declared) = state.declared.get_mut(name) {
             declared.value = value.clone();
+            let (value, origin) = (value.clone(), Origin::Service);
+            state.given.insert(name.to_owned(), Given { value, origin });
         }
+        drop(state);
         changes.tell(Values::new(), [(name.to_owned(), value)].into());
     }
 
@@ -359,6 +363,8 @@ mod tests {
             told.try_iter().last().unwrap().1["count"],
             ParamValue::I64(5)
         );
+        set(&params, &[("least_m", "1.0")]).unwrap();
+        assert_eq!(options.try_recv().unwrap().2, 5);
     }
 
     #[test]
