@@ -19,6 +19,8 @@ messages! {
     SetParametersResult [];
     ListParametersResult [];
     ParameterEvent [Time, Parameter];
+    LoggerLevel [];
+    SetLoggerLevelsResult [];
 }
 
 services! {
@@ -28,6 +30,8 @@ services! {
     GetParameterTypes: GetParameterTypesRequest [], GetParameterTypesResponse [];
     ListParameters: ListParametersRequest [], ListParametersResponse [ListParametersResult];
     SetParameters: SetParametersRequest [Parameter], SetParametersResponse [SetParametersResult];
+    GetLoggerLevels: GetLoggerLevelsRequest [], GetLoggerLevelsResponse [LoggerLevel];
+    SetLoggerLevels: SetLoggerLevelsRequest [LoggerLevel], SetLoggerLevelsResponse [SetLoggerLevelsResult];
     SetParametersAtomically: SetParametersAtomicallyRequest [Parameter], SetParametersAtomicallyResponse [SetParametersResult];
 }
 
@@ -318,4 +322,73 @@ pub struct SetParametersAtomicallyRequest {
 pub struct SetParametersAtomicallyResponse {
     /// For all of them.
     pub result: SetParametersResult,
+}
+
+/// Level of a logger.
+#[derive(Clone, Debug, Default, PartialEq, Serialize, Deserialize)]
+pub struct LoggerLevel {
+    /// The logger, levels parted by dots.
+    pub name: String,
+    /// One of the constants.
+    pub level: u32,
+}
+
+impl LoggerLevel {
+    /// Not set.
+    pub const LOG_LEVEL_UNKNOWN: u8 = 0;
+    /// As in [`Log`].
+    pub const LOG_LEVEL_DEBUG: u8 = 10;
+    /// As in [`Log`].
+    pub const LOG_LEVEL_INFO: u8 = 20;
+    /// As in [`Log`].
+    pub const LOG_LEVEL_WARN: u8 = 30;
+    /// As in [`Log`].
+    pub const LOG_LEVEL_ERROR: u8 = 40;
+    /// As in [`Log`].
+    pub const LOG_LEVEL_FATAL: u8 = 50;
+}
+
+/// Outcome of setting the level of a logger.
+#[derive(Clone, Debug, Default, PartialEq, Serialize, Deserialize)]
+pub struct SetLoggerLevelsResult {
+    /// True: it was.
+    pub successful: bool,
+    /// Reason of a refusal.
+    pub reason: String,
+}
+
+/// Levels of loggers.
+#[derive(Clone, Copy, Debug)]
+pub struct GetLoggerLevels;
+
+/// Loggers whose levels are asked for.
+#[derive(Clone, Debug, Default, PartialEq, Serialize, Deserialize)]
+pub struct GetLoggerLevelsRequest {
+    /// Names of loggers.
+    pub names: Vec<String>,
+}
+
+/// Their levels.
+#[derive(Clone, Debug, Default, PartialEq, Serialize, Deserialize)]
+pub struct GetLoggerLevelsResponse {
+    /// In the order of the names.
+    pub levels: Vec<LoggerLevel>,
+}
+
+/// Sets levels of loggers.
+#[derive(Clone, Copy, Debug)]
+pub struct SetLoggerLevels;
+
+/// Levels to set.
+#[derive(Clone, Debug, Default, PartialEq, Serialize, Deserialize)]
+pub struct SetLoggerLevelsRequest {
+    /// Loggers and their levels.
+    pub levels: Vec<LoggerLevel>,
+}
+
+/// Outcomes.
+#[derive(Clone, Debug, Default, PartialEq, Serialize, Deserialize)]
+pub struct SetLoggerLevelsResponse {
+    /// In the order of the levels.
+    pub results: Vec<SetLoggerLevelsResult>,
 }

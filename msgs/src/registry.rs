@@ -5,7 +5,7 @@ use crate::{
     action, action_msgs, builtin_interfaces, calibration, diagnostic_msgs, geographic_msgs,
     geometry_msgs, lattice, lifecycle_msgs, nav_msgs, novatel_oem7_msgs, rcl_interfaces,
     rmw_dds_common, rosbag2_interfaces, rosgraph_msgs, sensor_msgs, std_msgs, std_srvs, tf2_msgs,
-    unique_identifier_msgs, vision_msgs, visualization_msgs,
+    type_description_interfaces, unique_identifier_msgs, vision_msgs, visualization_msgs,
 };
 
 /// Visitor of every message type; see [`visit_messages`].
@@ -40,6 +40,8 @@ pub fn visit_messages(visitor: &mut impl MessageVisitor) {
     std_msgs::visit_messages(visitor);
     std_srvs::visit_services(visitor);
     tf2_msgs::visit_messages(visitor);
+    type_description_interfaces::visit_messages(visitor);
+    type_description_interfaces::visit_services(visitor);
     unique_identifier_msgs::visit_messages(visitor);
     vision_msgs::visit_messages(visitor);
     visualization_msgs::visit_messages(visitor);

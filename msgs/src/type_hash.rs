@@ -6,12 +6,32 @@ use std::sync::LazyLock;
 
 use hmac_sha256::Hash;
 
+use crate::interface::Schema;
+use crate::type_description_interfaces::{
+    Field, FieldType, IndividualTypeDescription, TypeDescription,
+};
 use crate::{MessageVisitor, RosMessage, visit_messages};
 
 /// Type hash (`RIHS01_...`) of a message by its definition with all dependencies (`ros2msg` text).
 ///
 /// `None` where the text is not of that kind, or lacks a message that a field refers to.
 pub fn type_hash(ros_type: &str, definition: &str) -> Option<String> {
+    let description = type_description(ros_type, definition)?;
+    let main = json(&description.type_description);
+    let referenced = description.referenced_type_descriptions.iter();
+    let referenced = referenced.map(json).collect::<Vec<_>>().join(", ");
+    let json = format!(
+        r#"{{"type_description": {main}, "referenced_type_descriptions": [{referenced}]}}"#
+    );
+    let mut hash = "RIHS01_".to_owned();
+    for byte in Hash::hash(json.as_bytes()) {
+        let _ = write!(hash, "{byte:02x}");
+    }
+    Some(hash)
+}
+
+/// Description of a message by its definition with all dependencies, as [`type_hash`] has it.
+pub fn type_description(ros_type: &str, definition: &str) -> Option<TypeDescription> {
     let [_, kind, _] = ros_type.split('/').collect::<Vec<_>>()[..] else {
         return None;
     };
@@ -27,38 +47,42 @@ pub fn type_hash(ros_type: &str, definition: &str) -> Option<String> {
         if described.contains_key(&name) {
             continue;
         }
-        let json = describe(&name, parts.get(&name)?, kind, &mut wanted)?;
-        described.insert(name, json);
+        let one = describe(&name, parts.get(&name)?, kind, &mut wanted)?;
+        described.insert(name, one);
     }
-    let main = described.remove(ros_type)?;
-    let referenced = Vec::from_iter(described.into_values()).join(", ");
-    let json = format!(
-        r#"{{"type_description": {main}, "referenced_type_descriptions": [{referenced}]}}"#
-    );
-    let mut hash = "RIHS01_".to_owned();
-    for byte in Hash::hash(json.as_bytes()) {
-        let _ = write!(hash, "{byte:02x}");
-    }
-    Some(hash)
+    Some(TypeDescription {
+        type_description: described.remove(ros_type)?,
+        referenced_type_descriptions: described.into_values().collect(),
+    })
 }
 
 /// Type hash of a message of this crate, or of a part of a service or an action.
 pub fn hash_of(ros_type: &str) -> Option<&'static str> {
+    known(ros_type).map(|(hash, _)| hash)
+}
+
+/// Schema of a message of this crate, or of a part of a service or an action.
+pub fn schema_of(ros_type: &str) -> Option<&'static Schema> {
+    known(ros_type).map(|(_, schema)| schema)
+}
+
+fn known(ros_type: &str) -> Option<(&'static str, &'static Schema)> {
     static HASHES: LazyLock<Hashes> = LazyLock::new(|| {
         let mut hashes = Hashes::default();
         visit_messages(&mut hashes);
         hashes
     });
-    HASHES.0.get(ros_type).map(String::as_str)
+    let found = HASHES.0.get(ros_type);
+    found.map(|(hash, schema)| (hash.as_str(), *schema))
 }
 
 #[derive(Default)]
-struct Hashes(HashMap<&'static str, String>);
+struct Hashes(HashMap<&'static str, (String, &'static Schema)>);
 
 impl MessageVisitor for Hashes {
     fn visit<M: RosMessage>(&mut self) {
         let hash = type_hash(M::TYPE, &M::definition());
-        self.0.extend(hash.map(|hash| (M::TYPE, hash)));
+        self.0.extend(hash.map(|hash| (M::TYPE, (hash, M::SCHEMA))));
     }
 }
 
@@ -74,8 +98,33 @@ fn full_name(name: &str, package: &str, kind: &str) -> String {
     }
 }
 
-/// Canonical JSON of one message; the names of those that it holds are added to `nested`.
-fn describe(type_name: &str, text: &str, kind: &str, nested: &mut Vec<String>) -> Option<String> {
+/// Canonical JSON of one message; default values do not count.
+fn json(description: &IndividualTypeDescription) -> String {
+    let field = |field: &Field| {
+        let FieldType {
+            type_id,
+            capacity,
+            string_capacity,
+            nested_type_name,
+        } = &field.type_;
+        format!(
+            "{{\"name\": \"{}\", \"type\": {{\"type_id\": {type_id}, \"capacity\": {capacity}, \
+             \"string_capacity\": {string_capacity}, \"nested_type_name\": \"{nested_type_name}\"}}}}",
+            field.name
+        )
+    };
+    let fields: Vec<String> = description.fields.iter().map(field).collect();
+    let (name, fields) = (&description.type_name, fields.join(", "));
+    format!(r#"{{"type_name": "{name}", "fields": [{fields}]}}"#)
+}
+
+/// Description of one message; the names of those that it holds are added to `nested`.
+fn describe(
+    type_name: &str,
+    text: &str,
+    kind: &str,
+    nested: &mut Vec<String>,
+) -> Option<IndividualTypeDescription> {
     let (package, _) = type_name.split_once('/')?;
     let mut fields = Vec::new();
     for line in text.lines().filter(|line| !line.starts_with("====")) {
@@ -89,25 +138,36 @@ fn describe(type_name: &str, text: &str, kind: &str, nested: &mut Vec<String>) -
         let (name, value) = rest.split_at(end.unwrap_or(rest.len()));
         let is_constant = value.trim_start().starts_with('=');
         if !is_constant {
-            fields.push(field(name, field_type, package, kind, nested)?);
+            let type_ = field_of(field_type, package, kind, nested)?;
+            fields.push(named(name, type_, value.trim())?);
         }
     }
     if fields.is_empty() {
         let padding = "structure_needs_at_least_one_member";
-        fields.push(field(padding, "uint8", package, kind, nested)?);
+        let type_ = field_of("uint8", package, kind, nested)?;
+        fields.push(named(padding, type_, "")?);
     }
-    let fields = fields.join(", ");
-    is_plain(type_name).then(|| format!(r#"{{"type_name": "{type_name}", "fields": [{fields}]}}"#))
+    is_plain(type_name).then(|| IndividualTypeDescription {
+        type_name: type_name.to_owned(),
+        fields,
+    })
 }
 
-/// Canonical JSON of a field.
-fn field(
-    name: &str,
+fn named(name: &str, type_: FieldType, default: &str) -> Option<Field> {
+    is_plain(name).then(|| Field {
+        name: name.to_owned(),
+        type_,
+        default_value: default.to_owned(),
+    })
+}
+
+/// Type of a field.
+fn field_of(
     field_type: &str,
     package: &str,
     kind: &str,
     nested: &mut Vec<String>,
-) -> Option<String> {
+) -> Option<FieldType> {
     // The numbers are those of type_description_interfaces/msg/FieldType.
     let (element, array) = match field_type.split_once('[') {
         Some((element, array)) => (element, Some(array.strip_suffix(']')?)),
@@ -147,12 +207,11 @@ fn field(
             1
         }
     };
-    let type_id = array_id + element_id;
-    is_plain(name).then(|| {
-        format!(
-            "{{\"name\": \"{name}\", \"type\": {{\"type_id\": {type_id}, \"capacity\": {capacity}, \
-             \"string_capacity\": {string_capacity}, \"nested_type_name\": \"{nested_type_name}\"}}}}"
-        )
+    Some(FieldType {
+        type_id: array_id + element_id,
+        capacity,
+        string_capacity,
+        nested_type_name,
     })
 }
 

@@ -3,10 +3,11 @@
 use std::process::ExitCode;
 
 use crate::running::Running;
-use crate::start::{NodeError, Start};
+use crate::start::{Declare, NodeError, Start};
 use crate::{enu_transformer, lattice_mapper, semantic_icp_server, voxel_marker_publisher};
 use lattice_runtime::Runtime;
 use lattice_runtime::logging;
+use lattice_runtime::params::Params;
 use lattice_runtime::ros_args::RosArgs;
 
 /// Every node that can share a process, in the order in which data flows.
@@ -18,6 +19,14 @@ pub const NODES: [(&str, Start); 4] = [
         voxel_marker_publisher::node::start,
     ),
     ("semantic_icp_server", semantic_icp_server::node::start),
+];
+
+/// Readers of the parameters of those nodes.
+pub const PARAMETERS: [(&str, Declare); 4] = [
+    ("enu_transformer", enu_transformer::declare),
+    ("lattice_mapper", lattice_mapper::declare),
+    ("voxel_marker_publisher", voxel_marker_publisher::declare),
+    ("semantic_icp_server", semantic_icp_server::declare),
 ];
 
 /// Finds the node of an executable name.
@@ -33,7 +42,8 @@ pub fn run(
     arguments: impl IntoIterator<Item = String>,
 ) -> Result<(), NodeError> {
     let args = RosArgs::parse(arguments)?;
-    if answers_help(name, &args) {
+    let declare = PARAMETERS.iter().find(|(node, _)| *node == name);
+    if answers_help(name, declare.map(|(_, declare)| *declare), &args) {
         return Ok(());
     }
     let name = args.node_name(name);
@@ -43,8 +53,8 @@ pub fn run(
     running.until_stopped(&runtime)
 }
 
-/// Prints how an executable is used if its arguments ask for it.
-pub fn answers_help(name: &str, args: &RosArgs) -> bool {
+/// Prints how an executable is used, and its parameters, if its arguments ask for it.
+pub fn answers_help(name: &str, declare: Option<Declare>, args: &RosArgs) -> bool {
     let asked = args
         .user_args
         .iter()
@@ -53,12 +63,18 @@ pub fn answers_help(name: &str, args: &RosArgs) -> bool {
         println!(
             "Usage: {name} [--ros-args [-r FROM:=TO] [-p NAME:=VALUE] [--params-file FILE] \
              [--log-level LEVEL] [--enclave NAME] ...]\n\n\
-             Topics and services are in README.md; every parameter, with its unit and meaning, is in\n\
-             params/bobcat.yaml and params/semantic_icp.yaml.\n\n\
+             Topics and services are in README.md.\n\n\
              Environment: ROS_DOMAIN_ID, ROS_AUTOMATIC_DISCOVERY_RANGE (LOCALHOST or SUBNET),\n\
              RMW_IMPLEMENTATION (rmw_cyclonedds_cpp where built in, or rustdds), ROS_SECURITY_ENABLE\n\
-             with the others of SROS2 (docs/security.md), RUST_LOG."
+             with the others of SROS2 (docs/security.md), RUST_LOG.\n"
         );
+        let params = Params::from_values(name, std::iter::empty::<(String, _)>());
+        if declare.is_some_and(|declare| declare(&params).is_ok()) {
+            println!(
+                "Parameters; those that are not [fixed] can be set while the node runs:\n\n{}",
+                params.help()
+            );
+        }
     }
     asked
 }

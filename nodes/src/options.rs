@@ -1,6 +1,26 @@
 //! Parameters that several nodes read alike: frames, words, bounds of threads and inboxes.
 
-use lattice_runtime::params::{ParamError, Params};
+use lattice_runtime::about;
+use lattice_runtime::params::{About, ParamError, Params};
+
+/// Parameters that several nodes have.
+pub const COMMON: &[About] = about! {
+    "map_frame" fixed(FRAME): "Frame of the map (x east, y north, z up where it comes from an INS).";
+    "threads" fixed("the pool is made with it"): "Threads of the compute pool; 0: one less than the machine has.";
+    "inbox_events" fixed(INBOX): "Most messages that wait for the compute thread.";
+    "inbox_bytes" fixed(INBOX): "Most bytes of messages that wait for the compute thread.";
+    "report_file" fixed("it names an output"): "File for a report in JSON at the end; empty: none.";
+    "mapper" fixed("it names a topic"): "Node that is asked for a keyframe when a part of the map was lost.";
+    "label_low_16_bits": "Whether only the low 16 of labels of 32 bits are the class (SemanticKITTI: the others are the instance).";
+    "ignored_labels": "Classes that say nothing, as 0 in SemanticKITTI.";
+    "palette_rgb_class": "Classes of colours, for clouds whose labels are the colours semantic_color, semantic_color1 to 3 or rgb: red, green, blue, class, and so on.";
+};
+
+/// Reason for which frames do not change.
+pub const FRAME: &str = "others know it by now";
+/// Reason for which topics do not change.
+pub const TOPIC: &str = "it is subscribed to";
+const INBOX: &str = "the inbox is made with it";
 
 /// Most events of an inbox that a parameter may ask for: room is made for all of them at once.
 const MAX_EVENTS: usize = 1 << 18;
@@ -20,12 +40,10 @@ pub fn frame(params: &Params, name: &str, default: &str) -> Result<String, Param
 
 /// One of several words; the first is the default.
 pub fn one_of<T: Copy>(params: &Params, name: &str, words: &[(&str, T)]) -> Result<T, ParamError> {
-    let word = params.string(name, words.first().map_or("", |(word, _)| word))?;
-    let found = words.iter().find(|(known, _)| *known == word);
-    found.map(|(_, value)| *value).ok_or_else(|| {
-        let known: Vec<&str> = words.iter().map(|(word, _)| *word).collect();
-        params.invalid(name, format!("{word:?}, expected {}", known.join(" or ")))
-    })
+    let known: Vec<&str> = words.iter().map(|(word, _)| *word).collect();
+    let place = params.word(name, &known)?;
+    let found = words.get(place).map(|(_, value)| *value);
+    found.ok_or_else(|| params.invalid(name, "there are no words to choose from"))
 }
 
 /// `inbox_events`: most events that wait for a node.

@@ -3,7 +3,7 @@
 use lattice_runtime::Runtime;
 use lattice_runtime::lifecycle::{ChangeRequests, Lifecycle, Step};
 
-use crate::start::{Finish, NodeError, Start};
+use crate::start::{Finish, NodeError, Servers, Start};
 
 /// The nodes of a process, in the order in which data flows.
 #[derive(Default)]
@@ -57,13 +57,22 @@ impl Running {
         let mut servers = Vec::new();
         for node in &mut self.nodes {
             runtime.work_off();
-            servers.extend(node.finish.take().map(|finish| finish()));
+            servers.extend(node.end(runtime));
         }
         Ok(runtime.spin()?)
     }
 }
 
 impl OneNode {
+    /// Ends the node if it is at work.
+    fn end(&mut self, runtime: &Runtime) -> Option<Servers> {
+        let finish = self.finish.take()?;
+        if let Ok(node) = runtime.node(&self.name) {
+            node.params().close();
+        }
+        Some(finish())
+    }
+
     fn take(&mut self, runtime: &Runtime, step: Step) -> Result<(), String> {
         match step {
             Step::Configure => {
@@ -71,9 +80,7 @@ impl OneNode {
                 self.finish = Some(started.map_err(|error| error.to_string())?);
             }
             Step::Cleanup | Step::Shutdown => {
-                if let Some(finish) = self.finish.take() {
-                    finish();
-                }
+                drop(self.end(runtime));
             }
             Step::Activate | Step::Deactivate => {}
         }

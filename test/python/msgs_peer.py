@@ -90,6 +90,9 @@ def difference(jazzy, store, name):
     """Where a type of Jazzy has other fields or constants here."""
     if name not in jazzy.fielddefs or jazzy.fielddefs[name] == store.fielddefs[name]:
         return None
+    if not store.fielddefs[name][0] and jazzy.fielddefs[name][1] == store.fielddefs[name][1]:
+        # Its constants are not repeated here.
+        return None
     return f"Jazzy: {jazzy.fielddefs[name]}; here: {store.fielddefs[name]}"
 
 

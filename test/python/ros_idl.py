@@ -218,3 +218,120 @@ SendGoalResponse = ros(f"{CALIBRATE}_SendGoal_Response", **ASKED, accepted=bool,
 GetResultRequest = ros(f"{CALIBRATE}_GetResult_Request", **ASKED, goal_id=UUID)
 GetResultResponse = ros(f"{CALIBRATE}_GetResult_Response", **ASKED, status=int8, result=Result)
 FeedbackMessage = ros(f"{CALIBRATE}_FeedbackMessage", goal_id=UUID, feedback=Feedback)
+
+
+def service(name, request, response):
+    """Both halves of a service."""
+    halves = {"Request": request, "Response": response}
+    return [ros(f"{name}_{half}", **ASKED, **fields) for half, fields in halves.items()]
+
+
+RCL = "rcl_interfaces/msg"
+ParameterValue = ros(
+    f"{RCL}/ParameterValue",
+    type=uint8,
+    bool_value=bool,
+    integer_value=int64,
+    double_value=float64,
+    string_value=str,
+    byte_array_value=sequence[uint8],
+    bool_array_value=sequence[bool],
+    integer_array_value=sequence[int64],
+    double_array_value=sequence[float64],
+    string_array_value=sequence[str],
+)
+Parameter = ros(f"{RCL}/Parameter", name=str, value=ParameterValue)
+FloatingPointRange = ros(
+    f"{RCL}/FloatingPointRange", from_value=float64, to_value=float64, step=float64
+)
+IntegerRange = ros(f"{RCL}/IntegerRange", from_value=int64, to_value=int64, step=uint64)
+ParameterDescriptor = ros(
+    f"{RCL}/ParameterDescriptor",
+    name=str,
+    type=uint8,
+    description=str,
+    additional_constraints=str,
+    read_only=bool,
+    dynamic_typing=bool,
+    floating_point_range=sequence[FloatingPointRange],
+    integer_range=sequence[IntegerRange],
+)
+SetParametersResult = ros(f"{RCL}/SetParametersResult", successful=bool, reason=str)
+ListParametersResult = ros(
+    f"{RCL}/ListParametersResult", names=sequence[str], prefixes=sequence[str]
+)
+ParameterEvent = ros(
+    f"{RCL}/ParameterEvent",
+    stamp=Time,
+    node=str,
+    new_parameters=sequence[Parameter],
+    changed_parameters=sequence[Parameter],
+    deleted_parameters=sequence[Parameter],
+)
+LoggerLevel = ros(f"{RCL}/LoggerLevel", name=str, level=uint32)
+SetLoggerLevelsResult = ros(f"{RCL}/SetLoggerLevelsResult", successful=bool, reason=str)
+
+TYPES = "type_description_interfaces/msg"
+FieldType = ros(
+    f"{TYPES}/FieldType",
+    type_id=uint8,
+    capacity=uint64,
+    string_capacity=uint64,
+    nested_type_name=str,
+)
+Field = ros(f"{TYPES}/Field", name=str, type=FieldType, default_value=str)
+IndividualTypeDescription = ros(
+    f"{TYPES}/IndividualTypeDescription", type_name=str, fields=sequence[Field]
+)
+TypeDescription = ros(
+    f"{TYPES}/TypeDescription",
+    type_description=IndividualTypeDescription,
+    referenced_type_descriptions=sequence[IndividualTypeDescription],
+)
+TypeKeyValue = ros(f"{TYPES}/KeyValue", key=str, value=str)
+TypeSource = ros(f"{TYPES}/TypeSource", type_name=str, encoding=str, raw_file_contents=str)
+
+NAMES = {"names": sequence[str]}
+PARAMETERS = {"parameters": sequence[Parameter]}
+LEVELS = {"levels": sequence[LoggerLevel]}
+NODE_SERVICES = {
+    "list_parameters": service(
+        "rcl_interfaces/srv/ListParameters",
+        {"prefixes": sequence[str], "depth": uint64},
+        {"result": ListParametersResult},
+    ),
+    "get_parameters": service(
+        "rcl_interfaces/srv/GetParameters", NAMES, {"values": sequence[ParameterValue]}
+    ),
+    "get_parameter_types": service(
+        "rcl_interfaces/srv/GetParameterTypes", NAMES, {"types": sequence[uint8]}
+    ),
+    "describe_parameters": service(
+        "rcl_interfaces/srv/DescribeParameters",
+        NAMES,
+        {"descriptors": sequence[ParameterDescriptor]},
+    ),
+    "set_parameters": service(
+        "rcl_interfaces/srv/SetParameters",
+        PARAMETERS,
+        {"results": sequence[SetParametersResult]},
+    ),
+    "set_parameters_atomically": service(
+        "rcl_interfaces/srv/SetParametersAtomically", PARAMETERS, {"result": SetParametersResult}
+    ),
+    "get_logger_levels": service("rcl_interfaces/srv/GetLoggerLevels", NAMES, LEVELS),
+    "set_logger_levels": service(
+        "rcl_interfaces/srv/SetLoggerLevels", LEVELS, {"results": sequence[SetLoggerLevelsResult]}
+    ),
+    "get_type_description": service(
+        "type_description_interfaces/srv/GetTypeDescription",
+        {"type_name": str, "type_hash": str, "include_type_sources": bool},
+        {
+            "successful": bool,
+            "failure_reason": str,
+            "type_description": TypeDescription,
+            "type_sources": sequence[TypeSource],
+            "extra_information": sequence[TypeKeyValue],
+        },
+    ),
+}

@@ -100,6 +100,11 @@ impl PoseBuffer {
         }
     }
 
+    /// Interpolates over at most so many seconds from now on.
+    pub fn set_max_gap_s(&mut self, max_gap_s: f64) {
+        self.max_gap_ns = duration_ns(max_gap_s);
+    }
+
     /// Takes the next pose and forgets what is out of bounds.
     pub fn push(&mut self, pose: StampedPose) -> PushOutcome {
         if !is_rigid(&pose.map_from_base) {

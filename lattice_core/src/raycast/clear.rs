@@ -73,6 +73,11 @@ impl RayClearer {
         }
     }
 
+    /// Goes on with other conditions; the memory for marks stays as it is.
+    pub fn set_options(&mut self, options: ClearOptions) {
+        self.options = options;
+    }
+
     /// Clears along the rays of a scan. The points themselves are not inserted; do that before or
     /// after.
     ///

@@ -5,11 +5,11 @@ use nalgebra::Vector3;
 use super::blocks::{Blocks, add_evidence, apply_to_hit};
 use super::clear::ClearReport;
 use super::coarse::Coarse;
-use super::evidence::{Steps, UNKNOWN};
+use super::evidence::{Evidence, Steps, UNKNOWN};
 use super::masks::{Cursor, Mask, ScanMasks};
 use super::options::{FreeSpaceError, FreeSpaceOptions};
 use super::packed::Packed;
-use super::scan::{self, RayBundle, ScanReport};
+use super::scan::{self, RayBundle, Reach, ScanReport};
 use super::traversal::Traversal;
 use crate::lattice::{Lattice, MortonKey};
 use crate::voxels::{DatumError, VoxelStore};
@@ -171,6 +171,13 @@ impl FreeSpaceMap {
         if let Ok(empty) = Self::new(lattice, self.datum_m, options) {
             *self = empty;
         }
+    }
+
+    /// Goes on with other weights and reach; cells keep their evidence.
+    pub fn set_weights(&mut self, evidence: Evidence, reach: Reach) -> Result<(), FreeSpaceError> {
+        self.steps = Steps::new(&evidence)?;
+        (self.options.evidence, self.options.reach) = (evidence, reach);
+        Ok(())
     }
 
     /// All occupied cells in ascending order.

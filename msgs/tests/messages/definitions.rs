@@ -5,6 +5,7 @@
 use std::collections::BTreeSet;
 
 use crate::shape::filled;
+use lattice_msgs::type_description_interfaces::GetTypeDescriptionRequest;
 use lattice_msgs::{
     MessageVisitor, RosMessage, Schema, geometry_msgs, sensor_msgs, visit_messages,
 };
@@ -190,8 +191,14 @@ fn defaults_agree() {
         [
             ["geometry_msgs/msg/Quaternion", "w", "1"],
             ["sensor_msgs/msg/NavSatStatus", "status", "-2"],
+            [
+                "type_description_interfaces/srv/GetTypeDescription_Request",
+                "include_type_sources",
+                "true"
+            ],
         ]
     );
     assert_eq!(geometry_msgs::Quaternion::default().w, 1.0);
     assert_eq!(sensor_msgs::NavSatStatus::default().status, -2);
+    assert!(GetTypeDescriptionRequest::default().include_type_sources);
 }

@@ -56,6 +56,8 @@ impl Run {
             .into());
         }
         let runtime = executables::start_runtime("lattice", RosArgs::parse(arguments)?)?;
+        // The node of the process itself has only the parameters of every node.
+        runtime.node("lattice")?.params().open(|_| Ok(()));
         let mut running = Running::default();
         for (name, start) in nodes {
             running.start(&runtime, name, *start)?;

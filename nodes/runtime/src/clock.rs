@@ -1,28 +1,44 @@
 //! The time nodes go by: that of the system, or the one on `/clock`.
 
-use std::sync::Arc;
-use std::sync::atomic::{AtomicI64, Ordering::Relaxed};
+use std::sync::atomic::{AtomicBool, AtomicI64, Ordering::Relaxed};
+use std::sync::{Arc, OnceLock};
 use std::time::{SystemTime, UNIX_EPOCH};
 
-/// Time of the system, or simulated time. Clones show the same.
+/// Time of the system, or simulated time. Clones show the same, and change together.
 #[derive(Clone, Debug, Default)]
 pub struct Clock {
-    sim_ns: Option<Arc<AtomicI64>>,
+    inner: Arc<Inner>,
+}
+
+#[derive(Debug, Default)]
+struct Inner {
+    is_simulated: AtomicBool,
+    /// Set when it first goes by simulated time.
+    sim_ns: OnceLock<Arc<AtomicI64>>,
 }
 
 impl Clock {
-    /// Simulated time, set from elsewhere.
-    pub(crate) fn simulated(now_ns: Arc<AtomicI64>) -> Self {
-        Self {
-            sim_ns: Some(now_ns),
-        }
+    /// Goes by simulated time, which is set from elsewhere.
+    pub(crate) fn simulate(&self, sim_ns: Arc<AtomicI64>) {
+        let _ = self.inner.sim_ns.set(sim_ns);
+        self.inner.is_simulated.store(true, Relaxed);
+    }
+
+    /// Goes by the system's time.
+    pub(crate) fn follow_system(&self) {
+        self.inner.is_simulated.store(false, Relaxed);
+    }
+
+    /// True if it goes by simulated time.
+    pub(crate) fn is_simulated(&self) -> bool {
+        self.inner.is_simulated.load(Relaxed)
     }
 
     /// Nanoseconds since the Unix epoch; with simulated time 0 until the first message on `/clock`.
     pub fn now_ns(&self) -> i64 {
-        match &self.sim_ns {
-            Some(sim_ns) => sim_ns.load(Relaxed),
-            None => system_ns(),
+        match self.inner.sim_ns.get() {
+            Some(sim_ns) if self.is_simulated() => sim_ns.load(Relaxed),
+            _ => system_ns(),
         }
     }
 }
@@ -43,6 +59,14 @@ mod tests {
         let clock = Clock::default();
         let first = clock.now_ns();
         assert!(first > 1_700_000_000_000_000_000 && clock.now_ns() >= first);
-        assert_eq!(Clock::simulated(Arc::default()).now_ns(), 0);
+        let (sim_ns, same) = (Arc::<AtomicI64>::default(), clock.clone());
+        clock.simulate(Arc::clone(&sim_ns));
+        assert_eq!(same.now_ns(), 0);
+        sim_ns.store(7, Relaxed);
+        assert_eq!(same.now_ns(), 7);
+        clock.follow_system();
+        assert!(same.now_ns() >= first);
+        clock.simulate(Arc::default());
+        assert_eq!(same.now_ns(), 7, "one simulated time for all");
     }
 }

@@ -1,13 +1,13 @@
 //! The runtime of a process: one participant, its threads, and the nodes on it.
 
 use std::sync::{Arc, Mutex};
-use std::time::{Duration, Instant};
+use std::time::Duration;
 
 use lattice_msgs::diagnostic_msgs::DiagnosticArray;
-use smol::Task;
 
 use super::env::{Network, TransportKind};
 use super::error::RuntimeError;
+use super::logger_services;
 use super::node::Node;
 use super::param_services;
 use super::qos::Qos;
@@ -17,12 +17,11 @@ use super::security::Enclave;
 use super::shared::{Shared, deadline};
 use super::shutdown::{Shutdown, SignalWatch};
 use super::sync::lock;
+use super::timer::Timer;
+use super::type_description;
 
 /// Between two messages on `/diagnostics`.
 const DIAGNOSTICS_PERIOD: Duration = Duration::from_secs(1);
-
-/// Shortest period of a timer.
-const MIN_TIMER_PERIOD: Duration = Duration::from_millis(1);
 
 /// Runs the nodes of a process. Dropping it closes the participant, and peers see it go at once.
 ///
@@ -35,19 +34,6 @@ pub struct Runtime {
     nodes: Mutex<Vec<(String, Node)>>,
     _signals: SignalWatch,
     _rosout: Option<Arc<rosout::Listener>>,
-}
-
-/// A timer; dropping it ends it. None where the process ends already.
-#[must_use = "dropping a timer ends it"]
-pub struct Timer(Option<Task<()>>);
-
-impl Timer {
-    /// Lets it run until shutdown.
-    pub fn detach(self) {
-        if let Some(task) = self.0 {
-            task.detach();
-        }
-    }
 }
 
 impl Runtime {
@@ -104,21 +90,11 @@ impl Runtime {
     }
 
     /// Calls `callback` in every period of the system's steady clock, 1 ms at least, until shutdown or until
-    /// the timer is dropped.
+    /// the timer is dropped; never with a period of zero. The period can be changed.
     ///
     /// It runs on the io thread and must return at once. Periods that were missed are left out.
-    pub fn timer(&self, period: Duration, mut callback: impl FnMut() + Send + 'static) -> Timer {
-        let period = period.max(MIN_TIMER_PERIOD);
-        let task = self.shared.io.spawn(async move {
-            let mut due = Instant::now().checked_add(period);
-            while let Some(at) = due {
-                let _ = smol::Timer::at(at).await;
-                callback();
-                let now = Instant::now();
-                due = at.checked_add(period).map(|next| next.max(now));
-            }
-        });
-        Timer(task)
+    pub fn timer(&self, period: Duration, callback: impl FnMut() + Send + 'static) -> Timer {
+        Timer::start(&self.shared.io, period, callback)
     }
 
     /// A handle to ask for shutdown.
@@ -183,6 +159,8 @@ fn node(
     default_name: &str,
 ) -> Result<Node, RuntimeError> {
     let node = Node::new(shared, args, default_name)?;
+    shared.keep(type_description::serve(&node)?.into_iter().collect());
+    shared.keep(logger_services::serve(&node)?.into());
     shared.keep(param_services::serve(&node, node.params())?);
     Ok(node)
 }

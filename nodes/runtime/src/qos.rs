@@ -67,6 +67,8 @@ impl Qos {
     pub const CLOCK_PLAYER: Qos = Qos::reliable(1);
     /// `/rosout`.
     pub const ROSOUT: Qos = Qos::latched(1000);
+    /// `/parameter_events`.
+    pub const PARAMETER_EVENTS: Qos = Qos::reliable(1000);
     /// Services.
     pub const SERVICES: Qos = Qos::reliable(10);
     /// Requests of a server: those that come while it is at work wait for it.
@@ -168,13 +170,10 @@ fn choose<T: Copy + PartialEq>(
     default: T,
     choices: [(&str, T); 2],
 ) -> Result<T, ParamError> {
-    let default = choices.iter().find(|(_, value)| *value == default);
-    let word = params.string(key, default.map_or("", |(word, _)| word))?;
-    let chosen = choices.iter().find(|(choice, _)| *choice == word);
-    chosen.map(|(_, value)| *value).ok_or_else(|| {
-        let [(first, _), (second, _)] = choices;
-        params.invalid(key, format!("expected {first} or {second}"))
-    })
+    let known = choices.iter().find(|(_, value)| *value == default);
+    let word = known.map_or("", |(word, _)| word);
+    let place = params.word_or(key, &choices.map(|(word, _)| word), word)?;
+    Ok(choices.get(place).map_or(default, |(_, value)| *value))
 }
 
 #[cfg(test)]

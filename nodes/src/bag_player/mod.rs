@@ -2,24 +2,27 @@
 
 mod controls;
 mod keyboard;
+mod parameters;
 mod playback;
 
 use std::path::PathBuf;
-use std::time::Duration;
+use std::sync::Arc;
 
 use serde::Serialize;
 
 use crate::executables::{answers_help, start_runtime};
 use crate::report;
-use crate::start::{NodeError, warn_unused};
+use crate::start::{NodeError, open_params};
 use controls::Controls;
 use keyboard::Keyboard;
-use lattice_bag::{BagQos, BagReader, Player, PlayerOptions, TopicInfo};
-use lattice_runtime::params::Params;
+use lattice_bag::{BagQos, BagReader, Player, TopicInfo};
 use lattice_runtime::qos::{Durability, Qos, Reliability};
 use lattice_runtime::ros_args::RosArgs;
 use lattice_runtime::{Node, RawPublisher};
+use parameters::Settings;
 use playback::{Playback, Playhead};
+
+pub use parameters::declare;
 
 /// Name of the executable and of the node unless it is remapped.
 pub const NAME: &str = "bag_player";
@@ -43,45 +46,62 @@ pub struct PlayerReport {
 /// Plays the log that the parameters name and returns at its end or after a signal.
 pub fn run(arguments: impl IntoIterator<Item = String>) -> Result<(), NodeError> {
     let args = RosArgs::parse(arguments)?;
-    if answers_help(NAME, &args) {
+    if answers_help(NAME, Some(parameters::declare), &args) {
         return Ok(());
     }
     let name = args.node_name(NAME);
     let runtime = start_runtime(&name, args)?;
     let node = runtime.node(&name)?;
     let params = node.params();
-    let bag = params.string("bag", "")?;
+    let Settings {
+        bag,
+        player,
+        waited,
+        wait,
+        settle,
+        max_wait,
+        start_paused,
+        keyboard,
+        report_file,
+    } = Settings::from_params(params)?;
     if bag.is_empty() {
         return Err("which log? Give it as `--ros-args -p bag:=DIRECTORY`".into());
     }
     let reader = BagReader::open(&PathBuf::from(&bag))?;
     let span_ns = (reader.start_ns().unwrap_or(0), reader.end_ns().unwrap_or(0));
-    let player = Player::new(reader, options(params)?)?;
-    let waited = params.string_array("wait_for_subscribers", &[])?;
-    let wait = seconds(params, "wait_timeout_s", 30.0)?;
-    let settle = seconds(params, "settle_s", 0.5)?;
-    let report_file = report::file(params)?;
+    let has_clock = player.clock_hz.is_some();
+    let player = Player::new(reader, player)?;
     let mut playback = Playback {
         topics: open_topics(&node, &player)?,
-        clock: match params.f64("clock_hz", 0.0)? > 0.0 {
+        clock: match has_clock {
             true => Some(node.publisher("/clock", Qos::CLOCK_PLAYER)?),
             false => None,
         },
-        most_wait: seconds(params, "max_wait_s", 2.0)?,
+        most_wait: max_wait,
         stuck: vec![false; player.topics().len()],
-        head: Playhead::new(params.bool("start_paused", false)?),
+        head: Playhead::new(start_paused),
         stopped: false,
         player,
         span_ns,
         shutdown: runtime.shutdown_handle(),
+        params: Arc::clone(params),
         report: PlayerReport::default(),
     };
     let controls = Controls::serve(&node)?;
-    let _keyboard = match params.bool("keyboard", true)? {
+    let _keyboard = match keyboard {
         true => Keyboard::start(controls.sender()),
         false => None,
     };
-    warn_unused(params);
+    let changes = controls.sender();
+    open_params(params, move |params| {
+        let settings = Settings::from_params(params).map_err(|error| error.to_string())?;
+        let (rate, max_wait) = (settings.player.rate, settings.max_wait);
+        let sent = changes.send(Box::new(move |playback| {
+            playback.most_wait = max_wait;
+            playback.change_rate(rate);
+        }));
+        sent.map_err(|_| "the log has ended".to_owned())
+    });
     playback.wait_for(&waited, wait);
     if !waited.is_empty() {
         // We know them; they may need a moment to know us.
@@ -96,27 +116,6 @@ pub fn run(arguments: impl IntoIterator<Item = String>) -> Result<(), NodeError>
     drop(runtime);
     drop(controls);
     result
-}
-
-/// A time of up to a day.
-fn seconds(params: &Params, name: &str, default: f64) -> Result<Duration, NodeError> {
-    let seconds = params.f64_in(name, default, 0.0..=86_400.0)?;
-    Ok(Duration::from_secs_f64(seconds))
-}
-
-fn options(params: &Params) -> Result<PlayerOptions, NodeError> {
-    let duration_s = params.f64("duration_s", 0.0)?;
-    let include = params.string_array("topics", &[])?;
-    let clock_hz = params.f64("clock_hz", 0.0)?;
-    Ok(PlayerOptions {
-        rate: params.f64("rate", 1.0)?,
-        start_offset_s: params.f64("start_offset_s", 0.0)?,
-        duration_s: (duration_s > 0.0).then_some(duration_s),
-        loop_: params.bool("loop", false)?,
-        include: (!include.is_empty()).then_some(include),
-        exclude: params.string_array("exclude_topics", &[])?,
-        clock_hz: (clock_hz > 0.0).then_some(clock_hz),
-    })
 }
 
 /// A publisher for each topic, with the QoS that was recorded unless a parameter says otherwise.

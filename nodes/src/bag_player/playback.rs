@@ -1,11 +1,12 @@
 //! Playback against the clock: what is due is published, and controls are obeyed between two messages.
 
-use std::sync::mpsc;
+use std::sync::{Arc, mpsc};
 use std::time::{Duration, Instant};
 
 use lattice_bag::{Player, Step};
 use lattice_msgs::builtin_interfaces::Time;
 use lattice_msgs::rosgraph_msgs::Clock;
+use lattice_runtime::params::{ParamValue, Params};
 use lattice_runtime::{Publisher, RawPublisher, Shutdown};
 
 use super::PlayerReport;
@@ -89,6 +90,8 @@ pub(super) struct Playback {
     /// True after a call of `stop`.
     pub stopped: bool,
     pub shutdown: Shutdown,
+    /// Those of the node, for its rate to be read.
+    pub params: Arc<Params>,
     pub report: PlayerReport,
 }
 
@@ -182,8 +185,17 @@ impl Playback {
         self.stopped = true;
     }
 
-    /// Goes on at another rate; false if that cannot be played.
+    /// Goes on at another rate, which the parameter then shows; false if that cannot be played.
     pub(super) fn set_rate(&mut self, rate: f64) -> bool {
+        let possible = self.change_rate(rate);
+        if possible {
+            self.params.note("rate", ParamValue::F64(rate));
+        }
+        possible
+    }
+
+    /// Goes on at another rate; false if that cannot be played.
+    pub(super) fn change_rate(&mut self, rate: f64) -> bool {
         let possible = self.player.set_rate(self.head.now_ns(), rate);
         match possible {
             true => log::info!("rate {rate}"),

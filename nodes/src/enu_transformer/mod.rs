@@ -6,11 +6,13 @@ mod counts;
 pub mod ins;
 pub mod node;
 mod options;
+mod parameters;
 mod transforms;
 mod waiting;
 
 pub use counts::{TransformerCounts, TransformerReport};
 pub use options::TransformerOptions;
+pub use parameters::declare;
 
 use std::sync::Arc;
 
@@ -112,6 +114,13 @@ impl EnuTransformer {
             counts: TransformerCounts::default(),
             options,
         }
+    }
+
+    /// Goes on with other options, except for frames, INS, origin and what is kept of poses.
+    pub fn set_options(&mut self, options: TransformerOptions) {
+        self.poses.set_max_gap_s(options.max_pose_gap_s);
+        self.waiting.set_max_clouds(options.max_waiting_clouds);
+        self.options = options;
     }
 
     /// Takes a message of the INS.

@@ -13,11 +13,12 @@ use lattice_msgs::sensor_msgs::{Imu, NavSatFix, PointCloud2};
 use lattice_msgs::tf2_msgs::TFMessage;
 
 use super::ins::{InsMessage, InsSource};
+use super::parameters::Settings;
 use super::{EnuOutput, EnuTransformer, TransformerOptions, TransformerReport};
-use crate::compute::{Compute, ComputeLimits, Inbox};
+use crate::compute::{Compute, Inbox};
 use crate::convert::cloud;
-use crate::start::{Finish, NodeError, warn_unused};
-use crate::{options, report};
+use crate::report;
+use crate::start::{Finish, NodeError, handed_over, open_params};
 use lattice_runtime::logging::Throttle;
 use lattice_runtime::qos::Qos;
 use lattice_runtime::{
@@ -36,6 +37,7 @@ enum Event {
     Odometry(Arc<Odometry>),
     Pose(Arc<PoseStamped>),
     Tick,
+    Settings(Box<TransformerOptions>),
     Finish,
 }
 
@@ -43,37 +45,36 @@ enum Event {
 pub fn start(runtime: &Runtime, name: &str) -> Result<Finish, NodeError> {
     let node = runtime.node(name)?;
     let params = node.params();
-    let transformer = TransformerOptions::from_params(params)?;
-    let source = transformer.ins.source;
-    let limits = ComputeLimits {
-        events: options::inbox_events(params, 8192)?,
-        bytes: transformer.max_waiting_bytes,
-        threads: options::threads(params, 0)?,
-    };
+    let settings = Settings::from_params(params)?;
+    let source = settings.transformer.ins.source;
     let [lost, lost_poses] = [(); 2].map(|()| Arc::new(AtomicU64::new(0)));
     let (lost_clouds, losses) = (Losses::default(), Losses::default());
     let mut shell = Shell {
         lost_clouds: lost_clouds.clone(),
         losses: losses.clone(),
-        machine: EnuTransformer::new(transformer),
+        machine: EnuTransformer::new(settings.transformer),
         outputs: Outputs::open(&node)?,
         clock: node.clock(),
         diagnostics: node.diagnostics(),
         lost: Arc::clone(&lost),
         lost_poses: Arc::clone(&lost_poses),
-        report_file: report::file(params)?,
+        report_file: settings.report_file,
     };
-    let compute = Compute::spawn(name, limits, runtime.shutdown_handle(), move |event| {
-        shell.on(event)
-    })?;
+    let compute = Compute::spawn(
+        name,
+        settings.limits,
+        runtime.shutdown_handle(),
+        move |event| shell.on(event),
+    )?;
     let inbox = compute.inbox();
     let mut clouds = Vec::new();
     let poses = PoseInbox {
         inbox: inbox.clone(),
         lost: lost_poses,
     };
-    let mut inputs = poses.subscribe_ins(&node, source)?;
-    for topic in params.string_array("points_topics", &["points"])? {
+    let (ins, imu) = (&settings.ins_topic, &settings.imu_topic);
+    let mut inputs = poses.subscribe_ins(&node, source, ins, imu)?;
+    for topic in settings.points_topics {
         let hand_over = inbox.counting(&lost, Event::Cloud, |cloud| cloud::bytes_of(cloud));
         clouds.push(node.subscribe(&topic, Qos::SCANS, Load::Large, hand_over)?);
     }
@@ -83,12 +84,16 @@ pub fn start(runtime: &Runtime, name: &str) -> Result<Finish, NodeError> {
     let (latched, transforms) = (Qos::TF_STATIC_LISTENER, |m| Event::Transforms(m, true));
     inputs.push(poses.subscribe(&node, "/tf_static", latched, transforms)?);
     losses.watch(inputs.iter().chain(&clouds));
+    let ticks = inbox.clone();
     let ticks = runtime.timer(Duration::from_millis(200), move || {
         // A full inbox is busy enough to look at its queue anyway.
-        let _ = inbox.send(Event::Tick, 0);
+        let _ = ticks.send(Event::Tick, 0);
     });
     log::info!("INS source {source}; azimuth 90 deg is yaw 0 (east)");
-    warn_unused(params);
+    open_params(params, move |params| {
+        let settings = Settings::from_params(params).map_err(|error| error.to_string())?;
+        handed_over(inbox.send(Event::Settings(Box::new(settings.transformer)), 0))
+    });
     Ok(Box::new(move || {
         drop((inputs, clouds, ticks));
         compute.finish_with(Event::Finish);
@@ -107,18 +112,17 @@ impl PoseInbox {
         &self,
         node: &Node,
         source: InsSource,
+        topic: &str,
+        imu: &str,
     ) -> Result<Vec<Subscription>, NodeError> {
-        let params = node.params();
-        let topic = params.string("ins.topic", "ins")?;
-        let imu = params.string("ins.imu_topic", "imu")?;
         let ins = match source {
-            InsSource::Inspva => self.subscribe(node, &topic, Qos::INS, Event::Inspva),
-            InsSource::Inspvax => self.subscribe(node, &topic, Qos::INS, Event::Inspvax),
-            InsSource::Odometry => self.subscribe(node, &topic, Qos::INS, Event::Odometry),
-            InsSource::Pose => self.subscribe(node, &topic, Qos::INS, Event::Pose),
+            InsSource::Inspva => self.subscribe(node, topic, Qos::INS, Event::Inspva),
+            InsSource::Inspvax => self.subscribe(node, topic, Qos::INS, Event::Inspvax),
+            InsSource::Odometry => self.subscribe(node, topic, Qos::INS, Event::Odometry),
+            InsSource::Pose => self.subscribe(node, topic, Qos::INS, Event::Pose),
             InsSource::NavsatfixImu => {
-                let fix = self.subscribe(node, &topic, Qos::INS, Event::Fix)?;
-                let imu = self.subscribe(node, &imu, Qos::INS, Event::Imu)?;
+                let fix = self.subscribe(node, topic, Qos::INS, Event::Fix)?;
+                let imu = self.subscribe(node, imu, Qos::INS, Event::Imu)?;
                 return Ok(vec![fix, imu]);
             }
         };
@@ -199,6 +203,10 @@ impl Shell {
                 let outputs = machine.tick(now_ns);
                 self.diagnose();
                 outputs
+            }
+            Event::Settings(options) => {
+                machine.set_options(*options);
+                machine.tick(now_ns)
             }
             Event::Finish => {
                 self.finish();

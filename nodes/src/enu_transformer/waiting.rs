@@ -80,6 +80,11 @@ impl Waiting {
         }
     }
 
+    /// Bounds the clouds from the next one on.
+    pub fn set_max_clouds(&mut self, max_clouds: usize) {
+        self.max_clouds = max_clouds.max(1);
+    }
+
     /// Adds a cloud and says how many older ones had to go for it.
     pub fn push(&mut self, cloud: WaitingCloud) -> u64 {
         self.bytes += cloud.bytes();

@@ -4,7 +4,7 @@ use std::io::ErrorKind;
 use std::thread::{self, JoinHandle};
 use std::time::Duration;
 
-use lattice_runtime::params::Params;
+use lattice_runtime::params::{ParamError, Params};
 
 use super::LatticeMapper;
 use super::map_folder::{MapFolder, Refusal};
@@ -12,6 +12,26 @@ use crate::start::NodeError;
 
 /// Longest time between two saves.
 const MAX_PERIOD_S: f64 = 86_400.0;
+
+/// Place and period of the saves of a map, and if the node goes on from there.
+pub(super) struct AutosaveOptions {
+    file: String,
+    /// Zero: never.
+    pub period: Duration,
+    resume: bool,
+}
+
+impl AutosaveOptions {
+    /// Reads the parameters `autosave_period_s`, `autosave_file` and `resume`.
+    pub(super) fn from_params(params: &Params) -> Result<Self, ParamError> {
+        let period_s = params.f64_in("autosave_period_s", 0.0, 0.0..=MAX_PERIOD_S)?;
+        Ok(Self {
+            file: params.string("autosave_file", "autosave.lattice")?,
+            period: Duration::from_secs_f64(period_s),
+            resume: params.bool("resume", false)?,
+        })
+    }
+}
 
 /// State of a map, as [`LatticeMapper::state`] gives it.
 type State = (u64, u64);
@@ -30,23 +50,20 @@ pub(super) struct Autosave {
 }
 
 impl Autosave {
-    /// Reads the parameters `autosave_period_s`, `autosave_file` and `resume`; with `resume` the map of
-    /// the file, if there is one, becomes the machine's.
+    /// With `resume` the map of the file, if there is one, becomes the machine's.
     pub(super) fn start(
-        params: &Params,
+        options: AutosaveOptions,
         maps: &MapFolder,
         machine: &mut LatticeMapper,
         max_voxels: usize,
     ) -> Result<Self, NodeError> {
-        let period_s = params.f64_in("autosave_period_s", 0.0, 0.0..=MAX_PERIOD_S)?;
-        let file = params.string("autosave_file", "autosave.lattice")?;
-        if params.bool("resume", false)? {
-            resume(maps, &file, machine, max_voxels)?;
+        if options.resume {
+            resume(maps, &options.file, machine, max_voxels)?;
         }
         Ok(Self {
             maps: maps.clone(),
-            file,
-            period: Duration::from_secs_f64(period_s),
+            file: options.file,
+            period: options.period,
             saved: machine.state(),
             writing: None,
             failed: None,
@@ -178,7 +195,12 @@ mod tests {
         let params = Params::load(&args, "/lattice_mapper").unwrap();
         let maps = MapFolder::new(&folder.display().to_string()).unwrap();
         let mut machine = machine(kind);
-        let autosave = Autosave::start(&params, &maps, &mut machine, 1000)?;
+        let autosave = Autosave::start(
+            AutosaveOptions::from_params(&params)?,
+            &maps,
+            &mut machine,
+            1000,
+        )?;
         Ok((machine, autosave))
     }
 

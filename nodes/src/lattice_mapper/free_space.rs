@@ -72,6 +72,20 @@ impl FreeSpace {
         }))
     }
 
+    /// Goes on with other options, except for method, memory and free level.
+    pub(super) fn set_options(&mut self, options: &MappedFreeSpace, max_points: usize) {
+        (self.sweep_ns, self.max_points) = (options.sweep_ns, max_points);
+        match &mut self.method {
+            Method::Clear(clearer) => clearer.set_options(options.clear),
+            Method::Evidence(map) => {
+                // They were checked when they were read.
+                if let Err(error) = map.set_weights(options.evidence, options.clear.reach) {
+                    log::error!("{error}");
+                }
+            }
+        }
+    }
+
     /// True if a cloud of this time begins another sweep, so that this one is to be cleared before
     /// its points are inserted.
     pub(super) fn is_complete(&self, stamp_ns: i64) -> bool {

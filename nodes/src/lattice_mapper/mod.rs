@@ -12,6 +12,7 @@ mod occupancy;
 mod operations;
 mod options;
 mod outputs;
+mod parameters;
 mod refusal;
 mod report;
 mod services;
@@ -20,6 +21,7 @@ pub use counts::MapperCounts;
 pub use free_options::{FreeSpaceMethod, MappedFreeSpace};
 pub use operations::LoadRefusal;
 pub use options::{MapPayload, MapperOptions};
+pub use parameters::declare;
 pub use refusal::CloudRefusal;
 pub use report::MapperReport;
 
@@ -80,10 +82,8 @@ impl LatticeMapper {
             .with_when_full(options.when_full);
         let occupancy = (options.payload == MapPayload::Occupancy)
             .then(|| OccupancyMap::new(&list, max_voxels, options.max_map_bytes));
-        let age_ns = options.forget_after_ns;
-        let step_ns = (age_ns / 2).max(SECOND_NS);
         Ok(Self {
-            stamps: (age_ns > 0).then(|| StampGate::new(step_ns, step_ns, AGREEING_CLOUDS)),
+            stamps: Self::stamp_gate(options.forget_after_ns),
             options,
             list,
             occupancy,
@@ -97,6 +97,27 @@ impl LatticeMapper {
             counts: MapperCounts::default(),
             shells: OnceLock::new(),
         })
+    }
+
+    /// Goes on with other options; those that the map is made with stay as they are.
+    pub fn set_options(&mut self, options: MapperOptions) {
+        let max_voxels = options.voxel_limit();
+        self.list.set_bound(max_voxels, options.when_full);
+        if let Some(occupancy) = &mut self.occupancy {
+            occupancy.set_max_voxels(max_voxels);
+        }
+        if let Some(free_space) = &mut self.free_space {
+            free_space.set_options(&options.free_space, options.max_cloud_points);
+        }
+        if self.options.forget_after_ns != options.forget_after_ns {
+            self.stamps = Self::stamp_gate(options.forget_after_ns);
+        }
+        self.options = options;
+    }
+
+    fn stamp_gate(age_ns: i64) -> Option<StampGate> {
+        let step_ns = (age_ns / 2).max(SECOND_NS);
+        (age_ns > 0).then(|| StampGate::new(step_ns, step_ns, AGREEING_CLOUDS))
     }
 
     /// Takes the geodetic origin of the map frame, which the map carries along.

@@ -1,7 +1,7 @@
 //! The mapper as a ROS node: a thin shell around [`LatticeMapper`].
 
 use std::collections::VecDeque;
-use std::sync::atomic::{AtomicBool, AtomicU64, Ordering};
+use std::sync::atomic::{AtomicBool, AtomicU64, AtomicUsize, Ordering};
 use std::sync::{Arc, Mutex, Once};
 use std::thread::JoinHandle;
 use std::time::{Duration, SystemTime, UNIX_EPOCH};
@@ -14,15 +14,16 @@ use lattice_msgs::std_msgs::Empty;
 use super::autosave::Autosave;
 use super::map_folder::MapFolder;
 use super::outputs::Outputs;
+use super::parameters::Settings;
 use super::services::{self, Call};
 use super::{LatticeMapper, MapperOptions, MapperReport};
-use crate::compute::{Compute, ComputeLimits, Inbox};
+use crate::compute::{Compute, Inbox};
 use crate::convert::cloud;
-use crate::start::{Finish, NodeError, warn_unused};
-use crate::{options, report};
+use crate::report;
+use crate::start::{Finish, NodeError, handed_over, open_params};
 use lattice_runtime::logging::Throttle;
 use lattice_runtime::qos::Qos;
-use lattice_runtime::{Diagnostics, Level, Load, Losses, Node, Runtime, lock};
+use lattice_runtime::{Diagnostics, Level, Load, Losses, Runtime, lock};
 
 /// Chunks of a keyframe published in one update period: 3 MB.
 const CHUNKS_PER_ROUND: usize = 50;
@@ -37,6 +38,7 @@ enum Event {
     Centers,
     Free,
     Autosave,
+    Settings(Box<MapperOptions>, Duration),
     Reset,
     Call(Call),
     Finish,
@@ -46,28 +48,19 @@ enum Event {
 pub fn start(runtime: &Runtime, name: &str) -> Result<Finish, NodeError> {
     let node = runtime.node(name)?;
     let params = node.params();
-    let mapper = MapperOptions::from_params(params)?;
-    let limits = ComputeLimits {
-        events: options::inbox_events(params, 4096)?,
-        bytes: options::inbox_bytes(params, 256 << 20)?,
-        threads: options::threads(params, 0)?,
-    };
-    let update_period = period(&node, "update_period_s", 0.2)?;
-    let centers_period = period(&node, "centers_period_s", 1.0)?;
-    let free_period = period(&node, "free_period_s", 1.0)?;
-    let has_free = mapper.free_space.free_level > 0;
+    let settings = Settings::from_params(params)?;
+    let (maps, old) = (settings.maps, settings.mapper.clone());
     let lost = Arc::new(AtomicU64::new(0));
     let (clouds, inputs) = (Losses::default(), Losses::default());
     let wishes = Arc::new(Wishes::default());
-    let max_voxels = mapper.voxel_limit();
-    let maps = MapFolder::from_params(params)?;
-    let mut machine = LatticeMapper::new(mapper, epoch())?;
-    let autosave = Autosave::start(params, &maps, &mut machine, max_voxels)?;
+    let max_voxels = Arc::new(AtomicUsize::new(old.voxel_limit()));
+    let mut machine = LatticeMapper::new(settings.mapper, epoch())?;
+    let autosave = Autosave::start(settings.autosave, &maps, &mut machine, old.voxel_limit())?;
     let autosave_period = autosave.period;
     let mut shell = Shell {
         machine,
         autosave,
-        outputs: Outputs::open(&node, has_free)?,
+        outputs: Outputs::open(&node, old.free_space.free_level > 0)?,
         diagnostics: node.diagnostics(),
         lost: Arc::clone(&lost),
         clouds: clouds.clone(),
@@ -81,12 +74,15 @@ pub fn start(runtime: &Runtime, name: &str) -> Result<Finish, NodeError> {
         writing: None,
         maps: maps.clone(),
         centers_of: None,
-        report_file: report::file(params)?,
+        report_file: settings.report_file,
     };
     let (map, centers) = (shell.outputs.map.clone(), shell.outputs.centers.clone());
-    let compute = Compute::spawn(name, limits, runtime.shutdown_handle(), move |event| {
-        shell.on(event)
-    })?;
+    let compute = Compute::spawn(
+        name,
+        settings.limits,
+        runtime.shutdown_handle(),
+        move |event| shell.on(event),
+    )?;
     let inbox = compute.inbox();
     let hand_over = inbox.counting(&lost, Event::Cloud, |cloud| cloud::bytes_of(cloud));
     let points = node.subscribe("points_enu", Qos::SCANS, Load::Large, hand_over)?;
@@ -112,21 +108,28 @@ pub fn start(runtime: &Runtime, name: &str) -> Result<Finish, NodeError> {
     })?;
     clouds.watch([&points]);
     inputs.watch([&points, &origins, &asked]);
-    let calls = services::serve(&node, &inbox, Event::Call, maps, max_voxels)?;
-    let updates = inbox.clone();
-    let mut timers = vec![runtime.timer(update_period, move || notify(&updates, Event::Update))];
-    if has_free {
-        let free = inbox.clone();
-        timers.push(runtime.timer(free_period, move || notify(&free, Event::Free)));
-    }
-    if !autosave_period.is_zero() {
-        let autosave = inbox.clone();
-        timers.push(runtime.timer(autosave_period, move || notify(&autosave, Event::Autosave)));
-    }
-    timers.push(runtime.timer(centers_period, move || notify(&inbox, Event::Centers)));
-    warn_unused(params);
+    let calls = services::serve(&node, &inbox, Event::Call, maps, Arc::clone(&max_voxels))?;
+    let timer = |period, event: fn() -> Event| {
+        let inbox = inbox.clone();
+        runtime.timer(period, move || notify(&inbox, event()))
+    };
+    let updates = timer(settings.update_period, || Event::Update);
+    let centers = timer(settings.centers_period, || Event::Centers);
+    let free = timer(settings.free_period, || Event::Free);
+    let autosave = timer(autosave_period, || Event::Autosave);
+    open_params(params, move |params| {
+        let settings = Settings::changed(params, &old).map_err(|error| error.to_string())?;
+        let (limit, saves) = (settings.mapper.voxel_limit(), settings.autosave.period);
+        handed_over(inbox.send(Event::Settings(Box::new(settings.mapper), saves), 0))?;
+        max_voxels.store(limit, Ordering::Relaxed);
+        updates.set(settings.update_period);
+        centers.set(settings.centers_period);
+        free.set(settings.free_period);
+        autosave.set(saves);
+        Ok(())
+    });
     Ok(Box::new(move || {
-        drop((points, origins, asked, timers));
+        drop((points, origins, asked));
         compute.finish_with(Event::Finish);
         Box::new((request_keyframe, reset, calls))
     }))
@@ -151,11 +154,6 @@ fn notify(inbox: &Inbox<Event>, event: Event) {
 fn epoch() -> u64 {
     let since = SystemTime::now().duration_since(UNIX_EPOCH);
     since.map_or(1, |since| since.as_nanos() as u64)
-}
-
-fn period(node: &Node, name: &str, default_s: f64) -> Result<Duration, NodeError> {
-    let seconds = node.params().f64_in(name, default_s, 0.01..=86_400.0)?;
-    Ok(Duration::from_secs_f64(seconds))
 }
 
 /// State of the compute thread.
@@ -205,6 +203,10 @@ impl Shell {
             Event::Centers => self.centers(),
             Event::Free => self.free(),
             Event::Autosave => self.autosave.save(&self.machine),
+            Event::Settings(options, saves) => {
+                self.machine.set_options(*options);
+                self.autosave.period = saves;
+            }
             Event::Reset => {
                 self.machine.reset(epoch());
                 self.replaced();

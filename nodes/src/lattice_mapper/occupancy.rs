@@ -43,6 +43,11 @@ impl OccupancyMap {
         self.sequence
     }
 
+    /// Bounds the voxels from now on.
+    pub(super) fn set_max_voxels(&mut self, max_voxels: usize) {
+        self.max_voxels = max_voxels;
+    }
+
     /// Most memory, bytes.
     pub(super) fn max_bytes(&self) -> usize {
         self.list.max_bytes()

@@ -1,5 +1,7 @@
 //! The services of the node: requests become events, files are read and written on threads of their own.
 
+use std::sync::Arc;
+use std::sync::atomic::{AtomicUsize, Ordering};
 use std::thread::{self, JoinHandle};
 
 use lattice_core::voxels::file::MapContents;
@@ -32,11 +34,12 @@ pub(super) fn serve<E: Send + 'static>(
     inbox: &Inbox<E>,
     wrap: fn(Call) -> E,
     maps: MapFolder,
-    max_voxels: usize,
+    max_voxels: Arc<AtomicUsize>,
 ) -> Result<[Server; 4], NodeError> {
     let to = inbox.clone();
     let load = node.service_later::<LoadMap>("~/load_map", move |request, reply| {
         let (to, late, maps) = (to.clone(), reply.clone(), maps.clone());
+        let max_voxels = max_voxels.load(Ordering::Relaxed);
         let read = move || {
             load(&maps, &request, max_voxels, reply, |call| {
                 to.send(wrap(call), 0)

@@ -102,6 +102,14 @@ impl MapFollower {
         }
     }
 
+    /// Keeps at most so many from now on; a map that is larger stays until a message of it comes.
+    pub fn set_max_voxels(&mut self, max_voxels: usize) {
+        if max_voxels > self.max_voxels {
+            self.too_large = None;
+        }
+        self.max_voxels = max_voxels;
+    }
+
     /// The map as far as it is complete.
     pub fn map(&self) -> Option<&FollowedMap> {
         self.map.as_ref()

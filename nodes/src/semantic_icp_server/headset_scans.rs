@@ -28,6 +28,14 @@ impl HeadsetScans {
         }
     }
 
+    /// Keeps so many from now on.
+    pub fn set_bounds(&mut self, max: usize, period_ns: i64) {
+        (self.max, self.period_ns) = (max.max(1), period_ns);
+        while self.kept.len() > self.max {
+            self.kept.pop_front();
+        }
+    }
+
     /// Adds a cloud; it replaces the newest if that has not been there for the period, and the oldest
     /// if there are too many. A headset that looks around slowly is seen from several sides.
     pub fn push(&mut self, headset_scan: Arc<HeadsetScan>, stamp_ns: i64, now_ns: i64) {

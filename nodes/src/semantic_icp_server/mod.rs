@@ -8,6 +8,7 @@ mod headset_scans;
 mod intake;
 pub mod node;
 mod options;
+mod parameters;
 mod results;
 mod search;
 mod search_thread;
@@ -15,6 +16,7 @@ mod state;
 
 pub use counts::ServerCounts;
 pub use options::{SearchWhen, ServerOptions, WhenBusy};
+pub use parameters::declare;
 pub use search::{Done, Job, LatticeSearch, MapCloud, Search, Work};
 
 use std::collections::BTreeMap;

@@ -14,17 +14,18 @@ use lattice_msgs::sensor_msgs::PointCloud2;
 use lattice_msgs::std_msgs::{Empty, String as StringMessage};
 use lattice_msgs::vision_msgs::LabelInfo;
 
+use super::parameters::Settings;
 use super::search_thread::{SearchPort, SearchThread};
 use super::{CallId, End, LatticeSearch, Output, SemanticIcpServer, ServerOptions};
-use crate::compute::{Compute, ComputeLimits, Inbox};
+use crate::compute::{Compute, Inbox};
 use crate::convert::cloud;
-use crate::start::{Finish, NodeError, warn_unused};
-use crate::{options, report};
+use crate::report;
+use crate::start::{Finish, NodeError, handed_over, open_params};
 use lattice_runtime::logging::Throttle;
 use lattice_runtime::qos::Qos;
 use lattice_runtime::{
     ActionLimits, Clock, Diagnostics, Feedback, GoalHandle, Level, Load, Losses, Publisher, Reply,
-    Runtime, TfBroadcaster, Undecoded,
+    Runtime, TfBroadcaster, Undecoded, lock,
 };
 
 /// Between two messages on diagnostics.
@@ -44,6 +45,7 @@ enum Event {
     Look,
     Tick,
     Diagnose,
+    Settings(Box<ServerOptions>),
     Finish,
 }
 
@@ -51,16 +53,15 @@ enum Event {
 pub fn start(runtime: &Runtime, name: &str) -> Result<Finish, NodeError> {
     let node = runtime.node(name)?;
     let params = node.params();
-    let server = ServerOptions::from_params(params)?;
-    let limits = ComputeLimits {
-        events: options::inbox_events(params, 4096)?,
-        bytes: options::inbox_bytes(params, 256 << 20)?,
-        threads: 1,
-    };
-    let threads = options::threads(params, 0)?;
-    let rate_hz = params.f64_in("tf_rate_hz", 10.0, 0.1..=100.0)?;
-    let mapper = params.string("mapper", "lattice_mapper")?;
+    let Settings {
+        server,
+        limits,
+        search_threads,
+        tf_period,
+        mapper,
+    } = Settings::from_params(params)?;
     let search = LatticeSearch::new(server.calibration);
+    let calibration = search.options();
     let lost = Arc::new(AtomicU64::new(0));
     let map_lost = Arc::new(AtomicBool::new(false));
     let outputs = Outputs {
@@ -90,7 +91,7 @@ pub fn start(runtime: &Runtime, name: &str) -> Result<Finish, NodeError> {
     let wake = inbox.clone();
     let thread = SearchThread::spawn(
         &format!("{name} search"),
-        threads,
+        search_threads,
         runtime.shutdown_handle(),
         search,
         move || notify(&wake, Event::Look),
@@ -145,16 +146,22 @@ pub fn start(runtime: &Runtime, name: &str) -> Result<Finish, NodeError> {
     )?);
     let goals = Arc::clone(&action);
     let ticks = inbox.clone();
-    let ticks = runtime.timer(Duration::from_secs_f64(1.0 / rate_hz), move || {
-        notify(&ticks, Event::Tick);
-    });
+    let tf_period = runtime.timer(tf_period, move || notify(&ticks, Event::Tick));
+    let diagnoses = inbox.clone();
     let seconds = runtime.timer(DIAGNOSE, move || {
         goals.expire();
-        notify(&inbox, Event::Diagnose);
+        notify(&diagnoses, Event::Diagnose);
     });
-    warn_unused(params);
+    open_params(params, move |params| {
+        let settings = Settings::from_params(params).map_err(|error| error.to_string())?;
+        let options = settings.server.calibration;
+        handed_over(inbox.send(Event::Settings(Box::new(settings.server)), 0))?;
+        *lock(&calibration) = options;
+        tf_period.set(settings.tf_period);
+        Ok(())
+    });
     Ok(Box::new(move || {
-        drop((maps, updates, clouds, sessions, infos, ticks));
+        drop((maps, updates, clouds, sessions, infos));
         compute.finish_with(Event::Finish);
         thread.finish();
         drop(seconds);
@@ -260,6 +267,10 @@ impl Shell {
                     .or(lost.then_some(Output::NeedKeyframe))
                     .into_iter()
                     .collect()
+            }
+            Event::Settings(options) => {
+                self.machine.set_options(*options);
+                Vec::new()
             }
             Event::Finish => self.machine.finish(),
         };

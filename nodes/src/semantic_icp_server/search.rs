@@ -1,13 +1,14 @@
 //! Searches and tracking as jobs for another thread.
 
 use std::ops::ControlFlow;
-use std::sync::Arc;
 use std::sync::atomic::{AtomicBool, Ordering::Relaxed};
+use std::sync::{Arc, Mutex};
 
 use lattice_core::registration::{
     Calibration, CalibrationMap, CalibrationOptions, CalibrationRequest, Confusion, HeadsetScan,
     Progress, SemanticCloud, Stage, TrackUpdate, Verdict, calibrate, track,
 };
+use lattice_runtime::lock;
 use nalgebra::Isometry3;
 
 /// A map to be made ready.
@@ -45,7 +46,7 @@ pub trait Search: Send + 'static {
 
 /// The search of the core.
 pub struct LatticeSearch {
-    options: CalibrationOptions,
+    options: Arc<Mutex<CalibrationOptions>>,
     map: Option<CalibrationMap>,
     /// Confusions of labels learned so far.
     confusion: Option<Confusion>,
@@ -55,10 +56,15 @@ impl LatticeSearch {
     /// Without a map.
     pub fn new(options: CalibrationOptions) -> Self {
         Self {
-            options,
+            options: Arc::new(Mutex::new(options)),
             map: None,
             confusion: None,
         }
+    }
+
+    /// The options, for the next job to go by.
+    pub fn options(&self) -> Arc<Mutex<CalibrationOptions>> {
+        Arc::clone(&self.options)
     }
 }
 
@@ -88,7 +94,8 @@ impl Search for LatticeSearch {
             start,
             confusion: self.confusion.as_ref(),
         };
-        let found = calibrate(map, &request, &self.options, progress);
+        let options = *lock(&self.options);
+        let found = calibrate(map, &request, &options, progress);
         if found.verdict == Verdict::Ok {
             self.confusion = Some(found.confusion.clone());
         }
@@ -101,7 +108,8 @@ impl Search for LatticeSearch {
         map_from_headset: &Isometry3<f64>,
     ) -> Option<TrackUpdate> {
         let map = self.map.as_ref()?;
-        Some(track(map, headset_scan, map_from_headset, &self.options))
+        let options = *lock(&self.options);
+        Some(track(map, headset_scan, map_from_headset, &options))
     }
 }
 

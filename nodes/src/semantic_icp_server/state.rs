@@ -44,6 +44,15 @@ impl Running {
 }
 
 impl SemanticIcpServer {
+    /// Goes on with other options; the searcher has its own.
+    pub fn set_options(&mut self, options: ServerOptions) {
+        self.follower.set_max_voxels(options.max_map_voxels);
+        let period_ns = options.headset_scan_period_ns;
+        self.headset_scans
+            .set_bounds(options.max_headset_scans, period_ns);
+        self.options = options;
+    }
+
     /// Begins what is due, if nothing is being calculated.
     pub(super) fn go_on(&mut self, now_ns: i64, out: &mut Vec<Output>) {
         if self.running.is_some() {

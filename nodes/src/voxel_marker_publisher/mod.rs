@@ -6,9 +6,11 @@ mod blocks;
 mod color;
 pub mod node;
 mod options;
+mod parameters;
 mod shape;
 
 pub use options::{ColorBy, MarkerOptions, MarkerStyle};
+pub use parameters::declare;
 
 use std::collections::BTreeSet;
 
@@ -106,6 +108,24 @@ impl VoxelMarkers {
         bytes
     }
 
+    /// Goes on with other options: everything is drawn again.
+    pub fn set_options(&mut self, options: MarkerOptions) {
+        self.follower.set_max_voxels(options.max_voxels);
+        if options.block_bits != self.options.block_bits {
+            self.blocks = Blocks::new(options.block_bits);
+            if let Some(map) = self.follower.map() {
+                let neighbors = map.lattice.face_neighbors();
+                for key in map.voxels().keys() {
+                    self.blocks.set(*key, true, neighbors, &mut self.dirty);
+                }
+            }
+        }
+        self.options = options;
+        self.style = self.wanted_style();
+        // Markers of other blocks or of another type go.
+        self.wipe();
+    }
+
     /// Takes a chunk of a keyframe.
     pub fn on_map(&mut self, message: &LatticeMap) -> Result<Followed, FollowError> {
         let result = self.follower.on_map(message);
@@ -200,6 +220,13 @@ impl VoxelMarkers {
         self.style
     }
 
+    fn wanted_style(&self) -> MarkerStyle {
+        match self.voxels() > self.options.max_marker_voxels {
+            true => MarkerStyle::Points,
+            false => self.options.style,
+        }
+    }
+
     fn after(&mut self, result: Result<Followed, FollowError>) -> Result<Followed, FollowError> {
         self.counts.messages_in += 1;
         match &result {
@@ -221,11 +248,7 @@ impl VoxelMarkers {
             let occupied = map.voxels().contains_key(&key);
             self.blocks.set(key, occupied, neighbors, &mut self.dirty);
         }
-        let wanted = if map.voxels().len() > self.options.max_marker_voxels {
-            MarkerStyle::Points
-        } else {
-            self.options.style
-        };
+        let wanted = self.wanted_style();
         if wanted != self.style {
             self.style = wanted;
             self.redraw();

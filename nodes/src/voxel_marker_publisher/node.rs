@@ -8,11 +8,12 @@ use lattice_msgs::lattice::{LatticeMap, LatticeMapUpdate};
 use lattice_msgs::std_msgs::Empty;
 use lattice_msgs::visualization_msgs::MarkerArray;
 
+use super::parameters::Settings;
 use super::{MarkerOptions, MarkerReport, VoxelMarkers};
-use crate::compute::{Compute, ComputeLimits};
+use crate::compute::Compute;
 use crate::map_follower::{FollowError, Followed};
-use crate::start::{Finish, NodeError, warn_unused};
-use crate::{options, report};
+use crate::report;
+use crate::start::{Finish, NodeError, handed_over, open_params};
 use lattice_runtime::logging::Throttle;
 use lattice_runtime::qos::Qos;
 use lattice_runtime::{Diagnostics, Level, Load, Losses, Publisher, Runtime, Undecoded};
@@ -26,6 +27,7 @@ enum Event {
     Update(Undecoded<LatticeMapUpdate>),
     Redraw,
     Draw,
+    Settings(MarkerOptions, usize),
     Finish,
 }
 
@@ -33,15 +35,7 @@ enum Event {
 pub fn start(runtime: &Runtime, name: &str) -> Result<Finish, NodeError> {
     let node = runtime.node(name)?;
     let params = node.params();
-    let markers = MarkerOptions::from_params(params)?;
-    let limits = ComputeLimits {
-        events: options::inbox_events(params, 4096)?,
-        bytes: options::inbox_bytes(params, 64 << 20)?,
-        threads: options::threads(params, 1)?,
-    };
-    let rate_hz = params.f64_in("rate_hz", 5.0, 0.1..=100.0)?;
-    let bytes_per_s = params.positive("max_bytes_per_s", 20_000_000)?;
-    let mapper = params.string("mapper", "lattice_mapper")?;
+    let settings = Settings::from_params(params)?;
     let publisher = node.publisher("voxel_markers", Qos::MARKERS)?;
     let lost = Arc::new(AtomicU64::new(0));
     let losses = Losses::default();
@@ -49,22 +43,28 @@ pub fn start(runtime: &Runtime, name: &str) -> Result<Finish, NodeError> {
         losses: losses.clone(),
         lost: Arc::clone(&lost),
         lost_seen: 0,
-        machine: VoxelMarkers::new(markers),
+        machine: VoxelMarkers::new(settings.markers),
         markers: publisher.clone(),
-        request: node.publisher(&format!("{mapper}/request_keyframe"), Qos::DEFAULT)?,
+        request: node.publisher(
+            &format!("{}/request_keyframe", settings.mapper),
+            Qos::DEFAULT,
+        )?,
         diagnostics: node.diagnostics(),
         refusals: Throttle::new(Duration::from_secs(5)),
         requests: Throttle::new(Duration::from_secs(1)),
         seconds: Throttle::new(Duration::from_secs(1)),
-        budget_bytes: (bytes_per_s as f64 / rate_hz) as usize,
+        budget_bytes: settings.budget_bytes,
         arrays_lost: 0,
         incomplete: false,
         repairs: Throttle::new(Duration::from_secs(5)),
-        report_file: report::file(params)?,
+        report_file: settings.report_file,
     };
-    let compute = Compute::spawn(name, limits, runtime.shutdown_handle(), move |event| {
-        shell.on(event)
-    })?;
+    let compute = Compute::spawn(
+        name,
+        settings.limits,
+        runtime.shutdown_handle(),
+        move |event| shell.on(event),
+    )?;
     let inbox = compute.inbox();
     let lost_map = Arc::clone(&lost);
     let lost_update = Arc::clone(&lost);
@@ -89,12 +89,18 @@ pub fn start(runtime: &Runtime, name: &str) -> Result<Finish, NodeError> {
     publisher.on_subscriber_joined(move || {
         let _ = joined.send(Event::Redraw, 0);
     });
-    let draws = runtime.timer(Duration::from_secs_f64(1.0 / rate_hz), move || {
-        let _ = inbox.send(Event::Draw, 0);
+    let draws = inbox.clone();
+    let period = runtime.timer(settings.period, move || {
+        let _ = draws.send(Event::Draw, 0);
     });
-    warn_unused(params);
+    open_params(params, move |params| {
+        let settings = Settings::from_params(params).map_err(|error| error.to_string())?;
+        period.set(settings.period);
+        let event = Event::Settings(settings.markers, settings.budget_bytes);
+        handed_over(inbox.send(event, 0))
+    });
     Ok(Box::new(move || {
-        drop((maps, updates, draws));
+        drop((maps, updates));
         compute.finish_with(Event::Finish);
         Box::new(())
     }))
@@ -151,6 +157,10 @@ impl Shell {
                 self.repair();
                 self.draw();
                 self.diagnose();
+            }
+            Event::Settings(markers, budget_bytes) => {
+                self.machine.set_options(markers);
+                self.budget_bytes = budget_bytes;
             }
             Event::Finish => self.finish(),
         }

@@ -7,6 +7,7 @@ mod client;
 mod conformance;
 mod cyclone;
 mod losses;
+mod params;
 mod peer;
 mod ros2_client_peer;
 mod security;

@@ -257,3 +257,22 @@ fn what_a_sweep_hits_it_does_not_clear() {
     assert!(seen(0) > 100);
     assert_eq!(seen(SECOND_NS), 0);
 }
+
+#[test]
+fn what_clears_can_be_changed_while_it_maps() {
+    for method in [FreeSpaceMethod::Clear, FreeSpaceMethod::Evidence] {
+        let mut changed = options(method, MapPayload::Centroid);
+        let mut mapper = maps::mapper(changed.clone());
+        // Nothing clears any more: all of each ray is kept.
+        changed.free_space.clear.reach.keep_ratio = 1.0;
+        let mut machine = Machine::new();
+        mapper.on_cloud(&machine.wall(3.0)).unwrap();
+        let stood = mapper.cells().len();
+        mapper.set_options(changed);
+        for _ in 0..4 {
+            mapper.on_cloud(&machine.wall(9.0)).unwrap();
+        }
+        assert_eq!(mapper.counts().voxels_cleared, 0);
+        assert!(mapper.cells().len() > stood);
+    }
+}

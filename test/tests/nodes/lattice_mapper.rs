@@ -3,7 +3,7 @@
 use lattice_core::lattice::LatticeKind;
 use lattice_msgs::cdr;
 use lattice_nodes::convert::cloud::{Precision, message_from_points};
-use lattice_nodes::lattice_mapper::MapperOptions;
+use lattice_nodes::lattice_mapper::{MapPayload, MapperOptions};
 use lattice_test::clouds::{cloud, header};
 use lattice_test::maps::{self, insert};
 use nalgebra::Vector3;
@@ -92,4 +92,26 @@ fn a_datum_far_away_loses_no_digit() {
     let mut near = maps::mapper(options());
     near.on_cloud(&message).unwrap();
     assert_eq!(near.counts().points_out_of_range, 100);
+}
+
+#[test]
+fn limits_can_be_changed_while_it_maps() {
+    for payload in [MapPayload::Centroid, MapPayload::Occupancy] {
+        let options = |max_voxels, max_cloud_points| MapperOptions {
+            payload,
+            max_voxels,
+            max_cloud_points,
+            ..maps::options(LatticeKind::Cubic, 0.125)
+        };
+        let mut mapper = maps::mapper(options(100, 10_000));
+        insert(&mut mapper, &scatter(1, 5000, [0.0; 3], 50.0));
+        assert_eq!(mapper.cells().len(), 100);
+        mapper.set_options(options(300, 10_000));
+        insert(&mut mapper, &scatter(2, 5000, [0.0; 3], 50.0));
+        assert_eq!(mapper.cells().len(), 300);
+        mapper.set_options(options(200, 10));
+        assert!(mapper.on_cloud(&cloud("map", 1, &[[1.0; 3]; 11])).is_err());
+        insert(&mut mapper, &[[200.0; 3]]);
+        assert_eq!(mapper.cells().len(), 300, "no more than there are");
+    }
 }

@@ -293,3 +293,29 @@ fn a_map_too_large_for_cells_is_drawn_as_points() {
     assert_eq!(bench.markers.style(), MarkerStyle::Points);
     assert_eq!(bench.shown_points(), 100);
 }
+
+#[test]
+fn other_options_draw_all_of_it_anew() {
+    let mut bench = Bench::new(LatticeKind::Fcc, MarkerOptions::default());
+    bench.insert(&line(100, 1.0));
+    let cells = bench.shown_points();
+    for (style, block_bits, points) in [
+        (MarkerStyle::Points, 3, 100),
+        (MarkerStyle::Points, 5, 100),
+        (MarkerStyle::Cells, 2, cells),
+    ] {
+        bench.markers.set_options(MarkerOptions {
+            style,
+            block_bits,
+            ..MarkerOptions::default()
+        });
+        bench.draw();
+        assert_eq!(bench.shown_points(), points, "{style:?} {block_bits}");
+    }
+    bench.insert(&line(120, 1.0));
+    bench.draw();
+    assert!(
+        bench.shown_points() > cells,
+        "changes are followed as before"
+    );
+}

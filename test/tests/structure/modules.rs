@@ -21,9 +21,9 @@ const LAYERS: [(&str, &str); 3] = [
     (
         "nodes/runtime/src",
         "sync names param_value params_file ros_args params security env logging qos error shutdown \
-         task_thread clock diagnostics loopback_domain port confine dds cyclone peers gate endpoints outbox graph \
-         local_bus publisher subscription service rosout shared node param_services action tf \
-         lifecycle process",
+         task_thread timer clock diagnostics loopback_domain port confine dds cyclone peers gate endpoints outbox graph \
+         local_bus publisher subscription service rosout shared node param_services \
+         logger_services type_description action tf lifecycle process",
     ),
 ];
 

@@ -1,11 +1,14 @@
-//! Parameter files have every parameter of the nodes, and no other.
+//! Parameter files have every parameter of the nodes, and no other; what they say of them is what the code
+//! declares.
+
+use std::collections::BTreeMap;
 
 use lattice_lab::datasets;
+use lattice_nodes::bag_player;
 use lattice_nodes::enu_transformer::TransformerOptions;
+use lattice_nodes::executables::PARAMETERS;
 use lattice_nodes::lattice_mapper::MapperOptions;
-use lattice_nodes::semantic_icp_server::ServerOptions;
-use lattice_nodes::voxel_marker_publisher::MarkerOptions;
-use lattice_runtime::params::Params;
+use lattice_runtime::params::{ParamValue, Params};
 use lattice_runtime::ros_args::RosArgs;
 
 use super::root;
@@ -16,65 +19,94 @@ fn params(file: &str, node: &str) -> Params {
     Params::load(&RosArgs::parse(arguments).unwrap(), node).unwrap()
 }
 
-/// Reader of the options of a node.
-type ReadOptions = fn(&Params);
+/// Every node with the file that has all its parameters.
+fn nodes() -> impl Iterator<Item = (&'static str, &'static str, Params)> {
+    let player = (bag_player::NAME, bag_player::declare as _);
+    let all = PARAMETERS.into_iter().chain([player]);
+    all.map(|(node, declare)| {
+        let file = match node {
+            "semantic_icp_server" => "semantic_icp.yaml",
+            _ => "bobcat.yaml",
+        };
+        let params = params(file, &format!("/robot/{node}"));
+        declare(&params).unwrap();
+        (file, node, params)
+    })
+}
 
-/// A node of the loader, what reads its options, and the parameters that its shell reads.
-const NODES: [(&str, ReadOptions, &str); 3] = [
-    (
-        "enu_transformer",
-        |params| _ = TransformerOptions::from_params(params).unwrap(),
-        "inbox_events ins.imu_topic ins.topic points_topics report_file threads",
-    ),
-    (
-        "lattice_mapper",
-        |params| _ = MapperOptions::from_params(params).unwrap(),
-        "autosave_file autosave_period_s centers_period_s free_period_s inbox_bytes inbox_events \
-         map_dir report_file resume \
-         threads update_period_s",
-    ),
-    (
-        "voxel_marker_publisher",
-        |params| _ = MarkerOptions::from_params(params).unwrap(),
-        "inbox_bytes inbox_events mapper max_bytes_per_s rate_hz report_file threads",
-    ),
-];
-
-fn missing(params: &Params) -> Vec<String> {
-    let declared = params.declared().into_keys();
-    declared.filter(|name| !params.is_given(name)).collect()
+/// Comments of the parameters of a node in a file, by full name.
+fn comments(file: &str, node: &str) -> BTreeMap<String, String> {
+    let text = std::fs::read_to_string(root().join("params").join(file)).unwrap();
+    let mut found = BTreeMap::new();
+    let (mut path, mut comment) = (Vec::new(), String::new());
+    let lines = text.lines();
+    let lines = lines.skip_while(|line| *line != format!("/**/{node}:"));
+    for line in lines.skip(2).take_while(|line| !line.starts_with("/**")) {
+        let depth = (line.len() - line.trim_start().len()) / 2;
+        if let Some(more) = line.trim_start().strip_prefix("# ") {
+            comment = format!("{comment} {more}").trim_start().to_owned();
+        } else if let Some((key, value)) = line.trim_start().split_once(':') {
+            path.truncate(depth.saturating_sub(2));
+            path.push(key);
+            let comment = std::mem::take(&mut comment);
+            if !value.is_empty() {
+                found.insert(path.join("."), comment);
+            }
+        }
+    }
+    found
 }
 
 #[test]
-fn the_file_for_the_simulated_loader_has_every_parameter_and_no_other() {
-    for (node, read, shell) in NODES {
-        for namespace in ["", "/robot"] {
-            let params = params("bobcat.yaml", &format!("{namespace}/{node}"));
-            read(&params);
-            assert_eq!(params.unused().join(" "), shell);
-            assert_eq!(missing(&params), Vec::<String>::new());
+fn the_files_have_every_parameter_and_no_other() {
+    for (file, node, params) in nodes() {
+        assert_eq!(params.unused(), [""; 0], "{file}: {node}");
+        let declared = params.declared().into_keys();
+        let missing: Vec<_> = declared.filter(|name| !params.is_given(name)).collect();
+        assert_eq!(missing, [""; 0], "{file}: {node}");
+    }
+}
+
+#[test]
+fn the_files_say_what_the_code_declares() {
+    for (file, node, params) in nodes() {
+        let comments = comments(file, node);
+        for (name, declared) in params.described() {
+            let comment = comments.get(&name).map_or("", String::as_str);
+            let (says, here) = comment.split_once(" Here: ").unwrap_or((comment, ""));
+            assert_eq!(says, declared.text(), "{file}: {node}: {name}");
+            let is_default = declared.value == declared.default;
+            assert!(
+                is_default || !here.is_empty(),
+                "{file}: {node}: {name}: the default is {}",
+                declared.default
+            );
         }
     }
 }
 
 #[test]
-fn the_file_for_a_headset_has_every_parameter_and_its_default() {
-    let params = params("semantic_icp.yaml", "/robot/semantic_icp_server");
-    let options = ServerOptions::from_params(&params).unwrap();
-    assert_eq!(
-        format!("{options:?}"),
-        format!("{:?}", ServerOptions::default())
-    );
-    let shell = [
-        "inbox_bytes",
-        "inbox_events",
-        "mapper",
-        "tf_rate_hz",
-        "threads",
-    ];
-    assert_eq!(params.unused(), shell);
-    assert_eq!(missing(&params), Vec::<String>::new());
-    let params = self::params("semantic_icp.yaml", "/lattice_mapper");
+fn every_parameter_is_described_with_its_unit() {
+    let units = "_m _s _hz _rad _deg _m3 _per_s".split(' ');
+    let units: Vec<_> = units.collect();
+    let numbers = "robability hare raction pacity likelihood scale seconds".split(' ');
+    let numbers: Vec<_> = numbers.collect();
+    for (_, node, params) in nodes() {
+        for (name, declared) in params.described() {
+            let text = declared.text();
+            assert!(text.ends_with('.'), "{node}: {name} is not described");
+            let has_unit = units.iter().any(|unit| name.ends_with(unit));
+            if matches!(declared.default, ParamValue::F64(_)) && !has_unit {
+                let is_number = numbers.iter().any(|word| text.contains(word));
+                assert!(is_number, "{node}: the unit of {name}");
+            }
+        }
+    }
+}
+
+#[test]
+fn the_headset_has_a_map_with_labels() {
+    let params = params("semantic_icp.yaml", "/lattice_mapper");
     let options = MapperOptions::from_params(&params).unwrap();
     assert!(options.labels.is_some() && params.unused().is_empty());
 }

@@ -26,6 +26,11 @@ impl VoxelList {
         self
     }
 
+    /// Goes on with another bound and policy; voxels beyond the bound stay until room is made.
+    pub fn set_bound(&mut self, max_voxels: usize, when_full: WhenFull) {
+        (self.max_voxels, self.when_full) = (max_voxels, when_full);
+    }
+
     /// Policy when the list is full.
     pub fn when_full(&self) -> WhenFull {
         self.when_full

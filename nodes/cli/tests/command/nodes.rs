@@ -146,3 +146,20 @@ fn every_command_has_help() {
         assert!(text(&[command, "--help"]).contains("Usage"));
     }
 }
+
+#[test]
+fn the_help_of_a_node_has_every_parameter() {
+    let help = text(&["node", "lattice_mapper", "--help"]);
+    for line in [
+        "  max_voxels: integer, 1 or more (default 20000000)\n      Most voxels.",
+        "  lattice [fixed]: string (default \"fcc\")\n      cubic, bcc",
+        "  when_full: string, refuse or forget_oldest (default \"refuse\")",
+    ] {
+        assert!(help.contains(line), "{help}");
+    }
+    let player = text(&["node", "bag_player", "-h"]);
+    assert!(
+        player.contains("  rate: double, 0.001 to 1000 (default 1.0)"),
+        "{player}"
+    );
+}

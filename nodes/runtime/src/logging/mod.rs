@@ -1,18 +1,25 @@
-//! The console log in the form of rcutils, and a tap for `/rosout`.
+//! The log of the process in the form of rcutils: to the console, to a file, and to a tap for `/rosout`.
 
+mod file;
+mod layout;
+mod levels;
 mod plan;
 mod throttle;
 
+pub(crate) use levels::{level, set_level};
 pub use throttle::Throttle;
 
 use crate::ros_args::RosArgs;
-use env_logger::{Builder, Logger};
+use crate::sync::lock;
+use env_logger::Logger;
+use file::LogFile;
+use layout::Layout;
+use levels::Console;
 use log::{Level, Log, Metadata, Record, SetLoggerError};
 use plan::Plan;
 use std::{
     cell::Cell,
-    io::Write,
-    sync::OnceLock,
+    sync::{Arc, Mutex, OnceLock},
     time::{Duration, SystemTime, UNIX_EPOCH},
 };
 
@@ -29,41 +36,38 @@ thread_local! {
     static IN_SINK: Cell<bool> = const { Cell::new(false) };
 }
 
-/// Starts logging to the console for a process whose node is `node_name`.
+/// Starts logging for a process whose node is `node_name`.
 ///
 /// `--log-level` decides what is shown, without it `RUST_LOG`, without both `info`. Prints the
 /// warnings of the command line. Fails if a logger is there already.
 pub fn init(args: &RosArgs, node_name: &str) -> Result<(), SetLoggerError> {
-    let plan = Plan::new(args, node_name, |name| std::env::var(name).ok());
-    let mut builder = Builder::new();
-    for (target, level) in &plan.filters {
-        let _ = builder.filter(target.as_deref(), *level);
-    }
-    if let Some(text) = &plan.rust_log {
-        let _ = builder.parse_filters(text);
-    }
-    let name = node_name.to_owned();
-    let _ = builder
-        .write_style(plan.style)
-        .format(move |buffer, record| {
-            let style = buffer.default_level_style(record.level());
-            let now = SystemTime::now()
-                .duration_since(UNIX_EPOCH)
-                .unwrap_or_default();
-            let line = line(record, now.as_nanos(), source(record.target(), &name));
-            writeln!(buffer, "{style}{line}{style:#}")
-        });
-    let console = builder.build();
-    let level = console.filter();
+    let lookup = |name: &str| std::env::var(name).ok();
+    let layout = Arc::new(Layout::new(&lookup));
+    let plan = Plan::new(args, node_name, lookup);
+    let console = Console::new(plan, Arc::clone(&layout), node_name);
+    let first = console.build();
+    let level = first.filter();
+    let shown = Arc::new(Mutex::new(Arc::new(first)));
+    let file = match args.no_log_file {
+        true => None,
+        false => Some(LogFile::open(args.log_file_name.as_deref(), lookup)),
+    };
+    let (file, refused) = match file.transpose() {
+        Ok(file) => (file, None),
+        Err(problem) => (None, Some(problem)),
+    };
     let logger = Tee {
-        console,
+        console: Arc::clone(&shown),
         to_console: !args.no_stdout_logs,
+        layout,
+        file,
         node_name: node_name.to_owned(),
         rustdds: Throttle::new(RUSTDDS_PERIOD),
     };
     log::set_boxed_logger(Box::new(logger))?;
     log::set_max_level(level);
-    for warning in &args.warnings {
+    levels::install(console, shown);
+    for warning in args.warnings.iter().chain(&refused) {
         log::warn!("{warning}");
     }
     Ok(())
@@ -75,49 +79,58 @@ pub fn tee(sink: Sink) -> bool {
 }
 
 struct Tee {
-    console: Logger,
+    /// Replaced when a level is set.
+    console: Arc<Mutex<Arc<Logger>>>,
     to_console: bool,
+    layout: Arc<Layout>,
+    file: Option<LogFile>,
     node_name: String,
     rustdds: Throttle,
 }
 
 impl Log for Tee {
     fn enabled(&self, metadata: &Metadata<'_>) -> bool {
-        self.console.enabled(metadata)
+        self.console().enabled(metadata)
     }
 
     fn log(&self, record: &Record<'_>) {
-        if !self.console.matches(record) {
-            return;
-        }
-        if self.is_flood(record) {
+        let console = self.console();
+        if !console.matches(record) || self.is_flood(&console, record) {
             return;
         }
         if self.to_console {
-            self.console.log(record);
+            console.log(record);
+        }
+        let source = source(record.target(), &self.node_name);
+        if let Some(file) = &self.file {
+            file.write(&self.layout.line(record, now_ns(), source));
         }
         if let Some(sink) = SINK.get()
             && !IN_SINK.replace(true)
         {
-            sink(record, source(record.target(), &self.node_name));
+            sink(record, source);
             IN_SINK.set(false);
         }
     }
 
     fn flush(&self) {
-        self.console.flush();
+        self.console().flush();
     }
 }
 
 impl Tee {
+    fn console(&self) -> Arc<Logger> {
+        Arc::clone(&lock(&self.console))
+    }
+
     /// True for an error of RustDDS soon after another, unless its warnings are asked for too.
-    fn is_flood(&self, record: &Record<'_>) -> bool {
+    fn is_flood(&self, console: &Logger, record: &Record<'_>) -> bool {
         let target = record.target();
         let warning = Metadata::builder()
             .level(Level::Warn)
             .target(target)
             .build();
-        if !target.starts_with(plan::RUSTDDS) || self.console.enabled(&warning) {
+        if !target.starts_with(plan::RUSTDDS) || console.enabled(&warning) {
             return false;
         }
         match self.rustdds.check() {
@@ -127,6 +140,11 @@ impl Tee {
         }
         false
     }
+}
+
+fn now_ns() -> u128 {
+    let since = SystemTime::now().duration_since(UNIX_EPOCH);
+    since.unwrap_or_default().as_nanos()
 }
 
 /// The node of a record: the process's, unless the record has a target that is no module path.
@@ -139,29 +157,10 @@ fn source<'a>(target: &'a str, node_name: &'a str) -> &'a str {
     }
 }
 
-/// `[INFO] [seconds.nanoseconds] [node]: text`, as rcutils prints it.
-fn line(record: &Record<'_>, now_ns: u128, source: &str) -> String {
-    let (seconds, nanoseconds) = (now_ns / 1_000_000_000, now_ns % 1_000_000_000);
-    format!(
-        "[{}] [{seconds}.{nanoseconds:09}] [{source}]: {}",
-        record.level(),
-        record.args()
-    )
-}
-
 #[cfg(test)]
 mod tests {
     use super::*;
-    use std::sync::Mutex;
-
-    #[test]
-    fn lines_look_like_those_of_rcutils() {
-        let text = format_args!("no points for 5 s");
-        let record = Record::builder().level(Level::Warn).args(text).build();
-        let text = line(&record, 1_700_000_000_000_000_042, "mapper");
-        let expected = "[WARN] [1700000000.000000042] [mapper]: no points for 5 s";
-        assert_eq!(text, expected);
-    }
+    use env_logger::Builder;
 
     #[test]
     fn records_are_named_after_their_node() {
@@ -179,9 +178,14 @@ mod tests {
             .filter_level(log::LevelFilter::Info)
             .filter_module("rustdds", log::LevelFilter::Error)
             .build();
+        let directory = tempfile::tempdir().unwrap();
+        let folder = directory.path().display().to_string();
+        let place = |name: &str| (name == "ROS_LOG_DIR").then(|| folder.clone());
         let log = TEE.get_or_init(|| Tee {
-            console,
+            console: Arc::new(Mutex::new(Arc::new(console))),
             to_console: false,
+            layout: Arc::new(Layout::new(&|_| None)),
+            file: Some(LogFile::open(Some("front"), place).unwrap()),
             node_name: "front".to_owned(),
             rustdds: Throttle::new(RUSTDDS_PERIOD),
         });
@@ -203,8 +207,12 @@ mod tests {
             .level(Level::Error)
             .target("rustdds::discovery")
             .build();
-        assert!(!log.is_flood(&error));
-        assert!(log.is_flood(&error), "the second at once");
+        assert!(!log.is_flood(&log.console(), &error));
+        assert!(log.is_flood(&log.console(), &error), "the second at once");
+        let written = std::fs::read_dir(directory.path()).unwrap().next().unwrap();
+        let written = std::fs::read_to_string(written.unwrap().path()).unwrap();
+        assert_eq!(written.lines().count(), 4, "{written}");
+        assert!(written.contains("[front]: three"), "{written}");
         assert_eq!(*HEARD.lock().unwrap(), ["front: one", "front: three"]);
     }
 

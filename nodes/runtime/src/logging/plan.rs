@@ -1,5 +1,7 @@
 use crate::ros_args::RosArgs;
-use env_logger::WriteStyle;
+use std::collections::BTreeMap;
+
+use env_logger::{Builder, Target, WriteStyle};
 use log::LevelFilter;
 
 /// Our own crates; their targets begin with it.
@@ -28,8 +30,12 @@ pub(super) struct Plan {
     pub filters: Vec<(Option<String>, LevelFilter)>,
     /// `RUST_LOG`, where no `--log-level` is given.
     pub rust_log: Option<String>,
+    /// Levels set at run time, by the name of the logger; they count above all others.
+    pub set: BTreeMap<String, (u32, LevelFilter)>,
     /// `RCUTILS_COLORIZED_OUTPUT`: 1 always, 0 never, else on a terminal.
     pub style: WriteStyle,
+    /// `RCUTILS_LOGGING_USE_STDOUT`: 1 standard output, else standard error.
+    pub to_stdout: bool,
 }
 
 impl Plan {
@@ -47,13 +53,7 @@ impl Plan {
                     filters.push((None, level));
                     filters.extend(libraries(level));
                 }
-                Some(logger) => {
-                    let node = logger.rsplit(['.', '/']).next().unwrap_or(logger);
-                    if node == node_name {
-                        filters.push((Some(OURS.to_owned()), level));
-                    }
-                    filters.push((Some(node.to_owned()), level));
-                }
+                Some(logger) => filters.extend(targets(logger, level, node_name)),
             }
         }
         let rust_log = lookup("RUST_LOG").filter(|_| args.log_levels.is_empty());
@@ -65,9 +65,54 @@ impl Plan {
         Plan {
             filters,
             rust_log,
+            set: BTreeMap::new(),
             style,
+            to_stdout: lookup("RCUTILS_LOGGING_USE_STDOUT").as_deref() == Some("1"),
         }
     }
+
+    /// Place of the console log.
+    pub(super) fn target(&self) -> Target {
+        match self.to_stdout {
+            true => Target::Stdout,
+            false => Target::Stderr,
+        }
+    }
+
+    /// Adds all levels to a builder.
+    pub(super) fn build(&self, builder: &mut Builder, node_name: &str) {
+        for (target, level) in &self.filters {
+            let _ = builder.filter(target.as_deref(), *level);
+        }
+        if let Some(text) = &self.rust_log {
+            let _ = builder.parse_filters(text);
+        }
+        for (logger, (_, level)) in &self.set {
+            for (target, level) in targets(logger, *level, node_name) {
+                let _ = builder.filter(target.as_deref(), level);
+            }
+        }
+    }
+}
+
+/// Targets of a logger; the empty name is the root.
+fn targets(
+    logger: &str,
+    level: LevelFilter,
+    node_name: &str,
+) -> Vec<(Option<String>, LevelFilter)> {
+    if logger.is_empty() {
+        let all = [(None, level)].into_iter().chain(libraries(level));
+        return all.collect();
+    }
+    let node = logger.rsplit(['.', '/']).next().unwrap_or(logger);
+    // The modules of one of several nodes of a process are named as the node.
+    let mut targets = vec![node.to_owned(), format!("{OURS}nodes::{node}")];
+    if node == node_name {
+        targets.push(OURS.to_owned());
+    }
+    let targets = targets.into_iter();
+    targets.map(|target| (Some(target), level)).collect()
 }
 
 /// Levels of libraries where ours is `level`.
@@ -102,12 +147,7 @@ mod tests {
     /// True if a plan lets a record through, by env_logger's own rules.
     fn shows(plan: &Plan, level: Level, target: &str) -> bool {
         let mut builder = env_logger::Builder::new();
-        for (target, level) in &plan.filters {
-            builder.filter(target.as_deref(), *level);
-        }
-        if let Some(text) = &plan.rust_log {
-            builder.parse_filters(text);
-        }
+        plan.build(&mut builder, "mapper");
         let record = Metadata::builder().level(level).target(target).build();
         builder.build().enabled(&record)
     }

@@ -56,12 +56,9 @@ impl Node {
             1..=u32::MAX as usize,
         )?;
         let id = shared.graph.add_node(&namespace, &name);
-        let clock = if params.bool("use_sim_time", false)? {
-            let topic = names::resolve(NameKind::Topic, "/clock", &name, &namespace, &args.remaps)?;
-            shared.sim_clock(id, &topic)?
-        } else {
-            Clock::default()
-        };
+        let clock = Clock::default();
+        let topic = names::resolve(NameKind::Topic, "/clock", &name, &namespace, &args.remaps)?;
+        follow_use_sim_time(shared, id, topic, &params, &clock)?;
         let inner = Inner {
             shared: Arc::clone(shared),
             args: Arc::clone(args),
@@ -147,6 +144,16 @@ impl Node {
         Ok(publisher)
     }
 
+    /// The same with the QoS that it is to have.
+    pub(crate) fn publisher_as_is<M: RosMessage>(
+        &self,
+        topic: &str,
+        qos: Qos,
+    ) -> Result<Publisher<M>, RuntimeError> {
+        let resolved = self.resolve(topic)?;
+        self.inner.shared.publisher(self.id(), &resolved, &qos)
+    }
+
     /// A publisher of CDR bytes of the type, such as `sensor_msgs/msg/Imu`, on a full topic name.
     ///
     /// `type_hash` is announced, where it is one (`RIHS01_...`); else that of our message of this type.
@@ -215,4 +222,25 @@ impl Node {
             .shared
             .subscribe(self.id(), &resolved, &qos, load, max, handler)
     }
+}
+
+/// Lets a clock go by simulated time as long as the parameter `use_sim_time` says so.
+fn follow_use_sim_time(
+    shared: &Arc<Shared>,
+    node: NodeId,
+    topic: String,
+    params: &Params,
+    clock: &Clock,
+) -> Result<(), RuntimeError> {
+    let (weak, changed) = (Arc::downgrade(shared), clock.clone());
+    let set = move |clock: &Clock, params: &Params| -> Result<(), RuntimeError> {
+        match (params.bool("use_sim_time", false)?, weak.upgrade()) {
+            (true, Some(shared)) => clock.simulate(shared.sim_clock(node, &topic)?),
+            _ => clock.follow_system(),
+        }
+        Ok(())
+    };
+    set(clock, params)?;
+    params.also_apply(move |params| set(&changed, params).map_err(|error| error.to_string()));
+    Ok(())
 }

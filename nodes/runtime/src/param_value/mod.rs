@@ -143,8 +143,49 @@ impl ParamValue {
         }
     }
 
-    fn is_array(&self) -> bool {
+    /// The name of the type in rclcpp's messages.
+    pub fn ros_type_name(&self) -> &'static str {
+        match self {
+            ParamValue::Bool(_) => "bool",
+            ParamValue::I64(_) => "integer",
+            ParamValue::F64(_) => "double",
+            ParamValue::String(_) => "string",
+            ParamValue::BoolArray(_) => "bool_array",
+            ParamValue::I64Array(_) => "integer_array",
+            ParamValue::F64Array(_) => "double_array",
+            ParamValue::StringArray(_) => "string_array",
+        }
+    }
+
+    pub(crate) fn is_array(&self) -> bool {
         self.type_code() > 5
+    }
+
+    /// Bytes of a text, or of all texts of a list, or items of a list.
+    pub(crate) fn length(&self) -> usize {
+        match self {
+            ParamValue::String(text) => text.len(),
+            ParamValue::BoolArray(items) => items.len(),
+            ParamValue::I64Array(items) => items.len(),
+            ParamValue::F64Array(items) => items.len(),
+            ParamValue::StringArray(items) => items.iter().map(|text| 1 + text.len()).sum(),
+            _ => 1,
+        }
+    }
+
+    pub(crate) fn is_empty_list(&self) -> bool {
+        self.is_array() && self.length() == 0
+    }
+
+    /// The empty list of the same type; other values as they are.
+    pub(crate) fn emptied(&self) -> ParamValue {
+        match self {
+            ParamValue::BoolArray(_) => ParamValue::BoolArray(Vec::new()),
+            ParamValue::I64Array(_) => ParamValue::I64Array(Vec::new()),
+            ParamValue::F64Array(_) => ParamValue::F64Array(Vec::new()),
+            ParamValue::StringArray(_) => ParamValue::StringArray(Vec::new()),
+            other => other.clone(),
+        }
     }
 
     /// The value as rcl would read it where a bool is wanted.

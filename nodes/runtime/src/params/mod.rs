@@ -1,26 +1,39 @@
-//! Parameters of a node: given by files and the command line, declared by the node as it reads them.
+//! Parameters of a node: given by files and the command line, declared by the node as it reads them, and
+//! changed while it runs.
 
+mod about;
+mod change;
 mod error;
 mod ranges;
 
 pub use crate::param_value::{ParamValue, ValueError};
+pub use about::{About, Declared, Range};
+pub(crate) use change::Refusal;
 pub use error::ParamError;
 
 use std::collections::BTreeMap;
 use std::path::{Path, PathBuf};
 use std::sync::Mutex;
 
+use self::change::Changes;
 use crate::sync::lock;
 use crate::{params_file, ros_args::RosArgs};
 
 /// The parameters of one node.
 ///
-/// Reading a parameter declares it. Values do not change while the node runs.
-#[derive(Debug, Default)]
+/// Reading a parameter declares it; [`Params::open`] lets others change it.
+#[derive(Default)]
 pub struct Params {
     node: String,
+    state: Mutex<State>,
+    changes: Mutex<Changes>,
+}
+
+#[derive(Clone, Default)]
+struct State {
     given: BTreeMap<String, Given>,
-    declared: Mutex<BTreeMap<String, ParamValue>>,
+    declared: BTreeMap<String, Declared>,
+    about: Vec<&'static [About]>,
 }
 
 /// A value with its origin.
@@ -34,6 +47,7 @@ struct Given {
 enum Origin {
     Default,
     CommandLine,
+    Service,
     File { path: PathBuf, key: String },
 }
 
@@ -42,8 +56,15 @@ impl std::fmt::Display for Origin {
         match self {
             Origin::Default => f.write_str("the default"),
             Origin::CommandLine => f.write_str("from the command line"),
+            Origin::Service => f.write_str("set at run time"),
             Origin::File { path, key } => write!(f, "from {}, `{key}`", path.display()),
         }
+    }
+}
+
+impl std::fmt::Debug for Params {
+    fn fmt(&self, f: &mut std::fmt::Formatter<'_>) -> std::fmt::Result {
+        write!(f, "Params of {}: {:?}", self.node, self.declared())
     }
 }
 
@@ -52,7 +73,7 @@ impl Params {
     ///
     /// Files count in the order given, then the command line; what comes later wins.
     pub fn load(args: &RosArgs, node_fqn: &str) -> Result<Params, ParamError> {
-        let mut params = Params {
+        let params = Params {
             node: node_fqn.to_owned(),
             ..Params::default()
         };
@@ -73,7 +94,7 @@ impl Params {
         node_fqn: &str,
         values: impl IntoIterator<Item = (N, ParamValue)>,
     ) -> Params {
-        let mut params = Params {
+        let params = Params {
             node: node_fqn.to_owned(),
             ..Params::default()
         };
@@ -83,7 +104,7 @@ impl Params {
         params
     }
 
-    fn add_file(&mut self, path: &Path) -> Result<(), ParamError> {
+    fn add_file(&self, path: &Path) -> Result<(), ParamError> {
         for entry in params_file::read(path)? {
             if entry.nodes.matches(&self.node) {
                 let (path, key) = (path.to_owned(), entry.key);
@@ -93,8 +114,10 @@ impl Params {
         Ok(())
     }
 
-    fn give(&mut self, name: String, value: ParamValue, origin: Origin) {
-        self.given.insert(name, Given { value, origin });
+    fn give(&self, name: String, value: ParamValue, origin: Origin) {
+        lock(&self.state)
+            .given
+            .insert(name, Given { value, origin });
     }
 
     /// A bool; `yes`, `on`, `no`, `off` count.
@@ -163,33 +186,36 @@ impl Params {
         convert: impl Fn(&ParamValue) -> Option<T>,
         wrap: impl Fn(T) -> ParamValue,
     ) -> Result<T, ParamError> {
-        let value = match self.given.get(name) {
-            None => default,
-            Some(Given { value, origin }) => convert(value).ok_or_else(|| ParamError::Type {
+        let given = lock(&self.state).given.get(name).cloned();
+        let value = match given {
+            None => default.clone(),
+            Some(Given { value, origin }) => convert(&value).ok_or_else(|| ParamError::Type {
                 node: self.node.clone(),
                 name: name.to_owned(),
                 expected,
-                found: format!("{} {}", value.type_name(), brief(value)),
+                found: format!("{} {}", value.type_name(), brief(&value)),
                 origin: origin.to_string(),
             })?,
         };
-        let declared = || wrap(value.clone());
-        let mut all = lock(&self.declared);
+        let mut state = lock(&self.state);
+        let about = state.about_of(name);
+        let declared = || Declared::new(wrap(value.clone()), wrap(default), about);
+        let all = &mut state.declared;
         all.entry(name.to_owned()).or_insert_with(declared);
-        drop(all);
         Ok(value)
     }
 
     /// True if a file or the command line gives the parameter.
     pub fn is_given(&self, name: &str) -> bool {
-        self.given.contains_key(name)
+        lock(&self.state).given.contains_key(name)
     }
 
     /// An error for a value of the right type that cannot be used.
     pub fn invalid(&self, name: &str, problem: impl Into<String>) -> ParamError {
-        let declared = lock(&self.declared);
-        let given = self.given.get(name);
-        let value = declared.get(name).or(given.map(|given| &given.value));
+        let state = lock(&self.state);
+        let given = state.given.get(name);
+        let declared = state.declared.get(name).map(|declared| &declared.value);
+        let value = declared.or(given.map(|given| &given.value));
         let origin = given.map_or(&Origin::Default, |given| &given.origin);
         ParamError::Invalid {
             node: self.node.clone(),
@@ -202,15 +228,25 @@ impl Params {
 
     /// Parameters given and never read by the node, sorted: typing errors, mostly.
     pub fn unused(&self) -> Vec<String> {
-        let declared = lock(&self.declared);
-        let names = self.given.keys();
+        let State {
+            given, declared, ..
+        } = &*lock(&self.state);
+        let names = given.keys();
         let unused = names.filter(|name| !declared.contains_key(*name));
         unused.cloned().collect()
     }
 
     /// Parameters the node has read, with the values in use.
     pub fn declared(&self) -> BTreeMap<String, ParamValue> {
-        lock(&self.declared).clone()
+        let state = lock(&self.state);
+        let all = state.declared.iter();
+        all.map(|(name, declared)| (name.clone(), declared.value.clone()))
+            .collect()
+    }
+
+    /// Parameters the node has read, with all that is known of them.
+    pub fn described(&self) -> BTreeMap<String, Declared> {
+        lock(&self.state).declared.clone()
     }
 }
 

@@ -3,7 +3,8 @@
 use std::fmt::Debug;
 use std::ops::RangeInclusive;
 
-use super::{ParamError, Params};
+use super::{Declared, ParamError, Params, Range};
+use crate::sync::lock;
 
 impl Params {
     /// A count within `range`.
@@ -13,7 +14,10 @@ impl Params {
         default: usize,
         range: RangeInclusive<usize>,
     ) -> Result<usize, ParamError> {
-        let value = self.i64(name, i64::try_from(default).unwrap_or(i64::MAX))?;
+        let integer = |value| i64::try_from(value).unwrap_or(i64::MAX);
+        let value = self.i64(name, integer(default))?;
+        let bounds = Range::Integer(integer(*range.start()), integer(*range.end()));
+        self.constrain(name, |declared| declared.range = Some(bounds));
         let value = usize::try_from(value).ok();
         value
             .filter(|value| range.contains(value))
@@ -38,10 +42,31 @@ impl Params {
         range: RangeInclusive<f64>,
     ) -> Result<f64, ParamError> {
         let value = self.f64(name, default)?;
+        let bounds = Range::Float(*range.start(), range.end().min(f64::MAX));
+        self.constrain(name, |declared| declared.range = Some(bounds));
         match range.contains(&value) {
             true => Ok(value),
             false => Err(self.outside(name, &range, *range.end() >= f64::MAX)),
         }
+    }
+
+    /// A text that is one of some words, by its place; the first word is the default.
+    pub fn word(&self, name: &str, words: &[&str]) -> Result<usize, ParamError> {
+        let default = words.first().copied().unwrap_or_default();
+        self.word_or(name, words, default)
+    }
+
+    /// The same with a default.
+    pub fn word_or(&self, name: &str, words: &[&str], default: &str) -> Result<usize, ParamError> {
+        let word = self.string(name, default)?;
+        let known = words.join(" or ");
+        self.constrain(name, |declared| declared.allowed.clone_from(&known));
+        let place = words.iter().position(|known| *known == word);
+        place.ok_or_else(|| self.invalid(name, format!("{word:?}, expected {known}")))
+    }
+
+    fn constrain(&self, name: &str, change: impl FnOnce(&mut Declared)) {
+        lock(&self.state).declared.get_mut(name).map(change);
     }
 
     fn outside<T: Debug>(

@@ -30,6 +30,10 @@ pub struct RosArgs {
     pub(crate) no_stdout_logs: bool,
     /// True after `--disable-rosout-logs`.
     pub(crate) no_rosout_logs: bool,
+    /// First part of the name of the log file; the program's name if none.
+    pub log_file_name: Option<String>,
+    /// True: no log file is written.
+    pub no_log_file: bool,
     /// Everything outside the ROS scopes in order, the program's name first where it was given.
     pub user_args: Vec<String>,
     /// Lines for the log once it is up.

@@ -86,16 +86,20 @@ fn ros_argument(
         "--params-file" => (args.params_files).push(value(rest, flag, PARAMS_FILE, not_empty)?),
         "-e" | "--enclave" => args.enclave = Some(value(rest, flag, ENCLAVE, enclave)?),
         "--log-level" => (args.log_levels).push(value(rest, flag, LOG_LEVEL, str::parse)?),
-        "--log-config-file" | "--log-file-name" => {
-            let _: String = value(rest, flag, LOG_FILE, not_empty)?;
-            let warning = format!("{flag} is accepted and has no effect");
+        "--log-file-name" => args.log_file_name = Some(value(rest, flag, LOG_FILE, file_name)?),
+        "--log-config-file" => {
+            let file: String = value(rest, flag, LOG_FILE, not_empty)?;
+            let file = shown(&file);
+            let warning =
+                format!("{flag} {file} has no effect: use --log-level, and README's variables");
             args.warnings.push(warning);
         }
         "--enable-stdout-logs" => args.no_stdout_logs = false,
         "--disable-stdout-logs" => args.no_stdout_logs = true,
         "--enable-rosout-logs" => args.no_rosout_logs = false,
         "--disable-rosout-logs" => args.no_rosout_logs = true,
-        "--enable-external-lib-logs" | "--disable-external-lib-logs" => {}
+        "--enable-external-lib-logs" => args.no_log_file = false,
+        "--disable-external-lib-logs" => args.no_log_file = true,
         _ => args.warnings.push(unknown(flag)),
     }
     Ok(())
@@ -129,6 +133,14 @@ fn not_empty<T: From<String>>(text: &str) -> Result<T, String> {
     match text.is_empty() {
         true => Err("it is empty".to_owned()),
         false => Ok(text.to_owned().into()),
+    }
+}
+
+/// Part of the name of a file: no folder, and not hidden.
+fn file_name(text: &str) -> Result<String, String> {
+    match text.contains('/') || text.starts_with('.') || text.len() > 128 {
+        true => Err("it is no plain name of at most 128 bytes".to_owned()),
+        false => not_empty(text),
     }
 }
 

@@ -138,7 +138,12 @@ fn parameters_files_and_logs() {
     ]));
     assert!(!args.no_stdout_logs && args.no_rosout_logs);
     assert_eq!(args.user_args, ["mapper"]);
-    assert_eq!(args.warnings.len(), 2, "there are no log files");
+    assert_eq!(args.warnings.len(), 1, "the log has no file of settings");
+    assert!(args.no_log_file && args.log_file_name.as_deref() == Some("mapper"));
+    for name in ["../mapper", ".mapper", &"m".repeat(129)] {
+        let words = ["--ros-args", "--log-file-name", name].map(str::to_owned);
+        assert!(RosArgs::parse(words).is_err(), "{name}");
+    }
     for name in words("a a.b qos./robot/points.depth qos.~/x.depth ~/a /a/b a__b") {
         assert_eq!(
             parse(&format!("--ros-args -p {name}:=1")).param_overrides[0].name,

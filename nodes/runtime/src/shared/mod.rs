@@ -17,7 +17,6 @@ use smol::Task;
 use smol::channel::Sender;
 
 use self::status::ReceiveBuffer;
-use super::clock::Clock;
 #[cfg(feature = "cyclone")]
 use super::cyclone::Cyclone;
 use super::dds::Dds;
@@ -60,7 +59,7 @@ pub(crate) struct Shared {
     pub tasks: Arc<Tasks>,
     pub receive_buffer: ReceiveBuffer,
     /// Simulated time, one for all nodes of a process.
-    sim_time: Mutex<Option<(Clock, Subscription)>>,
+    sim_time: Mutex<Option<(Arc<AtomicI64>, Subscription)>>,
     publishing: TaskThread,
     answers: Answers,
     endpoints: Arc<Endpoints>,
@@ -166,18 +165,18 @@ impl Shared {
         open.transport.reader(topic, qos, max_bytes)
     }
 
-    /// The clock on `topic`, subscribed to at the first call.
+    /// The time on `topic`, subscribed to at the first call.
     pub(crate) fn sim_clock(
         self: &Arc<Self>,
         node: NodeId,
         topic: &str,
-    ) -> Result<Clock, RuntimeError> {
+    ) -> Result<Arc<AtomicI64>, RuntimeError> {
         let mut sim = lock(&self.sim_time);
-        if let Some((clock, _)) = sim.as_ref() {
-            return Ok(clock.clone());
+        if let Some((now_ns, _)) = sim.as_ref() {
+            return Ok(Arc::clone(now_ns));
         }
         let now_ns = Arc::new(AtomicI64::new(0));
-        let clock = Clock::simulated(Arc::clone(&now_ns));
+        let shown = Arc::clone(&now_ns);
         let handler = move |sample: Sample<'_, rosgraph_msgs::Clock>, stats: &Arc<Stats>| {
             if let Some(message) = stats.decode(sample) {
                 now_ns.store(message.clock.to_ns(), Relaxed);
@@ -185,8 +184,8 @@ impl Shared {
         };
         let subscription =
             self.subscribe(node, topic, &Qos::CLOCK, Load::Small, 1 << 10, handler)?;
-        *sim = Some((clock.clone(), subscription));
-        Ok(clock)
+        *sim = Some((Arc::clone(&shown), subscription));
+        Ok(shown)
     }
 
     /// Publishers that are in use.

@@ -14,10 +14,11 @@ const NEW_KEY: &str = "-newkey ec -pkeyopt ec_paramgen_curve:prime256v1 -nodes";
 const DAYS: &str = "-days 30";
 
 /// Topics of every node.
-pub const OF_A_NODE: [&str; 5] = [
+pub const OF_A_NODE: [&str; 6] = [
     "ros_discovery_info",
     "rt/rosout",
     "rt/diagnostics",
+    "rt/parameter_events",
     "rq/*Request",
     "rr/*Reply",
 ];

@@ -199,3 +199,29 @@ fn the_queue_of_waiting_clouds_is_bounded() {
     assert_eq!(bench.machine.waiting(), 4);
     assert_eq!(bench.machine.counts().clouds_queue_full, 6);
 }
+
+#[test]
+fn ranges_limits_and_fields_can_be_changed_while_it_works() {
+    let options = || TransformerOptions::new(InsSource::Odometry);
+    let mut bench = Bench::new(options());
+    bench.drive(0, 10);
+    let scan = || cloud("base_link", START_NS, &[[1.0, 0.0, 0.0], [100.0, 0.0, 0.0]]);
+    bench.cloud(scan(), START_NS);
+    bench.machine.set_options(TransformerOptions {
+        max_range_m: 50.0,
+        viewpoints: true,
+        max_waiting_clouds: 2,
+        ..options()
+    });
+    bench.cloud(scan(), START_NS);
+    let widths: Vec<u32> = bench.clouds.iter().map(|cloud| cloud.width).collect();
+    assert_eq!(widths, [2, 1]);
+    assert_eq!(
+        bench.clouds[1].fields.len(),
+        bench.clouds[0].fields.len() + 3
+    );
+    for _ in 0..5 {
+        bench.cloud(base_cloud(START_NS + SECOND_NS), START_NS);
+    }
+    assert_eq!(bench.machine.waiting(), 2);
+}

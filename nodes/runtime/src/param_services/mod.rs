@@ -1,34 +1,63 @@
-//! The parameter services of a node, for `ros2 param` and its like. Parameters cannot change while a
-//! node runs; requests to set them are refused.
+//! The parameter services of a node and its `/parameter_events`, for `ros2 param` and its like.
+
+mod convert;
+mod set;
 
 use std::collections::BTreeSet;
 use std::sync::Arc;
 
 use lattice_msgs::RosService;
+use lattice_msgs::builtin_interfaces::Time;
 use lattice_msgs::rcl_interfaces::{
     DescribeParameters, DescribeParametersRequest, DescribeParametersResponse, GetParameterTypes,
     GetParameterTypesRequest, GetParameterTypesResponse, GetParameters, GetParametersRequest,
     GetParametersResponse, ListParameters, ListParametersRequest, ListParametersResponse,
-    ListParametersResult, ParameterDescriptor, ParameterType, ParameterValue, SetParameters,
-    SetParametersAtomically, SetParametersAtomicallyResponse, SetParametersRequest,
-    SetParametersResponse, SetParametersResult,
+    ListParametersResult, ParameterDescriptor, ParameterEvent, ParameterType,
 };
 
+use self::convert::{descriptor, messages, value_message};
 use super::error::RuntimeError;
 use super::node::Node;
 use super::params::{ParamValue, Params};
+use super::qos::Qos;
 use super::service::Server;
 
-/// Serves the six parameter services of `node` for as long as the servers live.
+/// Most names or parameters of one request; none of more are answered.
+const MAX_NAMES: usize = 1000;
+
+/// Serves the six parameter services of `node` for as long as the servers live, and tells of new and
+/// changed parameters.
 pub(crate) fn serve(node: &Node, params: &Arc<Params>) -> Result<Vec<Server>, RuntimeError> {
+    // Permissions from before there were events leave them out.
+    if let Err(error) = tell_events(node, params) {
+        log::warn!("changes of parameters are not published: {error}");
+    }
     Ok(vec![
         answer::<GetParameters>(node, "~/get_parameters", params, get_values)?,
         answer::<GetParameterTypes>(node, "~/get_parameter_types", params, get_types)?,
         answer::<ListParameters>(node, "~/list_parameters", params, list_names)?,
         answer::<DescribeParameters>(node, "~/describe_parameters", params, describe_all)?,
-        node.service::<SetParameters>("~/set_parameters", |request| refuse_each(&request))?,
-        node.service::<SetParametersAtomically>("~/set_parameters_atomically", |_| refuse_all())?,
+        set::serve_each(node, params)?,
+        set::serve_atomically(node, params)?,
     ])
+}
+
+fn tell_events(node: &Node, params: &Params) -> Result<(), RuntimeError> {
+    let publisher = node.publisher_as_is("/parameter_events", Qos::PARAMETER_EVENTS)?;
+    let (clock, name) = (node.clock(), node.fqn().to_owned());
+    params.listen(move |new, changed| {
+        let event = ParameterEvent {
+            stamp: Time::from_ns(clock.now_ns()),
+            node: name.clone(),
+            new_parameters: messages(new),
+            changed_parameters: messages(changed),
+            deleted_parameters: Vec::new(),
+        };
+        if let Err(error) = publisher.publish(event) {
+            log::debug!("event not published: {error}");
+        }
+    });
+    Ok(())
 }
 
 fn answer<S: RosService + 'static>(
@@ -43,15 +72,15 @@ fn answer<S: RosService + 'static>(
 
 fn get_values(params: &Params, request: &GetParametersRequest) -> GetParametersResponse {
     let declared = params.declared();
-    let value = |name: &String| declared.get(name).map(message).unwrap_or_default();
+    let value = |name: &String| declared.get(name).map(value_message).unwrap_or_default();
     GetParametersResponse {
-        values: request.names.iter().map(value).collect(),
+        values: bounded(&request.names).iter().map(value).collect(),
     }
 }
 
 fn get_types(params: &Params, request: &GetParameterTypesRequest) -> GetParameterTypesResponse {
     let declared = params.declared();
-    let names = request.names.iter();
+    let names = bounded(&request.names).iter();
     let types: Vec<u8> = names.map(|name| type_of(declared.get(name))).collect();
     GetParameterTypesResponse {
         types: types.into(),
@@ -62,15 +91,24 @@ fn describe_all(
     params: &Params,
     request: &DescribeParametersRequest,
 ) -> DescribeParametersResponse {
-    let declared = params.declared();
-    let describe = |name: &String| ParameterDescriptor {
-        name: name.clone(),
-        type_: type_of(declared.get(name)),
-        read_only: true,
-        ..ParameterDescriptor::default()
+    let all = params.described();
+    let describe = |name: &String| match all.get(name) {
+        Some(declared) => descriptor(name, declared),
+        None => ParameterDescriptor {
+            name: name.clone(),
+            ..ParameterDescriptor::default()
+        },
     };
     DescribeParametersResponse {
-        descriptors: request.names.iter().map(describe).collect(),
+        descriptors: bounded(&request.names).iter().map(describe).collect(),
+    }
+}
+
+/// The names of a request, none if there are too many.
+fn bounded<T>(names: &[T]) -> &[T] {
+    match names.len() <= MAX_NAMES {
+        true => names,
+        false => &[],
     }
 }
 
@@ -102,49 +140,14 @@ fn list_names(params: &Params, request: &ListParametersRequest) -> ListParameter
     }
 }
 
-fn refusal() -> SetParametersResult {
-    SetParametersResult {
-        successful: false,
-        reason: "parameters of this node cannot change while it runs; start it again with \
-                 --ros-args -p name:=value"
-            .to_owned(),
-    }
-}
-
-fn refuse_each(request: &SetParametersRequest) -> SetParametersResponse {
-    SetParametersResponse {
-        results: request.parameters.iter().map(|_| refusal()).collect(),
-    }
-}
-
-fn refuse_all() -> SetParametersAtomicallyResponse {
-    SetParametersAtomicallyResponse { result: refusal() }
-}
-
 fn type_of(declared: Option<&ParamValue>) -> u8 {
     declared.map_or(ParameterType::PARAMETER_NOT_SET, ParamValue::type_code)
 }
 
-fn message(value: &ParamValue) -> ParameterValue {
-    let mut message = ParameterValue {
-        type_: value.type_code(),
-        ..ParameterValue::default()
-    };
-    match value.clone() {
-        ParamValue::Bool(value) => message.bool_value = value,
-        ParamValue::I64(value) => message.integer_value = value,
-        ParamValue::F64(value) => message.double_value = value,
-        ParamValue::String(value) => message.string_value = value,
-        ParamValue::BoolArray(value) => message.bool_array_value = value,
-        ParamValue::I64Array(value) => message.integer_array_value = value,
-        ParamValue::F64Array(value) => message.double_array_value = value,
-        ParamValue::StringArray(value) => message.string_array_value = value,
-    }
-    message
-}
-
 #[cfg(test)]
 mod tests {
+    use lattice_msgs::rcl_interfaces::ParameterValue;
+
     use super::*;
 
     fn params() -> Params {
@@ -180,6 +183,12 @@ mod tests {
         let names = names().into();
         let descriptors = describe_all(&params(), &DescribeParametersRequest { names }).descriptors;
         assert!(descriptors[0].read_only && descriptors[2].type_ == 0);
+        let names = vec!["lattice".to_owned(); MAX_NAMES + 1];
+        assert!(
+            get_values(&params(), &GetParametersRequest { names })
+                .values
+                .is_empty()
+        );
     }
 
     #[test]
@@ -193,15 +202,5 @@ mod tests {
         let both = list(&["qos.map", "lattice"], 1);
         assert_eq!(both.names, ["lattice", "qos.map.depth"]);
         assert_eq!(list(&["latt"], 0).names, [""; 0]);
-    }
-
-    #[test]
-    fn nothing_is_set() {
-        let request = SetParametersRequest {
-            parameters: vec![Default::default(); 2],
-        };
-        let results = refuse_each(&request).results;
-        assert!(results.len() == 2 && results.iter().all(|r| !r.successful));
-        assert!(!refuse_all().result.successful);
     }
 }

@@ -1,0 +1,194 @@
+//! Description of parameters: stated once, in tables beside the code that reads them.
+
+use super::{ParamValue, Params, State};
+use crate::sync::lock;
+
+/// Meaning of a parameter, and its fixedness.
+#[derive(Debug, PartialEq, Eq)]
+pub struct About {
+    /// Full name; one that begins with `*` stands for all names that end with the rest.
+    pub name: &'static str,
+    /// Meaning, with the unit where the name has none.
+    pub text: &'static str,
+    /// Reason for which it cannot change while the node runs; none: it can.
+    pub fixed: Option<&'static str>,
+}
+
+/// A table of [`About`]: `"name": "text";` for what may change, `"name" fixed("reason"): "text";` for the rest.
+#[macro_export]
+macro_rules! about {
+    (@) => { None };
+    (@ $why:expr) => { Some($why) };
+    ($($name:literal $(fixed($why:expr))?: $text:literal;)*) => {
+        &[$($crate::params::About {
+            name: $name,
+            text: $text,
+            fixed: $crate::about!(@ $($why)?),
+        }),*]
+    };
+}
+
+/// Parameters of every node.
+pub(super) const OF_EVERY_NODE: &[About] = about! {
+    "max_message_bytes" fixed("subscriptions are made with it"): "Longer messages are not taken, bytes.";
+    "use_sim_time": "Whether the node goes by the time on /clock.";
+    "managed" fixed("it is read at the start"):
+        "Whether the node waits to be configured and activated, as ros2 lifecycle does it.";
+    "start_type_description_service" fixed("the service is made at the start"):
+        "Whether ~/get_type_description is served.";
+    "*.reliability" fixed(QOS): "Whether samples of the topic that were lost are sent again.";
+    "*.durability" fixed(QOS): "Whether who joins the topic late gets the last samples.";
+    "*.depth" fixed(QOS): "Samples of the topic that are kept.";
+};
+
+const QOS: &str = "endpoints are made with it";
+
+/// Least and most of a number.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub enum Range {
+    /// Both count.
+    Integer(i64, i64),
+    /// Both count.
+    Float(f64, f64),
+}
+
+/// A parameter that the node has read.
+#[derive(Clone, Debug, PartialEq)]
+pub struct Declared {
+    /// Value in use.
+    pub value: ParamValue,
+    /// Value where none is given.
+    pub default: ParamValue,
+    /// Least and most, where it has them.
+    pub range: Option<Range>,
+    /// Words of which it is one; empty: any.
+    pub allowed: String,
+    /// Meaning; none: nobody has stated it.
+    pub about: Option<&'static About>,
+    /// True once listeners know of it.
+    pub(super) told: bool,
+}
+
+impl Declared {
+    pub(super) fn new(
+        value: ParamValue,
+        default: ParamValue,
+        about: Option<&'static About>,
+    ) -> Self {
+        Self {
+            value,
+            default,
+            range: None,
+            allowed: String::new(),
+            about,
+            told: false,
+        }
+    }
+
+    /// Meaning, with its unit.
+    pub fn text(&self) -> &'static str {
+        self.about.map_or("", |about| about.text)
+    }
+
+    /// Reason for which it cannot change while the node runs.
+    pub fn fixed(&self) -> Option<&'static str> {
+        let unknown = "the node reads it at its start";
+        self.about.map_or(Some(unknown), |about| about.fixed)
+    }
+
+    /// Least and most, or the words of which it is one; empty: anything of its type.
+    pub fn constraint(&self) -> String {
+        match self.range {
+            Some(Range::Integer(least, i64::MAX)) => format!("{least} or more"),
+            Some(Range::Integer(least, most)) => format!("{least} to {most}"),
+            Some(Range::Float(least, f64::MAX)) => format!("{least} or more"),
+            Some(Range::Float(least, most)) => format!("{least} to {most}"),
+            None => self.allowed.clone(),
+        }
+    }
+}
+
+impl State {
+    pub(super) fn about_of(&self, name: &str) -> Option<&'static About> {
+        let is_of = |about: &&About| match about.name.strip_prefix('*') {
+            Some(ending) => name.starts_with("qos.") && name.ends_with(ending),
+            None => about.name == name,
+        };
+        let tables = self.about.iter().copied().chain([OF_EVERY_NODE]);
+        tables.flatten().find(is_of)
+    }
+}
+
+impl Params {
+    /// Adds a table; for parameters that are read after it.
+    pub fn describe(&self, table: &'static [About]) {
+        let about = &mut lock(&self.state).about;
+        if !about.contains(&table) {
+            about.push(table);
+        }
+    }
+
+    /// A table of all parameters for `--help`: name, type and default, range, meaning.
+    pub fn help(&self) -> String {
+        let described = self.described();
+        let lines = described.iter().map(|(name, declared)| {
+            let fixed = declared.fixed().map_or("", |_| " [fixed]");
+            let constraint = match declared.constraint() {
+                range if range.is_empty() => range,
+                range => format!(", {range}"),
+            };
+            format!(
+                "  {name}{fixed}: {}{constraint} (default {})\n      {}\n",
+                declared.default.ros_type_name(),
+                declared.default,
+                declared.text()
+            )
+        });
+        lines.collect()
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    const TABLE: &[About] = about! {
+        "rate_hz": "How often.";
+        "frame" fixed("it is"): "Where.";
+    };
+
+    #[test]
+    fn what_is_read_is_described_by_its_table() {
+        let params = Params::from_values("/n", [("rate_hz", ParamValue::F64(2.0))]);
+        params.describe(TABLE);
+        params.describe(TABLE);
+        params.f64_in("rate_hz", 5.0, 0.1..=100.0).unwrap();
+        params.usize_in("qos.map.depth", 5, 1..=9).unwrap();
+        params.word("frame", &["map", "odom"]).unwrap();
+        params.i64("other", 1).unwrap();
+        let all = params.described();
+        let rate = &all["rate_hz"];
+        assert_eq!((rate.text(), rate.fixed()), ("How often.", None));
+        assert_eq!(rate.range, Some(Range::Float(0.1, 100.0)));
+        assert_eq!(
+            (&rate.value, &rate.default),
+            (&ParamValue::F64(2.0), &ParamValue::F64(5.0))
+        );
+        assert_eq!(
+            all["qos.map.depth"].text(),
+            "Samples of the topic that are kept."
+        );
+        assert_eq!(all["frame"].constraint(), "map or odom");
+        assert!(
+            all["other"].fixed().is_some(),
+            "what is not described is fixed"
+        );
+        let help = params.help();
+        let expected = "  rate_hz: double, 0.1 to 100 (default 5.0)\n      How often.\n";
+        assert!(help.contains(expected), "{help}");
+        assert!(
+            help.contains("  frame [fixed]: string, map or odom (default \"map\")"),
+            "{help}"
+        );
+    }
+}

@@ -1,0 +1,85 @@
+//! All parameters of the player.
+
+use std::time::Duration;
+
+use crate::{options, report};
+use lattice_bag::PlayerOptions;
+use lattice_runtime::about;
+use lattice_runtime::params::{About, ParamError, Params};
+
+const ABOUT: &[About] = about! {
+    "bag" fixed(START): "rosbag2 directory, or one mcap or db3 file.";
+    "rate": "Log seconds per second.";
+    "start_offset_s" fixed(START): "Where to start, after the first message; latched messages before it are published first.";
+    "duration_s" fixed(START): "How much to play of the log; 0: to its end.";
+    "loop" fixed(START): "Whether to start again at the end.";
+    "topics" fixed(START): "Topics to play; empty: all.";
+    "exclude_topics" fixed(START): "Topics not to play.";
+    "clock_hz" fixed(START): "How often /clock is published; 0: never.";
+    "wait_for_subscribers" fixed(START): "Topics that must have a subscriber before the log starts.";
+    "wait_timeout_s" fixed(START): "How long to wait for them.";
+    "settle_s" fixed(START): "How long to wait for them to know us.";
+    "start_paused" fixed(START): "Whether the log is held until a call of ~/resume or the space bar.";
+    "keyboard" fixed(START): "Whether keys of the terminal are taken: space pauses, arrows step and change the rate.";
+    "max_wait_s": "How long a subscriber that does not acknowledge is waited for; then its topic's messages are skipped and counted until it does.";
+};
+
+const START: &str = "the log is opened with it";
+
+/// Settings of the node by its parameters.
+pub(super) struct Settings {
+    pub bag: String,
+    pub player: PlayerOptions,
+    pub waited: Vec<String>,
+    pub wait: Duration,
+    pub settle: Duration,
+    pub max_wait: Duration,
+    pub start_paused: bool,
+    pub keyboard: bool,
+    pub report_file: String,
+}
+
+impl Settings {
+    /// Reads the parameters of the node.
+    pub(super) fn from_params(params: &Params) -> Result<Self, ParamError> {
+        params.describe(ABOUT);
+        params.describe(options::COMMON);
+        Ok(Self {
+            bag: params.string("bag", "")?,
+            player: player_options(params)?,
+            waited: params.string_array("wait_for_subscribers", &[])?,
+            wait: seconds(params, "wait_timeout_s", 30.0)?,
+            settle: seconds(params, "settle_s", 0.5)?,
+            max_wait: seconds(params, "max_wait_s", 2.0)?,
+            start_paused: params.bool("start_paused", false)?,
+            keyboard: params.bool("keyboard", true)?,
+            report_file: report::file(params)?,
+        })
+    }
+}
+
+fn player_options(params: &Params) -> Result<PlayerOptions, ParamError> {
+    let duration_s = params.f64("duration_s", 0.0)?;
+    let include = params.string_array("topics", &[])?;
+    let clock_hz = params.f64("clock_hz", 0.0)?;
+    Ok(PlayerOptions {
+        rate: params.f64_in("rate", 1.0, 1e-3..=1e3)?,
+        start_offset_s: params.f64("start_offset_s", 0.0)?,
+        duration_s: (duration_s > 0.0).then_some(duration_s),
+        loop_: params.bool("loop", false)?,
+        include: (!include.is_empty()).then_some(include),
+        exclude: params.string_array("exclude_topics", &[])?,
+        clock_hz: (clock_hz > 0.0).then_some(clock_hz),
+    })
+}
+
+/// A time of up to a day.
+fn seconds(params: &Params, name: &str, default: f64) -> Result<Duration, ParamError> {
+    let seconds = params.f64_in(name, default, 0.0..=86_400.0)?;
+    Ok(Duration::from_secs_f64(seconds))
+}
+
+/// Reads all parameters of the node, as its start does.
+pub fn declare(params: &Params) -> Result<(), ParamError> {
+    Settings::from_params(params).map(drop)
+}

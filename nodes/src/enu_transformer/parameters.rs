@@ -1,0 +1,84 @@
+//! All parameters of the transformer.
+
+use super::TransformerOptions;
+use crate::compute::ComputeLimits;
+use crate::options::{self, FRAME, TOPIC};
+use crate::report;
+use lattice_runtime::about;
+use lattice_runtime::params::{About, ParamError, Params};
+
+const ABOUT: &[About] = about! {
+    "points_topics" fixed(TOPIC): "Topics of the sensors' clouds (sensor_msgs/PointCloud2); any number.";
+    "ins.source" fixed(TOPIC): "inspva, inspvax, navsatfix_imu, odometry or pose.";
+    "ins.topic" fixed(TOPIC): "Topic of the INS; for navsatfix_imu that of the NavSatFix.";
+    "ins.imu_topic" fixed(TOPIC): "Topic of the attitude, for navsatfix_imu.";
+    "ins.stamp" fixed(POSES): "Stamp of NovAtel poses: gps (week and milliseconds of the log) or header (time of arrival).";
+    "ins.leap_seconds" fixed(POSES): "GPS minus UTC, s.";
+    "ins.inspvax_height" fixed(POSES): "What the height of INSPVAX is measured from: geoid (its undulation is added) or ellipsoid.";
+    "ins.lever_arm_m" fixed(POSES): "Reference point of the INS in base_link (x forward, y left, z up).";
+    "ins.boresight_rpy_rad" fixed(POSES): "Rotation of the INS in base_link: fixed-axis roll, pitch, yaw.";
+    "ins.max_imu_gap_s" fixed(POSES): "Longest gap between two attitudes that a fix may fall into (navsatfix_imu).";
+    "origin.mode" fixed(POSES): "first_fix: the map frame begins where the first good fix is; fixed: at the place below.";
+    "origin.latitude_deg" fixed(POSES): "Latitude of that place, WGS84.";
+    "origin.longitude_deg" fixed(POSES): "Longitude of that place, WGS84.";
+    "origin.height_m" fixed(POSES): "Height of that place above the ellipsoid.";
+    "map_frame" fixed(FRAME): "East-north-up frame of the map.";
+    "base_frame" fixed(FRAME): "Frame of the machine.";
+    "earth_frame" fixed(FRAME): "Frame of the earth (ECEF).";
+    "odom_frame" fixed(FRAME): "If set, map -> odom_frame is published instead of map -> base_frame.";
+    "publish_tf": "Whether to publish transforms at all.";
+    "min_range_m": "Points nearer to the sensor are left out.";
+    "max_range_m": "Points farther from the sensor are left out; 0: no limit.";
+    "max_cloud_points": "Clouds of more points are refused.";
+    "deskew": "Whether points are moved to where they were at their own time.";
+    "time.field": "Field of the per-point time; empty: time, t, time_stamp, timestamp or offset_time.";
+    "time.unit": "auto, s or ns.";
+    "time.reference": "auto, stamp_start, stamp_end or absolute.";
+    "time.max_span_s": "Longest span of one cloud; a longer one is taken for a wrong unit and refused.";
+    "max_wait_s": "How long a cloud waits for the pose that covers it.";
+    "max_pose_gap_s": "Longest gap between two poses that is interpolated.";
+    "pose_span_s" fixed(POSES): "How long poses and moving mounts are kept.";
+    "max_waiting_clouds": "Most clouds that wait; the oldest cloud goes.";
+    "max_waiting_bytes" fixed("the inbox is made with it"): "Most bytes of clouds that wait; the oldest cloud goes.";
+    "precision": "Coordinates of points_enu: float32, or float64 for maps far from their origin.";
+    "pass_fields": "Fields of the clouds that points_enu keeps where they have them, as they are.";
+    "viewpoints": "Whether points_enu says for each point where the sensor was (vp_x, vp_y, vp_z), 12 or 24 bytes more; free_space of lattice_mapper needs it.";
+};
+
+const POSES: &str = "poses are read and kept with it";
+
+/// Settings of the node by its parameters.
+pub(super) struct Settings {
+    pub transformer: TransformerOptions,
+    pub limits: ComputeLimits,
+    pub points_topics: Vec<String>,
+    pub ins_topic: String,
+    pub imu_topic: String,
+    pub report_file: String,
+}
+
+impl Settings {
+    /// Reads the parameters of the node.
+    pub(super) fn from_params(params: &Params) -> Result<Self, ParamError> {
+        params.describe(ABOUT);
+        params.describe(options::COMMON);
+        let transformer = TransformerOptions::from_params(params)?;
+        Ok(Self {
+            limits: ComputeLimits {
+                events: options::inbox_events(params, 8192)?,
+                bytes: transformer.max_waiting_bytes,
+                threads: options::threads(params, 0)?,
+            },
+            points_topics: params.string_array("points_topics", &["points"])?,
+            ins_topic: params.string("ins.topic", "ins")?,
+            imu_topic: params.string("ins.imu_topic", "imu")?,
+            report_file: report::file(params)?,
+            transformer,
+        })
+    }
+}
+
+/// Reads all parameters of the node, as its start does.
+pub fn declare(params: &Params) -> Result<(), ParamError> {
+    Settings::from_params(params).map(drop)
+}

@@ -1,0 +1,60 @@
+//! All parameters of the marker publisher.
+
+use std::time::Duration;
+
+use super::MarkerOptions;
+use crate::compute::ComputeLimits;
+use crate::{options, report};
+use lattice_runtime::about;
+use lattice_runtime::params::{About, ParamError, Params};
+
+const ABOUT: &[About] = about! {
+    "style": "cells (true cell shapes, exposed faces only), cubes or points.";
+    "color_by": "height (of each vertex) or flat (one colour a marker, 40 % fewer bytes).";
+    "height_period_m": "Heights between two equal hues.";
+    "alpha": "Opacity.";
+    "block_bits": "Blocks are 2^block_bits lattice indices a side; a change republishes its whole block.";
+    "chunk_bytes": "Largest message, bytes.";
+    "max_marker_voxels": "Maps of more voxels are drawn as points.";
+    "max_voxels": "Larger maps are not followed.";
+    "rate_hz": "How often changes are published.";
+    "max_bytes_per_s": "Most bytes a second that are published.";
+};
+
+/// Settings of the node by its parameters.
+pub(super) struct Settings {
+    pub markers: MarkerOptions,
+    pub limits: ComputeLimits,
+    pub period: Duration,
+    /// Most bytes of a period.
+    pub budget_bytes: usize,
+    pub mapper: String,
+    pub report_file: String,
+}
+
+impl Settings {
+    /// Reads the parameters of the node.
+    pub(super) fn from_params(params: &Params) -> Result<Self, ParamError> {
+        params.describe(ABOUT);
+        params.describe(options::COMMON);
+        let rate_hz = params.f64_in("rate_hz", 5.0, 0.1..=100.0)?;
+        let bytes_per_s = params.positive("max_bytes_per_s", 20_000_000)?;
+        Ok(Self {
+            markers: MarkerOptions::from_params(params)?,
+            limits: ComputeLimits {
+                events: options::inbox_events(params, 4096)?,
+                bytes: options::inbox_bytes(params, 64 << 20)?,
+                threads: options::threads(params, 1)?,
+            },
+            period: Duration::from_secs_f64(1.0 / rate_hz),
+            budget_bytes: (bytes_per_s as f64 / rate_hz) as usize,
+            mapper: params.string("mapper", "lattice_mapper")?,
+            report_file: report::file(params)?,
+        })
+    }
+}
+
+/// Reads all parameters of the node, as its start does.
+pub fn declare(params: &Params) -> Result<(), ParamError> {
+    Settings::from_params(params).map(drop)
+}
