@@ -3,13 +3,15 @@
 use std::process::ExitCode;
 
 use crate::start::{Finish, NodeError, Start};
+#[cfg(feature = "viewer")]
+use crate::viewer_server;
 use crate::{enu_transformer, lattice_mapper, semantic_icp_server, voxel_marker_publisher};
 use lattice_runtime::Runtime;
 use lattice_runtime::logging;
 use lattice_runtime::ros_args::RosArgs;
 
 /// Every node that can share a process, in the order in which data flows.
-pub const NODES: [(&str, Start); 4] = [
+pub const NODES: &[(&str, Start)] = &[
     ("enu_transformer", enu_transformer::node::start),
     ("lattice_mapper", lattice_mapper::node::start),
     (
@@ -17,6 +19,8 @@ pub const NODES: [(&str, Start); 4] = [
         voxel_marker_publisher::node::start,
     ),
     ("semantic_icp_server", semantic_icp_server::node::start),
+    #[cfg(feature = "viewer")]
+    ("viewer_server", viewer_server::node::start),
 ];
 
 /// Finds the node of an executable name.

@@ -17,4 +17,6 @@ pub mod report;
 pub mod semantic_icp_server;
 mod stamps;
 pub mod start;
+#[cfg(feature = "viewer")]
+pub mod viewer_server;
 pub mod voxel_marker_publisher;
