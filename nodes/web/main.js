@@ -27,7 +27,7 @@ const cells = new CellRenderer(gl);
 const scene = new Scene(gl);
 const transforms = new Transforms();
 const state = {
-  open: false, lattice: null, frame: "map", size: 0, complete: false, sequence: null, changedAt: null, heardAt: Date.now(),
+  open: false, live: false, lattice: null, frame: "map", size: 0, complete: false, sequence: null, changedAt: null, heardAt: Date.now(),
   mode: "height", heights: [0, 1], slice: [0, 1], labels: new Set(), robot: null, path: [], headset: null,
   clouds: new Map(), measuring: false, measured: [], chosen: null, shown: { cells: true, robot: true, grid: true, headset: true },
   scansOn: new Set(), problems: [], frames: 0,
@@ -69,25 +69,47 @@ const colourOf = (name) => {
   return [1, 3, 5].map((i) => parseInt(hex.slice(i, i + 2), 16) / 255);
 };
 
+// The frame that the graphics processor is at.
+let fence = null;
+// True if there is something new to draw once it is done.
+let due = false;
+
 function frame() {
   waiting = false;
-  const begin = performance.now();
-  const seen = view();
+  due = fence !== null;
+  if (due) return;
+  drawNow();
+  fence = { begin: performance.now(), sync: gl.fenceSync(gl.SYNC_GPU_COMMANDS_COMPLETE, 0) };
+  gl.flush();
+  poll();
+  state.frames++;
+}
+
+// Waits for the frame to be done, to know its time.
+function poll() {
+  setTimeout(() => {
+    if (!fence) return;
+    if (gl.clientWaitSync(fence.sync, 0, 0) === gl.TIMEOUT_EXPIRED) return poll();
+    gl.deleteSync(fence.sync);
+    lastFrame = performance.now() - fence.begin;
+    fence = null;
+    cells.timed(lastFrame);
+    if (due) redraw();
+  }, 4);
+}
+
+function drawNow() {
+  view();
   aim();
-  Object.assign(seen, view());
+  const seen = view();
   gl.viewport(0, 0, seen.width, seen.height);
   gl.enable(gl.DEPTH_TEST);
   gl.disable(gl.BLEND);
   gl.clearColor(...colourOf("--ground"), 1);
   gl.clear(gl.COLOR_BUFFER_BIT | gl.DEPTH_BUFFER_BIT);
-  if (state.shown.cells) cells.draw(seen);
+  if (state.shown.cells) cells.draw(seen, performance.now() - movedAt < 200);
   drawScene(seen);
   showMarks(seen);
-  state.frames++;
-  const moving = performance.now() - movedAt < 200;
-  gl.finish();
-  cells.timed(performance.now() - begin, moving);
-  lastFrame = performance.now() - begin;
 }
 
 // Has the camera look where its mode says.
@@ -122,7 +144,7 @@ function drawScene(seen) {
       scene.set("path", state.path.flatMap((p) => sub(p, state.path[0])));
       scene.draw("path", gl.LINE_STRIP, { origin: state.path[0], ink: [...accent, 0.9] });
     }
-    const size = Math.max(1.6, camera.distance * 0.022);
+    const size = Math.max(1.6, camera.distance * 0.03);
     scene.draw("robot", gl.TRIANGLES, { origin: state.robot.position, turn: turned(state.robot.rotation, size), ink: [1, 0.78, 0.36, 1] });
   }
   if (state.shown.headset && state.headset) {
@@ -166,6 +188,7 @@ const handlers = {
     for (const box of by("layers").querySelectorAll("input[data-topic]")) box.disabled = true;
   },
   channels({ channels }) {
+    state.live = channels.some((channel) => channel.kind === "diagnostics");
     showLayers(channels);
   },
   lattice({ info, frame }) {
@@ -370,7 +393,7 @@ function fold() {
 }
 
 function picture() {
-  frame();
+  drawNow();
   canvas.toBlob((blob) => {
     const link = panel.element("a", { href: URL.createObjectURL(blob), download: "lattice.png" });
     link.click();
@@ -380,7 +403,8 @@ function picture() {
 
 // Says what is known of the connection, also when nothing comes.
 function tick() {
-  const quiet = Date.now() - state.heardAt;
+  // A map of a file says nothing more.
+  const quiet = state.live ? Date.now() - state.heardAt : 0;
   const changed = state.changedAt === null ? null : (Date.now() - state.changedAt) / 1000;
   cells.stale = state.open && quiet < QUIET_MS ? 0 : 1;
   if (!state.open) {
@@ -429,7 +453,7 @@ redraw();
 
 // For tests: what is shown, in figures.
 window.lattice = {
-  state, camera, cells, pick, frame,
+  state, camera, cells, pick, frame: drawNow,
   keys: () => new Promise((resolve) => {
     const take = ({ data }) => {
       if (data.type !== "keys") return;
@@ -441,7 +465,7 @@ window.lattice = {
   }),
   // Share of the pixels that are not ground.
   lit() {
-    frame();
+    drawNow();
     const [w, h] = [canvas.width, canvas.height];
     const pixels = new Uint8Array(4 * w * h);
     gl.readPixels(0, 0, w, h, gl.RGBA, gl.UNSIGNED_BYTE, pixels);

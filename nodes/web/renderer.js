@@ -9,8 +9,8 @@ import { paletteBytes } from "./colours.js";
 const BYTES_A_CELL = 8;
 // Cells of less than so many pixels are points.
 const SMALL = 1.6;
-// Frames that take longer make the next ones simpler while the view moves, ms.
-const SLOW = 120;
+// Time that ray-casting may take in a frame, at rest and while the view moves, ms; else cells are points.
+const PATIENCE = { still: 700, moving: 60 };
 
 export function program(gl, vertex, fragment) {
   const made = gl.createProgram();
@@ -48,7 +48,9 @@ export class CellRenderer {
     this.now = 0;
     this.stale = 0;
     this.drawn = 0;
-    this.simple = false;
+    // Time for a million pixels of cells, ms, as frames have taken, and pixels of the last frame.
+    this.pace = 1;
+    this.pixels = 0;
     this.target = null;
   }
 
@@ -185,16 +187,22 @@ export class CellRenderer {
     return found.sort((a, b) => a.depth - b.depth);
   }
 
-  draw(view) {
+  draw(view, moving) {
     if (!this.lattice) return;
     const { gl } = this;
     const seen = this.visible(view);
     if (this.chosen) this.chosen.number = this.tiles.get(this.chosen.tile)?.number ?? -1;
     this.drawn = 0;
-    const small = this.simple ? 12 : SMALL;
-    const near = seen.filter(({ pixels }) => pixels >= small);
-    const far = seen.filter(({ pixels }) => pixels < small);
-    if (near.length > 0) {
+    this.pixels = 0;
+    const near = seen.filter(({ pixels }) => pixels >= SMALL);
+    for (const { tile, pixels } of near) this.pixels += tile.size * Math.min(pixels * 1.25, 400) ** 2 * 1e-6;
+    const simple = this.pixels * this.pace > (moving ? PATIENCE.moving : PATIENCE.still);
+    if (simple) {
+      this.pixels = 0;
+      // It is tried again some time.
+      this.pace *= 0.98;
+    }
+    if (near.length > 0 && !simple) {
       this.use(this.cells, view);
       for (const { tile } of near) {
         this.place(this.cells, tile, view, tile.number);
@@ -202,12 +210,13 @@ export class CellRenderer {
         this.drawn += tile.size;
       }
     }
+    const far = simple ? seen : seen.filter(({ pixels }) => pixels < SMALL);
     if (far.length > 0) {
       this.use(this.flat, view);
       for (const { tile, pixels } of far) {
         // Where cells are much smaller than a pixel a share of them says as much.
         const share = Math.min(1, Math.max(0.02, pixels * pixels));
-        const cells = Math.ceil(tile.size * (this.simple ? Math.min(1, share * 4) : share));
+        const cells = Math.ceil(tile.size * share);
         gl.uniform1f(this.flat.at.u_enlarge, 1 / Math.sqrt(Math.max(share, 0.25)));
         this.place(this.flat, tile, view, tile.number);
         gl.drawArrays(gl.POINTS, 0, cells);
@@ -217,9 +226,9 @@ export class CellRenderer {
     gl.bindVertexArray(null);
   }
 
-  // Notes how long a frame took; after slow ones the view is simpler while it moves.
-  timed(ms, moving) {
-    this.simple = moving && (this.simple || ms > SLOW);
+  // Notes how long the frame has taken.
+  timed(ms) {
+    if (this.pixels > 0.5) this.pace += 0.5 * (ms / this.pixels - this.pace);
   }
 
   // The cell at a place of the screen, in pixels from its lower left corner.

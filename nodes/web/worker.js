@@ -63,8 +63,8 @@ function onText(message) {
     retry = 250;
     if (session !== message.sessionId) {
       session = message.sessionId;
-      // Another process: nothing that was known holds.
-      follower.sequence = null;
+      // Another process: nothing that was known holds once its map comes.
+      follower.info = null;
     }
     postMessage({ type: "open", session });
   } else if (message.op === "advertise") {

@@ -27,7 +27,7 @@ pub fn serve(list: &VoxelList, options: &ViewerOptions) -> io::Result<(Server, S
             frame_id: "map".to_owned(),
             ..Header::default()
         },
-        epoch: 1,
+        epoch: entry(Vec::new()).stamp_ns,
         sequence: 1,
         history: History::default(),
         origin: None,

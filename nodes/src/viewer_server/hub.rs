@@ -44,6 +44,16 @@ struct Channel {
 struct Client {
     outbox: Outbox,
     wake: Sender<()>,
+    /// True after it has taken all that there was.
+    idle: bool,
+}
+
+impl Client {
+    fn wake(&mut self) {
+        self.idle = false;
+        // One wake is enough.
+        let _ = self.wake.try_send(());
+    }
 }
 
 /// Counters of the server.
@@ -116,8 +126,7 @@ impl Hub {
         let mut inner = lock(&self.inner);
         for client in inner.clients.values_mut() {
             if client.outbox.offer(channel, &message) {
-                // One wake is enough.
-                let _ = client.wake.try_send(());
+                client.wake();
             }
         }
         if let Some(channel) = inner.channels.get_mut(channel as usize)
@@ -131,9 +140,7 @@ impl Hub {
     pub fn change_map(&self, change: impl FnOnce(&mut MapStream)) {
         let mut inner = lock(&self.inner);
         change(&mut inner.stream);
-        for client in inner.clients.values() {
-            let _ = client.wake.try_send(());
-        }
+        inner.clients.values_mut().for_each(Client::wake);
     }
 
     /// True if a client waits for a keyframe.
@@ -159,6 +166,11 @@ impl Hub {
     /// Clients there are.
     pub fn clients(&self) -> usize {
         lock(&self.inner).clients.len()
+    }
+
+    /// True if every client has taken all that there was.
+    pub fn is_drained(&self) -> bool {
+        lock(&self.inner).clients.values().all(|client| client.idle)
     }
 
     /// Counters.
@@ -188,7 +200,8 @@ impl Hub {
         let id = inner.next_client;
         inner.next_client += 1;
         inner.counts.clients_in += 1;
-        inner.clients.insert(id, Client { outbox, wake });
+        let idle = false;
+        inner.clients.insert(id, Client { outbox, wake, idle });
         Some((id, woken))
     }
 
@@ -209,7 +222,10 @@ impl Hub {
             counts,
             ..
         } = &mut *inner;
-        let next = clients.get_mut(&id)?.outbox.next(stream)?;
+        let client = clients.get_mut(&id)?;
+        let next = client.outbox.next(stream);
+        client.idle = next.is_none();
+        let next = next?;
         counts.messages_out += 1;
         if let Outgoing::Data(_, message) = &next {
             counts.bytes_out += message.cdr.len() as u64;

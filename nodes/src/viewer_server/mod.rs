@@ -25,3 +25,6 @@ pub use options::{ViewerOptions, url};
 pub use outbox::{Class, Outbox, Outgoing};
 pub use protocol::{ClientMessage, SUBPROTOCOLS};
 pub use server::Server;
+
+#[cfg(test)]
+mod tests;

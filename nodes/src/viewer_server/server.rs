@@ -5,7 +5,7 @@ use std::net::{SocketAddr, TcpListener, TcpStream};
 use std::sync::Arc;
 use std::sync::atomic::{AtomicUsize, Ordering};
 use std::thread::JoinHandle;
-use std::time::Duration;
+use std::time::{Duration, Instant};
 
 use smol::channel::{Sender, bounded};
 use smol::{Async, LocalExecutor, Timer};
@@ -17,8 +17,12 @@ use super::hub::Hub;
 /// Most connections, those of requests for files included.
 const MAX_CONNECTIONS: usize = 64;
 
+/// Time for clients to take the last messages.
+const LAST_TIME: Duration = Duration::from_secs(1);
+
 /// A server that is at work.
 pub struct Server {
+    hub: Arc<Hub>,
     address: SocketAddr,
     stop: Sender<()>,
     thread: JoinHandle<()>,
@@ -39,6 +43,7 @@ impl Server {
         let address = listener.local_addr()?;
         let listener = Async::new(listener)?;
         let (stop, stopped) = bounded::<()>(1);
+        let served = Arc::clone(&hub);
         let thread = std::thread::Builder::new()
             .name("viewer".to_owned())
             .spawn(move || {
@@ -51,6 +56,7 @@ impl Server {
                 smol::block_on(executor.run(smol::future::or(accept, ended)));
             })?;
         Ok(Self {
+            hub: served,
             address,
             stop,
             thread,
@@ -62,8 +68,12 @@ impl Server {
         self.address
     }
 
-    /// Closes all connections.
+    /// Lets clients take what there is, for a second at most, and closes all connections.
     pub fn finish(self) {
+        let late = Instant::now() + LAST_TIME;
+        while !self.hub.is_drained() && Instant::now() < late {
+            std::thread::sleep(Duration::from_millis(10));
+        }
         self.stop.close();
         if self.thread.join().is_err() {
             log::error!("the viewer's thread panicked");

@@ -9,6 +9,7 @@ mod map;
 mod nodes;
 mod paper;
 mod player;
+mod viewer;
 
 use std::process::{Command, Output};
 
