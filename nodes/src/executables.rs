@@ -56,7 +56,7 @@ pub fn answers_help(name: &str, args: &RosArgs) -> bool {
             "Usage: {name} [--ros-args [-r FROM:=TO] [-p NAME:=VALUE] [--params-file FILE] \
              [--log-level LEVEL] [--enclave NAME] ...]\n\n\
              Topics and services are in README.md; every parameter, with its unit and meaning, is in\n\
-             params/bobcat.yaml and params/semantic_icp.yaml.\n\n\
+             params/bobcat.yaml, params/semantic_icp.yaml and params/viewer.yaml.\n\n\
              Environment: ROS_DOMAIN_ID, ROS_AUTOMATIC_DISCOVERY_RANGE (LOCALHOST or SUBNET),\n\
              RMW_IMPLEMENTATION (rmw_cyclonedds_cpp where built in, or rustdds), ROS_SECURITY_ENABLE\n\
              with the others of SROS2 (docs/security.md), RUST_LOG."

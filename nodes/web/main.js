@@ -145,7 +145,10 @@ function drawScene(seen) {
       scene.draw("path", gl.LINE_STRIP, { origin: state.path[0], ink: [...accent, 0.9] });
     }
     const size = Math.max(1.6, camera.distance * 0.03);
+    // In front of all: it must not be lost behind its map.
+    gl.disable(gl.DEPTH_TEST);
     scene.draw("robot", gl.TRIANGLES, { origin: state.robot.position, turn: turned(state.robot.rotation, size), ink: [1, 0.78, 0.36, 1] });
+    gl.enable(gl.DEPTH_TEST);
   }
   if (state.shown.headset && state.headset) {
     const good = state.headset.verdict === 1;
@@ -423,7 +426,7 @@ function tick() {
   tick.stale = cells.stale;
 }
 
-const pointer = { moved, clicked: (x, y) => pick(x, y) };
+const pointer = { moved, clicked: (x, y) => { camera.automatic = false; pick(x, y); } };
 watchPointer(canvas, camera, pointer);
 watchKeys({
   1: () => setCamera("free"), 2: () => setCamera("follow"), 3: () => setCamera("top"), 4: () => setCamera("side"),

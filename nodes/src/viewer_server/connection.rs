@@ -24,7 +24,7 @@ const HEAD_TIME: Duration = Duration::from_secs(5);
 const SEND_TIME: Duration = Duration::from_secs(20);
 /// Longest message of a client, bytes.
 const MAX_INBOUND_BYTES: usize = 64 << 10;
-/// What the kernel keeps of what a client has not taken, bytes.
+/// Bytes that the kernel keeps until a client takes them.
 const SEND_BUFFER_BYTES: usize = 512 << 10;
 
 type Stream = Async<TcpStream>;

@@ -16,7 +16,7 @@ use super::protocol::{self, Advertised, ClientMessage};
 /// Most bytes of updates of the map that are kept for clients that are behind.
 const MAX_UPDATE_BYTES: usize = 8 << 20;
 
-/// What clients are shown, and what they want.
+/// Channels, the map and the clients of a server.
 pub struct Hub {
     max_clients: usize,
     session: String,

@@ -73,7 +73,7 @@ impl MapSource {
         self.follower.map()
     }
 
-    /// What clients do not have; nothing while the map is between two states.
+    /// Changes that clients do not have; nothing while the map is between two states.
     pub fn take_news(&mut self) -> Result<News, cdr::CdrError> {
         let (Some(map), Some(sequence)) = (self.follower.map(), self.follower.sequence()) else {
             return Ok(News::Nothing);

@@ -40,7 +40,7 @@ impl FromChannel for Event {
     }
 }
 
-/// What a server says of itself at its end.
+/// Report of a server at its end.
 #[derive(Serialize)]
 struct ViewerReport {
     counts: HubCounts,

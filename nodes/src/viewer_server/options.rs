@@ -72,7 +72,7 @@ impl ViewerOptions {
         })
     }
 
-    /// Who may come in. Without a token only this machine may; where none is given, one is made.
+    /// Conditions of entry. Without a token only this machine may; where none is given, one is made.
     pub fn gate(&self) -> std::io::Result<Gate> {
         let token = match (self.token.is_empty(), self.address.ip().is_loopback()) {
             (false, _) => Some(self.token.clone()),

@@ -1,4 +1,4 @@
-//! What waits for one client: control messages in order, the map by its place in the stream, the newest
+//! Messages that wait for one client: control messages in order, the map by its place in the stream, the newest
 //! messages of everything else.
 
 use std::collections::{BTreeMap, VecDeque};

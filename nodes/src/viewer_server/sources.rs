@@ -38,7 +38,7 @@ pub trait FromChannel: Send + 'static {
     fn message(channel: u32, message: Unwritten) -> Self;
 }
 
-/// When a channel is subscribed to.
+/// Time of a subscription to a channel.
 #[derive(Clone, Copy, PartialEq, Eq)]
 enum When {
     /// Always: it is small, and who comes late must have it.

@@ -4,6 +4,7 @@ use lattice_lab::datasets;
 use lattice_nodes::enu_transformer::TransformerOptions;
 use lattice_nodes::lattice_mapper::MapperOptions;
 use lattice_nodes::semantic_icp_server::ServerOptions;
+use lattice_nodes::viewer_server::ViewerOptions;
 use lattice_nodes::voxel_marker_publisher::MarkerOptions;
 use lattice_runtime::params::Params;
 use lattice_runtime::ros_args::RosArgs;
@@ -77,6 +78,23 @@ fn the_file_for_a_headset_has_every_parameter_and_its_default() {
     let params = self::params("semantic_icp.yaml", "/lattice_mapper");
     let options = MapperOptions::from_params(&params).unwrap();
     assert!(options.labels.is_some() && params.unused().is_empty());
+}
+
+#[test]
+fn the_file_of_the_viewer_has_every_parameter_and_its_default() {
+    let params = params("viewer.yaml", "/robot/viewer_server");
+    let options = ViewerOptions::from_params(&params).unwrap();
+    let defaults = ViewerOptions::default();
+    assert_eq!(format!("{options:?}"), format!("{defaults:?}"));
+    let shell = [
+        "inbox_bytes",
+        "inbox_events",
+        "mapper",
+        "report_file",
+        "threads",
+    ];
+    assert_eq!(params.unused(), shell);
+    assert_eq!(missing(&params), Vec::<String>::new());
 }
 
 #[test]

@@ -4,6 +4,7 @@ use std::io::{BufRead, BufReader};
 use std::path::Path;
 use std::process::{Child, Command, Stdio};
 
+use base64::prelude::*;
 use lattice_core::voxels::file::MapContents;
 use serde_json::json;
 
@@ -206,6 +207,13 @@ fn the_map_that_grows_in_a_demo_is_at_its_end_the_mappers() {
     let mut viewer = Viewer::start(&demo);
     let mut page = Page::open(&chromium, &viewer.url);
     page.wait_for("lattice.state.size > 100 && lattice.state.robot !== null");
+    if let Some(path) = std::env::var_os("LATTICE_PICTURE") {
+        // The picture in README, of a map that has grown for a while.
+        page.wait_for("lattice.state.path.length > 24");
+        page.value("lattice.frame()");
+        let picture = BASE64_STANDARD.decode(page.picture()).unwrap();
+        std::fs::write(path, picture).unwrap();
+    }
     assert!(viewer.process.wait().unwrap().success());
     page.wait_for("!document.getElementById('banner').hidden");
     let map = folder.path().join("map.lattice").display().to_string();

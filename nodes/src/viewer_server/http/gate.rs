@@ -11,12 +11,12 @@ use crate::viewer_server::protocol::SUBPROTOCOLS;
 /// Cookie that holds the token once it has been given in an address.
 const COOKIE: &str = "lattice_token";
 
-/// What the page may load and do: itself, from here, and nothing else.
+/// Policy of the page: it loads its own files and nothing else.
 const POLICY: &str = "default-src 'none'; script-src 'self'; worker-src 'self'; style-src 'self'; \
      connect-src 'self'; img-src 'self' data: blob:; base-uri 'none'; form-action 'none'; \
      frame-ancestors 'none'";
 
-/// Who may come in.
+/// Conditions on which a request is let in.
 #[derive(Clone, Debug, Default)]
 pub struct Gate {
     /// Names by which this machine may be called, besides `localhost` and addresses.
@@ -40,7 +40,7 @@ pub struct Response {
     pub body: &'static [u8],
 }
 
-/// What becomes of a request.
+/// Outcome of a request.
 #[derive(Debug, PartialEq)]
 pub enum Decision {
     /// An answer.

@@ -16,7 +16,7 @@ const OPTIONS: &str = "--headless --no-sandbox --use-gl=angle --use-angle=swifts
     --disable-component-update --disable-sync --window-size=1280,800 --remote-debugging-port=0 \
     about:blank";
 
-/// What has not happened by then never will.
+/// Longest wait for a condition.
 const PATIENCE: Duration = Duration::from_secs(120);
 
 /// A page in a browser of its own.
