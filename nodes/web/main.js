@@ -448,6 +448,7 @@ const given = /#view=(.*)/.exec(location.hash);
 if (given) camera.fromText(given[1]);
 if (window.innerWidth < 640) fold();
 showCamera();
+showLayers([]);
 chooseColour();
 chooseSlice();
 setInterval(tick, 250);

@@ -20,7 +20,7 @@ const LEVELS = ["ok", "warn", "bad", "warn"];
 export function showFacts({ size, lattice, volume, changed }) {
   by("cells").textContent = whole(size);
   by("lattice").textContent = lattice ? lattice.toUpperCase() : "–";
-  by("side").textContent = volume ? `${volume.toPrecision(3)} m³` : "–";
+  by("side").textContent = volume ? (volume < 0.01 ? `${(volume * 1000).toPrecision(2)} L` : `${volume.toPrecision(3)} m³`) : "–";
   by("changed").textContent = changed === null ? "–" : changed < 2 ? "now" : `${seconds(changed)} ago`;
 }
 

@@ -22,7 +22,6 @@ const wanted = new Set(["tf", "static", "map", "updates", "diagnostics", "calibr
 // How each channel is read, by the type and the end of its topic.
 const KINDS = [
   ["map", "lattice_msgs/msg/LatticeMap", /(^|\/)map$/],
-  ["free", "lattice_msgs/msg/LatticeMap", /(^|\/)free$/],
   ["updates", "lattice_msgs/msg/LatticeMapUpdate", /./],
   ["static", "tf2_msgs/msg/TFMessage", /tf_static$/],
   ["tf", "tf2_msgs/msg/TFMessage", /./],

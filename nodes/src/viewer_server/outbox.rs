@@ -67,7 +67,9 @@ impl Outbox {
             return false;
         }
         self.subscriptions.insert(id, (channel, class));
-        if matches!(class, Class::Map | Class::Updates) {
+        // Updates that passed while nobody here wanted them are missing.
+        let passed = matches!(self.cursor, Cursor::Updates(_));
+        if class == Class::Map || class == Class::Updates && passed {
             self.cursor = Cursor::Fresh;
         }
         true

@@ -7,6 +7,7 @@ use std::sync::Arc;
 use async_tungstenite::tungstenite::client::IntoClientRequest;
 use async_tungstenite::tungstenite::handshake::client::Response;
 use async_tungstenite::tungstenite::{Error, Message, WebSocket, client};
+use lattice_msgs::RosMessage;
 use lattice_msgs::cdr;
 use lattice_msgs::lattice::LatticeMap;
 use lattice_msgs::std_msgs::Empty;

@@ -117,6 +117,19 @@ fn shown(page: &mut Page) -> Vec<String> {
     keys
 }
 
+/// Cells found at places of the screen, and those of them that are drawn elsewhere.
+const PICK: &str = "(() => { const { camera, cells } = lattice; camera.automatic = false; lattice.frame(); \
+    const [w, h] = [innerWidth, innerHeight]; let [hits, wrong] = [0, 0]; \
+    for (let x = w * 0.3; x < w; x += 60) for (let y = 60; y < h; y += 60) { \
+    if (!lattice.pick(x, y)) continue; hits++; const p = camera.project(lattice.state.chosen.centre); \
+    if (Math.hypot(p.x - x, p.y - y) > 2 + 1.2 * cells.lattice.radius * camera.focal() / p.depth) wrong++; } \
+    return [hits, wrong]; })()";
+
+/// Distance of the robot from the middle of the view, pixels.
+const OFF_MIDDLE: &str = "(() => { const { camera, state } = lattice; lattice.frame(); \
+    const p = camera.project(state.robot.position); \
+    return Math.hypot(p.x - (1 + camera.aside) / 2 * camera.width, p.y - camera.height / 2); })()";
+
 const COMPLETE: &str = "lattice.state.open && lattice.state.complete";
 
 #[test]
@@ -134,17 +147,8 @@ fn cells_of_each_lattice_are_drawn_as_the_map_has_them() {
         assert_eq!(shown(page), keys(&map), "{lattice}");
         let lit = page.value("lattice.lit()").as_f64().unwrap();
         assert!(lit > 0.01, "{lattice}: {lit} of the pixels");
-        // The cell in the middle of what is drawn at a known one is that one.
-        let picked = page.value(
-            "(async () => { const { camera, cells } = lattice; const tile = [...cells.tiles.values()][0]; \
-             const box = document.getElementById('view').getBoundingClientRect(); \
-             let hits = 0; for (let i = 1; i < 12; i++) for (let k = 1; k < 8; k++) \
-             if (lattice.pick(box.width * i / 12, box.height * k / 8)) hits++; return hits; })()",
-        );
-        assert!(
-            picked.as_u64().unwrap() > 3,
-            "{lattice}: {picked} cells picked"
-        );
+        let picked: [u64; 2] = serde_json::from_value(page.value(PICK)).unwrap();
+        assert!(picked[0] > 10 && picked[1] == 0, "{lattice}: {picked:?}");
         assert_eq!(page.value("lattice.state.problems"), json!([]));
         let foreign: Vec<_> = page
             .requests
@@ -207,6 +211,20 @@ fn the_map_that_grows_in_a_demo_is_at_its_end_the_mappers() {
     let mut viewer = Viewer::start(&demo);
     let mut page = Page::open(&chromium, &viewer.url);
     page.wait_for("lattice.state.size > 100 && lattice.state.robot !== null");
+    page.value(
+        "document.querySelectorAll('#layers input[data-topic]').forEach((box) => box.click())",
+    );
+    for topic in ["/points_enu", "/fcc/map_centers"] {
+        page.wait_for(&format!(
+            "lattice.state.clouds.get('{topic}').scans.length > 0"
+        ));
+    }
+    page.value("document.querySelector('[data-camera=follow]').click()");
+    assert!(page.value(OFF_MIDDLE).as_f64().unwrap() < 5.0);
+    page.value("document.getElementById('fit').click()");
+    page.value(
+        "document.querySelectorAll('#layers input[data-topic]').forEach((box) => box.click())",
+    );
     if let Some(path) = std::env::var_os("LATTICE_PICTURE") {
         // The picture in README, of a map that has grown for a while.
         page.wait_for("lattice.state.path.length > 24");
