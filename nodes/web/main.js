@@ -1,12 +1,13 @@
 // The page: its worker, its view and its panel put together.
 
 import { Camera } from "./camera.js";
+import { Drawing, colourOf } from "./drawing.js";
 import { placeIndex } from "./keys.js";
 import { add, length, rotate, sub } from "./math.js";
 import * as panel from "./panel.js";
 import { watchKeys, watchPointer } from "./pointer.js";
 import { CellRenderer } from "./renderer.js";
-import { Scene, turned } from "./scene.js";
+import { Scene } from "./scene.js";
 import { Transforms } from "./transforms.js";
 
 const { by } = panel;
@@ -15,8 +16,6 @@ const HEADSET = "headset_origin";
 const MODES = ["height", "count", "label", "age"];
 const QUIET_MS = 5000;
 const MOST_PATH = 4000;
-// Scans stay this long, ms: those of a laser come in many small clouds.
-const SCAN_MS = 700;
 
 const canvas = by("view");
 const gl = canvas.getContext("webgl2", { antialias: false, preserveDrawingBuffer: false });
@@ -33,151 +32,8 @@ const state = {
   scansOn: new Set(), problems: [], frames: 0,
 };
 const worker = new Worker("/worker.js", { type: "module" });
-let waiting = false;
-let lastFrame = 0;
-let movedAt = 0;
-
-// --- Drawing, once for whatever has changed since the last frame.
-
-function redraw() {
-  if (waiting) return;
-  waiting = true;
-  requestAnimationFrame(frame);
-}
-
-function moved() {
-  movedAt = performance.now();
-  redraw();
-  setTimeout(redraw, 250);
-  clearTimeout(moved.link);
-  moved.link = setTimeout(() => history.replaceState(null, "", `#view=${camera.toText()}`), 500);
-  showCamera();
-}
-
-function view() {
-  const ratio = Math.min(window.devicePixelRatio || 1, 1.5);
-  const [width, height] = [Math.round(canvas.clientWidth * ratio), Math.round(canvas.clientHeight * ratio)];
-  if (canvas.width !== width || canvas.height !== height) [canvas.width, canvas.height] = [width, height];
-  [camera.width, camera.height] = [width, height];
-  camera.aside = window.innerWidth < 640 || by("panel").hidden ? 0 : Math.min(0.35, 280 / canvas.clientWidth);
-  const [axes, eye] = [camera.axes(), camera.eye()];
-  return { ratio, width, height, axes, eye, clip: camera.clip(), rays: camera.rays(), focal: camera.focal(), near: camera.near(), aside: camera.aside, window: [0, 0, width, height] };
-}
-
-const colourOf = (name) => {
-  const hex = getComputedStyle(document.documentElement).getPropertyValue(name).trim();
-  return [1, 3, 5].map((i) => parseInt(hex.slice(i, i + 2), 16) / 255);
-};
-
-// The frame that the graphics processor is at.
-let fence = null;
-// True if there is something new to draw once it is done.
-let due = false;
-
-function frame() {
-  waiting = false;
-  due = fence !== null;
-  if (due) return;
-  drawNow();
-  fence = { begin: performance.now(), sync: gl.fenceSync(gl.SYNC_GPU_COMMANDS_COMPLETE, 0) };
-  gl.flush();
-  poll();
-  state.frames++;
-}
-
-// Waits for the frame to be done, to know its time.
-function poll() {
-  setTimeout(() => {
-    if (!fence) return;
-    if (gl.clientWaitSync(fence.sync, 0, 0) === gl.TIMEOUT_EXPIRED) return poll();
-    gl.deleteSync(fence.sync);
-    lastFrame = performance.now() - fence.begin;
-    fence = null;
-    cells.timed(lastFrame);
-    if (due) redraw();
-  }, 4);
-}
-
-function drawNow() {
-  view();
-  aim();
-  const seen = view();
-  gl.viewport(0, 0, seen.width, seen.height);
-  gl.enable(gl.DEPTH_TEST);
-  gl.disable(gl.BLEND);
-  gl.clearColor(...colourOf("--ground"), 1);
-  gl.clear(gl.COLOR_BUFFER_BIT | gl.DEPTH_BUFFER_BIT);
-  if (state.shown.cells) cells.draw(seen, performance.now() - movedAt < 200);
-  drawScene(seen);
-  showMarks(seen);
-}
-
-// Has the camera look where its mode says.
-function aim() {
-  if (camera.mode === "follow" && state.robot) camera.target = state.robot.position;
-  else if (camera.automatic) {
-    const bounds = cells.bounds();
-    if (bounds) camera.fit(bounds.low, bounds.high);
-  }
-}
-
-function drawScene(seen) {
-  gl.enable(gl.BLEND);
-  gl.blendFunc(gl.SRC_ALPHA, gl.ONE_MINUS_SRC_ALPHA);
-  scene.begin(seen);
-  gl.depthMask(false);
-  if (state.shown.grid) {
-    const step = scene.grid(camera.target, state.heights[0] - 0.3, camera.distance, [...colourOf("--quiet"), 0.24]);
-    by("scale").textContent = `grid ${step < 1 ? `${Math.round(step * 100)} cm` : `${step} m`}`;
-  } else by("scale").textContent = "";
-  gl.depthMask(true);
-  const now = performance.now();
-  for (const [topic, { scans, ink }] of state.clouds) {
-    if (!state.scansOn.has(topic)) continue;
-    for (const { name, origin, at } of scans) {
-      if (now - at < SCAN_MS || scans.length === 1) scene.draw(name, gl.POINTS, { origin, ink, size: 2.5 * seen.ratio });
-    }
-  }
-  if (state.shown.robot && state.robot) {
-    const accent = colourOf("--accent");
-    if (state.path.length > 1) {
-      scene.set("path", state.path.flatMap((p) => sub(p, state.path[0])));
-      scene.draw("path", gl.LINE_STRIP, { origin: state.path[0], ink: [...accent, 0.9] });
-    }
-    const size = Math.max(1.6, camera.distance * 0.03);
-    // In front of all: it must not be lost behind its map.
-    gl.disable(gl.DEPTH_TEST);
-    scene.draw("robot", gl.TRIANGLES, { origin: state.robot.position, turn: turned(state.robot.rotation, size), ink: [1, 0.78, 0.36, 1] });
-    gl.enable(gl.DEPTH_TEST);
-  }
-  if (state.shown.headset && state.headset) {
-    const good = state.headset.verdict === 1;
-    const ink = [...colourOf(good ? "--good" : "--bad"), 1];
-    scene.draw("frustum", gl.LINES, { origin: state.headset.position, turn: turned(state.headset.rotation, 1.2), ink });
-  }
-  if (state.measured.length === 2) {
-    gl.disable(gl.DEPTH_TEST);
-    scene.set("measured", [0, 0, 0, ...sub(state.measured[1], state.measured[0])]);
-    scene.draw("measured", gl.LINES, { origin: state.measured[0], ink: [1, 0.93, 0.55, 1] });
-  }
-}
-
-// Words at places of the map.
-function showMarks(seen) {
-  const marks = [];
-  const mark = (point, text) => {
-    const { x, y, depth } = camera.project(point);
-    if (depth <= 0) return;
-    const span = panel.element("span", { textContent: text });
-    span.style.left = `${x / seen.ratio}px`;
-    span.style.top = `${y / seen.ratio}px`;
-    marks.push(span);
-  };
-  const [a, b] = state.measured;
-  if (a && b) mark(add(a, b).map((x) => x / 2), panel.metres(length(sub(a, b))));
-  else if (a) mark(a, "from here");
-  by("marks").replaceChildren(...marks);
-}
+const drawing = new Drawing({ gl, canvas, camera, cells, scene, state });
+const redraw = () => drawing.redraw();
 
 // --- What comes from the worker.
 
@@ -329,7 +185,7 @@ function wantCloud(topic, on) {
 // --- Cells that are chosen, and distances between them.
 
 function pick(x, y) {
-  const seen = view();
+  const seen = drawing.view();
   const found = cells.pick(seen, Math.round(x * seen.ratio), Math.round(seen.height - 1 - y * seen.ratio));
   if (!found) {
     cells.chosen = null;
@@ -367,6 +223,14 @@ function measure() {
 
 // --- Buttons, keys, time.
 
+// The view has been moved: the address tells it.
+function moved() {
+  drawing.moved();
+  clearTimeout(moved.link);
+  moved.link = setTimeout(() => history.replaceState(null, "", `#view=${camera.toText()}`), 500);
+  showCamera();
+}
+
 function setCamera(mode) {
   camera.setMode(mode);
   moved();
@@ -396,7 +260,7 @@ function fold() {
 }
 
 function picture() {
-  drawNow();
+  drawing.drawNow();
   canvas.toBlob((blob) => {
     const link = panel.element("a", { href: URL.createObjectURL(blob), download: "lattice.png" });
     link.click();
@@ -457,7 +321,7 @@ redraw();
 
 // For tests: what is shown, in figures.
 window.lattice = {
-  state, camera, cells, pick, frame: drawNow,
+  state, camera, cells, pick, frame: () => drawing.drawNow(),
   keys: () => new Promise((resolve) => {
     const take = ({ data }) => {
       if (data.type !== "keys") return;
@@ -469,7 +333,7 @@ window.lattice = {
   }),
   // Share of the pixels that are not ground.
   lit() {
-    drawNow();
+    drawing.drawNow();
     const [w, h] = [canvas.width, canvas.height];
     const pixels = new Uint8Array(4 * w * h);
     gl.readPixels(0, 0, w, h, gl.RGBA, gl.UNSIGNED_BYTE, pixels);
@@ -478,5 +342,5 @@ window.lattice = {
     for (let i = 0; i < pixels.length; i += 4) if (ground.some((x, k) => Math.abs(pixels[i + k] - x) > 24)) lit++;
     return lit / (w * h);
   },
-  frameMs: () => lastFrame,
+  frameMs: () => drawing.lastFrame,
 };

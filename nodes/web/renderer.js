@@ -10,7 +10,7 @@ const BYTES_A_CELL = 8;
 // Cells of less than so many pixels are points.
 const SMALL = 1.6;
 // Time that ray-casting may take in a frame, at rest and while the view moves, ms; else cells are points.
-const PATIENCE = { still: 700, moving: 60 };
+const PATIENCE = { still: 1500, moving: 60 };
 
 export function program(gl, vertex, fragment) {
   const made = gl.createProgram();

@@ -55,7 +55,8 @@ impl Viewer {
             });
         }
         drop(tell);
-        let url = told.recv().expect("the command says where the page is");
+        // It says so once it listens.
+        let url = told.recv().unwrap();
         Self { process, url }
     }
 

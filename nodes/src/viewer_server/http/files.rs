@@ -31,6 +31,7 @@ const FILES: &[File] = files! {
     "/cdr.js" "cdr.js" JAVASCRIPT;
     "/cell.js" "cell.js" JAVASCRIPT;
     "/colours.js" "colours.js" JAVASCRIPT;
+    "/drawing.js" "drawing.js" JAVASCRIPT;
     "/follower.js" "follower.js" JAVASCRIPT;
     "/keys.js" "keys.js" JAVASCRIPT;
     "/main.js" "main.js" JAVASCRIPT;

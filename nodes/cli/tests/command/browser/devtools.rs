@@ -48,7 +48,7 @@ impl Page {
             .by_ref()
             .map_while(Result::ok)
             .find_map(|line| Some(line.split_once("ws://")?.1.to_owned()))
-            .expect("chromium says where it listens");
+            .unwrap();
         // Nobody would read the rest, and a full pipe would stop it.
         std::thread::spawn(move || lines.for_each(drop));
         let (mut socket, _) = connect(format!("ws://{address}")).unwrap();
