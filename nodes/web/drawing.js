@@ -139,12 +139,12 @@ export class Drawing {
 
   drawRobot() {
     const { gl, camera, scene, state: { path, robot } } = this;
+    // In front of all: they must not be lost behind the map.
+    gl.disable(gl.DEPTH_TEST);
     if (path.length > 1) {
       scene.set("path", path.flatMap((p) => sub(p, path[0])));
       scene.draw("path", gl.LINE_STRIP, { origin: path[0], ink: [...colourOf("--accent"), 0.9] });
     }
-    // In front of all: it must not be lost behind its map.
-    gl.disable(gl.DEPTH_TEST);
     const size = Math.max(1.6, camera.distance * 0.03);
     scene.draw("robot", gl.TRIANGLES, { origin: robot.position, turn: turned(robot.rotation, size), ink: [1, 0.78, 0.36, 1] });
     gl.enable(gl.DEPTH_TEST);

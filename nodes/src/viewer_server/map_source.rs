@@ -206,7 +206,7 @@ fn update(
     let chunk = |(chunk, part): (u32, &&[MortonKey])| {
         let here = |key: &&MortonKey| map.voxels().contains_key(key);
         let (changed, removed): (Vec<MortonKey>, Vec<MortonKey>) =
-            part.iter().partition(|key| here(&key));
+            part.iter().partition(|key| here(key));
         let columns = Columns::of(changed.iter().filter_map(|key| map.voxels().get(key)));
         LatticeMapUpdate {
             header: header(map),
