@@ -198,12 +198,16 @@ fn the_map_that_grows_in_a_demo_is_at_its_end_the_mappers() {
     let Some(chromium) = chromium() else { return };
     let folder = tempfile::tempdir().unwrap();
     let out = folder.path().display().to_string();
+    let duration = match std::env::var_os("LATTICE_PICTURE") {
+        Some(_) => "40",
+        None => "12",
+    };
     let demo = [
         "demo",
         "--lattice",
         "fcc",
         "--duration",
-        "6",
+        duration,
         "--port",
         "0",
         "--out",
@@ -228,7 +232,7 @@ fn the_map_that_grows_in_a_demo_is_at_its_end_the_mappers() {
     );
     if let Some(path) = std::env::var_os("LATTICE_PICTURE") {
         // The picture in README, of a map that has grown for a while.
-        page.wait_for("lattice.state.path.length > 24");
+        page.wait_for("lattice.state.path.length > 120");
         page.value("Object.defineProperty(lattice.cells, 'pace', { get: () => 0, set() {} })");
         page.value("lattice.lit()");
         let picture = BASE64_STANDARD.decode(page.picture()).unwrap();
