@@ -4,6 +4,8 @@ use std::process::ExitCode;
 
 use crate::running::Running;
 use crate::start::{Declare, NodeError, Start};
+#[cfg(feature = "viewer")]
+use crate::viewer_server;
 use crate::{enu_transformer, lattice_mapper, semantic_icp_server, voxel_marker_publisher};
 use lattice_runtime::Runtime;
 use lattice_runtime::logging;
@@ -11,7 +13,7 @@ use lattice_runtime::params::Params;
 use lattice_runtime::ros_args::RosArgs;
 
 /// Every node that can share a process, in the order in which data flows.
-pub const NODES: [(&str, Start); 4] = [
+pub const NODES: &[(&str, Start)] = &[
     ("enu_transformer", enu_transformer::node::start),
     ("lattice_mapper", lattice_mapper::node::start),
     (
@@ -19,14 +21,18 @@ pub const NODES: [(&str, Start); 4] = [
         voxel_marker_publisher::node::start,
     ),
     ("semantic_icp_server", semantic_icp_server::node::start),
+    #[cfg(feature = "viewer")]
+    ("viewer_server", viewer_server::node::start),
 ];
 
 /// Readers of the parameters of those nodes.
-pub const PARAMETERS: [(&str, Declare); 4] = [
+pub const PARAMETERS: &[(&str, Declare)] = &[
     ("enu_transformer", enu_transformer::declare),
     ("lattice_mapper", lattice_mapper::declare),
     ("voxel_marker_publisher", voxel_marker_publisher::declare),
     ("semantic_icp_server", semantic_icp_server::declare),
+    #[cfg(feature = "viewer")]
+    ("viewer_server", viewer_server::declare),
 ];
 
 /// Finds the node of an executable name.

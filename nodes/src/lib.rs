@@ -18,4 +18,6 @@ pub mod running;
 pub mod semantic_icp_server;
 mod stamps;
 pub mod start;
+#[cfg(feature = "viewer")]
+pub mod viewer_server;
 pub mod voxel_marker_publisher;

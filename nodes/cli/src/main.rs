@@ -13,6 +13,8 @@ mod quantize;
 #[cfg(feature = "bags")]
 mod replay;
 mod run;
+#[cfg(feature = "viewer")]
+mod view;
 
 use std::error::Error;
 use std::process::ExitCode;
@@ -35,6 +37,9 @@ struct Cli {
 enum Command {
     /// Run several nodes in one process, as parameter files say
     Run(run::Run),
+    /// Show a map in the browser: of a file, of a log, or live
+    #[cfg(feature = "viewer")]
+    View(view::View),
     /// Run one node
     Node(node::NodeCommand),
     /// Make a link to this program for every node, by whose name it is that node
@@ -79,6 +84,8 @@ impl Command {
     fn run(self) -> CliResult {
         match self {
             Command::Run(command) => command.run(),
+            #[cfg(feature = "viewer")]
+            Command::View(command) => command.run(),
             Command::Node(command) => command.run(),
             Command::Link(command) => command.run(),
             #[cfg(feature = "bags")]

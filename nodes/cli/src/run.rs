@@ -22,9 +22,27 @@ pub struct Run {
     /// As for any ROS node: `--ros-args -r from:=to -p name:=value ...`
     #[arg(last = true)]
     ros_args: Vec<String>,
+    /// Nodes that run whatever the files name.
+    #[arg(skip)]
+    always: &'static [&'static str],
 }
 
 impl Run {
+    /// Runs the nodes that parameter files name, and some others.
+    #[cfg(feature = "viewer")]
+    pub fn nodes_of(
+        params: Vec<PathBuf>,
+        always: &'static [&'static str],
+        ros_args: Vec<String>,
+    ) -> Self {
+        Self {
+            params,
+            only: Vec::new(),
+            ros_args,
+            always,
+        }
+    }
+
     /// Runs the command.
     pub fn run(self) -> CliResult {
         let mut arguments = vec!["--ros-args".to_owned()];
@@ -41,7 +59,8 @@ impl Run {
         arguments.extend(self.ros_args);
         let wanted = |name: &str| {
             let named = named.iter().any(|pattern| pattern.names(name));
-            named && (self.only.is_empty() || self.only.iter().any(|only| only == name))
+            self.always.contains(&name)
+                || named && (self.only.is_empty() || self.only.iter().any(|only| only == name))
         };
         let nodes: Vec<_> = executables::NODES
             .iter()

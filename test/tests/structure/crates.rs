@@ -31,7 +31,7 @@ const EDGES: [(&str, &str); 8] = [
 ];
 
 /// Crates that a robot's build is spared: bags, pictures, plots, meshes.
-const NOT_ON_A_ROBOT: &str = "base64 bzip2 fast-surface-nets lattice_bag lattice_lab mcap obvhs \
+const NOT_ON_A_ROBOT: &str = "async-tungstenite base64 bzip2 fast-surface-nets httparse lattice_bag lattice_lab mcap obvhs \
                               plotters png rusqlite";
 
 fn cargo(arguments: &[&str]) -> String {

@@ -22,10 +22,11 @@ fn params(file: &str, node: &str) -> Params {
 /// Every node with the file that has all its parameters.
 fn nodes() -> impl Iterator<Item = (&'static str, &'static str, Params)> {
     let player = (bag_player::NAME, bag_player::declare as _);
-    let all = PARAMETERS.into_iter().chain([player]);
+    let all = PARAMETERS.iter().copied().chain([player]);
     all.map(|(node, declare)| {
         let file = match node {
             "semantic_icp_server" => "semantic_icp.yaml",
+            "viewer_server" => "viewer.yaml",
             _ => "bobcat.yaml",
         };
         let params = params(file, &format!("/robot/{node}"));

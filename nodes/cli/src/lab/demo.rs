@@ -10,10 +10,17 @@ use lattice_lab::datasets::BobcatOptions;
 use lattice_lab::render::RenderOptions;
 use lattice_nodes::files::whole::write_text;
 use std::fs;
+#[cfg(feature = "viewer")]
+use std::io::IsTerminal;
+#[cfg(feature = "viewer")]
+use std::net::{Ipv4Addr, TcpListener};
 use std::path::PathBuf;
 
 /// Parameters of the simulated machine, for users to copy.
 const BOBCAT_PARAMS: &str = include_str!("../../../../params/bobcat.yaml");
+/// Parameters of the viewer.
+#[cfg(feature = "viewer")]
+const VIEWER_PARAMS: &str = include_str!("../../../../params/viewer.yaml");
 
 /// Simulate, play, map
 #[derive(Args)]
@@ -33,6 +40,14 @@ pub struct Demo {
     /// cubic, bcc, fcc, mcc, hex, hexopt, several with commas (five at most), or paper
     #[arg(long, default_value = "paper")]
     lattice: Lattices,
+    /// Do without the page that shows the FCC map, or the first, as it grows
+    #[cfg(feature = "viewer")]
+    #[arg(long)]
+    no_view: bool,
+    /// Port of this page; one that is free if it is taken
+    #[cfg(feature = "viewer")]
+    #[arg(long, default_value_t = 8765)]
+    port: u16,
     /// Print the report as JSON
     #[arg(long)]
     json: bool,
@@ -46,6 +61,7 @@ impl Demo {
         let params = self.out.join("bobcat.yaml");
         fs::create_dir_all(&self.out).map_err(|e| format!("{}: {e}", self.out.display()))?;
         write_text(&params, BOBCAT_PARAMS)?;
+        let (params, viewer) = self.viewer(params)?;
         let summary = simulate::bobcat(&BobcatOptions {
             seed: self.seed,
             duration_s: self.duration,
@@ -61,7 +77,7 @@ impl Demo {
             lattice: Some(self.lattice.clone()),
             cell_volume: None,
             orientation: None,
-            params: vec![params],
+            params,
             param: Vec::new(),
             points: Vec::new(),
             ins: None,
@@ -70,6 +86,7 @@ impl Demo {
             rate: self.rate,
             map_out: None,
             json: self.json,
+            viewer,
         };
         let report = replay.replay()?;
         // The same log without DDS: the map that the nodes should have made, and its picture.
@@ -93,6 +110,34 @@ impl Demo {
                 png.display()
             );
         }
+        #[cfg(feature = "viewer")]
+        if viewer.is_some() && std::io::stdout().is_terminal() {
+            // The nodes have ended: the page goes on with the map that they made.
+            let address = (Ipv4Addr::LOCALHOST, self.port).into();
+            let (_server, url) = crate::view::serve_file(&self.out.join("map.lattice"), address)?;
+            println!("the map stays at {url} until Ctrl-C");
+            loop {
+                std::thread::park();
+            }
+        }
         Ok(())
+    }
+
+    /// Files of parameters, and the port of the viewer if there is to be one.
+    #[cfg(feature = "viewer")]
+    fn viewer(&self, params: PathBuf) -> CliResult<(Vec<PathBuf>, Option<u16>)> {
+        if self.no_view {
+            return Ok((vec![params], None));
+        }
+        let viewer = self.out.join("viewer.yaml");
+        write_text(&viewer, VIEWER_PARAMS)?;
+        let is_free = TcpListener::bind((Ipv4Addr::LOCALHOST, self.port)).is_ok();
+        let port = if is_free { self.port } else { 0 };
+        Ok((vec![params, viewer], Some(port)))
+    }
+
+    #[cfg(not(feature = "viewer"))]
+    fn viewer(&self, params: PathBuf) -> CliResult<(Vec<PathBuf>, Option<u16>)> {
+        Ok((vec![params], None))
     }
 }

@@ -27,7 +27,7 @@ use processes::DdsReplay;
 const MAX_LOOPBACK_LATTICES: usize = 5;
 
 /// Map a rosbag2 log
-#[derive(Args, Clone, Debug)]
+#[derive(Args, Clone, Debug, Default)]
 pub struct Replay {
     /// rosbag2 directory, or one mcap or db3 file of it
     pub bag: PathBuf,
@@ -72,9 +72,24 @@ pub struct Replay {
     /// Print the report as JSON
     #[arg(long)]
     pub json: bool,
+    /// Port of a viewer of one of the maps.
+    #[arg(skip)]
+    pub viewer: Option<u16>,
 }
 
 impl Replay {
+    /// Maps a log directly, as the parameters' defaults say, and writes the map.
+    #[cfg(feature = "viewer")]
+    pub fn of_log(bag: &std::path::Path, map_out: &std::path::Path) -> Self {
+        Self {
+            bag: bag.to_owned(),
+            direct: true,
+            rate: 1.0,
+            map_out: Some(map_out.to_owned()),
+            ..Self::default()
+        }
+    }
+
     /// Runs the command.
     pub fn run(self) -> CliResult {
         init_logging();

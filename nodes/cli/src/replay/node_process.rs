@@ -33,6 +33,7 @@ pub struct NodeProcess {
 }
 
 impl NodeProcess {
+    /// Starts a node, or several with commas between in one process.
     pub fn start(
         node: &str,
         namespace: Option<&str>,
@@ -41,17 +42,30 @@ impl NodeProcess {
         report: &Path,
     ) -> CliResult<Self> {
         let mut command = Command::new(std::env::current_exe()?);
-        command.args(["node", node, "--ros-args", "--log-level", "info"]);
-        for file in &replay.options.params {
-            command.arg("--params-file").arg(file);
+        let nodes: Vec<&str> = node.split(',').collect();
+        let files = &replay.options.params;
+        if let [node] = nodes.as_slice() {
+            command.args(["node", node, "--ros-args"]);
+            for file in files {
+                command.arg("--params-file").arg(file);
+            }
+        } else {
+            command.arg("run").args(files);
+            for node in &nodes {
+                command.args(["--only", node]);
+            }
+            command.args(["--", "--ros-args"]);
         }
+        command.args(["--log-level", "info"]);
         if let Some(namespace) = namespace {
             command.args(["-r", &format!("__ns:=/{namespace}")]);
             for shared in ["points_enu", "map_origin"] {
                 command.args(["-r", &format!("{shared}:=/{shared}")]);
             }
         }
-        let report_file = param("report_file", &yaml_text(report));
+        // The first of several writes the report.
+        let first = nodes.first().copied().unwrap_or_default();
+        let report_file = param(&format!("{first}:report_file"), &yaml_text(report));
         for param in replay
             .options
             .param
@@ -89,10 +103,13 @@ impl NodeProcess {
         })
     }
 
-    /// Waits until the node has logged a line with this text.
-    pub fn expect(&mut self, text: &str) -> CliResult {
+    /// Waits until the node has logged a line with this text, and gives the line.
+    pub fn expect(&mut self, text: &str) -> CliResult<String> {
         let deadline = Instant::now() + MATCH_TIME;
-        while !self.seen.iter().any(|line| line.contains(text)) {
+        loop {
+            if let Some(line) = self.seen.iter().find(|line| line.contains(text)) {
+                return Ok(line.clone());
+            }
             match self.lines.recv_deadline(deadline) {
                 Ok(line) => self.seen.push(line),
                 Err(_) => {
@@ -109,7 +126,6 @@ impl NodeProcess {
                 }
             }
         }
-        Ok(())
     }
 
     /// Waits for the player's end; reports its progress.

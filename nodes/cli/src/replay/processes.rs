@@ -3,7 +3,7 @@
 use std::path::Path;
 use std::time::Instant;
 
-use lattice_core::lattice::Lattice;
+use lattice_core::lattice::{Lattice, LatticeKind};
 
 use super::Replay;
 use super::node_process::NodeProcess;
@@ -35,7 +35,8 @@ pub fn run(replay: &DdsReplay) -> CliResult<RunReport> {
     progress.say("nodes find each other");
     let mut branches = Vec::new();
     for lattice in &replay.lattices {
-        branches.push(Branch::start(replay, lattice, scratch.path())?);
+        let port = replay.viewer_port(lattice);
+        branches.push(Branch::start(replay, lattice, port, scratch.path())?);
     }
     let mut transformer = NodeProcess::start(
         "enu_transformer",
@@ -77,6 +78,16 @@ pub fn run(replay: &DdsReplay) -> CliResult<RunReport> {
 }
 
 impl DdsReplay<'_> {
+    /// Port of the viewer if it shows this lattice: FCC, or else the first.
+    fn viewer_port(&self, lattice: &Lattice) -> Option<u16> {
+        let mut all = self.lattices.iter().map(Lattice::kind);
+        let first = all.clone().next();
+        let shown = all.find(|kind| *kind == LatticeKind::Fcc).or(first);
+        self.options
+            .viewer
+            .filter(|_| shown == Some(lattice.kind()))
+    }
+
     fn topic(&self, wanted: impl Fn(&Role) -> bool) -> Vec<&str> {
         let roles = self.plan.roles.iter();
         let wanted = roles.filter(|(_, role)| wanted(role));
@@ -153,7 +164,12 @@ struct Branch {
 }
 
 impl Branch {
-    fn start(replay: &DdsReplay, lattice: &Lattice, scratch: &Path) -> CliResult<Self> {
+    fn start(
+        replay: &DdsReplay,
+        lattice: &Lattice,
+        viewer_port: Option<u16>,
+        scratch: &Path,
+    ) -> CliResult<Self> {
         let name = lattice.kind().name();
         let start = |node: &str, params: Vec<String>| {
             let report = scratch.join(format!("{name}_{node}.json"));
@@ -169,7 +185,19 @@ impl Branch {
         ];
         params.extend(orientation);
         let mapper = start("lattice_mapper", params)?;
-        let markers = start("voxel_marker_publisher", Vec::new())?;
+        let mut markers = match viewer_port {
+            // In one process: twelve find each other, and five lattices need them all.
+            Some(port) => {
+                let port = param("viewer_server:port", &port.to_string());
+                start("voxel_marker_publisher,viewer_server", vec![port])?
+            }
+            None => start("voxel_marker_publisher", Vec::new())?,
+        };
+        if viewer_port.is_some() {
+            let line = markers.expect("the map is at ")?;
+            let url = line.rsplit(' ').next().unwrap_or_default();
+            eprintln!("watch the {name} map grow at {url}");
+        }
         Ok(Self {
             namespace: format!("/{name}"),
             mapper,
@@ -184,7 +212,9 @@ impl Branch {
             let line = format!("{}/{topic}: publisher matched (1)", self.namespace);
             self.markers.expect(&line)?;
         }
-        self.mapper.expect("/points_enu: publisher matched (1)")
+        self.mapper
+            .expect("/points_enu: publisher matched (1)")
+            .map(drop)
     }
 
     fn end(self) -> CliResult<LatticeReport> {

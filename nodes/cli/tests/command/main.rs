@@ -10,6 +10,7 @@ mod map;
 mod nodes;
 mod paper;
 mod player;
+mod viewer;
 
 use std::process::{Command, Output};
 

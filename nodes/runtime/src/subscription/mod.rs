@@ -194,6 +194,15 @@ impl<M: RosMessage> Undecoded<M> {
         }
     }
 
+    /// The message as CDR, as it came or, if it comes from this process, as it would be sent; not checked.
+    pub fn into_cdr(self) -> Result<Vec<u8>, cdr::CdrError> {
+        self.stats.received.fetch_add(1, Relaxed);
+        match self.content {
+            Content::Shared(message) => cdr::to_vec(&*message),
+            Content::Cdr(bytes) => Ok(bytes),
+        }
+    }
+
     /// The message. `None`: the bytes are no message of the type, which is counted and logged.
     pub fn decode(self) -> Option<Arc<M>> {
         let Self { content, stats } = self;

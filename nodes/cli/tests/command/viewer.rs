@@ -1,0 +1,246 @@
+//! The page of the viewer server in a browser: its cells are those of the map.
+
+use std::io::{BufRead, BufReader};
+use std::path::Path;
+use std::process::{Child, Command, Stdio};
+
+use base64::prelude::*;
+use lattice_core::voxels::file::MapContents;
+use serde_json::json;
+
+use crate::browser::{chromium, devtools::Page};
+use crate::text;
+
+/// A process that serves a page.
+struct Viewer {
+    process: Child,
+    url: String,
+}
+
+impl Viewer {
+    fn show(map: &str, port: u16) -> Self {
+        Self::start(&["view", map, "--port", &port.to_string()])
+    }
+
+    /// Starts a command that says where the page is.
+    fn start(arguments: &[&str]) -> Self {
+        let mut process = Command::new(env!("CARGO_BIN_EXE_lattice"))
+            .args(arguments)
+            .env_remove("ROS_DOMAIN_ID")
+            .stdin(Stdio::null())
+            .stdout(Stdio::piped())
+            .stderr(Stdio::piped())
+            .spawn()
+            .unwrap();
+        let (out, err) = (
+            process.stdout.take().unwrap(),
+            process.stderr.take().unwrap(),
+        );
+        let (tell, told) = std::sync::mpsc::channel();
+        for stream in [
+            Box::new(out) as Box<dyn std::io::Read + Send>,
+            Box::new(err),
+        ] {
+            let tell = tell.clone();
+            // To its end: a full pipe would stop the process.
+            std::thread::spawn(move || {
+                for line in BufReader::new(stream).lines().map_while(Result::ok) {
+                    let word = line
+                        .split([' ', ','])
+                        .find(|word| word.starts_with("http://"));
+                    if let Some(url) = word {
+                        let _ = tell.send(url.to_owned());
+                    }
+                }
+            });
+        }
+        drop(tell);
+        // It says so once it listens.
+        let url = told.recv().unwrap();
+        Self { process, url }
+    }
+
+    fn port(&self) -> u16 {
+        self.url.rsplit(':').next().unwrap().parse().unwrap()
+    }
+}
+
+impl Drop for Viewer {
+    fn drop(&mut self) {
+        let _ = self.process.kill();
+        let _ = self.process.wait();
+    }
+}
+
+/// Points of a bumpy ground with a wall.
+fn scene(folder: &Path, wall_m: f64) -> String {
+    let mut points = String::new();
+    for i in 0..120 {
+        for k in 0..120 {
+            let (x, y) = (f64::from(i) * 0.25 - 15.0, f64::from(k) * 0.25 - 15.0);
+            points += &format!("{x} {y} {:.3}\n", (x / 4.0).sin() + (y / 5.0).cos());
+            if k < 24 {
+                points += &format!("{x} {wall_m} {:.3}\n", y + 15.0);
+            }
+        }
+    }
+    let path = folder.join(format!("{wall_m}.xyz"));
+    std::fs::write(&path, points).unwrap();
+    path.display().to_string()
+}
+
+fn map_of(cloud: &str, lattice: &str) -> String {
+    let map = format!("{cloud}.{lattice}.lattice");
+    text(&["quantize", cloud, "--lattice", lattice, "--map-out", &map]);
+    map
+}
+
+/// Keys of a map file as the page names them, sorted.
+fn keys(map: &str) -> Vec<String> {
+    let file = std::fs::File::open(map).unwrap();
+    let list = MapContents::read(BufReader::new(file), 1 << 20)
+        .unwrap()
+        .into_list(usize::MAX);
+    let mut keys: Vec<String> = list
+        .sorted()
+        .iter()
+        .map(|(key, _)| key.raw().to_string())
+        .collect();
+    keys.sort();
+    assert!(keys.len() > 1000);
+    keys
+}
+
+fn shown(page: &mut Page) -> Vec<String> {
+    let keys = page.value("lattice.keys()");
+    let mut keys: Vec<String> = serde_json::from_value(keys).unwrap();
+    keys.sort();
+    keys
+}
+
+/// Cells found at places of the screen, and those of them that are drawn elsewhere.
+const PICK: &str = "(() => { const { camera, cells } = lattice; camera.automatic = false; lattice.frame(); \
+    const [w, h] = [innerWidth, innerHeight]; let [hits, wrong] = [0, 0]; \
+    for (let x = w * 0.3; x < w; x += 60) for (let y = 60; y < h; y += 60) { \
+    if (!lattice.pick(x, y)) continue; hits++; const p = camera.project(lattice.state.chosen.centre); \
+    if (Math.hypot(p.x - x, p.y - y) > 2 + 1.2 * cells.lattice.radius * camera.focal() / p.depth) wrong++; } \
+    return [hits, wrong]; })()";
+
+/// Distance of the robot from the middle of the view, pixels.
+const OFF_MIDDLE: &str = "(() => { const { camera, state } = lattice; lattice.frame(); \
+    const p = camera.project(state.robot.position); \
+    return Math.hypot(p.x - (1 + camera.aside) / 2 * camera.width, p.y - camera.height / 2); })()";
+
+const COMPLETE: &str = "lattice.state.open && lattice.state.complete";
+
+#[test]
+fn cells_of_each_lattice_are_drawn_as_the_map_has_them() {
+    let Some(chromium) = chromium() else { return };
+    let folder = tempfile::tempdir().unwrap();
+    let cloud = scene(folder.path(), 5.0);
+    let mut page = None;
+    for lattice in ["cubic", "bcc", "fcc", "mcc", "hex"] {
+        let map = map_of(&cloud, lattice);
+        let viewer = Viewer::show(&map, 0);
+        let page = page.get_or_insert_with(|| Page::open(&chromium, "about:blank"));
+        page.go(&viewer.url);
+        page.wait_for(COMPLETE);
+        assert_eq!(shown(page), keys(&map), "{lattice}");
+        let lit = page.value("lattice.lit()").as_f64().unwrap();
+        assert!(lit > 0.01, "{lattice}: {lit} of the pixels");
+        let picked: [u64; 2] = serde_json::from_value(page.value(PICK)).unwrap();
+        assert!(picked[0] > 10 && picked[1] == 0, "{lattice}: {picked:?}");
+        assert_eq!(page.value("lattice.state.problems"), json!([]));
+        let foreign: Vec<_> = page
+            .requests
+            .iter()
+            .filter(|url| !is_own(url, &viewer.url))
+            .collect();
+        assert!(foreign.is_empty(), "{foreign:?}");
+        assert!(page.console.is_empty(), "{:?}", page.console);
+        page.requests.clear();
+        // What the console says of the lost connection is not asked for.
+        page.go("about:blank");
+    }
+}
+
+fn is_own(url: &str, own: &str) -> bool {
+    url.starts_with(own) || url.starts_with("data:") || url == "about:blank"
+}
+
+#[test]
+fn a_page_whose_server_has_gone_says_so_and_has_the_new_map_when_it_is_back() {
+    let Some(chromium) = chromium() else { return };
+    let folder = tempfile::tempdir().unwrap();
+    let [before, after] = [4.0, 9.0].map(|wall_m| map_of(&scene(folder.path(), wall_m), "fcc"));
+    let viewer = Viewer::show(&before, 0);
+    let (url, port) = (viewer.url.clone(), viewer.port());
+    let mut page = Page::open(&chromium, &url);
+    page.wait_for(COMPLETE);
+    assert_eq!(shown(&mut page), keys(&before));
+    drop(viewer);
+    page.wait_for("!document.getElementById('banner').hidden && lattice.cells.stale === 1");
+    assert_eq!(shown(&mut page), keys(&before), "what was known stays");
+    let _again = Viewer::show(&after, port);
+    page.wait_for(&format!(
+        "{COMPLETE} && document.getElementById('banner').hidden"
+    ));
+    let expected = keys(&after);
+    page.wait_for(&format!("lattice.state.size === {}", expected.len()));
+    assert_eq!(shown(&mut page), expected, "no cell of the map before");
+    let mut second = Page::open(&chromium, &url);
+    second.wait_for(COMPLETE);
+    assert_eq!(shown(&mut second), expected);
+}
+
+#[test]
+fn the_map_that_grows_in_a_demo_is_at_its_end_the_mappers() {
+    let Some(chromium) = chromium() else { return };
+    let folder = tempfile::tempdir().unwrap();
+    let out = folder.path().display().to_string();
+    let duration = match std::env::var_os("LATTICE_PICTURE") {
+        Some(_) => "40",
+        None => "12",
+    };
+    let demo = [
+        "demo",
+        "--lattice",
+        "fcc",
+        "--duration",
+        duration,
+        "--port",
+        "0",
+        "--out",
+        &out,
+    ];
+    let mut viewer = Viewer::start(&demo);
+    let mut page = Page::open(&chromium, &viewer.url);
+    page.wait_for("lattice.state.size > 100 && lattice.state.robot !== null");
+    page.value(
+        "document.querySelectorAll('#layers input[data-topic]').forEach((box) => box.click())",
+    );
+    for topic in ["/points_enu", "/fcc/map_centers"] {
+        page.wait_for(&format!(
+            "lattice.state.clouds.get('{topic}').scans.length > 0"
+        ));
+    }
+    page.value("document.querySelector('[data-camera=follow]').click()");
+    assert!(page.value(OFF_MIDDLE).as_f64().unwrap() < 5.0);
+    page.value("document.getElementById('fit').click()");
+    page.value(
+        "document.querySelectorAll('#layers input[data-topic]').forEach((box) => box.click())",
+    );
+    if let Some(path) = std::env::var_os("LATTICE_PICTURE") {
+        // The picture in README, of a map that has grown for a while.
+        page.wait_for("lattice.state.path.length > 120");
+        page.value("Object.defineProperty(lattice.cells, 'pace', { get: () => 0, set() {} })");
+        page.value("lattice.lit()");
+        let picture = BASE64_STANDARD.decode(page.picture()).unwrap();
+        std::fs::write(path, picture).unwrap();
+    }
+    assert!(viewer.process.wait().unwrap().success());
+    page.wait_for("!document.getElementById('banner').hidden");
+    let map = folder.path().join("map.lattice").display().to_string();
+    assert_eq!(shown(&mut page), keys(&map));
+    assert_eq!(page.value("lattice.state.problems"), json!([]));
+}

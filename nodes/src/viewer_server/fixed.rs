@@ -1,0 +1,44 @@
+//! A map that does not change, shown without ROS.
+
+use std::io;
+use std::sync::Arc;
+
+use lattice_core::voxels::VoxelList;
+use lattice_msgs::cdr;
+use lattice_msgs::lattice::{LatticeMap, LatticeMapUpdate};
+use lattice_msgs::std_msgs::Header;
+
+use super::hub::{Hub, entry};
+use super::options::{ViewerOptions, url};
+use super::outbox::Class;
+use super::server::Server;
+use crate::convert::map::{History, MapStamp, keyframe};
+
+/// Largest message of the map.
+const CHUNK_BYTES: usize = 60_000;
+
+/// Serves a map; gives the server and the address to open.
+pub fn serve(list: &VoxelList, options: &ViewerOptions) -> io::Result<(Server, String)> {
+    let hub = Arc::new(Hub::new(options.max_clients));
+    hub.channel::<LatticeMap>("/map", Class::Map, false);
+    hub.channel::<LatticeMapUpdate>("/map_updates", Class::Updates, false);
+    let stamp = MapStamp {
+        header: Header {
+            frame_id: "map".to_owned(),
+            ..Header::default()
+        },
+        epoch: entry(Vec::new()).stamp_ns,
+        sequence: 1,
+        history: History::default(),
+        origin: None,
+        chunk_bytes: CHUNK_BYTES,
+    };
+    let chunks = keyframe(list, &stamp);
+    let chunks = chunks.iter().map(|chunk| cdr::to_vec(chunk).map(entry));
+    let chunks: Vec<_> = chunks.collect::<Result<_, _>>().map_err(io::Error::other)?;
+    hub.change_map(|stream| stream.set_keyframe(chunks));
+    let gate = options.gate()?;
+    let server = Server::start(options.address, gate.clone(), hub)?;
+    let url = url(server.address(), &gate);
+    Ok((server, url))
+}

@@ -1,0 +1,295 @@
+//! Meeting place of the node's thread, which offers messages, and the clients, which take them.
+
+use std::collections::BTreeMap;
+use std::sync::Mutex;
+use std::time::{SystemTime, UNIX_EPOCH};
+
+use lattice_msgs::RosMessage;
+use lattice_runtime::lock;
+use serde::Serialize;
+use smol::channel::{Receiver, Sender, bounded};
+
+use super::map_stream::{Entry, MapStream};
+use super::outbox::{Class, Outbox, Outgoing};
+use super::protocol::{self, Advertised, ClientMessage};
+
+/// Most bytes of updates of the map that are kept for clients that are behind.
+const MAX_UPDATE_BYTES: usize = 8 << 20;
+
+/// Channels, the map and the clients of a server.
+pub struct Hub {
+    max_clients: usize,
+    session: String,
+    inner: Mutex<Inner>,
+}
+
+struct Inner {
+    channels: Vec<Channel>,
+    stream: MapStream,
+    clients: BTreeMap<u64, Client>,
+    next_client: u64,
+    counts: HubCounts,
+}
+
+struct Channel {
+    advertised: Advertised,
+    class: Class,
+    /// True if who comes late gets the last message.
+    kept: bool,
+    last: Option<Entry>,
+    /// Subscriptions so far.
+    joined: u64,
+}
+
+struct Client {
+    outbox: Outbox,
+    wake: Sender<()>,
+    /// True after it has taken all that there was.
+    idle: bool,
+}
+
+impl Client {
+    fn wake(&mut self) {
+        self.idle = false;
+        // One wake is enough.
+        let _ = self.wake.try_send(());
+    }
+}
+
+/// Counters of the server.
+#[derive(Clone, Copy, Debug, Default, Serialize)]
+pub struct HubCounts {
+    /// Clients that were let in.
+    pub clients_in: u64,
+    /// Clients refused since all places were taken.
+    pub clients_refused: u64,
+    /// Messages given to clients.
+    pub messages_out: u64,
+    /// Their bytes.
+    pub bytes_out: u64,
+    /// Messages that gave way to newer ones.
+    pub messages_dropped: u64,
+    /// Times that a client was too slow for the map and got it anew.
+    pub maps_restarted: u64,
+}
+
+/// Wish for a channel.
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
+pub struct Demand {
+    /// Clients that have it now.
+    pub clients: usize,
+    /// Times that a client asked for it.
+    pub joined: u64,
+}
+
+impl Hub {
+    /// A hub without channels, for `max_clients`.
+    pub fn new(max_clients: usize) -> Self {
+        let since = SystemTime::now().duration_since(UNIX_EPOCH);
+        Self {
+            max_clients,
+            session: since.map_or(0, |since| since.as_nanos()).to_string(),
+            inner: Mutex::new(Inner {
+                channels: Vec::new(),
+                stream: MapStream::new(MAX_UPDATE_BYTES),
+                clients: BTreeMap::new(),
+                next_client: 0,
+                counts: HubCounts::default(),
+            }),
+        }
+    }
+
+    /// Adds a channel before the first client comes; gives its id.
+    pub fn channel<M: RosMessage>(&self, topic: &str, class: Class, kept: bool) -> u32 {
+        let mut inner = lock(&self.inner);
+        let id = inner.channels.len() as u32;
+        inner.channels.push(Channel {
+            advertised: Advertised {
+                id,
+                topic: topic.to_owned(),
+                encoding: "cdr",
+                schema_name: M::TYPE,
+                schema_encoding: "ros2msg",
+                schema: M::definition(),
+            },
+            class,
+            kept,
+            last: None,
+            joined: 0,
+        });
+        id
+    }
+
+    /// Offers a message to who wants it.
+    pub fn offer(&self, channel: u32, cdr: Vec<u8>) {
+        let message = entry(cdr);
+        let mut inner = lock(&self.inner);
+        for client in inner.clients.values_mut() {
+            if client.outbox.offer(channel, &message) {
+                client.wake();
+            }
+        }
+        if let Some(channel) = inner.channels.get_mut(channel as usize)
+            && channel.kept
+        {
+            channel.last = Some(message);
+        }
+    }
+
+    /// Changes the stream of the map, and wakes who follows it.
+    pub fn change_map(&self, change: impl FnOnce(&mut MapStream)) {
+        let mut inner = lock(&self.inner);
+        change(&mut inner.stream);
+        inner.clients.values_mut().for_each(Client::wake);
+    }
+
+    /// True if a client waits for a keyframe.
+    pub fn keyframe_wanted(&self) -> bool {
+        let inner = lock(&self.inner);
+        let mut clients = inner.clients.values();
+        clients.any(|client| client.outbox.waits_for_keyframe())
+    }
+
+    /// Wish for a channel.
+    pub fn demand(&self, channel: u32) -> Demand {
+        let inner = lock(&self.inner);
+        let has = |client: &&Client| client.outbox.channels().any(|id| id == channel);
+        Demand {
+            clients: inner.clients.values().filter(has).count(),
+            joined: inner
+                .channels
+                .get(channel as usize)
+                .map_or(0, |channel| channel.joined),
+        }
+    }
+
+    /// Clients there are.
+    pub fn clients(&self) -> usize {
+        lock(&self.inner).clients.len()
+    }
+
+    /// True if every client has taken all that there was.
+    pub fn is_drained(&self) -> bool {
+        lock(&self.inner).clients.values().all(|client| client.idle)
+    }
+
+    /// Counters.
+    pub fn counts(&self) -> HubCounts {
+        let inner = lock(&self.inner);
+        let boxes = inner.clients.values().map(|client| &client.outbox);
+        let waiting: u64 = boxes.map(Outbox::dropped).sum();
+        HubCounts {
+            maps_restarted: inner.stream.fallen_behind(),
+            messages_dropped: inner.counts.messages_dropped + waiting,
+            ..inner.counts
+        }
+    }
+
+    /// Lets a client in; `None` if all places are taken. The receiver wakes it.
+    pub fn enter(&self) -> Option<(u64, Receiver<()>)> {
+        let mut inner = lock(&self.inner);
+        if inner.clients.len() >= self.max_clients {
+            inner.counts.clients_refused += 1;
+            return None;
+        }
+        let (wake, woken) = bounded(1);
+        let mut outbox = Outbox::default();
+        outbox.control(protocol::server_info(&self.session));
+        let channels = inner.channels.iter().map(|channel| &channel.advertised);
+        outbox.control(protocol::advertise(&channels.collect::<Vec<_>>()));
+        let id = inner.next_client;
+        inner.next_client += 1;
+        inner.counts.clients_in += 1;
+        let idle = false;
+        inner.clients.insert(id, Client { outbox, wake, idle });
+        Some((id, woken))
+    }
+
+    /// Forgets a client.
+    pub fn leave(&self, id: u64) {
+        let mut inner = lock(&self.inner);
+        if let Some(client) = inner.clients.remove(&id) {
+            inner.counts.messages_dropped += client.outbox.dropped();
+        }
+    }
+
+    /// The next message for a client.
+    pub fn next(&self, id: u64) -> Option<Outgoing> {
+        let mut inner = lock(&self.inner);
+        let Inner {
+            stream,
+            clients,
+            counts,
+            ..
+        } = &mut *inner;
+        let client = clients.get_mut(&id)?;
+        let next = client.outbox.next(stream);
+        client.idle = next.is_none();
+        let next = next?;
+        counts.messages_out += 1;
+        if let Outgoing::Data(_, message) = &next {
+            counts.bytes_out += message.cdr.len() as u64;
+        }
+        Some(next)
+    }
+
+    /// Takes a text message of a client.
+    pub fn text(&self, id: u64, text: &str) {
+        match ClientMessage::parse(text) {
+            Ok(ClientMessage::Subscribe { subscriptions }) => {
+                for wish in subscriptions {
+                    self.subscribe(id, wish.id, wish.channel_id);
+                }
+            }
+            Ok(ClientMessage::Unsubscribe { subscription_ids }) => {
+                let mut inner = lock(&self.inner);
+                if let Some(client) = inner.clients.get_mut(&id) {
+                    for subscription in subscription_ids {
+                        client.outbox.unsubscribe(subscription);
+                    }
+                }
+            }
+            Ok(ClientMessage::Other) => self.warn(id, "this server only shows"),
+            Err(error) => self.warn(id, &error.to_string()),
+        }
+    }
+
+    /// Tells a client what was wrong.
+    pub fn warn(&self, id: u64, message: &str) {
+        if let Some(client) = lock(&self.inner).clients.get_mut(&id) {
+            client.outbox.control(protocol::status(message));
+        }
+    }
+
+    fn subscribe(&self, id: u64, subscription: u32, channel_id: u32) {
+        let mut inner = lock(&self.inner);
+        let Inner {
+            channels, clients, ..
+        } = &mut *inner;
+        let Some(Client { outbox, .. }) = clients.get_mut(&id) else {
+            return;
+        };
+        let Some(channel) = channels.get_mut(channel_id as usize) else {
+            let problem = format!("there is no channel {channel_id}");
+            return outbox.control(protocol::status(&problem));
+        };
+        if !outbox.subscribe(subscription, channel_id, channel.class) {
+            let topic = &channel.advertised.topic;
+            let problem = format!("subscription {subscription} or one to {topic} is there already");
+            return outbox.control(protocol::status(&problem));
+        }
+        channel.joined += 1;
+        if let Some(last) = &channel.last {
+            outbox.offer(channel_id, last);
+        }
+    }
+}
+
+/// A message that comes now.
+pub fn entry(cdr: Vec<u8>) -> Entry {
+    let since = SystemTime::now().duration_since(UNIX_EPOCH);
+    Entry {
+        stamp_ns: since.map_or(0, |since| since.as_nanos() as u64),
+        cdr: cdr.into(),
+    }
+}

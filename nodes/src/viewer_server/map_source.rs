@@ -1,0 +1,232 @@
+//! The map of this process: follows the mapper's, and writes keyframes and merged updates for clients.
+//!
+//! Sequences and epochs are the mapper's. Checksums are of the updates as they are sent from here.
+
+use lattice_core::lattice::MortonKey;
+use lattice_core::voxels::codec;
+use lattice_msgs::RosMessage;
+use lattice_msgs::builtin_interfaces::Time;
+use lattice_msgs::cdr;
+use lattice_msgs::lattice::{LatticeMap, LatticeMapUpdate};
+use lattice_msgs::std_msgs::Header;
+use serde_bytes::ByteBuf;
+
+use super::hub::entry;
+use super::map_stream::Entry;
+use crate::convert::map::{History, KEY_ENCODING, VoxelState, sign};
+use crate::map_follower::{FollowError, Followed, FollowedMap, MapFollower};
+
+/// Voxels of a message: some 60 kB with labels.
+const CHUNK_VOXELS: usize = 3000;
+
+/// Difference between the map and what clients have been sent.
+#[derive(Debug)]
+pub enum News {
+    /// None.
+    Nothing,
+    /// All of it: it is another map.
+    OtherMap,
+    /// An update, in chunks.
+    Updates(Vec<Entry>),
+}
+
+/// Follows the map, and writes it for clients.
+pub struct MapSource {
+    follower: MapFollower,
+    /// State that clients are at.
+    sent: Option<Sent>,
+}
+
+#[derive(Clone, Copy)]
+struct Sent {
+    epoch: u64,
+    sequence: u64,
+    history: History,
+}
+
+impl MapSource {
+    /// Follows nothing yet; keeps at most `max_voxels`.
+    pub fn new(max_voxels: usize) -> Self {
+        Self {
+            follower: MapFollower::new(max_voxels),
+            sent: None,
+        }
+    }
+
+    /// Takes a chunk of a keyframe.
+    pub fn on_map(&mut self, chunk: &LatticeMap) -> Result<Followed, FollowError> {
+        self.follower.on_map(chunk)
+    }
+
+    /// Takes a chunk of an update.
+    pub fn on_update(&mut self, chunk: &LatticeMapUpdate) -> Result<Followed, FollowError> {
+        self.follower.on_update(chunk)
+    }
+
+    /// To be called once a second; true if a keyframe is to be asked for.
+    pub fn wait_a_second(&mut self) -> bool {
+        self.follower.wait_a_second()
+    }
+
+    /// The map as far as it is known.
+    pub fn map(&self) -> Option<&FollowedMap> {
+        self.follower.map()
+    }
+
+    /// Changes that clients do not have; nothing while the map is between two states.
+    pub fn take_news(&mut self) -> Result<News, cdr::CdrError> {
+        let (Some(map), Some(sequence)) = (self.follower.map(), self.follower.sequence()) else {
+            return Ok(News::Nothing);
+        };
+        let epoch = map.info.epoch;
+        let known = self.sent.filter(|sent| sent.epoch == epoch);
+        if known.is_some_and(|sent| sent.sequence == sequence) {
+            return Ok(News::Nothing);
+        }
+        let (touched, replaced) = self.follower.take_touched();
+        let Some(map) = self.follower.map() else {
+            return Ok(News::Nothing);
+        };
+        let Some(sent) = known.filter(|_| !replaced) else {
+            let history = History::default();
+            self.sent = Some(Sent {
+                epoch,
+                sequence,
+                history,
+            });
+            return Ok(News::OtherMap);
+        };
+        let mut keys: Vec<MortonKey> = touched.into_iter().collect();
+        keys.sort_unstable();
+        let mut chunks = update(map, &keys, sent.sequence, sequence);
+        let history = sign(&mut chunks, sent.history, sequence, map.voxels().len());
+        self.sent = Some(Sent {
+            epoch,
+            sequence,
+            history,
+        });
+        let updates = chunks.iter().map(message).collect::<Result<_, _>>()?;
+        Ok(News::Updates(updates))
+    }
+
+    /// A keyframe of the state that clients are at; `None` while there is none, or the map has gone on.
+    pub fn keyframe(&self) -> Result<Option<Vec<Entry>>, cdr::CdrError> {
+        let (Some(map), Some(sent)) = (self.follower.map(), self.sent) else {
+            return Ok(None);
+        };
+        if (map.info.epoch, self.follower.sequence()) != (sent.epoch, Some(sent.sequence)) {
+            return Ok(None);
+        }
+        let chunks = keyframe(map, sent.sequence, sent.history);
+        chunks
+            .iter()
+            .map(message)
+            .collect::<Result<_, _>>()
+            .map(Some)
+    }
+}
+
+fn message<M: RosMessage>(chunk: &M) -> Result<Entry, cdr::CdrError> {
+    cdr::to_vec(chunk).map(entry)
+}
+
+fn header(map: &FollowedMap) -> Header {
+    Header {
+        stamp: Time::from_ns(map.stamp_ns),
+        frame_id: map.frame_id.clone(),
+    }
+}
+
+/// Columns of voxels as messages hold them.
+#[derive(Default)]
+struct Columns {
+    counts: Vec<u32>,
+    mean_offsets: Vec<i16>,
+    labels: Vec<u16>,
+    label_counts: Vec<u32>,
+}
+
+impl Columns {
+    fn of<'a>(voxels: impl Iterator<Item = &'a VoxelState>) -> Self {
+        let mut columns = Self::default();
+        for voxel in voxels {
+            columns.counts.push(voxel.count);
+            columns.mean_offsets.extend(voxel.mean_offset);
+            columns.labels.push(voxel.label);
+            columns.label_counts.push(voxel.label_count);
+        }
+        if columns.label_counts.iter().all(|count| *count == 0) {
+            columns.labels.clear();
+            columns.label_counts.clear();
+        }
+        columns
+    }
+}
+
+fn keyframe(map: &FollowedMap, sequence: u64, history: History) -> Vec<LatticeMap> {
+    let mut keys: Vec<MortonKey> = map.voxels().keys().copied().collect();
+    keys.sort_unstable();
+    let parts: Vec<&[MortonKey]> = match keys.is_empty() {
+        true => vec![&[]],
+        false => keys.chunks(CHUNK_VOXELS).collect(),
+    };
+    let chunk = |(chunk, part): (u32, &&[MortonKey])| {
+        let columns = Columns::of(part.iter().filter_map(|key| map.voxels().get(key)));
+        LatticeMap {
+            header: header(map),
+            info: map.info.clone(),
+            sequence,
+            chunk,
+            chunks: parts.len() as u32,
+            voxels_total: keys.len() as u64,
+            key_encoding: KEY_ENCODING.to_owned(),
+            voxels: part.len() as u32,
+            keys: ByteBuf::from(codec::encode_keys(part)),
+            counts: columns.counts,
+            offset_unit_m: map.offset_unit_m,
+            mean_offsets: columns.mean_offsets,
+            labels: columns.labels,
+            label_counts: columns.label_counts,
+            history_checksum: history.0,
+        }
+    };
+    (0..).zip(&parts).map(chunk).collect()
+}
+
+fn update(
+    map: &FollowedMap,
+    keys: &[MortonKey],
+    previous_sequence: u64,
+    sequence: u64,
+) -> Vec<LatticeMapUpdate> {
+    let parts: Vec<&[MortonKey]> = match keys.is_empty() {
+        true => vec![&[]],
+        false => keys.chunks(CHUNK_VOXELS).collect(),
+    };
+    let chunk = |(chunk, part): (u32, &&[MortonKey])| {
+        let here = |key: &&MortonKey| map.voxels().contains_key(key);
+        let (changed, removed): (Vec<MortonKey>, Vec<MortonKey>) =
+            part.iter().partition(|key| here(key));
+        let columns = Columns::of(changed.iter().filter_map(|key| map.voxels().get(key)));
+        LatticeMapUpdate {
+            header: header(map),
+            info: map.info.clone(),
+            previous_sequence,
+            sequence,
+            chunk,
+            chunks: parts.len() as u32,
+            key_encoding: KEY_ENCODING.to_owned(),
+            voxels: changed.len() as u32,
+            keys: ByteBuf::from(codec::encode_keys(&changed)),
+            counts: columns.counts,
+            offset_unit_m: map.offset_unit_m,
+            mean_offsets: columns.mean_offsets,
+            labels: columns.labels,
+            label_counts: columns.label_counts,
+            removed: removed.len() as u32,
+            removed_keys: ByteBuf::from(codec::encode_keys(&removed)),
+            ..LatticeMapUpdate::default()
+        }
+    };
+    (0..).zip(&parts).map(chunk).collect()
+}

@@ -1,0 +1,32 @@
+//! The viewer server: a page that draws the map, and a Foxglove WebSocket, on one port.
+//!
+//! The node's thread follows the map and offers messages to a [`Hub`]; the server's thread gives each
+//! client what it wants, at the client's pace.
+
+mod connection;
+mod fixed;
+mod http;
+mod hub;
+mod map_source;
+mod map_stream;
+pub mod node;
+mod options;
+mod outbox;
+mod parameters;
+mod protocol;
+mod server;
+mod sources;
+
+pub use fixed::serve;
+pub use http::{Decision, Gate, Head};
+pub use hub::{Demand, Hub, HubCounts};
+pub use map_source::{MapSource, News};
+pub use map_stream::{Cursor, Entry, MapStream, Next};
+pub use options::{ViewerOptions, url};
+pub use outbox::{Class, Outbox, Outgoing};
+pub use parameters::declare;
+pub use protocol::{ClientMessage, SUBPROTOCOLS};
+pub use server::Server;
+
+#[cfg(test)]
+mod tests;

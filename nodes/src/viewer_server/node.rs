@@ -1,0 +1,277 @@
+//! The viewer server as a ROS node: subscriptions, the server's thread, and what is between.
+
+use std::sync::Arc;
+use std::sync::atomic::{AtomicU64, Ordering};
+use std::time::Duration;
+
+use lattice_msgs::lattice::{LatticeMap, LatticeMapUpdate};
+use lattice_msgs::std_msgs::Empty;
+use lattice_msgs::tf2_msgs::TFMessage;
+use serde::Serialize;
+
+use super::hub::{Hub, HubCounts};
+use super::map_source::{MapSource, News};
+use super::map_stream::MapStream;
+use super::options::{ViewerOptions, url};
+use super::outbox::Class;
+use super::parameters::Settings;
+use super::server::Server;
+use super::sources::{FixedTransforms, FromChannel, Sources, Unwritten};
+use crate::compute::Compute;
+use crate::map_follower::{FollowError, Followed};
+use crate::report;
+use crate::start::{Finish, NodeError, open_params};
+use lattice_runtime::logging::Throttle;
+use lattice_runtime::qos::Qos;
+use lattice_runtime::{Diagnostics, Level, Load, Losses, Publisher, Runtime, Undecoded};
+
+/// Event for the compute thread.
+enum Event {
+    Map(Undecoded<LatticeMap>),
+    Update(Undecoded<LatticeMapUpdate>),
+    FixedTransforms(Arc<TFMessage>),
+    Message(u32, Unwritten),
+    Tick,
+    Finish,
+}
+
+impl FromChannel for Event {
+    fn message(channel: u32, message: Unwritten) -> Self {
+        Event::Message(channel, message)
+    }
+}
+
+/// Report of a server at its end.
+#[derive(Serialize)]
+struct ViewerReport {
+    counts: HubCounts,
+    voxels: usize,
+    messages_lost: u64,
+}
+
+/// Starts the node.
+pub fn start(runtime: &Runtime, name: &str) -> Result<Finish, NodeError> {
+    let node = runtime.node(name)?;
+    let params = node.params();
+    let Settings {
+        viewer,
+        limits,
+        mapper,
+        report_file,
+    } = Settings::from_params(params)?;
+    let hub = Arc::new(Hub::new(viewer.max_clients));
+    hub.channel::<LatticeMap>(&node.resolve("map")?, Class::Map, false);
+    hub.channel::<LatticeMapUpdate>(&node.resolve("map_updates")?, Class::Updates, false);
+    let one = Class::Newest { depth: 1 };
+    let fixed_channel = hub.channel::<TFMessage>(&node.resolve("/tf_static")?, one, true);
+    let gate = viewer.gate()?;
+    let losses = Losses::default();
+    let lost = Arc::new(AtomicU64::new(0));
+    let mut shell = Shell {
+        hub: Arc::clone(&hub),
+        source: MapSource::new(viewer.max_voxels),
+        sources: None,
+        fixed: FixedTransforms::default(),
+        fixed_channel,
+        losses: losses.clone(),
+        lost: Arc::clone(&lost),
+        lost_seen: 0,
+        request: node.publisher(&format!("{mapper}/request_keyframe"), Qos::DEFAULT)?,
+        diagnostics: node.diagnostics(),
+        refusals: Throttle::new(Duration::from_secs(5)),
+        requests: Throttle::new(Duration::from_secs(1)),
+        seconds: Throttle::new(Duration::from_secs(1)),
+        report_file,
+    };
+    // Made by the compute thread's handler at its first event.
+    let (give, take) = crossbeam_channel::bounded(1);
+    let compute = Compute::spawn(name, limits, runtime.shutdown_handle(), move |event| {
+        if shell.sources.is_none() {
+            shell.sources = take.recv().ok();
+        }
+        shell.on(event)
+    })?;
+    let inbox = compute.inbox();
+    let _ = give.send(Sources::new(&node, &hub, &viewer, &inbox)?);
+    // Who listens comes after the channels: the list of them is sent once.
+    let address_url = |address| url(address, &gate);
+    let server = Server::start(viewer.address, gate.clone(), Arc::clone(&hub))?;
+    log::info!("the map is at {}", address_url(server.address()));
+    let on_map = inbox.counting(&lost, Event::Map, |map: &Undecoded<LatticeMap>| {
+        map.bytes(|map| map.keys.len() + map.counts.len() * 10)
+    });
+    let maps = node.subscribe_undecoded("map", Qos::MAP, Load::Small, on_map)?;
+    let on_update = inbox.counting(
+        &lost,
+        Event::Update,
+        |update: &Undecoded<LatticeMapUpdate>| {
+            update.bytes(|update| update.keys.len() + update.counts.len() * 10)
+        },
+    );
+    let updates = node.subscribe_undecoded("map_updates", Qos::DELTAS, Load::Small, on_update)?;
+    let on_fixed = inbox.counting(&lost, Event::FixedTransforms, |fixed: &Arc<TFMessage>| {
+        fixed.transforms.len() * 100
+    });
+    let fixed = node.subscribe("/tf_static", Qos::TF_STATIC_LISTENER, Load::Small, on_fixed)?;
+    losses.watch([&maps, &updates]);
+    let period = |viewer: &ViewerOptions| Duration::from_secs_f64(viewer.update_period_s);
+    let ticks = runtime.timer(period(&viewer), move || {
+        let _ = inbox.send(Event::Tick, 0);
+    });
+    open_params(params, move |params| {
+        let settings = Settings::from_params(params).map_err(|error| error.to_string())?;
+        ticks.set(period(&settings.viewer));
+        Ok(())
+    });
+    Ok(Box::new(move || {
+        drop((maps, updates, fixed));
+        compute.finish_with(Event::Finish);
+        server.finish();
+        Box::new(())
+    }))
+}
+
+/// State of the compute thread.
+struct Shell {
+    hub: Arc<Hub>,
+    source: MapSource,
+    sources: Option<Sources>,
+    fixed: FixedTransforms,
+    fixed_channel: u32,
+    /// Chunks lost before the inbox.
+    losses: Losses,
+    /// Messages that found the inbox full.
+    lost: Arc<AtomicU64>,
+    /// Those that a keyframe was asked for.
+    lost_seen: u64,
+    request: Publisher<Empty>,
+    diagnostics: Diagnostics,
+    refusals: Throttle,
+    requests: Throttle,
+    seconds: Throttle,
+    report_file: String,
+}
+
+impl Shell {
+    fn on(&mut self, event: Event) {
+        match event {
+            Event::Map(chunk) => {
+                let result = chunk.decode().map(|chunk| self.source.on_map(&chunk));
+                self.followed(result);
+            }
+            Event::Update(chunk) => {
+                let result = chunk.decode().map(|chunk| self.source.on_update(&chunk));
+                self.followed(result);
+            }
+            Event::FixedTransforms(message) => {
+                if let Ok(all) = self.fixed.add(&message) {
+                    self.hub.offer(self.fixed_channel, all);
+                }
+            }
+            Event::Message(channel, message) => match message() {
+                Ok(cdr) => self.hub.offer(channel, cdr),
+                Err(error) => log::debug!("not passed on: {error}"),
+            },
+            Event::Tick => self.tick(),
+            Event::Finish => self.finish(),
+        }
+    }
+
+    fn followed(&mut self, result: Option<Result<Followed, FollowError>>) {
+        match result {
+            Some(Ok(Followed::NeedKeyframe)) => self.ask_for_keyframe(),
+            Some(Err(error)) => {
+                if let Some(more) = self.refusals.check() {
+                    log::warn!("{error} ({more} more like it)");
+                }
+            }
+            Some(Ok(Followed::Applied | Followed::Old)) | None => {}
+        }
+    }
+
+    fn ask_for_keyframe(&mut self) {
+        if self.requests.check().is_some()
+            && let Err(error) = self.request.publish(Empty::default())
+        {
+            log::debug!("keyframe not requested: {error}");
+        }
+    }
+
+    fn tick(&mut self) {
+        let lost = self.lost.load(Ordering::Relaxed) + self.losses.lost();
+        if lost != self.lost_seen {
+            self.lost_seen = lost;
+            self.ask_for_keyframe();
+        }
+        let second = self.seconds.check().is_some();
+        if second && self.source.wait_a_second() {
+            self.ask_for_keyframe();
+        }
+        if let Some(sources) = &mut self.sources {
+            sources.adapt(&self.hub);
+        }
+        self.feed();
+        if second {
+            self.diagnose();
+        }
+    }
+
+    /// Gives clients what has changed, and a keyframe where one is wanted.
+    fn feed(&mut self) {
+        match self.source.take_news() {
+            Ok(News::Nothing) => {}
+            Ok(News::OtherMap) => self.hub.change_map(MapStream::reset),
+            Ok(News::Updates(updates)) => self
+                .hub
+                .change_map(|stream| updates.into_iter().for_each(|update| stream.push(update))),
+            Err(error) => log::warn!("the map was not passed on: {error}"),
+        }
+        if !self.hub.keyframe_wanted() {
+            return;
+        }
+        // Not within the lock: it takes a while, and only this thread changes the map.
+        match self.source.keyframe() {
+            Ok(Some(chunks)) => self.hub.change_map(|stream| stream.set_keyframe(chunks)),
+            Ok(None) => {}
+            Err(error) => log::warn!("the map was not passed on: {error}"),
+        }
+    }
+
+    fn messages_lost(&self) -> u64 {
+        let others = self.sources.as_ref();
+        let others = others.map_or(0, |sources| sources.lost.load(Ordering::Relaxed));
+        self.lost.load(Ordering::Relaxed) + self.losses.lost() + others
+    }
+
+    fn voxels(&self) -> usize {
+        self.source.map().map_or(0, |map| map.voxels().len())
+    }
+
+    fn diagnose(&self) {
+        let clients = self.hub.clients();
+        let mut values = report::key_values(&self.hub.counts());
+        values.push(("clients".into(), clients.to_string()));
+        values.push(("voxels".into(), self.voxels().to_string()));
+        values.push(("messages_lost".into(), self.messages_lost().to_string()));
+        let (level, message) = match self.source.map() {
+            None => (Level::Warn, "no map yet".to_owned()),
+            Some(_) => (Level::Ok, format!("{clients} clients")),
+        };
+        self.diagnostics.set("viewer", level, message, values);
+    }
+
+    fn finish(&mut self) {
+        self.feed();
+        if let Some(sources) = &mut self.sources {
+            sources.end();
+        }
+        let report = ViewerReport {
+            counts: self.hub.counts(),
+            voxels: self.voxels(),
+            messages_lost: self.messages_lost(),
+        };
+        if let Err(error) = report::write(&self.report_file, &report) {
+            log::error!("{error}");
+        }
+    }
+}

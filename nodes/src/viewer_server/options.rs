@@ -1,0 +1,129 @@
+//! Parameters of the viewer server.
+
+use std::io::Read;
+use std::net::{IpAddr, Ipv4Addr, SocketAddr};
+
+use lattice_runtime::params::{ParamError, Params};
+
+use super::http::Gate;
+
+/// Options of the viewer server.
+#[derive(Clone, Debug)]
+pub struct ViewerOptions {
+    /// Address and port to listen on.
+    pub address: SocketAddr,
+    /// Names by which this machine may be called, besides `localhost` and addresses.
+    pub allowed_hosts: Vec<String>,
+    /// Origins of pages from elsewhere that may connect.
+    pub allowed_origins: Vec<String>,
+    /// Secret that clients must know; empty: none on loopback, else a random one.
+    pub token: String,
+    /// Most clients at a time.
+    pub max_clients: usize,
+    /// Largest map followed.
+    pub max_voxels: usize,
+    /// Time between two messages of updates to clients, in s.
+    pub update_period_s: f64,
+    /// Topics of clouds that are shown.
+    pub cloud_topics: Vec<String>,
+}
+
+impl Default for ViewerOptions {
+    fn default() -> Self {
+        Self {
+            address: SocketAddr::from((Ipv4Addr::LOCALHOST, 8765)),
+            allowed_hosts: Vec::new(),
+            allowed_origins: Vec::new(),
+            token: String::new(),
+            max_clients: 16,
+            max_voxels: 20_000_000,
+            update_period_s: 0.1,
+            cloud_topics: ["points_enu", "headset/points"].map(str::to_owned).into(),
+        }
+    }
+}
+
+impl ViewerOptions {
+    /// Reads the parameters of the node.
+    pub fn from_params(params: &Params) -> Result<Self, ParamError> {
+        let defaults = Self::default();
+        let address = params.string("address", &defaults.address.ip().to_string())?;
+        let ip: IpAddr = address
+            .parse()
+            .map_err(|_| params.invalid("address", "expected an IP address, such as 0.0.0.0"))?;
+        let port = params.usize_in("port", usize::from(defaults.address.port()), 0..=65_535)?;
+        let token = params.string("token", "")?;
+        let sound = |c: char| c.is_ascii_alphanumeric() || "-_.".contains(c);
+        if !token.chars().all(sound) || token.len() > 128 {
+            let expected = "expected at most 128 letters, digits, -, _ and .";
+            return Err(params.invalid("token", expected));
+        }
+        let clouds: Vec<&str> = defaults.cloud_topics.iter().map(String::as_str).collect();
+        let period_s = defaults.update_period_s;
+        Ok(Self {
+            address: SocketAddr::new(ip, port as u16),
+            allowed_hosts: params.string_array("allowed_hosts", &[])?,
+            allowed_origins: params.string_array("allowed_origins", &[])?,
+            token,
+            max_clients: params.usize_in("max_clients", defaults.max_clients, 1..=60)?,
+            max_voxels: params.positive("max_voxels", defaults.max_voxels)?,
+            update_period_s: params.f64_in("update_period_s", period_s, 0.02..=10.0)?,
+            cloud_topics: params.string_array("cloud_topics", &clouds)?,
+        })
+    }
+
+    /// Conditions of entry. Without a token only this machine may; where none is given, one is made.
+    pub fn gate(&self) -> std::io::Result<Gate> {
+        let token = match (self.token.is_empty(), self.address.ip().is_loopback()) {
+            (false, _) => Some(self.token.clone()),
+            (true, true) => None,
+            (true, false) => Some(random_token()?),
+        };
+        Ok(Gate {
+            hosts: self.allowed_hosts.clone(),
+            origins: self.allowed_origins.clone(),
+            token,
+        })
+    }
+}
+
+/// The address to open in a browser.
+pub fn url(address: SocketAddr, gate: &Gate) -> String {
+    let host = match address.ip().is_unspecified() {
+        true => SocketAddr::new(Ipv4Addr::LOCALHOST.into(), address.port()),
+        false => address,
+    };
+    match &gate.token {
+        Some(token) => format!("http://{host}/?token={token}"),
+        None => format!("http://{host}"),
+    }
+}
+
+/// 128 random bits of the kernel.
+fn random_token() -> std::io::Result<String> {
+    let mut bytes = [0; 16];
+    std::fs::File::open("/dev/urandom")?.read_exact(&mut bytes)?;
+    Ok(bytes.iter().map(|byte| format!("{byte:02x}")).collect())
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn other_machines_need_a_token() {
+        let mut options = ViewerOptions::default();
+        assert_eq!(options.gate().unwrap().token, None);
+        assert_eq!(
+            url(options.address, &options.gate().unwrap()),
+            "http://127.0.0.1:8765"
+        );
+        options.address.set_ip(Ipv4Addr::UNSPECIFIED.into());
+        let [first, second] = [(), ()].map(|()| options.gate().unwrap());
+        assert_eq!(first.token.as_ref().unwrap().len(), 32);
+        assert_ne!(first.token, second.token);
+        assert!(url(options.address, &first).starts_with("http://127.0.0.1:8765/?token="));
+        options.token = "mine".to_owned();
+        assert_eq!(options.gate().unwrap().token.as_deref(), Some("mine"));
+    }
+}

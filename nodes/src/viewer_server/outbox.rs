@@ -1,0 +1,175 @@
+//! Messages that wait for one client: control messages in order, the map by its place in the stream, the newest
+//! messages of everything else.
+
+use std::collections::{BTreeMap, VecDeque};
+
+use super::map_stream::{Cursor, Entry, MapStream, Next};
+
+/// Most control messages that wait; a client that lets more come is no client.
+const MAX_CONTROL: usize = 256;
+/// Most bytes that wait on one channel besides the map.
+const MAX_RING_BYTES: usize = 8 << 20;
+
+/// The way in which messages of a channel wait.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub enum Class {
+    /// Keyframes of the map.
+    Map,
+    /// Its updates.
+    Updates,
+    /// The newest few; older ones give way.
+    Newest {
+        /// Messages that wait at most.
+        depth: usize,
+    },
+}
+
+/// A message to be sent to a client.
+#[derive(Debug, PartialEq)]
+pub enum Outgoing {
+    /// A control message.
+    Text(String),
+    /// A message of a subscription.
+    Data(u32, Entry),
+    /// Nothing more: the client let too many control messages wait.
+    Close,
+}
+
+/// Messages of one client.
+#[derive(Debug, Default)]
+pub struct Outbox {
+    control: VecDeque<String>,
+    overflown: bool,
+    /// Channel and class by subscription.
+    subscriptions: BTreeMap<u32, (u32, Class)>,
+    cursor: Cursor,
+    rings: BTreeMap<u32, VecDeque<Entry>>,
+    /// The subscription after which the next turn begins.
+    turn: u32,
+    maps_turn: bool,
+    waits_for_keyframe: bool,
+    dropped: u64,
+}
+
+impl Outbox {
+    /// Adds a control message.
+    pub fn control(&mut self, text: String) {
+        self.overflown |= self.control.len() >= MAX_CONTROL;
+        if !self.overflown {
+            self.control.push_back(text);
+        }
+    }
+
+    /// Adds a subscription; false if the id or the channel has one.
+    pub fn subscribe(&mut self, id: u32, channel: u32, class: Class) -> bool {
+        let taken = self.subscriptions.contains_key(&id) || self.id_of(channel).is_some();
+        if taken {
+            return false;
+        }
+        self.subscriptions.insert(id, (channel, class));
+        // Updates that passed while nobody here wanted them are missing.
+        let passed = matches!(self.cursor, Cursor::Updates(_));
+        if class == Class::Map || class == Class::Updates && passed {
+            self.cursor = Cursor::Fresh;
+        }
+        true
+    }
+
+    /// Ends a subscription; gives its channel.
+    pub fn unsubscribe(&mut self, id: u32) -> Option<u32> {
+        let (channel, _) = self.subscriptions.remove(&id)?;
+        self.rings.remove(&id);
+        Some(channel)
+    }
+
+    /// Channels that are subscribed to.
+    pub fn channels(&self) -> impl Iterator<Item = u32> + '_ {
+        self.subscriptions.values().map(|(channel, _)| *channel)
+    }
+
+    /// Offers a message of a channel; true if it now waits here.
+    pub fn offer(&mut self, channel: u32, message: &Entry) -> bool {
+        let Some(id) = self.id_of(channel) else {
+            return false;
+        };
+        let Some((_, Class::Newest { depth })) = self.subscriptions.get(&id) else {
+            return false;
+        };
+        let ring = self.rings.entry(id).or_default();
+        ring.push_back(message.clone());
+        let mut bytes: usize = ring.iter().map(|message| message.cdr.len()).sum();
+        while ring.len() > *depth || (bytes > MAX_RING_BYTES && ring.len() > 1) {
+            let oldest = ring.pop_front();
+            bytes = bytes.saturating_sub(oldest.map_or(0, |oldest| oldest.cdr.len()));
+            self.dropped += 1;
+        }
+        true
+    }
+
+    /// The next message. Control goes first, then the map and the others take turns.
+    pub fn next(&mut self, stream: &mut MapStream) -> Option<Outgoing> {
+        if self.overflown {
+            return Some(Outgoing::Close);
+        }
+        if let Some(text) = self.control.pop_front() {
+            return Some(Outgoing::Text(text));
+        }
+        self.maps_turn = !self.maps_turn;
+        match self.maps_turn {
+            true => self.map(stream).or_else(|| self.newest()),
+            false => self.newest().or_else(|| self.map(stream)),
+        }
+    }
+
+    /// True if the map goes no further without a keyframe.
+    pub fn waits_for_keyframe(&self) -> bool {
+        self.waits_for_keyframe
+    }
+
+    /// Messages that gave way to newer ones.
+    pub fn dropped(&self) -> u64 {
+        self.dropped
+    }
+
+    fn map(&mut self, stream: &mut MapStream) -> Option<Outgoing> {
+        let of = |class: Class| {
+            let mut all = self.subscriptions.iter();
+            let found = all.find(|(_, (_, other))| *other == class);
+            found.map(|(id, _)| *id)
+        };
+        let [maps, updates] = [Class::Map, Class::Updates].map(of);
+        if maps.is_none() && updates.is_none() {
+            self.waits_for_keyframe = false;
+            return None;
+        }
+        loop {
+            let next = stream.next(&mut self.cursor);
+            self.waits_for_keyframe = next == Next::Waits;
+            let (id, entry) = match next {
+                Next::Map(entry) => (maps, entry),
+                Next::Update(entry) => (updates, entry),
+                Next::Nothing | Next::Waits => return None,
+            };
+            if let Some(id) = id {
+                return Some(Outgoing::Data(id, entry));
+            }
+        }
+    }
+
+    fn newest(&mut self) -> Option<Outgoing> {
+        let waiting = |(id, ring): (&u32, &VecDeque<Entry>)| (!ring.is_empty()).then_some(*id);
+        let after = self.rings.range(self.turn.saturating_add(1)..);
+        let id = after
+            .chain(self.rings.range(..=self.turn))
+            .find_map(waiting)?;
+        self.turn = id;
+        let entry = self.rings.get_mut(&id)?.pop_front()?;
+        Some(Outgoing::Data(id, entry))
+    }
+
+    fn id_of(&self, channel: u32) -> Option<u32> {
+        let mut all = self.subscriptions.iter();
+        let found = all.find(|(_, (other, _))| *other == channel);
+        found.map(|(id, _)| *id)
+    }
+}

@@ -1,0 +1,53 @@
+//! All parameters of the viewer server.
+
+use super::options::ViewerOptions;
+use crate::compute::ComputeLimits;
+use crate::options::{self, TOPIC};
+use crate::report;
+use lattice_runtime::about;
+use lattice_runtime::params::{About, ParamError, Params};
+
+const ABOUT: &[About] = about! {
+    "address" fixed(SOCKET): "Address to listen on. With any but 127.0.0.1 (or ::1) clients need the token.";
+    "port" fixed(SOCKET): "Port of the page and the WebSocket; 0: one that is free.";
+    "token" fixed(SOCKET): "Secret of clients, letters, digits, -, _ and .; empty: none on 127.0.0.1, else a random one, which is in the address that the node logs.";
+    "allowed_hosts" fixed(SOCKET): "Names by which browsers may call this machine, besides localhost and addresses.";
+    "allowed_origins" fixed(SOCKET): "Pages from elsewhere that may connect, such as https://viewer.example.";
+    "max_clients" fixed(SOCKET): "Most clients at a time.";
+    "max_voxels" fixed("the map is followed with it"): "Larger maps are not followed.";
+    "update_period_s": "Time between two messages of map_updates to clients.";
+    "cloud_topics" fixed(TOPIC): "Clouds that clients can have (sensor_msgs/PointCloud2).";
+};
+
+const SOCKET: &str = "the server is made with it";
+
+/// Settings of the node by its parameters.
+pub(super) struct Settings {
+    pub viewer: ViewerOptions,
+    pub limits: ComputeLimits,
+    pub mapper: String,
+    pub report_file: String,
+}
+
+impl Settings {
+    /// Reads the parameters of the node.
+    pub(super) fn from_params(params: &Params) -> Result<Self, ParamError> {
+        params.describe(ABOUT);
+        params.describe(options::COMMON);
+        Ok(Self {
+            viewer: ViewerOptions::from_params(params)?,
+            limits: ComputeLimits {
+                events: options::inbox_events(params, 4096)?,
+                bytes: options::inbox_bytes(params, 64 << 20)?,
+                threads: options::threads(params, 1)?,
+            },
+            mapper: params.string("mapper", "lattice_mapper")?,
+            report_file: report::file(params)?,
+        })
+    }
+}
+
+/// Reads all parameters of the node, as its start does.
+pub fn declare(params: &Params) -> Result<(), ParamError> {
+    Settings::from_params(params).map(drop)
+}

@@ -1,0 +1,121 @@
+//! The thread that takes connections, and its end.
+
+use std::io;
+use std::net::{SocketAddr, TcpListener, TcpStream};
+use std::sync::Arc;
+use std::sync::atomic::{AtomicUsize, Ordering};
+use std::thread::JoinHandle;
+use std::time::{Duration, Instant};
+
+use smol::channel::{Sender, bounded};
+use smol::{Async, LocalExecutor, Timer};
+
+use super::connection;
+use super::http::Gate;
+use super::hub::Hub;
+
+/// Most connections, those of requests for files included.
+const MAX_CONNECTIONS: usize = 64;
+
+/// Time for clients to take the last messages.
+const LAST_TIME: Duration = Duration::from_secs(1);
+
+/// A server that is at work.
+pub struct Server {
+    hub: Arc<Hub>,
+    address: SocketAddr,
+    stop: Sender<()>,
+    thread: JoinHandle<()>,
+}
+
+impl Server {
+    /// Listens on an address; one that is taken is an error that says so.
+    pub fn start(address: SocketAddr, gate: Gate, hub: Arc<Hub>) -> io::Result<Self> {
+        let taken = |error: io::Error| {
+            io::Error::new(
+                error.kind(),
+                format!(
+                    "{address}: {error}; another viewer may have the port: choose one by `port`"
+                ),
+            )
+        };
+        let listener = TcpListener::bind(address).map_err(taken)?;
+        let address = listener.local_addr()?;
+        let listener = Async::new(listener)?;
+        let (stop, stopped) = bounded::<()>(1);
+        let served = Arc::clone(&hub);
+        let thread = std::thread::Builder::new()
+            .name("viewer".to_owned())
+            .spawn(move || {
+                let executor = LocalExecutor::new();
+                let accept = accept(&executor, listener, Arc::new(gate), hub);
+                let ended = async {
+                    // Ends when the sender closes.
+                    let _ = stopped.recv().await;
+                };
+                smol::block_on(executor.run(smol::future::or(accept, ended)));
+            })?;
+        Ok(Self {
+            hub: served,
+            address,
+            stop,
+            thread,
+        })
+    }
+
+    /// Address it listens on.
+    pub fn address(&self) -> SocketAddr {
+        self.address
+    }
+
+    /// Lets clients take what there is, for a second at most, and closes all connections.
+    pub fn finish(self) {
+        let late = Instant::now() + LAST_TIME;
+        while !self.hub.is_drained() && Instant::now() < late {
+            std::thread::sleep(Duration::from_millis(10));
+        }
+        self.stop.close();
+        if self.thread.join().is_err() {
+            log::error!("the viewer's thread panicked");
+        }
+    }
+}
+
+async fn accept(
+    executor: &LocalExecutor<'_>,
+    listener: Async<TcpListener>,
+    gate: Arc<Gate>,
+    hub: Arc<Hub>,
+) {
+    let open = Arc::new(AtomicUsize::new(0));
+    loop {
+        let stream = match accepted(&listener).await {
+            Ok(stream) => stream,
+            Err(error) => {
+                // As when there are no descriptors: it may pass.
+                log::warn!("a connection was not taken: {error}");
+                Timer::after(Duration::from_millis(100)).await;
+                continue;
+            }
+        };
+        if open.load(Ordering::Relaxed) >= MAX_CONNECTIONS {
+            log::debug!("a connection was refused: {MAX_CONNECTIONS} are open");
+            continue;
+        }
+        open.fetch_add(1, Ordering::Relaxed);
+        let (gate, hub, open) = (Arc::clone(&gate), Arc::clone(&hub), Arc::clone(&open));
+        executor
+            .spawn(async move {
+                if let Err(error) = connection::serve(stream, gate, hub).await {
+                    log::debug!("a connection ended: {error}");
+                }
+                open.fetch_sub(1, Ordering::Relaxed);
+            })
+            .detach();
+    }
+}
+
+async fn accepted(listener: &Async<TcpListener>) -> io::Result<TcpStream> {
+    let (stream, _) = listener.accept().await?;
+    stream.into_inner()
+}

@@ -1,0 +1,184 @@
+//! Topics besides the map, and their subscriptions, which are there while somebody wants them.
+
+use std::collections::BTreeMap;
+use std::sync::Arc;
+use std::sync::atomic::{AtomicU64, Ordering};
+
+use lattice_msgs::calibration::CalibrationResult;
+use lattice_msgs::cdr::CdrError;
+use lattice_msgs::diagnostic_msgs::DiagnosticArray;
+use lattice_msgs::geometry_msgs::TransformStamped;
+use lattice_msgs::sensor_msgs::PointCloud2;
+use lattice_msgs::tf2_msgs::TFMessage;
+use lattice_msgs::visualization_msgs::MarkerArray;
+use lattice_msgs::{RosMessage, cdr};
+use lattice_runtime::qos::Qos;
+use lattice_runtime::{Load, Node, RuntimeError, Subscription};
+
+use super::hub::{Demand, Hub};
+use super::options::ViewerOptions;
+use super::outbox::Class;
+use crate::compute::Inbox;
+
+/// Longest message that is passed on.
+const MAX_MESSAGE_BYTES: usize = 8 << 20;
+/// Most frames whose fixed transforms are kept.
+const MAX_STATIC_FRAMES: usize = 10_000;
+
+/// A message of a channel that is not yet in CDR.
+pub type Unwritten = Box<dyn FnOnce() -> Result<Vec<u8>, CdrError> + Send>;
+
+/// Makes the subscription of a channel.
+type Subscribe = Box<dyn Fn() -> Result<Subscription, RuntimeError> + Send>;
+
+/// Event for the compute thread.
+pub trait FromChannel: Send + 'static {
+    /// A message of a channel.
+    fn message(channel: u32, message: Unwritten) -> Self;
+}
+
+/// Time of a subscription to a channel.
+#[derive(Clone, Copy, PartialEq, Eq)]
+enum When {
+    /// Always: it is small, and who comes late must have it.
+    Always,
+    /// While somebody wants it.
+    Wanted,
+    /// The same, anew for each who comes: the publisher then sends all that there is again.
+    EachAnew,
+}
+
+struct Source {
+    channel: u32,
+    when: When,
+    subscribe: Subscribe,
+    subscription: Option<Subscription>,
+    joined: u64,
+}
+
+/// The topics besides the map.
+pub struct Sources {
+    sources: Vec<Source>,
+    /// Messages that found the inbox full or were too long.
+    pub lost: Arc<AtomicU64>,
+}
+
+/// Adds sources to a hub.
+struct Builder<'a, E> {
+    node: &'a Node,
+    hub: &'a Hub,
+    inbox: &'a Inbox<E>,
+    sources: Sources,
+}
+
+impl<E: FromChannel> Builder<'_, E> {
+    fn add<M: RosMessage>(
+        &mut self,
+        topic: &str,
+        (qos, load): (Qos, Load),
+        depth: usize,
+        when: When,
+    ) -> Result<(), RuntimeError> {
+        let kept = when != When::EachAnew && qos.durability == Qos::LATCHED.durability;
+        let full = self.node.resolve(topic)?;
+        let channel = self.hub.channel::<M>(&full, Class::Newest { depth }, kept);
+        let (node, inbox) = (self.node.clone(), self.inbox.clone());
+        let (topic, lost) = (topic.to_owned(), Arc::clone(&self.sources.lost));
+        self.sources.sources.push(Source {
+            channel,
+            when,
+            subscribe: Box::new(move || {
+                let (inbox, lost) = (inbox.clone(), Arc::clone(&lost));
+                node.subscribe_undecoded::<M>(&topic, qos, load, move |message| {
+                    let bytes = message.bytes(|_| 4096);
+                    let event = E::message(channel, Box::new(move || message.into_cdr()));
+                    let fits = bytes <= MAX_MESSAGE_BYTES && inbox.send(event, bytes);
+                    lost.fetch_add(u64::from(!fits), Ordering::Relaxed);
+                })
+            }),
+            subscription: None,
+            joined: 0,
+        });
+        Ok(())
+    }
+}
+
+impl Sources {
+    /// Adds the channels of all topics to a hub.
+    pub fn new<E: FromChannel>(
+        node: &Node,
+        hub: &Hub,
+        options: &ViewerOptions,
+        inbox: &Inbox<E>,
+    ) -> Result<Self, RuntimeError> {
+        let sources = Sources {
+            sources: Vec::new(),
+            lost: Arc::default(),
+        };
+        let mut builder = Builder {
+            node,
+            hub,
+            inbox,
+            sources,
+        };
+        let small = |qos| (qos, Load::Small);
+        let large = |qos| (qos, Load::Large);
+        builder.add::<TFMessage>("/tf", small(Qos::TF), 100, When::Always)?;
+        builder.add::<DiagnosticArray>(
+            "/diagnostics",
+            small(Qos::DIAGNOSTICS),
+            20,
+            When::Always,
+        )?;
+        builder.add::<CalibrationResult>("calibration", small(Qos::LATCHED), 1, When::Always)?;
+        builder.add::<PointCloud2>("map_centers", large(Qos::MARKERS), 1, When::Wanted)?;
+        builder.add::<MarkerArray>("voxel_markers", large(Qos::MARKERS), 1000, When::EachAnew)?;
+        for topic in &options.cloud_topics {
+            builder.add::<PointCloud2>(topic, large(Qos::SCANS), 20, When::Wanted)?;
+        }
+        Ok(builder.sources)
+    }
+
+    /// Makes and ends subscriptions as clients want them.
+    pub fn adapt(&mut self, hub: &Hub) {
+        for source in &mut self.sources {
+            let Demand { clients, joined } = hub.demand(source.channel);
+            let wanted = clients > 0 || source.when == When::Always;
+            let anew = source.when == When::EachAnew && joined != source.joined;
+            if !wanted || anew {
+                source.subscription = None;
+            }
+            source.joined = joined;
+            if wanted && source.subscription.is_none() {
+                match (source.subscribe)() {
+                    Ok(subscription) => source.subscription = Some(subscription),
+                    Err(error) => log::debug!("not subscribed: {error}"),
+                }
+            }
+        }
+    }
+
+    /// Ends all subscriptions.
+    pub fn end(&mut self) {
+        self.sources.clear();
+    }
+}
+
+/// All fixed transforms, of whatever publisher, as one message.
+#[derive(Default)]
+pub struct FixedTransforms(BTreeMap<String, TransformStamped>);
+
+impl FixedTransforms {
+    /// Adds those of a message; gives the message of all.
+    pub fn add(&mut self, message: &TFMessage) -> Result<Vec<u8>, CdrError> {
+        for transform in &message.transforms {
+            let child = &transform.child_frame_id;
+            if self.0.len() < MAX_STATIC_FRAMES || self.0.contains_key(child) {
+                self.0.insert(child.clone(), transform.clone());
+            }
+        }
+        cdr::to_vec(&TFMessage {
+            transforms: self.0.values().cloned().collect(),
+        })
+    }
+}

@@ -1,0 +1,68 @@
+// Reader of CDR: the bytes of a ROS message, behind their encapsulation header of four bytes.
+
+const HEADER = 4;
+const text = new TextDecoder();
+
+export class Reader {
+  constructor(bytes) {
+    this.bytes = bytes;
+    this.view = new DataView(bytes.buffer, bytes.byteOffset, bytes.byteLength);
+    if (bytes.byteLength < HEADER || this.view.getUint8(0) !== 0 || this.view.getUint8(1) > 1) {
+      throw new RangeError("no plain CDR");
+    }
+    this.little = this.view.getUint8(1) === 1;
+    this.at = HEADER;
+  }
+
+  // Offset of the next value of so many bytes, which begins at a multiple of them.
+  take(size, align = size) {
+    const at = Math.ceil((this.at - HEADER) / align) * align + HEADER;
+    this.at = at + size;
+    return at;
+  }
+
+  u8() { return this.view.getUint8(this.take(1)); }
+  bool() { return this.u8() !== 0; }
+  u16() { return this.view.getUint16(this.take(2), this.little); }
+  i32() { return this.view.getInt32(this.take(4), this.little); }
+  u32() { return this.view.getUint32(this.take(4), this.little); }
+  u64() { return this.view.getBigUint64(this.take(8), this.little); }
+  f64() { return this.view.getFloat64(this.take(8), this.little); }
+
+  string() {
+    const length = this.u32();
+    const at = this.take(length, 1);
+    // Without the zero at its end.
+    return text.decode(this.slice(at, Math.max(0, length - 1)));
+  }
+
+  slice(at, length) {
+    if (at + length > this.bytes.byteLength) throw new RangeError("the message ends too early");
+    return this.bytes.subarray(at, at + length);
+  }
+
+  octets() {
+    const length = this.u32();
+    return this.slice(this.take(length, 1), length);
+  }
+
+  f64s(count) { return Array.from({ length: count }, () => this.f64()); }
+
+  // A sequence of numbers of 2 or 4 bytes as a typed array.
+  numbers(type) {
+    const count = this.u32();
+    const size = type.BYTES_PER_ELEMENT;
+    if (count === 0) return new type(0);
+    const bytes = this.slice(this.take(count * size, size), count * size);
+    if (this.little) return new type(bytes.slice().buffer);
+    const swapped = bytes.slice().reverse();
+    return new type(swapped.buffer).reverse();
+  }
+
+  // A sequence; `least` is the fewest bytes that one element takes.
+  list(read, least) {
+    const count = this.u32();
+    if (count * least > this.bytes.byteLength - this.at) throw new RangeError("a list ends too early");
+    return Array.from({ length: count }, () => read(this));
+  }
+}

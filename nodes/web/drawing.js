@@ -1,0 +1,175 @@
+// One frame after another, for whatever has changed.
+
+import { add, length, sub } from "./math.js";
+import * as panel from "./panel.js";
+import { turned } from "./scene.js";
+
+const { by } = panel;
+// Scans stay this long, ms: those of a laser come in many small clouds.
+const SCAN_MS = 700;
+// The view moves until so long after it was moved, ms.
+const MOVING_MS = 200;
+// A narrower window has the panel below, px.
+const NARROW = 640;
+const PANEL = 280;
+
+export class Drawing {
+  constructor(parts) {
+    Object.assign(this, parts);
+    this.waiting = false;
+    // The frame that the graphics processor is at, and true if there is more to draw after it.
+    this.fence = null;
+    this.due = false;
+    this.movedAt = 0;
+    this.lastFrame = 0;
+  }
+
+  redraw() {
+    if (this.waiting) return;
+    this.waiting = true;
+    requestAnimationFrame(() => this.frame());
+  }
+
+  // Draws simply now, and fully when the view rests.
+  moved() {
+    this.movedAt = performance.now();
+    this.redraw();
+    setTimeout(() => this.redraw(), MOVING_MS + 50);
+  }
+
+  // The window and the camera in it, as all that is drawn needs them.
+  view() {
+    const { canvas, camera } = this;
+    const ratio = Math.min(window.devicePixelRatio || 1, 1.5);
+    const [width, height] = [Math.round(canvas.clientWidth * ratio), Math.round(canvas.clientHeight * ratio)];
+    if (canvas.width !== width || canvas.height !== height) [canvas.width, canvas.height] = [width, height];
+    [camera.width, camera.height] = [width, height];
+    camera.aside = window.innerWidth < NARROW || by("panel").hidden ? 0 : Math.min(0.35, PANEL / canvas.clientWidth);
+    return {
+      ratio, width, height, axes: camera.axes(), eye: camera.eye(), clip: camera.clip(), rays: camera.rays(),
+      focal: camera.focal(), near: camera.near(), aside: camera.aside, window: [0, 0, width, height],
+    };
+  }
+
+  frame() {
+    const { gl, state } = this;
+    this.waiting = false;
+    this.due = this.fence !== null;
+    if (this.due) return;
+    this.drawNow();
+    this.fence = { begin: performance.now(), sync: gl.fenceSync(gl.SYNC_GPU_COMMANDS_COMPLETE, 0) };
+    gl.flush();
+    this.poll();
+    state.frames++;
+  }
+
+  // Waits for the frame to be done, to know its time.
+  poll() {
+    const { gl } = this;
+    setTimeout(() => {
+      if (gl.clientWaitSync(this.fence.sync, 0, 0) === gl.TIMEOUT_EXPIRED) return this.poll();
+      gl.deleteSync(this.fence.sync);
+      this.lastFrame = performance.now() - this.fence.begin;
+      this.fence = null;
+      this.cells.timed(this.lastFrame);
+      if (this.due) this.redraw();
+    }, 4);
+  }
+
+  drawNow() {
+    const { gl, cells, state } = this;
+    this.view();
+    this.aim();
+    const seen = this.view();
+    gl.viewport(0, 0, seen.width, seen.height);
+    gl.enable(gl.DEPTH_TEST);
+    gl.disable(gl.BLEND);
+    gl.clearColor(...colourOf("--ground"), 1);
+    gl.clear(gl.COLOR_BUFFER_BIT | gl.DEPTH_BUFFER_BIT);
+    if (state.shown.cells) cells.draw(seen, performance.now() - this.movedAt < MOVING_MS);
+    this.drawScene(seen);
+    this.showMarks(seen);
+  }
+
+  // Has the camera look where its mode says.
+  aim() {
+    const { camera, cells, state } = this;
+    if (camera.mode === "follow" && state.robot) camera.target = state.robot.position;
+    else if (camera.automatic) {
+      const bounds = cells.bounds();
+      if (bounds) camera.fit(bounds.low, bounds.high);
+    }
+  }
+
+  drawScene(seen) {
+    const { gl, camera, scene, state } = this;
+    gl.enable(gl.BLEND);
+    gl.blendFunc(gl.SRC_ALPHA, gl.ONE_MINUS_SRC_ALPHA);
+    scene.begin(seen);
+    gl.depthMask(false);
+    by("scale").textContent = "";
+    if (state.shown.grid) {
+      const step = scene.grid(camera.target, state.heights[0] - 0.3, camera.distance, [...colourOf("--quiet"), 0.24]);
+      by("scale").textContent = `grid ${step < 1 ? `${Math.round(step * 100)} cm` : `${step} m`}`;
+    }
+    gl.depthMask(true);
+    this.drawClouds(seen);
+    if (state.shown.robot && state.robot) this.drawRobot();
+    if (state.shown.headset && state.headset) {
+      const ink = [...colourOf(state.headset.verdict === 1 ? "--good" : "--bad"), 1];
+      scene.draw("frustum", gl.LINES, { origin: state.headset.position, turn: turned(state.headset.rotation, 1.2), ink });
+    }
+    if (state.measured.length === 2) {
+      gl.disable(gl.DEPTH_TEST);
+      scene.set("measured", [0, 0, 0, ...sub(state.measured[1], state.measured[0])]);
+      scene.draw("measured", gl.LINES, { origin: state.measured[0], ink: [1, 0.93, 0.55, 1] });
+    }
+  }
+
+  drawClouds(seen) {
+    const { gl, scene, state } = this;
+    const now = performance.now();
+    for (const [topic, { scans, ink }] of state.clouds) {
+      if (!state.scansOn.has(topic)) continue;
+      for (const { name, origin, at } of scans) {
+        if (now - at < SCAN_MS || scans.length === 1) scene.draw(name, gl.POINTS, { origin, ink, size: 2.5 * seen.ratio });
+      }
+    }
+  }
+
+  drawRobot() {
+    const { gl, camera, scene, state: { path, robot } } = this;
+    // In front of all: they must not be lost behind the map.
+    gl.disable(gl.DEPTH_TEST);
+    if (path.length > 1) {
+      scene.set("path", path.flatMap((p) => sub(p, path[0])));
+      scene.draw("path", gl.LINE_STRIP, { origin: path[0], ink: [...colourOf("--accent"), 0.9] });
+    }
+    const size = Math.max(1.6, camera.distance * 0.03);
+    scene.draw("robot", gl.TRIANGLES, { origin: robot.position, turn: turned(robot.rotation, size), ink: [1, 0.78, 0.36, 1] });
+    gl.enable(gl.DEPTH_TEST);
+  }
+
+  // Words at places of the map.
+  showMarks(seen) {
+    const marks = [];
+    const mark = (point, text) => {
+      const { x, y, depth } = this.camera.project(point);
+      if (depth <= 0) return;
+      const span = panel.element("span", { textContent: text });
+      span.style.left = `${x / seen.ratio}px`;
+      span.style.top = `${y / seen.ratio}px`;
+      marks.push(span);
+    };
+    const [a, b] = this.state.measured;
+    if (a && b) mark(add(a, b).map((x) => x / 2), panel.metres(length(sub(a, b))));
+    else if (a) mark(a, "from here");
+    by("marks").replaceChildren(...marks);
+  }
+}
+
+// A colour of the style sheet, 0 to 1.
+export const colourOf = (name) => {
+  const hex = getComputedStyle(document.documentElement).getPropertyValue(name).trim();
+  return [1, 3, 5].map((i) => parseInt(hex.slice(i, i + 2), 16) / 255);
+};

@@ -1,0 +1,219 @@
+// The map as its messages tell it: tiles of sorted cells, and what has changed since the last look.
+
+import { decodeKeys, keyText, placeIndex, tileIndex } from "./keys.js";
+
+const ENCODING = "morton21_delta_leb128";
+export const NO_LABEL = 65535;
+
+// The cells of one tile, sorted by their place: parallel arrays with room to grow.
+class Tile {
+  constructor(id) {
+    this.id = id;
+    this.size = 0;
+    this.places = new Uint16Array(32);
+    this.counts = new Uint32Array(32);
+    this.labels = new Uint16Array(32);
+    this.seen = new Uint16Array(32);
+  }
+
+  find(place) {
+    let [low, high] = [0, this.size];
+    while (low < high) {
+      const middle = (low + high) >> 1;
+      if (this.places[middle] < place) low = middle + 1;
+      else high = middle;
+    }
+    return low;
+  }
+
+  columns() { return [this.places, this.counts, this.labels, this.seen]; }
+
+  // True if the cell is new.
+  set(place, count, label, seen) {
+    const last = this.size === 0 || this.places[this.size - 1] < place;
+    const i = last ? this.size : this.find(place);
+    const fresh = last || this.places[i] !== place;
+    if (fresh) {
+      if (this.size === this.places.length) this.grow();
+      for (const column of this.columns()) column.copyWithin(i + 1, i, this.size);
+      this.size++;
+    }
+    this.places[i] = place;
+    this.counts[i] = count;
+    this.labels[i] = label;
+    this.seen[i] = seen;
+    return fresh;
+  }
+
+  // True if the cell was there.
+  remove(place) {
+    const i = this.find(place);
+    if (i >= this.size || this.places[i] !== place) return false;
+    for (const column of this.columns()) column.copyWithin(i, i + 1, this.size);
+    this.size--;
+    return true;
+  }
+
+  grow() {
+    for (const name of ["places", "counts", "labels", "seen"]) {
+      const grown = new this[name].constructor(2 * this[name].length);
+      grown.set(this[name]);
+      this[name] = grown;
+    }
+  }
+}
+
+const sameLattice = (a, b) => a && b && a.epoch === b.epoch && a.lattice === b.lattice
+  && a.generator.every((x, i) => x === b.generator[i])
+  && a.place.position.every((x, i) => x === b.place.position[i]);
+
+export class Follower {
+  constructor() {
+    this.info = null;
+    this.sequence = null;
+    this.tiles = new Map();
+    this.size = 0;
+    this.dirty = new Set();
+    this.staging = null;
+    this.renewed = false;
+    this.frame = "map";
+    this.begin = Date.now();
+  }
+
+  // Seconds since this page began, as cells keep them.
+  now() { return Math.min(65535, Math.round((Date.now() - this.begin) / 1000)); }
+
+  onMap(map) {
+    if (map.encoding !== ENCODING) throw new RangeError(`keys are in ${map.encoding}`);
+    this.frame = map.header.frame;
+    if (!sameLattice(this.info, map.info)) {
+      this.info = map.info;
+      this.tiles = new Map();
+      this.size = 0;
+      this.dirty.clear();
+      this.sequence = null;
+      this.staging = null;
+      this.renewed = true;
+    }
+    if (!this.staging || this.staging.sequence !== map.sequence || this.staging.chunks !== map.chunks) {
+      this.staging = { sequence: map.sequence, chunks: map.chunks, come: new Set(), kept: new Map() };
+    }
+    const { come, kept } = this.staging;
+    come.add(map.chunk);
+    this.put(map);
+    // Places that the keyframe has, where something else may have been before.
+    if (this.sequence !== null) {
+      decodeKeys(map.keys, (tile, place) => {
+        if (!kept.has(tile)) kept.set(tile, new Set());
+        kept.get(tile).add(place);
+      });
+    }
+    if (come.size === map.chunks) {
+      if (this.sequence !== null) this.keepOnly(kept);
+      this.sequence = map.sequence;
+      this.staging = null;
+    }
+  }
+
+  // False: something is missing, and the map must be had anew.
+  onUpdate(update) {
+    if (update.encoding !== ENCODING) throw new RangeError(`keys are in ${update.encoding}`);
+    if (this.sequence === null || !sameLattice(this.info, update.info)) return this.staging !== null;
+    if (update.sequence <= this.sequence) return true;
+    if (update.previous > this.sequence) return false;
+    this.put(update);
+    decodeKeys(update.removedKeys, (id, place) => {
+      const tile = this.tiles.get(id);
+      if (!tile || !tile.remove(place)) return;
+      this.size--;
+      this.dirty.add(tile);
+    });
+    if (update.chunk + 1 < update.chunks) return true;
+    this.sequence = update.sequence;
+    return this.size === update.total;
+  }
+
+  put({ keys, counts, labels }) {
+    const seen = this.now();
+    let tile = null;
+    decodeKeys(keys, (id, place, i) => {
+      if (!tile || tile.id !== id) {
+        tile = this.tiles.get(id);
+        if (!tile) this.tiles.set(id, (tile = new Tile(id)));
+        this.dirty.add(tile);
+      }
+      const label = labels.length ? labels[i] : NO_LABEL;
+      if (tile.set(place, counts.length ? counts[i] : 1, label, seen)) this.size++;
+    });
+  }
+
+  keepOnly(kept) {
+    for (const tile of this.tiles.values()) {
+      const places = kept.get(tile.id);
+      for (const place of tile.places.slice(0, tile.size)) {
+        if (places?.has(place)) continue;
+        tile.remove(place);
+        this.size--;
+        this.dirty.add(tile);
+      }
+    }
+  }
+
+  // Tiles that have changed, packed for drawing: four 16-bit numbers a cell (place, label, logarithm of
+  // its count, second of its last change), shuffled so that any beginning is a fair sample.
+  takeDirty(most) {
+    const packed = [];
+    for (const tile of this.dirty) {
+      if (packed.length >= most) break;
+      this.dirty.delete(tile);
+      packed.push({ id: tile.id, index: tileIndex(tile.id), size: tile.size, cells: pack(tile), heights: this.heights(tile) });
+      if (tile.size === 0) this.tiles.delete(tile.id);
+    }
+    return packed;
+  }
+
+  // Lowest and highest centre of a tile along the map's z, from the datum, m.
+  heights(tile) {
+    const [x, y, z] = this.rowOfHeight ?? [0, 0, 1];
+    const [a, b, c] = tileIndex(tile.id);
+    let [low, high] = [Infinity, -Infinity];
+    for (let i = 0; i < tile.size; i++) {
+      const [u, v, w] = placeIndex(tile.places[i]);
+      const height = x * (a + u) + y * (b + v) + z * (c + w);
+      low = Math.min(low, height);
+      high = Math.max(high, height);
+    }
+    return [low, high];
+  }
+
+  cell(id, place) {
+    const tile = this.tiles.get(id);
+    const i = tile ? tile.find(place) : 0;
+    if (!tile || i >= tile.size || tile.places[i] !== place) return null;
+    return { key: keyText(id, place), count: tile.counts[i], label: tile.labels[i], age: this.now() - tile.seen[i] };
+  }
+
+  keys() {
+    const all = [];
+    for (const tile of this.tiles.values()) {
+      for (let i = 0; i < tile.size; i++) all.push(keyText(tile.id, tile.places[i]));
+    }
+    return all;
+  }
+}
+
+function pack(tile) {
+  const n = tile.size;
+  const cells = new Uint16Array(4 * n);
+  let step = Math.max(1, Math.round(n * 0.618));
+  while (gcd(step, n) > 1) step++;
+  for (let k = 0, i = 0; k < n; k++, i = (i + step) % n) {
+    cells[4 * k] = tile.places[i];
+    cells[4 * k + 1] = tile.labels[i];
+    cells[4 * k + 2] = Math.min(65535, Math.log2(tile.counts[i] + 1) * 2048);
+    cells[4 * k + 3] = tile.seen[i];
+  }
+  return cells;
+}
+
+const gcd = (a, b) => (b === 0 ? a : gcd(b, a % b));

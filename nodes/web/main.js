@@ -1,0 +1,346 @@
+// The page: its worker, its view and its panel put together.
+
+import { Camera } from "./camera.js";
+import { Drawing, colourOf } from "./drawing.js";
+import { placeIndex } from "./keys.js";
+import { add, length, rotate, sub } from "./math.js";
+import * as panel from "./panel.js";
+import { watchKeys, watchPointer } from "./pointer.js";
+import { CellRenderer } from "./renderer.js";
+import { Scene } from "./scene.js";
+import { Transforms } from "./transforms.js";
+
+const { by } = panel;
+const ROBOT = "base_link";
+const HEADSET = "headset_origin";
+const MODES = ["height", "count", "label", "age"];
+const QUIET_MS = 5000;
+const MOST_PATH = 4000;
+
+const canvas = by("view");
+const gl = canvas.getContext("webgl2", { antialias: false, preserveDrawingBuffer: false });
+if (!gl) panel.showBanner("This browser has no WebGL 2: the map cannot be drawn.");
+
+const camera = new Camera();
+const cells = new CellRenderer(gl);
+const scene = new Scene(gl);
+const transforms = new Transforms();
+const state = {
+  open: false, live: false, lattice: null, frame: "map", size: 0, complete: false, sequence: null, changedAt: null, heardAt: Date.now(),
+  mode: "height", heights: [0, 1], slice: [0, 1], labels: new Set(), robot: null, path: [], headset: null,
+  clouds: new Map(), measuring: false, measured: [], chosen: null, shown: { cells: true, robot: true, grid: true, headset: true },
+  scansOn: new Set(), problems: [], frames: 0,
+};
+const worker = new Worker("/worker.js", { type: "module" });
+const drawing = new Drawing({ gl, canvas, camera, cells, scene, state });
+const redraw = () => drawing.redraw();
+
+// --- What comes from the worker.
+
+const handlers = {
+  open() {
+    state.open = true;
+    state.heardAt = Date.now();
+  },
+  closed() {
+    state.open = false;
+    for (const box of by("layers").querySelectorAll("input[data-topic]")) box.disabled = true;
+  },
+  channels({ channels }) {
+    state.live = channels.some((channel) => channel.kind === "diagnostics");
+    showLayers(channels);
+  },
+  lattice({ info, frame }) {
+    Object.assign(state, { lattice: info, frame, size: 0, complete: false, chosen: null, measured: [], path: [] });
+    state.labels.clear();
+    cells.setLattice(info);
+    chooseColour();
+    panel.showCell(null);
+  },
+  tiles({ tiles, size, now, sequence, complete }) {
+    for (const tile of tiles) {
+      cells.setTile(tile);
+      if (state.mode === "label" || state.labels.size === 0) noteLabels(tile);
+    }
+    cells.now = now;
+    Object.assign(state, { size, sequence, complete, changedAt: Date.now() });
+    ranges();
+    redraw();
+  },
+  transforms({ transforms: come }) {
+    transforms.add(come);
+    const robot = transforms.find(state.frame, ROBOT);
+    if (robot) {
+      state.robot = robot;
+      const last = state.path[state.path.length - 1];
+      if (!last || length(sub(last, robot.position)) > 0.15) state.path.push(robot.position);
+      if (state.path.length > MOST_PATH) state.path.shift();
+    }
+    if (state.headset) Object.assign(state.headset, transforms.find(state.frame, HEADSET) ?? {});
+    redraw();
+  },
+  calibration({ result }) {
+    const { position, rotation, verdict, frame } = result;
+    state.headset = verdict === 0 ? null : { position, rotation, verdict, frame };
+    panel.showVerdict(result);
+    redraw();
+  },
+  cloud({ topic, cloud }) {
+    const known = state.clouds.get(topic);
+    if (!known) return;
+    const place = transforms.find(state.frame, cloud.frame);
+    if (!place && cloud.frame !== state.frame) return;
+    const origin = place ? add(place.position, rotate(place.rotation, cloud.origin)) : cloud.origin;
+    const slot = known.next++ % known.keep;
+    scene.set(`${topic} ${slot}`, place ? turnPoints(cloud.points, place.rotation) : cloud.points);
+    known.scans[slot] = { name: `${topic} ${slot}`, origin, at: performance.now() };
+    redraw();
+  },
+  diagnostics: panel.showDiagnostics,
+  rates({ rates }) {
+    if (rates.length > 0) state.heardAt = Date.now();
+    if (by("rates").closest("details").open) panel.showRates(rates);
+  },
+  problem({ text }) {
+    state.problems.push(text);
+    if (state.problems.length > 50) state.problems.shift();
+    console.warn(text);
+  },
+  cell: ({ cell, request }) => answered(cell, request),
+};
+
+worker.onmessage = ({ data }) => handlers[data.type]?.(data);
+
+function turnPoints(points, rotation) {
+  const out = new Float32Array(points.length);
+  for (let i = 0; i < points.length; i += 3) out.set(rotate(rotation, points.subarray(i, i + 3)), i);
+  return out;
+}
+
+function noteLabels({ cells: packed }) {
+  for (let i = 1; i < packed.length && state.labels.size < 64; i += 4) if (packed[i] !== 65535) state.labels.add(packed[i]);
+}
+
+// --- Colours, slice and layers.
+
+function ranges() {
+  const bounds = cells.bounds();
+  if (!bounds) return;
+  const [low, high] = [bounds.low[2], Math.max(bounds.high[2], bounds.low[2] + 1)];
+  const [was, wasHigh] = state.heights;
+  // Steady while the map grows a little.
+  if (Math.abs(low - was) > 0.2 || Math.abs(high - wasHigh) > 0.2) {
+    state.heights = [low, high];
+    chooseColour();
+    chooseSlice();
+  }
+}
+
+function chooseColour() {
+  const { mode } = state;
+  const range = { height: state.heights, count: [1, 10], label: [0, 1], age: [0, 60] }[mode];
+  cells.colour = { mode: MODES.indexOf(mode), range };
+  cells.setPalette(mode);
+  panel.showLegend(mode, range, [...state.labels].sort((a, b) => a - b));
+  redraw();
+}
+
+function chooseSlice() {
+  const [low, high] = [by("low"), by("high")].map((input) => Number(input.value) / 1000);
+  const [begin, end] = [state.heights[0] - 2, state.heights[1] + 6];
+  const at = (t) => begin + t * (end - begin);
+  cells.slice = [low === 0 ? -1e9 : at(low), high === 1 ? 1e9 : at(high)];
+  by("low-value").textContent = low === 0 ? "all" : panel.metres(at(low));
+  by("high-value").textContent = high === 1 ? "all" : panel.metres(at(high));
+  redraw();
+}
+
+const INKS = [[0.95, 0.97, 1, 0.9], [0.55, 0.85, 1, 0.9], [1, 0.7, 0.8, 0.9]];
+
+function showLayers(channels) {
+  const own = [["cells", "Cells"], ["grid", "Ground grid"], ["robot", "Robot and its path"], ["headset", "Headset"]];
+  const boxes = own.map(([name, text]) => panel.layerBox(text, state.shown[name], (on) => {
+    state.shown[name] = on;
+    redraw();
+  }));
+  const clouds = channels.filter((channel) => channel.kind === "cloud" || channel.kind === "centers");
+  clouds.forEach((channel, i) => {
+    const keep = channel.kind === "centers" ? 1 : 64;
+    if (!state.clouds.has(channel.topic)) state.clouds.set(channel.topic, { scans: [], next: 0, keep, ink: INKS[i % INKS.length] });
+    const box = panel.layerBox(channel.topic, state.scansOn.has(channel.topic), (on) => wantCloud(channel.topic, on));
+    box.firstChild.dataset.topic = channel.topic;
+    boxes.push(box);
+  });
+  by("layers").replaceChildren(...boxes);
+}
+
+function wantCloud(topic, on) {
+  if (on) state.scansOn.add(topic);
+  else state.scansOn.delete(topic);
+  state.clouds.get(topic).scans = [];
+  worker.postMessage({ type: "want", topic, on });
+  redraw();
+}
+
+// --- Cells that are chosen, and distances between them.
+
+function pick(x, y) {
+  const seen = drawing.view();
+  const found = cells.pick(seen, Math.round(x * seen.ratio), Math.round(seen.height - 1 - y * seen.ratio));
+  if (!found) {
+    cells.chosen = null;
+    if (state.measuring) state.measured = [];
+    panel.showCell(null);
+    redraw();
+    return null;
+  }
+  cells.chosen = { ...found, number: -1 };
+  const centre = cells.centre(found.tile, placeIndex(found.place));
+  state.chosen = { ...found, centre };
+  if (state.measuring) state.measured = state.measured.length === 1 ? [state.measured[0], centre] : [centre];
+  worker.postMessage({ type: "cell", ...found, request: centre });
+  redraw();
+  return found;
+}
+
+function answered(cell, centre) {
+  if (!cell) return panel.showCell(null);
+  const shown = { key: cell.key, centre: centre.map((x) => x.toFixed(2)).join(", ") + " m", points: panel.whole(cell.count) };
+  if (cell.label !== 65535) shown.label = cell.label;
+  shown.changed = `${panel.seconds(cell.age)} ago`;
+  if (state.robot) shown["from the robot"] = panel.metres(length(sub(centre, state.robot.position)));
+  state.cell = cell;
+  panel.showCell(shown);
+}
+
+function measure() {
+  state.measuring = !state.measuring;
+  state.measured = [];
+  by("measure").setAttribute("aria-pressed", state.measuring);
+  canvas.classList.toggle("aim", state.measuring);
+  redraw();
+}
+
+// --- Buttons, keys, time.
+
+// The view has been moved: the address tells it.
+function moved() {
+  drawing.moved();
+  clearTimeout(moved.link);
+  moved.link = setTimeout(() => history.replaceState(null, "", `#view=${camera.toText()}`), 500);
+  showCamera();
+}
+
+function setCamera(mode) {
+  camera.setMode(mode);
+  moved();
+}
+
+function fit() {
+  camera.automatic = true;
+  if (camera.mode === "follow") camera.mode = "free";
+  moved();
+}
+
+function showCamera() {
+  for (const button of document.querySelectorAll("[data-camera]")) button.setAttribute("aria-pressed", button.dataset.camera === camera.mode);
+}
+
+function theme() {
+  const light = document.documentElement.classList.toggle("light");
+  by("theme").textContent = light ? "Dark" : "Light";
+  localStorage.setItem("lattice-theme", light ? "light" : "dark");
+  redraw();
+}
+
+function fold() {
+  const hidden = (by("panel").hidden = !by("panel").hidden);
+  by("fold").setAttribute("aria-expanded", !hidden);
+  redraw();
+}
+
+function picture() {
+  drawing.drawNow();
+  canvas.toBlob((blob) => {
+    const link = panel.element("a", { href: URL.createObjectURL(blob), download: "lattice.png" });
+    link.click();
+    setTimeout(() => URL.revokeObjectURL(link.href), 1000);
+  });
+}
+
+// Says what is known of the connection, also when nothing comes.
+function tick() {
+  // A map of a file says nothing more.
+  const quiet = state.live ? Date.now() - state.heardAt : 0;
+  const changed = state.changedAt === null ? null : (Date.now() - state.changedAt) / 1000;
+  cells.stale = state.open && quiet < QUIET_MS ? 0 : 1;
+  if (!state.open) {
+    const since = new Date(state.changedAt ?? state.heardAt).toLocaleTimeString();
+    panel.showBanner(state.lattice ? `No connection: this is the map of ${since}. Trying again …` : "No connection to the viewer server. Trying again …");
+    panel.showState("not connected", "bad");
+  } else if (quiet >= QUIET_MS) {
+    panel.showBanner(`Nothing was heard for ${panel.seconds(quiet / 1000)}.`, true);
+    panel.showState("quiet", "warn");
+  } else {
+    panel.showBanner(null);
+    panel.showState(state.lattice ? (state.complete ? "live" : "loading") : "no map yet", state.lattice ? "ok" : "warn");
+  }
+  panel.showFacts({ size: state.size, lattice: state.lattice?.lattice, volume: state.lattice?.volume, changed });
+  if (cells.stale !== tick.stale || state.mode === "age") redraw();
+  tick.stale = cells.stale;
+}
+
+const pointer = { moved, clicked: (x, y) => { camera.automatic = false; pick(x, y); } };
+watchPointer(canvas, camera, pointer);
+watchKeys({
+  1: () => setCamera("free"), 2: () => setCamera("follow"), 3: () => setCamera("top"), 4: () => setCamera("side"),
+  f: fit, m: measure, p: picture, t: theme, h: fold,
+  ArrowLeft: () => { camera.orbit(-25, 0); moved(); }, ArrowRight: () => { camera.orbit(25, 0); moved(); },
+  ArrowUp: () => { camera.orbit(0, 20); moved(); }, ArrowDown: () => { camera.orbit(0, -20); moved(); },
+  "+": () => { camera.zoom(0.85); moved(); }, "-": () => { camera.zoom(1.18); moved(); },
+});
+for (const button of document.querySelectorAll("[data-camera]")) button.addEventListener("click", () => setCamera(button.dataset.camera));
+for (const [id, action] of Object.entries({ fit, measure, picture, theme, fold })) by(id).addEventListener("click", action);
+by("colour").addEventListener("change", (event) => {
+  state.mode = event.target.value;
+  chooseColour();
+});
+for (const id of ["low", "high"]) by(id).addEventListener("input", chooseSlice);
+new ResizeObserver(redraw).observe(canvas);
+if (localStorage.getItem("lattice-theme") === "light") theme();
+const given = /#view=(.*)/.exec(location.hash);
+if (given) camera.fromText(given[1]);
+if (window.innerWidth < 640) fold();
+showCamera();
+showLayers([]);
+chooseColour();
+chooseSlice();
+setInterval(tick, 250);
+tick();
+redraw();
+
+// For tests: what is shown, in figures.
+window.lattice = {
+  state, camera, cells, pick, frame: () => drawing.drawNow(),
+  keys: () => new Promise((resolve) => {
+    const take = ({ data }) => {
+      if (data.type !== "keys") return;
+      worker.removeEventListener("message", take);
+      resolve(data.keys);
+    };
+    worker.addEventListener("message", take);
+    worker.postMessage({ type: "keys" });
+  }),
+  // Share of the pixels that are not ground.
+  lit() {
+    drawing.drawNow();
+    const [w, h] = [canvas.width, canvas.height];
+    const pixels = new Uint8Array(4 * w * h);
+    gl.readPixels(0, 0, w, h, gl.RGBA, gl.UNSIGNED_BYTE, pixels);
+    const ground = colourOf("--ground").map((x) => Math.round(255 * x));
+    let lit = 0;
+    for (let i = 0; i < pixels.length; i += 4) if (ground.some((x, k) => Math.abs(pixels[i + k] - x) > 24)) lit++;
+    return lit / (w * h);
+  },
+  frameMs: () => drawing.lastFrame,
+};

@@ -1,0 +1,111 @@
+// Messages that the page understands, from CDR.
+
+import { Reader } from "./cdr.js";
+
+const time = (r) => r.i32() + r.u32() * 1e-9;
+const header = (r) => ({ stamp: time(r), frame: r.string() });
+const vector = (r) => r.f64s(3);
+const pose = (r) => ({ position: vector(r), rotation: r.f64s(4) });
+
+function latticeInfo(r) {
+  const info = { lattice: r.string(), volume: r.f64(), generator: r.f64s(9), place: pose(r) };
+  info.origin = r.f64s(3);
+  info.hasOrigin = r.bool();
+  info.epoch = r.u64();
+  return info;
+}
+
+function columns(r) {
+  return {
+    count: r.u32(),
+    keys: r.octets(),
+    counts: r.numbers(Uint32Array),
+    offsetUnit: r.f64(),
+    offsets: r.numbers(Int16Array),
+    labels: r.numbers(Uint16Array),
+    labelCounts: r.numbers(Uint32Array),
+  };
+}
+
+export function latticeMap(bytes) {
+  const r = new Reader(bytes);
+  const map = { header: header(r), info: latticeInfo(r), sequence: r.u64() };
+  map.chunk = r.u32();
+  map.chunks = r.u32();
+  map.total = Number(r.u64());
+  map.encoding = r.string();
+  return Object.assign(map, columns(r));
+}
+
+export function latticeMapUpdate(bytes) {
+  const r = new Reader(bytes);
+  const update = { header: header(r), info: latticeInfo(r), previous: r.u64(), sequence: r.u64() };
+  update.chunk = r.u32();
+  update.chunks = r.u32();
+  update.encoding = r.string();
+  Object.assign(update, columns(r));
+  update.removed = r.u32();
+  update.removedKeys = r.octets();
+  update.total = Number(r.u64());
+  return update;
+}
+
+export function transforms(bytes) {
+  return new Reader(bytes).list((r) => {
+    const { stamp, frame } = header(r);
+    return { stamp, parent: frame, child: r.string(), position: vector(r), rotation: r.f64s(4) };
+  }, 64);
+}
+
+export function diagnostics(bytes) {
+  const r = new Reader(bytes);
+  const { stamp } = header(r);
+  const status = r.list((r) => ({
+    level: r.u8(),
+    name: r.string(),
+    message: r.string(),
+    hardware: r.string(),
+    values: r.list((r) => [r.string(), r.string()], 8),
+  }), 16);
+  return { stamp, status };
+}
+
+export function calibration(bytes) {
+  const r = new Reader(bytes);
+  const result = { header: header(r), frame: r.string(), session: r.string(), verdict: r.u8(), reason: r.string() };
+  Object.assign(result, { position: vector(r), rotation: r.f64s(4), covariance: r.f64s(36), margin: r.f64(), inliers: r.f64(), rmse: r.f64() });
+  return result;
+}
+
+const FLOAT32 = 7;
+const FLOAT64 = 8;
+
+// Points of a cloud as offsets from the first, in single precision.
+export function cloud(bytes) {
+  const r = new Reader(bytes);
+  const { stamp, frame } = header(r);
+  const [height, width] = [r.u32(), r.u32()];
+  const fields = r.list((r) => ({ name: r.string(), offset: r.u32(), type: r.u8(), count: r.u32() }), 16);
+  const bigEndian = r.bool();
+  const [step, row] = [r.u32(), r.u32()];
+  const data = r.octets();
+  const of = (name) => fields.find((field) => field.name === name && (field.type === FLOAT32 || field.type === FLOAT64));
+  const axes = ["x", "y", "z"].map(of);
+  if (axes.some((axis) => !axis) || step === 0) return { stamp, frame, origin: [0, 0, 0], points: new Float32Array(0) };
+  const view = new DataView(data.buffer, data.byteOffset, data.byteLength);
+  const value = (axis, at) => axis.type === FLOAT32
+    ? view.getFloat32(at + axis.offset, !bigEndian) : view.getFloat64(at + axis.offset, !bigEndian);
+  const most = Math.min(height * width, Math.floor(data.byteLength / step));
+  const points = new Float32Array(3 * most);
+  let origin = null;
+  let n = 0;
+  for (let i = 0; i < most; i++) {
+    const at = Math.floor(i / width) * row + (i % width) * step;
+    if (at + step > data.byteLength) break;
+    const p = axes.map((axis) => value(axis, at));
+    if (!p.every(Number.isFinite)) continue;
+    origin ??= p;
+    for (let k = 0; k < 3; k++) points[n++] = p[k] - origin[k];
+  }
+  return { stamp, frame, origin: origin ?? [0, 0, 0], points: points.subarray(0, n) };
+}
