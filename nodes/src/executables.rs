@@ -1,5 +1,6 @@
 //! Executables: the table of nodes, a runtime for one or several of them, an orderly end.
 
+use std::io::{Write, stdout};
 use std::process::ExitCode;
 
 use crate::running::Running;
@@ -66,7 +67,7 @@ pub fn answers_help(name: &str, declare: Option<Declare>, args: &RosArgs) -> boo
         .iter()
         .any(|arg| arg == "--help" || arg == "-h");
     if asked {
-        println!(
+        let mut text = format!(
             "Usage: {name} [--ros-args [-r FROM:=TO] [-p NAME:=VALUE] [--params-file FILE] \
              [--log-level LEVEL] [--enclave NAME] ...]\n\n\
              Topics and services are in README.md.\n\n\
@@ -76,11 +77,11 @@ pub fn answers_help(name: &str, declare: Option<Declare>, args: &RosArgs) -> boo
         );
         let params = Params::from_values(name, std::iter::empty::<(String, _)>());
         if declare.is_some_and(|declare| declare(&params).is_ok()) {
-            println!(
-                "Parameters; those that are not [fixed] can be set while the node runs:\n\n{}",
-                params.help()
-            );
+            text += "\nParameters; those that are not [fixed] can be set while the node runs:\n\n";
+            text += &params.help();
         }
+        // Who reads it may have seen enough.
+        let _ = stdout().write_all(text.as_bytes());
     }
     asked
 }

@@ -72,8 +72,8 @@ fn refused() -> Vec<(Value, Value)> {
 #[test]
 fn a_cyclone_peer_describes_dumps_edits_and_loads_parameters() {
     let Some(python) = python() else { return };
-    // Fails if there is one already, which will do.
-    let _ = logging::init(&RosArgs::default(), "lattice_mapper");
+    // Fails if another test was first, which has the same.
+    let _ = logging::init(&RosArgs::default(), "logger");
     let directory = tempfile::tempdir().unwrap();
     let file = directory.path().join("scenario.json");
     let domain = TestDomain::take();

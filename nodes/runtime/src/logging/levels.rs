@@ -23,7 +23,10 @@ pub(super) struct Console {
 }
 
 /// The console of the process, and the logger that shows it now.
-static CONSOLE: OnceLock<(Mutex<Console>, Arc<Mutex<Arc<Logger>>>)> = OnceLock::new();
+static CONSOLE: OnceLock<(Mutex<Console>, Shown)> = OnceLock::new();
+
+/// The logger that shows the console now.
+pub(super) type Shown = Arc<Mutex<Arc<Logger>>>;
 
 impl Console {
     pub(super) fn new(plan: Plan, layout: Arc<Layout>, node_name: &str) -> Self {
@@ -72,7 +75,7 @@ impl Console {
     }
 }
 
-pub(super) fn install(console: Console, shown: Arc<Mutex<Arc<Logger>>>) {
+pub(super) fn install(console: Console, shown: Shown) {
     // One logger a process: there is none yet.
     let _ = CONSOLE.set((Mutex::new(console), shown));
 }

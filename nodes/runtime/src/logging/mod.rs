@@ -14,7 +14,7 @@ use crate::sync::lock;
 use env_logger::Logger;
 use file::LogFile;
 use layout::Layout;
-use levels::Console;
+use levels::{Console, Shown};
 use log::{Level, Log, Metadata, Record, SetLoggerError};
 use plan::Plan;
 use std::{
@@ -80,7 +80,7 @@ pub fn tee(sink: Sink) -> bool {
 
 struct Tee {
     /// Replaced when a level is set.
-    console: Arc<Mutex<Arc<Logger>>>,
+    console: Shown,
     to_console: bool,
     layout: Arc<Layout>,
     file: Option<LogFile>,
