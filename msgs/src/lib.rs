@@ -18,6 +18,7 @@ mod interface;
 pub mod lattice;
 pub mod nav_msgs;
 pub mod novatel_oem7_msgs;
+pub mod octomap_msgs;
 pub mod rcl_interfaces;
 mod registry;
 pub mod rmw_dds_common;
@@ -35,5 +36,5 @@ pub mod visualization_msgs;
 
 pub use action::RosAction;
 pub use interface::{RosMessage, RosService, Schema, dds_type_name};
-pub use registry::{MessageVisitor, visit_messages};
+pub use registry::{MessageVisitor, definition_of, visit_messages};
 pub use type_hash::{hash_of, type_hash};

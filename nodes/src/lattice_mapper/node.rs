@@ -13,6 +13,7 @@ use lattice_msgs::std_msgs::Empty;
 
 use super::autosave::Autosave;
 use super::map_folder::MapFolder;
+use super::octomap;
 use super::outputs::Outputs;
 use super::services::{self, Call};
 use super::{LatticeMapper, MapperOptions, MapperReport};
@@ -106,10 +107,21 @@ pub fn start(runtime: &Runtime, name: &str) -> Result<Finish, NodeError> {
         (true, "keyframe follows".into())
     })?;
     let services = inbox.clone();
-    let reset = node.service_trigger("~/reset", move || match services.send(Event::Reset, 0) {
-        true => (true, "map emptied".into()),
-        false => (false, "busy, ask again".into()),
-    })?;
+    let mut more = Vec::new();
+    match params.bool("octomap_services", false)? {
+        true => more.extend(octomap::serve(&node, &services, Event::Call, || {
+            Event::Reset
+        })?),
+        false => {
+            more.push(node.service_trigger(
+                "~/reset",
+                move || match services.send(Event::Reset, 0) {
+                    true => (true, "map emptied".into()),
+                    false => (false, "busy, ask again".into()),
+                },
+            )?)
+        }
+    }
     clouds.watch([&points]);
     inputs.watch([&points, &origins, &asked]);
     let calls = services::serve(&node, &inbox, Event::Call, maps, max_voxels)?;
@@ -126,7 +138,7 @@ pub fn start(runtime: &Runtime, name: &str) -> Result<Finish, NodeError> {
     runtime.timer(centers_period, move || notify(&inbox, Event::Centers));
     warn_unused(params);
     Ok(Box::new(move || {
-        drop((points, origins, asked, request_keyframe, reset, calls));
+        drop((points, origins, asked, request_keyframe, more, calls));
         compute.finish_with(Event::Finish);
     }))
 }

@@ -30,7 +30,7 @@ const NODES: [(&str, ReadOptions, &str); 3] = [
         "lattice_mapper",
         |params| _ = MapperOptions::from_params(params).unwrap(),
         "autosave_file autosave_period_s centers_period_s free_period_s inbox_bytes inbox_events \
-         map_dir report_file resume \
+         map_dir octomap_services report_file resume \
          threads update_period_s",
     ),
     (
