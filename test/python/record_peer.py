@@ -23,8 +23,8 @@ def talk(domain):
     latched = peer.writer("rt/latched", String, qos(1, latched=True))
     latched.write(String("kept"))
     said["/latched"].append(["kept"])
-    strings = peer.writer("rt/said", String, qos(100))
-    loads = peer.writer("rt/pit/load", Load, qos(100))
+    strings = peer.writer("rt/said", String, qos(COUNT))
+    loads = peer.writer("rt/pit/load", Load, qos(COUNT))
     peer.until_matched()
     # The test says when the recorder is ready, too.
     print("matched", flush=True)

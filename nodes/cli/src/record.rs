@@ -64,10 +64,10 @@ pub struct Record {
     /// Begin a new file when one spans so many seconds; 0: never
     #[arg(long, short = 'd', default_value_t = 0, value_name = "S")]
     max_bag_duration: u32,
-    /// What is compressed
+    /// Part that is compressed
     #[arg(long, value_enum, default_value = "none")]
     compression_mode: CompressionMode,
-    /// How
+    /// Format of the compression
     #[arg(long, value_enum, default_value = "zstd")]
     compression_format: CompressionFormat,
     /// Most bytes of messages that wait to be written; more are lost, and counted

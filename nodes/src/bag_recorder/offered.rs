@@ -1,28 +1,34 @@
 //! Quality of service of a recorded topic: what all its publishers can give, and how a bag notes theirs.
 
 use lattice_bag::BagQos;
-use lattice_runtime::RemotePublisher;
 use lattice_runtime::qos::{Durability, Qos, Reliability};
+use lattice_runtime::{Load, RemotePublisher};
 
-/// Samples that wait in DDS; those of a latched topic come all at once to one who joins late.
-const DEPTH: usize = 100;
-const LATCHED_DEPTH: usize = 500;
+/// Samples that wait in DDS: a burst of small ones, and not too much of 4 MB clouds.
+const SMALL_DEPTH: usize = 500;
+const LARGE_DEPTH: usize = 50;
+
+/// Depths that are noted of publishers; the samples of a latched one come all at once to one who joins late.
+const DEPTH: u64 = 100;
+const LATCHED_DEPTH: u64 = 500;
 
 /// The QoS of a subscription that hears all these publishers: reliable if all are, latched if all are.
-pub(super) fn subscription(publishers: &[&RemotePublisher]) -> Qos {
+pub(super) fn subscription(publishers: &[&RemotePublisher], load: Load) -> Qos {
     let reliable = |p: &&RemotePublisher| p.reliability == Reliability::Reliable;
     let latched = |p: &&RemotePublisher| p.durability == Durability::TransientLocal;
-    let latched = publishers.iter().all(latched);
     Qos {
         reliability: match publishers.iter().all(reliable) {
             true => Reliability::Reliable,
             false => Reliability::BestEffort,
         },
-        durability: match latched {
+        durability: match publishers.iter().all(latched) {
             true => Durability::TransientLocal,
             false => Durability::Volatile,
         },
-        depth: if latched { LATCHED_DEPTH } else { DEPTH },
+        depth: match load {
+            Load::Small => SMALL_DEPTH,
+            Load::Large => LARGE_DEPTH,
+        },
     }
 }
 
@@ -32,7 +38,7 @@ pub(super) fn noted(publisher: &RemotePublisher) -> BagQos {
     BagQos {
         reliable: publisher.reliability == Reliability::Reliable,
         latched,
-        depth: if latched { LATCHED_DEPTH } else { DEPTH } as u64,
+        depth: if latched { LATCHED_DEPTH } else { DEPTH },
         ..BagQos::default()
     }
 }
@@ -52,7 +58,7 @@ mod tests {
         };
         let [latched, reliable, sensor] = [Qos::LATCHED, Qos::DEFAULT, Qos::SENSOR].map(publisher);
         let heard = |publishers: &[&RemotePublisher]| {
-            let qos = subscription(publishers);
+            let qos = subscription(publishers, Load::Small);
             (qos.reliability, qos.durability)
         };
         type R = Reliability;

@@ -1,6 +1,6 @@
 //! A recording at work: which topics are heard, and what of them was lost.
 
-use std::collections::{BTreeMap, BTreeSet};
+use std::collections::BTreeMap;
 use std::sync::Arc;
 use std::sync::atomic::{AtomicBool, Ordering::Relaxed};
 
@@ -15,6 +15,9 @@ use super::offered;
 
 /// Topics of one recording, at most: as many as a file of MCAP has.
 const MAX_TOPICS: usize = 65_000;
+
+/// Types of one topic that are told of, at most.
+const MAX_TYPES: usize = 16;
 
 /// Types whose messages are large: they are taken on threads of their own.
 const LARGE: [&str; 3] = [
@@ -31,10 +34,18 @@ pub(super) struct Session {
     pub cache: Arc<Cache>,
     /// True while nothing is taken.
     pub paused: Arc<AtomicBool>,
-    pub topics: Vec<Subscription>,
-    types: Vec<String>,
-    /// Names that are recorded or were refused, with what was said of them.
-    seen: BTreeMap<String, BTreeSet<String>>,
+    pub topics: Vec<Heard>,
+    /// Topics that were given to the cache, also such as could not be heard.
+    places: usize,
+    /// Types of each name that is recorded or was refused, the recorded one first.
+    seen: BTreeMap<String, Vec<String>>,
+}
+
+/// A topic that is heard.
+pub(super) struct Heard {
+    subscription: Subscription,
+    ros_type: String,
+    place: usize,
 }
 
 impl Session {
@@ -52,7 +63,7 @@ impl Session {
             cache,
             paused: Arc::new(AtomicBool::new(paused)),
             topics: Vec::new(),
-            types: Vec::new(),
+            places: 0,
             seen: BTreeMap::new(),
         }
     }
@@ -72,18 +83,23 @@ impl Session {
                 continue;
             }
             let is_new = !self.seen.contains_key(topic);
+            if is_new && self.seen.len() >= MAX_TOPICS {
+                continue;
+            }
             let types = self.seen.entry(topic.to_owned()).or_default();
-            let first = types.first().cloned();
-            let new_types = publishers
-                .iter()
-                .filter(|p| types.insert(p.type_name.clone()));
-            let new_types: Vec<String> = new_types.map(|p| p.type_name.clone()).collect();
-            let Some(ros_type) = first.or_else(|| new_types.first().cloned()) else {
+            for publisher in &publishers {
+                let other = &publisher.type_name;
+                if types.contains(other) || types.len() >= MAX_TYPES {
+                    continue;
+                }
+                if let Some(recorded) = types.first() {
+                    log::warn!("{topic}: {other} is not recorded, the topic is one of {recorded}");
+                }
+                types.push(other.clone());
+            }
+            let Some(ros_type) = types.first().cloned() else {
                 continue;
             };
-            for other in new_types.iter().filter(|other| **other != ros_type) {
-                log::warn!("{topic}: {other} is not recorded, the topic is one of {ros_type}");
-            }
             let of_type = publishers.into_iter().filter(|p| p.type_name == ros_type);
             if is_new && let Err(error) = self.begin(topic, &ros_type, &Vec::from_iter(of_type)) {
                 log::warn!("{topic} is not recorded: {error}");
@@ -97,11 +113,7 @@ impl Session {
         ros_type: &str,
         publishers: &[&RemotePublisher],
     ) -> Result<(), RuntimeError> {
-        let place = self.topics.len();
-        if place >= MAX_TOPICS {
-            log::warn!("{topic} is not recorded: there are {MAX_TOPICS} topics already");
-            return Ok(());
-        }
+        let place = self.places;
         let announced = publishers.iter().find_map(|p| p.type_hash.as_deref());
         let defined = self.definitions.of(ros_type, announced);
         if defined.is_none() {
@@ -129,6 +141,7 @@ impl Session {
             false => Load::Small,
         };
         // First, so that the topic is in the bag before its messages.
+        self.places += 1;
         self.cache.push(Item::Topic(TopicSpec {
             name: topic.to_owned(),
             type_name: ros_type.to_owned(),
@@ -136,32 +149,34 @@ impl Session {
             definition: defined.map(|(text, _)| text),
             offered_qos: publishers.iter().map(|p| offered::noted(p)).collect(),
         }));
-        let qos = offered::subscription(publishers);
+        let qos = offered::subscription(publishers, load);
         let heard = self
             .node
             .subscribe_raw(topic, ros_type, qos, load, handler)?;
-        self.topics.push(heard);
-        self.types.push(ros_type.to_owned());
+        self.topics.push(Heard {
+            subscription: heard,
+            ros_type: ros_type.to_owned(),
+            place,
+        });
         log::info!("recording {topic} ({ros_type})");
         Ok(())
     }
 
-    /// What became of each topic.
+    /// Numbers of each topic.
     pub(super) fn report(&self) -> Vec<RecordedTopic> {
-        let topic = |(place, (heard, ros_type)): (usize, (&Subscription, &String))| RecordedTopic {
-            name: heard.topic().to_owned(),
-            type_name: ros_type.clone(),
-            heard: heard.received(),
-            lost: heard.lost().saturating_add(heard.undecodable()),
-            not_written: self.cache.lost(place),
+        let topic = |topic: &Heard| RecordedTopic {
+            name: topic.subscription.topic().to_owned(),
+            type_name: topic.ros_type.clone(),
+            heard: topic.subscription.received(),
+            lost: (topic.subscription.lost()).saturating_add(topic.subscription.undecodable()),
+            not_written: self.cache.lost(topic.place),
         };
-        let topics = self.topics.iter().zip(&self.types);
-        topics.enumerate().map(topic).collect()
+        self.topics.iter().map(topic).collect()
     }
 
     /// Messages that did not get here or found no room.
     pub(super) fn lost(&self) -> u64 {
-        let lost = self.topics.iter().map(Subscription::lost);
+        let lost = self.topics.iter().map(|topic| topic.subscription.lost());
         lost.fold(self.cache.all_lost(), u64::saturating_add)
     }
 }

@@ -39,15 +39,26 @@ pub(super) fn spawn(
 
 fn write(mut bag: BagWriter, cache: &Cache, written: &Written) -> Result<(), BagError> {
     let mut flushed = Instant::now();
+    // Nothing for a topic that no bag takes.
+    let mut places: Vec<Option<usize>> = Vec::new();
     let mut is_dirty = false;
     loop {
         match cache.next(FLUSH_PERIOD) {
-            Next::Item(Item::Topic(topic)) => drop(bag.add_topic(topic)?),
+            Next::Item(Item::Topic(topic)) => places.push(match bag.add_topic(topic) {
+                Err(error @ BagError::Invalid { .. }) => {
+                    log::warn!("not recorded: {error}");
+                    None
+                }
+                added => Some(added?),
+            }),
             Next::Item(Item::Message {
                 topic,
                 log_time_ns,
                 data,
             }) => {
+                let Some(topic) = places.get(topic).copied().flatten() else {
+                    continue;
+                };
                 match bag.write(topic, log_time_ns, &data) {
                     // No CDR, which nobody could read.
                     Err(error @ BagError::Invalid { .. }) => log::warn!("left out: {error}"),

@@ -5,6 +5,7 @@ mod browser;
 mod calibrate;
 mod evaluate;
 mod files;
+mod health;
 mod map;
 mod nodes;
 mod paper;
