@@ -80,6 +80,25 @@ fn the_file_for_a_headset_has_every_parameter_and_its_default() {
 }
 
 #[test]
+fn the_file_in_place_of_octomap_server_has_parameters_that_there_are() {
+    let names = [
+        "enu_transformer",
+        "octomap_server",
+        "voxel_marker_publisher",
+    ];
+    for ((_, read, shell), name) in NODES.into_iter().zip(names) {
+        let params = params("octomap_compat.yaml", &format!("/robot/{name}"));
+        read(&params);
+        for unused in params.unused() {
+            assert!(
+                shell.split(' ').any(|known| known == unused),
+                "{name}: {unused}"
+            );
+        }
+    }
+}
+
+#[test]
 fn the_parameter_file_fits_the_simulated_loader() {
     let params = params("bobcat.yaml", "/enu_transformer");
     let options = TransformerOptions::from_params(&params).unwrap();

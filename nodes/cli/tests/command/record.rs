@@ -41,7 +41,7 @@ pub fn expect(process: &mut Child, wanted: &[&str]) {
     let mut wanted = wanted.to_vec();
     let mut lines = BufReader::new(process.stderr.take().unwrap()).lines();
     while !wanted.is_empty() {
-        let line = lines.next().expect("the process has ended").unwrap();
+        let line = lines.next().unwrap().unwrap();
         wanted.retain(|text| !line.contains(text));
     }
     std::thread::spawn(move || lines.for_each(drop));
@@ -61,7 +61,7 @@ pub fn signal(process: &Child, signal: &str) {
 /// Ends a recording by a signal; what it printed.
 fn end(mut recorder: Child, by: &str) -> Value {
     signal(&recorder, by);
-    let status = recorder.wait_timeout(PATIENCE).unwrap().expect("it ends");
+    let status = recorder.wait_timeout(PATIENCE).unwrap().unwrap();
     assert!(status.success(), "{status}");
     serde_json::from_reader(recorder.stdout.take().unwrap()).unwrap()
 }
@@ -106,7 +106,7 @@ fn record_foreign(storage_and_more: &[&str], by: &str) -> Option<usize> {
     let mut lines = BufReader::new(peer.stdout.take().unwrap()).lines();
     assert_eq!(lines.next().unwrap().unwrap(), "matched");
     peer.stdin.take().unwrap().write_all(b"\n").unwrap();
-    let said = lines.next().expect("the peer has said all").unwrap();
+    let said = lines.next().unwrap().unwrap();
     let said: Value = serde_json::from_str(&said).unwrap();
     assert!(peer.wait().unwrap().success());
     let report = end(recorder, by);
@@ -182,13 +182,7 @@ fn a_recording_of_a_system_at_work_gives_the_same_map() {
     let folder = tempfile::tempdir().unwrap();
     let (recorder, mut nodes, mut player, bag, log) = record_system(folder.path(), "mcap");
     drop(player.stderr.take());
-    assert!(
-        player
-            .wait_timeout(PATIENCE)
-            .unwrap()
-            .expect("it ends")
-            .success()
-    );
+    assert!(player.wait_timeout(PATIENCE).unwrap().unwrap().success());
     signal(&nodes, "-TERM");
     nodes.wait().unwrap();
     let report = end(recorder, "-INT");
