@@ -19,6 +19,7 @@ pub mod lattice;
 pub mod lifecycle_msgs;
 pub mod nav_msgs;
 pub mod novatel_oem7_msgs;
+pub mod octomap_msgs;
 pub mod rcl_interfaces;
 mod registry;
 pub mod rmw_dds_common;
@@ -37,5 +38,5 @@ pub mod visualization_msgs;
 
 pub use action::RosAction;
 pub use interface::{RosMessage, RosService, Schema, dds_type_name};
-pub use registry::{MessageVisitor, visit_messages};
+pub use registry::{MessageVisitor, definition_of, visit_messages};
 pub use type_hash::{hash_of, schema_of, type_description, type_hash};

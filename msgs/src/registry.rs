@@ -3,9 +3,10 @@
 use crate::interface::RosMessage;
 use crate::{
     action, action_msgs, builtin_interfaces, calibration, diagnostic_msgs, geographic_msgs,
-    geometry_msgs, lattice, lifecycle_msgs, nav_msgs, novatel_oem7_msgs, rcl_interfaces,
-    rmw_dds_common, rosbag2_interfaces, rosgraph_msgs, sensor_msgs, std_msgs, std_srvs, tf2_msgs,
-    type_description_interfaces, unique_identifier_msgs, vision_msgs, visualization_msgs,
+    geometry_msgs, lattice, lifecycle_msgs, nav_msgs, novatel_oem7_msgs, octomap_msgs,
+    rcl_interfaces, rmw_dds_common, rosbag2_interfaces, rosgraph_msgs, sensor_msgs, std_msgs,
+    std_srvs, tf2_msgs, type_description_interfaces, unique_identifier_msgs, vision_msgs,
+    visualization_msgs,
 };
 
 /// Visitor of every message type; see [`visit_messages`].
@@ -31,6 +32,7 @@ pub fn visit_messages(visitor: &mut impl MessageVisitor) {
     lifecycle_msgs::visit_services(visitor);
     nav_msgs::visit_messages(visitor);
     novatel_oem7_msgs::visit_messages(visitor);
+    octomap_msgs::visit_services(visitor);
     rcl_interfaces::visit_messages(visitor);
     rcl_interfaces::visit_services(visitor);
     rmw_dds_common::visit_messages(visitor);
@@ -45,6 +47,21 @@ pub fn visit_messages(visitor: &mut impl MessageVisitor) {
     unique_identifier_msgs::visit_messages(visitor);
     vision_msgs::visit_messages(visitor);
     visualization_msgs::visit_messages(visitor);
+}
+
+/// Definition of a message of this crate with all that it depends on (`ros2msg` text).
+pub fn definition_of(ros_type: &str) -> Option<String> {
+    struct Find<'a>(&'a str, Option<String>);
+    impl MessageVisitor for Find<'_> {
+        fn visit<M: RosMessage>(&mut self) {
+            if self.0 == M::TYPE {
+                self.1 = Some(M::definition());
+            }
+        }
+    }
+    let mut find = Find(ros_type, None);
+    visit_messages(&mut find);
+    find.1
 }
 
 #[cfg(test)]

@@ -1,8 +1,8 @@
-//! Calls of a player of bags, as rosbag2 has them.
+//! Calls of a player and of a recorder of bags, as rosbag2 has them.
 
 use serde::{Deserialize, Serialize};
 
-use crate::builtin_interfaces::Time;
+use crate::builtin_interfaces::{Duration, Time};
 use crate::interface::services;
 
 services! {
@@ -17,6 +17,9 @@ services! {
     PlayNext: PlayNextRequest [], PlayNextResponse [];
     Burst: BurstRequest [], BurstResponse [];
     Seek: SeekRequest [Time], SeekResponse [];
+    Play: PlayRequest [Time, Duration], PlayResponse [];
+    SplitBagfile: SplitBagfileRequest [], SplitBagfileResponse [];
+    Snapshot: SnapshotRequest [], SnapshotResponse [];
 }
 
 /// States requests and responses without a field.
@@ -42,7 +45,10 @@ empty! {
     "Response of [`Stop`]." StopResponse,
     "Request of [`IsPaused`]." IsPausedRequest,
     "Request of [`GetRate`]." GetRateRequest,
-    "Request of [`PlayNext`]." PlayNextRequest
+    "Request of [`PlayNext`]." PlayNextRequest,
+    "Request of [`SplitBagfile`]." SplitBagfileRequest,
+    "Response of [`SplitBagfile`]." SplitBagfileResponse,
+    "Request of [`Snapshot`]." SnapshotRequest
 }
 
 /// Holds the log.
@@ -145,5 +151,42 @@ pub struct SeekRequest {
 #[derive(Clone, Debug, Default, PartialEq, Serialize, Deserialize)]
 pub struct SeekResponse {
     /// False: not a time of the log.
+    pub success: bool,
+}
+
+/// Plays a log that is not being played.
+#[derive(Clone, Copy, Debug)]
+pub struct Play;
+
+/// Request of [`Play`].
+#[derive(Clone, Debug, Default, PartialEq, Serialize, Deserialize)]
+pub struct PlayRequest {
+    /// Begin, from that of the log.
+    pub start_offset: Time,
+    /// Length; not above 0: to the end.
+    pub playback_duration: Duration,
+    /// Time of the log at which it ends; not above 0: at its end.
+    pub playback_until_timestamp: Time,
+}
+
+/// Response of [`Play`].
+#[derive(Clone, Debug, Default, PartialEq, Serialize, Deserialize)]
+pub struct PlayResponse {
+    /// False: it is being played already.
+    pub success: bool,
+}
+
+/// Goes on recording in a new storage file.
+#[derive(Clone, Copy, Debug)]
+pub struct SplitBagfile;
+
+/// Writes what a recorder of snapshots holds.
+#[derive(Clone, Copy, Debug)]
+pub struct Snapshot;
+
+/// Response of [`Snapshot`].
+#[derive(Clone, Debug, Default, PartialEq, Serialize, Deserialize)]
+pub struct SnapshotResponse {
+    /// False: this recorder takes none.
     pub success: bool,
 }

@@ -3,6 +3,8 @@
 
 #[cfg(feature = "bags")]
 pub mod bag_player;
+#[cfg(feature = "bags")]
+pub mod bag_recorder;
 pub mod compute;
 pub mod convert;
 pub mod enu_transformer;

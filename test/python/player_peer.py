@@ -28,6 +28,9 @@ SERVICES = {
     "set_rate": service("SetRate", {"rate": float64}, SUCCESS),
     "play_next": service("PlayNext", None, SUCCESS),
     "burst": service("Burst", {"num_messages": uint64}, {"actually_burst": uint64}),
+    "play": service(
+        "Play", {"start": ros.Time, "duration": ros.Duration, "until": ros.Time}, SUCCESS
+    ),
     "seek": service("Seek", {"time": ros.Time}, SUCCESS),
 }
 
@@ -95,6 +98,13 @@ def main():
     ask("resume")
     ask("is_paused")
     player.peer.until(lambda: player.times_ns[-1] > held_ns, lambda: "time stands")
+    ask("play", time(0), ros.Duration(0, 0), time(0))
+    ask("pause")
+    ask("play", time(3600 * 10**9), ros.Duration(0, 0), time(0))
+    ask("play", time(10**9), ros.Duration(2, 0), time(0))
+    player.peer.until(
+        lambda: player.times_ns[-1] < first_ns + 2 * 10**9, lambda: "time does not go back"
+    )
     ask("pause")
     ask("stop")
     print(json.dumps(said))

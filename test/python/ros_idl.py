@@ -220,12 +220,6 @@ GetResultResponse = ros(f"{CALIBRATE}_GetResult_Response", **ASKED, status=int8,
 FeedbackMessage = ros(f"{CALIBRATE}_FeedbackMessage", goal_id=UUID, feedback=Feedback)
 
 
-def service(name, request, response):
-    """Both halves of a service."""
-    halves = {"Request": request, "Response": response}
-    return [ros(f"{name}_{half}", **ASKED, **fields) for half, fields in halves.items()]
-
-
 RCL = "rcl_interfaces/msg"
 ParameterValue = ros(
     f"{RCL}/ParameterValue",

@@ -53,8 +53,8 @@ pub enum BagError {
         /// The reason, with line and column where known.
         reason: String,
     },
-    /// `metadata.yaml` points outside the bag.
-    #[error("{}: relative_file_paths names {entry:?}, which leaves the bag folder; such a bag is refused, correct the entry", path.display())]
+    /// `metadata.yaml` or a link points outside the bag.
+    #[error("{}: {entry:?} leads out of the bag folder; such a bag is refused: correct the entry, or put the file in place of the link", path.display())]
     PathTraversal { path: PathBuf, entry: String },
     /// Something is larger than the limits allow.
     #[error("{}: {what} at {position} takes {size_bytes} bytes, more than the limit of {limit_bytes}; {remedy}", path.display())]

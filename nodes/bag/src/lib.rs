@@ -29,4 +29,4 @@ pub use reader::{BagReader, ReadOptions};
 pub use recover::{Recovered, recover};
 use topic::MAX_MESSAGE_BYTES;
 pub use topic::{BagMessage, Storage, TopicInfo};
-pub use writer::{BagWriter, TopicSpec, WriterOptions};
+pub use writer::{BagWriter, Compression, TopicSpec, WriterOptions, replaceable};

@@ -43,8 +43,8 @@ impl Recovered {
 
 /// Writes what can be read of a bag as another one at `out`, which must not be there yet.
 ///
-/// Chunks of MCAP and rows of SQLite that are damaged are left out; of MCAP without a summary, and
-/// of SQLite whose pages are, what precedes the damage is read.
+/// Chunks of MCAP and rows of SQLite that are damaged are left out; of SQLite whose pages are, what precedes
+/// the damage is read.
 pub fn recover(bag: &Path, out: &Path) -> Result<Recovered, BagError> {
     let mut recovered = Recovered::default();
     let readers = readers(bag, &mut recovered)?;

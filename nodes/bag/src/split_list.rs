@@ -33,6 +33,7 @@ pub(crate) fn listed_splits(
         } else {
             file
         };
+        inside(folder, &file)?;
         // The first one is opened at once for the message definitions.
         let mut split = Split::new(file, !splits.is_empty())?;
         if split.open.is_none()
@@ -52,6 +53,7 @@ pub(crate) fn splits_in(folder: &Path) -> Result<Vec<Split>, BagError> {
     for entry in list(folder)? {
         let (file, name) = entry?;
         if is_storage(&name) {
+            inside(folder, &file)?;
             files.push(file);
         }
         too_many(folder, files.len())?;
@@ -68,6 +70,22 @@ pub(crate) fn splits_in(folder: &Path) -> Result<Vec<Split>, BagError> {
         .into_iter()
         .map(|file| Split::new(file, false))
         .collect()
+}
+
+/// Refuses a file that is a link out of the bag.
+fn inside(folder: &Path, file: &Path) -> Result<(), BagError> {
+    let real = |path: &Path| fs::canonicalize(path).map_err(BagError::io(path, "locate"));
+    if real(file)?.starts_with(real(folder)?) {
+        return Ok(());
+    }
+    Err(BagError::PathTraversal {
+        path: folder.to_path_buf(),
+        entry: file
+            .file_name()
+            .unwrap_or_default()
+            .to_string_lossy()
+            .into_owned(),
+    })
 }
 
 fn too_many(folder: &Path, files: usize) -> Result<(), BagError> {

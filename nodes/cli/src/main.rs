@@ -3,6 +3,7 @@
 #[cfg(feature = "bags")]
 mod bag;
 mod calibrate;
+mod health;
 #[cfg(feature = "lab")]
 mod lab;
 mod link;
@@ -10,6 +11,8 @@ mod map;
 mod node;
 mod progress;
 mod quantize;
+#[cfg(feature = "bags")]
+mod record;
 #[cfg(feature = "bags")]
 mod replay;
 mod run;
@@ -42,11 +45,16 @@ enum Command {
     View(view::View),
     /// Run one node
     Node(node::NodeCommand),
+    /// Fail unless nodes are at work and well, by their diagnostics; for health checks of containers
+    Health(health::Health),
     /// Make a link to this program for every node, by whose name it is that node
     Link(link::Link),
     /// Map a rosbag2 log: directly, or played through separate node processes
     #[cfg(feature = "bags")]
     Replay(replay::Replay),
+    /// Record topics of any type as a rosbag2 log
+    #[cfg(feature = "bags")]
+    Record(Box<record::Record>),
     /// Look after rosbag2 logs
     #[cfg(feature = "bags")]
     #[command(subcommand)]
@@ -87,9 +95,12 @@ impl Command {
             #[cfg(feature = "viewer")]
             Command::View(command) => command.run(),
             Command::Node(command) => command.run(),
+            Command::Health(command) => command.run(),
             Command::Link(command) => command.run(),
             #[cfg(feature = "bags")]
             Command::Replay(command) => command.run(),
+            #[cfg(feature = "bags")]
+            Command::Record(command) => command.run(),
             #[cfg(feature = "bags")]
             Command::Bag(command) => command.run(),
             Command::Quantize(command) => command.run(),

@@ -9,14 +9,19 @@ use futures::stream::BoxStream;
 
 use super::peers::Peers;
 use super::port::{EndpointId, PortEvent};
+use super::remote::RemotePublisher;
 use super::sync::lock;
 
 /// Events of endpoints that are not registered yet, kept at most.
 const MAX_EARLY_EVENTS: usize = 1024;
 
-/// Peers of all endpoints of a process.
+/// Publishers elsewhere that are remembered, at most.
+const MAX_REMOTES: usize = 8192;
+
+/// Peers of all endpoints of a process, and all publishers elsewhere.
 #[derive(Default)]
 pub(crate) struct Endpoints {
+    pub remotes: Remotes,
     inner: Mutex<Inner>,
 }
 
@@ -70,6 +75,7 @@ impl Endpoints {
                 peer,
                 policy,
             } => (endpoint, peer, Some(policy)),
+            PortEvent::Found { peer, publisher } => return self.remotes.add(peer, *publisher),
             PortEvent::Lost { peer: lost } => return self.lost(|peer| *peer == lost),
             PortEvent::ParticipantLost { any } => return self.lost(|peer| peer.is_beside(&any)),
             PortEvent::AllLost => return self.lost(|_| true),
@@ -92,6 +98,7 @@ impl Endpoints {
     }
 
     fn lost(&self, gone: impl Fn(&EndpointId) -> bool) {
+        self.remotes.remove(&gone);
         let mut inner = lock(&self.inner);
         inner.early.retain(|(_, change)| !gone(&change.peer));
         let all: Vec<Arc<Peers>> = inner.peers.values().filter_map(Weak::upgrade).collect();
@@ -109,9 +116,34 @@ fn apply(peers: &Peers, change: Change) {
     }
 }
 
+/// All publishers in other processes that are known.
+#[derive(Default)]
+pub(crate) struct Remotes(Mutex<BTreeMap<EndpointId, RemotePublisher>>);
+
+impl Remotes {
+    /// A publisher has been found, or tells of itself again.
+    pub(crate) fn add(&self, id: EndpointId, publisher: RemotePublisher) {
+        let mut all = lock(&self.0);
+        if all.len() < MAX_REMOTES || all.contains_key(&id) {
+            all.insert(id, publisher);
+        }
+    }
+
+    /// Publishers have gone.
+    pub(crate) fn remove(&self, gone: impl Fn(&EndpointId) -> bool) {
+        lock(&self.0).retain(|id, _| !gone(id));
+    }
+
+    /// Those that are there, in no order that means anything.
+    pub(crate) fn all(&self) -> Vec<RemotePublisher> {
+        lock(&self.0).values().cloned().collect()
+    }
+}
+
 #[cfg(test)]
 mod tests {
     use super::*;
+    use crate::qos::Qos;
 
     #[test]
     fn events_before_registration_are_kept_until_the_peer_goes() {
@@ -126,5 +158,21 @@ mod tests {
         assert_eq!(peers.count(), 1);
         endpoints.hear(PortEvent::ParticipantLost { any: peer });
         assert_eq!(peers.count(), 0);
+    }
+
+    #[test]
+    fn publishers_come_and_go() {
+        let remotes = Remotes::default();
+        let ids = [1, 2].map(|byte| EndpointId([byte; 16]));
+        let (name, offered) = (("rt/a", "a::msg::dds_::B_"), Qos::DEFAULT);
+        let offered = (offered.reliability, offered.durability);
+        let publisher = RemotePublisher::of(name, b"", offered).unwrap();
+        for id in ids {
+            remotes.add(id, publisher.clone());
+        }
+        remotes.add(ids[0], publisher);
+        assert_eq!(remotes.all().len(), 2);
+        remotes.remove(|id| *id == ids[0]);
+        assert_eq!(remotes.all().len(), 1);
     }
 }

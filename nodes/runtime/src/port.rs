@@ -11,6 +11,7 @@ use futures::stream::BoxStream;
 
 use super::error::RuntimeError;
 use super::qos::Qos;
+use super::remote::RemotePublisher;
 
 /// Buffer of a sample that writers share.
 pub(crate) use rustdds::bytes::Bytes;
@@ -73,7 +74,7 @@ pub(crate) const RELIABILITY_CONFLICT: &str =
 pub(crate) const DURABILITY_CONFLICT: &str =
     "durability (the subscription asks for transient_local, the publisher offers volatile)";
 
-/// A change of the other ends of our endpoints.
+/// A change of the other ends of our endpoints, or of what there is.
 #[derive(Clone, Debug)]
 pub(crate) enum PortEvent {
     /// An endpoint of ours and a peer have found each other.
@@ -86,6 +87,11 @@ pub(crate) enum PortEvent {
         endpoint: EndpointId,
         peer: EndpointId,
         policy: Cow<'static, str>,
+    },
+    /// There is a publisher, on any topic of ROS.
+    Found {
+        peer: EndpointId,
+        publisher: Box<RemotePublisher>,
     },
     /// A peer has gone.
     Lost { peer: EndpointId },

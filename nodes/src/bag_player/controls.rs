@@ -5,8 +5,9 @@ use std::time::Duration;
 
 use lattice_msgs::RosService;
 use lattice_msgs::rosbag2_interfaces::{
-    Burst, BurstResponse, GetRate, GetRateResponse, IsPaused, IsPausedResponse, Pause, PlayNext,
-    PlayNextResponse, Resume, Seek, SeekResponse, SetRate, SetRateResponse, Stop, TogglePaused,
+    Burst, BurstResponse, GetRate, GetRateResponse, IsPaused, IsPausedResponse, Pause, Play,
+    PlayNext, PlayNextResponse, PlayResponse, Resume, Seek, SeekResponse, SetRate, SetRateResponse,
+    Stop, TogglePaused,
 };
 use lattice_runtime::{Node, RuntimeError, Server};
 
@@ -47,6 +48,9 @@ impl Controls {
             })?,
             serve::<Burst>(to, "~/burst", |playback, request| BurstResponse {
                 actually_burst: playback.burst(request.num_messages),
+            })?,
+            serve::<Play>(to, "~/play", |playback, request| PlayResponse {
+                success: playback.play_part(&request),
             })?,
             serve::<Seek>(to, "~/seek", |playback, request| SeekResponse {
                 success: playback.seek(request.time.to_ns()),

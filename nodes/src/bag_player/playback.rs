@@ -5,6 +5,7 @@ use std::time::{Duration, Instant};
 
 use lattice_bag::{Player, Step};
 use lattice_msgs::builtin_interfaces::Time;
+use lattice_msgs::rosbag2_interfaces::PlayRequest;
 use lattice_msgs::rosgraph_msgs::Clock;
 use lattice_runtime::params::{ParamValue, Params};
 use lattice_runtime::{Publisher, RawPublisher, Shutdown};
@@ -211,6 +212,27 @@ impl Playback {
             log::error!("{error}");
             false
         })
+    }
+
+    /// Plays a log that is held from an offset on, for a time or until one; false where it is not held, and
+    /// for an offset behind its end.
+    pub(super) fn play_part(&mut self, part: &PlayRequest) -> bool {
+        if !self.head.is_held() {
+            return false;
+        }
+        let from_ns = self.span_ns.0.saturating_add(part.start_offset.to_ns());
+        let length_ns = part.playback_duration.to_ns();
+        let ends = [
+            (length_ns > 0).then(|| from_ns.saturating_add(length_ns)),
+            Some(part.playback_until_timestamp.to_ns()).filter(|until_ns| *until_ns > 0),
+        ];
+        let before_ns = self.player.end_at(ends.into_iter().flatten().min());
+        let found = self.seek(from_ns);
+        match found {
+            true => self.hold(false),
+            false => drop(self.player.end_at(before_ns)),
+        }
+        found
     }
 
     /// Plays the next messages of a log that is held, all for 0; how many there were.

@@ -9,6 +9,7 @@ mod free_space;
 mod map_folder;
 pub mod node;
 mod occupancy;
+mod octomap;
 mod operations;
 mod options;
 mod outputs;

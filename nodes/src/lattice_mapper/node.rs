@@ -13,6 +13,7 @@ use lattice_msgs::std_msgs::Empty;
 
 use super::autosave::Autosave;
 use super::map_folder::MapFolder;
+use super::octomap;
 use super::outputs::Outputs;
 use super::parameters::Settings;
 use super::services::{self, Call};
@@ -102,10 +103,21 @@ pub fn start(runtime: &Runtime, name: &str) -> Result<Finish, NodeError> {
         (true, "keyframe follows".into())
     })?;
     let services = inbox.clone();
-    let reset = node.service_trigger("~/reset", move || match services.send(Event::Reset, 0) {
-        true => (true, "map emptied".into()),
-        false => (false, "busy, ask again".into()),
-    })?;
+    let mut more = Vec::new();
+    match settings.octomap_services {
+        true => more.extend(octomap::serve(&node, &services, Event::Call, || {
+            Event::Reset
+        })?),
+        false => {
+            more.push(node.service_trigger(
+                "~/reset",
+                move || match services.send(Event::Reset, 0) {
+                    true => (true, "map emptied".into()),
+                    false => (false, "busy, ask again".into()),
+                },
+            )?)
+        }
+    }
     clouds.watch([&points]);
     inputs.watch([&points, &origins, &asked]);
     let calls = services::serve(&node, &inbox, Event::Call, maps, Arc::clone(&max_voxels))?;
@@ -131,7 +143,7 @@ pub fn start(runtime: &Runtime, name: &str) -> Result<Finish, NodeError> {
     Ok(Box::new(move || {
         drop((points, origins, asked));
         compute.finish_with(Event::Finish);
-        Box::new((request_keyframe, reset, calls))
+        Box::new((request_keyframe, more, calls))
     }))
 }
 

@@ -44,6 +44,7 @@ const ABOUT: &[About] = about! {
     "map_dir" fixed("it names outputs"): "Folder below which ~/save_map and ~/load_map take names of files; by default the one that the node was started in. Only maps are replaced.";
     "autosave_period_s": "Time between two saves of a map that changes, and at its end; 0: never.";
     "autosave_file" fixed("it names an output"): "File of these saves, below map_dir.";
+    "octomap_services" fixed("services are made with it"): "Whether ~/reset and ~/clear_bbox are as octomap_server has them (std_srvs/Empty, octomap_msgs/BoundingBoxQuery).";
     "resume" fixed("it is done at the start"): "Whether to go on from that file, if it is there, instead of beginning with an empty map.";
 };
 
@@ -59,6 +60,7 @@ pub(super) struct Settings {
     pub centers_period: Duration,
     /// Zero where there is no free space to publish.
     pub free_period: Duration,
+    pub octomap_services: bool,
     pub report_file: String,
 }
 
@@ -85,6 +87,7 @@ impl Settings {
             } else {
                 Duration::ZERO
             },
+            octomap_services: params.bool("octomap_services", false)?,
             report_file: report::file(params)?,
             mapper,
         })

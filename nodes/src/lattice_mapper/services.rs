@@ -11,6 +11,8 @@ use lattice_msgs::lattice::{
     QueryMap, QueryMapRequest, QueryMapResponse, SaveMap, SaveMapRequest, SaveMapResponse,
 };
 
+use lattice_msgs::octomap_msgs::BoundingBoxQueryResponse;
+
 use super::LatticeMapper;
 use super::map_folder::MapFolder;
 use crate::compute::Inbox;
@@ -25,6 +27,7 @@ pub(super) enum Call {
     /// With the map that was read.
     Load(Box<MapContents>, Reply<LoadMapResponse>),
     ClearBox(ClearBoxRequest, Reply<ClearBoxResponse>),
+    ClearBoundingBox(ClearBoxRequest, Reply<BoundingBoxQueryResponse>),
     Query(QueryMapRequest, Reply<QueryMapResponse>),
 }
 
@@ -125,6 +128,13 @@ pub(super) fn answer(
             Err(refusal) => reply.send(load_failed(refusal)),
         },
         Call::ClearBox(request, reply) => reply.send(machine.clear_box(&request)),
+        Call::ClearBoundingBox(request, reply) => {
+            let done = machine.clear_box(&request);
+            if !done.success {
+                log::warn!("a box is not cleared: {}", done.message);
+            }
+            reply.send(BoundingBoxQueryResponse::default());
+        }
         Call::Query(request, reply) => reply.send(machine.query(&request)),
     }
     done

@@ -4,6 +4,9 @@
 //! this file, so that it holds without a fuzzer too.
 #![allow(missing_docs)]
 
+pub mod read;
+pub mod received;
+
 use std::collections::BTreeMap;
 
 use lattice_core::cloud::Cloud;
@@ -243,8 +246,24 @@ fn detailed_maps() -> Vec<Vec<u8>> {
     files
 }
 
-/// Inputs to start from, by target.
-pub fn seeds() -> BTreeMap<&'static str, Vec<Vec<u8>>> {
+/// A target: its name, its body, and inputs to start from.
+pub type Target = (&'static str, fn(&[u8]), fn() -> Vec<Vec<u8>>);
+
+/// All targets.
+pub const TARGETS: [Target; 9] = [
+    ("map_file", map_file, || map_and_cloud_seeds().0),
+    ("insert", insert, || map_and_cloud_seeds().1),
+    ("message", received::message, received::message_seeds),
+    ("cloud", received::cloud, received::cloud_seeds),
+    ("follower", received::follower, received::follower_seeds),
+    ("params", read::params, read::params_seeds),
+    ("ros_args", read::ros_args, read::ros_args_seeds),
+    ("bag", read::bag, read::bag_seeds),
+    ("points", read::points, read::points_seeds),
+];
+
+/// Map files, and clouds to insert.
+fn map_and_cloud_seeds() -> (Vec<Vec<u8>>, Vec<Vec<u8>>) {
     let mut maps = detailed_maps();
     let mut clouds = Vec::new();
     for (number, kind) in (0_u8..).zip(LatticeKind::ALL) {
@@ -281,5 +300,5 @@ pub fn seeds() -> BTreeMap<&'static str, Vec<Vec<u8>>> {
         let far = [&[0][..], &1e300_f64.to_le_bytes()].concat();
         clouds.push([&[number, 30, 0, 0, 3, 3, 3][..], &far, &[3, 3, 0], &floats].concat());
     }
-    BTreeMap::from([("map_file", maps), ("insert", clouds)])
+    (maps, clouds)
 }

@@ -4,11 +4,11 @@ mod calibration;
 mod cloud;
 #[path = "../../fuzz/src/lib.rs"]
 mod fuzz;
+mod fuzz_seeds;
 mod geodesy;
 mod lattice_basis;
 mod lattice_properties;
 mod map_file;
-mod map_file_fuzz;
 mod pose;
 mod query;
 mod raycast;

@@ -3,8 +3,11 @@
 use std::sync::mpsc::channel;
 
 use futures::StreamExt;
+use lattice_msgs::octomap_msgs::{BoundingBoxQueryRequest, BoundingBoxQueryResponse};
 use lattice_msgs::rcl_interfaces::{GetParametersRequest, GetParametersResponse};
-use lattice_msgs::std_srvs::{Trigger, TriggerRequest, TriggerResponse};
+use lattice_msgs::std_srvs::{
+    EmptyRequest, EmptyResponse, Trigger, TriggerRequest, TriggerResponse,
+};
 use lattice_runtime::Runtime;
 use lattice_runtime::ros_args::RosArgs;
 use lattice_test::domain::TestDomain;
@@ -12,6 +15,7 @@ use ros2_client::qos::History;
 use ros2_client::{Message, Name, Node, NodeEvent, ServiceMapping, ServiceTypeName};
 
 use super::client::{Foreign, PATIENCE, insist, mappings, peer, reliable};
+use super::peer::{Nodes, params};
 
 const TRIGGER: (&str, &str) = ("std_srvs", "Trigger");
 
@@ -43,6 +47,29 @@ fn call<Q: Message + Clone + 'static, R: Message + 'static>(
         panic!("{service} did not answer to {mapping:?}");
     };
     smol::block_on(smol::future::or(answer, timeout))
+}
+
+#[test]
+fn clients_of_octomap_server_are_answered() {
+    let domain = TestDomain::take();
+    let mapper = ("lattice_mapper", params("octomap_services:=true"));
+    let nodes = Nodes::start(&domain, &[mapper]);
+    for mapping in mappings() {
+        let mut peer = peer(&domain);
+        for service in ["clear_bbox", "clear_bbx"] {
+            let (name, of) = (
+                format!("/lattice_mapper/{service}"),
+                ("octomap_msgs", "BoundingBoxQuery"),
+            );
+            let request = Foreign(BoundingBoxQueryRequest::default());
+            let _: Foreign<BoundingBoxQueryResponse> =
+                call(&mut peer, *mapping, &name, of, request);
+        }
+        let (request, of) = (Foreign(EmptyRequest::default()), ("std_srvs", "Empty"));
+        let _: Foreign<EmptyResponse> =
+            call(&mut peer, *mapping, "/lattice_mapper/reset", of, request);
+    }
+    nodes.finish();
 }
 
 #[test]

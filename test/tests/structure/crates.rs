@@ -34,7 +34,7 @@ const EDGES: [(&str, &str); 8] = [
 const NOT_ON_A_ROBOT: &str = "async-tungstenite base64 bzip2 fast-surface-nets httparse lattice_bag lattice_lab mcap obvhs \
                               plotters png rusqlite";
 
-fn cargo(arguments: &[&str]) -> String {
+pub fn cargo(arguments: &[&str]) -> String {
     let output = Command::new(env!("CARGO"))
         .args(arguments)
         .args(["--offline", "--locked"])

@@ -2,9 +2,11 @@
 
 mod crates;
 mod docs;
+mod launch;
 mod modules;
 mod params;
 mod source;
+mod supply;
 
 use std::path::Path;
 

@@ -16,12 +16,12 @@ const LAYERS: [(&str, &str); 3] = [
     (
         "nodes/src",
         "files convert stamps start report compute options map_follower enu_transformer lattice_mapper \
-         voxel_marker_publisher semantic_icp_server viewer_server replay running executables bag_player",
+         voxel_marker_publisher semantic_icp_server viewer_server replay running executables bag_player bag_recorder",
     ),
     (
         "nodes/runtime/src",
         "sync names param_value params_file ros_args params security env logging qos error shutdown \
-         task_thread timer clock diagnostics loopback_domain port confine dds cyclone peers gate endpoints outbox graph \
+         task_thread timer clock diagnostics loopback_domain remote port confine dds cyclone peers gate endpoints outbox graph \
          local_bus publisher subscription service rosout shared node param_services \
          logger_services type_description action tf lifecycle process",
     ),
@@ -178,6 +178,28 @@ fn every_public_module_of_the_core_has_a_user() {
             "no node and no command uses lattice_core::{}",
             path.join("::")
         );
+    }
+}
+
+/// Places that write files by other means than `WholeFile`: itself, and the writers of bags, whose files are
+/// read as far as they go.
+const WRITERS: [&str; 2] = ["nodes/src/files/whole.rs", "nodes/bag/src/writer/"];
+
+#[test]
+fn files_are_written_by_the_one_writer() {
+    for directory in ["lattice_core/src", "nodes"] {
+        for file in files(&root().join(directory)) {
+            let name = file.strip_prefix(root()).unwrap().display().to_string();
+            let is_test =
+                name.contains("/tests") || WRITERS.iter().any(|place| name.starts_with(place));
+            let code = code(&file).replace("WholeFile::create", "");
+            for writes in ["File::create", "fs::write("] {
+                assert!(
+                    is_test || !code.contains(writes),
+                    "{name}: {writes} is not WholeFile"
+                );
+            }
+        }
     }
 }
 

@@ -113,6 +113,20 @@ fn the_headset_has_a_map_with_labels() {
 }
 
 #[test]
+fn the_file_in_place_of_octomap_server_has_parameters_that_there_are() {
+    let names = [
+        "enu_transformer",
+        "octomap_server",
+        "voxel_marker_publisher",
+    ];
+    for ((_, declare), name) in PARAMETERS.iter().zip(names) {
+        let params = params("octomap_compat.yaml", &format!("/robot/{name}"));
+        declare(&params).unwrap();
+        assert_eq!(params.unused(), [""; 0], "{name}");
+    }
+}
+
+#[test]
 fn the_parameter_file_fits_the_simulated_loader() {
     let params = params("bobcat.yaml", "/enu_transformer");
     let options = TransformerOptions::from_params(&params).unwrap();

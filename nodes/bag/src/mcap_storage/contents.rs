@@ -7,6 +7,7 @@ use std::{
 
 use mcap::records::{Channel, Record};
 
+use super::lengths::parse_record;
 use crate::{
     BagError, TopicInfo,
     storage::{StorageInfo, TopicIndex, full_type_name, lenient_qos, merge_topic},
@@ -25,6 +26,8 @@ pub(super) struct Block {
     pub end_ns: u64,
     /// The channels inside, where known.
     pub channels: Option<Box<[u16]>>,
+    /// True behind damage.
+    pub behind: bool,
 }
 
 struct Schema {
@@ -69,7 +72,7 @@ pub(super) struct Contents {
 impl Contents {
     /// Takes a schema or channel record; the error is a reason.
     pub(super) fn take(&mut self, opcode: u8, body: &[u8]) -> Result<(), String> {
-        match mcap::parse_record(opcode, body).map_err(|e| e.to_string())? {
+        match parse_record(opcode, body)? {
             Record::Schema { header, data } => {
                 let text = String::from_utf8_lossy(&data).into_owned();
                 let schema = Schema {

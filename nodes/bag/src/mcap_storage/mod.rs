@@ -1,7 +1,9 @@
 //! MCAP storage files: summary where there is one, a scan of the whole file where not.
 
 mod contents;
+mod lengths;
 mod records;
+mod resume;
 mod scan;
 mod stream;
 mod summary;
@@ -22,6 +24,7 @@ use super::{
     storage::{Filter, StorageInfo, StorageStream},
 };
 use contents::Block;
+use lengths::parse_record;
 use records::{Cause, Place, RecordError, first_record};
 use stream::McapStream;
 
@@ -84,7 +87,7 @@ fn read_profile(file: &mut File, path: &Path, size: u64) -> Result<String, BagEr
     let first = first_record(file, at, size).map_err(|error| error.in_file(path, size, 0))?;
     let place = Place::in_file(at);
     let error = match &first {
-        Some((op::HEADER, body)) => match mcap::parse_record(op::HEADER, body) {
+        Some((op::HEADER, body)) => match parse_record(op::HEADER, body) {
             Ok(Record::Header(header)) => return Ok(header.profile),
             Ok(_) => RecordError::bad(place, "no header record"),
             Err(error) => RecordError::bad(place, error),

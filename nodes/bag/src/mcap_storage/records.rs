@@ -14,6 +14,7 @@ use mcap::{
     sans_io::{LinearReadEvent, LinearReader, LinearReaderOptions},
 };
 
+use super::lengths::parse_record;
 use crate::{BagError, MAX_MESSAGE_BYTES};
 
 /// Opcode and length of a record, bytes.
@@ -25,7 +26,7 @@ const MAX_CHUNK_RECORD_BYTES: u64 = MAX_MESSAGE_BYTES + 22;
 /// Bytes that one of a compressed chunk can become at most: zstd repeats a byte 128 KiB long in 4.
 const MAX_CHUNK_RATIO: u64 = 1 << 15;
 /// A chunk's record without the name of its compression and its content, bytes.
-const CHUNK_HEADER_BYTES: usize = 40;
+pub(super) const CHUNK_HEADER_BYTES: usize = 40;
 /// Bytes asked of a file at once; memory grows by what is there, not by what a record claims.
 const READ_BYTES: usize = 1 << 16;
 
@@ -148,7 +149,7 @@ pub(super) fn visit_chunk(
     body: &[u8],
     visit: &mut VisitInChunk<'_>,
 ) -> Result<ChunkHeader, RecordError> {
-    let header = match mcap::parse_record(op::CHUNK, body) {
+    let header = match parse_record(op::CHUNK, body) {
         Ok(Record::Chunk { header, .. }) => header,
         Ok(_) => return Err(RecordError::bad(Place::in_file(byte), "no chunk record")),
         Err(error) => return Err(RecordError::bad(Place::in_file(byte), error)),
@@ -215,7 +216,7 @@ pub(super) fn parse_message(
     place: Place,
     body: &[u8],
 ) -> Result<(MessageHeader, &[u8]), RecordError> {
-    let parsed = mcap::parse_record(op::MESSAGE, body);
+    let parsed = parse_record(op::MESSAGE, body);
     match parsed.map_err(|error| RecordError::bad(place, error))? {
         Record::Message {
             header,

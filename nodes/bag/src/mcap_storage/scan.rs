@@ -13,19 +13,27 @@ use mcap::{records::op, sans_io::LinearReaderOptions};
 use super::{
     contents::{Block, Contents, Seen},
     records::{Place, RECORD_HEADER_BYTES, RecordError, parse_message, visit_chunk, visit_records},
+    resume::next_chunk,
 };
 use crate::{BagError, sniff::MCAP_MAGIC};
 
 /// Messages outside of chunks are read in runs of about this many bytes.
 const RUN_BYTES: u64 = 1 << 20;
 
-/// Everything up to the end of the data or the first damage, which the contents then carry.
+/// Damages after which sound chunks are looked for, at most.
+const MAX_DAMAGES: usize = 1000;
+
+/// Everything up to the end of the data or the first damage, which the contents then carry; behind it only
+/// the blocks, not counted.
 pub(super) fn scan(file: &mut File, path: &Path, size: u64) -> Contents {
     let mut scan = Scan::default();
-    let ended = scan.records(file, size);
+    let ended = scan.records(file, MCAP_MAGIC.len() as u64, size);
     scan.end_run();
+    let readable_messages = scan.contents.seen.messages;
+    if let Err(error) = &ended {
+        scan.go_on(file, error.place.byte, size);
+    }
     let mut contents = scan.contents;
-    let readable_messages = contents.seen.messages;
     contents.damage = match ended {
         Ok(ControlFlow::Break(())) => None,
         Ok(ControlFlow::Continue(())) => Some(BagError::Truncated {
@@ -44,12 +52,35 @@ struct Scan {
     contents: Contents,
     /// Messages outside of chunks that are not yet a block.
     run: Option<(Block, BTreeSet<u16>)>,
+    /// True behind damage.
+    behind: bool,
 }
 
 impl Scan {
-    /// Breaks at the end of the data section.
-    fn records(&mut self, file: &mut File, size: u64) -> Result<ControlFlow<()>, RecordError> {
-        let start = MCAP_MAGIC.len() as u64;
+    /// Takes the sound chunks behind damage at a byte, and what follows them.
+    fn go_on(&mut self, file: &mut File, damaged: u64, size: u64) {
+        self.behind = true;
+        let mut damaged = damaged;
+        for _ in 0..MAX_DAMAGES {
+            let Ok(Some(chunk)) = next_chunk(file, damaged.saturating_add(1), size) else {
+                return;
+            };
+            let ended = self.records(file, chunk, size);
+            self.end_run();
+            match ended {
+                Ok(_) => return,
+                Err(error) => damaged = error.place.byte,
+            }
+        }
+    }
+
+    /// Takes the records from byte `start` on; breaks at the end of the data section.
+    fn records(
+        &mut self,
+        file: &mut File,
+        start: u64,
+        size: u64,
+    ) -> Result<ControlFlow<()>, RecordError> {
         file.seek(SeekFrom::Start(start))
             .map_err(|error| RecordError::bad(Place::in_file(start), error))?;
         let range = (start, size.saturating_sub(start));
@@ -100,6 +131,7 @@ impl Scan {
             start_ns: header.message_start_time,
             end_ns: header.message_end_time,
             channels: None,
+            behind: self.behind,
         };
         for (channel, (place, _)) in &seen {
             self.expect_channel(*place, *channel)?;
@@ -130,6 +162,7 @@ impl Scan {
                 start_ns: log_time_ns,
                 end_ns: log_time_ns,
                 channels: None,
+                behind: self.behind,
             };
             (block, BTreeSet::new())
         });
@@ -166,6 +199,9 @@ impl Scan {
     }
 
     fn count(&mut self, channel: u16, seen: Seen) {
+        if self.behind {
+            return;
+        }
         *self.contents.counts.entry(channel).or_default() += seen.messages;
         self.contents.seen.add(seen);
     }

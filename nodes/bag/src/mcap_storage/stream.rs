@@ -62,7 +62,8 @@ impl McapStream {
                     .any(|id| topic_of.get(id).is_none_or(|t| filter.wants_topic(*t)))
             });
             // Empty chunks may carry a reversed range.
-            has_topic && filter.overlaps((clamp(block.start_ns), clamp(block.end_ns)))
+            let is_meant = filter.past_damage || !block.behind;
+            is_meant && has_topic && filter.overlaps((clamp(block.start_ns), clamp(block.end_ns)))
         };
         let mut blocks: Vec<Block> = file.blocks.iter().filter(is_wanted).cloned().collect();
         blocks.sort_by_key(|block| (block.start_ns, block.offset));

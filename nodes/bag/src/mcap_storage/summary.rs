@@ -13,6 +13,7 @@ use mcap::{
 
 use super::{
     contents::{Block, Contents, Seen},
+    lengths::parse_record,
     records::{Cause, RECORD_HEADER_BYTES, RecordError, first_record, visit_records},
 };
 
@@ -64,7 +65,7 @@ fn summary_start(file: &mut File, size: u64) -> Result<u64, String> {
         .checked_sub(TAIL_BYTES)
         .ok_or("it is shorter than a footer")?;
     let start = match first_record(file, tail, size) {
-        Ok(Some((op::FOOTER, body))) => match mcap::parse_record(op::FOOTER, &body) {
+        Ok(Some((op::FOOTER, body))) => match parse_record(op::FOOTER, &body) {
             Ok(Record::Footer(footer)) => footer.summary_start,
             _ => return Err("its footer cannot be read".into()),
         },
@@ -116,13 +117,11 @@ impl Found {
         // Attachments are left out on purpose: nothing of them is used.
         match opcode {
             op::SCHEMA | op::CHANNEL => self.contents.take(opcode, body)?,
-            op::CHUNK_INDEX | op::STATISTICS => {
-                match mcap::parse_record(opcode, body).map_err(|e| e.to_string())? {
-                    Record::Statistics(statistics) => self.statistics = Some(statistics),
-                    Record::ChunkIndex(index) => self.chunks.push(index),
-                    _ => {}
-                }
-            }
+            op::CHUNK_INDEX | op::STATISTICS => match parse_record(opcode, body)? {
+                Record::Statistics(statistics) => self.statistics = Some(statistics),
+                Record::ChunkIndex(index) => self.chunks.push(index),
+                _ => {}
+            },
             _ => {}
         }
         Ok(())
@@ -145,5 +144,6 @@ fn block(chunk: ChunkIndex, data_end: u64) -> Result<Block, String> {
         start_ns: chunk.message_start_time,
         end_ns: chunk.message_end_time,
         channels: (!channels.is_empty()).then(|| channels.into_keys().collect()),
+        behind: false,
     })
 }

@@ -187,6 +187,12 @@ impl Player {
         Ok(is_played)
     }
 
+    /// Plays nothing of the bag from a time on, or all of it; counts from the next seek on. Gives the end
+    /// that was.
+    pub fn end_at(&mut self, end_ns: Option<i64>) -> Option<i64> {
+        std::mem::replace(&mut self.end_ns, end_ns)
+    }
+
     /// The next message, index of its topic and data, ahead of its time: the bag's time jumps there.
     /// None: nothing is left.
     pub fn skip_to_next(&mut self, now_ns: i64) -> Result<Option<(usize, Vec<u8>)>, BagError> {

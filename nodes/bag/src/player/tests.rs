@@ -14,7 +14,10 @@ const T0_NS: i64 = 1_700_000_000 * S;
 /// Messages at these whole seconds, on topics named with '!' for latched.
 fn bag(folder: &Path, messages: &[(&str, i64)]) -> BagReader {
     let path = folder.join("bag");
-    let options = WriterOptions { overwrite: true };
+    let options = WriterOptions {
+        overwrite: true,
+        ..WriterOptions::default()
+    };
     let mut writer = BagWriter::create(&path, Storage::Mcap, options).unwrap();
     let mut names: Vec<&str> = messages.iter().map(|(name, _)| *name).collect();
     names.sort_unstable();

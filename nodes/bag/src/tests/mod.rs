@@ -52,7 +52,10 @@ fn write(
     count: i64,
     first: i64,
 ) -> Vec<BagMessage> {
-    let options = WriterOptions { overwrite: true };
+    let options = WriterOptions {
+        overwrite: true,
+        ..WriterOptions::default()
+    };
     let mut writer = BagWriter::create(folder, storage, options).unwrap();
     writer.add_topic(spec("/a", false)).unwrap();
     writer.add_topic(spec("/b", false)).unwrap();
@@ -262,8 +265,15 @@ fn only_bags_are_overwritten() {
     let folder = tempfile::tempdir().unwrap();
     let bag = folder.path().join("bag");
     let create = |path: &Path, overwrite| {
-        BagWriter::create(path, Storage::Sqlite3, WriterOptions { overwrite })
-            .and_then(BagWriter::finish)
+        BagWriter::create(
+            path,
+            Storage::Sqlite3,
+            WriterOptions {
+                overwrite,
+                ..WriterOptions::default()
+            },
+        )
+        .and_then(BagWriter::finish)
     };
     let refused = |path: &Path, overwrite| match create(path, overwrite) {
         Err(error @ BagError::Exists { .. }) => error.to_string(),

@@ -127,3 +127,64 @@ fn many_channels_are_read() {
     // A minute, while each was compared with all.
     assert_eq!(read(&path).unwrap().len(), 32_000);
 }
+
+#[test]
+fn sound_chunks_behind_damage_are_found_without_an_index() {
+    let folder = tempfile::tempdir().unwrap();
+    let options = mcap::WriteOptions::new().compression(None);
+    let (path, written) = write_foreign(folder.path(), options, "cdr");
+    let whole = fs::read(&path).unwrap();
+    let needle = &written[6].data[50..80];
+    let place = whole
+        .windows(30)
+        .position(|window| window == needle)
+        .unwrap();
+    // Without its summary, and with a bit of a message or the length of a chunk in the middle wrong.
+    let end = whole
+        .windows(9)
+        .rposition(|w| w == [15, 4, 0, 0, 0, 0, 0, 0, 0])
+        .unwrap();
+    let chunk = whole[..place].windows(9).rposition(|w| {
+        let bytes = u64::from_le_bytes(w[1..].try_into().unwrap());
+        w[0] == 6 && bytes > 40 && bytes < whole.len() as u64
+    });
+    let chunk = chunk.unwrap();
+    for (number, at) in [place, chunk + 3].into_iter().enumerate() {
+        let mut bytes = whole[..end].to_vec();
+        bytes[at] ^= 0x50;
+        fs::write(&path, &bytes).unwrap();
+        let (before, error) = read_some(&path);
+        assert!(error.is_some());
+        let out = folder.path().join(format!("sound{number}"));
+        let recovered = recover(&path, &out).unwrap();
+        let sound = read(&out).unwrap();
+        assert!(sound.len() > before.len(), "{recovered:?}");
+        assert!((9..12).contains(&sound.len()), "{}", sound.len());
+        assert!(sound.iter().all(|message| written.contains(message)));
+        assert_eq!(sound.last(), written.last());
+        assert_eq!(recovered.damages, 1, "{:?}", recovered.told);
+    }
+}
+
+#[cfg(unix)]
+#[test]
+fn links_out_of_a_bag_are_refused() {
+    use std::os::unix::fs::symlink;
+    let folder = tempfile::tempdir().unwrap();
+    let bag = folder.path().join("bag");
+    let written = write(&bag, Storage::Mcap, Packing::None, 10, 0);
+    let (file, outside) = (storage_file(&bag), folder.path().join("outside.mcap"));
+    fs::rename(&file, &outside).unwrap();
+    symlink(&outside, &file).unwrap();
+    let refused = |found: Result<_, BagError>| matches!(found, Err(BagError::PathTraversal { .. }));
+    assert!(refused(read(&bag)));
+    fs::remove_file(bag.join("metadata.yaml")).unwrap();
+    assert!(refused(read(&bag)));
+    // A link inside, or to the whole bag, is none.
+    fs::remove_file(&file).unwrap();
+    fs::rename(&outside, bag.join("real")).unwrap();
+    symlink("real", &file).unwrap();
+    let link = folder.path().join("link");
+    symlink(&bag, &link).unwrap();
+    assert_eq!(read(&link).unwrap(), written);
+}

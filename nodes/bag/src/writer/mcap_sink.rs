@@ -26,6 +26,8 @@ impl McapSink {
             .profile("ros2")
             .library(concat!("lattice ", env!("CARGO_PKG_VERSION")))
             .compression(None)
+            // Chunks go to the file whole: a process that is killed leaves none that ends early.
+            .disable_seeking(true)
             .create(BufWriter::new(file))?;
         Ok(McapSink {
             writer,
@@ -61,6 +63,10 @@ impl Sink for McapSink {
         };
         *sequence = sequence.wrapping_add(1);
         Ok(self.writer.write_to_known_channel(&header, data)?)
+    }
+
+    fn flush(&mut self) -> Result<(), SinkError> {
+        Ok(self.writer.flush()?)
     }
 
     fn finish(mut self: Box<Self>, metadata: &str) -> Result<(), SinkError> {

@@ -1,27 +1,26 @@
 //! Writer of rosbag2 directories: metadata version 9, message definitions embedded.
 
 mod mcap_sink;
+mod parts;
+mod place;
 mod sqlite_sink;
 
 use std::{
     collections::HashSet,
     error::Error,
-    fs::{self, File},
+    fs,
     io::{self, Write},
     path::{Path, PathBuf},
 };
 
 use super::{
     BagError, BagQos, MAX_MESSAGE_BYTES, Storage, TopicInfo,
-    metadata::{
-        CountedTopic, EMPTY_START_NS, FileInformation, METADATA_VERSION, Metadata, Nanoseconds,
-        StartingTime, TopicMetadata,
-    },
-    split_list::{is_storage, list},
+    metadata::{CountedTopic, FileInformation, METADATA_VERSION, Metadata, TopicMetadata},
 };
 use mcap::McapError;
-use mcap_sink::McapSink;
-use sqlite_sink::SqliteSink;
+use parts::{Part, Written, ZSTD_LEVEL, described};
+use place::make_way;
+pub use place::replaceable;
 
 /// Name of the distribution in the metadata.
 const ROS_DISTRO: &str = "lattice";
@@ -33,6 +32,24 @@ const ENCAPSULATION_BYTES: usize = 4;
 pub struct WriterOptions {
     /// Replaces a bag at the same path.
     pub overwrite: bool,
+    /// A new storage file begins when one holds so many bytes of messages.
+    pub max_file_bytes: Option<u64>,
+    /// A new storage file begins when the messages of one span so long, ns.
+    pub max_file_ns: Option<i64>,
+    /// Compression with zstd.
+    pub compression: Compression,
+}
+
+/// Compression of a bag being written.
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
+pub enum Compression {
+    /// None.
+    #[default]
+    None,
+    /// Each message.
+    Messages,
+    /// Each storage file, when it is complete.
+    Files,
 }
 
 /// A topic to write.
@@ -56,6 +73,8 @@ type SinkError = Box<dyn Error + Send + Sync>;
 trait Sink: Send {
     fn add_topic(&mut self, topic: &TopicInfo, qos: &str) -> Result<(), SinkError>;
     fn write(&mut self, topic: usize, log_time_ns: i64, data: &[u8]) -> Result<(), SinkError>;
+    /// Hands everything so far to the system, so that it outlives the process.
+    fn flush(&mut self) -> Result<(), SinkError>;
     fn finish(self: Box<Self>, metadata: &str) -> Result<(), SinkError>;
 }
 
@@ -72,13 +91,14 @@ fn failed(path: &Path, doing: &'static str) -> impl FnOnce(SinkError) -> BagErro
 /// A bag being written. Without [`BagWriter::finish`] it lacks `metadata.yaml`.
 pub struct BagWriter {
     folder: PathBuf,
-    file: PathBuf,
     storage: Storage,
-    sink: Box<dyn Sink>,
+    options: WriterOptions,
+    part: Part,
+    /// Storage files that are complete.
+    finished: Vec<FileInformation>,
     topics: Vec<TopicInfo>,
     names: HashSet<String>,
-    message_count: u64,
-    range_ns: Option<(i64, i64)>,
+    written: Written,
 }
 
 impl BagWriter {
@@ -88,36 +108,21 @@ impl BagWriter {
         storage: Storage,
         options: WriterOptions,
     ) -> Result<BagWriter, BagError> {
-        let name = path.file_name().ok_or_else(|| {
+        path.file_name().ok_or_else(|| {
             let reason = format!("{} does not end in the name of a folder", path.display());
             BagError::invalid("path", reason)
         })?;
         make_way(path, options.overwrite)?;
         fs::create_dir_all(path).map_err(BagError::io(path, "create"))?;
-        let file = path.join(format!(
-            "{}_0.{}",
-            name.to_string_lossy(),
-            storage.extension()
-        ));
-        let created = File::create_new(&file).map_err(BagError::io(&file, "create"))?;
-        let sink: Result<Box<dyn Sink>, SinkError> = match storage {
-            Storage::Mcap => McapSink::create(created).map(|sink| Box::new(sink) as _),
-            Storage::Sqlite3 => {
-                // Closing it later would drop the locks that SQLite takes on the file.
-                drop(created);
-                SqliteSink::create(&file).map(|sink| Box::new(sink) as _)
-            }
-        };
-        let sink = sink.map_err(failed(&file, "create"))?;
         Ok(BagWriter {
             folder: path.to_path_buf(),
-            file,
+            part: Part::create(path, storage, 0)?,
             storage,
-            sink,
+            options,
+            finished: Vec::new(),
             topics: Vec::new(),
             names: HashSet::new(),
-            message_count: 0,
-            range_ns: None,
+            written: Written::default(),
         })
     }
 
@@ -149,10 +154,7 @@ impl BagWriter {
             definition: topic.definition,
             message_count: 0,
         };
-        let qos =
-            BagQos::to_text(&info.offered_qos).map_err(|e| BagError::invalid("offered_qos", e))?;
-        let added = self.sink.add_topic(&info, &qos);
-        added.map_err(failed(&self.file, "add a topic to"))?;
+        announce(&mut self.part, &info)?;
         self.names.insert(info.name.clone());
         self.topics.push(info);
         Ok(self.topics.len() - 1)
@@ -183,31 +185,82 @@ impl BagWriter {
                 ),
             );
         }
-        let written = self.sink.write(topic, log_time_ns, cdr);
-        written.map_err(failed(&self.file, "write"))?;
         info.message_count += 1;
-        self.message_count += 1;
-        let (first_ns, last_ns) = self.range_ns.unwrap_or((log_time_ns, log_time_ns));
-        self.range_ns = Some((first_ns.min(log_time_ns), last_ns.max(log_time_ns)));
+        if self.is_full(log_time_ns) {
+            self.split()?;
+        }
+        let written = match self.options.compression {
+            Compression::Messages => zstd::encode_all(cdr, ZSTD_LEVEL)
+                .map_err(Into::into)
+                .and_then(|packed| self.part.sink.write(topic, log_time_ns, &packed)),
+            _ => self.part.sink.write(topic, log_time_ns, cdr),
+        };
+        written.map_err(failed(&self.part.file, "write"))?;
+        self.part.written.add(log_time_ns, size);
+        self.written.add(log_time_ns, size);
         Ok(())
+    }
+
+    /// True if a message of this time belongs into the next storage file.
+    fn is_full(&self, log_time_ns: i64) -> bool {
+        let (options, part) = (&self.options, &self.part.written);
+        let most_bytes = options.max_file_bytes.unwrap_or(u64::MAX);
+        let most_ns = options.max_file_ns.unwrap_or(i64::MAX);
+        part.messages > 0 && (part.bytes >= most_bytes || part.span_with(log_time_ns) > most_ns)
+    }
+
+    /// Completes the storage file and begins the next one.
+    pub fn split(&mut self) -> Result<(), BagError> {
+        let embedded = self.embedded()?;
+        let mut next = Part::create(&self.folder, self.storage, self.finished.len() + 1)?;
+        for topic in &self.topics {
+            announce(&mut next, topic)?;
+        }
+        let full = std::mem::replace(&mut self.part, next);
+        let described = full.finish(&embedded, self.options.compression)?;
+        self.finished.push(described);
+        Ok(())
+    }
+
+    /// Hands everything so far to the system: a killed process loses only what came after.
+    pub fn flush(&mut self) -> Result<(), BagError> {
+        let flushed = self.part.sink.flush();
+        flushed.map_err(failed(&self.part.file, "write"))
+    }
+
+    fn embedded(&self) -> Result<String, BagError> {
+        let text = self.metadata(&self.open_part()).to_embedded_text();
+        text.map_err(|e| BagError::invalid("metadata", e))
+    }
+
+    fn open_part(&self) -> FileInformation {
+        described(&self.part.file, &self.part.written)
     }
 
     /// Completes the storage file and writes `metadata.yaml`.
     pub fn finish(self) -> Result<(), BagError> {
-        let metadata = self.metadata();
-        let unfit = |e: serde_yaml::Error| BagError::invalid("metadata", e);
-        let embedded = metadata.to_embedded_text().map_err(unfit)?;
-        let text = metadata.to_text().map_err(unfit)?;
-        let finished = self.sink.finish(&embedded);
-        finished.map_err(failed(&self.file, "finish"))?;
+        let embedded = self.embedded()?;
+        let mut metadata = self.metadata(&self.open_part());
         // The messages first, then whole metadata: a crash leaves neither without the other.
+        let last = self.part.finish(&embedded, self.options.compression)?;
+        if let Some(path) = metadata.relative_file_paths.last_mut() {
+            path.clone_from(&last.path);
+        }
+        if let Some(file) = metadata.files.last_mut() {
+            *file = last;
+        }
+        let text = metadata.to_text();
+        let text = text.map_err(|e| BagError::invalid("metadata", e))?;
         let path = self.folder.join("metadata.yaml");
+        let storage = metadata
+            .relative_file_paths
+            .last()
+            .map(|name| self.folder.join(name));
         let write = || -> io::Result<()> {
-            File::open(&self.file)?.sync_all()?;
             let mut unfinished = tempfile::NamedTempFile::new_in(&self.folder)?;
             unfinished.write_all(text.as_bytes())?;
             unfinished.as_file().sync_all()?;
-            let readable = fs::metadata(&self.file)?.permissions();
+            let readable = fs::metadata(storage.unwrap_or_default())?.permissions();
             unfinished.as_file().set_permissions(readable)?;
             unfinished
                 .persist(&path)
@@ -217,16 +270,10 @@ impl BagWriter {
         write().map_err(BagError::io(&path, "write"))
     }
 
-    fn metadata(&self) -> Metadata {
-        let file_name = self.file.file_name().unwrap_or_default();
-        let name = file_name.to_string_lossy().into_owned();
-        let (first_ns, last_ns) = self.range_ns.unwrap_or((EMPTY_START_NS, EMPTY_START_NS));
-        let starting_time = StartingTime {
-            nanoseconds_since_epoch: first_ns,
-        };
-        let duration = Nanoseconds {
-            nanoseconds: last_ns.saturating_sub(first_ns),
-        };
+    /// The metadata with the storage file that is open.
+    fn metadata(&self, open: &FileInformation) -> Metadata {
+        let (starting_time, duration) = self.written.times();
+        let files: Vec<_> = self.finished.iter().chain([open]).cloned().collect();
         let counted = |topic: &TopicInfo| CountedTopic {
             topic_metadata: TopicMetadata {
                 name: topic.name.clone(),
@@ -242,62 +289,39 @@ impl BagWriter {
             storage_identifier: self.storage.identifier().into(),
             duration,
             starting_time,
-            message_count: self.message_count,
+            message_count: self.written.messages,
             topics_with_message_count: self.topics.iter().map(counted).collect(),
-            relative_file_paths: vec![name.clone()],
-            files: vec![FileInformation {
-                path: name,
-                starting_time,
-                duration,
-                message_count: self.message_count,
-            }],
+            compression_format: match self.options.compression {
+                Compression::None => String::new(),
+                _ => "zstd".into(),
+            },
+            compression_mode: match self.options.compression {
+                Compression::None => "",
+                Compression::Messages => "MESSAGE",
+                Compression::Files => "FILE",
+            }
+            .into(),
+            relative_file_paths: files.iter().map(|file| file.path.clone()).collect(),
+            files,
             ros_distro: ROS_DISTRO,
             ..Metadata::default()
         }
     }
 }
 
-/// Removes a bag at `path` if that is wanted; anything else there is kept and refused.
-fn make_way(path: &Path, overwrite: bool) -> Result<(), BagError> {
-    let refuse = |why: String, or_overwrite| {
-        Err(BagError::Exists {
-            path: path.to_path_buf(),
-            why,
-            or_overwrite,
-        })
-    };
-    if !path.exists() {
-        return Ok(());
-    }
-    if !path.is_dir() {
-        return refuse(" and is not a folder".into(), "");
-    }
-    let endings = [".db3-wal", ".db3-shm", ".db3-journal"];
-    let is_ours = |name: &str| {
-        name == "metadata.yaml"
-            || is_storage(name)
-            || endings.iter().any(|ending| name.ends_with(ending))
-    };
-    let mut files = Vec::new();
-    for entry in list(path)? {
-        let (file, name) = entry?;
-        if !is_ours(&name) || file.is_dir() {
-            let why = format!(" and holds {name:?}, which is no part of a bag");
-            return refuse(why, "");
-        }
-        files.push(file);
-    }
-    if !files.is_empty() && !overwrite {
-        return refuse(String::new(), " or allow to overwrite");
-    }
-    files
-        .iter()
-        .try_for_each(|file| fs::remove_file(file).map_err(BagError::io(file, "remove")))
+/// Adds a topic to a storage file.
+fn announce(part: &mut Part, topic: &TopicInfo) -> Result<(), BagError> {
+    let qos = BagQos::to_text(&topic.offered_qos);
+    let qos = qos.map_err(|e| BagError::invalid("offered_qos", e))?;
+    let added = part.sink.add_topic(topic, &qos);
+    added.map_err(failed(&part.file, "add a topic to"))
 }
 
 #[cfg(test)]
 mod tests {
+    use super::mcap_sink::McapSink;
     use super::*;
+    use std::fs::File;
 
     #[test]
     fn a_full_disk_is_named() {

@@ -11,8 +11,8 @@ use crate::{TopicInfo, metadata::METADATA_VERSION, storage::definition_encoding}
 const TRANSACTION_BYTES: usize = 32 << 20;
 
 const TABLES: &str = "
-    PRAGMA journal_mode = MEMORY;
-    PRAGMA synchronous = OFF;
+    PRAGMA journal_mode = WAL;
+    PRAGMA synchronous = NORMAL;
     BEGIN;
     CREATE TABLE schema(schema_version INTEGER PRIMARY KEY, ros_distro TEXT NOT NULL);
     CREATE TABLE metadata(
@@ -77,19 +77,25 @@ impl Sink for SqliteSink {
         let insert = "INSERT INTO messages(topic_id, timestamp, data) VALUES (?1, ?2, ?3)";
         let mut statement = self.connection.prepare_cached(insert)?;
         statement.execute(params![id, log_time_ns, data])?;
+        drop(statement);
         self.open_bytes = self.open_bytes.saturating_add(data.len());
         if self.open_bytes >= TRANSACTION_BYTES {
-            self.connection.execute_batch("COMMIT; BEGIN")?;
-            self.open_bytes = 0;
+            self.flush()?;
         }
         Ok(())
+    }
+
+    fn flush(&mut self) -> Result<(), SinkError> {
+        self.open_bytes = 0;
+        Ok(self.connection.execute_batch("COMMIT; BEGIN")?)
     }
 
     fn finish(self: Box<Self>, metadata: &str) -> Result<(), SinkError> {
         let insert = "INSERT INTO metadata(metadata_version, metadata) VALUES (?1, ?2)";
         let values = params![METADATA_VERSION, metadata];
         self.connection.execute(insert, values)?;
-        self.connection.execute_batch("COMMIT; PRAGMA optimize")?;
+        self.connection
+            .execute_batch("COMMIT; PRAGMA optimize; PRAGMA journal_mode = DELETE")?;
         Ok(self.connection.close().map_err(|(_, error)| error)?)
     }
 }

@@ -74,6 +74,47 @@ fn a_report_that_cannot_be_written_is_refused_at_the_start() {
 }
 
 #[test]
+fn an_earlier_log_stays_until_the_new_one_is_whole() {
+    let directory = tempfile::tempdir().unwrap();
+    let log = directory.path().join("log").display().to_string();
+    let simulate = |duration| {
+        [
+            "simulate",
+            "bobcat",
+            "--overwrite",
+            "--out",
+            &log,
+            "--duration",
+            duration,
+        ]
+    };
+    text(&simulate("2"));
+    let files = || {
+        let names = [
+            "log_0.mcap",
+            "metadata.yaml",
+            "truth/poses.csv",
+            "truth/points.ply",
+        ];
+        names.map(|name| fs::read(directory.path().join("log").join(name)).unwrap())
+    };
+    let before = files();
+    for full in ["trap '' XFSZ", "true"] {
+        assert!(!confined(full, &simulate("3")).status.success());
+        assert!(files() == before, "{full}");
+    }
+    text(&simulate("3"));
+    assert!(files() != before);
+    assert_eq!(
+        json(&["bag", "info", &log])["topics"]
+            .as_array()
+            .unwrap()
+            .len(),
+        7
+    );
+}
+
+#[test]
 fn a_cut_log_is_recovered() {
     let directory = tempfile::tempdir().unwrap();
     let at = |name: &str| directory.path().join(name).display().to_string();

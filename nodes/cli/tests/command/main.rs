@@ -5,16 +5,37 @@ mod browser;
 mod calibrate;
 mod evaluate;
 mod files;
+mod health;
 mod lifecycle;
 mod map;
 mod nodes;
 mod paper;
 mod player;
+mod record;
+mod respawn;
 mod viewer;
 
+use std::io::{Write, stderr};
+use std::path::PathBuf;
 use std::process::{Command, Output};
+use std::time::Duration;
 
 use serde_json::Value;
+
+/// Long enough for a loaded machine; a test that passes does not wait for it.
+const PATIENCE: Duration = Duration::from_secs(120);
+
+/// A Python with the foreign peers; a line says where there is none.
+fn python() -> Option<PathBuf> {
+    let python = std::env::var_os("LATTICE_PYTHON");
+    if python.is_none() {
+        let _ = writeln!(
+            stderr(),
+            "SKIPPED: LATTICE_PYTHON names no python with cyclonedds"
+        );
+    }
+    python.map(PathBuf::from)
+}
 
 fn lattice(arguments: &[&str]) -> Output {
     Command::new(env!("CARGO_BIN_EXE_lattice"))

@@ -19,7 +19,7 @@ pub fn simulated(directory: &Path, storage: &str, seconds: &str) -> String {
 const PARAMS: &str = concat!(env!("CARGO_MANIFEST_DIR"), "/../../params/bobcat.yaml");
 
 /// Description of a map without the times and bytes that depend on the way it was made.
-fn figures(report: &Value) -> Vec<Value> {
+pub fn figures(report: &Value) -> Vec<Value> {
     let keys = "lattice voxels points mse_per_dimension_m2 map_crc32";
     let lattices = report["lattices"].as_array().unwrap().iter();
     lattices

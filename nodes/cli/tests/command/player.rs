@@ -1,6 +1,5 @@
 //! `bag_player` under the hands of a foreign client.
 
-use std::io::{Write, stderr};
 use std::process::{Command, Stdio};
 
 use lattice_bag::BagReader;
@@ -8,6 +7,7 @@ use lattice_runtime::LoopbackDomain;
 use serde_json::{Value, json};
 
 use crate::nodes::simulated;
+use crate::python;
 
 const CLIENT: &str = concat!(
     env!("CARGO_MANIFEST_DIR"),
@@ -16,13 +16,7 @@ const CLIENT: &str = concat!(
 
 #[test]
 fn a_player_obeys_the_services_of_rosbag2() {
-    let Some(python) = std::env::var_os("LATTICE_PYTHON") else {
-        let _ = writeln!(
-            stderr(),
-            "SKIPPED: LATTICE_PYTHON names no python with cyclonedds"
-        );
-        return;
-    };
+    let Some(python) = python() else { return };
     let directory = tempfile::tempdir().unwrap();
     let domain = LoopbackDomain::take().unwrap();
     let log = simulated(directory.path(), "mcap", "4");
@@ -64,6 +58,10 @@ fn a_player_obeys_the_services_of_rosbag2() {
         ["is_paused", true],
         ["resume", 0],
         ["is_paused", false],
+        ["play", false],
+        ["pause", 0],
+        ["play", false],
+        ["play", true],
         ["pause", 0],
         ["stop", 0],
     ]);

@@ -5,7 +5,7 @@ use super::log::{Block, Log};
 use super::truth::{self, Truth};
 use crate::simulate::{Bobcat, Laser};
 use crate::{AnyError, at};
-use lattice_bag::{BagQos, BagWriter, Storage, TopicSpec, WriterOptions};
+use lattice_bag::{BagQos, BagWriter, Storage, TopicSpec, WriterOptions, replaceable};
 use lattice_msgs::nav_msgs::Odometry;
 use lattice_msgs::novatel_oem7_msgs::INSPVAX;
 use lattice_msgs::sensor_msgs::PointCloud2;
@@ -16,6 +16,7 @@ use std::collections::HashMap;
 use std::fmt;
 use std::fs;
 use std::path::{Path, PathBuf};
+use tempfile::Builder;
 
 /// Options of a simulated log.
 #[derive(Clone, Debug)]
@@ -72,11 +73,29 @@ pub fn write_bobcat(
     options: &BobcatOptions,
     progress: &mut dyn FnMut(f64),
 ) -> Result<BobcatSummary, AnyError> {
-    let bobcat = Bobcat::new(options.seed, options.duration_s)?.with_person(options.person);
-    make_way(&options.out, options.overwrite)?;
-    let writer = WriterOptions {
-        overwrite: options.overwrite,
+    let earlier = earlier(&options.out, options.overwrite)?;
+    let (Some(name), false) = (options.out.file_name(), earlier.is_empty()) else {
+        return write_log(options, progress);
     };
+    // The earlier log goes when the new one is whole.
+    let parent = options.out.parent().filter(|p| *p != Path::new(""));
+    let parent = parent.unwrap_or(Path::new("."));
+    let beside = Builder::new().prefix(".lattice_").tempdir_in(parent);
+    let beside = beside.map_err(at(parent))?;
+    let mut there = options.clone();
+    there.out = beside.path().join(name);
+    let mut summary = write_log(&there, progress)?;
+    replace(&options.out, &earlier, &there.out)?;
+    summary.out.clone_from(&options.out);
+    Ok(summary)
+}
+
+fn write_log(
+    options: &BobcatOptions,
+    progress: &mut dyn FnMut(f64),
+) -> Result<BobcatSummary, AnyError> {
+    let bobcat = Bobcat::new(options.seed, options.duration_s)?.with_person(options.person);
+    let writer = WriterOptions::default();
     let mut bag = BagWriter::create(&options.out, options.storage, writer)?;
     let mut topics = HashMap::new();
     for topic in topic_specs() {
@@ -152,17 +171,17 @@ fn spec<M: RosMessage>(name: &str, qos: BagQos) -> TopicSpec {
     }
 }
 
-/// Removes the truth of an earlier log, file by file; the bag beside it is the writer's matter.
-fn make_way(out: &Path, overwrite: bool) -> Result<(), AnyError> {
+/// Files of an earlier log at `out` with its truth, which are replaced; anything else there is refused.
+fn earlier(out: &Path, overwrite: bool) -> Result<Vec<PathBuf>, AnyError> {
+    let mut files = replaceable(out, overwrite, &[truth::FOLDER])?;
     let folder = out.join(truth::FOLDER);
     if !folder.exists() {
-        return Ok(());
+        return Ok(files);
     }
     if !overwrite {
         let words = "there is a log already; choose another directory or allow to overwrite it";
         return Err(at(out)(words));
     }
-    let mut files = Vec::new();
     for entry in fs::read_dir(&folder).map_err(at(&folder))? {
         let path = entry.map_err(at(&folder))?.path();
         let mut known = truth::FILES.iter();
@@ -172,8 +191,17 @@ fn make_way(out: &Path, overwrite: bool) -> Result<(), AnyError> {
         }
         files.push(path);
     }
-    for path in &files {
+    Ok(files)
+}
+
+/// Puts a whole log in the place of an earlier one.
+fn replace(out: &Path, earlier: &[PathBuf], whole: &Path) -> Result<(), AnyError> {
+    for path in earlier {
         fs::remove_file(path).map_err(at(path))?;
     }
-    fs::remove_dir(&folder).map_err(at(&folder))
+    let folder = out.join(truth::FOLDER);
+    if folder.exists() {
+        fs::remove_dir(&folder).map_err(at(&folder))?;
+    }
+    fs::rename(whole, out).map_err(at(out))
 }

@@ -17,10 +17,11 @@ use smol::channel::Sender;
 
 use super::endpoint::{Description, Endpoint, Side};
 use super::entity::{Entity, endpoint_id};
-use super::qos::announced;
+use super::qos::{announced, user_data};
 use super::strangers::Strangers;
 use crate::port::{DURABILITY_CONFLICT, EndpointId, PortEvent, RELIABILITY_CONFLICT};
 use crate::qos::{Durability, Reliability};
+use crate::remote::RemotePublisher;
 use crate::sync::lock;
 
 /// Endpoints taken at a time.
@@ -42,6 +43,7 @@ struct Other<'a> {
     name: &'a CStr,
     type_name: &'a CStr,
     qos: Option<(Reliability, Durability)>,
+    user_data: Vec<u8>,
 }
 
 impl Discovery {
@@ -105,9 +107,27 @@ impl Discovery {
 
     fn heard(&self, reader: dds_entity_t, side: Side) {
         self.take(reader, &mut |other| {
+            if side == Side::Writer {
+                self.found(other);
+            }
             let all: Vec<_> = lock(&self.ours).iter().filter_map(Weak::upgrade).collect();
             all.iter().for_each(|ours| self.compare(ours, side, other));
         });
+    }
+
+    /// Tells of a publisher.
+    fn found(&self, other: &Other<'_>) {
+        let (Ok(name), Ok(type_name)) = (other.name.to_str(), other.type_name.to_str()) else {
+            return;
+        };
+        // The default of DDS where it does not say.
+        let qos = other
+            .qos
+            .unwrap_or((Reliability::Reliable, Durability::Volatile));
+        if let Some(found) = RemotePublisher::of((name, type_name), &other.user_data, qos) {
+            let (peer, publisher) = (other.id, Box::new(found));
+            let _ = self.events.try_send(PortEvent::Found { peer, publisher });
+        }
     }
 
     fn compare(&self, ours: &Endpoint, side: Side, other: &Other<'_>) {
@@ -160,15 +180,17 @@ impl Discovery {
             strangers.shows_itself(id);
         }
         // SAFETY: strings and QoS are null or live as long as the endpoint.
-        let (name, type_name, qos) = unsafe {
+        let (name, type_name, qos, user_data) = unsafe {
             let (name, type_name) = (text(endpoint.topic_name), text(endpoint.type_name));
-            (name, type_name, announced(endpoint.qos))
+            let user_data = user_data(endpoint.qos);
+            (name, type_name, announced(endpoint.qos), user_data)
         };
         each(&Other {
             id,
             name,
             type_name,
             qos,
+            user_data,
         });
     }
 }

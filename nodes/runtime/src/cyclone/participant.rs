@@ -25,6 +25,7 @@ use crate::env::Network;
 use crate::error::RuntimeError;
 use crate::port::{EndpointId, PortEvent, PortTopic, SampleReader, SampleWriter, Transport};
 use crate::qos::Qos;
+use crate::remote::is_type_hash;
 use crate::security::{Enclave, SecurityError};
 
 /// The Cyclone participant of a process.
@@ -106,11 +107,7 @@ impl Cyclone {
 
 /// USER_DATA of an endpoint, as rmw_dds_common reads it; nothing where the type's hash is unknown.
 fn user_data(of: PortTopic<'_>) -> String {
-    let is_hash = |text: &&str| {
-        let digits = text.strip_prefix("RIHS01_").unwrap_or_default();
-        digits.len() == 64 && digits.bytes().all(|digit| digit.is_ascii_hexdigit())
-    };
-    let hash = of.type_hash.filter(is_hash);
+    let hash = of.type_hash.filter(|text| is_type_hash(text));
     let hash = hash.or_else(|| hash_of(of.ros_type));
     hash.map_or_else(String::new, |hash| format!("typehash={hash};"))
 }

@@ -1,13 +1,14 @@
 //! Qualities of service in Cyclone's form.
 
 use std::ffi::CString;
+use std::ptr;
 
 use cyclors::{
     dds_create_qos, dds_delete_qos, dds_durability_kind_DDS_DURABILITY_TRANSIENT_LOCAL,
-    dds_durability_kind_DDS_DURABILITY_VOLATILE, dds_history_kind_DDS_HISTORY_KEEP_LAST,
+    dds_durability_kind_DDS_DURABILITY_VOLATILE, dds_free, dds_history_kind_DDS_HISTORY_KEEP_LAST,
     dds_ignorelocal_kind_DDS_IGNORELOCAL_PARTICIPANT, dds_qget_durability, dds_qget_reliability,
-    dds_qos_t, dds_qset_durability, dds_qset_durability_service, dds_qset_history,
-    dds_qset_ignorelocal, dds_qset_prop, dds_qset_reliability, dds_qset_userdata,
+    dds_qget_userdata, dds_qos_t, dds_qset_durability, dds_qset_durability_service,
+    dds_qset_history, dds_qset_ignorelocal, dds_qset_prop, dds_qset_reliability, dds_qset_userdata,
     dds_qset_writer_data_lifecycle, dds_reliability_kind_DDS_RELIABILITY_BEST_EFFORT,
     dds_reliability_kind_DDS_RELIABILITY_RELIABLE,
 };
@@ -84,6 +85,25 @@ impl Drop for NativeQos {
     fn drop(&mut self) {
         // SAFETY: made by `dds_create_qos`, deleted once.
         unsafe { dds_delete_qos(self.0) };
+    }
+}
+
+/// USER_DATA of a peer.
+///
+/// # Safety
+///
+/// `qos` is null or a QoS of Cyclone's that lives during the call.
+pub(super) unsafe fn user_data(qos: *const dds_qos_t) -> Vec<u8> {
+    let (mut copy, mut bytes) = (ptr::null_mut(), 0);
+    // SAFETY: the caller says that `qos` is alive; a copy is made of as many bytes as it says, which is ours
+    // to free, once.
+    unsafe {
+        if qos.is_null() || !dds_qget_userdata(qos, &mut copy, &mut bytes) || copy.is_null() {
+            return Vec::new();
+        }
+        let data = std::slice::from_raw_parts(copy.cast::<u8>(), bytes).to_vec();
+        dds_free(copy);
+        data
     }
 }
 

@@ -7,12 +7,14 @@ use std::borrow::Cow;
 use std::sync::{Arc, Mutex};
 
 use rustdds::policy::{Durability, Reliability};
-use rustdds::{DomainParticipantStatusEvent as Event, GUID, QosPolicies};
+use rustdds::{DomainParticipantStatusEvent as Event, EndpointDescription, GUID, QosPolicies};
 
 use super::endpoint_id;
 use super::lives::Lives;
 use super::probe::Probes;
 use crate::port::{DURABILITY_CONFLICT, PortEvent, RELIABILITY_CONFLICT};
+use crate::qos;
+use crate::remote::RemotePublisher;
 use crate::sync::lock;
 
 /// Translates the events of one participant.
@@ -38,9 +40,20 @@ impl Events {
     pub(super) fn translate(&self, event: Event, lives: &Lives) -> Option<PortEvent> {
         let own = self.own;
         let (endpoint, peer, policy) = match event {
-            Event::ReaderDetected { reader: found } | Event::WriterDetected { writer: found } => {
+            Event::ReaderDetected { reader: found } => {
                 lock(&self.found).replace((found.guid, found.type_name));
                 return None;
+            }
+            Event::WriterDetected { writer: found } => {
+                let publisher = (found.guid.prefix != own.prefix)
+                    .then(|| remote_publisher(&found))
+                    .flatten();
+                let peer = endpoint_id(found.guid);
+                lock(&self.found).replace((found.guid, found.type_name));
+                return Some(PortEvent::Found {
+                    peer,
+                    publisher: Box::new(publisher?),
+                });
             }
             Event::RemoteReaderMatched {
                 local_writer,
@@ -104,6 +117,21 @@ impl Events {
             },
         )
     }
+}
+
+/// The publisher of a writer, with what is the default of DDS where it does not say.
+fn remote_publisher(writer: &EndpointDescription) -> Option<RemotePublisher> {
+    let reliable = matches!(writer.qos.reliability(), Some(Reliability::Reliable { .. }));
+    let reliability = match reliable {
+        true => qos::Reliability::Reliable,
+        false => qos::Reliability::BestEffort,
+    };
+    let durability = match writer.qos.durability() {
+        None | Some(Durability::Volatile) => qos::Durability::Volatile,
+        Some(_) => qos::Durability::TransientLocal,
+    };
+    let name = (&*writer.topic_name, &*writer.type_name);
+    RemotePublisher::of(name, &writer.user_data, (reliability, durability))
 }
 
 /// First policy in which an offer is less than what is requested, in words for the operator.

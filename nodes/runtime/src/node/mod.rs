@@ -15,6 +15,7 @@ use super::names::{self, NameKind};
 use super::params::Params;
 use super::publisher::{Publisher, RawPublisher};
 use super::qos::Qos;
+use super::remote::RemotePublisher;
 use super::ros_args::RosArgs;
 use super::shared::{DEFAULT_MAX_MESSAGE_BYTES, Shared};
 use super::subscription::{Load, Sample, Stats, Subscription, Undecoded};
@@ -200,6 +201,28 @@ impl Node {
         self.subscribe_samples(topic, qos, load, move |sample, stats| {
             handler(Undecoded::new(sample, stats));
         })
+    }
+
+    /// Gives every message of other processes on a full topic name to `handler` as CDR bytes, encapsulation
+    /// header first, whatever the type. The handler is as that of [`Node::subscribe`].
+    pub fn subscribe_raw(
+        &self,
+        resolved_topic: &str,
+        type_name: &str,
+        qos: Qos,
+        load: Load,
+        handler: impl FnMut(Vec<u8>) + Send + 'static,
+    ) -> Result<Subscription, RuntimeError> {
+        names::validate_full_name(resolved_topic)?;
+        let (of, max) = ((resolved_topic, type_name), self.inner.max_message_bytes);
+        self.inner
+            .shared
+            .subscribe_raw(self.id(), of, &qos, load, max, handler)
+    }
+
+    /// Publishers in other processes that are known by now, on any topic.
+    pub fn remote_publishers(&self) -> Vec<RemotePublisher> {
+        self.inner.shared.remote_publishers()
     }
 
     fn subscribe_samples<M: RosMessage>(

@@ -32,6 +32,7 @@ use super::outbox::{Outbox, WhenFull};
 use super::port::{PortTopic, SampleReader, Transport};
 use super::publisher::PublisherParts;
 use super::qos::Qos;
+use super::remote::RemotePublisher;
 use super::security::Enclave;
 use super::service::{Answers, Server};
 use super::shutdown::Shutdown;
@@ -193,6 +194,11 @@ impl Shared {
         let open = lock(&self.open);
         let all = open.iter().flat_map(|open| &open.publishers);
         all.filter_map(Weak::upgrade).collect()
+    }
+
+    /// Publishers in other processes, on any topic.
+    pub(crate) fn remote_publishers(&self) -> Vec<RemotePublisher> {
+        self.endpoints.remotes.all()
     }
 
     /// Subscriptions that are in use.

@@ -31,7 +31,7 @@ impl Shared {
         let topic = PortTopic {
             name: &intake.topic,
             dds_name: &names::dds_topic(&intake.topic),
-            ros_type: intake.type_name,
+            ros_type: &intake.type_name,
             type_hash: None,
         };
         let reader = self.reader(topic, &intake.qos, intake.max_bytes)?;

@@ -1,14 +1,17 @@
 //! Subscriptions of the process.
 
-use std::sync::atomic::AtomicBool;
+use std::any::Any;
+use std::convert::Infallible;
+use std::sync::atomic::{AtomicBool, AtomicU64};
 use std::sync::{Arc, Mutex};
 
 use lattice_msgs::RosMessage;
-use smol::channel::{bounded, unbounded};
+use smol::channel::{Sender, bounded, unbounded};
 
 use super::{Shared, closed};
 use crate::error::RuntimeError;
 use crate::graph::NodeId;
+use crate::local_bus::{AnyMessage, LocalEndpoint, Topic};
 use crate::peers::Peers;
 use crate::qos::{Durability, Qos};
 use crate::subscription::{
@@ -23,6 +26,15 @@ const LOCAL_SMALL_MESSAGES: usize = 1024;
 /// The same for large ones: several bursts of line scans, and not too much of 4 MB clouds.
 const LOCAL_LARGE_MESSAGES: usize = 128;
 
+/// Way of a subscription to the messages of its own process.
+type Join = fn(
+    &Arc<Topic>,
+    &Arc<Peers>,
+    Sender<AnyMessage>,
+    Arc<AtomicU64>,
+    bool,
+) -> Result<Option<LocalEndpoint>, RuntimeError>;
+
 impl Shared {
     pub(crate) fn subscribe<M: RosMessage>(
         self: &Arc<Self>,
@@ -31,6 +43,45 @@ impl Shared {
         qos: &Qos,
         load: Load,
         max_bytes: usize,
+        handler: impl FnMut(Sample<'_, M>, &Arc<Stats>) + Send + 'static,
+    ) -> Result<Subscription, RuntimeError> {
+        let join: Join = |topic, peers, sender, lost, latched| {
+            topic
+                .join_subscriber::<M>(peers, sender, lost, latched)
+                .map(Some)
+        };
+        self.subscribe_with(node, (topic, M::TYPE), qos, load, max_bytes, join, handler)
+    }
+
+    /// The same of any type, as CDR bytes. What this process publishes is not heard.
+    pub(crate) fn subscribe_raw(
+        self: &Arc<Self>,
+        node: NodeId,
+        of: (&str, &str),
+        qos: &Qos,
+        load: Load,
+        max_bytes: usize,
+        mut handler: impl FnMut(Vec<u8>) + Send + 'static,
+    ) -> Result<Subscription, RuntimeError> {
+        let take = move |sample: Sample<'_, Infallible>, stats: &Arc<Stats>| {
+            handler(stats.take_bytes(sample));
+        };
+        let join: Join = |_, _, _, _, _| Ok(None);
+        self.subscribe_with(node, of, qos, load, max_bytes, join, take)
+    }
+
+    #[expect(
+        clippy::too_many_arguments,
+        reason = "one for each property of a subscription"
+    )]
+    fn subscribe_with<M: Any + Send + Sync>(
+        self: &Arc<Self>,
+        node: NodeId,
+        (topic, type_name): (&str, &str),
+        qos: &Qos,
+        load: Load,
+        max_bytes: usize,
+        join: Join,
         mut handler: impl FnMut(Sample<'_, M>, &Arc<Stats>) + Send + 'static,
     ) -> Result<Subscription, RuntimeError> {
         let peers = Arc::new(Peers::new(topic, "publisher", log::Level::Info));
@@ -39,14 +90,14 @@ impl Shared {
             Load::Small => LOCAL_SMALL_MESSAGES,
             Load::Large => LOCAL_LARGE_MESSAGES,
         }));
-        let latched = qos.durability == Durability::TransientLocal;
         let (place, lost) = (self.bus.topic(topic), Arc::clone(&stats.lost));
-        let place = place.join_subscriber::<M>(&peers, sender, lost, latched)?;
+        let latched = qos.durability == Durability::TransientLocal;
+        let place = join(&place, &peers, sender.clone(), lost, latched)?;
         let (commands, orders) = unbounded();
         let intake = Arc::new(Intake {
             node,
             topic: topic.to_owned(),
-            type_name: M::TYPE,
+            type_name: type_name.to_owned(),
             qos: *qos,
             max_bytes,
             peers,
@@ -59,6 +110,7 @@ impl Shared {
             commands: orders,
             local,
             _local: place,
+            _sender: sender,
             stats: Arc::clone(&stats),
         };
         let task = source.run(move |sample: Sample<'_, M>| handler(sample, &stats));

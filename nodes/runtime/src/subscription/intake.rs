@@ -35,7 +35,7 @@ pub(crate) enum Command {
 pub(crate) struct Intake {
     pub node: NodeId,
     pub topic: String,
-    pub type_name: &'static str,
+    pub type_name: String,
     pub qos: Qos,
     pub max_bytes: usize,
     pub peers: Arc<Peers>,

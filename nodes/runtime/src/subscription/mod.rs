@@ -6,6 +6,7 @@ mod source;
 pub(crate) use intake::{Command, Intake};
 pub(crate) use source::Source;
 
+use std::convert::Infallible;
 use std::sync::atomic::{AtomicU64, Ordering::Relaxed};
 use std::sync::{Arc, Mutex};
 use std::thread::JoinHandle;
@@ -145,6 +146,15 @@ impl Stats {
             self.received.fetch_add(1, Relaxed);
         }
         message
+    }
+
+    /// Takes the bytes of a sample as they are.
+    pub(crate) fn take_bytes(&self, sample: Sample<'_, Infallible>) -> Vec<u8> {
+        self.received.fetch_add(1, Relaxed);
+        match sample {
+            Sample::Shared(never) => match *never {},
+            Sample::Cdr(bytes) => std::mem::take(bytes),
+        }
     }
 
     fn not_decodable(&self, why: &dyn std::fmt::Display) {

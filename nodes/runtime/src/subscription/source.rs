@@ -1,11 +1,11 @@
 //! The task of a subscription: from DDS and from this process to one handler.
 
+use std::any::Any;
 use std::collections::BTreeMap;
 use std::sync::Arc;
 use std::sync::atomic::Ordering::Relaxed;
 
-use lattice_msgs::RosMessage;
-use smol::channel::Receiver;
+use smol::channel::{Receiver, Sender};
 use smol::future::{or, pending};
 
 use super::intake::Command;
@@ -23,13 +23,16 @@ const MAX_WRITERS: usize = 1024;
 pub(crate) struct Source {
     pub commands: Receiver<Command>,
     pub local: Receiver<AnyMessage>,
-    pub _local: LocalEndpoint,
+    /// None: what this process publishes is not heard.
+    pub _local: Option<LocalEndpoint>,
+    /// Keeps `local` open where no publisher has it.
+    pub _sender: Sender<AnyMessage>,
     pub stats: Arc<Stats>,
 }
 
 impl Source {
     /// Gives messages to the handler until the task is dropped.
-    pub(crate) async fn run<M: RosMessage>(self, mut handler: impl FnMut(Sample<'_, M>)) {
+    pub(crate) async fn run<M: Any + Send + Sync>(self, mut handler: impl FnMut(Sample<'_, M>)) {
         let mut turn: u32 = 0;
         let mut gaps = Gaps::default();
         let mut reader: Option<Box<dyn SampleReader>> = None;
@@ -91,7 +94,7 @@ impl Source {
     }
 }
 
-fn give_shared<M: RosMessage>(message: AnyMessage, handler: &mut impl FnMut(Sample<'_, M>)) {
+fn give_shared<M: Any + Send + Sync>(message: AnyMessage, handler: &mut impl FnMut(Sample<'_, M>)) {
     if let Ok(message) = message.downcast::<M>() {
         handler(Sample::Shared(message));
     }

@@ -6,8 +6,16 @@ use crate::fuzz;
 
 use std::path::PathBuf;
 
-fn over_seeds(target: &str, run: fn(&[u8])) {
-    let seeds = fuzz::seeds().remove(target).unwrap();
+#[test]
+fn fuzz_targets_hold_over_their_seeds_and_damaged_copies() {
+    for (target, run, seeds) in fuzz::TARGETS {
+        over_seeds(target, run, &seeds());
+    }
+}
+
+fn over_seeds(target: &str, run: fn(&[u8]), seeds: &[Vec<u8>]) {
+    // So that many seeds take no more time than a few.
+    let copies = (1200 / seeds.len()).clamp(5, 40);
     let mut state = 1_u64;
     let mut random = |below: usize| {
         state = state
@@ -17,7 +25,7 @@ fn over_seeds(target: &str, run: fn(&[u8])) {
     };
     for (number, seed) in seeds.iter().enumerate() {
         run(seed);
-        for _ in 0..40 {
+        for _ in 0..copies {
             let mut bytes = seed.clone();
             for _ in 0..=random(4) {
                 let at = random(bytes.len());
@@ -34,14 +42,4 @@ fn over_seeds(target: &str, run: fn(&[u8])) {
             std::fs::write(directory.join(format!("seed_{number:02}")), seed).unwrap();
         }
     }
-}
-
-#[test]
-fn map_file() {
-    over_seeds("map_file", fuzz::map_file);
-}
-
-#[test]
-fn insert() {
-    over_seeds("insert", fuzz::insert);
 }

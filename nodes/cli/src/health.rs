@@ -1,0 +1,126 @@
+//! `lattice health`: the state of nodes by what they say on `/diagnostics`.
+
+use std::collections::BTreeMap;
+use std::sync::mpsc::{RecvTimeoutError, channel};
+use std::time::{Duration, Instant};
+
+use clap::Args;
+use lattice_msgs::diagnostic_msgs::{DiagnosticArray, DiagnosticStatus};
+use lattice_runtime::qos::Qos;
+use lattice_runtime::ros_args::RosArgs;
+use lattice_runtime::{Load, Runtime};
+
+use super::{CliResult, init_logging};
+
+/// Name of the node that asks.
+const NAME: &str = "lattice_health";
+
+/// Fail unless nodes are at work and well, by their diagnostics
+#[derive(Args)]
+pub struct Health {
+    /// Full names of nodes, such as `lattice_mapper` or `robot/lattice_mapper`; any node if none is named
+    nodes: Vec<String>,
+    /// Longest wait for them, s; a node speaks each second
+    #[arg(long, default_value_t = 5.0, value_name = "S")]
+    timeout: f64,
+    /// As for any ROS node: `-- --ros-args -r /diagnostics:=/robot/diagnostics ...`
+    #[arg(last = true)]
+    ros_args: Vec<String>,
+}
+
+/// Highest level that each task of each node has stated last.
+type Tasks = BTreeMap<String, DiagnosticStatus>;
+
+impl Health {
+    /// Runs the command.
+    pub fn run(self) -> CliResult {
+        init_logging();
+        let timeout = Duration::try_from_secs_f64(self.timeout);
+        let timeout = timeout.map_err(|error| format!("--timeout: {error}"))?;
+        let quiet = ["--ros-args", "--disable-rosout-logs"].map(str::to_owned);
+        let args = RosArgs::parse(self.ros_args.iter().cloned().chain(quiet))?;
+        let runtime = Runtime::start(NAME, args)?;
+        let node = runtime.node(NAME)?;
+        let (sender, heard) = channel();
+        let handler = move |message| drop(sender.send(message));
+        let _subscription = node.subscribe::<DiagnosticArray>(
+            "/diagnostics",
+            Qos::DIAGNOSTICS,
+            Load::Small,
+            handler,
+        )?;
+        let deadline = Instant::now()
+            .checked_add(timeout)
+            .ok_or("--timeout is too long")?;
+        let mut tasks = Tasks::new();
+        loop {
+            match heard.recv_timeout(deadline.saturating_duration_since(Instant::now())) {
+                Ok(message) => tasks.extend(others(&message)),
+                Err(RecvTimeoutError::Timeout) => return self.judge(&tasks),
+                Err(RecvTimeoutError::Disconnected) => return Err("the subscription ended".into()),
+            }
+            if self.silent(&tasks).is_empty() {
+                return self.judge(&tasks);
+            }
+        }
+    }
+
+    /// Nodes that have said nothing.
+    fn silent(&self, tasks: &Tasks) -> Vec<String> {
+        if self.nodes.is_empty() {
+            return match tasks.is_empty() {
+                true => vec!["every node".to_owned()],
+                false => Vec::new(),
+            };
+        }
+        let speaks = |node: &str| tasks.keys().any(|task| node_of(task) == node);
+        let nodes = self.nodes.iter().map(|node| node.trim_start_matches('/'));
+        let silent = nodes.filter(|node| !speaks(node));
+        silent.map(str::to_owned).collect()
+    }
+
+    fn judge(&self, tasks: &Tasks) -> CliResult {
+        let silent = self.silent(tasks);
+        if !silent.is_empty() {
+            return Err(format!("no word from {} in {} s", silent.join(", "), self.timeout).into());
+        }
+        let named = |task: &str| {
+            let is = |node: &String| node.trim_start_matches('/') == node_of(task);
+            self.nodes.is_empty() || self.nodes.iter().any(is)
+        };
+        let mut ill = Vec::new();
+        for (task, status) in tasks.iter().filter(|(task, _)| named(task)) {
+            println!("{} {task}: {}", level(status.level), status.message);
+            if status.level >= DiagnosticStatus::ERROR {
+                ill.push(task.as_str());
+            }
+        }
+        match ill.is_empty() {
+            true => Ok(()),
+            false => Err(format!("not well: {}", ill.join(", ")).into()),
+        }
+    }
+}
+
+/// States in a message, but for our own.
+fn others(message: &DiagnosticArray) -> impl Iterator<Item = (String, DiagnosticStatus)> {
+    let others = message
+        .status
+        .iter()
+        .filter(|status| node_of(&status.name) != NAME);
+    others.map(|status| (status.name.clone(), status.clone()))
+}
+
+/// The node of a task, which is named `node: task`.
+fn node_of(task: &str) -> &str {
+    task.split_once(": ").map_or(task, |(node, _)| node)
+}
+
+fn level(level: u8) -> &'static str {
+    match level {
+        DiagnosticStatus::OK => "OK",
+        DiagnosticStatus::WARN => "WARN",
+        DiagnosticStatus::ERROR => "ERROR",
+        _ => "STALE",
+    }
+}

@@ -1,0 +1,228 @@
+//! `lattice record`: what is on the topics as a rosbag2 log, with the options of `ros2 bag record`.
+
+use std::path::PathBuf;
+use std::time::{Duration, SystemTime, UNIX_EPOCH};
+
+use clap::{Args, ValueEnum};
+use lattice_bag::{Compression, Storage, WriterOptions};
+use lattice_nodes::bag_recorder::{self, Choice, RecorderOptions, RecorderReport};
+use lattice_runtime::ros_args::RosArgs;
+use regex::Regex;
+
+use crate::CliResult;
+
+/// Kind of the files.
+#[derive(Clone, Copy, ValueEnum)]
+enum StorageName {
+    Mcap,
+    Sqlite3,
+}
+
+/// Part that is compressed.
+#[derive(Clone, Copy, ValueEnum)]
+enum CompressionMode {
+    None,
+    File,
+    Message,
+}
+
+/// Format of compression.
+#[derive(Clone, Copy, ValueEnum)]
+enum CompressionFormat {
+    Zstd,
+}
+
+/// Record topics of any type as a rosbag2 log, until Ctrl-C
+#[derive(Args)]
+pub struct Record {
+    /// Topics
+    topics: Vec<String>,
+    /// Record all topics
+    #[arg(long, short)]
+    all: bool,
+    /// Record topics whose names are like this
+    #[arg(long, short = 'e')]
+    regex: Option<Regex>,
+    /// Leave out topics whose names are like this
+    #[arg(long, short = 'x', alias = "exclude")]
+    exclude_regex: Option<Regex>,
+    /// Leave out these topics
+    #[arg(long, num_args = 1.., value_name = "TOPIC")]
+    exclude_topics: Vec<String>,
+    /// Record hidden topics too: those with a part that begins with `_`
+    #[arg(long)]
+    include_hidden_topics: bool,
+    /// Folder of the log, which must not be there yet; by default rosbag2_ and the time (UTC)
+    #[arg(long, short)]
+    output: Option<PathBuf>,
+    /// Kind of its files
+    #[arg(long, short, value_enum, default_value = "mcap")]
+    storage: StorageName,
+    /// Begin a new file when one holds so many bytes of messages; 0: never
+    #[arg(long, short = 'b', default_value_t = 0, value_name = "BYTES")]
+    max_bag_size: u64,
+    /// Begin a new file when one spans so many seconds; 0: never
+    #[arg(long, short = 'd', default_value_t = 0, value_name = "S")]
+    max_bag_duration: u32,
+    /// Part that is compressed
+    #[arg(long, value_enum, default_value = "none")]
+    compression_mode: CompressionMode,
+    /// Format of the compression
+    #[arg(long, value_enum, default_value = "zstd")]
+    compression_format: CompressionFormat,
+    /// Most bytes of messages that wait to be written; more are lost, and counted
+    #[arg(long, default_value_t = 100 << 20, value_name = "BYTES")]
+    max_cache_size: usize,
+    /// End after so many seconds
+    #[arg(long, value_name = "S")]
+    duration: Option<f64>,
+    /// Record only topics that are there at the begin
+    #[arg(long)]
+    no_discovery: bool,
+    /// Time between two looks for topics, ms
+    #[arg(long, short, default_value_t = 100, value_name = "MS", value_parser = clap::value_parser!(u32).range(1..))]
+    polling_interval: u32,
+    /// Note the times of /clock; nothing is recorded before its first message
+    #[arg(long)]
+    use_sim_time: bool,
+    /// Begin with nothing until a call of ~/resume
+    #[arg(long)]
+    start_paused: bool,
+    /// Folder with a folder for each package of messages, such as /opt/ros/jazzy/share; those of
+    /// AMENT_PREFIX_PATH are known
+    #[arg(long, value_name = "DIR")]
+    msg_path: Vec<PathBuf>,
+    /// Name of the node
+    #[arg(long, value_name = "NAME")]
+    node_name: Option<String>,
+    /// Print what was recorded as JSON
+    #[arg(long)]
+    json: bool,
+    /// As for any ROS node: `-- --ros-args -r from:=to -p name:=value ...`
+    #[arg(last = true)]
+    ros_args: Vec<String>,
+}
+
+impl Record {
+    /// Runs the command.
+    pub fn run(self) -> CliResult {
+        if self.topics.is_empty() && !self.all && self.regex.is_none() {
+            return Err("which topics? Name them, or give --all or --regex".into());
+        }
+        let mut args = self.ros_args.clone();
+        args.push("--ros-args".to_owned());
+        if self.use_sim_time {
+            args.extend(["-p", "use_sim_time:=true"].map(str::to_owned));
+        }
+        if let Some(name) = &self.node_name {
+            args.extend(["-r".to_owned(), format!("__node:={name}")]);
+        }
+        let (args, json) = (RosArgs::parse(args)?, self.json);
+        let options = self.options()?;
+        let bag = options.bag.display().to_string();
+        let report = bag_recorder::run(options, args)?;
+        match json {
+            true => println!("{}", serde_json::to_string_pretty(&report)?),
+            false => print(&bag, &report),
+        }
+        Ok(())
+    }
+
+    fn options(self) -> CliResult<RecorderOptions> {
+        let duration = self.duration.map(Duration::try_from_secs_f64);
+        let CompressionFormat::Zstd = self.compression_format;
+        Ok(RecorderOptions {
+            bag: self.output.unwrap_or_else(default_folder),
+            storage: match self.storage {
+                StorageName::Mcap => Storage::Mcap,
+                StorageName::Sqlite3 => Storage::Sqlite3,
+            },
+            writer: WriterOptions {
+                overwrite: false,
+                max_file_bytes: (self.max_bag_size > 0).then_some(self.max_bag_size),
+                max_file_ns: (self.max_bag_duration > 0)
+                    .then(|| i64::from(self.max_bag_duration) * 1_000_000_000),
+                compression: match self.compression_mode {
+                    CompressionMode::None => Compression::None,
+                    CompressionMode::File => Compression::Files,
+                    CompressionMode::Message => Compression::Messages,
+                },
+            },
+            choice: Choice {
+                topics: self.topics,
+                all: self.all,
+                regex: self.regex,
+                exclude: self.exclude_topics,
+                exclude_regex: self.exclude_regex,
+                hidden: self.include_hidden_topics,
+            },
+            msg_paths: self.msg_path,
+            cache_bytes: self.max_cache_size,
+            duration: duration
+                .transpose()
+                .map_err(|e| format!("--duration: {e}"))?,
+            discovery: !self.no_discovery,
+            polling: Duration::from_millis(self.polling_interval.into()),
+            start_paused: self.start_paused,
+        })
+    }
+}
+
+fn print(bag: &str, report: &RecorderReport) {
+    let width = report.topics.iter().map(|topic| topic.name.len()).max();
+    let width = width.unwrap_or(0).max("topic".len());
+    println!(
+        "{:width$} {:>9} {:>6} {:>11}  type",
+        "topic", "heard", "lost", "not written"
+    );
+    for topic in &report.topics {
+        let (name, heard, lost) = (&topic.name, topic.heard, topic.lost);
+        let (not_written, of) = (topic.not_written, &topic.type_name);
+        println!("{name:width$} {heard:>9} {lost:>6} {not_written:>11}  {of}");
+    }
+    let (messages, megabytes) = (report.messages, report.bytes as f64 / 1e6);
+    let seconds = report.seconds;
+    println!("{messages} messages, {megabytes:.1} MB, {seconds:.1} s in {bag}");
+}
+
+/// `rosbag2_2026_05_31-08_07_09`, in UTC.
+fn default_folder() -> PathBuf {
+    let now = SystemTime::now().duration_since(UNIX_EPOCH);
+    PathBuf::from(format!(
+        "rosbag2_{}",
+        calendar(now.unwrap_or_default().as_secs())
+    ))
+}
+
+/// Date and time of seconds since 1970, in the Gregorian calendar whose years begin in March.
+fn calendar(seconds: u64) -> String {
+    let (days, second) = (seconds / 86_400 + 719_468, seconds % 86_400);
+    let (era, day_of_era) = (days / 146_097, days % 146_097);
+    let leaps = day_of_era / 1_460 - day_of_era / 36_524 + day_of_era / 146_096;
+    let year_of_era = (day_of_era - leaps) / 365;
+    let day_of_year = day_of_era - (365 * year_of_era + year_of_era / 4 - year_of_era / 100);
+    let from_march = (5 * day_of_year + 2) / 153;
+    let day = day_of_year - (153 * from_march + 2) / 5 + 1;
+    let month = (from_march + 2) % 12 + 1;
+    let year = 400 * era + year_of_era + u64::from(month <= 2);
+    let (hour, minute, second) = (second / 3600, second / 60 % 60, second % 60);
+    format!("{year}_{month:02}_{day:02}-{hour:02}_{minute:02}_{second:02}")
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn folders_are_named_by_the_calendar() {
+        for (seconds, name) in [
+            (0, "1970_01_01-00_00_00"),
+            (951_827_696, "2000_02_29-12_34_56"),
+            (1_709_251_199, "2024_02_29-23_59_59"),
+            (1_709_251_200, "2024_03_01-00_00_00"),
+            (4_102_444_800, "2100_01_01-00_00_00"),
+        ] {
+            assert_eq!(calendar(seconds), name);
+        }
+    }
+}

@@ -1,0 +1,65 @@
+//! Choice of topics by name, as `ros2 bag record` has it.
+
+use regex::Regex;
+
+/// Topics to record.
+#[derive(Clone, Debug, Default)]
+pub struct Choice {
+    /// Full names.
+    pub topics: Vec<String>,
+    /// True for every topic.
+    pub all: bool,
+    /// Names of which a part is like this.
+    pub regex: Option<Regex>,
+    /// Full names that are left out.
+    pub exclude: Vec<String>,
+    /// Names of which a part is like this are left out.
+    pub exclude_regex: Option<Regex>,
+    /// True for topics with a part that begins with `_` too, where they are not named.
+    pub hidden: bool,
+}
+
+impl Choice {
+    /// True if a topic of this name is to be recorded.
+    pub fn wants(&self, topic: &str) -> bool {
+        let is = |list: &[String]| list.iter().any(|name| name == topic);
+        let like = |regex: &Option<Regex>| regex.as_ref().is_some_and(|r| r.is_match(topic));
+        if is(&self.exclude) || like(&self.exclude_regex) {
+            return false;
+        }
+        let hidden = topic.split('/').any(|part| part.starts_with('_'));
+        is(&self.topics) || ((self.all || like(&self.regex)) && (self.hidden || !hidden))
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    fn wanted(choice: &Choice) -> Vec<&'static str> {
+        let topics = ["/tf", "/robot/points", "/robot/_hidden", "/rosout"];
+        topics.into_iter().filter(|t| choice.wants(t)).collect()
+    }
+
+    #[test]
+    fn topics_are_chosen_by_name_and_likeness() {
+        let named = |names: &[&str]| names.iter().map(|&name| name.to_owned()).collect();
+        let like = |text| Some(Regex::new(text).unwrap());
+        let mut choice = Choice {
+            topics: named(&["/tf", "/robot/_hidden"]),
+            ..Choice::default()
+        };
+        assert_eq!(wanted(&choice), ["/tf", "/robot/_hidden"]);
+        choice.regex = like("points|hid");
+        assert_eq!(wanted(&choice), ["/tf", "/robot/points", "/robot/_hidden"]);
+        choice = Choice {
+            all: true,
+            ..Choice::default()
+        };
+        assert_eq!(wanted(&choice), ["/tf", "/robot/points", "/rosout"]);
+        choice.hidden = true;
+        choice.exclude = named(&["/tf"]);
+        choice.exclude_regex = like("^/ros");
+        assert_eq!(wanted(&choice), ["/robot/points", "/robot/_hidden"]);
+    }
+}

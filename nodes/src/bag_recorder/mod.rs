@@ -1,0 +1,195 @@
+//! `bag_recorder`: topics of any type as a rosbag2 log.
+
+mod cache;
+mod choice;
+mod controls;
+mod definitions;
+mod offered;
+mod session;
+mod writing;
+
+use std::io::{IsTerminal, Write, stderr};
+use std::path::PathBuf;
+use std::sync::Arc;
+use std::sync::atomic::Ordering::Relaxed;
+use std::time::{Duration, Instant};
+
+use serde::Serialize;
+
+use crate::executables::start_runtime;
+use crate::start::{NodeError, open_params};
+use cache::Cache;
+use definitions::Definitions;
+use lattice_bag::{BagWriter, Storage, WriterOptions};
+use lattice_runtime::ros_args::RosArgs;
+use session::Session;
+use writing::Written;
+
+pub use choice::Choice;
+
+/// Name of the node unless it is remapped.
+pub const NAME: &str = "bag_recorder";
+
+/// Time that discovery has where it is not to go on.
+const FIRST_LOOK: Duration = Duration::from_secs(3);
+/// Between two lines about the recording, and two about its losses.
+const STATUS_PERIOD: Duration = Duration::from_secs(1);
+
+/// Options of a recording.
+#[derive(Clone, Debug)]
+pub struct RecorderOptions {
+    /// Folder of the bag, which must not be there yet.
+    pub bag: PathBuf,
+    /// Kind of its files.
+    pub storage: Storage,
+    /// Splitting and compression.
+    pub writer: WriterOptions,
+    /// Topics.
+    pub choice: Choice,
+    /// Folders with a folder for each package of messages.
+    pub msg_paths: Vec<PathBuf>,
+    /// Most bytes of messages that wait to be written.
+    pub cache_bytes: usize,
+    /// Time after which it ends by itself.
+    pub duration: Option<Duration>,
+    /// False: only topics that are there at the begin.
+    pub discovery: bool,
+    /// Between two looks for topics.
+    pub polling: Duration,
+    /// True: nothing is taken before `~/resume`.
+    pub start_paused: bool,
+}
+
+/// A topic of a recording.
+#[derive(Clone, Debug, Default, Serialize)]
+pub struct RecordedTopic {
+    /// Full name.
+    pub name: String,
+    /// Type.
+    pub type_name: String,
+    /// Messages that came.
+    pub heard: u64,
+    /// Messages that were sent and did not get here, or were too long.
+    pub lost: u64,
+    /// Messages that found no room in the cache.
+    pub not_written: u64,
+}
+
+/// Outcome of a recording.
+#[derive(Clone, Debug, Default, Serialize)]
+pub struct RecorderReport {
+    /// Messages in the bag.
+    pub messages: u64,
+    /// Bytes of them.
+    pub bytes: u64,
+    /// Seconds that it took.
+    pub seconds: f64,
+    /// Topics.
+    pub topics: Vec<RecordedTopic>,
+}
+
+/// Records until a signal or the end of the duration.
+pub fn run(options: RecorderOptions, args: RosArgs) -> Result<RecorderReport, NodeError> {
+    let name = args.node_name(NAME);
+    let runtime = start_runtime(&name, args)?;
+    let node = runtime.node(&name)?;
+    let mut choice = options.choice;
+    for topic in choice.topics.iter_mut().chain(&mut choice.exclude) {
+        *topic = node.resolve(topic)?;
+    }
+    open_params(node.params(), |_| Ok(()));
+    let bag = BagWriter::create(&options.bag, options.storage, options.writer)?;
+    let cache = Arc::new(Cache::new(options.cache_bytes));
+    let written = Arc::new(Written::default());
+    let shutdown = runtime.shutdown_handle();
+    let writer = writing::spawn(bag, cache.clone(), written.clone(), shutdown.clone())?;
+    let definitions = Definitions::new(&options.msg_paths);
+    let mut session = Session::new(node, choice, definitions, cache, options.start_paused);
+    let servers = controls::serve(&session)?;
+    log::info!("recording to {}", options.bag.display());
+    let begin = Instant::now();
+    let mut status = Status::new(begin);
+    while !shutdown.is_requested() && options.duration.is_none_or(|most| begin.elapsed() < most) {
+        if options.discovery || begin.elapsed() < FIRST_LOOK {
+            session.look();
+        }
+        status.show(&session, &written);
+        let left = options
+            .duration
+            .map(|most| most.saturating_sub(begin.elapsed()));
+        shutdown.wait_timeout(options.polling.min(left.unwrap_or(options.polling)));
+    }
+    status.end();
+    let topics = session.report();
+    session.cache.close();
+    let ended = writer.join();
+    drop((servers, session));
+    ended.map_err(|_| "the thread that writes the bag has failed")??;
+    Ok(RecorderReport {
+        messages: written.messages.load(Relaxed),
+        bytes: written.bytes.load(Relaxed),
+        seconds: begin.elapsed().as_secs_f64(),
+        topics,
+    })
+}
+
+/// The line about the recording in a terminal, and warnings of losses anywhere.
+struct Status {
+    begin: Instant,
+    due: Instant,
+    before: (u64, u64),
+    lost: u64,
+    terminal: bool,
+}
+
+impl Status {
+    fn new(begin: Instant) -> Self {
+        Self {
+            begin,
+            due: begin + STATUS_PERIOD,
+            before: (0, 0),
+            lost: 0,
+            terminal: stderr().is_terminal(),
+        }
+    }
+
+    fn show(&mut self, session: &Session, written: &Written) {
+        let now = Instant::now();
+        if now < self.due {
+            return;
+        }
+        let period_s = (now - self.due + STATUS_PERIOD).as_secs_f64();
+        self.due = now + STATUS_PERIOD;
+        let lost = session.lost();
+        if lost > self.lost {
+            let more = lost - self.lost;
+            log::warn!("{more} messages lost in the last second, {lost} in all");
+            self.lost = lost;
+        }
+        let (messages, bytes) = (written.messages.load(Relaxed), written.bytes.load(Relaxed));
+        if self.terminal {
+            let rate = (messages - self.before.0) as f64 / period_s;
+            let rate_mb = (bytes - self.before.1) as f64 / period_s / 1e6;
+            let paused = if session.paused.load(Relaxed) {
+                ", paused"
+            } else {
+                ""
+            };
+            eprint!(
+                "\r\x1b[K{:.0} s: {} topics, {messages} messages ({rate:.0}/s), {:.1} MB ({rate_mb:.1} MB/s), \
+                 {lost} lost{paused}",
+                self.begin.elapsed().as_secs_f64(),
+                session.topics.len(),
+                bytes as f64 / 1e6,
+            );
+            let _ = stderr().flush();
+        }
+        self.before = (messages, bytes);
+    }
+
+    fn end(&self) {
+        if self.terminal {
+            eprintln!();
+        }
+    }
+}

@@ -1,0 +1,182 @@
+//! A recording at work: which topics are heard, and what of them was lost.
+
+use std::collections::BTreeMap;
+use std::sync::Arc;
+use std::sync::atomic::{AtomicBool, Ordering::Relaxed};
+
+use lattice_bag::TopicSpec;
+use lattice_runtime::{Load, Node, RemotePublisher, RuntimeError, Subscription};
+
+use super::RecordedTopic;
+use super::cache::{Cache, Item};
+use super::choice::Choice;
+use super::definitions::Definitions;
+use super::offered;
+
+/// Topics of one recording, at most: as many as a file of MCAP has.
+const MAX_TOPICS: usize = 65_000;
+
+/// Types of one topic that are told of, at most.
+const MAX_TYPES: usize = 16;
+
+/// Types whose messages are large: they are taken on threads of their own.
+const LARGE: [&str; 3] = [
+    "sensor_msgs/msg/PointCloud2",
+    "sensor_msgs/msg/Image",
+    "sensor_msgs/msg/CompressedImage",
+];
+
+/// Topics that are being recorded, by the order of their coming.
+pub(super) struct Session {
+    pub node: Node,
+    pub choice: Choice,
+    pub definitions: Definitions,
+    pub cache: Arc<Cache>,
+    /// True while nothing is taken.
+    pub paused: Arc<AtomicBool>,
+    pub topics: Vec<Heard>,
+    /// Topics that were given to the cache, also such as could not be heard.
+    places: usize,
+    /// Types of each name that is recorded or was refused, the recorded one first.
+    seen: BTreeMap<String, Vec<String>>,
+}
+
+/// A topic that is heard.
+pub(super) struct Heard {
+    subscription: Subscription,
+    ros_type: String,
+    place: usize,
+}
+
+impl Session {
+    pub(super) fn new(
+        node: Node,
+        choice: Choice,
+        definitions: Definitions,
+        cache: Arc<Cache>,
+        paused: bool,
+    ) -> Self {
+        Self {
+            node,
+            choice,
+            definitions,
+            cache,
+            paused: Arc::new(AtomicBool::new(paused)),
+            topics: Vec::new(),
+            places: 0,
+            seen: BTreeMap::new(),
+        }
+    }
+
+    /// Begins to hear topics that have come.
+    pub(super) fn look(&mut self) {
+        let publishers = self.node.remote_publishers();
+        let mut by_topic: BTreeMap<&str, Vec<&RemotePublisher>> = BTreeMap::new();
+        for publisher in &publishers {
+            by_topic
+                .entry(&publisher.topic)
+                .or_default()
+                .push(publisher);
+        }
+        for (topic, publishers) in by_topic {
+            if !self.choice.wants(topic) {
+                continue;
+            }
+            let is_new = !self.seen.contains_key(topic);
+            if is_new && self.seen.len() >= MAX_TOPICS {
+                continue;
+            }
+            let types = self.seen.entry(topic.to_owned()).or_default();
+            for publisher in &publishers {
+                let other = &publisher.type_name;
+                if types.contains(other) || types.len() >= MAX_TYPES {
+                    continue;
+                }
+                if let Some(recorded) = types.first() {
+                    log::warn!("{topic}: {other} is not recorded, the topic is one of {recorded}");
+                }
+                types.push(other.clone());
+            }
+            let Some(ros_type) = types.first().cloned() else {
+                continue;
+            };
+            let of_type = publishers.into_iter().filter(|p| p.type_name == ros_type);
+            if is_new && let Err(error) = self.begin(topic, &ros_type, &Vec::from_iter(of_type)) {
+                log::warn!("{topic} is not recorded: {error}");
+            }
+        }
+    }
+
+    fn begin(
+        &mut self,
+        topic: &str,
+        ros_type: &str,
+        publishers: &[&RemotePublisher],
+    ) -> Result<(), RuntimeError> {
+        let place = self.places;
+        let announced = publishers.iter().find_map(|p| p.type_hash.as_deref());
+        let defined = self.definitions.of(ros_type, announced);
+        if defined.is_none() {
+            log::warn!(
+                "{topic}: no definition of {ros_type} is known, it is recorded without one; name the folder \
+                 of its package's `share` with --msg-path"
+            );
+        }
+        let hash = defined.as_ref().map(|(_, hash)| hash.as_str());
+        let hash = announced.or(hash).unwrap_or_default().to_owned();
+        let (cache, paused, clock) = (self.cache.clone(), self.paused.clone(), self.node.clock());
+        let handler = move |data: Vec<u8>| {
+            let log_time_ns = clock.now_ns();
+            // With simulated time there is none before the first message on /clock.
+            if !paused.load(Relaxed) && log_time_ns > 0 {
+                cache.push(Item::Message {
+                    topic: place,
+                    log_time_ns,
+                    data,
+                });
+            }
+        };
+        let load = match LARGE.contains(&ros_type) {
+            true => Load::Large,
+            false => Load::Small,
+        };
+        // First, so that the topic is in the bag before its messages.
+        self.places += 1;
+        self.cache.push(Item::Topic(TopicSpec {
+            name: topic.to_owned(),
+            type_name: ros_type.to_owned(),
+            type_hash: hash,
+            definition: defined.map(|(text, _)| text),
+            offered_qos: publishers.iter().map(|p| offered::noted(p)).collect(),
+        }));
+        let qos = offered::subscription(publishers, load);
+        let heard = self
+            .node
+            .subscribe_raw(topic, ros_type, qos, load, handler)?;
+        self.topics.push(Heard {
+            subscription: heard,
+            ros_type: ros_type.to_owned(),
+            place,
+        });
+        log::info!("recording {topic} ({ros_type})");
+        Ok(())
+    }
+
+    /// Numbers of each topic.
+    pub(super) fn report(&self) -> Vec<RecordedTopic> {
+        let topic = |topic: &Heard| RecordedTopic {
+            name: topic.subscription.topic().to_owned(),
+            type_name: topic.ros_type.clone(),
+            heard: topic.subscription.received(),
+            lost: (topic.subscription.lost()).saturating_add(topic.subscription.undecodable()),
+            not_written: self.cache.lost(topic.place),
+        };
+        self.topics.iter().map(topic).collect()
+    }
+
+    /// Messages that did not get here or found no room.
+    pub(super) fn lost(&self) -> u64 {
+        let lost = self.topics.iter().map(|topic| topic.subscription.lost());
+        lost.fold(self.cache.all_lost(), u64::saturating_add)
+    }
+}

@@ -1,0 +1,71 @@
+//! Crates of others: their licences and sources are those that `deny.toml` allows, where there is no
+//! `cargo deny`.
+
+use std::fs;
+
+use serde_json::Value;
+
+use super::crates::cargo;
+use super::root;
+
+/// Texts of a list in `deny.toml`.
+fn list(key: &str) -> Vec<String> {
+    let text = fs::read_to_string(root().join("deny.toml")).unwrap();
+    let (_, rest) = text.split_once(&format!("\n{key} = [")).unwrap();
+    let (list, _) = rest.split_once(']').unwrap();
+    list.split('"')
+        .skip(1)
+        .step_by(2)
+        .map(str::to_owned)
+        .collect()
+}
+
+/// True if an SPDX expression can be met by licences that are allowed: one of each alternative.
+fn is_met(expression: &str, allowed: &[String]) -> bool {
+    let plain = expression.replace(['(', ')'], "").replace('/', " OR ");
+    let is_allowed = |licence: &str| allowed.iter().any(|name| name == licence.trim());
+    let mut parts = plain.split(" AND ");
+    parts.all(|part| part.split(" OR ").any(is_allowed))
+}
+
+#[test]
+fn crates_of_others_have_licences_and_sources_that_are_allowed() {
+    let (licences, sources, banned) = (list("allow"), list("allow-registry"), list("deny"));
+    let metadata = cargo(&["metadata", "--format-version", "1"]);
+    let metadata: Value = serde_json::from_str(&metadata).unwrap();
+    let mut others = 0;
+    for package in metadata["packages"].as_array().unwrap() {
+        let name = package["name"].as_str().unwrap();
+        assert!(
+            !banned.iter().any(|banned| banned == name),
+            "{name} is banned"
+        );
+        let licence = package["license"].as_str().unwrap_or_default();
+        assert!(is_met(licence, &licences), "{name}: {licence:?}");
+        // Ours have none.
+        if let Some(source) = package["source"].as_str() {
+            let registry = source.strip_prefix("registry+").unwrap_or(source);
+            assert!(
+                sources.iter().any(|allowed| allowed == registry),
+                "{name}: {source}"
+            );
+            others += 1;
+        }
+    }
+    assert!(others > 100, "{others} crates of others");
+}
+
+#[test]
+fn licences_are_read_as_alternatives() {
+    let allowed = ["MIT", "Zlib"].map(str::to_owned);
+    for (expression, met) in [
+        ("MIT/Apache-2.0", true),
+        ("GPL-3.0 OR (MIT)", true),
+        ("(MIT OR GPL-3.0) AND Zlib", true),
+        ("MIT AND GPL-3.0", false),
+        ("Apache-2.0 WITH LLVM-exception", false),
+        ("", false),
+    ] {
+        assert_eq!(is_met(expression, &allowed), met, "{expression}");
+    }
+}
