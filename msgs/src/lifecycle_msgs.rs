@@ -40,6 +40,18 @@ impl State {
     pub const PRIMARY_STATE_ACTIVE: u8 = 3;
     /// The node is to be ended.
     pub const PRIMARY_STATE_FINALIZED: u8 = 4;
+    /// On the way: configuring.
+    pub const TRANSITION_STATE_CONFIGURING: u8 = 10;
+    /// On the way: cleaningup.
+    pub const TRANSITION_STATE_CLEANINGUP: u8 = 11;
+    /// On the way: shuttingdown.
+    pub const TRANSITION_STATE_SHUTTINGDOWN: u8 = 12;
+    /// On the way: activating.
+    pub const TRANSITION_STATE_ACTIVATING: u8 = 13;
+    /// On the way: deactivating.
+    pub const TRANSITION_STATE_DEACTIVATING: u8 = 14;
+    /// On the way: errorprocessing.
+    pub const TRANSITION_STATE_ERRORPROCESSING: u8 = 15;
 }
 
 /// A way from one state to another.
@@ -52,6 +64,8 @@ pub struct Transition {
 }
 
 impl Transition {
+    /// Create.
+    pub const TRANSITION_CREATE: u8 = 0;
     /// Takes up resources.
     pub const TRANSITION_CONFIGURE: u8 = 1;
     /// Gives resources back.
@@ -60,6 +74,56 @@ impl Transition {
     pub const TRANSITION_ACTIVATE: u8 = 3;
     /// Ceases to work.
     pub const TRANSITION_DEACTIVATE: u8 = 4;
+    /// Unconfigured shutdown.
+    pub const TRANSITION_UNCONFIGURED_SHUTDOWN: u8 = 5;
+    /// Inactive shutdown.
+    pub const TRANSITION_INACTIVE_SHUTDOWN: u8 = 6;
+    /// Active shutdown.
+    pub const TRANSITION_ACTIVE_SHUTDOWN: u8 = 7;
+    /// Destroy.
+    pub const TRANSITION_DESTROY: u8 = 8;
+    /// End of configure: success.
+    pub const TRANSITION_ON_CONFIGURE_SUCCESS: u8 = 10;
+    /// End of configure: failure.
+    pub const TRANSITION_ON_CONFIGURE_FAILURE: u8 = 11;
+    /// End of configure: error.
+    pub const TRANSITION_ON_CONFIGURE_ERROR: u8 = 12;
+    /// End of cleanup: success.
+    pub const TRANSITION_ON_CLEANUP_SUCCESS: u8 = 20;
+    /// End of cleanup: failure.
+    pub const TRANSITION_ON_CLEANUP_FAILURE: u8 = 21;
+    /// End of cleanup: error.
+    pub const TRANSITION_ON_CLEANUP_ERROR: u8 = 22;
+    /// End of activate: success.
+    pub const TRANSITION_ON_ACTIVATE_SUCCESS: u8 = 30;
+    /// End of activate: failure.
+    pub const TRANSITION_ON_ACTIVATE_FAILURE: u8 = 31;
+    /// End of activate: error.
+    pub const TRANSITION_ON_ACTIVATE_ERROR: u8 = 32;
+    /// End of deactivate: success.
+    pub const TRANSITION_ON_DEACTIVATE_SUCCESS: u8 = 40;
+    /// End of deactivate: failure.
+    pub const TRANSITION_ON_DEACTIVATE_FAILURE: u8 = 41;
+    /// End of deactivate: error.
+    pub const TRANSITION_ON_DEACTIVATE_ERROR: u8 = 42;
+    /// End of shutdown: success.
+    pub const TRANSITION_ON_SHUTDOWN_SUCCESS: u8 = 50;
+    /// End of shutdown: failure.
+    pub const TRANSITION_ON_SHUTDOWN_FAILURE: u8 = 51;
+    /// End of shutdown: error.
+    pub const TRANSITION_ON_SHUTDOWN_ERROR: u8 = 52;
+    /// End of error: success.
+    pub const TRANSITION_ON_ERROR_SUCCESS: u8 = 60;
+    /// End of error: failure.
+    pub const TRANSITION_ON_ERROR_FAILURE: u8 = 61;
+    /// End of error: error.
+    pub const TRANSITION_ON_ERROR_ERROR: u8 = 62;
+    /// Outcome of the work: success.
+    pub const TRANSITION_CALLBACK_SUCCESS: u8 = 97;
+    /// Outcome of the work: failure.
+    pub const TRANSITION_CALLBACK_FAILURE: u8 = 98;
+    /// Outcome of the work: error.
+    pub const TRANSITION_CALLBACK_ERROR: u8 = 99;
 }
 
 /// A transition with its ends.

@@ -12,7 +12,6 @@ import ros_idl as ros
 from cyclonedds.idl.types import float64, uint64
 
 
-
 def service(name, *fields):
     return ros.service(f"rosbag2_interfaces/srv/{name}", *fields)
 

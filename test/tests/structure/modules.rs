@@ -181,9 +181,13 @@ fn every_public_module_of_the_core_has_a_user() {
     }
 }
 
-/// Places that write files by other means than `WholeFile`: itself, and the writers of bags, whose files are
-/// read as far as they go.
-const WRITERS: [&str; 2] = ["nodes/src/files/whole.rs", "nodes/bag/src/writer/"];
+/// Places that write files by other means than `WholeFile`: itself, and those whose files are read as far as
+/// they go, the writers of bags and of the log.
+const WRITERS: [&str; 3] = [
+    "nodes/src/files/whole.rs",
+    "nodes/bag/src/writer/",
+    "nodes/runtime/src/logging/file.rs",
+];
 
 #[test]
 fn files_are_written_by_the_one_writer() {

@@ -43,7 +43,7 @@ fn health_is_what_nodes_say_of_themselves() {
         message: "no disk".to_owned(),
         ..DiagnosticStatus::default()
     };
-    runtime.timer(Duration::from_millis(100), move || {
+    let _timer = runtime.timer(Duration::from_millis(100), move || {
         let message = DiagnosticArray {
             status: vec![ill.clone()],
             ..DiagnosticArray::default()
