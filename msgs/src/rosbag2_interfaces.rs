@@ -125,14 +125,14 @@ pub struct Burst;
 /// Request of [`Burst`].
 #[derive(Clone, Debug, Default, PartialEq, Serialize, Deserialize)]
 pub struct BurstRequest {
-    /// How many; 0: all.
+    /// Number of messages; 0: all.
     pub num_messages: u64,
 }
 
 /// Response of [`Burst`].
 #[derive(Clone, Debug, Default, PartialEq, Serialize, Deserialize)]
 pub struct BurstResponse {
-    /// How many were played.
+    /// Messages that were played.
     pub actually_burst: u64,
 }
 

@@ -3,7 +3,7 @@
 use lattice_runtime::LoopbackDomain;
 use lattice_runtime::env::Network;
 
-/// Where it is set, tests leave it to multicast to find peers: for a network namespace of their own.
+/// Variable that leaves it to multicast to find peers where it is set: for a network namespace of its own.
 const MULTICAST: &str = "LATTICE_TEST_MULTICAST";
 
 /// True unless the tests run in a network of their own that has multicast.

@@ -72,7 +72,7 @@ pub enum SecurityError {
     File {
         /// The file.
         path: PathBuf,
-        /// What the system says.
+        /// Reason that the system gives.
         error: io::Error,
     },
     /// RustDDS was chosen.

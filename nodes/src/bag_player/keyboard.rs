@@ -66,7 +66,7 @@ struct Keys {
 }
 
 impl Keys {
-    /// What a byte completes.
+    /// Key that a byte completes.
     fn press(&mut self, byte: u8) -> Option<fn(&mut Playback)> {
         let before = std::mem::take(&mut self.escape);
         match (before, byte) {

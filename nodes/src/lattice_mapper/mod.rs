@@ -59,7 +59,7 @@ pub struct LatticeMapper {
     history: map::History,
     origin: Option<GeoPoint>,
     last_stamp_ns: i64,
-    /// Where voxels grow old.
+    /// Set if voxels grow old.
     stamps: Option<StampGate>,
     /// Stamp at which old voxels were last looked for.
     forgot_at_ns: i64,

@@ -41,7 +41,7 @@ pub(super) struct OpenUpdate {
     pub chunks: Chunks,
     /// Over the chunks that have come.
     pub sum: u64,
-    /// What the map is to be after it.
+    /// State of the map after it.
     pub history: History,
     pub voxels_total: u64,
 }

@@ -8,6 +8,7 @@ mod headset_scans;
 mod intake;
 pub mod node;
 mod options;
+mod outputs;
 mod parameters;
 mod results;
 mod search;

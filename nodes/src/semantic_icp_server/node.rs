@@ -14,6 +14,7 @@ use lattice_msgs::sensor_msgs::PointCloud2;
 use lattice_msgs::std_msgs::{Empty, String as StringMessage};
 use lattice_msgs::vision_msgs::LabelInfo;
 
+use super::outputs::Outputs;
 use super::parameters::Settings;
 use super::search_thread::{SearchPort, SearchThread};
 use super::{CallId, End, LatticeSearch, Output, SemanticIcpServer, ServerOptions};
@@ -24,8 +25,8 @@ use crate::start::{Finish, NodeError, handed_over, open_params};
 use lattice_runtime::logging::Throttle;
 use lattice_runtime::qos::Qos;
 use lattice_runtime::{
-    ActionLimits, Clock, Diagnostics, Feedback, GoalHandle, Level, Load, Losses, Publisher, Reply,
-    Runtime, TfBroadcaster, Undecoded, lock,
+    ActionLimits, Clock, Diagnostics, Feedback, GoalHandle, Level, Load, Losses, Reply, Runtime,
+    Undecoded, lock,
 };
 
 /// Between two messages on diagnostics.
@@ -64,17 +65,12 @@ pub fn start(runtime: &Runtime, name: &str) -> Result<Finish, NodeError> {
     let calibration = search.options();
     let lost = Arc::new(AtomicU64::new(0));
     let map_lost = Arc::new(AtomicBool::new(false));
-    let outputs = Outputs {
-        calibration: node.publisher("calibration", Qos::latched(1))?,
-        tf: TfBroadcaster::new(&node)?,
-        request: node.publisher(&format!("{mapper}/request_keyframe"), Qos::DEFAULT)?,
-    };
     let losses = Losses::default();
     let mut shell = Shell {
         losses: losses.clone(),
         machine: SemanticIcpServer::new(server),
         search: None,
-        outputs,
+        outputs: Outputs::open(&node, &mapper)?,
         diagnostics: node.diagnostics(),
         clock: node.clock(),
         lost: Arc::clone(&lost),
@@ -181,13 +177,6 @@ fn notify(inbox: &Inbox<Event>, event: Event) {
     if !inbox.send(event, 0) {
         log::debug!("the inbox is full");
     }
-}
-
-/// The topics that the node speaks on.
-struct Outputs {
-    calibration: Publisher<CalibrationResult>,
-    tf: TfBroadcaster,
-    request: Publisher<Empty>,
 }
 
 /// A client that waits.

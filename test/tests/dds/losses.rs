@@ -1,4 +1,4 @@
-//! What a node loses before its inbox: in its diagnostics while it runs, and alike in its report.
+//! Losses of a node before its inbox: in its diagnostics while it runs, and alike in its report.
 
 use std::sync::mpsc::channel;
 

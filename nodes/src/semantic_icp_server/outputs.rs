@@ -1,0 +1,26 @@
+//! Publishers of the node.
+
+use lattice_msgs::calibration::CalibrationResult;
+use lattice_msgs::std_msgs::Empty;
+use lattice_runtime::qos::Qos;
+use lattice_runtime::{Node, Publisher, TfBroadcaster};
+
+use crate::start::NodeError;
+
+/// The topics that the node speaks on.
+pub(super) struct Outputs {
+    pub calibration: Publisher<CalibrationResult>,
+    pub tf: TfBroadcaster,
+    pub request: Publisher<Empty>,
+}
+
+impl Outputs {
+    /// `mapper` is asked for keyframes.
+    pub(super) fn open(node: &Node, mapper: &str) -> Result<Self, NodeError> {
+        Ok(Self {
+            calibration: node.publisher("calibration", Qos::latched(1))?,
+            tf: TfBroadcaster::new(node)?,
+            request: node.publisher(&format!("{mapper}/request_keyframe"), Qos::DEFAULT)?,
+        })
+    }
+}
