@@ -15,6 +15,7 @@ use super::local_bus::LocalEndpoint;
 use super::outbox::{Outbox, Serialize};
 use super::peers::Peers;
 use super::port::{Bytes, ENCAPSULATION_BYTES};
+use super::qos::Qos;
 use super::shutdown::Shutdown;
 use super::sync::lock;
 
@@ -29,19 +30,24 @@ pub(crate) struct PublisherParts {
     pub _graph: NodeEndpoint,
 }
 
-/// The last messages of a latched publisher from while no other process listened. They are serialised
-/// when one does.
+/// The last messages of a latched publisher that no other process has listened to yet. They are
+/// serialised when the first one does; from then on DDS keeps them.
 pub(crate) struct Latch {
     kept: VecDeque<Serialize>,
     depth: usize,
+    /// Late joiners get everything anew: for DDS there is nothing to keep while nobody listens.
+    renewed: bool,
+    heard: bool,
 }
 
 impl Latch {
-    /// Keeps up to `depth` messages.
-    pub(crate) fn new(depth: usize) -> Self {
+    /// Keeps as many messages as `qos` has for late joiners.
+    pub(crate) fn new(qos: &Qos) -> Self {
         Self {
             kept: VecDeque::new(),
-            depth,
+            depth: qos.kept(),
+            renewed: qos.kept.is_some(),
+            heard: false,
         }
     }
 }
@@ -56,7 +62,7 @@ impl PublisherParts {
             };
         };
         let mut latch = lock(latch);
-        if remote {
+        if remote || latch.heard && !latch.renewed {
             self.release(&mut latch);
             return self.writer.send(message);
         }
@@ -77,6 +83,7 @@ impl PublisherParts {
     }
 
     fn release(&self, latch: &mut Latch) {
+        latch.heard = true;
         for message in latch.kept.drain(..) {
             // A full queue is counted as a drop.
             let _ = self.writer.send(message);

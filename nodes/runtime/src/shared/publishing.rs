@@ -76,7 +76,7 @@ impl Shared {
             writer,
             peers: Arc::clone(&peers),
             local,
-            latch: (qos.kept() > 0).then(|| Mutex::new(Latch::new(qos.kept()))),
+            latch: (qos.kept() > 0).then(|| Mutex::new(Latch::new(qos))),
             shutdown: self.shutdown.clone(),
             _graph: self.graph.join(node, EndpointKind::Writer, id),
         });
