@@ -231,7 +231,7 @@ fn an_earlier_log_is_replaced_only_when_allowed() {
         (written, fractions)
     };
     let refused = again(false).0.unwrap_err().to_string();
-    assert!(refused.contains("there is a log already"), "{refused}");
+    assert!(refused.contains("exists already"), "{refused}");
     let (written, fractions) = again(true);
     assert_eq!(
         BagReader::open(&out).unwrap().message_count(),
