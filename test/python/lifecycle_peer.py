@@ -39,11 +39,12 @@ def cloud(x):
 class Manager:
     def __init__(self, domain):
         self.peer, self.events, self.voxels = Peer(domain), [], None
+        # Endpoints are announced in order: a node that answers a call knows this reader already.
+        self.peer.reader(f"rt/{NODE}/transition_event", ros.TransitionEvent, qos(20), self.on_event)
         self.calls = {
             name: Calls(self.peer, f"{NODE}/{name}", *ros.service(f"lifecycle_msgs/srv/{kind}", *types))
             for name, (kind, *types) in SERVICES.items()
         }
-        self.peer.reader(f"rt/{NODE}/transition_event", ros.TransitionEvent, qos(10), self.on_event)
         self.peer.until_matched()
         self.points = self.peer.writer("rt/points_enu", ros.PointCloud2, qos(5))
         self.peer.reader("rt/map", ros.LatticeMap, qos(500, latched=True), self.on_map)
@@ -65,6 +66,12 @@ class Manager:
 
     def transitions(self, name="get_available_transitions"):
         return [[t.transition.id, t.transition.label, t.goal_state.id] for t in self.ask(name)]
+
+    def goes(self, goal):
+        """Waits for the event of a transition that has ended in this state."""
+        self.peer.until(
+            lambda: self.events[-1:] and self.events[-1][2] == goal, lambda: f"transitions: {self.events}"
+        )
 
     def meets_mapper(self):
         """Waits until the mapper hears our cloud topic and we its map."""
@@ -98,7 +105,8 @@ def main():
     said["configure"] = manager.change("configure")
     said["inactive"] = manager.transitions()
     manager.meets_mapper()
-    manager.points.write(cloud(50.0))
+    # Of a cell that the map gets anyway: should the mapper be slow, it is active when this comes.
+    manager.points.write(cloud(0.0))
     manager.change()
     assert manager.voxels is None, "an inactive node publishes nothing"
     said["activate"] = manager.change("", 3)
@@ -111,6 +119,7 @@ def main():
     manager.map_of(1)
     said["shutdown"] = manager.change("shutdown")
     said["at last"] = manager.transitions()
+    manager.goes("finalized")
     said["events"] = manager.events
     print(json.dumps(said))
 

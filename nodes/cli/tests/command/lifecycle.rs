@@ -72,7 +72,7 @@ fn a_managed_mapper_goes_through_the_states_of_rclcpp_lifecycle() {
     assert_eq!(said["again"], json!([[true, "inactive"], [true, "active"]]));
     assert_eq!(said["at last"], json!([]));
     let events = said["events"].as_array().unwrap();
-    assert_eq!(events.len(), 14);
+    assert_eq!(events.len(), 14, "{events:?}");
     assert_eq!(
         events[0],
         json!(["configure", "unconfigured", "configuring"])
