@@ -53,7 +53,7 @@ class Manager:
         self.events.append([event.transition.label, event.start_state.label, event.goal_state.label])
 
     def on_map(self, chunk):
-        self.voxels = chunk.voxels_total
+        self.voxels, self.info = chunk.voxels_total, chunk.info
 
     def ask(self, name, *fields):
         """The only field of an answer."""
@@ -75,7 +75,7 @@ class Manager:
 
     def meets_mapper(self):
         """Waits until the mapper hears our cloud topic and we its map."""
-        topics = ("rt/points_enu", "rt/map")
+        topics = ("rt/points_enu", "rt/map", "rt/map_origin")
         self.peer.until(
             lambda: all(self.peer.matched.get(topic) for topic in topics),
             lambda: f"endpoints matched: {self.peer.matched}",
@@ -102,15 +102,20 @@ def main():
     said["activate too early"] = manager.change("activate")
     said["unknown"] = manager.change("transition_success")
     assert not manager.peer.matched.get("rt/map"), "an unconfigured node has no topics"
+    # Latched once, for an inactive node.
+    origin = manager.peer.writer("rt/map_origin", ros.GeoPointStamped, qos(1, latched=True))
+    origin.write(ros.GeoPointStamped(header(0, "earth"), ros.GeoPoint(48.1, 11.5, 515.0)))
     said["configure"] = manager.change("configure")
     said["inactive"] = manager.transitions()
     manager.meets_mapper()
+    assert origin.wait_for_acks(duration(seconds=PATIENCE_S))
     # Of a cell that the map gets anyway: should the mapper be slow, it is active when this comes.
     manager.points.write(cloud(0.0))
     manager.change()
     assert manager.voxels is None, "an inactive node publishes nothing"
     said["activate"] = manager.change("", 3)
     manager.map_of(3)
+    said["origin"] = manager.info.has_origin and manager.info.origin.latitude
     said["deactivate"] = manager.change("deactivate")
     said["cleanup"] = manager.change("cleanup")
     manager.peer.until(lambda: not manager.peer.matched["rt/map"], lambda: "the map is still there")

@@ -104,6 +104,7 @@ DiagnosticArray = ros(
 GeoPoint = ros(
     "geographic_msgs/msg/GeoPoint", latitude=float64, longitude=float64, altitude=float64
 )
+GeoPointStamped = ros("geographic_msgs/msg/GeoPointStamped", header=Header, position=GeoPoint)
 LatticeInfo = ros(
     "lattice_msgs/msg/LatticeInfo",
     lattice=str,

@@ -1,4 +1,5 @@
-//! The gate of a managed node: while it is closed, publishers are silent and subscriptions deaf.
+//! The gate of a managed node: while it is closed, publishers are silent and subscriptions deaf but for
+//! latched topics.
 
 use std::sync::atomic::{AtomicBool, Ordering::Relaxed};
 use std::sync::{Arc, Mutex, Weak};

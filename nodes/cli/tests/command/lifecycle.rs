@@ -70,6 +70,7 @@ fn a_managed_mapper_goes_through_the_states_of_rclcpp_lifecycle() {
         assert_eq!(said[step], json!([true, state]), "{step}");
     }
     assert_eq!(said["again"], json!([[true, "inactive"], [true, "active"]]));
+    assert_eq!(said["origin"], json!(48.1));
     assert_eq!(said["at last"], json!([]));
     let events = said["events"].as_array().unwrap();
     assert_eq!(events.len(), 14, "{events:?}");

@@ -14,7 +14,7 @@ use super::graph::NodeId;
 use super::names::{self, NameKind};
 use super::params::Params;
 use super::publisher::{Publisher, RawPublisher};
-use super::qos::Qos;
+use super::qos::{Durability, Qos};
 use super::remote::RemotePublisher;
 use super::ros_args::RosArgs;
 use super::shared::{DEFAULT_MAX_MESSAGE_BYTES, Shared};
@@ -236,8 +236,10 @@ impl Node {
         let qos = qos.with_overrides(&self.inner.params, &resolved, topic)?;
         let max = self.inner.max_message_bytes;
         let gate = Arc::clone(&self.inner.gate);
+        // Latched samples come once: an inactive node that dropped them would never have them.
+        let latched = qos.durability == Durability::TransientLocal;
         let handler = move |sample: Sample<'_, M>, stats: &Arc<Stats>| {
-            if gate.is_open() {
+            if latched || gate.is_open() {
                 handler(sample, stats);
             }
         };
