@@ -53,6 +53,7 @@ impl Running {
                 node.lifecycle = Some(lifecycle);
             }
         }
+        self.requests.end();
         // In the order in which data flows, so that each still gets what the one before publishes.
         let mut servers = Vec::new();
         for node in &mut self.nodes {

@@ -62,6 +62,15 @@ impl Diagnostics {
             states.insert(key, status);
         }
     }
+
+    /// Calls all tasks of the node stale: it has ended, and its figures are of the past.
+    pub(crate) fn end(&self) {
+        let mut states = lock(&self.tasks.states);
+        for (_, status) in states.iter_mut().filter(|(key, _)| key.0 == self.node) {
+            status.level = DiagnosticStatus::STALE;
+            status.message = "not at work".to_owned();
+        }
+    }
 }
 
 /// One state under the name that the tools expect, `node: task`.
@@ -125,6 +134,17 @@ mod tests {
         assert_eq!(
             (map.level, map.values[0].value.as_str()),
             (DiagnosticStatus::OK, "7")
+        );
+        diagnostics.end();
+        let ended = &tasks
+            .message(
+                0,
+                status("/robot/mapper", "transport", Level::Ok, "x", [("", "")]),
+            )
+            .status;
+        assert_eq!(
+            (ended[0].level, ended[1].level),
+            (DiagnosticStatus::OK, DiagnosticStatus::STALE)
         );
     }
 }

@@ -16,6 +16,7 @@ use smol::channel::{Receiver, Sender, unbounded};
 use smol::future::{block_on, or};
 
 use crate::error::RuntimeError;
+use crate::names::shown;
 use crate::node::Node;
 use crate::publisher::Publisher;
 use crate::qos::Qos;
@@ -53,6 +54,14 @@ impl ChangeRequests {
             None
         };
         block_on(or(ended, async { self.waiting.recv().await.ok() }))
+    }
+
+    /// Refuses those that wait, and all that come.
+    pub fn end(&self) {
+        self.waiting.close();
+        while let Ok(change) = self.waiting.try_recv() {
+            change.reply.send(ChangeStateResponse { success: false });
+        }
     }
 }
 
@@ -127,7 +136,8 @@ impl Lifecycle {
         let name = self.node.fqn();
         let (Some(edge), Some(step)) = (begun, begun.and_then(Edge::step)) else {
             let state = lock(&self.machine).state().label;
-            log::error!("{name}: no transition {wanted:?} from the state {state}");
+            let (id, label) = (wanted.id, shown(&wanted.label));
+            log::error!("{name}: no transition {id} {label:?} from the state {state}");
             change.reply.send(ChangeStateResponse { success: false });
             return;
         };
@@ -145,6 +155,9 @@ impl Lifecycle {
         }
         if success && step == Step::Activate {
             self.node.gate().set(true);
+        }
+        if matches!(step, Step::Cleanup | Step::Shutdown) {
+            self.node.diagnostics().end();
         }
         log::info!("{name}: {}", lock(&self.machine).state().label);
         change.reply.send(ChangeStateResponse { success });
