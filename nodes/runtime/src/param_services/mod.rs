@@ -24,6 +24,8 @@ use super::service::Server;
 
 /// Most names or parameters of one request; none of more are answered.
 const MAX_NAMES: usize = 1000;
+/// Items of arrays and bytes of strings in one answer, at most.
+const MAX_ANSWER_LENGTH: usize = 1 << 20;
 
 /// Serves the six parameter services of `node` for as long as the servers live, and tells of new and
 /// changed parameters.
@@ -72,9 +74,20 @@ fn answer<S: RosService + 'static>(
 
 fn get_values(params: &Params, request: &GetParametersRequest) -> GetParametersResponse {
     let declared = params.declared();
-    let value = |name: &String| declared.get(name).map(value_message).unwrap_or_default();
+    let values = || {
+        bounded(&request.names)
+            .iter()
+            .map(|name| declared.get(name))
+    };
+    // A small request can name a large value a thousand times.
+    let length: usize = values().flatten().map(ParamValue::length).sum();
+    if length > MAX_ANSWER_LENGTH {
+        log::warn!("a request for parameters of {length} bytes and items is answered with none");
+        return GetParametersResponse::default();
+    }
+    let message = |value: Option<&ParamValue>| value.map(value_message).unwrap_or_default();
     GetParametersResponse {
-        values: bounded(&request.names).iter().map(value).collect(),
+        values: values().map(message).collect(),
     }
 }
 
@@ -189,6 +202,20 @@ mod tests {
                 .values
                 .is_empty()
         );
+    }
+
+    #[test]
+    fn a_large_value_is_not_given_a_thousand_times() {
+        let classes = ParamValue::I64Array(vec![1; MAX_ANSWER_LENGTH / 500]);
+        let params = Params::from_values("/n", [("ignored_labels", classes)]);
+        params.i64_array("ignored_labels", &[]).unwrap();
+        let values = |n: usize| {
+            let names = vec!["ignored_labels".to_owned(); n];
+            get_values(&params, &GetParametersRequest { names })
+                .values
+                .len()
+        };
+        assert_eq!((values(499), values(501)), (499, 0));
     }
 
     #[test]
