@@ -93,12 +93,22 @@ pub fn run(arguments: impl IntoIterator<Item = String>) -> Result<(), NodeError>
         false => None,
     };
     let changes = controls.sender();
+    let now = Arc::clone(params);
     open_params(params, move |params| {
-        let settings = Settings::from_params(params).map_err(|error| error.to_string())?;
-        let (rate, max_wait) = (settings.player.rate, settings.max_wait);
+        let read = |params| Settings::from_params(params).map_err(|error| error.to_string());
+        let (
+            Settings {
+                player, max_wait, ..
+            },
+            now,
+        ) = (read(params)?, read(&now)?);
+        // The change of another parameter must not undo a rate that a key or service asks for.
+        let (rate, changed) = (player.rate, player.rate != now.player.rate);
         let sent = changes.send(Box::new(move |playback| {
             playback.most_wait = max_wait;
-            playback.change_rate(rate);
+            if changed {
+                playback.set_rate(rate);
+            }
         }));
         sent.map_err(|_| "the log has ended".to_owned())
     });

@@ -95,9 +95,10 @@ pub fn start(runtime: &Runtime, name: &str) -> Result<Finish, NodeError> {
     });
     open_params(params, move |params| {
         let settings = Settings::from_params(params).map_err(|error| error.to_string())?;
-        period.set(settings.period);
         let event = Event::Settings(settings.markers, settings.budget_bytes);
-        handed_over(inbox.send(event, 0))
+        handed_over(inbox.send(event, 0))?;
+        period.set(settings.period);
+        Ok(())
     });
     Ok(Box::new(move || {
         drop((maps, updates));
