@@ -29,7 +29,7 @@ pub struct Flat(Vec<Patch>);
 
 impl Default for Flat {
     fn default() -> Self {
-        let mut flat = Self(Vec::new());
+        let mut flat = Self::empty();
         flat.add([0., 0., 0.], [9., 0., 0.], [0., 6., 0.], FLOOR);
         for (corner, along) in [
             ([0., 0.], [9., 0.]),
@@ -42,19 +42,29 @@ impl Default for Flat {
             let ([x, y], [u, v]) = (corner, along);
             flat.add([x, y, 0.], [u, v, 0.], [0., 0., 2.6], WALL);
         }
-        for ([x, y, z], [a, b, c], label) in FURNITURE {
-            flat.add([x, y, z + c], [a, 0., 0.], [0., b, 0.], label);
-            flat.add([x, y, z], [a, 0., 0.], [0., 0., c], label);
-            flat.add([x, y + b, z], [a, 0., 0.], [0., 0., c], label);
-            flat.add([x, y, z], [0., b, 0.], [0., 0., c], label);
-            flat.add([x + a, y, z], [0., b, 0.], [0., 0., c], label);
+        for (corner, size, label) in FURNITURE {
+            flat.add_box(corner, size, label);
         }
         flat
     }
 }
 
 impl Flat {
-    fn add(&mut self, corner: [f64; 3], u: [f64; 3], v: [f64; 3], label: u16) {
+    /// Nothing yet.
+    pub(crate) fn empty() -> Flat {
+        Flat(Vec::new())
+    }
+
+    /// The top and the four sides of a box.
+    pub(crate) fn add_box(&mut self, [x, y, z]: [f64; 3], [a, b, c]: [f64; 3], label: u16) {
+        self.add([x, y, z + c], [a, 0., 0.], [0., b, 0.], label);
+        self.add([x, y, z], [a, 0., 0.], [0., 0., c], label);
+        self.add([x, y + b, z], [a, 0., 0.], [0., 0., c], label);
+        self.add([x, y, z], [0., b, 0.], [0., 0., c], label);
+        self.add([x + a, y, z], [0., b, 0.], [0., 0., c], label);
+    }
+
+    pub(crate) fn add(&mut self, corner: [f64; 3], u: [f64; 3], v: [f64; 3], label: u16) {
         self.0.push((corner.into(), u.into(), v.into(), label));
     }
 
@@ -103,7 +113,7 @@ impl Flat {
             for j in -30..30_i32 {
                 let (az, el) = (yaw + f64::from(i) * 0.012, -0.25 + f64::from(j) * 0.012);
                 let way = Vector3::new(az.cos() * el.cos(), az.sin() * el.cos(), el.sin());
-                if let Some((distance, label)) = self.hit(&eye, &way) {
+                if let Some((distance, label)) = self.hit(&eye, &way, 8.0) {
                     // A few millimetres off, other ones for each ray.
                     let off = 0.004 * f64::from((i * 7 + j * 13).rem_euclid(11) - 5) / 5.0;
                     let place = eye + way * (distance + off);
@@ -115,14 +125,20 @@ impl Flat {
         cloud
     }
 
-    fn hit(&self, eye: &Point3<f64>, way: &Vector3<f64>) -> Option<(f64, u16)> {
+    /// Distance and class of the first surface along a ray, within `range_m`.
+    pub(crate) fn hit(
+        &self,
+        eye: &Point3<f64>,
+        way: &Vector3<f64>,
+        range_m: f64,
+    ) -> Option<(f64, u16)> {
         let hits = self.0.iter().filter_map(|(corner, u, v, label)| {
             let normal = u.cross(v);
             let distance = normal.dot(&(corner - eye.coords)) / normal.dot(way);
             let off = eye.coords + way * distance - corner;
             let within =
                 |side: &Vector3<f64>| (0.0..1.0).contains(&(off.dot(side) / side.norm_squared()));
-            let is_hit = distance > 0.05 && distance < 8.0 && within(u) && within(v);
+            let is_hit = distance > 0.05 && distance < range_m && within(u) && within(v);
             is_hit.then_some((distance, *label))
         });
         hits.min_by(|a, b| a.0.total_cmp(&b.0))

@@ -7,3 +7,4 @@ pub mod flat;
 pub mod maps;
 pub mod python;
 pub mod random;
+pub mod rooms;

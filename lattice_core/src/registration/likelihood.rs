@@ -1,5 +1,7 @@
 //! Likelihood of a pose given a source and a target, by which all candidates are judged.
 
+use std::collections::BTreeMap;
+
 use nalgebra::{Isometry3, Point3, Vector3};
 use rayon::prelude::*;
 
@@ -14,6 +16,8 @@ const CONTRAST: f64 = 25.0;
 const FOLDS: usize = 5;
 /// Points of a region that count as independent, at most.
 const INDEPENDENT: f64 = 4.0;
+/// Standard deviation of a normal distribution over its median deviation.
+const DEVIATION_OF_MEDIAN: f64 = 1.4826;
 /// Target points that a source point may belong to.
 const NEIGHBORS: usize = 4;
 
@@ -247,27 +251,60 @@ impl<'a> Fit<'a> {
         }
         let counts = self.count(partners, closeness);
         let lifts = lifts(&counts, known, agreement);
-        let mut both = 0.0;
-        for (i, near) in partners.of_point.iter().enumerate() {
-            let label = self.source.label(i);
-            let lift = self
-                .folds
-                .get(i)
-                .and_then(|&fold| lifts.get(usize::from(fold)));
-            let mut labelled = 0.0;
-            for partner in near.iter().filter(|p| p.beside > 0.0) {
-                labelled += partner.nearness(closeness)
-                    * lift.map_or(1.0, |lift| {
-                        lift.expected(&label, &self.target.label(partner.target as usize))
-                    });
-            }
-            both += self.weight(i) * log_density(labelled);
-        }
+        let points = 0..partners.of_point.len();
+        let both: f64 = points
+            .map(|i| self.of_point(i, partners, closeness, &lifts))
+            .sum();
         let likelihood = Likelihood {
             surfaces,
             labels: both - surfaces,
         };
         (likelihood, sum(counts.iter()))
+    }
+
+    /// Log-likelihood of one point.
+    fn of_point(&self, i: usize, partners: &Partners, closeness: f64, lifts: &[Lift]) -> f64 {
+        let Some(near) = partners.of_point.get(i) else {
+            return 0.0;
+        };
+        let label = self.source.label(i);
+        let lift = (self.folds.get(i)).and_then(|&fold| lifts.get(usize::from(fold)));
+        let mut labelled = 0.0;
+        for partner in near.iter().filter(|p| p.beside > 0.0) {
+            labelled += partner.nearness(closeness)
+                * lift.map_or(1.0, |lift| {
+                    lift.expected(&label, &self.target.label(partner.target as usize))
+                });
+        }
+        self.weight(i) * log_density(labelled)
+    }
+
+    /// Standard deviation that chance gives the difference of the log-likelihoods of two poses by surfaces.
+    ///
+    /// From the scatter of the differences of regions of `region_m` about their median, where both poses
+    /// have the points on the map: where only one has, that is no chance.
+    pub fn noise_between(&self, poses: [&Isometry3<f64>; 2], region_m: f64) -> f64 {
+        let [a, b] = poses.map(|pose| self.of_regions(pose, region_m));
+        let both = a.into_values().zip(b.into_values());
+        let both = both.filter(|(a, b)| *a > 0.0 && *b > 0.0);
+        let mut differences: Vec<f64> = both.map(|(a, b)| a - b).collect();
+        let middle = median(&mut differences);
+        let mut deviations: Vec<f64> = differences.iter().map(|d| (d - middle).abs()).collect();
+        DEVIATION_OF_MEDIAN * median(&mut deviations) * (differences.len() as f64).sqrt()
+    }
+
+    /// Log-likelihood by surfaces of each region of a side.
+    fn of_regions(&self, pose: &Isometry3<f64>, region_m: f64) -> BTreeMap<[i64; 3], f64> {
+        let partners = self.partners(pose);
+        let parts = CLOSENESS.map(|part| (self.by_surfaces(&partners, part), part));
+        let best = parts.into_iter().max_by(|a, b| a.0.total_cmp(&b.0));
+        let closeness = best.map_or(1.0, |best| best.1);
+        let mut regions = BTreeMap::new();
+        for (i, point) in self.source.points_m().iter().enumerate() {
+            let region = [point.x, point.y, point.z].map(|c| (c / region_m).floor() as i64);
+            *regions.entry(region).or_default() += self.of_point(i, &partners, closeness, &[]);
+        }
+        regions
     }
 
     fn weight(&self, i: usize) -> f64 {
@@ -314,6 +351,15 @@ fn lifts(counts: &[Counts], known: &Confusion, agreement: f64) -> Vec<Lift> {
         known.merged(&others).lift(agreement)
     };
     (0..counts.len()).map(lift).collect()
+}
+
+/// Middle value; 0 of none.
+fn median(values: &mut [f64]) -> f64 {
+    let middle = values.len() / 2;
+    match values.is_empty() {
+        true => 0.0,
+        false => *values.select_nth_unstable_by(middle, f64::total_cmp).1,
+    }
 }
 
 fn sum<'a>(counts: impl Iterator<Item = &'a Counts>) -> Confusion {

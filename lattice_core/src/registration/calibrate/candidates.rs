@@ -17,6 +17,11 @@ const SECOND_LOOK: usize = 24;
 /// Log-likelihood that a blocked line of sight costs an observation.
 const BLOCKED_COST: f64 = 2.0;
 
+/// Poses farther apart than this in the midst of the points, or turned by more, are different answers;
+/// nearer ones say how sure the answer is.
+const DIFFERENT_M: f64 = 0.5;
+const DIFFERENT_RAD: f64 = 0.26;
+
 /// A pose with what speaks for it.
 #[derive(Clone, Debug)]
 pub(super) struct Candidate {
@@ -202,6 +207,11 @@ impl<'a> Workbench<'a> {
             rmse_m: partners.rmse_m,
             confusion,
         }
+    }
+
+    /// Least distance, metres, and turn, radians, between answers that count as different.
+    pub fn least_difference(&self) -> (f64, f64) {
+        (DIFFERENT_M.max(4.0 * self.map.spacing_m), DIFFERENT_RAD)
     }
 
     /// The midst of the headset's points, in its frame.

@@ -12,16 +12,14 @@ use super::likeliest;
 use super::types::{Calibration, ClassReliability, DirectionKind, Verdict, WeakDirection};
 use crate::pose::Axes;
 
-/// Poses farther apart than this in the midst of the points, or turned by more, are different answers;
-/// nearer ones say how sure the answer is.
-const DIFFERENT_M: f64 = 0.5;
-const DIFFERENT_RAD: f64 = 0.26;
 /// Log-likelihood that is as good as a natural logarithm of odds: observations are not independent.
 const SOFTNESS: f64 = 8.0;
 /// Largest ratio of the error of a region to its residuals.
 const INVISIBLE: f64 = 4.0;
 /// Hypotheses of a search with other axes.
 const MISREAD: usize = 48;
+/// Standard deviations of the margin, were two poses equally right, that it must exceed.
+const CERTAIN: f64 = 3.0;
 /// GICP from a given start stands unless another is better by this log-likelihood.
 const DISPLACE: f64 = 10.0;
 
@@ -31,14 +29,16 @@ pub(super) fn answer(bench: &Workbench<'_>, all: Vec<Candidate>, started: bool) 
         return Calibration::refused(Verdict::NoOverlap, "no place was found");
     };
     let middle = bench.middle();
-    let (shift_m, turn_rad) = different(bench);
+    let (shift_m, turn_rad) = bench.least_difference();
     let pose = best.map_from_headset;
-    let rival = all
-        .iter()
-        .filter(|c| !c.is_near(&pose, &middle, shift_m, turn_rad))
-        .map(Candidate::total)
-        .fold(bench.fit.nowhere(), f64::max);
-    let log_margin = best.total() - rival;
+    let elsewhere = (all.iter()).filter(|c| !c.is_near(&pose, &middle, shift_m, turn_rad));
+    let rival = elsewhere.max_by(|a, b| a.total().total_cmp(&b.total()));
+    let nowhere = bench.fit.nowhere();
+    let log_margin = best.total() - rival.map_or(nowhere, |rival| rival.total().max(nowhere));
+    let chance = rival.map_or(0.0, |rival| {
+        let poses = [&pose, &rival.map_from_headset];
+        CERTAIN * bench.fit.noise_between(poses, bench.options.region_m)
+    });
     let covariance = covariance(bench, best).map(|sure| {
         let near = all
             .iter()
@@ -69,7 +69,13 @@ pub(super) fn answer(bench: &Workbench<'_>, all: Vec<Candidate>, started: bool) 
             DirectionKind::Rotation => d.sigma > options.max_sigma_rad,
         })
         .collect();
-    let (verdict, reason) = verdict(bench, best, log_margin, covariance.is_some(), &weak);
+    let (verdict, reason) = verdict(
+        bench,
+        best,
+        (log_margin, chance),
+        covariance.is_some(),
+        &weak,
+    );
     let confusion = bench.known.merged(&best.confusion);
     Calibration {
         verdict,
@@ -88,11 +94,6 @@ pub(super) fn answer(bench: &Workbench<'_>, all: Vec<Candidate>, started: bool) 
             _ => bench.known.clone(),
         },
     }
-}
-
-/// Least distance between answers that count as different.
-fn different(bench: &Workbench<'_>) -> (f64, f64) {
-    (DIFFERENT_M.max(4.0 * bench.map.spacing_m), DIFFERENT_RAD)
 }
 
 /// The likeliest, but what GICP makes of a start if that is the same place or nearly as likely.
@@ -117,7 +118,7 @@ fn choose<'a>(bench: &Workbench<'_>, all: &'a [Candidate], started: bool) -> Opt
 fn verdict(
     bench: &Workbench<'_>,
     best: &Candidate,
-    log_margin: f64,
+    (log_margin, chance): (f64, f64),
     held: bool,
     weak: &[WeakDirection],
 ) -> (Verdict, String) {
@@ -131,7 +132,7 @@ fn verdict(
     }
     // Points without a partner might have one elsewhere.
     let unexplained = bench.fit.observations() * (1.0 - best.inlier_fraction);
-    let least = options.min_margin.max(0.5 * unexplained);
+    let least = options.min_margin.max(0.5 * unexplained).max(chance);
     if log_margin < least {
         let reason = format!(
             "another pose fits nearly as well: log-margin {log_margin:.1}, {least:.0} is needed; look elsewhere too"

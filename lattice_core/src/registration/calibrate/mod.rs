@@ -11,6 +11,7 @@ mod input;
 mod judge;
 mod map;
 mod rays;
+mod rivals;
 mod track;
 mod types;
 
@@ -86,11 +87,7 @@ fn run(
         .flat_map_iter(|c| bench.portfolio(&c.map_from_headset, "search"))
         .collect();
     all.extend(second);
-    // The likeliest again with near partners only, which leaves out what one of the two has not seen.
-    if let Some(best) = likeliest(&all) {
-        let tight = bench.tighten(&best.map_from_headset);
-        all.push(bench.judge(&bench.fit, tight, best.method));
-    }
+    all.extend(bench.contest(&all, region.as_ref()));
     if let Some(start) = &request.start {
         // The first of all is what GICP alone would answer.
         let mut from_start = from_start(&bench, start);

@@ -236,12 +236,13 @@ fn window(grid: &Grid, source: &SearchSource, region: Option<&Region>) -> Window
 }
 
 /// Turn about the vertical of a pose, radians.
-pub(super) fn yaw_of(pose: &Isometry3<f64>) -> f64 {
+pub(in crate::registration) fn yaw_of(pose: &Isometry3<f64>) -> f64 {
     let x = pose.rotation * Vector3::x();
     x.y.atan2(x.x)
 }
 
-fn angle_between(a: f64, b: f64) -> f64 {
+/// Least turn from one heading to another, radians.
+pub(in crate::registration) fn angle_between(a: f64, b: f64) -> f64 {
     let turn = (a - b).rem_euclid(std::f64::consts::TAU);
     turn.min(std::f64::consts::TAU - turn)
 }

@@ -1,0 +1,96 @@
+//! Rivals of the likeliest pose: other places that deserve the same care before one is called certain.
+
+use nalgebra::{Isometry3, Translation3, UnitQuaternion, Vector3};
+use rayon::prelude::*;
+
+use super::super::search::{Region, SearchSource, angle_between, search, yaw_of};
+use super::candidates::{Candidate, Workbench};
+use super::likeliest;
+
+/// Rivals from among the candidates that are refined like the likeliest.
+const KNOWN: usize = 4;
+/// Turns about the vertical under which rooms are often symmetric.
+const TWINS_RAD: [f64; 3] = [
+    std::f64::consts::FRAC_PI_2,
+    std::f64::consts::PI,
+    -std::f64::consts::FRAC_PI_2,
+];
+/// Deviation from such a turn that is searched, and places of each that are looked at.
+const TWIN_YAW_RAD: f64 = 0.06;
+const TWIN_PLACES: usize = 6;
+/// Farther than any map reaches.
+const ANYWHERE_M: f64 = 1e6;
+
+impl Workbench<'_> {
+    /// The likeliest candidate, its best rivals, and its twins in a symmetric room, all refined with near
+    /// partners only, which leaves out what one of the clouds has not seen.
+    ///
+    /// A likelihood is compared fairly only if all were refined alike.
+    pub fn contest(&self, all: &[Candidate], region: Option<&Region>) -> Vec<Candidate> {
+        let Some(best) = likeliest(all) else {
+            return Vec::new();
+        };
+        let mut places = vec![(best.map_from_headset, best.method)];
+        places.extend(self.known_rivals(all, best));
+        let twins = self.twins(best, region);
+        places.extend(twins.into_iter().map(|pose| (pose, "search")));
+        let refined = places.par_iter().map(|(pose, method)| {
+            let tight = self.tighten(pose);
+            self.judge(&self.fit, tight, method)
+        });
+        refined.collect()
+    }
+
+    /// The likeliest candidates elsewhere, one of each place.
+    fn known_rivals(
+        &self,
+        all: &[Candidate],
+        best: &Candidate,
+    ) -> Vec<(Isometry3<f64>, &'static str)> {
+        let middle = self.middle();
+        let (shift_m, turn_rad) = self.least_difference();
+        let mut sorted: Vec<&Candidate> = all.iter().collect();
+        sorted.sort_by(|a, b| b.total().total_cmp(&a.total()));
+        let mut kept = vec![best];
+        for candidate in sorted {
+            let near = |other: &&Candidate| {
+                other.is_near(&candidate.map_from_headset, &middle, shift_m, turn_rad)
+            };
+            if kept.len() <= KNOWN && !kept.iter().any(near) {
+                kept.push(candidate);
+            }
+        }
+        let rivals = kept.into_iter().skip(1);
+        rivals.map(|c| (c.map_from_headset, c.method)).collect()
+    }
+
+    /// The place that fits best with each heading of a symmetric room.
+    fn twins(&self, best: &Candidate, region: Option<&Region>) -> Vec<Isometry3<f64>> {
+        let source = SearchSource::by_surface(&self.input.few, self.input.sensor_m);
+        let twin = |turn_rad: &f64| {
+            let turn = UnitQuaternion::from_axis_angle(&Vector3::z_axis(), *turn_rad);
+            let about = Isometry3::from_parts(
+                region.map_or_else(Translation3::identity, |region| region.about.translation),
+                turn * best.map_from_headset.rotation,
+            );
+            let around = Region {
+                about,
+                radius_m: region.map_or(ANYWHERE_M, |region| region.radius_m),
+                yaw_rad: TWIN_YAW_RAD,
+            };
+            let wanted = region.is_none_or(|region| {
+                angle_between(yaw_of(&about), yaw_of(&region.about)) <= region.yaw_rad
+            });
+            let found = match wanted {
+                true => search(&self.map.surfaces, &source, Some(&around), TWIN_PLACES),
+                false => Vec::new(),
+            };
+            let looked_at = found.par_iter().map(|hypothesis| {
+                let pose = self.refine_few(&self.input.few, &hypothesis.target_from_source);
+                self.judge(&self.few, pose, "search")
+            });
+            likeliest(&looked_at.collect::<Vec<_>>()).map(|c| self.polish(&c.map_from_headset))
+        };
+        TWINS_RAD.par_iter().filter_map(twin).collect()
+    }
+}

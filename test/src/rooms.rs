@@ -1,0 +1,104 @@
+//! Rooms that look alike from several places: the traps of a calibration without a guess.
+
+use lattice_core::registration::{HeadsetScan, LabelDistribution, SemanticCloud};
+use nalgebra::{Isometry3, Point3, Vector3};
+
+use crate::flat::Flat;
+use crate::random::Random;
+
+const HEIGHT_M: f64 = 2.7;
+const EYE_M: f64 = 1.6;
+const FLOOR: u16 = 2;
+const WALL: u16 = 1;
+
+impl Flat {
+    /// An empty room of `x_m` by `y_m` about the origin, with floor and ceiling.
+    pub fn room(x_m: f64, y_m: f64) -> Flat {
+        let mut room = Flat::empty();
+        room.add_room([0.0, 0.0], x_m, y_m);
+        room
+    }
+
+    /// Equal square rooms in a row along x, without doors.
+    pub fn row_of_rooms(n: usize, side_m: f64) -> Flat {
+        let mut row = Flat::empty();
+        for i in 0..n {
+            row.add_room([i as f64 * (side_m + 0.3), 0.0], side_m, side_m);
+        }
+        row
+    }
+
+    /// A round room of flat panels.
+    pub fn silo(radius_m: f64, panels: usize) -> Flat {
+        let mut silo = Flat::empty();
+        let corner = |i: usize| {
+            let at = i as f64 * std::f64::consts::TAU / panels as f64;
+            [radius_m * at.cos(), radius_m * at.sin()]
+        };
+        for i in 0..panels {
+            let ([ax, ay], [bx, by]) = (corner(i), corner(i + 1));
+            silo.add(
+                [ax, ay, 0.0],
+                [bx - ax, by - ay, 0.0],
+                [0.0, 0.0, HEIGHT_M],
+                WALL,
+            );
+        }
+        silo
+    }
+
+    /// The same with a box of `size_m` that stands with a corner at `corner_m`.
+    #[must_use]
+    pub fn with_box(mut self, [x, y]: [f64; 2], [a, b, c]: [f64; 3]) -> Flat {
+        self.add_box([x, y, 0.0], [a, b, c], 5);
+        self
+    }
+
+    fn add_room(&mut self, [cx, cy]: [f64; 2], x_m: f64, y_m: f64) {
+        let (x, y) = (cx - x_m / 2.0, cy - y_m / 2.0);
+        for z in [0.0, HEIGHT_M] {
+            self.add([x, y, z], [x_m, 0.0, 0.0], [0.0, y_m, 0.0], FLOOR);
+        }
+        for ([x, y], [u, v]) in [
+            ([x, y], [x_m, 0.0]),
+            ([x, y + y_m], [x_m, 0.0]),
+            ([x, y], [0.0, y_m]),
+            ([x + x_m, y], [0.0, y_m]),
+        ] {
+            self.add([x, y, 0.0], [u, v, 0.0], [0.0, 0.0, HEIGHT_M], WALL);
+        }
+    }
+
+    /// The room as a map of cells of 5 cm has it, each centroid off by a few millimetres; no labels.
+    pub fn noisy_map(&self, random: &mut Random) -> SemanticCloud {
+        let points = self.map().points_m.into_iter();
+        SemanticCloud::unlabelled(points.map(|p| p + random.point(0.008)).collect())
+    }
+
+    /// Scan all around from `x_m`, `y_m`, 1.6 m above the floor, with labels.
+    pub fn all_around(
+        &self,
+        [x_m, y_m]: [f64; 2],
+        map_from_headset: &Isometry3<f64>,
+        random: &mut Random,
+    ) -> HeadsetScan {
+        let eye = Point3::new(x_m, y_m, EYE_M);
+        let headset_from_map = map_from_headset.inverse();
+        let mut cloud = SemanticCloud::default();
+        for i in 0..180 {
+            for j in -30..30 {
+                let (az, el) = (f64::from(i) * 0.035, f64::from(j) * 0.035);
+                let way = Vector3::new(az.cos() * el.cos(), az.sin() * el.cos(), el.sin());
+                if let Some((distance, label)) = self.hit(&eye, &way, 15.0) {
+                    let place = eye + way * distance + random.point(0.012);
+                    cloud.points_m.push(headset_from_map * place);
+                    cloud.labels.push(LabelDistribution::hard(label));
+                }
+            }
+        }
+        HeadsetScan {
+            cloud,
+            sensor_m: Some(headset_from_map * eye),
+        }
+    }
+}
