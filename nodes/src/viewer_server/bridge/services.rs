@@ -4,7 +4,7 @@ use lattice_msgs::lattice::{ClearBox, QueryMap, SaveMap};
 use lattice_msgs::rosbag2_interfaces::{
     GetRate, IsPaused, Pause, PlayNext, Resume, Seek, SetRate, TogglePaused,
 };
-use lattice_msgs::std_srvs::Empty;
+use lattice_msgs::std_srvs::Trigger;
 use lattice_msgs::{RosMessage, RosService};
 use lattice_runtime::{Client, Node, RuntimeError};
 
@@ -48,7 +48,7 @@ pub(super) fn of(
     table.add::<QueryMap>("query")?;
     if reach.allow_write {
         table.add::<ClearBox>("clear_box")?;
-        table.add::<Empty>("reset")?;
+        table.add::<Trigger>("reset")?;
         table.add::<SaveMap>("save_map")?;
     }
     table.of = &reach.player;
