@@ -6,6 +6,7 @@ use std::process::{Child, Command, Stdio};
 
 use base64::prelude::*;
 use lattice_core::voxels::file::MapContents;
+use lattice_runtime::LoopbackDomain;
 use serde_json::json;
 
 use crate::browser::{chromium, devtools::Page};
@@ -24,9 +25,22 @@ impl Viewer {
 
     /// Starts a command that says where the page is.
     pub fn start(arguments: &[&str]) -> Self {
-        let mut process = Command::new(env!("CARGO_BIN_EXE_lattice"))
+        let mut command = Command::new(env!("CARGO_BIN_EXE_lattice"));
+        Self::run(command.args(arguments).env_remove("ROS_DOMAIN_ID"))
+    }
+
+    /// The same in a domain of its own.
+    pub fn start_in(domain: &LoopbackDomain, arguments: &[&str]) -> Self {
+        let mut command = Command::new(env!("CARGO_BIN_EXE_lattice"));
+        command
             .args(arguments)
-            .env_remove("ROS_DOMAIN_ID")
+            .env("ROS_DOMAIN_ID", domain.id().to_string())
+            .env("ROS_AUTOMATIC_DISCOVERY_RANGE", "LOCALHOST");
+        Self::run(&mut command)
+    }
+
+    fn run(command: &mut Command) -> Self {
+        let mut process = command
             .stdin(Stdio::null())
             .stdout(Stdio::piped())
             .stderr(Stdio::piped())

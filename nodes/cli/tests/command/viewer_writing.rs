@@ -7,9 +7,11 @@ use async_tungstenite::tungstenite::client::IntoClientRequest;
 use async_tungstenite::tungstenite::{Message, connect};
 use lattice_core::lattice::MortonKey;
 use lattice_core::voxels::file::MapContents;
+use lattice_runtime::LoopbackDomain;
 use serde_json::{Value, json};
 
 use crate::browser::{chromium, devtools::Page};
+use crate::record;
 use crate::viewer::{COMPLETE, Viewer, keys, map_of, scene, shown};
 
 /// Between two layers of centres.
@@ -60,7 +62,8 @@ fn without_leave_nothing_is_offered_that_changes_something() {
     let folder = tempfile::tempdir().unwrap();
     let map = map_of(&scene(folder.path(), 5.0), "fcc");
     let params = params(folder.path(), &map, false);
-    let viewer = Viewer::start(&["view", &params, "--port", "0"]);
+    let domain = LoopbackDomain::take().unwrap();
+    let viewer = Viewer::start_in(&domain, &["view", &params, "--port", "0"]);
     let (capabilities, services) = offered(&viewer.url);
     assert_eq!(capabilities, json!(["services"]));
     let reading = [
@@ -125,29 +128,49 @@ fn in_the_box(map: &str) -> Vec<String> {
     keys
 }
 
-#[test]
-fn the_page_asks_first_and_the_mapper_loses_exactly_the_cells_of_the_box() {
-    let Some(chromium) = chromium() else { return };
-    let folder = tempfile::tempdir().unwrap();
-    let map = map_of(&scene(folder.path(), 5.0), "fcc");
-    let all = keys(&map);
-    let params = params(folder.path(), &map, true);
-    let viewer = Viewer::start(&["view", &params, "--port", "0"]);
-    let mut page = Page::open(&chromium, &viewer.url);
-    let (before, cleared) = clear_a_box(&mut page);
+/// A map, and parameters of nodes that may be written to.
+fn site(folder: &Path) -> (String, String) {
+    let map = map_of(&scene(folder, 5.0), "fcc");
+    let params = params(folder, &map, true);
+    (map, params)
+}
+
+/// Clears and saves; what the mapper has then is what the page shows, and the map without the box.
+fn clear_and_save(page: &mut Page, folder: &Path, map: &str) {
+    let all = keys(map);
+    let (before, cleared) = clear_a_box(page);
     assert_eq!((before, cleared > 100), (all.len() as u64, true));
-    // What the mapper has is what the page shows: saved, and read here.
     page.value("document.getElementById('save').click()");
     page.value("document.getElementById('save-name').value = 'after.lattice'");
     page.value("document.querySelector('#ask .do').click()");
     page.wait_for("/saved/.test(document.getElementById('said').textContent)");
-    let after = keys(&folder.path().join("after.lattice").display().to_string());
-    assert_eq!(shown(&mut page), after);
-    let gone: Vec<&String> = all.iter().filter(|key| !after.contains(key)).collect();
-    assert_eq!(gone.len() as u64, cleared);
-    assert!(after.iter().all(|key| all.binary_search(key).is_ok()));
-    let inside = in_the_box(&map);
-    assert_eq!(gone, inside.iter().collect::<Vec<_>>());
+    let after = keys(&folder.join("after.lattice").display().to_string());
+    assert_eq!(shown(page), after);
+    let inside = in_the_box(map);
+    let left: Vec<&String> = all.iter().filter(|key| !inside.contains(key)).collect();
+    assert_eq!(after.iter().collect::<Vec<_>>(), left);
+    assert_eq!(inside.len() as u64, cleared);
+}
+
+#[test]
+fn the_page_asks_first_and_the_mapper_loses_exactly_the_cells_of_the_box() {
+    let Some(chromium) = chromium() else { return };
+    let folder = tempfile::tempdir().unwrap();
+    let (map, params) = site(folder.path());
+    let domain = LoopbackDomain::take().unwrap();
+    let viewer = Viewer::start_in(&domain, &["view", &params, "--port", "0"]);
+    let mut page = Page::open(&chromium, &viewer.url);
+    let page = &mut page;
+    clear_and_save(page, folder.path(), &map);
+    // The mapper's word on a cell.
+    page.value(
+        "(() => { const { camera, cells } = lattice; camera.automatic = false; lattice.frame(); \
+         for (let x = innerWidth * 0.4; x < innerWidth; x += 20) for (let y = 60; y < innerHeight; \
+         y += 20) if (lattice.pick(x, y)) return; })()",
+    );
+    page.wait_for(
+        "/mapper *occupied, [0-9]+ points/.test(document.getElementById('cell').textContent)",
+    );
     // A parameter, then all of the map.
     page.value("document.getElementById('parameters').parentElement.open = true");
     let field = "document.getElementById('parameter /lattice_mapper.update_period_s')";
@@ -161,4 +184,27 @@ fn the_page_asks_first_and_the_mapper_loses_exactly_the_cells_of_the_box() {
     page.value("document.querySelector('#ask .do').click()");
     page.wait_for("lattice.state.size === 0");
     assert!(page.console.is_empty(), "{:?}", page.console);
+}
+
+#[test]
+fn a_mapper_in_another_process_is_asked_over_dds() {
+    let Some(chromium) = chromium() else { return };
+    let folder = tempfile::tempdir().unwrap();
+    let (map, params) = site(folder.path());
+    let domain = LoopbackDomain::take().unwrap();
+    let arguments = [
+        "node",
+        "lattice_mapper",
+        "--ros-args",
+        "--params-file",
+        &params,
+    ];
+    let mut mapper = record::start(&domain, &arguments);
+    let arguments = ["-p", "viewer_server:allow_write:=true"];
+    let viewer = ["view", "--port", "0", "--", "--ros-args"];
+    let viewer = Viewer::start_in(&domain, &[&viewer[..], &arguments].concat());
+    let mut page = Page::open(&chromium, &viewer.url);
+    clear_and_save(&mut page, folder.path(), &map);
+    let _ = mapper.kill();
+    let _ = mapper.wait();
 }
