@@ -75,9 +75,9 @@ const handlers = {
     ranges();
     redraw();
   },
-  transforms({ transforms: come }) {
+  transforms({ transforms: come, fixed }) {
     transforms.add(come);
-    player.heard(come.at(-1)?.stamp);
+    if (!fixed) player.heard(come.at(-1)?.stamp);
     const robot = transforms.find(state.frame, ROBOT);
     if (robot) {
       state.robot = robot;
@@ -341,7 +341,7 @@ redraw();
 
 // For tests: what is shown, in figures.
 window.lattice = {
-  state, camera, cells, pick, frame: () => drawing.drawNow(),
+  state, camera, cells, player, pick, frame: () => drawing.drawNow(),
   keys: () => new Promise((resolve) => {
     const take = ({ data }) => {
       if (data.type !== "keys") return;

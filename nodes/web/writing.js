@@ -30,8 +30,7 @@ export class Writing {
   // Says what came of something that was tried.
   async tried(work) {
     try {
-      const text = await work;
-      if (text) this.say(text);
+      this.say((await work) ?? "");
     } catch (error) {
       this.say(error.message, true);
     }

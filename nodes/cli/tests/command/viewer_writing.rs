@@ -5,12 +5,14 @@ use std::path::Path;
 
 use async_tungstenite::tungstenite::client::IntoClientRequest;
 use async_tungstenite::tungstenite::{Message, connect};
+use lattice_bag::BagReader;
 use lattice_core::lattice::MortonKey;
 use lattice_core::voxels::file::MapContents;
 use lattice_runtime::LoopbackDomain;
 use serde_json::{Value, json};
 
 use crate::browser::{chromium, devtools::Page};
+use crate::nodes::simulated;
 use crate::record;
 use crate::viewer::{COMPLETE, Viewer, keys, map_of, scene, shown};
 
@@ -31,15 +33,21 @@ fn params(folder: &Path, map: &str, allow_write: bool) -> String {
     path.display().to_string()
 }
 
-/// Capabilities and services that the server tells of.
-fn offered(url: &str) -> (Value, Vec<String>) {
+/// Capabilities and services that the server tells of, and its answer to a call of one that it does not.
+fn offered(url: &str) -> (Value, Vec<String>, Value) {
     let mut request = url.replace("http", "ws").into_client_request().unwrap();
     let protocol = "foxglove.websocket.v1".parse().unwrap();
     request
         .headers_mut()
         .insert("Sec-WebSocket-Protocol", protocol);
     let (mut socket, _) = connect(request).unwrap();
-    let mut capabilities = Value::Null;
+    let call = [
+        &[2, 3, 0, 0, 0, 9, 0, 0, 0, 3, 0, 0, 0][..],
+        b"cdr",
+        &[0, 1, 0, 0, 0],
+    ];
+    socket.send(Message::Binary(call.concat().into())).unwrap();
+    let (mut capabilities, mut names) = (Value::Null, Vec::new());
     loop {
         let Message::Text(text) = socket.read().unwrap() else {
             continue;
@@ -49,9 +57,9 @@ fn offered(url: &str) -> (Value, Vec<String>) {
             "serverInfo" => capabilities = message["capabilities"].clone(),
             "advertiseServices" => {
                 let services = message["services"].as_array().unwrap().iter();
-                let names = services.map(|service| service["name"].as_str().unwrap().to_owned());
-                return (capabilities, names.collect());
+                names.extend(services.map(|of| of["name"].as_str().unwrap().to_owned()));
             }
+            "serviceCallFailure" => return (capabilities, names, message),
             _ => {}
         }
     }
@@ -64,7 +72,11 @@ fn without_leave_nothing_is_offered_that_changes_something() {
     let params = params(folder.path(), &map, false);
     let domain = LoopbackDomain::take().unwrap();
     let viewer = Viewer::start_in(&domain, &["view", &params, "--port", "0"]);
-    let (capabilities, services) = offered(&viewer.url);
+    let (capabilities, services, refused) = offered(&viewer.url);
+    assert_eq!(
+        (&refused["serviceId"], &refused["callId"]),
+        (&json!(3), &json!(9))
+    );
     assert_eq!(capabilities, json!(["services"]));
     let reading = [
         "lattice_mapper/query",
@@ -207,4 +219,62 @@ fn a_mapper_in_another_process_is_asked_over_dds() {
     clear_and_save(&mut page, folder.path(), &map);
     let _ = mapper.kill();
     let _ = mapper.wait();
+}
+
+const BOBCAT: &str = concat!(env!("CARGO_MANIFEST_DIR"), "/../../params/bobcat.yaml");
+
+#[test]
+fn a_log_that_plays_is_held_and_moved_from_the_page_of_a_phone() {
+    let Some(chromium) = chromium() else { return };
+    let folder = tempfile::tempdir().unwrap();
+    let log = simulated(folder.path(), "mcap", "12");
+    let first_ns = BagReader::open(log.as_ref()).unwrap().start_ns().unwrap();
+    let domain = LoopbackDomain::take().unwrap();
+    let params = format!(
+        "bag_player:bag:={log} bag_player:start_paused:=true viewer_server:allow_write:=true"
+    );
+    let params = params.split(' ').flat_map(|param| ["-p", param]);
+    let mut arguments = vec!["view", BOBCAT, "--port", "0", "--", "--ros-args"];
+    arguments.extend(params);
+    let viewer = Viewer::start_in(&domain, &arguments);
+    let mut page = Page::open(&chromium, "about:blank");
+    let phone = json!({ "width": 390, "height": 800, "deviceScaleFactor": 2, "mobile": true });
+    page.call("Emulation.setDeviceMetricsOverride", phone);
+    page.go(&viewer.url);
+    let pause = "document.getElementById('pause')";
+    page.wait_for(&format!(
+        "!document.getElementById('player').hidden && {pause}.textContent === 'Play'"
+    ));
+    page.value(
+        "document.getElementById('panel').hidden && document.getElementById('fold').click()",
+    );
+    let fits = "(() => { const panel = document.getElementById('panel'); \
+        return !panel.hidden && panel.scrollWidth <= panel.clientWidth && innerWidth === 390; })()";
+    assert_eq!(page.value(fits), true);
+    page.value(&format!("{pause}.click()"));
+    page.wait_for(&format!("{pause}.textContent === 'Pause'"));
+    page.wait_for("lattice.state.size > 0 && lattice.player.now !== null");
+    let rate = "document.getElementById('rate')";
+    page.value(&format!(
+        "{rate}.value = 0.5; {rate}.dispatchEvent(new Event('change')); {rate}.value = ''"
+    ));
+    page.wait_for(&format!("{rate}.value === '0.5'"));
+    page.value(&format!("{pause}.click()"));
+    page.wait_for(&format!("{pause}.textContent === 'Play'"));
+    page.value("document.getElementById('step').click()");
+    let first_s = first_ns as f64 * 1e-9;
+    let said = "document.getElementById('said').textContent";
+    page.value(&format!(
+        "lattice.player.now = {first_s} + 5; document.getElementById('back').click()"
+    ));
+    page.wait_for(&format!("{said} === 'the log does not reach there'"));
+    page.value(&format!(
+        "lattice.player.now = {first_s} - 8; document.getElementById('on').click()"
+    ));
+    page.wait_for(&format!("{said} === ''"));
+    page.value("document.getElementById('clear').click()");
+    let fits = "(() => { const box = document.getElementById('ask').getBoundingClientRect(); \
+        return box.left >= 0 && box.right <= 390 && document.activeElement.textContent === 'Cancel'; })()";
+    assert_eq!(page.value(fits), true);
+    assert!(page.console.is_empty(), "{:?}", page.console);
 }

@@ -103,8 +103,10 @@ impl Parameters {
             }
         }
         Box::pin(async move {
-            let mut outcome = Outcome::default();
-            outcome.problems = problems;
+            let mut outcome = Outcome {
+                problems,
+                ..Outcome::default()
+            };
             for (remote, parameter) in works {
                 let name = parameter.name.clone();
                 if let Err(problem) = remote.set(parameter).await {
