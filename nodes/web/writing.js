@@ -1,4 +1,4 @@
-// What a person may change: the map, the parameters of nodes; each thing only where the server offers it.
+// Changes by a person: the map, the parameters of nodes; each thing only where the server offers it.
 
 import { askFirst } from "./dialog.js";
 import { by, element, whole } from "./panel.js";

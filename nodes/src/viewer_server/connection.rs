@@ -149,7 +149,7 @@ async fn talk(
     }
 }
 
-/// What happens to a connection.
+/// Event of a connection.
 enum Event {
     Come(Option<Result<Message, tungstenite::Error>>),
     Answered(Vec<Outgoing>),

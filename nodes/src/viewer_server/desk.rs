@@ -65,7 +65,7 @@ pub enum Ask {
     Publish(usize, Vec<u8>),
 }
 
-/// What follows from a message of a client.
+/// Consequence of a message of a client.
 #[derive(Debug, PartialEq)]
 pub enum Step {
     /// It wants channels.

@@ -1,4 +1,4 @@
-//! What a person changes through the page: off unless it is allowed, and asked for first.
+//! Changes through the page: off unless they are allowed, and asked for first.
 
 use std::io::BufReader;
 use std::path::Path;

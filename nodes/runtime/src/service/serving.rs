@@ -42,7 +42,7 @@ struct Asked<R> {
     client: Asker,
 }
 
-/// Who asked.
+/// Sender of a request.
 enum Asker {
     Remote { reply_to: ReplyTo, id: EndpointId },
     Local(Sender<Result<Vec<u8>, String>>),

@@ -97,7 +97,7 @@ pub(crate) fn header(writer: &EndpointId, number: i64) -> Header {
     header
 }
 
-/// What the inline QoS says of a request of ours: over RustDDS it tells our servers of the header.
+/// Words of the inline QoS on a request of ours: over RustDDS it tells our servers of the header.
 pub(crate) fn related(writer: EndpointId, number: i64) -> Option<SampleId> {
     (writer.vendor() == RUSTDDS_VENDOR).then_some(SampleId { writer, number })
 }

@@ -85,7 +85,7 @@ pub struct Value {
     /// In JSON.
     #[serde(default)]
     pub value: serde_json::Value,
-    /// Where JSON does not say it, as `float64`.
+    /// Type that JSON does not say, as `float64`.
     #[serde(rename = "type", default, skip_serializing_if = "Option::is_none")]
     pub kind: Option<String>,
 }
