@@ -230,13 +230,20 @@ fn a_log_that_plays_is_held_and_moved_from_the_page_of_a_phone() {
     let log = simulated(folder.path(), "mcap", "12");
     let first_ns = BagReader::open(log.as_ref()).unwrap().start_ns().unwrap();
     let domain = LoopbackDomain::take().unwrap();
-    let params = format!(
-        "bag_player:bag:={log} bag_player:start_paused:=true viewer_server:allow_write:=true"
-    );
-    let params = params.split(' ').flat_map(|param| ["-p", param]);
-    let mut arguments = vec!["view", BOBCAT, "--port", "0", "--", "--ros-args"];
-    arguments.extend(params);
-    let viewer = Viewer::start_in(&domain, &arguments);
+    let bag = format!("bag:={log}");
+    let player = [
+        "node",
+        "bag_player",
+        "--ros-args",
+        "-p",
+        &bag,
+        "-p",
+        "start_paused:=true",
+    ];
+    let mut player = record::start(&domain, &player);
+    let arguments = ["view", BOBCAT, "--port", "0", "--", "--ros-args"];
+    let write = ["-p", "viewer_server:allow_write:=true"];
+    let viewer = Viewer::start_in(&domain, &[&arguments[..], &write].concat());
     let mut page = Page::open(&chromium, "about:blank");
     let phone = json!({ "width": 390, "height": 800, "deviceScaleFactor": 2, "mobile": true });
     page.call("Emulation.setDeviceMetricsOverride", phone);
@@ -277,4 +284,6 @@ fn a_log_that_plays_is_held_and_moved_from_the_page_of_a_phone() {
         return box.left >= 0 && box.right <= 390 && document.activeElement.textContent === 'Cancel'; })()";
     assert_eq!(page.value(fits), true);
     assert!(page.console.is_empty(), "{:?}", page.console);
+    let _ = player.kill();
+    let _ = player.wait();
 }
