@@ -5,10 +5,13 @@ import { Drawing, colourOf } from "./drawing.js";
 import { placeIndex } from "./keys.js";
 import { add, length, rotate, sub } from "./math.js";
 import * as panel from "./panel.js";
+import { Player } from "./player.js";
 import { watchKeys, watchPointer } from "./pointer.js";
 import { CellRenderer } from "./renderer.js";
 import { Scene } from "./scene.js";
+import { Services } from "./services.js";
 import { Transforms } from "./transforms.js";
+import { Writing } from "./writing.js";
 
 const { by } = panel;
 const ROBOT = "base_link";
@@ -32,6 +35,9 @@ const state = {
   scansOn: new Set(), problems: [], frames: 0,
 };
 const worker = new Worker("/worker.js", { type: "module" });
+const services = new Services(worker);
+const writing = new Writing(services, worker, state);
+const player = new Player(services, writing);
 const drawing = new Drawing({ gl, canvas, camera, cells, scene, state });
 const redraw = () => drawing.redraw();
 
@@ -40,6 +46,8 @@ const redraw = () => drawing.redraw();
 const handlers = {
   open() {
     state.open = true;
+    services.offered = [];
+    writing.offered();
     state.heardAt = Date.now();
   },
   closed() {
@@ -67,8 +75,9 @@ const handlers = {
     ranges();
     redraw();
   },
-  transforms({ transforms: come }) {
+  transforms({ transforms: come, fixed }) {
     transforms.add(come);
+    if (!fixed) player.heard(come.at(-1)?.stamp);
     const robot = transforms.find(state.frame, ROBOT);
     if (robot) {
       state.robot = robot;
@@ -101,7 +110,15 @@ const handlers = {
     if (rates.length > 0) state.heardAt = Date.now();
     if (by("rates").closest("details").open) panel.showRates(rates);
   },
-  problem({ text }) {
+  services({ services: offered }) {
+    services.offered = offered;
+    writing.offered();
+    player.look();
+  },
+  answer: (message) => services.answered(message),
+  parameters: ({ parameters }) => writing.showParameters(parameters),
+  problem({ text, told }) {
+    if (told) writing.say(text, true);
     state.problems.push(text);
     if (state.problems.length > 50) state.problems.shift();
     console.warn(text);
@@ -211,6 +228,9 @@ function answered(cell, centre) {
   if (state.robot) shown["from the robot"] = panel.metres(length(sub(centre, state.robot.position)));
   state.cell = cell;
   panel.showCell(shown);
+  writing.query(centre).catch((error) => error.message).then((answer) => {
+    if (answer && state.cell === cell) panel.showCell({ ...shown, mapper: answer });
+  });
 }
 
 function measure() {
@@ -321,7 +341,7 @@ redraw();
 
 // For tests: what is shown, in figures.
 window.lattice = {
-  state, camera, cells, pick, frame: () => drawing.drawNow(),
+  state, camera, cells, player, pick, frame: () => drawing.drawNow(),
   keys: () => new Promise((resolve) => {
     const take = ({ data }) => {
       if (data.type !== "keys") return;

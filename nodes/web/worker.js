@@ -1,5 +1,6 @@
 // Connection, decoding and following, beside the page's thread.
 
+import * as calls from "./calls.js";
 import * as messages from "./messages.js";
 import { Follower } from "./follower.js";
 
@@ -58,6 +59,7 @@ function connect() {
 }
 
 function onText(message) {
+  if (calls.takeText(message)) return;
   if (message.op === "serverInfo") {
     retry = 250;
     if (session !== message.sessionId) {
@@ -71,7 +73,7 @@ function onText(message) {
     for (const channel of channels.values()) if (isWanted(channel)) subscribe(channel);
     postMessage({ type: "channels", channels: [...channels.values()].map(({ id, topic, schemaName, kind }) => ({ id, topic, schemaName, kind })) });
   } else if (message.op === "status") {
-    postMessage({ type: "problem", text: message.message });
+    postMessage({ type: "problem", text: message.message, told: true });
   }
 }
 
@@ -99,6 +101,7 @@ function renewMap() {
 }
 
 function onData(bytes) {
+  if (calls.takeData(bytes)) return;
   if (bytes[0] !== MESSAGE_DATA || bytes.length < HEADER) return;
   const view = new DataView(bytes.buffer);
   const channel = subscriptions.get(view.getUint32(1, true));
@@ -181,6 +184,7 @@ function tellRates() {
 }
 
 self.onmessage = ({ data }) => {
+  if (calls.ask(socket, data)) return;
   if (data.type === "want") {
     if (data.on) {
       wanted.add(data.topic);

@@ -58,6 +58,7 @@ pub use process::Runtime;
 pub use publisher::{Publisher, RawPublisher};
 pub use remote::RemotePublisher;
 pub use service::{Reply, Server};
+pub use shared::{CallError, Client};
 pub use shutdown::Shutdown;
 pub use subscription::{Load, Losses, Subscription, Undecoded};
 pub use sync::lock;

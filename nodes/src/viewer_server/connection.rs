@@ -6,17 +6,19 @@ use std::sync::Arc;
 use std::time::Duration;
 
 use async_tungstenite::WebSocketStream;
-use async_tungstenite::tungstenite::Message;
 use async_tungstenite::tungstenite::protocol::{Role, WebSocketConfig};
+use async_tungstenite::tungstenite::{self, Message};
+use futures::stream::FuturesUnordered;
 use futures::{AsyncReadExt, AsyncWriteExt, StreamExt};
 use smol::channel::Receiver;
-use smol::future::{or, poll_once};
+use smol::future::{or, pending, poll_once};
 use smol::{Async, Timer};
 
+use super::desk::{Desk, Step};
 use super::http::{Decision, Gate, Head, HeadError, MAX_HEAD_BYTES, Response};
 use super::hub::Hub;
 use super::outbox::Outgoing;
-use super::protocol::{ProtocolError, message_data};
+use super::protocol::message_data;
 
 /// Time for a request to come.
 const HEAD_TIME: Duration = Duration::from_secs(5);
@@ -88,41 +90,77 @@ async fn talk(
         .max_message_size(Some(MAX_INBOUND_BYTES))
         .max_frame_size(Some(MAX_INBOUND_BYTES));
     let mut socket = WebSocketStream::from_raw_socket(stream, Role::Server, Some(config)).await;
+    let mut desk = Desk::new(hub.offer_of_bridge());
+    let mut asked = FuturesUnordered::new();
     loop {
         // What has come goes first: who unsubscribes gets no more.
-        let come = match poll_once(socket.next()).await {
-            Some(come) => Some(come),
+        let event = match poll_once(socket.next()).await {
+            Some(come) => Event::Come(come),
             None => match hub.next(id) {
                 Some(next) => {
                     send(&mut socket, next).await?;
-                    None
+                    continue;
                 }
                 None => {
                     let woken = async {
                         let _ = woken.recv().await;
-                        None
+                        Event::Woken
                     };
-                    or(async { Some(socket.next().await) }, woken).await
+                    let answered = async {
+                        match asked.next().await {
+                            Some(messages) => Event::Answered(messages),
+                            None => pending().await,
+                        }
+                    };
+                    let come = async { Event::Come(socket.next().await) };
+                    or(answered, or(come, woken)).await
                 }
             },
         };
-        match come {
-            None => {}
-            Some(Some(Ok(Message::Text(text)))) => hub.text(id, &text),
-            Some(Some(Ok(Message::Binary(_)))) => {
-                hub.warn(id, &ProtocolError::Binary.to_string());
+        let step = match event {
+            Event::Woken => Step::Done,
+            Event::Answered(messages) => {
+                desk.answered();
+                messages
+                    .into_iter()
+                    .for_each(|message| hub.tell(id, message));
+                Step::Done
             }
-            Some(Some(Ok(Message::Close(_))) | None) => return Ok(()),
-            Some(Some(Ok(_))) => {}
-            Some(Some(Err(error))) => return Err(io::Error::other(error)),
+            Event::Come(Some(Ok(Message::Text(text)))) => desk.text(&text),
+            Event::Come(Some(Ok(Message::Binary(bytes)))) => desk.data(&bytes),
+            Event::Come(Some(Ok(Message::Close(_))) | None) => return Ok(()),
+            Event::Come(Some(Ok(_))) => Step::Done,
+            Event::Come(Some(Err(error))) => return Err(io::Error::other(error)),
+        };
+        match step {
+            Step::Subscribe(wishes) => {
+                for wish in wishes {
+                    hub.subscribe(id, wish.id, wish.channel_id);
+                }
+            }
+            Step::Unsubscribe(subscriptions) => hub.unsubscribe(id, &subscriptions),
+            Step::Ask(ask) => match hub.bridge() {
+                Some(bridge) => asked.push(bridge.ask(ask)),
+                None => desk.answered(),
+            },
+            Step::Tell(text) => hub.tell(id, Outgoing::Text(text)),
+            Step::Done => {}
         }
     }
+}
+
+/// Event of a connection.
+enum Event {
+    Come(Option<Result<Message, tungstenite::Error>>),
+    Answered(Vec<Outgoing>),
+    Woken,
 }
 
 /// Sends one message; an error after the last.
 async fn send(socket: &mut WebSocketStream<Stream>, next: Outgoing) -> io::Result<()> {
     let message = match next {
         Outgoing::Text(text) => Message::Text(text.into()),
+        Outgoing::Binary(bytes) => Message::Binary(bytes.into()),
         Outgoing::Data(id, entry) => {
             Message::Binary(message_data(id, entry.stamp_ns, &entry.cdr).into())
         }

@@ -1,7 +1,7 @@
 //! Meeting place of the node's thread, which offers messages, and the clients, which take them.
 
 use std::collections::BTreeMap;
-use std::sync::Mutex;
+use std::sync::{Mutex, OnceLock};
 use std::time::{SystemTime, UNIX_EPOCH};
 
 use lattice_msgs::RosMessage;
@@ -9,9 +9,11 @@ use lattice_runtime::lock;
 use serde::Serialize;
 use smol::channel::{Receiver, Sender, bounded};
 
+use super::bridge::Bridge;
+use super::desk::Offer;
 use super::map_stream::{Entry, MapStream};
 use super::outbox::{Class, Outbox, Outgoing};
-use super::protocol::{self, Advertised, ClientMessage};
+use super::protocol::{self, Advertised};
 
 /// Most bytes of updates of the map that are kept for clients that are behind.
 const MAX_UPDATE_BYTES: usize = 8 << 20;
@@ -20,6 +22,9 @@ const MAX_UPDATE_BYTES: usize = 8 << 20;
 pub struct Hub {
     max_clients: usize,
     session: String,
+    bridge: OnceLock<Box<dyn Bridge>>,
+    /// That of a hub without a bridge.
+    nothing: Offer,
     inner: Mutex<Inner>,
 }
 
@@ -89,6 +94,8 @@ impl Hub {
         Self {
             max_clients,
             session: since.map_or(0, |since| since.as_nanos()).to_string(),
+            bridge: OnceLock::new(),
+            nothing: Offer::default(),
             inner: Mutex::new(Inner {
                 channels: Vec::new(),
                 stream: MapStream::new(MAX_UPDATE_BYTES),
@@ -97,6 +104,23 @@ impl Hub {
                 counts: HubCounts::default(),
             }),
         }
+    }
+
+    /// Lets clients ask for more than is shown, from the first client on.
+    pub fn set_bridge(&self, bridge: Box<dyn Bridge>) {
+        if self.bridge.set(bridge).is_err() {
+            log::debug!("there is a bridge already");
+        }
+    }
+
+    /// The way to nodes, if clients have one.
+    pub fn bridge(&self) -> Option<&dyn Bridge> {
+        self.bridge.get().map(AsRef::as_ref)
+    }
+
+    /// All that clients may ask for.
+    pub fn offer_of_bridge(&self) -> &Offer {
+        self.bridge().map_or(&self.nothing, Bridge::offer)
     }
 
     /// Adds a channel before the first client comes; gives its id.
@@ -194,9 +218,14 @@ impl Hub {
         }
         let (wake, woken) = bounded(1);
         let mut outbox = Outbox::default();
-        outbox.control(protocol::server_info(&self.session));
+        let offer = self.offer_of_bridge();
+        let capabilities = offer.capabilities();
+        outbox.control(protocol::server_info(&self.session, &capabilities));
         let channels = inner.channels.iter().map(|channel| &channel.advertised);
         outbox.control(protocol::advertise(&channels.collect::<Vec<_>>()));
+        if !offer.services.is_empty() {
+            outbox.control(protocol::advertise_services(&offer.services));
+        }
         let id = inner.next_client;
         inner.next_client += 1;
         inner.counts.clients_in += 1;
@@ -233,35 +262,24 @@ impl Hub {
         Some(next)
     }
 
-    /// Takes a text message of a client.
-    pub fn text(&self, id: u64, text: &str) {
-        match ClientMessage::parse(text) {
-            Ok(ClientMessage::Subscribe { subscriptions }) => {
-                for wish in subscriptions {
-                    self.subscribe(id, wish.id, wish.channel_id);
-                }
-            }
-            Ok(ClientMessage::Unsubscribe { subscription_ids }) => {
-                let mut inner = lock(&self.inner);
-                if let Some(client) = inner.clients.get_mut(&id) {
-                    for subscription in subscription_ids {
-                        client.outbox.unsubscribe(subscription);
-                    }
-                }
-            }
-            Ok(ClientMessage::Other) => self.warn(id, "this server only shows"),
-            Err(error) => self.warn(id, &error.to_string()),
-        }
-    }
-
-    /// Tells a client what was wrong.
-    pub fn warn(&self, id: u64, message: &str) {
+    /// Ends subscriptions of a client.
+    pub fn unsubscribe(&self, id: u64, subscriptions: &[u32]) {
         if let Some(client) = lock(&self.inner).clients.get_mut(&id) {
-            client.outbox.control(protocol::status(message));
+            for subscription in subscriptions {
+                client.outbox.unsubscribe(*subscription);
+            }
         }
     }
 
-    fn subscribe(&self, id: u64, subscription: u32, channel_id: u32) {
+    /// Puts a message of the protocol before what waits.
+    pub fn tell(&self, id: u64, message: Outgoing) {
+        if let Some(client) = lock(&self.inner).clients.get_mut(&id) {
+            client.outbox.answer(message);
+        }
+    }
+
+    /// Gives a client messages of a channel.
+    pub fn subscribe(&self, id: u64, subscription: u32, channel_id: u32) {
         let mut inner = lock(&self.inner);
         let Inner {
             channels, clients, ..

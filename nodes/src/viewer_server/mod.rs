@@ -3,7 +3,9 @@
 //! The node's thread follows the map and offers messages to a [`Hub`]; the server's thread gives each
 //! client what it wants, at the client's pace.
 
+mod bridge;
 mod connection;
+mod desk;
 mod fixed;
 mod http;
 mod hub;
@@ -17,6 +19,8 @@ mod protocol;
 mod server;
 mod sources;
 
+pub use bridge::Bridge;
+pub use desk::{Ask, Desk, Offer, OpenTopic, Step};
 pub use fixed::serve;
 pub use http::{Decision, Gate, Head};
 pub use hub::{Demand, Hub, HubCounts};
@@ -25,7 +29,7 @@ pub use map_stream::{Cursor, Entry, MapStream, Next};
 pub use options::{ViewerOptions, url};
 pub use outbox::{Class, Outbox, Outgoing};
 pub use parameters::declare;
-pub use protocol::{ClientMessage, SUBPROTOCOLS};
+pub use protocol::{AdvertisedService, ClientChannel, SUBPROTOCOLS, Value, Wish};
 pub use server::Server;
 
 #[cfg(test)]

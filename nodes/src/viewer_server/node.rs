@@ -9,6 +9,7 @@ use lattice_msgs::std_msgs::Empty;
 use lattice_msgs::tf2_msgs::TFMessage;
 use serde::Serialize;
 
+use super::bridge::NodeBridge;
 use super::hub::{Hub, HubCounts};
 use super::map_source::{MapSource, News};
 use super::map_stream::MapStream;
@@ -56,7 +57,7 @@ pub fn start(runtime: &Runtime, name: &str) -> Result<Finish, NodeError> {
     let Settings {
         viewer,
         limits,
-        mapper,
+        reach,
         report_file,
     } = Settings::from_params(params)?;
     let hub = Arc::new(Hub::new(viewer.max_clients));
@@ -64,6 +65,7 @@ pub fn start(runtime: &Runtime, name: &str) -> Result<Finish, NodeError> {
     hub.channel::<LatticeMapUpdate>(&node.resolve("map_updates")?, Class::Updates, false);
     let one = Class::Newest { depth: 1 };
     let fixed_channel = hub.channel::<TFMessage>(&node.resolve("/tf_static")?, one, true);
+    hub.set_bridge(Box::new(NodeBridge::new(&node, &reach)?));
     let gate = viewer.gate()?;
     let losses = Losses::default();
     let lost = Arc::new(AtomicU64::new(0));
@@ -76,7 +78,7 @@ pub fn start(runtime: &Runtime, name: &str) -> Result<Finish, NodeError> {
         losses: losses.clone(),
         lost: Arc::clone(&lost),
         lost_seen: 0,
-        request: node.publisher(&format!("{mapper}/request_keyframe"), Qos::DEFAULT)?,
+        request: node.publisher(&format!("{}/request_keyframe", reach.mapper), Qos::DEFAULT)?,
         diagnostics: node.diagnostics(),
         refusals: Throttle::new(Duration::from_secs(5)),
         requests: Throttle::new(Duration::from_secs(1)),

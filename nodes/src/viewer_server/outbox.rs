@@ -29,6 +29,8 @@ pub enum Class {
 pub enum Outgoing {
     /// A control message.
     Text(String),
+    /// A control message that is no text.
+    Binary(Vec<u8>),
     /// A message of a subscription.
     Data(u32, Entry),
     /// Nothing more: the client let too many control messages wait.
@@ -38,7 +40,7 @@ pub enum Outgoing {
 /// Messages of one client.
 #[derive(Debug, Default)]
 pub struct Outbox {
-    control: VecDeque<String>,
+    control: VecDeque<Outgoing>,
     overflown: bool,
     /// Channel and class by subscription.
     subscriptions: BTreeMap<u32, (u32, Class)>,
@@ -54,9 +56,14 @@ pub struct Outbox {
 impl Outbox {
     /// Adds a control message.
     pub fn control(&mut self, text: String) {
+        self.answer(Outgoing::Text(text));
+    }
+
+    /// Adds a control message of either kind.
+    pub fn answer(&mut self, message: Outgoing) {
         self.overflown |= self.control.len() >= MAX_CONTROL;
         if !self.overflown {
-            self.control.push_back(text);
+            self.control.push_back(message);
         }
     }
 
@@ -111,8 +118,8 @@ impl Outbox {
         if self.overflown {
             return Some(Outgoing::Close);
         }
-        if let Some(text) = self.control.pop_front() {
-            return Some(Outgoing::Text(text));
+        if let Some(message) = self.control.pop_front() {
+            return Some(message);
         }
         self.maps_turn = !self.maps_turn;
         match self.maps_turn {

@@ -1,5 +1,6 @@
 //! All parameters of the viewer server.
 
+use super::bridge::Reach;
 use super::options::ViewerOptions;
 use crate::compute::ComputeLimits;
 use crate::options::{self, TOPIC};
@@ -17,15 +18,20 @@ const ABOUT: &[About] = about! {
     "max_voxels" fixed("the map is followed with it"): "Larger maps are not followed.";
     "update_period_s": "Time between two messages of map_updates to clients.";
     "cloud_topics" fixed(TOPIC): "Clouds that clients can have (sensor_msgs/PointCloud2).";
+    "allow_write" fixed(WRITING): "Lets clients clear and save the map, play logs, set parameters and send goals; needs no more than the token.";
+    "player" fixed(WRITING): "Node that plays a log.";
+    "parameter_nodes" fixed(WRITING): "Nodes whose parameters clients may set.";
+    "goal_topic" fixed(WRITING): "Topic of goals of clients (geometry_msgs/PoseStamped).";
 };
 
+const WRITING: &str = "what clients may do is settled at the start";
 const SOCKET: &str = "the server is made with it";
 
 /// Settings of the node by its parameters.
 pub(super) struct Settings {
     pub viewer: ViewerOptions,
     pub limits: ComputeLimits,
-    pub mapper: String,
+    pub reach: Reach,
     pub report_file: String,
 }
 
@@ -41,7 +47,13 @@ impl Settings {
                 bytes: options::inbox_bytes(params, 64 << 20)?,
                 threads: options::threads(params, 1)?,
             },
-            mapper: params.string("mapper", "lattice_mapper")?,
+            reach: Reach {
+                allow_write: params.bool("allow_write", false)?,
+                mapper: params.string("mapper", "lattice_mapper")?,
+                player: params.string("player", "bag_player")?,
+                parameter_nodes: params.string_array("parameter_nodes", &["lattice_mapper"])?,
+                goal_topic: params.string("goal_topic", "goal_pose")?,
+            },
             report_file: report::file(params)?,
         })
     }

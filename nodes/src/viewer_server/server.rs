@@ -7,6 +7,7 @@ use std::sync::atomic::{AtomicUsize, Ordering};
 use std::thread::JoinHandle;
 use std::time::{Duration, Instant};
 
+use lattice_runtime::logging::Throttle;
 use smol::channel::{Sender, bounded};
 use smol::{Async, LocalExecutor, Timer};
 
@@ -88,12 +89,15 @@ async fn accept(
     hub: Arc<Hub>,
 ) {
     let open = Arc::new(AtomicUsize::new(0));
+    let warnings = Throttle::new(Duration::from_secs(5));
     loop {
         let stream = match accepted(&listener).await {
             Ok(stream) => stream,
             Err(error) => {
                 // As when there are no descriptors: it may pass.
-                log::warn!("a connection was not taken: {error}");
+                if let Some(more) = warnings.check() {
+                    log::warn!("a connection was not taken: {error} ({more} more like it)");
+                }
                 Timer::after(Duration::from_millis(100)).await;
                 continue;
             }

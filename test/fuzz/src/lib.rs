@@ -4,6 +4,7 @@
 //! this file, so that it holds without a fuzzer too.
 #![allow(missing_docs)]
 
+pub mod connected;
 pub mod read;
 pub mod received;
 
@@ -250,7 +251,7 @@ fn detailed_maps() -> Vec<Vec<u8>> {
 pub type Target = (&'static str, fn(&[u8]), fn() -> Vec<Vec<u8>>);
 
 /// All targets.
-pub const TARGETS: [Target; 9] = [
+pub const TARGETS: [Target; 11] = [
     ("map_file", map_file, || map_and_cloud_seeds().0),
     ("insert", insert, || map_and_cloud_seeds().1),
     ("message", received::message, received::message_seeds),
@@ -260,6 +261,12 @@ pub const TARGETS: [Target; 9] = [
     ("ros_args", read::ros_args, read::ros_args_seeds),
     ("bag", read::bag, read::bag_seeds),
     ("points", read::points, read::points_seeds),
+    ("http_head", connected::http_head, connected::head_seeds),
+    (
+        "client_message",
+        connected::client_message,
+        connected::client_seeds,
+    ),
 ];
 
 /// Map files, and clouds to insert.

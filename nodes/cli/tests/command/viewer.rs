@@ -6,15 +6,16 @@ use std::process::{Child, Command, Stdio};
 
 use base64::prelude::*;
 use lattice_core::voxels::file::MapContents;
+use lattice_runtime::LoopbackDomain;
 use serde_json::json;
 
 use crate::browser::{chromium, devtools::Page};
 use crate::text;
 
 /// A process that serves a page.
-struct Viewer {
+pub struct Viewer {
     process: Child,
-    url: String,
+    pub url: String,
 }
 
 impl Viewer {
@@ -23,10 +24,23 @@ impl Viewer {
     }
 
     /// Starts a command that says where the page is.
-    fn start(arguments: &[&str]) -> Self {
-        let mut process = Command::new(env!("CARGO_BIN_EXE_lattice"))
+    pub fn start(arguments: &[&str]) -> Self {
+        let mut command = Command::new(env!("CARGO_BIN_EXE_lattice"));
+        Self::run(command.args(arguments).env_remove("ROS_DOMAIN_ID"))
+    }
+
+    /// The same in a domain of its own.
+    pub fn start_in(domain: &LoopbackDomain, arguments: &[&str]) -> Self {
+        let mut command = Command::new(env!("CARGO_BIN_EXE_lattice"));
+        command
             .args(arguments)
-            .env_remove("ROS_DOMAIN_ID")
+            .env("ROS_DOMAIN_ID", domain.id().to_string())
+            .env("ROS_AUTOMATIC_DISCOVERY_RANGE", "LOCALHOST");
+        Self::run(&mut command)
+    }
+
+    fn run(command: &mut Command) -> Self {
+        let mut process = command
             .stdin(Stdio::null())
             .stdout(Stdio::piped())
             .stderr(Stdio::piped())
@@ -73,7 +87,7 @@ impl Drop for Viewer {
 }
 
 /// Points of a bumpy ground with a wall.
-fn scene(folder: &Path, wall_m: f64) -> String {
+pub fn scene(folder: &Path, wall_m: f64) -> String {
     let mut points = String::new();
     for i in 0..120 {
         for k in 0..120 {
@@ -89,14 +103,14 @@ fn scene(folder: &Path, wall_m: f64) -> String {
     path.display().to_string()
 }
 
-fn map_of(cloud: &str, lattice: &str) -> String {
+pub fn map_of(cloud: &str, lattice: &str) -> String {
     let map = format!("{cloud}.{lattice}.lattice");
     text(&["quantize", cloud, "--lattice", lattice, "--map-out", &map]);
     map
 }
 
 /// Keys of a map file as the page names them, sorted.
-fn keys(map: &str) -> Vec<String> {
+pub fn keys(map: &str) -> Vec<String> {
     let file = std::fs::File::open(map).unwrap();
     let list = MapContents::read(BufReader::new(file), 1 << 20)
         .unwrap()
@@ -111,7 +125,7 @@ fn keys(map: &str) -> Vec<String> {
     keys
 }
 
-fn shown(page: &mut Page) -> Vec<String> {
+pub fn shown(page: &mut Page) -> Vec<String> {
     let keys = page.value("lattice.keys()");
     let mut keys: Vec<String> = serde_json::from_value(keys).unwrap();
     keys.sort();
@@ -131,7 +145,7 @@ const OFF_MIDDLE: &str = "(() => { const { camera, state } = lattice; lattice.fr
     const p = camera.project(state.robot.position); \
     return Math.hypot(p.x - (1 + camera.aside) / 2 * camera.width, p.y - camera.height / 2); })()";
 
-const COMPLETE: &str = "lattice.state.open && lattice.state.complete";
+pub const COMPLETE: &str = "lattice.state.open && lattice.state.complete";
 
 #[test]
 fn cells_of_each_lattice_are_drawn_as_the_map_has_them() {

@@ -7,6 +7,7 @@ use super::Node;
 use crate::error::RuntimeError;
 use crate::names::NameKind;
 use crate::service::{Reply, Server};
+use crate::shared::Client;
 
 impl Node {
     /// Serves `S`; the handler runs on the io thread and must return at once.
@@ -39,6 +40,12 @@ impl Node {
         let name = self.full_name(NameKind::Service, name)?;
         self.shared()
             .serve::<S>(self.id(), &name, max_pending, handler)
+    }
+
+    /// A client of `S`. Its endpoints are made at its first call.
+    pub fn client<S: RosService>(&self, name: &str) -> Result<Client, RuntimeError> {
+        let name = self.full_name(NameKind::Service, name)?;
+        Ok(self.shared().client::<S>(self.id(), name))
     }
 
     /// Serves `std_srvs/srv/Trigger`; the handler answers success and what came of it.

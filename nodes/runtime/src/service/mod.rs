@@ -1,8 +1,12 @@
-//! Servers of services, for clients of either rmw.
+//! Servers of services, for clients of either rmw, and the calls of our own clients.
 
+mod asking;
+mod local;
 mod serving;
 mod wire;
 
+pub(crate) use asking::{Asking, Waiting};
+pub(crate) use local::{LocalCall, LocalServices};
 pub(crate) use serving::Serving;
 
 use std::sync::{Arc, Mutex, Weak};

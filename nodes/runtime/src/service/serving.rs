@@ -5,12 +5,13 @@ use std::time::Duration;
 
 use futures::StreamExt;
 use futures::stream::FuturesUnordered;
-use lattice_msgs::{RosMessage, RosService};
+use lattice_msgs::{RosMessage, RosService, cdr};
 use smol::Timer;
 use smol::channel::{Receiver, Sender};
 use smol::future::{self, or};
 
 use super::Reply;
+use super::local::LocalCall;
 use super::wire::{ReplyTo, read_request, write_reply};
 use crate::logging::Throttle;
 use crate::outbox::Outbox;
@@ -24,6 +25,8 @@ const WAIT_FOR_CLIENT: Duration = Duration::from_secs(1);
 pub(crate) struct Serving {
     pub name: String,
     pub requests: Box<dyn SampleReader>,
+    /// Those of this process.
+    pub local: Receiver<LocalCall>,
     pub replies: Arc<Outbox>,
     /// The other ends of the replies.
     pub readers: Arc<Peers>,
@@ -36,13 +39,19 @@ pub(crate) struct Serving {
 /// A request that waits for its answer.
 struct Asked<R> {
     answered: Receiver<R>,
-    reply_to: ReplyTo,
-    client: EndpointId,
+    client: Asker,
+}
+
+/// Sender of a request.
+enum Asker {
+    Remote { reply_to: ReplyTo, id: EndpointId },
+    Local(Sender<Result<Vec<u8>, String>>),
 }
 
 /// Next event of a server.
 enum Step {
     Take(Result<Origin, String>),
+    TakeLocal(LocalCall),
     Answered(Result<(), String>),
     End(Sender<()>),
 }
@@ -59,7 +68,10 @@ impl Serving {
             let takes = ended.is_none() && pending.len() < self.max_pending;
             let take = async {
                 match takes {
-                    true => Step::Take(self.requests.next().await),
+                    true => {
+                        let remote = async { Step::Take(self.requests.next().await) };
+                        or(self.next_local(), remote).await
+                    }
                     false => future::pending().await,
                 }
             };
@@ -79,6 +91,12 @@ impl Serving {
                 Step::Take(sample) => self
                     .ask::<S>(sample, &mut handler)
                     .map(|asked| pending.push(self.answer(asked))),
+                Step::TakeLocal(call) => {
+                    pending.extend(
+                        ask_locally::<S>(call, &mut handler).map(|asked| self.answer(asked)),
+                    );
+                    Ok(())
+                }
                 Step::Answered(result) => result,
                 Step::End(done) => {
                     ended = Some(done);
@@ -94,6 +112,14 @@ impl Serving {
         }
     }
 
+    async fn next_local(&self) -> Step {
+        match self.local.recv().await {
+            Ok(call) => Step::TakeLocal(call),
+            // Another server has taken the name.
+            Err(_) => future::pending().await,
+        }
+    }
+
     fn ask<S: RosService>(
         &self,
         sample: Result<Origin, String>,
@@ -104,18 +130,25 @@ impl Serving {
             .map_err(|e| e.to_string())?;
         let (reply, answered) = Reply::channel();
         handler(request, reply);
-        Ok(Asked {
-            answered,
-            reply_to,
-            client: origin.sample.writer,
-        })
+        let id = origin.sample.writer;
+        let client = Asker::Remote { reply_to, id };
+        Ok(Asked { answered, client })
     }
 
     async fn answer<R: RosMessage>(&self, asked: Asked<R>) -> Result<(), String> {
         let answer = asked.answered.recv().await;
-        let reply = answer.map_err(|_| "nobody answered it".to_owned())?;
-        let (body, related) = write_reply(&reply, &asked.reply_to).map_err(|e| e.to_string())?;
-        self.wait_for_reader(&asked.client).await;
+        let reply = answer.map_err(|_| "nobody answered it".to_owned());
+        let (reply_to, id) = match asked.client {
+            Asker::Remote { reply_to, id } => (reply_to, id),
+            Asker::Local(to) => {
+                let written = |reply| cdr::to_vec(&reply).map_err(|e| e.to_string());
+                // It may wait no longer.
+                let _ = to.try_send(reply.and_then(written));
+                return Ok(());
+            }
+        };
+        let (body, related) = write_reply(&reply?, &reply_to).map_err(|e| e.to_string())?;
+        self.wait_for_reader(&id).await;
         self.replies
             .send_body(body, related)
             .map_err(|e| e.to_string())
@@ -127,5 +160,24 @@ impl Serving {
             Timer::after(WAIT_FOR_CLIENT).await;
         };
         or(known, timeout).await;
+    }
+}
+
+/// Gives a call of this process to the handler; one that is no request is answered at once.
+fn ask_locally<S: RosService>(
+    call: LocalCall,
+    handler: &mut impl FnMut(S::Request, Reply<S::Response>),
+) -> Option<Asked<S::Response>> {
+    let client = Asker::Local(call.answered.clone());
+    match cdr::from_slice(&call.request) {
+        Ok(request) => {
+            let (reply, answered) = Reply::channel();
+            handler(request, reply);
+            Some(Asked { answered, client })
+        }
+        Err(error) => {
+            let _ = call.answered.try_send(Err(error.to_string()));
+            None
+        }
     }
 }

@@ -7,7 +7,7 @@ use lattice_msgs::RosMessage;
 use lattice_msgs::cdr::{self, CdrError};
 use thiserror::Error;
 
-use crate::port::{Bytes, ENCAPSULATION_BYTES, Origin, SampleId};
+use crate::port::{Bytes, ENCAPSULATION_BYTES, EndpointId, Origin, SampleId};
 
 /// First two bytes of the GUIDs of a vendor.
 const CYCLONE_VENDOR: [u8; 2] = [0x01, 0x10];
@@ -20,11 +20,14 @@ const SECURED: u8 = 0x80;
 /// Eight bytes of the client's GUID and eight of the request's number.
 const CYCLONE_HEADER_BYTES: usize = 16;
 
+/// Identity of a request in the form of rmw_cyclonedds, which is also that of our own.
+pub(crate) type Header = [u8; CYCLONE_HEADER_BYTES];
+
 /// Identity of a request in a reply, in the form of the client's rmw.
 #[derive(Clone, Debug, PartialEq)]
 pub(crate) enum ReplyTo {
     Enhanced(SampleId),
-    Cyclone([u8; CYCLONE_HEADER_BYTES]),
+    Cyclone(Header),
 }
 
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
@@ -83,6 +86,47 @@ pub(crate) fn write_reply<R: RosMessage>(
     })
 }
 
+/// Identity of a request of ours: half of it of its writer's, half its number.
+pub(crate) fn header(writer: &EndpointId, number: i64) -> Header {
+    let id = u128::from_le_bytes(writer.0);
+    let folded = (id as u64) ^ ((id >> 64) as u64);
+    let mut header = Header::default();
+    let (first, second) = header.split_at_mut(8);
+    first.copy_from_slice(&folded.to_le_bytes());
+    second.copy_from_slice(&number.to_le_bytes());
+    header
+}
+
+/// Words of the inline QoS on a request of ours: over RustDDS it tells our servers of the header.
+pub(crate) fn related(writer: EndpointId, number: i64) -> Option<SampleId> {
+    (writer.vendor() == RUSTDDS_VENDOR).then_some(SampleId { writer, number })
+}
+
+/// The body of a request with its header. `None`: no little-endian CDR.
+pub(crate) fn write_request(message: &[u8], header: &Header) -> Option<Bytes> {
+    let (encapsulation, body) = message.split_first_chunk::<ENCAPSULATION_BYTES>()?;
+    let little = encapsulation.starts_with(&[0, 1]);
+    little.then(|| [header.as_slice(), body].concat().into())
+}
+
+/// The header of an answer, and the answer as CDR. `None`: none with a header.
+pub(crate) fn read_answer(bytes: &[u8]) -> Option<(Header, Vec<u8>)> {
+    let (encapsulation, rest) = bytes.split_first_chunk::<ENCAPSULATION_BYTES>()?;
+    let (header, body) = rest.split_first_chunk::<CYCLONE_HEADER_BYTES>()?;
+    let header = in_our_order(*header, encapsulation);
+    Some((header, [encapsulation.as_slice(), body].concat()))
+}
+
+/// A header in little-endian order.
+fn in_our_order(mut header: Header, encapsulation: &[u8]) -> Header {
+    if encapsulation.get(1) == Some(&0) {
+        for word in header.chunks_exact_mut(8) {
+            word.reverse();
+        }
+    }
+    header
+}
+
 fn likely_mapping(origin: &Origin) -> Mapping {
     match origin.sample.writer.vendor() {
         CYCLONE_VENDOR => Mapping::Cyclone,
@@ -110,13 +154,7 @@ fn read_as<Q: RosMessage>(
                 .split_first_chunk::<CYCLONE_HEADER_BYTES>()
                 .ok_or_else(no_header)?;
             let request = cdr::from_slice(&[encapsulation.as_slice(), body].concat())?;
-            let mut header = *header;
-            if encapsulation.get(1) == Some(&0) {
-                // Big endian; our reply is not.
-                for word in header.chunks_exact_mut(8) {
-                    word.reverse();
-                }
-            }
+            let header = in_our_order(*header, encapsulation);
             Ok((request, ReplyTo::Cyclone(header)))
         }
     }
@@ -140,7 +178,6 @@ mod tests {
     use lattice_msgs::std_srvs::{SetBoolRequest, TriggerResponse};
 
     use super::*;
-    use crate::port::EndpointId;
 
     fn origin(vendor: [u8; 2], related: Option<SampleId>) -> Origin {
         let mut guid = [7; 16];
@@ -194,6 +231,24 @@ mod tests {
         let (_, to) = read_request::<SetBoolRequest>(&big, &origin(CYCLONE_VENDOR, None)).unwrap();
         let swapped = [7, 6, 5, 4, 3, 2, 1, 0, 15, 14, 13, 12, 11, 10, 9, 8];
         assert_eq!(to, ReplyTo::Cyclone(swapped));
+    }
+
+    #[test]
+    fn our_servers_read_our_requests_and_our_clients_their_answers() {
+        let request = cdr::to_vec(&SetBoolRequest { data: true }).unwrap();
+        let mut writer = EndpointId([5; 16]);
+        writer.0[..2].copy_from_slice(&RUSTDDS_VENDOR);
+        let header = header(&writer, 3);
+        let body = write_request(&request, &header).unwrap();
+        let sent = [&[0, 1, 0, 0], &body[..]].concat();
+        let origin = origin(RUSTDDS_VENDOR, related(writer, 3));
+        let (read, to) = read_request::<SetBoolRequest>(&sent, &origin).unwrap();
+        assert!(read.data);
+        let (answer, _) = write_reply(&TriggerResponse::default(), &to).unwrap();
+        let answer = [&[0, 1, 0, 0], &answer[..]].concat();
+        let expected = cdr::to_vec(&TriggerResponse::default()).unwrap();
+        assert_eq!(read_answer(&answer), Some((header, expected)));
+        assert_eq!(write_request(&[0, 0, 0, 0, 1], &header), None);
     }
 
     #[test]

@@ -1,5 +1,6 @@
 //! The parts that the nodes of a process share: the participant, the threads, the local bus.
 
+mod calling;
 mod publishing;
 mod readers;
 mod serving;
@@ -16,6 +17,7 @@ use lattice_msgs::rosgraph_msgs;
 use smol::Task;
 use smol::channel::Sender;
 
+pub use self::calling::{CallError, Client};
 use self::status::ReceiveBuffer;
 #[cfg(feature = "cyclone")]
 use super::cyclone::Cyclone;
@@ -34,7 +36,7 @@ use super::publisher::PublisherParts;
 use super::qos::Qos;
 use super::remote::RemotePublisher;
 use super::security::Enclave;
-use super::service::{Answers, Server};
+use super::service::{Answers, LocalServices, Server};
 use super::shutdown::Shutdown;
 use super::subscription::{Command, Intake, Load, Sample, Stats, Subscription};
 use super::sync::{lock, wait_for};
@@ -63,6 +65,7 @@ pub(crate) struct Shared {
     sim_time: Mutex<Option<(Arc<AtomicI64>, Subscription)>>,
     publishing: TaskThread,
     answers: Answers,
+    services: LocalServices,
     endpoints: Arc<Endpoints>,
     pub graph: Arc<Graph>,
     /// Held while a writer is made, or a reader that a writer must not meet.
@@ -102,6 +105,7 @@ impl Shared {
             sim_time: Mutex::default(),
             publishing,
             answers: Answers::default(),
+            services: LocalServices::default(),
             endpoints,
             graph,
             writer_order: Mutex::default(),

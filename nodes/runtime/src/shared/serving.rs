@@ -59,6 +59,7 @@ impl Shared {
         let serving = Serving {
             name: name.to_owned(),
             requests,
+            local: self.services.add(name, S::TYPE),
             replies,
             readers,
             ending,

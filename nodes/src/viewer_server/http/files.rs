@@ -27,10 +27,12 @@ macro_rules! files {
 const FILES: &[File] = files! {
     "/" "index.html" "text/html; charset=utf-8";
     "/style.css" "style.css" "text/css; charset=utf-8";
+    "/calls.js" "calls.js" JAVASCRIPT;
     "/camera.js" "camera.js" JAVASCRIPT;
     "/cdr.js" "cdr.js" JAVASCRIPT;
     "/cell.js" "cell.js" JAVASCRIPT;
     "/colours.js" "colours.js" JAVASCRIPT;
+    "/dialog.js" "dialog.js" JAVASCRIPT;
     "/drawing.js" "drawing.js" JAVASCRIPT;
     "/follower.js" "follower.js" JAVASCRIPT;
     "/keys.js" "keys.js" JAVASCRIPT;
@@ -38,12 +40,16 @@ const FILES: &[File] = files! {
     "/math.js" "math.js" JAVASCRIPT;
     "/messages.js" "messages.js" JAVASCRIPT;
     "/panel.js" "panel.js" JAVASCRIPT;
+    "/player.js" "player.js" JAVASCRIPT;
     "/pointer.js" "pointer.js" JAVASCRIPT;
     "/renderer.js" "renderer.js" JAVASCRIPT;
+    "/requests.js" "requests.js" JAVASCRIPT;
     "/scene.js" "scene.js" JAVASCRIPT;
+    "/services.js" "services.js" JAVASCRIPT;
     "/shaders.js" "shaders.js" JAVASCRIPT;
     "/transforms.js" "transforms.js" JAVASCRIPT;
     "/worker.js" "worker.js" JAVASCRIPT;
+    "/writing.js" "writing.js" JAVASCRIPT;
 };
 
 /// The file of a path.

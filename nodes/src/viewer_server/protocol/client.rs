@@ -1,9 +1,9 @@
 //! Messages of a client.
 
-use serde::Deserialize;
+use serde::{Deserialize, Serialize};
 use thiserror::Error;
 
-/// Most subscriptions that one message may name.
+/// Most entries of a list in one message.
 const MAX_LIST: usize = 256;
 
 /// Error of a message of a client. It is told so, and stays connected.
@@ -13,13 +13,13 @@ pub enum ProtocolError {
     #[error("not understood: {0}")]
     Json(#[from] serde_json::Error),
     /// A longer list than anybody needs.
-    #[error("{found} subscriptions in one message, at most {MAX_LIST} are taken")]
+    #[error("{found} entries in one message, at most {MAX_LIST} are taken")]
     TooMany {
         /// Length of the list.
         found: usize,
     },
-    /// Binary messages are for writing, which is not offered.
-    #[error("binary messages are not taken here: this server only shows")]
+    /// A binary message that is none of the protocol.
+    #[error("a binary message is too short, or of an unknown kind")]
     Binary,
 }
 
@@ -37,6 +37,31 @@ pub enum ClientMessage {
         /// Ids of the subscriptions.
         subscription_ids: Vec<u32>,
     },
+    /// Wants values of parameters.
+    GetParameters {
+        /// Full names; none: all.
+        #[serde(default)]
+        parameter_names: Vec<String>,
+        /// Comes back in the answer.
+        id: Option<String>,
+    },
+    /// Wants other values.
+    SetParameters {
+        /// Names and values.
+        parameters: Vec<Value>,
+        /// Comes back in the answer.
+        id: Option<String>,
+    },
+    /// Will publish.
+    Advertise {
+        /// Its channels.
+        channels: Vec<ClientChannel>,
+    },
+    /// Will not any more.
+    Unadvertise {
+        /// Ids of the channels.
+        channel_ids: Vec<u32>,
+    },
     /// Anything else, which is not offered.
     #[serde(other)]
     Other,
@@ -52,6 +77,85 @@ pub struct Wish {
     pub channel_id: u32,
 }
 
+/// A parameter with its value.
+#[derive(Clone, Debug, Deserialize, PartialEq, Serialize)]
+pub struct Value {
+    /// Full name: that of the node, a dot, that in the node.
+    pub name: String,
+    /// In JSON.
+    #[serde(default)]
+    pub value: serde_json::Value,
+    /// Type that JSON does not say, as `float64`.
+    #[serde(rename = "type", default, skip_serializing_if = "Option::is_none")]
+    pub kind: Option<String>,
+}
+
+/// A channel of a client.
+#[derive(Clone, Debug, Deserialize, PartialEq)]
+#[serde(rename_all = "camelCase")]
+pub struct ClientChannel {
+    /// By which its messages name it.
+    pub id: u32,
+    /// Full name of the topic.
+    pub topic: String,
+    /// Must be `cdr`.
+    pub encoding: String,
+    /// Type of the messages.
+    pub schema_name: String,
+}
+
+/// A binary message of a client.
+#[derive(Debug, PartialEq)]
+pub enum ClientData<'a> {
+    /// A message of a channel of the client's.
+    Message {
+        /// The channel.
+        channel: u32,
+        /// The message.
+        payload: &'a [u8],
+    },
+    /// A call of a service.
+    Call {
+        /// The service.
+        service: u32,
+        /// By which the client knows the answer.
+        call: u32,
+        /// Must be `cdr`.
+        encoding: &'a [u8],
+        /// The request.
+        payload: &'a [u8],
+    },
+}
+
+impl<'a> ClientData<'a> {
+    /// Reads a binary message.
+    pub fn parse(bytes: &'a [u8]) -> Result<Self, ProtocolError> {
+        Self::read(bytes).ok_or(ProtocolError::Binary)
+    }
+
+    fn read(bytes: &'a [u8]) -> Option<Self> {
+        let (kind, mut rest) = bytes.split_first()?;
+        let mut number = || {
+            let (number, after) = rest.split_first_chunk()?;
+            rest = after;
+            Some(u32::from_le_bytes(*number))
+        };
+        let first = number()?;
+        if *kind == 1 {
+            let (channel, payload) = (first, rest);
+            return Some(Self::Message { channel, payload });
+        }
+        let (call, length) = (number()?, number()?);
+        let (encoding, payload) = rest.split_at_checked(length as usize)?;
+        (*kind == 2).then_some(Self::Call {
+            service: first,
+            call,
+            encoding,
+            payload,
+        })
+    }
+}
+
 impl ClientMessage {
     /// Reads a text message.
     pub fn parse(text: &str) -> Result<Self, ProtocolError> {
@@ -59,6 +163,12 @@ impl ClientMessage {
         let found = match &message {
             Self::Subscribe { subscriptions } => subscriptions.len(),
             Self::Unsubscribe { subscription_ids } => subscription_ids.len(),
+            Self::GetParameters {
+                parameter_names, ..
+            } => parameter_names.len(),
+            Self::SetParameters { parameters, .. } => parameters.len(),
+            Self::Advertise { channels } => channels.len(),
+            Self::Unadvertise { channel_ids } => channel_ids.len(),
             Self::Other => 0,
         };
         match found > MAX_LIST {
@@ -89,12 +199,13 @@ mod tests {
             message.unwrap(),
             ClientMessage::Unsubscribe { subscription_ids }
         );
-        let message = ClientMessage::parse(r#"{"op":"advertise","channels":[{"id":1}]}"#);
+        let message = ClientMessage::parse(r#"{"op":"fetchAsset","uri":"x","requestId":1}"#);
         assert_eq!(message.unwrap(), ClientMessage::Other);
         for wrong in [
             "",
             "[]",
             "{}",
+            r#"{"op":"advertise","channels":[{"id":1}]}"#,
             r#"{"op":"subscribe"}"#,
             r#"{"op":"subscribe","subscriptions":[{"id":-1,"channelId":0}]}"#,
         ] {
@@ -106,6 +217,33 @@ mod tests {
             ClientMessage::parse(&many),
             Err(ProtocolError::TooMany { found: 257 })
         ));
+    }
+
+    #[test]
+    fn binary_messages_are_read_as_far_as_they_go() {
+        let call = [
+            &[2, 7, 0, 0, 0, 9, 0, 0, 0, 3, 0, 0, 0][..],
+            b"cdr",
+            &[0, 1],
+        ]
+        .concat();
+        let expected = ClientData::Call {
+            service: 7,
+            call: 9,
+            encoding: b"cdr",
+            payload: &[0, 1],
+        };
+        assert_eq!(ClientData::parse(&call).unwrap(), expected);
+        for length in 0..16 {
+            assert!(ClientData::parse(&call[..length]).is_err(), "{length}");
+        }
+        let mut huge = call.clone();
+        huge[9..13].fill(255);
+        assert!(ClientData::parse(&huge).is_err());
+        assert!(ClientData::parse(&[&[3], &call[1..]].concat()).is_err());
+        let message = ClientData::parse(&[1, 4, 0, 0, 0, 8]).unwrap();
+        let (channel, payload) = (4, &[8][..]);
+        assert_eq!(message, ClientData::Message { channel, payload });
     }
 
     proptest! {

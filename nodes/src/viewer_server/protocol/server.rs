@@ -3,6 +3,8 @@
 use serde::Serialize;
 use serde_json::json;
 
+use super::client::Value;
+
 /// A channel as clients see it.
 #[derive(Clone, Debug, Serialize)]
 #[serde(rename_all = "camelCase")]
@@ -21,13 +23,30 @@ pub struct Advertised {
     pub schema: String,
 }
 
+/// A service as clients see it.
+#[derive(Clone, Debug, Serialize)]
+#[serde(rename_all = "camelCase")]
+pub struct AdvertisedService {
+    /// By which clients call it.
+    pub id: u32,
+    /// Full name.
+    pub name: String,
+    /// Type, such as `std_srvs/srv/Empty`.
+    #[serde(rename = "type")]
+    pub type_name: &'static str,
+    /// Text of the request's type with all that it holds.
+    pub request_schema: String,
+    /// The same of the answer's.
+    pub response_schema: String,
+}
+
 /// The first message. `session` is another one after each start, so that clients begin anew. No
 /// distribution of ROS is named: viewers would take its definitions for ours.
-pub fn server_info(session: &str) -> String {
+pub fn server_info(session: &str, capabilities: &[&str]) -> String {
     json!({
         "op": "serverInfo",
         "name": "lattice viewer_server",
-        "capabilities": [],
+        "capabilities": capabilities,
         "supportedEncodings": ["cdr"],
         "metadata": {},
         "sessionId": session,
@@ -43,6 +62,38 @@ pub fn advertise(channels: &[&Advertised]) -> String {
 /// A warning for the person at the client.
 pub fn status(message: &str) -> String {
     json!({ "op": "status", "level": 1, "message": message }).to_string()
+}
+
+/// The services that there are.
+pub fn advertise_services(services: &[AdvertisedService]) -> String {
+    json!({ "op": "advertiseServices", "services": services }).to_string()
+}
+
+/// An answer to a call: operation 3, service, call, encoding, CDR.
+pub fn service_response(service: u32, call: u32, cdr: &[u8]) -> Vec<u8> {
+    let encoding = b"cdr";
+    let mut bytes = vec![3];
+    for number in [service, call, encoding.len() as u32] {
+        bytes.extend_from_slice(&number.to_le_bytes());
+    }
+    bytes.extend_from_slice(encoding);
+    bytes.extend_from_slice(cdr);
+    bytes
+}
+
+/// A call that came to nothing.
+pub fn service_failure(service: u32, call: u32, message: &str) -> String {
+    json!({ "op": "serviceCallFailure", "serviceId": service, "callId": call, "message": message })
+        .to_string()
+}
+
+/// Values of parameters.
+pub fn parameter_values(parameters: &[Value], id: Option<&str>) -> String {
+    let mut message = json!({ "op": "parameterValues", "parameters": parameters });
+    if let (Some(id), Some(fields)) = (id, message.as_object_mut()) {
+        fields.insert("id".to_owned(), id.into());
+    }
+    message.to_string()
 }
 
 /// A message of a channel: operation 1, subscription, time of arrival, CDR.

@@ -1,0 +1,102 @@
+//! The calls of one client over DDS: who has asked, and which answer is whose.
+
+use std::collections::BTreeMap;
+use std::sync::Mutex;
+use std::sync::atomic::{AtomicI64, Ordering::Relaxed};
+
+use smol::channel::{Sender, bounded};
+
+use super::wire::{Header, header, read_answer, related, write_request};
+use crate::outbox::Outbox;
+use crate::peers::Peers;
+use crate::port::SampleReader;
+use crate::sync::lock;
+use std::sync::Arc;
+
+/// Calls that wait for answers.
+#[derive(Default)]
+pub(crate) struct Waiting(Mutex<BTreeMap<Header, Sender<Vec<u8>>>>);
+
+impl Waiting {
+    /// Hands an answer to who asked; those of other clients are passed over.
+    fn hear(&self, bytes: &[u8]) {
+        let Some((header, answer)) = read_answer(bytes) else {
+            return;
+        };
+        if let Some(sender) = lock(&self.0).remove(&header) {
+            let _ = sender.try_send(answer);
+        }
+    }
+
+    /// Hears answers until the task is dropped.
+    pub(crate) async fn listen(self: Arc<Self>, answers: Box<dyn SampleReader>) {
+        loop {
+            // What cannot be had is no answer; its call ends by time.
+            if answers.next().await.is_ok() {
+                self.hear(&answers.bytes());
+            }
+            smol::future::yield_now().await;
+        }
+    }
+}
+
+/// Asks over DDS.
+pub(crate) struct Asking {
+    pub requests: Arc<Outbox>,
+    /// The other ends of the requests.
+    pub servers: Arc<Peers>,
+    /// The other ends of the answers.
+    pub answerers: Arc<Peers>,
+    pub waiting: Arc<Waiting>,
+    pub next: AtomicI64,
+}
+
+impl Asking {
+    /// Asks once a server is known, and waits for the answer.
+    pub(crate) async fn call(&self, request: &[u8]) -> Result<Vec<u8>, String> {
+        self.servers.known(|_| true).await;
+        self.answerers.known(|_| true).await;
+        let number = self.next.fetch_add(1, Relaxed);
+        let writer = self.requests.id();
+        let header = header(&writer, number);
+        let body = write_request(request, &header).ok_or("the request is no CDR of this order")?;
+        let (sender, answer) = bounded(1);
+        lock(&self.waiting.0).insert(header, sender);
+        let _forgotten = Forget(&self.waiting, header);
+        self.requests
+            .send_body(body, related(writer, number))
+            .map_err(|error| error.to_string())?;
+        let answer = answer.recv().await;
+        answer.map_err(|_| "the client has ended".to_owned())
+    }
+}
+
+/// Forgets a call that is over, or that nobody waits for any more.
+struct Forget<'a>(&'a Waiting, Header);
+
+impl Drop for Forget<'_> {
+    fn drop(&mut self) {
+        lock(&self.0.0).remove(&self.1);
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn answers_go_to_who_asked() {
+        let waiting = Waiting::default();
+        let (sender, answer) = bounded(1);
+        lock(&waiting.0).insert([7; 16], sender);
+        for other in [&[0, 1, 0, 0][..], &[0, 1, 0, 0, 7], &[8; 40]] {
+            waiting.hear(other);
+        }
+        waiting.hear(&[&[0, 1, 0, 0][..], &[6; 16], b"no"].concat());
+        assert!(answer.is_empty());
+        waiting.hear(&[&[0, 1, 0, 0][..], &[7; 16], b"yes"].concat());
+        let heard = answer.try_recv().unwrap();
+        assert_eq!(heard, [&[0, 1, 0, 0][..], b"yes"].concat());
+        assert!(lock(&waiting.0).is_empty());
+    }
+}

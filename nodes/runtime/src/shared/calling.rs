@@ -1,0 +1,206 @@
+//! Clients of services, in this process or another.
+
+use std::sync::atomic::AtomicI64;
+use std::sync::{Arc, Mutex, Weak};
+use std::time::Duration;
+
+use lattice_msgs::{RosMessage, RosService};
+use smol::channel::bounded;
+use smol::future::or;
+use smol::{Task, Timer};
+use thiserror::Error;
+
+use super::{Shared, closed};
+use crate::error::RuntimeError;
+use crate::graph::{EndpointKind, NodeEndpoint, NodeId};
+use crate::names;
+use crate::outbox::WhenFull;
+use crate::peers::Peers;
+use crate::port::PortTopic;
+use crate::qos::Qos;
+use crate::service::{Asking, LocalCall, Waiting};
+use crate::sync::lock;
+
+/// Longest answer that is taken.
+const MAX_ANSWER_BYTES: usize = 4 << 20;
+
+/// Reason why a call has no answer.
+#[derive(Debug, Error)]
+pub enum CallError {
+    /// No server is known.
+    #[error("nobody serves {name}")]
+    NoServer {
+        /// Full name of the service.
+        name: String,
+    },
+    /// The server does not answer.
+    #[error("{name} has not answered within {patience_s} s")]
+    Late {
+        /// Full name of the service.
+        name: String,
+        /// Time given, s.
+        patience_s: f64,
+    },
+    /// It was refused, or not sent.
+    #[error("{name}: {reason}")]
+    Failed {
+        /// Full name of the service.
+        name: String,
+        /// In words.
+        reason: String,
+    },
+}
+
+/// A client of a service. Clones are the same client.
+#[derive(Clone)]
+pub struct Client(Arc<Inner>);
+
+struct Inner {
+    shared: Weak<Shared>,
+    node: NodeId,
+    name: String,
+    service: &'static str,
+    request: &'static str,
+    response: &'static str,
+    remote: Mutex<Option<Arc<Remote>>>,
+}
+
+/// Endpoints of a client.
+struct Remote {
+    asking: Asking,
+    _task: Task<()>,
+    _graph: [NodeEndpoint; 2],
+}
+
+impl Client {
+    /// Full name of the service.
+    pub fn name(&self) -> &str {
+        &self.0.name
+    }
+
+    /// Asks with little-endian CDR, encapsulation header first; the answer is CDR too. Servers over
+    /// rmw_fastrtps are not reached. A call that is dropped is over.
+    pub fn call(
+        &self,
+        request: Vec<u8>,
+        patience: Duration,
+    ) -> impl Future<Output = Result<Vec<u8>, CallError>> + Send + 'static {
+        let client = Arc::clone(&self.0);
+        async move {
+            let late = async {
+                Timer::after(patience).await;
+                Err(client.late(patience))
+            };
+            or(client.call(request), late).await
+        }
+    }
+}
+
+impl Inner {
+    async fn call(&self, request: Vec<u8>) -> Result<Vec<u8>, CallError> {
+        let answer = match self.local() {
+            Some(server) => {
+                let (answered, answer) = bounded(1);
+                match server.try_send(LocalCall { request, answered }) {
+                    Ok(()) => answer.recv().await.unwrap_or(Err("it has ended".into())),
+                    Err(_) => Err("busy, ask again".to_owned()),
+                }
+            }
+            None => match self.remote() {
+                Ok(remote) => remote.asking.call(&request).await,
+                Err(error) => Err(error.to_string()),
+            },
+        };
+        answer.map_err(|reason| CallError::Failed {
+            name: self.name.clone(),
+            reason,
+        })
+    }
+
+    /// The server in this process. Endpoints of ours would be in its way.
+    fn local(&self) -> Option<smol::channel::Sender<LocalCall>> {
+        let shared = self.shared.upgrade()?;
+        let server = shared.services.find(&self.name, self.service)?;
+        *lock(&self.remote) = None;
+        Some(server)
+    }
+
+    fn remote(&self) -> Result<Arc<Remote>, RuntimeError> {
+        let mut remote = lock(&self.remote);
+        if let Some(remote) = &*remote {
+            return Ok(Arc::clone(remote));
+        }
+        let shared = self.shared.upgrade().ok_or_else(|| closed(&self.name))?;
+        let made = Arc::new(shared.remote(self)?);
+        *remote = Some(Arc::clone(&made));
+        Ok(made)
+    }
+
+    fn late(&self, patience: Duration) -> CallError {
+        let name = self.name.clone();
+        let remote = lock(&self.remote);
+        match &*remote {
+            Some(remote) if remote.asking.servers.remote() == 0 => CallError::NoServer { name },
+            _ => CallError::Late {
+                name,
+                patience_s: patience.as_secs_f64(),
+            },
+        }
+    }
+}
+
+impl Shared {
+    /// A client of `S` under a full name.
+    pub(crate) fn client<S: RosService>(self: &Arc<Self>, node: NodeId, name: String) -> Client {
+        Client(Arc::new(Inner {
+            shared: Arc::downgrade(self),
+            node,
+            name,
+            service: S::TYPE,
+            request: S::Request::TYPE,
+            response: S::Response::TYPE,
+            remote: Mutex::default(),
+        }))
+    }
+
+    fn remote(&self, client: &Inner) -> Result<Remote, RuntimeError> {
+        let name = &client.name;
+        let topic = |dds_name, ros_type| PortTopic {
+            name,
+            dds_name,
+            ros_type,
+            type_hash: None,
+        };
+        let dds_name = names::dds_reply(name);
+        let answers = topic(dds_name.as_str(), client.response);
+        let answers = self.reader(answers, &Qos::SERVICES, MAX_ANSWER_BYTES)?;
+        let dds_name = names::dds_request(name);
+        let requests = topic(dds_name.as_str(), client.request);
+        let requests = self.outbox(requests, &Qos::SERVICES, WhenFull::Drop)?;
+        let graph = [
+            self.graph
+                .join(client.node, EndpointKind::Reader, answers.id()),
+            self.graph
+                .join(client.node, EndpointKind::Writer, requests.id()),
+        ];
+        let [servers, answerers] = ["server", "answer writer"]
+            .map(|kind| Arc::new(Peers::new(name, kind, log::Level::Debug)));
+        self.endpoints.register(requests.id(), &servers);
+        self.endpoints.register(answers.id(), &answerers);
+        let waiting = Arc::new(Waiting::default());
+        let listen = Arc::clone(&waiting).listen(answers);
+        let task = self.io.spawn(listen).ok_or_else(|| closed(name))?;
+        let next = AtomicI64::new(1);
+        Ok(Remote {
+            asking: Asking {
+                requests,
+                servers,
+                answerers,
+                waiting,
+                next,
+            },
+            _task: task,
+            _graph: graph,
+        })
+    }
+}

@@ -1,0 +1,175 @@
+//! Parameters of nodes, over their own services.
+
+use futures::future::{BoxFuture, join_all};
+use lattice_msgs::cdr;
+use lattice_msgs::rcl_interfaces::{
+    DescribeParameters, DescribeParametersRequest, DescribeParametersResponse, GetParameters,
+    GetParametersRequest, GetParametersResponse, ListParameters, ListParametersRequest,
+    ListParametersResponse, Parameter, ParameterValue, SetParameters, SetParametersRequest,
+    SetParametersResponse,
+};
+use lattice_runtime::{CallError, Client, Node, RuntimeError};
+
+use super::values::{from_json, to_json};
+use super::{PATIENCE, answer};
+use crate::viewer_server::protocol::Value;
+
+/// Most parameters of a node that are asked for.
+const MAX_PARAMETERS: usize = 1000;
+
+/// Values, and what went wrong.
+#[derive(Default)]
+pub(super) struct Outcome {
+    pub values: Vec<Value>,
+    pub problems: Vec<String>,
+}
+
+/// The nodes whose parameters are reached.
+pub(super) struct Parameters(Vec<Remote>);
+
+/// One of them.
+#[derive(Clone)]
+struct Remote {
+    /// Full name and a dot, in front of the names of its parameters.
+    prefix: String,
+    list: Client,
+    describe: Client,
+    get: Client,
+    set: Client,
+}
+
+impl Parameters {
+    pub(super) fn new(node: &Node, names: &[String]) -> Result<Self, RuntimeError> {
+        let remote = |name: &String| {
+            let list = node.client::<ListParameters>(&format!("{name}/list_parameters"))?;
+            let full = list.name().trim_end_matches("/list_parameters");
+            Ok(Remote {
+                prefix: format!("{full}."),
+                describe: node
+                    .client::<DescribeParameters>(&format!("{name}/describe_parameters"))?,
+                get: node.client::<GetParameters>(&format!("{name}/get_parameters"))?,
+                set: node.client::<SetParameters>(&format!("{name}/set_parameters"))?,
+                list,
+            })
+        };
+        names.iter().map(remote).collect::<Result<_, _>>().map(Self)
+    }
+
+    /// Values of these parameters; of all that can be changed if none are named. Nodes that are not there
+    /// are left out.
+    pub(super) fn get(&self, names: Vec<String>) -> BoxFuture<'static, Outcome> {
+        let all = names.is_empty();
+        let of = |remote: &Remote| {
+            let names = names
+                .iter()
+                .filter_map(|name| name.strip_prefix(&remote.prefix));
+            (remote.clone(), names.map(str::to_owned).collect::<Vec<_>>())
+        };
+        let nodes = self
+            .0
+            .iter()
+            .map(of)
+            .filter(|(_, names)| all || !names.is_empty());
+        let nodes = nodes.map(|(remote, names)| async move {
+            let names = match all {
+                true => remote.changeable().await?,
+                false => names,
+            };
+            remote.values(&names).await
+        });
+        let nodes = join_all(nodes.collect::<Vec<_>>());
+        Box::pin(async move {
+            let mut outcome = Outcome::default();
+            for result in nodes.await {
+                match result {
+                    Ok(values) => outcome.values.extend(values),
+                    Err(problem) if !all => outcome.problems.push(problem),
+                    Err(problem) => log::debug!("parameters not read: {problem}"),
+                }
+            }
+            outcome
+        })
+    }
+
+    /// Sets each parameter by itself; gives their values after that.
+    pub(super) fn set(&self, parameters: Vec<Value>) -> BoxFuture<'static, Outcome> {
+        let mut problems = Vec::new();
+        let mut works = Vec::new();
+        for parameter in parameters {
+            let of = |remote: &&Remote| parameter.name.starts_with(&remote.prefix);
+            match self.0.iter().find(of) {
+                Some(remote) => works.push((remote.clone(), parameter)),
+                None => problems.push(format!("{:?} is not within reach", parameter.name)),
+            }
+        }
+        Box::pin(async move {
+            let mut outcome = Outcome {
+                problems,
+                ..Outcome::default()
+            };
+            for (remote, parameter) in works {
+                let name = parameter.name.clone();
+                if let Err(problem) = remote.set(parameter).await {
+                    outcome.problems.push(format!("{name}: {problem}"));
+                }
+                let name = name.strip_prefix(&remote.prefix).unwrap_or_default();
+                let values = remote.values(&[name.to_owned()]).await;
+                outcome.values.extend(values.into_iter().flatten());
+            }
+            outcome
+        })
+    }
+}
+
+impl Remote {
+    async fn changeable(&self) -> Result<Vec<String>, String> {
+        let request = ListParametersRequest::default();
+        let list: ListParametersResponse = answer(ask(&self.list, &request)).await?;
+        let mut names = list.result.names;
+        names.truncate(MAX_PARAMETERS);
+        let request = DescribeParametersRequest { names };
+        let described: DescribeParametersResponse = answer(ask(&self.describe, &request)).await?;
+        let changeable = described.descriptors.into_iter().filter(|of| !of.read_only);
+        Ok(changeable.map(|of| of.name).collect())
+    }
+
+    async fn raw(&self, names: &[String]) -> Result<Vec<ParameterValue>, String> {
+        let names = names.to_vec();
+        let request = GetParametersRequest { names };
+        let got: GetParametersResponse = answer(ask(&self.get, &request)).await?;
+        Ok(got.values)
+    }
+
+    async fn values(&self, names: &[String]) -> Result<Vec<Value>, String> {
+        let values = self.raw(names).await?;
+        let value = |(name, value): (&String, ParameterValue)| {
+            let (value, kind) = to_json(value)?;
+            let name = format!("{}{name}", self.prefix);
+            Some(Value { name, value, kind })
+        };
+        Ok(names.iter().zip(values).filter_map(value).collect())
+    }
+
+    async fn set(&self, parameter: Value) -> Result<(), String> {
+        let name = parameter.name.strip_prefix(&self.prefix);
+        let name = name.unwrap_or_default().to_owned();
+        let known = self.raw(std::slice::from_ref(&name)).await?;
+        let type_ = known.first().map_or(0, |value| value.type_);
+        let value = from_json(parameter.value, type_).ok_or("not a value of its type")?;
+        let parameters = vec![Parameter { name, value }];
+        let request = SetParametersRequest { parameters };
+        let done: SetParametersResponse = answer(ask(&self.set, &request)).await?;
+        match done.results.into_iter().find(|result| !result.successful) {
+            Some(result) => Err(result.reason),
+            None => Ok(()),
+        }
+    }
+}
+
+fn ask<M: lattice_msgs::RosMessage>(
+    client: &Client,
+    request: &M,
+) -> impl Future<Output = Result<Vec<u8>, CallError>> + Send + 'static {
+    // What is not written is not read there, which the answer says.
+    client.call(cdr::to_vec(request).unwrap_or_default(), PATIENCE)
+}

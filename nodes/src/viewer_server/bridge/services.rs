@@ -1,0 +1,66 @@
+//! The services that clients may call.
+
+use lattice_msgs::lattice::{ClearBox, QueryMap, SaveMap};
+use lattice_msgs::rosbag2_interfaces::{
+    GetRate, IsPaused, Pause, PlayNext, Resume, Seek, SetRate, TogglePaused,
+};
+use lattice_msgs::std_srvs::Trigger;
+use lattice_msgs::{RosMessage, RosService};
+use lattice_runtime::{Client, Node, RuntimeError};
+
+use super::Reach;
+use crate::viewer_server::protocol::AdvertisedService;
+
+/// The table as it grows.
+struct Table<'a> {
+    node: &'a Node,
+    of: &'a str,
+    services: Vec<AdvertisedService>,
+    clients: Vec<Client>,
+}
+
+impl Table<'_> {
+    fn add<S: RosService>(&mut self, name: &str) -> Result<(), RuntimeError> {
+        let client = self.node.client::<S>(&format!("{}/{name}", self.of))?;
+        self.services.push(AdvertisedService {
+            id: self.services.len() as u32,
+            name: client.name().to_owned(),
+            type_name: S::TYPE,
+            request_schema: S::Request::definition(),
+            response_schema: S::Response::definition(),
+        });
+        self.clients.push(client);
+        Ok(())
+    }
+}
+
+/// The services, in the order of their ids; those that change something only where that is allowed.
+pub(super) fn of(
+    node: &Node,
+    reach: &Reach,
+) -> Result<(Vec<AdvertisedService>, Vec<Client>), RuntimeError> {
+    let mut table = Table {
+        node,
+        of: &reach.mapper,
+        services: Vec::new(),
+        clients: Vec::new(),
+    };
+    table.add::<QueryMap>("query")?;
+    if reach.allow_write {
+        table.add::<ClearBox>("clear_box")?;
+        table.add::<Trigger>("reset")?;
+        table.add::<SaveMap>("save_map")?;
+    }
+    table.of = &reach.player;
+    table.add::<IsPaused>("is_paused")?;
+    table.add::<GetRate>("get_rate")?;
+    if reach.allow_write {
+        table.add::<Pause>("pause")?;
+        table.add::<Resume>("resume")?;
+        table.add::<TogglePaused>("toggle_paused")?;
+        table.add::<PlayNext>("play_next")?;
+        table.add::<SetRate>("set_rate")?;
+        table.add::<Seek>("seek")?;
+    }
+    Ok((table.services, table.clients))
+}

@@ -1,0 +1,48 @@
+// Questions to nodes, in the worker: calls of services and parameters over the socket.
+
+const CALL = 2;
+const RESPONSE = 3;
+const CDR = new TextEncoder().encode("cdr");
+
+// Text messages that are of no concern elsewhere; true if this was one.
+export function takeText(message) {
+  if (message.op === "advertiseServices") {
+    postMessage({ type: "services", services: message.services.map(({ id, name, type }) => ({ id, name, kind: type })) });
+  } else if (message.op === "serviceCallFailure") {
+    postMessage({ type: "answer", call: message.callId, error: message.message });
+  } else if (message.op === "parameterValues") {
+    postMessage({ type: "parameters", parameters: message.parameters });
+  } else return false;
+  return true;
+}
+
+// The answer to a call; true if it was one.
+export function takeData(bytes) {
+  if (bytes[0] !== RESPONSE || bytes.length < 13) return false;
+  const view = new DataView(bytes.buffer);
+  const at = 13 + view.getUint32(9, true);
+  postMessage({ type: "answer", call: view.getUint32(5, true), bytes: bytes.slice(at) });
+  return true;
+}
+
+// Sends what the page asks; true if it was that.
+export function ask(socket, data) {
+  if (data.type === "call") {
+    const bytes = new Uint8Array(13 + CDR.length + data.request.length);
+    const view = new DataView(bytes.buffer);
+    bytes[0] = CALL;
+    [data.service, data.call, CDR.length].forEach((number, i) => view.setUint32(1 + 4 * i, number, true));
+    bytes.set(CDR, 13);
+    bytes.set(data.request, 13 + CDR.length);
+    send(socket, bytes);
+  } else if (data.type === "get") {
+    send(socket, JSON.stringify({ op: "getParameters", parameterNames: [] }));
+  } else if (data.type === "set") {
+    send(socket, JSON.stringify({ op: "setParameters", parameters: [data.parameter], id: data.parameter.name }));
+  } else return false;
+  return true;
+}
+
+function send(socket, message) {
+  if (socket.readyState === 1) socket.send(message);
+}

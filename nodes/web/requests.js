@@ -1,0 +1,49 @@
+// Requests of services in CDR, and what their answers say.
+
+import { Reader } from "./cdr.js";
+
+// Little-endian CDR of numbers, each with the letter of its kind.
+function cdr(...parts) {
+  const bytes = [0, 1, 0, 0];
+  for (const [kind, value] of parts) {
+    const size = kind === "d" ? 8 : 4;
+    while ((bytes.length - 4) % size !== 0) bytes.push(0);
+    const view = new DataView(new ArrayBuffer(size));
+    if (kind === "d") view.setFloat64(0, value, true);
+    else if (kind === "i") view.setInt32(0, value, true);
+    else view.setUint32(0, value, true);
+    bytes.push(...new Uint8Array(view.buffer));
+  }
+  return new Uint8Array(bytes);
+}
+
+const points = (...all) => cdr(...all.flat().map((x) => ["d", x]));
+
+export const requests = {
+  nothing: () => new Uint8Array([0, 1, 0, 0, 0]),
+  clearBox: (low, high) => points(low, high),
+  saveMap(path) {
+    const text = new TextEncoder().encode(path);
+    return new Uint8Array([...cdr(["u", text.length + 1]), ...text, 0]);
+  },
+  query: (point) => points(point),
+  setRate: (rate) => cdr(["d", rate]),
+  seek: (time) => cdr(["i", Math.floor(time)], ["u", Math.floor((time % 1) * 1e9)]),
+};
+
+// Success, words, and the number that follows where there is one.
+export function outcome(bytes) {
+  const r = new Reader(bytes);
+  const answer = { success: r.bool(), message: r.string() };
+  if (bytes.length - r.at >= 8) answer.number = Number(r.u64());
+  return answer;
+}
+
+export function queried(bytes) {
+  const r = new Reader(bytes);
+  const answer = { success: r.bool(), message: r.string(), occupied: r.bool(), points: r.u32(), hasNearest: r.bool() };
+  return Object.assign(answer, { clearance: r.f64(), nearest: r.f64s(3), distance: r.f64() });
+}
+
+export const said = (bytes) => new Reader(bytes).bool();
+export const rated = (bytes) => new Reader(bytes).f64();

@@ -1,0 +1,38 @@
+// The services that the server offers, as promises.
+
+const PATIENCE_MS = 8000;
+
+export class Services {
+  constructor(worker) {
+    this.worker = worker;
+    this.offered = [];
+    this.waiting = new Map();
+    this.next = 1;
+  }
+
+  // Takes a message of the worker; true if it was an answer.
+  answered({ call, bytes, error }) {
+    const waits = this.waiting.get(call);
+    if (!waits) return;
+    this.waiting.delete(call);
+    clearTimeout(waits.late);
+    if (error === undefined) waits.resolve(bytes);
+    else waits.reject(new Error(error));
+  }
+
+  // The service whose name ends so, if it is offered.
+  find(end) {
+    return this.offered.find(({ name }) => name.endsWith(`/${end}`));
+  }
+
+  call(end, request) {
+    const service = this.find(end);
+    if (!service) return Promise.reject(new Error(`${end} is not offered`));
+    const call = this.next++;
+    return new Promise((resolve, reject) => {
+      const late = setTimeout(() => this.answered({ call, error: "no answer came" }), PATIENCE_MS);
+      this.waiting.set(call, { resolve, reject, late });
+      this.worker.postMessage({ type: "call", service: service.id, call, request });
+    });
+  }
+}

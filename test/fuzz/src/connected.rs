@@ -1,0 +1,113 @@
+//! Bodies of the targets of what clients of the viewer send: heads of requests, messages of the protocol.
+
+use lattice_nodes::viewer_server::{AdvertisedService, Desk, Gate, Head, Offer, OpenTopic, Step};
+
+/// Reads the head of a request, and decides on it.
+pub fn http_head(bytes: &[u8]) {
+    if let Ok(Some((head, length))) = Head::parse(bytes) {
+        assert!(length <= bytes.len());
+        let token = Some("secret".to_owned());
+        for gate in [
+            Gate::default(),
+            Gate {
+                token,
+                ..Gate::default()
+            },
+        ] {
+            gate.decide(&head);
+        }
+        // The same once more, whatever follows it.
+        let again = Head::parse(&[&bytes[..length], b"more"].concat());
+        assert_eq!(again, Ok(Some((head, length))));
+    }
+}
+
+/// Gives one client's messages to a desk that offers all, and to one that offers nothing: kind, length (two
+/// bytes), message, and so on.
+pub fn client_message(bytes: &[u8]) {
+    let service = AdvertisedService {
+        id: 0,
+        name: "/lattice_mapper/reset".to_owned(),
+        type_name: "std_srvs/srv/Trigger",
+        request_schema: String::new(),
+        response_schema: String::new(),
+    };
+    let topic = OpenTopic {
+        name: "/goal_pose".to_owned(),
+        type_name: "geometry_msgs/msg/PoseStamped",
+    };
+    let (all, nothing) = (
+        Offer {
+            services: vec![service],
+            topics: vec![topic],
+            parameters: true,
+        },
+        Offer::default(),
+    );
+    for (offer, may_ask) in [(&all, true), (&nothing, false)] {
+        let mut desk = Desk::new(offer);
+        let mut asked = 0_usize;
+        let mut rest = bytes;
+        while let [kind, low, high, tail @ ..] = rest {
+            let length = usize::from(u16::from_le_bytes([*low, *high])).min(tail.len());
+            let (body, tail) = tail.split_at(length);
+            rest = tail;
+            let step = match kind % 3 {
+                0 => desk.text(&String::from_utf8_lossy(body)),
+                1 => desk.data(body),
+                _ => {
+                    desk.answered();
+                    asked = asked.saturating_sub(1);
+                    Step::Done
+                }
+            };
+            if matches!(step, Step::Ask(_)) {
+                asked += 1;
+                assert!(may_ask && asked <= 16);
+            }
+        }
+    }
+}
+
+/// Seeds of [`http_head`].
+pub fn head_seeds() -> Vec<Vec<u8>> {
+    [
+        "GET / HTTP/1.1\r\nHost: localhost:8765\r\n\r\n",
+        "GET /main.js?token=secret HTTP/1.1\r\nHost: 127.0.0.1\r\nCookie: lattice=secret\r\n\r\n",
+        "GET / HTTP/1.1\r\nHost: localhost\r\nOrigin: http://localhost\r\nConnection: Upgrade\r\n\
+         Upgrade: websocket\r\nSec-WebSocket-Version: 13\r\n\
+         Sec-WebSocket-Key: dGhlIHNhbXBsZSBub25jZQ==\r\n\
+         Sec-WebSocket-Protocol: foxglove.sdk.v1, foxglove.websocket.v1\r\n\r\n",
+    ]
+    .map(|text| text.as_bytes().to_vec())
+    .to_vec()
+}
+
+/// Seeds of [`client_message`].
+pub fn client_seeds() -> Vec<Vec<u8>> {
+    let texts = [
+        r#"{"op":"subscribe","subscriptions":[{"id":0,"channelId":3}]}"#,
+        r#"{"op":"unsubscribe","subscriptionIds":[0]}"#,
+        r#"{"op":"advertise","channels":[{"id":1,"topic":"/goal_pose","encoding":"cdr","schemaName":"geometry_msgs/msg/PoseStamped"}]}"#,
+        r#"{"op":"getParameters","parameterNames":["/a.b"],"id":"x"}"#,
+        r#"{"op":"setParameters","parameters":[{"name":"/a.b","value":3,"type":"float64"}]}"#,
+        r#"{"op":"unadvertise","channelIds":[1]}"#,
+    ];
+    let call = [
+        &[2, 0, 0, 0, 0, 9, 0, 0, 0, 3, 0, 0, 0][..],
+        b"cdr",
+        &[0, 1, 0, 0, 0],
+    ]
+    .concat();
+    let message = vec![1, 1, 0, 0, 0, 0, 1, 0, 0];
+    let texts = texts.map(|text| (0, text.as_bytes().to_vec()));
+    let all = texts
+        .into_iter()
+        .chain([(1, call), (1, message), (2, Vec::new())]);
+    let one = |(kind, body): (u8, Vec<u8>)| {
+        let length = u16::try_from(body.len()).unwrap().to_le_bytes();
+        [&[kind][..], &length, &body].concat()
+    };
+    let each: Vec<Vec<u8>> = all.map(one).collect();
+    [vec![each.concat()], each].concat()
+}
