@@ -1,6 +1,7 @@
 // One frame after another, for whatever has changed.
 
 import { add, length, sub } from "./math.js";
+import { drawHeadset } from "./headset.js";
 import * as panel from "./panel.js";
 import { turned } from "./scene.js";
 
@@ -115,10 +116,7 @@ export class Drawing {
     gl.depthMask(true);
     this.drawClouds(seen);
     if (state.shown.robot && state.robot) this.drawRobot();
-    if (state.shown.headset && state.headset) {
-      const ink = [...colourOf(state.headset.verdict === 1 ? "--good" : "--bad"), 1];
-      scene.draw("frustum", gl.LINES, { origin: state.headset.position, turn: turned(state.headset.rotation, 1.2), ink });
-    }
+    if (state.shown.headset && state.headset) drawHeadset(gl, scene, state.headset, colourOf);
     if (state.measured.length === 2) {
       gl.disable(gl.DEPTH_TEST);
       scene.set("measured", [0, 0, 0, ...sub(state.measured[1], state.measured[0])]);
@@ -164,6 +162,8 @@ export class Drawing {
     const [a, b] = this.state.measured;
     if (a && b) mark(add(a, b).map((x) => x / 2), panel.metres(length(sub(a, b))));
     else if (a) mark(a, "from here");
+    const { headset, shown } = this.state;
+    if (shown.headset) for (const { end, text } of headset?.weak ?? []) mark(add(headset.position, end), text);
     by("marks").replaceChildren(...marks);
   }
 }

@@ -2,6 +2,7 @@
 
 import { Camera } from "./camera.js";
 import { Drawing, colourOf } from "./drawing.js";
+import * as headset from "./headset.js";
 import { placeIndex } from "./keys.js";
 import { add, length, rotate, sub } from "./math.js";
 import * as panel from "./panel.js";
@@ -63,7 +64,7 @@ const handlers = {
       if (state.mode === "label" || state.labels.size === 0) noteLabels(tile);
     }
     cells.now = now;
-    Object.assign(state, { size, sequence, complete, changedAt: Date.now() });
+    Object.assign(state, { size, sequence, complete, changedAt: Date.now(), now });
     ranges();
     redraw();
   },
@@ -76,13 +77,12 @@ const handlers = {
       if (!last || length(sub(last, robot.position)) > 0.15) state.path.push(robot.position);
       if (state.path.length > MOST_PATH) state.path.shift();
     }
-    if (state.headset) Object.assign(state.headset, transforms.find(state.frame, HEADSET) ?? {});
+    headset.follow(state.headset, transforms.find(state.frame, HEADSET));
     redraw();
   },
   calibration({ result }) {
-    const { position, rotation, verdict, frame } = result;
-    state.headset = verdict === 0 ? null : { position, rotation, verdict, frame };
-    panel.showVerdict(result);
+    state.headset = headset.headsetOf(result);
+    headset.showVerdict(result);
     redraw();
   },
   cloud({ topic, cloud }) {
@@ -286,6 +286,8 @@ function tick() {
     panel.showState(state.lattice ? (state.complete ? "live" : "loading") : "no map yet", state.lattice ? "ok" : "warn");
   }
   panel.showFacts({ size: state.size, lattice: state.lattice?.lattice, volume: state.lattice?.volume, changed });
+  // Cells grow older though nothing comes.
+  if (changed !== null) cells.now = state.now + changed;
   if (cells.stale !== tick.stale || state.mode === "age") redraw();
   tick.stale = cells.stale;
 }

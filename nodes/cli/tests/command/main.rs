@@ -14,6 +14,7 @@ mod player;
 mod record;
 mod respawn;
 mod viewer;
+mod viewer_page;
 
 use std::io::{Write, stderr};
 use std::path::PathBuf;
