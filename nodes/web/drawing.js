@@ -114,6 +114,11 @@ export class Drawing {
       by("scale").textContent = `grid ${step < 1 ? `${Math.round(step * 100)} cm` : `${step} m`}`;
     }
     gl.depthMask(true);
+    this.free.slice = this.cells.slice;
+    this.free.stale = this.cells.stale;
+    this.free.draw(seen);
+    gl.blendFunc(gl.SRC_ALPHA, gl.ONE_MINUS_SRC_ALPHA);
+    scene.begin(seen);
     this.drawClouds(seen);
     if (state.shown.robot && state.robot) this.drawRobot();
     if (state.shown.headset && state.headset) drawHeadset(gl, scene, state.headset, colourOf);

@@ -2,6 +2,7 @@
 
 import { Camera } from "./camera.js";
 import { Drawing, colourOf } from "./drawing.js";
+import { FreeSpace } from "./free.js";
 import * as headset from "./headset.js";
 import { placeIndex } from "./keys.js";
 import { add, length, rotate, sub } from "./math.js";
@@ -24,6 +25,7 @@ if (!gl) panel.showBanner("This browser has no WebGL 2: the map cannot be drawn.
 
 const camera = new Camera();
 const cells = new CellRenderer(gl);
+const free = new FreeSpace(gl);
 const scene = new Scene(gl);
 const transforms = new Transforms();
 const state = {
@@ -33,7 +35,7 @@ const state = {
   scansOn: new Set(), problems: [], frames: 0,
 };
 const worker = new Worker("/worker.js", { type: "module" });
-const drawing = new Drawing({ gl, canvas, camera, cells, scene, state });
+const drawing = new Drawing({ gl, canvas, camera, cells, free, scene, state });
 const redraw = () => drawing.redraw();
 
 // --- What comes from the worker.
@@ -94,6 +96,10 @@ const handlers = {
     const slot = known.next++ % known.keep;
     scene.set(`${topic} ${slot}`, place ? turnPoints(cloud.points, place.rotation) : cloud.points);
     known.scans[slot] = { name: `${topic} ${slot}`, origin, at: performance.now() };
+    redraw();
+  },
+  free(news) {
+    free.take(news);
     redraw();
   },
   diagnostics: panel.showDiagnostics,
@@ -171,7 +177,18 @@ function showLayers(channels) {
     box.firstChild.dataset.topic = channel.topic;
     boxes.push(box);
   });
+  for (const { topic } of channels.filter((channel) => channel.kind === "free")) {
+    boxes.push(panel.layerBox("Free space", state.scansOn.has(topic), (on) => wantFree(topic, on)));
+    boxes.at(-1).firstChild.dataset.topic = topic;
+  }
   by("layers").replaceChildren(...boxes);
+}
+
+function wantFree(topic, on) {
+  state.scansOn[on ? "add" : "delete"](topic);
+  free.clear();
+  worker.postMessage({ type: "want", topic, on });
+  redraw();
 }
 
 function wantCloud(topic, on) {
@@ -323,7 +340,7 @@ redraw();
 
 // For tests: what is shown, in figures.
 window.lattice = {
-  state, camera, cells, pick, frame: () => drawing.drawNow(),
+  state, camera, cells, free, pick, frame: () => drawing.drawNow(),
   keys: () => new Promise((resolve) => {
     const take = ({ data }) => {
       if (data.type !== "keys") return;

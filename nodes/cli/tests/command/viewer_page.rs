@@ -207,6 +207,34 @@ fn each_verdict_has_its_text_and_class_and_its_open_directions_are_drawn() {
 }
 
 #[test]
+fn free_space_is_drawn_while_it_is_wanted() {
+    let Some(chromium) = chromium() else { return };
+    let stage = Stage::show(&stairs());
+    let free: Vec<Known> = (0..5)
+        .map(|i| Known::new([4 * i, 8, 0], 1, 65_535))
+        .collect();
+    stage.frees(&free);
+    let mut page = open(&chromium, &stage);
+    let free = serde_json::to_string(&free).unwrap();
+    page.value("document.querySelector('[data-camera=top]').click()");
+    page.value("document.getElementById('colour').value = 'height'");
+    // Green beside its ground, within two pixels of each centre.
+    let greens = format!(
+        "(() => {{ lattice.frame(); return {free}.filter(({{ index }}) => [-1, 0, 1].some((dx) => [-1, 0, 1].some((dy) => {{ \
+         const step = lattice.camera.distance / lattice.camera.focal(); \
+         const [r, g] = look.at([index[0] / 2 + dx * step, index[1] / 2 + dy * step, 0]); return g > r + 25; }}))).length; }})()"
+    );
+    let click = "document.querySelector('#layers input[data-topic=\"/free\"]').click()";
+    assert_eq!(page.value(&greens), 0);
+    page.value(click);
+    page.wait_for("lattice.free.size === 5 && lattice.free.tiles.size > 0");
+    assert_eq!(page.value(&greens), 5);
+    page.value(click);
+    assert_eq!(page.value(&greens), 0);
+    assert_eq!(page.value("lattice.state.problems"), json!([]));
+}
+
+#[test]
 fn on_a_phone_a_pinch_halves_the_distance_and_panels_fit() {
     let Some(chromium) = chromium() else { return };
     let stage = Stage::show(&stairs());

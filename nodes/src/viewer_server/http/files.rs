@@ -33,6 +33,7 @@ const FILES: &[File] = files! {
     "/colours.js" "colours.js" JAVASCRIPT;
     "/drawing.js" "drawing.js" JAVASCRIPT;
     "/follower.js" "follower.js" JAVASCRIPT;
+    "/free.js" "free.js" JAVASCRIPT;
     "/headset.js" "headset.js" JAVASCRIPT;
     "/keys.js" "keys.js" JAVASCRIPT;
     "/main.js" "main.js" JAVASCRIPT;

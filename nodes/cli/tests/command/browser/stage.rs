@@ -47,6 +47,7 @@ impl Known {
 pub struct Stage {
     hub: Arc<Hub>,
     calibration: u32,
+    free: u32,
     /// Address of the page.
     pub url: String,
     _server: Server,
@@ -59,6 +60,7 @@ impl Stage {
         hub.channel::<LatticeMap>("/map", Class::Map, false);
         let one = Class::Newest { depth: 1 };
         let calibration = hub.channel::<CalibrationResult>("/calibration", one, true);
+        let free = hub.channel::<LatticeMap>("/free", one, true);
         let chunk = Entry {
             stamp_ns: 1,
             cdr: cdr::to_vec(&map(cells)).unwrap().into(),
@@ -69,9 +71,15 @@ impl Stage {
         Self {
             hub,
             calibration,
+            free,
             url: format!("http://{}", server.address()),
             _server: server,
         }
+    }
+
+    /// Tells of free cells.
+    pub fn frees(&self, cells: &[Known]) {
+        self.hub.offer(self.free, cdr::to_vec(&map(cells)).unwrap());
     }
 
     /// Tells of a calibration.
