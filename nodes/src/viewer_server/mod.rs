@@ -29,4 +29,6 @@ pub use protocol::{ClientMessage, SUBPROTOCOLS};
 pub use server::Server;
 
 #[cfg(test)]
+mod pause_tests;
+#[cfg(test)]
 mod tests;
