@@ -1,6 +1,7 @@
 // One frame after another, for whatever has changed.
 
 import { add, length, sub } from "./math.js";
+import { drawHeadset } from "./headset.js";
 import * as panel from "./panel.js";
 import { turned } from "./scene.js";
 
@@ -113,12 +114,14 @@ export class Drawing {
       by("scale").textContent = `grid ${step < 1 ? `${Math.round(step * 100)} cm` : `${step} m`}`;
     }
     gl.depthMask(true);
+    this.free.slice = this.cells.slice;
+    this.free.stale = this.cells.stale;
+    this.free.draw(seen);
+    gl.blendFunc(gl.SRC_ALPHA, gl.ONE_MINUS_SRC_ALPHA);
+    scene.begin(seen);
     this.drawClouds(seen);
     if (state.shown.robot && state.robot) this.drawRobot();
-    if (state.shown.headset && state.headset) {
-      const ink = [...colourOf(state.headset.verdict === 1 ? "--good" : "--bad"), 1];
-      scene.draw("frustum", gl.LINES, { origin: state.headset.position, turn: turned(state.headset.rotation, 1.2), ink });
-    }
+    if (state.shown.headset && state.headset) drawHeadset(gl, scene, state.headset, colourOf);
     if (state.measured.length === 2) {
       gl.disable(gl.DEPTH_TEST);
       scene.set("measured", [0, 0, 0, ...sub(state.measured[1], state.measured[0])]);
@@ -164,6 +167,8 @@ export class Drawing {
     const [a, b] = this.state.measured;
     if (a && b) mark(add(a, b).map((x) => x / 2), panel.metres(length(sub(a, b))));
     else if (a) mark(a, "from here");
+    const { headset, shown } = this.state;
+    if (shown.headset) for (const { end, text } of headset?.weak ?? []) mark(add(headset.position, end), text);
     by("marks").replaceChildren(...marks);
   }
 }

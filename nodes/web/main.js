@@ -2,6 +2,8 @@
 
 import { Camera } from "./camera.js";
 import { Drawing, colourOf } from "./drawing.js";
+import { FreeSpace } from "./free.js";
+import * as headset from "./headset.js";
 import { placeIndex } from "./keys.js";
 import { add, length, rotate, sub } from "./math.js";
 import * as panel from "./panel.js";
@@ -26,6 +28,7 @@ if (!gl) panel.showBanner("This browser has no WebGL 2: the map cannot be drawn.
 
 const camera = new Camera();
 const cells = new CellRenderer(gl);
+const free = new FreeSpace(gl);
 const scene = new Scene(gl);
 const transforms = new Transforms();
 const state = {
@@ -38,7 +41,7 @@ const worker = new Worker("/worker.js", { type: "module" });
 const services = new Services(worker);
 const writing = new Writing(services, worker, state);
 const player = new Player(services, writing);
-const drawing = new Drawing({ gl, canvas, camera, cells, scene, state });
+const drawing = new Drawing({ gl, canvas, camera, cells, free, scene, state });
 const redraw = () => drawing.redraw();
 
 // --- What comes from the worker.
@@ -71,7 +74,7 @@ const handlers = {
       if (state.mode === "label" || state.labels.size === 0) noteLabels(tile);
     }
     cells.now = now;
-    Object.assign(state, { size, sequence, complete, changedAt: Date.now() });
+    Object.assign(state, { size, sequence, complete, changedAt: Date.now(), now });
     ranges();
     redraw();
   },
@@ -85,13 +88,12 @@ const handlers = {
       if (!last || length(sub(last, robot.position)) > 0.15) state.path.push(robot.position);
       if (state.path.length > MOST_PATH) state.path.shift();
     }
-    if (state.headset) Object.assign(state.headset, transforms.find(state.frame, HEADSET) ?? {});
+    headset.follow(state.headset, transforms.find(state.frame, HEADSET));
     redraw();
   },
   calibration({ result }) {
-    const { position, rotation, verdict, frame } = result;
-    state.headset = verdict === 0 ? null : { position, rotation, verdict, frame };
-    panel.showVerdict(result);
+    state.headset = headset.headsetOf(result);
+    headset.showVerdict(result);
     redraw();
   },
   cloud({ topic, cloud }) {
@@ -103,6 +105,10 @@ const handlers = {
     const slot = known.next++ % known.keep;
     scene.set(`${topic} ${slot}`, place ? turnPoints(cloud.points, place.rotation) : cloud.points);
     known.scans[slot] = { name: `${topic} ${slot}`, origin, at: performance.now() };
+    redraw();
+  },
+  free(news) {
+    free.take(news);
     redraw();
   },
   diagnostics: panel.showDiagnostics,
@@ -188,7 +194,18 @@ function showLayers(channels) {
     box.firstChild.dataset.topic = channel.topic;
     boxes.push(box);
   });
+  for (const { topic } of channels.filter((channel) => channel.kind === "free")) {
+    boxes.push(panel.layerBox("Free space", state.scansOn.has(topic), (on) => wantFree(topic, on)));
+    boxes.at(-1).firstChild.dataset.topic = topic;
+  }
   by("layers").replaceChildren(...boxes);
+}
+
+function wantFree(topic, on) {
+  state.scansOn[on ? "add" : "delete"](topic);
+  free.clear();
+  worker.postMessage({ type: "want", topic, on });
+  redraw();
 }
 
 function wantCloud(topic, on) {
@@ -306,6 +323,8 @@ function tick() {
     panel.showState(state.lattice ? (state.complete ? "live" : "loading") : "no map yet", state.lattice ? "ok" : "warn");
   }
   panel.showFacts({ size: state.size, lattice: state.lattice?.lattice, volume: state.lattice?.volume, changed });
+  // Cells grow older though nothing comes.
+  if (changed !== null) cells.now = state.now + changed;
   if (cells.stale !== tick.stale || state.mode === "age") redraw();
   tick.stale = cells.stale;
 }
@@ -341,7 +360,7 @@ redraw();
 
 // For tests: what is shown, in figures.
 window.lattice = {
-  state, camera, cells, player, pick, frame: () => drawing.drawNow(),
+  state, camera, cells, free, player, pick, frame: () => drawing.drawNow(),
   keys: () => new Promise((resolve) => {
     const take = ({ data }) => {
       if (data.type !== "keys") return;

@@ -74,6 +74,7 @@ export function calibration(bytes) {
   const r = new Reader(bytes);
   const result = { header: header(r), frame: r.string(), session: r.string(), verdict: r.u8(), reason: r.string() };
   Object.assign(result, { position: vector(r), rotation: r.f64s(4), covariance: r.f64s(36), margin: r.f64(), inliers: r.f64(), rmse: r.f64() });
+  result.weak = r.list((r) => ({ axis: vector(r), kind: r.u8(), sigma: r.f64() }), 33);
   return result;
 }
 

@@ -68,15 +68,6 @@ export function showCell(cell) {
   by("cell").replaceChildren(...rows);
 }
 
-const VERDICTS = ["nothing found yet", "OK", "AMBIGUOUS", "DEGENERATE", "NO OVERLAP", "REJECTED INPUT"];
-
-export function showVerdict(result) {
-  by("headset").hidden = false;
-  const verdict = by("verdict");
-  verdict.className = result.verdict === 1 ? "ok" : result.verdict === 0 ? "" : "bad";
-  verdict.textContent = `${VERDICTS[result.verdict] ?? result.verdict}: ${result.reason}`;
-}
-
 const KEPT = 120;
 const history = new Map();
 

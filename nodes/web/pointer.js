@@ -5,12 +5,17 @@ const STILL = 4;
 export function watchPointer(canvas, camera, { moved, clicked }) {
   const down = new Map();
   let travelled = 0;
+  // Pixels between two fingers.
   let pinch = null;
+  const apart = () => {
+    const [a, b] = [...down.values()];
+    return Math.max(1, Math.hypot(a.clientX - b.clientX, a.clientY - b.clientY));
+  };
   canvas.addEventListener("pointerdown", (event) => {
     canvas.setPointerCapture(event.pointerId);
     if (down.size === 0) travelled = 0;
     down.set(event.pointerId, event);
-    pinch = null;
+    pinch = down.size === 2 ? apart() : null;
   });
   canvas.addEventListener("pointermove", (event) => {
     const before = down.get(event.pointerId);
@@ -20,10 +25,9 @@ export function watchPointer(canvas, camera, { moved, clicked }) {
     travelled += Math.abs(dx) + Math.abs(dy);
     if (travelled <= STILL) return;
     if (down.size === 2) {
-      const [a, b] = [...down.values()];
-      const apart = Math.hypot(a.clientX - b.clientX, a.clientY - b.clientY);
-      if (pinch) camera.zoom(pinch / Math.max(apart, 1));
-      pinch = apart;
+      const now = apart();
+      camera.zoom(pinch / now);
+      pinch = now;
       camera.pan(dx / 2, dy / 2);
     } else if (event.buttons & 2 || event.buttons & 4 || event.shiftKey) camera.pan(dx, dy);
     else camera.orbit(dx, dy);
@@ -34,7 +38,7 @@ export function watchPointer(canvas, camera, { moved, clicked }) {
       const box = canvas.getBoundingClientRect();
       clicked(event.clientX - box.left, event.clientY - box.top);
     }
-    pinch = null;
+    pinch = down.size === 2 ? apart() : null;
   };
   canvas.addEventListener("pointerup", up);
   canvas.addEventListener("pointercancel", up);

@@ -13,6 +13,8 @@ let socket = null;
 let session = null;
 let retry = 250;
 let follower = new Follower();
+// Free space, while it is wanted.
+let free = new Follower();
 let channels = new Map();
 let subscriptions = new Map();
 let nextSubscription = 1;
@@ -23,6 +25,7 @@ const wanted = new Set(["tf", "static", "map", "updates", "diagnostics", "calibr
 // How each channel is read, by the type and the end of its topic.
 const KINDS = [
   ["map", "lattice_msgs/msg/LatticeMap", /(^|\/)map$/],
+  ["free", "lattice_msgs/msg/LatticeMap", /(^|\/)free$/],
   ["updates", "lattice_msgs/msg/LatticeMapUpdate", /./],
   ["static", "tf2_msgs/msg/TFMessage", /tf_static$/],
   ["tf", "tf2_msgs/msg/TFMessage", /./],
@@ -113,6 +116,9 @@ function onData(bytes) {
     case "map":
       onMap(messages.latticeMap(cdr));
       break;
+    case "free":
+      free.onMap(messages.latticeMap(cdr));
+      break;
     case "updates": {
       const update = messages.latticeMapUpdate(cdr);
       if (!follower.onUpdate(update)) renewMap();
@@ -156,6 +162,7 @@ function heightRow({ generator: g, place: { rotation: [x, y, z, w] } }) {
 }
 
 function flush() {
+  if (free.dirty.size > 0) flushFree();
   if (!changed) return;
   const tiles = follower.takeDirty(MOST_TILES);
   changed = follower.dirty.size > 0;
@@ -168,6 +175,13 @@ function flush() {
     sequence: sequence === null ? null : sequence.toString(),
     complete: sequence !== null && staging === null && !changed,
   }, tiles.map((tile) => tile.cells.buffer));
+}
+
+function flushFree() {
+  const info = free.renewed ? { ...free.info, epoch: "" } : null;
+  free.renewed = false;
+  const tiles = free.takeDirty(MOST_TILES);
+  postMessage({ type: "free", info, tiles, size: free.size }, tiles.map((tile) => tile.cells.buffer));
 }
 
 function count(channel, bytes, latency) {
@@ -186,6 +200,7 @@ function tellRates() {
 self.onmessage = ({ data }) => {
   if (calls.ask(socket, data)) return;
   if (data.type === "want") {
+    if (/(^|\/)free$/.test(data.topic)) free = new Follower();
     if (data.on) {
       wanted.add(data.topic);
       for (const channel of channels.values()) if (channel.topic === data.topic && socket.readyState === 1) subscribe(channel);

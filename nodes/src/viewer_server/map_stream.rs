@@ -164,6 +164,11 @@ impl MapStream {
         self.fallen_behind
     }
 
+    /// Bytes of what is kept.
+    pub fn kept_bytes(&self) -> usize {
+        self.bytes + self.keyframe.as_ref().map_or(0, |keyframe| keyframe.bytes)
+    }
+
     /// Number of the oldest update that is kept.
     fn begin(&self) -> u64 {
         self.end - self.updates.len() as u64

@@ -33,4 +33,6 @@ pub use protocol::{AdvertisedService, ClientChannel, SUBPROTOCOLS, Value, Wish};
 pub use server::Server;
 
 #[cfg(test)]
+mod pause_tests;
+#[cfg(test)]
 mod tests;

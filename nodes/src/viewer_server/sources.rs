@@ -8,6 +8,7 @@ use lattice_msgs::calibration::CalibrationResult;
 use lattice_msgs::cdr::CdrError;
 use lattice_msgs::diagnostic_msgs::DiagnosticArray;
 use lattice_msgs::geometry_msgs::TransformStamped;
+use lattice_msgs::lattice::LatticeMap;
 use lattice_msgs::sensor_msgs::PointCloud2;
 use lattice_msgs::tf2_msgs::TFMessage;
 use lattice_msgs::visualization_msgs::MarkerArray;
@@ -133,6 +134,7 @@ impl Sources {
         builder.add::<CalibrationResult>("calibration", small(Qos::LATCHED), 1, When::Always)?;
         builder.add::<PointCloud2>("map_centers", large(Qos::MARKERS), 1, When::Wanted)?;
         builder.add::<MarkerArray>("voxel_markers", large(Qos::MARKERS), 1000, When::EachAnew)?;
+        builder.add::<LatticeMap>("free", large(Qos::MAP), 1000, When::EachAnew)?;
         for topic in &options.cloud_topics {
             builder.add::<PointCloud2>(topic, large(Qos::SCANS), 20, When::Wanted)?;
         }

@@ -35,6 +35,8 @@ const FILES: &[File] = files! {
     "/dialog.js" "dialog.js" JAVASCRIPT;
     "/drawing.js" "drawing.js" JAVASCRIPT;
     "/follower.js" "follower.js" JAVASCRIPT;
+    "/free.js" "free.js" JAVASCRIPT;
+    "/headset.js" "headset.js" JAVASCRIPT;
     "/keys.js" "keys.js" JAVASCRIPT;
     "/main.js" "main.js" JAVASCRIPT;
     "/math.js" "math.js" JAVASCRIPT;

@@ -1,6 +1,7 @@
 //! Opens a page in headless Chromium: what it says on its console, and where its figures are.
 
 pub mod devtools;
+pub mod stage;
 
 use std::fs::{self, File};
 use std::io::Write;

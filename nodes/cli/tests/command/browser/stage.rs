@@ -1,0 +1,127 @@
+//! A server of the page with what a test puts on it: few cells that are known, and results of calibrations.
+
+use std::net::{Ipv4Addr, SocketAddr};
+use std::sync::Arc;
+
+use lattice_core::lattice::MortonKey;
+use lattice_core::voxels::codec;
+use lattice_msgs::calibration::CalibrationResult;
+use lattice_msgs::cdr;
+use lattice_msgs::geometry_msgs::{Pose, Quaternion};
+use lattice_msgs::lattice::{LatticeInfo, LatticeMap};
+use lattice_msgs::std_msgs::Header;
+use lattice_nodes::viewer_server::{Class, Entry, Gate, Hub, Server};
+use serde::Serialize;
+use serde_bytes::ByteBuf;
+
+/// Side of the cubic cells, m.
+const SIDE_M: f64 = 0.5;
+
+/// A cell of the map.
+#[derive(Clone, Debug, Serialize)]
+pub struct Known {
+    /// Index on the cubic lattice.
+    pub index: [i32; 3],
+    /// Key, as the page writes it.
+    pub key: String,
+    /// Points in it.
+    pub count: u32,
+    /// Label; 65535: none.
+    pub label: u16,
+}
+
+impl Known {
+    /// A cell.
+    pub fn new(index: [i32; 3], count: u32, label: u16) -> Self {
+        let key = MortonKey::pack(index).unwrap().raw().to_string();
+        Self {
+            index,
+            key,
+            count,
+            label,
+        }
+    }
+}
+
+/// The server and its channels.
+pub struct Stage {
+    hub: Arc<Hub>,
+    calibration: u32,
+    free: u32,
+    /// Address of the page.
+    pub url: String,
+    _server: Server,
+}
+
+impl Stage {
+    /// Shows these cells.
+    pub fn show(cells: &[Known]) -> Self {
+        let hub = Arc::new(Hub::new(4));
+        hub.channel::<LatticeMap>("/map", Class::Map, false);
+        let one = Class::Newest { depth: 1 };
+        let calibration = hub.channel::<CalibrationResult>("/calibration", one, true);
+        let free = hub.channel::<LatticeMap>("/free", one, true);
+        let chunk = Entry {
+            stamp_ns: 1,
+            cdr: cdr::to_vec(&map(cells)).unwrap().into(),
+        };
+        hub.change_map(|stream| stream.set_keyframe(vec![chunk]));
+        let address = SocketAddr::from((Ipv4Addr::LOCALHOST, 0));
+        let server = Server::start(address, Gate::default(), Arc::clone(&hub)).unwrap();
+        Self {
+            hub,
+            calibration,
+            free,
+            url: format!("http://{}", server.address()),
+            _server: server,
+        }
+    }
+
+    /// Tells of free cells.
+    pub fn frees(&self, cells: &[Known]) {
+        self.hub.offer(self.free, cdr::to_vec(&map(cells)).unwrap());
+    }
+
+    /// Tells of a calibration.
+    pub fn calibrated(&self, result: &CalibrationResult) {
+        self.hub
+            .offer(self.calibration, cdr::to_vec(result).unwrap());
+    }
+}
+
+fn map(cells: &[Known]) -> LatticeMap {
+    let mut sorted = cells.to_vec();
+    sorted.sort_by_key(|cell| cell.key.parse::<u64>().unwrap());
+    let key = |cell: &Known| MortonKey::pack(cell.index).unwrap();
+    let keys: Vec<MortonKey> = sorted.iter().map(key).collect();
+    LatticeMap {
+        header: Header {
+            frame_id: "map".to_owned(),
+            ..Header::default()
+        },
+        info: LatticeInfo {
+            lattice: "cubic".to_owned(),
+            cell_volume_m3: SIDE_M.powi(3),
+            generator: [SIDE_M, 0.0, 0.0, 0.0, SIDE_M, 0.0, 0.0, 0.0, SIDE_M],
+            map_from_lattice: Pose {
+                orientation: Quaternion {
+                    w: 1.0,
+                    ..Quaternion::default()
+                },
+                ..Pose::default()
+            },
+            epoch: 1,
+            ..LatticeInfo::default()
+        },
+        sequence: 1,
+        chunks: 1,
+        voxels_total: keys.len() as u64,
+        key_encoding: LatticeMap::KEY_ENCODING_MORTON21.to_owned(),
+        voxels: keys.len() as u32,
+        keys: ByteBuf::from(codec::encode_keys(&keys)),
+        counts: sorted.iter().map(|cell| cell.count).collect(),
+        labels: sorted.iter().map(|cell| cell.label).collect(),
+        label_counts: sorted.iter().map(|cell| cell.count).collect(),
+        ..LatticeMap::default()
+    }
+}
