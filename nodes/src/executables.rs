@@ -53,10 +53,9 @@ pub fn run(
     if answers_help(name, declare.map(|(_, declare)| *declare), &args) {
         return Ok(());
     }
-    let name = args.node_name(name);
-    let runtime = start_runtime(&name, args)?;
+    let runtime = start_runtime(name, args)?;
     let mut running = Running::default();
-    running.start(&runtime, &name, start)?;
+    running.start(&runtime, name, start)?;
     running.until_stopped(&runtime)
 }
 
@@ -88,7 +87,7 @@ pub fn answers_help(name: &str, declare: Option<Declare>, args: &RosArgs) -> boo
 
 /// Log lines as ROS users know them, and a runtime.
 pub fn start_runtime(name: &str, args: RosArgs) -> Result<Runtime, NodeError> {
-    if let Err(error) = logging::init(&args, name) {
+    if let Err(error) = logging::init(&args, &args.node_name(name)) {
         eprintln!("{name}: another logger is in place: {error}");
     }
     // The first is the program where a caller passes it along.

@@ -13,6 +13,7 @@ use serde::ser::{Serialize, SerializeTuple, Serializer};
 use smol::Timer;
 use smol::channel::{Receiver, Sender, bounded};
 
+use super::names;
 use super::outbox::Outbox;
 use super::port::{EndpointId, PortTopic, Transport};
 use super::sync::lock;
@@ -54,6 +55,19 @@ struct Entry {
     writers: BTreeSet<EndpointId>,
 }
 
+/// Text of a second node of the same name in a process; it begins as that of rcl.
+fn same_name(namespace: &str, name: &str) -> String {
+    let node = names::fully_qualified(name, namespace);
+    let logger = node.trim_start_matches('/').replace('/', ".");
+    format!(
+        "Publisher already registered for node name: '{name}'. If this is due to multiple nodes with the \
+         same name then all logs for the logger named '{logger}' will go out over the existing publisher. \
+         As soon as any node with that name is destructed it will unregister the publisher, preventing any \
+         further logs for that name from being published on the rosout topic. Services and parameters of \
+         {node} are now those of two nodes: rename one with `-r NODE:__node:=NAME`"
+    )
+}
+
 /// An endpoint in the graph; dropping it takes it out.
 pub(crate) struct NodeEndpoint {
     graph: Arc<Graph>,
@@ -76,12 +90,17 @@ impl Graph {
     pub(crate) fn add_node(&self, namespace: &str, name: &str) -> NodeId {
         let mut nodes = lock(&self.nodes);
         let id = NodeId(nodes.len());
+        let mut others = nodes.iter();
+        let twice = others.any(|node| (&*node.namespace, &*node.name) == (namespace, name));
         nodes.push(Entry {
             namespace: namespace.to_owned(),
             name: name.to_owned(),
             ..Entry::default()
         });
         drop(nodes);
+        if twice {
+            log::warn!("{}", same_name(namespace, name));
+        }
         self.note_change();
         id
     }

@@ -133,14 +133,7 @@ impl Peers {
         }
         if state.warned.len() < MAX_WARNINGS && state.warned.insert(policy.to_owned()) {
             drop(state);
-            let (topic, kind) = (&self.topic, self.peer_kind);
-            match policy.starts_with("type") {
-                true => log::warn!("{topic}: a {kind} does not match: {policy}; remap one of them"),
-                false => log::warn!(
-                    "{topic}: a {kind} is not heard because of its QoS: {policy}; set \
-                     qos.{topic}.* or the other side's QoS"
-                ),
-            }
+            log::warn!("{}", conflict(&self.topic, self.peer_kind, policy));
         }
     }
 
@@ -164,6 +157,25 @@ impl Peers {
         for callback in &callbacks {
             lock(callback)();
         }
+    }
+}
+
+/// Text of a peer that does not go with us; of publishers and subscriptions it begins as that of rclcpp.
+fn conflict(topic: &str, kind: &str, policy: &str) -> String {
+    let remedy = format!("set qos.{topic}.* or the other side's QoS");
+    match kind {
+        _ if policy.starts_with("type") => {
+            format!("{topic}: a {kind} does not match: {policy}; remap one of them")
+        }
+        "publisher" => format!(
+            "New publisher discovered on topic '{topic}', offering incompatible QoS. No messages will be \
+             received from it. Last incompatible policy: {policy}; {remedy}"
+        ),
+        "subscriber" => format!(
+            "New subscription discovered on topic '{topic}', requesting incompatible QoS. No messages \
+             will be sent to it. Last incompatible policy: {policy}; {remedy}"
+        ),
+        _ => format!("{topic}: a {kind} is not heard because of its QoS: {policy}; {remedy}"),
     }
 }
 
@@ -237,5 +249,26 @@ mod tests {
         assert_eq!(peers.incompatible_count(), 1);
         peers.remove(|p| p.is_beside(&peer(1)));
         assert_eq!(peers.incompatible_count(), 0);
+    }
+
+    #[test]
+    fn conflicts_are_told_as_rclcpp_tells_them() {
+        let reliability = crate::port::RELIABILITY_CONFLICT;
+        let offered = conflict("/scan", "publisher", reliability);
+        assert!(offered.starts_with(
+            "New publisher discovered on topic '/scan', offering incompatible QoS. No messages will be \
+             received from it. Last incompatible policy: RELIABILITY_QOS_POLICY ("
+        ));
+        assert!(offered.ends_with("; set qos./scan.* or the other side's QoS"));
+        let durability = crate::port::DURABILITY_CONFLICT;
+        assert!(conflict("/map", "subscriber", durability).starts_with(
+            "New subscription discovered on topic '/map', requesting incompatible QoS. No messages will \
+             be sent to it. Last incompatible policy: DURABILITY_QOS_POLICY ("
+        ));
+        let other = conflict("/imu", "publisher", "type a, not b");
+        assert_eq!(
+            other,
+            "/imu: a publisher does not match: type a, not b; remap one of them"
+        );
     }
 }

@@ -68,11 +68,10 @@ pub(crate) struct PortTopic<'a> {
     pub type_hash: Option<&'a str>,
 }
 
-/// Policies of a peer that does not go with ours, in words for the operator.
+/// Policies of a peer that does not go with ours, by their names in rclcpp and in words for the operator.
 pub(crate) const RELIABILITY_CONFLICT: &str =
-    "reliability (the subscription asks for reliable, the publisher offers best_effort)";
-pub(crate) const DURABILITY_CONFLICT: &str =
-    "durability (the subscription asks for transient_local, the publisher offers volatile)";
+    "RELIABILITY_QOS_POLICY (the subscription asks for reliable, the publisher offers best_effort)";
+pub(crate) const DURABILITY_CONFLICT: &str = "DURABILITY_QOS_POLICY (the subscription asks for transient_local, the publisher offers volatile)";
 
 /// A change of the other ends of our endpoints, or of what there is.
 #[derive(Clone, Debug)]

@@ -71,8 +71,9 @@ impl Qos {
     pub const PARAMETER_EVENTS: Qos = Qos::reliable(1000);
     /// Services.
     pub const SERVICES: Qos = Qos::reliable(10);
-    /// Requests of a server: those that come while it is at work wait for it.
-    pub const REQUESTS: Qos = Qos::reliable(256);
+    /// Requests of a server: those that come while it is at work wait for it; of more, the oldest are lost
+    /// and counted.
+    pub const REQUESTS: Qos = Qos::reliable(1024);
     /// The default of ROS.
     pub const DEFAULT: Qos = Qos::reliable(10);
 

@@ -144,7 +144,7 @@ fn incompatible_policy(offered: &QosPolicies, requested: &QosPolicies) -> &'stat
     } else if rank(requested) > rank(offered) {
         DURABILITY_CONFLICT
     } else if requested.deadline() != offered.deadline() {
-        "deadline"
+        "DEADLINE_QOS_POLICY"
     } else {
         "liveliness, ownership or another policy"
     }

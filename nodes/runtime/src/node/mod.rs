@@ -50,7 +50,7 @@ impl Node {
         names::validate_node_name(&name)?;
         names::validate_namespace(&namespace)?;
         let fqn = names::fully_qualified(&name, &namespace);
-        let params = Arc::new(Params::load(args, &fqn)?);
+        let params = Arc::new(Params::load_renamed(args, &fqn, default_name)?);
         let max_message_bytes = params.usize_in(
             "max_message_bytes",
             DEFAULT_MAX_MESSAGE_BYTES,

@@ -16,8 +16,9 @@ use std::path::{Path, PathBuf};
 use std::sync::Mutex;
 
 use self::change::Changes;
+use crate::params_file::{self, NodePattern};
+use crate::ros_args::RosArgs;
 use crate::sync::lock;
-use crate::{params_file, ros_args::RosArgs};
 
 /// The parameters of one node.
 ///
@@ -73,14 +74,24 @@ impl Params {
     ///
     /// Files count in the order given, then the command line; what comes later wins.
     pub fn load(args: &RosArgs, node_fqn: &str) -> Result<Params, ParamError> {
+        Self::load_renamed(args, node_fqn, name_of(node_fqn))
+    }
+
+    /// The same for a node that is called `code_name` in the code: of a file that does not name the node
+    /// itself, it takes what is under that name, which rcl does not do.
+    pub(crate) fn load_renamed(
+        args: &RosArgs,
+        node_fqn: &str,
+        code_name: &str,
+    ) -> Result<Params, ParamError> {
         let params = Params {
             node: node_fqn.to_owned(),
             ..Params::default()
         };
         for path in &args.params_files {
-            params.add_file(path)?;
+            params.add_file(path, code_name)?;
         }
-        let node_name = node_fqn.rsplit('/').next().unwrap_or(node_fqn);
+        let node_name = name_of(node_fqn);
         for rule in &args.param_overrides {
             if rule.node.as_deref().is_none_or(|node| node == node_name) {
                 params.give(rule.name.clone(), rule.value.clone(), Origin::CommandLine);
@@ -104,9 +115,16 @@ impl Params {
         params
     }
 
-    fn add_file(&self, path: &Path) -> Result<(), ParamError> {
-        for entry in params_file::read(path)? {
-            if entry.nodes.matches(&self.node) {
+    fn add_file(&self, path: &Path, code_name: &str) -> Result<(), ParamError> {
+        let entries = params_file::read(path)?;
+        let for_us = |nodes: &NodePattern| nodes.matches(&self.node);
+        let name = name_of(&self.node);
+        let knows_us = (entries.iter()).any(|e| e.nodes.names(name) && for_us(&e.nodes));
+        let namespace = self.node.strip_suffix(name).unwrap_or_default();
+        let in_code = format!("{namespace}{code_name}");
+        let by_code = |nodes: &NodePattern| nodes.names(code_name) && nodes.matches(&in_code);
+        for entry in entries {
+            if for_us(&entry.nodes) || !knows_us && by_code(&entry.nodes) {
                 let (path, key) = (path.to_owned(), entry.key);
                 self.give(entry.name, entry.value, Origin::File { path, key });
             }
@@ -248,6 +266,11 @@ impl Params {
     pub fn described(&self) -> BTreeMap<String, Declared> {
         lock(&self.state).declared.clone()
     }
+}
+
+/// A node's name without its namespace.
+fn name_of(node_fqn: &str) -> &str {
+    node_fqn.rsplit('/').next().unwrap_or(node_fqn)
 }
 
 /// A value for a message, not longer than a line or two.

@@ -120,3 +120,32 @@ fn a_missing_file_is_an_error_with_its_name() {
     let error = Params::load(&args, "/mapper").unwrap_err().to_string();
     assert!(error.contains("/nowhere/bobcat.yaml"), "{error}");
 }
+
+#[test]
+fn the_shipped_files_are_for_nodes_of_any_namespace_and_name() {
+    let shipped = concat!(env!("CARGO_MANIFEST_DIR"), "/../../params/bobcat.yaml");
+    let mut args = RosArgs {
+        params_files: vec![shipped.into()],
+        ..RosArgs::default()
+    };
+    let mode = |args: &RosArgs, node: &str| {
+        let params = Params::load_renamed(args, node, "enu_transformer").unwrap();
+        params.string("origin.mode", "none given").unwrap()
+    };
+    for node in [
+        "/enu_transformer",
+        "/robot1/enu_transformer",
+        "/to_enu",
+        "/robot1/to_enu",
+    ] {
+        assert_eq!(mode(&args, node), "fixed", "{node}");
+    }
+    // A file that names the node itself holds as rcl says.
+    let mut own = tempfile::NamedTempFile::new().unwrap();
+    let text = "/**/enu_transformer: {ros__parameters: {origin: {mode: first_fix}}}\n\
+                /robot1/to_enu: {ros__parameters: {map_frame: odom}}\n";
+    own.write_all(text.as_bytes()).unwrap();
+    args.params_files = vec![own.path().into()];
+    assert_eq!(mode(&args, "/robot1/to_enu"), "none given");
+    assert_eq!(mode(&args, "/robot2/to_enu"), "first_fix");
+}

@@ -9,6 +9,7 @@ pub(crate) use asking::{Asking, Waiting};
 pub(crate) use local::{LocalCall, LocalServices};
 pub(crate) use serving::Serving;
 
+use std::sync::atomic::AtomicU64;
 use std::sync::{Arc, Mutex, Weak};
 use std::time::Instant;
 
@@ -35,6 +36,15 @@ impl Server {
     pub fn name(&self) -> &str {
         &self.name
     }
+}
+
+/// Requests of a server that came to nothing: the wire knows no refusal, so they are told here.
+pub(crate) struct Unanswered {
+    pub name: String,
+    /// Gave way to newer ones before they were taken.
+    pub lost: AtomicU64,
+    /// Were taken, and could not be read or answered.
+    pub failed: AtomicU64,
 }
 
 /// Answers one request, from any thread. Of clones, the first to send counts.

@@ -1,6 +1,7 @@
 //! The task of a server: takes requests, and sends each answer when its client can hear it.
 
 use std::sync::Arc;
+use std::sync::atomic::Ordering::Relaxed;
 use std::time::Duration;
 
 use futures::StreamExt;
@@ -10,20 +11,22 @@ use smol::Timer;
 use smol::channel::{Receiver, Sender};
 use smol::future::{self, or};
 
-use super::Reply;
 use super::local::LocalCall;
 use super::wire::{ReplyTo, read_request, write_reply};
+use super::{Reply, Unanswered};
 use crate::logging::Throttle;
 use crate::outbox::Outbox;
 use crate::peers::Peers;
 use crate::port::{EndpointId, Origin, SampleReader};
+use crate::qos::Qos;
+use crate::subscription::Gaps;
 
 /// A client may ask before its reply reader is known here; a reply sent then would be lost.
 const WAIT_FOR_CLIENT: Duration = Duration::from_secs(1);
 
 /// A server at work.
 pub(crate) struct Serving {
-    pub name: String,
+    pub unanswered: Arc<Unanswered>,
     pub requests: Box<dyn SampleReader>,
     /// Those of this process.
     pub local: Receiver<LocalCall>,
@@ -64,6 +67,7 @@ impl Serving {
     ) {
         let mut pending = FuturesUnordered::new();
         let mut ended = None;
+        let mut gaps = Gaps::default();
         while ended.is_none() || !pending.is_empty() {
             let takes = ended.is_none() && pending.len() < self.max_pending;
             let take = async {
@@ -88,9 +92,11 @@ impl Serving {
                 }
             };
             let outcome = match or(end, or(answered, take)).await {
-                Step::Take(sample) => self
-                    .ask::<S>(sample, &mut handler)
-                    .map(|asked| pending.push(self.answer(asked))),
+                Step::Take(sample) => {
+                    self.count_lost(&sample, &mut gaps);
+                    self.ask::<S>(sample, &mut handler)
+                        .map(|asked| pending.push(self.answer(asked)))
+                }
                 Step::TakeLocal(call) => {
                     pending.extend(
                         ask_locally::<S>(call, &mut handler).map(|asked| self.answer(asked)),
@@ -103,10 +109,9 @@ impl Serving {
                     Ok(())
                 }
             };
-            if let Err(why) = outcome
-                && self.warning.check().is_some()
-            {
-                log::warn!("{}: request not answered: {why}", self.name);
+            if let Err(why) = outcome {
+                self.unanswered.failed.fetch_add(1, Relaxed);
+                self.warn(&format!("request not answered: {why}"));
             }
             future::yield_now().await;
         }
@@ -117,6 +122,27 @@ impl Serving {
             Ok(call) => Step::TakeLocal(call),
             // Another server has taken the name.
             Err(_) => future::pending().await,
+        }
+    }
+
+    /// Counts the requests between this one of a client and the one before.
+    fn count_lost(&self, sample: &Result<Origin, String>, gaps: &mut Gaps) {
+        let gap = sample
+            .as_ref()
+            .map_or(0, |origin| gaps.before(origin.sample));
+        let lost = gap.saturating_add(self.requests.missed());
+        if lost > 0 {
+            self.unanswered.lost.fetch_add(lost, Relaxed);
+            self.warn(&format!(
+                "{lost} requests lost: more than {} waited; ask again",
+                Qos::REQUESTS.depth
+            ));
+        }
+    }
+
+    fn warn(&self, problem: &str) {
+        if self.warning.check().is_some() {
+            log::warn!("{}: {problem}", self.unanswered.name);
         }
     }
 

@@ -36,7 +36,7 @@ use super::publisher::PublisherParts;
 use super::qos::Qos;
 use super::remote::RemotePublisher;
 use super::security::Enclave;
-use super::service::{Answers, LocalServices, Server};
+use super::service::{Answers, LocalServices, Server, Unanswered};
 use super::shutdown::Shutdown;
 use super::subscription::{Command, Intake, Load, Sample, Stats, Subscription};
 use super::sync::{lock, wait_for};
@@ -82,6 +82,7 @@ struct Open {
     intakes: Vec<Weak<Intake>>,
     readers: Vec<(Sender<()>, JoinHandle<()>)>,
     servers: Vec<Server>,
+    unanswered: Vec<Weak<Unanswered>>,
     graph: Option<Task<()>>,
 }
 
@@ -117,6 +118,7 @@ impl Shared {
                 intakes: Vec::new(),
                 readers: Vec::new(),
                 servers: Vec::new(),
+                unanswered: Vec::new(),
                 graph: None,
             })),
         });
@@ -209,6 +211,13 @@ impl Shared {
     pub(crate) fn intakes(&self) -> Vec<Arc<Intake>> {
         let open = lock(&self.open);
         let all = open.iter().flat_map(|open| &open.intakes);
+        all.filter_map(Weak::upgrade).collect()
+    }
+
+    /// Requests that came to nothing, of all servers.
+    pub(crate) fn unanswered(&self) -> Vec<Arc<Unanswered>> {
+        let open = lock(&self.open);
+        let all = open.iter().flat_map(|open| &open.unanswered);
         all.filter_map(Weak::upgrade).collect()
     }
 

@@ -1,6 +1,7 @@
 //! Servers of the process.
 
-use std::sync::Arc;
+use std::sync::atomic::AtomicU64;
+use std::sync::{Arc, Weak};
 use std::time::Duration;
 
 use lattice_msgs::{RosMessage, RosService};
@@ -15,10 +16,11 @@ use crate::outbox::WhenFull;
 use crate::peers::Peers;
 use crate::port::PortTopic;
 use crate::qos::Qos;
-use crate::service::{Reply, Server, Serving};
+use crate::service::{Reply, Server, Serving, Unanswered};
+use crate::sync::lock;
 
 /// Requests are short.
-const MAX_REQUEST_BYTES: usize = 4 << 20;
+const MAX_REQUEST_BYTES: usize = 1 << 20;
 
 /// Between two warnings of unreadable requests.
 const WARNING_PERIOD: Duration = Duration::from_secs(5);
@@ -56,8 +58,18 @@ impl Shared {
         self.endpoints.register(replies.id(), &readers);
         let (end, ending) = bounded(1);
         self.answers.add(end, &replies);
-        let serving = Serving {
+        let unanswered = Arc::new(Unanswered {
             name: name.to_owned(),
+            lost: AtomicU64::new(0),
+            failed: AtomicU64::new(0),
+        });
+        if let Some(open) = lock(&self.open).as_mut() {
+            let of_live = |of: &Weak<Unanswered>| of.strong_count() > 0;
+            open.unanswered.retain(of_live);
+            open.unanswered.push(Arc::downgrade(&unanswered));
+        }
+        let serving = Serving {
+            unanswered,
             requests,
             local: self.services.add(name, S::TYPE),
             replies,

@@ -84,6 +84,12 @@ impl Shared {
             let incompatible = intake.peers.incompatible_count() as u64;
             add(topic, "incompatible_publishers", incompatible, QOS);
         }
+        const REQUESTS: &str = "requests not answered";
+        for of in self.unanswered() {
+            let (lost, failed) = (of.lost.load(Relaxed), of.failed.load(Relaxed));
+            add(&of.name, "requests_lost", lost, REQUESTS);
+            add(&of.name, "requests_failed", failed, REQUESTS);
+        }
         let (level, message) = match problems.is_empty() {
             true => (Level::Ok, "running".to_owned()),
             false => (Level::Warn, problems.join("; ")),

@@ -4,7 +4,7 @@ mod intake;
 mod source;
 
 pub(crate) use intake::{Command, Intake};
-pub(crate) use source::Source;
+pub(crate) use source::{Gaps, Source};
 
 use std::convert::Infallible;
 use std::sync::atomic::{AtomicU64, Ordering::Relaxed};

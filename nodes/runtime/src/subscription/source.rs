@@ -109,13 +109,13 @@ enum Heard {
 
 /// Finds the samples that a writer numbered and we never saw.
 #[derive(Default)]
-struct Gaps {
+pub(crate) struct Gaps {
     last: BTreeMap<EndpointId, i64>,
 }
 
 impl Gaps {
     /// Samples missing between the one before and this one of the same writer.
-    fn before(&mut self, sample: SampleId) -> u64 {
+    pub(crate) fn before(&mut self, sample: SampleId) -> u64 {
         let SampleId { writer, number } = sample;
         if self.last.len() >= MAX_WRITERS && !self.last.contains_key(&writer) {
             self.last.clear();

@@ -137,6 +137,27 @@ fn the_log_of_the_process_is_on_rosout() {
 }
 
 #[test]
+fn a_second_node_of_the_same_name_is_told_as_rcl_tells_it() {
+    let _ = logging::init(&RosArgs::default(), "logger");
+    let two = Two::with_args(&["-r", "again:__node:=twin", "-r", "other:__node:=twin"]);
+    let (_subscription, heard) = two.hear::<Log>("/rosout", Qos::ROSOUT, Load::Small);
+    let _nodes = ["other", "again"].map(|name| two.b.node(name).unwrap());
+    let line = loop {
+        let line = heard.recv_timeout(PATIENCE).unwrap();
+        if line.msg.contains("twin") {
+            break line;
+        }
+    };
+    assert_eq!(line.level, Log::WARN);
+    let rcl = "Publisher already registered for node name: 'twin'. If this is due to multiple nodes with the \
+               same name then all logs for the logger named 'twin' will go out over the existing publisher. \
+               As soon as any node with that name is destructed it will unregister the publisher, \
+               preventing any further logs for that name from being published on the rosout topic.";
+    assert!(line.msg.starts_with(rcl), "{}", line.msg);
+    assert!(line.msg.ends_with("rename one with `-r NODE:__node:=NAME`"));
+}
+
+#[test]
 fn shutdown_stops_timers_sends_what_is_queued_and_leaves_at_once() {
     let two = Two::start();
     let qos = Qos::reliable(20);
