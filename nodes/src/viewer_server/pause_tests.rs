@@ -161,7 +161,8 @@ fn a_client_that_pauses_hurts_nobody_and_has_the_map_in_the_end() {
     let by_hand = std::env::var_os("LATTICE_PAUSE").is_some();
     let (steps, fresh, period_ms) = match by_hand {
         true => (300, 2667, 100),
-        false => (60, 500, 0),
+        // More than the server keeps and the kernel holds for a client.
+        false => (150, 500, 0),
     };
     let mut growing = Growing::new();
     let [mut reads, mut pauses] = [(); 2].map(|()| Client::new(&growing));
