@@ -8,7 +8,7 @@ const AXES = ["x", "y", "z"];
 
 export class Writing {
   constructor(services, worker, state) {
-    Object.assign(this, { services, worker, state });
+    Object.assign(this, { services, worker, state, attempts: 0 });
     by("clear").addEventListener("click", () => this.tried(this.clear()));
     by("reset").addEventListener("click", () => this.tried(this.reset()));
     by("save").addEventListener("click", () => this.tried(this.save()));
@@ -27,10 +27,12 @@ export class Writing {
     by("said").className = bad ? "bad" : "";
   }
 
-  // Says what came of something that was tried.
+  // Says what came of something that was tried; nothing to say clears no word on what was tried later.
   async tried(work) {
+    const attempt = ++this.attempts;
     try {
-      this.say((await work) ?? "");
+      const text = (await work) ?? "";
+      if (text || attempt === this.attempts) this.say(text);
     } catch (error) {
       this.say(error.message, true);
     }

@@ -57,7 +57,7 @@ impl Growing {
     fn grow(&mut self, voxels: usize, fresh: usize) {
         let place = |i: usize| {
             let i = i + self.step * fresh;
-            [i % 1000, i / 1000 % 1000, i / 1_000_000].map(|k| (k as f64 + 0.5) * 0.1)
+            [i % 1000, i / 1000 % 1000, i / 1_000_000].map(|k| k as f64 * 0.1)
         };
         let points: Vec<Vector3<f64>> = (0..voxels).map(|i| place(i).into()).collect();
         let header = Header {
