@@ -66,6 +66,10 @@ pub(crate) fn splits_in(folder: &Path) -> Result<Vec<Split>, BagError> {
         });
     }
     files.sort_by_key(|path| (path.as_os_str().len(), path.clone()));
+    // Of one that was being replaced by its compressed form, which then is whole, the latter counts.
+    let packed = |path: &PathBuf| files.contains(&path.with_added_extension("zstd"));
+    let twice: Vec<PathBuf> = files.iter().filter(|path| packed(path)).cloned().collect();
+    files.retain(|path| !twice.contains(path));
     files
         .into_iter()
         .map(|file| Split::new(file, false))

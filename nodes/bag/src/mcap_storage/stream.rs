@@ -51,6 +51,13 @@ struct Waiting {
     data: Vec<u8>,
 }
 
+impl Waiting {
+    /// Memory that it takes, without data too.
+    fn bytes(&self) -> u64 {
+        (size_of::<Waiting>() + self.data.len()) as u64
+    }
+}
+
 impl McapStream {
     pub(super) fn new(file: &McapFile, filter: Filter) -> Result<McapStream, BagError> {
         let topic_of = file.topic_of.clone();
@@ -100,18 +107,18 @@ impl McapStream {
             .seek(SeekFrom::Start(block.offset))
             .map_err(|error| RecordError::bad(start, error))?;
         let (filter, topic_of) = (&self.filter, &self.topic_of);
-        let waiting_bytes = &mut self.waiting_bytes;
         // A chunk counts only once its CRC is right.
         let mut read = Vec::new();
+        let mut waiting_bytes = self.waiting_bytes;
         let mut take = |place, opcode, body: &[u8]| {
             if opcode == op::MESSAGE
                 && let Some(message) = wanted(place, body, topic_of, filter, number)?
             {
-                *waiting_bytes = waiting_bytes.saturating_add(message.data.len() as u64);
-                if *waiting_bytes > MAX_WAITING_BYTES {
+                waiting_bytes = waiting_bytes.saturating_add(message.bytes());
+                if waiting_bytes > MAX_WAITING_BYTES {
                     let cause = Cause::TooLarge {
                         what: "all that chunks overlapping in time hold",
-                        size_bytes: *waiting_bytes,
+                        size_bytes: waiting_bytes,
                         limit_bytes: MAX_WAITING_BYTES,
                     };
                     return Err(RecordError { place, cause });
@@ -137,6 +144,7 @@ impl McapStream {
             Cause::Cut => RecordError::bad(error.place, "a record longer than the index has it"),
             _ => error,
         })?;
+        self.waiting_bytes = waiting_bytes;
         self.waiting.extend(read.into_iter().map(Reverse));
         Ok(())
     }
@@ -185,7 +193,7 @@ impl Iterator for McapStream {
             }
         }
         if let Some(Reverse(message)) = self.waiting.pop() {
-            self.waiting_bytes = self.waiting_bytes.saturating_sub(message.data.len() as u64);
+            self.waiting_bytes = self.waiting_bytes.saturating_sub(message.bytes());
             let Waiting {
                 log_time_ns,
                 topic,

@@ -50,7 +50,8 @@ pub(super) fn latched_before(
     let mut kept_messages: VecDeque<BagMessage> = VecDeque::new();
     let mut bytes = 0_usize;
     for message in reader.filtered(filter) {
-        let message = message?;
+        // Damage is told of where it is played; it may lie behind this time.
+        let Ok(message) = message else { break };
         let Some(topic) = latched
             .iter()
             .find(|topic| topic.bag_topic == message.topic)

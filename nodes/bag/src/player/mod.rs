@@ -179,10 +179,11 @@ impl Player {
         let is_played = first_ns.is_some_and(|first_ns| first_ns <= bag_ns)
             && last_ns.is_some_and(|last_ns| bag_ns <= last_ns);
         if is_played {
+            self.failed = None;
+            self.start_pass(bag_ns)?;
             self.timeline.anchor(now_ns, bag_ns);
             self.clock_due_ns = now_ns;
-            (self.ended, self.failed) = (false, None);
-            self.start_pass(bag_ns)?;
+            self.ended = false;
         }
         Ok(is_played)
     }
@@ -259,8 +260,8 @@ impl Player {
             self.ended = true;
             return Err(error);
         }
-        // A pass without messages would loop for ever without a step of time.
-        if !self.loops || self.last_ns.is_none() {
+        // A whole pass without messages would loop for ever without a step of time.
+        if !self.loops || self.last_ns.is_none() && self.pass_start_ns == self.start_ns {
             self.ended = true;
             return Ok(Step::End);
         }

@@ -217,6 +217,48 @@ fn a_truncated_bag_plays_up_to_the_cut_and_then_tells() {
 }
 
 #[test]
+fn a_truncated_bag_is_sought_in_as_a_whole_one() {
+    let folder = tempfile::tempdir().unwrap();
+    bag(folder.path(), &[("/map!", 0), ("/a", 1), ("/a", 3)]);
+    let file = folder.path().join("bag/bag_0.mcap");
+    let whole = fs::read(&file).unwrap();
+    let place = whole.windows(7).position(|w| w == b"rosbag2").unwrap();
+    fs::write(&file, &whole[..place]).unwrap();
+    let mut player = Player::new(BagReader::open(&file).unwrap(), options()).unwrap();
+    assert!(player.seek(10 * S, T0_NS + 2 * S).unwrap());
+    assert_eq!(play(&mut player, 2), ["/map 10", "/a 11"]);
+    assert!(matches!(player.next(), Err(BagError::Truncated { .. })));
+}
+
+#[test]
+fn a_loop_goes_on_after_a_place_behind_the_last_message() {
+    let folder = tempfile::tempdir().unwrap();
+    let bag = bag(folder.path(), &[("/map!", 0), ("/a", 4)]);
+    let looped = PlayerOptions {
+        loop_: true,
+        include: Some(vec!["/map".into()]),
+        ..options()
+    };
+    let mut player = Player::new(bag, looped).unwrap();
+    assert!(player.seek(0, T0_NS + 2 * S).unwrap());
+    let steps = play(&mut player, 3);
+    assert_eq!((&*steps[0], &*steps[1]), ("/map 0", "looped"));
+    assert!(steps[2].starts_with("/map"), "{steps:?}");
+}
+
+#[test]
+fn a_file_beside_its_compressed_form_is_read_once() {
+    let folder = tempfile::tempdir().unwrap();
+    bag(folder.path(), &[("/a", 0), ("/a", 1)]);
+    let path = folder.path().join("bag");
+    fs::remove_file(path.join("metadata.yaml")).unwrap();
+    let packed = zstd::encode_all(&fs::read(path.join("bag_0.mcap")).unwrap()[..], 0).unwrap();
+    fs::write(path.join("bag_0.mcap.zstd"), packed).unwrap();
+    let mut player = Player::new(BagReader::open(&path).unwrap(), options()).unwrap();
+    assert_eq!(play(&mut player, 9), ["/a 0", "/a 1", "end"]);
+}
+
+#[test]
 fn the_rate_changes_from_now_on() {
     let folder = tempfile::tempdir().unwrap();
     let bag = bag(folder.path(), &[("/a", 0), ("/a", 2), ("/a", 6)]);

@@ -107,7 +107,14 @@ fn compress(file: &Path) -> io::Result<PathBuf> {
     let mut packed = file.as_os_str().to_owned();
     packed.push(".zstd");
     let packed = PathBuf::from(packed);
-    zstd::stream::copy_encode(File::open(file)?, File::create_new(&packed)?, ZSTD_LEVEL)?;
+    // Under its name only once it is whole and on the disk, so that one of the two always is.
+    let mut part = file.as_os_str().to_owned();
+    part.push(".part");
+    let part = PathBuf::from(part);
+    let mut out = File::create_new(&part)?;
+    zstd::stream::copy_encode(File::open(file)?, &mut out, ZSTD_LEVEL)?;
+    out.sync_all()?;
+    fs::rename(&part, &packed)?;
     fs::remove_file(file)?;
     Ok(packed)
 }
