@@ -72,6 +72,9 @@ fn show(path: &Path, address: SocketAddr) -> CliResult {
         false => path,
     };
     let (_server, url) = serve_file(path, address)?;
+    // The map is in memory; only a signal ends this process.
+    #[cfg(feature = "bags")]
+    drop(folder);
     println!("the map is at {url}, until Ctrl-C");
     loop {
         std::thread::park();
