@@ -26,7 +26,8 @@ pub fn start(domain: &LoopbackDomain, arguments: &[&str]) -> Child {
     )
 }
 
-fn spawn(domain: &LoopbackDomain, command: &mut Command) -> Child {
+/// The same of any command.
+pub fn spawn(domain: &LoopbackDomain, command: &mut Command) -> Child {
     command
         .env("ROS_DOMAIN_ID", domain.id().to_string())
         .env("ROS_AUTOMATIC_DISCOVERY_RANGE", "LOCALHOST")
