@@ -3,7 +3,7 @@
 use std::collections::VecDeque;
 
 use super::{PlayedTopic, wanted};
-use crate::{BagError, BagMessage, BagQos, BagReader, storage::Filter};
+use crate::{BagMessage, BagQos, BagReader, storage::Filter};
 
 /// Messages kept of one topic.
 const MAX_PER_TOPIC: u64 = 1000;
@@ -29,7 +29,7 @@ pub(super) fn latched_before(
     reader: &BagReader,
     topics: &[PlayedTopic],
     before_ns: i64,
-) -> Result<VecDeque<BagMessage>, BagError> {
+) -> VecDeque<BagMessage> {
     let latched: Vec<&PlayedTopic> = topics
         .iter()
         .filter(|topic| topic.info.is_latched())
@@ -39,7 +39,7 @@ pub(super) fn latched_before(
             .start_ns()
             .is_none_or(|start_ns| start_ns >= before_ns)
     {
-        return Ok(VecDeque::new());
+        return VecDeque::new();
     }
     let filter = Filter {
         topics: wanted(reader, latched.iter().copied()),
@@ -74,7 +74,7 @@ pub(super) fn latched_before(
             bytes = bytes.saturating_sub(drop_oldest(&mut kept_messages, topic));
         }
     }
-    Ok(kept_messages)
+    kept_messages
 }
 
 /// Drops the oldest message of a topic; the result is its size, bytes.

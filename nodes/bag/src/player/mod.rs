@@ -100,7 +100,7 @@ impl Player {
             reader,
         };
         if !player.ended {
-            player.start_pass(start_ns)?;
+            player.start_pass(start_ns);
         }
         Ok(player)
     }
@@ -180,7 +180,7 @@ impl Player {
             && last_ns.is_some_and(|last_ns| bag_ns <= last_ns);
         if is_played {
             self.failed = None;
-            self.start_pass(bag_ns)?;
+            self.start_pass(bag_ns);
             self.timeline.anchor(now_ns, bag_ns);
             self.clock_due_ns = now_ns;
             self.ended = false;
@@ -213,10 +213,10 @@ impl Player {
         }
     }
 
-    fn start_pass(&mut self, from_ns: i64) -> Result<(), BagError> {
+    fn start_pass(&mut self, from_ns: i64) {
         self.last_ns = None;
         self.pass_start_ns = from_ns;
-        self.latched = latched_before(&self.reader, &self.topics, from_ns)?;
+        self.latched = latched_before(&self.reader, &self.topics, from_ns);
         self.messages = Some(self.reader.filtered(Filter {
             topics: wanted(&self.reader, &self.topics),
             start_ns: from_ns,
@@ -224,7 +224,6 @@ impl Player {
             past_damage: false,
         }));
         self.read_head();
-        Ok(())
     }
 
     fn read_head(&mut self) {
@@ -269,7 +268,7 @@ impl Player {
         let next_ns = self.pass_end_ns().max(began_ns.saturating_add(MIN_LOOP_NS));
         self.timeline.anchor(next_ns, self.start_ns);
         self.clock_due_ns = next_ns;
-        self.start_pass(self.start_ns)?;
+        self.start_pass(self.start_ns);
         Ok(Step::Looped)
     }
 }

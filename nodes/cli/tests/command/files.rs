@@ -10,7 +10,7 @@ use std::process::{Command, Output};
 
 use lattice_runtime::LoopbackDomain;
 
-use crate::record::{expect, spawn, start};
+use crate::record::{expect, play, spawn};
 use crate::{error, json, lattice, text};
 
 const PARAMS: &str = concat!(env!("CARGO_MANIFEST_DIR"), "/../../params/bobcat.yaml");
@@ -171,17 +171,7 @@ fn a_map_that_is_not_saved_is_told(log: &str, folder: &Path) {
     let period = "lattice_mapper:autosave_period_s:=0.2";
     let mut command = by_nobody(&["run", PARAMS, "--", "--ros-args", "-p", &maps, "-p", period]);
     let mut nodes = spawn(&domain, &mut command);
-    let bag = format!("bag:={log}");
-    let player = [
-        "node",
-        "bag_player",
-        "--ros-args",
-        "-p",
-        &bag,
-        "-p",
-        "loop:=true",
-    ];
-    let mut player = start(&domain, &player);
+    let mut player = play(&domain, log, &["loop:=true"]);
     drop(player.stderr.take());
     let told = "the map is not saved: \"autosave.lattice\": Permission denied";
     expect(&mut nodes, &[told]);

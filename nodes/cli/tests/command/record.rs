@@ -26,7 +26,16 @@ pub fn start(domain: &LoopbackDomain, arguments: &[&str]) -> Child {
     )
 }
 
-/// The same of any command.
+/// A player of a log with more parameters, `NAME:=VALUE`.
+pub fn play(domain: &LoopbackDomain, log: &str, parameters: &[&str]) -> Child {
+    let bag = format!("bag:={log}");
+    let parameters = parameters.iter().copied().chain([&*bag]);
+    let parameters = parameters.flat_map(|parameter| ["-p", parameter]);
+    let node = ["node", "bag_player", "--ros-args"].into_iter();
+    start(domain, &node.chain(parameters).collect::<Vec<_>>())
+}
+
+/// The same as [`start`] of any command.
 pub fn spawn(domain: &LoopbackDomain, command: &mut Command) -> Child {
     command
         .env("ROS_DOMAIN_ID", domain.id().to_string())

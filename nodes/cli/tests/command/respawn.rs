@@ -22,7 +22,7 @@ use lattice_runtime::{Load, LoopbackDomain, Publisher, Runtime, Subscription};
 
 use crate::PATIENCE;
 use crate::nodes::simulated;
-use crate::record::{PARAMS, expect, signal, start};
+use crate::record::{PARAMS, expect, play, signal, start};
 
 const NODES: [&str; 3] = [
     "enu_transformer",
@@ -168,20 +168,8 @@ fn nodes_that_are_killed_come_back_and_followers_agree_with_the_mapper() {
     let domain = LoopbackDomain::take().unwrap();
     let mut viewer = Viewer::start(&domain);
     let mut nodes = NODES.map(|node| Supervised::start(&domain, node, folder.path()));
-    let bag = format!("bag:={log}");
     let topics = "wait_for_subscribers:=['/left/points', '/novatel/oem7/inspvax']";
-    let player = [
-        "node",
-        "bag_player",
-        "--ros-args",
-        "-p",
-        &bag,
-        "-p",
-        topics,
-        "-p",
-        "settle_s:=2.0",
-    ];
-    let mut player = start(&domain, &player);
+    let mut player = play(&domain, &log, &[topics, "settle_s:=2.0"]);
     drop(player.stderr.take());
 
     viewer.until("the log begins", |keys| keys.len() > 100);

@@ -230,17 +230,7 @@ fn a_log_that_plays_is_held_and_moved_from_the_page_of_a_phone() {
     let log = simulated(folder.path(), "mcap", "12");
     let first_ns = BagReader::open(log.as_ref()).unwrap().start_ns().unwrap();
     let domain = LoopbackDomain::take().unwrap();
-    let bag = format!("bag:={log}");
-    let player = [
-        "node",
-        "bag_player",
-        "--ros-args",
-        "-p",
-        &bag,
-        "-p",
-        "start_paused:=true",
-    ];
-    let mut player = record::start(&domain, &player);
+    let mut player = record::play(&domain, &log, &["start_paused:=true"]);
     let arguments = ["view", BOBCAT, "--port", "0", "--", "--ros-args"];
     let write = ["-p", "viewer_server:allow_write:=true"];
     let viewer = Viewer::start_in(&domain, &[&arguments[..], &write].concat());
