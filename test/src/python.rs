@@ -8,13 +8,23 @@ use std::path::{Path, PathBuf};
 /// Without the variable, a line on standard error says so and the caller returns: such a test needs
 /// packages that cargo does not bring.
 pub fn python() -> Option<PathBuf> {
-    let Some(python) = std::env::var_os("LATTICE_PYTHON") else {
+    named("LATTICE_PYTHON", "requirements.txt")
+}
+
+/// The interpreter that `LATTICE_ROS_PYTHON` names, one with `test/python/requirements-ros.txt`
+/// installed, which has rclpy; else as [`python`].
+pub fn ros_python() -> Option<PathBuf> {
+    named("LATTICE_ROS_PYTHON", "requirements-ros.txt")
+}
+
+fn named(variable: &str, requirements: &str) -> Option<PathBuf> {
+    let Some(python) = std::env::var_os(variable) else {
         let test = std::thread::current().name().unwrap_or_default().to_owned();
         // Not eprintln: the test harness would keep it to itself.
         let _ = writeln!(
             std::io::stderr(),
-            "SKIPPED {test}: LATTICE_PYTHON is not set; have it name a python with {} installed",
-            script("requirements.txt").display()
+            "SKIPPED {test}: {variable} is not set; have it name a python with {} installed",
+            script(requirements).display()
         );
         return None;
     };

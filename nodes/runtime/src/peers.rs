@@ -57,10 +57,13 @@ impl Peers {
         lock(&self.state).remote.len()
     }
 
-    /// Completes when such a peer in another process is known.
-    pub(crate) async fn known(&self, wanted: impl Fn(&EndpointId) -> bool) {
-        let known = || lock(&self.state).remote.iter().any(&wanted).then_some(());
-        self.joined.until(known).await;
+    /// Completes with such a peer in another process once one is known.
+    pub(crate) async fn known(&self, wanted: impl Fn(&EndpointId) -> bool) -> EndpointId {
+        let known = || {
+            let state = lock(&self.state);
+            state.remote.iter().copied().find(&wanted)
+        };
+        self.joined.until(known).await
     }
 
     /// Peers here and elsewhere.

@@ -9,6 +9,7 @@ mod cyclone;
 mod losses;
 mod params;
 mod peer;
+mod rclpy;
 mod ros2_client_peer;
 mod security;
 mod transport;

@@ -5,19 +5,18 @@
 
 use std::net::{Ipv4Addr, SocketAddrV4, UdpSocket};
 
+use super::wire::{ENTITY_SPDP_WRITER, Message, put_end, put_parameter};
 use crate::port::EndpointId;
 
 /// Group of discovery.
-const GROUP: Ipv4Addr = Ipv4Addr::new(239, 255, 0, 1);
+pub(super) const GROUP: Ipv4Addr = Ipv4Addr::new(239, 255, 0, 1);
 
 /// Participants of this machine that are told, as far as Cyclone and FastDDS look for them.
-const LOCAL_PARTICIPANTS: u16 = 33;
+pub(super) const LOCAL_PARTICIPANTS: u16 = 33;
 
 /// After all that a participant numbers itself.
 const SEQUENCE_NUMBER: [u32; 2] = [1, 0];
 
-const ENTITY_SPDP_WRITER: [u8; 4] = [0, 1, 0, 0xc2];
-const PID_SENTINEL: u16 = 1;
 const PID_PARTICIPANT_GUID: u16 = 0x50;
 const PID_KEY_HASH: u16 = 0x70;
 const PID_STATUS_INFO: u16 = 0x71;
@@ -45,7 +44,7 @@ pub(super) fn say(domain: u16, localhost_only: bool, participant: EndpointId) {
 }
 
 /// Port of the announcements that all participants of a domain hear.
-fn multicast_port(domain: u16) -> Option<u16> {
+pub(super) fn multicast_port(domain: u16) -> Option<u16> {
     domain.checked_mul(250)?.checked_add(7400)
 }
 
@@ -56,29 +55,21 @@ fn unicast_port(domain: u16, place: u16) -> Option<u16> {
 
 fn message(participant: EndpointId) -> Vec<u8> {
     let guid = &participant.0;
-    let (prefix, _) = guid.split_at(12);
+    let [prefix @ .., _, _, _, _] = *guid;
     let mut data = vec![0, 0];
     // From the end of this number to the inline QoS.
     data.extend(16_u16.to_le_bytes());
     data.extend([0; 4]);
     data.extend(ENTITY_SPDP_WRITER);
     data.extend(SEQUENCE_NUMBER.into_iter().flat_map(u32::to_le_bytes));
-    parameter(&mut data, PID_STATUS_INFO, &STATUS);
-    parameter(&mut data, PID_KEY_HASH, guid);
-    parameter(&mut data, PID_SENTINEL, &[]);
+    put_parameter(&mut data, PID_STATUS_INFO, &STATUS);
+    put_parameter(&mut data, PID_KEY_HASH, guid);
+    put_end(&mut data);
     // A parameter list in little endian.
     data.extend([0, 3, 0, 0]);
-    parameter(&mut data, PID_PARTICIPANT_GUID, guid);
-    parameter(&mut data, PID_SENTINEL, &[]);
-    // Protocol 2.4, vendor RustDDS.
-    let header = [b"RTPS".as_slice(), &[2, 4, 1, 0x12], prefix].concat();
-    let length = u16::try_from(data.len()).unwrap_or(0).to_le_bytes();
-    [&header, [SUBMESSAGE_DATA, FLAGS].as_slice(), &length, &data].concat()
-}
-
-fn parameter(list: &mut Vec<u8>, id: u16, value: &[u8]) {
-    let length = u16::try_from(value.len()).unwrap_or(0);
-    list.extend(id.to_le_bytes());
-    list.extend(length.to_le_bytes());
-    list.extend(value);
+    put_parameter(&mut data, PID_PARTICIPANT_GUID, guid);
+    put_end(&mut data);
+    let mut message = Message::of(&prefix);
+    message.push(SUBMESSAGE_DATA, FLAGS, &data);
+    message.bytes
 }

@@ -5,7 +5,9 @@ use std::sync::{Arc, Mutex, Weak};
 
 use futures::future::BoxFuture;
 
+use super::addresses::Addresses;
 use super::goodbye;
+use super::large_call::LargeCalls;
 use super::participant::{Participant, Recipe};
 use super::reader::{DdsReader, ReaderSource};
 use super::writer::DdsWriter;
@@ -20,6 +22,8 @@ pub(super) struct Lives {
     /// Identity of the first participant, by which all are known above.
     id: EndpointId,
     renewals: AtomicU64,
+    addresses: Arc<Addresses>,
+    large_calls: Arc<LargeCalls>,
     now: Mutex<Now>,
 }
 
@@ -36,11 +40,14 @@ impl Lives {
     pub(super) fn begin(domain: u16, localhost_only: bool) -> Result<Self, RuntimeError> {
         let participant = Participant::join(domain, localhost_only)?;
         let id = participant.id();
+        let addresses = Arc::new(Addresses::new(domain, localhost_only));
         Ok(Self {
             domain,
             localhost_only,
             id,
             renewals: AtomicU64::new(0),
+            large_calls: Arc::new(LargeCalls::new(Arc::clone(&addresses))),
+            addresses,
             now: Mutex::new(Now {
                 participant: Some(Arc::new(participant)),
                 wire_id: id,
@@ -55,6 +62,10 @@ impl Lives {
         self.id
     }
 
+    pub(super) fn addresses(&self) -> &Arc<Addresses> {
+        &self.addresses
+    }
+
     /// Participants made after the first.
     pub(super) fn renewals(&self) -> u64 {
         self.renewals.load(Relaxed)
@@ -67,7 +78,9 @@ impl Lives {
     pub(super) fn writer(&self, recipe: Recipe) -> Result<Arc<DdsWriter>, RuntimeError> {
         let mut now = lock(&self.now);
         let participant = now.participant(&recipe.name, "publisher")?;
-        let writer = Arc::new(DdsWriter::new(&participant, recipe)?);
+        let large_calls = Arc::clone(&self.large_calls);
+        let writer = DdsWriter::new(&participant, recipe, large_calls)?;
+        let writer = Arc::new(writer);
         now.writers.retain(|writer| writer.strong_count() > 0);
         now.writers.push(Arc::downgrade(&writer));
         now.writers_made = now.writers_made.wrapping_add(1);

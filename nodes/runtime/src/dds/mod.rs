@@ -1,14 +1,17 @@
 //! The transport over RustDDS. All that names a RustDDS type is here.
 
+mod addresses;
 mod events;
 mod goodbye;
 mod health;
+mod large_call;
 mod lives;
 mod participant;
 mod payload;
 mod probe;
 mod reader;
 mod supervisor;
+mod wire;
 mod writer;
 
 pub(crate) use participant::effective_receive_buffer;
@@ -57,8 +60,9 @@ impl Dds {
         let thread = TaskThread::start("supervisor", shutdown.clone())?;
         let (sender, events) = bounded(MAX_EVENTS);
         let supervisor = Supervisor::new(Arc::clone(&lives), sender);
-        let task = thread.spawn(supervisor.run());
-        task.into_iter().for_each(smol::Task::detach);
+        let listening = thread.spawn(Arc::clone(lives.addresses()).listen());
+        let tasks = thread.spawn(supervisor.run()).into_iter().chain(listening);
+        tasks.for_each(smol::Task::detach);
         Ok(Self {
             lives,
             events,

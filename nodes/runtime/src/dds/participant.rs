@@ -179,6 +179,12 @@ impl Recipe {
         self.dds_name.starts_with("rt/")
     }
 
+    pub(super) fn is_service(&self) -> bool {
+        ["rq/", "rr/"]
+            .iter()
+            .any(|of| self.dds_name.starts_with(of))
+    }
+
     /// Our type as ROS writes it, and `theirs` likewise, if that is another.
     pub(super) fn other_type(&self, theirs: &str) -> Option<(&str, String)> {
         if dds_type_name(&self.ros_type).is_none_or(|ours| ours == theirs) {

@@ -10,7 +10,9 @@ use rustdds::dds::WriteError;
 use rustdds::no_key::DataWriter;
 use rustdds::{RTPSEntity, Timestamp, WriteOptionsBuilder};
 use smol::future::{or, poll_once};
+use smol::lock::MutexGuard;
 
+use super::large_call::{LargeCall, LargeCalls, MAX_WHOLE_BYTES};
 use super::participant::{Participant, Recipe};
 use super::payload::{Payload, PayloadSerializer};
 use super::{endpoint_id, sample_identity};
@@ -28,6 +30,16 @@ pub(super) struct DdsWriter {
     kept: usize,
     state: Mutex<State>,
     changed: Changed,
+    large_calls: Arc<LargeCalls>,
+    /// Numbers of requests or replies, which are written one after the other.
+    calls: smol::lock::Mutex<Calls>,
+}
+
+/// Requests or replies of one writer of RustDDS.
+struct Calls {
+    writer: EndpointId,
+    /// Number of the last.
+    written: i64,
 }
 
 struct State {
@@ -46,8 +58,22 @@ struct Sample {
     stamp: Timestamp,
 }
 
+impl Calls {
+    /// Identity that the next one gets.
+    fn next(&self) -> SampleId {
+        SampleId {
+            writer: self.writer,
+            number: self.written.saturating_add(1),
+        }
+    }
+}
+
 impl DdsWriter {
-    pub(super) fn new(participant: &Participant, recipe: Recipe) -> Result<Self, RuntimeError> {
+    pub(super) fn new(
+        participant: &Participant,
+        recipe: Recipe,
+        large_calls: Arc<LargeCalls>,
+    ) -> Result<Self, RuntimeError> {
         let raw = participant.writer(&recipe)?;
         let id = endpoint_id(raw.guid());
         // What is no ROS topic is the graph, which names endpoints of one participant.
@@ -65,6 +91,11 @@ impl DdsWriter {
                 kept: VecDeque::new(),
             }),
             changed: Changed::default(),
+            large_calls,
+            calls: smol::lock::Mutex::new(Calls {
+                writer: id,
+                written: 0,
+            }),
         })
     }
 
@@ -124,13 +155,39 @@ impl DdsWriter {
         true
     }
 
+    /// The numbers of calls, held while one is written. None: this writes none.
+    async fn calls(&self, raw: &RawWriter) -> Option<MutexGuard<'_, Calls>> {
+        if !self.recipe.is_service() {
+            return None;
+        }
+        let mut calls = self.calls.lock().await;
+        let writer = endpoint_id(raw.guid());
+        if calls.writer != writer {
+            *calls = Calls { writer, written: 0 };
+        }
+        Some(calls)
+    }
+
     async fn write_sample(&self, sample: &Sample, may_wait: bool) -> Result<(), WriteRefusal> {
         loop {
             let raw = match self.raw() {
                 Some(raw) => raw,
                 None => self.changed.until(|| self.raw()).await,
             };
-            let options = options(sample).best_effort_may_block(may_wait).build();
+            let mut calls = self.calls(&raw).await;
+            let mut options = options(sample).best_effort_may_block(may_wait);
+            if let Some(calls) = &calls
+                && let Some(related) = sample.related
+                && sample.body.len() > MAX_WHOLE_BYTES
+            {
+                self.large_calls.send(&LargeCall {
+                    sample: calls.next(),
+                    related,
+                    body: &sample.body,
+                });
+                options = options.related_sample_identity_opt(None);
+            }
+            let options = options.build();
             let write = raw.async_write_with_options(Payload(sample.body.clone()), options);
             let mut write = pin!(async { Some(write.await) });
             // Nearly always done at once.
@@ -144,6 +201,9 @@ impl DdsWriter {
                     .await
                 }
             };
+            if let (Some(calls), Some(Ok(sample))) = (&mut calls, &written) {
+                calls.written = sample.sequence_number.into();
+            }
             match written {
                 Some(Ok(_)) if self.keep(&raw, sample) => return Ok(()),
                 Some(Ok(_)) | None => {}

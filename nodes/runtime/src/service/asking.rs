@@ -1,17 +1,16 @@
 //! The calls of one client over DDS: who has asked, and which answer is whose.
 
 use std::collections::BTreeMap;
-use std::sync::Mutex;
 use std::sync::atomic::{AtomicI64, Ordering::Relaxed};
+use std::sync::{Arc, Mutex};
 
 use smol::channel::{Sender, bounded};
 
-use super::wire::{Header, header, read_answer, related, write_request};
+use super::wire::{Header, read_answer, write_request};
 use crate::outbox::Outbox;
 use crate::peers::Peers;
-use crate::port::SampleReader;
+use crate::port::{Origin, SampleReader};
 use crate::sync::lock;
-use std::sync::Arc;
 
 /// Calls that wait for answers.
 #[derive(Default)]
@@ -19,11 +18,11 @@ pub(crate) struct Waiting(Mutex<BTreeMap<Header, Sender<Vec<u8>>>>);
 
 impl Waiting {
     /// Hands an answer to who asked; those of other clients are passed over.
-    fn hear(&self, bytes: &[u8]) {
-        let Some((header, answer)) = read_answer(bytes) else {
+    fn hear(&self, bytes: &[u8], origin: &Origin) {
+        let Some((request, answer)) = read_answer(bytes, origin) else {
             return;
         };
-        if let Some(sender) = lock(&self.0).remove(&header) {
+        if let Some(sender) = lock(&self.0).remove(&request) {
             let _ = sender.try_send(answer);
         }
     }
@@ -32,8 +31,8 @@ impl Waiting {
     pub(crate) async fn listen(self: Arc<Self>, answers: Box<dyn SampleReader>) {
         loop {
             // What cannot be had is no answer; its call ends by time.
-            if answers.next().await.is_ok() {
-                self.hear(&answers.bytes());
+            if let Ok(origin) = answers.next().await {
+                self.hear(&answers.bytes(), &origin);
             }
             smol::future::yield_now().await;
         }
@@ -54,17 +53,16 @@ pub(crate) struct Asking {
 impl Asking {
     /// Asks once a server is known, and waits for the answer.
     pub(crate) async fn call(&self, request: &[u8]) -> Result<Vec<u8>, String> {
-        self.servers.known(|_| true).await;
+        let server = self.servers.known(|_| true).await;
         self.answerers.known(|_| true).await;
         let number = self.next.fetch_add(1, Relaxed);
-        let writer = self.requests.id();
-        let header = header(&writer, number);
-        let body = write_request(request, &header).ok_or("the request is no CDR of this order")?;
+        let asked = write_request(request, &self.requests.id(), &server, number);
+        let asked = asked.ok_or("the request is no CDR of this order")?;
         let (sender, answer) = bounded(1);
-        lock(&self.waiting.0).insert(header, sender);
-        let _forgotten = Forget(&self.waiting, header);
+        lock(&self.waiting.0).insert(asked.identity, sender);
+        let _forgotten = Forget(&self.waiting, asked.identity);
         self.requests
-            .send_body(body, related(writer, number))
+            .send_body(asked.body, asked.related)
             .map_err(|error| error.to_string())?;
         let answer = answer.recv().await;
         answer.map_err(|_| "the client has ended".to_owned())
@@ -83,18 +81,27 @@ impl Drop for Forget<'_> {
 #[cfg(test)]
 mod tests {
     use super::*;
+    use crate::port::{EndpointId, SampleId};
 
     #[test]
     fn answers_go_to_who_asked() {
         let waiting = Waiting::default();
         let (sender, answer) = bounded(1);
         lock(&waiting.0).insert([7; 16], sender);
+        let sample = SampleId {
+            writer: EndpointId([1; 16]),
+            number: 1,
+        };
+        let origin = Origin {
+            sample,
+            related: None,
+        };
         for other in [&[0, 1, 0, 0][..], &[0, 1, 0, 0, 7], &[8; 40]] {
-            waiting.hear(other);
+            waiting.hear(other, &origin);
         }
-        waiting.hear(&[&[0, 1, 0, 0][..], &[6; 16], b"no"].concat());
+        waiting.hear(&[&[0, 1, 0, 0][..], &[6; 16], b"no"].concat(), &origin);
         assert!(answer.is_empty());
-        waiting.hear(&[&[0, 1, 0, 0][..], &[7; 16], b"yes"].concat());
+        waiting.hear(&[&[0, 1, 0, 0][..], &[7; 16], b"yes"].concat(), &origin);
         let heard = answer.try_recv().unwrap();
         assert_eq!(heard, [&[0, 1, 0, 0][..], b"yes"].concat());
         assert!(lock(&waiting.0).is_empty());

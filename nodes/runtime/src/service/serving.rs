@@ -181,7 +181,9 @@ impl Serving {
     }
 
     async fn wait_for_reader(&self, client: &EndpointId) {
-        let known = self.readers.known(|reader| reader.is_beside(client));
+        let known = async {
+            self.readers.known(|reader| reader.is_beside(client)).await;
+        };
         let timeout = async {
             Timer::after(WAIT_FOR_CLIENT).await;
         };

@@ -1,4 +1,4 @@
-//! Requests and replies on DDS: each rmw has its own form, recognised by the vendor of the client.
+//! Requests and replies on DDS: each rmw has its own form, recognised by the vendor of the peer.
 //!
 //! rmw_fastrtps sends the bare message and names the request in the inline QoS (the "Enhanced" mapping
 //! of DDS-RPC 1.0); rmw_cyclonedds puts a header of 16 bytes in front of it.
@@ -12,6 +12,7 @@ use crate::port::{Bytes, ENCAPSULATION_BYTES, EndpointId, Origin, SampleId};
 /// First two bytes of the GUIDs of a vendor.
 const CYCLONE_VENDOR: [u8; 2] = [0x01, 0x10];
 const RUSTDDS_VENDOR: [u8; 2] = [0x01, 0x12];
+const FASTDDS_VENDOR: [u8; 2] = [0x01, 0x0f];
 
 /// Set in the first byte of the GUID of a secured participant, which comes from its certificate and so
 /// names no vendor.
@@ -19,6 +20,12 @@ const SECURED: u8 = 0x80;
 
 /// Eight bytes of the client's GUID and eight of the request's number.
 const CYCLONE_HEADER_BYTES: usize = 16;
+
+/// First bytes of the header of a request of ours.
+const OURS: [u8; 4] = *b"latt";
+
+/// Last byte of the identity of a writer without keys.
+const ENTITY_KIND_WRITER: u8 = 3;
 
 /// Identity of a request in the form of rmw_cyclonedds, which is also that of our own.
 pub(crate) type Header = [u8; CYCLONE_HEADER_BYTES];
@@ -64,7 +71,7 @@ pub(crate) fn read_request<Q: RosMessage>(
             _ => Err(RequestError::Numberless),
         };
     }
-    let (first, second) = match likely_mapping(origin) {
+    let (first, second) = match likely_mapping(bytes, origin) {
         Mapping::Enhanced => (Mapping::Enhanced, Mapping::Cyclone),
         Mapping::Cyclone => (Mapping::Cyclone, Mapping::Enhanced),
     };
@@ -86,31 +93,80 @@ pub(crate) fn write_reply<R: RosMessage>(
     })
 }
 
-/// Identity of a request of ours: half of it of its writer's, half its number.
-pub(crate) fn header(writer: &EndpointId, number: i64) -> Header {
+/// Identity of a request of ours in the form of rmw_cyclonedds: [`OURS`], some of its writer, its number.
+fn header(writer: &EndpointId, number: i64) -> Header {
     let id = u128::from_le_bytes(writer.0);
     let folded = (id as u64) ^ ((id >> 64) as u64);
+    let folded = (folded as u32) ^ ((folded >> 32) as u32);
     let mut header = Header::default();
     let (first, second) = header.split_at_mut(8);
-    first.copy_from_slice(&folded.to_le_bytes());
+    let (ours, of_writer) = first.split_at_mut(4);
+    ours.copy_from_slice(&OURS);
+    of_writer.copy_from_slice(&folded.to_le_bytes());
     second.copy_from_slice(&number.to_le_bytes());
     header
 }
 
-/// Words of the inline QoS on a request of ours: over RustDDS it tells our servers of the header.
-pub(crate) fn related(writer: EndpointId, number: i64) -> Option<SampleId> {
-    (writer.vendor() == RUSTDDS_VENDOR).then_some(SampleId { writer, number })
+/// Identity of a request to a server over Fast DDS: one of the server's participant, so that a large
+/// request finds it. A server answers to it unseen, since it is no reader's.
+fn identity_there(server: &EndpointId, number: i64) -> Header {
+    let [prefix @ .., _, _, _, _] = server.0;
+    let [a, b, c, ..] = number.to_le_bytes();
+    let mut identity = Header::default();
+    let (first, entity) = identity.split_at_mut(12);
+    first.copy_from_slice(&prefix);
+    entity.copy_from_slice(&[a, b, c, ENTITY_KIND_WRITER]);
+    identity
 }
 
-/// The body of a request with its header. `None`: no little-endian CDR.
-pub(crate) fn write_request(message: &[u8], header: &Header) -> Option<Bytes> {
+/// A request of ours, in the form of its server.
+pub(crate) struct Asked {
+    /// Names the request in its answer.
+    pub identity: Header,
+    pub body: Bytes,
+    /// Words of its inline QoS.
+    pub related: Option<SampleId>,
+}
+
+/// Writes a request to a server. `None`: it is no little-endian CDR.
+pub(crate) fn write_request(
+    message: &[u8],
+    writer: &EndpointId,
+    server: &EndpointId,
+    number: i64,
+) -> Option<Asked> {
     let (encapsulation, body) = message.split_first_chunk::<ENCAPSULATION_BYTES>()?;
-    let little = encapsulation.starts_with(&[0, 1]);
-    little.then(|| [header.as_slice(), body].concat().into())
+    if !encapsulation.starts_with(&[0, 1]) {
+        return None;
+    }
+    // Only RustDDS can say what such a server answers to.
+    if (writer.vendor(), server.vendor()) == (RUSTDDS_VENDOR, FASTDDS_VENDOR) {
+        let identity = identity_there(server, number);
+        let writer = EndpointId(identity);
+        return Some(Asked {
+            identity,
+            body: Bytes::copy_from_slice(body),
+            related: Some(SampleId { writer, number: 0 }),
+        });
+    }
+    let identity = header(writer, number);
+    Some(Asked {
+        identity,
+        body: [identity.as_slice(), body].concat().into(),
+        related: None,
+    })
+}
+
+/// Identity of the request of an answer, and the answer as CDR. `None`: none that names a request.
+pub(crate) fn read_answer(bytes: &[u8], origin: &Origin) -> Option<(Header, Vec<u8>)> {
+    match origin.related {
+        Some(request) => Some((request.writer.0, bytes.to_vec())),
+        None => read_headed(bytes),
+    }
 }
 
 /// The header of an answer, and the answer as CDR. `None`: none with a header.
-pub(crate) fn read_answer(bytes: &[u8]) -> Option<(Header, Vec<u8>)> {
+fn read_headed(bytes: &[u8]) -> Option<(Header, Vec<u8>)> {
     let (encapsulation, rest) = bytes.split_first_chunk::<ENCAPSULATION_BYTES>()?;
     let (header, body) = rest.split_first_chunk::<CYCLONE_HEADER_BYTES>()?;
     let header = in_our_order(*header, encapsulation);
@@ -127,9 +183,11 @@ fn in_our_order(mut header: Header, encapsulation: &[u8]) -> Header {
     header
 }
 
-fn likely_mapping(origin: &Origin) -> Mapping {
+fn likely_mapping(bytes: &[u8], origin: &Origin) -> Mapping {
+    let is_ours = (bytes.get(ENCAPSULATION_BYTES..)).is_some_and(|body| body.starts_with(&OURS));
     match origin.sample.writer.vendor() {
         CYCLONE_VENDOR => Mapping::Cyclone,
+        RUSTDDS_VENDOR if is_ours => Mapping::Cyclone,
         // ros2-client speaks both; only with the header does it name the request in a client.
         RUSTDDS_VENDOR if origin.related.is_some() => Mapping::Cyclone,
         _ => Mapping::Enhanced,
@@ -236,19 +294,33 @@ mod tests {
     #[test]
     fn our_servers_read_our_requests_and_our_clients_their_answers() {
         let request = cdr::to_vec(&SetBoolRequest { data: true }).unwrap();
-        let mut writer = EndpointId([5; 16]);
-        writer.0[..2].copy_from_slice(&RUSTDDS_VENDOR);
-        let header = header(&writer, 3);
-        let body = write_request(&request, &header).unwrap();
-        let sent = [&[0, 1, 0, 0], &body[..]].concat();
-        let origin = origin(RUSTDDS_VENDOR, related(writer, 3));
+        let origin = origin(RUSTDDS_VENDOR, None);
+        let writer = origin.sample.writer;
+        let asked = write_request(&request, &writer, &writer, 3).unwrap();
+        let sent = [&[0, 1, 0, 0], &asked.body[..]].concat();
         let (read, to) = read_request::<SetBoolRequest>(&sent, &origin).unwrap();
-        assert!(read.data);
+        assert!(read.data && asked.related.is_none());
         let (answer, _) = write_reply(&TriggerResponse::default(), &to).unwrap();
         let answer = [&[0, 1, 0, 0], &answer[..]].concat();
         let expected = cdr::to_vec(&TriggerResponse::default()).unwrap();
-        assert_eq!(read_answer(&answer), Some((header, expected)));
-        assert_eq!(write_request(&[0, 0, 0, 0, 1], &header), None);
+        let read = read_answer(&answer, &origin);
+        assert_eq!(read, Some((asked.identity, expected)));
+        assert!(write_request(&[0, 0, 0, 0, 1], &writer, &writer, 3).is_none());
+    }
+
+    #[test]
+    fn servers_over_fastdds_get_the_bare_request_and_what_to_answer_to() {
+        let request = cdr::to_vec(&SetBoolRequest { data: true }).unwrap();
+        let ours = origin(RUSTDDS_VENDOR, None).sample.writer;
+        let server = origin(FASTDDS_VENDOR, None).sample.writer;
+        let asked = write_request(&request, &ours, &server, 0x0403_0201).unwrap();
+        assert_eq!(asked.body[..], request[4..]);
+        let named = asked.related.unwrap().writer;
+        assert_eq!(named.0[..12], server.0[..12]);
+        assert_eq!(named.0[12..], [1, 2, 3, 3]);
+        let answer = origin(FASTDDS_VENDOR, asked.related);
+        let read = read_answer(&request, &answer);
+        assert_eq!(read, Some((asked.identity, request)));
     }
 
     #[test]

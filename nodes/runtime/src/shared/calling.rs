@@ -78,8 +78,8 @@ impl Client {
         &self.0.name
     }
 
-    /// Asks with little-endian CDR, encapsulation header first; the answer is CDR too. Servers over
-    /// rmw_fastrtps are not reached. A call that is dropped is over.
+    /// Asks with little-endian CDR, encapsulation header first; the answer is CDR too. Over Cyclone
+    /// DDS servers over rmw_fastrtps are not reached. A call that is dropped is over.
     pub fn call(
         &self,
         request: Vec<u8>,

@@ -1,0 +1,116 @@
+//! Nodes of ours seen by ROS 2 Jazzy: rclpy over the Fast DDS that comes with it.
+//!
+//! Over Cyclone DDS services do not reach it, as those of rmw_cyclonedds do not.
+
+use std::fs;
+use std::time::Duration;
+
+use lattice_msgs::cdr;
+use lattice_msgs::hash_of;
+use lattice_msgs::std_srvs::{Trigger, TriggerRequest, TriggerResponse};
+use lattice_runtime::Runtime;
+use lattice_runtime::env::{Network, TransportKind};
+use lattice_runtime::ros_args::RosArgs;
+use lattice_test::domain::TestDomain;
+use lattice_test::python::ros_python;
+use serde_json::{Value, json};
+
+use super::peer::{self, Nodes, params};
+
+const PATIENCE: Duration = Duration::from_secs(60);
+
+/// Calls of each server of the peer.
+const CALLS: usize = 20;
+
+/// Lengths of the answers of servers of the peer, which come in order.
+fn answers(domain: &TestDomain) -> Vec<usize> {
+    let args = RosArgs::parse(["--ros-args".to_owned()]).unwrap();
+    let runtime = Runtime::with_transport("asking", args, &domain.transport()).unwrap();
+    let node = runtime.node("asking").unwrap();
+    let mut lengths = Vec::new();
+    for name in ["/peer/short", "/peer/long"] {
+        let client = node.client::<Trigger>(name).unwrap();
+        for _ in 0..CALLS {
+            let request = cdr::to_vec(&TriggerRequest::default()).unwrap();
+            let answer = smol::block_on(client.call(request, PATIENCE)).unwrap();
+            let answer: TriggerResponse = cdr::from_slice(&answer).unwrap();
+            assert!(answer.success);
+            lengths.push(answer.message.len());
+        }
+    }
+    lengths
+}
+
+fn of_ros(python: &std::path::Path, scenario: &Value) -> Value {
+    let directory = tempfile::tempdir().unwrap();
+    let file = directory.path().join("scenario.json");
+    fs::write(&file, scenario.to_string()).unwrap();
+    peer::run(python, "rclpy_peer.py", &[&file])
+}
+
+#[test]
+fn rclpy_reads_and_changes_a_node_and_answers_ours() {
+    let Some(python) = ros_python() else { return };
+    if Network::from_env().unwrap().transport != TransportKind::RustDds {
+        return;
+    }
+    let domain = TestDomain::take();
+    let directory = tempfile::tempdir().unwrap();
+    let answered = directory.path().join("answered");
+    let cloud = "sensor_msgs/msg/PointCloud2";
+    let scenario = json!({
+        "domain": domain.id(),
+        "node": "lattice_mapper",
+        "set": {"max_cloud_points": 1234, "lattice": "bcc", "max_voxels": 0, "none": 1},
+        "changes": 1,
+        "type": [cloud, hash_of(cloud)],
+        "asked": 2 * CALLS,
+        "answered": answered,
+    });
+    let mapper = params("map_dir:=/tmp");
+    let nodes = Nodes::start(&domain, &[("lattice_mapper", mapper)]);
+    let found = std::thread::scope(|scope| {
+        let found = scope.spawn(|| of_ros(&python, &scenario));
+        let lengths = answers(&domain);
+        fs::write(&answered, "").unwrap();
+        let expected = [[10; CALLS], [5000; CALLS]].concat();
+        assert_eq!(lengths, expected);
+        found.join().unwrap()
+    });
+    nodes.finish();
+
+    let values = found["values"].as_object().unwrap();
+    assert!(values.len() > 50, "{values:?}");
+    assert_eq!(values["lattice"], "fcc");
+    assert_eq!(found["read_only"].as_object().unwrap().len(), values.len());
+    assert_eq!(found["read_only"]["lattice"], true);
+    let set = &found["set"];
+    assert_eq!(set["max_cloud_points"], Value::Null);
+    assert_eq!(
+        set["lattice"],
+        "parameter 'lattice' cannot be set because it is read-only: the map is made with it"
+    );
+    assert_eq!(
+        set["max_voxels"],
+        "Parameter {max_voxels} doesn't comply with integer range."
+    );
+    assert_eq!(
+        set["none"],
+        "parameter 'none' cannot be set because it was not declared"
+    );
+    assert_eq!(
+        found["events"],
+        json!([["/lattice_mapper", ["max_cloud_points"]]])
+    );
+    assert_eq!(found["type"], json!([true, 9]));
+    assert!(found["sources"].as_u64().unwrap() > 1000, "{found}");
+    assert_eq!(found["levels"], json!([["lattice_mapper", 0]]));
+    assert_eq!(found["reset"], true);
+    let topics = json!({"/map_centers": [cloud], "/map": ["lattice_msgs/msg/LatticeMap"]});
+    assert_eq!(found["topics"], topics);
+    assert_eq!(found["nodes"], json!(["asking", "lattice_mapper", "peer"]));
+    let services = found["services"].as_array().unwrap();
+    for name in ["clear_box", "query", "set_parameters"] {
+        assert!(services.contains(&json!(name)), "{name}: {services:?}");
+    }
+}
