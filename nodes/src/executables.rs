@@ -42,6 +42,12 @@ pub fn find(name: &str) -> Option<Start> {
     found.map(|(_, start)| *start)
 }
 
+/// Finds the reader of the parameters of an executable.
+pub fn reader_of(name: &str) -> Option<Declare> {
+    let found = PARAMETERS.iter().find(|(node, _)| *node == name);
+    found.map(|(_, declare)| *declare)
+}
+
 /// Runs one node until a signal stops it. `arguments` are those of the command line.
 pub fn run(
     name: &str,
@@ -49,13 +55,13 @@ pub fn run(
     arguments: impl IntoIterator<Item = String>,
 ) -> Result<(), NodeError> {
     let args = RosArgs::parse(arguments)?;
-    let declare = PARAMETERS.iter().find(|(node, _)| *node == name);
-    if answers_help(name, declare.map(|(_, declare)| *declare), &args) {
+    let declare = reader_of(name);
+    if answers_help(name, declare, &args) {
         return Ok(());
     }
     let runtime = start_runtime(name, args)?;
     let mut running = Running::default();
-    running.start(&runtime, name, start)?;
+    running.start(&runtime, name, start, declare)?;
     running.until_stopped(&runtime)
 }
 

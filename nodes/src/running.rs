@@ -2,8 +2,9 @@
 
 use lattice_runtime::Runtime;
 use lattice_runtime::lifecycle::{ChangeRequests, Lifecycle, Step};
+use lattice_runtime::params::Params;
 
-use crate::start::{Finish, NodeError, Servers, Start};
+use crate::start::{Declare, Finish, NodeError, Servers, Start};
 
 /// The nodes of a process, in the order in which data flows.
 #[derive(Default)]
@@ -16,6 +17,7 @@ pub struct Running {
 struct OneNode {
     name: String,
     start: Start,
+    declare: Option<Declare>,
     finish: Option<Finish>,
     /// Of a managed node.
     lifecycle: Option<Lifecycle>,
@@ -23,22 +25,37 @@ struct OneNode {
 
 impl Running {
     /// Starts a node; one whose parameter `managed` is true waits to be configured and activated.
-    pub fn start(&mut self, runtime: &Runtime, name: &str, start: Start) -> Result<(), NodeError> {
+    ///
+    /// Until then its parameters can be set, which `declare` reads.
+    pub fn start(
+        &mut self,
+        runtime: &Runtime,
+        name: &str,
+        start: Start,
+        declare: Option<Declare>,
+    ) -> Result<(), NodeError> {
         let node = runtime.node(name)?;
         let lifecycle = match node.params().bool("managed", false)? {
             true => Some(Lifecycle::serve(&node, self.nodes.len(), &self.requests)?),
             false => None,
         };
-        let finish = match lifecycle {
-            Some(_) => None,
-            None => Some(start(runtime, name)?),
-        };
-        self.nodes.push(OneNode {
+        let mut one = OneNode {
             name: name.to_owned(),
             start,
-            finish,
+            declare,
+            finish: None,
             lifecycle,
-        });
+        };
+        match one.lifecycle {
+            Some(_) => {
+                if let Some(Err(error)) = declare.map(|declare| declare(node.params())) {
+                    log::warn!("{name} cannot be configured until this is mended: {error}");
+                }
+                one.wait(runtime);
+            }
+            None => one.finish = Some(start(runtime, name)?),
+        }
+        self.nodes.push(one);
         Ok(())
     }
 
@@ -65,22 +82,46 @@ impl Running {
 }
 
 impl OneNode {
-    /// Ends the node if it is at work.
-    fn end(&mut self, runtime: &Runtime) -> Option<Servers> {
-        let finish = self.finish.take()?;
+    /// Lets parameters be set while the node is not configured: they are checked now and used then.
+    fn wait(&self, runtime: &Runtime) {
+        if let (Ok(node), Some(declare)) = (runtime.node(&self.name), self.declare) {
+            let check = move |wanted: &Params| declare(wanted).map_err(|error| error.to_string());
+            node.params().open(check);
+        }
+    }
+
+    /// Lets no parameters be set: what is being read or is to go does not change.
+    fn freeze(&self, runtime: &Runtime) {
         if let Ok(node) = runtime.node(&self.name) {
             node.params().close();
         }
+    }
+
+    /// Ends the node if it is at work.
+    fn end(&mut self, runtime: &Runtime) -> Option<Servers> {
+        let finish = self.finish.take()?;
+        self.freeze(runtime);
         Some(finish())
     }
 
     fn take(&mut self, runtime: &Runtime, step: Step) -> Result<(), String> {
         match step {
             Step::Configure => {
-                let started = (self.start)(runtime, &self.name);
-                self.finish = Some(started.map_err(|error| error.to_string())?);
+                self.freeze(runtime);
+                match (self.start)(runtime, &self.name) {
+                    Ok(finish) => self.finish = Some(finish),
+                    Err(error) => {
+                        self.wait(runtime);
+                        return Err(error.to_string());
+                    }
+                }
             }
-            Step::Cleanup | Step::Shutdown => {
+            Step::Cleanup => {
+                drop(self.end(runtime));
+                self.wait(runtime);
+            }
+            Step::Shutdown => {
+                self.freeze(runtime);
                 drop(self.end(runtime));
             }
             Step::Activate | Step::Deactivate => {}

@@ -35,7 +35,7 @@ CLASSES = {
 }
 ELEMENTS = {
     "launch": "",
-    "arg": "name default description",
+    "arg": "name default description value",
     "set_env": "name value",
     "include": "file",
     "node": "pkg exec name namespace output ros_args args respawn respawn_delay",
@@ -63,57 +63,78 @@ def install():
             setattr(sys.modules[module], name, stand_in(name, known.split()))
 
 
-def visit(value, found, declared, used):
+def visit(value, seen, bound):
     given = getattr(value, "given", {})
     match type(value).__name__:
         case "DeclareLaunchArgument":
-            declared.add(given["name"])
+            seen.declared.add(given["name"])
+            if given.get("default_value") is None:
+                seen.required.add(given["name"])
         case "LaunchConfiguration":
-            used.add(given["variable_name"])
+            seen.used.add(given["variable_name"])
+        case "IncludeLaunchDescription":
+            path = given["launch_description_source"].given["location"].given["substitutions"]
+            seen.follow(path[-1], dict(given.get("launch_arguments", [])))
         case "Node":
             assert given["package"] == "lattice_nodes"
-            found.append([given["executable"], given["name"]])
+            names = given["executable"], given["name"]
+            names = [bound.get(n.given["variable_name"]) if hasattr(n, "given") else n for n in names]
+            seen.nodes.append(names)
     parts = given if hasattr(value, "given") else value
     for part in parts.values() if isinstance(parts, dict) else parts:
         if hasattr(part, "given") or isinstance(part, (list, tuple, dict)):
-            visit(part, found, declared, used)
+            visit(part, seen, bound)
 
 
-def check_python(path):
-    space, found, declared, used = {}, [], set(), set()
-    exec(compile(path.read_text(), path, "exec"), space)
-    visit([space["generate_launch_description"]()], found, declared, used)
-    return found, declared, used
+class Seen:
+    """What a file starts, declares and uses, with the files that it includes."""
 
+    def __init__(self, path, bound):
+        self.path, self.nodes = path, []
+        self.declared, self.required, self.used = set(), set(), set()
+        if path.suffix == ".py":
+            space = {}
+            exec(compile(path.read_text(), path, "exec"), space)
+            visit([space["generate_launch_description"]()], self, bound)
+        else:
+            self.see_xml(bound)
+        assert self.used <= self.declared, f"{path}: {self.used - self.declared} is not declared"
 
-def check_xml(path):
-    found, declared, used = [], set(), set()
-    for element in ElementTree.parse(path).iter():
-        known = ELEMENTS[element.tag].split()
-        assert set(element.attrib) <= set(known), f"{path}: {element.tag} {element.attrib}"
-        if element.tag == "arg":
-            declared.add(element.attrib["name"])
-        for text in element.attrib.values():
-            used |= {part.split(")")[0] for part in text.split("$(var ")[1:]}
-        if element.tag == "node":
-            assert element.attrib["pkg"] == "lattice_nodes"
-            found.append([element.attrib["exec"], element.attrib["name"]])
-    return found, declared, used
+    def follow(self, name, bound):
+        other = Seen(self.path.parent / name, bound)
+        unknown, missing = set(bound) - other.declared, other.required - set(bound)
+        assert not unknown and not missing, f"{self.path}: {name} declares no {unknown}, needs {missing}"
+        self.nodes += other.nodes
+        self.declared |= other.declared
+
+    def see_xml(self, bound):
+        inner = set()
+        for element in ElementTree.parse(self.path).iter():
+            known = ELEMENTS[element.tag].split()
+            assert set(element.attrib) <= set(known), f"{self.path}: {element.tag} {element.attrib}"
+            for text in element.attrib.values():
+                self.used |= {part.split(")")[0] for part in text.split("$(var ")[1:]}
+            match element.tag:
+                case "arg" if element not in inner:
+                    assert "value" not in element.attrib, f"{self.path}: {element.attrib}"
+                    self.declared.add(element.attrib["name"])
+                    if "default" not in element.attrib:
+                        self.required.add(element.attrib["name"])
+                case "include":
+                    inner |= set(element)
+                    given = {arg.attrib["name"]: arg.attrib["value"] for arg in element}
+                    self.follow(element.attrib["file"].rsplit("/")[-1], given)
+                case "node":
+                    assert element.attrib["pkg"] == "lattice_nodes"
+                    names = [element.attrib["exec"], element.attrib["name"]]
+                    self.nodes.append([bound.get("node") if n == "$(var node)" else n for n in names])
 
 
 def main():
     install()
-    found, arguments = {}, {}
-    for path in sorted(Path(sys.argv[1]).iterdir()):
-        check = check_python if path.suffix == ".py" else check_xml
-        found[path.name], declared, used = check(path)
-        arguments[path.name] = declared, used
-    for name, (declared, used) in arguments.items():
-        # A file that includes another has its arguments too.
-        if name.startswith("replay"):
-            declared |= arguments[name.replace("replay", "mapping")][0]
-        assert used <= declared, f"{name}: {used - declared} is not declared"
-    print(json.dumps(found))
+    found = {path.name: Seen(path, {}).nodes for path in sorted(Path(sys.argv[1]).iterdir())}
+    # Those that are only included have no node of their own.
+    print(json.dumps({name: nodes for name, nodes in found.items() if [None, None] not in nodes}))
 
 
 main()

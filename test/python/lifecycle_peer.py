@@ -27,6 +27,7 @@ SERVICES = {
 
 
 FLOAT32 = 7
+INTEGER = 2
 
 
 def cloud(x):
@@ -45,6 +46,8 @@ class Manager:
             name: Calls(self.peer, f"{NODE}/{name}", *ros.service(f"lifecycle_msgs/srv/{kind}", *types))
             for name, (kind, *types) in SERVICES.items()
         }
+        for name in ("set_parameters", "get_parameters"):
+            self.calls[name] = Calls(self.peer, f"{NODE}/{name}", *ros.NODE_SERVICES[name])
         self.peer.until_matched()
         self.points = self.peer.writer("rt/points_enu", ros.PointCloud2, qos(5))
         self.peer.reader("rt/map", ros.LatticeMap, qos(500, latched=True), self.on_map)
@@ -66,6 +69,11 @@ class Manager:
 
     def transitions(self, name="get_available_transitions"):
         return [[t.transition.id, t.transition.label, t.goal_state.id] for t in self.ask(name)]
+
+    def set(self, name, integer):
+        value = ros.ParameterValue(INTEGER, False, integer, 0.0, "", [], [], [], [], [])
+        answer = self.ask("set_parameters", [ros.Parameter(name, value)])[0]
+        return [answer.successful, answer.reason]
 
     def goes(self, goal):
         """Waits for the event of a transition that has ended in this state."""
@@ -105,7 +113,9 @@ def main():
     # Latched once, for an inactive node.
     origin = manager.peer.writer("rt/map_origin", ros.GeoPointStamped, qos(1, latched=True))
     origin.write(ros.GeoPointStamped(header(0, "earth"), ros.GeoPoint(48.1, 11.5, 515.0)))
+    said["set"] = [manager.set("max_voxels", 1000), manager.set("max_map_bytes", 1)]
     said["configure"] = manager.change("configure")
+    said["used"] = manager.ask("get_parameters", ["max_voxels"])[0].integer_value
     said["inactive"] = manager.transitions()
     manager.meets_mapper()
     assert origin.wait_for_acks(duration(seconds=PATIENCE_S))
@@ -118,6 +128,7 @@ def main():
     said["origin"] = manager.info.has_origin and manager.info.origin.latitude
     said["deactivate"] = manager.change("deactivate")
     said["cleanup"] = manager.change("cleanup")
+    said["set again"] = manager.set("max_voxels", 2000)
     manager.peer.until(lambda: not manager.peer.matched["rt/map"], lambda: "the map is still there")
     said["again"] = [manager.change("configure"), manager.change("activate")]
     manager.meets_mapper()

@@ -106,7 +106,8 @@ impl Messages {
             let head = stream.next();
             let head_ns = match &head {
                 Some(Ok(message)) => message.log_time_ns,
-                Some(Err(_)) => i64::MAX,
+                // A file that begins with damage keeps its place; one of unknown time has been reached.
+                Some(Err(_)) => split.range_ns.map_or(i64::MIN, |(start_ns, _)| start_ns),
                 None => continue,
             };
             self.active.push(Active {

@@ -79,7 +79,7 @@ impl Run {
         runtime.node("lattice")?.params().open(|_| Ok(()));
         let mut running = Running::default();
         for (name, start) in nodes {
-            running.start(&runtime, name, *start)?;
+            running.start(&runtime, name, *start, executables::reader_of(name))?;
         }
         running.until_stopped(&runtime)
     }

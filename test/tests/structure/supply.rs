@@ -2,6 +2,7 @@
 //! `cargo deny`.
 
 use std::fs;
+use std::process::Command;
 
 use serde_json::Value;
 
@@ -67,5 +68,46 @@ fn licences_are_read_as_alternatives() {
         ("", false),
     ] {
         assert_eq!(is_met(expression, &allowed), met, "{expression}");
+    }
+}
+
+/// Runs `.ci/advisories` with a stand-in for cargo, which fails where its arguments are like `fails`.
+#[cfg(unix)]
+fn advisories(fails: &str, has_database: bool) -> (bool, String) {
+    use std::os::unix::fs::PermissionsExt;
+    let folder = tempfile::tempdir().unwrap();
+    let cargo = folder.path().join("cargo");
+    fs::write(
+        &cargo,
+        format!("#!/bin/sh\ncase \"$*\" in {fails}) exit 1;; esac\n"),
+    )
+    .unwrap();
+    fs::set_permissions(&cargo, fs::Permissions::from_mode(0o755)).unwrap();
+    if has_database {
+        fs::create_dir_all(folder.path().join("advisory-dbs/db")).unwrap();
+    }
+    let path = std::env::var("PATH").unwrap();
+    let output = Command::new(root().join(".ci/advisories"))
+        .env("PATH", format!("{}:{path}", folder.path().display()))
+        .env("CARGO_HOME", folder.path())
+        .output()
+        .unwrap();
+    let said = String::from_utf8_lossy(&output.stdout).into_owned();
+    (output.status.success(), said)
+}
+
+#[cfg(unix)]
+#[test]
+fn advisories_are_checked_where_there_is_a_database_and_offline_nothing_fails() {
+    for (fails, has_database, passes, words) in [
+        ("*--version", false, true, "no cargo deny"),
+        ("*fetch\\ db", false, true, "no database"),
+        ("*fetch\\ db", true, true, "last database"),
+        ("*fetch\\ db|*check*", true, false, "last database"),
+        ("*check*", false, false, "of today"),
+        ("nothing", false, true, "of today"),
+    ] {
+        let (passed, said) = advisories(fails, has_database);
+        assert!(passed == passes && said.contains(words), "{fails}: {said}");
     }
 }

@@ -289,6 +289,14 @@ fn only_bags_are_overwritten() {
         assert!(foreign.exists() && bag.join("metadata.yaml").exists());
         fs::remove_file(foreign).unwrap();
     }
+    let others = bag.join("years_of_work.db3");
+    fs::write(&others, "not of this bag").unwrap();
+    assert!(refused(&bag, true).contains("years_of_work.db3"));
+    fs::write(bag.join("metadata.yaml"), "not of a bag").unwrap();
+    assert!(refused(&bag, true).contains("no bag can be made out"));
+    fs::remove_file(bag.join("metadata.yaml")).unwrap();
+    refused(&bag, true);
+    assert!(others.exists() && bag.join("bag_0.db3").exists());
     let file = folder.path().join("file");
     fs::write(&file, "x").unwrap();
     refused(&file, true);

@@ -32,7 +32,7 @@ fn a_damaged_chunk_costs_its_messages_and_no_others() {
 fn cut_bags_of_either_storage_give_what_precedes_the_cut() {
     let folder = tempfile::tempdir().unwrap();
     for (storage, packing) in ALL {
-        let bag = folder.path().join("bag");
+        let bag = folder.path().join(format!("bag{storage:?}{packing:?}"));
         let written = write(&bag, storage, packing, 1000, 0);
         if packing == Packing::File {
             continue;
@@ -164,6 +164,31 @@ fn sound_chunks_behind_damage_are_found_without_an_index() {
         assert_eq!(sound.last(), written.last());
         assert_eq!(recovered.damages, 1, "{:?}", recovered.told);
     }
+}
+
+#[test]
+fn a_file_that_begins_with_damage_keeps_its_place() {
+    let folder = tempfile::tempdir().unwrap();
+    let (one, two) = (folder.path().join("one"), folder.path().join("two"));
+    write(&one, Storage::Mcap, Packing::None, 30, 0);
+    let later = write(&two, Storage::Mcap, Packing::None, 30, 100);
+    let bent = storage_file(&one);
+    let mut bytes = fs::read(&bent).unwrap();
+    let place = bytes.len() / 4;
+    bytes[place] ^= 0x10;
+    fs::write(&bent, &bytes).unwrap();
+    let second = storage_file(&two);
+    fs::copy(&second, one.join(second.file_name().unwrap())).unwrap();
+    fs::remove_file(one.join("metadata.yaml")).unwrap();
+    let options = ReadOptions {
+        past_damage: true,
+        ..ReadOptions::default()
+    };
+    let reader = BagReader::open(&one).unwrap();
+    let mut messages = reader.messages(&options).unwrap();
+    assert!(messages.next().unwrap().is_err(), "before what is later");
+    let behind: Vec<_> = messages.collect::<Result<_, _>>().unwrap();
+    assert_eq!(behind, later);
 }
 
 #[cfg(unix)]

@@ -4,7 +4,8 @@ use std::fs;
 use std::path::{Path, PathBuf};
 
 use crate::BagError;
-use crate::split_list::{is_storage, list};
+use crate::metadata::Metadata;
+use crate::split_list::list;
 
 /// Removes a bag at `path` if that is wanted; anything else there is kept and refused.
 pub(super) fn make_way(path: &Path, overwrite: bool) -> Result<(), BagError> {
@@ -12,8 +13,8 @@ pub(super) fn make_way(path: &Path, overwrite: bool) -> Result<(), BagError> {
     files.try_for_each(|file| fs::remove_file(&file).map_err(BagError::io(&file, "remove")))
 }
 
-/// Files of a bag at `path`, which one that is written there replaces. Refused where that is not wanted, or
-/// where something else is there but for the names `beside`.
+/// Files of a bag at `path` that its metadata name, which one that is written there replaces. Refused where
+/// that is not wanted, or where something else is there but for the names `beside`.
 pub fn replaceable(
     path: &Path,
     overwrite: bool,
@@ -32,11 +33,18 @@ pub fn replaceable(
     if !path.is_dir() {
         return refuse(" and is not a folder".into(), "");
     }
-    let endings = [".db3-wal", ".db3-shm", ".db3-journal"];
+    let listed = path.join("metadata.yaml");
+    let named = match listed.exists().then(|| Metadata::read(&listed)) {
+        None => Vec::new(),
+        Some(Ok(metadata)) => metadata.relative_file_paths,
+        Some(Err(error)) => {
+            return refuse(format!(" and no bag can be made out there ({error})"), "");
+        }
+    };
     let is_ours = |name: &str| {
-        name == "metadata.yaml"
-            || is_storage(name)
-            || endings.iter().any(|ending| name.ends_with(ending))
+        let endings = ["-wal", "-shm", "-journal"];
+        let of_file = endings.iter().find_map(|ending| name.strip_suffix(ending));
+        name == "metadata.yaml" || named.iter().any(|n| n == name || Some(&**n) == of_file)
     };
     let mut files = Vec::new();
     for entry in list(path)? {
@@ -45,7 +53,7 @@ pub fn replaceable(
             continue;
         }
         if !is_ours(&name) || file.is_dir() {
-            let why = format!(" and holds {name:?}, which is no part of a bag");
+            let why = format!(" and holds {name:?}, which no metadata.yaml there names");
             return refuse(why, "");
         }
         files.push(file);

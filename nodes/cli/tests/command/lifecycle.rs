@@ -58,6 +58,13 @@ fn a_managed_mapper_goes_through_the_states_of_rclcpp_lifecycle() {
         (&said["activate too early"], &said["unknown"]),
         (&refused, &refused)
     );
+    let fixed =
+        "parameter 'max_map_bytes' cannot be set because it is read-only: the map is made with it";
+    assert_eq!(said["set"], json!([[true, ""], [false, fixed]]));
+    assert_eq!(
+        (&said["used"], &said["set again"]),
+        (&json!(1000), &json!([true, ""]))
+    );
     let from_inactive = json!([[2, "cleanup", 11], [3, "activate", 13], [6, "shutdown", 12]]);
     assert_eq!(said["inactive"], from_inactive);
     for (step, state) in [
