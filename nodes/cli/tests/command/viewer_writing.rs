@@ -42,7 +42,7 @@ fn offered(url: &str) -> (Value, Vec<String>, Value) {
         .insert("Sec-WebSocket-Protocol", protocol);
     let (mut socket, _) = connect(request).unwrap();
     let call = [
-        &[2, 3, 0, 0, 0, 9, 0, 0, 0, 3, 0, 0, 0][..],
+        &[2, 4, 0, 0, 0, 9, 0, 0, 0, 3, 0, 0, 0][..],
         b"cdr",
         &[0, 1, 0, 0, 0],
     ];
@@ -75,11 +75,12 @@ fn without_leave_nothing_is_offered_that_changes_something() {
     let (capabilities, services, refused) = offered(&viewer.url);
     assert_eq!(
         (&refused["serviceId"], &refused["callId"]),
-        (&json!(3), &json!(9))
+        (&json!(4), &json!(9))
     );
     assert_eq!(capabilities, json!(["services"]));
     let reading = [
         "lattice_mapper/query",
+        "lattice_mapper/plan_path",
         "bag_player/is_paused",
         "bag_player/get_rate",
     ];
@@ -141,7 +142,7 @@ fn in_the_box(map: &str) -> Vec<String> {
 }
 
 /// A map, and parameters of nodes that may be written to.
-fn site(folder: &Path) -> (String, String) {
+pub fn site(folder: &Path) -> (String, String) {
     let map = map_of(&scene(folder, 5.0), "fcc");
     let params = params(folder, &map, true);
     (map, params)
