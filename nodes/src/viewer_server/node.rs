@@ -65,7 +65,7 @@ pub fn start(runtime: &Runtime, name: &str) -> Result<Finish, NodeError> {
     hub.channel::<LatticeMapUpdate>(&node.resolve("map_updates")?, Class::Updates, false);
     let one = Class::Newest { depth: 1 };
     let fixed_channel = hub.channel::<TFMessage>(&node.resolve("/tf_static")?, one, true);
-    hub.set_bridge(Box::new(NodeBridge::new(&node, &reach)?));
+    hub.set_bridge(Box::new(NodeBridge::new(&node, &reach, &hub)?));
     let gate = viewer.gate()?;
     let losses = Losses::default();
     let lost = Arc::new(AtomicU64::new(0));
