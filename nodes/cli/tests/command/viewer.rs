@@ -258,3 +258,26 @@ fn the_map_that_grows_in_a_demo_is_at_its_end_the_mappers() {
     assert_eq!(shown(&mut page), keys(&map));
     assert_eq!(page.value("lattice.state.problems"), json!([]));
 }
+
+#[test]
+fn a_token_is_told_to_the_terminal_and_to_no_log() {
+    let folder = tempfile::tempdir().unwrap();
+    let domain = LoopbackDomain::take().unwrap();
+    let mut command = Command::new(env!("CARGO_BIN_EXE_lattice"));
+    let arguments = ["view", "--address", "0.0.0.0", "--port", "0"];
+    command
+        .args(arguments)
+        .env("ROS_DOMAIN_ID", domain.id().to_string())
+        .env("ROS_AUTOMATIC_DISCOVERY_RANGE", "LOCALHOST")
+        .env("ROS_LOG_DIR", folder.path());
+    let viewer = Viewer::run(&mut command);
+    let (_, token) = viewer.url.split_once("?token=").unwrap();
+    assert_eq!(token.len(), 32);
+    // Its log file is there by now: the line on the token comes before that on the address.
+    let files = std::fs::read_dir(folder.path()).unwrap();
+    let logs: Vec<String> = files
+        .map(|file| std::fs::read_to_string(file.unwrap().path()).unwrap())
+        .collect();
+    assert!(logs.concat().contains("a token"), "{logs:?}");
+    assert!(!logs.concat().contains(token), "{logs:?}");
+}
