@@ -21,6 +21,7 @@ services! {
     LoadMap: LoadMapRequest [], LoadMapResponse [];
     ClearBox: ClearBoxRequest [Point], ClearBoxResponse [];
     QueryMap: QueryMapRequest [Point], QueryMapResponse [Point];
+    PlanPath: PlanPathRequest [Point], PlanPathResponse [Point];
 }
 
 /// Lattice of a map, and its place.
@@ -228,4 +229,34 @@ pub struct QueryMapResponse {
     pub nearest: Point,
     /// Distance to this centre, m.
     pub nearest_distance_m: f64,
+}
+
+/// Asks for the shortest path of a ball that touches no occupied cell of the map.
+#[derive(Clone, Copy, Debug)]
+pub struct PlanPath;
+
+/// Request of [`PlanPath`].
+#[derive(Clone, Debug, Default, PartialEq, Serialize, Deserialize)]
+pub struct PlanPathRequest {
+    /// In the map frame, m.
+    pub start: Point,
+    /// In the map frame, m.
+    pub goal: Point,
+    /// Radius of the ball, m.
+    pub radius_m: f64,
+    /// Distance that an end may move to where the ball fits, m.
+    pub tolerance_m: f64,
+}
+
+/// Response of [`PlanPath`].
+#[derive(Clone, Debug, Default, PartialEq, Serialize, Deserialize)]
+pub struct PlanPathResponse {
+    /// False: no path, the message says why.
+    pub success: bool,
+    /// Explanation of the outcome.
+    pub message: String,
+    /// Length of the path, m.
+    pub length_m: f64,
+    /// Centres of its cells, from start to goal, in the map frame, m.
+    pub path: Vec<Point>,
 }

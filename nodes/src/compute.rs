@@ -4,7 +4,7 @@
 
 use std::io;
 use std::sync::Arc;
-use std::sync::atomic::{AtomicU64, AtomicUsize, Ordering};
+use std::sync::atomic::{AtomicBool, AtomicU64, AtomicUsize, Ordering};
 use std::thread::{self, JoinHandle};
 
 use crossbeam_channel::{Sender, bounded};
@@ -26,10 +26,11 @@ pub struct ComputeLimits {
 /// An event with its bytes; `None` ends the work.
 type Item<E> = Option<(E, usize)>;
 
-/// Runs a handler on its own thread until it is finished.
+/// Runs a handler on its own thread until it is finished, or dropped: then without what waits.
 pub struct Compute<E> {
     inbox: Inbox<E>,
-    thread: JoinHandle<()>,
+    thread: Option<JoinHandle<()>>,
+    dropped: Arc<AtomicBool>,
 }
 
 /// The entrance to a compute thread.
@@ -72,11 +73,16 @@ impl<E: Send + 'static> Compute<E> {
         let (sender, receiver) = bounded::<Item<E>>(limits.events.max(1));
         let bytes = Arc::new(AtomicUsize::new(0));
         let in_flight = Arc::clone(&bytes);
+        let dropped = Arc::new(AtomicBool::new(false));
+        let stop = Arc::clone(&dropped);
         let thread = thread::Builder::new()
             .name(format!("{name} compute"))
             .spawn(move || {
                 guarded("compute", &shutdown, || {
                     while let Ok(Some((event, size))) = receiver.recv() {
+                        if stop.load(Ordering::Acquire) {
+                            break;
+                        }
                         pool.install(|| handler(event));
                         in_flight.fetch_sub(size, Ordering::Relaxed);
                     }
@@ -88,7 +94,8 @@ impl<E: Send + 'static> Compute<E> {
                 bytes,
                 max_bytes: limits.bytes,
             },
-            thread,
+            thread: Some(thread),
+            dropped,
         })
     }
 
@@ -98,14 +105,26 @@ impl<E: Send + 'static> Compute<E> {
     }
 
     /// Lets the handler work off what is in the inbox and a last event, then ends the thread.
-    pub fn finish_with(self, last: E) {
+    pub fn finish_with(mut self, last: E) {
         // Waits for room where readers could not: nobody reads any more.
         let sender = &self.inbox.sender;
         let sent = sender
             .send(Some((last, 0)))
             .and_then(|()| sender.send(None));
-        if sent.is_err() | self.thread.join().is_err() {
+        let ended = self.thread.take().map(JoinHandle::join);
+        if sent.is_err() | ended.is_some_and(|ended| ended.is_err()) {
             log::error!("a compute thread panicked; its last results are lost");
+        }
+    }
+}
+
+impl<E> Drop for Compute<E> {
+    /// Ends the thread of a node that did not come to start, whoever holds its inbox.
+    fn drop(&mut self) {
+        if self.thread.is_some() {
+            self.dropped.store(true, Ordering::Release);
+            // Where there is no room, the next event ends it.
+            let _ = self.inbox.sender.try_send(None);
         }
     }
 }
@@ -170,6 +189,23 @@ mod tests {
         sent.push(100);
         assert_eq!(results.into_iter().collect::<Vec<_>>(), sent);
         assert!(!inbox.send(7, 1), "an ended worker takes nothing");
+    }
+
+    #[test]
+    fn a_dropped_worker_ends_though_its_inbox_is_held_and_full() {
+        for waiting in 0..4 {
+            let (_alive, ended) = unbounded::<()>();
+            let (go, wait) = unbounded::<()>();
+            let worker = Compute::spawn("test", LIMITS, Shutdown::default(), move |_: u32| {
+                let _ = (&_alive, wait.recv());
+            });
+            let worker = worker.unwrap();
+            let inbox = worker.inbox();
+            (0..waiting).for_each(|i| _ = inbox.send(i, 0));
+            drop(worker);
+            drop(go);
+            assert!(ended.recv().is_err(), "the handler is gone");
+        }
     }
 
     #[test]

@@ -122,6 +122,7 @@ export class Drawing {
     this.drawClouds(seen);
     if (state.shown.robot && state.robot) this.drawRobot();
     if (state.shown.headset && state.headset) drawHeadset(gl, scene, state.headset, colourOf);
+    this.planning.draw(gl, scene);
     if (state.measured.length === 2) {
       gl.disable(gl.DEPTH_TEST);
       scene.set("measured", [0, 0, 0, ...sub(state.measured[1], state.measured[0])]);

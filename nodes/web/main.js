@@ -7,6 +7,7 @@ import * as headset from "./headset.js";
 import { placeIndex } from "./keys.js";
 import { add, length, rotate, sub } from "./math.js";
 import * as panel from "./panel.js";
+import { Planning } from "./planning.js";
 import { Player } from "./player.js";
 import { watchKeys, watchPointer } from "./pointer.js";
 import { CellRenderer } from "./renderer.js";
@@ -43,6 +44,7 @@ const writing = new Writing(services, worker, state);
 const player = new Player(services, writing);
 const drawing = new Drawing({ gl, canvas, camera, cells, free, scene, state });
 const redraw = () => drawing.redraw();
+const planning = drawing.planning = new Planning({ services, camera, state, redraw });
 
 // --- What comes from the worker.
 
@@ -64,6 +66,7 @@ const handlers = {
   lattice({ info, frame }) {
     Object.assign(state, { lattice: info, frame, size: 0, complete: false, chosen: null, measured: [], path: [] });
     state.labels.clear();
+    planning.turn(false);
     cells.setLattice(info);
     chooseColour();
     panel.showCell(null);
@@ -119,6 +122,7 @@ const handlers = {
   services({ services: offered }) {
     services.offered = offered;
     writing.offered();
+    planning.offered();
     player.look();
   },
   answer: (message) => services.answered(message),
@@ -232,6 +236,7 @@ function pick(x, y) {
   const centre = cells.centre(found.tile, placeIndex(found.place));
   state.chosen = { ...found, centre };
   if (state.measuring) state.measured = state.measured.length === 1 ? [state.measured[0], centre] : [centre];
+  planning.picked(centre);
   worker.postMessage({ type: "cell", ...found, request: centre });
   redraw();
   return found;
@@ -360,7 +365,7 @@ redraw();
 
 // For tests: what is shown, in figures.
 window.lattice = {
-  state, camera, cells, free, player, pick, frame: () => drawing.drawNow(),
+  state, camera, cells, free, planning, player, pick, frame: () => drawing.drawNow(),
   keys: () => new Promise((resolve) => {
     const take = ({ data }) => {
       if (data.type !== "keys") return;

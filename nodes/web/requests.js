@@ -27,6 +27,7 @@ export const requests = {
     return new Uint8Array([...cdr(["u", text.length + 1]), ...text, 0]);
   },
   query: (point) => points(point),
+  plan: (start, goal, radius, tolerance) => points(start, goal, [radius, tolerance]),
   setRate: (rate) => cdr(["d", rate]),
   seek: (time) => cdr(["i", Math.floor(time)], ["u", Math.floor((time % 1) * 1e9)]),
 };
@@ -43,6 +44,12 @@ export function queried(bytes) {
   const r = new Reader(bytes);
   const answer = { success: r.bool(), message: r.string(), occupied: r.bool(), points: r.u32(), hasNearest: r.bool() };
   return Object.assign(answer, { clearance: r.f64(), nearest: r.f64s(3), distance: r.f64() });
+}
+
+export function planned(bytes) {
+  const r = new Reader(bytes);
+  const answer = { success: r.bool(), message: r.string(), length: r.f64() };
+  return Object.assign(answer, { path: r.list(() => r.f64s(3), 24) });
 }
 
 export const said = (bytes) => new Reader(bytes).bool();

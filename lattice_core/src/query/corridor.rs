@@ -29,11 +29,7 @@ impl Corridor {
         let covering_m = lattice.covering_radius_m();
         // Cells are within a covering radius of the ball; see below for the slack.
         let reach_m = radius_m + 1.001 * covering_m;
-        let volume = 4.0 / 3.0 * std::f64::consts::PI * reach_m.powi(3);
-        let cells = volume / lattice.cell_volume_m3();
-        if cells.is_nan() || cells > MAX_ROBOT_CELLS as f64 {
-            return Err(PathError::Radius { radius_m, cells });
-        }
+        check_size(lattice, radius_m, reach_m)?;
         // Contact blocks; the slack makes that independent of rounding.
         let blocked_m = radius_m + 1e-9 * covering_m;
         let touching = |line: &Segment, reach_m: f64| -> Vec<LatticeIndex> {
@@ -72,6 +68,16 @@ impl Corridor {
         })
     }
 
+    /// Cells with their centres within a distance of that of cell 0, nearest first.
+    pub(super) fn ball_cells(
+        lattice: &Lattice,
+        radius_m: f64,
+    ) -> Result<Vec<LatticeIndex>, PathError> {
+        check_size(lattice, radius_m, radius_m)?;
+        let steps = steps_within(lattice, radius_m);
+        Ok(steps.into_iter().map(|step| step.by).collect())
+    }
+
     /// True if the ball fits in the middle of a cell.
     pub(super) fn is_clear(&self, store: &impl VoxelStore, w: LatticeIndex) -> bool {
         none_occupied(store, w, &self.at)
@@ -87,6 +93,15 @@ impl Corridor {
         let between = self.between.get(step);
         between.is_some_and(|between| none_occupied(store, w, between))
     }
+}
+
+fn check_size(lattice: &Lattice, radius_m: f64, reach_m: f64) -> Result<(), PathError> {
+    let volume = 4.0 / 3.0 * std::f64::consts::PI * reach_m.powi(3);
+    let cells = volume / lattice.cell_volume_m3();
+    if cells.is_nan() || cells > MAX_ROBOT_CELLS as f64 {
+        return Err(PathError::Radius { radius_m, cells });
+    }
+    Ok(())
 }
 
 fn none_occupied(store: &impl VoxelStore, w: LatticeIndex, around: &[LatticeIndex]) -> bool {

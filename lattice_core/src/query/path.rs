@@ -129,6 +129,18 @@ impl<S: VoxelStore> Query<'_, S> {
         goal_m: &Vector3<f64>,
         options: &PathOptions,
     ) -> Result<Path, PathError> {
+        self.shortest_path_while(start_m, goal_m, options, || true)
+    }
+
+    /// As [`Query::shortest_path`]; gives up as at the limit of cells once `go_on` says no, which is
+    /// asked before each cell that is looked around from.
+    pub fn shortest_path_while(
+        &self,
+        start_m: &Vector3<f64>,
+        goal_m: &Vector3<f64>,
+        options: &PathOptions,
+        mut go_on: impl FnMut() -> bool,
+    ) -> Result<Path, PathError> {
         super::error::check_distance(options.radius_m)?;
         if let Some(bounds) = &options.bounds {
             bounds.check()?;
@@ -193,7 +205,7 @@ impl<S: VoxelStore> Query<'_, S> {
             if at == goal {
                 return Ok(self.path_to(goal, reached.length_m, &cells, expanded));
             }
-            if expanded == options.max_expanded {
+            if expanded == options.max_expanded || !go_on() {
                 return Err(PathError::Limit { expanded });
             }
             expanded += 1;
@@ -222,6 +234,29 @@ impl<S: VoxelStore> Query<'_, S> {
             }
         }
         Err(PathError::NoPath { expanded })
+    }
+
+    /// Centre (map frame) of the cell in whose middle a ball fits and that is nearest to that of the
+    /// point, at most `within_m` from it; `None` if there is none.
+    pub fn nearest_passable(
+        &self,
+        point_m: &Vector3<f64>,
+        radius_m: f64,
+        within_m: f64,
+    ) -> Result<Option<Vector3<f64>>, PathError> {
+        super::error::check_distance(radius_m)?;
+        super::error::check_distance(within_m)?;
+        let _ = self.local(point_m)?;
+        let lattice = self.store.lattice();
+        let corridor = Corridor::new(lattice, radius_m, &[])?;
+        let around = Corridor::ball_cells(lattice, within_m)?;
+        let Some(key) = self.store.key_of(point_m) else {
+            return Ok(None);
+        };
+        let cells = around.iter().map(|&by| add(key.unpack(), by));
+        let open = cells.filter(|&w| corridor.is_clear(self.store, w));
+        let mut keys = open.filter_map(MortonKey::pack);
+        Ok(keys.next().map(|key| self.store.center_m(key)))
     }
 
     /// Takes corners out of a path where a straight line keeps a ball clear of occupied cells;

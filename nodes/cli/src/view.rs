@@ -29,13 +29,14 @@ pub struct View {
 impl View {
     /// Runs the command.
     pub fn run(self) -> CliResult {
-        let is_yaml = |path: &PathBuf| path.extension().is_some_and(|ending| ending == "yaml");
         match self.what.as_slice() {
-            [one] if !is_yaml(one) => show(one, SocketAddr::new(self.address, self.port)),
+            [one] if kind(one) != Kind::Params => {
+                show(one, SocketAddr::new(self.address, self.port))
+            }
             files => {
-                if let Some(other) = files.iter().find(|file| !is_yaml(file)) {
+                if let Some(other) = files.iter().find(|file| kind(file) != Kind::Params) {
                     let other = other.display();
-                    return Err(format!("{other}: one map, one log, or parameter files").into());
+                    return Err(format!("{other}: give one map, one log, or {PARAMS}").into());
                 }
                 self.live()
             }
@@ -57,6 +58,27 @@ impl View {
     }
 }
 
+/// Kind of what is shown.
+#[derive(PartialEq)]
+enum Kind {
+    Map,
+    Log,
+    Params,
+}
+
+const PARAMS: &str = "parameter files (.yaml, .yml)";
+
+/// The kind that a name tells; what else it is, is taken for a map.
+fn kind(path: &Path) -> Kind {
+    let ending = path.extension().and_then(|ending| ending.to_str());
+    match ending.map(str::to_ascii_lowercase).as_deref() {
+        _ if path.is_dir() || path.ends_with("metadata.yaml") => Kind::Log,
+        Some("mcap" | "db3" | "zstd" | "zst") => Kind::Log,
+        Some("yaml" | "yml") => Kind::Params,
+        _ => Kind::Map,
+    }
+}
+
 /// Shows a map file, or the map of a log, until the process is ended.
 fn show(path: &Path, address: SocketAddr) -> CliResult {
     #[cfg(feature = "bags")]
@@ -64,12 +86,12 @@ fn show(path: &Path, address: SocketAddr) -> CliResult {
     #[cfg(feature = "bags")]
     let mapped = folder.path().join("map.lattice");
     #[cfg(feature = "bags")]
-    let path = match is_log(path) {
-        true => {
+    let path = match kind(path) {
+        Kind::Log => {
             crate::replay::Replay::of_log(path, &mapped).replay()?;
             &mapped
         }
-        false => path,
+        _ => path,
     };
     let (_server, url) = serve_file(path, address)?;
     // The map is in memory; only a signal ends this process.
@@ -83,16 +105,13 @@ fn show(path: &Path, address: SocketAddr) -> CliResult {
 
 /// Serves a map file; gives the server and the address to open.
 pub fn serve_file(path: &Path, address: SocketAddr) -> CliResult<(viewer_server::Server, String)> {
-    let (map, _) = crate::map::read(path)?;
+    let (map, _) = crate::map::read(path).map_err(|error| {
+        let logs = "a log (a rosbag2 folder, .mcap, .db3, each also as .zstd)";
+        format!("{error}; what is shown is a map (.lattice), {logs}, or {PARAMS}")
+    })?;
     let options = ViewerOptions {
         address,
         ..ViewerOptions::default()
     };
     Ok(viewer_server::serve(&map.into_list(usize::MAX), &options)?)
-}
-
-#[cfg(feature = "bags")]
-fn is_log(path: &Path) -> bool {
-    let ending = path.extension().and_then(|ending| ending.to_str());
-    path.is_dir() || matches!(ending, Some("mcap" | "db3"))
 }

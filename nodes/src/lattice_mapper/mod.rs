@@ -14,6 +14,7 @@ mod operations;
 mod options;
 mod outputs;
 mod parameters;
+mod plan;
 mod refusal;
 mod report;
 mod services;

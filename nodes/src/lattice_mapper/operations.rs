@@ -153,6 +153,6 @@ impl LatticeMapper {
     }
 }
 
-fn vector(point: &Point) -> Vector3<f64> {
+pub(super) fn vector(point: &Point) -> Vector3<f64> {
     Vector3::new(point.x, point.y, point.z)
 }

@@ -8,18 +8,20 @@ use lattice_core::voxels::file::MapContents;
 use lattice_msgs::RosService;
 use lattice_msgs::lattice::{
     ClearBox, ClearBoxRequest, ClearBoxResponse, LoadMap, LoadMapRequest, LoadMapResponse,
-    QueryMap, QueryMapRequest, QueryMapResponse, SaveMap, SaveMapRequest, SaveMapResponse,
+    PlanPath, PlanPathRequest, PlanPathResponse, QueryMap, QueryMapRequest, QueryMapResponse,
+    SaveMap, SaveMapRequest, SaveMapResponse,
 };
 
 use lattice_msgs::octomap_msgs::BoundingBoxQueryResponse;
 
 use super::LatticeMapper;
 use super::map_folder::MapFolder;
+use super::plan::{self, Planner};
 use crate::compute::Inbox;
 use crate::start::NodeError;
 use lattice_runtime::{Node, Reply, Server};
 
-const BUSY: &str = "busy, ask again";
+pub(super) const BUSY: &str = "busy, ask again";
 
 /// A request that the compute thread answers.
 pub(super) enum Call {
@@ -29,6 +31,8 @@ pub(super) enum Call {
     ClearBox(ClearBoxRequest, Reply<ClearBoxResponse>),
     ClearBoundingBox(ClearBoxRequest, Reply<BoundingBoxQueryResponse>),
     Query(QueryMapRequest, Reply<QueryMapResponse>),
+    /// With the planner, which has been taken.
+    Plan(PlanPathRequest, Reply<PlanPathResponse>, Arc<Planner>),
 }
 
 /// Serves all calls; `wrap` makes an event of one.
@@ -38,7 +42,7 @@ pub(super) fn serve<E: Send + 'static>(
     wrap: fn(Call) -> E,
     maps: MapFolder,
     max_voxels: Arc<AtomicUsize>,
-) -> Result<[Server; 4], NodeError> {
+) -> Result<[Server; 5], NodeError> {
     let to = inbox.clone();
     let load = node.service_later::<LoadMap>("~/load_map", move |request, reply| {
         let (to, late, maps) = (to.clone(), reply.clone(), maps.clone());
@@ -55,6 +59,16 @@ pub(super) fn serve<E: Send + 'static>(
     let save = move |request, reply| wrap(Call::Save(request, reply));
     let clear_box = move |request, reply| wrap(Call::ClearBox(request, reply));
     let query = move |request, reply| wrap(Call::Query(request, reply));
+    let (to, planner) = (inbox.clone(), Arc::new(Planner::default()));
+    let plan = node.service_later::<PlanPath>("~/plan_path", move |request, reply| {
+        let late = reply.clone();
+        if !planner.take() {
+            late.send(plan::busy());
+        } else if !to.send(wrap(Call::Plan(request, reply, Arc::clone(&planner))), 0) {
+            planner.free();
+            late.send(plan::failed(BUSY));
+        }
+    })?;
     Ok([
         ask::<SaveMap, E>(node, "~/save_map", inbox, save, save_failed)?,
         load,
@@ -68,6 +82,7 @@ pub(super) fn serve<E: Send + 'static>(
             message,
             ..Default::default()
         })?,
+        plan,
     ])
 }
 
@@ -136,11 +151,15 @@ pub(super) fn answer(
             reply.send(BoundingBoxQueryResponse::default());
         }
         Call::Query(request, reply) => reply.send(machine.query(&request)),
+        Call::Plan(request, reply, planner) => planner.begin(machine, request, reply),
     }
     done
 }
 
-fn spawn(name: &str, work: impl FnOnce() + Send + 'static) -> std::io::Result<JoinHandle<()>> {
+pub(super) fn spawn(
+    name: &str,
+    work: impl FnOnce() + Send + 'static,
+) -> std::io::Result<JoinHandle<()>> {
     thread::Builder::new().name(name.to_owned()).spawn(work)
 }
 

@@ -138,6 +138,7 @@ async fn talk(
                     hub.subscribe(id, wish.id, wish.channel_id);
                 }
             }
+            Step::Watch(names, watch) => hub.watch(id, names, watch),
             Step::Unsubscribe(subscriptions) => hub.unsubscribe(id, &subscriptions),
             Step::Ask(ask) => match hub.bridge() {
                 Some(bridge) => asked.push(bridge.ask(ask)),

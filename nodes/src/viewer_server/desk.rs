@@ -37,6 +37,7 @@ impl Offer {
         [
             ("services", !self.services.is_empty()),
             ("parameters", self.parameters),
+            ("parametersSubscribe", self.parameters),
             ("clientPublish", !self.topics.is_empty()),
         ]
         .into_iter()
@@ -72,6 +73,8 @@ pub enum Step {
     Subscribe(Vec<Wish>),
     /// It wants them no more.
     Unsubscribe(Vec<u32>),
+    /// It wants to hear of changes of these parameters, none for all, or does no longer.
+    Watch(Vec<String>, bool),
     /// Something is to be asked for.
     Ask(Ask),
     /// A text for the client.
@@ -112,6 +115,16 @@ impl<'a> Desk<'a> {
             }) if self.offer.parameters => self.ask(Ask::GetParameters(parameter_names, id)),
             Ok(ClientMessage::SetParameters { parameters, id }) if self.offer.parameters => {
                 self.ask(Ask::SetParameters(parameters, id))
+            }
+            Ok(ClientMessage::SubscribeParameterUpdates { parameter_names })
+                if self.offer.parameters =>
+            {
+                Step::Watch(parameter_names, true)
+            }
+            Ok(ClientMessage::UnsubscribeParameterUpdates { parameter_names })
+                if self.offer.parameters =>
+            {
+                Step::Watch(parameter_names, false)
             }
             Ok(ClientMessage::Advertise { channels }) if !self.offer.topics.is_empty() => {
                 self.advertise(&channels)
@@ -238,6 +251,7 @@ mod tests {
         [&bytes, encoding, &[0, 1, 0, 0, 0]].concat()
     }
 
+    const WATCH: &str = r#"{"op":"subscribeParameterUpdates","parameterNames":["/a.b"]}"#;
     const ADVERTISE: &str = r#"{"op":"advertise","channels":[{"id":3,"topic":"/goal_pose","encoding":"cdr","schemaName":"geometry_msgs/msg/PoseStamped"}]}"#;
 
     #[test]
@@ -247,6 +261,7 @@ mod tests {
         let mut desk = Desk::new(&offer);
         for text in [
             ADVERTISE,
+            WATCH,
             r#"{"op":"getParameters","parameterNames":[]}"#,
             r#"{"op":"setParameters","parameters":[{"name":"/a.b","value":1}]}"#,
         ] {
@@ -268,6 +283,12 @@ mod tests {
             };
             assert!(text.contains("serviceCallFailure") && text.contains("\"callId\":7"));
         }
+        let names = vec!["/a.b".to_owned()];
+        assert_eq!(desk.text(WATCH), Step::Watch(names.clone(), true));
+        let unwatch = WATCH.replace("subscribe", "unsubscribe");
+        assert_eq!(desk.text(&unwatch), Step::Watch(names, false));
+        let all = r#"{"op":"subscribeParameterUpdates"}"#;
+        assert_eq!(desk.text(all), Step::Watch(Vec::new(), true));
         assert_eq!(desk.text(ADVERTISE), Step::Done);
         assert!(matches!(desk.text(ADVERTISE), Step::Tell(_)), "twice");
         let other = ADVERTISE
@@ -299,7 +320,7 @@ mod tests {
         fn mutated_messages_do_not_panic(changes in prop::collection::vec((0..200usize, any::<u8>()), 0..8), cut in 0..200usize) {
             let offer = offer();
             let mut desk = Desk::new(&offer);
-            for seed in [ADVERTISE.as_bytes(), &call(0, b"cdr")] {
+            for seed in [ADVERTISE.as_bytes(), WATCH.as_bytes(), &call(0, b"cdr")] {
                 let mut bytes = seed.to_vec();
                 for (at, byte) in &changes {
                     let at = at % bytes.len();

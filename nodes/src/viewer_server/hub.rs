@@ -13,7 +13,8 @@ use super::bridge::Bridge;
 use super::desk::Offer;
 use super::map_stream::{Entry, MapStream};
 use super::outbox::{Class, Outbox, Outgoing};
-use super::protocol::{self, Advertised};
+use super::protocol::{self, Advertised, Value};
+use super::watched::Watched;
 
 /// Most bytes of updates of the map that are kept for clients that are behind.
 const MAX_UPDATE_BYTES: usize = 8 << 20;
@@ -49,6 +50,7 @@ struct Channel {
 struct Client {
     outbox: Outbox,
     wake: Sender<()>,
+    watched: Watched,
     /// True after it has taken all that there was.
     idle: bool,
 }
@@ -229,8 +231,13 @@ impl Hub {
         let id = inner.next_client;
         inner.next_client += 1;
         inner.counts.clients_in += 1;
-        let idle = false;
-        inner.clients.insert(id, Client { outbox, wake, idle });
+        let client = Client {
+            outbox,
+            wake,
+            watched: Watched::default(),
+            idle: false,
+        };
+        inner.clients.insert(id, client);
         Some((id, woken))
     }
 
@@ -275,6 +282,29 @@ impl Hub {
     pub fn tell(&self, id: u64, message: Outgoing) {
         if let Some(client) = lock(&self.inner).clients.get_mut(&id) {
             client.outbox.answer(message);
+        }
+    }
+
+    /// Tells a client of changes of these parameters, none for all, or does no longer.
+    pub fn watch(&self, id: u64, names: Vec<String>, watch: bool) {
+        if let Some(client) = lock(&self.inner).clients.get_mut(&id)
+            && !client.watched.change(names, watch)
+        {
+            let problem = "too many names of parameters; none is watched now";
+            client.outbox.control(protocol::status(problem));
+        }
+    }
+
+    /// Tells of parameters that have changed to who watches them.
+    pub fn parameters_changed(&self, values: &[Value]) {
+        for client in lock(&self.inner).clients.values_mut() {
+            let wanted = values.iter().filter(|of| client.watched.wants(&of.name));
+            let wanted: Vec<&Value> = wanted.collect();
+            if !wanted.is_empty() {
+                let told = protocol::parameter_values(&wanted, None);
+                client.outbox.control(told);
+                client.wake();
+            }
         }
     }
 

@@ -18,6 +18,7 @@ mod parameters;
 mod protocol;
 mod server;
 mod sources;
+mod watched;
 
 pub use bridge::Bridge;
 pub use desk::{Ask, Desk, Offer, OpenTopic, Step};

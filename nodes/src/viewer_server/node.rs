@@ -1,5 +1,6 @@
 //! The viewer server as a ROS node: subscriptions, the server's thread, and what is between.
 
+use std::io::Write;
 use std::sync::Arc;
 use std::sync::atomic::{AtomicU64, Ordering};
 use std::time::Duration;
@@ -65,7 +66,7 @@ pub fn start(runtime: &Runtime, name: &str) -> Result<Finish, NodeError> {
     hub.channel::<LatticeMapUpdate>(&node.resolve("map_updates")?, Class::Updates, false);
     let one = Class::Newest { depth: 1 };
     let fixed_channel = hub.channel::<TFMessage>(&node.resolve("/tf_static")?, one, true);
-    hub.set_bridge(Box::new(NodeBridge::new(&node, &reach)?));
+    hub.set_bridge(Box::new(NodeBridge::new(&node, &reach, &hub)?));
     let gate = viewer.gate()?;
     let losses = Losses::default();
     let lost = Arc::new(AtomicU64::new(0));
@@ -96,9 +97,8 @@ pub fn start(runtime: &Runtime, name: &str) -> Result<Finish, NodeError> {
     let inbox = compute.inbox();
     let _ = give.send(Sources::new(&node, &hub, &viewer, &inbox)?);
     // Who listens comes after the channels: the list of them is sent once.
-    let address_url = |address| url(address, &gate);
     let server = Server::start(viewer.address, gate.clone(), Arc::clone(&hub))?;
-    log::info!("the map is at {}", address_url(server.address()));
+    tell_address(&url(server.address(), &gate), gate.token.is_some());
     let on_map = inbox.counting(&lost, Event::Map, |map: &Undecoded<LatticeMap>| {
         map.bytes(|map| map.keys.len() + map.counts.len() * 10)
     });
@@ -131,6 +131,18 @@ pub fn start(runtime: &Runtime, name: &str) -> Result<Finish, NodeError> {
         server.finish();
         Box::new(())
     }))
+}
+
+/// Says where the page is. A token is for the terminal alone: others read `/rosout` and log files.
+fn tell_address(url: &str, has_token: bool) {
+    match has_token {
+        true => {
+            log::info!("the address of the map has a token, which the terminal alone is told");
+            // A terminal that is gone is no reason to stop.
+            let _ = writeln!(std::io::stderr(), "the map is at {url}");
+        }
+        false => log::info!("the map is at {url}"),
+    }
 }
 
 /// State of the compute thread.

@@ -11,7 +11,7 @@ use lattice_runtime::params::{About, ParamError, Params};
 const ABOUT: &[About] = about! {
     "address" fixed(SOCKET): "Address to listen on. With any but 127.0.0.1 (or ::1) clients need the token.";
     "port" fixed(SOCKET): "Port of the page and the WebSocket; 0: one that is free.";
-    "token" fixed(SOCKET): "Secret of clients, letters, digits, -, _ and .; empty: none on 127.0.0.1, else a random one, which is in the address that the node logs.";
+    "token" fixed(SOCKET): "Secret of clients, letters, digits, -, _ and .; empty: none on 127.0.0.1, else a random one, which is in the address that the node tells on standard error alone.";
     "allowed_hosts" fixed(SOCKET): "Names by which browsers may call this machine, besides localhost and addresses.";
     "allowed_origins" fixed(SOCKET): "Pages from elsewhere that may connect, such as https://viewer.example.";
     "max_clients" fixed(SOCKET): "Most clients at a time.";

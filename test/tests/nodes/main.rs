@@ -8,5 +8,6 @@ mod map_follower;
 mod map_labels;
 mod semantic_clouds;
 mod semantic_icp_server;
+mod viewer_node;
 mod voxel_marker_node;
 mod voxel_markers;

@@ -15,6 +15,7 @@ mod record;
 mod respawn;
 mod viewer;
 mod viewer_page;
+mod viewer_planning;
 mod viewer_writing;
 
 use std::io::{Write, stderr};

@@ -258,3 +258,73 @@ fn the_map_that_grows_in_a_demo_is_at_its_end_the_mappers() {
     assert_eq!(shown(&mut page), keys(&map));
     assert_eq!(page.value("lattice.state.problems"), json!([]));
 }
+
+/// A zstd frame of these bytes as they are (RFC 8878: a window of 128 kB, blocks of kind raw).
+fn zstd_frame(bytes: &[u8]) -> Vec<u8> {
+    let mut frame = vec![0x28, 0xb5, 0x2f, 0xfd, 0, 7 << 3];
+    let mut blocks = bytes.chunks(128 << 10).peekable();
+    while let Some(block) = blocks.next() {
+        let head = u32::from(blocks.peek().is_none()) | (block.len() as u32) << 3;
+        frame.extend(head.to_le_bytes().iter().take(3));
+        frame.extend(block);
+    }
+    frame
+}
+
+#[test]
+fn what_is_shown_is_told_by_its_name_and_what_is_not_shown_by_its_error() {
+    let folder = tempfile::tempdir().unwrap();
+    let path = |name: &str| folder.path().join(name).display().to_string();
+    // A file of a log that is compressed.
+    let log = crate::nodes::simulated(folder.path(), "mcap", "12");
+    let files = std::fs::read_dir(&log)
+        .unwrap()
+        .map(|file| file.unwrap().path());
+    let file = { files }.find(|file| file.extension().is_some_and(|ending| ending == "mcap"));
+    let packed = zstd_frame(&std::fs::read(file.unwrap()).unwrap());
+    std::fs::write(path("log.mcap.zstd"), packed).unwrap();
+    let viewer = Viewer::start(&["view", &path("log.mcap.zstd"), "--port", "0"]);
+    assert!(viewer.port() > 0);
+    // Parameters, by either ending.
+    let domain = LoopbackDomain::take().unwrap();
+    let params = "/**/lattice_mapper:\n  ros__parameters: {cell_volume_m3: 0.125}\n";
+    std::fs::write(path("nodes.yml"), params).unwrap();
+    let viewer = Viewer::start_in(&domain, &["view", &path("nodes.yml"), "--port", "0"]);
+    assert!(viewer.port() > 0);
+    // Neither.
+    std::fs::write(path("cloud.pcd"), "# .PCD v.7\n").unwrap();
+    let refused = crate::error(&["view", &path("cloud.pcd")]);
+    for word in ["cloud.pcd", ".lattice", ".mcap", ".zstd", ".yml"] {
+        assert!(refused.contains(word), "{word} in {refused}");
+    }
+    let refused = crate::error(&["view", &path("nodes.yml"), &path("cloud.pcd")]);
+    assert!(
+        refused.contains("cloud.pcd") && refused.contains(".yml"),
+        "{refused}"
+    );
+    let refused = crate::error(&["view", &format!("{log}/metadata.yaml")]);
+    assert!(refused.contains("folder"), "{refused}");
+}
+
+#[test]
+fn a_token_is_told_to_the_terminal_and_to_no_log() {
+    let folder = tempfile::tempdir().unwrap();
+    let domain = LoopbackDomain::take().unwrap();
+    let mut command = Command::new(env!("CARGO_BIN_EXE_lattice"));
+    let arguments = ["view", "--address", "0.0.0.0", "--port", "0"];
+    command
+        .args(arguments)
+        .env("ROS_DOMAIN_ID", domain.id().to_string())
+        .env("ROS_AUTOMATIC_DISCOVERY_RANGE", "LOCALHOST")
+        .env("ROS_LOG_DIR", folder.path());
+    let viewer = Viewer::run(&mut command);
+    let (_, token) = viewer.url.split_once("?token=").unwrap();
+    assert_eq!(token.len(), 32);
+    // Its log file is there by now: the line on the token comes before that on the address.
+    let files = std::fs::read_dir(folder.path()).unwrap();
+    let logs: Vec<String> = files
+        .map(|file| std::fs::read_to_string(file.unwrap().path()).unwrap())
+        .collect();
+    assert!(logs.concat().contains("a token"), "{logs:?}");
+    assert!(!logs.concat().contains(token), "{logs:?}");
+}

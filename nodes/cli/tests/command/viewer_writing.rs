@@ -1,10 +1,12 @@
 //! Changes through the page: off unless they are allowed, and asked for first.
 
 use std::io::BufReader;
+use std::net::TcpStream;
 use std::path::Path;
 
 use async_tungstenite::tungstenite::client::IntoClientRequest;
-use async_tungstenite::tungstenite::{Message, connect};
+use async_tungstenite::tungstenite::stream::MaybeTlsStream;
+use async_tungstenite::tungstenite::{Message, WebSocket, connect};
 use lattice_bag::BagReader;
 use lattice_core::lattice::MortonKey;
 use lattice_core::voxels::file::MapContents;
@@ -33,36 +35,87 @@ fn params(folder: &Path, map: &str, allow_write: bool) -> String {
     path.display().to_string()
 }
 
-/// Capabilities and services that the server tells of, and its answer to a call of one that it does not.
-fn offered(url: &str) -> (Value, Vec<String>, Value) {
+type Socket = WebSocket<MaybeTlsStream<TcpStream>>;
+
+fn socket(url: &str) -> Socket {
     let mut request = url.replace("http", "ws").into_client_request().unwrap();
     let protocol = "foxglove.websocket.v1".parse().unwrap();
     request
         .headers_mut()
         .insert("Sec-WebSocket-Protocol", protocol);
-    let (mut socket, _) = connect(request).unwrap();
+    connect(request).unwrap().0
+}
+
+/// The next text message of this kind.
+fn text(socket: &mut Socket, op: &str) -> Value {
+    loop {
+        if let Message::Text(text) = socket.read().unwrap() {
+            let message: Value = serde_json::from_str(&text).unwrap();
+            if message["op"] == op {
+                return message;
+            }
+        }
+    }
+}
+
+/// Capabilities and services that the server tells of, and its answer to a call of one that it does not.
+fn offered(url: &str) -> (Value, Vec<String>, Value) {
+    let mut socket = socket(url);
     let call = [
-        &[2, 3, 0, 0, 0, 9, 0, 0, 0, 3, 0, 0, 0][..],
+        &[2, 4, 0, 0, 0, 9, 0, 0, 0, 3, 0, 0, 0][..],
         b"cdr",
         &[0, 1, 0, 0, 0],
     ];
     socket.send(Message::Binary(call.concat().into())).unwrap();
-    let (mut capabilities, mut names) = (Value::Null, Vec::new());
-    loop {
-        let Message::Text(text) = socket.read().unwrap() else {
-            continue;
-        };
-        let message: Value = serde_json::from_str(&text).unwrap();
-        match message["op"].as_str().unwrap() {
-            "serverInfo" => capabilities = message["capabilities"].clone(),
-            "advertiseServices" => {
-                let services = message["services"].as_array().unwrap().iter();
-                names.extend(services.map(|of| of["name"].as_str().unwrap().to_owned()));
-            }
-            "serviceCallFailure" => return (capabilities, names, message),
-            _ => {}
-        }
+    let capabilities = text(&mut socket, "serverInfo")["capabilities"].clone();
+    let services = text(&mut socket, "advertiseServices")["services"].clone();
+    let names = services.as_array().unwrap().iter();
+    let names = names.map(|of| of["name"].as_str().unwrap().to_owned());
+    let refused = text(&mut socket, "serviceCallFailure");
+    (capabilities, names.collect(), refused)
+}
+
+#[test]
+fn who_watches_parameters_hears_what_others_set() {
+    let folder = tempfile::tempdir().unwrap();
+    let (_, params) = site(folder.path());
+    let domain = LoopbackDomain::take().unwrap();
+    let viewer = Viewer::start_in(&domain, &["view", &params, "--port", "0"]);
+    let [mut watching, mut setting] = [(), ()].map(|()| socket(&viewer.url));
+    let capabilities = text(&mut watching, "serverInfo")["capabilities"].clone();
+    let watched = json!("parametersSubscribe");
+    assert!(capabilities.as_array().unwrap().contains(&watched));
+    let say = |socket: &mut Socket, message: Value| {
+        socket
+            .send(Message::Text(message.to_string().into()))
+            .unwrap();
+    };
+    let [period, centers] =
+        ["update_period_s", "centers_period_s"].map(|name| format!("/lattice_mapper.{name}"));
+    say(
+        &mut watching,
+        json!({"op": "subscribeParameterUpdates", "parameterNames": [period]}),
+    );
+    // An answer to the same client says that it is heard.
+    say(
+        &mut watching,
+        json!({"op": "getParameters", "parameterNames": [period], "id": "first"}),
+    );
+    assert_eq!(text(&mut watching, "parameterValues")["id"], "first");
+    for (name, value) in [(&centers, 2.5), (&period, 0.25)] {
+        let parameters = json!([{"name": name, "value": value}]);
+        say(
+            &mut setting,
+            json!({"op": "setParameters", "parameters": parameters, "id": name}),
+        );
+        assert_eq!(text(&mut setting, "parameterValues")["id"], **name);
     }
+    let heard = text(&mut watching, "parameterValues");
+    let expected = json!([{"name": period, "value": 0.25, "type": "float64"}]);
+    assert_eq!(
+        (&heard["parameters"], &heard["id"]),
+        (&expected, &Value::Null)
+    );
 }
 
 #[test]
@@ -75,11 +128,12 @@ fn without_leave_nothing_is_offered_that_changes_something() {
     let (capabilities, services, refused) = offered(&viewer.url);
     assert_eq!(
         (&refused["serviceId"], &refused["callId"]),
-        (&json!(3), &json!(9))
+        (&json!(4), &json!(9))
     );
     assert_eq!(capabilities, json!(["services"]));
     let reading = [
         "lattice_mapper/query",
+        "lattice_mapper/plan_path",
         "bag_player/is_paused",
         "bag_player/get_rate",
     ];
@@ -141,7 +195,7 @@ fn in_the_box(map: &str) -> Vec<String> {
 }
 
 /// A map, and parameters of nodes that may be written to.
-fn site(folder: &Path) -> (String, String) {
+pub fn site(folder: &Path) -> (String, String) {
     let map = map_of(&scene(folder, 5.0), "fcc");
     let params = params(folder, &map, true);
     (map, params)

@@ -4,16 +4,19 @@ mod parameters;
 mod services;
 mod values;
 
+use std::sync::Arc;
 use std::time::Duration;
 
 use futures::future::BoxFuture;
 use lattice_msgs::RosMessage;
 use lattice_msgs::geometry_msgs::PoseStamped;
+use lattice_msgs::rcl_interfaces::ParameterEvent;
 use lattice_runtime::qos::Qos;
-use lattice_runtime::{CallError, Client, Node, Publisher};
+use lattice_runtime::{CallError, Client, Load, Node, Publisher, Subscription};
 
 use self::parameters::Parameters;
 use super::desk::{Ask, Offer, OpenTopic};
+use super::hub::Hub;
 use super::outbox::Outgoing;
 use super::protocol::{parameter_values, service_failure, service_response, status};
 use crate::start::NodeError;
@@ -51,13 +54,14 @@ pub struct Reach {
 pub struct NodeBridge {
     offer: Offer,
     clients: Vec<Client>,
-    parameters: Parameters,
+    parameters: Arc<Parameters>,
+    _events: Option<Subscription>,
     goals: Option<Publisher<PoseStamped>>,
 }
 
 impl NodeBridge {
-    /// A bridge that offers what `reach` allows.
-    pub fn new(node: &Node, reach: &Reach) -> Result<Self, NodeError> {
+    /// A bridge that offers what `reach` allows, and tells the hub of parameters that change.
+    pub fn new(node: &Node, reach: &Reach, hub: &Arc<Hub>) -> Result<Self, NodeError> {
         let (services, clients) = services::of(node, reach)?;
         let mut offer = Offer {
             services,
@@ -72,10 +76,24 @@ impl NodeBridge {
             goals = Some(node.publisher(&reach.goal_topic, Qos::DEFAULT)?);
             offer.topics.push(OpenTopic { name, type_name });
         }
+        let parameters = Arc::new(Parameters::new(node, nodes)?);
+        let mut events = None;
+        if reach.allow_write {
+            // The hub holds the bridge.
+            let (hub, parameters) = (Arc::downgrade(hub), Arc::clone(&parameters));
+            let tell = move |event: Arc<ParameterEvent>| {
+                if let Some(hub) = hub.upgrade() {
+                    hub.parameters_changed(&parameters.changed(&event));
+                }
+            };
+            let qos = Qos::PARAMETER_EVENTS;
+            events = Some(node.subscribe("/parameter_events", qos, Load::Small, tell)?);
+        }
         Ok(Self {
             offer,
             clients,
-            parameters: Parameters::new(node, nodes)?,
+            parameters,
+            _events: events,
             goals,
         })
     }

@@ -5,8 +5,8 @@ use lattice_msgs::cdr;
 use lattice_msgs::rcl_interfaces::{
     DescribeParameters, DescribeParametersRequest, DescribeParametersResponse, GetParameters,
     GetParametersRequest, GetParametersResponse, ListParameters, ListParametersRequest,
-    ListParametersResponse, Parameter, ParameterValue, SetParameters, SetParametersRequest,
-    SetParametersResponse,
+    ListParametersResponse, Parameter, ParameterEvent, ParameterValue, SetParameters,
+    SetParametersRequest, SetParametersResponse,
 };
 use lattice_runtime::{CallError, Client, Node, RuntimeError};
 
@@ -89,6 +89,21 @@ impl Parameters {
             }
             outcome
         })
+    }
+
+    /// Values of an event of a node, if it is within reach.
+    pub(super) fn changed(&self, event: &ParameterEvent) -> Vec<Value> {
+        let prefix = format!("{}.", event.node);
+        let all = event.new_parameters.iter().chain(&event.changed_parameters);
+        let value = |Parameter { name, value }: &Parameter| {
+            let (value, kind) = to_json(value.clone())?;
+            let name = format!("{prefix}{name}");
+            Some(Value { name, value, kind })
+        };
+        match self.0.iter().any(|remote| remote.prefix == prefix) {
+            true => all.filter_map(value).take(MAX_PARAMETERS).collect(),
+            false => Vec::new(),
+        }
     }
 
     /// Sets each parameter by itself; gives their values after that.

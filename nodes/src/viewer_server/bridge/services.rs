@@ -1,6 +1,6 @@
 //! The services that clients may call.
 
-use lattice_msgs::lattice::{ClearBox, QueryMap, SaveMap};
+use lattice_msgs::lattice::{ClearBox, PlanPath, QueryMap, SaveMap};
 use lattice_msgs::rosbag2_interfaces::{
     GetRate, IsPaused, Pause, PlayNext, Resume, Seek, SetRate, TogglePaused,
 };
@@ -46,6 +46,7 @@ pub(super) fn of(
         clients: Vec::new(),
     };
     table.add::<QueryMap>("query")?;
+    table.add::<PlanPath>("plan_path")?;
     if reach.allow_write {
         table.add::<ClearBox>("clear_box")?;
         table.add::<Trigger>("reset")?;

@@ -42,6 +42,7 @@ const FILES: &[File] = files! {
     "/math.js" "math.js" JAVASCRIPT;
     "/messages.js" "messages.js" JAVASCRIPT;
     "/panel.js" "panel.js" JAVASCRIPT;
+    "/planning.js" "planning.js" JAVASCRIPT;
     "/player.js" "player.js" JAVASCRIPT;
     "/pointer.js" "pointer.js" JAVASCRIPT;
     "/renderer.js" "renderer.js" JAVASCRIPT;

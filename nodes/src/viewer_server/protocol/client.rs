@@ -52,6 +52,18 @@ pub enum ClientMessage {
         /// Comes back in the answer.
         id: Option<String>,
     },
+    /// Wants to hear when parameters change.
+    SubscribeParameterUpdates {
+        /// Full names; none: all.
+        #[serde(default)]
+        parameter_names: Vec<String>,
+    },
+    /// Does no longer.
+    UnsubscribeParameterUpdates {
+        /// Full names; none: all.
+        #[serde(default)]
+        parameter_names: Vec<String>,
+    },
     /// Will publish.
     Advertise {
         /// Its channels.
@@ -165,7 +177,9 @@ impl ClientMessage {
             Self::Unsubscribe { subscription_ids } => subscription_ids.len(),
             Self::GetParameters {
                 parameter_names, ..
-            } => parameter_names.len(),
+            }
+            | Self::SubscribeParameterUpdates { parameter_names }
+            | Self::UnsubscribeParameterUpdates { parameter_names } => parameter_names.len(),
             Self::SetParameters { parameters, .. } => parameters.len(),
             Self::Advertise { channels } => channels.len(),
             Self::Unadvertise { channel_ids } => channel_ids.len(),

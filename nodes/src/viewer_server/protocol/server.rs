@@ -3,8 +3,6 @@
 use serde::Serialize;
 use serde_json::json;
 
-use super::client::Value;
-
 /// A channel as clients see it.
 #[derive(Clone, Debug, Serialize)]
 #[serde(rename_all = "camelCase")]
@@ -88,7 +86,7 @@ pub fn service_failure(service: u32, call: u32, message: &str) -> String {
 }
 
 /// Values of parameters.
-pub fn parameter_values(parameters: &[Value], id: Option<&str>) -> String {
+pub fn parameter_values(parameters: &[impl Serialize], id: Option<&str>) -> String {
     let mut message = json!({ "op": "parameterValues", "parameters": parameters });
     if let (Some(id), Some(fields)) = (id, message.as_object_mut()) {
         fields.insert("id".to_owned(), id.into());

@@ -1,0 +1,273 @@
+//! Paths through the map: the compute thread hands over a copy of the cells, a thread searches in it.
+
+use std::sync::atomic::{AtomicBool, Ordering};
+use std::sync::{Arc, Mutex};
+use std::time::{Duration, Instant};
+
+use lattice_core::query::{Path, PathError, PathOptions, Query, Steps};
+use lattice_core::voxels::{OccupancyList, VoxelStore};
+use lattice_msgs::geometry_msgs::Point;
+use lattice_msgs::lattice::{PlanPathRequest, PlanPathResponse};
+use lattice_runtime::{Reply, lock};
+use nalgebra::Vector3;
+
+use super::LatticeMapper;
+use super::operations::vector;
+use super::services::{BUSY, spawn};
+
+/// Cells and time after which a search gives up.
+const MAX_EXPANDED: usize = 300_000;
+const PATIENCE: Duration = Duration::from_secs(3);
+/// Most cells that the ball of a request covers, and that an end may move over.
+const MAX_BALL_CELLS: f64 = 8192.0;
+
+/// Searches for paths, one at a time.
+#[derive(Default)]
+pub(super) struct Planner {
+    busy: AtomicBool,
+    /// Cells at the update with this number of this epoch.
+    copy: Mutex<Option<((u64, u64), Arc<OccupancyList>)>>,
+}
+
+impl Planner {
+    /// False while another search goes on; a search that may begin has to.
+    pub(super) fn take(&self) -> bool {
+        !self.busy.swap(true, Ordering::AcqRel)
+    }
+
+    /// Allows the next search.
+    pub(super) fn free(&self) {
+        self.busy.store(false, Ordering::Release);
+    }
+
+    /// Searches on a thread; the search ends with the service, which holds the planner.
+    pub(super) fn begin(
+        self: Arc<Self>,
+        machine: &LatticeMapper,
+        request: PlanPathRequest,
+        reply: Reply<PlanPathResponse>,
+    ) {
+        let (cells, late, planner) = (self.cells(machine), reply.clone(), Arc::clone(&self));
+        let search = move || {
+            let begun = Instant::now();
+            let go_on = || begun.elapsed() < PATIENCE && Arc::strong_count(&planner) > 1;
+            let answer = plan(&*cells, &request, go_on);
+            planner.free();
+            reply.send(answer);
+        };
+        if let Err(error) = spawn("plan path", search) {
+            self.free();
+            late.send(failed(error));
+        }
+    }
+
+    /// A copy of the cells, made at most once for each update of the map.
+    fn cells(&self, machine: &LatticeMapper) -> Arc<OccupancyList> {
+        let (state, store) = ((machine.epoch, machine.sequence), machine.cells());
+        let mut copy = lock(&self.copy);
+        match &*copy {
+            Some((of, cells)) if *of == state => Arc::clone(cells),
+            _ => {
+                let (lattice, datum) = (store.lattice().clone(), store.datum_index());
+                let keys = store.sorted_keys();
+                let cells = Arc::new(OccupancyList::from_keys(lattice, datum, keys, usize::MAX));
+                *copy = Some((state, Arc::clone(&cells)));
+                cells
+            }
+        }
+    }
+}
+
+/// The answer of a service that does not search.
+pub(super) fn failed(why: impl ToString) -> PlanPathResponse {
+    PlanPathResponse {
+        message: why.to_string(),
+        ..PlanPathResponse::default()
+    }
+}
+
+/// The answer while another search goes on.
+pub(super) fn busy() -> PlanPathResponse {
+    failed(format!("another path is searched: {BUSY}"))
+}
+
+/// Searches a path; gives up once `go_on` says no.
+fn plan(
+    store: &impl VoxelStore,
+    request: &PlanPathRequest,
+    go_on: impl FnMut() -> bool,
+) -> PlanPathResponse {
+    match find(store, request, go_on) {
+        Ok(path) => PlanPathResponse {
+            success: true,
+            message: format!("{:.2} m, {} cells looked at", path.length_m, path.expanded),
+            length_m: path.length_m,
+            path: path.centers_m.iter().map(point).collect(),
+        },
+        Err(why) => failed(why),
+    }
+}
+
+fn find(
+    store: &impl VoxelStore,
+    request: &PlanPathRequest,
+    go_on: impl FnMut() -> bool,
+) -> Result<Path, String> {
+    let &PlanPathRequest {
+        radius_m,
+        tolerance_m,
+        ..
+    } = request;
+    for (name, distance_m) in [("radius", radius_m), ("tolerance", tolerance_m)] {
+        let cells = 4.0 / 3.0 * std::f64::consts::PI * distance_m.powi(3)
+            / store.lattice().cell_volume_m3();
+        if cells > MAX_BALL_CELLS {
+            let problem = format!("{name} of {distance_m} m: a ball of {cells:.0} cells");
+            return Err(format!("{problem}, at most {MAX_BALL_CELLS} are allowed"));
+        }
+    }
+    let query = Query::new(store);
+    let end = |name: &str, point: &Point| {
+        let point_m = vector(point);
+        if tolerance_m == 0.0 {
+            return Ok(point_m);
+        }
+        let place = query.nearest_passable(&point_m, radius_m, tolerance_m);
+        place.map_err(words)?.ok_or_else(|| {
+            let at = format!("[{:.2}, {:.2}, {:.2}]", point.x, point.y, point.z);
+            format!("no room for radius {radius_m} m within {tolerance_m} m of {name} {at}")
+        })
+    };
+    let (start_m, goal_m) = (end("start", &request.start)?, end("goal", &request.goal)?);
+    let options = PathOptions {
+        radius_m,
+        steps: Steps::Touching,
+        bounds: None,
+        max_expanded: MAX_EXPANDED,
+    };
+    let path = query.shortest_path_while(&start_m, &goal_m, &options, go_on);
+    path.map_err(|error| match error {
+        PathError::Limit { expanded } => {
+            format!("no path found among {expanded} cells: the search gave up")
+        }
+        error => error.to_string(),
+    })
+}
+
+fn point(center_m: &Vector3<f64>) -> Point {
+    let [x, y, z] = (*center_m).into();
+    Point { x, y, z }
+}
+
+fn words(error: PathError) -> String {
+    error.to_string()
+}
+
+#[cfg(test)]
+mod tests {
+    use lattice_core::lattice::{Lattice, LatticeKind};
+    use lattice_core::voxels::VoxelList;
+
+    use super::*;
+
+    /// A wall across x = 0 of 8 m by 8 m.
+    fn wall() -> VoxelList {
+        let lattice = Lattice::new(LatticeKind::Fcc, 0.008).unwrap();
+        let mut list = VoxelList::new(lattice, Vector3::zeros(), 100_000).unwrap();
+        let offsets_m = (0..6400).map(|i| {
+            [
+                0.0,
+                (i % 80) as f32 * 0.1 - 4.0,
+                (i / 80) as f32 * 0.1 - 4.0,
+            ]
+        });
+        list.insert(&lattice_core::cloud::Cloud {
+            stamp_ns: 1,
+            datum_m: Vector3::zeros(),
+            offsets_m: offsets_m.collect(),
+        });
+        list
+    }
+
+    fn request(start: [f64; 3], goal: [f64; 3]) -> PlanPathRequest {
+        PlanPathRequest {
+            start: point(&start.into()),
+            goal: point(&goal.into()),
+            radius_m: 0.3,
+            tolerance_m: 0.0,
+        }
+    }
+
+    #[test]
+    fn a_path_goes_around_the_wall_from_end_to_end() {
+        let wall = wall();
+        let asked = request([-1.0, 3.0, 0.0], [1.0, 3.0, 0.0]);
+        let answer = plan(&wall, &asked, || true);
+        assert!(
+            answer.success && answer.length_m > 2.5,
+            "{}",
+            answer.message
+        );
+        let query = Query::new(&wall);
+        let ends = [&answer.path[0], answer.path.last().unwrap()];
+        for (end, asked) in ends.iter().zip([&asked.start, &asked.goal]) {
+            assert_eq!(wall.key_of(&vector(end)), wall.key_of(&vector(asked)));
+        }
+        for pair in answer.path.windows(2) {
+            let [from_m, to_m] = [&pair[0], &pair[1]].map(vector);
+            let line = lattice_core::query::Segment { from_m, to_m };
+            assert!(query.is_free(&line, 0.3 - 1e-6).unwrap());
+        }
+    }
+
+    #[test]
+    fn an_occupied_end_is_refused_or_moves_as_far_as_it_may() {
+        let wall = wall();
+        let mut asked = request([0.0, 3.0, 0.0], [1.0, 3.0, 0.0]);
+        let refused = plan(&wall, &asked, || true);
+        assert!(
+            !refused.success && refused.message.contains("start"),
+            "{}",
+            refused.message
+        );
+        asked.tolerance_m = 0.2;
+        let refused = plan(&wall, &asked, || true);
+        assert!(
+            refused.message.contains("within 0.2 m of start"),
+            "{}",
+            refused.message
+        );
+        asked.tolerance_m = 0.8;
+        let moved = plan(&wall, &asked, || true);
+        assert!(moved.success, "{}", moved.message);
+        let by_m = (vector(&moved.path[0]) - vector(&asked.start)).norm();
+        assert!((0.3..0.9).contains(&by_m), "{by_m}");
+    }
+
+    #[test]
+    fn searches_are_bounded_and_what_makes_no_sense_is_refused() {
+        let wall = wall();
+        let far = request([-1.0, 3.0, 0.0], [1.0, 3.0, 0.0]);
+        let mut asked = 0;
+        let stopped = plan(&wall, &far, || {
+            asked += 1;
+            asked <= 7
+        });
+        assert!(
+            stopped.message.contains("7 cells: the search gave up"),
+            "{}",
+            stopped.message
+        );
+        for bad in [f64::NAN, -1.0, 1e3, f64::INFINITY] {
+            for (radius_m, tolerance_m) in [(bad, 0.1), (0.1, bad)] {
+                let asked = PlanPathRequest {
+                    radius_m,
+                    tolerance_m,
+                    ..far.clone()
+                };
+                assert!(!plan(&wall, &asked, || true).success, "{bad}");
+            }
+        }
+        assert!(!plan(&wall, &request([f64::NAN; 3], [0.0; 3]), || true).success);
+    }
+}
