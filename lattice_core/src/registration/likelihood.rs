@@ -132,7 +132,7 @@ impl<'a> Fit<'a> {
     /// Cuts a source into regions, to be judged in a target.
     pub fn new(source: &'a PreparedCloud, target: &'a PreparedCloud, scale: FitScale) -> Fit<'a> {
         let regions: Vec<[i64; 3]> = (source.points_m().iter())
-            .map(|p| [p.x, p.y, p.z].map(|c| (c / scale.region_m).floor() as i64))
+            .map(|point| region_of(point, scale.region_m))
             .collect();
         let mut sizes = rustc_hash::FxHashMap::default();
         for region in &regions {
@@ -241,14 +241,7 @@ impl<'a> Fit<'a> {
         known: &Confusion,
         agreement: f64,
     ) -> (Likelihood, Confusion) {
-        let mut surfaces = f64::NEG_INFINITY;
-        let mut closeness = 1.0;
-        for part in CLOSENESS {
-            let of_part = self.by_surfaces(partners, part);
-            if of_part > surfaces {
-                (surfaces, closeness) = (of_part, part);
-            }
-        }
+        let (surfaces, closeness) = self.closest(partners);
         let counts = self.count(partners, closeness);
         let lifts = lifts(&counts, known, agreement);
         let points = 0..partners.of_point.len();
@@ -296,15 +289,21 @@ impl<'a> Fit<'a> {
     /// Log-likelihood by surfaces of each region of a side.
     fn of_regions(&self, pose: &Isometry3<f64>, region_m: f64) -> BTreeMap<[i64; 3], f64> {
         let partners = self.partners(pose);
-        let parts = CLOSENESS.map(|part| (self.by_surfaces(&partners, part), part));
-        let best = parts.into_iter().max_by(|a, b| a.0.total_cmp(&b.0));
-        let closeness = best.map_or(1.0, |best| best.1);
+        let (_, closeness) = self.closest(&partners);
         let mut regions = BTreeMap::new();
         for (i, point) in self.source.points_m().iter().enumerate() {
-            let region = [point.x, point.y, point.z].map(|c| (c / region_m).floor() as i64);
+            let region = region_of(point, region_m);
             *regions.entry(region).or_default() += self.of_point(i, &partners, closeness, &[]);
         }
         regions
+    }
+
+    /// Log-likelihood by surfaces at the closeness of surfaces that fits best, and that closeness; the
+    /// widest of equal ones.
+    fn closest(&self, partners: &Partners) -> (f64, f64) {
+        let parts = CLOSENESS.map(|part| (self.by_surfaces(partners, part), part));
+        let better = |a: (f64, f64), b: (f64, f64)| if b.0 > a.0 { b } else { a };
+        parts.into_iter().fold((f64::NEG_INFINITY, 1.0), better)
     }
 
     fn weight(&self, i: usize) -> f64 {
@@ -341,6 +340,11 @@ impl<'a> Fit<'a> {
         }
         counts
     }
+}
+
+/// Region of a side that a point is in.
+pub(super) fn region_of(point: &Point3<f64>, side_m: f64) -> [i64; 3] {
+    [point.x, point.y, point.z].map(|c| (c / side_m).floor() as i64)
 }
 
 /// The lift to judge each fold by: what is known and what the others teach.

@@ -53,6 +53,18 @@ impl DistortionSums {
         self.largest_square = self.largest_square.max(other.largest_square);
     }
 
+    /// The sums of so many of the points, if those are as far off as the others.
+    pub(super) fn of_part(&self, points: u64) -> DistortionSums {
+        let part = |sum| scaled(sum, points, self.points);
+        DistortionSums {
+            points,
+            squares: part(self.squares),
+            distances: part(self.distances),
+            // One of a part is at most the sum of them.
+            largest_square: u128::from(self.largest_square).min(part(self.squares)) as u64,
+        }
+    }
+
     /// Contradiction between these sums and points in cells of the lattice.
     pub(super) fn contradiction(&self, lattice: &Lattice) -> Option<String> {
         let points = u128::from(self.points);
@@ -89,6 +101,13 @@ impl DistortionSums {
             max_distance_m: (self.largest_square as f64 / STEPS).sqrt() * side_m,
         }
     }
+}
+
+/// A sum times `part` of `whole`, rounded down; saturates.
+pub(super) fn scaled(sum: u128, part: u64, whole: u64) -> u128 {
+    let (part, whole) = (u128::from(part), u128::from(whole.max(1)));
+    let rest = (sum % whole).saturating_mul(part) / whole;
+    (sum / whole).saturating_mul(part).saturating_add(rest)
 }
 
 #[cfg(test)]

@@ -5,8 +5,8 @@ use std::path::PathBuf;
 use clap::Args;
 use lattice_core::cloud::Cloud;
 use lattice_core::lattice::{Lattice, Orientation};
-use lattice_core::voxels::VoxelList;
 use lattice_core::voxels::file::write_map;
+use lattice_core::voxels::{Payload, VoxelList};
 use nalgebra::Vector3;
 use serde::Serialize;
 
@@ -17,7 +17,7 @@ use lattice_nodes::files::whole;
 /// Quantize a point file
 #[derive(Args)]
 pub struct Quantize {
-    /// ply, pcd, xyz or txt (also .bz2), or KITTI bin
+    /// ply, pcd, xyz or txt (also .bz2), or KITTI bin, with the labels of SemanticKITTI from its .label file
     file: PathBuf,
     /// cubic, bcc, fcc, mcc, hex, hexopt, several with commas, paper, or all
     #[arg(long, default_value = "all")]
@@ -49,7 +49,6 @@ struct Row {
     points: u64,
     refused_not_finite: u64,
     refused_out_of_range: u64,
-    refused_list_full: u64,
     voxels: usize,
     mse_per_dimension_m2: f64,
     mean_distance_m: f64,
@@ -67,6 +66,14 @@ impl Quantize {
         let file = read_points(&self.file, &limits)
             .map_err(|e| format!("{}: {e}", self.file.display()))?;
         let skipped = file.skipped_not_finite as u64;
+        if file.points_m.is_empty() {
+            let why = match skipped {
+                0 => "the file has no points".to_owned(),
+                n => format!("none of its {n} points is finite"),
+            };
+            return Err(format!("{}: {why}", self.file.display()).into());
+        }
+        let labels = file.labels;
         let points: Vec<Vector3<f64>> = file.points_m.into_iter().map(Vector3::from).collect();
         // Offsets from the middle keep the digits of far-away coordinates, whatever strays.
         let datum_m = middle_m(&points);
@@ -76,8 +83,21 @@ impl Quantize {
         for (i, kind) in self.lattice.0.iter().enumerate() {
             let lattice = Lattice::new(*kind, self.cell_volume)?;
             let lattice = lattice.with_orientation(self.orientation)?;
-            let mut list = VoxelList::new(lattice, datum_m, self.max_voxels)?;
-            let report = list.insert(&cloud);
+            let list = VoxelList::new(lattice, datum_m, self.max_voxels)?;
+            let mut list = list.with_payload(Payload {
+                // Only the map that is written keeps them.
+                labels: i == 0 && self.map_out.is_some() && !labels.is_empty(),
+                ..Payload::default()
+            });
+            let report = list.insert_labelled(&cloud, &labels);
+            if report.list_full > 0 {
+                let (left, most) = (report.list_full, self.max_voxels);
+                return Err(format!(
+                    "{left} points are beyond --max-voxels {most} on {}: allow more, or take larger cells",
+                    kind.name()
+                )
+                .into());
+            }
             let distortion = list.distortion();
             rows.push(Row {
                 lattice: kind.name(),
@@ -85,7 +105,6 @@ impl Quantize {
                 points: report.inserted,
                 refused_not_finite: report.not_finite + skipped,
                 refused_out_of_range: report.out_of_range,
-                refused_list_full: report.list_full,
                 voxels: list.len(),
                 mse_per_dimension_m2: distortion.mse_per_dimension_m2,
                 mean_distance_m: distortion.mean_distance_m,
@@ -124,7 +143,7 @@ fn print(rows: &[Row]) {
         "lattice", "points", "refused", "voxels", "MSE/dim (m^2)", "mean (m)", "RMS (m)", "max (m)"
     );
     for row in rows {
-        let refused = row.refused_not_finite + row.refused_out_of_range + row.refused_list_full;
+        let refused = row.refused_not_finite + row.refused_out_of_range;
         println!(
             "{:<8}{:>10}{:>10}{:>10}{:>16.6}{:>12.5}{:>10.5}{:>10.4}",
             row.lattice,

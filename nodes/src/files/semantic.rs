@@ -11,6 +11,18 @@ use nalgebra::Point3;
 
 use super::points::{PointFileLimits, read_points};
 
+impl SemanticFile {
+    /// The same, unless it has no points; the error says why, and names the file.
+    pub fn with_points(self, path: &Path) -> Result<SemanticFile, String> {
+        let why = match (self.cloud.is_empty(), self.skipped_not_finite) {
+            (false, _) => return Ok(self),
+            (true, 0) => "the file has no points".to_owned(),
+            (true, n) => format!("none of its {n} points is finite"),
+        };
+        Err(format!("{}: {why}", path.display()))
+    }
+}
+
 /// First bytes of every map file, whatever its version.
 const MAP_MAGIC: &[u8; 7] = b"LATTICE";
 
@@ -21,6 +33,8 @@ pub struct SemanticFile {
     pub cloud: SemanticCloud,
     /// Side of a cube as large as a voxel, metres, if the file is a map.
     pub cell_side_m: Option<f64>,
+    /// Points left out because a coordinate was NaN or infinite.
+    pub skipped_not_finite: usize,
 }
 
 /// Reads a map file, of which each voxel is a point, or a point file with or without a number `label`.
@@ -39,6 +53,7 @@ pub fn read_semantic(
         return Ok(SemanticFile {
             cell_side_m: Some(map.lattice().cell_volume_m3().cbrt()),
             cloud: SemanticCloud::from_voxels(&map),
+            skipped_not_finite: 0,
         });
     }
     let limits = PointFileLimits { max_points };
@@ -51,6 +66,7 @@ pub fn read_semantic(
                 .collect(),
         },
         cell_side_m: None,
+        skipped_not_finite: file.skipped_not_finite,
     })
 }
 

@@ -24,7 +24,7 @@ use std::collections::BTreeMap;
 use std::sync::Arc;
 use std::sync::atomic::{AtomicBool, Ordering::Relaxed};
 
-use lattice_core::registration::{Calibration, HeadsetScan, Stage, TrackUpdate, Verdict};
+use lattice_core::registration::{Calibration, HeadsetScan, Profile, Stage, TrackUpdate, Verdict};
 use lattice_msgs::calibration::{
     CalibrateFeedback, CalibrateGoal, CalibrateResult, CalibrationResult,
 };

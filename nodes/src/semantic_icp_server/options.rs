@@ -1,6 +1,6 @@
 //! Parameters of the server.
 
-use lattice_core::registration::CalibrationOptions;
+use lattice_core::registration::{CalibrationOptions, Profile};
 
 use crate::convert::semantic::SemanticOptions;
 use crate::options::{frame, one_of};
@@ -110,16 +110,21 @@ fn calibration_from(
     params: &Params,
     semantic: &SemanticOptions,
 ) -> Result<CalibrationOptions, ParamError> {
-    let d = CalibrationOptions::default();
+    let profiles = Profile::ALL.map(|profile| (profile.name(), profile));
+    let d = one_of(params, "profile", &profiles)?.options();
     let meters = 1e-6..=1e4;
     Ok(CalibrationOptions {
+        profile: d.profile,
         min_points: params.usize("min_points", d.min_points)?,
         max_points: semantic.max_points,
         registered_points: params.positive("registered_points", d.registered_points)?,
         noise_m: params.f64_in("noise_m", d.noise_m, meters.clone())?,
         region_m: params.f64_in("region_m", d.region_m, 1e-3..=1e4)?,
         scale_sigma: params.f64_in("scale_sigma", d.scale_sigma, 0.0..=0.5)?,
+        max_scale_error: params.f64_in("max_scale_error", d.max_scale_error, 0.0..=1.0)?,
+        estimate_scale: params.bool("estimate_scale", d.estimate_scale)?,
         gravity_sigma_rad: gravity_sigma_rad(params, d.gravity_sigma_rad)?,
+        axes: semantic.axes,
         agreement: params.f64_in("agreement", d.agreement, 0.0..=1.0)?,
         start_radius_m: params.f64_in("guess_radius_m", d.start_radius_m, meters.clone())?,
         start_yaw_rad: params.f64_in("guess_yaw_rad", d.start_yaw_rad, 0.0..=3.2)?,
@@ -132,6 +137,7 @@ fn calibration_from(
 
 /// Zero in the parameters stands for a frame that does not know where down is.
 fn gravity_sigma_rad(params: &Params, default: f64) -> Result<f64, ParamError> {
+    let default = if default.is_finite() { default } else { 0.0 };
     let sigma = params.f64_in("gravity_sigma_rad", default, 0.0..=3.2)?;
     Ok(if sigma > 0.0 { sigma } else { f64::INFINITY })
 }

@@ -24,11 +24,14 @@ const ABOUT: &[About] = about! {
     "lost_after": "Searches that must fail in a row before a known pose is given up.";
     "doubt_below": "A cloud is searched with alone if its share of points on the map is below this share of that of the calibration: it may be mirrored, or the headset elsewhere.";
     "map_refresh_s": "How long clouds are compared with an old state of a map that changes.";
+    "profile" fixed("the defaults of others follow from it"): "Sensor of the clouds: headset, lidar (outdoors, may lean) or depth_camera; the defaults of the parameters of the search follow from it.";
     "min_points": "Fewest points of a search.";
     "registered_points": "About how many points are registered; more are thinned.";
     "noise_m": "Standard deviation of the headset's points.";
     "region_m": "Standard deviation of the place of whole regions of them, and side of such regions.";
     "scale_sigma": "Standard deviation of the headset's scale.";
+    "max_scale_error": "Share by which the scale of a cloud may differ from 1 for it to be OK.";
+    "estimate_scale": "Whether clouds of any scale are scaled to the map; the pose is then that of the scaled cloud, and track, which scales nothing, is to be false.";
     "gravity_sigma_rad": "Standard deviation of the tilt between map and headset, as far as gravity tells; 0 if one of them does not know where down is.";
     "agreement": "Share of places where equal class numbers of headset and map are expected to agree before anything was learned; 0 if their numbers have nothing to do with each other.";
     "guess_radius_m": "How far the answer may be from a guess.";

@@ -135,7 +135,11 @@ fn what_cannot_be_used_is_refused_with_a_reason() {
             .for_each(|p| *p = Point3::new(-p.y, p.z, p.x));
     });
     assert_eq!(unity.verdict, Verdict::RejectedInput);
-    assert!(unity.reason.contains("Unity"), "{}", unity.reason);
+    assert!(
+        unity.reason.contains("fits as unity_ruf"),
+        "{}",
+        unity.reason
+    );
     let few_nans = changed(|cloud| {
         cloud
             .points_m

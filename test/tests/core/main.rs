@@ -1,6 +1,7 @@
 //! The library against independent arithmetic, brute force and its own invariants.
 
 mod calibration;
+mod calibration_misread;
 mod calibration_symmetry;
 mod cloud;
 #[path = "../../fuzz/src/lib.rs"]

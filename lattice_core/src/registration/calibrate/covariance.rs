@@ -6,6 +6,7 @@ use nalgebra::{
 use rustc_hash::FxHashMap;
 
 use super::super::PreparedCloud;
+use super::super::likelihood::region_of;
 use super::types::{DirectionKind, WeakDirection};
 use crate::pose::se3;
 
@@ -53,36 +54,19 @@ impl PoseCovariance {
         target_from_source: &Isometry3<f64>,
         model: &ErrorModel,
     ) -> Option<PoseCovariance> {
-        let turn = target_from_source.rotation.to_rotation_matrix();
-        let turn = turn.matrix();
         let mut hessian = Matrix6::zeros();
         let mut scaling = Vector6::zeros();
         let mut pulls: FxHashMap<[i64; 3], Pull> = FxHashMap::default();
-        for (point, spread) in source.points_m().iter().zip(source.covariances_m2()) {
-            let place = target_from_source * point;
-            let Some((j, _)) = target.nearest(&place, model.gate_m) else {
-                continue;
-            };
-            let (Some(q), Some(n)) = (target.points_m().get(j), target.normals().get(j)) else {
-                continue;
-            };
-            let flat = 1.0 - target.plane_epsilon();
-            let c = Matrix3::identity() - flat * n * n.transpose();
-            let Some(m) = (c + turn * spread * turn.transpose()).try_inverse() else {
-                continue;
-            };
-            let r = q - place;
-            let jacobian = jacobian(turn, point);
-            let weight = 1.0 / (1.0 + r.dot(&(m * r)) / (KERNEL * KERNEL));
-            let lever = jacobian.transpose() * m * weight;
-            hessian += lever * jacobian;
-            scaling += lever * (turn * (point - model.center));
-            let region = [point.x, point.y, point.z].map(|c| (c / model.region_m).floor() as i64);
+        for term in terms(source, target, target_from_source, 1.0, model) {
+            let lever = term.jacobian.transpose() * term.weight;
+            hessian += lever * term.jacobian;
+            scaling += lever * term.stretch;
+            let region = region_of(&term.point, model.region_m);
             let pull = pulls.entry(region).or_insert_with(|| Pull {
                 residual: Vector6::zeros(),
                 motion: Matrix6x3::zeros(),
             });
-            pull.residual += lever * r;
+            pull.residual += lever * term.residual;
             pull.motion += lever;
         }
         // In the order of the regions, so that the sum is the same every time.
@@ -192,6 +176,49 @@ impl PoseCovariance {
         }
         all
     }
+}
+
+/// A source point and its partner, linearised at a pose and a scale.
+pub(super) struct Term {
+    pub point: Point3<f64>,
+    /// Partner minus the point's place.
+    pub residual: Vector3<f64>,
+    /// Derivative of that by a motion and a turn on the right of the pose.
+    pub jacobian: Matrix3x6<f64>,
+    /// The opposite of its derivative by the scale.
+    pub stretch: Vector3<f64>,
+    /// Inverse covariance, times what the kernel leaves of it.
+    pub weight: Matrix3<f64>,
+}
+
+/// The points of a source that have a partner near their place.
+pub(super) fn terms<'a>(
+    source: &'a PreparedCloud,
+    target: &'a PreparedCloud,
+    target_from_source: &'a Isometry3<f64>,
+    scale: f64,
+    model: &'a ErrorModel,
+) -> impl Iterator<Item = Term> + 'a {
+    let turn = *target_from_source.rotation.to_rotation_matrix().matrix();
+    let points = source.points_m().iter().zip(source.covariances_m2());
+    points.filter_map(move |(point, spread)| {
+        let stretch = turn * (point - model.center);
+        let place = target_from_source * point + (scale - 1.0) * stretch;
+        let (j, _) = target.nearest(&place, model.gate_m)?;
+        let (q, n) = (target.points_m().get(j)?, target.normals().get(j)?);
+        let flat = 1.0 - target.plane_epsilon();
+        let c = Matrix3::identity() - flat * n * n.transpose();
+        let m = (c + turn * spread * turn.transpose()).try_inverse()?;
+        let residual = q - place;
+        let kernel = 1.0 / (1.0 + residual.dot(&(m * residual)) / (KERNEL * KERNEL));
+        Some(Term {
+            point: *point,
+            residual,
+            jacobian: jacobian(&turn, point),
+            stretch,
+            weight: m * kernel,
+        })
+    })
 }
 
 /// Jacobian of q - T p by a motion and a turn on the right of T.

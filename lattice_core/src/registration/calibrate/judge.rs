@@ -1,25 +1,26 @@
 //! Choice of the winning candidate, and the verdict on it.
 
-use nalgebra::{Matrix3, Matrix6, Vector3};
-use rayon::prelude::*;
+use nalgebra::{Isometry3, Matrix6, Vector3};
 
-use super::super::likelihood::Fit;
-use super::super::search::{Region, SearchSource, search};
-use super::super::{PrepareOptions, PreparedCloud, SemanticCloud};
 use super::candidates::{Candidate, Workbench};
 use super::covariance::{ErrorModel, PoseCovariance};
 use super::likeliest;
-use super::types::{Calibration, ClassReliability, DirectionKind, Verdict, WeakDirection};
-use crate::pose::Axes;
+use super::scale::scale_at;
+use super::types::{
+    Calibration, CalibrationOptions, ClassReliability, DirectionKind, ScaleEstimate, Verdict,
+    WeakDirection,
+};
 
 /// Log-likelihood that is as good as a natural logarithm of odds: observations are not independent.
 const SOFTNESS: f64 = 8.0;
 /// Largest ratio of the error of a region to its residuals.
 const INVISIBLE: f64 = 4.0;
-/// Hypotheses of a search with other axes.
-const MISREAD: usize = 48;
 /// Standard deviations of the margin, were two poses equally right, that it must exceed.
 const CERTAIN: f64 = 3.0;
+/// Standard deviations of the tilt beyond which a pose certainly leans.
+const LEANING: f64 = 5.0;
+/// Standard deviations of the scale by which it must differ from 1 to be wrong.
+const SIGNIFICANT: f64 = 2.0;
 /// GICP from a given start stands unless another is better by this log-likelihood.
 const DISPLACE: f64 = 10.0;
 
@@ -52,11 +53,12 @@ pub(super) fn answer(bench: &Workbench<'_>, all: Vec<Candidate>, started: bool) 
     let gravity = bench.options.gravity_sigma_rad;
     let stands = started && all.first().is_some_and(|gicp| std::ptr::eq(gicp, best));
     let upright = (covariance.as_ref())
-        .filter(|_| gravity.is_finite() && !stands)
-        .and_then(|covariance| covariance.upright(&pose, gravity));
-    let (pose, covariance) = match upright {
-        Some((pose, sure)) => (pose, Some(sure)),
-        None => (pose, covariance),
+        .filter(|_| gravity.is_finite())
+        .map(|covariance| covariance.upright(&pose, gravity));
+    let leans = upright == Some(None);
+    let (pose, covariance) = match upright.flatten() {
+        Some((pose, sure)) if !stands => (pose, Some(sure)),
+        _ => (pose, covariance),
     };
     let directions = (covariance.as_ref())
         .map(|c| c.directions(&pose, &middle))
@@ -69,13 +71,19 @@ pub(super) fn answer(bench: &Workbench<'_>, all: Vec<Candidate>, started: bool) 
             DirectionKind::Rotation => d.sigma > options.max_sigma_rad,
         })
         .collect();
-    let (verdict, reason) = verdict(
+    let (mut verdict, mut reason) = verdict(
         bench,
         best,
         (log_margin, chance),
         covariance.is_some(),
         &weak,
     );
+    let scale = scale(bench, best);
+    if best.inlier_fraction >= options.min_inliers
+        && let Some(fault) = leaning(&pose, leans, options).or_else(|| misscaled(scale, options))
+    {
+        (verdict, reason) = (Verdict::RejectedInput, fault);
+    }
     let confusion = bench.known.merged(&best.confusion);
     Calibration {
         verdict,
@@ -93,7 +101,33 @@ pub(super) fn answer(bench: &Workbench<'_>, all: Vec<Candidate>, started: bool) 
             Verdict::Ok => confusion,
             _ => bench.known.clone(),
         },
+        scale,
     }
+}
+
+/// Says that a pose does not stand upright, though both frames know where down is.
+fn leaning(pose: &Isometry3<f64>, leans: bool, options: &CalibrationOptions) -> Option<String> {
+    let angle_rad = (pose.rotation * Vector3::z()).angle(&Vector3::z());
+    let beyond = leans && angle_rad > LEANING * options.gravity_sigma_rad;
+    beyond.then(|| {
+        let degrees = angle_rad.to_degrees();
+        format!(
+            "the cloud leans by {degrees:.1} degrees in the map: gravity must be along -z of both"
+        )
+    })
+}
+
+/// Says that the points are of another scale than the map.
+fn misscaled(scale: Option<ScaleEstimate>, options: &CalibrationOptions) -> Option<String> {
+    let ScaleEstimate { scale, sigma } = scale.filter(|_| !options.estimate_scale)?;
+    let off = (scale - 1.0).abs();
+    (off > options.max_scale_error && off > SIGNIFICANT * sigma).then(|| {
+        let most = 100.0 * options.max_scale_error;
+        format!(
+            "the cloud fits with its points multiplied by {scale:.3}, standard deviation {sigma:.3}: \
+             the scale may be off by {most:.0} %, check its unit"
+        )
+    })
 }
 
 /// The likeliest, but what GICP makes of a start if that is the same place or nearly as likely.
@@ -161,17 +195,27 @@ fn verdict(
 }
 
 fn covariance(bench: &Workbench<'_>, best: &Candidate) -> Option<PoseCovariance> {
+    let (source, target) = (&bench.input.full, &bench.map.cloud);
+    let model = error_model(bench, best);
+    PoseCovariance::at(source, target, &best.map_from_headset, &model)
+}
+
+fn scale(bench: &Workbench<'_>, best: &Candidate) -> Option<ScaleEstimate> {
+    let (source, target) = (&bench.input.full, &bench.map.cloud);
+    let model = error_model(bench, best);
+    scale_at(source, target, &best.map_from_headset, &model)
+}
+
+fn error_model(bench: &Workbench<'_>, best: &Candidate) -> ErrorModel {
     let options = bench.options;
-    let model = ErrorModel {
+    ErrorModel {
         region_m: options.region_m,
         // A cloud that fits far closer than expected also errs less as a whole.
         sigma_m: options.noise_m.min(INVISIBLE * best.rmse_m),
         scale_sigma: options.scale_sigma,
         center: bench.input.sensor_m.unwrap_or_else(|| bench.middle()),
         gate_m: 6.0 * bench.map.spacing_m,
-    };
-    let (source, target) = (&bench.input.full, &bench.map.cloud);
-    PoseCovariance::at(source, target, &best.map_from_headset, &model)
+    }
 }
 
 fn reliability(best: &Candidate) -> Vec<ClassReliability> {
@@ -190,85 +234,4 @@ fn reliability(best: &Candidate) -> Vec<ClassReliability> {
         .map(of)
         .filter(|c| c.weight > 0.0)
         .collect()
-}
-
-/// A way in which the axes of a cloud may have been misread.
-#[derive(Clone, Copy)]
-pub(super) enum Misreading {
-    /// One axis has the wrong sign. It may fit by chance, so it is always looked at.
-    Mirrored,
-    /// Other axes than those of ROS.
-    Axes(Axes),
-}
-
-/// Misreadings of clouds that stand on their side.
-pub(super) const ON_THEIR_SIDE: [Misreading; 3] = [
-    Misreading::Axes(Axes::UnityRuf),
-    Misreading::Axes(Axes::WinrtRub),
-    Misreading::Axes(Axes::Optical),
-];
-
-impl Misreading {
-    fn name(self) -> &'static str {
-        match self {
-            Misreading::Mirrored => "mirrored",
-            Misreading::Axes(Axes::UnityRuf) => "as Unity's left-handed axes",
-            Misreading::Axes(Axes::WinrtRub) => "as WinRT's axes",
-            Misreading::Axes(Axes::Optical) => "as a camera's optical axes",
-            Misreading::Axes(Axes::RosFlu) => "as ROS axes",
-        }
-    }
-
-    /// The transform that mends it.
-    fn matrix(self) -> Matrix3<f64> {
-        match self {
-            Misreading::Mirrored => Matrix3::from_diagonal(&Vector3::new(1.0, -1.0, 1.0)),
-            Misreading::Axes(axes) => axes.matrix(),
-        }
-    }
-}
-
-/// The misreading (axes or scale) under which the cloud fits clearly better than as it is.
-pub(super) fn misread(
-    bench: &Workbench<'_>,
-    straight: &[Candidate],
-    readings: &[Misreading],
-    region: Option<&Region>,
-) -> Option<&'static str> {
-    let straight = straight
-        .iter()
-        .map(|c| c.likelihood.surfaces)
-        .fold(0.0, f64::max);
-    let fits = readings.iter().filter_map(|reading| {
-        Some((
-            surfaces_with(bench, &reading.matrix(), region)?,
-            reading.name(),
-        ))
-    });
-    let (best, name) = fits.max_by(|a, b| a.0.total_cmp(&b.0))?;
-    let observations = bench.few.observations();
-    let clear = straight + bench.options.min_margin.max(0.25 * observations);
-    (best > clear && best > 0.5 * observations).then_some(name)
-}
-
-/// The best likelihood by surfaces of the cloud with other axes, after a first look.
-fn surfaces_with(
-    bench: &Workbench<'_>,
-    axes: &Matrix3<f64>,
-    region: Option<&Region>,
-) -> Option<f64> {
-    let points = bench.input.few.points_m();
-    let turned = SemanticCloud::unlabelled(points.iter().map(|p| axes * p).collect());
-    let turned = PreparedCloud::new(turned, &PrepareOptions::default()).ok()?;
-    let source = SearchSource::by_surface(&turned, bench.input.sensor_m.map(|p| axes * p));
-    let hypotheses = search(&bench.map.surfaces, &source, region, MISREAD);
-    let scale = bench.map.scale(bench.options.noise_m).coarser(2.0);
-    let fit = Fit::new(&turned, &bench.map.cloud, scale);
-    let likelihoods = hypotheses.par_iter().map(|h| {
-        let pose = bench.refine_few(&turned, &h.target_from_source);
-        let partners = fit.partners(&pose);
-        let (likelihood, _) = fit.likelihood(&partners, &bench.known, 0.0);
-        likelihood.surfaces
-    });
-    likelihoods.max_by(f64::total_cmp)
 }

@@ -9,6 +9,8 @@ use super::super::{PrepareOptions, PreparedCloud, RegistrationError, SemanticClo
 pub struct CalibrationMap {
     pub(super) cloud: PreparedCloud,
     pub(super) surfaces: SearchMap,
+    /// The same with cells twice as large, for a look at readings that are hardly right.
+    pub(super) rough: SearchMap,
     pub(super) occupied: OccupiedGrid,
     pub(super) spacing_m: f64,
     pub(super) classes: Vec<(u16, f64)>,
@@ -28,8 +30,9 @@ impl CalibrationMap {
         }
         let cloud = PreparedCloud::new(cloud, &PrepareOptions::default())?;
         let surfaces = SearchMap::of_surfaces(&cloud, cell_side_m);
+        let rough = SearchMap::of_surfaces(&cloud, 2.0 * cell_side_m);
         let occupied = OccupiedGrid::new(cloud.points_m(), cloud.normals(), 2.0 * cell_side_m);
-        let (Some(surfaces), Some(occupied)) = (surfaces, occupied) else {
+        let (Some(surfaces), Some(rough), Some(occupied)) = (surfaces, rough, occupied) else {
             return Err(RegistrationError::TooFewPoints {
                 points: 0,
                 least: 1,
@@ -39,6 +42,7 @@ impl CalibrationMap {
             classes: shares(&cloud),
             cloud,
             surfaces,
+            rough,
             occupied,
             spacing_m: cell_side_m,
         })

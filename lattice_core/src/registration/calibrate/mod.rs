@@ -10,8 +10,11 @@ mod covariance;
 mod input;
 mod judge;
 mod map;
+mod profile;
 mod rays;
+mod readings;
 mod rivals;
+mod scale;
 mod track;
 mod types;
 
@@ -24,13 +27,15 @@ use super::search::{Hypothesis, Region, SearchMap, SearchSource, search};
 use super::{LabelDistribution, PreparedCloud, RegisterOptions, register};
 use candidates::{Candidate, Workbench};
 use input::Input;
+use readings::misread;
 use types::Refusal;
 
 pub use map::CalibrationMap;
+pub use profile::Profile;
 pub use track::{TrackUpdate, track};
 pub use types::{
     Calibration, CalibrationOptions, CalibrationRequest, ClassReliability, DirectionKind,
-    HeadsetScan, Progress, Stage, Verdict, WeakDirection,
+    HeadsetScan, Progress, ScaleEstimate, Stage, Verdict, WeakDirection,
 };
 
 /// Hypotheses of the search by surfaces: a piece of wall fits many walls.
@@ -39,8 +44,6 @@ const BY_LABELS: usize = 64;
 const FINALISTS: usize = 4;
 /// Log-likelihood of an observation that refining a candidate may still win it.
 const HOPE: f64 = 0.5;
-/// Share of points on the map above which a cloud is surely not on its side.
-const GOOD_INLIERS: f64 = 0.8;
 /// Classes that are searched by, at most.
 const SEARCHED_CLASSES: usize = 24;
 
@@ -53,7 +56,14 @@ pub fn calibrate(
     options: &CalibrationOptions,
     progress: &dyn Progress,
 ) -> Calibration {
-    run(map, request, options, progress).unwrap_or_else(Calibration::from)
+    let once = |request: &CalibrationRequest<'_>| {
+        run(map, request, options, progress).unwrap_or_else(Calibration::from)
+    };
+    let found = once(request);
+    match options.estimate_scale {
+        true => scale::calibrate_scaled(request, found, once),
+        false => found,
+    }
 }
 
 fn run(
@@ -96,29 +106,20 @@ fn run(
     }
     step(progress, Stage::Judge, 0.9)?;
     let calibration = judge::answer(&bench, all, request.start.is_some());
-    let mirrored = judge::misread(
-        &bench,
-        &first,
-        &[judge::Misreading::Mirrored],
-        region.as_ref(),
-    );
-    let good = calibration.verdict == Verdict::Ok && calibration.inlier_fraction > GOOD_INLIERS;
-    // A cloud that may lean is not of a headset, whose axes are often mistaken.
-    let good = good || !options.gravity_sigma_rad.is_finite();
-    let misread = mirrored.or_else(|| match good {
-        true => None,
-        false => judge::misread(&bench, &first, &judge::ON_THEIR_SIDE, None),
-    });
+    let misread = misread(&bench, &first, region.as_ref());
     let _ = progress.report(Stage::Judge, 1.0);
     Ok(match misread {
-        Some(reading) => Calibration {
+        Some(better) if better.clearly => Calibration {
             verdict: Verdict::RejectedInput,
-            reason: format!(
-                "the cloud fits the map only when it is read {reading}: check its axes"
-            ),
+            reason: format!("the cloud {}", better.reading.reason(options.axes)),
             ..calibration
         },
-        None => calibration,
+        Some(better) if calibration.verdict == Verdict::Ok => Calibration {
+            verdict: Verdict::Ambiguous,
+            reason: format!("perhaps the cloud {}", better.reading.reason(options.axes)),
+            ..calibration
+        },
+        _ => calibration,
     })
 }
 

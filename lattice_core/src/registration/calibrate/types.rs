@@ -4,6 +4,8 @@ use std::ops::ControlFlow;
 
 use nalgebra::{Isometry3, Matrix6, Point3, Vector3};
 
+use super::profile::Profile;
+use crate::pose::Axes;
 use crate::registration::{Confusion, SemanticCloud};
 
 /// One scan of the headset.
@@ -29,6 +31,8 @@ pub struct CalibrationRequest<'a> {
 /// Options of a calibration. All lengths are metres.
 #[derive(Clone, Copy, PartialEq, Debug)]
 pub struct CalibrationOptions {
+    /// Profile that the others were taken from.
+    pub profile: Profile,
     /// Fewest points of the headset.
     pub min_points: usize,
     /// Most points of the headset.
@@ -41,9 +45,15 @@ pub struct CalibrationOptions {
     pub region_m: f64,
     /// Standard deviation of the headset's scale.
     pub scale_sigma: f64,
+    /// Largest difference from 1 of the scale of the headset's points in the map; as a share.
+    pub max_scale_error: f64,
+    /// True if the headset's points are scaled to the map, whatever their scale.
+    pub estimate_scale: bool,
     /// Standard deviation of the tilt between the two frames, radians; infinite if one does not know
     /// where down is.
     pub gravity_sigma_rad: f64,
+    /// Axes that the clouds were read as, for what is said of those that were misread.
+    pub axes: Axes,
     /// Share of places where equal class numbers are expected to agree before anything was learned;
     /// 0 if the label sets have nothing to do with each other.
     pub agreement: f64,
@@ -61,30 +71,20 @@ pub struct CalibrationOptions {
     pub max_sigma_rad: f64,
 }
 
-impl CalibrationOptions {
-    /// For scans of laser scanners outdoors instead of a headset's mesh.
-    pub fn lidar() -> CalibrationOptions {
-        CalibrationOptions {
-            noise_m: 0.03,
-            scale_sigma: 0.0,
-            gravity_sigma_rad: f64::INFINITY,
-            start_radius_m: 30.0,
-            max_sigma_m: 0.15,
-            ..CalibrationOptions::default()
-        }
-    }
-}
-
 impl Default for CalibrationOptions {
     fn default() -> CalibrationOptions {
         CalibrationOptions {
+            profile: Profile::Headset,
             min_points: 100,
             max_points: 500_000,
             registered_points: 4_000,
             noise_m: 0.02,
             region_m: 1.0,
             scale_sigma: 0.005,
+            max_scale_error: 0.03,
+            estimate_scale: false,
             gravity_sigma_rad: 0.006,
+            axes: Axes::RosFlu,
             agreement: 0.6,
             start_radius_m: 2.0,
             start_yaw_rad: 1.0,
@@ -155,6 +155,15 @@ pub struct ClassReliability {
     pub weight: f64,
 }
 
+/// Scale of the headset's points: length in the map over that in the headset.
+#[derive(Clone, Copy, PartialEq, Debug)]
+pub struct ScaleEstimate {
+    /// The scale.
+    pub scale: f64,
+    /// Its standard deviation.
+    pub sigma: f64,
+}
+
 /// The answer.
 #[derive(Clone, PartialEq, Debug)]
 pub struct Calibration {
@@ -169,6 +178,9 @@ pub struct Calibration {
     /// Covariance of x, y, z (m^2) and the turns about x, y, z (rad^2), in the map frame, as in
     /// `geometry_msgs/PoseWithCovariance`.
     pub covariance: Matrix6<f64>,
+    /// Scale of the headset's points in the map, None if they do not tell it. The pose is that of points
+    /// multiplied by it only with [`CalibrationOptions::estimate_scale`].
+    pub scale: Option<ScaleEstimate>,
     /// Log-likelihood above that of the best different pose.
     pub log_margin: f64,
     /// Share of the headset's points on a surface of the map.
@@ -194,6 +206,7 @@ impl Calibration {
             cancelled: false,
             map_from_headset: Isometry3::identity(),
             covariance: Matrix6::zeros(),
+            scale: None,
             log_margin: 0.0,
             inlier_fraction: 0.0,
             rmse_m: 0.0,

@@ -6,6 +6,7 @@ use thiserror::Error;
 use super::MapContents;
 use super::contents::no_columns;
 use crate::lattice::MortonKey;
+use crate::voxels::distortion::scaled;
 use crate::voxels::store::payload_columns::Columns;
 use crate::voxels::{Voxel, set_ops};
 
@@ -108,7 +109,8 @@ impl MapContents {
     }
 
     /// Keeps the cells that `keep` wants, called in ascending order with key and centre (map frame,
-    /// metres). The statistics stay those of all points that were ever inserted.
+    /// metres). The statistics count the points of these; their distances, which no cell keeps, are taken
+    /// in proportion.
     pub fn retain(&mut self, mut keep: impl FnMut(MortonKey, Vector3<f64>) -> bool) {
         let datum_m = self.datum_m();
         let kept: Vec<bool> = self
@@ -116,6 +118,7 @@ impl MapContents {
             .iter()
             .map(|&key| keep(key, datum_m + self.lattice.center(key.unpack())))
             .collect();
+        let all = self.keys.len() as u64;
         let mut flags = kept.iter();
         self.keys.retain(|_| flags.next() == Some(&true));
         let places = kept.iter().enumerate().filter(|(_, kept)| **kept);
@@ -123,6 +126,14 @@ impl MapContents {
         if let Some(voxels) = &mut self.voxels {
             let mut flags = kept.iter();
             voxels.retain(|_| flags.next() == Some(&true));
+        }
+        if kept.contains(&false) {
+            let points = match &self.voxels {
+                Some(voxels) => voxels.iter().map(|voxel| u64::from(voxel.count)).sum(),
+                // Cells that count nothing share the points alike.
+                None => scaled(self.sums.points.into(), self.keys.len() as u64, all) as u64,
+            };
+            self.sums = self.sums.of_part(points);
         }
     }
 

@@ -2,7 +2,7 @@
 
 use std::fmt;
 
-use lattice_core::registration::{Calibration, DirectionKind, Registration};
+use lattice_core::registration::{Calibration, DirectionKind, Profile, Registration};
 use nalgebra::Isometry3;
 use serde::Serialize;
 
@@ -21,6 +21,12 @@ pub struct Answer {
     covariance: Option<Vec<f64>>,
     sigma_m: Option<[f64; 3]>,
     sigma_deg: Option<[f64; 3]>,
+    /// None without a verdict.
+    profile: Option<&'static str>,
+    /// Length in the map over that in the cloud, and its standard deviation; None if the points do not
+    /// tell it.
+    scale: Option<f64>,
+    scale_sigma: Option<f64>,
     /// None if no other pose was found.
     log_margin: Option<f64>,
     inlier_fraction: f64,
@@ -67,7 +73,11 @@ pub struct Times {
 
 impl Answer {
     /// Of a calibration.
-    pub fn of_calibration(calibration: &Calibration, names: &BTreeMap<u16, String>) -> Answer {
+    pub fn of_calibration(
+        calibration: &Calibration,
+        profile: Profile,
+        names: &BTreeMap<u16, String>,
+    ) -> Answer {
         let covariance = &calibration.covariance;
         let sigma = |i: usize| covariance[(i, i)].max(0.0).sqrt();
         let weak = calibration.weak_directions.iter().map(|weak| Weak {
@@ -93,6 +103,9 @@ impl Answer {
             covariance: Some(covariance.iter().copied().collect()),
             sigma_m: Some([0, 1, 2].map(sigma)),
             sigma_deg: Some([3, 4, 5].map(|i| sigma(i).to_degrees())),
+            profile: Some(profile.name()),
+            scale: calibration.scale.map(|estimate| estimate.scale),
+            scale_sigma: calibration.scale.map(|estimate| estimate.sigma),
             log_margin: (calibration.log_margin.is_finite()).then_some(calibration.log_margin),
             inlier_fraction: calibration.inlier_fraction,
             rmse_m: calibration.rmse_m,
@@ -144,7 +157,8 @@ impl fmt::Display for Answer {
     fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
         if let Some(verdict) = self.verdict {
             writeln!(f, "verdict        {verdict}: {}", self.reason)?;
-            writeln!(f, "method         {}", self.method)?;
+            let profile = self.profile.unwrap_or_default();
+            writeln!(f, "method         {}, profile {profile}", self.method)?;
         } else {
             writeln!(f, "method         {}, {}", self.method, self.reason)?;
         }
@@ -161,6 +175,9 @@ impl fmt::Display for Answer {
                 f,
                 "sigma          {x:.4} {y:.4} {z:.4} m, {rx:.3} {ry:.3} {rz:.3} deg"
             )?;
+        }
+        if let (Some(scale), Some(sigma)) = (self.scale, self.scale_sigma) {
+            writeln!(f, "scale          {scale:.4}, sigma {sigma:.4}")?;
         }
         if let Some(margin) = self.log_margin.filter(|_| self.verdict.is_some()) {
             writeln!(f, "log-margin     {margin:.1}")?;

@@ -16,6 +16,8 @@ use lattice_nodes::files::semantic::read_semantic;
 const MIN_CELL_M: f64 = 0.05;
 /// Sides of cells on the diagonal of a map that is a point file.
 const CELLS_A_DIAGONAL: f64 = 400.0;
+/// Cells that thinning counts from the origin, about.
+const MOST_CELLS: f64 = 1e6;
 /// Longest file of a learned confusion, bytes.
 const MAX_CONFUSION_BYTES: u64 = 1 << 20;
 
@@ -83,14 +85,25 @@ pub fn map(
     cell_side_m: Option<f64>,
     max_points: usize,
 ) -> CliResult<(SemanticCloud, f64)> {
-    let file = read_semantic(path, max_points)?;
-    if file.cloud.is_empty() {
-        return Err(format!("{}: the map has no points", path.display()).into());
-    }
+    let file = read_semantic(path, max_points)?.with_points(path)?;
     if let (Some(side_m), None) = (file.cell_side_m, cell_side_m) {
         return Ok((file.cloud, side_m));
     }
     let side_m = cell_side_m.unwrap_or_else(|| usual_cell_m(&file.cloud));
+    let farthest = |cloud: &SemanticCloud| {
+        let coordinates = cloud.points_m.iter().flat_map(|p| p.coords.iter());
+        coordinates.fold(0.0_f64, |most, c| most.max(c.abs()))
+    };
+    let least_m = farthest(&file.cloud) / MOST_CELLS;
+    if side_m < least_m {
+        let here = path.display();
+        return Err(format!(
+            "cells of {side_m} m are too small for {here}, which reaches {:.1} m from its origin: \
+             take at least {least_m:.1e}",
+            least_m * MOST_CELLS
+        )
+        .into());
+    }
     Ok((voxel_downsample(&file.cloud, side_m), side_m))
 }
 
@@ -112,7 +125,7 @@ pub fn headset_scans(
     max_points: usize,
 ) -> CliResult<Vec<HeadsetScan>> {
     let read = |path: &PathBuf| {
-        let mut cloud = read_semantic(path, max_points)?.cloud;
+        let mut cloud = read_semantic(path, max_points)?.with_points(path)?.cloud;
         for point in &mut cloud.points_m {
             *point = axes.point_to_ros(point);
         }

@@ -3,6 +3,7 @@
 mod answer;
 mod input;
 mod methods;
+mod options;
 
 use std::collections::BTreeMap;
 use std::ops::ControlFlow;
@@ -12,7 +13,8 @@ use std::time::Instant;
 use clap::Args;
 use lattice_core::pose::Axes;
 use lattice_core::registration::{
-    CalibrationMap, CalibrationOptions, CalibrationRequest, Stage, Verdict, calibrate,
+    CalibrationMap, CalibrationOptions, CalibrationRequest, HeadsetScan, SemanticCloud, Stage,
+    Verdict, calibrate,
 };
 
 use super::progress::Progress;
@@ -21,6 +23,7 @@ use answer::{Answer, Times};
 use input::{Guess, Place};
 use lattice_nodes::files::classes::read_classes;
 use methods::{MethodName, register_once};
+use options::SearchOptions;
 
 /// Options of `lattice calibrate`.
 ///
@@ -29,7 +32,8 @@ use methods::{MethodName, register_once};
 /// than `auto` if it converged; the answer is printed in any case.
 #[derive(Args)]
 pub struct Calibrate {
-    /// Map file, or ply, pcd, xyz (also .bz2) with or without a number `label` of each point; metres, z up
+    /// Map file, or ply, pcd, xyz (also .bz2) with or without a number `label` of each point, or KITTI bin with
+    /// a .label file of SemanticKITTI beside it or in ../labels; metres, z up
     #[arg(long, value_name = "FILE")]
     map: PathBuf,
     /// Cloud to find in it, of the same kinds; gravity along -z once the axes are those of ROS. Several
@@ -62,36 +66,14 @@ pub struct Calibrate {
     /// 1/400 of the diagonal, at least 0.05]
     #[arg(long)]
     cell: Option<f64>,
-    /// Sensor of the cloud; its noise and its knowledge of the vertical follow from it
-    #[arg(long, value_enum, default_value_t = Sensor::Headset)]
-    from: Sensor,
-    /// Standard deviation of the cloud's points, m [default: 0.02 of a headset, 0.03 of a lidar]
-    #[arg(long)]
-    noise: Option<f64>,
     /// Most points to read of a file
     #[arg(long, default_value_t = 20_000_000)]
     max_points: usize,
     /// Print as JSON
     #[arg(long)]
     json: bool,
-}
-
-/// Sensors of clouds.
-#[derive(Clone, Copy, Debug, clap::ValueEnum)]
-enum Sensor {
-    /// The mesh of a mixed-reality headset, upright
-    Headset,
-    /// A laser scanner, outdoors, that may lean
-    Lidar,
-}
-
-impl Sensor {
-    fn options(self) -> CalibrationOptions {
-        match self {
-            Sensor::Headset => CalibrationOptions::default(),
-            Sensor::Lidar => CalibrationOptions::lidar(),
-        }
-    }
+    #[command(flatten)]
+    search: SearchOptions,
 }
 
 impl Calibrate {
@@ -99,6 +81,8 @@ impl Calibrate {
     pub fn run(self) -> CliResult {
         init_logging();
         self.check()?;
+        let most = self.max_points.saturating_mul(self.cloud.len());
+        let options = self.search.options(self.axes, most)?;
         let names = match &self.labels {
             Some(path) => read_classes(path).map_err(|e| format!("{}: {e}", path.display()))?,
             None => BTreeMap::new(),
@@ -121,7 +105,13 @@ impl Calibrate {
                 let registration = register_once(&method, map, headset_scans, &start, &mut times)?;
                 Answer::of_registration(self.method.name(), &registration)
             }
-            None => self.search(map, cell_side_m, &headset_scans, &names, &mut times)?,
+            None => self.find(
+                (map, cell_side_m),
+                &headset_scans,
+                &options,
+                &names,
+                &mut times,
+            )?,
         };
         (answer.points, answer.map_points, answer.times) = (points, map_points, times);
         if self.json {
@@ -143,16 +133,15 @@ impl Calibrate {
             _ => Ok(()),
         };
         positive("gate", self.gate)?;
-        positive("cell", self.cell)?;
-        positive("noise", self.noise)
+        positive("cell", self.cell)
     }
 
     /// Searches, judges and keeps the learned confusion.
-    fn search(
+    fn find(
         &self,
-        map: lattice_core::registration::SemanticCloud,
-        cell_side_m: f64,
-        headset_scans: &[lattice_core::registration::HeadsetScan],
+        (map, cell_side_m): (SemanticCloud, f64),
+        headset_scans: &[HeadsetScan],
+        options: &CalibrationOptions,
         names: &BTreeMap<u16, String>,
         times: &mut Times,
     ) -> CliResult<Answer> {
@@ -171,19 +160,14 @@ impl Calibrate {
             start: self.guess.as_ref().map(|guess| guess.0),
             confusion: known.as_ref(),
         };
-        let usual = self.from.options();
-        let options = CalibrationOptions {
-            noise_m: self.noise.unwrap_or(usual.noise_m),
-            ..usual
-        };
         let started = Instant::now();
-        let calibration = calibrate(&map, &request, &options, &Shown(&bar));
+        let calibration = calibrate(&map, &request, options, &Shown(&bar));
         times.calibrate_ms = milliseconds(started);
         bar.done();
         if let (Some(path), Verdict::Ok) = (&self.confusion, calibration.verdict) {
             input::keep_confusion(path, &calibration.confusion)?;
         }
-        Ok(Answer::of_calibration(&calibration, names))
+        Ok(Answer::of_calibration(&calibration, options.profile, names))
     }
 }
 

@@ -8,7 +8,7 @@ use super::read;
 use crate::CliResult;
 #[cfg(feature = "lab")]
 use lattice_lab::render::RenderOptions;
-use lattice_nodes::files::export::{write_centers_ply, write_mesh_ply};
+use lattice_nodes::files::export::{write_centers_ply, write_centers_xyz, write_mesh_ply};
 use lattice_nodes::files::whole;
 
 /// Options of `lattice map export`.
@@ -16,7 +16,7 @@ use lattice_nodes::files::whole;
 pub struct Export {
     /// Map file, as `--map-out` writes it
     map: PathBuf,
-    /// File to write
+    /// File to write: .ply, .xyz (centres as text) or .png (a picture); without extension PLY
     #[arg(long, short)]
     out: PathBuf,
     /// Form to write; a `.png` file is always a picture
@@ -59,6 +59,7 @@ enum Form {
 impl Export {
     /// Runs the command.
     pub fn run(self) -> CliResult {
+        let text = self.check()?;
         let (map, _) = read(&self.map)?;
         let list = map.into_list(usize::MAX);
         #[cfg(feature = "lab")]
@@ -66,11 +67,38 @@ impl Export {
             return crate::lab::picture(&list, &self.picture.options(), &self.out);
         }
         whole::write(&self.out, |out| match self.form {
+            Form::Centers if text => write_centers_xyz(&list, out),
             Form::Centers => write_centers_ply(&list, out),
             Form::Mesh => write_mesh_ply(&list, out),
             #[cfg(feature = "lab")]
             Form::Png => Ok(()),
         })
+    }
+
+    /// True for text; refuses what the extension promises and the form is not.
+    fn check(&self) -> Result<bool, String> {
+        let extension = self.out.extension().unwrap_or_default().to_string_lossy();
+        let form = self.form;
+        match (extension.to_ascii_lowercase().as_str(), form) {
+            ("xyz", Form::Centers) => Ok(true),
+            ("ply", Form::Centers | Form::Mesh) | ("", _) => Ok(false),
+            #[cfg(feature = "lab")]
+            ("png", _) => Ok(false),
+            _ => {
+                let name = form.to_possible_value();
+                let name = name.as_ref().map_or("this", |value| value.get_name());
+                let out = self.out.display();
+                let known = match form {
+                    Form::Centers => ".ply or .xyz",
+                    Form::Mesh => ".ply",
+                    #[cfg(feature = "lab")]
+                    Form::Png => ".png",
+                };
+                Err(format!(
+                    "{out}: --as {name} writes {known}, no .{extension}"
+                ))
+            }
+        }
     }
 }
 

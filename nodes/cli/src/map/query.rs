@@ -24,8 +24,8 @@ pub struct Query {
     #[arg(long, num_args = 3, value_names = ["X", "Y", "Z"], allow_negative_numbers = true, group = "question")]
     nearest: Option<Vec<f64>>,
     /// Number of cells
-    #[arg(short, default_value_t = 1, requires = "nearest")]
-    k: usize,
+    #[arg(short, default_value_t = 1, requires = "nearest", value_parser = clap::value_parser!(u32).range(1..))]
+    k: u32,
     /// Distance from a point to the nearest occupied cell as the polyhedron that it is, and 0 in one
     #[arg(long, num_args = 3, value_names = ["X", "Y", "Z"], allow_negative_numbers = true, group = "question")]
     clearance: Option<Vec<f64>>,
@@ -93,7 +93,7 @@ impl Query {
             distance_m,
         };
         if let Some(point) = self.nearest.as_deref().and_then(first_point) {
-            let found = questions.nearest(&point, self.k)?.into_iter();
+            let found = questions.nearest(&point, self.k as usize)?.into_iter();
             return Ok(Answer::Nearest(
                 found.map(|near| cell(near.key, near.distance_m)).collect(),
             ));

@@ -176,13 +176,31 @@ fn faults_are_one_line() {
     let room = Labelled::room();
     let map = room.write(folder.path(), "map.ply", |p| p.coords.into());
     let none = Labelled(Vec::new()).write(folder.path(), "none.ply", |p| p.coords.into());
+    let nan = folder.path().join("nan.xyz").display().to_string();
+    std::fs::write(&nan, "nan 0 0\n0 inf 1\n").unwrap();
     let common = ["--map", &map, "--cloud", &map];
     for (arguments, message) in [
         (vec!["--map", "/no/such", "--cloud", &map], "/no/such: "),
         (vec!["--map", &map, "--cloud", "/no/such"], "/no/such: "),
         (
             vec!["--map", &none, "--cloud", &map],
-            "the map has no points",
+            "none.ply: the file has no points",
+        ),
+        (
+            vec!["--map", &nan, "--cloud", &map],
+            "nan.xyz: none of its 2 points is finite",
+        ),
+        (
+            vec!["--map", &map, "--cloud", &nan],
+            "nan.xyz: none of its 2 points is finite",
+        ),
+        (
+            [&common[..], &["--cell", "1e-9"]].concat(),
+            "take at least 6",
+        ),
+        (
+            [&common[..], &["--min-inliers", "40"]].concat(),
+            "--min-inliers 40 is not from 0 to 1",
         ),
         ([&common[..], &["--labels", &map]].concat(), "map.ply: "),
         ([&common[..], &["--confusion", &map]].concat(), "map.ply: "),
@@ -198,4 +216,48 @@ fn faults_are_one_line() {
     let output = calibrate(&[&common[..], &["--guess", "1 2 3"]].concat());
     let text = String::from_utf8(output.stderr).unwrap();
     assert!(text.contains("3 numbers instead of 4 or 7"), "{text}");
+}
+
+#[test]
+fn axes_and_scale_that_are_wrong_are_told_and_thresholds_can_be_set() {
+    let folder = tempfile::tempdir().unwrap();
+    let room = Labelled::room();
+    let map = room.write(folder.path(), "map.ply", |p| p.coords.into());
+    let seen = seen(&room);
+    let ros = seen.write(folder.path(), "ros.ply", |p| p.coords.into());
+    let small = seen.write(folder.path(), "small.ply", |p| (p.coords * 0.95).into());
+    let ask = |cloud: &str, more: &[&str]| {
+        let common = [
+            "--map", &map, "--cloud", cloud, "--sensor", "0 0 0", "--json",
+        ];
+        let output = calibrate(&[&common[..], more].concat());
+        let found = answer(&output);
+        assert_eq!(output.status.success(), found["verdict"] == "OK", "{found}");
+        found
+    };
+    let reason = |found: &Value| found["reason"].as_str().unwrap().to_owned();
+    for axes in ["unity_ruf", "optical"] {
+        let found = ask(&ros, &["--axes", axes]);
+        assert_eq!(found["verdict"], "REJECTED_INPUT");
+        let said = "fits as ros_flu: the cloud was converted twice";
+        assert!(reason(&found).contains(said), "{found}");
+    }
+    let found = ask(&small, &[]);
+    assert_eq!(found["verdict"], "REJECTED_INPUT");
+    assert!(reason(&found).contains("multiplied by 1.05"), "{found}");
+    let found = ask(&small, &["--estimate-scale"]);
+    assert_eq!(found["verdict"], "OK", "{found}");
+    assert!((found["scale"].as_f64().unwrap() - 1.0 / 0.95).abs() < 0.005);
+    check_pose(&found);
+    assert_eq!(ask(&small, &["--max-scale-error", "0.2"])["verdict"], "OK");
+    let found = ask(&ros, &["--profile", "depth_camera"]);
+    assert_eq!(
+        (&found["verdict"], &found["profile"]),
+        (&"OK".into(), &"depth_camera".into())
+    );
+    assert_eq!(ask(&ros, &["--from", "lidar"])["profile"], "lidar");
+    let found = ask(&ros, &["--min-margin", "1e6"]);
+    assert_eq!(found["verdict"], "AMBIGUOUS", "{found}");
+    let found = ask(&ros, &["--min-inliers", "1"]);
+    assert!(found["verdict"] == "OK" || reason(&found).contains("100 % are needed"));
 }

@@ -84,8 +84,12 @@ fn maps_merge_differ_and_are_cut() {
         let sides = [&["--min"], &min[..], &["--max"], &max[..]].concat();
         json(&[&["map", "crop", &merged, "-o", out, "--zstd"], &sides[..]].concat())
     };
-    let cut = boxed(low, ["7.5", high[1], high[2]], &left)["voxels"].as_u64();
-    let other = boxed(["7.5", low[1], low[2]], high, &right)["voxels"].as_u64();
+    let cut = boxed(low, ["7.5", high[1], high[2]], &left);
+    let other = boxed(["7.5", low[1], low[2]], high, &right);
+    let points = |cropped: &serde_json::Value| cropped["points"].as_u64().unwrap();
+    let all = whole.distortion().points;
+    assert_eq!(points(&cut) + points(&other), all);
+    let (cut, other) = (cut["voxels"].as_u64(), other["voxels"].as_u64());
     assert!(cut > Some(10) && other > Some(10));
     assert_eq!(cut.unwrap() + other.unwrap(), whole.len() as u64);
     let left = load(&left);
@@ -154,6 +158,12 @@ fn maps_answer_questions() {
     assert_eq!(
         (&near[0]["distance_m"], &near[1]["distance_m"]),
         (&1.0.into(), &1.25_f64.sqrt().into())
+    );
+    let none = lattice(&["map", "query", &path, "--nearest", "1", "0", "0", "-k", "0"]);
+    let told = String::from_utf8_lossy(&none.stderr).into_owned();
+    assert!(
+        !none.status.success() && told.contains("0 is not in 1.."),
+        "{told}"
     );
     let clear = ask(&["--clearance", "1", "0", "-0.1"]);
     assert_eq!(clear["clearance"]["distance_m"], 0.75);

@@ -115,6 +115,55 @@ fn a_map_file_can_be_looked_into_and_exported() {
         let bytes = std::fs::read(&out).unwrap();
         assert!(String::from_utf8_lossy(&bytes).starts_with(begin), "{form}");
     }
+    let xyz = directory.path().join("centres.xyz").display().to_string();
+    text(&["map", "export", &map, "-o", &xyz]);
+    assert_eq!(std::fs::read_to_string(&xyz).unwrap().lines().count(), 2);
+    assert_eq!(
+        json(&["quantize", &xyz, "--lattice", "fcc"])[0]["voxels"],
+        2
+    );
+    for (out, form, known) in [
+        ("a.las", "centers", ".ply or .xyz"),
+        ("a.xyz", "mesh", ".ply"),
+    ] {
+        let out = directory.path().join(out);
+        let line = error(&[
+            "map",
+            "export",
+            &map,
+            "-o",
+            &out.display().to_string(),
+            "--as",
+            form,
+        ]);
+        assert!(line.contains(known) && !out.exists(), "{line}");
+    }
+}
+
+#[test]
+fn a_quantization_that_leaves_points_out_fails_and_labels_are_kept() {
+    let directory = tempfile::tempdir().unwrap();
+    let at = |name: &str| directory.path().join(name).display().to_string();
+    let (cloud, map) = (at("cloud.ply"), at("map"));
+    let rows: String = (0..60).map(|i| format!("{i} 0 0 {}\n", i % 2)).collect();
+    let head = "ply\nformat ascii 1.0\nelement vertex 60\nproperty float x\nproperty float y\n\
+                property float z\nproperty ushort label\nend_header\n";
+    std::fs::write(&cloud, format!("{head}{rows}")).unwrap();
+    let quantize = ["quantize", &cloud, "--lattice", "fcc", "--map-out", &map];
+    let line = error(&[&quantize[..], &["--max-voxels", "5"]].concat());
+    assert!(
+        line.contains("55 points are beyond --max-voxels 5"),
+        "{line}"
+    );
+    assert!(!std::path::Path::new(&map).exists());
+    text(&quantize);
+    let read = lattice_nodes::files::semantic::read_semantic(map.as_ref(), 100).unwrap();
+    let labels: Vec<_> = read.cloud.labels.iter().map(|label| label.top()).collect();
+    assert_eq!(labels.len(), 60);
+    assert!(labels.contains(&Some(0)) && labels.contains(&Some(1)));
+    let nan = at("nan.xyz");
+    std::fs::write(&nan, "nan 0 0\n").unwrap();
+    assert!(error(&["quantize", &nan]).contains("none of its 1 points is finite"));
 }
 
 #[test]

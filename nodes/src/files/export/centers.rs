@@ -30,6 +30,18 @@ pub fn write_centers_ply(list: &VoxelList, writer: impl Write) -> Result<(), Exp
     Ok(())
 }
 
+/// Writes the centres of the occupied cells in Morton order as lines of text: x, y and z in metres, map
+/// frame.
+pub fn write_centers_xyz(list: &VoxelList, writer: impl Write) -> Result<(), ExportError> {
+    let mut writer = std::io::BufWriter::new(writer);
+    for (key, _) in list.sorted() {
+        let center = list.center_m(key);
+        writeln!(writer, "{} {} {}", center.x, center.y, center.z)?;
+    }
+    writer.flush()?;
+    Ok(())
+}
+
 #[cfg(test)]
 mod tests {
     use lattice_core::cloud::Cloud;

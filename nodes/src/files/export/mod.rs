@@ -6,7 +6,7 @@ mod mesh;
 pub mod palette;
 mod vertices;
 
-pub use centers::write_centers_ply;
+pub use centers::{write_centers_ply, write_centers_xyz};
 pub use cloud::write_labelled_ply;
 pub use mesh::write_mesh_ply;
 pub use palette::{HeightRange, category_color, color_at};

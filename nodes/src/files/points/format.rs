@@ -56,6 +56,16 @@ pub(super) fn is_bzip2(start: &[u8]) -> bool {
     start.starts_with(b"BZh") && block
 }
 
+/// Length of what can only be the start of a bzip2 stream that ends before its first block.
+pub(super) fn cut_bzip2(start: &[u8]) -> Option<u64> {
+    const HEAD: [u8; 10] = *b"BZh91AY&SY";
+    let is_start = match start {
+        [b'B', b'Z', b'h', b'1'..=b'9', rest @ ..] => HEAD.get(4..)?.starts_with(rest),
+        _ => false,
+    };
+    is_start.then_some(start.len() as u64)
+}
+
 /// The family by the first bytes of the content, or else by the extension.
 pub(super) fn detect(start: &[u8], name: &Path) -> Result<Family, PointFileError> {
     if start.starts_with(b"ply\n") || start.starts_with(b"ply\r") {

@@ -1,4 +1,11 @@
-//! KITTI Velodyne scans: records of x, y, z and intensity as little-endian f32, and nothing else.
+//! KITTI Velodyne scans: records of x, y, z and intensity as little-endian f32, and nothing else; the labels
+//! of SemanticKITTI, a u32 for each point, are in a file beside.
+
+use std::fs::File;
+use std::io::BufReader;
+use std::path::{Path, PathBuf};
+
+use lattice_core::registration::UNLABELED;
 
 use super::collect::Collector;
 use super::scalar::Scalar;
@@ -8,10 +15,68 @@ use super::{PointFileError, PointFormat};
 /// Bytes of a point.
 const RECORD: usize = 16;
 
+/// The file with the labels of a scan: beside it, or in `labels` beside its folder, as SemanticKITTI has it.
+fn labels_of(scan: &Path) -> Option<PathBuf> {
+    let beside = scan.with_extension("label");
+    let folder = scan.parent()?.parent().map(|above| above.join("labels"));
+    let apart = folder.and_then(|folder| Some(folder.join(beside.file_name()?)));
+    std::iter::once(beside)
+        .chain(apart)
+        .find(|path| path.is_file())
+}
+
+/// Labels in the order of the points.
+struct Labels {
+    path: PathBuf,
+    source: Source,
+}
+
+impl Labels {
+    fn open(scan: &Path) -> Result<Option<Labels>, PointFileError> {
+        let Some(path) = labels_of(scan) else {
+            return Ok(None);
+        };
+        let file = File::open(&path).map_err(|source| PointFileError::Io { byte: 0, source })?;
+        let source = Source::new(Box::new(BufReader::new(file)));
+        Ok(Some(Labels { path, source }))
+    }
+
+    /// The class of the next point: the low 16 bits, the others number the instance; 0 is none.
+    fn next(&mut self, number: u64) -> Result<u16, PointFileError> {
+        let mut label = [0; 4];
+        let path = self.path.display();
+        let part = format!("label {number} of {path}");
+        self.source.exact(&mut label, part)?;
+        let [low, high, ..] = label;
+        Ok(match u16::from_le_bytes([low, high]) {
+            0 => UNLABELED,
+            class => class,
+        })
+    }
+
+    /// Fails if there are more labels than points.
+    fn end(mut self, points: u64) -> Result<(), PointFileError> {
+        if self.source.peek()?.is_empty() {
+            return Ok(());
+        }
+        Err(PointFileError::Data {
+            format: PointFormat::KittiBin,
+            byte: self.source.byte(),
+            reason: format!(
+                "{} has labels for more than {points} points",
+                self.path.display()
+            ),
+        })
+    }
+}
+
+/// Reads a scan, with its labels if it has a name by which they are found.
 pub(super) fn read(
     source: &mut Source,
+    name: &Path,
     points: &mut Collector,
 ) -> Result<PointFormat, PointFileError> {
+    let mut labels = Labels::open(name)?;
     let mut record = [0; RECORD];
     let mut number = 0_u64;
     while !source.peek()?.is_empty() {
@@ -24,7 +89,12 @@ pub(super) fn read(
             let bytes = record.get(at..).unwrap_or_default();
             Scalar::F32.decode(bytes).unwrap_or(f64::NAN)
         };
-        points.push([0, 4, 8].map(coordinate))?;
+        let point_m = [0, 4, 8].map(coordinate);
+        match &mut labels {
+            Some(labels) => points.push_labelled(point_m, labels.next(number)?)?,
+            None => points.push(point_m)?,
+        }
     }
+    labels.map_or(Ok(()), |labels| labels.end(number))?;
     Ok(PointFormat::KittiBin)
 }

@@ -70,7 +70,12 @@ pub fn read_points(path: &Path, limits: &PointFileLimits) -> Result<PointFile, P
 pub fn open(path: &Path) -> Result<(Box<dyn BufRead>, PathBuf), PointFileError> {
     let io = |source| PointFileError::Io { byte: 0, source };
     let mut packed = BufReader::with_capacity(BUFFER, File::open(path).map_err(io)?);
-    if !format::is_bzip2(packed.fill_buf().map_err(io)?) {
+    let start = packed.fill_buf().map_err(io)?;
+    if !format::is_bzip2(start) {
+        if let Some(byte) = format::cut_bzip2(start) {
+            let part = "its packed data".to_owned();
+            return Err(PointFileError::Truncated { byte, part });
+        }
         return Ok((Box::new(packed), path.to_owned()));
     }
     let name = match path.extension() {
@@ -102,7 +107,7 @@ fn read_stream(
         format::Family::Ply => ply::read(&mut source, &mut points)?,
         format::Family::Pcd => pcd::read(&mut source, &mut points)?,
         format::Family::Text => text::read(&mut source, &mut points)?,
-        format::Family::Kitti => kitti::read(&mut source, &mut points)?,
+        format::Family::Kitti => kitti::read(&mut source, name, &mut points)?,
     };
     Ok(PointFile {
         points_m: points.points_m,

@@ -39,8 +39,7 @@ impl Source {
     }
 
     fn io(&self, source: io::Error) -> PointFileError {
-        let byte = self.byte;
-        PointFileError::Io { byte, source }
+        failed(self.byte, source)
     }
 
     /// Some of the bytes to come; none at the end of the file only.
@@ -48,7 +47,7 @@ impl Source {
         let byte = self.byte;
         self.reader
             .fill_buf()
-            .map_err(|source| PointFileError::Io { byte, source })
+            .map_err(|source| failed(byte, source))
     }
 
     /// The next line without its end, `None` at the end of the file.
@@ -120,6 +119,14 @@ impl Source {
             return Err(truncated(self.byte, part));
         }
         Ok(())
+    }
+}
+
+/// Only a decoder misses bytes that it expects.
+fn failed(byte: u64, source: io::Error) -> PointFileError {
+    match source.kind() {
+        io::ErrorKind::UnexpectedEof => truncated(byte, "its packed data"),
+        _ => PointFileError::Io { byte, source },
     }
 }
 

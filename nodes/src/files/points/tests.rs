@@ -251,3 +251,46 @@ proptest! {
         }
     }
 }
+
+#[test]
+fn labels_of_semantic_kitti_are_found_and_must_be_as_many() {
+    let folder = TempDir::new().unwrap();
+    let scans = folder.path().join("velodyne");
+    std::fs::create_dir_all(&scans).unwrap();
+    std::fs::create_dir_all(folder.path().join("labels")).unwrap();
+    let scan = scans.join("000007.bin");
+    std::fs::write(&scan, floats(f32::to_le_bytes, &[0.5])).unwrap();
+    assert!(read_points(&scan, &LIMITS).unwrap().labels.is_empty());
+    // The upper half is the instance.
+    let labels = |n: u32| (0..n).flat_map(|i| (i << 16 | 40 * (i % 3)).to_le_bytes());
+    let beside = scans.join("000007.label");
+    for path in [folder.path().join("labels/000007.label"), beside.clone()] {
+        std::fs::write(&path, labels(20).collect::<Vec<u8>>()).unwrap();
+        let read = read_points(&scan, &LIMITS).unwrap();
+        assert_eq!(read.points_m.len(), 20);
+        let unlabelled = lattice_core::registration::UNLABELED;
+        assert_eq!(read.labels[..4], [unlabelled, 40, 80, unlabelled]);
+    }
+    for (n, message) in [(19, "label 20 of "), (21, "labels for more than 20 points")] {
+        std::fs::write(&beside, labels(n).collect::<Vec<u8>>()).unwrap();
+        let error = read_points(&scan, &LIMITS).unwrap_err().to_string();
+        assert!(
+            error.contains(message) && error.contains("000007.label"),
+            "{error}"
+        );
+    }
+}
+
+#[test]
+fn a_packed_file_that_is_cut_says_so_wherever_it_is_cut() {
+    let folder = TempDir::new().unwrap();
+    let mut encoder = BzEncoder::new(Vec::new(), Compression::best());
+    encoder.write_all(rows("").as_bytes()).unwrap();
+    let packed = encoder.finish().unwrap();
+    let path = folder.path().join("points.xyz.bz2");
+    for length in [4, 7, 10, 60, packed.len() - 1] {
+        std::fs::write(&path, &packed[..length]).unwrap();
+        let error = read_points(&path, &LIMITS).unwrap_err().to_string();
+        assert!(error.contains("the file is cut short"), "{length}: {error}");
+    }
+}

@@ -6,8 +6,8 @@ use crate::bench::timed;
 use crate::evaluate::trial::rounded;
 use crate::metrics::PoseError;
 use lattice_core::registration::{
-    CalibrationMap, CalibrationOptions, CalibrationRequest, HeadsetScan, PrepareOptions,
-    PreparedCloud, SemanticCloud, calibrate, register, voxel_downsample,
+    CalibrationMap, CalibrationRequest, HeadsetScan, PrepareOptions, PreparedCloud, Profile,
+    SemanticCloud, calibrate, register, voxel_downsample,
 };
 use nalgebra::{Isometry3, Point3, UnitQuaternion, Vector3};
 use serde::Serialize;
@@ -179,7 +179,7 @@ impl Pair {
                     start,
                     confusion: None,
                 };
-                let options = CalibrationOptions::lidar();
+                let options = Profile::Lidar.options();
                 let (found, spent) = timed(|| calibrate(&target.map, &request, &options, &()));
                 PairRow {
                     register_ms: 1e3 * spent.cpu_s,

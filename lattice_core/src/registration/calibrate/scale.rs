@@ -1,0 +1,136 @@
+//! Scale of a source cloud, estimated with its pose.
+
+use nalgebra::{Isometry3, OMatrix, SMatrix, SVector, U7};
+use std::collections::BTreeMap;
+
+use super::super::PreparedCloud;
+use super::super::likelihood::region_of;
+use super::covariance::{ErrorModel, terms};
+use super::types::{Calibration, CalibrationRequest, HeadsetScan, ScaleEstimate};
+use crate::pose::se3;
+
+/// Steps of Gauss and Newton, with new partners before each.
+const STEPS: usize = 10;
+/// Change of the scale below which a step is none.
+const STILL: f64 = 1e-4;
+/// Calibrations that a scale may take.
+const ROUNDS: usize = 3;
+/// Difference from 1 that is not worth another calibration.
+const LEAST: f64 = 0.003;
+/// Scales that are believed to be of one world.
+const SANE: std::ops::Range<f64> = 0.5..2.0;
+
+/// Pose and scale, and what pulls at both by region.
+#[derive(Default)]
+struct Pulls {
+    hessian: OMatrix<f64, U7, U7>,
+    regions: BTreeMap<[i64; 3], (SVector<f64, 7>, SMatrix<f64, 7, 3>)>,
+}
+
+/// The scale that fits best near a pose, with the standard deviation that regions which err together
+/// give it; None if the points do not hold it.
+pub(super) fn scale_at(
+    source: &PreparedCloud,
+    target: &PreparedCloud,
+    target_from_source: &Isometry3<f64>,
+    model: &ErrorModel,
+) -> Option<ScaleEstimate> {
+    let (mut pose, mut scale) = (*target_from_source, 1.0);
+    let mut last = None;
+    for _ in 0..STEPS {
+        let pulls = Pulls::at(source, target, &pose, scale, model);
+        let inverse = pulls.hessian.try_inverse()?;
+        let pull: SVector<f64, 7> = pulls.regions.values().map(|(residual, _)| residual).sum();
+        let step = -(inverse * pull);
+        let moved = step.fixed_rows::<6>(0).into_owned();
+        (pose, scale) = (pose * se3::exp(&moved), scale + step[6]);
+        if !SANE.contains(&scale) {
+            return None;
+        }
+        let lever = inverse.row(6);
+        let variance = |(residual, motion): &(SVector<f64, 7>, SMatrix<f64, 7, 3>)| {
+            let moved = (lever * motion).norm_squared();
+            (lever * residual).norm_squared() + model.sigma_m.powi(2) * moved
+        };
+        let variance: f64 = pulls.regions.values().map(variance).sum();
+        // What a step still moves is not known.
+        let sigma = variance.sqrt().hypot(step[6]);
+        last = sigma.is_finite().then_some(ScaleEstimate { scale, sigma });
+        if step[6].abs() < STILL {
+            break;
+        }
+    }
+    last
+}
+
+/// Calibrates with the points multiplied by their scale, until that is 1.
+///
+/// `found` is the answer without; the scale of the answer is that of the points as they came.
+pub(super) fn calibrate_scaled(
+    request: &CalibrationRequest<'_>,
+    mut found: Calibration,
+    calibrate: impl Fn(&CalibrationRequest<'_>) -> Calibration,
+) -> Calibration {
+    let mut total = 1.0;
+    for _ in 0..ROUNDS {
+        let Some(left) = found.scale.filter(ScaleEstimate::matters) else {
+            break;
+        };
+        total *= left.scale;
+        let headset_scans: Vec<HeadsetScan> = (request.headset_scans.iter())
+            .map(|scan| scaled(scan, total))
+            .collect();
+        let request = CalibrationRequest {
+            headset_scans: &headset_scans,
+            ..*request
+        };
+        found = calibrate(&request);
+    }
+    if total != 1.0 {
+        found.reason = format!("{}; the points were multiplied by {total:.4}", found.reason);
+    }
+    found.scale = found.scale.map(|left| ScaleEstimate {
+        scale: total * left.scale,
+        sigma: total * left.sigma,
+    });
+    found
+}
+
+fn scaled(scan: &HeadsetScan, by: f64) -> HeadsetScan {
+    let mut scan = scan.clone();
+    let points = scan.cloud.points_m.iter_mut().chain(&mut scan.sensor_m);
+    points.for_each(|point| point.coords *= by);
+    scan
+}
+
+impl ScaleEstimate {
+    /// True if it is neither 1 nor next to it.
+    fn matters(&self) -> bool {
+        let off = (self.scale - 1.0).abs();
+        off > LEAST && off > 2.0 * self.sigma
+    }
+}
+
+impl Pulls {
+    fn at(
+        source: &PreparedCloud,
+        target: &PreparedCloud,
+        pose: &Isometry3<f64>,
+        scale: f64,
+        model: &ErrorModel,
+    ) -> Pulls {
+        let mut pulls = Pulls::default();
+        for term in terms(source, target, pose, scale, model) {
+            let mut jacobian = SMatrix::<f64, 3, 7>::zeros();
+            jacobian.fixed_columns_mut::<6>(0).copy_from(&term.jacobian);
+            jacobian.set_column(6, &-term.stretch);
+            let lever = jacobian.transpose() * term.weight;
+            pulls.hessian += lever * jacobian;
+            let region = region_of(&term.point, model.region_m);
+            let (residual, motion) = pulls.regions.entry(region).or_default();
+            *residual += lever * term.residual;
+            *motion += lever;
+        }
+        pulls
+    }
+}

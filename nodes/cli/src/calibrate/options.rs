@@ -1,0 +1,140 @@
+//! Options of the search of `lattice calibrate`: the profile and what is set in its place.
+
+use clap::Args;
+use clap::builder::{PossibleValue, PossibleValuesParser, TypedValueParser};
+use lattice_core::pose::Axes;
+use lattice_core::registration::{CalibrationOptions, Profile};
+
+/// Sensor and thresholds; each that is left out is that of the profile.
+#[derive(Args)]
+#[command(next_help_heading = "Search and verdict [default: of the profile]")]
+pub struct SearchOptions {
+    /// Sensor of the cloud, which sets the others
+    #[arg(long, alias = "from", value_parser = profile(), default_value = "headset")]
+    profile: Profile,
+    /// Standard deviation of the cloud's points, m
+    #[arg(long)]
+    noise: Option<f64>,
+    /// Side of the regions of the cloud that err together, m
+    #[arg(long)]
+    region: Option<f64>,
+    /// Standard deviation of the cloud's scale
+    #[arg(long)]
+    scale_sigma: Option<f64>,
+    /// Standard deviation of the tilt between cloud and map, rad; 0: one of them may lean
+    #[arg(long)]
+    gravity_sigma: Option<f64>,
+    /// Share of places where equal class numbers are expected to agree before anything was learned
+    #[arg(long)]
+    agreement: Option<f64>,
+    /// How far the answer may be from a guess, m
+    #[arg(long)]
+    guess_radius: Option<f64>,
+    /// How far the heading of the answer may be from that of a guess, rad
+    #[arg(long)]
+    guess_yaw: Option<f64>,
+    /// Fewest points of a cloud
+    #[arg(long)]
+    min_points: Option<usize>,
+    /// About how many points are registered; more are thinned
+    #[arg(long)]
+    registered_points: Option<usize>,
+    /// Log-likelihood by which a pose must beat every other to be OK
+    #[arg(long)]
+    min_margin: Option<f64>,
+    /// Share of the points that must lie on the map for it
+    #[arg(long)]
+    min_inliers: Option<f64>,
+    /// Most standard deviation of the place in its least sure direction for it, m
+    #[arg(long)]
+    max_sigma: Option<f64>,
+    /// Most standard deviation of a rotation about any axis for it, rad
+    #[arg(long)]
+    max_sigma_rad: Option<f64>,
+    /// Share by which the cloud's scale may differ from 1 for it
+    #[arg(long)]
+    max_scale_error: Option<f64>,
+    /// Scale the cloud to the map, whatever its scale; the pose is that of the scaled cloud
+    #[arg(long)]
+    estimate_scale: bool,
+}
+
+fn profile() -> impl TypedValueParser<Value = Profile> {
+    let help = |profile| match profile {
+        Profile::Headset => "The mesh of a mixed-reality headset, upright",
+        Profile::Lidar => "A laser scanner, outdoors, that may lean",
+        Profile::DepthCamera => "A depth camera with an IMU",
+    };
+    let value = move |profile: Profile| PossibleValue::new(profile.name()).help(help(profile));
+    let named = |name: &str| Profile::ALL.into_iter().find(|p| p.name() == name);
+    PossibleValuesParser::new(Profile::ALL.map(value))
+        .map(move |name: String| named(&name).unwrap_or_default())
+}
+
+/// A number in its bounds, or the default if none is given.
+fn within(
+    name: &str,
+    value: Option<f64>,
+    default: f64,
+    (least, most): (f64, f64),
+) -> Result<f64, String> {
+    match value {
+        Some(value) if !(least..=most).contains(&value) => {
+            Err(format!("--{name} {value} is not from {least} to {most}"))
+        }
+        _ => Ok(value.unwrap_or(default)),
+    }
+}
+
+impl SearchOptions {
+    /// The options of a calibration of clouds that were read as `axes`.
+    ///
+    /// # Errors
+    /// Names a number that is out of bounds.
+    pub fn options(&self, axes: Axes, max_points: usize) -> Result<CalibrationOptions, String> {
+        let usual = self.profile.options();
+        let (share, length, angle) = ((0.0, 1.0), (1e-6, 1e4), (0.0, 3.2));
+        let gravity = self.gravity_sigma.map(|sigma| match sigma {
+            0.0 => Ok(f64::INFINITY),
+            _ => within("gravity-sigma", Some(sigma), 0.0, angle),
+        });
+        let radius_m = usual.start_radius_m;
+        Ok(CalibrationOptions {
+            min_points: self.min_points.unwrap_or(usual.min_points),
+            max_points,
+            registered_points: (self.registered_points)
+                .unwrap_or(usual.registered_points)
+                .max(1),
+            noise_m: within("noise", self.noise, usual.noise_m, length)?,
+            region_m: within("region", self.region, usual.region_m, (1e-3, 1e4))?,
+            scale_sigma: within(
+                "scale-sigma",
+                self.scale_sigma,
+                usual.scale_sigma,
+                (0.0, 0.5),
+            )?,
+            max_scale_error: within(
+                "max-scale-error",
+                self.max_scale_error,
+                usual.max_scale_error,
+                share,
+            )?,
+            estimate_scale: self.estimate_scale,
+            gravity_sigma_rad: gravity.unwrap_or(Ok(usual.gravity_sigma_rad))?,
+            axes,
+            agreement: within("agreement", self.agreement, usual.agreement, share)?,
+            start_radius_m: within("guess-radius", self.guess_radius, radius_m, length)?,
+            start_yaw_rad: within("guess-yaw", self.guess_yaw, usual.start_yaw_rad, angle)?,
+            min_margin: within("min-margin", self.min_margin, usual.min_margin, (0.0, 1e9))?,
+            min_inliers: within("min-inliers", self.min_inliers, usual.min_inliers, share)?,
+            max_sigma_m: within("max-sigma", self.max_sigma, usual.max_sigma_m, length)?,
+            max_sigma_rad: within(
+                "max-sigma-rad",
+                self.max_sigma_rad,
+                usual.max_sigma_rad,
+                (1e-6, 3.2),
+            )?,
+            ..usual
+        })
+    }
+}
