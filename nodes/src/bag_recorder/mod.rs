@@ -90,9 +90,8 @@ pub struct RecorderReport {
 
 /// Records until a signal or the end of the duration.
 pub fn run(options: RecorderOptions, args: RosArgs) -> Result<RecorderReport, NodeError> {
-    let name = args.node_name(NAME);
-    let runtime = start_runtime(&name, args)?;
-    let node = runtime.node(&name)?;
+    let runtime = start_runtime(NAME, args)?;
+    let node = runtime.node(NAME)?;
     let mut choice = options.choice;
     for topic in choice.topics.iter_mut().chain(&mut choice.exclude) {
         *topic = node.resolve(topic)?;
