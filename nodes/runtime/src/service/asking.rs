@@ -1,8 +1,8 @@
 //! The calls of one client over DDS: who has asked, and which answer is whose.
 
 use std::collections::BTreeMap;
-use std::sync::Mutex;
 use std::sync::atomic::{AtomicI64, Ordering::Relaxed};
+use std::sync::{Arc, Mutex};
 
 use smol::channel::{Sender, bounded};
 
@@ -11,7 +11,6 @@ use crate::outbox::Outbox;
 use crate::peers::Peers;
 use crate::port::SampleReader;
 use crate::sync::lock;
-use std::sync::Arc;
 
 /// Calls that wait for answers.
 #[derive(Default)]
