@@ -1,6 +1,6 @@
 //! `lattice health`: the state of nodes by what they say on `/diagnostics`.
 
-use std::collections::BTreeMap;
+use std::collections::{BTreeMap, BTreeSet};
 use std::sync::mpsc::{RecvTimeoutError, channel};
 use std::time::{Duration, Instant};
 
@@ -18,7 +18,8 @@ const NAME: &str = "lattice_health";
 /// Fail unless nodes are at work and well, by their diagnostics
 #[derive(Args)]
 pub struct Health {
-    /// Full names of nodes, such as `lattice_mapper` or `robot/lattice_mapper`; any node if none is named
+    /// Full names of nodes, such as `lattice_mapper` or `robot/lattice_mapper`; if none is named, all that
+    /// are found to publish on /diagnostics
     nodes: Vec<String>,
     /// Longest wait for them, s; a node speaks each second
     #[arg(long, default_value_t = 5.0, value_name = "S")]
@@ -27,6 +28,9 @@ pub struct Health {
     #[arg(last = true)]
     ros_args: Vec<String>,
 }
+
+/// Time that discovery has where no node is named; each that is well has spoken by then.
+const FINDING: Duration = Duration::from_millis(1500);
 
 /// Highest level that each task of each node has stated last.
 type Tasks = BTreeMap<String, DiagnosticStatus>;
@@ -52,17 +56,42 @@ impl Health {
         let deadline = Instant::now()
             .checked_add(timeout)
             .ok_or("--timeout is too long")?;
-        let mut tasks = Tasks::new();
+        let found = match self.nodes.is_empty() {
+            true => deadline.min(Instant::now() + FINDING),
+            false => Instant::now(),
+        };
+        let topic = node.resolve("/diagnostics")?;
+        let publishers = || {
+            let all = node.remote_publishers();
+            all.iter().filter(|of| of.topic == topic).count()
+        };
+        let (mut tasks, mut sources) = (Tasks::new(), BTreeSet::new());
         loop {
-            match heard.recv_timeout(deadline.saturating_duration_since(Instant::now())) {
-                Ok(message) => tasks.extend(others(&message)),
-                Err(RecvTimeoutError::Timeout) => return self.judge(&tasks),
+            let now = Instant::now();
+            let until = if now < found { found } else { deadline };
+            match heard.recv_timeout(until.saturating_duration_since(now)) {
+                Ok(message) => {
+                    tasks.extend(others(&message));
+                    let first = message.status.first().map(|status| &status.name);
+                    sources.extend(first.filter(|name| node_of(name) != NAME).cloned());
+                }
+                Err(RecvTimeoutError::Timeout) if until < deadline => {}
+                Err(RecvTimeoutError::Timeout) => break,
                 Err(RecvTimeoutError::Disconnected) => return Err("the subscription ended".into()),
             }
-            if self.silent(&tasks).is_empty() {
+            let all = !self.nodes.is_empty() || sources.len() >= publishers();
+            if all && Instant::now() >= found && self.silent(&tasks).is_empty() {
                 return self.judge(&tasks);
             }
         }
+        let silent = publishers().saturating_sub(sources.len());
+        if self.nodes.is_empty() && silent > 0 {
+            eprintln!(
+                "{silent} publishers of {topic} have said nothing in {} s",
+                self.timeout
+            );
+        }
+        self.judge(&tasks)
     }
 
     /// Nodes that have said nothing.

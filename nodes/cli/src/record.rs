@@ -82,7 +82,8 @@ pub struct Record {
     /// Time between two looks for topics, ms
     #[arg(long, short, default_value_t = 100, value_name = "MS", value_parser = clap::value_parser!(u32).range(1..))]
     polling_interval: u32,
-    /// Note the times of /clock; nothing is recorded before its first message
+    /// Note the times of /clock; nothing is recorded before its first message,
+    /// latched messages are with it
     #[arg(long)]
     use_sim_time: bool,
     /// Begin with nothing until a call of ~/resume

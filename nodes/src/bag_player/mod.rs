@@ -49,9 +49,8 @@ pub fn run(arguments: impl IntoIterator<Item = String>) -> Result<(), NodeError>
     if answers_help(NAME, Some(parameters::declare), &args) {
         return Ok(());
     }
-    let name = args.node_name(NAME);
-    let runtime = start_runtime(&name, args)?;
-    let node = runtime.node(&name)?;
+    let runtime = start_runtime(NAME, args)?;
+    let node = runtime.node(NAME)?;
     let params = node.params();
     let Settings {
         bag,

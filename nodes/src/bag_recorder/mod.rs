@@ -90,9 +90,8 @@ pub struct RecorderReport {
 
 /// Records until a signal or the end of the duration.
 pub fn run(options: RecorderOptions, args: RosArgs) -> Result<RecorderReport, NodeError> {
-    let name = args.node_name(NAME);
-    let runtime = start_runtime(&name, args)?;
-    let node = runtime.node(&name)?;
+    let runtime = start_runtime(NAME, args)?;
+    let node = runtime.node(NAME)?;
     let mut choice = options.choice;
     for topic in choice.topics.iter_mut().chain(&mut choice.exclude) {
         *topic = node.resolve(topic)?;
@@ -109,8 +108,12 @@ pub fn run(options: RecorderOptions, args: RosArgs) -> Result<RecorderReport, No
     log::info!("recording to {}", options.bag.display());
     let begin = Instant::now();
     let mut status = Status::new(begin);
+    let mut first_look_end = begin + FIRST_LOOK;
     while !shutdown.is_requested() && options.duration.is_none_or(|most| begin.elapsed() < most) {
-        if options.discovery || begin.elapsed() < FIRST_LOOK {
+        if !session.has_time() {
+            first_look_end = Instant::now() + FIRST_LOOK;
+        }
+        if options.discovery || Instant::now() < first_look_end {
             session.look();
         }
         status.show(&session, &written);

@@ -5,6 +5,7 @@ use std::sync::Arc;
 use std::sync::atomic::{AtomicBool, Ordering::Relaxed};
 
 use lattice_bag::TopicSpec;
+use lattice_runtime::qos::Durability;
 use lattice_runtime::{Load, Node, RemotePublisher, RuntimeError, Subscription};
 
 use super::RecordedTopic;
@@ -68,8 +69,14 @@ impl Session {
         }
     }
 
+    /// False before the first message on /clock where time is simulated.
+    pub(super) fn has_time(&self) -> bool {
+        self.node.clock().now_ns() > 0
+    }
+
     /// Begins to hear topics that have come.
     pub(super) fn look(&mut self) {
+        let has_time = self.has_time();
         let publishers = self.node.remote_publishers();
         let mut by_topic: BTreeMap<&str, Vec<&RemotePublisher>> = BTreeMap::new();
         for publisher in &publishers {
@@ -83,6 +90,11 @@ impl Session {
                 continue;
             }
             let is_new = !self.seen.contains_key(topic);
+            // Latched samples come once: not before there is a time to note them with.
+            let latched = |p: &&RemotePublisher| p.durability == Durability::TransientLocal;
+            if is_new && !has_time && publishers.iter().any(latched) {
+                continue;
+            }
             if is_new && self.seen.len() >= MAX_TOPICS {
                 continue;
             }
@@ -178,5 +190,77 @@ impl Session {
     pub(super) fn lost(&self) -> u64 {
         let lost = self.topics.iter().map(|topic| topic.subscription.lost());
         lost.fold(self.cache.all_lost(), u64::saturating_add)
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use std::time::Duration;
+
+    use lattice_msgs::rosgraph_msgs::Clock;
+    use lattice_msgs::{builtin_interfaces::Time, std_msgs};
+    use lattice_runtime::env::Network;
+    use lattice_runtime::qos::Qos;
+    use lattice_runtime::ros_args::RosArgs;
+    use lattice_runtime::{LoopbackDomain, Runtime};
+
+    use super::super::cache::Next;
+    use super::*;
+
+    #[test]
+    fn latched_samples_are_kept_for_the_first_time_on_the_clock() {
+        let domain = LoopbackDomain::take().unwrap();
+        let network = Network {
+            domain_id: domain.id(),
+            localhost_only: true,
+            ..Network::from_env().unwrap()
+        };
+        let start = |name, args: &[&str]| {
+            let args = RosArgs::parse(args.iter().map(|&arg| arg.to_owned())).unwrap();
+            Runtime::with_transport(name, args, &network).unwrap()
+        };
+        let peer = start("peer", &[]);
+        let node = peer.node("peer").unwrap();
+        let latched = node.publisher("/latched", Qos::LATCHED).unwrap();
+        let data = "kept".to_owned();
+        latched.publish(std_msgs::String { data }).unwrap();
+        let _other = (node.publisher::<std_msgs::String>("/other", Qos::DEFAULT)).unwrap();
+        let clock = node.publisher("/clock", Qos::CLOCK_PLAYER).unwrap();
+
+        let simulated = ["--ros-args", "-p", "use_sim_time:=true"];
+        let recorder = start("bag_recorder", &simulated);
+        let choice = Choice {
+            topics: ["/latched", "/other"].map(str::to_owned).into(),
+            ..Choice::default()
+        };
+        let cache = Arc::new(Cache::new(1000));
+        let node = recorder.node("bag_recorder").unwrap();
+        let mut session = Session::new(node, choice, Definitions::new(&[]), cache.clone(), false);
+        let heard = |session: &Session| {
+            let topics = session.topics.iter();
+            Vec::from_iter(topics.map(|topic| topic.subscription.topic().to_owned()))
+        };
+        // The other is announced later: when it is known, so is the latched one.
+        while !heard(&session).contains(&"/other".to_owned()) {
+            session.look();
+        }
+        assert_eq!(heard(&session), ["/other"]);
+        let _timer = peer.timer(Duration::from_millis(10), move || {
+            let clock_time = Time::from_ns(7_000_000_000);
+            let _ = clock.publish(Clock { clock: clock_time });
+        });
+        while heard(&session).len() < 2 {
+            session.look();
+        }
+        loop {
+            match cache.next(Duration::from_secs(60)) {
+                Next::Item(Item::Message { log_time_ns, .. }) => {
+                    assert_eq!(log_time_ns, 7_000_000_000);
+                    break;
+                }
+                Next::Item(_) => {}
+                Next::Nothing | Next::End => panic!("the latched sample is lost"),
+            }
+        }
     }
 }

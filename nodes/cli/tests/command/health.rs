@@ -65,5 +65,11 @@ fn health_is_what_nodes_say_of_themselves() {
         let said = String::from_utf8_lossy(&output.stdout);
         assert_eq!(output.status.success(), well, "{arguments:?}: {said}");
         assert!(said.contains(words), "{arguments:?}: {said}");
+    } // Each of those that publish is heard, not the first alone.
+    let output = health(&domain, &["--timeout", "60"]);
+    let said = String::from_utf8_lossy(&output.stdout);
+    assert!(!output.status.success(), "{said}");
+    for words in ["well: transport", "no disk"] {
+        assert!(said.contains(words), "{said}");
     }
 }

@@ -5,9 +5,11 @@ use std::process::{Command, Stdio};
 use lattice_bag::BagReader;
 use lattice_runtime::LoopbackDomain;
 use serde_json::{Value, json};
+use wait_timeout::ChildExt;
 
 use crate::nodes::simulated;
-use crate::python;
+use crate::record::start;
+use crate::{PATIENCE, python};
 
 const CLIENT: &str = concat!(
     env!("CARGO_MANIFEST_DIR"),
@@ -66,4 +68,31 @@ fn a_player_obeys_the_services_of_rosbag2() {
         ["stop", 0],
     ]);
     assert_eq!(said, expected);
+}
+
+#[test]
+fn a_renamed_player_and_recorder_take_what_is_under_their_name_in_the_code() {
+    let directory = tempfile::tempdir().unwrap();
+    let domain = LoopbackDomain::take().unwrap();
+    let file = directory.path().join("params.yaml").display().to_string();
+    let bag = directory.path().join("bag").display().to_string();
+    let ros_args = ["--ros-args", "-r", "__node:=other", "--params-file", &file];
+    let player = [&["node", "bag_player"], &ros_args[..]].concat();
+    let recorder = [&["record", "-a", "-o", &bag, "--"], &ros_args[..]].concat();
+    for (name, arguments, wrong) in [
+        ("bag_player", player, "rate: -1.0"),
+        ("bag_recorder", recorder, "max_message_bytes: 0"),
+    ] {
+        let text = format!("{name}:\n  ros__parameters:\n    {wrong}\n");
+        std::fs::write(&file, text).unwrap();
+        let mut node = start(&domain, &arguments);
+        // One that passes the file over plays nothing, or records until it is stopped.
+        let status = node.wait_timeout(PATIENCE).unwrap();
+        let _ = node.kill();
+        let said = node.wait_with_output().unwrap().stderr;
+        let said = String::from_utf8_lossy(&said);
+        let (parameter, _) = wrong.split_once(':').unwrap();
+        assert!(status.is_some_and(|status| !status.success()), "{said}");
+        assert!(said.contains(parameter), "{said}");
+    }
 }
