@@ -62,8 +62,7 @@ pub fn start(runtime: &Runtime, name: &str) -> Result<Finish, NodeError> {
         report_file,
     } = Settings::from_params(params)?;
     let hub = Arc::new(Hub::new(viewer.max_clients));
-    hub.channel::<LatticeMap>(&node.resolve("map")?, Class::Map, false);
-    hub.channel::<LatticeMapUpdate>(&node.resolve("map_updates")?, Class::Updates, false);
+    hub.map_channels(&node.resolve("map")?, &node.resolve("map_updates")?);
     let one = Class::Newest { depth: 1 };
     let fixed_channel = hub.channel::<TFMessage>(&node.resolve("/tf_static")?, one, true);
     hub.set_bridge(Box::new(NodeBridge::new(&node, &reach, &hub)?));

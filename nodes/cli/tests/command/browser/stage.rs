@@ -64,6 +64,7 @@ impl Stage {
         let chunk = Entry {
             stamp_ns: 1,
             cdr: cdr::to_vec(&map(cells)).unwrap().into(),
+            thin: None,
         };
         hub.change_map(|stream| stream.set_keyframe(vec![chunk]));
         let address = SocketAddr::from((Ipv4Addr::LOCALHOST, 0));
