@@ -90,7 +90,8 @@ impl Stage {
     }
 }
 
-fn map(cells: &[Known]) -> LatticeMap {
+/// A map of these cells, as one message.
+pub fn map(cells: &[Known]) -> LatticeMap {
     let mut sorted = cells.to_vec();
     sorted.sort_by_key(|cell| cell.key.parse::<u64>().unwrap());
     let key = |cell: &Known| MortonKey::pack(cell.index).unwrap();
