@@ -58,7 +58,7 @@ impl MapLosses {
     }
 }
 
-/// What a follower of the map asks the mapper for, and tells the operator.
+/// Requests of a follower of the map to the mapper, and its words to the operator.
 pub struct MapRequests {
     losses: MapLosses,
     /// Losses that a keyframe was asked for.
