@@ -12,6 +12,7 @@ pub mod executables;
 pub mod files;
 pub mod lattice_mapper;
 pub mod map_follower;
+mod map_input;
 mod options;
 #[cfg(feature = "bags")]
 pub mod replay;

@@ -2,7 +2,6 @@
 
 import { decodeKeys, keyText, placeIndex, tileIndex } from "./keys.js";
 
-const ENCODING = "morton21_delta_leb128";
 export const NO_LABEL = 65535;
 
 // The cells of one tile, sorted by their place: parallel arrays with room to grow.
@@ -84,7 +83,6 @@ export class Follower {
   now() { return Math.min(65535, Math.round((Date.now() - this.begin) / 1000)); }
 
   onMap(map) {
-    if (map.encoding !== ENCODING) throw new RangeError(`keys are in ${map.encoding}`);
     this.frame = map.header.frame;
     if (!sameLattice(this.info, map.info)) {
       this.info = map.info;
@@ -117,7 +115,6 @@ export class Follower {
 
   // False: something is missing, and the map must be had anew.
   onUpdate(update) {
-    if (update.encoding !== ENCODING) throw new RangeError(`keys are in ${update.encoding}`);
     if (this.sequence === null || !sameLattice(this.info, update.info)) return this.staging !== null;
     if (update.sequence <= this.sequence) return true;
     if (update.previous > this.sequence) return false;
@@ -192,6 +189,9 @@ export class Follower {
     if (!tile || i >= tile.size || tile.places[i] !== place) return null;
     return { key: keyText(id, place), count: tile.counts[i], label: tile.labels[i], age: this.now() - tile.seen[i] };
   }
+
+  // Of all cells, in the order of the keys.
+  counts() { return [...this.tiles.values()].flatMap((tile) => [...tile.counts.subarray(0, tile.size)]); }
 
   keys() {
     const all = [];

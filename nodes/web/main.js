@@ -38,7 +38,7 @@ const state = {
   clouds: new Map(), measuring: false, measured: [], chosen: null, shown: { cells: true, robot: true, grid: true, headset: true },
   scansOn: new Set(), problems: [], frames: 0,
 };
-const worker = new Worker("/worker.js", { type: "module" });
+const worker = new Worker(`/worker.js${/[?&]thin=1/.test(location.search) ? "?thin=1" : ""}`, { type: "module" });
 const services = new Services(worker);
 const writing = new Writing(services, worker, state);
 const player = new Player(services, writing);
@@ -366,11 +366,12 @@ redraw();
 // For tests: what is shown, in figures.
 window.lattice = {
   state, camera, cells, free, planning, player, pick, frame: () => drawing.drawNow(),
-  keys: () => new Promise((resolve) => {
+  // Keys, or counts in the order of the keys.
+  keys: (what = "keys") => new Promise((resolve) => {
     const take = ({ data }) => {
       if (data.type !== "keys") return;
       worker.removeEventListener("message", take);
-      resolve(data.keys);
+      resolve(data[what]);
     };
     worker.addEventListener("message", take);
     worker.postMessage({ type: "keys" });

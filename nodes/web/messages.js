@@ -15,8 +15,13 @@ function latticeInfo(r) {
   return info;
 }
 
-function columns(r) {
-  return {
+const ENCODING = "morton21_delta_leb128";
+// Behind the keys stand the counts, as LEB128 too.
+const THIN_ENCODING = `${ENCODING}_counts_leb128`;
+
+function columns(r, encoding) {
+  if (encoding !== ENCODING && encoding !== THIN_ENCODING) throw new RangeError(`keys are in ${encoding}`);
+  const all = {
     count: r.u32(),
     keys: r.octets(),
     counts: r.numbers(Uint32Array),
@@ -25,6 +30,27 @@ function columns(r) {
     labels: r.numbers(Uint16Array),
     labelCounts: r.numbers(Uint32Array),
   };
+  return encoding === THIN_ENCODING ? parted(all) : all;
+}
+
+function parted(all) {
+  const { keys: bytes, count } = all;
+  let at = 0;
+  for (let left = count; left > 0; at++) {
+    if (at >= bytes.length) throw new RangeError("the keys end too early");
+    if (bytes[at] < 128) left--;
+  }
+  const counts = [];
+  for (let i = at, value = 0, scale = 1; i < bytes.length; i++) {
+    value += (bytes[i] & 127) * scale;
+    scale *= 128;
+    if (bytes[i] < 128) {
+      counts.push(value);
+      [value, scale] = [0, 1];
+    }
+  }
+  if (counts.length !== 0 && counts.length !== count) throw new RangeError("there is not one count for each key");
+  return { ...all, keys: bytes.subarray(0, at), counts };
 }
 
 export function latticeMap(bytes) {
@@ -34,7 +60,7 @@ export function latticeMap(bytes) {
   map.chunks = r.u32();
   map.total = Number(r.u64());
   map.encoding = r.string();
-  return Object.assign(map, columns(r));
+  return Object.assign(map, columns(r, map.encoding));
 }
 
 export function latticeMapUpdate(bytes) {
@@ -43,7 +69,7 @@ export function latticeMapUpdate(bytes) {
   update.chunk = r.u32();
   update.chunks = r.u32();
   update.encoding = r.string();
-  Object.assign(update, columns(r));
+  Object.assign(update, columns(r, update.encoding));
   update.removed = r.u32();
   update.removedKeys = r.octets();
   update.total = Number(r.u64());

@@ -47,10 +47,10 @@ export class Planning {
       if (asked === this.asked) by("way-said").textContent = text;
     };
     say("Searching …");
-    const room = radius + Math.cbrt(this.state.lattice.volume);
-    const [start, goal] = this.picks.map(({ centre, toEye }) => add(centre, toEye.map((x) => x * room)));
+    const side = Math.cbrt(this.state.lattice.volume);
+    const [start, goal] = this.picks.map(({ centre, toEye }) => add(centre, toEye.map((x) => x * (radius + side))));
     try {
-      const answer = planned(await this.services.call("plan_path", requests.plan(start, goal, radius, room)));
+      const answer = planned(await this.services.call("plan_path", requests.plan(start, goal, radius, radius + 2 * side)));
       if (asked !== this.asked) return;
       this.path = answer.path;
       say(answer.success ? metres(answer.length) : answer.message);

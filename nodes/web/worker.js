@@ -7,6 +7,8 @@ import { Follower } from "./follower.js";
 const PROTOCOLS = ["foxglove.sdk.v1", "foxglove.websocket.v1"];
 const MESSAGE_DATA = 1;
 const HEADER = 13;
+// A slow link has the keys and counts of the map alone.
+const THIN = self.location.search === "?thin=1" ? "_thin" : "";
 const MOST_TILES = 200;
 
 let socket = null;
@@ -24,9 +26,9 @@ const wanted = new Set(["tf", "static", "map", "updates", "diagnostics", "calibr
 
 // How each channel is read, by the type and the end of its topic.
 const KINDS = [
-  ["map", "lattice_msgs/msg/LatticeMap", /(^|\/)map$/],
+  ["map", "lattice_msgs/msg/LatticeMap", new RegExp(`(^|/)map${THIN}$`)],
   ["free", "lattice_msgs/msg/LatticeMap", /(^|\/)free$/],
-  ["updates", "lattice_msgs/msg/LatticeMapUpdate", /./],
+  ["updates", "lattice_msgs/msg/LatticeMapUpdate", new RegExp(`updates${THIN}$`)],
   ["static", "tf2_msgs/msg/TFMessage", /tf_static$/],
   ["tf", "tf2_msgs/msg/TFMessage", /./],
   ["diagnostics", "diagnostic_msgs/msg/DiagnosticArray", /./],
@@ -211,7 +213,7 @@ self.onmessage = ({ data }) => {
   } else if (data.type === "cell") {
     postMessage({ type: "cell", request: data.request, cell: follower.cell(data.tile, data.place) });
   } else if (data.type === "keys") {
-    postMessage({ type: "keys", keys: follower.keys() });
+    postMessage({ type: "keys", keys: follower.keys(), counts: follower.counts() });
   }
 };
 

@@ -36,6 +36,15 @@ pub fn encode_keys(sorted: &[MortonKey]) -> Vec<u8> {
     bytes
 }
 
+/// Encodes counts as LEB128, one byte for those below 128.
+pub fn encode_counts(counts: &[u32]) -> Vec<u8> {
+    let mut bytes = Vec::with_capacity(counts.len());
+    for count in counts {
+        push_varint(&mut bytes, u64::from(*count));
+    }
+    bytes
+}
+
 /// Decodes at most `max` keys; they ascend strictly. Allocates no more than the input justifies.
 pub fn decode_keys(bytes: &[u8], max: usize) -> Result<Vec<MortonKey>, CodecError> {
     let mut keys = Vec::with_capacity(bytes.len().min(max));

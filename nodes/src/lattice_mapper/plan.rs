@@ -25,8 +25,13 @@ const MAX_BALL_CELLS: f64 = 8192.0;
 #[derive(Default)]
 pub(super) struct Planner {
     busy: AtomicBool,
-    /// Cells at the update with this number of this epoch.
-    copy: Mutex<Option<((u64, u64), Arc<OccupancyList>)>>,
+    copy: Mutex<Option<Copied>>,
+}
+
+struct Copied {
+    /// Epoch, and number of the update.
+    state: (u64, u64),
+    cells: Arc<OccupancyList>,
 }
 
 impl Planner {
@@ -66,12 +71,15 @@ impl Planner {
         let (state, store) = ((machine.epoch, machine.sequence), machine.cells());
         let mut copy = lock(&self.copy);
         match &*copy {
-            Some((of, cells)) if *of == state => Arc::clone(cells),
+            Some(copy) if copy.state == state => Arc::clone(&copy.cells),
             _ => {
                 let (lattice, datum) = (store.lattice().clone(), store.datum_index());
                 let keys = store.sorted_keys();
                 let cells = Arc::new(OccupancyList::from_keys(lattice, datum, keys, usize::MAX));
-                *copy = Some((state, Arc::clone(&cells)));
+                *copy = Some(Copied {
+                    state,
+                    cells: Arc::clone(&cells),
+                });
                 cells
             }
         }

@@ -4,14 +4,12 @@ use std::io;
 use std::sync::Arc;
 
 use lattice_core::voxels::VoxelList;
-use lattice_msgs::cdr;
-use lattice_msgs::lattice::{LatticeMap, LatticeMapUpdate};
 use lattice_msgs::std_msgs::Header;
 
 use super::hub::{Hub, entry};
 use super::options::{ViewerOptions, url};
-use super::outbox::Class;
 use super::server::Server;
+use super::thin;
 use crate::convert::map::{History, MapStamp, keyframe};
 
 /// Largest message of the map.
@@ -20,8 +18,7 @@ const CHUNK_BYTES: usize = 60_000;
 /// Serves a map; gives the server and the address to open.
 pub fn serve(list: &VoxelList, options: &ViewerOptions) -> io::Result<(Server, String)> {
     let hub = Arc::new(Hub::new(options.max_clients));
-    hub.channel::<LatticeMap>("/map", Class::Map, false);
-    hub.channel::<LatticeMapUpdate>("/map_updates", Class::Updates, false);
+    hub.map_channels("/map", "/map_updates");
     let stamp = MapStamp {
         header: Header {
             frame_id: "map".to_owned(),
@@ -33,8 +30,7 @@ pub fn serve(list: &VoxelList, options: &ViewerOptions) -> io::Result<(Server, S
         origin: None,
         chunk_bytes: CHUNK_BYTES,
     };
-    let chunks = keyframe(list, &stamp);
-    let chunks = chunks.iter().map(|chunk| cdr::to_vec(chunk).map(entry));
+    let chunks = keyframe(list, &stamp).into_iter().map(thin::both);
     let chunks: Vec<_> = chunks.collect::<Result<_, _>>().map_err(io::Error::other)?;
     hub.change_map(|stream| stream.set_keyframe(chunks));
     let gate = options.gate()?;

@@ -5,6 +5,7 @@ use std::sync::{Mutex, OnceLock};
 use std::time::{SystemTime, UNIX_EPOCH};
 
 use lattice_msgs::RosMessage;
+use lattice_msgs::lattice::{LatticeMap, LatticeMapUpdate};
 use lattice_runtime::lock;
 use serde::Serialize;
 use smol::channel::{Receiver, Sender, bounded};
@@ -123,6 +124,14 @@ impl Hub {
     /// All that clients may ask for.
     pub fn offer_of_bridge(&self) -> &Offer {
         self.bridge().map_or(&self.nothing, Bridge::offer)
+    }
+
+    /// Adds the channels of the map, in both forms, of a node's topics.
+    pub fn map_channels(&self, map: &str, updates: &str) {
+        self.channel::<LatticeMap>(map, Class::Map, false);
+        self.channel::<LatticeMapUpdate>(updates, Class::Updates, false);
+        self.channel::<LatticeMap>(&format!("{map}_thin"), Class::ThinMap, false);
+        self.channel::<LatticeMapUpdate>(&format!("{updates}_thin"), Class::ThinUpdates, false);
     }
 
     /// Adds a channel before the first client comes; gives its id.
@@ -339,5 +348,6 @@ pub fn entry(cdr: Vec<u8>) -> Entry {
     Entry {
         stamp_ns: since.map_or(0, |since| since.as_nanos() as u64),
         cdr: cdr.into(),
+        thin: None,
     }
 }

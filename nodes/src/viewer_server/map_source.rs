@@ -4,15 +4,14 @@
 
 use lattice_core::lattice::MortonKey;
 use lattice_core::voxels::codec;
-use lattice_msgs::RosMessage;
 use lattice_msgs::builtin_interfaces::Time;
 use lattice_msgs::cdr;
 use lattice_msgs::lattice::{LatticeMap, LatticeMapUpdate};
 use lattice_msgs::std_msgs::Header;
 use serde_bytes::ByteBuf;
 
-use super::hub::entry;
 use super::map_stream::Entry;
+use super::thin;
 use crate::convert::map::{History, KEY_ENCODING, VoxelState, sign};
 use crate::map_follower::{FollowError, Followed, FollowedMap, MapFollower};
 
@@ -105,7 +104,10 @@ impl MapSource {
             sequence,
             history,
         });
-        let updates = chunks.iter().map(message).collect::<Result<_, _>>()?;
+        let updates = chunks
+            .into_iter()
+            .map(thin::both)
+            .collect::<Result<_, _>>()?;
         Ok(News::Updates(updates))
     }
 
@@ -119,15 +121,11 @@ impl MapSource {
         }
         let chunks = keyframe(map, sent.sequence, sent.history);
         chunks
-            .iter()
-            .map(message)
+            .into_iter()
+            .map(thin::both)
             .collect::<Result<_, _>>()
             .map(Some)
     }
-}
-
-fn message<M: RosMessage>(chunk: &M) -> Result<Entry, cdr::CdrError> {
-    cdr::to_vec(chunk).map(entry)
 }
 
 fn header(map: &FollowedMap) -> Header {

@@ -13,6 +13,24 @@ pub struct Entry {
     pub stamp_ns: u64,
     /// CDR.
     pub cdr: Arc<[u8]>,
+    /// CDR of the thin form, where there is one.
+    pub thin: Option<Arc<[u8]>>,
+}
+
+impl Entry {
+    /// Bytes of both forms.
+    pub fn bytes(&self) -> usize {
+        self.cdr.len() + self.thin.as_ref().map_or(0, |thin| thin.len())
+    }
+
+    /// The message in its thin form alone.
+    pub fn thinned(self) -> Self {
+        Self {
+            cdr: self.thin.unwrap_or(self.cdr),
+            thin: None,
+            ..self
+        }
+    }
 }
 
 /// Chunks of a keyframe, and the number of the first update that follows it.
@@ -86,14 +104,14 @@ impl MapStream {
 
     /// Adds an update.
     pub fn push(&mut self, update: Entry) {
-        self.bytes = self.bytes.saturating_add(update.cdr.len());
+        self.bytes = self.bytes.saturating_add(update.bytes());
         self.updates.push_back(update);
         self.end += 1;
         while self.bytes > self.limit_bytes {
             let Some(oldest) = self.updates.pop_front() else {
                 break;
             };
-            self.bytes = self.bytes.saturating_sub(oldest.cdr.len());
+            self.bytes = self.bytes.saturating_sub(oldest.bytes());
         }
         let begin = self.begin();
         if self
@@ -108,7 +126,7 @@ impl MapStream {
     /// The keyframe of the state after the last update.
     pub fn set_keyframe(&mut self, chunks: Vec<Entry>) {
         self.keyframe = Some(Keyframe {
-            bytes: chunks.iter().map(|chunk| chunk.cdr.len()).sum(),
+            bytes: chunks.iter().map(Entry::bytes).sum(),
             chunks: chunks.into(),
             at: self.end,
         });
@@ -179,7 +197,7 @@ impl MapStream {
         let keyframe = self.keyframe.as_ref()?;
         let index = usize::try_from(keyframe.at.checked_sub(self.begin())?).ok()?;
         let since = self.updates.iter().skip(index);
-        let since: usize = since.map(|update| update.cdr.len()).sum();
+        let since: usize = since.map(Entry::bytes).sum();
         (since <= keyframe.bytes.max(FEW_BYTES)).then_some(keyframe)
     }
 }

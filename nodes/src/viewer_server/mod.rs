@@ -18,6 +18,7 @@ mod parameters;
 mod protocol;
 mod server;
 mod sources;
+mod thin;
 mod watched;
 
 pub use bridge::Bridge;

@@ -2,11 +2,10 @@
 
 use std::io::Write;
 use std::sync::Arc;
-use std::sync::atomic::{AtomicU64, Ordering};
+use std::sync::atomic::Ordering;
 use std::time::Duration;
 
 use lattice_msgs::lattice::{LatticeMap, LatticeMapUpdate};
-use lattice_msgs::std_msgs::Empty;
 use lattice_msgs::tf2_msgs::TFMessage;
 use serde::Serialize;
 
@@ -20,12 +19,12 @@ use super::parameters::Settings;
 use super::server::Server;
 use super::sources::{FixedTransforms, FromChannel, Sources, Unwritten};
 use crate::compute::Compute;
-use crate::map_follower::{FollowError, Followed};
+use crate::map_input::{MapLosses, MapRequests};
 use crate::report;
 use crate::start::{Finish, NodeError, open_params};
 use lattice_runtime::logging::Throttle;
 use lattice_runtime::qos::Qos;
-use lattice_runtime::{Diagnostics, Level, Load, Losses, Publisher, Runtime, Undecoded};
+use lattice_runtime::{Diagnostics, Level, Load, Runtime, Undecoded};
 
 /// Event for the compute thread.
 enum Event {
@@ -62,27 +61,20 @@ pub fn start(runtime: &Runtime, name: &str) -> Result<Finish, NodeError> {
         report_file,
     } = Settings::from_params(params)?;
     let hub = Arc::new(Hub::new(viewer.max_clients));
-    hub.channel::<LatticeMap>(&node.resolve("map")?, Class::Map, false);
-    hub.channel::<LatticeMapUpdate>(&node.resolve("map_updates")?, Class::Updates, false);
+    hub.map_channels(&node.resolve("map")?, &node.resolve("map_updates")?);
     let one = Class::Newest { depth: 1 };
     let fixed_channel = hub.channel::<TFMessage>(&node.resolve("/tf_static")?, one, true);
     hub.set_bridge(Box::new(NodeBridge::new(&node, &reach, &hub)?));
     let gate = viewer.gate()?;
-    let losses = Losses::default();
-    let lost = Arc::new(AtomicU64::new(0));
+    let losses = MapLosses::default();
     let mut shell = Shell {
         hub: Arc::clone(&hub),
         source: MapSource::new(viewer.max_voxels),
         sources: None,
         fixed: FixedTransforms::default(),
         fixed_channel,
-        losses: losses.clone(),
-        lost: Arc::clone(&lost),
-        lost_seen: 0,
-        request: node.publisher(&format!("{}/request_keyframe", reach.mapper), Qos::DEFAULT)?,
+        input: MapRequests::new(&node, &reach.mapper, &losses)?,
         diagnostics: node.diagnostics(),
-        refusals: Throttle::new(Duration::from_secs(5)),
-        requests: Throttle::new(Duration::from_secs(1)),
         seconds: Throttle::new(Duration::from_secs(1)),
         report_file,
     };
@@ -99,23 +91,13 @@ pub fn start(runtime: &Runtime, name: &str) -> Result<Finish, NodeError> {
     // Who listens comes after the channels: the list of them is sent once.
     let server = Server::start(viewer.address, gate.clone(), Arc::clone(&hub))?;
     tell_address(&url(server.address(), &gate), gate.token.is_some());
-    let on_map = inbox.counting(&lost, Event::Map, |map: &Undecoded<LatticeMap>| {
-        map.bytes(|map| map.keys.len() + map.counts.len() * 10)
-    });
-    let maps = node.subscribe_undecoded("map", Qos::MAP, Load::Small, on_map)?;
-    let on_update = inbox.counting(
-        &lost,
-        Event::Update,
-        |update: &Undecoded<LatticeMapUpdate>| {
-            update.bytes(|update| update.keys.len() + update.counts.len() * 10)
-        },
+    let maps = losses.subscribe(&node, &inbox, Event::Map, Event::Update)?;
+    let on_fixed = inbox.counting(
+        &losses.at_inbox,
+        Event::FixedTransforms,
+        |fixed: &Arc<TFMessage>| fixed.transforms.len() * 100,
     );
-    let updates = node.subscribe_undecoded("map_updates", Qos::DELTAS, Load::Small, on_update)?;
-    let on_fixed = inbox.counting(&lost, Event::FixedTransforms, |fixed: &Arc<TFMessage>| {
-        fixed.transforms.len() * 100
-    });
     let fixed = node.subscribe("/tf_static", Qos::TF_STATIC_LISTENER, Load::Small, on_fixed)?;
-    losses.watch([&maps, &updates]);
     let period = |viewer: &ViewerOptions| Duration::from_secs_f64(viewer.update_period_s);
     let ticks = runtime.timer(period(&viewer), move || {
         let _ = inbox.send(Event::Tick, 0);
@@ -126,7 +108,7 @@ pub fn start(runtime: &Runtime, name: &str) -> Result<Finish, NodeError> {
         Ok(())
     });
     Ok(Box::new(move || {
-        drop((maps, updates, fixed));
+        drop((maps, fixed));
         compute.finish_with(Event::Finish);
         server.finish();
         Box::new(())
@@ -152,16 +134,8 @@ struct Shell {
     sources: Option<Sources>,
     fixed: FixedTransforms,
     fixed_channel: u32,
-    /// Chunks lost before the inbox.
-    losses: Losses,
-    /// Messages that found the inbox full.
-    lost: Arc<AtomicU64>,
-    /// Those that a keyframe was asked for.
-    lost_seen: u64,
-    request: Publisher<Empty>,
+    input: MapRequests,
     diagnostics: Diagnostics,
-    refusals: Throttle,
-    requests: Throttle,
     seconds: Throttle,
     report_file: String,
 }
@@ -171,11 +145,11 @@ impl Shell {
         match event {
             Event::Map(chunk) => {
                 let result = chunk.decode().map(|chunk| self.source.on_map(&chunk));
-                self.followed(result);
+                self.input.followed(result);
             }
             Event::Update(chunk) => {
                 let result = chunk.decode().map(|chunk| self.source.on_update(&chunk));
-                self.followed(result);
+                self.input.followed(result);
             }
             Event::FixedTransforms(message) => {
                 if let Ok(all) = self.fixed.add(&message) {
@@ -191,35 +165,11 @@ impl Shell {
         }
     }
 
-    fn followed(&mut self, result: Option<Result<Followed, FollowError>>) {
-        match result {
-            Some(Ok(Followed::NeedKeyframe)) => self.ask_for_keyframe(),
-            Some(Err(error)) => {
-                if let Some(more) = self.refusals.check() {
-                    log::warn!("{error} ({more} more like it)");
-                }
-            }
-            Some(Ok(Followed::Applied | Followed::Old)) | None => {}
-        }
-    }
-
-    fn ask_for_keyframe(&mut self) {
-        if self.requests.check().is_some()
-            && let Err(error) = self.request.publish(Empty::default())
-        {
-            log::debug!("keyframe not requested: {error}");
-        }
-    }
-
     fn tick(&mut self) {
-        let lost = self.lost.load(Ordering::Relaxed) + self.losses.lost();
-        if lost != self.lost_seen {
-            self.lost_seen = lost;
-            self.ask_for_keyframe();
-        }
+        self.input.make_good();
         let second = self.seconds.check().is_some();
         if second && self.source.wait_a_second() {
-            self.ask_for_keyframe();
+            self.input.ask_for_keyframe();
         }
         if let Some(sources) = &mut self.sources {
             sources.adapt(&self.hub);
@@ -254,7 +204,7 @@ impl Shell {
     fn messages_lost(&self) -> u64 {
         let others = self.sources.as_ref();
         let others = others.map_or(0, |sources| sources.lost.load(Ordering::Relaxed));
-        self.lost.load(Ordering::Relaxed) + self.losses.lost() + others
+        self.input.losses().count() + others
     }
 
     fn voxels(&self) -> usize {

@@ -17,6 +17,10 @@ pub enum Class {
     Map,
     /// Its updates.
     Updates,
+    /// Keyframes in their thin form.
+    ThinMap,
+    /// Updates in their thin form.
+    ThinUpdates,
     /// The newest few; older ones give way.
     Newest {
         /// Messages that wait at most.
@@ -76,8 +80,10 @@ impl Outbox {
         self.subscriptions.insert(id, (channel, class));
         // Updates that passed while nobody here wanted them are missing.
         let passed = matches!(self.cursor, Cursor::Updates(_));
-        if class == Class::Map || class == Class::Updates && passed {
-            self.cursor = Cursor::Fresh;
+        match class {
+            Class::Map | Class::ThinMap => self.cursor = Cursor::Fresh,
+            Class::Updates | Class::ThinUpdates if passed => self.cursor = Cursor::Fresh,
+            _ => {}
         }
         true
     }
@@ -144,7 +150,13 @@ impl Outbox {
             let found = all.find(|(_, (_, other))| *other == class);
             found.map(|(id, _)| *id)
         };
-        let [maps, updates] = [Class::Map, Class::Updates].map(of);
+        // Who wants both forms gets the full one.
+        let either = |full: Class, thin: Class| match of(full) {
+            Some(id) => Some((id, false)),
+            None => of(thin).map(|id| (id, true)),
+        };
+        let maps = either(Class::Map, Class::ThinMap);
+        let updates = either(Class::Updates, Class::ThinUpdates);
         if maps.is_none() && updates.is_none() {
             self.waits_for_keyframe = false;
             return None;
@@ -157,8 +169,10 @@ impl Outbox {
                 Next::Update(entry) => (updates, entry),
                 Next::Nothing | Next::Waits => return None,
             };
-            if let Some(id) = id {
-                return Some(Outgoing::Data(id, entry));
+            match id {
+                Some((id, true)) => return Some(Outgoing::Data(id, entry.thinned())),
+                Some((id, false)) => return Some(Outgoing::Data(id, entry)),
+                None => {}
             }
         }
     }

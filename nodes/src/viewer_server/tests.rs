@@ -22,6 +22,7 @@ fn message(state: u64) -> Entry {
     Entry {
         stamp_ns: state,
         cdr: vec![0; 1000].into(),
+        thin: None,
     }
 }
 

@@ -5,7 +5,7 @@ use std::collections::BTreeMap;
 /// Most bytes of names that are kept for a client.
 const MAX_NAME_BYTES: usize = 64 << 10;
 
-/// What a client has asked for.
+/// Names, or all, that a client has asked for.
 #[derive(Debug, Default)]
 pub struct Watched {
     /// True if others than those named are watched.

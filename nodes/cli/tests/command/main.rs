@@ -14,6 +14,7 @@ mod player;
 mod record;
 mod respawn;
 mod viewer;
+mod viewer_foreign;
 mod viewer_page;
 mod viewer_planning;
 mod viewer_writing;

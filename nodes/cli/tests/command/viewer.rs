@@ -140,6 +140,10 @@ const PICK: &str = "(() => { const { camera, cells } = lattice; camera.automatic
     if (Math.hypot(p.x - x, p.y - y) > 2 + 1.2 * cells.lattice.radius * camera.focal() / p.depth) wrong++; } \
     return [hits, wrong]; })()";
 
+/// Key and count of each cell.
+const CELLS: &str = "(async () => { const counts = await lattice.keys('counts'); \
+    return (await lattice.keys()).map((key, i) => `${key} ${counts[i]}`).sort(); })()";
+
 /// Distance of the robot from the middle of the view, pixels.
 const OFF_MIDDLE: &str = "(() => { const { camera, state } = lattice; lattice.frame(); \
     const p = camera.project(state.robot.position); \
@@ -160,6 +164,7 @@ fn cells_of_each_lattice_are_drawn_as_the_map_has_them() {
         page.go(&viewer.url);
         page.wait_for(COMPLETE);
         assert_eq!(shown(page), keys(&map), "{lattice}");
+        let cells = page.value(CELLS);
         let lit = page.value("lattice.lit()").as_f64().unwrap();
         assert!(lit > 0.01, "{lattice}: {lit} of the pixels");
         let picked: [u64; 2] = serde_json::from_value(page.value(PICK)).unwrap();
@@ -172,6 +177,10 @@ fn cells_of_each_lattice_are_drawn_as_the_map_has_them() {
             .collect();
         assert!(foreign.is_empty(), "{foreign:?}");
         assert!(page.console.is_empty(), "{:?}", page.console);
+        page.go(&format!("{}/?thin=1", viewer.url));
+        page.wait_for(COMPLETE);
+        assert_eq!(page.value(CELLS), cells, "{lattice}, thin");
+        assert_eq!(page.value("lattice.state.problems"), json!([]));
         page.requests.clear();
         // What the console says of the lost connection is not asked for.
         page.go("about:blank");
@@ -228,6 +237,7 @@ fn the_map_that_grows_in_a_demo_is_at_its_end_the_mappers() {
         &out,
     ];
     let mut viewer = Viewer::start(&demo);
+    let mut thin = Page::open(&chromium, &format!("{}/?thin=1", viewer.url));
     let mut page = Page::open(&chromium, &viewer.url);
     page.wait_for("lattice.state.size > 100 && lattice.state.robot !== null");
     page.value(
@@ -256,7 +266,11 @@ fn the_map_that_grows_in_a_demo_is_at_its_end_the_mappers() {
     page.wait_for("!document.getElementById('banner').hidden");
     let map = folder.path().join("map.lattice").display().to_string();
     assert_eq!(shown(&mut page), keys(&map));
-    assert_eq!(page.value("lattice.state.problems"), json!([]));
+    thin.wait_for("!document.getElementById('banner').hidden");
+    assert_eq!(thin.value(CELLS), page.value(CELLS));
+    for page in [&mut page, &mut thin] {
+        assert_eq!(page.value("lattice.state.problems"), json!([]));
+    }
 }
 
 /// A zstd frame of these bytes as they are (RFC 8878: a window of 128 kB, blocks of kind raw).

@@ -12,8 +12,8 @@ use crate::viewer::{COMPLETE, Viewer};
 use crate::viewer_writing::site;
 
 const RADIUS_M: f64 = 0.4;
-/// Largest distance of an end from the centre of its cell: that before its face, and as much for the ground.
-const END_M: f64 = 2.0 * (RADIUS_M + 0.5) + 0.5;
+/// Largest distance of an end from the centre of its cell: before its face, and beside that where it does not fit.
+const END_M: f64 = 2.0 * RADIUS_M + 3.0 * 0.5 + 0.5;
 
 /// Clicks on the first cell of the rows and columns that are named.
 const PICK: &str = "(window.click = (columns) => { const { camera } = lattice; camera.automatic = false; lattice.frame(); \

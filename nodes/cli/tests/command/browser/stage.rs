@@ -64,6 +64,7 @@ impl Stage {
         let chunk = Entry {
             stamp_ns: 1,
             cdr: cdr::to_vec(&map(cells)).unwrap().into(),
+            thin: None,
         };
         hub.change_map(|stream| stream.set_keyframe(vec![chunk]));
         let address = SocketAddr::from((Ipv4Addr::LOCALHOST, 0));
@@ -89,7 +90,8 @@ impl Stage {
     }
 }
 
-fn map(cells: &[Known]) -> LatticeMap {
+/// A map of these cells, as one message.
+pub fn map(cells: &[Known]) -> LatticeMap {
     let mut sorted = cells.to_vec();
     sorted.sort_by_key(|cell| cell.key.parse::<u64>().unwrap());
     let key = |cell: &Known| MortonKey::pack(cell.index).unwrap();

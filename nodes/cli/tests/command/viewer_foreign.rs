@@ -1,0 +1,161 @@
+//! The viewer's socket under the authors' own client of the Foxglove protocol, with foreign decoders.
+
+use std::io::{Write, stderr};
+use std::net::{Ipv4Addr, SocketAddr};
+use std::process::{Command, Stdio};
+use std::sync::Arc;
+
+use lattice_msgs::RosMessage;
+use lattice_msgs::cdr;
+use lattice_msgs::geometry_msgs::{Point, TransformStamped};
+use lattice_msgs::lattice::LatticeMap;
+use lattice_msgs::sensor_msgs::{PointCloud2, PointField};
+use lattice_msgs::std_msgs::Header;
+use lattice_msgs::tf2_msgs::TFMessage;
+use lattice_msgs::visualization_msgs::{Marker, MarkerArray};
+use lattice_nodes::viewer_server::{Class, Entry, Gate, Hub, Server};
+use serde_bytes::ByteBuf;
+use serde_json::{Map, Value, to_value};
+
+use crate::browser::stage::{Known, map};
+
+fn header() -> Header {
+    let mut header = Header {
+        frame_id: "map".to_owned(),
+        ..Header::default()
+    };
+    (header.stamp.sec, header.stamp.nanosec) = (1_700_000_000, 250_000_000);
+    header
+}
+
+fn markers() -> MarkerArray {
+    let corner = |x| Point { x, y: -0.5, z: 2.0 };
+    MarkerArray {
+        markers: vec![Marker {
+            header: header(),
+            ns: "voxels".to_owned(),
+            type_: Marker::TRIANGLE_LIST,
+            points: [0.25, 0.5, 0.75].map(corner).into(),
+            ..Marker::default()
+        }],
+    }
+}
+
+fn cloud() -> PointCloud2 {
+    PointCloud2 {
+        header: header(),
+        height: 1,
+        width: 2,
+        fields: vec![PointField {
+            name: "x".to_owned(),
+            datatype: PointField::FLOAT32,
+            count: 1,
+            ..PointField::default()
+        }],
+        point_step: 4,
+        row_step: 8,
+        data: ByteBuf::from([0, 1, 2, 3, 4, 5, 6, 255]),
+        is_dense: true,
+        ..PointCloud2::default()
+    }
+}
+
+fn transforms() -> TFMessage {
+    let mut transform = TransformStamped {
+        header: header(),
+        child_frame_id: "base_link".to_owned(),
+        ..TransformStamped::default()
+    };
+    transform.transform.translation.y = -3.5;
+    TFMessage {
+        transforms: vec![transform],
+    }
+}
+
+fn known_map() -> LatticeMap {
+    map(&[
+        Known::new([1, -2, 3], 7, 4),
+        Known::new([5, 6, -7], 300, 65_535),
+    ])
+}
+
+/// A server with one message on each channel, and these messages by their topics.
+fn server() -> (Server, Value) {
+    let hub = Arc::new(Hub::new(4));
+    let mut all = Map::new();
+    let map = known_map();
+    hub.channel::<LatticeMap>("/map", Class::Map, false);
+    all.insert("/map".to_owned(), to_value(&map).unwrap());
+    let chunk = Entry {
+        stamp_ns: 1,
+        cdr: cdr::to_vec(&map).unwrap().into(),
+        thin: None,
+    };
+    hub.change_map(|stream| stream.set_keyframe(vec![chunk]));
+    let mut add = |topic: &str, channel: u32, message: Value, cdr: Vec<u8>| {
+        hub.offer(channel, cdr);
+        all.insert(topic.to_owned(), message);
+    };
+    macro_rules! kept {
+        ($topic:literal, $message:expr) => {{
+            let message = $message;
+            let channel = channel_of(&hub, $topic, &message);
+            let cdr = cdr::to_vec(&message).unwrap();
+            add($topic, channel, to_value(&message).unwrap(), cdr);
+        }};
+    }
+    kept!("/voxel_markers", markers());
+    kept!("/map_centers", cloud());
+    kept!("/tf", transforms());
+    let address = SocketAddr::from((Ipv4Addr::LOCALHOST, 0));
+    let server = Server::start(address, Gate::default(), Arc::clone(&hub)).unwrap();
+    (server, Value::Object(all))
+}
+
+fn channel_of<M: RosMessage>(hub: &Hub, topic: &str, _: &M) -> u32 {
+    hub.channel::<M>(topic, Class::Newest { depth: 1 }, true)
+}
+
+/// The same with all numbers as floating-point ones, the only kind that JavaScript writes.
+fn alike(value: &Value) -> Value {
+    match value {
+        Value::Number(number) => number.as_f64().into(),
+        Value::Array(list) => list.iter().map(alike).collect(),
+        Value::Object(fields) => {
+            let fields = fields
+                .iter()
+                .map(|(name, value)| (name.clone(), alike(value)));
+            Value::Object(fields.collect())
+        }
+        other => other.clone(),
+    }
+}
+
+#[test]
+fn the_protocols_own_client_reads_every_kind_of_message_by_both_names() {
+    let Some(folder) = std::env::var_os("LATTICE_NODE_PEER") else {
+        let _ = writeln!(
+            stderr(),
+            "SKIPPED: LATTICE_NODE_PEER names no folder with test/node installed"
+        );
+        return;
+    };
+    let (server, messages) = server();
+    let url = format!("ws://{}", server.address());
+    for protocol in ["foxglove.websocket.v1", "foxglove.sdk.v1"] {
+        let peer = Command::new("node")
+            .args(["foxglove_peer.mjs", &url, protocol])
+            .current_dir(&folder)
+            .stderr(Stdio::inherit())
+            .output()
+            .unwrap();
+        assert!(peer.status.success(), "{protocol}");
+        let said: Value = serde_json::from_slice(&peer.stdout).unwrap();
+        assert_eq!(said["protocol"], protocol);
+        for (topic, message) in messages.as_object().unwrap() {
+            let read = &said["read"][topic];
+            assert_eq!(alike(read), alike(message), "{topic} by {protocol}");
+        }
+    }
+    server.finish();
+}
