@@ -62,7 +62,7 @@ enum Command {
     /// Quantize a point file (ply, pcd, xyz, KITTI bin) and show what each lattice makes of it
     Quantize(quantize::Quantize),
     /// Find where a cloud lies in a map, without a guess, and whether the answer holds
-    Calibrate(calibrate::Calibrate),
+    Calibrate(Box<calibrate::Calibrate>),
     /// Look into map files and export them
     #[command(subcommand)]
     Map(map::Map),

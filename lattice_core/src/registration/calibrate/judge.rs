@@ -19,7 +19,7 @@ const INVISIBLE: f64 = 4.0;
 const CERTAIN: f64 = 3.0;
 /// Standard deviations of the tilt beyond which a pose certainly leans.
 const LEANING: f64 = 5.0;
-/// Standard deviations of the scale by which it must differ from 1 to be wrong.
+/// Standard deviations of the scale by which it must be beyond what it may be to be wrong.
 const SIGNIFICANT: f64 = 2.0;
 /// GICP from a given start stands unless another is better by this log-likelihood.
 const DISPLACE: f64 = 10.0;
@@ -121,7 +121,7 @@ fn leaning(pose: &Isometry3<f64>, leans: bool, options: &CalibrationOptions) -> 
 fn misscaled(scale: Option<ScaleEstimate>, options: &CalibrationOptions) -> Option<String> {
     let ScaleEstimate { scale, sigma } = scale.filter(|_| !options.estimate_scale)?;
     let off = (scale - 1.0).abs();
-    (off > options.max_scale_error && off > SIGNIFICANT * sigma).then(|| {
+    (off > options.max_scale_error + SIGNIFICANT * sigma).then(|| {
         let most = 100.0 * options.max_scale_error;
         format!(
             "the cloud fits with its points multiplied by {scale:.3}, standard deviation {sigma:.3}: \

@@ -13,6 +13,8 @@ use crate::pose::Axes;
 const MISREAD: usize = 48;
 /// Hypotheses of a rough search.
 const ROUGH_PLACES: usize = 4;
+/// Readings that are looked at closely: the right one and its mirror image lead a rough search.
+const LOOKED_AT: usize = 2;
 /// Score by which a right reading may fall behind a wrong one in it.
 const ROUGH: f64 = 0.03;
 
@@ -111,12 +113,20 @@ pub(super) fn misread(
         let on_their_side = Reading::on_their_side().into_iter();
         readings.extend(on_their_side.map(|reading| (reading, None)));
     }
-    let fits = readings.par_iter().filter_map(|(reading, region)| {
+    let hopeful = readings.par_iter().filter_map(|(reading, region)| {
         let mended = Mended::new(bench, &reading.matrix)?;
-        let hopeful = mended.rough_score(bench, *region) >= rough - ROUGH;
-        let likelihood = hopeful.then(|| mended.likelihood(bench, *region))??;
-        Some((likelihood, *reading))
+        let score = mended.rough_score(bench, *region);
+        (score >= rough - ROUGH).then_some((score, *reading, *region, mended))
     });
+    let mut hopeful: Vec<_> = hopeful.collect();
+    hopeful.sort_by(|a, b| b.0.total_cmp(&a.0));
+    hopeful.truncate(LOOKED_AT);
+    let fits = hopeful
+        .par_iter()
+        .filter_map(|(_, reading, region, mended)| {
+            let likelihood = mended.likelihood(bench, *region)?;
+            Some((likelihood, *reading))
+        });
     let (best, reading) = fits.max_by(|a, b| a.0.total_cmp(&b.0))?;
     let observations = bench.few.observations();
     let margin = bench.options.min_margin;

@@ -262,7 +262,7 @@ fn labels_of_semantic_kitti_are_found_and_must_be_as_many() {
     std::fs::write(&scan, floats(f32::to_le_bytes, &[0.5])).unwrap();
     assert!(read_points(&scan, &LIMITS).unwrap().labels.is_empty());
     // The upper half is the instance.
-    let labels = |n: u32| (0..n).flat_map(|i| (i << 16 | 40 * (i % 3)).to_le_bytes());
+    let labels = |n: u32| (0..n).flat_map(|i| ((i << 16) | (40 * (i % 3))).to_le_bytes());
     let beside = scans.join("000007.label");
     for path in [folder.path().join("labels/000007.label"), beside.clone()] {
         std::fs::write(&path, labels(20).collect::<Vec<u8>>()).unwrap();
