@@ -1,5 +1,6 @@
 //! Reports of nodes: JSON files that they write at their end, and the same numbers as diagnostics.
 
+use std::collections::BTreeMap;
 use std::fs;
 use std::io;
 use std::path::Path;
@@ -8,6 +9,7 @@ use serde::{Deserialize, Serialize};
 
 use crate::files::whole::{self, WholeFile};
 use crate::start::NodeError;
+use lattice_runtime::Diagnostics;
 use lattice_runtime::params::{ParamError, Params};
 
 /// The numbers of a report as diagnostics show them, one level.
@@ -42,12 +44,26 @@ pub fn file(params: &Params) -> Result<String, ParamError> {
     }
 }
 
-/// Writes a report as JSON where a path is given.
-pub fn write(path: &str, report: &impl Serialize) -> Result<(), NodeError> {
+/// A report as it is written.
+#[derive(Serialize)]
+struct WithLosses<'a, R> {
+    #[serde(flatten)]
+    report: &'a R,
+    #[serde(skip_serializing_if = "BTreeMap::is_empty")]
+    transport: BTreeMap<String, u64>,
+}
+
+/// Writes a report as JSON where a path is given; under `transport` what its process has lost, if anything.
+pub fn write(
+    path: &str,
+    report: &impl Serialize,
+    diagnostics: &Diagnostics,
+) -> Result<(), NodeError> {
     if path.is_empty() {
         return Ok(());
     }
-    let text = serde_json::to_string_pretty(report)?;
+    let transport = diagnostics.losses().into_iter().collect();
+    let text = serde_json::to_string_pretty(&WithLosses { report, transport })?;
     whole::write_text(Path::new(path), &(text + "\n"))
 }
 

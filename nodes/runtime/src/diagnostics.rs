@@ -31,7 +31,11 @@ pub enum Level {
 pub struct Diagnostics {
     node: String,
     tasks: Arc<Tasks>,
+    losses: Counts,
 }
+
+/// Counts by name, as they are now.
+pub(crate) type Counts = Arc<dyn Fn() -> Vec<(String, u64)> + Send + Sync>;
 
 /// The tasks of all nodes of a process, by node and task.
 #[derive(Default)]
@@ -40,11 +44,17 @@ pub(crate) struct Tasks {
 }
 
 impl Diagnostics {
-    pub(crate) fn new(node: &str, tasks: &Arc<Tasks>) -> Self {
+    pub(crate) fn new(node: &str, tasks: &Arc<Tasks>, losses: Counts) -> Self {
         Self {
             node: node.to_owned(),
             tasks: Arc::clone(tasks),
+            losses,
         }
+    }
+
+    /// Messages and requests that this process has lost, by topic, as the task `transport` shows them.
+    pub fn losses(&self) -> Vec<(String, u64)> {
+        (self.losses)()
     }
 
     /// States how `task` is, with figures; repeated once a second until stated anew.
@@ -122,7 +132,7 @@ mod tests {
     #[test]
     fn the_last_state_of_a_task_counts() {
         let tasks = Arc::new(Tasks::default());
-        let diagnostics = Diagnostics::new("/robot/mapper", &tasks);
+        let diagnostics = Diagnostics::new("/robot/mapper", &tasks, Arc::new(Vec::new));
         diagnostics.set("map", Level::Error, "no clouds", [("clouds", 0)]);
         diagnostics.set("map", Level::Ok, "running", [("clouds", 7)]);
         let transport = status("/robot/mapper", "transport", Level::Warn, "x", [("a", "b")]);

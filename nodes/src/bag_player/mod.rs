@@ -120,7 +120,7 @@ pub fn run(arguments: impl IntoIterator<Item = String>) -> Result<(), NodeError>
     let result = playback.play(&controls);
     controls.obey_all(&mut playback);
     playback.flush();
-    report::write(&report_file, &playback.report)?;
+    report::write(&report_file, &playback.report, &node.diagnostics())?;
     // Sends the last answers, for which the servers must still be there.
     drop(runtime);
     drop(controls);

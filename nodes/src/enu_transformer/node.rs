@@ -265,7 +265,7 @@ impl Shell {
         let (clouds_in, clouds_out) = (report.counts.clouds_in, report.counts.clouds_out);
         let dropped = report.dropped();
         log::info!("{clouds_in} clouds in, {clouds_out} out, dropped: {dropped:?}");
-        if let Err(error) = report::write(&self.report_file, &report) {
+        if let Err(error) = report::write(&self.report_file, &report, &self.diagnostics) {
             log::error!("{error}");
         }
     }

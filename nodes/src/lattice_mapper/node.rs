@@ -391,7 +391,7 @@ impl Shell {
             "{clouds} clouds, {} points in {voxels} voxels",
             report.points
         );
-        if let Err(error) = report::write(&self.report_file, &report) {
+        if let Err(error) = report::write(&self.report_file, &report, &self.diagnostics) {
             log::error!("{error}");
         }
     }

@@ -234,7 +234,7 @@ impl Shell {
             voxels: self.voxels(),
             messages_lost: self.messages_lost(),
         };
-        if let Err(error) = report::write(&self.report_file, &report) {
+        if let Err(error) = report::write(&self.report_file, &report, &self.diagnostics) {
             log::error!("{error}");
         }
     }

@@ -183,7 +183,7 @@ impl Shell {
             inbox_full: self.input.losses().count(),
             undecodable: self.input.losses().undecodable(),
         };
-        if let Err(error) = report::write(&self.report_file, &report) {
+        if let Err(error) = report::write(&self.report_file, &report, &self.diagnostics) {
             log::error!("{error}");
         }
     }

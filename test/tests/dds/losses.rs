@@ -72,5 +72,11 @@ fn what_does_not_decode_is_in_diagnostics_and_report() {
         let text = std::fs::read_to_string(report(node)).unwrap();
         let report: Value = serde_json::from_str(&text).unwrap();
         assert!(report["undecodable"].as_u64() > Some(0), "{report}");
+        let transport = report["transport"].as_object().unwrap();
+        let mut undecodable = transport.iter();
+        assert!(
+            undecodable.any(|(of, _)| of.ends_with(" undecodable")),
+            "{report}"
+        );
     }
 }

@@ -27,10 +27,10 @@ pub struct SearchOptions {
     /// Share of places where equal class numbers are expected to agree before anything was learned
     #[arg(long)]
     agreement: Option<f64>,
-    /// How far the answer may be from a guess, m
+    /// Farthest that the answer may be from a guess, m
     #[arg(long)]
     guess_radius: Option<f64>,
-    /// How far the heading of the answer may be from that of a guess, rad
+    /// Most that the heading of the answer may differ from that of a guess, rad
     #[arg(long)]
     guess_yaw: Option<f64>,
     /// Fewest points of a cloud

@@ -128,7 +128,12 @@ impl Node {
 
     /// States of this node's tasks, for `/diagnostics`.
     pub fn diagnostics(&self) -> Diagnostics {
-        Diagnostics::new(&self.inner.fqn, &self.inner.shared.tasks)
+        let shared = Arc::downgrade(&self.inner.shared);
+        let losses = move || {
+            let shared = shared.upgrade();
+            shared.map_or_else(Vec::new, |shared| shared.losses())
+        };
+        Diagnostics::new(&self.inner.fqn, &self.inner.shared.tasks, Arc::new(losses))
     }
 
     /// A publisher; the parameters `qos.<topic>.*` override the QoS.

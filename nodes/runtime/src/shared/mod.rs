@@ -7,6 +7,7 @@ mod serving;
 mod status;
 mod subscribing;
 
+use std::collections::BTreeMap;
 use std::sync::atomic::{AtomicI64, AtomicU64, Ordering::Relaxed};
 use std::sync::{Arc, Mutex, Weak};
 use std::thread::JoinHandle;
@@ -61,6 +62,8 @@ pub(crate) struct Shared {
     pub io: TaskThread,
     pub tasks: Arc<Tasks>,
     pub receive_buffer: ReceiveBuffer,
+    /// Greatest count of each loss so far.
+    losses: Mutex<BTreeMap<String, u64>>,
     /// Simulated time, one for all nodes of a process.
     sim_time: Mutex<Option<(Arc<AtomicI64>, Subscription)>>,
     publishing: TaskThread,
@@ -103,6 +106,7 @@ impl Shared {
             io,
             tasks: Arc::default(),
             receive_buffer: ReceiveBuffer::probe(),
+            losses: Mutex::default(),
             sim_time: Mutex::default(),
             publishing,
             answers: Answers::default(),

@@ -7,6 +7,7 @@ use lattice_msgs::diagnostic_msgs::DiagnosticStatus;
 use super::Shared;
 use crate::dds::effective_receive_buffer;
 use crate::diagnostics::{Level, status};
+use crate::sync::lock;
 
 /// Below this, bursts of large messages are lost; twice the largest message is needed.
 const ENOUGH_BYTES: usize = 16 << 20;
@@ -40,6 +41,20 @@ impl ReceiveBuffer {
     }
 }
 
+const QOS: &str = "QoS does not match";
+
+/// Losses kept, at most.
+const MAX_LOSSES: usize = 1000;
+
+/// Something that went wrong between this process and another.
+struct Trouble {
+    /// Topic or service, and what happened there.
+    of: String,
+    count: u64,
+    /// The same for every topic.
+    problem: &'static str,
+}
+
 impl Shared {
     /// State of the transport of this process, as a task of `node`.
     pub(crate) fn transport_status(&self, node: &str) -> DiagnosticStatus {
@@ -60,15 +75,46 @@ impl Shared {
         if self.receive_buffer.is_short() {
             problems.push("receive buffer short, raise net.core.rmem_max");
         }
+        let troubles = self.troubles();
+        self.note_losses(&troubles);
+        for trouble in troubles {
+            if !problems.contains(&trouble.problem) {
+                problems.push(trouble.problem);
+            }
+            values.push((trouble.of, trouble.count.to_string()));
+        }
+        let (level, message) = match problems.is_empty() {
+            true => (Level::Ok, "running".to_owned()),
+            false => (Level::Warn, problems.join("; ")),
+        };
+        status(node, "transport", level, message, values)
+    }
+
+    /// Messages and requests lost so far, by topic, of endpoints that have ended as of the last status.
+    pub(crate) fn losses(&self) -> Vec<(String, u64)> {
+        self.note_losses(&self.troubles());
+        lock(&self.losses).clone().into_iter().collect()
+    }
+
+    fn note_losses(&self, troubles: &[Trouble]) {
+        let mut losses = lock(&self.losses);
+        for trouble in troubles.iter().filter(|trouble| trouble.problem != QOS) {
+            if losses.len() < MAX_LOSSES || losses.contains_key(&trouble.of) {
+                let most = losses.entry(trouble.of.clone()).or_default();
+                *most = trouble.count.max(*most);
+            }
+        }
+    }
+
+    /// Everything that was lost or does not match, with its count.
+    fn troubles(&self) -> Vec<Trouble> {
+        let mut troubles = Vec::new();
         let mut add = |topic: &str, what: &str, count: u64, problem: &'static str| {
             if count > 0 {
-                values.push((format!("{topic} {what}"), count.to_string()));
-                if !problems.contains(&problem) {
-                    problems.push(problem);
-                }
+                let of = format!("{topic} {what}");
+                troubles.push(Trouble { of, count, problem });
             }
         };
-        const QOS: &str = "QoS does not match";
         for publisher in self.publishers() {
             let topic = publisher.peers.topic();
             let dropped = publisher.writer.dropped();
@@ -90,10 +136,6 @@ impl Shared {
             add(&of.name, "requests_lost", lost, REQUESTS);
             add(&of.name, "requests_failed", failed, REQUESTS);
         }
-        let (level, message) = match problems.is_empty() {
-            true => (Level::Ok, "running".to_owned()),
-            false => (Level::Warn, problems.join("; ")),
-        };
-        status(node, "transport", level, message, values)
+        troubles
     }
 }
