@@ -297,6 +297,9 @@ fn only_bags_are_overwritten() {
     fs::remove_file(bag.join("metadata.yaml")).unwrap();
     refused(&bag, true);
     assert!(others.exists() && bag.join("bag_0.db3").exists());
+    fs::remove_file(others).unwrap();
+    // As a writer that was killed leaves it.
+    create(&bag, true).unwrap();
     let file = folder.path().join("file");
     fs::write(&file, "x").unwrap();
     refused(&file, true);

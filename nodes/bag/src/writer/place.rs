@@ -5,7 +5,7 @@ use std::path::{Path, PathBuf};
 
 use crate::BagError;
 use crate::metadata::Metadata;
-use crate::split_list::list;
+use crate::split_list::{is_storage, list};
 
 /// Removes a bag at `path` if that is wanted; anything else there is kept and refused.
 pub(super) fn make_way(path: &Path, overwrite: bool) -> Result<(), BagError> {
@@ -13,7 +13,7 @@ pub(super) fn make_way(path: &Path, overwrite: bool) -> Result<(), BagError> {
     files.try_for_each(|file| fs::remove_file(&file).map_err(BagError::io(&file, "remove")))
 }
 
-/// Files of a bag at `path` that its metadata name, which one that is written there replaces. Refused where
+/// Files of a bag at `path` that its metadata name, or that are numbered as ours if it has none, which one that is written there replaces. Refused where
 /// that is not wanted, or where something else is there but for the names `beside`.
 pub fn replaceable(
     path: &Path,
@@ -41,10 +41,14 @@ pub fn replaceable(
             return refuse(format!(" and no bag can be made out there ({error})"), "");
         }
     };
+    let folder = path.file_name().unwrap_or_default().to_string_lossy();
     let is_ours = |name: &str| {
         let endings = ["-wal", "-shm", "-journal"];
         let of_file = endings.iter().find_map(|ending| name.strip_suffix(ending));
-        name == "metadata.yaml" || named.iter().any(|n| n == name || Some(&**n) == of_file)
+        let file = of_file.unwrap_or(name);
+        // Without metadata a writer was killed.
+        let is_unlisted = || named.is_empty() && is_numbered(file, &folder);
+        name == "metadata.yaml" || named.iter().any(|n| n == file) || is_unlisted()
     };
     let mut files = Vec::new();
     for entry in list(path)? {
@@ -53,7 +57,7 @@ pub fn replaceable(
             continue;
         }
         if !is_ours(&name) || file.is_dir() {
-            let why = format!(" and holds {name:?}, which no metadata.yaml there names");
+            let why = format!(" and holds {name:?}, which is no part of a bag of ours");
             return refuse(why, "");
         }
         files.push(file);
@@ -62,4 +66,14 @@ pub fn replaceable(
         return refuse(String::new(), " or allow to overwrite");
     }
     Ok(files)
+}
+
+/// True for the name of a storage file that a writer makes in a folder of this name.
+fn is_numbered(file: &str, folder: &str) -> bool {
+    let number = file
+        .strip_prefix(folder)
+        .and_then(|rest| rest.strip_prefix('_'))
+        .and_then(|rest| rest.split_once('.'));
+    let digits = |number: &str| number.bytes().all(|byte| byte.is_ascii_digit());
+    is_storage(file) && number.is_some_and(|(number, _)| !number.is_empty() && digits(number))
 }
