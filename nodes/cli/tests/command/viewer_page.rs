@@ -37,11 +37,16 @@ const LOOK: &str = r#"(async () => {
   const centre = ({ key }) => cells.centre(Number(BigInt(key) >> 15n), placeIndex(Number(BigInt(key) & 32767n)));
   // A face that looks up is lit like this.
   const LIGHT = 0.52 + 0.3 + (0.22 * 0.2) / Math.hypot(0.55, 0.75, 0.2);
+  // With true shapes, however slow the machine is.
+  const picture = () => {
+    cells.pace = 0;
+    frame();
+  };
   window.look = {
     at, centre,
     // Largest difference of a colour from that of the legend, of cells seen from above.
     offLegend(known, value) {
-      frame();
+      picture();
       const [low, high] = cells.colour.range;
       const palette = paletteBytes(lattice.state.mode);
       const off = known.map((cell) => {
@@ -65,7 +70,7 @@ const LOOK: &str = r#"(async () => {
         set("low", low);
         set("high", high);
         cells.chosen = null;
-        frame();
+        picture();
         const [least, most] = cells.slice;
         const ground = getComputedStyle(document.documentElement).getPropertyValue("--ground").trim();
         const isGround = (pixel) => pixel.every((x, k) => Math.abs(x - parseInt(ground.slice(1 + 2 * k, 3 + 2 * k), 16)) < 30);
