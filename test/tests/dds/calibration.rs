@@ -87,7 +87,8 @@ fn a_cyclone_headset_is_found_and_every_bad_cloud_refused() {
         assert!(variance > 0.0 && variance < 1e-3, "{covariance:?}");
     }
     for (name, part) in [
-        ("mirrored", "mirrored"),
+        // A mirrored cloud of Unity is one of WinRT that looks the other way.
+        ("mirrored", "fits as winrt_rub, not as unity_ruf"),
         ("empty", "no points"),
         ("unlabelled", "no labels"),
         ("nan", "none of the 500 points is finite"),
