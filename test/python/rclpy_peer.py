@@ -10,6 +10,10 @@ import sys
 import time
 from pathlib import Path
 
+# Read while rclpy is loaded.
+os.environ["RMW_IMPLEMENTATION"] = "rmw_fastrtps_cpp"
+os.environ["ROS_AUTOMATIC_DISCOVERY_RANGE"] = "LOCALHOST"
+
 import rclpy
 from rcl_interfaces.msg import ParameterEvent
 from rcl_interfaces.srv import GetLoggerLevels
@@ -80,8 +84,6 @@ class Peer(Node):
 def main():
     faulthandler.dump_traceback_later(4 * PATIENCE_S, exit=True)
     scenario = json.loads(Path(sys.argv[1]).read_text())
-    os.environ["RMW_IMPLEMENTATION"] = "rmw_fastrtps_cpp"
-    os.environ["ROS_AUTOMATIC_DISCOVERY_RANGE"] = "LOCALHOST"
     rclpy.init(domain_id=scenario["domain"])
     peer = Peer(scenario["node"])
     said = {}
