@@ -12,6 +12,11 @@ use super::map::CalibrationMap;
 use super::rays::blocked_fraction;
 use super::types::CalibrationOptions;
 
+/// Steps of a first look, and those of them after which only the best go on.
+pub(super) const FEW_STEPS: usize = 7;
+pub(super) const GLIMPSE_STEPS: usize = 3;
+/// Hypotheses that get all steps of a first look.
+const FIRST_LOOK: usize = 64;
 /// Hypotheses that are refined with more points after a first look.
 const SECOND_LOOK: usize = 24;
 /// Log-likelihood that a blocked line of sight costs an observation.
@@ -89,14 +94,21 @@ impl<'a> Workbench<'a> {
     /// The hypotheses that stand a first look, refined with a few points, the best first and all
     /// different.
     pub fn first_look(&self, hypotheses: &[Hypothesis]) -> Vec<Candidate> {
-        let mut found: Vec<Candidate> = hypotheses
-            .par_iter()
-            .map(|hypothesis| {
-                let pose = self.refine_few(&self.input.few, &hypothesis.target_from_source);
-                self.judge(&self.few, pose, "search")
-            })
+        let refined = |pose: &Isometry3<f64>, steps: usize| {
+            let pose = self.refine_few(&self.input.few, pose, steps);
+            self.judge(&self.few, pose, "search")
+        };
+        let by_likelihood = |a: &Candidate, b: &Candidate| b.total().total_cmp(&a.total());
+        let glimpsed = hypotheses.par_iter();
+        let mut glimpsed: Vec<Candidate> = glimpsed
+            .map(|hypothesis| refined(&hypothesis.target_from_source, GLIMPSE_STEPS))
             .collect();
-        found.sort_by(|a, b| b.total().total_cmp(&a.total()));
+        glimpsed.sort_by(by_likelihood);
+        glimpsed.truncate(FIRST_LOOK);
+        let mut found: Vec<Candidate> = (glimpsed.par_iter())
+            .map(|glimpsed| refined(&glimpsed.map_from_headset, FEW_STEPS - GLIMPSE_STEPS))
+            .collect();
+        found.sort_by(by_likelihood);
         self.different(found, SECOND_LOOK)
     }
 
@@ -120,10 +132,15 @@ impl<'a> Workbench<'a> {
     }
 
     /// A few steps of GICP-SE(3) with a few points.
-    pub fn refine_few(&self, few: &PreparedCloud, start: &Isometry3<f64>) -> Isometry3<f64> {
+    pub fn refine_few(
+        &self,
+        few: &PreparedCloud,
+        start: &Isometry3<f64>,
+        steps: usize,
+    ) -> Isometry3<f64> {
         let options = RegisterOptions {
             gate_m: 8.0 * self.map.spacing_m,
-            max_iterations: 7,
+            max_iterations: steps,
             ..self.baseline()
         };
         register(few, &self.map.cloud, start, &options).target_from_source
@@ -153,6 +170,7 @@ impl<'a> Workbench<'a> {
     pub fn tighten(&self, start: &Isometry3<f64>) -> Isometry3<f64> {
         let options = RegisterOptions {
             gate_m: 4.0 * self.map.spacing_m,
+            max_iterations: 24,
             ..self.baseline()
         };
         register(&self.input.full, &self.map.cloud, start, &options).target_from_source

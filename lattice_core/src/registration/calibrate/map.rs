@@ -30,7 +30,7 @@ impl CalibrationMap {
         }
         let cloud = PreparedCloud::new(cloud, &PrepareOptions::default())?;
         let surfaces = SearchMap::of_surfaces(&cloud, cell_side_m);
-        let rough = SearchMap::of_surfaces(&cloud, 2.0 * cell_side_m);
+        let rough = SearchMap::rough(&cloud, cell_side_m);
         let occupied = OccupiedGrid::new(cloud.points_m(), cloud.normals(), 2.0 * cell_side_m);
         let (Some(surfaces), Some(rough), Some(occupied)) = (surfaces, rough, occupied) else {
             return Err(RegistrationError::TooFewPoints {

@@ -1,16 +1,18 @@
 //! Readings of a cloud's axes: those under which it would fit tell how it was misread.
 
-use nalgebra::{Matrix3, Vector3};
+use nalgebra::{Isometry3, Matrix3, Vector3};
 use rayon::prelude::*;
 
 use super::super::likelihood::Fit;
 use super::super::search::{Region, SearchSource, search};
 use super::super::{PrepareOptions, PreparedCloud, SemanticCloud};
-use super::candidates::{Candidate, Workbench};
+use super::candidates::{Candidate, FEW_STEPS, GLIMPSE_STEPS, Workbench};
 use crate::pose::Axes;
 
 /// Hypotheses of a search with other axes.
 const MISREAD: usize = 48;
+/// Those of them that get all steps of a first look.
+const FIRST_LOOK: usize = 16;
 /// Hypotheses of a rough search.
 const ROUGH_PLACES: usize = 4;
 /// Readings that are looked at closely: the right one and its mirror image lead a rough search.
@@ -167,12 +169,19 @@ impl Mended {
         let hypotheses = search(&bench.map.surfaces, &self.source, region, MISREAD);
         let scale = bench.map.scale(bench.options.noise_m).coarser(2.0);
         let fit = Fit::new(&self.cloud, &bench.map.cloud, scale);
-        let likelihoods = hypotheses.par_iter().map(|hypothesis| {
-            let pose = bench.refine_few(&self.cloud, &hypothesis.target_from_source);
+        let refined = |pose: &Isometry3<f64>, steps: usize| {
+            let pose = bench.refine_few(&self.cloud, pose, steps);
             let partners = fit.partners(&pose);
             let (likelihood, _) = fit.likelihood(&partners, &bench.known, bench.options.agreement);
-            likelihood.total()
-        });
+            (likelihood.total(), pose)
+        };
+        let glimpsed = hypotheses.par_iter();
+        let mut glimpsed: Vec<(f64, Isometry3<f64>)> = glimpsed
+            .map(|hypothesis| refined(&hypothesis.target_from_source, GLIMPSE_STEPS))
+            .collect();
+        glimpsed.sort_by(|a, b| b.0.total_cmp(&a.0));
+        let looked_at = glimpsed.par_iter().take(FIRST_LOOK);
+        let likelihoods = looked_at.map(|(_, pose)| refined(pose, FEW_STEPS - GLIMPSE_STEPS).0);
         likelihoods.max_by(f64::total_cmp)
     }
 }

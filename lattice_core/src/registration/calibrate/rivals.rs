@@ -4,7 +4,7 @@ use nalgebra::{Isometry3, Translation3, UnitQuaternion, Vector3};
 use rayon::prelude::*;
 
 use super::super::search::{Region, SearchSource, angle_between, search, yaw_of};
-use super::candidates::{Candidate, Workbench};
+use super::candidates::{Candidate, FEW_STEPS, Workbench};
 use super::likeliest;
 
 /// Rivals from among the candidates that are refined like the likeliest.
@@ -20,6 +20,8 @@ const TWIN_YAW_RAD: f64 = 0.06;
 const TWIN_PLACES: usize = 6;
 /// Farther than any map reaches.
 const ANYWHERE_M: f64 = 1e6;
+/// Log-likelihood of an observation by which a rival is beyond reach: refining it wins a fifth of that.
+const BEYOND: f64 = 1.0;
 
 impl Workbench<'_> {
     /// The likeliest candidate, its best rivals, and its twins in a symmetric room, all refined with near
@@ -56,7 +58,8 @@ impl Workbench<'_> {
             let near = |other: &&Candidate| {
                 other.is_near(&candidate.map_from_headset, &middle, shift_m, turn_rad)
             };
-            if kept.len() <= KNOWN && !kept.iter().any(near) {
+            let hopeful = candidate.total() > best.total() - BEYOND * self.fit.observations();
+            if hopeful && kept.len() <= KNOWN && !kept.iter().any(near) {
                 kept.push(candidate);
             }
         }
@@ -67,6 +70,8 @@ impl Workbench<'_> {
     /// The place that fits best with each heading of a symmetric room.
     fn twins(&self, best: &Candidate, region: Option<&Region>) -> Vec<Isometry3<f64>> {
         let source = SearchSource::by_surface(&self.input.few, self.input.sensor_m);
+        let best_of_few = self.judge(&self.few, best.map_from_headset, best.method);
+        let hopeful = best_of_few.total() - BEYOND * self.few.observations();
         let twin = |turn_rad: &f64| {
             let turn = UnitQuaternion::from_axis_angle(&Vector3::z_axis(), *turn_rad);
             let about = Isometry3::from_parts(
@@ -86,10 +91,13 @@ impl Workbench<'_> {
                 false => Vec::new(),
             };
             let looked_at = found.par_iter().map(|hypothesis| {
-                let pose = self.refine_few(&self.input.few, &hypothesis.target_from_source);
+                let pose =
+                    self.refine_few(&self.input.few, &hypothesis.target_from_source, FEW_STEPS);
                 self.judge(&self.few, pose, "search")
             });
-            likeliest(&looked_at.collect::<Vec<_>>()).map(|c| self.polish(&c.map_from_headset))
+            likeliest(&looked_at.collect::<Vec<_>>())
+                .filter(|twin| twin.total() > hopeful)
+                .map(|twin| self.polish(&twin.map_from_headset))
         };
         TWINS_RAD.par_iter().filter_map(twin).collect()
     }

@@ -4,9 +4,6 @@ use nalgebra::{Rotation3, Vector3};
 
 use super::field::Field;
 
-/// Cells of the source that are looked at, at most; more add little.
-const MAX_STEPS: usize = 256;
-
 /// A heading and a place that the source fits, and how well.
 #[derive(Clone, Copy, PartialEq, Debug)]
 pub(super) struct Peak {
@@ -28,13 +25,14 @@ pub(super) struct Window {
 /// The best places of the source's reference point for one heading.
 ///
 /// `points` are relative to the reference point, in the source frame, with the channel of each at this
-/// heading. At most `most` local maxima come back, the best first.
+/// heading; at most `looked_at` cells of them count. At most `most` local maxima come back, the best
+/// first.
 pub(super) fn best_places(
     field: &Field,
     points: impl Iterator<Item = (Vector3<f64>, usize)>,
     yaw_rad: f64,
     window: Window,
-    most: usize,
+    (looked_at, most): (usize, usize),
 ) -> Vec<Peak> {
     let turn = Rotation3::from_axis_angle(&Vector3::z_axis(), yaw_rad);
     let mut steps: Vec<(usize, [i64; 3])> = points
@@ -46,7 +44,7 @@ pub(super) fn best_places(
     // Each occupied cell of the source counts once.
     steps.sort_unstable_by_key(|(channel, [x, y, z])| (*channel, *z, *y, *x));
     steps.dedup();
-    let stride = steps.len().div_ceil(MAX_STEPS).max(1);
+    let stride = steps.len().div_ceil(looked_at.max(1)).max(1);
     let steps: Vec<_> = steps.into_iter().step_by(stride).collect();
     let sums = sum_all(field, &steps, window);
     maxima(&sums, window.dims, most)
@@ -222,7 +220,7 @@ mod tests {
             dims,
         };
         let source = points[..4].iter().map(|p| (p - points[2], 0));
-        let peaks = best_places(&field, source, 0.0, window, 3);
+        let peaks = best_places(&field, source, 0.0, window, (256, 3));
         assert_eq!(peaks[0].score, 400);
         assert_eq!(peaks[0].place_m, points[2].coords);
     }

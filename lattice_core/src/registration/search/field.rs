@@ -50,8 +50,10 @@ impl Facing {
 impl Field {
     /// Scores by the direction of surfaces: most for the same orientation, some for any, half of it one cell off.
     pub fn of_surfaces(grid: Grid, points_m: &[Point3<f64>], normals: &[Vector3<f64>]) -> Field {
-        let scores = |normal: &Vector3<f64>, channel: usize| -> u8 {
-            let own = Facing::of(normal).channel(0.0);
+        let facing: Vec<usize> = (normals.iter())
+            .map(|normal| Facing::of(normal).channel(0.0))
+            .collect();
+        let score = |own: usize, channel: usize| -> u8 {
             let apart = own.abs_diff(channel);
             match apart.min(AZIMUTHS.abs_diff(apart)) {
                 _ if (own == 0) != (channel == 0) => FULL / 5,
@@ -62,7 +64,7 @@ impl Field {
             }
         };
         Field::build(grid, points_m, 1 + AZIMUTHS, |i, channel| {
-            normals.get(i).map_or(FULL, |n| scores(n, channel))
+            facing.get(i).map_or(FULL, |own| score(*own, channel))
         })
     }
 

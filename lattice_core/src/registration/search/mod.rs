@@ -24,6 +24,11 @@ use super::PreparedCloud;
 pub use occupied::OccupiedGrid;
 
 const PLACES: usize = 24;
+/// Cells of the source that are laid on the coarse grid, at most; more add little.
+const LOOKED_AT: usize = 256;
+/// The same for a rough search, and for one by labels, which are of regions.
+const LOOKED_AT_ROUGHLY: usize = 96;
+const LOOKED_AT_BY_LABELS: usize = 128;
 /// Peaks that are climbed for each hypothesis that is wanted.
 const CLIMBED: usize = 3;
 /// Points that climbs look at, about.
@@ -56,6 +61,8 @@ pub struct Hypothesis {
 pub struct SearchMap {
     coarse: Field,
     fine: Field,
+    /// Cells of the source that are laid on the coarse grid, at most.
+    looked_at: usize,
 }
 
 impl SearchMap {
@@ -63,7 +70,16 @@ impl SearchMap {
     pub fn of_surfaces(map: &PreparedCloud, spacing_m: f64) -> Option<SearchMap> {
         let (points, normals) = (map.points_m(), map.normals());
         let make = |grid| Field::of_surfaces(grid, points, normals);
-        SearchMap::build(points, spacing_m, make)
+        SearchMap::build(points, spacing_m, LOOKED_AT, make)
+    }
+
+    /// The same with cells twice as large, for a quick search that tells about how well a source fits.
+    pub fn rough(map: &PreparedCloud, spacing_m: f64) -> Option<SearchMap> {
+        let rough = SearchMap::of_surfaces(map, 2.0 * spacing_m)?;
+        Some(SearchMap {
+            looked_at: LOOKED_AT_ROUGHLY,
+            ..rough
+        })
     }
 
     /// The same by `channels` classes of the source: `score(i, channel)` says what a source point of a
@@ -75,13 +91,18 @@ impl SearchMap {
         score: impl Fn(usize, usize) -> u8 + Sync,
     ) -> Option<SearchMap> {
         let points = map.points_m();
-        let make = |grid| Field::build(grid, points, channels, &score);
-        SearchMap::build(points, spacing_m, make)
+        let of_channel = |channel| (0..points.len()).map(|i| score(i, channel)).collect();
+        let scores: Vec<Vec<u8>> = (0..channels).into_par_iter().map(of_channel).collect();
+        let score = |i: usize, channel: usize| scores.get(channel).and_then(|s| s.get(i));
+        let score = |i, channel| score(i, channel).copied().unwrap_or(0);
+        let make = |grid| Field::build(grid, points, channels, score);
+        SearchMap::build(points, spacing_m, LOOKED_AT_BY_LABELS, make)
     }
 
     fn build(
         points_m: &[Point3<f64>],
         spacing_m: f64,
+        looked_at: usize,
         make: impl Fn(Grid) -> Field,
     ) -> Option<SearchMap> {
         let fine = Grid::around(points_m, 2.0 * spacing_m, 2)?;
@@ -90,6 +111,7 @@ impl SearchMap {
         Some(SearchMap {
             coarse: make(Grid::around(points_m, coarse_m, 2)?),
             fine: make(fine),
+            looked_at,
         })
     }
 }
@@ -160,7 +182,10 @@ pub fn search(
     let window = window(grid, source, region);
     let mut peaks: Vec<Peak> = headings
         .into_par_iter()
-        .flat_map_iter(|yaw| best_places(&map.coarse, probe.at_heading(yaw), yaw, window, PLACES))
+        .flat_map_iter(|yaw| {
+            let most = (map.looked_at, PLACES);
+            best_places(&map.coarse, probe.at_heading(yaw), yaw, window, most)
+        })
         .collect();
     peaks.sort_by_key(|peak| std::cmp::Reverse(peak.score));
     peaks.truncate(CLIMBED * most);
