@@ -7,4 +7,3 @@ pub mod flat;
 pub mod maps;
 pub mod python;
 pub mod random;
-pub mod rooms;

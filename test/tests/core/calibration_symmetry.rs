@@ -11,14 +11,16 @@ use nalgebra::{Isometry3, Vector3};
 /// its distance from the truth.
 fn ask(room: &Flat, reach_m: [f64; 2], seed: u64) -> (Calibration, f64) {
     let mut random = Random(seed);
-    let map = CalibrationMap::new(room.noisy_map(&mut random), 0.05).unwrap();
+    let mut map = room.noisy_map(&mut || random.unit());
+    map.labels.clear();
+    let map = CalibrationMap::new(map, 0.05).unwrap();
     let mut signed = || 2.0 * random.unit() - 1.0;
     let eye = reach_m.map(|reach| reach * signed());
     let truth = Isometry3::new(
         Vector3::new(3.0 * signed(), 3.0 * signed(), 1.5),
         Vector3::z() * 3.0 * signed(),
     );
-    let mut scan = room.all_around(eye, &truth, &mut random);
+    let mut scan = room.all_around(eye, &truth, &mut || random.unit());
     scan.cloud.labels.clear();
     let request = CalibrationRequest {
         headset_scans: &[scan.clone()],

@@ -7,7 +7,7 @@ use std::fs;
 use lattice_core::pose::Axes;
 use lattice_test::clouds::{cloud, labelled_cloud};
 use lattice_test::domain::TestDomain;
-use lattice_test::flat::{Flat, headset_cloud};
+use lattice_test::flat::{Flat, headset_cloud, map_cloud};
 use lattice_test::python::python;
 use nalgebra::{Isometry3, Point3, Quaternion, Translation3, UnitQuaternion, Vector3};
 use serde_json::{Value, json};
@@ -52,7 +52,7 @@ fn a_cyclone_headset_is_found_and_every_bad_cloud_refused() {
     let nan = labelled_cloud("headset_origin", 0, &[([f32::NAN; 3], 1); 500]);
     let large = labelled_cloud("headset_origin", 0, &vec![([1.0; 3], 1); TOO_MANY]);
     for (name, data) in [
-        ("map", &flat.map_cloud(0).data),
+        ("map", &map_cloud(&flat, 0).data),
         ("good", &good.data),
         ("mirrored", &headset_cloud(&look, 0, mirrored).data),
         ("empty", &labelled_cloud("headset_origin", 0, &[]).data),

@@ -1,6 +1,7 @@
 //! `lattice evaluate`: calibration and registration, measured.
 
 use super::evaluate_kitti::Kitti;
+use super::evaluate_traps::Traps;
 use super::{Choice, choice, processors};
 use crate::progress::Progress;
 use crate::{CliResult, init_logging};
@@ -21,6 +22,9 @@ pub enum Evaluate {
     /// Calibrate a headset to a robot's map in a simulated house: four scenes, wrong labels, starts that
     /// are off or none at all, against ICP, GICP and Semantic-ICP
     Calibration(Calibration),
+    /// Calibrate where no answer may be certain: rooms that look alike from several places, and clouds in wrong
+    /// axes, of a wrong scale, leaning, or of another building
+    Traps(Traps),
     /// Register real labelled laser scans with each method, against the truth of an INS
     Kitti(Kitti),
 }
@@ -103,6 +107,7 @@ impl Evaluate {
         init_logging();
         match self {
             Self::Calibration(command) => command.run(),
+            Self::Traps(command) => command.run(),
             Self::Kitti(command) => command.run(),
         }
     }
@@ -124,14 +129,8 @@ impl Calibration {
         let threads = self.threads.unwrap_or_else(processors).clamp(1, 1024);
         let testbed = Testbed::new(house, &settings)?;
         let mut results = Results::open(&self.out, &settings)?;
-        let bar = Progress::new("evaluate");
-        let started = Instant::now();
-        let mut tell = |done: usize, total: usize| {
-            bar.set(done as f64 / total.max(1) as f64);
-            let share = (total - done) as f64 / done.max(1) as f64;
-            let left = clock(started.elapsed().mul_f64(share));
-            bar.say(&format!("{done} of {total}, {left} left"));
-        };
+        let bar = Remaining::new();
+        let mut tell = |done: usize, total: usize| bar.tell(done, total);
         let ran = run(&testbed, &plan, &mut results, threads, &mut tell);
         bar.done();
         ran?;
@@ -169,6 +168,33 @@ impl Calibration {
             timed_seeds: 1,
             ..plan
         }
+    }
+}
+
+/// Progress of an evaluation with the time that is left.
+pub(super) struct Remaining {
+    bar: Progress,
+    started: Instant,
+}
+
+impl Remaining {
+    pub fn new() -> Remaining {
+        Remaining {
+            bar: Progress::new("evaluate"),
+            started: Instant::now(),
+        }
+    }
+
+    /// Says how many trials are done, of all.
+    pub fn tell(&self, done: usize, total: usize) {
+        self.bar.set(done as f64 / total.max(1) as f64);
+        let share = total.saturating_sub(done) as f64 / done.max(1) as f64;
+        let left = clock(self.started.elapsed().mul_f64(share));
+        self.bar.say(&format!("{done} of {total}, {left} left"));
+    }
+
+    pub fn done(self) {
+        self.bar.done();
     }
 }
 

@@ -6,6 +6,7 @@ mod bench_transport;
 mod demo;
 mod evaluate;
 mod evaluate_kitti;
+mod evaluate_traps;
 mod paper;
 mod simulate;
 

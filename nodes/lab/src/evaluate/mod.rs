@@ -17,6 +17,7 @@ mod settings;
 mod statistics;
 mod summary;
 mod testbed;
+pub mod traps;
 mod trial;
 
 pub use house::read_house;

@@ -4,7 +4,8 @@
 //! them on a turntable, and a SPAN-CPT-like INS, on an earth-moving `Site`. Everything is a pure function
 //! of a seed and a time, so that any number of threads gives the same bytes.
 //!
-//! [`house`] is another world: a furnished house, a robot that maps it and a headset.
+//! [`house`] is another world: a furnished house, a robot that maps it and a headset; [`rooms`] are of a few
+//! rectangles.
 //!
 //! Times are nanoseconds since the start of the log. The map frame is east, north, up (metres) about the
 //! middle of the site; `base_link` is forward, left, up on the ground in the middle of the wheels.
@@ -23,6 +24,7 @@ mod obstacles;
 mod person;
 mod profile;
 mod random;
+pub mod rooms;
 mod site;
 mod spin64;
 mod spline;

@@ -9,7 +9,7 @@ use lattice_msgs::vision_msgs::{LabelInfo, VisionClass};
 use lattice_nodes::convert::geometry::isometry_from_transform;
 use lattice_nodes::semantic_icp_server::{End, LatticeSearch, SearchWhen, ServerOptions};
 use lattice_test::clouds::SECOND_NS;
-use lattice_test::flat::{Flat, headset_cloud};
+use lattice_test::flat::{Flat, headset_cloud, map_cloud};
 use nalgebra::{Isometry3, Point3, Translation3, UnitQuaternion, Vector3};
 
 use super::bench::{Bench, Fake, NONE, OK, REJECTED, bench, found, good, map_point, mapper};
@@ -219,7 +219,7 @@ fn truth() -> Isometry3<f64> {
 fn a_left_handed_headset_is_found_and_a_mirrored_one_is_not() {
     let flat = Flat::default();
     let mut mapper = mapper(1);
-    mapper.on_cloud(&flat.map_cloud(1)).unwrap();
+    mapper.on_cloud(&map_cloud(&flat, 1)).unwrap();
     let mut options = ServerOptions::default();
     options.semantic.axes = Axes::UnityRuf;
     let mut bench = Bench::new(options, LatticeSearch::new(CalibrationOptions::default()));

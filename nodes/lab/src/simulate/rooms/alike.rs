@@ -3,13 +3,10 @@
 use lattice_core::registration::{HeadsetScan, LabelDistribution, SemanticCloud};
 use nalgebra::{Isometry3, Point3, Vector3};
 
-use crate::flat::Flat;
-use crate::random::Random;
+use super::{FLOOR, Flat, WALL};
 
 const HEIGHT_M: f64 = 2.7;
 const EYE_M: f64 = 1.6;
-const FLOOR: u16 = 2;
-const WALL: u16 = 1;
 
 impl Flat {
     /// An empty room of `x_m` by `y_m` about the origin, with floor and ceiling.
@@ -47,6 +44,25 @@ impl Flat {
         silo
     }
 
+    /// Stairs that rise along x between two walls, `n` steps about the origin.
+    pub fn stairs(n: usize) -> Flat {
+        const RUN: f64 = 0.3;
+        const RISE: f64 = 0.17;
+        const WIDTH: f64 = 1.6;
+        let mut stairs = Flat::empty();
+        let first = -(n as f64) / 2.0;
+        for i in 0..n {
+            let step = first + i as f64;
+            let ([x, z], y) = ([step * RUN, step * RISE], -WIDTH / 2.0);
+            stairs.add([x, y, z], [RUN, 0.0, 0.0], [0.0, WIDTH, 0.0], FLOOR);
+            stairs.add([x, y, z - RISE], [0.0, WIDTH, 0.0], [0.0, 0.0, RISE], WALL);
+            for side in [y, -y] {
+                stairs.add([x, side, z], [RUN, 0.0, 0.0], [0.0, 0.0, HEIGHT_M], WALL);
+            }
+        }
+        stairs
+    }
+
     /// The same with a box of `size_m` that stands with a corner at `corner_m`.
     #[must_use]
     pub fn with_box(mut self, [x, y]: [f64; 2], [a, b, c]: [f64; 3]) -> Flat {
@@ -69,10 +85,13 @@ impl Flat {
         }
     }
 
-    /// The room as a map of cells of 5 cm has it, each centroid off by a few millimetres; no labels.
-    pub fn noisy_map(&self, random: &mut Random) -> SemanticCloud {
-        let points = self.map().points_m.into_iter();
-        SemanticCloud::unlabelled(points.map(|p| p + random.point(0.008)).collect())
+    /// The room as a map of cells of 5 cm has it, each centroid off by a few millimetres; `uniform` gives
+    /// numbers in [0, 1).
+    pub fn noisy_map(&self, uniform: &mut impl FnMut() -> f64) -> SemanticCloud {
+        let mut map = self.map();
+        let points = map.points_m.iter_mut();
+        points.for_each(|p| *p += off(0.008, uniform));
+        map
     }
 
     /// Scan all around from `x_m`, `y_m`, 1.6 m above the floor, with labels.
@@ -80,7 +99,7 @@ impl Flat {
         &self,
         [x_m, y_m]: [f64; 2],
         map_from_headset: &Isometry3<f64>,
-        random: &mut Random,
+        uniform: &mut impl FnMut() -> f64,
     ) -> HeadsetScan {
         let eye = Point3::new(x_m, y_m, EYE_M);
         let headset_from_map = map_from_headset.inverse();
@@ -90,7 +109,7 @@ impl Flat {
                 let (az, el) = (f64::from(i) * 0.035, f64::from(j) * 0.035);
                 let way = Vector3::new(az.cos() * el.cos(), az.sin() * el.cos(), el.sin());
                 if let Some((distance, label)) = self.hit(&eye, &way, 15.0) {
-                    let place = eye + way * distance + random.point(0.012);
+                    let place = eye + way * distance + off(0.012, uniform);
                     cloud.points_m.push(headset_from_map * place);
                     cloud.labels.push(LabelDistribution::hard(label));
                 }
@@ -101,4 +120,9 @@ impl Flat {
             sensor_m: Some(headset_from_map * eye),
         }
     }
+}
+
+/// A point of a cube about 0.
+fn off(half_side_m: f64, uniform: &mut impl FnMut() -> f64) -> Vector3<f64> {
+    Vector3::from_fn(|_, _| (2.0 * uniform() - 1.0) * half_side_m)
 }

@@ -1,0 +1,219 @@
+//! Traps: rooms that look alike from several places, and clouds that are not what they are said to be.
+
+use crate::random::Stream;
+use crate::simulate::rooms::Flat;
+use lattice_core::pose::Axes;
+use lattice_core::registration::{CalibrationOptions, HeadsetScan, SemanticCloud};
+use nalgebra::{Isometry3, Point3, UnitQuaternion, Vector3};
+
+/// A map and a scan, with the truth.
+pub(super) struct Scene {
+    pub map: SemanticCloud,
+    pub scan: HeadsetScan,
+    pub options: CalibrationOptions,
+    pub truth: Isometry3<f64>,
+}
+
+/// A room that looks alike from several places, and how far from its middle a scan is taken, metres.
+type Shape = (&'static str, fn() -> Flat, [f64; 2]);
+
+pub(super) const SHAPES: [Shape; 10] = [
+    ("room of 12 m x 7 m", || Flat::room(12.0, 7.0), [4.0, 2.0]),
+    ("room of 6 m x 4 m", || Flat::room(6.0, 4.0), [2.0, 1.0]),
+    ("room of 5 m x 5 m", || Flat::room(5.0, 5.0), [1.5, 1.5]),
+    (
+        "corridor of 20 m x 2.5 m",
+        || Flat::room(20.0, 2.5),
+        [3.0, 0.4],
+    ),
+    ("hall of 25 m x 15 m", || Flat::room(25.0, 15.0), [5.0, 4.0]),
+    (
+        "3 rooms of 4 m x 4 m",
+        || Flat::row_of_rooms(3, 4.0),
+        [1.0, 1.0],
+    ),
+    (
+        "5 rooms of 3 m x 3 m",
+        || Flat::row_of_rooms(5, 3.0),
+        [0.7, 0.7],
+    ),
+    ("silo of 90 panels", || Flat::silo(4.0, 90), [1.5, 1.5]),
+    ("octagon", || Flat::silo(4.0, 8), [1.5, 1.5]),
+    ("stairs of 24 steps", || Flat::stairs(24), [1.0, 0.3]),
+];
+
+/// Fault of a cloud.
+#[derive(Clone, Copy, PartialEq, Debug)]
+pub(super) enum Fault {
+    /// Axes it has and those it is read as.
+    Axes(Axes, Axes),
+    /// Factor on its lengths.
+    Scale(f64),
+    /// Lean, degrees.
+    Tilt(f64),
+    /// One axis has the wrong sign.
+    Mirrored,
+    /// It was taken in another building.
+    Elsewhere,
+}
+
+impl Fault {
+    pub fn all() -> Vec<Fault> {
+        let pairs = Axes::ALL.into_iter().flat_map(|has| {
+            let others = Axes::ALL.into_iter().filter(move |read| *read != has);
+            others.map(move |read| Fault::Axes(has, read))
+        });
+        let mut all: Vec<Fault> = pairs.collect();
+        all.extend([0.8, 0.9, 0.95, 1.05, 1.1, 1.25].map(Fault::Scale));
+        all.extend([5.0, 10.0, 20.0].map(Fault::Tilt));
+        all.extend([Fault::Mirrored, Fault::Elsewhere]);
+        all
+    }
+
+    pub fn name(self) -> String {
+        match self {
+            Fault::Axes(has, read) => format!("{has} read as {read}"),
+            Fault::Scale(by) => format!("scaled by {by}"),
+            Fault::Tilt(degrees) => format!("leaning by {degrees} degrees"),
+            Fault::Mirrored => "mirrored".to_owned(),
+            Fault::Elsewhere => "of another building".to_owned(),
+        }
+    }
+
+    /// True if the reason of an answer names this fault.
+    pub fn is_named_by(self, reason: &str) -> bool {
+        let any = |parts: &[&str]| parts.iter().any(|part| reason.contains(part));
+        match self {
+            Fault::Axes(has, _) => reason.contains(&format!("fits as {has}")),
+            Fault::Scale(_) => any(&["scale"]),
+            Fault::Tilt(_) => any(&["leans"]),
+            Fault::Mirrored => any(&["mirrored", "fits as"]),
+            Fault::Elsewhere => any(&["lie on the map", "another pose", "no place"]),
+        }
+    }
+}
+
+/// A scan in a room, in whole or of a sixth of the circle; with a box in sight or none, with labels
+/// or none.
+pub(super) fn of_shape(
+    (_, room, reach_m): Shape,
+    whole: bool,
+    boxed: bool,
+    labelled: bool,
+    random: &mut Stream,
+) -> Scene {
+    let truth = any_pose(random);
+    // A box needs room beside who looks at it.
+    let reach = if boxed { 0.3 } else { 1.0 };
+    let eye = reach_m.map(|most| most * reach * signed(random));
+    let room = match boxed {
+        true => room().with_box([eye[0] + 1.0, eye[1] + 0.1], [0.5, 0.5, 0.9]),
+        false => room(),
+    };
+    let uniform = &mut || random.uniform();
+    let mut map = room.noisy_map(uniform);
+    let mut scan = room.all_around(eye, &truth, uniform);
+    if !whole {
+        keep_sector(&mut scan, 0.52, random);
+    }
+    if !labelled {
+        map.labels.clear();
+        scan.cloud.labels.clear();
+    }
+    Scene {
+        map,
+        scan,
+        options: CalibrationOptions::default(),
+        truth,
+    }
+}
+
+/// Places and headings in the flat.
+const LOOKS: [([f64; 3], f64); 3] = [
+    ([3.5, 3.8, 1.6], -2.2),
+    ([1.0, 3.9, 1.6], -0.6),
+    ([7.5, 3.0, 1.6], 2.2),
+];
+
+/// A look into the flat with a fault.
+pub(super) fn of_fault(fault: Fault, seed: u64, random: &mut Stream) -> Scene {
+    let flat = Flat::default();
+    let truth = any_pose(random);
+    let looks = LOOKS.into_iter().cycle();
+    let (place, yaw) = looks
+        .skip((seed % LOOKS.len() as u64) as usize)
+        .next()
+        .unwrap_or_default();
+    let moved = Vector3::new(signed(random), signed(random), 0.0) * 0.2;
+    let eye = Point3::from(place) + moved;
+    let yaw = yaw + 0.2 * signed(random);
+    let mut cloud = match fault {
+        Fault::Elsewhere => Flat::room(7.0, 5.0)
+            .with_box([1.0, 0.5], [0.6, 1.4, 0.8])
+            .with_box([-2.0, -1.5], [1.2, 0.5, 1.7])
+            .look(Point3::new(0.0, 0.0, 1.6), yaw, &truth),
+        _ => flat.look(eye, yaw, &truth),
+    };
+    let mut map = flat.map();
+    if seed % 2 == 1 {
+        cloud.labels.clear();
+        map.labels.clear();
+    }
+    let axis = UnitQuaternion::from_axis_angle(&Vector3::z_axis(), yaw) * Vector3::x_axis();
+    let change = |p: Vector3<f64>| match fault {
+        Fault::Axes(has, read) => read.to_ros(has.from_ros(p)),
+        Fault::Scale(by) => p * by,
+        Fault::Tilt(degrees) => UnitQuaternion::from_axis_angle(&axis, degrees.to_radians()) * p,
+        Fault::Mirrored => Vector3::new(p.x, -p.y, p.z),
+        Fault::Elsewhere => p,
+    };
+    let mut scan = HeadsetScan {
+        cloud,
+        sensor_m: Some(truth.inverse() * eye),
+    };
+    let points = scan.cloud.points_m.iter_mut().chain(&mut scan.sensor_m);
+    points.for_each(|p| p.coords = change(p.coords));
+    let axes = match fault {
+        Fault::Axes(_, read) => read,
+        _ => Axes::RosFlu,
+    };
+    Scene {
+        map,
+        scan,
+        options: CalibrationOptions {
+            axes,
+            ..CalibrationOptions::default()
+        },
+        truth,
+    }
+}
+
+fn any_pose(random: &mut Stream) -> Isometry3<f64> {
+    let place = Vector3::new(3.0 * signed(random), 3.0 * signed(random), 1.5);
+    Isometry3::new(place, Vector3::z() * std::f64::consts::PI * signed(random))
+}
+
+/// Uniform in [-1, 1).
+fn signed(random: &mut Stream) -> f64 {
+    2.0 * random.uniform() - 1.0
+}
+
+/// Keeps the points within `half_rad` of a random heading.
+fn keep_sector(scan: &mut HeadsetScan, half_rad: f64, random: &mut Stream) {
+    let Some(eye) = scan.sensor_m else { return };
+    let turn = std::f64::consts::PI * signed(random);
+    let heading = Vector3::new(turn.cos(), turn.sin(), 0.0);
+    let is_kept = |p: &Point3<f64>| {
+        let way = p - eye;
+        Vector3::new(way.x, way.y, 0.0).angle(&heading) < half_rad
+    };
+    let kept: Vec<bool> = scan.cloud.points_m.iter().map(is_kept).collect();
+    let mut keep = kept.iter().copied();
+    scan.cloud
+        .points_m
+        .retain(|_| keep.next().unwrap_or_default());
+    let mut keep = kept.iter().copied();
+    scan.cloud
+        .labels
+        .retain(|_| keep.next().unwrap_or_default());
+}
