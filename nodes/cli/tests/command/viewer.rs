@@ -74,6 +74,11 @@ impl Viewer {
         Self { process, url }
     }
 
+    /// The server's process.
+    pub fn process(&self) -> u32 {
+        self.process.id()
+    }
+
     fn port(&self) -> u16 {
         self.url.rsplit(':').next().unwrap().parse().unwrap()
     }
