@@ -7,8 +7,10 @@ use std::sync::{Arc, Mutex, Weak};
 use futures::StreamExt;
 use futures::stream::BoxStream;
 
+use super::names;
+use super::neighbours::Neighbours;
 use super::peers::Peers;
-use super::port::{EndpointId, PortEvent};
+use super::port::{EndpointId, EndpointKind, PortEvent};
 use super::remote::RemotePublisher;
 use super::sync::lock;
 
@@ -22,6 +24,7 @@ const MAX_REMOTES: usize = 8192;
 #[derive(Default)]
 pub(crate) struct Endpoints {
     pub remotes: Remotes,
+    pub neighbours: Neighbours,
     inner: Mutex<Inner>,
 }
 
@@ -75,7 +78,14 @@ impl Endpoints {
                 peer,
                 policy,
             } => (endpoint, peer, Some(policy)),
-            PortEvent::Found { peer, publisher } => return self.remotes.add(peer, *publisher),
+            PortEvent::Found { peer, publisher } => {
+                let dds_name = names::dds_topic(&publisher.topic);
+                self.neighbours.add(peer, EndpointKind::Writer, &dds_name);
+                return self.remotes.add(peer, *publisher);
+            }
+            PortEvent::FoundReader { peer, dds_name } => {
+                return self.neighbours.add(peer, EndpointKind::Reader, &dds_name);
+            }
             PortEvent::Lost { peer: lost } => return self.lost(|peer| *peer == lost),
             PortEvent::ParticipantLost { any } => return self.lost(|peer| peer.is_beside(&any)),
             PortEvent::AllLost => return self.lost(|_| true),
@@ -99,6 +109,7 @@ impl Endpoints {
 
     fn lost(&self, gone: impl Fn(&EndpointId) -> bool) {
         self.remotes.remove(&gone);
+        self.neighbours.remove(&gone);
         let mut inner = lock(&self.inner);
         inner.early.retain(|(_, change)| !gone(&change.peer));
         let all: Vec<Arc<Peers>> = inner.peers.values().filter_map(Weak::upgrade).collect();

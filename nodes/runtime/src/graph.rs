@@ -3,7 +3,7 @@
 //! ROS 2 nodes are no DDS entities: every participant says on `ros_discovery_info` which nodes it
 //! holds, with the readers and writers of each (rmw_dds_common).
 
-use std::collections::BTreeSet;
+use std::collections::BTreeMap;
 use std::sync::{Arc, Mutex, Weak};
 use std::time::Duration;
 
@@ -14,8 +14,9 @@ use smol::Timer;
 use smol::channel::{Receiver, Sender, bounded};
 
 use super::names;
+use super::neighbours::{GraphEndpoint, role};
 use super::outbox::Outbox;
-use super::port::{EndpointId, PortTopic, Transport};
+use super::port::{EndpointId, EndpointKind, PortTopic, Transport};
 use super::sync::lock;
 
 /// DDS topic, whose name is not mangled.
@@ -33,13 +34,6 @@ const SETTLE_TIME: Duration = Duration::from_millis(50);
 #[derive(Clone, Copy, Debug)]
 pub(crate) struct NodeId(usize);
 
-/// Kind of an endpoint of a node.
-#[derive(Clone, Copy, Debug, PartialEq, Eq)]
-pub(crate) enum EndpointKind {
-    Reader,
-    Writer,
-}
-
 /// The nodes of this process.
 pub(crate) struct Graph {
     nodes: Mutex<Vec<Entry>>,
@@ -51,9 +45,12 @@ pub(crate) struct Graph {
 struct Entry {
     namespace: String,
     name: String,
-    readers: BTreeSet<EndpointId>,
-    writers: BTreeSet<EndpointId>,
+    readers: Endpoints,
+    writers: Endpoints,
 }
+
+/// Names in DDS, by identity.
+type Endpoints = BTreeMap<EndpointId, String>;
 
 /// Text of a second node of the same name in a process; it begins as that of rcl.
 fn same_name(namespace: &str, name: &str) -> String {
@@ -110,9 +107,9 @@ impl Graph {
         self: &Arc<Self>,
         node: NodeId,
         kind: EndpointKind,
-        guid: EndpointId,
+        (guid, dds_name): (EndpointId, &str),
     ) -> NodeEndpoint {
-        self.edit(node, kind, |set| set.insert(guid));
+        self.edit(node, kind, |all| _ = all.insert(guid, dds_name.to_owned()));
         NodeEndpoint {
             graph: Arc::clone(self),
             node,
@@ -121,12 +118,7 @@ impl Graph {
         }
     }
 
-    fn edit(
-        &self,
-        node: NodeId,
-        kind: EndpointKind,
-        change: impl FnOnce(&mut BTreeSet<EndpointId>) -> bool,
-    ) {
+    fn edit(&self, node: NodeId, kind: EndpointKind, change: impl FnOnce(&mut Endpoints)) {
         if let Some(entry) = lock(&self.nodes).get_mut(node.0) {
             change(match kind {
                 EndpointKind::Reader => &mut entry.readers,
@@ -134,6 +126,24 @@ impl Graph {
             });
         }
         self.note_change();
+    }
+
+    /// Endpoints of the nodes.
+    pub(crate) fn all(&self) -> Vec<GraphEndpoint> {
+        let mut all = Vec::new();
+        for entry in lock(&self.nodes).iter() {
+            let node = names::fully_qualified(&entry.name, &entry.namespace);
+            let readers = entry.readers.values();
+            let readers = readers.filter_map(|name| role(EndpointKind::Reader, name));
+            let writers = entry.writers.values();
+            let writers = writers.filter_map(|name| role(EndpointKind::Writer, name));
+            all.extend(readers.chain(writers).map(|(role, name)| GraphEndpoint {
+                role,
+                name: name.to_owned(),
+                node: node.clone(),
+            }));
+        }
+        all
     }
 
     /// Has the graph published again.
@@ -150,7 +160,7 @@ impl Graph {
         wire_id: impl Fn(EndpointId) -> EndpointId,
     ) -> ParticipantEntitiesInfo<Gid> {
         let gid = |id: EndpointId| Gid::new(wire_id(id), gid_bytes);
-        let gids = |set: &BTreeSet<EndpointId>| set.iter().copied().map(gid).collect();
+        let gids = |all: &Endpoints| all.keys().copied().map(gid).collect();
         let node = |entry: &Entry| NodeEntitiesInfo {
             node_namespace: entry.namespace.clone(),
             node_name: entry.name.clone(),
@@ -165,7 +175,7 @@ impl Graph {
 
     /// Publishes the graph after every change, until the task is dropped.
     pub(crate) async fn publish(self: Arc<Self>, of: Weak<dyn Transport>, writer: Arc<Outbox>) {
-        let gid_bytes = gid_bytes(std::env::var("ROS_DISTRO").ok().as_deref());
+        let gid_bytes = gid_bytes();
         while self.changes.recv().await.is_ok() {
             // Endpoints come in bursts, and each message stays in the history for late joiners.
             Timer::after(SETTLE_TIME).await;
@@ -184,13 +194,18 @@ impl Graph {
 
 impl Drop for NodeEndpoint {
     fn drop(&mut self) {
-        let remove = |set: &mut BTreeSet<_>| set.remove(&self.guid);
+        let remove = |all: &mut Endpoints| _ = all.remove(&self.guid);
         self.graph.edit(self.node, self.kind, remove);
     }
 }
 
-/// Bytes of a gid on the wire: 24 up to Humble, 16 since Iron.
-fn gid_bytes(distro: Option<&str>) -> usize {
+/// Bytes of a gid on the wire of the distribution that the environment names.
+pub(crate) fn gid_bytes() -> usize {
+    gid_bytes_of(std::env::var("ROS_DISTRO").ok().as_deref())
+}
+
+/// 24 up to Humble, 16 since Iron.
+fn gid_bytes_of(distro: Option<&str>) -> usize {
     match distro {
         Some("dashing" | "eloquent" | "foxy" | "galactic" | "humble") => 24,
         _ => 16,
@@ -229,8 +244,11 @@ mod tests {
         let guid = |byte| EndpointId([byte; 16]);
         let graph = Graph::new();
         let node = graph.add_node("/", "n");
-        let reader = graph.join(node, EndpointKind::Reader, guid(2));
-        let writer = graph.join(node, EndpointKind::Writer, guid(3));
+        let reader = graph.join(node, EndpointKind::Reader, (guid(2), "rt/in"));
+        let writer = graph.join(node, EndpointKind::Writer, (guid(3), "rt/out"));
+        let all = graph.all().into_iter().map(|of| (of.name, of.node));
+        let expected = ["/in", "/out"].map(|name| (name.to_owned(), "/n".to_owned()));
+        assert!(all.eq(expected));
         let message = |gid_bytes| cdr::to_vec(&graph.message(guid(1), gid_bytes, |id| id)).unwrap();
         let one = [1, 0, 0, 0];
         let slash = [2, 0, 0, 0, b'/', 0, 0, 0];
@@ -247,6 +265,6 @@ mod tests {
     #[test]
     fn humble_has_longer_gids() {
         let distros = [None, Some("humble"), Some("iron"), Some("jazzy")];
-        assert_eq!(distros.map(gid_bytes), [16, 24, 16, 16]);
+        assert_eq!(distros.map(gid_bytes_of), [16, 24, 16, 16]);
     }
 }

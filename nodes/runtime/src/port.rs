@@ -30,10 +30,22 @@ impl EndpointId {
         [first, second]
     }
 
+    /// All bytes in hexadecimal digits.
+    pub(crate) fn hex(&self) -> String {
+        self.0.iter().map(|byte| format!("{byte:02x}")).collect()
+    }
+
     /// True for two endpoints of one participant.
     pub(crate) fn is_beside(&self, other: &Self) -> bool {
         self.0.first_chunk::<12>() == other.0.first_chunk()
     }
+}
+
+/// Kind of an endpoint.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub(crate) enum EndpointKind {
+    Reader,
+    Writer,
 }
 
 /// One sample among all samples.
@@ -92,6 +104,8 @@ pub(crate) enum PortEvent {
         peer: EndpointId,
         publisher: Box<RemotePublisher>,
     },
+    /// There is a reader, on any topic of DDS.
+    FoundReader { peer: EndpointId, dds_name: String },
     /// A peer has gone.
     Lost { peer: EndpointId },
     /// All peers of the participant of this endpoint have gone.

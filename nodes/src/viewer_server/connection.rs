@@ -139,6 +139,7 @@ async fn talk(
                 }
             }
             Step::Watch(names, watch) => hub.watch(id, names, watch),
+            Step::Graph(follow) => hub.follow_graph(id, follow),
             Step::Unsubscribe(subscriptions) => hub.unsubscribe(id, &subscriptions),
             Step::Ask(ask) => match hub.bridge() {
                 Some(bridge) => asked.push(bridge.ask(ask)),

@@ -29,6 +29,8 @@ pub struct Offer {
     pub topics: Vec<OpenTopic>,
     /// True if parameters may be read and set.
     pub parameters: bool,
+    /// True if the graph of nodes is known.
+    pub graph: bool,
 }
 
 impl Offer {
@@ -39,6 +41,7 @@ impl Offer {
             ("parameters", self.parameters),
             ("parametersSubscribe", self.parameters),
             ("clientPublish", !self.topics.is_empty()),
+            ("connectionGraph", self.graph),
         ]
         .into_iter()
         .filter_map(|(name, offered)| offered.then_some(name))
@@ -75,6 +78,8 @@ pub enum Step {
     Unsubscribe(Vec<u32>),
     /// It wants to hear of changes of these parameters, none for all, or does no longer.
     Watch(Vec<String>, bool),
+    /// It wants the graph of nodes, or does no longer.
+    Graph(bool),
     /// Something is to be asked for.
     Ask(Ask),
     /// A text for the client.
@@ -126,6 +131,8 @@ impl<'a> Desk<'a> {
             {
                 Step::Watch(parameter_names, false)
             }
+            Ok(ClientMessage::SubscribeConnectionGraph) if self.offer.graph => Step::Graph(true),
+            Ok(ClientMessage::UnsubscribeConnectionGraph) => Step::Graph(false),
             Ok(ClientMessage::Advertise { channels }) if !self.offer.topics.is_empty() => {
                 self.advertise(&channels)
             }
@@ -240,6 +247,7 @@ mod tests {
                 type_name: "geometry_msgs/msg/PoseStamped",
             }],
             parameters: true,
+            graph: true,
         }
     }
 
@@ -252,6 +260,7 @@ mod tests {
     }
 
     const WATCH: &str = r#"{"op":"subscribeParameterUpdates","parameterNames":["/a.b"]}"#;
+    const GRAPH: &str = r#"{"op":"subscribeConnectionGraph"}"#;
     const ADVERTISE: &str = r#"{"op":"advertise","channels":[{"id":3,"topic":"/goal_pose","encoding":"cdr","schemaName":"geometry_msgs/msg/PoseStamped"}]}"#;
 
     #[test]
@@ -262,6 +271,7 @@ mod tests {
         for text in [
             ADVERTISE,
             WATCH,
+            GRAPH,
             r#"{"op":"getParameters","parameterNames":[]}"#,
             r#"{"op":"setParameters","parameters":[{"name":"/a.b","value":1}]}"#,
         ] {
@@ -287,6 +297,9 @@ mod tests {
         assert_eq!(desk.text(WATCH), Step::Watch(names.clone(), true));
         let unwatch = WATCH.replace("subscribe", "unsubscribe");
         assert_eq!(desk.text(&unwatch), Step::Watch(names, false));
+        assert_eq!(desk.text(GRAPH), Step::Graph(true));
+        let unfollow = GRAPH.replace("subscribe", "unsubscribe");
+        assert_eq!(desk.text(&unfollow), Step::Graph(false));
         let all = r#"{"op":"subscribeParameterUpdates"}"#;
         assert_eq!(desk.text(all), Step::Watch(Vec::new(), true));
         assert_eq!(desk.text(ADVERTISE), Step::Done);

@@ -12,6 +12,7 @@ use smol::channel::{Receiver, Sender, bounded};
 
 use super::bridge::Bridge;
 use super::desk::Offer;
+use super::graph::ConnectionGraph;
 use super::map_stream::{Entry, MapStream};
 use super::outbox::{Class, Outbox, Outgoing};
 use super::protocol::{self, Advertised, Value};
@@ -36,6 +37,8 @@ struct Inner {
     clients: BTreeMap<u64, Client>,
     next_client: u64,
     counts: HubCounts,
+    /// As those who follow it know it.
+    graph: ConnectionGraph,
 }
 
 struct Channel {
@@ -52,6 +55,8 @@ struct Client {
     outbox: Outbox,
     wake: Sender<()>,
     watched: Watched,
+    /// True for one that follows the graph of nodes.
+    follows_graph: bool,
     /// True after it has taken all that there was.
     idle: bool,
 }
@@ -105,6 +110,7 @@ impl Hub {
                 clients: BTreeMap::new(),
                 next_client: 0,
                 counts: HubCounts::default(),
+                graph: ConnectionGraph::default(),
             }),
         }
     }
@@ -244,6 +250,7 @@ impl Hub {
             outbox,
             wake,
             watched: Watched::default(),
+            follows_graph: false,
             idle: false,
         };
         inner.clients.insert(id, client);
@@ -314,6 +321,42 @@ impl Hub {
                 client.outbox.control(told);
                 client.wake();
             }
+        }
+    }
+
+    /// Tells a client of the graph of nodes, all that is known and then its changes, or does no longer.
+    pub fn follow_graph(&self, id: u64, follow: bool) {
+        let mut inner = lock(&self.inner);
+        let Inner { clients, graph, .. } = &mut *inner;
+        let followed = clients.values().any(|client| client.follows_graph);
+        if let Some(client) = clients.get_mut(&id) {
+            if follow && !client.follows_graph {
+                if !followed {
+                    // Nobody has kept it up to date.
+                    *graph = ConnectionGraph::default();
+                }
+                client.outbox.control(graph.whole());
+            }
+            client.follows_graph = follow;
+        }
+    }
+
+    /// True if a client follows the graph of nodes.
+    pub fn graph_wanted(&self) -> bool {
+        let inner = lock(&self.inner);
+        inner.clients.values().any(|client| client.follows_graph)
+    }
+
+    /// Tells who follows the graph of what has changed.
+    pub fn set_graph(&self, graph: ConnectionGraph) {
+        let mut inner = lock(&self.inner);
+        if let Some(message) = graph.since(&inner.graph) {
+            let clients = inner.clients.values_mut();
+            for client in clients.filter(|client| client.follows_graph) {
+                client.outbox.control(message.clone());
+                client.wake();
+            }
+            inner.graph = graph;
         }
     }
 

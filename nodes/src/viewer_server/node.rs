@@ -24,7 +24,7 @@ use crate::report;
 use crate::start::{Finish, NodeError, open_params};
 use lattice_runtime::logging::Throttle;
 use lattice_runtime::qos::Qos;
-use lattice_runtime::{Diagnostics, Level, Load, Runtime, Undecoded};
+use lattice_runtime::{Diagnostics, Level, Load, Node, Runtime, Undecoded};
 
 /// Event for the compute thread.
 enum Event {
@@ -68,6 +68,7 @@ pub fn start(runtime: &Runtime, name: &str) -> Result<Finish, NodeError> {
     let gate = viewer.gate()?;
     let losses = MapLosses::default();
     let mut shell = Shell {
+        node: node.clone(),
         hub: Arc::clone(&hub),
         source: MapSource::new(viewer.max_voxels),
         sources: None,
@@ -129,6 +130,7 @@ fn tell_address(url: &str, has_token: bool) {
 
 /// State of the compute thread.
 struct Shell {
+    node: Node,
     hub: Arc<Hub>,
     source: MapSource,
     sources: Option<Sources>,
@@ -176,6 +178,9 @@ impl Shell {
         }
         self.feed();
         if second {
+            if self.hub.graph_wanted() {
+                self.hub.set_graph(self.node.graph().into_iter().collect());
+            }
             self.diagnose();
         }
     }

@@ -41,6 +41,7 @@ pub fn client_message(bytes: &[u8]) {
             services: vec![service],
             topics: vec![topic],
             parameters: true,
+            graph: true,
         },
         Offer::default(),
     );
@@ -92,6 +93,8 @@ pub fn client_seeds() -> Vec<Vec<u8>> {
         r#"{"op":"getParameters","parameterNames":["/a.b"],"id":"x"}"#,
         r#"{"op":"setParameters","parameters":[{"name":"/a.b","value":3,"type":"float64"}]}"#,
         r#"{"op":"unadvertise","channelIds":[1]}"#,
+        r#"{"op":"subscribeConnectionGraph"}"#,
+        r#"{"op":"unsubscribeConnectionGraph"}"#,
     ];
     let call = [
         &[2, 0, 0, 0, 0, 9, 0, 0, 0, 3, 0, 0, 0][..],

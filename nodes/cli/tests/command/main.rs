@@ -17,6 +17,7 @@ mod viewer;
 mod viewer_foreign;
 mod viewer_page;
 mod viewer_planning;
+mod viewer_survey;
 mod viewer_writing;
 
 use std::io::{Write, stderr};

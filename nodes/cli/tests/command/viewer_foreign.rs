@@ -1,6 +1,7 @@
 //! The viewer's socket under the authors' own client of the Foxglove protocol, with foreign decoders.
 
-use std::io::{Write, stderr};
+use std::ffi::OsString;
+use std::io::{BufRead, BufReader, Write, stderr};
 use std::net::{Ipv4Addr, SocketAddr};
 use std::process::{Command, Stdio};
 use std::sync::Arc;
@@ -10,14 +11,19 @@ use lattice_msgs::cdr;
 use lattice_msgs::geometry_msgs::{Point, TransformStamped};
 use lattice_msgs::lattice::LatticeMap;
 use lattice_msgs::sensor_msgs::{PointCloud2, PointField};
-use lattice_msgs::std_msgs::Header;
+use lattice_msgs::std_msgs::{self, Header};
 use lattice_msgs::tf2_msgs::TFMessage;
 use lattice_msgs::visualization_msgs::{Marker, MarkerArray};
 use lattice_nodes::viewer_server::{Class, Entry, Gate, Hub, Server};
+use lattice_runtime::env::Network;
+use lattice_runtime::qos::Qos;
+use lattice_runtime::ros_args::RosArgs;
+use lattice_runtime::{Load, LoopbackDomain, Runtime};
 use serde_bytes::ByteBuf;
 use serde_json::{Map, Value, to_value};
 
 use crate::browser::stage::{Known, map};
+use crate::viewer::Viewer;
 
 fn header() -> Header {
     let mut header = Header {
@@ -131,15 +137,19 @@ fn alike(value: &Value) -> Value {
     }
 }
 
+/// Where `test/node` is installed; else a line says so.
+fn folder() -> Option<OsString> {
+    let folder = std::env::var_os("LATTICE_NODE_PEER");
+    if folder.is_none() {
+        let problem = "SKIPPED: LATTICE_NODE_PEER names no folder with test/node installed";
+        let _ = writeln!(stderr(), "{problem}");
+    }
+    folder
+}
+
 #[test]
 fn the_protocols_own_client_reads_every_kind_of_message_by_both_names() {
-    let Some(folder) = std::env::var_os("LATTICE_NODE_PEER") else {
-        let _ = writeln!(
-            stderr(),
-            "SKIPPED: LATTICE_NODE_PEER names no folder with test/node installed"
-        );
-        return;
-    };
+    let Some(folder) = folder() else { return };
     let (server, messages) = server();
     let url = format!("ws://{}", server.address());
     for protocol in ["foxglove.websocket.v1", "foxglove.sdk.v1"] {
@@ -158,4 +168,75 @@ fn the_protocols_own_client_reads_every_kind_of_message_by_both_names() {
         }
     }
     server.finish();
+}
+
+/// Takes changes of the graph until it has what is asked for: ids by kind and name, and all that was removed.
+fn follow(
+    lines: &mut impl Iterator<Item = String>,
+    known: &mut Map<String, Value>,
+    is_enough: impl Fn(&Map<String, Value>) -> bool,
+) {
+    while !is_enough(known) {
+        let change: Value = serde_json::from_str(&lines.next().unwrap()).unwrap();
+        for (kind, ids) in [
+            ("publishedTopics", "publisherIds"),
+            ("subscribedTopics", "subscriberIds"),
+            ("advertisedServices", "providerIds"),
+        ] {
+            for entry in change[kind].as_array().unwrap() {
+                let name = entry["name"].as_str().unwrap();
+                known.insert(format!("{kind} {name}"), entry[ids].clone());
+            }
+        }
+        for kind in ["removedTopics", "removedServices"] {
+            for name in change[kind].as_array().unwrap() {
+                known.insert(format!("{kind} {}", name.as_str().unwrap()), Value::Null);
+            }
+        }
+    }
+}
+
+#[test]
+fn the_protocols_own_client_sees_nodes_elsewhere_come_and_go() {
+    let Some(folder) = folder() else { return };
+    let domain = LoopbackDomain::take().unwrap();
+    let viewer = Viewer::start_in(&domain, &["view", "--port", "0"]);
+    let mut client = Command::new("node")
+        .args(["foxglove_graph.mjs", &viewer.url.replace("http", "ws")])
+        .current_dir(&folder)
+        .stdout(Stdio::piped())
+        .spawn()
+        .unwrap();
+    let lines = BufReader::new(client.stdout.take().unwrap()).lines();
+    let (lines, mut known) = (&mut lines.map(Result::unwrap), Map::new());
+    let network = Network {
+        domain_id: domain.id(),
+        localhost_only: true,
+        ..Network::from_env().unwrap()
+    };
+    let args = RosArgs::parse(["--ros-args", "-r", "__ns:=/robot"].map(str::to_owned)).unwrap();
+    let runtime = Runtime::with_transport("peer", args, &network).unwrap();
+    let node = runtime.node("peer").unwrap();
+    let ours = node.publisher::<std_msgs::Empty>("/from_peer", Qos::DEFAULT);
+    let heard = |_: Arc<std_msgs::Empty>| {};
+    let theirs = node.subscribe("/to_peer", Qos::DEFAULT, Load::Small, heard);
+    assert!(ours.is_ok() && theirs.is_ok());
+    let peer = ["/robot/peer"].as_slice();
+    follow(lines, &mut known, |known| {
+        known.get("publishedTopics /from_peer") == Some(&peer.into())
+            && known.get("subscribedTopics /to_peer") == Some(&peer.into())
+            && known.get("advertisedServices /robot/peer/get_parameters") == Some(&peer.into())
+            && known.get("subscribedTopics /map") == Some(&["/viewer_server"].as_slice().into())
+    });
+    assert!(!known.keys().any(|name| name.starts_with("removed")));
+    drop((ours, theirs, node));
+    drop(runtime);
+    follow(lines, &mut known, |known| {
+        known.contains_key("removedTopics /from_peer")
+            && known.contains_key("removedTopics /to_peer")
+            && known.contains_key("removedServices /robot/peer/get_parameters")
+    });
+    assert!(!known.contains_key("removedTopics /map"));
+    client.kill().unwrap();
+    client.wait().unwrap();
 }

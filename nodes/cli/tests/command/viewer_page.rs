@@ -44,6 +44,10 @@ const LOOK: &str = r#"(async () => {
   };
   window.look = {
     at, centre,
+    click(cell) {
+      const { x, y } = camera.project(centre(cell));
+      pick(x, y);
+    },
     // Largest difference of a colour from that of the legend, of cells seen from above.
     offLegend(known, value) {
       picture();
@@ -140,6 +144,34 @@ fn colours_and_slice_are_those_of_the_legend_and_the_range() {
         "{sizes:?}"
     );
     assert_eq!(page.value("lattice.state.problems"), json!([]));
+}
+
+#[test]
+fn a_click_gives_key_and_count_of_a_cell_and_two_their_distance() {
+    let Some(chromium) = chromium() else { return };
+    let known = stairs();
+    let stage = Stage::show(&known);
+    let mut page = open(&chromium, &stage);
+    page.value("document.querySelector('[data-camera=top]').click(); lattice.frame()");
+    let click = |page: &mut Page, cell: &Known| {
+        page.value(&format!("look.click({})", json!(cell)));
+    };
+    for cell in &known {
+        click(&mut page, cell);
+        let Known { key, count, .. } = cell;
+        page.wait_for(&format!(
+            "String(lattice.state.cell?.key) === '{key}' && Number(lattice.state.cell.count) === {count}"
+        ));
+    }
+    page.value("document.getElementById('measure').click()");
+    click(&mut page, &known[0]);
+    click(&mut page, &known[11]);
+    let ends = page.value("lattice.state.measured");
+    let ends: [[f64; 3]; 2] = serde_json::from_value(ends).unwrap();
+    let steps: f64 = (0..3).map(|k| (ends[1][k] - ends[0][k]).powi(2)).sum();
+    // 44 and 22 cells of 0.5 m.
+    let expected_m = 0.5 * 44_f64.hypot(22.0);
+    assert!((steps.sqrt() - expected_m).abs() < 1e-3, "{ends:?}");
 }
 
 #[test]

@@ -130,7 +130,7 @@ fn without_leave_nothing_is_offered_that_changes_something() {
         (&refused["serviceId"], &refused["callId"]),
         (&json!(4), &json!(9))
     );
-    assert_eq!(capabilities, json!(["services"]));
+    assert_eq!(capabilities, json!(["services", "connectionGraph"]));
     let reading = [
         "lattice_mapper/query",
         "lattice_mapper/plan_path",

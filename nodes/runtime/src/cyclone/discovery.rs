@@ -107,12 +107,23 @@ impl Discovery {
 
     fn heard(&self, reader: dds_entity_t, side: Side) {
         self.take(reader, &mut |other| {
-            if side == Side::Writer {
-                self.found(other);
+            match side {
+                Side::Writer => self.found(other),
+                Side::Reader => self.found_reader(other),
             }
             let all: Vec<_> = lock(&self.ours).iter().filter_map(Weak::upgrade).collect();
             all.iter().for_each(|ours| self.compare(ours, side, other));
         });
+    }
+
+    /// Tells of a reader.
+    fn found_reader(&self, other: &Other<'_>) {
+        if let Ok(dds_name) = other.name.to_str().map(str::to_owned) {
+            let peer = other.id;
+            let _ = self
+                .events
+                .try_send(PortEvent::FoundReader { peer, dds_name });
+        }
     }
 
     /// Tells of a publisher.

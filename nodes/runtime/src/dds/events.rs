@@ -41,8 +41,11 @@ impl Events {
         let own = self.own;
         let (endpoint, peer, policy) = match event {
             Event::ReaderDetected { reader: found } => {
+                let dds_name = found.topic_name;
                 lock(&self.found).replace((found.guid, found.type_name));
-                return None;
+                let peer = endpoint_id(found.guid);
+                let is_other = found.guid.prefix != own.prefix;
+                return is_other.then_some(PortEvent::FoundReader { peer, dds_name });
             }
             Event::WriterDetected { writer: found } => {
                 let publisher = (found.guid.prefix != own.prefix)

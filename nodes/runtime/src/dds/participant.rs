@@ -81,10 +81,7 @@ impl Participant {
         let subscriber = participant.create_subscriber(&none);
         let subscriber = subscriber.map_err(|e| failed(&e))?;
         let guid = participant.guid();
-        let name: String = (guid.to_bytes().iter())
-            .map(|byte| format!("{byte:02x}"))
-            .collect();
-        let name = format!("lattice_probe_{name}");
+        let name = format!("lattice_probe_{}", endpoint_id(guid).hex());
         let topic = PortTopic {
             name: &name,
             dds_name: &name,

@@ -12,6 +12,7 @@ use super::error::RuntimeError;
 use super::gate::Gate;
 use super::graph::NodeId;
 use super::names::{self, NameKind};
+use super::neighbours::GraphEndpoint;
 use super::params::Params;
 use super::publisher::{Publisher, RawPublisher};
 use super::qos::{Durability, Qos};
@@ -228,6 +229,12 @@ impl Node {
     /// Publishers in other processes that are known by now, on any topic.
     pub fn remote_publishers(&self) -> Vec<RemotePublisher> {
         self.inner.shared.remote_publishers()
+    }
+
+    /// Publishers, subscriptions and servers that are known by now, of the nodes of all processes. The names of
+    /// nodes elsewhere follow soon after the first call.
+    pub fn graph(&self) -> Vec<GraphEndpoint> {
+        self.inner.shared.graph_of_all()
     }
 
     fn subscribe_samples<M: RosMessage>(

@@ -12,11 +12,11 @@ use thiserror::Error;
 
 use super::{Shared, closed};
 use crate::error::RuntimeError;
-use crate::graph::{EndpointKind, NodeEndpoint, NodeId};
+use crate::graph::{NodeEndpoint, NodeId};
 use crate::names;
 use crate::outbox::WhenFull;
 use crate::peers::Peers;
-use crate::port::PortTopic;
+use crate::port::{EndpointKind, PortTopic};
 use crate::qos::Qos;
 use crate::service::{Asking, LocalCall, Waiting};
 use crate::sync::lock;
@@ -171,17 +171,16 @@ impl Shared {
             ros_type,
             type_hash: None,
         };
-        let dds_name = names::dds_reply(name);
-        let answers = topic(dds_name.as_str(), client.response);
+        let dds_answers = names::dds_reply(name);
+        let answers = topic(dds_answers.as_str(), client.response);
         let answers = self.reader(answers, &Qos::SERVICES, MAX_ANSWER_BYTES)?;
-        let dds_name = names::dds_request(name);
-        let requests = topic(dds_name.as_str(), client.request);
+        let dds_requests = names::dds_request(name);
+        let requests = topic(dds_requests.as_str(), client.request);
         let requests = self.outbox(requests, &Qos::SERVICES, WhenFull::Drop)?;
+        let (reader, writer) = (EndpointKind::Reader, EndpointKind::Writer);
         let graph = [
-            self.graph
-                .join(client.node, EndpointKind::Reader, answers.id()),
-            self.graph
-                .join(client.node, EndpointKind::Writer, requests.id()),
+            (self.graph).join(client.node, reader, (answers.id(), &dds_answers)),
+            (self.graph).join(client.node, writer, (requests.id(), &dds_requests)),
         ];
         let [servers, answerers] = ["server", "answer writer"]
             .map(|kind| Arc::new(Peers::new(name, kind, log::Level::Debug)));

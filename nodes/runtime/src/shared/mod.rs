@@ -1,6 +1,7 @@
 //! The parts that the nodes of a process share: the participant, the threads, the local bus.
 
 mod calling;
+mod listening;
 mod publishing;
 mod readers;
 mod serving;
@@ -87,6 +88,7 @@ struct Open {
     servers: Vec<Server>,
     unanswered: Vec<Weak<Unanswered>>,
     graph: Option<Task<()>>,
+    graph_of_others: Option<Task<()>>,
 }
 
 impl Shared {
@@ -124,6 +126,7 @@ impl Shared {
                 servers: Vec::new(),
                 unanswered: Vec::new(),
                 graph: None,
+                graph_of_others: None,
             })),
         });
         shared.publish_graph()?;

@@ -7,12 +7,12 @@ use lattice_msgs::RosMessage;
 
 use super::Shared;
 use crate::error::RuntimeError;
-use crate::graph::{EndpointKind, NodeId};
+use crate::graph::NodeId;
 use crate::local_bus::LocalEndpoint;
 use crate::names;
 use crate::outbox::WhenFull;
 use crate::peers::Peers;
-use crate::port::PortTopic;
+use crate::port::{EndpointKind, PortTopic};
 use crate::publisher::{Latch, Publisher, PublisherParts, RawPublisher};
 use crate::qos::Qos;
 use crate::sync::lock;
@@ -63,9 +63,10 @@ impl Shared {
     ) -> Result<Arc<PublisherParts>, RuntimeError> {
         let peers = Arc::new(Peers::new(topic, "subscriber", log::Level::Info));
         let local = join(&peers)?;
+        let dds_name = names::dds_topic(topic);
         let port_topic = PortTopic {
             name: topic,
-            dds_name: &names::dds_topic(topic),
+            dds_name: &dds_name,
             ros_type,
             type_hash,
         };
@@ -78,7 +79,7 @@ impl Shared {
             local,
             latch: (qos.kept() > 0).then(|| Mutex::new(Latch::new(qos))),
             shutdown: self.shutdown.clone(),
-            _graph: self.graph.join(node, EndpointKind::Writer, id),
+            _graph: (self.graph).join(node, EndpointKind::Writer, (id, &dds_name)),
         });
         if let Some(open) = lock(&self.open).as_mut() {
             open.publishers.retain(|p| p.strong_count() > 0);

@@ -8,9 +8,8 @@ use futures::future::BoxFuture;
 
 use super::Shared;
 use crate::error::RuntimeError;
-use crate::graph::EndpointKind;
 use crate::names;
-use crate::port::PortTopic;
+use crate::port::{EndpointKind, PortTopic};
 use crate::subscription::Intake;
 use crate::sync::lock;
 
@@ -28,15 +27,17 @@ impl Shared {
 
     /// Makes the reader and gives it to the task.
     fn open_reader(&self, intake: &Intake) -> Result<(), RuntimeError> {
+        let dds_name = names::dds_topic(&intake.topic);
         let topic = PortTopic {
             name: &intake.topic,
-            dds_name: &names::dds_topic(&intake.topic),
+            dds_name: &dds_name,
             ros_type: &intake.type_name,
             type_hash: None,
         };
         let reader = self.reader(topic, &intake.qos, intake.max_bytes)?;
         let id = reader.id();
-        let graph = self.graph.join(intake.node, EndpointKind::Reader, id);
+        let kind = EndpointKind::Reader;
+        let graph = self.graph.join(intake.node, kind, (id, &dds_name));
         intake.open(reader, graph);
         self.endpoints.register(id, &intake.peers);
         Ok(())
@@ -87,7 +88,7 @@ impl Shared {
 }
 
 /// A wait for the writers made so far. `None` after shutdown.
-fn begin_wait(shared: &Weak<Shared>) -> Option<(u64, BoxFuture<'static, ()>)> {
+pub(super) fn begin_wait(shared: &Weak<Shared>) -> Option<(u64, BoxFuture<'static, ()>)> {
     let shared = shared.upgrade()?;
     let writers_made = shared.writers_made.load(Relaxed);
     let wait = shared.writers_known()?;

@@ -9,12 +9,12 @@ use smol::channel::bounded;
 
 use super::{Shared, closed};
 use crate::error::RuntimeError;
-use crate::graph::{EndpointKind, NodeId};
+use crate::graph::NodeId;
 use crate::logging::Throttle;
 use crate::names;
 use crate::outbox::WhenFull;
 use crate::peers::Peers;
-use crate::port::PortTopic;
+use crate::port::{EndpointKind, PortTopic};
 use crate::qos::Qos;
 use crate::service::{Reply, Server, Serving, Unanswered};
 use crate::sync::lock;
@@ -35,24 +35,27 @@ impl Shared {
         handler: impl FnMut(S::Request, Reply<S::Response>) + Send + 'static,
     ) -> Result<Server, RuntimeError> {
         let clients = Arc::new(Peers::new(name, "client", log::Level::Debug));
+        let dds_requests = names::dds_request(name);
         let topic = PortTopic {
             name,
-            dds_name: &names::dds_request(name),
+            dds_name: &dds_requests,
             ros_type: S::Request::TYPE,
             type_hash: None,
         };
         let requests = self.reader(topic, &Qos::REQUESTS, MAX_REQUEST_BYTES)?;
         let readers = Arc::new(Peers::new(name, "reply reader", log::Level::Debug));
+        let dds_replies = names::dds_reply(name);
         let topic = PortTopic {
             name,
-            dds_name: &names::dds_reply(name),
+            dds_name: &dds_replies,
             ros_type: S::Response::TYPE,
             type_hash: None,
         };
         let replies = self.outbox(topic, &Qos::SERVICES, WhenFull::Drop)?;
+        let (reader, writer) = (EndpointKind::Reader, EndpointKind::Writer);
         let graph = [
-            self.graph.join(node, EndpointKind::Reader, requests.id()),
-            self.graph.join(node, EndpointKind::Writer, replies.id()),
+            (self.graph).join(node, reader, (requests.id(), &dds_requests)),
+            (self.graph).join(node, writer, (replies.id(), &dds_replies)),
         ];
         self.endpoints.register(requests.id(), &clients);
         self.endpoints.register(replies.id(), &readers);

@@ -66,6 +66,7 @@ impl NodeBridge {
         let mut offer = Offer {
             services,
             parameters: reach.allow_write,
+            graph: true,
             ..Offer::default()
         };
         let mut goals = None;

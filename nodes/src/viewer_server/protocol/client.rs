@@ -74,6 +74,10 @@ pub enum ClientMessage {
         /// Ids of the channels.
         channel_ids: Vec<u32>,
     },
+    /// Wants the graph of nodes.
+    SubscribeConnectionGraph,
+    /// Wants it no more.
+    UnsubscribeConnectionGraph,
     /// Anything else, which is not offered.
     #[serde(other)]
     Other,
@@ -183,7 +187,7 @@ impl ClientMessage {
             Self::SetParameters { parameters, .. } => parameters.len(),
             Self::Advertise { channels } => channels.len(),
             Self::Unadvertise { channel_ids } => channel_ids.len(),
-            Self::Other => 0,
+            Self::SubscribeConnectionGraph | Self::UnsubscribeConnectionGraph | Self::Other => 0,
         };
         match found > MAX_LIST {
             true => Err(ProtocolError::TooMany { found }),
@@ -215,6 +219,8 @@ mod tests {
         );
         let message = ClientMessage::parse(r#"{"op":"fetchAsset","uri":"x","requestId":1}"#);
         assert_eq!(message.unwrap(), ClientMessage::Other);
+        let message = ClientMessage::parse(r#"{"op":"subscribeConnectionGraph"}"#);
+        assert_eq!(message.unwrap(), ClientMessage::SubscribeConnectionGraph);
         for wrong in [
             "",
             "[]",

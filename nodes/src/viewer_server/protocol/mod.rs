@@ -5,8 +5,9 @@ mod server;
 
 pub use client::{ClientChannel, ClientData, ClientMessage, Value, Wish};
 pub use server::{
-    Advertised, AdvertisedService, advertise, advertise_services, message_data, parameter_values,
-    server_info, service_failure, service_response, status,
+    Advertised, AdvertisedService, GraphUpdate, advertise, advertise_services,
+    connection_graph_update, message_data, parameter_values, server_info, service_failure,
+    service_response, status,
 };
 
 /// Names of the protocol, the preferred one first: they differ in nothing that is used here.

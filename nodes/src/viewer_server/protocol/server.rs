@@ -85,6 +85,40 @@ pub fn service_failure(service: u32, call: u32, message: &str) -> String {
         .to_string()
 }
 
+/// Names of topics or services, with the names of nodes.
+type Linked<'a> = Vec<(&'a str, Vec<&'a str>)>;
+
+/// Changes of the graph of nodes.
+pub struct GraphUpdate<'a> {
+    /// Topics with other publishers than before, and all of these.
+    pub published: Linked<'a>,
+    /// Topics with other subscribers.
+    pub subscribed: Linked<'a>,
+    /// Services with other servers.
+    pub services: Linked<'a>,
+    /// Topics that nobody has any more.
+    pub removed_topics: Vec<&'a String>,
+    /// Services that nobody serves any more.
+    pub removed_services: Vec<&'a String>,
+}
+
+/// Changes of the graph.
+pub fn connection_graph_update(update: &GraphUpdate<'_>) -> String {
+    let list = |all: &Linked<'_>, ids: &str| -> Vec<serde_json::Value> {
+        let entry = |(name, nodes): &(&str, Vec<&str>)| json!({ "name": name, ids: nodes });
+        all.iter().map(entry).collect()
+    };
+    json!({
+        "op": "connectionGraphUpdate",
+        "publishedTopics": list(&update.published, "publisherIds"),
+        "subscribedTopics": list(&update.subscribed, "subscriberIds"),
+        "advertisedServices": list(&update.services, "providerIds"),
+        "removedTopics": update.removed_topics,
+        "removedServices": update.removed_services,
+    })
+    .to_string()
+}
+
 /// Values of parameters.
 pub fn parameter_values(parameters: &[impl Serialize], id: Option<&str>) -> String {
     let mut message = json!({ "op": "parameterValues", "parameters": parameters });

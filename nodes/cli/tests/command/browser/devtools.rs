@@ -72,6 +72,11 @@ impl Page {
         page
     }
 
+    /// The browser's process, whose descendants do the work.
+    pub fn process(&self) -> u32 {
+        self.browser.id()
+    }
+
     /// Goes to another address.
     pub fn go(&mut self, url: &str) {
         self.call("Page.navigate", json!({ "url": url }));

@@ -1,0 +1,203 @@
+//! The graph of other processes: endpoints that discovery finds, and the nodes that are said to have them.
+
+use std::collections::BTreeMap;
+use std::sync::Mutex;
+
+use lattice_msgs::cdr::{self, CdrError};
+use lattice_msgs::rmw_dds_common::{NodeEntitiesInfo, ParticipantEntitiesInfo};
+
+use super::names;
+use super::port::{EndpointId, EndpointKind};
+use super::sync::lock;
+
+/// Endpoints that are remembered, at most.
+const MAX_ENDPOINTS: usize = 8192;
+
+/// Longest name of a topic, service or node, bytes.
+const MAX_NAME_BYTES: usize = 512;
+
+/// Role of an endpoint in the graph of nodes.
+#[derive(Clone, Copy, Debug, PartialEq, Eq, PartialOrd, Ord)]
+pub enum GraphRole {
+    /// Publishes a topic.
+    Publisher,
+    /// Subscribes to a topic.
+    Subscriber,
+    /// Answers calls of a service.
+    Server,
+}
+
+/// A publisher, subscription or server in the graph of nodes.
+#[derive(Clone, Debug, PartialEq, Eq, PartialOrd, Ord)]
+pub struct GraphEndpoint {
+    /// Its role.
+    pub role: GraphRole,
+    /// Full name of the topic or service.
+    pub name: String,
+    /// Full name of its node; its identity in hexadecimal digits where no node says that it is its own.
+    pub node: String,
+}
+
+/// Role and full ROS name of an endpoint of DDS; none of clients, replies and what is not of ROS.
+pub(crate) fn role(kind: EndpointKind, dds_name: &str) -> Option<(GraphRole, &str)> {
+    let (prefix, name) = dds_name.split_at_checked(2)?;
+    if !name.starts_with('/') || dds_name.len() > MAX_NAME_BYTES {
+        return None;
+    }
+    match (kind, prefix) {
+        (EndpointKind::Writer, "rt") => Some((GraphRole::Publisher, name)),
+        (EndpointKind::Reader, "rt") => Some((GraphRole::Subscriber, name)),
+        (EndpointKind::Reader, "rq") => Some((GraphRole::Server, name.strip_suffix("Request")?)),
+        _ => None,
+    }
+}
+
+/// Endpoints in other processes, by identity.
+#[derive(Default)]
+pub(crate) struct Neighbours(Mutex<Known>);
+
+#[derive(Default)]
+struct Known {
+    endpoints: BTreeMap<EndpointId, (GraphRole, String)>,
+    nodes: BTreeMap<EndpointId, String>,
+}
+
+impl Neighbours {
+    /// An endpoint has been found, or tells of itself again.
+    pub(crate) fn add(&self, id: EndpointId, kind: EndpointKind, dds_name: &str) {
+        let endpoints = &mut lock(&self.0).endpoints;
+        if let Some((role, name)) = role(kind, dds_name)
+            && (endpoints.len() < MAX_ENDPOINTS || endpoints.contains_key(&id))
+        {
+            endpoints.insert(id, (role, name.to_owned()));
+        }
+    }
+
+    /// Endpoints have gone.
+    pub(crate) fn remove(&self, gone: impl Fn(&EndpointId) -> bool) {
+        let mut known = lock(&self.0);
+        known.endpoints.retain(|id, _| !gone(id));
+        known.nodes.retain(|id, _| !gone(id));
+    }
+
+    /// Takes a message of `ros_discovery_info`, whose identities have 16 or 24 bytes. A participant speaks
+    /// for its own endpoints alone.
+    pub(crate) fn hear(&self, message: &[u8], gid_bytes: usize) -> Result<(), CdrError> {
+        match gid_bytes {
+            16 => self.keep(cdr::from_slice::<ParticipantEntitiesInfo<[u8; 16]>>(
+                message,
+            )?),
+            _ => self.keep(cdr::from_slice::<ParticipantEntitiesInfo<[u8; 24]>>(
+                message,
+            )?),
+        }
+        Ok(())
+    }
+
+    fn keep<const N: usize>(&self, message: ParticipantEntitiesInfo<[u8; N]>) {
+        let id = |gid: &[u8; N]| gid.first_chunk().copied().map(EndpointId);
+        let Some(participant) = id(&message.gid) else {
+            return;
+        };
+        let nodes = &mut lock(&self.0).nodes;
+        nodes.retain(|id, _| !id.is_beside(&participant));
+        for node in &message.node_entities_info_seq {
+            let NodeEntitiesInfo {
+                node_name,
+                node_namespace,
+                reader_gid_seq,
+                writer_gid_seq,
+            } = node;
+            let name = names::fully_qualified(node_name, node_namespace);
+            let ids = reader_gid_seq.iter().chain(writer_gid_seq).filter_map(id);
+            for id in ids.filter(|id| id.is_beside(&participant)) {
+                if nodes.len() < MAX_ENDPOINTS && name.len() <= MAX_NAME_BYTES {
+                    nodes.insert(id, name.clone());
+                }
+            }
+        }
+    }
+
+    /// Those that are known by now.
+    pub(crate) fn all(&self) -> Vec<GraphEndpoint> {
+        let known = lock(&self.0);
+        let endpoint = |(id, (role, name)): (&EndpointId, &(GraphRole, String))| GraphEndpoint {
+            role: *role,
+            name: name.clone(),
+            node: known.nodes.get(id).cloned().unwrap_or_else(|| id.hex()),
+        };
+        known.endpoints.iter().map(endpoint).collect()
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    const WRITER: EndpointId = EndpointId([7; 16]);
+
+    fn message(participant: u8, endpoint: [u8; 16]) -> Vec<u8> {
+        let node = NodeEntitiesInfo {
+            node_namespace: "/robot".to_owned(),
+            node_name: "mapper".to_owned(),
+            reader_gid_seq: Vec::new(),
+            writer_gid_seq: vec![endpoint],
+        };
+        cdr::to_vec(&ParticipantEntitiesInfo {
+            gid: [participant; 16],
+            node_entities_info_seq: vec![node],
+        })
+        .unwrap()
+    }
+
+    #[test]
+    fn endpoints_are_of_the_nodes_that_their_participant_names() {
+        let all = Neighbours::default();
+        all.add(WRITER, EndpointKind::Writer, "rt/map");
+        assert_eq!(all.all()[0].node, "07".repeat(16));
+        all.hear(&message(9, WRITER.0), 16).unwrap();
+        assert_eq!(all.all()[0].node, "07".repeat(16), "said by another");
+        all.hear(&message(7, WRITER.0), 16).unwrap();
+        let expected = GraphEndpoint {
+            role: GraphRole::Publisher,
+            name: "/map".to_owned(),
+            node: "/robot/mapper".to_owned(),
+        };
+        assert_eq!(all.all(), [expected]);
+        all.hear(&message(7, [8; 16]), 16).unwrap();
+        assert_eq!(all.all()[0].node, "07".repeat(16), "no longer its own");
+        all.remove(|id| *id == WRITER);
+        assert!(all.all().is_empty());
+    }
+
+    #[test]
+    fn what_is_sent_is_bounded_and_may_be_cut() {
+        let all = Neighbours::default();
+        let whole = message(7, WRITER.0);
+        for length in 0..whole.len() {
+            assert!(all.hear(&whole[..length], 16).is_err(), "{length}");
+        }
+        for i in 0..=MAX_ENDPOINTS as u128 {
+            all.add(EndpointId(i.to_le_bytes()), EndpointKind::Reader, "rt/a");
+        }
+        assert_eq!(all.all().len(), MAX_ENDPOINTS);
+    }
+
+    #[test]
+    fn roles_are_those_of_topics_and_servers() {
+        use EndpointKind::{Reader, Writer};
+        let server = Some((GraphRole::Server, "/a/call"));
+        assert_eq!(role(Reader, "rq/a/callRequest"), server);
+        let long = format!("rt/{}", "x".repeat(MAX_NAME_BYTES));
+        for (kind, name) in [
+            (Writer, "rq/a/callRequest"),
+            (Reader, "rr/a/callReply"),
+            (Reader, "rq/a/call"),
+            (Writer, "ros_discovery_info"),
+            (Writer, "r\u{e4}/a"),
+            (Writer, &long),
+        ] {
+            assert_eq!(role(kind, name), None, "{name}");
+        }
+    }
+}

@@ -1,0 +1,68 @@
+//! The graph of all nodes, of which other participants publish their parts.
+
+use std::sync::{Arc, Weak};
+
+use super::Shared;
+use super::readers::begin_wait;
+use crate::endpoints::Endpoints;
+use crate::graph::{TOPIC, gid_bytes};
+use crate::neighbours::GraphEndpoint;
+use crate::port::SampleReader;
+use crate::qos::Qos;
+use crate::sync::lock;
+
+/// Longest part of a participant that is taken.
+const MAX_PART_BYTES: usize = 1 << 20;
+
+/// The parts of many participants, which late joiners get.
+const PARTS: Qos = Qos::latched(100);
+
+impl Shared {
+    /// Publishers, subscriptions and servers that are known by now, of all processes. The first call begins
+    /// to listen for the names of nodes elsewhere.
+    pub(crate) fn graph_of_all(self: &Arc<Self>) -> Vec<GraphEndpoint> {
+        if let Some(open) = lock(&self.open).as_mut()
+            && open.graph_of_others.is_none()
+        {
+            let shared = Arc::downgrade(self);
+            open.graph_of_others = self.io.spawn(async move {
+                if let Some((reader, endpoints)) = reader(shared).await {
+                    listen(reader, endpoints).await;
+                }
+            });
+        }
+        let mut all = self.graph.all();
+        all.extend(self.endpoints.neighbours.all());
+        all
+    }
+}
+
+/// A reader that does not meet the writer of this process.
+async fn reader(shared: Weak<Shared>) -> Option<(Box<dyn SampleReader>, Arc<Endpoints>)> {
+    let (_, wait) = begin_wait(&shared)?;
+    wait.await;
+    let shared = shared.upgrade()?;
+    match shared.reader(TOPIC, &PARTS, MAX_PART_BYTES) {
+        Ok(reader) => Some((reader, Arc::clone(&shared.endpoints))),
+        Err(error) => {
+            log::warn!("nodes elsewhere have no names: {error}");
+            None
+        }
+    }
+}
+
+async fn listen(reader: Box<dyn SampleReader>, endpoints: Arc<Endpoints>) {
+    let gid_bytes = gid_bytes();
+    loop {
+        let heard = match reader.next().await {
+            Ok(_) => {
+                let heard = endpoints.neighbours.hear(&reader.bytes(), gid_bytes);
+                heard.map_err(|error| error.to_string())
+            }
+            Err(error) => Err(error),
+        };
+        if let Err(error) = heard {
+            log::debug!("{}: {error}", TOPIC.name);
+        }
+    }
+}
