@@ -33,7 +33,7 @@ impl Default for CloudOptions {
         Self {
             pair: PairOptions {
                 queue_size: 5,
-                max_difference_ns: 50_000_000,
+                max_difference_ns: 20_000_000,
                 with_confidence: false,
             },
             max_image_pixels: 4_000_000,
@@ -54,7 +54,7 @@ impl CloudOptions {
     /// Reads the parameters of the node.
     pub fn from_params(params: &Params) -> Result<Self, ParamError> {
         let defaults = Self::default();
-        let difference_s = params.f64_in("max_stamp_difference_s", 0.05, 0.0..=3600.0)?;
+        let difference_s = params.f64_in("max_stamp_difference_s", 0.02, 0.0..=3600.0)?;
         let max_difference_ns = match params.bool("exact_sync", false)? {
             true => 0,
             false => (difference_s * 1e9) as u64,
