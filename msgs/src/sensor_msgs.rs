@@ -1,4 +1,4 @@
-//! Point clouds, inertial and satellite measurements.
+//! Point clouds, images, inertial and satellite measurements.
 
 use serde::{Deserialize, Serialize};
 use serde_bytes::ByteBuf;
@@ -11,7 +11,10 @@ messages! {
     "sensor_msgs" in "../definitions/sensor_msgs/";
     PointField [];
     PointCloud2 [Header, PointField];
+    Image [Header];
     CompressedImage [Header];
+    RegionOfInterest [];
+    CameraInfo [Header, RegionOfInterest];
     Imu [Header, Quaternion, Vector3];
     NavSatStatus [];
     NavSatFix [Header, NavSatStatus];
@@ -70,6 +73,67 @@ pub struct PointCloud2 {
     pub data: ByteBuf,
     /// True: no point has an invalid (NaN) coordinate.
     pub is_dense: bool,
+}
+
+/// An image without compression.
+#[derive(Clone, Debug, Default, PartialEq, Serialize, Deserialize)]
+pub struct Image {
+    /// Time of acquisition, and optical frame: x right, y down, z forward.
+    pub header: Header,
+    /// Rows.
+    pub height: u32,
+    /// Pixels in a row.
+    pub width: u32,
+    /// What a pixel is, such as 16UC1 or mono8.
+    pub encoding: String,
+    /// Byte order of the numbers, 0 or 1.
+    pub is_bigendian: u8,
+    /// Bytes from row to row.
+    pub step: u32,
+    /// The pixels, step * height bytes.
+    pub data: ByteBuf,
+}
+
+/// Part of an image; all zero is the whole.
+#[derive(Clone, Debug, Default, PartialEq, Serialize, Deserialize)]
+pub struct RegionOfInterest {
+    /// First column.
+    pub x_offset: u32,
+    /// First row.
+    pub y_offset: u32,
+    /// Rows.
+    pub height: u32,
+    /// Columns.
+    pub width: u32,
+    /// True: the rectified image is to be cut like this.
+    pub do_rectify: bool,
+}
+
+/// Map of a camera from rays to pixels. A pixel's whole coordinates are its centre.
+#[derive(Clone, Debug, Default, PartialEq, Serialize, Deserialize)]
+pub struct CameraInfo {
+    /// Time of acquisition, and optical frame: x right, y down, z forward.
+    pub header: Header,
+    /// Rows of the whole image.
+    pub height: u32,
+    /// Pixels in a row of the whole image.
+    pub width: u32,
+    /// The model of `d`: plumb_bob, rational_polynomial, equidistant.
+    pub distortion_model: String,
+    /// Parameters of the distortion.
+    pub d: Vec<f64>,
+    /// Camera matrix of the raw image, row-major; 0 first: not calibrated.
+    pub k: [f64; 9],
+    /// Rotation from the camera to the rectified one.
+    pub r: [f64; 9],
+    /// Projection of the rectified image, row-major.
+    pub p: [f64; 12],
+    /// Pixels in one, 0 as 1.
+    pub binning_x: u32,
+    /// Rows in one, 0 as 1.
+    pub binning_y: u32,
+    /// Part of the image that is sent.
+    pub roi: RegionOfInterest,
 }
 
 /// An image in a compressed format.

@@ -237,6 +237,14 @@ mod tests {
                 "9198cabf7da3796ae6fe19c4cb3bdd3525492988c70522628af5daa124bae2b5",
             ),
             (
+                "sensor_msgs/msg/Image",
+                "d31d41a9a4c4bc8eae9be757b0beed306564f7526c88ea6a4588fb9582527d47",
+            ),
+            (
+                "sensor_msgs/msg/CameraInfo",
+                "b3dfd68ff46c9d56c80fd3bd4ed22c7a4ddce8c8348f2f59c299e73118e7e275",
+            ),
+            (
                 "std_srvs/srv/Trigger_Request",
                 "d010825374ce8918e72bfd826c82603e60f45419e932ea976f807b74a863a199",
             ),

@@ -7,7 +7,9 @@ use crate::running::Running;
 use crate::start::{Declare, NodeError, Start};
 #[cfg(feature = "viewer")]
 use crate::viewer_server;
-use crate::{enu_transformer, lattice_mapper, semantic_icp_server, voxel_marker_publisher};
+use crate::{
+    enu_transformer, lattice_mapper, semantic_cloud, semantic_icp_server, voxel_marker_publisher,
+};
 use lattice_runtime::Runtime;
 use lattice_runtime::logging;
 use lattice_runtime::params::Params;
@@ -15,6 +17,7 @@ use lattice_runtime::ros_args::RosArgs;
 
 /// Every node that can share a process, in the order in which data flows.
 pub const NODES: &[(&str, Start)] = &[
+    ("semantic_cloud", semantic_cloud::node::start),
     ("enu_transformer", enu_transformer::node::start),
     ("lattice_mapper", lattice_mapper::node::start),
     (
@@ -28,6 +31,7 @@ pub const NODES: &[(&str, Start)] = &[
 
 /// Readers of the parameters of those nodes.
 pub const PARAMETERS: &[(&str, Declare)] = &[
+    ("semantic_cloud", semantic_cloud::declare),
     ("enu_transformer", enu_transformer::declare),
     ("lattice_mapper", lattice_mapper::declare),
     ("voxel_marker_publisher", voxel_marker_publisher::declare),

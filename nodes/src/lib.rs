@@ -18,6 +18,7 @@ mod options;
 pub mod replay;
 pub mod report;
 pub mod running;
+pub mod semantic_cloud;
 pub mod semantic_icp_server;
 mod stamps;
 pub mod start;

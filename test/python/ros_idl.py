@@ -58,6 +58,38 @@ PointCloud2 = ros(
     is_dense=bool,
 )
 
+Image = ros(
+    "sensor_msgs/msg/Image",
+    header=Header,
+    height=uint32,
+    width=uint32,
+    encoding=str,
+    is_bigendian=uint8,
+    step=uint32,
+    data=sequence[uint8],
+)
+RegionOfInterest = ros(
+    "sensor_msgs/msg/RegionOfInterest",
+    x_offset=uint32,
+    y_offset=uint32,
+    height=uint32,
+    width=uint32,
+    do_rectify=bool,
+)
+CameraInfo = ros(
+    "sensor_msgs/msg/CameraInfo",
+    header=Header,
+    height=uint32,
+    width=uint32,
+    distortion_model=str,
+    d=sequence[float64],
+    k=array[float64, 9],
+    r=array[float64, 9],
+    p=array[float64, 12],
+    binning_x=uint32,
+    binning_y=uint32,
+    roi=RegionOfInterest,
+)
 CompressedImage = ros(
     "sensor_msgs/msg/CompressedImage", header=Header, format=str, data=sequence[uint8]
 )

@@ -32,15 +32,18 @@ pub enum InsSource {
     Odometry,
     /// `geometry_msgs/PoseStamped`, in the map frame.
     Pose,
+    /// Transforms of `/tf` from the map to the machine, by way of any frames.
+    Tf,
 }
 
 impl InsSource {
-    const ALL: [(Self, &'static str); 5] = [
+    const ALL: [(Self, &'static str); 6] = [
         (Self::Inspva, "inspva"),
         (Self::Inspvax, "inspvax"),
         (Self::NavsatfixImu, "navsatfix_imu"),
         (Self::Odometry, "odometry"),
         (Self::Pose, "pose"),
+        (Self::Tf, "tf"),
     ];
 
     /// ROS types of its messages; the second one is paired with the first.
@@ -51,6 +54,7 @@ impl InsSource {
             Self::NavsatfixImu => &[NavSatFix::TYPE, Imu::TYPE],
             Self::Odometry => &[Odometry::TYPE],
             Self::Pose => &[PoseStamped::TYPE],
+            Self::Tf => &[],
         }
     }
 }

@@ -27,7 +27,7 @@ use lattice_msgs::geometry_msgs::TransformStamped;
 use lattice_msgs::sensor_msgs::PointCloud2;
 use nalgebra::{Isometry3, Vector3};
 
-use self::ins::{InsDecoder, InsMessage, InsRefusal};
+use self::ins::{InsDecoder, InsMessage, InsRefusal, InsSource};
 use self::waiting::{Waiting, WaitingCloud};
 use crate::convert::{cloud, viewpoint};
 use crate::stamps::StampGate;
@@ -100,6 +100,9 @@ impl EnuTransformer {
             ..TransformBufferOptions::default()
         });
         mounts.keep(&options.base_frame);
+        if options.ins.source == InsSource::Tf {
+            mounts.keep(&options.map_frame);
+        }
         options.odom_frame.iter().for_each(|odom| mounts.keep(odom));
         let span_ns = (options.pose_span_s * 1e9) as i64;
         Self {
@@ -279,7 +282,7 @@ impl EnuTransformer {
             }
         };
         for stamp_ns in [cloud.first_ns, cloud.last_ns] {
-            match self.poses.at(stamp_ns) {
+            match self.map_from_base(stamp_ns) {
                 Ok(_) => {}
                 Err(PoseMiss::Empty | PoseMiss::AfterEnd { .. }) => return wait(Drop::PoseLate),
                 Err(PoseMiss::BeforeStart { .. }) => return Verdict::Drop(Drop::BeforePoses),
@@ -306,7 +309,7 @@ impl EnuTransformer {
             .view(&message.data, &limits)
             .map_err(|_| Drop::Malformed)?;
         let map_from_sensor = |stamp_ns: i64| -> Result<Isometry3<f64>, Drop> {
-            let map_from_base = self.poses.at(stamp_ns).map_err(|_| Drop::PoseGap)?;
+            let map_from_base = self.map_from_base(stamp_ns).map_err(|_| Drop::PoseGap)?;
             let mount = self.mount(&waiting.frame, stamp_ns);
             Ok(map_from_base * mount.map_err(|_| Drop::NoMount)?)
         };

@@ -116,6 +116,7 @@ impl PoseInbox {
         imu: &str,
     ) -> Result<Vec<Subscription>, NodeError> {
         let ins = match source {
+            InsSource::Tf => return Ok(Vec::new()),
             InsSource::Inspva => self.subscribe(node, topic, Qos::INS, Event::Inspva),
             InsSource::Inspvax => self.subscribe(node, topic, Qos::INS, Event::Inspvax),
             InsSource::Odometry => self.subscribe(node, topic, Qos::INS, Event::Odometry),

@@ -9,7 +9,7 @@ use lattice_runtime::params::{About, ParamError, Params};
 
 const ABOUT: &[About] = about! {
     "points_topics" fixed(TOPIC): "Topics of the sensors' clouds (sensor_msgs/PointCloud2); any number.";
-    "ins.source" fixed(TOPIC): "inspva, inspvax, navsatfix_imu, odometry or pose.";
+    "ins.source" fixed(TOPIC): "inspva, inspvax, navsatfix_imu, odometry, pose, or tf: transforms from map_frame to base_frame that others publish.";
     "ins.topic" fixed(TOPIC): "Topic of the INS; for navsatfix_imu that of the NavSatFix.";
     "ins.imu_topic" fixed(TOPIC): "Topic of the attitude, for navsatfix_imu.";
     "ins.stamp" fixed(POSES): "Stamp of NovAtel poses: gps (week and milliseconds of the log) or header (time of arrival).";

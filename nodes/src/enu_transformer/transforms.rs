@@ -1,11 +1,12 @@
 //! Transforms that the transformer takes and gives.
 
-use lattice_core::pose::{StampedPose, TfMiss};
+use lattice_core::pose::{PoseMiss, StampedPose, TfMiss};
 use lattice_msgs::geographic_msgs::{GeoPoint, GeoPointStamped};
 use lattice_msgs::geometry_msgs::TransformStamped;
 use lattice_msgs::tf2_msgs::TFMessage;
 use nalgebra::Isometry3;
 
+use super::ins::InsSource;
 use super::{EnuOutput, EnuTransformer};
 use crate::convert::geometry;
 
@@ -27,6 +28,7 @@ impl EnuTransformer {
             };
             let refused = !pose.is_some_and(insert);
             self.counts.transforms_refused += u64::from(refused);
+            self.counts.poses_in += u64::from(self.has_poses_of_tf() && !refused);
         }
         self.announce_odom(&mut out);
         self.serve(now_ns, &mut out);
@@ -109,7 +111,29 @@ impl EnuTransformer {
     /// True for a transform that this node publishes itself.
     fn is_own(&self, transform: &TransformStamped) -> bool {
         let parent = transform.header.frame_id.trim_start_matches('/');
-        parent == self.options.map_frame || parent == self.options.earth_frame
+        let is_published = parent == self.options.map_frame || parent == self.options.earth_frame;
+        is_published && !self.has_poses_of_tf()
+    }
+
+    fn has_poses_of_tf(&self) -> bool {
+        self.options.ins.source == InsSource::Tf
+    }
+
+    /// Pose of the machine at a stamp.
+    pub(super) fn map_from_base(&self, stamp_ns: i64) -> Result<Isometry3<f64>, PoseMiss> {
+        if !self.has_poses_of_tf() {
+            return self.poses.at(stamp_ns);
+        }
+        let (map, base) = (&self.options.map_frame, &self.options.base_frame);
+        let found = self.mounts.lookup(map, base, stamp_ns);
+        found.map_err(|miss| match miss {
+            TfMiss::UnknownFrame { .. } | TfMiss::Disconnected { .. } => PoseMiss::Empty,
+            TfMiss::TooOld { by_ns, .. } => PoseMiss::BeforeStart { by_ns },
+            TfMiss::TooNew { by_ns, .. } => PoseMiss::AfterEnd { by_ns },
+            TfMiss::Gap {
+                gap_ns, max_gap_ns, ..
+            } => PoseMiss::Gap { gap_ns, max_gap_ns },
+        })
     }
 
     /// `base_from_sensor` at a stamp.

@@ -10,6 +10,7 @@ mod losses;
 mod params;
 mod peer;
 mod rclpy;
+mod rgbd;
 mod ros2_client_peer;
 mod security;
 mod transport;

@@ -6,6 +6,7 @@ mod lattice_mapper;
 mod lattice_mapper_services;
 mod map_follower;
 mod map_labels;
+mod semantic_cloud;
 mod semantic_clouds;
 mod semantic_icp_server;
 mod viewer_node;

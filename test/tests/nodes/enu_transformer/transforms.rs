@@ -111,3 +111,41 @@ fn wrong_publishers_of_transforms_do_not_take_a_sensor_out() {
         }
     }
 }
+
+#[test]
+fn poses_come_of_transforms_that_others_publish() {
+    let mut bench = Bench::new(TransformerOptions::new(InsSource::Tf));
+    bench.tf(
+        "base_link",
+        "camera",
+        0,
+        &Isometry3::translation(0.0, 0.0, 2.0),
+        true,
+    );
+    // A map frame that odometry drifts in, every 50 ms, the odometry between.
+    for step in 0..=20 {
+        if step % 5 == 0 {
+            let drift = Isometry3::translation(0.0, step as f64, 0.0);
+            bench.tf("map", "odom", step, &drift, false);
+        }
+        if step == 12 {
+            let stamp_ns = START_NS + step * STEP_NS;
+            bench.cloud(cloud("camera", stamp_ns, &[[1.0, 0.0, 0.0]]), stamp_ns);
+        }
+        bench.tf("odom", "base_link", step, &driven(step), false);
+        assert_eq!(bench.clouds.len(), usize::from(step >= 15), "{step}");
+    }
+    let found = points(&bench.clouds[0])[0];
+    assert!(
+        (found - Vector3::new(1.12, 12.0, 2.0)).norm() < 1e-6,
+        "{found}"
+    );
+    assert!(bench.transforms.is_empty(), "the others publish them");
+    assert!(bench.machine.counts().poses_in > 0);
+    // Before all transforms, and after them.
+    bench.cloud(cloud("camera", START_NS - SECOND_NS, &[[1.0; 3]]), START_NS);
+    assert_eq!(bench.machine.counts().clouds_before_poses, 1);
+    bench.cloud(cloud("camera", START_NS + SECOND_NS, &[[1.0; 3]]), START_NS);
+    bench.tick(START_NS + 5 * SECOND_NS);
+    assert_eq!(bench.machine.counts().clouds_pose_late, 1);
+}

@@ -1,0 +1,129 @@
+//! Rays of the pixels of a calibrated camera.
+
+use lattice_msgs::sensor_msgs::CameraInfo;
+use thiserror::Error;
+
+use super::distortion::Distortion;
+
+/// Error of a camera that cannot be used.
+#[derive(Clone, Debug, PartialEq, Eq, Error)]
+pub enum CameraError {
+    /// No calibration in it.
+    #[error("its matrix {matrix} has no focal lengths: the camera is not calibrated")]
+    NotCalibrated {
+        /// `k`, or `p` of a rectified image.
+        matrix: &'static str,
+    },
+    /// A model that is not known.
+    #[error(
+        "distortion model '{0}', expected plumb_bob, rational_polynomial or equidistant; \
+         `rectified: true` if the images are rectified"
+    )]
+    Model(String),
+    /// A number of parameters that the model does not have.
+    #[error("{found} parameters of {model}, expected {expected}")]
+    Parameters {
+        /// The model.
+        model: &'static str,
+        /// Parameters there are.
+        found: usize,
+        /// Numbers there may be.
+        expected: &'static str,
+    },
+    /// NaN or infinite.
+    #[error("its numbers are not all finite")]
+    NotFinite,
+    /// An image that is not the whole one.
+    #[error("its image is binned or cut: send a camera_info of the image as it is")]
+    Cut,
+}
+
+impl CameraError {
+    /// Name under which it is counted.
+    pub fn name(&self) -> &'static str {
+        match self {
+            Self::NotCalibrated { .. } => "not_calibrated",
+            Self::Model(_) => "distortion_model",
+            Self::Parameters { .. } | Self::NotFinite => "malformed",
+            Self::Cut => "cut",
+        }
+    }
+}
+
+/// A pinhole camera with distortion.
+#[derive(Clone, Debug, PartialEq)]
+pub struct Camera {
+    /// Pixels in a row.
+    pub width: u32,
+    /// Rows.
+    pub height: u32,
+    focal: [f64; 2],
+    center: [f64; 2],
+    distortion: Distortion,
+}
+
+impl Camera {
+    /// Reads a camera: of rectified images `p`, else `k` and `d`.
+    pub fn new(info: &CameraInfo, rectified: bool) -> Result<Self, CameraError> {
+        let roi = &info.roi;
+        let part = (roi.width, roi.height);
+        let is_whole = (roi.x_offset, roi.y_offset) == (0, 0)
+            && (part == (0, 0) || part == (info.width, info.height));
+        if !is_whole || info.binning_x > 1 || info.binning_y > 1 {
+            return Err(CameraError::Cut);
+        }
+        let (matrix, numbers) = match rectified {
+            true => ("p", [info.p[0], info.p[5], info.p[2], info.p[6]]),
+            false => ("k", [info.k[0], info.k[4], info.k[2], info.k[5]]),
+        };
+        let mut all = numbers.iter().chain(info.d.iter().take(64));
+        if !all.all(|v| v.is_finite()) {
+            return Err(CameraError::NotFinite);
+        }
+        let [fx, fy, cx, cy] = numbers;
+        if fx <= 0.0 || fy <= 0.0 {
+            return Err(CameraError::NotCalibrated { matrix });
+        }
+        let distortion = match rectified {
+            true => Distortion::None,
+            false => Distortion::new(&info.distortion_model, &info.d)?,
+        };
+        Ok(Self {
+            width: info.width,
+            height: info.height,
+            focal: [fx, fy],
+            center: [cx, cy],
+            distortion,
+        })
+    }
+
+    /// True if rays are bent by a lens.
+    pub fn is_distorted(&self) -> bool {
+        self.distortion != Distortion::None
+    }
+
+    /// The pixel of a point x, y, z in the optical frame; column and row of whole pixels are their centres.
+    pub fn project(&self, point_m: [f64; 3]) -> [f64; 2] {
+        let [x, y, z] = point_m;
+        let bent = self.distortion.distort([x / z, y / z]);
+        [0, 1].map(|i| self.focal[i] * bent[i] + self.center[i])
+    }
+
+    /// The ray of a pixel as x / z and y / z; `None` where no ray in front of the camera comes from.
+    pub fn ray(&self, column: f64, row: f64) -> Option<[f64; 2]> {
+        let place = [column, row];
+        let bent = [0, 1].map(|i| (place[i] - self.center[i]) / self.focal[i]);
+        self.distortion.undistort(bent)
+    }
+
+    /// Rays of all pixels, row by row; NaN where there is none.
+    pub fn rays(&self) -> Vec<[f32; 2]> {
+        let rows = 0..self.height;
+        let places = rows.flat_map(|row| (0..self.width).map(move |column| (column, row)));
+        let ray = |(column, row)| {
+            let ray = self.ray(f64::from(column), f64::from(row));
+            ray.map_or([f32::NAN; 2], |ray| ray.map(|v| v as f32))
+        };
+        places.map(ray).collect()
+    }
+}

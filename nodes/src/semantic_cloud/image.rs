@@ -1,0 +1,259 @@
+//! Pixels of an image whose header has been checked against its bytes.
+
+use lattice_core::registration::UNLABELED;
+use lattice_msgs::sensor_msgs::Image;
+use thiserror::Error;
+
+/// Error of an image that cannot be read.
+#[derive(Clone, Debug, PartialEq, Eq, Error)]
+pub enum ImageError {
+    /// An encoding that this topic does not take.
+    #[error("encoding '{found}', expected {expected}")]
+    Encoding {
+        /// Its first letters.
+        found: String,
+        /// Those that are taken.
+        expected: &'static str,
+    },
+    /// More pixels than the parameter allows.
+    #[error("{width} x {height} pixels, more than `max_image_pixels` {max}")]
+    TooLarge {
+        /// Pixels in a row.
+        width: u32,
+        /// Rows.
+        height: u32,
+        /// The limit.
+        max: usize,
+    },
+    /// Nothing in it.
+    #[error("{width} x {height} pixels: it is empty")]
+    Empty {
+        /// Pixels in a row.
+        width: u32,
+        /// Rows.
+        height: u32,
+    },
+    /// Rows that overlap.
+    #[error("step {step}, but a row of {width} pixels has {row} bytes")]
+    Step {
+        /// Bytes from row to row, as it says.
+        step: u32,
+        /// Pixels in a row.
+        width: u32,
+        /// Bytes of a row.
+        row: u64,
+    },
+    /// Fewer bytes than the header says.
+    #[error("{found} bytes, but {height} rows with step {step} need {needed}")]
+    Truncated {
+        /// Bytes there are.
+        found: usize,
+        /// Rows.
+        height: u32,
+        /// Bytes from row to row.
+        step: u32,
+        /// Bytes there must be.
+        needed: u64,
+    },
+}
+
+impl ImageError {
+    /// Name under which it is counted.
+    pub fn name(&self) -> &'static str {
+        match self {
+            Self::Encoding { .. } => "encoding",
+            Self::TooLarge { .. } => "too_large",
+            Self::Empty { .. } | Self::Step { .. } | Self::Truncated { .. } => "malformed",
+        }
+    }
+}
+
+/// Number that a pixel is.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub enum Pixel {
+    /// mono8, 8UC1.
+    U8,
+    /// mono16, 16UC1.
+    U16,
+    /// 32SC1.
+    I32,
+    /// 32FC1.
+    F32,
+}
+
+impl Pixel {
+    fn of(encoding: &str) -> Option<Self> {
+        match encoding {
+            "mono8" | "8UC1" => Some(Self::U8),
+            "mono16" | "16UC1" => Some(Self::U16),
+            "32SC1" => Some(Self::I32),
+            "32FC1" => Some(Self::F32),
+            _ => None,
+        }
+    }
+
+    fn bytes(self) -> usize {
+        match self {
+            Self::U8 => 1,
+            Self::U16 => 2,
+            Self::I32 | Self::F32 => 4,
+        }
+    }
+}
+
+/// Meaning of the pixels of an image.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub enum Content {
+    /// Distances along the optical axis: 16UC1 in mm, 32FC1 in m.
+    Depth,
+    /// Class numbers: mono8, 8UC1, mono16, 16UC1, 32SC1.
+    Labels,
+    /// From 0 to 1 in 32FC1, to the largest number in mono8, 8UC1, mono16, 16UC1.
+    Confidence,
+}
+
+impl Content {
+    fn encodings(self) -> (&'static [Pixel], &'static str) {
+        match self {
+            Self::Depth => (&[Pixel::U16, Pixel::F32], "16UC1 or 32FC1"),
+            Self::Labels => (
+                &[Pixel::U8, Pixel::U16, Pixel::I32],
+                "mono8, 8UC1, mono16, 16UC1 or 32SC1",
+            ),
+            Self::Confidence => (
+                &[Pixel::F32, Pixel::U8, Pixel::U16],
+                "32FC1, mono8, 8UC1, mono16 or 16UC1",
+            ),
+        }
+    }
+}
+
+/// An image in which every pixel can be read.
+#[derive(Clone, Copy, Debug)]
+pub struct ImageView<'a> {
+    /// Pixels in a row, at least 1.
+    pub width: usize,
+    /// Rows, at least 1.
+    pub height: usize,
+    /// Number that a pixel is.
+    pub pixel: Pixel,
+    step: usize,
+    is_bigendian: bool,
+    data: &'a [u8],
+}
+
+impl<'a> ImageView<'a> {
+    /// Checks encoding, size, step and length, in this order; allocates nothing for the pixels.
+    pub fn new(image: &'a Image, content: Content, max_pixels: usize) -> Result<Self, ImageError> {
+        let (pixels, expected) = content.encodings();
+        let pixel = Pixel::of(&image.encoding).filter(|pixel| pixels.contains(pixel));
+        let pixel = pixel.ok_or_else(|| ImageError::Encoding {
+            found: image.encoding.chars().take(32).collect(),
+            expected,
+        })?;
+        let (width, height, step) = (image.width, image.height, image.step);
+        if width == 0 || height == 0 {
+            return Err(ImageError::Empty { width, height });
+        }
+        let max = max_pixels;
+        if u64::from(width) * u64::from(height) > max as u64 {
+            return Err(ImageError::TooLarge { width, height, max });
+        }
+        let row = u64::from(width) * pixel.bytes() as u64;
+        if u64::from(step) < row {
+            return Err(ImageError::Step { step, width, row });
+        }
+        // The last row may end with its last pixel.
+        let needed = u64::from(step) * u64::from(height - 1) + row;
+        if (image.data.len() as u64) < needed {
+            return Err(ImageError::Truncated {
+                found: image.data.len(),
+                height,
+                step,
+                needed,
+            });
+        }
+        Ok(Self {
+            width: width as usize,
+            height: height as usize,
+            pixel,
+            step: step as usize,
+            is_bigendian: image.is_bigendian != 0,
+            data: &image.data,
+        })
+    }
+
+    /// Bytes of a row; none beyond the last.
+    fn row(&self, row: usize) -> &'a [u8] {
+        let begin = row.saturating_mul(self.step);
+        let end = begin.saturating_add(self.width * self.pixel.bytes());
+        self.data.get(begin..end).unwrap_or_default()
+    }
+
+    /// Numbers of a row in order.
+    fn numbers<const N: usize, T>(
+        &self,
+        row: usize,
+        from_bytes: fn([u8; N]) -> T,
+    ) -> impl Iterator<Item = T> {
+        let big = self.is_bigendian;
+        let (numbers, _) = self.row(row).as_chunks::<N>();
+        numbers.iter().map(move |bytes| {
+            let mut bytes = *bytes;
+            if big {
+                bytes.reverse();
+            }
+            from_bytes(bytes)
+        })
+    }
+
+    /// Depths of a row in m; NaN where there is none: 0, negative, infinite.
+    pub fn depths_m(&self, row: usize, out: &mut Vec<f32>) {
+        let valid = |z_m: f32| {
+            if z_m > 0.0 && z_m < f32::INFINITY {
+                z_m
+            } else {
+                f32::NAN
+            }
+        };
+        match self.pixel {
+            Pixel::F32 => out.extend(self.numbers(row, f32::from_le_bytes).map(valid)),
+            _ => {
+                let depths_mm = self.numbers(row, u16::from_le_bytes);
+                out.extend(depths_mm.map(|mm| valid((f64::from(mm) * 1e-3) as f32)));
+            }
+        }
+    }
+
+    /// Classes of a row; `UNLABELED`: the largest number of the encoding, or none from 0 to 65534.
+    pub fn classes(&self, row: usize, out: &mut Vec<u16>) {
+        match self.pixel {
+            Pixel::U8 => out.extend(self.numbers(row, u8::from_le_bytes).map(
+                |class| match class {
+                    u8::MAX => UNLABELED,
+                    class => u16::from(class),
+                },
+            )),
+            Pixel::U16 => out.extend(self.numbers(row, u16::from_le_bytes)),
+            Pixel::I32 | Pixel::F32 => {
+                let classes = self.numbers(row, i32::from_le_bytes);
+                out.extend(classes.map(|class| u16::try_from(class).unwrap_or(UNLABELED)));
+            }
+        }
+    }
+
+    /// Confidences of a row, 0 to 1; 0 where it is no number.
+    pub fn confidences(&self, row: usize, out: &mut Vec<f32>) {
+        match self.pixel {
+            Pixel::U8 => out.extend(self.row(row).iter().map(|v| f32::from(*v) / 255.0)),
+            Pixel::U16 => {
+                let numbers = self.numbers(row, u16::from_le_bytes);
+                out.extend(numbers.map(|v| f32::from(v) / 65535.0));
+            }
+            Pixel::I32 | Pixel::F32 => {
+                let numbers = self.numbers(row, f32::from_le_bytes);
+                out.extend(numbers.map(|v| if v.is_nan() { 0.0 } else { v.clamp(0.0, 1.0) }));
+            }
+        }
+    }
+}

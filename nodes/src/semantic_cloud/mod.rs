@@ -1,0 +1,272 @@
+//! From a depth camera and a segmenter to clouds with labels.
+//!
+//! [`SemanticCloud`] is a state machine without I/O; [`node`] runs it behind DDS.
+
+mod camera;
+mod counts;
+mod distortion;
+mod image;
+pub mod node;
+mod options;
+mod parameters;
+mod project;
+mod waiting;
+
+pub use camera::{Camera, CameraError};
+pub use counts::{CloudCounts, CloudReport, PointCounts};
+pub use image::{Content, ImageError, ImageView};
+pub use options::CloudOptions;
+pub use parameters::declare;
+pub use project::PointOptions;
+pub use waiting::{PairOptions, Stream};
+
+use std::collections::BTreeSet;
+use std::sync::Arc;
+
+use lattice_core::registration::UNLABELED;
+use lattice_msgs::sensor_msgs::{CameraInfo, Image, PointCloud2, PointField};
+use lattice_msgs::vision_msgs::LabelInfo;
+
+use self::project::{Classes, POINT_STEP, Views};
+use self::waiting::{Left, Set, Waiting};
+use crate::convert::cloud::{dense_cloud, field, xyz_fields};
+
+/// Output of the machine.
+#[derive(Clone, Debug, PartialEq)]
+pub enum CloudOutput {
+    /// For `points`, in the frame of the depth image and of its stamp.
+    Points(PointCloud2),
+    /// For `label_info`: the names of the classes in `points`.
+    LabelInfo(LabelInfo),
+}
+
+/// Makes a labelled cloud of each depth image and the label image of its time.
+///
+/// Images are checked before they wait, and nothing is allocated by what their headers say. The newest
+/// `camera_info` holds for all images that it fits.
+pub struct SemanticCloud {
+    options: CloudOptions,
+    waiting: Waiting,
+    info: Option<Arc<CameraInfo>>,
+    camera: Option<Camera>,
+    /// Rays of the camera, made with its first image.
+    rays: Vec<[f32; 2]>,
+    label_info: Option<Arc<LabelInfo>>,
+    classes: Classes,
+    counts: CloudCounts,
+    problem: Option<String>,
+}
+
+impl SemanticCloud {
+    /// A machine that has seen nothing.
+    pub fn new(options: CloudOptions) -> Self {
+        Self {
+            waiting: Waiting::new(options.pair.clone()),
+            classes: Classes {
+                class_of: (0..=u16::MAX)
+                    .map(|class| options.class_of(class))
+                    .collect(),
+                min_confidence: 0.0,
+            },
+            options,
+            info: None,
+            camera: None,
+            rays: Vec::new(),
+            label_info: None,
+            counts: CloudCounts::default(),
+            problem: None,
+        }
+    }
+
+    /// Goes on with other options; the names of the classes are told anew.
+    pub fn set_options(&mut self, options: CloudOptions) -> Vec<CloudOutput> {
+        self.waiting.set_options(options.pair.clone());
+        self.classes.class_of = (0..=u16::MAX)
+            .map(|class| options.class_of(class))
+            .collect();
+        self.options = options;
+        if let Some(info) = self.info.take() {
+            self.on_camera_info(info);
+        }
+        self.names().into_iter().collect()
+    }
+
+    /// Takes an image.
+    pub fn on_image(&mut self, stream: Stream, image: Arc<Image>) -> Vec<CloudOutput> {
+        let (count, content) = match stream {
+            Stream::Depth => (&mut self.counts.depth_in, Content::Depth),
+            Stream::Labels => (&mut self.counts.labels_in, Content::Labels),
+            Stream::Confidence => (&mut self.counts.confidence_in, Content::Confidence),
+        };
+        *count += 1;
+        if let Err(error) = ImageView::new(&image, content, self.options.max_image_pixels) {
+            self.refuse(stream.name(), error.name(), &error.to_string());
+            return Vec::new();
+        }
+        for (stream, reason) in self.waiting.push(stream, image) {
+            self.drop_image(stream, reason);
+        }
+        self.serve(false)
+    }
+
+    /// Takes the calibration of the camera. One that cannot be used leaves the node without.
+    pub fn on_camera_info(&mut self, info: Arc<CameraInfo>) -> Vec<CloudOutput> {
+        let is_known = self.info.as_ref().is_some_and(|old| {
+            (&old.k, &old.p, &old.d) == (&info.k, &info.p, &info.d)
+                && old.distortion_model == info.distortion_model
+                && (
+                    old.width,
+                    old.height,
+                    old.binning_x,
+                    old.binning_y,
+                    &old.roi,
+                ) == (
+                    info.width,
+                    info.height,
+                    info.binning_x,
+                    info.binning_y,
+                    &info.roi,
+                )
+        });
+        if is_known && self.camera.is_some() {
+            return Vec::new();
+        }
+        match Camera::new(&info, self.options.rectified) {
+            Ok(camera) => {
+                if camera.is_distorted() && !is_known {
+                    let model = &info.distortion_model;
+                    log::info!("pixels are undistorted ({model}); set `rectified` if images are");
+                }
+                if self.camera.as_ref() != Some(&camera) {
+                    self.rays = Vec::new();
+                }
+                self.camera = Some(camera);
+            }
+            Err(error) => {
+                self.camera = None;
+                self.rays = Vec::new();
+                self.refuse("camera_info", error.name(), &error.to_string());
+            }
+        }
+        self.info = Some(info);
+        self.serve(false)
+    }
+
+    /// Takes the names of the classes.
+    pub fn on_label_info(&mut self, info: Arc<LabelInfo>) -> Vec<CloudOutput> {
+        let threshold = info.threshold;
+        self.classes.min_confidence = if threshold.is_nan() { 0.0 } else { threshold };
+        self.label_info = Some(info);
+        self.names().into_iter().collect()
+    }
+
+    /// Ends the input: what belongs together comes out, the rest is counted.
+    pub fn finish(&mut self) -> Vec<CloudOutput> {
+        let outputs = self.serve(true);
+        for (stream, reason) in self.waiting.clear(Left::NoPartner) {
+            self.drop_image(stream, reason);
+        }
+        outputs
+    }
+
+    /// Counters of images, pixels and points, by reason.
+    pub fn counts(&self) -> &CloudCounts {
+        &self.counts
+    }
+
+    /// Images that wait for others.
+    pub fn waiting(&self) -> usize {
+        self.waiting.len()
+    }
+
+    /// True if there is a camera to make points with.
+    pub fn has_camera(&self) -> bool {
+        self.camera.is_some()
+    }
+
+    /// The last refusal in words.
+    pub fn problem(&self) -> Option<&str> {
+        self.problem.as_deref()
+    }
+
+    /// Clouds of all images that belong together by now.
+    fn serve(&mut self, is_end: bool) -> Vec<CloudOutput> {
+        let mut outputs = Vec::new();
+        while self.camera.is_some()
+            && let Some(set) = self.waiting.take(is_end)
+        {
+            outputs.extend(self.cloud(&set).map(CloudOutput::Points));
+        }
+        outputs
+    }
+
+    fn cloud(&mut self, set: &Set) -> Option<PointCloud2> {
+        let camera = self.camera.as_ref()?;
+        let max = self.options.max_image_pixels;
+        let view = |image, content| ImageView::new(image, content, max).ok();
+        let depth = view(&set.depth, Content::Depth)?;
+        let (width, height) = (camera.width, camera.height);
+        if (depth.width, depth.height) != (width as usize, height as usize) {
+            let problem = format!(
+                "{} x {} pixels, but camera_info is of {width} x {height}",
+                depth.width, depth.height
+            );
+            self.refuse("depth", "size", &problem);
+            return None;
+        }
+        if self.rays.is_empty() {
+            self.rays = camera.rays();
+        }
+        let views = Views {
+            depth,
+            labels: view(&set.labels, Content::Labels)?,
+            confidence: match &set.confidence {
+                Some(confidence) => Some(view(confidence, Content::Confidence)?),
+                None => None,
+            },
+            rays: &self.rays,
+        };
+        let data = views.points(&self.options.points, &self.classes, &mut self.counts.points);
+        self.counts.clouds_out += 1;
+        let mut fields = xyz_fields(PointField::FLOAT32, 4);
+        fields.push(field("label", 12, PointField::UINT16));
+        fields.push(field("confidence", 14, PointField::FLOAT32));
+        let points = data.len() / POINT_STEP;
+        Some(dense_cloud(
+            set.depth.header.clone(),
+            fields,
+            POINT_STEP as u32,
+            points,
+            data,
+        ))
+    }
+
+    /// Names of the classes that points may have.
+    fn names(&self) -> Option<CloudOutput> {
+        let mut info = LabelInfo::clone(self.label_info.as_deref()?);
+        let from = info
+            .class_map
+            .iter()
+            .map(|class| self.options.class_of(class.class_id));
+        let used: BTreeSet<u16> = from.filter(|class| *class != UNLABELED).collect();
+        info.class_map
+            .retain(|class| used.contains(&class.class_id));
+        Some(CloudOutput::LabelInfo(info))
+    }
+
+    fn drop_image(&mut self, stream: Stream, reason: Left) {
+        let reason = match reason {
+            Left::NoPartner if self.camera.is_none() => "no_camera_info",
+            Left::NoPartner => "no_partner",
+            Left::Repeated => "repeated",
+            Left::TimeJump => "time_jump",
+        };
+        self.counts.drop_one(stream.name(), reason);
+    }
+
+    fn refuse(&mut self, topic: &str, reason: &str, problem: &str) {
+        self.counts.drop_one(topic, reason);
+        self.problem = Some(format!("{topic}: {problem}"));
+        log::debug!("{topic} refused: {problem}");
+    }
+}

@@ -1,0 +1,121 @@
+//! Options of a [`super::SemanticCloud`].
+
+use std::collections::{BTreeMap, BTreeSet};
+
+use lattice_core::registration::UNLABELED;
+
+use super::project::PointOptions;
+use super::waiting::PairOptions;
+use lattice_runtime::params::{ParamError, Params};
+
+/// Most images of a topic that a parameter may let wait.
+const MAX_QUEUE: usize = 1000;
+
+/// Options of a [`super::SemanticCloud`].
+#[derive(Clone, Debug, PartialEq)]
+pub struct CloudOptions {
+    /// Rules by which images belong together.
+    pub pair: PairOptions,
+    /// Images of more pixels are refused.
+    pub max_image_pixels: usize,
+    /// True if the images are rectified: `p` of the camera holds, and its distortion does not.
+    pub rectified: bool,
+    /// Choice of the pixels that become points.
+    pub points: PointOptions,
+    /// Classes that say nothing.
+    pub ignored: BTreeSet<u16>,
+    /// Class that others count as.
+    pub groups: BTreeMap<u16, u16>,
+}
+
+impl Default for CloudOptions {
+    fn default() -> Self {
+        Self {
+            pair: PairOptions {
+                queue_size: 5,
+                max_difference_ns: 20_000_000,
+                with_confidence: false,
+            },
+            max_image_pixels: 4_000_000,
+            rectified: false,
+            points: PointOptions {
+                stride: 1,
+                min_range_m: 0.0,
+                max_range_m: f64::INFINITY,
+                edge_jump: 0.05,
+            },
+            ignored: BTreeSet::new(),
+            groups: BTreeMap::new(),
+        }
+    }
+}
+
+impl CloudOptions {
+    /// Reads the parameters of the node.
+    pub fn from_params(params: &Params) -> Result<Self, ParamError> {
+        let defaults = Self::default();
+        let difference_s = params.f64_in("max_stamp_difference_s", 0.02, 0.0..=3600.0)?;
+        let max_difference_ns = match params.bool("exact_sync", false)? {
+            true => 0,
+            false => (difference_s * 1e9) as u64,
+        };
+        let (pair, points) = (&defaults.pair, &defaults.points);
+        let min_range_m = params.f64_in("min_range_m", 0.0, 0.0..=f64::MAX)?;
+        let max_range_m = match params.f64_in("max_range_m", 0.0, 0.0..=f64::MAX)? {
+            0.0 => f64::INFINITY,
+            max_range_m => max_range_m,
+        };
+        if min_range_m > max_range_m {
+            let problem = format!("expected at most `max_range_m`, {max_range_m}");
+            return Err(params.invalid("min_range_m", problem));
+        }
+        let edge_jump = params.f64_in("edge_jump", 0.05, 0.0..=1e9)?;
+        let ignored = params.i64_array("ignored_labels", &[])?;
+        let ignored: Result<_, _> = ignored.into_iter().map(u16::try_from).collect();
+        Ok(Self {
+            pair: PairOptions {
+                queue_size: params.usize_in("queue_size", pair.queue_size, 1..=MAX_QUEUE)?,
+                max_difference_ns,
+                with_confidence: params.bool("use_confidence", false)?,
+            },
+            max_image_pixels: params.positive("max_image_pixels", defaults.max_image_pixels)?,
+            rectified: params.bool("rectified", false)?,
+            points: PointOptions {
+                stride: params.positive("stride", points.stride)?,
+                min_range_m,
+                max_range_m,
+                edge_jump: if edge_jump == 0.0 {
+                    f32::INFINITY
+                } else {
+                    edge_jump as f32
+                },
+            },
+            ignored: ignored.map_err(|_| {
+                params.invalid("ignored_labels", "expected numbers from 0 to 65535")
+            })?,
+            groups: groups(params)?,
+        })
+    }
+
+    /// Class of a point by the number of its pixel.
+    pub fn class_of(&self, number: u16) -> u16 {
+        match self.ignored.contains(&number) {
+            true => UNLABELED,
+            false => self.groups.get(&number).copied().unwrap_or(number),
+        }
+    }
+}
+
+fn groups(params: &Params) -> Result<BTreeMap<u16, u16>, ParamError> {
+    let numbers = params.i64_array("group_labels", &[])?;
+    let (pairs, rest) = numbers.as_chunks::<2>();
+    let class = |v: i64| u16::try_from(v).ok().filter(|class| *class != UNLABELED);
+    let pairs = pairs
+        .iter()
+        .map(|&[from, to]| Some((class(from)?, class(to)?)));
+    let groups: Option<BTreeMap<_, _>> = rest.is_empty().then(|| pairs.collect()).flatten();
+    groups.ok_or_else(|| {
+        let problem = "expected two numbers for each class, itself and its group, from 0 to 65534";
+        params.invalid("group_labels", problem)
+    })
+}

@@ -1,0 +1,50 @@
+//! All parameters of the node.
+
+use super::CloudOptions;
+use crate::compute::ComputeLimits;
+use crate::{options, report};
+use lattice_runtime::about;
+use lattice_runtime::params::{About, ParamError, Params};
+
+const ABOUT: &[About] = about! {
+    "queue_size": "Images of each topic that wait for those of their time; the oldest goes and is counted.";
+    "exact_sync": "Whether the stamps of depth and labels must be equal.";
+    "max_stamp_difference_s": "Otherwise, the largest difference between them.";
+    "use_confidence" fixed(options::TOPIC): "Whether labels wait for labels/confidence of their stamp.";
+    "rectified": "Whether the images are rectified: then p of camera_info holds, otherwise k and the distortion.";
+    "max_image_pixels": "Images of more pixels are refused.";
+    "stride": "Only every so many rows and columns become points.";
+    "min_range_m": "Points nearer to the sensor are left out.";
+    "max_range_m": "Points farther from the sensor are left out; 0: no limit.";
+    "edge_jump": "Pixels are left out whose depth and that of one of the eight around differ by more than this fraction: labels bleed there; 0: none.";
+    "group_labels": "Classes that count as others: class, group, class, group and so on.";
+};
+
+/// Settings of the node by its parameters.
+pub(super) struct Settings {
+    pub cloud: CloudOptions,
+    pub limits: ComputeLimits,
+    pub report_file: String,
+}
+
+impl Settings {
+    /// Reads the parameters of the node.
+    pub(super) fn from_params(params: &Params) -> Result<Self, ParamError> {
+        params.describe(ABOUT);
+        params.describe(options::COMMON);
+        Ok(Self {
+            cloud: CloudOptions::from_params(params)?,
+            limits: ComputeLimits {
+                events: options::inbox_events(params, 4096)?,
+                bytes: options::inbox_bytes(params, 128 << 20)?,
+                threads: 1,
+            },
+            report_file: report::file(params)?,
+        })
+    }
+}
+
+/// Reads all parameters of the node, as its start does.
+pub fn declare(params: &Params) -> Result<(), ParamError> {
+    Settings::from_params(params).map(drop)
+}

@@ -1,0 +1,221 @@
+//! Depth and labels to points.
+
+use lattice_core::registration::UNLABELED;
+
+use super::counts::PointCounts;
+use super::image::ImageView;
+
+/// Bytes of a point: x, y, z in f32, label in u16, confidence in f32.
+pub const POINT_STEP: usize = 18;
+
+/// Choice of the pixels that become points.
+#[derive(Clone, Debug, PartialEq)]
+pub struct PointOptions {
+    /// Every so many columns and rows.
+    pub stride: usize,
+    /// Points nearer to the camera are left out, m.
+    pub min_range_m: f64,
+    /// Points farther from the camera are left out, m.
+    pub max_range_m: f64,
+    /// Largest difference to the depths of the eight pixels around, as a fraction of the smaller; infinite: any.
+    pub edge_jump: f32,
+}
+
+/// Meaning of the numbers in label images.
+#[derive(Clone, Debug)]
+pub struct Classes {
+    /// Class of a point by the number of its pixel; all 65536.
+    pub class_of: Vec<u16>,
+    /// Labels of less confidence are none.
+    pub min_confidence: f32,
+}
+
+/// Images of one time with the rays of the depth image's pixels.
+pub struct Views<'a> {
+    /// Depth.
+    pub depth: ImageView<'a>,
+    /// Labels, of any size.
+    pub labels: ImageView<'a>,
+    /// Confidences, of any size.
+    pub confidence: Option<ImageView<'a>>,
+    /// x / z and y / z of each pixel of the depth image; NaN: none.
+    pub rays: &'a [[f32; 2]],
+}
+
+impl Views<'_> {
+    /// Records of the points, little endian.
+    pub fn points(
+        &self,
+        options: &PointOptions,
+        classes: &Classes,
+        counts: &mut PointCounts,
+    ) -> Vec<u8> {
+        let (width, height) = (self.depth.width, self.depth.height);
+        let mut depths_m = Vec::with_capacity(width * height);
+        (0..height).for_each(|row| self.depth.depths_m(row, &mut depths_m));
+        let edges = Edges::new(&depths_m, width, options.edge_jump);
+        let stride = options.stride.max(1);
+        let mut data =
+            Vec::with_capacity(width.div_ceil(stride) * height.div_ceil(stride) * POINT_STEP);
+        let mut labels = Sampled::new(self.labels, width, ImageView::classes);
+        let confidence = self.confidence;
+        let mut confidence =
+            confidence.map(|view| Sampled::new(view, width, ImageView::confidences));
+        for row in (0..height).step_by(stride) {
+            labels.seek(row, height);
+            if let Some(confidence) = &mut confidence {
+                confidence.seek(row, height);
+            }
+            for column in (0..width).step_by(stride) {
+                let i = row * width + column;
+                let (Some(&z_m), Some(&[x, y])) = (depths_m.get(i), self.rays.get(i)) else {
+                    continue;
+                };
+                counts.pixels += 1;
+                if z_m.is_nan() {
+                    counts.pixels_no_depth += 1;
+                    continue;
+                }
+                if x.is_nan() {
+                    counts.pixels_no_ray += 1;
+                    continue;
+                }
+                if edges.has(row, column) {
+                    counts.pixels_at_edges += 1;
+                    continue;
+                }
+                let point_m = [x * z_m, y * z_m, z_m];
+                let range_m = point_m
+                    .map(f64::from)
+                    .iter()
+                    .map(|v| v * v)
+                    .sum::<f64>()
+                    .sqrt();
+                if range_m < options.min_range_m || range_m > options.max_range_m {
+                    counts.pixels_out_of_range += 1;
+                    continue;
+                }
+                let worth = confidence
+                    .as_ref()
+                    .map_or(1.0, |c| c.at(column).unwrap_or(0.0));
+                let number = labels.at(column).unwrap_or(UNLABELED);
+                let class = classes.class_of.get(usize::from(number)).copied();
+                let known =
+                    class.filter(|class| *class != UNLABELED && worth >= classes.min_confidence);
+                counts.points_unlabelled += u64::from(known.is_none());
+                for v in point_m {
+                    data.extend_from_slice(&v.to_le_bytes());
+                }
+                data.extend_from_slice(&known.unwrap_or(UNLABELED).to_le_bytes());
+                data.extend_from_slice(&known.map_or(0.0, |_| worth).to_le_bytes());
+            }
+        }
+        counts.points += (data.len() / POINT_STEP) as u64;
+        data
+    }
+}
+
+/// Rows of an image, read at the columns of another by nearest neighbour.
+struct Sampled<'a, T> {
+    view: ImageView<'a>,
+    read: fn(&ImageView<'a>, usize, &mut Vec<T>),
+    columns: Vec<usize>,
+    row: Option<usize>,
+    numbers: Vec<T>,
+}
+
+/// Place in `to` pixels under the centre of a pixel of `from`.
+fn nearest(at: usize, from: usize, to: usize) -> usize {
+    (2 * at + 1) * to / (2 * from)
+}
+
+impl<'a, T: Copy> Sampled<'a, T> {
+    fn new(
+        view: ImageView<'a>,
+        width: usize,
+        read: fn(&ImageView<'a>, usize, &mut Vec<T>),
+    ) -> Self {
+        Self {
+            columns: (0..width)
+                .map(|column| nearest(column, width, view.width))
+                .collect(),
+            view,
+            read,
+            row: None,
+            numbers: Vec::new(),
+        }
+    }
+
+    /// Goes to a row of the other image.
+    fn seek(&mut self, row: usize, height: usize) {
+        let row = nearest(row, height, self.view.height);
+        if self.row != Some(row) {
+            self.row = Some(row);
+            self.numbers.clear();
+            (self.read)(&self.view, row, &mut self.numbers);
+        }
+    }
+
+    fn at(&self, column: usize) -> Option<T> {
+        self.numbers.get(*self.columns.get(column)?).copied()
+    }
+}
+
+/// Pixels whose depth differs much from that of one of the eight around; those without depth say nothing.
+struct Edges {
+    width: usize,
+    is_edge: Vec<bool>,
+}
+
+impl Edges {
+    fn new(depths_m: &[f32], width: usize, jump: f32) -> Self {
+        if jump == f32::INFINITY {
+            return Self {
+                width,
+                is_edge: Vec::new(),
+            };
+        }
+        // Nearest and farthest in a row and then of three rows; min and max pass over NaN.
+        let near = around(depths_m, width, f32::min);
+        let far = around(depths_m, width, f32::max);
+        let bounds = depths_m.iter().zip(near.iter().zip(&far));
+        let is_edge = bounds.map(|(&z_m, (&near_m, &far_m))| {
+            far_m - z_m > jump * z_m || z_m - near_m > jump * near_m
+        });
+        Self {
+            width,
+            is_edge: is_edge.collect(),
+        }
+    }
+
+    fn has(&self, row: usize, column: usize) -> bool {
+        let place = row * self.width + column;
+        self.is_edge.get(place).copied().unwrap_or(false)
+    }
+}
+
+/// The best of each pixel and the eight around it.
+fn around(values: &[f32], width: usize, best: impl Fn(f32, f32) -> f32 + Copy) -> Vec<f32> {
+    let mut in_rows = values.to_vec();
+    for (row, out) in values.chunks(width).zip(in_rows.chunks_mut(width)) {
+        fold_neighbours(row, out, 1, best);
+    }
+    let mut out = in_rows.clone();
+    fold_neighbours(&in_rows, &mut out, width, best);
+    out
+}
+
+/// Folds into each value those `distance` before and behind it.
+fn fold_neighbours(
+    values: &[f32],
+    out: &mut [f32],
+    distance: usize,
+    best: impl Fn(f32, f32) -> f32 + Copy,
+) {
+    for (out, before) in out.iter_mut().skip(distance).zip(values) {
+        *out = best(*out, *before);
+    }
+    for (out, behind) in out.iter_mut().zip(values.iter().skip(distance)) {
+        *out = best(*out, *behind);
+    }
+}

@@ -1,0 +1,170 @@
+//! Images that wait for those of the same time.
+
+use std::collections::BTreeMap;
+use std::sync::Arc;
+
+use lattice_msgs::sensor_msgs::Image;
+
+/// A step back of a stream's stamps by more than this is a log that loops.
+const JUMP_BACK_NS: i64 = 1_000_000_000;
+
+/// A topic of images.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub enum Stream {
+    /// Depth images, whose stamps the clouds have.
+    Depth,
+    /// Label images, of the stamp nearest to a depth image's.
+    Labels,
+    /// Confidences, of exactly the stamp of a label image.
+    Confidence,
+}
+
+impl Stream {
+    /// All, in the order of their numbers.
+    pub const ALL: [Self; 3] = [Self::Depth, Self::Labels, Self::Confidence];
+
+    /// Name under which it is counted.
+    pub fn name(self) -> &'static str {
+        match self {
+            Self::Depth => "depth",
+            Self::Labels => "labels",
+            Self::Confidence => "confidence",
+        }
+    }
+}
+
+/// Rules by which images belong together.
+#[derive(Clone, Debug, PartialEq, Eq)]
+pub struct PairOptions {
+    /// Most images of a topic that wait; the oldest goes.
+    pub queue_size: usize,
+    /// Largest difference between the stamps of depth and labels; 0: they must be equal.
+    pub max_difference_ns: u64,
+    /// True if labels come with confidences.
+    pub with_confidence: bool,
+}
+
+/// Images of one time.
+#[derive(Debug)]
+pub struct Set {
+    /// Depth image.
+    pub depth: Arc<Image>,
+    /// Label image.
+    pub labels: Arc<Image>,
+    /// Confidences, if they are asked for.
+    pub confidence: Option<Arc<Image>>,
+}
+
+/// Reason for which an image left without its partner.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub enum Left {
+    /// Others of its topic needed its place.
+    NoPartner,
+    /// There was one of its stamp.
+    Repeated,
+    /// It waited when the stamps jumped back.
+    TimeJump,
+}
+
+/// Images of each topic by stamp, at most `queue_size` of each.
+///
+/// Depth and labels belong together if each is the nearest to the other; unless their stamps are equal
+/// this is known once each topic has come to the stamp of the other. Every image is used once.
+#[derive(Debug)]
+pub struct Waiting {
+    options: PairOptions,
+    queues: [BTreeMap<i64, Arc<Image>>; 3],
+    newest_ns: [Option<i64>; 3],
+}
+
+impl Waiting {
+    /// No images.
+    pub fn new(options: PairOptions) -> Self {
+        Self {
+            options,
+            queues: Default::default(),
+            newest_ns: [None; 3],
+        }
+    }
+
+    /// Goes on by other rules.
+    pub fn set_options(&mut self, options: PairOptions) {
+        self.options = options;
+    }
+
+    /// Adds an image, and tells of those that leave for it.
+    pub fn push(&mut self, stream: Stream, image: Arc<Image>) -> Vec<(Stream, Left)> {
+        let stamp_ns = image.header.stamp.to_ns();
+        let mut left = Vec::new();
+        let newest_ns = self.newest_ns[stream as usize].unwrap_or(stamp_ns);
+        if stamp_ns < newest_ns.saturating_sub(JUMP_BACK_NS) {
+            left = self.clear(Left::TimeJump);
+            self.newest_ns = [None; 3];
+        }
+        let newest = &mut self.newest_ns[stream as usize];
+        *newest = Some(newest.map_or(stamp_ns, |newest_ns| newest_ns.max(stamp_ns)));
+        let queue = &mut self.queues[stream as usize];
+        if queue.insert(stamp_ns, image).is_some() {
+            left.push((stream, Left::Repeated));
+        }
+        while queue.len() > self.options.queue_size.max(1) {
+            queue.pop_first();
+            left.push((stream, Left::NoPartner));
+        }
+        left
+    }
+
+    /// Takes the oldest images that belong together; at the end of the input (`is_end`) no others are
+    /// waited for.
+    pub fn take(&mut self, is_end: bool) -> Option<Set> {
+        let depths = self.queues[Stream::Depth as usize].keys();
+        let found =
+            depths.filter_map(|depth_ns| Some((*depth_ns, self.labels_of(*depth_ns, is_end)?)));
+        let (depth_ns, labels_ns) = { found }.next()?;
+        let [depths, labels, confidences] = &mut self.queues;
+        Some(Set {
+            depth: depths.remove(&depth_ns)?,
+            labels: labels.remove(&labels_ns)?,
+            confidence: confidences.remove(&labels_ns),
+        })
+    }
+
+    /// Stamp of the labels that belong to a depth image, once that is sure.
+    fn labels_of(&self, depth_ns: i64, is_end: bool) -> Option<i64> {
+        let [depths, labels, confidences] = &self.queues;
+        let labels_ns = nearest(labels, depth_ns)?;
+        let is_near = depth_ns.abs_diff(labels_ns) <= self.options.max_difference_ns;
+        let is_whole = !self.options.with_confidence || confidences.contains_key(&labels_ns);
+        let come_to = |stream: Stream, stamp_ns| {
+            self.newest_ns[stream as usize].is_some_and(|newest_ns| newest_ns >= stamp_ns)
+        };
+        let is_sure = is_end
+            || depth_ns == labels_ns
+            || (come_to(Stream::Depth, labels_ns) && come_to(Stream::Labels, depth_ns));
+        let belong = is_near && is_whole && is_sure && nearest(depths, labels_ns) == Some(depth_ns);
+        belong.then_some(labels_ns)
+    }
+
+    /// Forgets all images, and tells of them.
+    pub fn clear(&mut self, reason: Left) -> Vec<(Stream, Left)> {
+        let mut left = Vec::new();
+        for stream in Stream::ALL {
+            let queue = std::mem::take(&mut self.queues[stream as usize]);
+            left.extend(queue.iter().map(|_| (stream, reason)));
+        }
+        left
+    }
+
+    /// Images that wait.
+    pub fn len(&self) -> usize {
+        self.queues.iter().map(BTreeMap::len).sum()
+    }
+}
+
+/// The stamp in a queue that is nearest, of two the older.
+fn nearest<T>(queue: &BTreeMap<i64, T>, stamp_ns: i64) -> Option<i64> {
+    let before = queue.range(..=stamp_ns).next_back();
+    let after = queue.range(stamp_ns..).next();
+    let both = before.into_iter().chain(after).map(|(at_ns, _)| *at_ns);
+    both.min_by_key(|at_ns| at_ns.abs_diff(stamp_ns))
+}
