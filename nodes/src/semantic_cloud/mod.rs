@@ -3,6 +3,11 @@
 //! [`SemanticCloud`] is a state machine without I/O; [`node`] runs it behind DDS.
 
 mod camera;
+#[cfg_attr(
+    not(feature = "compressed_depth"),
+    expect(dead_code, reason = "errors of PNG files")
+)]
+mod compressed;
 mod counts;
 mod distortion;
 mod image;
@@ -24,7 +29,7 @@ use std::collections::BTreeSet;
 use std::sync::Arc;
 
 use lattice_core::registration::UNLABELED;
-use lattice_msgs::sensor_msgs::{CameraInfo, Image, PointCloud2, PointField};
+use lattice_msgs::sensor_msgs::{CameraInfo, CompressedImage, Image, PointCloud2, PointField};
 use lattice_msgs::vision_msgs::LabelInfo;
 
 use self::project::{Classes, POINT_STEP, Views};
@@ -107,6 +112,18 @@ impl SemanticCloud {
             self.drop_image(stream, reason);
         }
         self.serve(false)
+    }
+
+    /// Takes a depth image as compressed_depth_image_transport packs it.
+    pub fn on_compressed_depth(&mut self, message: &CompressedImage) -> Vec<CloudOutput> {
+        match compressed::depth_image(message, self.options.max_image_pixels) {
+            Ok(image) => self.on_image(Stream::Depth, Arc::new(image)),
+            Err(error) => {
+                self.counts.depth_in += 1;
+                self.refuse("depth", error.name(), &error.to_string());
+                Vec::new()
+            }
+        }
     }
 
     /// Takes the calibration of the camera. One that cannot be used leaves the node without.

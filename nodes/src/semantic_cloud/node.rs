@@ -4,7 +4,7 @@ use std::sync::Arc;
 use std::sync::atomic::{AtomicU64, Ordering};
 use std::time::Duration;
 
-use lattice_msgs::sensor_msgs::{CameraInfo, Image, PointCloud2};
+use lattice_msgs::sensor_msgs::{CameraInfo, CompressedImage, Image, PointCloud2};
 use lattice_msgs::vision_msgs::LabelInfo;
 
 use super::parameters::Settings;
@@ -19,6 +19,7 @@ use lattice_runtime::{Diagnostics, Level, Load, Losses, Publisher, Runtime};
 /// Event for the compute thread.
 enum Event {
     Image(Stream, Arc<Image>),
+    CompressedDepth(Arc<CompressedImage>),
     CameraInfo(Arc<CameraInfo>),
     LabelInfo(Arc<LabelInfo>),
     Diagnose,
@@ -50,17 +51,19 @@ pub fn start(runtime: &Runtime, name: &str) -> Result<Finish, NodeError> {
     })?;
     let inbox = compute.inbox();
     let bytes = |image: &Arc<Image>| size_of::<Image>() + image.data.len();
-    let depth = inbox.counting(&lost, |image| Event::Image(Stream::Depth, image), bytes);
+    let topic = "depth_registered/image_rect";
+    let depth = if settings.compressed_depth {
+        let size = |image: &Arc<CompressedImage>| size_of::<CompressedImage>() + image.data.len();
+        let depth = inbox.counting(&lost, Event::CompressedDepth, size);
+        let topic = format!("{topic}/compressedDepth");
+        node.subscribe(&topic, Qos::SENSOR, Load::Large, depth)?
+    } else {
+        let depth = inbox.counting(&lost, |image| Event::Image(Stream::Depth, image), bytes);
+        node.subscribe(topic, Qos::SENSOR, Load::Large, depth)?
+    };
     let labels = inbox.counting(&lost, |image| Event::Image(Stream::Labels, image), bytes);
-    let mut inputs = vec![
-        node.subscribe(
-            "depth_registered/image_rect",
-            Qos::SENSOR,
-            Load::Large,
-            depth,
-        )?,
-        node.subscribe("labels/image", Qos::SENSOR, Load::Large, labels)?,
-    ];
+    let labels = node.subscribe("labels/image", Qos::SENSOR, Load::Large, labels)?;
+    let mut inputs = vec![depth, labels];
     if with_confidence {
         let confidence = inbox.counting(&lost, |m| Event::Image(Stream::Confidence, m), bytes);
         inputs.push(node.subscribe("labels/confidence", Qos::SENSOR, Load::Large, confidence)?);
@@ -104,6 +107,7 @@ impl Shell {
     fn on(&mut self, event: Event) {
         let outputs = match event {
             Event::Image(stream, image) => self.machine.on_image(stream, image),
+            Event::CompressedDepth(image) => self.machine.on_compressed_depth(&image),
             Event::CameraInfo(info) => self.machine.on_camera_info(info),
             Event::LabelInfo(info) => self.machine.on_label_info(info),
             Event::Settings(options) => self.machine.set_options(*options),

@@ -11,6 +11,7 @@ const ABOUT: &[About] = about! {
     "exact_sync": "Whether the stamps of depth and labels must be equal.";
     "max_stamp_difference_s": "Otherwise, the largest difference between them.";
     "use_confidence" fixed(options::TOPIC): "Whether labels wait for labels/confidence of their stamp.";
+    "compressed_depth" fixed(options::TOPIC): "Whether depth is taken from depth_registered/image_rect/compressedDepth (PNG).";
     "rectified": "Whether the images are rectified: then p of camera_info holds, otherwise k and the distortion.";
     "max_image_pixels": "Images of more pixels are refused.";
     "stride": "Only every so many rows and columns become points.";
@@ -23,6 +24,7 @@ const ABOUT: &[About] = about! {
 /// Settings of the node by its parameters.
 pub(super) struct Settings {
     pub cloud: CloudOptions,
+    pub compressed_depth: bool,
     pub limits: ComputeLimits,
     pub report_file: String,
 }
@@ -32,7 +34,13 @@ impl Settings {
     pub(super) fn from_params(params: &Params) -> Result<Self, ParamError> {
         params.describe(ABOUT);
         params.describe(options::COMMON);
+        let compressed_depth = params.bool("compressed_depth", false)?;
+        if compressed_depth && !cfg!(feature = "compressed_depth") {
+            let problem = "this program was built without the feature `compressed_depth`";
+            return Err(params.invalid("compressed_depth", problem));
+        }
         Ok(Self {
+            compressed_depth,
             cloud: CloudOptions::from_params(params)?,
             limits: ComputeLimits {
                 events: options::inbox_events(params, 4096)?,

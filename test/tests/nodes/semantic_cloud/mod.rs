@@ -1,5 +1,6 @@
 //! Depth and label images to labelled clouds.
 
+mod compressed;
 mod hostile;
 mod pairs;
 mod scene;
