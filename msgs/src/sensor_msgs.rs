@@ -84,7 +84,7 @@ pub struct Image {
     pub height: u32,
     /// Pixels in a row.
     pub width: u32,
-    /// What a pixel is, such as 16UC1 or mono8.
+    /// Encoding of a pixel, such as 16UC1 or mono8.
     pub encoding: String,
     /// Byte order of the numbers, 0 or 1.
     pub is_bigendian: u8,

@@ -137,7 +137,7 @@ fn alike(value: &Value) -> Value {
     }
 }
 
-/// Where `test/node` is installed; else a line says so.
+/// Folder in which `test/node` is installed; else a line says so.
 fn folder() -> Option<OsString> {
     let folder = std::env::var_os("LATTICE_NODE_PEER");
     if folder.is_none() {
