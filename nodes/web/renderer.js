@@ -96,7 +96,7 @@ export class CellRenderer {
     }
     gl.bindBuffer(gl.ARRAY_BUFFER, tile.buffer);
     if (cells.byteLength > tile.room) {
-      tile.room = Math.ceil(cells.byteLength * 1.25);
+      tile.room = Math.ceil(cells.byteLength * (tile.room ? 1.25 : 1));
       gl.bufferData(gl.ARRAY_BUFFER, tile.room, gl.DYNAMIC_DRAW);
     }
     gl.bufferSubData(gl.ARRAY_BUFFER, 0, cells);
