@@ -24,6 +24,10 @@ pub struct Voxels {
     /// room_scan{1,2}.pcd; either may be missing
     #[arg(long, value_name = "DIR")]
     pairs: Option<PathBuf>,
+    /// Point files of a map and of a scan for Fig. 6, and a text file with the scan's pose in the map, 4 x 4
+    /// numbers row by row; may be given several times
+    #[arg(long = "pair", num_args = 3, value_names = ["MAP", "SCAN", "POSE"])]
+    pair_files: Vec<PathBuf>,
 }
 
 impl Voxels {
@@ -35,6 +39,7 @@ impl Voxels {
             scans: self.scans,
             bags: self.bags,
             pairs: self.pairs,
+            pair_files: self.pair_files.as_chunks().0.to_vec(),
         };
         make(&self.report, |progress| run(&options, progress))
     }

@@ -17,8 +17,9 @@ mod theory;
 use crate::report::{Report, Section};
 use crate::{AnyError, at};
 use lattice_core::lattice::{Lattice, LatticeIndex, LatticeKind};
+use std::borrow::Cow;
 use std::fs;
-use std::path::PathBuf;
+use std::path::{Path, PathBuf};
 
 /// Options of the report.
 #[derive(Clone, Debug)]
@@ -33,6 +34,8 @@ pub struct Options {
     pub bags: Vec<PathBuf>,
     /// Folder of pairs of scans, for Fig. 6.
     pub pairs: Option<PathBuf>,
+    /// Further pairs: file of the map's scan, of the scan that is matched, and of its pose in the map.
+    pub pair_files: Vec<[PathBuf; 3]>,
 }
 
 type Make = fn(&Options, &mut dyn FnMut(f64)) -> Result<Section, AnyError>;
@@ -55,6 +58,7 @@ const SECTIONS: [(&str, f64, Make); 10] = [
 pub fn run(options: &Options, progress: &mut dyn FnMut(f64, &str)) -> Result<Report, AnyError> {
     // Before a minute of work.
     let files = options.scans.iter().chain(&options.bags);
+    let files = files.chain(options.pair_files.iter().flatten());
     for path in files.chain(&options.pairs) {
         fs::metadata(path).map_err(at(path))?;
     }
@@ -78,14 +82,19 @@ fn command(options: &Options) -> String {
     if options.quick {
         words.push_str(" --quick");
     }
-    let named = |option: &str, path: &PathBuf| {
-        let name = path.file_name().unwrap_or_default().to_string_lossy();
-        format!(" --{option} {name}")
-    };
+    let named = |option: &str, path: &PathBuf| format!(" --{option} {}", file_name(path));
     words.extend(options.scans.iter().map(|path| named("scan", path)));
     words.extend(options.bags.iter().map(|path| named("bag", path)));
     words.extend(options.pairs.iter().map(|path| named("pairs", path)));
+    for [map, scan, pose] in &options.pair_files {
+        words.push_str(&named("pair", map));
+        words.extend([scan, pose].map(|path| format!(" {}", file_name(path))));
+    }
     words
+}
+
+fn file_name(path: &Path) -> Cow<'_, str> {
+    path.file_name().unwrap_or_default().to_string_lossy()
 }
 
 /// The lattice with cells of 1 m^3.
@@ -114,6 +123,7 @@ mod tests {
             scans: Vec::new(),
             bags: Vec::new(),
             pairs: None,
+            pair_files: Vec::new(),
         };
         // Figs. 5 and 6 take most of the time; their loops have tests of their own.
         let quick = |(name, ..): &&(&str, f64, Make)| !["Fig. 5", "Fig. 6"].contains(name);

@@ -159,6 +159,7 @@ mod tests {
             scans: vec!["/nowhere/scan.ply".into()],
             bags: Vec::new(),
             pairs: None,
+            pair_files: Vec::new(),
         };
         let error = scans(&options).err().unwrap().to_string();
         assert!(error.contains("/nowhere/scan.ply"), "{error}");

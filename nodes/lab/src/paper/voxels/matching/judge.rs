@@ -117,7 +117,8 @@ pub(super) fn checks(rooms: &Group) -> Vec<Check> {
 
 #[cfg(test)]
 mod tests {
-    use super::super::{Estimate, OFFICE, ROOMS, STREET};
+    use super::super::Estimate;
+    use super::super::scenes::{OFFICE, ROOMS, STREET};
     use super::*;
 
     /// A group whose lattices all differ from cubic by so much, with intervals of `half` to either side.

@@ -13,7 +13,7 @@ use crate::report::{Cell, Figure, Section, Table};
 use compare::{Estimate, Quantiles, SHARES, change};
 use judge::{ELSEWHERE, checks, finding, verdict};
 use lattice_core::lattice::LatticeKind;
-use scenes::{OFFICE, ROOMS, STREET, Scene, Source, scenes};
+use scenes::{Scene, Source, scenes};
 use trials::Trials;
 
 /// Trials of a scene, and of a quick run.
@@ -38,7 +38,7 @@ struct Played {
 
 pub fn section(options: &Options, progress: &mut dyn FnMut(f64)) -> Result<Section, AnyError> {
     let pick = |(full, quick): (usize, usize)| if options.quick { quick } else { full };
-    let (sources, scenes) = scenes(options.seed, options.pairs.as_deref())?;
+    let (sources, scenes) = scenes(options.seed, options.pairs.as_deref(), &options.pair_files)?;
     let all = scenes.len() as f64;
     let mut played = Vec::new();
     for (number, scene) in scenes.into_iter().enumerate() {
@@ -53,11 +53,12 @@ pub fn section(options: &Options, progress: &mut dyn FnMut(f64)) -> Result<Secti
             quantiles,
         });
     }
-    let group = |place| {
-        let members = played.iter().filter(|p| p.scene.place == place);
-        Some((place, Group::of(&members.collect::<Vec<_>>())?))
-    };
-    let groups = [ROOMS, STREET, OFFICE].into_iter().filter_map(group);
+    // Scenes of a place follow each other.
+    let places = played.chunk_by(|a, b| a.scene.place == b.scene.place);
+    let groups = places.filter_map(|members| {
+        let place = members.first()?.scene.place.as_str();
+        Some((place, Group::of(&members.iter().collect::<Vec<_>>())?))
+    });
     let groups: Vec<(&str, Group)> = groups.collect();
     let (_, rooms) = groups.first().ok_or("there are no rooms")?;
     let doubt_m = sources.iter().find_map(Source::doubt_m);
@@ -161,7 +162,13 @@ fn errors_table(played: &[Played]) -> Table {
             let [side, start] = [(scene.side_m, 2), (scene.start_m, 1)];
             let [side, start] = [side, start].map(|(value, digits)| Cell::Number(value, digits));
             let kind = title(kind).into();
-            let mut row = vec![scene.place.into(), side, start, kind, errors_m.len().into()];
+            let mut row = vec![
+                scene.place.clone().into(),
+                side,
+                start,
+                kind,
+                errors_m.len().into(),
+            ];
             for share in 0..SHARES.len() {
                 let Estimate { value, low, high } = quantiles.estimate(share, lattice);
                 row.push(Cell::Number(value, 4));

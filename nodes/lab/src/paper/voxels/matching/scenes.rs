@@ -11,7 +11,7 @@ use lattice_core::registration::{
 };
 use lattice_nodes::files::points::{PointFileLimits, read_points};
 use nalgebra::{Isometry3, Matrix3, Rotation3, Translation3, UnitQuaternion, Vector3};
-use std::path::Path;
+use std::path::{Path, PathBuf};
 
 /// Pairs of stands all over the house.
 const STANDS: usize = 12;
@@ -75,7 +75,7 @@ impl Source {
 /// One panel of the figure.
 pub(super) struct Scene {
     /// "simulated rooms".
-    pub(super) place: &'static str,
+    pub(super) place: String,
     /// Number of the source.
     pub(super) source: usize,
     /// Side of a cube of the finest cell's volume, metres.
@@ -104,27 +104,50 @@ pub(super) const STREET: &str = "street (small_gicp)";
 /// The pair of the Point Cloud Library.
 pub(super) const OFFICE: &str = "room (PCL)";
 
-/// All scenes, and what they are made of.
+/// All scenes, and what they are made of; `files` are of a map, a scan and its pose in the map.
 pub(super) fn scenes(
     seed: u64,
     pairs: Option<&Path>,
+    files: &[[PathBuf; 3]],
 ) -> Result<(Vec<Source>, Vec<Scene>), AnyError> {
     let house = House::generated(seed)?;
     let views = LaserView::pairs(&house, STANDS, seed)?;
     let mut sources = vec![Source::Simulated(views)];
     let mut scenes = Vec::new();
-    let mut add = |place, source, cases: &[(f64, f64)]| {
+    let mut add = |place: &str, source, cases: &[(f64, f64)]| {
         scenes.extend(cases.iter().map(|&(side_m, start_m)| Scene {
-            place,
+            place: place.to_owned(),
             source,
             side_m,
             start_m,
         }));
     };
     add(ROOMS, 0, &[(0.1, 0.2), (0.2, 0.3), (0.2, 0.6)]);
+    for [map, scan, truth] in files {
+        let scans = [points(map)?, points(scan)?];
+        let side_m = side_of(&scans[0]).ok_or_else(|| format!("{}: no points", map.display()))?;
+        let cases = [side_m, side_m / 2.0].map(|side_m| (side_m, 2.0 * side_m));
+        let name = |path: &Path| {
+            path.file_name()
+                .unwrap_or_default()
+                .to_string_lossy()
+                .into_owned()
+        };
+        add(
+            &format!("{} on {}", name(scan), name(map)),
+            sources.len(),
+            &cases,
+        );
+        sources.push(Source::Files {
+            scans,
+            map_from_scan: pose(truth)?,
+            doubt_m: None,
+        });
+    }
     let Some(folder) = pairs else {
         return Ok((sources, scenes));
     };
+    let given = sources.len();
     let both = |names: [&str; 2]| -> Result<[Vec<[f32; 3]>; 2], AnyError> {
         let [map, scan] = names.map(|name| points(&folder.join(name)));
         Ok([map?, scan?])
@@ -151,12 +174,35 @@ pub(super) fn scenes(
             doubt_m: Some(apart.norm()),
         });
     }
-    if sources.len() == 1 {
+    if sources.len() == given {
         let words =
             "has neither small_gicp/T_target_source.txt nor room_scan1.pcd and room_scan2.pcd";
         return Err(format!("{}: {words}", folder.display()).into());
     }
     Ok((sources, scenes))
+}
+
+/// Side of cells for a scan: a four hundredth of the diagonal of its box, of the sides 1, 2, 5, 10 and so on cm
+/// the nearest.
+fn side_of(points_m: &[[f32; 3]]) -> Option<f64> {
+    let bounds = |axis: usize| {
+        let along = points_m.iter().map(move |p| f64::from(p[axis]));
+        let low = along.clone().fold(f64::INFINITY, f64::min);
+        along.fold(f64::NEG_INFINITY, f64::max) - low
+    };
+    let diagonal_m = [0, 1, 2]
+        .map(bounds)
+        .iter()
+        .map(|d| d * d)
+        .sum::<f64>()
+        .sqrt();
+    let wanted_m = diagonal_m / 400.0;
+    let sides_m = (-2..=2).flat_map(|power| [1.0, 2.0, 5.0].map(|d| d * 10_f64.powi(power)));
+    let off = |side_m: &f64| (side_m / wanted_m).ln().abs();
+    let is_finite = wanted_m.is_finite() && wanted_m > 0.0;
+    sides_m
+        .min_by(|a, b| off(a).total_cmp(&off(b)))
+        .filter(|_| is_finite)
 }
 
 fn points(path: &Path) -> Result<Vec<[f32; 3]>, AnyError> {
@@ -252,9 +298,35 @@ mod tests {
     #[test]
     fn a_folder_without_pairs_is_refused() {
         let folder = tempfile::tempdir().unwrap();
-        let error = scenes(1, Some(folder.path())).err().unwrap().to_string();
+        let error = scenes(1, Some(folder.path()), &[])
+            .err()
+            .unwrap()
+            .to_string();
         assert!(error.contains("room_scan1.pcd"), "{error}");
-        let (sources, scenes) = scenes(1, None).unwrap();
+        let (sources, scenes) = scenes(1, None, &[]).unwrap();
         assert_eq!((sources.len(), scenes.len()), (1, 3));
+    }
+
+    #[test]
+    fn a_pair_of_files_is_a_place_with_cells_of_its_size() {
+        let folder = tempfile::tempdir().unwrap();
+        let path = |name: &str| folder.path().join(name);
+        let points = "0 0 0\n60 0 0\n60 70 3\n";
+        for name in ["map.xyz", "scan.xyz"] {
+            std::fs::write(path(name), points).unwrap();
+        }
+        std::fs::write(path("pose.txt"), "1 0 0 2\n0 1 0 0\n0 0 1 0\n0 0 0 1\n").unwrap();
+        let files = [["map.xyz", "scan.xyz", "pose.txt"].map(path)];
+        let (sources, scenes) = scenes(1, None, &files).unwrap();
+        assert_eq!((sources.len(), scenes.len()), (2, 5));
+        let last = scenes.last().unwrap();
+        assert_eq!(
+            last.title(),
+            "scan.xyz on map.xyz, 0.1 m cells, start ±0.2 m"
+        );
+        let pair = sources[1].pair(1, 0, 0).unwrap();
+        assert_eq!(pair.map_from_scan.translation.x, 2.0);
+        assert_eq!(side_of(&[]), None);
+        assert_eq!(side_of(&[[1.0; 3]]), None);
     }
 }

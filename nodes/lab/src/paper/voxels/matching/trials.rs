@@ -121,7 +121,7 @@ mod tests {
 
     #[test]
     fn trials_come_closer_and_do_not_depend_on_threads() {
-        let (sources, scenes) = scenes(2, None).unwrap();
+        let (sources, scenes) = scenes(2, None, &[]).unwrap();
         let scene = &scenes[1];
         let on = |threads: usize| {
             let go = || run(scene, 1, &sources[0], 2, 6, &mut |_| {}).unwrap();
