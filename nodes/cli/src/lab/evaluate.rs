@@ -1,7 +1,7 @@
 //! `lattice evaluate`: calibration and registration, measured.
 
 use super::evaluate_kitti::Kitti;
-use super::evaluate_traps::Traps;
+use super::evaluate_many::Many;
 use super::{Choice, choice, processors};
 use crate::progress::Progress;
 use crate::{CliResult, init_logging};
@@ -24,7 +24,9 @@ pub enum Evaluate {
     Calibration(Calibration),
     /// Calibrate where no answer may be certain: rooms that look alike from several places, and clouds in wrong
     /// axes, of a wrong scale, leaning, or of another building
-    Traps(Traps),
+    Traps(Many),
+    /// Find lidar scans of a simulated street in each other, 5 to 30 m apart, without a start
+    Town(Many),
     /// Register real labelled laser scans with each method, against the truth of an INS
     Kitti(Kitti),
 }
@@ -107,7 +109,8 @@ impl Evaluate {
         init_logging();
         match self {
             Self::Calibration(command) => command.run(),
-            Self::Traps(command) => command.run(),
+            Self::Traps(command) => command.traps(),
+            Self::Town(command) => command.town(),
             Self::Kitti(command) => command.run(),
         }
     }

@@ -6,7 +6,7 @@ mod bench_transport;
 mod demo;
 mod evaluate;
 mod evaluate_kitti;
-mod evaluate_traps;
+mod evaluate_many;
 mod paper;
 mod simulate;
 

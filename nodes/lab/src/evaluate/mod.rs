@@ -9,6 +9,7 @@ mod figures;
 mod house;
 mod initial_guess;
 pub mod kitti;
+mod many;
 mod methods;
 mod report;
 mod results;
@@ -17,6 +18,7 @@ mod settings;
 mod statistics;
 mod summary;
 mod testbed;
+pub mod town;
 pub mod traps;
 mod trial;
 

@@ -35,6 +35,9 @@ pub struct Trial {
     pub view_m: f64,
     /// Wall time, milliseconds, on one thread but for those that are timed.
     pub wall_ms: f64,
+    /// Share of the cloud's points that the map has too, where that is measured.
+    #[serde(skip_serializing_if = "Option::is_none", default)]
+    pub overlap: Option<f64>,
     #[serde(skip_serializing_if = "Option::is_none", default)]
     pub judged: Option<Judged>,
 }
@@ -91,6 +94,7 @@ impl Trial {
             d_se3_left: rounded(error.d_se3_left),
             view_m: rounded(apart_m.sum::<f64>() / seen_m.len().max(1) as f64),
             wall_ms: rounded(wall_ms),
+            overlap: None,
             judged: None,
         }
     }

@@ -31,6 +31,7 @@ mod spline;
 mod survey;
 #[cfg(test)]
 mod tests;
+pub mod town;
 
 pub use bobcat::{BASE_FROM_IMU_M, Laser};
 pub(crate) use bobcat::{BASE_FROM_TURNTABLE_M, Bobcat, TURNTABLE_PERIOD_NS, base_from_imu};

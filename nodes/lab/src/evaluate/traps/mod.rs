@@ -6,18 +6,15 @@ mod scenes;
 
 pub use report::traps_report;
 
-use std::sync::mpsc;
-
 use lattice_core::registration::{CalibrationMap, CalibrationRequest, calibrate};
 use nalgebra::Isometry3;
-use rayon::prelude::*;
 
-use super::results::name;
+use super::many::run_many;
 use super::settings::{Cell, Settings};
 use super::trial::{OURS, Trial};
 use super::{Results, Start};
+use crate::AnyError;
 use crate::random::Stream;
-use crate::{AnyError, pool};
 use scenes::{Fault, SHAPES, of_fault, of_shape};
 
 /// Side of the cells of the maps, metres.
@@ -137,31 +134,11 @@ pub fn run(
     threads: usize,
     progress: &mut dyn FnMut(usize, usize),
 ) -> Result<(), AnyError> {
-    let done = results.done();
     let traps = Trap::all();
     // Seed by seed, so that what is done first covers all traps.
-    let all = (0..seeds).flat_map(|seed| traps.iter().map(move |trap| (*trap, seed)));
-    let left: Vec<(Trap, u64)> = all
-        .filter(|(trap, seed)| !done.contains(&name(&cell(*trap, *seed), OURS)))
-        .collect();
-    let pool = pool(threads)?;
-    let (sender, receiver) = mpsc::channel();
-    std::thread::scope(|scope| {
-        let left = &left;
-        scope.spawn(move || {
-            pool.install(|| {
-                left.par_iter().with_max_len(1).for_each(|(trap, seed)| {
-                    // The receiver is gone only after an error.
-                    let _ = sender.send(trap.run(*seed));
-                });
-            });
-        });
-        for (i, trial) in receiver.into_iter().enumerate() {
-            results.add(trial?)?;
-            progress(i + 1, left.len());
-        }
-        Ok(())
-    })
+    let all = (0..seeds).flat_map(|seed| traps.iter().map(move |trap| (cell(*trap, seed), *trap)));
+    let run = |cell: &Cell, trap: &Trap| trap.run(cell.seed);
+    run_many(all.collect(), run, results, threads, progress)
 }
 
 #[cfg(test)]

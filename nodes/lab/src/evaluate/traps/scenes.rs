@@ -139,11 +139,8 @@ const LOOKS: [([f64; 3], f64); 3] = [
 pub(super) fn of_fault(fault: Fault, seed: u64, random: &mut Stream) -> Scene {
     let flat = Flat::default();
     let truth = any_pose(random);
-    let looks = LOOKS.into_iter().cycle();
-    let (place, yaw) = looks
-        .skip((seed % LOOKS.len() as u64) as usize)
-        .next()
-        .unwrap_or_default();
+    let look = LOOKS.get((seed % LOOKS.len() as u64) as usize);
+    let (place, yaw) = look.copied().unwrap_or_default();
     let moved = Vector3::new(signed(random), signed(random), 0.0) * 0.2;
     let eye = Point3::from(place) + moved;
     let yaw = yaw + 0.2 * signed(random);

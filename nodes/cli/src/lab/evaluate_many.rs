@@ -1,0 +1,59 @@
+//! `lattice evaluate traps` and `lattice evaluate town`.
+
+use super::evaluate::Remaining;
+use super::processors;
+use crate::CliResult;
+use clap::Args;
+use lattice_lab::evaluate::{Results, Settings, town, traps};
+use lattice_lab::{AnyError, Report, markdown, write_report};
+use std::path::PathBuf;
+
+/// Options of evaluations that consist of many trials of one method.
+#[derive(Args)]
+pub struct Many {
+    /// Folder of the results and the report; a run that was ended goes on where it was
+    #[arg(long)]
+    out: PathBuf,
+    /// Seeds: trials of each kind
+    #[arg(long, default_value_t = 30)]
+    seeds: u64,
+    /// Threads [default: as many as processors]
+    #[arg(long)]
+    threads: Option<usize>,
+}
+
+impl Many {
+    /// Runs `lattice evaluate traps`.
+    pub fn traps(self) -> CliResult {
+        let results = self.measure(&traps::settings(), traps::run)?;
+        self.show(&traps::traps_report(&results.sorted()))
+    }
+
+    /// Runs `lattice evaluate town`.
+    pub fn town(self) -> CliResult {
+        let results = self.measure(&town::settings(), town::run)?;
+        self.show(&town::town_report(&results.sorted()))
+    }
+
+    fn measure(
+        &self,
+        settings: &Settings,
+        run: impl Fn(u64, &mut Results, usize, &mut dyn FnMut(usize, usize)) -> Result<(), AnyError>,
+    ) -> Result<Results, AnyError> {
+        let threads = self.threads.unwrap_or_else(processors).clamp(1, 1024);
+        let mut results = Results::open(&self.out, settings)?;
+        let bar = Remaining::new();
+        let mut tell = |done: usize, total: usize| bar.tell(done, total);
+        let ran = run(self.seeds, &mut results, threads, &mut tell);
+        bar.done();
+        ran?;
+        Ok(results)
+    }
+
+    fn show(&self, report: &Report) -> CliResult {
+        write_report(report, &self.out)?;
+        print!("{}", markdown(report));
+        println!("\nwritten to {}", self.out.display());
+        Ok(())
+    }
+}

@@ -1,0 +1,219 @@
+//! Lidar scans of a simulated street, some metres apart, registered without a start.
+
+use lattice_core::registration::{
+    CalibrationMap, CalibrationRequest, HeadsetScan, PreparedCloud, Profile, calibrate,
+    voxel_downsample,
+};
+use nalgebra::{Isometry3, Point3, Vector3};
+
+use super::many::run_many;
+use super::settings::{Cell, Settings};
+use super::trial::{OURS, Trial, WRONG, rounded};
+use super::{Results, Start};
+use crate::AnyError;
+use crate::random::Stream;
+use crate::report::{Cell as Entry, Report, Section, Table};
+use crate::simulate::town::{Lidar, Town};
+
+/// Side of the cells that scans are thinned to, metres.
+const CELL_SIDE_M: f64 = 0.3;
+/// Distance within which the map has a point too, metres.
+const SHARED_M: f64 = 0.5;
+/// Share of points in both by which pairs are told apart.
+const OVERLAP: f64 = 0.3;
+/// Distances of the scans, metres.
+const APART_M: [f64; 4] = [5.0, 10.0, 20.0, 30.0];
+
+/// Two scans of a town.
+#[derive(Clone, Copy, Debug)]
+struct Pair {
+    lidar: (&'static str, Lidar),
+    apart_m: f64,
+    labelled: bool,
+}
+
+const LIDARS: [(&str, Lidar); 2] = [("64 beams", Lidar::HDL64), ("16 beams", Lidar::VLP16)];
+
+impl Pair {
+    fn all() -> Vec<Pair> {
+        let of = |lidar| {
+            let labels = move |apart_m| {
+                [true, false].map(|labelled| Pair {
+                    lidar,
+                    apart_m,
+                    labelled,
+                })
+            };
+            APART_M.into_iter().flat_map(labels)
+        };
+        LIDARS.into_iter().flat_map(of).collect()
+    }
+
+    fn cell(&self, seed: u64) -> Cell {
+        let labels = if self.labelled { "labels" } else { "no labels" };
+        Cell {
+            scene: format!("{}, {} m apart, {labels}", self.lidar.0, self.apart_m),
+            seed,
+            q: 0.0,
+            start: Start::None.to_string(),
+        }
+    }
+
+    fn run(&self, cell: &Cell) -> Result<Trial, AnyError> {
+        let town = Town::new(cell.seed);
+        let random = &mut Stream::numbered(cell.seed, self.apart_m as u64);
+        let x_m = 160.0 * random.uniform() - 100.0;
+        let mut drive = |x_m: f64| {
+            let mut lean = || 0.02 * (random.uniform() - 0.5);
+            let tilt = Vector3::new(lean(), lean(), 0.0);
+            let place = Vector3::new(x_m, 4.0 * random.uniform() - 3.0, 1.73);
+            let back = if random.uniform() < 0.3 {
+                std::f64::consts::PI
+            } else {
+                0.0
+            };
+            let yaw = back + 0.3 * (random.uniform() - 0.5);
+            Isometry3::new(place, Vector3::z() * yaw) * Isometry3::rotation(tilt)
+        };
+        let [first, second] = [x_m, x_m + self.apart_m].map(&mut drive);
+        let truth = first.inverse() * second;
+        let scan = |pose, time| {
+            let mut cloud = town.scan(pose, &self.lidar.1, time);
+            if !self.labelled {
+                cloud.labels.clear();
+            }
+            cloud
+        };
+        let map = voxel_downsample(&scan(&first, 0), CELL_SIDE_M);
+        let map = CalibrationMap::new(map, CELL_SIDE_M)?;
+        let cloud = scan(&second, 1);
+        let thinned = voxel_downsample(&cloud, CELL_SIDE_M).points_m;
+        let overlap = shared(&thinned, map.cloud(), &truth);
+        let request = CalibrationRequest {
+            headset_scans: &[HeadsetScan {
+                cloud,
+                sensor_m: Some(Point3::origin()),
+            }],
+            start: None,
+            confusion: None,
+        };
+        let found = calibrate(&map, &request, &Profile::Lidar.options(), &());
+        let pose = &found.map_from_headset;
+        // Times are taken beside other trials: they would say nothing.
+        let trial = Trial::of_pose(cell, OURS, pose, &truth, &thinned, 0.0);
+        Ok(Trial {
+            overlap: Some(rounded(overlap)),
+            ..trial.with_judgement(&found, &truth)
+        })
+    }
+}
+
+/// Share of points that a cloud has too.
+fn shared(points_m: &[Point3<f64>], map: &PreparedCloud, map_from_points: &Isometry3<f64>) -> f64 {
+    let near = |p: &&Point3<f64>| map.nearest(&(map_from_points * **p), SHARED_M).is_some();
+    points_m.iter().filter(near).count() as f64 / points_m.len().max(1) as f64
+}
+
+/// Settings that results of the town are kept with.
+pub fn settings() -> Settings {
+    Settings {
+        cell_side_m: CELL_SIDE_M,
+        survey_views: 0,
+        map_seeds: 0,
+        ..Settings::default()
+    }
+}
+
+/// Runs the trials of `seeds` towns that the results do not have yet, on `threads` threads.
+///
+/// `progress` hears of trials done, of all.
+pub fn run(
+    seeds: u64,
+    results: &mut Results,
+    threads: usize,
+    progress: &mut dyn FnMut(usize, usize),
+) -> Result<(), AnyError> {
+    let pairs = Pair::all();
+    let all = (0..seeds).flat_map(|seed| pairs.iter().map(move |pair| (pair.cell(seed), *pair)));
+    let run = |cell: &Cell, pair: &Pair| pair.run(cell);
+    run_many(all.collect(), run, results, threads, progress)
+}
+
+/// A table of the pairs by distance, and one by overlap.
+pub fn town_report(trials: &[Trial]) -> Report {
+    let mut scenes: Vec<(String, Vec<&Trial>)> = Vec::new();
+    for trial in trials {
+        match scenes
+            .iter_mut()
+            .find(|(name, _)| *name == trial.cell.scene)
+        {
+            Some((_, all)) => all.push(trial),
+            None => scenes.push((trial.cell.scene.clone(), vec![trial])),
+        }
+    }
+    let of_overlap = |much: bool| {
+        let is = |t: &&Trial| (t.overlap.unwrap_or(0.0) >= OVERLAP) == much;
+        trials.iter().filter(is).collect::<Vec<_>>()
+    };
+    let percent = 100.0 * OVERLAP;
+    scenes.push((format!("all with {percent} % overlap"), of_overlap(true)));
+    scenes.push(("all with less".to_owned(), of_overlap(false)));
+    let rows: Vec<Vec<Entry>> = scenes.iter().map(|(name, of)| line(name, of)).collect();
+    let columns = "pairs|trials|OK and right|OK and wrong|refused, right|refused, wrong|median overlap|median NEES of OK";
+    let title = "Lidar scans of a simulated street, without a start";
+    let lead = format!(
+        "Scans thinned to cells of {CELL_SIDE_M} m; right is within {} m and {} degrees; overlap is the share of points with \
+         one of the other scan within {SHARED_M} m.",
+        WRONG.m, WRONG.deg
+    );
+    let section = Section {
+        tables: vec![Table::new("town", title, columns, rows)],
+        ..Section::measured("town", title, "")
+    };
+    Report::new(
+        title,
+        lead,
+        "lattice evaluate town".to_owned(),
+        vec![section],
+    )
+}
+
+fn line(name: &str, trials: &[&Trial]) -> Vec<Entry> {
+    let count = |accepted: bool, right: bool| {
+        let is = |t: &&&Trial| t.is_accepted() == accepted && t.is_within(WRONG) == right;
+        let n = trials.iter().filter(is).count();
+        let percent = 100.0 * n as f64 / trials.len().max(1) as f64;
+        format!("{n}, {percent:.0} %")
+    };
+    let nees = trials.iter().filter(|t| t.is_accepted());
+    let nees = nees.filter_map(|t| t.judged.as_ref()?.nees);
+    vec![
+        name.into(),
+        trials.len().into(),
+        count(true, true).into(),
+        count(true, false).into(),
+        count(false, true).into(),
+        count(false, false).into(),
+        Entry::number(super::median(trials.iter().filter_map(|t| t.overlap)), 2),
+        Entry::number(super::median(nees), 1),
+    ]
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn a_near_pair_is_found_and_told_as_right() {
+        let pair = Pair {
+            lidar: LIDARS[0],
+            apart_m: 5.0,
+            labelled: true,
+        };
+        let trial = pair.run(&pair.cell(0)).unwrap();
+        assert!(trial.is_within(WRONG), "{trial:?}");
+        assert!(trial.overlap.unwrap() > OVERLAP);
+        let report = crate::report::markdown(&town_report(&[trial]));
+        assert!(report.contains("all with 30 % overlap | 1 |"), "{report}");
+    }
+}
