@@ -192,6 +192,9 @@ def run(scenario):
         and camera.value("lattice_mapper: map", "voxels") == str(camera.centers.width),
         lambda: f"{points} points: {camera.tasks}, {camera.centers and camera.centers.width}",
     )
+    # Diagnostics come twice a second.
+    refused = lambda: camera.value("semantic_cloud: clouds", "last_refused")
+    camera.peer.until(refused, lambda: f"nothing refused: {camera.tasks}")
     return {
         "clouds": len(camera.clouds),
         "expected": len(expected),
@@ -201,7 +204,7 @@ def run(scenario):
         "names": camera.names,
         "frame": camera.clouds[stamp(0)].header.frame_id,
         "centers": centers(camera.centers),
-        "refused": camera.value("semantic_cloud: clouds", "last_refused"),
+        "refused": refused(),
     }
 
 
