@@ -1,6 +1,7 @@
 //! `lattice simulate`: logs and point files of simulated machines.
 
 mod house;
+mod town;
 
 use super::{Choice, choice, show};
 use crate::progress::Progress;
@@ -22,6 +23,8 @@ pub enum Simulate {
     Site(Site),
     /// A furnished house: a robot's labelled map, what a headset sees of four scenes, and the truth
     House(house::House),
+    /// A street of a town as two lidar scans see it at different times, and the truth
+    Town(town::Town),
 }
 
 /// Values of `--storage`.
@@ -95,6 +98,7 @@ impl Simulate {
             Self::Bobcat(command) => command.run(),
             Self::Site(command) => command.run(),
             Self::House(command) => command.run(),
+            Self::Town(command) => command.run(),
         }
     }
 }

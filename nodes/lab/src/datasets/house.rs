@@ -14,7 +14,7 @@ use serde::{Deserialize, Serialize};
 use std::collections::BTreeMap;
 use std::fmt;
 use std::fs;
-use std::path::PathBuf;
+use std::path::{Path, PathBuf};
 
 /// Name of the robot's map in the folder.
 pub const MAP_FILE: &str = "map.lattice";
@@ -182,8 +182,16 @@ pub fn write_house(
 }
 
 fn place(options: &HouseOptions, name: &str) -> Result<PathBuf, AnyError> {
-    let path = options.out.join(name);
-    if path.exists() && !options.overwrite {
+    free_place(&options.out, name, options.overwrite)
+}
+
+/// Place of a file in a folder.
+///
+/// # Errors
+/// If there is one already that is not to be replaced.
+pub(super) fn free_place(folder: &Path, name: &str, overwrite: bool) -> Result<PathBuf, AnyError> {
+    let path = folder.join(name);
+    if path.exists() && !overwrite {
         let words = "there is a file already; choose another folder or allow to overwrite";
         return Err(at(&path)(words));
     }

@@ -27,6 +27,7 @@ mod facts;
 mod house;
 mod log;
 mod messages;
+mod town;
 mod truth;
 mod write;
 
@@ -38,4 +39,5 @@ pub use facts::{
 pub use house::{
     CLASSES_FILE, HeadsetAxes, HouseOptions, HouseSummary, MAP_FILE, SceneTruth, write_house,
 };
+pub use town::{TownOptions, TownSummary, write_town};
 pub use write::{BobcatOptions, BobcatSummary, write_bobcat};

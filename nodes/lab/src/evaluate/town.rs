@@ -4,16 +4,15 @@ use lattice_core::registration::{
     CalibrationMap, CalibrationRequest, HeadsetScan, PreparedCloud, Profile, calibrate,
     voxel_downsample,
 };
-use nalgebra::{Isometry3, Point3, Vector3};
+use nalgebra::{Isometry3, Point3};
 
 use super::many::run_many;
 use super::settings::{Cell, Settings};
 use super::trial::{OURS, Trial, WRONG, rounded};
 use super::{Results, Start};
 use crate::AnyError;
-use crate::random::Stream;
 use crate::report::{Cell as Entry, Report, Section, Table};
-use crate::simulate::town::{Lidar, Town};
+use crate::simulate::town::{Lidar, Town, drive};
 
 /// Side of the cells that scans are thinned to, metres.
 const CELL_SIDE_M: f64 = 0.3;
@@ -61,21 +60,7 @@ impl Pair {
 
     fn run(&self, cell: &Cell) -> Result<Trial, AnyError> {
         let town = Town::new(cell.seed);
-        let random = &mut Stream::numbered(cell.seed, self.apart_m as u64);
-        let x_m = 160.0 * random.uniform() - 100.0;
-        let mut drive = |x_m: f64| {
-            let mut lean = || 0.02 * (random.uniform() - 0.5);
-            let tilt = Vector3::new(lean(), lean(), 0.0);
-            let place = Vector3::new(x_m, 4.0 * random.uniform() - 3.0, 1.73);
-            let back = if random.uniform() < 0.3 {
-                std::f64::consts::PI
-            } else {
-                0.0
-            };
-            let yaw = back + 0.3 * (random.uniform() - 0.5);
-            Isometry3::new(place, Vector3::z() * yaw) * Isometry3::rotation(tilt)
-        };
-        let [first, second] = [x_m, x_m + self.apart_m].map(&mut drive);
+        let [first, second] = drive(cell.seed, self.apart_m);
         let truth = first.inverse() * second;
         let scan = |pose, time| {
             let mut cloud = town.scan(pose, &self.lidar.1, time);

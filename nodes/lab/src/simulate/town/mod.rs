@@ -20,6 +20,16 @@ const CAR: u16 = 4;
 const VEGETATION: u16 = 5;
 const POLE: u16 = 6;
 
+/// Names of the classes of points.
+pub const CLASSES: [(u16, &str); 6] = [
+    (ROAD, "road"),
+    (SIDEWALK, "sidewalk"),
+    (BUILDING, "building"),
+    (CAR, "car"),
+    (VEGETATION, "vegetation"),
+    (POLE, "pole"),
+];
+
 /// Length of the street on either side of its middle, metres.
 const HALF_M: f64 = 150.0;
 /// Half the width of the road, and height of the kerb, metres.
@@ -65,6 +75,23 @@ impl Lidar {
         range_m: 80.0,
         noise_m: 0.02,
     };
+}
+
+/// Poses of a sensor on the road, `apart_m` along it, in the town: it leans by up to a degree and may look the other way.
+pub fn drive(seed: u64, apart_m: f64) -> [Isometry3<f64>; 2] {
+    let random = &mut Stream::numbered(seed, apart_m as u64);
+    let first_m = 160.0 * random.uniform() - 100.0;
+    [first_m, first_m + apart_m].map(|x_m| {
+        let mut lean = || 0.02 * (random.uniform() - 0.5);
+        let tilt = Vector3::new(lean(), lean(), 0.0);
+        let place = Vector3::new(x_m, 4.0 * random.uniform() - 3.0, 1.73);
+        let back = match random.uniform() < 0.3 {
+            true => std::f64::consts::PI,
+            false => 0.0,
+        };
+        let yaw = back + 0.3 * (random.uniform() - 0.5);
+        Isometry3::new(place, Vector3::z() * yaw) * Isometry3::rotation(tilt)
+    })
 }
 
 /// A town at two times.
