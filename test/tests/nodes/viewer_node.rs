@@ -16,13 +16,17 @@ fn threads(name: &str) -> usize {
     names.filter(|found| found.starts_with(name)).count()
 }
 
-/// Waits until there are no such threads; they end by themselves.
-fn assert_they_end(name: &str) {
+/// Waits until a number of such threads holds; they take their names, and end, by themselves.
+fn until_threads(name: &str, holds: impl Fn(usize) -> bool) {
     let late = Instant::now() + Duration::from_secs(20);
-    while threads(name) > 0 {
+    while !holds(threads(name)) {
         assert!(Instant::now() < late, "{} threads of {name}", threads(name));
         std::thread::yield_now();
     }
+}
+
+fn assert_they_end(name: &str) {
+    until_threads(name, |n| n == 0);
 }
 
 fn runtime(domain: &TestDomain, arguments: &[&str]) -> Runtime {
@@ -49,7 +53,7 @@ fn a_viewer_whose_port_is_taken_leaves_no_thread() {
     assert_they_end("taken");
     drop(taken);
     let finish = viewer_server::node::start(&runtime, "taken").unwrap();
-    assert!(threads("taken") > 0);
+    until_threads("taken", |n| n > 0);
     finish();
     assert_they_end("taken");
 }
