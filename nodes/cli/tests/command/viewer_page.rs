@@ -92,7 +92,8 @@ const LOOK: &str = r#"(async () => {
   };
 })()"#;
 
-const COMPLETE: &str = "lattice.state.open && lattice.state.complete";
+/// All is there, and no longer grey as before the first word of the server.
+const COMPLETE: &str = "lattice.state.open && lattice.state.complete && lattice.cells.stale === 0";
 
 fn open(chromium: &std::path::Path, stage: &Stage) -> Page {
     let mut page = Page::open(chromium, &stage.url);

@@ -142,15 +142,12 @@ pub(super) fn of_fault(fault: Fault, seed: u64, random: &mut Stream) -> Scene {
     let look = LOOKS.get((seed % LOOKS.len() as u64) as usize);
     let (place, yaw) = look.copied().unwrap_or_default();
     let moved = Vector3::new(signed(random), signed(random), 0.0) * 0.2;
-    let eye = Point3::from(place) + moved;
     let yaw = yaw + 0.2 * signed(random);
-    let mut cloud = match fault {
-        Fault::Elsewhere => Flat::room(7.0, 5.0)
-            .with_box([1.0, 0.5], [0.6, 1.4, 0.8])
-            .with_box([-2.0, -1.5], [1.2, 0.5, 1.7])
-            .look(Point3::new(0.0, 0.0, 1.6), yaw, &truth),
-        _ => flat.look(eye, yaw, &truth),
+    let (building, eye) = match fault {
+        Fault::Elsewhere => (elsewhere(), Point3::new(0.0, 0.0, 1.6) + moved),
+        _ => (flat.clone(), Point3::from(place) + moved),
     };
+    let mut cloud = building.look(eye, yaw, &truth);
     let mut map = flat.map();
     if seed % 2 == 1 {
         cloud.labels.clear();
@@ -183,6 +180,13 @@ pub(super) fn of_fault(fault: Fault, seed: u64, random: &mut Stream) -> Scene {
         },
         truth,
     }
+}
+
+/// Another building.
+fn elsewhere() -> Flat {
+    Flat::room(7.0, 5.0)
+        .with_box([1.0, 0.5], [0.6, 1.4, 0.8])
+        .with_box([-2.0, -1.5], [1.2, 0.5, 1.7])
 }
 
 fn any_pose(random: &mut Stream) -> Isometry3<f64> {
