@@ -2,7 +2,7 @@
 
 import { by, element } from "./panel.js";
 
-// Asks with fields; gives their values, or null for no. Escape is no, and so is what the focus begins with.
+// Asks with fields; gives their values, or null for no, which Escape and the first focus are.
 export function askFirst({ title, text, action, fields = [] }) {
   const box = by("ask");
   const inputs = fields.map(({ label, ...properties }) => {
@@ -16,14 +16,14 @@ export function askFirst({ title, text, action, fields = [] }) {
   const form = element("form", {}, heading, element("p", { textContent: text }), ...inputs, element("div", { className: "row" }, no, yes));
   box.replaceChildren(form);
   return new Promise((resolve) => {
-    let values = null;
-    no.addEventListener("click", () => box.close());
+    const end = (values) => (resolve(values), box.close());
+    no.addEventListener("click", () => end(null));
     form.addEventListener("submit", (event) => {
       event.preventDefault();
-      values = inputs.map((label) => (label.lastChild.type === "number" ? label.lastChild.valueAsNumber : label.lastChild.value));
-      box.close();
+      end(inputs.map(({ lastChild: of }) => (of.type === "number" ? of.valueAsNumber : of.value)));
     });
-    box.onclose = () => resolve(values);
+    // Not of an earlier one.
+    box.onclose = () => box.open || resolve(null);
     box.showModal();
   });
 }

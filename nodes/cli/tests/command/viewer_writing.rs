@@ -147,10 +147,14 @@ fn clear_a_box(page: &mut Page) -> (u64, u64) {
     let before = page.value("lattice.state.size").as_u64().unwrap();
     page.value("document.getElementById('clear').click()");
     assert_eq!(page.value("document.getElementById('ask').open"), true);
-    // No is no.
-    page.value("document.querySelector('#ask [type=button]').click()");
-    page.wait_for("!document.getElementById('ask').open");
-    page.value("document.getElementById('clear').click()");
+    // No is no, and what the browser still tells of that dialog answers no later one.
+    let closed = page.value(
+        "(() => { document.querySelector('#ask [type=button]').click(); \
+         const closed = !document.getElementById('ask').open; \
+         document.getElementById('clear').click(); return closed; })()",
+    );
+    assert_eq!(closed, true);
+    assert_eq!(page.value("document.getElementById('ask').open"), true);
     for (end, plane, height) in [("from", -20.0, -200.0), ("to", BOX_END_M, 200.0)] {
         for (axis, value) in [("x", plane), ("y", plane), ("z", height)] {
             page.value(&format!(
