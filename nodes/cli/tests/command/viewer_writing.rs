@@ -154,6 +154,8 @@ fn clear_a_box(page: &mut Page) -> (u64, u64) {
          document.getElementById('clear').click(); return closed; })()",
     );
     assert_eq!(closed, true);
+    // Chromium tells of it at the next frame.
+    page.value("new Promise((done) => requestAnimationFrame(() => requestAnimationFrame(done)))");
     assert_eq!(page.value("document.getElementById('ask').open"), true);
     for (end, plane, height) in [("from", -20.0, -200.0), ("to", BOX_END_M, 200.0)] {
         for (axis, value) in [("x", plane), ("y", plane), ("z", height)] {
