@@ -129,21 +129,12 @@ impl SemanticCloud {
     /// Takes the calibration of the camera. One that cannot be used leaves the node without.
     pub fn on_camera_info(&mut self, info: Arc<CameraInfo>) -> Vec<CloudOutput> {
         let is_known = self.info.as_ref().is_some_and(|old| {
-            (&old.k, &old.p, &old.d) == (&info.k, &info.p, &info.d)
-                && old.distortion_model == info.distortion_model
-                && (
-                    old.width,
-                    old.height,
-                    old.binning_x,
-                    old.binning_y,
-                    &old.roi,
-                ) == (
-                    info.width,
-                    info.height,
-                    info.binning_x,
-                    info.binning_y,
-                    &info.roi,
-                )
+            let header = info.header.clone();
+            *info
+                == CameraInfo {
+                    header,
+                    ..CameraInfo::clone(old)
+                }
         });
         if is_known && self.camera.is_some() {
             return Vec::new();

@@ -6,7 +6,7 @@ use lattice_core::registration::{
     Calibration, CalibrationMap, CalibrationOptions, CalibrationRequest, HeadsetScan,
     LabelDistribution, Progress, SemanticCloud, Stage, Verdict, calibrate, track,
 };
-use lattice_test::flat::Flat;
+use lattice_lab::simulate::rooms::{Flat, LOOKS};
 use lattice_test::random::Random;
 use nalgebra::{Isometry3, Point3, Translation3, UnitQuaternion, Vector3};
 
@@ -51,16 +51,6 @@ fn ask(
     };
     calibrate(map, &request, &CalibrationOptions::default(), &())
 }
-
-/// Places to look from, and headings.
-const LOOKS: [([f64; 3], f64); 6] = [
-    ([3.5, 3.8, 1.6], -2.2),
-    ([1.0, 3.9, 1.6], -0.6),
-    ([7.5, 3.0, 1.6], 2.2),
-    ([6.5, 3.0, 1.6], -0.4),
-    ([4.2, 4.3, 1.6], 3.0),
-    ([3.5, 3.0, 1.6], 1.6),
-];
 
 #[test]
 fn every_place_is_found_without_a_start() {

@@ -5,15 +5,8 @@ use lattice_core::registration::{
     Calibration, CalibrationMap, CalibrationOptions, CalibrationRequest, HeadsetScan, Verdict,
     calibrate,
 };
-use lattice_test::flat::Flat;
+use lattice_lab::simulate::rooms::{Flat, LOOKS};
 use nalgebra::{Isometry3, Point3, Vector3};
-
-/// Place and heading of a look.
-const LOOKS: [([f64; 3], f64); 3] = [
-    ([3.5, 3.8, 1.6], -2.2),
-    ([1.0, 3.9, 1.6], -0.6),
-    ([7.5, 3.0, 1.6], 2.2),
-];
 
 struct Scene {
     map: CalibrationMap,

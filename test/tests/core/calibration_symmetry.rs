@@ -3,7 +3,7 @@
 use lattice_core::registration::{
     Calibration, CalibrationMap, CalibrationOptions, CalibrationRequest, Verdict, calibrate,
 };
-use lattice_test::flat::Flat;
+use lattice_lab::simulate::rooms::Flat;
 use lattice_test::random::Random;
 use nalgebra::{Isometry3, Vector3};
 

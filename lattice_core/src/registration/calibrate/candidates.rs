@@ -14,7 +14,7 @@ use super::types::CalibrationOptions;
 
 /// Steps of a first look, and those of them after which only the best go on.
 pub(super) const FEW_STEPS: usize = 7;
-pub(super) const GLIMPSE_STEPS: usize = 3;
+const GLIMPSE_STEPS: usize = 3;
 /// Hypotheses that get all steps of a first look.
 const FIRST_LOOK: usize = 64;
 /// Hypotheses that are refined with more points after a first look.
@@ -94,22 +94,35 @@ impl<'a> Workbench<'a> {
     /// The hypotheses that stand a first look, refined with a few points, the best first and all
     /// different.
     pub fn first_look(&self, hypotheses: &[Hypothesis]) -> Vec<Candidate> {
-        let refined = |pose: &Isometry3<f64>, steps: usize| {
-            let pose = self.refine_few(&self.input.few, pose, steps);
-            self.judge(&self.few, pose, "search")
-        };
-        let by_likelihood = |a: &Candidate, b: &Candidate| b.total().total_cmp(&a.total());
-        let glimpsed = hypotheses.par_iter();
-        let mut glimpsed: Vec<Candidate> = glimpsed
-            .map(|hypothesis| refined(&hypothesis.target_from_source, GLIMPSE_STEPS))
-            .collect();
-        glimpsed.sort_by(by_likelihood);
-        glimpsed.truncate(FIRST_LOOK);
-        let mut found: Vec<Candidate> = (glimpsed.par_iter())
-            .map(|glimpsed| refined(&glimpsed.map_from_headset, FEW_STEPS - GLIMPSE_STEPS))
-            .collect();
-        found.sort_by(by_likelihood);
+        let found = self.refine_best(&self.input.few, hypotheses, FIRST_LOOK, |pose| {
+            let candidate = self.judge(&self.few, pose, "search");
+            (candidate.total(), candidate)
+        });
+        let found = found.into_iter().map(|(_, candidate)| candidate).collect();
         self.different(found, SECOND_LOOK)
+    }
+
+    /// Poses that the best `kept` hypotheses lead to, with their likelihoods, the best first: all of them are
+    /// refined by a few steps, and the best go on.
+    pub fn refine_best<T: Send>(
+        &self,
+        few: &PreparedCloud,
+        hypotheses: &[Hypothesis],
+        kept: usize,
+        judge: impl Fn(Isometry3<f64>) -> (f64, T) + Sync,
+    ) -> Vec<(f64, T)> {
+        let glimpsed = hypotheses.par_iter().map(|hypothesis| {
+            let pose = self.refine_few(few, &hypothesis.target_from_source, GLIMPSE_STEPS);
+            (judge(pose).0, pose)
+        });
+        let mut glimpsed: Vec<(f64, Isometry3<f64>)> = glimpsed.collect();
+        glimpsed.sort_by(|a, b| b.0.total_cmp(&a.0));
+        let best = glimpsed.par_iter().take(kept);
+        let refined =
+            best.map(|(_, pose)| judge(self.refine_few(few, pose, FEW_STEPS - GLIMPSE_STEPS)));
+        let mut refined: Vec<(f64, T)> = refined.collect();
+        refined.sort_by(|a, b| b.0.total_cmp(&a.0));
+        refined
     }
 
     /// The same candidates after some steps with more points, judged by all of them, the best first.

@@ -1,12 +1,12 @@
 //! Readings of a cloud's axes: those under which it would fit tell how it was misread.
 
-use nalgebra::{Isometry3, Matrix3, Vector3};
+use nalgebra::{Matrix3, Vector3};
 use rayon::prelude::*;
 
 use super::super::likelihood::Fit;
 use super::super::search::{Region, SearchSource, search};
 use super::super::{PrepareOptions, PreparedCloud, SemanticCloud};
-use super::candidates::{Candidate, FEW_STEPS, GLIMPSE_STEPS, Workbench};
+use super::candidates::{Candidate, Workbench};
 use crate::pose::Axes;
 
 /// Hypotheses of a search with other axes.
@@ -169,19 +169,11 @@ impl Mended {
         let hypotheses = search(&bench.map.surfaces, &self.source, region, MISREAD);
         let scale = bench.map.scale(bench.options.noise_m).coarser(2.0);
         let fit = Fit::new(&self.cloud, &bench.map.cloud, scale);
-        let refined = |pose: &Isometry3<f64>, steps: usize| {
-            let pose = bench.refine_few(&self.cloud, pose, steps);
+        let found = bench.refine_best(&self.cloud, &hypotheses, FIRST_LOOK, |pose| {
             let partners = fit.partners(&pose);
             let (likelihood, _) = fit.likelihood(&partners, &bench.known, bench.options.agreement);
-            (likelihood.total(), pose)
-        };
-        let glimpsed = hypotheses.par_iter();
-        let mut glimpsed: Vec<(f64, Isometry3<f64>)> = glimpsed
-            .map(|hypothesis| refined(&hypothesis.target_from_source, GLIMPSE_STEPS))
-            .collect();
-        glimpsed.sort_by(|a, b| b.0.total_cmp(&a.0));
-        let looked_at = glimpsed.par_iter().take(FIRST_LOOK);
-        let likelihoods = looked_at.map(|(_, pose)| refined(pose, FEW_STEPS - GLIMPSE_STEPS).0);
-        likelihoods.max_by(f64::total_cmp)
+            (likelihood.total(), ())
+        });
+        found.first().map(|(likelihood, ())| *likelihood)
     }
 }

@@ -20,7 +20,7 @@ const TWIN_YAW_RAD: f64 = 0.06;
 const TWIN_PLACES: usize = 6;
 /// Farther than any map reaches.
 const ANYWHERE_M: f64 = 1e6;
-/// Log-likelihood of an observation by which a rival is beyond reach: refining it wins a fifth of that.
+/// Log-likelihood of an observation by which a rival is beyond reach: refining it wins less.
 const BEYOND: f64 = 1.0;
 
 impl Workbench<'_> {

@@ -13,8 +13,9 @@ pub(super) fn make_way(path: &Path, overwrite: bool) -> Result<(), BagError> {
     files.try_for_each(|file| fs::remove_file(&file).map_err(BagError::io(&file, "remove")))
 }
 
-/// Files of a bag at `path` that its metadata name, or that are numbered as ours if it has none, which one that is written there replaces. Refused where
-/// that is not wanted, or where something else is there but for the names `beside`.
+/// Files of a bag at `path` that its metadata name, or that are numbered as ours if it has none, which one
+/// that is written there replaces. Refused where that is not wanted, or where something else is there but
+/// for the names `beside`.
 pub fn replaceable(
     path: &Path,
     overwrite: bool,

@@ -4,7 +4,9 @@ use super::evaluate::Remaining;
 use super::processors;
 use crate::CliResult;
 use clap::Args;
-use lattice_lab::evaluate::{Results, Settings, town, traps};
+use lattice_lab::evaluate::{
+    Case, Pair, Results, Trap, run_cases, settings_of, town_report, traps_report,
+};
 use lattice_lab::{AnyError, Report, markdown, write_report};
 use std::path::PathBuf;
 
@@ -25,26 +27,20 @@ pub struct Many {
 impl Many {
     /// Runs `lattice evaluate traps`.
     pub fn traps(self) -> CliResult {
-        let results = self.measure(&traps::settings(), traps::run)?;
-        self.show(&traps::traps_report(&results.sorted()))
+        self.show(&traps_report(&self.measure::<Trap>()?.sorted()))
     }
 
     /// Runs `lattice evaluate town`.
     pub fn town(self) -> CliResult {
-        let results = self.measure(&town::settings(), town::run)?;
-        self.show(&town::town_report(&results.sorted()))
+        self.show(&town_report(&self.measure::<Pair>()?.sorted()))
     }
 
-    fn measure(
-        &self,
-        settings: &Settings,
-        run: impl Fn(u64, &mut Results, usize, &mut dyn FnMut(usize, usize)) -> Result<(), AnyError>,
-    ) -> Result<Results, AnyError> {
+    fn measure<C: Case>(&self) -> Result<Results, AnyError> {
         let threads = self.threads.unwrap_or_else(processors).clamp(1, 1024);
-        let mut results = Results::open(&self.out, settings)?;
+        let mut results = Results::open(&self.out, &settings_of::<C>())?;
         let bar = Remaining::new();
         let mut tell = |done: usize, total: usize| bar.tell(done, total);
-        let ran = run(self.seeds, &mut results, threads, &mut tell);
+        let ran = run_cases::<C>(self.seeds, &mut results, threads, &mut tell);
         bar.done();
         ran?;
         Ok(results)

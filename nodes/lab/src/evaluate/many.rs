@@ -1,37 +1,73 @@
-//! Trials that have nothing in common but how they are kept.
+//! Trials that have nothing in common but how they are run and kept.
 
 use std::sync::mpsc;
 
 use rayon::prelude::*;
 
-use super::Results;
 use super::results::name;
-use super::settings::Cell;
+use super::settings::{Cell, Settings};
 use super::trial::{OURS, Trial};
+use super::{Results, Start};
 use crate::{AnyError, pool};
 
-/// Runs the trials that the results do not have yet, in this order, on `threads` threads.
+/// A case of an evaluation: all that a trial depends on but its seed.
+pub trait Case: Copy + Send + Sync + 'static {
+    /// Side of the cells of the maps, metres.
+    const CELL_SIDE_M: f64;
+
+    /// All cases.
+    fn all() -> Vec<Self>;
+
+    /// Name of the scene, by which reports sort.
+    fn name(self) -> String;
+
+    /// Runs the trial of a cell.
+    fn run(self, cell: &Cell) -> Result<Trial, AnyError>;
+
+    /// The cell of a seed: all labels as they are, and no start.
+    fn cell(self, seed: u64) -> Cell {
+        Cell {
+            scene: self.name(),
+            seed,
+            q: 0.0,
+            start: Start::None.to_string(),
+        }
+    }
+}
+
+/// Settings that results of cases are kept with.
+pub fn settings_of<C: Case>() -> Settings {
+    Settings {
+        cell_side_m: C::CELL_SIDE_M,
+        survey_views: 0,
+        map_seeds: 0,
+        ..Settings::default()
+    }
+}
+
+/// Runs the trials of all cases with `seeds` seeds that the results do not have yet, seed by seed, on
+/// `threads` threads.
 ///
 /// `progress` hears of trials done, of all that are left.
-pub(super) fn run_many<T: Sync>(
-    trials: Vec<(Cell, T)>,
-    run: impl Fn(&Cell, &T) -> Result<Trial, AnyError> + Sync,
+pub fn run_cases<C: Case>(
+    seeds: u64,
     results: &mut Results,
     threads: usize,
     progress: &mut dyn FnMut(usize, usize),
 ) -> Result<(), AnyError> {
-    let done = results.done();
-    let mut left = trials;
-    left.retain(|(cell, _)| !done.contains(&name(cell, OURS)));
+    let (done, cases) = (results.done(), C::all());
+    let trials = (0..seeds).flat_map(|seed| cases.iter().map(move |case| (case.cell(seed), *case)));
+    let left = trials.filter(|(cell, _)| !done.contains(&name(cell, OURS)));
+    let left: Vec<(Cell, C)> = left.collect();
     let pool = pool(threads)?;
     let (sender, receiver) = mpsc::channel();
     std::thread::scope(|scope| {
-        let (left, run) = (&left, &run);
+        let left = &left;
         scope.spawn(move || {
             pool.install(|| {
-                left.par_iter().with_max_len(1).for_each(|(cell, trial)| {
+                left.par_iter().with_max_len(1).for_each(|(cell, case)| {
                     // The receiver is gone only after an error.
-                    let _ = sender.send(run(cell, trial));
+                    let _ = sender.send(case.run(cell));
                 });
             });
         });

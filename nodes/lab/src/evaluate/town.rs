@@ -6,10 +6,9 @@ use lattice_core::registration::{
 };
 use nalgebra::{Isometry3, Point3};
 
-use super::many::run_many;
-use super::settings::{Cell, Settings};
+use super::many::Case;
+use super::settings::Cell;
 use super::trial::{OURS, Trial, WRONG, rounded};
-use super::{Results, Start};
 use crate::AnyError;
 use crate::report::{Cell as Entry, Report, Section, Table};
 use crate::simulate::town::{Lidar, Town, drive};
@@ -25,7 +24,7 @@ const APART_M: [f64; 4] = [5.0, 10.0, 20.0, 30.0];
 
 /// Two scans of a town.
 #[derive(Clone, Copy, Debug)]
-struct Pair {
+pub struct Pair {
     lidar: (&'static str, Lidar),
     apart_m: f64,
     labelled: bool,
@@ -33,7 +32,9 @@ struct Pair {
 
 const LIDARS: [(&str, Lidar); 2] = [("64 beams", Lidar::HDL64), ("16 beams", Lidar::VLP16)];
 
-impl Pair {
+impl Case for Pair {
+    const CELL_SIDE_M: f64 = CELL_SIDE_M;
+
     fn all() -> Vec<Pair> {
         let of = |lidar| {
             let labels = move |apart_m| {
@@ -48,17 +49,12 @@ impl Pair {
         LIDARS.into_iter().flat_map(of).collect()
     }
 
-    fn cell(&self, seed: u64) -> Cell {
+    fn name(self) -> String {
         let labels = if self.labelled { "labels" } else { "no labels" };
-        Cell {
-            scene: format!("{}, {} m apart, {labels}", self.lidar.0, self.apart_m),
-            seed,
-            q: 0.0,
-            start: Start::None.to_string(),
-        }
+        format!("{}, {} m apart, {labels}", self.lidar.0, self.apart_m)
     }
 
-    fn run(&self, cell: &Cell) -> Result<Trial, AnyError> {
+    fn run(self, cell: &Cell) -> Result<Trial, AnyError> {
         let town = Town::new(cell.seed);
         let [first, second] = drive(cell.seed, self.apart_m);
         let truth = first.inverse() * second;
@@ -97,31 +93,6 @@ impl Pair {
 fn shared(points_m: &[Point3<f64>], map: &PreparedCloud, map_from_points: &Isometry3<f64>) -> f64 {
     let near = |p: &&Point3<f64>| map.nearest(&(map_from_points * **p), SHARED_M).is_some();
     points_m.iter().filter(near).count() as f64 / points_m.len().max(1) as f64
-}
-
-/// Settings that results of the town are kept with.
-pub fn settings() -> Settings {
-    Settings {
-        cell_side_m: CELL_SIDE_M,
-        survey_views: 0,
-        map_seeds: 0,
-        ..Settings::default()
-    }
-}
-
-/// Runs the trials of `seeds` towns that the results do not have yet, on `threads` threads.
-///
-/// `progress` hears of trials done, of all.
-pub fn run(
-    seeds: u64,
-    results: &mut Results,
-    threads: usize,
-    progress: &mut dyn FnMut(usize, usize),
-) -> Result<(), AnyError> {
-    let pairs = Pair::all();
-    let all = (0..seeds).flat_map(|seed| pairs.iter().map(move |pair| (pair.cell(seed), *pair)));
-    let run = |cell: &Cell, pair: &Pair| pair.run(cell);
-    run_many(all.collect(), run, results, threads, progress)
 }
 
 /// A table of the pairs by distance, and one by overlap.

@@ -31,20 +31,29 @@ fn is_wrong(trial: &Trial) -> bool {
     trial.is_accepted() && !trial.is_within(WRONG)
 }
 
-/// Trials of a kind, by the rest of their scene's name.
-fn of_kind<'a>(trials: &'a [Trial], kind: &str) -> Vec<(&'a str, Vec<&'a Trial>)> {
+/// A line for each scene of a kind, by the rest of its name, and one for all of them.
+fn lines(
+    trials: &[Trial],
+    kind: &str,
+    line: impl Fn(&str, &[&Trial]) -> Vec<Cell>,
+) -> Vec<Vec<Cell>> {
     let mut scenes: Vec<(&str, Vec<&Trial>)> = Vec::new();
-    for trial in trials {
-        let name = trial.cell.scene.split_once('/');
-        let Some((_, name)) = name.filter(|(of, _)| *of == kind) else {
-            continue;
-        };
+    let mut all = Vec::new();
+    for trial in trials.iter().filter(|trial| scene(trial).0 == kind) {
+        let name = scene(trial).1;
         match scenes.iter_mut().find(|(known, _)| *known == name) {
-            Some((_, all)) => all.push(trial),
+            Some((_, of)) => of.push(trial),
             None => scenes.push((name, vec![trial])),
         }
+        all.push(trial);
     }
-    scenes
+    scenes.push(("all", all));
+    scenes.iter().map(|(name, of)| line(name, of)).collect()
+}
+
+/// Kind of the scene of a trial, and the rest of its name.
+fn scene(trial: &Trial) -> (&str, &str) {
+    trial.cell.scene.split_once('/').unwrap_or_default()
 }
 
 /// Number of trials of which something holds, and their share.
@@ -69,50 +78,40 @@ fn section(trials: &[Trial], kind: &str, title: &str) -> Section {
             share(of, |t| !t.is_accepted() && !verdict_is(t, "AMBIGUOUS")).into(),
         ]
     };
-    let scenes = of_kind(trials, kind);
-    let all: Vec<&Trial> = scenes.iter().flat_map(|(_, of)| of.clone()).collect();
-    let mut rows: Vec<Vec<Cell>> = scenes.iter().map(|(name, of)| line(name, of)).collect();
-    rows.push(line("all", &all));
     let columns = "scene|trials|OK and right|OK and wrong|AMBIGUOUS|else";
     Section {
-        tables: vec![Table::new(kind, title, columns, rows)],
+        tables: vec![Table::new(kind, title, columns, lines(trials, kind, line))],
         ..Section::measured(kind, title, "")
     }
 }
 
 fn faults(trials: &[Trial]) -> Section {
-    let named = |name: &str, trial: &Trial| {
-        let fault = Fault::all().into_iter().find(|fault| fault.name() == name);
+    let faults: Vec<(String, Fault)> = (Fault::all().into_iter())
+        .map(|fault| (fault.name(), fault))
+        .collect();
+    let is_named = |trial: &Trial| {
+        let fault = faults.iter().find(|(name, _)| name == scene(trial).1);
         let reason = trial.judged.as_ref().map_or("", |j| &j.reason);
-        !trial.is_accepted() && fault.is_some_and(|fault| fault.is_named_by(reason))
+        !trial.is_accepted() && fault.is_some_and(|(_, fault)| fault.is_named_by(reason))
     };
-    let scenes = of_kind(trials, WRONG_INPUT);
-    let line = |(name, of): &(&str, Vec<&Trial>)| -> Vec<Cell> {
+    let line = |name: &str, of: &[&Trial]| -> Vec<Cell> {
         vec![
-            (*name).into(),
+            name.into(),
             of.len().into(),
             share(of, is_wrong).into(),
             share(of, Trial::is_accepted).into(),
-            share(of, |trial| named(name, trial)).into(),
+            share(of, is_named).into(),
         ]
     };
-    let mut rows: Vec<Vec<Cell>> = scenes.iter().map(line).collect();
-    let all: Vec<&Trial> = scenes.iter().flat_map(|(_, of)| of.clone()).collect();
-    let named = |trial: &Trial| {
-        let name = trial.cell.scene.split_once('/').map_or("", |name| name.1);
-        named(name, trial)
-    };
-    rows.push(vec![
-        "all".into(),
-        all.len().into(),
-        share(&all, is_wrong).into(),
-        share(&all, Trial::is_accepted).into(),
-        share(&all, named).into(),
-    ]);
     let columns = "cloud|trials|OK and wrong|OK|refused, with the cause named";
     let title = "Clouds that are not what they are said to be";
     Section {
-        tables: vec![Table::new("faults", title, columns, rows)],
+        tables: vec![Table::new(
+            "faults",
+            title,
+            columns,
+            lines(trials, WRONG_INPUT, line),
+        )],
         ..Section::measured("faults", title, "")
     }
 }

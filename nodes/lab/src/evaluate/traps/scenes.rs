@@ -1,7 +1,7 @@
 //! Traps: rooms that look alike from several places, and clouds that are not what they are said to be.
 
 use crate::random::Stream;
-use crate::simulate::rooms::Flat;
+use crate::simulate::rooms::{Flat, LOOKS};
 use lattice_core::pose::Axes;
 use lattice_core::registration::{CalibrationOptions, HeadsetScan, SemanticCloud};
 use nalgebra::{Isometry3, Point3, UnitQuaternion, Vector3};
@@ -17,7 +17,7 @@ pub(super) struct Scene {
 /// A room that looks alike from several places, and how far from its middle a scan is taken, metres.
 type Shape = (&'static str, fn() -> Flat, [f64; 2]);
 
-pub(super) const SHAPES: [Shape; 10] = [
+const SHAPES: [Shape; 10] = [
     ("room of 12 m x 7 m", || Flat::room(12.0, 7.0), [4.0, 2.0]),
     ("room of 6 m x 4 m", || Flat::room(6.0, 4.0), [2.0, 1.0]),
     ("room of 5 m x 5 m", || Flat::room(5.0, 5.0), [1.5, 1.5]),
@@ -91,94 +91,119 @@ impl Fault {
             Fault::Elsewhere => any(&["lie on the map", "another pose", "no place"]),
         }
     }
+
+    /// A look into the flat with this fault.
+    pub fn scene(self, seed: u64, random: &mut Stream) -> Scene {
+        let flat = Flat::default();
+        let truth = any_pose(random);
+        // The last look is at a bare wall.
+        let number = (seed % (LOOKS.len() as u64 - 1)) as usize;
+        let (place, yaw) = LOOKS.get(number).copied().unwrap_or_default();
+        let moved = Vector3::new(signed(random), signed(random), 0.0) * 0.2;
+        let yaw = yaw + 0.2 * signed(random);
+        let (building, eye) = match self {
+            Fault::Elsewhere => (elsewhere(), Point3::new(0.0, 0.0, 1.6) + moved),
+            _ => (flat.clone(), Point3::from(place) + moved),
+        };
+        let mut cloud = building.look(eye, yaw, &truth);
+        let mut map = flat.map();
+        if seed % 2 == 1 {
+            cloud.labels.clear();
+            map.labels.clear();
+        }
+        let axis = UnitQuaternion::from_axis_angle(&Vector3::z_axis(), yaw) * Vector3::x_axis();
+        let change = |p: Vector3<f64>| match self {
+            Fault::Axes(has, read) => read.to_ros(has.from_ros(p)),
+            Fault::Scale(by) => p * by,
+            Fault::Tilt(degrees) => {
+                UnitQuaternion::from_axis_angle(&axis, degrees.to_radians()) * p
+            }
+            Fault::Mirrored => Vector3::new(p.x, -p.y, p.z),
+            Fault::Elsewhere => p,
+        };
+        let mut scan = HeadsetScan {
+            cloud,
+            sensor_m: Some(truth.inverse() * eye),
+        };
+        let points = scan.cloud.points_m.iter_mut().chain(&mut scan.sensor_m);
+        points.for_each(|p| p.coords = change(p.coords));
+        let axes = match self {
+            Fault::Axes(_, read) => read,
+            _ => Axes::RosFlu,
+        };
+        Scene {
+            map,
+            scan,
+            options: CalibrationOptions {
+                axes,
+                ..CalibrationOptions::default()
+            },
+            truth,
+        }
+    }
 }
 
-/// A scan in a room, in whole or of a sixth of the circle; with a box in sight or none, with labels
-/// or none.
-pub(super) fn of_shape(
-    (_, room, reach_m): Shape,
+/// A scan in a room that looks alike from several places.
+#[derive(Clone, Copy, Debug)]
+pub(super) struct Look {
+    shape: Shape,
+    /// True for a scan all around, else of a sixth of the circle.
     whole: bool,
-    boxed: bool,
+    /// True with a box in sight.
+    pub boxed: bool,
     labelled: bool,
-    random: &mut Stream,
-) -> Scene {
-    let truth = any_pose(random);
-    // A box needs room beside who looks at it.
-    let reach = if boxed { 0.3 } else { 1.0 };
-    let eye = reach_m.map(|most| most * reach * signed(random));
-    let room = match boxed {
-        true => room().with_box([eye[0] + 1.0, eye[1] + 0.1], [0.5, 0.5, 0.9]),
-        false => room(),
-    };
-    let uniform = &mut || random.uniform();
-    let mut map = room.noisy_map(uniform);
-    let mut scan = room.all_around(eye, &truth, uniform);
-    if !whole {
-        keep_sector(&mut scan, 0.52, random);
-    }
-    if !labelled {
-        map.labels.clear();
-        scan.cloud.labels.clear();
-    }
-    Scene {
-        map,
-        scan,
-        options: CalibrationOptions::default(),
-        truth,
-    }
 }
 
-/// Places and headings in the flat.
-const LOOKS: [([f64; 3], f64); 3] = [
-    ([3.5, 3.8, 1.6], -2.2),
-    ([1.0, 3.9, 1.6], -0.6),
-    ([7.5, 3.0, 1.6], 2.2),
-];
-
-/// A look into the flat with a fault.
-pub(super) fn of_fault(fault: Fault, seed: u64, random: &mut Stream) -> Scene {
-    let flat = Flat::default();
-    let truth = any_pose(random);
-    let look = LOOKS.get((seed % LOOKS.len() as u64) as usize);
-    let (place, yaw) = look.copied().unwrap_or_default();
-    let moved = Vector3::new(signed(random), signed(random), 0.0) * 0.2;
-    let yaw = yaw + 0.2 * signed(random);
-    let (building, eye) = match fault {
-        Fault::Elsewhere => (elsewhere(), Point3::new(0.0, 0.0, 1.6) + moved),
-        _ => (flat.clone(), Point3::from(place) + moved),
-    };
-    let mut cloud = building.look(eye, yaw, &truth);
-    let mut map = flat.map();
-    if seed % 2 == 1 {
-        cloud.labels.clear();
-        map.labels.clear();
+impl Look {
+    pub fn all() -> Vec<Look> {
+        let mut all = Vec::new();
+        for shape in SHAPES {
+            for labelled in [false, true] {
+                for (whole, boxed) in [(true, false), (false, false), (true, true)] {
+                    all.push(Look {
+                        shape,
+                        whole,
+                        boxed,
+                        labelled,
+                    });
+                }
+            }
+        }
+        all
     }
-    let axis = UnitQuaternion::from_axis_angle(&Vector3::z_axis(), yaw) * Vector3::x_axis();
-    let change = |p: Vector3<f64>| match fault {
-        Fault::Axes(has, read) => read.to_ros(has.from_ros(p)),
-        Fault::Scale(by) => p * by,
-        Fault::Tilt(degrees) => UnitQuaternion::from_axis_angle(&axis, degrees.to_radians()) * p,
-        Fault::Mirrored => Vector3::new(p.x, -p.y, p.z),
-        Fault::Elsewhere => p,
-    };
-    let mut scan = HeadsetScan {
-        cloud,
-        sensor_m: Some(truth.inverse() * eye),
-    };
-    let points = scan.cloud.points_m.iter_mut().chain(&mut scan.sensor_m);
-    points.for_each(|p| p.coords = change(p.coords));
-    let axes = match fault {
-        Fault::Axes(_, read) => read,
-        _ => Axes::RosFlu,
-    };
-    Scene {
-        map,
-        scan,
-        options: CalibrationOptions {
-            axes,
-            ..CalibrationOptions::default()
-        },
-        truth,
+
+    pub fn name(self) -> String {
+        let view = if self.whole { "whole" } else { "in part" };
+        let labels = if self.labelled { "labels" } else { "no labels" };
+        format!("{}, {view}, {labels}", self.shape.0)
+    }
+
+    pub fn scene(self, random: &mut Stream) -> Scene {
+        let (_, room, reach_m) = self.shape;
+        let truth = any_pose(random);
+        // A box needs room beside who looks at it.
+        let reach = if self.boxed { 0.3 } else { 1.0 };
+        let eye = reach_m.map(|most| most * reach * signed(random));
+        let room = match self.boxed {
+            true => room().with_box([eye[0] + 1.0, eye[1] + 0.1], [0.5, 0.5, 0.9]),
+            false => room(),
+        };
+        let uniform = &mut || random.uniform();
+        let mut map = room.noisy_map(uniform);
+        let mut scan = room.all_around(eye, &truth, uniform);
+        if !self.whole {
+            keep_sector(&mut scan, 0.52, random);
+        }
+        if !self.labelled {
+            map.labels.clear();
+            scan.cloud.labels.clear();
+        }
+        Scene {
+            map,
+            scan,
+            options: CalibrationOptions::default(),
+            truth,
+        }
     }
 }
 

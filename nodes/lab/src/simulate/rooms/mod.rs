@@ -23,6 +23,16 @@ const FURNITURE: [([f64; 3], [f64; 3], u16); 8] = [
     ([6.1, 4.2, 0.0], [1.6, 1.5, 0.5], 8),
 ];
 
+/// Places in the flat to look from, and headings; from the last only a bare wall is seen.
+pub const LOOKS: [([f64; 3], f64); 6] = [
+    ([3.5, 3.8, 1.6], -2.2),
+    ([1.0, 3.9, 1.6], -0.6),
+    ([7.5, 3.0, 1.6], 2.2),
+    ([6.5, 3.0, 1.6], -0.4),
+    ([4.2, 4.3, 1.6], 3.0),
+    ([3.5, 3.0, 1.6], 1.6),
+];
+
 /// Two rooms of 9 m x 6 m with a door between.
 #[derive(Clone, Debug)]
 pub struct Flat(Vec<Patch>);

@@ -79,7 +79,8 @@ impl Lidar {
 
 /// Poses of a sensor on the road, `apart_m` along it, in the town: it leans by up to a degree and may look the other way.
 pub fn drive(seed: u64, apart_m: f64) -> [Isometry3<f64>; 2] {
-    let random = &mut Stream::numbered(seed, apart_m as u64);
+    // Above the numbers of the town and its scans.
+    let random = &mut Stream::numbered(seed, apart_m.to_bits());
     let first_m = 160.0 * random.uniform() - 100.0;
     [first_m, first_m + apart_m].map(|x_m| {
         let mut lean = || 0.02 * (random.uniform() - 0.5);

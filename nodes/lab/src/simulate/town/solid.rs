@@ -1,4 +1,4 @@
-//! Solids of a town, and where a ray meets them.
+//! Solids of a town, and the distances at which rays meet them.
 
 use nalgebra::{Point3, Vector3};
 
@@ -77,7 +77,7 @@ impl Solid {
     }
 }
 
-/// Where a ray enters a box, and through the sides of which axis.
+/// Distance at which a ray enters a box, and the axis of the sides that it enters through.
 fn enter(
     eye: &Point3<f64>,
     way: &Vector3<f64>,
@@ -96,7 +96,7 @@ fn enter(
     (from > 0.0 && from <= to).then_some((from, side))
 }
 
-/// Where a ray enters and leaves a sphere about 0, or a cylinder if z is 0 in both.
+/// Distances at which a ray enters and leaves a sphere about 0, or a cylinder if z is 0 in both.
 fn chord(off: &Vector3<f64>, way: &Vector3<f64>, radius: f64) -> Option<(f64, f64)> {
     let a = way.norm_squared();
     let half = off.dot(way);
