@@ -18,6 +18,8 @@ const FOLDS: usize = 5;
 const INDEPENDENT: f64 = 4.0;
 /// Standard deviation of a normal distribution over its median deviation.
 const DEVIATION_OF_MEDIAN: f64 = 1.4826;
+/// Largest deviation that chance gives the log-likelihood of a region: rooms that are alike differ by less.
+const BY_CHANCE: f64 = 2.5;
 /// Target points that a source point may belong to.
 const NEIGHBORS: usize = 4;
 
@@ -283,7 +285,8 @@ impl<'a> Fit<'a> {
         let mut differences: Vec<f64> = both.map(|(a, b)| a - b).collect();
         let middle = median(&mut differences);
         let mut deviations: Vec<f64> = differences.iter().map(|d| (d - middle).abs()).collect();
-        DEVIATION_OF_MEDIAN * median(&mut deviations) * (differences.len() as f64).sqrt()
+        let deviation = DEVIATION_OF_MEDIAN * median(&mut deviations);
+        deviation.min(BY_CHANCE) * (differences.len() as f64).sqrt()
     }
 
     /// Log-likelihood by surfaces of each region of a side.

@@ -16,8 +16,8 @@ mod solver;
 
 pub use calibrate::{
     Calibration, CalibrationMap, CalibrationOptions, CalibrationRequest, ClassReliability,
-    DirectionKind, HeadsetScan, Profile, Progress, ScaleEstimate, Stage, TrackUpdate, Verdict,
-    WeakDirection, calibrate, track,
+    DirectionKind, HeadsetScan, Margin, Profile, Progress, ScaleEstimate, Stage, TrackUpdate,
+    Verdict, WeakDirection, calibrate, track,
 };
 pub use cloud::SemanticCloud;
 pub use confusion::{Confusion, Lift};

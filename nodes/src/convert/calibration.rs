@@ -28,7 +28,7 @@ pub fn result_from(found: &Calibration) -> CalibrationResult {
             false => verdict_code(found.verdict),
         },
         reason: found.reason.clone(),
-        log_margin: found.log_margin,
+        log_margin: found.margin.log,
         inlier_fraction: found.inlier_fraction,
         rmse_m: found.rmse_m,
         weak_directions: weak

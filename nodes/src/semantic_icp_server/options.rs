@@ -128,7 +128,7 @@ fn calibration_from(
         agreement: params.f64_in("agreement", d.agreement, 0.0..=1.0)?,
         start_radius_m: params.f64_in("guess_radius_m", d.start_radius_m, meters.clone())?,
         start_yaw_rad: params.f64_in("guess_yaw_rad", d.start_yaw_rad, 0.0..=3.2)?,
-        min_margin: params.f64_in("min_margin", d.min_margin, 0.0..=1e9)?,
+        max_p_wrong: params.f64_in("max_p_wrong", d.max_p_wrong, 1e-12..=0.5)?,
         min_inliers: params.f64_in("min_inliers", d.min_inliers, 0.0..=1.0)?,
         max_sigma_m: params.f64_in("max_sigma_m", d.max_sigma_m, meters)?,
         max_sigma_rad: params.f64_in("max_sigma_rad", d.max_sigma_rad, 1e-6..=3.2)?,

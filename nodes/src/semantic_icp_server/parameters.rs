@@ -36,7 +36,7 @@ const ABOUT: &[About] = about! {
     "agreement": "Share of places where equal class numbers of headset and map are expected to agree before anything was learned; 0 if their numbers have nothing to do with each other.";
     "guess_radius_m": "How far the answer may be from a guess.";
     "guess_yaw_rad": "How far the heading of the answer may be from that of a guess.";
-    "min_margin": "Log-likelihood by which a pose must beat every other to be OK.";
+    "max_p_wrong": "Largest probability that another pose is right, for a pose to be OK.";
     "min_inliers": "Share of the points that must lie on the map for it.";
     "max_sigma_m": "Most standard deviation of a place in its least sure direction for it.";
     "max_sigma_rad": "Most standard deviation of a rotation about any axis for it.";

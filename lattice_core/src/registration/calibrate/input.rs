@@ -67,9 +67,16 @@ impl Input {
             PreparedCloud::new(cloud, &PrepareOptions::default())
                 .map_err(|e| rejected(format!("the points cannot be registered: {e}")))
         };
+        let full = prepare(full)?;
+        // Too far apart for normals of their own.
+        let points_m = few.points_m.clone();
+        let few = prepare(few)?.with_normals(|i| {
+            let (nearest, _) = full.nearest(points_m.get(i)?, f64::MAX)?;
+            full.normals().get(nearest).copied()
+        });
         Ok(Input {
-            full: prepare(full)?,
-            few: prepare(few)?,
+            full,
+            few,
             sensor_m: match (sensors.as_slice(), request.headset_scans.len()) {
                 ([sensor], 1) if sensor.iter().all(|c| c.abs() <= MAX_RANGE_M) => Some(*sensor),
                 _ => None,

@@ -5,18 +5,15 @@ use nalgebra::{Isometry3, Matrix6, Vector3};
 use super::candidates::{Candidate, Workbench};
 use super::covariance::{ErrorModel, PoseCovariance};
 use super::likeliest;
+use super::margin::{Margin, SOFTNESS};
 use super::scale::scale_at;
 use super::types::{
     Calibration, CalibrationOptions, ClassReliability, DirectionKind, ScaleEstimate, Verdict,
     WeakDirection,
 };
 
-/// Log-likelihood that is as good as a natural logarithm of odds: observations are not independent.
-const SOFTNESS: f64 = 8.0;
 /// Largest ratio of the error of a region to its residuals.
 const INVISIBLE: f64 = 4.0;
-/// Standard deviations of the margin, were two poses equally right, that it must exceed.
-const CERTAIN: f64 = 3.0;
 /// Standard deviations of the tilt beyond which a pose certainly leans.
 const LEANING: f64 = 5.0;
 /// Standard deviations of the scale by which it must be beyond what it may be to be wrong.
@@ -35,11 +32,14 @@ pub(super) fn answer(bench: &Workbench<'_>, all: Vec<Candidate>, started: bool) 
     let elsewhere = (all.iter()).filter(|c| !c.is_near(&pose, &middle, shift_m, turn_rad));
     let rival = elsewhere.max_by(|a, b| a.total().total_cmp(&b.total()));
     let nowhere = bench.fit.nowhere();
-    let log_margin = best.total() - rival.map_or(nowhere, |rival| rival.total().max(nowhere));
-    let chance = rival.map_or(0.0, |rival| {
-        let poses = [&pose, &rival.map_from_headset];
-        CERTAIN * bench.fit.noise_between(poses, bench.options.region_m)
-    });
+    let margin = Margin {
+        log: best.total() - rival.map_or(nowhere, |rival| rival.total().max(nowhere)),
+        chance: rival.map_or(0.0, |rival| {
+            let poses = [&pose, &rival.map_from_headset];
+            bench.fit.noise_between(poses, bench.options.region_m)
+        }),
+        unexplained: bench.fit.observations() * (1.0 - best.inlier_fraction),
+    };
     let covariance = covariance(bench, best).map(|sure| {
         let near = all
             .iter()
@@ -71,13 +71,7 @@ pub(super) fn answer(bench: &Workbench<'_>, all: Vec<Candidate>, started: bool) 
             DirectionKind::Rotation => d.sigma > options.max_sigma_rad,
         })
         .collect();
-    let (mut verdict, mut reason) = verdict(
-        bench,
-        best,
-        (log_margin, chance),
-        covariance.is_some(),
-        &weak,
-    );
+    let (mut verdict, mut reason) = verdict(options, best, &margin, covariance.is_some(), &weak);
     let scale = scale(bench, best);
     if best.inlier_fraction >= options.min_inliers
         && let Some(fault) = leaning(&pose, leans, options).or_else(|| misscaled(scale, options))
@@ -91,7 +85,7 @@ pub(super) fn answer(bench: &Workbench<'_>, all: Vec<Candidate>, started: bool) 
         cancelled: false,
         map_from_headset: pose,
         covariance: covariance.map_or_else(Matrix6::zeros, |c| c.in_target(&pose)),
-        log_margin,
+        margin,
         inlier_fraction: best.inlier_fraction,
         rmse_m: best.rmse_m,
         weak_directions: weak,
@@ -150,13 +144,12 @@ fn choose<'a>(bench: &Workbench<'_>, all: &'a [Candidate], started: bool) -> Opt
 }
 
 fn verdict(
-    bench: &Workbench<'_>,
+    options: &CalibrationOptions,
     best: &Candidate,
-    (log_margin, chance): (f64, f64),
+    margin: &Margin,
     held: bool,
     weak: &[WeakDirection],
 ) -> (Verdict, String) {
-    let options = bench.options;
     let percent = 100.0 * best.inlier_fraction;
     if best.inlier_fraction < options.min_inliers {
         let least = 100.0 * options.min_inliers;
@@ -164,12 +157,12 @@ fn verdict(
             format!("only {percent:.0} % of the points lie on the map, {least:.0} % are needed");
         return (Verdict::NoOverlap, reason);
     }
-    // Points without a partner might have one elsewhere.
-    let unexplained = bench.fit.observations() * (1.0 - best.inlier_fraction);
-    let least = options.min_margin.max(0.5 * unexplained).max(chance);
-    if log_margin < least {
+    let (log, p_wrong) = (margin.log, margin.p_wrong());
+    if p_wrong > options.max_p_wrong {
+        let least = margin.at(options.max_p_wrong);
         let reason = format!(
-            "another pose fits nearly as well: log-margin {log_margin:.1}, {least:.0} is needed; look elsewhere too"
+            "another pose is right with a probability of {p_wrong:.2}: log-margin {log:.1}, {least:.0} is needed; \
+             look elsewhere too"
         );
         return (Verdict::Ambiguous, reason);
     }
@@ -190,7 +183,9 @@ fn verdict(
     if !held {
         return (Verdict::Degenerate, "too few surfaces hold the pose".into());
     }
-    let reason = format!("{percent:.0} % of the points lie on the map, log-margin {log_margin:.0}");
+    let reason = format!(
+        "{percent:.0} % of the points lie on the map, log-margin {log:.0}, wrong with a probability of {p_wrong:.0e}"
+    );
     (Verdict::Ok, reason)
 }
 

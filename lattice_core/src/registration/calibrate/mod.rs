@@ -10,6 +10,7 @@ mod covariance;
 mod input;
 mod judge;
 mod map;
+mod margin;
 mod profile;
 mod rays;
 mod readings;
@@ -31,6 +32,7 @@ use readings::misread;
 use types::Refusal;
 
 pub use map::CalibrationMap;
+pub use margin::Margin;
 pub use profile::Profile;
 pub use track::{TrackUpdate, track};
 pub use types::{

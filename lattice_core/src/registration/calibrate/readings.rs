@@ -17,6 +17,8 @@ const FIRST_LOOK: usize = 16;
 const ROUGH_PLACES: usize = 4;
 /// Readings that are looked at closely: the right one and its mirror image lead a rough search.
 const LOOKED_AT: usize = 2;
+/// Log-likelihood by which a reading is certainly better.
+const MARGIN: f64 = 40.0;
 /// Score by which a right reading may fall behind a wrong one in it.
 const ROUGH: f64 = 0.03;
 
@@ -131,9 +133,8 @@ pub(super) fn misread(
         });
     let (best, reading) = fits.max_by(|a, b| a.0.total_cmp(&b.0))?;
     let observations = bench.few.observations();
-    let margin = bench.options.min_margin;
-    let clearly = best > straight + margin.max(0.25 * observations) && best > 0.5 * observations;
-    let better = clearly || best > straight + 0.5 * margin;
+    let clearly = best > straight + MARGIN.max(0.25 * observations) && best > 0.5 * observations;
+    let better = clearly || best > straight + 0.5 * MARGIN;
     better.then_some(Better { reading, clearly })
 }
 
@@ -153,6 +154,7 @@ impl Mended {
         let points_m = few.points_m().iter().map(|p| matrix * p).collect();
         let cloud = SemanticCloud { points_m, labels };
         let cloud = PreparedCloud::new(cloud, &PrepareOptions::default()).ok()?;
+        let cloud = cloud.with_normals(|i| few.normals().get(i).map(|n| matrix * n));
         let sensor_m = bench.input.sensor_m.map(|p| matrix * p);
         let source = SearchSource::by_surface(&cloud, sensor_m);
         Some(Mended { cloud, source })

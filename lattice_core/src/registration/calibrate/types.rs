@@ -4,6 +4,7 @@ use std::ops::ControlFlow;
 
 use nalgebra::{Isometry3, Matrix6, Point3, Vector3};
 
+use super::margin::Margin;
 use super::profile::Profile;
 use crate::pose::Axes;
 use crate::registration::{Confusion, SemanticCloud};
@@ -61,8 +62,8 @@ pub struct CalibrationOptions {
     pub start_radius_m: f64,
     /// Largest difference of its heading from that of a given start, radians.
     pub start_yaw_rad: f64,
-    /// Log-likelihood by which the answer must beat every other pose.
-    pub min_margin: f64,
+    /// Largest probability that another pose is right.
+    pub max_p_wrong: f64,
     /// Share of the headset's points that must lie on the map.
     pub min_inliers: f64,
     /// Largest standard deviation of the position in any direction.
@@ -88,7 +89,7 @@ impl Default for CalibrationOptions {
             agreement: 0.6,
             start_radius_m: 2.0,
             start_yaw_rad: 1.0,
-            min_margin: 40.0,
+            max_p_wrong: 0.01,
             min_inliers: 0.4,
             max_sigma_m: 0.1,
             max_sigma_rad: 0.04,
@@ -181,8 +182,8 @@ pub struct Calibration {
     /// Scale of the headset's points in the map, None if they do not tell it. The pose is that of points
     /// multiplied by it only with [`CalibrationOptions::estimate_scale`].
     pub scale: Option<ScaleEstimate>,
-    /// Log-likelihood above that of the best different pose.
-    pub log_margin: f64,
+    /// Margin over the best different pose.
+    pub margin: Margin,
     /// Share of the headset's points on a surface of the map.
     pub inlier_fraction: f64,
     /// Root mean square distance of those from the surfaces, metres.
@@ -207,7 +208,7 @@ impl Calibration {
             map_from_headset: Isometry3::identity(),
             covariance: Matrix6::zeros(),
             scale: None,
-            log_margin: 0.0,
+            margin: Margin::default(),
             inlier_fraction: 0.0,
             rmse_m: 0.0,
             weak_directions: Vec::new(),

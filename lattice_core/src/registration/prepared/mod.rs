@@ -78,6 +78,18 @@ impl PreparedCloud {
         })
     }
 
+    /// The cloud with the normals that are known for points, by their places in the cloud that was prepared.
+    pub(super) fn with_normals(
+        mut self,
+        normal: impl Fn(usize) -> Option<Vector3<f64>>,
+    ) -> PreparedCloud {
+        let Surface { normals, order, .. } = &mut self.surface;
+        for (own, &place) in normals.iter_mut().zip(order.iter()) {
+            *own = normal(place as usize).unwrap_or(*own);
+        }
+        self
+    }
+
     /// Number of points.
     pub fn len(&self) -> usize {
         self.surface.points_m.len()

@@ -29,6 +29,8 @@ pub struct Answer {
     scale_sigma: Option<f64>,
     /// None if no other pose was found.
     log_margin: Option<f64>,
+    /// Probability that another pose is right; None without a verdict.
+    p_wrong: Option<f64>,
     inlier_fraction: f64,
     rmse_m: f64,
     weak_directions: Vec<Weak>,
@@ -106,7 +108,8 @@ impl Answer {
             profile: Some(profile.name()),
             scale: calibration.scale.map(|estimate| estimate.scale),
             scale_sigma: calibration.scale.map(|estimate| estimate.sigma),
-            log_margin: (calibration.log_margin.is_finite()).then_some(calibration.log_margin),
+            log_margin: Some(calibration.margin.log).filter(|margin| margin.is_finite()),
+            p_wrong: Some(calibration.margin.p_wrong()),
             inlier_fraction: calibration.inlier_fraction,
             rmse_m: calibration.rmse_m,
             weak_directions: weak.collect(),
@@ -179,8 +182,11 @@ impl fmt::Display for Answer {
         if let (Some(scale), Some(sigma)) = (self.scale, self.scale_sigma) {
             writeln!(f, "scale          {scale:.4}, sigma {sigma:.4}")?;
         }
-        if let Some(margin) = self.log_margin.filter(|_| self.verdict.is_some()) {
-            writeln!(f, "log-margin     {margin:.1}")?;
+        if let (Some(margin), Some(p_wrong)) = (self.log_margin, self.p_wrong) {
+            writeln!(
+                f,
+                "log-margin     {margin:.1}, wrong with a probability of {p_wrong:.1e}"
+            )?;
         }
         writeln!(
             f,

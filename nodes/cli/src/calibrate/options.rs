@@ -39,9 +39,9 @@ pub struct SearchOptions {
     /// About how many points are registered; more are thinned
     #[arg(long)]
     registered_points: Option<usize>,
-    /// Log-likelihood by which a pose must beat every other to be OK
+    /// Largest probability that another pose is right, for a pose to be OK
     #[arg(long)]
-    min_margin: Option<f64>,
+    max_p_wrong: Option<f64>,
     /// Share of the points that must lie on the map for it
     #[arg(long)]
     min_inliers: Option<f64>,
@@ -125,7 +125,12 @@ impl SearchOptions {
             agreement: within("agreement", self.agreement, usual.agreement, share)?,
             start_radius_m: within("guess-radius", self.guess_radius, radius_m, length)?,
             start_yaw_rad: within("guess-yaw", self.guess_yaw, usual.start_yaw_rad, angle)?,
-            min_margin: within("min-margin", self.min_margin, usual.min_margin, (0.0, 1e9))?,
+            max_p_wrong: within(
+                "max-p-wrong",
+                self.max_p_wrong,
+                usual.max_p_wrong,
+                (1e-12, 0.5),
+            )?,
             min_inliers: within("min-inliers", self.min_inliers, usual.min_inliers, share)?,
             max_sigma_m: within("max-sigma", self.max_sigma, usual.max_sigma_m, length)?,
             max_sigma_rad: within(

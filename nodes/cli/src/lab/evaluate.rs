@@ -1,7 +1,7 @@
 //! `lattice evaluate`: calibration and registration, measured.
 
 use super::evaluate_kitti::Kitti;
-use super::evaluate_many::Many;
+use super::evaluate_many::{Many, Reliability};
 use super::{Choice, choice, processors};
 use crate::progress::Progress;
 use crate::{CliResult, init_logging};
@@ -27,6 +27,8 @@ pub enum Evaluate {
     Traps(Many),
     /// Find lidar scans of a simulated street in each other, 5 to 30 m apart, without a start
     Town(Many),
+    /// Compare what verdicts of other evaluations stated with what was observed
+    Reliability(Reliability),
     /// Register real labelled laser scans with each method, against the truth of an INS
     Kitti(Kitti),
 }
@@ -111,6 +113,7 @@ impl Evaluate {
             Self::Calibration(command) => command.run(),
             Self::Traps(command) => command.traps(),
             Self::Town(command) => command.town(),
+            Self::Reliability(command) => command.run(),
             Self::Kitti(command) => command.run(),
         }
     }

@@ -1,14 +1,15 @@
-//! `lattice evaluate traps` and `lattice evaluate town`.
+//! `lattice evaluate traps`, `town` and `reliability`.
 
 use super::evaluate::Remaining;
 use super::processors;
 use crate::CliResult;
 use clap::Args;
 use lattice_lab::evaluate::{
-    Case, Pair, Results, Trap, run_cases, settings_of, town_report, traps_report,
+    Case, Pair, Results, Trap, reliability_report, run_cases, settings_of, town_report,
+    traps_report,
 };
 use lattice_lab::{AnyError, Report, markdown, write_report};
-use std::path::PathBuf;
+use std::path::{Path, PathBuf};
 
 /// Options of evaluations that consist of many trials of one method.
 #[derive(Args)]
@@ -47,9 +48,37 @@ impl Many {
     }
 
     fn show(&self, report: &Report) -> CliResult {
-        write_report(report, &self.out)?;
-        print!("{}", markdown(report));
-        println!("\nwritten to {}", self.out.display());
-        Ok(())
+        show(report, &self.out)
     }
+}
+
+/// Options of `lattice evaluate reliability`.
+#[derive(Args)]
+pub struct Reliability {
+    /// Folders of results of `lattice evaluate calibration`, `traps` and `town`
+    #[arg(required = true, value_name = "RESULTS")]
+    results: Vec<PathBuf>,
+    /// Folder of the report
+    #[arg(long)]
+    out: PathBuf,
+}
+
+impl Reliability {
+    /// Runs the command.
+    pub fn run(self) -> CliResult {
+        let set = |folder: &PathBuf| -> Result<_, AnyError> {
+            let name = folder.file_name().unwrap_or(folder.as_os_str());
+            let (_, trials) = Results::read(folder)?;
+            Ok((name.to_string_lossy().into_owned(), trials))
+        };
+        let sets: Result<Vec<_>, AnyError> = self.results.iter().map(set).collect();
+        show(&reliability_report(&sets?)?, &self.out)
+    }
+}
+
+fn show(report: &Report, out: &Path) -> CliResult {
+    write_report(report, out)?;
+    print!("{}", markdown(report));
+    println!("\nwritten to {}", out.display());
+    Ok(())
 }

@@ -51,6 +51,15 @@ pub struct Judged {
     pub chosen: String,
     /// Log-likelihood above the best different pose; None if there was none.
     pub margin: Option<f64>,
+    /// Probability that another pose is right.
+    #[serde(default)]
+    pub p_wrong: Option<f64>,
+    /// Standard deviation of the margin by chance.
+    #[serde(default)]
+    pub chance: Option<f64>,
+    /// Independent observations without a partner.
+    #[serde(default)]
+    pub unexplained: Option<f64>,
     pub inliers: f64,
     /// Normalised squared error of the stated covariance, 6 degrees of freedom; None without a covariance.
     pub nees: Option<f64>,
@@ -100,13 +109,16 @@ impl Trial {
     }
 
     pub fn with_judgement(self, calibration: &Calibration, truth: &Isometry3<f64>) -> Trial {
-        let margin = calibration.log_margin;
+        let margin = calibration.margin;
         Trial {
             judged: Some(Judged {
                 verdict: calibration.verdict.name().to_owned(),
                 reason: calibration.reason.clone(),
                 chosen: calibration.method.to_owned(),
-                margin: margin.is_finite().then_some(rounded(margin)),
+                margin: margin.log.is_finite().then_some(rounded(margin.log)),
+                p_wrong: Some(margin.p_wrong()),
+                chance: Some(margin.chance),
+                unexplained: Some(margin.unexplained),
                 inliers: rounded(calibration.inlier_fraction),
                 nees: nees(calibration, truth).map(rounded),
             }),
@@ -153,6 +165,7 @@ fn nees(calibration: &Calibration, truth: &Isometry3<f64>) -> Option<f64> {
 #[cfg(test)]
 mod tests {
     use super::*;
+    use lattice_core::registration::Margin;
     use nalgebra::Matrix6;
 
     fn cell() -> Cell {
@@ -179,7 +192,10 @@ mod tests {
         let calibration = Calibration {
             map_from_headset: off,
             covariance: Matrix6::from_diagonal(&Vector6::from([1e-4; 6])),
-            log_margin: f64::INFINITY,
+            margin: Margin {
+                log: f64::INFINITY,
+                ..Margin::default()
+            },
             ..Calibration::refused(Verdict::Ok, "")
         };
         let trial = trial.with_judgement(&calibration, &truth);

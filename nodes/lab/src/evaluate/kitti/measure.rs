@@ -184,7 +184,7 @@ impl Pair {
                 PairRow {
                     register_ms: 1e3 * spent.cpu_s,
                     verdict: Some(found.verdict.name().to_owned()),
-                    margin: Some(rounded(found.log_margin)).filter(|m| m.is_finite()),
+                    margin: Some(rounded(found.margin.log)).filter(|m| m.is_finite()),
                     ..row(&found.map_from_headset, target.map_ms)
                 }
             }

@@ -1,0 +1,63 @@
+//! Margin of a pose over all others, and the probability that another is right.
+
+/// Log-likelihood that is worth a natural logarithm of odds: observations are not independent.
+pub(super) const SOFTNESS: f64 = 6.0;
+/// The same for each standard deviation that chance gives the margin.
+const PER_CHANCE: f64 = 0.43;
+/// The same for each observation without a partner, which might have one elsewhere.
+const PER_UNEXPLAINED: f64 = 0.08;
+/// Logarithm of the odds against a pose without a margin: there are places that nobody tried.
+const UNTRIED: f64 = 2.5;
+
+/// Evidence for a pose against all others.
+#[derive(Clone, Copy, PartialEq, Debug, Default)]
+pub struct Margin {
+    /// Log-likelihood above that of the best different pose.
+    pub log: f64,
+    /// Standard deviation of that, were both poses equally right.
+    pub chance: f64,
+    /// Independent observations that have no partner at the pose.
+    pub unexplained: f64,
+}
+
+impl Margin {
+    /// Probability that the pose is wrong, and another one right.
+    ///
+    /// Logistic in the margin; its constants are fitted to simulated scenes, see `docs/calibration.md`.
+    pub fn p_wrong(&self) -> f64 {
+        1.0 / (1.0 + (self.log / self.scale() - UNTRIED).exp())
+    }
+
+    /// The margin at which the pose is wrong with a probability.
+    pub fn at(&self, p_wrong: f64) -> f64 {
+        self.scale() * (((1.0 - p_wrong) / p_wrong).ln() + UNTRIED)
+    }
+
+    fn scale(&self) -> f64 {
+        let chance = PER_CHANCE * self.chance;
+        SOFTNESS.max(chance).max(PER_UNEXPLAINED * self.unexplained)
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn the_more_speaks_for_a_pose_the_less_is_it_wrong() {
+        let margin = |log, chance, unexplained| Margin {
+            log,
+            chance,
+            unexplained,
+        };
+        assert!(margin(0.0, 5.0, 10.0).p_wrong() > 0.5);
+        let sure = margin(60.0, 5.0, 10.0);
+        assert!(sure.p_wrong() < 0.01 && margin(30.0, 5.0, 10.0).p_wrong() > 0.01);
+        // Chance and what is not explained both count against it.
+        assert!(margin(60.0, 40.0, 10.0).p_wrong() > sure.p_wrong());
+        assert!(margin(60.0, 5.0, 200.0).p_wrong() > sure.p_wrong());
+        let least = sure.at(0.01);
+        assert!((margin(least, 5.0, 10.0).p_wrong() - 0.01).abs() < 1e-12);
+        assert_eq!(margin(f64::INFINITY, 5.0, 10.0).p_wrong(), 0.0);
+    }
+}

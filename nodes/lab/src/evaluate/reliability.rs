@@ -1,0 +1,212 @@
+//! Reliability of verdicts: probabilities and covariances as stated, against errors as observed.
+
+use std::ops::Range;
+
+use plotters::prelude::*;
+
+use super::statistics::{Share, median};
+use super::trial::{Judged, OURS, Trial};
+use crate::AnyError;
+use crate::report::plot::{Layout, chart, svg};
+use crate::report::{Cell, Figure, Report, Section, Table};
+
+/// Errors beyond which a pose is one of another place: metres of the seen points, and degrees.
+const ELSEWHERE: (f64, f64) = (0.5, 15.0);
+/// Stated probabilities that are counted together.
+const DECADES: [Range<f64>; 5] = [0.1..1.0, 1e-2..0.1, 1e-3..1e-2, 1e-4..1e-3, 0.0..1e-4];
+/// Share that is drawn for none, and where stated ones that are less are drawn.
+const LEAST: f64 = 2e-5;
+const STATED: RGBColor = RGBColor(0, 114, 178);
+
+/// Trials of one evaluation, with its name.
+pub type Set = (String, Vec<Trial>);
+
+/// Report of how often poses are wrong by the probability that was stated, and of the errors by the covariance.
+pub fn reliability_report(sets: &[Set]) -> Result<Report, AnyError> {
+    let (m, degrees) = ELSEWHERE;
+    let lead = format!(
+        "Poses found without a start, whatever their verdict. A pose is at another place if the seen points are {m} m from \
+         where they should be on average, or it is turned by {degrees} degrees; shares with 95 % intervals."
+    );
+    let sections = vec![stated(sets)?, errors(sets)];
+    let command = "lattice evaluate reliability".to_owned();
+    Ok(Report::new(
+        "Verdicts, stated and observed",
+        lead,
+        command,
+        sections,
+    ))
+}
+
+/// Poses with what was said of them; clouds that belong nowhere are left out.
+fn judged(trials: &[Trial]) -> impl Iterator<Item = (&Trial, &Judged, f64)> {
+    let ours = trials
+        .iter()
+        .filter(|t| t.method == OURS && t.cell.start == "none");
+    let somewhere = ours.filter(|t| !t.cell.scene.starts_with("wrong input/"));
+    somewhere.filter_map(|t| {
+        let judged = t.judged.as_ref()?;
+        Some((t, judged, judged.p_wrong?))
+    })
+}
+
+fn is_elsewhere(trial: &Trial) -> bool {
+    trial.view_m > ELSEWHERE.0 || trial.rotation_deg > ELSEWHERE.1
+}
+
+/// A bin of stated probabilities: their mean, and the share that was wrong.
+struct Bin {
+    stated: f64,
+    observed: Share,
+}
+
+fn bins(sets: &[Set]) -> Vec<(Range<f64>, Bin)> {
+    let bin = |range: &Range<f64>| {
+        let all = sets.iter().flat_map(|(_, trials)| judged(trials));
+        let within: Vec<(&Trial, f64)> = all
+            .filter(|(_, _, p)| range.contains(p))
+            .map(|(trial, _, p)| (trial, p))
+            .collect();
+        let sum: f64 = within.iter().map(|(_, p)| p).sum();
+        let bin = Bin {
+            stated: sum / within.len().max(1) as f64,
+            observed: Share::of(within.iter().map(|(trial, _)| is_elsewhere(trial))),
+        };
+        (range.clone(), bin)
+    };
+    DECADES.iter().map(bin).collect()
+}
+
+fn stated(sets: &[Set]) -> Result<Section, AnyError> {
+    let all = bins(sets);
+    let line = |(range, bin): &(Range<f64>, Bin)| -> Vec<Cell> {
+        let counts = sets.iter().map(|(_, trials)| {
+            let within = judged(trials).filter(|(_, _, p)| range.contains(p));
+            let elsewhere = within.map(|(trial, _, _)| is_elsewhere(trial));
+            let Share { k, n, .. } = Share::of(elsewhere);
+            Cell::from(format!("{k} of {n}"))
+        });
+        let mut cells = vec![
+            format!("{} to {}", range.start, range.end).into(),
+            format!("{:.1e}", bin.stated).into(),
+            bin.observed.text(2).into(),
+        ];
+        cells.extend(counts);
+        cells
+    };
+    let names: String = sets.iter().map(|(name, _)| format!("|{name}")).collect();
+    let columns = format!("stated probability|its mean|at another place{names}");
+    let title = "Probability that a pose is at another place";
+    let rows: Vec<Vec<Cell>> = all.iter().map(line).collect();
+    Ok(Section {
+        tables: vec![Table::new("stated", title, &columns, rows)],
+        figures: vec![diagram(&all)?],
+        ..Section::measured("stated", title, "")
+    })
+}
+
+/// Observed share over the stated probability; a line where they are equal.
+fn diagram(bins: &[(Range<f64>, Bin)]) -> Result<Figure, AnyError> {
+    let shown = |share: f64| share.clamp(LEAST, 1.0);
+    let layout = Layout::new((430, 330), [1, 1], 170, &[(STATED, "share, 95 %")]);
+    let picture = svg(&layout, |areas| {
+        for area in areas {
+            let x = ("stated probability", (LEAST..1.0).log_scale());
+            let y = ("share at another place", (LEAST..1.0).log_scale());
+            let mut chart = chart(area, "all sets", x, y, &[])?;
+            let equal = [LEAST, 1.0].map(|p| (p, p));
+            chart.draw_series(LineSeries::new(equal, BLACK.mix(0.4)))?;
+            for (_, bin) in bins {
+                let Some(share) = bin.observed.share else {
+                    continue;
+                };
+                let x = shown(bin.stated);
+                let ends = [bin.observed.low, bin.observed.high].map(|y| (x, shown(y)));
+                chart.draw_series([PathElement::new(ends, STATED)])?;
+                chart.draw_series([Circle::new((x, shown(share)), 4, STATED.filled())])?;
+            }
+        }
+        Ok(())
+    })?;
+    let caption =
+        "Share of poses at another place by the probability that was stated; right is the line";
+    Ok(Figure::new("reliability", caption, picture))
+}
+
+fn errors(sets: &[Set]) -> Section {
+    let line = |(name, trials): &Set| -> Vec<Cell> {
+        let accepted = judged(trials).filter(|(trial, _, _)| trial.is_accepted());
+        let nees: Vec<f64> = accepted.filter_map(|(_, judged, _)| judged.nees).collect();
+        let mean = nees.iter().sum::<f64>() / nees.len().max(1) as f64;
+        vec![
+            name.as_str().into(),
+            nees.len().into(),
+            Cell::number(median(nees.iter().copied()), 1),
+            Cell::number((!nees.is_empty()).then_some(mean), 1),
+            Cell::number(nees.iter().copied().reduce(f64::max), 0),
+        ]
+    };
+    let columns = "set|accepted|median NEES|mean NEES|largest";
+    let title = "Normalised squared error of the accepted, 6 degrees of freedom: 6 is right on average, 5.3 in the median";
+    let rows: Vec<Vec<Cell>> = sets.iter().map(line).collect();
+    Section {
+        tables: vec![Table::new("nees", title, columns, rows)],
+        ..Section::measured("nees", "Errors against the stated covariance", "")
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::evaluate::Cell as TrialCell;
+    use nalgebra::{Isometry3, Point3};
+
+    fn trial(scene: &str, off_m: f64, p_wrong: f64) -> Trial {
+        let cell = TrialCell {
+            scene: scene.to_owned(),
+            seed: 0,
+            q: 0.0,
+            start: "none".to_owned(),
+        };
+        let (pose, truth) = (
+            Isometry3::translation(off_m, 0.0, 0.0),
+            Isometry3::identity(),
+        );
+        Trial {
+            judged: Some(Judged {
+                verdict: "OK".to_owned(),
+                reason: String::new(),
+                chosen: String::new(),
+                margin: None,
+                p_wrong: Some(p_wrong),
+                chance: None,
+                unexplained: None,
+                inliers: 1.0,
+                nees: Some(4.0),
+            }),
+            ..Trial::of_pose(&cell, OURS, &pose, &truth, &[Point3::origin()], 0.0)
+        }
+    }
+
+    #[test]
+    fn poses_are_counted_where_their_probability_is() {
+        let trials = [
+            (9.0, 0.02),
+            (0.1, 0.05),
+            (0.1, 0.03),
+            (0.1, 0.05),
+            (0.1, 1e-9),
+        ];
+        let mut trials: Vec<Trial> = trials.map(|(off, p)| trial("desk", off, p)).into();
+        // A cloud that belongs nowhere says nothing of places.
+        trials.push(trial("wrong input/of another building", 9.0, 0.02));
+        let report = reliability_report(&[("house".to_owned(), trials)]).unwrap();
+        let text = crate::report::markdown(&report);
+        assert!(
+            text.contains("0.01 to 0.1 | 3.8e-2 | 25.00 % of 4"),
+            "{text}"
+        );
+        assert!(text.contains("| 1 of 4"), "{text}");
+        assert!(text.contains("house | 5 | 4.0 | 4.0 | 4"), "{text}");
+    }
+}
