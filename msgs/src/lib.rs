@@ -14,6 +14,7 @@ pub mod cdr;
 pub mod diagnostic_msgs;
 pub mod geographic_msgs;
 pub mod geometry_msgs;
+pub mod headset;
 mod interface;
 pub mod lattice;
 pub mod lifecycle_msgs;

@@ -3,7 +3,7 @@
 use crate::interface::RosMessage;
 use crate::{
     action, action_msgs, builtin_interfaces, calibration, diagnostic_msgs, geographic_msgs,
-    geometry_msgs, lattice, lifecycle_msgs, nav_msgs, novatel_oem7_msgs, octomap_msgs,
+    geometry_msgs, headset, lattice, lifecycle_msgs, nav_msgs, novatel_oem7_msgs, octomap_msgs,
     rcl_interfaces, rmw_dds_common, rosbag2_interfaces, rosgraph_msgs, sensor_msgs, std_msgs,
     std_srvs, tf2_msgs, type_description_interfaces, unique_identifier_msgs, vision_msgs,
     visualization_msgs,
@@ -26,6 +26,7 @@ pub fn visit_messages(visitor: &mut impl MessageVisitor) {
     diagnostic_msgs::visit_messages(visitor);
     geographic_msgs::visit_messages(visitor);
     geometry_msgs::visit_messages(visitor);
+    headset::visit_messages(visitor);
     lattice::visit_messages(visitor);
     lattice::visit_services(visitor);
     lifecycle_msgs::visit_messages(visitor);

@@ -3,6 +3,8 @@
 use std::io::{Write, stdout};
 use std::process::ExitCode;
 
+#[cfg(feature = "headset")]
+use crate::headset_cloud;
 use crate::running::Running;
 use crate::start::{Declare, NodeError, Start};
 #[cfg(feature = "viewer")]
@@ -18,6 +20,8 @@ use lattice_runtime::ros_args::RosArgs;
 /// Every node that can share a process, in the order in which data flows.
 pub const NODES: &[(&str, Start)] = &[
     ("semantic_cloud", semantic_cloud::node::start),
+    #[cfg(feature = "headset")]
+    ("headset_cloud", headset_cloud::node::start),
     ("enu_transformer", enu_transformer::node::start),
     ("lattice_mapper", lattice_mapper::node::start),
     (
@@ -32,6 +36,8 @@ pub const NODES: &[(&str, Start)] = &[
 /// Readers of the parameters of those nodes.
 pub const PARAMETERS: &[(&str, Declare)] = &[
     ("semantic_cloud", semantic_cloud::declare),
+    #[cfg(feature = "headset")]
+    ("headset_cloud", headset_cloud::declare),
     ("enu_transformer", enu_transformer::declare),
     ("lattice_mapper", lattice_mapper::declare),
     ("voxel_marker_publisher", voxel_marker_publisher::declare),

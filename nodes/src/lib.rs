@@ -5,14 +5,19 @@
 pub mod bag_player;
 #[cfg(feature = "bags")]
 pub mod bag_recorder;
+pub mod camera;
 pub mod compute;
 pub mod convert;
 pub mod enu_transformer;
 pub mod executables;
 pub mod files;
+#[cfg(feature = "headset")]
+pub mod headset_cloud;
 pub mod lattice_mapper;
 pub mod map_follower;
 mod map_input;
+#[cfg(feature = "headset")]
+pub mod mesh;
 mod options;
 #[cfg(feature = "bags")]
 pub mod replay;

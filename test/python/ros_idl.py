@@ -226,6 +226,20 @@ CalibrationResult = ros(
     headset_scans=uint32,
     points=uint64,
 )
+HeadsetMesh = ros(
+    "lattice_msgs/msg/HeadsetMesh",
+    header=Header,
+    session=str,
+    surface=str,
+    removed=bool,
+    chunk=uint32,
+    chunks=uint32,
+    pose=Pose,
+    vertices=sequence[float32],
+    triangles=sequence[uint32],
+    classes=sequence[uint16],
+)
+PoseStamped = ros("geometry_msgs/msg/PoseStamped", header=Header, pose=Pose)
 ASKS = {"has_guess": bool, "guess": Pose, "session": str}
 ANSWERS = {"success": bool, "message": str, "result": CalibrationResult}
 CalibrateRequest = ros("lattice_msgs/srv/Calibrate_Request", **ASKED, **ASKS)

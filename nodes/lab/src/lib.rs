@@ -10,7 +10,7 @@ pub mod bench;
 pub mod datasets;
 pub mod evaluate;
 mod matching;
-pub mod mesh;
+pub use lattice_nodes::mesh;
 pub mod metrics;
 mod options;
 pub mod paper;

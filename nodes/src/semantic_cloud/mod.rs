@@ -2,39 +2,33 @@
 //!
 //! [`SemanticCloud`] is a state machine without I/O; [`node`] runs it behind DDS.
 
-mod camera;
 #[cfg_attr(
     not(feature = "compressed_depth"),
     expect(dead_code, reason = "errors of PNG files")
 )]
 mod compressed;
 mod counts;
-mod distortion;
-mod image;
 pub mod node;
 mod options;
 mod parameters;
 mod project;
 mod waiting;
 
-pub use camera::{Camera, CameraError};
+pub use crate::camera::{Camera, CameraError, Content, ImageError, ImageView};
 pub use counts::{CloudCounts, CloudReport, PointCounts};
-pub use image::{Content, ImageError, ImageView};
 pub use options::CloudOptions;
 pub use parameters::declare;
 pub use project::PointOptions;
 pub use waiting::{PairOptions, Stream};
 
-use std::collections::BTreeSet;
 use std::sync::Arc;
 
-use lattice_core::registration::UNLABELED;
-use lattice_msgs::sensor_msgs::{CameraInfo, CompressedImage, Image, PointCloud2, PointField};
+use lattice_msgs::sensor_msgs::{CameraInfo, CompressedImage, Image, PointCloud2};
 use lattice_msgs::vision_msgs::LabelInfo;
 
-use self::project::{Classes, POINT_STEP, Views};
+use self::project::Views;
 use self::waiting::{Left, Set, Waiting};
-use crate::convert::cloud::{dense_cloud, field, xyz_fields};
+use crate::camera::Classes;
 
 /// Output of the machine.
 #[derive(Clone, Debug, PartialEq)]
@@ -67,12 +61,7 @@ impl SemanticCloud {
     pub fn new(options: CloudOptions) -> Self {
         Self {
             waiting: Waiting::new(options.pair.clone()),
-            classes: Classes {
-                class_of: (0..=u16::MAX)
-                    .map(|class| options.class_of(class))
-                    .collect(),
-                min_confidence: 0.0,
-            },
+            classes: Classes::new(&options.classes),
             options,
             info: None,
             camera: None,
@@ -86,9 +75,7 @@ impl SemanticCloud {
     /// Goes on with other options; the names of the classes are told anew.
     pub fn set_options(&mut self, options: CloudOptions) -> Vec<CloudOutput> {
         self.waiting.set_options(options.pair.clone());
-        self.classes.class_of = (0..=u16::MAX)
-            .map(|class| options.class_of(class))
-            .collect();
+        self.classes.set_rules(&options.classes);
         self.options = options;
         if let Some(info) = self.info.take() {
             self.on_camera_info(info);
@@ -162,8 +149,7 @@ impl SemanticCloud {
 
     /// Takes the names of the classes.
     pub fn on_label_info(&mut self, info: Arc<LabelInfo>) -> Vec<CloudOutput> {
-        let threshold = info.threshold;
-        self.classes.min_confidence = if threshold.is_nan() { 0.0 } else { threshold };
+        self.classes.set_threshold(info.threshold);
         self.label_info = Some(info);
         self.names().into_iter().collect()
     }
@@ -234,31 +220,14 @@ impl SemanticCloud {
             },
             rays: &self.rays,
         };
-        let data = views.points(&self.options.points, &self.classes, &mut self.counts.points);
+        let points = views.points(&self.options.points, &self.classes, &mut self.counts.points);
         self.counts.clouds_out += 1;
-        let mut fields = xyz_fields(PointField::FLOAT32, 4);
-        fields.push(field("label", 12, PointField::UINT16));
-        fields.push(field("confidence", 14, PointField::FLOAT32));
-        let points = data.len() / POINT_STEP;
-        Some(dense_cloud(
-            set.depth.header.clone(),
-            fields,
-            POINT_STEP as u32,
-            points,
-            data,
-        ))
+        Some(points.cloud(set.depth.header.clone()))
     }
 
     /// Names of the classes that points may have.
     fn names(&self) -> Option<CloudOutput> {
-        let mut info = LabelInfo::clone(self.label_info.as_deref()?);
-        let from = info
-            .class_map
-            .iter()
-            .map(|class| self.options.class_of(class.class_id));
-        let used: BTreeSet<u16> = from.filter(|class| *class != UNLABELED).collect();
-        info.class_map
-            .retain(|class| used.contains(&class.class_id));
+        let info = self.options.classes.names(self.label_info.as_deref()?);
         Some(CloudOutput::LabelInfo(info))
     }
 

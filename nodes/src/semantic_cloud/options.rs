@@ -1,11 +1,8 @@
 //! Options of a [`super::SemanticCloud`].
 
-use std::collections::{BTreeMap, BTreeSet};
-
-use lattice_core::registration::UNLABELED;
-
 use super::project::PointOptions;
 use super::waiting::PairOptions;
+use crate::camera::ClassRules;
 use lattice_runtime::params::{ParamError, Params};
 
 /// Most images of a topic that a parameter may let wait.
@@ -22,10 +19,8 @@ pub struct CloudOptions {
     pub rectified: bool,
     /// Choice of the pixels that become points.
     pub points: PointOptions,
-    /// Classes that say nothing.
-    pub ignored: BTreeSet<u16>,
-    /// Class that others count as.
-    pub groups: BTreeMap<u16, u16>,
+    /// Meaning of the classes.
+    pub classes: ClassRules,
 }
 
 impl Default for CloudOptions {
@@ -44,8 +39,7 @@ impl Default for CloudOptions {
                 max_range_m: f64::INFINITY,
                 edge_jump: 0.05,
             },
-            ignored: BTreeSet::new(),
-            groups: BTreeMap::new(),
+            classes: ClassRules::default(),
         }
     }
 }
@@ -70,8 +64,6 @@ impl CloudOptions {
             return Err(params.invalid("min_range_m", problem));
         }
         let edge_jump = params.f64_in("edge_jump", 0.05, 0.0..=1e9)?;
-        let ignored = params.i64_array("ignored_labels", &[])?;
-        let ignored: Result<_, _> = ignored.into_iter().map(u16::try_from).collect();
         Ok(Self {
             pair: PairOptions {
                 queue_size: params.usize_in("queue_size", pair.queue_size, 1..=MAX_QUEUE)?,
@@ -90,32 +82,7 @@ impl CloudOptions {
                     edge_jump as f32
                 },
             },
-            ignored: ignored.map_err(|_| {
-                params.invalid("ignored_labels", "expected numbers from 0 to 65535")
-            })?,
-            groups: groups(params)?,
+            classes: ClassRules::from_params(params)?,
         })
     }
-
-    /// Class of a point by the number of its pixel.
-    pub fn class_of(&self, number: u16) -> u16 {
-        match self.ignored.contains(&number) {
-            true => UNLABELED,
-            false => self.groups.get(&number).copied().unwrap_or(number),
-        }
-    }
-}
-
-fn groups(params: &Params) -> Result<BTreeMap<u16, u16>, ParamError> {
-    let numbers = params.i64_array("group_labels", &[])?;
-    let (pairs, rest) = numbers.as_chunks::<2>();
-    let class = |v: i64| u16::try_from(v).ok().filter(|class| *class != UNLABELED);
-    let pairs = pairs
-        .iter()
-        .map(|&[from, to]| Some((class(from)?, class(to)?)));
-    let groups: Option<BTreeMap<_, _>> = rest.is_empty().then(|| pairs.collect()).flatten();
-    groups.ok_or_else(|| {
-        let problem = "expected two numbers for each class, itself and its group, from 0 to 65534";
-        params.invalid("group_labels", problem)
-    })
 }

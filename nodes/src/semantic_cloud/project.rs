@@ -3,10 +3,7 @@
 use lattice_core::registration::UNLABELED;
 
 use super::counts::PointCounts;
-use super::image::ImageView;
-
-/// Bytes of a point: x, y, z in f32, label in u16, confidence in f32.
-pub const POINT_STEP: usize = 18;
+use crate::camera::{Classes, ImageView, LabelledPoints, Sampled};
 
 /// Choice of the pixels that become points.
 #[derive(Clone, Debug, PartialEq)]
@@ -19,15 +16,6 @@ pub struct PointOptions {
     pub max_range_m: f64,
     /// Largest difference to the depths of the eight pixels around, as a fraction of the smaller; infinite: any.
     pub edge_jump: f32,
-}
-
-/// Meaning of the numbers in label images.
-#[derive(Clone, Debug)]
-pub struct Classes {
-    /// Class of a point by the number of its pixel; all 65536.
-    pub class_of: Vec<u16>,
-    /// Labels of less confidence are none.
-    pub min_confidence: f32,
 }
 
 /// Images of one time with the rays of the depth image's pixels.
@@ -43,20 +31,20 @@ pub struct Views<'a> {
 }
 
 impl Views<'_> {
-    /// Records of the points, little endian.
+    /// The points, row by row.
     pub fn points(
         &self,
         options: &PointOptions,
         classes: &Classes,
         counts: &mut PointCounts,
-    ) -> Vec<u8> {
+    ) -> LabelledPoints {
         let (width, height) = (self.depth.width, self.depth.height);
         let mut depths_m = Vec::with_capacity(width * height);
         (0..height).for_each(|row| self.depth.depths_m(row, &mut depths_m));
         let edges = Edges::new(&depths_m, width, options.edge_jump);
         let stride = options.stride.max(1);
-        let mut data =
-            Vec::with_capacity(width.div_ceil(stride) * height.div_ceil(stride) * POINT_STEP);
+        let most = width.div_ceil(stride) * height.div_ceil(stride);
+        let mut points = LabelledPoints::with_capacity(most);
         let mut labels = Sampled::new(self.labels, width, ImageView::classes);
         let confidence = self.confidence;
         let mut confidence =
@@ -99,65 +87,13 @@ impl Views<'_> {
                     .as_ref()
                     .map_or(1.0, |c| c.at(column).unwrap_or(0.0));
                 let number = labels.at(column).unwrap_or(UNLABELED);
-                let class = classes.class_of.get(usize::from(number)).copied();
-                let known =
-                    class.filter(|class| *class != UNLABELED && worth >= classes.min_confidence);
+                let known = classes.known(number, worth);
                 counts.points_unlabelled += u64::from(known.is_none());
-                for v in point_m {
-                    data.extend_from_slice(&v.to_le_bytes());
-                }
-                data.extend_from_slice(&known.unwrap_or(UNLABELED).to_le_bytes());
-                data.extend_from_slice(&known.map_or(0.0, |_| worth).to_le_bytes());
+                points.push(point_m, known, worth);
             }
         }
-        counts.points += (data.len() / POINT_STEP) as u64;
-        data
-    }
-}
-
-/// Rows of an image, read at the columns of another by nearest neighbour.
-struct Sampled<'a, T> {
-    view: ImageView<'a>,
-    read: fn(&ImageView<'a>, usize, &mut Vec<T>),
-    columns: Vec<usize>,
-    row: Option<usize>,
-    numbers: Vec<T>,
-}
-
-/// Place in `to` pixels under the centre of a pixel of `from`.
-fn nearest(at: usize, from: usize, to: usize) -> usize {
-    (2 * at + 1) * to / (2 * from)
-}
-
-impl<'a, T: Copy> Sampled<'a, T> {
-    fn new(
-        view: ImageView<'a>,
-        width: usize,
-        read: fn(&ImageView<'a>, usize, &mut Vec<T>),
-    ) -> Self {
-        Self {
-            columns: (0..width)
-                .map(|column| nearest(column, width, view.width))
-                .collect(),
-            view,
-            read,
-            row: None,
-            numbers: Vec::new(),
-        }
-    }
-
-    /// Goes to a row of the other image.
-    fn seek(&mut self, row: usize, height: usize) {
-        let row = nearest(row, height, self.view.height);
-        if self.row != Some(row) {
-            self.row = Some(row);
-            self.numbers.clear();
-            (self.read)(&self.view, row, &mut self.numbers);
-        }
-    }
-
-    fn at(&self, column: usize) -> Option<T> {
-        self.numbers.get(*self.columns.get(column)?).copied()
+        counts.points += points.len() as u64;
+        points
     }
 }
 

@@ -6,6 +6,7 @@ mod calibration;
 mod client;
 mod conformance;
 mod cyclone;
+mod headset;
 mod losses;
 mod params;
 mod peer;

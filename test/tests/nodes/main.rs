@@ -2,6 +2,7 @@
 
 mod enu_transformer;
 mod free_space;
+mod headset_cloud;
 mod lattice_mapper;
 mod lattice_mapper_services;
 mod map_follower;

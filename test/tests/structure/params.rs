@@ -3,11 +3,13 @@
 
 use std::collections::BTreeMap;
 
+use lattice_core::pose::Axes;
 use lattice_lab::datasets;
 use lattice_nodes::bag_player;
 use lattice_nodes::enu_transformer::TransformerOptions;
 use lattice_nodes::executables::PARAMETERS;
 use lattice_nodes::lattice_mapper::MapperOptions;
+use lattice_nodes::semantic_icp_server::ServerOptions;
 use lattice_runtime::params::{ParamValue, Params};
 use lattice_runtime::ros_args::RosArgs;
 
@@ -26,6 +28,7 @@ fn nodes() -> impl Iterator<Item = (&'static str, &'static str, Params)> {
     all.map(|(node, declare)| {
         let file = match node {
             "semantic_cloud" => "rgbd.yaml",
+            "headset_cloud" => "headset.yaml",
             "semantic_icp_server" => "semantic_icp.yaml",
             "viewer_server" => "viewer.yaml",
             _ => "bobcat.yaml",
@@ -108,9 +111,16 @@ fn every_parameter_is_described_with_its_unit() {
 
 #[test]
 fn the_headset_has_a_map_with_labels() {
-    let params = params("semantic_icp.yaml", "/lattice_mapper");
-    let options = MapperOptions::from_params(&params).unwrap();
-    assert!(options.labels.is_some() && params.unused().is_empty());
+    for file in ["semantic_icp.yaml", "headset.yaml"] {
+        let params = params(file, "/lattice_mapper");
+        let options = MapperOptions::from_params(&params).unwrap();
+        assert!(options.labels.is_some() && params.unused().is_empty());
+    }
+    // The clouds of headset_cloud have the axes of ROS.
+    let params = params("headset.yaml", "/semantic_icp_server");
+    let options = ServerOptions::from_params(&params).unwrap();
+    assert_eq!(options.semantic.axes, Axes::RosFlu);
+    assert!(params.unused().is_empty());
 }
 
 #[test]
@@ -120,7 +130,9 @@ fn the_file_in_place_of_octomap_server_has_parameters_that_there_are() {
         "octomap_server",
         "voxel_marker_publisher",
     ];
-    for ((_, declare), name) in PARAMETERS.iter().skip(1).zip(names) {
+    let nodes = PARAMETERS.iter();
+    let nodes = nodes.skip_while(|(node, _)| *node != "enu_transformer");
+    for ((_, declare), name) in nodes.zip(names) {
         let params = params("octomap_compat.yaml", &format!("/robot/{name}"));
         declare(&params).unwrap();
         assert_eq!(params.unused(), [""; 0], "{name}");

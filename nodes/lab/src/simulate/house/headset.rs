@@ -49,6 +49,18 @@ pub struct HouseScan {
     pub regions: Vec<u16>,
     /// Position of the camera in headset_origin, metres.
     pub sensor_m: Point3<f64>,
+    /// Pose of the camera: x forward, y left, z up, both in ROS axes.
+    pub headset_from_camera: Isometry3<f64>,
+}
+
+impl HouseScan {
+    /// Pixels in a row and rows of the camera; its axis is in the middle.
+    pub const PIXELS: [usize; 2] = PIXELS;
+
+    /// Focal length of the camera, pixels.
+    pub fn focal_px() -> f64 {
+        PIXELS[0] as f64 / 2.0 / (HFOV_DEG.to_radians() / 2.0).tan()
+    }
 }
 
 /// A headset before a scene, with the truth.
@@ -278,6 +290,7 @@ fn look(
         points_m: Vec::with_capacity(camera.pixels()),
         regions: Vec::with_capacity(camera.pixels()),
         sensor_m: headset_from_house * origin_m,
+        headset_from_camera: headset_from_house * pose,
     };
     for (pixel, region) in regions.iter().enumerate() {
         let direction = (pose.rotation * camera.direction(pixel)).normalize();

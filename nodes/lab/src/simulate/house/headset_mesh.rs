@@ -115,7 +115,8 @@ impl Volume {
         });
         let triangles: Vec<[u32; 3]> = triangles.collect();
         let none = vec![0; triangles.len()];
-        LabelledMesh::new(vertices_m.collect(), triangles, none.clone(), none)
+        let mesh = LabelledMesh::new(vertices_m.collect(), triangles, none.clone(), none)?;
+        Ok(mesh)
     }
 }
 

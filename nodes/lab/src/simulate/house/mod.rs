@@ -26,8 +26,7 @@ mod tests;
 mod warp;
 
 pub use building::House;
-pub use headset::HeadsetTrial;
-pub(crate) use headset::HouseScan;
+pub use headset::{HeadsetTrial, HouseScan};
 pub use labels::{LabelDraw, RegionLabels};
 pub(crate) use laser::LaserView;
 pub use robot::{Survey, SurveyOptions};

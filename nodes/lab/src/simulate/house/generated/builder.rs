@@ -97,6 +97,7 @@ impl Builder {
     }
 
     pub(super) fn build(self) -> Result<LabelledMesh, AnyError> {
-        LabelledMesh::new(self.vertices_m, self.triangles, self.labels, self.instances)
+        let mesh = LabelledMesh::new(self.vertices_m, self.triangles, self.labels, self.instances)?;
+        Ok(mesh)
     }
 }

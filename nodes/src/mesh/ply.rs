@@ -1,13 +1,11 @@
 //! Meshes from PLY files: the elements `vertex` and `face`.
 
-use super::{LabelledMesh, MAX_TRIANGLES};
-use crate::AnyError;
+use super::{LabelledMesh, MeshError};
+use crate::files::points::PointFileError;
+use crate::files::points::ply::header::{Element, Header, Property};
+use crate::files::points::ply::{axes, number, record};
+use crate::files::points::source::Source;
 use lattice_core::registration::UNLABELED;
-use lattice_nodes::files::points::ply::header::{Element, Header, Property};
-use lattice_nodes::files::points::ply::{axes, number, record};
-use lattice_nodes::files::points::source::Source;
-use lattice_nodes::files::points::{self, PointFileError};
-use std::path::Path;
 
 /// Most corners of a polygon.
 const MAX_CORNERS: usize = 1024;
@@ -40,17 +38,10 @@ struct Face {
     instance: f64,
 }
 
-/// A mesh file with a class and an instance for each triangle.
-///
-/// PLY, also packed with bzip2: vertices with `x`, `y`, `z` (metres), faces with a list `vertex_indices`
-/// or `vertex_index` and numbers `label` and `instance`. Polygons become fans of triangles. Without
-/// labels all are [`UNLABELED`], without instances each label is one.
-pub fn read_mesh(path: &Path, max_triangles: usize) -> Result<LabelledMesh, AnyError> {
-    let (reader, _) = points::open(path)?;
-    read(&mut Source::new(reader), max_triangles.min(MAX_TRIANGLES))
-}
-
-fn read(source: &mut Source, max_triangles: usize) -> Result<LabelledMesh, AnyError> {
+/// Reads vertices with `x`, `y`, `z` (metres), faces with a list `vertex_indices` or `vertex_index` and numbers
+/// `label` and `instance`. Polygons become fans of triangles. Without labels all are [`UNLABELED`], without
+/// instances each label is one.
+pub(super) fn read(source: &mut Source, max_triangles: usize) -> Result<LabelledMesh, MeshError> {
     let header = Header::read(source)?;
     let mut parts = Parts::default();
     for name in ["vertex", "face"] {
@@ -72,7 +63,7 @@ fn read(source: &mut Source, max_triangles: usize) -> Result<LabelledMesh, AnyEr
         instances,
     } = parts;
     LabelledMesh::new(vertices_m, triangles, labels, instances)
-        .map_err(|error| format!("the file was read, but is no mesh: {error}").into())
+        .map_err(|error| MeshError::NoMesh(Box::new(error)))
 }
 
 fn line(header: &Header, reason: String) -> PointFileError {
@@ -120,15 +111,12 @@ fn read_faces(
     element: &Element,
     max_triangles: usize,
     parts: &mut Parts,
-) -> Result<(), AnyError> {
+) -> Result<(), MeshError> {
     let columns = face_columns(element).map_err(|reason| line(header, reason))?;
-    let too_many = |triangles: u64| {
-        format!(
-            "the file has {triangles} triangles or more, but at most {max_triangles} are allowed: simplify the mesh"
-        )
-    };
+    let max = max_triangles;
+    let too_many = |triangles: u64| MeshError::FileTooLarge { triangles, max };
     if element.count > max_triangles as u64 {
-        return Err(too_many(element.count).into());
+        return Err(too_many(element.count));
     }
     parts.triangles.reserve(element.count.min(TRUSTED) as usize);
     let mut face = Face::default();
@@ -159,7 +147,7 @@ fn read_faces(
             reason: format!("{reason}, in {part}"),
         })?;
         if parts.triangles.len() > max_triangles {
-            return Err(too_many(parts.triangles.len() as u64).into());
+            return Err(too_many(parts.triangles.len() as u64));
         }
     }
     Ok(())

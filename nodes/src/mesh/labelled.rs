@@ -1,6 +1,6 @@
 //! A triangle mesh with a class and an instance for each triangle.
 
-use crate::AnyError;
+use super::MeshError;
 
 /// Most triangles, and vertices, of a mesh.
 pub const MAX_TRIANGLES: usize = 20_000_000;
@@ -26,39 +26,41 @@ impl LabelledMesh {
         triangles: Vec<[u32; 3]>,
         labels: Vec<u16>,
         instances: Vec<u16>,
-    ) -> Result<LabelledMesh, AnyError> {
+    ) -> Result<LabelledMesh, MeshError> {
         for (what, found) in [
             ("vertices", vertices_m.len()),
             ("triangles", triangles.len()),
         ] {
             if found > MAX_TRIANGLES {
-                return Err(
-                    format!("{found} {what}, but at most {MAX_TRIANGLES} are taken").into(),
-                );
+                let max = MAX_TRIANGLES;
+                return Err(MeshError::TooMany { what, found, max });
             }
         }
         for (what, found) in [("labels", labels.len()), ("instances", instances.len())] {
             if found != triangles.len() {
-                return Err(format!("{found} {what} for {} triangles", triangles.len()).into());
+                let triangles = triangles.len();
+                return Err(MeshError::Count {
+                    what,
+                    found,
+                    triangles,
+                });
             }
         }
         for (vertex, point) in vertices_m.iter().enumerate() {
             let beyond = |c: &&f32| !(-MAX_COORDINATE_M..=MAX_COORDINATE_M).contains(*c);
-            if let Some(value) = point.iter().find(beyond) {
-                return Err(format!(
-                    "vertex {vertex} is at {value} m, not within {MAX_COORDINATE_M} m; check the unit or move the \
-                     mesh to its origin"
-                )
-                .into());
+            if let Some(&value) = point.iter().find(beyond) {
+                let max = MAX_COORDINATE_M;
+                return Err(MeshError::Beyond { vertex, value, max });
             }
         }
         let vertices = vertices_m.len();
         for (triangle, corners) in triangles.iter().enumerate() {
-            if let Some(vertex) = corners.iter().find(|&&v| v as usize >= vertices) {
-                return Err(format!(
-                    "triangle {triangle} has vertex {vertex}, but there are {vertices}"
-                )
-                .into());
+            if let Some(&vertex) = corners.iter().find(|&&v| v as usize >= vertices) {
+                return Err(MeshError::Index {
+                    triangle,
+                    vertex,
+                    vertices,
+                });
             }
         }
         Ok(LabelledMesh {
@@ -69,29 +71,32 @@ impl LabelledMesh {
         })
     }
 
+    /// Triangles.
     pub fn len(&self) -> usize {
         self.triangles.len()
     }
 
+    /// True without triangles.
     pub fn is_empty(&self) -> bool {
         self.triangles.is_empty()
     }
 
-    #[cfg(test)]
+    /// The vertices, metres.
     pub fn vertices_m(&self) -> &[[f32; 3]] {
         &self.vertices_m
     }
 
     /// The vertices of each triangle; all of them are there.
-    #[cfg(test)]
     pub fn triangles(&self) -> &[[u32; 3]] {
         &self.triangles
     }
 
+    /// The class of each triangle.
     pub fn labels(&self) -> &[u16] {
         &self.labels
     }
 
+    /// The instance of each triangle.
     pub fn instances(&self) -> &[u16] {
         &self.instances
     }

@@ -1,6 +1,6 @@
 //! Lens distortion as OpenCV and ROS define it, and its inverse.
 
-use super::camera::CameraError;
+use super::pinhole::CameraError;
 
 /// Steps of the inverse; a ray that needs more is outside the model.
 const MAX_STEPS: usize = 50;

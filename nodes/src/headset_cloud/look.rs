@@ -1,0 +1,186 @@
+//! Clouds of what a headset sees of its mesh.
+
+use lattice_core::pose::Axes;
+use lattice_core::registration::UNLABELED;
+use nalgebra::{Isometry3, Matrix3, Point3, Vector3};
+
+use super::counts::LookCounts;
+use crate::camera::{Classes, ImageView, LabelledPoints, Sampled};
+use crate::mesh::{LabelledMesh, MeshError, MeshScene};
+
+/// Fewest hits by which a mesh is said to be inside out.
+const MIN_HITS: u64 = 20;
+
+/// Choice of the pixels that become points.
+#[derive(Clone, Debug, PartialEq)]
+pub struct LookOptions {
+    /// Every so many columns and rows.
+    pub stride: usize,
+    /// Hits nearer to the camera are none, m.
+    pub min_range_m: f64,
+    /// Hits farther from the camera are none, m.
+    pub max_range_m: f64,
+    /// True if images are refused that see most of the mesh from behind.
+    pub check_winding: bool,
+}
+
+/// A mesh in headset_origin, sorted for ray casting.
+pub(super) struct Room {
+    mesh: LabelledMesh,
+    scene: MeshScene,
+}
+
+/// An image of labels with what its pixels see.
+pub(super) struct Look<'a> {
+    /// Labels, of any size.
+    pub labels: ImageView<'a>,
+    /// Confidences, of any size.
+    pub confidence: Option<ImageView<'a>>,
+    /// x / z and y / z of each pixel of the camera; NaN: none.
+    pub rays: &'a [[f32; 2]],
+    /// Pixels in a row of the camera.
+    pub width: usize,
+    /// Place of the camera and its turn from optical axes, both in headset_origin and the axes of ROS.
+    pub camera: (Point3<f64>, Matrix3<f64>),
+}
+
+/// `ros_from_optical` of a camera: its pose is in the axes of the headset, its own axes are given.
+pub(super) fn placed(
+    origin_from_camera: &Isometry3<f64>,
+    headset: Axes,
+    camera: Axes,
+) -> (Point3<f64>, Matrix3<f64>) {
+    let place = headset.to_ros(origin_from_camera.translation.vector);
+    let turn = origin_from_camera.rotation.to_rotation_matrix();
+    // Each of these matrices is orthonormal: its transpose is the way back.
+    let camera_from_optical = camera.matrix().transpose() * Axes::Optical.matrix();
+    let ros_from_optical = headset.matrix() * turn.matrix() * camera_from_optical;
+    (place.into(), ros_from_optical)
+}
+
+impl Room {
+    /// Sorts a mesh.
+    pub fn new(mesh: LabelledMesh) -> Result<Self, MeshError> {
+        let scene = MeshScene::new_fast(&mesh)?;
+        Ok(Self { mesh, scene })
+    }
+
+    /// The points that the pixels see, or how many of how many were seen from behind.
+    pub fn see(
+        &self,
+        look: &Look,
+        options: &LookOptions,
+        classes: &Classes,
+        counts: &mut LookCounts,
+    ) -> Result<LabelledPoints, [u64; 2]> {
+        let width = look.width.max(1);
+        let height = look.rays.len() / width;
+        let stride = options.stride.max(1);
+        let (origin_m, ros_from_optical) = &look.camera;
+        let mut labels = Sampled::new(look.labels, width, ImageView::classes);
+        let confidence = look.confidence;
+        let mut confidence =
+            confidence.map(|view| Sampled::new(view, width, ImageView::confidences));
+        let (mut points, mut new) = (LabelledPoints::default(), LookCounts::default());
+        let (mut hits, mut behind) = (0, 0);
+        for row in (0..height).step_by(stride) {
+            labels.seek(row, height);
+            if let Some(confidence) = &mut confidence {
+                confidence.seek(row, height);
+            }
+            for column in (0..width).step_by(stride) {
+                let Some(&[x, y]) = look.rays.get(row * width + column) else {
+                    continue;
+                };
+                new.pixels += 1;
+                if x.is_nan() {
+                    new.pixels_no_ray += 1;
+                    continue;
+                }
+                let ray = Vector3::new(f64::from(x), f64::from(y), 1.0);
+                let direction = (ros_from_optical * ray).normalize();
+                let hit = self.scene.cast(origin_m, &direction, options.max_range_m);
+                let near = |distance_m: f64| distance_m < options.min_range_m;
+                let Some(hit) = hit.filter(|hit| !near(hit.distance_m)) else {
+                    new.pixels_no_mesh += 1;
+                    continue;
+                };
+                hits += 1;
+                behind += u64::from(self.is_behind(hit.triangle, &direction));
+                let point_m = (origin_m + direction * hit.distance_m).coords;
+                let worth = confidence
+                    .as_ref()
+                    .map_or(1.0, |c| c.at(column).unwrap_or(0.0));
+                let number = labels.at(column).unwrap_or(UNLABELED);
+                let class = classes.known(number, worth);
+                new.points_unlabelled += u64::from(class.is_none());
+                points.push(point_m.map(|c| c as f32).into(), class, worth);
+            }
+        }
+        if options.check_winding && hits >= MIN_HITS && 2 * behind > hits {
+            return Err([behind, hits]);
+        }
+        new.points = points.len() as u64;
+        counts.add(&new);
+        Ok(points)
+    }
+
+    /// Points all over the mesh, one for so much of it, with the class of its triangles.
+    pub fn sampled(
+        &self,
+        spacing_m: f64,
+        max_points: usize,
+        classes: &Classes,
+        counts: &mut LookCounts,
+    ) -> LabelledPoints {
+        let triangles = || self.mesh.corners_m().zip(self.mesh.labels());
+        let area_m2 = |corners: [[f32; 3]; 3]| {
+            let [a, b, c] = corners.map(|p| Vector3::from(p.map(f64::from)));
+            0.5 * (b - a).cross(&(c - a)).norm()
+        };
+        let all_m2: f64 = triangles().map(|(corners, _)| area_m2(corners)).sum();
+        let each_m2 = (spacing_m * spacing_m).max(all_m2 / max_points.max(1) as f64);
+        let (mut points, mut saved_m2, mut number) = (LabelledPoints::default(), 0.0, 0_u32);
+        for (corners, label) in triangles() {
+            let [a, b, c] = corners.map(|p| Vector3::from(p.map(f64::from)));
+            saved_m2 += area_m2(corners);
+            while saved_m2 >= each_m2 && points.len() < max_points {
+                saved_m2 -= each_m2;
+                number = number.wrapping_add(1);
+                // Two irrational steps fill a square evenly; half of it is folded onto the other.
+                let step = |part: f64| (f64::from(number) * part).fract();
+                let (mut u, mut v) = (step(0.754_877_666_246_693), step(0.569_840_290_998_053));
+                if u + v > 1.0 {
+                    (u, v) = (1.0 - u, 1.0 - v);
+                }
+                let point_m = a + (b - a) * u + (c - a) * v;
+                let class = classes.known(*label, 1.0);
+                counts.points_unlabelled += u64::from(class.is_none());
+                points.push(point_m.map(|c| c as f32).into(), class, 1.0);
+            }
+        }
+        counts.points += points.len() as u64;
+        points
+    }
+
+    /// True if a ray meets a triangle from where its corners go clockwise.
+    fn is_behind(&self, triangle: usize, direction: &Vector3<f64>) -> bool {
+        let corners = self.mesh.triangles().get(triangle);
+        let vertex = |v: u32| self.mesh.vertices_m().get(v as usize).copied();
+        let corners = corners.map(|corners| corners.map(|v| vertex(v).unwrap_or_default()));
+        let [a, b, c] = corners
+            .unwrap_or_default()
+            .map(|p| Vector3::from(p.map(f64::from)));
+        (b - a).cross(&(c - a)).dot(direction) > 0.0
+    }
+}
+
+impl LookCounts {
+    fn add(&mut self, other: &Self) {
+        self.pixels += other.pixels;
+        self.pixels_no_ray += other.pixels_no_ray;
+        self.pixels_no_mesh += other.pixels_no_mesh;
+        self.points += other.points;
+        self.points_unlabelled += other.points_unlabelled;
+    }
+}

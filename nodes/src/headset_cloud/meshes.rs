@@ -1,0 +1,109 @@
+//! Meshes and sessions as they come.
+
+use std::sync::Arc;
+
+use lattice_msgs::headset::HeadsetMesh;
+use lattice_msgs::visualization_msgs::Marker;
+
+use super::marker::{FromMarker, from_marker};
+use super::refusal::{MeshRefusal, shown};
+use super::session::Told;
+use super::surfaces::Change;
+use super::{HeadsetCloud, HeadsetOutput};
+use crate::mesh::LabelledMesh;
+
+/// Name of the surface that a file is.
+const FILE: &str = "file";
+
+impl HeadsetCloud {
+    /// Takes a surface, a chunk of it, or word that it is gone.
+    pub fn on_mesh(&mut self, message: &Arc<HeadsetMesh>) -> Vec<HeadsetOutput> {
+        self.counts.meshes_in += 1;
+        let mut outputs = Vec::new();
+        match self.take_mesh(message, &mut outputs) {
+            Ok(change) => self.changed(change, message.header.stamp.to_ns()),
+            Err(refusal) => self.refuse("mesh", refusal.name(), &refusal.to_string()),
+        }
+        outputs.extend(self.serve());
+        outputs
+    }
+
+    /// Takes a marker of triangles as a surface of the session that holds.
+    pub fn on_marker(&mut self, marker: &Marker) -> Vec<HeadsetOutput> {
+        match from_marker(marker) {
+            FromMarker::Surface(surface) => return self.on_mesh(&Arc::new(surface)),
+            FromMarker::RemoveAll(prefix) => {
+                let removed = self.surfaces.remove_all(&prefix);
+                let change = Change {
+                    removed,
+                    ..Change::default()
+                };
+                self.changed(change, marker.header.stamp.to_ns());
+            }
+            FromMarker::Refused(reason, problem) => self.refuse("marker", reason, problem),
+        }
+        self.counts.meshes_in += 1;
+        Vec::new()
+    }
+
+    /// Takes a mesh that is there from the start, in the frame and axes of the headset.
+    pub fn on_mesh_file(&mut self, mesh: &LabelledMesh) -> Result<(), MeshRefusal> {
+        let change = self.surfaces.on_file(FILE, mesh)?;
+        self.changed(change, 0);
+        Ok(())
+    }
+
+    /// Takes the session of the headset: another one than before means another origin.
+    pub fn on_session(&mut self, text: &str) {
+        match self.session.on_topic(text) {
+            Told::Same | Told::First => {}
+            Told::Another => self.begin_session(),
+            Told::Ended => self.refuse("session", "malformed", "its text is too long"),
+        }
+    }
+
+    fn take_mesh(
+        &mut self,
+        message: &Arc<HeadsetMesh>,
+        outputs: &mut Vec<HeadsetOutput>,
+    ) -> Result<Change, MeshRefusal> {
+        self.surfaces.check(message)?;
+        let stamp_ns = message.header.stamp.to_ns();
+        let told = self.session.on_mesh(&message.session, stamp_ns);
+        if told == Told::Ended {
+            return Err(MeshRefusal::OtherSession {
+                surface: shown(&message.surface),
+                found: shown(&message.session),
+            });
+        }
+        if told == Told::Another {
+            self.begin_session();
+        }
+        if told != Told::Same {
+            outputs.push(HeadsetOutput::Session(message.session.clone()));
+        }
+        self.surfaces.on_mesh(message)
+    }
+
+    /// Forgets what was known in the origin before.
+    fn begin_session(&mut self) {
+        self.counts.sessions += 1;
+        self.surfaces.clear();
+        self.poses.clear();
+        self.drop_waiting(Some("other_session"));
+        self.room = None;
+        self.changed_ns = None;
+    }
+
+    fn changed(&mut self, change: Change, stamp_ns: i64) {
+        let counts = &mut self.counts;
+        counts.surfaces_replaced += change.replaced;
+        counts.surfaces_removed += change.removed;
+        counts.triangles_degenerate += change.degenerate;
+        counts.drop_some("mesh", "incomplete", change.incomplete);
+        if change.replaced + change.removed > 0 {
+            self.room = None;
+            self.changed_ns = Some(stamp_ns);
+        }
+    }
+}

@@ -1,0 +1,355 @@
+//! From the mesh of a headset and labels of its camera to clouds for `semantic_icp_server`.
+//!
+//! [`HeadsetCloud`] is a state machine without I/O; [`node`] runs it behind DDS.
+
+mod chunks;
+mod counts;
+mod look;
+mod marker;
+mod meshes;
+pub mod node;
+mod options;
+mod parameters;
+mod poses;
+mod refusal;
+mod session;
+mod surfaces;
+mod waiting;
+
+pub use counts::{HeadsetCounts, HeadsetReport, LookCounts};
+pub use look::LookOptions;
+pub use options::{HeadsetOptions, LabelsFrom, PoseSource};
+pub use parameters::declare;
+pub use refusal::MeshRefusal;
+pub use surfaces::MeshOptions;
+pub use waiting::HeadsetStream;
+
+use std::sync::Arc;
+
+use lattice_msgs::geometry_msgs::PoseStamped;
+use lattice_msgs::sensor_msgs::{CameraInfo, Image, PointCloud2};
+use lattice_msgs::tf2_msgs::TFMessage;
+use lattice_msgs::vision_msgs::LabelInfo;
+use nalgebra::Isometry3;
+
+use self::look::{Look, Room, placed};
+use self::poses::{PoseAt, Poses};
+use self::session::Session;
+use self::surfaces::Surfaces;
+use self::waiting::{LabelSet, Waiting};
+use crate::camera::{Camera, Classes, Content, ImageView};
+use crate::convert::geometry::header;
+
+/// Output of the machine.
+#[derive(Clone, Debug, PartialEq)]
+pub enum HeadsetOutput {
+    /// For `headset/points`: in the frame of the headset and the axes of ROS.
+    Points(PointCloud2),
+    /// For `headset/label_info`: the names of the classes in `headset/points`.
+    LabelInfo(LabelInfo),
+    /// For `headset/session`: one that the meshes have told of.
+    Session(String),
+}
+
+/// Keeps the surfaces of a headset's mesh, and casts the pixels of its label images on them.
+///
+/// Input is checked before it waits, and nothing is allocated by what headers say. The newest
+/// `camera_info` holds for all images, of any size, over the same view.
+pub struct HeadsetCloud {
+    options: HeadsetOptions,
+    surfaces: Surfaces,
+    /// The mesh for rays, made with its first image; none in it: it cannot be used.
+    room: Option<Option<Room>>,
+    /// Stamp of the newest change of the mesh that no cloud was made of.
+    changed_ns: Option<i64>,
+    session: Session,
+    poses: Poses,
+    waiting: Waiting,
+    info: Option<Arc<CameraInfo>>,
+    camera: Option<Camera>,
+    /// Rays of the camera, made with its first image.
+    rays: Vec<[f32; 2]>,
+    label_info: Option<Arc<LabelInfo>>,
+    classes: Classes,
+    counts: HeadsetCounts,
+    problem: Option<String>,
+}
+
+impl HeadsetCloud {
+    /// A machine that has seen nothing.
+    pub fn new(options: HeadsetOptions) -> Self {
+        Self {
+            surfaces: Surfaces::new(options.mesh.clone()),
+            room: None,
+            changed_ns: None,
+            session: Session::default(),
+            poses: Poses::new(&options),
+            waiting: Waiting::default(),
+            info: None,
+            camera: None,
+            rays: Vec::new(),
+            label_info: None,
+            classes: Classes::new(&options.classes),
+            counts: HeadsetCounts::default(),
+            problem: None,
+            options,
+        }
+    }
+
+    /// Goes on with other options; the names of the classes are told anew.
+    pub fn set_options(&mut self, options: HeadsetOptions) -> Vec<HeadsetOutput> {
+        self.surfaces.set_options(options.mesh.clone());
+        self.classes.set_rules(&options.classes);
+        self.options = options;
+        self.camera = None;
+        let mut out: Vec<_> = self.names().into_iter().collect();
+        if let Some(info) = self.info.take() {
+            out.extend(self.on_camera_info(info));
+        }
+        out
+    }
+
+    /// Takes an image.
+    pub fn on_image(&mut self, stream: HeadsetStream, image: Arc<Image>) -> Vec<HeadsetOutput> {
+        let (count, content) = match stream {
+            HeadsetStream::Labels => (&mut self.counts.labels_in, Content::Labels),
+            HeadsetStream::Confidence => (&mut self.counts.confidence_in, Content::Confidence),
+        };
+        *count += 1;
+        if let Err(error) = ImageView::new(&image, content, self.options.max_image_pixels) {
+            self.refuse(stream.name(), error.name(), &error.to_string());
+            return Vec::new();
+        }
+        let [repeated, oldest] = self.waiting.push(stream, image, self.options.queue_size);
+        let reason = self.missing(stream);
+        self.counts.drop_some(stream.name(), "repeated", repeated);
+        self.counts.drop_some(stream.name(), reason, oldest);
+        self.serve()
+    }
+
+    /// Takes the calibration of the camera. One that cannot be used leaves the node without.
+    pub fn on_camera_info(&mut self, info: Arc<CameraInfo>) -> Vec<HeadsetOutput> {
+        let (width, height) = (info.width, info.height);
+        let pixels = u64::from(width) * u64::from(height);
+        let found = Camera::new(&info, self.options.rectified);
+        let max = self.options.max_image_pixels;
+        let refused = match &found {
+            Err(error) => Some((error.name(), error.to_string())),
+            Ok(_) if pixels == 0 || pixels > max as u64 => {
+                let problem =
+                    format!("{width} x {height} pixels, not from 1 to `max_image_pixels` {max}");
+                Some(("size", problem))
+            }
+            Ok(_) => None,
+        };
+        let camera = found.ok().filter(|_| refused.is_none());
+        if let Some((reason, problem)) = refused {
+            self.refuse("camera_info", reason, &problem);
+        }
+        if self.camera != camera {
+            self.rays = Vec::new();
+            self.camera = camera;
+        }
+        self.info = Some(info);
+        self.serve()
+    }
+
+    /// Takes the names of the classes.
+    pub fn on_label_info(&mut self, info: Arc<LabelInfo>) -> Vec<HeadsetOutput> {
+        self.classes.set_threshold(info.threshold);
+        self.label_info = Some(info);
+        self.names().into_iter().collect()
+    }
+
+    /// Takes a pose of the camera in the frame of the headset.
+    pub fn on_pose(&mut self, pose: &PoseStamped) -> Vec<HeadsetOutput> {
+        self.counts.poses_in += 1;
+        let frame = &self.options.mesh.headset_frame;
+        match self.poses.on_pose(pose, frame) {
+            Ok(()) => self.serve(),
+            Err((reason, problem)) => {
+                self.refuse("pose", reason, &problem);
+                Vec::new()
+            }
+        }
+    }
+
+    /// Takes transforms.
+    pub fn on_tf(&mut self, message: &TFMessage, is_static: bool) -> Vec<HeadsetOutput> {
+        self.counts.poses_in += message.transforms.len() as u64;
+        let refused = self.poses.on_tf(message, is_static);
+        self.counts.drop_some("transform", "refused", refused);
+        self.serve()
+    }
+
+    /// Makes a cloud of the mesh itself, if that is asked for and it has changed.
+    pub fn tick(&mut self) -> Vec<HeadsetOutput> {
+        if self.options.labels_from == LabelsFrom::Image {
+            return Vec::new();
+        }
+        let Some(stamp_ns) = self.changed_ns.take() else {
+            return Vec::new();
+        };
+        self.build_room();
+        let Some(Some(room)) = &self.room else {
+            return Vec::new();
+        };
+        let (spacing_m, max_points) = (self.options.spacing_m, self.options.max_points);
+        let counts = &mut self.counts.look;
+        let points = room.sampled(spacing_m, max_points, &self.classes, counts);
+        if points.is_empty() {
+            return Vec::new();
+        }
+        self.counts.clouds_out += 1;
+        let header = header(&self.options.mesh.headset_frame, stamp_ns);
+        vec![HeadsetOutput::Points(points.cloud(header))]
+    }
+
+    /// Ends the input: what still waits is counted.
+    pub fn finish(&mut self) -> Vec<HeadsetOutput> {
+        let outputs = self.tick();
+        self.drop_waiting(None);
+        outputs
+    }
+
+    /// Counters of messages, surfaces, pixels and points, by reason.
+    pub fn counts(&self) -> &HeadsetCounts {
+        &self.counts
+    }
+
+    /// Images that wait for others, and surfaces that wait for chunks.
+    pub fn waiting(&self) -> [usize; 2] {
+        [self.waiting.len(), self.surfaces.waiting()]
+    }
+
+    /// Surfaces that are known, and their triangles.
+    pub fn mesh_size(&self) -> [usize; 2] {
+        [self.surfaces.len(), self.surfaces.triangles()]
+    }
+
+    /// True if there is a camera to cast rays from.
+    pub fn has_camera(&self) -> bool {
+        self.camera.is_some()
+    }
+
+    /// The last refusal in words.
+    pub fn problem(&self) -> Option<&str> {
+        self.problem.as_deref()
+    }
+
+    /// Clouds of all images whose pose is known by now.
+    fn serve(&mut self) -> Vec<HeadsetOutput> {
+        let mut outputs = Vec::new();
+        if self.camera.is_none() || self.surfaces.len() == 0 {
+            return outputs;
+        }
+        for (stamp_ns, frame) in self.waiting.ready(self.options.use_confidence) {
+            let origin = &self.options.mesh.headset_frame;
+            let pose = match self.poses.at(origin, &frame, stamp_ns) {
+                PoseAt::Later => continue,
+                PoseAt::Known(pose) => Some(pose),
+                PoseAt::Never => None,
+            };
+            let Some(set) = self.waiting.take(stamp_ns) else {
+                continue;
+            };
+            match pose {
+                Some(pose) => outputs.extend(self.cloud(&set, &pose).map(HeadsetOutput::Points)),
+                None => {
+                    let problem = "there is no pose at its stamp, only before and behind";
+                    self.refuse("labels", "no_pose", problem);
+                }
+            }
+        }
+        outputs
+    }
+
+    fn cloud(&mut self, set: &LabelSet, pose: &Isometry3<f64>) -> Option<PointCloud2> {
+        self.build_room();
+        let camera = self.camera.as_ref()?;
+        let Some(Some(room)) = &self.room else {
+            self.counts.drop_some("labels", "no_mesh", 1);
+            return None;
+        };
+        if self.rays.is_empty() {
+            self.rays = camera.rays();
+        }
+        let max = self.options.max_image_pixels;
+        let view = |image, content| ImageView::new(image, content, max).ok();
+        let look = Look {
+            labels: view(&set.labels, Content::Labels)?,
+            confidence: match &set.confidence {
+                Some(confidence) => Some(view(confidence, Content::Confidence)?),
+                None => None,
+            },
+            rays: &self.rays,
+            width: camera.width as usize,
+            camera: placed(pose, self.options.pose_axes(), self.options.camera_axes),
+        };
+        let counts = &mut self.counts.look;
+        match room.see(&look, &self.options.look, &self.classes, counts) {
+            Ok(points) if points.is_empty() => {
+                let problem = "none of its rays meets the mesh";
+                self.refuse("labels", "sees_no_mesh", problem);
+                None
+            }
+            Ok(points) => {
+                self.counts.clouds_out += 1;
+                let stamp_ns = set.labels.header.stamp.to_ns();
+                let header = header(&self.options.mesh.headset_frame, stamp_ns);
+                Some(points.cloud(header))
+            }
+            Err([behind, hits]) => {
+                let problem = format!(
+                    "the mesh is inside out, {behind} of {hits} rays meet it from behind: check `headset_axes`, \
+                     or turn its triangles"
+                );
+                self.refuse("labels", "mesh_inside_out", &problem);
+                None
+            }
+        }
+    }
+
+    /// Makes the mesh for rays if it has changed.
+    fn build_room(&mut self) {
+        if self.room.is_some() {
+            return;
+        }
+        let room = self.surfaces.merged().and_then(Room::new);
+        if let Err(error) = &room {
+            self.refuse("mesh", error.name(), &error.to_string());
+        }
+        self.room = Some(room.ok());
+    }
+
+    /// Names of the classes that points may have.
+    fn names(&self) -> Option<HeadsetOutput> {
+        let info = self.options.classes.names(self.label_info.as_deref()?);
+        Some(HeadsetOutput::LabelInfo(info))
+    }
+
+    /// Reason for which images wait.
+    fn missing(&self, stream: HeadsetStream) -> &'static str {
+        match stream {
+            HeadsetStream::Confidence => "no_labels",
+            HeadsetStream::Labels if self.camera.is_none() => "no_camera_info",
+            HeadsetStream::Labels if self.surfaces.len() == 0 => "no_mesh",
+            HeadsetStream::Labels => "no_pose",
+        }
+    }
+
+    fn drop_waiting(&mut self, reason: Option<&'static str>) {
+        let streams = [HeadsetStream::Labels, HeadsetStream::Confidence];
+        let reasons = streams.map(|stream| reason.unwrap_or_else(|| self.missing(stream)));
+        let numbers = self.waiting.clear();
+        for ((stream, reason), number) in streams.into_iter().zip(reasons).zip(numbers) {
+            self.counts.drop_some(stream.name(), reason, number);
+        }
+    }
+
+    fn refuse(&mut self, topic: &str, reason: &str, problem: &str) {
+        self.counts.drop_some(topic, reason, 1);
+        self.problem = Some(format!("{topic}: {problem}"));
+        log::debug!("{topic} refused: {problem}");
+    }
+}

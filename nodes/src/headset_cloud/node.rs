@@ -1,0 +1,275 @@
+//! The machine as a ROS node: a thin shell around [`HeadsetCloud`].
+
+use std::path::Path;
+use std::sync::Arc;
+use std::sync::atomic::{AtomicU64, Ordering};
+use std::time::Duration;
+
+use lattice_msgs::geometry_msgs::PoseStamped;
+use lattice_msgs::headset::HeadsetMesh;
+use lattice_msgs::sensor_msgs::{CameraInfo, Image, PointCloud2};
+use lattice_msgs::std_msgs;
+use lattice_msgs::tf2_msgs::TFMessage;
+use lattice_msgs::vision_msgs::LabelInfo;
+use lattice_msgs::visualization_msgs::Marker;
+
+use super::parameters::Settings;
+use super::{
+    HeadsetCloud, HeadsetOptions, HeadsetOutput, HeadsetReport, HeadsetStream, LabelsFrom,
+    PoseSource,
+};
+use crate::compute::{Compute, Inbox};
+use crate::mesh::read_mesh;
+use crate::report;
+use crate::start::{Finish, NodeError, handed_over, open_params};
+use lattice_runtime::logging::Throttle;
+use lattice_runtime::qos::Qos;
+use lattice_runtime::{Diagnostics, Level, Load, Losses, Node, Publisher, Runtime, Subscription};
+
+/// Event for the compute thread.
+enum Event {
+    Mesh(Arc<HeadsetMesh>),
+    Marker(Arc<Marker>),
+    Session(Arc<std_msgs::String>),
+    Image(HeadsetStream, Arc<Image>),
+    CameraInfo(Arc<CameraInfo>),
+    LabelInfo(Arc<LabelInfo>),
+    Pose(Arc<PoseStamped>),
+    Transforms(Arc<TFMessage>, bool),
+    Tick,
+    Settings(Box<HeadsetOptions>),
+    Finish,
+}
+
+/// Starts the node.
+pub fn start(runtime: &Runtime, name: &str) -> Result<Finish, NodeError> {
+    let node = runtime.node(name)?;
+    let params = node.params();
+    let settings = Settings::from_params(params)?;
+    let mut machine = HeadsetCloud::new(settings.headset.clone());
+    if !settings.mesh_file.is_empty() {
+        let max_triangles = settings.headset.mesh.max_triangles;
+        let read = read_mesh(Path::new(&settings.mesh_file), max_triangles);
+        let taken = match &read {
+            Ok(mesh) => machine.on_mesh_file(mesh).map_err(|e| e.to_string()),
+            Err(error) => Err(error.to_string()),
+        };
+        taken.map_err(|problem| params.invalid("mesh_file", problem))?;
+    }
+    let (lost, losses) = (Arc::new(AtomicU64::new(0)), Losses::default());
+    let mut shell = Shell {
+        machine,
+        points: node.publisher("headset/points", Qos::SCANS)?,
+        label_info: node.publisher("headset/label_info", Qos::LATCHED)?,
+        session: node.publisher("headset/session", Qos::LATCHED)?,
+        diagnostics: node.diagnostics(),
+        lost: Arc::clone(&lost),
+        losses: losses.clone(),
+        warnings: Throttle::new(Duration::from_secs(5)),
+        warned: 0,
+        report_file: settings.report_file,
+    };
+    let shutdown = runtime.shutdown_handle();
+    let compute = Compute::spawn(name, settings.limits, shutdown, move |event| {
+        shell.on(event)
+    })?;
+    let inbox = compute.inbox();
+    let inputs = subscribe(&node, &inbox, &lost, &settings.headset)?;
+    losses.watch(&inputs);
+    let looks = inbox.clone();
+    let looks = runtime.timer(Duration::from_millis(500), move || {
+        let _ = looks.send(Event::Tick, 0);
+    });
+    open_params(params, move |params| {
+        let settings = Settings::from_params(params).map_err(|error| error.to_string())?;
+        handed_over(inbox.send(Event::Settings(Box::new(settings.headset)), 0))
+    });
+    Ok(Box::new(move || {
+        drop((inputs, looks));
+        compute.finish_with(Event::Finish);
+        Box::new(())
+    }))
+}
+
+fn subscribe(
+    node: &Node,
+    inbox: &Inbox<Event>,
+    lost: &Arc<AtomicU64>,
+    options: &HeadsetOptions,
+) -> Result<Vec<Subscription>, NodeError> {
+    let size = |mesh: &Arc<HeadsetMesh>| {
+        4 * (mesh.vertices.len() + mesh.triangles.len()) + 2 * mesh.classes.len()
+    };
+    let mesh = inbox.counting(lost, Event::Mesh, size);
+    let marker = inbox.counting(lost, Event::Marker, |marker| 24 * marker.points.len());
+    let session = inbox.counting(lost, Event::Session, |session| session.data.len());
+    let names = inbox.counting(lost, Event::LabelInfo, |_| 0);
+    let mut inputs = vec![
+        node.subscribe("headset/mesh", Qos::reliable(1000), Load::Large, mesh)?,
+        node.subscribe(
+            "headset/mesh_marker",
+            Qos::reliable(1000),
+            Load::Large,
+            marker,
+        )?,
+        node.subscribe("headset/session", Qos::LATCHED, Load::Small, session)?,
+        node.subscribe(
+            "headset/labels/label_info",
+            Qos::LATCHED,
+            Load::Small,
+            names,
+        )?,
+    ];
+    if options.labels_from == LabelsFrom::Mesh {
+        return Ok(inputs);
+    }
+    let bytes = |image: &Arc<Image>| size_of::<Image>() + image.data.len();
+    let labels = |image| Event::Image(HeadsetStream::Labels, image);
+    let labels = inbox.counting(lost, labels, bytes);
+    inputs.push(node.subscribe("headset/labels/image", Qos::SENSOR, Load::Large, labels)?);
+    if options.use_confidence {
+        let confidence = |image| Event::Image(HeadsetStream::Confidence, image);
+        let confidence = inbox.counting(lost, confidence, bytes);
+        let topic = "headset/labels/confidence";
+        inputs.push(node.subscribe(topic, Qos::SENSOR, Load::Large, confidence)?);
+    }
+    let camera = inbox.counting(lost, Event::CameraInfo, |_| 0);
+    inputs.push(node.subscribe("headset/camera_info", Qos::SENSOR, Load::Small, camera)?);
+    match options.poses {
+        PoseSource::Topic => {
+            let pose = inbox.counting(lost, Event::Pose, |_| 0);
+            inputs.push(node.subscribe("headset/pose", Qos::INS, Load::Small, pose)?);
+        }
+        PoseSource::Tf => {
+            let moving = inbox.counting(lost, |m| Event::Transforms(m, false), |_| 0);
+            inputs.push(node.subscribe("/tf", Qos::TF, Load::Small, moving)?);
+            let fixed = inbox.counting(lost, |m| Event::Transforms(m, true), |_| 0);
+            let latched = Qos::TF_STATIC_LISTENER;
+            inputs.push(node.subscribe("/tf_static", latched, Load::Small, fixed)?);
+        }
+    }
+    Ok(inputs)
+}
+
+/// State of the compute thread.
+struct Shell {
+    machine: HeadsetCloud,
+    points: Publisher<PointCloud2>,
+    label_info: Publisher<LabelInfo>,
+    session: Publisher<std_msgs::String>,
+    diagnostics: Diagnostics,
+    /// Messages that found the inbox full, and those lost before it.
+    lost: Arc<AtomicU64>,
+    losses: Losses,
+    warnings: Throttle,
+    /// Messages dropped when there was a warning last.
+    warned: u64,
+    report_file: String,
+}
+
+impl Shell {
+    fn on(&mut self, event: Event) {
+        let machine = &mut self.machine;
+        let outputs = match event {
+            Event::Mesh(mesh) => machine.on_mesh(&mesh),
+            Event::Marker(marker) => machine.on_marker(&marker),
+            Event::Session(session) => {
+                machine.on_session(&session.data);
+                return;
+            }
+            Event::Image(stream, image) => machine.on_image(stream, image),
+            Event::CameraInfo(info) => machine.on_camera_info(info),
+            Event::LabelInfo(info) => machine.on_label_info(info),
+            Event::Pose(pose) => machine.on_pose(&pose),
+            Event::Transforms(message, is_static) => machine.on_tf(&message, is_static),
+            Event::Settings(options) => machine.set_options(*options),
+            Event::Tick => {
+                let outputs = machine.tick();
+                self.diagnose();
+                outputs
+            }
+            Event::Finish => {
+                let outputs = machine.finish();
+                self.publish(outputs);
+                self.finish();
+                return;
+            }
+        };
+        self.publish(outputs);
+    }
+
+    fn publish(&self, outputs: Vec<HeadsetOutput>) {
+        for output in outputs {
+            let published = match output {
+                HeadsetOutput::Points(points) => self.points.publish(Arc::new(points)),
+                HeadsetOutput::LabelInfo(info) => self.label_info.publish(Arc::new(info)),
+                HeadsetOutput::Session(data) => {
+                    self.session.publish(Arc::new(std_msgs::String { data }))
+                }
+            };
+            if let Err(error) = published {
+                log::debug!("not published: {error}");
+            }
+        }
+    }
+
+    fn report(&self) -> HeadsetReport {
+        HeadsetReport {
+            counts: self.machine.counts().clone(),
+            messages_lost: self.lost.load(Ordering::Relaxed) + self.losses.lost(),
+            undecodable: self.losses.undecodable(),
+            clouds_not_published: self.points.dropped(),
+        }
+    }
+
+    fn diagnose(&mut self) {
+        let report = self.report();
+        let counts = &report.counts;
+        let dropped: u64 = counts.dropped.values().sum();
+        let [surfaces, triangles] = self.machine.mesh_size();
+        let message = if surfaces == 0 {
+            "no mesh yet".to_owned()
+        } else if counts.clouds_out == 0 && dropped == 0 {
+            "no cloud yet".to_owned()
+        } else if dropped == 0 {
+            "making clouds".to_owned()
+        } else {
+            let reasons = counts.dropped.iter().map(|(r, n)| format!("{n} {r}"));
+            let reasons: Vec<_> = reasons.collect();
+            format!("dropped: {}", reasons.join(", "))
+        };
+        let is_good = surfaces > 0 && counts.clouds_out > 0 && dropped == 0;
+        let level = if is_good { Level::Ok } else { Level::Warn };
+        let problem = self.machine.problem().map(str::to_owned);
+        if let Some(problem) = problem.as_ref().filter(|_| dropped > self.warned)
+            && self.warnings.check().is_some()
+        {
+            self.warned = dropped;
+            log::warn!("{message}; last refused: {problem}");
+        }
+        let [images, chunked] = self.machine.waiting();
+        let mut values = report::key_values(&report);
+        for (name, number) in [
+            ("surfaces", surfaces),
+            ("triangles", triangles),
+            ("images_waiting", images),
+            ("surfaces_waiting", chunked),
+        ] {
+            values.push((name.into(), number.to_string()));
+        }
+        values.push(("last_refused".into(), problem.unwrap_or_default()));
+        self.diagnostics.set("clouds", level, message, values);
+    }
+
+    fn finish(&mut self) {
+        self.points.flush(Duration::from_secs(2));
+        let report = self.report();
+        let counts = &report.counts;
+        let (labels_in, clouds_out) = (counts.labels_in, counts.clouds_out);
+        let dropped = &counts.dropped;
+        log::info!("{labels_in} label images in, {clouds_out} clouds out, dropped: {dropped:?}");
+        if let Err(error) = report::write(&self.report_file, &report, &self.diagnostics) {
+            log::error!("{error}");
+        }
+    }
+}

@@ -1,0 +1,291 @@
+//! The mesh of a headset: surfaces by name, in its origin and the axes of ROS.
+
+use std::collections::BTreeMap;
+use std::sync::Arc;
+
+use lattice_core::pose::Axes;
+use lattice_core::registration::UNLABELED;
+use lattice_msgs::headset::HeadsetMesh;
+use nalgebra::{Isometry3, Point3, Vector3};
+
+use super::chunks::Chunks;
+use super::refusal::{MeshRefusal, shown};
+use crate::convert::geometry::isometry_from_pose;
+use crate::mesh::{LabelledMesh, MeshError};
+
+/// Longest name of a surface or a session, bytes.
+const MAX_NAME: usize = 256;
+/// Most chunks of a surface.
+const MAX_CHUNKS: u32 = 1 << 16;
+
+/// Rules for the mesh of a headset.
+#[derive(Clone, Debug, PartialEq, Eq)]
+pub struct MeshOptions {
+    /// Frame that surfaces must be in.
+    pub headset_frame: String,
+    /// Axes of that frame and of the surfaces.
+    pub axes: Axes,
+    /// Most triangles of all surfaces, and vertices.
+    pub max_triangles: usize,
+    /// Most surfaces.
+    pub max_surfaces: usize,
+}
+
+/// A surface, its vertices in the headset's origin and the axes of ROS, seen from where its corners go
+/// counterclockwise.
+struct Surface {
+    stamp_ns: i64,
+    mesh: LabelledMesh,
+}
+
+/// Effect of a message on the mesh.
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
+pub(super) struct Change {
+    /// Surfaces that are new or replaced.
+    pub replaced: u64,
+    /// Surfaces that are gone.
+    pub removed: u64,
+    /// Triangles left out since they have no area.
+    pub degenerate: u64,
+    /// Surfaces forgotten before all of their chunks came.
+    pub incomplete: u64,
+}
+
+/// Surfaces of one session, each replaced whole.
+pub(super) struct Surfaces {
+    options: MeshOptions,
+    surfaces: BTreeMap<String, Surface>,
+    chunks: Chunks,
+}
+
+impl Surfaces {
+    pub fn new(options: MeshOptions) -> Self {
+        Self {
+            options,
+            surfaces: BTreeMap::new(),
+            chunks: Chunks::default(),
+        }
+    }
+
+    /// Goes on with other bounds.
+    pub fn set_options(&mut self, options: MeshOptions) {
+        self.options = options;
+    }
+
+    /// Takes a surface, a chunk of it, or word that it is gone, which were checked.
+    pub fn on_mesh(&mut self, message: &Arc<HeadsetMesh>) -> Result<Change, MeshRefusal> {
+        let stamp_ns = message.header.stamp.to_ns();
+        let there = self.surfaces.get(&message.surface);
+        if there.is_some_and(|there| stamp_ns < there.stamp_ns) {
+            let surface = shown(&message.surface);
+            return Err(MeshRefusal::Stale { surface });
+        }
+        let mut change = Change::default();
+        if message.removed {
+            self.chunks.remove(&message.surface);
+            change.removed = u64::from(self.surfaces.remove(&message.surface).is_some());
+            return Ok(change);
+        }
+        if let Some(chunks) = self.chunks.push(Arc::clone(message))? {
+            let (mesh, degenerate) = self.joined(&chunks)?;
+            change.degenerate = degenerate;
+            change.replaced = 1;
+            self.insert(&message.surface, stamp_ns, mesh)?;
+        }
+        let max_numbers = self.options.max_triangles.saturating_mul(7);
+        change.incomplete = self.chunks.bound(self.options.max_surfaces, max_numbers);
+        Ok(change)
+    }
+
+    /// Takes a mesh in the headset's origin and axes as a surface.
+    pub fn on_file(&mut self, name: &str, mesh: &LabelledMesh) -> Result<Change, MeshRefusal> {
+        let triangles = mesh.triangles().iter().copied();
+        let at = Isometry3::identity();
+        let vertices_m = mesh.vertices_m().iter().copied();
+        let classes = mesh.labels().to_vec();
+        let surface = || shown(name);
+        let (mesh, degenerate) = self
+            .in_ros(&at, vertices_m, triangles.collect(), classes)
+            .map_err(|error| MeshRefusal::Mesh {
+                surface: surface(),
+                error,
+            })?;
+        self.insert(name, 0, mesh)?;
+        Ok(Change {
+            replaced: 1,
+            degenerate,
+            ..Change::default()
+        })
+    }
+
+    /// Forgets the surfaces whose names begin like this; gives how many.
+    pub fn remove_all(&mut self, prefix: &str) -> u64 {
+        let before = self.surfaces.len();
+        self.surfaces.retain(|name, _| !name.starts_with(prefix));
+        (before - self.surfaces.len()) as u64
+    }
+
+    /// Forgets everything.
+    pub fn clear(&mut self) {
+        self.surfaces.clear();
+        self.chunks.clear();
+    }
+
+    /// Surfaces.
+    pub fn len(&self) -> usize {
+        self.surfaces.len()
+    }
+
+    /// Surfaces that wait for chunks.
+    pub fn waiting(&self) -> usize {
+        self.chunks.len()
+    }
+
+    /// Triangles of all surfaces.
+    pub fn triangles(&self) -> usize {
+        self.surfaces.values().map(|s| s.mesh.len()).sum()
+    }
+
+    /// All surfaces as one mesh.
+    pub fn merged(&self) -> Result<LabelledMesh, MeshError> {
+        let (mut vertices_m, mut triangles, mut classes) = (Vec::new(), Vec::new(), Vec::new());
+        for surface in self.surfaces.values() {
+            let first = vertices_m.len() as u32;
+            vertices_m.extend_from_slice(surface.mesh.vertices_m());
+            let shifted = surface.mesh.triangles().iter();
+            triangles.extend(shifted.map(|corners| corners.map(|v| v.saturating_add(first))));
+            classes.extend_from_slice(surface.mesh.labels());
+        }
+        let instances = vec![0; triangles.len()];
+        LabelledMesh::new(vertices_m, triangles, classes, instances)
+    }
+
+    /// Checks the parts of a message that are of one size.
+    pub fn check(&self, message: &HeadsetMesh) -> Result<(), MeshRefusal> {
+        let found = message.header.frame_id.trim_start_matches('/');
+        if found != self.options.headset_frame {
+            return Err(MeshRefusal::Frame {
+                found: shown(found),
+                expected: self.options.headset_frame.clone(),
+            });
+        }
+        let problem = if message.surface.len() > MAX_NAME {
+            "its name is too long"
+        } else if message.removed {
+            return Ok(());
+        } else if message.chunks == 0 || message.chunks > MAX_CHUNKS {
+            "`chunks` is not from 1 to 65536"
+        } else if message.chunk >= message.chunks {
+            "`chunk` is not below `chunks`"
+        } else {
+            return Ok(());
+        };
+        let surface = shown(&message.surface);
+        Err(MeshRefusal::Malformed { surface, problem })
+    }
+
+    /// The mesh of all chunks, and how many of its triangles were left out.
+    fn joined(&self, chunks: &[Arc<HeadsetMesh>]) -> Result<(LabelledMesh, u64), MeshRefusal> {
+        let surface = || shown(chunks.first().map_or("", |chunk| &chunk.surface));
+        let malformed = |problem| MeshRefusal::Malformed {
+            surface: surface(),
+            problem,
+        };
+        let pose = chunks.first().map(|chunk| chunk.pose).unwrap_or_default();
+        let origin_from_surface =
+            isometry_from_pose(&pose).ok_or_else(|| malformed("its pose is none"))?;
+        let numbers: Vec<f32> = chunks.iter().flat_map(|c| &c.vertices).copied().collect();
+        let corners: Vec<u32> = chunks.iter().flat_map(|c| &c.triangles).copied().collect();
+        let mut classes: Vec<u16> = chunks.iter().flat_map(|c| &c.classes).copied().collect();
+        let (vertices_m, rest) = numbers.as_chunks::<3>();
+        if !rest.is_empty() {
+            return Err(malformed("three numbers make a vertex"));
+        }
+        let (triangles, rest) = corners.as_chunks::<3>();
+        if !rest.is_empty() {
+            return Err(malformed("three vertices make a triangle"));
+        }
+        if classes.is_empty() {
+            classes = vec![UNLABELED; triangles.len()];
+        }
+        let vertices_m = vertices_m.iter().copied();
+        self.in_ros(
+            &origin_from_surface,
+            vertices_m,
+            triangles.to_vec(),
+            classes,
+        )
+        .map_err(|error| MeshRefusal::Mesh {
+            surface: surface(),
+            error,
+        })
+    }
+
+    /// A mesh in the axes of ROS, with its triangles turned if those of the headset are left-handed, and
+    /// without those that have no area.
+    fn in_ros(
+        &self,
+        origin_from_surface: &Isometry3<f64>,
+        vertices_m: impl Iterator<Item = [f32; 3]>,
+        triangles: Vec<[u32; 3]>,
+        classes: Vec<u16>,
+    ) -> Result<(LabelledMesh, u64), MeshError> {
+        let axes = self.options.axes;
+        let in_ros = |v: [f32; 3]| -> [f32; 3] {
+            let at = origin_from_surface * Point3::from(v.map(f64::from));
+            axes.to_ros(at.coords).map(|c| c as f32).into()
+        };
+        let turned = axes.matrix().determinant() < 0.0;
+        let triangles = triangles.into_iter();
+        let triangles = triangles.map(|[a, b, c]| if turned { [a, c, b] } else { [a, b, c] });
+        let instances = vec![0; classes.len()];
+        let vertices_m = vertices_m.map(in_ros).collect();
+        let mesh = LabelledMesh::new(vertices_m, triangles.collect(), classes, instances)?;
+        let has_area = mesh.corners_m().map(|corners| {
+            let [a, b, c] = corners.map(|p| Vector3::from(p.map(f64::from)));
+            (b - a).cross(&(c - a)).norm_squared() > 0.0
+        });
+        let has_area: Vec<bool> = has_area.collect();
+        let degenerate = has_area.iter().filter(|has| !**has).count();
+        if degenerate == 0 {
+            return Ok((mesh, 0));
+        }
+        let kept = |i: &usize| has_area.get(*i) == Some(&true);
+        let of = |all: &[u16]| {
+            let all = all.iter().enumerate().filter(|(i, _)| kept(i));
+            all.map(|(_, v)| *v).collect::<Vec<u16>>()
+        };
+        let triangles = mesh.triangles().iter().enumerate();
+        let triangles = triangles.filter(|(i, _)| kept(i)).map(|(_, t)| *t);
+        let (triangles, classes) = (triangles.collect(), of(mesh.labels()));
+        let instances = of(mesh.instances());
+        let mesh = LabelledMesh::new(mesh.vertices_m().to_vec(), triangles, classes, instances)?;
+        Ok((mesh, degenerate as u64))
+    }
+
+    /// Puts a surface in the place of the one of its name, if it is not too large.
+    fn insert(&mut self, name: &str, stamp_ns: i64, mesh: LabelledMesh) -> Result<(), MeshRefusal> {
+        let others = || self.surfaces.iter().filter(|(other, _)| *other != name);
+        let surface = || shown(name);
+        if others().count() >= self.options.max_surfaces {
+            let (surface, max) = (surface(), self.options.max_surfaces);
+            return Err(MeshRefusal::TooManySurfaces { surface, max });
+        }
+        let size = |mesh: &LabelledMesh| mesh.len().max(mesh.vertices_m().len() / 3);
+        let triangles = others().map(|(_, s)| size(&s.mesh)).sum::<usize>() + size(&mesh);
+        if triangles > self.options.max_triangles {
+            return Err(MeshRefusal::TooManyTriangles {
+                surface: surface(),
+                triangles,
+                max: self.options.max_triangles,
+            });
+        }
+        if mesh.is_empty() {
+            self.surfaces.remove(name);
+        } else {
+            let surface = Surface { stamp_ns, mesh };
+            self.surfaces.insert(name.to_owned(), surface);
+        }
+        Ok(())
+    }
+}

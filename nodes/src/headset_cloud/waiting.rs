@@ -1,0 +1,84 @@
+//! Label images that wait for the pose of their time.
+
+use std::collections::BTreeMap;
+use std::sync::Arc;
+
+use lattice_msgs::sensor_msgs::Image;
+
+/// A topic of images.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub enum HeadsetStream {
+    /// Label images, whose stamps the clouds have.
+    Labels,
+    /// Confidences, of exactly the stamp of a label image.
+    Confidence,
+}
+
+impl HeadsetStream {
+    /// Name under which it is counted.
+    pub fn name(self) -> &'static str {
+        match self {
+            Self::Labels => "labels",
+            Self::Confidence => "confidence",
+        }
+    }
+}
+
+/// Labels of one time.
+pub(super) struct LabelSet {
+    pub labels: Arc<Image>,
+    pub confidence: Option<Arc<Image>>,
+}
+
+/// Images of each topic by stamp, in bounded number.
+#[derive(Default)]
+pub(super) struct Waiting {
+    queues: [BTreeMap<i64, Arc<Image>>; 2],
+}
+
+impl Waiting {
+    /// Adds an image; gives how many of its topic leave for it: one of its stamp, and the oldest.
+    pub fn push(
+        &mut self,
+        stream: HeadsetStream,
+        image: Arc<Image>,
+        queue_size: usize,
+    ) -> [u64; 2] {
+        let queue = &mut self.queues[stream as usize];
+        let repeated = queue.insert(image.header.stamp.to_ns(), image).is_some();
+        let mut oldest = 0;
+        while queue.len() > queue_size.max(1) {
+            queue.pop_first();
+            oldest += 1;
+        }
+        [u64::from(repeated), oldest]
+    }
+
+    /// Stamps of labels for which nothing but a pose may be missing, and the frames of their cameras.
+    pub fn ready(&self, with_confidence: bool) -> Vec<(i64, String)> {
+        let [labels, confidences] = &self.queues;
+        let is_whole = |stamp_ns: &i64| !with_confidence || confidences.contains_key(stamp_ns);
+        let ready = labels.iter().filter(|(stamp_ns, _)| is_whole(stamp_ns));
+        let frame = |image: &Image| image.header.frame_id.clone();
+        ready.map(|(at, image)| (*at, frame(image))).collect()
+    }
+
+    /// Takes the images of a stamp.
+    pub fn take(&mut self, stamp_ns: i64) -> Option<LabelSet> {
+        let [labels, confidences] = &mut self.queues;
+        Some(LabelSet {
+            labels: labels.remove(&stamp_ns)?,
+            confidence: confidences.remove(&stamp_ns),
+        })
+    }
+
+    /// Forgets all images, and tells how many labels and confidences they were.
+    pub fn clear(&mut self) -> [u64; 2] {
+        std::mem::take(&mut self.queues).map(|queue| queue.len() as u64)
+    }
+
+    /// Images that wait.
+    pub fn len(&self) -> usize {
+        self.queues.iter().map(BTreeMap::len).sum()
+    }
+}
