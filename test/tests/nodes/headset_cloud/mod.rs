@@ -3,6 +3,7 @@
 mod hostile;
 mod meshes;
 mod scene;
+mod unity;
 
 use std::collections::BTreeMap;
 use std::sync::Arc;
