@@ -16,8 +16,9 @@ use super::types::{
 const INVISIBLE: f64 = 4.0;
 /// Standard deviations of the tilt beyond which a pose certainly leans.
 const LEANING: f64 = 5.0;
-/// Standard deviations of the scale by which it must be beyond what it may be to be wrong.
-const SIGNIFICANT: f64 = 2.0;
+/// Standard deviations of the scale by which it must be beyond what it may be to be wrong: at one, right looks on
+/// warped meshes are refused, at two, clouds that are 5 % too small pass.
+const SIGNIFICANT: f64 = 1.5;
 /// GICP from a given start stands unless another is better by this log-likelihood.
 const DISPLACE: f64 = 10.0;
 
@@ -229,4 +230,24 @@ fn reliability(best: &Candidate) -> Vec<ClassReliability> {
         .map(of)
         .filter(|c| c.weight > 0.0)
         .collect()
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn a_scale_is_wrong_that_is_surely_beyond_its_bound() {
+        let given = CalibrationOptions::default();
+        let is_wrong = |scale, sigma, options: &CalibrationOptions| {
+            misscaled(Some(ScaleEstimate { scale, sigma }), options).is_some()
+        };
+        assert!(is_wrong(1.053, 0.012, &given) && is_wrong(0.9, 0.02, &given));
+        assert!(!is_wrong(1.053, 0.02, &given) && !is_wrong(1.02, 0.001, &given));
+        let estimated = CalibrationOptions {
+            estimate_scale: true,
+            ..given
+        };
+        assert!(!is_wrong(0.9, 0.02, &estimated));
+    }
 }

@@ -181,6 +181,7 @@ mod tests {
                 p_wrong: Some(p_wrong),
                 chance: None,
                 unexplained: None,
+                scale: None,
                 inliers: 1.0,
                 nees: Some(4.0),
             }),

@@ -60,6 +60,9 @@ pub struct Judged {
     /// Independent observations without a partner.
     #[serde(default)]
     pub unexplained: Option<f64>,
+    /// Scale of the points and its standard deviation.
+    #[serde(default)]
+    pub scale: Option<(f64, f64)>,
     pub inliers: f64,
     /// Normalised squared error of the stated covariance, 6 degrees of freedom; None without a covariance.
     pub nees: Option<f64>,
@@ -119,6 +122,9 @@ impl Trial {
                 p_wrong: Some(margin.p_wrong()),
                 chance: Some(margin.chance),
                 unexplained: Some(margin.unexplained),
+                scale: calibration
+                    .scale
+                    .map(|s| (rounded(s.scale), rounded(s.sigma))),
                 inliers: rounded(calibration.inlier_fraction),
                 nees: nees(calibration, truth).map(rounded),
             }),
