@@ -10,7 +10,8 @@ use crate::start::{Declare, NodeError, Start};
 #[cfg(feature = "viewer")]
 use crate::viewer_server;
 use crate::{
-    enu_transformer, lattice_mapper, semantic_cloud, semantic_icp_server, voxel_marker_publisher,
+    enu_transformer, lattice_mapper, segmenter, semantic_cloud, semantic_icp_server,
+    voxel_marker_publisher,
 };
 use lattice_runtime::Runtime;
 use lattice_runtime::logging;
@@ -19,6 +20,7 @@ use lattice_runtime::ros_args::RosArgs;
 
 /// Every node that can share a process, in the order in which data flows.
 pub const NODES: &[(&str, Start)] = &[
+    ("segmenter", segmenter::node::start),
     ("semantic_cloud", semantic_cloud::node::start),
     #[cfg(feature = "headset")]
     ("headset_cloud", headset_cloud::node::start),
@@ -35,6 +37,7 @@ pub const NODES: &[(&str, Start)] = &[
 
 /// Readers of the parameters of those nodes.
 pub const PARAMETERS: &[(&str, Declare)] = &[
+    ("segmenter", segmenter::declare),
     ("semantic_cloud", semantic_cloud::declare),
     #[cfg(feature = "headset")]
     ("headset_cloud", headset_cloud::declare),

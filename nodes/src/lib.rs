@@ -23,6 +23,7 @@ mod options;
 pub mod replay;
 pub mod report;
 pub mod running;
+pub mod segmenter;
 pub mod semantic_cloud;
 pub mod semantic_icp_server;
 mod stamps;

@@ -79,6 +79,10 @@ pub enum Pixel {
     I32,
     /// 32FC1.
     F32,
+    /// rgb8, rgba8 with 4 bytes.
+    Rgb(u8),
+    /// bgr8, 8UC3, bgra8 with 4 bytes.
+    Bgr(u8),
 }
 
 impl Pixel {
@@ -88,6 +92,10 @@ impl Pixel {
             "mono16" | "16UC1" => Some(Self::U16),
             "32SC1" => Some(Self::I32),
             "32FC1" => Some(Self::F32),
+            "rgb8" => Some(Self::Rgb(3)),
+            "rgba8" => Some(Self::Rgb(4)),
+            "bgr8" | "8UC3" => Some(Self::Bgr(3)),
+            "bgra8" | "8UC4" => Some(Self::Bgr(4)),
             _ => None,
         }
     }
@@ -97,6 +105,7 @@ impl Pixel {
             Self::U8 => 1,
             Self::U16 => 2,
             Self::I32 | Self::F32 => 4,
+            Self::Rgb(bytes) | Self::Bgr(bytes) => usize::from(bytes),
         }
     }
 }
@@ -110,6 +119,8 @@ pub enum Content {
     Labels,
     /// From 0 to 1 in 32FC1, to the largest number in mono8, 8UC1, mono16, 16UC1.
     Confidence,
+    /// Colours: rgb8, bgr8, rgba8, bgra8, 8UC3, 8UC4, or grey: mono8, 8UC1.
+    Colors,
 }
 
 impl Content {
@@ -123,6 +134,16 @@ impl Content {
             Self::Confidence => (
                 &[Pixel::F32, Pixel::U8, Pixel::U16],
                 "32FC1, mono8, 8UC1, mono16 or 16UC1",
+            ),
+            Self::Colors => (
+                &[
+                    Pixel::Rgb(3),
+                    Pixel::Bgr(3),
+                    Pixel::Rgb(4),
+                    Pixel::Bgr(4),
+                    Pixel::U8,
+                ],
+                "rgb8, bgr8, rgba8, bgra8 or mono8",
             ),
         }
     }
@@ -235,7 +256,7 @@ impl<'a> ImageView<'a> {
                 },
             )),
             Pixel::U16 => out.extend(self.numbers(row, u16::from_le_bytes)),
-            Pixel::I32 | Pixel::F32 => {
+            _ => {
                 let classes = self.numbers(row, i32::from_le_bytes);
                 out.extend(classes.map(|class| u16::try_from(class).unwrap_or(UNLABELED)));
             }
@@ -250,10 +271,22 @@ impl<'a> ImageView<'a> {
                 let numbers = self.numbers(row, u16::from_le_bytes);
                 out.extend(numbers.map(|v| f32::from(v) / 65535.0));
             }
-            Pixel::I32 | Pixel::F32 => {
+            _ => {
                 let numbers = self.numbers(row, f32::from_le_bytes);
                 out.extend(numbers.map(|v| if v.is_nan() { 0.0 } else { v.clamp(0.0, 1.0) }));
             }
+        }
+    }
+
+    /// Red, green and blue of a row.
+    pub fn colors(&self, row: usize, out: &mut Vec<[u8; 3]>) {
+        let bytes = self.row(row);
+        match self.pixel {
+            Pixel::Rgb(4) => out.extend(bytes.as_chunks().0.iter().map(|&[r, g, b, _]| [r, g, b])),
+            Pixel::Bgr(4) => out.extend(bytes.as_chunks().0.iter().map(|&[b, g, r, _]| [r, g, b])),
+            Pixel::Rgb(_) => out.extend_from_slice(bytes.as_chunks().0),
+            Pixel::Bgr(_) => out.extend(bytes.as_chunks().0.iter().map(|&[b, g, r]| [r, g, b])),
+            _ => out.extend(bytes.iter().map(|grey| [*grey; 3])),
         }
     }
 }

@@ -14,4 +14,6 @@ mod rclpy;
 mod rgbd;
 mod ros2_client_peer;
 mod security;
+#[cfg(feature = "onnx")]
+mod segmenter;
 mod transport;

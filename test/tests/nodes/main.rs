@@ -7,6 +7,8 @@ mod lattice_mapper;
 mod lattice_mapper_services;
 mod map_follower;
 mod map_labels;
+#[cfg(feature = "onnx")]
+mod segmenter;
 mod semantic_cloud;
 mod semantic_clouds;
 mod semantic_icp_server;

@@ -27,6 +27,7 @@ fn nodes() -> impl Iterator<Item = (&'static str, &'static str, Params)> {
     let all = PARAMETERS.iter().copied().chain([player]);
     all.map(|(node, declare)| {
         let file = match node {
+            "segmenter" => "segmenter.yaml",
             "semantic_cloud" => "rgbd.yaml",
             "headset_cloud" => "headset.yaml",
             "semantic_icp_server" => "semantic_icp.yaml",

@@ -32,6 +32,8 @@ pub enum Bench {
     File(MapFile),
     /// Prepare two point files of any format and register one to the other
     Register(super::bench_register::Register),
+    /// Run a network on an image, as the node `segmenter` does
+    Segment(super::bench_segment::Segment),
     /// Send clouds to another process over the DDS of the nodes: loss, latency, processor time
     Transport(super::bench_transport::Transport),
 }
@@ -176,6 +178,7 @@ impl Bench {
             Self::Raycast(command) => command.run(),
             Self::File(command) => command.run(),
             Self::Register(command) => command.run(),
+            Self::Segment(command) => command.run(),
             Self::Transport(command) => command.run(),
         }
     }

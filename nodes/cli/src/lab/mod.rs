@@ -2,6 +2,7 @@
 
 mod bench;
 mod bench_register;
+mod bench_segment;
 mod bench_transport;
 mod demo;
 mod evaluate;

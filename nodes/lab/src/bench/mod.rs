@@ -13,6 +13,7 @@ mod quantize;
 mod raycast;
 mod register;
 mod report;
+mod segment;
 mod site;
 mod transport;
 
@@ -26,5 +27,6 @@ pub use quantize::{QuantizeMethod, quantize};
 pub use raycast::{RaycastMethod, raycast};
 pub use register::{RegisterSetup, register};
 pub use report::Report;
+pub use segment::{SegmentReport, segment};
 pub use site::{SiteOptions, SiteSummary, write_site};
 pub use transport::{Received, TransportReport, TransportSetup, listen, send};

@@ -1,0 +1,56 @@
+//! `lattice bench segment`.
+
+use crate::CliResult;
+use clap::Args;
+use lattice_lab::bench;
+use lattice_nodes::segmenter::{Size, read_network};
+use std::path::PathBuf;
+
+/// Options of `lattice bench segment`.
+#[derive(Args)]
+pub struct Segment {
+    /// Network, an ONNX file
+    #[arg(long)]
+    model: PathBuf,
+    /// Width and height of its input, where the file leaves them open
+    #[arg(long, num_args = 2, value_names = ["WIDTH", "HEIGHT"])]
+    input_size: Option<Vec<usize>>,
+    /// Measured runs; one more goes before
+    #[arg(long, default_value_t = 10)]
+    rounds: usize,
+    /// Threads of the network
+    #[arg(long, default_value_t = 1, value_parser = clap::value_parser!(u16).range(1..=256))]
+    threads: u16,
+    /// Print the result as one line of JSON
+    #[arg(long)]
+    json: bool,
+}
+
+impl Segment {
+    /// Runs the command.
+    pub fn run(self) -> CliResult {
+        let size = self.input_size.and_then(|size| match size[..] {
+            [width, height] => Some(Size { width, height }),
+            _ => None,
+        });
+        let network = read_network(&self.model, size, self.threads.into())?;
+        let report = bench::segment(network.as_ref(), self.rounds)?;
+        if self.json {
+            println!("{}", serde_json::to_string(&report)?);
+            return Ok(());
+        }
+        let median_ms = |times: &[f64]| {
+            let mut times = times.to_vec();
+            times.sort_by(f64::total_cmp);
+            1e3 * times.get(times.len() / 2).copied().unwrap_or_default()
+        };
+        let ([width, height], [columns, rows]) = (report.input, report.output);
+        println!(
+            "{width} x {height} to {columns} x {rows}, {} threads: {:.1} ms in the median, {:.1} ms of processor time",
+            self.threads,
+            median_ms(&report.wall),
+            median_ms(&report.cpu)
+        );
+        Ok(())
+    }
+}

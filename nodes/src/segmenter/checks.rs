@@ -1,0 +1,166 @@
+//! Checks of a model before anything is made of it.
+
+use tract_onnx::pb::tensor_proto::DataLocation;
+use tract_onnx::pb::{AttributeProto, GraphProto, ModelProto, NodeProto, TensorProto};
+
+/// Most values of a tensor: 1 GiB of floats.
+pub(super) const MAX_TENSOR_VALUES: usize = 1 << 28;
+/// Deepest graphs inside of graphs.
+const MAX_DEPTH: usize = 8;
+/// Most letters of a file that are shown.
+const SHOWN: usize = 160;
+
+/// A text of a file as it may be shown: not too long, on one line.
+pub(super) fn shown(text: &str) -> String {
+    let line = text.lines().next().unwrap_or_default();
+    line.chars()
+        .filter(|c| !c.is_control())
+        .take(SHOWN)
+        .collect()
+}
+
+/// Checks that operators are known and that tensors have the values that they say.
+pub(super) fn model(model: &ModelProto, known: impl Fn(&str) -> bool) -> Result<(), String> {
+    let graph = model
+        .graph
+        .as_ref()
+        .ok_or("this is no ONNX file: it has no graph")?;
+    let mut unknown = Vec::new();
+    self::graph(graph, &known, &mut unknown, 0)?;
+    unknown.sort();
+    unknown.dedup();
+    if unknown.is_empty() {
+        return Ok(());
+    }
+    Err(format!(
+        "operators that are not known: {}",
+        unknown.join(", ")
+    ))
+}
+
+fn graph(
+    graph: &GraphProto,
+    known: &impl Fn(&str) -> bool,
+    unknown: &mut Vec<String>,
+    depth: usize,
+) -> Result<(), String> {
+    if depth > MAX_DEPTH {
+        return Err(format!(
+            "graphs are inside of graphs more than {MAX_DEPTH} deep"
+        ));
+    }
+    for given in &graph.initializer {
+        tensor(given)?;
+    }
+    for node in &graph.node {
+        if !known(&node.op_type) && unknown.len() < 20 {
+            unknown.push(shown(&node.op_type));
+        }
+        made(node, graph)?;
+        for attribute in &node.attribute {
+            let AttributeProto { t, tensors, .. } = attribute;
+            t.iter().chain(tensors).try_for_each(tensor)?;
+            let inner = attribute.g.iter().chain(&attribute.graphs);
+            for inner in inner {
+                self::graph(inner, known, unknown, depth + 1)?;
+            }
+        }
+    }
+    let names = graph.node.iter().flat_map(|node| &node.output);
+    let names: std::collections::HashSet<&str> = (names.map(String::as_str))
+        .chain(graph.input.iter().map(|input| input.name.as_str()))
+        .chain(graph.initializer.iter().map(|tensor| tensor.name.as_str()))
+        .collect();
+    // One of an inner graph may come from outside.
+    let lost = graph
+        .output
+        .iter()
+        .find(|o| !names.contains(o.name.as_str()));
+    match lost.filter(|_| depth == 0) {
+        Some(output) => Err(format!(
+            "nothing makes its output '{}'",
+            shown(&output.name)
+        )),
+        None => Ok(()),
+    }
+}
+
+/// Values of a shape.
+fn volume(dims: &[i64]) -> Option<usize> {
+    dims.iter().try_fold(1usize, |volume, dim| {
+        volume.checked_mul(usize::try_from(*dim).ok()?)
+    })
+}
+
+fn bounded(name: &str, dims: &[i64]) -> Result<usize, String> {
+    let values = volume(dims).filter(|values| *values <= MAX_TENSOR_VALUES);
+    values.ok_or_else(|| {
+        let name = shown(name);
+        format!("tensor '{name}' is of {dims:?}, at most {MAX_TENSOR_VALUES} values are read")
+    })
+}
+
+fn tensor(tensor: &TensorProto) -> Result<(), String> {
+    let name = shown(&tensor.name);
+    let is_elsewhere = tensor.data_location == Some(DataLocation::External as i32);
+    if is_elsewhere || !tensor.external_data.is_empty() {
+        return Err(format!(
+            "the values of tensor '{name}' are in another file: save it as one"
+        ));
+    }
+    let values = bounded(&name, &tensor.dims)?;
+    // The least bytes of a value in each list.
+    let there = [
+        tensor.raw_data.len(),
+        tensor.float_data.len(),
+        2 * tensor.int32_data.len(),
+        tensor.int64_data.len(),
+        tensor.double_data.len(),
+        tensor.uint64_data.len(),
+        tensor.string_data.len(),
+    ];
+    match there.iter().any(|there| *there >= values) {
+        true => Ok(()),
+        false => Err(format!(
+            "tensor '{name}' says {values} values and has fewer"
+        )),
+    }
+}
+
+/// Checks what operators make of shapes that are written in the file.
+fn made(node: &NodeProto, graph: &GraphProto) -> Result<(), String> {
+    let shape = match node.op_type.as_str() {
+        "ConstantOfShape" => node.input.first(),
+        "Expand" | "Tile" => node.input.get(1),
+        "Range" => node.input.get(1),
+        _ => None,
+    };
+    let Some(shape) = shape else {
+        return Ok(());
+    };
+    let given = graph
+        .initializer
+        .iter()
+        .find(|tensor| tensor.name == *shape);
+    let constants = graph.node.iter().filter(|node| node.op_type == "Constant");
+    let constant = || {
+        let mut constants = constants;
+        let found = constants.find(|node| node.output.first() == Some(shape))?;
+        found
+            .attribute
+            .iter()
+            .find_map(|attribute| attribute.t.as_ref())
+    };
+    let Some(tensor) = given.or_else(constant) else {
+        return Ok(());
+    };
+    let (numbers, _) = tensor.raw_data.as_chunks::<8>();
+    let numbers = numbers.iter().map(|bytes| i64::from_le_bytes(*bytes));
+    let dims: Vec<i64> = tensor.int64_data.iter().copied().chain(numbers).collect();
+    // -1 keeps a length.
+    let dims: Vec<i64> = dims
+        .into_iter()
+        .map(|dim| if dim == -1 { 1 } else { dim })
+        .collect();
+    bounded(&node.name, &dims).map(drop)
+}

@@ -1,0 +1,284 @@
+//! From the images of a camera to labels, by a network.
+//!
+//! [`Segmenter`] is a state machine without I/O; [`node`] runs it behind DDS.
+
+#[cfg(feature = "onnx")]
+mod checks;
+mod colors;
+mod labels;
+mod names;
+mod network;
+pub mod node;
+mod options;
+mod parameters;
+#[cfg(feature = "onnx")]
+mod tract;
+
+pub use colors::Normalisation;
+pub use labels::{Labelled, Meaning};
+pub use network::{ModelError, Network, Scores, Size, Values};
+pub use options::SegmenterOptions;
+pub use parameters::declare;
+
+use std::collections::BTreeMap;
+use std::path::Path;
+
+use lattice_msgs::sensor_msgs::Image;
+use lattice_msgs::std_msgs::Header;
+use lattice_msgs::vision_msgs::{LabelInfo, VisionClass};
+use serde::{Deserialize, Serialize};
+
+use crate::camera::{Content, ImageView};
+
+/// The network of a file. `size` is that of its input where the file leaves it open.
+///
+/// Errors name the file and what is wrong with it; without the feature `onnx` there is no network.
+#[cfg_attr(
+    not(feature = "onnx"),
+    expect(unused_variables, reason = "there is no backend")
+)]
+pub fn read_network(
+    path: &Path,
+    size: Option<Size>,
+    threads: usize,
+) -> Result<Box<dyn Network>, ModelError> {
+    #[cfg(feature = "onnx")]
+    return Ok(Box::new(tract::OnnxNetwork::read(path, size, threads)?));
+    #[cfg(not(feature = "onnx"))]
+    Err(ModelError::NotBuilt)
+}
+
+/// Counters of one node. Every image is labelled or in `dropped`.
+#[derive(Clone, Debug, Default, PartialEq, Eq, Serialize, Deserialize)]
+pub struct SegmenterCounts {
+    /// Images received.
+    pub images_in: u64,
+    /// Label images made.
+    pub labels_out: u64,
+    /// Images refused or dropped, by reason.
+    pub dropped: BTreeMap<String, u64>,
+}
+
+/// The end of a `segmenter`.
+#[derive(Clone, Debug, Default, PartialEq, Serialize, Deserialize)]
+pub struct SegmenterReport {
+    /// Everything counted by the state machine.
+    #[serde(flatten)]
+    pub counts: SegmenterCounts,
+    /// Images that were sent and lost on the way.
+    pub images_lost: u64,
+    /// Samples that did not decode.
+    pub undecodable: u64,
+}
+
+/// Labels images one by one.
+pub struct Segmenter {
+    options: SegmenterOptions,
+    network: Box<dyn Network>,
+    counts: SegmenterCounts,
+    problem: Option<String>,
+}
+
+impl Segmenter {
+    /// A machine that has seen nothing.
+    pub fn new(options: SegmenterOptions, network: Box<dyn Network>) -> Self {
+        Self {
+            options,
+            network,
+            counts: SegmenterCounts::default(),
+            problem: None,
+        }
+    }
+
+    /// Goes on with other options.
+    pub fn set_options(&mut self, options: SegmenterOptions) {
+        self.options = options;
+    }
+
+    /// Labels an image. Checked before anything is made of it.
+    pub fn on_image(&mut self, image: &Image) -> Option<Labelled> {
+        self.counts.images_in += 1;
+        let view = match ImageView::new(image, Content::Colors, self.options.max_image_pixels) {
+            Ok(view) => view,
+            Err(error) => {
+                self.refuse(error.name(), error.to_string());
+                return None;
+            }
+        };
+        let size = self.network.input();
+        let planes = colors::planes(view, size, &self.options.normalisation);
+        let names = Some(self.names().len()).filter(|names| *names > 0);
+        let scores = self.network.run(planes);
+        let found = scores.and_then(|scores| {
+            labels::labelled(&image.header, &scores, self.options.meaning, names)
+        });
+        match found {
+            Ok(labelled) => {
+                self.counts.labels_out += 1;
+                Some(labelled)
+            }
+            Err(problem) => {
+                self.refuse("network", problem);
+                None
+            }
+        }
+    }
+
+    /// Counts images for which newer ones came while the network was at work.
+    pub fn skip(&mut self, images: u64) {
+        if images > 0 {
+            self.counts.images_in += images;
+            *self.counts.dropped.entry("skipped".to_owned()).or_default() += images;
+        }
+    }
+
+    /// Names of the classes: given ones, or those of the model; none if nobody names them.
+    pub fn label_info(&self) -> Option<LabelInfo> {
+        let numbered = self.names().iter().zip(0u16..);
+        let classes = numbered.filter(|(name, _)| !name.is_empty());
+        let class_map: Vec<VisionClass> = classes
+            .map(|(name, class_id)| VisionClass {
+                class_id,
+                class_name: name.clone(),
+            })
+            .collect();
+        (!class_map.is_empty()).then(|| LabelInfo {
+            header: Header::default(),
+            class_map,
+            threshold: 0.0,
+        })
+    }
+
+    fn names(&self) -> &[String] {
+        match self.options.names.as_slice() {
+            [] => self.network.names(),
+            names => names,
+        }
+    }
+
+    /// Counters of images, by reason.
+    pub fn counts(&self) -> &SegmenterCounts {
+        &self.counts
+    }
+
+    /// The last refusal in words.
+    pub fn problem(&self) -> Option<&str> {
+        self.problem.as_deref()
+    }
+
+    fn refuse(&mut self, reason: &str, problem: String) {
+        *self.counts.dropped.entry(reason.to_owned()).or_default() += 1;
+        log::debug!("image refused: {problem}");
+        self.problem = Some(problem);
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    /// Says 0 where red is less than a half and 1 elsewhere; fails on black.
+    struct Red;
+
+    impl Network for Red {
+        fn input(&self) -> Size {
+            Size {
+                width: 2,
+                height: 1,
+            }
+        }
+
+        fn names(&self) -> &[String] {
+            &[]
+        }
+
+        fn run(&self, planes: Vec<f32>) -> Result<Scores, String> {
+            if planes.iter().all(|v| *v == 0.0) {
+                return Err("it is dark".to_owned());
+            }
+            let red = planes[..2].iter();
+            let values = red.clone().map(|_| 0.5).chain(red.copied()).collect();
+            Ok(Scores {
+                size: self.input(),
+                values: Values::Scores { classes: 2, values },
+            })
+        }
+    }
+
+    fn machine(names: &[&str]) -> Segmenter {
+        let options = SegmenterOptions {
+            normalisation: Normalisation {
+                mean: [0.0; 3],
+                deviation: [1.0; 3],
+            },
+            meaning: Meaning::Probabilities,
+            names: names.iter().map(|name| name.to_string()).collect(),
+            ..SegmenterOptions::default()
+        };
+        Segmenter::new(options, Box::new(Red))
+    }
+
+    fn image(encoding: &str, data: &[u8]) -> Image {
+        Image {
+            height: 1,
+            width: 2,
+            encoding: encoding.to_owned(),
+            step: data.len() as u32,
+            data: data.to_vec().into(),
+            ..Image::default()
+        }
+    }
+
+    #[test]
+    fn each_image_becomes_labels_or_is_counted() {
+        let mut machine = machine(&[]);
+        let good = image("rgb8", &[255, 0, 0, 0, 0, 255]);
+        let found = machine.on_image(&good).unwrap();
+        assert_eq!(found.labels.data.to_vec(), [1, 0]);
+        assert_eq!(found.confidence.unwrap().data.to_vec(), [255, 128]);
+
+        let short = Image {
+            step: 3,
+            ..good.clone()
+        };
+        let huge = Image {
+            width: 1 << 31,
+            height: 1 << 31,
+            step: u32::MAX,
+            ..good.clone()
+        };
+        let dark = image("rgb8", &[0; 6]);
+        let yuv = image("yuv422", &[0; 4]);
+        for image in [&short, &huge, &dark, &yuv] {
+            assert_eq!(machine.on_image(image), None);
+        }
+        machine.skip(3);
+        assert!(machine.problem().unwrap().contains("yuv422"));
+        let dropped = machine.counts().dropped.iter();
+        let dropped: Vec<_> = dropped.map(|(reason, n)| (reason.as_str(), *n)).collect();
+        let expected = [
+            ("encoding", 1),
+            ("malformed", 1),
+            ("network", 1),
+            ("skipped", 3),
+            ("too_large", 1),
+        ];
+        assert_eq!(dropped, expected);
+        assert!(machine.on_image(&good).is_some());
+        assert_eq!(
+            (machine.counts().images_in, machine.counts().labels_out),
+            (9, 2)
+        );
+    }
+
+    #[test]
+    fn given_names_are_told_with_their_numbers() {
+        assert_eq!(machine(&[]).label_info(), None);
+        let info = machine(&["wall", "", "door"]).label_info().unwrap();
+        let classes = info.class_map.iter();
+        let classes: Vec<_> = classes
+            .map(|class| (class.class_id, class.class_name.as_str()))
+            .collect();
+        assert_eq!(classes, [(0, "wall"), (2, "door")]);
+    }
+}

@@ -1,0 +1,235 @@
+//! The machine as a ROS node: a thin shell around [`Segmenter`].
+
+use std::sync::atomic::{AtomicU64, Ordering};
+use std::sync::{Arc, Mutex, PoisonError};
+use std::time::{Duration, Instant};
+
+use lattice_msgs::sensor_msgs::Image;
+use lattice_msgs::vision_msgs::LabelInfo;
+
+use super::parameters::Settings;
+use super::{Segmenter, SegmenterOptions, SegmenterReport, read_network};
+use crate::compute::Compute;
+use crate::report;
+use crate::start::{Finish, NodeError, handed_over, open_params};
+use lattice_runtime::logging::Throttle;
+use lattice_runtime::qos::Qos;
+use lattice_runtime::{Diagnostics, Level, Load, Losses, Publisher, Runtime};
+
+/// Event for the compute thread.
+enum Event {
+    /// There is an image in the slot.
+    Image,
+    Diagnose,
+    Settings(Box<SegmenterOptions>),
+    Finish,
+}
+
+/// Place of the newest image; those that it replaces are skipped.
+#[derive(Default)]
+struct Slot {
+    image: Mutex<Option<Arc<Image>>>,
+    skipped: AtomicU64,
+}
+
+impl Slot {
+    /// Puts an image there; true if the place was empty.
+    fn put(&self, image: Arc<Image>) -> bool {
+        let mut slot = self.image.lock().unwrap_or_else(PoisonError::into_inner);
+        let is_first = slot.replace(image).is_none();
+        if !is_first {
+            self.skipped.fetch_add(1, Ordering::Relaxed);
+        }
+        is_first
+    }
+
+    fn take(&self) -> Option<Arc<Image>> {
+        let mut slot = self.image.lock().unwrap_or_else(PoisonError::into_inner);
+        slot.take()
+    }
+}
+
+/// Starts the node.
+pub fn start(runtime: &Runtime, name: &str) -> Result<Finish, NodeError> {
+    let node = runtime.node(name)?;
+    let params = node.params();
+    let settings = Settings::from_params(params)?;
+    if settings.model.as_os_str().is_empty() {
+        return Err(params.invalid("model", "expected an ONNX file").into());
+    }
+    let threads = match settings.threads {
+        0 => {
+            let cores = std::thread::available_parallelism().map_or(1, usize::from);
+            cores.saturating_sub(1).max(1)
+        }
+        threads => threads,
+    };
+    let began = Instant::now();
+    let network = read_network(&settings.model, settings.input_size, threads)
+        .map_err(|error| params.invalid("model", error.to_string()))?;
+    let size = network.input();
+    log::info!(
+        "{}: images of {} x {}, {} names of classes, ready in {:.1} s",
+        settings.model.display(),
+        size.width,
+        size.height,
+        network.names().len(),
+        began.elapsed().as_secs_f64()
+    );
+    let (slot, losses) = (Arc::new(Slot::default()), Losses::default());
+    let shell = Shell {
+        machine: Segmenter::new(settings.segmenter, network),
+        slot: Arc::clone(&slot),
+        labels: node.publisher("labels/image", Qos::SCANS)?,
+        confidence: node.publisher("labels/confidence", Qos::SCANS)?,
+        label_info: node.publisher("labels/label_info", Qos::LATCHED)?,
+        diagnostics: node.diagnostics(),
+        losses: losses.clone(),
+        last_s: 0.0,
+        warnings: Throttle::new(Duration::from_secs(5)),
+        warned: 0,
+        report_file: settings.report_file,
+    };
+    shell.tell_names();
+    let mut shell = shell;
+    let shutdown = runtime.shutdown_handle();
+    let compute = Compute::spawn(name, settings.limits, shutdown, move |event| {
+        shell.on(event)
+    })?;
+    let inbox = compute.inbox();
+    let wake = inbox.clone();
+    let on_image = move |image: Arc<Image>| {
+        if slot.put(image) && !wake.send(Event::Image, 0) {
+            // The next one finds the place empty.
+            slot.take();
+            slot.skipped.fetch_add(1, Ordering::Relaxed);
+        }
+    };
+    let images = node.subscribe("rgb/image_rect_color", Qos::SENSOR, Load::Large, on_image)?;
+    losses.watch(std::slice::from_ref(&images));
+    let looks = inbox.clone();
+    let looks = runtime.timer(Duration::from_millis(500), move || {
+        let _ = looks.send(Event::Diagnose, 0);
+    });
+    open_params(params, move |params| {
+        let settings = Settings::from_params(params).map_err(|error| error.to_string())?;
+        handed_over(inbox.send(Event::Settings(Box::new(settings.segmenter)), 0))
+    });
+    Ok(Box::new(move || {
+        drop((images, looks));
+        compute.finish_with(Event::Finish);
+        Box::new(())
+    }))
+}
+
+/// State of the compute thread.
+struct Shell {
+    machine: Segmenter,
+    slot: Arc<Slot>,
+    labels: Publisher<Image>,
+    confidence: Publisher<Image>,
+    label_info: Publisher<LabelInfo>,
+    diagnostics: Diagnostics,
+    losses: Losses,
+    /// Time of the last image in the network, seconds.
+    last_s: f64,
+    warnings: Throttle,
+    /// Images refused when there was a warning last.
+    warned: u64,
+    report_file: String,
+}
+
+impl Shell {
+    fn on(&mut self, event: Event) {
+        match event {
+            Event::Image => self.label(),
+            Event::Settings(options) => {
+                self.machine.set_options(*options);
+                self.tell_names();
+            }
+            Event::Diagnose => self.diagnose(),
+            Event::Finish => {
+                self.label();
+                self.finish();
+            }
+        }
+    }
+
+    fn label(&mut self) {
+        let Some(image) = self.slot.take() else {
+            return;
+        };
+        let skipped = self.slot.skipped.swap(0, Ordering::Relaxed);
+        self.machine.skip(skipped);
+        let began = Instant::now();
+        let Some(labelled) = self.machine.on_image(&image) else {
+            return;
+        };
+        self.last_s = began.elapsed().as_secs_f64();
+        let confidence = labelled
+            .confidence
+            .map(|c| self.confidence.publish(Arc::new(c)));
+        let labels = self.labels.publish(Arc::new(labelled.labels));
+        if let Err(error) = labels.and(confidence.unwrap_or(Ok(()))) {
+            log::debug!("not published: {error}");
+        }
+    }
+
+    fn tell_names(&self) {
+        if let Some(info) = self.machine.label_info()
+            && let Err(error) = self.label_info.publish(Arc::new(info))
+        {
+            log::debug!("not published: {error}");
+        }
+    }
+
+    fn report(&self) -> SegmenterReport {
+        SegmenterReport {
+            counts: self.machine.counts().clone(),
+            images_lost: self.losses.lost(),
+            undecodable: self.losses.undecodable(),
+        }
+    }
+
+    fn diagnose(&mut self) {
+        let report = self.report();
+        let counts = &report.counts;
+        // Images that come faster than the network works are no fault.
+        let refused = counts
+            .dropped
+            .iter()
+            .filter(|(reason, _)| *reason != "skipped");
+        let reasons: Vec<String> = refused.clone().map(|(r, n)| format!("{n} {r}")).collect();
+        let refused: u64 = refused.map(|(_, n)| n).sum();
+        let problem = self.machine.problem().map(str::to_owned);
+        let message = match (counts.labels_out, refused) {
+            (0, 0) => "no image yet".to_owned(),
+            (_, 0) => "labelling images".to_owned(),
+            _ => format!("dropped: {}", reasons.join(", ")),
+        };
+        let is_good = counts.labels_out > 0 && refused == 0;
+        let level = if is_good { Level::Ok } else { Level::Warn };
+        if let Some(problem) = problem.as_ref().filter(|_| refused > self.warned)
+            && self.warnings.check().is_some()
+        {
+            self.warned = refused;
+            log::warn!("{message}; last refused: {problem}");
+        }
+        let mut values = report::key_values(&report);
+        values.push(("last_image_s".into(), format!("{:.4}", self.last_s)));
+        values.push(("last_refused".into(), problem.unwrap_or_default()));
+        self.diagnostics.set("labels", level, message, values);
+    }
+
+    fn finish(&mut self) {
+        self.labels.flush(Duration::from_secs(2));
+        let report = self.report();
+        let counts = &report.counts;
+        let (images_in, labels_out, dropped) =
+            (counts.images_in, counts.labels_out, &counts.dropped);
+        log::info!("{images_in} images in, {labels_out} labelled, dropped: {dropped:?}");
+        if let Err(error) = report::write(&self.report_file, &report, &self.diagnostics) {
+            log::error!("{error}");
+        }
+    }
+}
