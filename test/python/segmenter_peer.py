@@ -21,11 +21,15 @@ def stamp_of(message):
 
 
 class Camera:
-    def __init__(self, domain):
+    def __init__(self, domain, jpeg=None):
         self.peer, self.tasks, self.labels, self.confidence, self.names = Peer(domain), {}, {}, {}, []
-        self.greetings = 0
+        self.greetings, self.jpeg = 0, jpeg and Path(jpeg).read_bytes()
         peer = self.peer
-        self.images = peer.writer("rt/rgb/image_rect_color", ros.Image, qos(20))
+        topic = "rt/rgb/image_rect_color"
+        if jpeg:
+            self.images = peer.writer(f"{topic}/compressed", ros.CompressedImage, qos(20))
+        else:
+            self.images = peer.writer(topic, ros.Image, qos(20))
         keep = lambda kept: lambda m: kept.update({stamp_of(m): m})
         peer.reader("rt/labels/image", ros.Image, qos(20), keep(self.labels))
         peer.reader("rt/labels/confidence", ros.Image, qos(20), keep(self.confidence))
@@ -41,7 +45,10 @@ class Camera:
             self.tasks[status.name] = {v.key: v.value for v in status.values}
         # The node may not know the readers yet when they know it.
         if not (self.labels and self.confidence):
-            self.send(self.greetings, "mono8", bytes(WIDTH * HEIGHT), WIDTH)
+            if self.jpeg:
+                self.pack(self.greetings, self.jpeg)
+            else:
+                self.send(self.greetings, "mono8", bytes(WIDTH * HEIGHT), WIDTH)
             self.greetings += 1
 
     def greet(self):
@@ -60,6 +67,15 @@ class Camera:
             ros.Image(header(stamp_ns, "camera"), HEIGHT, WIDTH, encoding, False, step, data)
         )
 
+    def pack(self, stamp_ns, data):
+        self.images.write(ros.CompressedImage(header(stamp_ns, "camera"), "rgb8; jpeg compressed bgr8", data))
+
+    def until_labelled(self, stamp_ns):
+        there = lambda: stamp_ns in self.labels and stamp_ns in self.confidence
+        self.peer.until(there, lambda: f"no labels of {stamp_ns}: {self.tasks}")
+        found = self.labels[stamp_ns]
+        return found, np.frombuffer(bytes(found.data), "u1").reshape(found.height, found.width)
+
     def look(self, stamp_ns, encoding, edge):
         """Sends an image that is red to the left of a column; the share of right pixels, and how sure."""
         pixels = np.zeros((HEIGHT, WIDTH, 4), "u1")
@@ -69,10 +85,8 @@ class Camera:
         channels = [order[letter] for letter in encoding if letter in order]
         data = np.ascontiguousarray(pixels[:, :, channels]).tobytes()
         self.send(stamp_ns, encoding, data, WIDTH * len(channels))
-        there = lambda: stamp_ns in self.labels and stamp_ns in self.confidence
-        self.peer.until(there, lambda: f"no labels of {stamp_ns}: {self.tasks}")
-        found, sure = self.labels[stamp_ns], self.confidence[stamp_ns]
-        classes = np.frombuffer(bytes(found.data), "u1").reshape(found.height, found.width)
+        found, classes = self.until_labelled(stamp_ns)
+        sure = self.confidence[stamp_ns]
         expected = np.arange(found.width) < edge * found.width / WIDTH
         return {
             "encoding": found.encoding,
@@ -97,11 +111,26 @@ def run(scenario):
     return {"greetings": camera.greetings, "looks": looks, "names": camera.names, "refused": refused}
 
 
+def run_packed(scenario):
+    """JPEG files, whole and cut; shares of red in the left and the right half."""
+    camera = Camera(scenario["domain"], scenario["jpeg"])
+    camera.greet()
+    camera.pack(SECOND_NS, camera.jpeg[:200])
+    camera.until("malformed", 1)
+    camera.pack(SECOND_NS, b"\x89PNG")
+    camera.until("encoding", 1)
+    camera.pack(2 * SECOND_NS, camera.jpeg)
+    _, classes = camera.until_labelled(2 * SECOND_NS)
+    halves = np.split(classes, 2, axis=1)
+    refused = camera.tasks["segmenter: labels"]["last_refused"]
+    return {"red": [float(half.mean()) for half in halves], "refused": refused}
+
+
 def main():
     faulthandler.dump_traceback_later(2 * PATIENCE_S, exit=True)
     directory = Path(sys.argv[1])
     scenario = json.loads((directory / "scenario.json").read_text())
-    print(json.dumps(run(scenario)))
+    print(json.dumps(run_packed(scenario) if "jpeg" in scenario else run(scenario)))
 
 
 if __name__ == "__main__":

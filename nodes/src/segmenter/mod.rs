@@ -5,6 +5,8 @@
 #[cfg(feature = "onnx")]
 mod checks;
 mod colors;
+#[cfg(feature = "onnx")]
+mod jpeg;
 mod labels;
 mod names;
 mod network;
@@ -23,7 +25,7 @@ pub use parameters::declare;
 use std::collections::BTreeMap;
 use std::path::Path;
 
-use lattice_msgs::sensor_msgs::Image;
+use lattice_msgs::sensor_msgs::{CompressedImage, Image};
 use lattice_msgs::std_msgs::Header;
 use lattice_msgs::vision_msgs::{LabelInfo, VisionClass};
 use serde::{Deserialize, Serialize};
@@ -119,6 +121,27 @@ impl Segmenter {
             }
             Err(problem) => {
                 self.refuse("network", problem);
+                None
+            }
+        }
+    }
+
+    /// Labels an image that is packed as JPEG.
+    #[cfg_attr(
+        not(feature = "onnx"),
+        expect(unused_variables, reason = "there is no decoder")
+    )]
+    pub fn on_compressed(&mut self, message: &CompressedImage) -> Option<Labelled> {
+        #[cfg(feature = "onnx")]
+        let image = jpeg::image(message, self.options.max_image_pixels)
+            .map_err(|error| (error.name(), error.to_string()));
+        #[cfg(not(feature = "onnx"))]
+        let image = Err::<Image, _>(("encoding", ModelError::NotBuilt.to_string()));
+        match image {
+            Ok(image) => self.on_image(&image),
+            Err((reason, problem)) => {
+                self.counts.images_in += 1;
+                self.refuse(reason, problem);
                 None
             }
         }

@@ -4,7 +4,7 @@ use std::sync::atomic::{AtomicU64, Ordering};
 use std::sync::{Arc, Mutex, PoisonError};
 use std::time::{Duration, Instant};
 
-use lattice_msgs::sensor_msgs::Image;
+use lattice_msgs::sensor_msgs::{CompressedImage, Image};
 use lattice_msgs::vision_msgs::LabelInfo;
 
 use super::parameters::Settings;
@@ -25,16 +25,22 @@ enum Event {
     Finish,
 }
 
+/// Image as it came.
+enum Input {
+    Plain(Arc<Image>),
+    Compressed(Arc<CompressedImage>),
+}
+
 /// Place of the newest image; those that it replaces are skipped.
 #[derive(Default)]
 struct Slot {
-    image: Mutex<Option<Arc<Image>>>,
+    image: Mutex<Option<Input>>,
     skipped: AtomicU64,
 }
 
 impl Slot {
     /// Puts an image there; true if the place was empty.
-    fn put(&self, image: Arc<Image>) -> bool {
+    fn put(&self, image: Input) -> bool {
         let mut slot = self.image.lock().unwrap_or_else(PoisonError::into_inner);
         let is_first = slot.replace(image).is_none();
         if !is_first {
@@ -43,7 +49,7 @@ impl Slot {
         is_first
     }
 
-    fn take(&self) -> Option<Arc<Image>> {
+    fn take(&self) -> Option<Input> {
         let mut slot = self.image.lock().unwrap_or_else(PoisonError::into_inner);
         slot.take()
     }
@@ -98,14 +104,22 @@ pub fn start(runtime: &Runtime, name: &str) -> Result<Finish, NodeError> {
     })?;
     let inbox = compute.inbox();
     let wake = inbox.clone();
-    let on_image = move |image: Arc<Image>| {
+    let on_image = move |image: Input| {
         if slot.put(image) && !wake.send(Event::Image, 0) {
             // The next one finds the place empty.
             slot.take();
             slot.skipped.fetch_add(1, Ordering::Relaxed);
         }
     };
-    let images = node.subscribe("rgb/image_rect_color", Qos::SENSOR, Load::Large, on_image)?;
+    let topic = "rgb/image_rect_color";
+    let images = if settings.compressed {
+        let topic = format!("{topic}/compressed");
+        let on_image = move |image| on_image(Input::Compressed(image));
+        node.subscribe(&topic, Qos::SENSOR, Load::Large, on_image)?
+    } else {
+        let on_image = move |image| on_image(Input::Plain(image));
+        node.subscribe(topic, Qos::SENSOR, Load::Large, on_image)?
+    };
     losses.watch(std::slice::from_ref(&images));
     let looks = inbox.clone();
     let looks = runtime.timer(Duration::from_millis(500), move || {
@@ -162,7 +176,11 @@ impl Shell {
         let skipped = self.slot.skipped.swap(0, Ordering::Relaxed);
         self.machine.skip(skipped);
         let began = Instant::now();
-        let Some(labelled) = self.machine.on_image(&image) else {
+        let labelled = match image {
+            Input::Plain(image) => self.machine.on_image(&image),
+            Input::Compressed(image) => self.machine.on_compressed(&image),
+        };
+        let Some(labelled) = labelled else {
             return;
         };
         self.last_s = began.elapsed().as_secs_f64();

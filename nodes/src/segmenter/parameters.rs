@@ -14,6 +14,7 @@ const MODEL: &str = "the network is made at the start";
 const ABOUT: &[About] = about! {
     "model" fixed(MODEL): "The network, an ONNX file: one image in (1 x 3 x rows x columns), scores of classes or classes out.";
     "input_size" fixed(MODEL): "Width and height of the images that the network takes, where its file leaves them open.";
+    "compressed" fixed(options::TOPIC): "Whether images are taken from rgb/image_rect_color/compressed (JPEG).";
     "mean": "Means of red, green and blue, for colours from 0 to 1, as the network was trained with.";
     "std": "Standard deviations of red, green and blue, likewise.";
     "scores": "Whether the scores of the network are logits or probabilities.";
@@ -25,6 +26,7 @@ const ABOUT: &[About] = about! {
 pub(super) struct Settings {
     pub segmenter: SegmenterOptions,
     pub model: PathBuf,
+    pub compressed: bool,
     pub input_size: Option<Size>,
     pub threads: usize,
     pub limits: ComputeLimits,
@@ -39,6 +41,7 @@ impl Settings {
         Ok(Self {
             segmenter: SegmenterOptions::from_params(params)?,
             model: params.string("model", "")?.into(),
+            compressed: params.bool("compressed", false)?,
             input_size: input_size(params)?,
             threads: options::threads(params, 0)?,
             limits: ComputeLimits {

@@ -63,3 +63,35 @@ fn a_cyclone_camera_gets_labels_of_a_network() {
     assert_eq!(counts.dropped.values().sum::<u64>(), skipped + 2);
     assert_eq!((report.images_lost, report.undecodable), (0, 0));
 }
+
+#[test]
+fn a_cyclone_camera_that_packs_its_images_gets_labels_too() {
+    let Some(python) = python() else { return };
+    let directory = tempfile::tempdir().unwrap();
+    let path = directory.path();
+    peer::run(&python, "onnx_models.py", &[path]);
+    let domain = TestDomain::take();
+    let jpeg = concat!(
+        env!("CARGO_MANIFEST_DIR"),
+        "/../nodes/src/segmenter/red_blue.jpg"
+    );
+    let scenario = json!({"domain": domain.id(), "jpeg": jpeg});
+    fs::write(path.join("scenario.json"), scenario.to_string()).unwrap();
+    let topics = [
+        "rgb/image_rect_color/compressed",
+        "labels/image",
+        "labels/confidence",
+    ];
+    let qos = topics.map(|topic| format!("qos.{topic}.reliability:=reliable"));
+    let given = format!(
+        "{} model:={} input_size:=[16,8] mean:=[0.5,0.5,0.5] std:=[0.5,0.5,0.5] compressed:=true",
+        qos.join(" "),
+        path.join("red.onnx").display()
+    );
+    let nodes = Nodes::start(&domain, &[("segmenter", params(&given))]);
+    let found = peer::run(&python, "segmenter_peer.py", &[path]);
+    nodes.finish();
+    assert_eq!(found["red"], json!([1.0, 0.0]));
+    let refused = found["refused"].as_str().unwrap();
+    assert!(refused.contains("expected jpeg"), "{refused}");
+}
