@@ -13,7 +13,7 @@ pub const COMMON: &[About] = about! {
     "mapper" fixed("it names a topic"): "Node that is asked for a keyframe when a part of the map was lost.";
     "label_low_16_bits": "Whether only the low 16 of labels of 32 bits are the class (SemanticKITTI: the others are the instance).";
     "ignored_labels": "Classes that say nothing, as 0 in SemanticKITTI.";
-    "palette_rgb_class": "Classes of colours, for clouds whose labels are the colours semantic_color, semantic_color1 to 3 or rgb: red, green, blue, class, and so on.";
+    "palette_rgb_class": "Classes of colours, for clouds whose labels are the colours semantic_color, semantic_color1 to 3 or rgb, and for images of colours: red, green, blue, class, and so on.";
 };
 
 /// Reason for which frames do not change.

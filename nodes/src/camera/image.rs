@@ -110,6 +110,11 @@ impl Pixel {
     }
 }
 
+/// True if the pixels of an encoding are colours, not grey.
+pub(super) fn is_colored(encoding: &str) -> bool {
+    matches!(Pixel::of(encoding), Some(Pixel::Rgb(_) | Pixel::Bgr(_)))
+}
+
 /// Meaning of the pixels of an image.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum Content {
@@ -129,7 +134,7 @@ impl Content {
             Self::Depth => (&[Pixel::U16, Pixel::F32], "16UC1 or 32FC1"),
             Self::Labels => (
                 &[Pixel::U8, Pixel::U16, Pixel::I32],
-                "mono8, 8UC1, mono16, 16UC1 or 32SC1",
+                "mono8, 8UC1, mono16, 16UC1 or 32SC1 (colours need `palette_rgb_class`)",
             ),
             Self::Confidence => (
                 &[Pixel::F32, Pixel::U8, Pixel::U16],

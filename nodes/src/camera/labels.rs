@@ -1,11 +1,15 @@
 //! Classes of pixels: which numbers mean what, and images of labels read at the pixels of another.
 
 use std::collections::{BTreeMap, BTreeSet};
+use std::sync::Arc;
 
 use lattice_core::registration::UNLABELED;
+use lattice_msgs::sensor_msgs::Image;
 use lattice_msgs::vision_msgs::LabelInfo;
 
-use super::image::ImageView;
+use super::image::{ImageError, ImageView};
+use super::palette;
+use crate::convert::semantic::{Color, palette_from_params};
 use lattice_runtime::params::{ParamError, Params};
 
 /// Classes that say nothing, and those that count as others.
@@ -15,10 +19,12 @@ pub struct ClassRules {
     pub ignored: BTreeSet<u16>,
     /// Class that others count as.
     pub groups: BTreeMap<u16, u16>,
+    /// Class of a colour, for masks of colours.
+    pub palette: BTreeMap<Color, u16>,
 }
 
 impl ClassRules {
-    /// Reads `ignored_labels` and `group_labels`.
+    /// Reads `ignored_labels`, `group_labels` and `palette_rgb_class`.
     pub fn from_params(params: &Params) -> Result<Self, ParamError> {
         let ignored = params.i64_array("ignored_labels", &[])?;
         let ignored: Result<_, _> = ignored.into_iter().map(u16::try_from).collect();
@@ -27,7 +33,13 @@ impl ClassRules {
                 params.invalid("ignored_labels", "expected numbers from 0 to 65535")
             })?,
             groups: groups(params)?,
+            palette: palette_from_params(params)?,
         })
+    }
+
+    /// A label image as numbers: a mask of colours becomes one by the palette.
+    pub fn numbered(&self, image: Arc<Image>, max_pixels: usize) -> Result<Arc<Image>, ImageError> {
+        palette::numbered(image, &self.palette, max_pixels)
     }
 
     /// Class of a point by the number of its pixel.

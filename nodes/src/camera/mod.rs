@@ -3,6 +3,7 @@
 mod distortion;
 mod image;
 mod labels;
+mod palette;
 mod pinhole;
 mod points;
 

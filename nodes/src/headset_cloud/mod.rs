@@ -116,10 +116,22 @@ impl HeadsetCloud {
             HeadsetStream::Confidence => (&mut self.counts.confidence_in, Content::Confidence),
         };
         *count += 1;
-        if let Err(error) = ImageView::new(&image, content, self.options.max_image_pixels) {
-            self.refuse(stream.name(), error.name(), &error.to_string());
-            return Vec::new();
-        }
+        let max = self.options.max_image_pixels;
+        let image = match stream {
+            HeadsetStream::Labels => self.options.classes.numbered(image, max),
+            _ => Ok(image),
+        };
+        let checked = image.and_then(|image| {
+            ImageView::new(&image, content, max)?;
+            Ok(image)
+        });
+        let image = match checked {
+            Ok(image) => image,
+            Err(error) => {
+                self.refuse(stream.name(), error.name(), &error.to_string());
+                return Vec::new();
+            }
+        };
         let [repeated, oldest] = self.waiting.push(stream, image, self.options.queue_size);
         let reason = self.missing(stream);
         self.counts.drop_some(stream.name(), "repeated", repeated);

@@ -91,10 +91,22 @@ impl SemanticCloud {
             Stream::Confidence => (&mut self.counts.confidence_in, Content::Confidence),
         };
         *count += 1;
-        if let Err(error) = ImageView::new(&image, content, self.options.max_image_pixels) {
-            self.refuse(stream.name(), error.name(), &error.to_string());
-            return Vec::new();
-        }
+        let max = self.options.max_image_pixels;
+        let image = match stream {
+            Stream::Labels => self.options.classes.numbered(image, max),
+            _ => Ok(image),
+        };
+        let checked = image.and_then(|image| {
+            ImageView::new(&image, content, max)?;
+            Ok(image)
+        });
+        let image = match checked {
+            Ok(image) => image,
+            Err(error) => {
+                self.refuse(stream.name(), error.name(), &error.to_string());
+                return Vec::new();
+            }
+        };
         for (stream, reason) in self.waiting.push(stream, image) {
             self.drop_image(stream, reason);
         }

@@ -7,7 +7,7 @@ mod options;
 mod write;
 
 pub use fields::LabelReader;
-pub use options::{Color, LabelOptions, SemanticOptions};
+pub use options::{Color, LabelOptions, SemanticOptions, palette_from_params};
 pub use write::{color_of, message_from_semantic};
 
 use lattice_core::cloud::{CloudError, CloudLimits};

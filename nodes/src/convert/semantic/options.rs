@@ -37,19 +37,24 @@ impl LabelOptions {
         let defaults = Self::default();
         let ignored = params.i64_array("ignored_labels", &[])?;
         let ignored: Result<_, _> = ignored.into_iter().map(u16::try_from).collect();
-        let palette = params.i64_array("palette_rgb_class", &[])?;
         Ok(Self {
             low_16_bits: params.bool("label_low_16_bits", defaults.low_16_bits)?,
             ignored: ignored.map_err(|_| {
                 params.invalid("ignored_labels", "expected numbers from 0 to 65535")
             })?,
-            palette: palette_from(&palette).ok_or_else(|| {
-                let problem = "expected four numbers for each class: red, green, blue from 0 to \
-                               255 and the class from 0 to 65534";
-                params.invalid("palette_rgb_class", problem)
-            })?,
+            palette: palette_from_params(params)?,
         })
     }
+}
+
+/// `palette_rgb_class`: classes of colours.
+pub fn palette_from_params(params: &Params) -> Result<BTreeMap<Color, u16>, ParamError> {
+    let palette = params.i64_array("palette_rgb_class", &[])?;
+    palette_from(&palette).ok_or_else(|| {
+        let problem = "expected four numbers for each class: red, green, blue from 0 to 255 and the class from 0 \
+                       to 65534";
+        params.invalid("palette_rgb_class", problem)
+    })
 }
 
 fn palette_from(numbers: &[i64]) -> Option<BTreeMap<Color, u16>> {

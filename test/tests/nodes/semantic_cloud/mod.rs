@@ -5,9 +5,10 @@ mod hostile;
 mod pairs;
 mod scene;
 
+use std::collections::BTreeSet;
 use std::sync::Arc;
 
-use lattice_msgs::sensor_msgs::{CameraInfo, PointCloud2};
+use lattice_msgs::sensor_msgs::{CameraInfo, Image, PointCloud2};
 use lattice_msgs::vision_msgs::{LabelInfo, VisionClass};
 use lattice_nodes::semantic_cloud::{Camera, CloudOptions, CloudOutput, SemanticCloud, Stream};
 use lattice_runtime::params::{ParamValue, Params};
@@ -237,4 +238,45 @@ fn confidences_come_along_and_weak_labels_are_none() {
         let expected = if is_left { 0.0 } else { 0.8 };
         assert!((point.confidence - expected).abs() < 1e-6);
     }
+}
+
+#[test]
+fn masks_of_colours_give_the_cloud_of_their_numbers() {
+    let info = camera_info("plumb_bob", &[]);
+    let camera = Camera::new(&info, false).unwrap();
+    let numbers = labels(&camera, 7, 1, Form::plain("mono8"));
+    let known: BTreeSet<u8> = numbers.data.iter().copied().collect();
+    assert!(known.len() > 2);
+    // Class 0 has no colour.
+    let palette = known.iter().filter(|class| **class > 0);
+    let palette: Vec<String> = palette
+        .map(|class| format!("{class}, 0, 200, {class}"))
+        .collect();
+    let palette = format!("[{}]", palette.join(", "));
+    let colors = numbers.data.iter().flat_map(|class| [*class, 0, 200]);
+    let mask = Image {
+        encoding: "rgb8".to_owned(),
+        step: 3 * numbers.width,
+        data: colors.collect::<Vec<_>>().into(),
+        ..numbers.clone()
+    };
+    let cloud = |params: &[(&str, &str)], image: Image| {
+        let mut machine = SemanticCloud::new(options(params));
+        machine.on_camera_info(Arc::new(info.clone()));
+        machine.on_image(Stream::Labels, Arc::new(image));
+        let depth = depth(&camera, 7, Form::plain("32FC1"));
+        let clouds = clouds(machine.on_image(Stream::Depth, Arc::new(depth)));
+        (clouds, machine.problem().map(str::to_owned))
+    };
+    let (expected, _) = cloud(&[("ignored_labels", "[0]")], numbers);
+    let (found, _) = cloud(&[("palette_rgb_class", &palette)], mask.clone());
+    assert_eq!(found, expected);
+    assert_eq!(found.len(), 1);
+    let (found, problem) = cloud(&[], mask);
+    assert!(found.is_empty());
+    assert!(
+        problem
+            .unwrap()
+            .contains("colours need `palette_rgb_class`")
+    );
 }
