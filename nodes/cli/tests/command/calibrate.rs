@@ -256,8 +256,15 @@ fn axes_and_scale_that_are_wrong_are_told_and_thresholds_can_be_set() {
         (&"OK".into(), &"depth_camera".into())
     );
     assert_eq!(ask(&ros, &["--from", "lidar"])["profile"], "lidar");
-    let found = ask(&ros, &["--min-margin", "1e6"]);
-    assert_eq!(found["verdict"], "AMBIGUOUS", "{found}");
+    let found = ask(&ros, &["--max-p-wrong", "1e-12"]);
+    let is_sure = found["p_wrong"].as_f64().unwrap() <= 1e-12;
+    assert_eq!(found["verdict"], if is_sure { "OK" } else { "AMBIGUOUS" });
+    let output = calibrate(&["--map", &map, "--cloud", &ros, "--max-p-wrong", "0.9"]);
+    let said = String::from_utf8_lossy(&output.stderr).into_owned();
+    assert!(
+        !output.status.success() && said.contains("--max-p-wrong"),
+        "{said}"
+    );
     let found = ask(&ros, &["--min-inliers", "1"]);
     assert!(found["verdict"] == "OK" || reason(&found).contains("100 % are needed"));
 }
