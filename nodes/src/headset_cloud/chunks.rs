@@ -20,6 +20,16 @@ pub(super) struct Chunks {
     numbers: usize,
 }
 
+/// Longest that messages overtake each other. A state that seems to be older yet comes of a clock that was set, or
+/// the one before had a stamp of the future.
+const OVERTAKEN_NS: i64 = 60_000_000_000;
+
+/// True if a state was overtaken by the one that is known.
+pub(super) fn is_late(stamp_ns: i64, known_ns: i64) -> bool {
+    let late_ns = known_ns.saturating_sub(stamp_ns);
+    (1..=OVERTAKEN_NS).contains(&late_ns)
+}
+
 /// Numbers in the arrays of a chunk, and one for the chunk itself.
 fn numbers(chunk: &HeadsetMesh) -> usize {
     1 + chunk.vertices.len() + chunk.triangles.len() + chunk.classes.len()
@@ -34,10 +44,10 @@ impl Chunks {
         let stamp_ns = chunk.header.stamp.to_ns();
         let known = self.pending.get(&chunk.surface).map(|state| state.stamp_ns);
         let surface = || shown(&chunk.surface);
-        if known.is_some_and(|known_ns| stamp_ns < known_ns) {
+        if known.is_some_and(|known_ns| is_late(stamp_ns, known_ns)) {
             return Err(MeshRefusal::Stale { surface: surface() });
         }
-        if known.is_some_and(|known_ns| stamp_ns > known_ns) {
+        if known.is_some_and(|known_ns| stamp_ns != known_ns) {
             self.remove(&chunk.surface);
         }
         let of = self.pending.entry(chunk.surface.clone());

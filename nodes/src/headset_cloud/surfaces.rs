@@ -8,7 +8,7 @@ use lattice_core::registration::UNLABELED;
 use lattice_msgs::headset::HeadsetMesh;
 use nalgebra::{Isometry3, Point3, Vector3};
 
-use super::chunks::Chunks;
+use super::chunks::{Chunks, is_late};
 use super::refusal::{MeshRefusal, shown};
 use crate::convert::geometry::isometry_from_pose;
 use crate::mesh::{LabelledMesh, MeshError};
@@ -76,7 +76,7 @@ impl Surfaces {
     pub fn on_mesh(&mut self, message: &Arc<HeadsetMesh>) -> Result<Change, MeshRefusal> {
         let stamp_ns = message.header.stamp.to_ns();
         let there = self.surfaces.get(&message.surface);
-        if there.is_some_and(|there| stamp_ns < there.stamp_ns) {
+        if there.is_some_and(|there| is_late(stamp_ns, there.stamp_ns)) {
             let surface = shown(&message.surface);
             return Err(MeshRefusal::Stale { surface });
         }

@@ -8,6 +8,7 @@ mod colors;
 #[cfg(feature = "onnx")]
 mod jpeg;
 mod labels;
+#[cfg(feature = "onnx")]
 mod names;
 mod network;
 pub mod node;

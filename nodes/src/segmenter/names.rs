@@ -7,10 +7,10 @@ use std::path::Path;
 
 use serde::Deserialize;
 
+use super::network::MAX_CLASSES;
+
 /// Most bytes of names that are read.
 const MAX_BYTES: u64 = 1 << 20;
-/// Most classes: their numbers have 16 bits, and one is none.
-pub(super) const MAX_CLASSES: usize = u16::MAX as usize;
 
 /// Names in one of the forms in which they are written.
 #[derive(Deserialize)]

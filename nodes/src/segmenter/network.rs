@@ -4,6 +4,9 @@ use std::path::PathBuf;
 
 use thiserror::Error;
 
+/// Most classes: their numbers have 16 bits, and one is none.
+pub(super) const MAX_CLASSES: usize = u16::MAX as usize;
+
 /// Size of an image or of the output of a network, pixels.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub struct Size {

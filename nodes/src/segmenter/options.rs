@@ -2,8 +2,7 @@
 
 use super::colors::Normalisation;
 use super::labels::Meaning;
-use super::names::MAX_CLASSES;
-use super::network::Size;
+use super::network::{MAX_CLASSES, Size};
 use crate::options::one_of;
 use lattice_runtime::params::{ParamError, Params};
 

@@ -62,6 +62,21 @@ fn surfaces_are_replaced_and_removed() {
 }
 
 #[test]
+fn a_stamp_of_the_future_holds_up_no_later_state() {
+    let mut machine = machine(&[]);
+    machine.on_mesh(&Arc::new(shifted(0.0, 2_000_000_000_000_000_000)));
+    let first_half = HeadsetMesh {
+        chunks: 2,
+        ..shifted(-2.0, 2_000_000_000_000_000_000)
+    };
+    machine.on_mesh(&Arc::new(first_half));
+    machine.on_mesh(&Arc::new(shifted(-1.0, 7)));
+    assert_eq!(seen_m(&mut machine, AT_NS), Some(2.0));
+    assert_eq!(machine.waiting(), [0, 0]);
+    assert!(machine.counts().dropped.is_empty());
+}
+
+#[test]
 fn half_a_surface_changes_nothing_and_a_newer_state_takes_its_place() {
     let mut machine = machine(&[]);
     machine.on_mesh(&Arc::new(square()));
