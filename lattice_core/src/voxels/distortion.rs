@@ -25,14 +25,15 @@ pub struct Distortion {
 
 /// Integer sums behind [`Distortion`]; sums saturate, which keeps them associative.
 #[derive(Clone, Copy, PartialEq, Eq, Debug, Default)]
-pub(super) struct DistortionSums {
-    pub(super) points: u64,
+pub struct DistortionSums {
+    /// Number of points.
+    pub points: u64,
     /// Sum of squared distances, in cell sides^2 / 2^20.
-    pub(super) squares: u128,
+    pub squares: u128,
     /// Sum of distances, in cell sides / 2^20.
-    pub(super) distances: u128,
+    pub distances: u128,
     /// The largest squared distance, in cell sides^2 / 2^20.
-    pub(super) largest_square: u64,
+    pub largest_square: u64,
 }
 
 impl DistortionSums {
@@ -46,7 +47,8 @@ impl DistortionSums {
         });
     }
 
-    pub(super) fn add(&mut self, other: &DistortionSums) {
+    /// Adds the sums of other points.
+    pub fn add(&mut self, other: &DistortionSums) {
         self.points = self.points.saturating_add(other.points);
         self.squares = self.squares.saturating_add(other.squares);
         self.distances = self.distances.saturating_add(other.distances);

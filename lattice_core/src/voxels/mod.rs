@@ -15,7 +15,7 @@ pub(crate) mod store;
 mod voxel;
 mod voxel_store;
 
-pub use distortion::Distortion;
+pub use distortion::{Distortion, DistortionSums};
 pub use list::{Changes, DatumError, InsertReport, NoStamps, VoxelList, WhenFull};
 pub use occupancy::OccupancyList;
 pub use region::{Region, RegionError};

@@ -1,9 +1,7 @@
 //! The fixed head of a map file, of a section, and its end.
 
-use nalgebra::{Matrix3, Quaternion, UnitQuaternion};
-
-use super::FileError;
-use crate::lattice::{Lattice, LatticeKind};
+use super::{Figure, FileError, LatticeFigures};
+use crate::lattice::Lattice;
 use crate::voxels::distortion::DistortionSums;
 
 pub(super) const MAGIC: &[u8; 8] = b"LATTICE2";
@@ -18,8 +16,6 @@ pub(super) const SECTION_HEAD_BYTES: usize = 48;
 const VOLUME_AT: u64 = 24;
 const ORIENTATION_AT: u64 = 32;
 const GENERATOR_AT: u64 = 64;
-/// Largest deviation of the squared length of a quaternion from 1.
-const UNIT_SLACK: f64 = 1e-6;
 
 /// Head of a map file: lattice, datum, counts.
 pub(super) struct Head {
@@ -34,12 +30,10 @@ impl Head {
     pub(super) fn to_bytes(&self) -> Vec<u8> {
         let mut bytes = Vec::with_capacity(HEAD_BYTES);
         bytes.extend(MAGIC);
-        bytes.extend(name16(self.lattice.kind().name()));
-        bytes.extend(self.lattice.cell_volume_m3().to_le_bytes());
-        for value in orientation(&self.lattice)
-            .iter()
-            .chain(self.lattice.unoriented_generator().iter())
-        {
+        let figures = LatticeFigures::from(&self.lattice);
+        bytes.extend(name16(figures.kind.name()));
+        bytes.extend(figures.cell_volume_m3.to_le_bytes());
+        for value in figures.orientation.iter().chain(&figures.generator_m) {
             bytes.extend(value.to_le_bytes());
         }
         self.datum_index
@@ -63,16 +57,20 @@ impl Head {
         };
         let at = fields.position;
         let name = name_of(&fields.array::<16>()).map_err(|reason| corrupt(at, reason))?;
-        let kind = match LatticeKind::Custom.name() == name {
-            true => Ok(LatticeKind::Custom),
-            false => name.parse(),
+        let figures = LatticeFigures {
+            kind: LatticeFigures::kind_of(&name).map_err(|reason| corrupt(at, reason))?,
+            cell_volume_m3: fields.f64(),
+            orientation: std::array::from_fn(|_| fields.f64()),
+            generator_m: std::array::from_fn(|_| fields.f64()),
         };
-        let kind: LatticeKind = kind.map_err(|error| corrupt(at, format!("{error}")))?;
-        let volume_m3 = fields.f64();
-        let orientation: [f64; 4] = std::array::from_fn(|_| fields.f64());
-        let generator: [f64; 9] = std::array::from_fn(|_| fields.f64());
-        let lattice = lattice(kind, volume_m3, orientation, generator)
-            .map_err(|(at, reason)| corrupt(at, reason))?;
+        let lattice = figures.lattice().map_err(|error| {
+            let at = match error.figure {
+                Figure::Volume => VOLUME_AT,
+                Figure::Orientation => ORIENTATION_AT,
+                Figure::Generator => GENERATOR_AT,
+            };
+            corrupt(at, error.to_string())
+        })?;
         let datum_index = std::array::from_fn(|_| i64::from_le_bytes(fields.array()));
         let sums = DistortionSums {
             points: fields.u64(),
@@ -89,61 +87,6 @@ impl Head {
             sections,
         })
     }
-}
-
-/// `map_from_lattice` as w, x, y, z.
-fn orientation(lattice: &Lattice) -> [f64; 4] {
-    let q = lattice.orientation();
-    [q.w, q.i, q.j, q.k]
-}
-
-pub(super) fn orientation_error(map_from_lattice: &UnitQuaternion<f64>) -> Option<String> {
-    let square = map_from_lattice.coords.norm_squared();
-    // Not a number is refused too.
-    let unit = (square - 1.0).abs() <= UNIT_SLACK;
-    (!unit).then(|| {
-        format!(
-            "the orientation {:?} is no unit quaternion",
-            map_from_lattice.coords
-        )
-    })
-}
-
-/// The lattice of these figures, if it is the one that they were written for, to the bit; or the
-/// place of what is wrong.
-fn lattice(
-    kind: LatticeKind,
-    volume_m3: f64,
-    turned: [f64; 4],
-    generator: [f64; 9],
-) -> Result<Lattice, (u64, String)> {
-    let lattice = match kind {
-        LatticeKind::Custom => Lattice::from_basis(Matrix3::from_column_slice(&generator))
-            .map_err(|error| (GENERATOR_AT, error.to_string()))?,
-        _ => Lattice::new(kind, volume_m3).map_err(|error| (VOLUME_AT, error.to_string()))?,
-    };
-    let [w, x, y, z] = turned;
-    let rotation = UnitQuaternion::new_unchecked(Quaternion::new(w, x, y, z));
-    if let Some(reason) = orientation_error(&rotation) {
-        return Err((ORIENTATION_AT, reason));
-    }
-    let lattice = lattice.oriented(rotation);
-    let bits = |values: &[f64]| values.iter().map(|v| v.to_bits()).collect::<Vec<_>>();
-    if volume_m3.to_bits() != lattice.cell_volume_m3().to_bits() {
-        let found = lattice.cell_volume_m3();
-        let reason = format!("the cell volume is {volume_m3} m^3, that of the basis {found} m^3");
-        return Err((VOLUME_AT, reason));
-    }
-    let expected = orientation(&lattice);
-    if bits(&turned) != bits(&expected) {
-        let reason = format!("orientation {turned:?} should be written as {expected:?}");
-        return Err((ORIENTATION_AT, reason));
-    }
-    if bits(&generator) != bits(lattice.unoriented_generator().as_slice()) {
-        let reason = format!("generator {generator:?} is not that of {lattice:?}");
-        return Err((GENERATOR_AT, reason));
-    }
-    Ok(lattice)
 }
 
 #[derive(Clone, Copy, PartialEq, Eq, Debug)]

@@ -3,9 +3,11 @@
 //! `docs/map_file.md` describes the format and has a reader in Python.
 
 mod column_values;
+mod columns;
 mod contents;
 mod error;
 mod head;
+mod lattice_figures;
 mod operations;
 mod read;
 mod source;
@@ -18,8 +20,10 @@ use std::io::{Read, Write};
 
 use super::{OccupancyList, VoxelList, VoxelStore};
 
+pub use columns::{ColumnsError, MapColumns};
 pub use contents::MapContents;
 pub use error::FileError;
+pub use lattice_figures::{Figure, FiguresError, LatticeFigures};
 pub use operations::OperationError;
 
 /// A section may not unpack to more than this many times its stored bytes.

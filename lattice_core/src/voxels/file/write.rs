@@ -5,8 +5,8 @@ use std::io::Write;
 use super::column_values::{encode_labels, encode_stamps};
 use super::head::{
     COUNT, Codec, Column, END_TAG, Head, KEYS, LABELS, OFFSET_SUM, STAMPS, SectionHead,
-    orientation_error,
 };
+use super::lattice_figures::orientation_error;
 use super::{FileError, MAX_EXPANSION, MapContents, WriteOptions};
 use crate::voxels::codec::{encode_keys, push_varint, zigzag};
 

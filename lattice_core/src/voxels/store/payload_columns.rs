@@ -38,7 +38,7 @@ pub struct Stamps {
 
 impl Stamps {
     /// Stamps of no points.
-    pub(crate) const NONE: Stamps = Stamps {
+    pub const NONE: Stamps = Stamps {
         first_ns: i64::MAX,
         last_ns: i64::MIN,
     };
