@@ -3,6 +3,7 @@
 #[cfg(feature = "bags")]
 mod bag;
 mod calibrate;
+mod fleet;
 mod health;
 #[cfg(feature = "lab")]
 mod lab;
@@ -66,6 +67,8 @@ enum Command {
     /// Look into map files and export them
     #[command(subcommand)]
     Map(map::Map),
+    /// One map of many logs and robots, as tables on a data engine; needs the program lattice-fleet
+    Fleet(fleet::Fleet),
     #[cfg(feature = "lab")]
     #[command(flatten)]
     Lab(lab::Lab),
@@ -106,6 +109,7 @@ impl Command {
             Command::Quantize(command) => command.run(),
             Command::Calibrate(command) => command.run(),
             Command::Map(command) => command.run(),
+            Command::Fleet(command) => command.run(),
             #[cfg(feature = "lab")]
             Command::Lab(command) => command.run(),
         }

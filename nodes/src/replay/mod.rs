@@ -15,6 +15,7 @@ use lattice_core::pose::StampedPose;
 use lattice_core::raycast::FreeSpaceError;
 use lattice_msgs::RosMessage;
 use lattice_msgs::cdr::{self, CdrError};
+use lattice_msgs::geographic_msgs::GeoPoint;
 use lattice_msgs::geometry_msgs::PoseStamped;
 use lattice_msgs::nav_msgs::Odometry;
 use lattice_msgs::novatel_oem7_msgs::{INSPVA, INSPVAX};
@@ -28,6 +29,8 @@ use lattice_bag::{BagMessage, BagReader, ReadOptions};
 
 /// Epoch of maps that come from a replay: the same log gives the same bytes.
 const EPOCH: u64 = 1;
+/// Poses and transforms behind a slice that its last clouds may wait for.
+const POSES_BEHIND_NS: i64 = 10_000_000_000;
 /// Time between two updates of the map to its followers, in log time.
 const UPDATE_PERIOD_NS: i64 = 1_000_000_000;
 
@@ -37,6 +40,7 @@ pub struct Pipeline {
     branches: Vec<Branch>,
     undecodable: u64,
     next_update_ns: Option<i64>,
+    origin: Option<GeoPoint>,
 }
 
 struct Branch {
@@ -64,6 +68,7 @@ impl Pipeline {
             branches: maps.into_iter().map(branch).collect::<Result<_, _>>()?,
             undecodable: 0,
             next_update_ns: None,
+            origin: None,
         })
     }
 
@@ -98,6 +103,9 @@ impl Pipeline {
                 ..TransformerReport::default()
             },
             lattices,
+            origin: self
+                .origin
+                .map(|at| [at.latitude, at.longitude, at.altitude]),
             implausible_rows: 0,
             wall_s: 0.0,
         }
@@ -135,6 +143,9 @@ impl Pipeline {
 
     fn map(&mut self, outputs: Vec<EnuOutput>) {
         for output in outputs {
+            if let EnuOutput::Origin(origin) = &output {
+                self.origin = Some(origin.position);
+            }
             for branch in &mut self.branches {
                 match &output {
                     EnuOutput::Points(points) => {
@@ -186,33 +197,80 @@ impl Branch {
     }
 }
 
-/// Replays a whole log; `progress` gets the part that has passed, from 0 to 1.
+/// Part of a log by log time, from its beginning.
+#[derive(Clone, Copy, PartialEq, Debug)]
+pub struct Slice {
+    /// The first log time, s.
+    pub from_s: f64,
+    /// The first log time behind it, s.
+    pub to_s: f64,
+}
+
+impl Slice {
+    /// The whole of a log.
+    pub const WHOLE: Slice = Slice {
+        from_s: 0.0,
+        to_s: f64::INFINITY,
+    };
+
+    /// Bounds in log time, if they are in order.
+    fn range_ns(&self, start_ns: i64) -> Result<(i64, i64), TopicError> {
+        // Not a number is refused too.
+        if !(self.from_s >= 0.0 && self.from_s < self.to_s) {
+            let (from_s, to_s) = (self.from_s, self.to_s);
+            return Err(TopicError::Slice { from_s, to_s });
+        }
+        let at = |s: f64| start_ns.saturating_add((s * 1e9) as i64);
+        Ok((at(self.from_s), at(self.to_s)))
+    }
+}
+
+/// Replays the clouds of a slice of a log, with the poses and transforms of before and shortly after.
+///
+/// `progress` gets the part that has passed, from 0 to 1. Slices that share no time and leave none out
+/// have together the clouds of the log, each transformed as in one replay of it all.
 pub fn run(
     bag: &BagReader,
     plan: &TopicPlan,
+    slice: &Slice,
     pipeline: &mut Pipeline,
     source: &str,
     progress: &mut dyn FnMut(f64),
 ) -> Result<RunReport, TopicError> {
     let begin = Instant::now();
-    let wanted = plan.roles.keys();
-    let topics = wanted.filter_map(|i| Some(bag.topics().get(*i)?.name.clone()));
-    let options = ReadOptions {
-        topics: Some(topics.collect()),
+    let start_ns = bag.start_ns().unwrap_or(0);
+    let (from_ns, to_ns) = slice.range_ns(start_ns)?;
+    let end_ns = bag.end_ns().unwrap_or(0).min(to_ns);
+    let span_ns = end_ns.saturating_sub(start_ns).max(1) as f64;
+    let whole = *slice == Slice::WHOLE;
+    let before = ReadOptions {
+        topics: Some(plan.names(bag, |role| role != Role::Cloud)),
+        end_ns: Some(from_ns),
         ..ReadOptions::default()
     };
-    let start_ns = bag.start_ns().unwrap_or(0);
-    let span_ns = bag.end_ns().unwrap_or(0).saturating_sub(start_ns).max(1) as f64;
-    for message in bag.messages(&options)? {
-        let message = message?;
-        if let Some(role) = plan.roles.get(&message.topic) {
-            pipeline.on_message(*role, &message);
+    let within = ReadOptions {
+        topics: Some(plan.names(bag, |_| true)),
+        start_ns: (!whole).then_some(from_ns),
+        end_ns: (!whole).then_some(to_ns.saturating_add(POSES_BEHIND_NS)),
+        ..ReadOptions::default()
+    };
+    let mut clouds = 0;
+    let passes = [(!whole).then_some(before), Some(within)];
+    for options in passes.into_iter().flatten() {
+        for message in bag.messages(&options)? {
+            let message = message?;
+            let role = plan.roles.get(&message.topic).copied();
+            let behind = role == Some(Role::Cloud) && message.log_time_ns >= to_ns;
+            if let Some(role) = role.filter(|_| !behind) {
+                clouds += u64::from(role == Role::Cloud);
+                pipeline.on_message(role, &message);
+            }
+            progress(message.log_time_ns.saturating_sub(start_ns) as f64 / span_ns);
         }
-        progress(message.log_time_ns.saturating_sub(start_ns) as f64 / span_ns);
     }
     Ok(RunReport {
         source: source.to_owned(),
-        clouds_in_log: plan.clouds(bag),
+        clouds_in_log: if whole { plan.clouds(bag) } else { clouds },
         implausible_rows: bag.implausible_rows(),
         wall_s: begin.elapsed().as_secs_f64(),
         ..pipeline.finish()

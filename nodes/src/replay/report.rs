@@ -28,6 +28,9 @@ pub struct RunReport {
     pub transformer: TransformerReport,
     /// One for each lattice.
     pub lattices: Vec<LatticeReport>,
+    /// Latitude and longitude in degrees and ellipsoidal height in m of the map's origin, where known.
+    #[serde(default)]
+    pub origin: Option<[f64; 3]>,
     /// Rows of the log that are no messages and were left out.
     #[serde(default)]
     pub implausible_rows: u64,

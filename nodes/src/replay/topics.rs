@@ -13,6 +13,16 @@ use lattice_bag::{BagError, BagReader, ReadOptions};
 /// Reason for which a log cannot be replayed.
 #[derive(Debug, Error)]
 pub enum TopicError {
+    /// A slice that is empty or begins before the log.
+    #[error(
+        "no clouds from {from_s} s to {to_s} s: a slice begins at 0 s or later and ends behind its beginning"
+    )]
+    Slice {
+        /// Asked for.
+        from_s: f64,
+        /// Asked for.
+        to_s: f64,
+    },
     /// A topic that was asked for.
     #[error("no topic '{name}' of type {type_name} in the log; it has {has}")]
     Missing {
@@ -90,6 +100,13 @@ impl TopicPlan {
         let clouds = self.roles.iter().filter(|(_, role)| **role == Role::Cloud);
         let topics = clouds.filter_map(|(i, _)| bag.topics().get(*i));
         topics.map(|topic| topic.message_count).sum()
+    }
+
+    /// Names of the topics with a role that is wanted.
+    pub(super) fn names(&self, bag: &BagReader, wanted: impl Fn(Role) -> bool) -> Vec<String> {
+        let topics = self.roles.iter().filter(|(_, role)| wanted(**role));
+        let topics = topics.filter_map(|(i, _)| bag.topics().get(*i));
+        topics.map(|topic| topic.name.clone()).collect()
     }
 }
 

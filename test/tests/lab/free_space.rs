@@ -5,7 +5,7 @@ use lattice_core::lattice::MortonKey;
 use lattice_lab::datasets::{BobcatOptions, write_bobcat};
 use lattice_nodes::enu_transformer::TransformerOptions;
 use lattice_nodes::lattice_mapper::MapperOptions;
-use lattice_nodes::replay::{self, Pipeline, TopicWishes};
+use lattice_nodes::replay::{self, Pipeline, Slice, TopicWishes};
 use lattice_nodes::voxel_marker_publisher::MarkerOptions;
 use lattice_runtime::params::Params;
 use lattice_runtime::ros_args::RosArgs;
@@ -70,7 +70,15 @@ fn maps(bag: &Path, variants: &[&[&str]]) -> Vec<BTreeSet<MortonKey>> {
         ..MarkerOptions::default()
     };
     let mut pipeline = Pipeline::new(transformer, options, &no_markers).unwrap();
-    let report = replay::run(&bag, &plan, &mut pipeline, "bobcat", &mut |_| {}).unwrap();
+    let report = replay::run(
+        &bag,
+        &plan,
+        &Slice::WHOLE,
+        &mut pipeline,
+        "bobcat",
+        &mut |_| {},
+    )
+    .unwrap();
     assert_eq!(report.losses(), Vec::<String>::new());
     let cells = pipeline
         .mappers()

@@ -8,7 +8,7 @@ use lattice_nodes::enu_transformer::TransformerOptions;
 use lattice_nodes::enu_transformer::ins::InsSource;
 use lattice_nodes::lattice_mapper::MapperOptions;
 use lattice_nodes::replay::RunReport;
-use lattice_nodes::replay::{self, Pipeline, TopicWishes};
+use lattice_nodes::replay::{self, Pipeline, Slice, TopicWishes};
 use lattice_nodes::voxel_marker_publisher::MarkerOptions;
 use lattice_test::data::shared;
 use std::path::Path;
@@ -37,7 +37,17 @@ fn replayed(bag: &Path) -> (RunReport, Pipeline) {
     let maps =
         LatticeKind::PAPER.map(|kind| MapperOptions::new(Lattice::new(kind, 0.125).unwrap()));
     let mut pipeline = Pipeline::new(options, maps, &MarkerOptions::default()).unwrap();
-    let run = || replay::run(&reader, &plan, &mut pipeline, "kitti", &mut |_| {}).unwrap();
+    let run = || {
+        replay::run(
+            &reader,
+            &plan,
+            &Slice::WHOLE,
+            &mut pipeline,
+            "kitti",
+            &mut |_| {},
+        )
+        .unwrap()
+    };
     (on_threads(2, run), pipeline)
 }
 

@@ -13,7 +13,7 @@ use lattice_nodes::enu_transformer::ins::{InsMessage, InsSource};
 use lattice_nodes::enu_transformer::{EnuOutput, EnuTransformer, TransformerOptions};
 use lattice_nodes::lattice_mapper::{LatticeMapper, MapperOptions};
 use lattice_nodes::map_follower::MapFollower;
-use lattice_nodes::replay::{self, Pipeline, TopicWishes};
+use lattice_nodes::replay::{self, Pipeline, Slice, TopicWishes};
 use lattice_nodes::voxel_marker_publisher::MarkerOptions;
 use lattice_test::clouds::{SECOND_NS, cloud, field, labelled_cloud, odometry};
 use lattice_test::data::shared;
@@ -217,7 +217,15 @@ fn replaying_labelled_scans_gives_a_labelled_map() {
     map.labels = Some(labels);
     let transformer = TransformerOptions::new(plan.source);
     let mut pipeline = Pipeline::new(transformer, [map], &MarkerOptions::default()).unwrap();
-    replay::run(&reader, &plan, &mut pipeline, "kitti", &mut |_| {}).unwrap();
+    replay::run(
+        &reader,
+        &plan,
+        &Slice::WHOLE,
+        &mut pipeline,
+        "kitti",
+        &mut |_| {},
+    )
+    .unwrap();
     let mapper = pipeline.mappers().next().unwrap();
     assert_eq!(mapper.counts().clouds_unlabelled, 0);
     let cloud = SemanticCloud::from_voxels(mapper.list());

@@ -1,6 +1,6 @@
 //! Inserting clouds into a list, on one thread or many.
 
-use nalgebra::Translation3;
+use nalgebra::{Translation3, Vector3};
 use rayon::prelude::*;
 
 use super::VoxelList;
@@ -110,20 +110,31 @@ impl VoxelList {
 
     /// [`VoxelList::insert`] with a label for each point; points beyond the labels have none.
     pub fn insert_labelled(&mut self, cloud: &Cloud, labels: &[u16]) -> InsertReport {
+        self.insert_offsets(cloud.stamp_ns, cloud.datum_m, &cloud.offsets_m, labels)
+    }
+
+    /// [`VoxelList::insert_labelled`] for the parts of a [`Cloud`], which others may hold.
+    pub fn insert_offsets(
+        &mut self,
+        stamp_ns: i64,
+        datum_m: Vector3<f64>,
+        offsets_m: &[[f32; 3]],
+        labels: &[u16],
+    ) -> InsertReport {
         let before = self.len();
         let mut report = InsertReport {
-            points: cloud.offsets_m.len() as u64,
+            points: offsets_m.len() as u64,
             ..InsertReport::default()
         };
         let now = self.advance();
-        let shift = Translation3::from(cloud.datum_m - self.datum_m);
+        let shift = Translation3::from(datum_m - self.datum_m);
         let quantizer = BatchQuantizer::new(&self.lattice, shift.into());
         let mut chunks: Vec<Chunk> = Vec::new();
         let mut labels = labels;
-        for wave in cloud.offsets_m.chunks(self.wave_points(WAVE)) {
+        for wave in offsets_m.chunks(self.wave_points(WAVE)) {
             report.forgotten_voxels += self.make_room(wave.len(), now) as u64;
             let origin = Origin {
-                stamp_ns: cloud.stamp_ns,
+                stamp_ns,
                 labels: (!labels.is_empty()).then_some(labels),
             };
             labels = labels.get(wave.len()..).unwrap_or_default();

@@ -75,18 +75,11 @@ impl Demo {
             bag,
             direct: false,
             lattice: Some(self.lattice.clone()),
-            cell_volume: None,
-            orientation: None,
             params,
-            param: Vec::new(),
-            points: Vec::new(),
-            ins: None,
-            ins_topic: None,
-            threads: 0,
             rate: self.rate,
-            map_out: None,
             json: self.json,
             viewer,
+            ..Replay::default()
         };
         let report = replay.replay()?;
         // The same log without DDS: the map that the nodes should have made, and its picture.

@@ -13,7 +13,7 @@ use std::path::Path;
 use clap::Subcommand;
 use lattice_core::voxels::file::{MapContents, max_voxels_of};
 
-use super::{CliResult, init_logging};
+use super::{CliResult, fleet, init_logging};
 
 /// Look into map files, export, merge, compare, cut and question them
 #[derive(Subcommand)]
@@ -30,6 +30,10 @@ pub enum Map {
     Crop(combine::Crop),
     /// The nearest voxels, the clearance of a point, or the shortest path of a ball
     Query(query::Query),
+    /// Add map files to a folder of Parquet tables; needs the program lattice-fleet
+    ToTable(fleet::Fleet),
+    /// One map file of a folder of Parquet tables; needs the program lattice-fleet
+    FromTable(fleet::Fleet),
 }
 
 impl Map {
@@ -43,6 +47,8 @@ impl Map {
             Self::Diff(command) => command.run(),
             Self::Crop(command) => command.run(),
             Self::Query(command) => command.run(),
+            Self::ToTable(command) => command.run_as("to-table"),
+            Self::FromTable(command) => command.run_as("from-table"),
         }
     }
 }

@@ -3,20 +3,21 @@
 mod node_process;
 mod processes;
 
-use std::path::PathBuf;
+use std::ffi::OsString;
+use std::path::{Path, PathBuf};
 
 use clap::Args;
 use lattice_core::lattice::{Lattice, Orientation};
 use lattice_core::voxels::file::WriteOptions;
 
 use super::progress::Progress;
-use super::{CliResult, Lattices, init_logging};
+use super::{CliResult, Lattices, fleet, init_logging};
 use lattice_bag::BagReader;
 use lattice_nodes::enu_transformer::TransformerOptions;
 use lattice_nodes::enu_transformer::ins::InsSource;
 use lattice_nodes::files::whole;
 use lattice_nodes::lattice_mapper::MapperOptions;
-use lattice_nodes::replay::{self, Pipeline, RunReport, TopicWishes};
+use lattice_nodes::replay::{self, Pipeline, RunReport, Slice, TopicWishes};
 use lattice_nodes::voxel_marker_publisher::MarkerOptions;
 use lattice_runtime::LoopbackDomain;
 use lattice_runtime::params::Params;
@@ -66,9 +67,18 @@ pub struct Replay {
     /// Speed of the log over DDS, 1 is real time
     #[arg(long, default_value_t = 1.0)]
     pub rate: f64,
+    /// Map only clouds from here on, s of log time from its beginning; needs --direct
+    #[arg(long, value_name = "SECONDS")]
+    pub start: Option<f64>,
+    /// Map only clouds before this, s of log time from its beginning; needs --direct
+    #[arg(long, value_name = "SECONDS")]
+    pub stop: Option<f64>,
     /// Write the map here, for `lattice map`; with several lattices the name goes before the ending
     #[arg(long, value_name = "FILE")]
     pub map_out: Option<PathBuf>,
+    /// Add the map to a folder of tables, for `lattice fleet`; needs --direct and the program lattice-fleet
+    #[arg(long, value_name = "DIR")]
+    pub out_table: Option<PathBuf>,
     /// Print the report as JSON
     #[arg(long)]
     pub json: bool,
@@ -107,8 +117,15 @@ impl Replay {
         if self.direct {
             return self.replay_direct();
         }
-        if self.map_out.is_some() {
-            return Err("--map-out needs --direct".into());
+        for (option, given) in [
+            ("--map-out", self.map_out.is_some()),
+            ("--out-table", self.out_table.is_some()),
+            ("--start", self.start.is_some()),
+            ("--stop", self.stop.is_some()),
+        ] {
+            if given {
+                return Err(format!("{option} needs --direct").into());
+            }
         }
         let bag = BagReader::open(&self.bag)?;
         let plan = replay::plan(&bag, &self.wishes()?)?;
@@ -148,31 +165,39 @@ impl Replay {
         let source = self.bag.display().to_string();
         let report = pool.install(|| {
             let tell = &mut |done| progress.set(done);
-            replay::run(&bag, &plan, &mut pipeline, &source, tell)
+            replay::run(&bag, &plan, &self.slice(), &mut pipeline, &source, tell)
         })?;
         progress.done();
-        self.write_maps(&pipeline)?;
+        if let Some(path) = &self.map_out {
+            write_maps(path, &pipeline)?;
+        }
+        if let Some(tables) = &self.out_table {
+            self.add_to_tables(tables, &pipeline, &report)?;
+        }
         Ok(report)
     }
 
-    fn write_maps(&self, pipeline: &Pipeline) -> CliResult {
-        let Some(path) = &self.map_out else {
-            return Ok(());
-        };
-        let several = pipeline.mappers().count() > 1;
-        for mapper in pipeline.mappers() {
-            let mut path = path.clone();
-            if several {
-                let name = mapper.list().lattice().kind().name();
-                let ending = path.extension().unwrap_or_default().to_owned();
-                path.set_extension(name);
-                path.as_mut_os_string().push(".");
-                path.as_mut_os_string().push(ending);
-            }
-            let map = mapper.contents();
-            whole::write(&path, |file| map.write(file, &WriteOptions::default()))?;
+    /// Part of the log whose clouds are mapped.
+    fn slice(&self) -> Slice {
+        Slice {
+            from_s: self.start.unwrap_or(Slice::WHOLE.from_s),
+            to_s: self.stop.unwrap_or(Slice::WHOLE.to_s),
         }
-        Ok(())
+    }
+
+    /// Writes the maps to a file each, which `lattice-fleet` makes parts of the tables.
+    fn add_to_tables(&self, tables: &Path, pipeline: &Pipeline, report: &RunReport) -> CliResult {
+        let folder = tempfile::tempdir()?;
+        write_maps(&folder.path().join("map.lat"), pipeline)?;
+        let mut arguments: Vec<OsString> = vec!["to-table".into(), "-o".into(), tables.into()];
+        if let Some(origin) = report.origin {
+            arguments.push("--origin".into());
+            arguments.extend(origin.map(|value| value.to_string().into()));
+        }
+        for file in std::fs::read_dir(folder.path())? {
+            arguments.push(file?.path().into());
+        }
+        fleet::run(arguments)
     }
 
     /// Options of one mapper for each lattice.
@@ -234,4 +259,22 @@ impl Replay {
         let args = RosArgs::parse(arguments)?;
         Ok(Params::load(&args, &format!("/{node}"))?)
     }
+}
+
+/// Writes the map of each mapper; of several the name of the lattice goes before the ending.
+fn write_maps(path: &Path, pipeline: &Pipeline) -> CliResult {
+    let several = pipeline.mappers().count() > 1;
+    for mapper in pipeline.mappers() {
+        let mut path = path.to_owned();
+        if several {
+            let name = mapper.list().lattice().kind().name();
+            let ending = path.extension().unwrap_or_default().to_owned();
+            path.set_extension(name);
+            path.as_mut_os_string().push(".");
+            path.as_mut_os_string().push(ending);
+        }
+        let map = mapper.contents();
+        whole::write(&path, |file| map.write(file, &WriteOptions::default()))?;
+    }
+    Ok(())
 }

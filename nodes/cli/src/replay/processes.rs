@@ -70,6 +70,7 @@ pub fn run(replay: &DdsReplay) -> CliResult<RunReport> {
         clouds_in_log: replay.plan.clouds(replay.reader),
         transformer,
         lattices: lattices.collect::<Result<_, _>>()?,
+        origin: None,
         implausible_rows: replay.reader.implausible_rows(),
         wall_s: begin.elapsed().as_secs_f64(),
     };

@@ -8,7 +8,7 @@ use lattice_core::lattice::{Lattice, LatticeKind};
 use lattice_nodes::enu_transformer::TransformerOptions;
 use lattice_nodes::lattice_mapper::MapperOptions;
 use lattice_nodes::replay::RunReport;
-use lattice_nodes::replay::{self, Pipeline, TopicWishes};
+use lattice_nodes::replay::{self, Pipeline, Slice, TopicWishes};
 use lattice_nodes::voxel_marker_publisher::MarkerOptions;
 use std::path::Path;
 
@@ -38,6 +38,6 @@ pub fn replayed(path: &Path, progress: &mut dyn FnMut(f64)) -> Result<RunReport,
     let maps: Result<Vec<_>, AnyError> = LatticeKind::ALL.into_iter().map(map).collect();
     let transformer = TransformerOptions::new(plan.source);
     let mut pipeline = Pipeline::new(transformer, maps?, &MarkerOptions::default())?;
-    let run = replay::run(&bag, &plan, &mut pipeline, "", progress);
+    let run = replay::run(&bag, &plan, &Slice::WHOLE, &mut pipeline, "", progress);
     run.map_err(at(path))
 }

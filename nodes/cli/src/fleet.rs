@@ -1,0 +1,65 @@
+//! `lattice fleet`: the program `lattice-fleet`, which is built apart.
+
+use std::ffi::OsString;
+use std::io::ErrorKind;
+use std::path::PathBuf;
+use std::process::Command;
+
+use clap::Args;
+
+use crate::CliResult;
+
+/// Name of the program.
+const PROGRAM: &str = "lattice-fleet";
+
+/// Options of `lattice fleet`.
+#[derive(Args)]
+#[command(disable_help_flag = true)]
+pub struct Fleet {
+    /// Command and options of lattice-fleet
+    #[arg(
+        trailing_var_arg = true,
+        allow_hyphen_values = true,
+        value_name = "COMMAND"
+    )]
+    arguments: Vec<OsString>,
+}
+
+impl Fleet {
+    /// Runs the command.
+    pub fn run(self) -> CliResult {
+        run(self.arguments)
+    }
+
+    /// Runs a command of `lattice-fleet` that has another name here.
+    pub fn run_as(self, command: &str) -> CliResult {
+        let mut arguments = vec![command.into()];
+        arguments.extend(self.arguments);
+        run(arguments)
+    }
+}
+
+/// Runs `lattice-fleet` with these arguments and waits for it.
+pub fn run(arguments: Vec<OsString>) -> CliResult {
+    let program = beside_this().unwrap_or_else(|| PROGRAM.into());
+    let status = Command::new(&program).args(&arguments).status();
+    let status = status.map_err(|error| match error.kind() {
+        ErrorKind::NotFound => format!(
+            "there is no program {PROGRAM}, which holds the data engine and is built apart: \
+             cargo install --path nodes/fleet"
+        ),
+        _ => format!("{}: {error}", program.display()),
+    })?;
+    match status.code() {
+        Some(0) => Ok(()),
+        // It has said why.
+        Some(code) => std::process::exit(code),
+        None => Err(format!("{PROGRAM} was killed: {status}").into()),
+    }
+}
+
+/// The program beside this one, if it is there.
+fn beside_this() -> Option<PathBuf> {
+    let path = std::env::current_exe().ok()?.with_file_name(PROGRAM);
+    path.is_file().then_some(path)
+}

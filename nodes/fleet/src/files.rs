@@ -1,0 +1,108 @@
+//! Files that take their place whole, and digests that name them.
+
+use std::fs::{self, File};
+use std::io::{self, Read, Write};
+use std::path::Path;
+
+use serde::{Deserialize, Serialize};
+use sha2::{Digest, Sha256};
+
+use crate::{AnyError, Result};
+
+/// Size and digest of a file.
+#[derive(Clone, PartialEq, Eq, Debug, Default, Serialize, Deserialize)]
+pub struct FileId {
+    /// Size.
+    pub bytes: u64,
+    /// SHA-256, in hexadecimal digits.
+    pub sha256: String,
+}
+
+impl FileId {
+    /// Reads a file through.
+    pub fn of(path: &Path) -> io::Result<FileId> {
+        let mut file = File::open(path)?;
+        let (mut digest, mut bytes) = (Sha256::new(), 0);
+        let mut buffer = vec![0; 1 << 18];
+        loop {
+            let read = file.read(&mut buffer)?;
+            let Some(read) = buffer.get(..read).filter(|read| !read.is_empty()) else {
+                break;
+            };
+            digest.update(read);
+            bytes += read.len() as u64;
+        }
+        let sha256 = hex(&digest.finalize());
+        Ok(FileId { bytes, sha256 })
+    }
+
+    /// Fails, with its path, unless a file is this one.
+    pub fn verify(&self, path: &Path) -> Result {
+        let found = FileId::of(path).map_err(|error| at(path, error))?;
+        if found == *self {
+            return Ok(());
+        }
+        Err(at(
+            path,
+            format!(
+                "damaged: {} bytes with SHA-256 {:.16}..., but it was written with {} bytes and {:.16}...",
+                found.bytes, found.sha256, self.bytes, self.sha256
+            ),
+        ))
+    }
+}
+
+/// An error with the path of its file.
+pub fn at(path: &Path, error: impl std::fmt::Display) -> AnyError {
+    format!("{}: {error}", path.display()).into()
+}
+
+/// SHA-256 of some texts, in hexadecimal digits; which text ends where counts too.
+pub fn digest_of<'a>(texts: impl IntoIterator<Item = &'a str>) -> String {
+    let mut digest = Sha256::new();
+    for text in texts {
+        digest.update((text.len() as u64).to_le_bytes());
+        digest.update(text);
+    }
+    hex(&digest.finalize())
+}
+
+fn hex(bytes: &[u8]) -> String {
+    bytes.iter().map(|byte| format!("{byte:02x}")).collect()
+}
+
+/// Writes a file beside its place, brings it to the disk and renames it.
+pub fn write_whole(path: &Path, fill: impl FnOnce(&mut File) -> Result) -> Result {
+    let folder = path.parent().unwrap_or(Path::new("."));
+    let mut file = tempfile::Builder::new()
+        .prefix(".new-")
+        .tempfile_in(folder)
+        .map_err(|error| at(path, error))?;
+    fill(file.as_file_mut()).map_err(|error| at(path, error))?;
+    file.as_file().sync_all().map_err(|error| at(path, error))?;
+    let file = file.persist(path).map_err(|error| at(path, error.error))?;
+    open_to_all(&file).map_err(|error| at(path, error))
+}
+
+/// The rights of any new file, not those of a temporary one.
+fn open_to_all(file: &File) -> io::Result<()> {
+    use std::os::unix::fs::PermissionsExt;
+    file.set_permissions(fs::Permissions::from_mode(0o644))
+}
+
+/// Writes a value as JSON.
+pub fn write_json(path: &Path, value: &impl Serialize) -> Result {
+    let text = serde_json::to_vec_pretty(value)?;
+    write_whole(path, |file| Ok(file.write_all(&text)?))
+}
+
+/// Reads a value from JSON of at most 64 MB.
+pub fn read_json<T: serde::de::DeserializeOwned>(path: &Path) -> Result<T> {
+    const LONGEST: u64 = 64 << 20;
+    let file = File::open(path).map_err(|error| at(path, error))?;
+    let mut text = Vec::new();
+    file.take(LONGEST)
+        .read_to_end(&mut text)
+        .map_err(|error| at(path, error))?;
+    serde_json::from_slice(&text).map_err(|error| at(path, error))
+}
