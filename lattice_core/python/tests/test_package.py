@@ -65,7 +65,7 @@ def test_a_table_in_any_order_is_the_map_again(cloud, tmp_path):
     assert duckdb.sql("SELECT SUM(count) FROM rows").fetchall() == [(len(cloud),)]
     loaded = VoxelMap.load(tmp_path / "map.lat")
     assert loaded.lattice == map.lattice and len(loaded) == len(map)
-    np.testing.assert_allclose(loaded.lattice.centers(loaded.cells()), loaded.centers())
+    np.testing.assert_allclose(loaded.lattice.centers(loaded.cells()), loaded.centers(), atol=1e-12)
 
 
 def test_the_map_file_is_that_of_the_independent_reader(cloud, tmp_path):

@@ -40,7 +40,9 @@ pub async fn session(place: &str) -> Result<SessionContext> {
 
 async fn session_of(place: &str, config: SessionConfig) -> Result<SessionContext> {
     let state = state_of(config)?;
-    Ok(SessionContext::remote_with_state(&format!("df://{place}"), state).await?)
+    let session = SessionContext::remote_with_state(&format!("df://{place}"), state).await?;
+    session.register_udf(ScalarUDF::new_from_impl(MapFunction::new()));
+    Ok(session)
 }
 
 /// State of a session that knows our function, alike in the driver, the scheduler and the executors.

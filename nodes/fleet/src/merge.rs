@@ -306,3 +306,58 @@ fn remove_others(folder: &Path, made: &BTreeMap<Tile, MergedTile>) -> Result {
     }
     Ok(())
 }
+
+#[cfg(test)]
+mod tests {
+    use lattice_core::lattice::{Lattice, LatticeKind};
+    use lattice_core::voxels::VoxelList;
+    use lattice_core::voxels::file::MapContents;
+
+    use super::*;
+    use crate::part::{PartInfo, Source};
+
+    fn part(max_count: i64) -> Part {
+        let lattice = Lattice::new(LatticeKind::Fcc, 1.0).unwrap();
+        let list = VoxelList::new(lattice, nalgebra::Vector3::zeros(), 1).unwrap();
+        let source = Source {
+            kind: "map".to_owned(),
+            path: String::new(),
+            sha256: String::new(),
+            slice_s: (0.0, None),
+            settings: Vec::new(),
+            program: String::new(),
+        };
+        let tile = TileInfo {
+            tile: 7,
+            rows: 1,
+            label_rows: 0,
+            max_count,
+            voxels: Default::default(),
+            labels: None,
+        };
+        Part {
+            name: String::new(),
+            folder: PathBuf::new(),
+            info: PartInfo {
+                version: VERSION,
+                source,
+                map: MapInfo::of(&MapContents::from_list(&list).into(), None),
+                tiles: vec![tile],
+            },
+        }
+    }
+
+    #[test]
+    fn sums_that_could_wrap_around_are_refused_with_the_numbers() {
+        let bound = |counts: &[i64]| {
+            let parts: Vec<_> = counts.iter().map(|count| part(*count)).collect();
+            check_bounds(&map_of(&parts).unwrap(), &jobs_of(&parts))
+        };
+        assert!(bound(&[1 << 40, 1 << 40]).is_ok());
+        let error = bound(&[1 << 43, 1 << 43]).unwrap_err().to_string();
+        assert!(
+            error.contains("tile 7") && error.contains("more than 64 bits hold"),
+            "{error}"
+        );
+    }
+}

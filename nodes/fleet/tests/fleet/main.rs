@@ -1,0 +1,13 @@
+//! The program `lattice-fleet` as its users call it.
+//!
+//! Tests of logs need the program `lattice` in LATTICE_PROGRAM, those beside foreign engines a Python with
+//! DuckDB, Polars and pyarrow in LATTICE_PYTHON; they say so and skip where there is none.
+
+mod bounds;
+#[cfg(feature = "ballista")]
+mod cluster;
+mod engines;
+mod fixture;
+mod logs;
+mod merging;
+mod refusals;
