@@ -145,12 +145,12 @@ impl<E> Inbox<E> {
 
     /// A handler that hands each message over as an event of so many bytes, and counts those that
     /// find no room.
-    pub fn counting<M>(
+    pub fn counting<M, F: Fn(M) -> E>(
         &self,
         lost: &Arc<AtomicU64>,
-        event: fn(M) -> E,
+        event: F,
         bytes: fn(&M) -> usize,
-    ) -> impl FnMut(M) + use<E, M> {
+    ) -> impl FnMut(M) + use<E, M, F> {
         let (inbox, lost) = (self.clone(), Arc::clone(lost));
         move |message| {
             let bytes = bytes(&message);

@@ -10,7 +10,7 @@ use crate::start::{Declare, NodeError, Start};
 #[cfg(feature = "viewer")]
 use crate::viewer_server;
 use crate::{
-    enu_transformer, lattice_mapper, segmenter, semantic_cloud, semantic_icp_server,
+    enu_transformer, lattice_mapper, map_merger, segmenter, semantic_cloud, semantic_icp_server,
     voxel_marker_publisher,
 };
 use lattice_runtime::Runtime;
@@ -26,6 +26,7 @@ pub const NODES: &[(&str, Start)] = &[
     ("headset_cloud", headset_cloud::node::start),
     ("enu_transformer", enu_transformer::node::start),
     ("lattice_mapper", lattice_mapper::node::start),
+    ("map_merger", map_merger::node::start),
     (
         "voxel_marker_publisher",
         voxel_marker_publisher::node::start,
@@ -43,6 +44,7 @@ pub const PARAMETERS: &[(&str, Declare)] = &[
     ("headset_cloud", headset_cloud::declare),
     ("enu_transformer", enu_transformer::declare),
     ("lattice_mapper", lattice_mapper::declare),
+    ("map_merger", map_merger::declare),
     ("voxel_marker_publisher", voxel_marker_publisher::declare),
     ("semantic_icp_server", semantic_icp_server::declare),
     #[cfg(feature = "viewer")]

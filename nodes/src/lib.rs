@@ -16,6 +16,8 @@ pub mod headset_cloud;
 pub mod lattice_mapper;
 pub mod map_follower;
 mod map_input;
+pub mod map_merger;
+mod map_output;
 #[cfg(feature = "headset")]
 pub mod mesh;
 mod options;

@@ -30,6 +30,18 @@ impl MapLosses {
         map: fn(Undecoded<LatticeMap>) -> E,
         update: fn(Undecoded<LatticeMapUpdate>) -> E,
     ) -> Result<[Subscription; 2], RuntimeError> {
+        self.subscribe_to(node, ["map", "map_updates"], inbox, map, update)
+    }
+
+    /// The same of topics with other names.
+    pub fn subscribe_to<E: Send + 'static>(
+        &self,
+        node: &Node,
+        [map_topic, update_topic]: [impl AsRef<str>; 2],
+        inbox: &Inbox<E>,
+        map: impl Fn(Undecoded<LatticeMap>) -> E + Send + Sync + 'static,
+        update: impl Fn(Undecoded<LatticeMapUpdate>) -> E + Send + Sync + 'static,
+    ) -> Result<[Subscription; 2], RuntimeError> {
         let on_map = inbox.counting(&self.at_inbox, map, |map: &Undecoded<LatticeMap>| {
             map.bytes(|map| map.keys.len() + map.counts.len() * 10)
         });
@@ -40,9 +52,9 @@ impl MapLosses {
                 update.bytes(|update| update.keys.len() + update.counts.len() * 10)
             },
         );
-        let maps = node.subscribe_undecoded("map", Qos::MAP, Load::Small, on_map)?;
+        let maps = node.subscribe_undecoded(map_topic.as_ref(), Qos::MAP, Load::Small, on_map)?;
         let updates =
-            node.subscribe_undecoded("map_updates", Qos::DELTAS, Load::Small, on_update)?;
+            node.subscribe_undecoded(update_topic.as_ref(), Qos::DELTAS, Load::Small, on_update)?;
         self.before.watch([&maps, &updates]);
         Ok([maps, updates])
     }

@@ -1,7 +1,10 @@
 //! Parameters that several nodes read alike: frames, words, bounds of threads and inboxes.
 
+use std::time::Duration;
+
 use lattice_runtime::about;
 use lattice_runtime::params::{About, ParamError, Params};
+use nalgebra::Vector3;
 
 /// Parameters that several nodes have.
 pub const COMMON: &[About] = about! {
@@ -59,6 +62,20 @@ pub fn inbox_bytes(params: &Params, default: usize) -> Result<usize, ParamError>
 /// `threads`: threads of a pool; 0: one less than the machine has.
 pub fn threads(params: &Params, default: usize) -> Result<usize, ParamError> {
     params.usize_in("threads", default, 0..=MAX_THREADS)
+}
+
+/// A time between two events, in seconds.
+pub fn period(params: &Params, name: &str, default_s: f64) -> Result<Duration, ParamError> {
+    let seconds = params.f64_in(name, default_s, 0.01..=86_400.0)?;
+    Ok(Duration::from_secs_f64(seconds))
+}
+
+/// A place, metres; the origin if not given.
+pub fn place_m(params: &Params, name: &str) -> Result<Vector3<f64>, ParamError> {
+    match params.f64_array(name, &[0.0; 3])?[..] {
+        [x, y, z] => Ok(Vector3::new(x, y, z)),
+        _ => Err(params.invalid(name, "expected three numbers, x y z in metres")),
+    }
 }
 
 /// `chunk_bytes`: largest serialised message.

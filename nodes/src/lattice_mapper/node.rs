@@ -1,15 +1,12 @@
 //! The mapper as a ROS node: a thin shell around [`LatticeMapper`].
 
-use std::collections::VecDeque;
 use std::sync::atomic::{AtomicBool, AtomicU64, AtomicUsize, Ordering};
 use std::sync::{Arc, Mutex, Once};
 use std::thread::JoinHandle;
-use std::time::{Duration, SystemTime, UNIX_EPOCH};
+use std::time::Duration;
 
 use lattice_msgs::geographic_msgs::GeoPointStamped;
-use lattice_msgs::lattice::LatticeMap;
 use lattice_msgs::sensor_msgs::PointCloud2;
-use lattice_msgs::std_msgs::Empty;
 
 use super::autosave::Autosave;
 use super::map_folder::MapFolder;
@@ -20,14 +17,12 @@ use super::services::{self, Call};
 use super::{LatticeMapper, MapperOptions, MapperReport};
 use crate::compute::{Compute, Inbox};
 use crate::convert::cloud;
+use crate::map_output::{MapOutput, epoch};
 use crate::report;
 use crate::start::{Finish, NodeError, handed_over, open_params};
 use lattice_runtime::logging::Throttle;
 use lattice_runtime::qos::Qos;
 use lattice_runtime::{Diagnostics, Level, Load, Losses, Runtime, lock};
-
-/// Chunks of a keyframe published in one update period: 3 MB.
-const CHUNKS_PER_ROUND: usize = 50;
 
 /// Said where rays shall clear voxels and a cloud does not say where they begin.
 const NO_VIEWPOINTS: &str = "no sensor positions (vp_x, vp_y, vp_z), so no free space: set `viewpoints: true` of enu_transformer";
@@ -56,11 +51,13 @@ pub fn start(runtime: &Runtime, name: &str) -> Result<Finish, NodeError> {
     let wishes = Arc::new(Wishes::default());
     let max_voxels = Arc::new(AtomicUsize::new(old.voxel_limit()));
     let mut machine = LatticeMapper::new(settings.mapper, epoch())?;
+    let (output, requests) = MapOutput::open(&node)?;
     let autosave = Autosave::start(settings.autosave, &maps, &mut machine, old.voxel_limit())?;
     let autosave_period = autosave.period;
     let mut shell = Shell {
         machine,
         autosave,
+        output,
         outputs: Outputs::open(&node, old.free_space.free_level > 0)?,
         diagnostics: node.diagnostics(),
         lost: Arc::clone(&lost),
@@ -69,15 +66,12 @@ pub fn start(runtime: &Runtime, name: &str) -> Result<Finish, NodeError> {
         refusals: Throttle::new(Duration::from_secs(5)),
         no_viewpoints: Once::new(),
         wishes: Arc::clone(&wishes),
-        pending: VecDeque::new(),
-        updates_lost: 0,
-        chunks_waited: 0,
         writing: None,
         maps: maps.clone(),
         centers_of: None,
         report_file: settings.report_file,
     };
-    let (map, centers) = (shell.outputs.map.clone(), shell.outputs.centers.clone());
+    let centers = shell.outputs.centers.clone();
     let compute = Compute::spawn(
         name,
         settings.limits,
@@ -90,18 +84,7 @@ pub fn start(runtime: &Runtime, name: &str) -> Result<Finish, NodeError> {
     let origins = Arc::clone(&wishes);
     let take = move |origin| *lock(&origins.origin) = Some(origin);
     let origins = node.subscribe("map_origin", Qos::LATCHED, Load::Small, take)?;
-    let joined = Arc::clone(&wishes);
-    map.on_subscriber_joined(move || joined.keyframe.store(true, Ordering::Relaxed));
-    let joined = Arc::clone(&wishes);
-    centers.on_subscriber_joined(move || joined.centers.store(true, Ordering::Relaxed));
-    // By topic too: our own followers need no answer, and the topic passes inside a process.
-    let requests = Arc::clone(&wishes);
-    let ask = move |_: Arc<Empty>| requests.keyframe.store(true, Ordering::Relaxed);
-    let asked = node.subscribe("~/request_keyframe", Qos::DEFAULT, Load::Small, ask)?;
-    let request_keyframe = node.service_trigger("~/request_keyframe", move || {
-        wishes.keyframe.store(true, Ordering::Relaxed);
-        (true, "keyframe follows".into())
-    })?;
+    centers.on_subscriber_joined(move || wishes.centers.store(true, Ordering::Relaxed));
     let services = inbox.clone();
     let mut more = Vec::new();
     match settings.octomap_services {
@@ -119,7 +102,7 @@ pub fn start(runtime: &Runtime, name: &str) -> Result<Finish, NodeError> {
         }
     }
     clouds.watch([&points]);
-    inputs.watch([&points, &origins, &asked]);
+    inputs.watch([&points, &origins, &requests.topic]);
     let calls = services::serve(&node, &inbox, Event::Call, maps, Arc::clone(&max_voxels))?;
     let timer = |period, event: fn() -> Event| {
         let inbox = inbox.clone();
@@ -141,16 +124,15 @@ pub fn start(runtime: &Runtime, name: &str) -> Result<Finish, NodeError> {
         Ok(())
     });
     Ok(Box::new(move || {
-        drop((points, origins, asked));
+        drop((points, origins));
         compute.finish_with(Event::Finish);
-        Box::new((request_keyframe, more, calls))
+        Box::new((requests, more, calls))
     }))
 }
 
 /// Requests for the next update, kept whatever waits in the inbox.
 #[derive(Default)]
 struct Wishes {
-    keyframe: AtomicBool,
     centers: AtomicBool,
     origin: Mutex<Option<Arc<GeoPointStamped>>>,
 }
@@ -162,16 +144,11 @@ fn notify(inbox: &Inbox<Event>, event: Event) {
     }
 }
 
-/// Epochs of one map after another differ, those of restarted nodes too.
-fn epoch() -> u64 {
-    let since = SystemTime::now().duration_since(UNIX_EPOCH);
-    since.map_or(1, |since| since.as_nanos() as u64)
-}
-
 /// State of the compute thread.
 struct Shell {
     machine: LatticeMapper,
     autosave: Autosave,
+    output: MapOutput,
     outputs: Outputs,
     diagnostics: Diagnostics,
     /// Clouds that found the inbox full.
@@ -182,12 +159,6 @@ struct Shell {
     refusals: Throttle,
     no_viewpoints: Once,
     wishes: Arc<Wishes>,
-    /// Chunks of a keyframe that are still to be published.
-    pending: VecDeque<Arc<LatticeMap>>,
-    /// Updates lost by the publisher that a keyframe was asked for.
-    updates_lost: u64,
-    /// Times that a chunk of a keyframe found the publisher full, and waited.
-    chunks_waited: u64,
     /// A map file on its way to the disk.
     writing: Option<JoinHandle<()>>,
     /// Place of map files.
@@ -221,12 +192,12 @@ impl Shell {
             }
             Event::Reset => {
                 self.machine.reset(epoch());
-                self.replaced();
+                self.output.replaced();
             }
             Event::Call(call) => {
                 let done = services::answer(&mut self.machine, call, epoch(), &self.maps);
                 if done.replaced {
-                    self.replaced();
+                    self.output.replaced();
                 }
                 self.writing = done.writing.or(self.writing.take());
             }
@@ -234,42 +205,13 @@ impl Shell {
         }
     }
 
-    /// Shows followers the map of a new epoch.
-    fn replaced(&mut self) {
-        self.pending.clear();
-        self.wishes.keyframe.store(true, Ordering::Relaxed);
-    }
-
     /// Publishes what changed, and a keyframe where one was asked for or an update was lost.
     fn update(&mut self) {
         if let Some(origin) = lock(&self.wishes.origin).take() {
             self.machine.on_origin(&origin);
         }
-        for chunk in self.machine.take_update() {
-            if let Err(error) = self.outputs.updates.publish(Arc::new(chunk)) {
-                log::debug!("update not published: {error}");
-            }
-        }
-        // Also those that were taken and then found no reader that keeps up.
-        let lost = self.outputs.updates.dropped();
-        if lost != self.updates_lost {
-            self.updates_lost = lost;
-            self.wishes.keyframe.store(true, Ordering::Relaxed);
-        }
-        if self.pending.is_empty() && self.wishes.keyframe.swap(false, Ordering::Relaxed) {
-            self.pending = self.machine.keyframe().into_iter().map(Arc::new).collect();
-        }
-        // A large map takes several rounds: readers and queues are not flooded.
-        for _ in 0..CHUNKS_PER_ROUND {
-            let Some(chunk) = self.pending.front() else {
-                break;
-            };
-            if self.outputs.map.publish(Arc::clone(chunk)).is_err() {
-                self.chunks_waited += 1;
-                break;
-            }
-            self.pending.pop_front();
-        }
+        let update = self.machine.take_update();
+        self.output.publish(update, || self.machine.keyframe());
         self.diagnose();
     }
 
@@ -306,8 +248,8 @@ impl Shell {
         MapperReport {
             clouds_inbox_full: self.clouds_lost(),
             undecodable: self.inputs.undecodable(),
-            updates_not_published: self.outputs.updates.dropped(),
-            chunks_not_published: self.chunks_lost(),
+            updates_not_published: self.output.updates_lost(),
+            chunks_not_published: self.output.chunks_lost(),
             ..MapperReport::of(&mut self.machine)
         }
     }
@@ -317,17 +259,11 @@ impl Shell {
         self.lost.load(Ordering::Relaxed) + self.clouds.lost()
     }
 
-    /// Chunks of keyframes that the publisher took and did not send.
-    fn chunks_lost(&self) -> u64 {
-        let dropped = self.outputs.map.dropped();
-        dropped.saturating_sub(self.chunks_waited)
-    }
-
     fn diagnose(&self) {
         let counts = self.machine.counts();
         let lost = self.clouds_lost();
-        let updates = self.outputs.updates.dropped();
-        let not_published = updates + self.chunks_lost();
+        let updates = self.output.updates_lost();
+        let not_published = updates + self.output.chunks_lost();
         let refused =
             counts.clouds_malformed + counts.clouds_wrong_frame + counts.clouds_stamp_jump;
         let (level, message) = if let Some(problem) = self.autosave.problem() {
@@ -360,7 +296,7 @@ impl Shell {
             ("updates_not_published".into(), updates.to_string()),
             (
                 "chunks_not_published".into(),
-                self.chunks_lost().to_string(),
+                self.output.chunks_lost().to_string(),
             ),
             ("voxels".into(), self.machine.cells().len().to_string()),
             ("rms_m".into(), format!("{:.5}", distortion.rms_m)),
@@ -377,14 +313,13 @@ impl Shell {
         self.autosave.finish(&self.machine);
         self.update();
         let mut left = usize::MAX;
-        while !self.pending.is_empty() && self.pending.len() < left {
-            left = self.pending.len();
+        while self.output.pending() > 0 && self.output.pending() < left {
+            left = self.output.pending();
             self.update();
         }
         self.centers();
         // What is not sent by then counts.
-        self.outputs.map.flush(Duration::from_secs(2));
-        self.outputs.updates.flush(Duration::from_secs(2));
+        self.output.flush();
         let report = self.report();
         let (clouds, voxels) = (report.counts.clouds_in, report.voxels);
         log::info!(

@@ -91,13 +91,9 @@ impl MapperOptions {
             .map(|orientation| lattice.with_orientation(orientation))?
             .map_err(|e| params.invalid("lattice_orientation", format!("{e}")))?;
         let defaults = Self::new(lattice);
-        let datum = params.f64_array("datum_m", &[0.0; 3])?;
-        let [x, y, z] = datum[..] else {
-            return Err(params.invalid("datum_m", "expected three numbers, x y z in metres"));
-        };
         let read = Self {
             map_frame: options::frame(params, "map_frame", &defaults.map_frame)?,
-            datum_near_m: Vector3::new(x, y, z),
+            datum_near_m: options::place_m(params, "datum_m")?,
             max_voxels: params.positive("max_voxels", defaults.max_voxels)?,
             max_map_bytes: params.usize("max_map_bytes", defaults.max_map_bytes)?,
             when_full: options::one_of(params, "when_full", &WHEN_FULL)?,

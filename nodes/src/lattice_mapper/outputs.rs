@@ -1,16 +1,14 @@
-//! Publishers of the node.
+//! Publishers of the node besides those of the map.
 
-use lattice_msgs::lattice::{LatticeMap, LatticeMapUpdate};
+use lattice_msgs::lattice::LatticeMap;
 use lattice_msgs::sensor_msgs::PointCloud2;
 use lattice_runtime::qos::Qos;
 use lattice_runtime::{Node, Publisher};
 
 use crate::start::NodeError;
 
-/// The topics that the node speaks on.
+/// The further topics that the node speaks on.
 pub(super) struct Outputs {
-    pub map: Publisher<LatticeMap>,
-    pub updates: Publisher<LatticeMapUpdate>,
     pub centers: Publisher<PointCloud2>,
     pub free: Option<Publisher<LatticeMap>>,
 }
@@ -19,8 +17,6 @@ impl Outputs {
     pub(super) fn open(node: &Node, has_free: bool) -> Result<Self, NodeError> {
         let free = has_free.then(|| node.publisher("free", Qos::MAP));
         Ok(Self {
-            map: node.publisher("map", Qos::MAP)?,
-            updates: node.publisher("map_updates", Qos::DELTAS)?,
             centers: node.publisher("map_centers", Qos::LATCHED)?,
             free: free.transpose()?,
         })

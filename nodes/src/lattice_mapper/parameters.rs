@@ -70,7 +70,7 @@ impl Settings {
         params.describe(ABOUT);
         params.describe(options::COMMON);
         let mapper = MapperOptions::from_params(params)?;
-        let free_period = period(params, "free_period_s", 1.0)?;
+        let free_period = options::period(params, "free_period_s", 1.0)?;
         let has_free = mapper.free_space.free_level > 0;
         Ok(Self {
             limits: ComputeLimits {
@@ -80,8 +80,8 @@ impl Settings {
             },
             maps: MapFolder::from_params(params)?,
             autosave: AutosaveOptions::from_params(params)?,
-            update_period: period(params, "update_period_s", 0.2)?,
-            centers_period: period(params, "centers_period_s", 1.0)?,
+            update_period: options::period(params, "update_period_s", 0.2)?,
+            centers_period: options::period(params, "centers_period_s", 1.0)?,
             free_period: if has_free {
                 free_period
             } else {
@@ -104,11 +104,6 @@ impl Settings {
             }
         }
     }
-}
-
-fn period(params: &Params, name: &str, default_s: f64) -> Result<Duration, ParamError> {
-    let seconds = params.f64_in(name, default_s, 0.01..=86_400.0)?;
-    Ok(Duration::from_secs_f64(seconds))
 }
 
 /// Reads all parameters of the node, as its start does.

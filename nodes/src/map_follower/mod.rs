@@ -1,8 +1,10 @@
 //! The consumer's side of `map` and `map_updates`: keyframes, deltas, gaps and late joining.
 
+mod followed;
 mod followed_map;
 mod incomplete;
 
+pub use followed::{FollowError, Followed};
 pub use followed_map::FollowedMap;
 
 use std::collections::BTreeMap;
@@ -10,7 +12,6 @@ use std::collections::BTreeMap;
 use lattice_core::lattice::MortonKey;
 use lattice_msgs::lattice::{LatticeMap, LatticeMapUpdate};
 use rustc_hash::FxHashSet;
-use thiserror::Error;
 
 use self::followed_map::Changes;
 use self::incomplete::{Chunks, MAX_WAITING_UPDATES, OpenUpdate, Staging};
@@ -27,37 +28,13 @@ const MAX_OLD_UPDATES: u32 = 128;
 /// mapper with a long update period must not be asked again and again.
 const PATIENCE_S: [u32; 2] = [2, 64];
 
-/// Error of a message of the map. The map is as it was before.
-#[derive(Debug, Error)]
-pub enum FollowError {
-    /// Malformed.
-    #[error(transparent)]
-    Message(#[from] MapMessageError),
-    /// More voxels than allowed.
-    #[error("the map has {found} voxels, at most {limit} are kept (`max_voxels`)")]
-    TooLarge {
-        /// Voxels that there would be.
-        found: u64,
-        /// The limit.
-        limit: usize,
-    },
-}
-
-/// Effect of a message.
-#[derive(Clone, Copy, Debug, PartialEq, Eq)]
-pub enum Followed {
-    /// Applied, or kept until the rest of its keyframe has come.
-    Applied,
-    /// Of the state at hand or an older one, or of a map that is too large; ignored.
-    Old,
-    /// Something before it was lost or never received: ask for a keyframe.
-    NeedKeyframe,
-}
-
 /// Follows one map from its two topics.
 pub struct MapFollower {
     max_voxels: usize,
     map: Option<FollowedMap>,
+    /// The map of the epoch before until the first keyframe of the new one is complete, if it is to be kept.
+    before: Option<FollowedMap>,
+    keeps_before: bool,
     /// State of the voxels; none until the first keyframe of an epoch is complete.
     sequence: Option<u64>,
     /// Checksum of the updates up to there.
@@ -86,6 +63,8 @@ impl MapFollower {
         Self {
             max_voxels,
             map: None,
+            before: None,
+            keeps_before: false,
             sequence: None,
             history: History::default(),
             differences: 0,
@@ -100,6 +79,17 @@ impl MapFollower {
             quiet_s: 0,
             patience_s: PATIENCE_S[0],
         }
+    }
+
+    /// Keeps the map of an epoch until the first keyframe of the next one is complete.
+    pub fn keeping_before(mut self) -> Self {
+        self.keeps_before = true;
+        self
+    }
+
+    /// The map of the epoch before, if it is kept and the first keyframe of the new one is not complete.
+    pub fn before(&self) -> Option<&FollowedMap> {
+        self.before.as_ref()
     }
 
     /// Keeps at most so many from now on; a map that is larger stays until a message of it comes.
@@ -325,7 +315,11 @@ impl MapFollower {
     }
 
     fn begin_epoch(&mut self, map: FollowedMap) {
-        self.map = Some(map);
+        let old = self.map.replace(map);
+        // Of a new map that was never complete nothing is kept.
+        if self.keeps_before && self.before.is_none() {
+            self.before = old;
+        }
         self.sequence = None;
         self.newest = 0;
         self.staging = None;
@@ -368,6 +362,7 @@ impl MapFollower {
             return Ok(Ok(()));
         };
         map.replace(done.voxels, &mut self.touched);
+        self.before = None;
         if self.sequence.is_none_or(|at| done.sequence > at) {
             (self.sequence, self.history) = (Some(done.sequence), done.history);
         }

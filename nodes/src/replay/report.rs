@@ -181,6 +181,7 @@ mod tests {
                 map: MapperReport::of(&mut mapper),
                 markers: MarkerReport::default(),
             }],
+            origin: None,
             implausible_rows: 0,
             wall_s: 1.0,
         };

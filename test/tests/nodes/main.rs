@@ -7,6 +7,7 @@ mod lattice_mapper;
 mod lattice_mapper_services;
 mod map_follower;
 mod map_labels;
+mod map_merger;
 #[cfg(feature = "onnx")]
 mod segmenter;
 mod semantic_cloud;

@@ -30,6 +30,7 @@ fn nodes() -> impl Iterator<Item = (&'static str, &'static str, Params)> {
             "segmenter" => "segmenter.yaml",
             "semantic_cloud" => "rgbd.yaml",
             "headset_cloud" => "headset.yaml",
+            "map_merger" => "map_merger.yaml",
             "semantic_icp_server" => "semantic_icp.yaml",
             "viewer_server" => "viewer.yaml",
             _ => "bobcat.yaml",
@@ -126,14 +127,13 @@ fn the_headset_has_a_map_with_labels() {
 
 #[test]
 fn the_file_in_place_of_octomap_server_has_parameters_that_there_are() {
-    let names = [
-        "enu_transformer",
-        "octomap_server",
-        "voxel_marker_publisher",
-    ];
-    let nodes = PARAMETERS.iter();
-    let nodes = nodes.skip_while(|(node, _)| *node != "enu_transformer");
-    for ((_, declare), name) in nodes.zip(names) {
+    for (node, name) in [
+        ("enu_transformer", "enu_transformer"),
+        ("lattice_mapper", "octomap_server"),
+        ("voxel_marker_publisher", "voxel_marker_publisher"),
+    ] {
+        let mut nodes = PARAMETERS.iter();
+        let (_, declare) = nodes.find(|(known, _)| *known == node).unwrap();
         let params = params("octomap_compat.yaml", &format!("/robot/{name}"));
         declare(&params).unwrap();
         assert_eq!(params.unused(), [""; 0], "{name}");

@@ -1,10 +1,10 @@
 //! Filling a list with voxels that were read.
 
 use crate::lattice::{BlockKey, MortonKey};
-use crate::voxels::store::fixed_point::offsets_in;
-use crate::voxels::store::payload_columns::Columns;
+use crate::voxels::store::fixed_point::{offsets_in, reach};
+use crate::voxels::store::payload_columns::{Columns, Details};
 use crate::voxels::store::shard::{SHARDS, shard_of};
-use crate::voxels::{Voxel, VoxelList};
+use crate::voxels::{LabelCount, Voxel, VoxelList, VoxelStore};
 
 impl VoxelList {
     /// Adds cells of which none is in the list, with those further columns that the list keeps, until
@@ -35,5 +35,94 @@ impl VoxelList {
                 shard.columns.add(number as usize, &columns.get(row));
             }
         }
+    }
+
+    /// Puts a voxel with its labels in place of what a cell holds, a voxel without points to take it out;
+    /// false, changing nothing, if the cell is new and the list is full. The statistics stay as they are.
+    pub fn put(&mut self, key: MortonKey, voxel: &Voxel, labels: &[LabelCount]) -> bool {
+        if voxel.count == 0 {
+            self.remove(key);
+            return true;
+        }
+        if !self.contains(key) && self.len() >= self.max_voxels {
+            return false;
+        }
+        self.remove(key);
+        let reach = i64::from(voxel.count).saturating_mul(reach(&self.lattice) as i64);
+        let voxel = Voxel {
+            count: voxel.count,
+            sum: voxel.sum.map(|sum| sum.clamp(-reach, reach)),
+        };
+        let now = self.advance();
+        let code = BlockKey::from(key);
+        let Some(shard) = self.shards.get_mut(shard_of(code)) else {
+            return false;
+        };
+        let Some(number) = shard.find_or_add(code, usize::MAX, now) else {
+            return false;
+        };
+        shard.add_offsets(number, &offsets_in(&voxel), now);
+        if self.payload.labels {
+            let details = Details {
+                stamps: None,
+                labels: labels.to_vec(),
+            };
+            shard.columns.add(number as usize, &details);
+        }
+        true
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use nalgebra::Vector3;
+
+    use super::*;
+    use crate::lattice::{Lattice, LatticeKind};
+    use crate::voxels::{Changes, Payload};
+
+    #[test]
+    fn a_voxel_takes_the_place_of_another_and_changes_tell_of_it() {
+        let lattice = Lattice::new(LatticeKind::Fcc, 1.0).unwrap();
+        let labels = Payload {
+            labels: true,
+            ..Payload::default()
+        };
+        let mut list = VoxelList::new(lattice, Vector3::zeros(), 2)
+            .unwrap()
+            .with_payload(labels);
+        let keys = [0, 1, 2].map(|i| MortonKey::pack([i, 0, 0]).unwrap());
+        let voxel = |count| Voxel {
+            count,
+            sum: [i64::from(count), -5, 0],
+        };
+        let label = |count| [LabelCount { label: 7, count }];
+        assert!(list.put(keys[0], &voxel(3), &label(2)));
+        assert!(list.put(keys[1], &voxel(4_000_000_000), &[]));
+        assert!(!list.put(keys[2], &voxel(1), &[]));
+        assert_eq!(list.take_changes().changed, keys[..2]);
+        assert!(list.put(keys[0], &voxel(9), &label(1)));
+        assert_eq!(list.get(keys[0]), Some(voxel(9)));
+        assert_eq!(list.labels(keys[0]), label(1));
+        assert_eq!(list.get(keys[1]), Some(voxel(4_000_000_000)));
+        let changes = |changed: &[_], removed: &[_]| Changes {
+            changed: changed.to_vec(),
+            removed: removed.to_vec(),
+        };
+        assert_eq!(list.take_changes(), changes(&keys[..1], &[]));
+        assert!(list.put(keys[1], &Voxel::default(), &[]));
+        assert!(list.put(keys[2], &voxel(1), &[]));
+        assert_eq!(list.take_changes(), changes(&keys[2..], &keys[1..2]));
+        // Sums that no points of the cell have are those of points at its border.
+        list.put(
+            keys[2],
+            &Voxel {
+                count: 2,
+                sum: [i64::MAX, 0, 0],
+            },
+            &[],
+        );
+        let reach = 2 * reach(list.lattice()) as i64;
+        assert_eq!(list.get(keys[2]).unwrap().sum, [reach, 0, 0]);
     }
 }

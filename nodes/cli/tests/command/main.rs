@@ -8,6 +8,7 @@ mod files;
 mod health;
 mod lifecycle;
 mod map;
+mod merger;
 mod nodes;
 mod paper;
 mod player;

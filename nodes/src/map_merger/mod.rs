@@ -1,0 +1,258 @@
+//! Maps of several robots as one.
+//!
+//! Each voxel is the sum of what the robots' maps say of its cell, in integers, so that the order in which
+//! their messages come does not matter. Of each robot the merger knows what `map` tells: counts, mean offsets
+//! in the unit of the message, and the most frequent label.
+
+pub mod node;
+mod parameters;
+mod share;
+
+use std::collections::BTreeMap;
+
+use lattice_core::lattice::MortonKey;
+use lattice_core::voxels::{LabelCount, Payload, Voxel, VoxelList};
+use lattice_msgs::geographic_msgs::GeoPoint;
+use lattice_msgs::lattice::{LatticeMap, LatticeMapUpdate};
+use nalgebra::Vector3;
+use serde::Serialize;
+
+pub use parameters::declare;
+pub use share::{Refusal, Share};
+
+use crate::convert::{geometry, map};
+use crate::map_follower::{FollowError, Followed, MapFollower};
+
+/// Options of a merger.
+#[derive(Clone, PartialEq, Debug)]
+pub struct MergerOptions {
+    /// Names of the robots: their maps are `/NAME/map`.
+    pub robots: Vec<String>,
+    /// Frame that all maps must be in.
+    pub map_frame: String,
+    /// Keys are counted from the lattice point next to this place, map frame; metres.
+    pub datum_m: Vector3<f64>,
+    /// Most voxels of the merged map, and of each robot's.
+    pub max_voxels: usize,
+    /// Whether labels are counted.
+    pub keep_labels: bool,
+    /// Largest message.
+    pub chunk_bytes: usize,
+}
+
+/// Counters of a merger.
+#[derive(Clone, PartialEq, Eq, Debug, Default, Serialize)]
+pub struct MergerCounts {
+    /// Messages of maps.
+    pub messages_in: u64,
+    /// Messages that were malformed, or of a map that is too large.
+    pub messages_refused: u64,
+    /// Times that a robot's map began anew.
+    pub shares_replaced: u64,
+    /// Voxels that found the list full.
+    pub voxels_list_full: u64,
+    /// Voxels more than 2^20 cells from the datum.
+    pub voxels_out_of_range: u64,
+    /// Updates that were made.
+    pub updates: u64,
+    /// Keyframes that were made.
+    pub keyframes: u64,
+}
+
+/// Follows the maps of several robots and keeps their sum.
+pub struct MapMerger {
+    options: MergerOptions,
+    shares: Vec<Share>,
+    /// None before the first robot's map is known.
+    union: Option<VoxelList>,
+    origin: Option<GeoPoint>,
+    epoch: u64,
+    sequence: u64,
+    history: map::History,
+    counts: MergerCounts,
+}
+
+impl MapMerger {
+    /// Has heard of no robot yet; `epoch` tells this map from earlier ones on the same topic.
+    pub fn new(options: MergerOptions, epoch: u64) -> Self {
+        let share = |_| Share::new(MapFollower::new(options.max_voxels));
+        Self {
+            shares: (0..options.robots.len()).map(share).collect(),
+            options,
+            union: None,
+            origin: None,
+            epoch,
+            sequence: 0,
+            history: map::History::default(),
+            counts: MergerCounts::default(),
+        }
+    }
+
+    /// Goes on with other options; robots, frame, datum and labels stay as they are.
+    pub fn set_options(&mut self, options: MergerOptions) {
+        let (max_voxels, chunk_bytes) = (options.max_voxels, options.chunk_bytes);
+        for share in &mut self.shares {
+            share.follower.set_max_voxels(max_voxels);
+        }
+        self.options.max_voxels = max_voxels;
+        self.options.chunk_bytes = chunk_bytes;
+    }
+
+    /// Takes a chunk of the keyframe of a robot.
+    pub fn on_map(&mut self, robot: usize, chunk: &LatticeMap) -> Result<Followed, FollowError> {
+        self.follow(robot, |follower| follower.on_map(chunk))
+    }
+
+    /// Takes a chunk of an update of a robot.
+    pub fn on_update(
+        &mut self,
+        robot: usize,
+        chunk: &LatticeMapUpdate,
+    ) -> Result<Followed, FollowError> {
+        self.follow(robot, |follower| follower.on_update(chunk))
+    }
+
+    fn follow(
+        &mut self,
+        robot: usize,
+        message: impl FnOnce(&mut MapFollower) -> Result<Followed, FollowError>,
+    ) -> Result<Followed, FollowError> {
+        self.counts.messages_in += 1;
+        let Some(share) = self.shares.get_mut(robot) else {
+            return Ok(Followed::Old);
+        };
+        let followed = message(&mut share.follower);
+        self.counts.messages_refused += u64::from(followed.is_err());
+        followed
+    }
+
+    /// Waits a second more for what is incomplete; gives the robots whose keyframe is to be asked for.
+    pub fn wait_a_second(&mut self) -> Vec<usize> {
+        let waiting = self.shares.iter_mut().enumerate();
+        let waiting = waiting.filter_map(|(i, share)| share.follower.wait_a_second().then_some(i));
+        waiting.collect()
+    }
+
+    /// The changes of all robots since the call before, as one step of the sequence.
+    pub fn take_update(&mut self) -> Vec<LatticeMapUpdate> {
+        for robot in 0..self.shares.len() {
+            self.admit(robot);
+        }
+        self.sum_up();
+        let Some(union) = &mut self.union else {
+            return Vec::new();
+        };
+        let changes = union.take_changes();
+        if changes.changed.is_empty() && changes.removed.is_empty() {
+            return Vec::new();
+        }
+        let previous = self.sequence;
+        self.sequence += 1;
+        self.counts.updates += 1;
+        let Some(union) = &self.union else {
+            return Vec::new();
+        };
+        let mut messages = map::update(union, &changes, previous, &self.stamp());
+        self.history = map::sign(&mut messages, self.history, self.sequence, union.len());
+        messages
+    }
+
+    /// The whole map in self-contained chunks; none before a robot's map is known.
+    pub fn keyframe(&mut self) -> Vec<LatticeMap> {
+        self.counts.keyframes += 1;
+        match &self.union {
+            Some(union) => map::keyframe(union, &self.stamp()),
+            None => Vec::new(),
+        }
+    }
+
+    /// Takes the lattice of a robot's map if it is the first, else holds it against the merged one.
+    fn admit(&mut self, robot: usize) {
+        let options = &self.options;
+        let Some(share) = self.shares.get_mut(robot) else {
+            return;
+        };
+        let Some(followed) = share.begun() else {
+            return;
+        };
+        self.counts.shares_replaced += 1;
+        if self.union.is_none() {
+            let payload = Payload {
+                labels: options.keep_labels,
+                stamps: false,
+            };
+            let list = VoxelList::new(followed.lattice.clone(), options.datum_m, usize::MAX);
+            self.union = list.ok().map(|list| list.with_payload(payload));
+            self.origin = followed.info.has_origin.then_some(followed.info.origin);
+        }
+        let Some(union) = &self.union else {
+            return;
+        };
+        let admitted = share.admit(union, &options.map_frame, self.origin.as_ref());
+        match admitted {
+            Ok(origin) => self.origin = self.origin.or(origin),
+            Err(refusal) => {
+                let name = options.robots.get(robot).map_or("", String::as_str);
+                log::warn!("the map of {name} is left out: {refusal}");
+            }
+        }
+    }
+
+    /// Sums up the cells that changed in any share.
+    fn sum_up(&mut self) {
+        let Some(union) = &mut self.union else {
+            return;
+        };
+        let mut cells: Vec<MortonKey> = Vec::new();
+        for share in &mut self.shares {
+            self.counts.voxels_out_of_range += share.take_changed(&mut cells);
+        }
+        cells.sort_unstable();
+        cells.dedup();
+        let mut labels = BTreeMap::new();
+        for cell in cells {
+            labels.clear();
+            let mut sum = Voxel::default();
+            for share in &self.shares {
+                share.add_to(cell, &mut sum, &mut labels);
+            }
+            let labels = labels.iter().map(|(label, count)| LabelCount {
+                label: *label,
+                count: *count,
+            });
+            let labels: Vec<_> = labels.collect();
+            let has_room = union.len() < self.options.max_voxels || union.contains(cell);
+            if !((sum.count == 0 || has_room) && union.put(cell, &sum, &labels)) {
+                self.counts.voxels_list_full += 1;
+            }
+        }
+    }
+
+    /// Voxels of the merged map, none before a robot's map is known.
+    pub fn list(&self) -> Option<&VoxelList> {
+        self.union.as_ref()
+    }
+
+    /// Robots whose map is part of the merged one, in the order of the options.
+    pub fn shares(&self) -> &[Share] {
+        &self.shares
+    }
+
+    /// Counters.
+    pub fn counts(&self) -> &MergerCounts {
+        &self.counts
+    }
+
+    fn stamp(&self) -> map::MapStamp<'_> {
+        let stamps = self.shares.iter().filter_map(Share::stamp_ns);
+        let newest_ns = stamps.max().unwrap_or(0);
+        map::MapStamp {
+            header: geometry::header(&self.options.map_frame, newest_ns),
+            epoch: self.epoch,
+            sequence: self.sequence,
+            history: self.history,
+            origin: self.origin.as_ref(),
+            chunk_bytes: self.options.chunk_bytes,
+        }
+    }
+}

@@ -1,0 +1,210 @@
+//! The merger as a ROS node: a thin shell around [`MapMerger`].
+
+use std::time::Duration;
+
+use lattice_msgs::lattice::{LatticeMap, LatticeMapUpdate};
+use lattice_runtime::logging::Throttle;
+use lattice_runtime::{Diagnostics, Level, Runtime, Subscription, Undecoded};
+use serde::Serialize;
+
+use super::parameters::Settings;
+use super::{MapMerger, MergerCounts, MergerOptions};
+use crate::compute::Compute;
+use crate::map_follower::{FollowError, Followed};
+use crate::map_input::{MapLosses, MapRequests};
+use crate::map_output::{MapOutput, epoch};
+use crate::report;
+use crate::start::{Finish, NodeError, handed_over, open_params};
+
+/// Event for the compute thread.
+enum Event {
+    /// Of a robot, by its place among the options.
+    Map(usize, Undecoded<LatticeMap>),
+    Update(usize, Undecoded<LatticeMapUpdate>),
+    Publish,
+    Settings(MergerOptions),
+    Finish,
+}
+
+/// Report of a run.
+#[derive(Serialize)]
+struct MergerReport<'a> {
+    counts: &'a MergerCounts,
+    voxels: usize,
+    robots: Vec<(&'a str, usize)>,
+    updates_not_published: u64,
+    chunks_not_published: u64,
+}
+
+/// Starts the node.
+pub fn start(runtime: &Runtime, name: &str) -> Result<Finish, NodeError> {
+    let node = runtime.node(name)?;
+    let params = node.params();
+    let settings = Settings::from_params(params)?;
+    let robots = settings.merger.robots.clone();
+    let (output, requests) = MapOutput::open(&node)?;
+    let losses: Vec<MapLosses> = robots.iter().map(|_| MapLosses::default()).collect();
+    let input = |(robot, losses): (&String, &MapLosses)| {
+        let mapper = format!("/{robot}/{}", settings.mapper);
+        MapRequests::new(&node, &mapper, losses)
+    };
+    let mut shell = Shell {
+        inputs: robots
+            .iter()
+            .zip(&losses)
+            .map(input)
+            .collect::<Result<_, _>>()?,
+        machine: MapMerger::new(settings.merger, epoch()),
+        robots: robots.clone(),
+        output,
+        diagnostics: node.diagnostics(),
+        seconds: Throttle::new(Duration::from_secs(1)),
+        report_file: settings.report_file,
+    };
+    let compute = Compute::spawn(
+        name,
+        settings.limits,
+        runtime.shutdown_handle(),
+        move |event| shell.on(event),
+    )?;
+    let inbox = compute.inbox();
+    let mut subscriptions: Vec<[Subscription; 2]> = Vec::new();
+    for (i, (robot, losses)) in robots.iter().zip(&losses).enumerate() {
+        let topics = [format!("/{robot}/map"), format!("/{robot}/map_updates")];
+        let map = move |chunk| Event::Map(i, chunk);
+        let update = move |chunk| Event::Update(i, chunk);
+        subscriptions.push(losses.subscribe_to(&node, topics, &inbox, map, update)?);
+    }
+    let publishes = inbox.clone();
+    let period = runtime.timer(settings.period, move || {
+        let _ = publishes.send(Event::Publish, 0);
+    });
+    open_params(params, move |params| {
+        let settings = Settings::from_params(params).map_err(|error| error.to_string())?;
+        handed_over(inbox.send(Event::Settings(settings.merger), 0))?;
+        period.set(settings.period);
+        Ok(())
+    });
+    Ok(Box::new(move || {
+        drop(subscriptions);
+        compute.finish_with(Event::Finish);
+        Box::new(requests)
+    }))
+}
+
+/// State of the compute thread.
+struct Shell {
+    inputs: Vec<MapRequests>,
+    machine: MapMerger,
+    robots: Vec<String>,
+    output: MapOutput,
+    diagnostics: Diagnostics,
+    seconds: Throttle,
+    report_file: String,
+}
+
+impl Shell {
+    fn on(&mut self, event: Event) {
+        match event {
+            Event::Map(robot, chunk) => {
+                let result = chunk.decode();
+                let result = result.map(|chunk| self.machine.on_map(robot, &chunk));
+                self.followed(robot, result);
+            }
+            Event::Update(robot, chunk) => {
+                let result = chunk.decode();
+                let result = result.map(|chunk| self.machine.on_update(robot, &chunk));
+                self.followed(robot, result);
+            }
+            Event::Publish => self.publish(),
+            Event::Settings(options) => self.machine.set_options(options),
+            Event::Finish => self.finish(),
+        }
+    }
+
+    fn followed(&self, robot: usize, result: Option<Result<Followed, FollowError>>) {
+        if let Some(input) = self.inputs.get(robot) {
+            input.followed(result);
+        }
+    }
+
+    fn publish(&mut self) {
+        self.inputs.iter_mut().for_each(MapRequests::make_good);
+        if self.seconds.check().is_some() {
+            for robot in self.machine.wait_a_second() {
+                if let Some(input) = self.inputs.get(robot) {
+                    input.ask_for_keyframe();
+                }
+            }
+        }
+        let update = self.machine.take_update();
+        // Before the first robot there is no map that could be shown.
+        if self.machine.list().is_some() {
+            self.output.publish(update, || self.machine.keyframe());
+        }
+        self.diagnose();
+    }
+
+    fn diagnose(&self) {
+        let shares = || self.robots.iter().zip(self.machine.shares());
+        let refused = shares().find_map(|(robot, share)| Some((robot, share.refusal()?)));
+        let silent: Vec<&str> = shares()
+            .filter(|(_, share)| share.voxels() == 0)
+            .map(|(robot, _)| robot.as_str())
+            .collect();
+        let counts = self.machine.counts();
+        let (level, message) = if let Some((robot, refusal)) = refused {
+            (
+                Level::Error,
+                format!("the map of {robot} is left out: {refusal}"),
+            )
+        } else if counts.voxels_list_full > 0 {
+            (Level::Warn, "the list is full (`max_voxels`)".to_owned())
+        } else if !silent.is_empty() {
+            (Level::Warn, format!("no voxels of {}", silent.join(", ")))
+        } else {
+            (Level::Ok, "merging".to_owned())
+        };
+        let mut values = report::key_values(counts);
+        for (robot, share) in shares() {
+            values.push((format!("{robot}_voxels"), share.voxels().to_string()));
+        }
+        for (robot, input) in self.robots.iter().zip(&self.inputs) {
+            let losses = input.losses();
+            values.push((format!("{robot}_inbox_full"), losses.count().to_string()));
+            values.push((
+                format!("{robot}_undecodable"),
+                losses.undecodable().to_string(),
+            ));
+        }
+        values.push(("voxels".into(), self.voxels().to_string()));
+        self.diagnostics.set("merged map", level, message, values);
+    }
+
+    fn voxels(&self) -> usize {
+        self.machine.list().map_or(0, |list| list.len())
+    }
+
+    fn finish(&mut self) {
+        self.publish();
+        let mut left = usize::MAX;
+        while self.output.pending() > 0 && self.output.pending() < left {
+            left = self.output.pending();
+            self.publish();
+        }
+        self.output.flush();
+        let shares = self.robots.iter().zip(self.machine.shares());
+        let report = MergerReport {
+            counts: self.machine.counts(),
+            voxels: self.voxels(),
+            robots: shares
+                .map(|(robot, share)| (robot.as_str(), share.voxels()))
+                .collect(),
+            updates_not_published: self.output.updates_lost(),
+            chunks_not_published: self.output.chunks_lost(),
+        };
+        if let Err(error) = report::write(&self.report_file, &report, &self.diagnostics) {
+            log::error!("{error}");
+        }
+    }
+}

@@ -1,0 +1,70 @@
+//! All parameters of the merger.
+
+use std::time::Duration;
+
+use super::MergerOptions;
+use crate::compute::ComputeLimits;
+use crate::{options, report};
+use lattice_runtime::about;
+use lattice_runtime::params::{About, ParamError, Params};
+
+const ABOUT: &[About] = about! {
+    "robots" fixed(options::TOPIC): "Names of the robots: their maps are /NAME/map and /NAME/map_updates.";
+    "datum_m" fixed("keys are counted from it"): "Keys of the merged map are counted from the lattice point next to this place in the map frame. They reach a million cells in every direction.";
+    "max_voxels": "Most voxels of the merged map, and of each robot's.";
+    "keep_labels" fixed("the map is made with it"): "Whether labels are merged: of each robot the most frequent one of a voxel is known.";
+    "chunk_bytes": "Largest message of map and map_updates, bytes.";
+    "update_period_s": "Time between two messages of map_updates.";
+};
+
+/// Settings of the node by its parameters.
+pub(super) struct Settings {
+    pub merger: MergerOptions,
+    pub limits: ComputeLimits,
+    pub period: Duration,
+    /// Name of the mappers below the robots' namespaces.
+    pub mapper: String,
+    pub report_file: String,
+}
+
+impl Settings {
+    /// Reads the parameters of the node.
+    pub(super) fn from_params(params: &Params) -> Result<Self, ParamError> {
+        params.describe(ABOUT);
+        params.describe(options::COMMON);
+        let robots = params.string_array("robots", &["robot1", "robot2"])?;
+        let mut names: Vec<_> = robots
+            .iter()
+            .map(|name| name.trim_matches('/').to_owned())
+            .collect();
+        names.sort();
+        names.dedup();
+        if names.len() != robots.len() || names.is_empty() || names.contains(&String::new()) {
+            return Err(params.invalid("robots", "expected names of robots, each once"));
+        }
+        let robots = robots.iter().map(|name| name.trim_matches('/').to_owned());
+        Ok(Self {
+            merger: MergerOptions {
+                robots: robots.collect(),
+                map_frame: options::frame(params, "map_frame", "map")?,
+                datum_m: options::place_m(params, "datum_m")?,
+                max_voxels: params.positive("max_voxels", 10_000_000)?,
+                keep_labels: params.bool("keep_labels", true)?,
+                chunk_bytes: options::chunk_bytes(params, 60_000)?,
+            },
+            limits: ComputeLimits {
+                events: options::inbox_events(params, 4096)?,
+                bytes: options::inbox_bytes(params, 64 << 20)?,
+                threads: options::threads(params, 1)?,
+            },
+            period: options::period(params, "update_period_s", 1.0)?,
+            mapper: params.string("mapper", "lattice_mapper")?,
+            report_file: report::file(params)?,
+        })
+    }
+}
+
+/// Reads all parameters of the node, as its start does.
+pub fn declare(params: &Params) -> Result<(), ParamError> {
+    Settings::from_params(params).map(drop)
+}

@@ -1,0 +1,232 @@
+//! What one robot's map adds to the merged one.
+
+use std::collections::BTreeMap;
+
+use lattice_core::lattice::MortonKey;
+use lattice_core::registration::UNLABELED;
+use lattice_core::voxels::{OFFSET_UNIT_M, Voxel, VoxelList};
+use lattice_msgs::geographic_msgs::GeoPoint;
+use rustc_hash::FxHashSet;
+use thiserror::Error;
+
+use crate::map_follower::{FollowedMap, MapFollower};
+
+/// Largest distance of a datum from a lattice point of the merged map, in cell sides.
+const DATUM_SLACK: f64 = 1e-6;
+
+/// Reason why a robot's map is no part of the merged one.
+#[derive(Clone, PartialEq, Debug, Error)]
+#[expect(missing_docs, reason = "the messages name the fields")]
+pub enum Refusal {
+    /// Another frame.
+    #[error("it is in frame '{found}', the merged one in '{expected}'")]
+    Frame { found: String, expected: String },
+    /// Other cells.
+    #[error("it is of {found}, the merged one of {expected}")]
+    Lattice { found: String, expected: String },
+    /// Another origin.
+    #[error(
+        "its origin is {found:?} (latitude, longitude, height), that of the merged one {expected:?}"
+    )]
+    Origin { found: [f64; 3], expected: [f64; 3] },
+    /// Cells that lie between those of the merged map.
+    #[error("its datum {datum_m:?} m is {off_m} m from the next lattice point of the merged one")]
+    Datum { datum_m: [f64; 3], off_m: f64 },
+}
+
+/// A robot's map and its place in the merged one.
+pub struct Share {
+    pub(super) follower: MapFollower,
+    /// Lattice index of its datum less that of the merged map's; none if it is not part of it.
+    shift: Option<[i64; 3]>,
+    /// Epoch that the shift is of.
+    epoch: Option<u64>,
+    refusal: Option<Refusal>,
+    /// Cells of the merged map that it was part of.
+    cells: FxHashSet<MortonKey>,
+    /// All cells are to be summed up again.
+    anew: bool,
+    /// Unit of its mean offsets over that of sums.
+    unit: f64,
+}
+
+impl Share {
+    pub(super) fn new(follower: MapFollower) -> Self {
+        Self {
+            follower: follower.keeping_before(),
+            shift: None,
+            epoch: None,
+            refusal: None,
+            cells: FxHashSet::default(),
+            anew: false,
+            unit: 1.0,
+        }
+    }
+
+    /// Voxels that it has in the merged map.
+    pub fn voxels(&self) -> usize {
+        self.cells.len()
+    }
+
+    /// Reason why it is no part of the merged map.
+    pub fn refusal(&self) -> Option<&Refusal> {
+        self.refusal.as_ref()
+    }
+
+    /// Stamp of its newest message.
+    pub(super) fn stamp_ns(&self) -> Option<i64> {
+        self.shift.and(self.follower.map()).map(|map| map.stamp_ns)
+    }
+
+    /// The map of its epoch: that of before until a new one is complete.
+    fn map(&self) -> Option<&FollowedMap> {
+        let maps = self
+            .follower
+            .map()
+            .into_iter()
+            .chain(self.follower.before());
+        let mut own = maps.filter(|map| Some(map.info.epoch) == self.epoch);
+        own.next()
+    }
+
+    /// Its map, if that is complete and of an epoch that was not admitted yet.
+    pub(super) fn begun(&self) -> Option<&FollowedMap> {
+        self.follower.sequence()?;
+        let map = self.follower.map()?;
+        (self.epoch != Some(map.info.epoch)).then_some(map)
+    }
+
+    /// Makes its map part of the merged one from now on, or says why not; gives its origin. What was part
+    /// of it before goes.
+    pub(super) fn admit(
+        &mut self,
+        union: &VoxelList,
+        frame: &str,
+        origin: Option<&GeoPoint>,
+    ) -> Result<Option<GeoPoint>, Refusal> {
+        let Some(map) = self.follower.map() else {
+            return Ok(None);
+        };
+        self.epoch = Some(map.info.epoch);
+        self.anew = true;
+        self.unit = map.offset_unit_m / OFFSET_UNIT_M;
+        let place = place(map, union, frame, origin);
+        self.shift = place.as_ref().ok().copied();
+        self.refusal = place.as_ref().err().cloned();
+        place.map(|_| map.info.has_origin.then_some(map.info.origin))
+    }
+
+    /// Adds the cells of the merged map that may have changed; gives the number of those out of its range.
+    pub(super) fn take_changed(&mut self, cells: &mut Vec<MortonKey>) -> u64 {
+        // A new map is first to be complete: until then the old one is part of the merged one.
+        let known = self.follower.map().map(|map| map.info.epoch);
+        if self.epoch.is_none() || known != self.epoch {
+            return 0;
+        }
+        let (touched, _) = self.follower.take_touched();
+        let mut out_of_range = 0;
+        let of_map = self.follower.map().into_iter();
+        let all = of_map.flat_map(|map| map.voxels().keys().copied());
+        let keys: Vec<MortonKey> = match self.anew {
+            true => all.collect(),
+            false => touched.into_iter().collect(),
+        };
+        if std::mem::take(&mut self.anew) {
+            cells.extend(self.cells.drain());
+        }
+        let Some(shift) = self.shift else {
+            return 0;
+        };
+        let voxels = self.follower.map().map(FollowedMap::voxels);
+        for key in keys {
+            let Some(cell) = shifted(key, shift) else {
+                out_of_range += 1;
+                continue;
+            };
+            match voxels.is_some_and(|voxels| voxels.contains_key(&key)) {
+                true => self.cells.insert(cell),
+                false => self.cells.remove(&cell),
+            };
+            cells.push(cell);
+        }
+        out_of_range
+    }
+
+    /// Adds what it says of a cell of the merged map.
+    pub(super) fn add_to(&self, cell: MortonKey, sum: &mut Voxel, labels: &mut BTreeMap<u16, u32>) {
+        if !self.cells.contains(&cell) {
+            return;
+        }
+        let own = self.shift.map(|shift| shift.map(i64::wrapping_neg));
+        let own = own.and_then(|back| shifted(cell, back));
+        let Some(voxel) = own
+            .zip(self.map())
+            .and_then(|(own, map)| map.voxels().get(&own))
+        else {
+            return;
+        };
+        sum.count = sum.count.saturating_add(voxel.count);
+        for (sum, mean) in sum.sum.iter_mut().zip(voxel.mean_offset) {
+            let offsets = f64::from(voxel.count) * f64::from(mean) * self.unit;
+            *sum = sum.saturating_add(offsets.round() as i64);
+        }
+        if voxel.label != UNLABELED && voxel.label_count > 0 {
+            let count = labels.entry(voxel.label).or_default();
+            *count = count.saturating_add(voxel.label_count);
+        }
+    }
+}
+
+fn place(
+    map: &FollowedMap,
+    union: &VoxelList,
+    frame: &str,
+    origin: Option<&GeoPoint>,
+) -> Result<[i64; 3], Refusal> {
+    let found = map.frame_id.trim_start_matches('/');
+    if found != frame {
+        return Err(Refusal::Frame {
+            found: found.chars().take(64).collect(),
+            expected: frame.to_owned(),
+        });
+    }
+    if map.lattice != *union.lattice() {
+        return Err(Refusal::Lattice {
+            found: format!("{:?}", map.lattice),
+            expected: format!("{:?}", union.lattice()),
+        });
+    }
+    let numbers = |at: &GeoPoint| [at.latitude, at.longitude, at.altitude];
+    let own = map.info.has_origin.then_some(&map.info.origin);
+    if let (Some(own), Some(origin)) = (own, origin)
+        && own != origin
+    {
+        return Err(Refusal::Origin {
+            found: numbers(own),
+            expected: numbers(origin),
+        });
+    }
+    let index = union.lattice().quantize_wide(&map.datum_m);
+    let index = index.unwrap_or([i64::MAX; 3]);
+    let off_m = (union.lattice().center_wide(index) - map.datum_m).norm();
+    // Not a number is refused too.
+    let on = off_m <= DATUM_SLACK * union.lattice().cell_side_m();
+    if !on {
+        let datum_m = map.datum_m.into();
+        return Err(Refusal::Datum { datum_m, off_m });
+    }
+    let datum = union.datum_index();
+    Ok([0, 1, 2].map(|i: usize| index[i].saturating_sub(datum[i])))
+}
+
+fn shifted(key: MortonKey, shift: [i64; 3]) -> Option<MortonKey> {
+    let w = key.unpack();
+    let moved = [0, 1, 2].map(|i: usize| {
+        let index = i64::from(w[i]).checked_add(shift[i])?;
+        i32::try_from(index).ok()
+    });
+    match moved {
+        [Some(x), Some(y), Some(z)] => MortonKey::pack([x, y, z]),
+        _ => None,
+    }
+}
