@@ -152,7 +152,10 @@ def test_the_gil_is_free_while_points_are_inserted():
     assert steps > 5
 
 
-def test_the_readme_says_what_runs(tmp_path):
-    text = (Path(__file__).parents[3] / "README.md").read_text()
-    lines = text.split("```python\n")[1].split("```")[0]
-    subprocess.run([sys.executable, "-c", lines], check=True, cwd=tmp_path)
+@pytest.mark.parametrize("page", ["README.md", "docs/python.md"])
+def test_what_the_pages_say_runs(page, tmp_path):
+    text = (Path(__file__).parents[3] / page).read_text()
+    blocks = [rest.split("```")[0] for rest in text.split("```python\n")[1:]]
+    assert blocks
+    for block in blocks:
+        subprocess.run([sys.executable, "-c", block], check=True, cwd=tmp_path)

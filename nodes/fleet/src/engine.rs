@@ -86,7 +86,7 @@ pub struct Inputs {
     pub labels: Vec<String>,
 }
 
-/// The rows of one map of all inputs, sorted by tile.
+/// The rows of one map of all inputs by tile, not sorted within it.
 pub async fn merge(session: &SessionContext, inputs: &Inputs) -> Result<BTreeMap<Tile, TileRows>> {
     let mut tiles = BTreeMap::<Tile, TileRows>::new();
     let merged = grouped(session, "voxels", &inputs.voxels, MERGE_VOXELS).await?;
@@ -109,7 +109,6 @@ pub async fn merge(session: &SessionContext, inputs: &Inputs) -> Result<BTreeMap
             })?;
         }
     }
-    tiles.values_mut().for_each(TileRows::sort);
     Ok(tiles)
 }
 

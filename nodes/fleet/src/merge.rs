@@ -3,6 +3,7 @@
 use std::collections::{BTreeMap, BTreeSet};
 use std::fs;
 use std::path::{Path, PathBuf};
+use std::sync::{Mutex, PoisonError};
 
 use serde::{Deserialize, Serialize};
 
@@ -10,6 +11,7 @@ use crate::Result;
 use crate::engine::{Engine, Inputs, Limits, merge as merge_rows};
 use crate::files::{at, digest_of, read_json, write_json};
 use crate::part::{MapInfo, Statistics, TileInfo, VERSION, tile_folder, write_tile};
+use crate::rows::TileRows;
 use crate::tables::{Part, Tables, read_map};
 use crate::tile::Tile;
 
@@ -134,13 +136,14 @@ pub async fn merge(
         rest = later;
         let inputs = inputs_of(batch)?;
         let mut tiles = merge_rows(&session, &inputs).await?;
-        for (tile, job) in batch {
-            let rows = tiles.remove(tile).unwrap_or_default();
-            let files = write_tile(&options.out, **tile, &rows, map.labels)?;
-            let made_from = digest(job);
-            made.insert(**tile, MergedTile { made_from, files });
-            report.rows_in += rows_of(job);
+        let work: Vec<_> = batch
+            .iter()
+            .map(|(tile, job)| (**tile, digest(job), tiles.remove(tile).unwrap_or_default()))
+            .collect();
+        for tile in write_tiles(&options.out, work, map.labels, options.limits.threads)? {
+            made.insert(tile.files.tile, tile);
         }
+        report.rows_in += batch.iter().map(|(_, job)| rows_of(job)).sum::<u64>();
         if let Some(tile) = tiles.keys().next() {
             return Err(
                 format!("the engine gave rows of tile {tile}, which was not asked for").into(),
@@ -158,6 +161,38 @@ pub async fn merge(
         report.bytes += tile.files.voxels.bytes + labels;
     }
     Ok(report)
+}
+
+/// Sorts and writes tiles on several threads; each comes with the digest of what it was made from.
+fn write_tiles(
+    folder: &Path,
+    work: Vec<(Tile, String, TileRows)>,
+    labels: bool,
+    threads: usize,
+) -> Result<Vec<MergedTile>> {
+    let (work, done) = (Mutex::new(work), Mutex::new(Vec::new()));
+    let held = |list: PoisonError<_>| list.into_inner();
+    let write = || {
+        loop {
+            let next = work.lock().unwrap_or_else(held).pop();
+            let Some((tile, made_from, mut rows)) = next else {
+                break;
+            };
+            rows.sort();
+            let files = write_tile(folder, tile, &rows, labels);
+            let written = files.map(|files| MergedTile { made_from, files });
+            done.lock()
+                .unwrap_or_else(|list| list.into_inner())
+                .push(written);
+        }
+    };
+    std::thread::scope(|scope| {
+        for _ in 0..threads.max(1) {
+            scope.spawn(write);
+        }
+    });
+    let done = done.into_inner().unwrap_or_else(|list| list.into_inner());
+    done.into_iter().collect()
 }
 
 /// The merged map of a folder as the columns of a map file; fails if it is not finished.

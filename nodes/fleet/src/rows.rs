@@ -46,9 +46,9 @@ impl TileRows {
     /// Sorts by cell, and labels of a cell by label.
     pub fn sort(&mut self) {
         self.voxels
-            .sort_unstable_by_key(|row| order_in_tile(row.cell));
+            .sort_by_cached_key(|row| order_in_tile(row.cell));
         let key = |row: &LabelRow| (order_in_tile(row.cell), row.label);
-        self.labels.sort_unstable_by_key(key);
+        self.labels.sort_by_cached_key(key);
     }
 
     /// The largest count of points; 0 where none are kept.

@@ -1,10 +1,12 @@
 //! Foreign engines on the same tables: DuckDB and Polars give the sums of the embedded one, and the recipes
 //! of the documentation run.
 
-use std::path::Path;
+use std::fs;
+use std::path::{Path, PathBuf};
 use std::process::Command;
 
-use crate::fixture::{Recipe, from_environment, run, text};
+use crate::fixture::{Recipe, from_environment, parts, run, text};
+use crate::logs::Logs;
 
 const COMPARE: &str = r#"
 import sys
@@ -53,12 +55,44 @@ fn the_recipes_of_the_documentation_run() {
         .collect();
     assert!(recipes.len() >= 2, "{} recipes", recipes.len());
     for recipe in recipes {
+        let of_logs = recipe.contains("\"logs\"");
+        let needs_java = recipe.contains("pyspark");
+        if needs_java && Command::new("java").arg("-version").output().is_err() {
+            eprintln!("skipped: the recipe for Spark needs java");
+            continue;
+        }
         let folder = tempfile::tempdir().unwrap();
-        tables(folder.path());
-        // They name the folder `tables` of where they are.
-        let script = format!("import os\nos.chdir({:?})\n{recipe}", text(folder.path()));
-        python_runs(&python, &script, &[]);
+        let mut path = Vec::new();
+        if of_logs {
+            let Some(logs) = Logs::simulate(&folder.path().join("logs"), 2, "2") else {
+                continue;
+            };
+            fs::copy(&logs.params, folder.path().join("params.yaml")).unwrap();
+            // `lattice` finds the program that is tested on the PATH, unless one is beside it.
+            path.extend(
+                [
+                    Path::new(env!("CARGO_BIN_EXE_lattice-fleet")),
+                    &logs.lattice,
+                ]
+                .map(parent),
+            );
+        } else {
+            tables(folder.path());
+        }
+        // They name folders of where they are.
+        path.extend(std::env::split_paths(&std::env::var_os("PATH").unwrap()));
+        let mut command = Command::new(&python);
+        command.args(["-c", recipe]).current_dir(folder.path());
+        command.env("PATH", std::env::join_paths(path).unwrap());
+        succeeds(&mut command, recipe);
+        if of_logs {
+            assert_eq!(parts(&folder.path().join("tables")).len(), 2);
+        }
     }
+}
+
+fn parent(path: &Path) -> PathBuf {
+    path.parent().unwrap().to_owned()
 }
 
 /// Tables of three maps, merged.
@@ -77,11 +111,13 @@ fn tables(folder: &Path) -> std::path::PathBuf {
 }
 
 fn python_runs(python: &Path, script: &str, arguments: &[&str]) {
-    let output = Command::new(python)
-        .args(["-c", script])
-        .args(arguments)
-        .output()
-        .unwrap();
+    let mut command = Command::new(python);
+    command.args(["-c", script]).args(arguments);
+    succeeds(&mut command, script);
+}
+
+fn succeeds(command: &mut Command, script: &str) {
+    let output = command.output().unwrap();
     let said = String::from_utf8_lossy(&output.stderr);
     assert!(output.status.success(), "{said}\n{script}");
 }

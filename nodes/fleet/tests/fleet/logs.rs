@@ -17,6 +17,7 @@ impl Logs {
     /// Simulates logs below a folder; none without the program.
     pub fn simulate(folder: &Path, count: usize, duration_s: &str) -> Option<Logs> {
         let lattice = from_environment("LATTICE_PROGRAM")?;
+        fs::create_dir_all(folder).unwrap();
         let params = Path::new(env!("CARGO_MANIFEST_DIR")).join("../../params/bobcat.yaml");
         let log = |seed: usize| {
             let log = folder.join(format!("log{seed}"));
@@ -26,7 +27,12 @@ impl Logs {
             command
                 .args(["simulate", "bobcat", "--out", text(&log)])
                 .args(options);
-            assert!(command.output().unwrap().status.success());
+            let output = command.output().unwrap();
+            assert!(
+                output.status.success(),
+                "{}",
+                String::from_utf8_lossy(&output.stderr)
+            );
             log
         };
         Some(Logs {
