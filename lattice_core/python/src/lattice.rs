@@ -110,9 +110,8 @@ impl Lattice {
         wide: impl Fn(&[T; 3]) -> [f64; 3] + Sync,
     ) -> Option<usize> {
         let parts = rows.par_chunks(PART).zip(cells.par_chunks_mut(PART));
-        let first_bad = |(number, (rows, cells)): (usize, (&[[T; 3]], &mut [[i32; 3]]))| {
-            let mut bad = None;
-            let mut at = 0;
+        let first_bad = parts.enumerate().filter_map(|(number, (rows, cells))| {
+            let (mut bad, mut at) = (None, 0);
             self.core.quantize_each(rows.iter().map(&wide), |_, cell| {
                 match (cell, cells.get_mut(at)) {
                     (Some(cell), Some(to)) => *to = cell,
@@ -121,7 +120,7 @@ impl Lattice {
                 at += 1;
             });
             bad
-        };
-        parts.enumerate().filter_map(first_bad).min()
+        });
+        first_bad.min()
     }
 }

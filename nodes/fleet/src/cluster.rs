@@ -168,13 +168,15 @@ impl ScalarUDFImpl for MapFunction {
 
 /// Runs a scheduler until it is stopped.
 pub async fn scheduler(address: SocketAddr, executor_timeout_s: u64) -> Result {
-    let mut config = SchedulerConfig::default();
-    config.bind_host = address.ip().to_string();
-    config.external_host = address.ip().to_string();
-    config.bind_port = address.port();
-    config.executor_timeout_seconds = executor_timeout_s;
-    config.expire_dead_executor_interval_seconds = (executor_timeout_s / 4).max(1);
-    config.override_session_builder = Some(Arc::new(state_of));
+    let config = SchedulerConfig {
+        bind_host: address.ip().to_string(),
+        external_host: address.ip().to_string(),
+        bind_port: address.port(),
+        executor_timeout_seconds: executor_timeout_s,
+        expire_dead_executor_interval_seconds: (executor_timeout_s / 4).max(1),
+        override_session_builder: Some(Arc::new(state_of)),
+        ..SchedulerConfig::default()
+    };
     let cluster = BallistaCluster::new_from_config(&config).await?;
     Ok(start_server(cluster, address, Arc::new(config)).await?)
 }

@@ -80,7 +80,8 @@ impl Task {
                 let slices = (duration_s(&settings.program, &log)? / length_s)
                     .ceil()
                     .max(1.0);
-                if !(slices <= 1e6) {
+                // An infinite log, or one whose length is not a number, is refused too.
+                if !slices.is_finite() || slices > 1e6 {
                     return Err(at(&log, format!("slices of {length_s} s are too many")));
                 }
                 for number in 0..slices as u32 {

@@ -21,7 +21,7 @@ fn crowded() -> MapContents {
         .stamps
         .iter_mut()
         .for_each(|stamps| stamps.truncate(1));
-    for voxels in &mut columns.voxels {
+    if let Some(voxels) = &mut columns.voxels {
         voxels.truncate(1);
         voxels[0].count = count;
         voxels[0].sum = [i64::from(count) * (reach / 2), 0, 0];

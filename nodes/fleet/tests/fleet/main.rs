@@ -2,6 +2,7 @@
 //!
 //! Tests of logs need the program `lattice` in LATTICE_PROGRAM, those beside foreign engines a Python with
 //! DuckDB, Polars and pyarrow in LATTICE_PYTHON; they say so and skip where there is none.
+#![allow(clippy::unwrap_used)]
 
 mod bounds;
 #[cfg(feature = "ballista")]
