@@ -83,6 +83,8 @@ fn the_recipes_of_the_documentation_run() {
         path.extend(std::env::split_paths(&std::env::var_os("PATH").unwrap()));
         let mut command = Command::new(&python);
         command.args(["-c", recipe]).current_dir(folder.path());
+        // What Spark starts its workers with.
+        command.env("PYSPARK_PYTHON", &python);
         command.env("PATH", std::env::join_paths(path).unwrap());
         succeeds(&mut command, recipe);
         if of_logs {
