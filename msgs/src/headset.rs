@@ -1,4 +1,4 @@
-//! What a headset sends of its surroundings; `msg/HeadsetMesh.msg` says how surfaces are sent in chunks.
+//! Surroundings of a headset as it sends them; `msg/HeadsetMesh.msg` says how surfaces are sent in chunks.
 
 use serde::{Deserialize, Serialize};
 

@@ -27,7 +27,7 @@ pub struct MapOutput {
     chunks_waited: u64,
 }
 
-/// What hears those who ask for keyframes; they are heard until it is dropped.
+/// Topic and service by which keyframes are asked for, until it is dropped.
 pub struct KeyframeRequests {
     /// The topic.
     pub topic: Subscription,

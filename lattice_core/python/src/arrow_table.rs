@@ -190,7 +190,7 @@ fn read_head(digits: &str) -> PyResult<MapColumns> {
         .into())
 }
 
-/// What a row holds besides its key.
+/// A row besides its key.
 struct Row {
     voxel: Voxel,
     stamps: Stamps,

@@ -104,7 +104,7 @@ fn write_task(path: &Path, task: &Task) -> Result {
     })
 }
 
-/// What a task says at its end.
+/// Answer of a task at its end.
 #[derive(Serialize, Deserialize)]
 enum Answer {
     Added { new: bool },

@@ -1,6 +1,6 @@
 //! Maps as tables: map files to Parquet and back, and one map of many logs on a data engine.
 //!
-//! What a voxel holds are integers whose sums do not depend on an order, so that one map of many is a
+//! A voxel holds integers, whose sums do not depend on an order, so that one map of many is a
 //! `SUM ... GROUP BY` over its cells: any engine does it, with the same bits. `docs/tables.md` is the
 //! contract of the tables.
 

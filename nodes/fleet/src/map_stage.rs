@@ -13,7 +13,7 @@ use crate::files::{FileId, at};
 use crate::part::Source;
 use crate::tables::{Added, Tables, digest_of_log, read_map_file};
 
-/// How the logs are mapped, the same for all.
+/// Settings by which logs are mapped, the same for all.
 #[derive(Clone, PartialEq, Debug, Serialize, Deserialize)]
 pub struct Settings {
     /// The program `lattice`.
@@ -31,9 +31,9 @@ pub struct Settings {
 pub struct Task {
     /// Folder of the tables.
     pub tables: PathBuf,
-    /// How to map.
+    /// Settings of the replay.
     pub settings: Settings,
-    /// What the part is made from.
+    /// Source of the part.
     pub source: Source,
 }
 

@@ -18,7 +18,7 @@ use crate::tile::Tile;
 /// Name of the file that says what a merged map holds.
 pub const MERGED_FILE: &str = "merged.json";
 
-/// What a merged map holds and what each tile was made from.
+/// Contents of a merged map, and the source of each tile.
 #[derive(Clone, PartialEq, Debug, Serialize, Deserialize)]
 #[serde(deny_unknown_fields)]
 pub struct Merged {
@@ -202,7 +202,7 @@ pub fn read_merged(folder: &Path) -> Result<lattice_core::voxels::file::MapConte
     read_map(folder, &merged.map, &tiles)
 }
 
-/// What the map of all parts has besides its rows; the least datum counts, so that no order does.
+/// The map of all parts besides its rows; the least datum counts, so that no order does.
 pub fn map_of(parts: &[Part]) -> Result<MapInfo> {
     let [first, rest @ ..] = parts else {
         return Err("there are no parts to merge".into());

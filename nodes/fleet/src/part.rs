@@ -18,13 +18,13 @@ use crate::{Result, schema};
 /// Version of the tables.
 pub const VERSION: u32 = 1;
 
-/// What a part holds and what it was made from: the file `part.json`.
+/// Contents and source of a part: the file `part.json`.
 #[derive(Clone, PartialEq, Debug, Serialize, Deserialize)]
 #[serde(deny_unknown_fields)]
 pub struct PartInfo {
     /// Version of the tables.
     pub version: u32,
-    /// What it was made from.
+    /// Its source.
     pub source: Source,
     /// The map besides its rows.
     pub map: MapInfo,
@@ -32,7 +32,7 @@ pub struct PartInfo {
     pub tiles: Vec<TileInfo>,
 }
 
-/// What a part was made from; its digest is the name of the part.
+/// Source of a part; its digest is the name of the part.
 #[derive(Clone, PartialEq, Debug, Serialize, Deserialize)]
 #[serde(deny_unknown_fields)]
 pub struct Source {

@@ -25,7 +25,7 @@ pub struct Status {
     pub tiles_merged: usize,
     /// Folders of parts that were begun and not finished.
     pub unfinished: usize,
-    /// What is not as it was written.
+    /// Files that are not as they were written.
     pub damaged: Vec<String>,
 }
 

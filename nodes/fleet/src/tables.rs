@@ -28,7 +28,7 @@ pub struct Part {
     pub name: String,
     /// Its folder.
     pub folder: PathBuf,
-    /// What it holds.
+    /// Its contents and source.
     pub info: PartInfo,
 }
 

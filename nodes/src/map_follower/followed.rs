@@ -1,4 +1,4 @@
-//! What became of a message of the map.
+//! Effects and errors of messages of the map.
 
 use thiserror::Error;
 

@@ -34,7 +34,7 @@ pub struct MergerOptions {
     pub datum_m: Vector3<f64>,
     /// Most voxels of the merged map, and of each robot's.
     pub max_voxels: usize,
-    /// Whether labels are counted.
+    /// True if labels are counted.
     pub keep_labels: bool,
     /// Largest message.
     pub chunk_bytes: usize,

@@ -1,4 +1,4 @@
-//! What one robot's map adds to the merged one.
+//! A robot's share in the merged map.
 
 use std::collections::BTreeMap;
 

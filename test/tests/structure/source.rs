@@ -3,12 +3,13 @@
 use std::fs;
 use std::path::{Path, PathBuf};
 
-/// All `.rs` files below a directory, sorted.
+/// All `.rs` files below a directory, sorted; without those that cargo has built.
 pub fn files(directory: &Path) -> Vec<PathBuf> {
     let mut found = Vec::new();
     for entry in fs::read_dir(directory).unwrap() {
         let path = entry.unwrap().path();
-        if path.is_dir() {
+        // What cargo builds of a workspace of its own is none of its sources.
+        if path.is_dir() && !path.ends_with("target") {
             found.extend(files(&path));
         } else if path.extension().is_some_and(|ending| ending == "rs") {
             found.push(path);

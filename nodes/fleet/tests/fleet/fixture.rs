@@ -12,7 +12,7 @@ use nalgebra::Vector3;
 use rand::{RngExt, SeedableRng};
 use rand_chacha::ChaCha8Rng;
 
-/// How a map is made.
+/// Recipe of a map.
 #[derive(Clone, Copy)]
 pub struct Recipe {
     pub kind: LatticeKind,

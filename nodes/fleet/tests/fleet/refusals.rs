@@ -1,4 +1,4 @@
-//! What does not go together is refused before any work, with the numbers.
+//! Maps that do not go together are refused before any work, with the numbers.
 
 use std::fs;
 

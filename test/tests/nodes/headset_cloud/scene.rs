@@ -1,4 +1,4 @@
-//! What a headset would send of a mesh, in the axes that it has.
+//! Messages that a headset would send of a mesh, in the axes that it has.
 
 use std::sync::Arc;
 

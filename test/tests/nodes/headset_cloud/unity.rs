@@ -59,7 +59,7 @@ fn surface(stamp_ns: i64, surface: &str) -> HeadsetMesh {
     }
 }
 
-/// What `Frames.cs` means to send.
+/// Messages that `Frames.cs` means to send.
 fn expected() -> (Vec<HeadsetMesh>, CameraInfo, Image) {
     let wall = HeadsetMesh {
         pose: in_unity(0.0, 3.0),
