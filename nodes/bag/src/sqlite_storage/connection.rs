@@ -3,7 +3,7 @@
 use std::{
     fs::File,
     io::{self, Read},
-    path::{Path, PathBuf},
+    path::Path,
     sync::Arc,
 };
 
@@ -18,7 +18,7 @@ use crate::BagError;
 /// Of a database that is `cut` the pages that are there are read.
 pub(super) fn connect(path: &Path, cut: bool) -> Result<Connection, BagError> {
     let path = &std::path::absolute(path).map_err(BagError::io(path, "locate"))?;
-    let has_wal = wal_path(path).metadata().is_ok_and(|wal| wal.len() > 0);
+    let has_wal = has_wal(path);
     let parameters = if has_wal {
         "mode=ro"
     } else {
@@ -54,11 +54,21 @@ pub(super) fn connect(path: &Path, cut: bool) -> Result<Connection, BagError> {
     Ok(connection)
 }
 
-/// SQLite appends "-wal" to the whole name.
-fn wal_path(path: &Path) -> PathBuf {
+/// True where a write-ahead log lies beside the database: SQLite appends "-wal" to the whole name.
+fn has_wal(path: &Path) -> bool {
     let mut name = path.as_os_str().to_owned();
     name.push("-wal");
-    PathBuf::from(name)
+    Path::new(&name).metadata().is_ok_and(|wal| wal.len() > 0)
+}
+
+/// True where the write-ahead log makes a whole database of the file: a writer that is stopped while it
+/// copies the log leaves the first page, which counts pages that only the log holds.
+fn wal_completes(path: &Path) -> bool {
+    let opens = |connection: Connection| {
+        let count = "SELECT COUNT(*) FROM sqlite_master";
+        connection.query_row(count, [], |_| Ok(())).is_ok()
+    };
+    has_wal(path) && connect(path, false).is_ok_and(opens)
 }
 
 fn percent_encode(path: &Path) -> String {
@@ -97,6 +107,9 @@ impl Cut {
 
 /// Compares the size in the database header with the file's (https://www.sqlite.org/fileformat.html, 1.3).
 pub(super) fn missing_pages(path: &Path) -> Result<Option<Cut>, BagError> {
+    if wal_completes(path) {
+        return Ok(None);
+    }
     let mut file = File::open(path).map_err(BagError::io(path, "open"))?;
     let size_bytes = file
         .metadata()

@@ -210,3 +210,31 @@ fn an_unfinished_sqlite_recording_reads_from_its_log() {
         .unwrap();
     assert_eq!(read(&path).unwrap().len(), 9001);
 }
+
+#[test]
+fn a_recorder_stopped_while_it_copies_its_log_leaves_all_of_it() {
+    let folder = tempfile::tempdir().unwrap();
+    let path = write_old(&folder, true, true);
+    let connection = Connection::open(&path).unwrap();
+    connection
+        .execute_batch("PRAGMA journal_mode = WAL; PRAGMA wal_autocheckpoint = 0;")
+        .unwrap();
+    for i in 0..100 {
+        let insert = "INSERT INTO messages(topic_id, timestamp, data) VALUES (7, ?1, ?2)";
+        let time_ns = T0_NS + 99_999 + i;
+        connection.execute(insert, (time_ns, cdr(i, 5000))).unwrap();
+    }
+    let stopped = folder.path().join("stopped.db3");
+    fs::copy(&path, &stopped).unwrap();
+    let wal = |path: &Path| format!("{}-wal", path.display());
+    fs::copy(wal(&path), wal(&stopped)).unwrap();
+    connection
+        .execute_batch("PRAGMA wal_checkpoint(TRUNCATE)")
+        .unwrap();
+    // The first page is copied first, and counts pages that the file does not have yet.
+    let mut file = fs::OpenOptions::new().write(true).open(&stopped).unwrap();
+    let first_page = &fs::read(&path).unwrap()[..4096];
+    std::io::Write::write_all(&mut file, first_page).unwrap();
+    assert_eq!(read(&stopped).unwrap(), read(&path).unwrap());
+    assert_eq!(read(&stopped).unwrap().len(), 9100);
+}

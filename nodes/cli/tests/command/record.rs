@@ -280,12 +280,12 @@ fn a_recorder_that_is_killed_leaves_what_it_had() {
         let left: u64 = left.map(|topic| topic["messages"].as_u64().unwrap()).sum();
         assert!(left > 100, "{storage}: {info}");
         let out = folder.path().join("whole").display().to_string();
-        text(&["bag", "recover", &bag, "--out", &out]);
+        let recovered = text(&["bag", "recover", &bag, "--out", &out]);
         let whole = BagReader::open(out.as_ref()).unwrap();
         assert_eq!(
             Some(whole.message_count()),
             info["messages"].as_u64(),
-            "{storage}"
+            "{storage}: {recovered}\n{info}"
         );
     }
 }
