@@ -37,6 +37,7 @@ fn log(folder: &Path, person: bool) -> PathBuf {
         seed: 1,
         duration_s: DURATION_S,
         person,
+        ins_offset: [0.0; 4],
         storage: Storage::Mcap,
         out: out.clone(),
         overwrite: false,

@@ -24,6 +24,7 @@ fn options(out: &Path, storage: Storage, seed: u64) -> BobcatOptions {
         seed,
         duration_s: DURATION_S,
         person: false,
+        ins_offset: [0.0; 4],
         storage,
         out: out.to_owned(),
         overwrite: false,

@@ -66,6 +66,7 @@ impl Demo {
             seed: self.seed,
             duration_s: self.duration,
             person: false,
+            ins_offset: [0.0; 4],
             storage: Storage::Mcap,
             out: bag.clone(),
             overwrite: true,

@@ -59,6 +59,10 @@ pub struct Bobcat {
     /// Let a person walk through the yard in the first 15 s
     #[arg(long)]
     person: bool,
+    /// Constant error of the INS, as by a base station at wrong coordinates: m to the east, north and up,
+    /// degrees about up
+    #[arg(long, num_args = 4, allow_negative_numbers = true, value_names = ["EAST", "NORTH", "UP", "TURN"])]
+    ins_offset: Option<Vec<f64>>,
     /// Container of the messages
     #[arg(long, value_parser = choice(&STORAGES), default_value = "mcap")]
     storage: Storage,
@@ -124,6 +128,10 @@ impl Bobcat {
             seed: self.seed,
             duration_s: self.duration,
             person: self.person,
+            ins_offset: match self.ins_offset.as_deref() {
+                Some(&[east_m, north_m, up_m, turn_deg]) => [east_m, north_m, up_m, turn_deg],
+                _ => [0.0; 4],
+            },
             storage: self.storage,
             out: self.out,
             overwrite: self.overwrite,

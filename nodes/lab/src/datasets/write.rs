@@ -11,6 +11,7 @@ use lattice_msgs::novatel_oem7_msgs::INSPVAX;
 use lattice_msgs::sensor_msgs::PointCloud2;
 use lattice_msgs::tf2_msgs::TFMessage;
 use lattice_msgs::{RosMessage, hash_of};
+use nalgebra::{Isometry3, Vector3};
 use serde::Serialize;
 use std::collections::HashMap;
 use std::fmt;
@@ -27,6 +28,8 @@ pub struct BobcatOptions {
     pub duration_s: f64,
     /// A person who walks through the yard.
     pub person: bool,
+    /// Constant error of the INS: east, north, up in m, then about up in degrees.
+    pub ins_offset: [f64; 4],
     /// Storage of the bag.
     pub storage: Storage,
     /// Directory of the bag.
@@ -94,7 +97,17 @@ fn write_log(
     options: &BobcatOptions,
     progress: &mut dyn FnMut(f64),
 ) -> Result<BobcatSummary, AnyError> {
-    let bobcat = Bobcat::new(options.seed, options.duration_s)?.with_person(options.person);
+    let [east_m, north_m, up_m, turn_deg] = options.ins_offset;
+    if options.ins_offset.iter().any(|offset| !offset.is_finite()) {
+        return Err(format!("an INS cannot be off by {:?}", options.ins_offset).into());
+    }
+    let ins_offset = Isometry3::new(
+        Vector3::new(east_m, north_m, up_m),
+        Vector3::z() * turn_deg.to_radians(),
+    );
+    let bobcat = Bobcat::new(options.seed, options.duration_s)?
+        .with_person(options.person)
+        .with_ins_offset(ins_offset);
     let writer = WriterOptions::default();
     let mut bag = BagWriter::create(&options.out, options.storage, writer)?;
     let mut topics = HashMap::new();

@@ -106,6 +106,7 @@ pub struct Bobcat {
     loader: Loader,
     body: [Block; 2],
     person: bool,
+    ins_offset: Isometry3<f64>,
 }
 
 impl Bobcat {
@@ -128,12 +129,18 @@ impl Bobcat {
                 block(-0.1, [1.2, 2.05], 1.2, 1.0),
             ],
             person: false,
+            ins_offset: Isometry3::identity(),
         })
     }
 
     /// With a [`Person`] who walks through the yard; all else is the same.
     pub fn with_person(self, person: bool) -> Self {
         Self { person, ..self }
+    }
+
+    /// With an INS whose whole map lies elsewhere, as by a base station at wrong coordinates.
+    pub fn with_ins_offset(self, ins_offset: Isometry3<f64>) -> Self {
+        Self { ins_offset, ..self }
     }
 
     pub fn seed(&self) -> u64 {
@@ -221,6 +228,11 @@ impl Bobcat {
         let hits = self.body.iter().filter_map(|b| b.cast(&origin, &direction));
         hits.map(|(distance_m, _)| distance_m)
             .min_by(f64::total_cmp)
+    }
+
+    /// `measured_from_map`: the constant error of the INS.
+    pub(super) fn ins_offset(&self) -> &Isometry3<f64> {
+        &self.ins_offset
     }
 
     /// The INS epochs from the start of the log to its end.

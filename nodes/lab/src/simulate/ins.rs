@@ -77,11 +77,13 @@ impl<'a> InsSamples<'a> {
         let per_s = 0.5 / DERIVATIVE_STEP_S;
         let [from, to] = [before, after].map(|base| (base * mount).translation.vector);
         let imu_velocity = (to - from) * per_s;
-        let map_from_imu = Isometry3::from_parts(
-            Translation3::from(true_imu.translation.vector + position_m),
-            UnitQuaternion::from_scaled_axis(attitude_rad) * true_imu.rotation,
-        );
-        let velocity_mps = imu_velocity + velocity_error_mps;
+        let offset = self.bobcat.ins_offset();
+        let map_from_imu = offset
+            * Isometry3::from_parts(
+                Translation3::from(true_imu.translation.vector + position_m),
+                UnitQuaternion::from_scaled_axis(attitude_rad) * true_imu.rotation,
+            );
+        let velocity_mps = offset.rotation * imu_velocity + velocity_error_mps;
         let turn_rate_radps = (before.rotation.inverse() * after.rotation).scaled_axis() * per_s;
         let lever_mps = turn_rate_radps.cross(&mount.translation.vector);
         InsSample {
@@ -90,7 +92,8 @@ impl<'a> InsSamples<'a> {
             map_from_base: map_from_imu * mount.inverse(),
             true_map_from_base: truth,
             velocity_mps,
-            base_velocity_mps: truth.rotation.inverse() * velocity_mps - lever_mps,
+            base_velocity_mps: (offset.rotation * truth.rotation).inverse() * velocity_mps
+                - lever_mps,
             base_turn_rate_radps: turn_rate_radps,
             delay_ns,
         }
