@@ -198,7 +198,10 @@ impl EnuTransformer {
         })
     }
 
-    fn on_pose(&mut self, pose: StampedPose, out: &mut Vec<EnuOutput>) {
+    fn on_pose(&mut self, mut pose: StampedPose, out: &mut Vec<EnuOutput>) {
+        if let Some(correction) = &self.options.correction {
+            pose.map_from_base = correction * pose.map_from_base;
+        }
         if !self.stamps.passes(pose.stamp_ns) {
             self.counts.poses_stamp_jump += 1;
             return;

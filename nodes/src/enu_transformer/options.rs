@@ -2,7 +2,7 @@
 
 use lattice_core::cloud::{TimeOptions, TimeReference, TimeUnit};
 use lattice_core::geodesy::{Geodetic, InsMount};
-use nalgebra::Vector3;
+use nalgebra::{Isometry3, Translation3, UnitQuaternion, Vector3};
 
 use super::ins::{HeightDatum, InsOptions, InsSource, InsStamp};
 use crate::convert::cloud::Precision;
@@ -52,6 +52,8 @@ pub struct TransformerOptions {
     /// True if `points_enu` has for each point the place of the sensor, which a mapper of free space
     /// needs.
     pub viewpoints: bool,
+    /// `map_from_map`: a correction of all poses, where one is known.
+    pub correction: Option<Isometry3<f64>>,
 }
 
 /// More than any cloud has that a map needs.
@@ -92,6 +94,7 @@ impl TransformerOptions {
             precision: Precision::Float32,
             pass_fields: LABEL_FIELDS.map(str::to_owned).into(),
             viewpoints: false,
+            correction: None,
         }
     }
 
@@ -139,6 +142,7 @@ impl TransformerOptions {
             return Err(params.invalid("pass_fields", problem));
         }
         options.viewpoints = params.bool("viewpoints", options.viewpoints)?;
+        options.correction = correction(params)?;
         let mut names = std::collections::BTreeSet::from(["x", "y", "z"]);
         if options.viewpoints {
             names.extend(VIEWPOINT_FIELDS);
@@ -176,6 +180,15 @@ fn ins_options(params: &Params, defaults: InsOptions) -> Result<InsOptions, Para
         max_imu_gap_s: not_negative(params, "ins.max_imu_gap_s", defaults.max_imu_gap_s)?,
         ..defaults
     })
+}
+
+/// None unless it moves something: the poses keep their bits.
+fn correction(params: &Params) -> Result<Option<Isometry3<f64>>, ParamError> {
+    let [x, y, z] = triple(params, "correction.translation_m")?;
+    let [roll, pitch, yaw] = triple(params, "correction.rpy_rad")?;
+    let rotation = UnitQuaternion::from_euler_angles(roll, pitch, yaw);
+    let correction = Isometry3::from_parts(Translation3::new(x, y, z), rotation);
+    Ok(Some(correction).filter(|correction| *correction != Isometry3::identity()))
 }
 
 fn time_options(params: &Params) -> Result<TimeOptions, ParamError> {

@@ -22,6 +22,8 @@ const ABOUT: &[About] = about! {
     "origin.latitude_deg" fixed(POSES): "Latitude of that place, WGS84.";
     "origin.longitude_deg" fixed(POSES): "Longitude of that place, WGS84.";
     "origin.height_m" fixed(POSES): "Height of that place above the ellipsoid.";
+    "correction.translation_m" fixed(POSES): "Correction of all poses, in the map frame: moved by this after the rotation below.";
+    "correction.rpy_rad" fixed(POSES): "Its rotation about the origin of the map: fixed-axis roll, pitch, yaw.";
     "map_frame" fixed(FRAME): "East-north-up frame of the map.";
     "base_frame" fixed(FRAME): "Frame of the machine.";
     "earth_frame" fixed(FRAME): "Frame of the earth (ECEF).";

@@ -126,7 +126,8 @@ impl EnuTransformer {
         }
         let (map, base) = (&self.options.map_frame, &self.options.base_frame);
         let found = self.mounts.lookup(map, base, stamp_ns);
-        found.map_err(|miss| match miss {
+        let corrected = |pose| self.options.correction.map_or(pose, |by| by * pose);
+        found.map(corrected).map_err(|miss| match miss {
             TfMiss::UnknownFrame { .. } | TfMiss::Disconnected { .. } => PoseMiss::Empty,
             TfMiss::TooOld { by_ns, .. } => PoseMiss::BeforeStart { by_ns },
             TfMiss::TooNew { by_ns, .. } => PoseMiss::AfterEnd { by_ns },

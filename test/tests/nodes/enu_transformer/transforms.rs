@@ -1,5 +1,7 @@
 //! Mounts of sensors, odometry, and wrong publishers of transforms.
 
+use std::f64::consts::FRAC_PI_2;
+
 use lattice_msgs::tf2_msgs::TFMessage;
 use lattice_nodes::convert::geometry::{isometry_from_transform, transform_stamped};
 use lattice_nodes::enu_transformer::TransformerOptions;
@@ -7,7 +9,7 @@ use lattice_nodes::enu_transformer::ins::InsSource;
 use lattice_test::clouds::{SECOND_NS, cloud, odometry, points, timed_cloud};
 use nalgebra::{Isometry3, Vector3};
 
-use super::{Bench, START_NS, STEP_NS, driven};
+use super::{Bench, START_NS, STEP_NS, base_cloud, driven};
 
 #[test]
 fn a_turning_mount_is_followed() {
@@ -148,4 +150,30 @@ fn poses_come_of_transforms_that_others_publish() {
     bench.cloud(cloud("camera", START_NS + SECOND_NS, &[[1.0; 3]]), START_NS);
     bench.tick(START_NS + 5 * SECOND_NS);
     assert_eq!(bench.machine.counts().clouds_pose_late, 1);
+}
+
+#[test]
+fn a_correction_moves_poses_and_points_whatever_the_source() {
+    let correction = Isometry3::new(Vector3::new(5.0, 0.0, 1.0), Vector3::z() * FRAC_PI_2);
+    for source in [InsSource::Odometry, InsSource::Tf] {
+        let mut bench = Bench::new(TransformerOptions {
+            correction: Some(correction),
+            ..TransformerOptions::new(source)
+        });
+        for step in 0..=2 {
+            match source {
+                InsSource::Tf => bench.tf("map", "base_link", step, &driven(step), false),
+                _ => bench.drive(step, step + 1),
+            }
+        }
+        bench.cloud(base_cloud(START_NS + STEP_NS), START_NS);
+        let found = points(&bench.clouds[0])[0];
+        assert!(
+            (found - Vector3::new(3.0, 1.01, 4.0)).norm() < 1e-6,
+            "{source}: {found}"
+        );
+        for transform in &bench.transforms {
+            assert_eq!(transform.transform.translation.z, 1.0);
+        }
+    }
 }
