@@ -4,8 +4,10 @@
 //! `SUM ... GROUP BY` over its cells: any engine does it, with the same bits. `docs/tables.md` is the
 //! contract of the tables.
 
+pub mod align;
 #[cfg(feature = "ballista")]
 pub mod cluster;
+pub mod corrections;
 pub mod engine;
 pub mod files;
 pub mod map_stage;

@@ -9,6 +9,7 @@ use serde::{Deserialize, Serialize};
 use serde_json::Value;
 
 use crate::Result;
+use crate::corrections::Corrections;
 use crate::files::{FileId, at};
 use crate::part::Source;
 use crate::tables::{Added, Tables, digest_of_log, read_map_file};
@@ -35,23 +36,33 @@ pub struct Task {
     pub settings: Settings,
     /// Source of the part.
     pub source: Source,
+    /// True if the poses of the log are corrected.
+    pub corrected: bool,
 }
 
 impl Task {
-    /// The tasks of a log: one, or one for each slice of `slice_s`.
+    /// The tasks of a log: one, or one for each slice of `slice_s`; fails where the corrections leave it out.
     pub fn of_log(
         log: &Path,
         slice_s: Option<f64>,
         settings: &Settings,
+        corrections: Option<&Corrections>,
         tables: &Tables,
     ) -> Result<Vec<Task>> {
+        let absolute = |path: &Path| path.canonicalize().map_err(|error| at(path, error));
+        let log = absolute(log)?;
+        let sha256 = digest_of_log(&log)?;
+        let correction = match corrections {
+            Some(corrections) => corrections.options_of(&log, &sha256)?,
+            None => Vec::new(),
+        };
+        let mut settings = settings.clone();
+        settings.options.extend_from_slice(&correction);
         let mut recorded = settings.options.clone();
         for path in &settings.params {
             let id = FileId::of(path).map_err(|error| at(path, error))?;
             recorded.push(format!("--params of SHA-256 {}", id.sha256));
         }
-        let absolute = |path: &Path| path.canonicalize().map_err(|error| at(path, error));
-        let log = absolute(log)?;
         let task = |slice_s| -> Result<Task> {
             Ok(Task {
                 tables: absolute(tables.folder())?,
@@ -66,11 +77,12 @@ impl Task {
                 source: Source {
                     kind: "log".to_owned(),
                     path: log.display().to_string(),
-                    sha256: String::new(),
+                    sha256: sha256.clone(),
                     slice_s,
                     settings: recorded.clone(),
                     program: version_of(&settings.program)?,
                 },
+                corrected: !correction.is_empty(),
             })
         };
         let mut tasks = vec![];
@@ -92,10 +104,6 @@ impl Task {
                 }
             }
         }
-        let sha256 = digest_of_log(&log)?;
-        tasks
-            .iter_mut()
-            .for_each(|task| task.source.sha256.clone_from(&sha256));
         Ok(tasks)
     }
 

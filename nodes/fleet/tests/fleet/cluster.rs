@@ -109,7 +109,7 @@ impl Cluster {
 #[test]
 fn an_executor_that_is_killed_while_it_maps_costs_time_only() {
     let folder = tempfile::tempdir().unwrap();
-    let Some(logs) = Logs::simulate(folder.path(), 6, "8") else {
+    let Some(logs) = Logs::simulate(folder.path(), 6, "8", &[]) else {
         return;
     };
     let expected = logs.expected(folder.path());

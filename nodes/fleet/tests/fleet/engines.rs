@@ -64,7 +64,7 @@ fn the_recipes_of_the_documentation_run() {
         let folder = tempfile::tempdir().unwrap();
         let mut path = Vec::new();
         if of_logs {
-            let Some(logs) = Logs::simulate(&folder.path().join("logs"), 2, "2") else {
+            let Some(logs) = Logs::simulate(&folder.path().join("logs"), 2, "2", &[]) else {
                 continue;
             };
             fs::copy(&logs.params, folder.path().join("params.yaml")).unwrap();

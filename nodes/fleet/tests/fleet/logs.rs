@@ -14,8 +14,13 @@ pub struct Logs {
 }
 
 impl Logs {
-    /// Simulates logs below a folder; none without the program.
-    pub fn simulate(folder: &Path, count: usize, duration_s: &str) -> Option<Logs> {
+    /// Simulates logs below a folder with further options; none without the program.
+    pub fn simulate(
+        folder: &Path,
+        count: usize,
+        duration_s: &str,
+        further: &[&str],
+    ) -> Option<Logs> {
         let lattice = from_environment("LATTICE_PROGRAM")?;
         fs::create_dir_all(folder).unwrap();
         let params = Path::new(env!("CARGO_MANIFEST_DIR")).join("../../params/bobcat.yaml");
@@ -26,7 +31,8 @@ impl Logs {
             let mut command = Command::new(&lattice);
             command
                 .args(["simulate", "bobcat", "--out", text(&log)])
-                .args(options);
+                .args(options)
+                .args(further);
             let output = command.output().unwrap();
             assert!(
                 output.status.success(),
@@ -84,7 +90,7 @@ impl Logs {
 #[test]
 fn logs_in_slices_give_the_map_of_the_whole_logs() {
     let folder = tempfile::tempdir().unwrap();
-    let Some(logs) = Logs::simulate(folder.path(), 2, "6") else {
+    let Some(logs) = Logs::simulate(folder.path(), 2, "6", &[]) else {
         return;
     };
     let expected = logs.expected(folder.path());
@@ -115,7 +121,7 @@ fn logs_in_slices_give_the_map_of_the_whole_logs() {
 #[test]
 fn a_log_that_cannot_be_mapped_is_named_and_the_others_are_mapped() {
     let folder = tempfile::tempdir().unwrap();
-    let Some(mut logs) = Logs::simulate(folder.path(), 1, "2") else {
+    let Some(mut logs) = Logs::simulate(folder.path(), 1, "2", &[]) else {
         return;
     };
     let broken = folder.path().join("broken.mcap");
@@ -138,7 +144,7 @@ fn a_log_that_cannot_be_mapped_is_named_and_the_others_are_mapped() {
 #[test]
 fn a_replay_adds_its_map_to_the_tables() {
     let folder = tempfile::tempdir().unwrap();
-    let Some(logs) = Logs::simulate(folder.path(), 1, "2") else {
+    let Some(logs) = Logs::simulate(folder.path(), 1, "2", &[]) else {
         return;
     };
     let tables = folder.path().join("tables");

@@ -4,6 +4,7 @@
 //! DuckDB, Polars and pyarrow in LATTICE_PYTHON; they say so and skip where there is none.
 #![allow(clippy::unwrap_used)]
 
+mod aligning;
 mod bounds;
 #[cfg(feature = "ballista")]
 mod cluster;

@@ -1,5 +1,6 @@
 //! The program `lattice-fleet`, which `lattice fleet` runs.
 
+mod align;
 mod map;
 mod merge;
 mod progress;
@@ -8,6 +9,7 @@ mod serve;
 mod status;
 mod table;
 
+use std::path::PathBuf;
 use std::process::ExitCode;
 
 use clap::{Parser, Subcommand};
@@ -32,6 +34,8 @@ enum Command {
     Map(map::Map),
     /// One map of all parts; tiles whose parts are as before are kept
     Merge(merge::Merge),
+    /// Propose a correction of the poses of logs by a merged map, each with a verdict
+    Align(align::Align),
     /// Parts, tiles and what is damaged, left over or not merged yet
     Status(status::Status),
     /// Be the scheduler or an executor of a Ballista cluster
@@ -48,6 +52,7 @@ fn main() -> ExitCode {
         Command::FromTable(command) => command.run(),
         Command::Map(command) => command.run(),
         Command::Merge(command) => command.run(),
+        Command::Align(command) => command.run(),
         Command::Status(command) => command.run(),
         #[cfg(feature = "ballista")]
         Command::Serve(command) => command.run(),
@@ -73,4 +78,27 @@ fn block_on<T>(threads: usize, work: impl Future<Output = Result<T>>) -> Result<
 /// Number of cores, for options that are not given.
 fn cores() -> usize {
     std::thread::available_parallelism().map_or(1, usize::from)
+}
+
+/// The program `lattice`: as given, beside this one, or on the PATH.
+fn program_lattice(given: Option<PathBuf>) -> PathBuf {
+    let beside = || {
+        let path = std::env::current_exe().ok()?.with_file_name("lattice");
+        path.is_file().then_some(path)
+    };
+    given.or_else(beside).unwrap_or_else(|| "lattice".into())
+}
+
+fn positive(text: &str) -> std::result::Result<f64, String> {
+    match not_negative(text) {
+        Ok(value) if value > 0.0 => Ok(value),
+        _ => Err("a number above 0 is needed".to_owned()),
+    }
+}
+
+fn not_negative(text: &str) -> std::result::Result<f64, String> {
+    match text.parse() {
+        Ok(value) if value >= 0.0 && f64::is_finite(value) => Ok(value),
+        _ => Err("a number of at least 0 is needed".to_owned()),
+    }
 }

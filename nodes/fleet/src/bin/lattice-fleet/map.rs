@@ -5,12 +5,13 @@ use std::time::Instant;
 
 use clap::Args;
 use lattice_fleet::Result;
+use lattice_fleet::corrections::Corrections;
 use lattice_fleet::engine::Engine;
 use lattice_fleet::map_stage::{Settings, Task, run_all};
 use lattice_fleet::tables::Tables;
 use serde::Serialize;
 
-use crate::{cores, progress};
+use crate::{cores, positive, program_lattice, progress};
 
 /// Options of `lattice fleet map`.
 #[derive(Args)]
@@ -36,6 +37,9 @@ pub struct Map {
     /// Part each log by its time, a task for each slice
     #[arg(long, value_name = "SECONDS", value_parser = positive)]
     slice: Option<f64>,
+    /// Corrections of poses, as `lattice fleet align` writes them; logs without an entry are mapped as they are
+    #[arg(long, value_name = "FILE")]
+    corrections: Option<PathBuf>,
     /// Tasks at a time in this process; 0: one for each core
     #[arg(long, default_value_t = 0)]
     workers: usize,
@@ -53,6 +57,7 @@ pub struct Map {
 #[derive(Serialize)]
 struct Report {
     tasks: usize,
+    tasks_corrected: usize,
     parts_new: usize,
     parts_there: usize,
     failed: Vec<String>,
@@ -65,10 +70,12 @@ impl Map {
         let begin = Instant::now();
         let tables = Tables::open_or_create(&self.out)?;
         let settings = self.settings();
+        let corrections = self.corrections.as_deref().map(Corrections::read);
+        let corrections = corrections.transpose()?;
         let bar = progress::bar("logs", self.logs.len() as u64);
         let (mut tasks, mut failed) = (Vec::new(), Vec::new());
         for log in &self.logs {
-            match Task::of_log(log, self.slice, &settings, &tables) {
+            match Task::of_log(log, self.slice, &settings, corrections.as_ref(), &tables) {
                 Ok(of_log) => tasks.extend(of_log),
                 Err(error) => failed.push(format!("{}: {error}", log.display())),
             }
@@ -76,6 +83,7 @@ impl Map {
         }
         bar.finish_and_clear();
         let all = tasks.len();
+        let tasks_corrected = tasks.iter().filter(|task| task.corrected).count();
         // Twice the same log is one task.
         tasks.sort_by_key(|task| task.source.part_name());
         tasks.dedup_by_key(|task| task.source.part_name());
@@ -107,6 +115,7 @@ impl Map {
         failed.extend(failures);
         let report = Report {
             tasks: all,
+            tasks_corrected,
             parts_new,
             parts_there: all.saturating_sub(parts_new + failed.len()),
             wall_s: begin.elapsed().as_secs_f64(),
@@ -126,13 +135,8 @@ impl Map {
         if let Some(volume_m3) = self.cell_volume {
             options.extend(["--cell-volume".to_owned(), volume_m3.to_string()]);
         }
-        let beside = || {
-            let path = std::env::current_exe().ok()?.with_file_name("lattice");
-            path.is_file().then_some(path)
-        };
-        let program = self.program.clone().or_else(beside);
         Settings {
-            program: program.unwrap_or_else(|| "lattice".into()),
+            program: program_lattice(self.program.clone()),
             params: self.params.clone(),
             options,
             threads: 1,
@@ -144,8 +148,9 @@ impl Map {
             println!("{}", serde_json::to_string_pretty(report)?);
         } else {
             println!(
-                "{} tasks: {} new parts, {} there already, {} failed, {:.1} s",
+                "{} tasks, {} of them with corrected poses: {} new parts, {} there already, {} failed, {:.1} s",
                 report.tasks,
+                report.tasks_corrected,
                 report.parts_new,
                 report.parts_there,
                 report.failed.len(),
@@ -162,12 +167,5 @@ impl Map {
             )
             .into()),
         }
-    }
-}
-
-fn positive(text: &str) -> std::result::Result<f64, String> {
-    match text.parse() {
-        Ok(value) if value > 0.0 && f64::is_finite(value) => Ok(value),
-        _ => Err("a number above 0 is needed".to_owned()),
     }
 }
