@@ -34,7 +34,7 @@ const scene = new Scene(gl);
 const transforms = new Transforms();
 const state = {
   open: false, live: false, lattice: null, frame: "map", size: 0, complete: false, sequence: null, changedAt: null, heardAt: Date.now(),
-  mode: "height", heights: [0, 1], slice: [0, 1], labels: new Set(), robot: null, path: [], headset: null,
+  mode: "height", heights: [0, 1], slice: [0, 1], labels: new Set(), names: new Map(), robot: null, path: [], headset: null,
   clouds: new Map(), measuring: false, measured: [], chosen: null, shown: { cells: true, robot: true, grid: true, headset: true },
   scansOn: new Set(), problems: [], frames: 0,
 };
@@ -94,10 +94,14 @@ const handlers = {
     headset.follow(state.headset, transforms.find(state.frame, HEADSET));
     redraw();
   },
-  calibration({ result }) {
-    state.headset = headset.headsetOf(result);
-    headset.showVerdict(result);
+  calibration({ said }) {
+    state.headset = headset.headsetOf(said);
+    headset.showVerdict(said);
     redraw();
+  },
+  names({ said }) {
+    state.names = said;
+    chooseColour();
   },
   cloud({ topic, cloud }) {
     const known = state.clouds.get(topic);
@@ -114,7 +118,7 @@ const handlers = {
     free.take(news);
     redraw();
   },
-  diagnostics: panel.showDiagnostics,
+  diagnostics: ({ said }) => panel.showDiagnostics(said),
   rates({ rates }) {
     if (rates.length > 0) state.heardAt = Date.now();
     if (by("rates").closest("details").open) panel.showRates(rates);
@@ -168,7 +172,7 @@ function chooseColour() {
   const range = { height: state.heights, count: [1, 10], label: [0, 1], age: [0, 60] }[mode];
   cells.colour = { mode: MODES.indexOf(mode), range };
   cells.setPalette(mode);
-  panel.showLegend(mode, range, [...state.labels].sort((a, b) => a - b));
+  panel.showLegend(mode, range, [...state.labels].sort((a, b) => a - b), state.names);
   redraw();
 }
 
@@ -245,7 +249,7 @@ function pick(x, y) {
 function answered(cell, centre) {
   if (!cell) return panel.showCell(null);
   const shown = { key: cell.key, centre: centre.map((x) => x.toFixed(2)).join(", ") + " m", points: panel.whole(cell.count) };
-  if (cell.label !== 65535) shown.label = cell.label;
+  if (cell.label !== 65535) shown.label = state.names.get(cell.label) ?? cell.label;
   shown.changed = `${panel.seconds(cell.age)} ago`;
   if (state.robot) shown["from the robot"] = panel.metres(length(sub(centre, state.robot.position)));
   state.cell = cell;

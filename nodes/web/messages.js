@@ -104,6 +104,13 @@ export function calibration(bytes) {
   return result;
 }
 
+// Names of labels.
+export function names(bytes) {
+  const r = new Reader(bytes);
+  header(r);
+  return new Map(r.list((r) => [r.u16(), r.string()], 7));
+}
+
 const FLOAT32 = 7;
 const FLOAT64 = 8;
 

@@ -36,15 +36,15 @@ export function showBanner(text, warn = false) {
   if (banner.textContent !== text) banner.textContent = text ?? "";
 }
 
-export function showLegend(mode, range, labels) {
+export function showLegend(mode, range, labels, names) {
   const legend = by("legend");
   if (mode === "label") {
-    const names = labels.map((label) => {
+    const entries = labels.map((label) => {
       const swatch = element("i");
       swatch.style.background = labelColour(label);
-      return element("span", {}, swatch, String(label));
+      return element("span", {}, swatch, names.get(label) ?? String(label));
     });
-    legend.replaceChildren(element("div", { className: "names" }, ...(names.length ? names : ["this map has no labels"])));
+    legend.replaceChildren(element("div", { className: "names" }, ...(entries.length ? entries : ["this map has no labels"])));
     return;
   }
   const bar = element("div", { className: "bar" });

@@ -22,7 +22,7 @@ let subscriptions = new Map();
 let nextSubscription = 1;
 let changed = false;
 const rates = new Map();
-const wanted = new Set(["tf", "static", "map", "updates", "diagnostics", "calibration"]);
+const wanted = new Set(["tf", "static", "map", "updates", "diagnostics", "calibration", "names"]);
 
 // How each channel is read, by the type and the end of its topic.
 const KINDS = [
@@ -33,6 +33,7 @@ const KINDS = [
   ["tf", "tf2_msgs/msg/TFMessage", /./],
   ["diagnostics", "diagnostic_msgs/msg/DiagnosticArray", /./],
   ["calibration", "lattice_msgs/msg/CalibrationResult", /./],
+  ["names", "vision_msgs/msg/LabelInfo", /(^|\/)label_info$/],
   ["centers", "sensor_msgs/msg/PointCloud2", /map_centers$/],
   ["cloud", "sensor_msgs/msg/PointCloud2", /./],
 ];
@@ -132,17 +133,13 @@ function onData(bytes) {
       postMessage({ type: "transforms", transforms: messages.transforms(cdr), fixed: channel.kind === "static" });
       break;
     case "diagnostics":
-      postMessage({ type: "diagnostics", ...messages.diagnostics(cdr) });
-      break;
     case "calibration":
-      postMessage({ type: "calibration", result: messages.calibration(cdr) });
+    case "names":
+      postMessage({ type: channel.kind, said: messages[channel.kind](cdr) });
       break;
     case "centers":
-    case "cloud": {
-      const cloud = messages.cloud(cdr);
-      postMessage({ type: "cloud", topic: channel.topic, cloud });
-      break;
-    }
+    case "cloud":
+      postMessage({ type: "cloud", topic: channel.topic, cloud: messages.cloud(cdr) });
   }
 }
 

@@ -34,10 +34,21 @@ pub struct MergerOptions {
     pub datum_m: Vector3<f64>,
     /// Most voxels of the merged map, and of each robot's.
     pub max_voxels: usize,
-    /// True if labels are counted.
-    pub keep_labels: bool,
+    /// Labels of the merged map.
+    pub labels: MergedLabels,
     /// Largest message.
     pub chunk_bytes: usize,
+}
+
+/// Labels of a merged map.
+#[derive(Clone, Copy, PartialEq, Eq, Debug)]
+pub enum MergedLabels {
+    /// None.
+    None,
+    /// Those of the robots' maps.
+    Own,
+    /// The robots: label 0 is the first one, with as many points as it has in the voxel.
+    Robots,
 }
 
 /// Counters of a merger.
@@ -178,7 +189,7 @@ impl MapMerger {
         self.counts.shares_replaced += 1;
         if self.union.is_none() {
             let payload = Payload {
-                labels: options.keep_labels,
+                labels: options.labels != MergedLabels::None,
                 stamps: false,
             };
             let list = VoxelList::new(followed.lattice.clone(), options.datum_m, usize::MAX);
@@ -213,8 +224,9 @@ impl MapMerger {
         for cell in cells {
             labels.clear();
             let mut sum = Voxel::default();
-            for share in &self.shares {
-                share.add_to(cell, &mut sum, &mut labels);
+            for (robot, share) in (0..).zip(&self.shares) {
+                let robot = (self.options.labels == MergedLabels::Robots).then_some(robot);
+                share.add_to(cell, &mut sum, &mut labels, robot);
             }
             let labels = labels.iter().map(|(label, count)| LabelCount {
                 label: *label,

@@ -3,13 +3,16 @@
 use std::time::Duration;
 
 use lattice_msgs::lattice::{LatticeMap, LatticeMapUpdate};
+use lattice_msgs::vision_msgs::{LabelInfo, VisionClass};
 use lattice_runtime::logging::Throttle;
-use lattice_runtime::{Diagnostics, Level, Runtime, Subscription, Undecoded};
+use lattice_runtime::qos::Qos;
+use lattice_runtime::{Diagnostics, Level, Node, Publisher, Runtime, Subscription, Undecoded};
 use serde::Serialize;
 
 use super::parameters::Settings;
-use super::{MapMerger, MergerCounts, MergerOptions};
+use super::{MapMerger, MergedLabels, MergerCounts, MergerOptions};
 use crate::compute::Compute;
+use crate::convert::geometry;
 use crate::map_follower::{FollowError, Followed};
 use crate::map_input::{MapLosses, MapRequests};
 use crate::map_output::{MapOutput, epoch};
@@ -43,6 +46,10 @@ pub fn start(runtime: &Runtime, name: &str) -> Result<Finish, NodeError> {
     let settings = Settings::from_params(params)?;
     let robots = settings.merger.robots.clone();
     let (output, requests) = MapOutput::open(&node)?;
+    let label_info = match settings.merger.labels {
+        MergedLabels::Robots => Some(names(&node, &settings.merger)?),
+        MergedLabels::Own | MergedLabels::None => None,
+    };
     let losses: Vec<MapLosses> = robots.iter().map(|_| MapLosses::default()).collect();
     let input = |(robot, losses): (&String, &MapLosses)| {
         let mapper = format!("/{robot}/{}", settings.mapper);
@@ -88,8 +95,25 @@ pub fn start(runtime: &Runtime, name: &str) -> Result<Finish, NodeError> {
     Ok(Box::new(move || {
         drop(subscriptions);
         compute.finish_with(Event::Finish);
-        Box::new(requests)
+        Box::new((requests, label_info))
     }))
+}
+
+/// The publisher of the robots' names, which every later subscriber gets.
+fn names(node: &Node, options: &MergerOptions) -> Result<Publisher<LabelInfo>, NodeError> {
+    let classes = (0..)
+        .zip(&options.robots)
+        .map(|(class_id, name)| VisionClass {
+            class_id,
+            class_name: name.clone(),
+        });
+    let publisher = node.publisher("label_info", Qos::LATCHED)?;
+    publisher.publish(LabelInfo {
+        header: geometry::header(&options.map_frame, 0),
+        class_map: classes.collect(),
+        threshold: 0.0,
+    })?;
+    Ok(publisher)
 }
 
 /// State of the compute thread.

@@ -2,7 +2,7 @@
 
 use std::time::Duration;
 
-use super::MergerOptions;
+use super::{MergedLabels, MergerOptions};
 use crate::compute::ComputeLimits;
 use crate::{options, report};
 use lattice_runtime::about;
@@ -12,10 +12,18 @@ const ABOUT: &[About] = about! {
     "robots" fixed(options::TOPIC): "Names of the robots: their maps are /NAME/map and /NAME/map_updates.";
     "datum_m" fixed("keys are counted from it"): "Keys of the merged map are counted from the lattice point next to this place in the map frame. They reach a million cells in every direction.";
     "max_voxels": "Most voxels of the merged map, and of each robot's.";
-    "keep_labels" fixed("the map is made with it"): "Whether labels are merged: of each robot the most frequent one of a voxel is known.";
+    "labels" fixed("the map is made with it"): "Labels of the merged map: own, those of the maps (of each robot the most frequent one of a voxel is known); robots, the robots themselves, with their names on label_info; or none.";
     "chunk_bytes": "Largest message of map and map_updates, bytes.";
     "update_period_s": "Time between two messages of map_updates.";
 };
+
+const MAX_ROBOTS: usize = 1000;
+
+const LABELS: [(&str, MergedLabels); 3] = [
+    ("own", MergedLabels::Own),
+    ("robots", MergedLabels::Robots),
+    ("none", MergedLabels::None),
+];
 
 /// Settings of the node by its parameters.
 pub(super) struct Settings {
@@ -42,6 +50,10 @@ impl Settings {
         if names.len() != robots.len() || names.is_empty() || names.contains(&String::new()) {
             return Err(params.invalid("robots", "expected names of robots, each once"));
         }
+        if robots.len() > MAX_ROBOTS {
+            let problem = format!("expected at most {MAX_ROBOTS}");
+            return Err(params.invalid("robots", problem));
+        }
         let robots = robots.iter().map(|name| name.trim_matches('/').to_owned());
         Ok(Self {
             merger: MergerOptions {
@@ -49,7 +61,7 @@ impl Settings {
                 map_frame: options::frame(params, "map_frame", "map")?,
                 datum_m: options::place_m(params, "datum_m")?,
                 max_voxels: params.positive("max_voxels", 10_000_000)?,
-                keep_labels: params.bool("keep_labels", true)?,
+                labels: options::one_of(params, "labels", &LABELS)?,
                 chunk_bytes: options::chunk_bytes(params, 60_000)?,
             },
             limits: ComputeLimits {

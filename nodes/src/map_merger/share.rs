@@ -152,8 +152,14 @@ impl Share {
         out_of_range
     }
 
-    /// Adds what it says of a cell of the merged map.
-    pub(super) fn add_to(&self, cell: MortonKey, sum: &mut Voxel, labels: &mut BTreeMap<u16, u32>) {
+    /// Adds what it says of a cell of the merged map; all of its points have the label `robot` if there is one.
+    pub(super) fn add_to(
+        &self,
+        cell: MortonKey,
+        sum: &mut Voxel,
+        labels: &mut BTreeMap<u16, u32>,
+        robot: Option<u16>,
+    ) {
         if !self.cells.contains(&cell) {
             return;
         }
@@ -170,9 +176,13 @@ impl Share {
             let offsets = f64::from(voxel.count) * f64::from(mean) * self.unit;
             *sum = sum.saturating_add(offsets.round() as i64);
         }
-        if voxel.label != UNLABELED && voxel.label_count > 0 {
-            let count = labels.entry(voxel.label).or_default();
-            *count = count.saturating_add(voxel.label_count);
+        let (label, points) = match robot {
+            Some(robot) => (robot, voxel.count),
+            None => (voxel.label, voxel.label_count),
+        };
+        if label != UNLABELED && points > 0 {
+            let count = labels.entry(label).or_default();
+            *count = count.saturating_add(points);
         }
     }
 }

@@ -11,6 +11,7 @@ use lattice_msgs::geometry_msgs::TransformStamped;
 use lattice_msgs::lattice::LatticeMap;
 use lattice_msgs::sensor_msgs::PointCloud2;
 use lattice_msgs::tf2_msgs::TFMessage;
+use lattice_msgs::vision_msgs::LabelInfo;
 use lattice_msgs::visualization_msgs::MarkerArray;
 use lattice_msgs::{RosMessage, cdr};
 use lattice_runtime::qos::Qos;
@@ -132,6 +133,7 @@ impl Sources {
             When::Always,
         )?;
         builder.add::<CalibrationResult>("calibration", small(Qos::LATCHED), 1, When::Always)?;
+        builder.add::<LabelInfo>("label_info", small(Qos::LATCHED), 1, When::Always)?;
         builder.add::<PointCloud2>("map_centers", large(Qos::MARKERS), 1, When::Wanted)?;
         builder.add::<MarkerArray>("voxel_markers", large(Qos::MARKERS), 1000, When::EachAnew)?;
         builder.add::<LatticeMap>("free", large(Qos::MAP), 1000, When::EachAnew)?;

@@ -6,7 +6,7 @@ use lattice_core::lattice::{Lattice, LatticeKind, MortonKey};
 use lattice_msgs::geographic_msgs::{GeoPoint, GeoPointStamped};
 use lattice_nodes::lattice_mapper::{LatticeMapper, MapperOptions};
 use lattice_nodes::map_follower::{Followed, MapFollower};
-use lattice_nodes::map_merger::{MapMerger, MergerOptions};
+use lattice_nodes::map_merger::{MapMerger, MergedLabels, MergerOptions};
 use lattice_test::maps::{self, insert};
 use nalgebra::Vector3;
 use proptest::prelude::*;
@@ -19,7 +19,7 @@ fn options(robots: usize) -> MergerOptions {
         map_frame: "map".to_owned(),
         datum_m: Vector3::zeros(),
         max_voxels: 1_000_000,
-        keep_labels: false,
+        labels: MergedLabels::None,
         chunk_bytes: 60_000,
     }
 }
@@ -237,4 +237,43 @@ fn a_full_map_stays_and_says_so() {
     assert_eq!(merger.list().unwrap().len(), 300);
     let lost = robots[0].list().len() + robots[1].list().len() - 300;
     assert_eq!(merger.counts().voxels_list_full, lost as u64);
+}
+
+#[test]
+fn labels_say_which_robot_saw_most_of_a_cell() {
+    let mut robots = [mapper([0.0; 3]), mapper([0.0; 3])];
+    let mut merger = MapMerger::new(
+        MergerOptions {
+            labels: MergedLabels::Robots,
+            ..options(2)
+        },
+        70,
+    );
+    for (i, robot) in robots.iter_mut().enumerate() {
+        insert(
+            robot,
+            &scatter(i as u64, 4000, [i as f32 * 4.0, 0.0, 0.0], 9.0),
+        );
+        show(&mut merger, i, robot);
+    }
+    merger.take_update();
+    let mut follower = MapFollower::new(1_000_000);
+    for chunk in merger.keyframe() {
+        follower.on_map(&chunk).unwrap();
+    }
+    let count =
+        |robot: usize, key: &MortonKey| robots[robot].list().get(*key).map_or(0, |v| v.count);
+    let mut shared = 0;
+    for (key, voxel) in follower.map().unwrap().voxels() {
+        let [first, second] = [count(0, key), count(1, key)];
+        assert_eq!(voxel.count, first + second);
+        assert_eq!(
+            voxel.label,
+            u16::from(second > first),
+            "{first} and {second}"
+        );
+        assert_eq!(voxel.label_count, first.max(second));
+        shared += usize::from(first > 0 && second > 0);
+    }
+    assert!(shared > 50, "{shared}");
 }

@@ -10,6 +10,7 @@ use std::time::{Duration, Instant};
 use lattice_core::lattice::MortonKey;
 use lattice_msgs::lattice::{LatticeMap, LatticeMapUpdate};
 use lattice_msgs::sensor_msgs::{PointCloud2, PointField};
+use lattice_msgs::vision_msgs::LabelInfo;
 use lattice_nodes::convert::{cloud, geometry};
 use lattice_nodes::map_follower::{Followed, MapFollower};
 use lattice_runtime::env::Network;
@@ -129,6 +130,8 @@ fn the_map_of_two_robots_stays_exact_when_one_begins_anew() {
         "--ros-args",
         "-p",
         "update_period_s:=0.2",
+        "-p",
+        "labels:=robots",
     ];
     let mut merger = start(&domain, &arguments);
     let clouds = names.map(|name| {
@@ -187,6 +190,18 @@ fn the_map_of_two_robots_stays_exact_when_one_begins_anew() {
     until(&mut maps, &mut merged, true, "the robot is back", &new);
     until(&mut maps, &mut merged, false, "the new sum", &new);
     assert_ne!(all, merged.counts());
+    // A late listener is told the names of the labels, which are those of the robots.
+    let (told, names_told) = channel();
+    let told = move |info: Arc<LabelInfo>| drop(told.send(info));
+    let _info = node
+        .subscribe("/label_info", Qos::LATCHED, Load::Small, told)
+        .unwrap();
+    let info = names_told.recv_timeout(PATIENCE).unwrap();
+    let info = info.class_map.iter();
+    let info: Vec<_> = info
+        .map(|class| (class.class_id, class.class_name.as_str()))
+        .collect();
+    assert_eq!(info, [(0, names[0]), (1, names[1])]);
     for process in robots.iter_mut().chain([&mut merger]) {
         signal(process, "-TERM");
         assert!(process.wait().unwrap().success());

@@ -176,6 +176,27 @@ fn a_click_gives_key_and_count_of_a_cell_and_two_their_distance() {
 }
 
 #[test]
+fn labels_have_the_names_that_label_info_tells() {
+    let Some(chromium) = chromium() else { return };
+    let known = stairs();
+    let stage = Stage::show(&known);
+    let mut page = open(&chromium, &stage);
+    page.value("document.getElementById('colour').value = 'label'; document.getElementById('colour').dispatchEvent(new Event('change'))");
+    let legend = |text: &str| format!("document.getElementById('legend').textContent === '{text}'");
+    page.wait_for(&legend("37"));
+    stage.names(&[(3, "robot <b>1</b>"), (9, "nobody")]);
+    page.wait_for(&legend("robot <b>1</b>7"));
+    page.value("document.querySelector('[data-camera=top]').click()");
+    let first = serde_json::to_string(&known[0]).unwrap();
+    let click = format!(
+        "(() => {{ const {{ x, y }} = lattice.camera.project(look.centre({first})); lattice.pick(x, y); }})()"
+    );
+    page.value(&click);
+    page.wait_for("document.getElementById('cell').textContent.includes('robot <b>1</b>')");
+    assert_eq!(page.value("lattice.state.problems"), json!([]));
+}
+
+#[test]
 fn each_verdict_has_its_text_and_class_and_its_open_directions_are_drawn() {
     let Some(chromium) = chromium() else { return };
     let stage = Stage::show(&stairs());

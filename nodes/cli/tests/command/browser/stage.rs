@@ -10,6 +10,7 @@ use lattice_msgs::cdr;
 use lattice_msgs::geometry_msgs::{Pose, Quaternion};
 use lattice_msgs::lattice::{LatticeInfo, LatticeMap};
 use lattice_msgs::std_msgs::Header;
+use lattice_msgs::vision_msgs::{LabelInfo, VisionClass};
 use lattice_nodes::viewer_server::{Class, Entry, Gate, Hub, Server};
 use serde::Serialize;
 use serde_bytes::ByteBuf;
@@ -48,6 +49,7 @@ pub struct Stage {
     hub: Arc<Hub>,
     calibration: u32,
     free: u32,
+    label_info: u32,
     /// Address of the page.
     pub url: String,
     _server: Server,
@@ -61,6 +63,7 @@ impl Stage {
         let one = Class::Newest { depth: 1 };
         let calibration = hub.channel::<CalibrationResult>("/calibration", one, true);
         let free = hub.channel::<LatticeMap>("/free", one, true);
+        let label_info = hub.channel::<LabelInfo>("/label_info", one, true);
         let chunk = Entry {
             stamp_ns: 1,
             cdr: cdr::to_vec(&map(cells)).unwrap().into(),
@@ -73,6 +76,7 @@ impl Stage {
             hub,
             calibration,
             free,
+            label_info,
             url: format!("http://{}", server.address()),
             _server: server,
         }
@@ -81,6 +85,19 @@ impl Stage {
     /// Tells of free cells.
     pub fn frees(&self, cells: &[Known]) {
         self.hub.offer(self.free, cdr::to_vec(&map(cells)).unwrap());
+    }
+
+    /// Tells the names of labels.
+    pub fn names(&self, classes: &[(u16, &str)]) {
+        let class = |&(class_id, name): &(u16, &str)| VisionClass {
+            class_id,
+            class_name: name.to_owned(),
+        };
+        let info = LabelInfo {
+            class_map: classes.iter().map(class).collect(),
+            ..LabelInfo::default()
+        };
+        self.hub.offer(self.label_info, cdr::to_vec(&info).unwrap());
     }
 
     /// Tells of a calibration.
