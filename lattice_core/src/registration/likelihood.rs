@@ -175,17 +175,15 @@ impl<'a> Fit<'a> {
         self.partners_at(&target_from_source.rotation, |p| target_from_source * p)
     }
 
-    /// The same with the distances of the points from a centre multiplied by a scale. Regions and weights stay those
-    /// of the points as they are, so that likelihoods can be compared.
+    /// The same with the distances of the points from a centre multiplied by a scale; regions and weights stay.
     pub fn partners_scaled(
         &self,
         target_from_source: &Isometry3<f64>,
         center: &Point3<f64>,
         scale: f64,
     ) -> Partners {
-        self.partners_at(&target_from_source.rotation, |p| {
-            target_from_source * (center + scale * (p - center))
-        })
+        let place = |p: &Point3<f64>| target_from_source * (center + scale * (p - center));
+        self.partners_at(&target_from_source.rotation, place)
     }
 
     fn partners_at(

@@ -49,7 +49,9 @@ fn a_view_of_what_was_mapped_is_explained() {
 fn a_box_that_is_new_is_listed_with_its_place() {
     let found = ask(&with_box(), &Flat::default());
     let new = found.fit.unexplained.iter();
-    let new: Vec<_> = new.filter(|p| p.kind == UnexplainedKind::Floating).collect();
+    let new: Vec<_> = new
+        .filter(|p| p.kind == UnexplainedKind::Floating)
+        .collect();
     let apart = |place: &Point3<f64>| nalgebra::distance(&place.xy(), &MIDST.xy());
     assert!(
         new.iter().any(|part| apart(&part.place_m) < 0.6),

@@ -48,6 +48,8 @@ const BY_LABELS: usize = 64;
 const FINALISTS: usize = 4;
 /// Log-likelihood of an observation that refining a candidate may still win it.
 const HOPE: f64 = 0.5;
+/// Logarithm of the ratio of two scales that are about equal.
+const ABOUT: f64 = 0.08;
 /// Classes that are searched by, at most.
 const SEARCHED_CLASSES: usize = 24;
 
@@ -126,8 +128,14 @@ fn read_as(found: Calibration, other: &Other, options: &CalibrationOptions) -> C
     };
     let reason = || other.reading.reason(options.axes);
     match found.verdict {
-        // What leans fits better if it is smaller, too.
-        Verdict::RejectedInput if other.reading.is_scaled() => found,
+        // What leans fits better at another scale, and what is of another scale often leans: both are told.
+        Verdict::RejectedInput if other.reading.is_scaled() => Calibration {
+            reason: match other.is_certain && !found.is_about(other.reading.scale()) {
+                true => format!("{}; or it {}", found.reason, reason()),
+                false => found.reason,
+            },
+            ..found
+        },
         _ if other.is_certain => Calibration {
             verdict: Verdict::RejectedInput,
             reason: format!("the cloud {}", reason()),
@@ -143,6 +151,14 @@ fn read_as(found: Calibration, other: &Other, options: &CalibrationOptions) -> C
             ..found
         },
         _ => found,
+    }
+}
+
+impl Calibration {
+    /// True if the scale that was estimated is about another one.
+    fn is_about(&self, scale: f64) -> bool {
+        let estimate = self.scale.map_or(1.0, |estimate| estimate.scale);
+        (estimate / scale).ln().abs() < ABOUT
     }
 }
 

@@ -19,6 +19,8 @@ const ROUNDS: usize = 3;
 const LEAST: f64 = 0.003;
 /// Standard deviation of a scale that was only tried.
 const ROUGHLY: f64 = 0.03;
+/// Log-likelihood that a scale gains which matters, whatever its standard deviation.
+const CLEAR_GAIN: f64 = 40.0;
 /// Scales that are believed to be of one world.
 const SANE: std::ops::Range<f64> = 0.5..2.0;
 
@@ -132,7 +134,7 @@ impl ScaleEstimate {
     /// True if it is neither 1 nor next to it.
     fn matters(&self) -> bool {
         let off = (self.scale - 1.0).abs();
-        off > LEAST && off > 2.0 * self.sigma
+        off > LEAST && (off > 2.0 * self.sigma || self.gain > CLEAR_GAIN)
     }
 }
 
