@@ -65,6 +65,7 @@ impl Demo {
         let summary = simulate::bobcat(&BobcatOptions {
             seed: self.seed,
             duration_s: self.duration,
+            begin_s: 0.0,
             person: false,
             ins_offset: [0.0; 4],
             storage: Storage::Mcap,

@@ -56,6 +56,9 @@ pub struct Bobcat {
     /// Length of the log in s
     #[arg(long, default_value_t = 30.0)]
     duration: f64,
+    /// Time of the tour at which the log begins, s; its stamps are as much later
+    #[arg(long, default_value_t = 0.0, value_name = "SECONDS")]
+    begin: f64,
     /// Let a person walk through the yard in the first 15 s
     #[arg(long)]
     person: bool,
@@ -127,6 +130,7 @@ impl Bobcat {
         let summary = bobcat(&BobcatOptions {
             seed: self.seed,
             duration_s: self.duration,
+            begin_s: self.begin,
             person: self.person,
             ins_offset: match self.ins_offset.as_deref() {
                 Some(&[east_m, north_m, up_m, turn_deg]) => [east_m, north_m, up_m, turn_deg],
