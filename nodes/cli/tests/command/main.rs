@@ -16,6 +16,7 @@ mod record;
 mod respawn;
 mod viewer;
 mod viewer_foreign;
+mod viewer_headset;
 mod viewer_page;
 mod viewer_planning;
 mod viewer_survey;
