@@ -1,6 +1,7 @@
 //! `lattice simulate`: logs and point files of simulated machines.
 
 mod house;
+mod images;
 mod town;
 
 use super::{Choice, choice, show};
@@ -23,6 +24,9 @@ pub enum Simulate {
     Site(Site),
     /// A furnished house: a robot's labelled map, what a headset sees of four scenes, and the truth
     House(house::House),
+    /// Images of rooms as the camera of a robot or a headset sees them, with depth, true labels and poses, for
+    /// training networks
+    Images(images::Images),
     /// A street of a town as two lidar scans see it at different times, and the truth
     Town(town::Town),
 }
@@ -102,6 +106,7 @@ impl Simulate {
             Self::Bobcat(command) => command.run(),
             Self::Site(command) => command.run(),
             Self::House(command) => command.run(),
+            Self::Images(command) => command.run(),
             Self::Town(command) => command.run(),
         }
     }
