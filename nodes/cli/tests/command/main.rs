@@ -6,6 +6,7 @@ mod calibrate;
 mod evaluate;
 mod files;
 mod health;
+mod indoor;
 mod lifecycle;
 mod map;
 mod merger;

@@ -25,7 +25,7 @@ use crate::viewer_foreign::folder;
 fn params(folder: &Path) -> String {
     let dir = folder.display();
     let text = format!(
-        "/**/lattice_mapper:\n  ros__parameters: {{cell_volume_m3: 0.000125, keep_labels: true, map_dir: \
+        "/**/lattice_mapper:\n  ros__parameters: {{lattice: cubic, cell_volume_m3: 0.000125, keep_labels: true, map_dir: \
          '{dir}', autosave_file: house.lattice, resume: true}}\n\
          /**/headset_cloud:\n  ros__parameters: {{stride: 1}}\n\
          /**/semantic_icp_server:\n  ros__parameters: {{headset_axes: ros_flu}}\n\

@@ -91,7 +91,7 @@ impl Headset {
             ..SurveyOptions::default()
         };
         let survey = Survey::new(&house, &options, 1).unwrap();
-        let lattice = Lattice::new(LatticeKind::Cubic, 0.05_f64.powi(3)).unwrap();
+        let lattice = Lattice::new(LatticeKind::Cubic, 0.000125).unwrap();
         let truth = RegionLabels::truth(&house);
         let list = survey.voxels(&lattice, &truth).unwrap();
         write_map(&list, File::create(folder.join("house.lattice")).unwrap()).unwrap();
