@@ -16,10 +16,10 @@ use lattice_msgs::visualization_msgs::Marker;
 use super::parameters::Settings;
 use super::{
     HeadsetCloud, HeadsetOptions, HeadsetOutput, HeadsetReport, HeadsetStream, LabelsFrom,
-    PoseSource,
+    MeshOptions, PoseSource,
 };
 use crate::compute::{Compute, Inbox};
-use crate::mesh::read_mesh;
+use crate::mesh::read_mesh_in;
 use crate::report;
 use crate::start::{Finish, NodeError, handed_over, open_params};
 use lattice_runtime::logging::Throttle;
@@ -48,8 +48,12 @@ pub fn start(runtime: &Runtime, name: &str) -> Result<Finish, NodeError> {
     let settings = Settings::from_params(params)?;
     let mut machine = HeadsetCloud::new(settings.headset.clone());
     if !settings.mesh_file.is_empty() {
-        let max_triangles = settings.headset.mesh.max_triangles;
-        let read = read_mesh(Path::new(&settings.mesh_file), max_triangles);
+        let MeshOptions {
+            axes,
+            max_triangles,
+            ..
+        } = settings.headset.mesh;
+        let read = read_mesh_in(Path::new(&settings.mesh_file), axes, max_triangles);
         let taken = match &read {
             Ok(mesh) => machine.on_mesh_file(mesh).map_err(|e| e.to_string()),
             Err(error) => Err(error.to_string()),

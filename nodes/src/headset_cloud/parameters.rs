@@ -12,7 +12,7 @@ const ABOUT: &[About] = about! {
     "camera_axes" fixed(options::FRAME): "Axes of the camera's own frame: as headset_axes, or auto: the same, and optical where poses are in those of ROS.";
     "pose_source" fixed(options::TOPIC): "Where the pose of the camera is taken from: topic (headset/pose) or tf (transforms from headset_frame to the frame of the images).";
     "max_pose_gap_s" fixed("poses are kept with it"): "Longest time between two poses that is interpolated over.";
-    "mesh_file" fixed("it is read at the start"): "Mesh in headset_frame and headset_axes that is there from the start, PLY or OBJ; empty: none.";
+    "mesh_file" fixed("it is read at the start"): "Mesh in headset_frame and headset_axes that is there from the start, PLY, OBJ or glTF (.glb, .gltf), whose axes become those; empty: none.";
     "labels_from" fixed(options::TOPIC): "Where classes are taken from: image (points are what the pixels of label images see) or mesh (points all over the mesh have the classes of its triangles).";
     "spacing_m": "Distance of points that are taken all over the mesh.";
     "max_points": "Most points of such a cloud; those of a larger mesh are farther apart.";

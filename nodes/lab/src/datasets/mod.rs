@@ -27,6 +27,7 @@
 mod facts;
 mod house;
 mod images;
+mod indoor;
 mod log;
 mod messages;
 mod town;
@@ -44,6 +45,9 @@ pub use house::{
 pub use images::{
     IMAGES_FILE, ImageCamera, ImageEntry, ImageHouses, ImageSet, ImagesOptions, ImagesSummary,
     write_images,
+};
+pub use indoor::{
+    Indoor, IndoorOptions, IndoorSummary, LabelAccuracy, label_accuracy, write_indoor,
 };
 pub use town::{TownOptions, TownSummary, write_town};
 pub use write::{BobcatOptions, BobcatSummary, write_bobcat};

@@ -178,7 +178,7 @@ fn topic_specs() -> Vec<TopicSpec> {
     specs
 }
 
-fn spec<M: RosMessage>(name: &str, qos: BagQos) -> TopicSpec {
+pub(super) fn spec<M: RosMessage>(name: &str, qos: BagQos) -> TopicSpec {
     TopicSpec {
         name: name.to_owned(),
         type_name: M::TYPE.to_owned(),
