@@ -1,6 +1,7 @@
 //! The commands of the laboratory: simulation, papers, evaluations, benchmarks.
 
 mod bench;
+mod bench_camera;
 mod bench_register;
 mod bench_segment;
 mod bench_transport;
