@@ -1,10 +1,11 @@
 //! Networks in ONNX files: their output beside that of ONNX Runtime, and those that cannot be used; by each backend.
 //!
-//! Networks are made by `python/onnx_models.py` with random weights.
+//! Networks are made by `python/onnx_models.py` with random weights; `rooms` is the one that comes with the laboratory.
 
 use std::fs;
 use std::path::Path;
 
+use lattice_lab::models::write_rooms;
 use lattice_nodes::segmenter::{Backend, Scores, Size, Values, read_network, read_network_by};
 use lattice_test::python::{python, script};
 use serde_json::Value;
@@ -61,7 +62,8 @@ fn networks_give_what_onnx_runtime_gives() {
     let path = directory.path();
     let folder = path.to_str().unwrap();
     run(&python, "onnx_models.py", &[folder]);
-    let names = ["psp", "psp_classes", "deeplab", "segformer"];
+    write_rooms(path).unwrap();
+    let names = ["psp", "psp_classes", "deeplab", "segformer", "rooms"];
     let peer = run(&python, "onnx_parity.py", &[&[folder][..], &names].concat());
     for name in names {
         let file = path.join(name);

@@ -7,6 +7,7 @@ mod bench_segment;
 mod bench_transport;
 mod demo;
 mod evaluate;
+mod evaluate_chain;
 mod evaluate_kitti;
 mod evaluate_many;
 mod paper;
