@@ -15,6 +15,7 @@ use lattice_runtime::ros_args::RosArgs;
 use lattice_runtime::{Load, LoopbackDomain, Publisher, Runtime};
 use serde::Serialize;
 
+use super::clock::process_cpu_s;
 use crate::AnyError;
 
 const NODE: &str = "semantic_cloud";
@@ -192,7 +193,7 @@ impl CameraSetup {
 
 /// Processor time so far of the threads of the node and of all, s, as Linux tells it.
 fn cpu_s() -> Result<[f64; 2], AnyError> {
-    let (mut of_node, mut of_all) = (0.0, 0.0);
+    let mut of_node = 0.0;
     for task in fs::read_dir("/proc/self/task")? {
         let task = task?.path();
         let read = |name: &str| fs::read_to_string(task.join(name));
@@ -200,13 +201,12 @@ fn cpu_s() -> Result<[f64; 2], AnyError> {
         let (Ok(name), Ok(spent)) = (read("comm"), read("schedstat")) else {
             continue;
         };
-        let spent_ns: f64 = spent.split(' ').next().unwrap_or("0").parse()?;
-        of_all += spent_ns * 1e-9;
         if name.starts_with(NODE) {
+            let spent_ns: f64 = spent.split(' ').next().unwrap_or("0").parse()?;
             of_node += spent_ns * 1e-9;
         }
     }
-    Ok([of_node, of_all])
+    Ok([of_node, process_cpu_s()])
 }
 
 #[cfg(test)]
