@@ -81,7 +81,7 @@ pub type HandOver = Box<dyn Fn(u64, Input) -> bool + Send + Sync>;
 /// A bridge to nodes of ROS.
 pub struct NodeBridge {
     offer: Offer,
-    clients: Vec<(Client, Duration)>,
+    clients: services::Clients,
     parameters: Arc<Parameters>,
     _events: Option<Subscription>,
     goals: Option<Publisher<PoseStamped>>,
