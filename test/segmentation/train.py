@@ -2,13 +2,13 @@
 
     train.py --train DIR... --test NAME=DIR... --out rooms.onnx
 
-The same folders, options and versions give the same network. What it was trained on, and how right it is on
-each test, goes into OUT with the suffix .json.
+The same folders, options and versions give the same network, also if it was ended and went on: OUT with the suffix
+.pt has its state. What it was trained on, and how right it is on each test, goes into OUT with the suffix .json.
 """
 
 import argparse
+import copy
 import json
-import struct
 import time
 from pathlib import Path
 
@@ -169,36 +169,59 @@ def shares(labels, classes):
     return counts / counts.sum()
 
 
+class Mean:
+    """Running mean of the weights of a model, which needs no end of the training to be good."""
+
+    def __init__(self, model):
+        self.model = copy.deepcopy(model).eval()
+
+    def take(self, model, step):
+        keep = min(0.995, (1 + step) / (10 + step))
+        with torch.no_grad():
+            for mean, now in zip(self.model.state_dict().values(), model.state_dict().values()):
+                if mean.is_floating_point():
+                    mean.mul_(keep).add_(now, alpha=1 - keep)
+                else:
+                    mean.copy_(now)
+
+
 def train(images, labels, classes, options):
+    """The mean of the weights after so many steps; each step has its own random numbers."""
     torch.manual_seed(options.seed)
-    random = np.random.default_rng(options.seed)
     model = Rooms(classes)
+    mean = Mean(model)
+    optimizer = torch.optim.AdamW(model.parameters(), options.rate, weight_decay=1e-2)
     weights = (shares(labels, classes) + 1e-4) ** -options.balance
     weights = (weights / (weights * shares(labels, classes)).sum()).clamp(max=8).float()
-    optimizer = torch.optim.AdamW(model.parameters(), options.rate, weight_decay=1e-2)
-    schedule = torch.optim.lr_scheduler.OneCycleLR(
-        optimizer, options.rate, total_steps=options.steps, pct_start=0.1
-    )
-    begin, order, lost = time.time(), [], 0.0
-    for step in range(options.steps):
-        if len(order) < options.batch:
-            order = list(random.permutation(len(images)))
-        chosen = [order.pop() for _ in range(options.batch)]
+    state, first, lost, begin = options.out.with_suffix(".pt"), 0, [], time.time()
+    if state.exists():
+        first, *parts = torch.load(state)
+        for part, saved in zip((model, mean.model, optimizer), parts):
+            part.load_state_dict(saved)
+    for step in range(first, options.steps):
+        random = np.random.default_rng([options.seed, step])
+        # No end in sight: a rate that falls with the root of the steps, after a start from below.
+        rate = options.rate * min((step + 1) / 60, (1 + step / 400) ** -0.5)
+        for group in optimizer.param_groups:
+            group["lr"] = rate
+        chosen = random.choice(len(images), options.batch, replace=False)
         x, y = augmented(images[chosen], labels[chosen], random)
-        model.train()
         loss = F.cross_entropy(
-            model(normal(x)), y, weight=weights, ignore_index=NONE, label_smoothing=0.05
+            model.train()(normal(x)), y, weight=weights, ignore_index=NONE, label_smoothing=0.05
         )
         optimizer.zero_grad()
         loss.backward()
         nn.utils.clip_grad_norm_(model.parameters(), 5.0)
         optimizer.step()
-        schedule.step()
-        lost += loss.item()
+        mean.take(model, step)
+        lost.append(loss.item())
         if (step + 1) % 50 == 0:
-            print(f"{step + 1}/{options.steps} loss {lost / 50:.3f} {time.time() - begin:.0f} s", flush=True)
-            lost = 0.0
-    return model.eval()
+            parts = [part.state_dict() for part in (model, mean.model, optimizer)]
+            torch.save([step + 1, *parts], state.with_suffix(".tmp"))
+            state.with_suffix(".tmp").replace(state)
+            spent = f"{time.time() - begin:.0f} s, {time.process_time():.0f} s of processor"
+            print(f"{step + 1}/{options.steps} loss {np.mean(lost[-50:]):.3f} {spent}", flush=True)
+    return mean.model
 
 
 def varint(value):
@@ -234,8 +257,8 @@ def main():
     parser.add_argument("--test", nargs="*", default=[])
     parser.add_argument("--out", type=Path, required=True)
     parser.add_argument("--steps", type=int, default=3000)
-    parser.add_argument("--batch", type=int, default=12)
-    parser.add_argument("--rate", type=float, default=4e-3)
+    parser.add_argument("--batch", type=int, default=8)
+    parser.add_argument("--rate", type=float, default=3e-3)
     parser.add_argument("--balance", type=float, default=0.35, help="0: each pixel counts as much, 1: each class")
     parser.add_argument("--seed", type=int, default=1)
     options = parser.parse_args()
@@ -254,13 +277,12 @@ def main():
         images.append(x)
         labels.append(y)
     images, labels = torch.cat(images), torch.cat(labels)
-    begin = time.time()
     model = train(images, labels, len(names), options)
     parameters = sum(p.numel() for p in model.parameters())
     report = {
         "seed": options.seed, "steps": options.steps, "batch": options.batch, "rate": options.rate,
         "balance": options.balance, "images": len(images), "parameters": parameters,
-        "torch": torch.__version__, "train_s": round(time.time() - begin), "tests": {},
+        "torch": torch.__version__, "tests": {},
     }
     for test in options.test:
         name, folder = test.split("=", 1)

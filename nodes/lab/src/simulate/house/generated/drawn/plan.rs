@@ -135,7 +135,8 @@ impl Plan {
             wall(builder, *spot, *from, *to, openings, self.height_m);
         }
         for (spot, wide) in &self.curtains {
-            let _ = s.uniform();
+            // One number for each, so that a seed keeps its furniture if curtains change.
+            s.uniform();
             curtain(builder, *spot, *wide);
         }
     }
