@@ -161,7 +161,7 @@ impl Demo {
         let out = self.out("target/lattice_demo_indoor")?;
         let model = match self.true_labels {
             true => None,
-            false => network::model(self.model.as_ref(), &out)?,
+            false => Some(network::model(self.model.as_ref(), &out)?),
         };
         #[cfg(feature = "viewer")]
         let viewer = (!self.no_view).then(|| self.port());
