@@ -42,6 +42,19 @@ fn a_headset_is_found_in_the_map_of_a_short_survey() {
     }
 }
 
+#[cfg(not(feature = "onnx"))]
+#[test]
+fn a_build_without_networks_says_what_to_run() {
+    let folder = tempfile::tempdir().unwrap();
+    let out = folder.path().display().to_string();
+    let said = crate::error(&["demo", "--indoor", "--out", &out]);
+    let command = "cargo run --release --features onnx --bin lattice -- demo --indoor";
+    assert!(
+        said.contains(command) && said.contains("--true-labels"),
+        "{said}"
+    );
+}
+
 #[test]
 fn options_of_one_demo_are_not_taken_by_the_other() {
     for arguments in [

@@ -15,7 +15,7 @@ use lattice_msgs::RosMessage;
 use lattice_msgs::geometry_msgs::PoseStamped;
 use lattice_msgs::rcl_interfaces::ParameterEvent;
 use lattice_runtime::qos::Qos;
-use lattice_runtime::{CallError, Client, Load, Node, Publisher, Subscription};
+use lattice_runtime::{CallError, Load, Node, Publisher, Subscription};
 
 pub use self::headset::HeadsetTopics;
 use self::parameters::Parameters;
@@ -81,7 +81,7 @@ pub type HandOver = Box<dyn Fn(u64, Input) -> bool + Send + Sync>;
 /// A bridge to nodes of ROS.
 pub struct NodeBridge {
     offer: Offer,
-    clients: Vec<(Client, Duration)>,
+    clients: services::Clients,
     parameters: Arc<Parameters>,
     _events: Option<Subscription>,
     goals: Option<Publisher<PoseStamped>>,

@@ -17,13 +17,16 @@ use crate::viewer_server::protocol::AdvertisedService;
 /// Time for the answer of a calibration, which may search for a while.
 const CALIBRATION_PATIENCE: Duration = Duration::from_secs(120);
 
+/// Clients of services with the time for their answers.
+pub(super) type Clients = Vec<(Client, Duration)>;
+
 /// The table as it grows.
 struct Table<'a> {
     node: &'a Node,
     of: &'a str,
     patience: Duration,
     services: Vec<AdvertisedService>,
-    clients: Vec<(Client, Duration)>,
+    clients: Clients,
 }
 
 impl Table<'_> {
@@ -45,7 +48,7 @@ impl Table<'_> {
 pub(super) fn of(
     node: &Node,
     reach: &Reach,
-) -> Result<(Vec<AdvertisedService>, Vec<(Client, Duration)>), RuntimeError> {
+) -> Result<(Vec<AdvertisedService>, Clients), RuntimeError> {
     let mut table = Table {
         node,
         of: &reach.mapper,

@@ -159,12 +159,11 @@ impl Demo {
 
     #[cfg(feature = "headset")]
     fn run_indoor(&self) -> CliResult {
-        let network = match self.true_labels {
-            true => None,
-            false => Some(network::Network::find(self.model.clone())?),
-        };
         let out = self.out("target/lattice_demo_indoor")?;
-        let model = network.map(|network| network.file_in(&out)).transpose()?;
+        let model = match self.true_labels {
+            true => None,
+            false => Some(network::model(self.model.as_ref(), &out)?),
+        };
         #[cfg(feature = "viewer")]
         let viewer = (!self.no_view).then(|| self.port());
         #[cfg(not(feature = "viewer"))]

@@ -12,6 +12,7 @@
 //!
 //! The robot's views come in an even period, then there is a pause, then the headset looks about once a second.
 
+mod log;
 mod messages;
 mod truth;
 
@@ -19,22 +20,16 @@ use std::collections::BTreeMap;
 use std::fmt;
 use std::path::PathBuf;
 
-use lattice_bag::{BagQos, BagWriter, Storage, WriterOptions, replaceable};
+use lattice_bag::{BagWriter, Storage, WriterOptions, replaceable};
 use lattice_core::lattice::{Lattice, LatticeKind};
 use lattice_core::voxels::{Payload, VoxelList};
-use lattice_msgs::geometry_msgs::PoseStamped;
-use lattice_msgs::headset::HeadsetMesh;
-use lattice_msgs::sensor_msgs::{CameraInfo, Image};
-use lattice_msgs::tf2_msgs::TFMessage;
-use lattice_msgs::vision_msgs::LabelInfo;
-use lattice_msgs::{RosMessage, cdr, std_msgs};
 use nalgebra::{Isometry3, Vector3};
 use serde::Serialize;
 
-use super::write::spec;
+use self::log::Log;
 use crate::AnyError;
 use crate::options::within;
-use crate::simulate::house::{HeadsetTrial, House, RoomCamera, RoomImages, Scene, robot_views};
+use crate::simulate::house::{HeadsetTrial, House, RoomImages, Scene};
 
 pub use truth::{LabelAccuracy, label_accuracy};
 
@@ -43,9 +38,6 @@ const START_NS: i64 = 1_700_000_000_000_000_000;
 const SECOND_NS: i64 = 1_000_000_000;
 /// Time between the survey and the headset, ns.
 const PAUSE_NS: i64 = 2 * SECOND_NS;
-/// Time between two looks of the headset, and between two of its poses, ns.
-const LOOK_NS: i64 = SECOND_NS;
-const POSE_NS: i64 = SECOND_NS / 10;
 /// Pictures of the scene, which the headset looks at in turn.
 const SCANS: usize = 3;
 /// Place of the house in the map, m, and its turn, rad.
@@ -162,164 +154,6 @@ pub fn write_indoor(
         map_from_headset: trial.map_from_headset,
         truth: log.truth,
     })
-}
-
-/// The log as it grows.
-struct Log<'a> {
-    options: &'a IndoorOptions,
-    house: &'a House,
-    rooms: RoomImages<'a>,
-    bag: BagWriter,
-    topics: BTreeMap<&'static str, usize>,
-    truth: VoxelList,
-    /// Time of the next message.
-    at_ns: i64,
-}
-
-impl Log<'_> {
-    fn add_topics(&mut self) -> Result<(), AnyError> {
-        self.add::<Image>("/depth_registered/image_rect", false)?;
-        self.add::<CameraInfo>("/rgb/camera_info", false)?;
-        self.add::<TFMessage>("/tf", false)?;
-        self.add::<std_msgs::String>("/headset/session", true)?;
-        self.add::<HeadsetMesh>("/headset/mesh", false)?;
-        self.add::<CameraInfo>("/headset/camera_info", false)?;
-        self.add::<PoseStamped>("/headset/pose", false)?;
-        if self.options.colors {
-            self.add::<Image>("/rgb/image_rect_color", false)?;
-            return self.add::<Image>("/headset/image", false);
-        }
-        self.add::<Image>("/labels/image", false)?;
-        self.add::<LabelInfo>("/labels/label_info", true)?;
-        self.add::<Image>("/headset/labels/image", false)?;
-        self.add::<LabelInfo>("/headset/labels/label_info", true)
-    }
-
-    fn add<M: RosMessage>(&mut self, topic: &'static str, latched: bool) -> Result<(), AnyError> {
-        let depth = if latched { 1 } else { 100 };
-        let qos = BagQos {
-            depth,
-            latched,
-            ..BagQos::default()
-        };
-        let number = self.bag.add_topic(spec::<M>(topic, qos))?;
-        self.topics.insert(topic, number);
-        Ok(())
-    }
-
-    fn write<M: RosMessage>(&mut self, topic: &str, message: &M) -> Result<(), AnyError> {
-        let number = self.topics.get(topic).copied().unwrap_or(usize::MAX);
-        self.bag.write(number, self.at_ns, &cdr::to_vec(message)?)?;
-        Ok(())
-    }
-
-    fn survey(&mut self, progress: &mut dyn FnMut(f64)) -> Result<(), AnyError> {
-        let IndoorOptions {
-            views, seed, width, ..
-        } = *self.options;
-        let camera = RoomCamera::ROBOT;
-        let camera = camera.sized(width, width * camera.height / camera.width);
-        let period_ns = (self.options.period_s * 1e9) as i64;
-        let map_from_house = self.house.map_from_house();
-        if !self.options.colors {
-            let names = messages::label_info("camera", self.at_ns, self.house.class_names());
-            self.write("/labels/label_info", &names)?;
-        }
-        for (number, view) in robot_views(self.house, views, seed)?.iter().enumerate() {
-            let image = self.rooms.take(&camera, &view.truth, number as u64);
-            let depth_m = image.measured_depth_m(number as u64);
-            let map_from_camera = map_from_house * view.measured;
-            let stamp_ns = self.at_ns;
-            self.write("/tf", &messages::robot(stamp_ns, &map_from_camera))?;
-            let info = camera.camera_info("camera", stamp_ns);
-            self.write("/rgb/camera_info", &info)?;
-            let size = [image.width, image.height];
-            match self.options.colors {
-                true => {
-                    let colors = messages::rgb8("camera", stamp_ns, size, &image.rgb);
-                    self.write("/rgb/image_rect_color", &colors)?;
-                }
-                false => {
-                    let labels = messages::mono16("camera", stamp_ns, size, &image.labels);
-                    self.write("/labels/image", &labels)?;
-                }
-            }
-            let depth = messages::depth("camera", stamp_ns, size, &depth_m);
-            self.write("/depth_registered/image_rect", &depth)?;
-            truth::insert(
-                &mut self.truth,
-                &camera,
-                &map_from_camera,
-                &depth_m,
-                &image.labels,
-            );
-            self.at_ns += period_ns;
-            progress((number + 1) as f64 / views as f64);
-        }
-        // A pose behind the last image.
-        let views = robot_views(self.house, views, seed)?;
-        match views.last() {
-            Some(last) => {
-                let transforms = messages::robot(self.at_ns, &(map_from_house * last.measured));
-                self.write("/tf", &transforms)
-            }
-            None => Ok(()),
-        }
-    }
-
-    fn headset(&mut self, trial: &HeadsetTrial) -> Result<(), AnyError> {
-        let camera = RoomCamera::HEADSET;
-        let width = self.options.width;
-        let camera = camera.sized(width, width * camera.height / camera.width);
-        let headset_from_house = trial.map_from_headset.inverse() * self.house.map_from_house();
-        let session = "demo".to_owned();
-        let data = session.clone();
-        self.write("/headset/session", &std_msgs::String { data })?;
-        if !self.options.colors {
-            let names =
-                messages::label_info("headset_camera", self.at_ns, self.house.class_names());
-            self.write("/headset/labels/label_info", &names)?;
-        }
-        let chunks = messages::mesh(self.at_ns, &session, &trial.mesh, &headset_from_house);
-        for chunk in &chunks {
-            self.write("/headset/mesh", chunk)?;
-        }
-        let from_ns = self.at_ns;
-        for look in 0..self.options.looks {
-            let number = look % trial.headset_scans.len().max(1);
-            let Some(scan) = trial.headset_scans.get(number) else {
-                continue;
-            };
-            let pose = &scan.headset_from_camera;
-            self.at_ns = from_ns + look as i64 * LOOK_NS;
-            for _ in 0..LOOK_NS / POSE_NS {
-                let message = messages::headset_pose(self.at_ns, pose);
-                self.write("/headset/pose", &message)?;
-                self.at_ns += POSE_NS;
-            }
-            // The image of a pose that has come.
-            let stamp_ns = self.at_ns - LOOK_NS / 2;
-            self.at_ns -= POSE_NS / 2;
-            let house_from_camera = headset_from_house.inverse() * pose;
-            let image = self
-                .rooms
-                .take(&camera, &house_from_camera, 1000 + look as u64);
-            let info = camera.camera_info("headset_camera", stamp_ns);
-            self.write("/headset/camera_info", &info)?;
-            let size = [image.width, image.height];
-            match self.options.colors {
-                true => {
-                    let colors = messages::rgb8("headset_camera", stamp_ns, size, &image.rgb);
-                    self.write("/headset/image", &colors)?;
-                }
-                false => {
-                    let labels = messages::mono16("headset_camera", stamp_ns, size, &image.labels);
-                    self.write("/headset/labels/image", &labels)?;
-                }
-            }
-        }
-        Ok(())
-    }
 }
 
 #[cfg(test)]
