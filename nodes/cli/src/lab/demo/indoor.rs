@@ -223,7 +223,9 @@ impl IndoorDemo {
         }
         command.args(["--", "--ros-args", "--log-level", "info"]);
         let mut all = params.to_vec();
-        if nodes.contains(&"headset_cloud") {
+        // A segmenter is in either process.
+        let has_headset = nodes.contains(&"headset_cloud");
+        if has_headset {
             for names in OF_HEADSET {
                 command.args(["-r", &format!("segmenter:{names}")]);
             }
@@ -233,7 +235,10 @@ impl IndoorDemo {
             let file = yaml_text(&report_file(scratch, node));
             all.push(param(&format!("{node}:report_file"), &file));
         }
-        for (node, topic) in self.inputs().filter(|(node, _)| nodes.contains(node)) {
+        let is_taken = |(node, topic): &(&str, &str)| {
+            nodes.contains(node) && topic.starts_with("/headset/") == has_headset
+        };
+        for (node, topic) in self.inputs().filter(is_taken) {
             all.push(param(
                 &format!("{node}:qos.{topic}.reliability"),
                 "reliable",
