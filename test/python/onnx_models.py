@@ -179,6 +179,24 @@ def refused():
     entry.key, entry.value = "location", "../../etc/passwd"
     made = Graph(6)
     made.add("ConstantOfShape", made.given(np.array([100_000, 100_000], "i8")))
+    # Sizes that stand nowhere: a product of constants, doubled again and again, spread from both sides.
+    product = Graph(10)
+    side = product.given(np.array([100_000], "i8"))
+    ones = product.given(np.array([1], "i8"))
+    both = product.add("Concat", product.add("Mul", side, ones), product.add("Mul", side, ones), axis=0)
+    product.add("ConstantOfShape", both)
+    doubled = Graph(11)
+    grown = doubled.given(np.zeros([1, 1024], "f4"))
+    for _ in range(40):
+        grown = doubled.add("Concat", grown, grown, axis=0)
+    spread = Graph(12)
+    wide = lambda shape: spread.add("ConstantOfShape", spread.given(np.array(shape, "i8")))
+    spread.add("Add", wide([100_000, 1]), wide([1, 100_000]))
+    inner = helper.make_graph(
+        [helper.make_node("Identity", ["image"], ["then"])], "then", [],
+        [helper.make_tensor_value_info("then", TensorProto.FLOAT, [1, 3, 8, 8])])
+    branch = Graph(13)
+    branch.add("If", branch.given(np.array(True)), then_branch=inner, else_branch=inner)
     pair = Graph(7)
     inputs = [helper.make_tensor_value_info(n, TensorProto.FLOAT, [1, 3, 8, 8]) for n in "ab"]
     pair = pair.model(pair.add("Add", "a", "b"), [1, 3, 8, 8], 8, 8, inputs=inputs)
@@ -197,6 +215,8 @@ def refused():
     return {
         "huge": huge, "cut": cut, "elsewhere": elsewhere, "pair": pair, "grey": grey, "flat": flat,
         "lost": lost, "named": named, "made": one("Identity", "image", graph=made),
+        "product": one("Identity", "image", graph=product), "doubled": one("Identity", "image", graph=doubled),
+        "spread": one("Identity", "image", graph=spread), "branch": one("Identity", "image", graph=branch),
         "unknown": one("Frobnicate", "image"),
     }
 

@@ -12,6 +12,7 @@ pub mod evaluate;
 mod matching;
 pub use lattice_nodes::mesh;
 pub mod metrics;
+pub mod models;
 mod options;
 pub mod paper;
 pub mod printed;

@@ -125,7 +125,7 @@ pub struct Sampled<'a, T> {
 }
 
 /// Place in `to` pixels under the centre of a pixel of `from`.
-fn nearest(at: usize, from: usize, to: usize) -> usize {
+pub(super) fn nearest(at: usize, from: usize, to: usize) -> usize {
     (2 * at + 1) * to / (2 * from)
 }
 

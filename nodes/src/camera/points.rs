@@ -1,54 +1,193 @@
-//! Points with a class and its confidence, as clouds have them.
+//! Points with a class and what is known of it, as clouds have them.
 
 use lattice_core::registration::UNLABELED;
 use lattice_msgs::sensor_msgs::{PointCloud2, PointField};
 use lattice_msgs::std_msgs::Header;
 
+use super::labels::Classes;
+use super::pixels::Pixel;
 use crate::convert::cloud::{dense_cloud, field, xyz_fields};
 
-/// Bytes of a point: x, y, z in f32, label in u16, confidence in f32.
-const POINT_STEP: usize = 18;
+/// Most bytes of a cloud with probabilities; a larger one has none.
+const MAX_BYTES: usize = 32 << 20;
+
+/// Fields of a cloud beside x, y, z, label and confidence.
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
+pub struct PointLayout {
+    /// True with the field `rgb`.
+    pub has_color: bool,
+    /// Elements of the field `label_probs`; 0: there is none.
+    pub classes: usize,
+}
+
+impl PointLayout {
+    /// Bytes of a point: x, y, z, rgb, confidence and probabilities in four bytes each, label in two.
+    fn step(self) -> usize {
+        18 + 4 * (usize::from(self.has_color) + self.classes)
+    }
+
+    /// The same without probabilities if so many points would need too much room.
+    pub fn bounded(self, points: usize) -> Self {
+        match points.saturating_mul(self.step()) <= MAX_BYTES {
+            true => self,
+            false => Self { classes: 0, ..self },
+        }
+    }
+}
 
 /// Records of points, little endian.
 #[derive(Debug, Default)]
 pub struct LabelledPoints {
+    layout: PointLayout,
     data: Vec<u8>,
+    points: usize,
+    unlabelled: u64,
 }
 
 impl LabelledPoints {
     /// No points, with room for some.
-    pub fn with_capacity(points: usize) -> Self {
+    pub fn new(layout: PointLayout, points: usize) -> Self {
         Self {
-            data: Vec::with_capacity(points * POINT_STEP),
+            layout,
+            data: Vec::with_capacity(points.saturating_mul(layout.step())),
+            points: 0,
+            unlabelled: 0,
         }
     }
 
-    /// Adds a point; without a class its confidence is 0.
-    pub fn push(&mut self, point_m: [f32; 3], class: Option<u16>, confidence: f32) {
+    /// Adds the point that a pixel sees; without a class its confidence and probabilities are 0.
+    pub fn push(&mut self, point_m: [f32; 3], pixel: &Pixel, classes: &Classes) {
+        self.points += 1;
         for v in point_m {
             self.data.extend_from_slice(&v.to_le_bytes());
         }
+        if self.layout.has_color {
+            // As PCL has it: the bytes of a whole number in place of a float.
+            let [r, g, b] = pixel.color;
+            self.data.extend_from_slice(&[b, g, r, 0]);
+        }
+        let class = classes.known(pixel.number, pixel.confidence);
+        self.unlabelled += u64::from(class.is_none());
+        let confidence = class.map_or(0.0, |_| pixel.confidence);
         let label = class.unwrap_or(UNLABELED);
-        let confidence = class.map_or(0.0, |_| confidence);
         self.data.extend_from_slice(&label.to_le_bytes());
         self.data.extend_from_slice(&confidence.to_le_bytes());
+        let begin = self.data.len();
+        self.data.resize(begin + 4 * self.layout.classes, 0);
+        let (elements, _) = self.data[begin..].as_chunks_mut::<4>();
+        for share in pixel.shares.iter().filter(|_| class.is_some()) {
+            let class = classes.known(share.class, 1.0);
+            let element = class.and_then(|class| elements.get_mut(usize::from(class)));
+            if let Some(element) = element {
+                let sum = f32::from_le_bytes(*element) + share.probability();
+                *element = sum.to_le_bytes();
+            }
+        }
     }
 
     /// Points.
     pub fn len(&self) -> usize {
-        self.data.len() / POINT_STEP
+        self.points
+    }
+
+    /// Points of no known class.
+    pub fn unlabelled(&self) -> u64 {
+        self.unlabelled
+    }
+
+    /// True with the field `label_probs`.
+    pub fn has_probabilities(&self) -> bool {
+        self.layout.classes > 0
     }
 
     /// True without points.
     pub fn is_empty(&self) -> bool {
-        self.data.is_empty()
+        self.points == 0
     }
 
-    /// The cloud with the fields x, y, z, label and confidence.
+    /// The cloud with the fields x, y, z, rgb if there are colours, label, confidence and label_probs if there
+    /// are probabilities.
     pub fn cloud(self, header: Header) -> PointCloud2 {
         let mut fields = xyz_fields(PointField::FLOAT32, 4);
-        fields.push(field("label", 12, PointField::UINT16));
-        fields.push(field("confidence", 14, PointField::FLOAT32));
-        dense_cloud(header, fields, POINT_STEP as u32, self.len(), self.data)
+        let mut at = 12;
+        if self.layout.has_color {
+            fields.push(field("rgb", at, PointField::FLOAT32));
+            at += 4;
+        }
+        fields.push(field("label", at, PointField::UINT16));
+        fields.push(field("confidence", at + 2, PointField::FLOAT32));
+        if let Some(count) = u32::try_from(self.layout.classes).ok().filter(|n| *n > 0) {
+            fields.push(PointField {
+                count,
+                ..field("label_probs", at + 6, PointField::FLOAT32)
+            });
+        }
+        let step = self.layout.step() as u32;
+        dense_cloud(header, fields, step, self.points, self.data)
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::camera::soft::Share;
+    use crate::camera::{ClassRules, SoftLabels};
+    use crate::convert::semantic::{SemanticOptions, semantic_from_message};
+    use lattice_core::registration::LabelDistribution;
+
+    fn pixel(number: u16, shares: &[(u16, f32)]) -> Pixel {
+        let mut pixel = Pixel {
+            number,
+            confidence: 0.5,
+            color: [1, 2, 3],
+            ..Pixel::NONE
+        };
+        for (share, (class, probability)) in pixel.shares.iter_mut().zip(shares) {
+            *share = Share::new(*class, *probability);
+        }
+        pixel
+    }
+
+    #[test]
+    fn what_a_pixel_knows_is_read_from_the_cloud() {
+        let rules = ClassRules {
+            ignored: [4].into(),
+            groups: [(3, 1)].into(),
+            ..ClassRules::default()
+        };
+        let classes = Classes::new(&rules);
+        let soft = SoftLabels::none(5);
+        let layout = PointLayout {
+            has_color: true,
+            classes: soft.elements(&classes),
+        };
+        assert_eq!(layout.classes, 3, "4 is ignored and 3 counts as 1");
+        let mut points = LabelledPoints::new(layout, 2);
+        let shares = [(0, 0.5), (1, 0.125), (3, 0.25), (4, 0.0625)];
+        points.push([1.0, 2.0, 3.0], &pixel(0, &shares), &classes);
+        points.push([4.0, 5.0, 6.0], &pixel(4, &shares), &classes);
+        assert_eq!((points.len(), points.unlabelled()), (2, 1));
+        let cloud = points.cloud(Header::default());
+        assert_eq!(cloud.point_step, 34);
+        assert_eq!(cloud.data[12..16], [3, 2, 1, 0]);
+        let (read, _) = semantic_from_message(&cloud, &SemanticOptions::default()).unwrap();
+        let found: Vec<_> = read.label(0).iter().collect();
+        for ((class, found), expected) in found.iter().zip([(0, 0.5), (1, 0.375)]) {
+            assert_eq!(*class, expected.0);
+            assert!((found - expected.1).abs() < 1e-4, "{found}");
+        }
+        assert_eq!(found.len(), 2);
+        assert_eq!(read.label(1), LabelDistribution::UNKNOWN);
+    }
+
+    #[test]
+    fn clouds_that_would_be_too_large_have_no_probabilities() {
+        let layout = PointLayout {
+            has_color: false,
+            classes: 150,
+        };
+        assert_eq!(layout.bounded(50_000), layout);
+        assert_eq!(layout.bounded(60_000).classes, 0);
+        assert_eq!(layout.bounded(usize::MAX).classes, 0);
     }
 }

@@ -2,6 +2,7 @@
 
 use std::collections::BTreeMap;
 
+use crate::segmenter::SegmenterCounts;
 use serde::{Deserialize, Serialize};
 
 /// Counters of pixels and points.
@@ -40,6 +41,8 @@ pub struct HeadsetCounts {
     pub triangles_degenerate: u64,
     /// Clouds published.
     pub clouds_out: u64,
+    /// Of these, without the probabilities that there are, as they would be too large.
+    pub clouds_without_probs: u64,
     /// Pixels and points.
     #[serde(flatten)]
     pub look: LookCounts,
@@ -68,4 +71,7 @@ pub struct HeadsetReport {
     pub undecodable: u64,
     /// Clouds that could not be given to the publisher.
     pub clouds_not_published: u64,
+    /// Counters of the network, if there is one inside of the node.
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    pub network: Option<SegmenterCounts>,
 }

@@ -1,11 +1,10 @@
 //! Clouds of what a headset sees of its mesh.
 
 use lattice_core::pose::Axes;
-use lattice_core::registration::UNLABELED;
 use nalgebra::{Isometry3, Matrix3, Point3, Vector3};
 
 use super::counts::LookCounts;
-use crate::camera::{Classes, ImageView, LabelledPoints, Sampled};
+use crate::camera::{Classes, LabelledPoints, Pixel, PixelReader, PointLayout};
 use crate::mesh::{LabelledMesh, MeshError, MeshScene};
 
 /// Fewest hits by which a mesh is said to be inside out.
@@ -32,10 +31,8 @@ pub(super) struct Room {
 
 /// An image of labels with what its pixels see.
 pub(super) struct Look<'a> {
-    /// Labels, of any size.
-    pub labels: ImageView<'a>,
-    /// Confidences, of any size.
-    pub confidence: Option<ImageView<'a>>,
+    /// Labels and what came with them, read at the pixels of the camera.
+    pub pixels: PixelReader<'a>,
     /// x / z and y / z of each pixel of the camera; NaN: none.
     pub rays: &'a [[f32; 2]],
     /// Pixels in a row of the camera.
@@ -68,7 +65,7 @@ impl Room {
     /// The points that the pixels see, or how many of how many were seen from behind.
     pub fn see(
         &self,
-        look: &Look,
+        look: &mut Look,
         options: &LookOptions,
         classes: &Classes,
         counts: &mut LookCounts,
@@ -77,17 +74,12 @@ impl Room {
         let height = look.rays.len() / width;
         let stride = options.stride.max(1);
         let (origin_m, ros_from_optical) = &look.camera;
-        let mut labels = Sampled::new(look.labels, width, ImageView::classes);
-        let confidence = look.confidence;
-        let mut confidence =
-            confidence.map(|view| Sampled::new(view, width, ImageView::confidences));
-        let (mut points, mut new) = (LabelledPoints::default(), LookCounts::default());
+        let most = width.div_ceil(stride) * height.div_ceil(stride);
+        let layout = look.pixels.layout(classes).bounded(most);
+        let (mut points, mut new) = (LabelledPoints::new(layout, 0), LookCounts::default());
         let (mut hits, mut behind) = (0, 0);
         for row in (0..height).step_by(stride) {
-            labels.seek(row, height);
-            if let Some(confidence) = &mut confidence {
-                confidence.seek(row, height);
-            }
+            look.pixels.seek(row, height);
             for column in (0..width).step_by(stride) {
                 let Some(&[x, y]) = look.rays.get(row * width + column) else {
                     continue;
@@ -108,19 +100,15 @@ impl Room {
                 hits += 1;
                 behind += u64::from(self.is_behind(hit.triangle, &direction));
                 let point_m = (origin_m + direction * hit.distance_m).coords;
-                let worth = confidence
-                    .as_ref()
-                    .map_or(1.0, |c| c.at(column).unwrap_or(0.0));
-                let number = labels.at(column).unwrap_or(UNLABELED);
-                let class = classes.known(number, worth);
-                new.points_unlabelled += u64::from(class.is_none());
-                points.push(point_m.map(|c| c as f32).into(), class, worth);
+                let place: [f32; 3] = point_m.map(|c| c as f32).into();
+                points.push(place, &look.pixels.at(column), classes);
             }
         }
         if options.check_winding && hits >= MIN_HITS && 2 * behind > hits {
             return Err([behind, hits]);
         }
         new.points = points.len() as u64;
+        new.points_unlabelled = points.unlabelled();
         counts.add(&new);
         Ok(points)
     }
@@ -140,7 +128,8 @@ impl Room {
         };
         let all_m2: f64 = triangles().map(|(corners, _)| area_m2(corners)).sum();
         let each_m2 = (spacing_m * spacing_m).max(all_m2 / max_points.max(1) as f64);
-        let (mut points, mut saved_m2, mut number) = (LabelledPoints::default(), 0.0, 0_u32);
+        let (mut points, mut saved_m2, mut number) =
+            (LabelledPoints::new(PointLayout::default(), 0), 0.0, 0_u32);
         for (corners, label) in triangles() {
             let [a, b, c] = corners.map(|p| Vector3::from(p.map(f64::from)));
             saved_m2 += area_m2(corners);
@@ -154,12 +143,12 @@ impl Room {
                     (u, v) = (1.0 - u, 1.0 - v);
                 }
                 let point_m = a + (b - a) * u + (c - a) * v;
-                let class = classes.known(*label, 1.0);
-                counts.points_unlabelled += u64::from(class.is_none());
-                points.push(point_m.map(|c| c as f32).into(), class, 1.0);
+                let place: [f32; 3] = point_m.map(|c| c as f32).into();
+                points.push(place, &Pixel::certain(*label), classes);
             }
         }
         counts.points += points.len() as u64;
+        counts.points_unlabelled += points.unlabelled();
         points
     }
 

@@ -36,8 +36,8 @@ use self::look::{Look, Room, placed};
 use self::poses::{PoseAt, Poses};
 use self::session::Session;
 use self::surfaces::Surfaces;
-use self::waiting::{LabelSet, Waiting};
-use crate::camera::{Camera, Classes, Content, ImageView};
+use self::waiting::Waiting;
+use crate::camera::{Camera, Classes, Content, ImageView, LabelSet};
 use crate::convert::geometry::header;
 
 /// Output of the machine.
@@ -132,11 +132,29 @@ impl HeadsetCloud {
                 return Vec::new();
             }
         };
-        let [repeated, oldest] = self.waiting.push(stream, image, self.options.queue_size);
+        let left = self.waiting.push(stream, image, self.options.queue_size);
+        self.left(stream, left);
+        self.serve()
+    }
+
+    /// Takes labels that a network has made, with what came with them.
+    pub fn on_labelled(&mut self, labels: LabelSet) -> Vec<HeadsetOutput> {
+        self.counts.labels_in += 1;
+        if labels.reader(1, self.options.max_image_pixels).is_none() {
+            let problem = "the output of the network is larger than `max_image_pixels`";
+            self.refuse("labels", "too_large", problem);
+            return Vec::new();
+        }
+        let left = self.waiting.push_labels(labels, self.options.queue_size);
+        self.left(HeadsetStream::Labels, left);
+        self.serve()
+    }
+
+    /// Counts images that left for others: one of the same stamp, and the oldest.
+    fn left(&mut self, stream: HeadsetStream, [repeated, oldest]: [u64; 2]) {
         let reason = self.missing(stream);
         self.counts.drop_some(stream.name(), "repeated", repeated);
         self.counts.drop_some(stream.name(), reason, oldest);
-        self.serve()
     }
 
     /// Takes the calibration of the camera. One that cannot be used leaves the node without.
@@ -286,20 +304,15 @@ impl HeadsetCloud {
         if self.rays.is_empty() {
             self.rays = camera.rays();
         }
-        let max = self.options.max_image_pixels;
-        let view = |image, content| ImageView::new(image, content, max).ok();
-        let look = Look {
-            labels: view(&set.labels, Content::Labels)?,
-            confidence: match &set.confidence {
-                Some(confidence) => Some(view(confidence, Content::Confidence)?),
-                None => None,
-            },
+        let width = camera.width as usize;
+        let mut look = Look {
+            pixels: set.reader(width, self.options.max_image_pixels)?,
             rays: &self.rays,
-            width: camera.width as usize,
+            width,
             camera: placed(pose, self.options.pose_axes(), self.options.camera_axes),
         };
         let counts = &mut self.counts.look;
-        match room.see(&look, &self.options.look, &self.classes, counts) {
+        match room.see(&mut look, &self.options.look, &self.classes, counts) {
             Ok(points) if points.is_empty() => {
                 let problem = "none of its rays meets the mesh";
                 self.refuse("labels", "sees_no_mesh", problem);
@@ -307,6 +320,8 @@ impl HeadsetCloud {
             }
             Ok(points) => {
                 self.counts.clouds_out += 1;
+                let lost = set.soft.is_some() && !points.has_probabilities();
+                self.counts.clouds_without_probs += u64::from(lost);
                 let stamp_ns = set.labels.header.stamp.to_ns();
                 let header = header(&self.options.mesh.headset_frame, stamp_ns);
                 Some(points.cloud(header))

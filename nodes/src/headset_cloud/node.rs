@@ -16,11 +16,12 @@ use lattice_msgs::visualization_msgs::Marker;
 use super::parameters::Settings;
 use super::{
     HeadsetCloud, HeadsetOptions, HeadsetOutput, HeadsetReport, HeadsetStream, LabelsFrom,
-    PoseSource,
+    MeshOptions, PoseSource,
 };
 use crate::compute::{Compute, Inbox};
-use crate::mesh::read_mesh;
+use crate::mesh::read_mesh_in;
 use crate::report;
+use crate::segmenter::{NetworkView, News, Ready, Worker};
 use crate::start::{Finish, NodeError, handed_over, open_params};
 use lattice_runtime::logging::Throttle;
 use lattice_runtime::qos::Qos;
@@ -36,6 +37,8 @@ enum Event {
     LabelInfo(Arc<LabelInfo>),
     Pose(Arc<PoseStamped>),
     Transforms(Arc<TFMessage>, bool),
+    /// Of the network inside of the node.
+    Network(News),
     Tick,
     Settings(Box<HeadsetOptions>),
     Finish,
@@ -48,62 +51,103 @@ pub fn start(runtime: &Runtime, name: &str) -> Result<Finish, NodeError> {
     let settings = Settings::from_params(params)?;
     let mut machine = HeadsetCloud::new(settings.headset.clone());
     if !settings.mesh_file.is_empty() {
-        let max_triangles = settings.headset.mesh.max_triangles;
-        let read = read_mesh(Path::new(&settings.mesh_file), max_triangles);
+        let MeshOptions {
+            axes,
+            max_triangles,
+            ..
+        } = settings.headset.mesh;
+        let read = read_mesh_in(Path::new(&settings.mesh_file), axes, max_triangles);
         let taken = match &read {
             Ok(mesh) => machine.on_mesh_file(mesh).map_err(|e| e.to_string()),
             Err(error) => Err(error.to_string()),
         };
         taken.map_err(|problem| params.invalid("mesh_file", problem))?;
     }
+    let ready = match &settings.network {
+        Some((network, options)) => Some(Ready::new(params, network, options.clone())?),
+        None => None,
+    };
     let (lost, losses) = (Arc::new(AtomicU64::new(0)), Losses::default());
     let mut shell = Shell {
         machine,
         points: node.publisher("headset/points", Qos::SCANS)?,
         label_info: node.publisher("headset/label_info", Qos::LATCHED)?,
         session: node.publisher("headset/session", Qos::LATCHED)?,
+        network: ready.as_ref().map(Ready::view),
         diagnostics: node.diagnostics(),
         lost: Arc::clone(&lost),
         losses: losses.clone(),
         warnings: Throttle::new(Duration::from_secs(5)),
         warned: 0,
-        report_file: settings.report_file,
+        report_file: settings.report_file.clone(),
     };
+    shell.tell_names();
     let shutdown = runtime.shutdown_handle();
-    let compute = Compute::spawn(name, settings.limits, shutdown, move |event| {
+    let compute = Compute::spawn(name, settings.limits, shutdown.clone(), move |event| {
         shell.on(event)
     })?;
     let inbox = compute.inbox();
-    let inputs = subscribe(&node, &inbox, &lost, &settings.headset)?;
+    let mut inputs = subscribe(&node, &inbox, &lost, &settings)?;
+    let mut network = None;
+    if let Some(ready) = ready {
+        let names = [name, "headset/image"];
+        let tell = news_to(&inbox, &lost);
+        let (worker, images) =
+            ready.start(&node, names, settings.compressed_color, shutdown, tell)?;
+        inputs.push(images);
+        network = Some(worker);
+    }
     losses.watch(&inputs);
     let looks = inbox.clone();
     let looks = runtime.timer(Duration::from_millis(500), move || {
         let _ = looks.send(Event::Tick, 0);
     });
+    let set_network = network.as_ref().map(Worker::settings);
     open_params(params, move |params| {
         let settings = Settings::from_params(params).map_err(|error| error.to_string())?;
+        if let (Some(set), Some((_, options))) = (&set_network, settings.network) {
+            handed_over(set(options))?;
+        }
         handed_over(inbox.send(Event::Settings(Box::new(settings.headset)), 0))
     });
     Ok(Box::new(move || {
         drop((inputs, looks));
+        if let Some(network) = network {
+            network.finish();
+        }
         compute.finish_with(Event::Finish);
         Box::new(())
     }))
+}
+
+/// Hands news of the network over; labels that find no room are counted.
+fn news_to(inbox: &Inbox<Event>, lost: &Arc<AtomicU64>) -> impl FnMut(News) + Send + use<> {
+    let (inbox, lost) = (inbox.clone(), Arc::clone(lost));
+    move |news| {
+        let bytes = match &news {
+            News::Labelled(labels) => labels.bytes(),
+            // Poses are kept for longer than an image takes.
+            News::Begun(_) => return,
+            News::Names => 0,
+        };
+        let sent = inbox.send(Event::Network(news), bytes);
+        lost.fetch_add(u64::from(!sent), Ordering::Relaxed);
+    }
 }
 
 fn subscribe(
     node: &Node,
     inbox: &Inbox<Event>,
     lost: &Arc<AtomicU64>,
-    options: &HeadsetOptions,
+    settings: &Settings,
 ) -> Result<Vec<Subscription>, NodeError> {
     let size = |mesh: &Arc<HeadsetMesh>| {
         4 * (mesh.vertices.len() + mesh.triangles.len()) + 2 * mesh.classes.len()
     };
+    let options = &settings.headset;
     let mesh = inbox.counting(lost, Event::Mesh, size);
     let marker = inbox.counting(lost, Event::Marker, |marker| 24 * marker.points.len());
     let session = inbox.counting(lost, Event::Session, |session| session.data.len());
-    let names = inbox.counting(lost, Event::LabelInfo, |_| 0);
     let mut inputs = vec![
         node.subscribe("headset/mesh", Qos::reliable(1000), Load::Large, mesh)?,
         node.subscribe(
@@ -113,20 +157,21 @@ fn subscribe(
             marker,
         )?,
         node.subscribe("headset/session", Qos::LATCHED, Load::Small, session)?,
-        node.subscribe(
-            "headset/labels/label_info",
-            Qos::LATCHED,
-            Load::Small,
-            names,
-        )?,
     ];
+    if settings.network.is_none() {
+        let names = inbox.counting(lost, Event::LabelInfo, |_| 0);
+        let topic = "headset/labels/label_info";
+        inputs.push(node.subscribe(topic, Qos::LATCHED, Load::Small, names)?);
+    }
     if options.labels_from == LabelsFrom::Mesh {
         return Ok(inputs);
     }
     let bytes = |image: &Arc<Image>| size_of::<Image>() + image.data.len();
-    let labels = |image| Event::Image(HeadsetStream::Labels, image);
-    let labels = inbox.counting(lost, labels, bytes);
-    inputs.push(node.subscribe("headset/labels/image", Qos::SENSOR, Load::Large, labels)?);
+    if settings.network.is_none() {
+        let labels = |image| Event::Image(HeadsetStream::Labels, image);
+        let labels = inbox.counting(lost, labels, bytes);
+        inputs.push(node.subscribe("headset/labels/image", Qos::SENSOR, Load::Large, labels)?);
+    }
     if options.use_confidence {
         let confidence = |image| Event::Image(HeadsetStream::Confidence, image);
         let confidence = inbox.counting(lost, confidence, bytes);
@@ -157,6 +202,7 @@ struct Shell {
     points: Publisher<PointCloud2>,
     label_info: Publisher<LabelInfo>,
     session: Publisher<std_msgs::String>,
+    network: Option<NetworkView>,
     diagnostics: Diagnostics,
     /// Messages that found the inbox full, and those lost before it.
     lost: Arc<AtomicU64>,
@@ -182,6 +228,12 @@ impl Shell {
             Event::LabelInfo(info) => machine.on_label_info(info),
             Event::Pose(pose) => machine.on_pose(&pose),
             Event::Transforms(message, is_static) => machine.on_tf(&message, is_static),
+            Event::Network(News::Labelled(labels)) => machine.on_labelled(labels),
+            Event::Network(News::Begun(_)) => return,
+            Event::Network(News::Names) => {
+                self.tell_names();
+                return;
+            }
             Event::Settings(options) => machine.set_options(*options),
             Event::Tick => {
                 let outputs = machine.tick();
@@ -196,6 +248,15 @@ impl Shell {
             }
         };
         self.publish(outputs);
+    }
+
+    /// Names of the classes of the network inside of the node.
+    fn tell_names(&mut self) {
+        let info = self.network.as_ref().and_then(NetworkView::label_info);
+        if let Some(info) = info {
+            let outputs = self.machine.on_label_info(Arc::new(info));
+            self.publish(outputs);
+        }
     }
 
     fn publish(&self, outputs: Vec<HeadsetOutput>) {
@@ -219,11 +280,15 @@ impl Shell {
             messages_lost: self.lost.load(Ordering::Relaxed) + self.losses.lost(),
             undecodable: self.losses.undecodable(),
             clouds_not_published: self.points.dropped(),
+            network: self.network.as_ref().map(NetworkView::counts),
         }
     }
 
     fn diagnose(&mut self) {
-        let report = self.report();
+        let report = HeadsetReport {
+            network: None,
+            ..self.report()
+        };
         let counts = &report.counts;
         let dropped: u64 = counts.dropped.values().sum();
         let [surfaces, triangles] = self.machine.mesh_size();
@@ -259,6 +324,9 @@ impl Shell {
         }
         values.push(("last_refused".into(), problem.unwrap_or_default()));
         self.diagnostics.set("clouds", level, message, values);
+        if let Some(network) = &self.network {
+            network.diagnose(&self.diagnostics);
+        }
     }
 
     fn finish(&mut self) {

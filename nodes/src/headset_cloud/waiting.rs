@@ -5,6 +5,8 @@ use std::sync::Arc;
 
 use lattice_msgs::sensor_msgs::Image;
 
+use crate::camera::LabelSet;
+
 /// A topic of images.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum HeadsetStream {
@@ -24,16 +26,10 @@ impl HeadsetStream {
     }
 }
 
-/// Labels of one time.
-pub(super) struct LabelSet {
-    pub labels: Arc<Image>,
-    pub confidence: Option<Arc<Image>>,
-}
-
 /// Images of each topic by stamp, in bounded number.
 #[derive(Default)]
 pub(super) struct Waiting {
-    queues: [BTreeMap<i64, Arc<Image>>; 2],
+    queues: [BTreeMap<i64, LabelSet>; 2],
 }
 
 impl Waiting {
@@ -44,8 +40,18 @@ impl Waiting {
         image: Arc<Image>,
         queue_size: usize,
     ) -> [u64; 2] {
+        self.push_set(stream, LabelSet::new(image), queue_size)
+    }
+
+    /// Adds labels with what came with them, likewise.
+    pub fn push_labels(&mut self, labels: LabelSet, queue_size: usize) -> [u64; 2] {
+        self.push_set(HeadsetStream::Labels, labels, queue_size)
+    }
+
+    fn push_set(&mut self, stream: HeadsetStream, set: LabelSet, queue_size: usize) -> [u64; 2] {
+        let stamp_ns = set.labels.header.stamp.to_ns();
         let queue = &mut self.queues[stream as usize];
-        let repeated = queue.insert(image.header.stamp.to_ns(), image).is_some();
+        let repeated = queue.insert(stamp_ns, set).is_some();
         let mut oldest = 0;
         while queue.len() > queue_size.max(1) {
             queue.pop_first();
@@ -59,17 +65,18 @@ impl Waiting {
         let [labels, confidences] = &self.queues;
         let is_whole = |stamp_ns: &i64| !with_confidence || confidences.contains_key(stamp_ns);
         let ready = labels.iter().filter(|(stamp_ns, _)| is_whole(stamp_ns));
-        let frame = |image: &Image| image.header.frame_id.clone();
-        ready.map(|(at, image)| (*at, frame(image))).collect()
+        let frame = |set: &LabelSet| set.labels.header.frame_id.clone();
+        ready.map(|(at, set)| (*at, frame(set))).collect()
     }
 
     /// Takes the images of a stamp.
     pub fn take(&mut self, stamp_ns: i64) -> Option<LabelSet> {
         let [labels, confidences] = &mut self.queues;
-        Some(LabelSet {
-            labels: labels.remove(&stamp_ns)?,
-            confidence: confidences.remove(&stamp_ns),
-        })
+        let mut set = labels.remove(&stamp_ns)?;
+        if let Some(confidence) = confidences.remove(&stamp_ns) {
+            set.confidence = Some(confidence.labels);
+        }
+        Some(set)
     }
 
     /// Forgets all images, and tells how many labels and confidences they were.

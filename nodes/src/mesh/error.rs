@@ -43,6 +43,9 @@ pub enum MeshError {
     /// A line of an OBJ file that cannot be read.
     #[error("OBJ line {line}: {reason}")]
     Obj { line: u64, reason: String },
+    /// A glTF file that cannot be read.
+    #[error("glTF: {0}")]
+    Gltf(String),
     /// A file with more triangles than are taken.
     #[error(
         "the file has {triangles} triangles or more, but at most {max} are allowed: simplify the mesh"
@@ -63,7 +66,7 @@ impl MeshError {
             Self::Beyond { .. } => "not_finite",
             Self::Index { .. } => "indices",
             Self::Nested { .. } => "nested",
-            Self::File(_) | Self::Obj { .. } | Self::NoMesh(_) => "file",
+            Self::File(_) | Self::Obj { .. } | Self::Gltf(_) | Self::NoMesh(_) => "file",
         }
     }
 }

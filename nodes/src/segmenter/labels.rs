@@ -4,6 +4,7 @@ use lattice_msgs::sensor_msgs::Image;
 use lattice_msgs::std_msgs::Header;
 
 use super::network::{Scores, Size, Values};
+use crate::camera::{SHARES, Share, SoftLabels};
 
 /// Meaning of the scores of a network.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
@@ -24,23 +25,35 @@ pub struct Labelled {
     pub labels: Image,
     /// mono8, 255 for certain; none if the network gives classes only.
     pub confidence: Option<Image>,
+    /// Probabilities of the best classes, if they were asked for and the network gives scores.
+    pub soft: Option<SoftLabels>,
 }
 
-/// Images of an output. `classes` is the number of names, where there are some.
+/// Images of an output. `classes` is the number of names, where there are some; `with_soft` asks for the
+/// probabilities of more classes than the best.
 pub fn labelled(
     header: &Header,
     scores: &Scores,
     meaning: Meaning,
     classes: Option<usize>,
+    with_soft: bool,
 ) -> Result<Labelled, String> {
     let pixels = scores.size.pixels();
+    let mut soft = None;
     let (numbers, confidence, most) = match &scores.values {
         Values::Scores { classes, values } => {
             if *classes == 0 || classes.checked_mul(pixels) != Some(values.len()) {
                 return Err(format!("{} values for {classes} classes", values.len()));
             }
-            let (numbers, confidence) = chosen(values, pixels, meaning);
-            (numbers, Some(confidence), *classes)
+            let (numbers, probabilities) = chosen(values, pixels, meaning);
+            if with_soft {
+                let shares = shares(values, &probabilities, meaning);
+                let size = [scores.size.width, scores.size.height];
+                soft = SoftLabels::new(size, *classes, shares);
+            }
+            // Where nothing is known the cast makes it 0.
+            let bytes = probabilities.iter().map(|p| (p * 255.0).round() as u8);
+            (numbers, Some(bytes.collect()), *classes)
         }
         Values::Classes(numbers) => {
             if numbers.len() != pixels {
@@ -64,11 +77,12 @@ pub fn labelled(
     Ok(Labelled {
         labels: image(header, scores.size, labels.0, labels.1),
         confidence: confidence.map(|bytes| image(header, scores.size, "mono8", bytes)),
+        soft,
     })
 }
 
-/// The best class of each pixel and its probability, 255 for one. NaN is never best.
-fn chosen(values: &[f32], pixels: usize, meaning: Meaning) -> (Vec<u16>, Vec<u8>) {
+/// The best class of each pixel and its probability. NaN is never best.
+fn chosen(values: &[f32], pixels: usize, meaning: Meaning) -> (Vec<u16>, Vec<f32>) {
     let mut best = vec![f32::NEG_INFINITY; pixels];
     let mut numbers = vec![NONE; pixels];
     for (class, plane) in values.chunks_exact(pixels).enumerate() {
@@ -91,9 +105,35 @@ fn chosen(values: &[f32], pixels: usize, meaning: Meaning) -> (Vec<u16>, Vec<u8>
             sums.iter().map(|sum| 1.0 / sum).collect()
         }
     };
-    // Where nothing is known the cast makes it 0.
-    let bytes = probabilities.iter().map(|p| (p * 255.0).round() as u8);
-    (numbers, bytes.collect())
+    (numbers, probabilities)
+}
+
+/// The best classes of each pixel with their probabilities, given that of the best.
+fn shares(values: &[f32], best: &[f32], meaning: Meaning) -> Vec<[Share; SHARES]> {
+    let mut kept = vec![[(f32::NEG_INFINITY, NONE); SHARES]; best.len()];
+    for (plane, class) in values.chunks_exact(best.len()).zip(0..NONE) {
+        for (value, kept) in plane.iter().zip(&mut kept) {
+            let mut new = (*value, class);
+            for old in kept {
+                if new.0 > old.0 {
+                    std::mem::swap(&mut new, old);
+                }
+            }
+        }
+    }
+    let probability = |value: f32, first: f32, best: f32| match meaning {
+        Meaning::Probabilities => value,
+        Meaning::Logits => (value - first).exp() * best,
+    };
+    let pixels = kept.iter().zip(best);
+    let pixels = pixels.map(|(kept, best)| {
+        let first = kept[0].0;
+        kept.map(|(value, class)| match class {
+            NONE => Share::NONE,
+            class => Share::new(class, probability(value, first, *best)),
+        })
+    });
+    pixels.collect()
 }
 
 fn image(header: &Header, size: Size, encoding: &str, data: Vec<u8>) -> Image {
@@ -118,7 +158,8 @@ mod tests {
             width: 2,
             height: 1,
         };
-        labelled(&Header::default(), &Scores { size, values }, meaning, names).unwrap()
+        let scores = Scores { size, values };
+        labelled(&Header::default(), &scores, meaning, names, true).unwrap()
     }
 
     #[test]
@@ -139,6 +180,27 @@ mod tests {
         let found = of(values, Meaning::Probabilities, None);
         assert_eq!(found.labels.data.to_vec(), [1, 255]);
         assert_eq!(found.confidence.unwrap().data.to_vec(), [153, 0]);
+    }
+
+    #[test]
+    fn the_best_classes_keep_their_probabilities() {
+        // Six classes of two pixels; nothing is known of the second.
+        let p = [0.05_f32, 0.4, 0.1, 0.25, 0.15, 0.05];
+        let plain: Vec<f32> = p.iter().flat_map(|p| [*p, f32::NAN]).collect();
+        let logits: Vec<f32> = p.iter().flat_map(|p| [p.ln() + 3.0, f32::NAN]).collect();
+        for (values, meaning) in [(plain, Meaning::Probabilities), (logits, Meaning::Logits)] {
+            let classes = p.len();
+            let found = of(Values::Scores { classes, values }, meaning, None);
+            let soft = found.soft.unwrap();
+            for (share, class) in soft.at(0, 0).iter().zip([1, 3, 4, 2]) {
+                assert_eq!(share.class, class);
+                let expected = p[usize::from(class)];
+                assert!((share.probability() - expected).abs() < 1e-4, "{share:?}");
+            }
+            assert_eq!(soft.at(1, 0), [Share::NONE; SHARES]);
+        }
+        let chosen = of(Values::Classes(vec![7, 1]), Meaning::Logits, None);
+        assert_eq!(chosen.soft, None);
     }
 
     #[test]
@@ -169,6 +231,7 @@ mod tests {
             &Scores { size, values },
             Meaning::Logits,
             None,
+            false,
         );
         assert_eq!(found.unwrap_err(), "11 values for 3 classes");
     }

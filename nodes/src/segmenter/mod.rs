@@ -6,25 +6,37 @@
 mod checks;
 mod colors;
 #[cfg(feature = "onnx")]
+mod file;
+mod inside;
+#[cfg(feature = "onnx")]
 mod jpeg;
 mod labels;
 #[cfg(feature = "onnx")]
 mod names;
 mod network;
 pub mod node;
+#[cfg(feature = "ort")]
+mod onnx_runtime;
 mod options;
 mod parameters;
 #[cfg(feature = "onnx")]
+mod sizes;
+#[cfg(feature = "onnx")]
 mod tract;
+mod worker;
 
 pub use colors::Normalisation;
+pub(crate) use inside::{NetworkView, Ready};
 pub use labels::{Labelled, Meaning};
-pub use network::{ModelError, Network, Scores, Size, Values};
+pub use network::{Backend, ModelError, Network, Scores, Size, Values};
 pub use options::SegmenterOptions;
 pub use parameters::declare;
+pub(crate) use parameters::{NETWORK, NetworkSettings};
+pub(crate) use worker::{News, Worker};
 
 use std::collections::BTreeMap;
 use std::path::Path;
+use std::sync::Arc;
 
 use lattice_msgs::sensor_msgs::{CompressedImage, Image};
 use lattice_msgs::std_msgs::Header;
@@ -33,22 +45,55 @@ use serde::{Deserialize, Serialize};
 
 use crate::camera::{Content, ImageView};
 
-/// The network of a file. `size` is that of its input where the file leaves it open.
+/// The network of a file, run by tract. `size` is that of its input where the file leaves it open.
 ///
 /// Errors name the file and what is wrong with it; without the feature `onnx` there is no network.
-#[cfg_attr(
-    not(feature = "onnx"),
-    expect(unused_variables, reason = "there is no backend")
-)]
 pub fn read_network(
     path: &Path,
     size: Option<Size>,
     threads: usize,
 ) -> Result<Box<dyn Network>, ModelError> {
+    read_network_by(Backend::Tract, path, size, threads)
+}
+
+/// The network of a file, run by a library that the program has.
+#[cfg_attr(
+    not(feature = "onnx"),
+    expect(unused_variables, reason = "there is no backend")
+)]
+pub fn read_network_by(
+    backend: Backend,
+    path: &Path,
+    size: Option<Size>,
+    threads: usize,
+) -> Result<Box<dyn Network>, ModelError> {
+    match backend {
+        #[cfg(feature = "onnx")]
+        Backend::Tract => Ok(Box::new(tract::OnnxNetwork::read(path, size, threads)?)),
+        #[cfg(not(feature = "onnx"))]
+        Backend::Tract => Err(ModelError::NotBuilt("onnx")),
+        #[cfg(feature = "ort")]
+        Backend::Ort => Ok(Box::new(onnx_runtime::OrtNetwork::read(
+            path, size, threads,
+        )?)),
+        #[cfg(not(feature = "ort"))]
+        Backend::Ort => Err(ModelError::NotBuilt("ort")),
+    }
+}
+
+/// An image that is packed as JPEG, as rgb8; else the reason and the problem. Checked before room is made for it.
+#[cfg_attr(
+    not(feature = "onnx"),
+    expect(unused_variables, reason = "there is no decoder")
+)]
+pub(crate) fn unpacked(
+    message: &CompressedImage,
+    max_pixels: usize,
+) -> Result<Image, (&'static str, String)> {
     #[cfg(feature = "onnx")]
-    return Ok(Box::new(tract::OnnxNetwork::read(path, size, threads)?));
+    return jpeg::image(message, max_pixels).map_err(|error| (error.name(), error.to_string()));
     #[cfg(not(feature = "onnx"))]
-    Err(ModelError::NotBuilt)
+    Err(("encoding", ModelError::NotBuilt("onnx").to_string()))
 }
 
 /// Counters of one node. Every image is labelled or in `dropped`.
@@ -113,7 +158,10 @@ impl Segmenter {
         let names = Some(self.names().len()).filter(|names| *names > 0);
         let scores = self.network.run(planes);
         let found = scores.and_then(|scores| {
-            labels::labelled(&image.header, &scores, self.options.meaning, names)
+            let SegmenterOptions {
+                meaning, with_soft, ..
+            } = self.options;
+            labels::labelled(&image.header, &scores, meaning, names, with_soft)
         });
         match found {
             Ok(labelled) => {
@@ -128,18 +176,15 @@ impl Segmenter {
     }
 
     /// Labels an image that is packed as JPEG.
-    #[cfg_attr(
-        not(feature = "onnx"),
-        expect(unused_variables, reason = "there is no decoder")
-    )]
     pub fn on_compressed(&mut self, message: &CompressedImage) -> Option<Labelled> {
-        #[cfg(feature = "onnx")]
-        let image = jpeg::image(message, self.options.max_image_pixels)
-            .map_err(|error| (error.name(), error.to_string()));
-        #[cfg(not(feature = "onnx"))]
-        let image = Err::<Image, _>(("encoding", ModelError::NotBuilt.to_string()));
-        match image {
-            Ok(image) => self.on_image(&image),
+        let image = self.unpack(message)?;
+        self.on_image(&image)
+    }
+
+    /// Unpacks a JPEG file; one that cannot be is refused.
+    pub(crate) fn unpack(&mut self, message: &CompressedImage) -> Option<Arc<Image>> {
+        match unpacked(message, self.options.max_image_pixels) {
+            Ok(image) => Some(Arc::new(image)),
             Err((reason, problem)) => {
                 self.counts.images_in += 1;
                 self.refuse(reason, problem);
@@ -293,6 +338,24 @@ mod tests {
             (machine.counts().images_in, machine.counts().labels_out),
             (9, 2)
         );
+    }
+
+    #[test]
+    fn backends_that_are_not_built_in_say_how_they_are() {
+        let refused = |backend| {
+            let found = read_network_by(backend, Path::new("/nowhere"), None, 1);
+            found
+                .err()
+                .map(|error| error.to_string())
+                .unwrap_or_default()
+        };
+        for (backend, feature, is_built) in [
+            (Backend::Tract, "onnx", cfg!(feature = "onnx")),
+            (Backend::Ort, "ort", cfg!(feature = "ort")),
+        ] {
+            let expected = format!("build it with `--features {feature}`");
+            assert_eq!(refused(backend).contains(&expected), !is_built, "{feature}");
+        }
     }
 
     #[test]

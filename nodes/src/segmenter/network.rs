@@ -23,6 +23,21 @@ impl Size {
     }
 }
 
+/// Library that runs a network.
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
+pub enum Backend {
+    /// tract, which is built in with the feature `onnx`.
+    #[default]
+    Tract,
+    /// ONNX Runtime, a library that is loaded, with the feature `ort`.
+    Ort,
+}
+
+impl Backend {
+    /// All, by the names that parameters and options have for them.
+    pub const ALL: [(&'static str, Self); 2] = [("tract", Self::Tract), ("ort", Self::Ort)];
+}
+
 /// Output of a network, row by row.
 #[derive(Clone, Debug, PartialEq)]
 pub enum Values {
@@ -49,9 +64,12 @@ pub struct Scores {
 /// Error of a model that cannot be used.
 #[derive(Debug, Error)]
 pub enum ModelError {
-    /// The program has no backend.
-    #[error("this program was built without the feature `onnx`")]
-    NotBuilt,
+    /// The program does not have the backend.
+    #[error("this program was built without the feature `{0}`: build it with `--features {0}`")]
+    NotBuilt(&'static str),
+    /// The library of ONNX Runtime cannot be used.
+    #[error("ONNX Runtime: {0}")]
+    Library(String),
     /// The file cannot be read.
     #[error("{}: {error}", path.display())]
     File {

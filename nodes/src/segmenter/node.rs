@@ -1,20 +1,21 @@
 //! The machine as a ROS node: a thin shell around [`Segmenter`].
 
-use std::sync::atomic::{AtomicU64, Ordering};
-use std::sync::{Arc, Mutex, PoisonError};
+use std::sync::Arc;
 use std::time::{Duration, Instant};
 
-use lattice_msgs::sensor_msgs::{CompressedImage, Image};
+use lattice_msgs::sensor_msgs::Image;
 use lattice_msgs::vision_msgs::LabelInfo;
 
+use super::inside::fares;
 use super::parameters::Settings;
-use super::{Segmenter, SegmenterOptions, SegmenterReport, read_network};
+use super::worker::{Input, Slot};
+use super::{Segmenter, SegmenterOptions, SegmenterReport};
 use crate::compute::Compute;
 use crate::report;
 use crate::start::{Finish, NodeError, handed_over, open_params};
 use lattice_runtime::logging::Throttle;
 use lattice_runtime::qos::Qos;
-use lattice_runtime::{Diagnostics, Level, Load, Losses, Publisher, Runtime};
+use lattice_runtime::{Diagnostics, Load, Losses, Publisher, Runtime};
 
 /// Event for the compute thread.
 enum Event {
@@ -25,63 +26,15 @@ enum Event {
     Finish,
 }
 
-/// Image as it came.
-enum Input {
-    Plain(Arc<Image>),
-    Compressed(Arc<CompressedImage>),
-}
-
-/// Place of the newest image; those that it replaces are skipped.
-#[derive(Default)]
-struct Slot {
-    image: Mutex<Option<Input>>,
-    skipped: AtomicU64,
-}
-
-impl Slot {
-    /// Puts an image there; true if the place was empty.
-    fn put(&self, image: Input) -> bool {
-        let mut slot = self.image.lock().unwrap_or_else(PoisonError::into_inner);
-        let is_first = slot.replace(image).is_none();
-        if !is_first {
-            self.skipped.fetch_add(1, Ordering::Relaxed);
-        }
-        is_first
-    }
-
-    fn take(&self) -> Option<Input> {
-        let mut slot = self.image.lock().unwrap_or_else(PoisonError::into_inner);
-        slot.take()
-    }
-}
-
 /// Starts the node.
 pub fn start(runtime: &Runtime, name: &str) -> Result<Finish, NodeError> {
     let node = runtime.node(name)?;
     let params = node.params();
     let settings = Settings::from_params(params)?;
-    if settings.model.as_os_str().is_empty() {
+    let Some(network) = &settings.network else {
         return Err(params.invalid("model", "expected an ONNX file").into());
-    }
-    let threads = match settings.threads {
-        0 => {
-            let cores = std::thread::available_parallelism().map_or(1, usize::from);
-            cores.saturating_sub(1).max(1)
-        }
-        threads => threads,
     };
-    let began = Instant::now();
-    let network = read_network(&settings.model, settings.input_size, threads)
-        .map_err(|error| params.invalid("model", error.to_string()))?;
-    let size = network.input();
-    log::info!(
-        "{}: images of {} x {}, {} names of classes, ready in {:.1} s",
-        settings.model.display(),
-        size.width,
-        size.height,
-        network.names().len(),
-        began.elapsed().as_secs_f64()
-    );
+    let network = network.read(params)?;
     let (slot, losses) = (Arc::new(Slot::default()), Losses::default());
     let shell = Shell {
         machine: Segmenter::new(settings.segmenter, network),
@@ -107,8 +60,7 @@ pub fn start(runtime: &Runtime, name: &str) -> Result<Finish, NodeError> {
     let on_image = move |image: Input| {
         if slot.put(image) && !wake.send(Event::Image, 0) {
             // The next one finds the place empty.
-            slot.take();
-            slot.skipped.fetch_add(1, Ordering::Relaxed);
+            slot.take_back();
         }
     };
     let topic = "rgb/image_rect_color";
@@ -173,8 +125,7 @@ impl Shell {
         let Some(image) = self.slot.take() else {
             return;
         };
-        let skipped = self.slot.skipped.swap(0, Ordering::Relaxed);
-        self.machine.skip(skipped);
+        self.machine.skip(self.slot.skipped());
         let began = Instant::now();
         let labelled = match image {
             Input::Plain(image) => self.machine.on_image(&image),
@@ -211,22 +162,11 @@ impl Shell {
 
     fn diagnose(&mut self) {
         let report = self.report();
-        let counts = &report.counts;
-        // Images that come faster than the network works are no fault.
-        let refused = counts
-            .dropped
-            .iter()
-            .filter(|(reason, _)| *reason != "skipped");
-        let reasons: Vec<String> = refused.clone().map(|(r, n)| format!("{n} {r}")).collect();
+        let (level, message) = fares(&report.counts);
+        let dropped = report.counts.dropped.iter();
+        let refused = dropped.filter(|(reason, _)| *reason != "skipped");
         let refused: u64 = refused.map(|(_, n)| n).sum();
         let problem = self.machine.problem().map(str::to_owned);
-        let message = match (counts.labels_out, refused) {
-            (0, 0) => "no image yet".to_owned(),
-            (_, 0) => "labelling images".to_owned(),
-            _ => format!("dropped: {}", reasons.join(", ")),
-        };
-        let is_good = counts.labels_out > 0 && refused == 0;
-        let level = if is_good { Level::Ok } else { Level::Warn };
         if let Some(problem) = problem.as_ref().filter(|_| refused > self.warned)
             && self.warnings.check().is_some()
         {

@@ -20,6 +20,8 @@ pub struct SegmenterOptions {
     pub meaning: Meaning,
     /// Names of the classes; empty: those of the model.
     pub names: Vec<String>,
+    /// True if the probabilities of more classes than the best are wanted.
+    pub with_soft: bool,
 }
 
 impl Default for SegmenterOptions {
@@ -32,13 +34,25 @@ impl Default for SegmenterOptions {
             },
             meaning: Meaning::Logits,
             names: Vec::new(),
+            with_soft: false,
         }
     }
 }
 
 impl SegmenterOptions {
-    /// Reads the parameters of the node.
+    /// Reads the parameters of the node `segmenter`.
     pub fn from_params(params: &Params) -> Result<Self, ParamError> {
+        let max_image_pixels = Self::default().max_image_pixels;
+        let max_image_pixels = params.positive("max_image_pixels", max_image_pixels)?;
+        Self::of_network(params, max_image_pixels, false)
+    }
+
+    /// Reads what belongs to the network.
+    pub(crate) fn of_network(
+        params: &Params,
+        max_image_pixels: usize,
+        with_soft: bool,
+    ) -> Result<Self, ParamError> {
         let defaults = Self::default();
         let Normalisation { mean, deviation } = defaults.normalisation;
         let names = params.string_array("names", &[])?;
@@ -54,13 +68,14 @@ impl SegmenterOptions {
             ("probabilities", Meaning::Probabilities),
         ];
         Ok(Self {
-            max_image_pixels: params.positive("max_image_pixels", defaults.max_image_pixels)?,
+            max_image_pixels,
             normalisation: Normalisation {
                 mean: channels(params, "mean", mean)?,
                 deviation,
             },
             meaning: one_of(params, "scores", &meanings)?,
             names,
+            with_soft,
         })
     }
 }

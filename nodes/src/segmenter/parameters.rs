@@ -1,10 +1,11 @@
 //! All parameters of the node.
 
 use std::path::PathBuf;
+use std::time::Instant;
 
-use super::SegmenterOptions;
-use super::network::Size;
+use super::network::{Backend, ModelError, Network, Size};
 use super::options::input_size;
+use super::{SegmenterOptions, read_network_by};
 use crate::compute::ComputeLimits;
 use crate::{options, report};
 use lattice_runtime::about;
@@ -13,22 +14,82 @@ use lattice_runtime::params::{About, ParamError, Params};
 const MODEL: &str = "the network is made at the start";
 const ABOUT: &[About] = about! {
     "model" fixed(MODEL): "The network, an ONNX file: one image in (1 x 3 x rows x columns), scores of classes or classes out.";
-    "input_size" fixed(MODEL): "Width and height of the images that the network takes, where its file leaves them open.";
     "compressed" fixed(options::TOPIC): "Whether images are taken from rgb/image_rect_color/compressed (JPEG).";
+    "max_image_pixels": "Images of more pixels are refused.";
+};
+
+/// Parameters of a network, whichever node runs it.
+pub(crate) const NETWORK: &[About] = about! {
+    "model" fixed(MODEL): "A network that labels the images of colours inside this node, an ONNX file as segmenter takes it; empty: labels come from a topic.";
+    "backend" fixed(MODEL): "What runs the network: tract, which is built in, or ort, the library of ONNX Runtime that ORT_DYLIB_PATH names (feature ort).";
+    "input_size" fixed(MODEL): "Width and height of the images that the network takes, where its file leaves them open.";
     "mean": "Means of red, green and blue, for colours from 0 to 1, as the network was trained with.";
     "std": "Standard deviations of red, green and blue, likewise.";
     "scores": "Whether the scores of the network are logits or probabilities.";
     "names": "Names of the classes in the order of their numbers; none: those of the model.";
-    "max_image_pixels": "Images of more pixels are refused.";
+    "label_probs": "Whether points have label_probs, the probabilities of the four best classes of their pixel, with model.";
+    "compressed_color" fixed(options::TOPIC): "Whether images of colours are taken packed (JPEG), from the topic with /compressed behind its name.";
 };
+
+/// A network by its parameters.
+#[derive(Clone)]
+pub(crate) struct NetworkSettings {
+    model: PathBuf,
+    backend: Backend,
+    input_size: Option<Size>,
+    threads: usize,
+}
+
+impl NetworkSettings {
+    /// Reads the parameters of a network; `None` without a model.
+    pub(crate) fn from_params(params: &Params) -> Result<Option<Self>, ParamError> {
+        let model: PathBuf = params.string("model", "")?.into();
+        let found = Self {
+            backend: options::one_of(params, "backend", &Backend::ALL)?,
+            input_size: input_size(params)?,
+            threads: options::threads(params, 0)?,
+            model,
+        };
+        Ok(Some(found).filter(|found| !found.model.as_os_str().is_empty()))
+    }
+
+    /// Makes the network, which takes a moment.
+    pub(crate) fn read(&self, params: &Params) -> Result<Box<dyn Network>, ParamError> {
+        let threads = match self.threads {
+            0 => {
+                let cores = std::thread::available_parallelism().map_or(1, usize::from);
+                cores.saturating_sub(1).max(1)
+            }
+            threads => threads,
+        };
+        let began = Instant::now();
+        let found = read_network_by(self.backend, &self.model, self.input_size, threads);
+        let network = found.map_err(|error| {
+            let name = match error {
+                ModelError::Library(_) | ModelError::NotBuilt("ort") => "backend",
+                _ => "model",
+            };
+            params.invalid(name, error.to_string())
+        })?;
+        let size = network.input();
+        log::info!(
+            "{}: images of {} x {}, {} names of classes, ready in {:.1} s",
+            self.model.display(),
+            size.width,
+            size.height,
+            network.names().len(),
+            began.elapsed().as_secs_f64()
+        );
+        Ok(network)
+    }
+}
 
 /// Settings of the node by its parameters.
 pub(super) struct Settings {
     pub segmenter: SegmenterOptions,
-    pub model: PathBuf,
+    /// None: no model is given.
+    pub network: Option<NetworkSettings>,
     pub compressed: bool,
-    pub input_size: Option<Size>,
-    pub threads: usize,
     pub limits: ComputeLimits,
     pub report_file: String,
 }
@@ -37,13 +98,12 @@ impl Settings {
     /// Reads the parameters of the node.
     pub(super) fn from_params(params: &Params) -> Result<Self, ParamError> {
         params.describe(ABOUT);
+        params.describe(NETWORK);
         params.describe(options::COMMON);
         Ok(Self {
             segmenter: SegmenterOptions::from_params(params)?,
-            model: params.string("model", "")?.into(),
+            network: NetworkSettings::from_params(params)?,
             compressed: params.bool("compressed", false)?,
-            input_size: input_size(params)?,
-            threads: options::threads(params, 0)?,
             limits: ComputeLimits {
                 events: 16,
                 // The image that waits is the newest; none other does.

@@ -2,6 +2,7 @@
 
 use std::collections::BTreeMap;
 
+use crate::segmenter::SegmenterCounts;
 use serde::{Deserialize, Serialize};
 
 /// Counters of pixels and points.
@@ -32,8 +33,12 @@ pub struct CloudCounts {
     pub labels_in: u64,
     /// Images of confidences received.
     pub confidence_in: u64,
+    /// Images of colours received, but for those that go to a network.
+    pub color_in: u64,
     /// Clouds published.
     pub clouds_out: u64,
+    /// Of these, without the probabilities that there are, as they would be too large.
+    pub clouds_without_probs: u64,
     /// Pixels and points.
     #[serde(flatten)]
     pub points: PointCounts,
@@ -60,4 +65,7 @@ pub struct CloudReport {
     pub undecodable: u64,
     /// Clouds that could not be given to the publisher.
     pub clouds_not_published: u64,
+    /// Counters of the network, if there is one inside of the node.
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    pub network: Option<SegmenterCounts>,
 }

@@ -8,13 +8,16 @@
 )]
 mod compressed;
 mod counts;
+mod network;
 pub mod node;
 mod options;
 mod parameters;
 mod project;
 mod waiting;
 
-pub use crate::camera::{Camera, CameraError, Content, ImageError, ImageView};
+pub use crate::camera::{
+    Camera, CameraError, Content, ImageError, ImageView, LabelSet, SHARES, Share, SoftLabels,
+};
 pub use counts::{CloudCounts, CloudReport, PointCounts};
 pub use options::CloudOptions;
 pub use parameters::declare;
@@ -29,6 +32,7 @@ use lattice_msgs::vision_msgs::LabelInfo;
 use self::project::Views;
 use self::waiting::{Left, Set, Waiting};
 use crate::camera::Classes;
+use crate::segmenter;
 
 /// Output of the machine.
 #[derive(Clone, Debug, PartialEq)]
@@ -89,6 +93,7 @@ impl SemanticCloud {
             Stream::Depth => (&mut self.counts.depth_in, Content::Depth),
             Stream::Labels => (&mut self.counts.labels_in, Content::Labels),
             Stream::Confidence => (&mut self.counts.confidence_in, Content::Confidence),
+            Stream::Color => (&mut self.counts.color_in, Content::Colors),
         };
         *count += 1;
         let max = self.options.max_image_pixels;
@@ -123,6 +128,38 @@ impl SemanticCloud {
                 Vec::new()
             }
         }
+    }
+
+    /// Takes an image of colours that is packed as JPEG.
+    pub fn on_compressed_color(&mut self, message: &CompressedImage) -> Vec<CloudOutput> {
+        match segmenter::unpacked(message, self.options.max_image_pixels) {
+            Ok(image) => self.on_image(Stream::Color, Arc::new(image)),
+            Err((reason, problem)) => {
+                self.counts.color_in += 1;
+                self.refuse("color", reason, &problem);
+                Vec::new()
+            }
+        }
+    }
+
+    /// Hears that a network begins with the image of a stamp: its depth image is kept until it has labels.
+    pub fn on_begun(&mut self, stamp_ns: i64) -> Vec<CloudOutput> {
+        self.waiting.hold(stamp_ns);
+        self.serve(false)
+    }
+
+    /// Takes labels that a network has made, with what came with them.
+    pub fn on_labelled(&mut self, labels: LabelSet) -> Vec<CloudOutput> {
+        self.counts.labels_in += 1;
+        if labels.reader(1, self.options.max_image_pixels).is_none() {
+            let problem = "the output of the network is larger than `max_image_pixels`";
+            self.refuse(Stream::Labels.name(), "too_large", problem);
+            return Vec::new();
+        }
+        for (stream, reason) in self.waiting.push_labels(labels) {
+            self.drop_image(stream, reason);
+        }
+        self.serve(false)
     }
 
     /// Takes the calibration of the camera. One that cannot be used leaves the node without.
@@ -223,17 +260,15 @@ impl SemanticCloud {
         if self.rays.is_empty() {
             self.rays = camera.rays();
         }
-        let views = Views {
+        let mut views = Views {
+            pixels: set.labels.reader(depth.width, max)?,
             depth,
-            labels: view(&set.labels, Content::Labels)?,
-            confidence: match &set.confidence {
-                Some(confidence) => Some(view(confidence, Content::Confidence)?),
-                None => None,
-            },
             rays: &self.rays,
         };
         let points = views.points(&self.options.points, &self.classes, &mut self.counts.points);
         self.counts.clouds_out += 1;
+        let lost = set.labels.soft.is_some() && !points.has_probabilities();
+        self.counts.clouds_without_probs += u64::from(lost);
         Some(points.cloud(set.depth.header.clone()))
     }
 

@@ -1,27 +1,39 @@
 //! The machine as a ROS node: a thin shell around [`SemanticCloud`].
 
+use std::collections::VecDeque;
 use std::sync::Arc;
 use std::sync::atomic::{AtomicU64, Ordering};
-use std::time::Duration;
+use std::time::{Duration, Instant};
 
 use lattice_msgs::sensor_msgs::{CameraInfo, CompressedImage, Image, PointCloud2};
 use lattice_msgs::vision_msgs::LabelInfo;
 
+use super::network::Outputs;
 use super::parameters::Settings;
 use super::{CloudOptions, CloudOutput, CloudReport, SemanticCloud, Stream};
-use crate::compute::Compute;
+use crate::compute::{Compute, Inbox};
 use crate::report;
+use crate::segmenter::{News, Ready, Worker};
 use crate::start::{Finish, NodeError, handed_over, open_params};
 use lattice_runtime::logging::Throttle;
 use lattice_runtime::qos::Qos;
-use lattice_runtime::{Diagnostics, Level, Load, Losses, Publisher, Runtime};
+use lattice_runtime::{Diagnostics, Level, Load, Losses, Node, Publisher, Runtime, Subscription};
+
+/// Most depth images whose arrival is remembered.
+const MAX_ARRIVALS: usize = 256;
+/// Images of colours.
+const COLOR: &str = "rgb/image_rect_color";
 
 /// Event for the compute thread.
 enum Event {
-    Image(Stream, Arc<Image>),
-    CompressedDepth(Arc<CompressedImage>),
+    /// An image, and when it came.
+    Image(Stream, Arc<Image>, Instant),
+    CompressedDepth(Arc<CompressedImage>, Instant),
+    CompressedColor(Arc<CompressedImage>),
     CameraInfo(Arc<CameraInfo>),
     LabelInfo(Arc<LabelInfo>),
+    /// Of the network inside of the node.
+    Network(News),
     Diagnose,
     Settings(Box<CloudOptions>),
     Finish,
@@ -32,60 +44,125 @@ pub fn start(runtime: &Runtime, name: &str) -> Result<Finish, NodeError> {
     let node = runtime.node(name)?;
     let params = node.params();
     let settings = Settings::from_params(params)?;
-    let with_confidence = settings.cloud.pair.with_confidence;
     let (lost, losses) = (Arc::new(AtomicU64::new(0)), Losses::default());
+    let ready = match &settings.network {
+        Some((network, options)) => Some(Ready::new(params, network, options.clone())?),
+        None => None,
+    };
+    let view = ready.as_ref().map(Ready::view);
     let mut shell = Shell {
-        machine: SemanticCloud::new(settings.cloud),
+        machine: SemanticCloud::new(settings.cloud.clone()),
         points: node.publisher("points", Qos::SCANS)?,
         label_info: node.publisher("label_info", Qos::LATCHED)?,
+        network: view.map(|view| Outputs::new(&node, view)).transpose()?,
         diagnostics: node.diagnostics(),
         lost: Arc::clone(&lost),
         losses: losses.clone(),
+        arrivals: VecDeque::new(),
+        last_latency_s: 0.0,
         warnings: Throttle::new(Duration::from_secs(5)),
         warned: 0,
-        report_file: settings.report_file,
+        report_file: settings.report_file.clone(),
     };
+    shell.tell_names();
     let shutdown = runtime.shutdown_handle();
-    let compute = Compute::spawn(name, settings.limits, shutdown, move |event| {
+    let compute = Compute::spawn(name, settings.limits, shutdown.clone(), move |event| {
         shell.on(event)
     })?;
     let inbox = compute.inbox();
-    let bytes = |image: &Arc<Image>| size_of::<Image>() + image.data.len();
-    let topic = "depth_registered/image_rect";
-    let depth = if settings.compressed_depth {
-        let size = |image: &Arc<CompressedImage>| size_of::<CompressedImage>() + image.data.len();
-        let depth = inbox.counting(&lost, Event::CompressedDepth, size);
-        let topic = format!("{topic}/compressedDepth");
-        node.subscribe(&topic, Qos::SENSOR, Load::Large, depth)?
-    } else {
-        let depth = inbox.counting(&lost, |image| Event::Image(Stream::Depth, image), bytes);
-        node.subscribe(topic, Qos::SENSOR, Load::Large, depth)?
-    };
-    let labels = inbox.counting(&lost, |image| Event::Image(Stream::Labels, image), bytes);
-    let labels = node.subscribe("labels/image", Qos::SENSOR, Load::Large, labels)?;
-    let mut inputs = vec![depth, labels];
-    if with_confidence {
-        let confidence = inbox.counting(&lost, |m| Event::Image(Stream::Confidence, m), bytes);
-        inputs.push(node.subscribe("labels/confidence", Qos::SENSOR, Load::Large, confidence)?);
+    let mut inputs = subscribe(&node, &inbox, &lost, &settings)?;
+    let mut network = None;
+    if let Some(ready) = ready {
+        let tell = news_to(&inbox, &lost);
+        let (worker, images) = ready.start(
+            &node,
+            [name, COLOR],
+            settings.compressed_color,
+            shutdown,
+            tell,
+        )?;
+        inputs.push(images);
+        network = Some(worker);
     }
-    let camera = inbox.counting(&lost, Event::CameraInfo, |_| 0);
-    inputs.push(node.subscribe("rgb/camera_info", Qos::SENSOR, Load::Small, camera)?);
-    let names = inbox.counting(&lost, Event::LabelInfo, |_| 0);
-    inputs.push(node.subscribe("labels/label_info", Qos::LATCHED, Load::Small, names)?);
     losses.watch(&inputs);
     let looks = inbox.clone();
     let looks = runtime.timer(Duration::from_millis(500), move || {
         let _ = looks.send(Event::Diagnose, 0);
     });
+    let set_network = network.as_ref().map(Worker::settings);
     open_params(params, move |params| {
         let settings = Settings::from_params(params).map_err(|error| error.to_string())?;
+        if let (Some(set), Some((_, options))) = (&set_network, settings.network) {
+            handed_over(set(options))?;
+        }
         handed_over(inbox.send(Event::Settings(Box::new(settings.cloud)), 0))
     });
     Ok(Box::new(move || {
         drop((inputs, looks));
+        if let Some(network) = network {
+            network.finish();
+        }
         compute.finish_with(Event::Finish);
         Box::new(())
     }))
+}
+
+/// Hands news of the network over; labels that find no room are counted.
+fn news_to(inbox: &Inbox<Event>, lost: &Arc<AtomicU64>) -> impl FnMut(News) + Send + use<> {
+    let (inbox, lost) = (inbox.clone(), Arc::clone(lost));
+    move |news| {
+        let bytes = match &news {
+            News::Labelled(labels) => labels.bytes(),
+            News::Begun(_) | News::Names => 0,
+        };
+        let sent = inbox.send(Event::Network(news), bytes);
+        lost.fetch_add(u64::from(!sent), Ordering::Relaxed);
+    }
+}
+
+fn subscribe(
+    node: &Node,
+    inbox: &Inbox<Event>,
+    lost: &Arc<AtomicU64>,
+    settings: &Settings,
+) -> Result<Vec<Subscription>, NodeError> {
+    let bytes = |image: &Arc<Image>| size_of::<Image>() + image.data.len();
+    let packed = |image: &Arc<CompressedImage>| size_of::<CompressedImage>() + image.data.len();
+    let images = |stream| {
+        let event = move |image| Event::Image(stream, image, Instant::now());
+        inbox.counting(lost, event, bytes)
+    };
+    let topic = "depth_registered/image_rect";
+    let mut inputs = vec![if settings.compressed_depth {
+        let event = |image| Event::CompressedDepth(image, Instant::now());
+        let depth = inbox.counting(lost, event, packed);
+        let topic = format!("{topic}/compressedDepth");
+        node.subscribe(&topic, Qos::SENSOR, Load::Large, depth)?
+    } else {
+        node.subscribe(topic, Qos::SENSOR, Load::Large, images(Stream::Depth))?
+    }];
+    if settings.network.is_none() {
+        let labels = images(Stream::Labels);
+        inputs.push(node.subscribe("labels/image", Qos::SENSOR, Load::Large, labels)?);
+        let names = inbox.counting(lost, Event::LabelInfo, |_| 0);
+        inputs.push(node.subscribe("labels/label_info", Qos::LATCHED, Load::Small, names)?);
+    }
+    if settings.cloud.pair.with_confidence {
+        let confidence = images(Stream::Confidence);
+        inputs.push(node.subscribe("labels/confidence", Qos::SENSOR, Load::Large, confidence)?);
+    }
+    if settings.cloud.pair.with_color {
+        inputs.push(if settings.compressed_color {
+            let color = inbox.counting(lost, Event::CompressedColor, packed);
+            let topic = format!("{COLOR}/compressed");
+            node.subscribe(&topic, Qos::SENSOR, Load::Large, color)?
+        } else {
+            node.subscribe(COLOR, Qos::SENSOR, Load::Large, images(Stream::Color))?
+        });
+    }
+    let camera = inbox.counting(lost, Event::CameraInfo, |_| 0);
+    inputs.push(node.subscribe("rgb/camera_info", Qos::SENSOR, Load::Small, camera)?);
+    Ok(inputs)
 }
 
 /// State of the compute thread.
@@ -93,10 +170,15 @@ struct Shell {
     machine: SemanticCloud,
     points: Publisher<PointCloud2>,
     label_info: Publisher<LabelInfo>,
+    network: Option<Outputs>,
     diagnostics: Diagnostics,
     /// Messages that found the inbox full, and those lost before it.
     lost: Arc<AtomicU64>,
     losses: Losses,
+    /// Stamps of depth images, and when they came.
+    arrivals: VecDeque<(i64, Instant)>,
+    /// From the arrival of a depth image to its cloud, seconds.
+    last_latency_s: f64,
     warnings: Throttle,
     /// Messages dropped when there was a warning last.
     warned: u64,
@@ -106,8 +188,28 @@ struct Shell {
 impl Shell {
     fn on(&mut self, event: Event) {
         let outputs = match event {
-            Event::Image(stream, image) => self.machine.on_image(stream, image),
-            Event::CompressedDepth(image) => self.machine.on_compressed_depth(&image),
+            Event::Image(stream, image, at) => {
+                if stream == Stream::Depth {
+                    self.arrived(image.header.stamp.to_ns(), at);
+                }
+                self.machine.on_image(stream, image)
+            }
+            Event::CompressedDepth(image, at) => {
+                self.arrived(image.header.stamp.to_ns(), at);
+                self.machine.on_compressed_depth(&image)
+            }
+            Event::CompressedColor(image) => self.machine.on_compressed_color(&image),
+            Event::Network(News::Begun(stamp_ns)) => self.machine.on_begun(stamp_ns),
+            Event::Network(News::Labelled(labels)) => {
+                if let Some(network) = &self.network {
+                    network.publish(&labels);
+                }
+                self.machine.on_labelled(labels)
+            }
+            Event::Network(News::Names) => {
+                self.tell_names();
+                return;
+            }
             Event::CameraInfo(info) => self.machine.on_camera_info(info),
             Event::LabelInfo(info) => self.machine.on_label_info(info),
             Event::Settings(options) => self.machine.set_options(*options),
@@ -125,10 +227,34 @@ impl Shell {
         self.publish(outputs);
     }
 
-    fn publish(&self, outputs: Vec<CloudOutput>) {
+    fn arrived(&mut self, stamp_ns: i64, at: Instant) {
+        self.arrivals.push_back((stamp_ns, at));
+        if self.arrivals.len() > MAX_ARRIVALS {
+            self.arrivals.pop_front();
+        }
+    }
+
+    /// Names of the classes of the network inside of the node.
+    fn tell_names(&mut self) {
+        let info = self.network.as_ref().and_then(Outputs::tell_names);
+        if let Some(info) = info {
+            let outputs = self.machine.on_label_info(info);
+            self.publish(outputs);
+        }
+    }
+
+    fn publish(&mut self, outputs: Vec<CloudOutput>) {
         for output in outputs {
             let published = match output {
-                CloudOutput::Points(points) => self.points.publish(Arc::new(points)),
+                CloudOutput::Points(points) => {
+                    let stamp_ns = points.header.stamp.to_ns();
+                    let published = self.points.publish(Arc::new(points));
+                    let mut arrivals = self.arrivals.iter();
+                    if let Some((_, at)) = arrivals.find(|(stamp, _)| *stamp == stamp_ns) {
+                        self.last_latency_s = at.elapsed().as_secs_f64();
+                    }
+                    published
+                }
                 CloudOutput::LabelInfo(info) => self.label_info.publish(Arc::new(info)),
             };
             if let Err(error) = published {
@@ -143,11 +269,15 @@ impl Shell {
             images_lost: self.lost.load(Ordering::Relaxed) + self.losses.lost(),
             undecodable: self.losses.undecodable(),
             clouds_not_published: self.points.dropped(),
+            network: self.network.as_ref().map(|network| network.view.counts()),
         }
     }
 
     fn diagnose(&mut self) {
-        let report = self.report();
+        let report = CloudReport {
+            network: None,
+            ..self.report()
+        };
         let counts = &report.counts;
         let dropped: u64 = counts.dropped.values().sum();
         let problem = self.machine.problem().map(str::to_owned);
@@ -175,7 +305,14 @@ impl Shell {
         let mut values = report::key_values(&report);
         values.push(("images_waiting".into(), self.machine.waiting().to_string()));
         values.push(("last_refused".into(), problem.unwrap_or_default()));
+        values.push((
+            "last_latency_s".into(),
+            format!("{:.4}", self.last_latency_s),
+        ));
         self.diagnostics.set("clouds", level, message, values);
+        if let Some(network) = &self.network {
+            network.view.diagnose(&self.diagnostics);
+        }
     }
 
     fn finish(&mut self) {

@@ -2,6 +2,7 @@
 
 use super::CloudOptions;
 use crate::compute::ComputeLimits;
+use crate::segmenter::{NETWORK, NetworkSettings, SegmenterOptions};
 use crate::{options, report};
 use lattice_runtime::about;
 use lattice_runtime::params::{About, ParamError, Params};
@@ -11,6 +12,7 @@ const ABOUT: &[About] = about! {
     "exact_sync": "Whether the stamps of depth and labels must be equal.";
     "max_stamp_difference_s": "Otherwise, the largest difference between them.";
     "use_confidence" fixed(options::TOPIC): "Whether labels wait for labels/confidence of their stamp.";
+    "use_color" fixed(options::TOPIC): "Whether points have the colours of rgb/image_rect_color, for which labels wait until it has come with their stamp; with model they always have.";
     "compressed_depth" fixed(options::TOPIC): "Whether depth is taken from depth_registered/image_rect/compressedDepth (PNG).";
     "rectified": "Whether the images are rectified: then p of camera_info holds, otherwise k and the distortion.";
     "max_image_pixels": "Images of more pixels are refused.";
@@ -18,12 +20,16 @@ const ABOUT: &[About] = about! {
     "min_range_m": "Points nearer to the sensor are left out.";
     "max_range_m": "Points farther from the sensor are left out; 0: no limit.";
     "edge_jump": "Pixels are left out whose depth and that of one of the eight around differ by more than this fraction: labels bleed there; 0: none.";
+    "threads" fixed("the pool is made with it"): "Threads of the network; 0: one less than the machine has.";
     "group_labels": "Classes that count as others: class, group, class, group and so on.";
 };
 
 /// Settings of the node by its parameters.
 pub(super) struct Settings {
     pub cloud: CloudOptions,
+    /// Network inside of the node, with its options.
+    pub network: Option<(NetworkSettings, SegmenterOptions)>,
+    pub compressed_color: bool,
     pub compressed_depth: bool,
     pub limits: ComputeLimits,
     pub report_file: String,
@@ -33,15 +39,31 @@ impl Settings {
     /// Reads the parameters of the node.
     pub(super) fn from_params(params: &Params) -> Result<Self, ParamError> {
         params.describe(ABOUT);
+        params.describe(NETWORK);
         params.describe(options::COMMON);
         let compressed_depth = params.bool("compressed_depth", false)?;
         if compressed_depth && !cfg!(feature = "compressed_depth") {
             let problem = "this program was built without the feature `compressed_depth`";
             return Err(params.invalid("compressed_depth", problem));
         }
+        let mut cloud = CloudOptions::from_params(params)?;
+        let with_soft = params.bool("label_probs", false)?;
+        let of_network = SegmenterOptions::of_network(params, cloud.max_image_pixels, with_soft)?;
+        let network = NetworkSettings::from_params(params)?;
+        if network.is_some() {
+            // They come with the labels.
+            (cloud.pair.with_confidence, cloud.pair.with_color) = (false, false);
+        }
+        let compressed_color = params.bool("compressed_color", false)?;
+        if compressed_color && cloud.pair.with_color && !cfg!(feature = "onnx") {
+            let problem = "this program was built without the feature `onnx`, which reads JPEG";
+            return Err(params.invalid("compressed_color", problem));
+        }
         Ok(Self {
             compressed_depth,
-            cloud: CloudOptions::from_params(params)?,
+            compressed_color,
+            cloud,
+            network: network.map(|network| (network, of_network)),
             limits: ComputeLimits {
                 events: options::inbox_events(params, 4096)?,
                 bytes: options::inbox_bytes(params, 128 << 20)?,

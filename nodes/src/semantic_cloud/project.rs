@@ -1,9 +1,7 @@
 //! Depth and labels to points.
 
-use lattice_core::registration::UNLABELED;
-
 use super::counts::PointCounts;
-use crate::camera::{Classes, ImageView, LabelledPoints, Sampled};
+use crate::camera::{Classes, ImageView, LabelledPoints, PixelReader};
 
 /// Choice of the pixels that become points.
 #[derive(Clone, Debug, PartialEq)]
@@ -22,10 +20,8 @@ pub struct PointOptions {
 pub struct Views<'a> {
     /// Depth.
     pub depth: ImageView<'a>,
-    /// Labels, of any size.
-    pub labels: ImageView<'a>,
-    /// Confidences, of any size.
-    pub confidence: Option<ImageView<'a>>,
+    /// Labels and what came with them, read at the pixels of the depth image.
+    pub pixels: PixelReader<'a>,
     /// x / z and y / z of each pixel of the depth image; NaN: none.
     pub rays: &'a [[f32; 2]],
 }
@@ -33,7 +29,7 @@ pub struct Views<'a> {
 impl Views<'_> {
     /// The points, row by row.
     pub fn points(
-        &self,
+        &mut self,
         options: &PointOptions,
         classes: &Classes,
         counts: &mut PointCounts,
@@ -44,16 +40,10 @@ impl Views<'_> {
         let edges = Edges::new(&depths_m, width, options.edge_jump);
         let stride = options.stride.max(1);
         let most = width.div_ceil(stride) * height.div_ceil(stride);
-        let mut points = LabelledPoints::with_capacity(most);
-        let mut labels = Sampled::new(self.labels, width, ImageView::classes);
-        let confidence = self.confidence;
-        let mut confidence =
-            confidence.map(|view| Sampled::new(view, width, ImageView::confidences));
+        let layout = self.pixels.layout(classes).bounded(most);
+        let mut points = LabelledPoints::new(layout, most);
         for row in (0..height).step_by(stride) {
-            labels.seek(row, height);
-            if let Some(confidence) = &mut confidence {
-                confidence.seek(row, height);
-            }
+            self.pixels.seek(row, height);
             for column in (0..width).step_by(stride) {
                 let i = row * width + column;
                 let (Some(&z_m), Some(&[x, y])) = (depths_m.get(i), self.rays.get(i)) else {
@@ -83,16 +73,11 @@ impl Views<'_> {
                     counts.pixels_out_of_range += 1;
                     continue;
                 }
-                let worth = confidence
-                    .as_ref()
-                    .map_or(1.0, |c| c.at(column).unwrap_or(0.0));
-                let number = labels.at(column).unwrap_or(UNLABELED);
-                let known = classes.known(number, worth);
-                counts.points_unlabelled += u64::from(known.is_none());
-                points.push(point_m, known, worth);
+                points.push(point_m, &self.pixels.at(column), classes);
             }
         }
         counts.points += points.len() as u64;
+        counts.points_unlabelled += points.unlabelled();
         points
     }
 }

@@ -5,6 +5,8 @@ use std::sync::Arc;
 
 use lattice_msgs::sensor_msgs::Image;
 
+use crate::camera::LabelSet;
+
 /// A step back of a stream's stamps by more than this is a log that loops.
 const JUMP_BACK_NS: i64 = 1_000_000_000;
 
@@ -17,11 +19,13 @@ pub enum Stream {
     Labels,
     /// Confidences, of exactly the stamp of a label image.
     Confidence,
+    /// Images of colours, of exactly the stamp of a label image.
+    Color,
 }
 
 impl Stream {
     /// All, in the order of their numbers.
-    pub const ALL: [Self; 3] = [Self::Depth, Self::Labels, Self::Confidence];
+    pub const ALL: [Self; 4] = [Self::Depth, Self::Labels, Self::Confidence, Self::Color];
 
     /// Name under which it is counted.
     pub fn name(self) -> &'static str {
@@ -29,6 +33,7 @@ impl Stream {
             Self::Depth => "depth",
             Self::Labels => "labels",
             Self::Confidence => "confidence",
+            Self::Color => "color",
         }
     }
 }
@@ -42,6 +47,8 @@ pub struct PairOptions {
     pub max_difference_ns: u64,
     /// True if labels come with confidences.
     pub with_confidence: bool,
+    /// True if labels come with colours.
+    pub with_color: bool,
 }
 
 /// Images of one time.
@@ -49,10 +56,8 @@ pub struct PairOptions {
 pub struct Set {
     /// Depth image.
     pub depth: Arc<Image>,
-    /// Label image.
-    pub labels: Arc<Image>,
-    /// Confidences, if they are asked for.
-    pub confidence: Option<Arc<Image>>,
+    /// Label image with what is asked for beside it.
+    pub labels: LabelSet,
 }
 
 /// Reason for which an image left without its partner.
@@ -73,8 +78,10 @@ pub enum Left {
 #[derive(Debug)]
 pub struct Waiting {
     options: PairOptions,
-    queues: [BTreeMap<i64, Arc<Image>>; 3],
-    newest_ns: [Option<i64>; 3],
+    queues: [BTreeMap<i64, LabelSet>; 4],
+    newest_ns: [Option<i64>; 4],
+    /// Stamp of the image that a network labels: the depth image that is nearest does not go.
+    held_ns: Option<i64>,
 }
 
 impl Waiting {
@@ -83,8 +90,17 @@ impl Waiting {
         Self {
             options,
             queues: Default::default(),
-            newest_ns: [None; 3],
+            newest_ns: [None; 4],
+            held_ns: None,
         }
+    }
+
+    /// Hears that labels of a stamp are being made: the depth image of that time waits for them, however many
+    /// come meanwhile, and no labels of earlier stamps will come.
+    pub fn hold(&mut self, stamp_ns: i64) {
+        self.held_ns = Some(stamp_ns);
+        let newest = &mut self.newest_ns[Stream::Labels as usize];
+        *newest = Some(newest.map_or(stamp_ns, |newest_ns| newest_ns.max(stamp_ns)));
     }
 
     /// Goes on by other rules.
@@ -94,21 +110,34 @@ impl Waiting {
 
     /// Adds an image, and tells of those that leave for it.
     pub fn push(&mut self, stream: Stream, image: Arc<Image>) -> Vec<(Stream, Left)> {
-        let stamp_ns = image.header.stamp.to_ns();
+        self.push_set(stream, LabelSet::new(image))
+    }
+
+    /// Adds labels with what came with them.
+    pub fn push_labels(&mut self, labels: LabelSet) -> Vec<(Stream, Left)> {
+        self.push_set(Stream::Labels, labels)
+    }
+
+    fn push_set(&mut self, stream: Stream, set: LabelSet) -> Vec<(Stream, Left)> {
+        let stamp_ns = set.labels.header.stamp.to_ns();
         let mut left = Vec::new();
         let newest_ns = self.newest_ns[stream as usize].unwrap_or(stamp_ns);
         if stamp_ns < newest_ns.saturating_sub(JUMP_BACK_NS) {
             left = self.clear(Left::TimeJump);
-            self.newest_ns = [None; 3];
+            self.newest_ns = [None; 4];
         }
         let newest = &mut self.newest_ns[stream as usize];
         *newest = Some(newest.map_or(stamp_ns, |newest_ns| newest_ns.max(stamp_ns)));
         let queue = &mut self.queues[stream as usize];
-        if queue.insert(stamp_ns, image).is_some() {
+        if queue.insert(stamp_ns, set).is_some() {
             left.push((stream, Left::Repeated));
         }
+        let held_ns = self.held_ns.filter(|_| stream == Stream::Depth);
+        let held_ns = held_ns.and_then(|held_ns| nearest(queue, held_ns));
         while queue.len() > self.options.queue_size.max(1) {
-            queue.pop_first();
+            let oldest = queue.keys().find(|stamp_ns| Some(**stamp_ns) != held_ns);
+            let Some(oldest) = oldest.copied() else { break };
+            queue.remove(&oldest);
             left.push((stream, Left::NoPartner));
         }
         left
@@ -121,20 +150,26 @@ impl Waiting {
         let found =
             depths.filter_map(|depth_ns| Some((*depth_ns, self.labels_of(*depth_ns, is_end)?)));
         let (depth_ns, labels_ns) = { found }.next()?;
-        let [depths, labels, confidences] = &mut self.queues;
-        Some(Set {
-            depth: depths.remove(&depth_ns)?,
-            labels: labels.remove(&labels_ns)?,
-            confidence: confidences.remove(&labels_ns),
-        })
+        let [depths, labels, confidences, colors] = &mut self.queues;
+        let mut labels = labels.remove(&labels_ns)?;
+        let image = |set: LabelSet| set.labels;
+        if let Some(confidence) = confidences.remove(&labels_ns) {
+            labels.confidence = Some(image(confidence));
+        }
+        if let Some(colors) = colors.remove(&labels_ns) {
+            labels.colors = Some(image(colors));
+        }
+        let depth = image(depths.remove(&depth_ns)?);
+        Some(Set { depth, labels })
     }
 
     /// Stamp of the labels that belong to a depth image, once that is sure.
     fn labels_of(&self, depth_ns: i64, is_end: bool) -> Option<i64> {
-        let [depths, labels, confidences] = &self.queues;
+        let [depths, labels, confidences, colors] = &self.queues;
         let labels_ns = nearest(labels, depth_ns)?;
         let is_near = depth_ns.abs_diff(labels_ns) <= self.options.max_difference_ns;
-        let is_whole = !self.options.with_confidence || confidences.contains_key(&labels_ns);
+        let is_whole = (!self.options.with_confidence || confidences.contains_key(&labels_ns))
+            && (!self.options.with_color || colors.contains_key(&labels_ns));
         let come_to = |stream: Stream, stamp_ns| {
             self.newest_ns[stream as usize].is_some_and(|newest_ns| newest_ns >= stamp_ns)
         };

@@ -3,10 +3,11 @@
 use std::io;
 use std::net::TcpStream;
 use std::sync::Arc;
-use std::time::Duration;
+use std::time::{Duration, Instant};
 
 use async_tungstenite::WebSocketStream;
-use async_tungstenite::tungstenite::protocol::{Role, WebSocketConfig};
+use async_tungstenite::tungstenite::protocol::frame::coding::CloseCode;
+use async_tungstenite::tungstenite::protocol::{CloseFrame, Role, WebSocketConfig};
 use async_tungstenite::tungstenite::{self, Message};
 use futures::stream::FuturesUnordered;
 use futures::{AsyncReadExt, AsyncWriteExt, StreamExt};
@@ -15,17 +16,19 @@ use smol::future::{or, pending, poll_once};
 use smol::{Async, Timer};
 
 use super::desk::{Desk, Step};
+use super::flow::Flow;
 use super::http::{Decision, Gate, Head, HeadError, MAX_HEAD_BYTES, Response};
 use super::hub::Hub;
+use super::inputs::{Input, InputRefusal};
 use super::outbox::Outgoing;
-use super::protocol::message_data;
+use super::protocol::{message_data, status};
 
 /// Time for a request to come.
 const HEAD_TIME: Duration = Duration::from_secs(5);
 /// Time for one message, or one file, to be taken.
 const SEND_TIME: Duration = Duration::from_secs(20);
-/// Longest message of a client, bytes.
-const MAX_INBOUND_BYTES: usize = 64 << 10;
+/// Time for the reason of an end to be taken.
+const LAST_TIME: Duration = Duration::from_secs(1);
 /// Bytes that the kernel keeps until a client takes them.
 const SEND_BUFFER_BYTES: usize = 512 << 10;
 
@@ -86,11 +89,14 @@ async fn talk(
     hub: &Hub,
 ) -> io::Result<()> {
     within(SEND_TIME, stream.write_all(head.as_bytes())).await?;
+    let offer = hub.offer_of_bridge();
+    let longest = Some(offer.max_message_bytes());
     let config = WebSocketConfig::default()
-        .max_message_size(Some(MAX_INBOUND_BYTES))
-        .max_frame_size(Some(MAX_INBOUND_BYTES));
+        .max_message_size(longest)
+        .max_frame_size(longest);
     let mut socket = WebSocketStream::from_raw_socket(stream, Role::Server, Some(config)).await;
-    let mut desk = Desk::new(hub.offer_of_bridge());
+    let mut desk = Desk::new(offer);
+    let mut flow = Flow::new(offer.stream_bytes_per_s, Instant::now());
     let mut asked = FuturesUnordered::new();
     loop {
         // What has come goes first: who unsubscribes gets no more.
@@ -130,7 +136,12 @@ async fn talk(
             Event::Come(Some(Ok(Message::Binary(bytes)))) => desk.data(&bytes),
             Event::Come(Some(Ok(Message::Close(_))) | None) => return Ok(()),
             Event::Come(Some(Ok(_))) => Step::Done,
-            Event::Come(Some(Err(error))) => return Err(io::Error::other(error)),
+            Event::Come(Some(Err(error))) => {
+                if matches!(error, tungstenite::Error::Capacity(_)) {
+                    too_long(&mut socket, hub).await;
+                }
+                return Err(io::Error::other(error));
+            }
         };
         match step {
             Step::Subscribe(wishes) => {
@@ -145,6 +156,13 @@ async fn talk(
                 Some(bridge) => asked.push(bridge.ask(ask)),
                 None => desk.answered(),
             },
+            Step::Input(input) => {
+                if let Some(refusal) = take(hub, id, &mut flow, input)
+                    && flow.may_tell(Instant::now())
+                {
+                    hub.tell(id, Outgoing::Text(status(refusal.words())));
+                }
+            }
             Step::Tell(text) => hub.tell(id, Outgoing::Text(text)),
             Step::Done => {}
         }
@@ -156,6 +174,36 @@ enum Event {
     Come(Option<Result<Message, tungstenite::Error>>),
     Answered(Vec<Outgoing>),
     Woken,
+}
+
+/// Hands a message for a headset over, at the pace of its client; what is refused is counted.
+fn take(hub: &Hub, id: u64, flow: &mut Flow, input: Input) -> Option<InputRefusal> {
+    let bridge = hub.bridge()?;
+    let taken = match flow.admits(input.bytes.len(), Instant::now()) {
+        true => bridge.take(id, input),
+        false => Err(InputRefusal::TooMuch),
+    };
+    let refusal = taken.err()?;
+    bridge.inputs().refused(refusal);
+    Some(refusal)
+}
+
+/// Tells why the connection ends: what comes next of it cannot be told from the rest of the message.
+async fn too_long(socket: &mut WebSocketStream<Stream>, hub: &Hub) {
+    let has_headset = hub.offer_of_bridge().stream_bytes_per_s > 0;
+    if let Some(bridge) = hub.bridge().filter(|_| has_headset) {
+        bridge.inputs().refused(InputRefusal::TooLong);
+    }
+    let close = CloseFrame {
+        code: CloseCode::Size,
+        reason: "a message is longer than is taken".into(),
+    };
+    let closed = async {
+        let sent = socket.send(Message::Close(Some(close))).await;
+        sent.map_err(io::Error::other)
+    };
+    // Who has gone needs no reason.
+    let _ = within(LAST_TIME, closed).await;
 }
 
 /// Sends one message; an error after the last.

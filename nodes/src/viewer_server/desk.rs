@@ -2,52 +2,14 @@
 
 use std::collections::BTreeMap;
 
-use super::protocol::{
-    self, AdvertisedService, ClientChannel, ClientData, ClientMessage, Value, Wish,
-};
+use super::inputs::Input;
+use super::offer::{MAX_MESSAGE_BYTES, Offer, OpenTopic};
+use super::protocol::{self, ClientChannel, ClientData, ClientMessage, Value, Wish};
 
 /// Most questions of a client that wait for their answers.
 const MAX_IN_FLIGHT: usize = 16;
 /// Most channels of a client.
-const MAX_CHANNELS: usize = 16;
-
-/// A topic that clients may publish on.
-#[derive(Clone, Debug)]
-pub struct OpenTopic {
-    /// Full name.
-    pub name: String,
-    /// Type of its messages.
-    pub type_name: &'static str,
-}
-
-/// All that clients may ask for besides what is shown.
-#[derive(Clone, Debug, Default)]
-pub struct Offer {
-    /// Services, by their ids.
-    pub services: Vec<AdvertisedService>,
-    /// Topics.
-    pub topics: Vec<OpenTopic>,
-    /// True if parameters may be read and set.
-    pub parameters: bool,
-    /// True if the graph of nodes is known.
-    pub graph: bool,
-}
-
-impl Offer {
-    /// Names of what is offered in the protocol.
-    pub fn capabilities(&self) -> Vec<&'static str> {
-        [
-            ("services", !self.services.is_empty()),
-            ("parameters", self.parameters),
-            ("parametersSubscribe", self.parameters),
-            ("clientPublish", !self.topics.is_empty()),
-            ("connectionGraph", self.graph),
-        ]
-        .into_iter()
-        .filter_map(|(name, offered)| offered.then_some(name))
-        .collect()
-    }
-}
+const MAX_CHANNELS: usize = 32;
 
 /// A question that others answer.
 #[derive(Debug, PartialEq)]
@@ -82,6 +44,8 @@ pub enum Step {
     Graph(bool),
     /// Something is to be asked for.
     Ask(Ask),
+    /// A message for a headset's topic, which is not answered.
+    Input(Input),
     /// A text for the client.
     Tell(String),
     /// Nothing.
@@ -92,8 +56,8 @@ pub enum Step {
 #[derive(Debug)]
 pub struct Desk<'a> {
     offer: &'a Offer,
-    /// Topics of the offer by the client's channels.
-    channels: BTreeMap<u32, usize>,
+    /// Topics of the offer by the client's channels; true for those in JSON.
+    channels: BTreeMap<u32, (usize, bool)>,
     in_flight: usize,
 }
 
@@ -109,6 +73,9 @@ impl<'a> Desk<'a> {
 
     /// Takes a text message.
     pub fn text(&mut self, text: &str) -> Step {
+        if text.len() > MAX_MESSAGE_BYTES {
+            return tell(TOO_LONG);
+        }
         match ClientMessage::parse(text) {
             Ok(ClientMessage::Subscribe { subscriptions }) => Step::Subscribe(subscriptions),
             Ok(ClientMessage::Unsubscribe { subscription_ids }) => {
@@ -150,10 +117,10 @@ impl<'a> Desk<'a> {
     /// Takes a binary message.
     pub fn data(&mut self, bytes: &[u8]) -> Step {
         match ClientData::parse(bytes) {
-            Ok(ClientData::Message { channel, payload }) => match self.channels.get(&channel) {
-                Some(topic) => self.ask(Ask::Publish(*topic, payload.to_vec())),
-                None => tell(&format!("channel {channel} is not yours to publish on")),
-            },
+            Ok(ClientData::Message { channel, payload }) => self.message(channel, payload),
+            Ok(ClientData::Call { service, call, .. }) if bytes.len() > MAX_MESSAGE_BYTES => {
+                Step::Tell(protocol::service_failure(service, call, TOO_LONG))
+            }
             Ok(ClientData::Call {
                 service,
                 call,
@@ -181,6 +148,25 @@ impl<'a> Desk<'a> {
         }
     }
 
+    fn message(&mut self, channel: u32, payload: &[u8]) -> Step {
+        let Some(&(topic, is_json)) = self.channels.get(&channel) else {
+            return tell(&format!("channel {channel} is not yours to publish on"));
+        };
+        let streams = self.offer.topics.get(topic);
+        if streams.is_some_and(|topic| topic.stream_bytes.is_some()) {
+            let bytes = payload.to_vec();
+            return Step::Input(Input {
+                topic,
+                is_json,
+                bytes,
+            });
+        }
+        match payload.len() > MAX_MESSAGE_BYTES {
+            true => tell(TOO_LONG),
+            false => self.ask(Ask::Publish(topic, payload.to_vec())),
+        }
+    }
+
     /// To be called for each answer.
     pub fn answered(&mut self) {
         self.in_flight = self.in_flight.saturating_sub(1);
@@ -202,8 +188,14 @@ impl<'a> Desk<'a> {
             let topic = self.offer.topics.iter().position(fits);
             let room = self.channels.len() < MAX_CHANNELS;
             let free = !self.channels.contains_key(&channel.id);
-            match topic.filter(|_| room && free && channel.encoding == "cdr") {
-                Some(topic) => _ = self.channels.insert(channel.id, topic),
+            let streams = |at: usize| {
+                let topic = self.offer.topics.get(at);
+                topic.is_some_and(|topic| topic.stream_bytes.is_some())
+            };
+            let is_json = channel.encoding == "json";
+            let is_read = |at: &usize| channel.encoding == "cdr" || is_json && streams(*at);
+            match topic.filter(|at| room && free && is_read(at)) {
+                Some(topic) => _ = self.channels.insert(channel.id, (topic, is_json)),
                 None => return tell(&refusal(channel, &self.offer.topics)),
             }
         }
@@ -211,6 +203,7 @@ impl<'a> Desk<'a> {
     }
 }
 
+const TOO_LONG: &str = "a message above 64 kB";
 const TOO_MANY: &str = "too many questions wait for their answers";
 
 fn tell(problem: &str) -> Step {
@@ -231,6 +224,7 @@ mod tests {
     use proptest::prelude::*;
 
     use super::*;
+    use crate::viewer_server::protocol::AdvertisedService;
 
     fn offer() -> Offer {
         let service = AdvertisedService {
@@ -242,12 +236,21 @@ mod tests {
         };
         Offer {
             services: vec![service],
-            topics: vec![OpenTopic {
-                name: "/goal_pose".to_owned(),
-                type_name: "geometry_msgs/msg/PoseStamped",
-            }],
+            topics: vec![
+                OpenTopic {
+                    name: "/goal_pose".to_owned(),
+                    type_name: "geometry_msgs/msg/PoseStamped",
+                    stream_bytes: None,
+                },
+                OpenTopic {
+                    name: "/headset/pose".to_owned(),
+                    type_name: "geometry_msgs/msg/PoseStamped",
+                    stream_bytes: Some(100_000),
+                },
+            ],
             parameters: true,
             graph: true,
+            stream_bytes_per_s: 1_000_000,
         }
     }
 
@@ -325,6 +328,44 @@ mod tests {
             Step::Done
         );
         assert!(matches!(desk.data(&publish), Step::Tell(_)), "no longer");
+    }
+
+    #[test]
+    fn messages_for_a_headset_are_no_questions_and_may_be_long() {
+        let offer = offer();
+        assert_eq!(offer.max_message_bytes(), 100_005);
+        assert_eq!(Offer::default().max_message_bytes(), MAX_MESSAGE_BYTES);
+        let mut desk = Desk::new(&offer);
+        let pose = ADVERTISE.replace("/goal_pose", "/headset/pose");
+        assert_eq!(desk.text(&pose), Step::Done);
+        let json = pose.replace(":3", ":4").replace("\"cdr", "\"json");
+        assert_eq!(desk.text(&json), Step::Done);
+        let goal = ADVERTISE.replace(":3", ":5");
+        assert_eq!(desk.text(&goal), Step::Done);
+        let json_goal = goal.replace(":5", ":6").replace("\"cdr", "\"json");
+        assert!(matches!(desk.text(&json_goal), Step::Tell(_)));
+        let message = |channel: u8, length: usize| {
+            let head = [1, channel, 0, 0, 0];
+            [&head[..], &vec![7; length]].concat()
+        };
+        for (channel, is_json) in [(3, false), (4, true)] {
+            for _ in 0..2 * MAX_IN_FLIGHT {
+                let bytes = vec![7; 90_000];
+                let input = Input {
+                    topic: 1,
+                    is_json,
+                    bytes,
+                };
+                assert_eq!(desk.data(&message(channel, 90_000)), Step::Input(input));
+            }
+        }
+        assert!(matches!(desk.data(&message(5, 90_000)), Step::Tell(_)));
+        assert!(matches!(desk.data(&message(5, 1)), Step::Ask(_)));
+        let long = "x".repeat(90_000);
+        assert_eq!(desk.text(&long), tell(TOO_LONG));
+        let mut long = call(0, b"cdr");
+        long.resize(90_000, 0);
+        assert!(matches!(desk.data(&long), Step::Tell(text) if text.contains("above 64 kB")));
     }
 
     proptest! {

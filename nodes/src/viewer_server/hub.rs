@@ -11,9 +11,9 @@ use serde::Serialize;
 use smol::channel::{Receiver, Sender, bounded};
 
 use super::bridge::Bridge;
-use super::desk::Offer;
 use super::graph::ConnectionGraph;
 use super::map_stream::{Entry, MapStream};
+use super::offer::Offer;
 use super::outbox::{Class, Outbox, Outgoing};
 use super::protocol::{self, Advertised, Value};
 use super::watched::Watched;
@@ -298,6 +298,7 @@ impl Hub {
     pub fn tell(&self, id: u64, message: Outgoing) {
         if let Some(client) = lock(&self.inner).clients.get_mut(&id) {
             client.outbox.answer(message);
+            client.wake();
         }
     }
 

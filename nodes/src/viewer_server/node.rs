@@ -9,16 +9,18 @@ use lattice_msgs::lattice::{LatticeMap, LatticeMapUpdate};
 use lattice_msgs::tf2_msgs::TFMessage;
 use serde::Serialize;
 
-use super::bridge::NodeBridge;
+use super::bridge::{HandOver, HeadsetTopics, NodeBridge};
 use super::hub::{Hub, HubCounts};
+use super::inputs::{Input, InputCounts, Inputs};
 use super::map_source::{MapSource, News};
 use super::map_stream::MapStream;
 use super::options::{ViewerOptions, url};
-use super::outbox::Class;
+use super::outbox::{Class, Outgoing};
 use super::parameters::Settings;
+use super::protocol::status;
 use super::server::Server;
 use super::sources::{FixedTransforms, FromChannel, Sources, Unwritten};
-use crate::compute::Compute;
+use crate::compute::{Compute, Inbox};
 use crate::map_input::{MapLosses, MapRequests};
 use crate::report;
 use crate::start::{Finish, NodeError, open_params};
@@ -32,6 +34,8 @@ enum Event {
     Update(Undecoded<LatticeMapUpdate>),
     FixedTransforms(Arc<TFMessage>),
     Message(u32, Unwritten),
+    /// Of a client, for a headset's topic.
+    Input(u64, Input),
     Tick,
     Finish,
 }
@@ -46,6 +50,7 @@ impl FromChannel for Event {
 #[derive(Serialize)]
 struct ViewerReport {
     counts: HubCounts,
+    inputs: InputCounts,
     voxels: usize,
     messages_lost: u64,
 }
@@ -64,14 +69,16 @@ pub fn start(runtime: &Runtime, name: &str) -> Result<Finish, NodeError> {
     hub.map_channels(&node.resolve("map")?, &node.resolve("map_updates")?);
     let one = Class::Newest { depth: 1 };
     let fixed_channel = hub.channel::<TFMessage>(&node.resolve("/tf_static")?, one, true);
-    hub.set_bridge(Box::new(NodeBridge::new(&node, &reach, &hub)?));
+    let inputs = Arc::new(Inputs::default());
     let gate = viewer.gate()?;
     let losses = MapLosses::default();
     let mut shell = Shell {
         node: node.clone(),
         hub: Arc::clone(&hub),
         source: MapSource::new(viewer.max_voxels),
-        sources: None,
+        parts: None,
+        inputs: Arc::clone(&inputs),
+        refusals: Throttle::new(Duration::from_secs(1)),
         fixed: FixedTransforms::default(),
         fixed_channel,
         input: MapRequests::new(&node, &reach.mapper, &losses)?,
@@ -82,13 +89,17 @@ pub fn start(runtime: &Runtime, name: &str) -> Result<Finish, NodeError> {
     // Made by the compute thread's handler at its first event.
     let (give, take) = crossbeam_channel::bounded(1);
     let compute = Compute::spawn(name, limits, runtime.shutdown_handle(), move |event| {
-        if shell.sources.is_none() {
-            shell.sources = take.recv().ok();
+        if shell.parts.is_none() {
+            shell.parts = take.recv().ok();
         }
         shell.on(event)
     })?;
     let inbox = compute.inbox();
-    let _ = give.send(Sources::new(&node, &hub, &viewer, &inbox)?);
+    let hand_over = hand_over(&inbox);
+    let (bridge, headset) = NodeBridge::new(&node, &reach, &hub, (inputs, hand_over))?;
+    hub.set_bridge(Box::new(bridge));
+    let sources = Sources::new(&node, &hub, &viewer, &inbox)?;
+    let _ = give.send(Parts { sources, headset });
     // Who listens comes after the channels: the list of them is sent once.
     let server = Server::start(viewer.address, gate.clone(), Arc::clone(&hub))?;
     tell_address(&url(server.address(), &gate), gate.token.is_some());
@@ -116,6 +127,21 @@ pub fn start(runtime: &Runtime, name: &str) -> Result<Finish, NodeError> {
     }))
 }
 
+/// Hands messages of clients over to the compute thread.
+fn hand_over(inbox: &Inbox<Event>) -> HandOver {
+    let inbox = inbox.clone();
+    Box::new(move |client, input| {
+        let bytes = input.bytes.len();
+        inbox.send(Event::Input(client, input), bytes)
+    })
+}
+
+/// Parts of the compute thread that are made once it runs.
+struct Parts {
+    sources: Sources,
+    headset: HeadsetTopics,
+}
+
 /// Says where the page is. A token is for the terminal alone: others read `/rosout` and log files.
 fn tell_address(url: &str, has_token: bool) {
     match has_token {
@@ -133,7 +159,9 @@ struct Shell {
     node: Node,
     hub: Arc<Hub>,
     source: MapSource,
-    sources: Option<Sources>,
+    parts: Option<Parts>,
+    inputs: Arc<Inputs>,
+    refusals: Throttle,
     fixed: FixedTransforms,
     fixed_channel: u32,
     input: MapRequests,
@@ -162,8 +190,24 @@ impl Shell {
                 Ok(cdr) => self.hub.offer(channel, cdr),
                 Err(error) => log::debug!("not passed on: {error}"),
             },
+            Event::Input(client, input) => self.pass(client, &input),
             Event::Tick => self.tick(),
             Event::Finish => self.finish(),
+        }
+    }
+
+    /// Publishes a client's message on its topic, or tells the client why not.
+    fn pass(&mut self, client: u64, input: &Input) {
+        let Some(parts) = &self.parts else { return };
+        match parts.headset.publish(input) {
+            Ok(()) => self.inputs.taken(input.bytes.len()),
+            Err(refusal) => {
+                self.inputs.refused(refusal);
+                if self.refusals.check().is_some() {
+                    let words = Outgoing::Text(status(refusal.words()));
+                    self.hub.tell(client, words);
+                }
+            }
         }
     }
 
@@ -173,8 +217,8 @@ impl Shell {
         if second && self.source.wait_a_second() {
             self.input.ask_for_keyframe();
         }
-        if let Some(sources) = &mut self.sources {
-            sources.adapt(&self.hub);
+        if let Some(parts) = &mut self.parts {
+            parts.sources.adapt(&self.hub);
         }
         self.feed();
         if second {
@@ -207,8 +251,8 @@ impl Shell {
     }
 
     fn messages_lost(&self) -> u64 {
-        let others = self.sources.as_ref();
-        let others = others.map_or(0, |sources| sources.lost.load(Ordering::Relaxed));
+        let others = self.parts.as_ref();
+        let others = others.map_or(0, |parts| parts.sources.lost.load(Ordering::Relaxed));
         self.input.losses().count() + others
     }
 
@@ -218,24 +262,36 @@ impl Shell {
 
     fn diagnose(&self) {
         let clients = self.hub.clients();
+        let inputs = self.inputs.counts();
         let mut values = report::key_values(&self.hub.counts());
+        values.extend(report::key_values(&inputs));
         values.push(("clients".into(), clients.to_string()));
         values.push(("voxels".into(), self.voxels().to_string()));
         values.push(("messages_lost".into(), self.messages_lost().to_string()));
         let (level, message) = match self.source.map() {
             None => (Level::Warn, "no map yet".to_owned()),
-            Some(_) => (Level::Ok, format!("{clients} clients")),
+            Some(_) if inputs.headset_refused.is_empty() => {
+                (Level::Ok, format!("{clients} clients"))
+            }
+            Some(_) => {
+                let refused = inputs.headset_refused.iter();
+                let refused = refused.map(|(reason, n)| format!("{n} {reason}"));
+                let refused: Vec<_> = refused.collect();
+                let message = format!("{clients} clients; refused: {}", refused.join(", "));
+                (Level::Warn, message)
+            }
         };
         self.diagnostics.set("viewer", level, message, values);
     }
 
     fn finish(&mut self) {
         self.feed();
-        if let Some(sources) = &mut self.sources {
-            sources.end();
+        if let Some(parts) = &mut self.parts {
+            parts.sources.end();
         }
         let report = ViewerReport {
             counts: self.hub.counts(),
+            inputs: self.inputs.counts(),
             voxels: self.voxels(),
             messages_lost: self.messages_lost(),
         };

@@ -1,6 +1,6 @@
 //! All parameters of the viewer server.
 
-use super::bridge::Reach;
+use super::bridge::{HeadsetReach, Reach};
 use super::options::ViewerOptions;
 use crate::compute::ComputeLimits;
 use crate::options::{self, TOPIC};
@@ -19,6 +19,10 @@ const ABOUT: &[About] = about! {
     "update_period_s": "Time between two messages of map_updates to clients.";
     "cloud_topics" fixed(TOPIC): "Clouds that clients can have (sensor_msgs/PointCloud2).";
     "allow_write" fixed(WRITING): "Lets clients clear and save the map, play logs, set parameters and send goals; needs no more than the token.";
+    "allow_headset" fixed(WRITING): "Lets clients publish what a headset sees (headset/mesh, headset/pose and so on) and ask for a calibration; needs no more than the token.";
+    "headset_message_bytes" fixed(WRITING): "Longest such message, bytes.";
+    "headset_bytes_per_s" fixed(WRITING): "Most bytes of such messages that a client may send in a second; what is beyond is refused and counted.";
+    "calibrator" fixed(WRITING): "Node that clients ask for a calibration.";
     "player" fixed(WRITING): "Node that plays a log.";
     "parameter_nodes" fixed(WRITING): "Nodes whose parameters clients may set.";
     "goal_topic" fixed(WRITING): "Topic of goals of clients (geometry_msgs/PoseStamped).";
@@ -53,10 +57,28 @@ impl Settings {
                 player: params.string("player", "bag_player")?,
                 parameter_nodes: params.string_array("parameter_nodes", &["lattice_mapper"])?,
                 goal_topic: params.string("goal_topic", "goal_pose")?,
+                headset: headset(params)?,
             },
             report_file: report::file(params)?,
         })
     }
+}
+
+/// Bounds of what clients may publish for a headset, if they may.
+fn headset(params: &Params) -> Result<Option<HeadsetReach>, ParamError> {
+    let allow = params.bool("allow_headset", false)?;
+    let message_bytes = params.usize_in("headset_message_bytes", 4 << 20, 4096..=64 << 20)?;
+    let bytes_per_s = params.usize_in("headset_bytes_per_s", 32 << 20, 4096..=1 << 30)?;
+    if bytes_per_s < message_bytes {
+        let problem = format!("expected at least `headset_message_bytes`, {message_bytes}");
+        return Err(params.invalid("headset_bytes_per_s", problem));
+    }
+    let calibrator = params.string("calibrator", "semantic_icp_server")?;
+    Ok(allow.then_some(HeadsetReach {
+        message_bytes,
+        bytes_per_s,
+        calibrator,
+    }))
 }
 
 /// Reads all parameters of the node, as its start does.

@@ -35,13 +35,20 @@ pub fn client_message(bytes: &[u8]) {
     let topic = OpenTopic {
         name: "/goal_pose".to_owned(),
         type_name: "geometry_msgs/msg/PoseStamped",
+        stream_bytes: None,
+    };
+    let stream = OpenTopic {
+        name: "/headset/pose".to_owned(),
+        type_name: "geometry_msgs/msg/PoseStamped",
+        stream_bytes: Some(100_000),
     };
     let (all, nothing) = (
         Offer {
             services: vec![service],
-            topics: vec![topic],
+            topics: vec![topic, stream],
             parameters: true,
             graph: true,
+            stream_bytes_per_s: 1_000_000,
         },
         Offer::default(),
     );
@@ -62,9 +69,13 @@ pub fn client_message(bytes: &[u8]) {
                     Step::Done
                 }
             };
-            if matches!(step, Step::Ask(_)) {
-                asked += 1;
-                assert!(may_ask && asked <= 16);
+            match step {
+                Step::Ask(_) => {
+                    asked += 1;
+                    assert!(may_ask && asked <= 16);
+                }
+                Step::Input(input) => assert!(may_ask && input.topic == 1),
+                _ => {}
             }
         }
     }
@@ -90,6 +101,7 @@ pub fn client_seeds() -> Vec<Vec<u8>> {
         r#"{"op":"subscribe","subscriptions":[{"id":0,"channelId":3}]}"#,
         r#"{"op":"unsubscribe","subscriptionIds":[0]}"#,
         r#"{"op":"advertise","channels":[{"id":1,"topic":"/goal_pose","encoding":"cdr","schemaName":"geometry_msgs/msg/PoseStamped"}]}"#,
+        r#"{"op":"advertise","channels":[{"id":2,"topic":"/headset/pose","encoding":"json","schemaName":"geometry_msgs/msg/PoseStamped"}]}"#,
         r#"{"op":"getParameters","parameterNames":["/a.b"],"id":"x"}"#,
         r#"{"op":"setParameters","parameters":[{"name":"/a.b","value":3,"type":"float64"}]}"#,
         r#"{"op":"unadvertise","channelIds":[1]}"#,
@@ -103,10 +115,11 @@ pub fn client_seeds() -> Vec<Vec<u8>> {
     ]
     .concat();
     let message = vec![1, 1, 0, 0, 0, 0, 1, 0, 0];
+    let input = vec![1, 2, 0, 0, 0, b'{', b'}'];
     let texts = texts.map(|text| (0, text.as_bytes().to_vec()));
     let all = texts
         .into_iter()
-        .chain([(1, call), (1, message), (2, Vec::new())]);
+        .chain([(1, call), (1, message), (1, input), (2, Vec::new())]);
     let one = |(kind, body): (u8, Vec<u8>)| {
         let length = u16::try_from(body.len()).unwrap().to_le_bytes();
         [&[kind][..], &length, &body].concat()

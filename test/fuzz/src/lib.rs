@@ -251,7 +251,7 @@ fn detailed_maps() -> Vec<Vec<u8>> {
 pub type Target = (&'static str, fn(&[u8]), fn() -> Vec<Vec<u8>>);
 
 /// All targets.
-pub const TARGETS: [Target; 11] = [
+pub const TARGETS: [Target; 12] = [
     ("map_file", map_file, || map_and_cloud_seeds().0),
     ("insert", insert, || map_and_cloud_seeds().1),
     ("message", received::message, received::message_seeds),
@@ -261,6 +261,7 @@ pub const TARGETS: [Target; 11] = [
     ("ros_args", read::ros_args, read::ros_args_seeds),
     ("bag", read::bag, read::bag_seeds),
     ("points", read::points, read::points_seeds),
+    ("mesh", read::mesh, read::mesh_seeds),
     ("http_head", connected::http_head, connected::head_seeds),
     (
         "client_message",

@@ -6,6 +6,7 @@ use std::path::Path;
 
 use lattice_bag::{BagReader, BagWriter, ReadOptions, Storage, TopicSpec, WriterOptions};
 use lattice_nodes::files::points::{PointFileLimits, read_points};
+use lattice_nodes::mesh::read_mesh;
 use lattice_runtime::params::Params;
 use lattice_runtime::params_file;
 use lattice_runtime::ros_args::RosArgs;
@@ -75,6 +76,24 @@ pub fn points(bytes: &[u8]) {
             assert!(file.points_m.len() + file.skipped_not_finite <= MOST);
             assert!(file.labels.is_empty() || file.labels.len() == file.points_m.len());
             assert!(file.points_m.iter().flatten().all(|x| x.is_finite()));
+        }
+    });
+}
+
+/// Reads a mesh file; the first byte says by which name.
+pub fn mesh(bytes: &[u8]) {
+    let Some((name, content)) = bytes.split_first() else {
+        return;
+    };
+    let ending = [".ply", ".obj", ".gltf", ".glb"][usize::from(name % 4)];
+    in_file(ending, content, |path| {
+        if let Ok(mesh) = read_mesh(path, MOST) {
+            let vertices = mesh.vertices_m().len();
+            assert!(mesh.len() <= MOST && vertices <= 3 * MOST);
+            assert!(mesh.vertices_m().iter().flatten().all(|x| x.is_finite()));
+            let mut corners = mesh.triangles().iter().flatten();
+            assert!(corners.all(|v| (*v as usize) < vertices));
+            assert_eq!(mesh.labels().len(), mesh.len());
         }
     });
 }
@@ -156,4 +175,49 @@ pub fn points_seeds() -> Vec<Vec<u8>> {
         b"\x021 2 3\n4,5,6 # x\n\nnan 0 1\n".to_vec(),
         [vec![3], vec![63; 64]].concat(),
     ]
+}
+
+/// Seeds of [`mesh`]: one square in each of the formats.
+pub fn mesh_seeds() -> Vec<Vec<u8>> {
+    let ply = b"ply\nformat ascii 1.0\nelement vertex 4\nproperty float x\nproperty float y\n\
+        property float z\nelement face 1\nproperty list uchar int vertex_indices\n\
+        property uchar label\nend_header\n0 0 0\n2 0 0\n2 1 0\n0 1 0\n4 0 1 2 3 7\n";
+    let obj = b"v 0 0 0\nv 2 0 0\nv 2 1 0\nv 0 1 0\nf 1/1/1 2 3 -1\n";
+    let vertices = [0.0_f32, 0., 0., 2., 0., 0., 2., 1., 0., 0., 1., 0.];
+    let corners = [0_u16, 1, 2, 0, 2, 3];
+    let vertices = vertices.iter().flat_map(|c| c.to_le_bytes());
+    let corners = corners.iter().flat_map(|c| c.to_le_bytes());
+    let binary: Vec<u8> = vertices.chain(corners).collect();
+    let text = |uri: &str| {
+        format!(
+            r#"{{"asset":{{"version":"2.0"}},"scenes":[{{"nodes":[0]}}],
+"nodes":[{{"children":[1],"rotation":[0,0,1,0]}},{{"mesh":0,"scale":[1,2,-3],"extras":{{"label":7}}}}],
+"meshes":[{{"primitives":[{{"attributes":{{"POSITION":0}},"indices":1,"mode":4}}]}}],
+"accessors":[{{"bufferView":0,"componentType":5126,"count":4,"type":"VEC3"}},
+{{"bufferView":0,"byteOffset":48,"componentType":5123,"count":6,"type":"SCALAR"}}],
+"bufferViews":[{{"buffer":0,"byteLength":60,"byteOffset":0}}],"buffers":[{{"byteLength":60{uri}}}]}} "#
+        )
+    };
+    let data = "AAAAAAAAAAAAAAAAAAAAQAAAAAAAAAAAAAAAQAAAgD8AAAAAAAAAAAAAgD8AAAAAAAABAAIAAAACAAMA";
+    let gltf = text(&format!(r#","uri":"data:;base64,{data}""#));
+    let mut json = text("").into_bytes();
+    json.resize(json.len().next_multiple_of(4), b' ');
+    let number = |length: usize| (length as u32).to_le_bytes();
+    let whole = 12 + 8 + json.len() + 8 + binary.len();
+    let glb = [
+        b"glTF",
+        &number(2)[..],
+        &number(whole),
+        &number(json.len()),
+        b"JSON",
+        &json,
+        &number(binary.len()),
+        b"BIN\0",
+        &binary,
+    ];
+    let files = [ply.to_vec(), obj.to_vec(), gltf.into_bytes(), glb.concat()];
+    let named = (0_u8..).zip(files);
+    named
+        .map(|(name, file)| [vec![name], file].concat())
+        .collect()
 }

@@ -4,11 +4,16 @@
 
 use std::fs;
 
+use lattice_nodes::executables;
+use lattice_nodes::headset_cloud::HeadsetReport;
 use lattice_nodes::report;
 use lattice_nodes::segmenter::SegmenterReport;
+use lattice_nodes::semantic_cloud::CloudReport;
+use lattice_runtime::Runtime;
+use lattice_runtime::ros_args::RosArgs;
 use lattice_test::domain::TestDomain;
 use lattice_test::python::python;
-use serde_json::json;
+use serde_json::{Value, json};
 
 use super::peer::{self, Nodes, params};
 
@@ -94,4 +99,120 @@ fn a_cyclone_camera_that_packs_its_images_gets_labels_too() {
     assert_eq!(found["red"], json!([1.0, 0.0]));
     let refused = found["refused"].as_str().unwrap();
     assert!(refused.contains("expected jpeg"), "{refused}");
+}
+
+/// Parameters of a node with a network inside, whose topics are reliable.
+fn inside(topics: &str, model: &str, further: &str) -> Vec<String> {
+    let topics = topics.split_whitespace();
+    let qos: Vec<_> = topics
+        .map(|topic| format!("qos.{topic}.reliability:=reliable"))
+        .collect();
+    let qos = qos.join(" ");
+    let numbers = "mean:=[0.5,0.5,0.5] std:=[0.5,0.5,0.5]";
+    params(&format!("{qos} model:={model} {numbers} {further}"))
+}
+
+fn right(found: &Value, least: u64) {
+    let fields = "x y z rgb label confidence label_probs";
+    let fields: Vec<_> = fields.split(' ').collect();
+    assert_eq!(found["fields"], json!(fields));
+    assert!(found["points"].as_u64() >= Some(least), "{found}");
+    for wrong in ["wrong", "wrong_color", "wrong_probs"] {
+        assert_eq!(found[wrong], 0, "{wrong}: {found}");
+    }
+    assert!(found["far_from_one"].as_f64() < Some(1e-3), "{found}");
+    assert_eq!(found["names"], json!([[0, "other"], [1, "red"]]));
+}
+
+#[test]
+fn networks_inside_of_nodes_label_what_a_cyclone_camera_and_headset_see() {
+    let Some(python) = python() else { return };
+    let directory = tempfile::tempdir().unwrap();
+    let path = directory.path();
+    peer::run(&python, "onnx_models.py", &[path]);
+    let domain = TestDomain::take();
+    let jpeg = concat!(
+        env!("CARGO_MANIFEST_DIR"),
+        "/../nodes/src/segmenter/red_blue.jpg"
+    );
+    let scenario = json!({"domain": domain.id(), "jpeg": jpeg});
+    fs::write(path.join("scenario.json"), scenario.to_string()).unwrap();
+    let model = path.join("red.onnx").display().to_string();
+    let report = |name: &str| path.join(name).display().to_string();
+    let camera = format!(
+        "input_size:=[160,120] label_probs:=true report_file:={}",
+        report("camera")
+    );
+    let topics =
+        "depth_registered/image_rect rgb/image_rect_color rgb/camera_info points labels/image";
+    let camera = inside(topics, &model, &camera);
+    let headset = format!(
+        "input_size:=[16,8] compressed_color:=true headset_axes:=unity_ruf stride:=1 report_file:={}",
+        report("headset")
+    );
+    let topics = "headset/image/compressed headset/camera_info headset/pose headset/points";
+    let headset = inside(topics, &model, &headset);
+    let nodes = [("semantic_cloud", camera), ("headset_cloud", headset)];
+    let nodes = Nodes::start(&domain, &nodes);
+    let found = peer::run(&python, "onnx_inside_peer.py", &[path]);
+    nodes.finish();
+
+    let camera = &found["depth_camera"];
+    right(camera, 160 * 120);
+    assert_eq!(camera["later"], 160 * 120);
+    assert_eq!(camera["told"], camera["names"]);
+    assert_eq!(camera["mask"], json!(["mono8", 160, 120, "camera"]));
+    let refused = camera["refused"].as_str().unwrap();
+    assert!(refused.contains("1000 bytes, but 120 rows"), "{refused}");
+    let headset = &found["headset"];
+    right(headset, 16 * 8);
+    let refused = headset["refused"].as_str().unwrap();
+    assert!(refused.contains("its JPEG file"), "{refused}");
+
+    let camera: CloudReport = report::read(&path.join("camera")).unwrap();
+    let headset: HeadsetReport = report::read(&path.join("headset")).unwrap();
+    for network in [camera.network.unwrap(), headset.network.unwrap()] {
+        assert_eq!(network.dropped["malformed"], 1);
+        let dropped: u64 = network.dropped.values().sum();
+        assert_eq!(network.images_in, network.labels_out + dropped);
+    }
+    assert_eq!((camera.images_lost, headset.messages_lost), (0, 0));
+    assert!(camera.counts.clouds_out >= 2 && headset.counts.clouds_out >= 1);
+}
+
+/// Refusal of a node at its start.
+fn refusal(domain: &TestDomain, name: &str, line: &str) -> String {
+    let params = params(line).into_iter();
+    let params = params.flat_map(|param| ["-p".to_owned(), param]);
+    let args = ["--ros-args".to_owned()].into_iter().chain(params);
+    let args = RosArgs::parse(args).unwrap();
+    let runtime = Runtime::with_transport(name, args, &domain.transport()).unwrap();
+    let started = executables::find(name).unwrap()(&runtime, name);
+    started.map(drop).unwrap_err().to_string()
+}
+
+#[test]
+fn a_model_that_a_program_cannot_run_is_refused_at_the_start() {
+    let domain = TestDomain::take();
+    for (node, given, expected) in [
+        (
+            "semantic_cloud",
+            "model:=/nowhere/model.onnx",
+            "No such file",
+        ),
+        (
+            "headset_cloud",
+            "model:=/nowhere/model.onnx",
+            "No such file",
+        ),
+        (
+            "headset_cloud",
+            "model:=/nowhere/model.onnx labels_from:=mesh",
+            "takes no labels of images",
+        ),
+        ("semantic_cloud", "backend:=caffe", "tract or ort"),
+    ] {
+        let error = refusal(&domain, node, given);
+        assert!(error.contains(expected), "{node}: {error}");
+    }
 }

@@ -36,6 +36,7 @@ fn log(folder: &Path, person: bool) -> PathBuf {
     let options = BobcatOptions {
         seed: 1,
         duration_s: DURATION_S,
+        begin_s: 0.0,
         person,
         ins_offset: [0.0; 4],
         storage: Storage::Mcap,

@@ -23,6 +23,7 @@ fn options(out: &Path, storage: Storage, seed: u64) -> BobcatOptions {
     BobcatOptions {
         seed,
         duration_s: DURATION_S,
+        begin_s: 0.0,
         person: false,
         ins_offset: [0.0; 4],
         storage,

@@ -1,11 +1,12 @@
-//! Networks in ONNX files: their output beside that of ONNX Runtime, and those that cannot be used.
+//! Networks in ONNX files: their output beside that of ONNX Runtime, and those that cannot be used; by each backend.
 //!
-//! Networks are made by `python/onnx_models.py` with random weights.
+//! Networks are made by `python/onnx_models.py` with random weights; `rooms` is the one that comes with the laboratory.
 
 use std::fs;
 use std::path::Path;
 
-use lattice_nodes::segmenter::{Scores, Size, Values, read_network};
+use lattice_lab::models::write_rooms;
+use lattice_nodes::segmenter::{Backend, Scores, Size, Values, read_network, read_network_by};
 use lattice_test::python::{python, script};
 use serde_json::Value;
 
@@ -18,6 +19,18 @@ fn run(python: &Path, name: &str, arguments: &[&str]) -> Value {
     let errors = String::from_utf8_lossy(&output.stderr);
     assert!(output.status.success(), "{name}: {errors}");
     serde_json::from_slice(&output.stdout).unwrap()
+}
+
+/// Backends that can be tested: ONNX Runtime with the feature and a library alone.
+fn backends() -> Vec<(&'static str, Backend)> {
+    let has_library = std::env::var_os("ORT_DYLIB_PATH").is_some();
+    let ort = cfg!(feature = "ort") && has_library;
+    if !ort {
+        println!("skipped for ort: no feature `ort`, or no library in ORT_DYLIB_PATH");
+    }
+    let all = Backend::ALL.into_iter();
+    all.filter(|(_, backend)| *backend == Backend::Tract || ort)
+        .collect()
 }
 
 fn numbers<const N: usize, T>(path: &Path, from_bytes: fn([u8; N]) -> T) -> Vec<T> {
@@ -49,13 +62,16 @@ fn networks_give_what_onnx_runtime_gives() {
     let path = directory.path();
     let folder = path.to_str().unwrap();
     run(&python, "onnx_models.py", &[folder]);
-    let names = ["psp", "psp_classes", "deeplab", "segformer"];
+    write_rooms(path).unwrap();
+    let names = ["psp", "psp_classes", "deeplab", "segformer", "rooms"];
     let peer = run(&python, "onnx_parity.py", &[&[folder][..], &names].concat());
     for name in names {
         let file = path.join(name);
         let image = numbers(&file.with_extension("in"), f32::from_le_bytes);
-        for threads in [1, 2] {
-            let network = read_network(&file.with_extension("onnx"), None, threads).unwrap();
+        let model = file.with_extension("onnx");
+        let backends = backends().into_iter();
+        for ((backend, by), threads) in backends.flat_map(|by| [(by, 1), (by, 2)]) {
+            let network = read_network_by(by, &model, None, threads).unwrap();
             let found = network.run(image.clone()).unwrap();
             let expected = match &found.values {
                 Values::Classes(_) => {
@@ -84,7 +100,7 @@ fn networks_give_what_onnx_runtime_gives() {
             let pairs = classes(&found).into_iter().zip(peer_classes);
             let differ = pairs.filter(|(a, b)| a != b).count();
             println!(
-                "{name}, {threads} threads: {difference:.1e} of the range from onnxruntime {}, {differ} of {} \
+                "{name}, {backend}, {threads} threads: {difference:.1e} of the range from onnxruntime {}, {differ} of {} \
                  pixels differ",
                 peer["version"],
                 size.pixels()
@@ -108,11 +124,19 @@ fn models_that_cannot_be_used_are_refused_by_what_is_wrong() {
     for (name, given, expected) in [
         ("nowhere", None, "No such file"),
         ("text", None, "this is no ONNX file"),
-        ("unknown", None, "operators that are not known: Frobnicate"),
+        ("unknown", None, "Frobnicate"),
         ("huge", None, "tensor 'huge' is of [50000, 50000]"),
         ("cut", None, "tensor 'cut' says 100 values and has fewer"),
         ("elsewhere", None, "tensor 'elsewhere' are in another file"),
         ("made", None, "[100000, 100000]"),
+        ("product", None, "[100000, 100000], at most"),
+        ("doubled", None, "[524288, 1024], at most"),
+        ("spread", None, "[100000, 100000], at most"),
+        (
+            "branch",
+            None,
+            "graphs inside of graphs are not read: operator If",
+        ),
         ("pair", None, "it has 2 inputs"),
         ("grey", None, "expected f32 of 1 x 3 x rows x columns"),
         ("flat", None, "expected scores of 1 x classes"),
@@ -127,12 +151,16 @@ fn models_that_cannot_be_used_are_refused_by_what_is_wrong() {
         ),
     ] {
         let file = path.join(name).with_extension("onnx");
-        let found = read_network(&file, given, 1).map(drop);
-        let error = found.unwrap_err().to_string();
-        assert!(error.contains(expected), "{name}: {error}");
-        assert!(error.contains(&file.display().to_string()), "{error}");
+        for (backend, by) in backends() {
+            let found = read_network_by(by, &file, given, 1).map(drop);
+            let error = found.unwrap_err().to_string();
+            assert!(error.contains(expected), "{name}, {backend}: {error}");
+            assert!(error.contains(&file.display().to_string()), "{error}");
+        }
     }
-    let open = read_network(&path.join("open.onnx"), size(8, 6), 1).unwrap();
-    assert_eq!(open.input().pixels(), 48);
-    assert!(open.names().is_empty());
+    for (_, by) in backends() {
+        let open = read_network_by(by, &path.join("open.onnx"), size(8, 6), 1).unwrap();
+        assert_eq!(open.input().pixels(), 48);
+        assert!(open.names().is_empty());
+    }
 }

@@ -32,6 +32,8 @@ pub enum Bench {
     File(MapFile),
     /// Prepare two point files of any format and register one to the other
     Register(super::bench_register::Register),
+    /// Send images of a camera to the node `semantic_cloud`: latency of its clouds, processor time
+    Camera(super::bench_camera::Camera),
     /// Run a network on an image, as the node `segmenter` does
     Segment(super::bench_segment::Segment),
     /// Send clouds to another process over the DDS of the nodes: loss, latency, processor time
@@ -178,6 +180,7 @@ impl Bench {
             Self::Raycast(command) => command.run(),
             Self::File(command) => command.run(),
             Self::Register(command) => command.run(),
+            Self::Camera(command) => command.run(),
             Self::Segment(command) => command.run(),
             Self::Transport(command) => command.run(),
         }

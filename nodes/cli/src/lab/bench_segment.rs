@@ -3,7 +3,7 @@
 use crate::CliResult;
 use clap::Args;
 use lattice_lab::bench;
-use lattice_nodes::segmenter::{Size, read_network};
+use lattice_nodes::segmenter::{Backend, Size, read_network_by};
 use std::path::PathBuf;
 
 /// Options of `lattice bench segment`.
@@ -15,6 +15,9 @@ pub struct Segment {
     /// Width and height of its input, where the file leaves them open
     #[arg(long, num_args = 2, value_names = ["WIDTH", "HEIGHT"])]
     input_size: Option<Vec<usize>>,
+    /// Library that runs it: tract, or ort where the program has it
+    #[arg(long, default_value = "tract", value_parser = backend)]
+    backend: Backend,
     /// Measured runs; one more goes before
     #[arg(long, default_value_t = 10)]
     rounds: usize,
@@ -26,6 +29,12 @@ pub struct Segment {
     json: bool,
 }
 
+fn backend(name: &str) -> Result<Backend, String> {
+    let found = Backend::ALL.iter().find(|(known, _)| *known == name);
+    let expected = "expected tract or ort".to_owned();
+    found.map(|(_, backend)| *backend).ok_or(expected)
+}
+
 impl Segment {
     /// Runs the command.
     pub fn run(self) -> CliResult {
@@ -33,7 +42,7 @@ impl Segment {
             [width, height] => Some(Size { width, height }),
             _ => None,
         });
-        let network = read_network(&self.model, size, self.threads.into())?;
+        let network = read_network_by(self.backend, &self.model, size, self.threads.into())?;
         let report = bench::segment(network.as_ref(), self.rounds)?;
         if self.json {
             println!("{}", serde_json::to_string(&report)?);

@@ -1,5 +1,6 @@
 //! `lattice evaluate`: calibration and registration, measured.
 
+use super::evaluate_chain::Chain;
 use super::evaluate_kitti::Kitti;
 use super::evaluate_many::{Many, Reliability};
 use super::{Choice, choice, processors};
@@ -25,6 +26,9 @@ pub enum Evaluate {
     /// Calibrate where no answer may be certain: rooms that look alike from several places, and clouds in wrong
     /// axes, of a wrong scale, leaning, or of another building
     Traps(Many),
+    /// Calibrate a headset to a robot's map by rendered images and a network that labels them, beside the same without
+    /// labels and with true ones; needs the feature `onnx`
+    Chain(Chain),
     /// Find lidar scans of a simulated street in each other, 5 to 30 m apart, without a start
     Town(Many),
     /// Compare what verdicts of other evaluations stated with what was observed
@@ -115,6 +119,7 @@ impl Evaluate {
         match self {
             Self::Calibration(command) => command.run(),
             Self::Traps(command) => command.traps(),
+            Self::Chain(command) => command.run(),
             Self::Town(command) => command.town(),
             Self::Reliability(command) => command.run(),
             Self::Kitti(command) => command.run(),

@@ -1,11 +1,13 @@
 //! The commands of the laboratory: simulation, papers, evaluations, benchmarks.
 
 mod bench;
+mod bench_camera;
 mod bench_register;
 mod bench_segment;
 mod bench_transport;
 mod demo;
 mod evaluate;
+mod evaluate_chain;
 mod evaluate_kitti;
 mod evaluate_many;
 mod paper;

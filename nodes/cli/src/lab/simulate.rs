@@ -1,6 +1,7 @@
 //! `lattice simulate`: logs and point files of simulated machines.
 
 mod house;
+mod images;
 mod town;
 
 use super::{Choice, choice, show};
@@ -23,6 +24,9 @@ pub enum Simulate {
     Site(Site),
     /// A furnished house: a robot's labelled map, what a headset sees of four scenes, and the truth
     House(house::House),
+    /// Images of rooms as the camera of a robot or a headset sees them, with depth, true labels and poses, for
+    /// training networks
+    Images(images::Images),
     /// A street of a town as two lidar scans see it at different times, and the truth
     Town(town::Town),
 }
@@ -56,6 +60,9 @@ pub struct Bobcat {
     /// Length of the log in s
     #[arg(long, default_value_t = 30.0)]
     duration: f64,
+    /// Time of the tour at which the log begins, s; its stamps are as much later
+    #[arg(long, default_value_t = 0.0, value_name = "SECONDS")]
+    begin: f64,
     /// Let a person walk through the yard in the first 15 s
     #[arg(long)]
     person: bool,
@@ -102,6 +109,7 @@ impl Simulate {
             Self::Bobcat(command) => command.run(),
             Self::Site(command) => command.run(),
             Self::House(command) => command.run(),
+            Self::Images(command) => command.run(),
             Self::Town(command) => command.run(),
         }
     }
@@ -127,6 +135,7 @@ impl Bobcat {
         let summary = bobcat(&BobcatOptions {
             seed: self.seed,
             duration_s: self.duration,
+            begin_s: self.begin,
             person: self.person,
             ins_offset: match self.ins_offset.as_deref() {
                 Some(&[east_m, north_m, up_m, turn_deg]) => [east_m, north_m, up_m, turn_deg],

@@ -1,6 +1,6 @@
 //! `lattice replay`: maps of a log.
 
-mod node_process;
+pub mod node_process;
 mod processes;
 
 use std::ffi::OsString;
@@ -23,6 +23,7 @@ use lattice_runtime::LoopbackDomain;
 use lattice_runtime::params::Params;
 use lattice_runtime::ros_args::RosArgs;
 use processes::DdsReplay;
+pub use processes::{param, yaml_text};
 
 /// Lattices of a replay over DDS: each takes two of the twelve participants that loopback shows.
 const MAX_LOOPBACK_LATTICES: usize = 5;

@@ -14,6 +14,7 @@ use crossbeam_channel::{Receiver, Sender, unbounded};
 use super::processes::{DdsReplay, param, yaml_text};
 use crate::CliResult;
 use lattice_nodes::report;
+use lattice_runtime::LoopbackDomain;
 
 /// Texts of warnings that are remembered.
 const MAX_TEXTS: usize = 1000;
@@ -75,7 +76,21 @@ impl NodeProcess {
         {
             command.args(["-p", param]);
         }
-        if let Some(domain) = &replay.domain {
+        let what = match namespace {
+            Some(namespace) => format!("{namespace}/{node}"),
+            None => node.to_owned(),
+        };
+        Self::spawn(command, what, replay.domain.as_ref(), report)
+    }
+
+    /// Starts a command that runs nodes, one of which writes this report, on a domain of loopback.
+    pub fn spawn(
+        mut command: Command,
+        what: String,
+        domain: Option<&LoopbackDomain>,
+        report: &Path,
+    ) -> CliResult<Self> {
+        if let Some(domain) = domain {
             command.env("ROS_DOMAIN_ID", domain.id().to_string());
         }
         command
@@ -84,10 +99,6 @@ impl NodeProcess {
             .stdin(Stdio::null())
             .stdout(Stdio::null())
             .stderr(Stdio::piped());
-        let what = match namespace {
-            Some(namespace) => format!("{namespace}/{node}"),
-            None => node.to_owned(),
-        };
         let spawned = command.spawn();
         let mut child = spawned.map_err(|error| format!("cannot start {what}: {error}"))?;
         let (sender, lines) = unbounded();

@@ -143,12 +143,12 @@ impl DdsReplay<'_> {
 }
 
 /// A parameter as `-p` takes it.
-pub(super) fn param(name: &str, value: &str) -> String {
+pub fn param(name: &str, value: &str) -> String {
     format!("{name}:={value}")
 }
 
 /// A path as YAML text.
-pub(super) fn yaml_text(path: &Path) -> String {
+pub fn yaml_text(path: &Path) -> String {
     format!("'{}'", path.display().to_string().replace('\'', "''"))
 }
 

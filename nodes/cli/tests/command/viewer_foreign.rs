@@ -138,7 +138,7 @@ fn alike(value: &Value) -> Value {
 }
 
 /// Folder in which `test/node` is installed; else a line says so.
-fn folder() -> Option<OsString> {
+pub fn folder() -> Option<OsString> {
     let folder = std::env::var_os("LATTICE_NODE_PEER");
     if folder.is_none() {
         let problem = "SKIPPED: LATTICE_NODE_PEER names no folder with test/node installed";

@@ -35,9 +35,9 @@ fn params(folder: &Path, map: &str, allow_write: bool) -> String {
     path.display().to_string()
 }
 
-type Socket = WebSocket<MaybeTlsStream<TcpStream>>;
+pub type Socket = WebSocket<MaybeTlsStream<TcpStream>>;
 
-fn socket(url: &str) -> Socket {
+pub fn socket(url: &str) -> Socket {
     let mut request = url.replace("http", "ws").into_client_request().unwrap();
     let protocol = "foxglove.websocket.v1".parse().unwrap();
     request
@@ -47,7 +47,7 @@ fn socket(url: &str) -> Socket {
 }
 
 /// The next text message of this kind.
-fn text(socket: &mut Socket, op: &str) -> Value {
+pub fn text(socket: &mut Socket, op: &str) -> Value {
     loop {
         if let Message::Text(text) = socket.read().unwrap() {
             let message: Value = serde_json::from_str(&text).unwrap();

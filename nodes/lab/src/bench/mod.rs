@@ -3,6 +3,7 @@
 //! A point file is little-endian f32 `x y z i`, 16 bytes a point. `FILE.scans` beside it says which points
 //! belong to one scan: records of 32 bytes, three f64 (position of the scanner, m) and a u64 (points).
 
+mod camera;
 mod clock;
 mod file;
 mod hash26;
@@ -17,6 +18,7 @@ mod segment;
 mod site;
 mod transport;
 
+pub use camera::{CameraReport, CameraSetup, camera};
 use clock::Spent;
 pub(crate) use clock::timed;
 pub use file::{FileMethod, file};

@@ -36,7 +36,7 @@ pub(super) struct Block<'a> {
     pub(super) entries: Vec<LogEntry>,
     /// INS epochs, for their true poses.
     pub(super) epochs: &'a [InsSample],
-    /// End of the block, ns since the start of the log.
+    /// End of the block, ns since the start of the tour.
     pub(super) end_ns: i64,
 }
 
@@ -55,7 +55,7 @@ impl<'a> Log<'a> {
     pub(super) fn new(bobcat: &'a Bobcat) -> Result<Self, AnyError> {
         let mounts = LogEntry {
             topic: TF_STATIC_TOPIC,
-            log_time_ns: bobcat_start_ns(),
+            log_time_ns: bobcat_start_ns().saturating_add(bobcat.begin_ns()),
             cdr: cdr::to_vec(&messages::mounts())?,
             true_points_m: Vec::new(),
         };
@@ -63,8 +63,8 @@ impl<'a> Log<'a> {
             bobcat,
             map: EnuFrame::new(bobcat_origin()?),
             samples: bobcat.ins().peekable(),
-            next_scan: [0; 3],
-            begin_ns: 0,
+            next_scan: Laser::ALL.map(|laser| bobcat.first_scan(laser)),
+            begin_ns: bobcat.begin_ns(),
             epochs: Vec::new(),
             pending: vec![mounts],
         })
@@ -72,7 +72,7 @@ impl<'a> Log<'a> {
 
     /// The next block, None after the last. Each block holds what arrives in it, wherever it was measured.
     pub(super) fn next_block(&mut self) -> Result<Option<Block<'_>>, AnyError> {
-        if self.begin_ns > self.bobcat.duration_ns() {
+        if self.begin_ns > self.bobcat.end_ns() {
             return Ok(None);
         }
         let end_ns = self.begin_ns.saturating_add(BLOCK_NS);
@@ -91,7 +91,7 @@ impl<'a> Log<'a> {
         // Log times of one topic differ, so that this order is the only one.
         self.pending
             .sort_by(|a, b| (a.log_time_ns, a.topic).cmp(&(b.log_time_ns, b.topic)));
-        let last = end_ns > self.bobcat.duration_ns();
+        let last = end_ns > self.bobcat.end_ns();
         let limit_ns = bobcat_start_ns().saturating_add(end_ns);
         let arrived = if last {
             self.pending.len()
@@ -180,6 +180,30 @@ mod tests {
         let bobcat = Bobcat::new(1, 3.0).unwrap();
         for laser in Laser::ALL {
             assert_eq!(count(points_topic(laser)) as u64, bobcat.scan_count(laser));
+        }
+    }
+
+    #[test]
+    fn a_later_log_has_what_a_longer_one_has_then() {
+        let later = Bobcat::new(1, 1.5).unwrap().from_time(3.0).unwrap();
+        let mut log = Log::new(&later).unwrap();
+        let mut found = Vec::new();
+        while let Some(block) = log.next_block().unwrap() {
+            found.extend(block.entries);
+        }
+        let whole = entries(1, 4.5);
+        let begin_ns = bobcat_start_ns() + later.begin_ns();
+        assert_eq!(found[0].topic, TF_STATIC_TOPIC);
+        assert_eq!(found[0].log_time_ns, begin_ns);
+        assert!(found[1..].iter().all(|entry| whole.contains(entry)));
+        // Scans that started before it are the only ones that it lacks.
+        let missing = whole
+            .iter()
+            .filter(|e| e.log_time_ns >= begin_ns && !found.contains(e));
+        let missing: Vec<_> = missing.map(|e| e.topic).collect();
+        assert!(missing.len() <= 6, "{missing:?}");
+        for begin_s in [-1.0, f64::NAN, 1e9] {
+            assert!(Bobcat::new(1, 1.0).unwrap().from_time(begin_s).is_err());
         }
     }
 

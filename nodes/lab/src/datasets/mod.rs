@@ -21,10 +21,13 @@
 //! `site.yaml` (origin, mounts, noise, seed).
 //!
 //! [`write_house`] writes another world: a furnished house as a robot maps it and as a headset sees
-//! four of its corners (see [`crate::simulate::house`]), for calibrations.
+//! four of its corners (see [`crate::simulate::house`]), for calibrations; [`write_images`] what cameras see of such
+//! houses, for networks.
 
 mod facts;
 mod house;
+mod images;
+mod indoor;
 mod log;
 mod messages;
 mod town;
@@ -38,6 +41,13 @@ pub use facts::{
 };
 pub use house::{
     CLASSES_FILE, HeadsetAxes, HouseOptions, HouseSummary, MAP_FILE, SceneTruth, write_house,
+};
+pub use images::{
+    IMAGES_FILE, ImageCamera, ImageEntry, ImageHouses, ImageSet, ImagesOptions, ImagesSummary,
+    write_images,
+};
+pub use indoor::{
+    Indoor, IndoorOptions, IndoorSummary, LabelAccuracy, label_accuracy, write_indoor,
 };
 pub use town::{TownOptions, TownSummary, write_town};
 pub use write::{BobcatOptions, BobcatSummary, write_bobcat};

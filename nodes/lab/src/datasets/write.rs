@@ -26,6 +26,8 @@ pub struct BobcatOptions {
     pub seed: u64,
     /// Length of the log, s.
     pub duration_s: f64,
+    /// Time of the tour at which it begins, s.
+    pub begin_s: f64,
     /// A person who walks through the yard.
     pub person: bool,
     /// Constant error of the INS: east, north, up in m, then about up in degrees.
@@ -106,6 +108,7 @@ fn write_log(
         Vector3::z() * turn_deg.to_radians(),
     );
     let bobcat = Bobcat::new(options.seed, options.duration_s)?
+        .from_time(options.begin_s)?
         .with_person(options.person)
         .with_ins_offset(ins_offset);
     let writer = WriterOptions::default();
@@ -124,7 +127,8 @@ fn write_log(
     let mut log = Log::new(&bobcat)?;
     while let Some(block) = log.next_block()? {
         write_block(&block, &mut bag, &topics, &mut truth, &mut summary)?;
-        progress((block.end_ns as f64 / bobcat.duration_ns() as f64).min(1.0));
+        let done_ns = block.end_ns.saturating_sub(bobcat.begin_ns());
+        progress((done_ns as f64 * 1e-9 / options.duration_s).min(1.0));
     }
     truth.finish()?;
     bag.finish()?;
@@ -174,7 +178,7 @@ fn topic_specs() -> Vec<TopicSpec> {
     specs
 }
 
-fn spec<M: RosMessage>(name: &str, qos: BagQos) -> TopicSpec {
+pub(super) fn spec<M: RosMessage>(name: &str, qos: BagQos) -> TopicSpec {
     TopicSpec {
         name: name.to_owned(),
         type_name: M::TYPE.to_owned(),

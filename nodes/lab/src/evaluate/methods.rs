@@ -2,7 +2,7 @@
 
 use super::testbed::Scenario;
 use super::trial::{OURS, TIMED, TRACKED};
-use lattice_core::registration::{Method, NamedMethod, register};
+use lattice_core::registration::{CalibrationMap, Method, NamedMethod, PreparedCloud, register};
 use nalgebra::Isometry3;
 use plotters::style::RGBColor;
 
@@ -68,19 +68,38 @@ impl Baseline {
         self.0.map_or(START, |method| method.name)
     }
 
+    /// The method with a name.
+    pub fn named(name: &str) -> Option<Baseline> {
+        Baseline::all().find(|baseline| baseline.name() == name)
+    }
+
+    /// The pose that it finds for a cloud in a map from a start.
+    pub fn register(
+        &self,
+        source: &PreparedCloud,
+        map: &CalibrationMap,
+        start: &Isometry3<f64>,
+    ) -> Isometry3<f64> {
+        let found = |method: &NamedMethod| {
+            let options = method.options(GATE_M);
+            register(source, map.cloud(), start, &options).target_from_source
+        };
+        self.0.map_or(*start, found)
+    }
+
     /// The pose that it finds from a start.
     ///
     /// The class-wise method of 2017 gets all points: it leaves out classes of fewer than 400, which would
     /// be nearly all of the thinned ones.
     pub fn run(&self, scenario: &Scenario, start: &Isometry3<f64>) -> Isometry3<f64> {
-        let Some(method) = self.0 else {
-            return *start;
+        let class_wise = self.0.is_some_and(|method| {
+            let options = method.options(GATE_M);
+            matches!(options.method, Method::ClassWise) && options.kernel_of_square
+        });
+        let source = match class_wise {
+            true => &scenario.full,
+            false => &scenario.source,
         };
-        let options = method.options(GATE_M);
-        let source = match options.method {
-            Method::ClassWise if options.kernel_of_square => &scenario.full,
-            _ => &scenario.source,
-        };
-        register(source, scenario.map.cloud(), start, &options).target_from_source
+        self.register(source, &scenario.map, start)
     }
 }

@@ -5,6 +5,7 @@
 //! Results are lines of a file that grows and is continued; the report is made of all of them, failures
 //! included.
 
+mod chain;
 mod figures;
 mod house;
 mod initial_guess;
@@ -23,6 +24,7 @@ mod town;
 mod traps;
 mod trial;
 
+pub use chain::{ChainOptions, chain_report, chain_settings, run_chain};
 pub use house::read_house;
 pub use many::{Case, run_cases, settings_of};
 pub use methods::competitors;

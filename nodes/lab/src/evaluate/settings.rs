@@ -15,6 +15,9 @@ pub struct Settings {
     pub format: u32,
     /// Checksum of the mesh, or None for the house of our own making.
     pub mesh_crc32: Option<u32>,
+    /// Checksum of the network that labels images, where one does.
+    #[serde(skip_serializing_if = "Option::is_none", default)]
+    pub model_crc32: Option<u32>,
     /// Side of a cubic cell of the robot's map, metres.
     pub cell_side_m: f64,
     /// Views of the robot's survey.
@@ -53,6 +56,7 @@ impl Default for Settings {
         Settings {
             format: FORMAT,
             mesh_crc32: None,
+            model_crc32: None,
             cell_side_m: 0.05,
             survey_views: 384,
             map_seeds: 3,

@@ -38,8 +38,20 @@ pub struct Trial {
     /// Share of the cloud's points that the map has too, where that is measured.
     #[serde(skip_serializing_if = "Option::is_none", default)]
     pub overlap: Option<f64>,
+    /// Shares of labels that are right, where a network gave them.
+    #[serde(skip_serializing_if = "Option::is_none", default)]
+    pub labels: Option<LabelsRight>,
     #[serde(skip_serializing_if = "Option::is_none", default)]
     pub judged: Option<Judged>,
+}
+
+/// Shares of labels that are right.
+#[derive(Clone, Copy, PartialEq, Debug, Serialize, Deserialize)]
+pub struct LabelsRight {
+    /// Of the voxels of the map, by their most frequent label.
+    pub map: f64,
+    /// Of the points of the headset.
+    pub headset: f64,
 }
 
 /// A calibration's judgement of its pose.
@@ -117,6 +129,7 @@ impl Trial {
             view_m: rounded(apart_m.sum::<f64>() / seen_m.len().max(1) as f64),
             wall_ms: rounded(wall_ms),
             overlap: None,
+            labels: None,
             judged: None,
         }
     }

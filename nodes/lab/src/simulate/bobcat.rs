@@ -95,12 +95,21 @@ pub enum SimulationError {
         /// Duration asked for, s.
         duration_s: f64,
     },
+    /// The log begins before its tour, or ends too late.
+    #[error(
+        "cannot begin {begin_s} s after the start of the tour; a log ends within {MAX_DURATION_S} s of it"
+    )]
+    Begin {
+        /// Begin asked for, s.
+        begin_s: f64,
+    },
 }
 
 /// The simulated loader with its sensors on its site.
 #[derive(Clone, Debug)]
 pub struct Bobcat {
     seed: u64,
+    begin_ns: i64,
     duration_ns: i64,
     site: Site,
     loader: Loader,
@@ -121,6 +130,7 @@ impl Bobcat {
         };
         Ok(Self {
             seed,
+            begin_ns: 0,
             duration_ns: (duration_s * 1e9).round() as i64,
             site: Site::earth_moving(),
             loader: Loader::new(seed),
@@ -130,6 +140,20 @@ impl Bobcat {
             ],
             person: false,
             ins_offset: Isometry3::identity(),
+        })
+    }
+
+    /// The part of the tour from `begin_s` on, of the same duration; stamps begin as much later.
+    pub fn from_time(self, begin_s: f64) -> Result<Self, SimulationError> {
+        let duration_s = self.duration_ns as f64 * 1e-9 + begin_s;
+        if begin_s.is_nan() || begin_s < 0.0 || duration_s > MAX_DURATION_S {
+            return Err(SimulationError::Begin { begin_s });
+        }
+        // At an epoch, so that every scan lies between two.
+        let epochs = (begin_s * 1e9 / INS_PERIOD_NS as f64).round();
+        Ok(Self {
+            begin_ns: epochs as i64 * INS_PERIOD_NS,
+            ..self
         })
     }
 
@@ -147,8 +171,14 @@ impl Bobcat {
         self.seed
     }
 
-    pub fn duration_ns(&self) -> i64 {
-        self.duration_ns
+    /// Begin of the log, ns since the start of the tour.
+    pub fn begin_ns(&self) -> i64 {
+        self.begin_ns
+    }
+
+    /// End of the log, ns since the start of the tour.
+    pub fn end_ns(&self) -> i64 {
+        self.begin_ns.saturating_add(self.duration_ns)
     }
 
     pub fn site(&self) -> &Site {
@@ -182,7 +212,7 @@ impl Bobcat {
         }
     }
 
-    /// Start of a scan, ns since the start of the log.
+    /// Start of a scan, ns since the start of the tour.
     pub fn scan_start_ns(&self, laser: Laser, index: u64) -> i64 {
         let rate = i128::from(SCAN_RATE_HZ);
         let since_first = (i128::from(index) * 1_000_000_000 + rate / 2) / rate;
@@ -190,9 +220,21 @@ impl Bobcat {
         laser.first_scan_ns().saturating_add(since_first)
     }
 
-    /// Number of scans that end before the last INS epoch.
+    /// Number of scans of the tour that start before the log.
+    pub fn first_scan(&self, laser: Laser) -> u64 {
+        let before_ns = i128::from(self.begin_ns - laser.first_scan_ns());
+        let guess = before_ns * i128::from(SCAN_RATE_HZ) / 1_000_000_000;
+        // Starts are rounded to ns.
+        let mut first = u64::try_from(guess).unwrap_or(0);
+        while self.scan_start_ns(laser, first) < self.begin_ns {
+            first += 1;
+        }
+        first
+    }
+
+    /// Number of scans of the tour that end before the last INS epoch of the log.
     pub fn scan_count(&self, laser: Laser) -> u64 {
-        let last_epoch_ns = self.duration_ns / INS_PERIOD_NS * INS_PERIOD_NS;
+        let last_epoch_ns = self.end_ns() / INS_PERIOD_NS * INS_PERIOD_NS;
         let room_ns = last_epoch_ns - laser.first_scan_ns() - SCAN_SPAN_NS - 1;
         let scans = i128::from(room_ns) * i128::from(SCAN_RATE_HZ) / 1_000_000_000;
         u64::try_from(scans).map_or(0, |n| n + 1)

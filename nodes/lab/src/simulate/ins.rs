@@ -58,10 +58,16 @@ pub struct InsSamples<'a> {
 
 impl<'a> InsSamples<'a> {
     pub(super) fn new(bobcat: &'a Bobcat) -> Self {
+        let next = bobcat.begin_ns() / INS_PERIOD_NS;
+        let mut errors = Errors::new(bobcat.seed());
+        for _ in 0..next {
+            errors.step();
+            errors.delay_ns();
+        }
         Self {
             bobcat,
-            errors: Errors::new(bobcat.seed()),
-            next: 0,
+            errors,
+            next,
         }
     }
 
@@ -105,7 +111,7 @@ impl Iterator for InsSamples<'_> {
 
     fn next(&mut self) -> Option<InsSample> {
         let time_ns = self.next.checked_mul(INS_PERIOD_NS)?;
-        if time_ns > self.bobcat.duration_ns() {
+        if time_ns > self.bobcat.end_ns() {
             return None;
         }
         self.next += 1;

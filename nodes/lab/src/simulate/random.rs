@@ -29,6 +29,15 @@ pub(super) enum Purpose {
     LaserStand = 57,
     /// Range noise of a scan of the house; one stream per scan.
     LaserScan = 58,
+    /// Materials of a house; one stream per thing.
+    Materials = 59,
+    Lamps = 60,
+    /// Exposure and noise of an image.
+    Exposure = 61,
+    /// Views of someone who looks at things; one stream per view.
+    LookView = 62,
+    DepthNoise = 63,
+    DrawnHouse = 64,
 }
 
 impl Stream {

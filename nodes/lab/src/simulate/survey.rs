@@ -82,7 +82,7 @@ impl Survey {
                 3 * counts.into_iter().min().unwrap_or(0)
             }
             SurveyPattern::Os64 => {
-                u64::try_from((self.bobcat.duration_ns() - SPIN64_START_NS) / TURN_NS)
+                u64::try_from((self.bobcat.end_ns() - SPIN64_START_NS) / TURN_NS)
                     .map_or(0, |turns| turns.saturating_sub(1))
             }
         }

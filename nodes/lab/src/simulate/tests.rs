@@ -135,7 +135,7 @@ fn every_beam_lies_between_two_ins_epochs() {
     for duration_s in [0.1, 0.5, 1.234_567, 30.0] {
         let bobcat = Bobcat::new(1, duration_s).unwrap();
         let last_ns = bobcat.ins().last().unwrap().time_ns;
-        assert!(last_ns <= bobcat.duration_ns() && bobcat.duration_ns() - last_ns < INS_PERIOD_NS);
+        assert!(last_ns <= bobcat.end_ns() && bobcat.end_ns() - last_ns < INS_PERIOD_NS);
         for laser in Laser::ALL {
             let count = bobcat.scan_count(laser);
             assert!(count > 0);

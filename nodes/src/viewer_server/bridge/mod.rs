@@ -1,5 +1,8 @@
-//! The bridge from clients to nodes: a fixed table of services, parameters of named nodes, one topic.
+//! The bridge from clients to nodes: a fixed table of services, parameters of named nodes, a topic of goals, and
+//! those of a headset.
 
+mod headset;
+mod mesh_chunks;
 mod parameters;
 mod services;
 mod values;
@@ -12,11 +15,14 @@ use lattice_msgs::RosMessage;
 use lattice_msgs::geometry_msgs::PoseStamped;
 use lattice_msgs::rcl_interfaces::ParameterEvent;
 use lattice_runtime::qos::Qos;
-use lattice_runtime::{CallError, Client, Load, Node, Publisher, Subscription};
+use lattice_runtime::{CallError, Load, Node, Publisher, Subscription};
 
+pub use self::headset::HeadsetTopics;
 use self::parameters::Parameters;
-use super::desk::{Ask, Offer, OpenTopic};
+use super::desk::Ask;
 use super::hub::Hub;
+use super::inputs::{Input, InputRefusal, Inputs};
+use super::offer::{Offer, OpenTopic};
 use super::outbox::Outgoing;
 use super::protocol::{parameter_values, service_failure, service_response, status};
 use crate::start::NodeError;
@@ -33,6 +39,12 @@ pub trait Bridge: Send + Sync {
 
     /// Asks; gives messages for the client. Dropping the future ends the question.
     fn ask(&self, ask: Ask) -> BoxFuture<'static, Vec<Outgoing>>;
+
+    /// Hands a client's message for a headset's topic over, at once, or says why not.
+    fn take(&self, client: u64, input: Input) -> Result<(), InputRefusal>;
+
+    /// Counters of such messages.
+    fn inputs(&self) -> &Inputs;
 }
 
 /// Nodes that clients reach.
@@ -48,20 +60,44 @@ pub struct Reach {
     pub parameter_nodes: Vec<String>,
     /// Topic of goals (`geometry_msgs/PoseStamped`).
     pub goal_topic: String,
+    /// Bounds of what clients may publish for a headset, if they may.
+    pub headset: Option<HeadsetReach>,
 }
+
+/// Bounds of what clients may publish for a headset.
+#[derive(Clone, Debug)]
+pub struct HeadsetReach {
+    /// Longest message, bytes.
+    pub message_bytes: usize,
+    /// Most bytes of a client in a second.
+    pub bytes_per_s: usize,
+    /// The node that calibrates.
+    pub calibrator: String,
+}
+
+/// Hands a message of a client over to the node's thread; false if there is no room.
+pub type HandOver = Box<dyn Fn(u64, Input) -> bool + Send + Sync>;
 
 /// A bridge to nodes of ROS.
 pub struct NodeBridge {
     offer: Offer,
-    clients: Vec<Client>,
+    clients: services::Clients,
     parameters: Arc<Parameters>,
     _events: Option<Subscription>,
     goals: Option<Publisher<PoseStamped>>,
+    inputs: Arc<Inputs>,
+    hand_over: HandOver,
 }
 
 impl NodeBridge {
-    /// A bridge that offers what `reach` allows, and tells the hub of parameters that change.
-    pub fn new(node: &Node, reach: &Reach, hub: &Arc<Hub>) -> Result<Self, NodeError> {
+    /// A bridge that offers what `reach` allows, and tells the hub of parameters that change. What clients publish
+    /// for a headset is handed over, for the topics that are given back.
+    pub fn new(
+        node: &Node,
+        reach: &Reach,
+        hub: &Arc<Hub>,
+        (inputs, hand_over): (Arc<Inputs>, HandOver),
+    ) -> Result<(Self, HeadsetTopics), NodeError> {
         let (services, clients) = services::of(node, reach)?;
         let mut offer = Offer {
             services,
@@ -75,7 +111,16 @@ impl NodeBridge {
             nodes = &reach.parameter_nodes;
             let (name, type_name) = (node.resolve(&reach.goal_topic)?, PoseStamped::TYPE);
             goals = Some(node.publisher(&reach.goal_topic, Qos::DEFAULT)?);
-            offer.topics.push(OpenTopic { name, type_name });
+            offer.topics.push(OpenTopic {
+                name,
+                type_name,
+                stream_bytes: None,
+            });
+        }
+        let mut topics = HeadsetTopics::default();
+        if let Some(headset) = &reach.headset {
+            offer.stream_bytes_per_s = headset.bytes_per_s;
+            topics = HeadsetTopics::new(node, headset.message_bytes, &mut offer.topics)?;
         }
         let parameters = Arc::new(Parameters::new(node, nodes)?);
         let mut events = None;
@@ -90,16 +135,19 @@ impl NodeBridge {
             let qos = Qos::PARAMETER_EVENTS;
             events = Some(node.subscribe("/parameter_events", qos, Load::Small, tell)?);
         }
-        Ok(Self {
+        let bridge = Self {
             offer,
             clients,
             parameters,
             _events: events,
             goals,
-        })
+            inputs,
+            hand_over,
+        };
+        Ok((bridge, topics))
     }
 
-    /// Publishes a goal: the only topic of the offer.
+    /// Publishes a goal: the only topic whose messages are questions.
     fn publish(&self, message: &[u8]) -> Result<(), String> {
         let message: PoseStamped = lattice_msgs::cdr::from_slice(message).map_err(words)?;
         match &self.goals {
@@ -114,6 +162,17 @@ impl Bridge for NodeBridge {
         &self.offer
     }
 
+    fn take(&self, client: u64, input: Input) -> Result<(), InputRefusal> {
+        match (self.hand_over)(client, input) {
+            true => Ok(()),
+            false => Err(InputRefusal::Busy),
+        }
+    }
+
+    fn inputs(&self) -> &Inputs {
+        &self.inputs
+    }
+
     fn ask(&self, ask: Ask) -> BoxFuture<'static, Vec<Outgoing>> {
         match ask {
             Ask::Call {
@@ -122,7 +181,7 @@ impl Bridge for NodeBridge {
                 request,
             } => {
                 let client = self.clients.get(service as usize);
-                let answer = client.map(|client| client.call(request, PATIENCE));
+                let answer = client.map(|(client, patience)| client.call(request, *patience));
                 Box::pin(async move {
                     let answer = match answer {
                         Some(answer) => answer.await.map_err(words),

@@ -1,5 +1,8 @@
 //! The services that clients may call.
 
+use std::time::Duration;
+
+use lattice_msgs::calibration::Calibrate;
 use lattice_msgs::lattice::{ClearBox, PlanPath, QueryMap, SaveMap};
 use lattice_msgs::rosbag2_interfaces::{
     GetRate, IsPaused, Pause, PlayNext, Resume, Seek, SetRate, TogglePaused,
@@ -8,15 +11,22 @@ use lattice_msgs::std_srvs::Trigger;
 use lattice_msgs::{RosMessage, RosService};
 use lattice_runtime::{Client, Node, RuntimeError};
 
-use super::Reach;
+use super::{PATIENCE, Reach};
 use crate::viewer_server::protocol::AdvertisedService;
+
+/// Time for the answer of a calibration, which may search for a while.
+const CALIBRATION_PATIENCE: Duration = Duration::from_secs(120);
+
+/// Clients of services with the time for their answers.
+pub(super) type Clients = Vec<(Client, Duration)>;
 
 /// The table as it grows.
 struct Table<'a> {
     node: &'a Node,
     of: &'a str,
+    patience: Duration,
     services: Vec<AdvertisedService>,
-    clients: Vec<Client>,
+    clients: Clients,
 }
 
 impl Table<'_> {
@@ -29,7 +39,7 @@ impl Table<'_> {
             request_schema: S::Request::definition(),
             response_schema: S::Response::definition(),
         });
-        self.clients.push(client);
+        self.clients.push((client, self.patience));
         Ok(())
     }
 }
@@ -38,10 +48,11 @@ impl Table<'_> {
 pub(super) fn of(
     node: &Node,
     reach: &Reach,
-) -> Result<(Vec<AdvertisedService>, Vec<Client>), RuntimeError> {
+) -> Result<(Vec<AdvertisedService>, Clients), RuntimeError> {
     let mut table = Table {
         node,
         of: &reach.mapper,
+        patience: PATIENCE,
         services: Vec::new(),
         clients: Vec::new(),
     };
@@ -62,6 +73,11 @@ pub(super) fn of(
         table.add::<PlayNext>("play_next")?;
         table.add::<SetRate>("set_rate")?;
         table.add::<Seek>("seek")?;
+    }
+    if let Some(headset) = &reach.headset {
+        table.of = &headset.calibrator;
+        table.patience = CALIBRATION_PATIENCE;
+        table.add::<Calibrate>("calibrate")?;
     }
     Ok((table.services, table.clients))
 }

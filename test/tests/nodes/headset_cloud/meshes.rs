@@ -3,16 +3,18 @@
 use std::sync::Arc;
 
 use lattice_core::pose::Axes;
-use lattice_lab::mesh::read_mesh;
+use lattice_lab::mesh::{read_mesh, read_mesh_in};
 use lattice_lab::simulate::house::HouseScan;
 use lattice_msgs::geometry_msgs::{Point, Vector3};
 use lattice_msgs::headset::HeadsetMesh;
 use lattice_msgs::visualization_msgs::Marker;
 use lattice_nodes::convert::geometry::header;
 use lattice_nodes::headset_cloud::{HeadsetCloud, HeadsetOutput, HeadsetStream};
-use nalgebra::Isometry3;
+use nalgebra::{Isometry3, Vector3 as Vector};
 
-use super::scene::{FRAME, image, look, machine, options, points, pose, pose_in, square};
+use super::scene::{
+    FRAME, camera_info, image, look, machine, options, points, pose, pose_in, square,
+};
 
 const AT_NS: i64 = 1_000_000_000;
 
@@ -240,5 +242,62 @@ fn a_mesh_inside_out_is_refused_unless_told_otherwise() {
         assert_eq!(machine.counts().clouds_out, clouds);
         let refused = machine.counts().dropped.get("labels_mesh_inside_out");
         assert_eq!(refused.is_some(), clouds == 0);
+    }
+}
+
+/// The square as glTF: its numbers for a file that becomes the axes of a headset.
+fn gltf_of_square(axes: Axes) -> (String, Vec<u8>) {
+    let square = square();
+    let in_file = |place: &[f32]| {
+        let [x, y, z] = [0, 1, 2].map(|i| f64::from(place[i]));
+        let [x, y, z] = axes.from_ros(Vector::new(x, y, z)).into();
+        let file = match axes {
+            Axes::RosFlu => [x, z, -y],
+            Axes::UnityRuf => [-x, y, z],
+            Axes::WinrtRub => [x, y, z],
+            Axes::Optical => [x, -y, -z],
+        };
+        file.map(|c| c as f32)
+    };
+    let vertices = square.vertices.chunks(3).flat_map(in_file);
+    let vertices = vertices.flat_map(f32::to_le_bytes);
+    let corners = square.triangles.iter().flat_map(|v| v.to_le_bytes());
+    let json = r#"{"asset": {"version": "2.0"}, "scenes": [{"nodes": [0]}], "nodes": [{"mesh": 0}],
+        "meshes": [{"primitives": [{"attributes": {"POSITION": 0}, "indices": 1}]}],
+        "accessors": [{"bufferView": 0, "componentType": 5126, "count": 4, "type": "VEC3"},
+                      {"bufferView": 1, "componentType": 5125, "count": 6, "type": "SCALAR"}],
+        "bufferViews": [{"buffer": 0, "byteLength": 48},
+                        {"buffer": 0, "byteOffset": 48, "byteLength": 24}],
+        "buffers": [{"byteLength": 72, "uri": "square.bin"}]}"#;
+    (json.to_owned(), vertices.chain(corners).collect())
+}
+
+#[test]
+fn gltf_files_come_in_the_axes_of_each_headset_with_their_fronts() {
+    for axes in Axes::ALL {
+        let directory = tempfile::tempdir().unwrap();
+        let path = directory.path().join("square.gltf");
+        let (json, bytes) = gltf_of_square(axes);
+        std::fs::write(&path, json).unwrap();
+        std::fs::write(directory.path().join("square.bin"), bytes).unwrap();
+        let given = [
+            ("stride", "1"),
+            ("max_pose_gap_s", "2.0"),
+            ("headset_axes", axes.name()),
+        ];
+        let mut machine = HeadsetCloud::new(options(&given));
+        machine.on_camera_info(Arc::new(camera_info()));
+        let own = match axes {
+            Axes::RosFlu => Axes::Optical,
+            same => same,
+        };
+        let at = pose_in(axes, own, &Isometry3::identity());
+        for stamp_ns in [AT_NS, 2 * AT_NS] {
+            machine.on_pose(&pose(stamp_ns, at));
+        }
+        let mesh = read_mesh_in(&path, axes, 10).unwrap();
+        machine.on_mesh_file(&mesh).unwrap();
+        // One that is seen from behind would be refused.
+        assert_eq!(seen_m(&mut machine, AT_NS), Some(3.0), "{axes}");
     }
 }

@@ -2,6 +2,7 @@
 
 mod hostile;
 mod meshes;
+mod network;
 mod scene;
 mod unity;
 

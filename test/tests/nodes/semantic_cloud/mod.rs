@@ -2,6 +2,7 @@
 
 mod compressed;
 mod hostile;
+mod network;
 mod pairs;
 mod scene;
 

@@ -17,8 +17,8 @@ pub struct House {
     /// (.ply) with the truth beside it (.json)
     #[arg(long, default_value = "house")]
     out: PathBuf,
-    /// A mesh (PLY; faces with label and instance) instead of our own house
-    #[arg(long, value_name = "PLY", requires = "classes")]
+    /// A mesh (PLY with label and instance of each face, or glTF with them in extras) instead of our own house
+    #[arg(long, value_name = "FILE", requires = "classes")]
     mesh: Option<PathBuf>,
     /// Names of the classes of the mesh
     #[arg(long, value_name = "YAML", requires = "mesh")]

@@ -24,7 +24,7 @@ pub struct SurfaceHit {
 #[derive(Debug)]
 pub struct House {
     mesh: LabelledMesh,
-    scene: MeshScene,
+    pub(super) scene: MeshScene,
     pub(super) class_names: BTreeMap<u16, String>,
     pub(super) regions: Regions,
     pub(super) free: FreeSpace,

@@ -22,8 +22,8 @@ const STROLL_M: f64 = 0.9;
 const MARGIN_M: f64 = 0.25;
 
 /// The camera of a HoloLens: pixels in a row, rows, horizontal field of view.
-const PIXELS: [usize; 2] = [144, 81];
-const HFOV_DEG: f64 = 48.0;
+pub(super) const PIXELS: [usize; 2] = [144, 81];
+pub(super) const HFOV_DEG: f64 = 48.0;
 /// Height of the eyes above the floor, metres.
 const EYE_HEIGHT_M: f64 = 1.62;
 /// Greatest distance of the mesh, metres.

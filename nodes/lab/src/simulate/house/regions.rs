@@ -32,6 +32,13 @@ pub(super) struct Thing {
     grid: Option<Grid>,
 }
 
+impl Thing {
+    /// True of walls, floors and ceilings.
+    pub(super) fn is_structural(&self) -> bool {
+        self.grid.is_some()
+    }
+}
+
 /// Patches of a structural thing, seen from above.
 #[derive(Clone, Copy, Debug)]
 struct Grid {

@@ -35,11 +35,11 @@ impl Default for SurveyOptions {
 }
 
 /// Horizontal field of view of an Asus Xtion, degrees.
-const HFOV_DEG: f64 = 58.0;
+pub(super) const HFOV_DEG: f64 = 58.0;
 /// Height of the camera above the floor, metres.
 const HEIGHT_M: f64 = 1.0;
 /// Depths that are measured, metres.
-const RANGE_M: std::ops::RangeInclusive<f64> = 0.4..=4.5;
+pub(super) const RANGE_M: std::ops::RangeInclusive<f64> = 0.4..=4.5;
 /// Standard deviations of the measured position (metres) and rotation (degrees) of a view, each axis.
 const POSITION_NOISE_M: f64 = 0.008;
 const ROTATION_NOISE_DEG: f64 = 0.15;
@@ -65,17 +65,10 @@ pub(super) fn depth_noise_m(depth_m: f64) -> f64 {
 impl Survey {
     /// Walks through the house; computed in parallel, the same on any number of threads.
     pub fn new(house: &House, options: &SurveyOptions, seed: u64) -> Result<Survey, AnyError> {
-        within("views", options.views as f64, 1.0, 2e4)?;
-        let mut path = Stream::new(seed, Purpose::RobotPath, 0, 0);
-        let stops = options.views.div_ceil(VIEWS_A_STOP);
-        let stops = house.free.spread_m(stops, || path.uniform());
-        let views: Vec<_> = (0..options.views)
-            .into_par_iter()
-            .map(|view| {
-                // A small house has fewer places than asked for: stop again.
-                let stop = stops.get(view / VIEWS_A_STOP % stops.len().max(1));
-                view_from(house, options, seed, view, *stop.unwrap_or(&[0.0; 2]))
-            })
+        let stops = stops_m(house, options.views, seed)?;
+        let views = (0..options.views).into_par_iter();
+        let views: Vec<_> = views
+            .map(|view| view_from(house, options, seed, view, stop_m(&stops, view)))
             .collect();
         let datum_m = house.map_from_house().translation.vector;
         let mut survey = Survey {
@@ -90,6 +83,57 @@ impl Survey {
         }
         Ok(survey)
     }
+}
+
+/// Poses of the robot's camera on its walk: of each view the true one, and the one that the robot measures. The
+/// views of a [`Survey`] of the same seed and number.
+pub fn robot_views(house: &House, views: usize, seed: u64) -> Result<Vec<RobotView>, AnyError> {
+    let stops = stops_m(house, views, seed)?;
+    let view = |view: usize| {
+        let mut stream = Stream::new(seed, Purpose::RobotView, 0, view as u64);
+        RobotView::new(house, stop_m(&stops, view), view, &mut stream)
+    };
+    Ok((0..views).map(view).collect())
+}
+
+/// A view of the robot: x forward, y left, z up.
+#[derive(Clone, Copy, PartialEq, Debug)]
+pub struct RobotView {
+    /// True pose of the camera in the house.
+    pub truth: Isometry3<f64>,
+    /// The pose as measured.
+    pub measured: Isometry3<f64>,
+}
+
+impl RobotView {
+    fn new(house: &House, stop_m: [f64; 2], view: usize, stream: &mut Stream) -> RobotView {
+        let turn = (view % VIEWS_A_STOP) as f64 + stream.uniform();
+        let yaw = turn * std::f64::consts::TAU / VIEWS_A_STOP as f64;
+        let pitch = (-18.0 + 30.0 * stream.uniform()).to_radians();
+        let truth = looking(house.free.above_m(stop_m, HEIGHT_M), yaw, pitch);
+        let mut normal = |sigma: f64| Vector3::from_fn(|_, _| sigma * stream.normal());
+        let error = Isometry3::from_parts(
+            Translation3::from(normal(POSITION_NOISE_M)),
+            UnitQuaternion::from_scaled_axis(normal(ROTATION_NOISE_DEG.to_radians())),
+        );
+        RobotView {
+            truth,
+            measured: truth * error,
+        }
+    }
+}
+
+fn stops_m(house: &House, views: usize, seed: u64) -> Result<Vec<[f64; 2]>, AnyError> {
+    within("views", views as f64, 1.0, 2e4)?;
+    let mut path = Stream::new(seed, Purpose::RobotPath, 0, 0);
+    let stops = views.div_ceil(VIEWS_A_STOP);
+    Ok(house.free.spread_m(stops, || path.uniform()))
+}
+
+/// Stop of a view. A small house has fewer places than asked for: stop again.
+fn stop_m(stops_m: &[[f64; 2]], view: usize) -> [f64; 2] {
+    let stop = stops_m.get(view / VIEWS_A_STOP % stops_m.len().max(1));
+    *stop.unwrap_or(&[0.0; 2])
 }
 
 struct View {
@@ -107,16 +151,7 @@ fn view_from(
     stop_m: [f64; 2],
 ) -> View {
     let mut stream = Stream::new(seed, Purpose::RobotView, 0, view as u64);
-    let turn = (view % VIEWS_A_STOP) as f64 + stream.uniform();
-    let yaw = turn * std::f64::consts::TAU / VIEWS_A_STOP as f64;
-    let pitch = (-18.0 + 30.0 * stream.uniform()).to_radians();
-    let truth = looking(house.free.above_m(stop_m, HEIGHT_M), yaw, pitch);
-    let mut normal = |sigma: f64| Vector3::from_fn(|_, _| sigma * stream.normal());
-    let error = Isometry3::from_parts(
-        Translation3::from(normal(POSITION_NOISE_M)),
-        UnitQuaternion::from_scaled_axis(normal(ROTATION_NOISE_DEG.to_radians())),
-    );
-    let measured = truth * error;
+    let RobotView { truth, measured } = RobotView::new(house, stop_m, view, &mut stream);
     let camera = Camera::new(options.width, options.height, HFOV_DEG);
     let image = Image::take(house, &truth, camera, RANGE_M.end() * 2.5);
     let regions = image.bled(BLEED_PX, &mut stream);

@@ -1,6 +1,7 @@
 //! The generated house: eight rooms, 20 x 12 m.
 
 mod builder;
+mod drawn;
 mod furniture;
 mod rooms;
 mod walls;
@@ -8,7 +9,7 @@ mod walls;
 use super::House;
 use crate::AnyError;
 use crate::simulate::random::{Purpose, Stream};
-use builder::Builder;
+use builder::{Builder, Spot};
 use std::collections::BTreeMap;
 
 /// The classes, by number.
@@ -42,10 +43,14 @@ impl House {
         let mut stream = Stream::new(seed, Purpose::GeneratedHouse, 0, 0);
         walls::build(&mut builder)?;
         rooms::furnish(&mut builder, &mut stream)?;
-        let names = CLASSES.split_whitespace().map(str::to_owned);
-        let names: BTreeMap<u16, String> = (0..).zip(names).collect();
-        House::from_mesh(builder.build()?, names)
+        House::from_mesh(builder.build()?, names())
     }
+}
+
+/// Names of the classes.
+fn names() -> BTreeMap<u16, String> {
+    let names = CLASSES.split_whitespace().map(str::to_owned);
+    (0..).zip(names).collect()
 }
 
 fn between(stream: &mut Stream, low: f32, high: f32) -> f32 {

@@ -11,7 +11,7 @@ const HALF: f32 = 0.06;
 
 /// An opening in a wall: from and to along it, lower and upper height, m.
 #[derive(Clone, Copy)]
-enum Opening {
+pub(super) enum Opening {
     /// Open, with a door leaf turned by so many degrees, if any.
     Door(f32, f32, Option<f32>),
     /// With a pane, from the height of the sill to that of the lintel.
@@ -55,7 +55,7 @@ pub(super) fn build(builder: &mut Builder) -> Result<(), AnyError> {
     let ceiling = builder.fixed(CEILING);
     ceiling.block([0.0, 0.0, HEIGHT], [20.0, 12.0, HEIGHT + 0.1]);
     for (spot, from, to, openings) in walls()? {
-        wall(builder, spot, from, to, &openings);
+        wall(builder, spot, from, to, &openings, HEIGHT);
     }
     // A chimney and a column.
     let chimney = builder.fixed(WALL);
@@ -72,8 +72,15 @@ pub(super) fn build(builder: &mut Builder) -> Result<(), AnyError> {
     Ok(())
 }
 
-/// A wall along the x axis of its spot, which stands at `from`.
-fn wall(builder: &mut Builder, spot: Spot, from: f32, to: f32, openings: &[Opening]) {
+/// A wall along the x axis of its spot, which stands at `from`, of a height.
+pub(super) fn wall(
+    builder: &mut Builder,
+    spot: Spot,
+    from: f32,
+    to: f32,
+    openings: &[Opening],
+    height: f32,
+) {
     let piece = |builder: &mut Builder, a: f32, b: f32, low: f32, high: f32| {
         if b > a && high > low {
             builder.block([a - from, -HALF, low], [b - from, HALF, high]);
@@ -86,12 +93,12 @@ fn wall(builder: &mut Builder, spot: Spot, from: f32, to: f32, openings: &[Openi
             Door(a, b, _) => (a, b, 0.0, 2.1),
             Window(a, b, sill, lintel) => (a, b, sill, lintel),
         };
-        piece(builder, at, a, 0.0, HEIGHT);
+        piece(builder, at, a, 0.0, height);
         piece(builder, a, b, 0.0, sill);
-        piece(builder, a, b, lintel, HEIGHT);
+        piece(builder, a, b, lintel, height);
         at = b;
     }
-    piece(builder, at, to, 0.0, HEIGHT);
+    piece(builder, at, to, 0.0, height);
     let (sin, cos) = spot.yaw_deg.to_radians().sin_cos();
     for opening in openings {
         match *opening {
@@ -121,7 +128,7 @@ fn wall(builder: &mut Builder, spot: Spot, from: f32, to: f32, openings: &[Openi
 }
 
 /// Folds of cloth from the floor to above a window.
-fn curtain(builder: &mut Builder, spot: Spot, width: f32) {
+pub(super) fn curtain(builder: &mut Builder, spot: Spot, width: f32) {
     let curtain = builder.thing(CURTAIN, spot);
     let folds = (width / 0.09) as i32;
     for fold in 0..folds {

@@ -1,0 +1,72 @@
+//! `lattice evaluate chain`.
+
+use super::evaluate::Remaining;
+use super::processors;
+use crate::CliResult;
+use clap::Args;
+use lattice_lab::evaluate::{ChainOptions, Results, chain_report, chain_settings, run_chain};
+use lattice_lab::{markdown, models, write_report};
+use std::path::PathBuf;
+
+/// Options of `lattice evaluate chain`.
+#[derive(Args)]
+pub struct Chain {
+    /// Folder of the results and the report; a run that was ended goes on where it was
+    #[arg(long)]
+    out: PathBuf,
+    /// PLY of a house, metres, z up, with `label` and `instance` of each face [default: a house of our own]
+    #[arg(long, value_name = "PLY", requires = "classes")]
+    mesh: Option<PathBuf>,
+    /// YAML with the names of its classes, which must be those of the network
+    #[arg(long, value_name = "YAML", requires = "mesh")]
+    classes: Option<PathBuf>,
+    /// Network of the classes of the house, an ONNX file [default: the one that was trained on other rooms]
+    #[arg(long, value_name = "ONNX")]
+    model: Option<PathBuf>,
+    /// Trials of each scene
+    #[arg(long, default_value_t = 10)]
+    seeds: u64,
+    /// Surveys of the robot, each with other materials and lamps
+    #[arg(long, default_value_t = 3)]
+    maps: u64,
+    /// Views of a survey
+    #[arg(long, default_value_t = 192)]
+    views: usize,
+    /// Trials at once [default: as many as processors]
+    #[arg(long)]
+    threads: Option<usize>,
+}
+
+impl Chain {
+    /// Runs the command.
+    pub fn run(self) -> CliResult {
+        if !cfg!(feature = "onnx") {
+            let words = "networks are not built in; build with `cargo build --release --features onnx --bin lattice`";
+            return Err(words.into());
+        }
+        let folder = tempfile::tempdir()?;
+        let model = match self.model {
+            Some(model) => model,
+            None => models::write_rooms(folder.path())?,
+        };
+        let options = ChainOptions {
+            seeds: self.seeds,
+            maps: self.maps,
+            views: self.views,
+            mesh: self.mesh.zip(self.classes),
+            model,
+            threads: self.threads.unwrap_or_else(processors).clamp(1, 1024),
+        };
+        let mut results = Results::open(&self.out, &chain_settings(&options)?)?;
+        let bar = Remaining::new();
+        let mut tell = |done: usize, total: usize| bar.tell(done, total);
+        let ran = run_chain(&options, &mut results, &mut tell);
+        bar.done();
+        ran?;
+        let report = chain_report(&results.sorted());
+        write_report(&report, &self.out)?;
+        print!("{}", markdown(&report));
+        println!("\nwritten to {}", self.out.display());
+        Ok(())
+    }
+}

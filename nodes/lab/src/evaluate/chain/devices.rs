@@ -1,0 +1,307 @@
+//! Robot and headset from images to labelled points, each by the machines of its nodes.
+
+use std::sync::{Arc, Mutex, PoisonError};
+
+use lattice_core::cloud::Cloud;
+use lattice_core::lattice::Lattice;
+use lattice_core::registration::{HeadsetScan, SemanticCloud, UNLABELED};
+use lattice_core::voxels::{Payload, VoxelList};
+use lattice_msgs::geometry_msgs::PoseStamped;
+use lattice_msgs::headset::HeadsetMesh;
+use lattice_msgs::sensor_msgs::{Image, PointCloud2};
+use lattice_nodes::convert::geometry::{header, pose_from};
+use lattice_nodes::convert::semantic::{SemanticOptions, semantic_from_message};
+use lattice_nodes::headset_cloud::{HeadsetCloud, HeadsetOptions, HeadsetOutput, HeadsetStream};
+use lattice_nodes::segmenter::{Labelled, Segmenter};
+use lattice_nodes::semantic_cloud::{
+    CloudOptions, CloudOutput, SemanticCloud as DepthCloud, Stream,
+};
+use lattice_runtime::params::Params;
+use nalgebra::{Isometry3, Point3};
+
+use crate::AnyError;
+use crate::evaluate::initial_guess::seed_of;
+use crate::mesh::LabelledMesh;
+use crate::simulate::house::{
+    HeadsetTrial, House, HouseScan, RoomCamera, RoomImage, RoomImages, robot_views,
+};
+
+/// Frames of the messages.
+const CAMERA: &str = "camera";
+const HEADSET: &str = "headset_origin";
+/// Time between images, ns.
+const PERIOD_NS: i64 = 1_000_000_000;
+/// Every so many columns and rows of a depth image become points.
+const STRIDE: usize = 2;
+/// Numbers of vertices or triangles in a chunk of a mesh.
+const CHUNK: usize = 4500;
+
+/// One thing with the labels of the network, and the same with true labels.
+pub(super) struct Both<T> {
+    pub found: T,
+    pub truth: T,
+}
+
+/// The robot's map: points in the map frame from posed depth images and labels of their colours.
+pub(super) fn robot_map(
+    rooms: &RoomImages,
+    segmenter: &Mutex<Segmenter>,
+    lattice: &Lattice,
+    views: usize,
+    seed: u64,
+) -> Result<Both<SemanticCloud>, AnyError> {
+    let house = rooms.house();
+    let mut found = Mapper::new(house, lattice)?;
+    let mut truth = Mapper::new(house, lattice)?;
+    for (view, number) in robot_views(house, views, seed)?.iter().zip(0_u64..) {
+        let stamp_ns = number as i64 * PERIOD_NS;
+        let image = rooms.take(&RoomCamera::ROBOT, &view.truth, seed_of(&[seed, number, 1]));
+        let depth = image.measured_depth_m(seed_of(&[seed, number, 2]));
+        let depth = Arc::new(depth_image(&image, &depth, stamp_ns));
+        let labels = labelled(segmenter, &image, stamp_ns)?.labels;
+        let map_from_camera = house.map_from_house() * view.measured;
+        found.add(&depth, labels, &map_from_camera)?;
+        truth.add(&depth, true_labels(&image, stamp_ns), &map_from_camera)?;
+    }
+    Ok(Both {
+        found: found.map(),
+        truth: truth.map(),
+    })
+}
+
+/// `semantic_cloud`, and the voxels of its points.
+struct Mapper {
+    machine: DepthCloud,
+    list: VoxelList,
+}
+
+impl Mapper {
+    fn new(house: &House, lattice: &Lattice) -> Result<Mapper, AnyError> {
+        let mut options = CloudOptions::default();
+        options.points.stride = STRIDE;
+        let mut machine = DepthCloud::new(options);
+        machine.on_camera_info(Arc::new(RoomCamera::ROBOT.camera_info(CAMERA, 0)));
+        let payload = Payload {
+            labels: true,
+            ..Payload::default()
+        };
+        let datum_m = house.map_from_house().translation.vector;
+        let list = VoxelList::new(lattice.clone(), datum_m, usize::MAX)?;
+        Ok(Mapper {
+            machine,
+            list: list.with_payload(payload),
+        })
+    }
+
+    fn add(
+        &mut self,
+        depth: &Arc<Image>,
+        labels: Image,
+        map_from_camera: &Isometry3<f64>,
+    ) -> Result<(), AnyError> {
+        let mut outputs = self.machine.on_image(Stream::Depth, Arc::clone(depth));
+        outputs.extend(self.machine.on_image(Stream::Labels, Arc::new(labels)));
+        let mut clouds = outputs.iter().filter_map(|output| match output {
+            CloudOutput::Points(cloud) => Some(cloud),
+            _ => None,
+        });
+        let cloud = clouds.next().ok_or_else(|| {
+            let problem = self.machine.problem().unwrap_or("no partner");
+            format!("semantic_cloud made no points: {problem}")
+        })?;
+        let Some(cloud) = points(cloud)? else {
+            // A wall too near to be seen.
+            return Ok(());
+        };
+        let map_from_optical = map_from_camera * RoomCamera::camera_from_optical();
+        let in_map = cloud.points_m.iter().map(|p| (map_from_optical * p).coords);
+        let in_map: Vec<_> = in_map.collect();
+        let labels = cloud
+            .labels
+            .iter()
+            .map(|label| label.top().unwrap_or(UNLABELED));
+        let labels: Vec<u16> = labels.collect();
+        let cloud = Cloud::from_points(0, self.list.datum_m(), &in_map);
+        self.list.insert_labelled(&cloud, &labels);
+        Ok(())
+    }
+
+    fn map(&self) -> SemanticCloud {
+        SemanticCloud::from_voxels(&self.list)
+    }
+}
+
+/// The headset's points of one picture: `headset_cloud` on its own mesh and on labels of its image.
+pub(super) fn headset_scan(
+    rooms: &RoomImages,
+    segmenter: &Mutex<Segmenter>,
+    trial: &HeadsetTrial,
+    scan: &HouseScan,
+    seed: u64,
+) -> Result<Both<HeadsetScan>, AnyError> {
+    let house_from_headset = rooms.house().map_from_house().inverse() * trial.map_from_headset;
+    let pose = house_from_headset * scan.headset_from_camera;
+    let image = rooms.take(&RoomCamera::HEADSET, &pose, seed);
+    let found = labelled(segmenter, &image, PERIOD_NS)?;
+    let headset_from_house = house_from_headset.inverse();
+    let chunks = mesh_chunks(&trial.mesh, &headset_from_house);
+    let seen = |labels: Image, confidence: Option<Image>| -> Result<HeadsetScan, AnyError> {
+        let cloud = look(&chunks, scan, labels, confidence)?;
+        Ok(HeadsetScan {
+            cloud,
+            // As `semantic_icp_server` has it, which only gets the points.
+            sensor_m: None,
+        })
+    };
+    Ok(Both {
+        found: seen(found.labels, found.confidence)?,
+        truth: seen(true_labels(&image, PERIOD_NS), None)?,
+    })
+}
+
+fn look(
+    chunks: &[Arc<HeadsetMesh>],
+    scan: &HouseScan,
+    labels: Image,
+    confidence: Option<Image>,
+) -> Result<SemanticCloud, AnyError> {
+    let mut options = HeadsetOptions::from_params(&Params::default())?;
+    options.look.stride = 1;
+    options.use_confidence = confidence.is_some();
+    let mut machine = HeadsetCloud::new(options);
+    for chunk in chunks {
+        machine.on_mesh(chunk);
+    }
+    let [width, height] = HouseScan::PIXELS;
+    let camera = RoomCamera::HEADSET.sized(width, height);
+    machine.on_camera_info(Arc::new(camera.camera_info(CAMERA, 0)));
+    let pose = scan.headset_from_camera * RoomCamera::camera_from_optical();
+    machine.on_pose(&PoseStamped {
+        header: header(HEADSET, PERIOD_NS),
+        pose: pose_from(&pose),
+    });
+    let mut outputs = machine.on_image(HeadsetStream::Labels, Arc::new(labels));
+    if let Some(confidence) = confidence {
+        outputs.extend(machine.on_image(HeadsetStream::Confidence, Arc::new(confidence)));
+    }
+    let mut clouds = outputs.iter().filter_map(|output| match output {
+        HeadsetOutput::Points(cloud) => Some(cloud),
+        _ => None,
+    });
+    let cloud = clouds.next().map(points).transpose()?.flatten();
+    Ok(cloud.ok_or_else(|| {
+        let problem = machine.problem().unwrap_or("no partner");
+        format!("headset_cloud made no points: {problem}")
+    })?)
+}
+
+/// A mesh as the chunks of one surface, whose pose in the headset's frame is given.
+fn mesh_chunks(mesh: &LabelledMesh, headset_from_mesh: &Isometry3<f64>) -> Vec<Arc<HeadsetMesh>> {
+    let vertices: Vec<f32> = mesh.vertices_m().concat();
+    let triangles: Vec<u32> = mesh.triangles().concat();
+    let chunks = vertices.len().max(triangles.len()).div_ceil(CHUNK).max(1);
+    let part = |i: usize, len: usize| (i * CHUNK).min(len)..((i + 1) * CHUNK).min(len);
+    let chunk = |i: usize| HeadsetMesh {
+        header: header(HEADSET, PERIOD_NS),
+        session: String::new(),
+        surface: "room".to_owned(),
+        removed: false,
+        chunk: i as u32,
+        chunks: chunks as u32,
+        pose: pose_from(headset_from_mesh),
+        vertices: vertices
+            .get(part(i, vertices.len()))
+            .unwrap_or_default()
+            .to_vec(),
+        triangles: triangles
+            .get(part(i, triangles.len()))
+            .unwrap_or_default()
+            .to_vec(),
+        classes: Vec::new(),
+    };
+    (0..chunks).map(|i| Arc::new(chunk(i))).collect()
+}
+
+/// Points and labels of a cloud as `semantic_icp_server` reads them; none of an empty one.
+fn points(cloud: &PointCloud2) -> Result<Option<SemanticCloud>, AnyError> {
+    if cloud.width == 0 || cloud.height == 0 {
+        return Ok(None);
+    }
+    let (mut cloud, _) = semantic_from_message(cloud, &SemanticOptions::default())?;
+    if cloud.labels.is_empty() {
+        let none = lattice_core::registration::LabelDistribution::UNKNOWN;
+        cloud.labels = vec![none; cloud.points_m.len()];
+    }
+    Ok(Some(cloud))
+}
+
+fn labelled(
+    segmenter: &Mutex<Segmenter>,
+    image: &RoomImage,
+    stamp_ns: i64,
+) -> Result<Labelled, AnyError> {
+    let data = image.rgb.clone();
+    let message = message(image, "rgb8", 3, data, stamp_ns);
+    // A thread that panicked left no image half done.
+    let mut segmenter = segmenter.lock().unwrap_or_else(PoisonError::into_inner);
+    let found = segmenter.on_image(&message);
+    Ok(found.ok_or_else(|| {
+        let problem = segmenter.problem().unwrap_or_default();
+        format!("the segmenter refused an image: {problem}")
+    })?)
+}
+
+fn depth_image(image: &RoomImage, depth_m: &[f32], stamp_ns: i64) -> Image {
+    let data = depth_m.iter().flat_map(|d| d.to_le_bytes()).collect();
+    message(image, "32FC1", 4, data, stamp_ns)
+}
+
+fn true_labels(image: &RoomImage, stamp_ns: i64) -> Image {
+    let data = image.labels.iter().flat_map(|l| l.to_le_bytes()).collect();
+    message(image, "mono16", 2, data, stamp_ns)
+}
+
+fn message(image: &RoomImage, encoding: &str, bytes: usize, data: Vec<u8>, stamp_ns: i64) -> Image {
+    Image {
+        header: header(CAMERA, stamp_ns),
+        height: image.height as u32,
+        width: image.width as u32,
+        encoding: encoding.to_owned(),
+        is_bigendian: 0,
+        step: (image.width * bytes) as u32,
+        data: data.into(),
+    }
+}
+
+/// Share of points whose most probable label is the true one, of those that truly have one.
+pub(super) fn right_share(found: &SemanticCloud, truth: &SemanticCloud) -> Result<f64, AnyError> {
+    if found.points_m != truth.points_m {
+        return Err("points with labels of the network are not those with true labels".into());
+    }
+    let pairs = found.labels.iter().zip(&truth.labels);
+    let known = pairs.filter(|(_, truth)| truth.top().is_some());
+    let (mut right, mut all) = (0_u64, 0_u64);
+    for (found, truth) in known {
+        all += 1;
+        right += u64::from(found.top() == truth.top());
+    }
+    Ok(right as f64 / all.max(1) as f64)
+}
+
+/// Cloud without its labels.
+pub(super) fn unlabelled(cloud: &SemanticCloud) -> SemanticCloud {
+    SemanticCloud {
+        points_m: cloud.points_m.clone(),
+        labels: Vec::new(),
+    }
+}
+
+/// Middle of a cloud.
+pub(super) fn middle_m(cloud: &SemanticCloud) -> Point3<f64> {
+    let sum = cloud
+        .points_m
+        .iter()
+        .map(|p| p.coords)
+        .sum::<nalgebra::Vector3<f64>>();
+    (sum / cloud.points_m.len().max(1) as f64).into()
+}

@@ -1,0 +1,325 @@
+//! The whole chain from images to a verdict, with a network in it: a robot's survey and a headset's look are rendered,
+//! labelled by the network, made points by the machines of `semantic_cloud` and `headset_cloud`, and calibrated
+//! without a start; beside it the same without labels, with true labels, and by GICP-SE(3) from starts near the
+//! truth.
+
+mod devices;
+mod report;
+
+pub use report::chain_report;
+
+use std::collections::HashSet;
+use std::path::PathBuf;
+use std::sync::{Mutex, OnceLock, mpsc};
+
+use lattice_core::lattice::{Lattice, LatticeKind};
+use lattice_core::registration::{
+    CalibrationMap, CalibrationOptions, CalibrationRequest, HeadsetScan, PrepareOptions,
+    PreparedCloud, SemanticCloud, calibrate, voxel_downsample,
+};
+use lattice_nodes::segmenter::{Segmenter, SegmenterOptions, read_network};
+use nalgebra::{Isometry3, Point3};
+use rayon::prelude::*;
+
+use super::initial_guess::{perturbed, seed_of};
+use super::methods::Baseline;
+use super::results::name;
+use super::settings::{Cell, Settings, Start};
+use super::trial::{LabelsRight, OURS, Trial, rounded};
+use super::{Results, read_house};
+use crate::options::within;
+use crate::simulate::house::{HeadsetTrial, House, RoomImages, Scene};
+use crate::{AnyError, at, pool};
+use devices::{Both, headset_scan, middle_m, right_share, robot_map, unlabelled};
+
+/// Purposes of seeds.
+const VIEW: u64 = 11;
+const SURVEY: u64 = 12;
+const LOOK: u64 = 13;
+const IMAGE: u64 = 14;
+const START: u64 = 15;
+
+/// Ours without any labels, and with true ones.
+pub const UNLABELLED: &str = "ours_unlabelled";
+/// Ours with true labels.
+pub const TRUE_LABELS: &str = "ours_true_labels";
+/// The competitor, with the starts that it gets.
+pub const COMPETITOR: &str = "gicp_se3";
+const STARTS: [Start; 2] = [
+    Start::Off { m: 0.3, deg: 10.0 },
+    Start::Off { m: 0.8, deg: 35.0 },
+];
+/// Distance within which a point of the headset is compared with one of the map, metres.
+const SHARED_M: f64 = 0.15;
+
+/// Options of the evaluation.
+#[derive(Clone, Debug)]
+pub struct ChainOptions {
+    /// Trials of each scene.
+    pub seeds: u64,
+    /// Surveys of the robot, each of other materials and lamps, and without a mesh of other clutter.
+    pub maps: u64,
+    /// Views of a survey.
+    pub views: usize,
+    /// A mesh and the names of its classes, which are those of the network.
+    pub mesh: Option<(PathBuf, PathBuf)>,
+    /// The network.
+    pub model: PathBuf,
+    /// Trials at once.
+    pub threads: usize,
+}
+
+/// A house with a look, and its map: with labels of the network, with true ones, and without.
+struct Place {
+    house: House,
+    look: u64,
+    map: Both<CalibrationMap>,
+    unlabelled: CalibrationMap,
+    labels_right: f64,
+}
+
+/// All that trials share.
+struct Chain<'a> {
+    options: &'a ChainOptions,
+    segmenter: Mutex<Segmenter>,
+    places: Vec<OnceLock<Result<Place, String>>>,
+    cell_side_m: f64,
+}
+
+/// Settings that results of the chain are kept with.
+pub fn chain_settings(options: &ChainOptions) -> Result<Settings, AnyError> {
+    let crc32 = |path: &PathBuf| -> Result<u32, AnyError> {
+        Ok(crc32fast::hash(&std::fs::read(path).map_err(at(path))?))
+    };
+    let mesh = options.mesh.as_ref().map(|(mesh, _)| crc32(mesh));
+    Ok(Settings {
+        mesh_crc32: mesh.transpose()?,
+        model_crc32: Some(crc32(&options.model)?),
+        survey_views: options.views,
+        map_seeds: options.maps,
+        ..Settings::default()
+    })
+}
+
+/// Runs the trials that the results do not have yet, seed by seed.
+///
+/// `progress` hears of views of scenes done, of all that are left.
+pub fn run_chain(
+    options: &ChainOptions,
+    results: &mut Results,
+    progress: &mut dyn FnMut(usize, usize),
+) -> Result<(), AnyError> {
+    let chain = Chain::new(options)?;
+    let done = results.done();
+    let all = (0..options.seeds).flat_map(|seed| Scene::ALL.map(|scene| (seed, scene)));
+    let left: Vec<(u64, Scene)> = all
+        .filter(|&(seed, scene)| !is_done(&done, seed, scene))
+        .collect();
+    let pool = pool(options.threads)?;
+    let (sender, receiver) = mpsc::channel();
+    std::thread::scope(|scope| {
+        let (left, chain) = (&left, &chain);
+        scope.spawn(move || {
+            pool.install(|| {
+                left.par_iter().with_max_len(1).for_each(|&(seed, scene)| {
+                    // The receiver is gone only after an error.
+                    let _ = sender.send(chain.trials(seed, scene));
+                });
+            });
+        });
+        for (i, trials) in receiver.into_iter().enumerate() {
+            for trial in trials? {
+                if !done.contains(&name(&trial.cell, &trial.method)) {
+                    results.add(trial)?;
+                }
+            }
+            progress(i + 1, left.len());
+        }
+        Ok(())
+    })
+}
+
+fn cell(seed: u64, scene: Scene, start: Start) -> Cell {
+    Cell {
+        scene: scene.name().to_owned(),
+        seed,
+        q: 0.0,
+        start: start.to_string(),
+    }
+}
+
+fn is_done(done: &HashSet<String>, seed: u64, scene: Scene) -> bool {
+    let ours = [OURS, UNLABELLED, TRUE_LABELS].map(|method| (method, Start::None));
+    let others = STARTS.map(|start| (COMPETITOR, start));
+    let mut all = ours.into_iter().chain(others);
+    all.all(|(method, start)| done.contains(&name(&cell(seed, scene, start), method)))
+}
+
+impl Chain<'_> {
+    fn new(options: &ChainOptions) -> Result<Chain<'_>, AnyError> {
+        within("maps", options.maps as f64, 1.0, 1000.0)?;
+        let network = read_network(&options.model, None, 1)?;
+        Ok(Chain {
+            segmenter: Mutex::new(Segmenter::new(SegmenterOptions::default(), network)),
+            places: (0..options.maps).map(|_| OnceLock::new()).collect(),
+            cell_side_m: Settings::default().cell_side_m,
+            options,
+        })
+    }
+
+    /// The place of a seed, surveyed when it is first needed.
+    fn place(&self, seed: u64) -> Result<&Place, AnyError> {
+        let number = seed % self.options.maps;
+        let slot = self
+            .places
+            .get(number as usize)
+            .ok_or("no place of that number")?;
+        let made = slot.get_or_init(|| self.survey(number).map_err(|error| error.to_string()));
+        made.as_ref().map_err(|error| error.clone().into())
+    }
+
+    fn survey(&self, number: u64) -> Result<Place, AnyError> {
+        let (house, _) = read_house(self.options.mesh.as_ref(), seed_of(&[LOOK, number]))?;
+        let look = seed_of(&[LOOK, number, 1]);
+        let lattice = Lattice::new(LatticeKind::Cubic, self.cell_side_m.powi(3))?;
+        let rooms = RoomImages::new(&house, look);
+        let seed = seed_of(&[SURVEY, number]);
+        let map = robot_map(&rooms, &self.segmenter, &lattice, self.options.views, seed)?;
+        let prepared = |cloud: SemanticCloud| CalibrationMap::new(cloud, self.cell_side_m);
+        Ok(Place {
+            labels_right: right_share(&map.found, &map.truth)?,
+            unlabelled: prepared(unlabelled(&map.found))?,
+            map: Both {
+                found: prepared(map.found)?,
+                truth: prepared(map.truth)?,
+            },
+            house,
+            look,
+        })
+    }
+
+    /// All trials of one look of the headset.
+    fn trials(&self, seed: u64, scene: Scene) -> Result<Vec<Trial>, AnyError> {
+        let place = self.place(seed)?;
+        let trial = HeadsetTrial::new(&place.house, scene, 1, seed_of(&[VIEW, seed]))?;
+        let seen = trial
+            .headset_scans
+            .first()
+            .ok_or("the headset took no picture")?;
+        let rooms = RoomImages::new(&place.house, place.look);
+        let image_seed = seed_of(&[IMAGE, seed, scene as u64]);
+        let scan = headset_scan(&rooms, &self.segmenter, &trial, seen, image_seed)?;
+        let labels = LabelsRight {
+            map: rounded(place.labels_right),
+            headset: rounded(right_share(&scan.found.cloud, &scan.truth.cloud)?),
+        };
+        let truth = trial.map_from_headset;
+        let bare = HeadsetScan {
+            cloud: unlabelled(&scan.found.cloud),
+            sensor_m: scan.found.sensor_m,
+        };
+        let mut trials = Vec::new();
+        let none = cell(seed, scene, Start::None);
+        for (method, map, scan) in [
+            (OURS, &place.map.found, &scan.found),
+            (UNLABELLED, &place.unlabelled, &bare),
+            (TRUE_LABELS, &place.map.truth, &scan.truth),
+        ] {
+            let request = CalibrationRequest {
+                headset_scans: std::slice::from_ref(scan),
+                start: None,
+                confusion: None,
+            };
+            let found = calibrate(map, &request, &CalibrationOptions::default(), &());
+            let pose = &found.map_from_headset;
+            // Times are taken beside other trials: they would say nothing.
+            let trial = Trial::of_pose(&none, method, pose, &truth, &scan.cloud.points_m, 0.0);
+            trials.push(Trial {
+                labels: (method == OURS).then_some(labels),
+                different_share: rounded(different_share(map, &scan.cloud, &truth)),
+                ..trial.with_judgement(&found, &truth)
+            });
+        }
+        let source = voxel_downsample(&scan.found.cloud, self.cell_side_m);
+        let source = PreparedCloud::new(source, &PrepareOptions::default())?;
+        let pivot_m = middle_m(&scan.found.cloud);
+        for start in STARTS {
+            let cell = cell(seed, scene, start);
+            let seed = [START, seed, scene as u64];
+            let from = start_pose(start, &truth, &pivot_m, &seed);
+            let found = Baseline::named(COMPETITOR).map_or(from, |method| {
+                method.register(&source, &place.map.found, &from)
+            });
+            let seen_m = source.points_m();
+            trials.push(Trial::of_pose(
+                &cell, COMPETITOR, &found, &truth, seen_m, 0.0,
+            ));
+        }
+        Ok(trials)
+    }
+}
+
+/// The truth, moved and turned as a start says.
+fn start_pose(
+    start: Start,
+    truth: &Isometry3<f64>,
+    pivot_m: &Point3<f64>,
+    seed: &[u64; 3],
+) -> Isometry3<f64> {
+    match start {
+        Start::Off { m, deg } => {
+            let seed = seed_of(&[seed.as_slice(), &[m.to_bits()]].concat());
+            perturbed(truth, pivot_m, m, deg, seed)
+        }
+        Start::None => Isometry3::identity(),
+    }
+}
+
+/// Share of points with another label than the map has beside them, of those that both have.
+fn different_share(map: &CalibrationMap, scan: &SemanticCloud, truth: &Isometry3<f64>) -> f64 {
+    let (mut different, mut all) = (0_u64, 0_u64);
+    for (point_m, label) in scan.points_m.iter().zip(&scan.labels) {
+        let near = map.cloud().nearest(&(truth * point_m), SHARED_M);
+        let beside = near.and_then(|(index, _)| map.cloud().label(index).top());
+        if let (Some(label), Some(beside)) = (label.top(), beside) {
+            all += 1;
+            different += u64::from(label != beside);
+        }
+    }
+    different as f64 / all.max(1) as f64
+}
+
+#[cfg(all(test, feature = "onnx"))]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn a_look_through_the_chain_has_labels_that_are_wrong_and_is_the_same_each_time() {
+        let folder = tempfile::tempdir().unwrap();
+        let options = ChainOptions {
+            seeds: 1,
+            maps: 1,
+            views: 24,
+            mesh: None,
+            model: crate::models::write_rooms(folder.path()).unwrap(),
+            threads: 1,
+        };
+        let trials = || Chain::new(&options).unwrap().trials(0, Scene::Tv).unwrap();
+        let found = trials();
+        assert_eq!(found.len(), 5);
+        assert_eq!(found, trials());
+        let of = |method: &str| found.iter().find(|t| t.method == method).unwrap();
+        let labels = of(OURS).labels.unwrap();
+        assert!(labels.map > 0.4 && labels.headset > 0.3, "{labels:?}");
+        assert!(of(OURS).different_share > of(TRUE_LABELS).different_share);
+        assert!(of(TRUE_LABELS).different_share < 0.2);
+        assert!(
+            [OURS, UNLABELLED, TRUE_LABELS]
+                .iter()
+                .all(|m| of(m).judged.is_some())
+        );
+        let report = crate::report::markdown(&chain_report(&found));
+        assert!(report.contains("labels of the network | 1 |"), "{report}");
+        assert!(chain_settings(&options).unwrap().model_crc32.is_some());
+    }
+}

@@ -1,0 +1,133 @@
+//! The report of the chain.
+
+use super::super::statistics::{Share, median};
+use super::super::trial::{OURS, Trial, WRONG};
+use super::{COMPETITOR, TRUE_LABELS, UNLABELLED};
+use crate::report::{Cell, Report, Section, Table};
+
+/// Goals: least share of OK, and most of OK that may be wrong, percent.
+const GOALS: [u32; 2] = [85, 2];
+
+/// A table of the methods, one of the scenes, and the answers of ours that were OK and wrong.
+pub fn chain_report(trials: &[Trial]) -> Report {
+    let title = "From images to a verdict, with a network";
+    let lead = format!(
+        "Rendered rooms, labelled by the network, calibrated without a start; right is within {} m and {} degrees. \
+         Goals: at least {} % OK, at most {} % of the OK wrong. Intervals are of 95 % (Wilson). docs/calibration.md says \
+         how it is made.",
+        WRONG.m, WRONG.deg, GOALS[0], GOALS[1]
+    );
+    let sections = vec![methods(trials), scenes(trials), wrong(trials)];
+    Report::new(title, lead, "lattice evaluate chain".to_owned(), sections)
+}
+
+fn methods(trials: &[Trial]) -> Section {
+    let rows = [
+        ("ours, labels of the network", OURS, "none"),
+        ("ours, without labels", UNLABELLED, "none"),
+        ("ours, true labels", TRUE_LABELS, "none"),
+        (
+            "GICP-SE(3), start 0.3 m and 10 degrees off",
+            COMPETITOR,
+            "0.3/10",
+        ),
+        (
+            "GICP-SE(3), start 0.8 m and 35 degrees off",
+            COMPETITOR,
+            "0.8/35",
+        ),
+    ];
+    let line = |(title, method, start): (&str, &str, &str)| -> Vec<Cell> {
+        let of: Vec<&Trial> = (trials.iter())
+            .filter(|t| t.method == method && t.cell.start == start)
+            .collect();
+        let judged = method != COMPETITOR;
+        let mut cells: Vec<Cell> = vec![title.into(), of.len().into()];
+        cells.extend(line_of(&of, judged));
+        cells
+    };
+    let columns = "method|trials|right|OK|of the OK wrong|median error of the right (m)";
+    let title = "What labels of the network are worth";
+    Section {
+        tables: vec![Table::new("methods", title, columns, rows.map(line))],
+        ..Section::measured("methods", title, "")
+    }
+}
+
+/// Shares of right answers, of OK, and of wrong ones among them; the median error of the right.
+fn line_of(of: &[&Trial], judged: bool) -> [Cell; 4] {
+    let right = Share::of(of.iter().map(|t| t.is_within(WRONG)));
+    let accepted = Share::of(of.iter().map(|t| t.is_accepted()));
+    let ok = of.iter().filter(|t| t.is_accepted());
+    let wrong = Share::of(ok.map(|t| !t.is_within(WRONG)));
+    let near = of.iter().filter(|t| t.is_within(WRONG));
+    let error_m = median(near.map(|t| t.translation_m));
+    let stated = |share: Share| match judged {
+        true => Cell::from(share.text(0)),
+        false => Cell::Empty,
+    };
+    [
+        right.text(0).into(),
+        stated(accepted),
+        stated(wrong),
+        Cell::number(error_m, 3),
+    ]
+}
+
+fn scenes(trials: &[Trial]) -> Section {
+    let mut names: Vec<&str> = trials.iter().map(|t| t.cell.scene.as_str()).collect();
+    names.sort_unstable();
+    names.dedup();
+    let line = |scene: Option<&str>| -> Vec<Cell> {
+        let of: Vec<&Trial> = (trials.iter())
+            .filter(|t| t.method == OURS && scene.is_none_or(|scene| t.cell.scene == scene))
+            .collect();
+        let percent = |of_trial: fn(&Trial) -> Option<f64>| {
+            let share = median(of.iter().filter_map(|t| of_trial(t)));
+            Cell::number(share.map(|share| 100.0 * share), 0)
+        };
+        let mut cells: Vec<Cell> = vec![scene.unwrap_or("all").into()];
+        cells.extend(line_of(&of, true));
+        cells.push(percent(|t| t.labels.map(|labels| labels.map)));
+        cells.push(percent(|t| t.labels.map(|labels| labels.headset)));
+        cells.push(percent(|t| Some(t.different_share)));
+        cells
+    };
+    let rows = names.into_iter().map(Some).chain([None]).map(line);
+    let columns = "scene|right|OK|of the OK wrong|median error of the right (m)|voxels of the map rightly labelled (%)|\
+                   points of the headset rightly labelled (%)|points that differ from the map (%)";
+    let title = "Ours with labels of the network, by scene";
+    Section {
+        tables: vec![Table::new("scenes", title, columns, rows)],
+        ..Section::measured(
+            "scenes",
+            title,
+            "Shares of labels are medians of the trials.",
+        )
+    }
+}
+
+fn wrong(trials: &[Trial]) -> Section {
+    let ours = trials.iter().filter(|t| t.method != COMPETITOR);
+    let failed = ours.filter(|t| !t.is_accepted() || !t.is_within(WRONG));
+    let line = |t: &Trial| -> Vec<Cell> {
+        let verdict = t.judged.as_ref().map_or("", |j| j.verdict.as_str());
+        vec![
+            t.method.as_str().into(),
+            t.cell.scene.as_str().into(),
+            t.cell.seed.to_string().into(),
+            verdict.into(),
+            Cell::Number(t.translation_m, 3),
+            Cell::Number(t.rotation_deg, 2),
+            Cell::number(t.judged.as_ref().and_then(|j| j.margin), 0),
+            Cell::number(t.judged.as_ref().map(|j| 100.0 * j.inliers), 0),
+        ]
+    };
+    let rows: Vec<Vec<Cell>> = failed.map(line).collect();
+    let columns = "method|scene|seed|verdict|m|degrees|log-margin|% on the map";
+    let title = "Answers of ours that were wrong or not OK";
+    Section {
+        tables: vec![Table::new("failed", title, columns, rows)],
+        ..Section::measured("failed", title, "")
+    }
+}

@@ -1,0 +1,204 @@
+//! The bytes of buffers: of the file, of data URIs, of files beside it.
+
+use std::borrow::Cow;
+use std::fs::File;
+use std::io::Read;
+use std::path::{Component, Path, PathBuf};
+
+use base64::Engine;
+use base64::engine::general_purpose::STANDARD;
+
+use super::document::{Buffer, BufferView, Document};
+
+/// Most bytes of all buffers that are read from elsewhere.
+const MAX_BYTES: u64 = 1 << 30;
+
+/// Buffers, each read when it is first used.
+pub(super) struct Buffers<'a> {
+    document: &'a Document,
+    binary: Option<&'a [u8]>,
+    folder: Option<&'a Path>,
+    read: Vec<Option<Cow<'a, [u8]>>>,
+    bytes: u64,
+}
+
+impl<'a> Buffers<'a> {
+    /// Buffers of a document with the bytes that came with it; files are looked for in the folder alone.
+    pub fn new(
+        document: &'a Document,
+        binary: Option<&'a [u8]>,
+        folder: Option<&'a Path>,
+    ) -> Buffers<'a> {
+        let read = document.buffers.0.iter().map(|_| None).collect();
+        Buffers {
+            document,
+            binary,
+            folder,
+            read,
+            bytes: 0,
+        }
+    }
+
+    /// The bytes of a view, and the distance of its records if it names one.
+    pub fn view(&mut self, number: usize) -> Result<(&[u8], Option<u64>), String> {
+        let views = &self.document.buffer_views.0;
+        let &BufferView {
+            buffer,
+            byte_offset,
+            byte_length,
+            byte_stride,
+        } = views
+            .get(number)
+            .ok_or_else(|| format!("there is no buffer view {number}"))?;
+        let bytes = self.buffer(buffer)?;
+        let end = byte_offset.checked_add(byte_length);
+        let range = usize::try_from(byte_offset).ok().zip(end);
+        let view = range.and_then(|(from, to)| bytes.get(from..usize::try_from(to).ok()?));
+        match view {
+            Some(view) => Ok((view, byte_stride)),
+            None => Err(format!(
+                "buffer view {number} is {byte_length} bytes from {byte_offset}, but buffer {buffer} has {}",
+                bytes.len()
+            )),
+        }
+    }
+
+    fn buffer(&mut self, number: usize) -> Result<&[u8], String> {
+        let buffers = &self.document.buffers.0;
+        let (Some(buffer), Some(place)) = (buffers.get(number), self.read.get_mut(number)) else {
+            return Err(format!("there is no buffer {number}"));
+        };
+        if place.is_none() {
+            let found = content(buffer, number, self.binary, self.folder, self.bytes);
+            let found = found.map_err(|reason| format!("buffer {number}: {reason}"))?;
+            if let Cow::Owned(bytes) = &found {
+                self.bytes = self.bytes.saturating_add(bytes.len() as u64);
+            }
+            *place = Some(found);
+        }
+        Ok(place.as_deref().unwrap_or_default())
+    }
+}
+
+/// The bytes of a buffer, of exactly the length that it says.
+fn content<'a>(
+    buffer: &Buffer,
+    number: usize,
+    binary: Option<&'a [u8]>,
+    folder: Option<&Path>,
+    before: u64,
+) -> Result<Cow<'a, [u8]>, String> {
+    let length = buffer.byte_length;
+    if before.saturating_add(length) > MAX_BYTES {
+        return Err(format!(
+            "{length} bytes, but at most {MAX_BYTES} of all buffers are taken"
+        ));
+    }
+    let mut bytes: Cow<'a, [u8]> = match buffer.uri.as_deref() {
+        None if number == 0 => binary.ok_or("it has no uri, and the file no bytes")?.into(),
+        None => return Err("it has no uri".to_owned()),
+        Some(uri) => match uri.strip_prefix("data:") {
+            Some(data) => embedded(data)?.into(),
+            None => beside(uri, folder, length)?.into(),
+        },
+    };
+    let wanted = usize::try_from(length).ok();
+    let found = bytes.len();
+    let Some(wanted) = wanted.filter(|wanted| *wanted <= found) else {
+        return Err(format!("{length} bytes are said, but {found} are there"));
+    };
+    match &mut bytes {
+        Cow::Borrowed(bytes) => *bytes = bytes.get(..wanted).unwrap_or_default(),
+        Cow::Owned(bytes) => bytes.truncate(wanted),
+    }
+    Ok(bytes)
+}
+
+/// The bytes of a data URI behind `data:`.
+fn embedded(data: &str) -> Result<Vec<u8>, String> {
+    let (media, text) = data.split_once(',').ok_or("its data URI has no comma")?;
+    if !media.ends_with(";base64") {
+        return Err("its data URI is not base64".to_owned());
+    }
+    let decoded = STANDARD.decode(text);
+    decoded.map_err(|error| format!("its data URI is not base64: {error}"))
+}
+
+/// The first bytes of a file in the folder or below it.
+fn beside(uri: &str, folder: Option<&Path>, length: u64) -> Result<Vec<u8>, String> {
+    let folder = folder.ok_or("files beside this one are not read")?;
+    let path = inside(uri).ok_or_else(|| {
+        let uri: String = uri.chars().take(80).collect();
+        format!("'{uri}' leads out of the folder of the file")
+    })?;
+    let failed = |error: std::io::Error| format!("{}: {error}", path.display());
+    // A link may lead elsewhere, too.
+    let folder = folder.canonicalize().map_err(failed)?;
+    let full = folder.join(&path).canonicalize().map_err(failed)?;
+    if !full.starts_with(&folder) {
+        return Err(format!(
+            "{} leads out of the folder of the file",
+            path.display()
+        ));
+    }
+    if !full.metadata().map_err(failed)?.is_file() {
+        return Err(format!("{} is no file", path.display()));
+    }
+    let mut bytes = Vec::new();
+    let file = File::open(&full).map_err(failed)?;
+    file.take(length).read_to_end(&mut bytes).map_err(failed)?;
+    Ok(bytes)
+}
+
+/// A relative path that goes down alone; percent codes are read.
+fn inside(uri: &str) -> Option<PathBuf> {
+    let mut bytes = Vec::new();
+    let mut rest = uri.as_bytes();
+    while let [first, tail @ ..] = rest {
+        rest = tail;
+        if *first != b'%' {
+            bytes.push(*first);
+            continue;
+        }
+        let (code, after) = rest.split_at_checked(2)?;
+        let code = std::str::from_utf8(code).ok()?;
+        // A sign would be read as part of the number.
+        let code = Some(code).filter(|code| code.bytes().all(|b| b.is_ascii_hexdigit()))?;
+        bytes.push(u8::from_str_radix(code, 16).ok()?);
+        rest = after;
+    }
+    let text = String::from_utf8(bytes).ok()?;
+    if text.is_empty() || text.contains(['\\', ':', '\0']) {
+        return None;
+    }
+    let path = PathBuf::from(text);
+    let down = |part: Component<'_>| matches!(part, Component::Normal(_) | Component::CurDir);
+    path.components().all(down).then_some(path)
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn uris_go_down_alone() {
+        for (uri, path) in [
+            ("room.bin", Some("room.bin")),
+            ("a/b%20c.bin", Some("a/b c.bin")),
+            ("", None),
+            ("/etc/passwd", None),
+            ("../room.bin", None),
+            ("a/../../b", None),
+            ("%2e%2e/room.bin", None),
+            ("./room.bin", Some("./room.bin")),
+            ("file:///etc/passwd", None),
+            ("a\\b", None),
+            ("a%0", None),
+            ("a%+1", None),
+            ("a%00", None),
+            ("%ff", None),
+        ] {
+            assert_eq!(inside(uri), path.map(PathBuf::from), "{uri}");
+        }
+    }
+}

@@ -1,0 +1,233 @@
+//! The parts of a glTF 2.0 document that make a mesh.
+
+use std::fmt;
+use std::marker::PhantomData;
+
+use serde::de::{Deserializer, Error, IgnoredAny, MapAccess, SeqAccess, Visitor};
+use serde::{Deserialize, de};
+
+/// Most nodes, meshes, accessors and so on of a document: a few bytes of text make one of them.
+const MAX_OBJECTS: usize = 100_000;
+
+/// A document. What is not named here does not change where triangles are.
+#[derive(Debug, Default, Deserialize)]
+#[serde(rename_all = "camelCase", default)]
+pub(super) struct Document {
+    pub asset: Asset,
+    pub extensions_required: Few<String>,
+    pub scene: Option<usize>,
+    pub scenes: Few<Scene>,
+    pub nodes: Few<Node>,
+    pub meshes: Few<Mesh>,
+    pub accessors: Few<Accessor>,
+    pub buffer_views: Few<BufferView>,
+    pub buffers: Few<Buffer>,
+}
+
+/// Word about the document itself.
+#[derive(Debug, Default, Deserialize)]
+#[serde(default)]
+pub(super) struct Asset {
+    pub version: String,
+}
+
+/// Nodes that are shown together.
+#[derive(Debug, Default, Deserialize)]
+#[serde(default)]
+pub(super) struct Scene {
+    pub nodes: Vec<usize>,
+}
+
+/// A place, and what is there.
+#[derive(Debug, Default, Deserialize)]
+#[serde(default)]
+pub(super) struct Node {
+    pub children: Vec<usize>,
+    pub mesh: Option<usize>,
+    pub skin: Option<usize>,
+    /// Column by column.
+    pub matrix: Option<Box<[f64; 16]>>,
+    pub translation: Option<[f64; 3]>,
+    /// x, y, z, w.
+    pub rotation: Option<[f64; 4]>,
+    pub scale: Option<[f64; 3]>,
+    pub extras: Extras,
+}
+
+/// Primitives that go together.
+#[derive(Debug, Deserialize)]
+pub(super) struct Mesh {
+    pub primitives: Vec<Primitive>,
+    #[serde(default)]
+    pub extras: Extras,
+}
+
+/// Triangles, or what else is drawn.
+#[derive(Debug, Deserialize)]
+pub(super) struct Primitive {
+    pub attributes: Attributes,
+    pub indices: Option<usize>,
+    pub mode: Option<u32>,
+    #[serde(default)]
+    pub extras: Extras,
+}
+
+/// Accessors of the vertices.
+#[derive(Debug, Deserialize)]
+pub(super) struct Attributes {
+    #[serde(rename = "POSITION")]
+    pub position: Option<usize>,
+}
+
+/// Numbers in a view.
+#[derive(Debug, Deserialize)]
+#[serde(rename_all = "camelCase")]
+pub(super) struct Accessor {
+    pub buffer_view: Option<usize>,
+    #[serde(default)]
+    pub byte_offset: u64,
+    pub component_type: u32,
+    #[serde(default)]
+    pub normalized: bool,
+    pub count: u64,
+    #[serde(rename = "type")]
+    pub kind: String,
+    pub sparse: Option<IgnoredAny>,
+}
+
+/// A part of a buffer.
+#[derive(Debug, Deserialize)]
+#[serde(rename_all = "camelCase")]
+pub(super) struct BufferView {
+    pub buffer: usize,
+    #[serde(default)]
+    pub byte_offset: u64,
+    pub byte_length: u64,
+    pub byte_stride: Option<u64>,
+}
+
+/// Bytes: of the file itself without `uri`.
+#[derive(Debug, Deserialize)]
+#[serde(rename_all = "camelCase")]
+pub(super) struct Buffer {
+    pub uri: Option<String>,
+    pub byte_length: u64,
+}
+
+/// A list that is not longer than anybody needs.
+#[derive(Debug)]
+pub(super) struct Few<T>(pub Vec<T>);
+
+impl<T> Default for Few<T> {
+    fn default() -> Self {
+        Self(Vec::new())
+    }
+}
+
+impl<'de, T: Deserialize<'de>> Deserialize<'de> for Few<T> {
+    fn deserialize<D: Deserializer<'de>>(deserializer: D) -> Result<Self, D::Error> {
+        deserializer.deserialize_seq(FewVisitor(PhantomData))
+    }
+}
+
+struct FewVisitor<T>(PhantomData<T>);
+
+impl<'de, T: Deserialize<'de>> Visitor<'de> for FewVisitor<T> {
+    type Value = Few<T>;
+
+    fn expecting(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
+        write!(f, "a list of at most {MAX_OBJECTS}")
+    }
+
+    fn visit_seq<A: SeqAccess<'de>>(self, mut list: A) -> Result<Few<T>, A::Error> {
+        let mut all = Vec::new();
+        while let Some(one) = list.next_element()? {
+            if all.len() == MAX_OBJECTS {
+                return Err(A::Error::invalid_length(all.len() + 1, &self));
+            }
+            all.push(one);
+        }
+        Ok(Few(all))
+    }
+}
+
+/// Word of the application: of a node, a mesh or a primitive.
+#[derive(Clone, Copy, Debug, Default, PartialEq)]
+pub(super) struct Extras {
+    pub label: Option<f64>,
+    pub instance: Option<f64>,
+}
+
+/// A value of an application; it may be anything.
+#[derive(Deserialize)]
+#[serde(untagged)]
+enum Given {
+    Number(f64),
+    Other(IgnoredAny),
+}
+
+impl<'de> Deserialize<'de> for Extras {
+    fn deserialize<D: Deserializer<'de>>(deserializer: D) -> Result<Self, D::Error> {
+        deserializer.deserialize_any(ExtrasVisitor)
+    }
+}
+
+struct ExtrasVisitor;
+
+impl<'de> Visitor<'de> for ExtrasVisitor {
+    type Value = Extras;
+
+    fn expecting(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
+        f.write_str("anything")
+    }
+
+    fn visit_map<A: MapAccess<'de>>(self, mut map: A) -> Result<Extras, A::Error> {
+        let mut extras = Extras::default();
+        while let Some(key) = map.next_key::<String>()? {
+            let known = match key.as_str() {
+                "label" => Some(&mut extras.label),
+                "instance" => Some(&mut extras.instance),
+                _ => None,
+            };
+            match known {
+                None => drop(map.next_value::<IgnoredAny>()?),
+                Some(known) => {
+                    *known = match map.next_value()? {
+                        Given::Number(number) => Some(number),
+                        Given::Other(IgnoredAny) => None,
+                    }
+                }
+            }
+        }
+        Ok(extras)
+    }
+
+    fn visit_seq<A: SeqAccess<'de>>(self, mut list: A) -> Result<Extras, A::Error> {
+        while list.next_element::<IgnoredAny>()?.is_some() {}
+        Ok(Extras::default())
+    }
+
+    fn visit_bool<E: de::Error>(self, _: bool) -> Result<Extras, E> {
+        Ok(Extras::default())
+    }
+
+    fn visit_i64<E: de::Error>(self, _: i64) -> Result<Extras, E> {
+        Ok(Extras::default())
+    }
+
+    fn visit_u64<E: de::Error>(self, _: u64) -> Result<Extras, E> {
+        Ok(Extras::default())
+    }
+
+    fn visit_f64<E: de::Error>(self, _: f64) -> Result<Extras, E> {
+        Ok(Extras::default())
+    }
+
+    fn visit_str<E: de::Error>(self, _: &str) -> Result<Extras, E> {
+        Ok(Extras::default())
+    }
+
+    fn visit_unit<E: de::Error>(self) -> Result<Extras, E> {
+        Ok(Extras::default())
+    }
+}

@@ -1,0 +1,108 @@
+//! Models as files: what every backend reads and checks of them.
+
+use std::fs::File;
+use std::io::{Cursor, Read};
+use std::path::Path;
+
+use tract_onnx::Onnx;
+use tract_onnx::pb::ModelProto;
+use tract_onnx::prelude::Framework;
+
+use super::checks::{self, MAX_TENSOR_VALUES};
+use super::names;
+use super::network::{ModelError, Network, Size, Values};
+
+/// Largest model that is read, bytes: the format holds no more than 2 GiB.
+const MAX_MODEL_BYTES: u64 = 1 << 30;
+
+/// Bytes of a model's file.
+pub(super) fn read(path: &Path) -> Result<Vec<u8>, ModelError> {
+    let on_error = |error| ModelError::File {
+        path: path.to_owned(),
+        error,
+    };
+    let file = File::open(path).map_err(on_error)?;
+    let bytes = file.metadata().map_err(on_error)?.len();
+    if bytes > MAX_MODEL_BYTES {
+        return Err(ModelError::Large {
+            path: path.to_owned(),
+            bytes,
+            max: MAX_MODEL_BYTES,
+        });
+    }
+    let mut read = Vec::new();
+    file.take(MAX_MODEL_BYTES)
+        .read_to_end(&mut read)
+        .map_err(on_error)?;
+    Ok(read)
+}
+
+/// The graph of a file, checked, and the names of its classes.
+pub(super) fn checked(
+    bytes: &[u8],
+    path: &Path,
+    onnx: &Onnx,
+    known: impl Fn(&str) -> bool,
+) -> Result<(ModelProto, Vec<String>), String> {
+    let proto = onnx
+        .proto_model_for_read(&mut Cursor::new(bytes))
+        .map_err(|_| "this is no ONNX file".to_owned())?;
+    checks::model(&proto, known)?;
+    let metadata = proto.metadata_props.iter();
+    let metadata = metadata.map(|entry| (entry.key.as_str(), entry.value.as_str()));
+    let names = names::of_model(metadata, path)?;
+    Ok((proto, names))
+}
+
+/// Size of the images that a model takes: its own (1 x 3 x rows x columns), or the given one where that is open;
+/// `None`: another shape.
+pub(super) fn input_size(
+    dims: &[Option<usize>],
+    given: Option<Size>,
+) -> Option<Result<Size, String>> {
+    let &[batch, channels, height, width] = dims else {
+        return None;
+    };
+    if batch.unwrap_or(1) != 1 || channels.unwrap_or(3) != 3 {
+        return None;
+    }
+    let own = |own: Option<usize>, given: Option<usize>| match (own, given) {
+        (Some(own), Some(given)) if own != given => Err(format!(
+            "its input has {own} pixels, not {given} as `input_size` says"
+        )),
+        (None, None) => Err("it leaves the size of its input open: set `input_size`".to_owned()),
+        (own, given) => Ok(own.or(given).unwrap_or(1)),
+    };
+    let size = || {
+        let size = Size {
+            width: own(width, given.map(|size| size.width))?,
+            height: own(height, given.map(|size| size.height))?,
+        };
+        let pixels = size.pixels();
+        if pixels == 0 || pixels > MAX_TENSOR_VALUES / 3 {
+            return Err(format!("its input has {pixels} pixels"));
+        }
+        Ok(size)
+    };
+    Some(size())
+}
+
+/// Runs a network once, so that what does not fit shows at the start.
+pub(super) fn tried<N: Network>(network: N) -> Result<N, String> {
+    let scores = network.run(vec![0.0; 3 * network.input().pixels()])?;
+    let names = network.names().len();
+    match scores.values {
+        Values::Scores { classes, .. } if names > 0 && names != classes => {
+            Err(format!("it has {classes} classes and {names} names"))
+        }
+        _ => Ok(network),
+    }
+}
+
+/// Refusal of an output that is neither scores nor classes.
+pub(super) fn other_output(kind: impl std::fmt::Debug, shape: impl std::fmt::Debug) -> String {
+    format!(
+        "its output is {kind:?} of {shape:?}, expected scores of 1 x classes x rows x columns or whole numbers of 1 x \
+         rows x columns"
+    )
+}

@@ -1,0 +1,105 @@
+//! A network inside of another node: what that node starts, hears and shows of it.
+
+use std::sync::{Arc, Mutex, PoisonError};
+
+use lattice_msgs::vision_msgs::LabelInfo;
+
+use super::parameters::NetworkSettings;
+use super::worker::{Input, News, Worker, WorkerState};
+use super::{Segmenter, SegmenterCounts, SegmenterOptions};
+use crate::report;
+use crate::start::NodeError;
+use lattice_runtime::params::{ParamError, Params};
+use lattice_runtime::qos::Qos;
+use lattice_runtime::{Diagnostics, Level, Load, Node, Shutdown, Subscription};
+
+/// A network that is ready to work.
+pub(crate) struct Ready {
+    segmenter: Segmenter,
+    view: NetworkView,
+}
+
+impl Ready {
+    /// Reads the model; errors name the parameter that is wrong.
+    pub fn new(
+        params: &Params,
+        settings: &NetworkSettings,
+        options: SegmenterOptions,
+    ) -> Result<Self, ParamError> {
+        let segmenter = Segmenter::new(options, settings.read(params)?);
+        let view = WorkerState::new(&segmenter, 0.0);
+        let view = NetworkView(Arc::new(Mutex::new(view)));
+        Ok(Self { segmenter, view })
+    }
+
+    /// What the node sees of it.
+    pub fn view(&self) -> NetworkView {
+        self.view.clone()
+    }
+
+    /// Starts its thread on the images of a topic; `tell` is called on it.
+    pub fn start(
+        self,
+        node: &Node,
+        [name, topic]: [&str; 2],
+        is_compressed: bool,
+        shutdown: Shutdown,
+        tell: impl FnMut(News) + Send + 'static,
+    ) -> Result<(Worker, Subscription), NodeError> {
+        let worker = Worker::spawn(name, self.segmenter, self.view.0, shutdown, tell)?;
+        let mut enter = worker.entrance();
+        let images = if is_compressed {
+            let topic = format!("{topic}/compressed");
+            let enter = move |image| enter(Input::Compressed(image));
+            node.subscribe(&topic, Qos::SENSOR, Load::Large, enter)?
+        } else {
+            let enter = move |image| enter(Input::Plain(image));
+            node.subscribe(topic, Qos::SENSOR, Load::Large, enter)?
+        };
+        Ok((worker, images))
+    }
+}
+
+/// State of a network as it was after its last image.
+#[derive(Clone)]
+pub(crate) struct NetworkView(Arc<Mutex<WorkerState>>);
+
+impl NetworkView {
+    fn state(&self) -> WorkerState {
+        let state = self.0.lock().unwrap_or_else(PoisonError::into_inner);
+        state.clone()
+    }
+
+    /// Counters of images.
+    pub fn counts(&self) -> SegmenterCounts {
+        self.state().counts
+    }
+
+    /// Names of the classes.
+    pub fn label_info(&self) -> Option<LabelInfo> {
+        self.state().label_info
+    }
+
+    /// Tells how the network fares.
+    pub fn diagnose(&self, diagnostics: &Diagnostics) {
+        let state = self.state();
+        let (level, message) = fares(&state.counts);
+        let mut values = report::key_values(&state.counts);
+        values.push(("last_image_s".into(), format!("{:.4}", state.last_s)));
+        values.push(("last_refused".into(), state.problem.unwrap_or_default()));
+        diagnostics.set("network", level, message, values);
+    }
+}
+
+/// How the labelling of images fares, in words.
+pub(super) fn fares(counts: &SegmenterCounts) -> (Level, String) {
+    // Images that come faster than the network works are no fault.
+    let refused = counts.dropped.iter();
+    let refused = refused.filter(|(reason, _)| *reason != "skipped");
+    let reasons: Vec<String> = refused.map(|(r, n)| format!("{n} {r}")).collect();
+    match (counts.labels_out, reasons.is_empty()) {
+        (0, true) => (Level::Warn, "no image yet".to_owned()),
+        (_, true) => (Level::Ok, "labelling images".to_owned()),
+        _ => (Level::Warn, format!("dropped: {}", reasons.join(", "))),
+    }
+}

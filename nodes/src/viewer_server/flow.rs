@@ -1,0 +1,87 @@
+//! The pace at which one client may send what a headset sees.
+
+use std::time::{Duration, Instant};
+
+/// Bytes that the shortest message counts as.
+const MIN_MESSAGE_BYTES: usize = 4096;
+/// Time between two words to a client about messages that were refused.
+const WORDS_PERIOD: Duration = Duration::from_secs(1);
+
+/// Bytes that a client may still send: a second's worth at most, which time brings back.
+#[derive(Debug)]
+pub struct Flow {
+    bytes_per_s: f64,
+    left: f64,
+    at: Instant,
+    told: Option<Instant>,
+}
+
+impl Flow {
+    /// The flow of a client that comes now.
+    pub fn new(bytes_per_s: usize, now: Instant) -> Self {
+        let bytes_per_s = bytes_per_s as f64;
+        Self {
+            bytes_per_s,
+            left: bytes_per_s,
+            at: now,
+            told: None,
+        }
+    }
+
+    /// True if a message of so many bytes is not too much now; it is then taken off.
+    pub fn admits(&mut self, bytes: usize, now: Instant) -> bool {
+        let passed_s = now.saturating_duration_since(self.at).as_secs_f64();
+        self.at = now;
+        self.left = (self.left + passed_s * self.bytes_per_s).min(self.bytes_per_s);
+        let bytes = bytes.max(MIN_MESSAGE_BYTES) as f64;
+        let fits = bytes <= self.left;
+        if fits {
+            self.left -= bytes;
+        }
+        fits
+    }
+
+    /// True if the client may be told now that something was refused.
+    pub fn may_tell(&mut self, now: Instant) -> bool {
+        let told = self.told;
+        let may = told.is_none_or(|told| now.saturating_duration_since(told) >= WORDS_PERIOD);
+        if may {
+            self.told = Some(now);
+        }
+        may
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn a_second_of_bytes_may_come_at_once_and_then_as_time_goes() {
+        let start = Instant::now();
+        let after = |ms: u64| start + Duration::from_millis(ms);
+        let mut flow = Flow::new(100_000, start);
+        assert!(flow.admits(90_000, start));
+        assert!(!flow.admits(20_000, start), "refused and not taken off");
+        assert!(flow.admits(10_000, start));
+        assert!(!flow.admits(20_000, after(100)));
+        assert!(flow.admits(20_000, after(200)));
+        // Short messages count, too, and an hour brings no more than a second's worth.
+        let hour = after(3_600_000);
+        assert_eq!((0..100).filter(|_| flow.admits(1, hour)).count(), 24);
+        // A clock that goes back brings nothing.
+        assert!(!flow.admits(5000, start));
+        assert!(!flow.admits(200_000, after(7_200_000)));
+    }
+
+    #[test]
+    fn words_come_once_a_second() {
+        let start = Instant::now();
+        let mut flow = Flow::new(1, start);
+        let told = [0, 999, 1000, 1500, 2000].map(|ms| {
+            let now = start + Duration::from_millis(ms);
+            flow.may_tell(now)
+        });
+        assert_eq!(told, [true, false, true, false, true]);
+    }
+}
