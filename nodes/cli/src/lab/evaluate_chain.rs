@@ -32,6 +32,9 @@ pub struct Chain {
     /// Views of a survey
     #[arg(long, default_value_t = 192)]
     views: usize,
+    /// Pictures that the headset takes at a scene, 1 to 6: of the thing itself, then to its sides
+    #[arg(long, default_value_t = 1)]
+    looks: usize,
     /// Trials at once [default: as many as processors]
     #[arg(long)]
     threads: Option<usize>,
@@ -53,6 +56,7 @@ impl Chain {
             seeds: self.seeds,
             maps: self.maps,
             views: self.views,
+            looks: self.looks,
             mesh: self.mesh.zip(self.classes),
             model,
             threads: self.threads.unwrap_or_else(processors).clamp(1, 1024),

@@ -185,7 +185,7 @@ mod tests {
 
     #[test]
     fn a_later_log_has_what_a_longer_one_has_then() {
-        let later = Bobcat::new(1, 1.5).unwrap().from_time(3.0).unwrap();
+        let later = Bobcat::new(1, 1.5).unwrap().starting_at(3.0).unwrap();
         let mut log = Log::new(&later).unwrap();
         let mut found = Vec::new();
         while let Some(block) = log.next_block().unwrap() {
@@ -203,7 +203,7 @@ mod tests {
         let missing: Vec<_> = missing.map(|e| e.topic).collect();
         assert!(missing.len() <= 6, "{missing:?}");
         for begin_s in [-1.0, f64::NAN, 1e9] {
-            assert!(Bobcat::new(1, 1.0).unwrap().from_time(begin_s).is_err());
+            assert!(Bobcat::new(1, 1.0).unwrap().starting_at(begin_s).is_err());
         }
     }
 

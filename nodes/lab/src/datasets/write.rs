@@ -108,7 +108,7 @@ fn write_log(
         Vector3::z() * turn_deg.to_radians(),
     );
     let bobcat = Bobcat::new(options.seed, options.duration_s)?
-        .from_time(options.begin_s)?
+        .starting_at(options.begin_s)?
         .with_person(options.person)
         .with_ins_offset(ins_offset);
     let writer = WriterOptions::default();

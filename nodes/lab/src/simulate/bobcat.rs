@@ -144,7 +144,7 @@ impl Bobcat {
     }
 
     /// The part of the tour from `begin_s` on, of the same duration; stamps begin as much later.
-    pub fn from_time(self, begin_s: f64) -> Result<Self, SimulationError> {
+    pub fn starting_at(self, begin_s: f64) -> Result<Self, SimulationError> {
         let duration_s = self.duration_ns as f64 * 1e-9 + begin_s;
         if begin_s.is_nan() || begin_s < 0.0 || duration_s > MAX_DURATION_S {
             return Err(SimulationError::Begin { begin_s });

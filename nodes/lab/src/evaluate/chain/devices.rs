@@ -288,6 +288,19 @@ pub(super) fn right_share(found: &SemanticCloud, truth: &SemanticCloud) -> Resul
     Ok(right as f64 / all.max(1) as f64)
 }
 
+/// The points and labels of all scans.
+pub(super) fn together(scans: &[HeadsetScan]) -> SemanticCloud {
+    let clouds = || scans.iter().map(|scan| &scan.cloud);
+    SemanticCloud {
+        points_m: clouds()
+            .flat_map(|cloud| cloud.points_m.iter().copied())
+            .collect(),
+        labels: clouds()
+            .flat_map(|cloud| cloud.labels.iter().cloned())
+            .collect(),
+    }
+}
+
 /// Cloud without its labels.
 pub(super) fn unlabelled(cloud: &SemanticCloud) -> SemanticCloud {
     SemanticCloud {

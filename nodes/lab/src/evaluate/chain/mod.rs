@@ -30,7 +30,7 @@ use super::{Results, read_house};
 use crate::options::within;
 use crate::simulate::house::{HeadsetTrial, House, RoomImages, Scene};
 use crate::{AnyError, at, pool};
-use devices::{Both, headset_scan, middle_m, right_share, robot_map, unlabelled};
+use devices::{Both, headset_scan, middle_m, right_share, robot_map, together, unlabelled};
 
 /// Purposes of seeds.
 const VIEW: u64 = 11;
@@ -61,6 +61,8 @@ pub struct ChainOptions {
     pub maps: u64,
     /// Views of a survey.
     pub views: usize,
+    /// Pictures that the headset takes at a scene, turned to its sides after the first.
+    pub looks: usize,
     /// A mesh and the names of its classes, which are those of the network.
     pub mesh: Option<(PathBuf, PathBuf)>,
     /// The network.
@@ -97,6 +99,7 @@ pub fn chain_settings(options: &ChainOptions) -> Result<Settings, AnyError> {
         model_crc32: Some(crc32(&options.model)?),
         survey_views: options.views,
         map_seeds: options.maps,
+        headset_scans: options.looks,
         ..Settings::default()
     })
 }
@@ -198,51 +201,56 @@ impl Chain<'_> {
         })
     }
 
-    /// All trials of one look of the headset.
+    /// All trials of what the headset sees of a scene.
     fn trials(&self, seed: u64, scene: Scene) -> Result<Vec<Trial>, AnyError> {
         let place = self.place(seed)?;
-        let trial = HeadsetTrial::new(&place.house, scene, 1, seed_of(&[VIEW, seed]))?;
-        let seen = trial
-            .headset_scans
-            .first()
-            .ok_or("the headset took no picture")?;
+        let looks = self.options.looks;
+        let trial = HeadsetTrial::new(&place.house, scene, looks, seed_of(&[VIEW, seed]))?;
         let rooms = RoomImages::new(&place.house, place.look);
-        let image_seed = seed_of(&[IMAGE, seed, scene as u64]);
-        let scan = headset_scan(&rooms, &self.segmenter, &trial, seen, image_seed)?;
+        let scans = (0_u64..).zip(&trial.headset_scans).map(|(number, seen)| {
+            let image_seed = seed_of(&[IMAGE, seed, scene as u64, number]);
+            headset_scan(&rooms, &self.segmenter, &trial, seen, image_seed)
+        });
+        let scans: Vec<Both<HeadsetScan>> = scans.collect::<Result<_, _>>()?;
+        let (found, right): (Vec<_>, Vec<_>) =
+            scans.into_iter().map(|s| (s.found, s.truth)).unzip();
+        let (seen, seen_right) = (together(&found), together(&right));
         let labels = LabelsRight {
             map: rounded(place.labels_right),
-            headset: rounded(right_share(&scan.found.cloud, &scan.truth.cloud)?),
+            headset: rounded(right_share(&seen, &seen_right)?),
         };
         let truth = trial.map_from_headset;
-        let bare = HeadsetScan {
-            cloud: unlabelled(&scan.found.cloud),
-            sensor_m: scan.found.sensor_m,
-        };
+        let bare = found.iter().map(|scan| HeadsetScan {
+            cloud: unlabelled(&scan.cloud),
+            sensor_m: scan.sensor_m,
+        });
+        let bare: Vec<_> = bare.collect();
         let mut trials = Vec::new();
         let none = cell(seed, scene, Start::None);
-        for (method, map, scan) in [
-            (OURS, &place.map.found, &scan.found),
+        for (method, map, headset_scans) in [
+            (OURS, &place.map.found, &found),
             (UNLABELLED, &place.unlabelled, &bare),
-            (TRUE_LABELS, &place.map.truth, &scan.truth),
+            (TRUE_LABELS, &place.map.truth, &right),
         ] {
+            let cloud = together(headset_scans);
             let request = CalibrationRequest {
-                headset_scans: std::slice::from_ref(scan),
+                headset_scans,
                 start: None,
                 confusion: None,
             };
             let found = calibrate(map, &request, &CalibrationOptions::default(), &());
             let pose = &found.map_from_headset;
             // Times are taken beside other trials: they would say nothing.
-            let trial = Trial::of_pose(&none, method, pose, &truth, &scan.cloud.points_m, 0.0);
+            let trial = Trial::of_pose(&none, method, pose, &truth, &cloud.points_m, 0.0);
             trials.push(Trial {
                 labels: (method == OURS).then_some(labels),
-                different_share: rounded(different_share(map, &scan.cloud, &truth)),
+                different_share: rounded(different_share(map, &cloud, &truth)),
                 ..trial.with_judgement(&found, &truth)
             });
         }
-        let source = voxel_downsample(&scan.found.cloud, self.cell_side_m);
+        let source = voxel_downsample(&seen, self.cell_side_m);
         let source = PreparedCloud::new(source, &PrepareOptions::default())?;
-        let pivot_m = middle_m(&scan.found.cloud);
+        let pivot_m = middle_m(&seen);
         for start in STARTS {
             let cell = cell(seed, scene, start);
             let seed = [START, seed, scene as u64];
@@ -300,6 +308,7 @@ mod tests {
             seeds: 1,
             maps: 1,
             views: 24,
+            looks: 2,
             mesh: None,
             model: crate::models::write_rooms(folder.path()).unwrap(),
             threads: 1,

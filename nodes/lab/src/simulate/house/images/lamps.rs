@@ -76,7 +76,7 @@ impl Lamps {
         for (place_m, light) in &self.lamps {
             let to = place_m - start_m;
             let distance_m = to.norm();
-            if distance_m >= REACH_M || distance_m < 1e-3 {
+            if !(1e-3..REACH_M).contains(&distance_m) {
                 continue;
             }
             let to = to / distance_m;
