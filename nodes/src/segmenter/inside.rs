@@ -32,7 +32,7 @@ impl Ready {
         Ok(Self { segmenter, view })
     }
 
-    /// What the node sees of it.
+    /// The handle by which the node feeds it and reads its state.
     pub fn view(&self) -> NetworkView {
         self.view.clone()
     }
@@ -91,7 +91,7 @@ impl NetworkView {
     }
 }
 
-/// How the labelling of images fares, in words.
+/// State of the labelling of images, with its level, in words.
 pub(super) fn fares(counts: &SegmenterCounts) -> (Level, String) {
     // Images that come faster than the network works are no fault.
     let refused = counts.dropped.iter();

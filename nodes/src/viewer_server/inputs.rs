@@ -1,4 +1,4 @@
-//! What clients publish for a headset: counted, and refused by name.
+//! Messages that clients publish for a headset: counted, and refused by name.
 
 use std::collections::BTreeMap;
 use std::sync::Mutex;

@@ -108,7 +108,7 @@ fn ask_for_a_calibration(client: &mut Client) {
     }
 }
 
-/// What cannot be taken is told and counted, and the next client is served.
+/// Messages that cannot be taken: each is told and counted, and the next client is served.
 fn hostile(mut client: Client, url: &str) {
     let mesh = client
         .mine
