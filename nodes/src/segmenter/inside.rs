@@ -32,7 +32,7 @@ impl Ready {
         Ok(Self { segmenter, view })
     }
 
-    /// The handle by which the node feeds it and reads its state.
+    /// State of the network as the node reads it.
     pub fn view(&self) -> NetworkView {
         self.view.clone()
     }
