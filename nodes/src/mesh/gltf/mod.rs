@@ -17,6 +17,7 @@ use nalgebra::{Matrix4, Point3, Quaternion, Translation3, UnitQuaternion, Vector
 
 use self::buffers::Buffers;
 use self::document::{Document, Extras, Node, Primitive};
+use super::labelled::Parts;
 use super::{LabelledMesh, MeshError};
 
 /// Most bytes of a file.
@@ -84,14 +85,8 @@ pub fn from_bytes(
         nodes: 0,
     };
     reading.scene()?;
-    let Parts {
-        vertices_m,
-        triangles,
-        labels,
-        instances,
-    } = reading.parts;
-    LabelledMesh::new(vertices_m, triangles, labels, instances)
-        .map_err(|error| MeshError::NoMesh(Box::new(error)))
+    let mesh = reading.parts.mesh();
+    mesh.map_err(|error| MeshError::NoMesh(Box::new(error)))
 }
 
 fn fault(reason: String) -> MeshError {
@@ -131,15 +126,6 @@ fn in_axes(axes: Axes, p: Point3<f64>) -> [f32; 3] {
         Axes::Optical => [x, -y, -z],
     };
     turned.map(|c| c as f32)
-}
-
-/// The mesh as it grows.
-#[derive(Default)]
-struct Parts {
-    vertices_m: Vec<[f32; 3]>,
-    triangles: Vec<[u32; 3]>,
-    labels: Vec<u16>,
-    instances: Vec<u16>,
 }
 
 /// A document that is being read.
