@@ -32,8 +32,8 @@ class Lattice:
     @property
     def generator(self) -> npt.NDArray[np.float64]:
         """Generator matrix, shape (3, 3); columns are basis vectors, m."""
-    def quantize(self, xyz: Points) -> npt.NDArray[np.int32]:
-        """Lattice indices of the cells of points, shape (n, 3)."""
+    def quantize(self, xyz: Points, *, out: npt.NDArray[np.int32] | None = None) -> npt.NDArray[np.int32]:
+        """Lattice indices of the cells of points, shape (n, 3); written to `out` where given, which is returned."""
     def centers(self, cells: npt.NDArray[np.integer[Any]]) -> npt.NDArray[np.float64]:
         """Centres of cells by their lattice indices, shape (n, 3), m."""
 

@@ -1,11 +1,12 @@
 //! `Lattice`.
 
-use lattice_core::lattice::{Lattice as Core, LatticeKind};
-use numpy::PyReadonlyArray2;
+use lattice_core::lattice::{BatchQuantizer, Lattice as Core, LatticeIndex, LatticeKind};
+use nalgebra::Isometry3;
+use numpy::{PyArray2, PyArrayMethods, PyReadonlyArray2, PyUntypedArrayMethods};
 use pyo3::prelude::*;
 use rayon::prelude::*;
 
-use crate::points::{Points, Rows, array_of};
+use crate::points::{Points, Rows, array_of, new_array};
 use crate::refuse;
 
 /// Rows that a thread takes at a time.
@@ -47,22 +48,31 @@ impl Lattice {
         array_of(py, &[row(0), row(1), row(2)])
     }
 
-    /// Lattice indices of the cells of points (m), int32 of shape (n, 3).
+    /// Lattice indices of the cells of points (m), int32 of shape (n, 3); into `out` where given.
+    #[pyo3(signature = (xyz, *, out=None))]
     fn quantize<'py>(
         &self,
         py: Python<'py>,
         xyz: &Bound<'py, PyAny>,
+        out: Option<Bound<'py, PyAny>>,
     ) -> PyResult<Bound<'py, PyAny>> {
         let points = Points::of(xyz)?;
         let rows = points.rows()?;
-        let (cells, bad) = py.detach(|| self.quantize_rows(&rows));
+        let run = |cells: &mut [LatticeIndex]| self.quantize_rows(&rows, cells);
+        let (cells, bad) = match out {
+            Some(out) => {
+                let bad = into_array(&out, rows.len(), run)?;
+                (out, bad)
+            }
+            None => new_array(py, rows.len(), run)?,
+        };
         if let Some(row) = bad {
             let point = rows.get(row);
             return Err(refuse(format!(
                 "row {row}: point {point:?} is not finite or more than 2^20 cells from the origin"
             )));
         }
-        array_of(py, &cells)
+        Ok(cells)
     }
 
     /// Centres of cells by their lattice indices, float64 of shape (n, 3), m.
@@ -77,9 +87,11 @@ impl Lattice {
             .extract()
             .map_err(|_| refuse("cells are not rows of three integers"))?;
         let cells = cells.as_slice().map_err(refuse)?.as_chunks::<3>().0;
-        let center = |w: &[i64; 3]| <[f64; 3]>::from(self.core.center_wide(*w));
-        let centers: Vec<[f64; 3]> = py.detach(|| cells.par_iter().map(center).collect());
-        array_of(py, &centers)
+        let fill = |centers: &mut [[f64; 3]]| {
+            let each = cells.par_iter().zip(centers).with_min_len(PART);
+            each.for_each(|(w, center)| *center = self.core.center_wide(*w).into());
+        };
+        Ok(new_array(py, cells.len(), fill)?.0)
     }
 
     fn __repr__(&self) -> String {
@@ -93,34 +105,59 @@ impl Lattice {
 }
 
 impl Lattice {
-    /// The cells, and the first row that is in none.
-    fn quantize_rows(&self, rows: &Rows) -> (Vec<[i32; 3]>, Option<usize>) {
-        let mut cells = vec![[0; 3]; rows.len()];
-        let bad = match rows {
-            Rows::F32(rows) => self.each(rows, &mut cells, |row| row.map(f64::from)),
-            Rows::F64(rows) => self.each(rows, &mut cells, |row| *row),
-        };
-        (cells, bad)
+    /// Writes the cells of the rows; the first row that is in none.
+    fn quantize_rows(&self, rows: &Rows, cells: &mut [LatticeIndex]) -> Option<usize> {
+        match rows {
+            Rows::F32(rows) => {
+                let batch = BatchQuantizer::new(&self.core, Isometry3::identity());
+                by_parts(rows, cells, |rows, cells| batch.indices(rows, cells))
+            }
+            Rows::F64(rows) => by_parts(rows, cells, |rows, cells| self.exactly(rows, cells)),
+        }
     }
 
-    fn each<T: Sync>(
-        &self,
-        rows: &[[T; 3]],
-        cells: &mut [[i32; 3]],
-        wide: impl Fn(&[T; 3]) -> [f64; 3] + Sync,
-    ) -> Option<usize> {
-        let parts = rows.par_chunks(PART).zip(cells.par_chunks_mut(PART));
-        let first_bad = parts.enumerate().filter_map(|(number, (rows, cells))| {
-            let (mut bad, mut at) = (None, 0);
-            self.core.quantize_each(rows.iter().map(&wide), |_, cell| {
-                match (cell, cells.get_mut(at)) {
-                    (Some(cell), Some(to)) => *to = cell,
-                    _ => bad = bad.or(Some(number * PART + at)),
-                }
-                at += 1;
-            });
-            bad
+    /// Writes the cells of rows in double precision, one at a time; the first row that is in none.
+    fn exactly(&self, rows: &[[f64; 3]], cells: &mut [LatticeIndex]) -> Option<usize> {
+        let (mut bad, mut to) = (None, cells.iter_mut().enumerate());
+        self.core.quantize_each(rows.iter().copied(), |_, cell| {
+            let Some((row, to)) = to.next() else { return };
+            match cell {
+                Some(cell) => *to = cell,
+                None => bad = bad.or(Some(row)),
+            }
         });
-        first_bad.min()
+        bad
     }
+}
+
+/// Runs parts of the rows on all threads; the first row of all that a part gives.
+fn by_parts<T: Sync>(
+    rows: &[T],
+    cells: &mut [LatticeIndex],
+    run: impl Fn(&[T], &mut [LatticeIndex]) -> Option<usize> + Sync,
+) -> Option<usize> {
+    let parts = rows.par_chunks(PART).zip(cells.par_chunks_mut(PART));
+    let first_bad = parts
+        .enumerate()
+        .filter_map(|(number, (rows, cells))| Some(number * PART + run(rows, cells)?));
+    first_bad.min()
+}
+
+/// Lets `fill` write the rows of an array of the caller without the GIL.
+fn into_array<R: Send>(
+    out: &Bound<'_, PyAny>,
+    len: usize,
+    fill: impl FnOnce(&mut [LatticeIndex]) -> R + Send,
+) -> PyResult<R> {
+    let array = out
+        .cast::<PyArray2<i32>>()
+        .map_err(|_| refuse("out is not an array of int32 of shape (n, 3)"))?;
+    let shape = array.shape();
+    if shape != [len, 3] {
+        return Err(refuse(format!("out has shape {shape:?}, not ({len}, 3)")));
+    }
+    let not = |why: &dyn std::fmt::Display| refuse(format!("out cannot be written: {why}"));
+    let mut rows = array.try_readwrite().map_err(|why| not(&why))?;
+    let rows = rows.as_slice_mut().map_err(|why| not(&why))?;
+    Ok(out.py().detach(|| fill(rows.as_chunks_mut().0)))
 }

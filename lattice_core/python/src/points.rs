@@ -1,8 +1,6 @@
 //! Points of NumPy: float32 or float64 rows of x, y, z.
 
-use numpy::{
-    PyArrayDyn, PyArrayMethods, PyReadonlyArray1, PyReadonlyArray2, PyUntypedArrayMethods,
-};
+use numpy::{PyArray2, PyArrayMethods, PyReadonlyArray1, PyReadonlyArray2, PyUntypedArrayMethods};
 use pyo3::prelude::*;
 
 use crate::refuse;
@@ -113,12 +111,30 @@ pub fn labels(array: &Bound<'_, PyAny>, count: usize) -> PyResult<Vec<u16>> {
     values.into_iter().enumerate().map(label).collect()
 }
 
+/// A new array of `len` rows of `N` values, which `fill` writes without the GIL, and its answer.
+pub fn new_array<'py, T, R, const N: usize>(
+    py: Python<'py>,
+    len: usize,
+    fill: impl FnOnce(&mut [[T; N]]) -> R + Send,
+) -> PyResult<(Bound<'py, PyAny>, R)>
+where
+    T: numpy::Element + Send,
+    R: Send,
+{
+    let array = PyArray2::<T>::zeros(py, [len, N], false);
+    let answer = {
+        let mut rows = array.try_readwrite().map_err(refuse)?;
+        let rows = rows.as_slice_mut().map_err(refuse)?.as_chunks_mut().0;
+        py.detach(|| fill(rows))
+    };
+    Ok((array.into_any(), answer))
+}
+
 /// Rows of `N` values as an array of shape (n, N).
-pub fn array_of<'py, T: numpy::Element + Copy, const N: usize>(
+pub fn array_of<'py, T: numpy::Element + Copy + Sync, const N: usize>(
     py: Python<'py>,
     rows: &[[T; N]],
 ) -> PyResult<Bound<'py, PyAny>> {
-    let flat = numpy::PyArray1::from_slice(py, rows.as_flattened());
-    let shaped: Bound<'py, PyArrayDyn<T>> = flat.reshape(vec![rows.len(), N])?;
-    Ok(shaped.into_any())
+    let copy = |to: &mut [[T; N]]| to.copy_from_slice(rows);
+    Ok(new_array(py, rows.len(), copy)?.0)
 }

@@ -29,6 +29,9 @@ def test_a_point_is_in_the_cell_of_the_nearest_center(name, cloud):
         assert (own <= other + 1e-9).all()
     np.testing.assert_allclose(lattice.centers(np.eye(3, dtype=np.int64)), lattice.generator.T)
     np.testing.assert_array_equal(lattice.quantize(cloud.astype(np.float64)), cells)
+    given = np.full(cloud.shape, 7, np.int32)
+    assert lattice.quantize(cloud, out=given) is given
+    np.testing.assert_array_equal(given, cells)
 
 
 def test_labels_and_stamps_are_kept_and_maps_merge_exactly(cloud):
@@ -114,11 +117,19 @@ def refusals():
     fcc = Lattice("fcc", 1.0)
     nan = np.zeros((20, 3))
     nan[17, 1] = np.nan
+    frozen = np.zeros((4, 3), np.int32)
+    frozen.flags.writeable = False
     return [
         (lambda: Lattice("fc", 1.0), "fc"),
         (lambda: Lattice("fcc", -1.0), "-1"),
         (lambda: fcc.quantize(nan), "row 17"),
+        (lambda: fcc.quantize(nan.astype(np.float32)), "row 17"),
+        (lambda: fcc.quantize(np.full((1, 3), 1e9, np.float32)), "row 0"),
         (lambda: fcc.quantize(np.zeros((4, 2))), "[4, 2]"),
+        (lambda: fcc.quantize(np.zeros((4, 3)), out=np.zeros((3, 3), np.int32)), "[3, 3], not (4, 3)"),
+        (lambda: fcc.quantize(np.zeros((4, 3)), out=np.zeros((4, 3))), "int32"),
+        (lambda: fcc.quantize(np.zeros((4, 3)), out=frozen), "out cannot be written"),
+        (lambda: fcc.quantize(np.zeros((4, 3)), out=np.zeros((4, 6), np.int32)[:, ::2]), "out cannot be written"),
         (lambda: fcc.quantize(np.array([["a", "b", "c"]])), "could not convert"),
         (lambda: VoxelMap(fcc).insert(np.zeros((4, 3)), labels=[1, 2, 3, 4]), "labels=True"),
         (lambda: VoxelMap(fcc, labels=True).insert(np.zeros((4, 3)), labels=[1, 2]), "4 points and 2 labels"),
@@ -132,7 +143,7 @@ def refusals():
     ]
 
 
-@pytest.mark.parametrize("number", range(14))
+@pytest.mark.parametrize("number", range(20))
 def test_what_is_refused_says_the_numbers(number):
     call, expected = refusals()[number]
     with pytest.raises(ValueError) as error:

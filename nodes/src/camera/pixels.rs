@@ -73,7 +73,7 @@ impl LabelSet {
     }
 }
 
-/// What is known of a pixel.
+/// Label and colour of a pixel, as far as they are known.
 #[derive(Clone, Copy, Debug)]
 pub struct Pixel {
     /// Its number in the label image.

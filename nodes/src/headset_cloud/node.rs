@@ -124,12 +124,11 @@ pub fn start(runtime: &Runtime, name: &str) -> Result<Finish, NodeError> {
 fn news_to(inbox: &Inbox<Event>, lost: &Arc<AtomicU64>) -> impl FnMut(News) + Send + use<> {
     let (inbox, lost) = (inbox.clone(), Arc::clone(lost));
     move |news| {
-        let bytes = match &news {
-            News::Labelled(labels) => labels.bytes(),
-            // Poses are kept for longer than an image takes.
-            News::Begun(_) => return,
-            News::Names => 0,
-        };
+        // Poses are kept for longer than an image takes.
+        if matches!(news, News::Begun(_)) {
+            return;
+        }
+        let bytes = news.bytes();
         let sent = inbox.send(Event::Network(news), bytes);
         lost.fetch_add(u64::from(!sent), Ordering::Relaxed);
     }

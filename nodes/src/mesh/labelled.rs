@@ -18,6 +18,22 @@ pub struct LabelledMesh {
     instances: Vec<u16>,
 }
 
+/// The parts of a mesh as they are read.
+#[derive(Default)]
+pub(super) struct Parts {
+    pub vertices_m: Vec<[f32; 3]>,
+    pub triangles: Vec<[u32; 3]>,
+    pub labels: Vec<u16>,
+    pub instances: Vec<u16>,
+}
+
+impl Parts {
+    /// The mesh of them.
+    pub fn mesh(self) -> Result<LabelledMesh, MeshError> {
+        LabelledMesh::new(self.vertices_m, self.triangles, self.labels, self.instances)
+    }
+}
+
 impl LabelledMesh {
     /// A mesh of vertices (metres), triangles (three vertices each) and the class and instance of
     /// each triangle.

@@ -1,5 +1,6 @@
 //! Meshes from PLY files: the elements `vertex` and `face`.
 
+use super::labelled::Parts;
 use super::{LabelledMesh, MeshError};
 use crate::files::points::PointFileError;
 use crate::files::points::ply::header::{Element, Header, Property};
@@ -11,15 +12,6 @@ use lattice_core::registration::UNLABELED;
 const MAX_CORNERS: usize = 1024;
 /// Room that is made on the word of a header alone.
 const TRUSTED: u64 = 1 << 16;
-
-/// The parts of a mesh as they are read.
-#[derive(Default)]
-struct Parts {
-    vertices_m: Vec<[f32; 3]>,
-    triangles: Vec<[u32; 3]>,
-    labels: Vec<u16>,
-    instances: Vec<u16>,
-}
 
 /// Columns of the properties of a face.
 struct FaceColumns {
@@ -56,14 +48,8 @@ pub(super) fn read(source: &mut Source, max_triangles: usize) -> Result<Labelled
             _ => record::skip(source, &header, element)?,
         }
     }
-    let Parts {
-        vertices_m,
-        triangles,
-        labels,
-        instances,
-    } = parts;
-    LabelledMesh::new(vertices_m, triangles, labels, instances)
-        .map_err(|error| MeshError::NoMesh(Box::new(error)))
+    let mesh = parts.mesh();
+    mesh.map_err(|error| MeshError::NoMesh(Box::new(error)))
 }
 
 fn line(header: &Header, reason: String) -> PointFileError {

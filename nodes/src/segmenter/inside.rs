@@ -32,7 +32,7 @@ impl Ready {
         Ok(Self { segmenter, view })
     }
 
-    /// What the node sees of it.
+    /// State of the network as the node reads it.
     pub fn view(&self) -> NetworkView {
         self.view.clone()
     }
@@ -47,17 +47,26 @@ impl Ready {
         tell: impl FnMut(News) + Send + 'static,
     ) -> Result<(Worker, Subscription), NodeError> {
         let worker = Worker::spawn(name, self.segmenter, self.view.0, shutdown, tell)?;
-        let mut enter = worker.entrance();
-        let images = if is_compressed {
-            let topic = format!("{topic}/compressed");
-            let enter = move |image| enter(Input::Compressed(image));
-            node.subscribe(&topic, Qos::SENSOR, Load::Large, enter)?
-        } else {
-            let enter = move |image| enter(Input::Plain(image));
-            node.subscribe(topic, Qos::SENSOR, Load::Large, enter)?
-        };
+        let images = subscribe(node, topic, is_compressed, worker.entrance())?;
         Ok((worker, images))
     }
+}
+
+/// Subscribes to the images of a topic, plain or those packed as JPEG beside it.
+pub(super) fn subscribe(
+    node: &Node,
+    topic: &str,
+    is_compressed: bool,
+    mut enter: impl FnMut(Input) + Send + 'static,
+) -> Result<Subscription, NodeError> {
+    Ok(if is_compressed {
+        let topic = format!("{topic}/compressed");
+        let enter = move |image| enter(Input::Compressed(image));
+        node.subscribe(&topic, Qos::SENSOR, Load::Large, enter)?
+    } else {
+        let enter = move |image| enter(Input::Plain(image));
+        node.subscribe(topic, Qos::SENSOR, Load::Large, enter)?
+    })
 }
 
 /// State of a network as it was after its last image.
@@ -91,7 +100,7 @@ impl NetworkView {
     }
 }
 
-/// How the labelling of images fares, in words.
+/// State of the labelling of images, with its level, in words.
 pub(super) fn fares(counts: &SegmenterCounts) -> (Level, String) {
     // Images that come faster than the network works are no fault.
     let refused = counts.dropped.iter();

@@ -6,7 +6,7 @@ use std::time::{Duration, Instant};
 use lattice_msgs::sensor_msgs::Image;
 use lattice_msgs::vision_msgs::LabelInfo;
 
-use super::inside::fares;
+use super::inside::{self, fares};
 use super::parameters::Settings;
 use super::worker::{Input, Slot};
 use super::{Segmenter, SegmenterOptions, SegmenterReport};
@@ -15,7 +15,7 @@ use crate::report;
 use crate::start::{Finish, NodeError, handed_over, open_params};
 use lattice_runtime::logging::Throttle;
 use lattice_runtime::qos::Qos;
-use lattice_runtime::{Diagnostics, Load, Losses, Publisher, Runtime};
+use lattice_runtime::{Diagnostics, Losses, Publisher, Runtime};
 
 /// Event for the compute thread.
 enum Event {
@@ -63,15 +63,7 @@ pub fn start(runtime: &Runtime, name: &str) -> Result<Finish, NodeError> {
             slot.take_back();
         }
     };
-    let topic = "rgb/image_rect_color";
-    let images = if settings.compressed {
-        let topic = format!("{topic}/compressed");
-        let on_image = move |image| on_image(Input::Compressed(image));
-        node.subscribe(&topic, Qos::SENSOR, Load::Large, on_image)?
-    } else {
-        let on_image = move |image| on_image(Input::Plain(image));
-        node.subscribe(topic, Qos::SENSOR, Load::Large, on_image)?
-    };
+    let images = inside::subscribe(&node, "rgb/image_rect_color", settings.compressed, on_image)?;
     losses.watch(std::slice::from_ref(&images));
     let looks = inbox.clone();
     let looks = runtime.timer(Duration::from_millis(500), move || {

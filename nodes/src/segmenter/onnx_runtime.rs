@@ -186,7 +186,7 @@ where
     Ok(values.iter().map(|v| value(*v)).collect())
 }
 
-/// What went wrong, on one line.
+/// The error on one line.
 fn in_words<R>(error: ort::Error<R>) -> String {
     checks::shown(&error.to_string())
 }

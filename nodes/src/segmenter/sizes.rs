@@ -18,7 +18,7 @@ const MAX_ROUNDS: usize = 32;
 /// Most values of constants of which something of unknown size may be made.
 const MAX_UNFORESEEN: usize = 1 << 12;
 
-/// What keeps a graph from being used.
+/// Reason why a graph cannot be used.
 pub(super) enum Problem {
     /// A tensor is too large.
     Size(String),

@@ -73,6 +73,16 @@ pub(crate) enum News {
     Names,
 }
 
+impl News {
+    /// Bytes that wait in the inbox of the node.
+    pub fn bytes(&self) -> usize {
+        match self {
+            Self::Labelled(labels) => labels.bytes(),
+            Self::Begun(_) | Self::Names => 0,
+        }
+    }
+}
+
 /// State that other threads look at.
 #[derive(Clone, Debug)]
 pub(super) struct WorkerState {

@@ -1,4 +1,4 @@
-//! What the node tells of the network inside of it.
+//! Diagnostics and messages of the network inside of the node.
 
 use std::sync::Arc;
 

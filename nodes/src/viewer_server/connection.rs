@@ -12,7 +12,7 @@ use async_tungstenite::tungstenite::{self, Message};
 use futures::stream::FuturesUnordered;
 use futures::{AsyncReadExt, AsyncWriteExt, StreamExt};
 use smol::channel::Receiver;
-use smol::future::{or, pending, poll_once};
+use smol::future::{or, pending, poll_once, yield_now};
 use smol::{Async, Timer};
 
 use super::desk::{Desk, Step};
@@ -20,6 +20,7 @@ use super::flow::Flow;
 use super::http::{Decision, Gate, Head, HeadError, MAX_HEAD_BYTES, Response};
 use super::hub::Hub;
 use super::inputs::{Input, InputRefusal};
+use super::offer::{MAX_MESSAGE_BYTES, MESSAGE_HEAD_BYTES};
 use super::outbox::Outgoing;
 use super::protocol::{message_data, status};
 
@@ -123,6 +124,10 @@ async fn talk(
                 }
             },
         };
+        if matches!(event, Event::Come(_)) {
+            // A client that sends without end does not hold up the others of this thread.
+            yield_now().await;
+        }
         let step = match event {
             Event::Woken => Step::Done,
             Event::Answered(messages) => {
@@ -130,6 +135,15 @@ async fn talk(
                 messages
                     .into_iter()
                     .for_each(|message| hub.tell(id, message));
+                Step::Done
+            }
+            // Before anything is made of it.
+            Event::Come(Some(Ok(message))) if !is_paced(&mut flow, message.len()) => {
+                let refusal = InputRefusal::TooMuch;
+                if let Some(bridge) = hub.bridge() {
+                    bridge.inputs().refused(refusal);
+                }
+                refused(hub, id, &mut flow, refusal);
                 Step::Done
             }
             Event::Come(Some(Ok(Message::Text(text)))) => desk.text(&text),
@@ -157,10 +171,8 @@ async fn talk(
                 None => desk.answered(),
             },
             Step::Input(input) => {
-                if let Some(refusal) = take(hub, id, &mut flow, input)
-                    && flow.may_tell(Instant::now())
-                {
-                    hub.tell(id, Outgoing::Text(status(refusal.words())));
+                if let Some(refusal) = take(hub, id, &mut flow, input) {
+                    refused(hub, id, &mut flow, refusal);
                 }
             }
             Step::Tell(text) => hub.tell(id, Outgoing::Text(text)),
@@ -176,10 +188,25 @@ enum Event {
     Woken,
 }
 
+/// True of a message that is short, as questions are, or that comes at the pace of headsets.
+fn is_paced(flow: &mut Flow, bytes: usize) -> bool {
+    bytes <= MAX_MESSAGE_BYTES || flow.admits(bytes, Instant::now())
+}
+
+/// Tells a client of a refusal, where it was not told of one just now.
+fn refused(hub: &Hub, id: u64, flow: &mut Flow, refusal: InputRefusal) {
+    if flow.may_tell(Instant::now()) {
+        hub.tell(id, Outgoing::Text(status(refusal.words())));
+    }
+}
+
 /// Hands a message for a headset over, at the pace of its client; what is refused is counted.
 fn take(hub: &Hub, id: u64, flow: &mut Flow, input: Input) -> Option<InputRefusal> {
     let bridge = hub.bridge()?;
-    let taken = match flow.admits(input.bytes.len(), Instant::now()) {
+    // A long one was asked for its pace when it came.
+    let head_and_message = input.bytes.len() + MESSAGE_HEAD_BYTES;
+    let is_long = head_and_message > MAX_MESSAGE_BYTES;
+    let taken = match is_long || flow.admits(input.bytes.len(), Instant::now()) {
         true => bridge.take(id, input),
         false => Err(InputRefusal::TooMuch),
     };
@@ -196,11 +223,18 @@ async fn too_long(socket: &mut WebSocketStream<Stream>, hub: &Hub) {
     }
     let close = CloseFrame {
         code: CloseCode::Size,
-        reason: "a message is longer than is taken".into(),
+        reason: match has_headset {
+            true => InputRefusal::TooLong.words().into(),
+            false => "a message is longer than is taken".into(),
+        },
     };
     let closed = async {
         let sent = socket.send(Message::Close(Some(close))).await;
-        sent.map_err(io::Error::other)
+        sent.map_err(io::Error::other)?;
+        // A socket closed with bytes unread is reset, and the reason is lost with it.
+        let mut rest = vec![0; 1 << 16];
+        while socket.get_mut().read(&mut rest).await? > 0 {}
+        Ok(())
     };
     // Who has gone needs no reason.
     let _ = within(LAST_TIME, closed).await;

@@ -1,7 +1,8 @@
-//! What clients publish for a headset: counted, and refused by name.
+//! Messages that clients publish for a headset: counted, and refused by name.
 
 use std::collections::BTreeMap;
 use std::sync::Mutex;
+use std::sync::atomic::{AtomicUsize, Ordering};
 
 use lattice_runtime::lock;
 use serde::Serialize;
@@ -28,8 +29,10 @@ pub enum InputRefusal {
     Busy,
     /// Not a message of the topic's type.
     Malformed,
-    /// A part of a mesh that is too long to be sent on.
+    /// A part of a mesh that is too long to be sent on, or a mesh of too many parts.
     LongChunk,
+    /// Names of a mesh that are too long to be in each of its parts.
+    LongNames,
     /// Nobody took it from the publisher.
     NotSent,
 }
@@ -43,6 +46,7 @@ impl InputRefusal {
             Self::Busy => "headset_busy",
             Self::Malformed => "headset_malformed",
             Self::LongChunk => "headset_long_chunk",
+            Self::LongNames => "headset_long_names",
             Self::NotSent => "headset_not_sent",
         }
     }
@@ -55,8 +59,9 @@ impl InputRefusal {
             Self::Busy => "the node has not worked off what came before",
             Self::Malformed => "not a message of the type of its topic",
             Self::LongChunk => {
-                "a chunk of a mesh has more than 60 kB: send the surface whole, or in more"
+                "a chunk of a mesh has more than 60 kB, or a whole one more than 1000 of them: send it in more surfaces"
             }
+            Self::LongNames => "session, surface and frame of a mesh have more than 2 kB",
             Self::NotSent => "the publisher has no room",
         }
     }
@@ -71,6 +76,50 @@ pub struct InputCounts {
     pub headset_bytes_in: u64,
     /// Those that were not.
     pub headset_refused: BTreeMap<&'static str, u64>,
+}
+
+/// Messages of clients in the node's inbox: at most half of its places and bytes, so that no client takes the map's.
+#[derive(Debug)]
+pub struct Waiting {
+    max_events: usize,
+    max_bytes: usize,
+    events: AtomicUsize,
+    bytes: AtomicUsize,
+}
+
+impl Waiting {
+    /// Of an inbox of so many events and bytes.
+    pub fn new(events: usize, bytes: usize) -> Self {
+        Self {
+            max_events: (events / 2).max(1),
+            max_bytes: bytes / 2,
+            events: AtomicUsize::new(0),
+            bytes: AtomicUsize::new(0),
+        }
+    }
+
+    /// Counts a message that is to wait; false if there is no room for it.
+    pub fn enter(&self, bytes: usize) -> bool {
+        let add = |to: &AtomicUsize, more: usize, most: usize| {
+            let fits = |now: usize| now.checked_add(more).filter(|sum| *sum <= most);
+            let order = Ordering::Relaxed;
+            to.fetch_update(order, order, fits).is_ok()
+        };
+        if !add(&self.events, 1, self.max_events) {
+            return false;
+        }
+        let has_room = add(&self.bytes, bytes, self.max_bytes);
+        if !has_room {
+            self.events.fetch_sub(1, Ordering::Relaxed);
+        }
+        has_room
+    }
+
+    /// Takes a message off that waits no more.
+    pub fn leave(&self, bytes: usize) {
+        self.events.fetch_sub(1, Ordering::Relaxed);
+        self.bytes.fetch_sub(bytes, Ordering::Relaxed);
+    }
 }
 
 /// Shared counters.
@@ -96,5 +145,21 @@ impl Inputs {
     /// The counters.
     pub fn counts(&self) -> InputCounts {
         lock(&self.0).clone()
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn inputs_wait_in_half_of_the_inbox() {
+        let waiting = Waiting::new(8, 1000);
+        assert!(waiting.enter(500) && !waiting.enter(1));
+        waiting.leave(500);
+        assert_eq!((0..8).filter(|_| waiting.enter(10)).count(), 4);
+        waiting.leave(10);
+        // What found no room has taken none.
+        assert!(!waiting.enter(471) && waiting.enter(470));
     }
 }

@@ -11,7 +11,7 @@ use serde::Serialize;
 
 use super::bridge::{HandOver, HeadsetTopics, NodeBridge};
 use super::hub::{Hub, HubCounts};
-use super::inputs::{Input, InputCounts, Inputs};
+use super::inputs::{Input, InputCounts, Inputs, Waiting};
 use super::map_source::{MapSource, News};
 use super::map_stream::MapStream;
 use super::options::{ViewerOptions, url};
@@ -70,6 +70,7 @@ pub fn start(runtime: &Runtime, name: &str) -> Result<Finish, NodeError> {
     let one = Class::Newest { depth: 1 };
     let fixed_channel = hub.channel::<TFMessage>(&node.resolve("/tf_static")?, one, true);
     let inputs = Arc::new(Inputs::default());
+    let waiting = Arc::new(Waiting::new(limits.events, limits.bytes));
     let gate = viewer.gate()?;
     let losses = MapLosses::default();
     let mut shell = Shell {
@@ -78,6 +79,7 @@ pub fn start(runtime: &Runtime, name: &str) -> Result<Finish, NodeError> {
         source: MapSource::new(viewer.max_voxels),
         parts: None,
         inputs: Arc::clone(&inputs),
+        waiting: Arc::clone(&waiting),
         refusals: Throttle::new(Duration::from_secs(1)),
         fixed: FixedTransforms::default(),
         fixed_channel,
@@ -95,7 +97,7 @@ pub fn start(runtime: &Runtime, name: &str) -> Result<Finish, NodeError> {
         shell.on(event)
     })?;
     let inbox = compute.inbox();
-    let hand_over = hand_over(&inbox);
+    let hand_over = hand_over(&inbox, waiting);
     let (bridge, headset) = NodeBridge::new(&node, &reach, &hub, (inputs, hand_over))?;
     hub.set_bridge(Box::new(bridge));
     let sources = Sources::new(&node, &hub, &viewer, &inbox)?;
@@ -128,11 +130,18 @@ pub fn start(runtime: &Runtime, name: &str) -> Result<Finish, NodeError> {
 }
 
 /// Hands messages of clients over to the compute thread.
-fn hand_over(inbox: &Inbox<Event>) -> HandOver {
+fn hand_over(inbox: &Inbox<Event>, waiting: Arc<Waiting>) -> HandOver {
     let inbox = inbox.clone();
     Box::new(move |client, input| {
         let bytes = input.bytes.len();
-        inbox.send(Event::Input(client, input), bytes)
+        if !waiting.enter(bytes) {
+            return false;
+        }
+        let sent = inbox.send(Event::Input(client, input), bytes);
+        if !sent {
+            waiting.leave(bytes);
+        }
+        sent
     })
 }
 
@@ -161,6 +170,7 @@ struct Shell {
     source: MapSource,
     parts: Option<Parts>,
     inputs: Arc<Inputs>,
+    waiting: Arc<Waiting>,
     refusals: Throttle,
     fixed: FixedTransforms,
     fixed_channel: u32,
@@ -198,6 +208,7 @@ impl Shell {
 
     /// Publishes a client's message on its topic, or tells the client why not.
     fn pass(&mut self, client: u64, input: &Input) {
+        self.waiting.leave(input.bytes.len());
         let Some(parts) = &self.parts else { return };
         match parts.headset.publish(input) {
             Ok(()) => self.inputs.taken(input.bytes.len()),

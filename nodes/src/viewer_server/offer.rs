@@ -5,7 +5,7 @@ use super::protocol::AdvertisedService;
 /// Longest message of a client but on topics that take longer ones, bytes.
 pub const MAX_MESSAGE_BYTES: usize = 64 << 10;
 /// Operation and channel before a message.
-const MESSAGE_HEAD_BYTES: usize = 5;
+pub const MESSAGE_HEAD_BYTES: usize = 5;
 
 /// A topic that clients may publish on.
 #[derive(Clone, Debug)]

@@ -1,6 +1,7 @@
 //! All parameters of the viewer server.
 
 use super::bridge::{HeadsetReach, Reach};
+use super::offer::MAX_MESSAGE_BYTES;
 use super::options::ViewerOptions;
 use crate::compute::ComputeLimits;
 use crate::options::{self, TOPIC};
@@ -67,7 +68,11 @@ impl Settings {
 /// Bounds of what clients may publish for a headset, if they may.
 fn headset(params: &Params) -> Result<Option<HeadsetReach>, ParamError> {
     let allow = params.bool("allow_headset", false)?;
-    let message_bytes = params.usize_in("headset_message_bytes", 4 << 20, 4096..=64 << 20)?;
+    let message_bytes = params.usize_in(
+        "headset_message_bytes",
+        4 << 20,
+        MAX_MESSAGE_BYTES..=64 << 20,
+    )?;
     let bytes_per_s = params.usize_in("headset_bytes_per_s", 32 << 20, 4096..=1 << 30)?;
     if bytes_per_s < message_bytes {
         let problem = format!("expected at least `headset_message_bytes`, {message_bytes}");

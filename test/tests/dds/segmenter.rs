@@ -3,6 +3,7 @@
 //! Loopback only, no multicast. The camera is `python/segmenter_peer.py`; networks are made by `onnx_models.py`.
 
 use std::fs;
+use std::path::Path;
 
 use lattice_nodes::executables;
 use lattice_nodes::headset_cloud::HeadsetReport;
@@ -76,12 +77,7 @@ fn a_cyclone_camera_that_packs_its_images_gets_labels_too() {
     let path = directory.path();
     peer::run(&python, "onnx_models.py", &[path]);
     let domain = TestDomain::take();
-    let jpeg = concat!(
-        env!("CARGO_MANIFEST_DIR"),
-        "/../nodes/src/segmenter/red_blue.jpg"
-    );
-    let scenario = json!({"domain": domain.id(), "jpeg": jpeg});
-    fs::write(path.join("scenario.json"), scenario.to_string()).unwrap();
+    write_scenario(&domain, path);
     let topics = [
         "rgb/image_rect_color/compressed",
         "labels/image",
@@ -99,6 +95,16 @@ fn a_cyclone_camera_that_packs_its_images_gets_labels_too() {
     assert_eq!(found["red"], json!([1.0, 0.0]));
     let refused = found["refused"].as_str().unwrap();
     assert!(refused.contains("expected jpeg"), "{refused}");
+}
+
+/// The scenario of a peer that sends a JPEG file.
+fn write_scenario(domain: &TestDomain, folder: &Path) {
+    let jpeg = concat!(
+        env!("CARGO_MANIFEST_DIR"),
+        "/../nodes/src/segmenter/red_blue.jpg"
+    );
+    let scenario = json!({"domain": domain.id(), "jpeg": jpeg});
+    fs::write(folder.join("scenario.json"), scenario.to_string()).unwrap();
 }
 
 /// Parameters of a node with a network inside, whose topics are reliable.
@@ -120,7 +126,8 @@ fn right(found: &Value, least: u64) {
     for wrong in ["wrong", "wrong_color", "wrong_probs"] {
         assert_eq!(found[wrong], 0, "{wrong}: {found}");
     }
-    assert!(found["far_from_one"].as_f64() < Some(1e-3), "{found}");
+    let far = found["far_from_one"].as_f64();
+    assert!(far.is_some_and(|far| far < 1e-3), "{found}");
     assert_eq!(found["names"], json!([[0, "other"], [1, "red"]]));
 }
 
@@ -131,12 +138,7 @@ fn networks_inside_of_nodes_label_what_a_cyclone_camera_and_headset_see() {
     let path = directory.path();
     peer::run(&python, "onnx_models.py", &[path]);
     let domain = TestDomain::take();
-    let jpeg = concat!(
-        env!("CARGO_MANIFEST_DIR"),
-        "/../nodes/src/segmenter/red_blue.jpg"
-    );
-    let scenario = json!({"domain": domain.id(), "jpeg": jpeg});
-    fs::write(path.join("scenario.json"), scenario.to_string()).unwrap();
+    write_scenario(&domain, path);
     let model = path.join("red.onnx").display().to_string();
     let report = |name: &str| path.join(name).display().to_string();
     let camera = format!(

@@ -10,7 +10,7 @@ mod simd;
 
 use nalgebra::{Isometry3, Matrix3, Vector3};
 
-use super::{BlockKey, Lattice, LatticeKind};
+use super::{BlockKey, Lattice, LatticeIndex, LatticeKind};
 use crate::prefetch::prefetch;
 use form::{Bcc, Cubic, Fcc, Form, Hex, Mcc};
 use kernel::{BLOCK, Constants, Lane, LaneSums, Lanes, STEPS};
@@ -124,6 +124,25 @@ impl BatchQuantizer {
     pub fn codes(&self, points: &[[f32; 3]], codes: &mut Vec<BlockKey>) {
         codes.reserve(points.len());
         self.for_blocks(points, |block, _| codes.extend_from_slice(block));
+    }
+
+    /// Writes the lattice index of each point to the same place of `indices`, which is as long;
+    /// the first point without a cell, whose index is void.
+    pub fn indices(&self, points: &[[f32; 3]], indices: &mut [LatticeIndex]) -> Option<usize> {
+        let (mut bad, mut at, mut rest) = (None, 0, indices);
+        self.for_blocks(points, |block, sums| {
+            if bad.is_none() && sums.points != block.len() as u64 {
+                let none = block.iter().position(|&key| key == BlockKey::NONE);
+                bad = none.map(|place| at + place);
+            }
+            let len = block.len().min(rest.len());
+            let (now, later) = std::mem::take(&mut rest).split_at_mut(len);
+            for (index, key) in now.iter_mut().zip(block) {
+                *index = key.unpack();
+            }
+            (at, rest) = (at + block.len(), later);
+        });
+        bad
     }
 
     /// Visits the cells of up to [`BatchQuantizer::BLOCK`] points at a time, in order. Of the sums

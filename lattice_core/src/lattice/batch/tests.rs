@@ -53,6 +53,12 @@ proptest! {
             batch.codes(&points, &mut codes);
             let single: Vec<_> = points.iter().map(|&p| single(&lattice, &batch.transform(p))).collect();
             prop_assert_eq!(&codes, &single);
+            let mut indices = vec![[7; 3]; points.len()];
+            let bad = batch.indices(&points, &mut indices);
+            prop_assert_eq!(bad, single.iter().position(|&code| code == BlockKey::NONE));
+            for (&index, &code) in indices.iter().zip(&single) {
+                prop_assert!(code == BlockKey::NONE || index == code.unpack());
+            }
             let (mut sums, mut one_by_one) = (BatchSums::default(), BatchSums::default());
             batch.for_blocks_with_sums(&points, |block| sums.add(block.sums));
             sums.far = false;

@@ -8,10 +8,11 @@ use lattice_lab::AnyError;
 use lattice_lab::bench::FileMethod::{Load, Save};
 use lattice_lab::bench::NeighborMethod::{Hash26, Pass, Probe};
 use lattice_lab::bench::QuantizeMethod::{Batch, Paper27, Portable, Scalar};
+use lattice_lab::bench::QuantizeOutput::{Indices, Keys, NewIndices};
 use lattice_lab::bench::RaycastMethod::{Clear, Evidence, Map};
 use lattice_lab::bench::Store::List;
 use lattice_lab::bench::{
-    self, FileMethod, NeighborMethod, QuantizeMethod, RaycastMethod, Report, Store,
+    self, FileMethod, NeighborMethod, QuantizeMethod, QuantizeOutput, RaycastMethod, Report, Store,
 };
 use std::path::PathBuf;
 
@@ -71,6 +72,9 @@ pub struct Quantize {
     /// Way to quantize
     #[arg(long, value_parser = choice(&QUANTIZERS), default_value = "batch")]
     method: QuantizeMethod,
+    /// What is written; indices only by `--method batch`
+    #[arg(long, value_parser = choice(&OUTPUTS), default_value = "keys")]
+    output: QuantizeOutput,
 }
 
 /// Options of `lattice bench insert`.
@@ -146,6 +150,21 @@ const QUANTIZERS: [Choice<QuantizeMethod>; 4] = [
     ("scalar", "One point at a time in f64", Scalar),
     ("paper27", PAPER27, Paper27),
 ];
+
+/// Values of `--output` of `lattice bench quantize`.
+const OUTPUTS: [Choice<QuantizeOutput>; 3] = [
+    ("keys", "Keys, in memory that was written before", Keys),
+    (
+        "indices",
+        "Indices, in memory that was written before",
+        Indices,
+    ),
+    (
+        "new-indices",
+        "Indices, in memory that is asked for while the clock runs",
+        NewIndices,
+    ),
+];
 const BATCH: &str = "The batch quantizer with the best instructions of this machine";
 const PORTABLE: &str = "The batch quantizer with what every machine of the target has";
 const PAPER27: &str = "The nearest of 27 candidates, as Ryde & Brünig 2011 do it";
@@ -189,8 +208,12 @@ impl Bench {
 
 impl Quantize {
     fn run(self) -> CliResult {
-        self.common
-            .measure(|lattice, points| Ok(bench::quantize(self.method, lattice, &points)))
+        if self.output != Keys && self.method != Batch {
+            return Err("--output indices is measured with --method batch only".into());
+        }
+        self.common.measure(|lattice, points| {
+            Ok(bench::quantize(self.method, self.output, lattice, &points))
+        })
     }
 }
 

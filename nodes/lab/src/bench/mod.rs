@@ -25,7 +25,7 @@ pub use file::{FileMethod, file};
 pub use insert::{Store, insert};
 pub use neighbors::{NeighborMethod, neighbors};
 pub use points::{ScanRecord, read_points, read_scans};
-pub use quantize::{QuantizeMethod, quantize};
+pub use quantize::{QuantizeMethod, QuantizeOutput, quantize};
 pub use raycast::{RaycastMethod, raycast};
 pub use register::{RegisterSetup, register};
 pub use report::Report;

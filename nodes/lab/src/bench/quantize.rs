@@ -1,8 +1,8 @@
 //! Quantizing and packing keys, without a store.
 
-use super::{Report, timed};
+use super::{Report, Spent, timed};
 use crate::printed::Search27;
-use lattice_core::lattice::{BatchQuantizer, BlockKey, Lattice, Simd};
+use lattice_core::lattice::{BatchQuantizer, BlockKey, Lattice, LatticeIndex, Simd};
 use nalgebra::Isometry3;
 use rayon::prelude::*;
 
@@ -34,8 +34,73 @@ impl QuantizeMethod {
     }
 }
 
-/// Quantizes all points into a stream of keys ([`BlockKey`]) in memory; the report has its digest.
-pub fn quantize(method: QuantizeMethod, lattice: &Lattice, points_m: &[[f32; 3]]) -> Report {
+/// What the quantized points are written to.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub enum QuantizeOutput {
+    /// Keys, in memory that was written before.
+    Keys,
+    /// Lattice indices, in memory that was written before.
+    Indices,
+    /// Lattice indices, in memory that is asked for while the clock runs.
+    NewIndices,
+}
+
+/// Quantizes all points, to indices by [`QuantizeMethod::Batch`] whatever the method; the report
+/// has the digest of the keys ([`BlockKey`]).
+pub fn quantize(
+    method: QuantizeMethod,
+    output: QuantizeOutput,
+    lattice: &Lattice,
+    points_m: &[[f32; 3]],
+) -> Report {
+    let (name, keys, spent) = match output {
+        QuantizeOutput::Keys => {
+            let (keys, spent) = to_keys(method, lattice, points_m);
+            (method.name(), keys, spent)
+        }
+        QuantizeOutput::Indices | QuantizeOutput::NewIndices => {
+            let new = output == QuantizeOutput::NewIndices;
+            let (indices, spent) = to_indices(lattice, points_m, new);
+            let key = |w: &LatticeIndex| BlockKey::pack(*w).unwrap_or(BlockKey::NONE);
+            ("lattice-indices", indices.iter().map(key).collect(), spent)
+        }
+    };
+    Report {
+        n: points_m.len() as u64,
+        hash: Some(format!("{:016x}", digest(&keys))),
+        ..Report::new(name, lattice, spent)
+    }
+}
+
+fn to_indices(lattice: &Lattice, points_m: &[[f32; 3]], new: bool) -> (Vec<LatticeIndex>, Spent) {
+    let best = BatchQuantizer::new(lattice, Isometry3::identity());
+    // Ones, so that the pages are there before the clock runs.
+    let given = if new {
+        Vec::new()
+    } else {
+        vec![[1; 3]; points_m.len()]
+    };
+    timed(|| {
+        let mut indices = if new {
+            vec![[0; 3]; points_m.len()]
+        } else {
+            given
+        };
+        let chunks = points_m
+            .par_chunks(CHUNK)
+            .zip(indices.par_chunks_mut(CHUNK));
+        chunks.for_each(|(points_m, indices)| {
+            best.indices(points_m, indices);
+        });
+        indices
+    })
+}
+
+fn to_keys(
+    method: QuantizeMethod,
+    lattice: &Lattice,
+    points_m: &[[f32; 3]],
+) -> (Vec<BlockKey>, Spent) {
     // Written once before, so that no page is first touched while the clock runs.
     let mut keys = vec![BlockKey::NONE; points_m.len()];
     let batch = |simd| BatchQuantizer::with_simd(lattice, Isometry3::identity(), simd);
@@ -54,11 +119,7 @@ pub fn quantize(method: QuantizeMethod, lattice: &Lattice, points_m: &[[f32; 3]]
             }
         });
     });
-    Report {
-        n: points_m.len() as u64,
-        hash: Some(format!("{:016x}", digest(&keys))),
-        ..Report::new(method.name(), lattice, spent)
-    }
+    (keys, spent)
 }
 
 fn blocks(quantizer: &BatchQuantizer, points_m: &[[f32; 3]], mut keys: &mut [BlockKey]) {
@@ -111,13 +172,19 @@ mod tests {
             .collect();
         let hash = |threads, method, points: &[[f32; 3]]| {
             let pool = crate::pool(threads).unwrap();
-            pool.install(|| quantize(method, &lattice, points).hash)
+            pool.install(|| quantize(method, QuantizeOutput::Keys, &lattice, points).hash)
         };
         let one = hash(1, Scalar, &points);
         use QuantizeMethod::{Batch, Portable, Scalar};
         for method in [Scalar, Batch, Portable] {
             assert_eq!(hash(3, method, &points), one, "{method:?}");
             assert_ne!(hash(1, method, &points[1..]), one, "{method:?}");
+        }
+        let pool = crate::pool(2).unwrap();
+        for output in [QuantizeOutput::Indices, QuantizeOutput::NewIndices] {
+            let hash = |points| quantize(Batch, output, &lattice, points).hash;
+            assert_eq!(pool.install(|| hash(&points)), one, "{output:?}");
+            assert_ne!(hash(&points[1..]), one, "{output:?}");
         }
         let paper = |points| hash(2, QuantizeMethod::Paper27, points);
         // Its keys are the exact ones where single precision is enough.

@@ -58,7 +58,11 @@ impl<'a> Records<'a> {
 pub(super) fn count(document: &Document, number: usize) -> Result<u64, String> {
     let accessor = document.accessors.0.get(number);
     let accessor = accessor.ok_or_else(|| format!("there is no accessor {number}"))?;
-    Ok(accessor.count)
+    match accessor.count {
+        // Else what costs nothing could stand there without end.
+        0 => Err(format!("accessor {number}: it has no records")),
+        count => Ok(count),
+    }
 }
 
 /// The vertices of an accessor of positions. `quantized` allows integers (`KHR_mesh_quantization`).
@@ -143,10 +147,7 @@ fn records<'b>(
     }
     let last = accessor.count.checked_sub(1);
     let end = last.and_then(|last| last.checked_mul(stride)?.checked_add(size as u64));
-    let end = match accessor.count {
-        0 => Some(accessor.byte_offset),
-        _ => end.and_then(|end| end.checked_add(accessor.byte_offset)),
-    };
+    let end = end.and_then(|end| end.checked_add(accessor.byte_offset));
     let has = view.len();
     let start = usize::try_from(accessor.byte_offset).ok();
     let first = start.and_then(|start| view.get(start..));

@@ -35,14 +35,14 @@ pub(super) struct Asset {
 #[derive(Debug, Default, Deserialize)]
 #[serde(default)]
 pub(super) struct Scene {
-    pub nodes: Vec<usize>,
+    pub nodes: Few<usize>,
 }
 
 /// A place, and what is there.
 #[derive(Debug, Default, Deserialize)]
 #[serde(default)]
 pub(super) struct Node {
-    pub children: Vec<usize>,
+    pub children: Few<usize>,
     pub mesh: Option<usize>,
     pub skin: Option<usize>,
     /// Column by column.
@@ -57,7 +57,7 @@ pub(super) struct Node {
 /// Primitives that go together.
 #[derive(Debug, Deserialize)]
 pub(super) struct Mesh {
-    pub primitives: Vec<Primitive>,
+    pub primitives: Few<Primitive>,
     #[serde(default)]
     pub extras: Extras,
 }
@@ -158,76 +158,85 @@ pub(super) struct Extras {
     pub instance: Option<f64>,
 }
 
-/// A value of an application; it may be anything.
-#[derive(Deserialize)]
-#[serde(untagged)]
-enum Given {
-    Number(f64),
-    Other(IgnoredAny),
-}
-
 impl<'de> Deserialize<'de> for Extras {
     fn deserialize<D: Deserializer<'de>>(deserializer: D) -> Result<Self, D::Error> {
-        deserializer.deserialize_any(ExtrasVisitor)
+        let Given { extras, .. } = Given::deserialize(deserializer)?;
+        Ok(extras)
     }
 }
 
-struct ExtrasVisitor;
+/// A value of an application, of which nothing else is kept, whatever it is.
+#[derive(Default)]
+struct Given {
+    number: Option<f64>,
+    extras: Extras,
+}
 
-impl<'de> Visitor<'de> for ExtrasVisitor {
-    type Value = Extras;
+impl<'de> Deserialize<'de> for Given {
+    fn deserialize<D: Deserializer<'de>>(deserializer: D) -> Result<Self, D::Error> {
+        deserializer.deserialize_any(GivenVisitor)
+    }
+}
+
+impl Given {
+    fn of(number: f64) -> Self {
+        Self {
+            number: Some(number),
+            ..Self::default()
+        }
+    }
+}
+
+struct GivenVisitor;
+
+impl<'de> Visitor<'de> for GivenVisitor {
+    type Value = Given;
 
     fn expecting(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
         f.write_str("anything")
     }
 
-    fn visit_map<A: MapAccess<'de>>(self, mut map: A) -> Result<Extras, A::Error> {
+    fn visit_map<A: MapAccess<'de>>(self, mut map: A) -> Result<Given, A::Error> {
         let mut extras = Extras::default();
         while let Some(key) = map.next_key::<String>()? {
-            let known = match key.as_str() {
-                "label" => Some(&mut extras.label),
-                "instance" => Some(&mut extras.instance),
-                _ => None,
-            };
-            match known {
-                None => drop(map.next_value::<IgnoredAny>()?),
-                Some(known) => {
-                    *known = match map.next_value()? {
-                        Given::Number(number) => Some(number),
-                        Given::Other(IgnoredAny) => None,
-                    }
-                }
+            match key.as_str() {
+                "label" => extras.label = map.next_value::<Given>()?.number,
+                "instance" => extras.instance = map.next_value::<Given>()?.number,
+                _ => drop(map.next_value::<IgnoredAny>()?),
             }
         }
-        Ok(extras)
+        Ok(Given {
+            extras,
+            ..Given::default()
+        })
     }
 
-    fn visit_seq<A: SeqAccess<'de>>(self, mut list: A) -> Result<Extras, A::Error> {
+    fn visit_seq<A: SeqAccess<'de>>(self, mut list: A) -> Result<Given, A::Error> {
         while list.next_element::<IgnoredAny>()?.is_some() {}
-        Ok(Extras::default())
+        Ok(Given::default())
     }
 
-    fn visit_bool<E: de::Error>(self, _: bool) -> Result<Extras, E> {
-        Ok(Extras::default())
+    fn visit_bool<E: de::Error>(self, _: bool) -> Result<Given, E> {
+        Ok(Given::default())
     }
 
-    fn visit_i64<E: de::Error>(self, _: i64) -> Result<Extras, E> {
-        Ok(Extras::default())
+    fn visit_i64<E: de::Error>(self, number: i64) -> Result<Given, E> {
+        Ok(Given::of(number as f64))
     }
 
-    fn visit_u64<E: de::Error>(self, _: u64) -> Result<Extras, E> {
-        Ok(Extras::default())
+    fn visit_u64<E: de::Error>(self, number: u64) -> Result<Given, E> {
+        Ok(Given::of(number as f64))
     }
 
-    fn visit_f64<E: de::Error>(self, _: f64) -> Result<Extras, E> {
-        Ok(Extras::default())
+    fn visit_f64<E: de::Error>(self, number: f64) -> Result<Given, E> {
+        Ok(Given::of(number))
     }
 
-    fn visit_str<E: de::Error>(self, _: &str) -> Result<Extras, E> {
-        Ok(Extras::default())
+    fn visit_str<E: de::Error>(self, _: &str) -> Result<Given, E> {
+        Ok(Given::default())
     }
 
-    fn visit_unit<E: de::Error>(self) -> Result<Extras, E> {
-        Ok(Extras::default())
+    fn visit_unit<E: de::Error>(self) -> Result<Given, E> {
+        Ok(Given::default())
     }
 }

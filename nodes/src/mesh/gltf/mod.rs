@@ -7,6 +7,7 @@ mod document;
 #[cfg(test)]
 mod tests;
 
+use std::borrow::Cow;
 use std::collections::BTreeMap;
 use std::io::{BufRead, Read};
 use std::path::Path;
@@ -17,6 +18,7 @@ use nalgebra::{Matrix4, Point3, Quaternion, Translation3, UnitQuaternion, Vector
 
 use self::buffers::Buffers;
 use self::document::{Document, Extras, Node, Primitive};
+use super::labelled::Parts;
 use super::{LabelledMesh, MeshError};
 
 /// Most bytes of a file.
@@ -84,14 +86,8 @@ pub fn from_bytes(
         nodes: 0,
     };
     reading.scene()?;
-    let Parts {
-        vertices_m,
-        triangles,
-        labels,
-        instances,
-    } = reading.parts;
-    LabelledMesh::new(vertices_m, triangles, labels, instances)
-        .map_err(|error| MeshError::NoMesh(Box::new(error)))
+    let mesh = reading.parts.mesh();
+    mesh.map_err(|error| MeshError::NoMesh(Box::new(error)))
 }
 
 fn fault(reason: String) -> MeshError {
@@ -133,15 +129,6 @@ fn in_axes(axes: Axes, p: Point3<f64>) -> [f32; 3] {
     turned.map(|c| c as f32)
 }
 
-/// The mesh as it grows.
-#[derive(Default)]
-struct Parts {
-    vertices_m: Vec<[f32; 3]>,
-    triangles: Vec<[u32; 3]>,
-    labels: Vec<u16>,
-    instances: Vec<u16>,
-}
-
 /// A document that is being read.
 struct Reading<'a> {
     document: &'a Document,
@@ -163,7 +150,7 @@ struct Placed {
     first: BTreeMap<usize, u32>,
 }
 
-impl Reading<'_> {
+impl<'a> Reading<'a> {
     /// Reads the nodes of the scene, each once: nodes are trees.
     fn scene(&mut self) -> Result<(), MeshError> {
         let document = self.document;
@@ -173,7 +160,7 @@ impl Reading<'_> {
         let mut scene_from_parent = Matrix4::identity();
         loop {
             // The first of them comes next.
-            for number in next.into_iter().rev() {
+            for &number in next.iter().rev() {
                 let (Some(node), Some(seen)) = (document.nodes.0.get(number), seen.get_mut(number))
                 else {
                     return Err(fault(format!("there is no node {number}")));
@@ -199,7 +186,7 @@ impl Reading<'_> {
                         other => other,
                     })?;
             }
-            next = node.children.clone();
+            next = Cow::Borrowed(&node.children.0);
             scene_from_parent = scene_from_node;
         }
         match self.parts.triangles.is_empty() {
@@ -209,7 +196,7 @@ impl Reading<'_> {
     }
 
     /// Nodes of the scene that is to be shown; without scenes all that are below none.
-    fn roots(&self) -> Result<Vec<usize>, MeshError> {
+    fn roots(&self) -> Result<Cow<'a, [usize]>, MeshError> {
         let Document {
             scene,
             scenes,
@@ -218,19 +205,19 @@ impl Reading<'_> {
         } = self.document;
         let number = scene.unwrap_or(0);
         if let Some(scene) = scenes.0.get(number) {
-            return Ok(scene.nodes.clone());
+            return Ok(Cow::Borrowed(&scene.nodes.0));
         }
         if scene.is_some() {
             return Err(fault(format!("there is no scene {number}")));
         }
         let mut is_root = vec![true; nodes.0.len()];
-        for child in nodes.0.iter().flat_map(|node| &node.children) {
+        for child in nodes.0.iter().flat_map(|node| &node.children.0) {
             if let Some(is_root) = is_root.get_mut(*child) {
                 *is_root = false;
             }
         }
         let roots = is_root.iter().enumerate().filter(|(_, is_root)| **is_root);
-        Ok(roots.map(|(number, _)| number).collect())
+        Ok(roots.map(|(number, _)| number).collect::<Vec<_>>().into())
     }
 
     fn mesh(
@@ -251,7 +238,7 @@ impl Reading<'_> {
         };
         placed.say(&node.extras).map_err(fault)?;
         placed.say(&mesh.extras).map_err(fault)?;
-        for primitive in &mesh.primitives {
+        for primitive in &mesh.primitives.0 {
             self.primitive(primitive, &mut placed)?;
         }
         Ok(())

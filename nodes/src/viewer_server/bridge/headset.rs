@@ -40,8 +40,7 @@ impl HeadsetTopics {
         };
         let mesh = node.publisher::<HeadsetMesh>("headset/mesh", Qos::reliable(1000))?;
         table.pass::<HeadsetMesh>("headset/mesh", move |message| {
-            let chunks = in_chunks(message).ok_or(InputRefusal::LongChunk)?;
-            chunks
+            in_chunks(message)?
                 .into_iter()
                 .try_for_each(|chunk| sent(mesh.publish(chunk)))
         })?;

@@ -304,7 +304,10 @@ impl IndoorDemo {
         let found = found.and_then(|last| isometry_from_transform(&last.transform));
         let error = found.map(|found| indoor.map_from_headset.inverse() * found);
         let mut dropped = clouds.counts.dropped.clone();
-        dropped.extend(headset.counts.dropped.clone());
+        // Both nodes have reasons of the same names.
+        for (reason, count) in &headset.counts.dropped {
+            *dropped.entry(format!("headset_{reason}")).or_default() += count;
+        }
         Ok(IndoorReport {
             labels: match self.model {
                 Some(_) => "of a network",

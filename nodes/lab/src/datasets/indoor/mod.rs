@@ -72,7 +72,7 @@ pub struct Indoor {
     pub summary: IndoorSummary,
     /// The pose that a calibration looks for.
     pub map_from_headset: Isometry3<f64>,
-    /// What the robot saw at the poses that it measured, with the true labels.
+    /// Voxels that the robot saw at the poses that it measured, with the true labels.
     pub truth: VoxelList,
 }
 

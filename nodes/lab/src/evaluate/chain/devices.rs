@@ -131,22 +131,26 @@ impl Mapper {
     }
 }
 
+/// Pose of the headset's frame in the house.
+pub(super) fn house_from_headset(rooms: &RoomImages, trial: &HeadsetTrial) -> Isometry3<f64> {
+    rooms.house().map_from_house().inverse() * trial.map_from_headset
+}
+
+/// The headset's own mesh as it sends it.
+pub(super) fn headset_mesh(rooms: &RoomImages, trial: &HeadsetTrial) -> Vec<Arc<HeadsetMesh>> {
+    mesh_chunks(&trial.mesh, &house_from_headset(rooms, trial).inverse())
+}
+
 /// The headset's points of one picture: `headset_cloud` on its own mesh and on labels of its image.
 pub(super) fn headset_scan(
-    rooms: &RoomImages,
+    image: &RoomImage,
     segmenter: &Mutex<Segmenter>,
-    trial: &HeadsetTrial,
+    chunks: &[Arc<HeadsetMesh>],
     scan: &HouseScan,
-    seed: u64,
 ) -> Result<Both<HeadsetScan>, AnyError> {
-    let house_from_headset = rooms.house().map_from_house().inverse() * trial.map_from_headset;
-    let pose = house_from_headset * scan.headset_from_camera;
-    let image = rooms.take(&RoomCamera::HEADSET, &pose, seed);
-    let found = labelled(segmenter, &image, PERIOD_NS)?;
-    let headset_from_house = house_from_headset.inverse();
-    let chunks = mesh_chunks(&trial.mesh, &headset_from_house);
+    let found = labelled(segmenter, image, PERIOD_NS)?;
     let seen = |labels: Image, confidence: Option<Image>| -> Result<HeadsetScan, AnyError> {
-        let cloud = look(&chunks, scan, labels, confidence)?;
+        let cloud = look(chunks, scan, labels, confidence)?;
         Ok(HeadsetScan {
             cloud,
             // As `semantic_icp_server` has it, which only gets the points.
@@ -155,7 +159,7 @@ pub(super) fn headset_scan(
     };
     Ok(Both {
         found: seen(found.labels, found.confidence)?,
-        truth: seen(true_labels(&image, PERIOD_NS), None)?,
+        truth: seen(true_labels(image, PERIOD_NS), None)?,
     })
 }
 

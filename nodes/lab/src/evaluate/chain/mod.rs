@@ -28,9 +28,12 @@ use super::settings::{Cell, Settings, Start};
 use super::trial::{LabelsRight, OURS, Trial, rounded};
 use super::{Results, read_house};
 use crate::options::within;
-use crate::simulate::house::{HeadsetTrial, House, RoomImages, Scene};
+use crate::simulate::house::{HeadsetTrial, House, RoomCamera, RoomImages, Scene};
 use crate::{AnyError, at, pool};
-use devices::{Both, headset_scan, middle_m, right_share, robot_map, together, unlabelled};
+use devices::{
+    Both, headset_mesh, headset_scan, house_from_headset, middle_m, right_share, robot_map,
+    together, unlabelled,
+};
 
 /// Purposes of seeds.
 const VIEW: u64 = 11;
@@ -207,9 +210,12 @@ impl Chain<'_> {
         let looks = self.options.looks;
         let trial = HeadsetTrial::new(&place.house, scene, looks, seed_of(&[VIEW, seed]))?;
         let rooms = RoomImages::new(&place.house, place.look);
+        let chunks = headset_mesh(&rooms, &trial);
         let scans = (0_u64..).zip(&trial.headset_scans).map(|(number, seen)| {
             let image_seed = seed_of(&[IMAGE, seed, scene as u64, number]);
-            headset_scan(&rooms, &self.segmenter, &trial, seen, image_seed)
+            let pose = house_from_headset(&rooms, &trial) * seen.headset_from_camera;
+            let image = rooms.take(&RoomCamera::HEADSET, &pose, image_seed);
+            headset_scan(&image, &self.segmenter, &chunks, seen)
         });
         let scans: Vec<Both<HeadsetScan>> = scans.collect::<Result<_, _>>()?;
         let (found, right): (Vec<_>, Vec<_>) =
@@ -227,12 +233,12 @@ impl Chain<'_> {
         let bare: Vec<_> = bare.collect();
         let mut trials = Vec::new();
         let none = cell(seed, scene, Start::None);
-        for (method, map, headset_scans) in [
-            (OURS, &place.map.found, &found),
-            (UNLABELLED, &place.unlabelled, &bare),
-            (TRUE_LABELS, &place.map.truth, &right),
+        let seen_bare = unlabelled(&seen);
+        for (method, map, headset_scans, cloud) in [
+            (OURS, &place.map.found, &found, &seen),
+            (UNLABELLED, &place.unlabelled, &bare, &seen_bare),
+            (TRUE_LABELS, &place.map.truth, &right, &seen_right),
         ] {
-            let cloud = together(headset_scans);
             let request = CalibrationRequest {
                 headset_scans,
                 start: None,
@@ -244,7 +250,7 @@ impl Chain<'_> {
             let trial = Trial::of_pose(&none, method, pose, &truth, &cloud.points_m, 0.0);
             trials.push(Trial {
                 labels: (method == OURS).then_some(labels),
-                different_share: rounded(different_share(map, &cloud, &truth)),
+                different_share: rounded(different_share(map, cloud, &truth)),
                 ..trial.with_judgement(&found, &truth)
             });
         }

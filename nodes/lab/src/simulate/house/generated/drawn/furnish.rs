@@ -206,6 +206,11 @@ pub(super) fn room(b: &mut Builder, s: &mut Stream, mut room: Room, number: usiz
     }
 }
 
+/// Width, depth and height, each drawn between two, metres.
+fn size(s: &mut Stream, ranges_m: [[f32; 2]; 3]) -> [f32; 3] {
+    ranges_m.map(|[low_m, high_m]| between(s, low_m, high_m))
+}
+
 fn add(b: &mut Builder, s: &mut Stream, room: &mut Room, piece: &str) -> Option<()> {
     match piece {
         "tv" => stand_with_tv(b, s, room)?,
@@ -217,11 +222,7 @@ fn add(b: &mut Builder, s: &mut Stream, room: &mut Room, piece: &str) -> Option<
         }
         "low table" => {
             let [x, y] = room.amid(s, 1.1)?;
-            let size = [
-                between(s, 0.6, 1.1),
-                between(s, 0.5, 0.7),
-                between(s, 0.35, 0.5),
-            ];
+            let size = size(s, [[0.6, 1.1], [0.5, 0.7], [0.35, 0.5]]);
             any_table(b, s, at(x, y - size[1] / 2.0, 0.0), size);
         }
         "bookshelf" => {
@@ -230,21 +231,13 @@ fn add(b: &mut Builder, s: &mut Stream, room: &mut Room, piece: &str) -> Option<
             bookshelf(b, spot, size, s);
         }
         "cabinet" => {
-            let size = [
-                between(s, 0.6, 2.0),
-                between(s, 0.3, 0.55),
-                between(s, 0.5, 1.4),
-            ];
+            let size = size(s, [[0.6, 2.0], [0.3, 0.55], [0.5, 1.4]]);
             let doors = (s.uniform() * 4.0) as i32 + 1;
             let spot = room.at_wall(s, size[0], size[1], 0.4)?;
             cabinet(b, spot, size, doors);
         }
         "wardrobe" => {
-            let size = [
-                between(s, 0.9, 2.2),
-                between(s, 0.5, 0.65),
-                between(s, 1.7, 2.2),
-            ];
+            let size = size(s, [[0.9, 2.2], [0.5, 0.65], [1.7, 2.2]]);
             let doors = (s.uniform() * 3.0) as i32 + 2;
             let spot = room.at_wall(s, size[0], size[1], 0.4)?;
             cabinet(b, spot, size, doors);
@@ -319,11 +312,7 @@ fn stand_with_tv(b: &mut Builder, s: &mut Stream, room: &mut Room) -> Option<()>
 
 /// A table with chairs around it.
 fn dining(b: &mut Builder, s: &mut Stream, room: &mut Room) -> Option<()> {
-    let size = [
-        between(s, 0.9, 1.9),
-        between(s, 0.8, 1.0),
-        between(s, 0.7, 0.78),
-    ];
+    let size = size(s, [[0.9, 1.9], [0.8, 1.0], [0.7, 0.78]]);
     let [x, y] = room.amid(s, size[0].max(size[1]) + 1.0)?;
     let yaw = if s.uniform() < 0.5 { 0.0 } else { 90.0_f32 };
     let (sin, cos) = yaw.to_radians().sin_cos();
@@ -360,11 +349,7 @@ fn dining(b: &mut Builder, s: &mut Stream, room: &mut Room) -> Option<()> {
 }
 
 fn study_desk(b: &mut Builder, s: &mut Stream, room: &mut Room) -> Option<()> {
-    let size = [
-        between(s, 1.1, 1.9),
-        between(s, 0.6, 0.85),
-        between(s, 0.7, 0.78),
-    ];
+    let size = size(s, [[1.1, 1.9], [0.6, 0.85], [0.7, 0.78]]);
     let spot = room.at_wall(s, size[0], size[1], 0.8)?;
     desk(b, spot, size, s);
     let (sin, cos) = spot.yaw_deg.to_radians().sin_cos();

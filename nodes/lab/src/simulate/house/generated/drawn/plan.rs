@@ -7,7 +7,7 @@ use super::{Builder, Stream};
 
 /// Rooms side by side and one behind the other, with the heights of their walls.
 pub(super) struct Plan {
-    /// Where walls stand along x and along y, metres.
+    /// Positions of walls along x and along y, metres.
     x_m: Vec<f32>,
     y_m: Vec<f32>,
     pub(super) height_m: f32,
