@@ -2,7 +2,7 @@
 
 use super::printed_formulas::unit;
 use lattice_core::lattice::{BatchQuantizer, BlockKey, Lattice, LatticeKind, Simd};
-use lattice_lab::bench::{self, QuantizeMethod};
+use lattice_lab::bench::{self, QuantizeMethod, QuantizeOutput};
 use lattice_lab::theory::{mean_width_m, surface_m2};
 use lattice_test::random::Random;
 use nalgebra::{Isometry3, UnitQuaternion, Vector3};
@@ -102,7 +102,12 @@ fn the_key_stream_of_a_point_file_has_one_digest_on_every_machine() {
     let mut found = Vec::new();
     for kind in LatticeKind::ALL {
         let lattice = Lattice::new(kind, 0.008).unwrap();
-        let hash = |method| bench::quantize(method, &lattice, &points).hash.unwrap();
+        let keys = QuantizeOutput::Keys;
+        let hash = |method| {
+            bench::quantize(method, keys, &lattice, &points)
+                .hash
+                .unwrap()
+        };
         let portable = hash(QuantizeMethod::Portable);
         assert_eq!(portable, hash(QuantizeMethod::Batch), "{kind}");
         assert_eq!(portable, hash(QuantizeMethod::Scalar), "{kind}");
