@@ -2,7 +2,7 @@
 
 use std::collections::BTreeMap;
 
-use nalgebra::{Isometry3, Point3, Vector3};
+use nalgebra::{Isometry3, Point3, UnitQuaternion, Vector3};
 use rayon::prelude::*;
 
 use super::confusion::{Confusion, Counts, Lift};
@@ -54,7 +54,7 @@ impl FitScale {
     }
 
     /// Farthest that a partner may be, metres.
-    fn gate_m(&self) -> f64 {
+    pub fn gate_m(&self) -> f64 {
         3.0 * self.tangent_m.max(self.normal_m)
     }
 }
@@ -172,12 +172,31 @@ impl<'a> Fit<'a> {
 
     /// Finds the partners of all source points.
     pub fn partners(&self, target_from_source: &Isometry3<f64>) -> Partners {
+        self.partners_at(&target_from_source.rotation, |p| target_from_source * p)
+    }
+
+    /// The same with the distances of the points from a centre multiplied by a scale; regions and weights stay.
+    pub fn partners_scaled(
+        &self,
+        target_from_source: &Isometry3<f64>,
+        center: &Point3<f64>,
+        scale: f64,
+    ) -> Partners {
+        let place = |p: &Point3<f64>| target_from_source * (center + scale * (p - center));
+        self.partners_at(&target_from_source.rotation, place)
+    }
+
+    fn partners_at(
+        &self,
+        turn: &UnitQuaternion<f64>,
+        place: impl Fn(&Point3<f64>) -> Point3<f64> + Sync,
+    ) -> Partners {
         let points = self.source.points_m();
         let of_point: Vec<([Partner; NEIGHBORS], f64)> = points
             .par_iter()
             .enumerate()
             .with_min_len(256)
-            .map(|(i, point)| self.partners_of(i, point, target_from_source))
+            .map(|(i, point)| self.partners_of(i, &place(point), turn))
             .collect();
         let (mut sum, mut n) = (0.0, 0.0);
         for (_, squared) in of_point.iter().filter(|p| p.1.is_finite()) {
@@ -191,26 +210,25 @@ impl<'a> Fit<'a> {
         }
     }
 
-    /// Partners of one point, and its squared distance across the surface of the nearest.
+    /// Partners of a point at its place, and its squared distance across the surface of the nearest.
     fn partners_of(
         &self,
         i: usize,
-        point: &Point3<f64>,
-        target_from_source: &Isometry3<f64>,
+        place: &Point3<f64>,
+        turn: &UnitQuaternion<f64>,
     ) -> ([Partner; NEIGHBORS], f64) {
-        let place = target_from_source * point;
         let normal = self
             .source
             .normals()
             .get(i)
             .copied()
             .unwrap_or_else(Vector3::zeros);
-        let normal = target_from_source.rotation * normal;
+        let normal = turn * normal;
         let mut partners = [Partner::NONE; NEIGHBORS];
         let mut nearest = f64::INFINITY;
         let mut near = Neighbors::default();
         let gate_m = self.scale.gate_m();
-        self.target.nearest_k(&place, NEIGHBORS, gate_m, &mut near);
+        self.target.nearest_k(place, NEIGHBORS, gate_m, &mut near);
         for (slot, (j, _)) in partners.iter_mut().zip(near.iter()) {
             let (Some(q), Some(m)) = (self.target.points_m().get(j), self.target.normals().get(j))
             else {

@@ -15,9 +15,9 @@ mod search;
 mod solver;
 
 pub use calibrate::{
-    Calibration, CalibrationMap, CalibrationOptions, CalibrationRequest, ClassReliability,
-    DirectionKind, HeadsetScan, Margin, Profile, Progress, ScaleEstimate, Stage, TrackUpdate,
-    Verdict, WeakDirection, calibrate, track,
+    AbsoluteFit, Calibration, CalibrationMap, CalibrationOptions, CalibrationRequest,
+    ClassReliability, DirectionKind, HeadsetScan, Margin, Profile, Progress, ScaleEstimate, Stage,
+    TrackUpdate, Unexplained, UnexplainedKind, Verdict, WeakDirection, calibrate, track,
 };
 pub use cloud::SemanticCloud;
 pub use confusion::{Confusion, Lift};

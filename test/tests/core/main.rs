@@ -2,6 +2,7 @@
 
 mod calibration;
 mod calibration_misread;
+mod calibration_regions;
 mod calibration_symmetry;
 mod cloud;
 #[path = "../../fuzz/src/lib.rs"]

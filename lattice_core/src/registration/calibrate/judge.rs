@@ -2,10 +2,12 @@
 
 use nalgebra::{Isometry3, Matrix6, Vector3};
 
+use super::super::likelihood::Partners;
 use super::candidates::{Candidate, Workbench};
 use super::covariance::{ErrorModel, PoseCovariance};
 use super::likeliest;
 use super::margin::{Margin, SOFTNESS};
+use super::regions::absolute_fit;
 use super::scale::scale_at;
 use super::types::{
     Calibration, CalibrationOptions, ClassReliability, DirectionKind, ScaleEstimate, Verdict,
@@ -16,9 +18,14 @@ use super::types::{
 const INVISIBLE: f64 = 4.0;
 /// Standard deviations of the tilt beyond which a pose certainly leans.
 const LEANING: f64 = 5.0;
-/// Standard deviations of the scale by which it must be beyond what it may be to be wrong: at one, right looks on
-/// warped meshes are refused, at two, clouds that are 5 % too small pass.
-const SIGNIFICANT: f64 = 1.5;
+/// Log-likelihood that another scale must gain to be certain, and the same of an observation: right looks on warped
+/// meshes gain less than a tenth, clouds that are 5 % too small or too large one and more.
+const SCALE_GAIN: f64 = 40.0;
+const SCALE_GAIN_OF_ONE: f64 = 0.3;
+/// Share of the points that another scale may leave without a partner and still be better.
+const FEWER: f64 = 0.02;
+/// Distance from surfaces, metres, below which points are not told to be closer.
+const CLOSEST_M: f64 = 1e-3;
 /// GICP from a given start stands unless another is better by this log-likelihood.
 const DISPLACE: f64 = 10.0;
 
@@ -41,6 +48,7 @@ pub(super) fn answer(bench: &Workbench<'_>, all: Vec<Candidate>, started: bool) 
         }),
         unexplained: bench.fit.observations() * (1.0 - best.inlier_fraction),
     };
+    let fit = absolute_fit(bench, &pose);
     let covariance = covariance(bench, best).map(|sure| {
         let near = all
             .iter()
@@ -75,9 +83,16 @@ pub(super) fn answer(bench: &Workbench<'_>, all: Vec<Candidate>, started: bool) 
     let (mut verdict, mut reason) = verdict(options, best, &margin, covariance.is_some(), &weak);
     let scale = scale(bench, best);
     if best.inlier_fraction >= options.min_inliers
-        && let Some(fault) = leaning(&pose, leans, options).or_else(|| misscaled(scale, options))
+        && let Some(fault) = leaning(&pose, leans, options)
+            .or_else(|| misscaled(scale, bench.fit.observations(), options))
     {
         (verdict, reason) = (Verdict::RejectedInput, fault);
+    }
+    if let Some(regions) = (verdict != Verdict::RejectedInput)
+        .then(|| fit.in_words())
+        .flatten()
+    {
+        reason = format!("{reason}; {regions}");
     }
     let confusion = bench.known.merged(&best.confusion);
     Calibration {
@@ -87,6 +102,8 @@ pub(super) fn answer(bench: &Workbench<'_>, all: Vec<Candidate>, started: bool) 
         map_from_headset: pose,
         covariance: covariance.map_or_else(Matrix6::zeros, |c| c.in_target(&pose)),
         margin,
+        fit,
+        other_reading_ahead: None,
         inlier_fraction: best.inlier_fraction,
         rmse_m: best.rmse_m,
         weak_directions: weak,
@@ -113,10 +130,15 @@ fn leaning(pose: &Isometry3<f64>, leans: bool, options: &CalibrationOptions) -> 
 }
 
 /// Says that the points are of another scale than the map.
-fn misscaled(scale: Option<ScaleEstimate>, options: &CalibrationOptions) -> Option<String> {
-    let ScaleEstimate { scale, sigma } = scale.filter(|_| !options.estimate_scale)?;
-    let off = (scale - 1.0).abs();
-    (off > options.max_scale_error + SIGNIFICANT * sigma).then(|| {
+fn misscaled(
+    scale: Option<ScaleEstimate>,
+    observations: f64,
+    options: &CalibrationOptions,
+) -> Option<String> {
+    let ScaleEstimate { scale, sigma, gain } = scale.filter(|_| !options.estimate_scale)?;
+    let off = (scale - 1.0).abs() > options.max_scale_error;
+    let is_certain = gain > SCALE_GAIN.max(SCALE_GAIN_OF_ONE * observations);
+    (off && is_certain).then(|| {
         let most = 100.0 * options.max_scale_error;
         format!(
             "the cloud fits with its points multiplied by {scale:.3}, standard deviation {sigma:.3}: \
@@ -199,7 +221,25 @@ fn covariance(bench: &Workbench<'_>, best: &Candidate) -> Option<PoseCovariance>
 fn scale(bench: &Workbench<'_>, best: &Candidate) -> Option<ScaleEstimate> {
     let (source, target) = (&bench.input.full, &bench.map.cloud);
     let model = error_model(bench, best);
-    scale_at(source, target, &best.map_from_headset, &model)
+    let found = scale_at(source, target, &best.map_from_headset, &model)?;
+    let (pose, scale) = (&found.target_from_source, found.scale);
+    let partners = bench.fit.partners_scaled(pose, &model.center, scale);
+    Some(ScaleEstimate {
+        scale,
+        sigma: found.sigma,
+        gain: gain(bench.fit.observations(), best, &partners),
+    })
+}
+
+/// Log-likelihood of a normal distribution whose deviation is that of the points, at partners that another scale
+/// gives, above that of the pose as it is; 0 if it leaves points without partners.
+fn gain(observations: f64, best: &Candidate, scaled: &Partners) -> f64 {
+    if scaled.inlier_fraction < best.inlier_fraction - FEWER {
+        return 0.0;
+    }
+    let both = scaled.inlier_fraction.min(best.inlier_fraction);
+    let closer = (best.rmse_m.max(CLOSEST_M) / scaled.rmse_m.max(CLOSEST_M)).ln();
+    both * observations * closer
 }
 
 fn error_model(bench: &Workbench<'_>, best: &Candidate) -> ErrorModel {
@@ -237,17 +277,23 @@ mod tests {
     use super::*;
 
     #[test]
-    fn a_scale_is_wrong_that_is_surely_beyond_its_bound() {
+    fn a_scale_is_wrong_that_is_beyond_its_bound_and_fits_far_better() {
         let given = CalibrationOptions::default();
-        let is_wrong = |scale, sigma, options: &CalibrationOptions| {
-            misscaled(Some(ScaleEstimate { scale, sigma }), options).is_some()
+        let is_wrong = |scale, gain, options: &CalibrationOptions| {
+            let estimate = ScaleEstimate {
+                scale,
+                sigma: 0.02,
+                gain,
+            };
+            misscaled(Some(estimate), 500.0, options).is_some()
         };
-        assert!(is_wrong(1.053, 0.012, &given) && is_wrong(0.9, 0.02, &given));
-        assert!(!is_wrong(1.053, 0.02, &given) && !is_wrong(1.02, 0.001, &given));
+        assert!(is_wrong(1.053, 300.0, &given) && is_wrong(0.9, 300.0, &given));
+        // A bump of a warped mesh is explained a little better by a scale.
+        assert!(!is_wrong(1.053, 100.0, &given) && !is_wrong(1.02, 300.0, &given));
         let estimated = CalibrationOptions {
             estimate_scale: true,
             ..given
         };
-        assert!(!is_wrong(0.9, 0.02, &estimated));
+        assert!(!is_wrong(0.9, 300.0, &estimated));
     }
 }

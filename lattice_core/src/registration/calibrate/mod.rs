@@ -14,6 +14,7 @@ mod margin;
 mod profile;
 mod rays;
 mod readings;
+mod regions;
 mod rivals;
 mod scale;
 mod track;
@@ -28,12 +29,13 @@ use super::search::{Hypothesis, Region, SearchMap, SearchSource, search};
 use super::{LabelDistribution, PreparedCloud, RegisterOptions, register};
 use candidates::{Candidate, Workbench};
 use input::Input;
-use readings::misread;
+use readings::{Other, other_reading};
 use types::Refusal;
 
 pub use map::CalibrationMap;
 pub use margin::Margin;
 pub use profile::Profile;
+pub use regions::{AbsoluteFit, Unexplained, UnexplainedKind};
 pub use track::{TrackUpdate, track};
 pub use types::{
     Calibration, CalibrationOptions, CalibrationRequest, ClassReliability, DirectionKind,
@@ -46,6 +48,8 @@ const BY_LABELS: usize = 64;
 const FINALISTS: usize = 4;
 /// Log-likelihood of an observation that refining a candidate may still win it.
 const HOPE: f64 = 0.5;
+/// Logarithm of the ratio of two scales that are about equal.
+const ABOUT: f64 = 0.08;
 /// Classes that are searched by, at most.
 const SEARCHED_CLASSES: usize = 24;
 
@@ -108,21 +112,54 @@ fn run(
     }
     step(progress, Stage::Judge, 0.9)?;
     let calibration = judge::answer(&bench, all, request.start.is_some());
-    let misread = misread(&bench, &first, region.as_ref());
+    let other = other_reading(&bench, &first, region.as_ref());
     let _ = progress.report(Stage::Judge, 1.0);
-    Ok(match misread {
-        Some(better) if better.clearly => Calibration {
-            verdict: Verdict::RejectedInput,
-            reason: format!("the cloud {}", better.reading.reason(options.axes)),
-            ..calibration
-        },
-        Some(better) if calibration.verdict == Verdict::Ok => Calibration {
-            verdict: Verdict::Ambiguous,
-            reason: format!("perhaps the cloud {}", better.reading.reason(options.axes)),
-            ..calibration
-        },
-        _ => calibration,
+    Ok(match other {
+        Some(other) => read_as(calibration, &other, options),
+        None => calibration,
     })
+}
+
+/// The answer when another reading of the cloud was looked at.
+fn read_as(found: Calibration, other: &Other, options: &CalibrationOptions) -> Calibration {
+    let found = Calibration {
+        other_reading_ahead: Some(other.ahead),
+        ..found
+    };
+    let reason = || other.reading.reason(options.axes);
+    match found.verdict {
+        // What leans fits better at another scale, and what is of another scale often leans: both are told.
+        Verdict::RejectedInput if other.reading.is_scaled() => Calibration {
+            reason: match other.is_certain && !found.is_about(other.reading.scale()) {
+                true => format!("{}; or it {}", found.reason, reason()),
+                false => found.reason,
+            },
+            ..found
+        },
+        _ if other.is_certain => Calibration {
+            verdict: Verdict::RejectedInput,
+            reason: format!("the cloud {}", reason()),
+            scale: match other.reading.is_scaled() {
+                true => Some(ScaleEstimate::about(other.reading.scale())),
+                false => found.scale,
+            },
+            ..found
+        },
+        Verdict::Ok if other.is_possible() => Calibration {
+            verdict: Verdict::Ambiguous,
+            reason: format!("perhaps the cloud {}", reason()),
+            ..found
+        },
+        _ => found,
+    }
+}
+
+impl Calibration {
+    /// True if the scale that was estimated is about another one.
+    fn is_about(&self, scale: f64) -> bool {
+        let estimate = self.scale.map_or(1.0, |estimate| estimate.scale);
+        (estimate / scale).ln().abs() < ABOUT
+    }
 }
 
 /// The candidate that most speaks for.

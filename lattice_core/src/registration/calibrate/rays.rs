@@ -1,6 +1,6 @@
 //! Lines of sight of a headset: a right pose does not look through walls.
 
-use nalgebra::{Isometry3, Point3};
+use nalgebra::{Isometry3, Point3, Vector3};
 
 use super::super::PreparedCloud;
 use super::super::search::OccupiedGrid;
@@ -28,23 +28,31 @@ pub(super) fn blocked_fraction(
     let (mut rays, mut blocked) = (0_u32, 0_u32);
     for point in points.iter().step_by(step) {
         let to = target_from_source * point;
-        let way = to - from;
-        let length = way.norm();
+        let length = nalgebra::distance(&from, &to);
         if length < 3.0 * clear_m {
             continue;
         }
         rays += 1;
-        let direction = way / length;
-        // Less than a cell, so that none is passed over but at its corners.
-        let stride = STRIDE * occupied.cell_m();
-        let (begin_m, end_m) = (clear_m, length - clear_m);
-        let steps = ((end_m - begin_m) / stride) as usize;
-        let meets = (0..=steps.min(STEPS)).any(|i| {
-            let place = from + direction * (begin_m + i as f64 * stride);
-            let crossing = occupied.crossing_m(&place, &from, &direction);
-            crossing.is_some_and(|along_m| along_m > begin_m && along_m < end_m)
-        });
-        blocked += u32::from(meets);
+        let direction = (to - from) / length;
+        let way = clear_m..length - clear_m;
+        blocked += u32::from(crossing_m(occupied, &from, &direction, way).is_some());
     }
     f64::from(blocked) / f64::from(rays.max(1))
+}
+
+/// Distance at which a ray goes through a surface, within a part of its way, metres.
+pub(super) fn crossing_m(
+    occupied: &OccupiedGrid,
+    from_m: &Point3<f64>,
+    direction: &Vector3<f64>,
+    way_m: std::ops::Range<f64>,
+) -> Option<f64> {
+    // Less than a cell, so that none is passed over but at its corners.
+    let stride = STRIDE * occupied.cell_m();
+    let steps = ((way_m.end - way_m.start) / stride) as usize;
+    (0..=steps.min(STEPS)).find_map(|i| {
+        let place = from_m + direction * (way_m.start + i as f64 * stride);
+        let crossing = occupied.crossing_m(&place, from_m, direction);
+        crossing.filter(|along_m| *along_m > way_m.start && *along_m < way_m.end)
+    })
 }

@@ -1,4 +1,4 @@
-//! Readings of a cloud's axes: those under which it would fit tell how it was misread.
+//! Readings of a cloud's axes and unit: those under which it would fit tell how it was misread.
 
 use nalgebra::{Matrix3, Vector3};
 use rayon::prelude::*;
@@ -9,20 +9,28 @@ use super::super::{PrepareOptions, PreparedCloud, SemanticCloud};
 use super::candidates::{Candidate, Workbench};
 use crate::pose::Axes;
 
-/// Hypotheses of a search with other axes.
-const MISREAD: usize = 48;
-/// Those of them that get all steps of a first look.
-const FIRST_LOOK: usize = 16;
+/// Hypotheses of a search with other axes, and those of them that get all steps of a first look.
+const MISREAD_PLACES: (usize, usize) = (48, 16);
+/// The same with another scale: what is of it fits many places nearly.
+const SCALED_PLACES: (usize, usize) = (128, 64);
 /// Hypotheses of a rough search.
 const ROUGH_PLACES: usize = 4;
 /// Readings that are looked at closely: the right one and its mirror image lead a rough search.
 const LOOKED_AT: usize = 2;
+/// Scales that a cloud may have instead of 1; what is nearer to 1 is estimated with the pose.
+const SCALES: [f64; 4] = [0.8, 0.9, 1.11, 1.25];
+/// Score by which a scale must be ahead in a rough search to be looked at closely: a scale that is wrong is behind
+/// in all but bare views.
+const SCALED_AHEAD: f64 = 0.02;
 /// Log-likelihood by which a reading is certainly better.
 const MARGIN: f64 = 40.0;
+/// Log-likelihood by which a reading must be behind to be out of the question: where one cloud in fifty is misread,
+/// that is a probability of one in a hundred.
+const NOT_BEHIND: f64 = 4.0;
 /// Score by which a right reading may fall behind a wrong one in it.
 const ROUGH: f64 = 0.03;
 
-/// Axes that a cloud may have instead of forward, left, up.
+/// Axes or unit that a cloud may have instead of forward, left, up in metres.
 ///
 /// Turns about the vertical are searched anyway, so the axis that points up and the handedness tell all.
 #[derive(Clone, Copy, PartialEq, Debug)]
@@ -53,6 +61,23 @@ impl Reading {
         up.flat_map(hands).collect()
     }
 
+    /// Lengths are to be multiplied by a factor.
+    fn scaled(by: f64) -> Reading {
+        Reading {
+            matrix: Matrix3::identity() * by,
+        }
+    }
+
+    /// Factor on lengths.
+    pub fn scale(&self) -> f64 {
+        self.matrix.determinant().abs().cbrt()
+    }
+
+    /// True if it changes lengths.
+    pub fn is_scaled(&self) -> bool {
+        (self.scale() - 1.0).abs() > 1e-6
+    }
+
     /// True if two differ by a turn about the vertical only.
     fn is_like(&self, matrix: &Matrix3<f64>) -> bool {
         let same_up = self.matrix.row(2) == matrix.row(2);
@@ -61,6 +86,12 @@ impl Reading {
 
     /// The reading in words, for a cloud that was read as one of `axes`.
     pub fn reason(&self, axes: Axes) -> String {
+        if self.is_scaled() {
+            return format!(
+                "fits with its points multiplied by about {:.2}: it is of another scale, check its unit",
+                self.scale()
+            );
+        }
         let back = axes.matrix().transpose();
         let mut all = Axes::ALL.into_iter();
         if let Some(right) = all.clone().find(|a| self.is_like(&(a.matrix() * back))) {
@@ -91,61 +122,99 @@ impl Reading {
     }
 }
 
-/// A reading of a cloud that fits better than the one it has.
+/// Another reading of a cloud, the best of those that were looked at closely.
 #[derive(Clone, Copy, PartialEq, Debug)]
-pub(super) struct Better {
+pub(super) struct Other {
     pub reading: Reading,
+    /// Log-likelihood of the few points by which it is ahead of the cloud as it is.
+    pub ahead: f64,
     /// True if it is beyond doubt.
-    pub clearly: bool,
+    pub is_certain: bool,
 }
 
-/// The best reading under which the cloud fits better than as it is, after a first look.
+impl Other {
+    /// True if it fits about as well as the cloud as it is, so that the odds beforehand do not rule it out.
+    pub fn is_possible(&self) -> bool {
+        self.is_certain || self.ahead > -NOT_BEHIND
+    }
+}
+
+/// The best other reading of a cloud, after a first look.
 ///
 /// A rough search leaves out those that cannot be it.
-pub(super) fn misread(
+pub(super) fn other_reading(
     bench: &Workbench<'_>,
     straight: &[Candidate],
     region: Option<&Region>,
-) -> Option<Better> {
+) -> Option<Other> {
     let likelihoods = straight.iter().map(|c| c.likelihood.total());
     let straight = likelihoods.fold(0.0, f64::max);
-    let as_it_is = Mended::new(bench, &Matrix3::identity())?;
+    let as_it_is = Mended::new(bench, &Reading::scaled(1.0))?;
     let rough = as_it_is.rough_score(bench, region);
-    let mut readings = vec![(Reading::MIRRORED, region)];
     // A cloud that may lean is not of a headset, whose axes are often mistaken.
+    let mut axes = vec![(Reading::MIRRORED, region)];
     if bench.options.gravity_sigma_rad.is_finite() {
         let on_their_side = Reading::on_their_side().into_iter();
-        readings.extend(on_their_side.map(|reading| (reading, None)));
+        axes.extend(on_their_side.map(|reading| (reading, None)));
     }
-    let hopeful = readings.par_iter().filter_map(|(reading, region)| {
-        let mended = Mended::new(bench, &reading.matrix)?;
-        let score = mended.rough_score(bench, *region);
-        (score >= rough - ROUGH).then_some((score, *reading, *region, mended))
+    // Nor is the scale of a laser in doubt.
+    let scales = match bench.options.scale_sigma > 0.0 {
+        true => SCALES.map(|by| (Reading::scaled(by), region)).to_vec(),
+        false => Vec::new(),
+    };
+    let mut hopeful = hopeful(bench, axes, rough - ROUGH, LOOKED_AT);
+    hopeful.extend(self::hopeful(bench, scales, rough + SCALED_AHEAD, 1));
+    let fits = hopeful.par_iter().filter_map(|(reading, region, mended)| {
+        let places = match reading.is_scaled() {
+            true => SCALED_PLACES,
+            false => MISREAD_PLACES,
+        };
+        // A density of lengths that are to be multiplied is one over them.
+        let density = bench.few.observations() * reading.scale().ln();
+        let likelihood = mended.likelihood(bench, *region, places)? + density;
+        Some((likelihood, *reading))
     });
-    let mut hopeful: Vec<_> = hopeful.collect();
-    hopeful.sort_by(|a, b| b.0.total_cmp(&a.0));
-    hopeful.truncate(LOOKED_AT);
-    let fits = hopeful
-        .par_iter()
-        .filter_map(|(_, reading, region, mended)| {
-            let likelihood = mended.likelihood(bench, *region)?;
-            Some((likelihood, *reading))
-        });
     let (best, reading) = fits.max_by(|a, b| a.0.total_cmp(&b.0))?;
     let observations = bench.few.observations();
-    let clearly = best > straight + MARGIN.max(0.25 * observations) && best > 0.5 * observations;
-    let better = clearly || best > straight + 0.5 * MARGIN;
-    better.then_some(Better { reading, clearly })
+    let ahead = best - straight;
+    Some(Other {
+        reading,
+        ahead,
+        is_certain: ahead > MARGIN.max(0.25 * observations) && best > 0.5 * observations,
+    })
 }
 
-/// The few points in other axes.
+type Asked<'a> = (Reading, Option<&'a Region>);
+type Hopeful<'a> = (Reading, Option<&'a Region>, Mended);
+
+/// The readings that a rough search gives a score of `least`, the best `most` of them.
+fn hopeful<'a>(
+    bench: &Workbench<'_>,
+    readings: Vec<Asked<'a>>,
+    least: f64,
+    most: usize,
+) -> Vec<Hopeful<'a>> {
+    let scored = readings.into_par_iter().filter_map(|(reading, region)| {
+        let mended = Mended::new(bench, &reading)?;
+        let score = mended.rough_score(bench, region);
+        (score >= least).then_some((score, (reading, region, mended)))
+    });
+    let mut scored: Vec<(f64, Hopeful<'a>)> = scored.collect();
+    scored.sort_by(|a, b| b.0.total_cmp(&a.0));
+    scored.truncate(most);
+    scored.into_iter().map(|(_, hopeful)| hopeful).collect()
+}
+
+/// The few points by another reading.
 struct Mended {
     cloud: PreparedCloud,
     source: SearchSource,
 }
 
 impl Mended {
-    fn new(bench: &Workbench<'_>, matrix: &Matrix3<f64>) -> Option<Mended> {
+    fn new(bench: &Workbench<'_>, reading: &Reading) -> Option<Mended> {
+        let matrix = &reading.matrix;
+        let turn = matrix / reading.scale();
         let few = &bench.input.few;
         let labels = match few.is_labelled() {
             true => (0..few.len()).map(|i| few.label(i)).collect(),
@@ -154,7 +223,7 @@ impl Mended {
         let points_m = few.points_m().iter().map(|p| matrix * p).collect();
         let cloud = SemanticCloud { points_m, labels };
         let cloud = PreparedCloud::new(cloud, &PrepareOptions::default()).ok()?;
-        let cloud = cloud.with_normals(|i| few.normals().get(i).map(|n| matrix * n));
+        let cloud = cloud.with_normals(|i| few.normals().get(i).map(|n| turn * n));
         let sensor_m = bench.input.sensor_m.map(|p| matrix * p);
         let source = SearchSource::by_surface(&cloud, sensor_m);
         Some(Mended { cloud, source })
@@ -166,16 +235,22 @@ impl Mended {
         found.first().map_or(0.0, |hypothesis| hypothesis.score)
     }
 
-    /// The best likelihood after a first look.
-    fn likelihood(&self, bench: &Workbench<'_>, region: Option<&Region>) -> Option<f64> {
-        let hypotheses = search(&bench.map.surfaces, &self.source, region, MISREAD);
+    /// The best likelihood after a first look, as if it had as many regions as the cloud as it is.
+    fn likelihood(
+        &self,
+        bench: &Workbench<'_>,
+        region: Option<&Region>,
+        (places, looked_at): (usize, usize),
+    ) -> Option<f64> {
+        let hypotheses = search(&bench.map.surfaces, &self.source, region, places);
         let scale = bench.map.scale(bench.options.noise_m).coarser(2.0);
         let fit = Fit::new(&self.cloud, &bench.map.cloud, scale);
-        let found = bench.refine_best(&self.cloud, &hypotheses, FIRST_LOOK, |pose| {
+        let share = bench.few.observations() / fit.observations().max(1.0);
+        let found = bench.refine_best(&self.cloud, &hypotheses, looked_at, |pose| {
             let partners = fit.partners(&pose);
             let (likelihood, _) = fit.likelihood(&partners, &bench.known, bench.options.agreement);
             (likelihood.total(), ())
         });
-        found.first().map(|(likelihood, ())| *likelihood)
+        found.first().map(|(likelihood, ())| share * likelihood)
     }
 }

@@ -17,6 +17,10 @@ const STILL: f64 = 1e-4;
 const ROUNDS: usize = 3;
 /// Difference from 1 that is not worth another calibration.
 const LEAST: f64 = 0.003;
+/// Standard deviation of a scale that was only tried.
+const ROUGHLY: f64 = 0.03;
+/// Log-likelihood that a scale gains which matters, whatever its standard deviation.
+const CLEAR_GAIN: f64 = 40.0;
 /// Scales that are believed to be of one world.
 const SANE: std::ops::Range<f64> = 0.5..2.0;
 
@@ -27,14 +31,23 @@ struct Pulls {
     regions: BTreeMap<[i64; 3], (SVector<f64, 7>, SMatrix<f64, 7, 3>)>,
 }
 
-/// The scale that fits best near a pose, with the standard deviation that regions which err together
-/// give it; None if the points do not hold it.
+/// Pose and scale that fit best together.
+#[derive(Clone, Copy, PartialEq, Debug)]
+pub(super) struct ScaledPose {
+    /// Pose of points that keep their distance from the centre of the model, but for the scale.
+    pub target_from_source: Isometry3<f64>,
+    pub scale: f64,
+    /// Standard deviation that regions which err together give the scale.
+    pub sigma: f64,
+}
+
+/// The scale that fits best near a pose; None if the points do not hold it.
 pub(super) fn scale_at(
     source: &PreparedCloud,
     target: &PreparedCloud,
     target_from_source: &Isometry3<f64>,
     model: &ErrorModel,
-) -> Option<ScaleEstimate> {
+) -> Option<ScaledPose> {
     let (mut pose, mut scale) = (*target_from_source, 1.0);
     let mut last = None;
     for _ in 0..STEPS {
@@ -55,7 +68,11 @@ pub(super) fn scale_at(
         let variance: f64 = pulls.regions.values().map(variance).sum();
         // What a step still moves is not known.
         let sigma = variance.sqrt().hypot(step[6]);
-        last = sigma.is_finite().then_some(ScaleEstimate { scale, sigma });
+        last = sigma.is_finite().then_some(ScaledPose {
+            target_from_source: pose,
+            scale,
+            sigma,
+        });
         if step[6].abs() < STILL {
             break;
         }
@@ -92,6 +109,7 @@ pub(super) fn calibrate_scaled(
     found.scale = found.scale.map(|left| ScaleEstimate {
         scale: total * left.scale,
         sigma: total * left.sigma,
+        ..left
     });
     found
 }
@@ -104,10 +122,19 @@ fn scaled(scan: &HeadsetScan, by: f64) -> HeadsetScan {
 }
 
 impl ScaleEstimate {
+    /// Of a scale that is known only to be about right.
+    pub(super) fn about(scale: f64) -> ScaleEstimate {
+        ScaleEstimate {
+            scale,
+            sigma: ROUGHLY,
+            gain: 0.0,
+        }
+    }
+
     /// True if it is neither 1 nor next to it.
     fn matters(&self) -> bool {
         let off = (self.scale - 1.0).abs();
-        off > LEAST && off > 2.0 * self.sigma
+        off > LEAST && (off > 2.0 * self.sigma || self.gain > CLEAR_GAIN)
     }
 }
 

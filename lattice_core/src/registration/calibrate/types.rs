@@ -6,6 +6,7 @@ use nalgebra::{Isometry3, Matrix6, Point3, Vector3};
 
 use super::margin::Margin;
 use super::profile::Profile;
+use super::regions::AbsoluteFit;
 use crate::pose::Axes;
 use crate::registration::{Confusion, SemanticCloud};
 
@@ -163,6 +164,8 @@ pub struct ScaleEstimate {
     pub scale: f64,
     /// Its standard deviation.
     pub sigma: f64,
+    /// Log-likelihood by which the cloud fits better with it than as it is.
+    pub gain: f64,
 }
 
 /// The answer.
@@ -184,6 +187,11 @@ pub struct Calibration {
     pub scale: Option<ScaleEstimate>,
     /// Margin over the best different pose.
     pub margin: Margin,
+    /// Fit of the cloud to the map as such, part by part.
+    pub fit: AbsoluteFit,
+    /// Log-likelihood by which other axes or another unit of the cloud are ahead after a first look; None if a rough
+    /// one was enough.
+    pub other_reading_ahead: Option<f64>,
     /// Share of the headset's points on a surface of the map.
     pub inlier_fraction: f64,
     /// Root mean square distance of those from the surfaces, metres.
@@ -209,6 +217,8 @@ impl Calibration {
             covariance: Matrix6::zeros(),
             scale: None,
             margin: Margin::default(),
+            fit: AbsoluteFit::default(),
+            other_reading_ahead: None,
             inlier_fraction: 0.0,
             rmse_m: 0.0,
             weak_directions: Vec::new(),

@@ -33,6 +33,14 @@ pub struct Answer {
     p_wrong: Option<f64>,
     inlier_fraction: f64,
     rmse_m: f64,
+    /// Squared shift of parts of the cloud over what sensor and cells explain; None without a verdict.
+    chi_square: Option<f64>,
+    /// Share of the points that float before a surface of the map.
+    floating_fraction: Option<f64>,
+    /// Share of the lines of sight that go through a surface of the map.
+    blocked_fraction: Option<f64>,
+    /// Parts of the cloud that the map does not explain, those with the most points first.
+    unexplained: Vec<Part>,
     weak_directions: Vec<Weak>,
     classes: Vec<Class>,
     pub points: usize,
@@ -53,6 +61,17 @@ struct Weak {
     axis: [f64; 3],
     /// Metres or radians.
     sigma: f64,
+}
+
+#[derive(Serialize)]
+struct Part {
+    /// missing, floating, beside or hidden.
+    kind: &'static str,
+    /// Its midst in the map, metres.
+    place_m: [f64; 3],
+    points: usize,
+    /// Distance from the map's surfaces, metres.
+    beside_m: f64,
 }
 
 #[derive(Serialize)]
@@ -96,6 +115,13 @@ impl Answer {
             agreement: class.agreement,
             observations: class.weight,
         });
+        let fit = &calibration.fit;
+        let unexplained = fit.unexplained.iter().map(|part| Part {
+            kind: part.kind.name(),
+            place_m: part.place_m.into(),
+            points: part.points,
+            beside_m: part.beside_m,
+        });
         Answer {
             verdict: Some(calibration.verdict.name()),
             reason: calibration.reason.clone(),
@@ -112,6 +138,10 @@ impl Answer {
             p_wrong: Some(calibration.margin.p_wrong()),
             inlier_fraction: calibration.inlier_fraction,
             rmse_m: calibration.rmse_m,
+            chi_square: Some(fit.chi_square),
+            floating_fraction: Some(fit.floating),
+            blocked_fraction: Some(fit.blocked),
+            unexplained: unexplained.collect(),
             weak_directions: weak.collect(),
             classes: classes.collect(),
             ..Answer::default()
@@ -194,6 +224,30 @@ impl fmt::Display for Answer {
             100.0 * self.inlier_fraction,
             self.rmse_m
         )?;
+        if let (Some(chi_square), Some(floating), Some(blocked)) = (
+            self.chi_square,
+            self.floating_fraction,
+            self.blocked_fraction,
+        ) {
+            writeln!(
+                f,
+                "shift          {chi_square:.2} of what is expected, squared; {:.0} % floating, {:.0} % hidden",
+                100.0 * floating,
+                100.0 * blocked
+            )?;
+        }
+        for part in &self.unexplained {
+            let [x, y, z] = part.place_m;
+            let beside = match part.kind {
+                "beside" => format!(" by {:.2} m", part.beside_m),
+                _ => String::new(),
+            };
+            writeln!(
+                f,
+                "not explained  {}{beside} at {x:.2} {y:.2} {z:.2}: {} points",
+                part.kind, part.points
+            )?;
+        }
         for weak in &self.weak_directions {
             let [x, y, z] = weak.axis;
             let sigma = match weak.kind {

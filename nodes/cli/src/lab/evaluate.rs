@@ -52,6 +52,9 @@ pub struct Calibration {
     /// Trials of each cell
     #[arg(long, default_value_t = 30)]
     seeds: u64,
+    /// First of their seeds, to measure with others than before
+    #[arg(long, default_value_t = 0)]
+    first_seed: u64,
     /// Shares of the view that are labelled wrongly, object by object
     #[arg(long, value_delimiter = ',', default_values_t = Plan::default().flips)]
     flips: Vec<f64>,
@@ -163,6 +166,7 @@ impl Calibration {
     fn plan(&self) -> Plan {
         let plan = Plan {
             scenes: self.scenes.clone(),
+            first_seed: self.first_seed,
             seeds: self.seeds,
             flips: self.flips.clone(),
             starts: self.starts.clone(),

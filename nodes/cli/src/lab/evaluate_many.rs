@@ -20,6 +20,12 @@ pub struct Many {
     /// Seeds: trials of each kind
     #[arg(long, default_value_t = 30)]
     seeds: u64,
+    /// First of the seeds, to measure with others than before
+    #[arg(long, default_value_t = 0)]
+    first_seed: u64,
+    /// Only cases with this in their names, as in "wrong input/scaled" [default: all]
+    #[arg(long, default_value = "", hide_default_value = true)]
+    cases: String,
     /// Threads [default: as many as processors]
     #[arg(long)]
     threads: Option<usize>,
@@ -41,7 +47,8 @@ impl Many {
         let mut results = Results::open(&self.out, &settings_of::<C>())?;
         let bar = Remaining::new();
         let mut tell = |done: usize, total: usize| bar.tell(done, total);
-        let ran = run_cases::<C>(self.seeds, &mut results, threads, &mut tell);
+        let seeds = self.first_seed..self.first_seed.saturating_add(self.seeds);
+        let ran = run_cases::<C>(seeds, &self.cases, &mut results, threads, &mut tell);
         bar.done();
         ran?;
         Ok(results)

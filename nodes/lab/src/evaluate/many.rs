@@ -1,5 +1,6 @@
 //! Trials that have nothing in common but how they are run and kept.
 
+use std::ops::Range;
 use std::sync::mpsc;
 
 use rayon::prelude::*;
@@ -45,18 +46,26 @@ pub fn settings_of<C: Case>() -> Settings {
     }
 }
 
-/// Runs the trials of all cases with `seeds` seeds that the results do not have yet, seed by seed, on
-/// `threads` threads.
+/// Runs the trials of all cases whose names contain `part`, with each of `seeds`, that the results do not have
+/// yet, seed by seed, on `threads` threads.
 ///
 /// `progress` hears of trials done, of all that are left.
+///
+/// # Errors
+/// If no case has such a name, or a trial or its result fails.
 pub fn run_cases<C: Case>(
-    seeds: u64,
+    seeds: Range<u64>,
+    part: &str,
     results: &mut Results,
     threads: usize,
     progress: &mut dyn FnMut(usize, usize),
 ) -> Result<(), AnyError> {
-    let (done, cases) = (results.done(), C::all());
-    let trials = (0..seeds).flat_map(|seed| cases.iter().map(move |case| (case.cell(seed), *case)));
+    let (done, mut cases) = (results.done(), C::all());
+    cases.retain(|case| case.name().contains(part));
+    if cases.is_empty() {
+        return Err(format!("no case has {part:?} in its name").into());
+    }
+    let trials = seeds.flat_map(|seed| cases.iter().map(move |case| (case.cell(seed), *case)));
     let left = trials.filter(|(cell, _)| !done.contains(&name(cell, OURS)));
     let left: Vec<(Cell, C)> = left.collect();
     let pool = pool(threads)?;

@@ -75,6 +75,16 @@ pub struct Judged {
     /// Scale of the points and its standard deviation.
     #[serde(default)]
     pub scale: Option<(f64, f64)>,
+    /// Log-likelihood by which the cloud fits better with that scale.
+    #[serde(default)]
+    pub scale_gain: Option<f64>,
+    /// Log-likelihood by which other axes or another unit are ahead.
+    #[serde(default)]
+    pub other_reading_ahead: Option<f64>,
+    /// Squared shift of regions over what is expected, shares of points that float and of lines of sight through
+    /// surfaces, and regions that are not explained.
+    #[serde(default)]
+    pub fit: Option<(f64, f64, f64, usize)>,
     pub inliers: f64,
     /// Normalised squared error of the stated covariance, 6 degrees of freedom; None without a covariance.
     pub nees: Option<f64>,
@@ -125,7 +135,7 @@ impl Trial {
     }
 
     pub fn with_judgement(self, calibration: &Calibration, truth: &Isometry3<f64>) -> Trial {
-        let margin = calibration.margin;
+        let (margin, fit) = (calibration.margin, &calibration.fit);
         Trial {
             judged: Some(Judged {
                 verdict: calibration.verdict.name().to_owned(),
@@ -138,6 +148,14 @@ impl Trial {
                 scale: calibration
                     .scale
                     .map(|s| (rounded(s.scale), rounded(s.sigma))),
+                scale_gain: calibration.scale.map(|s| rounded(s.gain)),
+                other_reading_ahead: calibration.other_reading_ahead.map(rounded),
+                fit: Some((
+                    rounded(fit.chi_square),
+                    rounded(fit.floating),
+                    rounded(fit.blocked),
+                    fit.unexplained.len(),
+                )),
                 inliers: rounded(calibration.inlier_fraction),
                 nees: nees(calibration, truth).map(rounded),
             }),

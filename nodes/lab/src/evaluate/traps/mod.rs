@@ -78,6 +78,27 @@ impl Case for Trap {
 #[cfg(test)]
 mod tests {
     use super::*;
+    use lattice_core::pose::Axes;
+
+    /// All of them were once OK, up to twelve metres off.
+    #[test]
+    fn faults_that_fit_elsewhere_too_are_named() {
+        let faults = [
+            (Fault::Scale(0.9), 0),
+            (Fault::Scale(0.8), 1),
+            (Fault::Scale(0.95), 2),
+            (Fault::Scale(1.05), 2),
+            (Fault::Axes(Axes::UnityRuf, Axes::WinrtRub), 3),
+            (Fault::Axes(Axes::WinrtRub, Axes::UnityRuf), 3),
+        ];
+        for (fault, seed) in faults {
+            let trap = Trap(Kind::Fault(fault));
+            let trial = trap.run(&trap.cell(seed)).unwrap();
+            let reason = &trial.judged.as_ref().unwrap().reason;
+            assert!(!trial.is_accepted(), "{fault:?}: {reason}");
+            assert!(fault.is_named_by(reason), "{fault:?}: {reason}");
+        }
+    }
 
     #[test]
     fn a_trap_is_the_same_each_time_and_its_reason_is_told() {

@@ -1,0 +1,287 @@
+//! Fit of a cloud at a pose as such, whatever other poses do: the regions of it that the map explains, and the places
+//! of those that it does not.
+
+use std::collections::BTreeMap;
+
+use nalgebra::{Isometry3, Matrix3, Point3, Vector3};
+
+use super::super::likelihood::region_of;
+use super::candidates::Workbench;
+use super::rays::crossing_m;
+
+/// Fewest points of a region that says anything.
+const MIN_POINTS: usize = 8;
+/// Standard deviations by which a region lies beside the surfaces of the map.
+const BESIDE: f64 = 3.0;
+/// Share of the points of a region in one direction that hold it there.
+const HELD: f64 = 0.1;
+/// Share of the points of a region that something must be true of for it to be true of the region.
+const MOST: f64 = 0.5;
+/// Regions that are listed, at most.
+const LISTED: usize = 16;
+/// Distance of a surface from a point by which it is another, in cells.
+const CLEAR: f64 = 5.0;
+/// Longest way behind a point on which a surface of the map is looked for, metres.
+const BEHIND_M: f64 = 10.0;
+
+/// Fit of a cloud to a map as such, part by part.
+#[derive(Clone, PartialEq, Debug, Default)]
+pub struct AbsoluteFit {
+    /// Squared shift of the regions against the map, in variances that sensor and cells explain, mean over all
+    /// directions that are held: about 1 or less where nothing else is at work.
+    pub chi_square: f64,
+    /// Share of the points that float before a surface of the map, with nothing of the map where they are; 0 if the
+    /// place of the sensor is not known.
+    pub floating: f64,
+    /// Share of the lines of sight that go through a surface of the map.
+    pub blocked: f64,
+    /// Regions that are not explained, those with the most points first; at most 16.
+    pub unexplained: Vec<Unexplained>,
+}
+
+impl AbsoluteFit {
+    /// The regions that are not explained, in words; None if all are.
+    pub(super) fn in_words(&self) -> Option<String> {
+        let first = self.unexplained.first()?;
+        let [x, y, z] = [first.place_m.x, first.place_m.y, first.place_m.z];
+        let regions = match self.unexplained.len() {
+            1 => "1 region is".to_owned(),
+            LISTED => format!("{LISTED} regions and more are"),
+            n => format!("{n} regions are"),
+        };
+        let kind = first.kind.name();
+        Some(format!(
+            "{regions} not explained by the map, the largest ({kind}) at ({x:.1}, {y:.1}, {z:.1})"
+        ))
+    }
+}
+
+/// A region of a cloud that the map does not explain.
+#[derive(Clone, Copy, PartialEq, Debug)]
+pub struct Unexplained {
+    /// What is wrong with it.
+    pub kind: UnexplainedKind,
+    /// Midst of its points, in the map, metres.
+    pub place_m: Point3<f64>,
+    /// Its points, of those that were registered.
+    pub points: usize,
+    /// Distance from the surfaces of the map, metres; 0 where there are none.
+    pub beside_m: f64,
+}
+
+/// Kind of a region that is not explained.
+#[derive(Clone, Copy, PartialEq, Eq, Debug)]
+pub enum UnexplainedKind {
+    /// The map has no surface there, and none behind it.
+    Missing,
+    /// The map has no surface there, but one behind it: something new, or the wrong place.
+    Floating,
+    /// It lies beside a surface of the map.
+    Beside,
+    /// It was seen through a surface of the map: something is gone, or it is the wrong place.
+    Hidden,
+}
+
+impl UnexplainedKind {
+    /// Name in answers.
+    pub fn name(self) -> &'static str {
+        match self {
+            UnexplainedKind::Missing => "missing",
+            UnexplainedKind::Floating => "floating",
+            UnexplainedKind::Beside => "beside",
+            UnexplainedKind::Hidden => "hidden",
+        }
+    }
+}
+
+/// Points of a region, and what they say.
+#[derive(Default)]
+struct Region {
+    points: usize,
+    sum_m: Vector3<f64>,
+    /// Points with a surface of the map near them, and the sums over them that a shift follows from.
+    near: usize,
+    normals: Matrix3<f64>,
+    pull_m: Vector3<f64>,
+    /// Points that were looked at from the sensor, those that float, and those behind a surface.
+    looked_at: usize,
+    floating: usize,
+    hidden: usize,
+}
+
+/// Shift of a region along a direction in which it is held.
+#[derive(Clone, Copy)]
+struct Shift {
+    meters: f64,
+    sigmas: f64,
+}
+
+/// Judges a pose by itself.
+pub(super) fn absolute_fit(bench: &Workbench<'_>, pose: &Isometry3<f64>) -> AbsoluteFit {
+    let regions = regions(bench, pose);
+    let scale = bench.map.scale(bench.options.noise_m);
+    let sigmas_m = (bench.options.noise_m, scale.normal_m);
+    let (mut chi_square, mut held) = (0.0, 0_u32);
+    let mut unexplained = Vec::new();
+    for region in regions.values().filter(|r| r.points >= MIN_POINTS) {
+        let shifts = region.shifts(sigmas_m);
+        chi_square += shifts.iter().map(|s| s.sigmas.powi(2)).sum::<f64>();
+        held += shifts.len() as u32;
+        unexplained.extend(region.unexplained(&shifts));
+    }
+    unexplained.sort_by_key(|region| std::cmp::Reverse(region.points));
+    unexplained.truncate(LISTED);
+    let sum = |of: fn(&Region) -> usize| regions.values().map(of).sum::<usize>() as f64;
+    let looked_at = sum(|r| r.looked_at).max(1.0);
+    AbsoluteFit {
+        chi_square: chi_square / f64::from(held.max(1)),
+        floating: sum(|r| r.floating) / looked_at,
+        blocked: sum(|r| r.hidden) / looked_at,
+        unexplained,
+    }
+}
+
+/// The regions that err together, in the order of their places in the cloud.
+fn regions(bench: &Workbench<'_>, pose: &Isometry3<f64>) -> BTreeMap<[i64; 3], Region> {
+    let (map, side_m) = (&bench.map.cloud, bench.options.region_m);
+    let gate_m = bench.map.scale(bench.options.noise_m).gate_m();
+    let mut regions: BTreeMap<[i64; 3], Region> = BTreeMap::new();
+    for point in bench.input.full.points_m() {
+        let place = pose * point;
+        let region = regions.entry(region_of(point, side_m)).or_default();
+        region.points += 1;
+        region.sum_m += place.coords;
+        let near = map.nearest(&place, gate_m);
+        let near = near.and_then(|(j, _)| map.points_m().get(j).zip(map.normals().get(j)));
+        if let Some((q, n)) = near {
+            region.near += 1;
+            region.normals += n * n.transpose();
+            region.pull_m += n * n.dot(&(place - q));
+        }
+    }
+    let Some(sensor_m) = bench.input.sensor_m else {
+        return regions;
+    };
+    let (from, occupied) = (pose * sensor_m, &bench.map.occupied);
+    let clear_m = CLEAR * bench.map.spacing_m;
+    for point in bench.input.few.points_m() {
+        let region = regions.entry(region_of(point, side_m)).or_default();
+        let place = pose * point;
+        let length = nalgebra::distance(&from, &place);
+        if length < 3.0 * clear_m {
+            continue;
+        }
+        let direction = (place - from) / length;
+        let crosses = |way| crossing_m(occupied, &from, &direction, way).is_some();
+        region.looked_at += 1;
+        if crosses(clear_m..length - clear_m) {
+            region.hidden += 1;
+        } else if map.nearest(&place, clear_m).is_none()
+            && crosses(length + clear_m..length + BEHIND_M)
+        {
+            region.floating += 1;
+        }
+    }
+    regions
+}
+
+impl Region {
+    /// Shifts against the map, given the standard deviations of a region's place and of a point's, metres.
+    fn shifts(&self, (of_region_m, of_point_m): (f64, f64)) -> Vec<Shift> {
+        let eigen = self.normals.symmetric_eigen();
+        let directions = eigen
+            .eigenvalues
+            .iter()
+            .zip(eigen.eigenvectors.column_iter());
+        let held = directions.filter(|(held, _)| **held > HELD * self.points as f64);
+        let shift = |(held, axis): (&f64, _)| {
+            let meters = self.pull_m.dot(&axis) / held;
+            let sigma_m = of_region_m.hypot(of_point_m / held.sqrt());
+            Shift {
+                meters: meters.abs(),
+                sigmas: meters.abs() / sigma_m,
+            }
+        };
+        held.map(shift).collect()
+    }
+
+    fn unexplained(&self, shifts: &[Shift]) -> Option<Unexplained> {
+        let most = |n: usize, of: usize| n as f64 > MOST * of as f64;
+        let beside = shifts.iter().filter(|s| s.sigmas > BESIDE);
+        let beside_m = beside.map(|s| s.meters).reduce(f64::max);
+        let kind = if most(self.hidden, self.looked_at) {
+            UnexplainedKind::Hidden
+        } else if !most(self.near, self.points) {
+            match most(2 * self.floating, self.looked_at) {
+                true => UnexplainedKind::Floating,
+                false => UnexplainedKind::Missing,
+            }
+        } else if beside_m.is_some() {
+            UnexplainedKind::Beside
+        } else {
+            return None;
+        };
+        Some(Unexplained {
+            kind,
+            place_m: (self.sum_m / self.points.max(1) as f64).into(),
+            points: self.points,
+            beside_m: match kind {
+                UnexplainedKind::Beside => beside_m.unwrap_or_default(),
+                _ => 0.0,
+            },
+        })
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    /// A region of `n` points of a wall, `near` of them within reach of it and `off_m` beside it.
+    fn region(n: usize, near: usize, off_m: f64) -> Region {
+        let normal = Vector3::x();
+        Region {
+            points: n,
+            sum_m: Vector3::new(2.0, 1.0, 0.5) * n as f64,
+            near,
+            normals: normal * normal.transpose() * near as f64,
+            pull_m: normal * off_m * near as f64,
+            looked_at: n,
+            ..Region::default()
+        }
+    }
+
+    fn kind(region: &Region) -> Option<UnexplainedKind> {
+        let shifts = region.shifts((0.02, 0.02));
+        region.unexplained(&shifts).map(|found| found.kind)
+    }
+
+    #[test]
+    fn a_region_is_unexplained_for_what_is_wrong_with_it() {
+        assert_eq!(kind(&region(40, 40, 0.01)), None);
+        assert_eq!(kind(&region(40, 40, -0.1)), Some(UnexplainedKind::Beside));
+        assert_eq!(kind(&region(40, 10, 0.0)), Some(UnexplainedKind::Missing));
+        let floating = Region {
+            floating: 30,
+            ..region(40, 10, 0.0)
+        };
+        assert_eq!(kind(&floating), Some(UnexplainedKind::Floating));
+        let hidden = Region {
+            hidden: 30,
+            ..region(40, 40, 0.0)
+        };
+        assert_eq!(kind(&hidden), Some(UnexplainedKind::Hidden));
+        let beside = region(40, 40, -0.1);
+        let found = beside.unexplained(&beside.shifts((0.02, 0.02))).unwrap();
+        assert!((found.beside_m - 0.1).abs() < 1e-9 && found.points == 40);
+        assert!((found.place_m - Point3::new(2.0, 1.0, 0.5)).norm() < 1e-9);
+    }
+
+    #[test]
+    fn a_wall_holds_a_region_across_it_only() {
+        let shifts = region(100, 100, 0.04).shifts((0.02, 0.02));
+        assert_eq!(shifts.len(), 1);
+        // A region errs by 2 cm as a whole, however many points it has.
+        assert!((shifts[0].sigmas - 2.0).abs() < 0.02);
+    }
+}
