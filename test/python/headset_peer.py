@@ -18,10 +18,10 @@ FRAME, SECOND_NS = "headset_origin", 10**9
 # Numbers of an array in a chunk: 48 kB.
 CHUNK = 12_000
 CLOUD = {
-    "names": ["x", "y", "z", "label", "confidence"],
-    "formats": ["<f4", "<f4", "<f4", "<u2", "<f4"],
-    "offsets": [0, 4, 8, 12, 14],
-    "itemsize": 18,
+    "names": ["x", "y", "z", "label", "confidence", "vp_x", "vp_y", "vp_z"],
+    "formats": ["<f4", "<f4", "<f4", "<u2", "<f4", "<f4", "<f4", "<f4"],
+    "offsets": [0, 4, 8, 12, 14, 18, 22, 26],
+    "itemsize": 30,
 }
 
 
@@ -117,7 +117,14 @@ class Headset:
         wrong = int((rows["label"] != (column > CX)).sum())
         far, counts = np.unique(np.round(x, 4), return_counts=True)
         found = {f"{m:g}": int(n) for m, n in zip(far, counts)}
-        return {"frame": cloud.header.frame_id, "at_m": found, "off_px": off_px, "wrong": wrong}
+        viewpoint_m = [float(np.abs(rows[name]).max()) for name in ("vp_x", "vp_y", "vp_z")]
+        return {
+            "frame": cloud.header.frame_id,
+            "at_m": found,
+            "off_px": off_px,
+            "wrong": wrong,
+            "viewpoint_m": viewpoint_m,
+        }
 
 
 def run(scenario):

@@ -119,6 +119,7 @@ impl PixelReader<'_> {
     pub fn layout(&self, classes: &Classes) -> PointLayout {
         PointLayout {
             has_color: self.colors.is_some(),
+            viewpoint_m: None,
             classes: self.soft.map_or(0, |soft| soft.elements(classes)),
         }
     }

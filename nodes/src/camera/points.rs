@@ -7,23 +7,27 @@ use lattice_msgs::std_msgs::Header;
 use super::labels::Classes;
 use super::pixels::Pixel;
 use crate::convert::cloud::{dense_cloud, field, xyz_fields};
+use crate::convert::viewpoint::VIEWPOINT_FIELDS;
 
 /// Most bytes of a cloud with probabilities; a larger one has none.
 const MAX_BYTES: usize = 32 << 20;
 
 /// Fields of a cloud beside x, y, z, label and confidence.
-#[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
+#[derive(Clone, Copy, Debug, Default, PartialEq)]
 pub struct PointLayout {
     /// True with the field `rgb`.
     pub has_color: bool,
+    /// Place of the camera in the frame of the cloud, m: in the fields `vp_x`, `vp_y`, `vp_z` of each point.
+    pub viewpoint_m: Option<[f32; 3]>,
     /// Elements of the field `label_probs`; 0: there is none.
     pub classes: usize,
 }
 
 impl PointLayout {
-    /// Bytes of a point: x, y, z, rgb, confidence and probabilities in four bytes each, label in two.
+    /// Bytes of a point: x, y, z, rgb, confidence, viewpoint and probabilities in four bytes each, label in two.
     fn step(self) -> usize {
-        18 + 4 * (usize::from(self.has_color) + self.classes)
+        let viewpoint = 3 * usize::from(self.viewpoint_m.is_some());
+        18 + 4 * (usize::from(self.has_color) + viewpoint + self.classes)
     }
 
     /// The same without probabilities if so many points would need too much room.
@@ -72,6 +76,9 @@ impl LabelledPoints {
         let label = class.unwrap_or(UNLABELED);
         self.data.extend_from_slice(&label.to_le_bytes());
         self.data.extend_from_slice(&confidence.to_le_bytes());
+        for v in self.layout.viewpoint_m.iter().flatten() {
+            self.data.extend_from_slice(&v.to_le_bytes());
+        }
         let begin = self.data.len();
         self.data.resize(begin + 4 * self.layout.classes, 0);
         let (elements, _) = self.data[begin..].as_chunks_mut::<4>();
@@ -105,8 +112,8 @@ impl LabelledPoints {
         self.points == 0
     }
 
-    /// The cloud with the fields x, y, z, rgb if there are colours, label, confidence and label_probs if there
-    /// are probabilities.
+    /// The cloud with the fields x, y, z, rgb if there are colours, label, confidence, vp_x, vp_y, vp_z if there
+    /// is a viewpoint, and label_probs if there are probabilities.
     pub fn cloud(self, header: Header) -> PointCloud2 {
         let mut fields = xyz_fields(PointField::FLOAT32, 4);
         let mut at = 12;
@@ -116,10 +123,17 @@ impl LabelledPoints {
         }
         fields.push(field("label", at, PointField::UINT16));
         fields.push(field("confidence", at + 2, PointField::FLOAT32));
+        at += 6;
+        if self.layout.viewpoint_m.is_some() {
+            for name in VIEWPOINT_FIELDS {
+                fields.push(field(name, at, PointField::FLOAT32));
+                at += 4;
+            }
+        }
         if let Some(count) = u32::try_from(self.layout.classes).ok().filter(|n| *n > 0) {
             fields.push(PointField {
                 count,
-                ..field("label_probs", at + 6, PointField::FLOAT32)
+                ..field("label_probs", at, PointField::FLOAT32)
             });
         }
         let step = self.layout.step() as u32;
@@ -133,7 +147,10 @@ mod tests {
     use crate::camera::soft::Share;
     use crate::camera::{ClassRules, SoftLabels};
     use crate::convert::semantic::{SemanticOptions, semantic_from_message};
+    use crate::convert::viewpoint::viewpoints_from_message;
+    use lattice_core::cloud::CloudLimits;
     use lattice_core::registration::LabelDistribution;
+    use nalgebra::Vector3;
 
     fn pixel(number: u16, shares: &[(u16, f32)]) -> Pixel {
         let mut pixel = Pixel {
@@ -159,6 +176,7 @@ mod tests {
         let soft = SoftLabels::none(5);
         let layout = PointLayout {
             has_color: true,
+            viewpoint_m: Some([7.0, 8.0, 9.0]),
             classes: soft.elements(&classes),
         };
         assert_eq!(layout.classes, 3, "4 is ignored and 3 counts as 1");
@@ -168,7 +186,12 @@ mod tests {
         points.push([4.0, 5.0, 6.0], &pixel(4, &shares), &classes);
         assert_eq!((points.len(), points.unlabelled()), (2, 1));
         let cloud = points.cloud(Header::default());
-        assert_eq!(cloud.point_step, 34);
+        assert_eq!(cloud.point_step, 46);
+        let viewpoints = viewpoints_from_message(&cloud, &CloudLimits::default());
+        assert_eq!(
+            viewpoints.unwrap(),
+            Some(vec![Vector3::new(7.0, 8.0, 9.0); 2])
+        );
         assert_eq!(cloud.data[12..16], [3, 2, 1, 0]);
         let (read, _) = semantic_from_message(&cloud, &SemanticOptions::default()).unwrap();
         let found: Vec<_> = read.label(0).iter().collect();
@@ -183,8 +206,8 @@ mod tests {
     #[test]
     fn clouds_that_would_be_too_large_have_no_probabilities() {
         let layout = PointLayout {
-            has_color: false,
             classes: 150,
+            ..PointLayout::default()
         };
         assert_eq!(layout.bounded(50_000), layout);
         assert_eq!(layout.bounded(60_000).classes, 0);

@@ -47,3 +47,58 @@ pub fn viewpoints_from_message(
     let at = |i| Vector3::new(view.scalar(x, i), view.scalar(y, i), view.scalar(z, i));
     Ok(Some((0..view.len()).map(at).collect()))
 }
+
+/// The one viewpoint of all points of a cloud, in its frame; `None` if it is not known, or moved by more than
+/// `max_moved_m` from that of the first point.
+pub fn viewpoint_from_message(
+    cloud: &PointCloud2,
+    limits: &CloudLimits,
+    max_moved_m: f64,
+) -> Result<Option<Vector3<f64>>, CloudError> {
+    let all = viewpoints_from_message(cloud, limits)?.unwrap_or_default();
+    // A distance from NaN is below no limit.
+    let Some(first) = all.first() else {
+        return Ok(None);
+    };
+    let still = all.iter().all(|v| (v - first).norm() <= max_moved_m);
+    Ok(still.then_some(*first))
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::convert::cloud::{dense_cloud, field, xyz_fields};
+    use lattice_msgs::std_msgs::Header;
+
+    fn cloud(names: [&str; 3], viewpoints: &[[f32; 3]]) -> PointCloud2 {
+        let float = sensor_msgs::PointField::FLOAT32;
+        let mut fields = xyz_fields(float, 4);
+        fields.extend(
+            [12, 16, 20]
+                .into_iter()
+                .zip(names)
+                .map(|(at, name)| field(name, at, float)),
+        );
+        let point = |v: &[f32; 3]| [1.0, 2.0, 3.0, v[0], v[1], v[2]].map(f32::to_le_bytes);
+        let data: Vec<u8> = viewpoints.iter().flat_map(point).flatten().collect();
+        dense_cloud(Header::default(), fields, 24, viewpoints.len(), data)
+    }
+
+    #[test]
+    fn a_sensor_that_stood_still_has_one_viewpoint() {
+        let limits = CloudLimits::default();
+        let one = |names, viewpoints: &[[f32; 3]]| {
+            viewpoint_from_message(&cloud(names, viewpoints), &limits, 0.1).unwrap()
+        };
+        let here = [4.0, 5.0, 6.0];
+        let near = [4.0, 5.0, 6.05];
+        let away = [4.0, 5.0, 6.5];
+        let expected = Some(Vector3::new(4.0, 5.0, 6.0));
+        assert_eq!(one(VIEWPOINT_FIELDS, &[here, near]), expected);
+        assert_eq!(one(VIEWPOINT_FIELDS, &[here, near, away]), None);
+        assert_eq!(one(VIEWPOINT_FIELDS, &[here, [f32::NAN; 3]]), None);
+        assert_eq!(one(VIEWPOINT_FIELDS, &[[f32::INFINITY; 3]; 2]), None);
+        assert_eq!(one(VIEWPOINT_FIELDS, &[]), None);
+        assert_eq!(one(["vp_x", "vp_y", "nx"], &[here]), None);
+    }
+}

@@ -75,7 +75,11 @@ impl Room {
         let stride = options.stride.max(1);
         let (origin_m, ros_from_optical) = &look.camera;
         let most = width.div_ceil(stride) * height.div_ceil(stride);
-        let layout = look.pixels.layout(classes).bounded(most);
+        let layout = PointLayout {
+            viewpoint_m: Some(origin_m.coords.map(|c| c as f32).into()),
+            ..look.pixels.layout(classes)
+        };
+        let layout = layout.bounded(most);
         let (mut points, mut new) = (LabelledPoints::new(layout, 0), LookCounts::default());
         let (mut hits, mut behind) = (0, 0);
         for row in (0..height).step_by(stride) {

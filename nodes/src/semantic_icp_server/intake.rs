@@ -5,7 +5,7 @@ use lattice_msgs::sensor_msgs::PointCloud2;
 use thiserror::Error;
 
 use super::*;
-use crate::convert::semantic::{SemanticError, semantic_from_message};
+use crate::convert::semantic::{SemanticError, headset_scan_from_message};
 
 /// Error of a cloud that cannot be used.
 #[derive(Debug, Error)]
@@ -60,13 +60,10 @@ impl SemanticIcpServer {
                 expected: self.options.headset_frame.clone(),
             });
         }
-        let (cloud, report) = semantic_from_message(message, &self.options.semantic)?;
+        let (headset_scan, report) = headset_scan_from_message(message, &self.options.semantic)?;
         self.counts.points_not_finite += report.not_finite as u64;
         self.counts.points_too_far += report.too_far as u64;
-        Ok(HeadsetScan {
-            cloud,
-            sensor_m: None,
-        })
+        Ok(headset_scan)
     }
 
     fn count(&mut self, refusal: &Refusal) {

@@ -202,12 +202,20 @@ fn a_cyclone_peer_feeds_the_nodes_and_rebuilds_the_map() {
     assert_eq!(found["wrong_triangles"], 0);
     assert!(found["map_chunks"].as_u64() > Some(1), "{found}");
     assert!(found["triangles"].as_u64() > Some(10_000), "{found}");
-    assert!(found["generator_error_m"].as_f64() < Some(1e-12), "{found}");
+    assert!(
+        found["generator_error_m"]
+            .as_f64()
+            .is_some_and(|m| m < 1e-12),
+        "{found}"
+    );
     // Single precision, up to 32 m from the datum.
     let off_m = found["centers_off_lattice_m"].as_f64();
-    assert!(off_m < Some(2e-6), "{off_m:?}");
+    assert!(off_m.is_some_and(|m| m < 2e-6), "{off_m:?}");
     // A border takes a point in ten thousand: the comparison leaves out next to nothing.
-    assert!(found["on_borders"].as_u64() < Some(200), "{found}");
+    assert!(
+        found["on_borders"].as_u64().is_some_and(|n| n < 200),
+        "{found}"
+    );
 
     let transformer: TransformerReport = report::read(&path.join("enu_transformer")).unwrap();
     let (counts, dropped) = (&transformer.counts, transformer.dropped());
@@ -235,7 +243,10 @@ fn a_cyclone_peer_hears_transforms_and_diagnostics_and_calls_a_service() {
 
     assert_eq!(found["replies"], json!([[true, true, true]]), "{found}");
     assert_eq!(found["reply"], "keyframe follows");
-    assert!(found["tf_error"].as_f64() < Some(1e-12), "{found}");
+    assert!(
+        found["tf_error"].as_f64().is_some_and(|e| e < 1e-12),
+        "{found}"
+    );
     let tasks = found["tasks"].as_array().unwrap();
     for task in ["enu_transformer: clouds", "lattice_mapper: map"] {
         assert!(tasks.contains(&json!(task)), "{tasks:?}");

@@ -38,7 +38,11 @@ fn a_cyclone_headset_sees_its_mesh_until_that_is_replaced() {
         let look = &found["looks"][look];
         assert_eq!(look["frame"], "headset_origin");
         assert_eq!(look["wrong"], 0);
-        assert!(look["off_px"].as_f64() < Some(0.01), "{look}");
+        assert!(
+            look["off_px"].as_f64().is_some_and(|px| px < 0.01),
+            "{look}"
+        );
+        assert_eq!(look["viewpoint_m"], json!([0.0, 0.0, 0.0]));
         let count = |at_m: &str| look["at_m"][at_m].as_u64().unwrap_or(0);
         assert_eq!(count(at_m) + count("2"), all, "{look}");
     }

@@ -49,7 +49,10 @@ fn a_cyclone_camera_and_segmenter_make_a_map_with_labels() {
     assert_eq!(found["clouds"], 12);
     assert_eq!(found["expected"], 12);
     assert_eq!(found["frame"], "camera");
-    assert!(found["excess_m"].as_f64() < Some(0.0), "{found}");
+    assert!(
+        found["excess_m"].as_f64().is_some_and(|m| m < 0.0),
+        "{found}"
+    );
     assert_eq!(found["wrong_labels"], 0);
     assert!(found["fewest_points"].as_u64() > Some(17_000), "{found}");
     let names = json!([[0, "void"], [1, "floor"], [2, "wall"], [3, "panel"]]);
@@ -63,7 +66,10 @@ fn a_cyclone_camera_and_segmenter_make_a_map_with_labels() {
     let centers = &found["centers"];
     assert_eq!(centers["frame"], "map");
     // Half the width of a cell of 5 cm, and some.
-    assert!(centers["farthest_m"].as_f64() < Some(0.05), "{centers}");
+    assert!(
+        centers["farthest_m"].as_f64().is_some_and(|m| m < 0.05),
+        "{centers}"
+    );
     for label in ["1", "2", "3"] {
         assert!(centers["voxels"][label].as_u64() > Some(100), "{centers}");
     }

@@ -33,7 +33,7 @@ pub struct Chain {
     #[arg(long, default_value_t = 192)]
     views: usize,
     /// Pictures that the headset takes at a scene, 1 to 6: of the thing itself, then to its sides
-    #[arg(long, default_value_t = 1)]
+    #[arg(long, default_value_t = 3)]
     looks: usize,
     /// Trials at once [default: as many as processors]
     #[arg(long)]

@@ -11,11 +11,15 @@ pub use options::{Color, LabelOptions, SemanticOptions, palette_from_params};
 pub use write::{color_of, message_from_semantic};
 
 use lattice_core::cloud::{CloudError, CloudLimits};
-use lattice_core::registration::{LabelDistribution, SemanticCloud};
+use lattice_core::registration::{HeadsetScan, LabelDistribution, SemanticCloud};
 use lattice_msgs::sensor_msgs::PointCloud2;
 use thiserror::Error;
 
 use super::cloud;
+use super::viewpoint::viewpoint_from_message;
+
+/// Way of a sensor during a cloud that still has one viewpoint, m.
+const MAX_MOVED_M: f64 = 0.1;
 
 /// Error of a cloud that cannot be used.
 #[derive(Debug, Error)]
@@ -127,6 +131,20 @@ pub fn semantic_from_message(
         semantic.labels.clear();
     }
     Ok((semantic, report))
+}
+
+/// Reads a cloud of a headset as [`semantic_from_message`] does, and from where it was seen.
+pub fn headset_scan_from_message(
+    message: &PointCloud2,
+    options: &SemanticOptions,
+) -> Result<(HeadsetScan, SemanticReport), SemanticError> {
+    let (cloud, report) = semantic_from_message(message, options)?;
+    let limits = CloudLimits {
+        max_points: options.max_points,
+    };
+    let viewpoint_m = viewpoint_from_message(message, &limits, MAX_MOVED_M)?;
+    let sensor_m = viewpoint_m.map(|v| options.axes.to_ros(v).into());
+    Ok((HeadsetScan { cloud, sensor_m }, report))
 }
 
 /// The most probable class of each point of a message, in its order, NaN points included; `None` if

@@ -14,7 +14,7 @@ use lattice_lab::simulate::house::{HeadsetTrial, House, HouseScan, Scene};
 use lattice_nodes::headset_cloud::{HeadsetCloud, HeadsetStream};
 use nalgebra::{Isometry3, Point3};
 
-use self::scene::{camera_info, chunks, image, options, points, pose, pose_in};
+use self::scene::{camera_info, chunks, image, options, points, pose, pose_in, viewpoint_m};
 
 /// Pixel of a point, by its camera with x forward.
 fn pixel(camera: &Isometry3<f64>, point_m: &Point3<f64>) -> usize {
@@ -70,7 +70,10 @@ fn the_simulated_headsets_points_come_from_its_mesh_in_all_axes() {
                 let there = pose_in(axes, own, camera);
                 machine.on_pose(&pose(stamp_ns, there));
                 let image = image(stamp_ns, width, &labels);
-                let found = points(&machine.on_image(HeadsetStream::Labels, image));
+                let outputs = machine.on_image(HeadsetStream::Labels, image);
+                let from_m = viewpoint_m(&outputs).unwrap();
+                assert!((from_m - camera.translation.vector).norm() < 1e-5);
+                let found = points(&outputs);
                 let mut missed = truth.len().abs_diff(found.len());
                 for (point_m, label) in &found {
                     let at = pixel(camera, point_m);

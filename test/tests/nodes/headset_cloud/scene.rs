@@ -9,6 +9,7 @@ use lattice_msgs::geometry_msgs::{Point, Pose, PoseStamped, Quaternion};
 use lattice_msgs::headset::HeadsetMesh;
 use lattice_msgs::sensor_msgs::{CameraInfo, Image};
 use lattice_nodes::convert::geometry::header;
+use lattice_nodes::convert::semantic::{SemanticOptions, headset_scan_from_message};
 use lattice_nodes::headset_cloud::{HeadsetCloud, HeadsetOptions, HeadsetOutput, HeadsetStream};
 use lattice_runtime::params::{ParamValue, Params};
 use nalgebra::{Isometry3, Matrix3, Point3, Rotation3, UnitQuaternion, Vector3};
@@ -136,6 +137,15 @@ pub fn points(outputs: &[HeadsetOutput]) -> Vec<(Point3<f64>, u16)> {
         }
     }
     found
+}
+
+/// Place of the camera as the server reads it from the one cloud of some outputs.
+pub fn viewpoint_m(outputs: &[HeadsetOutput]) -> Option<Vector3<f64>> {
+    let [HeadsetOutput::Points(cloud)] = outputs else {
+        panic!("{outputs:?}");
+    };
+    let read = headset_scan_from_message(cloud, &SemanticOptions::default());
+    Some(read.unwrap().0.sensor_m?.coords)
 }
 
 /// A square of 2 m before the camera, 3 m away, that looks back; the camera is the origin.

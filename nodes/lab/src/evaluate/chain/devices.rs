@@ -4,13 +4,13 @@ use std::sync::{Arc, Mutex, PoisonError};
 
 use lattice_core::cloud::Cloud;
 use lattice_core::lattice::Lattice;
-use lattice_core::registration::{HeadsetScan, SemanticCloud, UNLABELED};
+use lattice_core::registration::{HeadsetScan, LabelDistribution, SemanticCloud, UNLABELED};
 use lattice_core::voxels::{Payload, VoxelList};
 use lattice_msgs::geometry_msgs::PoseStamped;
 use lattice_msgs::headset::HeadsetMesh;
 use lattice_msgs::sensor_msgs::{Image, PointCloud2};
 use lattice_nodes::convert::geometry::{header, pose_from};
-use lattice_nodes::convert::semantic::{SemanticOptions, semantic_from_message};
+use lattice_nodes::convert::semantic::{SemanticOptions, headset_scan_from_message};
 use lattice_nodes::headset_cloud::{HeadsetCloud, HeadsetOptions, HeadsetOutput, HeadsetStream};
 use lattice_nodes::segmenter::{Labelled, Segmenter};
 use lattice_nodes::semantic_cloud::{
@@ -109,7 +109,7 @@ impl Mapper {
             let problem = self.machine.problem().unwrap_or("no partner");
             format!("semantic_cloud made no points: {problem}")
         })?;
-        let Some(cloud) = points(cloud)? else {
+        let Some(HeadsetScan { cloud, .. }) = points(cloud)? else {
             // A wall too near to be seen.
             return Ok(());
         };
@@ -149,17 +149,9 @@ pub(super) fn headset_scan(
     scan: &HouseScan,
 ) -> Result<Both<HeadsetScan>, AnyError> {
     let found = labelled(segmenter, image, PERIOD_NS)?;
-    let seen = |labels: Image, confidence: Option<Image>| -> Result<HeadsetScan, AnyError> {
-        let cloud = look(chunks, scan, labels, confidence)?;
-        Ok(HeadsetScan {
-            cloud,
-            // As `semantic_icp_server` has it, which only gets the points.
-            sensor_m: None,
-        })
-    };
     Ok(Both {
-        found: seen(found.labels, found.confidence)?,
-        truth: seen(true_labels(image, PERIOD_NS), None)?,
+        found: look(chunks, scan, found.labels, found.confidence)?,
+        truth: look(chunks, scan, true_labels(image, PERIOD_NS), None)?,
     })
 }
 
@@ -168,7 +160,7 @@ fn look(
     scan: &HouseScan,
     labels: Image,
     confidence: Option<Image>,
-) -> Result<SemanticCloud, AnyError> {
+) -> Result<HeadsetScan, AnyError> {
     let mut options = HeadsetOptions::from_params(&Params::default())?;
     options.look.stride = 1;
     options.use_confidence = confidence.is_some();
@@ -226,17 +218,16 @@ fn mesh_chunks(mesh: &LabelledMesh, headset_from_mesh: &Isometry3<f64>) -> Vec<A
     (0..chunks).map(|i| Arc::new(chunk(i))).collect()
 }
 
-/// Points and labels of a cloud as `semantic_icp_server` reads them; none of an empty one.
-fn points(cloud: &PointCloud2) -> Result<Option<SemanticCloud>, AnyError> {
+/// Points, labels and viewpoint of a cloud as `semantic_icp_server` reads them; none of an empty one.
+fn points(cloud: &PointCloud2) -> Result<Option<HeadsetScan>, AnyError> {
     if cloud.width == 0 || cloud.height == 0 {
         return Ok(None);
     }
-    let (mut cloud, _) = semantic_from_message(cloud, &SemanticOptions::default())?;
-    if cloud.labels.is_empty() {
-        let none = lattice_core::registration::LabelDistribution::UNKNOWN;
-        cloud.labels = vec![none; cloud.points_m.len()];
+    let (mut scan, _) = headset_scan_from_message(cloud, &SemanticOptions::default())?;
+    if scan.cloud.labels.is_empty() {
+        scan.cloud.labels = vec![LabelDistribution::UNKNOWN; scan.cloud.points_m.len()];
     }
-    Ok(Some(cloud))
+    Ok(Some(scan))
 }
 
 fn labelled(

@@ -8,7 +8,7 @@ mod report;
 
 pub use report::chain_report;
 
-use std::collections::HashSet;
+use std::collections::{BTreeSet, HashSet};
 use std::path::PathBuf;
 use std::sync::{Mutex, OnceLock, mpsc};
 
@@ -122,14 +122,19 @@ pub fn run_chain(
         .filter(|&(seed, scene)| !is_done(&done, seed, scene))
         .collect();
     let pool = pool(options.threads)?;
+    // Before the trials: a thread of the pool that waited in one for a survey could have begun that survey itself.
+    let numbers: BTreeSet<u64> = left.iter().map(|(seed, _)| seed % options.maps).collect();
+    pool.install(|| numbers.iter().try_for_each(|&n| chain.place(n).map(|_| ())))?;
     let (sender, receiver) = mpsc::channel();
     std::thread::scope(|scope| {
         let (left, chain) = (&left, &chain);
         scope.spawn(move || {
             pool.install(|| {
-                left.par_iter().with_max_len(1).for_each(|&(seed, scene)| {
-                    // The receiver is gone only after an error.
-                    let _ = sender.send(chain.trials(seed, scene));
+                // The receiver is gone only after an error: then no more trials begin.
+                let trials = left.par_iter().with_max_len(1);
+                let _ = trials.try_for_each(|&(seed, scene)| {
+                    let sent = sender.send(chain.trials(seed, scene));
+                    sent.map_err(drop)
                 });
             });
         });

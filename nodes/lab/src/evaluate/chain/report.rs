@@ -2,7 +2,8 @@
 
 use super::super::statistics::{Share, median};
 use super::super::trial::{OURS, Trial, WRONG};
-use super::{COMPETITOR, TRUE_LABELS, UNLABELLED};
+use super::{COMPETITOR, STARTS, TRUE_LABELS, UNLABELLED};
+use crate::evaluate::settings::Start;
 use crate::report::{Cell, Report, Section, Table};
 
 /// Goals: least share of OK, and most of OK that may be wrong, percent.
@@ -22,30 +23,29 @@ pub fn chain_report(trials: &[Trial]) -> Report {
 }
 
 fn methods(trials: &[Trial]) -> Section {
-    let rows = [
-        ("ours, labels of the network", OURS, "none"),
-        ("ours, without labels", UNLABELLED, "none"),
-        ("ours, true labels", TRUE_LABELS, "none"),
-        (
-            "GICP-SE(3), start 0.3 m and 10 degrees off",
-            COMPETITOR,
-            "0.3/10",
-        ),
-        (
-            "GICP-SE(3), start 0.8 m and 35 degrees off",
-            COMPETITOR,
-            "0.8/35",
-        ),
+    let ours = [
+        ("ours, labels of the network", OURS),
+        ("ours, without labels", UNLABELLED),
+        ("ours, true labels", TRUE_LABELS),
     ];
-    let line = |(title, method, start): (&str, &str, &str)| -> Vec<Cell> {
+    let ours = ours.map(|(title, method)| (title.to_owned(), method, Start::None));
+    let others = STARTS.map(|start| {
+        let title = match start {
+            Start::Off { m, deg } => format!("GICP-SE(3), start {m} m and {deg} degrees off"),
+            Start::None => "GICP-SE(3), no start".to_owned(),
+        };
+        (title, COMPETITOR, start)
+    });
+    let line = |(title, method, start): (String, &str, Start)| -> Vec<Cell> {
+        let start = start.to_string();
         let of: Vec<&Trial> = (trials.iter())
             .filter(|t| t.method == method && t.cell.start == start)
             .collect();
-        let judged = method != COMPETITOR;
         let mut cells: Vec<Cell> = vec![title.into(), of.len().into()];
-        cells.extend(line_of(&of, judged));
+        cells.extend(line_of(&of, method != COMPETITOR));
         cells
     };
+    let rows = ours.into_iter().chain(others);
     let columns = "method|trials|right|OK|of the OK wrong|median error of the right (m)";
     let title = "What labels of the network are worth";
     Section {
