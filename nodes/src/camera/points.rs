@@ -61,28 +61,34 @@ impl LabelledPoints {
 
     /// Adds the point that a pixel sees; without a class its confidence and probabilities are 0.
     pub fn push(&mut self, point_m: [f32; 3], pixel: &Pixel, classes: &Classes) {
-        self.points += 1;
-        for v in point_m {
-            self.data.extend_from_slice(&v.to_le_bytes());
-        }
-        if self.layout.has_color {
-            // As PCL has it: the bytes of a whole number in place of a float.
-            let [r, g, b] = pixel.color;
-            self.data.extend_from_slice(&[b, g, r, 0]);
-        }
         let class = classes.known(pixel.number, pixel.confidence);
+        self.points += 1;
         self.unlabelled += u64::from(class.is_none());
-        let confidence = class.map_or(0.0, |_| pixel.confidence);
-        let label = class.unwrap_or(UNLABELED);
-        self.data.extend_from_slice(&label.to_le_bytes());
-        self.data.extend_from_slice(&confidence.to_le_bytes());
+        let label = class.unwrap_or(UNLABELED).to_le_bytes();
+        let confidence = class.map_or(0.0, |_| pixel.confidence).to_le_bytes();
+        let [x, y, z] = point_m.map(f32::to_le_bytes);
+        // As PCL has it: the bytes of a whole number in place of a float.
+        let [r, g, b] = pixel.color;
+        let record: &[&[u8]] = match self.layout.has_color {
+            true => &[&x, &y, &z, &[b, g, r, 0], &label, &confidence],
+            false => &[&x, &y, &z, &label, &confidence],
+        };
+        for part in record {
+            self.data.extend_from_slice(part);
+        }
         for v in self.layout.viewpoint_m.iter().flatten() {
             self.data.extend_from_slice(&v.to_le_bytes());
         }
+        if self.has_probabilities() {
+            self.push_probabilities(pixel, classes, class.is_some());
+        }
+    }
+
+    fn push_probabilities(&mut self, pixel: &Pixel, classes: &Classes, is_known: bool) {
         let begin = self.data.len();
         self.data.resize(begin + 4 * self.layout.classes, 0);
         let (elements, _) = self.data[begin..].as_chunks_mut::<4>();
-        for share in pixel.shares.iter().filter(|_| class.is_some()) {
+        for share in pixel.shares.iter().filter(|_| is_known) {
             let class = classes.known(share.class, 1.0);
             let element = class.and_then(|class| elements.get_mut(usize::from(class)));
             if let Some(element) = element {

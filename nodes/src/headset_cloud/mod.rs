@@ -305,8 +305,13 @@ impl HeadsetCloud {
             self.rays = camera.rays();
         }
         let width = camera.width as usize;
+        let Some(pixels) = set.reader(width, self.options.max_image_pixels) else {
+            // The limit may be lower than when they came.
+            self.refuse("labels", "too_large", "larger than `max_image_pixels`");
+            return None;
+        };
         let mut look = Look {
-            pixels: set.reader(width, self.options.max_image_pixels)?,
+            pixels,
             rays: &self.rays,
             width,
             camera: placed(pose, self.options.pose_axes(), self.options.camera_axes),

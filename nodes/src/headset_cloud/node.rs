@@ -21,7 +21,7 @@ use super::{
 use crate::compute::{Compute, Inbox};
 use crate::mesh::read_mesh_in;
 use crate::report;
-use crate::segmenter::{NetworkView, News, Ready, Worker};
+use crate::segmenter::{self, LoadedNetwork, NetworkEvent, NetworkView, Worker};
 use crate::start::{Finish, NodeError, handed_over, open_params};
 use lattice_runtime::logging::Throttle;
 use lattice_runtime::qos::Qos;
@@ -38,7 +38,7 @@ enum Event {
     Pose(Arc<PoseStamped>),
     Transforms(Arc<TFMessage>, bool),
     /// Of the network inside of the node.
-    Network(News),
+    Network(NetworkEvent),
     Tick,
     Settings(Box<HeadsetOptions>),
     Finish,
@@ -64,7 +64,7 @@ pub fn start(runtime: &Runtime, name: &str) -> Result<Finish, NodeError> {
         taken.map_err(|problem| params.invalid("mesh_file", problem))?;
     }
     let ready = match &settings.network {
-        Some((network, options)) => Some(Ready::new(params, network, options.clone())?),
+        Some((network, options)) => Some(LoadedNetwork::new(params, network, options.clone())?),
         None => None,
     };
     let (lost, losses) = (Arc::new(AtomicU64::new(0)), Losses::default());
@@ -73,7 +73,7 @@ pub fn start(runtime: &Runtime, name: &str) -> Result<Finish, NodeError> {
         points: node.publisher("headset/points", Qos::SCANS)?,
         label_info: node.publisher("headset/label_info", Qos::LATCHED)?,
         session: node.publisher("headset/session", Qos::LATCHED)?,
-        network: ready.as_ref().map(Ready::view),
+        network: ready.as_ref().map(LoadedNetwork::view),
         diagnostics: node.diagnostics(),
         lost: Arc::clone(&lost),
         losses: losses.clone(),
@@ -91,7 +91,7 @@ pub fn start(runtime: &Runtime, name: &str) -> Result<Finish, NodeError> {
     let mut network = None;
     if let Some(ready) = ready {
         let names = [name, "headset/image"];
-        let tell = news_to(&inbox, &lost);
+        let tell = segmenter::hand_over(&inbox, &lost, Event::Network);
         let (worker, images) =
             ready.start(&node, names, settings.compressed_color, shutdown, tell)?;
         inputs.push(images);
@@ -118,20 +118,6 @@ pub fn start(runtime: &Runtime, name: &str) -> Result<Finish, NodeError> {
         compute.finish_with(Event::Finish);
         Box::new(())
     }))
-}
-
-/// Hands news of the network over; labels that find no room are counted.
-fn news_to(inbox: &Inbox<Event>, lost: &Arc<AtomicU64>) -> impl FnMut(News) + Send + use<> {
-    let (inbox, lost) = (inbox.clone(), Arc::clone(lost));
-    move |news| {
-        // Poses are kept for longer than an image takes.
-        if matches!(news, News::Begun(_)) {
-            return;
-        }
-        let bytes = news.bytes();
-        let sent = inbox.send(Event::Network(news), bytes);
-        lost.fetch_add(u64::from(!sent), Ordering::Relaxed);
-    }
 }
 
 fn subscribe(
@@ -227,9 +213,10 @@ impl Shell {
             Event::LabelInfo(info) => machine.on_label_info(info),
             Event::Pose(pose) => machine.on_pose(&pose),
             Event::Transforms(message, is_static) => machine.on_tf(&message, is_static),
-            Event::Network(News::Labelled(labels)) => machine.on_labelled(labels),
-            Event::Network(News::Begun(_)) => return,
-            Event::Network(News::Names) => {
+            Event::Network(NetworkEvent::Labelled(labels)) => machine.on_labelled(labels),
+            // Poses are kept for longer than an image takes.
+            Event::Network(NetworkEvent::Begun(_)) => return,
+            Event::Network(NetworkEvent::Names) => {
                 self.tell_names();
                 return;
             }

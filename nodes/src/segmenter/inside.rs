@@ -1,12 +1,14 @@
 //! A network inside of another node: what that node starts, hears and shows of it.
 
+use std::sync::atomic::{AtomicU64, Ordering};
 use std::sync::{Arc, Mutex, PoisonError};
 
 use lattice_msgs::vision_msgs::LabelInfo;
 
 use super::parameters::NetworkSettings;
-use super::worker::{Input, News, Worker, WorkerState};
+use super::worker::{Input, NetworkEvent, Worker, WorkerState};
 use super::{Segmenter, SegmenterCounts, SegmenterOptions};
+use crate::compute::Inbox;
 use crate::report;
 use crate::start::NodeError;
 use lattice_runtime::params::{ParamError, Params};
@@ -14,12 +16,12 @@ use lattice_runtime::qos::Qos;
 use lattice_runtime::{Diagnostics, Level, Load, Node, Shutdown, Subscription};
 
 /// A network that is ready to work.
-pub(crate) struct Ready {
+pub(crate) struct LoadedNetwork {
     segmenter: Segmenter,
     view: NetworkView,
 }
 
-impl Ready {
+impl LoadedNetwork {
     /// Reads the model; errors name the parameter that is wrong.
     pub fn new(
         params: &Params,
@@ -44,10 +46,10 @@ impl Ready {
         [name, topic]: [&str; 2],
         is_compressed: bool,
         shutdown: Shutdown,
-        tell: impl FnMut(News) + Send + 'static,
+        tell: impl FnMut(NetworkEvent) + Send + 'static,
     ) -> Result<(Worker, Subscription), NodeError> {
         let worker = Worker::spawn(name, self.segmenter, self.view.0, shutdown, tell)?;
-        let images = subscribe(node, topic, is_compressed, worker.entrance())?;
+        let images = subscribe(node, topic, is_compressed, worker.image_callback())?;
         Ok((worker, images))
     }
 }
@@ -67,6 +69,20 @@ pub(super) fn subscribe(
         let enter = move |image| enter(Input::Plain(image));
         node.subscribe(topic, Qos::SENSOR, Load::Large, enter)?
     })
+}
+
+/// Hands what a network tells over to the thread of its node; labels that find no room are counted as `lost`.
+pub(crate) fn hand_over<E: Send + 'static>(
+    inbox: &Inbox<E>,
+    lost: &Arc<AtomicU64>,
+    event: fn(NetworkEvent) -> E,
+) -> impl FnMut(NetworkEvent) + Send + use<E> {
+    let (inbox, lost) = (inbox.clone(), Arc::clone(lost));
+    move |news| {
+        let (bytes, is_image) = (news.bytes(), matches!(news, NetworkEvent::Labelled(_)));
+        let sent = inbox.send(event(news), bytes);
+        lost.fetch_add(u64::from(is_image && !sent), Ordering::Relaxed);
+    }
 }
 
 /// State of a network as it was after its last image.
@@ -89,10 +105,10 @@ impl NetworkView {
         self.state().label_info
     }
 
-    /// Tells how the network fares.
+    /// Sets the status of the network in the diagnostics.
     pub fn diagnose(&self, diagnostics: &Diagnostics) {
         let state = self.state();
-        let (level, message) = fares(&state.counts);
+        let (level, message) = status_of(&state.counts);
         let mut values = report::key_values(&state.counts);
         values.push(("last_image_s".into(), format!("{:.4}", state.last_s)));
         values.push(("last_refused".into(), state.problem.unwrap_or_default()));
@@ -101,7 +117,7 @@ impl NetworkView {
 }
 
 /// State of the labelling of images, with its level, in words.
-pub(super) fn fares(counts: &SegmenterCounts) -> (Level, String) {
+pub(super) fn status_of(counts: &SegmenterCounts) -> (Level, String) {
     // Images that come faster than the network works are no fault.
     let refused = counts.dropped.iter();
     let refused = refused.filter(|(reason, _)| *reason != "skipped");

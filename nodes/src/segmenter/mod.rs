@@ -26,13 +26,13 @@ mod tract;
 mod worker;
 
 pub use colors::Normalisation;
-pub(crate) use inside::{NetworkView, Ready};
+pub(crate) use inside::{LoadedNetwork, NetworkView, hand_over};
 pub use labels::{Labelled, Meaning};
 pub use network::{Backend, ModelError, Network, Scores, Size, Values};
 pub use options::SegmenterOptions;
 pub use parameters::declare;
 pub(crate) use parameters::{NETWORK, NetworkSettings};
-pub(crate) use worker::{News, Worker};
+pub(crate) use worker::{NetworkEvent, Worker};
 
 use std::collections::BTreeMap;
 use std::path::Path;
@@ -173,6 +173,11 @@ impl Segmenter {
                 None
             }
         }
+    }
+
+    /// True of an image that [`Segmenter::on_image`] does not refuse before the network sees it.
+    pub(crate) fn can_read(&self, image: &Image) -> bool {
+        ImageView::new(image, Content::Colors, self.options.max_image_pixels).is_ok()
     }
 
     /// Labels an image that is packed as JPEG.

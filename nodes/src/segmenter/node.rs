@@ -6,7 +6,7 @@ use std::time::{Duration, Instant};
 use lattice_msgs::sensor_msgs::Image;
 use lattice_msgs::vision_msgs::LabelInfo;
 
-use super::inside::{self, fares};
+use super::inside::{self, status_of};
 use super::parameters::Settings;
 use super::worker::{Input, Slot};
 use super::{Segmenter, SegmenterOptions, SegmenterReport};
@@ -154,7 +154,7 @@ impl Shell {
 
     fn diagnose(&mut self) {
         let report = self.report();
-        let (level, message) = fares(&report.counts);
+        let (level, message) = status_of(&report.counts);
         let dropped = report.counts.dropped.iter();
         let refused = dropped.filter(|(reason, _)| *reason != "skipped");
         let refused: u64 = refused.map(|(_, n)| n).sum();

@@ -106,7 +106,10 @@ fn made_of(
         // Sizes that only the shapes tell; what tract cannot read of these is left to the library.
         match sizes::analysed(&onnx, &proto, size) {
             Err(sizes::Problem::Size(problem)) => return Err(problem),
-            Err(sizes::Problem::Other(problem)) => log::debug!("sizes are not known: {problem}"),
+            Err(sizes::Problem::Other(problem)) => log::warn!(
+                "{}: the sizes of its tensors are not bounded, as they are not known before: {problem}",
+                path.display()
+            ),
             Ok(_) => {}
         }
     }

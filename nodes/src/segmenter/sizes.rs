@@ -1,6 +1,6 @@
 //! Sizes of the tensors of a graph, known before any of them is made.
 
-use std::collections::BTreeSet;
+use std::collections::{BTreeMap, BTreeSet};
 
 use tract_onnx::Onnx;
 use tract_onnx::pb::ModelProto;
@@ -61,10 +61,20 @@ fn analyse(model: &mut InferenceModel) -> Result<(), Problem> {
     let reached: BTreeSet<usize> = order.iter().copied().collect();
     let nodes = 0..model.nodes().len();
     order.extend(nodes.filter(|node| !reached.contains(node)));
+    // Values that are made of constants alone: those stay in memory.
+    let mut made = BTreeMap::new();
     for _ in 0..MAX_ROUNDS {
         let mut changed = false;
         for node in &order {
-            foresee(model, *node)?;
+            if let Some(values) = foresee(model, *node)? {
+                made.insert(*node, values);
+                let all = made.values().fold(0usize, |all, n| all.saturating_add(*n));
+                if all > MAX_TENSOR_VALUES {
+                    return Err(Problem::Size(format!(
+                        "{all} values are made of its constants, at most {MAX_TENSOR_VALUES} are"
+                    )));
+                }
+            }
             changed |= pass_on(model, *node).map_err(in_words)?;
         }
         if !changed {
@@ -120,8 +130,9 @@ fn pass_on(model: &mut InferenceModel, node: usize) -> TractResult<bool> {
 }
 
 /// Checks the sizes of what a node makes, as far as they are known: those that are too large are refused, and those
-/// that are not known where the node is about to be computed.
-fn foresee(model: &InferenceModel, node: usize) -> Result<(), Problem> {
+/// that are not known where the node is about to be computed. The number of values that are made, where all inputs are
+/// constants.
+fn foresee(model: &InferenceModel, node: usize) -> Result<Option<usize>, Problem> {
     let in_words = |error: TractError| Problem::Other(first_line(&error));
     let name = || checks::shown(&model.node(node).name);
     let ([inputs, outputs, observed], _) = facts(model, node).map_err(in_words)?;
@@ -139,6 +150,7 @@ fn foresee(model: &InferenceModel, node: usize) -> Result<(), Problem> {
     let constants: Option<usize> = constants
         .filter(|inputs| !inputs.is_empty())
         .map(|inputs| inputs.iter().sum());
+    let mut made = 0usize;
     for output in &outputs {
         let dims = output.shape.concretize();
         let dims = dims.and_then(|dims| {
@@ -150,12 +162,13 @@ fn foresee(model: &InferenceModel, node: usize) -> Result<(), Problem> {
                 let values = dims
                     .iter()
                     .try_fold(1usize, |all, dim| all.checked_mul(*dim));
-                if values.is_none_or(|values| values > MAX_TENSOR_VALUES) {
+                let Some(values) = values.filter(|values| *values <= MAX_TENSOR_VALUES) else {
                     return Err(Problem::Size(format!(
                         "'{}' makes {dims:?}, at most {MAX_TENSOR_VALUES} values are made",
                         name()
                     )));
-                }
+                };
+                made = made.saturating_add(values);
             }
             (None, Some(values)) if values > MAX_UNFORESEEN => {
                 return Err(Problem::Size(format!(
@@ -166,7 +179,7 @@ fn foresee(model: &InferenceModel, node: usize) -> Result<(), Problem> {
             (None, _) => {}
         }
     }
-    Ok(())
+    Ok(constants.map(|_| made))
 }
 
 /// Checks the tensors of a model of which everything is known.

@@ -29,12 +29,14 @@ pub(super) struct Slot {
 impl Slot {
     /// Puts an image there; true if the place was empty.
     pub fn put(&self, image: Input) -> bool {
-        let mut slot = self.image.lock().unwrap_or_else(PoisonError::into_inner);
-        let is_first = slot.replace(image).is_none();
-        if !is_first {
-            self.skipped.fetch_add(1, Ordering::Relaxed);
-        }
-        is_first
+        let old = {
+            let mut slot = self.image.lock().unwrap_or_else(PoisonError::into_inner);
+            slot.replace(image)
+        };
+        // It is freed without the lock.
+        self.skipped
+            .fetch_add(u64::from(old.is_some()), Ordering::Relaxed);
+        old.is_none()
     }
 
     pub fn take(&self) -> Option<Input> {
@@ -63,8 +65,8 @@ enum Event {
     Finish,
 }
 
-/// News of the thread of the network.
-pub(crate) enum News {
+/// Event that the thread of a network tells of.
+pub(crate) enum NetworkEvent {
     /// The network begins with an image of this stamp.
     Begun(i64),
     /// An image is labelled; its colours are in the set.
@@ -73,7 +75,7 @@ pub(crate) enum News {
     Names,
 }
 
-impl News {
+impl NetworkEvent {
     /// Bytes that wait in the inbox of the node.
     pub fn bytes(&self) -> usize {
         match self {
@@ -117,7 +119,7 @@ impl Worker {
         segmenter: Segmenter,
         state: Arc<Mutex<WorkerState>>,
         shutdown: Shutdown,
-        tell: impl FnMut(News) + Send + 'static,
+        tell: impl FnMut(NetworkEvent) + Send + 'static,
     ) -> io::Result<Self> {
         let slot = Arc::new(Slot::default());
         let mut job = Job {
@@ -139,7 +141,7 @@ impl Worker {
     }
 
     /// A handler that hands images over and returns at once.
-    pub fn entrance(&self) -> impl FnMut(Input) + Send + 'static {
+    pub fn image_callback(&self) -> impl FnMut(Input) + Send + 'static {
         let (slot, inbox): (_, Inbox<Event>) = (Arc::clone(&self.slot), self.compute.inbox());
         move |image| {
             if slot.put(image) && !inbox.send(Event::Image, 0) {
@@ -170,17 +172,17 @@ struct Job<T> {
     tell: T,
 }
 
-impl<T: FnMut(News)> Job<T> {
+impl<T: FnMut(NetworkEvent)> Job<T> {
     fn on(&mut self, event: Event) {
         match event {
             Event::Settings(options) => {
                 self.segmenter.set_options(*options);
                 self.show();
-                (self.tell)(News::Names);
+                (self.tell)(NetworkEvent::Names);
             }
             Event::Image | Event::Finish => {
                 if let Some(set) = self.label() {
-                    (self.tell)(News::Labelled(set));
+                    (self.tell)(NetworkEvent::Labelled(set));
                 }
                 self.show();
             }
@@ -190,16 +192,14 @@ impl<T: FnMut(News)> Job<T> {
     fn label(&mut self) -> Option<LabelSet> {
         let input = self.slot.take()?;
         self.segmenter.skip(self.slot.skipped());
-        let stamp = match &input {
-            Input::Plain(image) => image.header.stamp,
-            Input::Compressed(image) => image.header.stamp,
-        };
-        (self.tell)(News::Begun(stamp.to_ns()));
         let began = Instant::now();
         let image = match input {
             Input::Plain(image) => image,
             Input::Compressed(packed) => self.segmenter.unpack(&packed)?,
         };
+        if self.segmenter.can_read(&image) {
+            (self.tell)(NetworkEvent::Begun(image.header.stamp.to_ns()));
+        }
         let Labelled {
             labels,
             confidence,

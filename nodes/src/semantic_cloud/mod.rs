@@ -144,7 +144,9 @@ impl SemanticCloud {
 
     /// Hears that a network begins with the image of a stamp: its depth image is kept until it has labels.
     pub fn on_begun(&mut self, stamp_ns: i64) -> Vec<CloudOutput> {
-        self.waiting.hold(stamp_ns);
+        for (stream, reason) in self.waiting.hold(stamp_ns) {
+            self.drop_image(stream, reason);
+        }
         self.serve(false)
     }
 
@@ -246,8 +248,13 @@ impl SemanticCloud {
     fn cloud(&mut self, set: &Set) -> Option<PointCloud2> {
         let camera = self.camera.as_ref()?;
         let max = self.options.max_image_pixels;
-        let view = |image, content| ImageView::new(image, content, max).ok();
-        let depth = view(&set.depth, Content::Depth)?;
+        let depth = match ImageView::new(&set.depth, Content::Depth, max) {
+            Ok(depth) => depth,
+            Err(error) => {
+                self.refuse("depth", error.name(), &error.to_string());
+                return None;
+            }
+        };
         let (width, height) = (camera.width, camera.height);
         if (depth.width, depth.height) != (width as usize, height as usize) {
             let problem = format!(
@@ -260,8 +267,14 @@ impl SemanticCloud {
         if self.rays.is_empty() {
             self.rays = camera.rays();
         }
+        let Some(pixels) = set.labels.reader(depth.width, max) else {
+            // The limit may be lower than when they came.
+            let problem = "larger than `max_image_pixels`";
+            self.refuse(Stream::Labels.name(), "too_large", problem);
+            return None;
+        };
         let mut views = Views {
-            pixels: set.labels.reader(depth.width, max)?,
+            pixels,
             depth,
             rays: &self.rays,
         };

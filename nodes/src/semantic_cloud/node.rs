@@ -13,7 +13,7 @@ use super::parameters::Settings;
 use super::{CloudOptions, CloudOutput, CloudReport, SemanticCloud, Stream};
 use crate::compute::{Compute, Inbox};
 use crate::report;
-use crate::segmenter::{News, Ready, Worker};
+use crate::segmenter::{self, LoadedNetwork, NetworkEvent, Worker};
 use crate::start::{Finish, NodeError, handed_over, open_params};
 use lattice_runtime::logging::Throttle;
 use lattice_runtime::qos::Qos;
@@ -33,7 +33,7 @@ enum Event {
     CameraInfo(Arc<CameraInfo>),
     LabelInfo(Arc<LabelInfo>),
     /// Of the network inside of the node.
-    Network(News),
+    Network(NetworkEvent),
     Diagnose,
     Settings(Box<CloudOptions>),
     Finish,
@@ -46,10 +46,10 @@ pub fn start(runtime: &Runtime, name: &str) -> Result<Finish, NodeError> {
     let settings = Settings::from_params(params)?;
     let (lost, losses) = (Arc::new(AtomicU64::new(0)), Losses::default());
     let ready = match &settings.network {
-        Some((network, options)) => Some(Ready::new(params, network, options.clone())?),
+        Some((network, options)) => Some(LoadedNetwork::new(params, network, options.clone())?),
         None => None,
     };
-    let view = ready.as_ref().map(Ready::view);
+    let view = ready.as_ref().map(LoadedNetwork::view);
     let mut shell = Shell {
         machine: SemanticCloud::new(settings.cloud.clone()),
         points: node.publisher("points", Qos::SCANS)?,
@@ -73,7 +73,7 @@ pub fn start(runtime: &Runtime, name: &str) -> Result<Finish, NodeError> {
     let mut inputs = subscribe(&node, &inbox, &lost, &settings)?;
     let mut network = None;
     if let Some(ready) = ready {
-        let tell = news_to(&inbox, &lost);
+        let tell = segmenter::hand_over(&inbox, &lost, Event::Network);
         let (worker, images) = ready.start(
             &node,
             [name, COLOR],
@@ -105,16 +105,6 @@ pub fn start(runtime: &Runtime, name: &str) -> Result<Finish, NodeError> {
         compute.finish_with(Event::Finish);
         Box::new(())
     }))
-}
-
-/// Hands news of the network over; labels that find no room are counted.
-fn news_to(inbox: &Inbox<Event>, lost: &Arc<AtomicU64>) -> impl FnMut(News) + Send + use<> {
-    let (inbox, lost) = (inbox.clone(), Arc::clone(lost));
-    move |news| {
-        let bytes = news.bytes();
-        let sent = inbox.send(Event::Network(news), bytes);
-        lost.fetch_add(u64::from(!sent), Ordering::Relaxed);
-    }
 }
 
 fn subscribe(
@@ -196,14 +186,14 @@ impl Shell {
                 self.machine.on_compressed_depth(&image)
             }
             Event::CompressedColor(image) => self.machine.on_compressed_color(&image),
-            Event::Network(News::Begun(stamp_ns)) => self.machine.on_begun(stamp_ns),
-            Event::Network(News::Labelled(labels)) => {
+            Event::Network(NetworkEvent::Begun(stamp_ns)) => self.machine.on_begun(stamp_ns),
+            Event::Network(NetworkEvent::Labelled(labels)) => {
                 if let Some(network) = &self.network {
                     network.publish(&labels);
                 }
                 self.machine.on_labelled(labels)
             }
-            Event::Network(News::Names) => {
+            Event::Network(NetworkEvent::Names) => {
                 self.tell_names();
                 return;
             }

@@ -42,6 +42,8 @@ impl Views<'_> {
         let most = width.div_ceil(stride) * height.div_ceil(stride);
         let layout = self.pixels.layout(classes).bounded(most);
         let mut points = LabelledPoints::new(layout, most);
+        let square = |range_m: f64| range_m * range_m;
+        let range_m2 = square(options.min_range_m)..=square(options.max_range_m);
         for row in (0..height).step_by(stride) {
             self.pixels.seek(row, height);
             for column in (0..width).step_by(stride) {
@@ -63,13 +65,8 @@ impl Views<'_> {
                     continue;
                 }
                 let point_m = [x * z_m, y * z_m, z_m];
-                let range_m = point_m
-                    .map(f64::from)
-                    .iter()
-                    .map(|v| v * v)
-                    .sum::<f64>()
-                    .sqrt();
-                if range_m < options.min_range_m || range_m > options.max_range_m {
+                let [x_m, y_m, z_m] = point_m.map(f64::from);
+                if !range_m2.contains(&(x_m * x_m + y_m * y_m + z_m * z_m)) {
                     counts.pixels_out_of_range += 1;
                     continue;
                 }
@@ -133,10 +130,17 @@ fn fold_neighbours(
     distance: usize,
     best: impl Fn(f32, f32) -> f32 + Copy,
 ) {
-    for (out, before) in out.iter_mut().skip(distance).zip(values) {
+    // Slices, whose loops have one number and so many lanes.
+    for (out, before) in out
+        .get_mut(distance..)
+        .unwrap_or_default()
+        .iter_mut()
+        .zip(values)
+    {
         *out = best(*out, *before);
     }
-    for (out, behind) in out.iter_mut().zip(values.iter().skip(distance)) {
+    let behind = values.get(distance..).unwrap_or_default();
+    for (out, behind) in out.iter_mut().zip(behind) {
         *out = best(*out, *behind);
     }
 }

@@ -97,10 +97,23 @@ impl Waiting {
 
     /// Hears that labels of a stamp are being made: the depth image of that time waits for them, however many
     /// come meanwhile, and no labels of earlier stamps will come.
-    pub fn hold(&mut self, stamp_ns: i64) {
+    pub fn hold(&mut self, stamp_ns: i64) -> Vec<(Stream, Left)> {
+        let left = self.come_to(Stream::Labels, stamp_ns);
         self.held_ns = Some(stamp_ns);
-        let newest = &mut self.newest_ns[Stream::Labels as usize];
+        left
+    }
+
+    /// Notes the stamp of what comes; where it lies far behind, all that waits leaves.
+    fn come_to(&mut self, stream: Stream, stamp_ns: i64) -> Vec<(Stream, Left)> {
+        let mut left = Vec::new();
+        let newest_ns = self.newest_ns[stream as usize].unwrap_or(stamp_ns);
+        if stamp_ns < newest_ns.saturating_sub(JUMP_BACK_NS) {
+            left = self.clear(Left::TimeJump);
+            (self.newest_ns, self.held_ns) = ([None; 4], None);
+        }
+        let newest = &mut self.newest_ns[stream as usize];
         *newest = Some(newest.map_or(stamp_ns, |newest_ns| newest_ns.max(stamp_ns)));
+        left
     }
 
     /// Goes on by other rules.
@@ -120,14 +133,7 @@ impl Waiting {
 
     fn push_set(&mut self, stream: Stream, set: LabelSet) -> Vec<(Stream, Left)> {
         let stamp_ns = set.labels.header.stamp.to_ns();
-        let mut left = Vec::new();
-        let newest_ns = self.newest_ns[stream as usize].unwrap_or(stamp_ns);
-        if stamp_ns < newest_ns.saturating_sub(JUMP_BACK_NS) {
-            left = self.clear(Left::TimeJump);
-            self.newest_ns = [None; 4];
-        }
-        let newest = &mut self.newest_ns[stream as usize];
-        *newest = Some(newest.map_or(stamp_ns, |newest_ns| newest_ns.max(stamp_ns)));
+        let mut left = self.come_to(stream, stamp_ns);
         let queue = &mut self.queues[stream as usize];
         if queue.insert(stamp_ns, set).is_some() {
             left.push((stream, Left::Repeated));
@@ -170,12 +176,12 @@ impl Waiting {
         let is_near = depth_ns.abs_diff(labels_ns) <= self.options.max_difference_ns;
         let is_whole = (!self.options.with_confidence || confidences.contains_key(&labels_ns))
             && (!self.options.with_color || colors.contains_key(&labels_ns));
-        let come_to = |stream: Stream, stamp_ns| {
+        let has_come_to = |stream: Stream, stamp_ns| {
             self.newest_ns[stream as usize].is_some_and(|newest_ns| newest_ns >= stamp_ns)
         };
         let is_sure = is_end
             || depth_ns == labels_ns
-            || (come_to(Stream::Depth, labels_ns) && come_to(Stream::Labels, depth_ns));
+            || (has_come_to(Stream::Depth, labels_ns) && has_come_to(Stream::Labels, depth_ns));
         let belong = is_near && is_whole && is_sure && nearest(depths, labels_ns) == Some(depth_ns);
         belong.then_some(labels_ns)
     }

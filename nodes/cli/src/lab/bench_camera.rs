@@ -32,9 +32,6 @@ impl Camera {
     /// Runs the command.
     pub fn run(self) -> CliResult {
         init_logging();
-        if !(self.rate_hz.is_finite() && self.rate_hz > 0.0) {
-            return Err(format!("--rate-hz {} is not above 0", self.rate_hz).into());
-        }
         let [width, height] = self.size[..] else {
             return Err("--size takes a width and a height".into());
         };

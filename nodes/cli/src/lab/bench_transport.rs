@@ -34,9 +34,6 @@ impl Transport {
     /// Runs the command.
     pub fn run(self) -> CliResult {
         init_logging();
-        if !(self.rate_hz.is_finite() && self.rate_hz > 0.0) {
-            return Err(format!("--rate-hz {} is not above 0", self.rate_hz).into());
-        }
         let setup = TransportSetup {
             bytes: self.bytes,
             rate_hz: self.rate_hz,

@@ -17,6 +17,7 @@ use serde::Serialize;
 
 use super::clock::process_cpu_s;
 use crate::AnyError;
+use crate::options::within;
 
 const NODE: &str = "semantic_cloud";
 /// For the last cloud.
@@ -60,6 +61,8 @@ pub struct CameraReport {
 
 /// Sends images to the node in this process, by channels as `lattice run` does.
 pub fn camera(setup: &CameraSetup) -> Result<CameraReport, AnyError> {
+    within("rate-hz", setup.rate_hz, 0.1, 1e4)?;
+    within("count", setup.count as f64, 1.0, 1e6)?;
     let domain = LoopbackDomain::take()?;
     let network = Network {
         domain_id: domain.id(),
@@ -155,7 +158,9 @@ impl CameraSetup {
                 (start, before) = (Instant::now(), Some(cpu_s()?));
             }
             let (depths, picture) = (stamped(&depths, i), stamped(&picture, i));
-            sent.push((depths.header.stamp.to_ns(), Instant::now()));
+            if i >= WARM_UP {
+                sent.push((depths.header.stamp.to_ns(), Instant::now()));
+            }
             depth.publish(depths)?;
             pictures.publish(picture)?;
         }
@@ -166,8 +171,9 @@ impl CameraSetup {
         let last = sent.last().map_or(0, |(stamp_ns, _)| *stamp_ns);
         while let Ok((stamp_ns, width, at)) = heard.recv_timeout(PATIENCE) {
             let mut of = sent.iter().filter(|(stamp, _)| *stamp == stamp_ns);
-            let took = of.next().map(|(_, sent)| at.duration_since(*sent));
-            delays_ms.extend(took.map(|took| 1e3 * took.as_secs_f64()));
+            // None of the images that went before.
+            let Some((_, sent)) = of.next() else { continue };
+            delays_ms.push(1e3 * at.duration_since(*sent).as_secs_f64());
             points = width;
             if stamp_ns == last {
                 break;

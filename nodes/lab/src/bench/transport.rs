@@ -16,6 +16,7 @@ use serde::{Deserialize, Serialize};
 
 use super::clock::process_cpu_s;
 use crate::AnyError;
+use crate::options::within;
 
 const TOPIC: &str = "/points";
 /// For the match and for each message, and for the first one of the other side.
@@ -93,6 +94,7 @@ pub fn send(
     setup: TransportSetup,
     listener: impl FnOnce(u16) -> Command,
 ) -> Result<TransportReport, AnyError> {
+    within("rate-hz", setup.rate_hz, 0.1, 1e6)?;
     let domain = LoopbackDomain::take()?;
     let (_runtime, node, transport) = node(domain.id(), "sender")?;
     let publisher = node.publisher::<PointCloud2>(TOPIC, setup.qos())?;

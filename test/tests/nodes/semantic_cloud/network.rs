@@ -216,6 +216,23 @@ fn the_depth_image_that_a_network_is_at_work_on_waits_for_it() {
 }
 
 #[test]
+fn a_stamp_that_lies_holds_up_one_image_and_no_more() {
+    let (camera, mut machine) = camera();
+    let depth = |stamp_ns| Arc::new(depth(&camera, stamp_ns, Form::plain("32FC1")));
+    assert!(machine.on_image(Stream::Depth, depth(SECOND_NS)).is_empty());
+    assert!(machine.on_begun(i64::MAX).is_empty());
+    // All stamps before are in the past of that one: what waits leaves, and is counted.
+    assert!(machine.on_begun(2 * SECOND_NS).is_empty());
+    assert_eq!(machine.counts().dropped["depth_time_jump"], 1);
+    for i in 2..40 {
+        machine.on_image(Stream::Depth, depth(i * SECOND_NS));
+    }
+    let found = clouds(machine.on_labelled(labelled(&camera, 2 * SECOND_NS)));
+    assert_eq!(found.len(), 1);
+    assert_eq!(found[0].header.stamp.to_ns(), 2 * SECOND_NS);
+}
+
+#[test]
 fn clouds_that_are_too_large_go_without_probabilities() {
     let (camera, mut machine) = camera();
     let pixel = [

@@ -141,18 +141,19 @@ pub(super) fn headset_mesh(rooms: &RoomImages, trial: &HeadsetTrial) -> Vec<Arc<
     mesh_chunks(&trial.mesh, &house_from_headset(rooms, trial).inverse())
 }
 
-/// The headset's points of one picture: `headset_cloud` on its own mesh and on labels of its image.
+/// The headset's points of one picture: `headset_cloud` on its own mesh and on labels of its image; none if the
+/// picture shows nothing that the headset has a mesh of.
 pub(super) fn headset_scan(
     image: &RoomImage,
     segmenter: &Mutex<Segmenter>,
     chunks: &[Arc<HeadsetMesh>],
     scan: &HouseScan,
-) -> Result<Both<HeadsetScan>, AnyError> {
+) -> Result<Option<Both<HeadsetScan>>, AnyError> {
     let found = labelled(segmenter, image, PERIOD_NS)?;
-    Ok(Both {
-        found: look(chunks, scan, found.labels, found.confidence)?,
-        truth: look(chunks, scan, true_labels(image, PERIOD_NS), None)?,
-    })
+    let found = look(chunks, scan, found.labels, found.confidence)?;
+    let truth = look(chunks, scan, true_labels(image, PERIOD_NS), None)?;
+    let both = found.zip(truth);
+    Ok(both.map(|(found, truth)| Both { found, truth }))
 }
 
 fn look(
@@ -160,7 +161,7 @@ fn look(
     scan: &HouseScan,
     labels: Image,
     confidence: Option<Image>,
-) -> Result<HeadsetScan, AnyError> {
+) -> Result<Option<HeadsetScan>, AnyError> {
     let mut options = HeadsetOptions::from_params(&Params::default())?;
     options.look.stride = 1;
     options.use_confidence = confidence.is_some();
@@ -185,10 +186,12 @@ fn look(
         _ => None,
     });
     let cloud = clouds.next().map(points).transpose()?.flatten();
-    Ok(cloud.ok_or_else(|| {
+    let sees_nothing = machine.counts().dropped.contains_key("labels_sees_no_mesh");
+    if cloud.is_none() && !sees_nothing {
         let problem = machine.problem().unwrap_or("no partner");
-        format!("headset_cloud made no points: {problem}")
-    })?)
+        return Err(format!("headset_cloud made no points: {problem}").into());
+    }
+    Ok(cloud)
 }
 
 /// A mesh as the chunks of one surface, whose pose in the headset's frame is given.

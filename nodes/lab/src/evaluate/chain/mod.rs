@@ -222,9 +222,9 @@ impl Chain<'_> {
             let image = rooms.take(&RoomCamera::HEADSET, &pose, image_seed);
             headset_scan(&image, &self.segmenter, &chunks, seen)
         });
-        let scans: Vec<Both<HeadsetScan>> = scans.collect::<Result<_, _>>()?;
-        let (found, right): (Vec<_>, Vec<_>) =
-            scans.into_iter().map(|s| (s.found, s.truth)).unzip();
+        let scans: Vec<Option<Both<HeadsetScan>>> = scans.collect::<Result<_, _>>()?;
+        let scans = scans.into_iter().flatten();
+        let (found, right): (Vec<_>, Vec<_>) = scans.map(|s| (s.found, s.truth)).unzip();
         let (seen, seen_right) = (together(&found), together(&right));
         let labels = LabelsRight {
             map: rounded(place.labels_right),
