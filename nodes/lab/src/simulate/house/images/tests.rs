@@ -91,14 +91,28 @@ fn a_lamp_casts_shadows_and_images_are_neither_black_nor_white() {
 #[test]
 fn noise_of_depth_grows_with_it_and_ends_at_the_range() {
     let house = House::generated(3).unwrap();
-    let view = robot_views(&house, 1, 2).unwrap()[0];
-    let image = RoomImages::new(&house, 1).take(&small(RoomCamera::ROBOT), &view.truth, 1);
-    for (depth_m, measured_m) in image.depth_m.iter().zip(image.measured_depth_m(3)) {
-        match (0.4..=4.5).contains(depth_m) {
-            true => assert!((depth_m - measured_m).abs() < 0.2),
-            false => assert_eq!(measured_m, 0.0),
+    let rooms = RoomImages::new(&house, 1);
+    let (mut near_m, mut far_m) = (Vec::new(), Vec::new());
+    let views = robot_views(&house, 6, 2).unwrap();
+    let pixels = views.iter().flat_map(|view| {
+        let image = rooms.take(&small(RoomCamera::ROBOT), &view.truth, 1);
+        let measured_m = image.measured_depth_m(3);
+        image.depth_m.into_iter().zip(measured_m)
+    });
+    for (depth_m, measured_m) in pixels {
+        let off_m: f32 = (depth_m - measured_m).abs();
+        match depth_m {
+            0.4..1.5 => near_m.push(off_m),
+            1.5..2.5 => {}
+            2.5..=4.5 => far_m.push(off_m),
+            _ => assert_eq!(measured_m, 0.0),
         }
+        assert!(measured_m == 0.0 || off_m < 0.2);
     }
+    let mean_m = |all: &[f32]| all.iter().sum::<f32>() / all.len() as f32;
+    let [near, far] = [near_m.len(), far_m.len()];
+    assert!(near > 100 && far > 100, "{near} {far}");
+    assert!(mean_m(&near_m) > 0.0 && mean_m(&far_m) > 2.0 * mean_m(&near_m));
 }
 
 #[test]
