@@ -55,6 +55,10 @@ pub struct ServerCounts {
     pub tracking_misses: u64,
     /// Clouds that fitted the known pose less than they should.
     pub tracking_doubts: u64,
+    /// Searches with more looks than the known pose was found with.
+    pub confirmations: u64,
+    /// Of these those that fitted best elsewhere: what was known is not known any more.
+    pub poses_withdrawn: u64,
     /// Times that the known pose was given up.
     pub tracking_lost: u64,
     /// Parts of the map refused.

@@ -53,11 +53,26 @@ impl SemanticIcpServer {
             self.hold(running, update, now_ns, out);
             return;
         }
+        let before = self.known.as_ref().map(|known| known.map_from_headset);
+        let moved = before.is_some_and(|before| !is_near(&before, &found.map_from_headset, MOVED));
+        if running.confirms {
+            self.counts.confirmations += 1;
+            self.counts.poses_withdrawn += u64::from(moved);
+            match &mut self.known {
+                // Together they fit best elsewhere: what one of them told is not so.
+                _ if moved => self.known = None,
+                // They tell no more than that each fits.
+                Some(known) if found.verdict != Verdict::Ok => {
+                    known.looks = running.headset_scans.len();
+                    return;
+                }
+                _ => {}
+            }
+        }
         match found.verdict {
             Verdict::Ok => {
                 self.misses = 0;
-                let before = self.known.as_ref().map(|known| known.map_from_headset);
-                if before.is_some_and(|before| !is_near(&before, &found.map_from_headset, MOVED)) {
+                if moved {
                     // The headset has another origin than for the looks before.
                     self.headset_scans.clear();
                 }
@@ -69,6 +84,7 @@ impl SemanticIcpServer {
                 let known = Known {
                     map_from_headset: found.map_from_headset,
                     result: result.clone(),
+                    looks: running.headset_scans.len(),
                 };
                 out.push(Output::Transform(self.transform(&known, now_ns)));
                 self.known = Some(known);
@@ -182,6 +198,7 @@ impl SemanticIcpServer {
         if !(same && recent && self.last.verdict == CalibrationResult::OK) {
             self.publish(result, now_ns, out);
         }
+        self.confirm(now_ns, out);
     }
 }
 

@@ -14,6 +14,8 @@ pub(super) struct Known {
     pub map_from_headset: Isometry3<f64>,
     /// Result of the search that found it.
     pub result: CalibrationResult,
+    /// Looks that it was searched with, in vain or not, since it is known.
+    pub looks: usize,
 }
 
 /// A job that is being calculated.
@@ -30,6 +32,8 @@ pub(super) struct Running {
     pub tracking: bool,
     /// Of a search with a look that fits the known pose, yet less than it should: how it fits.
     pub doubted: Option<TrackUpdate>,
+    /// True of a search that is to confirm the known pose with more looks.
+    pub confirms: bool,
 }
 
 impl Running {
@@ -82,6 +86,21 @@ impl SemanticIcpServer {
         }
     }
 
+    /// Begins a search that confirms the known pose, if there are more looks than it was found with: one look alone
+    /// can fit elsewhere as well.
+    pub(super) fn confirm(&mut self, now_ns: i64, out: &mut Vec<Output>) {
+        let looks = self.headset_scans.all().len();
+        let is_due = self.known.as_ref().is_some_and(|known| looks > known.looks);
+        let is_free = self.running.is_none() && self.wanted.is_none();
+        if !is_due || !is_free || self.options.search != SearchWhen::Lost {
+            return;
+        }
+        self.search_all(Wanted::default(), now_ns, out);
+        if let Some(running) = &mut self.running {
+            running.confirms = true;
+        }
+    }
+
     /// Begins a search with all clouds that are kept.
     fn search_all(&mut self, wanted: Wanted, now_ns: i64, out: &mut Vec<Output>) {
         self.fresh_cloud = false;
@@ -119,6 +138,7 @@ impl SemanticIcpServer {
             headset_scans,
             tracking: matches!(work, Work::Track { .. }),
             doubted: None,
+            confirms: false,
         };
         out.push(Output::Job(Job {
             id: self.next_job,

@@ -118,8 +118,7 @@ fn inside(topics: &str, model: &str, further: &str) -> Vec<String> {
     params(&format!("{qos} model:={model} {numbers} {further}"))
 }
 
-fn right(found: &Value, least: u64) {
-    let fields = "x y z rgb label confidence label_probs";
+fn right(found: &Value, fields: &str, least: u64) {
     let fields: Vec<_> = fields.split(' ').collect();
     assert_eq!(found["fields"], json!(fields));
     assert!(found["points"].as_u64() >= Some(least), "{found}");
@@ -160,14 +159,16 @@ fn networks_inside_of_nodes_label_what_a_cyclone_camera_and_headset_see() {
     nodes.finish();
 
     let camera = &found["depth_camera"];
-    right(camera, 160 * 120);
+    let fields = "x y z rgb label confidence label_probs";
+    right(camera, fields, 160 * 120);
     assert_eq!(camera["later"], 160 * 120);
     assert_eq!(camera["told"], camera["names"]);
     assert_eq!(camera["mask"], json!(["mono8", 160, 120, "camera"]));
     let refused = camera["refused"].as_str().unwrap();
     assert!(refused.contains("1000 bytes, but 120 rows"), "{refused}");
     let headset = &found["headset"];
-    right(headset, 16 * 8);
+    let fields = "x y z rgb label confidence vp_x vp_y vp_z label_probs";
+    right(headset, fields, 16 * 8);
     let refused = headset["refused"].as_str().unwrap();
     assert!(refused.contains("its JPEG file"), "{refused}");
 

@@ -243,4 +243,5 @@ pub fn good() -> PointCloud2 {
 
 pub const OK: u8 = CalibrationResult::OK;
 pub const REJECTED: u8 = CalibrationResult::REJECTED_INPUT;
+pub const AMBIGUOUS: u8 = CalibrationResult::AMBIGUOUS;
 pub const NONE: u8 = CalibrationResult::NONE;

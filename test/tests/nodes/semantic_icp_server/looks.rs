@@ -5,7 +5,7 @@ use lattice_msgs::calibration::CalibrateGoal;
 use lattice_nodes::semantic_icp_server::ServerOptions;
 use lattice_test::clouds::{SECOND_NS, cloud, labelled_cloud};
 
-use super::bench::{NONE, OK, REJECTED, bench, good};
+use super::bench::{AMBIGUOUS, NONE, OK, REJECTED, bench, found, good};
 
 #[test]
 fn every_refusal_has_its_reason_and_the_next_good_cloud_succeeds() {
@@ -86,7 +86,11 @@ fn a_look_that_does_not_fit_is_searched_with_alone() {
 
 #[test]
 fn a_look_that_fits_somewhat_is_doubted() {
-    let mut bench = bench(ServerOptions::default());
+    // No looks more than one, which would confirm the pose.
+    let mut bench = bench(ServerOptions {
+        max_headset_scans: 1,
+        ..ServerOptions::default()
+    });
     bench.cloud(&good());
     // What is to be refused is, as often as it comes.
     for _ in 0..2 {
@@ -108,4 +112,38 @@ fn a_look_that_fits_somewhat_is_doubted() {
     assert_eq!((counts.tracking_misses, counts.tracking_lost), (0, 0));
     let pose = bench.machine.map_from_headset().unwrap();
     assert_eq!(pose.translation.x.round(), 1.0);
+}
+
+#[test]
+fn a_pose_by_one_look_is_confirmed_by_the_next_or_withdrawn() {
+    let mut bench = bench(ServerOptions::default());
+    bench.cloud(&good());
+    // Two looks tell nothing more: the pose stands. Three find another, and then there are no more searches.
+    let verdicts = [(Verdict::Ambiguous, 1.1), (Verdict::Ok, 50.0)];
+    bench.search.verdicts = verdicts.map(|(verdict, x)| found(verdict, x)).into();
+    for (x, searches) in [(1.0, vec![1, 2]), (50.0, vec![1, 2, 3])] {
+        bench.cloud(&good());
+        let pose = bench.machine.map_from_headset().unwrap();
+        assert!((pose.translation.x - x).abs() < 0.1, "{pose}");
+        assert_eq!(bench.verdict(), OK);
+        assert_eq!(bench.search.headset_scans, searches);
+    }
+    let last = bench.transforms.last().unwrap();
+    assert_eq!(last.transform.translation.x, 50.0);
+    bench.cloud(&good());
+    assert_eq!(bench.search.headset_scans, [1, 2, 3]);
+    let counts = bench.machine.counts();
+    assert_eq!((counts.confirmations, counts.poses_withdrawn), (2, 1));
+    assert_eq!((counts.tracking_lost, counts.searches_ambiguous), (0, 1));
+
+    // Two looks that fit best elsewhere, and not for sure: then nothing is known.
+    let mut bench = super::bench::bench(ServerOptions::default());
+    bench.cloud(&good());
+    bench.search.verdicts = [found(Verdict::Ambiguous, 9.0)].into();
+    bench.cloud(&good());
+    assert!(bench.machine.map_from_headset().is_none());
+    assert_eq!(bench.verdict(), AMBIGUOUS);
+    bench.cloud(&good());
+    assert_eq!(bench.verdict(), OK);
+    assert_eq!(bench.search.headset_scans, [1, 2, 3]);
 }

@@ -183,7 +183,12 @@ impl IndoorDemo {
         };
         let mut of_robot = vec!["semantic_cloud", "lattice_mapper", "enu_transformer"];
         let mut of_headset = vec!["headset_cloud", "semantic_icp_server"];
-        let (mut robot, mut headset) = (robot.to_vec(), Vec::new());
+        // All that the headset looks at, at half the columns and rows of its small images.
+        let of_looks = [
+            param("semantic_icp_server:max_headset_scans", "6"),
+            param("headset_cloud:stride", "2"),
+        ];
+        let (mut robot, mut headset) = (robot.to_vec(), of_looks.to_vec());
         if let Some(model) = &self.model {
             let model = param("segmenter:model", &yaml_text(model));
             for (nodes, params) in [(&mut of_robot, &mut robot), (&mut of_headset, &mut headset)] {

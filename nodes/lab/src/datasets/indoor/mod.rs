@@ -39,7 +39,7 @@ const SECOND_NS: i64 = 1_000_000_000;
 /// Time between the survey and the headset, ns.
 const PAUSE_NS: i64 = 2 * SECOND_NS;
 /// Pictures of the scene, which the headset looks at in turn.
-const SCANS: usize = 3;
+const SCANS: usize = 6;
 /// Place of the house in the map, m, and its turn, rad.
 const HOUSE: [f64; 4] = [6.0, -4.0, 0.0, 0.6];
 
