@@ -18,6 +18,13 @@ pub fn verdict_code(verdict: Verdict) -> u8 {
     }
 }
 
+/// Name of the verdict of a message; NONE if it has none.
+pub fn verdict_name(code: u8) -> &'static str {
+    let mut all = Verdict::ALL.into_iter();
+    let found = all.find(|verdict| verdict_code(*verdict) == code);
+    found.map_or("NONE", Verdict::name)
+}
+
 /// All that is known of a calibration itself; header, frames and counts are the caller's.
 pub fn result_from(found: &Calibration) -> CalibrationResult {
     let weak = found.weak_directions.iter();

@@ -59,7 +59,7 @@ impl AbsoluteFit {
 /// A region of a cloud that the map does not explain.
 #[derive(Clone, Copy, PartialEq, Debug)]
 pub struct Unexplained {
-    /// What is wrong with it.
+    /// Kind of the misfit.
     pub kind: UnexplainedKind,
     /// Midst of its points, in the map, metres.
     pub place_m: Point3<f64>,

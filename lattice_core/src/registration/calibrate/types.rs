@@ -114,6 +114,15 @@ pub enum Verdict {
 }
 
 impl Verdict {
+    /// All of them.
+    pub const ALL: [Verdict; 5] = [
+        Verdict::Ok,
+        Verdict::Ambiguous,
+        Verdict::Degenerate,
+        Verdict::NoOverlap,
+        Verdict::RejectedInput,
+    ];
+
     /// Name as in `CalibrationResult.msg`.
     pub fn name(self) -> &'static str {
         match self {

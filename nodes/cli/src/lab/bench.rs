@@ -72,7 +72,7 @@ pub struct Quantize {
     /// Way to quantize
     #[arg(long, value_parser = choice(&QUANTIZERS), default_value = "batch")]
     method: QuantizeMethod,
-    /// What is written; indices only by `--method batch`
+    /// Output; indices only by `--method batch`
     #[arg(long, value_parser = choice(&OUTPUTS), default_value = "keys")]
     output: QuantizeOutput,
 }

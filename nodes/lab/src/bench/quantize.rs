@@ -34,7 +34,7 @@ impl QuantizeMethod {
     }
 }
 
-/// What the quantized points are written to.
+/// Output of a benchmark of quantizing.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum QuantizeOutput {
     /// Keys, in memory that was written before.

@@ -3,23 +3,21 @@
 use std::path::{Path, PathBuf};
 use std::process::Command;
 use std::sync::Arc;
-use std::time::{Duration, Instant};
+use std::time::Instant;
 
-use crossbeam_channel::{Receiver, unbounded};
 use lattice_lab::datasets::{Indoor, IndoorOptions, label_accuracy, write_indoor};
 use lattice_msgs::calibration::CalibrationResult;
+use lattice_nodes::convert::calibration::verdict_name;
 use lattice_nodes::convert::geometry::isometry_from_transform;
 use lattice_nodes::files::whole::write_text;
 use lattice_nodes::headset_cloud::HeadsetReport;
 use lattice_nodes::lattice_mapper::MapperReport;
 use lattice_nodes::report;
 use lattice_nodes::semantic_cloud::CloudReport;
-use lattice_runtime::env::Network;
-use lattice_runtime::qos::Qos;
-use lattice_runtime::ros_args::RosArgs;
-use lattice_runtime::{Load, LoopbackDomain, Runtime, Subscription};
+use lattice_runtime::LoopbackDomain;
 
 use super::indoor_report::IndoorReport;
+use super::indoor_results::Results;
 use crate::CliResult;
 use crate::progress::Progress;
 use crate::replay::node_process::NodeProcess;
@@ -49,9 +47,6 @@ const PERIOD_S: f64 = 0.125;
 const LOOKS: usize = 12;
 /// Pixels in a row of the images.
 const WIDTH: usize = 256;
-/// Time for an answer after the last look.
-const LAST_ANSWER: Duration = Duration::from_secs(60);
-
 /// Topics of the log that must reach their nodes whole.
 const INPUTS: [(&str, &str); 4] = [
     ("semantic_cloud", "/depth_registered/image_rect"),
@@ -94,18 +89,12 @@ pub struct IndoorDemo {
     pub json: bool,
 }
 
-/// Results of calibrations.
-type Results = Receiver<Arc<CalibrationResult>>;
-
 /// The processes of the nodes.
 struct Nodes {
     robot: NodeProcess,
     headset: NodeProcess,
     viewer: Option<NodeProcess>,
-    /// Results of calibrations as they come.
     results: Results,
-    _subscription: Subscription,
-    _runtime: Runtime,
 }
 
 impl IndoorDemo {
@@ -122,9 +111,9 @@ impl IndoorDemo {
             Some(_) => None,
             None => Some(LoopbackDomain::take()?),
         };
-        let mut nodes = self.start(domain.as_ref(), scratch.path())?;
+        let nodes = self.start(domain.as_ref(), scratch.path())?;
         self.play(domain.as_ref(), scratch.path())?;
-        let last = nodes.answer();
+        let last = nodes.results.last();
         let report = self.report(
             nodes.robot,
             nodes.headset,
@@ -162,7 +151,7 @@ impl IndoorDemo {
     }
 
     fn start(&self, domain: Option<&LoopbackDomain>, scratch: &Path) -> CliResult<Nodes> {
-        let (runtime, subscription, results) = listen(domain)?;
+        let results = Results::listen(domain)?;
         let map = |name: &str, value: &str| param(&format!("lattice_mapper:{name}"), value);
         let robot = [
             map("lattice", "cubic"),
@@ -205,8 +194,6 @@ impl IndoorDemo {
             headset: self.nodes(domain, scratch, &of_headset, &headset)?,
             viewer,
             results,
-            _subscription: subscription,
-            _runtime: runtime,
         })
     }
 
@@ -330,7 +317,7 @@ impl IndoorDemo {
             headset_points: headset.counts.look.points,
             verdict: last
                 .as_ref()
-                .map_or("none", |last| verdict(last))
+                .map_or("none", |last| verdict_name(last.verdict))
                 .to_owned(),
             reason: last
                 .as_ref()
@@ -343,61 +330,6 @@ impl IndoorDemo {
     }
 }
 
-impl Nodes {
-    /// The last result after the log: the first that is OK if none was before.
-    fn answer(&mut self) -> Option<Arc<CalibrationResult>> {
-        let mut last: Option<Arc<CalibrationResult>> = None;
-        let late = Instant::now() + LAST_ANSWER;
-        let is_ok = |last: &Option<Arc<CalibrationResult>>| {
-            last.as_ref()
-                .is_some_and(|last| last.verdict == CalibrationResult::OK)
-        };
-        loop {
-            // All that has come by now.
-            while let Ok(result) = self.results.try_recv() {
-                last = Some(result);
-            }
-            if is_ok(&last) {
-                return last;
-            }
-            match self.results.recv_deadline(late) {
-                Ok(result) => last = Some(result),
-                Err(_) => return last,
-            }
-        }
-    }
-}
-
-/// A node of this process that hears of calibrations.
-fn listen(domain: Option<&LoopbackDomain>) -> CliResult<(Runtime, Subscription, Results)> {
-    let mut network = Network::from_env()?;
-    network.localhost_only = true;
-    if let Some(domain) = domain {
-        network.domain_id = domain.id();
-    }
-    let args = RosArgs::parse(["--ros-args".to_owned()])?;
-    let runtime = Runtime::with_transport("lattice_demo", args, &network)?;
-    let node = runtime.node("lattice_demo")?;
-    let (tell, results) = unbounded();
-    let heard = move |result: Arc<CalibrationResult>| {
-        // Nobody listens any more at the end.
-        let _ = tell.send(result);
-    };
-    let subscription = node.subscribe("calibration", Qos::LATCHED, Load::Small, heard)?;
-    Ok((runtime, subscription, results))
-}
-
 fn report_file(scratch: &Path, node: &str) -> PathBuf {
     scratch.join(format!("{node}.json"))
-}
-
-fn verdict(result: &CalibrationResult) -> &'static str {
-    match result.verdict {
-        CalibrationResult::OK => "OK",
-        CalibrationResult::AMBIGUOUS => "AMBIGUOUS",
-        CalibrationResult::DEGENERATE => "DEGENERATE",
-        CalibrationResult::NO_OVERLAP => "NO_OVERLAP",
-        CalibrationResult::REJECTED_INPUT => "REJECTED_INPUT",
-        _ => "NONE",
-    }
 }

@@ -5,6 +5,8 @@ mod indoor;
 #[cfg(feature = "headset")]
 mod indoor_report;
 #[cfg(feature = "headset")]
+mod indoor_results;
+#[cfg(feature = "headset")]
 mod network;
 
 use super::{picture, simulate};
