@@ -140,16 +140,36 @@ fn what_cannot_be_used_is_refused_with_a_reason() {
     assert_eq!(few_nans.verdict, Verdict::Ok, "{}", few_nans.reason);
 }
 
+/// The points of a look for which something is so.
+fn seen(scan: HeadsetScan, is_so: impl Fn(&Point3<f64>, Option<u16>) -> bool) -> HeadsetScan {
+    let HeadsetScan { cloud, sensor_m } = scan;
+    let all = cloud.points_m.into_iter().zip(cloud.labels);
+    let (points_m, labels) = all.filter(|(p, l)| is_so(p, l.top())).unzip();
+    let cloud = SemanticCloud { points_m, labels };
+    HeadsetScan { cloud, sensor_m }
+}
+
 #[test]
 fn a_bare_wall_may_be_anywhere() {
     let flat = Flat::default();
-    let map = map(&flat);
-    let mut bare = scan(&flat, 5, &truth(5));
-    let points = bare.cloud.points_m.iter().zip(&bare.cloud.labels);
-    let wall = points.filter(|(_, label)| label.top() == Some(1));
-    (bare.cloud.points_m, bare.cloud.labels) = wall.map(|(p, l)| (*p, *l)).unzip();
-    let found = ask(&map, &[bare], None);
+    let bare = seen(scan(&flat, 5, &truth(5)), |_, label| label == Some(1));
+    let found = ask(&map(&flat), &[bare], None);
     assert_ne!(found.verdict, Verdict::Ok, "{}", found.reason);
+}
+
+#[test]
+fn looks_at_one_plane_do_not_drag_a_tracked_pose() {
+    let flat = Flat::default();
+    let (map, truth) = (map(&flat), truth(5));
+    let look = scan(&flat, 1, &truth);
+    let floor = seen(look.clone(), |p, _| (truth * p).z < 0.05);
+    assert!(floor.cloud.len() > 100);
+    let off = truth * Isometry3::new(Vector3::new(0.0, 0.0, 0.03), Vector3::z() * 0.005);
+    let follow = |look| track(&map, look, &off, &CalibrationOptions::default());
+    let update = follow(&floor);
+    assert!(update.fits && update.map_from_headset == off, "{update:?}");
+    // All of the look holds it.
+    assert!(distance(&follow(&look).map_from_headset, &truth).0 < 0.01);
 }
 
 #[test]

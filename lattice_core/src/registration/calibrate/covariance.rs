@@ -1,5 +1,7 @@
 //! Covariance of a pose.
 
+use std::collections::BTreeMap;
+
 use nalgebra::{
     Isometry3, Matrix2, Matrix2x6, Matrix3, Matrix3x6, Matrix6, Matrix6x3, Point3, Vector3, Vector6,
 };
@@ -81,6 +83,33 @@ impl PoseCovariance {
         let at_source = inverse * scatter * inverse;
         let finite = at_source.iter().all(|c| c.is_finite());
         (finite && !pulls.is_empty()).then_some(PoseCovariance { at_source })
+    }
+
+    /// At a pose, of what points tell across the surfaces of their partners: a plane holds nothing along itself, though
+    /// the nearest point of it does. Each region of the source counts as one point. None without six directions.
+    pub fn across_surfaces(
+        source: &PreparedCloud,
+        target: &PreparedCloud,
+        target_from_source: &Isometry3<f64>,
+        model: &ErrorModel,
+    ) -> Option<PoseCovariance> {
+        let turn = *target_from_source.rotation.to_rotation_matrix().matrix();
+        let mut regions: BTreeMap<[i64; 3], (Matrix6<f64>, f64)> = BTreeMap::new();
+        for point in source.points_m() {
+            let near = target.nearest(&(target_from_source * point), model.gate_m);
+            let Some(n) = near.and_then(|(j, _)| target.normals().get(j)) else {
+                continue;
+            };
+            let lever = jacobian(&turn, point).transpose() * n;
+            let region = regions.entry(region_of(point, model.region_m));
+            let (sum, points) = region.or_default();
+            *sum += lever * lever.transpose();
+            *points += 1.0;
+        }
+        let all = regions.values().map(|(sum, points)| sum / *points);
+        let at_source = all.sum::<Matrix6<f64>>().try_inverse()? * model.sigma_m.powi(2);
+        let finite = at_source.iter().all(|c| c.is_finite());
+        finite.then_some(PoseCovariance { at_source })
     }
 
     /// The pose and its covariance when both frames are known to stand upright up to `sigma_rad`.

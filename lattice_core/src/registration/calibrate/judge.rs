@@ -69,17 +69,9 @@ pub(super) fn answer(bench: &Workbench<'_>, all: Vec<Candidate>, started: bool) 
         Some((pose, sure)) if !stands => (pose, Some(sure)),
         _ => (pose, covariance),
     };
-    let directions = (covariance.as_ref())
-        .map(|c| c.directions(&pose, &middle))
-        .unwrap_or_default();
     let options = bench.options;
-    let weak: Vec<WeakDirection> = directions
-        .into_iter()
-        .filter(|d| match d.kind {
-            DirectionKind::Translation => d.sigma > options.max_sigma_m,
-            DirectionKind::Rotation => d.sigma > options.max_sigma_rad,
-        })
-        .collect();
+    let weak = covariance.as_ref().map(|sure| weak(bench, sure, &pose));
+    let weak = weak.unwrap_or_default();
     let (mut verdict, mut reason) = verdict(options, best, &margin, covariance.is_some(), &weak);
     let scale = scale(bench, best);
     if best.inlier_fraction >= options.min_inliers
@@ -115,6 +107,38 @@ pub(super) fn answer(bench: &Workbench<'_>, all: Vec<Candidate>, started: bool) 
         },
         scale,
     }
+}
+
+/// True if the surfaces hold a pose in all directions, as an answer must that is OK.
+pub(super) fn is_held(bench: &Workbench<'_>, candidate: &Candidate) -> bool {
+    let pose = &candidate.map_from_headset;
+    let gravity = bench.options.gravity_sigma_rad;
+    let (source, target) = (&bench.input.full, &bench.map.cloud);
+    let model = ErrorModel {
+        sigma_m: bench.options.noise_m,
+        ..error_model(bench, candidate)
+    };
+    let sure = PoseCovariance::across_surfaces(source, target, pose, &model);
+    let sure = sure.and_then(|sure| match gravity.is_finite() {
+        true => sure.upright(pose, gravity).map(|(_, sure)| sure),
+        false => Some(sure),
+    });
+    sure.is_some_and(|sure| weak(bench, &sure, pose).is_empty())
+}
+
+/// Directions in which a pose is not known well enough.
+fn weak(
+    bench: &Workbench<'_>,
+    covariance: &PoseCovariance,
+    pose: &Isometry3<f64>,
+) -> Vec<WeakDirection> {
+    let options = bench.options;
+    let mut directions = covariance.directions(pose, &bench.middle());
+    directions.retain(|d| match d.kind {
+        DirectionKind::Translation => d.sigma > options.max_sigma_m,
+        DirectionKind::Rotation => d.sigma > options.max_sigma_rad,
+    });
+    directions
 }
 
 /// Says that a pose does not stand upright, though both frames know where down is.

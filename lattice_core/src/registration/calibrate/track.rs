@@ -4,6 +4,7 @@ use nalgebra::Isometry3;
 
 use super::candidates::Workbench;
 use super::input::Input;
+use super::judge::is_held;
 use super::map::CalibrationMap;
 use super::types::{CalibrationOptions, CalibrationRequest, HeadsetScan};
 
@@ -25,6 +26,8 @@ pub struct TrackUpdate {
 
 /// Refines a known pose by one more look, cheaply: nothing is searched.
 ///
+/// A look that does not hold the pose in all directions, as one at a wall alone, tells no more than whether it fits:
+/// otherwise one after the other would drag the pose along what they do not see.
 /// A look that cannot be used fits as little as one from elsewhere.
 pub fn track(
     map: &CalibrationMap,
@@ -49,7 +52,8 @@ pub fn track(
     let old = bench.judge(&bench.fit, *map_from_headset, "tracking");
     let pose = bench.polish(map_from_headset);
     let new = bench.judge(&bench.fit, pose, "tracking");
-    let best = match new.total() > old.total() + BETTER {
+    let is_better = new.total() > old.total() + BETTER;
+    let best = match is_better && is_held(&bench, &new) {
         true => new,
         false => old,
     };
