@@ -86,6 +86,10 @@ impl HeadsetScans {
         self.kept.is_empty()
     }
 
+    pub fn len(&self) -> usize {
+        self.kept.len()
+    }
+
     /// Stamp of the newest; 0 without any.
     pub fn stamp_ns(&self) -> i64 {
         self.kept.back().map_or(0, |kept| kept.stamp_ns)

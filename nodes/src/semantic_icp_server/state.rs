@@ -89,7 +89,7 @@ impl SemanticIcpServer {
     /// Begins a search that confirms the known pose, if there are more looks than it was found with: one look alone
     /// can fit elsewhere as well.
     pub(super) fn confirm(&mut self, now_ns: i64, out: &mut Vec<Output>) {
-        let looks = self.headset_scans.all().len();
+        let looks = self.headset_scans.len();
         let is_due = self.known.as_ref().is_some_and(|known| looks > known.looks);
         let is_free = self.running.is_none() && self.wanted.is_none();
         if !is_due || !is_free || self.options.search != SearchWhen::Lost {
