@@ -64,6 +64,7 @@ impl SemanticIcpServer {
                 // They tell no more than that each fits.
                 Some(known) if found.verdict != Verdict::Ok => {
                     known.looks = running.headset_scans.len();
+                    self.answer_found(running.caller, found.verdict, &result, out);
                     return;
                 }
                 _ => {}
@@ -98,14 +99,27 @@ impl SemanticIcpServer {
             // A further look may tell.
             Verdict::Ambiguous | Verdict::Degenerate => self.missed(),
         }
-        if let Some(call) = running.caller {
-            let end = match found.verdict {
+        self.answer_found(running.caller, found.verdict, &result, out);
+        // That a place was confirmed is no news, and no answer to the cloud that came last.
+        if !running.confirms || moved {
+            self.publish(result, now_ns, out);
+        }
+    }
+
+    fn answer_found(
+        &self,
+        caller: Option<CallId>,
+        verdict: Verdict,
+        result: &CalibrationResult,
+        out: &mut Vec<Output>,
+    ) {
+        if let Some(call) = caller {
+            let end = match verdict {
                 Verdict::Ok => End::Found,
                 _ => End::Failed,
             };
             out.push(answer(call, end, result.clone()));
         }
-        self.publish(result, now_ns, out);
     }
 
     fn missed(&mut self) {

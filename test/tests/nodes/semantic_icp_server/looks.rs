@@ -2,7 +2,7 @@
 
 use lattice_core::registration::Verdict;
 use lattice_msgs::calibration::CalibrateGoal;
-use lattice_nodes::semantic_icp_server::ServerOptions;
+use lattice_nodes::semantic_icp_server::{ServerOptions, Work};
 use lattice_test::clouds::{SECOND_NS, cloud, labelled_cloud};
 
 use super::bench::{AMBIGUOUS, NONE, OK, REJECTED, bench, found, good};
@@ -135,6 +135,22 @@ fn a_pose_by_one_look_is_confirmed_by_the_next_or_withdrawn() {
     let counts = bench.machine.counts();
     assert_eq!((counts.confirmations, counts.poses_withdrawn), (2, 1));
     assert_eq!((counts.tracking_lost, counts.searches_ambiguous), (0, 1));
+
+    // Who asked meanwhile is answered, whatever comes of it, and nobody else hears that nothing is new.
+    let mut bench = super::bench::bench(ServerOptions::default());
+    bench.cloud(&good());
+    bench.search.verdicts = [found(Verdict::Ambiguous, 1.1)].into();
+    bench.send(&good());
+    let (job, results) = (bench.jobs.pop_front().unwrap(), bench.results.len());
+    let id = job.id;
+    let done = job.run(&mut bench.search, |_, _| ());
+    let outputs = bench.machine.on_done(id, done, bench.now_ns);
+    bench.put(outputs);
+    assert!(matches!(bench.jobs[0].work, Work::Calibrate { .. }));
+    bench.ask(1, &CalibrateGoal::default());
+    bench.work();
+    assert_eq!(bench.answered(0).0, 1);
+    assert_eq!(bench.results.len(), results);
 
     // Two looks that fit best elsewhere, and not for sure: then nothing is known.
     let mut bench = super::bench::bench(ServerOptions::default());
