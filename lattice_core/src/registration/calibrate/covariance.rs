@@ -5,7 +5,6 @@ use std::collections::BTreeMap;
 use nalgebra::{
     Isometry3, Matrix2, Matrix2x6, Matrix3, Matrix3x6, Matrix6, Matrix6x3, Point3, Vector3, Vector6,
 };
-use rustc_hash::FxHashMap;
 
 use super::super::PreparedCloud;
 use super::super::likelihood::region_of;
@@ -16,13 +15,26 @@ use crate::pose::se3;
 const KERNEL: f64 = 3.0;
 /// Squared tilt in standard deviations that is still believed; one in ten thousand is larger.
 const MAX_TILT_SQUARED: f64 = 18.4;
+/// Distance across surfaces, metres, below which points are not told to be closer.
+const CLOSEST_M: f64 = 0.005;
+/// Spacings of the target by which a surface errs whose normals are at right angles in the two clouds.
+const BENT: f64 = 0.8;
+/// Variance of the mean of two normals along a direction over the squared sine of the angle between them: the difference
+/// has twice the variance of each, the mean half of it, and two directions share both.
+const OF_MEAN_NORMAL: f64 = 0.125;
+/// Least share of the information of a direction that errors of the normals leave.
+const LEAST_LEFT: f64 = 1e-3;
+/// Information of a direction over that of the best held one, below which there is none.
+const NONE: f64 = 1e-9;
 
 /// Covariance of a pose whose source is a surface that is wrong by whole regions.
 ///
 /// Points of a region err together (a mesh is bent, a depth camera is off), which the inverse Hessian
 /// does not know: it would be far too small (Bonnabel et al., arXiv 1410.7632). So the pull of each
-/// region is what varies, once as the residuals show it and once as the source is known to err:
-/// H^-1 (sum over regions of the covariance of their pulls) H^-1.
+/// region is what varies: as the residuals show it, as the source is known to err, and as surfaces err that are not
+/// planes: H^-1 (sum over regions of the covariance of their pulls) H^-1. Points pull across surfaces only: a plane holds
+/// nothing along itself, though the nearest point of it does, nor does it by the noise of its normals, of which H is
+/// rid as in a regression whose regressors err.
 #[derive(Clone, Copy, PartialEq, Debug)]
 pub(super) struct PoseCovariance {
     /// Covariance of a motion and a turn in the source frame (rho, phi; right perturbation).
@@ -34,6 +46,10 @@ pub(super) struct ErrorModel {
     pub region_m: f64,
     /// Standard deviation of a region's place along each axis, metres.
     pub sigma_m: f64,
+    /// Standard deviation of points across surfaces, metres.
+    pub point_m: f64,
+    /// Spacing of the target's points, metres.
+    pub spacing_m: f64,
     /// Standard deviation of the source's scale.
     pub scale_sigma: f64,
     /// Place in the source from which its scale counts.
@@ -43,9 +59,11 @@ pub(super) struct ErrorModel {
 }
 
 /// Pull of the points of a region on the pose.
+#[derive(Clone, Copy, Default)]
 struct Pull {
     residual: Vector6<f64>,
     motion: Matrix6x3<f64>,
+    bend: Matrix6x3<f64>,
 }
 
 impl PoseCovariance {
@@ -56,60 +74,45 @@ impl PoseCovariance {
         target_from_source: &Isometry3<f64>,
         model: &ErrorModel,
     ) -> Option<PoseCovariance> {
-        let mut hessian = Matrix6::zeros();
+        let mut information = Information::default();
         let mut scaling = Vector6::zeros();
-        let mut pulls: FxHashMap<[i64; 3], Pull> = FxHashMap::default();
-        for term in terms(source, target, target_from_source, 1.0, model) {
-            let lever = term.jacobian.transpose() * term.weight;
-            hessian += lever * term.jacobian;
-            scaling += lever * term.stretch;
-            let region = region_of(&term.point, model.region_m);
-            let pull = pulls.entry(region).or_insert_with(|| Pull {
-                residual: Vector6::zeros(),
-                motion: Matrix6x3::zeros(),
-            });
-            pull.residual += lever * term.residual;
-            pull.motion += lever;
+        let mut pulls: BTreeMap<[i64; 3], Pull> = BTreeMap::new();
+        for (i, point) in source.points_m().iter().enumerate() {
+            let place = target_from_source * point;
+            let near = target.nearest(&place, model.gate_m);
+            let near = near
+                .and_then(|(j, _)| target.points_m().get(j).zip(target.normals().get(j)))
+                .zip(source.normals().get(i));
+            let Some(((partner, theirs), ours)) = near else {
+                continue;
+            };
+            let ours = target_from_source * ours;
+            let Some(across) = mean_normal(&ours, theirs) else {
+                continue;
+            };
+            let sine_squared = ours.cross(theirs).norm_squared().min(1.0);
+            let residual_m = across.dot(&(partner - place));
+            let sigmas = residual_m / model.point_m.max(CLOSEST_M);
+            let weight = (1.0 - sine_squared) / (1.0 + (sigmas / KERNEL).powi(2));
+            let lever = lever(target_from_source, point, &across);
+            information.add(weight, &lever, sine_squared, point);
+            scaling += lever * weight * across.dot(&(target_from_source * (point - model.center)));
+            let pull = pulls.entry(region_of(point, model.region_m)).or_default();
+            pull.residual += lever * weight * residual_m;
+            let motion = lever * weight * across.transpose();
+            pull.motion += motion;
+            pull.bend += motion * (BENT * model.spacing_m * sine_squared.sqrt());
         }
-        // In the order of the regions, so that the sum is the same every time.
-        let mut pulls: Vec<_> = pulls.into_iter().collect();
-        pulls.sort_by_key(|(region, _)| *region);
         let mut scatter = model.scale_sigma.powi(2) * scaling * scaling.transpose();
-        for (_, pull) in &pulls {
+        for pull in pulls.values() {
             scatter += pull.residual * pull.residual.transpose();
             scatter += model.sigma_m.powi(2) * pull.motion * pull.motion.transpose();
+            scatter += pull.bend * pull.bend.transpose();
         }
-        let inverse = hessian.try_inverse()?;
+        let inverse = information.inverse()?;
         let at_source = inverse * scatter * inverse;
         let finite = at_source.iter().all(|c| c.is_finite());
         (finite && !pulls.is_empty()).then_some(PoseCovariance { at_source })
-    }
-
-    /// At a pose, of what points tell across the surfaces of their partners: a plane holds nothing along itself, though
-    /// the nearest point of it does. Each region of the source counts as one point. None without six directions.
-    pub fn across_surfaces(
-        source: &PreparedCloud,
-        target: &PreparedCloud,
-        target_from_source: &Isometry3<f64>,
-        model: &ErrorModel,
-    ) -> Option<PoseCovariance> {
-        let turn = *target_from_source.rotation.to_rotation_matrix().matrix();
-        let mut regions: BTreeMap<[i64; 3], (Matrix6<f64>, f64)> = BTreeMap::new();
-        for point in source.points_m() {
-            let near = target.nearest(&(target_from_source * point), model.gate_m);
-            let Some(n) = near.and_then(|(j, _)| target.normals().get(j)) else {
-                continue;
-            };
-            let lever = jacobian(&turn, point).transpose() * n;
-            let region = regions.entry(region_of(point, model.region_m));
-            let (sum, points) = region.or_default();
-            *sum += lever * lever.transpose();
-            *points += 1.0;
-        }
-        let all = regions.values().map(|(sum, points)| sum / *points);
-        let at_source = all.sum::<Matrix6<f64>>().try_inverse()? * model.sigma_m.powi(2);
-        let finite = at_source.iter().all(|c| c.is_finite());
-        finite.then_some(PoseCovariance { at_source })
     }
 
     /// The pose and its covariance when both frames are known to stand upright up to `sigma_rad`.
@@ -207,62 +210,121 @@ impl PoseCovariance {
     }
 }
 
-/// A source point and its partner, linearised at a pose and a scale.
-pub(super) struct Term {
-    pub point: Point3<f64>,
-    /// Partner minus the point's place.
-    pub residual: Vector3<f64>,
-    /// Derivative of that by a motion and a turn on the right of the pose.
-    pub jacobian: Matrix3x6<f64>,
-    /// The opposite of its derivative by the scale.
-    pub stretch: Vector3<f64>,
-    /// Inverse covariance, times what the kernel leaves of it.
-    pub weight: Matrix3<f64>,
+/// Information on a pose, and that part of it which comes of errors of the normals.
+#[derive(Clone, Copy, Default)]
+struct Information {
+    all: Matrix6<f64>,
+    of_errors: Matrix6<f64>,
 }
 
-/// The points of a source that have a partner near their place.
-pub(super) fn terms<'a>(
-    source: &'a PreparedCloud,
-    target: &'a PreparedCloud,
-    target_from_source: &'a Isometry3<f64>,
-    scale: f64,
-    model: &'a ErrorModel,
-) -> impl Iterator<Item = Term> + 'a {
-    let turn = *target_from_source.rotation.to_rotation_matrix().matrix();
-    let points = source.points_m().iter().zip(source.covariances_m2());
-    points.filter_map(move |(point, spread)| {
-        let stretch = turn * (point - model.center);
-        let place = target_from_source * point + (scale - 1.0) * stretch;
-        let (j, _) = target.nearest(&place, model.gate_m)?;
-        let (q, n) = (target.points_m().get(j)?, target.normals().get(j)?);
-        let flat = 1.0 - target.plane_epsilon();
-        let c = Matrix3::identity() - flat * n * n.transpose();
-        let m = (c + turn * spread * turn.transpose()).try_inverse()?;
-        let residual = q - place;
-        let kernel = 1.0 / (1.0 + residual.dot(&(m * residual)) / (KERNEL * KERNEL));
-        Some(Term {
-            point: *point,
-            residual,
-            jacobian: jacobian(&turn, point),
-            stretch,
-            weight: m * kernel,
-        })
-    })
+impl Information {
+    fn add(&mut self, weight: f64, lever: &Vector6<f64>, sine_squared: f64, point: &Point3<f64>) {
+        self.all += lever * weight * lever.transpose();
+        // Errors of the normal go along the surface, in both directions alike.
+        let cross = point.coords.cross_matrix();
+        let mut isotropic = Matrix3x6::zeros();
+        isotropic.fixed_view_mut::<3, 3>(0, 0).fill_with_identity();
+        isotropic.fixed_view_mut::<3, 3>(0, 3).copy_from(&-cross);
+        let along = isotropic.transpose() * isotropic - lever * lever.transpose();
+        self.of_errors += along * (weight * OF_MEAN_NORMAL * sine_squared);
+    }
+
+    /// Inverse of what is left without the errors; None if there is nothing.
+    fn inverse(&self) -> Option<Matrix6<f64>> {
+        let eigen = self.all.symmetric_eigen();
+        let most = eigen.eigenvalues.max();
+        if !(most.is_finite() && most > 0.0) {
+            return None;
+        }
+        let root = |value: f64| 1.0 / value.max(NONE * most).sqrt();
+        let whitened = eigen.eigenvectors * Matrix6::from_diagonal(&eigen.eigenvalues.map(root));
+        let left = whitened.transpose() * (self.all - self.of_errors) * whitened;
+        let left = (0.5 * (left + left.transpose())).symmetric_eigen();
+        let basis = whitened * left.eigenvectors;
+        let inverse = left.eigenvalues.map(|value| 1.0 / value.max(LEAST_LEFT));
+        Some(basis * Matrix6::from_diagonal(&inverse) * basis.transpose())
+    }
 }
 
-/// Jacobian of q - T p by a motion and a turn on the right of T.
-fn jacobian(turn: &Matrix3<f64>, point: &Point3<f64>) -> Matrix3x6<f64> {
-    let mut jacobian = Matrix3x6::zeros();
-    jacobian.fixed_view_mut::<3, 3>(0, 0).copy_from(&-turn);
-    let lever = turn * point.coords.cross_matrix();
-    jacobian.fixed_view_mut::<3, 3>(0, 3).copy_from(&lever);
-    jacobian
+/// Mean of two unit normals whose signs mean nothing; None if one of them is not a normal.
+fn mean_normal(ours: &Vector3<f64>, theirs: &Vector3<f64>) -> Option<Vector3<f64>> {
+    let sign = 1.0_f64.copysign(ours.dot(theirs));
+    (theirs + ours * sign).try_normalize(1e-6)
+}
+
+/// Derivative of a point's residual across a surface by a motion and a turn on the right of the pose, times -1.
+fn lever(
+    target_from_source: &Isometry3<f64>,
+    point: &Point3<f64>,
+    across: &Vector3<f64>,
+) -> Vector6<f64> {
+    let across = target_from_source.inverse_transform_vector(across);
+    let turning = point.coords.cross(&across);
+    Vector6::new(
+        across.x, across.y, across.z, turning.x, turning.y, turning.z,
+    )
 }
 
 #[cfg(test)]
 mod tests {
     use super::*;
+    use crate::registration::{PrepareOptions, SemanticCloud};
     use nalgebra::UnitQuaternion;
+
+    const SPACING_M: f64 = 0.05;
+
+    /// Points of walls of 2 m by 2 m with these normals, each moved by up to a centimetre across its wall, otherwise
+    /// for each seed.
+    fn walls(normals: &[Vector3<f64>], seed: u64) -> PreparedCloud {
+        let mut state = seed;
+        let mut noise_m = || {
+            state = state
+                .wrapping_mul(6_364_136_223_846_793_005)
+                .wrapping_add(1);
+            0.02 * ((state >> 40) as f64 / (1_u64 << 24) as f64 - 0.5)
+        };
+        let mut points_m = Vec::new();
+        for normal in normals {
+            let along = Vector3::new(normal.y, normal.z, normal.x);
+            let other = Vector3::new(normal.z, normal.x, normal.y);
+            for (i, j) in (0..40).flat_map(|i| (0..40).map(move |j| (i, j))) {
+                let [i, j] = [i, j].map(|k| SPACING_M * (f64::from(k) + 0.5));
+                points_m.push(Point3::from(along * i + other * j + normal * noise_m()));
+            }
+        }
+        let labels = Vec::new();
+        let cloud = SemanticCloud { points_m, labels };
+        PreparedCloud::new(cloud, &PrepareOptions::default()).unwrap()
+    }
+
+    /// Standard deviations of the place, metres, the largest first.
+    fn sigmas(normals: &[Vector3<f64>]) -> [f64; 3] {
+        let model = ErrorModel {
+            region_m: 1.0,
+            sigma_m: 0.02,
+            point_m: 0.01,
+            spacing_m: SPACING_M,
+            scale_sigma: 0.0,
+            center: Point3::origin(),
+            gate_m: 6.0 * SPACING_M,
+        };
+        let (source, target) = (walls(normals, 1), walls(normals, 2));
+        let pose = Isometry3::identity();
+        let sure = PoseCovariance::at(&source, &target, &pose, &model).unwrap();
+        let (_, sure) = sure.upright(&pose, 0.006).unwrap();
+        let all = sure.directions(&pose, &Point3::new(1.0, 1.0, 1.0));
+        [all[0].sigma, all[1].sigma, all[2].sigma]
+    }
+
+    #[test]
+    fn a_wall_holds_a_pose_across_it_only_however_its_normals_scatter() {
+        let [x, y, z] = [Vector3::x(), Vector3::y(), Vector3::z()];
+        let [first, second, third] = sigmas(&[x]);
+        assert!(first > 0.1 && second > 0.1 && third < 0.01);
+        let [first, second, _] = sigmas(&[x, y]);
+        assert!(first > 0.05 && second < 0.01);
+        assert!(sigmas(&[x, y, z])[0] < 0.01);
+    }
 
     #[test]
     fn a_pose_that_leans_a_little_is_set_upright() {

@@ -49,15 +49,7 @@ pub(super) fn answer(bench: &Workbench<'_>, all: Vec<Candidate>, started: bool) 
         unexplained: bench.fit.observations() * (1.0 - best.inlier_fraction),
     };
     let fit = absolute_fit(bench, &pose);
-    let covariance = covariance(bench, best).map(|sure| {
-        let near = all
-            .iter()
-            .filter(|c| c.is_near(&pose, &middle, shift_m, turn_rad));
-        near.fold(sure, |sure, rival| {
-            let odds = ((rival.total() - best.total()) / SOFTNESS).exp().min(1.0);
-            sure.with_rival(&pose, &rival.map_from_headset, odds / (1.0 + odds))
-        })
-    });
+    let covariance = covariance(bench, best);
     // Both frames know where down is; but what GICP made of a start stands as it is.
     let gravity = bench.options.gravity_sigma_rad;
     let stands = started && all.first().is_some_and(|gicp| std::ptr::eq(gicp, best));
@@ -69,6 +61,13 @@ pub(super) fn answer(bench: &Workbench<'_>, all: Vec<Candidate>, started: bool) 
         Some((pose, sure)) if !stands => (pose, Some(sure)),
         _ => (pose, covariance),
     };
+    let covariance = covariance.map(|sure| {
+        let near = (all.iter()).filter(|c| c.is_near(&pose, &middle, shift_m, turn_rad));
+        near.fold(bench.probed(&pose, sure), |sure, rival| {
+            let odds = ((rival.total() - best.total()) / SOFTNESS).exp().min(1.0);
+            sure.with_rival(&pose, &rival.map_from_headset, odds / (1.0 + odds))
+        })
+    });
     let options = bench.options;
     let weak = covariance.as_ref().map(|sure| weak(bench, sure, &pose));
     let weak = weak.unwrap_or_default();
@@ -113,12 +112,7 @@ pub(super) fn answer(bench: &Workbench<'_>, all: Vec<Candidate>, started: bool) 
 pub(super) fn is_held(bench: &Workbench<'_>, candidate: &Candidate) -> bool {
     let pose = &candidate.map_from_headset;
     let gravity = bench.options.gravity_sigma_rad;
-    let (source, target) = (&bench.input.full, &bench.map.cloud);
-    let model = ErrorModel {
-        sigma_m: bench.options.noise_m,
-        ..error_model(bench, candidate)
-    };
-    let sure = PoseCovariance::across_surfaces(source, target, pose, &model);
+    let sure = covariance(bench, candidate);
     let sure = sure.and_then(|sure| match gravity.is_finite() {
         true => sure.upright(pose, gravity).map(|(_, sure)| sure),
         false => Some(sure),
@@ -272,6 +266,8 @@ fn error_model(bench: &Workbench<'_>, best: &Candidate) -> ErrorModel {
         region_m: options.region_m,
         // A cloud that fits far closer than expected also errs less as a whole.
         sigma_m: options.noise_m.min(INVISIBLE * best.rmse_m),
+        point_m: best.rmse_m,
+        spacing_m: bench.map.spacing_m,
         scale_sigma: options.scale_sigma,
         center: bench.input.sensor_m.unwrap_or_else(|| bench.middle()),
         gate_m: 6.0 * bench.map.spacing_m,

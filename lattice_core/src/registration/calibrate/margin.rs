@@ -1,7 +1,7 @@
 //! Margin of a pose over all others, and the probability that another is right.
 
 /// Log-likelihood that is worth a natural logarithm of odds: observations are not independent.
-pub(super) const SOFTNESS: f64 = 6.0;
+pub(super) const SOFTNESS: f64 = 5.0;
 /// The same for each standard deviation that chance gives the margin.
 const PER_CHANCE: f64 = 0.43;
 /// The same for each observation without a partner, which might have one elsewhere.

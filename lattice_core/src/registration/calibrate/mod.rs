@@ -11,6 +11,7 @@ mod input;
 mod judge;
 mod map;
 mod margin;
+mod probe;
 mod profile;
 mod rays;
 mod readings;

@@ -1,14 +1,16 @@
 //! Scale of a source cloud, estimated with its pose.
 
-use nalgebra::{Isometry3, OMatrix, SMatrix, SVector, U7};
+use nalgebra::{Isometry3, Matrix3, Matrix3x6, OMatrix, Point3, SMatrix, SVector, U7, Vector3};
 use std::collections::BTreeMap;
 
 use super::super::PreparedCloud;
 use super::super::likelihood::region_of;
-use super::covariance::{ErrorModel, terms};
+use super::covariance::ErrorModel;
 use super::types::{Calibration, CalibrationRequest, HeadsetScan, ScaleEstimate};
 use crate::pose::se3;
 
+/// Distance in standard deviations at which a point counts half.
+const KERNEL: f64 = 3.0;
 /// Steps of Gauss and Newton, with new partners before each.
 const STEPS: usize = 10;
 /// Change of the scale below which a step is none.
@@ -160,4 +162,56 @@ impl Pulls {
         }
         pulls
     }
+}
+
+/// A source point and its partner, linearised at a pose and a scale.
+struct Term {
+    point: Point3<f64>,
+    /// Partner minus the point's place.
+    residual: Vector3<f64>,
+    /// Derivative of that by a motion and a turn on the right of the pose.
+    jacobian: Matrix3x6<f64>,
+    /// The opposite of its derivative by the scale.
+    stretch: Vector3<f64>,
+    /// Inverse covariance, times what the kernel leaves of it.
+    weight: Matrix3<f64>,
+}
+
+/// The points of a source that have a partner near their place.
+fn terms<'a>(
+    source: &'a PreparedCloud,
+    target: &'a PreparedCloud,
+    target_from_source: &'a Isometry3<f64>,
+    scale: f64,
+    model: &'a ErrorModel,
+) -> impl Iterator<Item = Term> + 'a {
+    let turn = *target_from_source.rotation.to_rotation_matrix().matrix();
+    let points = source.points_m().iter().zip(source.covariances_m2());
+    points.filter_map(move |(point, spread)| {
+        let stretch = turn * (point - model.center);
+        let place = target_from_source * point + (scale - 1.0) * stretch;
+        let (j, _) = target.nearest(&place, model.gate_m)?;
+        let (q, n) = (target.points_m().get(j)?, target.normals().get(j)?);
+        let flat = 1.0 - target.plane_epsilon();
+        let c = Matrix3::identity() - flat * n * n.transpose();
+        let m = (c + turn * spread * turn.transpose()).try_inverse()?;
+        let residual = q - place;
+        let kernel = 1.0 / (1.0 + residual.dot(&(m * residual)) / (KERNEL * KERNEL));
+        Some(Term {
+            point: *point,
+            residual,
+            jacobian: jacobian(&turn, point),
+            stretch,
+            weight: m * kernel,
+        })
+    })
+}
+
+/// Jacobian of q - T p by a motion and a turn on the right of T.
+fn jacobian(turn: &Matrix3<f64>, point: &Point3<f64>) -> Matrix3x6<f64> {
+    let mut jacobian = Matrix3x6::zeros();
+    jacobian.fixed_view_mut::<3, 3>(0, 0).copy_from(&-turn);
+    let lever = turn * point.coords.cross_matrix();
+    jacobian.fixed_view_mut::<3, 3>(0, 3).copy_from(&lever);
+    jacobian
 }
