@@ -14,13 +14,11 @@ use lattice_msgs::{RosMessage, cdr, std_msgs};
 use super::{IndoorOptions, SECOND_NS, messages, truth};
 use crate::AnyError;
 use crate::datasets::write::spec;
-use crate::simulate::house::{HeadsetTrial, House, RobotView, RoomCamera, RoomImages, robot_views};
+use crate::simulate::house::{HeadsetTrial, House, RoomCamera, RoomImages, robot_views};
 
 /// Time between two looks of the headset, and between two of its poses, ns.
 const LOOK_NS: i64 = SECOND_NS;
 const POSE_NS: i64 = SECOND_NS / 10;
-/// Views of the robot from one place.
-const VIEWS_A_STOP: usize = 8;
 
 /// The log as it grows.
 pub(super) struct Log<'a> {
@@ -83,7 +81,7 @@ impl Log<'_> {
             let names = messages::label_info("camera", self.at_ns, self.house.class_names());
             self.write("/labels/label_info", &names)?;
         }
-        let walk = walk(&robot_views(self.house, views, seed)?);
+        let walk = robot_views(self.house, views, seed)?;
         for (number, view) in walk.iter().enumerate() {
             let image = self.rooms.take(&camera, &view.truth, number as u64);
             let depth_m = image.measured_depth_m(number as u64);
@@ -178,21 +176,4 @@ impl Log<'_> {
         }
         Ok(())
     }
-}
-
-/// The views stop by stop, from each stop to the nearest one that is left.
-fn walk(views: &[RobotView]) -> Vec<RobotView> {
-    let at = |stop: &[RobotView]| stop.first().map(|view| view.truth.translation.vector);
-    let mut left: Vec<&[RobotView]> = views.chunks(VIEWS_A_STOP).collect();
-    let mut walk: Vec<RobotView> = Vec::with_capacity(views.len());
-    let mut here = left.first().and_then(|stop| at(stop)).unwrap_or_default();
-    while !left.is_empty() {
-        let apart_m = |stop: &&[RobotView]| at(stop).map_or(0.0, |there| (there - here).norm());
-        let numbered = left.iter().map(apart_m).enumerate();
-        let nearest = numbered.min_by(|a, b| a.1.total_cmp(&b.1));
-        let stop = left.remove(nearest.map_or(0, |(number, _)| number));
-        here = at(stop).unwrap_or(here);
-        walk.extend(stop);
-    }
-    walk
 }
