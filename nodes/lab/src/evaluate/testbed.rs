@@ -1,8 +1,8 @@
 //! The testbed of the trials: the house, the robot's maps of it and the views of the headset.
 
-use super::initial_guess::seed_of;
 use super::settings::{Pivot, Settings};
 use crate::AnyError;
+use crate::random::seed_of;
 use crate::simulate::house::{
     HeadsetTrial, House, HouseScan, LabelDraw, Scene, Survey, SurveyMap, SurveyOptions,
 };

@@ -14,11 +14,15 @@ use lattice_msgs::{RosMessage, cdr, std_msgs};
 use super::{IndoorOptions, SECOND_NS, messages, truth};
 use crate::AnyError;
 use crate::datasets::write::spec;
+use crate::random::seed_of;
 use crate::simulate::house::{HeadsetTrial, House, RoomCamera, RoomImages, robot_views};
 
 /// Time between two looks of the headset, and between two of its poses, ns.
 const LOOK_NS: i64 = SECOND_NS;
 const POSE_NS: i64 = SECOND_NS / 10;
+/// Parts of the seeds of noise: whose camera it is.
+const ROBOT: u64 = 0;
+const HEADSET: u64 = 1;
 
 /// The log as it grows.
 pub(super) struct Log<'a> {
@@ -83,8 +87,9 @@ impl Log<'_> {
         }
         let walk = robot_views(self.house, views, seed)?;
         for (number, view) in walk.iter().enumerate() {
-            let image = self.rooms.take(&camera, &view.truth, number as u64);
-            let depth_m = image.measured_depth_m(number as u64);
+            let noise = seed_of(&[seed, ROBOT, number as u64]);
+            let image = self.rooms.take(&camera, &view.truth, noise);
+            let depth_m = image.measured_depth_m(noise);
             let map_from_camera = map_from_house * view.measured;
             let stamp_ns = self.at_ns;
             self.write("/tf", &messages::robot(stamp_ns, &map_from_camera))?;
@@ -157,9 +162,8 @@ impl Log<'_> {
             let stamp_ns = self.at_ns - LOOK_NS / 2;
             self.at_ns -= POSE_NS / 2;
             let house_from_camera = headset_from_house.inverse() * pose;
-            let image = self
-                .rooms
-                .take(&camera, &house_from_camera, 1000 + look as u64);
+            let noise = seed_of(&[self.options.seed, HEADSET, look as u64]);
+            let image = self.rooms.take(&camera, &house_from_camera, noise);
             let info = camera.camera_info("headset_camera", stamp_ns);
             self.write("/headset/camera_info", &info)?;
             let size = [image.width, image.height];

@@ -20,8 +20,8 @@ use lattice_runtime::params::Params;
 use nalgebra::{Isometry3, Point3};
 
 use crate::AnyError;
-use crate::evaluate::initial_guess::seed_of;
 use crate::mesh::LabelledMesh;
+use crate::random::seed_of;
 use crate::simulate::house::{
     HeadsetTrial, House, HouseScan, RoomCamera, RoomImage, RoomImages, robot_views,
 };
