@@ -10,6 +10,8 @@ use lattice_msgs::sensor_msgs::{CameraInfo, Image};
 use lattice_msgs::tf2_msgs::TFMessage;
 use lattice_msgs::vision_msgs::LabelInfo;
 use lattice_msgs::{RosMessage, cdr, std_msgs};
+use lattice_nodes::convert::geometry::header;
+use lattice_nodes::convert::headset_mesh::{chunks_for, in_chunks};
 
 use super::{IndoorOptions, SECOND_NS, messages, truth};
 use crate::AnyError;
@@ -82,7 +84,7 @@ impl Log<'_> {
         let period_ns = (self.options.period_s * 1e9) as i64;
         let map_from_house = self.house.map_from_house();
         if !self.options.colors {
-            let names = messages::label_info("camera", self.at_ns, self.house.class_names());
+            let names = self.house.label_info(header("camera", self.at_ns));
             self.write("/labels/label_info", &names)?;
         }
         let walk = robot_views(self.house, views, seed)?;
@@ -95,18 +97,18 @@ impl Log<'_> {
             self.write("/tf", &messages::robot(stamp_ns, &map_from_camera))?;
             let info = camera.camera_info("camera", stamp_ns);
             self.write("/rgb/camera_info", &info)?;
-            let size = [image.width, image.height];
+            let stamped = header("camera", stamp_ns);
             match self.options.colors {
                 true => {
-                    let colors = messages::rgb8("camera", stamp_ns, size, &image.rgb);
+                    let colors = image.colors_message(stamped.clone());
                     self.write("/rgb/image_rect_color", &colors)?;
                 }
                 false => {
-                    let labels = messages::mono16("camera", stamp_ns, size, &image.labels);
+                    let labels = image.labels_message(stamped.clone());
                     self.write("/labels/image", &labels)?;
                 }
             }
-            let depth = messages::depth("camera", stamp_ns, size, &depth_m);
+            let depth = image.depth_message(stamped, &depth_m);
             self.write("/depth_registered/image_rect", &depth)?;
             truth::insert(
                 &mut self.truth,
@@ -137,13 +139,12 @@ impl Log<'_> {
         let data = session.clone();
         self.write("/headset/session", &std_msgs::String { data })?;
         if !self.options.colors {
-            let names =
-                messages::label_info("headset_camera", self.at_ns, self.house.class_names());
+            let names = self.house.label_info(header("headset_camera", self.at_ns));
             self.write("/headset/labels/label_info", &names)?;
         }
-        let chunks = messages::mesh(self.at_ns, &session, &trial.mesh, &headset_from_house);
-        for chunk in &chunks {
-            self.write("/headset/mesh", chunk)?;
+        let mesh = trial.mesh_message(self.house, header("headset_origin", self.at_ns), &session);
+        for chunk in in_chunks(&mesh, chunks_for(&mesh)) {
+            self.write("/headset/mesh", &chunk)?;
         }
         let from_ns = self.at_ns;
         for look in 0..self.options.looks {
@@ -166,16 +167,10 @@ impl Log<'_> {
             let image = self.rooms.take(&camera, &house_from_camera, noise);
             let info = camera.camera_info("headset_camera", stamp_ns);
             self.write("/headset/camera_info", &info)?;
-            let size = [image.width, image.height];
+            let stamped = header("headset_camera", stamp_ns);
             match self.options.colors {
-                true => {
-                    let colors = messages::rgb8("headset_camera", stamp_ns, size, &image.rgb);
-                    self.write("/headset/image", &colors)?;
-                }
-                false => {
-                    let labels = messages::mono16("headset_camera", stamp_ns, size, &image.labels);
-                    self.write("/headset/labels/image", &labels)?;
-                }
+                true => self.write("/headset/image", &image.colors_message(stamped))?,
+                false => self.write("/headset/labels/image", &image.labels_message(stamped))?,
             }
         }
         Ok(())
