@@ -3,7 +3,7 @@
 use super::initial_guess::perturbed;
 use super::methods::Baseline;
 use super::results::{Results, name};
-use super::settings::{Cell, Plan, Start};
+use super::settings::{Cell, Plan, Start, check_seeds};
 use super::testbed::{Scenario, Testbed};
 use super::trial::{OURS, TIMED, TRACKED, Trial, rounded};
 use crate::random::seed_of;
@@ -62,6 +62,7 @@ pub fn run(
     threads: usize,
     progress: &mut dyn FnMut(usize, usize),
 ) -> Result<(), AnyError> {
+    check_seeds(plan.seeds)?;
     let done = results.done();
     let [jobs, timed] = [false, true].map(|timed| jobs(plan, &done, timed));
     let total = jobs.iter().chain(&timed).map(|job| job.tasks.len()).sum();

@@ -24,7 +24,7 @@ use rayon::prelude::*;
 use super::initial_guess::perturbed;
 use super::methods::Baseline;
 use super::results::name;
-use super::settings::{Cell, Settings, Start};
+use super::settings::{Cell, Settings, Start, check_seeds};
 use super::trial::{LabelsRight, OURS, Trial, rounded};
 use super::{Results, read_house};
 use crate::options::within;
@@ -116,6 +116,7 @@ pub fn run_chain(
     results: &mut Results,
     progress: &mut dyn FnMut(usize, usize),
 ) -> Result<(), AnyError> {
+    check_seeds(options.seeds)?;
     let chain = Chain::new(options)?;
     let done = results.done();
     let all = (0..options.seeds).flat_map(|seed| Scene::ALL.map(|scene| (seed, scene)));
