@@ -75,10 +75,10 @@ pub fn run_cases<C: Case>(
         let left = &left;
         scope.spawn(move || {
             pool.install(|| {
-                left.par_iter().with_max_len(1).for_each(|(cell, case)| {
-                    // The receiver is gone only after an error.
-                    let _ = sender.send(case.run(cell));
-                });
+                // The receiver is gone only after an error: then no more trials begin.
+                let trials = left.par_iter().with_max_len(1);
+                let _ =
+                    trials.try_for_each(|(cell, case)| sender.send(case.run(cell)).map_err(drop));
             });
         });
         for (i, trial) in receiver.into_iter().enumerate() {
