@@ -34,7 +34,7 @@ mod tests {
     #[test]
     fn the_network_labels_rooms_that_it_has_not_seen() {
         use crate::simulate::house::{House, RoomCamera, RoomImages, look_views, robot_views};
-        use lattice_msgs::sensor_msgs::Image;
+        use lattice_msgs::std_msgs::Header;
         use lattice_nodes::segmenter::{Segmenter, SegmenterOptions, read_network};
 
         let folder = tempfile::tempdir().unwrap();
@@ -51,14 +51,7 @@ mod tests {
         let (mut right, mut all) = (0, 0);
         for (number, (camera, pose)) in robot.chain(looks).enumerate() {
             let image = rooms.take(&camera, &pose, number as u64);
-            let labelled = machine.on_image(&Image {
-                height: image.height as u32,
-                width: image.width as u32,
-                encoding: "rgb8".to_owned(),
-                step: 3 * image.width as u32,
-                data: image.rgb.clone().into(),
-                ..Image::default()
-            });
+            let labelled = machine.on_image(&image.colors_message(Header::default()));
             let labels = labelled.unwrap().labels;
             let [width, height] = [labels.width, labels.height].map(|side| side as usize);
             for (pixel, label) in image.labels.iter().enumerate() {

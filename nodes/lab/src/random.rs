@@ -1,4 +1,4 @@
-//! Streams of random numbers that depend on nothing but a seed and a number, and uniform rotations.
+//! Streams of random numbers that depend on nothing but a seed and a number, seeds of seeds, and uniform rotations.
 
 use nalgebra::{Quaternion, UnitQuaternion, Vector3};
 use rand_chacha::ChaCha8Rng;
@@ -64,9 +64,42 @@ pub fn arvo([turn, around, height]: [f64; 3]) -> UnitQuaternion<f64> {
     UnitQuaternion::new_normalize(Quaternion::from_parts(0.0, axis)) * turn
 }
 
+/// The next number of SplitMix64 (Steele, Lea & Flood 2014).
+pub(crate) fn mix(state: &mut u64) -> u64 {
+    *state = state.wrapping_add(0x9e37_79b9_7f4a_7c15);
+    let mut z = *state;
+    z = (z ^ (z >> 30)).wrapping_mul(0xbf58_476d_1ce4_e5b9);
+    z = (z ^ (z >> 27)).wrapping_mul(0x94d0_49bb_1331_11eb);
+    z ^ (z >> 31)
+}
+
+/// A seed for a purpose, from others.
+pub(crate) fn seed_of(parts: &[u64]) -> u64 {
+    let mut state = 0;
+    for part in parts {
+        state = mix(&mut state) ^ part;
+    }
+    mix(&mut state)
+}
+
 #[cfg(test)]
 mod tests {
     use super::*;
+
+    #[test]
+    fn seeds_are_those_of_all_their_parts() {
+        let parts: [&[u64]; 6] = [
+            &[1, 0, 0],
+            &[2, 0, 0],
+            &[1, 1, 0],
+            &[1, 0, 1],
+            &[1, 0],
+            &[0, 1],
+        ];
+        let seeds: std::collections::BTreeSet<u64> = parts.map(seed_of).into();
+        assert_eq!(seeds.len(), parts.len());
+        assert_eq!(seed_of(parts[0]), seed_of(&[1, 0, 0]));
+    }
 
     #[test]
     fn rotations_are_uniform() {

@@ -3,6 +3,7 @@
 pub mod calibration;
 pub mod cloud;
 pub mod geometry;
+pub mod headset_mesh;
 pub mod map;
 pub mod semantic;
 pub mod viewpoint;

@@ -1,7 +1,7 @@
 //! Fields `vp_x`, `vp_y`, `vp_z` of a cloud: the place of the sensor when it saw the point, in the
 //! frame of the cloud. Rays from there are free space.
 
-use lattice_core::cloud::{CloudError, CloudLimits, PointField};
+use lattice_core::cloud::{CloudError, CloudLimits, CloudView, PointField};
 use lattice_msgs::sensor_msgs::{self, PointCloud2};
 use nalgebra::Vector3;
 
@@ -40,28 +40,26 @@ pub fn viewpoints_from_message(
 ) -> Result<Option<Vec<Vector3<f64>>>, CloudError> {
     let layout = layout_of(cloud);
     let view = layout.view(&cloud.data, limits)?;
-    let field = |name: &str| view.fields().iter().find(|field| field.name == name);
-    let [Some(x), Some(y), Some(z)] = VIEWPOINT_FIELDS.map(field) else {
-        return Ok(None);
-    };
-    let at = |i| Vector3::new(view.scalar(x, i), view.scalar(y, i), view.scalar(z, i));
-    Ok(Some((0..view.len()).map(at).collect()))
+    Ok(viewpoints(&view).map(Iterator::collect))
 }
 
 /// The one viewpoint of all points of a cloud, in its frame; `None` if it is not known, or moved by more than
 /// `max_moved_m` from that of the first point.
-pub fn viewpoint_from_message(
-    cloud: &PointCloud2,
-    limits: &CloudLimits,
-    max_moved_m: f64,
-) -> Result<Option<Vector3<f64>>, CloudError> {
-    let all = viewpoints_from_message(cloud, limits)?.unwrap_or_default();
+pub fn viewpoint_of(view: &CloudView, max_moved_m: f64) -> Option<Vector3<f64>> {
+    let mut all = viewpoints(view)?;
+    let first = all.next()?;
     // A distance from NaN is below no limit.
-    let Some(first) = all.first() else {
-        return Ok(None);
+    let is_still = |v: Vector3<f64>| (v - first).norm() <= max_moved_m;
+    (is_still(first) && all.all(is_still)).then_some(first)
+}
+
+fn viewpoints(view: &CloudView) -> Option<impl Iterator<Item = Vector3<f64>>> {
+    let field = |name: &str| view.fields().iter().find(|field| field.name == name);
+    let [Some(x), Some(y), Some(z)] = VIEWPOINT_FIELDS.map(field) else {
+        return None;
     };
-    let still = all.iter().all(|v| (v - first).norm() <= max_moved_m);
-    Ok(still.then_some(*first))
+    let at = |i| Vector3::new(view.scalar(x, i), view.scalar(y, i), view.scalar(z, i));
+    Some((0..view.len()).map(at))
 }
 
 #[cfg(test)]
@@ -88,7 +86,9 @@ mod tests {
     fn a_sensor_that_stood_still_has_one_viewpoint() {
         let limits = CloudLimits::default();
         let one = |names, viewpoints: &[[f32; 3]]| {
-            viewpoint_from_message(&cloud(names, viewpoints), &limits, 0.1).unwrap()
+            let cloud = cloud(names, viewpoints);
+            let layout = layout_of(&cloud);
+            viewpoint_of(&layout.view(&cloud.data, &limits).unwrap(), 0.1)
         };
         let here = [4.0, 5.0, 6.0];
         let near = [4.0, 5.0, 6.05];

@@ -22,7 +22,7 @@ use super::hub::Hub;
 use super::inputs::{Input, InputRefusal};
 use super::offer::{MAX_MESSAGE_BYTES, MESSAGE_HEAD_BYTES};
 use super::outbox::Outgoing;
-use super::protocol::{message_data, status};
+use super::protocol::message_data;
 
 /// Time for a request to come.
 const HEAD_TIME: Duration = Duration::from_secs(5);
@@ -143,7 +143,7 @@ async fn talk(
                 if let Some(bridge) = hub.bridge() {
                     bridge.inputs().refused(refusal);
                 }
-                refused(hub, id, &mut flow, refusal);
+                hub.refuse(id, refusal);
                 Step::Done
             }
             Event::Come(Some(Ok(Message::Text(text)))) => desk.text(&text),
@@ -172,7 +172,7 @@ async fn talk(
             },
             Step::Input(input) => {
                 if let Some(refusal) = take(hub, id, &mut flow, input) {
-                    refused(hub, id, &mut flow, refusal);
+                    hub.refuse(id, refusal);
                 }
             }
             Step::Tell(text) => hub.tell(id, Outgoing::Text(text)),
@@ -191,13 +191,6 @@ enum Event {
 /// True of a message that is short, as questions are, or that comes at the pace of headsets.
 fn is_paced(flow: &mut Flow, bytes: usize) -> bool {
     bytes <= MAX_MESSAGE_BYTES || flow.admits(bytes, Instant::now())
-}
-
-/// Tells a client of a refusal, where it was not told of one just now.
-fn refused(hub: &Hub, id: u64, flow: &mut Flow, refusal: InputRefusal) {
-    if flow.may_tell(Instant::now()) {
-        hub.tell(id, Outgoing::Text(status(refusal.words())));
-    }
 }
 
 /// Hands a message for a headset over, at the pace of its client; what is refused is counted.

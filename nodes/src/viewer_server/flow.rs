@@ -1,11 +1,9 @@
 //! The pace at which one client may send what a headset sees.
 
-use std::time::{Duration, Instant};
+use std::time::Instant;
 
 /// Bytes that the shortest message counts as.
 const MIN_MESSAGE_BYTES: usize = 4096;
-/// Time between two words to a client about messages that were refused.
-const WORDS_PERIOD: Duration = Duration::from_secs(1);
 
 /// Bytes that a client may still send: a second's worth at most, which time brings back.
 #[derive(Debug)]
@@ -13,7 +11,6 @@ pub struct Flow {
     bytes_per_s: f64,
     left: f64,
     at: Instant,
-    told: Option<Instant>,
 }
 
 impl Flow {
@@ -24,7 +21,6 @@ impl Flow {
             bytes_per_s,
             left: bytes_per_s,
             at: now,
-            told: None,
         }
     }
 
@@ -40,20 +36,12 @@ impl Flow {
         }
         fits
     }
-
-    /// True if the client may be told now that something was refused.
-    pub fn may_tell(&mut self, now: Instant) -> bool {
-        let told = self.told;
-        let may = told.is_none_or(|told| now.saturating_duration_since(told) >= WORDS_PERIOD);
-        if may {
-            self.told = Some(now);
-        }
-        may
-    }
 }
 
 #[cfg(test)]
 mod tests {
+    use std::time::Duration;
+
     use super::*;
 
     #[test]
@@ -72,16 +60,5 @@ mod tests {
         // A clock that goes back brings nothing.
         assert!(!flow.admits(5000, start));
         assert!(!flow.admits(200_000, after(7_200_000)));
-    }
-
-    #[test]
-    fn words_come_once_a_second() {
-        let start = Instant::now();
-        let mut flow = Flow::new(1, start);
-        let told = [0, 999, 1000, 1500, 2000].map(|ms| {
-            let now = start + Duration::from_millis(ms);
-            flow.may_tell(now)
-        });
-        assert_eq!(told, [true, false, true, false, true]);
     }
 }

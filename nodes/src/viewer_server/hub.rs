@@ -8,15 +8,16 @@ use lattice_msgs::RosMessage;
 use lattice_msgs::lattice::{LatticeMap, LatticeMapUpdate};
 use lattice_runtime::lock;
 use serde::Serialize;
-use smol::channel::{Receiver, Sender, bounded};
+use smol::channel::{Receiver, bounded};
 
 use super::bridge::Bridge;
+use super::client::Client;
 use super::graph::ConnectionGraph;
+use super::inputs::InputRefusal;
 use super::map_stream::{Entry, MapStream};
 use super::offer::Offer;
 use super::outbox::{Class, Outbox, Outgoing};
 use super::protocol::{self, Advertised, Value};
-use super::watched::Watched;
 
 /// Most bytes of updates of the map that are kept for clients that are behind.
 const MAX_UPDATE_BYTES: usize = 8 << 20;
@@ -49,24 +50,6 @@ struct Channel {
     last: Option<Entry>,
     /// Subscriptions so far.
     joined: u64,
-}
-
-struct Client {
-    outbox: Outbox,
-    wake: Sender<()>,
-    watched: Watched,
-    /// True for one that follows the graph of nodes.
-    follows_graph: bool,
-    /// True after it has taken all that there was.
-    idle: bool,
-}
-
-impl Client {
-    fn wake(&mut self) {
-        self.idle = false;
-        // One wake is enough.
-        let _ = self.wake.try_send(());
-    }
 }
 
 /// Counters of the server.
@@ -246,14 +229,7 @@ impl Hub {
         let id = inner.next_client;
         inner.next_client += 1;
         inner.counts.clients_in += 1;
-        let client = Client {
-            outbox,
-            wake,
-            watched: Watched::default(),
-            follows_graph: false,
-            idle: false,
-        };
-        inner.clients.insert(id, client);
+        inner.clients.insert(id, Client::new(outbox, wake));
         Some((id, woken))
     }
 
@@ -297,8 +273,14 @@ impl Hub {
     /// Puts a message of the protocol before what waits.
     pub fn tell(&self, id: u64, message: Outgoing) {
         if let Some(client) = lock(&self.inner).clients.get_mut(&id) {
-            client.outbox.answer(message);
-            client.wake();
+            client.tell(message);
+        }
+    }
+
+    /// Tells a client that a message of it was refused, at most once a second.
+    pub fn refuse(&self, id: u64, refusal: InputRefusal) {
+        if let Some(client) = lock(&self.inner).clients.get_mut(&id) {
+            client.refuse(refusal);
         }
     }
 

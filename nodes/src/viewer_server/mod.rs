@@ -4,6 +4,7 @@
 //! client what it wants, at the client's pace.
 
 mod bridge;
+mod client;
 mod connection;
 mod desk;
 mod fixed;

@@ -15,9 +15,8 @@ use super::inputs::{Input, InputCounts, Inputs, Waiting};
 use super::map_source::{MapSource, News};
 use super::map_stream::MapStream;
 use super::options::{ViewerOptions, url};
-use super::outbox::{Class, Outgoing};
+use super::outbox::Class;
 use super::parameters::Settings;
-use super::protocol::status;
 use super::server::Server;
 use super::sources::{FixedTransforms, FromChannel, Sources, Unwritten};
 use crate::compute::{Compute, Inbox};
@@ -80,7 +79,6 @@ pub fn start(runtime: &Runtime, name: &str) -> Result<Finish, NodeError> {
         parts: None,
         inputs: Arc::clone(&inputs),
         waiting: Arc::clone(&waiting),
-        refusals: Throttle::new(Duration::from_secs(1)),
         fixed: FixedTransforms::default(),
         fixed_channel,
         input: MapRequests::new(&node, &reach.mapper, &losses)?,
@@ -171,7 +169,6 @@ struct Shell {
     parts: Option<Parts>,
     inputs: Arc<Inputs>,
     waiting: Arc<Waiting>,
-    refusals: Throttle,
     fixed: FixedTransforms,
     fixed_channel: u32,
     input: MapRequests,
@@ -214,10 +211,7 @@ impl Shell {
             Ok(()) => self.inputs.taken(input.bytes.len()),
             Err(refusal) => {
                 self.inputs.refused(refusal);
-                if self.refusals.check().is_some() {
-                    let words = Outgoing::Text(status(refusal.words()));
-                    self.hub.tell(client, words);
-                }
+                self.hub.refuse(client, refusal);
             }
         }
     }

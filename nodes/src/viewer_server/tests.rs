@@ -258,3 +258,22 @@ fn newest_messages_give_way_and_control_is_bounded() {
     }
     assert_eq!(outbox.next(&mut stream), Some(Outgoing::Close));
 }
+
+#[test]
+fn a_client_that_is_often_refused_silences_no_other() {
+    let hub = Hub::new(2);
+    let [(noisy, _noisy), (other, _other)] = [(); 2].map(|()| hub.enter().unwrap());
+    let told = |id: u64| {
+        let waiting = std::iter::from_fn(|| hub.next(id));
+        let words =
+            |message: &Outgoing| matches!(message, Outgoing::Text(text) if text.contains("status"));
+        waiting.filter(words).count()
+    };
+    for _ in 0..100 {
+        hub.refuse(noisy, InputRefusal::Busy);
+    }
+    hub.refuse(other, InputRefusal::Malformed);
+    assert_eq!((told(noisy), told(other)), (1, 1));
+    hub.refuse(other, InputRefusal::Malformed);
+    assert_eq!(told(other), 0, "a word a second");
+}

@@ -55,3 +55,21 @@ fn an_evaluation_is_continued_and_does_not_depend_on_threads() {
     let other = error(&evaluate(folder.path(), &["--headset-scans", "2"]));
     assert!(other.contains("other settings"), "{other}");
 }
+
+#[test]
+fn seeds_and_maps_without_end_are_refused_at_once() {
+    for (command, option) in [
+        ("calibration", "seeds"),
+        ("calibration", "maps"),
+        ("traps", "seeds"),
+        ("town", "seeds"),
+    ] {
+        let folder = tempfile::tempdir().unwrap();
+        let out = ["--out", folder.path().to_str().unwrap()];
+        let most = u64::MAX.to_string();
+        let option_of = format!("--{option}");
+        let said = error(&[&["evaluate", command, &option_of, &most], &out[..]].concat());
+        let expected = format!("{option} is {}, not within", u64::MAX as f64);
+        assert!(said.contains(&expected), "{command}: {said}");
+    }
+}

@@ -2,6 +2,8 @@
 
 use nalgebra::{Isometry3, Point3, Translation3, UnitQuaternion, Vector3};
 
+use crate::random::mix;
+
 /// The truth, moved by exactly `m` and turned by exactly `deg` about the vertical, either way, both at
 /// `pivot_m` (headset frame).
 ///
@@ -27,27 +29,10 @@ pub fn perturbed(
     moved_place * turn * place.inverse() * truth
 }
 
-/// The next number of SplitMix64 (Steele, Lea & Flood 2014).
-fn mix(state: &mut u64) -> u64 {
-    *state = state.wrapping_add(0x9e37_79b9_7f4a_7c15);
-    let mut z = *state;
-    z = (z ^ (z >> 30)).wrapping_mul(0xbf58_476d_1ce4_e5b9);
-    z = (z ^ (z >> 27)).wrapping_mul(0x94d0_49bb_1331_11eb);
-    z ^ (z >> 31)
-}
-
-/// A seed for a purpose, from others.
-pub fn seed_of(parts: &[u64]) -> u64 {
-    let mut state = 0;
-    for part in parts {
-        state = mix(&mut state) ^ part;
-    }
-    mix(&mut state)
-}
-
 #[cfg(test)]
 mod tests {
     use super::*;
+    use crate::random::seed_of;
 
     #[test]
     fn starts_are_off_by_as_much_as_is_said_at_the_pivot() {

@@ -6,7 +6,7 @@ use std::sync::mpsc;
 use rayon::prelude::*;
 
 use super::results::name;
-use super::settings::{Cell, Settings};
+use super::settings::{Cell, Settings, check_seeds};
 use super::trial::{OURS, Trial};
 use super::{Results, Start};
 use crate::{AnyError, pool};
@@ -60,6 +60,7 @@ pub fn run_cases<C: Case>(
     threads: usize,
     progress: &mut dyn FnMut(usize, usize),
 ) -> Result<(), AnyError> {
+    check_seeds(seeds.end.saturating_sub(seeds.start))?;
     let (done, mut cases) = (results.done(), C::all());
     cases.retain(|case| case.name().contains(part));
     if cases.is_empty() {
@@ -74,10 +75,10 @@ pub fn run_cases<C: Case>(
         let left = &left;
         scope.spawn(move || {
             pool.install(|| {
-                left.par_iter().with_max_len(1).for_each(|(cell, case)| {
-                    // The receiver is gone only after an error.
-                    let _ = sender.send(case.run(cell));
-                });
+                // The receiver is gone only after an error: then no more trials begin.
+                let trials = left.par_iter().with_max_len(1);
+                let _ =
+                    trials.try_for_each(|(cell, case)| sender.send(case.run(cell)).map_err(drop));
             });
         });
         for (i, trial) in receiver.into_iter().enumerate() {

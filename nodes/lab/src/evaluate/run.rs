@@ -1,11 +1,12 @@
 //! The run of all trials, side by side and timed.
 
-use super::initial_guess::{perturbed, seed_of};
+use super::initial_guess::perturbed;
 use super::methods::Baseline;
 use super::results::{Results, name};
-use super::settings::{Cell, Plan, Start};
+use super::settings::{Cell, Plan, Start, check_seeds};
 use super::testbed::{Scenario, Testbed};
 use super::trial::{OURS, TIMED, TRACKED, Trial, rounded};
+use crate::random::seed_of;
 use crate::simulate::house::Scene;
 use crate::{AnyError, pool};
 use lattice_core::registration::{CalibrationOptions, CalibrationRequest, calibrate, track};
@@ -61,6 +62,7 @@ pub fn run(
     threads: usize,
     progress: &mut dyn FnMut(usize, usize),
 ) -> Result<(), AnyError> {
+    check_seeds(plan.seeds)?;
     let done = results.done();
     let [jobs, timed] = [false, true].map(|timed| jobs(plan, &done, timed));
     let total = jobs.iter().chain(&timed).map(|job| job.tasks.len()).sum();

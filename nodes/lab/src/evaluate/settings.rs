@@ -1,5 +1,7 @@
 //! Settings of an evaluation and the plan of its trials.
 
+use crate::AnyError;
+use crate::options::within;
 use crate::simulate::house::Scene;
 use serde::{Deserialize, Serialize};
 use std::fmt;
@@ -108,6 +110,14 @@ impl FromStr for Start {
             deg: number(deg, 180.0)?,
         })
     }
+}
+
+/// Most seeds of one run: all of its trials are listed before the first.
+const MAX_SEEDS: f64 = 10_000.0;
+
+/// Checks the number of seeds; none at all makes the report of trials that are there.
+pub(super) fn check_seeds(seeds: u64) -> Result<(), AnyError> {
+    within("seeds", seeds as f64, 0.0, MAX_SEEDS)
 }
 
 /// The trials of one run.

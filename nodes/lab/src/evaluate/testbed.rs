@@ -1,8 +1,9 @@
 //! The testbed of the trials: the house, the robot's maps of it and the views of the headset.
 
-use super::initial_guess::seed_of;
 use super::settings::{Pivot, Settings};
 use crate::AnyError;
+use crate::options::within;
+use crate::random::seed_of;
 use crate::simulate::house::{
     HeadsetTrial, House, HouseScan, LabelDraw, Scene, Survey, SurveyMap, SurveyOptions,
 };
@@ -51,12 +52,11 @@ pub struct Scenario {
 impl Testbed {
     /// A testbed in a house.
     pub fn new(house: House, settings: &Settings) -> Result<Testbed, AnyError> {
+        within("maps", settings.map_seeds as f64, 1.0, 1000.0)?;
         let cell_volume_m3 = settings.cell_side_m.powi(3);
         Ok(Testbed {
             lattice: Lattice::new(LatticeKind::Cubic, cell_volume_m3)?,
-            surveys: (0..settings.map_seeds.clamp(1, 1000))
-                .map(|_| OnceLock::new())
-                .collect(),
+            surveys: (0..settings.map_seeds).map(|_| OnceLock::new()).collect(),
             settings: settings.clone(),
             house,
         })

@@ -10,13 +10,13 @@ pub use fields::LabelReader;
 pub use options::{Color, LabelOptions, SemanticOptions, palette_from_params};
 pub use write::{color_of, message_from_semantic};
 
-use lattice_core::cloud::{CloudError, CloudLimits};
+use lattice_core::cloud::{CloudError, CloudLimits, CloudView};
 use lattice_core::registration::{HeadsetScan, LabelDistribution, SemanticCloud};
 use lattice_msgs::sensor_msgs::PointCloud2;
 use thiserror::Error;
 
 use super::cloud;
-use super::viewpoint::viewpoint_from_message;
+use super::viewpoint::viewpoint_of;
 
 /// Way of a sensor during a cloud that still has one viewpoint, m.
 const MAX_MOVED_M: f64 = 0.1;
@@ -78,10 +78,19 @@ pub fn semantic_from_message(
     options: &SemanticOptions,
 ) -> Result<(SemanticCloud, SemanticReport), SemanticError> {
     let layout = cloud::layout_of(message);
-    let limits = CloudLimits {
+    semantic_from_view(&layout.view(&message.data, &limits(options))?, options)
+}
+
+fn limits(options: &SemanticOptions) -> CloudLimits {
+    CloudLimits {
         max_points: options.max_points,
-    };
-    let view = layout.view(&message.data, &limits)?;
+    }
+}
+
+fn semantic_from_view(
+    view: &CloudView,
+    options: &SemanticOptions,
+) -> Result<(SemanticCloud, SemanticReport), SemanticError> {
     let mut report = SemanticReport {
         points: view.len(),
         ..SemanticReport::default()
@@ -109,7 +118,7 @@ pub fn semantic_from_message(
         } else {
             semantic.points_m.push(options.axes.to_ros(p).into());
             if let Some(reader) = &reader {
-                let label = reader.read(&view, i);
+                let label = reader.read(view, i);
                 report.unlabelled += usize::from(label == LabelDistribution::UNKNOWN);
                 semantic.labels.push(label);
             }
@@ -138,11 +147,10 @@ pub fn headset_scan_from_message(
     message: &PointCloud2,
     options: &SemanticOptions,
 ) -> Result<(HeadsetScan, SemanticReport), SemanticError> {
-    let (cloud, report) = semantic_from_message(message, options)?;
-    let limits = CloudLimits {
-        max_points: options.max_points,
-    };
-    let viewpoint_m = viewpoint_from_message(message, &limits, MAX_MOVED_M)?;
+    let layout = cloud::layout_of(message);
+    let view = layout.view(&message.data, &limits(options))?;
+    let (cloud, report) = semantic_from_view(&view, options)?;
+    let viewpoint_m = viewpoint_of(&view, MAX_MOVED_M);
     let sensor_m = viewpoint_m.map(|v| options.axes.to_ros(v).into());
     Ok((HeadsetScan { cloud, sensor_m }, report))
 }

@@ -2,10 +2,9 @@
 
 use lattice_msgs::headset::HeadsetMesh;
 
+use crate::convert::headset_mesh::{self, chunks_for};
 use crate::viewer_server::inputs::InputRefusal;
 
-/// Most bytes of the arrays of a chunk, so that a message with its names has at most 60 kB.
-const CHUNK_BYTES: usize = 56_000;
 /// Most bytes of session, surface and frame in all: every chunk has them.
 const NAMES_BYTES: usize = 2_000;
 /// Most chunks of a surface: those that a reader may still ask for again.
@@ -17,35 +16,14 @@ pub(super) fn in_chunks(mesh: HeadsetMesh) -> Result<Vec<HeadsetMesh>, InputRefu
     if names > NAMES_BYTES {
         return Err(InputRefusal::LongNames);
     }
-    let numbers = mesh.vertices.len() + mesh.triangles.len();
-    let bytes = 4 * numbers + 2 * mesh.classes.len();
-    if bytes <= CHUNK_BYTES {
+    let chunks = chunks_for(&mesh);
+    if chunks <= 1 {
         return Ok(vec![mesh]);
     }
-    // Room for what each array is rounded up by.
-    let chunks = bytes.div_ceil(CHUNK_BYTES - 16);
     if mesh.chunks > 1 || mesh.removed || chunks > MAX_CHUNKS {
         return Err(InputRefusal::LongChunk);
     }
-    let chunk = |i: usize| HeadsetMesh {
-        header: mesh.header.clone(),
-        session: mesh.session.clone(),
-        surface: mesh.surface.clone(),
-        removed: false,
-        chunk: i as u32,
-        chunks: chunks as u32,
-        pose: mesh.pose,
-        vertices: part(&mesh.vertices, i, chunks),
-        triangles: part(&mesh.triangles, i, chunks),
-        classes: part(&mesh.classes, i, chunks),
-    };
-    Ok((0..chunks).map(chunk).collect())
-}
-
-/// One of so many parts of an array that are as long as each other, but for the last.
-fn part<T: Copy>(all: &[T], i: usize, parts: usize) -> Vec<T> {
-    let length = all.len().div_ceil(parts).max(1);
-    all.chunks(length).nth(i).unwrap_or_default().to_vec()
+    Ok(headset_mesh::in_chunks(&mesh, chunks))
 }
 
 #[cfg(test)]
@@ -53,34 +31,15 @@ mod tests {
     use super::*;
 
     #[test]
-    fn surfaces_are_parted_and_join_to_what_they_were() {
+    fn whole_surfaces_are_parted_and_chunks_go_on_as_they_are() {
         let whole = HeadsetMesh {
             surface: "room".to_owned(),
-            session: "s".to_owned(),
             chunks: 1,
-            vertices: (0..30_000).map(|i| i as f32).collect(),
             triangles: (0..60_001).collect(),
-            classes: (0..20_000).map(|i| i as u16).collect(),
             ..HeadsetMesh::default()
         };
         let chunks = in_chunks(whole.clone()).unwrap();
-        assert_eq!(chunks.len(), 8);
-        let mut joined = HeadsetMesh {
-            chunks: 1,
-            vertices: Vec::new(),
-            triangles: Vec::new(),
-            classes: Vec::new(),
-            ..whole.clone()
-        };
-        for (i, chunk) in chunks.iter().enumerate() {
-            assert_eq!((chunk.chunk, chunk.chunks), (i as u32, 8));
-            let cdr = lattice_msgs::cdr::to_vec(chunk).unwrap();
-            assert!(cdr.len() <= 60_000, "{}", cdr.len());
-            joined.vertices.extend(&chunk.vertices);
-            joined.triangles.extend(&chunk.triangles);
-            joined.classes.extend(&chunk.classes);
-        }
-        assert_eq!(joined, whole);
+        assert_eq!(chunks.len(), 5);
         assert_eq!(in_chunks(chunks[3].clone()), Ok(vec![chunks[3].clone()]));
         let long = HeadsetMesh { chunks: 2, ..whole };
         assert_eq!(in_chunks(long), Err(InputRefusal::LongChunk));

@@ -9,6 +9,7 @@ use lattice_msgs::geometry_msgs::{Point, Pose, PoseStamped, Quaternion};
 use lattice_msgs::headset::HeadsetMesh;
 use lattice_msgs::sensor_msgs::{CameraInfo, Image};
 use lattice_nodes::convert::geometry::header;
+use lattice_nodes::convert::headset_mesh::in_chunks;
 use lattice_nodes::convert::semantic::{SemanticOptions, headset_scan_from_message};
 use lattice_nodes::headset_cloud::{HeadsetCloud, HeadsetOptions, HeadsetOutput, HeadsetStream};
 use lattice_runtime::params::{ParamValue, Params};
@@ -47,7 +48,7 @@ pub fn pose_in(axes: Axes, own: Axes, ros_from_thing: &Isometry3<f64>) -> Pose {
     }
 }
 
-/// A mesh in its own frame as the chunks of one surface, with so many numbers in each.
+/// A mesh in its own frame as the chunks of one surface, with up to so many numbers in each array.
 pub fn chunks(
     mesh: &LabelledMesh,
     origin_from_mesh: &Isometry3<f64>,
@@ -63,22 +64,19 @@ pub fn chunks(
     let turned = axes.matrix().determinant() < 0.0;
     let corners = |&[a, b, c]: &[u32; 3]| if turned { [a, c, b] } else { [a, b, c] };
     let triangles: Vec<u32> = mesh.triangles().iter().flat_map(corners).collect();
-    let pose = pose_in(axes, axes, origin_from_mesh);
     let chunks = vertices.len().max(triangles.len()).div_ceil(numbers).max(1);
-    let part = |i: usize, len: usize| (i * numbers).min(len)..((i + 1) * numbers).min(len);
-    let chunk = |i: usize| HeadsetMesh {
+    let whole = HeadsetMesh {
         header: header(FRAME, 5),
         session: "first".to_owned(),
         surface: "room".to_owned(),
-        removed: false,
-        chunk: i as u32,
-        chunks: chunks as u32,
-        pose,
-        vertices: vertices[part(i, vertices.len())].to_vec(),
-        triangles: triangles[part(i, triangles.len())].to_vec(),
-        classes: Vec::new(),
+        chunks: 1,
+        pose: pose_in(axes, axes, origin_from_mesh),
+        vertices,
+        triangles,
+        ..HeadsetMesh::default()
     };
-    (0..chunks).map(|i| Arc::new(chunk(i))).collect()
+    let all = in_chunks(&whole, chunks).into_iter();
+    all.map(Arc::new).collect()
 }
 
 /// The camera of the simulated headset.

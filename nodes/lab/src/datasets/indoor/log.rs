@@ -10,17 +10,21 @@ use lattice_msgs::sensor_msgs::{CameraInfo, Image};
 use lattice_msgs::tf2_msgs::TFMessage;
 use lattice_msgs::vision_msgs::LabelInfo;
 use lattice_msgs::{RosMessage, cdr, std_msgs};
+use lattice_nodes::convert::geometry::header;
+use lattice_nodes::convert::headset_mesh::{chunks_for, in_chunks};
 
 use super::{IndoorOptions, SECOND_NS, messages, truth};
 use crate::AnyError;
 use crate::datasets::write::spec;
-use crate::simulate::house::{HeadsetTrial, House, RobotView, RoomCamera, RoomImages, robot_views};
+use crate::random::seed_of;
+use crate::simulate::house::{HeadsetTrial, House, RoomCamera, RoomImages, robot_views};
 
 /// Time between two looks of the headset, and between two of its poses, ns.
 const LOOK_NS: i64 = SECOND_NS;
 const POSE_NS: i64 = SECOND_NS / 10;
-/// Views of the robot from one place.
-const VIEWS_A_STOP: usize = 8;
+/// Parts of the seeds of noise: whose camera it is.
+const ROBOT: u64 = 0;
+const HEADSET: u64 = 1;
 
 /// The log as it grows.
 pub(super) struct Log<'a> {
@@ -80,30 +84,31 @@ impl Log<'_> {
         let period_ns = (self.options.period_s * 1e9) as i64;
         let map_from_house = self.house.map_from_house();
         if !self.options.colors {
-            let names = messages::label_info("camera", self.at_ns, self.house.class_names());
+            let names = self.house.label_info(header("camera", self.at_ns));
             self.write("/labels/label_info", &names)?;
         }
-        let walk = walk(&robot_views(self.house, views, seed)?);
+        let walk = robot_views(self.house, views, seed)?;
         for (number, view) in walk.iter().enumerate() {
-            let image = self.rooms.take(&camera, &view.truth, number as u64);
-            let depth_m = image.measured_depth_m(number as u64);
+            let noise = seed_of(&[seed, ROBOT, number as u64]);
+            let image = self.rooms.take(&camera, &view.truth, noise);
+            let depth_m = image.measured_depth_m(noise);
             let map_from_camera = map_from_house * view.measured;
             let stamp_ns = self.at_ns;
             self.write("/tf", &messages::robot(stamp_ns, &map_from_camera))?;
             let info = camera.camera_info("camera", stamp_ns);
             self.write("/rgb/camera_info", &info)?;
-            let size = [image.width, image.height];
+            let stamped = header("camera", stamp_ns);
             match self.options.colors {
                 true => {
-                    let colors = messages::rgb8("camera", stamp_ns, size, &image.rgb);
+                    let colors = image.colors_message(stamped.clone());
                     self.write("/rgb/image_rect_color", &colors)?;
                 }
                 false => {
-                    let labels = messages::mono16("camera", stamp_ns, size, &image.labels);
+                    let labels = image.labels_message(stamped.clone());
                     self.write("/labels/image", &labels)?;
                 }
             }
-            let depth = messages::depth("camera", stamp_ns, size, &depth_m);
+            let depth = image.depth_message(stamped, &depth_m);
             self.write("/depth_registered/image_rect", &depth)?;
             truth::insert(
                 &mut self.truth,
@@ -134,13 +139,12 @@ impl Log<'_> {
         let data = session.clone();
         self.write("/headset/session", &std_msgs::String { data })?;
         if !self.options.colors {
-            let names =
-                messages::label_info("headset_camera", self.at_ns, self.house.class_names());
+            let names = self.house.label_info(header("headset_camera", self.at_ns));
             self.write("/headset/labels/label_info", &names)?;
         }
-        let chunks = messages::mesh(self.at_ns, &session, &trial.mesh, &headset_from_house);
-        for chunk in &chunks {
-            self.write("/headset/mesh", chunk)?;
+        let mesh = trial.mesh_message(self.house, header("headset_origin", self.at_ns), &session);
+        for chunk in in_chunks(&mesh, chunks_for(&mesh)) {
+            self.write("/headset/mesh", &chunk)?;
         }
         let from_ns = self.at_ns;
         for look in 0..self.options.looks {
@@ -159,40 +163,16 @@ impl Log<'_> {
             let stamp_ns = self.at_ns - LOOK_NS / 2;
             self.at_ns -= POSE_NS / 2;
             let house_from_camera = headset_from_house.inverse() * pose;
-            let image = self
-                .rooms
-                .take(&camera, &house_from_camera, 1000 + look as u64);
+            let noise = seed_of(&[self.options.seed, HEADSET, look as u64]);
+            let image = self.rooms.take(&camera, &house_from_camera, noise);
             let info = camera.camera_info("headset_camera", stamp_ns);
             self.write("/headset/camera_info", &info)?;
-            let size = [image.width, image.height];
+            let stamped = header("headset_camera", stamp_ns);
             match self.options.colors {
-                true => {
-                    let colors = messages::rgb8("headset_camera", stamp_ns, size, &image.rgb);
-                    self.write("/headset/image", &colors)?;
-                }
-                false => {
-                    let labels = messages::mono16("headset_camera", stamp_ns, size, &image.labels);
-                    self.write("/headset/labels/image", &labels)?;
-                }
+                true => self.write("/headset/image", &image.colors_message(stamped))?,
+                false => self.write("/headset/labels/image", &image.labels_message(stamped))?,
             }
         }
         Ok(())
     }
-}
-
-/// The views stop by stop, from each stop to the nearest one that is left.
-fn walk(views: &[RobotView]) -> Vec<RobotView> {
-    let at = |stop: &[RobotView]| stop.first().map(|view| view.truth.translation.vector);
-    let mut left: Vec<&[RobotView]> = views.chunks(VIEWS_A_STOP).collect();
-    let mut walk: Vec<RobotView> = Vec::with_capacity(views.len());
-    let mut here = left.first().and_then(|stop| at(stop)).unwrap_or_default();
-    while !left.is_empty() {
-        let apart_m = |stop: &&[RobotView]| at(stop).map_or(0.0, |there| (there - here).norm());
-        let numbered = left.iter().map(apart_m).enumerate();
-        let nearest = numbered.min_by(|a, b| a.1.total_cmp(&b.1));
-        let stop = left.remove(nearest.map_or(0, |(number, _)| number));
-        here = at(stop).unwrap_or(here);
-        walk.extend(stop);
-    }
-    walk
 }

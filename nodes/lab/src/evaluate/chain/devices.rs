@@ -10,6 +10,7 @@ use lattice_msgs::geometry_msgs::PoseStamped;
 use lattice_msgs::headset::HeadsetMesh;
 use lattice_msgs::sensor_msgs::{Image, PointCloud2};
 use lattice_nodes::convert::geometry::{header, pose_from};
+use lattice_nodes::convert::headset_mesh::{chunks_for, in_chunks};
 use lattice_nodes::convert::semantic::{SemanticOptions, headset_scan_from_message};
 use lattice_nodes::headset_cloud::{HeadsetCloud, HeadsetOptions, HeadsetOutput, HeadsetStream};
 use lattice_nodes::segmenter::{Labelled, Segmenter};
@@ -20,8 +21,7 @@ use lattice_runtime::params::Params;
 use nalgebra::{Isometry3, Point3};
 
 use crate::AnyError;
-use crate::evaluate::initial_guess::seed_of;
-use crate::mesh::LabelledMesh;
+use crate::random::seed_of;
 use crate::simulate::house::{
     HeadsetTrial, House, HouseScan, RoomCamera, RoomImage, RoomImages, robot_views,
 };
@@ -33,8 +33,6 @@ const HEADSET: &str = "headset_origin";
 const PERIOD_NS: i64 = 1_000_000_000;
 /// Every so many columns and rows of a depth image become points.
 const STRIDE: usize = 2;
-/// Numbers of vertices or triangles in a chunk of a mesh.
-const CHUNK: usize = 4500;
 
 /// One thing with the labels of the network, and the same with true labels.
 pub(super) struct Both<T> {
@@ -57,11 +55,12 @@ pub(super) fn robot_map(
         let stamp_ns = number as i64 * PERIOD_NS;
         let image = rooms.take(&RoomCamera::ROBOT, &view.truth, seed_of(&[seed, number, 1]));
         let depth = image.measured_depth_m(seed_of(&[seed, number, 2]));
-        let depth = Arc::new(depth_image(&image, &depth, stamp_ns));
+        let depth = Arc::new(image.depth_message(header(CAMERA, stamp_ns), &depth));
         let labels = labelled(segmenter, &image, stamp_ns)?.labels;
         let map_from_camera = house.map_from_house() * view.measured;
         found.add(&depth, labels, &map_from_camera)?;
-        truth.add(&depth, true_labels(&image, stamp_ns), &map_from_camera)?;
+        let true_labels = image.labels_message(header(CAMERA, stamp_ns));
+        truth.add(&depth, true_labels, &map_from_camera)?;
     }
     Ok(Both {
         found: found.map(),
@@ -138,7 +137,9 @@ pub(super) fn house_from_headset(rooms: &RoomImages, trial: &HeadsetTrial) -> Is
 
 /// The headset's own mesh as it sends it.
 pub(super) fn headset_mesh(rooms: &RoomImages, trial: &HeadsetTrial) -> Vec<Arc<HeadsetMesh>> {
-    mesh_chunks(&trial.mesh, &house_from_headset(rooms, trial).inverse())
+    let mesh = trial.mesh_message(rooms.house(), header(HEADSET, PERIOD_NS), "");
+    let chunks = in_chunks(&mesh, chunks_for(&mesh));
+    chunks.into_iter().map(Arc::new).collect()
 }
 
 /// The headset's points of one picture: `headset_cloud` on its own mesh and on labels of its image; none if the
@@ -151,7 +152,8 @@ pub(super) fn headset_scan(
 ) -> Result<Option<Both<HeadsetScan>>, AnyError> {
     let found = labelled(segmenter, image, PERIOD_NS)?;
     let found = look(chunks, scan, found.labels, found.confidence)?;
-    let truth = look(chunks, scan, true_labels(image, PERIOD_NS), None)?;
+    let true_labels = image.labels_message(header(CAMERA, PERIOD_NS));
+    let truth = look(chunks, scan, true_labels, None)?;
     let both = found.zip(truth);
     Ok(both.map(|(found, truth)| Both { found, truth }))
 }
@@ -194,33 +196,6 @@ fn look(
     Ok(cloud)
 }
 
-/// A mesh as the chunks of one surface, whose pose in the headset's frame is given.
-fn mesh_chunks(mesh: &LabelledMesh, headset_from_mesh: &Isometry3<f64>) -> Vec<Arc<HeadsetMesh>> {
-    let vertices: Vec<f32> = mesh.vertices_m().concat();
-    let triangles: Vec<u32> = mesh.triangles().concat();
-    let chunks = vertices.len().max(triangles.len()).div_ceil(CHUNK).max(1);
-    let part = |i: usize, len: usize| (i * CHUNK).min(len)..((i + 1) * CHUNK).min(len);
-    let chunk = |i: usize| HeadsetMesh {
-        header: header(HEADSET, PERIOD_NS),
-        session: String::new(),
-        surface: "room".to_owned(),
-        removed: false,
-        chunk: i as u32,
-        chunks: chunks as u32,
-        pose: pose_from(headset_from_mesh),
-        vertices: vertices
-            .get(part(i, vertices.len()))
-            .unwrap_or_default()
-            .to_vec(),
-        triangles: triangles
-            .get(part(i, triangles.len()))
-            .unwrap_or_default()
-            .to_vec(),
-        classes: Vec::new(),
-    };
-    (0..chunks).map(|i| Arc::new(chunk(i))).collect()
-}
-
 /// Points, labels and viewpoint of a cloud as `semantic_icp_server` reads them; none of an empty one.
 fn points(cloud: &PointCloud2) -> Result<Option<HeadsetScan>, AnyError> {
     if cloud.width == 0 || cloud.height == 0 {
@@ -238,8 +213,7 @@ fn labelled(
     image: &RoomImage,
     stamp_ns: i64,
 ) -> Result<Labelled, AnyError> {
-    let data = image.rgb.clone();
-    let message = message(image, "rgb8", 3, data, stamp_ns);
+    let message = image.colors_message(header(CAMERA, stamp_ns));
     // A thread that panicked left no image half done.
     let mut segmenter = segmenter.lock().unwrap_or_else(PoisonError::into_inner);
     let found = segmenter.on_image(&message);
@@ -247,28 +221,6 @@ fn labelled(
         let problem = segmenter.problem().unwrap_or_default();
         format!("the segmenter refused an image: {problem}")
     })?)
-}
-
-fn depth_image(image: &RoomImage, depth_m: &[f32], stamp_ns: i64) -> Image {
-    let data = depth_m.iter().flat_map(|d| d.to_le_bytes()).collect();
-    message(image, "32FC1", 4, data, stamp_ns)
-}
-
-fn true_labels(image: &RoomImage, stamp_ns: i64) -> Image {
-    let data = image.labels.iter().flat_map(|l| l.to_le_bytes()).collect();
-    message(image, "mono16", 2, data, stamp_ns)
-}
-
-fn message(image: &RoomImage, encoding: &str, bytes: usize, data: Vec<u8>, stamp_ns: i64) -> Image {
-    Image {
-        header: header(CAMERA, stamp_ns),
-        height: image.height as u32,
-        width: image.width as u32,
-        encoding: encoding.to_owned(),
-        is_bigendian: 0,
-        step: (image.width * bytes) as u32,
-        data: data.into(),
-    }
 }
 
 /// Share of points whose most probable label is the true one, of those that truly have one.

@@ -21,13 +21,14 @@ use lattice_nodes::segmenter::{Segmenter, SegmenterOptions, read_network};
 use nalgebra::{Isometry3, Point3};
 use rayon::prelude::*;
 
-use super::initial_guess::{perturbed, seed_of};
+use super::initial_guess::perturbed;
 use super::methods::Baseline;
 use super::results::name;
-use super::settings::{Cell, Settings, Start};
+use super::settings::{Cell, Settings, Start, check_seeds};
 use super::trial::{LabelsRight, OURS, Trial, rounded};
 use super::{Results, read_house};
 use crate::options::within;
+use crate::random::seed_of;
 use crate::simulate::house::{HeadsetTrial, House, RoomCamera, RoomImages, Scene};
 use crate::{AnyError, at, pool};
 use devices::{
@@ -115,6 +116,7 @@ pub fn run_chain(
     results: &mut Results,
     progress: &mut dyn FnMut(usize, usize),
 ) -> Result<(), AnyError> {
+    check_seeds(options.seeds)?;
     let chain = Chain::new(options)?;
     let done = results.done();
     let all = (0..options.seeds).flat_map(|seed| Scene::ALL.map(|scene| (seed, scene)));

@@ -19,6 +19,7 @@ mod headset_mesh;
 mod images;
 mod labels;
 mod laser;
+mod messages;
 mod regions;
 mod robot;
 mod scenes;

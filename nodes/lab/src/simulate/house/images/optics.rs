@@ -5,6 +5,7 @@ use lattice_msgs::sensor_msgs::CameraInfo;
 use lattice_nodes::convert::geometry::header;
 use nalgebra::{Rotation3, UnitQuaternion, Vector3};
 
+use crate::simulate::house::camera::Camera;
 use crate::simulate::house::headset::{HFOV_DEG as HEADSET_HFOV_DEG, PIXELS as HEADSET_PIXELS};
 use crate::simulate::house::robot::HFOV_DEG as ROBOT_HFOV_DEG;
 
@@ -71,10 +72,8 @@ impl RoomCamera {
 
     /// The ray of a pixel's centre: x forward (1), y left, z up.
     pub fn ray(&self, column: usize, row: usize) -> Vector3<f64> {
-        let focal_px = self.focal_px();
-        let y = (self.width as f64 / 2.0 - 0.5 - column as f64) / focal_px;
-        let z = (self.height as f64 / 2.0 - 0.5 - row as f64) / focal_px;
-        Vector3::new(1.0, y, z)
+        let camera = Camera::new(self.width, self.height, self.hfov_deg);
+        camera.direction(row * self.width + column)
     }
 
     /// The calibration as nodes take it: no distortion.

@@ -9,7 +9,7 @@ use crate::simulate::random::{Purpose, Stream};
 use plan::Plan;
 
 impl House {
-    /// A house of four to six furnished rooms in two rows, all of it drawn by a seed: walls, doors, windows, what
+    /// A house of four or six furnished rooms in two rows, all of it drawn by a seed: walls, doors, windows, what
     /// is in the rooms, where, and how large. Some have no ceiling, as scans often have none.
     ///
     /// No seed gives the rooms of [`House::generated`], which makes it fit for training what is tested there.

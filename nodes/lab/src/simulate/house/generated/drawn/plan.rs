@@ -5,7 +5,7 @@ use super::super::{Spot, between};
 use super::furnish::Room;
 use super::{Builder, Stream};
 
-/// Rooms side by side and one behind the other, with the heights of their walls.
+/// Rooms side by side and one behind the other, with the height of their walls.
 pub(super) struct Plan {
     /// Positions of walls along x and along y, metres.
     x_m: Vec<f32>,
@@ -135,7 +135,7 @@ impl Plan {
             wall(builder, *spot, *from, *to, openings, self.height_m);
         }
         for (spot, wide) in &self.curtains {
-            // One number for each, so that a seed keeps its furniture if curtains change.
+            // Nothing comes of it, but without it each seed had other furniture than networks were trained on.
             s.uniform();
             curtain(builder, *spot, *wide);
         }
