@@ -3,6 +3,7 @@
 mod convolution;
 mod planes;
 mod replace;
+mod resize;
 mod taps;
 
 use std::panic::{AssertUnwindSafe, catch_unwind};

@@ -6,9 +6,11 @@ use tract_onnx::tract_hir::tract_core::ops::binary::TypedBinOp;
 use tract_onnx::tract_hir::tract_core::ops::cnn::Conv;
 use tract_onnx::tract_hir::tract_core::ops::cnn::conv::KernelFormat;
 use tract_onnx::tract_hir::tract_core::ops::nn::DataFormat;
+use tract_onnx::tract_hir::tract_core::ops::nn::resize::{self, Interpolator};
 
 use super::convolution::{Convolution, packed};
 use super::planes::{Axis, Layout};
+use super::resize::Resize;
 
 /// Fewest pixels of an output that are worth it.
 const MIN_PIXELS: usize = 64;
@@ -19,7 +21,9 @@ pub(super) fn replaced(mut model: TypedModel) -> TractResult<TypedModel> {
     // As it declutters, tract makes matrix products of convolutions of single pixels, and takes norms into the others.
     convolutions.rewrite(&false, &mut model)?;
     let mut model = model.into_decluttered()?;
-    convolutions.rewrite(&true, &mut model)?;
+    let rest =
+        convolutions.with_rule_for("resize", |_, model, node, _, op| resized(model, node, op));
+    rest.rewrite(&true, &mut model)?;
     Ok(model)
 }
 
@@ -96,6 +100,42 @@ fn is_scaled(model: &TypedModel, node: &TypedNode) -> bool {
     next.is_some_and(|next| matches!(next.0.name(), "Mul" | "Add" | "Sub" | "Div"))
 }
 
+fn resized(model: &TypedModel, node: &TypedNode, op: &resize::Resize) -> Patch {
+    rule_if!(op.interpolator == Interpolator::Linear);
+    let facts = model.node_input_facts(node.id)?;
+    rule_if_some!(input = facts.first());
+    rule_if!(input.datum_type == f32::datum_type());
+    let output = model.node_output_facts(node.id)?;
+    rule_if_some!(output = output.first());
+    let (Some(from), Some(to)) = (input.shape.as_concrete(), output.shape.as_concrete()) else {
+        return Ok(None);
+    };
+    let (&[1, channels, rows, columns], &[1, same, height, width]) = (from, to) else {
+        return Ok(None);
+    };
+    rule_if!(channels == same && rows * columns * height * width > 0);
+    let given = op.optional_scales_input.and_then(|at| facts.get(at));
+    let given = given.filter(|given| given.shape.volume() == 4.to_dim());
+    let scales = match given {
+        None => [height as f32 / rows as f32, width as f32 / columns as f32],
+        Some(given) => {
+            rule_if_some!(given = &given.konst);
+            let given = given.cast_to::<f32>()?;
+            match *given.try_as_plain_ram()?.as_slice::<f32>()? {
+                [1.0, 1.0, vertical, horizontal] => [vertical, horizontal],
+                _ => return Ok(None),
+            }
+        }
+    };
+    let op = Resize {
+        asked: op.clone(),
+        scales: scales.map(f32::to_bits),
+        output: [1, channels, height, width],
+    };
+    rule_if_some!(input = node.inputs.first());
+    TypedModelPatch::replace_single_op(model, node, &[*input], op).map(Some)
+}
+
 #[cfg(test)]
 mod tests {
     use tract_onnx::tract_hir::tract_core::ops::cnn::{PaddingSpec, PoolSpec};
@@ -150,7 +190,9 @@ mod tests {
 
     fn ours(model: &TypedModel) -> usize {
         let nodes = model.nodes.iter();
-        nodes.filter(|node| node.op_is::<Convolution>()).count()
+        nodes
+            .filter(|node| node.op_is::<Convolution>() || node.op_is::<Resize>())
+            .count()
     }
 
     fn run(model: TypedModel) -> Tensor {
