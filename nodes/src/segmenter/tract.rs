@@ -1,5 +1,11 @@
 //! Networks in ONNX files, run by tract.
 
+mod convolution;
+mod planes;
+mod replace;
+mod resize;
+mod taps;
+
 use std::panic::{AssertUnwindSafe, catch_unwind};
 use std::path::Path;
 use std::sync::Arc;
@@ -77,6 +83,7 @@ fn made_of(
     let in_words = |error: TractError| first_line(&error);
     let model = model.into_typed().map_err(in_words)?;
     sizes::bounded(&model)?;
+    let model = replace::replaced(model).map_err(in_words)?;
     let model = model.into_optimized().map_err(in_words)?;
     sizes::bounded(&model)?;
     if model.outputs.is_empty() {
