@@ -12,11 +12,11 @@ use super::types::{DirectionKind, WeakDirection};
 use crate::pose::se3;
 
 /// Distance in standard deviations at which a point counts half.
-const KERNEL: f64 = 3.0;
+pub(super) const KERNEL: f64 = 3.0;
 /// Squared tilt in standard deviations that is still believed; one in ten thousand is larger.
 const MAX_TILT_SQUARED: f64 = 18.4;
-/// Distance across surfaces, metres, below which points are not told to be closer.
-const CLOSEST_M: f64 = 0.005;
+/// Least standard deviation of points across surfaces, metres.
+const LEAST_POINT_M: f64 = 0.005;
 /// Spacings of the target by which a surface errs whose normals are at right angles in the two clouds.
 const BENT: f64 = 0.8;
 /// Variance of the mean of two normals along a direction over the squared sine of the angle between them: the difference
@@ -24,7 +24,7 @@ const BENT: f64 = 0.8;
 const OF_MEAN_NORMAL: f64 = 0.125;
 /// Least share of the information of a direction that errors of the normals leave.
 const LEAST_LEFT: f64 = 1e-3;
-/// Information of a direction over that of the best held one, below which there is none.
+/// Least information of a direction over that of the best held one; below it there is none.
 const NONE: f64 = 1e-9;
 
 /// Covariance of a pose whose source is a surface that is wrong by whole regions.
@@ -92,7 +92,7 @@ impl PoseCovariance {
             };
             let sine_squared = ours.cross(theirs).norm_squared().min(1.0);
             let residual_m = across.dot(&(partner - place));
-            let sigmas = residual_m / model.point_m.max(CLOSEST_M);
+            let sigmas = residual_m / model.point_m.max(LEAST_POINT_M);
             let weight = (1.0 - sine_squared) / (1.0 + (sigmas / KERNEL).powi(2));
             let lever = lever(target_from_source, point, &across);
             information.add(weight, &lever, sine_squared, point);
@@ -143,6 +143,14 @@ impl PoseCovariance {
             at_source: 0.5 * (at_source + at_source.transpose()),
         };
         Some((pose * se3::exp(&-(gain * tilt)), upright))
+    }
+
+    /// The covariance of [`PoseCovariance::upright`]; the same if `sigma_rad` is infinite.
+    pub fn with_gravity(&self, pose: &Isometry3<f64>, sigma_rad: f64) -> Option<PoseCovariance> {
+        match sigma_rad.is_finite() {
+            true => self.upright(pose, sigma_rad).map(|(_, sure)| sure),
+            false => Some(*self),
+        }
     }
 
     /// As wide as it takes for another pose to be that probable.

@@ -49,7 +49,15 @@ pub(super) fn answer(bench: &Workbench<'_>, all: Vec<Candidate>, started: bool) 
         unexplained: bench.fit.observations() * (1.0 - best.inlier_fraction),
     };
     let fit = absolute_fit(bench, &pose);
-    let covariance = covariance(bench, best);
+    let covariance = covariance(bench, best).map(|surfaces| {
+        let near = all
+            .iter()
+            .filter(|c| c.is_near(&pose, &middle, shift_m, turn_rad));
+        near.fold(bench.probed(best, surfaces), |sure, rival| {
+            let odds = ((rival.total() - best.total()) / SOFTNESS).exp().min(1.0);
+            sure.with_rival(&pose, &rival.map_from_headset, odds / (1.0 + odds))
+        })
+    });
     // Both frames know where down is; but what GICP made of a start stands as it is.
     let gravity = bench.options.gravity_sigma_rad;
     let stands = started && all.first().is_some_and(|gicp| std::ptr::eq(gicp, best));
@@ -61,13 +69,6 @@ pub(super) fn answer(bench: &Workbench<'_>, all: Vec<Candidate>, started: bool) 
         Some((pose, sure)) if !stands => (pose, Some(sure)),
         _ => (pose, covariance),
     };
-    let covariance = covariance.map(|sure| {
-        let near = (all.iter()).filter(|c| c.is_near(&pose, &middle, shift_m, turn_rad));
-        near.fold(bench.probed(&pose, sure), |sure, rival| {
-            let odds = ((rival.total() - best.total()) / SOFTNESS).exp().min(1.0);
-            sure.with_rival(&pose, &rival.map_from_headset, odds / (1.0 + odds))
-        })
-    });
     let options = bench.options;
     let weak = covariance.as_ref().map(|sure| weak(bench, sure, &pose));
     let weak = weak.unwrap_or_default();
@@ -111,12 +112,8 @@ pub(super) fn answer(bench: &Workbench<'_>, all: Vec<Candidate>, started: bool) 
 /// True if the surfaces hold a pose in all directions, as an answer must that is OK.
 pub(super) fn is_held(bench: &Workbench<'_>, candidate: &Candidate) -> bool {
     let pose = &candidate.map_from_headset;
-    let gravity = bench.options.gravity_sigma_rad;
     let sure = covariance(bench, candidate);
-    let sure = sure.and_then(|sure| match gravity.is_finite() {
-        true => sure.upright(pose, gravity).map(|(_, sure)| sure),
-        false => Some(sure),
-    });
+    let sure = sure.and_then(|sure| sure.with_gravity(pose, bench.options.gravity_sigma_rad));
     sure.is_some_and(|sure| weak(bench, &sure, pose).is_empty())
 }
 
@@ -126,12 +123,8 @@ fn weak(
     covariance: &PoseCovariance,
     pose: &Isometry3<f64>,
 ) -> Vec<WeakDirection> {
-    let options = bench.options;
     let mut directions = covariance.directions(pose, &bench.middle());
-    directions.retain(|d| match d.kind {
-        DirectionKind::Translation => d.sigma > options.max_sigma_m,
-        DirectionKind::Rotation => d.sigma > options.max_sigma_rad,
-    });
+    directions.retain(|d| d.sigma > bench.options.max_sigma(d.kind));
     directions
 }
 

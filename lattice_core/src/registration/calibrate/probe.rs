@@ -2,7 +2,7 @@
 
 use nalgebra::{Isometry3, Point3, RowVector6, Vector6};
 
-use super::candidates::Workbench;
+use super::candidates::{Candidate, Workbench};
 use super::covariance::PoseCovariance;
 use super::margin::SOFTNESS;
 use super::types::{DirectionKind, WeakDirection};
@@ -16,24 +16,22 @@ const MEASURED: usize = 3;
 const STEPS: [f64; 4] = [1.0, 2.0, 4.0, 8.0];
 
 impl Workbench<'_> {
-    /// The covariance of a pose with what its likelihood says of the directions that surfaces leave weak: the ends of
-    /// a wall and its labels hold a pose along the wall.
+    /// The covariance of a candidate's pose with what its likelihood says of the directions that surfaces and gravity
+    /// leave weak: the ends of a wall and its labels hold a pose along the wall.
     ///
     /// The likelihood is that of a normal distribution through its least drop, so that one valley is enough to leave
     /// a direction weak.
-    pub fn probed(&self, pose: &Isometry3<f64>, surfaces: PoseCovariance) -> PoseCovariance {
-        let middle = self.middle();
-        let mut weak = surfaces.directions(pose, &middle);
-        weak.retain(|direction| direction.sigma > WEAK * self.largest(direction.kind));
-        weak.truncate(MEASURED);
-        if weak.is_empty() {
-            return surfaces;
-        }
-        let here = self.judge(&self.fit, *pose, "search").total();
-        weak.iter().fold(surfaces, |covariance, direction| {
-            let along = Direction::new(direction, pose, &middle, &covariance);
-            let variance = self.variance(here, pose, direction, &along);
-            match variance < direction.sigma.powi(2) {
+    pub fn probed(&self, candidate: &Candidate, surfaces: PoseCovariance) -> PoseCovariance {
+        let (pose, middle) = (&candidate.map_from_headset, self.middle());
+        let upright = surfaces.with_gravity(pose, self.options.gravity_sigma_rad);
+        let held = upright.unwrap_or(surfaces);
+        let mut weak = held.directions(pose, &middle);
+        weak.retain(|d| d.sigma > WEAK * self.options.max_sigma(d.kind));
+        let weak = weak.iter().take(MEASURED);
+        weak.fold(surfaces, |covariance, weak| {
+            let along = Direction::new(weak, pose, &middle, &held);
+            let variance = self.variance(candidate, weak.kind, &along);
+            match variance < weak.sigma.powi(2) {
                 true => covariance.measured(&along, variance),
                 false => covariance,
             }
@@ -41,35 +39,23 @@ impl Workbench<'_> {
     }
 
     /// Variance of a direction by how much less likely poses along it are; infinite if one of them is not.
-    fn variance(
-        &self,
-        here: f64,
-        pose: &Isometry3<f64>,
-        weak: &WeakDirection,
-        along: &Direction,
-    ) -> f64 {
-        let reach_m = match weak.kind {
+    fn variance(&self, candidate: &Candidate, kind: DirectionKind, along: &Direction) -> f64 {
+        let reach_m = match kind {
             DirectionKind::Translation => 1.0,
             DirectionKind::Rotation => self.reach_m(),
         };
         let steps = STEPS.into_iter().flat_map(|step| [step, -step]);
         let variances = steps.map(|step| {
             let step = step * self.map.spacing_m / reach_m;
-            let moved = pose * se3::exp(&(along.motion * step));
-            let drop = here - self.judge(&self.fit, moved, "search").total();
+            let moved = candidate.map_from_headset * se3::exp(&(along.motion * step));
+            let moved = self.judge(&self.fit, moved, candidate.method);
+            let drop = candidate.total() - moved.total();
             match drop > 0.0 {
                 true => 0.5 * SOFTNESS * step * step / drop,
                 false => f64::INFINITY,
             }
         });
         variances.fold(0.0, f64::max)
-    }
-
-    fn largest(&self, kind: DirectionKind) -> f64 {
-        match kind {
-            DirectionKind::Translation => self.options.max_sigma_m,
-            DirectionKind::Rotation => self.options.max_sigma_rad,
-        }
     }
 
     /// Root mean square distance of the headset's points from their midst, metres.

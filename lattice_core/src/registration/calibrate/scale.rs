@@ -5,12 +5,10 @@ use std::collections::BTreeMap;
 
 use super::super::PreparedCloud;
 use super::super::likelihood::region_of;
-use super::covariance::ErrorModel;
+use super::covariance::{ErrorModel, KERNEL};
 use super::types::{Calibration, CalibrationRequest, HeadsetScan, ScaleEstimate};
 use crate::pose::se3;
 
-/// Distance in standard deviations at which a point counts half.
-const KERNEL: f64 = 3.0;
 /// Steps of Gauss and Newton, with new partners before each.
 const STEPS: usize = 10;
 /// Change of the scale below which a step is none.

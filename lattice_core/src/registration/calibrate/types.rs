@@ -98,6 +98,16 @@ impl Default for CalibrationOptions {
     }
 }
 
+impl CalibrationOptions {
+    /// Largest standard deviation along a direction of a kind, metres or radians.
+    pub(super) fn max_sigma(&self, kind: DirectionKind) -> f64 {
+        match kind {
+            DirectionKind::Translation => self.max_sigma_m,
+            DirectionKind::Rotation => self.max_sigma_rad,
+        }
+    }
+}
+
 /// Verdict on a calibration.
 #[derive(Clone, Copy, PartialEq, Eq, Debug)]
 pub enum Verdict {
