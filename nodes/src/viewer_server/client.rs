@@ -1,4 +1,4 @@
-//! What a hub keeps of one client.
+//! Client of a hub: its outbox, what it watches and the pace of its refusals.
 
 use std::time::Duration;
 

@@ -51,7 +51,7 @@ impl Axis {
     }
 }
 
-/// How rows of an output are made of an image: in bands, whose planes stay near the processor.
+/// Layout of an image in bands of rows of the output, whose planes stay near the processor.
 #[derive(Clone, Debug, Hash, PartialEq, Eq)]
 pub(super) struct Layout {
     channels: usize,

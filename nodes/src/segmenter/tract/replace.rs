@@ -90,7 +90,7 @@ fn convolution(last: &bool, model: &TypedModel, node: &TypedNode, name: &str, op
     Ok(Some(patch))
 }
 
-/// Whether a node is alone followed by a factor or term, as a norm is.
+/// True if a node is followed by nothing but a factor or term, as by a norm.
 fn is_scaled(model: &TypedModel, node: &TypedNode) -> bool {
     let mut after = node.outputs.iter().flat_map(|output| &output.successors);
     let (Some(next), None) = (after.next(), after.next()) else {

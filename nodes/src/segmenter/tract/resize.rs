@@ -11,7 +11,7 @@ use tract_onnx::tract_hir::tract_core::ops::nn::resize::{self, AxisPlan};
 /// Rows and columns of images (1 x channels x rows x columns) scaled.
 #[derive(Clone, Debug, Hash, PartialEq, Eq)]
 pub(super) struct Resize {
-    /// What is asked for, which knows the coordinates.
+    /// Operator of tract, which knows the coordinates.
     pub asked: resize::Resize,
     /// Bits of the scales of rows and columns.
     pub scales: [u32; 2],

@@ -12,7 +12,7 @@ pub(super) const MAX_LANES: usize = 64;
 pub(super) struct Sums<'a> {
     /// Weight of each output at each tap, all taps of the first channel, all of the second and so on.
     pub weights: &'a [[f32; OUTPUTS]],
-    /// What each output begins with.
+    /// Bias of each output.
     pub bias: [f32; OUTPUTS],
     /// Values of all channels, one after the other.
     pub planes: &'a [f32],

@@ -284,7 +284,7 @@ impl IndoorDemo {
         headset: NodeProcess,
         scratch: &Path,
         indoor: &Indoor,
-        last: Option<Arc<CalibrationResult>>,
+        (last, search_s): (Option<Arc<CalibrationResult>>, f64),
         begin: Instant,
     ) -> CliResult<IndoorReport> {
         let headset: HeadsetReport = headset.end()?;
@@ -324,7 +324,7 @@ impl IndoorDemo {
                 .map_or_else(String::new, |last| last.reason.clone()),
             off_m: error.map(|error| error.translation.vector.norm()),
             off_deg: error.map(|error| error.rotation.angle().to_degrees()),
-            search_s: last.as_ref().map_or(0.0, |last| last.duration_s),
+            search_s,
             wall_s: begin.elapsed().as_secs_f64(),
         })
     }

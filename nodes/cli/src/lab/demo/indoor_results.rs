@@ -46,9 +46,11 @@ impl Results {
         })
     }
 
-    /// The last result after the log: the first that is OK if none was before.
-    pub fn last(&self) -> Option<Arc<CalibrationResult>> {
+    /// The last result after the log, the first that is OK if none was before, and the time of the longest answer, s:
+    /// that of a search, as looks at a known place take little.
+    pub fn last(&self) -> (Option<Arc<CalibrationResult>>, f64) {
         let mut last: Option<Arc<CalibrationResult>> = None;
+        let mut longest_s = 0.0;
         let late = Instant::now() + LAST_ANSWER;
         let is_ok = |last: &Option<Arc<CalibrationResult>>| {
             last.as_ref()
@@ -56,16 +58,15 @@ impl Results {
         };
         loop {
             // All that has come by now.
-            while let Ok(result) = self.heard.try_recv() {
-                last = Some(result);
-            }
-            if is_ok(&last) {
-                return last;
-            }
-            match self.heard.recv_deadline(late) {
-                Ok(result) => last = Some(result),
-                Err(_) => return last,
-            }
+            let news = match is_ok(&last) {
+                false => self.heard.recv_deadline(late).ok(),
+                true => self.heard.try_recv().ok(),
+            };
+            let Some(result) = news else {
+                return (last, longest_s);
+            };
+            longest_s = f64::max(longest_s, result.duration_s);
+            last = Some(result);
         }
     }
 }

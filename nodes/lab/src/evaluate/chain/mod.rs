@@ -75,6 +75,13 @@ pub struct ChainOptions {
     pub threads: usize,
 }
 
+impl ChainOptions {
+    fn check(&self) -> Result<(), AnyError> {
+        check_seeds(self.seeds)?;
+        within("maps", self.maps as f64, 1.0, 1000.0)
+    }
+}
+
 /// A house with a look, and its map: with labels of the network, with true ones, and without.
 struct Place {
     house: House,
@@ -93,7 +100,11 @@ struct Chain<'a> {
 }
 
 /// Settings that results of the chain are kept with.
+///
+/// # Errors
+/// If an option is out of its range or a file cannot be read.
 pub fn chain_settings(options: &ChainOptions) -> Result<Settings, AnyError> {
+    options.check()?;
     let crc32 = |path: &PathBuf| -> Result<u32, AnyError> {
         Ok(crc32fast::hash(&std::fs::read(path).map_err(at(path))?))
     };
@@ -116,7 +127,6 @@ pub fn run_chain(
     results: &mut Results,
     progress: &mut dyn FnMut(usize, usize),
 ) -> Result<(), AnyError> {
-    check_seeds(options.seeds)?;
     let chain = Chain::new(options)?;
     let done = results.done();
     let all = (0..options.seeds).flat_map(|seed| Scene::ALL.map(|scene| (seed, scene)));
@@ -170,7 +180,7 @@ fn is_done(done: &HashSet<String>, seed: u64, scene: Scene) -> bool {
 
 impl Chain<'_> {
     fn new(options: &ChainOptions) -> Result<Chain<'_>, AnyError> {
-        within("maps", options.maps as f64, 1.0, 1000.0)?;
+        options.check()?;
         let network = read_network(&options.model, None, 1)?;
         Ok(Chain {
             segmenter: Mutex::new(Segmenter::new(SegmenterOptions::default(), network)),
