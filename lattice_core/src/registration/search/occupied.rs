@@ -11,6 +11,8 @@ const FLAT: f32 = 0.8;
 const STEEP: f64 = 0.4;
 /// Largest distance from the midst of a facet at which a ray goes through it, in cells.
 const REACH: f64 = 0.75;
+/// Distance from an edge within which a ray may pass it at a pose that is a little off, metres.
+const EDGE_M: f64 = 0.1;
 
 /// Cells of a map with the facets of surfaces in them.
 #[derive(Clone, Debug)]
@@ -92,8 +94,29 @@ impl OccupiedGrid {
             return None;
         }
         let along_m = normal.dot(&(middle_m - from_m)) / steepness;
-        let beside_m = (from_m + direction * along_m - middle_m).norm();
-        (beside_m < REACH * self.grid.cell_m).then_some(along_m)
+        let crossing_m = from_m + direction * along_m;
+        let is_near = (crossing_m - middle_m).norm() < REACH * self.grid.cell_m;
+        (is_near && self.goes_on_around(&crossing_m, &normal)).then_some(along_m)
+    }
+
+    /// True if there is surface on all sides of a place on it: a pose that is a little off looks past edges.
+    fn goes_on_around(&self, place_m: &Point3<f64>, normal: &Vector3<f64>) -> bool {
+        let axis = Vector3::ith(normal.iamin(), 1.0);
+        let along = normal.cross(&axis).normalize() * EDGE_M.min(self.grid.cell_m);
+        let other = normal.cross(&along);
+        let across = normal * (0.5 * self.grid.cell_m);
+        [along, -along, other, -other].into_iter().all(|side| {
+            let beside = place_m + side;
+            [beside, beside + across, beside - across]
+                .iter()
+                .any(|place| self.is_occupied(place))
+        })
+    }
+
+    fn is_occupied(&self, place_m: &Point3<f64>) -> bool {
+        let at = self.grid.index(self.grid.cell_of(&place_m.coords));
+        at.and_then(|at| self.cells.get(at))
+            .is_some_and(|cell| *cell > 0)
     }
 }
 
@@ -138,6 +161,20 @@ mod tests {
         );
         let elsewhere = Point3::new(1.0, 0.0, 0.0);
         assert_eq!(wall.crossing_m(&elsewhere, &from, &through), None);
+    }
+
+    #[test]
+    fn a_ray_past_the_edge_of_a_wall_does_not_count() {
+        let (wall, from) = (wall(), Point3::origin());
+        let crosses = |y: f64| {
+            let through = Vector3::new(2.0, y, 0.3);
+            let place = from + through;
+            wall.crossing_m(&place, &from, &through.normalize())
+                .is_some()
+        };
+        assert!(crosses(0.55) && crosses(-0.65));
+        // An edge is known to a cell.
+        assert!(!crosses(1.0) && !crosses(-0.97));
     }
 
     #[test]
