@@ -19,6 +19,8 @@ const GLIMPSE_STEPS: usize = 3;
 const FIRST_LOOK: usize = 64;
 /// Hypotheses that are refined with more points after a first look.
 const SECOND_LOOK: usize = 24;
+/// Log-likelihood of an observation that refining a candidate may still win it.
+const HOPE: f64 = 0.5;
 /// Log-likelihood that a blocked line of sight costs an observation.
 const BLOCKED_COST: f64 = 2.0;
 
@@ -179,14 +181,20 @@ impl<'a> Workbench<'a> {
         register(&self.input.full, &self.map.cloud, start, &options).target_from_source
     }
 
+    /// GICP-SE(3) of another cloud, at last with near partners only.
+    pub fn settled(&self, cloud: &PreparedCloud, start: &Isometry3<f64>) -> Isometry3<f64> {
+        let polished = register(cloud, &self.map.cloud, start, &self.baseline());
+        self.tighten(cloud, &polished.target_from_source)
+    }
+
     /// GICP-SE(3) with near partners only.
-    pub fn tighten(&self, start: &Isometry3<f64>) -> Isometry3<f64> {
+    pub fn tighten(&self, cloud: &PreparedCloud, start: &Isometry3<f64>) -> Isometry3<f64> {
         let options = RegisterOptions {
             gate_m: 4.0 * self.map.spacing_m,
             max_iterations: 24,
             ..self.baseline()
         };
-        register(&self.input.full, &self.map.cloud, start, &options).target_from_source
+        register(cloud, &self.map.cloud, start, &options).target_from_source
     }
 
     /// GICP-SE(3) as everything is compared with.
@@ -238,6 +246,11 @@ impl<'a> Workbench<'a> {
             rmse_m: partners.rmse_m,
             confusion,
         }
+    }
+
+    /// Log-likelihood that refining a candidate may still win it.
+    pub fn hope(&self) -> f64 {
+        HOPE * self.fit.observations()
     }
 
     /// Least distance, metres, and turn, radians, between answers that count as different.

@@ -223,7 +223,8 @@ fn verdict(
     (Verdict::Ok, reason)
 }
 
-fn covariance(bench: &Workbench<'_>, best: &Candidate) -> Option<PoseCovariance> {
+/// Covariance of a candidate's pose by the surfaces; None if they do not hold it at all.
+pub(super) fn covariance(bench: &Workbench<'_>, best: &Candidate) -> Option<PoseCovariance> {
     let (source, target) = (&bench.input.full, &bench.map.cloud);
     let model = error_model(bench, best);
     PoseCovariance::at(source, target, &best.map_from_headset, &model)

@@ -47,8 +47,6 @@ pub use types::{
 const BY_SURFACES: usize = 128;
 const BY_LABELS: usize = 64;
 const FINALISTS: usize = 4;
-/// Log-likelihood of an observation that refining a candidate may still win it.
-const HOPE: f64 = 0.5;
 /// Logarithm of the ratio of two scales that are about equal.
 const ABOUT: f64 = 0.08;
 /// Classes that are searched by, at most.
@@ -96,7 +94,7 @@ fn run(
     step(progress, Stage::Refine, 0.6)?;
     let second = bench.second_look(&first);
     step(progress, Stage::Refine, 0.7)?;
-    let hopeful = second.first().map_or(0.0, Candidate::total) - HOPE * bench.fit.observations();
+    let hopeful = second.first().map_or(0.0, Candidate::total) - bench.hope();
     let mut all: Vec<Candidate> = second
         .par_iter()
         .take(FINALISTS)
@@ -112,8 +110,9 @@ fn run(
         all = from_start;
     }
     step(progress, Stage::Judge, 0.9)?;
+    let refined = readings::best_of(&all);
     let calibration = judge::answer(&bench, all, request.start.is_some());
-    let other = other_reading(&bench, &first, region.as_ref());
+    let other = other_reading(&bench, &first, refined, region.as_ref());
     let _ = progress.report(Stage::Judge, 1.0);
     Ok(match other {
         Some(other) => read_as(calibration, &other, options),

@@ -1,9 +1,11 @@
 //! Directions that surfaces leave weak, measured by moving the pose along them.
 
 use nalgebra::{Isometry3, Point3, RowVector6, Vector6};
+use rayon::prelude::*;
 
 use super::candidates::{Candidate, Workbench};
 use super::covariance::PoseCovariance;
+use super::judge::covariance;
 use super::margin::SOFTNESS;
 use super::types::{DirectionKind, WeakDirection};
 use crate::pose::se3;
@@ -12,50 +14,97 @@ use crate::pose::se3;
 const WEAK: f64 = 0.25;
 /// Weak directions that are measured, at most.
 const MEASURED: usize = 3;
-/// Distances by which what is seen is moved, in spacings of the map.
-const STEPS: [f64; 4] = [1.0, 2.0, 4.0, 8.0];
+/// Spacings of the map by which what is seen is moved to measure a direction, at most.
+const REACH: u32 = 8;
+/// Odds of a step over none, at most.
+const LIKELIEST: f64 = 1e6;
+/// Spacings of the map by which it is moved to climb, at first and once more.
+const FAR: [f64; 5] = [8.0, 4.0, 2.0, 1.0, 0.5];
+const NEAR: [f64; 3] = [2.0, 1.0, 0.5];
 
 impl Workbench<'_> {
     /// The covariance of a candidate's pose with what its likelihood says of the directions that surfaces and gravity
     /// leave weak: the ends of a wall and its labels hold a pose along the wall.
-    ///
-    /// The likelihood is that of a normal distribution through its least drop, so that one valley is enough to leave
-    /// a direction weak.
     pub fn probed(&self, candidate: &Candidate, surfaces: PoseCovariance) -> PoseCovariance {
-        let (pose, middle) = (&candidate.map_from_headset, self.middle());
-        let upright = surfaces.with_gravity(pose, self.options.gravity_sigma_rad);
-        let held = upright.unwrap_or(surfaces);
-        let mut weak = held.directions(pose, &middle);
-        weak.retain(|d| d.sigma > WEAK * self.options.max_sigma(d.kind));
-        let weak = weak.iter().take(MEASURED);
-        weak.fold(surfaces, |covariance, weak| {
-            let along = Direction::new(weak, pose, &middle, &held);
-            let variance = self.variance(candidate, weak.kind, &along);
+        let weak = self.weak(candidate, &surfaces);
+        weak.iter().fold(surfaces, |covariance, (weak, along)| {
+            let variance = self.variance(candidate, weak.kind, along);
             match variance < weak.sigma.powi(2) {
-                true => covariance.measured(&along, variance),
+                true => covariance.measured(along, variance),
                 false => covariance,
             }
         })
     }
 
-    /// Variance of a direction by how much less likely poses along it are; infinite if one of them is not.
-    fn variance(&self, candidate: &Candidate, kind: DirectionKind, along: &Direction) -> f64 {
-        let reach_m = match kind {
-            DirectionKind::Translation => 1.0,
-            DirectionKind::Rotation => self.reach_m(),
+    /// A candidate moved to where it is likeliest along the directions that surfaces and gravity leave weak, in which
+    /// registration goes astray.
+    pub fn climbed(&self, candidate: Candidate) -> Candidate {
+        let begin = candidate.total();
+        let far = self.climbed_by(candidate, &FAR);
+        match far.total() > begin {
+            // Other directions are weak there.
+            true => self.climbed_by(far, &NEAR),
+            false => far,
+        }
+    }
+
+    fn climbed_by(&self, candidate: Candidate, steps: &[f64]) -> Candidate {
+        let Some(surfaces) = covariance(self, &candidate) else {
+            return candidate;
         };
-        let steps = STEPS.into_iter().flat_map(|step| [step, -step]);
-        let variances = steps.map(|step| {
-            let step = step * self.map.spacing_m / reach_m;
-            let moved = candidate.map_from_headset * se3::exp(&(along.motion * step));
-            let moved = self.judge(&self.fit, moved, candidate.method);
-            let drop = candidate.total() - moved.total();
-            match drop > 0.0 {
-                true => 0.5 * SOFTNESS * step * step / drop,
-                false => f64::INFINITY,
-            }
+        let weak = self.weak(&candidate, &surfaces);
+        weak.iter().fold(candidate, |best, (weak, along)| {
+            let steps = steps.iter().map(|step| step * self.unit(weak.kind));
+            steps.fold(best, |best, step| self.likelier_of(best, along, step))
+        })
+    }
+
+    /// The likeliest of a candidate and those a step to both sides.
+    fn likelier_of(&self, candidate: Candidate, along: &Direction, step: f64) -> Candidate {
+        let sides = [step, -step].map(|step| self.moved(&candidate, along, step));
+        let likelier = |a: Candidate, b: Candidate| if b.total() > a.total() { b } else { a };
+        sides.into_iter().fold(candidate, likelier)
+    }
+
+    /// The directions that surfaces and gravity leave weak, the weakest first of each kind.
+    fn weak(
+        &self,
+        candidate: &Candidate,
+        surfaces: &PoseCovariance,
+    ) -> Vec<(WeakDirection, Direction)> {
+        let (pose, middle) = (&candidate.map_from_headset, self.middle());
+        let upright = surfaces.with_gravity(pose, self.options.gravity_sigma_rad);
+        let held = upright.as_ref().unwrap_or(surfaces);
+        let mut weak = held.directions(pose, &middle);
+        weak.retain(|d| d.sigma > WEAK * self.options.max_sigma(d.kind));
+        weak.truncate(MEASURED);
+        let direction = |weak: WeakDirection| (weak, Direction::new(&weak, pose, &middle, held));
+        weak.into_iter().map(direction).collect()
+    }
+
+    fn moved(&self, candidate: &Candidate, along: &Direction, step: f64) -> Candidate {
+        let moved = candidate.map_from_headset * se3::exp(&(along.motion * step));
+        self.judge(&self.fit, moved, candidate.method)
+    }
+
+    /// Variance of a direction about a pose, by the likelihoods of poses along it.
+    fn variance(&self, candidate: &Candidate, kind: DirectionKind, along: &Direction) -> f64 {
+        let unit = self.unit(kind);
+        let sides = (1..=REACH).flat_map(|i| [f64::from(i), -f64::from(i)]);
+        let steps: Vec<f64> = sides.map(|step| step * unit).collect();
+        let steps = steps.par_iter().map(|step| {
+            let drop = candidate.total() - self.moved(candidate, along, *step).total();
+            (*step, drop / SOFTNESS)
         });
-        variances.fold(0.0, f64::max)
+        variance(unit, &steps.collect::<Vec<_>>())
+    }
+
+    /// Step along a direction by which what is seen moves by a spacing of the map.
+    fn unit(&self, kind: DirectionKind) -> f64 {
+        match kind {
+            DirectionKind::Translation => self.map.spacing_m,
+            DirectionKind::Rotation => self.map.spacing_m / self.reach_m(),
+        }
     }
 
     /// Root mean square distance of the headset's points from their midst, metres.
@@ -66,6 +115,23 @@ impl Workbench<'_> {
             .sqrt()
             .max(self.map.spacing_m)
     }
+}
+
+/// Second moment about 0 of a direction, given how much less likely steps along it are than none, in logarithms of odds.
+fn variance(unit: f64, steps: &[(f64, f64)]) -> f64 {
+    let (mut all, mut moment) = (1.0, 0.0);
+    let mut narrow = 0.0_f64;
+    for (step, drop) in steps {
+        let likely = (-drop).exp().min(LIKELIEST);
+        all += likely;
+        moment += likely * step * step;
+        // A peak that lies between two steps is that of a normal distribution.
+        if step.abs() < 1.5 * unit {
+            let peak = 0.5 * step * step / drop.max(f64::MIN_POSITIVE);
+            narrow = narrow.max(peak.min(step * step));
+        }
+    }
+    (moment / all).max(narrow)
 }
 
 /// A direction of the place of a source point, or of the orientation.
@@ -118,7 +184,11 @@ impl PoseCovariance {
 
 #[cfg(test)]
 mod tests {
+    use super::super::CalibrationMap;
+    use super::super::input::Input;
+    use super::super::types::{CalibrationOptions, CalibrationRequest, HeadsetScan};
     use super::*;
+    use crate::registration::SemanticCloud;
     use nalgebra::{Matrix6, Vector3};
 
     #[test]
@@ -136,5 +206,69 @@ mod tests {
         let told = loose.measured(&direction, 0.01 * 0.01);
         let after = told.directions(&pose, &middle);
         assert!(after[0].sigma < 0.03);
+    }
+
+    #[test]
+    fn a_peak_has_the_variance_of_a_normal_distribution_and_a_valley_beside_it_widens_it() {
+        let unit = 0.05;
+        let steps = |drop: &dyn Fn(f64) -> f64| -> Vec<(f64, f64)> {
+            let sides = (1..=REACH).flat_map(|i| [f64::from(i), -f64::from(i)]);
+            sides.map(|i| (i * unit, drop(i * unit))).collect()
+        };
+        for sigma in [0.01, 0.03, 0.05, 0.1] {
+            let normal = variance(unit, &steps(&|step| 0.5 * (step / sigma).powi(2)));
+            let ratio = normal.sqrt() / sigma;
+            assert!((0.8..1.1).contains(&ratio), "{sigma}: {ratio}");
+        }
+        let another = |step: f64| if (step - 0.3).abs() < 0.01 { 0.0 } else { 9.0 };
+        assert!(variance(unit, &steps(&another)).sqrt() > 0.15);
+        assert!(variance(unit, &steps(&|_| f64::NEG_INFINITY)).is_finite());
+    }
+
+    /// Points 4 cm apart on a wall at x = 2 m with a flat box on it, as far as they are within the bounds of y and z.
+    fn wall(y_m: f64, z_m: f64) -> SemanticCloud {
+        let places = (-60..=60).flat_map(|y| (-60..=60).map(move |z| (y, z)));
+        let places = places.map(|(y, z)| (0.04 * f64::from(y), 0.04 * f64::from(z)));
+        let within = places.filter(|(y, z)| y.abs() < y_m && z.abs() < z_m);
+        let point = |(y, z): (f64, f64)| {
+            let before_m = if y.abs() < 0.5 && z.abs() < 0.3 {
+                0.1
+            } else {
+                0.0
+            };
+            Point3::new(2.0 - before_m, y, z)
+        };
+        SemanticCloud::unlabelled(within.map(point).collect())
+    }
+
+    #[test]
+    fn a_pose_that_slid_along_a_wall_climbs_back() {
+        let map = CalibrationMap::new(wall(2.4, 1.4), 0.05).unwrap();
+        let options = CalibrationOptions::default();
+        let scan = HeadsetScan {
+            cloud: wall(1.4, 0.9),
+            sensor_m: Some(Point3::origin()),
+        };
+        let request = CalibrationRequest {
+            headset_scans: &[scan],
+            start: None,
+            confusion: None,
+        };
+        let input = Input::new(&request, &options, 0.05).unwrap();
+        let bench = Workbench::new(&map, &input, &options, None);
+        let off_m = |candidate: &Candidate| candidate.map_from_headset.translation.vector.norm();
+        for slide in [Vector3::y() * 0.3, Vector3::y() * -0.45, Vector3::z() * 0.2] {
+            let slid = bench.judge(
+                &bench.fit,
+                Isometry3::new(slide, Vector3::zeros()),
+                "search",
+            );
+            let back = bench.climbed(slid.clone());
+            assert!(
+                back.total() > slid.total() && off_m(&back) < 0.05,
+                "{slide}: {}",
+                off_m(&back)
+            );
+        }
     }
 }

@@ -1,6 +1,6 @@
 //! Readings of a cloud's axes and unit: those under which it would fit tell how it was misread.
 
-use nalgebra::{Matrix3, Vector3};
+use nalgebra::{Isometry3, Matrix3, Vector3};
 use rayon::prelude::*;
 
 use super::super::likelihood::Fit;
@@ -17,6 +17,8 @@ const SCALED_PLACES: (usize, usize) = (128, 64);
 const ROUGH_PLACES: usize = 4;
 /// Readings that are looked at closely: the right one and its mirror image lead a rough search.
 const LOOKED_AT: usize = 2;
+/// Poses of a reading that are looked at with all points.
+const CLOSELY: usize = 4;
 /// Scales that a cloud may have instead of 1; what is nearer to 1 is estimated with the pose.
 const SCALES: [f64; 4] = [0.8, 0.9, 1.11, 1.25];
 /// Score by which a scale must be ahead in a rough search to be looked at closely: a scale that is wrong is behind
@@ -126,30 +128,71 @@ impl Reading {
 #[derive(Clone, Copy, PartialEq, Debug)]
 pub(super) struct Other {
     pub reading: Reading,
-    /// Log-likelihood of the few points by which it is ahead of the cloud as it is.
+    /// Log-likelihood by which it is ahead of the cloud as it is, of few points or, where these leave doubt, of all.
     pub ahead: f64,
     /// True if it is beyond doubt.
     pub is_certain: bool,
 }
 
 impl Other {
+    /// A reading with a likelihood, beside that of the cloud as it is.
+    fn new(reading: Reading, likelihood: f64, as_it_is: f64, observations: f64) -> Other {
+        let ahead = likelihood - as_it_is;
+        let is_clear = ahead > MARGIN.max(0.25 * observations);
+        Other {
+            reading,
+            ahead,
+            is_certain: is_clear && likelihood > 0.5 * observations,
+        }
+    }
+
     /// True if it fits about as well as the cloud as it is, so that the odds beforehand do not rule it out.
     pub fn is_possible(&self) -> bool {
         self.is_certain || self.ahead > -NOT_BEHIND
     }
+
+    /// The same by all points, from the poses that the few led to, beside the refined likelihood of the cloud as it is.
+    fn looked_at_closely(
+        self,
+        bench: &Workbench<'_>,
+        poses: &[Isometry3<f64>],
+        refined: f64,
+    ) -> Option<Other> {
+        let mended = Mended::new(bench, &bench.input.full, &self.reading)?;
+        let fit = Fit::new(
+            &mended.cloud,
+            &bench.map.cloud,
+            bench.map.scale(bench.options.noise_m),
+        );
+        let share = bench.fit.observations() / fit.observations().max(1.0);
+        let likelihoods = poses.par_iter().map(|pose| {
+            let pose = bench.settled(&mended.cloud, pose);
+            mended.likelihood_at(bench, &fit, &pose)
+        });
+        let best = share * likelihoods.reduce(|| f64::NEG_INFINITY, f64::max);
+        let observations = bench.fit.observations();
+        let density = observations * self.reading.scale().ln();
+        let likelihood = best + density;
+        Some(Other::new(self.reading, likelihood, refined, observations))
+    }
 }
 
-/// The best other reading of a cloud, after a first look.
+/// Best likelihood of candidates; lines of sight are not compared between readings.
+pub(super) fn best_of(candidates: &[Candidate]) -> f64 {
+    let likelihoods = candidates.iter().map(|c| c.likelihood.total());
+    likelihoods.fold(0.0, f64::max)
+}
+
+/// The best other reading of a cloud, after a first look, given the likelihood of the cloud as it is after the last.
 ///
 /// A rough search leaves out those that cannot be it.
 pub(super) fn other_reading(
     bench: &Workbench<'_>,
     straight: &[Candidate],
+    refined: f64,
     region: Option<&Region>,
 ) -> Option<Other> {
-    let likelihoods = straight.iter().map(|c| c.likelihood.total());
-    let straight = likelihoods.fold(0.0, f64::max);
-    let as_it_is = Mended::new(bench, &Reading::scaled(1.0))?;
+    let as_it_is = Mended::new(bench, &bench.input.few, &Reading::scaled(1.0))?;
     let rough = as_it_is.rough_score(bench, region);
     // A cloud that may lean is not of a headset, whose axes are often mistaken.
     let mut axes = vec![(Reading::MIRRORED, region)];
@@ -171,16 +214,16 @@ pub(super) fn other_reading(
         };
         // A density of lengths that are to be multiplied is one over them.
         let density = bench.few.observations() * reading.scale().ln();
-        let likelihood = mended.likelihood(bench, *region, places)? + density;
-        Some((likelihood, *reading))
+        let (likelihood, poses) = mended.likelihood(bench, *region, places)?;
+        Some((likelihood + density, *reading, poses))
     });
-    let (best, reading) = fits.max_by(|a, b| a.0.total_cmp(&b.0))?;
-    let observations = bench.few.observations();
-    let ahead = best - straight;
-    Some(Other {
-        reading,
-        ahead,
-        is_certain: ahead > MARGIN.max(0.25 * observations) && best > 0.5 * observations,
+    let (best, reading, poses) = fits.max_by(|a, b| a.0.total_cmp(&b.0))?;
+    let other = Other::new(reading, best, best_of(straight), bench.few.observations());
+    Some(match other.is_possible() && !other.is_certain {
+        true => other
+            .looked_at_closely(bench, &poses, refined)
+            .unwrap_or(other),
+        false => other,
     })
 }
 
@@ -195,7 +238,7 @@ fn hopeful<'a>(
     most: usize,
 ) -> Vec<Hopeful<'a>> {
     let scored = readings.into_par_iter().filter_map(|(reading, region)| {
-        let mended = Mended::new(bench, &reading)?;
+        let mended = Mended::new(bench, &bench.input.few, &reading)?;
         let score = mended.rough_score(bench, region);
         (score >= least).then_some((score, (reading, region, mended)))
     });
@@ -212,10 +255,9 @@ struct Mended {
 }
 
 impl Mended {
-    fn new(bench: &Workbench<'_>, reading: &Reading) -> Option<Mended> {
+    fn new(bench: &Workbench<'_>, few: &PreparedCloud, reading: &Reading) -> Option<Mended> {
         let matrix = &reading.matrix;
         let turn = matrix / reading.scale();
-        let few = &bench.input.few;
         let labels = match few.is_labelled() {
             true => (0..few.len()).map(|i| few.label(i)).collect(),
             false => Vec::new(),
@@ -235,22 +277,29 @@ impl Mended {
         found.first().map_or(0.0, |hypothesis| hypothesis.score)
     }
 
-    /// The best likelihood after a first look, as if it had as many regions as the cloud as it is.
+    /// The best likelihood after a first look, as if it had as many regions as the cloud as it is, and the best poses.
     fn likelihood(
         &self,
         bench: &Workbench<'_>,
         region: Option<&Region>,
         (places, looked_at): (usize, usize),
-    ) -> Option<f64> {
+    ) -> Option<(f64, Vec<Isometry3<f64>>)> {
         let hypotheses = search(&bench.map.surfaces, &self.source, region, places);
         let scale = bench.map.scale(bench.options.noise_m).coarser(2.0);
         let fit = Fit::new(&self.cloud, &bench.map.cloud, scale);
         let share = bench.few.observations() / fit.observations().max(1.0);
-        let found = bench.refine_best(&self.cloud, &hypotheses, looked_at, |pose| {
-            let partners = fit.partners(&pose);
-            let (likelihood, _) = fit.likelihood(&partners, &bench.known, bench.options.agreement);
-            (likelihood.total(), ())
+        let mut found = bench.refine_best(&self.cloud, &hypotheses, looked_at, |pose| {
+            (self.likelihood_at(bench, &fit, &pose), pose)
         });
-        found.first().map(|(likelihood, ())| share * likelihood)
+        found.truncate(CLOSELY);
+        let best = found.first()?.0;
+        let poses = found.into_iter().map(|(_, pose)| pose);
+        Some((share * best, poses.collect()))
+    }
+
+    fn likelihood_at(&self, bench: &Workbench<'_>, fit: &Fit<'_>, pose: &Isometry3<f64>) -> f64 {
+        let partners = fit.partners(pose);
+        let (likelihood, _) = fit.likelihood(&partners, &bench.known, bench.options.agreement);
+        likelihood.total()
     }
 }

@@ -25,7 +25,7 @@ const BEYOND: f64 = 1.0;
 
 impl Workbench<'_> {
     /// The likeliest candidate, its best rivals, and its twins in a symmetric room, all refined with near
-    /// partners only, which leaves out what one of the clouds has not seen.
+    /// partners only, which leaves out what one of the clouds has not seen, and moved along what surfaces leave weak.
     ///
     /// A likelihood is compared fairly only if all were refined alike.
     pub fn contest(&self, all: &[Candidate], region: Option<&Region>) -> Vec<Candidate> {
@@ -37,10 +37,13 @@ impl Workbench<'_> {
         let twins = self.twins(best, region);
         places.extend(twins.into_iter().map(|pose| (pose, "search")));
         let refined = places.par_iter().map(|(pose, method)| {
-            let tight = self.tighten(pose);
+            let tight = self.tighten(&self.input.full, pose);
             self.judge(&self.fit, tight, method)
         });
-        refined.collect()
+        let refined: Vec<Candidate> = refined.collect();
+        let least = likeliest(&refined).map_or(0.0, Candidate::total) - self.hope();
+        let hopeful = refined.into_par_iter().filter(|c| c.total() > least);
+        hopeful.map(|candidate| self.climbed(candidate)).collect()
     }
 
     /// The likeliest candidates elsewhere, one of each place.
