@@ -130,6 +130,7 @@ fn calibration_from(
         start_yaw_rad: params.f64_in("guess_yaw_rad", d.start_yaw_rad, 0.0..=3.2)?,
         max_p_wrong: params.f64_in("max_p_wrong", d.max_p_wrong, 1e-12..=0.5)?,
         min_inliers: params.f64_in("min_inliers", d.min_inliers, 0.0..=1.0)?,
+        max_contradicted: params.f64_in("max_contradicted", d.max_contradicted, 0.0..=1.0)?,
         max_sigma_m: params.f64_in("max_sigma_m", d.max_sigma_m, meters)?,
         max_sigma_rad: params.f64_in("max_sigma_rad", d.max_sigma_rad, 1e-6..=3.2)?,
     })

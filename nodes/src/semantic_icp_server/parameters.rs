@@ -38,6 +38,7 @@ const ABOUT: &[About] = about! {
     "guess_yaw_rad": "How far the heading of the answer may be from that of a guess.";
     "max_p_wrong": "Largest probability that another pose is right, for a pose to be OK.";
     "min_inliers": "Share of the points that must lie on the map for it.";
+    "max_contradicted": "Share of the lines of sight that may end before a surface of the map, with nothing of it there, or go through one.";
     "max_sigma_m": "Most standard deviation of a place in its least sure direction for it.";
     "max_sigma_rad": "Most standard deviation of a rotation about any axis for it.";
     "tf_rate_hz": "How often /tf map -> headset_origin is published while it is known.";

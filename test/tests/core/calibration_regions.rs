@@ -14,6 +14,19 @@ const MIDST: Point3<f64> = Point3::new(1.6, 1.5, 0.5);
 
 /// The answer to the first look into a flat, given the map of another.
 fn ask(seen: &Flat, mapped: &Flat) -> Calibration {
+    let (found, truth) = ask_by(seen, mapped, &CalibrationOptions::default());
+    assert_eq!(found.verdict, Verdict::Ok, "{}", found.reason);
+    let off_m = (found.map_from_headset.translation.vector - truth.translation.vector).norm();
+    assert!(off_m < 0.03, "{off_m}");
+    found
+}
+
+/// The same by options, with the truth.
+fn ask_by(
+    seen: &Flat,
+    mapped: &Flat,
+    options: &CalibrationOptions,
+) -> (Calibration, Isometry3<f64>) {
     let truth = Isometry3::new(Vector3::new(2.0, 4.0, 1.5), Vector3::z() * 2.5);
     let (eye, yaw) = LOOKS[0];
     let eye = Point3::from(eye);
@@ -27,11 +40,7 @@ fn ask(seen: &Flat, mapped: &Flat) -> Calibration {
         start: None,
         confusion: None,
     };
-    let found = calibrate(&map, &request, &CalibrationOptions::default(), &());
-    assert_eq!(found.verdict, Verdict::Ok, "{}", found.reason);
-    let off_m = (found.map_from_headset.translation.vector - truth.translation.vector).norm();
-    assert!(off_m < 0.03, "{off_m}");
-    found
+    (calibrate(&map, &request, options, &()), truth)
 }
 
 fn with_box() -> Flat {
@@ -72,4 +81,20 @@ fn a_box_that_is_gone_is_seen_through() {
         found.fit
     );
     assert!(found.fit.blocked > 0.05, "{:?}", found.fit);
+}
+
+#[test]
+fn a_view_that_the_map_contradicts_is_refused() {
+    let strict = CalibrationOptions {
+        max_contradicted: 0.05,
+        ..CalibrationOptions::default()
+    };
+    let flats = [Flat::default(), with_box()];
+    for [seen, mapped] in [[0, 1], [1, 0]] {
+        let (found, _) = ask_by(&flats[seen], &flats[mapped], &strict);
+        assert_eq!(found.verdict, Verdict::NoOverlap, "{}", found.reason);
+        assert!(found.reason.contains("contradicts"), "{}", found.reason);
+    }
+    let (same, _) = ask_by(&flats[0], &flats[0], &strict);
+    assert_eq!(same.verdict, Verdict::Ok, "{}", same.reason);
 }

@@ -7,7 +7,7 @@ use super::candidates::{Candidate, Workbench};
 use super::covariance::{ErrorModel, PoseCovariance};
 use super::likeliest;
 use super::margin::{Margin, SOFTNESS};
-use super::regions::absolute_fit;
+use super::regions::{AbsoluteFit, absolute_fit};
 use super::scale::scale_at;
 use super::types::{
     Calibration, CalibrationOptions, ClassReliability, DirectionKind, ScaleEstimate, Verdict,
@@ -72,7 +72,8 @@ pub(super) fn answer(bench: &Workbench<'_>, all: Vec<Candidate>, started: bool) 
     let options = bench.options;
     let weak = covariance.as_ref().map(|sure| weak(bench, sure, &pose));
     let weak = weak.unwrap_or_default();
-    let (mut verdict, mut reason) = verdict(options, best, &margin, covariance.is_some(), &weak);
+    let held = covariance.is_some();
+    let (mut verdict, mut reason) = verdict(options, best, &margin, &fit, held, &weak);
     let scale = scale(bench, best);
     if best.inlier_fraction >= options.min_inliers
         && let Some(fault) = leaning(&pose, leans, options)
@@ -181,6 +182,7 @@ fn verdict(
     options: &CalibrationOptions,
     best: &Candidate,
     margin: &Margin,
+    fit: &AbsoluteFit,
     held: bool,
     weak: &[WeakDirection],
 ) -> (Verdict, String) {
@@ -190,6 +192,9 @@ fn verdict(
         let reason =
             format!("only {percent:.0} % of the points lie on the map, {least:.0} % are needed");
         return (Verdict::NoOverlap, reason);
+    }
+    if fit.floating + fit.blocked > options.max_contradicted {
+        return (Verdict::NoOverlap, contradicted(fit, options));
     }
     let (log, p_wrong) = (margin.log, margin.p_wrong());
     if p_wrong > options.max_p_wrong {
@@ -221,6 +226,16 @@ fn verdict(
         "{percent:.0} % of the points lie on the map, log-margin {log:.0}, wrong with a probability of {p_wrong:.0e}"
     );
     (Verdict::Ok, reason)
+}
+
+/// Says that the map speaks against a pose.
+fn contradicted(fit: &AbsoluteFit, options: &CalibrationOptions) -> String {
+    let [floating, blocked, most] =
+        [fit.floating, fit.blocked, options.max_contradicted].map(|share| 100.0 * share);
+    format!(
+        "the map contradicts the cloud: {floating:.0} % of its points float before surfaces of the map, {blocked:.0} % \
+         are seen through one, {most:.0} % together are allowed; it is of another place, or much has moved"
+    )
 }
 
 /// Covariance of a candidate's pose by the surfaces; None if they do not hold it at all.

@@ -67,6 +67,8 @@ pub struct CalibrationOptions {
     pub max_p_wrong: f64,
     /// Share of the headset's points that must lie on the map.
     pub min_inliers: f64,
+    /// Share of the lines of sight that may contradict the map: they end before one of its surfaces, or go through one.
+    pub max_contradicted: f64,
     /// Largest standard deviation of the position in any direction.
     pub max_sigma_m: f64,
     /// Largest standard deviation of the orientation about any axis, radians.
@@ -92,6 +94,7 @@ impl Default for CalibrationOptions {
             start_yaw_rad: 1.0,
             max_p_wrong: 0.01,
             min_inliers: 0.4,
+            max_contradicted: 0.3,
             max_sigma_m: 0.1,
             max_sigma_rad: 0.04,
         }

@@ -45,6 +45,9 @@ pub struct SearchOptions {
     /// Share of the points that must lie on the map for it
     #[arg(long)]
     min_inliers: Option<f64>,
+    /// Share of the lines of sight that may end before a surface of the map, with nothing of it there, or go through one
+    #[arg(long)]
+    max_contradicted: Option<f64>,
     /// Most standard deviation of the place in its least sure direction for it, m
     #[arg(long)]
     max_sigma: Option<f64>,
@@ -132,6 +135,12 @@ impl SearchOptions {
                 (1e-12, 0.5),
             )?,
             min_inliers: within("min-inliers", self.min_inliers, usual.min_inliers, share)?,
+            max_contradicted: within(
+                "max-contradicted",
+                self.max_contradicted,
+                usual.max_contradicted,
+                share,
+            )?,
             max_sigma_m: within("max-sigma", self.max_sigma, usual.max_sigma_m, length)?,
             max_sigma_rad: within(
                 "max-sigma-rad",
