@@ -2,60 +2,20 @@
 
 import argparse
 import json
-import math
 import pathlib
 import sys
 import time
 
-import kiss_matcher
 import numpy as np
-import small_gicp
 
 sys.path.insert(0, str(pathlib.Path(__file__).resolve().parent))
 sys.dont_write_bytecode = True
 
 import ply  # noqa: E402
+from peers import error, gicp, kiss, prepare  # noqa: E402
 
-NEIGHBORS = 20  # as many as ours take for a covariance
 GATES_M = (1.0, 2.0)
 VOXELS_M = (0.3, 0.5)
-
-
-def error(pose, truth):
-    """Metres between the translations, degrees between the rotations."""
-    # |R_a - R_b| (Frobenius) = 2 sqrt(2) sin(angle / 2), which keeps its digits for small angles.
-    sine = np.linalg.norm(pose[:3, :3] - truth[:3, :3]) / math.sqrt(8)
-    return float(np.linalg.norm(pose[:3, 3] - truth[:3, 3])), math.degrees(2 * math.asin(min(1.0, sine)))
-
-
-def prepare(points):
-    """Tree and covariances, and the processor time they took, s."""
-    begin = time.process_time()
-    cloud = small_gicp.PointCloud(points)
-    tree = small_gicp.KdTree(cloud, 1)
-    small_gicp.estimate_covariances(cloud, tree, NEIGHBORS, 1)
-    return cloud, tree, time.process_time() - begin
-
-
-def gicp(target, source, start, gate_m):
-    return small_gicp.align(
-        target[0],
-        source[0],
-        target[1],
-        init_T_target_source=start,
-        registration_type="GICP",
-        max_correspondence_distance=gate_m,
-        num_threads=1,
-    ).T_target_source
-
-
-def kiss(source, target, voxel_m, quatro):
-    """Transform of KISS-Matcher and whether it holds it for valid."""
-    config = kiss_matcher.KISSMatcherConfig(voxel_m, use_quatro=quatro)
-    found = kiss_matcher.KISSMatcher(config).estimate(source, target)
-    pose = np.eye(4)
-    pose[:3, :3], pose[:3, 3] = found.rotation, np.ravel(found.translation)
-    return pose, bool(found.valid)
 
 
 def main():

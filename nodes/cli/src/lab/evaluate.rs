@@ -82,6 +82,9 @@ pub struct Calibration {
     /// Surveys of the robot
     #[arg(long, default_value_t = Settings::default().map_seeds)]
     maps: u64,
+    /// Also write the looks whose times are measured to the folder `looks` of the results, for other programs
+    #[arg(long)]
+    write_looks: bool,
     /// A few trials, in less than a minute
     #[arg(long)]
     quick: bool,
@@ -171,6 +174,7 @@ impl Calibration {
             flips: self.flips.clone(),
             starts: self.starts.clone(),
             methods: self.methods.clone(),
+            looks: self.write_looks.then(|| self.out.join("looks")),
             ..Plan::default()
         };
         if !self.quick {

@@ -7,6 +7,7 @@
 
 mod chain;
 mod figures;
+mod files;
 mod house;
 mod initial_guess;
 pub mod kitti;

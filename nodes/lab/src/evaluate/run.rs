@@ -1,5 +1,6 @@
 //! The run of all trials, side by side and timed.
 
+use super::files::write_look;
 use super::initial_guess::perturbed;
 use super::methods::Baseline;
 use super::results::{Results, name};
@@ -12,6 +13,7 @@ use crate::{AnyError, pool};
 use lattice_core::registration::{CalibrationOptions, CalibrationRequest, calibrate, track};
 use nalgebra::Isometry3;
 use std::collections::HashSet;
+use std::path::Path;
 use std::sync::atomic::{AtomicUsize, Ordering};
 use std::sync::mpsc;
 use std::time::Instant;
@@ -82,7 +84,7 @@ pub fn run(
             trials.push(trial);
             Ok(())
         };
-        pool.install(|| run_job(testbed, job, &mut found))?;
+        pool.install(|| run_job(testbed, job, plan.looks.as_deref(), &mut found))?;
         trials.into_iter().try_for_each(&mut keep)?;
     }
     Ok(())
@@ -107,7 +109,7 @@ fn side_by_side(
                 };
                 let mut work = || {
                     while let Some(job) = jobs.get(next.fetch_add(1, Ordering::Relaxed)) {
-                        run_job(testbed, job, &mut found)?;
+                        run_job(testbed, job, None, &mut found)?;
                     }
                     Ok(())
                 };
@@ -189,12 +191,16 @@ fn timed_tasks(plan: &Plan, scene: Scene, seed: u64) -> Vec<Task> {
 fn run_job(
     testbed: &Testbed,
     job: &Job,
+    looks: Option<&Path>,
     found: &mut (dyn FnMut(Trial) -> Result<(), AnyError> + Send),
 ) -> Result<(), AnyError> {
     let view = testbed.view(job.scene, job.seed)?;
     for tasks in job.tasks.chunk_by(|a, b| a.cell.q == b.cell.q) {
         let q = tasks.first().map_or(0.0, |task| task.cell.q);
         let scenario = testbed.scenario(&view, q)?;
+        if let Some((folder, task)) = looks.zip(tasks.first()) {
+            write_look(folder, &task.cell, &scenario)?;
+        }
         for task in tasks {
             found(run_task(&scenario, task, job))?;
         }

@@ -5,6 +5,7 @@ use crate::options::within;
 use crate::simulate::house::Scene;
 use serde::{Deserialize, Serialize};
 use std::fmt;
+use std::path::PathBuf;
 use std::str::FromStr;
 
 /// Version of trials and their seeds; old results are not continued with new ones.
@@ -137,6 +138,8 @@ pub struct Plan {
     pub methods: Vec<String>,
     /// Seeds of each scene whose times are measured with nothing else running.
     pub timed_seeds: u64,
+    /// Folder to which the looks are written whose times are measured, for other programs.
+    pub looks: Option<PathBuf>,
 }
 
 impl Default for Plan {
@@ -154,6 +157,7 @@ impl Default for Plan {
             ],
             methods: Vec::new(),
             timed_seeds: 4,
+            looks: None,
         }
     }
 }

@@ -1,10 +1,9 @@
 //! Scans for other programs.
 
 use super::Prepared;
+use crate::evaluate::files::write_cloud;
 use crate::{AnyError, at};
-use lattice_core::registration::{SemanticCloud, UNLABELED};
-use lattice_nodes::files::export::write_labelled_ply;
-use lattice_nodes::files::whole;
+use lattice_core::registration::SemanticCloud;
 use std::fs;
 use std::path::Path;
 
@@ -15,13 +14,8 @@ pub fn write_scans(folder: &Path, names: &[String], scans: &[Prepared]) -> Resul
     for (number, (name, scan)) in names.iter().zip(scans).enumerate() {
         let write = |kind: &str, cloud: &SemanticCloud| {
             let path = folder.join(format!("{kind}_{number}.ply"));
-            let labels: Vec<u16> = (0..cloud.len())
-                .map(|i| cloud.label(i).top().unwrap_or(UNLABELED))
-                .collect();
             let comment = format!("{kind} at {name}, metres, sensor frame");
-            whole::write(&path, |file| {
-                write_labelled_ply(&cloud.points_m, &labels, &comment, file)
-            })
+            write_cloud(&path, &cloud.points_m, |i| cloud.label(i), &comment)
         };
         write("scan", &scan.whole)?;
         write("thinned", &scan.thinned)?;

@@ -60,6 +60,7 @@ impl Trials {
             starts: STARTS.to_vec(),
             methods: names(&methods()),
             timed_seeds: 0,
+            looks: None,
         };
         let between = Plan {
             flips: vec![BETWEEN],

@@ -1,0 +1,52 @@
+//! Clouds of an evaluation as files, for other programs.
+
+use super::Scenario;
+use super::settings::Cell;
+use crate::{AnyError, at};
+use lattice_core::registration::{LabelDistribution, UNLABELED};
+use lattice_nodes::files::export::write_labelled_ply;
+use lattice_nodes::files::whole::{self, write_text};
+use nalgebra::Point3;
+use std::fs;
+use std::path::Path;
+
+/// Writes points, metres, with their most probable classes.
+pub(super) fn write_cloud(
+    path: &Path,
+    points_m: &[Point3<f64>],
+    label: impl Fn(usize) -> LabelDistribution,
+    comment: &str,
+) -> Result<(), AnyError> {
+    let labels = (0..points_m.len()).map(|i| label(i).top().unwrap_or(UNLABELED));
+    let labels: Vec<u16> = labels.collect();
+    whole::write(path, |file| {
+        write_labelled_ply(points_m, &labels, comment, file)
+    })
+}
+
+/// Writes a look to a folder: `SCENE_SEED_map.ply` and `SCENE_SEED_cloud.ply`, as the map and the headset have them, and
+/// `SCENE_SEED.json` with the true `map_from_headset`, row by row.
+pub(super) fn write_look(folder: &Path, cell: &Cell, scenario: &Scenario) -> Result<(), AnyError> {
+    fs::create_dir_all(folder).map_err(at(folder))?;
+    let name = format!("{}_{}", cell.scene, cell.seed);
+    let (map, cloud) = (scenario.map.cloud(), &scenario.full);
+    let path = |kind: &str| folder.join(format!("{name}_{kind}.ply"));
+    write_cloud(
+        &path("map"),
+        map.points_m(),
+        |i| map.label(i),
+        "voxels of the map, metres",
+    )?;
+    write_cloud(
+        &path("cloud"),
+        cloud.points_m(),
+        |i| cloud.label(i),
+        "points of the headset, metres",
+    )?;
+    let truth = scenario.truth.to_homogeneous();
+    let rows: Vec<Vec<f64>> = (truth.row_iter())
+        .map(|row| row.iter().copied().collect())
+        .collect();
+    let json = serde_json::json!({ "map_from_headset": rows });
+    write_text(&folder.join(format!("{name}.json")), &json.to_string())
+}
