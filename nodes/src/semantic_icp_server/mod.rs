@@ -16,7 +16,7 @@ mod search_thread;
 mod state;
 
 pub use counts::ServerCounts;
-pub use options::{SearchWhen, ServerOptions, WhenBusy};
+pub use options::{ByProfile, SearchWhen, ServerOptions, WhenBusy};
 pub use parameters::declare;
 pub use search::{Done, Job, LatticeSearch, MapCloud, Search, Work};
 
@@ -24,7 +24,7 @@ use std::collections::BTreeMap;
 use std::sync::Arc;
 use std::sync::atomic::{AtomicBool, Ordering::Relaxed};
 
-use lattice_core::registration::{Calibration, HeadsetScan, Profile, Stage, TrackUpdate, Verdict};
+use lattice_core::registration::{Calibration, HeadsetScan, Stage, TrackUpdate, Verdict};
 use lattice_msgs::calibration::{
     CalibrateFeedback, CalibrateGoal, CalibrateResult, CalibrationResult,
 };

@@ -1,6 +1,6 @@
 //! Parameters of the server.
 
-use lattice_core::registration::{CalibrationOptions, Profile};
+use lattice_core::registration::{CalibrationOptions, HeadsetScan, Profile};
 
 use crate::convert::semantic::SemanticOptions;
 use crate::options::{frame, one_of};
@@ -24,6 +24,10 @@ pub enum WhenBusy {
     Supersede,
 }
 
+/// Options of calibrations, one for each profile where the clouds tell it; else all alike.
+#[derive(Clone, Copy, Debug)]
+pub struct ByProfile([CalibrationOptions; Profile::ALL.len()]);
+
 /// Options of a [`super::SemanticIcpServer`].
 #[derive(Clone, Debug)]
 pub struct ServerOptions {
@@ -34,7 +38,7 @@ pub struct ServerOptions {
     /// Options for reading clouds.
     pub semantic: SemanticOptions,
     /// Options of calibrations.
-    pub calibration: CalibrationOptions,
+    pub calibration: ByProfile,
     /// Maps of more voxels are not followed.
     pub max_map_voxels: usize,
     /// Occasion on which a whole search begins by itself.
@@ -62,7 +66,7 @@ impl Default for ServerOptions {
             map_frame: "map".into(),
             headset_frame: "headset_origin".into(),
             semantic: SemanticOptions::default(),
-            calibration: CalibrationOptions::default(),
+            calibration: ByProfile::from(CalibrationOptions::default()),
             max_map_voxels: 5_000_000,
             search: SearchWhen::Lost,
             when_busy: WhenBusy::Reject,
@@ -81,7 +85,7 @@ impl ServerOptions {
     pub fn from_params(params: &Params) -> Result<Self, ParamError> {
         let defaults = Self::default();
         let semantic = SemanticOptions::from_params(params)?;
-        let calibration = calibration_from(params, &semantic)?;
+        let calibration = ByProfile::from_params(params, &semantic)?;
         let lost_after = defaults.lost_after as usize;
         let lost_after = params.usize_in("lost_after", lost_after, 1..=1 << 20)?;
         let scan_period_s = params.f64_in("headset_scan_period_s", 1.0, 0.0..=1e6)?;
@@ -106,12 +110,47 @@ impl ServerOptions {
     }
 }
 
+impl ByProfile {
+    fn from_params(params: &Params, semantic: &SemanticOptions) -> Result<ByProfile, ParamError> {
+        let auto = std::iter::once(("auto", None));
+        let named = Profile::ALL.map(|profile| (profile.name(), Some(profile)));
+        let profiles: Vec<_> = named.into_iter().chain(auto).collect();
+        if let Some(profile) = one_of(params, "profile", &profiles)? {
+            return calibration_from(params, semantic, profile).map(ByProfile::from);
+        }
+        // The first that are read are shown as the parameters.
+        let [first, ..] = Profile::ALL;
+        let mut options = [calibration_from(params, semantic, first)?; Profile::ALL.len()];
+        for (options, profile) in options.iter_mut().zip(Profile::ALL).skip(1) {
+            *options = calibration_from(params, semantic, profile)?;
+        }
+        Ok(ByProfile(options))
+    }
+
+    /// The options for clouds.
+    pub fn options(&self, headset_scans: &[HeadsetScan]) -> CalibrationOptions {
+        let [first, others @ ..] = &self.0;
+        if others.iter().all(|other| other.profile == first.profile) {
+            return *first;
+        }
+        let seen = Profile::of(headset_scans);
+        let options = self.0.iter().find(|options| options.profile == seen);
+        *options.unwrap_or(first)
+    }
+}
+
+impl From<CalibrationOptions> for ByProfile {
+    fn from(options: CalibrationOptions) -> ByProfile {
+        ByProfile([options; Profile::ALL.len()])
+    }
+}
+
 fn calibration_from(
     params: &Params,
     semantic: &SemanticOptions,
+    profile: Profile,
 ) -> Result<CalibrationOptions, ParamError> {
-    let profiles = Profile::ALL.map(|profile| (profile.name(), profile));
-    let d = one_of(params, "profile", &profiles)?.options();
+    let d = profile.options();
     let meters = 1e-6..=1e4;
     Ok(CalibrationOptions {
         profile: d.profile,
@@ -141,4 +180,55 @@ fn gravity_sigma_rad(params: &Params, default: f64) -> Result<f64, ParamError> {
     let default = if default.is_finite() { default } else { 0.0 };
     let sigma = params.f64_in("gravity_sigma_rad", default, 0.0..=3.2)?;
     Ok(if sigma > 0.0 { sigma } else { f64::INFINITY })
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use lattice_core::registration::SemanticCloud;
+    use lattice_runtime::params::ParamValue;
+    use nalgebra::Point3;
+
+    /// Points a metre apart on a square around the sensor.
+    fn around(half_side: i32) -> [HeadsetScan; 1] {
+        let sides = -half_side..=half_side;
+        let points = sides
+            .clone()
+            .flat_map(|x| sides.clone().map(move |y| (x, y)));
+        let points = points.map(|(x, y)| Point3::new(f64::from(x), f64::from(y), 0.0));
+        [HeadsetScan {
+            cloud: SemanticCloud::unlabelled(points.collect()),
+            sensor_m: Some(Point3::origin()),
+        }]
+    }
+
+    #[test]
+    fn each_cloud_has_the_options_of_its_sensor_but_for_what_is_given() {
+        let given = [
+            ("profile", ParamValue::String("auto".into())),
+            ("noise_m", ParamValue::F64(0.07)),
+        ];
+        let params = Params::from_values("/node", given);
+        let all = ServerOptions::from_params(&params).unwrap().calibration;
+        let (room, street) = (all.options(&around(4)), all.options(&around(40)));
+        assert_eq!(
+            (room.profile, street.profile),
+            (Profile::Headset, Profile::Lidar)
+        );
+        assert_eq!((room.noise_m, street.noise_m), (0.07, 0.07));
+        let usual = Profile::Lidar.options();
+        assert_eq!(street.region_m, usual.region_m);
+        assert_ne!(room.region_m, usual.region_m);
+        // Shown are those of a headset.
+        let shown = params.declared();
+        assert_eq!(shown.get("region_m"), Some(&ParamValue::F64(room.region_m)));
+    }
+
+    #[test]
+    fn a_profile_that_is_given_holds_for_all_clouds() {
+        let given = [("profile", ParamValue::String("depth_camera".into()))];
+        let options = ServerOptions::from_params(&Params::from_values("/node", given)).unwrap();
+        let street = options.calibration.options(&around(40));
+        assert_eq!(street.profile, Profile::DepthCamera);
+    }
 }

@@ -27,10 +27,6 @@ impl SemanticIcpServer {
         }
         let mut result = result_from(found);
         self.describe(&mut result, running.stamp_ns);
-        let profile = self.options.calibration.profile;
-        if profile != Profile::Headset {
-            result.reason = format!("{}; profile {profile}", result.reason);
-        }
         result.duration_s = now_ns.saturating_sub(running.begun_ns) as f64 * 1e-9;
         (result.gazes, result.points) = running.gazes_and_points();
         let counts = &mut self.counts;

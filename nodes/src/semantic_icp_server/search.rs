@@ -5,11 +5,13 @@ use std::sync::atomic::{AtomicBool, Ordering::Relaxed};
 use std::sync::{Arc, Mutex};
 
 use lattice_core::registration::{
-    Calibration, CalibrationMap, CalibrationOptions, CalibrationRequest, Confusion, HeadsetScan,
-    Progress, SemanticCloud, Stage, TrackUpdate, Verdict, calibrate, track,
+    Calibration, CalibrationMap, CalibrationRequest, Confusion, HeadsetScan, Profile, Progress,
+    SemanticCloud, Stage, TrackUpdate, Verdict, calibrate, track,
 };
 use lattice_runtime::lock;
 use nalgebra::Isometry3;
+
+use super::ByProfile;
 
 /// A map to be made ready.
 #[derive(Clone, Debug)]
@@ -46,7 +48,7 @@ pub trait Search: Send + 'static {
 
 /// The search of the core.
 pub struct LatticeSearch {
-    options: Arc<Mutex<CalibrationOptions>>,
+    options: Arc<Mutex<ByProfile>>,
     map: Option<CalibrationMap>,
     /// Confusions of labels learned so far.
     confusion: Option<Confusion>,
@@ -54,7 +56,7 @@ pub struct LatticeSearch {
 
 impl LatticeSearch {
     /// Without a map.
-    pub fn new(options: CalibrationOptions) -> Self {
+    pub fn new(options: ByProfile) -> Self {
         Self {
             options: Arc::new(Mutex::new(options)),
             map: None,
@@ -63,7 +65,7 @@ impl LatticeSearch {
     }
 
     /// The options, for the next job to go by.
-    pub fn options(&self) -> Arc<Mutex<CalibrationOptions>> {
+    pub fn options(&self) -> Arc<Mutex<ByProfile>> {
         Arc::clone(&self.options)
     }
 }
@@ -95,7 +97,11 @@ impl Search for LatticeSearch {
             confusion: self.confusion.as_ref(),
         };
         let options = *lock(&self.options);
-        let found = calibrate(map, &request, &options, progress);
+        let options = options.options(headset_scans);
+        let mut found = calibrate(map, &request, &options, progress);
+        if options.profile != Profile::Headset {
+            found.reason = format!("{}; profile {}", found.reason, options.profile);
+        }
         if found.verdict == Verdict::Ok {
             self.confusion = Some(found.confusion.clone());
         }
@@ -109,6 +115,7 @@ impl Search for LatticeSearch {
     ) -> Option<TrackUpdate> {
         let map = self.map.as_ref()?;
         let options = *lock(&self.options);
+        let options = options.options(std::slice::from_ref(headset_scan));
         Some(track(map, headset_scan, map_from_headset, &options))
     }
 }

@@ -18,6 +18,7 @@ mod readings;
 mod regions;
 mod rivals;
 mod scale;
+mod seen;
 mod track;
 mod types;
 

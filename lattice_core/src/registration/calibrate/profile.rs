@@ -2,7 +2,15 @@
 
 use std::fmt;
 
-use super::types::CalibrationOptions;
+use super::seen::Seen;
+use super::types::{CalibrationOptions, HeadsetScan};
+
+/// Range beyond which a laser scanner outdoors is at work, metres.
+const LIDAR_M: f64 = 15.0;
+/// Points of a cell of 10 cm from which on a depth camera may be at work: meshes of headsets have up to 16.
+const DENSE: f64 = 24.0;
+/// Noise within such a cell from which on it is no mesh, metres.
+const NOISY_M: f64 = 1.5e-3;
 
 /// Kind of sensor; what it sets is the default of every option.
 #[derive(Clone, Copy, PartialEq, Eq, Debug, Default)]
@@ -26,6 +34,18 @@ impl Profile {
             Profile::Headset => "headset",
             Profile::Lidar => "lidar",
             Profile::DepthCamera => "depth_camera",
+        }
+    }
+
+    /// The profile of the sensor that clouds look like, by their range, density and noise.
+    pub fn of(scans: &[HeadsetScan]) -> Profile {
+        let seen = Seen::in_scans(scans);
+        if seen.range_m > LIDAR_M {
+            Profile::Lidar
+        } else if seen.points_of_cell >= DENSE && seen.noise_m >= NOISY_M {
+            Profile::DepthCamera
+        } else {
+            Profile::Headset
         }
     }
 
@@ -62,5 +82,37 @@ impl Profile {
 impl fmt::Display for Profile {
     fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
         f.write_str(self.name())
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::registration::SemanticCloud;
+    use nalgebra::Point3;
+
+    /// Points `apart_m` from each other on a wall of `side_m`, with up to `noise_m` across it, seen from as far away.
+    fn wall(side_m: f64, apart_m: f64, noise_m: f64) -> HeadsetScan {
+        let n = (side_m / apart_m) as u32;
+        let places = (0..n).flat_map(|y| (0..n).map(move |z| (y, z)));
+        let point = |(y, z): (u32, u32)| {
+            let across_m = noise_m * f64::from((7 * y + 3 * z) % 11) / 11.0;
+            let [y, z] = [y, z].map(|i| apart_m * (f64::from(i) + 0.5) - 0.5 * side_m);
+            Point3::new(side_m + 0.03 + across_m, y, z)
+        };
+        HeadsetScan {
+            cloud: SemanticCloud::unlabelled(places.map(point).collect()),
+            sensor_m: Some(Point3::origin()),
+        }
+    }
+
+    #[test]
+    fn the_sensor_is_told_by_range_density_and_noise() {
+        assert_eq!(Profile::of(&[wall(30.0, 0.2, 0.02)]), Profile::Lidar);
+        assert_eq!(Profile::of(&[wall(2.0, 0.01, 0.01)]), Profile::DepthCamera);
+        // A mesh, however finely its faces were filled with points.
+        assert_eq!(Profile::of(&[wall(2.0, 0.01, 0.0)]), Profile::Headset);
+        assert_eq!(Profile::of(&[wall(2.0, 0.05, 0.02)]), Profile::Headset);
+        assert_eq!(Profile::of(&[]), Profile::Headset);
     }
 }

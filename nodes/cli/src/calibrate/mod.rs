@@ -82,7 +82,8 @@ impl Calibrate {
         init_logging();
         self.check()?;
         let most = self.max_points.saturating_mul(self.cloud.len());
-        let options = self.search.options(self.axes, most)?;
+        // What is out of bounds is told before anything is read.
+        self.search.options(self.axes, most, &[])?;
         let names = match &self.labels {
             Some(path) => read_classes(path).map_err(|e| format!("{}: {e}", path.display()))?,
             None => BTreeMap::new(),
@@ -96,6 +97,7 @@ impl Calibrate {
             read_ms: milliseconds(started),
             ..Times::default()
         };
+        let options = self.search.options(self.axes, most, &headset_scans)?;
         let points = headset_scans.iter().map(|scan| scan.cloud.len()).sum();
         let map_points = map.len();
         let mut answer = match self.method.single(self.gate) {

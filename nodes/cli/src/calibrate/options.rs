@@ -3,15 +3,15 @@
 use clap::Args;
 use clap::builder::{PossibleValue, PossibleValuesParser, TypedValueParser};
 use lattice_core::pose::Axes;
-use lattice_core::registration::{CalibrationOptions, Profile};
+use lattice_core::registration::{CalibrationOptions, HeadsetScan, Profile};
 
 /// Sensor and thresholds; each that is left out is that of the profile.
 #[derive(Args)]
 #[command(next_help_heading = "Search and verdict [default: of the profile]")]
 pub struct SearchOptions {
     /// Sensor of the cloud, which sets the others
-    #[arg(long, alias = "from", value_parser = profile(), default_value = "headset")]
-    profile: Profile,
+    #[arg(long, alias = "from", value_parser = profile(), default_value = AUTO)]
+    profile: Sensor,
     /// Standard deviation of the cloud's points, m
     #[arg(long)]
     noise: Option<f64>,
@@ -62,16 +62,24 @@ pub struct SearchOptions {
     estimate_scale: bool,
 }
 
-fn profile() -> impl TypedValueParser<Value = Profile> {
+/// Profile that is asked for; None for that of the sensor that the cloud looks like.
+#[derive(Clone, Copy)]
+struct Sensor(Option<Profile>);
+
+const AUTO: &str = "auto";
+
+fn profile() -> impl TypedValueParser<Value = Sensor> {
     let help = |profile| match profile {
         Profile::Headset => "The mesh of a mixed-reality headset, upright",
         Profile::Lidar => "A laser scanner, outdoors, that may lean",
         Profile::DepthCamera => "A depth camera with an IMU",
     };
-    let value = move |profile: Profile| PossibleValue::new(profile.name()).help(help(profile));
+    let auto = PossibleValue::new(AUTO).help("As its range, density and noise tell");
+    let value = |profile: Profile| PossibleValue::new(profile.name()).help(help(profile));
+    let values = std::iter::once(auto).chain(Profile::ALL.map(value));
     let named = |name: &str| Profile::ALL.into_iter().find(|p| p.name() == name);
-    PossibleValuesParser::new(Profile::ALL.map(value))
-        .map(move |name: String| named(&name).unwrap_or_default())
+    PossibleValuesParser::new(values.collect::<Vec<_>>())
+        .map(move |name: String| Sensor(named(&name)))
 }
 
 /// A number in its bounds, or the default if none is given.
@@ -94,8 +102,15 @@ impl SearchOptions {
     ///
     /// # Errors
     /// Names a number that is out of bounds.
-    pub fn options(&self, axes: Axes, max_points: usize) -> Result<CalibrationOptions, String> {
-        let usual = self.profile.options();
+    pub fn options(
+        &self,
+        axes: Axes,
+        max_points: usize,
+        headset_scans: &[HeadsetScan],
+    ) -> Result<CalibrationOptions, String> {
+        let Sensor(asked) = self.profile;
+        let profile = asked.unwrap_or_else(|| Profile::of(headset_scans));
+        let usual = profile.options();
         let (share, length, angle) = ((0.0, 1.0), (1e-6, 1e4), (0.0, 3.2));
         let gravity = self.gravity_sigma.map(|sigma| match sigma {
             0.0 => Ok(f64::INFINITY),

@@ -1,0 +1,147 @@
+//! Properties of clouds by which the sensor that made them is told.
+
+use nalgebra::{Matrix3, Point3, Vector3};
+use rustc_hash::FxHashMap;
+
+use super::types::HeadsetScan;
+
+/// Points that are looked at, at most; of more, some.
+const POINTS: usize = 1_000_000;
+/// Side of the cells that points are counted in, metres.
+const CELL_M: f64 = 0.1;
+/// Fewest points of a cell that a plane is fitted to.
+const LEAST: f64 = 12.0;
+/// Share of the cells that are within the range.
+const WITHIN: f64 = 0.9;
+/// Farthest that a point may be, metres.
+const FARTHEST_M: f64 = 1e6;
+
+/// Range, density and noise of clouds.
+#[derive(Clone, Copy, PartialEq, Debug, Default)]
+pub(super) struct Seen {
+    /// Distance from the sensor, or from the midst of the points, within which nine of ten surfaces are, metres.
+    pub range_m: f64,
+    /// Points of a cell of 10 cm, in the median.
+    pub points_of_cell: f64,
+    /// Distance of points from the plane through those of their cell, root mean square, metres, in the median; 0 if
+    /// there are too few.
+    pub noise_m: f64,
+}
+
+#[derive(Clone, Copy, Default)]
+struct Cell {
+    points: f64,
+    sum_m: Vector3<f64>,
+    squares: Matrix3<f64>,
+    distance_m: f64,
+}
+
+impl Seen {
+    /// Looks at clouds.
+    pub fn in_scans(scans: &[HeadsetScan]) -> Seen {
+        let all: usize = scans.iter().map(|scan| scan.cloud.len()).sum();
+        let stride = all.div_ceil(POINTS).max(1);
+        let (mut distances_m, mut counts, mut noises_m) = (Vec::new(), Vec::new(), Vec::new());
+        for scan in scans {
+            for cell in cells(scan, stride) {
+                distances_m.push(cell.distance_m);
+                counts.push(cell.points * stride as f64);
+                noises_m.extend(cell.noise_m());
+            }
+        }
+        Seen {
+            range_m: quantile(&mut distances_m, WITHIN),
+            points_of_cell: quantile(&mut counts, 0.5),
+            noise_m: quantile(&mut noises_m, 0.5),
+        }
+    }
+}
+
+fn cells(scan: &HeadsetScan, stride: usize) -> Vec<Cell> {
+    let usable = |p: &&Point3<f64>| p.iter().all(|c| c.abs() <= FARTHEST_M);
+    let points = || scan.cloud.points_m.iter().step_by(stride).filter(usable);
+    let sum = points().fold(Vector3::zeros(), |sum, p| sum + p.coords);
+    let middle = Point3::from(sum / (points().count().max(1)) as f64);
+    let from = scan.sensor_m.unwrap_or(middle);
+    let mut cells: FxHashMap<[i32; 3], Cell> = FxHashMap::default();
+    for point in points() {
+        let key = [point.x, point.y, point.z].map(|c| (c / CELL_M).floor() as i32);
+        let cell = cells.entry(key).or_insert_with(|| Cell {
+            distance_m: nalgebra::distance(point, &from),
+            ..Cell::default()
+        });
+        // From a corner of the cell: squares of large coordinates lose their digits.
+        let place = point.coords - Vector3::from(key.map(|c| f64::from(c) * CELL_M));
+        cell.points += 1.0;
+        cell.sum_m += place;
+        cell.squares += place * place.transpose();
+    }
+    cells.into_values().collect()
+}
+
+impl Cell {
+    fn noise_m(&self) -> Option<f64> {
+        if self.points < LEAST {
+            return None;
+        }
+        let middle = self.sum_m / self.points;
+        let spread = self.squares / self.points - middle * middle.transpose();
+        Some(spread.symmetric_eigenvalues().min().max(0.0).sqrt())
+    }
+}
+
+/// Value below which a share of all is; 0 of none.
+fn quantile(values: &mut [f64], share: f64) -> f64 {
+    let at = (share * values.len() as f64) as usize;
+    match values.is_empty() {
+        true => 0.0,
+        false => {
+            let at = at.min(values.len() - 1);
+            *values.select_nth_unstable_by(at, f64::total_cmp).1
+        }
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::registration::SemanticCloud;
+
+    /// A floor of 2 m by 2 m below a sensor, a point each centimetre, every other moved up by `noise_m`.
+    fn floor(noise_m: f64) -> HeadsetScan {
+        let places = (0..200).flat_map(|x| (0..200).map(move |y| (x, y)));
+        let point = |(x, y): (i32, i32)| {
+            let up_m = noise_m * f64::from((x + y) % 2);
+            Point3::new(
+                0.01 * f64::from(x) - 0.995,
+                0.01 * f64::from(y) - 0.995,
+                up_m + 0.05,
+            )
+        };
+        HeadsetScan {
+            cloud: SemanticCloud::unlabelled(places.map(point).collect()),
+            sensor_m: Some(Point3::new(0.0, 0.0, 1.5)),
+        }
+    }
+
+    #[test]
+    fn range_density_and_noise_of_a_floor_are_seen() {
+        let seen = Seen::in_scans(&[floor(0.0)]);
+        assert!((seen.range_m - 1.8).abs() < 0.1, "{seen:?}");
+        assert_eq!(seen.points_of_cell, 100.0);
+        assert!(seen.noise_m < 1e-6);
+        let noisy = Seen::in_scans(&[floor(0.02)]);
+        assert!((noisy.noise_m - 0.01).abs() < 1e-3, "{noisy:?}");
+    }
+
+    #[test]
+    fn what_is_no_cloud_has_no_range() {
+        let mut broken = floor(0.0);
+        broken.cloud.points_m = vec![
+            Point3::new(f64::NAN, 0.0, 0.0),
+            Point3::new(1e300, 0.0, 0.0),
+        ];
+        assert_eq!(Seen::in_scans(&[broken]), Seen::default());
+        assert_eq!(Seen::in_scans(&[]), Seen::default());
+    }
+}
