@@ -14,11 +14,13 @@ use crate::pose::se3;
 const WEAK: f64 = 0.25;
 /// Weak directions that are measured, at most.
 const MEASURED: usize = 3;
-/// Spacings of the map by which what is seen is moved to measure a direction, at most.
+/// Part of a spacing that what is seen moves by in a turn: surfaces hold turns far better than motions.
+const TURN: f64 = 0.25;
+/// Steps by which what is seen is moved to measure a direction, at most.
 const REACH: u32 = 8;
 /// Odds of a step over none, at most.
 const LIKELIEST: f64 = 1e6;
-/// Spacings of the map by which it is moved to climb, at first and once more.
+/// Steps by which it is moved to climb, at first and once more.
 const FAR: [f64; 5] = [8.0, 4.0, 2.0, 1.0, 0.5];
 const NEAR: [f64; 3] = [2.0, 1.0, 0.5];
 
@@ -99,11 +101,11 @@ impl Workbench<'_> {
         variance(unit, &steps.collect::<Vec<_>>())
     }
 
-    /// Step along a direction by which what is seen moves by a spacing of the map.
+    /// Step along a direction: a spacing of the map, or a turn by which what is seen moves by a part of that.
     fn unit(&self, kind: DirectionKind) -> f64 {
         match kind {
             DirectionKind::Translation => self.map.spacing_m,
-            DirectionKind::Rotation => self.map.spacing_m / self.reach_m(),
+            DirectionKind::Rotation => TURN * self.map.spacing_m / self.reach_m(),
         }
     }
 

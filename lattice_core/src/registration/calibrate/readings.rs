@@ -128,7 +128,7 @@ impl Reading {
 #[derive(Clone, Copy, PartialEq, Debug)]
 pub(super) struct Other {
     pub reading: Reading,
-    /// Log-likelihood by which it is ahead of the cloud as it is, of few points or, where these leave doubt, of all.
+    /// Log-likelihood by which it is ahead of the cloud as it is: of few points, or of all if it is possible by these.
     pub ahead: f64,
     /// True if it is beyond doubt.
     pub is_certain: bool,
@@ -219,7 +219,7 @@ pub(super) fn other_reading(
     });
     let (best, reading, poses) = fits.max_by(|a, b| a.0.total_cmp(&b.0))?;
     let other = Other::new(reading, best, best_of(straight), bench.few.observations());
-    Some(match other.is_possible() && !other.is_certain {
+    Some(match other.is_possible() {
         true => other
             .looked_at_closely(bench, &poses, refined)
             .unwrap_or(other),
