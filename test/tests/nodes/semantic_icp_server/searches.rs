@@ -3,7 +3,7 @@
 use std::sync::atomic::Ordering::Relaxed;
 
 use lattice_core::pose::Axes;
-use lattice_core::registration::{CalibrationOptions, Verdict};
+use lattice_core::registration::Verdict;
 use lattice_msgs::calibration::CalibrateGoal;
 use lattice_msgs::vision_msgs::{LabelInfo, VisionClass};
 use lattice_nodes::convert::geometry::isometry_from_transform;
@@ -226,7 +226,8 @@ fn a_left_handed_headset_is_found_and_a_mirrored_one_is_not() {
     mapper.on_cloud(&map_cloud(&flat, 1)).unwrap();
     let mut options = ServerOptions::default();
     options.semantic.axes = Axes::UnityRuf;
-    let mut bench = Bench::new(options, LatticeSearch::new(CalibrationOptions::default()));
+    let search = LatticeSearch::new(options.calibration);
+    let mut bench = Bench::new(options, search);
     bench.map(&mut mapper);
     let look = flat.look(Point3::new(3.5, 3.8, 1.6), -2.2, &truth());
     let unity = |v: Vector3<f64>| Axes::UnityRuf.from_ros(v);
