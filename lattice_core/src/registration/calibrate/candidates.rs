@@ -233,19 +233,30 @@ impl<'a> Workbench<'a> {
         let partners: Partners = fit.partners(&pose);
         let (likelihood, confusion) =
             fit.likelihood(&partners, &self.known, self.options.agreement);
-        let blocked = self.input.sensor_m.map_or(0.0, |sensor| {
-            let clear_m = 5.0 * self.map.spacing_m;
-            blocked_fraction(&self.map.occupied, &self.input.few, &sensor, &pose, clear_m)
-        });
+        let sensor_m = self.input.sensor_m.as_ref();
         Candidate {
             map_from_headset: pose,
             method,
             likelihood,
-            blocked: blocked * fit.observations() * BLOCKED_COST,
+            blocked: self.blocked(&self.input.few, sensor_m, &pose) * fit.observations(),
             inlier_fraction: partners.inlier_fraction,
             rmse_m: partners.rmse_m,
             confusion,
         }
+    }
+
+    /// Log-likelihood of an observation that lines of sight through walls cost; 0 without a place of the sensor.
+    pub fn blocked(
+        &self,
+        cloud: &PreparedCloud,
+        sensor_m: Option<&Point3<f64>>,
+        pose: &Isometry3<f64>,
+    ) -> f64 {
+        let clear_m = 5.0 * self.map.spacing_m;
+        let occupied = &self.map.occupied;
+        sensor_m.map_or(0.0, |sensor_m| {
+            BLOCKED_COST * blocked_fraction(occupied, cloud, sensor_m, pose, clear_m)
+        })
     }
 
     /// Log-likelihood that refining a candidate may still win it.

@@ -31,7 +31,7 @@ use super::search::{Hypothesis, Region, SearchMap, SearchSource, search};
 use super::{LabelDistribution, PreparedCloud, RegisterOptions, register};
 use candidates::{Candidate, Workbench};
 use input::Input;
-use readings::{Other, other_reading};
+use readings::{Other, Refined, other_reading};
 use types::Refusal;
 
 pub use map::CalibrationMap;
@@ -111,7 +111,7 @@ fn run(
         all = from_start;
     }
     step(progress, Stage::Judge, 0.9)?;
-    let refined = readings::best_of(&all);
+    let refined = Refined::of(&all);
     let calibration = judge::answer(&bench, all, request.start.is_some());
     let other = other_reading(&bench, &first, refined, region.as_ref());
     let _ = progress.report(Stage::Judge, 1.0);

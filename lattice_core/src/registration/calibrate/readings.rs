@@ -1,6 +1,6 @@
 //! Readings of a cloud's axes and unit: those under which it would fit tell how it was misread.
 
-use nalgebra::{Isometry3, Matrix3, Vector3};
+use nalgebra::{Isometry3, Matrix3, Point3, Vector3};
 use rayon::prelude::*;
 
 use super::super::likelihood::Fit;
@@ -151,45 +151,78 @@ impl Other {
         self.is_certain || self.ahead > -NOT_BEHIND
     }
 
-    /// The same by all points, from the poses that the few led to, beside the refined likelihood of the cloud as it is.
+    /// The same by all points, from the poses that the few led to, beside the cloud as it is after its last refinement.
+    ///
+    /// It is possible if it is so with lines of sight or without: a few of them are blocked at right poses too.
     fn looked_at_closely(
         self,
         bench: &Workbench<'_>,
         poses: &[Isometry3<f64>],
-        refined: f64,
+        refined: Refined,
     ) -> Option<Other> {
         let mended = Mended::new(bench, &bench.input.full, &self.reading)?;
-        let fit = Fit::new(
-            &mended.cloud,
-            &bench.map.cloud,
-            bench.map.scale(bench.options.noise_m),
-        );
-        let share = bench.fit.observations() / fit.observations().max(1.0);
+        let scale = bench.map.scale(bench.options.noise_m);
+        let fit = Fit::new(&mended.cloud, &bench.map.cloud, scale);
+        let observations = bench.fit.observations();
+        let share = observations / fit.observations().max(1.0);
+        let density = observations * self.reading.scale().ln();
         let likelihoods = poses.par_iter().map(|pose| {
             let pose = bench.settled(&mended.cloud, pose);
-            mended.likelihood_at(bench, &fit, &pose)
+            let likelihood = share * mended.likelihood_at(bench, &fit, &pose) + density;
+            let blocked = bench.blocked(&mended.cloud, mended.sensor_m.as_ref(), &pose);
+            Refined {
+                likelihood,
+                total: likelihood - blocked * observations,
+            }
         });
-        let best = share * likelihoods.reduce(|| f64::NEG_INFINITY, f64::max);
-        let observations = bench.fit.observations();
-        let density = observations * self.reading.scale().ln();
-        let likelihood = best + density;
-        Some(Other::new(self.reading, likelihood, refined, observations))
+        let best = likelihoods.reduce(|| Refined::NOWHERE, Refined::max);
+        let other = Other::new(self.reading, best.total, refined.total, observations);
+        Some(Other {
+            ahead: other.ahead.max(best.likelihood - refined.likelihood),
+            ..other
+        })
     }
 }
 
-/// Best likelihood of candidates; lines of sight are not compared between readings.
-pub(super) fn best_of(candidates: &[Candidate]) -> f64 {
-    let likelihoods = candidates.iter().map(|c| c.likelihood.total());
-    likelihoods.fold(0.0, f64::max)
+/// Best log-likelihoods of refined poses.
+#[derive(Clone, Copy, Debug)]
+pub(super) struct Refined {
+    /// Without lines of sight.
+    likelihood: f64,
+    /// With them.
+    total: f64,
 }
 
-/// The best other reading of a cloud, after a first look, given the likelihood of the cloud as it is after the last.
+impl Refined {
+    const NOWHERE: Refined = Refined {
+        likelihood: f64::NEG_INFINITY,
+        total: f64::NEG_INFINITY,
+    };
+
+    /// The best of candidates.
+    pub fn of(candidates: &[Candidate]) -> Refined {
+        let each = candidates.iter().map(|c| Refined {
+            likelihood: c.likelihood.total(),
+            total: c.total(),
+        });
+        each.fold(Refined::NOWHERE, Refined::max)
+    }
+
+    fn max(self, other: Refined) -> Refined {
+        Refined {
+            likelihood: self.likelihood.max(other.likelihood),
+            total: self.total.max(other.total),
+        }
+    }
+}
+
+/// The best other reading of a cloud, after a first look, given what the cloud as it is has after its last refinement.
 ///
 /// A rough search leaves out those that cannot be it.
 pub(super) fn other_reading(
     bench: &Workbench<'_>,
     straight: &[Candidate],
-    refined: f64,
+    refined: Refined,
     region: Option<&Region>,
 ) -> Option<Other> {
     let as_it_is = Mended::new(bench, &bench.input.few, &Reading::scaled(1.0))?;
@@ -218,7 +251,9 @@ pub(super) fn other_reading(
         Some((likelihood + density, *reading, poses))
     });
     let (best, reading, poses) = fits.max_by(|a, b| a.0.total_cmp(&b.0))?;
-    let other = Other::new(reading, best, best_of(straight), bench.few.observations());
+    let straight = straight.iter().map(|c| c.likelihood.total());
+    let straight = straight.fold(0.0, f64::max);
+    let other = Other::new(reading, best, straight, bench.few.observations());
     Some(match other.is_possible() {
         true => other
             .looked_at_closely(bench, &poses, refined)
@@ -251,6 +286,7 @@ fn hopeful<'a>(
 /// The few points by another reading.
 struct Mended {
     cloud: PreparedCloud,
+    sensor_m: Option<Point3<f64>>,
     source: SearchSource,
 }
 
@@ -268,7 +304,11 @@ impl Mended {
         let cloud = cloud.with_normals(|i| few.normals().get(i).map(|n| turn * n));
         let sensor_m = bench.input.sensor_m.map(|p| matrix * p);
         let source = SearchSource::by_surface(&cloud, sensor_m);
-        Some(Mended { cloud, source })
+        Some(Mended {
+            cloud,
+            sensor_m,
+            source,
+        })
     }
 
     /// Share of the full score at the best place of a rough search.
