@@ -14,6 +14,22 @@ def output(*command):
         return ""
 
 
+def peers_python(root):
+    """The Python of test/peers/setup, with small_gicp and KISS-Matcher."""
+    return os.environ.get("PEERS_PYTHON", str(root / "target/peers/python/bin/python"))
+
+
+def versions(python, *names):
+    """Packages of a Python whose names begin so, with their versions."""
+    return ", ".join(line for line in output(python, "-m", "pip", "freeze").splitlines() if line.startswith(names))
+
+
+def put(page, begin, end, text):
+    """Replaces what stands between two lines of a page."""
+    head, rest = page.read_text().split(begin)
+    page.write_text(f"{head}{begin}\n\n{text}\n{end}{rest.split(end)[1]}")
+
+
 def facts(root):
     """Machine, versions and commit as a flat dictionary of text."""
     cpu = re.search(r"Model name:\s*(.*)", output("lscpu"))

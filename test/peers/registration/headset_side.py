@@ -7,6 +7,7 @@ import sys
 import time
 
 import numpy as np
+import small_gicp
 
 sys.path.insert(0, str(pathlib.Path(__file__).resolve().parent))
 sys.dont_write_bytecode = True
@@ -17,13 +18,6 @@ from peers import error, gicp, kiss, prepare  # noqa: E402
 CELL_M = 0.05  # of the map
 GATE_M = 0.5
 VOXELS_M = (0.05, 0.1)
-
-
-def thinned(points):
-    """Means of the points in each cell."""
-    _, cells, counts = np.unique(np.floor(points / CELL_M).astype(np.int64), axis=0, return_inverse=True, return_counts=True)
-    sums = np.stack([np.bincount(cells.ravel(), points[:, axis]) for axis in range(3)], axis=1)
-    return sums / counts[:, None]
 
 
 def main():
@@ -43,7 +37,7 @@ def main():
             rows.append(row | {"ms": 1e3 * seconds, "verdict": verdict})
 
         begin = time.perf_counter()
-        source = prepare(thinned(cloud), options.threads, time.perf_counter)
+        source = prepare(small_gicp.voxelgrid_sampling(cloud, CELL_M).points()[:, :3], options.threads, time.perf_counter)
         prepared = time.perf_counter() - begin
         begin = time.perf_counter()
         pose = gicp(target, source, np.eye(4), GATE_M, options.threads)
