@@ -301,9 +301,9 @@ impl<'a> Fit<'a> {
         let both = a.into_values().zip(b.into_values());
         let both = both.filter(|(a, b)| *a > 0.0 && *b > 0.0);
         let mut differences: Vec<f64> = both.map(|(a, b)| a - b).collect();
-        let middle = median(&mut differences);
+        let middle = quantile(&mut differences, 0.5);
         let mut deviations: Vec<f64> = differences.iter().map(|d| (d - middle).abs()).collect();
-        let deviation = DEVIATION_OF_MEDIAN * median(&mut deviations);
+        let deviation = DEVIATION_OF_MEDIAN * quantile(&mut deviations, 0.5);
         deviation.min(BY_CHANCE) * (differences.len() as f64).sqrt()
     }
 
@@ -378,12 +378,13 @@ fn lifts(counts: &[Counts], known: &Confusion, agreement: f64) -> Vec<Lift> {
     (0..counts.len()).map(lift).collect()
 }
 
-/// Middle value; 0 of none.
-fn median(values: &mut [f64]) -> f64 {
-    let middle = values.len() / 2;
+/// Value below which a share of all is; 0 of none.
+pub(super) fn quantile(values: &mut [f64], share: f64) -> f64 {
+    let at = (share * values.len() as f64) as usize;
+    let at = at.min(values.len().saturating_sub(1));
     match values.is_empty() {
         true => 0.0,
-        false => *values.select_nth_unstable_by(middle, f64::total_cmp).1,
+        false => *values.select_nth_unstable_by(at, f64::total_cmp).1,
     }
 }
 

@@ -128,13 +128,18 @@ impl ByProfile {
     }
 
     /// The options for clouds.
-    pub fn options(&self, headset_scans: &[HeadsetScan]) -> CalibrationOptions {
+    pub fn of_clouds(&self, headset_scans: &[HeadsetScan]) -> CalibrationOptions {
         let [first, others @ ..] = &self.0;
-        if others.iter().all(|other| other.profile == first.profile) {
-            return *first;
+        match others.iter().all(|other| other.profile == first.profile) {
+            true => *first,
+            false => self.of_profile(Profile::of(headset_scans)),
         }
-        let seen = Profile::of(headset_scans);
-        let options = self.0.iter().find(|options| options.profile == seen);
+    }
+
+    /// The options for clouds of a profile; where none is told by the clouds, those of all.
+    pub fn of_profile(&self, profile: Profile) -> CalibrationOptions {
+        let [first, ..] = &self.0;
+        let options = self.0.iter().find(|options| options.profile == profile);
         *options.unwrap_or(first)
     }
 }
@@ -210,7 +215,7 @@ mod tests {
         ];
         let params = Params::from_values("/node", given);
         let all = ServerOptions::from_params(&params).unwrap().calibration;
-        let (room, street) = (all.options(&around(4)), all.options(&around(40)));
+        let (room, street) = (all.of_clouds(&around(4)), all.of_clouds(&around(40)));
         assert_eq!(
             (room.profile, street.profile),
             (Profile::Headset, Profile::Lidar)
@@ -219,6 +224,7 @@ mod tests {
         let usual = Profile::Lidar.options();
         assert_eq!(street.region_m, usual.region_m);
         assert_ne!(room.region_m, usual.region_m);
+        assert_eq!(all.of_profile(Profile::Lidar).region_m, usual.region_m);
         // Shown are those of a headset.
         let shown = params.declared();
         assert_eq!(shown.get("region_m"), Some(&ParamValue::F64(room.region_m)));
@@ -228,7 +234,7 @@ mod tests {
     fn a_profile_that_is_given_holds_for_all_clouds() {
         let given = [("profile", ParamValue::String("depth_camera".into()))];
         let options = ServerOptions::from_params(&Params::from_values("/node", given)).unwrap();
-        let street = options.calibration.options(&around(40));
+        let street = options.calibration.of_clouds(&around(40));
         assert_eq!(street.profile, Profile::DepthCamera);
     }
 }

@@ -52,6 +52,8 @@ pub struct LatticeSearch {
     map: Option<CalibrationMap>,
     /// Confusions of labels learned so far.
     confusion: Option<Confusion>,
+    /// Profile of the clouds of the last calibration that was OK, which tracking keeps: one look of them may seem otherwise.
+    profile: Profile,
 }
 
 impl LatticeSearch {
@@ -61,6 +63,7 @@ impl LatticeSearch {
             options: Arc::new(Mutex::new(options)),
             map: None,
             confusion: None,
+            profile: Profile::default(),
         }
     }
 
@@ -97,13 +100,14 @@ impl Search for LatticeSearch {
             confusion: self.confusion.as_ref(),
         };
         let options = *lock(&self.options);
-        let options = options.options(headset_scans);
+        let options = options.of_clouds(headset_scans);
         let mut found = calibrate(map, &request, &options, progress);
         if options.profile != Profile::Headset {
             found.reason = format!("{}; profile {}", found.reason, options.profile);
         }
         if found.verdict == Verdict::Ok {
             self.confusion = Some(found.confusion.clone());
+            self.profile = options.profile;
         }
         found
     }
@@ -114,8 +118,7 @@ impl Search for LatticeSearch {
         map_from_headset: &Isometry3<f64>,
     ) -> Option<TrackUpdate> {
         let map = self.map.as_ref()?;
-        let options = *lock(&self.options);
-        let options = options.options(std::slice::from_ref(headset_scan));
+        let options = lock(&self.options).of_profile(self.profile);
         Some(track(map, headset_scan, map_from_headset, &options))
     }
 }

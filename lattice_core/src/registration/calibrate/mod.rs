@@ -6,6 +6,7 @@
 //! given start stands unless another pose is clearly better.
 
 mod candidates;
+mod cloud_statistics;
 mod covariance;
 mod input;
 mod judge;
@@ -18,7 +19,6 @@ mod readings;
 mod regions;
 mod rivals;
 mod scale;
-mod seen;
 mod track;
 mod types;
 

@@ -2,7 +2,7 @@
 
 use std::fmt;
 
-use super::seen::Seen;
+use super::cloud_statistics::CloudStatistics;
 use super::types::{CalibrationOptions, HeadsetScan};
 
 /// Range beyond which a laser scanner outdoors is at work, metres.
@@ -39,10 +39,10 @@ impl Profile {
 
     /// The profile of the sensor that clouds look like, by their range, density and noise.
     pub fn of(scans: &[HeadsetScan]) -> Profile {
-        let seen = Seen::in_scans(scans);
-        if seen.range_m > LIDAR_M {
+        let cloud = CloudStatistics::of(scans);
+        if cloud.range_m > LIDAR_M {
             Profile::Lidar
-        } else if seen.points_of_cell >= DENSE && seen.noise_m >= NOISY_M {
+        } else if cloud.points_of_cell >= DENSE && cloud.noise_m >= NOISY_M {
             Profile::DepthCamera
         } else {
             Profile::Headset

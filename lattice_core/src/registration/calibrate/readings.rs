@@ -283,37 +283,35 @@ fn hopeful<'a>(
     scored.into_iter().map(|(_, hopeful)| hopeful).collect()
 }
 
-/// The few points by another reading.
+/// A cloud by another reading.
 struct Mended {
     cloud: PreparedCloud,
     sensor_m: Option<Point3<f64>>,
-    source: SearchSource,
 }
 
 impl Mended {
-    fn new(bench: &Workbench<'_>, few: &PreparedCloud, reading: &Reading) -> Option<Mended> {
+    fn new(bench: &Workbench<'_>, given: &PreparedCloud, reading: &Reading) -> Option<Mended> {
         let matrix = &reading.matrix;
         let turn = matrix / reading.scale();
-        let labels = match few.is_labelled() {
-            true => (0..few.len()).map(|i| few.label(i)).collect(),
+        let labels = match given.is_labelled() {
+            true => (0..given.len()).map(|i| given.label(i)).collect(),
             false => Vec::new(),
         };
-        let points_m = few.points_m().iter().map(|p| matrix * p).collect();
+        let points_m = given.points_m().iter().map(|p| matrix * p).collect();
         let cloud = SemanticCloud { points_m, labels };
         let cloud = PreparedCloud::new(cloud, &PrepareOptions::default()).ok()?;
-        let cloud = cloud.with_normals(|i| few.normals().get(i).map(|n| turn * n));
+        let cloud = cloud.with_normals(|i| given.normals().get(i).map(|n| turn * n));
         let sensor_m = bench.input.sensor_m.map(|p| matrix * p);
-        let source = SearchSource::by_surface(&cloud, sensor_m);
-        Some(Mended {
-            cloud,
-            sensor_m,
-            source,
-        })
+        Some(Mended { cloud, sensor_m })
+    }
+
+    fn source(&self) -> SearchSource {
+        SearchSource::by_surface(&self.cloud, self.sensor_m)
     }
 
     /// Share of the full score at the best place of a rough search.
     fn rough_score(&self, bench: &Workbench<'_>, region: Option<&Region>) -> f64 {
-        let found = search(&bench.map.rough, &self.source, region, ROUGH_PLACES);
+        let found = search(&bench.map.rough, &self.source(), region, ROUGH_PLACES);
         found.first().map_or(0.0, |hypothesis| hypothesis.score)
     }
 
@@ -324,7 +322,7 @@ impl Mended {
         region: Option<&Region>,
         (places, looked_at): (usize, usize),
     ) -> Option<(f64, Vec<Isometry3<f64>>)> {
-        let hypotheses = search(&bench.map.surfaces, &self.source, region, places);
+        let hypotheses = search(&bench.map.surfaces, &self.source(), region, places);
         let scale = bench.map.scale(bench.options.noise_m).coarser(2.0);
         let fit = Fit::new(&self.cloud, &bench.map.cloud, scale);
         let share = bench.few.observations() / fit.observations().max(1.0);

@@ -1,12 +1,13 @@
-//! Properties of clouds by which the sensor that made them is told.
+//! Range, density and noise of clouds, by which the sensor that made them is told.
 
 use nalgebra::{Matrix3, Point3, Vector3};
 use rustc_hash::FxHashMap;
 
+use super::super::likelihood::quantile;
 use super::types::HeadsetScan;
 
 /// Points that are looked at, at most; of more, some.
-const POINTS: usize = 1_000_000;
+const POINTS: usize = 200_000;
 /// Side of the cells that points are counted in, metres.
 const CELL_M: f64 = 0.1;
 /// Fewest points of a cell that a plane is fitted to.
@@ -18,7 +19,7 @@ const FARTHEST_M: f64 = 1e6;
 
 /// Range, density and noise of clouds.
 #[derive(Clone, Copy, PartialEq, Debug, Default)]
-pub(super) struct Seen {
+pub(super) struct CloudStatistics {
     /// Distance from the sensor, or from the midst of the points, within which nine of ten surfaces are, metres.
     pub range_m: f64,
     /// Points of a cell of 10 cm, in the median.
@@ -36,9 +37,9 @@ struct Cell {
     distance_m: f64,
 }
 
-impl Seen {
-    /// Looks at clouds.
-    pub fn in_scans(scans: &[HeadsetScan]) -> Seen {
+impl CloudStatistics {
+    /// Of clouds, each seen from its own sensor.
+    pub fn of(scans: &[HeadsetScan]) -> CloudStatistics {
         let all: usize = scans.iter().map(|scan| scan.cloud.len()).sum();
         let stride = all.div_ceil(POINTS).max(1);
         let (mut distances_m, mut counts, mut noises_m) = (Vec::new(), Vec::new(), Vec::new());
@@ -49,7 +50,7 @@ impl Seen {
                 noises_m.extend(cell.noise_m());
             }
         }
-        Seen {
+        CloudStatistics {
             range_m: quantile(&mut distances_m, WITHIN),
             points_of_cell: quantile(&mut counts, 0.5),
             noise_m: quantile(&mut noises_m, 0.5),
@@ -90,18 +91,6 @@ impl Cell {
     }
 }
 
-/// Value below which a share of all is; 0 of none.
-fn quantile(values: &mut [f64], share: f64) -> f64 {
-    let at = (share * values.len() as f64) as usize;
-    match values.is_empty() {
-        true => 0.0,
-        false => {
-            let at = at.min(values.len() - 1);
-            *values.select_nth_unstable_by(at, f64::total_cmp).1
-        }
-    }
-}
-
 #[cfg(test)]
 mod tests {
     use super::*;
@@ -126,11 +115,11 @@ mod tests {
 
     #[test]
     fn range_density_and_noise_of_a_floor_are_seen() {
-        let seen = Seen::in_scans(&[floor(0.0)]);
-        assert!((seen.range_m - 1.8).abs() < 0.1, "{seen:?}");
-        assert_eq!(seen.points_of_cell, 100.0);
-        assert!(seen.noise_m < 1e-6);
-        let noisy = Seen::in_scans(&[floor(0.02)]);
+        let found = CloudStatistics::of(&[floor(0.0)]);
+        assert!((found.range_m - 1.8).abs() < 0.1, "{found:?}");
+        assert_eq!(found.points_of_cell, 100.0);
+        assert!(found.noise_m < 1e-6);
+        let noisy = CloudStatistics::of(&[floor(0.02)]);
         assert!((noisy.noise_m - 0.01).abs() < 1e-3, "{noisy:?}");
     }
 
@@ -141,7 +130,7 @@ mod tests {
             Point3::new(f64::NAN, 0.0, 0.0),
             Point3::new(1e300, 0.0, 0.0),
         ];
-        assert_eq!(Seen::in_scans(&[broken]), Seen::default());
-        assert_eq!(Seen::in_scans(&[]), Seen::default());
+        assert_eq!(CloudStatistics::of(&[broken]), CloudStatistics::default());
+        assert_eq!(CloudStatistics::of(&[]), CloudStatistics::default());
     }
 }
