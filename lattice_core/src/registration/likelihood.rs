@@ -59,7 +59,8 @@ impl FitScale {
     }
 }
 
-/// Deviations across surfaces that a pose may turn out to have, as parts of the expected one.
+/// Deviations across surfaces that a pose may turn out to have, as parts of the expected one: each variance is half of
+/// the one before.
 const CLOSENESS: [f64; 5] = [
     1.0,
     std::f64::consts::FRAC_1_SQRT_2,
@@ -83,6 +84,16 @@ impl Partner {
         beside: 0.0,
         across: 0.0,
     };
+
+    /// Adds the likelihoods that they are one place by each of the [`CLOSENESS`].
+    fn add_to(&self, nearness: &mut [f64; CLOSENESS.len()]) {
+        let mut across = (-0.5 * self.across).exp();
+        for (sum, closeness) in nearness.iter_mut().zip(CLOSENESS) {
+            *sum += self.beside / closeness * across;
+            // Half of a variance squares it.
+            across *= across;
+        }
+    }
 
     /// Likelihood that they are one place, if the deviation across surfaces is `closeness` of the expected
     /// one; 1 over that at most.
@@ -196,7 +207,9 @@ impl<'a> Fit<'a> {
             .par_iter()
             .enumerate()
             .with_min_len(256)
-            .map(|(i, point)| self.partners_of(i, &place(point), turn))
+            .map_init(Neighbors::default, |near, (i, point)| {
+                self.partners_of(i, &place(point), turn, near)
+            })
             .collect();
         let (mut sum, mut n) = (0.0, 0.0);
         for (_, squared) in of_point.iter().filter(|p| p.1.is_finite()) {
@@ -216,6 +229,7 @@ impl<'a> Fit<'a> {
         i: usize,
         place: &Point3<f64>,
         turn: &UnitQuaternion<f64>,
+        near: &mut Neighbors,
     ) -> ([Partner; NEIGHBORS], f64) {
         let normal = self
             .source
@@ -226,9 +240,8 @@ impl<'a> Fit<'a> {
         let normal = turn * normal;
         let mut partners = [Partner::NONE; NEIGHBORS];
         let mut nearest = f64::INFINITY;
-        let mut near = Neighbors::default();
         let gate_m = self.scale.gate_m();
-        self.target.nearest_k(place, NEIGHBORS, gate_m, &mut near);
+        self.target.nearest_k(place, NEIGHBORS, gate_m, near);
         for (slot, (j, _)) in partners.iter_mut().zip(near.iter()) {
             let (Some(q), Some(m)) = (self.target.points_m().get(j), self.target.normals().get(j))
             else {
@@ -322,21 +335,33 @@ impl<'a> Fit<'a> {
     /// Log-likelihood by surfaces at the closeness of surfaces that fits best, and that closeness; the
     /// widest of equal ones.
     fn closest(&self, partners: &Partners) -> (f64, f64) {
-        let parts = CLOSENESS.map(|part| (self.by_surfaces(partners, part), part));
+        let parts = self.by_surfaces(partners).into_iter().zip(CLOSENESS);
         let better = |a: (f64, f64), b: (f64, f64)| if b.0 > a.0 { b } else { a };
-        parts.into_iter().fold((f64::NEG_INFINITY, 1.0), better)
+        parts.fold((f64::NEG_INFINITY, 1.0), better)
     }
 
     fn weight(&self, i: usize) -> f64 {
         self.weights.get(i).copied().unwrap_or(0.0)
     }
 
-    fn by_surfaces(&self, partners: &Partners, closeness: f64) -> f64 {
-        let of_point = partners.of_point.iter().enumerate().map(|(i, near)| {
-            let plain: f64 = near.iter().map(|p| p.nearness(closeness)).sum();
-            self.weight(i) * log_density(plain)
-        });
-        of_point.sum()
+    /// Log-likelihood by surfaces at each of the [`CLOSENESS`].
+    fn by_surfaces(&self, partners: &Partners) -> [f64; CLOSENESS.len()] {
+        let nowhere = log_density(0.0);
+        let mut sums = [0.0; CLOSENESS.len()];
+        for (near, weight) in partners.of_point.iter().zip(&self.weights) {
+            let mut nearness = [0.0; CLOSENESS.len()];
+            let mut near = near.iter().filter(|p| p.beside > 0.0).peekable();
+            let is_nowhere = near.peek().is_none();
+            near.for_each(|partner| partner.add_to(&mut nearness));
+            for (sum, nearness) in sums.iter_mut().zip(nearness) {
+                *sum += weight
+                    * match is_nowhere {
+                        true => nowhere,
+                        false => log_density(nearness),
+                    };
+            }
+        }
+        sums
     }
 
     /// Labels seen in one place, by fold; none where one cloud has none.

@@ -3,6 +3,7 @@
 use nalgebra::{Rotation3, Vector3};
 
 use super::field::Field;
+use super::grid::rounded;
 
 /// A heading and a place that the source fits, and how well.
 #[derive(Clone, Copy, PartialEq, Debug)]
@@ -38,7 +39,7 @@ pub(super) fn best_places(
     let mut steps: Vec<(usize, [i64; 3])> = points
         .map(|(p, channel)| {
             let step = (turn * p) / field.grid.cell_m;
-            (channel, [step.x, step.y, step.z].map(|s| s.round() as i64))
+            (channel, [step.x, step.y, step.z].map(rounded))
         })
         .collect();
     // Each occupied cell of the source counts once.
@@ -63,38 +64,72 @@ pub(super) fn best_places(
 ///
 /// Zero for rows that leave less than half of the points within the field.
 fn sum_all(field: &Field, steps: &[(usize, [i64; 3])], window: Window) -> Vec<u16> {
-    let [nx, ny, nz] = field.grid.dims.map(|n| n as i64);
+    #[cfg(target_arch = "x86_64")]
+    if is_x86_feature_detected!("avx2") {
+        // SAFETY: the machine has AVX2.
+        #[allow(unsafe_code)]
+        return unsafe { sum_all_avx2(field, steps, window) };
+    }
+    sum_all_portably(field, steps, window)
+}
+
+/// The same code with wider vectors.
+#[cfg(target_arch = "x86_64")]
+#[target_feature(enable = "avx2")]
+fn sum_all_avx2(field: &Field, steps: &[(usize, [i64; 3])], window: Window) -> Vec<u16> {
+    sum_all_portably(field, steps, window)
+}
+
+#[inline(always)]
+fn sum_all_portably(field: &Field, steps: &[(usize, [i64; 3])], window: Window) -> Vec<u16> {
+    let [nx, ny, nz] = field.grid.dims;
     let [wx, wy, wz] = window.dims;
+    let rows: Vec<Row<'_>> = steps
+        .iter()
+        .filter_map(|(channel, [x, y, z])| {
+            // Cells of the field that the window's rows fall on.
+            let x = window.first[0] as i64 + x;
+            let [from, to] = [x, x + wx as i64].map(|x| x.clamp(0, nx as i64));
+            Some(Row {
+                scores: field.channels.get(*channel)?,
+                y: (window.first[1] as i64 + y) as usize,
+                z: (window.first[2] as i64 + z) as usize,
+                cells: from as usize..to as usize,
+                skipped: (from - x) as usize,
+            })
+        })
+        .collect();
     let mut sums = vec![0_u16; wx * wy * wz];
     for (row, sums) in sums.chunks_exact_mut(wx.max(1)).enumerate() {
-        let y = (window.first[1] + row % wy) as i64;
-        let z = (window.first[2] + row / wy) as i64;
-        let inside = |step: &&(usize, [i64; 3])| {
-            (0..ny).contains(&(y + step.1[1])) && (0..nz).contains(&(z + step.1[2]))
+        // Places before the first row are those beyond any last one.
+        let place = |step: &Row<'_>| {
+            let (y, z) = (step.y.wrapping_add(row % wy), step.z.wrapping_add(row / wy));
+            (y < ny && z < nz).then(|| (z * ny + y) * nx)
         };
-        if 2 * steps.iter().filter(inside).count() < steps.len() {
+        if 2 * rows.iter().filter_map(place).count() < steps.len() {
             continue;
         }
-        for (channel, step) in steps {
-            let (y, z) = (y + step[1], z + step[2]);
-            if !(0..ny).contains(&y) || !(0..nz).contains(&z) {
-                continue;
-            }
-            // Cells of the field that the window's row falls on.
-            let x = window.first[0] as i64 + step[0];
-            let (from, to) = (x.clamp(0, nx), (x + wx as i64).clamp(0, nx));
-            let base = (z * ny + y) * nx;
-            let scores = field.channels.get(*channel);
-            let scores = scores.and_then(|s| s.get((base + from) as usize..(base + to) as usize));
-            let Some(sums) = sums.get_mut((from - x) as usize..) else {
-                continue;
-            };
-            for (sum, score) in sums.iter_mut().zip(scores.unwrap_or_default()) {
+        for step in &rows {
+            let Some(base) = place(step) else { continue };
+            let cells = base + step.cells.start..base + step.cells.end;
+            let scores = step.scores.get(cells).unwrap_or_default();
+            let sums = sums.get_mut(step.skipped..).unwrap_or_default();
+            for (sum, score) in sums.iter_mut().zip(scores) {
                 *sum += u16::from(*score);
             }
         }
     }
     sums
+}
+
+/// A row of the field that a point of the source lies in, with the first row of a window at its place.
+struct Row<'a> {
+    scores: &'a [u8],
+    y: usize,
+    z: usize,
+    /// Cells of the row that the window falls on, and cells of the window before them.
+    cells: std::ops::Range<usize>,
+    skipped: usize,
 }
 
 /// Local maxima among 26 neighbours, the best first; of equal ones that with the lesser number.

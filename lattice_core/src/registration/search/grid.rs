@@ -47,7 +47,7 @@ impl Grid {
     /// Cell coordinates of a place, rounded, beyond the box too.
     pub fn cell_of(&self, place_m: &Vector3<f64>) -> [i64; 3] {
         let cell = (place_m - self.origin_m) / self.cell_m;
-        [cell.x, cell.y, cell.z].map(|c| c.round() as i64)
+        [cell.x, cell.y, cell.z].map(rounded)
     }
 
     /// Number of a cell, if it is in the box.
@@ -63,9 +63,27 @@ impl Grid {
     }
 }
 
+/// The nearest whole number, of two that are as near the farther from 0: `round`, without a call where the processor
+/// has no instruction for it.
+#[inline(always)]
+pub(super) fn rounded(value: f64) -> i64 {
+    const HALF: f64 = 0.5 - f64::EPSILON / 4.0;
+    (value + HALF.copysign(value)) as i64
+}
+
 #[cfg(test)]
 mod tests {
     use super::*;
+    use proptest::prelude::*;
+
+    proptest! {
+        #[test]
+        fn rounded_is_round(value in prop_oneof![-1e17..1e17_f64, -9.0..9.0, (-9i32..9).prop_map(|i| f64::from(i) / 2.0)]) {
+            for value in [value, f64::next_up(value), f64::next_down(value)] {
+                prop_assert_eq!(rounded(value), value.round() as i64);
+            }
+        }
+    }
 
     #[test]
     fn the_box_holds_its_points_and_a_margin() {
