@@ -20,6 +20,8 @@ const INDEPENDENT: f64 = 4.0;
 const DEVIATION_OF_MEDIAN: f64 = 1.4826;
 /// Largest deviation that chance gives the log-likelihood of a region: rooms that are alike differ by less.
 const BY_CHANCE: f64 = 2.5;
+/// Deviations by the median beyond which a region differs by more than chance: its difference counts as so large.
+const HEAVY: f64 = 4.0;
 /// Target points that a source point may belong to.
 const NEIGHBORS: usize = 4;
 
@@ -316,8 +318,10 @@ impl<'a> Fit<'a> {
         let mut differences: Vec<f64> = both.map(|(a, b)| a - b).collect();
         let middle = quantile(&mut differences, 0.5);
         let mut deviations: Vec<f64> = differences.iter().map(|d| (d - middle).abs()).collect();
-        let deviation = DEVIATION_OF_MEDIAN * quantile(&mut deviations, 0.5);
-        deviation.min(BY_CHANCE) * (differences.len() as f64).sqrt()
+        let most = HEAVY * DEVIATION_OF_MEDIAN * quantile(&mut deviations, 0.5);
+        let squared: f64 = deviations.iter().map(|d| d.min(most).powi(2)).sum();
+        let n = deviations.len() as f64;
+        squared.sqrt().min(BY_CHANCE * n.sqrt())
     }
 
     /// Log-likelihood by surfaces of each region of a side.

@@ -17,7 +17,8 @@ mod solver;
 pub use calibrate::{
     AbsoluteFit, Calibration, CalibrationMap, CalibrationOptions, CalibrationRequest,
     ClassReliability, DirectionKind, HeadsetScan, Margin, Profile, Progress, ScaleEstimate, Stage,
-    TrackUpdate, Unexplained, UnexplainedKind, Verdict, WeakDirection, calibrate, track,
+    TrackUpdate, Unexplained, UnexplainedKind, Verdict, WeakDirection, calibrate, p_wrong_in_words,
+    track,
 };
 pub use cloud::SemanticCloud;
 pub use confusion::{Confusion, Lift};

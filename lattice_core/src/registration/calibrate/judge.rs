@@ -6,7 +6,7 @@ use super::super::likelihood::Partners;
 use super::candidates::{Candidate, Workbench};
 use super::covariance::{ErrorModel, PoseCovariance};
 use super::likeliest;
-use super::margin::{Margin, SOFTNESS};
+use super::margin::{Margin, SOFTNESS, p_wrong_in_words};
 use super::regions::{AbsoluteFit, absolute_fit};
 use super::scale::scale_at;
 use super::types::{
@@ -223,7 +223,8 @@ fn verdict(
         return (Verdict::Degenerate, "too few surfaces hold the pose".into());
     }
     let reason = format!(
-        "{percent:.0} % of the points lie on the map, log-margin {log:.0}, wrong with a probability of {p_wrong:.0e}"
+        "{percent:.0} % of the points lie on the map, log-margin {log:.0}, {}",
+        p_wrong_in_words(p_wrong)
     );
     (Verdict::Ok, reason)
 }

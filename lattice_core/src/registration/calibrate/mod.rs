@@ -35,7 +35,7 @@ use readings::{Other, Refined, other_reading};
 use types::Refusal;
 
 pub use map::CalibrationMap;
-pub use margin::Margin;
+pub use margin::{Margin, p_wrong_in_words};
 pub use profile::Profile;
 pub use regions::{AbsoluteFit, Unexplained, UnexplainedKind};
 pub use track::{TrackUpdate, track};

@@ -2,7 +2,9 @@
 
 use std::fmt;
 
-use lattice_core::registration::{Calibration, DirectionKind, Profile, Registration};
+use lattice_core::registration::{
+    Calibration, DirectionKind, Profile, Registration, p_wrong_in_words,
+};
 use nalgebra::Isometry3;
 use serde::Serialize;
 
@@ -215,7 +217,8 @@ impl fmt::Display for Answer {
         if let (Some(margin), Some(p_wrong)) = (self.log_margin, self.p_wrong) {
             writeln!(
                 f,
-                "log-margin     {margin:.1}, wrong with a probability of {p_wrong:.1e}"
+                "log-margin     {margin:.1}, {}",
+                p_wrong_in_words(p_wrong)
             )?;
         }
         writeln!(
