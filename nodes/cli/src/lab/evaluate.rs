@@ -76,6 +76,9 @@ pub struct Calibration {
     /// Pictures that the headset takes
     #[arg(long, default_value_t = 1)]
     headset_scans: usize,
+    /// Share of each picture that is kept, from its left, as in 0.5 for half a view
+    #[arg(long, default_value_t = Settings::default().view_part)]
+    view_part: f64,
     /// Side of a cell of the robot's map, m
     #[arg(long, default_value_t = Settings::default().cell_side_m)]
     cell: f64,
@@ -139,6 +142,7 @@ impl Calibration {
             cell_side_m: self.cell,
             map_seeds: if self.quick { 1 } else { self.maps },
             headset_scans: self.headset_scans,
+            view_part: self.view_part,
             pivot: self.pivot,
             ..Settings::default()
         };

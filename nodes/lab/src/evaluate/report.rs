@@ -13,8 +13,12 @@ const LISTED: usize = 60;
 /// The report of a summary, with pictures of its trials.
 pub fn report(summary: &Summary, trials: &[Trial]) -> Result<Report, AnyError> {
     let settings = &summary.settings;
+    let part = match settings.view_part {
+        part if part < 1.0 => format!(", the left {:.0} % of each", 100.0 * part),
+        _ => String::new(),
+    };
     let lead = format!(
-        "{} results; map cells of {} m, {} surveys of {} views, {} picture(s) of the headset; {}. \
+        "{} results; map cells of {} m, {} surveys of {} views, {} picture(s) of the headset{part}; {}. \
          docs/calibration.md says how it is done. A pose is right within 0.15 m and 3 degrees; q is the \
          share of the view whose objects are labelled wrongly in the map or in the headset. \
          Brackets are 95 % intervals (Wilson).",

@@ -29,8 +29,19 @@ pub struct Settings {
     pub map_seeds: u64,
     /// Pictures that the headset takes.
     pub headset_scans: usize,
+    /// Share of the points of each picture that is kept, from its left.
+    #[serde(skip_serializing_if = "is_whole", default = "whole")]
+    pub view_part: f64,
     /// Point at which starts are moved and turned.
     pub pivot: Pivot,
+}
+
+fn whole() -> f64 {
+    1.0
+}
+
+fn is_whole(part: &f64) -> bool {
+    *part == whole()
 }
 
 /// Point at which a start is moved and turned.
@@ -64,6 +75,7 @@ impl Default for Settings {
             survey_views: 384,
             map_seeds: 3,
             headset_scans: 1,
+            view_part: whole(),
             pivot: Pivot::default(),
         }
     }

@@ -53,6 +53,7 @@ impl Testbed {
     /// A testbed in a house.
     pub fn new(house: House, settings: &Settings) -> Result<Testbed, AnyError> {
         within("maps", settings.map_seeds as f64, 1.0, 1000.0)?;
+        within("view part", settings.view_part, 0.01, 1.0)?;
         let cell_volume_m3 = settings.cell_side_m.powi(3);
         Ok(Testbed {
             lattice: Lattice::new(LatticeKind::Cubic, cell_volume_m3)?,
@@ -79,7 +80,11 @@ impl Testbed {
         let draw = LabelDraw::new(&self.house, std::slice::from_ref(&view.trial), q, seed)?;
         let map = self.survey(view.seed)?.cloud(&draw.map);
         let scan = |scan: &HouseScan| HeadsetScan {
-            cloud: draw.headset.cloud(&scan.points_m, &scan.regions),
+            cloud: left_part(
+                draw.headset.cloud(&scan.points_m, &scan.regions),
+                &scan.sensor_m,
+                self.settings.view_part,
+            ),
             sensor_m: Some(scan.sensor_m),
         };
         let headset_scans: Vec<HeadsetScan> = view.trial.headset_scans.iter().map(scan).collect();
@@ -121,5 +126,59 @@ impl Testbed {
         let slot = slot.ok_or("no map of that number")?;
         let made = slot.get_or_init(|| make().map_err(|error| error.to_string()));
         made.as_ref().map_err(|error| error.clone().into())
+    }
+}
+
+/// The leftmost points of a picture taken from a place, a share of all.
+fn left_part(mut cloud: SemanticCloud, sensor_m: &Point3<f64>, part: f64) -> SemanticCloud {
+    if part >= 1.0 {
+        return cloud;
+    }
+    let ways = || cloud.points_m.iter().map(|p| p - sensor_m);
+    let ahead: Vector3<f64> = ways().sum();
+    let to_right = |way: Vector3<f64>| {
+        way.x
+            .mul_add(ahead.y, -way.y * ahead.x)
+            .atan2(way.dot(&ahead))
+    };
+    let bearings: Vec<f64> = ways().map(to_right).collect();
+    let mut sorted = bearings.clone();
+    sorted.sort_by(f64::total_cmp);
+    let last = sorted.get((part * sorted.len() as f64) as usize);
+    let last = last.copied().unwrap_or(f64::INFINITY);
+    let mut of_point = bearings.iter();
+    let mut of_label = bearings.iter();
+    let is_left = |bearing: Option<&f64>| bearing.is_some_and(|bearing| *bearing < last);
+    cloud.points_m.retain(|_| is_left(of_point.next()));
+    cloud.labels.retain(|_| is_left(of_label.next()));
+    cloud
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use lattice_core::registration::LabelDistribution;
+
+    #[test]
+    fn half_a_picture_is_its_left_half() {
+        let sensor_m = Point3::new(1.0, 1.0, 0.0);
+        let y = (-50..50).map(|i| 0.01 + 0.02 * f64::from(i));
+        let points_m: Vec<Point3<f64>> = y.map(|y| Point3::new(3.0, 1.0 + y, 0.5)).collect();
+        let labels = points_m
+            .iter()
+            .map(|p| LabelDistribution::hard(u16::from(p.y > 1.0)));
+        let cloud = SemanticCloud {
+            labels: labels.collect(),
+            points_m,
+        };
+        assert_eq!(
+            left_part(cloud.clone(), &sensor_m, 1.0).points_m,
+            cloud.points_m
+        );
+        let left = left_part(cloud, &sensor_m, 0.5);
+        // Looking along x, y is to the left.
+        assert_eq!((left.len(), left.labels.len()), (50, 50));
+        assert!(left.points_m.iter().all(|p| p.y > 1.0));
+        assert!((0..50).all(|i| left.label(i).top() == Some(1)));
     }
 }

@@ -13,7 +13,7 @@ use super::settings::Cell;
 use super::trial::{OURS, Trial};
 use crate::AnyError;
 use crate::random::Stream;
-use scenes::{Fault, Look, Scene};
+use scenes::{Fault, Look, Object, Scene};
 
 /// A trap.
 #[derive(Clone, Copy, Debug)]
@@ -28,6 +28,7 @@ enum Kind {
 /// Kinds of traps, the first part of a scene's name.
 const ALIKE: &str = "alike";
 const BROKEN: &str = "broken";
+const NEARLY: &str = "nearly alike";
 const WRONG_INPUT: &str = "wrong input";
 
 impl Case for Trap {
@@ -43,7 +44,11 @@ impl Case for Trap {
         match self.0 {
             Kind::Fault(fault) => format!("{WRONG_INPUT}/{}", fault.name()),
             Kind::Alike(look) => {
-                let kind = if look.boxed { BROKEN } else { ALIKE };
+                let kind = match look.object {
+                    Object::None => ALIKE,
+                    Object::Box => BROKEN,
+                    Object::Cube => NEARLY,
+                };
                 format!("{kind}/{}", look.name())
             }
         }

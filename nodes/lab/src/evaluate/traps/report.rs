@@ -1,7 +1,7 @@
 //! The report of the traps.
 
 use super::scenes::Fault;
-use super::{ALIKE, BROKEN, WRONG_INPUT};
+use super::{ALIKE, BROKEN, NEARLY, WRONG_INPUT};
 use crate::evaluate::trial::{Trial, WRONG};
 use crate::report::{Cell, Report, Section, Table};
 
@@ -20,6 +20,11 @@ pub fn traps_report(trials: &[Trial]) -> Report {
     let sections = vec![
         section(trials, ALIKE, "Rooms that look alike from several places"),
         section(trials, BROKEN, "The same with a box in sight"),
+        section(
+            trials,
+            NEARLY,
+            "The same with a cube of 5 to 45 cm, which may be too little to tell",
+        ),
         faults(trials),
         wrong(trials),
     ];

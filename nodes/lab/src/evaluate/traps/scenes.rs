@@ -149,25 +149,36 @@ pub(super) struct Look {
     shape: Shape,
     /// True for a scan all around, else of a sixth of the circle.
     whole: bool,
-    /// True with a box in sight.
-    pub boxed: bool,
+    pub object: Object,
     labelled: bool,
+}
+
+/// What stands in a room and breaks its symmetry.
+#[derive(Clone, Copy, PartialEq, Debug)]
+pub(super) enum Object {
+    None,
+    /// A box as large as a chair.
+    Box,
+    /// A cube of 5 to 45 cm, which may be too little to tell.
+    Cube,
 }
 
 impl Look {
     pub fn all() -> Vec<Look> {
         let mut all = Vec::new();
         for shape in SHAPES {
+            let look = |whole, object, labelled| Look {
+                shape,
+                whole,
+                object,
+                labelled,
+            };
             for labelled in [false, true] {
-                for (whole, boxed) in [(true, false), (false, false), (true, true)] {
-                    all.push(Look {
-                        shape,
-                        whole,
-                        boxed,
-                        labelled,
-                    });
-                }
+                all.push(look(true, Object::None, labelled));
+                all.push(look(false, Object::None, labelled));
+                all.push(look(true, Object::Box, labelled));
             }
+            all.push(look(true, Object::Cube, false));
         }
         all
     }
@@ -181,12 +192,17 @@ impl Look {
     pub fn scene(self, random: &mut Stream) -> Scene {
         let (_, room, reach_m) = self.shape;
         let truth = any_pose(random);
-        // A box needs room beside who looks at it.
-        let reach = if self.boxed { 0.3 } else { 1.0 };
+        // An object needs room beside who looks at it.
+        let reach = match self.object {
+            Object::None => 1.0,
+            Object::Box | Object::Cube => 0.3,
+        };
         let eye = reach_m.map(|most| most * reach * signed(random));
-        let room = match self.boxed {
-            true => room().with_box([eye[0] + 1.0, eye[1] + 0.1], [0.5, 0.5, 0.9]),
-            false => room(),
+        let with_box = |size_m| room().with_box([eye[0] + 1.0, eye[1] + 0.1], size_m);
+        let room = match self.object {
+            Object::None => room(),
+            Object::Box => with_box([0.5, 0.5, 0.9]),
+            Object::Cube => with_box([0.05 + 0.4 * random.uniform(); 3]),
         };
         let uniform = &mut || random.uniform();
         let mut map = room.noisy_map(uniform);
