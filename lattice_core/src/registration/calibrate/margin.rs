@@ -1,8 +1,10 @@
 //! Margin of a pose over all others, and the probability that another is right.
 
-/// Unit of the log-likelihood: observations are not independent.
+/// Log-likelihood that is worth a natural logarithm of odds: observations are not independent.
 pub(super) const SOFTNESS: f64 = 5.0;
-/// The same for each standard deviation that chance gives the margin.
+/// Least unit of a margin.
+const UNIT: f64 = 4.5;
+/// The unit for each standard deviation that chance gives the margin.
 const PER_CHANCE: f64 = 0.5;
 /// The same for each observation without a partner, which might have one elsewhere.
 const PER_UNEXPLAINED: f64 = 0.08;
@@ -41,7 +43,7 @@ impl Margin {
 
     fn scale(&self) -> f64 {
         let chance = PER_CHANCE * self.chance;
-        SOFTNESS.max(chance).max(PER_UNEXPLAINED * self.unexplained)
+        UNIT.max(chance).max(PER_UNEXPLAINED * self.unexplained)
     }
 }
 
@@ -66,7 +68,7 @@ mod tests {
         };
         assert!(margin(0.0, 5.0, 10.0).p_wrong() > 0.5);
         let sure = margin(60.0, 5.0, 10.0);
-        assert!(sure.p_wrong() < 0.01 && margin(30.0, 5.0, 10.0).p_wrong() > 0.01);
+        assert!(sure.p_wrong() < 0.01 && margin(28.0, 5.0, 10.0).p_wrong() > 0.01);
         // Chance and what is not explained both count against it.
         assert!(margin(60.0, 40.0, 10.0).p_wrong() > sure.p_wrong());
         assert!(margin(60.0, 5.0, 200.0).p_wrong() > sure.p_wrong());
