@@ -101,9 +101,10 @@ fn sum_all_portably(field: &Field, steps: &[(usize, [i64; 3])], window: Window) 
         .collect();
     let mut sums = vec![0_u16; wx * wy * wz];
     for (row, sums) in sums.chunks_exact_mut(wx.max(1)).enumerate() {
-        // Places before the first row are those beyond any last one.
+        let (row_y, row_z) = (row % wy, row / wy);
+        // What is before the first row comes out beyond any last one.
         let place = |step: &Row<'_>| {
-            let (y, z) = (step.y.wrapping_add(row % wy), step.z.wrapping_add(row / wy));
+            let (y, z) = (step.y.wrapping_add(row_y), step.z.wrapping_add(row_z));
             (y < ny && z < nz).then(|| (z * ny + y) * nx)
         };
         if 2 * rows.iter().filter_map(place).count() < steps.len() {

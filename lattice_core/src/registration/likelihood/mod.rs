@@ -1,12 +1,16 @@
 //! Likelihood of a pose given a source and a target, by which all candidates are judged.
 
-use std::collections::BTreeMap;
+mod chance;
+mod partners;
 
-use nalgebra::{Isometry3, Point3, UnitQuaternion, Vector3};
-use rayon::prelude::*;
+use nalgebra::Point3;
 
+use super::PreparedCloud;
 use super::confusion::{Confusion, Counts, Lift};
-use super::{Neighbors, PreparedCloud};
+use partners::CLOSENESS;
+
+pub(super) use chance::quantile;
+pub use partners::Partners;
 
 /// Share of source points that have a partner in the target.
 const INLIERS: f64 = 0.8;
@@ -16,14 +20,6 @@ const CONTRAST: f64 = 25.0;
 const FOLDS: usize = 5;
 /// Points of a region that count as independent, at most.
 const INDEPENDENT: f64 = 4.0;
-/// Standard deviation of a normal distribution over its median deviation.
-const DEVIATION_OF_MEDIAN: f64 = 1.4826;
-/// Largest deviation that chance gives the log-likelihood of a region: rooms that are alike differ by less.
-const BY_CHANCE: f64 = 2.5;
-/// Deviations by the median beyond which a region differs by more than chance: its difference counts as so large.
-const HEAVY: f64 = 4.0;
-/// Target points that a source point may belong to.
-const NEIGHBORS: usize = 4;
 
 /// Deviations within which points are expected to agree.
 #[derive(Clone, Copy, PartialEq, Debug)]
@@ -61,53 +57,6 @@ impl FitScale {
     }
 }
 
-/// Deviations across surfaces that a pose may turn out to have, as parts of the expected one: each variance is half of
-/// the one before.
-const CLOSENESS: [f64; 5] = [
-    1.0,
-    std::f64::consts::FRAC_1_SQRT_2,
-    0.5,
-    0.5 * std::f64::consts::FRAC_1_SQRT_2,
-    0.25,
-];
-
-#[derive(Clone, Copy, Debug)]
-struct Partner {
-    target: u32,
-    /// Likelihood that they are one place by all but their distance across the surface, 1 at most.
-    beside: f64,
-    /// Squared distance across the surface in expected deviations.
-    across: f64,
-}
-
-impl Partner {
-    const NONE: Partner = Partner {
-        target: 0,
-        beside: 0.0,
-        across: 0.0,
-    };
-
-    /// Adds the likelihoods that they are one place by each of the [`CLOSENESS`].
-    fn add_to(&self, nearness: &mut [f64; CLOSENESS.len()]) {
-        let mut across = (-0.5 * self.across).exp();
-        for (sum, closeness) in nearness.iter_mut().zip(CLOSENESS) {
-            *sum += self.beside / closeness * across;
-            // Half of a variance squares it.
-            across *= across;
-        }
-    }
-
-    /// Likelihood that they are one place, if the deviation across surfaces is `closeness` of the expected
-    /// one; 1 over that at most.
-    fn nearness(&self, closeness: f64) -> f64 {
-        if self.beside > 0.0 {
-            self.beside / closeness * (-0.5 * self.across / (closeness * closeness)).exp()
-        } else {
-            0.0
-        }
-    }
-}
-
 /// The source, cut into regions, ready to be judged at many poses.
 pub struct Fit<'a> {
     source: &'a PreparedCloud,
@@ -116,15 +65,6 @@ pub struct Fit<'a> {
     /// Weight of each source point; points of a crowded region share what it counts.
     weights: Vec<f64>,
     folds: Vec<u8>,
-}
-
-/// Source points with their partners at a pose.
-pub struct Partners {
-    of_point: Vec<[Partner; NEIGHBORS]>,
-    /// Root mean square distance across the surfaces of points with a partner, metres.
-    pub rmse_m: f64,
-    /// Share of the points that have a partner.
-    pub inlier_fraction: f64,
 }
 
 /// Log-likelihood of a pose; each observation adds 0 where it lies on the map as often as by chance.
@@ -183,89 +123,6 @@ impl<'a> Fit<'a> {
         self.observations() * log_density(0.0)
     }
 
-    /// Finds the partners of all source points.
-    pub fn partners(&self, target_from_source: &Isometry3<f64>) -> Partners {
-        self.partners_at(&target_from_source.rotation, |p| target_from_source * p)
-    }
-
-    /// The same with the distances of the points from a centre multiplied by a scale; regions and weights stay.
-    pub fn partners_scaled(
-        &self,
-        target_from_source: &Isometry3<f64>,
-        center: &Point3<f64>,
-        scale: f64,
-    ) -> Partners {
-        let place = |p: &Point3<f64>| target_from_source * (center + scale * (p - center));
-        self.partners_at(&target_from_source.rotation, place)
-    }
-
-    fn partners_at(
-        &self,
-        turn: &UnitQuaternion<f64>,
-        place: impl Fn(&Point3<f64>) -> Point3<f64> + Sync,
-    ) -> Partners {
-        let points = self.source.points_m();
-        let of_point: Vec<([Partner; NEIGHBORS], f64)> = points
-            .par_iter()
-            .enumerate()
-            .with_min_len(256)
-            .map_init(Neighbors::default, |near, (i, point)| {
-                self.partners_of(i, &place(point), turn, near)
-            })
-            .collect();
-        let (mut sum, mut n) = (0.0, 0.0);
-        for (_, squared) in of_point.iter().filter(|p| p.1.is_finite()) {
-            sum += squared;
-            n += 1.0;
-        }
-        Partners {
-            rmse_m: if n > 0.0 { f64::sqrt(sum / n) } else { 0.0 },
-            inlier_fraction: n / points.len().max(1) as f64,
-            of_point: of_point.into_iter().map(|p| p.0).collect(),
-        }
-    }
-
-    /// Partners of a point at its place, and its squared distance across the surface of the nearest.
-    fn partners_of(
-        &self,
-        i: usize,
-        place: &Point3<f64>,
-        turn: &UnitQuaternion<f64>,
-        near: &mut Neighbors,
-    ) -> ([Partner; NEIGHBORS], f64) {
-        let normal = self
-            .source
-            .normals()
-            .get(i)
-            .copied()
-            .unwrap_or_else(Vector3::zeros);
-        let normal = turn * normal;
-        let mut partners = [Partner::NONE; NEIGHBORS];
-        let mut nearest = f64::INFINITY;
-        let gate_m = self.scale.gate_m();
-        self.target.nearest_k(place, NEIGHBORS, gate_m, near);
-        for (slot, (j, _)) in partners.iter_mut().zip(near.iter()) {
-            let (Some(q), Some(m)) = (self.target.points_m().get(j), self.target.normals().get(j))
-            else {
-                continue;
-            };
-            let r = place - q;
-            let across = r.dot(m);
-            let along_sq = (r.norm_squared() - across * across).max(0.0);
-            let along = along_sq / self.scale.tangent_m.powi(2);
-            let facing = 0.3 + 0.7 * normal.dot(m).powi(2);
-            *slot = Partner {
-                target: j as u32,
-                beside: facing * (-0.5 * along).exp() / NEIGHBORS as f64,
-                across: (across / self.scale.normal_m).powi(2),
-            };
-            if across.abs() < 3.0 * self.scale.normal_m {
-                nearest = nearest.min(across * across);
-            }
-        }
-        (partners, nearest)
-    }
-
     /// Likelihood of a pose whose partners these are. How close surfaces are is learned from the pose, up
     /// to the expected closeness: one that fits better than it had to is the likelier. Labels count as far
     /// as `known` and what the other folds teach predict them; `agreement` as in [`Confusion::lift`]. With
@@ -305,35 +162,6 @@ impl<'a> Fit<'a> {
                 });
         }
         self.weight(i) * log_density(labelled)
-    }
-
-    /// Standard deviation that chance gives the difference of the log-likelihoods of two poses by surfaces.
-    ///
-    /// From the scatter of the differences of regions of `region_m` about their median, where both poses
-    /// have the points on the map: where only one has, that is no chance.
-    pub fn noise_between(&self, poses: [&Isometry3<f64>; 2], region_m: f64) -> f64 {
-        let [a, b] = poses.map(|pose| self.of_regions(pose, region_m));
-        let both = a.into_values().zip(b.into_values());
-        let both = both.filter(|(a, b)| *a > 0.0 && *b > 0.0);
-        let mut differences: Vec<f64> = both.map(|(a, b)| a - b).collect();
-        let middle = quantile(&mut differences, 0.5);
-        let mut deviations: Vec<f64> = differences.iter().map(|d| (d - middle).abs()).collect();
-        let most = HEAVY * DEVIATION_OF_MEDIAN * quantile(&mut deviations, 0.5);
-        let squared: f64 = deviations.iter().map(|d| d.min(most).powi(2)).sum();
-        let n = deviations.len() as f64;
-        squared.sqrt().min(BY_CHANCE * n.sqrt())
-    }
-
-    /// Log-likelihood by surfaces of each region of a side.
-    fn of_regions(&self, pose: &Isometry3<f64>, region_m: f64) -> BTreeMap<[i64; 3], f64> {
-        let partners = self.partners(pose);
-        let (_, closeness) = self.closest(&partners);
-        let mut regions = BTreeMap::new();
-        for (i, point) in self.source.points_m().iter().enumerate() {
-            let region = region_of(point, region_m);
-            *regions.entry(region).or_default() += self.of_point(i, &partners, closeness, &[]);
-        }
-        regions
     }
 
     /// Log-likelihood by surfaces at the closeness of surfaces that fits best, and that closeness; the
@@ -405,16 +233,6 @@ fn lifts(counts: &[Counts], known: &Confusion, agreement: f64) -> Vec<Lift> {
         known.merged(&others).lift(agreement)
     };
     (0..counts.len()).map(lift).collect()
-}
-
-/// Value below which a share of all is; 0 of none.
-pub(super) fn quantile(values: &mut [f64], share: f64) -> f64 {
-    let at = (share * values.len() as f64) as usize;
-    let at = at.min(values.len().saturating_sub(1));
-    match values.is_empty() {
-        true => 0.0,
-        false => *values.select_nth_unstable_by(at, f64::total_cmp).1,
-    }
 }
 
 fn sum<'a>(counts: impl Iterator<Item = &'a Counts>) -> Confusion {
