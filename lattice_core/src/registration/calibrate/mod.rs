@@ -113,7 +113,8 @@ fn run(
     step(progress, Stage::Judge, 0.9)?;
     let refined = Refined::of(&all);
     let calibration = judge::answer(&bench, all, request.start.is_some());
-    let other = other_reading(&bench, &first, refined, region.as_ref());
+    let contradicted = calibration.fit.floating + calibration.fit.blocked;
+    let other = other_reading(&bench, &first, refined, contradicted, region.as_ref());
     let _ = progress.report(Stage::Judge, 1.0);
     Ok(match other {
         Some(other) => read_as(calibration, &other, options),

@@ -95,6 +95,10 @@ mod tests {
             (Fault::Scale(1.05), 2),
             (Fault::Axes(Axes::UnityRuf, Axes::WinrtRub), 3),
             (Fault::Axes(Axes::WinrtRub, Axes::UnityRuf), 3),
+            // These fit all points elsewhere, through surfaces.
+            (Fault::Axes(Axes::WinrtRub, Axes::UnityRuf), 18),
+            (Fault::Mirrored, 18),
+            (Fault::Scale(0.9), 19),
         ];
         for (fault, seed) in faults {
             let trap = Trap(Kind::Fault(fault));
