@@ -159,7 +159,7 @@ pub(super) enum Object {
     None,
     /// A box as large as a chair.
     Box,
-    /// A cube of 5 to 45 cm, which may be too little to tell.
+    /// A cube of 20 to 60 cm, which may be too little to tell.
     Cube,
 }
 
@@ -202,7 +202,7 @@ impl Look {
         let room = match self.object {
             Object::None => room(),
             Object::Box => with_box([0.5, 0.5, 0.9]),
-            Object::Cube => with_box([0.05 + 0.4 * random.uniform(); 3]),
+            Object::Cube => with_box([0.2 + 0.4 * random.uniform(); 3]),
         };
         let uniform = &mut || random.uniform();
         let mut map = room.noisy_map(uniform);
