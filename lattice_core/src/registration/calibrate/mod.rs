@@ -48,6 +48,8 @@ pub use types::{
 const BY_SURFACES: usize = 128;
 const BY_LABELS: usize = 64;
 const FINALISTS: usize = 4;
+/// Contradicted share of the lines of sight above which a pose is in doubt; right poses hardly ever reach it.
+const IN_DOUBT: f64 = 0.1;
 /// Logarithm of the ratio of two scales that are about equal.
 const ABOUT: f64 = 0.08;
 /// Classes that are searched by, at most.
@@ -114,7 +116,8 @@ fn run(
     let refined = Refined::of(&all);
     let calibration = judge::answer(&bench, all, request.start.is_some());
     let contradicted = calibration.fit.floating + calibration.fit.blocked;
-    let other = other_reading(&bench, &first, refined, contradicted, region.as_ref());
+    let in_doubt = contradicted > IN_DOUBT && calibration.verdict != Verdict::RejectedInput;
+    let other = other_reading(&bench, &first, refined, in_doubt, region.as_ref());
     let _ = progress.report(Stage::Judge, 1.0);
     Ok(match other {
         Some(other) => read_as(calibration, &other, options),

@@ -19,9 +19,6 @@ const ROUGH_PLACES: usize = 4;
 const LOOKED_AT: usize = 2;
 /// The best readings that are looked at closely where the cloud as it is is in doubt.
 const DOUBTED: usize = 4;
-/// Contradicted share of the lines of sight above which a pose is in doubt: all readings are looked at then. Right poses
-/// reach 13 %, but hardly ever.
-const IN_DOUBT: f64 = 0.1;
 /// Poses of a reading that are looked at with all points.
 const CLOSELY: usize = 4;
 /// Scales that a cloud may have instead of 1; what is nearer to 1 is estimated with the pose.
@@ -223,26 +220,43 @@ impl Refined {
 
 /// The best other reading of a cloud, after a first look, given what the cloud as it is has after its last refinement.
 ///
-/// A rough search leaves out those that cannot be it, unless the map contradicts a share of the cloud's lines of sight.
+/// A rough search leaves out those that cannot be it; if none of the rest is certain and the cloud is in doubt, all are
+/// looked at.
 pub(super) fn other_reading(
     bench: &Workbench<'_>,
     straight: &[Candidate],
     refined: Refined,
-    contradicted: f64,
+    in_doubt: bool,
     region: Option<&Region>,
 ) -> Option<Other> {
-    let in_doubt = contradicted > IN_DOUBT;
     let as_it_is = Mended::new(bench, &bench.input.few, &Reading::scaled(1.0))?;
-    let rough = match in_doubt {
-        true => f64::NEG_INFINITY,
-        false => as_it_is.rough_score(bench, region),
-    };
+    let rough = as_it_is.rough_score(bench, region);
     let (axes, scales) = readings(bench, region);
-    let most = |looked_at| if in_doubt { usize::MAX } else { looked_at };
-    let mut hopeful = hopeful(bench, axes, rough - ROUGH, most(LOOKED_AT));
-    let scales = self::hopeful(bench, scales, rough + SCALED_AHEAD, most(1));
-    hopeful.extend(scales);
-    let fits = hopeful.par_iter().filter_map(|(reading, region, mended)| {
+    let mut readings = hopeful(bench, &axes, rough - ROUGH, LOOKED_AT);
+    readings.extend(hopeful(bench, &scales, rough + SCALED_AHEAD, 1));
+    let straight = straight.iter().map(|c| c.likelihood.total());
+    let straight = straight.fold(0.0, f64::max);
+    let found = best_of(bench, &readings, straight, 1, |other| {
+        other.is_possible().then_some(refined)
+    });
+    if !in_doubt || found.is_some_and(|other| other.is_certain) {
+        return found;
+    }
+    let mut readings = hopeful(bench, &axes, f64::NEG_INFINITY, axes.len());
+    readings.extend(hopeful(bench, &scales, f64::NEG_INFINITY, scales.len()));
+    best_of(bench, &readings, straight, DOUBTED, |_| Some(refined))
+}
+
+/// The best of some readings: by a few points, and then by all those of the best `kept` for which `closely` has what to
+/// compare them with.
+fn best_of(
+    bench: &Workbench<'_>,
+    readings: &[Hopeful<'_>],
+    straight: f64,
+    kept: usize,
+    closely: impl Fn(&Other) -> Option<Refined>,
+) -> Option<Other> {
+    let fits = readings.par_iter().filter_map(|(reading, region, mended)| {
         let places = match reading.is_scaled() {
             true => SCALED_PLACES,
             false => MISREAD_PLACES,
@@ -254,17 +268,12 @@ pub(super) fn other_reading(
     });
     let mut fits: Vec<_> = fits.collect();
     fits.sort_by(|a, b| b.0.total_cmp(&a.0));
-    fits.truncate(if in_doubt { DOUBTED } else { 1 });
-    let straight = straight.iter().map(|c| c.likelihood.total());
-    let straight = straight.fold(0.0, f64::max);
+    fits.truncate(kept);
     let others = fits.into_iter().map(|(likelihood, reading, poses)| {
         let other = Other::new(reading, likelihood, straight, bench.few.observations());
-        match in_doubt || other.is_possible() {
-            true => other
-                .looked_at_closely(bench, &poses, refined)
-                .unwrap_or(other),
-            false => other,
-        }
+        let closely =
+            closely(&other).and_then(|refined| other.looked_at_closely(bench, &poses, refined));
+        closely.unwrap_or(other)
     });
     others.max_by(|a, b| a.ahead.total_cmp(&b.ahead))
 }
@@ -294,11 +303,11 @@ type Hopeful<'a> = (Reading, Option<&'a Region>, Mended);
 /// The readings that a rough search gives a score of `least`, the best `most` of them.
 fn hopeful<'a>(
     bench: &Workbench<'_>,
-    readings: Vec<Asked<'a>>,
+    readings: &[Asked<'a>],
     least: f64,
     most: usize,
 ) -> Vec<Hopeful<'a>> {
-    let scored = readings.into_par_iter().filter_map(|(reading, region)| {
+    let scored = readings.par_iter().filter_map(|&(reading, region)| {
         let mended = Mended::new(bench, &bench.input.few, &reading)?;
         let score = mended.rough_score(bench, region);
         (score >= least).then_some((score, (reading, region, mended)))
