@@ -40,6 +40,16 @@ impl SemanticCloud {
         cloud
     }
 
+    /// Keeps the points of which something holds, with their labels.
+    pub fn retain(&mut self, is_kept: impl Fn(&Point3<f64>) -> bool) {
+        let kept: Vec<bool> = self.points_m.iter().map(is_kept).collect();
+        let mut of_point = kept.iter().copied();
+        let mut of_label = kept.iter().copied();
+        self.points_m
+            .retain(|_| of_point.next().unwrap_or_default());
+        self.labels.retain(|_| of_label.next().unwrap_or_default());
+    }
+
     /// Number of points.
     pub fn len(&self) -> usize {
         self.points_m.len()

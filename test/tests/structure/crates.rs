@@ -34,7 +34,7 @@ const EDGES: [(&str, &str); 8] = [
 const NOT_ON_A_ROBOT: &str = "async-tungstenite base64 bzip2 fast-surface-nets httparse lattice_bag lattice_lab mcap obvhs \
                               plotters png rusqlite";
 
-/// What cargo prints. It may have to download crates: a build gets only those of its own platform.
+/// Output of a cargo command. It may have to download crates: a build gets only those of its own platform.
 pub fn cargo(arguments: &[&str]) -> String {
     let output = Command::new(env!("CARGO"))
         .args(arguments)

@@ -232,31 +232,53 @@ pub(super) fn other_reading(
     let as_it_is = Mended::new(bench, &bench.input.few, &Reading::scaled(1.0))?;
     let rough = as_it_is.rough_score(bench, region);
     let (axes, scales) = readings(bench, region);
-    let mut readings = hopeful(bench, &axes, rough - ROUGH, LOOKED_AT);
-    readings.extend(hopeful(bench, &scales, rough + SCALED_AHEAD, 1));
+    let (mut likely, mut rest) = scored(bench, axes, rough - ROUGH, LOOKED_AT);
+    let (scales, other_scales) = scored(bench, scales, rough + SCALED_AHEAD, 1);
+    likely.extend(scales);
+    rest.extend(other_scales);
     let straight = straight.iter().map(|c| c.likelihood.total());
     let straight = straight.fold(0.0, f64::max);
-    let found = best_of(bench, &readings, straight, 1, |other| {
-        other.is_possible().then_some(refined)
+    let by_few = |found: &Found| {
+        Other::new(
+            found.reading,
+            found.likelihood,
+            straight,
+            bench.few.observations(),
+        )
+    };
+    let closely = |found: &Found| {
+        let other = by_few(found);
+        other
+            .looked_at_closely(bench, &found.poses, refined)
+            .unwrap_or(other)
+    };
+    let mut found = look_at(bench, &likely);
+    let first = found
+        .iter()
+        .max_by(|a, b| a.likelihood.total_cmp(&b.likelihood));
+    let best = first.map(|first| match by_few(first).is_possible() {
+        true => closely(first),
+        false => by_few(first),
     });
-    if !in_doubt || found.is_some_and(|other| other.is_certain) {
-        return found;
+    if !in_doubt || best.is_some_and(|other| other.is_certain) {
+        return best;
     }
-    let mut readings = hopeful(bench, &axes, f64::NEG_INFINITY, axes.len());
-    readings.extend(hopeful(bench, &scales, f64::NEG_INFINITY, scales.len()));
-    best_of(bench, &readings, straight, DOUBTED, |_| Some(refined))
+    found.extend(look_at(bench, &rest));
+    found.sort_by(|a, b| b.likelihood.total_cmp(&a.likelihood));
+    let others = found.iter().take(DOUBTED).map(closely);
+    others.max_by(|a, b| a.ahead.total_cmp(&b.ahead))
 }
 
-/// The best of some readings: by a few points, and then by all those of the best `kept` for which `closely` has what to
-/// compare them with.
-fn best_of(
-    bench: &Workbench<'_>,
-    readings: &[Hopeful<'_>],
-    straight: f64,
-    kept: usize,
-    closely: impl Fn(&Other) -> Option<Refined>,
-) -> Option<Other> {
-    let fits = readings.par_iter().filter_map(|(reading, region, mended)| {
+/// A reading after a first look: its likelihood by a few points, and its best poses.
+struct Found {
+    reading: Reading,
+    likelihood: f64,
+    poses: Vec<Isometry3<f64>>,
+}
+
+/// Looks at readings by a few points.
+fn look_at(bench: &Workbench<'_>, readings: &[Hopeful<'_>]) -> Vec<Found> {
+    let found = readings.par_iter().filter_map(|(reading, region, mended)| {
         let places = match reading.is_scaled() {
             true => SCALED_PLACES,
             false => MISREAD_PLACES,
@@ -264,18 +286,13 @@ fn best_of(
         // A density of lengths that are to be multiplied is one over them.
         let density = bench.few.observations() * reading.scale().ln();
         let (likelihood, poses) = mended.likelihood(bench, *region, places)?;
-        Some((likelihood + density, *reading, poses))
+        Some(Found {
+            reading: *reading,
+            likelihood: likelihood + density,
+            poses,
+        })
     });
-    let mut fits: Vec<_> = fits.collect();
-    fits.sort_by(|a, b| b.0.total_cmp(&a.0));
-    fits.truncate(kept);
-    let others = fits.into_iter().map(|(likelihood, reading, poses)| {
-        let other = Other::new(reading, likelihood, straight, bench.few.observations());
-        let closely =
-            closely(&other).and_then(|refined| other.looked_at_closely(bench, &poses, refined));
-        closely.unwrap_or(other)
-    });
-    others.max_by(|a, b| a.ahead.total_cmp(&b.ahead))
+    found.collect()
 }
 
 /// Readings of axes that a cloud may have, and of scales, each with where it is searched.
@@ -300,22 +317,26 @@ fn readings<'a>(
 type Asked<'a> = (Reading, Option<&'a Region>);
 type Hopeful<'a> = (Reading, Option<&'a Region>, Mended);
 
-/// The readings that a rough search gives a score of `least`, the best `most` of them.
-fn hopeful<'a>(
+/// The readings to which a rough search gives a score of `least`, the best `most` of them, and the rest.
+fn scored<'a>(
     bench: &Workbench<'_>,
-    readings: &[Asked<'a>],
+    readings: Vec<Asked<'a>>,
     least: f64,
     most: usize,
-) -> Vec<Hopeful<'a>> {
-    let scored = readings.par_iter().filter_map(|&(reading, region)| {
+) -> (Vec<Hopeful<'a>>, Vec<Hopeful<'a>>) {
+    let scored = readings.into_par_iter().filter_map(|(reading, region)| {
         let mended = Mended::new(bench, &bench.input.few, &reading)?;
         let score = mended.rough_score(bench, region);
-        (score >= least).then_some((score, (reading, region, mended)))
+        Some((score, (reading, region, mended)))
     });
     let mut scored: Vec<(f64, Hopeful<'a>)> = scored.collect();
     scored.sort_by(|a, b| b.0.total_cmp(&a.0));
-    scored.truncate(most);
-    scored.into_iter().map(|(_, hopeful)| hopeful).collect()
+    let likely = scored
+        .partition_point(|(score, _)| *score >= least)
+        .min(most);
+    let mut hopeful: Vec<_> = scored.into_iter().map(|(_, hopeful)| hopeful).collect();
+    let rest = hopeful.split_off(likely);
+    (hopeful, rest)
 }
 
 /// A cloud by another reading.

@@ -1,4 +1,4 @@
-//! What chance makes of the likelihoods of two poses that are equally right.
+//! Scatter of the difference of the likelihoods of two poses that are equally right.
 
 use std::collections::BTreeMap;
 
@@ -10,7 +10,7 @@ use super::{Fit, region_of};
 const DEVIATION_OF_MEDIAN: f64 = 1.4826;
 /// Largest deviation that chance gives the log-likelihood of a region: rooms that are alike differ by less.
 const BY_CHANCE: f64 = 2.5;
-/// Deviations by the median beyond which a region differs by more than chance: its difference counts as so large.
+/// Standard deviations, estimated by the median, to which the difference of a region is clipped (winsorised).
 const HEAVY: f64 = 4.0;
 
 impl Fit<'_> {

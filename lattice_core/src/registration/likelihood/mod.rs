@@ -137,13 +137,16 @@ impl<'a> Fit<'a> {
         let counts = self.count(partners, closeness);
         let lifts = lifts(&counts, known, agreement);
         let points = 0..partners.of_point.len();
-        let both: f64 = points
-            .map(|i| self.of_point(i, partners, closeness, &lifts))
-            .sum();
-        let likelihood = Likelihood {
-            surfaces,
-            labels: both - surfaces,
+        let both = || -> f64 {
+            points
+                .map(|i| self.of_point(i, partners, closeness, &lifts))
+                .sum()
         };
+        let labels = match counts.is_empty() {
+            true => 0.0,
+            false => both() - surfaces,
+        };
+        let likelihood = Likelihood { surfaces, labels };
         (likelihood, sum(counts.iter()))
     }
 
@@ -182,15 +185,19 @@ impl<'a> Fit<'a> {
         let mut sums = [0.0; CLOSENESS.len()];
         for (near, weight) in partners.of_point.iter().zip(&self.weights) {
             let mut nearness = [0.0; CLOSENESS.len()];
-            let mut near = near.iter().filter(|p| p.beside > 0.0).peekable();
-            let is_nowhere = near.peek().is_none();
+            let near = near.iter().filter(|p| p.beside > 0.0);
             near.for_each(|partner| partner.add_to(&mut nearness));
+            // Without a partner all are 0, and none needs a logarithm.
+            let [widest, ..] = nearness;
+            let density = |n: f64| {
+                if widest > 0.0 {
+                    log_density(n)
+                } else {
+                    nowhere
+                }
+            };
             for (sum, nearness) in sums.iter_mut().zip(nearness) {
-                *sum += weight
-                    * match is_nowhere {
-                        true => nowhere,
-                        false => log_density(nearness),
-                    };
+                *sum += weight * density(nearness);
             }
         }
         sums

@@ -6,6 +6,8 @@
 
 use nalgebra::Point3;
 
+use crate::lattice::Simd;
+
 pub(crate) const BLOCK: usize = 8;
 /// Smallest number of points whose halves are built in parallel.
 const PARALLEL: usize = 4096;
@@ -77,7 +79,7 @@ impl Tree {
     #[inline]
     pub(crate) fn search(&self, query: &Point3<f64>, keep: &mut impl Keep) {
         #[cfg(target_arch = "x86_64")]
-        if is_x86_feature_detected!("avx2") {
+        if Simd::detect() == Simd::Avx2 {
             // SAFETY: the machine has AVX2.
             #[allow(unsafe_code)]
             return unsafe { self.search_avx2(query, keep) };

@@ -4,6 +4,7 @@ use nalgebra::{Rotation3, Vector3};
 
 use super::field::Field;
 use super::grid::rounded;
+use crate::lattice::Simd;
 
 /// A heading and a place that the source fits, and how well.
 #[derive(Clone, Copy, PartialEq, Debug)]
@@ -65,7 +66,7 @@ pub(super) fn best_places(
 /// Zero for rows that leave less than half of the points within the field.
 fn sum_all(field: &Field, steps: &[(usize, [i64; 3])], window: Window) -> Vec<u16> {
     #[cfg(target_arch = "x86_64")]
-    if is_x86_feature_detected!("avx2") {
+    if Simd::detect() == Simd::Avx2 {
         // SAFETY: the machine has AVX2.
         #[allow(unsafe_code)]
         return unsafe { sum_all_avx2(field, steps, window) };

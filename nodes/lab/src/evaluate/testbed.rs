@@ -1,6 +1,7 @@
 //! The testbed of the trials: the house, the robot's maps of it and the views of the headset.
 
 use super::settings::{Pivot, Settings};
+use super::statistics::quantile;
 use crate::AnyError;
 use crate::options::within;
 use crate::random::seed_of;
@@ -134,23 +135,14 @@ fn left_part(mut cloud: SemanticCloud, sensor_m: &Point3<f64>, part: f64) -> Sem
     if part >= 1.0 {
         return cloud;
     }
-    let ways = || cloud.points_m.iter().map(|p| p - sensor_m);
-    let ahead: Vector3<f64> = ways().sum();
-    let to_right = |way: Vector3<f64>| {
-        way.x
-            .mul_add(ahead.y, -way.y * ahead.x)
-            .atan2(way.dot(&ahead))
+    let ahead: Vector3<f64> = cloud.points_m.iter().map(|p| p - sensor_m).sum();
+    let to_right_rad = |p: &Point3<f64>| {
+        let way = p - sensor_m;
+        (way.x * ahead.y - way.y * ahead.x).atan2(way.dot(&ahead))
     };
-    let bearings: Vec<f64> = ways().map(to_right).collect();
-    let mut sorted = bearings.clone();
-    sorted.sort_by(f64::total_cmp);
-    let last = sorted.get((part * sorted.len() as f64) as usize);
-    let last = last.copied().unwrap_or(f64::INFINITY);
-    let mut of_point = bearings.iter();
-    let mut of_label = bearings.iter();
-    let is_left = |bearing: Option<&f64>| bearing.is_some_and(|bearing| *bearing < last);
-    cloud.points_m.retain(|_| is_left(of_point.next()));
-    cloud.labels.retain(|_| is_left(of_label.next()));
+    if let Some(most_rad) = quantile(cloud.points_m.iter().map(to_right_rad), part) {
+        cloud.retain(|p| to_right_rad(p) < most_rad);
+    }
     cloud
 }
 

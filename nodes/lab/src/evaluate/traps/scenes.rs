@@ -153,7 +153,7 @@ pub(super) struct Look {
     labelled: bool,
 }
 
-/// What stands in a room and breaks its symmetry.
+/// Object in a room that breaks its symmetry.
 #[derive(Clone, Copy, PartialEq, Debug)]
 pub(super) enum Object {
     None,
@@ -245,17 +245,8 @@ fn keep_sector(scan: &mut HeadsetScan, half_rad: f64, random: &mut Stream) {
     let Some(eye) = scan.sensor_m else { return };
     let turn = std::f64::consts::PI * signed(random);
     let heading = Vector3::new(turn.cos(), turn.sin(), 0.0);
-    let is_kept = |p: &Point3<f64>| {
+    scan.cloud.retain(|p| {
         let way = p - eye;
         Vector3::new(way.x, way.y, 0.0).angle(&heading) < half_rad
-    };
-    let kept: Vec<bool> = scan.cloud.points_m.iter().map(is_kept).collect();
-    let mut keep = kept.iter().copied();
-    scan.cloud
-        .points_m
-        .retain(|_| keep.next().unwrap_or_default());
-    let mut keep = kept.iter().copied();
-    scan.cloud
-        .labels
-        .retain(|_| keep.next().unwrap_or_default());
+    });
 }
