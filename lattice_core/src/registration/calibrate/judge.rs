@@ -14,6 +14,8 @@ use super::types::{
     WeakDirection,
 };
 
+/// Candidates elsewhere that count, at most.
+const RIVALS: usize = 16;
 /// Largest ratio of the error of a region to its residuals.
 const INVISIBLE: f64 = 4.0;
 /// Standard deviations of the tilt beyond which a pose certainly leans.
@@ -37,17 +39,7 @@ pub(super) fn answer(bench: &Workbench<'_>, all: Vec<Candidate>, started: bool) 
     let middle = bench.middle();
     let (shift_m, turn_rad) = bench.least_difference();
     let pose = best.map_from_headset;
-    let elsewhere = (all.iter()).filter(|c| !c.is_near(&pose, &middle, shift_m, turn_rad));
-    let rival = elsewhere.max_by(|a, b| a.total().total_cmp(&b.total()));
-    let nowhere = bench.fit.nowhere();
-    let margin = Margin {
-        log: best.total() - rival.map_or(nowhere, |rival| rival.total().max(nowhere)),
-        chance: rival.map_or(0.0, |rival| {
-            let poses = [&pose, &rival.map_from_headset];
-            bench.fit.noise_between(poses, bench.options.region_m)
-        }),
-        unexplained: bench.fit.observations() * (1.0 - best.inlier_fraction),
-    };
+    let margin = margin(bench, &all, best);
     let fit = absolute_fit(bench, &pose);
     let covariance = covariance(bench, best).map(|surfaces| {
         let near = all
@@ -108,6 +100,31 @@ pub(super) fn answer(bench: &Workbench<'_>, all: Vec<Candidate>, started: bool) 
         },
         scale,
     }
+}
+
+/// Margin of a pose over the best candidates elsewhere.
+fn margin(bench: &Workbench<'_>, all: &[Candidate], best: &Candidate) -> Margin {
+    let nowhere = bench.fit.nowhere();
+    let mut rivals = bench.rivals(all, best, RIVALS);
+    // The chances of those that are far behind matter only if there are no others.
+    let within_reach = rivals
+        .iter()
+        .filter(|rival| bench.is_within_reach(rival, best));
+    rivals.truncate(within_reach.count().max(1));
+    let poses: Vec<&Isometry3<f64>> = rivals.iter().map(|c| &c.map_from_headset).collect();
+    let region_m = bench.options.region_m;
+    let chances = bench
+        .fit
+        .noise_between(&best.map_from_headset, &poses, region_m);
+    let ahead = |rival: &&Candidate| best.total() - rival.total().max(nowhere);
+    let places = rivals.iter().map(ahead).zip(chances);
+    let unexplained = bench.fit.observations() * (1.0 - best.inlier_fraction);
+    let margin = Margin::over(places, unexplained);
+    margin.unwrap_or_else(|| Margin {
+        log: best.total() - nowhere,
+        unexplained,
+        ..Margin::default()
+    })
 }
 
 /// True if the surfaces hold a pose in all directions, as an answer must that is OK.

@@ -3,13 +3,11 @@
 /// Log-likelihood that is worth a natural logarithm of odds: observations are not independent.
 pub(super) const SOFTNESS: f64 = 5.0;
 /// Least unit of a margin.
-const UNIT: f64 = 4.5;
+const UNIT: f64 = 5.0;
 /// The unit for each standard deviation that chance gives the margin.
 const PER_CHANCE: f64 = 0.5;
 /// The same for each observation without a partner, which might have one elsewhere.
-const PER_UNEXPLAINED: f64 = 0.08;
-/// Logarithm of the odds against a pose without a margin: rooms that look alike often do from more than two places.
-const TIE: f64 = 1.0;
+const PER_UNEXPLAINED: f64 = 0.088;
 /// Logarithm of the odds that the square of a unit is worth: chance makes margins that are normally distributed.
 const SQUARE: f64 = 0.111;
 /// Least probability that is told: there are too few simulated poses to measure smaller ones.
@@ -18,30 +16,59 @@ const LEAST_MEASURED: f64 = 1e-4;
 /// Evidence for a pose against all others.
 #[derive(Clone, Copy, PartialEq, Debug, Default)]
 pub struct Margin {
-    /// Log-likelihood above that of the best different pose.
+    /// Log-likelihood above that of the different pose that is most probably right in its place.
     pub log: f64,
     /// Standard deviation of that, were both poses equally right.
     pub chance: f64,
     /// Independent observations that have no partner at the pose.
     pub unexplained: f64,
+    /// Number of other places, in which each counts by how probable it is beside the most probable one.
+    pub places: f64,
 }
 
 impl Margin {
+    /// Over several other places, given the log-likelihood above each and its standard deviation by chance; None over none.
+    pub(super) fn over(
+        places: impl IntoIterator<Item = (f64, f64)>,
+        unexplained: f64,
+    ) -> Option<Margin> {
+        let one = |(log, chance)| Margin {
+            log,
+            chance,
+            unexplained,
+            places: 1.0,
+        };
+        let mut all: Vec<Margin> = places.into_iter().map(one).collect();
+        all.sort_by(|a, b| a.against().total_cmp(&b.against()));
+        let likeliest = *all.first()?;
+        let beside = |place: &Margin| (likeliest.against() - place.against()).exp();
+        let others: f64 = all.iter().skip(1).map(beside).sum();
+        Some(Margin {
+            places: 1.0 + others,
+            ..likeliest
+        })
+    }
+
     /// Probability that the pose is wrong, and another one right.
     ///
-    /// Logistic in the square of the margin; its constants are fitted to simulated scenes, see `docs/calibration.md`.
+    /// Odds fall with the square of the margin; its constants are fitted to simulated scenes, see `docs/calibration.md`.
     pub fn p_wrong(&self) -> f64 {
-        let units = self.log / self.scale();
-        1.0 / (1.0 + (SQUARE * units * units.abs() - TIE).exp())
+        1.0 / (1.0 + (self.against() - self.places.max(1.0).ln()).exp())
     }
 
     /// The margin at which the pose is wrong with a probability.
     pub fn at(&self, p_wrong: f64) -> f64 {
-        let square = (((1.0 - p_wrong) / p_wrong).ln() + TIE) / SQUARE;
-        self.scale() * square.abs().sqrt().copysign(square)
+        let odds = ((1.0 - p_wrong) / p_wrong).ln() + self.places.max(1.0).ln();
+        self.unit() * (odds.abs() / SQUARE).sqrt().copysign(odds)
     }
 
-    fn scale(&self) -> f64 {
+    /// Logarithm of the odds against one other place.
+    fn against(&self) -> f64 {
+        let units = self.log / self.unit();
+        SQUARE * units * units.abs()
+    }
+
+    fn unit(&self) -> f64 {
         let chance = PER_CHANCE * self.chance;
         UNIT.max(chance).max(PER_UNEXPLAINED * self.unexplained)
     }
@@ -65,8 +92,9 @@ mod tests {
             log,
             chance,
             unexplained,
+            places: 1.0,
         };
-        assert!(margin(0.0, 5.0, 10.0).p_wrong() > 0.5);
+        assert_eq!(margin(0.0, 5.0, 10.0).p_wrong(), 0.5);
         let sure = margin(60.0, 5.0, 10.0);
         assert!(sure.p_wrong() < 0.01 && margin(30.0, 5.0, 10.0).p_wrong() > 0.01);
         // Chance and what is not explained both count against it.
@@ -78,6 +106,31 @@ mod tests {
         // What stands by a start may be behind another.
         assert!(margin(-60.0, 5.0, 10.0).p_wrong() > 0.99);
         assert_eq!(margin(f64::INFINITY, 5.0, 10.0).p_wrong(), 0.0);
+    }
+
+    #[test]
+    fn places_count_by_how_probable_they_are() {
+        let p_wrong = |places: &[(f64, f64)]| {
+            let margin = Margin::over(places.iter().copied(), 10.0);
+            margin.unwrap().p_wrong()
+        };
+        // Four places that fit alike: each is right with a probability of a quarter.
+        assert!((p_wrong(&[(0.0, 5.0); 3]) - 0.75).abs() < 1e-12);
+        let one = p_wrong(&[(25.0, 5.0)]);
+        let odds = |p: f64| p / (1.0 - p);
+        assert!((odds(p_wrong(&[(25.0, 5.0), (25.0, 5.0)])) / odds(one) - 2.0).abs() < 1e-9);
+        assert!((p_wrong(&[(25.0, 5.0), (900.0, 5.0)]) - one).abs() < 1e-12);
+        // A place that is behind by more may still be the likelier one, if chance is larger there.
+        let margin = Margin::over([(50.0, 5.0), (60.0, 40.0)], 10.0).unwrap();
+        assert_eq!((margin.log, margin.chance), (60.0, 40.0));
+        assert!((margin.places - 1.0) < 0.1 && margin.places > 1.0);
+        let least = margin.at(0.01);
+        let there = Margin {
+            log: least,
+            ..margin
+        };
+        assert!((there.p_wrong() - 0.01).abs() < 1e-12);
+        assert_eq!(Margin::over([], 10.0), None);
     }
 
     #[test]

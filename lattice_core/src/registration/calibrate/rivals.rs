@@ -33,7 +33,9 @@ impl Workbench<'_> {
             return Vec::new();
         };
         let mut places = vec![(best.map_from_headset, best.method)];
-        places.extend(self.known_rivals(all, best));
+        let known = self.rivals(all, best, KNOWN).into_iter();
+        let known = known.filter(|rival| self.is_within_reach(rival, best));
+        places.extend(known.map(|rival| (rival.map_from_headset, rival.method)));
         let twins = self.twins(best, region);
         places.extend(twins.into_iter().map(|pose| (pose, "search")));
         let refined = places.par_iter().map(|(pose, method)| {
@@ -46,12 +48,13 @@ impl Workbench<'_> {
         hopeful.map(|candidate| self.climbed(candidate)).collect()
     }
 
-    /// The likeliest candidates elsewhere, one of each place.
-    fn known_rivals(
+    /// The likeliest candidates elsewhere, at most so many, one of each place, the likeliest first.
+    pub fn rivals<'a>(
         &self,
-        all: &[Candidate],
-        best: &Candidate,
-    ) -> Vec<(Isometry3<f64>, &'static str)> {
+        all: &'a [Candidate],
+        best: &'a Candidate,
+        most: usize,
+    ) -> Vec<&'a Candidate> {
         let middle = self.middle();
         let (shift_m, turn_rad) = self.least_difference();
         let mut sorted: Vec<&Candidate> = all.iter().collect();
@@ -61,13 +64,16 @@ impl Workbench<'_> {
             let near = |other: &&Candidate| {
                 other.is_near(&candidate.map_from_headset, &middle, shift_m, turn_rad)
             };
-            let hopeful = candidate.total() > best.total() - BEYOND * self.fit.observations();
-            if hopeful && kept.len() <= KNOWN && !kept.iter().any(near) {
+            if kept.len() <= most && !kept.iter().any(near) {
                 kept.push(candidate);
             }
         }
-        let rivals = kept.into_iter().skip(1);
-        rivals.map(|c| (c.map_from_headset, c.method)).collect()
+        kept.split_off(1)
+    }
+
+    /// True if refining a rival may win what it is behind.
+    pub fn is_within_reach(&self, rival: &Candidate, best: &Candidate) -> bool {
+        rival.total() > best.total() - BEYOND * self.fit.observations()
     }
 
     /// The place that fits best with each heading of a symmetric room.

@@ -181,6 +181,7 @@ mod tests {
                 p_wrong: Some(p_wrong),
                 chance: None,
                 unexplained: None,
+                places: None,
                 scale: None,
                 scale_gain: None,
                 other_reading_ahead: None,

@@ -72,6 +72,9 @@ pub struct Judged {
     /// Independent observations without a partner.
     #[serde(default)]
     pub unexplained: Option<f64>,
+    /// Number of other places, those that are less probable counting less.
+    #[serde(default)]
+    pub places: Option<f64>,
     /// Scale of the points and its standard deviation.
     #[serde(default)]
     pub scale: Option<(f64, f64)>,
@@ -145,6 +148,7 @@ impl Trial {
                 p_wrong: Some(margin.p_wrong()),
                 chance: Some(margin.chance),
                 unexplained: Some(margin.unexplained),
+                places: Some(margin.places),
                 scale: calibration
                     .scale
                     .map(|s| (rounded(s.scale), rounded(s.sigma))),
