@@ -24,7 +24,7 @@ const ABOUT: &[About] = about! {
     "lost_after": "Searches that must fail in a row before a known pose is given up.";
     "doubt_below": "A cloud is searched with alone if its share of points on the map is below this share of that of the calibration: it may be mirrored, or the headset elsewhere.";
     "map_refresh_s": "How long clouds are compared with an old state of a map that changes.";
-    "profile" fixed("the defaults of others follow from it"): "Sensor of the clouds: headset, lidar (outdoors, may lean), depth_camera, or auto for what range, density and noise of each cloud tell; the defaults of the parameters of the search follow from it.";
+    "profile" fixed("the defaults of others follow from it"): "Sensor of the clouds: headset, lidar (may lean), depth_camera, or auto for what range, density and noise of each cloud tell; the defaults of the parameters of the search follow from it.";
     "min_points": "Fewest points of a search.";
     "registered_points": "About how many points are registered; more are thinned.";
     "noise_m": "Standard deviation of the headset's points.";

@@ -7,6 +7,8 @@ use super::types::{CalibrationOptions, HeadsetScan};
 
 /// Range beyond which a laser scanner outdoors is at work, metres.
 const LIDAR_M: f64 = 15.0;
+/// Range beyond which what is noisy is the scan of a laser in rooms, metres: depth cameras see less far.
+const INDOOR_LIDAR_M: f64 = 5.5;
 /// Points of a cell of 10 cm from which on a depth camera may be at work: meshes of headsets have up to 16.
 const DENSE: f64 = 24.0;
 /// Noise within such a cell from which on it is no mesh, metres.
@@ -18,7 +20,7 @@ pub enum Profile {
     /// The mesh of a mixed-reality headset, upright.
     #[default]
     Headset,
-    /// A laser scanner, outdoors, that may lean.
+    /// A laser scanner that may lean.
     Lidar,
     /// A depth camera with an IMU.
     DepthCamera,
@@ -40,12 +42,12 @@ impl Profile {
     /// The profile of the sensor that clouds look like, by their range, density and noise.
     pub fn of(scans: &[HeadsetScan]) -> Profile {
         let cloud = CloudStatistics::of(scans);
-        if cloud.range_m > LIDAR_M {
-            Profile::Lidar
-        } else if cloud.points_of_cell >= DENSE && cloud.noise_m >= NOISY_M {
-            Profile::DepthCamera
-        } else {
-            Profile::Headset
+        let is_noisy = cloud.noise_m >= NOISY_M;
+        match cloud.range_m {
+            range_m if range_m > LIDAR_M => Profile::Lidar,
+            _ if is_noisy && cloud.points_of_cell >= DENSE => Profile::DepthCamera,
+            range_m if is_noisy && range_m > INDOOR_LIDAR_M => Profile::Lidar,
+            _ => Profile::Headset,
         }
     }
 
@@ -110,6 +112,8 @@ mod tests {
     fn the_sensor_is_told_by_range_density_and_noise() {
         assert_eq!(Profile::of(&[wall(30.0, 0.2, 0.02)]), Profile::Lidar);
         assert_eq!(Profile::of(&[wall(2.0, 0.01, 0.01)]), Profile::DepthCamera);
+        // Fewer points than of a camera, from farther away.
+        assert_eq!(Profile::of(&[wall(6.0, 0.025, 0.02)]), Profile::Lidar);
         // A mesh, however finely its faces were filled with points.
         assert_eq!(Profile::of(&[wall(2.0, 0.01, 0.0)]), Profile::Headset);
         assert_eq!(Profile::of(&[wall(2.0, 0.05, 0.02)]), Profile::Headset);

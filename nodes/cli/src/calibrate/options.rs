@@ -71,7 +71,7 @@ const AUTO: &str = "auto";
 fn profile() -> impl TypedValueParser<Value = Sensor> {
     let help = |profile| match profile {
         Profile::Headset => "The mesh of a mixed-reality headset, upright",
-        Profile::Lidar => "A laser scanner, outdoors, that may lean",
+        Profile::Lidar => "A laser scanner that may lean",
         Profile::DepthCamera => "A depth camera with an IMU",
     };
     let auto = PossibleValue::new(AUTO).help("As its range, density and noise tell");
