@@ -15,6 +15,7 @@ pub mod metrics;
 pub mod models;
 mod options;
 pub mod paper;
+pub mod poses;
 pub mod printed;
 pub mod random;
 pub mod render;

@@ -1,9 +1,9 @@
 //! `lattice calibrate`: pose of one cloud in another.
 
 mod answer;
-mod input;
+pub mod input;
 mod methods;
-mod options;
+pub mod options;
 
 use std::collections::BTreeMap;
 use std::ops::ControlFlow;

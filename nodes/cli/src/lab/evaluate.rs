@@ -3,6 +3,7 @@
 use super::evaluate_chain::Chain;
 use super::evaluate_kitti::Kitti;
 use super::evaluate_many::{Many, Reliability};
+use super::evaluate_scans::OfScans;
 use super::{Choice, choice, processors};
 use crate::progress::Progress;
 use crate::{CliResult, init_logging};
@@ -31,6 +32,8 @@ pub enum Evaluate {
     Chain(Chain),
     /// Find lidar scans of a simulated street in each other, 5 to 30 m apart, without a start
     Town(Many),
+    /// Find parts of a given scan in another scan of the same place, without a start: what verdicts are worth there
+    Scans(Box<OfScans>),
     /// Compare what verdicts of other evaluations stated with what was observed
     Reliability(Reliability),
     /// Register real labelled laser scans with each method, against the truth of an INS
@@ -127,6 +130,7 @@ impl Evaluate {
             Self::Traps(command) => command.traps(),
             Self::Chain(command) => command.run(),
             Self::Town(command) => command.town(),
+            Self::Scans(command) => command.run(),
             Self::Reliability(command) => command.run(),
             Self::Kitti(command) => command.run(),
         }

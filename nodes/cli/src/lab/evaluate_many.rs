@@ -5,7 +5,7 @@ use super::processors;
 use crate::CliResult;
 use clap::Args;
 use lattice_lab::evaluate::{
-    Case, Pair, Results, Trap, reliability_report, run_cases, settings_of, town_report,
+    Case, Pair, Results, Settings, Trap, reliability_report, run_cases, settings_of, town_report,
     traps_report,
 };
 use lattice_lab::{AnyError, Report, markdown, write_report};
@@ -34,27 +34,35 @@ pub struct Many {
 impl Many {
     /// Runs `lattice evaluate traps`.
     pub fn traps(self) -> CliResult {
-        self.show(&traps_report(&self.measure::<Trap>()?.sorted()))
+        let settings = settings_of(Trap::CELL_SIDE_M);
+        self.show(&traps_report(
+            &self.measure(&Trap::all(), &settings)?.sorted(),
+        ))
     }
 
     /// Runs `lattice evaluate town`.
     pub fn town(self) -> CliResult {
-        self.show(&town_report(&self.measure::<Pair>()?.sorted()))
+        let settings = settings_of(Pair::CELL_SIDE_M);
+        self.show(&town_report(
+            &self.measure(&Pair::all(), &settings)?.sorted(),
+        ))
     }
 
-    fn measure<C: Case>(&self) -> Result<Results, AnyError> {
+    /// Runs the trials that the results do not have yet.
+    pub fn measure<C: Case>(&self, cases: &[C], settings: &Settings) -> Result<Results, AnyError> {
         let threads = self.threads.unwrap_or_else(processors).clamp(1, 1024);
-        let mut results = Results::open(&self.out, &settings_of::<C>())?;
+        let mut results = Results::open(&self.out, settings)?;
         let bar = Remaining::new();
         let mut tell = |done: usize, total: usize| bar.tell(done, total);
         let seeds = self.first_seed..self.first_seed.saturating_add(self.seeds);
-        let ran = run_cases::<C>(seeds, &self.cases, &mut results, threads, &mut tell);
+        let ran = run_cases(cases, seeds, &self.cases, &mut results, threads, &mut tell);
         bar.done();
         ran?;
         Ok(results)
     }
 
-    fn show(&self, report: &Report) -> CliResult {
+    /// Writes and prints a report.
+    pub fn show(&self, report: &Report) -> CliResult {
         show(report, &self.out)
     }
 }

@@ -12,21 +12,15 @@ use super::{Results, Start};
 use crate::{AnyError, pool};
 
 /// A case of an evaluation: all that a trial depends on but its seed.
-pub trait Case: Copy + Send + Sync + 'static {
-    /// Side of the cells of the maps, metres.
-    const CELL_SIDE_M: f64;
-
-    /// All cases.
-    fn all() -> Vec<Self>;
-
+pub trait Case: Sync {
     /// Name of the scene, by which reports sort.
-    fn name(self) -> String;
+    fn name(&self) -> String;
 
     /// Runs the trial of a cell.
-    fn run(self, cell: &Cell) -> Result<Trial, AnyError>;
+    fn run(&self, cell: &Cell) -> Result<Trial, AnyError>;
 
     /// The cell of a seed: all labels as they are, and no start.
-    fn cell(self, seed: u64) -> Cell {
+    fn cell(&self, seed: u64) -> Cell {
         Cell {
             scene: self.name(),
             seed,
@@ -36,17 +30,17 @@ pub trait Case: Copy + Send + Sync + 'static {
     }
 }
 
-/// Settings that results of cases are kept with.
-pub fn settings_of<C: Case>() -> Settings {
+/// Settings that results of cases are kept with, given the side of the cells of the maps.
+pub fn settings_of(cell_side_m: f64) -> Settings {
     Settings {
-        cell_side_m: C::CELL_SIDE_M,
+        cell_side_m,
         survey_views: 0,
         map_seeds: 0,
         ..Settings::default()
     }
 }
 
-/// Runs the trials of all cases whose names contain `part`, with each of `seeds`, that the results do not have
+/// Runs the trials of the cases whose names contain `part`, with each of `seeds`, that the results do not have
 /// yet, seed by seed, on `threads` threads.
 ///
 /// `progress` hears of trials done, of all that are left.
@@ -54,6 +48,7 @@ pub fn settings_of<C: Case>() -> Settings {
 /// # Errors
 /// If no case has such a name, or a trial or its result fails.
 pub fn run_cases<C: Case>(
+    cases: &[C],
     seeds: Range<u64>,
     part: &str,
     results: &mut Results,
@@ -61,14 +56,15 @@ pub fn run_cases<C: Case>(
     progress: &mut dyn FnMut(usize, usize),
 ) -> Result<(), AnyError> {
     check_seeds(seeds.end.saturating_sub(seeds.start))?;
-    let (done, mut cases) = (results.done(), C::all());
-    cases.retain(|case| case.name().contains(part));
+    let done = results.done();
+    let cases = cases.iter().filter(|case| case.name().contains(part));
+    let cases: Vec<&C> = cases.collect();
     if cases.is_empty() {
         return Err(format!("no case has {part:?} in its name").into());
     }
     let trials = seeds.flat_map(|seed| cases.iter().map(move |case| (case.cell(seed), *case)));
     let left = trials.filter(|(cell, _)| !done.contains(&name(cell, OURS)));
-    let left: Vec<(Cell, C)> = left.collect();
+    let left: Vec<(Cell, &C)> = left.collect();
     let pool = pool(threads)?;
     let (sender, receiver) = mpsc::channel();
     std::thread::scope(|scope| {

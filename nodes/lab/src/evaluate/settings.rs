@@ -21,6 +21,9 @@ pub struct Settings {
     /// Checksum of the network that labels images, where one does.
     #[serde(skip_serializing_if = "Option::is_none", default)]
     pub model_crc32: Option<u32>,
+    /// Checksum of two given scans and of how they are calibrated.
+    #[serde(skip_serializing_if = "Option::is_none", default)]
+    pub scans_crc32: Option<u32>,
     /// Side of a cubic cell of the robot's map, metres.
     pub cell_side_m: f64,
     /// Views of the robot's survey.
@@ -71,6 +74,7 @@ impl Default for Settings {
             format: FORMAT,
             mesh_crc32: None,
             model_crc32: None,
+            scans_crc32: None,
             cell_side_m: 0.05,
             survey_views: 384,
             map_seeds: 3,

@@ -1,19 +1,18 @@
 //! Lidar scans of a simulated street, some metres apart, registered without a start.
 
 use lattice_core::registration::{
-    CalibrationMap, CalibrationRequest, HeadsetScan, PreparedCloud, Profile, calibrate,
-    voxel_downsample,
+    CalibrationMap, CalibrationRequest, HeadsetScan, Profile, calibrate, voxel_downsample,
 };
-use nalgebra::{Isometry3, Point3};
+use nalgebra::Point3;
 
 use super::many::Case;
+use super::pairs::{columns, line, of_scenes, shared};
 use super::settings::Cell;
 use super::trial::{OURS, Trial, WRONG, rounded};
 use crate::AnyError;
 use crate::report::{Cell as Entry, Report, Section, Table};
 use crate::simulate::town::{Lidar, Town, drive};
 
-/// Side of the cells that scans are thinned to, metres.
 const CELL_SIDE_M: f64 = 0.3;
 /// Distance within which the map has a point too, metres.
 const SHARED_M: f64 = 0.5;
@@ -32,10 +31,12 @@ pub struct Pair {
 
 const LIDARS: [(&str, Lidar); 2] = [("64 beams", Lidar::HDL64), ("16 beams", Lidar::VLP16)];
 
-impl Case for Pair {
-    const CELL_SIDE_M: f64 = CELL_SIDE_M;
+impl Pair {
+    /// Side of the cells that scans are thinned to, metres.
+    pub const CELL_SIDE_M: f64 = CELL_SIDE_M;
 
-    fn all() -> Vec<Pair> {
+    /// All pairs.
+    pub fn all() -> Vec<Pair> {
         let of = |lidar| {
             let labels = move |apart_m| {
                 [true, false].map(|labelled| Pair {
@@ -48,13 +49,15 @@ impl Case for Pair {
         };
         LIDARS.into_iter().flat_map(of).collect()
     }
+}
 
-    fn name(self) -> String {
+impl Case for Pair {
+    fn name(&self) -> String {
         let labels = if self.labelled { "labels" } else { "no labels" };
         format!("{}, {} m apart, {labels}", self.lidar.0, self.apart_m)
     }
 
-    fn run(self, cell: &Cell) -> Result<Trial, AnyError> {
+    fn run(&self, cell: &Cell) -> Result<Trial, AnyError> {
         let town = Town::new(cell.seed);
         let [first, second] = drive(cell.seed, self.apart_m);
         let truth = first.inverse() * second;
@@ -69,7 +72,7 @@ impl Case for Pair {
         let map = CalibrationMap::new(map, CELL_SIDE_M)?;
         let cloud = scan(&second, 1);
         let thinned = voxel_downsample(&cloud, CELL_SIDE_M).points_m;
-        let overlap = shared(&thinned, map.cloud(), &truth);
+        let overlap = shared(&thinned, map.cloud(), &truth, SHARED_M);
         let request = CalibrationRequest {
             headset_scans: &[HeadsetScan {
                 cloud,
@@ -89,24 +92,9 @@ impl Case for Pair {
     }
 }
 
-/// Share of points that a cloud has too.
-fn shared(points_m: &[Point3<f64>], map: &PreparedCloud, map_from_points: &Isometry3<f64>) -> f64 {
-    let near = |p: &&Point3<f64>| map.nearest(&(map_from_points * **p), SHARED_M).is_some();
-    points_m.iter().filter(near).count() as f64 / points_m.len().max(1) as f64
-}
-
 /// A table of the pairs by distance, and one by overlap.
 pub fn town_report(trials: &[Trial]) -> Report {
-    let mut scenes: Vec<(String, Vec<&Trial>)> = Vec::new();
-    for trial in trials {
-        match scenes
-            .iter_mut()
-            .find(|(name, _)| *name == trial.cell.scene)
-        {
-            Some((_, all)) => all.push(trial),
-            None => scenes.push((trial.cell.scene.clone(), vec![trial])),
-        }
-    }
+    let mut scenes = of_scenes(trials);
     let of_overlap = |much: bool| {
         let is = |t: &&Trial| (t.overlap.unwrap_or(0.0) >= OVERLAP) == much;
         trials.iter().filter(is).collect::<Vec<_>>()
@@ -115,7 +103,6 @@ pub fn town_report(trials: &[Trial]) -> Report {
     scenes.push((format!("all with {percent} % overlap"), of_overlap(true)));
     scenes.push(("all with less".to_owned(), of_overlap(false)));
     let rows: Vec<Vec<Entry>> = scenes.iter().map(|(name, of)| line(name, of)).collect();
-    let columns = "pairs|trials|OK and right|OK and wrong|refused, right|refused, wrong|median overlap|median NEES of OK";
     let title = "Lidar scans of a simulated street, without a start";
     let lead = format!(
         "Scans thinned to cells of {CELL_SIDE_M} m; right is within {} m and {} degrees; overlap is the share of points with \
@@ -123,7 +110,7 @@ pub fn town_report(trials: &[Trial]) -> Report {
         WRONG.m, WRONG.deg
     );
     let section = Section {
-        tables: vec![Table::new("town", title, columns, rows)],
+        tables: vec![Table::new("town", title, &columns("pairs"), rows)],
         ..Section::measured("town", title, "")
     };
     Report::new(
@@ -132,27 +119,6 @@ pub fn town_report(trials: &[Trial]) -> Report {
         "lattice evaluate town".to_owned(),
         vec![section],
     )
-}
-
-fn line(name: &str, trials: &[&Trial]) -> Vec<Entry> {
-    let count = |accepted: bool, right: bool| {
-        let is = |t: &&&Trial| t.is_accepted() == accepted && t.is_within(WRONG) == right;
-        let n = trials.iter().filter(is).count();
-        let percent = 100.0 * n as f64 / trials.len().max(1) as f64;
-        format!("{n}, {percent:.0} %")
-    };
-    let nees = trials.iter().filter(|t| t.is_accepted());
-    let nees = nees.filter_map(|t| t.judged.as_ref()?.nees);
-    vec![
-        name.into(),
-        trials.len().into(),
-        count(true, true).into(),
-        count(true, false).into(),
-        count(false, true).into(),
-        count(false, false).into(),
-        Entry::number(super::median(trials.iter().filter_map(|t| t.overlap)), 2),
-        Entry::number(super::median(nees), 1),
-    ]
 }
 
 #[cfg(test)]

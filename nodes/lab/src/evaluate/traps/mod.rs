@@ -13,7 +13,7 @@ use super::settings::Cell;
 use super::trial::{OURS, Trial};
 use crate::AnyError;
 use crate::random::Stream;
-use scenes::{Fault, Look, Object, Scene};
+use scenes::{Fault, Look, Object, Scene, small_room};
 
 /// A trap.
 #[derive(Clone, Copy, Debug)]
@@ -22,6 +22,7 @@ pub struct Trap(Kind);
 #[derive(Clone, Copy, Debug)]
 enum Kind {
     Alike(Look),
+    SmallRoom,
     Fault(Fault),
 }
 
@@ -31,16 +32,20 @@ const BROKEN: &str = "broken";
 const NEARLY: &str = "nearly alike";
 const WRONG_INPUT: &str = "wrong input";
 
-impl Case for Trap {
-    const CELL_SIDE_M: f64 = 0.05;
+impl Trap {
+    /// Side of the cells of the maps, metres.
+    pub const CELL_SIDE_M: f64 = 0.05;
 
-    fn all() -> Vec<Trap> {
+    /// All traps.
+    pub fn all() -> Vec<Trap> {
         let faults = Fault::all().into_iter().map(Kind::Fault);
         let all = faults.chain(Look::all().into_iter().map(Kind::Alike));
-        all.map(Trap).collect()
+        all.chain([Kind::SmallRoom]).map(Trap).collect()
     }
+}
 
-    fn name(self) -> String {
+impl Case for Trap {
+    fn name(&self) -> String {
         match self.0 {
             Kind::Fault(fault) => format!("{WRONG_INPUT}/{}", fault.name()),
             Kind::Alike(look) => {
@@ -51,10 +56,11 @@ impl Case for Trap {
                 };
                 format!("{kind}/{}", look.name())
             }
+            Kind::SmallRoom => format!("{NEARLY}/small room, whole, no labels"),
         }
     }
 
-    fn run(self, cell: &Cell) -> Result<Trial, AnyError> {
+    fn run(&self, cell: &Cell) -> Result<Trial, AnyError> {
         let number = u64::from(crc32fast::hash(cell.scene.as_bytes()));
         let random = &mut Stream::numbered(cell.seed, number);
         let Scene {
@@ -65,6 +71,7 @@ impl Case for Trap {
         } = match self.0 {
             Kind::Fault(fault) => fault.scene(cell.seed, random),
             Kind::Alike(look) => look.scene(random),
+            Kind::SmallRoom => small_room(random),
         };
         let map = CalibrationMap::new(map, Self::CELL_SIDE_M)?;
         let seen_m = scan.cloud.points_m.clone();
@@ -116,7 +123,7 @@ mod tests {
         let trial = trap.run(&cell).unwrap();
         assert_eq!(trial, trap.run(&cell).unwrap());
         assert!(!trial.is_accepted());
-        let mut names: Vec<String> = Trap::all().into_iter().map(Trap::name).collect();
+        let mut names: Vec<String> = Trap::all().iter().map(Trap::name).collect();
         names.sort();
         names.dedup();
         assert_eq!(names.len(), Trap::all().len());

@@ -1,5 +1,6 @@
 //! Traps: rooms that look alike from several places, and clouds that are not what they are said to be.
 
+use crate::evaluate::looks::{any_pose, keep_sector, signed};
 use crate::random::Stream;
 use crate::simulate::rooms::{Flat, LOOKS};
 use lattice_core::pose::Axes;
@@ -223,30 +224,31 @@ impl Look {
     }
 }
 
+/// A scan all around in a small room with a cube somewhere, which may be too little to tell from where: of those
+/// thousands are calibrated in an hour.
+pub(super) fn small_room(random: &mut Stream) -> Scene {
+    let truth = any_pose(random);
+    let sides = [(); 2].map(|()| 2.0 + 2.0 * random.uniform());
+    let eye = sides.map(|side| 0.25 * side * signed(random));
+    let size = 0.1 + 0.3 * random.uniform();
+    let corner = sides.map(|side| (side - size) * random.uniform() - side / 2.0);
+    let room = Flat::room(sides[0], sides[1]).with_box(corner, [size; 3]);
+    let uniform = &mut || random.uniform();
+    let mut map = room.noisy_map(uniform);
+    let mut scan = room.all_around(eye, &truth, uniform);
+    map.labels.clear();
+    scan.cloud.labels.clear();
+    Scene {
+        map,
+        scan,
+        options: CalibrationOptions::default(),
+        truth,
+    }
+}
+
 /// Another building.
 fn elsewhere() -> Flat {
     Flat::room(7.0, 5.0)
         .with_box([1.0, 0.5], [0.6, 1.4, 0.8])
         .with_box([-2.0, -1.5], [1.2, 0.5, 1.7])
-}
-
-fn any_pose(random: &mut Stream) -> Isometry3<f64> {
-    let place = Vector3::new(3.0 * signed(random), 3.0 * signed(random), 1.5);
-    Isometry3::new(place, Vector3::z() * std::f64::consts::PI * signed(random))
-}
-
-/// Uniform in [-1, 1).
-fn signed(random: &mut Stream) -> f64 {
-    2.0 * random.uniform() - 1.0
-}
-
-/// Keeps the points within `half_rad` of a random heading.
-fn keep_sector(scan: &mut HeadsetScan, half_rad: f64, random: &mut Stream) {
-    let Some(eye) = scan.sensor_m else { return };
-    let turn = std::f64::consts::PI * signed(random);
-    let heading = Vector3::new(turn.cos(), turn.sin(), 0.0);
-    scan.cloud.retain(|p| {
-        let way = p - eye;
-        Vector3::new(way.x, way.y, 0.0).angle(&heading) < half_rad
-    });
 }

@@ -1,6 +1,7 @@
 //! Scans that are matched: of a simulated house, and pairs of files.
 
 use crate::matching::{MultiResolutionList, Spread, search};
+use crate::poses::read_pose;
 use crate::simulate::RANGE_NOISE_M;
 use crate::simulate::house::{House, LaserView};
 use crate::{AnyError, at};
@@ -10,7 +11,7 @@ use lattice_core::registration::{
     PrepareOptions, PreparedCloud, RegisterOptions, SemanticCloud, register, voxel_downsample,
 };
 use lattice_nodes::files::points::{PointFileLimits, read_points};
-use nalgebra::{Isometry3, Matrix3, Rotation3, Translation3, UnitQuaternion, Vector3};
+use nalgebra::{Isometry3, Vector3};
 use std::path::{Path, PathBuf};
 
 /// Pairs of stands all over the house.
@@ -140,7 +141,7 @@ pub(super) fn scenes(
         );
         sources.push(Source::Files {
             scans,
-            map_from_scan: pose(truth)?,
+            map_from_scan: read_pose(truth)?,
             doubt_m: None,
         });
     }
@@ -157,7 +158,7 @@ pub(super) fn scenes(
         add(STREET, sources.len(), &[(0.5, 1.0), (0.25, 0.5)]);
         sources.push(Source::Files {
             scans: both(["small_gicp/target.ply", "small_gicp/source.ply"])?,
-            map_from_scan: pose(&truth)?,
+            map_from_scan: read_pose(&truth)?,
             doubt_m: None,
         });
     }
@@ -212,28 +213,6 @@ fn points(path: &Path) -> Result<Vec<[f32; 3]>, AnyError> {
     Ok(file.points_m.iter().map(narrow).collect())
 }
 
-/// A transform from a file of 16 numbers, row by row.
-fn pose(path: &Path) -> Result<Isometry3<f64>, AnyError> {
-    let wrong = |why: &str| format!("{}: {why}", path.display());
-    let text = std::fs::read_to_string(path).map_err(|e| wrong(&e.to_string()))?;
-    parse_pose(&text).ok_or_else(|| wrong("is not a rigid transform of 4 x 4 numbers").into())
-}
-
-fn parse_pose(text: &str) -> Option<Isometry3<f64>> {
-    let numbers: Option<Vec<f64>> = text.split_whitespace().map(|w| w.parse().ok()).collect();
-    let rows: [f64; 16] = numbers?.try_into().ok()?;
-    let [a, b, c, x, d, e, f, y, g, h, i, z, ..] = rows;
-    let matrix = Matrix3::new(a, b, c, d, e, f, g, h, i);
-    let off = (matrix * matrix.transpose() - Matrix3::identity()).amax();
-    // The file of small_gicp has six digits.
-    let rigid = off < 1e-3 && matrix.determinant() > 0.0 && [x, y, z].iter().all(|t| t.is_finite());
-    rigid.then(|| {
-        let rotation = Rotation3::from_matrix(&matrix);
-        let translation = Translation3::new(x, y, z);
-        Isometry3::from_parts(translation, UnitQuaternion::from_rotation_matrix(&rotation))
-    })
-}
-
 /// Pose of a scan that comes without one: by our search for a heading and a place, then by GICP.
 fn registered(map: &[[f32; 3]], scan: &[[f32; 3]]) -> Result<Isometry3<f64>, AnyError> {
     let cloud = |points: &[[f32; 3]]| Cloud {
@@ -273,27 +252,6 @@ fn registered(map: &[[f32; 3]], scan: &[[f32; 3]]) -> Result<Isometry3<f64>, Any
 #[cfg(test)]
 mod tests {
     use super::*;
-
-    #[test]
-    fn a_transform_is_read_and_anything_else_refused() {
-        let text = "0 -1 0 1\n1 0 0 2\n0 0 1 3\n0 0 0 1\n";
-        let read = parse_pose(text).unwrap();
-        let expected = Isometry3::new(
-            Vector3::new(1.0, 2.0, 3.0),
-            Vector3::z() * std::f64::consts::FRAC_PI_2,
-        );
-        assert!((read.to_homogeneous() - expected.to_homogeneous()).amax() < 1e-12);
-        for bad in [
-            "",
-            "1 0 0 0 0 1 0 0 0 0 1 0 0 0 0",
-            "0 1 0 0 1 0 0 0 0 0 1 0 0 0 0 1",
-            "2 0 0 0 0 2 0 0 0 0 2 0 0 0 0 1",
-            "1 0 0 NaN 0 1 0 0 0 0 1 0 0 0 0 1",
-            "1 0 0 x 0 1 0 0 0 0 1 0 0 0 0 1",
-        ] {
-            assert_eq!(parse_pose(bad), None, "{bad}");
-        }
-    }
 
     #[test]
     fn a_folder_without_pairs_is_refused() {

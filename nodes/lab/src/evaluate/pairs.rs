@@ -1,0 +1,62 @@
+//! Pairs of scans: what they share, and tables of them.
+
+use lattice_core::registration::PreparedCloud;
+use nalgebra::{Isometry3, Point3};
+
+use super::trial::{Trial, WRONG};
+use crate::report::Cell as Entry;
+
+/// Share of points that a map has too, within a distance.
+pub fn shared(
+    points_m: &[Point3<f64>],
+    map: &PreparedCloud,
+    map_from_points: &Isometry3<f64>,
+    within_m: f64,
+) -> f64 {
+    let near = |p: &&Point3<f64>| map.nearest(&(map_from_points * **p), within_m).is_some();
+    points_m.iter().filter(near).count() as f64 / points_m.len().max(1) as f64
+}
+
+/// Trials by the name of their scene, in the order of the trials.
+pub fn of_scenes(trials: &[Trial]) -> Vec<(String, Vec<&Trial>)> {
+    let mut scenes: Vec<(String, Vec<&Trial>)> = Vec::new();
+    for trial in trials {
+        let name = &trial.cell.scene;
+        match scenes.iter_mut().find(|(known, _)| known == name) {
+            Some((_, of)) => of.push(trial),
+            None => scenes.push((name.clone(), vec![trial])),
+        }
+    }
+    scenes
+}
+
+/// Titles of a table whose rows are of `what`.
+pub fn columns(what: &str) -> String {
+    format!(
+        "{what}|trials|OK and right|OK and wrong|refused, right|refused, wrong|median overlap|median NEES of OK|mean"
+    )
+}
+
+/// A row of [`columns`] of the trials of a name.
+pub fn line(name: &str, trials: &[&Trial]) -> Vec<Entry> {
+    let count = |accepted: bool, right: bool| {
+        let is = |t: &&&Trial| t.is_accepted() == accepted && t.is_within(WRONG) == right;
+        let n = trials.iter().filter(is).count();
+        let percent = 100.0 * n as f64 / trials.len().max(1) as f64;
+        format!("{n}, {percent:.0} %")
+    };
+    let accepted = trials.iter().filter(|t| t.is_accepted());
+    let nees: Vec<f64> = accepted.filter_map(|t| t.judged.as_ref()?.nees).collect();
+    let mean = nees.iter().sum::<f64>() / nees.len().max(1) as f64;
+    vec![
+        name.into(),
+        trials.len().into(),
+        count(true, true).into(),
+        count(true, false).into(),
+        count(false, true).into(),
+        count(false, false).into(),
+        Entry::number(super::median(trials.iter().filter_map(|t| t.overlap)), 2),
+        Entry::number(super::median(nees.iter().copied()), 1),
+        Entry::number((!nees.is_empty()).then_some(mean), 1),
+    ]
+}
