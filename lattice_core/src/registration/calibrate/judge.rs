@@ -14,6 +14,8 @@ use super::types::{
     WeakDirection,
 };
 
+/// Observations without a partner that one counts as whose line of sight the map contradicts.
+const CONTRADICTED: f64 = 3.0;
 /// Candidates elsewhere that count, at most.
 const RIVALS: usize = 16;
 /// Largest ratio of the error of a region to its residuals.
@@ -39,8 +41,8 @@ pub(super) fn answer(bench: &Workbench<'_>, all: Vec<Candidate>, started: bool) 
     let middle = bench.middle();
     let (shift_m, turn_rad) = bench.least_difference();
     let pose = best.map_from_headset;
-    let margin = margin(bench, &all, best);
     let fit = absolute_fit(bench, &pose);
+    let margin = margin(bench, &all, best, &fit);
     let covariance = covariance(bench, best).map(|surfaces| {
         let near = all
             .iter()
@@ -103,7 +105,7 @@ pub(super) fn answer(bench: &Workbench<'_>, all: Vec<Candidate>, started: bool) 
 }
 
 /// Margin of a pose over the best candidates elsewhere.
-fn margin(bench: &Workbench<'_>, all: &[Candidate], best: &Candidate) -> Margin {
+fn margin(bench: &Workbench<'_>, all: &[Candidate], best: &Candidate, fit: &AbsoluteFit) -> Margin {
     let nowhere = bench.fit.nowhere();
     let mut rivals = bench.rivals(all, best, RIVALS);
     // The chances of those that are far behind matter only if there are no others.
@@ -118,7 +120,8 @@ fn margin(bench: &Workbench<'_>, all: &[Candidate], best: &Candidate) -> Margin 
         .noise_between(&best.map_from_headset, &poses, region_m);
     let ahead = |rival: &&Candidate| best.total() - rival.total().max(nowhere);
     let places = rivals.iter().map(ahead).zip(chances);
-    let unexplained = bench.fit.observations() * (1.0 - best.inlier_fraction);
+    let contradicted = CONTRADICTED * (fit.floating + fit.blocked);
+    let unexplained = bench.fit.observations() * (1.0 - best.inlier_fraction + contradicted);
     let margin = Margin::over(places, unexplained);
     margin.unwrap_or_else(|| Margin {
         log: best.total() - nowhere,

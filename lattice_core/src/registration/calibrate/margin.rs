@@ -7,7 +7,7 @@ const UNIT: f64 = 5.0;
 /// The unit for each standard deviation that chance gives the margin.
 const PER_CHANCE: f64 = 0.5;
 /// The same for each observation without a partner, which might have one elsewhere.
-const PER_UNEXPLAINED: f64 = 0.088;
+const PER_UNEXPLAINED: f64 = 0.07;
 /// Logarithm of the odds that the square of a unit is worth: chance makes margins that are normally distributed.
 const SQUARE: f64 = 0.111;
 /// Least probability that is told: there are too few simulated poses to measure smaller ones.
@@ -20,7 +20,7 @@ pub struct Margin {
     pub log: f64,
     /// Standard deviation of that, were both poses equally right.
     pub chance: f64,
-    /// Independent observations that have no partner at the pose.
+    /// Independent observations that have no partner at the pose; more for those that the map contradicts.
     pub unexplained: f64,
     /// Number of other places, in which each counts by how probable it is beside the most probable one.
     pub places: f64,
