@@ -44,6 +44,8 @@ pub(super) struct PoseCovariance {
 pub(super) struct ErrorModel {
     /// Side of a region that errs as one, metres.
     pub region_m: f64,
+    /// Side of smaller regions that err too, in a source that is hardly larger than a region, metres.
+    pub within_m: Option<f64>,
     /// Standard deviation of a region's place along each axis, metres.
     pub sigma_m: f64,
     /// Standard deviation of points across surfaces, metres.
@@ -77,6 +79,7 @@ impl PoseCovariance {
         let mut information = Information::default();
         let mut scaling = Vector6::zeros();
         let mut pulls: BTreeMap<[i64; 3], Pull> = BTreeMap::new();
+        let mut within: BTreeMap<[i64; 3], Matrix6x3<f64>> = BTreeMap::new();
         for (i, point) in source.points_m().iter().enumerate() {
             let place = target_from_source * point;
             let near = target.nearest(&place, model.gate_m);
@@ -102,12 +105,21 @@ impl PoseCovariance {
             let motion = lever * weight * across.transpose();
             pull.motion += motion;
             pull.bend += motion * (BENT * model.spacing_m * sine_squared.sqrt());
+            if let Some(side_m) = model.within_m {
+                *within.entry(region_of(point, side_m)).or_default() += motion;
+            }
         }
         let mut scatter = model.scale_sigma.powi(2) * scaling * scaling.transpose();
         for pull in pulls.values() {
             scatter += pull.residual * pull.residual.transpose();
-            scatter += model.sigma_m.powi(2) * pull.motion * pull.motion.transpose();
             scatter += pull.bend * pull.bend.transpose();
+        }
+        for motion in pulls
+            .values()
+            .map(|pull| &pull.motion)
+            .chain(within.values())
+        {
+            scatter += model.sigma_m.powi(2) * motion * motion.transpose();
         }
         let inverse = information.inverse()?;
         let at_source = inverse * scatter * inverse;
@@ -305,10 +317,15 @@ mod tests {
         PreparedCloud::new(cloud, &PrepareOptions::default()).unwrap()
     }
 
-    /// Standard deviations of the place, metres, the largest first.
-    fn sigmas(normals: &[Vector3<f64>]) -> [f64; 3] {
+    /// Covariance of walls, given the sides of the regions that err.
+    fn covariance(
+        normals: &[Vector3<f64>],
+        region_m: f64,
+        within_m: Option<f64>,
+    ) -> PoseCovariance {
         let model = ErrorModel {
-            region_m: 1.0,
+            region_m,
+            within_m,
             sigma_m: 0.02,
             point_m: 0.01,
             spacing_m: SPACING_M,
@@ -317,8 +334,13 @@ mod tests {
             gate_m: 6.0 * SPACING_M,
         };
         let (source, target) = (walls(normals, 1), walls(normals, 2));
+        PoseCovariance::at(&source, &target, &Isometry3::identity(), &model).unwrap()
+    }
+
+    /// Standard deviations of the place, metres, the largest first.
+    fn sigmas(normals: &[Vector3<f64>]) -> [f64; 3] {
         let pose = Isometry3::identity();
-        let sure = PoseCovariance::at(&source, &target, &pose, &model).unwrap();
+        let sure = covariance(normals, 1.0, None);
         let (_, sure) = sure.upright(&pose, 0.006).unwrap();
         let all = sure.directions(&pose, &Point3::new(1.0, 1.0, 1.0));
         [all[0].sigma, all[1].sigma, all[2].sigma]
@@ -332,6 +354,15 @@ mod tests {
         let [first, second, _] = sigmas(&[x, y]);
         assert!(first > 0.05 && second < 0.01);
         assert!(sigmas(&[x, y, z])[0] < 0.01);
+    }
+
+    #[test]
+    fn a_source_of_one_region_errs_within_it_too() {
+        let normals = [Vector3::x(), Vector3::y(), Vector3::z()];
+        let turn = |sure: PoseCovariance| sure.at_source.fixed_view::<3, 3>(3, 3).trace().sqrt();
+        let whole = turn(covariance(&normals, 8.0, None));
+        let within = turn(covariance(&normals, 8.0, Some(0.5)));
+        assert!(within > 2.0 * whole, "{within} {whole}");
     }
 
     #[test]

@@ -20,6 +20,11 @@ const CONTRADICTED: f64 = 3.0;
 const RIVALS: usize = 16;
 /// Largest ratio of the error of a region to its residuals.
 const INVISIBLE: f64 = 4.0;
+/// Extent of a cloud over the root mean square distance of its points from their midst, about.
+const EXTENT: f64 = 3.5;
+/// Regions along the extent of a cloud from which on it is large, and smaller ones along that of one which is not.
+const LARGE: f64 = 2.0;
+const REGIONS: f64 = 4.0;
 /// Standard deviations of the tilt beyond which a pose certainly leans.
 const LEANING: f64 = 5.0;
 /// Log-likelihood that another scale must gain to be certain, and the same of an observation: right looks on warped
@@ -292,8 +297,11 @@ fn gain(observations: f64, best: &Candidate, scaled: &Partners) -> f64 {
 
 fn error_model(bench: &Workbench<'_>, best: &Candidate) -> ErrorModel {
     let options = bench.options;
+    let extent_m = EXTENT * bench.reach_m();
+    let is_small = extent_m < LARGE * options.region_m;
     ErrorModel {
         region_m: options.region_m,
+        within_m: is_small.then_some(extent_m / REGIONS),
         // A cloud that fits far closer than expected also errs less as a whole.
         sigma_m: options.noise_m.min(INVISIBLE * best.rmse_m),
         point_m: best.rmse_m,

@@ -110,7 +110,7 @@ impl Workbench<'_> {
     }
 
     /// Root mean square distance of the headset's points from their midst, metres.
-    fn reach_m(&self) -> f64 {
+    pub fn reach_m(&self) -> f64 {
         let (middle, points): (Point3<f64>, _) = (self.middle(), self.input.few.points_m());
         let sum: f64 = points.iter().map(|p| (p - middle).norm_squared()).sum();
         (sum / points.len().max(1) as f64)
