@@ -73,3 +73,56 @@ fn seeds_and_maps_without_end_are_refused_at_once() {
         assert!(said.contains(&expected), "{command}: {said}");
     }
 }
+
+/// Points of a room with a box in it, 5 cm apart, as lines of text; all of them moved by `x_m`.
+fn room(x_m: f64) -> String {
+    let patch = |[x, y, z]: [f64; 3], u: [f64; 3], v: [f64; 3], n: [u32; 2]| {
+        let points = (0..n[0]).flat_map(move |i| (0..n[1]).map(move |j| (i, j)));
+        let point = move |(i, j)| {
+            let [s, t] = [i, j].map(|k: u32| 0.05 * (f64::from(k) + 0.5));
+            let at = |k: usize| u[k] * s + v[k] * t;
+            format!("{} {} {}\n", x + x_m + at(0), y + at(1), z + at(2))
+        };
+        points.map(point).collect::<String>()
+    };
+    let [x, y, z] = [[1.0, 0.0, 0.0], [0.0, 1.0, 0.0], [0.0, 0.0, 1.0]];
+    [
+        patch([-2.0, -1.5, 0.0], x, y, [80, 60]),
+        patch([-2.0, -1.5, 0.0], x, z, [80, 50]),
+        patch([-2.0, 1.5, 0.0], x, z, [80, 50]),
+        patch([-2.0, -1.5, 0.0], y, z, [60, 50]),
+        patch([2.0, -1.5, 0.0], y, z, [60, 50]),
+        patch([0.8, 0.2, 0.0], y, z, [24, 20]),
+        patch([0.8, 0.2, 1.0], x, y, [16, 24]),
+        patch([0.8, 0.2, 0.0], x, z, [16, 20]),
+    ]
+    .concat()
+}
+
+#[test]
+fn parts_of_a_scan_are_found_in_another_one() {
+    let folder = tempfile::tempdir().unwrap();
+    let path = |name: &str| folder.path().join(name).to_str().unwrap().to_owned();
+    let (map, cloud, truth, out) = (path("a.xyz"), path("b.xyz"), path("pose.txt"), path("out"));
+    std::fs::write(&map, room(0.0)).unwrap();
+    std::fs::write(&cloud, room(-0.3)).unwrap();
+    std::fs::write(&truth, "1 0 0 0.3\n0 1 0 0\n0 0 1 0\n0 0 0 1\n").unwrap();
+    let base = [
+        "evaluate", "scans", "--map", &map, "--cloud", &cloud, "--out", &out,
+    ];
+    let more = ["--seeds", "1", "--sensor", "-0.8 0 1.5", "--truth", &truth];
+    let all = [&base[..], &more].concat();
+    let report = text(&[&all[..], &["--widths", "360"]].concat());
+    assert!(
+        report.contains("| 360 degrees | 1 | 1, 100 % |"),
+        "{report}"
+    );
+    let said = error(&[&all[..], &["--widths", "0"]].concat());
+    assert!(said.contains("widths is 0, not within"), "{said}");
+    // The whole scan tells another pose, by a few micrometres.
+    let said = error(&[&base[..], &["--seeds", "1"]].concat());
+    assert!(said.contains("other settings"), "{said}");
+    std::fs::write(&truth, "1 0 0\n").unwrap();
+    let said = error(&all);
+    assert!(said.contains("is not a rigid transform"), "{said}");
+}
