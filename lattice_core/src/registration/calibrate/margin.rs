@@ -3,11 +3,13 @@
 /// Log-likelihood that is worth a natural logarithm of odds: observations are not independent.
 pub(super) const SOFTNESS: f64 = 5.0;
 /// Least unit of a margin.
-const UNIT: f64 = 5.0;
+const UNIT: f64 = 4.7;
 /// The unit for each standard deviation that chance gives the margin.
 const PER_CHANCE: f64 = 0.5;
 /// The same for each observation without a partner, which might have one elsewhere.
-const PER_UNEXPLAINED: f64 = 0.07;
+const PER_UNEXPLAINED: f64 = 0.066;
+/// Logarithm of the odds against a pose over one other place without a margin: more may have been missed.
+const MISSED: f64 = 0.5;
 /// Logarithm of the odds that the square of a unit is worth: chance makes margins that are normally distributed.
 const SQUARE: f64 = 0.111;
 /// Least probability that is told: there are too few simulated poses to measure smaller ones.
@@ -53,13 +55,18 @@ impl Margin {
     ///
     /// Odds fall with the square of the margin; its constants are fitted to simulated scenes, see `docs/calibration.md`.
     pub fn p_wrong(&self) -> f64 {
-        1.0 / (1.0 + (self.against() - self.places.max(1.0).ln()).exp())
+        1.0 / (1.0 + (self.against() - self.without()).exp())
     }
 
     /// The margin at which the pose is wrong with a probability.
     pub fn at(&self, p_wrong: f64) -> f64 {
-        let odds = ((1.0 - p_wrong) / p_wrong).ln() + self.places.max(1.0).ln();
+        let odds = ((1.0 - p_wrong) / p_wrong).ln() + self.without();
         self.unit() * (odds.abs() / SQUARE).sqrt().copysign(odds)
+    }
+
+    /// Logarithm of the odds that it is wrong without a margin.
+    fn without(&self) -> f64 {
+        MISSED + self.places.max(1.0).ln()
     }
 
     /// Logarithm of the odds against one other place.
@@ -94,7 +101,8 @@ mod tests {
             unexplained,
             places: 1.0,
         };
-        assert_eq!(margin(0.0, 5.0, 10.0).p_wrong(), 0.5);
+        let tie = margin(0.0, 5.0, 10.0).p_wrong();
+        assert!((0.5..0.7).contains(&tie));
         let sure = margin(60.0, 5.0, 10.0);
         assert!(sure.p_wrong() < 0.01 && margin(30.0, 5.0, 10.0).p_wrong() > 0.01);
         // Chance and what is not explained both count against it.
@@ -114,10 +122,11 @@ mod tests {
             let margin = Margin::over(places.iter().copied(), 10.0);
             margin.unwrap().p_wrong()
         };
-        // Four places that fit alike: each is right with a probability of a quarter.
-        assert!((p_wrong(&[(0.0, 5.0); 3]) - 0.75).abs() < 1e-12);
-        let one = p_wrong(&[(25.0, 5.0)]);
         let odds = |p: f64| p / (1.0 - p);
+        // Of four places that fit alike the others are three times as probable as one of two.
+        let four = odds(p_wrong(&[(0.0, 5.0); 3]));
+        assert!((four / odds(p_wrong(&[(0.0, 5.0)])) - 3.0).abs() < 1e-9);
+        let one = p_wrong(&[(25.0, 5.0)]);
         assert!((odds(p_wrong(&[(25.0, 5.0), (25.0, 5.0)])) / odds(one) - 2.0).abs() < 1e-9);
         assert!((p_wrong(&[(25.0, 5.0), (900.0, 5.0)]) - one).abs() < 1e-12);
         // A place that is behind by more may still be the likelier one, if chance is larger there.

@@ -26,7 +26,8 @@ pub fn reliability_report(sets: &[Set]) -> Result<Report, AnyError> {
     let (m, degrees) = ELSEWHERE;
     let lead = format!(
         "Poses found without a start, whatever their verdict. A pose is at another place if the seen points are {m} m from \
-         where they should be on average, or it is turned by {degrees} degrees; shares with 95 % intervals."
+         where they should be on average, or it is turned by {degrees} degrees; shares with 95 % intervals. Probabilities are \
+         those that this version states of the margins that were recorded."
     );
     let sections = vec![stated(sets)?, errors(sets)];
     let command = "lattice evaluate reliability".to_owned();
@@ -46,7 +47,7 @@ fn judged(trials: &[Trial]) -> impl Iterator<Item = (&Trial, &Judged, f64)> {
     let somewhere = ours.filter(|t| !t.cell.scene.starts_with("wrong input/"));
     somewhere.filter_map(|t| {
         let judged = t.judged.as_ref()?;
-        Some((t, judged, judged.p_wrong?))
+        Some((t, judged, judged.p_wrong_by_margin()?))
     })
 }
 

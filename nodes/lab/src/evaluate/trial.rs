@@ -2,7 +2,7 @@
 
 use super::settings::Cell;
 use crate::metrics::PoseError;
-use lattice_core::registration::{Calibration, Verdict};
+use lattice_core::registration::{Calibration, Margin, Verdict};
 use nalgebra::{Isometry3, Point3, Vector3, Vector6};
 use serde::{Deserialize, Serialize};
 
@@ -91,6 +91,24 @@ pub struct Judged {
     pub inliers: f64,
     /// Normalised squared error of the stated covariance, 6 degrees of freedom; None without a covariance.
     pub nees: Option<f64>,
+}
+
+impl Judged {
+    /// Probability that another pose is right, as this version states it of the margin that was recorded; what was
+    /// stated then if there was none.
+    pub fn p_wrong_by_margin(&self) -> Option<f64> {
+        let evidence = self.margin.zip(self.chance).zip(self.unexplained);
+        let p_wrong = evidence.map(|((log, chance), unexplained)| {
+            let margin = Margin {
+                log,
+                chance,
+                unexplained,
+                places: self.places.unwrap_or(1.0),
+            };
+            margin.p_wrong()
+        });
+        p_wrong.or(self.p_wrong)
+    }
 }
 
 /// Bounds of a right pose: metres and degrees.
@@ -206,7 +224,6 @@ fn nees(calibration: &Calibration, truth: &Isometry3<f64>) -> Option<f64> {
 #[cfg(test)]
 mod tests {
     use super::*;
-    use lattice_core::registration::Margin;
     use nalgebra::Matrix6;
 
     fn cell() -> Cell {
@@ -242,6 +259,12 @@ mod tests {
         let trial = trial.with_judgement(&calibration, &truth);
         let judged = trial.judged.clone().unwrap();
         assert!(trial.is_accepted() && judged.margin.is_none());
+        assert_eq!(judged.p_wrong_by_margin(), Some(0.0));
+        let recorded = Judged {
+            margin: Some(0.0),
+            ..judged.clone()
+        };
+        assert!(recorded.p_wrong_by_margin() > Some(0.5));
         // (0.03^2 + 0.04^2 + 0.01^2) / 1e-4.
         assert!((judged.nees.unwrap() - 26.0).abs() < 1e-6);
 
