@@ -7,7 +7,7 @@ const UNIT: f64 = 4.7;
 /// The unit for each standard deviation that chance gives the margin.
 const PER_CHANCE: f64 = 0.5;
 /// The same for each observation without a partner, which might have one elsewhere.
-const PER_UNEXPLAINED: f64 = 0.066;
+const PER_UNEXPLAINED: f64 = 0.075;
 /// Logarithm of the odds against a pose over one other place without a margin: more may have been missed.
 const MISSED: f64 = 0.5;
 /// Logarithm of the odds that the square of a unit is worth: chance makes margins that are normally distributed.
