@@ -1,10 +1,15 @@
 //! Poses in files.
 
+use std::fs::File;
+use std::io::Read;
 use std::path::Path;
 
 use nalgebra::{Isometry3, Matrix3, Rotation3, Translation3, UnitQuaternion};
 
 use crate::AnyError;
+
+/// Most bytes of a file of 16 numbers.
+const MAX_BYTES: u64 = 1 << 16;
 
 /// A transform from a file of 16 numbers, row by row.
 ///
@@ -12,7 +17,10 @@ use crate::AnyError;
 /// Names the file that cannot be read or is no rigid transform.
 pub fn read_pose(path: &Path) -> Result<Isometry3<f64>, AnyError> {
     let wrong = |why: &str| format!("{}: {why}", path.display());
-    let text = std::fs::read_to_string(path).map_err(|e| wrong(&e.to_string()))?;
+    let mut text = String::new();
+    let file = File::open(path).map_err(|e| wrong(&e.to_string()))?;
+    let read = file.take(MAX_BYTES).read_to_string(&mut text);
+    read.map_err(|e| wrong(&e.to_string()))?;
     parse_pose(&text).ok_or_else(|| wrong("is not a rigid transform of 4 x 4 numbers").into())
 }
 

@@ -53,7 +53,8 @@ impl Margin {
 
     /// Probability that the pose is wrong, and another one right.
     ///
-    /// Odds fall with the square of the margin; its constants are fitted to simulated scenes, see `docs/calibration.md`.
+    /// Odds fall with the square of the margin; its constants are fitted to simulated scenes and a room,
+    /// see `docs/calibration.md`.
     pub fn p_wrong(&self) -> f64 {
         1.0 / (1.0 + (self.against() - self.without()).exp())
     }

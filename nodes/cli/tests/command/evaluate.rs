@@ -119,7 +119,7 @@ fn parts_of_a_scan_are_found_in_another_one() {
     );
     let said = error(&[&all[..], &["--widths", "0"]].concat());
     assert!(said.contains("widths is 0, not within"), "{said}");
-    // The whole scan tells another pose, by a few micrometres.
+    // Another place of the sensor, and the pose that a calibration finds.
     let said = error(&[&base[..], &["--seeds", "1"]].concat());
     assert!(said.contains("other settings"), "{said}");
     std::fs::write(&truth, "1 0 0\n").unwrap();

@@ -1,9 +1,10 @@
 //! Pairs of scans: what they share, and tables of them.
 
-use lattice_core::registration::PreparedCloud;
+use lattice_core::registration::{Calibration, PreparedCloud};
 use nalgebra::{Isometry3, Point3};
 
-use super::trial::{Trial, WRONG};
+use super::settings::Cell;
+use super::trial::{OURS, Trial, WRONG, rounded};
 use crate::report::Cell as Entry;
 
 /// Share of points that a map has too, within a distance.
@@ -15,6 +16,22 @@ pub fn shared(
 ) -> f64 {
     let near = |p: &&Point3<f64>| map.nearest(&(map_from_points * **p), within_m).is_some();
     points_m.iter().filter(near).count() as f64 / points_m.len().max(1) as f64
+}
+
+/// Trial of a calibration, given the points that were seen and the share of them that the map has too.
+pub fn trial(
+    cell: &Cell,
+    found: &Calibration,
+    truth: &Isometry3<f64>,
+    seen_m: &[Point3<f64>],
+    overlap: f64,
+) -> Trial {
+    // Times are taken beside other trials: they would say nothing.
+    let trial = Trial::of_pose(cell, OURS, &found.map_from_headset, truth, seen_m, 0.0);
+    Trial {
+        overlap: Some(rounded(overlap)),
+        ..trial.with_judgement(found, truth)
+    }
 }
 
 /// Trials by the name of their scene, in the order of the trials.

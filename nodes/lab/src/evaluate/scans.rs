@@ -9,9 +9,9 @@ use nalgebra::{Isometry3, Point3};
 use super::Settings;
 use super::looks::{any_pose, keep_sector};
 use super::many::{Case, settings_of};
-use super::pairs::{columns, line, of_scenes, shared};
+use super::pairs::{columns, line, of_scenes, shared, trial};
 use super::settings::Cell;
-use super::trial::{OURS, Trial, WRONG, rounded};
+use super::trial::{Trial, WRONG};
 use crate::AnyError;
 use crate::options::within;
 use crate::random::Stream;
@@ -39,7 +39,7 @@ pub struct Part<'a> {
 impl Scans {
     /// Two scans with the pose of the second one, or that which a calibration of all its points finds.
     ///
-    /// Where nothing is said of it, the sensor stands at the origin of the scan.
+    /// The sensor stands at the origin of the scan unless its place is given.
     ///
     /// # Errors
     /// If the map has no points, or no pose is given and the calibration is not OK.
@@ -106,9 +106,12 @@ impl Scans {
         {
             point.iter().for_each(|x| hash.update(&x.to_le_bytes()));
         }
-        let labels = &self.scan.cloud.labels;
+        let of_map = (0..self.map.cloud().len()).map(|i| self.map.cloud().label(i));
+        for label in of_map.chain(self.scan.cloud.labels.iter().cloned()) {
+            hash.update(format!("{label:?}").as_bytes());
+        }
         let (pose, sensor_m) = (&self.map_from_scan, &self.scan.sensor_m);
-        hash.update(format!("{labels:?} {pose:?} {sensor_m:?} {:?}", self.options).as_bytes());
+        hash.update(format!("{pose:?} {sensor_m:?} {:?}", self.options).as_bytes());
         Settings {
             scans_crc32: Some(hash.finalize()),
             ..settings_of(self.cell_side_m)
@@ -144,13 +147,7 @@ impl Case for Part<'_> {
         let thinned = voxel_downsample(&look.cloud, scans.cell_side_m).points_m;
         let shared_m = SHARED_CELLS * scans.cell_side_m;
         let overlap = shared(&thinned, scans.map.cloud(), &truth, shared_m);
-        let pose = &found.map_from_headset;
-        // Times are taken beside other trials: they would say nothing.
-        let trial = Trial::of_pose(cell, OURS, pose, &truth, &thinned, 0.0);
-        Ok(Trial {
-            overlap: Some(rounded(overlap)),
-            ..trial.with_judgement(&found, &truth)
-        })
+        Ok(trial(cell, &found, &truth, &thinned, overlap))
     }
 }
 

@@ -6,9 +6,9 @@ use lattice_core::registration::{
 use nalgebra::Point3;
 
 use super::many::Case;
-use super::pairs::{columns, line, of_scenes, shared};
+use super::pairs::{columns, line, of_scenes, shared, trial};
 use super::settings::Cell;
-use super::trial::{OURS, Trial, WRONG, rounded};
+use super::trial::{Trial, WRONG};
 use crate::AnyError;
 use crate::report::{Cell as Entry, Report, Section, Table};
 use crate::simulate::town::{Lidar, Town, drive};
@@ -82,13 +82,7 @@ impl Case for Pair {
             confusion: None,
         };
         let found = calibrate(&map, &request, &Profile::Lidar.options(), &());
-        let pose = &found.map_from_headset;
-        // Times are taken beside other trials: they would say nothing.
-        let trial = Trial::of_pose(cell, OURS, pose, &truth, &thinned, 0.0);
-        Ok(Trial {
-            overlap: Some(rounded(overlap)),
-            ..trial.with_judgement(&found, &truth)
-        })
+        Ok(trial(cell, &found, &truth, &thinned, overlap))
     }
 }
 

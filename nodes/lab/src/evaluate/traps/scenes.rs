@@ -15,6 +15,30 @@ pub(super) struct Scene {
     pub truth: Isometry3<f64>,
 }
 
+impl Scene {
+    /// A noisy map of a room, and a scan all around from a place in it.
+    fn all_around(
+        room: &Flat,
+        eye_m: [f64; 2],
+        truth: Isometry3<f64>,
+        random: &mut Stream,
+    ) -> Scene {
+        let uniform = &mut || random.uniform();
+        Scene {
+            map: room.noisy_map(uniform),
+            scan: room.all_around(eye_m, &truth, uniform),
+            options: CalibrationOptions::default(),
+            truth,
+        }
+    }
+
+    fn without_labels(mut self) -> Scene {
+        self.map.labels.clear();
+        self.scan.cloud.labels.clear();
+        self
+    }
+}
+
 /// A room that looks alike from several places, and how far from its middle a scan is taken, metres.
 type Shape = (&'static str, fn() -> Flat, [f64; 2]);
 
@@ -205,21 +229,13 @@ impl Look {
             Object::Box => with_box([0.5, 0.5, 0.9]),
             Object::Cube => with_box([0.2 + 0.4 * random.uniform(); 3]),
         };
-        let uniform = &mut || random.uniform();
-        let mut map = room.noisy_map(uniform);
-        let mut scan = room.all_around(eye, &truth, uniform);
+        let mut scene = Scene::all_around(&room, eye, truth, random);
         if !self.whole {
-            keep_sector(&mut scan, 0.52, random);
+            keep_sector(&mut scene.scan, 0.52, random);
         }
-        if !self.labelled {
-            map.labels.clear();
-            scan.cloud.labels.clear();
-        }
-        Scene {
-            map,
-            scan,
-            options: CalibrationOptions::default(),
-            truth,
+        match self.labelled {
+            true => scene,
+            false => scene.without_labels(),
         }
     }
 }
@@ -233,17 +249,7 @@ pub(super) fn small_room(random: &mut Stream) -> Scene {
     let size = 0.1 + 0.3 * random.uniform();
     let corner = sides.map(|side| (side - size) * random.uniform() - side / 2.0);
     let room = Flat::room(sides[0], sides[1]).with_box(corner, [size; 3]);
-    let uniform = &mut || random.uniform();
-    let mut map = room.noisy_map(uniform);
-    let mut scan = room.all_around(eye, &truth, uniform);
-    map.labels.clear();
-    scan.cloud.labels.clear();
-    Scene {
-        map,
-        scan,
-        options: CalibrationOptions::default(),
-        truth,
-    }
+    Scene::all_around(&room, eye, truth, random).without_labels()
 }
 
 /// Another building.
