@@ -167,6 +167,7 @@ fn calibration_from(
         scale_sigma: params.f64_in("scale_sigma", d.scale_sigma, 0.0..=0.5)?,
         max_scale_error: params.f64_in("max_scale_error", d.max_scale_error, 0.0..=1.0)?,
         estimate_scale: params.bool("estimate_scale", d.estimate_scale)?,
+        trust_axes: params.bool("trust_axes", d.trust_axes)?,
         gravity_sigma_rad: gravity_sigma_rad(params, d.gravity_sigma_rad)?,
         axes: semantic.axes,
         agreement: params.f64_in("agreement", d.agreement, 0.0..=1.0)?,

@@ -103,6 +103,24 @@ fn a_conversion_too_many_and_a_mirror_are_told() {
 }
 
 #[test]
+fn no_other_axes_are_tried_of_a_cloud_whose_axes_are_trusted() {
+    let scene = Scene::new(0, true);
+    let given = CalibrationOptions::default();
+    let trusted = CalibrationOptions {
+        trust_axes: true,
+        ..given
+    };
+    let [checked, found] = [given, trusted].map(|options| scene.ask(&options, |p| p));
+    assert_eq!(found.verdict, Verdict::Ok, "{}", found.reason);
+    assert_eq!(found.map_from_headset, checked.map_from_headset);
+    assert_eq!(found.other_reading_ahead, None);
+    let mirror = |p: Vector3<f64>| Vector3::new(p.x, -p.y, p.z);
+    let found = scene.ask(&trusted, mirror);
+    assert!(!found.reason.contains("mirrored"), "{}", found.reason);
+    assert_ne!(found.verdict, Verdict::Ok, "{}", found.reason);
+}
+
+#[test]
 fn a_cloud_that_leans_is_not_ok() {
     let scene = Scene::new(0, true);
     for deg in [4.0_f64, 12.0, 90.0] {

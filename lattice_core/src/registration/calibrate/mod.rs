@@ -117,7 +117,10 @@ fn run(
     let calibration = judge::answer(&bench, all, request.start.is_some());
     let contradicted = calibration.fit.floating + calibration.fit.blocked;
     let in_doubt = contradicted > IN_DOUBT && calibration.verdict != Verdict::RejectedInput;
-    let other = other_reading(&bench, &first, refined, in_doubt, region.as_ref());
+    let other = match options.trust_axes {
+        true => None,
+        false => other_reading(&bench, &first, refined, in_doubt, region.as_ref()),
+    };
     let _ = progress.report(Stage::Judge, 1.0);
     Ok(match other {
         Some(other) => read_as(calibration, &other, options),

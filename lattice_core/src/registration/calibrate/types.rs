@@ -56,6 +56,8 @@ pub struct CalibrationOptions {
     pub gravity_sigma_rad: f64,
     /// Axes that the clouds were read as, for what is said of those that were misread.
     pub axes: Axes,
+    /// True if axes, handedness and scale are certain: no others are tried, which takes about half the time.
+    pub trust_axes: bool,
     /// Share of places where equal class numbers are expected to agree before anything was learned;
     /// 0 if the label sets have nothing to do with each other.
     pub agreement: f64,
@@ -89,6 +91,7 @@ impl Default for CalibrationOptions {
             estimate_scale: false,
             gravity_sigma_rad: 0.006,
             axes: Axes::RosFlu,
+            trust_axes: false,
             agreement: 0.6,
             start_radius_m: 2.0,
             start_yaw_rad: 1.0,

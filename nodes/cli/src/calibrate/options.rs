@@ -60,6 +60,9 @@ pub struct SearchOptions {
     /// Scale the cloud to the map, whatever its scale; the pose is that of the scaled cloud
     #[arg(long)]
     estimate_scale: bool,
+    /// Try no other axes, mirrorings and scales of the cloud: these are certain; takes about half the time
+    #[arg(long)]
+    trust_axes: bool,
 }
 
 /// Profile that is asked for; None for that of the sensor that the cloud looks like.
@@ -140,6 +143,7 @@ impl SearchOptions {
             estimate_scale: self.estimate_scale,
             gravity_sigma_rad: gravity.unwrap_or(Ok(usual.gravity_sigma_rad))?,
             axes,
+            trust_axes: self.trust_axes,
             agreement: within("agreement", self.agreement, usual.agreement, share)?,
             start_radius_m: within("guess-radius", self.guess_radius, radius_m, length)?,
             start_yaw_rad: within("guess-yaw", self.guess_yaw, usual.start_yaw_rad, angle)?,

@@ -242,6 +242,9 @@ fn axes_and_scale_that_are_wrong_are_told_and_thresholds_can_be_set() {
         let said = "fits as ros_flu: the cloud was converted twice";
         assert!(reason(&found).contains(said), "{found}");
     }
+    let found = ask(&ros, &["--axes", "unity_ruf", "--trust-axes"]);
+    assert!(!reason(&found).contains("fits as"), "{found}");
+    assert_eq!(ask(&ros, &["--trust-axes"])["verdict"], "OK");
     let found = ask(&small, &[]);
     assert_eq!(found["verdict"], "REJECTED_INPUT");
     assert!(reason(&found).contains("multiplied by 1.05"), "{found}");
