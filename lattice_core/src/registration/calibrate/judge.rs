@@ -120,11 +120,9 @@ fn margin(bench: &Workbench<'_>, all: &[Candidate], best: &Candidate, fit: &Abso
     rivals.truncate(within_reach.count().max(1));
     let poses: Vec<&Isometry3<f64>> = rivals.iter().map(|c| &c.map_from_headset).collect();
     let region_m = bench.options.region_m;
-    let chances = bench
-        .fit
-        .noise_between(&best.map_from_headset, &poses, region_m);
+    let even = bench.fit.even(&best.map_from_headset, &poses, region_m);
     let ahead = |rival: &&Candidate| best.total() - rival.total().max(nowhere);
-    let places = rivals.iter().map(ahead).zip(chances);
+    let places = rivals.iter().map(ahead).zip(even);
     let contradicted = CONTRADICTED * (fit.floating + fit.blocked);
     let unexplained = bench.fit.observations() * (1.0 - best.inlier_fraction + contradicted);
     let margin = Margin::over(places, unexplained);

@@ -9,6 +9,7 @@ use super::PreparedCloud;
 use super::confusion::{Confusion, Counts, Lift};
 use partners::CLOSENESS;
 
+pub use chance::Even;
 pub(super) use chance::quantile;
 pub use partners::Partners;
 

@@ -66,7 +66,10 @@ pub struct Judged {
     /// Probability that another pose is right.
     #[serde(default)]
     pub p_wrong: Option<f64>,
-    /// Standard deviation of the margin by chance.
+    /// Part of the margin that may be chance.
+    #[serde(default)]
+    pub even: Option<f64>,
+    /// Standard deviation of that by chance.
     #[serde(default)]
     pub chance: Option<f64>,
     /// Independent observations without a partner.
@@ -97,10 +100,12 @@ impl Judged {
     /// Probability that another pose is right, as this version states it of the margin that was recorded; what was
     /// stated then if there was none.
     pub fn p_wrong_by_margin(&self) -> Option<f64> {
-        let evidence = self.margin.zip(self.chance).zip(self.unexplained);
-        let p_wrong = evidence.map(|((log, chance), unexplained)| {
+        let parts = self.even.zip(self.chance);
+        let evidence = self.margin.zip(parts).zip(self.unexplained);
+        let p_wrong = evidence.map(|((log, (even, chance)), unexplained)| {
             let margin = Margin {
                 log,
+                even,
                 chance,
                 unexplained,
                 places: self.places.unwrap_or(1.0),
@@ -164,6 +169,7 @@ impl Trial {
                 chosen: calibration.method.to_owned(),
                 margin: margin.log.is_finite().then_some(rounded(margin.log)),
                 p_wrong: Some(margin.p_wrong()),
+                even: Some(margin.even),
                 chance: Some(margin.chance),
                 unexplained: Some(margin.unexplained),
                 places: Some(margin.places),
