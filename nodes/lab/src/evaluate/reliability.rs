@@ -17,6 +17,9 @@ const DECADES: [Range<f64>; 5] = [0.1..1.0, 1e-2..0.1, 1e-3..1e-2, 1e-4..1e-3, 0
 /// Share that is drawn for none, and where stated ones that are less are drawn.
 const LEAST: f64 = 2e-5;
 const STATED: RGBColor = RGBColor(0, 114, 178);
+const TWICE: RGBColor = RGBColor(153, 153, 153);
+/// Panels beside each other.
+const COLUMNS: usize = 3;
 
 /// Trials of one evaluation, with its name.
 pub type Set = (String, Vec<Trial>);
@@ -61,63 +64,73 @@ struct Bin {
     observed: Share,
 }
 
-fn bins(sets: &[Set]) -> Vec<(Range<f64>, Bin)> {
-    let bin = |range: &Range<f64>| {
+impl Bin {
+    fn of(sets: &[Set], range: &Range<f64>) -> Bin {
         let all = sets.iter().flat_map(|(_, trials)| judged(trials));
         let within: Vec<(&Trial, f64)> = all
             .filter(|(_, _, p)| range.contains(p))
             .map(|(trial, _, p)| (trial, p))
             .collect();
         let sum: f64 = within.iter().map(|(_, p)| p).sum();
-        let bin = Bin {
+        Bin {
             stated: sum / within.len().max(1) as f64,
             observed: Share::of(within.iter().map(|(trial, _)| is_elsewhere(trial))),
-        };
-        (range.clone(), bin)
-    };
-    DECADES.iter().map(bin).collect()
+        }
+    }
+
+    /// Counts, and the mean that was stated; nothing of none.
+    fn text(&self) -> String {
+        let Share { k, n, .. } = self.observed;
+        match n {
+            0 => String::new(),
+            _ => format!("{k} of {n}, stated {:.1e}", self.stated),
+        }
+    }
 }
 
 fn stated(sets: &[Set]) -> Result<Section, AnyError> {
-    let all = bins(sets);
-    let line = |(range, bin): &(Range<f64>, Bin)| -> Vec<Cell> {
-        let counts = sets.iter().map(|(_, trials)| {
-            let within = judged(trials).filter(|(_, _, p)| range.contains(p));
-            let elsewhere = within.map(|(trial, _, _)| is_elsewhere(trial));
-            let Share { k, n, .. } = Share::of(elsewhere);
-            Cell::from(format!("{k} of {n}"))
-        });
+    let line = |range: &Range<f64>| -> Vec<Cell> {
+        let bin = Bin::of(sets, range);
         let mut cells = vec![
             format!("{} to {}", range.start, range.end).into(),
             format!("{:.1e}", bin.stated).into(),
             bin.observed.text(2).into(),
         ];
-        cells.extend(counts);
+        let each = sets.chunks(1).map(|set| Bin::of(set, range).text());
+        cells.extend(each.map(Cell::from));
         cells
     };
     let names: String = sets.iter().map(|(name, _)| format!("|{name}")).collect();
     let columns = format!("stated probability|its mean|at another place{names}");
     let title = "Probability that a pose is at another place";
-    let rows: Vec<Vec<Cell>> = all.iter().map(line).collect();
+    let rows: Vec<Vec<Cell>> = DECADES.iter().map(line).collect();
     Ok(Section {
         tables: vec![Table::new("stated", title, &columns, rows)],
-        figures: vec![diagram(&all)?],
+        figures: vec![diagram(sets)?],
         ..Section::measured("stated", title, "")
     })
 }
 
-/// Observed share over the stated probability; a line where they are equal.
-fn diagram(bins: &[(Range<f64>, Bin)]) -> Result<Figure, AnyError> {
+/// Observed share over the stated probability, of all sets and of each; a line where they are equal, and two where one
+/// is twice the other.
+fn diagram(sets: &[Set]) -> Result<Figure, AnyError> {
     let shown = |share: f64| share.clamp(LEAST, 1.0);
-    let layout = Layout::new((430, 330), [1, 1], 170, &[(STATED, "share, 95 %")]);
-    let picture = svg(&layout, |areas| {
-        for area in areas {
+    let each = sets.iter().zip(sets.chunks(1));
+    let each = each.map(|((name, _), set)| (name.as_str(), set));
+    let panels: Vec<(&str, &[Set])> = std::iter::once(("all", sets)).chain(each).collect();
+    let grid = [COLUMNS, panels.len().div_ceil(COLUMNS)];
+    let key = [(STATED, "share, 95 %"), (TWICE, "equal, twice")];
+    let picture = svg(&Layout::new((300, 280), grid, 130, &key), |areas| {
+        for (area, (name, sets)) in areas.iter().zip(&panels) {
             let x = ("stated probability", (LEAST..1.0).log_scale());
             let y = ("share at another place", (LEAST..1.0).log_scale());
-            let mut chart = chart(area, "all sets", x, y, &[])?;
-            let equal = [LEAST, 1.0].map(|p| (p, p));
-            chart.draw_series(LineSeries::new(equal, BLACK.mix(0.4)))?;
-            for (_, bin) in bins {
+            let mut chart = chart(area, name, x, y, &[])?;
+            for factor in [0.5, 1.0, 2.0] {
+                let ends =
+                    [LEAST.max(LEAST / factor), 1.0_f64.min(1.0 / factor)].map(|p| (p, factor * p));
+                chart.draw_series(LineSeries::new(ends, TWICE))?;
+            }
+            for bin in DECADES.iter().map(|range| Bin::of(sets, range)) {
                 let Some(share) = bin.observed.share else {
                     continue;
                 };
@@ -212,7 +225,7 @@ mod tests {
             text.contains("0.01 to 0.1 | 3.8e-2 | 25.00 % of 4"),
             "{text}"
         );
-        assert!(text.contains("| 1 of 4"), "{text}");
+        assert!(text.contains("| 1 of 4, stated 3.8e-2"), "{text}");
         assert!(text.contains("house | 5 | 4.0 | 4.0 | 4"), "{text}");
     }
 }

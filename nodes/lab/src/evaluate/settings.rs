@@ -130,7 +130,7 @@ impl FromStr for Start {
 }
 
 /// Most seeds of one run: all of its trials are listed before the first.
-const MAX_SEEDS: f64 = 10_000.0;
+const MAX_SEEDS: f64 = 100_000.0;
 
 /// Checks the number of seeds; none at all makes the report of trials that are there.
 pub(super) fn check_seeds(seeds: u64) -> Result<(), AnyError> {

@@ -22,7 +22,7 @@ pub struct Trap(Kind);
 #[derive(Clone, Copy, Debug)]
 enum Kind {
     Alike(Look),
-    SmallRoom,
+    SmallRoom(Object),
     Fault(Fault),
 }
 
@@ -40,7 +40,17 @@ impl Trap {
     pub fn all() -> Vec<Trap> {
         let faults = Fault::all().into_iter().map(Kind::Fault);
         let all = faults.chain(Look::all().into_iter().map(Kind::Alike));
-        all.chain([Kind::SmallRoom]).map(Trap).collect()
+        all.chain([Object::None, Object::Cube].map(Kind::SmallRoom))
+            .map(Trap)
+            .collect()
+    }
+}
+
+fn kind_of(object: Object) -> &'static str {
+    match object {
+        Object::None => ALIKE,
+        Object::Box => BROKEN,
+        Object::Cube => NEARLY,
     }
 }
 
@@ -48,15 +58,10 @@ impl Case for Trap {
     fn name(&self) -> String {
         match self.0 {
             Kind::Fault(fault) => format!("{WRONG_INPUT}/{}", fault.name()),
-            Kind::Alike(look) => {
-                let kind = match look.object {
-                    Object::None => ALIKE,
-                    Object::Box => BROKEN,
-                    Object::Cube => NEARLY,
-                };
-                format!("{kind}/{}", look.name())
+            Kind::Alike(look) => format!("{}/{}", kind_of(look.object), look.name()),
+            Kind::SmallRoom(object) => {
+                format!("{}/small room, whole, no labels", kind_of(object))
             }
-            Kind::SmallRoom => format!("{NEARLY}/small room, whole, no labels"),
         }
     }
 
@@ -71,7 +76,7 @@ impl Case for Trap {
         } = match self.0 {
             Kind::Fault(fault) => fault.scene(cell.seed, random),
             Kind::Alike(look) => look.scene(random),
-            Kind::SmallRoom => small_room(random),
+            Kind::SmallRoom(object) => small_room(object, random),
         };
         let map = CalibrationMap::new(map, Self::CELL_SIDE_M)?;
         let seen_m = scan.cloud.points_m.clone();

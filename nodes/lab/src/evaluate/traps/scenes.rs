@@ -240,16 +240,25 @@ impl Look {
     }
 }
 
-/// A scan all around in a small room with a cube somewhere, which may be too little to tell from where: of those
-/// thousands are calibrated in an hour.
-pub(super) fn small_room(random: &mut Stream) -> Scene {
+/// A scan all around in a small room, empty or with a cube somewhere, which may be too little to tell from where; its
+/// axes are trusted, so that thousands are calibrated in an hour.
+pub(super) fn small_room(object: Object, random: &mut Stream) -> Scene {
     let truth = any_pose(random);
     let sides = [(); 2].map(|()| 2.0 + 2.0 * random.uniform());
     let eye = sides.map(|side| 0.25 * side * signed(random));
-    let size = 0.1 + 0.3 * random.uniform();
-    let corner = sides.map(|side| (side - size) * random.uniform() - side / 2.0);
-    let room = Flat::room(sides[0], sides[1]).with_box(corner, [size; 3]);
-    Scene::all_around(&room, eye, truth, random).without_labels()
+    let room = Flat::room(sides[0], sides[1]);
+    let room = match object {
+        Object::None => room,
+        Object::Box | Object::Cube => {
+            let size = 0.1 + 0.3 * random.uniform();
+            let corner = sides.map(|side| (side - size) * random.uniform() - side / 2.0);
+            room.with_box(corner, [size; 3])
+        }
+    };
+    let mut scene = Scene::all_around(&room, eye, truth, random).without_labels();
+    scene.options.trust_axes = true;
+    scene.options.registered_points = 2_000;
+    scene
 }
 
 /// Another building.
