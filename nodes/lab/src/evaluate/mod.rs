@@ -14,6 +14,7 @@ pub mod kitti;
 mod looks;
 mod many;
 mod methods;
+mod odds;
 mod pairs;
 mod reliability;
 mod report;

@@ -4,6 +4,7 @@ use std::ops::Range;
 
 use plotters::prelude::*;
 
+use super::odds::OddsCurve;
 use super::statistics::{Share, median};
 use super::trial::{Judged, OURS, Trial};
 use crate::AnyError;
@@ -14,6 +15,8 @@ use crate::report::{Cell, Figure, Report, Section, Table};
 const ELSEWHERE: (f64, f64) = (0.5, 15.0);
 /// Stated probabilities that are counted together.
 const DECADES: [Range<f64>; 5] = [0.1..1.0, 1e-2..0.1, 1e-3..1e-2, 1e-4..1e-3, 0.0..1e-4];
+/// Stated probabilities at which the curve of the odds is told.
+const AT: [f64; 4] = [0.1, 0.01, 1e-3, 1e-4];
 /// Share that is drawn for none, and where stated ones that are less are drawn.
 const LEAST: f64 = 2e-5;
 const STATED: RGBColor = RGBColor(0, 114, 178);
@@ -105,10 +108,37 @@ fn stated(sets: &[Set]) -> Result<Section, AnyError> {
     let title = "Probability that a pose is at another place";
     let rows: Vec<Vec<Cell>> = DECADES.iter().map(line).collect();
     Ok(Section {
-        tables: vec![Table::new("stated", title, &columns, rows)],
+        tables: vec![Table::new("stated", title, &columns, rows), odds(sets)],
         figures: vec![diagram(sets)?],
         ..Section::measured("stated", title, "")
     })
+}
+
+/// Observed probabilities where some are stated, by a curve through all of them.
+fn odds(sets: &[Set]) -> Table {
+    let line = |name: &str, sets: &[Set]| -> Vec<Cell> {
+        let all = sets.iter().flat_map(|(_, trials)| judged(trials));
+        let outcomes: Vec<(f64, bool)> =
+            all.map(|(trial, _, p)| (p, is_elsewhere(trial))).collect();
+        let curve = OddsCurve::fit(&outcomes);
+        let slope = curve.map(|curve| curve.slope());
+        let mut cells = vec![name.into(), outcomes.len().into()];
+        cells.push(slope.map_or("-".into(), |(b, sigma)| {
+            format!("{b:.2} ± {sigma:.2}").into()
+        }));
+        cells.extend(AT.map(|p| match curve.map(|curve| curve.observed(p)) {
+            Some([low, p, high]) => format!("{p:.1e} [{low:.1e}, {high:.1e}]").into(),
+            None => Cell::from("-"),
+        }));
+        cells
+    };
+    let mut rows = vec![line("all", sets)];
+    let each = sets.iter().zip(sets.chunks(1));
+    rows.extend(each.map(|((name, _), set)| line(name, set)));
+    let at: String = AT.iter().map(|p| format!("|where {p} is stated")).collect();
+    let columns = format!("set|poses|slope{at}");
+    let title = "Odds observed as a power of those stated (Cox 1958), all probabilities at once; 1 is the right slope";
+    Table::new("odds", title, &columns, rows)
 }
 
 /// Observed share over the stated probability, of all sets and of each; a line where they are equal, and two where one
@@ -193,6 +223,7 @@ mod tests {
                 chosen: String::new(),
                 margin: None,
                 p_wrong: Some(p_wrong),
+                even: None,
                 chance: None,
                 unexplained: None,
                 places: None,

@@ -3,7 +3,7 @@
 use serde::Serialize;
 
 /// Normal quantile of a two-sided 95 % interval.
-const Z: f64 = 1.959_963_984_540_054;
+pub(super) const Z: f64 = 1.959_963_984_540_054;
 
 /// A share of trials, with the 95 % interval of Wilson (1927).
 #[derive(Clone, Copy, PartialEq, Debug, Serialize)]
