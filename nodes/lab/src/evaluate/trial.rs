@@ -270,7 +270,7 @@ mod tests {
             margin: Some(0.0),
             ..judged.clone()
         };
-        assert!(recorded.p_wrong_by_margin() > Some(0.5));
+        assert_eq!(recorded.p_wrong_by_margin(), Some(0.5));
         // (0.03^2 + 0.04^2 + 0.01^2) / 1e-4.
         assert!((judged.nees.unwrap() - 26.0).abs() < 1e-6);
 
