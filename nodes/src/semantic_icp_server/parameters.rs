@@ -32,7 +32,7 @@ const ABOUT: &[About] = about! {
     "scale_sigma": "Standard deviation of the headset's scale.";
     "max_scale_error": "Share by which the scale of a cloud may differ from 1 for it to be OK.";
     "estimate_scale": "Whether clouds of any scale are scaled to the map; the pose is then that of the scaled cloud, and track, which scales nothing, is to be false.";
-    "trust_axes": "Whether axes, handedness and scale of the clouds are certain: no others are tried then, which takes about half the time.";
+    "trust_axes": "Whether axes, handedness and scale of the clouds are certain: no others are tried then, which takes a fifth less time or more.";
     "gravity_sigma_rad": "Standard deviation of the tilt between map and headset, as far as gravity tells; 0 if one of them does not know where down is.";
     "agreement": "Share of places where equal class numbers of headset and map are expected to agree before anything was learned; 0 if their numbers have nothing to do with each other.";
     "guess_radius_m": "How far the answer may be from a guess.";

@@ -56,7 +56,7 @@ pub struct CalibrationOptions {
     pub gravity_sigma_rad: f64,
     /// Axes that the clouds were read as, for what is said of those that were misread.
     pub axes: Axes,
-    /// True if axes, handedness and scale are certain: no others are tried, which takes about half the time.
+    /// True if axes, handedness and scale are certain: no others are tried, which takes a fifth less time or more.
     pub trust_axes: bool,
     /// Share of places where equal class numbers are expected to agree before anything was learned;
     /// 0 if the label sets have nothing to do with each other.

@@ -60,7 +60,7 @@ pub struct SearchOptions {
     /// Scale the cloud to the map, whatever its scale; the pose is that of the scaled cloud
     #[arg(long)]
     estimate_scale: bool,
-    /// Try no other axes, mirrorings and scales of the cloud: these are certain; takes about half the time
+    /// Try no other axes, mirrorings and scales of the cloud: these are certain; takes a fifth less time or more
     #[arg(long)]
     trust_axes: bool,
 }
