@@ -13,7 +13,6 @@ const DEVIATION_OF_MEDIAN: f64 = 1.4826;
 const BY_CHANCE: f64 = 2.5;
 /// Standard deviations, estimated by the median, to which the difference of a region is clipped (winsorised).
 const HEAVY: f64 = 4.0;
-
 /// Difference of the log-likelihoods of a cell from which on it is no chance: one pose has points on the map there.
 const STANDS_OUT: f64 = 5.0;
 
