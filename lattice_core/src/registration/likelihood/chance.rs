@@ -1,7 +1,5 @@
 //! Scatter of the difference of the likelihoods of two poses that are equally right.
 
-use std::collections::BTreeMap;
-
 use nalgebra::Isometry3;
 use rayon::prelude::*;
 
@@ -37,12 +35,13 @@ impl Fit<'_> {
         region_m: f64,
     ) -> Vec<Even> {
         let here = self.of_points(pose);
+        let [cells, regions] = [self.scale.region_m, region_m].map(|side_m| self.regions(side_m));
         let there = others.par_iter();
         let even = there.map(|other| {
             let both: Vec<(f64, f64)> = (here.iter().copied()).zip(self.of_points(other)).collect();
             Even {
-                log: even(&self.of_regions(&both, self.scale.region_m)),
-                chance: noise(&self.of_regions(&both, region_m)),
+                log: even(&sums(&both, &cells)),
+                chance: noise(&sums(&both, &regions)),
             }
         });
         even.collect()
@@ -56,15 +55,28 @@ impl Fit<'_> {
         (0..self.source.len()).map(of_point).collect()
     }
 
-    /// Log-likelihoods of the regions of a side, in the order of their places, given those of the points.
-    fn of_regions(&self, of_points: &[(f64, f64)], side_m: f64) -> Vec<(f64, f64)> {
-        let mut regions: BTreeMap<[i64; 3], (f64, f64)> = BTreeMap::new();
-        for (point, (a, b)) in self.source.points_m().iter().zip(of_points) {
-            let region = regions.entry(region_of(point, side_m)).or_default();
-            *region = (region.0 + a, region.1 + b);
-        }
-        regions.into_values().collect()
+    /// Number of the region of a side that each point is in, in the order of their places.
+    fn regions(&self, side_m: f64) -> Vec<usize> {
+        let of_points = self.source.points_m().iter();
+        let of_points: Vec<[i64; 3]> = of_points.map(|point| region_of(point, side_m)).collect();
+        let mut regions = of_points.clone();
+        regions.sort_unstable();
+        regions.dedup();
+        let number = |region| regions.partition_point(|other| other < region);
+        of_points.iter().map(number).collect()
     }
+}
+
+/// Log-likelihoods of regions at two poses, given those of points and the numbers of their regions.
+fn sums(of_points: &[(f64, f64)], regions: &[usize]) -> Vec<(f64, f64)> {
+    let n = regions.iter().max().map_or(0, |last| last + 1);
+    let mut sums = vec![(0.0, 0.0); n];
+    for ((a, b), region) in of_points.iter().zip(regions) {
+        if let Some(sum) = sums.get_mut(*region) {
+            *sum = (sum.0 + a, sum.1 + b);
+        }
+    }
+    sums
 }
 
 /// Part of the difference of the log-likelihoods of two poses, given those of cells, from those that do not stand out.

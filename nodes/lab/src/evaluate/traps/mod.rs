@@ -46,6 +46,7 @@ impl Trap {
     }
 }
 
+/// Kind of a room with an object in it.
 fn kind_of(object: Object) -> &'static str {
     match object {
         Object::None => ALIKE,

@@ -23,7 +23,7 @@ pub fn traps_report(trials: &[Trial]) -> Report {
         section(
             trials,
             NEARLY,
-            "The same with a cube of 20 to 60 cm, or in a small room of 10 to 40 cm, which may be too little to tell",
+            "The same with a cube of 20 to 60 cm, in small rooms of 10 to 40 cm, which may be too little to tell",
         ),
         faults(trials),
         wrong(trials),
