@@ -131,6 +131,15 @@ impl PoseBuffer {
         self.track.at(stamp_ns, self.max_gap_ns)
     }
 
+    /// Poses after one time and before another, in order.
+    pub fn between(&self, after_ns: i64, before_ns: i64) -> impl Iterator<Item = StampedPose> {
+        let samples = self.track.between(after_ns, before_ns);
+        samples.map(|&(stamp_ns, map_from_base)| StampedPose {
+            stamp_ns,
+            map_from_base,
+        })
+    }
+
     /// Time of the newest pose, nanoseconds.
     pub fn newest_ns(&self) -> Option<i64> {
         self.track.newest_ns()
@@ -190,6 +199,17 @@ mod tests {
             assert_eq!(outcome, PushOutcome::Accepted);
         }
         buffer
+    }
+
+    #[test]
+    fn poses_between_two_times_exclude_both() {
+        let buffer = filled(&[0, 10, 20, 30]);
+        let between = |after, before| -> Vec<i64> {
+            buffer.between(after, before).map(|p| p.stamp_ns).collect()
+        };
+        assert_eq!(between(0, 30), [10, 20]);
+        assert_eq!(between(-5, 11), [0, 10]);
+        assert_eq!(between(30, 5), []);
     }
 
     #[test]

@@ -92,6 +92,17 @@ impl Track {
         Ok(interpolate(before, after, fraction))
     }
 
+    /// Samples after one time and before another, in order.
+    pub fn between(
+        &self,
+        after_ns: i64,
+        before_ns: i64,
+    ) -> impl Iterator<Item = &(i64, Isometry3<f64>)> {
+        let first = self.samples.partition_point(|s| s.0 <= after_ns);
+        let samples = self.samples.iter().skip(first);
+        samples.take_while(move |s| s.0 < before_ns)
+    }
+
     pub fn validate(&self, max_samples: usize) -> Result<(), String> {
         if self.samples.len() > max_samples {
             return Err(format!(

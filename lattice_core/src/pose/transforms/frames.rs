@@ -88,6 +88,20 @@ impl Frames {
         claim.map(|claim| &claim.link)
     }
 
+    /// The uppermost frame that a frame hangs below by static transforms alone; itself if by none.
+    pub fn static_root(&self, id: usize) -> usize {
+        let parent = |id: usize| {
+            let frame = self.frames.get(id)?;
+            let mut claims = frame.claims.iter();
+            let claim = claims.find(|claim| matches!(claim.link, Link::Static(_)))?;
+            Some(claim.parent)
+        };
+        // A loop of static transforms ends at the bound.
+        (0..self.frames.len())
+            .try_fold(id, |id, _| parent(id).ok_or(id))
+            .unwrap_or_else(|root| root)
+    }
+
     /// The shortest way from one frame to another by way of a common ancestor.
     pub fn path(&self, target: usize, source: usize) -> Option<Path> {
         Path::find(target, source, |id| self.parents(id))

@@ -178,6 +178,13 @@ impl TransformBuffer {
         self.frames.find(bare(frame)).is_some()
     }
 
+    /// Name of the uppermost frame that a frame hangs below by static transforms alone: the base of the
+    /// machine that carries a sensor. The frame itself if it hangs below none, `None` if it is unknown.
+    pub fn static_root(&self, frame: &str) -> Option<&str> {
+        let id = self.frames.find(bare(frame))?;
+        Some(self.frames.name(self.frames.static_root(id)))
+    }
+
     /// Number of frames.
     pub fn len(&self) -> usize {
         self.frames.len()

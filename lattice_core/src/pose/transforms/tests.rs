@@ -296,3 +296,18 @@ fn a_static_transform_can_be_corrected() {
         .unwrap();
     assert_eq!(tf.lookup("base_link", "mount", 0), Ok(shift(0.0, 0.0, 3.0)));
 }
+
+#[test]
+fn the_static_root_of_a_sensor_is_the_frame_that_carries_it() {
+    let mut tf = machine();
+    assert_eq!(tf.static_root("laser"), Some("turntable"));
+    assert_eq!(tf.static_root("/mount"), Some("base_link"));
+    assert_eq!(tf.static_root("base_link"), Some("base_link"));
+    assert_eq!(tf.static_root("nowhere"), None);
+    // A loop of static transforms has no root, and ends.
+    for (parent, child) in [("a", "b"), ("b", "c"), ("c", "a")] {
+        tf.insert(parent, child, 0, shift(0.0, 0.0, 0.0), true)
+            .unwrap();
+    }
+    assert!(tf.static_root("a").is_some());
+}
