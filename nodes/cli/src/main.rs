@@ -143,6 +143,7 @@ fn init_logging() {
     // A second command in one process (tests) keeps the first logger.
     let _ = env_logger::Builder::from_env(env)
         .format_timestamp(None)
+        .format_target(false)
         // Says what it could not send while it meets other processes.
         .filter_module("rustdds", log::LevelFilter::Error)
         // Prints an error at every end, of a socket that leaves a group of which it is no member.

@@ -88,7 +88,9 @@ fn show(path: &Path, address: SocketAddr) -> CliResult {
     #[cfg(feature = "bags")]
     let path = match kind(path) {
         Kind::Log => {
-            crate::replay::Replay::of_log(path, &mapped).replay()?;
+            crate::replay::Replay::of_log(path, &mapped)
+                .replay()?
+                .check()?;
             &mapped
         }
         _ => path,

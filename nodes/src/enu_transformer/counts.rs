@@ -4,6 +4,8 @@ use std::collections::BTreeMap;
 
 use serde::{Deserialize, Serialize};
 
+use super::{Refusal, most_frequent};
+
 /// Counters of one transformer. Every cloud ends in exactly one of the `clouds_` counters
 /// other than `clouds_in`, or still waits.
 #[derive(Clone, Debug, Default, PartialEq, Eq, Serialize, Deserialize)]
@@ -42,6 +44,9 @@ pub struct TransformerCounts {
     pub poses_invalid: u64,
     /// Poses refused: the INS says that its solution is not good.
     pub poses_not_good: u64,
+    /// Poses refused: the transform of their frame, or of the frame that they are in, is not published.
+    #[serde(default)]
+    pub poses_no_transform: u64,
     /// Poses refused: not newer than the pose before.
     pub poses_out_of_order: u64,
     /// Poses refused: of another time than those before, unless several in a row agree on it.
@@ -66,9 +71,48 @@ pub struct TransformerReport {
     pub undecodable: u64,
     /// Clouds that could not be given to the publisher.
     pub clouds_not_published: u64,
+    /// Messages refused, by topic and reason, with value and remedy.
+    #[serde(default)]
+    pub refusals: Vec<Refusal>,
+}
+
+impl TransformerCounts {
+    /// Poses refused, for whichever reason.
+    pub fn poses_refused(&self) -> u64 {
+        self.poses_invalid
+            + self.poses_not_good
+            + self.poses_no_transform
+            + self.poses_out_of_order
+            + self.poses_stamp_jump
+    }
 }
 
 impl TransformerReport {
+    /// Cause, in one line, of a map that stays empty; `None` while clouds come out.
+    pub fn cause_of_nothing(&self) -> Option<String> {
+        let counts = &self.counts;
+        if counts.clouds_out > 0 {
+            return None;
+        }
+        let (poses, refused) = (counts.poses_in, counts.poses_refused());
+        let text = |reason: &str| {
+            let refusal = most_frequent(&self.refusals, reason);
+            refusal.map(|refusal| format!("{}: {}", refusal.topic, refusal.text))
+        };
+        let all = poses + refused;
+        Some(
+            match (text("poses_"), text("clouds_").or(text("undecodable"))) {
+                (Some(text), _) if refused > poses => {
+                    format!("{poses} of {all} poses usable: {text}")
+                }
+                (_, Some(text)) => format!("0 of {} clouds usable: {text}", counts.clouds_in),
+                _ if counts.clouds_in == 0 => "no cloud came".to_owned(),
+                _ if poses == 0 => "no pose came".to_owned(),
+                _ => "all clouds wait for poses that cover them".to_owned(),
+            },
+        )
+    }
+
     /// Clouds lost by reason, zeros left out.
     pub fn dropped(&self) -> BTreeMap<String, u64> {
         let counts = &self.counts;

@@ -1,23 +1,21 @@
 //! From the messages of an INS to poses of the machine in the map.
 
-use std::collections::VecDeque;
 use std::fmt;
 use std::str::FromStr;
+use std::sync::Arc;
 
 use lattice_core::geodesy::{EnuFrame, Geodetic, InsMount, enu_from_flu, utc_ns_from_gps};
-use lattice_core::pose::{PoseBuffer, PoseBufferOptions, PoseMiss, PushOutcome, StampedPose};
 use lattice_msgs::RosMessage;
-use lattice_msgs::geometry_msgs::PoseStamped;
+use lattice_msgs::geometry_msgs::{Pose, PoseStamped, PoseWithCovarianceStamped};
 use lattice_msgs::nav_msgs::Odometry;
 use lattice_msgs::novatel_oem7_msgs::{INSPVA, INSPVAX, InertialSolutionStatus, Oem7Header};
 use lattice_msgs::sensor_msgs::{Imu, NavSatFix, NavSatStatus};
 use lattice_msgs::std_msgs::Header;
 use nalgebra::{Isometry3, Translation3, UnitQuaternion};
+use thiserror::Error;
 
+use super::fixes::{Attitude, Fix, FixPairing};
 use crate::convert::geometry;
-
-/// Most fixes that wait for the attitude at their stamp.
-const MAX_WAITING_FIXES: usize = 64;
 
 /// Messages that carry the pose of the machine.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
@@ -28,21 +26,24 @@ pub enum InsSource {
     Inspvax,
     /// `sensor_msgs/NavSatFix` with `sensor_msgs/Imu`: geodetic, paired by stamp.
     NavsatfixImu,
-    /// `nav_msgs/Odometry`, in the map frame.
+    /// `nav_msgs/Odometry`.
     Odometry,
-    /// `geometry_msgs/PoseStamped`, in the map frame.
+    /// `geometry_msgs/PoseStamped`.
     Pose,
+    /// `geometry_msgs/PoseWithCovarianceStamped`, as AMCL and NDT publish it.
+    PoseWithCovariance,
     /// Transforms of `/tf` from the map to the machine, by way of any frames.
     Tf,
 }
 
 impl InsSource {
-    const ALL: [(Self, &'static str); 6] = [
+    const ALL: [(Self, &'static str); 7] = [
         (Self::Inspva, "inspva"),
         (Self::Inspvax, "inspvax"),
         (Self::NavsatfixImu, "navsatfix_imu"),
         (Self::Odometry, "odometry"),
         (Self::Pose, "pose"),
+        (Self::PoseWithCovariance, "pose_with_covariance"),
         (Self::Tf, "tf"),
     ];
 
@@ -54,6 +55,7 @@ impl InsSource {
             Self::NavsatfixImu => &[NavSatFix::TYPE, Imu::TYPE],
             Self::Odometry => &[Odometry::TYPE],
             Self::Pose => &[PoseStamped::TYPE],
+            Self::PoseWithCovariance => &[PoseWithCovarianceStamped::TYPE],
             Self::Tf => &[],
         }
     }
@@ -107,14 +109,17 @@ pub struct InsOptions {
     pub leap_seconds: i32,
     /// Height of INSPVAX.
     pub inspvax_height: HeightDatum,
-    /// Place of the INS on the machine.
-    pub mount: InsMount,
-    /// Frame of the machine: odometry of this frame needs no lever arm.
+    /// Place of the INS on the machine; `None`: the mount of its frame on tf.
+    pub mount: Option<InsMount>,
+    /// Frame of the machine: odometry of this frame needs no mount.
     pub base_frame: String,
     /// Origin of the map; `None`: the first good fix.
     pub origin: Option<Geodetic>,
     /// Longest gap between two attitudes that a fix may fall into, in s.
     pub max_imu_gap_s: f64,
+    /// Longest gap between two fixes over which positions are interpolated at the stamps of the
+    /// attitudes, in s.
+    pub max_fix_gap_s: f64,
 }
 
 /// One message of an INS.
@@ -128,43 +133,93 @@ pub enum InsMessage<'a> {
     Fix(&'a NavSatFix),
     /// Attitude.
     Imu(&'a Imu),
-    /// Pose in the map frame.
+    /// Pose of its `child_frame_id` in the frame of its header.
     Odometry(&'a Odometry),
-    /// Pose in the map frame.
+    /// Pose of the machine in the frame of its header.
     Pose(&'a PoseStamped),
+    /// Pose of the machine in the frame of its header.
+    PoseWithCovariance(&'a PoseWithCovarianceStamped),
+}
+
+/// Frame whose position or attitude a message gives.
+#[derive(Clone, Debug, PartialEq, Eq)]
+pub enum Body {
+    /// The machine: no mount applies.
+    Base,
+    /// An INS in this frame, without leading slash; empty where the message names none.
+    Ins(Arc<str>),
+}
+
+impl Body {
+    pub(super) fn ins(frame: &str) -> Self {
+        Self::Ins(frame.trim_start_matches('/').into())
+    }
+}
+
+/// A pose as messages give it: its mount and the place of its reference frame are still to be applied.
+#[derive(Clone, Debug)]
+pub struct BodyPose {
+    /// Nanoseconds since the Unix epoch.
+    pub stamp_ns: i64,
+    /// Frame that the pose is in, without leading slash; `None`: the map frame.
+    pub reference: Option<Arc<str>>,
+    /// `reference_from_body`: position of the first body, attitude of the second; metres.
+    pub pose: Isometry3<f64>,
+    /// Frame whose position it is.
+    pub position_of: Body,
+    /// Frame whose attitude it is.
+    pub attitude_of: Body,
 }
 
 /// Reason for which a message gave no pose.
-#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+#[derive(Clone, Debug, PartialEq, Error)]
+#[expect(missing_docs, reason = "the messages name the fields")]
 pub enum InsRefusal {
-    /// The INS says that its solution is not good, or has no fix.
-    NotGood,
-    /// Numbers without meaning, or no orientation.
-    Invalid,
+    /// The INS has no solution yet.
+    #[error(
+        "INS status is {status}, expected 3 (INS_SOLUTION_GOOD), 6 (INS_SOLUTION_FREE) or 7 (INS_ALIGNMENT_COMPLETE)"
+    )]
+    NoSolution { status: u32 },
+    /// The receiver has no position.
+    #[error("fix status is {status} (no fix), expected 0 or more")]
+    NoFix { status: i8 },
+    /// The Imu has no attitude.
+    #[error(
+        "orientation covariance is -1: the Imu has no orientation (REP 145); run an attitude filter such as imu_filter_madgwick, or choose another source of poses (`ins.source`)"
+    )]
+    NoOrientation,
+    /// Latitude, longitude or height.
+    #[error("{problem}")]
+    Place { problem: String },
+    /// Numbers of a pose.
+    #[error("position is not finite, or the quaternion is zero or not finite")]
+    Pose,
 }
 
-/// Turns messages of an INS into poses of `base_link` in the map.
+impl InsRefusal {
+    /// True if the INS itself says that its solution is not good; else numbers have no meaning.
+    pub fn is_by_status(&self) -> bool {
+        matches!(
+            self,
+            Self::NoSolution { .. } | Self::NoFix { .. } | Self::NoOrientation
+        )
+    }
+}
+
+/// Turns messages of an INS into poses of its frames.
 pub struct InsDecoder {
     options: InsOptions,
     frame: Option<EnuFrame>,
-    attitudes: PoseBuffer,
-    fixes: VecDeque<(i64, Geodetic)>,
+    pairing: FixPairing,
 }
 
 impl InsDecoder {
     /// A decoder that has seen nothing.
     pub fn new(options: InsOptions) -> Self {
-        let attitudes = PoseBuffer::new(PoseBufferOptions {
-            span_s: 2.0,
-            max_gap_s: options.max_imu_gap_s,
-            max_poses: 4096,
-            jump_back_s: 1.0,
-        });
         Self {
             frame: options.origin.map(EnuFrame::new),
+            pairing: FixPairing::new(options.max_imu_gap_s, options.max_fix_gap_s),
             options,
-            attitudes,
-            fixes: VecDeque::new(),
         }
     }
 
@@ -174,15 +229,13 @@ impl InsDecoder {
     }
 
     /// Poses that the message completes: mostly one, none for half a pair, several when an
-    /// attitude brings those of several fixes.
-    pub fn decode(&mut self, message: InsMessage) -> Result<Vec<StampedPose>, InsRefusal> {
+    /// attitude or a fix completes those before it.
+    pub fn decode(&mut self, message: InsMessage) -> Result<Vec<BodyPose>, InsRefusal> {
         match message {
             InsMessage::Inspva(m) => {
                 let place = geodetic(m.latitude, m.longitude, m.height)?;
-                good(&m.status)?;
                 let attitude = enu_from_flu(m.roll, m.pitch, m.azimuth);
-                let stamp_ns = self.novatel_stamp_ns(&m.header, &m.nov_header);
-                self.pose_at_place(stamp_ns, &place, &attitude)
+                self.novatel_pose(&m.header, &m.nov_header, &m.status, &place, &attitude)
             }
             InsMessage::Inspvax(m) => {
                 let undulation_m = match self.options.inspvax_height {
@@ -190,59 +243,47 @@ impl InsDecoder {
                     HeightDatum::Geoid => f64::from(m.undulation),
                 };
                 let place = geodetic(m.latitude, m.longitude, m.height + undulation_m)?;
-                good(&m.ins_status)?;
                 let attitude = enu_from_flu(m.roll, m.pitch, m.azimuth);
-                let stamp_ns = self.novatel_stamp_ns(&m.header, &m.nov_header);
-                self.pose_at_place(stamp_ns, &place, &attitude)
+                self.novatel_pose(&m.header, &m.nov_header, &m.ins_status, &place, &attitude)
             }
             InsMessage::Fix(m) => self.on_fix(m),
             InsMessage::Imu(m) => self.on_imu(m),
-            InsMessage::Odometry(m)
-                if m.child_frame_id.trim_start_matches('/') == self.options.base_frame =>
-            {
-                let pose = geometry::isometry_from_pose(&m.pose.pose);
-                Ok(vec![StampedPose {
-                    stamp_ns: m.header.stamp.to_ns(),
-                    map_from_base: pose.ok_or(InsRefusal::Invalid)?,
-                }])
+            InsMessage::Odometry(m) => {
+                let child = m.child_frame_id.trim_start_matches('/');
+                let body = match child == self.options.base_frame {
+                    true => Body::Base,
+                    false => Body::ins(child),
+                };
+                one(&m.header, &m.pose.pose, body)
             }
-            InsMessage::Odometry(m) => self.pose_in_map(&m.header, &m.pose.pose),
-            InsMessage::Pose(m) => self.pose_in_map(&m.header, &m.pose),
+            InsMessage::Pose(m) => one(&m.header, &m.pose, Body::ins("")),
+            InsMessage::PoseWithCovariance(m) => one(&m.header, &m.pose.pose, Body::ins("")),
         }
     }
 
-    fn pose_in_map(
-        &self,
-        header: &Header,
-        pose: &lattice_msgs::geometry_msgs::Pose,
-    ) -> Result<Vec<StampedPose>, InsRefusal> {
-        let map_from_ins = geometry::isometry_from_pose(pose).ok_or(InsRefusal::Invalid)?;
-        Ok(vec![self.stamped(header.stamp.to_ns(), &map_from_ins)])
-    }
-
-    fn pose_at_place(
+    fn novatel_pose(
         &mut self,
-        stamp_ns: i64,
+        header: &Header,
+        oem7: &Oem7Header,
+        status: &InertialSolutionStatus,
         place: &Geodetic,
         level_from_ins: &UnitQuaternion<f64>,
-    ) -> Result<Vec<StampedPose>, InsRefusal> {
+    ) -> Result<Vec<BodyPose>, InsRefusal> {
+        good(status)?;
         if !level_from_ins.coords.iter().all(|v| v.is_finite()) {
-            return Err(InsRefusal::Invalid);
+            return Err(InsRefusal::Pose);
         }
         let frame = *self.frame.get_or_insert_with(|| EnuFrame::new(*place));
         let position_m = frame.enu_from_geodetic(place);
         let rotation = frame.enu_from_local_level(place) * level_from_ins;
-        let map_from_ins = Isometry3::from_parts(Translation3::from(position_m), rotation);
-        Ok(vec![self.stamped(stamp_ns, &map_from_ins)])
-    }
-
-    fn stamped(&self, stamp_ns: i64, map_from_ins: &Isometry3<f64>) -> StampedPose {
-        let (position, rotation) = (&map_from_ins.translation, &map_from_ins.rotation);
-        let mount = &self.options.mount;
-        StampedPose {
-            stamp_ns,
-            map_from_base: mount.map_from_base(&position.vector, rotation),
-        }
+        let body = Body::ins(&header.frame_id);
+        Ok(vec![BodyPose {
+            stamp_ns: self.novatel_stamp_ns(header, oem7),
+            reference: None,
+            pose: Isometry3::from_parts(Translation3::from(position_m), rotation),
+            position_of: body.clone(),
+            attitude_of: body,
+        }])
     }
 
     fn novatel_stamp_ns(&self, header: &Header, oem7: &Oem7Header) -> i64 {
@@ -256,54 +297,52 @@ impl InsDecoder {
         }
     }
 
-    fn on_fix(&mut self, fix: &NavSatFix) -> Result<Vec<StampedPose>, InsRefusal> {
-        if fix.status.status < NavSatStatus::STATUS_FIX {
-            return Err(InsRefusal::NotGood);
+    fn on_fix(&mut self, fix: &NavSatFix) -> Result<Vec<BodyPose>, InsRefusal> {
+        let status = fix.status.status;
+        if status < NavSatStatus::STATUS_FIX {
+            return Err(InsRefusal::NoFix { status });
         }
         let place = geodetic(fix.latitude, fix.longitude, fix.altitude)?;
-        if self.fixes.len() >= MAX_WAITING_FIXES {
-            self.fixes.pop_front();
-        }
-        self.fixes.push_back((fix.header.stamp.to_ns(), place));
-        self.pair()
-    }
-
-    fn on_imu(&mut self, imu: &Imu) -> Result<Vec<StampedPose>, InsRefusal> {
-        // REP-145: minus one says that there is no orientation.
-        if imu.orientation_covariance[0] == -1.0 {
-            return Err(InsRefusal::NotGood);
-        }
-        let rotation = geometry::rotation_from(&imu.orientation).ok_or(InsRefusal::Invalid)?;
-        let outcome = self.attitudes.push(StampedPose {
-            stamp_ns: imu.header.stamp.to_ns(),
-            map_from_base: Isometry3::from_parts(Translation3::identity(), rotation),
+        self.pairing.push_fix(Fix {
+            stamp_ns: fix.header.stamp.to_ns(),
+            place,
+            antenna: Body::ins(&fix.header.frame_id),
         });
-        if outcome == PushOutcome::JumpedBack {
-            let newest_ns = imu.header.stamp.to_ns();
-            self.fixes.retain(|(stamp_ns, _)| *stamp_ns <= newest_ns);
-        }
-        self.pair()
+        Ok(self.pairing.poses(&mut self.frame))
     }
 
-    /// Poses of the fixes whose attitude is known by now, in order.
-    fn pair(&mut self) -> Result<Vec<StampedPose>, InsRefusal> {
-        let mut poses = Vec::new();
-        while let Some((stamp_ns, place)) = self.fixes.front().copied() {
-            match self.attitudes.at(stamp_ns) {
-                Ok(attitude) => {
-                    poses.extend(self.pose_at_place(stamp_ns, &place, &attitude.rotation)?);
-                }
-                Err(PoseMiss::Empty | PoseMiss::AfterEnd { .. }) => break,
-                Err(PoseMiss::BeforeStart { .. } | PoseMiss::Gap { .. }) => {}
-            }
-            self.fixes.pop_front();
+    fn on_imu(&mut self, imu: &Imu) -> Result<Vec<BodyPose>, InsRefusal> {
+        // REP 145: minus one says that there is no orientation.
+        if imu.orientation_covariance[0] == -1.0 {
+            return Err(InsRefusal::NoOrientation);
         }
-        Ok(poses)
+        let rotation = geometry::rotation_from(&imu.orientation).ok_or(InsRefusal::Pose)?;
+        self.pairing.push_attitude(Attitude {
+            stamp_ns: imu.header.stamp.to_ns(),
+            level_from_imu: rotation,
+            imu: Body::ins(&imu.header.frame_id),
+        });
+        Ok(self.pairing.poses(&mut self.frame))
     }
 }
 
+/// The pose of a body in the frame of a header.
+fn one(header: &Header, pose: &Pose, body: Body) -> Result<Vec<BodyPose>, InsRefusal> {
+    let reference = header.frame_id.trim_start_matches('/');
+    Ok(vec![BodyPose {
+        stamp_ns: header.stamp.to_ns(),
+        reference: (!reference.is_empty()).then(|| reference.into()),
+        pose: geometry::isometry_from_pose(pose).ok_or(InsRefusal::Pose)?,
+        position_of: body.clone(),
+        attitude_of: body,
+    }])
+}
+
 fn geodetic(latitude: f64, longitude: f64, height_m: f64) -> Result<Geodetic, InsRefusal> {
-    Geodetic::from_degrees(latitude, longitude, height_m).map_err(|_| InsRefusal::Invalid)
+    let place = Geodetic::from_degrees(latitude, longitude, height_m);
+    place.map_err(|error| InsRefusal::Place {
+        problem: error.to_string(),
+    })
 }
 
 fn good(status: &InertialSolutionStatus) -> Result<(), InsRefusal> {
@@ -311,6 +350,6 @@ fn good(status: &InertialSolutionStatus) -> Result<(), InsRefusal> {
         InertialSolutionStatus::INS_SOLUTION_GOOD
         | InertialSolutionStatus::INS_SOLUTION_FREE
         | InertialSolutionStatus::INS_ALIGNMENT_COMPLETE => Ok(()),
-        _ => Err(InsRefusal::NotGood),
+        status => Err(InsRefusal::NoSolution { status }),
     }
 }

@@ -3,22 +3,28 @@
 //! [`EnuTransformer`] is a state machine without I/O; [`node`] runs it behind DDS.
 
 mod counts;
+mod drops;
+mod fixes;
 pub mod ins;
 pub mod node;
 mod options;
 mod parameters;
+mod pose_frames;
+mod refusals;
 mod transforms;
 mod waiting;
 
 pub use counts::{TransformerCounts, TransformerReport};
 pub use options::TransformerOptions;
 pub use parameters::declare;
+pub use refusals::{Refusal, Refusals, most_frequent};
 
+use std::collections::VecDeque;
 use std::sync::Arc;
 
 use lattice_core::cloud::{CloudLimits, RangeLimits, transform_points};
 use lattice_core::pose::{
-    PoseBuffer, PoseBufferOptions, PoseMiss, PushOutcome, StampedPose, TfMiss, TransformBuffer,
+    PoseBuffer, PoseBufferOptions, PoseMiss, StampedPose, TfMiss, TransformBuffer,
     TransformBufferOptions,
 };
 use lattice_msgs::builtin_interfaces::Time;
@@ -27,7 +33,9 @@ use lattice_msgs::geometry_msgs::TransformStamped;
 use lattice_msgs::sensor_msgs::PointCloud2;
 use nalgebra::{Isometry3, Vector3};
 
-use self::ins::{InsDecoder, InsMessage, InsRefusal, InsSource};
+use self::drops::Drop;
+use self::ins::{InsDecoder, InsMessage, InsSource};
+use self::pose_frames::{Reference, WaitingPose};
 use self::waiting::{Waiting, WaitingCloud};
 use crate::convert::{cloud, viewpoint};
 use crate::stamps::StampGate;
@@ -50,17 +58,6 @@ pub enum EnuOutput {
     Origin(GeoPointStamped),
 }
 
-/// Reason for which a cloud was dropped.
-#[derive(Clone, Copy, Debug, PartialEq, Eq)]
-enum Drop {
-    Malformed,
-    BeforePoses,
-    PoseGap,
-    PoseLate,
-    NoMount,
-    TimeJump,
-}
-
 /// Treatment of a cloud at this time.
 enum Verdict {
     Transform,
@@ -80,11 +77,17 @@ pub struct EnuTransformer {
     stamps: StampGate,
     mounts: TransformBuffer,
     waiting: Waiting,
+    waiting_poses: VecDeque<WaitingPose>,
+    reference: Reference,
+    /// Frame that poses are in, where it is not the map frame.
+    pose_frame: Option<Arc<str>>,
+    has_warned_reference: bool,
     announced: bool,
     /// Stamp of the newest `map` -> `odom_frame`.
     odom_ns: Option<i64>,
     last_now_ns: Option<i64>,
     counts: TransformerCounts,
+    refusals: Refusals,
 }
 
 impl EnuTransformer {
@@ -111,10 +114,15 @@ impl EnuTransformer {
             stamps: StampGate::new(CLOCK_JUMP_NS, span_ns.max(CLOCK_JUMP_NS), AGREEING_POSES),
             mounts,
             waiting: Waiting::new(options.max_waiting_clouds, options.max_waiting_bytes),
+            waiting_poses: VecDeque::new(),
+            reference: Reference::Unknown,
+            pose_frame: None,
+            has_warned_reference: false,
             announced: false,
             odom_ns: None,
             last_now_ns: None,
             counts: TransformerCounts::default(),
+            refusals: Refusals::default(),
             options,
         }
     }
@@ -126,41 +134,58 @@ impl EnuTransformer {
         self.options = options;
     }
 
-    /// Takes a message of the INS.
-    pub fn on_ins(&mut self, message: InsMessage, now_ns: i64) -> Vec<EnuOutput> {
+    /// Takes a message of the INS on a topic.
+    pub fn on_ins(&mut self, topic: &str, message: InsMessage, now_ns: i64) -> Vec<EnuOutput> {
         let mut out = Vec::new();
         self.advance(now_ns);
         match self.ins.decode(message) {
             Ok(poses) => {
                 for pose in poses {
-                    self.on_pose(pose, &mut out);
+                    self.on_body_pose(topic, pose, now_ns, &mut out);
                 }
             }
-            Err(InsRefusal::NotGood) => self.counts.poses_not_good += 1,
-            Err(InsRefusal::Invalid) => self.counts.poses_invalid += 1,
+            Err(refusal) => {
+                let (counter, reason) = match refusal.is_by_status() {
+                    true => (&mut self.counts.poses_not_good, "poses_not_good"),
+                    false => (&mut self.counts.poses_invalid, "poses_invalid"),
+                };
+                *counter += 1;
+                self.refusals.add(topic, reason, || refusal.to_string());
+            }
         }
         self.announce_origin(&mut out);
         self.serve(now_ns, &mut out);
         out
     }
 
-    /// Takes a cloud of a sensor; it comes out at once or when its poses have come.
-    pub fn on_cloud(&mut self, message: Arc<PointCloud2>, now_ns: i64) -> Vec<EnuOutput> {
+    /// Takes a cloud of a sensor on a topic; it comes out at once or when its poses have come.
+    pub fn on_cloud(
+        &mut self,
+        topic: &str,
+        message: Arc<PointCloud2>,
+        now_ns: i64,
+    ) -> Vec<EnuOutput> {
         let mut out = Vec::new();
         self.advance(now_ns);
         self.counts.clouds_in += 1;
-        match WaitingCloud::new(message, now_ns, &self.options) {
+        match WaitingCloud::new(topic, message, now_ns, &self.options) {
             Ok(cloud) => {
                 self.mounts.keep(&cloud.frame);
-                self.counts.clouds_queue_full += self.waiting.push(cloud);
+                let gone = self.waiting.push(cloud);
+                for cloud in gone {
+                    self.drop_cloud(&cloud.topic, &Drop::QueueFull);
+                }
                 self.serve(now_ns, &mut out);
             }
-            Err(error) => {
-                log::debug!("cloud dropped: {error}");
-                self.drop_cloud(Drop::Malformed);
-            }
+            Err(error) => self.drop_cloud(topic, &Drop::Malformed(error)),
         }
         out
+    }
+
+    /// Counts a message of a topic that did not decode.
+    pub fn on_undecodable(&mut self, topic: &str, error: &dyn std::fmt::Display) {
+        self.refusals
+            .add(topic, "undecodable", || format!("does not decode: {error}"));
     }
 
     /// Lets clouds that have waited too long go. To be called now and then.
@@ -173,9 +198,19 @@ impl EnuTransformer {
 
     /// Ends the input: what still waits is counted as having come too early.
     pub fn finish(&mut self) {
-        while self.waiting.take(0).is_some() {
-            self.drop_cloud(Drop::PoseLate);
+        self.refuse_waiting_poses();
+        while let Some(cloud) = self.waiting.take(0) {
+            let reason = match self.verdict(&cloud, i64::MAX) {
+                Verdict::Drop(reason) => reason,
+                Verdict::Transform | Verdict::Wait => Drop::PoseLate(None),
+            };
+            self.drop_cloud(&cloud.topic, &reason);
         }
+    }
+
+    /// Messages refused, by topic and reason.
+    pub fn refusals(&self) -> &Refusals {
+        &self.refusals
     }
 
     /// Counters of clouds, points and poses, by reason.
@@ -198,38 +233,12 @@ impl EnuTransformer {
         })
     }
 
-    fn on_pose(&mut self, mut pose: StampedPose, out: &mut Vec<EnuOutput>) {
-        if let Some(correction) = &self.options.correction {
-            pose.map_from_base = correction * pose.map_from_base;
-        }
-        if !self.stamps.passes(pose.stamp_ns) {
-            self.counts.poses_stamp_jump += 1;
-            return;
-        }
-        match self.poses.push(pose) {
-            PushOutcome::Accepted => self.counts.poses_in += 1,
-            PushOutcome::JumpedBack => {
-                self.counts.poses_in += 1;
-                self.on_time_jump(pose.stamp_ns);
-            }
-            PushOutcome::OutOfOrder => {
-                self.counts.poses_out_of_order += 1;
-                return;
-            }
-            PushOutcome::NotFinite => {
-                self.counts.poses_invalid += 1;
-                return;
-            }
-        }
-        self.announce_pose(&pose, out);
-    }
-
     /// Notices a receiving clock that jumped back.
     fn advance(&mut self, now_ns: i64) {
         let last_ns = self.last_now_ns.replace(now_ns).unwrap_or(now_ns);
         if now_ns < last_ns.saturating_sub(CLOCK_JUMP_NS) {
-            while self.waiting.take(0).is_some() {
-                self.drop_cloud(Drop::TimeJump);
+            while let Some(cloud) = self.waiting.take(0) {
+                self.drop_cloud(&cloud.topic, &Drop::TimeJump);
             }
         }
     }
@@ -243,8 +252,9 @@ impl EnuTransformer {
         let mut i = 0;
         while let Some(cloud) = self.waiting.get(i) {
             if cloud.last_ns > after {
-                self.waiting.take(i);
-                self.drop_cloud(Drop::TimeJump);
+                if let Some(cloud) = self.waiting.take(i) {
+                    self.drop_cloud(&cloud.topic, &Drop::TimeJump);
+                }
             } else {
                 i += 1;
             }
@@ -253,13 +263,15 @@ impl EnuTransformer {
 
     /// Transforms what can be transformed by now, in the order of arrival.
     fn serve(&mut self, now_ns: i64, out: &mut Vec<EnuOutput>) {
+        self.settle_poses(now_ns, out);
         let mut i = 0;
         while let Some(cloud) = self.waiting.get(i) {
             match self.verdict(cloud, now_ns) {
                 Verdict::Wait => i += 1,
                 Verdict::Drop(reason) => {
-                    self.waiting.take(i);
-                    self.drop_cloud(reason);
+                    if let Some(cloud) = self.waiting.take(i) {
+                        self.drop_cloud(&cloud.topic, &reason);
+                    }
                 }
                 Verdict::Transform => {
                     if let Some(cloud) = self.waiting.take(i) {
@@ -268,7 +280,7 @@ impl EnuTransformer {
                                 self.counts.clouds_out += 1;
                                 out.push(EnuOutput::Points(Arc::new(points)));
                             }
-                            Err(reason) => self.drop_cloud(reason),
+                            Err(reason) => self.drop_cloud(&cloud.topic, &reason),
                         }
                     }
                 }
@@ -279,7 +291,7 @@ impl EnuTransformer {
     fn verdict(&self, cloud: &WaitingCloud, now_ns: i64) -> Verdict {
         let wait = |reason| {
             let waited_s = now_ns.saturating_sub(cloud.arrived_ns) as f64 * 1e-9;
-            match waited_s > self.options.max_wait_s {
+            match waited_s > self.options.longest_wait_s() {
                 true => Verdict::Drop(reason),
                 false => Verdict::Wait,
             }
@@ -287,16 +299,20 @@ impl EnuTransformer {
         for stamp_ns in [cloud.first_ns, cloud.last_ns] {
             match self.map_from_base(stamp_ns) {
                 Ok(_) => {}
-                Err(PoseMiss::Empty | PoseMiss::AfterEnd { .. }) => return wait(Drop::PoseLate),
-                Err(PoseMiss::BeforeStart { .. }) => return Verdict::Drop(Drop::BeforePoses),
-                Err(PoseMiss::Gap { .. }) => return Verdict::Drop(Drop::PoseGap),
+                Err(miss @ (PoseMiss::Empty | PoseMiss::AfterEnd { .. })) => {
+                    return wait(Drop::PoseLate(Some(miss)));
+                }
+                Err(PoseMiss::BeforeStart { by_ns }) => {
+                    return Verdict::Drop(Drop::BeforePoses { by_ns });
+                }
+                Err(miss @ PoseMiss::Gap { .. }) => return Verdict::Drop(Drop::PoseGap(miss)),
             }
             match self.mount(&cloud.frame, stamp_ns) {
                 Ok(_) => {}
-                Err(TfMiss::TooOld { .. } | TfMiss::Gap { .. }) => {
-                    return Verdict::Drop(Drop::NoMount);
+                Err(miss @ (TfMiss::TooOld { .. } | TfMiss::Gap { .. })) => {
+                    return Verdict::Drop(Drop::no_mount(&cloud.frame, miss));
                 }
-                Err(_) => return wait(Drop::NoMount),
+                Err(miss) => return wait(Drop::no_mount(&cloud.frame, miss)),
             }
         }
         Verdict::Transform
@@ -310,11 +326,14 @@ impl EnuTransformer {
         };
         let view = layout
             .view(&message.data, &limits)
-            .map_err(|_| Drop::Malformed)?;
+            .map_err(Drop::Malformed)?;
         let map_from_sensor = |stamp_ns: i64| -> Result<Isometry3<f64>, Drop> {
-            let map_from_base = self.map_from_base(stamp_ns).map_err(|_| Drop::PoseGap)?;
+            if waiting.frame == self.options.map_frame {
+                return Ok(Isometry3::identity());
+            }
+            let map_from_base = self.map_from_base(stamp_ns).map_err(Drop::PoseGap)?;
             let mount = self.mount(&waiting.frame, stamp_ns);
-            Ok(map_from_base * mount.map_err(|_| Drop::NoMount)?)
+            Ok(map_from_base * mount.map_err(|miss| Drop::no_mount(&waiting.frame, miss))?)
         };
         let range = RangeLimits {
             min_range_m: self.options.min_range_m,
@@ -356,17 +375,5 @@ impl EnuTransformer {
         self.counts.points_out_of_range += moved.out_of_range as u64;
         self.counts.points_no_time += moved.no_time as u64;
         Ok(points)
-    }
-
-    fn drop_cloud(&mut self, reason: Drop) {
-        let counter = match reason {
-            Drop::Malformed => &mut self.counts.clouds_malformed,
-            Drop::BeforePoses => &mut self.counts.clouds_before_poses,
-            Drop::PoseGap => &mut self.counts.clouds_pose_gap,
-            Drop::PoseLate => &mut self.counts.clouds_pose_late,
-            Drop::NoMount => &mut self.counts.clouds_no_mount,
-            Drop::TimeJump => &mut self.counts.clouds_time_jump,
-        };
-        *counter += 1;
     }
 }

@@ -6,7 +6,7 @@ use std::time::Duration;
 
 use lattice_msgs::RosMessage;
 use lattice_msgs::geographic_msgs::GeoPointStamped;
-use lattice_msgs::geometry_msgs::PoseStamped;
+use lattice_msgs::geometry_msgs::{PoseStamped, PoseWithCovarianceStamped};
 use lattice_msgs::nav_msgs::Odometry;
 use lattice_msgs::novatel_oem7_msgs::{INSPVA, INSPVAX};
 use lattice_msgs::sensor_msgs::{Imu, NavSatFix, PointCloud2};
@@ -14,7 +14,7 @@ use lattice_msgs::tf2_msgs::TFMessage;
 
 use super::ins::{InsMessage, InsSource};
 use super::parameters::Settings;
-use super::{EnuOutput, EnuTransformer, TransformerOptions, TransformerReport};
+use super::{EnuOutput, EnuTransformer, TransformerOptions, TransformerReport, most_frequent};
 use crate::compute::{Compute, Inbox};
 use crate::convert::cloud;
 use crate::report;
@@ -28,7 +28,7 @@ use lattice_runtime::{
 
 /// Event for the compute thread.
 enum Event {
-    Cloud(Arc<PointCloud2>),
+    Cloud(Arc<str>, Arc<PointCloud2>),
     Transforms(Arc<TFMessage>, bool),
     Inspva(Arc<INSPVA>),
     Inspvax(Arc<INSPVAX>),
@@ -36,6 +36,7 @@ enum Event {
     Imu(Arc<Imu>),
     Odometry(Arc<Odometry>),
     Pose(Arc<PoseStamped>),
+    PoseWithCovariance(Arc<PoseWithCovarianceStamped>),
     Tick,
     Settings(Box<TransformerOptions>),
     Finish,
@@ -46,6 +47,7 @@ pub fn start(runtime: &Runtime, name: &str) -> Result<Finish, NodeError> {
     let node = runtime.node(name)?;
     let params = node.params();
     let settings = Settings::from_params(params)?;
+    let taken = settings.taken();
     let source = settings.transformer.ins.source;
     let [lost, lost_poses] = [(); 2].map(|()| Arc::new(AtomicU64::new(0)));
     let (lost_clouds, losses) = (Losses::default(), Losses::default());
@@ -58,6 +60,10 @@ pub fn start(runtime: &Runtime, name: &str) -> Result<Finish, NodeError> {
         diagnostics: node.diagnostics(),
         lost: Arc::clone(&lost),
         lost_poses: Arc::clone(&lost_poses),
+        topics: InsTopics {
+            ins: settings.ins_topic.clone(),
+            imu: settings.imu_topic.clone(),
+        },
         report_file: settings.report_file,
     };
     let compute = Compute::spawn(
@@ -75,7 +81,9 @@ pub fn start(runtime: &Runtime, name: &str) -> Result<Finish, NodeError> {
     let (ins, imu) = (&settings.ins_topic, &settings.imu_topic);
     let mut inputs = poses.subscribe_ins(&node, source, ins, imu)?;
     for topic in settings.points_topics {
-        let hand_over = inbox.counting(&lost, Event::Cloud, |cloud| cloud::bytes_of(cloud));
+        let name: Arc<str> = topic.as_str().into();
+        let event = move |cloud| Event::Cloud(Arc::clone(&name), cloud);
+        let hand_over = inbox.counting(&lost, event, |cloud| cloud::bytes_of(cloud));
         clouds.push(node.subscribe(&topic, Qos::SCANS, Load::Large, hand_over)?);
     }
     lost_clouds.watch(&clouds);
@@ -89,7 +97,7 @@ pub fn start(runtime: &Runtime, name: &str) -> Result<Finish, NodeError> {
         // A full inbox is busy enough to look at its queue anyway.
         let _ = ticks.send(Event::Tick, 0);
     });
-    log::info!("INS source {source}; azimuth 90 deg is yaw 0 (east)");
+    log::info!("{taken}");
     open_params(params, move |params| {
         let settings = Settings::from_params(params).map_err(|error| error.to_string())?;
         handed_over(inbox.send(Event::Settings(Box::new(settings.transformer)), 0))
@@ -121,6 +129,9 @@ impl PoseInbox {
             InsSource::Inspvax => self.subscribe(node, topic, Qos::INS, Event::Inspvax),
             InsSource::Odometry => self.subscribe(node, topic, Qos::INS, Event::Odometry),
             InsSource::Pose => self.subscribe(node, topic, Qos::INS, Event::Pose),
+            InsSource::PoseWithCovariance => {
+                self.subscribe(node, topic, Qos::INS, Event::PoseWithCovariance)
+            }
             InsSource::NavsatfixImu => {
                 let fix = self.subscribe(node, topic, Qos::INS, Event::Fix)?;
                 let imu = self.subscribe(node, imu, Qos::INS, Event::Imu)?;
@@ -171,6 +182,12 @@ impl Outputs {
     }
 }
 
+/// Topics of the INS, for the texts of refusals.
+struct InsTopics {
+    ins: String,
+    imu: String,
+}
+
 /// State of the compute thread.
 struct Shell {
     machine: EnuTransformer,
@@ -184,6 +201,7 @@ struct Shell {
     losses: Losses,
     /// Poses and transforms that found the inbox full.
     lost_poses: Arc<AtomicU64>,
+    topics: InsTopics,
     report_file: String,
 }
 
@@ -191,15 +209,18 @@ impl Shell {
     fn on(&mut self, event: Event) {
         let now_ns = self.clock.now_ns();
         let machine = &mut self.machine;
+        let topics = &self.topics;
+        let mut ins = |topic: &str, message| machine.on_ins(topic, message, now_ns);
         let outputs = match event {
-            Event::Cloud(cloud) => machine.on_cloud(cloud, now_ns),
+            Event::Cloud(topic, cloud) => machine.on_cloud(&topic, cloud, now_ns),
             Event::Transforms(m, is_static) => machine.on_tf(&m, is_static, now_ns),
-            Event::Inspva(m) => machine.on_ins(InsMessage::Inspva(&m), now_ns),
-            Event::Inspvax(m) => machine.on_ins(InsMessage::Inspvax(&m), now_ns),
-            Event::Fix(m) => machine.on_ins(InsMessage::Fix(&m), now_ns),
-            Event::Imu(m) => machine.on_ins(InsMessage::Imu(&m), now_ns),
-            Event::Odometry(m) => machine.on_ins(InsMessage::Odometry(&m), now_ns),
-            Event::Pose(m) => machine.on_ins(InsMessage::Pose(&m), now_ns),
+            Event::Inspva(m) => ins(&topics.ins, InsMessage::Inspva(&m)),
+            Event::Inspvax(m) => ins(&topics.ins, InsMessage::Inspvax(&m)),
+            Event::Fix(m) => ins(&topics.ins, InsMessage::Fix(&m)),
+            Event::Imu(m) => ins(&topics.imu, InsMessage::Imu(&m)),
+            Event::Odometry(m) => ins(&topics.ins, InsMessage::Odometry(&m)),
+            Event::Pose(m) => ins(&topics.ins, InsMessage::Pose(&m)),
+            Event::PoseWithCovariance(m) => ins(&topics.ins, InsMessage::PoseWithCovariance(&m)),
             Event::Tick => {
                 let outputs = machine.tick(now_ns);
                 self.diagnose();
@@ -238,21 +259,23 @@ impl Shell {
             poses_inbox_full: self.lost_poses.load(Ordering::Relaxed),
             undecodable: self.losses.undecodable(),
             clouds_not_published: self.outputs.points.dropped(),
+            refusals: self.machine.refusals().all().to_vec(),
         }
     }
 
     fn diagnose(&self) {
         let report = self.report();
-        let counts = &report.counts;
         let dropped = report.dropped();
-        let (level, message) = if counts.poses_in == 0 {
-            (Level::Warn, "no pose yet".to_owned())
-        } else if dropped.is_empty() {
-            (Level::Ok, "transforming".to_owned())
-        } else {
-            let reasons: Vec<String> = dropped.iter().map(|(r, n)| format!("{n} {r}")).collect();
-            let reasons = reasons.join(", ");
-            (Level::Warn, format!("clouds dropped: {reasons}"))
+        let dropped: Vec<String> = dropped.iter().map(|(r, n)| format!("{n} {r}")).collect();
+        let dropped = dropped.join(", ");
+        let (level, message) = match report.cause_of_nothing() {
+            Some(cause) => (Level::Warn, cause),
+            None if dropped.is_empty() => (Level::Ok, "transforming".to_owned()),
+            None => {
+                let text = most_frequent(&report.refusals, "clouds_");
+                let text = text.map_or(String::new(), |r| format!("; {}: {}", r.topic, r.text));
+                (Level::Warn, format!("clouds dropped: {dropped}{text}"))
+            }
         };
         let mut values = report::key_values(&report);
         values.push(("clouds_waiting".into(), self.machine.waiting().to_string()));

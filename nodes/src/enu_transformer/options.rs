@@ -71,10 +71,11 @@ impl TransformerOptions {
                 stamp: InsStamp::Gps,
                 leap_seconds: 18,
                 inspvax_height: HeightDatum::Geoid,
-                mount: InsMount::new(Vector3::zeros(), [0.0; 3]),
+                mount: None,
                 origin: None,
                 base_frame: "base_link".into(),
                 max_imu_gap_s: 0.1,
+                max_fix_gap_s: 1.5,
             },
             map_frame: "map".into(),
             base_frame: "base_link".into(),
@@ -95,6 +96,14 @@ impl TransformerOptions {
             pass_fields: LABEL_FIELDS.map(str::to_owned).into(),
             viewpoints: false,
             correction: None,
+        }
+    }
+
+    /// Longest wait of a cloud, s: positions between two fixes are known with the second.
+    pub(super) fn longest_wait_s(&self) -> f64 {
+        match self.ins.source {
+            InsSource::NavsatfixImu => self.max_wait_s + self.ins.max_fix_gap_s,
+            _ => self.max_wait_s,
         }
     }
 
@@ -166,18 +175,22 @@ fn ins_options(params: &Params, defaults: InsOptions) -> Result<InsOptions, Para
     let stamps = [("gps", InsStamp::Gps), ("header", InsStamp::Header)];
     let (geoid, ellipsoid) = (HeightDatum::Geoid, HeightDatum::Ellipsoid);
     let heights = [("geoid", geoid), ("ellipsoid", ellipsoid)];
+    let mount = InsMount::new(
+        Vector3::from(triple(params, "ins.lever_arm_m")?),
+        triple(params, "ins.boresight_rpy_rad")?,
+    );
+    let mount_is_given =
+        params.is_given("ins.lever_arm_m") || params.is_given("ins.boresight_rpy_rad");
     let leap_seconds = params.i64("ins.leap_seconds", i64::from(defaults.leap_seconds))?;
     Ok(InsOptions {
         stamp: one_of(params, "ins.stamp", &stamps)?,
         leap_seconds: i32::try_from(leap_seconds)
             .map_err(|_| params.invalid("ins.leap_seconds", "expected a small number, 18"))?,
         inspvax_height: one_of(params, "ins.inspvax_height", &heights)?,
-        mount: InsMount::new(
-            Vector3::from(triple(params, "ins.lever_arm_m")?),
-            triple(params, "ins.boresight_rpy_rad")?,
-        ),
+        mount: mount_is_given.then_some(mount),
         origin: is_fixed.then_some(place).transpose()?,
         max_imu_gap_s: not_negative(params, "ins.max_imu_gap_s", defaults.max_imu_gap_s)?,
+        max_fix_gap_s: params.f64_in("ins.max_fix_gap_s", defaults.max_fix_gap_s, 0.0..=60.0)?,
         ..defaults
     })
 }

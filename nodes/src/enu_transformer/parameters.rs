@@ -1,6 +1,7 @@
 //! All parameters of the transformer.
 
 use super::TransformerOptions;
+use super::ins::InsSource;
 use crate::compute::ComputeLimits;
 use crate::options::{self, FRAME, TOPIC};
 use crate::report;
@@ -9,15 +10,16 @@ use lattice_runtime::params::{About, ParamError, Params};
 
 const ABOUT: &[About] = about! {
     "points_topics" fixed(TOPIC): "Topics of the sensors' clouds (sensor_msgs/PointCloud2); any number.";
-    "ins.source" fixed(TOPIC): "inspva, inspvax, navsatfix_imu, odometry, pose, or tf: transforms from map_frame to base_frame that others publish.";
+    "ins.source" fixed(TOPIC): "inspva, inspvax, navsatfix_imu, odometry, pose, pose_with_covariance, or tf: transforms from map_frame to base_frame that others publish.";
     "ins.topic" fixed(TOPIC): "Topic of the INS; for navsatfix_imu that of the NavSatFix.";
     "ins.imu_topic" fixed(TOPIC): "Topic of the attitude, for navsatfix_imu.";
     "ins.stamp" fixed(POSES): "Stamp of NovAtel poses: gps (week and milliseconds of the log) or header (time of arrival).";
     "ins.leap_seconds" fixed(POSES): "GPS minus UTC, s.";
     "ins.inspvax_height" fixed(POSES): "What the height of INSPVAX is measured from: geoid (its undulation is added) or ellipsoid.";
-    "ins.lever_arm_m" fixed(POSES): "Reference point of the INS in base_link (x forward, y left, z up).";
-    "ins.boresight_rpy_rad" fixed(POSES): "Rotation of the INS in base_link: fixed-axis roll, pitch, yaw.";
+    "ins.lever_arm_m" fixed(POSES): "Reference point of the INS in base_frame (x forward, y left, z up). If this or the boresight is set, it holds in place of the mount of the INS on tf.";
+    "ins.boresight_rpy_rad" fixed(POSES): "Rotation of the INS in base_frame: fixed-axis roll, pitch, yaw.";
     "ins.max_imu_gap_s" fixed(POSES): "Longest gap between two attitudes that a fix may fall into (navsatfix_imu).";
+    "ins.max_fix_gap_s" fixed(POSES): "Longest gap between two fixes over which positions are interpolated, at the stamps of the attitudes (navsatfix_imu); clouds wait that much longer.";
     "origin.mode" fixed(POSES): "first_fix: the map frame begins where the first good fix is; fixed: at the place below.";
     "origin.latitude_deg" fixed(POSES): "Latitude of that place, WGS84.";
     "origin.longitude_deg" fixed(POSES): "Longitude of that place, WGS84.";
@@ -77,6 +79,26 @@ impl Settings {
             report_file: report::file(params)?,
             transformer,
         })
+    }
+}
+
+impl Settings {
+    /// Topics and frames, for the log.
+    pub(super) fn taken(&self) -> String {
+        let options = &self.transformer;
+        let (ins, imu) = (&self.ins_topic, &self.imu_topic);
+        let poses = match options.ins.source {
+            InsSource::Tf => "/tf".to_owned(),
+            InsSource::NavsatfixImu => format!("{ins} and {imu}"),
+            _ => ins.clone(),
+        };
+        format!(
+            "clouds: {}; poses: {poses}, as {}, of {} in {}; transforms: /tf, /tf_static",
+            self.points_topics.join(", "),
+            options.ins.source,
+            options.base_frame,
+            options.map_frame
+        )
     }
 }
 

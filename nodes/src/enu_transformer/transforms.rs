@@ -24,12 +24,23 @@ impl EnuTransformer {
             let pose = geometry::isometry_from_transform(&transform.transform);
             let insert = |pose| {
                 let inserted = self.mounts.insert(parent, child, stamp_ns, pose, is_static);
-                inserted.is_ok()
+                inserted.map(drop).map_err(|error| error.to_string())
             };
-            let refused = !pose.is_some_and(insert);
-            self.counts.transforms_refused += u64::from(refused);
-            self.counts.poses_in += u64::from(self.has_poses_of_tf() && !refused);
+            let unusable = || {
+                format!(
+                    "transform of '{child}' in '{parent}' is not finite, or its quaternion is zero"
+                )
+            };
+            match pose.ok_or_else(unusable).and_then(insert) {
+                Ok(()) => self.counts.poses_in += u64::from(self.has_poses_of_tf()),
+                Err(problem) => {
+                    self.counts.transforms_refused += 1;
+                    let topic = if is_static { "/tf_static" } else { "/tf" };
+                    self.refusals.add(topic, "transforms_refused", || problem);
+                }
+            }
         }
+        self.check_reference();
         self.announce_odom(&mut out);
         self.serve(now_ns, &mut out);
         out
@@ -110,8 +121,12 @@ impl EnuTransformer {
 
     /// True for a transform that this node publishes itself.
     fn is_own(&self, transform: &TransformStamped) -> bool {
+        let options = &self.options;
         let parent = transform.header.frame_id.trim_start_matches('/');
-        let is_published = parent == self.options.map_frame || parent == self.options.earth_frame;
+        let child = transform.child_frame_id.trim_start_matches('/');
+        let published = options.odom_frame.as_ref().unwrap_or(&options.base_frame);
+        let is_published = (parent == options.map_frame && child == published)
+            || (parent == options.earth_frame && child == options.map_frame);
         is_published && !self.has_poses_of_tf()
     }
 
@@ -137,9 +152,9 @@ impl EnuTransformer {
         })
     }
 
-    /// `base_from_sensor` at a stamp.
+    /// `base_from_sensor` at a stamp; for clouds in the map frame, which need none, the identity.
     pub(super) fn mount(&self, frame: &str, stamp_ns: i64) -> Result<Isometry3<f64>, TfMiss> {
-        if frame == self.options.base_frame {
+        if frame == self.options.base_frame || frame == self.options.map_frame {
             return Ok(Isometry3::identity());
         }
         self.mounts

@@ -11,6 +11,7 @@ use crate::convert::cloud;
 
 /// A cloud whose layout has been checked, with the time of each point.
 pub struct WaitingCloud {
+    pub topic: Arc<str>,
     pub message: Arc<PointCloud2>,
     /// Frame without a leading slash.
     pub frame: String,
@@ -26,6 +27,7 @@ pub struct WaitingCloud {
 
 impl WaitingCloud {
     pub fn new(
+        topic: &str,
         message: Arc<PointCloud2>,
         arrived_ns: i64,
         options: &TransformerOptions,
@@ -47,6 +49,7 @@ impl WaitingCloud {
         });
         let (first_ns, last_ns) = span.unwrap_or((stamp_ns, stamp_ns));
         Ok(Self {
+            topic: topic.into(),
             frame: message.header.frame_id.trim_start_matches('/').to_owned(),
             stamp_ns,
             times,
@@ -85,18 +88,17 @@ impl Waiting {
         self.max_clouds = max_clouds.max(1);
     }
 
-    /// Adds a cloud and says how many older ones had to go for it.
-    pub fn push(&mut self, cloud: WaitingCloud) -> u64 {
+    /// Adds a cloud and gives the older ones that have to go for it.
+    pub fn push(&mut self, cloud: WaitingCloud) -> Vec<WaitingCloud> {
         self.bytes += cloud.bytes();
         self.clouds.push_back(cloud);
-        let mut dropped = 0;
+        let mut gone = Vec::new();
         while self.clouds.len() > self.max_clouds
             || (self.bytes > self.max_bytes && self.clouds.len() > 1)
         {
-            self.take(0);
-            dropped += 1;
+            gone.extend(self.take(0));
         }
-        dropped
+        gone
     }
 
     pub fn get(&self, i: usize) -> Option<&WaitingCloud> {

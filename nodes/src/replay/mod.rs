@@ -2,11 +2,15 @@
 //!
 //! Messages pass in the order of the log, so the map depends on nothing else.
 
+mod plan;
+mod poses;
 mod report;
+mod survey;
 mod topics;
 
+pub use plan::{TopicPlan, TopicWishes, plan};
 pub use report::{LatticeReport, RunReport};
-pub use topics::{Role, TopicError, TopicPlan, TopicWishes, plan};
+pub use topics::{Role, TopicError};
 
 use std::sync::Arc;
 use std::time::Instant;
@@ -16,7 +20,7 @@ use lattice_core::raycast::FreeSpaceError;
 use lattice_msgs::RosMessage;
 use lattice_msgs::cdr::{self, CdrError};
 use lattice_msgs::geographic_msgs::GeoPoint;
-use lattice_msgs::geometry_msgs::PoseStamped;
+use lattice_msgs::geometry_msgs::{PoseStamped, PoseWithCovarianceStamped};
 use lattice_msgs::nav_msgs::Odometry;
 use lattice_msgs::novatel_oem7_msgs::{INSPVA, INSPVAX};
 use lattice_msgs::sensor_msgs::{Imu, NavSatFix};
@@ -72,13 +76,13 @@ impl Pipeline {
         })
     }
 
-    /// Passes one message of the log through all machines.
-    pub fn on_message(&mut self, role: Role, message: &BagMessage) {
-        match self.transform(role, message) {
+    /// Passes one message of a topic of the log through all machines.
+    pub fn on_message(&mut self, topic: &str, role: Role, message: &BagMessage) {
+        match self.transform(topic, role, message) {
             Ok(outputs) => self.map(outputs),
             Err(error) => {
                 self.undecodable += 1;
-                log::debug!("message at {} ns: {error}", message.log_time_ns);
+                self.transformer.on_undecodable(topic, &error);
             }
         }
         let now_ns = message.log_time_ns;
@@ -100,6 +104,7 @@ impl Pipeline {
             transformer: TransformerReport {
                 counts: self.transformer.counts().clone(),
                 undecodable: self.undecodable,
+                refusals: self.transformer.refusals().all().to_vec(),
                 ..TransformerReport::default()
             },
             lattices,
@@ -107,6 +112,7 @@ impl Pipeline {
                 .origin
                 .map(|at| [at.latitude, at.longitude, at.altitude]),
             implausible_rows: 0,
+            choices: Vec::new(),
             wall_s: 0.0,
         }
     }
@@ -121,13 +127,18 @@ impl Pipeline {
         self.transformer.newest_pose()
     }
 
-    fn transform(&mut self, role: Role, message: &BagMessage) -> Result<Vec<EnuOutput>, CdrError> {
+    fn transform(
+        &mut self,
+        topic: &str,
+        role: Role,
+        message: &BagMessage,
+    ) -> Result<Vec<EnuOutput>, CdrError> {
         let now_ns = message.log_time_ns;
         let data = &message.data;
         let machine = &mut self.transformer;
-        let mut ins = |message: InsMessage| machine.on_ins(message, now_ns);
+        let mut ins = |message: InsMessage| machine.on_ins(topic, message, now_ns);
         Ok(match role {
-            Role::Cloud => machine.on_cloud(Arc::new(cdr::from_slice(data)?), now_ns),
+            Role::Cloud => machine.on_cloud(topic, Arc::new(cdr::from_slice(data)?), now_ns),
             Role::Transforms(is_static) => {
                 machine.on_tf(&cdr::from_slice(data)?, is_static, now_ns)
             }
@@ -136,6 +147,9 @@ impl Pipeline {
             Role::Ins(NavSatFix::TYPE) => ins(InsMessage::Fix(&cdr::from_slice(data)?)),
             Role::Ins(Imu::TYPE) => ins(InsMessage::Imu(&cdr::from_slice(data)?)),
             Role::Ins(PoseStamped::TYPE) => ins(InsMessage::Pose(&cdr::from_slice(data)?)),
+            Role::Ins(PoseWithCovarianceStamped::TYPE) => {
+                ins(InsMessage::PoseWithCovariance(&cdr::from_slice(data)?))
+            }
             Role::Ins(Odometry::TYPE) => ins(InsMessage::Odometry(&cdr::from_slice(data)?)),
             Role::Ins(_) => Vec::new(),
         })
@@ -263,7 +277,9 @@ pub fn run(
             let behind = role == Some(Role::Cloud) && message.log_time_ns >= to_ns;
             if let Some(role) = role.filter(|_| !behind) {
                 clouds += u64::from(role == Role::Cloud);
-                pipeline.on_message(role, &message);
+                let topic = bag.topics().get(message.topic);
+                let topic = topic.map_or("", |topic| topic.name.as_str());
+                pipeline.on_message(topic, role, &message);
             }
             progress(message.log_time_ns.saturating_sub(start_ns) as f64 / span_ns);
         }
@@ -272,6 +288,7 @@ pub fn run(
         source: source.to_owned(),
         clouds_in_log: if whole { plan.clouds(bag) } else { clouds },
         implausible_rows: bag.implausible_rows(),
+        choices: plan.choices.clone(),
         wall_s: begin.elapsed().as_secs_f64(),
         ..pipeline.finish()
     })

@@ -3,8 +3,9 @@
 use std::fmt;
 
 use serde::{Deserialize, Serialize};
+use thiserror::Error;
 
-use crate::enu_transformer::TransformerReport;
+use crate::enu_transformer::{Refusal, TransformerReport};
 use crate::lattice_mapper::MapperReport;
 use crate::voxel_marker_publisher::MarkerReport;
 
@@ -15,6 +16,13 @@ pub struct LatticeReport {
     pub map: MapperReport,
     /// Its markers.
     pub markers: MarkerReport,
+}
+
+/// A run whose map stayed empty.
+#[derive(Debug, Error)]
+#[error("nothing was mapped: {cause}")]
+pub struct NothingMapped {
+    cause: String,
 }
 
 /// A whole run over a log.
@@ -34,11 +42,41 @@ pub struct RunReport {
     /// Rows of the log that are no messages and were left out.
     #[serde(default)]
     pub implausible_rows: u64,
+    /// Topics that were taken for clouds, poses and transforms, and those that were not, with the reason.
+    #[serde(default)]
+    pub choices: Vec<String>,
     /// Wall time.
     pub wall_s: f64,
 }
 
 impl RunReport {
+    /// Fails with the cause unless some cloud was mapped in every lattice.
+    pub fn check(&self) -> Result<(), NothingMapped> {
+        let is_empty = |report: &LatticeReport| report.map.voxels == 0;
+        if !self.lattices.iter().any(is_empty) {
+            return Ok(());
+        }
+        let counts = &self.transformer.counts;
+        let cause = match self.transformer.cause_of_nothing() {
+            Some(_) if self.clouds_in_log == 0 => {
+                "no cloud in the part of the log that was replayed".into()
+            }
+            Some(cause) => cause,
+            None if counts.points_in == 0 => {
+                format!("0 points in {} clouds", counts.clouds_out)
+            }
+            None if counts.points_out == 0 => format!(
+                "of {} points {} are not finite, {} out of range (`min_range_m`, `max_range_m`), {} without time",
+                counts.points_in,
+                counts.points_not_finite,
+                counts.points_out_of_range,
+                counts.points_no_time
+            ),
+            None => self.losses().join("; "),
+        };
+        Err(NothingMapped { cause })
+    }
+
     /// One line per loss, empty when nothing was lost.
     pub fn losses(&self) -> Vec<String> {
         let mut lines = Vec::new();
@@ -55,13 +93,19 @@ impl RunReport {
         for (reason, count) in self.transformer.dropped() {
             lines.push(format!("{count} of {} clouds: {reason}", counts.clouds_in));
         }
+        // With value and remedy.
+        for refusal in &self.transformer.refusals {
+            let Refusal {
+                topic,
+                reason,
+                count,
+                text,
+            } = refusal;
+            lines.push(format!("{count} on {topic} ({reason}): {text}"));
+        }
         if self.implausible_rows > 0 {
             let rows = self.implausible_rows;
             lines.push(format!("{rows} rows of the log are no messages"));
-        }
-        let jumped = counts.poses_stamp_jump;
-        if jumped > 0 {
-            lines.push(format!("{jumped} poses: of another time than those around"));
         }
         let poses = self.transformer.poses_inbox_full;
         if poses > 0 {
@@ -183,6 +227,7 @@ mod tests {
             }],
             origin: None,
             implausible_rows: 0,
+            choices: Vec::new(),
             wall_s: 1.0,
         };
         let counts = &mut report.transformer.counts;

@@ -71,9 +71,9 @@ pub fn cloud(bytes: &[u8]) {
         pose.child_frame_id = "base_link".into();
         pose.pose.pose.orientation.w = 1.0;
         pose.pose.pose.position.x = i as f64;
-        transformer.on_ins(InsMessage::Odometry(&pose), at_ns);
+        transformer.on_ins("ins", InsMessage::Odometry(&pose), at_ns);
     }
-    for output in transformer.on_cloud(Arc::new(message), stamp_ns) {
+    for output in transformer.on_cloud("points", Arc::new(message), stamp_ns) {
         if let EnuOutput::Points(points) = output {
             cloud_from_message(&points, &limits, &Vector3::zeros()).unwrap();
         }

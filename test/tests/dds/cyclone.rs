@@ -135,11 +135,11 @@ fn mapped_directly(clouds: &[PointCloud2]) -> Voxels {
     let mut mapper = LatticeMapper::new(MapperOptions::new(lattice), 1).unwrap();
     for i in 0..=CLOUDS[2] {
         let pose = odometry(stamp_ns(i), &map_from_base(i));
-        transformer.on_ins(InsMessage::Odometry(&pose), stamp_ns(i));
+        transformer.on_ins("ins", InsMessage::Odometry(&pose), stamp_ns(i));
         let Some(cloud) = CLOUDS.iter().position(|&at| at == i) else {
             continue;
         };
-        for output in transformer.on_cloud(Arc::new(clouds[cloud].clone()), stamp_ns(i)) {
+        for output in transformer.on_cloud("points", Arc::new(clouds[cloud].clone()), stamp_ns(i)) {
             if let EnuOutput::Points(points) = output {
                 mapper.on_cloud(&points).unwrap();
             }

@@ -108,7 +108,7 @@ fn the_sqlite3_log_is_the_first_three_scans() {
                 continue;
             }
         }
-        on_threads(1, || first.on_message(*role, &message));
+        on_threads(1, || first.on_message("topic", *role, &message));
     }
     on_threads(1, || first.finish());
     for (one, two) in pipeline.mappers().zip(first.mappers()) {
@@ -142,7 +142,7 @@ fn odometry_and_fix_with_imu_agree() {
         for message in reader.messages(&Default::default()).unwrap() {
             let message = message.unwrap();
             if let Some(role @ replay::Role::Ins(_)) = plan.roles.get(&message.topic) {
-                pipeline.on_message(*role, &message);
+                pipeline.on_message("topic", *role, &message);
                 track.extend(pipeline.newest_pose());
             }
         }

@@ -48,13 +48,16 @@ impl Machine {
         let pose = odometry(self.step * STEP_NS, &place);
         self.step += 1;
         let now_ns = pose.header.stamp.to_ns();
-        self.transformer.on_ins(InsMessage::Odometry(&pose), now_ns)
+        self.transformer
+            .on_ins("ins", InsMessage::Odometry(&pose), now_ns)
     }
 
     /// A cloud of the base frame, in the map.
     fn see(&mut self, message: PointCloud2) -> Arc<PointCloud2> {
         let now_ns = message.header.stamp.to_ns();
-        let mut outputs = self.transformer.on_cloud(Arc::new(message), now_ns);
+        let mut outputs = self
+            .transformer
+            .on_cloud("points", Arc::new(message), now_ns);
         outputs.extend(self.drive());
         let clouds = outputs.into_iter().filter_map(|output| match output {
             EnuOutput::Points(points) => Some(points),

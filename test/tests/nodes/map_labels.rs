@@ -180,7 +180,7 @@ fn the_transformer_passes_labels_of_the_points_it_keeps() {
     for step in 0..10 {
         let stamp_ns = start_ns + step * SECOND_NS / 100;
         let pose = odometry(stamp_ns, &Isometry3::translation(10.0, 0.0, 0.0));
-        transformer.on_ins(InsMessage::Odometry(&pose), stamp_ns);
+        transformer.on_ins("ins", InsMessage::Odometry(&pose), stamp_ns);
     }
     let points = [
         ([0.5, 0.0, 0.0], 1),
@@ -190,7 +190,7 @@ fn the_transformer_passes_labels_of_the_points_it_keeps() {
     ];
     let mut message = labelled_cloud("base_link", start_ns + SECOND_NS / 100, &points);
     message.fields.push(field("other", 12, 2));
-    let outputs = transformer.on_cloud(Arc::new(message), start_ns);
+    let outputs = transformer.on_cloud("points", Arc::new(message), start_ns);
     let Some(EnuOutput::Points(out)) = outputs.last() else {
         panic!("{outputs:?}");
     };

@@ -17,7 +17,7 @@ use lattice_nodes::enu_transformer::TransformerOptions;
 use lattice_nodes::enu_transformer::ins::InsSource;
 use lattice_nodes::files::whole;
 use lattice_nodes::lattice_mapper::MapperOptions;
-use lattice_nodes::replay::{self, Pipeline, RunReport, Slice, TopicWishes};
+use lattice_nodes::replay::{self, Pipeline, RunReport, Slice, TopicPlan, TopicWishes};
 use lattice_nodes::voxel_marker_publisher::MarkerOptions;
 use lattice_runtime::LoopbackDomain;
 use lattice_runtime::params::Params;
@@ -56,7 +56,8 @@ pub struct Replay {
     /// Cloud topics; found in the log if not given
     #[arg(long, value_name = "TOPIC")]
     pub points: Vec<String>,
-    /// INS source: inspva, inspvax, navsatfix_imu, odometry, pose; found in the log if not given
+    /// Source of poses: odometry, inspvax, inspva, navsatfix_imu, pose, pose_with_covariance, or tf (transforms
+    /// alone); found in the log, in this order, if not given
     #[arg(long)]
     pub ins: Option<InsSource>,
     /// Topic of the INS; found in the log if not given
@@ -110,10 +111,10 @@ impl Replay {
         } else {
             println!("{report}");
         }
-        Ok(())
+        Ok(report.check()?)
     }
 
-    /// Runs the replay and returns its report.
+    /// Runs the replay and returns its report, in which the map may be empty.
     pub fn replay(&self) -> CliResult<RunReport> {
         if self.direct {
             return self.replay_direct();
@@ -129,7 +130,7 @@ impl Replay {
             }
         }
         let bag = BagReader::open(&self.bag)?;
-        let plan = replay::plan(&bag, &self.wishes()?)?;
+        let plan = self.plan(&bag)?;
         let lattices: Vec<_> = self.maps()?.into_iter().map(|map| map.lattice).collect();
         // Apart from a robot on domain 0, and from other replays.
         let domain = match (std::env::var_os("ROS_DOMAIN_ID"), lattices.len()) {
@@ -154,11 +155,18 @@ impl Replay {
 
     fn replay_direct(&self) -> CliResult<RunReport> {
         let bag = BagReader::open(&self.bag)?;
-        let plan = replay::plan(&bag, &self.wishes()?)?;
+        let plan = self.plan(&bag)?;
         let mut transformer = TransformerOptions::from_params(&self.params_of("enu_transformer")?)?;
         transformer.ins.source = plan.source;
+        transformer.map_frame.clone_from(&plan.map_frame);
+        transformer.base_frame.clone_from(&plan.base_frame);
+        transformer.ins.base_frame.clone_from(&plan.base_frame);
+        let mut maps = self.maps()?;
+        for map in &mut maps {
+            map.map_frame.clone_from(&plan.map_frame);
+        }
         let markers = MarkerOptions::from_params(&self.params_of("voxel_marker_publisher")?)?;
-        let mut pipeline = Pipeline::new(transformer, self.maps()?, &markers)?;
+        let mut pipeline = Pipeline::new(transformer, maps, &markers)?;
         let pool = rayon::ThreadPoolBuilder::new()
             .num_threads(self.threads)
             .build()?;
@@ -176,6 +184,15 @@ impl Replay {
             self.add_to_tables(tables, &pipeline, &report)?;
         }
         Ok(report)
+    }
+
+    /// Chooses topics and frames, and says which.
+    fn plan(&self, bag: &BagReader) -> CliResult<TopicPlan> {
+        let plan = replay::plan(bag, &self.wishes()?)?;
+        for line in &plan.choices {
+            eprintln!("{line}");
+        }
+        Ok(plan)
     }
 
     /// Part of the log whose clouds are mapped.
@@ -242,10 +259,16 @@ impl Replay {
         };
         let ins = self.ins_topic.clone();
         let ins = ins.or(Some(topic).filter(|topic| !topic.is_empty()));
+        let frame = |name| -> CliResult<Option<String>> {
+            let frame = params.string(name, "")?.trim_start_matches('/').to_owned();
+            Ok((!frame.is_empty()).then_some(frame))
+        };
         Ok(TopicWishes {
             points,
             source,
             ins,
+            map_frame: frame("map_frame")?,
+            base_frame: frame("base_frame")?,
         })
     }
 

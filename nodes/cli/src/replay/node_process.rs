@@ -64,6 +64,9 @@ impl NodeProcess {
                 command.args(["-r", &format!("{shared}:=/{shared}")]);
             }
         }
+        for remap in replay.remaps() {
+            command.args(["-r", &remap]);
+        }
         // The first of several writes the report.
         let first = nodes.first().copied().unwrap_or_default();
         let report_file = param(&format!("{first}:report_file"), &yaml_text(report));

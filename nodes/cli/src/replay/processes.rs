@@ -72,6 +72,7 @@ pub fn run(replay: &DdsReplay) -> CliResult<RunReport> {
         lattices: lattices.collect::<Result<_, _>>()?,
         origin: None,
         implausible_rows: replay.reader.implausible_rows(),
+        choices: replay.plan.choices.clone(),
         wall_s: begin.elapsed().as_secs_f64(),
     };
     progress.done();
@@ -89,15 +90,24 @@ impl DdsReplay<'_> {
             .filter(|_| shown == Some(lattice.kind()))
     }
 
-    fn topic(&self, wanted: impl Fn(&Role) -> bool) -> Vec<&str> {
-        let roles = self.plan.roles.iter();
-        let wanted = roles.filter(|(_, role)| wanted(role));
-        let topics = wanted.filter_map(|(i, _)| self.reader.topics().get(*i));
+    fn topic<'a>(&'a self, wanted: impl Fn(Role) -> bool + 'a) -> Vec<&'a str> {
+        let topics = self.plan.topics(self.reader, wanted);
         topics.map(|topic| topic.name.as_str()).collect()
     }
 
     fn clouds(&self) -> Vec<&str> {
-        self.topic(|role| *role == Role::Cloud)
+        self.topic(|role| role == Role::Cloud)
+    }
+
+    /// Topics of transforms that are not named as the nodes name them, with the names that they get.
+    pub fn remaps(&self) -> Vec<String> {
+        let named = [("/tf", false), ("/tf_static", true)];
+        let remaps = named.into_iter().flat_map(|(name, is_static)| {
+            let topics = self.topic(move |role| role == Role::Transforms(is_static));
+            let others = topics.into_iter().filter(move |topic| *topic != name);
+            others.map(move |topic| format!("{name}:={topic}"))
+        });
+        remaps.collect()
     }
 
     fn transformer_arguments(&self) -> Vec<String> {
@@ -105,6 +115,8 @@ impl DdsReplay<'_> {
         let mut arguments = vec![
             param("points_topics", &quoted(&self.clouds())),
             param("ins.source", &source.to_string()),
+            param("map_frame", &self.plan.map_frame),
+            param("base_frame", &self.plan.base_frame),
             param("qos./points_enu.reliability", "reliable"),
             param("qos./points_enu.depth", "512"),
         ];
@@ -112,7 +124,7 @@ impl DdsReplay<'_> {
             .iter()
             .zip(source.type_names())
         {
-            for topic in self.topic(|role| *role == Role::Ins(type_name)) {
+            for topic in self.topic(move |role| role == Role::Ins(type_name)) {
                 arguments.push(param(name, topic));
             }
         }
@@ -181,6 +193,7 @@ impl Branch {
         let mut params = vec![
             param("lattice", name),
             param("cell_volume_m3", &format!("{:?}", lattice.cell_volume_m3())),
+            param("map_frame", &replay.plan.map_frame),
             param("qos./points_enu.reliability", "reliable"),
             param("qos./points_enu.depth", "512"),
         ];

@@ -40,7 +40,7 @@ fn inspvax_gives_the_pose_of_the_machine_not_of_the_ins() {
     let lever_arm_m = Vector3::new(-0.35, 0.12, 1.25);
     let mut options = TransformerOptions::new(InsSource::Inspvax);
     options.ins.origin = Some(*frame.origin());
-    options.ins.mount = InsMount::new(lever_arm_m, [0.0; 3]);
+    options.ins.mount = Some(InsMount::new(lever_arm_m, [0.0; 3]));
     let mut bench = Bench::new(options);
     let (roll, pitch, yaw) = level_from_base.euler_angles();
     let mut message = INSPVAX {
@@ -76,6 +76,7 @@ fn inspvax_gives_the_pose_of_the_machine_not_of_the_ins() {
 fn a_fix_is_paired_with_the_attitude_at_its_stamp() {
     let (place, frame, level_from_base) = place();
     let mut options = TransformerOptions::new(InsSource::NavsatfixImu);
+    options.ins.mount = Some(InsMount::new(Vector3::zeros(), [0.0; 3]));
     options.ins.origin = Some(*frame.origin());
     let mut bench = Bench::new(options);
     let mut fix = NavSatFix {
@@ -112,11 +113,11 @@ fn an_imu_without_orientation_and_a_receiver_without_fix_give_no_pose() {
     let mut bench = Bench::new(TransformerOptions::new(InsSource::NavsatfixImu));
     let mut imu = Imu::default();
     imu.orientation_covariance[0] = -1.0;
-    bench.machine.on_ins(InsMessage::Imu(&imu), 0);
+    bench.machine.on_ins("ins", InsMessage::Imu(&imu), 0);
     let mut fix = NavSatFix::default();
     for status in [-1, -2] {
         fix.status.status = status;
-        bench.machine.on_ins(InsMessage::Fix(&fix), 0);
+        bench.machine.on_ins("ins", InsMessage::Fix(&fix), 0);
     }
     assert_eq!(bench.machine.counts().poses_not_good, 3);
 }

@@ -1,6 +1,7 @@
 //! The transformer's logic: waiting, dropping by reason, deskew, and hostile input.
 
 mod clouds;
+mod frames;
 mod ins;
 mod transforms;
 
@@ -9,6 +10,8 @@ use std::sync::Arc;
 use lattice_msgs::geometry_msgs::TransformStamped;
 use lattice_msgs::nav_msgs::Odometry;
 use lattice_msgs::sensor_msgs::PointCloud2;
+use lattice_msgs::tf2_msgs::TFMessage;
+use lattice_nodes::convert::geometry::transform_stamped;
 use lattice_nodes::enu_transformer::ins::{InsMessage, InsSource};
 use lattice_nodes::enu_transformer::{EnuOutput, EnuTransformer, TransformerOptions};
 use lattice_test::clouds::{SECOND_NS, cloud, odometry};
@@ -62,7 +65,15 @@ impl Bench {
 
     /// Any message of an INS.
     fn ins(&mut self, message: InsMessage, now_ns: i64) {
-        let outputs = self.machine.on_ins(message, now_ns);
+        let outputs = self.machine.on_ins("ins", message, now_ns);
+        self.take(outputs);
+    }
+
+    fn tf(&mut self, parent: &str, child: &str, step: i64, pose: &Isometry3<f64>, is_static: bool) {
+        let stamp_ns = START_NS + step * STEP_NS;
+        let transforms = vec![transform_stamped(parent, child, stamp_ns, pose)];
+        let message = TFMessage { transforms };
+        let outputs = self.machine.on_tf(&message, is_static, stamp_ns);
         self.take(outputs);
     }
 
@@ -72,7 +83,7 @@ impl Bench {
     }
 
     fn cloud(&mut self, message: PointCloud2, now_ns: i64) {
-        let outputs = self.machine.on_cloud(Arc::new(message), now_ns);
+        let outputs = self.machine.on_cloud("points", Arc::new(message), now_ns);
         self.take(outputs);
     }
 }

@@ -46,16 +46,6 @@ fn an_unknown_mount_is_a_reason_of_its_own() {
     assert_eq!(bench.machine.counts().clouds_no_mount, 1);
 }
 
-impl Bench {
-    fn tf(&mut self, parent: &str, child: &str, step: i64, pose: &Isometry3<f64>, is_static: bool) {
-        let stamp_ns = START_NS + step * STEP_NS;
-        let transforms = vec![transform_stamped(parent, child, stamp_ns, pose)];
-        let message = TFMessage { transforms };
-        let outputs = self.machine.on_tf(&message, is_static, stamp_ns);
-        self.take(outputs);
-    }
-}
-
 #[test]
 fn the_odometry_frame_is_published_though_odometry_comes_after_the_pose() {
     let mut bench = Bench::new(TransformerOptions {

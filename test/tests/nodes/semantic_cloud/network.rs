@@ -158,9 +158,9 @@ fn probabilities_reach_the_map_and_the_calibration() {
     for step in 0..10 {
         let stamp_ns = start_ns + step * SECOND_NS / 100;
         let pose = odometry(stamp_ns, &Isometry3::identity());
-        transformer.on_ins(InsMessage::Odometry(&pose), stamp_ns);
+        transformer.on_ins("ins", InsMessage::Odometry(&pose), stamp_ns);
     }
-    let outputs = transformer.on_cloud(Arc::new(cloud), start_ns);
+    let outputs = transformer.on_cloud("points", Arc::new(cloud), start_ns);
     let Some(EnuOutput::Points(enu)) = outputs.last() else {
         panic!("{outputs:?}");
     };

@@ -1,0 +1,292 @@
+//! From poses of the frames that messages name to poses of the machine in the map: mounts of the INS, and
+//! the frame that a pose is in.
+
+use std::sync::Arc;
+
+use lattice_core::geodesy::InsMount;
+use lattice_core::pose::{PushOutcome, StampedPose, TfMiss};
+use nalgebra::Isometry3;
+
+use super::ins::{Body, BodyPose};
+use super::{EnuOutput, EnuTransformer};
+
+/// Most poses that wait for transforms.
+const MAX_WAITING_POSES: usize = 4096;
+
+/// A pose that waits for the transforms it needs.
+pub(super) struct WaitingPose {
+    topic: Arc<str>,
+    pose: BodyPose,
+    arrived_ns: i64,
+}
+
+/// Relation of the frame that poses are in to the map frame.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub(super) enum Reference {
+    /// Not known yet.
+    Unknown,
+    /// Transforms connect it with the map frame.
+    OnTf,
+    /// Nothing connects it with the map frame: it is the map frame.
+    IsMap,
+}
+
+/// A transform that a pose needs and that is not there.
+struct Missing {
+    miss: TfMiss,
+    of: MissingOf,
+}
+
+#[derive(Clone, PartialEq)]
+enum MissingOf {
+    /// `base_frame` <- frame of the INS.
+    Mount(Arc<str>),
+    /// `map_frame` <- frame that the pose is in.
+    Reference(Arc<str>),
+}
+
+impl EnuTransformer {
+    /// Takes a pose of a frame; it counts when its transforms are known.
+    pub(super) fn on_body_pose(
+        &mut self,
+        topic: &str,
+        pose: BodyPose,
+        now_ns: i64,
+        out: &mut Vec<EnuOutput>,
+    ) {
+        for frame in [&pose.position_of, &pose.attitude_of] {
+            if let Body::Ins(frame) = frame
+                && !frame.is_empty()
+                && self.options.ins.mount.is_none()
+            {
+                self.mounts.keep(frame);
+            }
+        }
+        pose.reference.iter().for_each(|f| self.mounts.keep(f));
+        if self.waiting_poses.len() >= MAX_WAITING_POSES
+            && let Some(oldest) = self.waiting_poses.pop_front()
+            && let Err(missing) = self.resolve(&oldest.pose)
+        {
+            self.refuse_pose(&oldest.topic, &missing);
+        }
+        self.waiting_poses.push_back(WaitingPose {
+            topic: topic.into(),
+            pose,
+            arrived_ns: now_ns,
+        });
+        self.settle_poses(now_ns, out);
+    }
+
+    /// Takes the waiting poses whose transforms are known by now, in the order in which they came.
+    pub(super) fn settle_poses(&mut self, now_ns: i64, out: &mut Vec<EnuOutput>) {
+        while let Some(waiting) = self.waiting_poses.front() {
+            let waited_s = now_ns.saturating_sub(waiting.arrived_ns) as f64 * 1e-9;
+            let is_due = waited_s > self.options.max_wait_s;
+            match self.resolve(&waiting.pose) {
+                Ok(pose) => {
+                    if let Some(waiting) = self.waiting_poses.pop_front() {
+                        if let Some(frame) = &waiting.pose.reference
+                            && **frame != *self.options.map_frame
+                            && self.reference == Reference::Unknown
+                        {
+                            self.reference = Reference::OnTf;
+                        }
+                        self.on_pose(&waiting.topic, pose, out);
+                    }
+                }
+                Err(missing) if is_due && self.is_unconnected(&missing) => {
+                    self.reference = Reference::IsMap;
+                    if let MissingOf::Reference(frame) = &missing.of {
+                        let map = &self.options.map_frame;
+                        log::info!(
+                            "poses are in {frame}, and no transform {map} <- {frame} is published: the map is {frame}"
+                        );
+                    }
+                }
+                Err(missing) if is_due || !may_come(&missing.miss) => {
+                    if let Some(waiting) = self.waiting_poses.pop_front() {
+                        self.refuse_pose(&waiting.topic, &missing);
+                    }
+                }
+                Err(_) => return,
+            }
+        }
+    }
+
+    /// Takes a pose of the machine in the map.
+    fn on_pose(&mut self, topic: &str, mut pose: StampedPose, out: &mut Vec<EnuOutput>) {
+        if let Some(correction) = &self.options.correction {
+            pose.map_from_base = correction * pose.map_from_base;
+        }
+        let seconds = pose.stamp_ns as f64 * 1e-9;
+        if !self.stamps.passes(pose.stamp_ns) {
+            self.counts.poses_stamp_jump += 1;
+            let text = || format!("its stamp {seconds:.3} s jumps against those before it");
+            self.refusals.add(topic, "poses_stamp_jump", text);
+            return;
+        }
+        let newest_ns = self.poses.newest_ns();
+        match self.poses.push(pose) {
+            PushOutcome::Accepted => self.counts.poses_in += 1,
+            PushOutcome::JumpedBack => {
+                self.counts.poses_in += 1;
+                self.on_time_jump(pose.stamp_ns);
+            }
+            PushOutcome::OutOfOrder => {
+                self.counts.poses_out_of_order += 1;
+                let newest = newest_ns.unwrap_or(0) as f64 * 1e-9;
+                let text = || {
+                    format!(
+                        "its stamp {seconds:.3} s is not after that of the pose before, {newest:.3} s"
+                    )
+                };
+                self.refusals.add(topic, "poses_out_of_order", text);
+                return;
+            }
+            PushOutcome::NotFinite => {
+                self.counts.poses_invalid += 1;
+                let text = || "a number is not finite after mount and correction".to_owned();
+                self.refusals.add(topic, "poses_invalid", text);
+                return;
+            }
+        }
+        self.announce_pose(&pose, out);
+    }
+
+    /// Refuses all poses that still wait.
+    pub(super) fn refuse_waiting_poses(&mut self) {
+        while let Some(waiting) = self.waiting_poses.pop_front() {
+            if let Err(missing) = self.resolve(&waiting.pose) {
+                self.refuse_pose(&waiting.topic, &missing);
+            }
+        }
+    }
+
+    /// Says once if the frame that poses are in, which was taken for the map, is connected with it after all.
+    pub(super) fn check_reference(&mut self) {
+        let Some(frame) = &self.pose_frame else {
+            return;
+        };
+        let map = &self.options.map_frame;
+        if self.reference != Reference::IsMap || self.has_warned_reference {
+            return;
+        }
+        let found = self.mounts.lookup(map, frame, 0);
+        if !matches!(
+            found,
+            Err(TfMiss::UnknownFrame { .. } | TfMiss::Disconnected { .. })
+        ) {
+            self.has_warned_reference = true;
+            log::warn!(
+                "a transform {map} <- {frame} is published now; poses are taken in {frame} as before: start again to map in {map}, or set map_frame: {frame}"
+            );
+        }
+    }
+
+    /// The pose of the machine in the map.
+    fn resolve(&self, pose: &BodyPose) -> Result<StampedPose, Missing> {
+        let stamp_ns = pose.stamp_ns;
+        let position_of = self.ins_mount(&pose.position_of, stamp_ns)?;
+        let map_from_reference = self.map_from_reference(pose)?;
+        // The same frame mostly; of a receiver and an Imu the lever arm of one, the boresight of the other.
+        let mount = match pose.position_of == pose.attitude_of {
+            true => position_of,
+            false => InsMount {
+                base_from_ins: self.ins_mount(&pose.attitude_of, stamp_ns)?.base_from_ins,
+                ..position_of
+            },
+        };
+        let unmoved = (&pose.position_of, &pose.attitude_of) == (&Body::Base, &Body::Base);
+        let (position, rotation) = (&pose.pose.translation, &pose.pose.rotation);
+        let reference_from_base = match unmoved {
+            true => pose.pose,
+            false => mount.map_from_base(&position.vector, rotation),
+        };
+        Ok(StampedPose {
+            stamp_ns,
+            map_from_base: match map_from_reference {
+                Some(map_from_reference) => map_from_reference * reference_from_base,
+                None => reference_from_base,
+            },
+        })
+    }
+
+    /// Place of an INS on the machine at a stamp: by parameters, else by tf.
+    fn ins_mount(&self, body: &Body, stamp_ns: i64) -> Result<InsMount, Missing> {
+        let identity = || InsMount::new(nalgebra::Vector3::zeros(), [0.0; 3]);
+        let frame = match (body, &self.options.ins.mount) {
+            (Body::Base, _) => return Ok(identity()),
+            (Body::Ins(_), Some(mount)) => return Ok(*mount),
+            (Body::Ins(frame), None) => frame,
+        };
+        if frame.is_empty() || **frame == *self.options.base_frame {
+            return Ok(identity());
+        }
+        let base = &self.options.base_frame;
+        let found = self.mounts.lookup(base, frame, stamp_ns);
+        let base_from_ins = found.map_err(|miss| Missing {
+            miss,
+            of: MissingOf::Mount(Arc::clone(frame)),
+        })?;
+        Ok(InsMount {
+            lever_arm_m: base_from_ins.translation.vector,
+            base_from_ins: base_from_ins.rotation,
+        })
+    }
+
+    /// Place of the frame that a pose is in; `None` if that is the map frame.
+    fn map_from_reference(&self, pose: &BodyPose) -> Result<Option<Isometry3<f64>>, Missing> {
+        let map = &self.options.map_frame;
+        let frame = match &pose.reference {
+            Some(frame) if **frame != **map && self.reference != Reference::IsMap => frame,
+            _ => return Ok(None),
+        };
+        let found = self.mounts.lookup(map, frame, pose.stamp_ns);
+        found.map(Some).map_err(|miss| Missing {
+            miss,
+            of: MissingOf::Reference(Arc::clone(frame)),
+        })
+    }
+
+    /// True if nothing has ever connected the frame that poses are in with the map frame.
+    fn is_unconnected(&self, missing: &Missing) -> bool {
+        let unconnected = matches!(
+            missing.miss,
+            TfMiss::UnknownFrame { .. } | TfMiss::Disconnected { .. }
+        );
+        let of_reference = matches!(missing.of, MissingOf::Reference(_));
+        unconnected && of_reference && self.reference == Reference::Unknown
+    }
+
+    fn refuse_pose(&mut self, topic: &str, missing: &Missing) {
+        self.counts.poses_no_transform += 1;
+        let text = || match &missing.of {
+            MissingOf::Reference(frame) => {
+                let map = &self.options.map_frame;
+                format!(
+                    "no transform {map} <- {frame}, the frame that its poses are in: {}",
+                    missing.miss
+                )
+            }
+            MissingOf::Mount(frame) => {
+                let base = &self.options.base_frame;
+                let why = match &missing.miss {
+                    TfMiss::UnknownFrame { .. } | TfMiss::Disconnected { .. } => String::new(),
+                    miss => format!(" ({miss})"),
+                };
+                format!(
+                    "no transform {base} <- {frame}, the frame whose poses it gives{why}: publish it on /tf_static, or set `ins.lever_arm_m` and `ins.boresight_rpy_rad` ([0.0, 0.0, 0.0] where the frames coincide), or `base_frame: {frame}` if sensors are mounted on that"
+                )
+            }
+        };
+        self.refusals.add(topic, "poses_no_transform", text);
+    }
+}
+
+/// True if waiting may help.
+fn may_come(miss: &TfMiss) -> bool {
+    matches!(
+        miss,
+        TfMiss::UnknownFrame { .. } | TfMiss::Disconnected { .. } | TfMiss::TooNew { .. }
+    )
+}

@@ -1,0 +1,258 @@
+//! Choice of the topics and frames of a replay: clouds, poses and transforms.
+
+use std::collections::{BTreeMap, BTreeSet};
+
+use lattice_bag::{BagReader, TopicInfo};
+use lattice_msgs::RosMessage;
+use lattice_msgs::sensor_msgs::PointCloud2;
+use lattice_msgs::tf2_msgs::TFMessage;
+
+use super::poses::{Log, Poses};
+use super::survey::{self, CloudTopic, FrameTree};
+use super::topics::{Role, TopicError, listing};
+use crate::enu_transformer::ins::InsSource;
+
+/// Wishes of the user; empty or `None` is "find out".
+#[derive(Clone, Debug, Default)]
+pub struct TopicWishes {
+    /// Cloud topics.
+    pub points: Vec<String>,
+    /// Source of poses.
+    pub source: Option<InsSource>,
+    /// Topic of the INS.
+    pub ins: Option<String>,
+    /// Frame of the map.
+    pub map_frame: Option<String>,
+    /// Frame of the machine.
+    pub base_frame: Option<String>,
+}
+
+/// Roles by topic of the log, the source of poses, and the frames.
+#[derive(Debug)]
+pub struct TopicPlan {
+    /// Role by index of the topic in the log.
+    pub roles: BTreeMap<usize, Role>,
+    /// Source of poses.
+    pub source: InsSource,
+    /// Frame of the map.
+    pub map_frame: String,
+    /// Frame of the machine.
+    pub base_frame: String,
+    /// What was taken and what not, a line each, for the user.
+    pub choices: Vec<String>,
+}
+
+impl TopicPlan {
+    /// Clouds of the log that the replay is about.
+    pub fn clouds(&self, bag: &BagReader) -> u64 {
+        let topics = self.topics(bag, |role| role == Role::Cloud);
+        topics.map(|topic| topic.message_count).sum()
+    }
+
+    /// Topics whose role is wanted.
+    pub fn topics<'a>(
+        &'a self,
+        bag: &'a BagReader,
+        wanted: impl Fn(Role) -> bool + 'a,
+    ) -> impl Iterator<Item = &'a TopicInfo> + 'a {
+        let topics = self.roles.iter().filter(move |(_, role)| wanted(**role));
+        topics.filter_map(|(i, _)| bag.topics().get(*i))
+    }
+
+    /// Names of the topics with a role that is wanted.
+    pub(super) fn names(&self, bag: &BagReader, wanted: impl Fn(Role) -> bool) -> Vec<String> {
+        let topics = self.topics(bag, wanted);
+        topics.map(|topic| topic.name.clone()).collect()
+    }
+}
+
+/// Gives every topic that is of use its role, and finds the frames that the user does not name.
+pub fn plan(bag: &BagReader, wishes: &TopicWishes) -> Result<TopicPlan, TopicError> {
+    let mut clouds = survey::clouds(bag)?;
+    if !wishes.points.is_empty() {
+        let find = |name: &String| find(bag, name, PointCloud2::TYPE);
+        let wanted = wishes.points.iter().map(find);
+        let wanted: BTreeSet<usize> = wanted.collect::<Result<_, _>>()?;
+        clouds.retain(|cloud| wanted.contains(&cloud.topic));
+    }
+    if clouds.is_empty() {
+        return Err(TopicError::NoClouds {
+            type_name: PointCloud2::TYPE,
+            has: listing(bag),
+        });
+    }
+    let transforms = transforms(bag, &clouds)?;
+    let tree = FrameTree::read(bag, transforms.iter().copied())?;
+    let mut log = Log {
+        bag,
+        wishes,
+        clouds,
+        tree,
+        choices: Vec::new(),
+    };
+    let poses = log.poses()?;
+    let map_frame = log.map_frame(&poses);
+    let chosen = log.chosen_clouds(&poses, &map_frame);
+    let mut roles = BTreeMap::new();
+    roles.extend(chosen.into_iter().map(|topic| (topic, Role::Cloud)));
+    roles.extend(
+        poses
+            .topics
+            .iter()
+            .map(|(topic, type_name)| (*topic, Role::Ins(type_name))),
+    );
+    let transforms = transforms.into_iter();
+    roles.extend(transforms.map(|(topic, is_static)| (topic, Role::Transforms(is_static))));
+    let mut plan = TopicPlan {
+        roles,
+        source: poses.source,
+        map_frame,
+        base_frame: poses.base_frame,
+        choices: Vec::new(),
+    };
+    plan.choices = said(bag, &plan);
+    plan.choices.extend(log.choices);
+    Ok(plan)
+}
+
+/// Topics and frames that were taken, in a line each.
+fn said(bag: &BagReader, plan: &TopicPlan) -> Vec<String> {
+    let names = |wanted: fn(Role) -> bool| {
+        let topics = plan.topics(bag, wanted);
+        let names =
+            topics.map(|topic| format!("{} ({} messages)", topic.name, topic.message_count));
+        let names: Vec<String> = names.collect();
+        match names.is_empty() {
+            true => "none".to_owned(),
+            false => names.join(", "),
+        }
+    };
+    let tf = names(|role| matches!(role, Role::Transforms(_)));
+    let poses = match plan.source {
+        InsSource::Tf => tf.clone(),
+        _ => names(|role| matches!(role, Role::Ins(_))),
+    };
+    let TopicPlan {
+        source,
+        map_frame,
+        base_frame,
+        ..
+    } = plan;
+    vec![
+        format!("clouds: {}", names(|role| role == Role::Cloud)),
+        format!("poses: {poses}, as {source}, of {base_frame} in {map_frame}"),
+        format!("transforms: {tf}"),
+    ]
+}
+
+impl Log<'_> {
+    /// The cloud topics to map: one for each frame of a sensor. Clouds of the machine's own frame, and of
+    /// frames that are fixed in the world, are made of those of the sensors: they are taken where there
+    /// are no others that transforms connect.
+    fn chosen_clouds(&mut self, poses: &Poses, map_frame: &str) -> Vec<usize> {
+        let base = &poses.base_frame;
+        let is_world = |frame: &str| {
+            frame == map_frame || frame == poses.frame || self.tree.is_world_of(frame, base)
+        };
+        if !self.wishes.points.is_empty() {
+            return self.clouds.iter().map(|cloud| cloud.topic).collect();
+        }
+        let connected = |frame: &str| self.tree.connects(base, frame);
+        let is_sensor = |frame: &str| frame != base && !is_world(frame);
+        let classes: [&dyn Fn(&str) -> bool; 4] = [
+            &|frame| is_sensor(frame) && connected(frame),
+            &|frame| frame == base,
+            &|frame| is_world(frame),
+            &|_| true,
+        ];
+        let has = |class: &dyn Fn(&str) -> bool| self.clouds.iter().any(|c| class(&c.frame));
+        let class = classes.iter().position(|class| has(class)).unwrap_or(0);
+        let is_taken = |frame: &str| match class {
+            // Those that nothing connects are refused by name, one by one.
+            0 => is_sensor(frame),
+            class => classes.get(class).is_some_and(|class| class(frame)),
+        };
+        let mut best: BTreeMap<&str, &CloudTopic> = BTreeMap::new();
+        let rank = |cloud: &CloudTopic| {
+            let count = self.count(cloud.topic);
+            (cloud.labelled, u64::MAX - count, cloud.topic)
+        };
+        for cloud in self.clouds.iter().filter(|cloud| is_taken(&cloud.frame)) {
+            let best = best.entry(&cloud.frame).or_insert(cloud);
+            if rank(cloud) < rank(best) {
+                *best = cloud;
+            }
+        }
+        let mut lines = Vec::new();
+        for cloud in &self.clouds {
+            let (name, frame) = (self.name(cloud.topic), cloud.frame.as_str());
+            let why = match best.get(frame) {
+                Some(taken) if taken.topic == cloud.topic => continue,
+                Some(taken) => format!("of {frame} as {}", self.name(taken.topic)),
+                None if is_world(frame) => {
+                    format!("in {frame}, fixed in the world: made of other clouds")
+                }
+                None if frame == base => format!("in {frame}: made of other clouds"),
+                None => format!("no transform {base} <- {frame}"),
+            };
+            lines.push(format!(
+                "not taken: {name} ({why}; --points {name} takes it)"
+            ));
+        }
+        let chosen = best.into_values().map(|cloud| cloud.topic).collect();
+        self.choices.extend(lines);
+        chosen
+    }
+}
+
+/// The transform topics of the robot whose clouds these are, each with whether it is static.
+///
+/// Topics in the namespace of the clouds come first, then those of the root, then any.
+fn transforms(bag: &BagReader, clouds: &[CloudTopic]) -> Result<Vec<(usize, bool)>, TopicError> {
+    let name = |topic: usize| bag.topics().get(topic).map_or("", |t| t.name.as_str());
+    let mut found = Vec::new();
+    for (end, is_static) in [("/tf", false), ("/tf_static", true)] {
+        let all = survey::topics_of(bag, TFMessage::TYPE);
+        let all: Vec<(usize, &str)> = all
+            .filter_map(|topic| Some((topic, name(topic).strip_suffix(end)?)))
+            .collect();
+        let is_above = |space: &str, cloud: &CloudTopic| {
+            let rest = name(cloud.topic).strip_prefix(space);
+            !space.is_empty() && rest.is_some_and(|rest| rest.starts_with('/'))
+        };
+        let beside: Vec<&(usize, &str)> = all
+            .iter()
+            .filter(|(_, space)| clouds.iter().any(|cloud| is_above(space, cloud)))
+            .collect();
+        if beside.len() > 1 {
+            let robots = beside.iter().map(|(topic, space)| {
+                let of_it = clouds.iter().filter(|cloud| is_above(space, cloud));
+                let of_it: Vec<&str> = of_it.map(|cloud| name(cloud.topic)).collect();
+                format!("{} with {}", of_it.join(", "), name(*topic))
+            });
+            return Err(TopicError::Robots {
+                robots: robots.collect::<Vec<_>>().join("; "),
+            });
+        }
+        let root = all.iter().find(|(_, space)| space.is_empty());
+        let chosen = beside.first().copied().or(root).or(all.first());
+        found.extend(chosen.map(|(topic, _)| (*topic, is_static)));
+    }
+    Ok(found)
+}
+
+/// Place of a topic of a type that the user names.
+pub(super) fn find(
+    bag: &BagReader,
+    name: &str,
+    type_name: &'static str,
+) -> Result<usize, TopicError> {
+    let mut topics = bag.topics().iter();
+    topics
+        .position(|topic| topic.name == name && topic.type_name == type_name)
+        .ok_or_else(|| TopicError::Missing {
+            name: name.to_owned(),
+            type_name,
+            has: listing(bag),
+        })
+}
