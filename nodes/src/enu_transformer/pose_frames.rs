@@ -275,7 +275,7 @@ impl EnuTransformer {
                     miss => format!(" ({miss})"),
                 };
                 format!(
-                    "no transform {base} <- {frame}, the frame whose poses it gives{why}: publish it on /tf_static, or set `ins.lever_arm_m` and `ins.boresight_rpy_rad` ([0.0, 0.0, 0.0] where the frames coincide), or `base_frame: {frame}` if sensors are mounted on that"
+                    "no transform {base} <- {frame}, the frame of its poses{why}: publish it on /tf_static, or set `ins.lever_arm_m` and `ins.boresight_rpy_rad` ([0.0, 0.0, 0.0] where the frames coincide), or `base_frame: {frame}` if sensors are mounted on that"
                 )
             }
         };
