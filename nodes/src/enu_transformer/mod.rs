@@ -237,6 +237,7 @@ impl EnuTransformer {
     fn advance(&mut self, now_ns: i64) {
         let last_ns = self.last_now_ns.replace(now_ns).unwrap_or(now_ns);
         if now_ns < last_ns.saturating_sub(CLOCK_JUMP_NS) {
+            self.refuse_waiting_poses();
             while let Some(cloud) = self.waiting.take(0) {
                 self.drop_cloud(&cloud.topic, &Drop::TimeJump);
             }

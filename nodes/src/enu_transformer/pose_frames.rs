@@ -37,7 +37,6 @@ struct Missing {
     of: MissingOf,
 }
 
-#[derive(Clone, PartialEq)]
 enum MissingOf {
     /// `base_frame` <- frame of the INS.
     Mount(Arc<str>),
@@ -62,7 +61,14 @@ impl EnuTransformer {
                 self.mounts.keep(frame);
             }
         }
-        pose.reference.iter().for_each(|f| self.mounts.keep(f));
+        if let Some(frame) = &pose.reference
+            && **frame != *self.options.map_frame
+        {
+            self.mounts.keep(frame);
+            if self.pose_frame.as_ref() != Some(frame) {
+                self.pose_frame = Some(Arc::clone(frame));
+            }
+        }
         if self.waiting_poses.len() >= MAX_WAITING_POSES
             && let Some(oldest) = self.waiting_poses.pop_front()
             && let Err(missing) = self.resolve(&oldest.pose)
