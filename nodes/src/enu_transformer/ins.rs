@@ -4,14 +4,14 @@ use std::fmt;
 use std::str::FromStr;
 use std::sync::Arc;
 
-use lattice_core::geodesy::{EnuFrame, Geodetic, InsMount, enu_from_flu, utc_ns_from_gps};
+use lattice_core::geodesy::{EnuFrame, Geodetic, enu_from_flu, utc_ns_from_gps};
 use lattice_msgs::RosMessage;
 use lattice_msgs::geometry_msgs::{Pose, PoseStamped, PoseWithCovarianceStamped};
 use lattice_msgs::nav_msgs::Odometry;
 use lattice_msgs::novatel_oem7_msgs::{INSPVA, INSPVAX, InertialSolutionStatus, Oem7Header};
 use lattice_msgs::sensor_msgs::{Imu, NavSatFix, NavSatStatus};
 use lattice_msgs::std_msgs::Header;
-use nalgebra::{Isometry3, Translation3, UnitQuaternion};
+use nalgebra::{Isometry3, Translation3, UnitQuaternion, Vector3};
 use thiserror::Error;
 
 use super::fixes::{Attitude, Fix, FixPairing};
@@ -109,8 +109,10 @@ pub struct InsOptions {
     pub leap_seconds: i32,
     /// Height of INSPVAX.
     pub inspvax_height: HeightDatum,
-    /// Place of the INS on the machine; `None`: the mount of its frame on tf.
-    pub mount: Option<InsMount>,
+    /// Reference point of the INS in the frame of the machine, m; `None`: that of its frame on tf.
+    pub lever_arm_m: Option<Vector3<f64>>,
+    /// Rotation of the INS in the frame of the machine; `None`: that of its frame on tf.
+    pub base_from_ins: Option<UnitQuaternion<f64>>,
     /// Frame of the machine: odometry of this frame needs no mount.
     pub base_frame: String,
     /// Origin of the map; `None`: the first good fix.

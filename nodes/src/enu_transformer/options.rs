@@ -1,7 +1,7 @@
 //! Parameters of the transformer.
 
 use lattice_core::cloud::{TimeOptions, TimeReference, TimeUnit};
-use lattice_core::geodesy::{Geodetic, InsMount};
+use lattice_core::geodesy::Geodetic;
 use nalgebra::{Isometry3, Translation3, UnitQuaternion, Vector3};
 
 use super::ins::{HeightDatum, InsOptions, InsSource, InsStamp};
@@ -17,6 +17,9 @@ pub struct TransformerOptions {
     pub ins: InsOptions,
     /// Frame of the output.
     pub map_frame: String,
+    /// True if poses in another frame need a transform to the map frame; else a frame that nothing connects
+    /// with it is the map.
+    pub map_frame_is_given: bool,
     /// Frame of the machine.
     pub base_frame: String,
     /// If set, `map` -> this frame is published and `base_frame` is found below it.
@@ -71,13 +74,15 @@ impl TransformerOptions {
                 stamp: InsStamp::Gps,
                 leap_seconds: 18,
                 inspvax_height: HeightDatum::Geoid,
-                mount: None,
+                lever_arm_m: None,
+                base_from_ins: None,
                 origin: None,
                 base_frame: "base_link".into(),
                 max_imu_gap_s: 0.1,
                 max_fix_gap_s: 1.5,
             },
             map_frame: "map".into(),
+            map_frame_is_given: false,
             base_frame: "base_link".into(),
             odom_frame: None,
             earth_frame: "earth".into(),
@@ -116,6 +121,7 @@ impl TransformerOptions {
         let mut options = Self::new(source);
         options.ins = ins_options(params, options.ins)?;
         options.map_frame = frame(params, "map_frame", &options.map_frame)?;
+        options.map_frame_is_given = params.is_given("map_frame");
         options.base_frame = frame(params, "base_frame", &options.base_frame)?;
         options.ins.base_frame.clone_from(&options.base_frame);
         options.earth_frame = frame(params, "earth_frame", &options.earth_frame)?;
@@ -175,19 +181,19 @@ fn ins_options(params: &Params, defaults: InsOptions) -> Result<InsOptions, Para
     let stamps = [("gps", InsStamp::Gps), ("header", InsStamp::Header)];
     let (geoid, ellipsoid) = (HeightDatum::Geoid, HeightDatum::Ellipsoid);
     let heights = [("geoid", geoid), ("ellipsoid", ellipsoid)];
-    let mount = InsMount::new(
-        Vector3::from(triple(params, "ins.lever_arm_m")?),
-        triple(params, "ins.boresight_rpy_rad")?,
-    );
-    let mount_is_given =
-        params.is_given("ins.lever_arm_m") || params.is_given("ins.boresight_rpy_rad");
+    let lever_arm_m = Vector3::from(triple(params, "ins.lever_arm_m")?);
+    let [roll, pitch, yaw] = triple(params, "ins.boresight_rpy_rad")?;
+    let base_from_ins = UnitQuaternion::from_euler_angles(roll, pitch, yaw);
     let leap_seconds = params.i64("ins.leap_seconds", i64::from(defaults.leap_seconds))?;
     Ok(InsOptions {
         stamp: one_of(params, "ins.stamp", &stamps)?,
         leap_seconds: i32::try_from(leap_seconds)
             .map_err(|_| params.invalid("ins.leap_seconds", "expected a small number, 18"))?,
         inspvax_height: one_of(params, "ins.inspvax_height", &heights)?,
-        mount: mount_is_given.then_some(mount),
+        lever_arm_m: params.is_given("ins.lever_arm_m").then_some(lever_arm_m),
+        base_from_ins: params
+            .is_given("ins.boresight_rpy_rad")
+            .then_some(base_from_ins),
         origin: is_fixed.then_some(place).transpose()?,
         max_imu_gap_s: not_negative(params, "ins.max_imu_gap_s", defaults.max_imu_gap_s)?,
         max_fix_gap_s: params.f64_in("ins.max_fix_gap_s", defaults.max_fix_gap_s, 0.0..=60.0)?,

@@ -16,8 +16,8 @@ const ABOUT: &[About] = about! {
     "ins.stamp" fixed(POSES): "Stamp of NovAtel poses: gps (week and milliseconds of the log) or header (time of arrival).";
     "ins.leap_seconds" fixed(POSES): "GPS minus UTC, s.";
     "ins.inspvax_height" fixed(POSES): "What the height of INSPVAX is measured from: geoid (its undulation is added) or ellipsoid.";
-    "ins.lever_arm_m" fixed(POSES): "Reference point of the INS in base_frame (x forward, y left, z up). If this or the boresight is set, it holds in place of the mount of the INS on tf.";
-    "ins.boresight_rpy_rad" fixed(POSES): "Rotation of the INS in base_frame: fixed-axis roll, pitch, yaw.";
+    "ins.lever_arm_m" fixed(POSES): "Reference point of the INS in base_frame (x forward, y left, z up), in place of that of its frame on tf.";
+    "ins.boresight_rpy_rad" fixed(POSES): "Rotation of the INS in base_frame, fixed-axis roll, pitch, yaw, in place of that of its frame on tf.";
     "ins.max_imu_gap_s" fixed(POSES): "Longest gap between two attitudes that a fix may fall into (navsatfix_imu).";
     "ins.max_fix_gap_s" fixed(POSES): "Longest gap between two fixes over which positions are interpolated, at the stamps of the attitudes (navsatfix_imu); clouds wait that much longer.";
     "origin.mode" fixed(POSES): "first_fix: the map frame begins where the first good fix is; fixed: at the place below.";
@@ -26,7 +26,7 @@ const ABOUT: &[About] = about! {
     "origin.height_m" fixed(POSES): "Height of that place above the ellipsoid.";
     "correction.translation_m" fixed(POSES): "Correction of all poses, in the map frame: moved by this after the rotation below.";
     "correction.rpy_rad" fixed(POSES): "Its rotation about the origin of the map: fixed-axis roll, pitch, yaw.";
-    "map_frame" fixed(FRAME): "East-north-up frame of the map.";
+    "map_frame" fixed(FRAME): "East-north-up frame of the map. If set, poses in another frame need a transform to it; else a frame that nothing connects with it is the map.";
     "base_frame" fixed(FRAME): "Frame of the machine.";
     "earth_frame" fixed(FRAME): "Frame of the earth (ECEF).";
     "odom_frame" fixed(FRAME): "If set, map -> odom_frame is published instead of map -> base_frame.";

@@ -5,7 +5,7 @@ use std::sync::Arc;
 
 use lattice_core::geodesy::InsMount;
 use lattice_core::pose::{PushOutcome, StampedPose, TfMiss};
-use nalgebra::Isometry3;
+use nalgebra::{Isometry3, UnitQuaternion, Vector3};
 
 use super::ins::{Body, BodyPose};
 use super::{EnuOutput, EnuTransformer};
@@ -56,7 +56,6 @@ impl EnuTransformer {
         for frame in [&pose.position_of, &pose.attitude_of] {
             if let Body::Ins(frame) = frame
                 && !frame.is_empty()
-                && self.options.ins.mount.is_none()
             {
                 self.mounts.keep(frame);
             }
@@ -192,21 +191,18 @@ impl EnuTransformer {
     /// The pose of the machine in the map.
     fn resolve(&self, pose: &BodyPose) -> Result<StampedPose, Missing> {
         let stamp_ns = pose.stamp_ns;
-        let position_of = self.ins_mount(&pose.position_of, stamp_ns)?;
         let map_from_reference = self.map_from_reference(pose)?;
-        // The same frame mostly; of a receiver and an Imu the lever arm of one, the boresight of the other.
-        let mount = match pose.position_of == pose.attitude_of {
-            true => position_of,
-            false => InsMount {
-                base_from_ins: self.ins_mount(&pose.attitude_of, stamp_ns)?.base_from_ins,
-                ..position_of
-            },
-        };
-        let unmoved = (&pose.position_of, &pose.attitude_of) == (&Body::Base, &Body::Base);
-        let (position, rotation) = (&pose.pose.translation, &pose.pose.rotation);
-        let reference_from_base = match unmoved {
+        let of_base = (&pose.position_of, &pose.attitude_of) == (&Body::Base, &Body::Base);
+        let reference_from_base = match of_base {
             true => pose.pose,
-            false => mount.map_from_base(&position.vector, rotation),
+            false => {
+                let mount = InsMount {
+                    lever_arm_m: self.lever_arm_m(&pose.position_of, stamp_ns)?,
+                    base_from_ins: self.base_from_ins(&pose.attitude_of, stamp_ns)?,
+                };
+                let (position, rotation) = (&pose.pose.translation, &pose.pose.rotation);
+                mount.map_from_base(&position.vector, rotation)
+            }
         };
         Ok(StampedPose {
             stamp_ns,
@@ -217,27 +213,35 @@ impl EnuTransformer {
         })
     }
 
-    /// Place of an INS on the machine at a stamp: by parameters, else by tf.
-    fn ins_mount(&self, body: &Body, stamp_ns: i64) -> Result<InsMount, Missing> {
-        let identity = || InsMount::new(nalgebra::Vector3::zeros(), [0.0; 3]);
-        let frame = match (body, &self.options.ins.mount) {
-            (Body::Base, _) => return Ok(identity()),
-            (Body::Ins(_), Some(mount)) => return Ok(*mount),
-            (Body::Ins(frame), None) => frame,
-        };
-        if frame.is_empty() || **frame == *self.options.base_frame {
-            return Ok(identity());
+    /// Place of a body on the machine at a stamp: by the parameter, else by tf.
+    fn lever_arm_m(&self, body: &Body, stamp_ns: i64) -> Result<Vector3<f64>, Missing> {
+        match (body, &self.options.ins.lever_arm_m) {
+            (Body::Ins(_), Some(lever_arm_m)) => Ok(*lever_arm_m),
+            _ => Ok(self.base_from_body(body, stamp_ns)?.translation.vector),
         }
+    }
+
+    /// Rotation of a body on the machine at a stamp: by the parameter, else by tf.
+    fn base_from_ins(&self, body: &Body, stamp_ns: i64) -> Result<UnitQuaternion<f64>, Missing> {
+        match (body, &self.options.ins.base_from_ins) {
+            (Body::Ins(_), Some(base_from_ins)) => Ok(*base_from_ins),
+            _ => Ok(self.base_from_body(body, stamp_ns)?.rotation),
+        }
+    }
+
+    /// The mount of a body on tf at a stamp.
+    fn base_from_body(&self, body: &Body, stamp_ns: i64) -> Result<Isometry3<f64>, Missing> {
         let base = &self.options.base_frame;
-        let found = self.mounts.lookup(base, frame, stamp_ns);
-        let base_from_ins = found.map_err(|miss| Missing {
-            miss,
-            of: MissingOf::Mount(Arc::clone(frame)),
-        })?;
-        Ok(InsMount {
-            lever_arm_m: base_from_ins.translation.vector,
-            base_from_ins: base_from_ins.rotation,
-        })
+        match body {
+            Body::Ins(frame) if !frame.is_empty() && **frame != **base => {
+                let found = self.mounts.lookup(base, frame, stamp_ns);
+                found.map_err(|miss| Missing {
+                    miss,
+                    of: MissingOf::Mount(Arc::clone(frame)),
+                })
+            }
+            _ => Ok(Isometry3::identity()),
+        }
     }
 
     /// Place of the frame that a pose is in; `None` if that is the map frame.
@@ -254,14 +258,15 @@ impl EnuTransformer {
         })
     }
 
-    /// True if nothing has ever connected the frame that poses are in with the map frame.
+    /// True if nothing has ever connected the frame that poses are in with the map frame, which nobody asked for.
     fn is_unconnected(&self, missing: &Missing) -> bool {
         let unconnected = matches!(
             missing.miss,
             TfMiss::UnknownFrame { .. } | TfMiss::Disconnected { .. }
         );
         let of_reference = matches!(missing.of, MissingOf::Reference(_));
-        unconnected && of_reference && self.reference == Reference::Unknown
+        let may_be_map = !self.options.map_frame_is_given && self.reference == Reference::Unknown;
+        unconnected && of_reference && may_be_map
     }
 
     fn refuse_pose(&mut self, topic: &str, missing: &Missing) {
@@ -270,7 +275,7 @@ impl EnuTransformer {
             MissingOf::Reference(frame) => {
                 let map = &self.options.map_frame;
                 format!(
-                    "no transform {map} <- {frame}, the frame that its poses are in: {}",
+                    "no transform {map} <- {frame}, the frame that its poses are in ({}): publish it, or set `map_frame: {frame}`",
                     missing.miss
                 )
             }

@@ -88,6 +88,7 @@ pub fn plan(bag: &BagReader, wishes: &TopicWishes) -> Result<TopicPlan, TopicErr
         wishes,
         clouds,
         tree,
+        transforms: transforms.clone(),
         choices: Vec::new(),
     };
     let poses = log.poses()?;

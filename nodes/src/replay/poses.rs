@@ -11,6 +11,9 @@ use crate::enu_transformer::ins::InsSource;
 
 /// Mean rate below which poses alone leave gaps that are not interpolated (`max_pose_gap_s`), Hz.
 const SPARSE_HZ: f64 = 4.0;
+/// Distance between odometry and transforms of the same frames beyond which they are of two estimators: a fifth of the
+/// edge of a default cell, m.
+const MAX_CONTRADICTION_M: f64 = 0.1;
 const MAP: &str = "map";
 const BASE: &str = "base_link";
 
@@ -43,6 +46,8 @@ pub(super) struct Log<'a> {
     pub wishes: &'a TopicWishes,
     pub clouds: Vec<CloudTopic>,
     pub tree: FrameTree,
+    /// Transform topics, each with whether it is static.
+    pub transforms: Vec<(usize, bool)>,
     /// Topics that were not taken, with the reason.
     pub choices: Vec<String>,
 }
@@ -56,6 +61,10 @@ impl Log<'_> {
     pub fn count(&self, topic: usize) -> u64 {
         let topic = self.bag.topics().get(topic);
         topic.map_or(0, |topic| topic.message_count)
+    }
+
+    fn rate_hz(&self, topic: usize) -> f64 {
+        self.count(topic) as f64 / self.span_s().max(1e-9)
     }
 
     fn span_s(&self) -> f64 {
@@ -96,11 +105,9 @@ impl Log<'_> {
                 continue;
             };
             let name = self.name(topic).to_owned();
-            let is_alone = matches!(source, InsSource::Pose | InsSource::PoseWithCovariance);
-            let rate_hz = self.count(topic) as f64 / self.span_s().max(1e-9);
-            if tf.is_some() && is_alone && rate_hz < SPARSE_HZ {
-                let why = format!("its {rate_hz:.1} Hz leave gaps, and transforms give the poses");
-                worse.push((name, poses, why));
+            let rate_hz = self.rate_hz(topic);
+            if source != InsSource::NavsatfixImu && rate_hz < SPARSE_HZ {
+                worse.push((name, poses, format!("its {rate_hz:.1} Hz leave gaps")));
                 continue;
             }
             match fit {
@@ -141,7 +148,7 @@ impl Log<'_> {
         }
         let mut topics = Vec::new();
         let (mut frame, mut base, mut connected) = (String::new(), self.known_base(), true);
-        let mut unusable = None;
+        let (mut unusable, mut contradicted_by_m) = (None, 0.0);
         for (i, type_name) in source.type_names().iter().enumerate() {
             let mut candidates = survey::poses(self.bag, type_name)?;
             if let (0, Some(name)) = (i, &self.wishes.ins) {
@@ -157,6 +164,9 @@ impl Log<'_> {
                     base = Some(best.child.clone());
                 }
                 connected = self.is_connected(best, base.as_deref());
+                if source == InsSource::Odometry {
+                    contradicted_by_m = survey::contradiction_m(self.bag, best, &self.transforms)?;
+                }
             }
             unusable = unusable.or(best.unusable);
             let taken = best.topic;
@@ -182,6 +192,9 @@ impl Log<'_> {
             },
             match (unusable, connected) {
                 (Some(why), _) => Err(why.to_owned()),
+                (None, true) if contradicted_by_m > MAX_CONTRADICTION_M => Err(format!(
+                    "the transforms contradict it by {contradicted_by_m:.1} m"
+                )),
                 (None, false) => Err("no transform connects its frame with the machine".to_owned()),
                 (None, true) => Ok(()),
             },
@@ -195,6 +208,7 @@ impl Log<'_> {
             let name = self.name(candidate.topic);
             (
                 candidate.unusable.is_none(),
+                self.rate_hz(candidate.topic) >= SPARSE_HZ,
                 self.is_beside_clouds(name),
                 self.is_connected(candidate, base),
                 name.contains("filtered"),

@@ -3,6 +3,7 @@
 use std::collections::{BTreeMap, BTreeSet, VecDeque};
 
 use lattice_bag::{BagReader, ReadOptions};
+use lattice_core::pose::{TransformBuffer, TransformBufferOptions};
 use lattice_msgs::RosMessage;
 use lattice_msgs::cdr;
 use lattice_msgs::geometry_msgs::{PoseStamped, PoseWithCovarianceStamped};
@@ -12,6 +13,7 @@ use lattice_msgs::tf2_msgs::TFMessage;
 use serde::de::DeserializeOwned;
 
 use super::TopicError;
+use crate::convert::geometry;
 
 /// Part of a log in which frames of `/tf` are looked for, ns.
 const TF_SPAN_NS: i64 = 10_000_000_000;
@@ -198,6 +200,56 @@ pub(super) fn poses(bag: &BagReader, type_name: &str) -> Result<Vec<PoseTopic>, 
         poses.push(pose);
     }
     Ok(poses)
+}
+
+/// Longest distance between the positions of an odometry and those that transforms give its frames at its stamps, in
+/// the first part of a log, m; 0 where transforms do not give them.
+pub(super) fn contradiction_m(
+    bag: &BagReader,
+    odometry: &PoseTopic,
+    transforms: &[(usize, bool)],
+) -> Result<f64, TopicError> {
+    let end_ns = bag.start_ns().unwrap_or(0).saturating_add(TF_SPAN_NS);
+    let of = |topic: usize| {
+        let name = bag.topics().get(topic).map(|topic| topic.name.clone());
+        bag.messages(&ReadOptions {
+            topics: Some(name.into_iter().collect()),
+            end_ns: Some(end_ns),
+            ..ReadOptions::default()
+        })
+    };
+    let mut buffer = TransformBuffer::new(TransformBufferOptions {
+        history_s: f64::INFINITY,
+        ..TransformBufferOptions::default()
+    });
+    for (topic, is_static) in transforms {
+        for message in of(*topic)?.take(MAX_TF_MESSAGES) {
+            let Ok(message) = cdr::from_slice::<TFMessage>(&message?.data) else {
+                continue;
+            };
+            for transform in &message.transforms {
+                if let Some(pose) = geometry::isometry_from_transform(&transform.transform) {
+                    let (parent, child) = (&transform.header.frame_id, &transform.child_frame_id);
+                    let stamp_ns = transform.header.stamp.to_ns();
+                    // A transform without meaning is refused when it is replayed.
+                    let _ = buffer.insert(parent, child, stamp_ns, pose, *is_static);
+                }
+            }
+        }
+    }
+    let mut longest_m: f64 = 0.0;
+    for message in of(odometry.topic)?.take(MAX_TF_MESSAGES) {
+        let Ok(message) = cdr::from_slice::<Odometry>(&message?.data) else {
+            continue;
+        };
+        let stamp_ns = message.header.stamp.to_ns();
+        let by_tf = buffer.lookup(&odometry.frame, &odometry.child, stamp_ns);
+        if let (Ok(by_tf), Some(pose)) = (by_tf, geometry::isometry_from_pose(&message.pose.pose)) {
+            let apart = by_tf.translation.vector - pose.translation.vector;
+            longest_m = longest_m.max(apart.norm());
+        }
+    }
+    Ok(longest_m)
 }
 
 /// Places of the topics of a type that have messages.

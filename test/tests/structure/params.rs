@@ -146,7 +146,7 @@ fn the_parameter_file_fits_the_simulated_loader() {
     let options = TransformerOptions::from_params(&params).unwrap();
     assert_eq!(options.ins.origin, datasets::bobcat_origin().ok());
     assert_eq!(options.ins.leap_seconds, datasets::BOBCAT_LEAP_SECONDS);
-    let lever_arm_m: [f64; 3] = options.ins.mount.unwrap().lever_arm_m.into();
+    let lever_arm_m: [f64; 3] = options.ins.lever_arm_m.unwrap().into();
     assert_eq!(lever_arm_m, lattice_lab::simulate::BASE_FROM_IMU_M);
     assert_eq!(
         params.string("ins.topic", "").unwrap(),

@@ -159,6 +159,7 @@ impl Replay {
         let mut transformer = TransformerOptions::from_params(&self.params_of("enu_transformer")?)?;
         transformer.ins.source = plan.source;
         transformer.map_frame.clone_from(&plan.map_frame);
+        transformer.map_frame_is_given = true;
         transformer.base_frame.clone_from(&plan.base_frame);
         transformer.ins.base_frame.clone_from(&plan.base_frame);
         let mut maps = self.maps()?;

@@ -2,13 +2,13 @@
 
 use std::f64::consts::FRAC_PI_2;
 
-use lattice_core::geodesy::{EnuFrame, Geodetic, InsMount};
+use lattice_core::geodesy::{EnuFrame, Geodetic};
 use lattice_msgs::geometry_msgs::{PoseStamped, PoseWithCovarianceStamped};
 use lattice_msgs::sensor_msgs::{Imu, NavSatFix};
 use lattice_nodes::enu_transformer::TransformerOptions;
 use lattice_nodes::enu_transformer::ins::{InsMessage, InsSource};
 use lattice_test::clouds::{SECOND_NS, header, odometry, points, pose};
-use nalgebra::{Isometry3, Vector3};
+use nalgebra::{Isometry3, UnitQuaternion, Vector3};
 
 use super::{Bench, START_NS, STEP_NS, base_cloud, driven};
 
@@ -74,12 +74,23 @@ fn a_pose_whose_mount_nobody_publishes_is_refused_by_name_and_remedy() {
 #[test]
 fn a_mount_by_parameters_holds_in_place_of_tf() {
     let mut options = TransformerOptions::new(InsSource::Odometry);
-    options.ins.mount = Some(InsMount::new(Vector3::x(), [0.0, 0.0, FRAC_PI_2]));
-    let mut bench = Bench::new(options);
-    bench.tf("base_link", "imu_link", 0, &Isometry3::identity(), true);
-    bench.pose(&imu_odometry(3));
-    let found = bench.machine.newest_pose().unwrap().map_from_base;
-    assert!((found.to_homogeneous() - driven(3).to_homogeneous()).norm() < 1e-12);
+    let by_tf = base_from_imu();
+    // Both by parameters while tf says otherwise, then each alone, the other by tf.
+    for (lever_arm, boresight) in [(true, true), (true, false), (false, true)] {
+        options.ins.lever_arm_m = lever_arm.then(Vector3::x);
+        let turn = UnitQuaternion::from_euler_angles(0.0, 0.0, FRAC_PI_2);
+        options.ins.base_from_ins = boresight.then_some(turn);
+        let mut bench = Bench::new(options.clone());
+        let on_tf = match (lever_arm, boresight) {
+            (true, true) => Isometry3::identity(),
+            (true, false) => Isometry3::from_parts(Vector3::y().into(), by_tf.rotation),
+            _ => Isometry3::from_parts(by_tf.translation, UnitQuaternion::identity()),
+        };
+        bench.tf("base_link", "imu_link", 0, &on_tf, true);
+        bench.pose(&imu_odometry(3));
+        let found = bench.machine.newest_pose().unwrap().map_from_base;
+        assert!((found.to_homogeneous() - driven(3).to_homogeneous()).norm() < 1e-12);
+    }
 }
 
 #[test]
@@ -115,6 +126,32 @@ fn a_frame_that_nothing_connects_with_the_map_is_the_map() {
     bench.pose(&message);
     let found = bench.machine.newest_pose().unwrap().map_from_base;
     assert_eq!(found.translation.vector.x, driven(201).translation.vector.x);
+}
+
+#[test]
+fn a_map_frame_that_is_asked_for_needs_a_transform() {
+    let mut bench = Bench::new(TransformerOptions {
+        map_frame_is_given: true,
+        ..TransformerOptions::new(InsSource::Odometry)
+    });
+    for step in 0..=200 {
+        if step == 150 {
+            bench.tf("map", "odom", step, &Isometry3::identity(), false);
+        }
+        let mut message = odometry(START_NS + step * STEP_NS, &driven(step));
+        message.header.frame_id = "odom".into();
+        bench.pose(&message);
+    }
+    let counts = bench.machine.counts();
+    assert_eq!(
+        (counts.poses_in, counts.poses_no_transform > 100),
+        (1, true)
+    );
+    let text = &bench.machine.refusals().all()[0].text;
+    assert!(
+        text.contains("map <- odom") && text.contains("map_frame"),
+        "{text}"
+    );
 }
 
 #[test]

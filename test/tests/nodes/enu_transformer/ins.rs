@@ -1,6 +1,6 @@
 //! Poses from the messages of an INS.
 
-use lattice_core::geodesy::{EnuFrame, Geodetic, InsMount};
+use lattice_core::geodesy::{EnuFrame, Geodetic};
 use lattice_msgs::novatel_oem7_msgs::{INSPVAX, InertialSolutionStatus};
 use lattice_msgs::sensor_msgs::{Imu, NavSatFix};
 use lattice_nodes::enu_transformer::TransformerOptions;
@@ -40,7 +40,8 @@ fn inspvax_gives_the_pose_of_the_machine_not_of_the_ins() {
     let lever_arm_m = Vector3::new(-0.35, 0.12, 1.25);
     let mut options = TransformerOptions::new(InsSource::Inspvax);
     options.ins.origin = Some(*frame.origin());
-    options.ins.mount = Some(InsMount::new(lever_arm_m, [0.0; 3]));
+    options.ins.lever_arm_m = Some(lever_arm_m);
+    options.ins.base_from_ins = Some(UnitQuaternion::identity());
     let mut bench = Bench::new(options);
     let (roll, pitch, yaw) = level_from_base.euler_angles();
     let mut message = INSPVAX {
@@ -76,7 +77,8 @@ fn inspvax_gives_the_pose_of_the_machine_not_of_the_ins() {
 fn a_fix_is_paired_with_the_attitude_at_its_stamp() {
     let (place, frame, level_from_base) = place();
     let mut options = TransformerOptions::new(InsSource::NavsatfixImu);
-    options.ins.mount = Some(InsMount::new(Vector3::zeros(), [0.0; 3]));
+    options.ins.lever_arm_m = Some(Vector3::zeros());
+    options.ins.base_from_ins = Some(UnitQuaternion::identity());
     options.ins.origin = Some(*frame.origin());
     let mut bench = Bench::new(options);
     let mut fix = NavSatFix {
