@@ -267,6 +267,40 @@ def odometry_of_body(log):
 
 
 @register
+def odometry_without_child(log):
+    velodyne(log)
+    log.odometry("/odom", "odom", "", 50)
+
+
+@register
+def base_footprint_alone(log):
+    velodyne(log, "base_footprint")
+    log.odometry("/odom", "odom", "base_footprint", 50)
+
+
+@register
+def odom_static_in_map(log):
+    velodyne(log)
+    log.tf_static(("map", "odom", ODOM))
+    log.odometry("/odom", "odom", "base_link", 50, frame_from_world=ODOM_FROM_MAP)
+
+
+@register
+def motion_capture(log):
+    velodyne(log)
+    log.poses("/vrpn_mocap/robot/pose", "world", 100)
+
+
+@register
+def two_robots(log):
+    # The names of frames are the same, the mounts are not.
+    for robot, world, mount in [("robot1", IDENTITY, LIDAR), ("robot2", SLIPPED, CAMERA)]:
+        log.clouds(f"/{robot}/velodyne_points", "velodyne", VELODYNE, mount)
+        log.odometry(f"/{robot}/odom", "odom", "base_link", 50, frame_from_world=world)
+        log.tf_static(("base_link", "velodyne", mount), topic=f"/{robot}/tf_static")
+
+
+@register
 def names_with_slashes(log):
     log.clouds("/velodyne_points", "/velodyne", VELODYNE, LIDAR)
     log.tf_static(("/base_link", "/velodyne", LIDAR))

@@ -1,9 +1,9 @@
 """Logs that lack something, or have it otherwise than it is taken."""
 
 from driver_clouds import OAKD, OUSTER
-from driver_messages import header, make
+from driver_messages import header, make, pose_message
 from driver_robot import LIDAR, filtered, register, velodyne
-from driver_scene import IDENTITY
+from driver_scene import IDENTITY, pose
 
 
 @register
@@ -73,6 +73,22 @@ def clouds_before_and_after_poses(log):
 def sparse_poses(log):
     velodyne(log)
     log.odometry("/odom", "odom", "base_link", 1)
+
+
+@register
+def late_poses(log):
+    # An estimator two seconds behind.
+    velodyne(log)
+    log.odometry("/odom", "odom", "base_link", 50, latency_ns=2_000_000_000)
+
+
+@register
+def poses_without_stamps(log):
+    velodyne(log)
+    for at_ns in log.times(50):
+        posed = make("geometry_msgs/msg/PoseWithCovariance", pose=pose_message(pose(at_ns)))
+        fields = {"header": header("odom", 0), "child_frame_id": "base_link", "pose": posed}
+        log.add("/odom", at_ns, make("nav_msgs/msg/Odometry", **fields))
 
 
 @register

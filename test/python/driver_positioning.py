@@ -55,6 +55,17 @@ def gps_imu_reversed(log):
 
 
 @register
+def gps_two_imus(log):
+    # That of the lidar has no attitude.
+    velodyne(log)
+    mounts = [(name, IDENTITY) for name in ("imu_link", "os_imu")]
+    log.tf_static(("base_link", "gps", MAST), *(("base_link", *mount) for mount in mounts))
+    log.imu("/a_lidar/imu", "os_imu", 100, unknown=True)
+    log.imu("/imu/data", "imu_link", 50)
+    log.fixes("/fix", "gps", 10, MAST)
+
+
+@register
 def gps_imu_without_mount(log):
     velodyne(log)
     log.tf_static(("base_link", "gps", MAST))

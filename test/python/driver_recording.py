@@ -96,14 +96,22 @@ class Recording:
             self.add_bytes(topic, at_ns + LATENCY_NS, "sensor_msgs/msg/PointCloud2", data, SENSOR)
 
     def odometry(
-        self, topic, frame, child, rate_hz, mount=IDENTITY, frame_from_world=IDENTITY, **options
+        self,
+        topic,
+        frame,
+        child,
+        rate_hz,
+        mount=IDENTITY,
+        frame_from_world=IDENTITY,
+        latency_ns=LATENCY_NS,
+        **options,
     ):
         """Poses of `child`, which `mount` has in the base frame."""
         for at_ns in self.times(rate_hz, **options):
             matrix = frame_from_world @ pose(at_ns) @ mount
             posed = make("geometry_msgs/msg/PoseWithCovariance", pose=pose_message(matrix))
             fields = {"header": header(frame, at_ns), "child_frame_id": child, "pose": posed}
-            self.add(topic, at_ns + LATENCY_NS, make("nav_msgs/msg/Odometry", **fields))
+            self.add(topic, at_ns + latency_ns, make("nav_msgs/msg/Odometry", **fields))
 
     def poses(self, topic, frame, rate_hz, covariance=False, mount=IDENTITY, **options):
         """PoseStamped, or with a covariance."""
