@@ -148,11 +148,21 @@ def slip(log, rate_hz):
 @register
 def amcl(log):
     velodyne(log)
-    base = ("base_footprint", "base_link", numpy.linalg.inv(FOOTPRINT))
-    log.tf_static(base)
-    footprint = {"mount": FOOTPRINT}
-    log.odometry("/odom", "odom", "base_footprint", 20, frame_from_world=ODOM_FROM_MAP, **footprint)
-    log.poses("/amcl_pose", "map", 2, covariance=True, **footprint)
+    amcl_alone(log)
+    moved = {"mount": FOOTPRINT, "frame_from_world": ODOM_FROM_MAP}
+    log.odometry("/odom", "odom", "base_footprint", 20, **moved)
+
+
+@register
+def amcl_without_odometry(log):
+    velodyne(log)
+    amcl_alone(log)
+
+
+def amcl_alone(log):
+    """AMCL's sparse poses and the transforms of a robot on its wheels."""
+    log.tf_static(("base_footprint", "base_link", numpy.linalg.inv(FOOTPRINT)))
+    log.poses("/amcl_pose", "map", 2, covariance=True, mount=FOOTPRINT)
     log.tf("odom", "base_footprint", 20, lambda at_ns: odom_from_base(at_ns) @ FOOTPRINT)
     log.tf("map", "odom", 10, lambda _: ODOM)
 

@@ -85,40 +85,62 @@ fn lidars() -> Vec<Case> {
 
 fn estimators() -> Vec<Case> {
     vec![
-        mcap("fast_lio_all").says(&["body"]).over_dds(),
-        sqlite3("fast_lio_registered"),
-        mcap("fast_lio_raw").says(&["/cloud_registered"]),
+        mcap("fast_lio_all")
+            .says(&[
+                "clouds: /cloud_registered_body (30 ",
+                "of body in camera_init",
+                "not taken: /cloud_registered (in camera_init, fixed in the world",
+            ])
+            .over_dds(),
+        sqlite3("fast_lio_registered").says(&["clouds: /cloud_registered (30 "]),
+        mcap("fast_lio_raw").says(&[
+            "clouds: /velodyne_points (30 ",
+            "not taken: /cloud_registered (",
+        ]),
         sqlite3("fast_lio_raw_without_mount").refused(&["no transform body <- velodyne"]),
         mcap("kiss_icp")
-            .says(&["velodyne", "/kiss/local_map"])
+            .says(&["of velodyne in odom_lidar", "not taken: /kiss/local_map ("])
             .over_dds(),
-        sqlite3("zed").says(&["zed_camera_link"]),
-        mcap("lio_sam").refused(&["no transform base_link <- odom_"]),
-        mcap("lio_sam").with(&["--ins", "tf"]),
+        sqlite3("zed").says(&["of zed_camera_link in map"]),
+        mcap("lio_sam").says(&["as tf, of base_link in map", "--ins odometry takes it"]),
+        mcap("lio_sam")
+            .with(&["--ins", "odometry"])
+            .refused(&["no transform base_link <- odom_", "ins.lever_arm_m"]),
         sqlite3("robot_localization_footprint").over_dds(),
         mcap("robot_localization_dual"),
-        sqlite3("navsat_transform"),
+        sqlite3("navsat_transform").says(&["poses: /odometry/filtered ("]),
         mcap("wheel_odometry_beside")
-            .says(&["/odometry/filtered", "/odom", "--ins-topic"])
+            .says(&["poses: /odometry/filtered (", "--ins-topic /odom takes it"])
             .over_dds(),
+        sqlite3("wheel_odometry_faster"),
         sqlite3("wheel_odometry_faster").with(&["--ins-topic", "/odometry/filtered"]),
         mcap("amcl").over_dds(),
+        sqlite3("amcl_without_odometry")
+            .says(&["as tf, of base_link in map", "not taken: /amcl_pose ("]),
         sqlite3("amcl_pose_alone").over_dds(),
-        mcap("amcl_pose_sparse").refused(&["max_pose_gap_s"]),
+        mcap("amcl_pose_sparse").refused(&["poses around it are 1.000 s apart", "max_pose_gap_s"]),
         mcap("amcl_pose_sparse").with(&["-p", "max_pose_gap_s:=1.0"]),
         sqlite3("ndt").over_dds(),
         mcap("autoware"),
         sqlite3("mavros"),
         mcap("mavros_odometry"),
-        sqlite3("tf_alone").over_dds(),
-        mcap("tf_alone_without_map"),
-        sqlite3("clearpath_odometry").over_dds(),
+        sqlite3("tf_alone")
+            .says(&["as tf, of base_link in map"])
+            .over_dds(),
+        mcap("tf_alone_without_map").says(&["as tf, of base_link in odom"]),
+        sqlite3("clearpath_odometry")
+            .says(&[
+                "poses: /a200_0001/platform/odom/filtered (",
+                "/a200_0001/tf_static (",
+            ])
+            .over_dds(),
         mcap("clearpath_tf_alone"),
         sqlite3("turtlebot4"),
         mcap("imu_odometry").over_dds(),
         sqlite3("imu_odometry_without_mount").refused(&[
+            "0 of 501 poses usable",
             "no transform base_link <- imu_link",
-            "base_frame",
+            "base_frame: imu_link",
             "ins.lever_arm_m",
         ]),
         sqlite3("imu_odometry_without_mount").with(&[
@@ -127,18 +149,14 @@ fn estimators() -> Vec<Case> {
             "-p",
             "ins.boresight_rpy_rad:=[0.0, 0.0, 1.5707963267948966]",
         ]),
-        mcap("odometry_of_body").says(&["body"]),
+        mcap("odometry_of_body").says(&["of body in camera_init"]),
         sqlite3("odometry_without_child"),
-        mcap("base_footprint_alone").says(&["base_footprint"]),
-        sqlite3("odom_static_in_map"),
-        mcap("motion_capture"),
+        mcap("base_footprint_alone").says(&["of base_footprint in odom"]),
+        sqlite3("odom_static_in_map").says(&["of base_link in map"]),
+        mcap("motion_capture").says(&["of base_link in world"]),
+        sqlite3("two_robots").refused(&["clouds of several robots", "--points TOPIC"]),
         sqlite3("two_robots")
-            .with(&[
-                "--points",
-                "/robot1/velodyne_points",
-                "--ins-topic",
-                "/robot1/odom",
-            ])
+            .with(&["--points", "/robot1/velodyne_points"])
             .over_dds(),
         sqlite3("names_with_slashes"),
     ]
@@ -148,10 +166,11 @@ fn positioning() -> Vec<Case> {
     vec![
         mcap("novatel_inspvax").over_dds(),
         sqlite3("novatel_driver").with(&["--ins", "inspvax"]),
+        sqlite3("novatel_driver").refused(&["--ins inspvax"]),
         mcap("novatel_inspva_in_base"),
         sqlite3("novatel_without_mount").refused(&["no transform base_link <- gps"]),
         sqlite3("novatel_without_mount").with(&["-p", AHEAD]),
-        mcap("novatel_aligning").refused(&["0 of 251 poses usable"]),
+        mcap("novatel_aligning").refused(&["0 of 251 poses usable", "INS status is 1"]),
         sqlite3("gps_1_hz_imu_100_hz").over_dds(),
         mcap("gps_imu_reversed").over_dds(),
         sqlite3("gps_two_imus").over_dds(),
@@ -159,9 +178,9 @@ fn positioning() -> Vec<Case> {
         mcap("gps_antenna_without_mount").refused(&["no transform base_link <- gps"]),
         mcap("gps_antenna_without_mount").with(&["-p", MAST]),
         sqlite3("gps_imu_without_orientation")
-            .refused(&["orientation covariance is -1"])
+            .refused(&["0 of 501 poses usable", "orientation covariance is -1"])
             .over_dds(),
-        mcap("gps_without_fix").refused(&["0 of 51 poses usable"]),
+        mcap("gps_without_fix").refused(&["poses usable", "fix status is -1"]),
     ]
 }
 
@@ -199,7 +218,7 @@ fn faults() -> Vec<Case> {
             .over_dds(),
         mcap("ouster")
             .with(&["-p", "base_frame:=base_lnk"])
-            .refused(&["base_lnk", "base_link"]),
+            .refused(&["no transform base_lnk <- ", "-p base_frame:=base_link"]),
         mcap("ouster")
             .with(&["-p", "latice:=bcc"])
             .refused(&["latice", "'lattice'"]),
