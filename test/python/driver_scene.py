@@ -22,17 +22,17 @@ COLUMNS, ROWS = 100, 20
 BORDER_M = 1e-3
 GENERATOR = fcc(0.125)
 # Lever arms, up and ahead, that carry cells to cells: maps that begin at an antenna have the same borders.
-MAST_M = GENERATOR @ [2, -4, -4]
+MAST_M = GENERATOR @ [1, -2, -2]
 AHEAD_M = GENERATOR @ [1, 0, 0]
 
 # x, y, z in m and roll, pitch, yaw in rad, one a second from the beginning of the drive.
 KNOTS = numpy.array(
     [
         [0.0, 0.0, 0.0, 0.0, 0.0, 0.0],
-        [1.2, 0.0, 0.02, 0.01, -0.01, 0.05],
-        [2.6, 0.3, 0.05, 0.02, 0.015, 0.45],
-        [3.7, 1.2, 0.03, -0.015, 0.02, 0.95],
-        [4.2, 2.5, 0.0, 0.01, -0.02, 1.45],
+        [1.2, 0.0, 0.02, 0.0025, -0.0025, 0.05],
+        [2.6, 0.3, 0.05, 0.005, 0.004, 0.45],
+        [3.7, 1.2, 0.03, -0.004, 0.005, 0.95],
+        [4.2, 2.5, 0.0, 0.0025, -0.005, 1.45],
         [4.2, 3.9, -0.02, 0.0, 0.0, 1.6],
     ]
 )
