@@ -58,7 +58,8 @@ def kiss_icp(log):
     log.clouds("/velodyne_points", "velodyne", VELODYNE, LIDAR)
     log.clouds("/kiss/local_map", "odom_lidar", OAKD, in_world=True)
     log.odometry("/kiss/odometry", "odom_lidar", "velodyne", 10, mount=LIDAR)
-    log.tf("odom_lidar", "velodyne", 10, lambda at_ns: pose(at_ns) @ LIDAR)
+    # invert_odom_tf.
+    log.tf("velodyne", "odom_lidar", 10, lambda at_ns: numpy.linalg.inv(pose(at_ns) @ LIDAR))
 
 
 @register
@@ -299,6 +300,40 @@ def odom_static_in_map(log):
 def motion_capture(log):
     velodyne(log)
     log.poses("/vrpn_mocap/robot/pose", "world", 100)
+
+
+@register
+def frames_with_prefix(log):
+    log.clouds("/robot1/velodyne_points", "robot1/velodyne", VELODYNE, LIDAR)
+    log.odometry("/robot1/odom", "robot1/odom", "robot1/base_link", 50)
+    log.tf_static(("robot1/base_link", "robot1/velodyne", LIDAR))
+    log.tf("robot1/odom", "robot1/base_link", 50)
+
+
+@register
+def map_begins_late(log):
+    # Localization starts two seconds after odometry.
+    velodyne(log)
+    log.odometry("/odom", "odom", "base_link", 50, frame_from_world=ODOM_FROM_MAP)
+    log.tf("odom", "base_link", 50, odom_from_base)
+    log.tf("map", "odom", 10, lambda _: ODOM, span_s=(0.9, 4))
+    log.mapped = log.scans[9:]
+
+
+@register
+def nav2_goal(log):
+    velodyne(log)
+    log.poses("/goal_pose", "map", 10, span_s=(-1, -1))
+    log.poses("/initialpose", "map", 10, covariance=True, span_s=(-1, -1))
+    log.poses("/amcl_pose", "map", 10, covariance=True)
+
+
+@register
+def wheel_odometry_under_ekf(log):
+    # The filter's odometry is on tf only; that of the wheels has the same frames.
+    velodyne(log)
+    slip(log, 50)
+    log.tf("odom", "base_link", 50)
 
 
 @register

@@ -55,6 +55,14 @@ def gps_imu_reversed(log):
 
 
 @register
+def gps_imu_reversed_antenna_without_mount(log):
+    velodyne(log)
+    log.tf_static(("base_link", "imu_link", REVERSED_IMU))
+    log.fixes("/gps/fix", "gps", 10, AHEAD)
+    log.imu("/imu/data", "imu_link", 100, REVERSED_IMU)
+
+
+@register
 def gps_two_imus(log):
     # That of the lidar has no attitude.
     velodyne(log)

@@ -123,9 +123,9 @@ class Recording:
                 kind = "geometry_msgs/msg/PoseWithCovarianceStamped"
             self.add(topic, at_ns + LATENCY_NS, make(kind, header=header(frame, at_ns), pose=posed))
 
-    def tf(self, parent, child, rate_hz, matrix_at=pose, topic="/tf"):
+    def tf(self, parent, child, rate_hz, matrix_at=pose, topic="/tf", **options):
         """A moving transform; by default that of the machine in the world."""
-        for at_ns in self.times(rate_hz):
+        for at_ns in self.times(rate_hz, **options):
             transforms = [transform_message(parent, child, matrix_at(at_ns), at_ns)]
             self.add(
                 topic, at_ns + LATENCY_NS, make("tf2_msgs/msg/TFMessage", transforms=transforms)

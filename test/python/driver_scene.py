@@ -1,9 +1,8 @@
 """A drive through a walled yard: the pose of the machine at any time, and the returns of each scan.
 
-Every estimator samples the same drive, and every lidar has the same returns, so that every log gives the
-same map. Poses lie on straight lines and constant turns between knots a second apart: those between two
-samples are exact by linear interpolation, whatever the rate. No return lies within BORDER_M of the border
-of a cell.
+Every estimator samples the same drive, and every lidar has the same returns: every log gives the same map.
+Between knots a second apart the machine moves on a straight line and turns at a constant rate, so that
+interpolation between samples of any rate is exact. No return lies within BORDER_M of the border of a cell.
 """
 
 import functools
@@ -21,7 +20,7 @@ SCAN_NS = SECOND_NS // 10
 COLUMNS, ROWS = 100, 20
 BORDER_M = 1e-3
 GENERATOR = fcc(0.125)
-# Lever arms, up and ahead, that carry cells to cells: maps that begin at an antenna have the same borders.
+# Lever arms up and ahead. They are lattice vectors, so a map that begins at an antenna has the same cells.
 MAST_M = GENERATOR @ [1, -2, -2]
 AHEAD_M = GENERATOR @ [1, 0, 0]
 

@@ -153,6 +153,8 @@ fn estimators() -> Vec<Case> {
         sqlite3("odometry_without_child"),
         mcap("base_footprint_alone").says(&["of base_footprint in odom"]),
         sqlite3("odom_static_in_map").says(&["of base_link in map"]),
+        mcap("frames_with_prefix").says(&["of robot1/base_link in robot1/odom"]),
+        mcap("wheel_odometry_under_ekf").with(&["--ins", "tf"]),
         mcap("motion_capture").says(&["of base_link in world"]),
         sqlite3("two_robots").refused(&["clouds of several robots", "--points TOPIC"]),
         sqlite3("two_robots")
@@ -220,8 +222,5 @@ fn faults() -> Vec<Case> {
         mcap("ouster")
             .with(&["-p", "base_frame:=base_lnk"])
             .refused(&["no transform base_lnk <- ", "base_frame: base_link"]),
-        mcap("ouster")
-            .with(&["-p", "latice:=bcc"])
-            .refused(&["latice", "'lattice'"]),
     ]
 }
