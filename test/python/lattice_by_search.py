@@ -14,8 +14,8 @@ def fcc(cell_volume_m3):
     return f * numpy.array([[2, 1, 0], [0, -1, 1], [0, 0, -1]], dtype=float)
 
 
-def nearest(generator, points_m):
-    """Index of the nearest lattice point of each point, and who else is as near but for BORDER_M.
+def nearest(generator, points_m, border_m=BORDER_M):
+    """Index of the nearest lattice point of each point, and who else is as near but for border_m.
 
     The second is a dictionary: number of the point -> list of other indices.
     """
@@ -32,7 +32,7 @@ def nearest(generator, points_m):
     border = (distances - distances.min(axis=0)) / (2 * apart[:, best])
     border[best, numpy.arange(len(points_m))] = numpy.inf
     near = {}
-    for other, point in zip(*numpy.nonzero(border < BORDER_M)):
+    for other, point in zip(*numpy.nonzero(border < border_m)):
         near.setdefault(int(point), []).append(base[point] + offsets[other])
     return (base + offsets[best]).astype(numpy.int64), near
 

@@ -3,6 +3,7 @@
 
 mod browser;
 mod calibrate;
+mod driver_logs;
 mod evaluate;
 mod files;
 mod health;

@@ -1,0 +1,170 @@
+//! Logs as drivers and estimators record them: the reference map cell for cell, or a refusal by name.
+//!
+//! `test/python/driver_logs.py` makes the logs with `rosbags` and the cells that they must give.
+
+mod cases;
+
+use std::collections::{BTreeMap, BTreeSet};
+use std::path::Path;
+use std::process::{Command, Stdio};
+
+use lattice_core::voxels::file::MapContents;
+use serde::Deserialize;
+use serde_json::Value;
+
+use self::cases::{Case, Outcome, cases};
+use crate::nodes::figures;
+use crate::{lattice, python};
+
+const MAKER: &str = concat!(
+    env!("CARGO_MANIFEST_DIR"),
+    "/../../test/python/driver_logs.py"
+);
+/// Points of each cell by its index.
+type Cells = BTreeMap<[i32; 3], u32>;
+
+/// Output of the maker: maps, and the number of its map for each log.
+#[derive(Deserialize)]
+struct Made {
+    maps: Vec<Vec<(i32, i32, i32, u32)>>,
+    logs: BTreeMap<String, usize>,
+}
+
+impl Made {
+    /// Makes the logs of some cases in `folder`.
+    fn of(cases: &[Case], folder: &Path) -> Option<Self> {
+        let logs: BTreeMap<_, _> = cases.iter().map(|case| (case.log, case.storage)).collect();
+        let logs = logs.iter().map(|(log, storage)| format!("{log}:{storage}"));
+        let mut maker = Command::new(python()?);
+        maker.arg(MAKER).arg(folder).args(logs);
+        let output = maker.stderr(Stdio::inherit()).output().unwrap();
+        assert!(output.status.success(), "{MAKER}");
+        Some(serde_json::from_slice(&output.stdout).unwrap())
+    }
+
+    fn cells(&self, log: &str) -> Cells {
+        let rows = self.maps[self.logs[log]].iter();
+        rows.map(|&(x, y, z, count)| ([x, y, z], count)).collect()
+    }
+}
+
+fn cells_of_file(path: &Path) -> Cells {
+    let map = MapContents::read(&std::fs::read(path).unwrap()[..], usize::MAX).unwrap();
+    assert_eq!(map.datum_index(), [0; 3]);
+    let counts = map.voxels().unwrap().iter().map(|voxel| voxel.count);
+    let keys = map.keys().iter().map(|key| key.unpack());
+    keys.zip(counts).collect()
+}
+
+/// Difference of a map from the reference, in words.
+fn compare(found: &Cells, expected: &Cells) -> Result<(), String> {
+    if found == expected {
+        return Ok(());
+    }
+    let other = |a: &Cells, b: &Cells| a.keys().filter(|cell| !b.contains_key(*cell)).count();
+    let counts = found.iter().filter(|(cell, count)| {
+        let expected = expected.get(*cell);
+        expected.is_some_and(|expected| expected != *count)
+    });
+    Err(format!(
+        "{} cells instead of {}: {} beside, {} missing, {} of other counts",
+        found.len(),
+        expected.len(),
+        other(found, expected),
+        other(expected, found),
+        counts.count()
+    ))
+}
+
+/// Runs `lattice replay` of a case; its report if it ended as the case says.
+fn replay(case: &Case, folder: &Path, options: &[&str]) -> Result<Option<Value>, String> {
+    let bag = folder.join(case.log).display().to_string();
+    let arguments = [&["replay", &bag, "--json"], case.arguments, options].concat();
+    let output = lattice(&arguments);
+    let errors = String::from_utf8_lossy(&output.stderr);
+    let texts = match case.outcome {
+        Outcome::Map => case.says,
+        Outcome::Refused(texts) => texts,
+    };
+    let refused = !matches!(case.outcome, Outcome::Map);
+    if output.status.code() != Some(i32::from(refused)) {
+        return Err(format!("{}: {errors}", output.status));
+    }
+    if let Some(text) = texts.iter().find(|text| !errors.contains(*text)) {
+        return Err(format!("no '{text}' in: {errors}"));
+    }
+    match refused {
+        true => Ok(None),
+        false => Ok(Some(serde_json::from_slice(&output.stdout).unwrap())),
+    }
+}
+
+/// Runs a check on each case and shows all that fail.
+fn check_all(cases: &[Case], check: impl Fn(&Case) -> Result<(), String>) {
+    let failed = cases.iter().filter_map(|case| {
+        let why = check(case).err()?;
+        Some(format!("{} {:?}: {why}\n", case.log, case.arguments))
+    });
+    let failed: Vec<String> = failed.collect();
+    let (count, all) = (failed.len(), cases.len());
+    assert!(
+        failed.is_empty(),
+        "{count} of {all} logs:\n{}",
+        failed.concat()
+    );
+}
+
+#[test]
+fn logs_of_drivers_give_the_reference_map_or_say_what_is_missing() {
+    let directory = tempfile::tempdir().unwrap();
+    let folder = directory.path();
+    let cases = cases();
+    let Some(made) = Made::of(&cases, folder) else {
+        return;
+    };
+    check_all(&cases, |case| {
+        let map = folder.join("map.lattice");
+        let options = ["--direct", "--map-out", &map.display().to_string()];
+        match replay(case, folder, &options)? {
+            Some(_) => compare(&cells_of_file(&map), &made.cells(case.log)),
+            None => Ok(()),
+        }
+    });
+}
+
+#[test]
+fn logs_of_drivers_give_the_same_over_dds() {
+    let directory = tempfile::tempdir().unwrap();
+    let folder = directory.path();
+    let all = cases();
+    let logs = |cases: &[Case]| {
+        cases
+            .iter()
+            .map(|case| case.log)
+            .collect::<BTreeSet<_>>()
+            .len()
+    };
+    let count = logs(&all);
+    let cases: Vec<Case> = all.into_iter().filter(|case| case.over_dds).collect();
+    assert!(3 * logs(&cases) >= count, "{} of {count}", logs(&cases));
+    let Some(made) = Made::of(&cases, folder) else {
+        return;
+    };
+    check_all(&cases, |case| {
+        let Some(played) = replay(case, folder, &["--rate", "3"])? else {
+            return Ok(());
+        };
+        let expected = made.cells(case.log);
+        let map = &played["lattices"][0]["map"];
+        let points: u32 = expected.values().sum();
+        if map["voxels"] != expected.len() || map["points"] != points {
+            return Err(format!("{} cells, {} points", map["voxels"], map["points"]));
+        }
+        // The test above compares the direct map with the reference, cell for cell.
+        let direct = replay(case, folder, &["--direct"])?.unwrap_or_default();
+        match figures(&played) == figures(&direct) {
+            true => Ok(()),
+            false => Err("other figures than the direct replay".into()),
+        }
+    });
+}
