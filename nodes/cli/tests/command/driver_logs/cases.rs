@@ -154,6 +154,9 @@ fn estimators() -> Vec<Case> {
         mcap("base_footprint_alone").says(&["of base_footprint in odom"]),
         sqlite3("odom_static_in_map").says(&["of base_link in map"]),
         mcap("frames_with_prefix").says(&["of robot1/base_link in robot1/odom"]),
+        sqlite3("map_begins_late").says(&["of base_link in map"]),
+        mcap("nav2_goal").says(&["poses: /amcl_pose ("]),
+        mcap("wheel_odometry_under_ekf").says(&["--ins tf"]),
         mcap("wheel_odometry_under_ekf").with(&["--ins", "tf"]),
         mcap("motion_capture").says(&["of base_link in world"]),
         sqlite3("two_robots").refused(&["clouds of several robots", "--points TOPIC"]),
@@ -176,6 +179,7 @@ fn positioning() -> Vec<Case> {
         mcap("novatel_aligning").refused(&["0 of 251 poses usable", "INS status is 1"]),
         sqlite3("gps_1_hz_imu_100_hz").over_dds(),
         mcap("gps_imu_reversed").over_dds(),
+        mcap("gps_imu_reversed_antenna_without_mount").with(&["-p", AHEAD]),
         sqlite3("gps_two_imus").over_dds(),
         sqlite3("gps_imu_without_mount").refused(&["no transform base_link <- imu_link"]),
         mcap("gps_antenna_without_mount").refused(&["no transform base_link <- gps"]),
@@ -222,5 +226,8 @@ fn faults() -> Vec<Case> {
         mcap("ouster")
             .with(&["-p", "base_frame:=base_lnk"])
             .refused(&["no transform base_lnk <- ", "base_frame: base_link"]),
+        mcap("ouster")
+            .with(&["-p", "latice:=bcc"])
+            .refused(&["latice", "'lattice'"]),
     ]
 }
