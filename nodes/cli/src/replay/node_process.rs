@@ -67,13 +67,8 @@ impl NodeProcess {
         // The first of several writes the report.
         let first = nodes.first().copied().unwrap_or_default();
         let report_file = param(&format!("{first}:report_file"), &yaml_text(report));
-        for param in replay
-            .options
-            .param
-            .iter()
-            .chain(params)
-            .chain([&report_file])
-        {
+        let given = replay.options.params_for(&nodes)?;
+        for param in given.iter().chain(params).chain([&report_file]) {
             command.args(["-p", param]);
         }
         let what = match namespace {
