@@ -206,7 +206,9 @@ fn forward(
             // Twelve processes say the same of one machine: it is shown once.
             let text = line.rsplit_once("]: ").map_or(&*line, |(_, text)| text);
             let warning = line.contains("[WARN]") || line.contains("[ERROR]");
-            if warning && first_time(text) {
+            // The player starts when all others have found each other.
+            let expected = text.starts_with("no publisher on ");
+            if warning && !expected && first_time(text) {
                 log::warn!("{name}: {text}");
             } else {
                 log::debug!("{name}: {line}");
