@@ -1,5 +1,9 @@
 //! Executables: the table of nodes, a runtime for one or several of them, an orderly end.
 
+mod names;
+
+pub use names::{Files, NamedNode, check_names};
+
 use std::io::{Write, stdout};
 use std::process::ExitCode;
 
@@ -74,7 +78,7 @@ pub fn run(
     if answers_help(name, declare, &args) {
         return Ok(());
     }
-    let runtime = start_runtime(name, args)?;
+    let runtime = start_runtime(name, args, &[(name, declare)], Files::Shared)?;
     let mut running = Running::default();
     running.start(&runtime, name, start, declare)?;
     running.until_stopped(&runtime)
@@ -106,8 +110,13 @@ pub fn answers_help(name: &str, declare: Option<Declare>, args: &RosArgs) -> boo
     asked
 }
 
-/// Log lines as ROS users know them, and a runtime.
-pub fn start_runtime(name: &str, args: RosArgs) -> Result<Runtime, NodeError> {
+/// Log lines as ROS users know them, and a runtime, unless a name is given that none of the nodes knows.
+pub fn start_runtime(
+    name: &str,
+    args: RosArgs,
+    nodes: &[NamedNode<'_>],
+    files: Files,
+) -> Result<Runtime, NodeError> {
     if let Err(error) = logging::init(&args, &args.node_name(name)) {
         eprintln!("{name}: another logger is in place: {error}");
     }
@@ -115,6 +124,7 @@ pub fn start_runtime(name: &str, args: RosArgs) -> Result<Runtime, NodeError> {
     for unknown in args.user_args.iter().filter(|arg| arg.starts_with('-')) {
         log::warn!("argument '{unknown}' has no meaning here; ROS arguments follow --ros-args");
     }
+    check_names(&args, nodes, files)?;
     Ok(Runtime::start(name, args)?)
 }
 

@@ -56,6 +56,7 @@ impl MapLosses {
         let updates =
             node.subscribe_undecoded(update_topic.as_ref(), Qos::DELTAS, Load::Small, on_update)?;
         self.before.watch([&maps, &updates]);
+        node.expect_publishers([&maps], "lattice_mapper", None, |_| true);
         Ok([maps, updates])
     }
 

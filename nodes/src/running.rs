@@ -4,7 +4,7 @@ use lattice_runtime::Runtime;
 use lattice_runtime::lifecycle::{ChangeRequests, Lifecycle, Step};
 use lattice_runtime::params::Params;
 
-use crate::start::{Declare, Finish, NodeError, Servers, Start};
+use crate::start::{Declare, Finish, NodeError, Servers, Start, check_topics};
 
 /// The nodes of a process, in the order in which data flows.
 #[derive(Default)]
@@ -62,6 +62,7 @@ impl Running {
     /// Serves managed nodes until the end is asked for, lets each node work off its inbox and publish the
     /// rest, and leaves.
     pub fn until_stopped(mut self, runtime: &Runtime) -> Result<(), NodeError> {
+        self.check_topics(runtime)?;
         while let Some(change) = self.requests.next(&runtime.shutdown_handle()) {
             if let Some(node) = self.nodes.get_mut(change.node)
                 && let Some(lifecycle) = node.lifecycle.take()
@@ -78,6 +79,20 @@ impl Running {
             servers.extend(node.end(runtime));
         }
         Ok(runtime.spin()?)
+    }
+
+    /// Refuses parameters of topics that no node has.
+    fn check_topics(&self, runtime: &Runtime) -> Result<(), NodeError> {
+        let nodes = self.nodes.iter().map(|node| runtime.node(&node.name));
+        let nodes = nodes.collect::<Result<Vec<_>, _>>()?;
+        // A managed node has no topics yet.
+        let waits = self.nodes.iter().any(|node| node.finish.is_none());
+        let has = |name: &str| waits || nodes.iter().any(|node| node.params().has(name));
+        let at_work = self.nodes.iter().zip(&nodes);
+        for (_, node) in at_work.filter(|(one, _)| one.finish.is_some()) {
+            check_topics(node.params(), has)?;
+        }
+        Ok(())
     }
 }
 

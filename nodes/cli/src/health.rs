@@ -8,7 +8,7 @@ use clap::Args;
 use lattice_msgs::diagnostic_msgs::{DiagnosticArray, DiagnosticStatus};
 use lattice_runtime::qos::Qos;
 use lattice_runtime::ros_args::RosArgs;
-use lattice_runtime::{Load, Runtime};
+use lattice_runtime::{Load, Runtime, WORKING};
 
 use super::{CliResult, init_logging};
 
@@ -16,6 +16,9 @@ use super::{CliResult, init_logging};
 const NAME: &str = "lattice_health";
 
 /// Fail unless nodes are at work and well, by their diagnostics
+///
+/// A node is not well if a task of it is an ERROR or STALE, or a WARN with the value `working: false`: a mapper says
+/// so until it has mapped a cloud. Other warnings are printed.
 #[derive(Args)]
 pub struct Health {
     /// Full names of nodes, such as `lattice_mapper` or `robot/lattice_mapper`; if none is named, all that
@@ -120,7 +123,7 @@ impl Health {
         let mut ill = Vec::new();
         for (task, status) in tasks.iter().filter(|(task, _)| named(task)) {
             println!("{} {task}: {}", level(status.level), status.message);
-            if status.level >= DiagnosticStatus::ERROR {
+            if !is_well(status) {
                 ill.push(task.as_str());
             }
         }
@@ -143,6 +146,16 @@ fn others(message: &DiagnosticArray) -> impl Iterator<Item = (String, Diagnostic
 /// The node of a task, which is named `node: task`.
 fn node_of(task: &str) -> &str {
     task.split_once(": ").map_or(task, |(node, _)| node)
+}
+
+/// False for a task that does not work, or that cannot do its work yet.
+fn is_well(status: &DiagnosticStatus) -> bool {
+    let working = || status.values.iter().find(|value| value.key == WORKING);
+    match status.level {
+        DiagnosticStatus::OK => true,
+        DiagnosticStatus::WARN => working().is_none_or(|value| value.value != "false"),
+        _ => false,
+    }
 }
 
 fn level(level: u8) -> &'static str {

@@ -5,10 +5,14 @@ use std::path::PathBuf;
 use clap::Args;
 
 use super::CliResult;
-use lattice_nodes::executables;
+use lattice_nodes::executables::{self, Files};
 use lattice_nodes::running::Running;
+use lattice_runtime::params::nearest;
 use lattice_runtime::params_file;
 use lattice_runtime::ros_args::RosArgs;
+
+/// Name of the node of the process itself.
+const PROCESS: &str = "lattice";
 
 /// Run several nodes in one process
 #[derive(Args)]
@@ -47,6 +51,11 @@ impl Run {
     pub fn run(self) -> CliResult {
         let mut arguments = vec!["--ros-args".to_owned()];
         let mut named = Vec::new();
+        for only in &self.only {
+            if !known().any(|name| name == only) {
+                return Err(unknown_node(only).into());
+            }
+        }
         for file in &self.params {
             named.extend(
                 params_file::read(file)?
@@ -66,21 +75,38 @@ impl Run {
             .iter()
             .filter(|(name, _)| wanted(name))
             .collect();
+        let args = RosArgs::parse(arguments)?;
         if nodes.is_empty() {
-            let known: Vec<&str> = executables::NODES.iter().map(|(name, _)| *name).collect();
-            return Err(format!(
-                "the parameter files name none of the nodes {}",
-                known.join(", ")
-            )
-            .into());
+            executables::check_names(&args, &[], Files::Own)?;
+            let known = known().collect::<Vec<_>>().join(", ");
+            return Err(format!("the parameter files name none of the nodes {known}").into());
         }
-        let runtime = executables::start_runtime("lattice", RosArgs::parse(arguments)?)?;
         // The node of the process itself has only the parameters of every node.
-        runtime.node("lattice")?.params().open(|_| Ok(()));
+        let checked = nodes
+            .iter()
+            .map(|(name, _)| (*name, executables::reader_of(name)));
+        let checked: Vec<_> = checked.chain([(PROCESS, None)]).collect();
+        let runtime = executables::start_runtime(PROCESS, args, &checked, Files::Own)?;
+        runtime.node(PROCESS)?.params().open(|_| Ok(()));
         let mut running = Running::default();
         for (name, start) in nodes {
             running.start(&runtime, name, *start, executables::reader_of(name))?;
         }
         running.until_stopped(&runtime)
+    }
+}
+
+/// Names of the nodes that can share a process.
+fn known() -> impl Iterator<Item = &'static str> {
+    executables::NODES.iter().map(|(name, _)| *name)
+}
+
+fn unknown_node(name: &str) -> String {
+    match nearest(name, known()) {
+        Some((near, _)) => format!("no node '{name}' (`--only`); did you mean '{near}'?"),
+        None => {
+            let known = known().collect::<Vec<_>>().join(", ");
+            format!("no node '{name}' (`--only`), expected one of {known}")
+        }
     }
 }

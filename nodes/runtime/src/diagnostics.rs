@@ -13,6 +13,10 @@ use super::sync::lock;
 /// Tasks of all nodes of a process, at most.
 const MAX_TASKS: usize = 1000;
 
+/// Key of the value that is `false` while a node cannot do its work: with it a warning counts as an error in
+/// `lattice health`.
+pub const WORKING: &str = "working";
+
 /// State of a task.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, PartialOrd, Ord)]
 pub enum Level {

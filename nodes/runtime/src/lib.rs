@@ -51,7 +51,7 @@ mod type_description;
 
 pub use action::{ActionLimits, ActionServer, Feedback, GoalHandle};
 pub use clock::Clock;
-pub use diagnostics::{Diagnostics, Level};
+pub use diagnostics::{Diagnostics, Level, WORKING};
 pub use error::{PublishError, RuntimeError};
 pub use loopback_domain::LoopbackDomain;
 pub use neighbours::{GraphEndpoint, GraphRole};

@@ -10,9 +10,9 @@ use std::sync::Arc;
 
 use serde::Serialize;
 
-use crate::executables::{answers_help, start_runtime};
+use crate::executables::{Files, answers_help, start_runtime};
 use crate::report;
-use crate::start::{NodeError, open_params};
+use crate::start::{Declare, NodeError, check_topics, open_params};
 use controls::Controls;
 use keyboard::Keyboard;
 use lattice_bag::{BagQos, BagReader, Player, TopicInfo};
@@ -49,7 +49,8 @@ pub fn run(arguments: impl IntoIterator<Item = String>) -> Result<(), NodeError>
     if answers_help(NAME, Some(parameters::declare), &args) {
         return Ok(());
     }
-    let runtime = start_runtime(NAME, args)?;
+    let nodes = [(NAME, Some(parameters::declare as Declare))];
+    let runtime = start_runtime(NAME, args, &nodes, Files::Shared)?;
     let node = runtime.node(NAME)?;
     let params = node.params();
     let Settings {
@@ -86,6 +87,7 @@ pub fn run(arguments: impl IntoIterator<Item = String>) -> Result<(), NodeError>
         params: Arc::clone(params),
         report: PlayerReport::default(),
     };
+    check_topics(params, |_| false)?;
     let controls = Controls::serve(&node)?;
     let _keyboard = match keyboard {
         true => Keyboard::start(controls.sender()),

@@ -16,8 +16,8 @@ use std::time::{Duration, Instant};
 
 use serde::Serialize;
 
-use crate::executables::start_runtime;
-use crate::start::{NodeError, open_params};
+use crate::executables::{Files, start_runtime};
+use crate::start::{NodeError, check_topics, open_params};
 use cache::Cache;
 use definitions::Definitions;
 use lattice_bag::{BagWriter, Storage, WriterOptions};
@@ -90,12 +90,13 @@ pub struct RecorderReport {
 
 /// Records until a signal or the end of the duration.
 pub fn run(options: RecorderOptions, args: RosArgs) -> Result<RecorderReport, NodeError> {
-    let runtime = start_runtime(NAME, args)?;
+    let runtime = start_runtime(NAME, args, &[(NAME, None)], Files::Shared)?;
     let node = runtime.node(NAME)?;
     let mut choice = options.choice;
     for topic in choice.topics.iter_mut().chain(&mut choice.exclude) {
         *topic = node.resolve(topic)?;
     }
+    check_topics(node.params(), |_| false)?;
     open_params(node.params(), |_| Ok(()));
     let bag = BagWriter::create(&options.bag, options.storage, options.writer)?;
     let cache = Arc::new(Cache::new(options.cache_bytes));

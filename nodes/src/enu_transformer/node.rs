@@ -80,6 +80,8 @@ pub fn start(runtime: &Runtime, name: &str) -> Result<Finish, NodeError> {
     };
     let (ins, imu) = (&settings.ins_topic, &settings.imu_topic);
     let mut inputs = poses.subscribe_ins(&node, source, ins, imu)?;
+    let of_ins = Some("ins.source and ins.topic");
+    node.expect_publishers(&inputs, "the driver of the INS", of_ins, |_| true);
     for topic in settings.points_topics {
         let name: Arc<str> = topic.as_str().into();
         let event = move |cloud| Event::Cloud(Arc::clone(&name), cloud);
@@ -87,6 +89,13 @@ pub fn start(runtime: &Runtime, name: &str) -> Result<Finish, NodeError> {
         clouds.push(node.subscribe(&topic, Qos::SCANS, Load::Large, hand_over)?);
     }
     lost_clouds.watch(&clouds);
+    let is_raw = |topic: &str| !topic.ends_with("/points_enu") && !topic.ends_with("/map_centers");
+    node.expect_publishers(
+        &clouds,
+        "the sensor's driver",
+        Some("points_topics"),
+        is_raw,
+    );
     let transforms = |m| Event::Transforms(m, false);
     inputs.push(poses.subscribe(&node, "/tf", Qos::TF, transforms)?);
     let (latched, transforms) = (Qos::TF_STATIC_LISTENER, |m| Event::Transforms(m, true));

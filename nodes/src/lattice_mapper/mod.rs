@@ -18,6 +18,7 @@ mod plan;
 mod refusal;
 mod report;
 mod services;
+mod unmapped;
 
 pub use counts::MapperCounts;
 pub use free_options::{FreeSpaceMethod, MappedFreeSpace};

@@ -14,6 +14,7 @@ use super::octomap;
 use super::outputs::Outputs;
 use super::parameters::Settings;
 use super::services::{self, Call};
+use super::unmapped::Unmapped;
 use super::{LatticeMapper, MapperOptions, MapperReport};
 use crate::compute::{Compute, Inbox};
 use crate::convert::cloud;
@@ -22,7 +23,7 @@ use crate::report;
 use crate::start::{Finish, NodeError, handed_over, open_params};
 use lattice_runtime::logging::Throttle;
 use lattice_runtime::qos::Qos;
-use lattice_runtime::{Diagnostics, Level, Load, Losses, Runtime, lock};
+use lattice_runtime::{Diagnostics, Level, Load, Losses, Runtime, WORKING, lock};
 
 /// Said where rays shall clear voxels and a cloud does not say where they begin.
 const NO_VIEWPOINTS: &str = "no sensor positions (vp_x, vp_y, vp_z), so no free space: set `viewpoints: true` of enu_transformer";
@@ -60,6 +61,7 @@ pub fn start(runtime: &Runtime, name: &str) -> Result<Finish, NodeError> {
         output,
         outputs: Outputs::open(&node, old.free_space.free_level > 0)?,
         diagnostics: node.diagnostics(),
+        unmapped: Some(Unmapped::new(node.resolve("points_enu")?)),
         lost: Arc::clone(&lost),
         clouds: clouds.clone(),
         inputs: inputs.clone(),
@@ -102,6 +104,8 @@ pub fn start(runtime: &Runtime, name: &str) -> Result<Finish, NodeError> {
         }
     }
     clouds.watch([&points]);
+    let is_enu = |topic: &str| topic.ends_with("/points_enu");
+    node.expect_publishers([&points], "enu_transformer", None, is_enu);
     inputs.watch([&points, &origins, &requests.topic]);
     let calls = services::serve(&node, &inbox, Event::Call, maps, Arc::clone(&max_voxels))?;
     let timer = |period, event: fn() -> Event| {
@@ -151,6 +155,8 @@ struct Shell {
     output: MapOutput,
     outputs: Outputs,
     diagnostics: Diagnostics,
+    /// Until there is a map.
+    unmapped: Option<Unmapped>,
     /// Clouds that found the inbox full.
     lost: Arc<AtomicU64>,
     /// Losses before it: of clouds, and of all inputs.
@@ -172,10 +178,13 @@ impl Shell {
     fn on(&mut self, event: Event) {
         match event {
             Event::Cloud(cloud) => {
-                if let Err(refusal) = self.machine.on_cloud(&cloud)
-                    && let Some(more) = self.refusals.check()
-                {
-                    log::warn!("{refusal} ({more} more like it)");
+                if let Err(refusal) = self.machine.on_cloud(&cloud) {
+                    if let Some(more) = self.refusals.check() {
+                        log::warn!("{refusal} ({more} more like it)");
+                    }
+                    if let Some(unmapped) = &mut self.unmapped {
+                        unmapped.last_refusal = Some(refusal.to_string());
+                    }
                 }
                 if self.machine.counts().clouds_no_viewpoint == 1 {
                     self.no_viewpoints
@@ -259,8 +268,12 @@ impl Shell {
         self.lost.load(Ordering::Relaxed) + self.clouds.lost()
     }
 
-    fn diagnose(&self) {
+    fn diagnose(&mut self) {
+        let voxels = self.machine.cells().len();
         let counts = self.machine.counts();
+        if counts.points_mapped > 0 || voxels > 0 {
+            self.unmapped = None;
+        }
         let lost = self.clouds_lost();
         let updates = self.output.updates_lost();
         let not_published = updates + self.output.chunks_lost();
@@ -268,6 +281,8 @@ impl Shell {
             counts.clouds_malformed + counts.clouds_wrong_frame + counts.clouds_stamp_jump;
         let (level, message) = if let Some(problem) = self.autosave.problem() {
             (Level::Error, problem)
+        } else if let Some(unmapped) = &self.unmapped {
+            (Level::Warn, unmapped.message(counts))
         } else if counts.clouds_in == 0 {
             (Level::Warn, "no cloud yet".to_owned())
         } else if counts.points_list_full > 0 {
@@ -298,7 +313,8 @@ impl Shell {
                 "chunks_not_published".into(),
                 self.output.chunks_lost().to_string(),
             ),
-            ("voxels".into(), self.machine.cells().len().to_string()),
+            ("voxels".into(), voxels.to_string()),
+            (WORKING.into(), self.unmapped.is_none().to_string()),
             ("rms_m".into(), format!("{:.5}", distortion.rms_m)),
         ]);
         self.diagnostics.set("map", level, message, values);

@@ -121,6 +121,8 @@ pub fn start(runtime: &Runtime, name: &str) -> Result<Finish, NodeError> {
     let infos = node.subscribe("headset/label_info", Qos::LATCHED, Load::Small, on_info)?;
 
     losses.watch([&maps, &updates, &clouds, &sessions, &infos]);
+    // A headset comes when its wearer does.
+    node.expect_publishers([&maps], "lattice_mapper", None, |_| true);
     let to = inbox.clone();
     // One answer does not wait for another: a busy server says so at once.
     let service =

@@ -1,6 +1,7 @@
 //! `lattice replay`: maps of a log.
 
 pub mod node_process;
+mod params;
 mod processes;
 
 use std::ffi::OsString;
@@ -20,8 +21,6 @@ use lattice_nodes::lattice_mapper::MapperOptions;
 use lattice_nodes::replay::{self, Pipeline, RunReport, Slice, TopicPlan, TopicWishes};
 use lattice_nodes::voxel_marker_publisher::MarkerOptions;
 use lattice_runtime::LoopbackDomain;
-use lattice_runtime::params::Params;
-use lattice_runtime::ros_args::RosArgs;
 use processes::DdsReplay;
 pub use processes::{param, yaml_text};
 
@@ -116,6 +115,7 @@ impl Replay {
 
     /// Runs the replay and returns its report, in which the map may be empty.
     pub fn replay(&self) -> CliResult<RunReport> {
+        self.check_names()?;
         if self.direct {
             return self.replay_direct();
         }
@@ -271,18 +271,6 @@ impl Replay {
             map_frame: frame("map_frame")?,
             base_frame: frame("base_frame")?,
         })
-    }
-
-    fn params_of(&self, node: &str) -> CliResult<Params> {
-        let mut arguments = vec!["--ros-args".to_owned()];
-        for file in &self.params {
-            arguments.extend(["--params-file".to_owned(), file.display().to_string()]);
-        }
-        for param in &self.param {
-            arguments.extend(["-p".to_owned(), param.clone()]);
-        }
-        let args = RosArgs::parse(arguments)?;
-        Ok(Params::load(&args, &format!("/{node}"))?)
     }
 }
 

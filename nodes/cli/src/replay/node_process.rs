@@ -70,13 +70,8 @@ impl NodeProcess {
         // The first of several writes the report.
         let first = nodes.first().copied().unwrap_or_default();
         let report_file = param(&format!("{first}:report_file"), &yaml_text(report));
-        for param in replay
-            .options
-            .param
-            .iter()
-            .chain(params)
-            .chain([&report_file])
-        {
+        let given = replay.options.params_for(&nodes)?;
+        for param in given.iter().chain(params).chain([&report_file]) {
             command.args(["-p", param]);
         }
         let what = match namespace {
@@ -214,7 +209,9 @@ fn forward(
             // Twelve processes say the same of one machine: it is shown once.
             let text = line.rsplit_once("]: ").map_or(&*line, |(_, text)| text);
             let warning = line.contains("[WARN]") || line.contains("[ERROR]");
-            if warning && first_time(text) {
+            // The player starts when all others have found each other.
+            let expected = text.starts_with("no publisher on ");
+            if warning && !expected && first_time(text) {
                 log::warn!("{name}: {text}");
             } else {
                 log::debug!("{name}: {line}");

@@ -1,13 +1,19 @@
 //! `lattice health` beside a node that is well, one that is not, and none.
 
 use std::process::{Command, Output};
-use std::time::Duration;
+use std::sync::{Arc, Mutex};
+use std::time::{Duration, Instant};
 
 use lattice_msgs::diagnostic_msgs::{DiagnosticArray, DiagnosticStatus};
+use lattice_msgs::sensor_msgs::{PointCloud2, PointField};
+use lattice_nodes::convert::{cloud, geometry};
 use lattice_runtime::env::Network;
 use lattice_runtime::qos::Qos;
 use lattice_runtime::ros_args::RosArgs;
 use lattice_runtime::{LoopbackDomain, Runtime};
+
+use crate::PATIENCE;
+use crate::record::start;
 
 fn health(domain: &LoopbackDomain, arguments: &[&str]) -> Output {
     Command::new(env!("CARGO_BIN_EXE_lattice"))
@@ -65,11 +71,62 @@ fn health_is_what_nodes_say_of_themselves() {
         let said = String::from_utf8_lossy(&output.stdout);
         assert_eq!(output.status.success(), well, "{arguments:?}: {said}");
         assert!(said.contains(words), "{arguments:?}: {said}");
-    } // Each of those that publish is heard, not the first alone.
+    }
+    // Each of those that publish is heard, not the first alone.
     let output = health(&domain, &["--timeout", "60"]);
     let said = String::from_utf8_lossy(&output.stdout);
     assert!(!output.status.success(), "{said}");
     for words in ["well: transport", "no disk"] {
         assert!(said.contains(words), "{said}");
     }
+}
+
+/// A cloud of one point.
+fn cloud(frame: &str) -> PointCloud2 {
+    let data = [1.0_f32, 2.0, 3.0].map(f32::to_le_bytes).concat();
+    let fields = cloud::xyz_fields(PointField::FLOAT32, 4);
+    cloud::dense_cloud(geometry::header(frame, 1), fields, 12, 1, data)
+}
+
+#[test]
+fn a_mapper_is_not_well_until_it_has_mapped_a_cloud() {
+    let domain = LoopbackDomain::take().unwrap();
+    let network = Network {
+        domain_id: domain.id(),
+        localhost_only: true,
+        ..Network::from_env().unwrap()
+    };
+    let mut mapper = start(&domain, &["node", "lattice_mapper"]);
+    let ask = || health(&domain, &["lattice_mapper", "--timeout", "60"]);
+    let until = |well: bool, expected: &str| {
+        let begin = Instant::now();
+        loop {
+            let output = ask();
+            let said = String::from_utf8_lossy(&output.stdout);
+            if output.status.success() == well && said.contains(expected) {
+                return;
+            }
+            assert!(begin.elapsed() < PATIENCE, "{expected}: {said}");
+        }
+    };
+    until(false, "s ago: none came on /points_enu");
+    let begin =
+        "WARN lattice_mapper: inputs: no publisher on /points_enu (sensor_msgs/msg/PointCloud2)";
+    until(false, begin);
+    let runtime = Runtime::with_transport("driver", RosArgs::default(), &network).unwrap();
+    let node = runtime.node("driver").unwrap();
+    let points = node.publisher("points_enu", Qos::reliable(10)).unwrap();
+    let frame = Arc::new(Mutex::new("velodyne"));
+    let of = Arc::clone(&frame);
+    let _timer = runtime.timer(Duration::from_millis(100), move || {
+        let _ = points.publish(cloud(*of.lock().unwrap()));
+    });
+    until(
+        false,
+        "the last was refused: cloud in frame 'velodyne', expected 'map'",
+    );
+    *frame.lock().unwrap() = "map";
+    until(true, "OK lattice_mapper: inputs: publishers on all topics");
+    mapper.kill().unwrap();
+    mapper.wait().unwrap();
 }

@@ -11,6 +11,7 @@ mod indoor;
 mod lifecycle;
 mod map;
 mod merger;
+mod names;
 mod nodes;
 mod paper;
 mod player;

@@ -13,7 +13,7 @@ use wait_timeout::ChildExt;
 use crate::nodes::{figures, simulated};
 use crate::{PATIENCE, json, python, text};
 
-const PEER: &str = concat!(
+pub const PEER: &str = concat!(
     env!("CARGO_MANIFEST_DIR"),
     "/../../test/python/record_peer.py"
 );

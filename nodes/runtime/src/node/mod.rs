@@ -1,11 +1,13 @@
 //! A logical node: name, parameters, remaps, and the endpoints made under them.
 
+mod expected;
 mod services;
 
 use std::sync::Arc;
 
 use lattice_msgs::RosMessage;
 
+use self::expected::Expected;
 use super::clock::Clock;
 use super::diagnostics::Diagnostics;
 use super::error::RuntimeError;
@@ -38,6 +40,7 @@ struct Inner {
     clock: Clock,
     max_message_bytes: usize,
     gate: Arc<Gate>,
+    expected: Arc<Expected>,
 }
 
 impl Node {
@@ -72,6 +75,7 @@ impl Node {
             clock,
             max_message_bytes,
             gate: Arc::default(),
+            expected: Arc::default(),
         };
         Ok(Self {
             inner: Arc::new(inner),

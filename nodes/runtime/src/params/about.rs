@@ -14,6 +14,15 @@ pub struct About {
     pub fixed: Option<&'static str>,
 }
 
+impl About {
+    pub(super) fn is_of(&self, name: &str) -> bool {
+        match self.name.strip_prefix('*') {
+            Some(ending) => name.starts_with("qos.") && name.ends_with(ending),
+            None => self.name == name,
+        }
+    }
+}
+
 /// A table of [`About`]: `"name": "text";` for what may change, `"name" fixed("reason"): "text";` for the rest.
 #[macro_export]
 macro_rules! about {
@@ -110,12 +119,8 @@ impl Declared {
 
 impl State {
     pub(super) fn about_of(&self, name: &str) -> Option<&'static About> {
-        let is_of = |about: &&About| match about.name.strip_prefix('*') {
-            Some(ending) => name.starts_with("qos.") && name.ends_with(ending),
-            None => about.name == name,
-        };
         let tables = self.about.iter().copied().chain([OF_EVERY_NODE]);
-        tables.flatten().find(is_of)
+        tables.flatten().find(|about| about.is_of(name))
     }
 }
 

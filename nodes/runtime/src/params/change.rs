@@ -96,8 +96,9 @@ impl Params {
         let mut state = lock(&self.state);
         if let Some(declared) = state.declared.get_mut(name) {
             declared.value = value.clone();
-            let (value, origin) = (value.clone(), Origin::Service);
-            state.given.insert(name.to_owned(), Given { value, origin });
+            state
+                .given
+                .insert(name.to_owned(), Given::set(value.clone()));
         }
         drop(state);
         changes.tell(Values::new(), [(name.to_owned(), value)].into());
@@ -139,8 +140,7 @@ impl Params {
             }
         }
         for (name, value) in values {
-            let (value, origin) = (value.clone(), Origin::Service);
-            state.given.insert(name.clone(), Given { value, origin });
+            state.given.insert(name.clone(), Given::set(value.clone()));
         }
         state.declared.clear();
         let candidate = Params {
@@ -149,6 +149,17 @@ impl Params {
         };
         *lock(&candidate.state) = state;
         candidate
+    }
+}
+
+impl Given {
+    /// A value that was set at run time.
+    fn set(value: ParamValue) -> Self {
+        Self {
+            value,
+            origin: Origin::Service,
+            named: true,
+        }
     }
 }
 

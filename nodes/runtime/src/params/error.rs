@@ -35,4 +35,16 @@ pub enum ParamError {
         /// The problem with it, and what would be right.
         problem: String,
     },
+    /// The node has no such parameter.
+    #[error("parameter '{name}' of {node} is unknown{origin}; {remedy}")]
+    Unknown {
+        /// The parameter.
+        name: String,
+        /// The node's name, or those of several.
+        node: String,
+        /// The place of a file in brackets after a space; empty: the command line.
+        origin: String,
+        /// The nearest name, or how to see all of them.
+        remedy: String,
+    },
 }

@@ -5,17 +5,22 @@ mod about;
 mod change;
 mod error;
 mod ranges;
+mod sections;
+mod unknown;
 
 pub use crate::param_value::{ParamValue, ValueError};
 pub use about::{About, Declared, Range};
 pub(crate) use change::Refusal;
 pub use error::ParamError;
+pub use sections::{Addressed, addressed};
+pub use unknown::{Unknown, is_near, nearest};
 
 use std::collections::BTreeMap;
 use std::path::{Path, PathBuf};
 use std::sync::Mutex;
 
 use self::change::Changes;
+use crate::names;
 use crate::params_file::{self, NodePattern};
 use crate::ros_args::RosArgs;
 use crate::sync::lock;
@@ -42,6 +47,8 @@ struct State {
 struct Given {
     value: ParamValue,
     origin: Origin,
+    /// True if it is for this node by name; false: for all nodes that are given the file or the arguments.
+    named: bool,
 }
 
 #[derive(Clone, Debug)]
@@ -77,6 +84,13 @@ impl Params {
         Self::load_renamed(args, node_fqn, name_of(node_fqn))
     }
 
+    /// The same of the node that is called `code_name` in the code, under the name and namespace that the
+    /// arguments give it.
+    pub fn of_node(args: &RosArgs, code_name: &str) -> Result<Params, ParamError> {
+        let (name, namespace) = (args.node_name(code_name), args.namespace(code_name));
+        Self::load_renamed(args, &names::fully_qualified(&name, &namespace), code_name)
+    }
+
     /// The same for a node that is called `code_name` in the code: of a file that does not name the node
     /// itself, it takes what is under that name, which rcl does not do.
     pub(crate) fn load_renamed(
@@ -94,7 +108,8 @@ impl Params {
         let node_name = name_of(node_fqn);
         for rule in &args.param_overrides {
             if rule.node.as_deref().is_none_or(|node| node == node_name) {
-                params.give(rule.name.clone(), rule.value.clone(), Origin::CommandLine);
+                let (value, named) = (rule.value.clone(), rule.node.is_some());
+                params.give(rule.name.clone(), value, Origin::CommandLine, named);
             }
         }
         Ok(params)
@@ -110,7 +125,7 @@ impl Params {
             ..Params::default()
         };
         for (name, value) in values {
-            params.give(name.into(), value, Origin::CommandLine);
+            params.give(name.into(), value, Origin::CommandLine, true);
         }
         params
     }
@@ -126,16 +141,20 @@ impl Params {
         for entry in entries {
             if for_us(&entry.nodes) || !knows_us && by_code(&entry.nodes) {
                 let (path, key) = (path.to_owned(), entry.key);
-                self.give(entry.name, entry.value, Origin::File { path, key });
+                let named = entry.nodes.name().is_some();
+                self.give(entry.name, entry.value, Origin::File { path, key }, named);
             }
         }
         Ok(())
     }
 
-    fn give(&self, name: String, value: ParamValue, origin: Origin) {
-        lock(&self.state)
-            .given
-            .insert(name, Given { value, origin });
+    fn give(&self, name: String, value: ParamValue, origin: Origin, named: bool) {
+        let given = Given {
+            value,
+            origin,
+            named,
+        };
+        lock(&self.state).given.insert(name, given);
     }
 
     /// A bool; `yes`, `on`, `no`, `off` count.
@@ -207,13 +226,15 @@ impl Params {
         let given = lock(&self.state).given.get(name).cloned();
         let value = match given {
             None => default.clone(),
-            Some(Given { value, origin }) => convert(&value).ok_or_else(|| ParamError::Type {
-                node: self.node.clone(),
-                name: name.to_owned(),
-                expected,
-                found: format!("{} {}", value.type_name(), brief(&value)),
-                origin: origin.to_string(),
-            })?,
+            Some(Given { value, origin, .. }) => {
+                convert(&value).ok_or_else(|| ParamError::Type {
+                    node: self.node.clone(),
+                    name: name.to_owned(),
+                    expected,
+                    found: format!("{} {}", value.type_name(), brief(&value)),
+                    origin: origin.to_string(),
+                })?
+            }
         };
         let mut state = lock(&self.state);
         let about = state.about_of(name);
@@ -221,6 +242,16 @@ impl Params {
         let all = &mut state.declared;
         all.entry(name.to_owned()).or_insert_with(declared);
         Ok(value)
+    }
+
+    /// Full name of the node.
+    pub fn node(&self) -> &str {
+        &self.node
+    }
+
+    /// True if the node has read the parameter.
+    pub fn has(&self, name: &str) -> bool {
+        lock(&self.state).declared.contains_key(name)
     }
 
     /// True if a file or the command line gives the parameter.
@@ -244,7 +275,7 @@ impl Params {
         }
     }
 
-    /// Parameters given and never read by the node, sorted: typing errors, mostly.
+    /// Parameters given and never read by the node, sorted.
     pub fn unused(&self) -> Vec<String> {
         let State {
             given, declared, ..

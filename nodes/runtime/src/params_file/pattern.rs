@@ -3,12 +3,12 @@ use crate::names::is_identifier;
 /// The nodes a section of a parameter file is for, for example `/**` or `/robot/*/mapper`.
 ///
 /// `*` stands for one part of a node's full name, `**` for any number of them.
-#[derive(Clone, Debug, PartialEq, Eq)]
+#[derive(Clone, Debug, PartialEq, Eq, PartialOrd, Ord)]
 pub struct NodePattern {
     parts: Vec<Part>,
 }
 
-#[derive(Clone, Debug, PartialEq, Eq)]
+#[derive(Clone, Debug, PartialEq, Eq, PartialOrd, Ord)]
 enum Part {
     Name(String),
     One,
@@ -34,9 +34,17 @@ impl NodePattern {
         })
     }
 
+    /// The node name that is the last part of the pattern; none where that is a wildcard.
+    pub fn name(&self) -> Option<&str> {
+        match self.parts.last() {
+            Some(Part::Name(name)) => Some(name),
+            _ => None,
+        }
+    }
+
     /// True if the last part of the pattern is this node name itself, not a wildcard.
     pub fn names(&self, node_name: &str) -> bool {
-        matches!(self.parts.last(), Some(Part::Name(name)) if name == node_name)
+        self.name() == Some(node_name)
     }
 
     /// True if the pattern covers the node of this full name.
