@@ -1,5 +1,9 @@
 //! The `lattice` command, and every node by its name.
 
+// First, for its macros.
+#[macro_use]
+mod streams;
+
 #[cfg(feature = "bags")]
 mod bag;
 mod calibrate;
@@ -82,6 +86,7 @@ fn main() -> ExitCode {
         Some(name) => node::run(name, std::env::args().skip(1)),
         None => Cli::parse().command.run(),
     };
+    let result = result.and_then(|()| Ok(streams::finish()?));
     match result {
         Ok(()) => ExitCode::SUCCESS,
         Err(error) => {

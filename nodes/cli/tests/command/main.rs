@@ -15,6 +15,7 @@ mod paper;
 mod player;
 mod record;
 mod respawn;
+mod streams;
 mod viewer;
 mod viewer_foreign;
 mod viewer_headset;
