@@ -6,6 +6,8 @@ mod streams;
 
 #[cfg(feature = "bags")]
 mod bag;
+#[cfg(feature = "bags")]
+mod calendar;
 mod calibrate;
 mod fleet;
 mod health;

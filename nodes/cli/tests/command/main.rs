@@ -1,6 +1,7 @@
 //! The `lattice` command as a user runs it.
 #![allow(clippy::unwrap_used)]
 
+mod bag_info;
 mod browser;
 mod calibrate;
 mod evaluate;
