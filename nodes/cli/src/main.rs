@@ -9,6 +9,7 @@ mod bag;
 #[cfg(feature = "bags")]
 mod calendar;
 mod calibrate;
+mod cell_size;
 mod fleet;
 mod health;
 #[cfg(feature = "lab")]
