@@ -17,6 +17,7 @@ mod lab;
 mod link;
 mod map;
 mod node;
+mod points;
 mod progress;
 mod quantize;
 #[cfg(feature = "bags")]
@@ -48,7 +49,7 @@ struct Cli {
 enum Command {
     /// Run several nodes in one process, as parameter files say
     Run(run::Run),
-    /// Show a map in the browser: of a file, of a log, or live
+    /// Show a map in the browser: of a map file, a point file or a log, or live
     #[cfg(feature = "viewer")]
     View(view::View),
     /// Run one node
@@ -67,7 +68,7 @@ enum Command {
     #[cfg(feature = "bags")]
     #[command(subcommand)]
     Bag(bag::Bag),
-    /// Quantize a point file (ply, pcd, xyz, KITTI bin) and show what each lattice makes of it
+    /// Quantize a point file (ply, pcd, las, laz, e57, bt, xyz, KITTI bin) and show what each lattice makes of it
     Quantize(quantize::Quantize),
     /// Find where a cloud lies in a map, without a guess, and whether the answer holds
     Calibrate(Box<calibrate::Calibrate>),

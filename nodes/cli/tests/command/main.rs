@@ -14,6 +14,7 @@ mod merger;
 mod nodes;
 mod paper;
 mod player;
+mod point_files;
 mod record;
 mod respawn;
 mod streams;
