@@ -1,6 +1,7 @@
 //! Options for the size of the cells.
 
 use clap::Args;
+use lattice_nodes::lattice_mapper::cube_m3;
 
 /// Smallest and largest cell size, m; the lattice has the same bounds as volumes.
 const BOUNDS_M: std::ops::RangeInclusive<f64> = 1e-3..=1e3;
@@ -20,8 +21,7 @@ pub struct CellSize {
 impl CellSize {
     /// The volume that is asked for, m^3.
     pub fn volume_m3(&self) -> Option<f64> {
-        let cube = |edge_m: f64| edge_m * edge_m * edge_m;
-        self.cell_volume.or(self.cell_size.map(cube))
+        self.cell_volume.or(self.cell_size.map(cube_m3))
     }
 
     /// Fails, and says why, if one is given where the cells are known.
@@ -63,7 +63,7 @@ mod tests {
             assert_eq!(size(text).unwrap_err(), "expected 0.001 to 1000 m");
         }
         for text in ["0.001", "1000"] {
-            let volume_m3 = size(text).unwrap().powi(3);
+            let volume_m3 = cube_m3(size(text).unwrap());
             let kind = lattice_core::lattice::LatticeKind::Fcc;
             lattice_core::lattice::Lattice::new(kind, volume_m3).unwrap();
         }

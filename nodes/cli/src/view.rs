@@ -7,6 +7,7 @@ use clap::Args;
 use lattice_core::lattice::{Lattice, LatticeKind};
 use lattice_core::voxels::VoxelList;
 use lattice_nodes::files::points::is_named_as_points;
+use lattice_nodes::lattice_mapper::cube_m3;
 use lattice_nodes::viewer_server::{self, ViewerOptions};
 
 use super::CliResult;
@@ -142,7 +143,7 @@ fn quantized(path: &Path, cells: &CellSize) -> CliResult<VoxelList> {
         None => {
             let (size_m, why) = points.usual_cell_m();
             let why = format!(", {why} (--cell-size sets it)");
-            (size_m * size_m * size_m, why)
+            (cube_m3(size_m), why)
         }
     };
     let lattice = Lattice::new(LatticeKind::Fcc, volume_m3)?;

@@ -166,9 +166,16 @@ fn cell_volume_m3(params: &Params) -> Result<f64, ParamError> {
     } else if params.is_given("cell_volume_m3") {
         "`cell_volume_m3` is given too: remove one of them"
     } else {
-        return Ok(size_m * size_m * size_m);
+        return Ok(cube_m3(size_m));
     };
     Err(params.invalid("cell_size_m", problem))
+}
+
+/// Volume of a cube by its edge, m^3, to fifteen digits: that of 0.05 m is 0.000125, as one would type it, so that
+/// cells by size and by volume are the same to the bit.
+pub fn cube_m3(edge_m: f64) -> f64 {
+    let cube = edge_m * edge_m * edge_m;
+    format!("{cube:.14e}").parse().unwrap_or(cube)
 }
 
 fn forget_after_ns(params: &Params) -> Result<i64, ParamError> {
@@ -193,6 +200,14 @@ mod tests {
         let options = MapperOptions::from_params(&params);
         let volume = options.map(|options| options.lattice.cell_volume_m3());
         volume.map_err(|error| error.to_string())
+    }
+
+    #[test]
+    fn cubes_are_as_one_types_them() {
+        for (edge_m, cube) in [(0.05, 0.000125), (0.2, 0.008), (0.7, 0.343), (0.1, 0.001)] {
+            assert_eq!(cube_m3(edge_m), cube);
+        }
+        assert_eq!((cube_m3(1e-3), cube_m3(1e3)), (1e-9, 1e9));
     }
 
     #[test]

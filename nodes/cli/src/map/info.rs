@@ -79,9 +79,7 @@ impl Info {
         }
         println!(
             "lattice        {}, cells of {} m^3 (cell size {:.4} m)",
-            summary.lattice,
-            digits(summary.cell_volume_m3),
-            summary.cell_size_m
+            summary.lattice, summary.cell_volume_m3, summary.cell_size_m
         );
         let without = if summary.counts {
             ""
@@ -106,9 +104,4 @@ impl Info {
         );
         Ok(())
     }
-}
-
-/// A number to nine digits, so that the cube of 0.7 is 0.343.
-fn digits(number: f64) -> f64 {
-    format!("{number:.8e}").parse().unwrap_or(number)
 }

@@ -78,6 +78,7 @@ pub enum PointFileError {
     },
 }
 
+#[cfg(feature = "survey")]
 impl PointFileError {
     /// LAZ or E57, which are read in no order, inside of bzip2.
     pub(super) const PACKED_TWICE: PointFileError = PointFileError::NotRead {
