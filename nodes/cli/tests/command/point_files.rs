@@ -1,7 +1,7 @@
 //! Point files of all kinds, and cells by their size, as a user has them.
 
 use std::fs;
-use std::io::{BufRead, BufReader};
+use std::io::{BufRead, BufReader, Write, stderr};
 use std::process::{Command, Stdio};
 
 use crate::{error, json, lattice, text};
@@ -139,4 +139,24 @@ fn a_point_file_is_shown_in_cells_that_are_told() {
     text(&["quantize", &points, "--map-out", &at("map.xyz")]);
     let told = error(&["view", &at("map.xyz"), "--cell-size", "1"]);
     assert!(told.contains("--cell-size has no use here"), "{told}");
+}
+
+#[test]
+fn an_octree_of_octomap_is_read_voxel_by_voxel() {
+    let data = concat!(env!("CARGO_MANIFEST_DIR"), "/../../../shared/data");
+    let office = format!("{data}/indoor/geb079.bt");
+    if fs::metadata(&office).is_err() {
+        let _ = writeln!(stderr(), "SKIPPED: {office} is not there");
+        return;
+    }
+    // As octomap's own library counts them.
+    let command = ["quantize", &office, "--lattice", "cubic"];
+    let rows = json(&[&command[..], &["--cell-size", "0.16"]].concat());
+    assert_eq!(rows[0]["points"], 185_673);
+    assert_eq!(rows[0]["voxels"], 48_251);
+    let shown = shown(&[&office]);
+    assert!(
+        shown.contains("cell size 0.1600 m, two voxels of the octree"),
+        "{shown}"
+    );
 }

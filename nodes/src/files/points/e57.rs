@@ -50,7 +50,6 @@ fn fault(error: impl ToString) -> PointFileError {
 mod tests {
     use ::e57::{E57Writer, Record, RecordValue};
 
-    use super::*;
     use crate::files::points::{PointFileLimits, read_points};
 
     fn written() -> Vec<u8> {

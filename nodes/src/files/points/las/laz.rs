@@ -80,18 +80,16 @@ impl Packed {
             ));
         }
         let damaged = |error: io::Error| format!("the chunks of the packed points: {error}");
-        self.check_table().map_err(damaged)?;
-        let is_layered = CompressorType::LayeredChunked as u16;
-        match header
-            .laszip
-            .as_deref()
-            .and_then(|record| record.first_chunk())
-        {
-            Some(kind) if u16::from_le_bytes(*kind) == is_layered => {
-                self.check_layers(header).map_err(damaged)
-            }
-            _ => Ok(()),
+        let kind = header.laszip.as_deref();
+        let kind = kind.and_then(|record| record.first_chunk());
+        let kind = kind.map_or(0, |kind| u16::from_le_bytes(*kind));
+        if kind != CompressorType::PointWise as u16 {
+            self.check_table().map_err(damaged)?;
         }
+        if kind == CompressorType::LayeredChunked as u16 {
+            self.check_layers(header).map_err(damaged)?;
+        }
+        Ok(())
     }
 
     /// A table of chunks has a byte or more for each of them.
