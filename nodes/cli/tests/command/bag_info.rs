@@ -86,8 +86,7 @@ fn a_log_is_shown_with_its_dates_rates_sizes_and_frames() {
 fn a_log_without_messages_has_no_dates() {
     let folder = tempfile::tempdir().unwrap();
     let log = folder.path().join("log").display().to_string();
-    let mut options = lattice_bag::WriterOptions::default();
-    options.overwrite = true;
+    let options = lattice_bag::WriterOptions::default();
     let path = std::path::Path::new(&log);
     let storage = lattice_bag::Storage::Mcap;
     let writer = lattice_bag::BagWriter::create(path, storage, options).unwrap();

@@ -77,9 +77,10 @@ fn expect(found: &PointFile, format: PointFormat) {
     assert_eq!(found.labels, [2, u16::MAX, 6]);
     assert_eq!(found.points_m.len(), POINTS.len());
     for (found_m, (steps, _)) in found.points_m.iter().zip(POINTS) {
-        for axis in 0..3 {
-            let expected_m = ORIGIN_M[axis] + 0.01 * f64::from(steps[axis]);
-            assert!((found_m[axis] - expected_m).abs() < 1e-8, "{found_m:?}");
+        let steps = steps.into_iter().zip(ORIGIN_M);
+        for (coordinate_m, (steps, origin_m)) in found_m.iter().zip(steps) {
+            let expected_m = origin_m + 0.01 * f64::from(steps);
+            assert!((coordinate_m - expected_m).abs() < 1e-8, "{found_m:?}");
         }
     }
 }
