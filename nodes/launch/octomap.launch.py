@@ -2,7 +2,7 @@
 
 from launch import LaunchDescription
 from launch.actions import DeclareLaunchArgument
-from launch.substitutions import LaunchConfiguration, PathJoinSubstitution, PythonExpression
+from launch.substitutions import LaunchConfiguration, PathJoinSubstitution
 from launch_ros.actions import Node
 from launch_ros.parameter_descriptions import ParameterValue
 from launch_ros.substitutions import FindPackageShare
@@ -36,7 +36,6 @@ def node(executable, name, remappings, **parameters):
 
 def generate_launch_description():
     frame = value(LaunchConfiguration("frame_id"), str)
-    side_m = LaunchConfiguration("resolution")
     return LaunchDescription([
         *(
             DeclareLaunchArgument(name, default_value=default, description=description)
@@ -58,7 +57,7 @@ def generate_launch_description():
             "octomap_server",
             [("map_centers", "octomap_point_cloud_centers")],
             map_frame=frame,
-            cell_volume_m3=value(PythonExpression(["float(", side_m, ") ** 3"]), float),
+            cell_size_m=value(LaunchConfiguration("resolution"), float),
         ),
         node(
             "voxel_marker_publisher",

@@ -7,7 +7,7 @@ use std::{
 };
 
 use super::{
-    BagError, Messages, TopicInfo,
+    BagError, Messages, Storage, TopicInfo,
     messages::MessageCompression,
     metadata::{CompressionMode, Metadata},
     recover::is_sqlite,
@@ -36,6 +36,7 @@ pub struct BagReader {
     topics: Arc<[TopicInfo]>,
     message_count: u64,
     range_ns: Option<(i64, i64)>,
+    ros_distro: String,
     splits: Arc<[Split]>,
     compression: MessageCompression,
 }
@@ -76,6 +77,24 @@ impl BagReader {
     /// Number of messages, by the bag's index.
     pub fn message_count(&self) -> u64 {
         self.message_count
+    }
+
+    /// The storage files in order of time.
+    pub fn files(&self) -> impl Iterator<Item = &Path> {
+        self.splits.iter().map(|split| split.path.as_path())
+    }
+
+    /// Storage plugin of the files.
+    pub fn storage(&self) -> Storage {
+        match self.is_sqlite() {
+            true => Storage::Sqlite3,
+            false => Storage::Mcap,
+        }
+    }
+
+    /// ROS distribution of the recorder; empty where `metadata.yaml` names none.
+    pub fn ros_distro(&self) -> &str {
+        &self.ros_distro
     }
 
     /// Rows of SQLite files that are no messages and are left out: of no topic, without time or content.
@@ -160,6 +179,10 @@ impl BagReader {
             }
         }
         let all_open = splits.iter().all(|split| split.open.is_some());
+        if !all_open {
+            // Of some files only.
+            (topics.iter_mut()).for_each(|topic| topic.message_bytes = None);
+        }
         let listed = metadata.as_ref().and_then(Metadata::range_ns);
         let seen = splits
             .iter()
@@ -183,6 +206,7 @@ impl BagReader {
                 _ => count,
             },
             range_ns: if all_open { seen } else { listed.or(seen) },
+            ros_distro: metadata.map(|m| m.ros_distro).unwrap_or_default(),
             topics: topics.into(),
             splits: splits.into(),
             compression,
@@ -205,6 +229,7 @@ fn listed_topics(metadata: Option<&Metadata>) -> Vec<TopicInfo> {
             offered_qos: topic.offered_qos_profiles,
             definition: None,
             message_count: counted.message_count,
+            message_bytes: None,
         }
     };
     listed.iter().map(topic).collect()

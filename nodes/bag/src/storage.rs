@@ -123,6 +123,8 @@ pub(crate) fn merge_topic(
         known.offered_qos.clone_from(&topic.offered_qos);
     }
     known.definition = known.definition.take().or_else(|| topic.definition.clone());
+    let bytes = known.message_bytes.into_iter().chain(topic.message_bytes);
+    known.message_bytes = bytes.reduce(u64::saturating_add);
     if counted {
         known.message_count = known.message_count.saturating_add(topic.message_count);
     }

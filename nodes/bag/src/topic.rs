@@ -49,6 +49,8 @@ pub struct TopicInfo {
     pub definition: Option<String>,
     /// Number of its messages, by the bag's index.
     pub message_count: u64,
+    /// Bytes of its messages as they are stored; nothing where the bag's index lacks it, as that of MCAP does.
+    pub message_bytes: Option<u64>,
 }
 
 impl TopicInfo {

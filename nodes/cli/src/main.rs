@@ -1,8 +1,15 @@
 //! The `lattice` command, and every node by its name.
 
+// First, for its macros.
+#[macro_use]
+mod streams;
+
 #[cfg(feature = "bags")]
 mod bag;
+#[cfg(feature = "bags")]
+mod calendar;
 mod calibrate;
+mod cell_size;
 mod fleet;
 mod health;
 #[cfg(feature = "lab")]
@@ -10,6 +17,7 @@ mod lab;
 mod link;
 mod map;
 mod node;
+mod points;
 mod progress;
 mod quantize;
 #[cfg(feature = "bags")]
@@ -41,7 +49,7 @@ struct Cli {
 enum Command {
     /// Run several nodes in one process, as parameter files say
     Run(run::Run),
-    /// Show a map in the browser: of a file, of a log, or live
+    /// Show a map in the browser: of a map file, a point file or a log, or live
     #[cfg(feature = "viewer")]
     View(view::View),
     /// Run one node
@@ -60,7 +68,7 @@ enum Command {
     #[cfg(feature = "bags")]
     #[command(subcommand)]
     Bag(bag::Bag),
-    /// Quantize a point file (ply, pcd, xyz, KITTI bin) and show what each lattice makes of it
+    /// Quantize a point file (ply, pcd, las, laz, e57, bt, xyz, KITTI bin) and show what each lattice makes of it
     Quantize(quantize::Quantize),
     /// Find where a cloud lies in a map, without a guess, and whether the answer holds
     Calibrate(Box<calibrate::Calibrate>),
@@ -82,6 +90,7 @@ fn main() -> ExitCode {
         Some(name) => node::run(name, std::env::args().skip(1)),
         None => Cli::parse().command.run(),
     };
+    let result = result.and_then(|()| Ok(streams::finish()?));
     match result {
         Ok(()) => ExitCode::SUCCESS,
         Err(error) => {

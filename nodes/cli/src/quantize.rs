@@ -3,28 +3,26 @@
 use std::path::PathBuf;
 
 use clap::Args;
-use lattice_core::cloud::Cloud;
 use lattice_core::lattice::{Lattice, Orientation};
 use lattice_core::voxels::file::write_map;
-use lattice_core::voxels::{Payload, VoxelList};
-use nalgebra::Vector3;
 use serde::Serialize;
 
+use super::cell_size::CellSize;
+use super::points::Points;
 use super::{CliResult, Lattices, init_logging};
-use lattice_nodes::files::points::{PointFileLimits, read_points};
 use lattice_nodes::files::whole;
 
 /// Quantize a point file
 #[derive(Args)]
 pub struct Quantize {
-    /// ply, pcd, xyz or txt (also .bz2), or KITTI bin, with the labels of SemanticKITTI from its .label file
+    /// ply, pcd, las, laz, e57, bt (octomap), xyz or txt (also .bz2), or KITTI bin, with the labels of SemanticKITTI
+    /// from its .label file
     file: PathBuf,
     /// cubic, bcc, fcc, mcc, hex, hexopt, several with commas, paper, or all
     #[arg(long, default_value = "all")]
     lattice: Lattices,
-    /// Volume of one cell in m^3
-    #[arg(long, default_value_t = 0.125)]
-    cell_volume: f64,
+    #[command(flatten)]
+    cells: CellSize,
     /// Orientation of the cells: paper, ground (flattest), or a crystal direction that points up, as 110-up
     #[arg(long, default_value = "paper")]
     orientation: Orientation,
@@ -46,6 +44,7 @@ pub struct Quantize {
 struct Row {
     lattice: &'static str,
     cell_volume_m3: f64,
+    cell_size_m: f64,
     points: u64,
     refused_not_finite: u64,
     refused_out_of_range: u64,
@@ -60,50 +59,22 @@ impl Quantize {
     /// Runs the command.
     pub fn run(self) -> CliResult {
         init_logging();
-        let limits = PointFileLimits {
-            max_points: self.max_points,
-        };
-        let file = read_points(&self.file, &limits)
-            .map_err(|e| format!("{}: {e}", self.file.display()))?;
-        let skipped = file.skipped_not_finite as u64;
-        if file.points_m.is_empty() {
-            let why = match skipped {
-                0 => "the file has no points".to_owned(),
-                n => format!("none of its {n} points is finite"),
-            };
-            return Err(format!("{}: {why}", self.file.display()).into());
-        }
-        let labels = file.labels;
-        let points: Vec<Vector3<f64>> = file.points_m.into_iter().map(Vector3::from).collect();
-        // Offsets from the middle keep the digits of far-away coordinates, whatever strays.
-        let datum_m = middle_m(&points);
-        let cloud = Cloud::from_points(0, datum_m, &points);
-        drop(points);
+        let points = Points::read(&self.file, self.max_points)?;
+        let cell_volume_m3 = self.cells.volume_m3().unwrap_or(0.125);
         let mut rows = Vec::new();
         for (i, kind) in self.lattice.0.iter().enumerate() {
-            let lattice = Lattice::new(*kind, self.cell_volume)?;
+            let lattice = Lattice::new(*kind, cell_volume_m3)?;
             let lattice = lattice.with_orientation(self.orientation)?;
-            let list = VoxelList::new(lattice, datum_m, self.max_voxels)?;
-            let mut list = list.with_payload(Payload {
-                // Only the map that is written keeps them.
-                labels: i == 0 && self.map_out.is_some() && !labels.is_empty(),
-                ..Payload::default()
-            });
-            let report = list.insert_labelled(&cloud, &labels);
-            if report.list_full > 0 {
-                let (left, most) = (report.list_full, self.max_voxels);
-                return Err(format!(
-                    "{left} points are beyond --max-voxels {most} on {}: allow more, or take larger cells",
-                    kind.name()
-                )
-                .into());
-            }
+            // Only the map that is written keeps labels.
+            let keep_labels = i == 0 && self.map_out.is_some();
+            let (list, report) = points.quantize(lattice, self.max_voxels, keep_labels)?;
             let distortion = list.distortion();
             rows.push(Row {
                 lattice: kind.name(),
-                cell_volume_m3: self.cell_volume,
+                cell_volume_m3,
+                cell_size_m: list.lattice().cell_side_m(),
                 points: report.inserted,
-                refused_not_finite: report.not_finite + skipped,
+                refused_not_finite: report.not_finite + points.not_finite,
                 refused_out_of_range: report.out_of_range,
                 voxels: list.len(),
                 mse_per_dimension_m2: distortion.mse_per_dimension_m2,
@@ -122,19 +93,6 @@ impl Quantize {
         }
         Ok(())
     }
-}
-
-/// Median of each coordinate in whole kilometres, so that files about their origin keep it.
-fn middle_m(points: &[Vector3<f64>]) -> Vector3<f64> {
-    if points.is_empty() {
-        return Vector3::zeros();
-    }
-    Vector3::from_fn(|axis, _| {
-        let mut values: Vec<f64> = points.iter().map(|p| p[axis]).collect();
-        let middle = values.len() / 2;
-        let (_, median, _) = values.select_nth_unstable_by(middle, f64::total_cmp);
-        (*median / 1000.0).round() * 1000.0
-    })
 }
 
 fn print(rows: &[Row]) {

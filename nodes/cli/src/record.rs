@@ -9,7 +9,7 @@ use lattice_nodes::bag_recorder::{self, Choice, RecorderOptions, RecorderReport}
 use lattice_runtime::ros_args::RosArgs;
 use regex::Regex;
 
-use crate::CliResult;
+use crate::{CliResult, calendar};
 
 /// Kind of the files.
 #[derive(Clone, Copy, ValueEnum)]
@@ -189,25 +189,14 @@ fn print(bag: &str, report: &RecorderReport) {
 /// `rosbag2_2026_05_31-08_07_09`, in UTC.
 fn default_folder() -> PathBuf {
     let now = SystemTime::now().duration_since(UNIX_EPOCH);
-    PathBuf::from(format!(
-        "rosbag2_{}",
-        calendar(now.unwrap_or_default().as_secs())
-    ))
+    folder_of(now.unwrap_or_default().as_secs())
 }
 
-/// Date and time of seconds since 1970, in the Gregorian calendar whose years begin in March.
-fn calendar(seconds: u64) -> String {
-    let (days, second) = (seconds / 86_400 + 719_468, seconds % 86_400);
-    let (era, day_of_era) = (days / 146_097, days % 146_097);
-    let leaps = day_of_era / 1_460 - day_of_era / 36_524 + day_of_era / 146_096;
-    let year_of_era = (day_of_era - leaps) / 365;
-    let day_of_year = day_of_era - (365 * year_of_era + year_of_era / 4 - year_of_era / 100);
-    let from_march = (5 * day_of_year + 2) / 153;
-    let day = day_of_year - (153 * from_march + 2) / 5 + 1;
-    let month = (from_march + 2) % 12 + 1;
-    let year = 400 * era + year_of_era + u64::from(month <= 2);
-    let (hour, minute, second) = (second / 3600, second / 60 % 60, second % 60);
-    format!("{year}_{month:02}_{day:02}-{hour:02}_{minute:02}_{second:02}")
+fn folder_of(seconds: u64) -> PathBuf {
+    let [year, month, day, hour, minute, second] = calendar::utc(seconds);
+    PathBuf::from(format!(
+        "rosbag2_{year}_{month:02}_{day:02}-{hour:02}_{minute:02}_{second:02}"
+    ))
 }
 
 #[cfg(test)]
@@ -217,13 +206,10 @@ mod tests {
     #[test]
     fn folders_are_named_by_the_calendar() {
         for (seconds, name) in [
-            (0, "1970_01_01-00_00_00"),
-            (951_827_696, "2000_02_29-12_34_56"),
-            (1_709_251_199, "2024_02_29-23_59_59"),
-            (1_709_251_200, "2024_03_01-00_00_00"),
-            (4_102_444_800, "2100_01_01-00_00_00"),
+            (0, "rosbag2_1970_01_01-00_00_00"),
+            (1_709_251_199, "rosbag2_2024_02_29-23_59_59"),
         ] {
-            assert_eq!(calendar(seconds), name);
+            assert_eq!(folder_of(seconds), PathBuf::from(name));
         }
     }
 }

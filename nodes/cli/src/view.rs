@@ -4,17 +4,27 @@ use std::net::{IpAddr, SocketAddr};
 use std::path::{Path, PathBuf};
 
 use clap::Args;
+use lattice_core::lattice::{Lattice, LatticeKind};
+use lattice_core::voxels::VoxelList;
+use lattice_nodes::files::points::is_named_as_points;
+use lattice_nodes::lattice_mapper::cube_m3;
 use lattice_nodes::viewer_server::{self, ViewerOptions};
 
 use super::CliResult;
+use crate::cell_size::CellSize;
+use crate::points::Points;
 use crate::run::Run;
 
-/// Show a map in the browser: of a file, of a log, or live
+/// Show a map in the browser: of a map file, a point file or a log, or live
 #[derive(Args)]
 pub struct View {
-    /// A map file; a rosbag2 log, which is mapped first; parameter files, whose nodes are run with the
-    /// viewer. Nothing: the map of the nodes that run on this ROS domain
+    /// A map file; a point file (ply, pcd, las, laz, e57, bt, xyz, txt, csv or KITTI bin, also .bz2), which is quantized
+    /// first, in cells for its extent and number of points unless a size is given; a rosbag2 log, which is mapped
+    /// first; parameter files, whose nodes are run with the viewer. Nothing: the map of the nodes that run on this ROS
+    /// domain
     what: Vec<PathBuf>,
+    #[command(flatten)]
+    cells: CellSize,
     /// Address to listen on; any but this machine's own makes a token
     #[arg(long, default_value = "127.0.0.1")]
     address: IpAddr,
@@ -31,13 +41,18 @@ impl View {
     pub fn run(self) -> CliResult {
         match self.what.as_slice() {
             [one] if kind(one) != Kind::Params => {
-                show(one, SocketAddr::new(self.address, self.port))
+                show(one, &self.cells, SocketAddr::new(self.address, self.port))
             }
             files => {
                 if let Some(other) = files.iter().find(|file| kind(file) != Kind::Params) {
                     let other = other.display();
-                    return Err(format!("{other}: give one map, one log, or {PARAMS}").into());
+                    return Err(format!(
+                        "{other}: give one map, one point file, one log, or {PARAMS}"
+                    )
+                    .into());
                 }
+                self.cells
+                    .expect_none("cells of nodes are set by `cell_size_m` of lattice_mapper")?;
                 self.live()
             }
         }
@@ -62,9 +77,13 @@ impl View {
 #[derive(PartialEq)]
 enum Kind {
     Map,
+    Points,
     Log,
     Params,
 }
+
+/// Most points of a file.
+const MAX_POINTS: usize = 500_000_000;
 
 const PARAMS: &str = "parameter files (.yaml, .yml)";
 
@@ -75,12 +94,22 @@ fn kind(path: &Path) -> Kind {
         _ if path.is_dir() || path.ends_with("metadata.yaml") => Kind::Log,
         Some("mcap" | "db3" | "zstd" | "zst") => Kind::Log,
         Some("yaml" | "yml") => Kind::Params,
+        _ if is_named_as_points(path) && !is_map(path) => Kind::Points,
         _ => Kind::Map,
     }
 }
 
-/// Shows a map file, or the map of a log, until the process is ended.
-fn show(path: &Path, address: SocketAddr) -> CliResult {
+/// True for a map, whatever its name.
+fn is_map(path: &Path) -> bool {
+    std::fs::File::open(path).is_ok_and(lattice_core::voxels::file::is_map)
+}
+
+/// Shows a map file, or the map of a log or of points, until the process is ended.
+fn show(path: &Path, cells: &CellSize, address: SocketAddr) -> CliResult {
+    if kind(path) == Kind::Points {
+        let (_server, url) = serve(&quantized(path, cells)?, address)?;
+        return stay(&url);
+    }
     #[cfg(feature = "bags")]
     let folder = tempfile::tempdir()?;
     #[cfg(feature = "bags")]
@@ -88,17 +117,52 @@ fn show(path: &Path, address: SocketAddr) -> CliResult {
     #[cfg(feature = "bags")]
     let path = match kind(path) {
         Kind::Log => {
-            crate::replay::Replay::of_log(path, &mapped)
-                .replay()?
-                .check()?;
+            let mut replay = crate::replay::Replay::of_log(path, &mapped);
+            replay.cells = *cells;
+            replay.replay()?.check()?;
             &mapped
         }
-        _ => path,
+        _ => {
+            cells.expect_none("the cells of a map file are as they are")?;
+            path
+        }
     };
     let (_server, url) = serve_file(path, address)?;
     // The map is in memory; only a signal ends this process.
     #[cfg(feature = "bags")]
     drop(folder);
+    stay(&url)
+}
+
+/// The map of a point file on the FCC lattice, with a line that says which cells it has.
+fn quantized(path: &Path, cells: &CellSize) -> CliResult<VoxelList> {
+    crate::init_logging();
+    let points = Points::read(path, MAX_POINTS)?;
+    let (volume_m3, why) = match cells.volume_m3() {
+        Some(volume_m3) => (volume_m3, String::new()),
+        None => {
+            let (size_m, why) = points.usual_cell_m();
+            let why = format!(", {why} (--cell-size sets it)");
+            (cube_m3(size_m), why)
+        }
+    };
+    let lattice = Lattice::new(LatticeKind::Fcc, volume_m3)?;
+    let size_m = lattice.cell_side_m();
+    let (list, report) = points.quantize(lattice, usize::MAX, true)?;
+    let (path, voxels) = (path.display(), list.len());
+    println!(
+        "{path}: {} points, {voxels} voxels of the FCC lattice, cell size {size_m:.4} m{why}",
+        report.inserted
+    );
+    let refused = points.not_finite + report.not_finite + report.out_of_range;
+    if refused > 0 {
+        println!("{refused} points are not finite or too far away, and left out");
+    }
+    Ok(list)
+}
+
+/// Serves until the process is ended.
+fn stay(url: &str) -> CliResult {
     println!("the map is at {url}, until Ctrl-C");
     loop {
         std::thread::park();
@@ -108,12 +172,17 @@ fn show(path: &Path, address: SocketAddr) -> CliResult {
 /// Serves a map file; gives the server and the address to open.
 pub fn serve_file(path: &Path, address: SocketAddr) -> CliResult<(viewer_server::Server, String)> {
     let (map, _) = crate::map::read(path).map_err(|error| {
+        let points = "a point file (.ply, .pcd, .las, .laz, .e57, .bt, .xyz, .txt, .csv, .bin)";
         let logs = "a log (a rosbag2 folder, .mcap, .db3, each also as .zstd)";
-        format!("{error}; what is shown is a map (.lattice), {logs}, or {PARAMS}")
+        format!("{error}; what is shown is a map (.lattice), {points}, {logs}, or {PARAMS}")
     })?;
+    serve(&map.into_list(usize::MAX), address)
+}
+
+fn serve(list: &VoxelList, address: SocketAddr) -> CliResult<(viewer_server::Server, String)> {
     let options = ViewerOptions {
         address,
         ..ViewerOptions::default()
     };
-    Ok(viewer_server::serve(&map.into_list(usize::MAX), &options)?)
+    Ok(viewer_server::serve(list, &options)?)
 }

@@ -31,13 +31,13 @@ const MAP_MAGIC: &[u8; 7] = b"LATTICE";
 pub struct SemanticFile {
     /// Points in the frame of the file, with labels where the file has some.
     pub cloud: SemanticCloud,
-    /// Side of a cube as large as a voxel, metres, if the file is a map.
+    /// Side of a cube as large as a voxel, metres, if the file is a map or an octree.
     pub cell_side_m: Option<f64>,
     /// Points left out because a coordinate was NaN or infinite.
     pub skipped_not_finite: usize,
 }
 
-/// Reads a map file, of which each voxel is a point, or a point file with or without a number `label`.
+/// Reads a map file or an octree, of which each voxel is a point, or a point file with or without a number `label`.
 ///
 /// At most `max_points` points; errors name the file.
 pub fn read_semantic(
@@ -65,7 +65,7 @@ pub fn read_semantic(
                 .map(LabelDistribution::hard)
                 .collect(),
         },
-        cell_side_m: None,
+        cell_side_m: file.voxel_m,
         skipped_not_finite: file.skipped_not_finite,
     })
 }

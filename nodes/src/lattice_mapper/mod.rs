@@ -23,7 +23,7 @@ mod unmapped;
 pub use counts::MapperCounts;
 pub use free_options::{FreeSpaceMethod, MappedFreeSpace};
 pub use operations::LoadRefusal;
-pub use options::{MapPayload, MapperOptions};
+pub use options::{MapPayload, MapperOptions, cube_m3};
 pub use parameters::declare;
 pub use refusal::CloudRefusal;
 pub use report::MapperReport;

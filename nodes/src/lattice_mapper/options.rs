@@ -85,7 +85,7 @@ impl MapperOptions {
         let kind: LatticeKind = name
             .parse()
             .map_err(|e| params.invalid("lattice", format!("{e}")))?;
-        let lattice = Lattice::new(kind, params.f64("cell_volume_m3", 0.125)?)
+        let lattice = Lattice::new(kind, cell_volume_m3(params)?)
             .map_err(|e| params.invalid("cell_volume_m3", format!("{e}")))?;
         let lattice = Self::orientation_from(params)
             .map(|orientation| lattice.with_orientation(orientation))?
@@ -154,6 +154,30 @@ impl MapperOptions {
     }
 }
 
+/// Volume of a cell, which either of two parameters gives.
+fn cell_volume_m3(params: &Params) -> Result<f64, ParamError> {
+    let volume_m3 = params.f64("cell_volume_m3", 0.125)?;
+    let size_m = params.f64("cell_size_m", 0.0)?;
+    if size_m == 0.0 {
+        return Ok(volume_m3);
+    }
+    let problem = if !(1e-3..=1e3).contains(&size_m) {
+        "expected 0.001 to 1000 m, or 0.0 for that of `cell_volume_m3`"
+    } else if params.is_given("cell_volume_m3") {
+        "`cell_volume_m3` is given too: remove one of them"
+    } else {
+        return Ok(cube_m3(size_m));
+    };
+    Err(params.invalid("cell_size_m", problem))
+}
+
+/// Volume of a cube by its edge, m^3, to fifteen digits: that of 0.05 m is 0.000125, as one would type it, so that
+/// cells by size and by volume are the same to the bit.
+pub fn cube_m3(edge_m: f64) -> f64 {
+    let cube = edge_m * edge_m * edge_m;
+    format!("{cube:.14e}").parse().unwrap_or(cube)
+}
+
 fn forget_after_ns(params: &Params) -> Result<i64, ParamError> {
     let seconds = params.f64("forget_after_s", 0.0)?;
     // A century; and less than a nanosecond is not an age.
@@ -162,4 +186,44 @@ fn forget_after_ns(params: &Params) -> Result<i64, ParamError> {
     }
     let problem = format!("{seconds}, expected 0 (never) or 0.001 to 3e9");
     Err(params.invalid("forget_after_s", problem))
+}
+
+#[cfg(test)]
+mod tests {
+    use lattice_runtime::params::ParamValue;
+
+    use super::*;
+
+    fn volume_m3(values: &[(&str, f64)]) -> Result<f64, String> {
+        let values = values.iter().map(|&(name, v)| (name, ParamValue::F64(v)));
+        let params = Params::from_values("/lattice_mapper", values);
+        let options = MapperOptions::from_params(&params);
+        let volume = options.map(|options| options.lattice.cell_volume_m3());
+        volume.map_err(|error| error.to_string())
+    }
+
+    #[test]
+    fn cubes_are_as_one_types_them() {
+        for (edge_m, cube) in [(0.05, 0.000125), (0.2, 0.008), (0.7, 0.343), (0.1, 0.001)] {
+            assert_eq!(cube_m3(edge_m), cube);
+        }
+        assert_eq!((cube_m3(1e-3), cube_m3(1e3)), (1e-9, 1e9));
+    }
+
+    #[test]
+    fn cells_have_a_volume_or_a_size() {
+        assert_eq!(volume_m3(&[]), Ok(0.125));
+        assert_eq!(volume_m3(&[("cell_volume_m3", 2.0)]), Ok(2.0));
+        assert_eq!(volume_m3(&[("cell_size_m", 0.25)]), Ok(0.015625));
+        let unset = [("cell_size_m", 0.0), ("cell_volume_m3", 2.0)];
+        assert_eq!(volume_m3(&unset), Ok(2.0));
+        let both = volume_m3(&[("cell_size_m", 0.25), ("cell_volume_m3", 2.0)]);
+        let refusal = both.unwrap_err();
+        let names_both = refusal.contains("`cell_volume_m3`") && refusal.contains("cell_size_m");
+        assert!(names_both, "{refusal}");
+        for size_m in [-0.2, 1e-4, 1e4, f64::INFINITY] {
+            let refusal = volume_m3(&[("cell_size_m", size_m)]).unwrap_err();
+            assert!(refusal.contains("expected 0.001 to 1000 m"), "{refusal}");
+        }
+    }
 }

@@ -14,6 +14,7 @@ const ABOUT: &[About] = about! {
     "lattice" fixed(MAP): "cubic, bcc, fcc, mcc, hex or hexopt.";
     "lattice_orientation" fixed(MAP): "How its cells lie: paper (axes as Ryde & Bruenig print them), ground (flattest), or a crystal direction that points up, as 110-up.";
     "cell_volume_m3" fixed(MAP): "Volume of one cell: 0.125 is as much as a cube of 0.5 m.";
+    "cell_size_m" fixed(MAP): "Edge of the cube with the volume of one cell, in place of cell_volume_m3; 0.0: as cell_volume_m3 says.";
     "map_frame" fixed(options::FRAME): "Frame that clouds must be in.";
     "datum_m" fixed(MAP): "Keys are counted from the lattice point next to this place in the map frame. They reach a million cells in every direction.";
     "payload" fixed(MAP): "centroid: count and mean of the points of each voxel; occupancy: 2 to 3 bytes a voxel, without count, mean, labels and stamps.";

@@ -161,6 +161,7 @@ impl Contents {
                 .map(|s| s.text.clone())
                 .filter(|text| !text.is_empty()),
             message_count: self.counts.get(&id).copied().unwrap_or(0),
+            message_bytes: None,
         }
     }
 }

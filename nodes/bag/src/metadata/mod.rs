@@ -52,8 +52,8 @@ pub(crate) struct Metadata {
     /// Nothing: its users' own pairs are not read.
     #[serde(skip_deserializing)]
     pub custom_data: (),
-    #[serde(skip_deserializing)]
-    pub ros_distro: &'static str,
+    #[serde(deserialize_with = "null_is_default")]
+    pub ros_distro: String,
 }
 
 #[derive(Clone, Copy, Debug, Default, Serialize, Deserialize)]

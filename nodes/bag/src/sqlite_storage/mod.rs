@@ -169,21 +169,28 @@ impl SqliteFile {
             Ok(first.zip(last))
         });
         self.info.range_ns = range.map_err(wrong)?;
+        for topic in &mut self.info.topics {
+            topic.message_bytes = Some(0);
+        }
         let select = format!(
-            "SELECT COALESCE(CAST(topic_id AS INTEGER), -1), COUNT(*), SUM({IMPLAUSIBLE}) \
-             FROM messages GROUP BY 1"
+            "SELECT COALESCE(CAST(topic_id AS INTEGER), -1), COUNT(*), SUM({IMPLAUSIBLE}), \
+             TOTAL(octet_length(data)) FROM messages GROUP BY 1"
         );
         let mut statement = connection.prepare(&select).map_err(wrong)?;
         let rows = statement.query_map([], |row| {
-            Ok((row.get::<_, i64>(0)?, row.get(1)?, row.get(2)?))
+            Ok((row.get::<_, i64>(0)?, row.get(1)?, row.get(2)?, row.get(3)?))
         });
         for row in rows.map_err(wrong)? {
-            let (id, count, implausible): (i64, i64, i64) = row.map_err(wrong)?;
+            let (id, count, implausible, bytes): (i64, i64, i64, f64) = row.map_err(wrong)?;
             let [count, implausible] = [count, implausible].map(i64::unsigned_abs);
             let is_topic = self.topic_of.contains_key(&id);
             let implausible = if is_topic { implausible } else { count };
             self.info.implausible += implausible;
             self.count(id, count.saturating_sub(implausible));
+            let index = self.topic_of.get(&id).copied();
+            if let Some(topic) = index.and_then(|index| self.info.topics.get_mut(index)) {
+                topic.message_bytes = Some(bytes as u64);
+            }
         }
         Ok(())
     }
@@ -199,6 +206,7 @@ impl SqliteFile {
     /// Lists the messages up to the damage, in the order they were written.
     fn rescue(&mut self, connection: &Connection, mut damage: BagError) {
         for topic in &mut self.info.topics {
+            topic.message_bytes = None;
             topic.message_count = 0;
         }
         self.info.message_count = 0;

@@ -153,6 +153,7 @@ impl BagWriter {
             offered_qos: topic.offered_qos,
             definition: topic.definition,
             message_count: 0,
+            message_bytes: None,
         };
         announce(&mut self.part, &info)?;
         self.names.insert(info.name.clone());
@@ -303,7 +304,7 @@ impl BagWriter {
             .into(),
             relative_file_paths: files.iter().map(|file| file.path.clone()).collect(),
             files,
-            ros_distro: ROS_DISTRO,
+            ros_distro: ROS_DISTRO.into(),
             ..Metadata::default()
         }
     }

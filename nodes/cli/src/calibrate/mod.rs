@@ -32,8 +32,8 @@ use options::SearchOptions;
 /// than `auto` if it converged; the answer is printed in any case.
 #[derive(Args)]
 pub struct Calibrate {
-    /// Map file, or ply, pcd, xyz (also .bz2) with or without a number `label` of each point, or KITTI bin with
-    /// a .label file of SemanticKITTI beside it or in ../labels; metres, z up
+    /// Map file, or ply, pcd, xyz (also .bz2) with or without a number `label` of each point, las, laz, e57, bt
+    /// (octomap), or KITTI bin with a .label file of SemanticKITTI beside it or in ../labels; metres, z up
     #[arg(long, value_name = "FILE")]
     map: PathBuf,
     /// Cloud to find in it, of the same kinds; gravity along -z once the axes are those of ROS. Several
@@ -62,8 +62,8 @@ pub struct Calibrate {
     /// after a calibration that is OK
     #[arg(long, value_name = "FILE")]
     confusion: Option<PathBuf>,
-    /// Side of the cells that points are thinned to, m [default: that of the map file; of a point file
-    /// 1/400 of the diagonal, at least 0.05]
+    /// Side of the cells that points are thinned to, m [default: that of the map file or octree; of a
+    /// point file 1/400 of the diagonal, at least 0.05]
     #[arg(long)]
     cell: Option<f64>,
     /// Most points to read of a file

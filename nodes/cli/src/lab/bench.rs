@@ -50,8 +50,8 @@ struct Common {
     /// Use only so many points from the start of the file
     #[arg(long, default_value_t = 500_000_000)]
     max_points: usize,
-    /// Side of a cube with the volume of a cell, m
-    #[arg(long)]
+    /// Edge of the cube with the volume of one cell, m
+    #[arg(long = "cell-size", alias = "cell", value_name = "M")]
     cell: f64,
     /// cubic, bcc, fcc, mcc or hex
     #[arg(long, default_value = "fcc")]

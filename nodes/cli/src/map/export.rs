@@ -3,12 +3,15 @@
 use std::path::PathBuf;
 
 use clap::{Args, ValueEnum};
+use lattice_core::lattice::LatticeKind;
 
 use super::read;
 use crate::CliResult;
 #[cfg(feature = "lab")]
 use lattice_lab::render::RenderOptions;
-use lattice_nodes::files::export::{write_centers_ply, write_centers_xyz, write_mesh_ply};
+use lattice_nodes::files::export::{
+    write_centers_pcd, write_centers_ply, write_centers_xyz, write_mesh_ply, write_octree,
+};
 use lattice_nodes::files::whole;
 
 /// Options of `lattice map export`.
@@ -16,7 +19,8 @@ use lattice_nodes::files::whole;
 pub struct Export {
     /// Map file, as `--map-out` writes it
     map: PathBuf,
-    /// File to write: .ply, .xyz (centres as text) or .png (a picture); without extension PLY
+    /// File to write: .ply, .pcd or .xyz (centres), .bt (octree of octomap, of half the cell size) or .png (a picture);
+    /// without extension PLY
     #[arg(long, short)]
     out: PathBuf,
     /// Form to write; a `.png` file is always a picture
@@ -47,7 +51,7 @@ struct Picture {
 
 #[derive(Clone, Copy, ValueEnum, PartialEq, Eq)]
 enum Form {
-    /// PLY points: centre, count and mean offset of every voxel
+    /// Points: centre and count of every voxel
     Centers,
     /// PLY mesh: exposed faces of the cells
     Mesh,
@@ -56,49 +60,67 @@ enum Form {
     Png,
 }
 
+/// Kind of the file.
+#[derive(Clone, Copy)]
+enum Target {
+    CentersPly,
+    CentersPcd,
+    CentersXyz,
+    Octree,
+    MeshPly,
+    #[cfg(feature = "lab")]
+    Png,
+}
+
 impl Export {
     /// Runs the command.
     pub fn run(self) -> CliResult {
-        let text = self.check()?;
+        let target = self.target()?;
         let (map, _) = read(&self.map)?;
         let list = map.into_list(usize::MAX);
-        #[cfg(feature = "lab")]
-        if self.form == Form::Png || self.out.extension().is_some_and(|ending| ending == "png") {
-            return crate::lab::picture(&list, &self.picture.options(), &self.out);
-        }
-        whole::write(&self.out, |out| match self.form {
-            Form::Centers if text => write_centers_xyz(&list, out),
-            Form::Centers => write_centers_ply(&list, out),
-            Form::Mesh => write_mesh_ply(&list, out),
+        let out = &self.out;
+        match target {
+            Target::CentersPly => whole::write(out, |out| write_centers_ply(&list, out)),
+            Target::CentersPcd => whole::write(out, |out| write_centers_pcd(&list, out)),
+            Target::CentersXyz => whole::write(out, |out| write_centers_xyz(&list, out)),
+            Target::MeshPly => whole::write(out, |out| write_mesh_ply(&list, out)),
+            Target::Octree => {
+                let tree = whole::write(out, |out| write_octree(&list, out))?;
+                let exact = match list.lattice().kind() {
+                    LatticeKind::Cubic => "each cell is eight voxels, exactly",
+                    _ => "those with their centre in an occupied cell (--lattice cubic is exact)",
+                };
+                let (voxels, edge_m) = (tree.voxels, tree.resolution_m);
+                println!("{voxels} voxels of {edge_m} m, half the cell size: {exact}");
+                Ok(())
+            }
             #[cfg(feature = "lab")]
-            Form::Png => Ok(()),
-        })
+            Target::Png => crate::lab::picture(&list, &self.picture.options(), out),
+        }
     }
 
-    /// True for text; refuses what the extension promises and the form is not.
-    fn check(&self) -> Result<bool, String> {
+    /// Kind of the file by its extension and the form; refuses one that the other is not.
+    fn target(&self) -> Result<Target, String> {
         let extension = self.out.extension().unwrap_or_default().to_string_lossy();
-        let form = self.form;
-        match (extension.to_ascii_lowercase().as_str(), form) {
-            ("xyz", Form::Centers) => Ok(true),
-            ("ply", Form::Centers | Form::Mesh) | ("", _) => Ok(false),
+        let known = match (extension.to_ascii_lowercase().as_str(), self.form) {
+            ("ply" | "", Form::Centers) => return Ok(Target::CentersPly),
+            ("pcd", Form::Centers) => return Ok(Target::CentersPcd),
+            ("xyz", Form::Centers) => return Ok(Target::CentersXyz),
+            ("bt", Form::Centers) => return Ok(Target::Octree),
+            ("ply" | "", Form::Mesh) => return Ok(Target::MeshPly),
             #[cfg(feature = "lab")]
-            ("png", _) => Ok(false),
-            _ => {
-                let name = form.to_possible_value();
-                let name = name.as_ref().map_or("this", |value| value.get_name());
-                let out = self.out.display();
-                let known = match form {
-                    Form::Centers => ".ply or .xyz",
-                    Form::Mesh => ".ply",
-                    #[cfg(feature = "lab")]
-                    Form::Png => ".png",
-                };
-                Err(format!(
-                    "{out}: --as {name} writes {known}, no .{extension}"
-                ))
-            }
-        }
+            ("png", _) | ("", Form::Png) => return Ok(Target::Png),
+            (_, Form::Centers) => ".ply, .pcd, .xyz or .bt",
+            (_, Form::Mesh) => ".ply",
+            #[cfg(feature = "lab")]
+            (_, Form::Png) => ".png",
+        };
+        let name = self.form.to_possible_value();
+        let name = name.as_ref().map_or("this", |value| value.get_name());
+        let out = self.out.display();
+        Err(format!(
+            "{out}: --as {name} writes {known}, no .{extension}"
+        ))
     }
 }
 

@@ -22,6 +22,8 @@ pub struct Info {
 struct Summary {
     lattice: &'static str,
     cell_volume_m3: f64,
+    /// Edge of the cube of the same volume.
+    cell_size_m: f64,
     datum_m: [f64; 3],
     datum_index: [i64; 3],
     voxels: usize,
@@ -56,6 +58,7 @@ impl Info {
         let summary = Summary {
             lattice: map.lattice().kind().name(),
             cell_volume_m3: map.lattice().cell_volume_m3(),
+            cell_size_m: map.lattice().cell_side_m(),
             datum_m: map.datum_m().into(),
             datum_index: map.datum_index(),
             voxels,
@@ -75,8 +78,8 @@ impl Info {
             return Ok(());
         }
         println!(
-            "lattice        {}, cells of {} m^3",
-            summary.lattice, summary.cell_volume_m3
+            "lattice        {}, cells of {} m^3 (cell size {:.4} m)",
+            summary.lattice, summary.cell_volume_m3, summary.cell_size_m
         );
         let without = if summary.counts {
             ""

@@ -20,7 +20,7 @@ use super::{CliResult, fleet, init_logging};
 pub enum Map {
     /// Lattice, size, extent and statistics
     Info(info::Info),
-    /// As PLY (cell centres, or a mesh of exposed cell faces) or as a picture
+    /// As PLY or PCD (cell centres), PLY mesh of exposed cell faces, octree of octomap (.bt), or as a picture
     Export(export::Export),
     /// One map of the voxels of several with the same cells; of one, to write it in another form
     Merge(combine::Merge),

@@ -11,6 +11,7 @@ use clap::Args;
 use lattice_core::lattice::{Lattice, Orientation};
 use lattice_core::voxels::file::WriteOptions;
 
+use super::cell_size::CellSize;
 use super::progress::Progress;
 use super::{CliResult, Lattices, fleet, init_logging};
 use lattice_bag::BagReader;
@@ -39,9 +40,8 @@ pub struct Replay {
     /// cubic, bcc, fcc, mcc, hex, hexopt, several with commas, paper, or all; of the parameters if not given
     #[arg(long)]
     pub lattice: Option<Lattices>,
-    /// Volume of one cell in m^3; of the parameters if not given (0.125)
-    #[arg(long)]
-    pub cell_volume: Option<f64>,
+    #[command(flatten)]
+    pub cells: CellSize,
     /// Orientation of the cells: paper, ground (flattest), or a crystal direction that points up, as
     /// 110-up; of the parameters if not given (paper)
     #[arg(long)]
@@ -231,7 +231,10 @@ impl Replay {
             Some(Lattices(kinds)) => kinds.clone(),
             None => vec![given.lattice.kind()],
         };
-        let volume_m3 = self.cell_volume.unwrap_or(given.lattice.cell_volume_m3());
+        let volume_m3 = self
+            .cells
+            .volume_m3()
+            .unwrap_or(given.lattice.cell_volume_m3());
         let map = |kind| {
             Ok(MapperOptions {
                 lattice: Lattice::new(kind, volume_m3)?.with_orientation(orientation)?,

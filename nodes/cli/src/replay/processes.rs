@@ -194,6 +194,8 @@ impl Branch {
             param("lattice", name),
             param("cell_volume_m3", &format!("{:?}", lattice.cell_volume_m3())),
             param("map_frame", &replay.plan.map_frame),
+            // In place of one in a file.
+            param("cell_size_m", "0.0"),
             param("qos./points_enu.reliability", "reliable"),
             param("qos./points_enu.depth", "512"),
         ];

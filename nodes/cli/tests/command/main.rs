@@ -1,6 +1,7 @@
 //! The `lattice` command as a user runs it.
 #![allow(clippy::unwrap_used)]
 
+mod bag_info;
 mod browser;
 mod calibrate;
 mod driver_logs;
@@ -15,8 +16,10 @@ mod names;
 mod nodes;
 mod paper;
 mod player;
+mod point_files;
 mod record;
 mod respawn;
+mod streams;
 mod viewer;
 mod viewer_foreign;
 mod viewer_headset;

@@ -313,15 +313,26 @@ fn what_is_shown_is_told_by_its_name_and_what_is_not_shown_by_its_error() {
     std::fs::write(path("nodes.yml"), params).unwrap();
     let viewer = Viewer::start_in(&domain, &["view", &path("nodes.yml"), "--port", "0"]);
     assert!(viewer.port() > 0);
-    // Neither.
-    std::fs::write(path("cloud.pcd"), "# .PCD v.7\n").unwrap();
-    let refused = crate::error(&["view", &path("cloud.pcd")]);
-    for word in ["cloud.pcd", ".lattice", ".mcap", ".zstd", ".yml"] {
+    // Neither, nor what its name says.
+    std::fs::write(path("part.step"), "ISO-10303-21;\n").unwrap();
+    let refused = crate::error(&["view", &path("part.step")]);
+    for word in ["part.step", ".lattice", ".las", ".mcap", ".zstd", ".yml"] {
         assert!(refused.contains(word), "{word} in {refused}");
     }
+    std::fs::write(path("cloud.pcd"), "# .PCD v.7\n").unwrap();
+    let refused = crate::error(&["view", &path("cloud.pcd")]);
+    assert!(
+        refused.contains("cloud.pcd: ") && refused.contains("header"),
+        "{refused}"
+    );
     let refused = crate::error(&["view", &path("nodes.yml"), &path("cloud.pcd")]);
     assert!(
         refused.contains("cloud.pcd") && refused.contains(".yml"),
+        "{refused}"
+    );
+    let refused = crate::error(&["view", &path("nodes.yml"), "--cell-size", "0.2"]);
+    assert!(
+        refused.contains("--cell-size") && refused.contains("`cell_size_m`"),
         "{refused}"
     );
     let refused = crate::error(&["view", &format!("{log}/metadata.yaml")]);

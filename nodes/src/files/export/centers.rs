@@ -4,7 +4,7 @@ use std::io::Write;
 
 use lattice_core::voxels::VoxelList;
 
-use super::{ExportError, ply_comment, ply_header};
+use super::{ExportError, comment, ply_header};
 
 /// Writes the occupied cells in Morton order as vertices of a binary PLY file.
 ///
@@ -16,7 +16,7 @@ pub fn write_centers_ply(list: &VoxelList, writer: impl Write) -> Result<(), Exp
     let [ox, oy, oz] = ["float offset_x", "float offset_y", "float offset_z"];
     let properties = [x, y, z, "uint count", ox, oy, oz];
     let vertices = ("vertex", list.len() as u64, &properties[..]);
-    writer.write_all(ply_header(&ply_comment(list), &[vertices]).as_bytes())?;
+    writer.write_all(ply_header(&comment(list), &[vertices]).as_bytes())?;
     for (key, voxel) in list.sorted() {
         for coordinate in list.center_m(key).iter() {
             writer.write_all(&coordinate.to_le_bytes())?;

@@ -8,7 +8,7 @@ use nalgebra::Vector3;
 use rustc_hash::FxHashMap;
 
 use super::vertices::SharedVertices;
-use super::{ExportError, HeightRange, color_at, ply_comment, ply_header};
+use super::{ExportError, HeightRange, color_at, comment, ply_header};
 
 /// Writes the faces between occupied and empty cells as a binary PLY mesh of convex polygons.
 ///
@@ -23,7 +23,7 @@ pub fn write_mesh_ply(list: &VoxelList, writer: impl Write) -> Result<(), Export
     let vertices = ("vertex", mesh.vertices_m.len() as u64, &properties[..]);
     let indices = &["list uchar int vertex_indices"][..];
     let faces = ("face", mesh.faces as u64, indices);
-    writer.write_all(ply_header(&ply_comment(list), &[vertices, faces]).as_bytes())?;
+    writer.write_all(ply_header(&comment(list), &[vertices, faces]).as_bytes())?;
     for vertex in &mesh.vertices_m {
         for coordinate in vertex.iter() {
             writer.write_all(&coordinate.to_le_bytes())?;

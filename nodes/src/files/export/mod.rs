@@ -1,15 +1,19 @@
-//! Maps for other programs and for people: PLY of centres, PLY mesh of cells.
+//! Maps for other programs and for people: centres as PLY, PCD or text, a PLY mesh of cells, octrees.
 
 mod centers;
 mod cloud;
 mod mesh;
+mod octree;
 pub mod palette;
+mod pcd;
 mod vertices;
 
 pub use centers::{write_centers_ply, write_centers_xyz};
 pub use cloud::write_labelled_ply;
 pub use mesh::write_mesh_ply;
+pub use octree::{OctreeSummary, write_octree};
 pub use palette::{HeightRange, category_color, color_at};
+pub use pcd::write_centers_pcd;
 
 use lattice_core::voxels::VoxelList;
 use thiserror::Error;
@@ -26,6 +30,17 @@ pub enum ExportError {
         i32::MAX
     )]
     TooManyVertices,
+    /// An octree has 65536 voxels on a side, with its middle at the origin.
+    #[error(
+        "the cell at {center_m:.1?} m is outside an octree of these cells, which reaches {limit_m} m from the \
+         origin of the map: take larger cells, or a part of the map by `lattice map crop`"
+    )]
+    OutsideOctree {
+        /// Centre of a cell.
+        center_m: [f64; 3],
+        /// Half the edge of the tree.
+        limit_m: f64,
+    },
 }
 
 /// An element: its name, how many there are, and the type and name of each property.
@@ -44,8 +59,8 @@ pub fn ply_header(comment: &str, elements: &[PlyElement]) -> String {
     header + "end_header\n"
 }
 
-/// The comment of a PLY header that says what the map is.
-fn ply_comment(list: &VoxelList) -> String {
+/// The comment of a header that says what the map is.
+fn comment(list: &VoxelList) -> String {
     let lattice = list.lattice();
     format!(
         "{} lattice, cell volume {} m^3, metres, map frame: x east, y north, z up",

@@ -36,6 +36,12 @@ impl Collector {
         Err(PointFileError::TooManyPoints { points, max_points })
     }
 
+    /// The same for points beside those that were found.
+    pub(super) fn promise_more(&mut self, points: u64) -> Result<(), PointFileError> {
+        let found = self.points_m.len().saturating_add(self.skipped) as u64;
+        self.promise(found.saturating_add(points))
+    }
+
     /// Takes a point, metres.
     pub(super) fn push(&mut self, point_m: [f64; 3]) -> Result<(), PointFileError> {
         let found = self.points_m.len().saturating_add(self.skipped);

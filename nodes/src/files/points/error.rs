@@ -20,7 +20,7 @@ pub enum PointFileError {
     /// Neither the content nor the name tells what it is.
     #[error(
         "cannot tell the format from the content or the extension {extension:?}: \
-         name the file .ply, .pcd, .xyz, .txt, .csv or .bin, followed by .bz2 if packed"
+         name the file .ply, .pcd, .las, .laz, .e57, .bt, .xyz, .txt, .csv or .bin, followed by .bz2 if packed"
     )]
     UnknownFormat {
         /// The extension, without .bz2.
@@ -58,6 +58,14 @@ pub enum PointFileError {
     #[cfg(not(feature = "bzip2"))]
     #[error("the file is packed with bzip2, which this build lacks: unpack it first")]
     Packed,
+    /// A kind that is known but not read.
+    #[error("{what} is not read: {remedy}")]
+    NotRead {
+        /// Kind of the file, and why if it depends.
+        what: &'static str,
+        /// Way to a file that is read.
+        remedy: &'static str,
+    },
     /// More points than the caller allows.
     #[error(
         "the file has {points} points or more, but at most {max_points} are allowed: raise the limit or thin the file"
@@ -68,4 +76,13 @@ pub enum PointFileError {
         /// Limit of the caller.
         max_points: usize,
     },
+}
+
+#[cfg(feature = "survey")]
+impl PointFileError {
+    /// LAZ or E57, which are read in no order, inside of bzip2.
+    pub(super) const PACKED_TWICE: PointFileError = PointFileError::NotRead {
+        what: "LAZ or E57 packed with bzip2",
+        remedy: "unpack it with `bunzip2`",
+    };
 }

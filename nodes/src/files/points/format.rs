@@ -3,7 +3,7 @@
 use std::fmt;
 use std::path::Path;
 
-use super::PointFileError;
+use super::{PointFileError, las, octree};
 
 /// The kinds of point file that are read.
 #[derive(Clone, Copy, PartialEq, Eq, Debug)]
@@ -24,6 +24,14 @@ pub enum PointFormat {
     Text,
     /// KITTI scan: x, y, z and intensity as 32-bit floats.
     KittiBin,
+    /// LAS.
+    Las,
+    /// LAS, packed by LASzip.
+    Laz,
+    /// E57.
+    E57,
+    /// Binary octree of OctoMap.
+    OctoMapBinary,
 }
 
 impl fmt::Display for PointFormat {
@@ -37,6 +45,10 @@ impl fmt::Display for PointFormat {
             PointFormat::PcdBinaryCompressed => "PCD (binary compressed)",
             PointFormat::Text => "text",
             PointFormat::KittiBin => "KITTI bin",
+            PointFormat::Las => "LAS",
+            PointFormat::Laz => "LAZ",
+            PointFormat::E57 => "E57",
+            PointFormat::OctoMapBinary => "OctoMap (binary)",
         })
     }
 }
@@ -48,6 +60,42 @@ pub(super) enum Family {
     Pcd,
     Text,
     Kitti,
+    Las,
+    E57,
+    Octree,
+}
+
+/// Families by the extension.
+const EXTENSIONS: [(&str, Family); 11] = [
+    ("ply", Family::Ply),
+    ("pcd", Family::Pcd),
+    ("xyz", Family::Text),
+    ("txt", Family::Text),
+    ("asc", Family::Text),
+    ("csv", Family::Text),
+    ("bin", Family::Kitti),
+    ("las", Family::Las),
+    ("laz", Family::Las),
+    ("e57", Family::E57),
+    ("bt", Family::Octree),
+];
+
+/// True for the name of a point file, packed or not.
+pub fn is_named_as_points(path: &Path) -> bool {
+    let packed = path
+        .extension()
+        .is_some_and(|e| e.eq_ignore_ascii_case("bz2"));
+    match packed {
+        true => by_name(&path.with_extension("")).is_some(),
+        false => by_name(path).is_some(),
+    }
+}
+
+fn by_name(path: &Path) -> Option<Family> {
+    let extension = path.extension()?;
+    let mut known = EXTENSIONS.iter();
+    let found = known.find(|(known, _)| extension.eq_ignore_ascii_case(known));
+    found.map(|(_, family)| *family)
 }
 
 /// True if the bytes are the start of a bzip2 stream with a block in it.
@@ -74,16 +122,27 @@ pub(super) fn detect(start: &[u8], name: &Path) -> Result<Family, PointFileError
     if start.starts_with(b"# .PCD") || start.starts_with(b"VERSION ") {
         return Ok(Family::Pcd);
     }
-    let extension = name.extension().unwrap_or_default().to_string_lossy();
-    match extension.to_ascii_lowercase().as_str() {
-        "ply" => Ok(Family::Ply),
-        "pcd" => Ok(Family::Pcd),
-        "xyz" | "txt" | "asc" | "csv" => Ok(Family::Text),
-        "bin" => Ok(Family::Kitti),
-        _ => Err(PointFileError::UnknownFormat {
-            extension: extension.into_owned(),
-        }),
+    if start.starts_with(las::SIGNATURE) {
+        return Ok(Family::Las);
     }
+    if start.starts_with(b"ASTM-E57") {
+        return Ok(Family::E57);
+    }
+    if start.starts_with(octree::SIGNATURE) {
+        return Ok(Family::Octree);
+    }
+    if start.starts_with(octree::FULL_SIGNATURE) {
+        return Err(PointFileError::NotRead {
+            what: "an octree with probabilities (.ot)",
+            remedy: "convert it to .bt with octomap's `convert_octree`",
+        });
+    }
+    by_name(name).ok_or_else(|| {
+        let extension = name.extension().unwrap_or_default().to_string_lossy();
+        PointFileError::UnknownFormat {
+            extension: extension.into_owned(),
+        }
+    })
 }
 
 #[cfg(test)]
@@ -98,7 +157,22 @@ mod tests {
         assert_eq!(detect(b"1 2 3", "scan.PLY"), Some(Family::Ply));
         assert_eq!(detect(b"1 2 3", "scan.TXT"), Some(Family::Text));
         assert_eq!(detect(b"", "0000.bin"), Some(Family::Kitti));
-        assert_eq!(detect(b"1 2 3", "scan.las"), None);
+        assert_eq!(detect(b"LASF\x01", "scan.xyz"), Some(Family::Las));
+        assert_eq!(detect(b"", "scan.laz"), Some(Family::Las));
+        assert_eq!(detect(b"ASTM-E57", "scan"), Some(Family::E57));
+        assert_eq!(detect(octree::SIGNATURE, "map"), Some(Family::Octree));
+        assert_eq!(detect(octree::FULL_SIGNATURE, "map.bt"), None);
+        assert_eq!(detect(b"1 2 3", "scan.step"), None);
         assert_eq!(detect(b"1 2 3", "scan"), None);
+    }
+
+    #[test]
+    fn point_files_are_known_by_their_names() {
+        for name in ["a.ply", "a.PCD", "a.b.laz", "a.xyz.bz2", "a.bt"] {
+            assert!(is_named_as_points(Path::new(name)), "{name}");
+        }
+        for name in ["a", "map.lattice", "a.bz2", "a.ply.zip", "ply"] {
+            assert!(!is_named_as_points(Path::new(name)), "{name}");
+        }
     }
 }

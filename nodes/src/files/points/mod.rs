@@ -1,13 +1,18 @@
-//! Points from files: PLY, PCD, text and KITTI scans, any of them packed with bzip2.
+//! Points from files: PLY, PCD, LAS, text, KITTI scans and OctoMap's binary trees, any of them packed with
+//! bzip2; LAZ and E57 with the feature `survey`.
 //!
 //! Files are read as a stream, so that memory is bounded by the points kept and not by what a
 //! header promises. Coordinates are taken as they stand, in metres: the viewpoint of a PCD file and
-//! the like are not applied.
+//! the like are not applied. Only the scans of an E57 file are placed by their poses, as they are meant.
 
 mod collect;
+#[cfg(feature = "survey")]
+mod e57;
 mod error;
 mod format;
 mod kitti;
+mod las;
+mod octree;
 mod pcd;
 pub mod ply;
 mod scalar;
@@ -19,7 +24,7 @@ use std::io::{BufRead, BufReader};
 use std::path::{Path, PathBuf};
 
 pub use error::PointFileError;
-pub use format::PointFormat;
+pub use format::{PointFormat, is_named_as_points};
 
 use collect::Collector;
 use source::Source;
@@ -55,6 +60,8 @@ pub struct PointFile {
     pub format: PointFormat,
     /// Points left out because a coordinate was NaN or infinite.
     pub skipped_not_finite: usize,
+    /// Edge of the voxels whose centres the points are, metres, if the file is an octree.
+    pub voxel_m: Option<f64>,
 }
 
 /// Reads the points of a file.
@@ -62,12 +69,54 @@ pub struct PointFile {
 /// The content decides on the format where it has a signature, otherwise the extension does.
 /// Errors do not name the file.
 pub fn read_points(path: &Path, limits: &PointFileLimits) -> Result<PointFile, PointFileError> {
-    let (reader, name) = open(path)?;
-    read_stream(reader, &name, limits)
+    let (reader, name, is_packed) = unpack(path)?;
+    let mut source = Source::new(reader);
+    let mut points = Collector::new(limits.max_points);
+    let mut voxel_m = None;
+    // LAZ and E57 are not read from the start to the end.
+    let file = (!is_packed).then_some(path);
+    let format = match format::detect(source.peek()?, &name)? {
+        format::Family::Ply => ply::read(&mut source, &mut points)?,
+        format::Family::Pcd => pcd::read(&mut source, &mut points)?,
+        format::Family::Text => text::read(&mut source, &mut points)?,
+        format::Family::Kitti => kitti::read(&mut source, &name, &mut points)?,
+        format::Family::Las => las::read(&mut source, file, &mut points)?,
+        format::Family::E57 => read_e57(file, &mut points)?,
+        format::Family::Octree => {
+            let (format, edge_m) = octree::read(&mut source, &mut points)?;
+            voxel_m = Some(edge_m);
+            format
+        }
+    };
+    Ok(PointFile {
+        points_m: points.points_m,
+        labels: points.labels,
+        format,
+        skipped_not_finite: points.skipped,
+        voxel_m,
+    })
+}
+
+#[cfg(feature = "survey")]
+fn read_e57(file: Option<&Path>, points: &mut Collector) -> Result<PointFormat, PointFileError> {
+    e57::read(file.ok_or(PointFileError::PACKED_TWICE)?, points)
+}
+
+#[cfg(not(feature = "survey"))]
+fn read_e57(_file: Option<&Path>, _points: &mut Collector) -> Result<PointFormat, PointFileError> {
+    Err(PointFileError::NotRead {
+        what: "E57 (this build lacks the feature `survey`)",
+        remedy: "convert it, for example with `pdal translate scan.e57 scan.las`",
+    })
 }
 
 /// Content and name of a file, both after unpacking.
 pub fn open(path: &Path) -> Result<(Box<dyn BufRead>, PathBuf), PointFileError> {
+    unpack(path).map(|(reader, name, _)| (reader, name))
+}
+
+/// The same, with true if the file is packed.
+fn unpack(path: &Path) -> Result<(Box<dyn BufRead>, PathBuf, bool), PointFileError> {
     let io = |source| PointFileError::Io { byte: 0, source };
     let mut packed = BufReader::with_capacity(BUFFER, File::open(path).map_err(io)?);
     let start = packed.fill_buf().map_err(io)?;
@@ -76,13 +125,13 @@ pub fn open(path: &Path) -> Result<(Box<dyn BufRead>, PathBuf), PointFileError> 
             let part = "its packed data".to_owned();
             return Err(PointFileError::Truncated { byte, part });
         }
-        return Ok((Box::new(packed), path.to_owned()));
+        return Ok((Box::new(packed), path.to_owned(), false));
     }
     let name = match path.extension() {
         Some(extension) if extension.eq_ignore_ascii_case("bz2") => path.with_extension(""),
         _ => path.to_owned(),
     };
-    Ok((unpacked(packed)?, name))
+    Ok((unpacked(packed)?, name, true))
 }
 
 #[cfg(feature = "bzip2")]
@@ -94,27 +143,6 @@ fn unpacked(packed: BufReader<File>) -> Result<Box<dyn BufRead>, PointFileError>
 #[cfg(not(feature = "bzip2"))]
 fn unpacked(_packed: BufReader<File>) -> Result<Box<dyn BufRead>, PointFileError> {
     Err(PointFileError::Packed)
-}
-
-fn read_stream(
-    reader: Box<dyn BufRead>,
-    name: &Path,
-    limits: &PointFileLimits,
-) -> Result<PointFile, PointFileError> {
-    let mut source = Source::new(reader);
-    let mut points = Collector::new(limits.max_points);
-    let format = match format::detect(source.peek()?, name)? {
-        format::Family::Ply => ply::read(&mut source, &mut points)?,
-        format::Family::Pcd => pcd::read(&mut source, &mut points)?,
-        format::Family::Text => text::read(&mut source, &mut points)?,
-        format::Family::Kitti => kitti::read(&mut source, name, &mut points)?,
-    };
-    Ok(PointFile {
-        points_m: points.points_m,
-        labels: points.labels,
-        format,
-        skipped_not_finite: points.skipped,
-    })
 }
 
 #[cfg(test)]

@@ -109,6 +109,7 @@ fn every_format_gives_the_same_points_packed_or_not() {
             labels: Vec::new(),
             format,
             skipped_not_finite: 0,
+            voxel_m: None,
         };
         assert_eq!(read_bytes(name, &bytes).unwrap(), expected, "{format}");
         let unpacked = read_bytes(&format!("{name}.bz2"), &pack(&bytes));
@@ -178,8 +179,10 @@ fn the_limit_holds_with_and_without_a_header() {
 fn files_that_are_not_there_or_of_no_known_kind_are_told() {
     let missing = read_points(Path::new("/no/such/file.ply"), &LIMITS);
     assert!(matches!(missing, Err(PointFileError::Io { byte: 0, .. })));
-    let las = read_bytes("a.las", b"LASF").unwrap_err().to_string();
-    assert!(las.contains("extension \"las\""), "{las}");
+    let step = read_bytes("a.step", b"ISO").unwrap_err().to_string();
+    assert!(step.contains("extension \"step\""), "{step}");
+    let full = read_bytes("a.bt", b"# Octomap OcTree file\n").unwrap_err();
+    assert!(full.to_string().contains("convert_octree"), "{full}");
 }
 
 #[test]

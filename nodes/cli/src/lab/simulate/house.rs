@@ -41,9 +41,9 @@ pub struct House {
     /// Lattice of the map
     #[arg(long, default_value = "cubic")]
     lattice: LatticeKind,
-    /// Side of a cube as large as its cells, m
-    #[arg(long, default_value_t = 0.05)]
-    cell_side: f64,
+    /// Edge of the cube with the volume of one cell, m
+    #[arg(long, alias = "cell-side", default_value_t = 0.05, value_name = "M")]
+    cell_size: f64,
     /// Axes of the headset's clouds
     #[arg(long, value_parser = choice(&AXES), default_value = "ros")]
     axes: HeadsetAxes,
@@ -84,7 +84,7 @@ impl House {
             headset_scans: self.headset_scans,
             flips: self.flips,
             lattice: self.lattice,
-            cell_side_m: self.cell_side,
+            cell_side_m: self.cell_size,
             axes: self.axes,
         };
         let progress = Progress::new("simulate");
