@@ -2,6 +2,7 @@
 
 mod controls;
 mod keyboard;
+mod lockstep;
 mod parameters;
 mod playback;
 
@@ -19,6 +20,7 @@ use lattice_bag::{BagQos, BagReader, Player, TopicInfo};
 use lattice_runtime::qos::{Durability, Qos, Reliability};
 use lattice_runtime::ros_args::RosArgs;
 use lattice_runtime::{Node, RawPublisher};
+use lockstep::Lockstep;
 use parameters::Settings;
 use playback::{Playback, Playhead};
 
@@ -57,6 +59,7 @@ pub fn run(arguments: impl IntoIterator<Item = String>) -> Result<(), NodeError>
         bag,
         player,
         waited,
+        lockstep,
         wait,
         settle,
         max_wait,
@@ -79,6 +82,7 @@ pub fn run(arguments: impl IntoIterator<Item = String>) -> Result<(), NodeError>
         },
         most_wait: max_wait,
         stuck: vec![false; player.topics().len()],
+        lockstep: Lockstep::default(),
         head: Playhead::new(start_paused),
         stopped: false,
         player,
@@ -114,7 +118,8 @@ pub fn run(arguments: impl IntoIterator<Item = String>) -> Result<(), NodeError>
         sent.map_err(|_| "the log has ended".to_owned())
     });
     playback.wait_for(&waited, wait);
-    if !waited.is_empty() {
+    playback.start_lockstep(&lockstep, &node, wait)?;
+    if !(waited.is_empty() && lockstep.is_empty()) {
         // We know them; they may need a moment to know us.
         playback.shutdown.wait_timeout(settle);
     }

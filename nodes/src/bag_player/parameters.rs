@@ -17,11 +17,12 @@ const ABOUT: &[About] = about! {
     "exclude_topics" fixed(START): "Topics not to play.";
     "clock_hz" fixed(START): "How often /clock is published; 0: never.";
     "wait_for_subscribers" fixed(START): "Topics that must have a subscriber before the log starts.";
-    "wait_timeout_s" fixed(START): "How long to wait for them.";
+    "lockstep" fixed(START): "Pairs of topics: a played one, each message of which waits until the one before is answered, and that of the answers, which have the same stamp.";
+    "wait_timeout_s" fixed(START): "How long to wait for these subscribers and publishers.";
     "settle_s" fixed(START): "How long to wait for them to know us.";
     "start_paused" fixed(START): "Whether the log is held until a call of ~/resume or the space bar.";
     "keyboard" fixed(START): "Whether keys of the terminal are taken: space pauses, arrows step and change the rate.";
-    "max_wait_s": "How long a subscriber that does not acknowledge is waited for; then its topic's messages are skipped and counted until it does.";
+    "max_wait_s": "How long a subscriber that does not acknowledge is waited for; then its topic's messages are skipped and counted until it does. Also how long an answer of lockstep is waited for.";
 };
 
 const START: &str = "the log is opened with it";
@@ -31,6 +32,7 @@ pub(super) struct Settings {
     pub bag: String,
     pub player: PlayerOptions,
     pub waited: Vec<String>,
+    pub lockstep: Vec<String>,
     pub wait: Duration,
     pub settle: Duration,
     pub max_wait: Duration,
@@ -48,6 +50,7 @@ impl Settings {
             bag: params.string("bag", "")?,
             player: player_options(params)?,
             waited: params.string_array("wait_for_subscribers", &[])?,
+            lockstep: params.string_array("lockstep", &[])?,
             wait: seconds(params, "wait_timeout_s", 30.0)?,
             settle: seconds(params, "settle_s", 0.5)?,
             max_wait: seconds(params, "max_wait_s", 2.0)?,

@@ -8,10 +8,11 @@ use lattice_msgs::builtin_interfaces::Time;
 use lattice_msgs::rosbag2_interfaces::PlayRequest;
 use lattice_msgs::rosgraph_msgs::Clock;
 use lattice_runtime::params::{ParamValue, Params};
-use lattice_runtime::{Publisher, RawPublisher, Shutdown};
+use lattice_runtime::{Node, Publisher, RawPublisher, Shutdown};
 
 use super::PlayerReport;
 use super::controls::Controls;
+use super::lockstep::Lockstep;
 use crate::start::NodeError;
 
 /// Time that what is queued at the end has to reach its readers.
@@ -22,7 +23,7 @@ const HURRIED_FLUSH_TIME: Duration = Duration::from_secs(2);
 /// for those who listen.
 const MOST_LATE: Duration = Duration::from_secs(1);
 /// Longest sleep between two looks at the shutdown flag, and between two times on `/clock` while held.
-const NAP: Duration = Duration::from_millis(100);
+pub(super) const NAP: Duration = Duration::from_millis(100);
 
 /// The player's own clock, which stands while the log is held.
 pub(super) struct Playhead {
@@ -60,6 +61,13 @@ impl Playhead {
         let _ = self.held.get_or_insert_with(Instant::now);
     }
 
+    /// Stands still for a time that has passed.
+    fn stand(&mut self, passed: Duration) {
+        if !self.is_held() {
+            self.begin += passed;
+        }
+    }
+
     pub(super) fn go_on(&mut self) {
         if let Some(held) = self.held.take() {
             self.begin += held.elapsed();
@@ -84,6 +92,8 @@ pub(super) struct Playback {
     pub topics: Vec<RawPublisher>,
     /// Topics whose queue a subscriber holds up.
     pub stuck: Vec<bool>,
+    /// Topics each message of which waits for an answer to the one before.
+    pub lockstep: Lockstep,
     /// Time that such a subscriber is waited for.
     pub most_wait: Duration,
     pub clock: Option<Publisher<Clock>>,
@@ -117,6 +127,19 @@ impl Playback {
                 let _ = join.recv_timeout(left.min(NAP));
             }
         }
+    }
+
+    /// Begins with the lockstep of pairs of topics.
+    pub(super) fn start_lockstep(
+        &mut self,
+        pairs: &[String],
+        node: &Node,
+        timeout: Duration,
+    ) -> Result<(), NodeError> {
+        let topics = self.player.topics().iter();
+        let played: Vec<String> = topics.map(|topic| topic.info.name.clone()).collect();
+        self.lockstep = Lockstep::start(pairs, &played, node, timeout, &self.shutdown)?;
+        Ok(())
     }
 
     /// Plays to the end, a call of `stop` or a signal.
@@ -287,8 +310,13 @@ impl Playback {
         }
     }
 
-    /// Publishes a message; a subscriber that does not acknowledge is waited for once.
+    /// Publishes a message, in lockstep when the one before is answered; a subscriber that does not acknowledge is
+    /// waited for once.
     fn publish(&mut self, topic: usize, data: Vec<u8>) {
+        let begin = Instant::now();
+        let shutdown = &self.shutdown;
+        self.lockstep.before(topic, &data, self.most_wait, shutdown);
+        self.head.stand(begin.elapsed());
         let (Some(publisher), Some(stuck)) = (self.topics.get(topic), self.stuck.get_mut(topic))
         else {
             return;
@@ -317,6 +345,7 @@ impl Playback {
             true => HURRIED_FLUSH_TIME,
             false => FLUSH_TIME,
         };
+        self.lockstep.finish(patience, &self.shutdown);
         let deadline = Instant::now() + patience;
         self.report.acknowledged = true;
         for publisher in &self.topics {

@@ -1,0 +1,228 @@
+//! Lockstep: each message of a topic waits until the one before it is answered on another topic.
+
+use std::collections::BTreeMap;
+use std::sync::{Arc, Condvar, Mutex, MutexGuard, PoisonError};
+use std::time::{Duration, Instant};
+
+use lattice_runtime::qos::{Durability, Qos, Reliability};
+use lattice_runtime::{Load, Node, RemotePublisher, Shutdown, Subscription};
+
+use super::playback::NAP;
+use crate::start::NodeError;
+
+/// Answers that a subscription holds.
+const DEPTH: usize = 100;
+/// Bytes of CDR before the first field.
+const ENCAPSULATION_BYTES: usize = 4;
+
+/// Topics in lockstep, by their index in the player.
+#[derive(Default)]
+pub(super) struct Lockstep(BTreeMap<usize, Pair>);
+
+/// A played topic and that of its answers.
+struct Pair {
+    answers: String,
+    awaited: Arc<Awaited>,
+    /// True after an answer that did not come in time, until one comes.
+    given_up: bool,
+    _subscription: Subscription,
+}
+
+/// Stamp of the message whose answer has not come yet.
+#[derive(Default)]
+struct Awaited {
+    stamp: Mutex<Option<[u8; 8]>>,
+    answered: Condvar,
+}
+
+impl Awaited {
+    fn lock(&self) -> MutexGuard<'_, Option<[u8; 8]>> {
+        self.stamp.lock().unwrap_or_else(PoisonError::into_inner)
+    }
+
+    /// Notes an answer.
+    fn answer(&self, cdr: &[u8]) {
+        let mut stamp = self.lock();
+        if stamp.is_some() && *stamp == stamp_of(cdr) {
+            *stamp = None;
+            self.answered.notify_all();
+        }
+    }
+
+    /// Waits until nothing is awaited; false after this time or at the end of the process.
+    fn wait(&self, patience: Duration, shutdown: &Shutdown) -> bool {
+        let deadline = Instant::now() + patience;
+        let mut stamp = self.lock();
+        while stamp.is_some() {
+            let left = deadline.saturating_duration_since(Instant::now());
+            if left.is_zero() || shutdown.is_requested() {
+                return false;
+            }
+            let woken = self.answered.wait_timeout(stamp, left.min(NAP));
+            stamp = woken.unwrap_or_else(PoisonError::into_inner).0;
+        }
+        true
+    }
+}
+
+impl Lockstep {
+    /// Pairs of topics: one that is played, and one that answers it with messages of the same stamp.
+    ///
+    /// # Errors
+    /// If a topic is not played, or nobody publishes the answers within `patience`.
+    pub(super) fn start(
+        pairs: &[String],
+        played: &[String],
+        node: &Node,
+        patience: Duration,
+        shutdown: &Shutdown,
+    ) -> Result<Self, NodeError> {
+        let mut lockstep = Self::default();
+        let refused = |problem: String| node.params().invalid("lockstep", problem);
+        for pair in pairs.chunks(2) {
+            let (topic, answers) = match pair {
+                [topic, answers] => (topic, node.resolve(answers)?),
+                _ => return Err(refused("expected pairs of topics".to_owned()).into()),
+            };
+            let Some(index) = played.iter().position(|name| name == topic) else {
+                return Err(refused(format!("'{topic}' is not played")).into());
+            };
+            let Some(publisher) = publisher_of(&answers, node, patience, shutdown) else {
+                let seconds = patience.as_secs();
+                let problem = format!("no publisher on '{answers}' after {seconds} s");
+                return Err(refused(format!("{problem} (`wait_timeout_s`)")).into());
+            };
+            let awaited = Arc::new(Awaited::default());
+            let on_answer = {
+                let awaited = Arc::clone(&awaited);
+                move |cdr: Vec<u8>| awaited.answer(&cdr)
+            };
+            let of = publisher.type_name.as_str();
+            let qos = qos_of(&publisher);
+            let subscription = node.subscribe_raw(&answers, of, qos, Load::Large, on_answer)?;
+            let pair = Pair {
+                answers,
+                awaited,
+                given_up: false,
+                _subscription: subscription,
+            };
+            lockstep.0.insert(index, pair);
+        }
+        Ok(lockstep)
+    }
+
+    /// Waits for the answer to the last message of a topic, and awaits that to the next one. A topic whose answers
+    /// do not come is waited for once.
+    pub(super) fn before(
+        &mut self,
+        topic: usize,
+        next: &[u8],
+        patience: Duration,
+        shutdown: &Shutdown,
+    ) {
+        let Some(pair) = self.0.get_mut(&topic) else {
+            return;
+        };
+        let patience = match pair.given_up {
+            true => Duration::ZERO,
+            false => patience,
+        };
+        let answered = pair.awaited.wait(patience, shutdown);
+        if !answered && !pair.given_up && !shutdown.is_requested() {
+            let seconds = patience.as_secs_f64();
+            log::warn!(
+                "{}: no answer within {seconds} s (`max_wait_s`); not waited for until one comes",
+                pair.answers
+            );
+        }
+        pair.given_up = !answered;
+        *pair.awaited.lock() = stamp_of(next);
+    }
+
+    /// Waits for the answers to the last messages.
+    pub(super) fn finish(&self, patience: Duration, shutdown: &Shutdown) {
+        for pair in self.0.values().filter(|pair| !pair.given_up) {
+            if !pair.awaited.wait(patience, shutdown) {
+                log::warn!("{}: the last message was not answered", pair.answers);
+            }
+        }
+    }
+}
+
+/// The first publisher of a topic in another process.
+fn publisher_of(
+    topic: &str,
+    node: &Node,
+    patience: Duration,
+    shutdown: &Shutdown,
+) -> Option<RemotePublisher> {
+    let deadline = Instant::now() + patience;
+    loop {
+        let mut all = node.remote_publishers().into_iter();
+        let found = all.find(|publisher| publisher.topic == topic);
+        if found.is_some() || Instant::now() >= deadline || shutdown.is_requested() {
+            return found;
+        }
+        shutdown.wait_timeout(NAP);
+    }
+}
+
+/// As the publisher offers it.
+fn qos_of(publisher: &RemotePublisher) -> Qos {
+    match (publisher.reliability, publisher.durability) {
+        (Reliability::BestEffort, _) => Qos::best_effort(DEPTH),
+        (Reliability::Reliable, Durability::Volatile) => Qos::reliable(DEPTH),
+        (Reliability::Reliable, Durability::TransientLocal) => Qos::latched(DEPTH),
+    }
+}
+
+/// Seconds and nanoseconds of the stamp of a message that begins with a header, little-endian.
+fn stamp_of(cdr: &[u8]) -> Option<[u8; 8]> {
+    let is_little = cdr.get(1)? & 1 == 1;
+    let fields = cdr.get(ENCAPSULATION_BYTES..)?.first_chunk::<8>()?;
+    let [a, b, c, d, e, f, g, h] = *fields;
+    Some(match is_little {
+        true => *fields,
+        false => [d, c, b, a, h, g, f, e],
+    })
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    const LITTLE: [u8; 14] = [0, 1, 0, 0, 7, 0, 0, 0, 9, 1, 0, 0, 42, 42];
+    const BIG: [u8; 12] = [0, 0, 0, 0, 0, 0, 0, 7, 0, 0, 1, 9];
+
+    #[test]
+    fn stamps_of_either_byte_order_are_one() {
+        assert_eq!(stamp_of(&LITTLE), Some([7, 0, 0, 0, 9, 1, 0, 0]));
+        assert_eq!(stamp_of(&LITTLE), stamp_of(&BIG));
+        for length in 0..12 {
+            assert_eq!(stamp_of(&BIG[..length]), None);
+        }
+    }
+
+    #[test]
+    fn only_the_answer_of_the_same_stamp_ends_the_wait() {
+        let (awaited, shutdown) = (Awaited::default(), Shutdown::default());
+        assert!(
+            awaited.wait(Duration::ZERO, &shutdown),
+            "nothing is awaited"
+        );
+        *awaited.lock() = stamp_of(&LITTLE);
+        let mut other = BIG;
+        other[7] = 8;
+        awaited.answer(&other);
+        awaited.answer(&[]);
+        assert!(!awaited.wait(Duration::ZERO, &shutdown));
+        std::thread::scope(|scope| {
+            let waiting = scope.spawn(|| awaited.wait(Duration::from_secs(600), &shutdown));
+            awaited.answer(&BIG);
+            assert!(waiting.join().unwrap());
+        });
+        *awaited.lock() = stamp_of(&LITTLE);
+        shutdown.request();
+        assert!(!awaited.wait(Duration::from_secs(600), &shutdown));
+    }
+}
