@@ -34,6 +34,11 @@ impl Progress {
         self.0.set_message(text.to_owned());
     }
 
+    /// Prints a line above the bar.
+    pub fn print(&self, line: &str) {
+        self.0.suspend(|| eprintln!("{line}"));
+    }
+
     /// Removes the bar.
     pub fn done(self) {
         self.0.finish_and_clear();

@@ -8,7 +8,7 @@ use std::ffi::OsString;
 use std::path::{Path, PathBuf};
 
 use clap::Args;
-use lattice_core::lattice::{Lattice, Orientation};
+use lattice_core::lattice::{Lattice, LatticeKind, Orientation};
 use lattice_core::voxels::file::WriteOptions;
 
 use super::cell_size::CellSize;
@@ -23,7 +23,7 @@ use lattice_nodes::replay::{self, Pipeline, RunReport, Slice, TopicPlan, TopicWi
 use lattice_nodes::voxel_marker_publisher::MarkerOptions;
 use lattice_runtime::LoopbackDomain;
 use processes::DdsReplay;
-pub use processes::{param, yaml_text};
+pub use processes::{param, quoted, yaml_text};
 
 /// Lattices of a replay over DDS: each takes two of the twelve participants that loopback shows.
 const MAX_LOOPBACK_LATTICES: usize = 5;
@@ -120,7 +120,6 @@ impl Replay {
             return self.replay_direct();
         }
         for (option, given) in [
-            ("--map-out", self.map_out.is_some()),
             ("--out-table", self.out_table.is_some()),
             ("--start", self.start.is_some()),
             ("--stop", self.stop.is_some()),
@@ -132,18 +131,16 @@ impl Replay {
         let bag = BagReader::open(&self.bag)?;
         let plan = self.plan(&bag)?;
         let lattices: Vec<_> = self.maps()?.into_iter().map(|map| map.lattice).collect();
-        // Apart from a robot on domain 0, and from other replays.
-        let domain = match (std::env::var_os("ROS_DOMAIN_ID"), lattices.len()) {
-            (Some(_), _) => None,
-            (None, ..=MAX_LOOPBACK_LATTICES) => Some(LoopbackDomain::take()?),
-            (None, count) => {
-                return Err(format!(
-                    "{count} lattices over DDS on loopback: at most \
-                     {MAX_LOOPBACK_LATTICES} find each other; use --direct"
-                )
-                .into());
-            }
-        };
+        if lattices.len() > MAX_LOOPBACK_LATTICES {
+            let count = lattices.len();
+            return Err(format!(
+                "{count} lattices over DDS on loopback: at most \
+                 {MAX_LOOPBACK_LATTICES} find each other; use --direct"
+            )
+            .into());
+        }
+        // Apart from robots and other replays, whatever ROS_DOMAIN_ID says.
+        let domain = LoopbackDomain::take()?;
         processes::run(&DdsReplay {
             options: self,
             reader: &bag,
@@ -277,18 +274,23 @@ impl Replay {
     }
 }
 
-/// Writes the map of each mapper; of several the name of the lattice goes before the ending.
+/// File of the map of a lattice; of several its name goes before the ending.
+pub fn map_file(path: &Path, kind: LatticeKind, several: bool) -> PathBuf {
+    let mut path = path.to_owned();
+    if several {
+        let ending = path.extension().unwrap_or_default().to_owned();
+        path.set_extension(kind.name());
+        path.as_mut_os_string().push(".");
+        path.as_mut_os_string().push(ending);
+    }
+    path
+}
+
+/// Writes the map of each mapper.
 fn write_maps(path: &Path, pipeline: &Pipeline) -> CliResult {
     let several = pipeline.mappers().count() > 1;
     for mapper in pipeline.mappers() {
-        let mut path = path.to_owned();
-        if several {
-            let name = mapper.list().lattice().kind().name();
-            let ending = path.extension().unwrap_or_default().to_owned();
-            path.set_extension(name);
-            path.as_mut_os_string().push(".");
-            path.as_mut_os_string().push(ending);
-        }
+        let path = map_file(path, mapper.list().lattice().kind(), several);
         let map = mapper.contents();
         whole::write(&path, |file| map.write(file, &WriteOptions::default()))?;
     }

@@ -16,6 +16,10 @@ use crate::CliResult;
 use lattice_nodes::report;
 use lattice_runtime::LoopbackDomain;
 
+/// Setting that a warning of a short receive buffer names.
+const BUFFER_SETTING: &str = "net.core.rmem_max";
+/// Such a warning of a node; it matters where something is lost.
+static SHORT_BUFFER: Mutex<Option<String>> = Mutex::new(None);
 /// Texts of warnings that are remembered.
 const MAX_TEXTS: usize = 1000;
 /// Time for all nodes to find each other.
@@ -78,20 +82,20 @@ impl NodeProcess {
             Some(namespace) => format!("{namespace}/{node}"),
             None => node.to_owned(),
         };
-        Self::spawn(command, what, replay.domain.as_ref(), report)
+        Self::spawn(command, what, &replay.domain, report)
     }
 
-    /// Starts a command that runs nodes, one of which writes this report, on a domain of loopback.
+    /// Starts a command that runs nodes, one of which writes this report, on a domain of loopback, whatever domain
+    /// and peers the environment names.
     pub fn spawn(
         mut command: Command,
         what: String,
-        domain: Option<&LoopbackDomain>,
+        domain: &LoopbackDomain,
         report: &Path,
     ) -> CliResult<Self> {
-        if let Some(domain) = domain {
-            command.env("ROS_DOMAIN_ID", domain.id().to_string());
-        }
         command
+            .env("ROS_DOMAIN_ID", domain.id().to_string())
+            .env_remove("ROS_STATIC_PEERS")
             .env_remove("ROS_LOCALHOST_ONLY")
             .env("ROS_AUTOMATIC_DISCOVERY_RANGE", "LOCALHOST")
             .stdin(Stdio::null())
@@ -125,6 +129,7 @@ impl NodeProcess {
                     if let Some(status) = self.child.try_wait()? {
                         return Err(self.ended(status));
                     }
+                    warn_of_short_buffer();
                     return Err(format!(
                         "{} did not log '{text}' within {} s: is the loopback interface up, and \
                          its domain used by nothing else?",
@@ -211,7 +216,10 @@ fn forward(
             let warning = line.contains("[WARN]") || line.contains("[ERROR]");
             // The player starts when all others have found each other.
             let expected = text.starts_with("no publisher on ");
-            if warning && !expected && first_time(text) {
+            if warning && text.contains(BUFFER_SETTING) {
+                let mut kept = SHORT_BUFFER.lock().unwrap_or_else(PoisonError::into_inner);
+                *kept = Some(text.to_owned());
+            } else if warning && !expected && first_time(text) {
                 log::warn!("{name}: {text}");
             } else {
                 log::debug!("{name}: {line}");
@@ -221,6 +229,14 @@ fn forward(
             }
         }
     })
+}
+
+/// Logs the warning of a node that its receive buffer is short, once something was lost.
+pub fn warn_of_short_buffer() {
+    let kept = SHORT_BUFFER.lock();
+    if let Some(text) = kept.unwrap_or_else(PoisonError::into_inner).take() {
+        log::warn!("{text}");
+    }
 }
 
 /// True if no process has logged this text before.

@@ -1,15 +1,19 @@
 //! Replay over DDS: the player and one process for each node, on a loopback domain of their own.
 
-use std::path::Path;
+use std::collections::BTreeMap;
+use std::fs::File;
+use std::io;
+use std::path::{Path, PathBuf};
 use std::time::Instant;
 
 use lattice_core::lattice::{Lattice, LatticeKind};
 
-use super::Replay;
-use super::node_process::NodeProcess;
+use super::node_process::{NodeProcess, warn_of_short_buffer};
+use super::{Replay, map_file};
 use crate::CliResult;
 use crate::progress::Progress;
 use lattice_bag::BagReader;
+use lattice_nodes::files::whole;
 use lattice_nodes::replay::{LatticeReport, Role, RunReport, TopicPlan};
 use lattice_runtime::LoopbackDomain;
 
@@ -23,8 +27,8 @@ pub struct DdsReplay<'a> {
     pub plan: &'a TopicPlan,
     /// One map for each.
     pub lattices: Vec<Lattice>,
-    /// Domain of the processes; `None`: that of `ROS_DOMAIN_ID`.
-    pub domain: Option<LoopbackDomain>,
+    /// Domain of the processes.
+    pub domain: LoopbackDomain,
 }
 
 /// Plays the log through separate processes and collects their reports.
@@ -60,22 +64,38 @@ pub fn run(replay: &DdsReplay) -> CliResult<RunReport> {
         &scratch.path().join("bag_player.json"),
     )?;
     progress.say("");
-    player.played(&mut |done| progress.set(done))?;
+    let mut pages: Vec<String> = branches.iter_mut().filter_map(|b| b.page.take()).collect();
+    player.played(&mut |done| {
+        progress.set(done);
+        // Who opens the page finds a map there.
+        for page in pages.drain(..) {
+            progress.print(&page);
+        }
+    })?;
     progress.set(1.0);
     progress.say("nodes end");
     let transformer = transformer.end()?;
-    let lattices = branches.into_iter().map(Branch::end);
+    // The branch with the page ends last, so that the page stays as long as it can.
+    let (last, first): (Vec<_>, Vec<_>) =
+        { branches.into_iter().enumerate() }.partition(|(_, branch)| branch.has_page);
+    let ends = first.into_iter().chain(last);
+    let ends = ends.map(|(i, branch)| Ok((i, branch.end()?)));
+    let lattices: BTreeMap<usize, LatticeReport> = ends.collect::<CliResult<_>>()?;
     let report = RunReport {
         source: replay.options.bag.display().to_string(),
         clouds_in_log: replay.plan.clouds(replay.reader),
         transformer,
-        lattices: lattices.collect::<Result<_, _>>()?,
+        lattices: lattices.into_values().collect(),
         origin: None,
         implausible_rows: replay.reader.implausible_rows(),
         choices: replay.plan.choices.clone(),
         wall_s: begin.elapsed().as_secs_f64(),
     };
     progress.done();
+    if !report.losses().is_empty() {
+        warn_of_short_buffer();
+    }
+    replay.keep_maps(scratch.path(), &report)?;
     Ok(report)
 }
 
@@ -88,6 +108,25 @@ impl DdsReplay<'_> {
         self.options
             .viewer
             .filter(|_| shown == Some(lattice.kind()))
+    }
+
+    /// Puts the maps that the mappers have saved where the user wants them.
+    fn keep_maps(&self, scratch: &Path, report: &RunReport) -> CliResult {
+        let Some(path) = &self.options.map_out else {
+            return Ok(());
+        };
+        let several = self.lattices.len() > 1;
+        for (lattice, report) in self.lattices.iter().zip(&report.lattices) {
+            if report.map.voxels == 0 {
+                // A mapper saves no empty map.
+                continue;
+            }
+            let saved: PathBuf = scratch.join(saved_map(lattice.kind().name()));
+            let mut saved = File::open(&saved).map_err(|e| format!("{}: {e}", saved.display()))?;
+            let to = map_file(path, lattice.kind(), several);
+            whole::write(&to, |file| io::copy(&mut saved, file))?;
+        }
+        Ok(())
     }
 
     fn topic<'a>(&'a self, wanted: impl Fn(Role) -> bool + 'a) -> Vec<&'a str> {
@@ -154,6 +193,11 @@ impl DdsReplay<'_> {
     }
 }
 
+/// Name of the file that the mapper of a lattice saves its map to.
+fn saved_map(name: &str) -> String {
+    format!("{name}.lattice")
+}
+
 /// A parameter as `-p` takes it.
 pub fn param(name: &str, value: &str) -> String {
     format!("{name}:={value}")
@@ -164,7 +208,8 @@ pub fn yaml_text(path: &Path) -> String {
     format!("'{}'", path.display().to_string().replace('\'', "''"))
 }
 
-fn quoted(names: &[&str]) -> String {
+/// Names as a YAML list.
+pub fn quoted(names: &[&str]) -> String {
     let names: Vec<String> = names.iter().map(|name| format!("'{name}'")).collect();
     format!("[{}]", names.join(", "))
 }
@@ -174,6 +219,9 @@ struct Branch {
     namespace: String,
     mapper: NodeProcess,
     markers: NodeProcess,
+    has_page: bool,
+    /// Line that says where the page is.
+    page: Option<String>,
 }
 
 impl Branch {
@@ -200,6 +248,14 @@ impl Branch {
             param("qos./points_enu.depth", "512"),
         ];
         params.extend(orientation);
+        if replay.options.map_out.is_some() {
+            params.extend([
+                param("map_dir", &yaml_text(scratch)),
+                param("autosave_file", &saved_map(name)),
+                // Only at the end.
+                param("autosave_period_s", "86400.0"),
+            ]);
+        }
         let mapper = start("lattice_mapper", params)?;
         let mut markers = match viewer_port {
             // In one process: twelve find each other, and five lattices need them all.
@@ -209,15 +265,21 @@ impl Branch {
             }
             None => start("voxel_marker_publisher", Vec::new())?,
         };
-        if viewer_port.is_some() {
-            let line = markers.expect("the map is at ")?;
-            let url = line.rsplit(' ').next().unwrap_or_default();
-            eprintln!("watch the {name} map grow at {url}");
-        }
+        let has_page = viewer_port.is_some();
+        let page = match has_page {
+            true => {
+                let line = markers.expect("the map is at ")?;
+                let url = line.rsplit(' ').next().unwrap_or_default();
+                Some(format!("watch the {name} map grow at {url}"))
+            }
+            false => None,
+        };
         Ok(Self {
             namespace: format!("/{name}"),
             mapper,
             markers,
+            has_page,
+            page,
         })
     }
 

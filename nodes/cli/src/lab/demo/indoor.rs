@@ -20,8 +20,8 @@ use super::indoor_report::IndoorReport;
 use super::indoor_results::Results;
 use crate::CliResult;
 use crate::progress::Progress;
-use crate::replay::node_process::NodeProcess;
-use crate::replay::{param, yaml_text};
+use crate::replay::node_process::{NodeProcess, warn_of_short_buffer};
+use crate::replay::{param, quoted, yaml_text};
 
 /// Parameters of the nodes, for users to copy.
 const PARAMS: [(&str, &str); 4] = [
@@ -63,6 +63,11 @@ const COLORS: [(&str, &str); 2] = [
     ("segmenter", "/rgb/image_rect_color"),
     ("segmenter", "/headset/image"),
 ];
+/// Images that a network labels, each with the topic of its labels: the log waits for them.
+const LOCKSTEP: [(&str, &str); 2] = [
+    ("/rgb/image_rect_color", "/labels/image"),
+    ("/headset/image", "/headset/labels/image"),
+];
 /// Names of the segmenter's topics where it labels the headset's images.
 const OF_HEADSET: [&str; 4] = [
     "rgb/image_rect_color:=headset/image",
@@ -85,6 +90,8 @@ pub struct IndoorDemo {
     pub model: Option<PathBuf>,
     /// Port of the page, if there is to be one.
     pub viewer: Option<u16>,
+    /// True if the page stays after the report, until Ctrl-C.
+    pub page_stays: bool,
     /// True for a report in JSON.
     pub json: bool,
 }
@@ -93,7 +100,10 @@ pub struct IndoorDemo {
 struct Nodes {
     robot: NodeProcess,
     headset: NodeProcess,
-    viewer: Option<NodeProcess>,
+    /// Serves the page while it lives.
+    _viewer: Option<NodeProcess>,
+    /// Address of the page.
+    url: Option<String>,
     results: Results,
 }
 
@@ -107,13 +117,13 @@ impl IndoorDemo {
         for (name, text) in PARAMS {
             write_text(&self.out.join(name), text)?;
         }
-        let domain = match std::env::var_os("ROS_DOMAIN_ID") {
-            Some(_) => None,
-            None => Some(LoopbackDomain::take()?),
-        };
-        let nodes = self.start(domain.as_ref(), scratch.path())?;
-        self.play(domain.as_ref(), scratch.path())?;
+        let domain = LoopbackDomain::take()?;
+        let mut nodes = self.start(&domain, scratch.path())?;
+        self.play(&domain, scratch.path(), nodes.url.as_deref())?;
         let last = nodes.results.last();
+        if nodes.results.is_interrupted() {
+            return Err("ended by a signal".into());
+        }
         let report = self.report(
             nodes.robot,
             nodes.headset,
@@ -122,6 +132,9 @@ impl IndoorDemo {
             last,
             begin,
         )?;
+        if !report.dropped.is_empty() {
+            warn_of_short_buffer();
+        }
         match self.json {
             true => println!("{}", serde_json::to_string_pretty(&report)?),
             false => println!(
@@ -129,7 +142,11 @@ impl IndoorDemo {
                 self.out.display()
             ),
         }
-        super::stay(nodes.viewer)
+        if let (true, Some(url)) = (self.page_stays, nodes.url.take()) {
+            println!("the page stays at {url} with this map; Ctrl-C ends it");
+            nodes.results.until_interrupted();
+        }
+        Ok(())
     }
 
     fn simulate(&self) -> CliResult<Indoor> {
@@ -150,7 +167,7 @@ impl IndoorDemo {
         Ok(indoor)
     }
 
-    fn start(&self, domain: Option<&LoopbackDomain>, scratch: &Path) -> CliResult<Nodes> {
+    fn start(&self, domain: &LoopbackDomain, scratch: &Path) -> CliResult<Nodes> {
         let results = Results::listen(domain)?;
         let map = |name: &str, value: &str| param(&format!("lattice_mapper:{name}"), value);
         let robot = [
@@ -159,16 +176,15 @@ impl IndoorDemo {
             map("autosave_file", "map.lattice"),
             map("autosave_period_s", "3600.0"),
         ];
-        let viewer = match self.viewer {
+        let (viewer, url) = match self.viewer {
             Some(port) => {
                 let port = param("viewer_server:port", &port.to_string());
                 let mut viewer = self.nodes(domain, scratch, &["viewer_server"], &[port])?;
                 let line = viewer.expect("the map is at ")?;
                 let url = line.rsplit(' ').next().unwrap_or_default();
-                eprintln!("watch the robot, its map and the headset at {url}");
-                Some(viewer)
+                (Some(viewer), Some(url.to_owned()))
             }
-            None => None,
+            None => (None, None),
         };
         let mut of_robot = vec!["semantic_cloud", "lattice_mapper", "enu_transformer"];
         let mut of_headset = vec!["headset_cloud", "semantic_icp_server"];
@@ -185,14 +201,22 @@ impl IndoorDemo {
                 params.push(model.clone());
             }
             robot.push(param("semantic_cloud:use_confidence", "true"));
-            // As many as come while the network works.
-            robot.push(param("semantic_cloud:queue_size", "40"));
             headset.push(param("headset_cloud:use_confidence", "true"));
+            // The player waits for each, and may know of the topic later than the first comes.
+            for ((_, labels), params) in LOCKSTEP.iter().zip([&mut robot, &mut headset]) {
+                for (key, value) in [
+                    ("reliability", "reliable"),
+                    ("durability", "transient_local"),
+                ] {
+                    params.push(param(&format!("segmenter:qos.{labels}.{key}"), value));
+                }
+            }
         }
         Ok(Nodes {
             robot: self.nodes(domain, scratch, &of_robot, &robot)?,
             headset: self.nodes(domain, scratch, &of_headset, &headset)?,
-            viewer,
+            _viewer: viewer,
+            url,
             results,
         })
     }
@@ -200,7 +224,7 @@ impl IndoorDemo {
     /// Starts nodes in one process, each with a report.
     fn nodes(
         &self,
-        domain: Option<&LoopbackDomain>,
+        domain: &LoopbackDomain,
         scratch: &Path,
         nodes: &[&str],
         params: &[String],
@@ -252,14 +276,31 @@ impl IndoorDemo {
         INPUTS.into_iter().chain(images)
     }
 
+    /// Topics of the log by their use.
+    fn topics(&self) -> String {
+        let images = match self.model {
+            Some(_) => "colours /rgb/image_rect_color, which a network labels",
+            None => "true labels /labels/image",
+        };
+        format!(
+            "clouds: of depth /depth_registered/image_rect and {images}; poses and mounts: /tf; \
+             headset: /headset/mesh, its images and /headset/pose"
+        )
+    }
+
     /// Plays the log to its end.
-    fn play(&self, domain: Option<&LoopbackDomain>, scratch: &Path) -> CliResult {
+    fn play(&self, domain: &LoopbackDomain, scratch: &Path, url: Option<&str>) -> CliResult {
         let progress = Progress::new("play");
+        progress.print(&self.topics());
         progress.say("the robot surveys the house, then the headset joins");
-        let waited: Vec<String> = self
-            .inputs()
-            .map(|(_, topic)| format!("'{topic}'"))
-            .collect();
+        let waited: Vec<&str> = self.inputs().map(|(_, topic)| topic).collect();
+        let lockstep: Vec<&str> = match self.model {
+            Some(_) => LOCKSTEP
+                .iter()
+                .flat_map(|(images, labels)| [*images, *labels])
+                .collect(),
+            None => Vec::new(),
+        };
         let mut command = Command::new(std::env::current_exe()?);
         command.args(["node", "bag_player", "--ros-args", "--log-level", "info"]);
         for param in [
@@ -267,13 +308,23 @@ impl IndoorDemo {
             param("rate", &format!("{:?}", self.rate)),
             param("max_wait_s", "600.0"),
             param("keyboard", "false"),
-            param("wait_for_subscribers", &format!("[{}]", waited.join(", "))),
+            param("wait_for_subscribers", &quoted(&waited)),
+            param("lockstep", &quoted(&lockstep)),
         ] {
             command.args(["-p", &param]);
         }
         let file = report_file(scratch, "bag_player");
         let player = NodeProcess::spawn(command, "bag_player".to_owned(), domain, &file)?;
-        player.played(&mut |done| progress.set(done))?;
+        let mut url = url;
+        player.played(&mut |done| {
+            progress.set(done);
+            // Who opens the page finds a map there.
+            if let Some(url) = url.take() {
+                progress.print(&format!(
+                    "watch the robot, its map and the headset at {url}"
+                ));
+            }
+        })?;
         progress.done();
         Ok(())
     }

@@ -10,7 +10,7 @@ mod indoor_results;
 mod network;
 
 use super::{picture, simulate};
-use crate::replay::Replay;
+use crate::replay::{Replay, map_file};
 use crate::{CliResult, Lattices, init_logging};
 use clap::Args;
 use lattice_bag::Storage;
@@ -18,7 +18,7 @@ use lattice_core::lattice::LatticeKind;
 use lattice_lab::datasets::BobcatOptions;
 use lattice_lab::render::RenderOptions;
 use lattice_nodes::files::whole::write_text;
-use std::fs;
+use std::fs::{self, File, TryLockError};
 #[cfg(feature = "viewer")]
 use std::io::IsTerminal;
 #[cfg(feature = "viewer")]
@@ -32,6 +32,9 @@ const BOBCAT_PARAMS: &str = include_str!("../../../../../params/bobcat.yaml");
 const VIEWER_PARAMS: &str = include_str!("../../../../../params/viewer.yaml");
 
 /// Simulate, play, map
+///
+/// A page shows the map as it grows. In a terminal it stays with the last map until Ctrl-C; in a pipe, with --json
+/// and with --no-view the demo ends with its table.
 #[derive(Args)]
 pub struct Demo {
     /// A robot with a depth camera surveys a house, and a headset joins it
@@ -70,7 +73,7 @@ pub struct Demo {
     /// cubic, bcc, fcc, mcc, hex, hexopt, several with commas (five at most), or paper
     #[arg(long, default_value = "paper")]
     lattice: Lattices,
-    /// Do without the page that shows the FCC map, or the first, as it grows
+    /// Do without the page that shows the FCC map, or the first, as it grows, and end with the table
     #[cfg(feature = "viewer")]
     #[arg(long)]
     no_view: bool,
@@ -91,11 +94,15 @@ impl Demo {
         if self.indoor {
             return self.run_indoor();
         }
-        let out = self.out("target/lattice_demo")?;
+        let (out, _lock) = self.out("target/lattice_demo")?;
         let bag = out.join("log");
         let params = out.join("bobcat.yaml");
         write_text(&params, BOBCAT_PARAMS)?;
         let (params, viewer) = self.viewer(&out, params)?;
+        let maps = out.join("map.lattice");
+        let map = self.shown_map(&maps);
+        // Of a demo before, which may have been another.
+        let _ = fs::remove_file(&map);
         let summary = simulate::bobcat(&BobcatOptions {
             seed: self.seed,
             duration_s: self.duration,
@@ -109,42 +116,41 @@ impl Demo {
         eprintln!("{summary}");
         let replay = Replay {
             bag,
-            direct: false,
             lattice: Some(self.lattice.clone()),
             params,
             rate: self.rate,
+            map_out: Some(maps),
             json: self.json,
             viewer,
             ..Replay::default()
         };
         let report = replay.replay()?;
-        // The same log without DDS: the map that the nodes should have made, and its picture.
-        let png = out.join("map.png");
-        let direct = Replay {
-            direct: true,
-            lattice: Some(Lattices(vec![LatticeKind::Fcc])),
-            map_out: Some(out.join("map.lattice")),
-            ..replay
+        // The nodes have ended: the page goes on with the map that they made.
+        #[cfg(feature = "viewer")]
+        let page = match viewer.filter(|_| self.page_stays()) {
+            Some(port) => Some(crate::view::serve_file(
+                &map,
+                (Ipv4Addr::LOCALHOST, port).into(),
+            )?),
+            None => None,
         };
-        direct.replay()?;
-        let (map, _) = crate::map::read(&out.join("map.lattice"))?;
-        picture(&map.into_list(usize::MAX), &RenderOptions::default(), &png)?;
+        let png = out.join("map.png");
+        let (list, _) = crate::map::read(&map)?;
+        picture(&list.into_list(usize::MAX), &RenderOptions::default(), &png)?;
         if self.json {
             println!("{}", serde_json::to_string_pretty(&report)?);
         } else {
             println!("{report}");
             println!(
-                "log {}, picture {}",
+                "log {}, map {}, picture {}",
                 out.join("log").display(),
+                map.display(),
                 png.display()
             );
         }
         #[cfg(feature = "viewer")]
-        if viewer.is_some() && std::io::stdout().is_terminal() {
-            // The nodes have ended: the page goes on with the map that they made.
-            let address = (Ipv4Addr::LOCALHOST, self.port).into();
-            let (_server, url) = crate::view::serve_file(&out.join("map.lattice"), address)?;
-            println!("the map stays at {url} until Ctrl-C");
+        if let Some((_server, url)) = page {
+            println!("the page stays at {url} with this map; Ctrl-C ends it");
             loop {
                 std::thread::park();
             }
@@ -152,24 +158,49 @@ impl Demo {
         Ok(())
     }
 
-    /// The directory, made.
-    fn out(&self, usual: &str) -> CliResult<PathBuf> {
+    /// The directory, made and kept from other demos.
+    fn out(&self, usual: &str) -> CliResult<(PathBuf, File)> {
         let out = self.out.clone().unwrap_or_else(|| PathBuf::from(usual));
-        fs::create_dir_all(&out).map_err(|e| format!("{}: {e}", out.display()))?;
-        Ok(out)
+        let named = |problem: &dyn std::fmt::Display| format!("{}: {problem}", out.display());
+        fs::create_dir_all(&out).map_err(|e| named(&e))?;
+        let lock = File::open(&out).map_err(|e| named(&e))?;
+        if let Err(TryLockError::WouldBlock) = lock.try_lock() {
+            let problem = "another demo is writing there; give this one a folder with --out";
+            return Err(named(&problem).into());
+        }
+        Ok((out, lock))
+    }
+
+    /// The map that is shown: FCC, or else the first.
+    fn shown_map(&self, maps: &Path) -> PathBuf {
+        let kinds = &self.lattice.0;
+        let fcc = kinds.iter().find(|kind| **kind == LatticeKind::Fcc);
+        match fcc.or(kinds.first()) {
+            Some(kind) => map_file(maps, *kind, kinds.len() > 1),
+            None => maps.to_owned(),
+        }
+    }
+
+    /// True where somebody looks at a terminal.
+    #[cfg(feature = "viewer")]
+    fn page_stays(&self) -> bool {
+        !self.json && std::io::stdout().is_terminal()
     }
 
     #[cfg(feature = "headset")]
     fn run_indoor(&self) -> CliResult {
-        let out = self.out("target/lattice_demo_indoor")?;
+        let (out, _lock) = self.out("target/lattice_demo_indoor")?;
         let model = match self.true_labels {
             true => None,
             false => Some(network::model(self.model.as_ref(), &out)?),
         };
         #[cfg(feature = "viewer")]
-        let viewer = (!self.no_view).then(|| self.port());
+        let (viewer, page_stays) = match self.no_view {
+            true => (None, false),
+            false => (Some(self.port()?), self.page_stays()),
+        };
         #[cfg(not(feature = "viewer"))]
-        let viewer = None;
+        let (viewer, page_stays) = (None, false);
         let demo = indoor::IndoorDemo {
             out,
             seed: self.seed,
@@ -177,16 +208,18 @@ impl Demo {
             views: self.views,
             model,
             viewer,
+            page_stays,
             json: self.json,
         };
         demo.run()
     }
 
-    /// The port that was asked for, or 0 if it is taken.
+    /// The port that was asked for, or one that is free if it is taken.
     #[cfg(feature = "viewer")]
-    fn port(&self) -> u16 {
-        let is_free = TcpListener::bind((Ipv4Addr::LOCALHOST, self.port)).is_ok();
-        if is_free { self.port } else { 0 }
+    fn port(&self) -> CliResult<u16> {
+        let bind = |port| TcpListener::bind((Ipv4Addr::LOCALHOST, port));
+        let free = bind(self.port).or_else(|_| bind(0))?;
+        Ok(free.local_addr()?.port())
     }
 
     /// Files of parameters, and the port of the viewer if there is to be one.
@@ -197,28 +230,11 @@ impl Demo {
         }
         let viewer = out.join("viewer.yaml");
         write_text(&viewer, VIEWER_PARAMS)?;
-        Ok((vec![params, viewer], Some(self.port())))
+        Ok((vec![params, viewer], Some(self.port()?)))
     }
 
     #[cfg(not(feature = "viewer"))]
     fn viewer(&self, _out: &Path, params: PathBuf) -> CliResult<(Vec<PathBuf>, Option<u16>)> {
         Ok((vec![params], None))
     }
-}
-
-/// Leaves a page up until Ctrl-C where somebody looks at a terminal.
-#[cfg(all(feature = "headset", feature = "viewer"))]
-fn stay(viewer: Option<crate::replay::node_process::NodeProcess>) -> CliResult {
-    if viewer.is_some() && std::io::stdout().is_terminal() {
-        println!("the page stays until Ctrl-C");
-        loop {
-            std::thread::park();
-        }
-    }
-    Ok(())
-}
-
-#[cfg(all(feature = "headset", not(feature = "viewer")))]
-fn stay(_viewer: Option<crate::replay::node_process::NodeProcess>) -> CliResult {
-    Ok(())
 }
