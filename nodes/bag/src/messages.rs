@@ -22,7 +22,8 @@ pub(crate) enum MessageCompression {
 }
 
 /// Messages of a bag in order of log time. Holds one message per storage file that overlaps in
-/// time, and for MCAP the chunks that overlap. Ends after the first error.
+/// time, and for MCAP the chunks that overlap. Ends after the first error, and without one where the last file of a
+/// recorder that was killed is cut.
 pub struct Messages {
     splits: Arc<[Split]>,
     topics: Arc<[TopicInfo]>,
@@ -32,6 +33,8 @@ pub struct Messages {
     /// Not yet opened, in order of time.
     pending: VecDeque<usize>,
     active: Vec<Active>,
+    /// True of a folder whose recorder was killed: it lacks `metadata.yaml`.
+    unfinished: bool,
     messages_read: u64,
     ended: bool,
 }
@@ -52,6 +55,7 @@ impl Messages {
         topics: Arc<[TopicInfo]>,
         filter: Filter,
         compression: MessageCompression,
+        unfinished: bool,
     ) -> Messages {
         let in_range = |split: &Split| {
             split
@@ -72,6 +76,7 @@ impl Messages {
             compression,
             pending,
             active: Vec::new(),
+            unfinished,
             messages_read: 0,
             ended: false,
         }
@@ -120,6 +125,15 @@ impl Messages {
             });
         }
         Ok(())
+    }
+
+    /// True for the error by which the last file of a killed recorder ends; the reader has warned of it.
+    fn is_end_of_unfinished(&self, error: &BagError) -> bool {
+        self.unfinished
+            && !self.filter.past_damage
+            && matches!(error, BagError::Truncated { .. })
+            && self.active.is_empty()
+            && self.pending.is_empty()
     }
 
     fn take_first(&mut self) -> Option<Result<BagMessage, BagError>> {
@@ -187,6 +201,10 @@ impl Iterator for Messages {
         let next = match self.open_due() {
             Ok(()) => self.take_first(),
             Err(error) => Some(Err(error)),
+        };
+        let next = match next {
+            Some(Err(error)) if self.is_end_of_unfinished(&error) => None,
+            next => next,
         };
         self.ended = match &next {
             None => true,

@@ -39,6 +39,8 @@ pub struct BagReader {
     ros_distro: String,
     splits: Arc<[Split]>,
     compression: MessageCompression,
+    /// True of a folder without `metadata.yaml`, which a recorder writes at its end.
+    unfinished: bool,
 }
 
 impl BagReader {
@@ -52,7 +54,11 @@ impl BagReader {
         }
         let metadata_path = path.join("metadata.yaml");
         if !metadata_path.exists() {
-            return Self::assemble(path, None, splits_in(path)?);
+            let reader = Self::assemble(path, None, splits_in(path)?)?;
+            return Ok(BagReader {
+                unfinished: true,
+                ..reader
+            });
         }
         let metadata = Metadata::read(&metadata_path)?;
         let splits = listed_splits(path, &metadata, &metadata_path)?;
@@ -110,7 +116,8 @@ impl BagReader {
 
     /// The wanted messages in order of log time across all files, with bounded memory.
     ///
-    /// A damaged bag yields what precedes the damage, then the error. Unknown topics are an error.
+    /// A damaged bag yields what precedes the damage, then the error; a folder without `metadata.yaml`, whose recorder
+    /// was killed, ends without one where its last file is cut. Unknown topics are an error.
     pub fn messages(&self, options: &ReadOptions) -> Result<Messages, BagError> {
         let names = options.topics.as_deref();
         self.expect_topics(names.unwrap_or_default())?;
@@ -125,7 +132,7 @@ impl BagReader {
 
     pub(crate) fn filtered(&self, filter: Filter) -> Messages {
         let (splits, topics) = (self.splits.clone(), self.topics.clone());
-        Messages::new(splits, topics, filter, self.compression)
+        Messages::new(splits, topics, filter, self.compression, self.unfinished)
     }
 
     /// Refuses names of topics that the bag lacks.
@@ -210,6 +217,7 @@ impl BagReader {
             topics: topics.into(),
             splits: splits.into(),
             compression,
+            unfinished: false,
         })
     }
 }

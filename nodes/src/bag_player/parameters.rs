@@ -17,12 +17,12 @@ const ABOUT: &[About] = about! {
     "exclude_topics" fixed(START): "Topics not to play.";
     "clock_hz" fixed(START): "How often /clock is published; 0: never.";
     "wait_for_subscribers" fixed(START): "Topics that must have a subscriber before the log starts.";
-    "lockstep" fixed(START): "Pairs of topics: a played one, each message of which waits until the one before is answered, and that of the answers, which have the same stamp.";
+    "lockstep" fixed(START): "Pairs of topics, a played one and that of its answers: each message waits for an answer with the stamp of the message before.";
     "wait_timeout_s" fixed(START): "How long to wait for these subscribers and publishers.";
     "settle_s" fixed(START): "How long to wait for them to know us.";
     "start_paused" fixed(START): "Whether the log is held until a call of ~/resume or the space bar.";
     "keyboard" fixed(START): "Whether keys of the terminal are taken: space pauses, arrows step and change the rate.";
-    "max_wait_s": "How long a subscriber that does not acknowledge is waited for; then its topic's messages are skipped and counted until it does. Also how long an answer of lockstep is waited for.";
+    "max_wait_s": "How long a subscriber that does not acknowledge is waited for; then its topic's messages are skipped and counted until it does. The same for an answer of lockstep.";
 };
 
 const START: &str = "the log is opened with it";

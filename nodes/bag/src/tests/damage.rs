@@ -109,6 +109,42 @@ proptest! {
 }
 
 #[test]
+fn a_folder_whose_recorder_was_killed_ends_where_its_file_is_cut() {
+    for (name, metadata, whole, written) in bags()
+        .iter()
+        .map(|made| (&made.name, &made.metadata, &made.whole, &made.written))
+        .filter(|(name, ..)| name.ends_with(".mcap"))
+    {
+        let folder = tempfile::tempdir().unwrap();
+        let (file, notes) = (
+            folder.path().join(name),
+            folder.path().join("metadata.yaml"),
+        );
+        // The last record of the data.
+        let cut = whole.windows(7).position(|w| w == b"rosbag2").unwrap();
+        fs::write(&file, &whole[..cut]).unwrap();
+        let (some, error) = read_some(folder.path());
+        assert!(error.is_none(), "{name}: {error:?}");
+        assert!(!some.is_empty() && some == written[..some.len()], "{name}");
+        // The metadata of a recorder that ended, or a file alone: something is missing.
+        fs::write(&notes, metadata).unwrap();
+        for place in [folder.path(), &file] {
+            let (again, error) = read_some(place);
+            assert_eq!(again, some, "{name}");
+            assert!(
+                matches!(error, Some(BagError::Truncated { .. })),
+                "{name}: {error:?}"
+            );
+        }
+        // Another file behind the cut one.
+        fs::remove_file(&notes).unwrap();
+        fs::write(folder.path().join("z.mcap"), whole).unwrap();
+        let (_, error) = read_some(folder.path());
+        assert!(error.is_some(), "{name}");
+    }
+}
+
+#[test]
 fn a_bent_chunk_is_found_by_its_crc_and_placed() {
     let folder = tempfile::tempdir().unwrap();
     let (path, written) = write_foreign(

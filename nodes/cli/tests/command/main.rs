@@ -4,6 +4,7 @@
 mod bag_info;
 mod browser;
 mod calibrate;
+mod demo;
 mod driver_logs;
 mod evaluate;
 mod files;
@@ -14,6 +15,7 @@ mod map;
 mod merger;
 mod names;
 mod nodes;
+mod pages;
 mod paper;
 mod player;
 mod point_files;

@@ -274,6 +274,10 @@ fn a_recorder_that_is_killed_leaves_what_it_had() {
         signal(&nodes, "-TERM");
         nodes.wait().unwrap();
         let info = json(&["bag", "info", &bag]);
+        // It is mapped as it is.
+        let report = json(&["replay", "--direct", &bag, "--params", PARAMS]);
+        let mapped = report["transformer"]["counts"]["clouds_out"].as_u64();
+        assert!(mapped > Some(100), "{storage}: {report}");
         // A second may be lost of more than four.
         let left = info["topics"].as_array().unwrap().iter();
         let left = left.filter(|topic| topic["name"] == "/left/points");

@@ -1,0 +1,201 @@
+//! What becomes of each command of the pages in the test.
+
+/// Treatment of a command.
+#[derive(Clone, Copy, Debug)]
+pub enum Rule {
+    /// Run with these arguments more, that it does less work; it must succeed.
+    Runs(&'static str),
+    /// Started with these arguments more, waited for until a line has this text, and ended by a signal.
+    Serves(&'static str, &'static str),
+    /// Started, waited for until this node publishes on `/diagnostics`, and ended by a signal.
+    Works(&'static str),
+    /// The whole block that begins with this command is one script, which must succeed.
+    Script,
+    /// Not run, for a reason. A command of `lattice` must exist with its options all the same.
+    NotHere(&'static str),
+}
+
+use Rule::{NotHere, Runs, Script, Serves, Works};
+
+/// Beginnings of commands of a page, or of all (`*`), with what becomes of them; the longest holds.
+pub const RULES: &[(&str, &str, Rule)] = &[
+    // What is elsewhere, or takes long.
+    (
+        "*",
+        "cargo",
+        NotHere("the tests run in a build; .ci has the others"),
+    ),
+    (
+        "*",
+        "pip install",
+        NotHere("needs PyPI; .ci/python builds the package"),
+    ),
+    (
+        "*",
+        "colcon",
+        NotHere("needs colcon; .ci/run lists the packages"),
+    ),
+    ("*", "ros2", NotHere("needs ROS 2")),
+    ("*", "test/peers/", NotHere("needs the peers")),
+    (
+        "*",
+        "lattice fleet",
+        NotHere("lattice-fleet is built apart: .ci/fleet"),
+    ),
+    (
+        "*",
+        "lattice evaluate",
+        NotHere("takes minutes to hours; evaluate.rs"),
+    ),
+    ("*", "lattice paper", NotHere("takes minutes; paper.rs")),
+    (
+        "*",
+        "lattice demo",
+        NotHere("viewer.rs and indoor.rs run the demos"),
+    ),
+    // Pages of users.
+    ("README.md", "lattice bag info LOG", Runs("")),
+    ("README.md", "lattice replay LOG --direct", Runs("")),
+    (
+        "README.md",
+        "lattice view map.lattice",
+        Serves("--port 0", "the map is at"),
+    ),
+    (
+        "README.md",
+        "lattice view robot.yaml",
+        Serves("--port 0", "the map is at"),
+    ),
+    (
+        "README.md",
+        "lattice run robot.yaml",
+        Works("lattice_mapper"),
+    ),
+    (
+        "README.md",
+        "lattice health",
+        NotHere("needs clouds at that time; health.rs"),
+    ),
+    (
+        "docs/calibration.md",
+        "lattice calibrate",
+        NotHere("calibrate.rs"),
+    ),
+    ("docs/calibration.md", "lattice simulate town", Runs("")),
+    ("docs/commands.md", "lattice", Runs("")),
+    (
+        "docs/free_space.md",
+        "lattice simulate bobcat",
+        Runs("--duration 2"),
+    ),
+    ("docs/free_space.md", "lattice replay yard", Runs("")),
+    ("docs/free_space.md", "lattice map diff", Runs("")),
+    (
+        "docs/front_ends.md",
+        "lattice run params/rgbd.yaml",
+        Works("lattice_mapper"),
+    ),
+    ("docs/front_ends.md", "lattice bag info LOG", Script),
+    (
+        "docs/front_ends.md",
+        "lattice run params/segmenter.yaml",
+        NotHere("needs --features onnx"),
+    ),
+    (
+        "docs/front_ends.md",
+        "lattice run params/rgbd.yaml -- --ros-args -p semantic_cloud:model",
+        NotHere("needs --features onnx"),
+    ),
+    (
+        "docs/front_ends.md",
+        "export ORT_DYLIB_PATH",
+        NotHere("needs onnxruntime of PyPI"),
+    ),
+    (
+        "docs/front_ends.md",
+        "lattice bench camera",
+        NotHere("measures for a minute"),
+    ),
+    ("docs/headset.md", "lattice run", Works("lattice_mapper")),
+    (
+        "docs/nodes.md",
+        "lattice node lattice_mapper",
+        Works("lattice_mapper"),
+    ),
+    ("docs/nodes.md", "lattice run", Serves("", "the map is at")),
+    (
+        "docs/nodes.md",
+        "lattice link",
+        NotHere("writes outside of the folder; link.rs"),
+    ),
+    (
+        "docs/octomap.md",
+        "lattice node lattice_mapper",
+        Works("octomap_server"),
+    ),
+    (
+        "docs/parameters.md",
+        "lattice node lattice_mapper --help",
+        Runs(""),
+    ),
+    (
+        "docs/parameters.md",
+        "lattice node lattice_mapper --ros-args",
+        Works("lattice_mapper"),
+    ),
+    ("docs/parameters.md", "lattice run", Works("lattice_mapper")),
+    (
+        "docs/recording.md",
+        "lattice record -a",
+        Serves("", "recording /tf"),
+    ),
+    (
+        "docs/recording.md",
+        "lattice record /points",
+        Serves("", "recording /tf"),
+    ),
+    (
+        "docs/recording.md",
+        "lattice record -e",
+        Serves("", "recording to"),
+    ),
+    ("docs/recording.md", "lattice record -a -o killed &", Script),
+    (
+        "docs/security.md",
+        "export",
+        NotHere("needs --features security; .ci/cyclone"),
+    ),
+    (
+        "docs/security.md",
+        "lattice node",
+        NotHere("needs --features security; .ci/cyclone"),
+    ),
+    ("docs/security.md", "xml=", Script),
+    ("docs/tables.md", "lattice run", Serves("", "the map is at")),
+    (
+        "docs/viewer.md",
+        "lattice view map.lattice",
+        Serves("--port 0", "the map is at"),
+    ),
+    (
+        "docs/viewer.md",
+        "lattice view LOG",
+        Serves("--port 0", "the map is at"),
+    ),
+    (
+        "docs/viewer.md",
+        "lattice view",
+        Serves("--port 0", "the map is at"),
+    ),
+    ("docs/viewer.md", "lattice run", Serves("", "the map is at")),
+];
+
+/// The rule of a command of a page, by its place in the table.
+pub fn rule_of(page: &str, command: &str) -> Option<usize> {
+    let rules = RULES.iter().enumerate();
+    let holds = |of: &str, begin: &str| (of == page || of == "*") && command.starts_with(begin);
+    let holding = rules.filter(|(_, (of, begin, _))| holds(of, begin));
+    holding
+        .max_by_key(|(_, (_, begin, _))| begin.len())
+        .map(|(i, _)| i)
+}
