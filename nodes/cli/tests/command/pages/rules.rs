@@ -157,7 +157,7 @@ pub const RULES: &[(&str, &str, Rule)] = &[
     (
         "docs/recording.md",
         "lattice record -e",
-        Serves("", "recording to"),
+        Serves("-o matched", "recording to"),
     ),
     ("docs/recording.md", "lattice record -a -o killed &", Script),
     (
