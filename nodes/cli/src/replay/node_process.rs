@@ -22,10 +22,10 @@ const BUFFER_SETTING: &str = "net.core.rmem_max";
 static SHORT_BUFFER: Mutex<Option<String>> = Mutex::new(None);
 /// Texts of warnings that are remembered.
 const MAX_TEXTS: usize = 1000;
-/// Time for all nodes to find each other.
-const MATCH_TIME: Duration = Duration::from_secs(30);
+/// Time for all nodes to find each other, also on a busy machine.
+const MATCH_TIME: Duration = Duration::from_secs(60);
 /// Time for a node to work off its inbox at its end.
-const END_TIME: Duration = Duration::from_secs(60);
+const END_TIME: Duration = Duration::from_secs(300);
 
 /// A node in a process of its own, and what it logs.
 pub struct NodeProcess {

@@ -67,7 +67,7 @@ pub fn run(replay: &DdsReplay) -> CliResult<RunReport> {
     let mut pages: Vec<String> = branches.iter_mut().filter_map(|b| b.page.take()).collect();
     player.played(&mut |done| {
         progress.set(done);
-        // Who opens the page finds a map there.
+        // A page that is opened now has a map to show.
         for page in pages.drain(..) {
             progress.print(&page);
         }

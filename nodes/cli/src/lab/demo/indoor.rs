@@ -318,7 +318,7 @@ impl IndoorDemo {
         let mut url = url;
         player.played(&mut |done| {
             progress.set(done);
-            // Who opens the page finds a map there.
+            // A page that is opened now has a map to show.
             if let Some(url) = url.take() {
                 progress.print(&format!(
                     "watch the robot, its map and the headset at {url}"

@@ -125,6 +125,7 @@ impl Demo {
             ..Replay::default()
         };
         let report = replay.replay()?;
+        report.check()?;
         // The nodes have ended: the page goes on with the map that they made.
         #[cfg(feature = "viewer")]
         let page = match viewer.filter(|_| self.page_stays()) {
@@ -181,7 +182,7 @@ impl Demo {
         }
     }
 
-    /// True where somebody looks at a terminal.
+    /// True if the report goes to a terminal.
     #[cfg(feature = "viewer")]
     fn page_stays(&self) -> bool {
         !self.json && std::io::stdout().is_terminal()

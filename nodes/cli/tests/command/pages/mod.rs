@@ -206,7 +206,8 @@ fn check_options(command: &str, of: &str) {
             options.push(word.to_owned());
         } else if options.is_empty() && help.contains("Commands:") && help.lines().any(is_command) {
             path.push(word.to_owned());
-            if path[0] == "fleet" {
+            // Options are those of another program, or of the node.
+            if ["fleet", "node"].contains(&word) {
                 return;
             }
             let arguments: Vec<&str> = path.iter().map(String::as_str).collect();
