@@ -145,6 +145,13 @@ pub const RULES: &[(&str, &str, Rule)] = &[
     ),
     ("docs/parameters.md", "lattice run", Works("lattice_mapper")),
     (
+        "docs/files.md",
+        "lattice",
+        NotHere("needs a scan; files.rs reads and writes each format"),
+    ),
+    ("docs/poses.md", "lattice bag info LOG", Runs("")),
+    ("docs/poses.md", "lattice replay LOG --direct", Runs("")),
+    (
         "docs/recording.md",
         "lattice record -a",
         Serves("", "recording /tf"),
