@@ -105,7 +105,7 @@ fn show(path: &Path, address: SocketAddr) -> CliResult {
 
 /// Serves a map file; gives the server and the address to open.
 pub fn serve_file(path: &Path, address: SocketAddr) -> CliResult<(viewer_server::Server, String)> {
-    let (map, _) = crate::map::read(path).map_err(|error| {
+    let (map, names) = crate::map::read_named(path).map_err(|error| {
         let logs = "a log (a rosbag2 folder, .mcap, .db3, each also as .zstd)";
         format!("{error}; what is shown is a map (.lattice), {logs}, or {PARAMS}")
     })?;
@@ -113,5 +113,6 @@ pub fn serve_file(path: &Path, address: SocketAddr) -> CliResult<(viewer_server:
         address,
         ..ViewerOptions::default()
     };
-    Ok(viewer_server::serve(&map.into_list(usize::MAX), &options)?)
+    let list = map.into_list(usize::MAX);
+    Ok(viewer_server::serve_labelled(&list, &names, &options)?)
 }
