@@ -137,7 +137,7 @@ export class Drawing {
     for (const [topic, { scans, ink }] of state.clouds) {
       if (!state.scansOn.has(topic)) continue;
       for (const { name, origin, at } of scans) {
-        if (now - at < SCAN_MS || scans.length === 1) scene.draw(name, gl.POINTS, { origin, ink, size: 2.5 * seen.ratio });
+        if (now - at < SCAN_MS || scans.length === 1) scene.draw(name, gl.POINTS, { origin, ink: [...colourOf(ink), 0.9], size: 2.5 * seen.ratio });
       }
     }
   }

@@ -68,7 +68,7 @@ export function drawHeadset(gl, scene, distance, { position: origin, rotation, v
   // In front of all: it must not be lost within the map.
   gl.disable(gl.DEPTH_TEST);
   const turn = turned(rotation, Math.max(1.2, distance * 0.05));
-  scene.draw("view", gl.TRIANGLES, { origin, turn, ink: [...ink.slice(0, 3), 0.28] });
+  scene.draw("view", gl.TRIANGLES, { origin, turn, ink: [...ink.slice(0, 3), 0.4] });
   scene.draw("frustum", gl.LINES, { origin, turn, ink });
   weak.forEach(({ lines }, i) => {
     scene.set(`weak ${i}`, lines);

@@ -1,12 +1,12 @@
 // The page: its worker, its view and its panel put together.
 
 import { Camera } from "./camera.js";
-import { FREE_COLOUR } from "./colours.js";
-import { Drawing, ROBOT_INK, colourOf, cssColour } from "./drawing.js";
+import { Drawing, colourOf, cssColour } from "./drawing.js";
 import { showNothing } from "./empty.js";
 import { FreeSpace } from "./free.js";
 import * as headset from "./headset.js";
 import { placeIndex } from "./keys.js";
+import { Layers } from "./layers.js";
 import { legendOf, showLegend } from "./legend.js";
 import { add, length, rotate, sub } from "./math.js";
 import * as panel from "./panel.js";
@@ -29,6 +29,7 @@ const QUIET_MS = 5000;
 // Time to connect, and to connect again, before the page says that it cannot, ms.
 const START_MS = 4000;
 const AGAIN_MS = 1000;
+const BEGUN = Date.now();
 const MOST_PATH = 4000;
 
 const canvas = by("view");
@@ -52,6 +53,7 @@ const writing = new Writing(services, worker, state);
 const player = new Player(services, writing);
 const drawing = new Drawing({ gl, canvas, camera, cells, free, scene, state });
 const redraw = () => drawing.redraw();
+const layers = new Layers({ state, worker, free, redraw });
 const slice = new Slice((bounds) => {
   cells.slice = bounds;
   redraw();
@@ -65,6 +67,7 @@ const handlers = {
     if (session !== state.session) {
       // Another process: what was known of robots holds no more.
       transforms = new Transforms();
+      slice.follow(null);
       Object.assign(state, { session, robot: null, headset: null, calibrated: false, path: [], names: new Map() });
     }
     Object.assign(state, { open: true, file, thin, published: null });
@@ -75,16 +78,16 @@ const handlers = {
   closed() {
     if (state.open) state.closedAt = Date.now();
     state.open = false;
-    showLayers();
+    layers.show();
   },
   channels({ channels }) {
     state.live = channels.some((channel) => channel.kind === "diagnostics");
     state.channels = channels;
-    showLayers();
+    layers.show();
   },
   published({ topics }) {
     state.published = new Set(topics);
-    showLayers();
+    layers.show();
   },
   lattice({ info, frame }) {
     Object.assign(state, { lattice: info, frame, size: 0, complete: false, chosen: null, measured: [], path: [] });
@@ -100,7 +103,6 @@ const handlers = {
     cells.now = now;
     Object.assign(state, { size, labels: new Map(labels), sequence, complete, changedAt: Date.now(), now });
     ranges();
-    if (state.mode === "label") chooseColour();
     redraw();
   },
   transforms({ transforms: come, fixed }) {
@@ -110,7 +112,8 @@ const handlers = {
     if (robot) {
       const first = !state.robot;
       state.robot = robot;
-      if (first) showLayers();
+      slice.follow(robot.position[2]);
+      if (first) layers.show();
       const last = state.path[state.path.length - 1];
       if (!last || length(sub(last, robot.position)) > 0.15) state.path.push(robot.position);
       if (state.path.length > MOST_PATH) state.path.shift();
@@ -122,7 +125,7 @@ const handlers = {
     state.headset = headset.headsetOf(said);
     headset.showVerdict(said);
     state.calibrated = true;
-    showLayers();
+    layers.show();
     redraw();
   },
   names({ said }) {
@@ -177,7 +180,7 @@ function turnPoints(points, rotation) {
   return out;
 }
 
-// --- Colours, slice and layers.
+// --- Colours and slice.
 
 function ranges() {
   const bounds = cells.bounds();
@@ -185,11 +188,9 @@ function ranges() {
   const [low, high] = [bounds.low[2], Math.max(bounds.high[2], bounds.low[2] + 1)];
   const [was, wasHigh] = state.heights;
   // Steady while the map grows a little.
-  if (Math.abs(low - was) > 0.2 || Math.abs(high - wasHigh) > 0.2) {
-    state.heights = [low, high];
-    chooseColour();
-  }
-  slice.update({ span: cells.heights(), most: state.heights, robot: state.robot?.position[2] ?? null });
+  if (Math.abs(low - was) > 0.2 || Math.abs(high - wasHigh) > 0.2) state.heights = [low, high];
+  slice.update(cells.heights(), state.heights);
+  chooseColour();
 }
 
 const legend = () => legendOf({ ...state, range: cells.colour.range, span: slice.span });
@@ -200,50 +201,6 @@ function chooseColour() {
   cells.colour = { mode: MODES.indexOf(mode), range };
   cells.setPalette(mode);
   showLegend(legend());
-  redraw();
-}
-
-const INKS = [[0.95, 0.97, 1, 0.9], [0.55, 0.85, 1, 0.9], [1, 0.7, 0.8, 0.9]];
-
-const inkOf = (ink) => `rgb(${ink.slice(0, 3).map((x) => Math.round(255 * x)).join(" ")})`;
-
-// Layers of what there is: clouds and free space that somebody publishes, the robot and the headset once they are known.
-function showLayers() {
-  const own = [["cells", "Cells", true], ["grid", "Ground grid", true], ["robot", "Robot and its path", state.robot, inkOf(ROBOT_INK)], ["headset", "Headset", state.calibrated]];
-  const there = ({ kind, topic }) => ["cloud", "centers", "free"].includes(kind) && (!state.published || state.published.has(topic) || state.scansOn.has(topic));
-  const layers = own.filter(([, , is]) => is);
-  const channels = state.channels.filter(there);
-  const key = JSON.stringify([layers.map(([name]) => name), channels.map(({ topic }) => topic), state.open]);
-  if (showLayers.key === key) return;
-  showLayers.key = key;
-  const boxes = layers.map(([name, text, , colour]) => panel.layerBox(text, state.shown[name], (on) => {
-    state.shown[name] = on;
-    redraw();
-  }, colour));
-  channels.sort((a, b) => (a.kind === "free") - (b.kind === "free")).forEach(({ kind, topic }, i) => {
-    const isFree = kind === "free";
-    const ink = INKS[i % INKS.length];
-    if (!isFree && !state.clouds.has(topic)) state.clouds.set(topic, { scans: [], next: 0, keep: kind === "centers" ? 1 : 64, ink });
-    const box = panel.layerBox(isFree ? "Free space" : topic, state.scansOn.has(topic), (on) => (isFree ? wantFree : wantCloud)(topic, on), isFree ? FREE_COLOUR : inkOf(state.clouds.get(topic).ink));
-    box.firstChild.dataset.topic = topic;
-    box.firstChild.disabled = !state.open;
-    boxes.push(box);
-  });
-  by("layers").replaceChildren(...boxes);
-}
-
-function wantFree(topic, on) {
-  state.scansOn[on ? "add" : "delete"](topic);
-  free.clear();
-  worker.postMessage({ type: "want", topic, on });
-  redraw();
-}
-
-function wantCloud(topic, on) {
-  if (on) state.scansOn.add(topic);
-  else state.scansOn.delete(topic);
-  state.clouds.get(topic).scans = [];
-  worker.postMessage({ type: "want", topic, on });
   redraw();
 }
 
@@ -354,7 +311,7 @@ function tick() {
   cells.stale = state.open && quiet < QUIET_MS ? 0 : 1;
   if (!state.open) {
     // The first connection, and one to a server that comes back at once, take a moment.
-    const waited = state.closedAt === null ? performance.now() > START_MS : Date.now() - state.closedAt > AGAIN_MS;
+    const waited = state.closedAt === null ? Date.now() - BEGUN > START_MS : Date.now() - state.closedAt > AGAIN_MS;
     const since = new Date(state.changedAt ?? state.heardAt).toLocaleTimeString();
     const text = state.lattice ? `No connection: this is the map of ${since}. Trying again …` : "No connection to the viewer server. Trying again …";
     panel.showBanner(waited ? text : null);
@@ -367,8 +324,10 @@ function tick() {
     const words = state.file ? "file" : "live";
     panel.showState(!state.lattice ? "no map yet" : !state.complete ? "loading" : isEmpty ? "empty" : words, isEmpty ? "warn" : "ok");
   }
-  showNothing(state.open && isEmpty && performance.now() > START_MS / 2, state.lattice, state.channels.find(({ kind }) => kind === "map")?.topic);
+  showNothing(state.open && isEmpty && Date.now() - BEGUN > START_MS / 2, state.lattice, state.channels.find(({ kind }) => kind === "map")?.topic);
   panel.showFacts({ ...state, changed });
+  document.querySelector("[data-camera=follow]").disabled = !state.robot;
+  by("heights").hidden = by("legend").hidden = state.size === 0;
   for (const id of ["rates", "nodes"]) by(id).closest("details").hidden = state.file;
   by("colour").querySelector("[value=age]").hidden = state.file;
   // Cells grow older though nothing comes.
@@ -398,7 +357,7 @@ const given = /#view=(.*)/.exec(location.hash);
 if (given) camera.fromText(given[1]);
 if (window.innerWidth <= 640) fold();
 showCamera();
-showLayers();
+layers.show();
 chooseColour();
 slice.show();
 setInterval(tick, 250);

@@ -15,17 +15,24 @@ export class Slice {
     // Lowest and highest centre of what is there, most of it, and the bounds, m; null: none.
     Object.assign(this, { changed, span: [0, 1], most: [0, 1], bounds: [null, null], robot: null });
     ["low", "high"].forEach((id, end) => by(id).addEventListener("input", () => this.slid(id, end)));
-    by("roof").addEventListener("change", () => this.cut());
+    by("roof").addEventListener("change", () => {
+      this.bounds[1] = null;
+      this.cut();
+    });
   }
 
-  // Takes what there is now: heights, those of most cells, and the robot's.
-  update({ span, most, robot }) {
-    const same = [span[0] === this.span[0], span[1] === this.span[1]].every(Boolean);
+  // Takes the heights of what there is now, and those of most cells.
+  update(span, most) {
+    if ([0, 1].every((end) => span[end] === this.span[end] && most[end] === this.most[end])) return;
     Object.assign(this, { span, most });
-    const moved = robot !== null && (this.robot === null || Math.abs(robot - this.robot) > STEP_M);
-    if (moved) this.robot = robot;
-    if (by("roof").checked && (moved || !same)) this.cut();
-    else if (!same) this.show();
+    this.cut();
+  }
+
+  // Takes the height of the robot; null: there is none.
+  follow(robot) {
+    if (robot === this.robot || (robot !== null && this.robot !== null && Math.abs(robot - this.robot) < STEP_M)) return;
+    this.robot = robot;
+    this.cut();
   }
 
   slid(id, end) {
@@ -42,9 +49,9 @@ export class Slice {
     return this.robot === null ? low + SHARE * (high - low) : this.robot + OVER_ROBOT_M;
   }
 
-  // Hides what is above the cut, or no longer.
+  // Hides what is above the cut, while that is wanted.
   cut() {
-    this.bounds[1] = by("roof").checked ? this.roof() : null;
+    if (by("roof").checked) this.bounds[1] = this.roof();
     this.show();
   }
 

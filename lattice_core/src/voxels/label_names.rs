@@ -11,7 +11,7 @@ use super::file::{FileError, MapContents, WriteOptions};
 pub type LabelNames = BTreeMap<u16, String>;
 
 /// Longest name, bytes of UTF-8.
-pub const MAX_NAME_BYTES: usize = 256;
+const MAX_NAME_BYTES: usize = 256;
 /// Longest section: all labels with the longest names.
 const MAX_SECTION_BYTES: u64 = (1 << 16) * (4 + MAX_NAME_BYTES as u64);
 const SECTION: &[u8; 16] = b"label_names\0\0\0\0\0";

@@ -40,6 +40,7 @@ const FILES: &[File] = files! {
     "/free.js" "free.js" JAVASCRIPT;
     "/headset.js" "headset.js" JAVASCRIPT;
     "/keys.js" "keys.js" JAVASCRIPT;
+    "/layers.js" "layers.js" JAVASCRIPT;
     "/legend.js" "legend.js" JAVASCRIPT;
     "/main.js" "main.js" JAVASCRIPT;
     "/math.js" "math.js" JAVASCRIPT;

@@ -78,7 +78,8 @@ impl Stage {
         let free = hub.channel::<LatticeMap>("/free", one, true);
         let label_info = hub.channel::<LabelInfo>("/label_info", one, true);
         let transforms = hub.channel::<TFMessage>("/tf", one, true);
-        let states = || hub.channel::<DiagnosticArray>("/diagnostics", one, true);
+        let states =
+            || hub.channel::<DiagnosticArray>("/diagnostics", Class::Newest { depth: 20 }, false);
         let diagnostics = live.then(states);
         let chunk = chunk(&map(cells));
         hub.change_map(|stream| stream.set_keyframe(vec![chunk]));
