@@ -127,7 +127,7 @@ export class Drawing {
     if (state.measured.length === 2) {
       gl.disable(gl.DEPTH_TEST);
       scene.set("measured", [0, 0, 0, ...sub(state.measured[1], state.measured[0])]);
-      scene.draw("measured", gl.LINES, { origin: state.measured[0], ink: [1, 0.93, 0.55, 1] });
+      scene.draw("measured", gl.LINES, { origin: state.measured[0], ink: [...colourOf("--ink"), 1] });
     }
   }
 

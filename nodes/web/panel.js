@@ -77,6 +77,8 @@ export function showCell(cell) {
 const KEPT = 120;
 const history = new Map();
 
+const delay = (ms) => (ms < 1000 ? `${Math.round(ms)} ms` : seconds(ms / 1000));
+
 export function showRates(rates) {
   const now = new Map(rates);
   for (const topic of now.keys()) if (!history.has(topic)) history.set(topic, []);
@@ -84,7 +86,7 @@ export function showRates(rates) {
     const { messages, bytes, latency } = now.get(topic) ?? { messages: 0, bytes: 0, latency: 0 };
     past.push(bytes);
     if (past.length > KEPT) past.shift();
-    const cells = [topic, messages, (bytes / 1000).toFixed(1), messages ? `${Math.max(0, Math.round(latency))} ms` : "–"];
+    const cells = [topic, messages, (bytes / 1000).toFixed(1), messages ? delay(Math.max(0, latency)) : "–"];
     const row = element("tr", { title: topic }, ...cells.map((text) => element("td", { textContent: text })), element("td"));
     row.lastChild.append(plot(past));
     return row;
