@@ -6,7 +6,7 @@ import { rated, requests, said } from "./requests.js";
 const LOOK_MS = 3000;
 const SHOW_MS = 500;
 // A player that has stated nothing for so long has ended, ms.
-const OLD_MS = 4000;
+const OLD_MS = 8000;
 const JUMP_S = 10;
 const ROUNDED_S = 1e-5;
 // Times before are of a simulation and no date, s.
