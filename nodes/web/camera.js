@@ -1,8 +1,10 @@
 // Where the scene is seen from: around a target, at a distance.
 
-import { add, clamp, cross, multiply, scale, sub } from "./math.js";
+import { add, clamp, cross, dot, multiply, scale, sub } from "./math.js";
 
 const FIELD_OF_VIEW = 0.9;
+// Room around a map that the view is fitted to.
+const MARGIN = 1.12;
 
 export class Camera {
   constructor() {
@@ -19,6 +21,8 @@ export class Camera {
     this.height = 1;
     // Middle of the view right of the middle of the screen, as a share of its half: beside the panel.
     this.aside = 0;
+    // The same upwards: above the panel of a narrow window.
+    this.above = 0;
   }
 
   // Unit vectors of the view: to the right, up, and back to the eye.
@@ -47,6 +51,7 @@ export class Camera {
     projection[0] = (f * this.height) / this.width;
     projection[5] = f;
     projection[8] = -this.aside;
+    projection[9] = -this.above;
     projection[10] = (near + far) / (near - far);
     projection[11] = -1;
     projection[14] = (2 * near * far) / (near - far);
@@ -60,7 +65,7 @@ export class Camera {
     const { right, up, back } = this.axes();
     const t = Math.tan(FIELD_OF_VIEW / 2);
     const [x, y] = [scale(right, (t * this.width) / this.height), scale(up, t)];
-    return new Float32Array([...x, ...y, ...sub(scale(back, -1), scale(x, this.aside))]);
+    return new Float32Array([...x, ...y, ...sub(sub(scale(back, -1), scale(x, this.aside)), scale(y, this.above))]);
   }
 
   orbit(dx, dy) {
@@ -96,9 +101,15 @@ export class Camera {
   // Shows a box, from its lowest to its highest corner.
   fit(low, high) {
     this.target = scale(add(low, high), 0.5);
-    const [x, y, z] = sub(high, low);
-    const wide = Math.min(1, ((1 - this.aside) * this.width) / this.height);
-    this.distance = clamp((0.45 * Math.hypot(x, y, z)) / Math.tan(FIELD_OF_VIEW / 2) / wide, 3, 20000);
+    const { right, up, back } = this.axes();
+    const t = Math.tan(FIELD_OF_VIEW / 2);
+    const [wide, tall] = [(t * (1 - this.aside) * this.width) / this.height, t * (1 - this.above)];
+    let distance = 0;
+    for (let corner = 0; corner < 8; corner++) {
+      const c = sub([0, 1, 2].map((k) => (corner & (1 << k) ? high : low)[k]), this.target);
+      distance = Math.max(distance, dot(c, back) + MARGIN * Math.max(Math.abs(dot(c, right)) / wide, Math.abs(dot(c, up)) / tall));
+    }
+    this.distance = clamp(distance, 3, 20000);
   }
 
   // Place of a point on the screen in pixels from its upper left corner, and its depth in m.

@@ -1,9 +1,11 @@
 // Palettes: colours between which a value is shown, from its lowest to its highest.
 
+export const FREE_COLOUR = "#7fd8a0";
+
 const PALETTES = {
   height: ["#31456e", "#2f6f8f", "#2f9a8f", "#7fbf7b", "#e3cf7a", "#f0a45d", "#e9825a"],
   count: ["#2b3350", "#5b4a8a", "#a5528f", "#e0706f", "#f5b36b", "#fbe8a6"],
-  free: ["#7fd8a0", "#7fd8a0"],
+  free: [FREE_COLOUR, FREE_COLOUR],
   age: ["#ffe08a", "#f0955f", "#b0598a", "#5a4a85", "#333d5c", "#2b3350"],
 };
 

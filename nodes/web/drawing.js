@@ -1,6 +1,7 @@
 // One frame after another, for whatever has changed.
 
 import { add, length, sub } from "./math.js";
+import { showCompass } from "./compass.js";
 import { drawHeadset } from "./headset.js";
 import * as panel from "./panel.js";
 import { turned } from "./scene.js";
@@ -13,6 +14,7 @@ const MOVING_MS = 200;
 // A narrower window has the panel below, px.
 const NARROW = 640;
 const PANEL = 280;
+export const ROBOT_INK = [1, 0.78, 0.36, 1];
 
 export class Drawing {
   constructor(parts) {
@@ -45,10 +47,12 @@ export class Drawing {
     const [width, height] = [Math.round(canvas.clientWidth * ratio), Math.round(canvas.clientHeight * ratio)];
     if (canvas.width !== width || canvas.height !== height) [canvas.width, canvas.height] = [width, height];
     [camera.width, camera.height] = [width, height];
-    camera.aside = window.innerWidth < NARROW || by("panel").hidden ? 0 : Math.min(0.35, PANEL / canvas.clientWidth);
+    const [narrow, folded] = [window.innerWidth <= NARROW, by("sheet").hidden];
+    camera.aside = narrow || folded ? 0 : Math.min(0.35, PANEL / canvas.clientWidth);
+    camera.above = narrow && !folded ? Math.min(0.5, by("panel").offsetHeight / canvas.clientHeight) : 0;
     return {
       ratio, width, height, axes: camera.axes(), eye: camera.eye(), clip: camera.clip(), rays: camera.rays(),
-      focal: camera.focal(), near: camera.near(), aside: camera.aside, window: [0, 0, width, height],
+      focal: camera.focal(), near: camera.near(), aside: camera.aside, above: camera.above, window: [0, 0, width, height],
     };
   }
 
@@ -90,6 +94,7 @@ export class Drawing {
     if (state.shown.cells) cells.draw(seen, performance.now() - this.movedAt < MOVING_MS);
     this.drawScene(seen);
     this.showMarks(seen);
+    this.compass = showCompass(by("compass"), { camera: this.camera, ratio: seen.ratio, grid: this.gridStep, css: cssColour });
   }
 
   // Has the camera look where its mode says.
@@ -108,11 +113,7 @@ export class Drawing {
     gl.blendFunc(gl.SRC_ALPHA, gl.ONE_MINUS_SRC_ALPHA);
     scene.begin(seen);
     gl.depthMask(false);
-    by("scale").textContent = "";
-    if (state.shown.grid) {
-      const step = scene.grid(camera.target, state.heights[0] - 0.3, camera.distance, [...colourOf("--quiet"), 0.24]);
-      by("scale").textContent = `grid ${step < 1 ? `${Math.round(step * 100)} cm` : `${step} m`}`;
-    }
+    this.gridStep = state.shown.grid ? scene.grid(camera.target, state.heights[0] - 0.3, camera.distance, [...colourOf("--quiet"), 0.24]) : null;
     gl.depthMask(true);
     this.free.slice = this.cells.slice;
     this.free.stale = this.cells.stale;
@@ -121,12 +122,12 @@ export class Drawing {
     scene.begin(seen);
     this.drawClouds(seen);
     if (state.shown.robot && state.robot) this.drawRobot();
-    if (state.shown.headset && state.headset) drawHeadset(gl, scene, state.headset, colourOf);
+    if (state.shown.headset && state.headset) drawHeadset(gl, scene, camera.distance, state.headset, colourOf);
     this.planning.draw(gl, scene);
     if (state.measured.length === 2) {
       gl.disable(gl.DEPTH_TEST);
       scene.set("measured", [0, 0, 0, ...sub(state.measured[1], state.measured[0])]);
-      scene.draw("measured", gl.LINES, { origin: state.measured[0], ink: [1, 0.93, 0.55, 1] });
+      scene.draw("measured", gl.LINES, { origin: state.measured[0], ink: [...colourOf("--ink"), 1] });
     }
   }
 
@@ -136,7 +137,7 @@ export class Drawing {
     for (const [topic, { scans, ink }] of state.clouds) {
       if (!state.scansOn.has(topic)) continue;
       for (const { name, origin, at } of scans) {
-        if (now - at < SCAN_MS || scans.length === 1) scene.draw(name, gl.POINTS, { origin, ink, size: 2.5 * seen.ratio });
+        if (now - at < SCAN_MS || scans.length === 1) scene.draw(name, gl.POINTS, { origin, ink: [...colourOf(ink), 0.9], size: 2.5 * seen.ratio });
       }
     }
   }
@@ -150,7 +151,7 @@ export class Drawing {
       scene.draw("path", gl.LINE_STRIP, { origin: path[0], ink: [...colourOf("--accent"), 0.9] });
     }
     const size = Math.max(1.6, camera.distance * 0.03);
-    scene.draw("robot", gl.TRIANGLES, { origin: robot.position, turn: turned(robot.rotation, size), ink: [1, 0.78, 0.36, 1] });
+    scene.draw("robot", gl.TRIANGLES, { origin: robot.position, turn: turned(robot.rotation, size), ink: ROBOT_INK });
     gl.enable(gl.DEPTH_TEST);
   }
 
@@ -169,13 +170,15 @@ export class Drawing {
     if (a && b) mark(add(a, b).map((x) => x / 2), panel.metres(length(sub(a, b))));
     else if (a) mark(a, "from here");
     const { headset, shown } = this.state;
+    if (shown.headset && headset) mark(headset.position, "headset");
     if (shown.headset) for (const { end, text } of headset?.weak ?? []) mark(add(headset.position, end), text);
     by("marks").replaceChildren(...marks);
   }
 }
 
-// A colour of the style sheet, 0 to 1.
+// A colour of the style sheet, as it stands there and as numbers 0 to 1.
+export const cssColour = (name) => getComputedStyle(document.documentElement).getPropertyValue(name).trim();
 export const colourOf = (name) => {
-  const hex = getComputedStyle(document.documentElement).getPropertyValue(name).trim();
+  const hex = cssColour(name);
   return [1, 3, 5].map((i) => parseInt(hex.slice(i, i + 2), 16) / 255);
 };

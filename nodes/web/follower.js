@@ -13,6 +13,8 @@ class Tile {
     this.counts = new Uint32Array(32);
     this.labels = new Uint16Array(32);
     this.seen = new Uint16Array(32);
+    // Cells of each label when it was last packed.
+    this.labelled = new Map();
   }
 
   find(place) {
@@ -73,6 +75,8 @@ export class Follower {
     this.tiles = new Map();
     this.size = 0;
     this.dirty = new Set();
+    // Cells of each label.
+    this.labelled = new Map();
     this.staging = null;
     this.renewed = false;
     this.frame = "map";
@@ -88,11 +92,14 @@ export class Follower {
       this.info = map.info;
       this.tiles = new Map();
       this.size = 0;
+      this.labelled = new Map();
       this.dirty.clear();
       this.sequence = null;
       this.staging = null;
       this.renewed = true;
     }
+    // Its origin on earth may have become known.
+    this.info = map.info;
     if (!this.staging || this.staging.sequence !== map.sequence || this.staging.chunks !== map.chunks) {
       this.staging = { sequence: map.sequence, chunks: map.chunks, come: new Set(), kept: new Map() };
     }
@@ -116,6 +123,7 @@ export class Follower {
   // False: something is missing, and the map must be had anew.
   onUpdate(update) {
     if (this.sequence === null || !sameLattice(this.info, update.info)) return this.staging !== null;
+    this.info = update.info;
     if (update.sequence <= this.sequence) return true;
     if (update.previous > this.sequence) return false;
     this.put(update);
@@ -163,10 +171,28 @@ export class Follower {
     for (const tile of this.dirty) {
       if (packed.length >= most) break;
       this.dirty.delete(tile);
+      this.countLabels(tile);
       packed.push({ id: tile.id, index: tileIndex(tile.id), size: tile.size, cells: pack(tile), heights: this.heights(tile) });
       if (tile.size === 0) this.tiles.delete(tile.id);
     }
     return packed;
+  }
+
+  // Counts the labels of a tile anew.
+  countLabels(tile) {
+    const change = (label, by) => {
+      const cells = (this.labelled.get(label) ?? 0) + by;
+      if (cells > 0) this.labelled.set(label, cells);
+      else this.labelled.delete(label);
+    };
+    const now = new Map();
+    for (let i = 0; i < tile.size; i++) {
+      const label = tile.labels[i];
+      if (label !== NO_LABEL) now.set(label, (now.get(label) ?? 0) + 1);
+    }
+    for (const [label, cells] of now) change(label, cells);
+    for (const [label, cells] of tile.labelled) change(label, -cells);
+    tile.labelled = now;
   }
 
   // Lowest and highest centre of a tile along the map's z, from the datum, m.

@@ -63,10 +63,13 @@ function across(axis) {
 }
 
 // Draws it with its eye, in the ink of its verdict, and what is open in front of all.
-export function drawHeadset(gl, scene, { position: origin, rotation, verdict, weak }, colourOf) {
+export function drawHeadset(gl, scene, distance, { position: origin, rotation, verdict, weak }, colourOf) {
   const ink = [...colourOf(verdict === OK ? "--good" : "--bad"), 1];
-  scene.draw("frustum", gl.LINES, { origin, turn: turned(rotation, 1.2), ink });
+  // In front of all: it must not be lost within the map.
   gl.disable(gl.DEPTH_TEST);
+  const turn = turned(rotation, Math.max(1.2, distance * 0.05));
+  scene.draw("view", gl.TRIANGLES, { origin, turn, ink: [...ink.slice(0, 3), 0.4] });
+  scene.draw("frustum", gl.LINES, { origin, turn, ink });
   weak.forEach(({ lines }, i) => {
     scene.set(`weak ${i}`, lines);
     scene.draw(`weak ${i}`, gl.LINES, { origin, ink: WEAK_INK });

@@ -1,18 +1,23 @@
 // The page: its worker, its view and its panel put together.
 
 import { Camera } from "./camera.js";
-import { Drawing, colourOf } from "./drawing.js";
+import { Drawing, colourOf, cssColour } from "./drawing.js";
+import { showNothing } from "./empty.js";
 import { FreeSpace } from "./free.js";
 import * as headset from "./headset.js";
 import { placeIndex } from "./keys.js";
+import { Layers } from "./layers.js";
+import { legendOf, showLegend } from "./legend.js";
 import { add, length, rotate, sub } from "./math.js";
 import * as panel from "./panel.js";
+import { pictureOf } from "./picture.js";
 import { Planning } from "./planning.js";
 import { Player } from "./player.js";
 import { watchKeys, watchPointer } from "./pointer.js";
 import { CellRenderer } from "./renderer.js";
 import { Scene } from "./scene.js";
 import { Services } from "./services.js";
+import { Slice } from "./slice.js";
 import { Transforms } from "./transforms.js";
 import { Writing } from "./writing.js";
 
@@ -21,6 +26,10 @@ const ROBOT = "base_link";
 const HEADSET = "headset_origin";
 const MODES = ["height", "count", "label", "age"];
 const QUIET_MS = 5000;
+// Time to connect, and to connect again, before the page says that it cannot, ms.
+const START_MS = 4000;
+const AGAIN_MS = 1000;
+const BEGUN = Date.now();
 const MOST_PATH = 4000;
 
 const canvas = by("view");
@@ -31,12 +40,12 @@ const camera = new Camera();
 const cells = new CellRenderer(gl);
 const free = new FreeSpace(gl);
 const scene = new Scene(gl);
-const transforms = new Transforms();
+let transforms = new Transforms();
 const state = {
-  open: false, live: false, lattice: null, frame: "map", size: 0, complete: false, sequence: null, changedAt: null, heardAt: Date.now(),
-  mode: "height", heights: [0, 1], slice: [0, 1], labels: new Set(), names: new Map(), robot: null, path: [], headset: null,
+  open: false, session: null, closedAt: null, file: false, thin: false, live: false, lattice: null, frame: "map", size: 0, complete: false, sequence: null, changedAt: null, heardAt: Date.now(),
+  mode: "height", heights: [0, 1], labels: new Map(), names: new Map(), robot: null, path: [], headset: null,
   clouds: new Map(), measuring: false, measured: [], chosen: null, shown: { cells: true, robot: true, grid: true, headset: true },
-  scansOn: new Set(), problems: [], frames: 0,
+  scansOn: new Set(), channels: [], published: null, calibrated: false, problems: [], frames: 0,
 };
 const worker = new Worker(`/worker.js${/[?&]thin=1/.test(location.search) ? "?thin=1" : ""}`, { type: "module" });
 const services = new Services(worker);
@@ -44,24 +53,41 @@ const writing = new Writing(services, worker, state);
 const player = new Player(services, writing);
 const drawing = new Drawing({ gl, canvas, camera, cells, free, scene, state });
 const redraw = () => drawing.redraw();
+const layers = new Layers({ state, worker, free, redraw });
+const slice = new Slice((bounds) => {
+  cells.slice = bounds;
+  redraw();
+});
 const planning = drawing.planning = new Planning({ services, camera, state, redraw });
 
 // --- What comes from the worker.
 
 const handlers = {
-  open() {
-    state.open = true;
+  open({ session, file, thin }) {
+    if (session !== state.session) {
+      // Another process: what was known of robots holds no more.
+      transforms = new Transforms();
+      slice.follow(null);
+      Object.assign(state, { session, robot: null, headset: null, calibrated: false, path: [], names: new Map() });
+    }
+    Object.assign(state, { open: true, file, thin, published: null });
     services.offered = [];
     writing.offered();
     state.heardAt = Date.now();
   },
   closed() {
+    if (state.open) state.closedAt = Date.now();
     state.open = false;
-    for (const box of by("layers").querySelectorAll("input[data-topic]")) box.disabled = true;
+    layers.show();
   },
   channels({ channels }) {
     state.live = channels.some((channel) => channel.kind === "diagnostics");
-    showLayers(channels);
+    state.channels = channels;
+    layers.show();
+  },
+  published({ topics }) {
+    state.published = new Set(topics);
+    layers.show();
   },
   lattice({ info, frame }) {
     Object.assign(state, { lattice: info, frame, size: 0, complete: false, chosen: null, measured: [], path: [] });
@@ -71,13 +97,11 @@ const handlers = {
     chooseColour();
     panel.showCell(null);
   },
-  tiles({ tiles, size, now, sequence, complete }) {
-    for (const tile of tiles) {
-      cells.setTile(tile);
-      if (state.mode === "label" || state.labels.size === 0) noteLabels(tile);
-    }
+  tiles({ tiles, size, labels, earth, now, sequence, complete }) {
+    if (state.lattice) Object.assign(state.lattice, earth);
+    for (const tile of tiles) cells.setTile(tile);
     cells.now = now;
-    Object.assign(state, { size, sequence, complete, changedAt: Date.now(), now });
+    Object.assign(state, { size, labels: new Map(labels), sequence, complete, changedAt: Date.now(), now });
     ranges();
     redraw();
   },
@@ -86,7 +110,10 @@ const handlers = {
     if (!fixed) player.heard(come.at(-1)?.stamp);
     const robot = transforms.find(state.frame, ROBOT);
     if (robot) {
+      const first = !state.robot;
       state.robot = robot;
+      slice.follow(robot.position[2]);
+      if (first) layers.show();
       const last = state.path[state.path.length - 1];
       if (!last || length(sub(last, robot.position)) > 0.15) state.path.push(robot.position);
       if (state.path.length > MOST_PATH) state.path.shift();
@@ -97,6 +124,8 @@ const handlers = {
   calibration({ said }) {
     state.headset = headset.headsetOf(said);
     headset.showVerdict(said);
+    state.calibrated = true;
+    layers.show();
     redraw();
   },
   names({ said }) {
@@ -118,7 +147,10 @@ const handlers = {
     free.take(news);
     redraw();
   },
-  diagnostics: ({ said }) => panel.showDiagnostics(said),
+  diagnostics({ said }) {
+    panel.showDiagnostics(said);
+    player.told(said);
+  },
   rates({ rates }) {
     if (rates.length > 0) state.heardAt = Date.now();
     if (by("rates").closest("details").open) panel.showRates(rates);
@@ -148,11 +180,7 @@ function turnPoints(points, rotation) {
   return out;
 }
 
-function noteLabels({ cells: packed }) {
-  for (let i = 1; i < packed.length && state.labels.size < 64; i += 4) if (packed[i] !== 65535) state.labels.add(packed[i]);
-}
-
-// --- Colours, slice and layers.
+// --- Colours and slice.
 
 function ranges() {
   const bounds = cells.bounds();
@@ -160,67 +188,19 @@ function ranges() {
   const [low, high] = [bounds.low[2], Math.max(bounds.high[2], bounds.low[2] + 1)];
   const [was, wasHigh] = state.heights;
   // Steady while the map grows a little.
-  if (Math.abs(low - was) > 0.2 || Math.abs(high - wasHigh) > 0.2) {
-    state.heights = [low, high];
-    chooseColour();
-    chooseSlice();
-  }
+  if (Math.abs(low - was) > 0.2 || Math.abs(high - wasHigh) > 0.2) state.heights = [low, high];
+  slice.update(cells.heights(), state.heights);
+  chooseColour();
 }
+
+const legend = () => legendOf({ ...state, range: cells.colour.range, span: slice.span });
 
 function chooseColour() {
   const { mode } = state;
   const range = { height: state.heights, count: [1, 10], label: [0, 1], age: [0, 60] }[mode];
   cells.colour = { mode: MODES.indexOf(mode), range };
   cells.setPalette(mode);
-  panel.showLegend(mode, range, [...state.labels].sort((a, b) => a - b), state.names);
-  redraw();
-}
-
-function chooseSlice() {
-  const [low, high] = [by("low"), by("high")].map((input) => Number(input.value) / 1000);
-  const [begin, end] = [state.heights[0] - 2, state.heights[1] + 6];
-  const at = (t) => begin + t * (end - begin);
-  cells.slice = [low === 0 ? -1e9 : at(low), high === 1 ? 1e9 : at(high)];
-  by("low-value").textContent = low === 0 ? "all" : panel.metres(at(low));
-  by("high-value").textContent = high === 1 ? "all" : panel.metres(at(high));
-  redraw();
-}
-
-const INKS = [[0.95, 0.97, 1, 0.9], [0.55, 0.85, 1, 0.9], [1, 0.7, 0.8, 0.9]];
-
-function showLayers(channels) {
-  const own = [["cells", "Cells"], ["grid", "Ground grid"], ["robot", "Robot and its path"], ["headset", "Headset"]];
-  const boxes = own.map(([name, text]) => panel.layerBox(text, state.shown[name], (on) => {
-    state.shown[name] = on;
-    redraw();
-  }));
-  const clouds = channels.filter((channel) => channel.kind === "cloud" || channel.kind === "centers");
-  clouds.forEach((channel, i) => {
-    const keep = channel.kind === "centers" ? 1 : 64;
-    if (!state.clouds.has(channel.topic)) state.clouds.set(channel.topic, { scans: [], next: 0, keep, ink: INKS[i % INKS.length] });
-    const box = panel.layerBox(channel.topic, state.scansOn.has(channel.topic), (on) => wantCloud(channel.topic, on));
-    box.firstChild.dataset.topic = channel.topic;
-    boxes.push(box);
-  });
-  for (const { topic } of channels.filter((channel) => channel.kind === "free")) {
-    boxes.push(panel.layerBox("Free space", state.scansOn.has(topic), (on) => wantFree(topic, on)));
-    boxes.at(-1).firstChild.dataset.topic = topic;
-  }
-  by("layers").replaceChildren(...boxes);
-}
-
-function wantFree(topic, on) {
-  state.scansOn[on ? "add" : "delete"](topic);
-  free.clear();
-  worker.postMessage({ type: "want", topic, on });
-  redraw();
-}
-
-function wantCloud(topic, on) {
-  if (on) state.scansOn.add(topic);
-  else state.scansOn.delete(topic);
-  state.clouds.get(topic).scans = [];
-  worker.postMessage({ type: "want", topic, on });
+  showLegend(legend());
   redraw();
 }
 
@@ -229,9 +209,10 @@ function wantCloud(topic, on) {
 function pick(x, y) {
   const seen = drawing.view();
   const found = cells.pick(seen, Math.round(x * seen.ratio), Math.round(seen.height - 1 - y * seen.ratio));
+  panel.showNote(found ? null : "no cell here", x, y);
   if (!found) {
-    cells.chosen = null;
-    if (state.measuring) state.measured = [];
+    cells.chosen = state.chosen = null;
+    if (state.measured.length === 2) state.measured = [];
     panel.showCell(null);
     redraw();
     return null;
@@ -300,14 +281,21 @@ function theme() {
 }
 
 function fold() {
-  const hidden = (by("panel").hidden = !by("panel").hidden);
+  const hidden = (by("sheet").hidden = !by("sheet").hidden);
   by("fold").setAttribute("aria-expanded", !hidden);
   redraw();
 }
 
 function picture() {
   drawing.drawNow();
-  canvas.toBlob((blob) => {
+  const { lattice, frame, size } = state;
+  const facts = { size, lattice: lattice ? panel.latticeText(lattice) : "no map", frame: lattice ? panel.frameText(frame, lattice) : "" };
+  const { ratio } = drawing.view();
+  return pictureOf({ canvas, ratio, camera, grid: drawing.gridStep, legend: legend(), css: cssColour, facts });
+}
+
+function savePicture() {
+  picture().toBlob((blob) => {
     const link = panel.element("a", { href: URL.createObjectURL(blob), download: "lattice.png" });
     link.click();
     setTimeout(() => URL.revokeObjectURL(link.href), 1000);
@@ -319,19 +307,29 @@ function tick() {
   // A map of a file says nothing more.
   const quiet = state.live ? Date.now() - state.heardAt : 0;
   const changed = state.changedAt === null ? null : (Date.now() - state.changedAt) / 1000;
+  const isEmpty = state.size === 0 && (!state.lattice || state.complete);
   cells.stale = state.open && quiet < QUIET_MS ? 0 : 1;
   if (!state.open) {
+    // The first connection, and one to a server that comes back at once, take a moment.
+    const waited = state.closedAt === null ? Date.now() - BEGUN > START_MS : Date.now() - state.closedAt > AGAIN_MS;
     const since = new Date(state.changedAt ?? state.heardAt).toLocaleTimeString();
-    panel.showBanner(state.lattice ? `No connection: this is the map of ${since}. Trying again …` : "No connection to the viewer server. Trying again …");
-    panel.showState("not connected", "bad");
+    const text = state.lattice ? `No connection: this is the map of ${since}. Trying again …` : "No connection to the viewer server. Trying again …";
+    panel.showBanner(waited ? text : null);
+    panel.showState(waited ? "not connected" : "connecting", waited ? "bad" : "");
   } else if (quiet >= QUIET_MS) {
     panel.showBanner(`Nothing was heard for ${panel.seconds(quiet / 1000)}.`, true);
     panel.showState("quiet", "warn");
   } else {
     panel.showBanner(null);
-    panel.showState(state.lattice ? (state.complete ? "live" : "loading") : "no map yet", state.lattice ? "ok" : "warn");
+    const words = state.file ? "file" : "live";
+    panel.showState(!state.lattice ? "no map yet" : !state.complete ? "loading" : isEmpty ? "empty" : words, isEmpty ? "warn" : "ok");
   }
-  panel.showFacts({ size: state.size, lattice: state.lattice?.lattice, volume: state.lattice?.volume, changed });
+  showNothing(state.open && isEmpty && Date.now() - BEGUN > START_MS / 2, state.lattice, state.channels.find(({ kind }) => kind === "map")?.topic);
+  panel.showFacts({ ...state, changed });
+  document.querySelector("[data-camera=follow]").disabled = !state.robot;
+  by("heights").hidden = by("legend").hidden = state.size === 0;
+  for (const id of ["rates", "nodes"]) by(id).closest("details").hidden = state.file;
+  by("colour").querySelector("[value=age]").hidden = state.file;
   // Cells grow older though nothing comes.
   if (changed !== null) cells.now = state.now + changed;
   if (cells.stale !== tick.stale || state.mode === "age") redraw();
@@ -342,34 +340,33 @@ const pointer = { moved, clicked: (x, y) => { camera.automatic = false; pick(x, 
 watchPointer(canvas, camera, pointer);
 watchKeys({
   1: () => setCamera("free"), 2: () => setCamera("follow"), 3: () => setCamera("top"), 4: () => setCamera("side"),
-  f: fit, m: measure, p: picture, t: theme, h: fold,
+  f: fit, m: measure, p: savePicture, r: () => by("roof").click(), t: theme, h: fold,
   ArrowLeft: () => { camera.orbit(-25, 0); moved(); }, ArrowRight: () => { camera.orbit(25, 0); moved(); },
   ArrowUp: () => { camera.orbit(0, 20); moved(); }, ArrowDown: () => { camera.orbit(0, -20); moved(); },
   "+": () => { camera.zoom(0.85); moved(); }, "-": () => { camera.zoom(1.18); moved(); },
 });
 for (const button of document.querySelectorAll("[data-camera]")) button.addEventListener("click", () => setCamera(button.dataset.camera));
-for (const [id, action] of Object.entries({ fit, measure, picture, theme, fold })) by(id).addEventListener("click", action);
+for (const [id, action] of Object.entries({ fit, measure, picture: savePicture, theme, fold })) by(id).addEventListener("click", action);
 by("colour").addEventListener("change", (event) => {
   state.mode = event.target.value;
   chooseColour();
 });
-for (const id of ["low", "high"]) by(id).addEventListener("input", chooseSlice);
 new ResizeObserver(redraw).observe(canvas);
 if (localStorage.getItem("lattice-theme") === "light") theme();
 const given = /#view=(.*)/.exec(location.hash);
 if (given) camera.fromText(given[1]);
-if (window.innerWidth < 640) fold();
+if (window.innerWidth <= 640) fold();
 showCamera();
-showLayers([]);
+layers.show();
 chooseColour();
-chooseSlice();
+slice.show();
 setInterval(tick, 250);
 tick();
 redraw();
 
 // For tests: what is shown, in figures.
 window.lattice = {
-  state, camera, cells, free, planning, player, pick, frame: () => drawing.drawNow(),
+  state, camera, cells, drawing, free, picture, planning, player, slice, pick, frame: () => drawing.drawNow(),
   // Keys, or counts in the order of the keys.
   keys: (what = "keys") => new Promise((resolve) => {
     const take = ({ data }) => {

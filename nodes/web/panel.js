@@ -1,7 +1,5 @@
 // The panel's words and figures.
 
-import { gradient, labelColour } from "./colours.js";
-
 export const by = (id) => document.getElementById(id);
 
 export function element(tag, properties = {}, ...children) {
@@ -12,15 +10,30 @@ export function element(tag, properties = {}, ...children) {
 
 const numbers = new Intl.NumberFormat("en");
 export const whole = (n) => numbers.format(n);
-export const metres = (m) => `${m.toFixed(Math.abs(m) < 100 ? 2 : 1)} m`;
+export const metres = (m) => `${m.toFixed(Math.abs(m) < 100 ? 2 : 1).replace("-", "−")} m`;
+// Edge of the cube of the same volume as a cell.
+export const cellSize = (volume) => `${Number(Math.cbrt(volume).toPrecision(3))} m`;
 export const seconds = (s) => (s < 60 ? `${Math.round(s)} s` : `${Math.round(s / 60)} min`);
 
+const NOTE_MS = 2000;
 const LEVELS = ["ok", "warn", "bad", "warn"];
 
-export function showFacts({ size, lattice, volume, changed }) {
+// The lattice and the size of its cells.
+export const latticeText = ({ lattice, volume }) => `${lattice.toUpperCase()}, cells of ${cellSize(volume)}`;
+
+// The frame and its axes (REP 103), with the place on earth where it is known.
+export function frameText(frame, { hasOrigin, origin: [latitude, longitude] }) {
+  const degrees = (x, [plus, minus]) => `${Math.abs(x).toFixed(5)}° ${x < 0 ? minus : plus}`;
+  return hasOrigin ? `${frame}, from ${degrees(latitude, "NS")}, ${degrees(longitude, "EW")}` : `${frame}: x east, y north`;
+}
+
+export function showFacts({ size, lattice, frame, changed, file }) {
   by("cells").textContent = whole(size);
-  by("lattice").textContent = lattice ? lattice.toUpperCase() : "–";
-  by("side").textContent = volume ? (volume < 0.01 ? `${(volume * 1000).toPrecision(2)} L` : `${volume.toPrecision(3)} m³`) : "–";
+  by("lattice").textContent = lattice ? latticeText(lattice) : "–";
+  by("lattice").title = lattice ? `A cell has ${Number((lattice.volume * 1000).toPrecision(4))} litres: the volume of a cube with this edge.` : "";
+  by("frame").textContent = lattice ? frameText(frame, lattice) : "–";
+  by("frame").title = "Axes of the map: x east (E), y north (N), z up. Without a position on earth, they are those of the odometry.";
+  by("changed").parentElement.hidden = file;
   by("changed").textContent = changed === null ? "–" : changed < 2 ? "now" : `${seconds(changed)} ago`;
 }
 
@@ -36,29 +49,22 @@ export function showBanner(text, warn = false) {
   if (banner.textContent !== text) banner.textContent = text ?? "";
 }
 
-export function showLegend(mode, range, labels, names) {
-  const legend = by("legend");
-  if (mode === "label") {
-    const entries = labels.map((label) => {
-      const swatch = element("i");
-      swatch.style.background = labelColour(label);
-      return element("span", {}, swatch, names.get(label) ?? String(label));
-    });
-    legend.replaceChildren(element("div", { className: "names" }, ...(entries.length ? entries : ["this map has no labels"])));
-    return;
-  }
-  const bar = element("div", { className: "bar" });
-  bar.style.background = gradient(mode);
-  const text = { height: metres, count: (v) => whole(Math.round(2 ** v - 1)), age: seconds }[mode];
-  const ends = range.map((value) => element("span", { textContent: text(value) }));
-  legend.replaceChildren(bar, element("div", { className: "ends" }, ...ends));
-}
-
 // A line for a layer, with a box that turns it on and off.
-export function layerBox(name, on, changed) {
+export function layerBox(name, on, changed, colour) {
   const box = element("input", { type: "checkbox", checked: on });
   box.addEventListener("change", () => changed(box.checked));
-  return element("label", { className: "layer" }, box, name);
+  const mark = element("i", { className: "swatch" });
+  mark.style.background = colour;
+  return element("label", { className: "layer" }, box, ...(colour ? [mark] : []), name);
+}
+
+// Says something at a place of the view for a while.
+export function showNote(text, x, y) {
+  const note = by("note");
+  Object.assign(note, { hidden: !text, textContent: text ?? "" });
+  [note.style.left, note.style.top] = [`${x}px`, `${y}px`];
+  clearTimeout(showNote.timer);
+  if (text) showNote.timer = setTimeout(() => showNote(null), NOTE_MS);
 }
 
 export function showCell(cell) {
@@ -71,6 +77,8 @@ export function showCell(cell) {
 const KEPT = 120;
 const history = new Map();
 
+const delay = (ms) => (ms < 1000 ? `${Math.round(ms)} ms` : seconds(ms / 1000));
+
 export function showRates(rates) {
   const now = new Map(rates);
   for (const topic of now.keys()) if (!history.has(topic)) history.set(topic, []);
@@ -78,7 +86,7 @@ export function showRates(rates) {
     const { messages, bytes, latency } = now.get(topic) ?? { messages: 0, bytes: 0, latency: 0 };
     past.push(bytes);
     if (past.length > KEPT) past.shift();
-    const cells = [topic, messages, (bytes / 1000).toFixed(1), messages ? `${Math.max(0, Math.round(latency))} ms` : "–"];
+    const cells = [topic, messages, (bytes / 1000).toFixed(1), messages ? delay(Math.max(0, latency)) : "–"];
     const row = element("tr", { title: topic }, ...cells.map((text) => element("td", { textContent: text })), element("td"));
     row.lastChild.append(plot(past));
     return row;
@@ -96,16 +104,20 @@ function plot(past) {
   return svg;
 }
 
-const tasks = new Map();
+const known = new Map();
 const MOST_TASKS = 200;
+const OLD_MS = 5000;
+
+// Tasks of nodes that were stated just now.
+export const tasks = () => [...known.values()].filter(({ at }) => Date.now() - at < OLD_MS);
 
 export function showDiagnostics({ status }) {
-  for (const task of status) if (tasks.size < MOST_TASKS || tasks.has(task.name)) tasks.set(task.name, { ...task, at: Date.now() });
-  const sorted = [...tasks.values()].sort((a, b) => b.level - a.level || a.name.localeCompare(b.name));
+  for (const task of status) if (known.size < MOST_TASKS || known.has(task.name)) known.set(task.name, { ...task, at: Date.now() });
+  const sorted = [...known.values()].sort((a, b) => b.level - a.level || a.name.localeCompare(b.name));
   by("worst").className = `light ${LEVELS[Math.max(...sorted.map((task) => task.level), 0)] ?? ""}`;
   if (!by("nodes").parentElement.open) return;
   by("nodes").replaceChildren(...sorted.map((task) => {
-    const old = Date.now() - task.at > 5000 ? ` (${seconds((Date.now() - task.at) / 1000)} ago)` : "";
+    const old = Date.now() - task.at > OLD_MS ? ` (${seconds((Date.now() - task.at) / 1000)} ago)` : "";
     const drops = task.values.filter(([key, value]) => /lost|drop|refus|full|old|not_/.test(key) && Number(value) > 0);
     const words = [task.message + old, ...drops.map(([key, value]) => `${key} ${value}`)].join(" · ");
     return element("div", { className: "node" }, element("span", { className: `light ${LEVELS[task.level] ?? ""}` }), ` ${task.name}`, element("p", { textContent: words }));

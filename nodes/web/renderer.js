@@ -170,7 +170,7 @@ export class CellRenderer {
   visible(view) {
     const reach = this.reach();
     const { right, up, back } = view.axes;
-    const [halfX, halfY] = [((1 + view.aside) * view.width) / 2 / view.focal, view.height / 2 / view.focal];
+    const [halfX, halfY] = [((1 + view.aside) * view.width) / 2 / view.focal, ((1 + view.above) * view.height) / 2 / view.focal];
     const found = [];
     let number = 0;
     for (const tile of this.tiles.values()) {
@@ -255,6 +255,13 @@ export class CellRenderer {
     if (out[0] === 0) return null;
     const { tile } = seen.find(({ tile }) => tile.number === out[0] - 1);
     return { tile: tile.id, place: out[1] };
+  }
+
+  // Lowest and highest centre of a cell, m; null without cells.
+  heights() {
+    let [low, high] = [Infinity, -Infinity];
+    for (const { heights } of this.tiles.values()) [low, high] = [Math.min(low, heights[0]), Math.max(high, heights[1])];
+    return low <= high ? [low, high] : null;
   }
 
   // Lowest and highest corner of what is mapped, without the outermost few cells.

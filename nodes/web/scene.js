@@ -11,11 +11,10 @@ const ROBOT = [
   [0.6, 0, 0.1], [-0.5, 0.38, 0], [-0.35, 0, 0.42], [0.6, 0, 0.1], [-0.35, 0, 0.42], [-0.5, -0.38, 0],
   [-0.5, 0.38, 0], [-0.3, 0, 0.1], [-0.35, 0, 0.42], [-0.5, -0.38, 0], [-0.3, 0, 0.1], [-0.35, 0, 0.42],
 ].flat();
-// What a headset sees, as lines from its eye.
-const FRUSTUM = (() => {
-  const corners = [[1, 0.6, 0.4], [1, -0.6, 0.4], [1, -0.6, -0.4], [1, 0.6, -0.4]];
-  return corners.flatMap((corner, i) => [[0, 0, 0], corner, corner, corners[(i + 1) % 4]]).flat();
-})();
+// What a headset sees: lines from its eye, and the faces between them.
+const CORNERS = [[1, 0.6, 0.4], [1, -0.6, 0.4], [1, -0.6, -0.4], [1, 0.6, -0.4]];
+const FRUSTUM = CORNERS.flatMap((corner, i) => [[0, 0, 0], corner, corner, CORNERS[(i + 1) % 4]]).flat();
+const VIEW = CORNERS.flatMap((corner, i) => [[0, 0, 0], corner, CORNERS[(i + 1) % 4]]).flat();
 
 export class Scene {
   constructor(gl) {
@@ -24,6 +23,7 @@ export class Scene {
     this.shapes = new Map();
     this.set("robot", ROBOT);
     this.set("frustum", FRUSTUM);
+    this.set("view", VIEW);
   }
 
   // Keeps the corners of a shape.

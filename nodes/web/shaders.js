@@ -96,11 +96,15 @@ uniform mat4 u_clip;
 uniform float u_near;
 uniform vec4 u_window;       // place and size of the picture, pixels
 
-// Follows the ray of this pixel into the cell: distance to it, and the face that is met.
-bool meet(vec3 centre, out vec3 ray, out float t, out vec3 normal) {
+// Follows the ray of this pixel into the cell: distance to it, the face that is met, and how far from there the
+// plane is that was passed before it, m: 0 at an edge between two faces in sight.
+bool meet(vec3 centre, out float t, out vec3 normal, out float edge) {
   vec2 at = (gl_FragCoord.xy - u_window.xy) / u_window.zw * 2.0 - 1.0;
-  ray = u_rays * vec3(at, 1.0);
+  vec3 ray = u_rays * vec3(at, 1.0);
   float enter = -1e30;
+  float before = -1e30;
+  float slant = 0.0;
+  float slant_before = 0.0;
   float leave = 1e30;
   for (int i = 0; i < 7; i++) {
     if (i >= u_slab_count) break;
@@ -109,13 +113,21 @@ bool meet(vec3 centre, out vec3 ray, out float t, out vec3 normal) {
     along = abs(along) < 1e-7 ? 1e-7 : along;
     float middle = dot(centre, n) / along;
     float half_way = abs(u_slabs[i].w / along);
-    if (middle - half_way > enter) {
-      enter = middle - half_way;
+    float here = middle - half_way;
+    if (here > enter) {
+      before = enter;
+      slant_before = slant;
+      enter = here;
+      slant = along;
       normal = along > 0.0 ? -n : n;
+    } else if (here > before) {
+      before = here;
+      slant_before = along;
     }
     leave = min(leave, middle + half_way);
   }
   t = enter;
+  edge = (enter - before) * abs(slant_before);
   vec4 clip = u_clip * vec4(ray * t, 1.0);
   gl_FragDepth = clamp(clip.z / clip.w * 0.5 + 0.5, 0.0, 1.0);
   return enter <= leave && enter > u_near;
@@ -132,22 +144,13 @@ flat in float v_size;
 out vec4 o_colour;
 
 void main() {
-  vec3 ray, normal;
-  float t;
-  if (!meet(v_centre, ray, t, normal)) discard;
+  vec3 normal;
+  float t, edge;
+  if (!meet(v_centre, t, normal, edge)) discard;
   float light = 0.52 + 0.30 * normal.z + 0.22 * dot(normal, normalize(vec3(0.55, -0.75, 0.2)));
-  if (v_size > 14.0) {
-    // Edges, where a second face is near, a pixel or two wide.
-    vec3 p = ray * t - v_centre;
-    float second = 1e30;
-    for (int i = 0; i < 7; i++) {
-      if (i >= u_slab_count) break;
-      float far = u_slabs[i].w - abs(dot(p, u_slabs[i].xyz));
-      if (abs(dot(normal, u_slabs[i].xyz)) < 0.999) second = min(second, far);
-    }
-    float edge = 1.0 - smoothstep(0.4, 1.8, second / (t * u_pixel));
-    light *= 1.0 - 0.38 * edge * smoothstep(14.0, 40.0, v_size);
-  }
+  // Edges are dark, a pixel or two wide, where cells are large enough for that.
+  float line = 1.0 - smoothstep(0.6, 2.2, edge / (t * u_pixel));
+  light *= 1.0 - 0.5 * line * smoothstep(8.0, 24.0, v_size);
   o_colour = vec4(v_colour * light, 1.0);
 }`;
 
@@ -162,9 +165,9 @@ flat in uint v_place;
 out uvec4 o_cell;
 
 void main() {
-  vec3 ray, normal;
-  float t;
-  if (!meet(v_centre, ray, t, normal)) discard;
+  vec3 normal;
+  float t, edge;
+  if (!meet(v_centre, t, normal, edge)) discard;
   o_cell = uvec4(uint(u_tile_number) + 1u, v_place, floatBitsToUint(t), 0u);
 }`;
 

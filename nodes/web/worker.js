@@ -20,6 +20,8 @@ let free = new Follower();
 let channels = new Map();
 let subscriptions = new Map();
 let nextSubscription = 1;
+// Nodes that publish each topic.
+let published = new Map();
 let changed = false;
 const rates = new Map();
 const wanted = new Set(["tf", "static", "map", "updates", "diagnostics", "calibration", "names"]);
@@ -73,11 +75,17 @@ function onText(message) {
       // Another process: nothing that was known holds once its map comes.
       follower.info = null;
     }
-    postMessage({ type: "open", session });
+    published = new Map();
+    postMessage({ type: "open", session, file: message.metadata?.source === "file", thin: THIN !== "" });
+    if (message.capabilities.includes("connectionGraph")) socket.send(JSON.stringify({ op: "subscribeConnectionGraph" }));
   } else if (message.op === "advertise") {
     channels = new Map(message.channels.map((channel) => [channel.id, { ...channel, kind: kindOf(channel) }]));
     for (const channel of channels.values()) if (isWanted(channel)) subscribe(channel);
     postMessage({ type: "channels", channels: [...channels.values()].map(({ id, topic, schemaName, kind }) => ({ id, topic, schemaName, kind })) });
+  } else if (message.op === "connectionGraphUpdate") {
+    for (const { name, publisherIds } of message.publishedTopics) published.set(name, publisherIds);
+    for (const name of message.removedTopics) published.delete(name);
+    postMessage({ type: "published", topics: [...published.keys()].filter((name) => published.get(name).length > 0) });
   } else if (message.op === "status") {
     postMessage({ type: "problem", text: message.message, told: true });
   }
@@ -170,6 +178,8 @@ function flush() {
     type: "tiles",
     tiles,
     size,
+    labels: [...follower.labelled],
+    earth: { hasOrigin: follower.info?.hasOrigin, origin: follower.info?.origin },
     now: follower.now(),
     sequence: sequence === null ? null : sequence.toString(),
     complete: sequence !== null && staging === null && !changed,

@@ -5,6 +5,7 @@
 
 pub mod codec;
 pub mod file;
+pub mod label_names;
 pub mod set_ops;
 
 mod distortion;

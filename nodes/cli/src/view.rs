@@ -6,6 +6,7 @@ use std::path::{Path, PathBuf};
 use clap::Args;
 use lattice_core::lattice::{Lattice, LatticeKind};
 use lattice_core::voxels::VoxelList;
+use lattice_core::voxels::label_names::LabelNames;
 use lattice_nodes::files::points::is_named_as_points;
 use lattice_nodes::lattice_mapper::cube_m3;
 use lattice_nodes::viewer_server::{self, ViewerOptions};
@@ -107,7 +108,7 @@ fn is_map(path: &Path) -> bool {
 /// Shows a map file, or the map of a log or of points, until the process is ended.
 fn show(path: &Path, cells: &CellSize, address: SocketAddr) -> CliResult {
     if kind(path) == Kind::Points {
-        let (_server, url) = serve(&quantized(path, cells)?, address)?;
+        let (_server, url) = serve(&quantized(path, cells)?, &LabelNames::default(), address)?;
         return stay(&url);
     }
     #[cfg(feature = "bags")]
@@ -171,18 +172,22 @@ fn stay(url: &str) -> CliResult {
 
 /// Serves a map file; gives the server and the address to open.
 pub fn serve_file(path: &Path, address: SocketAddr) -> CliResult<(viewer_server::Server, String)> {
-    let (map, _) = crate::map::read(path).map_err(|error| {
+    let (map, names) = crate::map::read_named(path).map_err(|error| {
         let points = "a point file (.ply, .pcd, .las, .laz, .e57, .bt, .xyz, .txt, .csv, .bin)";
         let logs = "a log (a rosbag2 folder, .mcap, .db3, each also as .zstd)";
         format!("{error}; what is shown is a map (.lattice), {points}, {logs}, or {PARAMS}")
     })?;
-    serve(&map.into_list(usize::MAX), address)
+    serve(&map.into_list(usize::MAX), &names, address)
 }
 
-fn serve(list: &VoxelList, address: SocketAddr) -> CliResult<(viewer_server::Server, String)> {
+fn serve(
+    list: &VoxelList,
+    names: &LabelNames,
+    address: SocketAddr,
+) -> CliResult<(viewer_server::Server, String)> {
     let options = ViewerOptions {
         address,
         ..ViewerOptions::default()
     };
-    Ok(viewer_server::serve(list, &options)?)
+    Ok(viewer_server::serve_labelled(list, names, &options)?)
 }

@@ -17,12 +17,13 @@ use crate::start::{Declare, NodeError, check_topics, open_params};
 use controls::Controls;
 use keyboard::Keyboard;
 use lattice_bag::{BagQos, BagReader, Player, TopicInfo};
+use lattice_runtime::logging::Throttle;
 use lattice_runtime::qos::{Durability, Qos, Reliability};
 use lattice_runtime::ros_args::RosArgs;
 use lattice_runtime::{Node, RawPublisher};
 use lockstep::Lockstep;
 use parameters::Settings;
-use playback::{Playback, Playhead};
+use playback::{Playback, Playhead, STATE_PERIOD};
 
 pub use parameters::declare;
 
@@ -89,6 +90,8 @@ pub fn run(arguments: impl IntoIterator<Item = String>) -> Result<(), NodeError>
         span_ns,
         shutdown: runtime.shutdown_handle(),
         params: Arc::clone(params),
+        diagnostics: node.diagnostics(),
+        pace: Throttle::new(STATE_PERIOD),
         report: PlayerReport::default(),
     };
     check_topics(params, |_| false)?;

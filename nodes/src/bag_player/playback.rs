@@ -7,8 +7,9 @@ use lattice_bag::{Player, Step};
 use lattice_msgs::builtin_interfaces::Time;
 use lattice_msgs::rosbag2_interfaces::PlayRequest;
 use lattice_msgs::rosgraph_msgs::Clock;
+use lattice_runtime::logging::Throttle;
 use lattice_runtime::params::{ParamValue, Params};
-use lattice_runtime::{Node, Publisher, RawPublisher, Shutdown};
+use lattice_runtime::{Diagnostics, Level, Node, Publisher, RawPublisher, Shutdown};
 
 use super::PlayerReport;
 use super::controls::Controls;
@@ -22,6 +23,8 @@ const HURRIED_FLUSH_TIME: Duration = Duration::from_secs(2);
 /// A player that is later than this goes on from there: what it missed would come in one burst, too fast
 /// for those who listen.
 const MOST_LATE: Duration = Duration::from_secs(1);
+/// Time between two statements of the place in the log.
+pub(super) const STATE_PERIOD: Duration = Duration::from_millis(500);
 /// Longest sleep between two looks at the shutdown flag, and between two times on `/clock` while held.
 pub(super) const NAP: Duration = Duration::from_millis(100);
 
@@ -103,6 +106,9 @@ pub(super) struct Playback {
     pub shutdown: Shutdown,
     /// Those of the node, for its rate to be read.
     pub params: Arc<Params>,
+    pub diagnostics: Diagnostics,
+    /// Pace at which the state is stated.
+    pub pace: Throttle,
     pub report: PlayerReport,
 }
 
@@ -147,12 +153,16 @@ impl Playback {
         self.head.restart();
         let mut percent = 0;
         while !self.shutdown.is_requested() && !self.stopped {
+            if self.pace.check().is_some() {
+                self.diagnose();
+            }
             let due_ns = self.player.due_ns();
             let left_ns = due_ns.saturating_sub(self.head.now_ns());
             let left = Duration::from_nanos(u64::try_from(left_ns).unwrap_or(0));
             let is_held = self.head.is_held();
             if let Some(control) = controls.next(if is_held { NAP } else { left.min(NAP) }) {
                 control(self);
+                self.diagnose();
                 continue;
             }
             if is_held {
@@ -298,6 +308,22 @@ impl Playback {
             *percent = share;
             log::info!("played {share} %");
         }
+    }
+
+    /// States the place in the log, for those who show it.
+    fn diagnose(&self) {
+        let (begin_ns, end_ns) = self.span_ns;
+        let now_ns = self.player.bag_time_ns(self.head.now_ns());
+        let paused = self.head.is_held();
+        let message = if paused { "paused" } else { "playing" };
+        let values = [
+            ("begin_ns", begin_ns.to_string()),
+            ("end_ns", end_ns.to_string()),
+            ("now_ns", now_ns.to_string()),
+            ("rate", self.player.rate().to_string()),
+            ("paused", paused.to_string()),
+        ];
+        self.diagnostics.set("log", Level::Ok, message, values);
     }
 
     fn publish_clock(&self, now_ns: i64) {

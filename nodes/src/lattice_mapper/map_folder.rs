@@ -3,9 +3,12 @@
 use std::fs::{self, File};
 use std::io::{self, BufReader, ErrorKind, Read, Seek};
 use std::path::{Component, Path, PathBuf};
-use std::sync::Arc;
+use std::sync::{Arc, Mutex};
 
 use lattice_core::voxels::file::{FileError, MapContents, WriteOptions, is_map};
+use lattice_core::voxels::label_names::{LabelNames, read_label_names, short_name, write_named};
+use lattice_msgs::vision_msgs::LabelInfo;
+use lattice_runtime::lock;
 use lattice_runtime::params::{ParamError, Params};
 use rustix::fs::{Mode, OFlags, open};
 use thiserror::Error;
@@ -34,16 +37,22 @@ pub(super) enum Refusal {
     Format(String, FileError),
 }
 
-/// The folder; clones are of the same.
+/// The folder, and the names of labels that go into its maps; clones are of the same.
 #[derive(Clone)]
-pub(super) struct MapFolder(Arc<Path>);
+pub(super) struct MapFolder {
+    folder: Arc<Path>,
+    names: Arc<Mutex<LabelNames>>,
+}
 
 impl MapFolder {
     /// The folder of a path, which must be there.
     pub(super) fn new(path: &str) -> io::Result<Self> {
         let folder = fs::canonicalize(path)?;
         match folder.is_dir() {
-            true => Ok(Self(folder.into())),
+            true => Ok(Self {
+                folder: folder.into(),
+                names: Arc::default(),
+            }),
             false => Err(ErrorKind::NotADirectory.into()),
         }
     }
@@ -62,9 +71,24 @@ impl MapFolder {
             return Err(Refusal::NotAMap(name.to_owned()));
         }
         let io = |error| Refusal::Io(name.to_owned(), error);
+        let format = |error| Refusal::Format(name.to_owned(), error);
         file.rewind().map_err(io)?;
-        let contents = MapContents::read(BufReader::new(file), max_voxels);
-        contents.map_err(|error| Refusal::Format(name.to_owned(), error))
+        let contents = MapContents::read(BufReader::new(&mut file), max_voxels).map_err(format)?;
+        file.rewind().map_err(io)?;
+        let read = read_label_names(BufReader::new(file)).map_err(format)?;
+        let mut names = lock(&self.names);
+        // What `label_info` has named since is newer.
+        for (label, name) in read {
+            names.entry(label).or_insert(name);
+        }
+        Ok(contents)
+    }
+
+    /// Takes names of labels for the maps that are written from now on.
+    pub(super) fn name_labels(&self, info: &LabelInfo) {
+        let classes = info.class_map.iter();
+        let named = classes.map(|class| (class.class_id, short_name(&class.class_name).to_owned()));
+        lock(&self.names).extend(named);
     }
 
     /// Writes a map, in place of an earlier one but of nothing else.
@@ -85,7 +109,11 @@ impl MapFolder {
             ..WriteOptions::default()
         };
         let mut file = WholeFile::create(&path).map_err(io)?;
-        let written = contents.write(&mut file, &options);
+        let names = match contents.payload().labels {
+            true => lock(&self.names).clone(),
+            false => LabelNames::new(),
+        };
+        let written = write_named(contents, &names, &mut file, &options);
         written.map_err(|error| Refusal::Format(name.to_owned(), error))?;
         file.finish().map_err(io)
     }
@@ -93,7 +121,7 @@ impl MapFolder {
     /// The path of a name; no folder on the way is a link.
     fn place(&self, name: &str) -> Result<PathBuf, Refusal> {
         let refusal = || Refusal::Name(name.to_owned());
-        let mut path = self.0.to_path_buf();
+        let mut path = self.folder.to_path_buf();
         let mut parts = Path::new(name).components().peekable();
         if parts.peek().is_none() || name.ends_with('/') {
             return Err(refusal());
@@ -131,7 +159,8 @@ mod tests {
     use std::os::unix::fs::symlink;
 
     use lattice_core::lattice::{Lattice, LatticeKind};
-    use lattice_core::voxels::VoxelList;
+    use lattice_core::voxels::{Payload, VoxelList};
+    use lattice_msgs::vision_msgs::VisionClass;
 
     use super::*;
 
@@ -182,5 +211,43 @@ mod tests {
             assert!(refused.to_string().contains("not replaced"), "{refused}");
             assert_eq!(fs::read_to_string(&path).unwrap(), secret);
         }
+    }
+
+    #[test]
+    fn names_of_labels_are_kept_in_maps_with_labels_and_come_back_with_them() {
+        let folder = tempfile::tempdir().unwrap();
+        let open = || MapFolder::new(&folder.path().display().to_string()).unwrap();
+        let named = |names: &[(u16, &str)]| LabelInfo {
+            class_map: { names.iter() }
+                .map(|&(class_id, name)| VisionClass {
+                    class_id,
+                    class_name: name.to_owned(),
+                })
+                .collect(),
+            ..LabelInfo::default()
+        };
+        let lattice = Lattice::new(LatticeKind::Bcc, 0.125).unwrap();
+        let list = VoxelList::new(lattice, Default::default(), 10).unwrap();
+        let labelled = MapContents::from_list(&list.with_payload(Payload {
+            labels: true,
+            ..Payload::default()
+        }));
+        let first = open();
+        first.name_labels(&named(&[(1, "wall"), (2, "door")]));
+        first.write("labelled", &labelled).unwrap();
+        first.write("plain", &contents()).unwrap();
+        let read = |file: &str| {
+            let file = File::open(folder.path().join(file)).unwrap();
+            read_label_names(BufReader::new(file)).unwrap()
+        };
+        assert_eq!(read("labelled")[&2], "door");
+        assert!(read("plain").is_empty());
+        // A mapper that goes on from the file keeps them, and takes what is named anew.
+        let second = open();
+        second.name_labels(&named(&[(2, "gate")]));
+        assert_eq!(second.read("labelled", 10).unwrap(), labelled);
+        second.write("again", &labelled).unwrap();
+        let again = read("again");
+        assert_eq!([1, 2].map(|label| again[&label].as_str()), ["wall", "gate"]);
     }
 }

@@ -7,6 +7,7 @@ use std::time::Duration;
 
 use lattice_msgs::geographic_msgs::GeoPointStamped;
 use lattice_msgs::sensor_msgs::PointCloud2;
+use lattice_msgs::vision_msgs::LabelInfo;
 
 use super::autosave::Autosave;
 use super::map_folder::MapFolder;
@@ -86,6 +87,14 @@ pub fn start(runtime: &Runtime, name: &str) -> Result<Finish, NodeError> {
     let origins = Arc::clone(&wishes);
     let take = move |origin| *lock(&origins.origin) = Some(origin);
     let origins = node.subscribe("map_origin", Qos::LATCHED, Load::Small, take)?;
+    let names = match old.payload().labels {
+        true => {
+            let maps = maps.clone();
+            let take = move |info: Arc<LabelInfo>| maps.name_labels(&info);
+            Some(node.subscribe("label_info", Qos::LATCHED, Load::Small, take)?)
+        }
+        false => None,
+    };
     centers.on_subscriber_joined(move || wishes.centers.store(true, Ordering::Relaxed));
     let services = inbox.clone();
     let mut more = Vec::new();
@@ -128,7 +137,7 @@ pub fn start(runtime: &Runtime, name: &str) -> Result<Finish, NodeError> {
         Ok(())
     });
     Ok(Box::new(move || {
-        drop((points, origins));
+        drop((points, origins, names));
         compute.finish_with(Event::Finish);
         Box::new((requests, more, calls))
     }))

@@ -184,6 +184,9 @@ impl MapFollower {
                 false => self.need_keyframe(),
             });
         };
+        // The origin on earth may become known after the map has begun.
+        map.info.origin = info.origin;
+        map.info.has_origin = info.has_origin;
         let history = History(message.history_checksum);
         if let Some(at) = self.sequence.filter(|at| message.sequence <= *at) {
             // One of the same number and other content, or many in a row, of which none can be new:

@@ -4,10 +4,14 @@ use std::io;
 use std::sync::Arc;
 
 use lattice_core::voxels::VoxelList;
+use lattice_core::voxels::label_names::LabelNames;
+use lattice_msgs::cdr;
 use lattice_msgs::std_msgs::Header;
+use lattice_msgs::vision_msgs::{LabelInfo, VisionClass};
 
 use super::hub::{Hub, entry};
 use super::options::{ViewerOptions, url};
+use super::outbox::Class;
 use super::server::Server;
 use super::thin;
 use crate::convert::map::{History, MapStamp, keyframe};
@@ -17,8 +21,22 @@ const CHUNK_BYTES: usize = 60_000;
 
 /// Serves a map; gives the server and the address to open.
 pub fn serve(list: &VoxelList, options: &ViewerOptions) -> io::Result<(Server, String)> {
-    let hub = Arc::new(Hub::new(options.max_clients));
+    serve_labelled(list, &LabelNames::new(), options)
+}
+
+/// [`serve`] with the names of the map's labels.
+pub fn serve_labelled(
+    list: &VoxelList,
+    names: &LabelNames,
+    options: &ViewerOptions,
+) -> io::Result<(Server, String)> {
+    let hub = Arc::new(Hub::of_file(options.max_clients));
     hub.map_channels("/map", "/map_updates");
+    if !names.is_empty() {
+        let channel = hub.channel::<LabelInfo>("/label_info", Class::Newest { depth: 1 }, true);
+        let info = cdr::to_vec(&label_info(names)).map_err(io::Error::other)?;
+        hub.offer(channel, info);
+    }
     let stamp = MapStamp {
         header: Header {
             frame_id: "map".to_owned(),
@@ -37,4 +55,15 @@ pub fn serve(list: &VoxelList, options: &ViewerOptions) -> io::Result<(Server, S
     let server = Server::start(options.address, gate.clone(), hub)?;
     let url = url(server.address(), &gate);
     Ok((server, url))
+}
+
+fn label_info(names: &LabelNames) -> LabelInfo {
+    let class = |(&class_id, name): (&u16, &String)| VisionClass {
+        class_id,
+        class_name: name.clone(),
+    };
+    LabelInfo {
+        class_map: names.iter().map(class).collect(),
+        ..LabelInfo::default()
+    }
 }

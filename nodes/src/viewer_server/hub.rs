@@ -26,6 +26,7 @@ const MAX_UPDATE_BYTES: usize = 8 << 20;
 pub struct Hub {
     max_clients: usize,
     session: String,
+    source: &'static str,
     bridge: OnceLock<Box<dyn Bridge>>,
     /// That of a hub without a bridge.
     nothing: Offer,
@@ -81,9 +82,19 @@ pub struct Demand {
 impl Hub {
     /// A hub without channels, for `max_clients`.
     pub fn new(max_clients: usize) -> Self {
+        Self::of("live", max_clients)
+    }
+
+    /// The same for a map of a file, which does not change.
+    pub fn of_file(max_clients: usize) -> Self {
+        Self::of("file", max_clients)
+    }
+
+    fn of(source: &'static str, max_clients: usize) -> Self {
         let since = SystemTime::now().duration_since(UNIX_EPOCH);
         Self {
             max_clients,
+            source,
             session: since.map_or(0, |since| since.as_nanos()).to_string(),
             bridge: OnceLock::new(),
             nothing: Offer::default(),
@@ -220,7 +231,11 @@ impl Hub {
         let mut outbox = Outbox::default();
         let offer = self.offer_of_bridge();
         let capabilities = offer.capabilities();
-        outbox.control(protocol::server_info(&self.session, &capabilities));
+        outbox.control(protocol::server_info(
+            &self.session,
+            &capabilities,
+            self.source,
+        ));
         let channels = inner.channels.iter().map(|channel| &channel.advertised);
         outbox.control(protocol::advertise(&channels.collect::<Vec<_>>()));
         if !offer.services.is_empty() {

@@ -28,7 +28,7 @@ mod watched;
 
 pub use bridge::Bridge;
 pub use desk::{Ask, Desk, Step};
-pub use fixed::serve;
+pub use fixed::{serve, serve_labelled};
 pub use graph::ConnectionGraph;
 pub use http::{Decision, Gate, Head};
 pub use hub::{Demand, Hub, HubCounts};

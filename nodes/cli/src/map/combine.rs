@@ -4,11 +4,12 @@ use std::path::PathBuf;
 
 use clap::Args;
 use lattice_core::voxels::file::MapContents;
+use lattice_core::voxels::label_names::LabelNames;
 use lattice_core::voxels::set_ops;
 use serde::Serialize;
 
 use super::output::Form;
-use super::read;
+use super::{read, read_named};
 use crate::CliResult;
 use crate::progress::Progress;
 
@@ -71,9 +72,21 @@ impl Merge {
     pub fn run(self) -> CliResult {
         let progress = Progress::new("merge");
         let mut merged: Option<MapContents> = None;
+        let mut names = LabelNames::new();
         for (number, path) in self.maps.iter().enumerate() {
             progress.set(number as f64 / self.maps.len() as f64);
-            let (mut map, _) = read(path)?;
+            let (mut map, named) = read_named(path)?;
+            let named = { named.into_iter() }.filter(|_| !self.form.occupancy_only);
+            for (label, name) in named {
+                let known = names.entry(label).or_insert_with(|| name.clone());
+                if *known != name {
+                    let path = path.display();
+                    return Err(format!(
+                        "{path}: label {label} is {name:?}, but {known:?} in a map before: only maps with the same classes are merged"
+                    )
+                    .into());
+                }
+            }
             if self.form.occupancy_only {
                 map.drop_payload();
             }
@@ -86,7 +99,10 @@ impl Merge {
         }
         progress.done();
         let merged = merged.ok_or("no map to merge")?;
-        Ok(self.form.write(&merged, &self.out)?.print(self.json)?)
+        Ok(self
+            .form
+            .write(&merged, &names, &self.out)?
+            .print(self.json)?)
     }
 }
 
@@ -100,7 +116,7 @@ struct Counts {
 impl Diff {
     /// Runs the command.
     pub fn run(self) -> CliResult {
-        let ((mut a, _), (b, _)) = (read(&self.a)?, read(&self.b)?);
+        let ((mut a, names), (b, _)) = (read_named(&self.a)?, read(&self.b)?);
         let there = |e| format!("{}: {e}", self.b.display());
         a.expect_cells_of(&b).map_err(there)?;
         let b = b.with_datum(a.datum_index()).map_err(there)?.into_keys();
@@ -122,7 +138,7 @@ impl Diff {
                 while theirs.next_if(|other| **other < key).is_some() {}
                 theirs.peek() != Some(&&key)
             });
-            self.form.write(&a, out)?;
+            self.form.write(&a, &names, out)?;
         }
         if self.json {
             println!("{}", serde_json::to_string_pretty(&counts)?);
@@ -147,11 +163,11 @@ impl Crop {
             )
             .into());
         }
-        let (mut map, _) = read(&self.map)?;
+        let (mut map, names) = read_named(&self.map)?;
         map.retain(|_, center_m| {
             let mut sides = sides.iter().zip(center_m.iter());
             sides.all(|((min, max), x)| (min..max).contains(&x))
         });
-        Ok(self.form.write(&map, &self.out)?.print(self.json)?)
+        Ok(self.form.write(&map, &names, &self.out)?.print(self.json)?)
     }
 }

@@ -12,6 +12,7 @@ use std::path::Path;
 
 use clap::Subcommand;
 use lattice_core::voxels::file::{MapContents, max_voxels_of};
+use lattice_core::voxels::label_names::{LabelNames, read_label_names};
 
 use super::{CliResult, fleet, init_logging};
 
@@ -51,6 +52,15 @@ impl Map {
             Self::FromTable(command) => command.run_as("from-table"),
         }
     }
+}
+
+/// Reads a map with the names of its labels.
+pub fn read_named(path: &Path) -> CliResult<(MapContents, LabelNames)> {
+    let (map, _) = read(path)?;
+    let here = |e: &dyn std::fmt::Display| format!("{}: {e}", path.display());
+    let file = File::open(path).map_err(|e| here(&e))?;
+    let names = read_label_names(BufReader::new(file)).map_err(|e| here(&e))?;
+    Ok((map, names))
 }
 
 /// Reads a map, and the bytes of its file, which bound the voxels.

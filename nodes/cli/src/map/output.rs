@@ -5,6 +5,7 @@ use std::path::Path;
 
 use clap::Args;
 use lattice_core::voxels::file::{MapContents, WriteOptions};
+use lattice_core::voxels::label_names::{LabelNames, write_named};
 use lattice_nodes::files::whole;
 use serde::Serialize;
 
@@ -34,15 +35,18 @@ pub struct Written {
 }
 
 impl Form {
-    /// Writes a map; readers see the whole file or the one before.
-    pub fn write(&self, map: &MapContents, out: &Path) -> CliResult<Written> {
+    /// Writes a map with the names of its labels; readers see the whole file or the one before.
+    pub fn write(&self, map: &MapContents, names: &LabelNames, out: &Path) -> CliResult<Written> {
+        let none = LabelNames::new();
+        let kept = map.payload().labels && !self.occupancy_only;
+        let names = if kept { names } else { &none };
         let options = WriteOptions {
             zstd_level: self.zstd,
             occupancy_only: self.occupancy_only,
         };
         let file_bytes = whole::write(out, |writer| {
             let mut file = Counted { writer, bytes: 0 };
-            map.write(&mut file, &options).map(|()| file.bytes)
+            write_named(map, names, &mut file, &options).map(|()| file.bytes)
         })?;
         let voxels = map.keys().len();
         Ok(Written {

@@ -25,9 +25,11 @@ mod streams;
 mod viewer;
 mod viewer_foreign;
 mod viewer_headset;
+mod viewer_layout;
 mod viewer_page;
 mod viewer_planning;
 mod viewer_survey;
+mod viewer_words;
 mod viewer_writing;
 
 use std::io::{Write, stderr};

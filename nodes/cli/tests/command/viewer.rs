@@ -245,6 +245,10 @@ fn the_map_that_grows_in_a_demo_is_at_its_end_the_mappers() {
     let mut thin = Page::open(&chromium, &format!("{}/?thin=1", viewer.url));
     let mut page = Page::open(&chromium, &viewer.url);
     page.wait_for("lattice.state.size > 100 && lattice.state.robot !== null");
+    // Layers are of topics that somebody publishes: here is no headset.
+    let layers = "[...document.querySelectorAll('#layers input[data-topic]')].map((box) => box.dataset.topic).sort().join()";
+    page.wait_for(&format!("{layers} === '/fcc/map_centers,/points_enu'"));
+    page.wait_for("/ of 0:/.test(document.getElementById('log-time').textContent) && document.getElementById('seek').disabled");
     page.value(
         "document.querySelectorAll('#layers input[data-topic]').forEach((box) => box.click())",
     );

@@ -182,10 +182,15 @@ fn labels_have_the_names_that_label_info_tells() {
     let stage = Stage::show(&known);
     let mut page = open(&chromium, &stage);
     page.value("document.getElementById('colour').value = 'label'; document.getElementById('colour').dispatchEvent(new Event('change'))");
-    let legend = |text: &str| format!("document.getElementById('legend').textContent === '{text}'");
-    page.wait_for(&legend("37"));
+    // Each with its cells, and those that have none.
+    let legend = |rows: &str| {
+        format!(
+            "[...document.querySelectorAll('#legend .names span')].map((part) => part.textContent).join('|') === '{rows}'"
+        )
+    };
+    page.wait_for(&legend("label 3|4|label 7|4|no label|4"));
     stage.names(&[(3, "robot <b>1</b>"), (9, "nobody")]);
-    page.wait_for(&legend("robot <b>1</b>7"));
+    page.wait_for(&legend("robot <b>1</b>|4|label 7|4|no label|4"));
     page.value("document.querySelector('[data-camera=top]').click()");
     let first = serde_json::to_string(&known[0]).unwrap();
     let click = format!(
@@ -201,6 +206,8 @@ fn each_verdict_has_its_text_and_class_and_its_open_directions_are_drawn() {
     let Some(chromium) = chromium() else { return };
     let stage = Stage::show(&stairs());
     let mut page = open(&chromium, &stage);
+    let headset = "[...document.querySelectorAll('#layers label')].some((box) => box.textContent === 'Headset')";
+    assert_eq!(page.value(headset), false, "there is none yet");
     for (verdict, name, class) in [
         (CalibrationResult::NONE, "nothing found yet", ""),
         (CalibrationResult::AMBIGUOUS, "AMBIGUOUS", "bad"),
@@ -240,6 +247,7 @@ fn each_verdict_has_its_text_and_class_and_its_open_directions_are_drawn() {
             class,
             "{name}"
         );
+        assert_eq!(page.value(headset), true);
         let drawn = page.value("lattice.state.headset !== null");
         assert_eq!(drawn, verdict != CalibrationResult::NONE, "{name}");
         if verdict == CalibrationResult::DEGENERATE {
@@ -330,7 +338,7 @@ fn on_a_phone_a_pinch_halves_the_distance_and_panels_fit() {
         ..CalibrationResult::default()
     });
     page.wait_for("!document.getElementById('headset').hidden");
-    let outside = "[...document.querySelectorAll('#cameras, #cameras button, #fold, #panel, #panel *, #banner')] \
+    let outside = "[...document.querySelectorAll('#cameras, #cameras button, #compass, #panel, #panel *, #banner')] \
         .filter((part) => part.checkVisibility()).map((part) => [part.id || part.textContent, part.getBoundingClientRect()]) \
         .filter(([, box]) => box.left < -0.5 || box.right > 390.5).map(([name]) => name)";
     let wide = "document.documentElement.scrollWidth";
@@ -340,7 +348,7 @@ fn on_a_phone_a_pinch_halves_the_distance_and_panels_fit() {
                 "document.getElementById('fold').click(); \
                 for (const part of document.querySelectorAll('#panel details')) part.open = true",
             );
-            page.wait_for("!document.getElementById('panel').hidden");
+            page.wait_for("!document.getElementById('sheet').hidden");
         }
         assert_eq!(page.value(outside), json!([]), "open: {open}");
         assert_eq!(page.value(wide), 390, "open: {open}");

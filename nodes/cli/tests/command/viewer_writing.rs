@@ -288,7 +288,8 @@ fn a_log_that_plays_is_held_and_moved_from_the_page_of_a_phone() {
     let Some(chromium) = chromium() else { return };
     let folder = tempfile::tempdir().unwrap();
     let log = simulated(folder.path(), "mcap", "12");
-    let first_ns = BagReader::open(log.as_ref()).unwrap().start_ns().unwrap();
+    let reader = BagReader::open(log.as_ref()).unwrap();
+    let (first_ns, last_ns) = (reader.start_ns().unwrap(), reader.end_ns().unwrap());
     let domain = LoopbackDomain::take().unwrap();
     let mut player = record::play(&domain, &log, &["start_paused:=true"]);
     let arguments = ["view", BOBCAT, "--port", "0", "--", "--ros-args"];
@@ -303,10 +304,10 @@ fn a_log_that_plays_is_held_and_moved_from_the_page_of_a_phone() {
         "!document.getElementById('player').hidden && {pause}.textContent === 'Play'"
     ));
     page.value(
-        "document.getElementById('panel').hidden && document.getElementById('fold').click()",
+        "document.getElementById('sheet').hidden && document.getElementById('fold').click()",
     );
     let fits = "(() => { const panel = document.getElementById('panel'); \
-        return !panel.hidden && panel.scrollWidth <= panel.clientWidth && innerWidth === 390; })()";
+        return !document.getElementById('sheet').hidden && panel.scrollWidth <= panel.clientWidth && innerWidth === 390; })()";
     assert_eq!(page.value(fits), true);
     page.value(&format!("{pause}.click()"));
     page.wait_for(&format!("{pause}.textContent === 'Pause'"));
@@ -319,16 +320,35 @@ fn a_log_that_plays_is_held_and_moved_from_the_page_of_a_phone() {
     page.value(&format!("{pause}.click()"));
     page.wait_for(&format!("{pause}.textContent === 'Play'"));
     page.value("document.getElementById('step').click()");
-    let first_s = first_ns as f64 * 1e-9;
+    // The bar goes from the beginning of the log to its end, and to where a person drags it.
+    let (first_s, last_s) = (first_ns as f64 * 1e-9, last_ns as f64 * 1e-9);
+    let at = |page: &mut Page| page.value("lattice.player.log.now").as_f64().unwrap();
+    let ends = "[lattice.player.log.begin, lattice.player.log.end]";
+    let ends: [f64; 2] = serde_json::from_value(page.value(ends)).unwrap();
+    assert!((ends[0] - first_s).abs() < 1e-3 && (ends[1] - last_s).abs() < 1e-3);
+    let seek = "document.getElementById('seek')";
+    page.value(&format!(
+        "{seek}.value = 750; {seek}.dispatchEvent(new Event('input')); {seek}.dispatchEvent(new Event('change'))"
+    ));
+    let sought_s = first_s + 0.75 * (last_s - first_s);
+    // As the player states it, not as the page asked.
+    page.value("lattice.player.log.now = 0");
+    page.wait_for(&format!(
+        "Math.abs(lattice.player.log.now - {sought_s}) < 0.01"
+    ));
     let said = "document.getElementById('said').textContent";
-    page.value(&format!(
-        "lattice.player.now = {first_s} + 5; document.getElementById('back').click()"
-    ));
-    page.wait_for(&format!("{said} === 'the log does not reach there'"));
-    page.value(&format!(
-        "lattice.player.now = {first_s} - 8; document.getElementById('on').click()"
-    ));
-    page.wait_for(&format!("{said} === ''"));
+    // Back by 10 s of 12, and not beyond the beginning.
+    for _ in 0..2 {
+        let before_s = at(&mut page);
+        page.value("document.getElementById('back').click()");
+        page.wait_for(&format!(
+            "lattice.player.log.now < {before_s} - 0.1 || lattice.player.log.now - {first_s} < 0.01"
+        ));
+    }
+    assert!(at(&mut page) - first_s < 0.01);
+    assert_eq!(page.value(said), "");
+    let time = "document.getElementById('log-time').textContent";
+    page.wait_for(&format!("/^0:00 of 0:1[12]$/.test({time})"));
     page.value("document.getElementById('clear').click()");
     let fits = "(() => { const box = document.getElementById('ask').getBoundingClientRect(); \
         return box.left >= 0 && box.right <= 390 && document.activeElement.textContent === 'Cancel'; })()";

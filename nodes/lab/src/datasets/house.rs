@@ -6,7 +6,8 @@ use crate::{AnyError, at};
 use lattice_core::lattice::{Lattice, LatticeKind};
 use lattice_core::pose::Axes;
 use lattice_core::registration::UNLABELED;
-use lattice_core::voxels::file::write_map;
+use lattice_core::voxels::file::{MapContents, WriteOptions};
+use lattice_core::voxels::label_names::write_named;
 use lattice_nodes::files::export::write_labelled_ply;
 use lattice_nodes::files::whole;
 use nalgebra::{Isometry3, Point3};
@@ -173,7 +174,10 @@ pub fn write_house(
     let list = survey.voxels(&lattice, &draw.map)?;
     summary.survey_points = survey.cloud.len();
     summary.voxels = list.len();
-    whole::write(&place(options, MAP_FILE)?, |file| write_map(&list, file))?;
+    let map = MapContents::from_list(&list);
+    whole::write(&place(options, MAP_FILE)?, |file| {
+        write_named(&map, house.class_names(), file, &WriteOptions::default())
+    })?;
     let classes = BTreeMap::from([("classes", house.class_names())]);
     let text = serde_yaml::to_string(&classes)?;
     whole::write_text(&place(options, CLASSES_FILE)?, &text)?;

@@ -39,14 +39,14 @@ pub struct AdvertisedService {
 }
 
 /// The first message. `session` is another one after each start, so that clients begin anew. No
-/// distribution of ROS is named: viewers would take its definitions for ours.
-pub fn server_info(session: &str, capabilities: &[&str]) -> String {
+/// distribution of ROS is named: viewers would take its definitions for ours. `source`: `live` or `file`.
+pub fn server_info(session: &str, capabilities: &[&str], source: &str) -> String {
     json!({
         "op": "serverInfo",
         "name": "lattice viewer_server",
         "capabilities": capabilities,
         "supportedEncodings": ["cdr"],
-        "metadata": {},
+        "metadata": { "source": source },
         "sessionId": session,
     })
     .to_string()

@@ -7,9 +7,11 @@ use lattice_core::lattice::MortonKey;
 use lattice_core::voxels::codec;
 use lattice_msgs::calibration::CalibrationResult;
 use lattice_msgs::cdr;
-use lattice_msgs::geometry_msgs::{Pose, Quaternion};
+use lattice_msgs::diagnostic_msgs::{DiagnosticArray, DiagnosticStatus, KeyValue};
+use lattice_msgs::geometry_msgs::{Pose, Quaternion, TransformStamped, Vector3};
 use lattice_msgs::lattice::{LatticeInfo, LatticeMap};
 use lattice_msgs::std_msgs::Header;
+use lattice_msgs::tf2_msgs::TFMessage;
 use lattice_msgs::vision_msgs::{LabelInfo, VisionClass};
 use lattice_nodes::viewer_server::{Class, Entry, Gate, Hub, Server};
 use serde::Serialize;
@@ -50,6 +52,8 @@ pub struct Stage {
     calibration: u32,
     free: u32,
     label_info: u32,
+    transforms: u32,
+    diagnostics: Option<u32>,
     /// Address of the page.
     pub url: String,
     _server: Server,
@@ -58,17 +62,26 @@ pub struct Stage {
 impl Stage {
     /// Shows these cells.
     pub fn show(cells: &[Known]) -> Self {
+        Self::with(cells, false)
+    }
+
+    /// The same with `/diagnostics`, without which the page takes silence for rest.
+    pub fn live(cells: &[Known]) -> Self {
+        Self::with(cells, true)
+    }
+
+    fn with(cells: &[Known], live: bool) -> Self {
         let hub = Arc::new(Hub::new(4));
         hub.channel::<LatticeMap>("/map", Class::Map, false);
         let one = Class::Newest { depth: 1 };
         let calibration = hub.channel::<CalibrationResult>("/calibration", one, true);
         let free = hub.channel::<LatticeMap>("/free", one, true);
         let label_info = hub.channel::<LabelInfo>("/label_info", one, true);
-        let chunk = Entry {
-            stamp_ns: 1,
-            cdr: cdr::to_vec(&map(cells)).unwrap().into(),
-            thin: None,
-        };
+        let transforms = hub.channel::<TFMessage>("/tf", one, true);
+        let states =
+            || hub.channel::<DiagnosticArray>("/diagnostics", Class::Newest { depth: 20 }, false);
+        let diagnostics = live.then(states);
+        let chunk = chunk(&map(cells));
         hub.change_map(|stream| stream.set_keyframe(vec![chunk]));
         let address = SocketAddr::from((Ipv4Addr::LOCALHOST, 0));
         let server = Server::start(address, Gate::default(), Arc::clone(&hub)).unwrap();
@@ -77,9 +90,58 @@ impl Stage {
             calibration,
             free,
             label_info,
+            transforms,
+            diagnostics,
             url: format!("http://{}", server.address()),
             _server: server,
         }
+    }
+
+    /// Shows another map.
+    pub fn replace(&self, cells: &[Known]) {
+        let mut map = map(cells);
+        map.info.epoch += 1;
+        self.hub.change_map(|stream| {
+            stream.reset();
+            stream.set_keyframe(vec![chunk(&map)]);
+        });
+    }
+
+    /// Tells where the robot is.
+    pub fn robot_at(&self, [x, y, z]: [f64; 3]) {
+        let mut transform = TransformStamped {
+            child_frame_id: "base_link".to_owned(),
+            ..TransformStamped::default()
+        };
+        transform.header.frame_id = "map".to_owned();
+        transform.transform.translation = Vector3 { x, y, z };
+        transform.transform.rotation.w = 1.0;
+        let message = TFMessage {
+            transforms: vec![transform],
+        };
+        self.hub
+            .offer(self.transforms, cdr::to_vec(&message).unwrap());
+    }
+
+    /// States a task of a node, with its values.
+    pub fn state(&self, name: &str, level: u8, message: &str, values: &[(&str, &str)]) {
+        let values = values.iter().map(|(key, value)| KeyValue {
+            key: (*key).to_owned(),
+            value: (*value).to_owned(),
+        });
+        let status = DiagnosticStatus {
+            level,
+            name: name.to_owned(),
+            message: message.to_owned(),
+            values: values.collect(),
+            ..DiagnosticStatus::default()
+        };
+        let states = DiagnosticArray {
+            status: vec![status],
+            ..DiagnosticArray::default()
+        };
+        let channel = self.diagnostics.unwrap();
+        self.hub.offer(channel, cdr::to_vec(&states).unwrap());
     }
 
     /// Tells of free cells.
@@ -104,6 +166,14 @@ impl Stage {
     pub fn calibrated(&self, result: &CalibrationResult) {
         self.hub
             .offer(self.calibration, cdr::to_vec(result).unwrap());
+    }
+}
+
+fn chunk(map: &LatticeMap) -> Entry {
+    Entry {
+        stamp_ns: 1,
+        cdr: cdr::to_vec(map).unwrap().into(),
+        thin: None,
     }
 }
 
