@@ -35,6 +35,7 @@ impl Progress {
     }
 
     /// Prints a line above the bar.
+    #[cfg(feature = "bags")]
     pub fn print(&self, line: &str) {
         self.0.suspend(|| eprintln!("{line}"));
     }
