@@ -317,7 +317,7 @@ def map_begins_late(log):
     log.odometry("/odom", "odom", "base_link", 50, frame_from_world=ODOM_FROM_MAP)
     log.tf("odom", "base_link", 50, odom_from_base)
     log.tf("map", "odom", 10, lambda _: ODOM, span_s=(0.9, 4))
-    log.mapped = log.scans[9:]
+    log.mapped = log.scans[10:]
 
 
 @register
