@@ -51,7 +51,12 @@ fn a_closed_pipe_ends_a_command_quietly() {
         let output = run(command, closed(), Stdio::piped());
         let errors = String::from_utf8_lossy(&output.stderr);
         assert_eq!(output.status.code(), Some(0), "{command:?}: {errors}");
-        assert_eq!(errors, "", "{command:?}");
+        // A replay says which topics it takes.
+        let said = ["clouds: ", "poses: ", "transforms: ", "not taken: "];
+        let is_choice =
+            |line: &&str| command[0] == "replay" && said.iter().any(|s| line.starts_with(s));
+        let others: Vec<&str> = errors.lines().filter(|line| !is_choice(line)).collect();
+        assert!(others.is_empty(), "{command:?}: {others:?}");
     }
     // An error has its status though nobody reads it.
     let output = run(&["map", "info", "nowhere"], closed(), closed());

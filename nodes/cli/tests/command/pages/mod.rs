@@ -34,7 +34,7 @@ struct Place {
 }
 
 impl Place {
-    /// Files of small sizes: `LOG`, `map.lattice`, `params/`, `robot.yaml` of README.
+    /// Files of small sizes: `LOG`, `map.lattice`, `scan.ply`, `params/`, `robot.yaml` of README.
     fn new() -> Self {
         let home = tempfile::tempdir().unwrap();
         let inside = |name: &str| home.path().join(name);
@@ -57,7 +57,9 @@ impl Place {
         symlink(env!("CARGO_BIN_EXE_lattice"), inside("bin/lattice")).unwrap();
         symlink(root(), inside("lattice")).unwrap();
         let domain = LoopbackDomain::take().unwrap();
-        Self { home, domain }
+        let place = Self { home, domain };
+        place.run("scan.ply", "lattice map export map.lattice -o scan.ply");
+        place
     }
 
     fn command(&self, script: &str) -> Command {

@@ -146,9 +146,18 @@ pub const RULES: &[(&str, &str, Rule)] = &[
     ("docs/parameters.md", "lattice run", Works("lattice_mapper")),
     (
         "docs/files.md",
-        "lattice",
-        NotHere("needs a scan; files.rs reads and writes each format"),
+        "lattice view scan.ply",
+        Serves("--port 0", "the map is at"),
     ),
+    ("docs/files.md", "lattice quantize scan.ply", Runs("")),
+    ("docs/files.md", "lattice map", Runs("")),
+    (
+        "docs/files.md",
+        "lattice calibrate",
+        NotHere("calibrate.rs"),
+    ),
+    ("docs/octomap.md", "lattice map export", Runs("")),
+    ("docs/octomap.md", "lattice quantize map.bt", Runs("")),
     ("docs/poses.md", "lattice bag info LOG", Runs("")),
     ("docs/poses.md", "lattice replay LOG --direct", Runs("")),
     (
