@@ -5,6 +5,7 @@ mod keyboard;
 mod lockstep;
 mod parameters;
 mod playback;
+mod playhead;
 
 use std::path::PathBuf;
 use std::sync::Arc;
@@ -23,7 +24,8 @@ use lattice_runtime::ros_args::RosArgs;
 use lattice_runtime::{Node, RawPublisher};
 use lockstep::Lockstep;
 use parameters::Settings;
-use playback::{Playback, Playhead, STATE_PERIOD};
+use playback::{Playback, STATE_PERIOD};
+use playhead::Playhead;
 
 pub use parameters::declare;
 

@@ -14,6 +14,7 @@ use lattice_runtime::{Diagnostics, Level, Node, Publisher, RawPublisher, Shutdow
 use super::PlayerReport;
 use super::controls::Controls;
 use super::lockstep::Lockstep;
+use super::playhead::Playhead;
 use crate::start::NodeError;
 
 /// Time that what is queued at the end has to reach its readers.
@@ -27,56 +28,6 @@ const MOST_LATE: Duration = Duration::from_secs(1);
 pub(super) const STATE_PERIOD: Duration = Duration::from_millis(500);
 /// Longest sleep between two looks at the shutdown flag, and between two times on `/clock` while held.
 pub(super) const NAP: Duration = Duration::from_millis(100);
-
-/// The player's own clock, which stands while the log is held.
-pub(super) struct Playhead {
-    begin: Instant,
-    held: Option<Instant>,
-}
-
-impl Playhead {
-    pub(super) fn new(held: bool) -> Self {
-        let begin = Instant::now();
-        Self {
-            begin,
-            held: held.then_some(begin),
-        }
-    }
-
-    /// Begins anew, held or not as before.
-    fn restart(&mut self) {
-        *self = Self::new(self.is_held());
-    }
-
-    pub(super) fn is_held(&self) -> bool {
-        self.held.is_some()
-    }
-
-    pub(super) fn now_ns(&self) -> i64 {
-        let elapsed = self.held.map_or_else(
-            || self.begin.elapsed(),
-            |held| held.saturating_duration_since(self.begin),
-        );
-        i64::try_from(elapsed.as_nanos()).unwrap_or(i64::MAX)
-    }
-
-    pub(super) fn hold(&mut self) {
-        let _ = self.held.get_or_insert_with(Instant::now);
-    }
-
-    /// Stands still for a time that has passed.
-    fn stand(&mut self, passed: Duration) {
-        if !self.is_held() {
-            self.begin += passed;
-        }
-    }
-
-    pub(super) fn go_on(&mut self) {
-        if let Some(held) = self.held.take() {
-            self.begin += held.elapsed();
-        }
-    }
-}
 
 /// The part of a delay by which all that follows is late too.
 fn not_made_up(late: Duration) -> Duration {
