@@ -88,7 +88,7 @@ impl Frames {
     }
 }
 
-/// What of a topic's messages names frames, if anything; images are many and of no use here.
+/// Part of a message type that names frames; `None` for images, which are many.
 fn content(topic: &TopicInfo) -> Option<Content> {
     match topic.type_name.as_str() {
         "tf2_msgs/msg/TFMessage" => return Some(Content::Transforms),

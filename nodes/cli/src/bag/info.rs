@@ -19,7 +19,7 @@ pub struct Info {
     json: bool,
 }
 
-/// What a log is.
+/// Contents of a log.
 #[derive(Serialize)]
 struct Summary {
     storage: &'static str,

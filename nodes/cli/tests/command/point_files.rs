@@ -6,7 +6,7 @@ use std::process::{Command, Stdio};
 
 use crate::{error, json, lattice, text};
 
-/// What `lattice view` says until it serves the map.
+/// Output of `lattice view` until it serves the map.
 fn shown(arguments: &[&str]) -> String {
     let mut command = Command::new(env!("CARGO_BIN_EXE_lattice"));
     command.args(["view", "--port", "0"]).args(arguments);

@@ -129,7 +129,7 @@ impl Place {
     }
 }
 
-/// What nodes publish on `/diagnostics`.
+/// Subscription to `/diagnostics`.
 struct Listener {
     nodes: Receiver<Vec<String>>,
     _subscription: lattice_runtime::Subscription,

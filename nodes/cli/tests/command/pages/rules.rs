@@ -1,4 +1,4 @@
-//! What becomes of each command of the pages in the test.
+//! Treatment of each command of the pages in the test.
 
 /// Treatment of a command.
 #[derive(Clone, Copy, Debug)]

@@ -35,7 +35,7 @@ pub(super) struct Header {
     pub(super) is_packed: bool,
     pub(super) scale: [f64; 3],
     pub(super) offset_m: [f64; 3],
-    /// How LASzip packed the points, as its record has it.
+    /// Compression of the points, from the record of LASzip.
     pub(super) laszip: Option<Vec<u8>>,
 }
 
