@@ -25,7 +25,7 @@ pub enum CloudError {
         needed: u64,
     },
     /// The data ends before the last row.
-    #[error("data has {bytes} bytes, height {height} * row_step {row_step} needs {needed}")]
+    #[error("data has {bytes} bytes, {height} rows of row_step {row_step} need {needed}")]
     ShortData {
         bytes: usize,
         height: u32,
@@ -36,7 +36,9 @@ pub enum CloudError {
     #[error("cloud declares {fields} fields, more than {max_fields}")]
     TooManyFields { fields: usize, max_fields: usize },
     /// A datatype code that PointField does not define.
-    #[error("field '{field}' has datatype {datatype}, not one of 1 to 8 (INT8 to FLOAT64)")]
+    #[error(
+        "field '{field}' has datatype {datatype}, not one of 1 to 11 (INT8 to FLOAT64; INT64, UINT64, BOOL)"
+    )]
     UnknownDatatype { field: String, datatype: u8 },
     /// A field of no elements.
     #[error("field '{field}' has count 0, a scalar has 1")]
@@ -68,11 +70,11 @@ pub enum CloudError {
         z: &'static str,
     },
     /// The time field asked for is not there.
-    #[error("cloud has no time field '{field}'; its fields are {present}: correct time_field")]
+    #[error("cloud has no time field '{field}'; its fields are {present}: correct `time.field`")]
     MissingTimeField { field: String, present: String },
     /// The time field asked for has a type whose unit cannot be guessed.
     #[error(
-        "time field '{field}' is {datatype}[{count}], whose unit is not known: set time_unit for a scalar, or another time_field"
+        "time field '{field}' is {datatype}[{count}], whose unit is not known: set `time.unit` for a scalar, or another `time.field`"
     )]
     TimeType {
         field: String,
@@ -81,31 +83,53 @@ pub enum CloudError {
     },
     /// The times of one cloud spread too far.
     #[error(
-        "times of field '{field}' read as {unit} span {span_s} s, not within 0..{max_span_s} s: set time_unit or time_field"
+        "times of field '{field}' read as {unit} span {span_s} s, not within 0..{max_span_s} s (`time.max_span_s`){}",
+        other_unit(fitting)
     )]
     TimeSpan {
         field: String,
         unit: &'static str,
         span_s: f64,
         max_span_s: f64,
+        fitting: Option<FittingUnit>,
     },
     /// Offsets that lead too far from the stamp.
     #[error(
-        "times of field '{field}' read as {unit} from the stamp reach {offset_s} s, over {max_span_s} s: set time_unit or time_reference"
+        "times of field '{field}' read as {unit} from the stamp reach {offset_s} s, over {max_span_s} s (`time.max_span_s`): set `time.reference` to stamp_start or stamp_end if they count from another instant{}",
+        other_unit(fitting)
     )]
     TimeOffset {
         field: String,
         unit: &'static str,
         offset_s: f64,
         max_span_s: f64,
+        fitting: Option<FittingUnit>,
     },
     /// Absolute times of another clock than the stamp's.
     #[error(
-        "times of field '{field}' read as absolute {unit} are {distance_s} s from the stamp: synchronise the sensor (37 s is TAI, 18 s is GPS time), or set time_reference to stamp_start or stamp_end, or to absolute to insist"
+        "times of field '{field}' read as absolute {unit} are {distance_s} s from the stamp: synchronise the sensor (37 s is TAI, 18 s is GPS time), or set `time.reference` to stamp_start or stamp_end, or to absolute to insist"
     )]
     TimeClock {
         field: String,
         unit: &'static str,
         distance_s: f64,
     },
+}
+
+/// A unit in which times would make a cloud of plausible duration.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct FittingUnit {
+    /// Value for `time.unit`.
+    pub unit: &'static str,
+    /// Duration of the cloud in that unit, seconds.
+    pub span_s: f64,
+}
+
+fn other_unit(fitting: &Option<FittingUnit>) -> String {
+    match fitting {
+        Some(FittingUnit { unit, span_s }) => {
+            format!("; read as {unit} they span {span_s:.6} s: set `time.unit: {unit}`")
+        }
+        None => "; set `time.unit` or `time.field`".to_owned(),
+    }
 }

@@ -3,7 +3,7 @@
 use super::view::Coordinates;
 use super::{CloudError, CloudView};
 
-const MAX_FIELDS: usize = 256;
+pub(super) const MAX_FIELDS: usize = 256;
 /// Longest part of a foreign name, and most names, repeated in an error.
 const SHOWN_CHARS: usize = 48;
 const SHOWN_FIELDS: usize = 24;
@@ -15,7 +15,7 @@ pub struct PointField {
     pub name: String,
     /// First byte of the field in its point.
     pub offset: u32,
-    /// Code of the type, 1 to 8.
+    /// Code of the type, 1 to 11.
     pub datatype: u8,
     /// Elements.
     pub count: u32,
@@ -53,7 +53,7 @@ impl Default for CloudLimits {
     }
 }
 
-/// Types of `sensor_msgs/PointField`.
+/// Types of `sensor_msgs/PointField`, 1 to 8, and of `pcl::PCLPointField`, 9 to 11.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 #[repr(u8)]
 #[expect(missing_docs, reason = "the names say the types")]
@@ -66,6 +66,9 @@ pub enum Datatype {
     Uint32 = 6,
     Float32 = 7,
     Float64 = 8,
+    Int64 = 9,
+    Uint64 = 10,
+    Bool = 11,
 }
 
 impl Datatype {
@@ -80,6 +83,9 @@ impl Datatype {
             6 => Datatype::Uint32,
             7 => Datatype::Float32,
             8 => Datatype::Float64,
+            9 => Datatype::Int64,
+            10 => Datatype::Uint64,
+            11 => Datatype::Bool,
             _ => return None,
         })
     }
@@ -87,14 +93,14 @@ impl Datatype {
     /// Bytes of an element.
     pub fn bytes(self) -> u32 {
         match self {
-            Datatype::Int8 | Datatype::Uint8 => 1,
+            Datatype::Int8 | Datatype::Uint8 | Datatype::Bool => 1,
             Datatype::Int16 | Datatype::Uint16 => 2,
             Datatype::Int32 | Datatype::Uint32 | Datatype::Float32 => 4,
-            Datatype::Float64 => 8,
+            Datatype::Float64 | Datatype::Int64 | Datatype::Uint64 => 8,
         }
     }
 
-    /// Name as in `sensor_msgs/PointField`.
+    /// Name as in `sensor_msgs/PointField` and PCL.
     pub fn name(self) -> &'static str {
         match self {
             Datatype::Int8 => "INT8",
@@ -105,6 +111,9 @@ impl Datatype {
             Datatype::Uint32 => "UINT32",
             Datatype::Float32 => "FLOAT32",
             Datatype::Float64 => "FLOAT64",
+            Datatype::Int64 => "INT64",
+            Datatype::Uint64 => "UINT64",
+            Datatype::Bool => "BOOL",
         }
     }
 }
@@ -150,7 +159,9 @@ impl CloudLayout {
                 needed: row_needs,
             });
         }
-        let needed = u64::from(self.height) * u64::from(self.row_step);
+        // The last row need not be padded.
+        let rows_before = u64::from(self.height).saturating_sub(1);
+        let needed = (rows_before * u64::from(self.row_step)).saturating_add(row_needs);
         if (bytes as u64) < needed {
             return Err(CloudError::ShortData {
                 bytes,
@@ -170,24 +181,8 @@ impl CloudLayout {
             });
         }
         for (i, field) in self.fields.iter().enumerate() {
-            let datatype =
-                Datatype::from_code(field.datatype).ok_or_else(|| CloudError::UnknownDatatype {
-                    field: shown(&field.name),
-                    datatype: field.datatype,
-                })?;
-            if field.count == 0 {
-                return Err(CloudError::CountZero {
-                    field: shown(&field.name),
-                });
-            }
-            let end =
-                u64::from(field.offset) + u64::from(field.count) * u64::from(datatype.bytes());
-            if end > u64::from(self.point_step) {
-                return Err(CloudError::BeyondPoint {
-                    field: shown(&field.name),
-                    end,
-                    point_step: self.point_step,
-                });
+            if let Some(problem) = field.problem(self.point_step) {
+                return Err(problem);
             }
             if self.fields.iter().take(i).any(|f| f.name == field.name) {
                 return Err(CloudError::Duplicate {

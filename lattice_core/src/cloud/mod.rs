@@ -7,16 +7,19 @@
 
 mod error;
 mod layout;
+mod mend;
 mod points;
 mod time;
+mod time_field;
 mod time_options;
 mod transform;
 mod view;
 
-pub use error::CloudError;
+pub use error::{CloudError, FittingUnit};
 pub use layout::{CloudLayout, CloudLimits, Datatype, PointField};
+pub use mend::LayoutNote;
 pub use points::Cloud;
-pub use time::NO_TIME_NS;
+pub use time::{NO_TIME_NS, PointTimes, TimeSource};
 pub use time_options::{TimeOptions, TimeReference, TimeUnit};
 pub use transform::{RangeLimits, Transformed, transform_points};
 pub use view::CloudView;

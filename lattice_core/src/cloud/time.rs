@@ -1,53 +1,103 @@
-//! Per-point time: field, unit and the instant that it counts from.
+//! Time of each point: field, unit and the instant that it counts from.
 
 use rayon::prelude::*;
 
-use super::layout::{names, shown};
-use super::{CloudError, CloudView, Datatype, PointField, TimeOptions, TimeReference, TimeUnit};
+use super::error::FittingUnit;
+use super::layout::shown;
+use super::time_field::{TimeField, candidates};
+use super::{CloudError, CloudView, PointField, TimeOptions, TimeReference, TimeUnit};
 
 /// Time of a point that has none.
 pub const NO_TIME_NS: i64 = i64::MIN;
 
-/// Names that sensors give their time, the first one present wins.
-const NAMES: [&str; 5] = ["time", "t", "time_stamp", "timestamp", "offset_time"];
 /// Points of one task, at least.
 const MIN_TASK: usize = 8192;
 /// An absolute time further from the stamp is of another clock.
 const MAX_CLOCK_DISTANCE_S: f64 = 10.0;
-/// Least f64 values taken as absolute: 1973 in seconds, milli-, micro- and nanoseconds.
-const LEAST_ABSOLUTE: [(f64, TimeUnit); 4] = [
-    (1.0e17, TimeUnit::Nanoseconds),
-    (1.0e14, TimeUnit::Microseconds),
-    (1.0e11, TimeUnit::Milliseconds),
-    (1.0e8, TimeUnit::Seconds),
-];
+/// Shortest sweep of a sensor that is proposed with another unit, s.
+const SHORTEST_SWEEP_S: f64 = 1.0e-3;
+
+/// Times of the points of a cloud, and what they were taken from.
+#[derive(Clone, Debug, PartialEq)]
+pub struct PointTimes<'a> {
+    /// Nanoseconds since the Unix epoch of each point, [`NO_TIME_NS`] where it has none; `None` if no
+    /// point has a time of its own.
+    pub times_ns: Option<Vec<i64>>,
+    /// Origin of the times.
+    pub source: TimeSource<'a>,
+}
+
+/// Origin of the times of a cloud's points.
+#[derive(Clone, Debug, PartialEq)]
+pub enum TimeSource<'a> {
+    /// The cloud has no return, or times were not asked for.
+    Nothing,
+    /// No field has a name and type known for times.
+    NoField {
+        /// Names of the fields that may be times, for a log; empty if none may.
+        candidates: String,
+    },
+    /// No return has a finite value.
+    NotFinite {
+        /// The field of times.
+        field: &'a PointField,
+    },
+    /// A field.
+    Field {
+        /// The field of times.
+        field: &'a PointField,
+        /// Its unit.
+        unit: TimeUnit,
+        /// Instant that it counts from.
+        reference: TimeReference,
+        /// Time between the earliest and the latest return, nanoseconds.
+        span_ns: i64,
+    },
+}
 
 /// Conversion of values of a field into times.
 struct Clock<'a> {
     field: &'a PointField,
     unit: TimeUnit,
+    reference: TimeReference,
     /// Nanoseconds since the epoch of the value zero.
     zero_ns: i64,
     /// Earliest and latest nanoseconds of the field.
     range_ns: (i64, i64),
 }
 
-impl CloudView<'_> {
-    /// Time of every point, nanoseconds since the epoch, [`NO_TIME_NS`] where it has none;
-    /// `None` if the cloud has no time field.
+impl<'a> CloudView<'a> {
+    /// Time of every point, and its origin.
     ///
-    /// Without overrides, `time`, `t`, `time_stamp`, `timestamp` and `offset_time` count as
-    /// f32 in seconds from the stamp, as u32 in nanoseconds from the stamp, and as f64 in
-    /// seconds from the stamp or, by their size, in s, ms, us or ns from the epoch. Points
-    /// that are not finite or lie in the sensor's origin are no returns: their times do not
-    /// enter the checks, and count as none where they leave the range of the others.
+    /// Without options, fields named `time`, `t`, `timestamp` and the like count as f32 in seconds from
+    /// the stamp, as 32-bit integers in nanoseconds from the stamp, and with 64 bits in seconds (f64) or
+    /// nanoseconds from the stamp or, by their size, in s, ms, us or ns from the epoch; a name that ends
+    /// in `_s`, `_ms`, `_us` or `_ns` states the unit. Points that are not finite or lie in the sensor's
+    /// origin are no returns: their times do not enter the checks, and count as none where they leave the
+    /// range of the others, as do times apart from those of most returns.
     pub fn point_times(
         &self,
         stamp_ns: i64,
         options: &TimeOptions,
-    ) -> Result<Option<Vec<i64>>, CloudError> {
-        let Some(clock) = self.clock(stamp_ns, options)? else {
-            return Ok(None);
+    ) -> Result<PointTimes<'a>, CloudError> {
+        let without = |source| PointTimes {
+            times_ns: None,
+            source,
+        };
+        if self.is_empty() || options.field.as_deref() == Some("") {
+            return Ok(without(TimeSource::Nothing));
+        }
+        let Some(field) = TimeField::of(self, options)? else {
+            let candidates = candidates(self.fields());
+            return Ok(without(TimeSource::NoField { candidates }));
+        };
+        let Some(clock) = self.clock(&field, stamp_ns, options)? else {
+            let field = field.field;
+            let has_return = (0..self.len()).any(|i| is_return(&self.xyz(i)));
+            return Ok(without(match has_return {
+                true => TimeSource::NotFinite { field },
+                false => TimeSource::Nothing,
+            }));
         };
         let (earliest_ns, latest_ns) = clock.range_ns;
         let times = (0..self.len())
@@ -60,32 +110,97 @@ impl CloudView<'_> {
                 _ => NO_TIME_NS,
             })
             .collect();
-        Ok(Some(times))
+        Ok(PointTimes {
+            times_ns: Some(times),
+            source: TimeSource::Field {
+                field: clock.field,
+                unit: clock.unit,
+                reference: clock.reference,
+                span_ns: latest_ns.saturating_sub(earliest_ns),
+            },
+        })
     }
 
-    fn clock(&self, stamp_ns: i64, options: &TimeOptions) -> Result<Option<Clock<'_>>, CloudError> {
-        let Some((field, datatype)) = self.time_field(options)? else {
+    fn clock(
+        &self,
+        field: &TimeField<'a>,
+        stamp_ns: i64,
+        options: &TimeOptions,
+    ) -> Result<Option<Clock<'a>>, CloudError> {
+        let Some(range) = self.value_range(field.field) else {
             return Ok(None);
         };
-        let Some((least, greatest)) = self.value_range(field) else {
-            return Ok(None);
+        let all = Clock::new(field, range, range.1, stamp_ns, options);
+        let Err(error) = all else {
+            return all.map(Some);
         };
-        let (unit, reference) = guess(datatype, greatest, options);
-        let unit = unit.ok_or_else(|| CloudError::TimeType {
-            field: shown(&field.name),
-            datatype: datatype.name(),
-            count: field.count,
-        })?;
-        let earliest_ns = to_ns(least, unit).unwrap_or(NO_TIME_NS);
-        let latest_ns = to_ns(greatest, unit).unwrap_or(NO_TIME_NS);
+        // Perhaps a few are absurd.
+        let most = self.range_of_most(field, options);
+        let clock = most
+            .and_then(|(range, middle)| Clock::new(field, range, middle, stamp_ns, options).ok());
+        clock.map(Some).ok_or(error)
+    }
+
+    /// Least and greatest value of `field` over the returns; `None` if there are none.
+    fn value_range(&self, field: &PointField) -> Option<(f64, f64)> {
+        (0..self.len())
+            .into_par_iter()
+            .with_min_len(MIN_TASK)
+            .filter_map(|i| {
+                let value = self.scalar(field, i);
+                (value.is_finite() && is_return(&self.xyz(i))).then_some((value, value))
+            })
+            .reduce_with(|a, b| (a.0.min(b.0), a.1.max(b.1)))
+    }
+
+    /// Range of the values of `field` within the longest duration of a cloud of their median, and the
+    /// median; `None` unless most returns lie there.
+    fn range_of_most(
+        &self,
+        field: &TimeField<'a>,
+        options: &TimeOptions,
+    ) -> Option<((f64, f64), f64)> {
+        let returns = (0..self.len()).filter(|&i| is_return(&self.xyz(i)));
+        let values = returns.map(|i| self.scalar(field.field, i));
+        let mut values: Vec<f64> = values.filter(|v| v.is_finite()).collect();
+        let half = values.len() / 2;
+        let middle = values
+            .get(half)
+            .is_some()
+            .then(|| *values.select_nth_unstable_by(half, f64::total_cmp).1)?;
+        let (unit, _) = field.guess(middle, options).ok()?;
+        let width = options.max_span_s * 1e9 / unit.scale_ns() as f64;
+        let near = values.iter().filter(|v| (**v - middle).abs() <= width);
+        let (count, least, greatest) = near.fold((0, middle, middle), |(n, a, b), v| {
+            (n + 1, v.min(a), v.max(b))
+        });
+        (2 * count > values.len()).then_some(((least, greatest), middle))
+    }
+}
+
+impl<'a> Clock<'a> {
+    /// Conversion of the values of a field from `range.0` to `range.1`; `value` is one of them.
+    fn new(
+        field: &TimeField<'a>,
+        range: (f64, f64),
+        value: f64,
+        stamp_ns: i64,
+        options: &TimeOptions,
+    ) -> Result<Self, CloudError> {
+        let (unit, reference) = field.guess(value, options)?;
+        let field = field.field;
+        let earliest_ns = to_ns(range.0, unit).unwrap_or(NO_TIME_NS);
+        let latest_ns = to_ns(range.1, unit).unwrap_or(NO_TIME_NS);
         let span_s = seconds_between(earliest_ns, latest_ns);
         let max_span_s = options.max_span_s;
+        let fitting = || fitting_unit(range.1 - range.0, unit, max_span_s);
         if !(0.0..max_span_s).contains(&span_s) {
             return Err(CloudError::TimeSpan {
                 field: shown(&field.name),
                 unit: unit.name(),
                 span_s,
                 max_span_s,
+                fitting: fitting(),
             });
         }
         let zero_ns = match reference {
@@ -117,100 +232,30 @@ impl CloudView<'_> {
                         unit: unit.name(),
                         offset_s,
                         max_span_s,
+                        fitting: fitting(),
                     });
                 }
             }
             TimeReference::StampEnd => stamp_ns.saturating_sub(latest_ns),
         };
-        Ok(Some(Clock {
+        Ok(Self {
             field,
             unit,
+            reference,
             zero_ns,
             range_ns: (earliest_ns, latest_ns),
-        }))
-    }
-
-    fn time_field(
-        &self,
-        options: &TimeOptions,
-    ) -> Result<Option<(&PointField, Datatype)>, CloudError> {
-        let find = |name: &str| self.fields().iter().find(|f| f.name == name);
-        match options.field.as_deref() {
-            Some("") => Ok(None),
-            _ if self.is_empty() => Ok(None),
-            Some(name) => {
-                let field = find(name).ok_or_else(|| CloudError::MissingTimeField {
-                    field: shown(name),
-                    present: names(self.fields()),
-                })?;
-                let datatype = Datatype::from_code(field.datatype);
-                match datatype.filter(|_| field.count == 1) {
-                    Some(datatype) => Ok(Some((field, datatype))),
-                    None => Err(CloudError::TimeType {
-                        field: shown(name),
-                        datatype: datatype.map_or("unknown", Datatype::name),
-                        count: field.count,
-                    }),
-                }
-            }
-            None => Ok(NAMES
-                .iter()
-                .filter_map(|name| find(name))
-                .filter(|field| field.count == 1)
-                .find_map(|field| match Datatype::from_code(field.datatype)? {
-                    datatype @ (Datatype::Float32 | Datatype::Float64 | Datatype::Uint32) => {
-                        Some((field, datatype))
-                    }
-                    datatype if options.unit.is_some() => Some((field, datatype)),
-                    _ => None,
-                })),
-        }
-    }
-
-    /// Least and greatest value of `field` over the returns; `None` if there are none.
-    fn value_range(&self, field: &PointField) -> Option<(f64, f64)> {
-        (0..self.len())
-            .into_par_iter()
-            .with_min_len(MIN_TASK)
-            .filter_map(|i| {
-                let value = self.scalar(field, i);
-                (value.is_finite() && is_return(&self.xyz(i))).then_some((value, value))
-            })
-            .reduce_with(|a, b| (a.0.min(b.0), a.1.max(b.1)))
+        })
     }
 }
 
-/// Unit and reference: what the user says, else what type and size suggest.
-fn guess(
-    datatype: Datatype,
-    greatest: f64,
-    options: &TimeOptions,
-) -> (Option<TimeUnit>, TimeReference) {
-    let by_size = LEAST_ABSOLUTE
-        .iter()
-        .find(|(least, _)| datatype == Datatype::Float64 && greatest >= *least);
-    let unit = options.unit.or(match (datatype, by_size) {
-        (Datatype::Float64, Some((_, unit))) => Some(*unit),
-        (Datatype::Float32 | Datatype::Float64, _) => Some(TimeUnit::Seconds),
-        (Datatype::Uint32, _) => Some(TimeUnit::Nanoseconds),
-        _ => None,
+/// The coarsest unit other than `unit` in which a difference of values is a sweep.
+pub(super) fn fitting_unit(span: f64, unit: TimeUnit, max_span_s: f64) -> Option<FittingUnit> {
+    let spans = TimeUnit::ALL.into_iter().filter(|u| *u != unit);
+    let mut spans = spans.map(|unit| FittingUnit {
+        unit: unit.name(),
+        span_s: span * unit.scale_ns() as f64 * 1e-9,
     });
-    // With a unit given, a value is absolute if that unit makes it later than 1973.
-    let absolute = match options.unit {
-        None => by_size.is_some(),
-        Some(unit) => {
-            datatype == Datatype::Float64
-                && LEAST_ABSOLUTE
-                    .iter()
-                    .any(|(least, u)| *u == unit && greatest >= *least)
-        }
-    };
-    let guessed = if absolute {
-        TimeReference::Absolute
-    } else {
-        TimeReference::StampStart
-    };
-    (unit, options.reference.unwrap_or(guessed))
+    spans.find(|fitting| (SHORTEST_SWEEP_S..max_span_s).contains(&fitting.span_s))
 }
 
 /// True for a point that a sensor measured: finite, and not in its own origin.

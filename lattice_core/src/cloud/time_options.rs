@@ -14,6 +14,14 @@ pub enum TimeUnit {
 }
 
 impl TimeUnit {
+    /// All units, the coarsest first.
+    pub const ALL: [TimeUnit; 4] = [
+        TimeUnit::Seconds,
+        TimeUnit::Milliseconds,
+        TimeUnit::Microseconds,
+        TimeUnit::Nanoseconds,
+    ];
+
     /// Short name: `s`, `ms`, `us`, `ns`.
     pub fn name(self) -> &'static str {
         match self {
@@ -25,12 +33,23 @@ impl TimeUnit {
     }
 
     /// Nanoseconds of one unit.
-    pub(super) fn scale_ns(self) -> i64 {
+    pub fn scale_ns(self) -> i64 {
         match self {
             TimeUnit::Seconds => 1_000_000_000,
             TimeUnit::Milliseconds => 1_000_000,
             TimeUnit::Microseconds => 1_000,
             TimeUnit::Nanoseconds => 1,
+        }
+    }
+}
+
+impl TimeReference {
+    /// Name as in the documentation of the variants.
+    pub fn name(self) -> &'static str {
+        match self {
+            TimeReference::StampStart => "stamp_start",
+            TimeReference::StampEnd => "stamp_end",
+            TimeReference::Absolute => "absolute",
         }
     }
 }

@@ -118,7 +118,11 @@ impl<'a> CloudView<'a> {
             Some(Datatype::Int32) => self.read(start, offset, |b| i32::from_be_bytes(b).into()),
             Some(Datatype::Uint16) => self.read(start, offset, |b| u16::from_be_bytes(b).into()),
             Some(Datatype::Int16) => self.read(start, offset, |b| i16::from_be_bytes(b).into()),
-            Some(Datatype::Uint8) => self.read(start, offset, |b| u8::from_be_bytes(b).into()),
+            Some(Datatype::Int64) => self.read(start, offset, |b| i64::from_be_bytes(b) as f64),
+            Some(Datatype::Uint64) => self.read(start, offset, |b| u64::from_be_bytes(b) as f64),
+            Some(Datatype::Uint8 | Datatype::Bool) => {
+                self.read(start, offset, |b| u8::from_be_bytes(b).into())
+            }
             Some(Datatype::Int8) => self.read(start, offset, |b| i8::from_be_bytes(b).into()),
             None => f64::NAN,
         }

@@ -125,6 +125,19 @@ impl PoseBuffer {
         outcome
     }
 
+    /// Takes a pose at its place in time, however old; one of a time that there is already is
+    /// [`PushOutcome::OutOfOrder`].
+    pub fn insert(&mut self, pose: StampedPose) -> PushOutcome {
+        if !is_rigid(&pose.map_from_base) {
+            return PushOutcome::NotFinite;
+        }
+        if !self.track.insert(pose.stamp_ns, pose.map_from_base) {
+            return PushOutcome::OutOfOrder;
+        }
+        self.track.trim(self.span_ns, self.max_poses);
+        PushOutcome::Accepted
+    }
+
     /// map_from_base at a time: exact at a pose, else linear and slerp between two; never
     /// outside of the poses, nor over a gap.
     pub fn at(&self, stamp_ns: i64) -> Result<Isometry3<f64>, PoseMiss> {
@@ -232,6 +245,17 @@ mod tests {
         assert_eq!(buffer.at(10 * SECOND - 1).unwrap().translation.x, 7.0);
         let by_ns = SECOND + 1;
         assert_eq!(buffer.at(11 * SECOND), Err(PoseMiss::AfterEnd { by_ns }));
+    }
+
+    #[test]
+    fn late_poses_find_their_place() {
+        let mut buffer = filled(&[0, 20, 30]);
+        assert_eq!(buffer.insert(at_x(10, 10.0)), PushOutcome::Accepted);
+        assert_eq!(buffer.insert(at_x(20, 7.0)), PushOutcome::OutOfOrder);
+        assert_eq!(buffer.insert(at_x(40, f64::NAN)), PushOutcome::NotFinite);
+        let x = |at| buffer.at(at).unwrap().translation.x;
+        assert_eq!([0, 10, 15, 20, 30].map(x), [0.0, 10.0, 15.0, 20.0, 30.0]);
+        assert_eq!(buffer.validate(), Ok(()));
     }
 
     #[test]

@@ -1,6 +1,8 @@
 //! PointCloud2 and the core's clouds.
 
-use lattice_core::cloud::{Cloud, CloudError, CloudLayout, CloudLimits, Datatype, PointField};
+use lattice_core::cloud::{
+    Cloud, CloudError, CloudLayout, CloudLimits, Datatype, LayoutNote, PointField,
+};
 use lattice_msgs::sensor_msgs::{self, PointCloud2};
 use lattice_msgs::std_msgs::Header;
 use nalgebra::Vector3;
@@ -18,22 +20,42 @@ pub enum Precision {
     Float64,
 }
 
-/// The layout that a message declares. Nothing is believed until [`CloudLayout::view`].
+/// Coordinates below this are rounded by less than 0.5 mm in single precision, m.
+const SINGLE_REACH_M: f64 = 16_384.0;
+
+impl Precision {
+    /// Single precision where it rounds the points by less than 0.5 mm, else double.
+    pub fn for_points(points_m: &[Vector3<f64>]) -> Self {
+        match points_m.iter().all(|p| p.amax() < SINGLE_REACH_M) {
+            true => Self::Float32,
+            false => Self::Float64,
+        }
+    }
+}
+
+/// The layout of a message, mended as its data allow. Nothing is believed until [`CloudLayout::view`].
 pub fn layout_of(cloud: &PointCloud2) -> CloudLayout {
+    mended_layout_of(cloud).0
+}
+
+/// The same, with what was mended.
+pub fn mended_layout_of(cloud: &PointCloud2) -> (CloudLayout, Vec<LayoutNote>) {
     let field = |field: &sensor_msgs::PointField| PointField {
         name: field.name.clone(),
         offset: field.offset,
         datatype: field.datatype,
         count: field.count,
     };
-    CloudLayout {
+    let mut layout = CloudLayout {
         width: cloud.width,
         height: cloud.height,
         point_step: cloud.point_step,
         row_step: cloud.row_step,
         is_bigendian: cloud.is_bigendian,
         fields: cloud.fields.iter().map(field).collect(),
-    }
+    };
+    let notes = layout.mend(cloud.data.len());
+    (layout, notes)
 }
 
 /// Bytes that a cloud takes in memory, its fields included.
@@ -184,6 +206,15 @@ mod tests {
         for (point, offset) in points.iter().zip(&cloud.offsets_m) {
             assert_eq!(*offset, [point.x as f32, point.y as f32, point.z as f32]);
         }
+    }
+
+    #[test]
+    fn points_far_from_the_origin_are_given_in_double_precision() {
+        let near = [Vector3::new(16_383.0, -16_383.0, 0.0)];
+        assert_eq!(Precision::for_points(&near), Precision::Float32);
+        let far = [near[0], Vector3::new(0.0, -16_385.0, 0.0)];
+        assert_eq!(Precision::for_points(&far), Precision::Float64);
+        assert!((f64::from(16_383.0004_f32) - 16_383.0004).abs() < 5e-4);
     }
 
     #[test]

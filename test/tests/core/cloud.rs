@@ -1,8 +1,8 @@
 //! Clouds: any layout reads back, any lie is refused, deskew equals the plain formula.
 
 use lattice_core::cloud::{
-    CloudLayout, CloudLimits, NO_TIME_NS, PointField, RangeLimits, TimeOptions, TimeReference,
-    TimeUnit, transform_points,
+    CloudLayout, CloudLimits, LayoutNote, NO_TIME_NS, PointField, RangeLimits, TimeOptions,
+    TimeReference, TimeUnit, transform_points,
 };
 use nalgebra::{Isometry3, Point3, Vector3};
 use proptest::prelude::*;
@@ -82,7 +82,7 @@ proptest! {
             });
             prop_assert_eq!(view.xyz(i), expected);
         }
-        let times = view.point_times(50, &TimeOptions::default()).unwrap().unwrap();
+        let times = view.point_times(50, &TimeOptions::default()).unwrap().times_ns.unwrap();
         let expected: Vec<i64> = (0..points as i64).map(|i| 50 + 1_000 * i).collect();
         prop_assert_eq!(times, expected);
     }
@@ -97,7 +97,7 @@ proptest! {
         is_bigendian in any::<bool>(),
         fields in prop::collection::vec(
             (prop::sample::select(vec!["x", "y", "z", "t", "time", "timestamp", ""]),
-             prop_oneof![0..40_u32, any::<u32>()], 0..10_u8, prop_oneof![0..3_u32, any::<u32>()]), 0..7),
+             prop_oneof![0..40_u32, any::<u32>()], 0..13_u8, prop_oneof![0..3_u32, any::<u32>()]), 0..7),
         data in prop::collection::vec(prop_oneof![4 => Just(0), 1 => any::<u8>()], 0..=850),
         stamp_ns in any::<i64>(),
         unit in prop::option::of(prop::sample::select(vec![TimeUnit::Seconds, TimeUnit::Nanoseconds])),
@@ -118,7 +118,7 @@ proptest! {
                 layout.fields.retain(|f| f.name.starts_with('t'));
                 for f in &mut layout.fields {
                     f.offset %= layout.point_step - 7;
-                    f.datatype = 1 + f.datatype % 8;
+                    f.datatype = 1 + f.datatype % 11;
                     f.count = 1;
                 }
                 layout.fields.sort_by(|a, b| a.name.cmp(&b.name));
@@ -126,14 +126,23 @@ proptest! {
                 layout.fields.extend([field("x", 0, 7), field("y", 4, 7), field("z", 8, 7)]);
                 prop_assert!(layout.view(&data, &LIMITS).is_ok() || data.len() < 800);
             }
-            let Ok(view) = layout.view(&data, &LIMITS) else { continue };
+            // What is mended is honest about its extent, and nothing is left to mend.
+            let mut mended = layout.clone();
+            mended.mend(data.len());
+            let again = mended.clone().mend(data.len());
+            let is_of_no_point = |note: &LayoutNote| matches!(note, LayoutNote::DataWithoutPoints { .. });
+            prop_assert!(again.iter().all(is_of_no_point));
+            if layout.view(&data, &LIMITS).is_ok() {
+                prop_assert!(mended.view(&data, &LIMITS).is_ok());
+            }
+            let Ok(view) = mended.view(&data, &LIMITS) else { continue };
             prop_assert!(view.len() <= LIMITS.max_points);
             for i in [0, view.len() / 2, view.len(), usize::MAX] {
                 let p = view.xyz(i);
                 prop_assert!(i < view.len() || p.x.is_nan());
             }
             let options = TimeOptions { unit, reference, ..TimeOptions::default() };
-            let times = view.point_times(stamp_ns, &options).ok().flatten();
+            let times = view.point_times(stamp_ns, &options).ok().and_then(|times| times.times_ns);
             if let Some(times) = &times {
                 prop_assert_eq!(times.len(), view.len());
                 let known = || times.iter().filter(|t| **t != NO_TIME_NS);
@@ -172,7 +181,7 @@ proptest! {
         };
         let view = layout.view(&data, &LIMITS).unwrap();
         let stamp_ns = 1_700_000_000_000_000_000;
-        let times = view.point_times(stamp_ns, &TimeOptions::default()).unwrap().unwrap();
+        let times = view.point_times(stamp_ns, &TimeOptions::default()).unwrap().times_ns.unwrap();
         let pose = |at: i64| {
             let t = (at - stamp_ns) as f64 * 1.0e-9;
             Isometry3::new(Vector3::new(9.0 * t, 1.0, 5.0), Vector3::new(0.1, 0.0, 20.0 * t))

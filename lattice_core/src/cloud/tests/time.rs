@@ -16,7 +16,8 @@ fn read(
     let points = vec![[1.0, 2.0, 3.0]; times.len()];
     let (layout, data) = timed(name, datatype, &points, times);
     let view = layout.view(&data, &CloudLimits::default()).unwrap();
-    view.point_times(stamp_ns, options)
+    let found = view.point_times(stamp_ns, options);
+    found.map(|times| times.times_ns)
 }
 
 fn f32s(values: &[f32]) -> Vec<Vec<u8>> {
@@ -73,6 +74,17 @@ fn sensors_are_known_by_name_type_and_size() {
     let nanoseconds = [1.7e18, 1.7e18 + 102_400.0];
     check("timestamp", F64, &f64s(&nanoseconds), absolute(102_400));
     check("time_stamp", F64, &f64s(&[-0.0625]), after(&[-62_500_000]));
+    let whole = [1_700_000_000_000_000_000_u64, 1_700_000_000_000_102_400];
+    let whole = whole.map(|v| v.to_le_bytes().to_vec());
+    check("timestamp", 10, &whole, absolute(102_400));
+    check("timestamp", 9, &whole, absolute(102_400));
+    let negative = [-99_i32, 0].map(|v| v.to_le_bytes().to_vec());
+    check("t", 5, &negative, after(&[-99, 0]));
+    // The name states the unit.
+    check("time_offset_ns", 5, &negative, after(&[-99, 0]));
+    check("t_us", F32, &f32s(&[0.0, 100.0]), after(&[0, 100_000]));
+    check("timestamp_ms", U32, &u32s(&[7]), after(&[7_000_000]));
+    check("ts", F32, &f32s(&[0.5]), after(&[500_000_000]));
     check("intensity", F32, &f32s(&[0.0]), Ok(None));
     // Of a type that is no time.
     check("t", 3, &[vec![0, 0]], Ok(None));
@@ -159,6 +171,7 @@ fn points_that_are_no_returns_have_no_say() {
     let (layout, data) = timed("timestamp", F64, &x.map(|x| [x, 0.0, 0.0]), &times);
     let view = layout.view(&data, &CloudLimits::default()).unwrap();
     let found = view.point_times(STAMP_NS, &TimeOptions::default());
+    let found = found.map(|times| times.times_ns);
     let (first, last) = (1_700_000_000_000_000_000, 1_700_000_000_250_000_000);
     assert_eq!(
         found,
@@ -180,4 +193,82 @@ fn extreme_values_do_not_overflow() {
             }
         }
     }
+}
+
+#[test]
+fn a_cloud_without_times_says_why() {
+    let source = |name: &str, datatype, times: &[Vec<u8>]| {
+        let (layout, data) = timed(name, datatype, &[[1.0, 2.0, 3.0]; 2], times);
+        let view = layout.view(&data, &CloudLimits::default()).unwrap();
+        let found = view.point_times(STAMP_NS, &TimeOptions::default());
+        format!("{:?}", found.unwrap().source)
+    };
+    let none = source("curvature", F32, &f32s(&[0.0, 50.0]));
+    assert_eq!(none, "NoField { candidates: \"curvature\" }");
+    let none = source("ring", 4, &[vec![1, 0], vec![2, 0]]);
+    assert_eq!(none, "NoField { candidates: \"\" }");
+    let none = source("time", F32, &f32s(&[f32::NAN; 2]));
+    assert!(none.starts_with("NotFinite"), "{none}");
+    let found = source("t", U32, &u32s(&[5, 25]));
+    assert!(found.contains("StampStart, span_ns: 20"), "{found}");
+}
+
+#[test]
+fn a_few_absurd_times_cost_their_points_only() {
+    let absurd = [0.0, 1e300, -1e300, STAMP_S + 1e6, STAMP_S - 5.0];
+    let mut seconds: Vec<f64> = (0..20)
+        .map(|i| STAMP_S + f64::from(i) * 0.0625 / 20.0)
+        .collect();
+    let first = (STAMP_S * 1e9) as i64;
+    for value in absurd {
+        let good = seconds.len();
+        seconds.push(value);
+        let found = read(
+            "timestamp",
+            F64,
+            &f64s(&seconds),
+            first,
+            &TimeOptions::default(),
+        );
+        let found = found.unwrap().unwrap();
+        assert_eq!(found[0], first);
+        let none = found.iter().filter(|t| **t == NO_TIME_NS).count();
+        assert_eq!(
+            (none, found[good]),
+            (seconds.len() - 20, NO_TIME_NS),
+            "{value}"
+        );
+    }
+    // Of as many absurd as sound ones, neither are believed.
+    let doubtful: Vec<f64> = (0..20).map(|i| STAMP_S + f64::from(i % 2) * 1e6).collect();
+    assert!(
+        read(
+            "timestamp",
+            F64,
+            &f64s(&doubtful),
+            first,
+            &TimeOptions::default()
+        )
+        .is_err()
+    );
+    // A long sweep is no matter of a few.
+    let long: Vec<f32> = (0..20).map(|i| i as f32 * 0.075).collect();
+    assert!(read("time", F32, &f32s(&long), first, &TimeOptions::default()).is_err());
+}
+
+#[test]
+fn an_error_proposes_the_unit_that_fits() {
+    let error = read(
+        "time",
+        F32,
+        &f32s(&[0.0, 99_900.0]),
+        0,
+        &TimeOptions::default(),
+    );
+    let error = error.unwrap_err().to_string();
+    assert!(error.contains("span 99900 s"), "{error}");
+    assert!(
+        error.contains("read as us they span 0.099900 s: set `time.unit: us`"),
+        "{error}"
+    );
 }

@@ -35,6 +35,7 @@ fn each_point_has_the_pose_of_its_time() {
     let times = view
         .point_times(stamp_ns, &TimeOptions::default())
         .unwrap()
+        .times_ns
         .unwrap();
     let asked = AtomicUsize::new(0);
     let found = transform_points(

@@ -107,12 +107,16 @@ impl Frames {
         Path::find(target, source, |id| self.parents(id))
     }
 
-    pub fn tracks_mut(&mut self) -> impl Iterator<Item = &mut Track> {
-        let claims = self.frames.iter_mut().flat_map(|frame| &mut frame.claims);
-        claims.filter_map(|claim| match &mut claim.link {
+    /// The moving transforms of a child in one of its parents.
+    pub fn track_mut(&mut self, parent: &str, child: &str) -> Option<&mut Track> {
+        let (parent, child) = (self.find(parent)?, self.find(child)?);
+        let claims = self.frames.get_mut(child)?.claims.iter_mut();
+        let of_parent = claims.filter(|claim| claim.parent == parent);
+        let mut tracks = of_parent.filter_map(|claim| match &mut claim.link {
             Link::Static(_) => None,
             Link::Moving(track) => Some(track),
-        })
+        });
+        tracks.next()
     }
 
     /// The link from a child to a parent, new if need be; it takes the place of one the other way.

@@ -8,7 +8,7 @@ use nalgebra::Isometry3;
 use self::frames::{Frames, Link};
 use super::frame_name::{bare, check_names, shown};
 use super::interpolate::is_rigid;
-use super::track::{Track, duration_ns};
+use super::track::duration_ns;
 use super::{PoseMiss, PushOutcome, TfInsertError, TfMiss};
 
 /// Bounds of a [`TransformBuffer`].
@@ -195,9 +195,11 @@ impl TransformBuffer {
         self.len() == 0
     }
 
-    /// Forgets the history of all moving frames; the frames and static transforms stay.
-    pub fn clear_moving(&mut self) {
-        self.frames.tracks_mut().for_each(Track::clear);
+    /// Forgets the history of a moving frame in one of its parents; frames and static transforms stay.
+    pub fn clear_link(&mut self, parent: &str, child: &str) {
+        if let Some(track) = self.frames.track_mut(bare(parent), bare(child)) {
+            track.clear();
+        }
     }
 
     /// Checks names, links, bounds and samples; for tests.

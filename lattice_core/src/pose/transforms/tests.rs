@@ -102,7 +102,7 @@ fn each_miss_has_its_reason() {
         tf.lookup("map", "base_link", 2_000 * MS),
         Err(TfMiss::Gap { gap_ns, .. }) if gap_ns == 2_000 * MS
     ));
-    tf.clear_moving();
+    tf.clear_link("map", "base_link");
     assert!(
         tf.lookup("map", "base_link", 0)
             .unwrap_err()
