@@ -4,7 +4,7 @@ use std::collections::BTreeMap;
 
 use serde::{Deserialize, Serialize};
 
-use super::{Refusal, most_frequent};
+use super::{CloudNote, Refusal, most_frequent};
 
 /// Counters of one transformer. Every cloud ends in exactly one of the `clouds_` counters
 /// other than `clouds_in`, or still waits.
@@ -47,12 +47,18 @@ pub struct TransformerCounts {
     /// Poses refused: the transform of their frame, or of the frame that they are in, is not published.
     #[serde(default)]
     pub poses_no_transform: u64,
-    /// Poses refused: not newer than the pose before.
+    /// Poses refused: of a stamp that came before, or older than the newest where no pose is missing.
     pub poses_out_of_order: u64,
     /// Poses refused: of another time than those before, unless several in a row agree on it.
     #[serde(default)]
     pub poses_stamp_jump: u64,
-    /// Times that the stamps of the poses jumped back (a log that loops).
+    /// Poses refused: the machine cannot have been there, by `ins.max_speed_m_per_s`.
+    #[serde(default)]
+    pub poses_too_fast: u64,
+    /// Times that the poses jumped to another place and stayed there.
+    #[serde(default)]
+    pub place_jumps: u64,
+    /// Times that the stamps of the poses were set back (a log that loops).
     pub time_jumps: u64,
     /// Transforms of `/tf` and `/tf_static` refused.
     pub transforms_refused: u64,
@@ -74,6 +80,9 @@ pub struct TransformerReport {
     /// Messages refused, by topic and reason, with value and remedy.
     #[serde(default)]
     pub refusals: Vec<Refusal>,
+    /// What of the clouds of a topic was taken otherwise than declared, and what for time.
+    #[serde(default)]
+    pub notes: Vec<CloudNote>,
 }
 
 impl TransformerCounts {
@@ -84,6 +93,19 @@ impl TransformerCounts {
             + self.poses_no_transform
             + self.poses_out_of_order
             + self.poses_stamp_jump
+            + self.poses_too_fast
+    }
+
+    /// Counts a pose by the reason of its refusal, or a jump of its place.
+    pub(super) fn add_pose(&mut self, reason: &str) {
+        match reason {
+            "poses_not_good" => self.poses_not_good += 1,
+            "poses_out_of_order" => self.poses_out_of_order += 1,
+            "poses_stamp_jump" => self.poses_stamp_jump += 1,
+            "poses_too_fast" => self.poses_too_fast += 1,
+            "place_jumps" => self.place_jumps += 1,
+            _ => self.poses_invalid += 1,
+        }
     }
 }
 

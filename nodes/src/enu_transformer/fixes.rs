@@ -2,11 +2,13 @@
 
 use std::collections::VecDeque;
 
-use lattice_core::geodesy::{EnuFrame, Geodetic};
-use lattice_core::pose::{PoseBuffer, PoseBufferOptions, PoseMiss, PushOutcome, StampedPose};
+use lattice_core::geodesy::{EnuFrame, Geodetic, ecef_from_geodetic};
+use lattice_core::pose::{PoseBuffer, PoseBufferOptions, PoseMiss, StampedPose};
 use nalgebra::{Isometry3, Translation3, UnitQuaternion, Vector3};
 
-use super::ins::{Body, BodyPose};
+use super::ins::{Body, BodyPose, InsOptions, InsRefusal};
+use super::speed_gate::{Placed, SpeedGate, TooFast};
+use super::stamp_order::{Refused, StampOrder};
 
 /// Most fixes that wait for the attitude at their stamp.
 const MAX_WAITING_FIXES: usize = 64;
@@ -16,6 +18,7 @@ const MAX_ATTITUDES: usize = 4096;
 const MARGIN_S: f64 = 2.0;
 
 /// A position of the antenna.
+#[derive(Clone, Debug)]
 pub(super) struct Fix {
     pub stamp_ns: i64,
     pub place: Geodetic,
@@ -23,6 +26,7 @@ pub(super) struct Fix {
 }
 
 /// An attitude against the local level (east, north, up).
+#[derive(Clone, Debug)]
 pub(super) struct Attitude {
     pub stamp_ns: i64,
     pub level_from_imu: UnitQuaternion<f64>,
@@ -33,47 +37,102 @@ pub(super) struct Attitude {
 /// position on the straight line between them.
 pub(super) struct FixPairing {
     attitudes: PoseBuffer,
+    attitude_order: StampOrder<Attitude>,
+    fix_order: StampOrder<Fix>,
+    speed: SpeedGate<Fix>,
     imu: Body,
     fixes: VecDeque<Fix>,
     /// Stamp and position in the map of the last fix that was paired.
     last: Option<(i64, Vector3<f64>)>,
+    max_imu_gap_ns: i64,
     max_fix_gap_ns: i64,
+    /// Fixes and attitudes refused since they were last asked for.
+    refused: Vec<InsRefusal>,
 }
 
 impl FixPairing {
-    pub fn new(max_imu_gap_s: f64, max_fix_gap_s: f64) -> Self {
+    pub fn new(options: &InsOptions) -> Self {
+        let (max_imu_gap_s, max_fix_gap_s) = (options.max_imu_gap_s, options.max_fix_gap_s);
+        let span_s = max_fix_gap_s + MARGIN_S;
+        let ahead_ns = options.ahead_ns;
         Self {
             attitudes: PoseBuffer::new(PoseBufferOptions {
-                span_s: max_fix_gap_s + MARGIN_S,
+                span_s,
                 max_gap_s: max_imu_gap_s,
                 max_poses: MAX_ATTITUDES,
-                jump_back_s: 1.0,
+                ..PoseBufferOptions::default()
             }),
+            attitude_order: StampOrder::new(ahead_ns),
+            fix_order: StampOrder::new(ahead_ns),
+            speed: SpeedGate::new(options.max_speed_m_per_s, options.settle_ns),
             imu: Body::ins(""),
             fixes: VecDeque::new(),
             last: None,
-            max_fix_gap_ns: (max_fix_gap_s * 1e9) as i64,
+            max_imu_gap_ns: ns(max_imu_gap_s),
+            max_fix_gap_ns: ns(max_fix_gap_s),
+            refused: Vec::new(),
         }
     }
 
     pub fn push_fix(&mut self, fix: Fix) {
-        if self.fixes.len() >= MAX_WAITING_FIXES {
-            self.fixes.pop_front();
+        let decision = self.fix_order.push(fix.stamp_ns, fix);
+        self.refuse(&decision.refused);
+        if decision.is_clock_set {
+            self.fixes.clear();
+            self.last = None;
+            self.speed.clear();
         }
-        self.fixes.push_back(fix);
+        for (stamp_ns, fix) in decision.taken {
+            let passed = self.speed.push(Placed {
+                stamp_ns,
+                position_m: ecef_from_geodetic(&fix.place),
+                item: fix,
+            });
+            let max_speed_m_per_s = self.speed.max_speed_m_per_s();
+            let too_fast = |step: &TooFast| InsRefusal::too_fast(step, max_speed_m_per_s);
+            self.refused.extend(passed.refused.iter().map(too_fast));
+            if let Some(step) = passed.jump {
+                self.last = None;
+                self.refused.push(InsRefusal::jump(&step));
+            }
+            for placed in passed.taken {
+                if self.fixes.len() >= MAX_WAITING_FIXES {
+                    self.fixes.pop_front();
+                }
+                self.fixes.push_back(placed.item);
+            }
+        }
     }
 
     pub fn push_attitude(&mut self, attitude: Attitude) {
-        let stamp_ns = attitude.stamp_ns;
-        self.imu = attitude.imu;
-        let outcome = self.attitudes.push(StampedPose {
-            stamp_ns,
-            map_from_base: Isometry3::from_parts(Translation3::identity(), attitude.level_from_imu),
-        });
-        if outcome == PushOutcome::JumpedBack {
-            self.fixes.retain(|fix| fix.stamp_ns <= stamp_ns);
+        let decision = self.attitude_order.push(attitude.stamp_ns, attitude);
+        self.refuse(&decision.refused);
+        if decision.is_clock_set {
+            self.attitudes.clear();
             self.last = None;
+            if let Some((newest_ns, _)) = decision.taken.last() {
+                let latest_ns = newest_ns.saturating_add(self.max_imu_gap_ns);
+                self.fixes.retain(|fix| fix.stamp_ns <= latest_ns);
+            }
         }
+        for (stamp_ns, attitude) in decision.taken {
+            self.imu = attitude.imu;
+            let rotation = attitude.level_from_imu;
+            self.attitudes.insert(StampedPose {
+                stamp_ns,
+                map_from_base: Isometry3::from_parts(Translation3::identity(), rotation),
+            });
+        }
+    }
+
+    /// Fixes and attitudes refused since the last call.
+    pub fn take_refused(&mut self) -> Vec<InsRefusal> {
+        std::mem::take(&mut self.refused)
+    }
+
+    fn refuse(&mut self, refused: &[Refused]) {
+        self.refused
+            .extend(refused.iter().map(|stamp| InsRefusal::Stamp(*stamp)));
     }
 
     /// Poses of the fixes whose attitude is known by now, and of the attitudes before them, in order.
@@ -81,6 +140,10 @@ impl FixPairing {
     /// The first fix makes the map frame where there is none.
     pub fn poses(&mut self, frame: &mut Option<EnuFrame>) -> Vec<BodyPose> {
         let mut poses = Vec::new();
+        // A fix of one clock has no attitude of another.
+        if self.fix_order.is_open() || self.attitude_order.is_open() {
+            return poses;
+        }
         while let Some(fix) = self.fixes.front() {
             match self.attitudes.at(fix.stamp_ns) {
                 Ok(attitude) => {
@@ -118,4 +181,8 @@ impl FixPairing {
         }
         poses
     }
+}
+
+fn ns(seconds: f64) -> i64 {
+    (seconds * 1e9) as i64
 }

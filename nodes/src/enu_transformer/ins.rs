@@ -12,9 +12,9 @@ use lattice_msgs::novatel_oem7_msgs::{INSPVA, INSPVAX, InertialSolutionStatus, O
 use lattice_msgs::sensor_msgs::{Imu, NavSatFix, NavSatStatus};
 use lattice_msgs::std_msgs::Header;
 use nalgebra::{Isometry3, Translation3, UnitQuaternion, Vector3};
-use thiserror::Error;
 
 use super::fixes::{Attitude, Fix, FixPairing};
+pub use super::ins_refusal::InsRefusal;
 use crate::convert::geometry;
 
 /// Messages that carry the pose of the machine.
@@ -122,6 +122,12 @@ pub struct InsOptions {
     /// Longest gap between two fixes over which positions are interpolated at the stamps of the
     /// attitudes, in s.
     pub max_fix_gap_s: f64,
+    /// Speed beyond which positions are refused, in m/s.
+    pub max_speed_m_per_s: f64,
+    /// Time for which positions are to agree on a place that could not be reached, in nanoseconds.
+    pub settle_ns: i64,
+    /// Step ahead of stamps beyond which three have to agree, in nanoseconds.
+    pub ahead_ns: i64,
 }
 
 /// One message of an INS.
@@ -173,41 +179,6 @@ pub struct BodyPose {
     pub attitude_of: Body,
 }
 
-/// Reason for which a message gave no pose.
-#[derive(Clone, Debug, PartialEq, Error)]
-#[expect(missing_docs, reason = "the messages name the fields")]
-pub enum InsRefusal {
-    /// The INS has no solution yet.
-    #[error(
-        "INS status is {status}, expected 3 (INS_SOLUTION_GOOD), 6 (INS_SOLUTION_FREE) or 7 (INS_ALIGNMENT_COMPLETE)"
-    )]
-    NoSolution { status: u32 },
-    /// The receiver has no position.
-    #[error("fix status is {status} (no fix), expected 0 or more")]
-    NoFix { status: i8 },
-    /// The Imu has no attitude.
-    #[error(
-        "orientation covariance is -1: the Imu has no orientation (REP 145); run an attitude filter such as imu_filter_madgwick, or choose another source of poses (`ins.source`)"
-    )]
-    NoOrientation,
-    /// Latitude, longitude or height.
-    #[error("{problem}")]
-    Place { problem: String },
-    /// Numbers of a pose.
-    #[error("position is not finite, or the quaternion is zero or not finite")]
-    Pose,
-}
-
-impl InsRefusal {
-    /// True if the INS itself says that its solution is not good; else numbers have no meaning.
-    pub fn is_by_status(&self) -> bool {
-        matches!(
-            self,
-            Self::NoSolution { .. } | Self::NoFix { .. } | Self::NoOrientation
-        )
-    }
-}
-
 /// Turns messages of an INS into poses of its frames.
 pub struct InsDecoder {
     options: InsOptions,
@@ -220,9 +191,14 @@ impl InsDecoder {
     pub fn new(options: InsOptions) -> Self {
         Self {
             frame: options.origin.map(EnuFrame::new),
-            pairing: FixPairing::new(options.max_imu_gap_s, options.max_fix_gap_s),
+            pairing: FixPairing::new(&options),
             options,
         }
+    }
+
+    /// Messages refused since the last call that were taken for a while.
+    pub(super) fn take_refused(&mut self) -> Vec<InsRefusal> {
+        self.pairing.take_refused()
     }
 
     /// The map frame on the earth, once known.
@@ -235,7 +211,7 @@ impl InsDecoder {
     pub fn decode(&mut self, message: InsMessage) -> Result<Vec<BodyPose>, InsRefusal> {
         match message {
             InsMessage::Inspva(m) => {
-                let place = geodetic(m.latitude, m.longitude, m.height)?;
+                let place = self.geodetic(m.latitude, m.longitude, m.height)?;
                 let attitude = enu_from_flu(m.roll, m.pitch, m.azimuth);
                 self.novatel_pose(&m.header, &m.nov_header, &m.status, &place, &attitude)
             }
@@ -244,7 +220,7 @@ impl InsDecoder {
                     HeightDatum::Ellipsoid => 0.0,
                     HeightDatum::Geoid => f64::from(m.undulation),
                 };
-                let place = geodetic(m.latitude, m.longitude, m.height + undulation_m)?;
+                let place = self.geodetic(m.latitude, m.longitude, m.height + undulation_m)?;
                 let attitude = enu_from_flu(m.roll, m.pitch, m.azimuth);
                 self.novatel_pose(&m.header, &m.nov_header, &m.ins_status, &place, &attitude)
             }
@@ -288,6 +264,30 @@ impl InsDecoder {
         }])
     }
 
+    fn geodetic(
+        &self,
+        latitude: f64,
+        longitude: f64,
+        height_m: f64,
+    ) -> Result<Geodetic, InsRefusal> {
+        let is_origin_near = |origin: &Geodetic| {
+            origin.latitude_deg().abs() < 1.0 && origin.longitude_deg().abs() < 1.0
+        };
+        if latitude == 0.0
+            && longitude == 0.0
+            && !self.options.origin.as_ref().is_some_and(is_origin_near)
+        {
+            return Err(InsRefusal::NullIsland);
+        }
+        if height_m.is_nan() && latitude.is_finite() && longitude.is_finite() {
+            return Err(InsRefusal::NoHeight);
+        }
+        let place = Geodetic::from_degrees(latitude, longitude, height_m);
+        place.map_err(|error| InsRefusal::Place {
+            problem: error.to_string(),
+        })
+    }
+
     fn novatel_stamp_ns(&self, header: &Header, oem7: &Oem7Header) -> i64 {
         match self.options.stamp {
             InsStamp::Header => header.stamp.to_ns(),
@@ -304,7 +304,7 @@ impl InsDecoder {
         if status < NavSatStatus::STATUS_FIX {
             return Err(InsRefusal::NoFix { status });
         }
-        let place = geodetic(fix.latitude, fix.longitude, fix.altitude)?;
+        let place = self.geodetic(fix.latitude, fix.longitude, fix.altitude)?;
         self.pairing.push_fix(Fix {
             stamp_ns: fix.header.stamp.to_ns(),
             place,
@@ -338,13 +338,6 @@ fn one(header: &Header, pose: &Pose, body: Body) -> Result<Vec<BodyPose>, InsRef
         position_of: body.clone(),
         attitude_of: body,
     }])
-}
-
-fn geodetic(latitude: f64, longitude: f64, height_m: f64) -> Result<Geodetic, InsRefusal> {
-    let place = Geodetic::from_degrees(latitude, longitude, height_m);
-    place.map_err(|error| InsRefusal::Place {
-        problem: error.to_string(),
-    })
 }
 
 fn good(status: &InertialSolutionStatus) -> Result<(), InsRefusal> {

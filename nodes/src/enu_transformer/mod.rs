@@ -2,30 +2,39 @@
 //!
 //! [`EnuTransformer`] is a state machine without I/O; [`node`] runs it behind DDS.
 
+mod cloud_clocks;
+mod cloud_notes;
 mod counts;
 mod drops;
 mod fixes;
 pub mod ins;
+mod ins_refusal;
+mod link_orders;
 pub mod node;
 mod options;
 mod parameters;
 mod pose_frames;
+mod pose_intake;
 mod refusals;
+mod speed_gate;
+mod stamp_order;
 mod transforms;
+mod verdict;
 mod waiting;
 
+pub use cloud_notes::CloudNote;
 pub use counts::{TransformerCounts, TransformerReport};
 pub use options::TransformerOptions;
 pub use parameters::declare;
 pub use refusals::{Refusal, Refusals, most_frequent};
+pub(crate) use stamp_order::StampOrder;
 
 use std::collections::VecDeque;
 use std::sync::Arc;
 
 use lattice_core::cloud::{CloudLimits, RangeLimits, transform_points};
 use lattice_core::pose::{
-    PoseBuffer, PoseBufferOptions, PoseMiss, StampedPose, TfMiss, TransformBuffer,
-    TransformBufferOptions,
+    PoseBuffer, PoseBufferOptions, PoseMiss, StampedPose, TransformBuffer, TransformBufferOptions,
 };
 use lattice_msgs::builtin_interfaces::Time;
 use lattice_msgs::geographic_msgs::GeoPointStamped;
@@ -33,17 +42,23 @@ use lattice_msgs::geometry_msgs::TransformStamped;
 use lattice_msgs::sensor_msgs::PointCloud2;
 use nalgebra::{Isometry3, Vector3};
 
+use self::cloud_clocks::CloudClocks;
+use self::cloud_notes::CloudNotes;
 use self::drops::Drop;
 use self::ins::{InsDecoder, InsMessage, InsSource};
+use self::link_orders::LinkOrders;
 use self::pose_frames::{Reference, WaitingPose};
+use self::speed_gate::SpeedGate;
+use self::verdict::Verdict;
 use self::waiting::{Waiting, WaitingCloud};
-use crate::convert::{cloud, viewpoint};
-use crate::stamps::StampGate;
+use crate::convert::cloud::{self, Precision};
+use crate::convert::viewpoint;
 
 /// A step back of the receiving clock by more than this is a log that loops.
 const CLOCK_JUMP_NS: i64 = 1_000_000_000;
-/// Poses in a row that agree on another time before it is believed.
-const AGREEING_POSES: u32 = 3;
+/// Part of the wait of a cloud after which another place of the machine is believed, so that clouds there
+/// are still waiting.
+const SETTLE_PART: f64 = 0.5;
 
 /// Output of the transformer.
 #[derive(Clone, Debug)]
@@ -58,13 +73,6 @@ pub enum EnuOutput {
     Origin(GeoPointStamped),
 }
 
-/// Treatment of a cloud at this time.
-enum Verdict {
-    Transform,
-    Wait,
-    Drop(Drop),
-}
-
 /// Moves clouds of any number of sensors into the map frame, each point at its own time.
 ///
 /// Clouds wait in a bounded queue until poses and mounts cover all of their points; nothing is
@@ -74,9 +82,18 @@ pub struct EnuTransformer {
     options: TransformerOptions,
     ins: InsDecoder,
     poses: PoseBuffer,
-    stamps: StampGate,
+    /// Order and speed of the poses of the machine in the map.
+    order: StampOrder<StampedPose>,
+    speed: SpeedGate<StampedPose>,
+    /// Delay of late poses that is known beforehand.
+    expected_delay_ns: i64,
+    /// Topic of the last pose.
+    pose_topic: Arc<str>,
     mounts: TransformBuffer,
+    links: LinkOrders,
     waiting: Waiting,
+    clocks: CloudClocks,
+    notes: CloudNotes,
     waiting_poses: VecDeque<WaitingPose>,
     reference: Reference,
     /// Frame that poses are in, where it is not the map frame.
@@ -107,11 +124,20 @@ impl EnuTransformer {
             mounts.keep(&options.map_frame);
         }
         options.odom_frame.iter().for_each(|odom| mounts.keep(odom));
-        let span_ns = (options.pose_span_s * 1e9) as i64;
+        let ahead_ns = ((options.pose_span_s * 1e9) as i64).max(CLOCK_JUMP_NS);
+        let settle_ns = (options.max_wait_s * SETTLE_PART * 1e9) as i64;
+        let mut ins = options.ins.clone();
+        (ins.ahead_ns, ins.settle_ns) = (ahead_ns, settle_ns);
         Self {
-            ins: InsDecoder::new(options.ins.clone()),
+            order: StampOrder::new(ahead_ns),
+            speed: SpeedGate::new(ins.max_speed_m_per_s, settle_ns),
+            pose_topic: "".into(),
+            expected_delay_ns: 0,
+            links: LinkOrders::default(),
+            clocks: CloudClocks::default(),
+            notes: CloudNotes::default(),
+            ins: InsDecoder::new(ins),
             poses,
-            stamps: StampGate::new(CLOCK_JUMP_NS, span_ns.max(CLOCK_JUMP_NS), AGREEING_POSES),
             mounts,
             waiting: Waiting::new(options.max_waiting_clouds, options.max_waiting_bytes),
             waiting_poses: VecDeque::new(),
@@ -144,14 +170,10 @@ impl EnuTransformer {
                     self.on_body_pose(topic, pose, now_ns, &mut out);
                 }
             }
-            Err(refusal) => {
-                let (counter, reason) = match refusal.is_by_status() {
-                    true => (&mut self.counts.poses_not_good, "poses_not_good"),
-                    false => (&mut self.counts.poses_invalid, "poses_invalid"),
-                };
-                *counter += 1;
-                self.refusals.add(topic, reason, || refusal.to_string());
-            }
+            Err(refusal) => self.refuse_message(topic, &refusal),
+        }
+        for refusal in self.ins.take_refused() {
+            self.refuse_message(topic, &refusal);
         }
         self.announce_origin(&mut out);
         self.serve(now_ns, &mut out);
@@ -168,9 +190,15 @@ impl EnuTransformer {
         let mut out = Vec::new();
         self.advance(now_ns);
         self.counts.clouds_in += 1;
-        match WaitingCloud::new(topic, message, now_ns, &self.options) {
-            Ok(cloud) => {
+        match WaitingCloud::new(topic, message, now_ns, &self.options, &mut self.notes) {
+            Ok(mut cloud) => {
                 self.mounts.keep(&cloud.frame);
+                let newest_ns = self.poses.newest_ns();
+                let Some(clock) = self.clocks.on_cloud(topic, cloud.stamp_ns, newest_ns) else {
+                    self.drop_cloud(topic, &Drop::TimeJump);
+                    return out;
+                };
+                cloud.clock = clock;
                 let gone = self.waiting.push(cloud);
                 for cloud in gone {
                     self.drop_cloud(&cloud.topic, &Drop::QueueFull);
@@ -196,16 +224,34 @@ impl EnuTransformer {
         out
     }
 
-    /// Ends the input: what still waits is counted as having come too early.
-    pub fn finish(&mut self) {
+    /// Ends the input: clouds that are covered come out, the others are counted as having come too early.
+    pub fn finish(&mut self) -> Vec<EnuOutput> {
+        let mut out = Vec::new();
         self.refuse_waiting_poses();
+        self.finish_poses();
         while let Some(cloud) = self.waiting.take(0) {
-            let reason = match self.verdict(&cloud, i64::MAX) {
-                Verdict::Drop(reason) => reason,
-                Verdict::Transform | Verdict::Wait => Drop::PoseLate(None),
-            };
-            self.drop_cloud(&cloud.topic, &reason);
+            match self.coverage(&cloud) {
+                Ok(()) => self.place(&cloud, &mut out),
+                Err(uncovered) => {
+                    let reason = match uncovered.reason {
+                        Drop::PoseLate(Some(PoseMiss::AfterEnd { .. })) => Drop::PoseLate(None),
+                        reason => reason,
+                    };
+                    self.drop_cloud(&cloud.topic, &reason);
+                }
+            }
         }
+        out
+    }
+
+    /// What of clouds was read otherwise than declared, and what was taken for the time of their points.
+    pub fn notes(&self) -> &[CloudNote] {
+        self.notes.all()
+    }
+
+    /// Expects poses to come late by as much, in nanoseconds, before the first one does.
+    pub fn expect_delay(&mut self, delay_ns: i64) {
+        self.expected_delay_ns = delay_ns;
     }
 
     /// Messages refused, by topic and reason.
@@ -244,24 +290,6 @@ impl EnuTransformer {
         }
     }
 
-    /// The poses begin anew at `stamp_ns`: clouds that belong to the time before go.
-    fn on_time_jump(&mut self, stamp_ns: i64) {
-        self.counts.time_jumps += 1;
-        self.mounts.clear_moving();
-        self.odom_ns = None;
-        let after = (stamp_ns as f64 + self.options.max_wait_s * 1e9) as i64;
-        let mut i = 0;
-        while let Some(cloud) = self.waiting.get(i) {
-            if cloud.last_ns > after {
-                if let Some(cloud) = self.waiting.take(i) {
-                    self.drop_cloud(&cloud.topic, &Drop::TimeJump);
-                }
-            } else {
-                i += 1;
-            }
-        }
-    }
-
     /// Transforms what can be transformed by now, in the order of arrival.
     fn serve(&mut self, now_ns: i64, out: &mut Vec<EnuOutput>) {
         self.settle_poses(now_ns, out);
@@ -276,47 +304,22 @@ impl EnuTransformer {
                 }
                 Verdict::Transform => {
                     if let Some(cloud) = self.waiting.take(i) {
-                        match self.transform(&cloud) {
-                            Ok(points) => {
-                                self.counts.clouds_out += 1;
-                                out.push(EnuOutput::Points(Arc::new(points)));
-                            }
-                            Err(reason) => self.drop_cloud(&cloud.topic, &reason),
-                        }
+                        self.place(&cloud, out);
                     }
                 }
             }
         }
     }
 
-    fn verdict(&self, cloud: &WaitingCloud, now_ns: i64) -> Verdict {
-        let wait = |reason| {
-            let waited_s = now_ns.saturating_sub(cloud.arrived_ns) as f64 * 1e-9;
-            match waited_s > self.options.longest_wait_s() {
-                true => Verdict::Drop(reason),
-                false => Verdict::Wait,
+    /// Transforms a cloud that is covered.
+    fn place(&mut self, cloud: &WaitingCloud, out: &mut Vec<EnuOutput>) {
+        match self.transform(cloud) {
+            Ok(points) => {
+                self.counts.clouds_out += 1;
+                out.push(EnuOutput::Points(Arc::new(points)));
             }
-        };
-        for stamp_ns in [cloud.first_ns, cloud.last_ns] {
-            match self.map_from_base(stamp_ns) {
-                Ok(_) => {}
-                Err(miss @ (PoseMiss::Empty | PoseMiss::AfterEnd { .. })) => {
-                    return wait(Drop::PoseLate(Some(miss)));
-                }
-                Err(PoseMiss::BeforeStart { by_ns }) => {
-                    return Verdict::Drop(Drop::BeforePoses { by_ns });
-                }
-                Err(miss @ PoseMiss::Gap { .. }) => return Verdict::Drop(Drop::PoseGap(miss)),
-            }
-            match self.mount(&cloud.frame, stamp_ns) {
-                Ok(_) => {}
-                Err(miss @ (TfMiss::TooOld { .. } | TfMiss::Gap { .. })) => {
-                    return Verdict::Drop(Drop::no_mount(&cloud.frame, miss));
-                }
-                Err(miss) => return wait(Drop::no_mount(&cloud.frame, miss)),
-            }
+            Err(reason) => self.drop_cloud(&cloud.topic, &reason),
         }
-        Verdict::Transform
     }
 
     fn transform(&mut self, waiting: &WaitingCloud) -> Result<PointCloud2, Drop> {
@@ -348,7 +351,9 @@ impl EnuTransformer {
         let passed = self.options.pass_fields.iter();
         let passed = passed.filter_map(|name| view.fields().iter().find(|f| f.name == *name));
         let passed: Vec<_> = passed.cloned().collect();
-        let (precision, mut fields) = (self.options.precision, passed.clone());
+        let by_distance = || Precision::for_points(&moved.points_m);
+        let precision = self.options.precision.unwrap_or_else(by_distance);
+        let mut fields = passed.clone();
         let seen_from = |i: usize| {
             let times = times.and_then(|times| times.get(i).copied());
             let pose = map_from_sensor(times.unwrap_or(waiting.stamp_ns));

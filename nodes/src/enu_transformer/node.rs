@@ -269,6 +269,7 @@ impl Shell {
             undecodable: self.losses.undecodable(),
             clouds_not_published: self.outputs.points.dropped(),
             refusals: self.machine.refusals().all().to_vec(),
+            notes: self.machine.notes().to_vec(),
         }
     }
 
@@ -292,7 +293,9 @@ impl Shell {
     }
 
     fn finish(&mut self) {
-        self.machine.finish();
+        for output in self.machine.finish() {
+            self.publish(output);
+        }
         self.outputs.points.flush(Duration::from_secs(2));
         let report = self.report();
         let (clouds_in, clouds_out) = (report.counts.clouds_in, report.counts.clouds_out);

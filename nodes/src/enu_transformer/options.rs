@@ -48,8 +48,8 @@ pub struct TransformerOptions {
     pub max_waiting_clouds: usize,
     /// Most bytes of clouds that wait.
     pub max_waiting_bytes: usize,
-    /// Type of the coordinates.
-    pub precision: Precision,
+    /// Type of the coordinates; `None`: as the distance from the origin asks for.
+    pub precision: Option<Precision>,
     /// Fields of the clouds that `points_enu` keeps, where they have them.
     pub pass_fields: Vec<String>,
     /// True if `points_enu` has for each point the place of the sensor, which a mapper of free space
@@ -58,6 +58,9 @@ pub struct TransformerOptions {
     /// `map_from_map`: a correction of all poses, where one is known.
     pub correction: Option<Isometry3<f64>>,
 }
+
+/// Faster than vehicles in traffic.
+const MAX_SPEED_M_PER_S: f64 = 50.0;
 
 /// More than any cloud has that a map needs.
 const MAX_PASS_FIELDS: usize = 64;
@@ -80,6 +83,9 @@ impl TransformerOptions {
                 base_frame: "base_link".into(),
                 max_imu_gap_s: 0.1,
                 max_fix_gap_s: 1.5,
+                max_speed_m_per_s: MAX_SPEED_M_PER_S,
+                settle_ns: 500_000_000,
+                ahead_ns: 10_000_000_000,
             },
             map_frame: "map".into(),
             map_frame_is_given: false,
@@ -97,7 +103,7 @@ impl TransformerOptions {
             pose_span_s: 10.0,
             max_waiting_clouds: 512,
             max_waiting_bytes: 256 << 20,
-            precision: Precision::Float32,
+            precision: None,
             pass_fields: LABEL_FIELDS.map(str::to_owned).into(),
             viewpoints: false,
             correction: None,
@@ -149,7 +155,11 @@ impl TransformerOptions {
         options.max_waiting_clouds = params.positive("max_waiting_clouds", clouds)?;
         options.max_waiting_bytes = params.positive("max_waiting_bytes", bytes)?;
         let (single, double) = (Precision::Float32, Precision::Float64);
-        let precisions = [("float32", single), ("float64", double)];
+        let precisions = [
+            ("auto", None),
+            ("float32", Some(single)),
+            ("float64", Some(double)),
+        ];
         options.precision = one_of(params, "precision", &precisions)?;
         options.pass_fields = params.string_array("pass_fields", &LABEL_FIELDS)?;
         if options.pass_fields.len() > MAX_PASS_FIELDS {
@@ -185,7 +195,13 @@ fn ins_options(params: &Params, defaults: InsOptions) -> Result<InsOptions, Para
     let [roll, pitch, yaw] = triple(params, "ins.boresight_rpy_rad")?;
     let base_from_ins = UnitQuaternion::from_euler_angles(roll, pitch, yaw);
     let leap_seconds = params.i64("ins.leap_seconds", i64::from(defaults.leap_seconds))?;
+    let max_speed_m_per_s =
+        not_negative(params, "ins.max_speed_m_per_s", defaults.max_speed_m_per_s)?;
     Ok(InsOptions {
+        max_speed_m_per_s: match max_speed_m_per_s > 0.0 {
+            true => max_speed_m_per_s,
+            false => f64::INFINITY,
+        },
         stamp: one_of(params, "ins.stamp", &stamps)?,
         leap_seconds: i32::try_from(leap_seconds)
             .map_err(|_| params.invalid("ins.leap_seconds", "expected a small number, 18"))?,
@@ -215,6 +231,8 @@ fn time_options(params: &Params) -> Result<TimeOptions, ParamError> {
     let units = [
         ("auto", None),
         ("s", Some(TimeUnit::Seconds)),
+        ("ms", Some(TimeUnit::Milliseconds)),
+        ("us", Some(TimeUnit::Microseconds)),
         ("ns", Some(TimeUnit::Nanoseconds)),
     ];
     let references = [

@@ -20,6 +20,7 @@ const ABOUT: &[About] = about! {
     "ins.boresight_rpy_rad" fixed(POSES): "Rotation of the INS in base_frame, fixed-axis roll, pitch, yaw, in place of that of its frame on tf.";
     "ins.max_imu_gap_s" fixed(POSES): "Longest gap between two attitudes that a fix may fall into (navsatfix_imu).";
     "ins.max_fix_gap_s" fixed(POSES): "Longest gap between two fixes over which positions are interpolated, at the stamps of the attitudes (navsatfix_imu); clouds wait that much longer.";
+    "ins.max_speed_m_per_s" fixed(POSES): "Poses farther from the one before than this speed allows, and 1 m, are refused until they have agreed on the new place for half of max_wait_s; 0: no limit. Not for tf.";
     "origin.mode" fixed(POSES): "first_fix: the map frame begins where the first good fix is; fixed: at the place below.";
     "origin.latitude_deg" fixed(POSES): "Latitude of that place, WGS84.";
     "origin.longitude_deg" fixed(POSES): "Longitude of that place, WGS84.";
@@ -35,16 +36,16 @@ const ABOUT: &[About] = about! {
     "max_range_m": "Points farther from the sensor are left out; 0: no limit.";
     "max_cloud_points": "Clouds of more points are refused.";
     "deskew": "Whether points are moved to where they were at their own time.";
-    "time.field": "Field of the per-point time; empty: time, t, time_stamp, timestamp or offset_time.";
-    "time.unit": "auto, s or ns.";
+    "time.field": "Field of the time of points; empty: time, t, timestamp, offset_time, ts, stamp and the like, with or without a unit behind the name (_ns, _us, _ms, _s).";
+    "time.unit": "auto, s, ms, us or ns.";
     "time.reference": "auto, stamp_start, stamp_end or absolute.";
-    "time.max_span_s": "Longest span of one cloud; a longer one is taken for a wrong unit and refused.";
+    "time.max_span_s": "Longest span of one cloud; a longer one is taken for a wrong unit and refused, single points farther from the others are left out.";
     "max_wait_s": "How long a cloud waits for the pose that covers it.";
     "max_pose_gap_s": "Longest gap between two poses that is interpolated.";
     "pose_span_s" fixed(POSES): "How long poses and moving mounts are kept.";
     "max_waiting_clouds": "Most clouds that wait; the oldest cloud goes.";
     "max_waiting_bytes" fixed("the inbox is made with it"): "Most bytes of clouds that wait; the oldest cloud goes.";
-    "precision": "Coordinates of points_enu: float32, or float64 for maps far from their origin.";
+    "precision": "Coordinates of points_enu: auto, float32, or float64, which RViz does not draw. auto is float64 for clouds beyond 16 km from the origin, where float32 errs by more than 0.5 mm.";
     "pass_fields": "Fields of the clouds that points_enu keeps where they have them, as they are.";
     "viewpoints": "Whether points_enu says for each point where the sensor was (vp_x, vp_y, vp_z), 12 or 24 bytes more; free_space of lattice_mapper needs it.";
 };

@@ -4,7 +4,7 @@
 use std::sync::Arc;
 
 use lattice_core::geodesy::InsMount;
-use lattice_core::pose::{PushOutcome, StampedPose, TfMiss};
+use lattice_core::pose::{StampedPose, TfMiss};
 use nalgebra::{Isometry3, UnitQuaternion, Vector3};
 
 use super::ins::{Body, BodyPose};
@@ -116,46 +116,6 @@ impl EnuTransformer {
                 Err(_) => return,
             }
         }
-    }
-
-    /// Takes a pose of the machine in the map.
-    fn on_pose(&mut self, topic: &str, mut pose: StampedPose, out: &mut Vec<EnuOutput>) {
-        if let Some(correction) = &self.options.correction {
-            pose.map_from_base = correction * pose.map_from_base;
-        }
-        let seconds = pose.stamp_ns as f64 * 1e-9;
-        if !self.stamps.passes(pose.stamp_ns) {
-            self.counts.poses_stamp_jump += 1;
-            let text = || format!("its stamp {seconds:.3} s jumps against those before it");
-            self.refusals.add(topic, "poses_stamp_jump", text);
-            return;
-        }
-        let newest_ns = self.poses.newest_ns();
-        match self.poses.push(pose) {
-            PushOutcome::Accepted => self.counts.poses_in += 1,
-            PushOutcome::JumpedBack => {
-                self.counts.poses_in += 1;
-                self.on_time_jump(pose.stamp_ns);
-            }
-            PushOutcome::OutOfOrder => {
-                self.counts.poses_out_of_order += 1;
-                let newest = newest_ns.unwrap_or(0) as f64 * 1e-9;
-                let text = || {
-                    format!(
-                        "its stamp {seconds:.3} s is not after that of the pose before, {newest:.3} s"
-                    )
-                };
-                self.refusals.add(topic, "poses_out_of_order", text);
-                return;
-            }
-            PushOutcome::NotFinite => {
-                self.counts.poses_invalid += 1;
-                let text = || "a number is not finite after mount and correction".to_owned();
-                self.refusals.add(topic, "poses_invalid", text);
-                return;
-            }
-        }
-        self.announce_pose(&pose, out);
     }
 
     /// Refuses all poses that still wait.

@@ -6,7 +6,8 @@ use lattice_msgs::geometry_msgs::TransformStamped;
 use lattice_msgs::tf2_msgs::TFMessage;
 use nalgebra::Isometry3;
 
-use super::ins::InsSource;
+use super::ins::{InsRefusal, InsSource};
+use super::stamp_order::Refused;
 use super::{EnuOutput, EnuTransformer};
 use crate::convert::geometry;
 
@@ -22,28 +23,85 @@ impl EnuTransformer {
             let (parent, child) = (&transform.header.frame_id, &transform.child_frame_id);
             let stamp_ns = transform.header.stamp.to_ns();
             let pose = geometry::isometry_from_transform(&transform.transform);
-            let insert = |pose| {
-                let inserted = self.mounts.insert(parent, child, stamp_ns, pose, is_static);
-                inserted.map(drop).map_err(|error| error.to_string())
-            };
-            let unusable = || {
-                format!(
+            let taken = match pose {
+                Some(pose) if is_static => self.insert(parent, child, stamp_ns, pose, true),
+                Some(pose) => self.on_moving(parent, child, stamp_ns, pose, &mut out),
+                None => Err(format!(
                     "transform of '{child}' in '{parent}' is not finite, or its quaternion is zero"
-                )
+                )),
             };
-            match pose.ok_or_else(unusable).and_then(insert) {
-                Ok(()) => self.counts.poses_in += u64::from(self.has_poses_of_tf()),
-                Err(problem) => {
-                    self.counts.transforms_refused += 1;
-                    let topic = if is_static { "/tf_static" } else { "/tf" };
-                    self.refusals.add(topic, "transforms_refused", || problem);
-                }
+            if let Err(problem) = taken {
+                self.counts.transforms_refused += 1;
+                let topic = if is_static { "/tf_static" } else { "/tf" };
+                self.refusals.add(topic, "transforms_refused", || problem);
             }
         }
         self.check_reference();
         self.announce_odom(&mut out);
         self.serve(now_ns, &mut out);
         out
+    }
+
+    /// Takes a moving transform in the order of its link.
+    fn on_moving(
+        &mut self,
+        parent: &str,
+        child: &str,
+        stamp_ns: i64,
+        parent_from_child: Isometry3<f64>,
+        out: &mut Vec<EnuOutput>,
+    ) -> Result<(), String> {
+        let Some((decision, newest_ns)) =
+            self.links.push(parent, child, stamp_ns, parent_from_child)
+        else {
+            return self.insert(parent, child, stamp_ns, parent_from_child, false);
+        };
+        let is_pose = self.has_poses_of_tf();
+        if decision.is_clock_set {
+            if let (true, Some(before_ns)) = (is_pose, newest_ns) {
+                self.on_set_back(before_ns, out);
+            }
+            self.mounts.clear_link(parent, child);
+        } else if is_pose && newest_ns.is_none_or(|newest_ns| stamp_ns > newest_ns) {
+            self.clocks.on_step();
+        }
+        for (stamp_ns, pose) in decision.taken {
+            self.insert(parent, child, stamp_ns, pose, false)?;
+        }
+        // A transform that is repeated is no news.
+        let mut alone = decision
+            .refused
+            .into_iter()
+            .filter(|r| matches!(r, Refused::Alone { .. }));
+        alone.next().map_or(Ok(()), |refused| {
+            let why = InsRefusal::Stamp(refused);
+            Err(format!("transform of '{child}' in '{parent}': {why}"))
+        })
+    }
+
+    fn insert(
+        &mut self,
+        parent: &str,
+        child: &str,
+        stamp_ns: i64,
+        parent_from_child: Isometry3<f64>,
+        is_static: bool,
+    ) -> Result<(), String> {
+        let inserted = self
+            .mounts
+            .insert(parent, child, stamp_ns, parent_from_child, is_static);
+        inserted.map_err(|error| error.to_string())?;
+        self.counts.poses_in += u64::from(self.has_poses_of_tf());
+        Ok(())
+    }
+
+    /// True while it is open whether the clock of the poses was set by so little that stamps before and
+    /// after are alike.
+    pub(super) fn is_order_ambiguous(&self) -> bool {
+        match self.has_poses_of_tf() {
+            true => self.links.is_ambiguous(),
+            false => self.order.is_ambiguous(),
+        }
     }
 
     /// `map` -> `base_frame` of a pose, or the newest `map` -> `odom_frame` where one is set.

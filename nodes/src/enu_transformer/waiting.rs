@@ -7,6 +7,8 @@ use lattice_core::cloud::{CloudError, CloudLimits, NO_TIME_NS};
 use lattice_msgs::sensor_msgs::PointCloud2;
 
 use super::TransformerOptions;
+use super::cloud_clocks::CloudClock;
+use super::cloud_notes::CloudNotes;
 use crate::convert::cloud;
 
 /// A cloud whose layout has been checked, with the time of each point.
@@ -23,6 +25,8 @@ pub struct WaitingCloud {
     pub last_ns: i64,
     /// Time at which it was received.
     pub arrived_ns: i64,
+    /// Clock of its topic when it came.
+    pub clock: CloudClock,
 }
 
 impl WaitingCloud {
@@ -31,15 +35,21 @@ impl WaitingCloud {
         message: Arc<PointCloud2>,
         arrived_ns: i64,
         options: &TransformerOptions,
+        notes: &mut CloudNotes,
     ) -> Result<Self, CloudError> {
         let limits = CloudLimits {
             max_points: options.max_cloud_points,
         };
         let stamp_ns = message.header.stamp.to_ns();
-        let layout = cloud::layout_of(&message);
+        let (layout, mended) = cloud::mended_layout_of(&message);
+        notes.on_layout(topic, &mended);
         let view = layout.view(&message.data, &limits)?;
         let times = match options.deskew {
-            true => view.point_times(stamp_ns, &options.time)?,
+            true => {
+                let found = view.point_times(stamp_ns, &options.time)?;
+                notes.on_times(topic, stamp_ns, &found.source);
+                found.times_ns
+            }
             false => None,
         };
         let known = times.iter().flatten().filter(|t| **t != NO_TIME_NS);
@@ -56,6 +66,7 @@ impl WaitingCloud {
             first_ns,
             last_ns,
             arrived_ns,
+            clock: CloudClock::default(),
             message,
         })
     }

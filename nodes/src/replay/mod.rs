@@ -2,6 +2,7 @@
 //!
 //! Messages pass in the order of the log, so the map depends on nothing else.
 
+mod disorder;
 mod plan;
 mod poses;
 mod report;
@@ -95,7 +96,8 @@ impl Pipeline {
 
     /// Ends the input and sums up.
     pub fn finish(&mut self) -> RunReport {
-        self.transformer.finish();
+        let outputs = self.transformer.finish();
+        self.map(outputs);
         self.update();
         let lattices = self.branches.iter_mut().map(Branch::finish).collect();
         RunReport {
@@ -105,6 +107,7 @@ impl Pipeline {
                 counts: self.transformer.counts().clone(),
                 undecodable: self.undecodable,
                 refusals: self.transformer.refusals().all().to_vec(),
+                notes: self.transformer.notes().to_vec(),
                 ..TransformerReport::default()
             },
             lattices,
@@ -268,6 +271,7 @@ pub fn run(
         end_ns: (!whole).then_some(to_ns.saturating_add(POSES_BEHIND_NS)),
         ..ReadOptions::default()
     };
+    pipeline.transformer.expect_delay(plan.pose_delay_ns);
     let mut clouds = 0;
     let passes = [(!whole).then_some(before), Some(within)];
     for options in passes.into_iter().flatten() {

@@ -7,6 +7,7 @@ use lattice_msgs::RosMessage;
 use lattice_msgs::sensor_msgs::PointCloud2;
 use lattice_msgs::tf2_msgs::TFMessage;
 
+use super::disorder;
 use super::poses::{Log, Poses};
 use super::survey::{self, CloudTopic, FrameTree};
 use super::topics::{Role, TopicError, listing};
@@ -38,6 +39,8 @@ pub struct TopicPlan {
     pub map_frame: String,
     /// Frame of the machine.
     pub base_frame: String,
+    /// Delay with which poses come late in the log, in nanoseconds.
+    pub pose_delay_ns: i64,
     /// What was taken and what not, a line each, for the user.
     pub choices: Vec<String>,
 }
@@ -109,8 +112,11 @@ pub fn plan(bag: &BagReader, wishes: &TopicWishes) -> Result<TopicPlan, TopicErr
         source: poses.source,
         map_frame,
         base_frame: poses.base_frame,
+        pose_delay_ns: 0,
         choices: Vec::new(),
     };
+    let of_ins = plan.names(bag, |role| matches!(role, Role::Ins(_)));
+    plan.pose_delay_ns = disorder::delay_ns(bag, of_ins)?;
     plan.choices = said(bag, &plan);
     plan.choices.extend(log.choices);
     Ok(plan)

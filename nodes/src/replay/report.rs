@@ -140,7 +140,7 @@ impl RunReport {
             add(
                 "points",
                 mapped.points_out_of_range,
-                "beyond the reach of keys",
+                "beyond the reach of keys from the datum (`datum_m`)",
             );
             add(
                 "points",
@@ -169,6 +169,9 @@ impl fmt::Display for RunReport {
             counts.points_out_of_range,
             counts.points_no_time
         )?;
+        for note in self.transformer.notes.iter().filter(|note| note.is_warning) {
+            writeln!(f, "note: {}: {}", note.topic, note.text)?;
+        }
         let losses = self.losses();
         if losses.is_empty() {
             writeln!(f, "dropped: none")?;

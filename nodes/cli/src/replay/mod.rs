@@ -105,6 +105,15 @@ impl Replay {
     pub fn run(self) -> CliResult {
         init_logging();
         let report = self.replay()?;
+        // Warnings were logged when they came up.
+        for note in report
+            .transformer
+            .notes
+            .iter()
+            .filter(|note| !note.is_warning)
+        {
+            eprintln!("{}: {}", note.topic, note.text);
+        }
         if self.json {
             println!("{}", serde_json::to_string_pretty(&report)?);
         } else {

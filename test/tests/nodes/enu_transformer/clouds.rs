@@ -45,6 +45,8 @@ fn clouds_before_any_pose_are_dropped_and_counted() {
     assert_eq!(bench.machine.waiting(), 0);
     bench.drive(0, 10);
     bench.cloud(base_cloud(START_NS - SECOND_NS), START_NS);
+    assert_eq!(bench.machine.waiting(), 1, "the clock may have been set");
+    bench.drive(10, 11);
     assert_eq!(bench.machine.counts().clouds_before_poses, 1);
     bench.cloud(base_cloud(START_NS + STEP_NS), START_NS);
     assert_eq!(bench.clouds.len(), 1, "the next good cloud passes");
@@ -88,9 +90,11 @@ fn a_pose_from_another_year_costs_no_cloud() {
         bench.ins(InsMessage::Odometry(&wrong), START_NS + 9 * STEP_NS);
         bench.cloud(base_cloud(START_NS + 5 * STEP_NS), START_NS + 9 * STEP_NS);
     }
+    assert_eq!(bench.clouds.len(), 2);
+    bench.drive(10, 11);
     let counts = bench.machine.counts();
-    assert_eq!((bench.clouds.len(), counts.poses_stamp_jump), (2, 2));
-    assert_eq!((bench.transforms.len(), counts.time_jumps), (10, 0));
+    assert_eq!((counts.poses_stamp_jump, counts.time_jumps), (2, 0));
+    assert_eq!(bench.transforms.len(), 11);
 }
 
 #[test]
@@ -129,13 +133,11 @@ fn malformed_clouds_are_refused_and_the_next_one_passes() {
     lie(&|m| (m.width, m.height) = (u32::MAX, u32::MAX));
     lie(&|m| m.point_step = u32::MAX);
     lie(&|m| m.point_step = 0);
-    lie(&|m| m.row_step = 3);
     lie(&|m| m.data = ByteBuf::from(vec![0; 5]));
     lie(&|m| m.fields.clear());
     lie(&|m| m.fields[2].name = "w".into());
     lie(&|m| m.fields[0].offset = u32::MAX - 1);
     lie(&|m| m.fields[0].datatype = 77);
-    lie(&|m| m.fields[1].count = 0);
     let number = lies.len() as u64;
     for message in lies {
         bench.cloud(message, START_NS);

@@ -136,6 +136,7 @@ fn poses_come_of_transforms_that_others_publish() {
     assert!(bench.machine.counts().poses_in > 0);
     // Before all transforms, and after them.
     bench.cloud(cloud("camera", START_NS - SECOND_NS, &[[1.0; 3]]), START_NS);
+    bench.tf("odom", "base_link", 21, &driven(21), false);
     assert_eq!(bench.machine.counts().clouds_before_poses, 1);
     bench.cloud(cloud("camera", START_NS + SECOND_NS, &[[1.0; 3]]), START_NS);
     bench.tick(START_NS + 5 * SECOND_NS);
