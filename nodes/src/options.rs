@@ -115,7 +115,12 @@ mod tests {
             (transformer, "base_frame", "'/'", "the name of a frame"),
             (transformer, "max_cloud_points", "0", "1 or more"),
             (transformer, "max_waiting_clouds", "0", "1 or more"),
-            (transformer, "precision", "half", "float32 or float64"),
+            (
+                transformer,
+                "precision",
+                "half",
+                "auto or float32 or float64",
+            ),
             (mapper, "map_frame", "''", "the name of a frame"),
             (mapper, "max_voxels", "0", "1 or more"),
             (mapper, "max_cloud_points", "0", "1 or more"),

@@ -5,7 +5,9 @@ import numpy
 from driver_messages import header, make
 from driver_scene import ROWS, SCAN_NS
 
+# Those of PCL behind those of sensor_msgs.
 CODES = {"i1": 1, "u1": 2, "i2": 3, "u2": 4, "i4": 5, "u4": 6, "f4": 7, "f8": 8}
+CODES |= {"i8": 9, "u8": 10, "b1": 11}
 XYZ = "x f4 0, y f4 4, z f4 8"
 
 

@@ -4,6 +4,7 @@
 
 mod autosave;
 mod counts;
+mod datum;
 mod free_options;
 mod free_space;
 mod map_folder;
@@ -44,10 +45,6 @@ use self::occupancy::OccupancyMap;
 use crate::convert::{cloud, geometry, map, semantic, viewpoint};
 use crate::stamps::StampGate;
 
-const SECOND_NS: i64 = 1_000_000_000;
-/// Clouds in a row whose stamps agree on another time before it is believed.
-const AGREEING_CLOUDS: u32 = 5;
-
 /// Builds one occupied voxel list, with its changes for followers.
 pub struct LatticeMapper {
     options: MapperOptions,
@@ -86,7 +83,7 @@ impl LatticeMapper {
         let occupancy = (options.payload == MapPayload::Occupancy)
             .then(|| OccupancyMap::new(&list, max_voxels, options.max_map_bytes));
         Ok(Self {
-            stamps: Self::stamp_gate(options.forget_after_ns),
+            stamps: options.stamp_gate(),
             options,
             list,
             occupancy,
@@ -113,14 +110,9 @@ impl LatticeMapper {
             free_space.set_options(&options.free_space, options.max_cloud_points);
         }
         if self.options.forget_after_ns != options.forget_after_ns {
-            self.stamps = Self::stamp_gate(options.forget_after_ns);
+            self.stamps = options.stamp_gate();
         }
         self.options = options;
-    }
-
-    fn stamp_gate(age_ns: i64) -> Option<StampGate> {
-        let step_ns = (age_ns / 2).max(SECOND_NS);
-        (age_ns > 0).then(|| StampGate::new(step_ns, step_ns, AGREEING_CLOUDS))
     }
 
     /// Takes the geodetic origin of the map frame, which the map carries along.
@@ -144,7 +136,8 @@ impl LatticeMapper {
         };
         let cloud = cloud::cloud_from_message(message, &limits, &self.list.datum_m())
             .inspect_err(|_| self.counts.clouds_malformed += 1)?;
-        // All that can be refused is read before anything of the map changes.
+        self.choose_datum(&cloud);
+        // All that can be refused is read before any voxel changes.
         let labels = self.labels_of(message)?;
         let viewpoints = self.viewpoints_of(message, &limits)?;
         // The first stamp is held against nothing: by that alone nothing grows old.

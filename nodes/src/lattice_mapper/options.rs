@@ -7,6 +7,7 @@ use nalgebra::Vector3;
 use super::free_options::MappedFreeSpace;
 use crate::convert::semantic::LabelOptions;
 use crate::options;
+use crate::stamps::StampGate;
 use lattice_runtime::params::{ParamError, Params};
 
 /// Options of a [`super::LatticeMapper`].
@@ -18,6 +19,9 @@ pub struct MapperOptions {
     pub map_frame: String,
     /// Place in the map frame near which voxel keys are counted from, in metres.
     pub datum_near_m: Vector3<f64>,
+    /// True if keys are counted from that place however far the points are; else from a place near the first
+    /// of them where that is out of reach.
+    pub datum_is_given: bool,
     /// Most voxels kept.
     pub max_voxels: usize,
     /// Most memory for voxels, which may allow fewer than `max_voxels`; 0: as many as those take.
@@ -37,6 +41,10 @@ pub struct MapperOptions {
     /// Rays that clear voxels.
     pub free_space: MappedFreeSpace,
 }
+
+const SECOND_NS: i64 = 1_000_000_000;
+/// Clouds in a row whose stamps agree on another time before it is believed.
+const AGREEING_CLOUDS: u32 = 5;
 
 /// Contents of a voxel.
 #[derive(Clone, Copy, PartialEq, Eq, Debug, Default)]
@@ -67,6 +75,7 @@ impl MapperOptions {
             lattice,
             map_frame: "map".into(),
             datum_near_m: Vector3::zeros(),
+            datum_is_given: false,
             max_voxels: 20_000_000,
             max_map_bytes: 0,
             when_full: WhenFull::Refuse,
@@ -94,6 +103,7 @@ impl MapperOptions {
         let read = Self {
             map_frame: options::frame(params, "map_frame", &defaults.map_frame)?,
             datum_near_m: options::place_m(params, "datum_m")?,
+            datum_is_given: params.is_given("datum_m"),
             max_voxels: params.positive("max_voxels", defaults.max_voxels)?,
             max_map_bytes: params.usize("max_map_bytes", defaults.max_map_bytes)?,
             when_full: options::one_of(params, "when_full", &WHEN_FULL)?,
@@ -132,6 +142,13 @@ impl MapperOptions {
         let name = params.string("lattice_orientation", "paper")?;
         name.parse()
             .map_err(|e| params.invalid("lattice_orientation", format!("{e}")))
+    }
+
+    /// Gate for the stamps of clouds, where voxels grow old by them.
+    pub(super) fn stamp_gate(&self) -> Option<StampGate> {
+        let age_ns = self.forget_after_ns;
+        let step_ns = (age_ns / 2).max(SECOND_NS);
+        (age_ns > 0).then(|| StampGate::new(step_ns, step_ns, AGREEING_CLOUDS))
     }
 
     /// Columns of a voxel of centroids.

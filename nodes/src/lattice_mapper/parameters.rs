@@ -16,7 +16,7 @@ const ABOUT: &[About] = about! {
     "cell_volume_m3" fixed(MAP): "Volume of one cell: 0.125 is as much as a cube of 0.5 m.";
     "cell_size_m" fixed(MAP): "Edge of the cube with the volume of one cell, in place of cell_volume_m3; 0.0: as cell_volume_m3 says.";
     "map_frame" fixed(options::FRAME): "Frame that clouds must be in.";
-    "datum_m" fixed(MAP): "Keys are counted from the lattice point next to this place in the map frame. They reach a million cells in every direction.";
+    "datum_m" fixed(MAP): "Keys are counted from the lattice point next to this place in the map frame. They reach a million cells in every direction. If not set, the place is the origin, or near the first point where that is out of reach, as in UTM.";
     "payload" fixed(MAP): "centroid: count and mean of the points of each voxel; occupancy: 2 to 3 bytes a voxel, without count, mean, labels and stamps.";
     "free_space" fixed(MAP): "off: voxels stay; clear: voxels that rays from the sensor pass through go; evidence: those that are probably free by the hits and misses of all scans. Needs viewpoints of enu_transformer. In quotes: YAML reads a bare off as false.";
     "rays.sweep_s": "Clouds of this long are one scan; 0: each is one. What any of them hits, the others do not clear. A laser on a turntable needs a turn.";

@@ -89,7 +89,10 @@ fn a_datum_far_away_loses_no_digit() {
     assert!(mapper.distortion().max_distance_m <= 0.0795);
     assert_same(&maps::follower(&mut mapper), &mapper);
     // The same cloud on a map about the origin is out of the reach of its keys.
-    let mut near = maps::mapper(options());
+    let mut near = maps::mapper(MapperOptions {
+        datum_is_given: true,
+        ..options()
+    });
     near.on_cloud(&message).unwrap();
     assert_eq!(near.counts().points_out_of_range, 100);
 }

@@ -1,5 +1,7 @@
 //! The logs, and what becomes of each.
 
+use super::oddities::oddities;
+
 /// End of a replay.
 #[derive(Clone, Copy)]
 pub enum Outcome {
@@ -24,22 +26,22 @@ pub struct Case {
 }
 
 impl Case {
-    fn with(self, arguments: &'static [&'static str]) -> Self {
+    pub fn with(self, arguments: &'static [&'static str]) -> Self {
         Self { arguments, ..self }
     }
 
-    fn refused(self, texts: &'static [&'static str]) -> Self {
+    pub fn refused(self, texts: &'static [&'static str]) -> Self {
         Self {
             outcome: Outcome::Refused(texts),
             ..self
         }
     }
 
-    fn says(self, says: &'static [&'static str]) -> Self {
+    pub fn says(self, says: &'static [&'static str]) -> Self {
         Self { says, ..self }
     }
 
-    fn over_dds(self) -> Self {
+    pub fn over_dds(self) -> Self {
         Self {
             over_dds: true,
             ..self
@@ -59,16 +61,16 @@ fn stored(storage: &'static str, log: &'static str) -> Case {
     }
 }
 
-fn mcap(log: &'static str) -> Case {
+pub fn mcap(log: &'static str) -> Case {
     stored("mcap", log)
 }
 
-fn sqlite3(log: &'static str) -> Case {
+pub fn sqlite3(log: &'static str) -> Case {
     stored("sqlite3", log)
 }
 
 pub fn cases() -> Vec<Case> {
-    [lidars(), estimators(), positioning(), faults()].concat()
+    [lidars(), estimators(), positioning(), faults(), oddities()].concat()
 }
 
 fn lidars() -> Vec<Case> {
@@ -221,9 +223,13 @@ fn faults() -> Vec<Case> {
         sqlite3("sparse_poses").with(&["-p", "max_pose_gap_s:=1.0"]),
         sqlite3("late_poses").refused(&["max_wait_s"]),
         sqlite3("late_poses").with(&["-p", "max_wait_s:=3.0"]),
-        mcap("poses_without_stamps").refused(&["/odom: its stamp 0.000 s is not after"]),
+        mcap("poses_without_stamps")
+            .refused(&["/odom: its stamp 0.000 s is that of the message before"]),
         mcap("poses_without_rotation")
-            .refused(&["0 of 251 poses usable"])
+            .refused(&[
+                "0 of 251 poses usable",
+                "position is not finite, or the quaternion is zero or not finite",
+            ])
             .over_dds(),
         mcap("ouster")
             .with(&["-p", "base_frame:=base_lnk"])
