@@ -8,6 +8,7 @@ use lattice_msgs::sensor_msgs::PointCloud2;
 use lattice_msgs::tf2_msgs::TFMessage;
 
 use super::poses::{Log, Poses};
+use super::statics::LateStatics;
 use super::survey::{self, CloudTopic, FrameTree};
 use super::topics::{Role, TopicError, listing};
 use crate::enu_transformer::ins::InsSource;
@@ -38,6 +39,8 @@ pub struct TopicPlan {
     pub map_frame: String,
     /// Frame of the machine.
     pub base_frame: String,
+    /// Static transforms that come after the first cloud, and hold from the beginning.
+    pub late_statics: TFMessage,
     /// What was taken and what not, a line each, for the user.
     pub choices: Vec<String>,
 }
@@ -109,10 +112,14 @@ pub fn plan(bag: &BagReader, wishes: &TopicWishes) -> Result<TopicPlan, TopicErr
         source: poses.source,
         map_frame,
         base_frame: poses.base_frame,
+        late_statics: TFMessage::default(),
         choices: Vec::new(),
     };
     plan.choices = said(bag, &plan);
     plan.choices.extend(log.choices);
+    let late = LateStatics::read(bag, &plan)?;
+    plan.choices.extend(late.lines);
+    plan.late_statics = late.message;
     Ok(plan)
 }
 
