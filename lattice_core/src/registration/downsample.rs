@@ -6,17 +6,20 @@ use super::{LabelDistribution, SemanticCloud, UNLABELED};
 
 /// Cells are numbered from minus to plus this along each axis.
 const MOST: f64 = (1 << 20) as f64;
+/// Distance of a cloud's median from the origin, in cells, from which on they are numbered from there.
+const FAR: f64 = MOST / 2.0;
 
 /// The mean point and the mean label distribution of each cubic cell, in the order of the cells.
 ///
 /// Cells have a corner at the origin, as those of small_gicp's `voxelgrid_sampling`. Points that are not
-/// finite or over a million cells away are left out; a side that is not over 0 leaves all as it is.
+/// finite or over a million cells away, from the origin or from the median of a cloud that is far from it, are left out; a side that is not over 0 leaves all as it is.
 pub fn voxel_downsample(cloud: &SemanticCloud, cell_side_m: f64) -> SemanticCloud {
     if cell_side_m.is_nan() || cell_side_m <= 0.0 {
         return cloud.clone();
     }
+    let first = first_cell(cloud, cell_side_m);
     let cell = |(index, p): (usize, &Point3<f64>)| {
-        let w = p.coords.map(|c| (c / cell_side_m).floor());
+        let w = p.coords.map(|c| (c / cell_side_m).floor()) - first;
         let near = w.iter().all(|w| w.abs() < MOST);
         let [x, y, z] = [w.x, w.y, w.z].map(|w| (w + MOST) as u64);
         near.then_some((z << 42 | y << 21 | x, index))
@@ -33,6 +36,24 @@ pub fn voxel_downsample(cloud: &SemanticCloud, cell_side_m: f64) -> SemanticClou
         }
     }
     thinned
+}
+
+/// The cell from which others are numbered: that of the origin, or along an axis on which the median is far that of it.
+fn first_cell(cloud: &SemanticCloud, cell_side_m: f64) -> Vector3<f64> {
+    Vector3::from_fn(|axis, _| {
+        let coordinate = |p: &Point3<f64>| p.coords.get(axis).copied();
+        let finite = cloud.points_m.iter().filter_map(coordinate);
+        let mut values: Vec<f64> = finite.filter(|c| c.is_finite()).collect();
+        let middle = values.len() / 2;
+        if middle >= values.len() {
+            return 0.0;
+        }
+        let (_, median, _) = values.select_nth_unstable_by(middle, f64::total_cmp);
+        let cell = (*median / cell_side_m).floor();
+        // Beyond 2^53 cells neighbours are no longer told apart.
+        let is_far = cell.abs() >= FAR && cell.abs() < 9e15;
+        if is_far { cell } else { 0.0 }
+    })
 }
 
 fn mean_point(cloud: &SemanticCloud, members: impl ExactSizeIterator<Item = usize>) -> Point3<f64> {
@@ -94,5 +115,28 @@ mod tests {
         assert_eq!(thinned.label(1).unknown(), 0.25);
         assert_eq!(voxel_downsample(&cloud, 0.0).len(), 5);
         assert!(voxel_downsample(&SemanticCloud::default(), 1.0).is_empty());
+    }
+
+    #[test]
+    fn cells_far_from_the_origin_are_those_about_it() {
+        // Inverse of the plastic number: no point lies on a side of a cell.
+        const A: f64 = 0.819_172_513_396_164_5;
+        let place = |i: u32, by: f64| 50.0 * (f64::from(i + 1) * by).fract();
+        let near: Vec<Point3<f64>> = (0..2000)
+            .map(|i| Point3::new(place(i, A), place(i, A * A), place(i, A * A * A)))
+            .collect();
+        let thin = |points_m: Vec<Point3<f64>>| {
+            voxel_downsample(&SemanticCloud::unlabelled(points_m), 0.5)
+        };
+        let expected = thin(near.clone());
+        // Whole cells away: some, as UTM, and 10,000 km.
+        for far_m in [[2e5, -1e3, 0.0], [448e3, 5_411e3, 300.0], [1e7, -1e7, 0.5]] {
+            let far_m = Vector3::from(far_m);
+            let thinned = thin(near.iter().map(|p| p + far_m).collect());
+            assert_eq!(thinned.len(), expected.len(), "{far_m:?}");
+            for (point, expected) in thinned.points_m.iter().zip(&expected.points_m) {
+                assert!((point - far_m - expected).norm() < 1e-7, "{far_m:?}");
+            }
+        }
     }
 }

@@ -28,5 +28,5 @@ pub use qos::BagQos;
 pub use reader::{BagReader, ReadOptions};
 pub use recover::{Recovered, recover};
 use topic::MAX_MESSAGE_BYTES;
-pub use topic::{BagMessage, Storage, TopicInfo};
+pub use topic::{BagMessage, STATIC_DEPTH, Storage, TopicInfo};
 pub use writer::{BagWriter, Compression, TopicSpec, WriterOptions, replaceable};

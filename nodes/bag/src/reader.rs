@@ -14,6 +14,7 @@ use super::{
     split::Split,
     split_list::{in_order_of_time, listed_splits, splits_in},
     storage::{Filter, TopicIndex, full_type_name, merge_topic},
+    topic::absolute_name,
 };
 
 /// Selection of messages by topic and time; the default is all.
@@ -35,6 +36,7 @@ pub struct BagReader {
     path: PathBuf,
     topics: Arc<[TopicInfo]>,
     message_count: u64,
+    miscounted: Option<u64>,
     range_ns: Option<(i64, i64)>,
     ros_distro: String,
     splits: Arc<[Split]>,
@@ -80,9 +82,14 @@ impl BagReader {
         self.range_ns.map(|(_, end_ns)| end_ns)
     }
 
-    /// Number of messages, by the bag's index.
+    /// Number of messages by the storage files; by `metadata.yaml` while compressed ones are not read.
     pub fn message_count(&self) -> u64 {
         self.message_count
+    }
+
+    /// Number of messages by `metadata.yaml`, if it counts others than the storage files, of all or of a topic.
+    pub fn miscounted(&self) -> Option<u64> {
+        self.miscounted
     }
 
     /// The storage files in order of time.
@@ -164,12 +171,17 @@ impl BagReader {
                 _ => MessageCompression::None,
             },
         };
-        let mut topics = listed_topics(metadata.as_ref());
+        let all_open = splits.iter().all(|split| split.open.is_some());
+        let listed = listed_topics(metadata.as_ref());
+        let mut topics = listed.clone();
+        if all_open {
+            // The storage counts its messages itself.
+            (topics.iter_mut()).for_each(|topic| topic.message_count = 0);
+        }
         let mut places = TopicIndex::new(&topics);
-        let counted = metadata.is_none();
         for open in splits.iter().filter_map(|split| split.open.as_ref()) {
             for topic in &open.info().topics {
-                merge_topic(&mut topics, &mut places, topic, counted);
+                merge_topic(&mut topics, &mut places, topic, all_open);
             }
         }
         for damage in splits.iter().filter_map(Split::damage) {
@@ -185,12 +197,11 @@ impl BagReader {
                 log::warn!("{path}: {rows} rows are no messages and left out");
             }
         }
-        let all_open = splits.iter().all(|split| split.open.is_some());
         if !all_open {
             // Of some files only.
             (topics.iter_mut()).for_each(|topic| topic.message_bytes = None);
         }
-        let listed = metadata.as_ref().and_then(Metadata::range_ns);
+        let listed_ns = metadata.as_ref().and_then(Metadata::range_ns);
         let seen = splits
             .iter()
             .filter_map(|split| split.range_ns)
@@ -199,12 +210,19 @@ impl BagReader {
             .iter()
             .filter_map(|split| split.message_count)
             .fold(0, u64::saturating_add);
-        if let Some(claimed) = metadata.as_ref().map(|m| m.message_count)
-            && all_open
-            && claimed != count
-        {
+        let claimed = metadata.as_ref().map(|m| m.message_count);
+        let wrong = listed.iter().zip(&topics);
+        let wrong = wrong.filter(|(of, is)| of.message_count != is.message_count);
+        let wrong: Vec<_> = wrong.map(|(_, topic)| topic.name.as_str()).collect();
+        let miscounted =
+            claimed.filter(|claimed| all_open && (*claimed != count || !wrong.is_empty()));
+        if let Some(claimed) = miscounted {
             let path = path.display();
-            log::warn!("{path}: metadata.yaml counts {claimed} messages, but there are {count}");
+            log::warn!(
+                "{path}: metadata.yaml counts {claimed} messages, the storage files {count}; theirs are taken \
+                 (topics counted otherwise: {})",
+                shown(&wrong)
+            );
         }
         Ok(BagReader {
             path: path.to_path_buf(),
@@ -212,13 +230,23 @@ impl BagReader {
                 Some(m) if !all_open => m.message_count,
                 _ => count,
             },
-            range_ns: if all_open { seen } else { listed.or(seen) },
+            miscounted,
+            range_ns: if all_open { seen } else { listed_ns.or(seen) },
             ros_distro: metadata.map(|m| m.ros_distro).unwrap_or_default(),
             topics: topics.into(),
             splits: splits.into(),
             compression,
             unfinished: false,
         })
+    }
+}
+
+/// The first three names, and the number of the others.
+fn shown(names: &[&str]) -> String {
+    match names {
+        [] => "none".to_owned(),
+        [a, b, c, _, ..] => format!("{a}, {b}, {c} and {} more", names.len() - 3),
+        names => names.join(", "),
     }
 }
 
@@ -230,7 +258,7 @@ fn listed_topics(metadata: Option<&Metadata>) -> Vec<TopicInfo> {
     let topic = |counted: &super::metadata::CountedTopic| {
         let topic = counted.topic_metadata.clone();
         TopicInfo {
-            name: topic.name,
+            name: absolute_name(&topic.name),
             type_name: full_type_name(&topic.type_name),
             type_hash: topic.type_description_hash,
             serialization_format: topic.serialization_format,

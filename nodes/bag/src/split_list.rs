@@ -10,37 +10,47 @@ use super::{BagError, metadata::Metadata, split::Split};
 /// Bags of more storage files than this are refused.
 const MAX_FILES: usize = 100_000;
 
-/// The storage files that the metadata lists, in its order.
+/// The storage files that the metadata lists, in its order; those in the folder if none of them is there.
+///
+/// Compressed files but the first stay closed while the counts of the metadata are credible.
 pub(crate) fn listed_splits(
     folder: &Path,
     metadata: &Metadata,
     metadata_path: &Path,
 ) -> Result<Vec<Split>, BagError> {
-    if !matches!(metadata.storage_identifier.as_str(), "mcap" | "sqlite3") {
-        return Err(BagError::unsupported(
-            metadata_path,
-            format!("storage plugin {:?}", metadata.storage_identifier),
-            "mcap and sqlite3 are known; convert with `ros2 bag convert`",
-        ));
-    }
     too_many(folder, metadata.relative_file_paths.len())?;
-    let mut splits = Vec::new();
-    for (entry, file) in metadata.storage_paths(folder, metadata_path)? {
+    let mut files = metadata.storage_paths(folder, metadata_path)?;
+    for (_, file) in &mut files {
         // Some versions of rosbag2 list compressed files by their names before compression.
-        let packed = PathBuf::from(format!("{}.zstd", file.display()));
-        let file = if !file.exists() && packed.exists() {
-            packed
-        } else {
-            file
-        };
+        let packed = file.with_added_extension("zstd");
+        if !file.exists() && packed.exists() {
+            *file = packed;
+        }
+    }
+    let is_there = files.iter().any(|(_, file)| file.exists());
+    if !is_there && list(folder)?.any(|entry| entry.is_ok_and(|(_, name)| is_storage(&name))) {
+        let (path, count) = (metadata_path.display(), files.len());
+        log::warn!(
+            "{path}: none of the {count} files that it lists is there; those in the folder are read"
+        );
+        return splits_in(folder);
+    }
+    let mut credible = metadata.has_consistent_counts();
+    let mut splits = Vec::new();
+    for (entry, file) in files {
         inside(folder, &file)?;
+        let listed = metadata.files.iter().find(|file| file.path == entry);
         // The first one is opened at once for the message definitions.
-        let mut split = Split::new(file, !splits.is_empty())?;
-        if split.open.is_none()
-            && let Some(listed) = metadata.files.iter().find(|file| file.path == entry)
-        {
-            split.range_ns = listed.range_ns();
-            split.message_count = Some(listed.message_count);
+        let mut split = Split::new(file, credible && !splits.is_empty())?;
+        match (&split.open, listed) {
+            (Some(_), Some(listed)) => {
+                credible &= split.message_count == Some(listed.message_count);
+            }
+            (None, Some(listed)) => {
+                split.range_ns = listed.range_ns();
+                split.message_count = Some(listed.message_count);
+            }
+            _ => {}
         }
         splits.push(split);
     }

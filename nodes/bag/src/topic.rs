@@ -5,6 +5,9 @@ use super::BagQos;
 /// Larger messages are refused, bytes.
 pub(crate) const MAX_MESSAGE_BYTES: u64 = 1 << 30;
 
+/// Messages of static transforms that a late joiner is given: the depth of tf2's listeners.
+pub const STATIC_DEPTH: u64 = 100;
+
 /// The storage plugins of rosbag2.
 #[derive(Clone, Copy, PartialEq, Eq, Hash, Debug)]
 pub enum Storage {
@@ -35,7 +38,7 @@ impl Storage {
 /// A topic of a bag.
 #[derive(Clone, PartialEq, Debug, Default)]
 pub struct TopicInfo {
-    /// The topic's name, such as "/tf".
+    /// The topic's name, such as "/tf": with a leading slash, also where the bag lacks it.
     pub name: String,
     /// The type, such as "sensor_msgs/msg/PointCloud2"; empty where the bag lacks it.
     pub type_name: String,
@@ -56,11 +59,22 @@ pub struct TopicInfo {
 impl TopicInfo {
     /// True if late joiners expect the last messages of this topic.
     pub fn is_latched(&self) -> bool {
-        match self.offered_qos.as_slice() {
-            // Bags up to metadata version 3 lack it, yet static transforms are always latched.
-            [] => self.name.ends_with("/tf_static") && self.type_name == "tf2_msgs/msg/TFMessage",
-            profiles => profiles.iter().any(|qos| qos.latched),
-        }
+        self.has_static_transforms() || self.offered_qos.iter().any(|qos| qos.latched)
+    }
+
+    /// True for `/tf_static` in any namespace. Its messages are latched and hold at all times, whatever QoS the bag
+    /// notes: up to metadata version 3 it notes none, and converters write the default.
+    pub fn has_static_transforms(&self) -> bool {
+        self.name.ends_with("/tf_static") && self.type_name == "tf2_msgs/msg/TFMessage"
+    }
+}
+
+/// The name of a topic with its leading slash, which writers other than rosbag2 leave out.
+pub(crate) fn absolute_name(name: &str) -> String {
+    match name {
+        "" => String::new(),
+        name if name.starts_with('/') => name.to_owned(),
+        name => format!("/{name}"),
     }
 }
 

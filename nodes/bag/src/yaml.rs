@@ -6,8 +6,9 @@ use serde::de::{DeserializeOwned, Error};
 /// Brackets open at a time; rosbag2 needs four.
 const MAX_DEPTH: usize = 64;
 
-/// Parses a text.
+/// Parses a text, without the byte order mark that some editors put before it.
 pub(crate) fn from_text<T: DeserializeOwned>(text: &str) -> Result<T, serde_yaml::Error> {
+    let text = text.strip_prefix('\u{feff}').unwrap_or(text);
     let mut depth = 0_usize;
     for byte in text.bytes() {
         match byte {

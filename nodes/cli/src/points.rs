@@ -2,17 +2,48 @@
 
 use std::path::Path;
 
+use clap::Args;
 use lattice_core::cloud::Cloud;
 use lattice_core::lattice::Lattice;
 use lattice_core::voxels::{InsertReport, Payload, VoxelList};
 use nalgebra::Vector3;
 
 use crate::CliResult;
-use lattice_nodes::files::points::{PointFileLimits, read_points};
+use lattice_nodes::files::points::{BinLayout, PointFileOptions, read_points, why_empty};
 
 /// Most cells along the diagonal of a cloud whose cell size is chosen.
 #[cfg(feature = "viewer")]
 const MOST_CELLS: f64 = 400.0;
+
+/// Columns of raw binary files.
+#[derive(Args, Clone, Copy, Default)]
+pub struct Columns {
+    /// Numbers of a point in a .bin file, x, y and z first: 3 to 64 floats, or as 3d doubles [default: 4, as KITTI]
+    #[arg(long, value_name = "N")]
+    columns: Option<BinLayout>,
+}
+
+impl Columns {
+    /// Options of reading files, one of which must be a .bin file if columns are given.
+    pub fn options(self, max_points: usize, paths: &[&Path]) -> CliResult<PointFileOptions> {
+        let is_bin = |path: &&Path| {
+            let name = path.to_string_lossy().to_ascii_lowercase();
+            name.strip_suffix(".bz2").unwrap_or(&name).ends_with(".bin")
+        };
+        if self.columns.is_some() && !paths.iter().any(is_bin) {
+            let names: Vec<String> = paths
+                .iter()
+                .map(|path| path.display().to_string())
+                .collect();
+            let names = names.join(", ");
+            return Err(format!("--columns is for .bin files, not for {names}").into());
+        }
+        Ok(PointFileOptions {
+            max_points,
+            columns: self.columns,
+        })
+    }
+}
 
 /// The points of a file, one at least.
 pub struct Points {
@@ -21,20 +52,18 @@ pub struct Points {
     datum_m: Vector3<f64>,
     /// Points left out because they are not finite.
     pub not_finite: u64,
+    /// Points left out because they are 0 0 0.
+    pub no_returns: u64,
     /// Edge of the voxels whose centres the points are, m, if the file is an octree.
     voxel_m: Option<f64>,
 }
 
 impl Points {
     /// Reads a file; errors name it.
-    pub fn read(path: &Path, max_points: usize) -> CliResult<Points> {
-        let limits = PointFileLimits { max_points };
-        let file = read_points(path, &limits).map_err(|e| format!("{}: {e}", path.display()))?;
+    pub fn read(path: &Path, options: &PointFileOptions) -> CliResult<Points> {
+        let file = read_points(path, options).map_err(|e| format!("{}: {e}", path.display()))?;
         if file.points_m.is_empty() {
-            let why = match file.skipped_not_finite {
-                0 => "the file has no points".to_owned(),
-                n => format!("none of its {n} points is finite"),
-            };
+            let why = why_empty(file.skipped_not_finite, file.no_returns);
             return Err(format!("{}: {why}", path.display()).into());
         }
         let points: Vec<Vector3<f64>> = file.points_m.into_iter().map(Vector3::from).collect();
@@ -45,6 +74,7 @@ impl Points {
             labels: file.labels,
             datum_m,
             not_finite: file.skipped_not_finite as u64,
+            no_returns: file.no_returns as u64,
             voxel_m: file.voxel_m,
         })
     }
@@ -140,6 +170,7 @@ mod tests {
             labels: Vec::new(),
             datum_m: Vector3::zeros(),
             not_finite: 0,
+            no_returns: 0,
             voxel_m,
         }
     }

@@ -8,7 +8,7 @@ use lattice_core::voxels::file::write_map;
 use serde::Serialize;
 
 use super::cell_size::CellSize;
-use super::points::Points;
+use super::points::{Columns, Points};
 use super::{CliResult, Lattices, init_logging};
 use lattice_nodes::files::whole;
 
@@ -29,6 +29,8 @@ pub struct Quantize {
     /// Most points to read
     #[arg(long, default_value_t = 500_000_000)]
     max_points: usize,
+    #[command(flatten)]
+    columns: Columns,
     /// Most voxels to keep
     #[arg(long, default_value_t = 200_000_000)]
     max_voxels: usize,
@@ -48,6 +50,8 @@ struct Row {
     points: u64,
     refused_not_finite: u64,
     refused_out_of_range: u64,
+    /// Points at 0 0 0, left out.
+    no_returns: u64,
     voxels: usize,
     mse_per_dimension_m2: f64,
     mean_distance_m: f64,
@@ -59,7 +63,8 @@ impl Quantize {
     /// Runs the command.
     pub fn run(self) -> CliResult {
         init_logging();
-        let points = Points::read(&self.file, self.max_points)?;
+        let options = self.columns.options(self.max_points, &[&self.file])?;
+        let points = Points::read(&self.file, &options)?;
         let cell_volume_m3 = self.cells.volume_m3().unwrap_or(0.125);
         let mut rows = Vec::new();
         for (i, kind) in self.lattice.0.iter().enumerate() {
@@ -76,6 +81,7 @@ impl Quantize {
                 points: report.inserted,
                 refused_not_finite: report.not_finite + points.not_finite,
                 refused_out_of_range: report.out_of_range,
+                no_returns: points.no_returns,
                 voxels: list.len(),
                 mse_per_dimension_m2: distortion.mse_per_dimension_m2,
                 mean_distance_m: distortion.mean_distance_m,

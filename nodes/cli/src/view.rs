@@ -7,13 +7,13 @@ use clap::Args;
 use lattice_core::lattice::{Lattice, LatticeKind};
 use lattice_core::voxels::VoxelList;
 use lattice_core::voxels::label_names::LabelNames;
-use lattice_nodes::files::points::is_named_as_points;
+use lattice_nodes::files::points::{PointFileOptions, is_named_as_points};
 use lattice_nodes::lattice_mapper::cube_m3;
 use lattice_nodes::viewer_server::{self, ViewerOptions};
 
 use super::CliResult;
 use crate::cell_size::CellSize;
-use crate::points::Points;
+use crate::points::{Columns, Points};
 use crate::run::Run;
 
 /// Show a map in the browser: of a map file, a point file or a log, or live
@@ -26,6 +26,8 @@ pub struct View {
     what: Vec<PathBuf>,
     #[command(flatten)]
     cells: CellSize,
+    #[command(flatten)]
+    columns: Columns,
     /// Address to listen on; any but this machine's own makes a token
     #[arg(long, default_value = "127.0.0.1")]
     address: IpAddr,
@@ -42,7 +44,8 @@ impl View {
     pub fn run(self) -> CliResult {
         match self.what.as_slice() {
             [one] if kind(one) != Kind::Params => {
-                show(one, &self.cells, SocketAddr::new(self.address, self.port))
+                let address = SocketAddr::new(self.address, self.port);
+                show(one, &self.cells, self.columns, address)
             }
             files => {
                 if let Some(other) = files.iter().find(|file| kind(file) != Kind::Params) {
@@ -52,6 +55,7 @@ impl View {
                     )
                     .into());
                 }
+                self.columns.options(MAX_POINTS, &[])?;
                 self.cells
                     .expect_none("cells of nodes are set by `cell_size_m` of lattice_mapper")?;
                 self.live()
@@ -106,9 +110,14 @@ fn is_map(path: &Path) -> bool {
 }
 
 /// Shows a map file, or the map of a log or of points, until the process is ended.
-fn show(path: &Path, cells: &CellSize, address: SocketAddr) -> CliResult {
+fn show(path: &Path, cells: &CellSize, columns: Columns, address: SocketAddr) -> CliResult {
+    let options = columns.options(MAX_POINTS, &[path])?;
     if kind(path) == Kind::Points {
-        let (_server, url) = serve(&quantized(path, cells)?, &LabelNames::default(), address)?;
+        let (_server, url) = serve(
+            &quantized(path, cells, &options)?,
+            &LabelNames::default(),
+            address,
+        )?;
         return stay(&url);
     }
     #[cfg(feature = "bags")]
@@ -136,9 +145,9 @@ fn show(path: &Path, cells: &CellSize, address: SocketAddr) -> CliResult {
 }
 
 /// The map of a point file on the FCC lattice, with a line that says which cells it has.
-fn quantized(path: &Path, cells: &CellSize) -> CliResult<VoxelList> {
+fn quantized(path: &Path, cells: &CellSize, options: &PointFileOptions) -> CliResult<VoxelList> {
     crate::init_logging();
-    let points = Points::read(path, MAX_POINTS)?;
+    let points = Points::read(path, options)?;
     let (volume_m3, why) = match cells.volume_m3() {
         Some(volume_m3) => (volume_m3, String::new()),
         None => {

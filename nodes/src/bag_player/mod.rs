@@ -17,7 +17,7 @@ use crate::report;
 use crate::start::{Declare, NodeError, check_topics, open_params};
 use controls::Controls;
 use keyboard::Keyboard;
-use lattice_bag::{BagQos, BagReader, Player, TopicInfo};
+use lattice_bag::{BagQos, BagReader, Player, STATIC_DEPTH, TopicInfo};
 use lattice_runtime::logging::Throttle;
 use lattice_runtime::qos::{Durability, Qos, Reliability};
 use lattice_runtime::ros_args::RosArgs;
@@ -162,26 +162,29 @@ fn type_hash(topic: &TopicInfo) -> Option<String> {
 }
 
 /// One publisher in place of all that were recorded: the weakest of each policy, so that every
-/// reader of then finds it, and room for the last samples of all of them.
+/// reader of then finds it, and room for the last samples of all of them. Static transforms are offered as tf2
+/// publishes them, whatever the bag notes.
 fn offered(topic: &TopicInfo) -> Qos {
     let recorded = topic.offered_qos.as_slice();
+    let is_static = topic.has_static_transforms();
     let depth = |qos: &BagQos| match qos.keep_all {
         true => MAX_DEPTH,
         false => qos.depth.max(1),
     };
-    let latched = match recorded {
-        [] => topic.is_latched(),
-        recorded => recorded.iter().all(|qos| qos.latched),
-    };
+    let all_latched = !recorded.is_empty() && recorded.iter().all(|qos| qos.latched);
+    if is_static && !recorded.is_empty() && !all_latched {
+        let name = &topic.name;
+        log::info!("{name}: recorded as volatile, published as transient local");
+    }
+    let latched = is_static || all_latched;
     let depths = recorded.iter().map(depth);
-    let depth = match (recorded, latched) {
-        ([], true) => 100,
-        ([], false) => 10,
-        (_, true) => depths.fold(0, u64::saturating_add),
-        (_, false) => depths.max().unwrap_or(10),
+    let depth = match latched {
+        true => depths.fold(0, u64::saturating_add),
+        false => depths.max().unwrap_or(10),
     };
+    let least = if is_static { STATIC_DEPTH } else { 1 };
     Qos {
-        reliability: match recorded.iter().all(|qos| qos.reliable) {
+        reliability: match is_static || recorded.iter().all(|qos| qos.reliable) {
             true => Reliability::Reliable,
             false => Reliability::BestEffort,
         },
@@ -189,7 +192,7 @@ fn offered(topic: &TopicInfo) -> Qos {
             true => Durability::TransientLocal,
             false => Durability::Volatile,
         },
-        depth: depth.clamp(1, MAX_DEPTH) as usize,
+        depth: depth.clamp(least, MAX_DEPTH) as usize,
         kept: None,
     }
 }

@@ -9,17 +9,18 @@ use lattice_core::registration::{LabelDistribution, SemanticCloud};
 use lattice_core::voxels::file::{max_voxels_of, read_map};
 use nalgebra::Point3;
 
-use super::points::{PointFileLimits, read_points};
+use super::points::{PointFileOptions, read_points, why_empty};
 
 impl SemanticFile {
     /// The same, unless it has no points; the error says why, and names the file.
     pub fn with_points(self, path: &Path) -> Result<SemanticFile, String> {
-        let why = match (self.cloud.is_empty(), self.skipped_not_finite) {
-            (false, _) => return Ok(self),
-            (true, 0) => "the file has no points".to_owned(),
-            (true, n) => format!("none of its {n} points is finite"),
-        };
-        Err(format!("{}: {why}", path.display()))
+        match self.cloud.is_empty() {
+            false => Ok(self),
+            true => {
+                let why = why_empty(self.skipped_not_finite, self.no_returns);
+                Err(format!("{}: {why}", path.display()))
+            }
+        }
     }
 }
 
@@ -35,29 +36,31 @@ pub struct SemanticFile {
     pub cell_side_m: Option<f64>,
     /// Points left out because a coordinate was NaN or infinite.
     pub skipped_not_finite: usize,
+    /// Points left out because they were 0 0 0.
+    pub no_returns: usize,
 }
 
 /// Reads a map file or an octree, of which each voxel is a point, or a point file with or without a number `label`.
 ///
-/// At most `max_points` points; errors name the file.
+/// Errors name the file.
 pub fn read_semantic(
     path: &Path,
-    max_points: usize,
+    options: &PointFileOptions,
 ) -> Result<SemanticFile, Box<dyn Error + Send + Sync>> {
     let here = |e: &dyn std::fmt::Display| format!("{}: {e}", path.display());
     if is_map(path).map_err(|e| here(&e))? {
         let file = File::open(path).map_err(|e| here(&e))?;
         let bytes = file.metadata().map_err(|e| here(&e))?.len();
-        let most = max_voxels_of(bytes).min(max_points);
+        let most = max_voxels_of(bytes).min(options.max_points);
         let map = read_map(BufReader::new(file), most).map_err(|e| here(&e))?;
         return Ok(SemanticFile {
             cell_side_m: Some(map.lattice().cell_volume_m3().cbrt()),
             cloud: SemanticCloud::from_voxels(&map),
             skipped_not_finite: 0,
+            no_returns: 0,
         });
     }
-    let limits = PointFileLimits { max_points };
-    let file = read_points(path, &limits).map_err(|e| here(&e))?;
+    let file = read_points(path, options).map_err(|e| here(&e))?;
     Ok(SemanticFile {
         cloud: SemanticCloud {
             points_m: file.points_m.into_iter().map(Point3::from).collect(),
@@ -67,6 +70,7 @@ pub fn read_semantic(
         },
         cell_side_m: file.voxel_m,
         skipped_not_finite: file.skipped_not_finite,
+        no_returns: file.no_returns,
     })
 }
 

@@ -6,6 +6,7 @@ mod disorder;
 mod plan;
 mod poses;
 mod report;
+mod statics;
 mod survey;
 mod topics;
 
@@ -25,6 +26,7 @@ use lattice_msgs::geometry_msgs::{PoseStamped, PoseWithCovarianceStamped};
 use lattice_msgs::nav_msgs::Odometry;
 use lattice_msgs::novatel_oem7_msgs::{INSPVA, INSPVAX};
 use lattice_msgs::sensor_msgs::{Imu, NavSatFix};
+use lattice_msgs::tf2_msgs::TFMessage;
 
 use crate::enu_transformer::ins::InsMessage;
 use crate::enu_transformer::{EnuOutput, EnuTransformer, TransformerOptions, TransformerReport};
@@ -92,6 +94,12 @@ impl Pipeline {
             self.next_update_ns = Some(now_ns.saturating_add(UPDATE_PERIOD_NS));
             self.update();
         }
+    }
+
+    /// Takes static transforms before the first message.
+    fn hold(&mut self, transforms: &TFMessage, now_ns: i64) {
+        let outputs = self.transformer.on_tf(transforms, true, now_ns);
+        self.map(outputs);
     }
 
     /// Ends the input and sums up.
@@ -273,6 +281,9 @@ pub fn run(
     };
     pipeline.transformer.expect_delay(plan.pose_delay_ns);
     let mut clouds = 0;
+    if !plan.late_statics.transforms.is_empty() {
+        pipeline.hold(&plan.late_statics, start_ns);
+    }
     let passes = [(!whole).then_some(before), Some(within)];
     for options in passes.into_iter().flatten() {
         for message in bag.messages(&options)? {

@@ -9,6 +9,7 @@ use lattice_msgs::tf2_msgs::TFMessage;
 
 use super::disorder;
 use super::poses::{Log, Poses};
+use super::statics::LateStatics;
 use super::survey::{self, CloudTopic, FrameTree};
 use super::topics::{Role, TopicError, listing};
 use crate::enu_transformer::ins::InsSource;
@@ -41,6 +42,8 @@ pub struct TopicPlan {
     pub base_frame: String,
     /// Delay with which poses come late in the log, in nanoseconds.
     pub pose_delay_ns: i64,
+    /// Static transforms that come after the first cloud, and hold from the beginning.
+    pub late_statics: TFMessage,
     /// What was taken and what not, a line each, for the user.
     pub choices: Vec<String>,
 }
@@ -113,12 +116,16 @@ pub fn plan(bag: &BagReader, wishes: &TopicWishes) -> Result<TopicPlan, TopicErr
         map_frame,
         base_frame: poses.base_frame,
         pose_delay_ns: 0,
+        late_statics: TFMessage::default(),
         choices: Vec::new(),
     };
     let of_ins = plan.names(bag, |role| matches!(role, Role::Ins(_)));
     plan.pose_delay_ns = disorder::delay_ns(bag, of_ins)?;
     plan.choices = said(bag, &plan);
     plan.choices.extend(log.choices);
+    let late = LateStatics::read(bag, &plan)?;
+    plan.choices.extend(late.lines);
+    plan.late_statics = late.message;
     Ok(plan)
 }
 

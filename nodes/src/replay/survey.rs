@@ -18,7 +18,7 @@ use crate::convert::geometry;
 /// Part of a log in which frames of `/tf` are looked for, ns.
 const TF_SPAN_NS: i64 = 10_000_000_000;
 /// Most messages of one transform topic that are read.
-const MAX_TF_MESSAGES: usize = 2000;
+pub(super) const MAX_TF_MESSAGES: usize = 2000;
 /// Distance from the origin at which coordinates of single precision are a millimetre apart, m.
 const MAX_DISTANCE_M: f64 = 10_000.0;
 /// Most frames of the tree.
@@ -276,7 +276,7 @@ fn first<M: DeserializeOwned>(bag: &BagReader, topic: usize) -> Result<Option<M>
     }
 }
 
-fn bare(frame: &str) -> String {
+pub(super) fn bare(frame: &str) -> String {
     frame.trim_start_matches('/').to_owned()
 }
 

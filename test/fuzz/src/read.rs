@@ -5,7 +5,7 @@ use std::io::Write;
 use std::path::Path;
 
 use lattice_bag::{BagReader, BagWriter, ReadOptions, Storage, TopicSpec, WriterOptions};
-use lattice_nodes::files::points::{PointFileLimits, read_points};
+use lattice_nodes::files::points::{PointFileOptions, read_points};
 use lattice_nodes::mesh::read_mesh;
 use lattice_runtime::params::Params;
 use lattice_runtime::params_file;
@@ -71,7 +71,10 @@ pub fn points(bytes: &[u8]) {
     };
     let ending = [".ply", ".pcd", ".xyz", ".bin"][usize::from(name % 4)];
     in_file(ending, content, |path| {
-        let limits = PointFileLimits { max_points: MOST };
+        let limits = PointFileOptions {
+            max_points: MOST,
+            ..PointFileOptions::default()
+        };
         if let Ok(file) = read_points(path, &limits) {
             assert!(file.points_m.len() + file.skipped_not_finite <= MOST);
             assert!(file.labels.is_empty() || file.labels.len() == file.points_m.len());

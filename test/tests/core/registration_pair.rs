@@ -6,12 +6,12 @@ use lattice_core::registration::{
     PrepareOptions, PreparedCloud, RegisterOptions, SemanticCloud, register, voxel_downsample,
 };
 use lattice_lab::metrics::PoseError;
-use lattice_nodes::files::points::{PointFileLimits, read_points};
+use lattice_nodes::files::points::{PointFileOptions, read_points};
 use lattice_test::data;
 use nalgebra::{Isometry3, Matrix3, Matrix4, Rotation3, Translation3, UnitQuaternion};
 
 fn cloud(path: &Path) -> SemanticCloud {
-    let file = read_points(path, &PointFileLimits::default()).unwrap();
+    let file = read_points(path, &PointFileOptions::default()).unwrap();
     SemanticCloud::unlabelled(file.points_m.into_iter().map(Into::into).collect())
 }
 

@@ -5,13 +5,14 @@ use lattice_core::lattice::{Lattice, LatticeKind};
 use lattice_core::voxels::VoxelList;
 use lattice_lab::render::{RenderOptions, render_png};
 use lattice_nodes::files::export::{write_centers_ply, write_mesh_ply};
-use lattice_nodes::files::points::{PointFile, PointFileLimits, PointFormat, read_points};
+use lattice_nodes::files::points::{PointFile, PointFileOptions, PointFormat, read_points};
 use lattice_test::data::shared;
 use nalgebra::Vector3;
 
 fn read(name: &str) -> Option<PointFile> {
-    let limits = PointFileLimits {
+    let limits = PointFileOptions {
         max_points: 200_000,
+        ..PointFileOptions::default()
     };
     shared(name).map(|path| read_points(&path, &limits).unwrap())
 }
@@ -100,8 +101,9 @@ fn maps_go_out_and_come_back() {
         let create = |name| std::fs::File::create(folder.path().join(name)).unwrap();
         write_centers_ply(&list, create("centers.ply")).unwrap();
         write_mesh_ply(&list, create("mesh.ply")).unwrap();
-        let limits = PointFileLimits {
+        let limits = PointFileOptions {
             max_points: 10_000_000,
+            ..PointFileOptions::default()
         };
 
         let centers = read_points(&folder.path().join("centers.ply"), &limits).unwrap();

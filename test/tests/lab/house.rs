@@ -11,7 +11,7 @@ use lattice_lab::simulate::house::{
     HeadsetTrial, House, LabelDraw, RegionLabels, Scene, Survey, SurveyMap, SurveyOptions,
 };
 use lattice_nodes::files::classes::read_classes;
-use lattice_nodes::files::points::{PointFileLimits, read_points};
+use lattice_nodes::files::points::{PointFileOptions, read_points};
 use lattice_test::data::shared;
 use nalgebra::{Isometry3, Point3, Quaternion, Translation3, UnitQuaternion, Vector3};
 use std::fs;
@@ -122,7 +122,7 @@ fn the_folder_of_a_house_holds_a_map_and_clouds_that_the_truth_brings_together()
         );
         for headset_scan in &truth.headset_scans {
             let file =
-                read_points(&out.join(&headset_scan.cloud), &PointFileLimits::default()).unwrap();
+                read_points(&out.join(&headset_scan.cloud), &PointFileOptions::default()).unwrap();
             assert_eq!(
                 file.points_m.len(),
                 summary.headset_points[&headset_scan.cloud]

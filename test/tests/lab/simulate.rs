@@ -11,7 +11,7 @@ use lattice_msgs::novatel_oem7_msgs::INSPVAX;
 use lattice_msgs::sensor_msgs::PointCloud2;
 use lattice_msgs::tf2_msgs::TFMessage;
 use lattice_msgs::{RosMessage, cdr};
-use lattice_nodes::files::points::{PointFileLimits, read_points};
+use lattice_nodes::files::points::{PointFileOptions, read_points};
 use nalgebra::{Isometry3, Point3, Quaternion, Translation3, UnitQuaternion, Vector3};
 use std::collections::BTreeMap;
 use std::fs;
@@ -71,7 +71,7 @@ fn true_poses(bag: &Path) -> Vec<(i64, Isometry3<f64>)> {
 /// Points of `points.ply`.
 fn true_points(bag: &Path) -> Vec<[f64; 3]> {
     let path = bag.join("truth/points.ply");
-    let file = read_points(&path, &PointFileLimits::default());
+    let file = read_points(&path, &PointFileOptions::default());
     file.unwrap().points_m
 }
 

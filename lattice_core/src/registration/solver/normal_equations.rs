@@ -1,8 +1,8 @@
 //! The normal equations of pairs of points.
 //!
-//! All is in the axes of the target: q = T x, z = R x, r = y - q, m = R n_s. A step (rho, phi) turns
-//! r into r - rho - phi x z, so J = [-I, [z]x]; with axes turned by R^T it is the right perturbation
-//! T Exp(delta).
+//! All is in the axes of the target: q = T x, z = R (x - c), r = y - q, m = R n_s, where c is the centre of the source.
+//! A step (rho, phi) turns r into r - rho - phi x z, so J = [-I, [z]x]; with axes turned by R^T it is the right
+//! perturbation about the centre, T C Exp(delta) C^-1, where C moves by c.
 
 use nalgebra::{Isometry3, Matrix3, Matrix6, Vector3, Vector6};
 
@@ -103,7 +103,7 @@ impl Sums {
         self
     }
 
-    /// Hessian and half gradient of the cost by the right perturbation (rho, phi) of the pose.
+    /// Hessian and half gradient of the cost by the right perturbation (rho, phi) of the pose about the centre.
     pub fn system(&self, pose: &Isometry3<f64>) -> (Matrix6<f64>, Vector6<f64>) {
         let mut h = Matrix6::zeros();
         let mut at = 0;

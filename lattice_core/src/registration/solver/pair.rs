@@ -1,6 +1,6 @@
 //! A pair of points and its Mahalanobis distance.
 //!
-//! All is in the axes of the target: q = T x, z = R x, r = y - q, m = R n_s.
+//! All is in the axes of the target: q = T x, z = R (x - c), r = y - q, m = R n_s, where c is the centre of the source.
 
 use nalgebra::{Point3, Vector3};
 
@@ -60,7 +60,7 @@ impl Metric {
 pub(super) struct Pair {
     /// Target point minus transformed source point, m.
     pub r: Vector3<f64>,
-    /// Rotated source point, m.
+    /// Rotated source point, from the centre of the source, m.
     pub z: Vector3<f64>,
     /// Rotated source normal.
     pub m: Vector3<f64>,
@@ -68,17 +68,18 @@ pub(super) struct Pair {
 }
 
 impl Pair {
-    /// Pair of a source point that the pose takes to `q`, and target point `y`.
+    /// Pair of a source point that the pose takes to `q`, and target point `y`; the pose takes the centre of the source
+    /// to `center`.
     #[inline(always)]
     pub fn new(
         metric: Metric,
-        p: &Vector3<f64>,
+        center: &Vector3<f64>,
         (q, m): (&Point3<f64>, &Vector3<f64>),
         (y, n): (&Point3<f64>, &Vector3<f64>),
     ) -> Pair {
         Pair {
             r: y - q,
-            z: q.coords - p,
+            z: q.coords - center,
             m: *m,
             information: metric.information(n, m),
         }

@@ -41,6 +41,8 @@ pub(super) struct Pairs<'a> {
     turn: f64,
     /// Variances are taken as so many times as large.
     pub(super) scale: f64,
+    /// Point of the source about which it turns, m: lever arms count from there.
+    center: Point3<f64>,
     candidates: usize,
     stride: usize,
     squared_gate_m2: f64,
@@ -52,13 +54,18 @@ pub(super) struct Pairs<'a> {
 pub(super) struct Placed {
     rotation: nalgebra::Matrix3<f64>,
     p: Vector3<f64>,
+    /// Place of the centre of the source.
+    center: Vector3<f64>,
 }
 
 impl Placed {
-    fn new(pose: &Isometry3<f64>) -> Placed {
+    fn new(pose: &Isometry3<f64>, center: &Point3<f64>) -> Placed {
+        let rotation = pose.rotation.to_rotation_matrix().into_inner();
+        let p = pose.translation.vector;
         Placed {
-            rotation: pose.rotation.to_rotation_matrix().into_inner(),
-            p: pose.translation.vector,
+            rotation,
+            p,
+            center: rotation * center.coords + p,
         }
     }
 
@@ -74,6 +81,7 @@ impl<'a> Pairs<'a> {
         source: &'a PreparedCloud,
         target: &'a PreparedCloud,
         options: &'a RegisterOptions<'a>,
+        center: Point3<f64>,
     ) -> Pairs<'a> {
         let layers = match options.method {
             Method::ClassWise => class_layers(source, target, options.min_class_points),
@@ -112,6 +120,7 @@ impl<'a> Pairs<'a> {
             kernel: Kernel::None,
             turn: if turns { flat(source) } else { 0.0 },
             scale: 1.0,
+            center,
             candidates,
             stride,
             squared_gate_m2: squared_reach(options.gate_m),
@@ -132,7 +141,7 @@ impl<'a> Pairs<'a> {
     pub fn find(&mut self, pose: &Isometry3<f64>, scale: f64) -> Sums {
         self.scale = scale;
         self.kernel = kernel(self.options, scale);
-        let placed = Placed::new(pose);
+        let placed = Placed::new(pose, &self.center);
         let mut slots = std::mem::take(&mut self.slots);
         let mut sums = Sums::default();
         for (layer, slots) in self.layers.iter().zip(&mut slots) {
@@ -162,7 +171,7 @@ impl<'a> Pairs<'a> {
     }
 
     fn each(&self, pose: &Isometry3<f64>, add: impl Fn(&mut Sums, &Pair, f64) + Sync) -> Sums {
-        let placed = Placed::new(pose);
+        let placed = Placed::new(pose, &self.center);
         let mut sums = Sums::default();
         for (layer, slots) in self.layers.iter().zip(&self.slots) {
             let chunks = slots.par_chunks(CHUNK * self.candidates).enumerate();
@@ -196,7 +205,7 @@ impl<'a> Pairs<'a> {
     ) -> Pair {
         let j = target as usize;
         let target = (&layer.target.points_m[j], &layer.target.normals[j]);
-        Pair::new(self.metric, &placed.p, source, target)
+        Pair::new(self.metric, &placed.center, source, target)
     }
 
     fn find_chunk(&self, layer: &Layer, placed: &Placed, first: usize, slots: &mut [Slot]) -> Sums {

@@ -239,3 +239,56 @@ fn options_beyond_reason_do_no_harm() {
         }
     }
 }
+
+#[test]
+fn clouds_far_from_the_origin_register_as_those_about_it() {
+    let truth = Isometry3::new(
+        Vector3::new(0.1, -0.05, 0.02),
+        Vector3::new(0.005, 0.01, 0.02),
+    );
+    let target = room(3000);
+    let source = moved(&target, &truth.inverse());
+    let start = off(&Isometry3::identity(), 0.01, 0.002);
+    // Beside the origin, 10 km off, in UTM, and 10,000 km off.
+    for far_m in [
+        Vector3::new(0.0, 60.0, -50.0),
+        Vector3::new(300.0, 0.0, 0.0),
+        Vector3::new(0.0, -10_000.0, 0.0),
+        Vector3::new(448_000.0, 5_411_000.0, 300.0),
+        Vector3::new(-1.0e7, 2.0e6, 1.0e7),
+    ] {
+        let away = Isometry3::from_parts(far_m.into(), Default::default());
+        let prepared = [&source, &target].map(|cloud| prepare(moved(cloud, &away)));
+        let [source, target] = &prepared;
+        // The same motion of the same points.
+        let about = |motion: &Isometry3<f64>| away * motion * away.inverse();
+        for method in NamedMethod::ALL {
+            let options = RegisterOptions {
+                min_class_points: 50,
+                ..method.options(1.0)
+            };
+            let found = register(source, target, &about(&start), &options);
+            let error = distance(&about_inverse(&away, &found.target_from_source), &truth);
+            let name = method.option;
+            assert!(found.converged, "{name} at {far_m:?}: {found:?}");
+            assert!(
+                error.0 < 3e-3 && error.1 < 2e-3,
+                "{name} at {far_m:?}: {error:?}"
+            );
+        }
+        let exact = precise(RegisterOptions::gicp(1.0));
+        let exact = RegisterOptions {
+            rotation_tolerance_rad: 1e-8,
+            translation_tolerance_m: 1e-7,
+            ..exact
+        };
+        let found = register(source, target, &about(&start), &exact);
+        let error = distance(&about_inverse(&away, &found.target_from_source), &truth);
+        assert!(found.converged && error.0 < 1e-6, "{far_m:?}: {error:?}");
+    }
+}
+
+/// A motion of points that were moved away, as that of the points before.
+fn about_inverse(away: &Isometry3<f64>, motion: &Isometry3<f64>) -> Isometry3<f64> {
+    away.inverse() * motion * away
+}

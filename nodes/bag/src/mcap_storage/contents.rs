@@ -11,6 +11,7 @@ use super::lengths::parse_record;
 use crate::{
     BagError, TopicInfo,
     storage::{StorageInfo, TopicIndex, full_type_name, lenient_qos, merge_topic},
+    topic::absolute_name,
 };
 
 /// A stretch of the file that is read as one: a chunk, or messages outside of chunks.
@@ -149,7 +150,7 @@ impl Contents {
         let qos = channel.metadata.get("offered_qos_profiles");
         let hash = channel.metadata.get("topic_type_hash");
         TopicInfo {
-            name: channel.topic.clone(),
+            name: absolute_name(&channel.topic),
             type_name: schema.map(|s| full_type_name(&s.name)).unwrap_or_default(),
             type_hash: hash.cloned().unwrap_or_default(),
             serialization_format: channel.message_encoding.clone(),

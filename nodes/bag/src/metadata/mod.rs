@@ -37,15 +37,20 @@ pub(crate) enum CompressionMode {
 #[serde(default)]
 pub(crate) struct Metadata {
     pub version: u32,
+    /// Not trusted: the storage files tell by their first bytes.
+    #[serde(deserialize_with = "null_is_default")]
     pub storage_identifier: String,
     pub duration: Nanoseconds,
     pub starting_time: StartingTime,
+    #[serde(deserialize_with = "lenient_count")]
     pub message_count: u64,
+    #[serde(deserialize_with = "null_is_default")]
     pub topics_with_message_count: Vec<CountedTopic>,
     #[serde(deserialize_with = "null_is_default")]
     pub compression_format: String,
     #[serde(deserialize_with = "null_is_default")]
     pub compression_mode: String,
+    #[serde(deserialize_with = "null_is_default")]
     pub relative_file_paths: Vec<String>,
     #[serde(deserialize_with = "null_is_default")]
     pub files: Vec<FileInformation>,
@@ -79,6 +84,7 @@ impl Default for StartingTime {
 #[derive(Clone, Debug, Serialize, Deserialize)]
 pub(crate) struct CountedTopic {
     pub topic_metadata: TopicMetadata,
+    #[serde(default, deserialize_with = "lenient_count")]
     pub message_count: u64,
 }
 
@@ -101,7 +107,7 @@ pub(crate) struct FileInformation {
     pub starting_time: StartingTime,
     #[serde(default)]
     pub duration: Nanoseconds,
-    #[serde(default)]
+    #[serde(default, deserialize_with = "lenient_count")]
     pub message_count: u64,
 }
 
@@ -169,6 +175,17 @@ impl Metadata {
         range_ns(self.starting_time, self.duration, self.message_count)
     }
 
+    /// True if there are messages, and the counts of topics and of files add up to their number.
+    pub(crate) fn has_consistent_counts(&self) -> bool {
+        let sum = |counts: &mut dyn Iterator<Item = u64>| counts.fold(0, u64::saturating_add);
+        let topics = self.topics_with_message_count.iter();
+        let of_topics = sum(&mut topics.map(|topic| topic.message_count));
+        let of_files = sum(&mut self.files.iter().map(|file| file.message_count));
+        self.message_count > 0
+            && of_topics == self.message_count
+            && (self.files.is_empty() || of_files == self.message_count)
+    }
+
     /// The text of `metadata.yaml`.
     pub(crate) fn to_text(&self) -> Result<String, serde_yaml::Error> {
         serde_yaml::to_string(&Document {
@@ -232,6 +249,12 @@ impl Metadata {
         };
         self.relative_file_paths.iter().map(safe).collect()
     }
+}
+
+/// A number of messages; one that is negative or no integer counts as 0.
+fn lenient_count<'de, D: serde::Deserializer<'de>>(deserializer: D) -> Result<u64, D::Error> {
+    let value = serde_yaml::Value::deserialize(deserializer)?;
+    Ok(value.as_u64().unwrap_or(0))
 }
 
 fn null_is_default<'de, D, T>(deserializer: D) -> Result<T, D::Error>

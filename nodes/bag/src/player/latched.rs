@@ -1,9 +1,10 @@
-//! The messages that a late joiner at some time of the recording would have been given.
+//! The messages that a late joiner at some time of the recording would have been given, and the static transforms that
+//! the log brings later.
 
 use std::collections::VecDeque;
 
 use super::{PlayedTopic, wanted};
-use crate::{BagMessage, BagQos, BagReader, storage::Filter};
+use crate::{BagMessage, BagReader, TopicInfo, storage::Filter, topic::STATIC_DEPTH};
 
 /// Messages kept of one topic.
 const MAX_PER_TOPIC: u64 = 1000;
@@ -11,21 +12,70 @@ const MAX_PER_TOPIC: u64 = 1000;
 const MAX_BYTES: usize = 256 << 20;
 
 /// Number of the last messages of a topic that its publishers kept together.
-fn kept(profiles: &[BagQos]) -> usize {
-    let depth = |qos: &BagQos| match qos.keep_all {
+fn kept(topic: &TopicInfo) -> usize {
+    let latched = topic.offered_qos.iter().filter(|qos| qos.latched);
+    let depths = latched.map(|qos| match qos.keep_all {
         true => MAX_PER_TOPIC,
         false => qos.depth.max(1),
+    });
+    let least = match topic.has_static_transforms() {
+        true => STATIC_DEPTH,
+        false => 1,
     };
-    let latched = profiles.iter().filter(|qos| qos.latched);
-    let total = latched
-        .map(depth)
-        .fold(0, u64::saturating_add)
-        .clamp(1, MAX_PER_TOPIC);
-    usize::try_from(total).unwrap_or(1)
+    let total = depths.fold(0, u64::saturating_add);
+    usize::try_from(total.clamp(least, MAX_PER_TOPIC)).unwrap_or(1)
+}
+
+/// The first messages of static transforms in a log, in order of log time and without those that say the same.
+///
+/// Reads no further than their number by the bag's index.
+pub(super) fn static_transforms(reader: &BagReader, topics: &[PlayedTopic]) -> Vec<BagMessage> {
+    let is_static = |topic: &&PlayedTopic| topic.info.has_static_transforms();
+    let topics: Vec<&PlayedTopic> = topics.iter().filter(is_static).collect();
+    let counts = topics.iter().map(|topic| topic.info.message_count);
+    let most = STATIC_DEPTH.saturating_mul(topics.len() as u64);
+    let count = counts.fold(0, u64::saturating_add).min(most);
+    let filter = Filter {
+        topics: wanted(reader, topics),
+        start_ns: i64::MIN,
+        end_ns: None,
+        past_damage: false,
+    };
+    let mut found: Vec<BagMessage> = Vec::new();
+    let count = usize::try_from(count).unwrap_or(usize::MAX);
+    // Damage is told of where it is played.
+    for message in reader.filtered(filter).take(count).map_while(Result::ok) {
+        let is_new =
+            |known: &BagMessage| known.topic != message.topic || known.data != message.data;
+        if found.iter().all(is_new) {
+            found.push(message);
+        }
+    }
+    found
+}
+
+/// What a late joiner at a time is given: first static transforms that come later, the earliest last, so that of one
+/// frame the value holds that is next in the log; then those and all other latched messages before that time.
+pub(super) fn given_at(
+    reader: &BagReader,
+    topics: &[PlayedTopic],
+    statics: &[BagMessage],
+    from_ns: i64,
+) -> VecDeque<BagMessage> {
+    let before = latched_before(reader, topics, from_ns);
+    let room = usize::try_from(STATIC_DEPTH)
+        .unwrap_or(1)
+        .saturating_sub(before.len());
+    let later = statics
+        .iter()
+        .filter(|message| message.log_time_ns > from_ns);
+    let mut later: Vec<BagMessage> = later.take(room).cloned().collect();
+    later.reverse();
+    later.into_iter().chain(before).collect()
 }
 
 /// The latched messages of `topics` before `before_ns`, in order of log time.
-pub(super) fn latched_before(
+fn latched_before(
     reader: &BagReader,
     topics: &[PlayedTopic],
     before_ns: i64,
@@ -62,7 +112,7 @@ pub(super) fn latched_before(
         let newest = message.topic;
         kept_messages.push_back(message);
         let of_topic = kept_messages.iter().filter(|m| m.topic == newest).count();
-        if of_topic > kept(&topic.info.offered_qos) {
+        if of_topic > kept(&topic.info) {
             bytes = bytes.saturating_sub(drop_oldest(&mut kept_messages, newest));
         }
         while bytes > MAX_BYTES {

@@ -12,7 +12,7 @@ mod timeline;
 use std::collections::VecDeque;
 
 use super::{BagError, BagMessage, BagReader, Messages, storage::Filter};
-use latched::latched_before;
+use latched::{given_at, static_transforms};
 pub use options::{PlayedTopic, PlayerOptions};
 use options::{RATES, ns_from_s};
 use timeline::Timeline;
@@ -48,6 +48,8 @@ pub struct Player {
     /// First log time no longer played.
     end_ns: Option<i64>,
     timeline: Timeline,
+    /// Static transforms of the whole log.
+    statics: Vec<BagMessage>,
     latched: VecDeque<BagMessage>,
     /// Bag time at which this pass began.
     pass_start_ns: i64,
@@ -64,7 +66,7 @@ pub struct Player {
 }
 
 impl Player {
-    /// Prepares to play. Reads what latched topics published before the start.
+    /// Prepares to play. Reads static transforms, and what latched topics published before the start.
     pub fn new(reader: BagReader, options: PlayerOptions) -> Result<Player, BagError> {
         options.check()?;
         let topics = options.topics(&reader)?;
@@ -79,6 +81,7 @@ impl Player {
             return Err(BagError::invalid("start_offset_s", reason));
         }
         let mut player = Player {
+            statics: static_transforms(&reader, &topics),
             topics,
             loops: options.loop_,
             start_ns,
@@ -171,8 +174,8 @@ impl Player {
         possible
     }
 
-    /// Goes on at another time of the bag, with what its latched topics published before. False: not
-    /// a time that is played.
+    /// Goes on at another time of the bag, with what its latched topics published before, and static transforms that
+    /// come later. False: not a time that is played.
     pub fn seek(&mut self, now_ns: i64, bag_ns: i64) -> Result<bool, BagError> {
         let (first_ns, last_ns) = (self.reader.start_ns(), self.reader.end_ns());
         let last_ns = last_ns.into_iter().chain(self.end_ns).min();
@@ -216,7 +219,7 @@ impl Player {
     fn start_pass(&mut self, from_ns: i64) {
         self.last_ns = None;
         self.pass_start_ns = from_ns;
-        self.latched = latched_before(&self.reader, &self.topics, from_ns);
+        self.latched = given_at(&self.reader, &self.topics, &self.statics, from_ns);
         self.messages = Some(self.reader.filtered(Filter {
             topics: wanted(&self.reader, &self.topics),
             start_ns: from_ns,

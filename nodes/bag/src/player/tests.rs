@@ -4,7 +4,7 @@ use std::{fs, path::Path};
 
 use super::*;
 use crate::{
-    BagWriter, Storage, WriterOptions,
+    BagWriter, Storage, TopicSpec, WriterOptions,
     tests::{cdr, spec},
 };
 
@@ -315,4 +315,76 @@ fn a_message_ahead_of_its_time_takes_the_time_along() {
     let last = play(&mut player, 20);
     assert_eq!(last[last.len() - 2..], ["/a 2", "end"]);
     assert_eq!(player.skip_to_next(3 * S).unwrap(), None);
+}
+
+/// A log of static transforms, recorded as volatile, at these seconds with these contents, and of `/a` at 0 to 9 s.
+fn statics(folder: &Path, namespace: &str, messages: &[(i64, i64)]) -> BagReader {
+    let path = folder.join("bag");
+    let options = WriterOptions {
+        overwrite: true,
+        ..WriterOptions::default()
+    };
+    let mut writer = BagWriter::create(&path, Storage::Mcap, options).unwrap();
+    let transforms = TopicSpec {
+        type_name: "tf2_msgs/msg/TFMessage".into(),
+        ..spec(&format!("{namespace}/tf_static"), false)
+    };
+    writer.add_topic(transforms).unwrap();
+    writer.add_topic(spec("/a", false)).unwrap();
+    for second in 0..10 {
+        writer.write(1, T0_NS + second * S, &cdr(0, 2)).unwrap();
+    }
+    for (second, content) in messages {
+        let data = cdr(*content, 2);
+        writer.write(0, T0_NS + second * S + 1, &data).unwrap();
+    }
+    writer.finish().unwrap();
+    BagReader::open(&path).unwrap()
+}
+
+/// Contents of the static transforms that are given at a place in the log, before its own messages.
+fn given(reader: BagReader, start_offset_s: f64) -> Vec<Vec<u8>> {
+    let options = PlayerOptions {
+        start_offset_s,
+        ..options()
+    };
+    let mut player = Player::new(reader, options).unwrap();
+    let mut found = Vec::new();
+    loop {
+        match player.next().unwrap() {
+            Step::Publish { topic, data } if player.topics()[topic].info.name != "/a" => {
+                found.push(data);
+            }
+            _ => return found,
+        }
+    }
+}
+
+#[test]
+fn static_transforms_hold_from_the_beginning_whatever_their_qos() {
+    let folder = tempfile::tempdir().unwrap();
+    let contents = |of: &[i64]| {
+        of.iter()
+            .map(|content| cdr(*content, 2))
+            .collect::<Vec<_>>()
+    };
+    for namespace in ["", "/robot"] {
+        // The earliest last, so that of one frame its first value holds at the beginning.
+        let all = [(3, 30), (5, 50), (5, 50), (7, 70)];
+        let reader = statics(folder.path(), namespace, &all);
+        assert!(reader.topics()[0].is_latched());
+        assert_eq!(given(reader.clone(), 0.0), contents(&[70, 50, 30]));
+        // What was sent before the place holds over what comes.
+        assert_eq!(given(reader.clone(), 4.0), contents(&[70, 50, 30]));
+        assert_eq!(given(reader, 9.0), contents(&[30, 50, 50, 70]));
+    }
+    // No more than a listener keeps.
+    let many: Vec<(i64, i64)> = (0..300).map(|i| (1, i)).collect();
+    let reader = statics(folder.path(), "", &many);
+    let found = given(reader, 0.0);
+    assert!(
+        found.len() <= 100 && found.last() == Some(&cdr(0, 2)),
+        "{}",
+        found.len()
+    );
 }

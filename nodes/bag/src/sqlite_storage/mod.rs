@@ -15,6 +15,7 @@ use tempfile::TempPath;
 use super::{
     BagError, TopicInfo,
     storage::{Filter, StorageInfo, StorageStream, full_type_name, lenient_qos},
+    topic::absolute_name,
 };
 use connection::{connect, missing_pages};
 use stream::{IMPLAUSIBLE, Key, SqliteStream};
@@ -113,7 +114,7 @@ impl SqliteFile {
                 text.map(Option::unwrap_or_default)
             };
             let topic = TopicInfo {
-                name: text(1)?,
+                name: absolute_name(&text(1)?),
                 type_name: full_type_name(&text(2)?),
                 serialization_format: text(3)?,
                 type_hash: text(5)?,

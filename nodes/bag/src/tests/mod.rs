@@ -3,6 +3,7 @@
 mod damage;
 mod foreign;
 mod recover;
+mod wrong_metadata;
 
 use std::{
     fs,

@@ -28,6 +28,8 @@ struct Summary {
     files: usize,
     bytes: u64,
     messages: u64,
+    /// By `metadata.yaml`; null where it counts as the storage files do.
+    metadata_messages: Option<u64>,
     start_ns: Option<i64>,
     end_ns: Option<i64>,
     start: Option<String>,
@@ -104,6 +106,7 @@ impl Summary {
             files: reader.files().count(),
             bytes: reader.files().map(size).sum(),
             messages: reader.message_count(),
+            metadata_messages: reader.miscounted(),
             start_ns,
             end_ns,
             start: start_ns.map(calendar::iso_8601),
@@ -125,7 +128,13 @@ impl Summary {
             println!("end       {end}");
             println!("duration  {}", calendar::duration(self.duration_s));
         }
-        println!("messages  {}\n", self.messages);
+        match self.metadata_messages {
+            None => println!("messages  {}\n", self.messages),
+            Some(claimed) => println!(
+                "messages  {} ({claimed} by metadata.yaml, which is wrong)\n",
+                self.messages
+            ),
+        }
         let has_bytes = self.topics.iter().any(|topic| topic.bytes.is_some());
         let mut rows = vec![Topic::head(has_bytes)];
         rows.extend(self.topics.iter().map(|topic| topic.row(has_bytes)));

@@ -5,7 +5,7 @@ use std::fmt;
 use lattice_core::registration::{
     Calibration, DirectionKind, Profile, Registration, p_wrong_in_words,
 };
-use nalgebra::Isometry3;
+use nalgebra::{Isometry3, UnitQuaternion, Vector3};
 use serde::Serialize;
 
 use std::collections::BTreeMap;
@@ -19,6 +19,10 @@ pub struct Answer {
     method: String,
     converged: Option<bool>,
     map_from_cloud: Pose,
+    /// Middle of a cloud that is far from its origin, and its place in the map (m): covariance and sigmas are of that
+    /// point. None of a cloud near its origin, of which they are.
+    cloud_middle_m: Option<[f64; 3]>,
+    middle_in_map_m: Option<[f64; 3]>,
     /// Row-major over x, y, z (m) and turns about x, y, z (rad), map frame; None without a verdict.
     covariance: Option<Vec<f64>>,
     sigma_m: Option<[f64; 3]>,
@@ -167,6 +171,21 @@ impl Answer {
         }
     }
 
+    /// Turns the pose of a cloud about its middle into that of the cloud; `scaled` if it is that of the cloud times its
+    /// scale.
+    pub fn place_origin(&mut self, middle_m: &Vector3<f64>, scaled: bool) {
+        if *middle_m == Vector3::zeros() {
+            return;
+        }
+        let pose = &mut self.map_from_cloud;
+        let rotation = UnitQuaternion::new_unchecked(pose.rotation_xyzw.into());
+        let scale = self.scale.filter(|_| scaled).unwrap_or(1.0);
+        let middle_in_map = Vector3::from(pose.translation_m);
+        pose.translation_m = (middle_in_map - rotation * middle_m * scale).into();
+        self.cloud_middle_m = Some((*middle_m).into());
+        self.middle_in_map_m = Some(middle_in_map.into());
+    }
+
     /// The reason not to use the pose, if there is one.
     pub fn refusal(&self) -> Option<String> {
         match (self.verdict, self.converged) {
@@ -201,10 +220,18 @@ impl fmt::Display for Answer {
         writeln!(f, "translation    {x:.4} {y:.4} {z:.4} m")?;
         let [qx, qy, qz, qw] = self.map_from_cloud.rotation_xyzw;
         let yaw_deg = self.map_from_cloud.yaw_deg;
+        // A millionth turns a place in UTM by metres.
+        let digits = if self.cloud_middle_m.is_some() { 12 } else { 6 };
         writeln!(
             f,
-            "rotation       {qx:.6} {qy:.6} {qz:.6} {qw:.6} (x y z w), yaw {yaw_deg:.3} deg"
+            "rotation       {qx:.digits$} {qy:.digits$} {qz:.digits$} {qw:.digits$} (x y z w), yaw {yaw_deg:.3} deg"
         )?;
+        if let (Some([x, y, z]), Some([mx, my, mz])) = (self.cloud_middle_m, self.middle_in_map_m) {
+            writeln!(
+                f,
+                "middle         {x:.0} {y:.0} {z:.0} m in the cloud is {mx:.4} {my:.4} {mz:.4} m; sigma is of this point"
+            )?;
+        }
         if let (Some([x, y, z]), Some([rx, ry, rz])) = (self.sigma_m, self.sigma_deg) {
             writeln!(
                 f,

@@ -10,14 +10,17 @@ use lattice_core::registration::{Confusion, HeadsetScan, SemanticCloud, voxel_do
 use nalgebra::{Isometry3, Point3, Quaternion, Translation3, UnitQuaternion, Vector3};
 
 use crate::CliResult;
+use lattice_nodes::files::points::PointFileOptions;
 use lattice_nodes::files::semantic::read_semantic;
 
 /// Least side of the cells of a map that is a point file, metres.
 const MIN_CELL_M: f64 = 0.05;
 /// Sides of cells on the diagonal of a map that is a point file.
 const CELLS_A_DIAGONAL: f64 = 400.0;
-/// Cells that thinning counts from the origin, about.
-const MOST_CELLS: f64 = 1e6;
+/// Cells along an axis that thinning tells apart wherever the cloud is.
+const MOST_CELLS: f64 = 5e5;
+/// Distance of the middle of clouds from their origin from which on they are registered about their middle, m.
+const FAR_M: f64 = 1000.0;
 /// Longest file of a learned confusion, bytes.
 const MAX_CONFUSION_BYTES: u64 = 1 << 20;
 
@@ -83,38 +86,44 @@ fn numbers(text: &str) -> Result<Vec<f64>, String> {
 pub fn map(
     path: &Path,
     cell_side_m: Option<f64>,
-    max_points: usize,
+    options: &PointFileOptions,
 ) -> CliResult<(SemanticCloud, f64)> {
-    let file = read_semantic(path, max_points)?.with_points(path)?;
+    let file = read_semantic(path, options)?.with_points(path)?;
     if let (Some(side_m), None) = (file.cell_side_m, cell_side_m) {
         return Ok((file.cloud, side_m));
     }
-    let side_m = cell_side_m.unwrap_or_else(|| usual_cell_m(&file.cloud));
-    let farthest = |cloud: &SemanticCloud| {
-        let coordinates = cloud.points_m.iter().flat_map(|p| p.coords.iter());
-        coordinates.fold(0.0_f64, |most, c| most.max(c.abs()))
-    };
-    let least_m = farthest(&file.cloud) / MOST_CELLS;
+    let size_m = size_m(&file.cloud);
+    let side_m = cell_side_m.unwrap_or((size_m.norm() / CELLS_A_DIAGONAL).max(MIN_CELL_M));
+    let least_m = size_m.max() / MOST_CELLS;
     if side_m < least_m {
         let here = path.display();
+        let longest_m = size_m.max();
         return Err(format!(
-            "cells of {side_m} m are too small for {here}, which reaches {:.1} m from its origin: \
-             take at least {least_m:.1e}",
-            least_m * MOST_CELLS
+            "cells of {side_m} m are too small for {here}, which is {longest_m:.1} m long: take {least_m:.1e} m or more \
+             (`--cell`), or leave out what lies far away"
         )
         .into());
     }
     Ok((voxel_downsample(&file.cloud, side_m), side_m))
 }
 
-fn usual_cell_m(cloud: &SemanticCloud) -> f64 {
+/// Lengths of the box around a cloud.
+fn size_m(cloud: &SemanticCloud) -> Vector3<f64> {
     let mut low = Point3::from([f64::INFINITY; 3]);
     let mut high = Point3::from([f64::NEG_INFINITY; 3]);
     for point in &cloud.points_m {
         low = low.inf(point);
         high = high.sup(point);
     }
-    ((high - low).norm() / CELLS_A_DIAGONAL).max(MIN_CELL_M)
+    high - low
+}
+
+/// Clouds about a point of their own frame.
+pub struct Scans {
+    /// Their points and sensors, from that point.
+    pub scans: Vec<HeadsetScan>,
+    /// The point: their origin, or in whole metres their middle if that is far away, as in UTM.
+    pub middle_m: Vector3<f64>,
 }
 
 /// The clouds, in the axes of ROS.
@@ -122,16 +131,46 @@ pub fn headset_scans(
     paths: &[PathBuf],
     axes: Axes,
     sensor_m: Option<Point3<f64>>,
-    max_points: usize,
-) -> CliResult<Vec<HeadsetScan>> {
-    let read = |path: &PathBuf| {
-        let mut cloud = read_semantic(path, max_points)?.with_points(path)?.cloud;
+    options: &PointFileOptions,
+) -> CliResult<Scans> {
+    let read = |path: &PathBuf| -> CliResult<HeadsetScan> {
+        let mut cloud = read_semantic(path, options)?.with_points(path)?.cloud;
         for point in &mut cloud.points_m {
             *point = axes.point_to_ros(point);
         }
         Ok(HeadsetScan { cloud, sensor_m })
     };
-    paths.iter().map(read).collect()
+    let scans = paths.iter().map(read).collect::<CliResult<Vec<_>>>()?;
+    Ok(Scans::about_middle(scans))
+}
+
+impl Scans {
+    fn about_middle(mut scans: Vec<HeadsetScan>) -> Self {
+        let median = |axis: usize, _| {
+            let points = scans.iter().flat_map(|scan| &scan.cloud.points_m);
+            let mut values: Vec<f64> = points.filter_map(|p| p.coords.get(axis).copied()).collect();
+            let middle = values.len() / 2;
+            match values.get(middle) {
+                None => 0.0,
+                Some(_) => *values.select_nth_unstable_by(middle, f64::total_cmp).1,
+            }
+        };
+        let mut middle_m = Vector3::from_fn(median).map(f64::round);
+        if middle_m.norm() <= FAR_M {
+            middle_m = Vector3::zeros();
+        }
+        for scan in &mut scans {
+            for point in scan.cloud.points_m.iter_mut().chain(&mut scan.sensor_m) {
+                *point -= middle_m;
+            }
+        }
+        Self { scans, middle_m }
+    }
+
+    /// A pose of the clouds as one of the point that they are about.
+    pub fn from_middle(&self, map_from_cloud: &Isometry3<f64>) -> Isometry3<f64> {
+        map_from_cloud * Translation3::from(self.middle_m)
+    }
 }
 
 /// The confusion that earlier calibrations learned, if there is a file.
@@ -189,6 +228,39 @@ mod tests {
             "1 2".parse::<Place>().unwrap_err(),
             "2 numbers instead of 3"
         );
+    }
+
+    #[test]
+    fn clouds_that_are_far_away_are_taken_about_their_middle() {
+        let cloud = |at: [f64; 3]| HeadsetScan {
+            cloud: SemanticCloud::unlabelled(vec![
+                Point3::from(at) + Vector3::new(-3.0, 1.0, 0.25),
+                Point3::from(at),
+                Point3::from(at) + Vector3::new(5.0, -1.0, 0.5),
+            ]),
+            sensor_m: Some(Point3::from(at)),
+        };
+        let pose: Guess = "1 2 3 90".parse().unwrap();
+        for (at, expected) in [
+            ([999.0, 0.0, 0.0], [0.0; 3]),
+            ([1001.0, 0.25, 0.0], [1001.0, 0.0, 0.0]),
+            (
+                [448_000.5, 5_411_000.25, 300.0],
+                [448_001.0, 5_411_000.0, 300.0],
+            ),
+            ([-1e7, 0.0, 1e7], [-1e7, 0.0, 1e7]),
+        ] {
+            let before = cloud(at);
+            let scans = Scans::about_middle(vec![before.clone()]);
+            assert_eq!(scans.middle_m, Vector3::from(expected));
+            let about = scans.from_middle(&pose.0);
+            let after = &scans.scans[0];
+            let points = before.cloud.points_m.iter().zip(&after.cloud.points_m);
+            for (old, new) in points.chain(before.sensor_m.iter().zip(&after.sensor_m)) {
+                assert!((pose.0 * old - about * new).norm() < 1e-8);
+            }
+        }
+        assert_eq!(Scans::about_middle(Vec::new()).middle_m, Vector3::zeros());
     }
 
     #[test]

@@ -45,7 +45,7 @@ impl MethodName {
 pub fn register_once(
     method: &RegisterOptions,
     (map, cell_side_m): (SemanticCloud, f64),
-    headset_scans: Vec<HeadsetScan>,
+    headset_scans: &[HeadsetScan],
     start: &Isometry3<f64>,
     times: &mut Times,
 ) -> Result<(Registration, usize), String> {
@@ -62,14 +62,14 @@ pub fn register_once(
 }
 
 /// All headset scans as one cloud; points of headset scans without labels are unlabelled.
-fn together(headset_scans: Vec<HeadsetScan>) -> SemanticCloud {
+fn together(headset_scans: &[HeadsetScan]) -> SemanticCloud {
     let labelled = headset_scans.iter().any(|s| !s.cloud.labels.is_empty());
     let mut all = SemanticCloud::default();
     for HeadsetScan { cloud, .. } in headset_scans {
         if labelled {
             all.labels.extend((0..cloud.len()).map(|i| cloud.label(i)));
         }
-        all.points_m.extend(cloud.points_m);
+        all.points_m.extend(&cloud.points_m);
     }
     all
 }

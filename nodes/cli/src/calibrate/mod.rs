@@ -16,7 +16,9 @@ use lattice_core::registration::{
     CalibrationMap, CalibrationOptions, CalibrationRequest, HeadsetScan, SemanticCloud, Stage,
     Verdict, calibrate,
 };
+use nalgebra::Isometry3;
 
+use super::points::Columns;
 use super::progress::Progress;
 use super::{CliResult, init_logging};
 use answer::{Answer, Times};
@@ -69,6 +71,8 @@ pub struct Calibrate {
     /// Most points to read of a file
     #[arg(long, default_value_t = 20_000_000)]
     max_points: usize,
+    #[command(flatten)]
+    columns: Columns,
     /// Print as JSON
     #[arg(long)]
     json: bool,
@@ -89,32 +93,39 @@ impl Calibrate {
             None => BTreeMap::new(),
         };
         let started = Instant::now();
-        let (map, cell_side_m) = input::map(&self.map, self.cell, self.max_points)?;
+        let files = self.cloud.iter().chain([&self.map]).map(PathBuf::as_path);
+        let reading = self
+            .columns
+            .options(self.max_points, &files.collect::<Vec<_>>())?;
+        let (map, cell_side_m) = input::map(&self.map, self.cell, &reading)?;
         let sensor_m = self.sensor.as_ref().map(|p| self.axes.point_to_ros(&p.0));
-        let headset_scans =
-            input::headset_scans(&self.cloud, self.axes, sensor_m, self.max_points)?;
+        let clouds = input::headset_scans(&self.cloud, self.axes, sensor_m, &reading)?;
+        let headset_scans = &clouds.scans;
+        let start = self
+            .guess
+            .as_ref()
+            .map(|guess| clouds.from_middle(&guess.0));
         let mut times = Times {
             read_ms: milliseconds(started),
             ..Times::default()
         };
-        let options = self.search.options(self.axes, most, &headset_scans)?;
+        let options = self.search.options(self.axes, most, headset_scans)?;
         let points = headset_scans.iter().map(|scan| scan.cloud.len()).sum();
         let map_points = map.len();
         let mut answer = match self.method.single(self.gate) {
             Some(method) => {
-                let start = self.guess.as_ref().map(|g| g.0).unwrap_or_default();
+                let start = start.unwrap_or(clouds.from_middle(&Isometry3::identity()));
                 let map = (map, cell_side_m);
                 let registration = register_once(&method, map, headset_scans, &start, &mut times)?;
                 Answer::of_registration(self.method.name(), &registration)
             }
-            None => self.find(
-                (map, cell_side_m),
-                &headset_scans,
-                &options,
-                &names,
-                &mut times,
-            )?,
+            None => {
+                let map = (map, cell_side_m);
+                let scans = (headset_scans.as_slice(), start);
+                self.find(map, scans, &options, &names, &mut times)?
+            }
         };
+        answer.place_origin(&clouds.middle_m, self.search.scales());
         (answer.points, answer.map_points, answer.times) = (points, map_points, times);
         if self.json {
             println!("{}", serde_json::to_string_pretty(&answer)?);
@@ -142,7 +153,7 @@ impl Calibrate {
     fn find(
         &self,
         (map, cell_side_m): (SemanticCloud, f64),
-        headset_scans: &[HeadsetScan],
+        (headset_scans, start): (&[HeadsetScan], Option<Isometry3<f64>>),
         options: &CalibrationOptions,
         names: &BTreeMap<u16, String>,
         times: &mut Times,
@@ -159,7 +170,7 @@ impl Calibrate {
         times.map_ms = milliseconds(started);
         let request = CalibrationRequest {
             headset_scans,
-            start: self.guess.as_ref().map(|guess| guess.0),
+            start,
             confusion: known.as_ref(),
         };
         let started = Instant::now();

@@ -101,6 +101,11 @@ fn within(
 }
 
 impl SearchOptions {
+    /// True if the pose is that of the cloud scaled to the map.
+    pub fn scales(&self) -> bool {
+        self.estimate_scale
+    }
+
     /// The options of a calibration of clouds that were read as `axes`.
     ///
     /// # Errors

@@ -5,7 +5,7 @@ use clap::Args;
 use clap::builder::{PossibleValuesParser, TypedValueParser};
 use lattice_core::registration::{NamedMethod, PrepareOptions, RegisterOptions, SemanticCloud};
 use lattice_lab::bench::{self, RegisterSetup};
-use lattice_nodes::files::points::{PointFileLimits, read_points};
+use lattice_nodes::files::points::{PointFileOptions, read_points};
 use std::path::{Path, PathBuf};
 
 /// Options of `lattice bench register`.
@@ -88,7 +88,7 @@ impl Register {
 }
 
 fn points(path: &Path) -> Result<SemanticCloud, String> {
-    let file = read_points(path, &PointFileLimits::default())
+    let file = read_points(path, &PointFileOptions::default())
         .map_err(|error| format!("{}: {error}", path.display()))?;
     let points_m = file.points_m.into_iter().map(Into::into).collect();
     Ok(SemanticCloud::unlabelled(points_m))

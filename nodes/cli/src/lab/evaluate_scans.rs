@@ -11,6 +11,7 @@ use super::evaluate_many::Many;
 use crate::CliResult;
 use crate::calibrate::input::{self, Place};
 use crate::calibrate::options::SearchOptions;
+use crate::points::Columns;
 
 /// Options of `lattice evaluate scans`.
 #[derive(Args)]
@@ -40,6 +41,8 @@ pub struct OfScans {
     #[arg(long, default_value_t = 20_000_000)]
     max_points: usize,
     #[command(flatten)]
+    columns: Columns,
+    #[command(flatten)]
     many: Many,
     #[command(flatten)]
     search: SearchOptions,
@@ -49,10 +52,14 @@ impl OfScans {
     /// Runs the command.
     pub fn run(self) -> CliResult {
         let truth = self.truth.as_deref().map(read_pose).transpose()?;
-        let map = input::map(&self.map, self.cell, self.max_points)?;
+        let files = [self.map.as_path(), &self.cloud];
+        let reading = self.columns.options(self.max_points, &files)?;
+        let map = input::map(&self.map, self.cell, &reading)?;
         let sensor_m = self.sensor.as_ref().map(|p| self.axes.point_to_ros(&p.0));
         let paths = std::slice::from_ref(&self.cloud);
-        let scans = input::headset_scans(paths, self.axes, sensor_m, self.max_points)?;
+        let clouds = input::headset_scans(paths, self.axes, sensor_m, &reading)?;
+        let truth = truth.map(|truth| clouds.from_middle(&truth));
+        let scans = clouds.scans;
         let options = self.search.options(self.axes, self.max_points, &scans)?;
         let scan = scans.into_iter().next().ok_or("there is no scan")?;
         let scans = Scans::new(map, scan, truth, options)?;

@@ -196,7 +196,7 @@ fn faults_are_one_line() {
         ),
         (
             [&common[..], &["--cell", "1e-9"]].concat(),
-            "take at least 6",
+            "or more (`--cell`)",
         ),
         (
             [&common[..], &["--min-inliers", "40"]].concat(),
@@ -270,4 +270,84 @@ fn axes_and_scale_that_are_wrong_are_told_and_thresholds_can_be_set() {
     );
     let found = ask(&ros, &["--min-inliers", "1"]);
     assert!(found["verdict"] == "OK" || reason(&found).contains("100 % are needed"));
+}
+
+#[test]
+fn maps_and_clouds_in_utm_are_registered_as_those_about_their_origin() {
+    let folder = tempfile::tempdir().unwrap();
+    let (room, utm) = (
+        Labelled::room(),
+        Vector3::new(448_007.4, 5_410_997.1, 298.5),
+    );
+    // Doubles: single precision has steps of half a metre there.
+    let write = |of: &Labelled, name: &str, by: Vector3<f64>| {
+        let path = of.write(folder.path(), name, |p| (p + by).coords.into());
+        let text = std::fs::read_to_string(&path).unwrap();
+        std::fs::write(&path, text.replace("float", "double")).unwrap();
+        path
+    };
+    let seen = seen(&room);
+    let (map, cloud) = ("map.ply", "cloud.ply");
+    let near = [
+        write(&room, map, Vector3::zeros()),
+        write(&seen, cloud, Vector3::zeros()),
+    ];
+    let far = [
+        write(&room, "far_map.ply", utm),
+        write(&seen, "far_cloud.ply", utm),
+    ];
+    let found = |map: &str, cloud: &str, more: &[&str]| {
+        let arguments = ["--map", map, "--cloud", cloud, "--cell", "0.08", "--json"];
+        let output = calibrate(&[&arguments[..], more].concat());
+        let errors = String::from_utf8_lossy(&output.stderr);
+        assert!(output.status.success(), "{map} {cloud} {more:?}: {errors}");
+        answer(&output)
+    };
+    let pose = |answer: &Value| {
+        let list = |key: &str| -> Vec<f64> {
+            serde_json::from_value(answer["map_from_cloud"][key].clone()).unwrap()
+        };
+        let (t, q) = (list("translation_m"), list("rotation_xyzw"));
+        let turn = nalgebra::Quaternion::new(q[3], q[0], q[1], q[2]);
+        Isometry3::from_parts(
+            Vector3::from_column_slice(&t).into(),
+            nalgebra::UnitQuaternion::from_quaternion(turn),
+        )
+    };
+    let middle = truth().inverse() * Point3::new(3.0, 2.0, 1.0);
+    let far_guess = Isometry3::from_parts(utm.into(), Default::default()) * truth();
+    let words = |pose: &Isometry3<f64>| {
+        let (t, q) = (pose.translation.vector, pose.rotation.coords);
+        format!("{} {} {} {} {} {} {}", t.x, t.y, t.z, q.x, q.y, q.z, q.w)
+    };
+    let both = far_guess * nalgebra::Translation3::from(-utm);
+    let (one_far, both_far) = (words(&far_guess), words(&both));
+    let gicp = |guess| ["--method", "gicp", "--gate", "0.3", "--guess", guess];
+    for (files, shift, guess) in [
+        ([&far[0], &near[1]], Vector3::zeros(), one_far.as_str()),
+        ([&far[0], &far[1]], utm, both_far.as_str()),
+    ] {
+        for more in [&[][..], &["--guess", guess], &gicp(guess)] {
+            let answer = found(files[0], files[1], more);
+            let error = pose(&answer) * (middle + shift) - (truth() * middle + utm);
+            assert!(error.norm() < 0.03, "{more:?}: {error:?}");
+            assert_eq!(
+                answer["cloud_middle_m"].is_null(),
+                shift == Vector3::zeros()
+            );
+        }
+    }
+    let error = error(&[
+        "calibrate",
+        "--map",
+        &far[0],
+        "--cloud",
+        &near[1],
+        "--cell",
+        "0.00001",
+    ]);
+    assert!(
+        error.contains("is 6.0 m long: take 1.2e-5 m or more"),
+        "{error}"
+    );
 }

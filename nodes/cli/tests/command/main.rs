@@ -15,6 +15,7 @@ mod map;
 mod merger;
 mod names;
 mod nodes;
+mod odd;
 mod pages;
 mod paper;
 mod player;

@@ -157,7 +157,8 @@ fn a_quantization_that_leaves_points_out_fails_and_labels_are_kept() {
     );
     assert!(!std::path::Path::new(&map).exists());
     text(&quantize);
-    let read = lattice_nodes::files::semantic::read_semantic(map.as_ref(), 100).unwrap();
+    let options = lattice_nodes::files::points::PointFileOptions::default();
+    let read = lattice_nodes::files::semantic::read_semantic(map.as_ref(), &options).unwrap();
     let labels: Vec<_> = read.cloud.labels.iter().map(|label| label.top()).collect();
     assert_eq!(labels.len(), 60);
     assert!(labels.contains(&Some(0)) && labels.contains(&Some(1)));

@@ -58,7 +58,8 @@ pub fn read(path: &Path) -> Result<Vec<FileParam>, ParamFileError> {
         path: path.to_owned(),
         message: error.utf8_error().to_string(),
     })?;
-    parse(&text, path)
+    // Some editors put a byte order mark before a text.
+    parse(text.strip_prefix('\u{feff}').unwrap_or(&text), path)
 }
 
 /// Reads the text of a parameter file; `path` is for messages.

@@ -162,3 +162,16 @@ fn a_fifo_is_refused_and_not_waited_for() {
     let refused = refused.expect("reading waits for a writer");
     assert!(matches!(refused, Err(ParamFileError::NotAFile { .. })));
 }
+
+#[test]
+fn a_byte_order_mark_is_passed_over() {
+    let directory = tempfile::tempdir().unwrap();
+    let path = directory.path().join("windows.yaml");
+    let text = "mapper:\n  ros__parameters:\n    rate: 1.0\n";
+    std::fs::write(&path, text).unwrap();
+    let expected = read(&path).unwrap();
+    assert_eq!(expected.len(), 1);
+    let marked = format!("\u{feff}{}", text.replace('\n', "\r\n"));
+    std::fs::write(&path, marked).unwrap();
+    assert_eq!(read(&path).unwrap(), expected);
+}

@@ -31,7 +31,7 @@ pub fn write_labelled_ply(
 
 #[cfg(test)]
 mod tests {
-    use crate::files::points::{PointFileLimits, read_points};
+    use crate::files::points::{PointFileOptions, read_points};
 
     use super::*;
 
@@ -42,7 +42,7 @@ mod tests {
         let points = [Point3::new(4e5, -0.25, 1e-9), Point3::new(0.1, 0.2, 0.3)];
         let file = std::fs::File::create(&path).unwrap();
         write_labelled_ply(&points, &[12], "two\nend_header", file).unwrap();
-        let read = read_points(&path, &PointFileLimits::default()).unwrap();
+        let read = read_points(&path, &PointFileOptions::default()).unwrap();
         assert_eq!(read.points_m, points.map(<[f64; 3]>::from));
         assert_eq!(read.labels, [12, u16::MAX]);
     }

@@ -60,7 +60,7 @@ mod tests {
     use nalgebra::Vector3;
 
     use super::*;
-    use crate::files::points::{PointFile, PointFileLimits, read_points};
+    use crate::files::points::{PointFile, PointFileOptions, read_points};
 
     fn list(datum_m: Vector3<f64>, labels: Option<&[u16]>) -> VoxelList {
         let lattice = Lattice::new(LatticeKind::Cubic, 1.0).unwrap();
@@ -84,7 +84,7 @@ mod tests {
         std::fs::write(&path, &bytes).unwrap();
         (
             bytes,
-            read_points(&path, &PointFileLimits::default()).unwrap(),
+            read_points(&path, &PointFileOptions::default()).unwrap(),
         )
     }
 

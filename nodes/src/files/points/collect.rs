@@ -7,12 +7,19 @@ use super::PointFileError;
 /// Room that is made on the word of a header alone, points.
 const TRUSTED: u64 = 1 << 16;
 
+/// Most points of one place in a drawing: eight boxes meet in a corner, with three faces each.
+const MAX_CORNER: usize = 24;
+
 /// Takes points up to a limit, and leaves out those that are not finite.
 pub(super) struct Collector {
     pub(super) points_m: Vec<[f64; 3]>,
     /// One for each point, or none at all.
     pub(super) labels: Vec<u16>,
     pub(super) skipped: usize,
+    /// True if the points are rows and columns of a sensor.
+    pub(super) is_organized: bool,
+    /// What the file says beside its points that is not applied.
+    pub(super) remark: Option<String>,
     max_points: usize,
 }
 
@@ -22,6 +29,8 @@ impl Collector {
             points_m: Vec::new(),
             labels: Vec::new(),
             skipped: 0,
+            is_organized: false,
+            remark: None,
             max_points,
         }
     }
@@ -57,6 +66,34 @@ impl Collector {
             self.skipped += 1;
         }
         Ok(())
+    }
+
+    /// Leaves out points at 0 0 0, which drivers write for rays without return; their number. Some are kept where rows and
+    /// columns of a sensor do not tell that they are none: they may be a corner of a drawing.
+    pub(super) fn leave_out_no_returns(&mut self) -> usize {
+        let is_none = |point_m: &[f64; 3]| *point_m == [0.0; 3];
+        let count = self
+            .points_m
+            .iter()
+            .filter(|point_m| is_none(point_m))
+            .count();
+        if count <= MAX_CORNER && !self.is_organized {
+            return 0;
+        }
+        let mut at = self.points_m.iter();
+        self.labels
+            .retain(|_| at.next().is_none_or(|point_m| !is_none(point_m)));
+        self.points_m.retain(|point_m| !is_none(point_m));
+        count
+    }
+
+    /// Lines on what is left out or not applied.
+    pub(super) fn notes(&self, no_returns: usize) -> impl Iterator<Item = String> + '_ {
+        let of = self.points_m.len().saturating_add(no_returns);
+        let left_out = (no_returns > 0).then(|| {
+            format!("{no_returns} no returns left out: points at 0 0 0, of {of} finite ones")
+        });
+        left_out.into_iter().chain(self.remark.clone())
     }
 
     /// Takes a point with its label; all points of a file have one or none has.

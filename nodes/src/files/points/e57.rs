@@ -50,7 +50,7 @@ fn fault(error: impl ToString) -> PointFileError {
 mod tests {
     use ::e57::{E57Writer, Record, RecordValue};
 
-    use crate::files::points::{PointFileLimits, read_points};
+    use crate::files::points::{PointFileOptions, read_points};
 
     fn written() -> Vec<u8> {
         let folder = tempfile::tempdir().unwrap();
@@ -90,7 +90,13 @@ mod tests {
         let folder = tempfile::tempdir().unwrap();
         let path = folder.path().join("scan");
         std::fs::write(&path, bytes).unwrap();
-        let read = read_points(&path, &PointFileLimits { max_points });
+        let read = read_points(
+            &path,
+            &PointFileOptions {
+                max_points,
+                ..PointFileOptions::default()
+            },
+        );
         read.map(|file| file.points_m).map_err(|e| e.to_string())
     }
 

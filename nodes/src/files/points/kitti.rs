@@ -1,5 +1,5 @@
-//! KITTI Velodyne scans: records of x, y, z and intensity as little-endian f32, and nothing else; the labels
-//! of SemanticKITTI, a u32 for each point, are in a file beside.
+//! KITTI Velodyne scans: records of x, y, z and intensity as little-endian f32, and nothing else, or of other columns
+//! that the caller states; the labels of SemanticKITTI, a u32 for each point, are in a file beside.
 
 use std::fs::File;
 use std::io::BufReader;
@@ -7,13 +7,10 @@ use std::path::{Path, PathBuf};
 
 use lattice_core::registration::UNLABELED;
 
+use super::bin_layout::{BinLayout, check_kitti};
 use super::collect::Collector;
-use super::scalar::Scalar;
 use super::source::Source;
 use super::{PointFileError, PointFormat};
-
-/// Bytes of a point.
-const RECORD: usize = 16;
 
 /// The file with the labels of a scan: beside it, or in `labels` beside its folder, as SemanticKITTI has it.
 fn labels_of(scan: &Path) -> Option<PathBuf> {
@@ -71,25 +68,34 @@ impl Labels {
 }
 
 /// Reads a scan, with its labels if it has a name by which they are found.
+///
+/// Without a layout it is one of KITTI, and refused if it cannot be; `size_bytes` is its length where that is known.
 pub(super) fn read(
     source: &mut Source,
-    name: &Path,
+    (name, size_bytes): (&Path, Option<u64>),
+    layout: Option<BinLayout>,
     points: &mut Collector,
 ) -> Result<PointFormat, PointFileError> {
+    if layout.is_none() {
+        check_kitti(source.peek()?, size_bytes).map_err(|reason| PointFileError::Data {
+            format: PointFormat::KittiBin,
+            byte: 0,
+            reason,
+        })?;
+    }
+    let layout = layout.unwrap_or(BinLayout::KITTI);
+    let (bytes, scalar) = (layout.bytes(), layout.scalar);
     let mut labels = Labels::open(name)?;
-    let mut record = [0; RECORD];
+    let mut record = vec![0; bytes];
     let mut number = 0_u64;
     while !source.peek()?.is_empty() {
         number += 1;
-        source.exact(
-            &mut record,
-            format_args!("point {number} of {RECORD} bytes"),
-        )?;
-        let coordinate = |at: usize| {
-            let bytes = record.get(at..).unwrap_or_default();
-            Scalar::F32.decode(bytes).unwrap_or(f64::NAN)
+        source.exact(&mut record, format_args!("point {number} of {bytes} bytes"))?;
+        let coordinate = |axis: usize| {
+            let bytes = record.get(axis * scalar.size()..).unwrap_or_default();
+            scalar.decode(bytes).unwrap_or(f64::NAN)
         };
-        let point_m = [0, 4, 8].map(coordinate);
+        let point_m = [0, 1, 2].map(coordinate);
         match &mut labels {
             Some(labels) => points.push_labelled(point_m, labels.next(number)?)?,
             None => points.push(point_m)?,

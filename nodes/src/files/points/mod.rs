@@ -3,14 +3,16 @@
 //!
 //! Files are read as a stream, so that memory is bounded by the points kept and not by what a
 //! header promises. Coordinates are taken as they stand, in metres: the viewpoint of a PCD file and
-//! the like are not applied. Only the scans of an E57 file are placed by their poses, as they are meant.
+//! the like are not applied but warned of. Only the scans of an E57 file are placed by their poses, as they are meant.
 
+mod bin_layout;
 mod collect;
 #[cfg(feature = "survey")]
 mod e57;
 mod error;
 mod format;
 mod kitti;
+mod label;
 mod las;
 mod octree;
 mod pcd;
@@ -23,6 +25,7 @@ use std::fs::File;
 use std::io::{BufRead, BufReader};
 use std::path::{Path, PathBuf};
 
+pub use bin_layout::BinLayout;
 pub use error::PointFileError;
 pub use format::{PointFormat, is_named_as_points};
 
@@ -32,18 +35,21 @@ use source::Source;
 /// Bytes read from the disk at once.
 const BUFFER: usize = 1 << 16;
 
-/// Bounds of what a point file may ask for.
+/// Options of reading a point file.
 #[derive(Clone, Copy, PartialEq, Eq, Debug)]
-pub struct PointFileLimits {
+pub struct PointFileOptions {
     /// Most points that are taken.
     pub max_points: usize,
+    /// Columns of a `.bin` file; those of KITTI, which are checked, where nothing.
+    pub columns: Option<BinLayout>,
 }
 
-impl Default for PointFileLimits {
+impl Default for PointFileOptions {
     /// A hundred million points, 2.4 GB.
-    fn default() -> PointFileLimits {
-        PointFileLimits {
+    fn default() -> PointFileOptions {
+        PointFileOptions {
             max_points: 100_000_000,
+            columns: None,
         }
     }
 }
@@ -60,6 +66,8 @@ pub struct PointFile {
     pub format: PointFormat,
     /// Points left out because a coordinate was NaN or infinite.
     pub skipped_not_finite: usize,
+    /// Points left out because they were 0 0 0: rays without return.
+    pub no_returns: usize,
     /// Edge of the voxels whose centres the points are, metres, if the file is an octree.
     pub voxel_m: Option<f64>,
 }
@@ -67,11 +75,11 @@ pub struct PointFile {
 /// Reads the points of a file.
 ///
 /// The content decides on the format where it has a signature, otherwise the extension does.
-/// Errors do not name the file.
-pub fn read_points(path: &Path, limits: &PointFileLimits) -> Result<PointFile, PointFileError> {
+/// Errors do not name the file. What is left out or not applied of a file that is read is warned of.
+pub fn read_points(path: &Path, options: &PointFileOptions) -> Result<PointFile, PointFileError> {
     let (reader, name, is_packed) = unpack(path)?;
     let mut source = Source::new(reader);
-    let mut points = Collector::new(limits.max_points);
+    let mut points = Collector::new(options.max_points);
     let mut voxel_m = None;
     // LAZ and E57 are not read from the start to the end.
     let file = (!is_packed).then_some(path);
@@ -79,7 +87,11 @@ pub fn read_points(path: &Path, limits: &PointFileLimits) -> Result<PointFile, P
         format::Family::Ply => ply::read(&mut source, &mut points)?,
         format::Family::Pcd => pcd::read(&mut source, &mut points)?,
         format::Family::Text => text::read(&mut source, &mut points)?,
-        format::Family::Kitti => kitti::read(&mut source, &name, &mut points)?,
+        format::Family::Kitti => {
+            let size_bytes = file.and_then(|file| file.metadata().ok());
+            let named = (name.as_path(), size_bytes.map(|about| about.len()));
+            kitti::read(&mut source, named, options.columns, &mut points)?
+        }
         format::Family::Las => las::read(&mut source, file, &mut points)?,
         format::Family::E57 => read_e57(file, &mut points)?,
         format::Family::Octree => {
@@ -88,13 +100,28 @@ pub fn read_points(path: &Path, limits: &PointFileLimits) -> Result<PointFile, P
             format
         }
     };
+    let no_returns = points.leave_out_no_returns();
+    for note in points.notes(no_returns) {
+        log::warn!("{}: {note}", path.display());
+    }
     Ok(PointFile {
+        no_returns,
         points_m: points.points_m,
         labels: points.labels,
         format,
         skipped_not_finite: points.skipped,
         voxel_m,
     })
+}
+
+/// Reason for which a file has no points, of those that were left out.
+pub fn why_empty(not_finite: usize, no_returns: usize) -> String {
+    match (not_finite, no_returns) {
+        (0, 0) => "the file has no points".to_owned(),
+        (n, 0) => format!("none of its {n} points is finite"),
+        (0, n) => format!("all of its {n} points are 0 0 0, no returns"),
+        (a, b) => format!("its points are not finite ({a}) or 0 0 0, no returns ({b})"),
+    }
 }
 
 #[cfg(feature = "survey")]

@@ -9,7 +9,10 @@ use tempfile::TempDir;
 
 use super::*;
 
-const LIMITS: PointFileLimits = PointFileLimits { max_points: 50 };
+const LIMITS: PointFileOptions = PointFileOptions {
+    max_points: 50,
+    columns: None,
+};
 
 fn points() -> Vec<[f64; 3]> {
     (0..20)
@@ -92,7 +95,11 @@ fn read_bytes_within(
     let folder = TempDir::new().unwrap();
     let path = folder.path().join(name);
     std::fs::write(&path, bytes).unwrap();
-    read_points(&path, &PointFileLimits { max_points })
+    let options = PointFileOptions {
+        max_points,
+        ..LIMITS
+    };
+    read_points(&path, &options)
 }
 
 fn pack(bytes: &[u8]) -> Vec<u8> {
@@ -109,6 +116,7 @@ fn every_format_gives_the_same_points_packed_or_not() {
             labels: Vec::new(),
             format,
             skipped_not_finite: 0,
+            no_returns: 0,
             voxel_m: None,
         };
         assert_eq!(read_bytes(name, &bytes).unwrap(), expected, "{format}");
@@ -293,4 +301,30 @@ fn a_packed_file_that_is_cut_says_so_wherever_it_is_cut() {
         let error = read_points(&path, &LIMITS).unwrap_err().to_string();
         assert!(error.contains("the file is cut short"), "{length}: {error}");
     }
+}
+
+#[test]
+fn no_returns_go_with_their_labels() {
+    let head = |rows: u32| {
+        format!(
+            "VERSION 0.7\nFIELDS x y z label\nSIZE 4 4 4 4\nTYPE F F F I\nWIDTH {}\nHEIGHT {rows}\nDATA ascii\n",
+            32 / rows
+        )
+    };
+    let row = |i: u32| match i % 4 {
+        0 => format!("0 0 0 {i}\n"),
+        _ => format!("{i} 0 0 {i}\n"),
+    };
+    let lines: String = (0..32).map(row).collect();
+    let read = |rows| read_bytes("a.pcd", format!("{}{lines}", head(rows)).as_bytes()).unwrap();
+    let (plain, organized) = (read(1), read(4));
+    assert_eq!((plain.no_returns, plain.points_m.len()), (0, 32));
+    assert_eq!((organized.no_returns, organized.points_m.len()), (8, 24));
+    let pairs = organized.points_m.iter().zip(&organized.labels);
+    assert!(
+        pairs
+            .clone()
+            .all(|([x, _, _], label)| *x == f64::from(*label))
+    );
+    assert_eq!(pairs.len(), 24);
 }

@@ -1,6 +1,6 @@
 //! Every command of README and of the pages in `docs`, as a user types it.
 
-mod blocks;
+pub mod blocks;
 mod links;
 mod rules;
 

@@ -5,7 +5,7 @@ use crate::paper::streams::{Purpose, stream};
 use crate::simulate::house::{House, LaserView};
 use crate::simulate::{RANGE_NOISE_M, Survey, SurveyPattern};
 use crate::{AnyError, at};
-use lattice_nodes::files::points::{PointFileLimits, read_points};
+use lattice_nodes::files::points::{PointFileOptions, read_points};
 use std::path::Path;
 
 /// Points of a simulated scan.
@@ -101,7 +101,7 @@ fn site(options: &Options) -> Result<Scan, AnyError> {
 }
 
 fn file(path: &Path, number: usize, options: &Options) -> Result<Scan, AnyError> {
-    let file = read_points(path, &PointFileLimits::default());
+    let file = read_points(path, &PointFileOptions::default());
     let points_m = file.map_err(at(path))?.points_m;
     if points_m.is_empty() {
         return Err(at(path)("no points"));

@@ -1,6 +1,6 @@
 //! LAS files as other programs write them, and damaged ones.
 
-use crate::files::points::{PointFile, PointFileLimits, PointFormat, read_points};
+use crate::files::points::{PointFile, PointFileOptions, PointFormat, read_points};
 
 /// A record of a point of format 0 or 6.
 fn record(format: u8, steps: [i32; 3], class: u8) -> Vec<u8> {
@@ -68,7 +68,10 @@ fn read(bytes: &[u8]) -> Result<PointFile, String> {
     let folder = tempfile::tempdir().unwrap();
     let path = folder.path().join("scan.las");
     std::fs::write(&path, bytes).unwrap();
-    let limits = PointFileLimits { max_points: 5000 };
+    let limits = PointFileOptions {
+        max_points: 5000,
+        ..PointFileOptions::default()
+    };
     read_points(&path, &limits).map_err(|error| error.to_string())
 }
 

@@ -1,5 +1,7 @@
 //! The header of a PCD file.
 
+use super::viewpoint;
+use crate::files::points::label::label_among;
 use crate::files::points::scalar::Scalar;
 use crate::files::points::source::Source;
 use crate::files::points::{PointFileError, PointFormat};
@@ -16,6 +18,8 @@ pub(super) struct Header {
     pub(super) format: PointFormat,
     /// Number of points.
     pub(super) points: u64,
+    /// Rows of an organised cloud, else 1.
+    pub(super) rows: u64,
     /// Bytes of a point.
     pub(super) point_bytes: u64,
     /// Numbers of a point.
@@ -24,6 +28,8 @@ pub(super) struct Header {
     pub(super) axes: [Axis; 3],
     /// The class, if there is a field `label` of one number.
     pub(super) label: Option<Axis>,
+    /// Remark on the sensor's pose, if it is another than the origin.
+    pub(super) viewpoint: Option<String>,
 }
 
 /// Place of one number.
@@ -46,6 +52,7 @@ struct Lines {
     width: Option<u64>,
     height: Option<u64>,
     points: Option<u64>,
+    viewpoint: Option<String>,
 }
 
 impl Header {
@@ -84,7 +91,8 @@ impl Lines {
         let keyword = words.next().unwrap_or_default();
         let words: Vec<&str> = words.collect();
         match (keyword, words.as_slice()) {
-            ("VERSION", ["0.7" | ".7"]) | ("", _) | ("VIEWPOINT", _) => {}
+            ("VERSION", ["0.7" | ".7"]) | ("", _) => {}
+            ("VIEWPOINT", words) => self.viewpoint = viewpoint::remark(words),
             _ if keyword.starts_with('#') => {}
             ("FIELDS", names) => self.fields = names.iter().map(|&name| name.to_owned()).collect(),
             ("SIZE", sizes) => self.size = integers(sizes)?,
@@ -120,7 +128,8 @@ impl Lines {
         let (mut offset, mut column) = (0_u64, 0_u64);
         let (mut axes, mut label) = ([None; 3], None);
         let sizes = self.size.iter().zip(&self.kind).zip(count);
-        for (name, ((&size, kind), &count)) in self.fields.iter().zip(sizes) {
+        let label_at = label_among(self.fields.iter().map(String::as_str));
+        for (at, (name, ((&size, kind), &count))) in self.fields.iter().zip(sizes).enumerate() {
             let place = |scalar| Axis {
                 scalar,
                 offset,
@@ -131,7 +140,8 @@ impl Lines {
                     *axis = Some(place(coordinate(name, kind, size, count)?));
                 }
             }
-            if let ("label", Some(scalar), 1) = (name.as_str(), number_kind(kind, size), count) {
+            if let (true, Some(scalar), 1) = (label_at == Some(at), number_kind(kind, size), count)
+            {
                 label = Some(place(scalar));
             }
             column = column.saturating_add(count);
@@ -148,10 +158,12 @@ impl Lines {
         Ok(Header {
             format,
             points: self.points()?,
+            rows: self.height.unwrap_or(1),
             point_bytes: offset,
             columns: column,
             axes: [x, y, z],
             label,
+            viewpoint: self.viewpoint.clone(),
         })
     }
 

@@ -4,6 +4,7 @@
 mod data;
 mod header;
 mod lzf;
+mod viewpoint;
 
 use header::Header;
 
@@ -17,6 +18,8 @@ pub(super) fn read(
 ) -> Result<PointFormat, PointFileError> {
     let header = Header::read(source)?;
     points.promise(header.points)?;
+    points.is_organized = header.rows > 1;
+    points.remark.clone_from(&header.viewpoint);
     match header.format {
         PointFormat::PcdAscii => data::read_text(source, &header, points)?,
         PointFormat::PcdBinary => data::read_binary(source, &header, points)?,

@@ -1,6 +1,6 @@
 //! PLY: a header that names elements and their properties, and the elements, as text or binary.
 //!
-//! Points are the element `vertex`, with a number `label` if they have classes. Elements before it are passed over, what follows is not read.
+//! Points are the element `vertex`, with a number `label`, or of another usual name, if they have classes. Elements before it are passed over, what follows is not read.
 
 pub mod header;
 pub mod record;
@@ -10,6 +10,7 @@ use header::{Element, Header, Property};
 use lattice_core::registration::UNLABELED;
 
 use super::collect::Collector;
+use super::label::label_among;
 use super::source::Source;
 use super::{PointFileError, PointFormat};
 
@@ -29,7 +30,14 @@ pub(super) fn read(
             continue;
         }
         let axes = axes(element).map_err(fault)?;
-        let label = number(element, "label");
+        let names = element.properties.iter().map(|property| match property {
+            Property::Scalar { name, .. } => name.as_str(),
+            Property::List { .. } => "",
+        });
+        let label = label_among(names.clone());
+        let label_name = label
+            .and_then(|at| names.clone().nth(at))
+            .unwrap_or_default();
         points.promise(element.count)?;
         for number in 1..=element.count {
             let part = format_args!("vertex {number} of {}", element.count);
@@ -53,7 +61,7 @@ pub(super) fn read(
                 format: header.format,
                 byte: source.byte(),
                 reason: format!(
-                    "label {class} is no whole number from 0 to 65535 or -1, in {part}"
+                    "{label_name} {class} is no whole number from 0 to 65535 or -1, in {part}"
                 ),
             })?;
             points.push_labelled(point_m, class)?;

@@ -10,7 +10,7 @@ use lattice_core::lattice::{Lattice, LatticeKind};
 use lattice_core::registration::{
     PrepareOptions, PreparedCloud, RegisterOptions, SemanticCloud, register, voxel_downsample,
 };
-use lattice_nodes::files::points::{PointFileLimits, read_points};
+use lattice_nodes::files::points::{PointFileOptions, read_points};
 use nalgebra::{Isometry3, Vector3};
 use std::path::{Path, PathBuf};
 
@@ -207,7 +207,7 @@ fn side_of(points_m: &[[f32; 3]]) -> Option<f64> {
 }
 
 fn points(path: &Path) -> Result<Vec<[f32; 3]>, AnyError> {
-    let file = read_points(path, &PointFileLimits::default());
+    let file = read_points(path, &PointFileOptions::default());
     let file = file.map_err(at(path))?;
     let narrow = |p: &[f64; 3]| p.map(|x| x as f32);
     Ok(file.points_m.iter().map(narrow).collect())
