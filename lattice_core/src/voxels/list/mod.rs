@@ -23,7 +23,7 @@ use crate::cloud::Cloud;
 use crate::lattice::{BlockKey, Lattice, MortonKey};
 
 pub use changes::Changes;
-pub use insert::InsertReport;
+pub use insert::{InsertReport, PointColumns};
 pub use remove::NoStamps;
 pub use when_full::WhenFull;
 
