@@ -1,0 +1,107 @@
+//! Map files, and files that take their place whole: after an error the one before stays.
+
+use std::fs::{self, File, Permissions};
+use std::io::{self, BufReader, BufWriter, Read, Write};
+use std::os::unix::fs::PermissionsExt;
+use std::path::Path;
+
+use lattice_core::voxels::file::{MapContents, WriteOptions, max_voxels_of};
+use pyo3::PyResult;
+use tempfile::{Builder, NamedTempFile};
+
+use crate::errors::{of_map_file, of_path};
+use crate::threads::Stop;
+
+/// Reads a map file.
+pub fn load(path: &Path, stop: &Stop) -> PyResult<MapContents> {
+    let system = |error: io::Error| of_path(path, &error);
+    let file = File::open(path).map_err(system)?;
+    let bytes = file.metadata().map_err(system)?.len();
+    let reader = Stoppable { file, stop };
+    MapContents::read(BufReader::new(reader), max_voxels_of(bytes))
+        .map_err(|error| of_map_file(path, &error))
+}
+
+/// Writes a map file.
+pub fn save(map: &MapContents, path: &Path, options: &WriteOptions, stop: &Stop) -> PyResult<()> {
+    let write = |file: &mut File| {
+        let writer = Stoppable { file, stop };
+        map.write(BufWriter::with_capacity(1 << 16, writer), options)
+            .map_err(|error| of_map_file(path, &error))
+    };
+    replace(path, write, stop)
+}
+
+/// Writes a file beside the one that is there, then takes its place. A pipe or device is written at once.
+pub fn replace(
+    path: &Path,
+    write: impl Fn(&mut File) -> PyResult<()>,
+    stop: &Stop,
+) -> PyResult<()> {
+    let system = |error: io::Error| of_path(path, &error);
+    let found = fs::metadata(path);
+    if found.as_ref().is_ok_and(|found| found.is_dir()) {
+        return Err(system(io::Error::from_raw_os_error(libc::EISDIR)));
+    }
+    if found.as_ref().is_ok_and(|found| !found.is_file()) {
+        let mut file = File::options().write(true).open(path).map_err(system)?;
+        return write(&mut file);
+    }
+    let mut beside = beside(path).map_err(system)?;
+    if let Ok(found) = found {
+        let kept = beside.as_file().set_permissions(found.permissions());
+        kept.map_err(system)?;
+    }
+    write(beside.as_file_mut())?;
+    beside.as_file().sync_all().map_err(system)?;
+    if stop.is_set() {
+        return Err(system(io::Error::from_raw_os_error(libc::EINTR)));
+    }
+    beside.persist(path).map_err(|error| system(error.error))?;
+    Ok(())
+}
+
+/// A file of a name of its own in the folder of another.
+fn beside(path: &Path) -> io::Result<NamedTempFile> {
+    if path.file_name().is_none() {
+        return Err(io::Error::from_raw_os_error(libc::ENOENT));
+    }
+    let folder = path.parent().filter(|folder| *folder != Path::new(""));
+    let mut named = Builder::new();
+    let named = named.prefix(".").permissions(Permissions::from_mode(0o666));
+    named.tempfile_in(folder.unwrap_or(Path::new(".")))
+}
+
+/// A file that fails once nobody waits for it any more.
+pub struct Stoppable<'a, F> {
+    pub file: F,
+    pub stop: &'a Stop,
+}
+
+impl<F> Stoppable<'_, F> {
+    fn expect_waiting(&self) -> io::Result<()> {
+        // Not `Interrupted`, after which writers try again.
+        match self.stop.is_set() {
+            true => Err(io::Error::other("nobody waits for it any more")),
+            false => Ok(()),
+        }
+    }
+}
+
+impl<F: Read> Read for Stoppable<'_, F> {
+    fn read(&mut self, bytes: &mut [u8]) -> io::Result<usize> {
+        self.expect_waiting()?;
+        self.file.read(bytes)
+    }
+}
+
+impl<F: Write> Write for Stoppable<'_, F> {
+    fn write(&mut self, bytes: &[u8]) -> io::Result<usize> {
+        self.expect_waiting()?;
+        self.file.write(bytes)
+    }
+
+    fn flush(&mut self) -> io::Result<()> {
+        self.file.flush()
+    }
+}
