@@ -1,16 +1,17 @@
 //! Columns of a table, as engines return them, as integers.
 
+use std::collections::BTreeMap;
+use std::sync::Arc;
+
 use arrow_array::cast::AsArray;
 use arrow_array::types::{Float64Type, Int64Type};
 use arrow_array::{Array, ArrayRef, Int64Array, ListArray, RecordBatch};
 use arrow_cast::{CastOptions, cast_with_options};
 use arrow_schema::{DataType, Field, TimeUnit};
+use lattice_core::voxels::LabelCount;
 use pyo3::PyResult;
-use std::collections::BTreeMap;
-use std::sync::Arc;
 
 use crate::errors::{mistyped, refuse};
-use lattice_core::voxels::LabelCount;
 
 /// Integers of a column of a batch without nulls, whatever their width; `None` if there is no such column.
 pub fn integers(batch: &RecordBatch, name: &str) -> PyResult<Option<Int64Array>> {
@@ -41,8 +42,9 @@ fn as_integers(column: &ArrayRef, name: &str) -> PyResult<Int64Array> {
     let kind = column.data_type().clone();
     let column = match &kind {
         kind if kind.is_integer() => column,
-        // The sums of engines that count beyond 64 bits.
-        DataType::Decimal32(_, 0)
+        // The sums of engines that count beyond 64 bits, and nulls of no type.
+        DataType::Null
+        | DataType::Decimal32(_, 0)
         | DataType::Decimal64(_, 0)
         | DataType::Decimal128(_, 0)
         | DataType::Decimal256(_, 0) => column,

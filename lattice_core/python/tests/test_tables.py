@@ -39,13 +39,13 @@ def test_the_table_itself_and_its_metadata_are_the_map(map):
 
 
 def engines(map):
-    table = pa.table(map.to_arrow())
+    rows = pa.table(map.to_arrow())
     yield "polars", polars.DataFrame(map.to_arrow())
     yield "polars sorted", polars.DataFrame(map.to_arrow()).sort("count")
-    yield "duckdb", duckdb.sql("SELECT * FROM table ORDER BY count").to_arrow_table()
-    yield "duckdb relation", duckdb.sql("SELECT * FROM table")
+    yield "duckdb", duckdb.sql("SELECT * FROM rows ORDER BY count").to_arrow_table()
+    yield "duckdb relation", duckdb.sql("SELECT * FROM rows")
     if hasattr(pandas.DataFrame, "__arrow_c_stream__"):
-        frame = table.to_pandas()
+        frame = rows.to_pandas()
         for name in ["first_ns", "last_ns"]:
             if name in frame:
                 frame[name] = frame[name].astype("Int64")
@@ -97,22 +97,22 @@ def test_the_hint_to_sum_first_works(cloud, map, plain):
     expected = VoxelMap(LATTICE)
     expected.merge(plain)
     expected.merge(other)
-    both = pa.concat_tables([pa.table(plain.to_arrow()), pa.table(other.to_arrow())])
+    pair = pa.concat_tables([pa.table(plain.to_arrow()), pa.table(other.to_arrow())])
     for lattice in [None, LATTICE]:
         with pytest.raises(ValueError, match="sum them first"):
-            VoxelMap.from_arrow(both, lattice=lattice)
+            VoxelMap.from_arrow(pair, lattice=lattice)
     sums = "SUM(count) AS count, SUM(sum_x) AS sum_x, SUM(sum_y) AS sum_y, SUM(sum_z) AS sum_z"
-    summed = duckdb.sql(f"SELECT ix, iy, iz, {sums} FROM both GROUP BY ix, iy, iz")
+    summed = duckdb.sql(f"SELECT ix, iy, iz, {sums} FROM pair GROUP BY ix, iy, iz")
     by_duckdb = VoxelMap.from_arrow(summed, lattice=LATTICE)
-    frame = polars.DataFrame(both).group_by("ix", "iy", "iz").agg(polars.sum("count", "sum_x", "sum_y", "sum_z"))
+    frame = polars.DataFrame(pair).group_by("ix", "iy", "iz").agg(polars.sum("count", "sum_x", "sum_y", "sum_z"))
     by_polars = VoxelMap.from_arrow(frame, lattice=LATTICE)
-    by_pyarrow = both.group_by(["ix", "iy", "iz"]).aggregate([(name, "sum") for name in ("count", "sum_x", "sum_y", "sum_z")])
+    by_pyarrow = pair.group_by(["ix", "iy", "iz"]).aggregate([(name, "sum") for name in ("count", "sum_x", "sum_y", "sum_z")])
     by_pyarrow = by_pyarrow.rename_columns([name.replace("_sum", "") for name in by_pyarrow.column_names])
     by_pyarrow = VoxelMap.from_arrow(by_pyarrow, lattice=LATTICE)
     assert by_duckdb == by_polars == by_pyarrow == expected
     assert by_duckdb.points == expected.points
     # The metadata of one of the maps, kept by pyarrow, with the rows of both.
-    kept = summed.to_arrow_table().replace_schema_metadata(both.schema.metadata)
+    kept = summed.to_arrow_table().replace_schema_metadata(pair.schema.metadata)
     assert VoxelMap.from_arrow(kept) == expected and VoxelMap.from_arrow(kept).points == expected.points
     # Labels and stamps too.
     twice = pa.concat_tables([pa.table(map.to_arrow())] * 2)
@@ -124,7 +124,7 @@ def test_the_hint_to_sum_first_works(cloud, map, plain):
 
 def test_part_of_a_table_has_its_points(map, plain):
     table = pa.table(map.to_arrow())
-    part = table.filter(pa.compute.greater(table["count"], 6))
+    part = table.filter(pa.compute.greater(table["count"], 1))
     again = VoxelMap.from_arrow(part)
     assert again.points == pa.compute.sum(part["count"]).as_py() and len(again) == len(part)
     fewer = VoxelMap.from_arrow(table.select(["ix", "iy", "iz", "count", "sum_x", "sum_y", "sum_z"]), lattice=LATTICE)

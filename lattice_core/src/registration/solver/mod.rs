@@ -45,7 +45,7 @@ pub struct Registration {
     pub inliers: usize,
     /// Root of the weighted mean of the squared distances, metres.
     pub rmse_m: f64,
-    /// Hessian of the cost (its half: J^T W J) by a translation (m) and a rotation (rad) in the axes of the source.
+    /// Half the Hessian of the cost, J^T W J, by a translation (m) and a rotation (rad) in the axes of the source.
     pub hessian: Matrix6<f64>,
 }
 
