@@ -1,13 +1,15 @@
 //! Columns of a table, as engines return them, as integers.
 
 use std::collections::BTreeMap;
-use std::sync::Arc;
 
 use arrow_array::cast::AsArray;
-use arrow_array::types::{Float64Type, Int64Type};
-use arrow_array::{Array, ArrayRef, Int64Array, ListArray, RecordBatch};
-use arrow_cast::{CastOptions, cast_with_options};
-use arrow_schema::{DataType, Field, TimeUnit};
+use arrow_array::types::{
+    ArrowPrimitiveType, Decimal32Type, Decimal64Type, Decimal128Type, Float32Type, Float64Type,
+    Int8Type, Int16Type, Int32Type, Int64Type, TimestampMicrosecondType, TimestampMillisecondType,
+    TimestampNanosecondType, TimestampSecondType, UInt8Type, UInt16Type, UInt32Type, UInt64Type,
+};
+use arrow_array::{Array, ArrayRef, Int64Array, RecordBatch};
+use arrow_schema::{DataType, TimeUnit};
 use lattice_core::voxels::LabelCount;
 use pyo3::PyResult;
 
@@ -35,115 +37,132 @@ pub fn nullable_integers(batch: &RecordBatch, name: &str) -> PyResult<Option<Int
 }
 
 fn as_integers(column: &ArrayRef, name: &str) -> PyResult<Int64Array> {
-    let column = match column.data_type() {
-        DataType::Dictionary(_, values) => cast(column, values, name)?,
-        _ => column.clone(),
-    };
-    let kind = column.data_type().clone();
-    let column = match &kind {
-        kind if kind.is_integer() => column,
-        // The sums of engines that count beyond 64 bits, and nulls of no type.
-        DataType::Null
-        | DataType::Decimal32(_, 0)
-        | DataType::Decimal64(_, 0)
-        | DataType::Decimal128(_, 0)
-        | DataType::Decimal256(_, 0) => column,
-        DataType::Float32 | DataType::Float64 => {
-            let column = cast(&column, &DataType::Float64, name)?;
-            expect_whole(&column, name)?;
-            column
+    let of_time = name.ends_with("_ns");
+    match column.data_type() {
+        DataType::Int8 => each::<Int8Type>(column, name, |v| Some(v.into())),
+        DataType::Int16 => each::<Int16Type>(column, name, |v| Some(v.into())),
+        DataType::Int32 => each::<Int32Type>(column, name, |v| Some(v.into())),
+        DataType::Int64 => each::<Int64Type>(column, name, Some),
+        DataType::UInt8 => each::<UInt8Type>(column, name, |v| Some(v.into())),
+        DataType::UInt16 => each::<UInt16Type>(column, name, |v| Some(v.into())),
+        DataType::UInt32 => each::<UInt32Type>(column, name, |v| Some(v.into())),
+        DataType::UInt64 => each::<UInt64Type>(column, name, |v| v.try_into().ok()),
+        // Sums of engines that count beyond 64 bits.
+        DataType::Decimal32(_, 0) => each::<Decimal32Type>(column, name, |v| Some(v.into())),
+        DataType::Decimal64(_, 0) => each::<Decimal64Type>(column, name, Some),
+        DataType::Decimal128(_, 0) => each::<Decimal128Type>(column, name, |v| v.try_into().ok()),
+        // What engines widen.
+        DataType::Float32 => each::<Float32Type>(column, name, |v| whole(v.into())),
+        DataType::Float64 => each::<Float64Type>(column, name, whole),
+        DataType::Timestamp(unit, _) if of_time => match unit {
+            TimeUnit::Second => times::<TimestampSecondType>(column, name, 1_000_000_000),
+            TimeUnit::Millisecond => times::<TimestampMillisecondType>(column, name, 1_000_000),
+            TimeUnit::Microsecond => times::<TimestampMicrosecondType>(column, name, 1000),
+            TimeUnit::Nanosecond => times::<TimestampNanosecondType>(column, name, 1),
+        },
+        DataType::Null => Ok(Int64Array::new_null(column.len())),
+        DataType::Dictionary(..) => {
+            let packed = column.as_any_dictionary();
+            let values = as_integers(packed.values(), name)?;
+            if values.is_empty() {
+                return Ok(Int64Array::new_null(column.len()));
+            }
+            let keys = packed.normalized_keys();
+            let value = |(row, key): (usize, &usize)| {
+                let known = column.is_valid(row) && *key < values.len() && values.is_valid(*key);
+                known.then(|| values.value(*key))
+            };
+            Ok(keys.iter().enumerate().map(value).collect())
         }
-        DataType::Timestamp(_, zone) if name.ends_with("_ns") => {
-            let kind = DataType::Timestamp(TimeUnit::Nanosecond, zone.clone());
-            cast(&column, &kind, name)?
-        }
-        other => {
-            return Err(mistyped(format!(
-                "column {name:?} is of {other}, not integers"
-            )));
-        }
-    };
-    let column = cast(&column, &DataType::Int64, name)?;
-    let integers = column.as_primitive_opt::<Int64Type>().cloned();
-    integers.ok_or_else(|| mistyped(format!("column {name:?} is of {kind}, not integers")))
-}
-
-/// Doubles are whole numbers, up to 2^53, in a column of integers that an engine has widened.
-fn expect_whole(column: &ArrayRef, name: &str) -> PyResult<()> {
-    let most = (1_u64 << 53) as f64;
-    let whole = |value: f64| value.fract() == 0.0 && value.abs() <= most;
-    let values = column.as_primitive::<Float64Type>().iter().flatten();
-    match values.into_iter().find(|value| !whole(*value)) {
-        Some(value) => Err(refuse(format!(
-            "column {name:?} has {value}, which is no integer up to 2^53"
+        other => Err(mistyped(format!(
+            "column {name:?} is of {other}, not integers"
         ))),
-        None => Ok(()),
     }
 }
 
-fn cast(column: &ArrayRef, to: &DataType, name: &str) -> PyResult<ArrayRef> {
-    let options = CastOptions {
-        safe: false,
-        ..CastOptions::default()
-    };
-    cast_with_options(column, to, &options)
-        .map_err(|error| refuse(format!("column {name:?}: {error}")))
+/// Doubles that are whole numbers up to 2^53, beyond which neighbours are not told apart.
+fn whole(value: f64) -> Option<i64> {
+    let most = (1_u64 << 53) as f64;
+    (value.fract() == 0.0 && value.abs() <= most).then_some(value as i64)
 }
 
-/// Lists of `{label, n}`; `None` if there is no such column.
-pub fn lists(batch: &RecordBatch, name: &str) -> PyResult<Option<ListArray>> {
-    let Some(column) = batch.column_by_name(name) else {
+fn times<T: ArrowPrimitiveType<Native = i64>>(
+    column: &ArrayRef,
+    name: &str,
+    ns: i64,
+) -> PyResult<Int64Array> {
+    each::<T>(column, name, |time| time.checked_mul(ns))
+}
+
+fn each<T: ArrowPrimitiveType>(
+    column: &ArrayRef,
+    name: &str,
+    integer: impl Fn(T::Native) -> Option<i64>,
+) -> PyResult<Int64Array> {
+    let value = |value: T::Native| {
+        let no = || {
+            refuse(format!(
+                "column {name:?} has {value:?}, no integer of 64 bits"
+            ))
+        };
+        integer(value).ok_or_else(no)
+    };
+    let values = column.as_primitive::<T>().iter();
+    values.map(|v| v.map(value).transpose()).collect()
+}
+
+/// The labels of each row of the lists `labels` of `{label, n}` with the sums of their points, ascending; none where the
+/// list is null. `None` if there is no such column.
+pub fn labels(batch: &RecordBatch) -> PyResult<Option<Vec<Vec<LabelCount>>>> {
+    let Some(column) = batch.column_by_name("labels") else {
         return Ok(None);
     };
-    let of = match column.data_type() {
-        DataType::List(item)
-        | DataType::LargeList(item)
-        | DataType::ListView(item)
-        | DataType::LargeListView(item)
-        | DataType::FixedSizeList(item, _) => item.data_type().clone(),
+    let (values, ends): (&ArrayRef, Vec<usize>) = match column.data_type() {
+        DataType::List(_) => {
+            let lists = column.as_list::<i32>();
+            let ends = lists.value_offsets().iter();
+            (lists.values(), ends.map(|end| *end as usize).collect())
+        }
+        DataType::LargeList(_) => {
+            let lists = column.as_list::<i64>();
+            let ends = lists.value_offsets().iter();
+            (lists.values(), ends.map(|end| *end as usize).collect())
+        }
+        DataType::Null => return Ok(Some(vec![Vec::new(); column.len()])),
         other => {
             return Err(mistyped(format!(
-                "column {name:?} is of {other}, not lists of {{label, n}}"
+                "column \"labels\" is of {other}, not lists of {{label, n}}"
             )));
         }
     };
-    let item = Field::new("item", of, true);
-    let lists = cast(column, &DataType::List(Arc::new(item)), name)?;
-    Ok(lists.as_list_opt::<i32>().cloned())
-}
-
-/// The labels of each row with the sums of their points, ascending; none where the list is null.
-pub fn labels_of(lists: &ListArray) -> PyResult<Vec<Vec<LabelCount>>> {
     let wrong = || mistyped("column \"labels\" has no lists of {label, n}");
-    let pairs = lists.values().as_struct_opt().ok_or_else(wrong)?;
-    let column = |name: &str| -> PyResult<Int64Array> {
+    let pairs = values.as_struct_opt().ok_or_else(wrong)?;
+    let of = |name: &str| -> PyResult<Int64Array> {
         as_integers(pairs.column_by_name(name).ok_or_else(wrong)?, name)
     };
-    let (label, n) = (column("label")?, column("n")?);
-    let row = |row: usize| {
+    let (label, n) = (of("label")?, of("n")?);
+    let rows = ends.iter().zip(ends.iter().skip(1)).enumerate();
+    let rows = rows.map(|(row, (start, end))| {
         let mut sums = BTreeMap::<u16, u32>::new();
-        let range = match lists.is_valid(row) {
-            true => {
-                let offset = |row: usize| lists.value_offsets().get(row).copied();
-                let offset = |row: usize| offset(row).and_then(|o| usize::try_from(o).ok());
-                offset(row).unwrap_or_default()..offset(row + 1).unwrap_or_default()
-            }
-            false => 0..0,
+        let places = if column.is_valid(row) {
+            *start..*end
+        } else {
+            0..0
         };
-        for place in range {
+        for place in places {
             if pairs.is_null(place) || label.is_null(place) || n.is_null(place) {
                 return Err(refuse(format!("row {row} has a label that is null")));
             }
             let (label, n) = (label.value(place), n.value(place));
             let known = u16::try_from(label).ok().zip(u32::try_from(n).ok());
-            let (label, n) = known
-                .ok_or_else(|| refuse(format!("row {row} has label {label} of {n} points")))?;
+            let no = || refuse(format!("row {row} has label {label} of {n} points"));
+            let (label, n) = known.ok_or_else(no)?;
             let sum = sums.entry(label).or_default();
             *sum = sum.saturating_add(n);
         }
         let known = sums.into_iter().filter(|(_, count)| *count > 0);
         let known = known.map(|(label, count)| LabelCount { label, count });
         Ok(known.collect())
-    };
-    (0..lists.len()).map(row).collect()
+    });
+    rows.collect::<PyResult<_>>().map(Some)
 }

@@ -10,7 +10,7 @@ use nalgebra::Vector3;
 use pyo3::prelude::*;
 use pyo3::types::PyCapsule;
 
-use crate::arrow_columns::{integers, labels_of, lists, nullable_integers};
+use crate::arrow_columns::{integers, labels, nullable_integers};
 use crate::arrow_table::{COUNTED, HEAD};
 use crate::errors::{mistyped, refuse};
 use crate::threads::background;
@@ -204,8 +204,8 @@ impl Rows {
             }
         }
         if head.labels.is_some() {
-            let lists = lists(batch, "labels")?.ok_or_else(|| lacks("labels"))?;
-            self.labels.extend(labels_of(&lists)?);
+            self.labels
+                .extend(labels(batch)?.ok_or_else(|| lacks("labels"))?);
         }
         Ok(())
     }

@@ -1,6 +1,5 @@
 //! Refusals as the exceptions that users of NumPy know.
 
-use std::error::Error;
 use std::io;
 use std::path::Path;
 
@@ -20,21 +19,14 @@ pub fn mistyped(reason: impl std::fmt::Display) -> PyErr {
 
 /// An error of the system about a path: `FileNotFoundError`, `PermissionError` and so on, by its number.
 pub fn of_path(path: &Path, error: &io::Error) -> PyErr {
-    let mut cause: Option<&(dyn Error + 'static)> = Some(error);
-    while let Some(error) = cause {
-        let system = error.downcast_ref::<io::Error>();
-        if let Some(number) = system.and_then(io::Error::raw_os_error) {
-            let text = io::Error::from_raw_os_error(number).to_string();
+    match error.raw_os_error() {
+        Some(number) => {
+            let text = error.to_string();
             let text = text.split(" (os error").next().unwrap_or_default();
-            let name = path.as_os_str().to_owned();
-            return PyOSError::new_err((number, text.to_owned(), name));
+            PyOSError::new_err((number, text.to_owned(), path.as_os_str().to_owned()))
         }
-        cause = match system.and_then(io::Error::get_ref) {
-            Some(inner) => Some(inner),
-            None => error.source(),
-        };
+        None => refuse(format!("{}: {error}", path.display())),
     }
-    refuse(format!("{}: {error}", path.display()))
 }
 
 /// An error of a map file.

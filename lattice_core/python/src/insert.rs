@@ -12,8 +12,10 @@ use crate::points::{Points, Rows, mask_of, part};
 use crate::shared_list::SharedList;
 use crate::threads::on_pool;
 
-/// Points between two looks for signals: below half a second, with labels and stamps too.
+/// Points between two looks for signals: well below half a second.
 const STEP: usize = 1 << 20;
+/// The same with labels or stamps, which one thread adds.
+const STEP_OF_COLUMNS: usize = 1 << 16;
 
 /// Adds points with their labels and stamps; rows in which something is masked are left out and counted.
 pub fn insert<'py>(
@@ -59,13 +61,17 @@ pub fn insert<'py>(
         StampColumn::Each(stamps_ns) => (0, stamps_ns.as_slice()),
     };
     let mut report = InsertReport::default();
-    for start in (0..rows.len()).step_by(STEP) {
+    let step = match payload.is_plain() {
+        true => STEP,
+        false => STEP_OF_COLUMNS,
+    };
+    for start in (0..rows.len()).step_by(step) {
         let columns = PointColumns {
             stamp_ns,
-            stamps_ns: part(stamps_ns, start, STEP),
-            labels: part(&label_column, start, STEP),
+            stamps_ns: part(stamps_ns, start, step),
+            labels: part(&label_column, start, step),
         };
-        let here = rows.part(start, STEP);
+        let here = rows.part(start, step);
         let zero = Vector3::zeros();
         let more = list.write(py, |list| {
             on_pool(|| match here {

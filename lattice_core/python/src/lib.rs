@@ -26,7 +26,7 @@ use pyo3::prelude::*;
 
 /// Occupied voxel maps on lattices, and registration.
 #[pymodule]
-mod lattice_core {
+mod _core {
     use pyo3::prelude::*;
 
     #[pymodule_export]

@@ -1,13 +1,13 @@
 //! Map files, and files that take their place whole: after an error the one before stays.
 
-use std::fs::{self, File, Permissions};
-use std::io::{self, BufReader, BufWriter, Read, Write};
-use std::os::unix::fs::PermissionsExt;
-use std::path::Path;
+use std::ffi::OsString;
+use std::fs::{self, File};
+use std::io::{self, BufReader, BufWriter, ErrorKind, Read, Write};
+use std::path::{Path, PathBuf};
+use std::sync::atomic::{AtomicU64, Ordering};
 
 use lattice_core::voxels::file::{MapContents, WriteOptions, max_voxels_of};
 use pyo3::PyResult;
-use tempfile::{Builder, NamedTempFile};
 
 use crate::errors::{of_map_file, of_path};
 use crate::threads::Stop;
@@ -47,29 +47,55 @@ pub fn replace(
         let mut file = File::options().write(true).open(path).map_err(system)?;
         return write(&mut file);
     }
-    let mut beside = beside(path).map_err(system)?;
+    let mut beside = Beside::create(path).map_err(system)?;
     if let Ok(found) = found {
-        let kept = beside.as_file().set_permissions(found.permissions());
+        let kept = beside.file.set_permissions(found.permissions());
         kept.map_err(system)?;
     }
-    write(beside.as_file_mut())?;
-    beside.as_file().sync_all().map_err(system)?;
+    write(&mut beside.file)?;
+    beside.file.sync_all().map_err(system)?;
     if stop.is_set() {
         return Err(system(io::Error::from_raw_os_error(libc::EINTR)));
     }
-    beside.persist(path).map_err(|error| system(error.error))?;
+    fs::rename(&beside.path, path).map_err(system)?;
+    beside.path = PathBuf::new();
     Ok(())
 }
 
-/// A file of a name of its own in the folder of another.
-fn beside(path: &Path) -> io::Result<NamedTempFile> {
-    if path.file_name().is_none() {
-        return Err(io::Error::from_raw_os_error(libc::ENOENT));
+/// A file of a name of its own in the folder of another; removed unless its path is taken away.
+struct Beside {
+    file: File,
+    path: PathBuf,
+}
+
+impl Beside {
+    fn create(path: &Path) -> io::Result<Beside> {
+        static NUMBER: AtomicU64 = AtomicU64::new(0);
+        let missing = || io::Error::from_raw_os_error(libc::ENOENT);
+        let name = path.file_name().ok_or_else(missing)?;
+        loop {
+            let mut own = OsString::from(".");
+            own.push(name);
+            let (process, number) = (std::process::id(), NUMBER.fetch_add(1, Ordering::Relaxed));
+            own.push(format!(".{process}-{number}"));
+            let path = path.with_file_name(own);
+            match File::options().write(true).create_new(true).open(&path) {
+                Ok(file) => return Ok(Beside { file, path }),
+                // Of a process of this number that was killed.
+                Err(error) if error.kind() == ErrorKind::AlreadyExists => {}
+                Err(error) => return Err(error),
+            }
+        }
     }
-    let folder = path.parent().filter(|folder| *folder != Path::new(""));
-    let mut named = Builder::new();
-    let named = named.prefix(".").permissions(Permissions::from_mode(0o666));
-    named.tempfile_in(folder.unwrap_or(Path::new(".")))
+}
+
+impl Drop for Beside {
+    fn drop(&mut self) {
+        if self.path != PathBuf::new() {
+            // Whatever the error that is on its way.
+            let _ = fs::remove_file(&self.path);
+        }
+    }
 }
 
 /// A file that fails once nobody waits for it any more.

@@ -21,7 +21,7 @@ const PART: usize = 64;
 /// fewer.
 pub fn query<'py>(
     py: Python<'py>,
-    list: &SharedList,
+    shared: &SharedList,
     shells: Arc<Shells>,
     xyz: &Bound<'py, PyAny>,
     k: usize,
@@ -29,7 +29,7 @@ pub fn query<'py>(
     let points = Points::of(xyz)?;
     let rows = points.rows()?;
     let count = rows.len();
-    let k = k.min(list.read(py, |list| list.len())?);
+    let k = k.min(shared.read(py, |list| list.len())?);
     let distances = empty::<f64, Ix2>(py, &[count, k])?;
     let centers = empty::<f64, Ix3>(py, &[count, k, 3])?;
     if k > 0 {
@@ -39,8 +39,8 @@ pub fn query<'py>(
         let centers = to_centers.as_slice_mut().map_err(refuse)?;
         let to = (to, centers.as_chunks_mut::<3>().0);
         let found = watched(py, |stop| {
-            list.read_away(|list| {
-                let questions = Query::with_shells(list, shells);
+            shared.read_away(|list| {
+                let questions = shared.questions(list, shells, count.saturating_mul(k));
                 on_pool(|| {
                     let parts = to.0.par_chunks_mut(PART * k);
                     let parts = parts.zip(to.1.par_chunks_mut(PART * k)).enumerate();

@@ -23,9 +23,10 @@ pub struct Registration {
     /// Takes source points to the target frame, shape (4, 4).
     target_from_source: Py<PyAny>,
     /// Covariance of x, y, z (m^2) and the turns about x, y, z (rad^2) in the target, shape (6, 6); NaN where the points
-    /// do not determine the pose.
+    /// do not determine the pose. Of a source more than 100 m from its origin x, y, z are of its middle.
     covariance: Py<PyAny>,
-    /// Hessian of the cost by a translation (m), then a rotation (rad) in the source, shape (6, 6).
+    /// Half the Hessian of the cost by a translation (m), then a rotation (rad) in the source, shape (6, 6), about the
+    /// same point.
     hessian: Py<PyAny>,
     /// True if the last step was below the tolerances.
     converged: bool,

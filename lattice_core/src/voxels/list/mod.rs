@@ -306,7 +306,10 @@ impl VoxelStore for VoxelList {
     #[inline]
     fn holds(&self, w: LatticeIndex) -> bool {
         let code = BlockKey::pack(w);
-        code.is_some_and(|code| self.shard(code).is_some_and(|shard| shard.voxels.holds(code)))
+        code.is_some_and(|code| {
+            self.shard(code)
+                .is_some_and(|shard| shard.voxels.holds(code))
+        })
     }
 
     fn sorted_keys(&self) -> Vec<MortonKey> {

@@ -11,6 +11,19 @@ from typing import Any, Literal, Sequence, SupportsIndex, TypedDict, final, type
 import numpy as np
 import numpy.typing as npt
 
+__all__ = [
+    "Calibration",
+    "Lattice",
+    "Registration",
+    "Table",
+    "VoxelMap",
+    "__version__",
+    "calibrate",
+    "gicp",
+    "read_points",
+    "write_points",
+]
+
 __version__: str
 
 @type_check_only
@@ -119,10 +132,11 @@ class Registration:
     def target_from_source(self) -> npt.NDArray[np.float64]: ...
     @property
     def covariance(self) -> npt.NDArray[np.float64]:
-        """Of x, y, z (m^2) and the turns about x, y, z (rad^2) in the target, shape (6, 6)."""
+        """Of x, y, z (m^2) and the turns about x, y, z (rad^2) in the target, shape (6, 6); of a source more than 100 m
+        from its origin x, y, z are of its middle."""
     @property
     def hessian(self) -> npt.NDArray[np.float64]:
-        """Of the cost, by a translation (m), then a rotation (rad) in the source, shape (6, 6)."""
+        """Half that of the cost, by a translation (m), then a rotation (rad) in the source, about the same point, shape (6, 6)."""
     @property
     def converged(self) -> bool: ...
     @property
