@@ -19,14 +19,11 @@ pub fn empty<'py, T: Element, D: Dimension>(
 }
 
 /// An array of these values.
-pub fn array_of<'py, T: Element, D: Dimension>(
+pub fn array_of<'py, T: Element + Copy, D: Dimension>(
     py: Python<'py>,
     shape: &[usize],
     values: &[T],
-) -> PyResult<Bound<'py, PyAny>>
-where
-    T: Copy,
-{
+) -> PyResult<Bound<'py, PyAny>> {
     let array = empty::<T, D>(py, shape)?;
     {
         let mut to = array.try_readwrite().map_err(refuse)?;

@@ -10,6 +10,7 @@ use pyo3::prelude::*;
 use crate::columns::labels as labels_of;
 use crate::errors::refuse;
 use crate::map::VoxelMap;
+use crate::pickle::Reduced;
 use crate::points::mask_of;
 use crate::pose::{isometry_of, matrix_of, matrix6_of};
 use crate::registration::cloud_of;
@@ -43,16 +44,13 @@ impl Calibration {
         format!("<Calibration {verdict} p_wrong={p_wrong:.2e}: {reason}>")
     }
 
-    #[expect(clippy::type_complexity, reason = "the fields in order")]
-    fn __reduce__<'py>(
-        slf: &Bound<'py, Self>,
-    ) -> PyResult<(Bound<'py, PyAny>, ([String; 3], [Py<PyAny>; 2], [f64; 3]))> {
+    fn __reduce__<'py>(slf: &Bound<'py, Self>) -> Reduced<'py> {
         let (py, own) = (slf.py(), slf.get());
         let texts = [&own.verdict, &own.reason, &own.method].map(String::clone);
         let arrays = [&own.map_from_cloud, &own.covariance].map(|array| array.clone_ref(py));
         let numbers = [own.p_wrong, own.inlier_fraction, own.rmse_m];
         let restore = slf.get_type().getattr("_restore")?;
-        Ok((restore, (texts, arrays, numbers)))
+        Ok((restore, (texts, arrays, numbers).into_pyobject(py)?))
     }
 
     #[staticmethod]

@@ -8,12 +8,12 @@ use pyo3::types::PyDict;
 
 use crate::columns::{StampColumn, kept, labels as labels_of, stamps as stamps_of};
 use crate::errors::refuse;
-use crate::points::{Points, Rows, mask_of, part};
+use crate::points::{Points, Rows, mask_of, part, warn_of_rounding};
 use crate::shared_list::SharedList;
 use crate::threads::on_pool;
 
 /// Points between two looks for signals: well below half a second.
-const STEP: usize = 1 << 20;
+const STEP: usize = 1 << 18;
 /// The same with labels or stamps, which one thread adds.
 const STEP_OF_COLUMNS: usize = 1 << 16;
 
@@ -25,7 +25,7 @@ pub fn insert<'py>(
     labels: Option<&Bound<'py, PyAny>>,
     stamps: Option<&Bound<'py, PyAny>>,
 ) -> PyResult<Bound<'py, PyDict>> {
-    let payload = list.read(py, |list| list.payload())?;
+    let (payload, side_m) = list.read(py, |list| (list.payload(), list.lattice().cell_side_m()))?;
     if labels.is_some() && !payload.labels {
         return Err(refuse("this map keeps no labels: make it with labels=True"));
     }
@@ -56,6 +56,7 @@ pub fn insert<'py>(
         }
     }
     let rows = points.rows()?;
+    warn_of_rounding(py, rows, side_m)?;
     let (stamp_ns, stamps_ns) = match &stamp_column {
         StampColumn::All(stamp_ns) => (*stamp_ns, &[][..]),
         StampColumn::Each(stamps_ns) => (0, stamps_ns.as_slice()),

@@ -13,6 +13,7 @@ use rayon::prelude::*;
 
 use crate::arrays::{empty, expect_out, rows_of};
 use crate::errors::{mistyped, refuse};
+use crate::pickle::Reduced;
 use crate::points::{Points, Rows, mask_of, shape_of};
 use crate::threads::step;
 
@@ -114,16 +115,15 @@ impl Lattice {
     }
 
     /// As the file of an empty map, which keeps the orientation and the basis too.
-    fn __reduce__<'py>(
-        slf: &Bound<'py, Self>,
-    ) -> PyResult<(Bound<'py, PyAny>, (Bound<'py, PyBytes>,))> {
+    fn __reduce__<'py>(slf: &Bound<'py, Self>) -> Reduced<'py> {
         let list = VoxelList::new(slf.get().core.clone(), Vector3::zeros(), 0).map_err(refuse)?;
         let mut bytes = Vec::new();
         let map = MapContents::from_list(&list);
         map.write(&mut bytes, &WriteOptions::default())
             .map_err(refuse)?;
         let restore = slf.get_type().getattr("_restore")?;
-        Ok((restore, (PyBytes::new(slf.py(), &bytes),)))
+        let arguments = (PyBytes::new(slf.py(), &bytes),);
+        Ok((restore, arguments.into_pyobject(slf.py())?))
     }
 
     #[staticmethod]
@@ -220,5 +220,5 @@ fn indices<'py>(cells: &Bound<'py, PyAny>) -> PyResult<PyReadonlyArray2<'py, i64
         )));
     }
     let cells = numpy.call_method1("require", (cells, "int64", ["C", "A"]))?;
-    Ok(cells.extract()?)
+    cells.extract()
 }

@@ -14,6 +14,7 @@ mod lattice;
 mod map;
 mod map_arrays;
 mod map_files;
+mod pickle;
 mod point_files;
 mod points;
 mod pose;

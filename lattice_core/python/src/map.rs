@@ -14,6 +14,7 @@ use crate::arrow_read::{Cells, map_of};
 use crate::arrow_table::Table;
 use crate::errors::refuse;
 use crate::lattice::Lattice;
+use crate::pickle::Reduced;
 use crate::shared_list::SharedList;
 use crate::threads::{background, on_pool};
 use crate::{insert, map_arrays, map_files, query};
@@ -224,9 +225,7 @@ impl VoxelMap {
     }
 
     /// As a map file and the bound of its voxels.
-    fn __reduce__<'py>(
-        slf: &Bound<'py, Self>,
-    ) -> PyResult<(Bound<'py, PyAny>, (Bound<'py, PyBytes>, usize))> {
+    fn __reduce__<'py>(slf: &Bound<'py, Self>) -> Reduced<'py> {
         let py = slf.py();
         let list = slf.get().list.clone();
         let (bytes, most) = background(py, move |_| {
@@ -236,7 +235,8 @@ impl VoxelMap {
             Ok::<_, PyErr>((bytes, list.read_away(VoxelList::max_voxels)))
         })??;
         let restore = slf.get_type().getattr("_restore")?;
-        Ok((restore, (PyBytes::new(py, &bytes), most)))
+        let arguments = (PyBytes::new(py, &bytes), most);
+        Ok((restore, arguments.into_pyobject(py)?))
     }
 
     #[staticmethod]

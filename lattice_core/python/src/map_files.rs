@@ -98,17 +98,17 @@ impl Drop for Beside {
     }
 }
 
-/// A file that fails once nobody waits for it any more.
+/// A file that fails after its call was interrupted.
 pub struct Stoppable<'a, F> {
     pub file: F,
     pub stop: &'a Stop,
 }
 
 impl<F> Stoppable<'_, F> {
-    fn expect_waiting(&self) -> io::Result<()> {
+    fn check(&self) -> io::Result<()> {
         // Not `Interrupted`, after which writers try again.
         match self.stop.is_set() {
-            true => Err(io::Error::other("nobody waits for it any more")),
+            true => Err(io::Error::other("interrupted")),
             false => Ok(()),
         }
     }
@@ -116,14 +116,14 @@ impl<F> Stoppable<'_, F> {
 
 impl<F: Read> Read for Stoppable<'_, F> {
     fn read(&mut self, bytes: &mut [u8]) -> io::Result<usize> {
-        self.expect_waiting()?;
+        self.check()?;
         self.file.read(bytes)
     }
 }
 
 impl<F: Write> Write for Stoppable<'_, F> {
     fn write(&mut self, bytes: &[u8]) -> io::Result<usize> {
-        self.expect_waiting()?;
+        self.check()?;
         self.file.write(bytes)
     }
 

@@ -1,6 +1,7 @@
 //! Points of NumPy: float32 or float64 rows of x, y, z.
 
 use numpy::{PyReadonlyArray2, PyUntypedArray, PyUntypedArrayMethods};
+use pyo3::exceptions::PyUserWarning;
 use pyo3::prelude::*;
 
 use crate::errors::{mistyped, refuse};
@@ -96,6 +97,31 @@ impl<'a> Rows<'a> {
             Rows::F64(rows) => Rows::F64(part(rows, start, len)),
         }
     }
+}
+
+/// Points that are looked at for their precision.
+const SAMPLES: usize = 16;
+/// Share of a cell's side that rounding may move a point by unsaid: a tenth moves one in some three to another cell.
+const COARSE: f64 = 0.1;
+
+/// Warns of points in single precision that are so far from the origin that rounding moves many to other cells.
+pub fn warn_of_rounding(py: Python<'_>, rows: Rows, side_m: f64) -> PyResult<()> {
+    let Rows::F32(rows) = rows else {
+        return Ok(());
+    };
+    let samples = rows.iter().step_by(rows.len().div_ceil(SAMPLES).max(1));
+    let sizes = samples.flatten().map(|coordinate| coordinate.abs());
+    let largest = f64::from(sizes.filter(|size| size.is_finite()).fold(0.0, f32::max));
+    let rounding_m = largest * f64::from(f32::EPSILON) / 2.0;
+    if rounding_m > COARSE * side_m && rounding_m < largest {
+        let text = format!(
+            "float32 rounds coordinates of {largest:.0} m by up to {rounding_m:.3} m, where cells have a side of \
+             {side_m:.3} m: give float64"
+        );
+        let text = std::ffi::CString::new(text)?;
+        PyErr::warn(py, &py.get_type::<PyUserWarning>(), &text, 1)?;
+    }
+    Ok(())
 }
 
 /// Up to `len` values from `start` on.

@@ -8,6 +8,7 @@ use nalgebra::{Matrix6, Point3};
 use pyo3::prelude::*;
 
 use crate::errors::refuse;
+use crate::pickle::Reduced;
 use crate::points::Points;
 use crate::pose::{isometry_of, matrix_of, matrix6_of};
 use crate::threads::{background, on_threads};
@@ -45,16 +46,14 @@ impl Registration {
         format!("<Registration converged={converged} inliers={inliers} rmse_m={rmse_m:.4}>")
     }
 
-    #[expect(clippy::type_complexity, reason = "the fields in order")]
-    fn __reduce__<'py>(
-        slf: &Bound<'py, Self>,
-    ) -> PyResult<(Bound<'py, PyAny>, ([Py<PyAny>; 3], bool, usize, usize, f64))> {
+    fn __reduce__<'py>(slf: &Bound<'py, Self>) -> Reduced<'py> {
         let (py, own) = (slf.py(), slf.get());
         let arrays = [&own.target_from_source, &own.covariance, &own.hessian];
         let arrays = arrays.map(|array| array.clone_ref(py));
         let rest = (own.converged, own.iterations, own.inliers, own.rmse_m);
         let restore = slf.get_type().getattr("_restore")?;
-        Ok((restore, (arrays, rest.0, rest.1, rest.2, rest.3)))
+        let arguments = (arrays, rest.0, rest.1, rest.2, rest.3);
+        Ok((restore, arguments.into_pyobject(py)?))
     }
 
     #[staticmethod]

@@ -54,7 +54,7 @@ pub fn step<T: Send>(py: Python<'_>, run: impl FnOnce() -> T + Send) -> PyResult
     Ok(answer)
 }
 
-/// True once nobody waits for the work any more.
+/// Set when the call that waits for the work was interrupted.
 #[derive(Clone, Default)]
 pub struct Stop(Arc<AtomicBool>);
 

@@ -1,5 +1,7 @@
 """Arrays as users of NumPy have them: layouts, precisions, masks, times, shapes."""
 
+import warnings
+
 import numpy as np
 import pytest
 
@@ -99,13 +101,26 @@ def datum_cell(map):
 def test_points_beyond_reach_of_the_datum_are_refused_with_one_that_is_near(cloud):
     map = VoxelMap(Lattice("fcc", 0.125))
     for points in [cloud + UTM, (cloud + UTM).astype(np.float32), np.full((9, 3), 1e300)]:
-        with pytest.raises(ValueError, match=r"VoxelMap\(lattice, datum="):
+        with warnings.catch_warnings(), pytest.raises(ValueError, match=r"VoxelMap\(lattice, datum="):
+            warnings.simplefilter("ignore")
             map.insert(points)
     assert len(map) == 0 == map.points
     report = map.insert(np.vstack([cloud, cloud[:3] + UTM, [[np.nan, 0, 0]]]))
     assert (report["inserted"], report["out_of_range"], report["not_finite"]) == (len(cloud), 3, 1)
     with pytest.raises(ValueError, match="2\\^31 m"):
         VoxelMap(Lattice("fcc", 0.125), datum=(1e10, 0, 0))
+
+
+def test_float32_far_from_the_origin_is_warned_of(cloud):
+    far = (cloud + UTM).astype(np.float32)
+    map = VoxelMap(Lattice("fcc", 0.125), datum=UTM)
+    with pytest.warns(UserWarning, match="float32 rounds coordinates of 54000.. m by up to 0.322 m"):
+        map.insert(far)
+    with warnings.catch_warnings():
+        warnings.simplefilter("error")
+        map.insert(far.astype(np.float64))
+        map.lattice.quantize(cloud.astype(np.float32) + np.float32(3000))
+        map.insert(np.full((3, 3), np.inf, np.float32))
 
 
 def test_float32_and_float64_of_the_same_points_are_the_same_map(cloud):

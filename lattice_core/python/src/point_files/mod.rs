@@ -158,10 +158,7 @@ impl PointFile {
 }
 
 /// The lines of a header up to the one that `ends` it, and what follows.
-fn header_of<'a>(
-    bytes: &'a [u8],
-    ends: impl Fn(&str) -> bool,
-) -> Result<(Vec<&'a str>, &'a [u8]), String> {
+fn header_of(bytes: &[u8], ends: impl Fn(&str) -> bool) -> Result<(Vec<&str>, &[u8]), String> {
     /// Longer headers are none.
     const MOST: usize = 1 << 16;
     let (mut lines, mut rest) = (Vec::new(), bytes);
