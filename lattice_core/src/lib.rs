@@ -5,6 +5,7 @@
 
 pub mod cloud;
 pub mod geodesy;
+mod kd_tree;
 pub mod lattice;
 pub mod pose;
 mod prefetch;

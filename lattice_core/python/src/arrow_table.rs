@@ -1,25 +1,25 @@
 //! Maps as Arrow tables, by the C data interface.
 
-use std::collections::BTreeMap;
 use std::sync::Arc;
 
-use arrow::array::{
-    Array, ArrayRef, AsArray, Int64Array, ListArray, RecordBatch, RecordBatchIterator,
-    RecordBatchReader, StructArray,
+use arrow_array::ffi_stream::FFI_ArrowArrayStream;
+use arrow_array::{
+    Array, ArrayRef, Int64Array, ListArray, RecordBatch, RecordBatchIterator, StructArray,
 };
-use arrow::buffer::OffsetBuffer;
-use arrow::datatypes::{DataType, Field, Fields, Int64Type, Schema};
-use arrow::ffi_stream::{ArrowArrayStreamReader, FFI_ArrowArrayStream};
+use arrow_buffer::OffsetBuffer;
+use arrow_schema::{DataType, Field, Fields, Schema};
 use lattice_core::lattice::MortonKey;
 use lattice_core::voxels::file::{MapColumns, MapContents, WriteOptions};
-use lattice_core::voxels::{LabelCount, Stamps, Voxel};
+use lattice_core::voxels::{LabelCount, Stamps};
 use pyo3::prelude::*;
 use pyo3::types::PyCapsule;
 
-use crate::refuse;
+use crate::errors::refuse;
 
 /// Key of the schema's metadata: the map file of the map without its rows, in hexadecimal digits.
-const HEAD: &str = "lattice_map";
+pub const HEAD: &str = "lattice_map";
+/// Key of the schema's metadata: the sum of the counts.
+pub const COUNTED: &str = "lattice_map_counted";
 
 /// Rows of a map as Arrow.
 #[pyclass(frozen, module = "lattice_core")]
@@ -60,9 +60,11 @@ impl Table {
 
 impl Table {
     /// The rows of a map, in the order of its keys.
-    pub fn of(map: &MapContents) -> PyResult<Table> {
-        let head = head_of(map)?;
-        let map = MapColumns::from(map.clone());
+    pub fn of(map: MapContents) -> PyResult<Table> {
+        let map = MapColumns::from(map);
+        let head = head_of(&map)?;
+        let voxels = map.voxels.iter().flatten();
+        let counted: u64 = voxels.map(|voxel| u64::from(voxel.count)).sum();
         let datum = map.datum_index;
         let mut columns: Vec<(&str, ArrayRef)> = Vec::new();
         for (axis, name) in ["ix", "iy", "iz"].into_iter().enumerate() {
@@ -102,7 +104,8 @@ impl Table {
             Field::new(*name, array.data_type().clone(), name.ends_with("_ns"))
         });
         let fields: Vec<Field> = fields.collect();
-        let metadata = [(HEAD.to_owned(), head)].into();
+        let metadata = [(HEAD, head), (COUNTED, counted.to_string())];
+        let metadata = metadata.map(|(key, value)| (key.to_owned(), value)).into();
         let schema = Schema::new(fields).with_metadata(metadata);
         let arrays = columns.into_iter().map(|(_, array)| array).collect();
         let batch = RecordBatch::try_new(Arc::new(schema), arrays).map_err(refuse)?;
@@ -111,12 +114,16 @@ impl Table {
 }
 
 /// The map file of the map without rows.
-fn head_of(map: &MapContents) -> PyResult<String> {
-    let mut columns = MapColumns::from(map.clone());
-    columns.keys.clear();
-    columns.voxels.iter_mut().for_each(Vec::clear);
-    columns.stamps.iter_mut().for_each(Vec::clear);
-    columns.labels.iter_mut().for_each(Vec::clear);
+fn head_of(map: &MapColumns) -> PyResult<String> {
+    let columns = MapColumns {
+        lattice: map.lattice.clone(),
+        datum_index: map.datum_index,
+        keys: Vec::new(),
+        voxels: map.voxels.is_some().then(Vec::new),
+        stamps: map.stamps.is_some().then(Vec::new),
+        labels: map.labels.is_some().then(Vec::new),
+        statistics: map.statistics,
+    };
     let mut bytes = Vec::new();
     let head = MapContents::try_from(columns).map_err(refuse)?;
     head.write(&mut bytes, &WriteOptions::default())
@@ -134,166 +141,4 @@ fn list_of(labels: &[Vec<LabelCount>]) -> PyResult<ListArray> {
     let item = Arc::new(Field::new("item", DataType::Struct(fields), false));
     let offsets = OffsetBuffer::from_lengths(labels.iter().map(Vec::len));
     ListArray::try_new(item, offsets, Arc::new(rows.map_err(refuse)?), None).map_err(refuse)
-}
-
-/// The map of any object with `__arrow_c_stream__`.
-pub fn map_of(table: &Bound<'_, PyAny>) -> PyResult<MapContents> {
-    let capsule = table
-        .call_method0("__arrow_c_stream__")
-        .map_err(|_| refuse("from_arrow takes a table with __arrow_c_stream__"))?;
-    let capsule = capsule
-        .cast::<PyCapsule>()
-        .map_err(|_| refuse("__arrow_c_stream__ gave no capsule"))?;
-    let pointer = capsule.pointer_checked(Some(c"arrow_array_stream"))?;
-    // SAFETY: a capsule of this name holds a stream of the Arrow C interface, of which the reader takes the
-    // ownership and leaves a released one behind, as the interface demands of a consumer.
-    let reader = unsafe { ArrowArrayStreamReader::from_raw(pointer.cast().as_ptr()) };
-    let reader = reader.map_err(refuse)?;
-    let schema = reader.schema();
-    let head = schema.metadata().get(HEAD).ok_or_else(|| {
-        refuse(format!(
-            "the schema lacks the metadata {HEAD:?}, in which to_arrow keeps the lattice"
-        ))
-    })?;
-    let head = read_head(head)?;
-    let mut rows = BTreeMap::new();
-    for batch in reader {
-        take_rows(&batch.map_err(refuse)?, &head, &mut rows)?;
-    }
-    let mut map = head;
-    for (key, row) in rows {
-        map.keys.push(key);
-        map.voxels
-            .iter_mut()
-            .for_each(|column| column.push(row.voxel));
-        map.stamps
-            .iter_mut()
-            .for_each(|column| column.push(row.stamps));
-        map.labels
-            .iter_mut()
-            .for_each(|column| column.push(row.labels.clone()));
-    }
-    MapContents::try_from(map).map_err(refuse)
-}
-
-fn read_head(digits: &str) -> PyResult<MapColumns> {
-    let wrong = || refuse(format!("the metadata {HEAD:?} is damaged"));
-    let pairs = digits.as_bytes().chunks(2);
-    let byte = |pair: &[u8]| u8::from_str_radix(std::str::from_utf8(pair).ok()?, 16).ok();
-    let bytes = pairs
-        .map(byte)
-        .collect::<Option<Vec<u8>>>()
-        .ok_or_else(wrong)?;
-    let head = MapContents::read(&bytes[..], 0);
-    Ok(head
-        .map_err(|error| refuse(format!("the metadata {HEAD:?}: {error}")))?
-        .into())
-}
-
-/// A row besides its key.
-struct Row {
-    voxel: Voxel,
-    stamps: Stamps,
-    labels: Vec<LabelCount>,
-}
-
-fn take_rows(
-    batch: &RecordBatch,
-    head: &MapColumns,
-    rows: &mut BTreeMap<MortonKey, Row>,
-) -> PyResult<()> {
-    let column = |name: &str| -> PyResult<&Int64Array> {
-        let column = batch.column_by_name(name);
-        let column = column.and_then(|column| column.as_primitive_opt::<Int64Type>());
-        column.ok_or_else(|| refuse(format!("there is no column {name:?} of int64")))
-    };
-    let cells = [column("ix")?, column("iy")?, column("iz")?];
-    let sums = match &head.voxels {
-        Some(_) => Some([
-            column("count")?,
-            column("sum_x")?,
-            column("sum_y")?,
-            column("sum_z")?,
-        ]),
-        None => None,
-    };
-    let stamps = match &head.stamps {
-        Some(_) => Some([column("first_ns")?, column("last_ns")?]),
-        None => None,
-    };
-    let labels = batch
-        .column_by_name("labels")
-        .and_then(|column| column.as_list_opt::<i32>());
-    if head.labels.is_some() && labels.is_none() {
-        return Err(refuse("there is no column \"labels\" of lists"));
-    }
-    for row in 0..batch.num_rows() {
-        let cell = cells.map(|column| column.value(row));
-        let key = key_of(cell, head.datum_index)?;
-        let voxel = match sums.map(|columns| columns.map(|column| column.value(row))) {
-            Some([count, x, y, z]) => Voxel {
-                count: u32::try_from(count)
-                    .map_err(|_| refuse(format!("cell {cell:?} has count {count}")))?,
-                sum: [x, y, z],
-            },
-            None => Voxel::default(),
-        };
-        let stamps = match stamps {
-            Some([first, last]) if first.is_valid(row) && last.is_valid(row) => Stamps {
-                first_ns: first.value(row),
-                last_ns: last.value(row),
-            },
-            _ => Stamps::NONE,
-        };
-        let labels = match labels {
-            Some(lists) if lists.is_valid(row) => labels_of(&lists.value(row))?,
-            _ => Vec::new(),
-        };
-        if rows
-            .insert(
-                key,
-                Row {
-                    voxel,
-                    stamps,
-                    labels,
-                },
-            )
-            .is_some()
-        {
-            return Err(refuse(format!(
-                "cell {cell:?} has two rows: sum them first"
-            )));
-        }
-    }
-    Ok(())
-}
-
-fn key_of(cell: [i64; 3], datum: [i64; 3]) -> PyResult<MortonKey> {
-    let w = [0, 1, 2].map(|i: usize| i32::try_from(cell[i].checked_sub(datum[i])?).ok());
-    let key = match w {
-        [Some(x), Some(y), Some(z)] => MortonKey::pack([x, y, z]),
-        _ => None,
-    };
-    key.ok_or_else(|| {
-        refuse(format!(
-            "cell {cell:?} is more than 2^20 cells from datum {datum:?}"
-        ))
-    })
-}
-
-fn labels_of(list: &ArrayRef) -> PyResult<Vec<LabelCount>> {
-    let wrong = || refuse("labels are not lists of {label, n} of int64");
-    let rows = list.as_struct_opt().ok_or_else(wrong)?;
-    let column = |name: &str| {
-        let column = rows.column_by_name(name)?;
-        column.as_primitive_opt::<Int64Type>()
-    };
-    let (label, n) = column("label").zip(column("n")).ok_or_else(wrong)?;
-    let pairs = label.values().iter().zip(n.values());
-    let count = |(label, n): (&i64, &i64)| {
-        let known = u16::try_from(*label).ok().zip(u32::try_from(*n).ok());
-        let known = known.map(|(label, count)| LabelCount { label, count });
-        known.ok_or_else(|| refuse(format!("label {label} of {n} points")))
-    };
-    pairs.map(count).collect()
 }

@@ -1,29 +1,33 @@
 //! `VoxelMap`.
 
-use std::fs::File;
-use std::io::{BufReader, BufWriter};
 use std::path::PathBuf;
+use std::sync::{Arc, OnceLock};
 
-use lattice_core::query::Query;
-use lattice_core::voxels::file::{MapColumns, MapContents, WriteOptions, max_voxels_of};
-use lattice_core::voxels::{InsertReport, Payload, VoxelList};
+use lattice_core::query::Shells;
+use lattice_core::voxels::file::{MapContents, WriteOptions};
+use lattice_core::voxels::{Payload, Region, VoxelList};
 use nalgebra::Vector3;
 use pyo3::prelude::*;
-use pyo3::types::PyDict;
-use rayon::prelude::*;
+use pyo3::types::{PyBytes, PyDict};
 
-use crate::arrow_table::{Table, map_of};
+use crate::arrow_read::{Cells, map_of};
+use crate::arrow_table::Table;
+use crate::errors::refuse;
 use crate::lattice::Lattice;
-use crate::points::{Points, Rows, array_of, integers, labels as labels_of};
-use crate::refuse;
+use crate::pickle::Reduced;
+use crate::shared_list::SharedList;
+use crate::threads::{background, on_pool};
+use crate::{insert, map_arrays, map_files, query};
 
-/// Points that become offsets at a time.
-const WAVE: usize = 1 << 20;
+/// Coordinates of a datum are below this, m: offsets of 2^-20 m from it are exact in double precision.
+const MAX_DATUM_M: f64 = (1_u64 << 31) as f64;
 
 /// The occupied voxels of a lattice: counts, mean offsets, and if wanted stamps and labels.
-#[pyclass(module = "lattice_core")]
+#[pyclass(frozen, module = "lattice_core")]
 pub struct VoxelMap {
-    pub list: VoxelList,
+    pub list: SharedList,
+    lattice: lattice_core::lattice::Lattice,
+    shells: OnceLock<Arc<Shells>>,
 }
 
 #[pymethods]
@@ -38,294 +42,233 @@ impl VoxelMap {
         stamps: bool,
         max_voxels: usize,
     ) -> PyResult<Self> {
-        let list =
-            VoxelList::new(lattice.core.clone(), datum.into(), max_voxels).map_err(refuse)?;
-        let list = list.with_payload(Payload { stamps, labels });
-        Ok(Self { list })
+        if datum.iter().any(|metres| metres.abs() >= MAX_DATUM_M) {
+            return Err(refuse(format!("datum {datum:?} m is not within 2^31 m")));
+        }
+        let list = VoxelList::new(lattice.core.clone(), datum.into(), max_voxels);
+        let list = list
+            .map_err(refuse)?
+            .with_payload(Payload { stamps, labels });
+        Ok(Self::of(list))
     }
 
-    /// Adds points (m), with a label for each and a stamp (ns) for each or for all; says what became of
-    /// them.
+    /// Adds points (m), with a label for each and a stamp for each or for all; says what became of them.
     #[pyo3(signature = (xyz, labels=None, stamps=None))]
     fn insert<'py>(
-        &mut self,
+        &self,
         py: Python<'py>,
         xyz: &Bound<'py, PyAny>,
         labels: Option<&Bound<'py, PyAny>>,
         stamps: Option<&Bound<'py, PyAny>>,
     ) -> PyResult<Bound<'py, PyDict>> {
-        let points = Points::of(xyz)?;
-        let rows = points.rows()?;
-        let payload = self.list.payload();
-        if labels.is_some() && !payload.labels {
-            return Err(refuse("this map keeps no labels: make it with labels=True"));
-        }
-        if stamps.is_some() && !payload.stamps {
-            return Err(refuse("this map keeps no stamps: make it with stamps=True"));
-        }
-        if stamps.is_none() && payload.stamps {
-            return Err(refuse("this map keeps stamps: give stamps="));
-        }
-        let labels = match labels {
-            Some(array) => labels_of(array, rows.len())?,
-            None => Vec::new(),
-        };
-        let runs = match stamps {
-            None => vec![(0, rows.len())],
-            Some(stamps) => match stamps.extract::<i64>() {
-                Ok(stamp_ns) => vec![(stamp_ns, rows.len())],
-                Err(_) => runs(&integers(stamps, "stamps", rows.len())?),
-            },
-        };
-        let list = &mut self.list;
-        let report = py.detach(|| insert(list, &rows, &labels, &runs));
-        let answer = PyDict::new(py);
-        for (name, count) in [
-            ("points", report.points),
-            ("inserted", report.inserted),
-            ("not_finite", report.not_finite),
-            ("out_of_range", report.out_of_range),
-            ("list_full", report.list_full),
-            ("new_voxels", report.new_voxels),
-        ] {
-            answer.set_item(name, count)?;
-        }
-        Ok(answer)
+        insert::insert(py, &self.list, xyz, labels, stamps)
     }
 
     /// Adds all voxels of another map of the same cells, exactly.
-    fn merge(&mut self, py: Python<'_>, other: &VoxelMap) -> PyResult<()> {
-        let (payload, max_voxels) = (self.list.payload(), self.list.max_voxels());
-        let (list, other) = (&self.list, &other.list);
-        let merged = py.detach(|| {
-            let mut merged = MapContents::from_list(list);
-            merged
-                .merge(MapContents::from_list(other))
-                .map_err(|error| error.to_string())?;
-            let voxels = merged.keys().len();
-            match voxels <= max_voxels {
-                true => Ok(merged.into_list_with(payload, max_voxels)),
-                false => Err(format!(
-                    "{voxels} voxels are more than max_voxels, {max_voxels}"
-                )),
-            }
-        });
-        self.list = merged.map_err(refuse)?;
-        Ok(())
+    fn merge(&self, py: Python<'_>, other: &VoxelMap) -> PyResult<()> {
+        let (list, other) = (self.list.clone(), other.list.clone());
+        background(py, move |stop| {
+            // Never under both locks at once.
+            let other = other.copied()?;
+            list.write_away(|list| {
+                let merged = on_pool(|| merged(list, other))??;
+                if !stop.is_set() {
+                    *list = merged;
+                }
+                Ok(())
+            })
+        })?
+    }
+
+    /// The voxels whose centres are in the closed box between two corners (m), as a map of their own.
+    fn crop(&self, py: Python<'_>, low: [f64; 3], high: [f64; 3]) -> PyResult<Self> {
+        let region = Region::cuboid(low.into(), high.into()).map_err(refuse)?;
+        let list = self.list.clone();
+        let cropped = background(py, move |_| {
+            let (payload, most) = list.read_away(|list| (list.payload(), list.max_voxels()));
+            let mut map = list.copied()?;
+            map.retain(|_, center_m| region.contains(&center_m));
+            on_pool(|| map.into_list_with(payload, most))
+        })??;
+        Ok(Self::of(cropped))
     }
 
     /// The map as an Arrow table (`__arrow_c_stream__`), which pyarrow, Polars and DuckDB take.
     fn to_arrow(&self, py: Python<'_>) -> PyResult<Table> {
-        py.detach(|| Table::of(&MapContents::from_list(&self.list)))
+        let list = self.list.clone();
+        background(py, move |_| Table::of(list.copied()?))?
     }
 
-    /// The map of an Arrow table that `to_arrow` made, in whatever order its rows are now.
+    /// The map of an Arrow table of cells in any order, such as `to_arrow` makes; `lattice`, and `datum` (m) if wanted, where
+    /// an engine has dropped them.
     #[staticmethod]
-    fn from_arrow(table: &Bound<'_, PyAny>) -> PyResult<Self> {
-        Ok(Self::of(map_of(table)?))
+    #[pyo3(signature = (table, *, lattice=None, datum=None))]
+    fn from_arrow(
+        py: Python<'_>,
+        table: &Bound<'_, PyAny>,
+        lattice: Option<&Lattice>,
+        datum: Option<[f64; 3]>,
+    ) -> PyResult<Self> {
+        let cells = Cells {
+            lattice: lattice.map(|lattice| lattice.core.clone()),
+            datum_m: datum.map(Vector3::from),
+        };
+        let map = map_of(py, table, cells)?;
+        Self::of_contents(py, map)
     }
 
     /// Reads a map file.
     #[staticmethod]
     fn load(py: Python<'_>, path: PathBuf) -> PyResult<Self> {
-        let read = || -> Result<MapContents, String> {
-            let here = |error: &dyn std::fmt::Display| format!("{}: {error}", path.display());
-            let file = File::open(&path).map_err(|error| here(&error))?;
-            let bytes = file.metadata().map_err(|error| here(&error))?.len();
-            MapContents::read(BufReader::new(file), max_voxels_of(bytes))
-                .map_err(|error| here(&error))
-        };
-        py.detach(read).map(Self::of).map_err(refuse)
+        let map = background(py, move |stop| map_files::load(&path, stop))??;
+        Self::of_contents(py, map)
     }
 
-    /// Writes a map file, packed by zstd at a level from 1 to 19 if given.
+    /// Writes a map file, packed by zstd at a level from 1 to 19 if given; after an error the one before stays.
     #[pyo3(signature = (path, zstd=None))]
     fn save(&self, py: Python<'_>, path: PathBuf, zstd: Option<i32>) -> PyResult<()> {
         let options = WriteOptions {
             zstd_level: zstd,
             occupancy_only: false,
         };
-        let write = || -> Result<(), String> {
-            let here = |error: &dyn std::fmt::Display| format!("{}: {error}", path.display());
-            let file = File::create(&path).map_err(|error| here(&error))?;
-            let map = MapContents::from_list(&self.list);
-            map.write(BufWriter::new(file), &options)
-                .map_err(|error| here(&error))
-        };
-        py.detach(write).map_err(refuse)
+        let list = self.list.clone();
+        background(py, move |stop| {
+            map_files::save(&list.copied()?, &path, &options, stop)
+        })?
     }
 
-    /// Distances (m), shape (n, k), and centres, shape (n, k, 3), of the `k` occupied cells nearest to
-    /// each point; infinite and NaN where there are fewer.
+    /// Distances (m), shape (n, k), and centres, shape (n, k, 3), of the `k` occupied cells nearest to each point, or of all
+    /// cells if there are fewer.
     #[pyo3(signature = (xyz, k=1))]
     fn query<'py>(
         &self,
         py: Python<'py>,
         xyz: &Bound<'py, PyAny>,
-        k: usize,
+        k: i64,
     ) -> PyResult<(Bound<'py, PyAny>, Bound<'py, PyAny>)> {
-        let points = Points::of(xyz)?;
-        let rows = points.rows()?;
-        let count = rows.len();
-        if k == 0 || count.saturating_mul(k) > 1 << 31 {
-            return Err(refuse(format!(
-                "{count} points with k = {k}: k is at least 1, and their product at most 2^31"
-            )));
-        }
-        let found = py.detach(|| {
-            let questions = Query::new(&self.list);
-            let ask = |i: usize| questions.nearest(&Vector3::from(rows.get(i)), k);
-            (0..count)
-                .into_par_iter()
-                .map(ask)
-                .collect::<Result<Vec<_>, _>>()
-        });
-        let found = found.map_err(refuse)?;
-        let (mut distances, mut centers) = (
-            vec![[f64::INFINITY]; count * k],
-            vec![[f64::NAN; 3]; count * k],
-        );
-        let places = distances.chunks_mut(k).zip(centers.chunks_mut(k));
-        for (neighbors, (distances, centers)) in found.iter().zip(places) {
-            for (near, (distance, center)) in
-                neighbors.iter().zip(distances.iter_mut().zip(centers))
-            {
-                (*distance, *center) = ([near.distance_m], near.center_m.into());
-            }
-        }
-        let shaped =
-            |array: Bound<'py, PyAny>, shape: Vec<usize>| array.call_method1("reshape", (shape,));
-        Ok((
-            shaped(array_of(py, &distances)?, vec![count, k])?,
-            shaped(array_of(py, &centers)?, vec![count, k, 3])?,
-        ))
+        let most = usize::try_from(k).ok().filter(|k| *k > 0);
+        let k = most.ok_or_else(|| refuse(format!("k = {k} is below 1")))?;
+        let shells = || Arc::new(Shells::new(&self.lattice));
+        let shells = self.shells.get_or_init(shells).clone();
+        query::query(py, &self.list, shells, xyz, k)
     }
 
-    /// Centres of the occupied cells, shape (n, 3), m, in the order of `cells` and `counts`.
+    /// Centres of the occupied cells, shape (n, 3), m, in the order of `cells` and the other columns.
     fn centers<'py>(&self, py: Python<'py>) -> PyResult<Bound<'py, PyAny>> {
-        let map = self.columns(py);
-        let center = |key| <[f64; 3]>::from(self.list.center_m(key));
-        let centers: Vec<[f64; 3]> = map.keys.iter().copied().map(center).collect();
-        array_of(py, &centers)
+        map_arrays::centers(py, &self.list)
     }
 
     /// Lattice indices of the occupied cells, int64 of shape (n, 3).
     fn cells<'py>(&self, py: Python<'py>) -> PyResult<Bound<'py, PyAny>> {
-        let map = self.columns(py);
-        let datum = map.datum_index;
-        let cell = |key: &lattice_core::lattice::MortonKey| {
-            let w = key.unpack();
-            [0, 1, 2].map(|i: usize| datum[i].saturating_add(w[i].into()))
-        };
-        let cells: Vec<[i64; 3]> = map.keys.iter().map(cell).collect();
-        array_of(py, &cells)
+        map_arrays::cells(py, &self.list)
     }
 
-    /// Points in each occupied cell, shape (n,).
-    fn counts<'py>(&self, py: Python<'py>) -> Bound<'py, PyAny> {
-        let map = self.columns(py);
-        let counts: Vec<u32> = map
-            .voxels
-            .iter()
-            .flatten()
-            .map(|voxel| voxel.count)
-            .collect();
-        numpy::PyArray1::from_vec(py, counts).into_any()
+    /// Points in each occupied cell, uint32 of shape (n,).
+    fn counts<'py>(&self, py: Python<'py>) -> PyResult<Bound<'py, PyAny>> {
+        map_arrays::counts(py, &self.list)
+    }
+
+    /// Mean of the points of each occupied cell, shape (n, 3), m.
+    fn means<'py>(&self, py: Python<'py>) -> PyResult<Bound<'py, PyAny>> {
+        map_arrays::means(py, &self.list)
+    }
+
+    /// Most frequent label of each occupied cell, the smallest of equals, int32 of shape (n,); -1 without labels.
+    fn labels<'py>(&self, py: Python<'py>) -> PyResult<Bound<'py, PyAny>> {
+        map_arrays::labels(py, &self.list)
+    }
+
+    /// Stamps of the first and the last point of each occupied cell, datetime64[ns] of shape (n, 2); NaT without stamps.
+    fn stamps<'py>(&self, py: Python<'py>) -> PyResult<Bound<'py, PyAny>> {
+        map_arrays::stamps(py, &self.list)
     }
 
     /// Lattice of the cells.
     #[getter]
     fn lattice(&self) -> Lattice {
         Lattice {
-            core: self.list.lattice().clone(),
+            core: self.lattice.clone(),
         }
+    }
+
+    /// Centre of the cell that cells are counted from, m.
+    #[getter]
+    fn datum(&self, py: Python<'_>) -> PyResult<(f64, f64, f64)> {
+        let [x, y, z] = self.list.read(py, |list| list.datum_m().into())?;
+        Ok((x, y, z))
     }
 
     /// Number of points that were inserted.
     #[getter]
-    fn points(&self) -> u64 {
-        self.list.distortion().points
+    fn points(&self, py: Python<'_>) -> PyResult<u64> {
+        self.list.read(py, |list| list.distortion().points)
     }
 
-    fn __len__(&self) -> usize {
-        self.list.len()
+    fn __len__(&self, py: Python<'_>) -> PyResult<usize> {
+        self.list.read(py, VoxelList::len)
     }
 
-    fn __repr__(&self) -> String {
-        let lattice = self.list.lattice();
-        format!(
-            "<VoxelMap of {} {} voxels of {} m^3>",
-            self.list.len(),
-            lattice.kind().name(),
-            lattice.cell_volume_m3()
-        )
+    fn __repr__(&self, py: Python<'_>) -> PyResult<String> {
+        let (name, volume) = (self.lattice.kind().name(), self.lattice.cell_volume_m3());
+        let voxels = self.__len__(py)?;
+        Ok(format!(
+            "<VoxelMap of {voxels} {name} voxels of {volume} m^3>"
+        ))
+    }
+
+    /// True for maps of the same voxels about the same datum.
+    fn __eq__(&self, py: Python<'_>, other: &VoxelMap) -> PyResult<bool> {
+        let (ours, theirs) = (self.list.clone(), other.list.clone());
+        background(py, move |_| {
+            Ok(map_arrays::rows(&ours)? == map_arrays::rows(&theirs)?)
+        })?
+    }
+
+    /// As a map file and the bound of its voxels.
+    fn __reduce__<'py>(slf: &Bound<'py, Self>) -> Reduced<'py> {
+        let py = slf.py();
+        let list = slf.get().list.clone();
+        let (bytes, most) = background(py, move |_| {
+            let mut bytes = Vec::new();
+            let written = list.copied()?.write(&mut bytes, &WriteOptions::default());
+            written.map_err(refuse)?;
+            Ok::<_, PyErr>((bytes, list.read_away(VoxelList::max_voxels)))
+        })??;
+        let restore = slf.get_type().getattr("_restore")?;
+        let arguments = (PyBytes::new(py, &bytes), most);
+        Ok((restore, arguments.into_pyobject(py)?))
+    }
+
+    #[staticmethod]
+    fn _restore(bytes: &[u8], max_voxels: usize) -> PyResult<Self> {
+        let map = MapContents::read(bytes, max_voxels).map_err(refuse)?;
+        Ok(Self::of(on_pool(|| map.into_list(max_voxels))?))
     }
 }
 
 impl VoxelMap {
-    fn of(map: MapContents) -> VoxelMap {
+    fn of(list: VoxelList) -> VoxelMap {
         VoxelMap {
-            list: map.into_list(usize::MAX),
+            lattice: list.lattice().clone(),
+            list: SharedList::new(list),
+            shells: OnceLock::new(),
         }
     }
 
-    fn columns(&self, py: Python<'_>) -> MapColumns {
-        py.detach(|| MapContents::from_list(&self.list).into())
+    fn of_contents(py: Python<'_>, map: MapContents) -> PyResult<VoxelMap> {
+        let list = background(py, move |_| on_pool(|| map.into_list(usize::MAX)))??;
+        Ok(Self::of(list))
     }
 }
 
-/// Lengths of the runs of equal values.
-fn runs(values: &[i64]) -> Vec<(i64, usize)> {
-    let runs = values.chunk_by(|a, b| a == b);
-    runs.filter_map(|run| Some((*run.first()?, run.len())))
-        .collect()
-}
-
-/// Inserts runs of points with one stamp each.
-fn insert(
-    list: &mut VoxelList,
-    rows: &Rows,
-    labels: &[u16],
-    runs: &[(i64, usize)],
-) -> InsertReport {
-    let mut all = InsertReport::default();
-    let datum_m = list.datum_m();
-    let mut at = 0;
-    for (stamp_ns, len) in runs {
-        let labels = labels.get(at..at + len).unwrap_or_default();
-        match rows {
-            Rows::F32(rows) => {
-                let rows = rows.get(at..at + len).unwrap_or_default();
-                add(
-                    &mut all,
-                    &list.insert_offsets(*stamp_ns, Vector3::zeros(), rows, labels),
-                );
-            }
-            Rows::F64(rows) => {
-                let rows = rows.get(at..at + len).unwrap_or_default();
-                for (number, rows) in rows.chunks(WAVE).enumerate() {
-                    let offset =
-                        |p: &[f64; 3]| [0, 1, 2].map(|i: usize| (p[i] - datum_m[i]) as f32);
-                    let offsets: Vec<[f32; 3]> = rows.par_iter().map(offset).collect();
-                    let from = (number * WAVE).min(labels.len());
-                    let labels = labels.get(from..).unwrap_or_default();
-                    add(
-                        &mut all,
-                        &list.insert_offsets(*stamp_ns, datum_m, &offsets, labels),
-                    );
-                }
-            }
-        }
-        at += len;
+fn merged(list: &VoxelList, other: MapContents) -> PyResult<VoxelList> {
+    let mut merged = MapContents::from_list(list);
+    merged.merge(other).map_err(refuse)?;
+    let (voxels, most) = (merged.keys().len(), list.max_voxels());
+    match voxels <= most {
+        true => Ok(merged.into_list_with(list.payload(), most)),
+        false => Err(refuse(format!(
+            "{voxels} voxels are more than max_voxels, {most}"
+        ))),
     }
-    all
-}
-
-fn add(all: &mut InsertReport, more: &InsertReport) {
-    all.points += more.points;
-    all.inserted += more.inserted;
-    all.not_finite += more.not_finite;
-    all.out_of_range += more.out_of_range;
-    all.list_full += more.list_full;
-    all.new_voxels += more.new_voxels;
 }

@@ -1,9 +1,10 @@
 //! Points of NumPy: float32 or float64 rows of x, y, z.
 
-use numpy::{PyArray2, PyArrayMethods, PyReadonlyArray1, PyReadonlyArray2, PyUntypedArrayMethods};
+use numpy::{PyReadonlyArray2, PyUntypedArray, PyUntypedArrayMethods};
+use pyo3::exceptions::PyUserWarning;
 use pyo3::prelude::*;
 
-use crate::refuse;
+use crate::errors::{mistyped, refuse};
 
 /// Points as NumPy holds them; the rows are borrowed, not copied.
 pub enum Points<'py> {
@@ -14,6 +15,7 @@ pub enum Points<'py> {
 }
 
 /// The rows of [`Points`], which threads without the GIL may read.
+#[derive(Clone, Copy)]
 pub enum Rows<'a> {
     /// Single precision.
     F32(&'a [[f32; 3]]),
@@ -22,44 +24,55 @@ pub enum Rows<'a> {
 }
 
 impl<'py> Points<'py> {
-    /// An array of shape (n, 3), in rows one after another; other layouts are copied by NumPy first.
+    /// An array of shape (n, 3) without masked values; other layouts, byte orders and numbers are copied by NumPy.
     pub fn of(array: &Bound<'py, PyAny>) -> PyResult<Points<'py>> {
+        if let Some(mask) = mask_of(array)? {
+            let row = first_true(&mask.call_method1("any", (-1,))?)?;
+            return Err(refuse(format!(
+                "row {row} is masked: give xyz.data[~xyz.mask.any(axis=1)]; only insert leaves masked rows out"
+            )));
+        }
+        Points::unmasked(array)
+    }
+
+    /// An array of shape (n, 3), whatever is masked.
+    pub fn unmasked(array: &Bound<'py, PyAny>) -> PyResult<Points<'py>> {
         let numpy = array.py().import("numpy")?;
-        let array = numpy.call_method1("ascontiguousarray", (array,))?;
-        let shape = match array.cast::<numpy::PyUntypedArray>() {
-            Ok(array) => array.shape().to_vec(),
-            Err(_) => Vec::new(),
-        };
+        let array = numpy.call_method1("asarray", (array,))?;
+        let shape = shape_of(&array)?;
         if shape.len() != 2 || shape.get(1) != Some(&3) {
             return Err(refuse(format!("points have shape {shape:?}, not (n, 3)")));
         }
-        if let Ok(single) = array.extract() {
-            return Ok(Points::F32(single));
+        let dtype = array.getattr("dtype")?;
+        let kind: String = dtype.getattr("kind")?.extract()?;
+        let bytes: usize = dtype.getattr("itemsize")?.extract()?;
+        let precision = match (kind.as_str(), bytes) {
+            ("f", 2 | 4) => "float32",
+            ("f" | "i" | "u", _) => "float64",
+            _ => {
+                return Err(mistyped(format!(
+                    "points are of {dtype}, not float32 or float64"
+                )));
+            }
+        };
+        // In rows one after another, aligned, in the byte order of the machine.
+        let array = numpy.call_method1("require", (array, precision, ["C", "A"]))?;
+        match precision {
+            "float32" => Ok(Points::F32(array.extract()?)),
+            _ => Ok(Points::F64(array.extract()?)),
         }
-        if let Ok(double) = array.extract() {
-            return Ok(Points::F64(double));
-        }
-        let double = array.call_method1("astype", ("float64",))?;
-        double.extract().map(Points::F64).map_err(|_| {
-            let kind = array.getattr("dtype").map(|kind| kind.to_string());
-            refuse(format!(
-                "points are of {}, not float32 or float64",
-                kind.unwrap_or_default()
-            ))
-        })
     }
 
     /// The rows.
     pub fn rows(&self) -> PyResult<Rows<'_>> {
-        let not = |_| refuse("points are not in rows one after another");
         Ok(match self {
-            Points::F32(array) => Rows::F32(array.as_slice().map_err(not)?.as_chunks().0),
-            Points::F64(array) => Rows::F64(array.as_slice().map_err(not)?.as_chunks().0),
+            Points::F32(array) => Rows::F32(array.as_slice().map_err(refuse)?.as_chunks().0),
+            Points::F64(array) => Rows::F64(array.as_slice().map_err(refuse)?.as_chunks().0),
         })
     }
 }
 
-impl Rows<'_> {
+impl<'a> Rows<'a> {
     /// Number of points.
     pub fn len(&self) -> usize {
         match self {
@@ -76,65 +89,67 @@ impl Rows<'_> {
         };
         row.unwrap_or([f64::NAN; 3])
     }
-}
 
-/// Integers of a column, one for each of `count` points.
-pub fn integers(array: &Bound<'_, PyAny>, name: &str, count: usize) -> PyResult<Vec<i64>> {
-    let numpy = array.py().import("numpy")?;
-    let array = numpy.call_method1("asarray", (array,))?;
-    let kind: String = array.getattr("dtype")?.getattr("kind")?.extract()?;
-    if kind != "i" && kind != "u" {
-        return Err(refuse(format!(
-            "{name} are of {}, not integers",
-            array.getattr("dtype")?
-        )));
+    /// Up to `len` rows from `start` on.
+    pub fn part(&self, start: usize, len: usize) -> Rows<'a> {
+        match self {
+            Rows::F32(rows) => Rows::F32(part(rows, start, len)),
+            Rows::F64(rows) => Rows::F64(part(rows, start, len)),
+        }
     }
-    let array = array.call_method1("astype", ("int64",))?;
-    let array: PyReadonlyArray1<i64> = array
-        .extract()
-        .map_err(|_| refuse(format!("{name} are not one row of integers")))?;
-    let values = array.as_slice().map_err(refuse)?.to_vec();
-    if values.len() != count {
-        let len = values.len();
-        return Err(refuse(format!("there are {count} points and {len} {name}")));
+}
+
+/// Points that are looked at for their precision.
+const SAMPLES: usize = 16;
+/// Share of a cell's side that rounding may move a point by unsaid: a tenth moves one in some three to another cell.
+const COARSE: f64 = 0.1;
+
+/// Warns of points in single precision that are so far from the origin that rounding moves many to other cells.
+pub fn warn_of_rounding(py: Python<'_>, rows: Rows, side_m: f64) -> PyResult<()> {
+    let Rows::F32(rows) = rows else {
+        return Ok(());
+    };
+    let samples = rows.iter().step_by(rows.len().div_ceil(SAMPLES).max(1));
+    let sizes = samples.flatten().map(|coordinate| coordinate.abs());
+    let largest = f64::from(sizes.filter(|size| size.is_finite()).fold(0.0, f32::max));
+    let rounding_m = largest * f64::from(f32::EPSILON) / 2.0;
+    if rounding_m > COARSE * side_m && rounding_m < largest {
+        let text = format!(
+            "float32 rounds coordinates of {largest:.0} m by up to {rounding_m:.3} m, where cells have a side of \
+             {side_m:.3} m: give float64"
+        );
+        let text = std::ffi::CString::new(text)?;
+        PyErr::warn(py, &py.get_type::<PyUserWarning>(), &text, 1)?;
     }
-    Ok(values)
+    Ok(())
 }
 
-/// Labels below 2^16, one for each of `count` points.
-pub fn labels(array: &Bound<'_, PyAny>, count: usize) -> PyResult<Vec<u16>> {
-    let label = |(row, value): (usize, i64)| {
-        u16::try_from(value)
-            .map_err(|_| refuse(format!("row {row}: label {value} is not below 65536")))
-    };
-    let values = integers(array, "labels", count)?;
-    values.into_iter().enumerate().map(label).collect()
+/// Up to `len` values from `start` on.
+pub fn part<T>(values: &[T], start: usize, len: usize) -> &[T] {
+    let rest = values.get(start..).unwrap_or_default();
+    rest.get(..len).unwrap_or(rest)
 }
 
-/// A new array of `len` rows of `N` values, which `fill` writes without the GIL, and its answer.
-pub fn new_array<'py, T, R, const N: usize>(
-    py: Python<'py>,
-    len: usize,
-    fill: impl FnOnce(&mut [[T; N]]) -> R + Send,
-) -> PyResult<(Bound<'py, PyAny>, R)>
-where
-    T: numpy::Element + Send,
-    R: Send,
-{
-    let array = PyArray2::<T>::zeros(py, [len, N], false);
-    let answer = {
-        let mut rows = array.try_readwrite().map_err(refuse)?;
-        let rows = rows.as_slice_mut().map_err(refuse)?.as_chunks_mut().0;
-        py.detach(|| fill(rows))
-    };
-    Ok((array.into_any(), answer))
+/// Lengths of an array along its axes.
+pub fn shape_of(array: &Bound<'_, PyAny>) -> PyResult<Vec<usize>> {
+    Ok(array.cast::<PyUntypedArray>()?.shape().to_vec())
 }
 
-/// Rows of `N` values as an array of shape (n, N).
-pub fn array_of<'py, T: numpy::Element + Copy + Sync, const N: usize>(
-    py: Python<'py>,
-    rows: &[[T; N]],
-) -> PyResult<Bound<'py, PyAny>> {
-    let copy = |to: &mut [[T; N]]| to.copy_from_slice(rows);
-    Ok(new_array(py, rows.len(), copy)?.0)
+/// The mask of a masked array in which something is masked.
+pub fn mask_of<'py>(array: &Bound<'py, PyAny>) -> PyResult<Option<Bound<'py, PyAny>>> {
+    let masked = array.py().import("numpy")?.getattr("ma")?;
+    if !masked
+        .call_method1("isMaskedArray", (array,))?
+        .is_truthy()?
+    {
+        return Ok(None);
+    }
+    let mask = masked.call_method1("getmaskarray", (array,))?;
+    let any = mask.call_method0("any")?.is_truthy()?;
+    Ok(any.then_some(mask))
+}
+
+/// The place of the first True of an array of them.
+pub fn first_true(flags: &Bound<'_, PyAny>) -> PyResult<usize> {
+    flags.call_method0("argmax")?.extract()
 }

@@ -1,23 +1,34 @@
-//! `gicp` and `calibrate`.
+//! `gicp`.
 
 use lattice_core::registration::{
-    CalibrationMap, CalibrationRequest, HeadsetScan, LabelDistribution, PrepareOptions,
-    PreparedCloud, Profile, RegisterOptions, SemanticCloud, calibrate as search, register,
-    voxel_downsample,
+    MAX_NEIGHBORS, PrepareOptions, PreparedCloud, RegisterOptions, Registration as Found,
+    SemanticCloud, register, voxel_downsample,
 };
-use nalgebra::{Isometry3, Matrix3, Point3, Rotation3, Translation3, UnitQuaternion, Vector3};
-use numpy::PyReadonlyArray2;
+use nalgebra::{Matrix6, Point3};
 use pyo3::prelude::*;
 
-use crate::map::VoxelMap;
-use crate::points::{Points, array_of, labels as labels_of};
-use crate::refuse;
+use crate::errors::refuse;
+use crate::pickle::Reduced;
+use crate::points::Points;
+use crate::pose::{isometry_of, matrix_of, matrix6_of};
+use crate::threads::{background, on_threads};
+
+/// Most threads of a call, more than a machine has cores.
+const MAX_THREADS: i64 = 1024;
+/// Most iterations, beyond any that converges.
+const MAX_ITERATIONS: i64 = 1_000_000;
 
 /// Result of a single registration.
 #[pyclass(frozen, get_all, module = "lattice_core")]
 pub struct Registration {
     /// Takes source points to the target frame, shape (4, 4).
     target_from_source: Py<PyAny>,
+    /// Covariance of x, y, z (m^2) and the turns about x, y, z (rad^2) in the target, shape (6, 6); NaN where the points
+    /// do not determine the pose. Of a source more than 100 m from its origin x, y, z are of its middle.
+    covariance: Py<PyAny>,
+    /// Half the Hessian of the cost by a translation (m), then a rotation (rad) in the source, shape (6, 6), about the
+    /// same point.
+    hessian: Py<PyAny>,
     /// True if the last step was below the tolerances.
     converged: bool,
     /// Searches for pairs.
@@ -28,46 +39,50 @@ pub struct Registration {
     rmse_m: f64,
 }
 
-/// Pose of a cloud in a map, and whether it can be trusted.
-#[pyclass(frozen, get_all, module = "lattice_core")]
-pub struct Calibration {
-    /// OK, AMBIGUOUS, DEGENERATE, NO_OVERLAP or REJECTED_INPUT; the pose is to be used only with OK.
-    verdict: &'static str,
-    /// Reason for the verdict.
-    reason: String,
-    /// Takes points of the cloud to the map, shape (4, 4).
-    map_from_cloud: Py<PyAny>,
-    /// Covariance of x, y, z (m^2) and the turns about x, y, z (rad^2) in the map, shape (6, 6).
-    covariance: Py<PyAny>,
-    /// Probability that another pose is right.
-    p_wrong: f64,
-    /// Share of the points on a surface of the map.
-    inlier_fraction: f64,
-    /// Root mean square distance of those from the surfaces, m.
-    rmse_m: f64,
-    /// Method that made the winning pose.
-    method: &'static str,
-}
-
 #[pymethods]
 impl Registration {
     fn __repr__(&self) -> String {
         let (converged, inliers, rmse_m) = (self.converged, self.inliers, self.rmse_m);
         format!("<Registration converged={converged} inliers={inliers} rmse_m={rmse_m:.4}>")
     }
-}
 
-#[pymethods]
-impl Calibration {
-    fn __repr__(&self) -> String {
-        let (verdict, p_wrong, reason) = (self.verdict, self.p_wrong, &self.reason);
-        format!("<Calibration {verdict} p_wrong={p_wrong:.2e}: {reason}>")
+    fn __reduce__<'py>(slf: &Bound<'py, Self>) -> Reduced<'py> {
+        let (py, own) = (slf.py(), slf.get());
+        let arrays = [&own.target_from_source, &own.covariance, &own.hessian];
+        let arrays = arrays.map(|array| array.clone_ref(py));
+        let rest = (own.converged, own.iterations, own.inliers, own.rmse_m);
+        let restore = slf.get_type().getattr("_restore")?;
+        let arguments = (arrays, rest.0, rest.1, rest.2, rest.3);
+        Ok((restore, arguments.into_pyobject(py)?))
+    }
+
+    #[staticmethod]
+    fn _restore(
+        arrays: [Py<PyAny>; 3],
+        converged: bool,
+        iterations: usize,
+        inliers: usize,
+        rmse_m: f64,
+    ) -> Self {
+        let [target_from_source, covariance, hessian] = arrays;
+        Self {
+            target_from_source,
+            covariance,
+            hessian,
+            converged,
+            iterations,
+            inliers,
+            rmse_m,
+        }
     }
 }
 
 /// Registers `source` to `target` (points, m) by GICP from `init` (4 x 4); `cell` thins both first (m).
 #[pyfunction]
-#[pyo3(signature = (source, target, init=None, *, max_distance=1.0, cell=None))]
+#[pyo3(signature = (
+    source, target, init=None, *, max_distance=1.0, cell=None, num_neighbors=10, num_threads=None, max_iterations=20
+))]
+#[expect(clippy::too_many_arguments, reason = "keywords of Python")]
 pub fn gicp(
     py: Python<'_>,
     source: &Bound<'_, PyAny>,
@@ -75,32 +90,47 @@ pub fn gicp(
     init: Option<&Bound<'_, PyAny>>,
     max_distance: f64,
     cell: Option<f64>,
+    num_neighbors: i64,
+    num_threads: Option<i64>,
+    max_iterations: i64,
 ) -> PyResult<Registration> {
     for (name, value) in [("max_distance", Some(max_distance)), ("cell", cell)] {
-        if value.is_some_and(|v| !(v > 0.0 && v.is_finite())) {
-            return Err(refuse(format!("{name} {value:?} is no length over 0")));
+        if let Some(value) = value.filter(|v| !(*v > 0.0 && v.is_finite())) {
+            return Err(refuse(format!("{name} {value} m is not a length over 0")));
         }
     }
-    let (source, target) = (cloud_of(source)?, cloud_of(target)?);
-    let start = init.map(isometry_of).transpose()?.unwrap_or_default();
-    let run = || {
-        let prepare = |cloud: SemanticCloud, name: &str| {
-            let cloud =
-                cell.map_or_else(|| cloud.clone(), |side_m| voxel_downsample(&cloud, side_m));
-            let prepared = PreparedCloud::new(cloud, &PrepareOptions::default());
-            prepared.map_err(|error| format!("{name}: {error}"))
-        };
-        let (source, target) = (prepare(source, "source")?, prepare(target, "target")?);
-        Ok::<_, String>(register(
-            &source,
-            &target,
-            &start,
-            &RegisterOptions::gicp(max_distance),
-        ))
+    let neighbors = count("num_neighbors", num_neighbors, 3, MAX_NEIGHBORS as i64)?;
+    let threads = num_threads.map(|threads| count("num_threads", threads, 1, MAX_THREADS));
+    let threads = threads.transpose()?;
+    let options = RegisterOptions {
+        max_iterations: count("max_iterations", max_iterations, 1, MAX_ITERATIONS)?,
+        ..RegisterOptions::gicp(max_distance)
     };
-    let found = py.detach(run).map_err(refuse)?;
+    let (source, target) = (cloud_of("source", source)?, cloud_of("target", target)?);
+    let start = init.map(|init| isometry_of("init", init)).transpose()?;
+    let start = start.unwrap_or_default();
+    let prepare = move |cloud: SemanticCloud, name: &str| {
+        let cloud = match cell {
+            Some(side_m) => voxel_downsample(&cloud, side_m),
+            None => cloud,
+        };
+        let options = PrepareOptions {
+            neighbors,
+            ..PrepareOptions::default()
+        };
+        let prepared = PreparedCloud::new(cloud, &options);
+        prepared.map_err(|error| refuse(format!("{name}: {error}")))
+    };
+    let found = background(py, move |_| {
+        on_threads(threads, || {
+            let (source, target) = (prepare(source, "source")?, prepare(target, "target")?);
+            Ok::<_, PyErr>(register(&source, &target, &start, &options))
+        })?
+    })??;
     Ok(Registration {
         target_from_source: matrix_of(py, &found.target_from_source)?,
+        covariance: matrix6_of(py, &covariance(&found))?,
+        hessian: matrix6_of(py, &found.hessian)?,
         converged: found.converged,
         iterations: found.iterations,
         inliers: found.inliers,
@@ -108,91 +138,37 @@ pub fn gicp(
     })
 }
 
-/// Finds where a cloud (points, m, gravity along -z) lies in a map, without a guess, and judges the answer.
-#[pyfunction]
-#[pyo3(signature = (map, xyz, labels=None, *, sensor=None, start=None, profile="headset"))]
-pub fn calibrate(
-    py: Python<'_>,
-    map: &VoxelMap,
-    xyz: &Bound<'_, PyAny>,
-    labels: Option<&Bound<'_, PyAny>>,
-    sensor: Option<[f64; 3]>,
-    start: Option<&Bound<'_, PyAny>>,
-    profile: &str,
-) -> PyResult<Calibration> {
-    let known = Profile::ALL.iter().find(|known| known.name() == profile);
-    let profile = known.ok_or_else(|| {
-        let names = Profile::ALL.map(Profile::name);
-        refuse(format!("profile {profile:?} is none of {names:?}"))
-    })?;
-    let mut cloud = cloud_of(xyz)?;
-    if let Some(labels) = labels {
-        let labels = labels_of(labels, cloud.len())?;
-        cloud.labels = labels.into_iter().map(LabelDistribution::hard).collect();
-    }
-    let start = start.map(isometry_of).transpose()?;
-    let run = || {
-        let side_m = map.list.lattice().cell_side_m();
-        let map = SemanticCloud::from_voxels(&map.list);
-        let map = CalibrationMap::new(map, side_m).map_err(|error| format!("map: {error}"))?;
-        let scans = [HeadsetScan {
-            cloud,
-            sensor_m: sensor.map(Point3::from),
-        }];
-        let request = CalibrationRequest {
-            headset_scans: &scans,
-            start,
-            confusion: None,
-        };
-        Ok::<_, String>(search(&map, &request, &profile.options(), &()))
+/// The inverse of the Hessian times the variance of a pair, in the axes of the target. A pair measures one distance,
+/// across its plane, in units of a variance that is known up to a factor: the cost for each pair beyond the six that
+/// the pose takes.
+fn covariance(found: &Found) -> Matrix6<f64> {
+    let free = found.inliers.saturating_sub(6);
+    let inverse = found.hessian.cholesky().map(|parts| parts.inverse());
+    let Some(inverse) = inverse.filter(|_| free > 0) else {
+        return Matrix6::repeat(f64::NAN);
     };
-    let found = py.detach(run).map_err(refuse)?;
-    let row = |i: usize| [0, 1, 2, 3, 4, 5].map(|k: usize| found.covariance[(i, k)]);
-    Ok(Calibration {
-        verdict: found.verdict.name(),
-        map_from_cloud: matrix_of(py, &found.map_from_headset)?,
-        covariance: array_of(py, &[0, 1, 2, 3, 4, 5].map(row))?.unbind(),
-        p_wrong: found.margin.p_wrong(),
-        inlier_fraction: found.inlier_fraction,
-        rmse_m: found.rmse_m,
-        method: found.method,
-        reason: found.reason,
-    })
+    let turn = found.target_from_source.rotation.to_rotation_matrix();
+    let mut axes = Matrix6::zeros();
+    axes.fixed_view_mut::<3, 3>(0, 0).copy_from(turn.matrix());
+    axes.fixed_view_mut::<3, 3>(3, 3).copy_from(turn.matrix());
+    axes * inverse * axes.transpose() * (found.cost / free as f64)
 }
 
-fn cloud_of(xyz: &Bound<'_, PyAny>) -> PyResult<SemanticCloud> {
+fn count(name: &str, value: i64, least: i64, most: i64) -> PyResult<usize> {
+    let within = (least..=most).contains(&value);
+    let value_in = usize::try_from(value).ok().filter(|_| within);
+    value_in.ok_or_else(|| refuse(format!("{name} {value} is outside {least}..={most}")))
+}
+
+/// Points as a cloud; a row that is not finite is refused.
+pub fn cloud_of(name: &str, xyz: &Bound<'_, PyAny>) -> PyResult<SemanticCloud> {
     let points = Points::of(xyz)?;
     let rows = points.rows()?;
-    let all = (0..rows.len()).map(|i| Point3::from(rows.get(i)));
-    Ok(SemanticCloud::unlabelled(all.collect()))
-}
-
-/// A rigid transform as a matrix of shape (4, 4).
-fn matrix_of(py: Python<'_>, pose: &Isometry3<f64>) -> PyResult<Py<PyAny>> {
-    let m = pose.to_homogeneous();
-    let row = |i: usize| [m[(i, 0)], m[(i, 1)], m[(i, 2)], m[(i, 3)]];
-    Ok(array_of(py, &[row(0), row(1), row(2), row(3)])?.unbind())
-}
-
-/// The rigid transform of a matrix of shape (4, 4); refuses one that is none.
-fn isometry_of(matrix: &Bound<'_, PyAny>) -> PyResult<Isometry3<f64>> {
-    let numpy = matrix.py().import("numpy")?;
-    let matrix = numpy.call_method1("ascontiguousarray", (matrix, "float64"))?;
-    let matrix: PyReadonlyArray2<f64> = matrix
-        .extract()
-        .map_err(|_| refuse("a pose is no (4, 4) matrix"))?;
-    let rows = matrix.as_slice().map_err(refuse)?.as_chunks::<4>().0;
-    let [a, b, c, last] = rows else {
-        return Err(refuse("a pose is no (4, 4) matrix"));
-    };
-    let turn = Matrix3::new(a[0], a[1], a[2], b[0], b[1], b[2], c[0], c[1], c[2]);
-    let rigid = (turn * turn.transpose() - Matrix3::identity()).norm() < 1e-6
-        && turn.determinant() > 0.0
-        && *last == [0.0, 0.0, 0.0, 1.0];
-    let place = Vector3::new(a[3], b[3], c[3]);
-    if !rigid || !place.iter().all(|value| value.is_finite()) {
-        return Err(refuse(format!("{rows:?} is no rigid transform")));
+    let all: Vec<Point3<f64>> = (0..rows.len()).map(|i| Point3::from(rows.get(i))).collect();
+    if let Some(row) = all.iter().position(|p| !p.iter().all(|c| c.is_finite())) {
+        return Err(refuse(format!(
+            "{name}: row {row} is not finite: give xyz[np.isfinite(xyz).all(axis=1)]"
+        )));
     }
-    let turn = UnitQuaternion::from_rotation_matrix(&Rotation3::from_matrix_unchecked(turn));
-    Ok(Isometry3::from_parts(Translation3::from(place), turn))
+    Ok(SemanticCloud::unlabelled(all))
 }

@@ -129,8 +129,8 @@ def refusals():
         (lambda: fcc.quantize(np.zeros((4, 3)), out=np.zeros((3, 3), np.int32)), "[3, 3], not (4, 3)"),
         (lambda: fcc.quantize(np.zeros((4, 3)), out=np.zeros((4, 3))), "int32"),
         (lambda: fcc.quantize(np.zeros((4, 3)), out=frozen), "out cannot be written"),
-        (lambda: fcc.quantize(np.zeros((4, 3)), out=np.zeros((4, 6), np.int32)[:, ::2]), "out cannot be written"),
-        (lambda: fcc.quantize(np.array([["a", "b", "c"]])), "could not convert"),
+        (lambda: fcc.quantize(np.zeros((4, 3)), out=np.zeros((4, 6), np.int32)[:, ::2]), "C order"),
+        (lambda: fcc.quantize(np.array([["a", "b", "c"]])), "points are of <U1"),
         (lambda: VoxelMap(fcc).insert(np.zeros((4, 3)), labels=[1, 2, 3, 4]), "labels=True"),
         (lambda: VoxelMap(fcc, labels=True).insert(np.zeros((4, 3)), labels=[1, 2]), "4 points and 2 labels"),
         (lambda: VoxelMap(fcc, labels=True).insert(np.zeros((1, 3)), labels=[70_000]), "70000"),
@@ -146,7 +146,7 @@ def refusals():
 @pytest.mark.parametrize("number", range(20))
 def test_what_is_refused_says_the_numbers(number):
     call, expected = refusals()[number]
-    with pytest.raises(ValueError) as error:
+    with pytest.raises((ValueError, TypeError, OSError)) as error:
         call()
     assert expected in str(error.value)
 

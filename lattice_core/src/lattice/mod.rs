@@ -26,7 +26,7 @@ use basis::Basis;
 use closed_form::{ClosedForm, Quantizer, with_form};
 use shape::Shape;
 
-pub use batch::{BatchBlock, BatchQuantizer, BatchSums, Simd};
+pub use batch::{BatchBlock, BatchQuantizer, BatchSums, Coordinate, Simd};
 pub use block_key::BlockKey;
 pub(crate) use closed_form::nearest_integer;
 pub use kind::LatticeKind;

@@ -8,6 +8,7 @@
 //! Answers are exact up to the rounding of f64, do not depend on the number of threads or on earlier
 //! questions, and go to the lower key where distances are equal.
 
+mod center_tree;
 mod clearance;
 mod corridor;
 mod error;
@@ -26,6 +27,7 @@ use nalgebra::Vector3;
 use crate::lattice::MortonKey;
 use crate::voxels::VoxelStore;
 
+pub use center_tree::PreparedNearest;
 pub use clearance::Clearance;
 pub use corridor::MAX_ROBOT_CELLS;
 pub use error::QueryError;
@@ -49,6 +51,8 @@ pub struct Query<'a, S> {
     store: &'a S,
     shells: Arc<Shells>,
     tree: OnceLock<Tree>,
+    /// See [`Query::prepare_nearest`]; none of more cells than it numbers.
+    prepared: OnceLock<Option<PreparedNearest>>,
 }
 
 impl<'a, S: VoxelStore> Query<'a, S> {
@@ -69,6 +73,15 @@ impl<'a, S: VoxelStore> Query<'a, S> {
             store,
             shells,
             tree: OnceLock::new(),
+            prepared: OnceLock::new(),
+        }
+    }
+
+    /// The same with what [`Query::prepare_nearest`] gave of this state of the store.
+    pub fn with_prepared(self, prepared: PreparedNearest) -> Query<'a, S> {
+        Query {
+            prepared: OnceLock::from(Some(prepared)),
+            ..self
         }
     }
 

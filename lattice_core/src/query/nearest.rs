@@ -4,6 +4,7 @@ use std::collections::BinaryHeap;
 
 use nalgebra::Vector3;
 
+use super::center_tree::PreparedNearest;
 use super::search::Search;
 use super::{Query, QueryError};
 use crate::lattice::MortonKey;
@@ -21,12 +22,28 @@ pub struct Neighbor {
 }
 
 impl<S: VoxelStore> Query<'_, S> {
+    /// Prepares for many questions about nearest cells by a k-d tree of all centres, in the time of some questions for each
+    /// hundred cells; `None` if there are more than 2^32. Answers stay the same.
+    pub fn prepare_nearest(&self) -> Option<PreparedNearest> {
+        let new = || PreparedNearest::new(self.store.lattice(), self.store.sorted_keys());
+        self.prepared.get_or_init(new).clone()
+    }
+
     /// The `k` occupied cells whose centres are nearest to a point, nearest first; fewer if the
     /// store has fewer.
     pub fn nearest(&self, point_m: &Vector3<f64>, k: usize) -> Result<Vec<Neighbor>, QueryError> {
         let local_m = self.local(point_m)?;
         if k == 0 || self.store.is_empty() {
             return Ok(Vec::new());
+        }
+        let neighbor = |(bits, key)| Neighbor {
+            key,
+            center_m: self.store.center_m(key),
+            distance_m: f64::from_bits(bits),
+        };
+        if let Some(Some(prepared)) = self.prepared.get() {
+            let found = prepared.nearest(&local_m, k).into_iter();
+            return Ok(found.map(neighbor).collect());
         }
         let mut search = NearestSearch {
             local_m,
@@ -35,11 +52,6 @@ impl<S: VoxelStore> Query<'_, S> {
             found: BinaryHeap::new(),
         };
         self.run(&mut search);
-        let neighbor = |(bits, key)| Neighbor {
-            key,
-            center_m: self.store.center_m(key),
-            distance_m: f64::from_bits(bits),
-        };
         Ok(search
             .found
             .into_sorted_vec()

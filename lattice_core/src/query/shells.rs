@@ -55,7 +55,9 @@ impl Shells {
                 return true;
             }
             let w = add(start, step.by);
-            if let Some(key) = MortonKey::pack(w).filter(|&key| store.contains(key)) {
+            if store.holds(w)
+                && let Some(key) = MortonKey::pack(w)
+            {
                 search.visit(key, &self.lattice.center(w));
             }
         }

@@ -14,6 +14,7 @@ mod prepared;
 mod search;
 mod solver;
 
+pub use crate::kd_tree::{MAX_NEIGHBORS, Neighbors};
 pub use calibrate::{
     AbsoluteFit, Calibration, CalibrationMap, CalibrationOptions, CalibrationRequest,
     ClassReliability, DirectionKind, HeadsetScan, Margin, Profile, Progress, ScaleEstimate, Stage,
@@ -27,6 +28,5 @@ pub use error::RegistrationError;
 pub use labels::{LabelDistribution, UNLABELED};
 pub use named::NamedMethod;
 pub use options::{LabelUse, MAX_CANDIDATES, Method, RegisterOptions, SemanticVariant};
-pub use prepared::kd_tree::{MAX_NEIGHBORS, Neighbors};
 pub use prepared::{MAX_COORDINATE_M, PrepareOptions, PreparedCloud};
 pub use solver::{Registration, register};

@@ -55,8 +55,8 @@ impl DistortionSums {
         self.largest_square = self.largest_square.max(other.largest_square);
     }
 
-    /// The sums of so many of the points, if those are as far off as the others.
-    pub(super) fn of_part(&self, points: u64) -> DistortionSums {
+    /// The sums of so many points, if those are as far off as these.
+    pub fn in_proportion(&self, points: u64) -> DistortionSums {
         let part = |sum| scaled(sum, points, self.points);
         DistortionSums {
             points,

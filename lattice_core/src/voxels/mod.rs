@@ -17,7 +17,7 @@ mod voxel;
 mod voxel_store;
 
 pub use distortion::{Distortion, DistortionSums};
-pub use list::{Changes, DatumError, InsertReport, NoStamps, VoxelList, WhenFull};
+pub use list::{Changes, DatumError, InsertReport, NoStamps, PointColumns, VoxelList, WhenFull};
 pub use occupancy::OccupancyList;
 pub use region::{Region, RegionError};
 pub use store::payload_columns::{LabelCount, Payload, Stamps};

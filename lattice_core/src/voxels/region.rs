@@ -33,7 +33,7 @@ impl Region {
     }
 
     /// True if the point (map frame, metres) is inside or on the border.
-    fn contains(&self, p: &Vector3<f64>) -> bool {
+    pub fn contains(&self, p: &Vector3<f64>) -> bool {
         self.contains_ball(p, 0.0) == Some(true)
     }
 

@@ -4,7 +4,7 @@ use nalgebra::Vector3;
 
 use super::{InsertReport, Region};
 use crate::cloud::Cloud;
-use crate::lattice::{Lattice, MortonKey};
+use crate::lattice::{Lattice, LatticeIndex, MortonKey};
 
 /// Occupied voxels of a lattice whose indices count from a datum in the map frame.
 ///
@@ -25,6 +25,12 @@ pub trait VoxelStore: Sync {
 
     /// True if the cell is occupied.
     fn contains(&self, key: MortonKey) -> bool;
+
+    /// True if the cell of an index is occupied.
+    #[inline]
+    fn holds(&self, w: LatticeIndex) -> bool {
+        MortonKey::pack(w).is_some_and(|key| self.contains(key))
+    }
 
     /// All occupied cells in ascending (Morton) order.
     fn sorted_keys(&self) -> Vec<MortonKey>;

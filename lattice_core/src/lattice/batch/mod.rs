@@ -4,6 +4,7 @@
 //! (`kernel`); the others, some in a thousand, go through the double precision closed form. So the
 //! batch gives what single points give, to the bit, on every machine and instruction set.
 
+mod coordinate;
 mod form;
 mod kernel;
 mod simd;
@@ -12,6 +13,7 @@ use nalgebra::{Isometry3, Matrix3, Vector3};
 
 use super::{BlockKey, Lattice, LatticeIndex, LatticeKind};
 use crate::prefetch::prefetch;
+pub use coordinate::Coordinate;
 use form::{Bcc, Cubic, Fcc, Form, Hex, Mcc};
 use kernel::{BLOCK, Constants, Lane, LaneSums, Lanes, STEPS};
 pub use simd::Simd;
@@ -65,7 +67,7 @@ pub struct BatchBlock<'a> {
     pub codes: &'a [BlockKey],
     /// Quantization error of those that have a cell.
     pub sums: &'a BatchSums,
-    /// Coordinates of the points, axis by axis, in 2^-20 m, within one unit; void if `sums.far`.
+    /// Coordinates of the points, axis by axis, in 2^-20 m modulo 2^32, within one unit; void if `sums.far`.
     pub fixed: &'a [[i32; BLOCK]; 3],
 }
 
@@ -105,8 +107,8 @@ impl BatchQuantizer {
 
     /// The point in the lattice, metres: rotated, then moved, each in double precision.
     #[inline]
-    pub fn transform(&self, p: [f32; 3]) -> Vector3<f64> {
-        let p = Vector3::from(p.map(f64::from));
+    pub fn transform<T: Into<f64>>(&self, p: [T; 3]) -> Vector3<f64> {
+        let p = Vector3::from(p.map(T::into));
         let turned = match &self.rotation {
             Some(rotation) => rotation * p,
             None => p,
@@ -264,7 +266,7 @@ impl BatchQuantizer {
     }
 
     /// Code and quantization error of one point in double precision.
-    fn exactly(&self, p: [f32; 3]) -> (BlockKey, BatchSums) {
+    fn exactly<T: Into<f64>>(&self, p: [T; 3]) -> (BlockKey, BatchSums) {
         let p = self.transform(p);
         let found = self.lattice.quantize(&p);
         let Some((w, code)) = found.and_then(|w| Some((w, BlockKey::pack(w)?))) else {

@@ -1,7 +1,6 @@
-//! A cloud ready to be registered: nearest neighbours ([`kd_tree`]), normals ([`plane`]) of its
+//! A cloud ready to be registered: nearest neighbours ([`kd_tree`](crate::kd_tree)), normals ([`plane`]) of its
 //! surface ([`surface`]), and labels.
 
-pub(super) mod kd_tree;
 mod plane;
 pub(super) mod surface;
 
@@ -11,10 +10,10 @@ use std::sync::OnceLock;
 use nalgebra::{Matrix3, Point3, Vector3};
 use rayon::prelude::*;
 
-use kd_tree::{MAX_NEIGHBORS, Nearest, Neighbors};
 use surface::Surface;
 
 use super::{LabelDistribution, RegistrationError, SemanticCloud, UNLABELED};
+use crate::kd_tree::{MAX_NEIGHBORS, Nearest, Neighbors};
 
 /// Largest coordinate that is taken, metres.
 pub const MAX_COORDINATE_M: f64 = 1e8;

@@ -3,8 +3,8 @@
 use nalgebra::{Point3, Vector3};
 use rayon::prelude::*;
 
-use super::kd_tree::{Item, Neighbors, Tree};
 use super::plane;
+use crate::kd_tree::{Item, Neighbors, Tree};
 
 /// Points of one piece of parallel work.
 const CHUNK: usize = 512;

@@ -34,7 +34,7 @@ const INNER_SHARE: f64 = 1e-3;
 
 /// Result of a registration.
 ///
-/// `cost`, `inliers` and `rmse_m` are of the last pairs, before the last step.
+/// `cost`, `inliers`, `rmse_m` and `hessian` are of the last pairs, before the last step.
 #[derive(Clone, PartialEq, Debug)]
 pub struct Registration {
     /// Takes source points to the target frame.
@@ -49,6 +49,8 @@ pub struct Registration {
     pub inliers: usize,
     /// Root of the weighted mean of the squared distances, metres.
     pub rmse_m: f64,
+    /// Half the Hessian of the cost, J^T W J, by a translation (m) and a rotation (rad) in the axes of the source.
+    pub hessian: Matrix6<f64>,
 }
 
 /// Registers `source` to `target` from a start.
@@ -76,6 +78,7 @@ pub fn register(
         cost: 0.0,
         inliers: 0,
         rmse_m: 0.0,
+        hessian: Matrix6::zeros(),
     };
     let finite = |pose: &Isometry3<f64>| pose.to_homogeneous().iter().all(|v| v.is_finite());
     if !finite(&state.pose) {
@@ -104,6 +107,7 @@ pub fn register(
         scale = (scale * options.anneal.max(0.0)).max(1.0);
     }
     let sums = &state.sums;
+    registration.hessian = sums.system(&state.pose).0;
     registration.target_from_source = state.pose;
     registration.cost = sums.cost;
     registration.inliers = sums.inliers;

@@ -7,7 +7,7 @@ use super::normal_equations::Sums;
 use super::pair::{Metric, Pair};
 use super::pair_weights::{Labels, labels};
 use super::robust_kernel::Kernel;
-use crate::registration::prepared::kd_tree::{Nearest, Neighbors};
+use crate::kd_tree::{Nearest, Neighbors};
 use crate::registration::prepared::squared_reach;
 use crate::registration::prepared::surface::Surface;
 use crate::registration::{

@@ -5,7 +5,7 @@ use rayon::prelude::*;
 
 use super::VoxelList;
 use crate::cloud::Cloud;
-use crate::lattice::{BatchBlock, BatchQuantizer, BatchSums, BlockKey};
+use crate::lattice::{BatchBlock, BatchQuantizer, BatchSums, BlockKey, Coordinate};
 use crate::voxels::distortion::DistortionSums;
 use crate::voxels::store::fixed_point::{FixedBlock, most_points, near_point};
 use crate::voxels::store::payload_columns::{Details, LabelCount, Stamps};
@@ -41,10 +41,10 @@ pub struct InsertReport {
 impl InsertReport {
     /// Counts the points of a batch that have no cell, by reason.
     #[inline]
-    pub(crate) fn count_rejects(
+    pub(crate) fn count_rejects<T: Coordinate>(
         &mut self,
         quantizer: &BatchQuantizer,
-        points: &[[f32; 3]],
+        points: &[[T; 3]],
         codes: &[BlockKey],
         sums: &BatchSums,
     ) {
@@ -54,10 +54,10 @@ impl InsertReport {
     }
 
     #[cold]
-    fn count_each_reject(
+    fn count_each_reject<T: Coordinate>(
         &mut self,
         quantizer: &BatchQuantizer,
-        points: &[[f32; 3]],
+        points: &[[T; 3]],
         codes: &[BlockKey],
     ) {
         for (point, code) in points.iter().zip(codes) {
@@ -84,11 +84,42 @@ impl InsertReport {
     }
 }
 
-/// Labels of the points of a cloud, one each, and its stamp.
-#[derive(Clone, Copy)]
-struct Origin<'a> {
-    stamp_ns: i64,
-    labels: Option<&'a [u16]>,
+/// Stamps and labels of points.
+#[derive(Clone, Copy, Debug, Default)]
+pub struct PointColumns<'a> {
+    /// Stamp of the points that have none of their own, ns.
+    pub stamp_ns: i64,
+    /// Stamps of the first points, ns.
+    pub stamps_ns: &'a [i64],
+    /// Labels of the first points; those beyond have none.
+    pub labels: &'a [u16],
+}
+
+impl PointColumns<'_> {
+    /// The columns of the points from `place` on.
+    fn after(self, place: usize) -> Self {
+        PointColumns {
+            stamps_ns: self.stamps_ns.get(place..).unwrap_or_default(),
+            labels: self.labels.get(place..).unwrap_or_default(),
+            ..self
+        }
+    }
+
+    /// Contribution of a point to the further columns.
+    fn details(&self, place: usize) -> Details {
+        let stamp_ns = self.stamps_ns.get(place).copied().unwrap_or(self.stamp_ns);
+        let label = self.labels.get(place).copied();
+        Details {
+            stamps: Some(Stamps {
+                first_ns: stamp_ns,
+                last_ns: stamp_ns,
+            }),
+            labels: label
+                .map(|label| LabelCount { label, count: 1 })
+                .into_iter()
+                .collect(),
+        }
+    }
 }
 
 /// The points of a chunk, quantized and gathered by cell, the cells by shard.
@@ -121,6 +152,21 @@ impl VoxelList {
         offsets_m: &[[f32; 3]],
         labels: &[u16],
     ) -> InsertReport {
+        let columns = PointColumns {
+            stamp_ns,
+            labels,
+            ..PointColumns::default()
+        };
+        self.insert_points(datum_m, offsets_m, columns)
+    }
+
+    /// Adds points `datum_m + offset`, as [`VoxelList::insert`] does, in the precision of their coordinates.
+    pub fn insert_points<T: Coordinate>(
+        &mut self,
+        datum_m: Vector3<f64>,
+        offsets_m: &[[T; 3]],
+        columns: PointColumns,
+    ) -> InsertReport {
         let before = self.len();
         let mut report = InsertReport {
             points: offsets_m.len() as u64,
@@ -130,17 +176,14 @@ impl VoxelList {
         let shift = Translation3::from(datum_m - self.datum_m);
         let quantizer = BatchQuantizer::new(&self.lattice, shift.into());
         let mut chunks: Vec<Chunk> = Vec::new();
-        let mut labels = labels;
+        let mut columns = columns;
         for wave in offsets_m.chunks(self.wave_points(WAVE)) {
             report.forgotten_voxels += self.make_room(wave.len(), now) as u64;
-            let origin = Origin {
-                stamp_ns,
-                labels: (!labels.is_empty()).then_some(labels),
-            };
-            labels = labels.get(wave.len()..).unwrap_or_default();
+            let of_wave = columns;
+            columns = columns.after(wave.len());
             let may_fill = self.len().saturating_add(wave.len()) > self.max_voxels;
             if may_fill || !self.payload.is_plain() || wave.len() < FEW {
-                self.insert_singly(&quantizer, wave, origin, now, &mut report);
+                self.insert_singly(&quantizer, wave, of_wave, now, &mut report);
                 continue;
             }
             // A part for each thread: which points are in which does not matter to the sums.
@@ -160,11 +203,11 @@ impl VoxelList {
     }
 
     /// Point by point: knows of each point whether it found room.
-    fn insert_singly(
+    fn insert_singly<T: Coordinate>(
         &mut self,
         quantizer: &BatchQuantizer,
-        offsets_m: &[[f32; 3]],
-        origin: Origin,
+        offsets_m: &[[T; 3]],
+        columns: PointColumns,
         now: u32,
         report: &mut InsertReport,
     ) {
@@ -189,9 +232,8 @@ impl VoxelList {
                 room -= shard.len() - known;
                 shard.add(number, &points.point(i), now);
                 if !self.payload.is_plain() {
-                    shard
-                        .columns
-                        .add(number as usize, &details(origin, place + i));
+                    let details = columns.details(place + i);
+                    shard.columns.add(number as usize, &details);
                 }
             }
             place += codes.len();
@@ -205,26 +247,26 @@ impl VoxelList {
 
     /// Adds the quantization errors of a block of which some points were refused.
     #[cold]
-    fn add_sums_of_known(
+    fn add_sums_of_known<T: Coordinate>(
         &mut self,
         quantizer: &BatchQuantizer,
-        offsets_m: &[[f32; 3]],
+        offsets_m: &[[T; 3]],
         codes: &[BlockKey],
     ) {
         for (&offset, &code) in offsets_m.iter().zip(codes) {
             let known = |shard: &Shard| shard.get(code).is_some();
             if code != BlockKey::NONE && self.shard(code).is_some_and(known) {
-                self.sums.add_batch(&quantizer.sums_of(offset));
+                self.sums.add_batch(&T::sums_of(quantizer, offset));
             }
         }
     }
 
     /// On the threads of the current pool: first by parts of the points, then by shards. There must be
     /// room for a voxel for each point.
-    fn insert_wave(
+    fn insert_wave<T: Coordinate>(
         &mut self,
         quantizer: &BatchQuantizer,
-        wave: &[[f32; 3]],
+        wave: &[[T; 3]],
         now: u32,
         chunks: &mut [Chunk],
     ) {
@@ -244,34 +286,19 @@ impl VoxelList {
 
 /// Visits up to a block of points at a time: offsets, cells and errors, fixed-point positions.
 #[inline(always)]
-fn for_fixed_blocks(
+fn for_fixed_blocks<T: Coordinate>(
     quantizer: &BatchQuantizer,
-    offsets_m: &[[f32; 3]],
-    mut visit: impl FnMut(&[[f32; 3]], &BatchBlock, &FixedBlock),
+    offsets_m: &[[T; 3]],
+    mut visit: impl FnMut(&[[T; 3]], &BatchBlock, &FixedBlock<T>),
 ) {
     let base_m = quantizer.translation_m();
     let mut place = 0;
-    quantizer.for_blocks_with_sums(offsets_m, |block| {
+    T::for_blocks_with_sums(quantizer, offsets_m, |block| {
         let end = place + block.codes.len();
         let here = offsets_m.get(place..end).unwrap_or_default();
         place = end;
         visit(here, block, &FixedBlock::new(base_m, here, block));
     });
-}
-
-/// Contribution of a point to the further columns.
-fn details(origin: Origin, place: usize) -> Details {
-    let label = origin.labels.and_then(|labels| labels.get(place).copied());
-    Details {
-        stamps: Some(Stamps {
-            first_ns: origin.stamp_ns,
-            last_ns: origin.stamp_ns,
-        }),
-        labels: label
-            .map(|label| LabelCount { label, count: 1 })
-            .into_iter()
-            .collect(),
-    }
 }
 
 impl Chunk {
@@ -285,7 +312,12 @@ impl Chunk {
     }
 
     /// Gathers points by cell, up to `most_points`, and the cells by shard.
-    fn sort(&mut self, quantizer: &BatchQuantizer, offsets_m: &[[f32; 3]], most_points: u32) {
+    fn sort<T: Coordinate>(
+        &mut self,
+        quantizer: &BatchQuantizer,
+        offsets_m: &[[T; 3]],
+        most_points: u32,
+    ) {
         let Chunk {
             gather,
             by_shard,

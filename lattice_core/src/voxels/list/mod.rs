@@ -20,10 +20,10 @@ use super::store::payload_columns::{Columns, Details, LabelCount, Payload, Stamp
 use super::store::shard::{Life, SHARDS, Shard, shard_of};
 use super::{Region, Voxel, VoxelStore};
 use crate::cloud::Cloud;
-use crate::lattice::{BlockKey, Lattice, MortonKey};
+use crate::lattice::{BlockKey, Lattice, LatticeIndex, MortonKey};
 
 pub use changes::Changes;
-pub use insert::InsertReport;
+pub use insert::{InsertReport, PointColumns};
 pub use remove::NoStamps;
 pub use when_full::WhenFull;
 
@@ -301,6 +301,15 @@ impl VoxelStore for VoxelList {
 
     fn contains(&self, key: MortonKey) -> bool {
         VoxelList::contains(self, key)
+    }
+
+    #[inline]
+    fn holds(&self, w: LatticeIndex) -> bool {
+        let code = BlockKey::pack(w);
+        code.is_some_and(|code| {
+            self.shard(code)
+                .is_some_and(|shard| shard.voxels.holds(code))
+        })
     }
 
     fn sorted_keys(&self) -> Vec<MortonKey> {

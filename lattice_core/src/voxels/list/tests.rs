@@ -248,3 +248,98 @@ fn sums_of_any_number_of_points_are_exact() {
         assert_eq!(singly.sorted(), expected);
     }
 }
+
+#[test]
+fn doubles_give_the_voxels_of_the_same_floats() {
+    for kind in LatticeKind::ALL {
+        let at =
+            |i: u32, m: u32| (i.wrapping_mul(2_654_435_761).wrapping_mul(m) >> 18) as f32 * 1e-3;
+        let mut points: Vec<[f32; 3]> = (0..10_000)
+            .map(|i| [at(i, 3), at(i, 7) - 8.0, 0.1 * at(i, 11)])
+            .collect();
+        points[77] = [3000.0, -2500.0, 1.0];
+        points[500] = [f32::NAN; 3];
+        points[900] = [1e9, 0.0, 0.0];
+        let doubles: Vec<[f64; 3]> = points.iter().map(|p| p.map(f64::from)).collect();
+        for max_voxels in [1 << 20, 300] {
+            let mut singles = list(kind, [3.0, -7.0, 0.3], max_voxels);
+            let mut exact = singles.clone();
+            let columns = PointColumns::default();
+            let report = singles.insert_points(Vector3::zeros(), &points, columns);
+            assert_eq!(
+                report,
+                exact.insert_points(Vector3::zeros(), &doubles, columns)
+            );
+            assert_eq!(singles.sorted(), exact.sorted(), "{kind}");
+            let (floats, doubles) = (singles.distortion(), exact.distortion());
+            assert_eq!(floats.points, doubles.points);
+            assert!((floats.rms_m - doubles.rms_m).abs() < 1e-6, "{kind}");
+            exact.validate().unwrap();
+        }
+    }
+}
+
+#[test]
+fn doubles_far_from_the_datum_are_in_the_cells_of_the_closed_form() {
+    for kind in LatticeKind::ALL {
+        let mut map = list(kind, [450_000.0, 5_400_000.0, 300.0], 1 << 20);
+        let far = [50_000.0, 20_000.0, -100.0];
+        let at = |i: u32, m: u32| f64::from(i.wrapping_mul(2_654_435_761).wrapping_mul(m)) * 1e-8;
+        let points: Vec<[f64; 3]> = (0..5000)
+            .map(|i| {
+                [0, 1, 2].map(|axis| map.datum_m()[axis] + far[axis] + at(i, 3 + 4 * axis as u32))
+            })
+            .collect();
+        let report = map.insert_points(Vector3::zeros(), &points, PointColumns::default());
+        assert_eq!(report.inserted, 5000, "{kind}");
+        let mut expected = std::collections::BTreeMap::<MortonKey, u32>::new();
+        for point in &points {
+            let local = Vector3::from(*point) - map.datum_m();
+            *expected
+                .entry(key(map.lattice().quantize(&local).unwrap()))
+                .or_default() += 1;
+        }
+        let found = map
+            .sorted()
+            .into_iter()
+            .map(|(key, voxel)| (key, voxel.count));
+        assert!(found.eq(expected), "{kind}");
+        map.validate().unwrap();
+    }
+    let mut map = list(LatticeKind::Fcc, [0.0; 3], 10);
+    let report = map.insert_points(
+        Vector3::zeros(),
+        &[[1e300, 0.0, 0.0]],
+        PointColumns::default(),
+    );
+    assert_eq!((report.out_of_range, report.inserted), (1, 0));
+}
+
+#[test]
+fn stamps_and_labels_go_with_their_points() {
+    let kept = Payload {
+        stamps: true,
+        labels: true,
+    };
+    let mut map = list(LatticeKind::Cubic, [0.0; 3], 10).with_payload(kept);
+    let columns = PointColumns {
+        stamp_ns: 9,
+        stamps_ns: &[4, 2],
+        labels: &[5, 6],
+    };
+    map.insert_points(
+        Vector3::zeros(),
+        &[[0.0_f64; 3], [0.1, 0.0, 0.0], [1.0; 3]],
+        columns,
+    );
+    let stamps = |w| {
+        map.stamps(key(w))
+            .map(|stamps| (stamps.first_ns, stamps.last_ns))
+    };
+    assert_eq!(
+        (stamps([0; 3]), stamps([2; 3])),
+        (Some((2, 4)), Some((9, 9)))
+    );
+    let labels = map.labels(key([0; 3])).into_iter().map(|known| known.label);
+    assert!(labels.eq([5, 6]) && map.labels(key([2; 3])).is_empty());
+}

@@ -12,7 +12,7 @@ use super::store::block_mask::{self, BlockMask};
 use super::store::hash_table::{Place, Row, Table};
 use super::{DatumError, InsertReport, VoxelStore};
 use crate::cloud::Cloud;
-use crate::lattice::{BlockKey, Lattice, MortonKey};
+use crate::lattice::{BlockKey, Lattice, LatticeIndex, MortonKey};
 
 /// Memory for a block, growth of the vectors and of the table included.
 const BLOCK_BYTES: usize = Table::<Block>::ROW_BYTES;
@@ -235,6 +235,11 @@ impl VoxelStore for OccupancyList {
 
     fn contains(&self, key: MortonKey) -> bool {
         self.has(BlockKey::from(key))
+    }
+
+    #[inline]
+    fn holds(&self, w: LatticeIndex) -> bool {
+        BlockKey::pack(w).is_some_and(|code| self.has(code))
     }
 
     fn sorted_keys(&self) -> Vec<MortonKey> {

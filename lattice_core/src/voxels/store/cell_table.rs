@@ -1,6 +1,6 @@
 //! A table of voxels that is found block by block.
 
-use super::block_mask::BlockMask;
+use super::block_mask::{self, BlockMask};
 use super::growth;
 use super::hash_table::{Place, Row, Table};
 use super::shard::Entry;
@@ -170,6 +170,14 @@ impl CellTable {
     pub(crate) fn find(&self, code: BlockKey) -> Option<u32> {
         let block = self.blocks.find(code.block())?;
         self.blocks.rows().get(block as usize)?.find(code.place())
+    }
+
+    /// True if a cell has a voxel.
+    #[inline]
+    pub(crate) fn holds(&self, code: BlockKey) -> bool {
+        let block = self.blocks.find(code.block());
+        let block = block.and_then(|block| self.blocks.rows().get(block as usize));
+        block.is_some_and(|block| block_mask::is_set(&block.leaf, code.place()))
     }
 
     /// Asks for the block of a cell, which will be searched soon.

@@ -2,7 +2,7 @@
 
 use wide::u32x4;
 
-use crate::lattice::{BatchBlock, BatchQuantizer, BlockKey, Lattice, nearest_integer};
+use crate::lattice::{BatchBlock, BatchQuantizer, BlockKey, Coordinate, Lattice, nearest_integer};
 use crate::voxels::{OFFSET_UNIT_M, Voxel};
 
 const PER_METRE: f64 = 1.0 / OFFSET_UNIT_M;
@@ -37,19 +37,19 @@ pub(crate) fn fixed(metres: [f64; 3]) -> [i64; 3] {
 /// The base is rounded, then the offset, so that neither the other points of a cloud nor the way it
 /// is cut into blocks matters.
 #[derive(Clone, Copy)]
-pub(crate) struct FixedBlock<'a> {
+pub(crate) struct FixedBlock<'a, T> {
     base: Point,
-    offsets_m: &'a [[f32; 3]],
+    offsets_m: &'a [[T; 3]],
     near: Option<&'a [[i32; BatchQuantizer::BLOCK]; 3]>,
 }
 
-impl FixedBlock<'_> {
+impl<'a, T: Coordinate> FixedBlock<'a, T> {
     /// Points at `base_m + offset`.
-    pub(crate) fn new<'a>(
+    pub(crate) fn new(
         base_m: [f64; 3],
-        offsets_m: &'a [[f32; 3]],
+        offsets_m: &'a [[T; 3]],
         block: &BatchBlock<'a>,
-    ) -> FixedBlock<'a> {
+    ) -> FixedBlock<'a, T> {
         FixedBlock {
             base: point_at(fixed(base_m).map(low), 0),
             offsets_m,
@@ -74,8 +74,8 @@ impl FixedBlock<'_> {
 
     #[cold]
     fn far(&self, i: usize) -> [u32; 3] {
-        let offset = self.offsets_m.get(i).copied().unwrap_or_default();
-        fixed(offset.map(f64::from)).map(low)
+        let offset = self.offsets_m.get(i).map(|offset| offset.map(T::into));
+        fixed(offset.unwrap_or_default()).map(low)
     }
 }
 
