@@ -46,7 +46,7 @@ pub fn map_of(py: Python<'_>, table: &Bound<'_, PyAny>, cells: Cells) -> PyResul
         let voxels = map.voxels.iter().flatten();
         let points: u64 = voxels.map(|voxel| u64::from(voxel.count)).sum();
         if points != counted {
-            map.statistics = map.statistics.in_proportion(points);
+            map.statistics = map.statistics.of_part(points);
         }
         MapContents::try_from(map).map_err(refuse)
     })?

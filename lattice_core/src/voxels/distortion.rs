@@ -56,7 +56,7 @@ impl DistortionSums {
     }
 
     /// The sums of so many points, if those are as far off as these.
-    pub fn in_proportion(&self, points: u64) -> DistortionSums {
+    pub fn of_part(&self, points: u64) -> DistortionSums {
         let part = |sum| scaled(sum, points, self.points);
         DistortionSums {
             points,

@@ -133,7 +133,7 @@ impl MapContents {
                 // Cells that count nothing share the points alike.
                 None => scaled(self.sums.points.into(), self.keys.len() as u64, all) as u64,
             };
-            self.sums = self.sums.in_proportion(points);
+            self.sums = self.sums.of_part(points);
         }
     }
 
