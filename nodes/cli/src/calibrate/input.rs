@@ -168,7 +168,7 @@ impl Scans {
     }
 
     /// A pose of the clouds as one of the point that they are about.
-    pub fn from_middle(&self, map_from_cloud: &Isometry3<f64>) -> Isometry3<f64> {
+    pub fn pose_of_middle(&self, map_from_cloud: &Isometry3<f64>) -> Isometry3<f64> {
         map_from_cloud * Translation3::from(self.middle_m)
     }
 }
@@ -253,7 +253,7 @@ mod tests {
             let before = cloud(at);
             let scans = Scans::about_middle(vec![before.clone()]);
             assert_eq!(scans.middle_m, Vector3::from(expected));
-            let about = scans.from_middle(&pose.0);
+            let about = scans.pose_of_middle(&pose.0);
             let after = &scans.scans[0];
             let points = before.cloud.points_m.iter().zip(&after.cloud.points_m);
             for (old, new) in points.chain(before.sensor_m.iter().zip(&after.sensor_m)) {

@@ -104,7 +104,7 @@ impl Calibrate {
         let start = self
             .guess
             .as_ref()
-            .map(|guess| clouds.from_middle(&guess.0));
+            .map(|guess| clouds.pose_of_middle(&guess.0));
         let mut times = Times {
             read_ms: milliseconds(started),
             ..Times::default()
@@ -114,7 +114,7 @@ impl Calibrate {
         let map_points = map.len();
         let mut answer = match self.method.single(self.gate) {
             Some(method) => {
-                let start = start.unwrap_or(clouds.from_middle(&Isometry3::identity()));
+                let start = start.unwrap_or(clouds.pose_of_middle(&Isometry3::identity()));
                 let map = (map, cell_side_m);
                 let registration = register_once(&method, map, headset_scans, &start, &mut times)?;
                 Answer::of_registration(self.method.name(), &registration)

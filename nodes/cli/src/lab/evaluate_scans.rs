@@ -58,7 +58,7 @@ impl OfScans {
         let sensor_m = self.sensor.as_ref().map(|p| self.axes.point_to_ros(&p.0));
         let paths = std::slice::from_ref(&self.cloud);
         let clouds = input::headset_scans(paths, self.axes, sensor_m, &reading)?;
-        let truth = truth.map(|truth| clouds.from_middle(&truth));
+        let truth = truth.map(|truth| clouds.pose_of_middle(&truth));
         let scans = clouds.scans;
         let options = self.search.options(self.axes, self.max_points, &scans)?;
         let scan = scans.into_iter().next().ok_or("there is no scan")?;
