@@ -39,6 +39,14 @@ def test_means_of_a_map_go_there_and_back(tmp_path):
     np.testing.assert_array_equal(labels, map.labels())
 
 
+def test_pcd_is_single_where_that_keeps_a_quarter_of_a_millimetre(tmp_path):
+    near = np.random.default_rng(1).uniform(-4095, 4095, (100, 3))
+    for xyz, size in [(near, 4), (near + [5000, 0, 0], 8)]:
+        write_points(tmp_path / "points.pcd", xyz)
+        assert f"SIZE {size} {size} {size}\n".encode() in (tmp_path / "points.pcd").read_bytes()
+        assert np.abs(read_points(tmp_path / "points.pcd")[0] - xyz).max() <= (0.00025 if size == 4 else 0)
+
+
 def rows_of(order):
     return b"".join(struct.pack(order + "BfffH", 9, x, y, z, label) for (x, y, z), label in zip([(1, 2, 3), (-4, 5, 6)], (3, 65535)))
 

@@ -197,4 +197,6 @@ def read_points(path: str | PathLike[str]) -> tuple[npt.NDArray[np.float64], npt
     """Points of a .ply or .pcd file, m, as they are in it, and their labels (-1 for none) if it has a field `label`."""
 
 def write_points(path: str | PathLike[str], xyz: npt.ArrayLike, labels: npt.ArrayLike | None = None) -> None:
-    """Writes points, m, and their labels (-1 for none) to a binary .ply or .pcd file; after an error the one before stays."""
+    """Writes points, m, and their labels (-1 for none) to a binary .ply or .pcd file; after an error the one before stays.
+
+    PCD is float32 where all coordinates are below 4096 m, which keeps a quarter of a millimetre; Open3D reads no other."""

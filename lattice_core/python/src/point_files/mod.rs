@@ -21,6 +21,10 @@ use crate::map_files::{Stoppable, replace};
 use crate::points::{Points, mask_of};
 use crate::threads::background;
 
+/// Coordinates below this are written to PCD in single precision, which errs by less than 0.25 mm there, m: many
+/// readers take all numbers of it for single ones.
+const SINGLE_M: f64 = 4096.0;
+
 /// Points of a file.
 struct PointFile {
     /// x, y and z of each point, m.
@@ -81,9 +85,13 @@ pub fn write_points(
         }
         None => None,
     };
-    let header = match path.extension().and_then(|kind| kind.to_str()) {
-        Some("ply") => ply::header(points.len(), single, labels.is_some()),
-        Some("pcd") => pcd::header(points.len(), single, labels.is_some()),
+    let near = |point: &[f64; 3]| !point.iter().any(|c| c.is_finite() && c.abs() >= SINGLE_M);
+    let (header, single) = match path.extension().and_then(|kind| kind.to_str()) {
+        Some("ply") => (ply::header(points.len(), single, labels.is_some()), single),
+        Some("pcd") => {
+            let single = single || points.iter().all(near);
+            (pcd::header(points.len(), single, labels.is_some()), single)
+        }
         _ => {
             return Err(refuse(format!(
                 "{}: the name of a file of points ends in .ply or .pcd",
