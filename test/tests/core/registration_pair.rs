@@ -12,7 +12,10 @@ use nalgebra::{Isometry3, Matrix3, Matrix4, Rotation3, Translation3, UnitQuatern
 
 fn cloud(path: &Path) -> SemanticCloud {
     let file = read_points(path, &PointFileOptions::default()).unwrap();
-    SemanticCloud::unlabelled(file.points_m.into_iter().map(Into::into).collect())
+    // small_gicp keeps rays without return, which are at 0 0 0.
+    let no_returns = std::iter::repeat_n([0.0; 3], file.no_returns);
+    let points_m = file.points_m.into_iter().chain(no_returns);
+    SemanticCloud::unlabelled(points_m.map(Into::into).collect())
 }
 
 fn pose(rows: &[f64]) -> Isometry3<f64> {

@@ -90,6 +90,10 @@ impl Register {
 fn points(path: &Path) -> Result<SemanticCloud, String> {
     let file = read_points(path, &PointFileOptions::default())
         .map_err(|error| format!("{}: {error}", path.display()))?;
-    let points_m = file.points_m.into_iter().map(Into::into).collect();
-    Ok(SemanticCloud::unlabelled(points_m))
+    // The peers keep rays without return, which are at 0 0 0.
+    let no_returns = std::iter::repeat_n([0.0; 3], file.no_returns);
+    let points_m = file.points_m.into_iter().chain(no_returns);
+    Ok(SemanticCloud::unlabelled(
+        points_m.map(Into::into).collect(),
+    ))
 }
