@@ -210,7 +210,9 @@ fn points(path: &Path) -> Result<Vec<[f32; 3]>, AnyError> {
     let file = read_points(path, &PointFileOptions::default());
     let file = file.map_err(at(path))?;
     let narrow = |p: &[f64; 3]| p.map(|x| x as f32);
-    Ok(file.points_m.iter().map(narrow).collect())
+    // Rays without return, which are at 0 0 0, are points of the peers.
+    let no_returns = std::iter::repeat_n([0.0; 3], file.no_returns);
+    Ok(file.points_m.iter().map(narrow).chain(no_returns).collect())
 }
 
 /// Pose of a scan that comes without one: by our search for a heading and a place, then by GICP.
