@@ -51,8 +51,16 @@ fn a_closed_pipe_ends_a_command_quietly() {
         let output = run(command, closed(), Stdio::piped());
         let errors = String::from_utf8_lossy(&output.stderr);
         assert_eq!(output.status.code(), Some(0), "{command:?}: {errors}");
-        // A replay says which topics it takes.
-        let said = ["clouds: ", "poses: ", "transforms: ", "not taken: "];
+        // A replay says which topics it takes, and what for the time of points.
+        let said = [
+            "clouds: ",
+            "poses: ",
+            "transforms: ",
+            "not taken: ",
+            "/left/points: time of points: ",
+            "/right/points: time of points: ",
+            "/top/points: time of points: ",
+        ];
         let is_choice =
             |line: &&str| command[0] == "replay" && said.iter().any(|s| line.starts_with(s));
         let others: Vec<&str> = errors.lines().filter(|line| !is_choice(line)).collect();

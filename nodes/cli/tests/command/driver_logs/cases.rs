@@ -70,7 +70,12 @@ pub fn sqlite3(log: &'static str) -> Case {
 }
 
 pub fn cases() -> Vec<Case> {
-    [lidars(), estimators(), positioning(), faults(), oddities()].concat()
+    [drivers(), oddities()].concat()
+}
+
+/// Logs of drivers and estimators as they are.
+pub fn drivers() -> Vec<Case> {
+    [lidars(), estimators(), positioning(), faults()].concat()
 }
 
 fn lidars() -> Vec<Case> {

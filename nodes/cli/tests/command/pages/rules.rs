@@ -32,6 +32,11 @@ pub const RULES: &[(&str, &str, Rule)] = &[
     ),
     (
         "*",
+        ".ci/wheels",
+        NotHere("needs PyPI; .ci/python builds the wheel"),
+    ),
+    (
+        "*",
         "colcon",
         NotHere("needs colcon; .ci/run lists the packages"),
     ),
@@ -158,6 +163,7 @@ pub const RULES: &[(&str, &str, Rule)] = &[
     ),
     ("docs/octomap.md", "lattice map export", Runs("")),
     ("docs/octomap.md", "lattice quantize map.bt", Runs("")),
+    ("docs/odd_logs.md", "lattice replay LOG --direct", Runs("")),
     ("docs/poses.md", "lattice bag info LOG", Runs("")),
     ("docs/poses.md", "lattice replay LOG --direct", Runs("")),
     (
