@@ -193,8 +193,8 @@ def test_threads_share_a_map(cloud):
 
 
 LONG_CALLS = {
-    "insert": "VoxelMap(lattice, labels=True).insert(points, labels=np.arange(len(points)) % 7)",
-    "insert64": "VoxelMap(lattice).insert(np.vstack([points] * 4).astype(float))",
+    "insert": "[VoxelMap(lattice, labels=True).insert(points, labels=np.arange(len(points)) % 7) for _ in range(1000)]",
+    "insert64": "[VoxelMap(lattice).insert(np.vstack([points] * 4).astype(float)) for _ in range(1000)]",
     "quantize": "[lattice.quantize(points) for _ in range(1000)]",
     "query": "map.query(points, k=200)",
     "to_arrow": "[map.to_arrow() for _ in range(1000)]",
@@ -204,7 +204,7 @@ LONG_CALLS = {
     "load": "map.save(path); [VoxelMap.load(path) for _ in range(1000)]",
     "means": "[map.means() for _ in range(1000)]",
     "gicp": "gicp(points, points + 0.1, max_iterations=1000)",
-    "calibrate": "calibrate(room, walls[::3] @ [[0, 1, 0], [-1, 0, 0], [0, 0, 1]])",
+    "calibrate": "[calibrate(room, walls[::3] @ [[0, 1, 0], [-1, 0, 0], [0, 0, 1]]) for _ in range(1000)]",
 }
 
 
