@@ -214,7 +214,7 @@ mod tests {
         assert_eq!(Precision::for_points(&near), Precision::Float32);
         let far = [near[0], Vector3::new(0.0, -16_385.0, 0.0)];
         assert_eq!(Precision::for_points(&far), Precision::Float64);
-        assert!((f64::from(16_383.0004_f32) - 16_383.0004).abs() < 5e-4);
+        assert!((f64::from(16_383.25_f32 + 4e-4) - (16_383.25 + 4e-4)).abs() < 5e-4);
     }
 
     #[test]

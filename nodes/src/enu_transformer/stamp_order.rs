@@ -135,7 +135,7 @@ impl<T: Clone> StampOrder<T> {
         if self.since.len() < MAX_SINCE_NEWEST {
             self.since.push((stamp_ns, item.clone()));
         }
-        if step_ns < 0 && step_ns >= -WINDOW_NS && self.fills_hole(stamp_ns) {
+        if (-WINDOW_NS..0).contains(&step_ns) && self.fills_hole(stamp_ns) {
             let delay_ns = -step_ns;
             if self.delay_ns(self.ahead_ns) <= delay_ns {
                 self.latest = Some((delay_ns, stamp_ns));

@@ -14,7 +14,7 @@ pub(super) fn label_among<'a>(names: impl Iterator<Item = &'a str> + Clone) -> O
         let mut bare_names = names.clone().map(bare);
         bare_names.position(|name| name.eq_ignore_ascii_case(wanted))
     };
-    NAMES.iter().find_map(|wanted| place(wanted))
+    NAMES.iter().find_map(place)
 }
 
 #[cfg(test)]
