@@ -1,5 +1,5 @@
-//! What of clouds was read otherwise than declared, and what was taken for the time of their points, said
-//! once for each topic.
+//! Notes on clouds that are read otherwise than declared, and on the source of the times of their points, once
+//! for each topic.
 
 use lattice_core::cloud::{LayoutNote, TimeSource, TimeUnit};
 use serde::{Deserialize, Serialize};
@@ -9,7 +9,7 @@ const MAX_NOTES: usize = 128;
 /// Clouds of a topic whose times are held against the time between them.
 const CHECKED_CLOUDS: u32 = 3;
 
-/// What is to be known of the clouds of a topic.
+/// Note on the clouds of a topic.
 #[derive(Clone, Debug, PartialEq, Eq, Serialize, Deserialize)]
 pub struct CloudNote {
     /// Topic of the clouds.

@@ -80,7 +80,7 @@ pub struct TransformerReport {
     /// Messages refused, by topic and reason, with value and remedy.
     #[serde(default)]
     pub refusals: Vec<Refusal>,
-    /// What of the clouds of a topic was taken otherwise than declared, and what for time.
+    /// Notes on clouds read otherwise than declared, and on the source of the times of their points.
     #[serde(default)]
     pub notes: Vec<CloudNote>,
 }

@@ -13,7 +13,7 @@ pub(super) enum Drop {
         by_ns: i64,
     },
     PoseGap(PoseMiss),
-    /// What there was of poses at the end of the wait; `None`: the input ended.
+    /// Reason for which no pose covers it at the end of the wait; `None`: the input ended.
     PoseLate(Option<PoseMiss>),
     NoMount {
         frame: String,

@@ -8,6 +8,9 @@ use super::stamp_order::{Decision, StampOrder};
 /// Most links whose order is followed; transforms of further ones are taken as they come.
 const MAX_LINKS: usize = 1000;
 
+/// Longest names kept, bytes: more than the buffer of transforms takes.
+const MAX_NAME_BYTES: usize = 1024;
+
 /// Orders of the links from child to parent.
 #[derive(Clone, Debug, Default)]
 pub(super) struct LinkOrders {
@@ -36,6 +39,10 @@ impl LinkOrders {
         stamp_ns: i64,
         parent_from_child: Isometry3<f64>,
     ) -> Option<(Decision<Isometry3<f64>>, Option<i64>)> {
+        // The buffer of transforms refuses such names.
+        if parent.len().max(child.len()) > MAX_NAME_BYTES {
+            return None;
+        }
         if !self.by_child.contains_key(child) {
             if self.links >= MAX_LINKS {
                 return None;
@@ -95,6 +102,9 @@ mod tests {
             push("odom", "base", 200_000_000),
             (Some((1, newest_ns)), false)
         );
+        let long = "n".repeat(MAX_NAME_BYTES + 1);
+        assert_eq!(push(&long, "base", 1), (None, false));
+        assert_eq!(push("base", &long, 1), (None, false));
         for i in 0..MAX_LINKS {
             push("base", &format!("joint{i}"), 1);
         }

@@ -244,7 +244,7 @@ impl EnuTransformer {
         out
     }
 
-    /// What of clouds was read otherwise than declared, and what was taken for the time of their points.
+    /// Notes on clouds read otherwise than declared, and on the source of the times of their points.
     pub fn notes(&self) -> &[CloudNote] {
         self.notes.all()
     }

@@ -16,7 +16,7 @@ pub(super) struct Placed<T> {
     pub stamp_ns: i64,
     /// Metres.
     pub position_m: Vector3<f64>,
-    /// What has this position.
+    /// Fix or pose at this position.
     pub item: T,
 }
 

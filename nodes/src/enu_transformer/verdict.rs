@@ -1,4 +1,4 @@
-//! Whether a cloud is transformed, waits or is dropped.
+//! Decision to transform a cloud, to let it wait or to drop it.
 
 use lattice_core::pose::{PoseMiss, TfMiss};
 

@@ -44,7 +44,7 @@ pub struct TopicPlan {
     pub pose_delay_ns: i64,
     /// Static transforms that come after the first cloud, and hold from the beginning.
     pub late_statics: TFMessage,
-    /// What was taken and what not, a line each, for the user.
+    /// Topics taken and left out, a line each, for the user.
     pub choices: Vec<String>,
 }
 

@@ -54,7 +54,7 @@ pub(super) fn static_transforms(reader: &BagReader, topics: &[PlayedTopic]) -> V
     found
 }
 
-/// What a late joiner at a time is given: first static transforms that come later, the earliest last, so that of one
+/// Messages for a late joiner at a time: first static transforms that come later, the earliest last, so that of one
 /// frame the value holds that is next in the log; then those and all other latched messages before that time.
 pub(super) fn given_at(
     reader: &BagReader,

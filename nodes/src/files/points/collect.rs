@@ -18,7 +18,7 @@ pub(super) struct Collector {
     pub(super) skipped: usize,
     /// True if the points are rows and columns of a sensor.
     pub(super) is_organized: bool,
-    /// What the file says beside its points that is not applied.
+    /// Statement of the file about its points that is not applied.
     pub(super) remark: Option<String>,
     max_points: usize,
 }

@@ -60,7 +60,7 @@ fn content(line: &str) -> &str {
     line.split("//").next().unwrap_or_default().trim()
 }
 
-/// What is between the columns of a line.
+/// Separator between the columns of a line.
 #[derive(Clone, Copy, PartialEq, Debug)]
 enum Separator {
     Blank,
