@@ -11,8 +11,8 @@ use serde::Deserialize;
 
 use crate::Result;
 use crate::corrections::{Action, Correction, Corrections, Found, VERSION};
-use crate::files::{at, read_json, write_whole};
-use crate::merge::{MERGED_FILE, Merged};
+use crate::files::{at, write_whole};
+use crate::merged::Merged;
 use crate::part::TileInfo;
 use crate::tables::{Part, Tables, read_map};
 use crate::tile::Tile;
@@ -42,7 +42,7 @@ pub fn align(
     options: &AlignOptions,
     progress: &mut dyn FnMut(usize),
 ) -> Result<Corrections> {
-    let merged: Merged = read_json(&reference.join(MERGED_FILE))?;
+    let merged = Merged::read(reference)?;
     let logs = logs_of(tables, &merged)?;
     let mut corrections = Corrections {
         version: VERSION,

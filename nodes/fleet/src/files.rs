@@ -90,6 +90,43 @@ fn open_to_all(file: &File) -> io::Result<()> {
     file.set_permissions(fs::Permissions::from_mode(0o644))
 }
 
+/// The text of a manifest whose member `digest` is the SHA-256 of the same text with an empty one.
+pub fn sealed(text: &str) -> String {
+    let empty = "\"digest\": \"\"";
+    let digest = hex(&Sha256::digest(text.as_bytes()));
+    text.replacen(empty, &format!("\"digest\": \"{digest}\""), 1)
+}
+
+/// The text of a manifest with an empty `digest`.
+pub fn unsealed(text: &str, digest: &str) -> String {
+    let filled = format!("\"digest\": \"{digest}\"");
+    text.replacen(&filled, "\"digest\": \"\"", 1)
+}
+
+/// Writes a manifest, whose `digest` is empty, as JSON and seals it.
+pub fn write_manifest(path: &Path, value: &impl Serialize) -> Result {
+    let text = serde_json::to_string_pretty(value)?;
+    write_whole(path, |file| Ok(file.write_all(sealed(&text).as_bytes())?))
+}
+
+/// Reads a manifest; fails, with its path, if a byte of it is not as it was written. `digest_of` gives its `digest`.
+pub fn read_manifest<T: serde::de::DeserializeOwned>(
+    path: &Path,
+    digest_of: impl Fn(&T) -> &str,
+) -> Result<T> {
+    let text = read_text(path)?;
+    let value: T = serde_json::from_slice(&text).map_err(|error| at(path, error))?;
+    let text = String::from_utf8(text).map_err(|error| at(path, error))?;
+    let digest = digest_of(&value);
+    if digest.len() == 64 && sealed(&unsealed(&text, digest)) == text {
+        return Ok(value);
+    }
+    Err(at(
+        path,
+        format!("damaged: it is not the text that its digest {digest:.16}... is of"),
+    ))
+}
+
 /// Writes a value as JSON.
 pub fn write_json(path: &Path, value: &impl Serialize) -> Result {
     let text = serde_json::to_vec_pretty(value)?;
@@ -98,11 +135,15 @@ pub fn write_json(path: &Path, value: &impl Serialize) -> Result {
 
 /// Reads a value from JSON of at most 64 MB.
 pub fn read_json<T: serde::de::DeserializeOwned>(path: &Path) -> Result<T> {
+    serde_json::from_slice(&read_text(path)?).map_err(|error| at(path, error))
+}
+
+fn read_text(path: &Path) -> Result<Vec<u8>> {
     const LONGEST: u64 = 64 << 20;
     let file = File::open(path).map_err(|error| at(path, error))?;
     let mut text = Vec::new();
     file.take(LONGEST)
         .read_to_end(&mut text)
         .map_err(|error| at(path, error))?;
-    serde_json::from_slice(&text).map_err(|error| at(path, error))
+    Ok(text)
 }

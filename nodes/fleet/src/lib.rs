@@ -12,6 +12,7 @@ pub mod engine;
 pub mod files;
 pub mod map_stage;
 pub mod merge;
+pub mod merged;
 pub mod part;
 pub mod rows;
 pub mod schema;

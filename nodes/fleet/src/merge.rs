@@ -5,42 +5,16 @@ use std::fs;
 use std::path::{Path, PathBuf};
 use std::sync::{Mutex, PoisonError};
 
-use serde::{Deserialize, Serialize};
+use serde::Serialize;
 
 use crate::Result;
 use crate::engine::{Engine, Inputs, Limits, merge as merge_rows};
-use crate::files::{at, digest_of, read_json, write_json};
+use crate::files::{at, digest_of, write_manifest};
+use crate::merged::{MERGED_FILE, Merged, MergedTile};
 use crate::part::{MapInfo, Statistics, TileInfo, VERSION, tile_folder, write_tile};
 use crate::rows::TileRows;
-use crate::tables::{Part, Tables, read_map};
+use crate::tables::{Part, Tables};
 use crate::tile::Tile;
-
-/// Name of the file that says what a merged map holds.
-pub const MERGED_FILE: &str = "merged.json";
-
-/// Contents of a merged map, and the source of each tile.
-#[derive(Clone, PartialEq, Debug, Serialize, Deserialize)]
-#[serde(deny_unknown_fields)]
-pub struct Merged {
-    /// Version of the tables.
-    pub version: u32,
-    /// The map besides its rows.
-    pub map: MapInfo,
-    /// Names of the parts.
-    pub parts: Vec<String>,
-    /// Its tiles, ascending.
-    pub tiles: Vec<MergedTile>,
-}
-
-/// A tile of a merged map.
-#[derive(Clone, PartialEq, Eq, Debug, Serialize, Deserialize)]
-#[serde(deny_unknown_fields)]
-pub struct MergedTile {
-    /// Digest of the names and files of the parts that it was made from.
-    pub made_from: String,
-    /// Its files.
-    pub files: TileInfo,
-}
 
 /// Options of the merge stage.
 #[derive(Clone, Debug)]
@@ -90,7 +64,7 @@ pub async fn merge(
     fs::create_dir_all(&options.out).map_err(|error| at(&options.out, error))?;
     let place = options.out.join(MERGED_FILE);
     let before: Option<Merged> = match place.exists() {
-        true => Some(read_json(&place)?),
+        true => Some(Merged::read(&options.out)?),
         false => None,
     };
     let mut made: BTreeMap<Tile, MergedTile> = BTreeMap::new();
@@ -118,12 +92,13 @@ pub async fn merge(
     let all: u64 = todo.iter().map(|(_, job)| rows_of(job)).sum();
     let state = |made: &BTreeMap<Tile, MergedTile>| Merged {
         version: VERSION,
+        digest: String::new(),
         map: map.clone(),
         parts: parts.iter().map(|part| part.name.clone()).collect(),
         tiles: made.values().cloned().collect(),
     };
     // Whoever stops this from here on leaves a list of tiles that are whole.
-    write_json(&place, &state(&made))?;
+    write_manifest(&place, &state(&made))?;
     let session = options.engine.session(&options.limits).await?;
     let mut rest = &todo[..];
     while !rest.is_empty() {
@@ -151,14 +126,15 @@ pub async fn merge(
         }
         progress(report.rows_in as f64 / all.max(1) as f64);
     }
-    write_json(&place, &state(&made))?;
+    write_manifest(&place, &state(&made))?;
     remove_others(&options.out, &made)?;
     report.tiles = made.len();
     report.points = map.statistics.points;
     for tile in made.values() {
         report.voxels += tile.files.rows;
         let labels = tile.files.labels.as_ref().map_or(0, |id| id.bytes);
-        report.bytes += tile.files.voxels.bytes + labels;
+        let bytes = tile.files.voxels.bytes.saturating_add(labels);
+        report.bytes = report.bytes.saturating_add(bytes);
     }
     Ok(report)
 }
@@ -193,13 +169,6 @@ fn write_tiles(
     });
     let done = done.into_inner().unwrap_or_else(|list| list.into_inner());
     done.into_iter().collect()
-}
-
-/// The merged map of a folder as the columns of a map file; fails if it is not finished.
-pub fn read_merged(folder: &Path) -> Result<lattice_core::voxels::file::MapContents> {
-    let merged: Merged = read_json(&folder.join(MERGED_FILE))?;
-    let tiles: Vec<_> = merged.tiles.iter().map(|tile| tile.files.clone()).collect();
-    read_map(folder, &merged.map, &tiles)
 }
 
 /// The map of all parts besides its rows; the least datum counts, so that no order does.
@@ -315,6 +284,7 @@ fn inputs_of(jobs: &[(&Tile, &Job)]) -> Result<Inputs> {
             .canonicalize()
             .map_err(|error| at(&part.folder, error))?;
         tile.verify(&folder)?;
+        tile.check_footers(&folder)?;
         for (number, (path, _)) in tile.files(&folder).into_iter().enumerate() {
             let path = path.into_os_string().into_string();
             let path = path.map_err(|path| format!("{path:?} is no UTF-8"))?;
@@ -375,6 +345,7 @@ mod tests {
             folder: PathBuf::new(),
             info: PartInfo {
                 version: VERSION,
+                digest: String::new(),
                 source,
                 map: MapInfo::of(&MapContents::from_list(&list).into(), None),
                 tiles: vec![tile],

@@ -8,15 +8,20 @@ use lattice_core::voxels::DistortionSums;
 use lattice_core::voxels::file::{LatticeFigures, MapColumns};
 use parquet::arrow::ArrowWriter;
 use parquet::arrow::arrow_reader::ParquetRecordBatchReaderBuilder;
+use parquet::file::metadata::ParquetMetaData;
+use parquet::file::statistics::Statistics as ColumnStatistics;
 use serde::{Deserialize, Serialize};
 
-use crate::files::{FileId, at, write_whole};
+use crate::files::{FileId, at, read_manifest, write_whole};
 use crate::rows::{TileRows, labels_of, voxels_of};
 use crate::tile::Tile;
 use crate::{Result, schema};
 
+/// Cells of a tile, 2^8 along each axis.
+const TILE_CELLS: u64 = 1 << 24;
+
 /// Version of the tables.
-pub const VERSION: u32 = 1;
+pub const VERSION: u32 = 2;
 
 /// Contents and source of a part: the file `part.json`.
 #[derive(Clone, PartialEq, Debug, Serialize, Deserialize)]
@@ -24,6 +29,8 @@ pub const VERSION: u32 = 1;
 pub struct PartInfo {
     /// Version of the tables.
     pub version: u32,
+    /// SHA-256 of the file with an empty digest.
+    pub digest: String,
     /// Its source.
     pub source: Source,
     /// The map besides its rows.
@@ -103,6 +110,52 @@ pub struct TileInfo {
     pub voxels: FileId,
     /// `labels.parquet`, if labels are kept.
     pub labels: Option<FileId>,
+}
+
+impl PartInfo {
+    /// Reads the manifest of a part; fails, with its path, if it is damaged or contradicts itself.
+    pub fn read(path: &Path) -> Result<PartInfo> {
+        let info: PartInfo = read_manifest(path, |info: &PartInfo| &info.digest)?;
+        let tiles = info.tiles.iter();
+        if let Some(reason) = contradiction_of(tiles, &info.map) {
+            return Err(at(path, reason));
+        }
+        Ok(info)
+    }
+}
+
+/// What tiles of a manifest say that no tiles of such a map are.
+pub fn contradiction_of<'a>(
+    tiles: impl Iterator<Item = &'a TileInfo>,
+    map: &MapInfo,
+) -> Option<String> {
+    let mut before: Option<Tile> = None;
+    for tile in tiles {
+        let name = tile.tile;
+        if let Some(before) = before.filter(|before| *before >= name) {
+            return Some(format!(
+                "tile {name} follows tile {before}: each comes once, ascending"
+            ));
+        }
+        before = Some(name);
+        if tile.labels.is_some() != map.labels {
+            return Some(format!(
+                "tile {name} and the map differ in whether there are labels"
+            ));
+        }
+        let rows = 1..=TILE_CELLS;
+        let label_rows = 0..=tile.rows.saturating_mul(1 << 16);
+        if !rows.contains(&tile.rows)
+            || !label_rows.contains(&tile.label_rows)
+            || (tile.max_count > 0) != map.counts
+        {
+            let (rows, labels, count) = (tile.rows, tile.label_rows, tile.max_count);
+            return Some(format!(
+                "tile {name} has {rows} rows of at most {count} points with {labels} labels: no tile of {TILE_CELLS} cells has"
+            ));
+        }
+    }
+    None
 }
 
 impl MapInfo {
@@ -241,6 +294,43 @@ impl TileInfo {
         files.iter().try_for_each(|(path, id)| id.verify(path))
     }
 
+    /// Fails, naming the file, unless the footers of verified files have the rows, the tile and the largest count
+    /// that are promised.
+    pub fn check_footers(&self, folder: &Path) -> Result {
+        for (path, _) in self.files(folder) {
+            let of_labels = path.ends_with("labels.parquet");
+            let promised = if of_labels {
+                self.label_rows
+            } else {
+                self.rows
+            };
+            let check = || -> Result {
+                let reader = ParquetRecordBatchReaderBuilder::try_new(File::open(&path)?)?;
+                let metadata = reader.metadata();
+                let rows = metadata.file_metadata().num_rows();
+                if u64::try_from(rows) != Ok(promised) {
+                    return Err(format!("{rows} rows, its manifest promises {promised}").into());
+                }
+                if rows > 0 && range_of(metadata, "tile")? != [self.tile; 2] {
+                    return Err(format!("rows of other tiles than {}", self.tile).into());
+                }
+                if !of_labels && self.max_count > 0 {
+                    let [_, most] = range_of(metadata, "count")?;
+                    if most != self.max_count {
+                        let promised = self.max_count;
+                        return Err(format!(
+                            "a count of {most}, its manifest promises at most {promised}"
+                        )
+                        .into());
+                    }
+                }
+                Ok(())
+            };
+            check().map_err(|error| at(&path, error))?;
+        }
+        Ok(())
+    }
+
     /// Reads the rows of a verified tile.
     pub fn read(&self, folder: &Path) -> Result<TileRows> {
         self.verify(folder)?;
@@ -279,6 +369,26 @@ impl TileInfo {
         rows.push(row);
         Ok(())
     }
+}
+
+/// The least and the largest value of a column by the footer.
+fn range_of(metadata: &ParquetMetaData, name: &str) -> Result<[i64; 2]> {
+    let mut range: Option<[i64; 2]> = None;
+    for group in metadata.row_groups() {
+        let column = group
+            .columns()
+            .iter()
+            .find(|column| column.column_descr().name() == name);
+        let statistics = match column.and_then(|column| column.statistics()) {
+            Some(ColumnStatistics::Int64(statistics)) => statistics,
+            _ => return Err(format!("no statistics of column {name:?}").into()),
+        };
+        if let (Some(&least), Some(&most)) = (statistics.min_opt(), statistics.max_opt()) {
+            let [low, high] = range.unwrap_or([least, most]);
+            range = Some([low.min(least), high.max(most)]);
+        }
+    }
+    range.ok_or_else(|| format!("no statistics of column {name:?}").into())
 }
 
 impl TileRows {

@@ -6,8 +6,9 @@ use std::path::Path;
 use serde::Serialize;
 
 use crate::Result;
-use crate::files::{at, read_json};
-use crate::merge::{MERGED_FILE, Merged, jobs_of};
+use crate::files::at;
+use crate::merge::jobs_of;
+use crate::merged::{MERGED_FILE, Merged};
 use crate::tables::Tables;
 
 /// State of a folder of tables.
@@ -41,8 +42,9 @@ pub fn status(tables: &Tables, merged: &Path, verify: bool) -> Result<Status> {
     for part in &parts {
         for tile in &part.info.tiles {
             status.rows += tile.rows;
-            status.bytes += tile.voxels.bytes;
-            status.bytes += tile.labels.as_ref().map_or(0, |id| id.bytes);
+            let labels = tile.labels.as_ref().map_or(0, |id| id.bytes);
+            let bytes = tile.voxels.bytes.saturating_add(labels);
+            status.bytes = status.bytes.saturating_add(bytes);
             for (path, id) in tile.files(&part.folder) {
                 let sound = match verify {
                     true => id.verify(&path),
@@ -63,7 +65,7 @@ pub fn status(tables: &Tables, merged: &Path, verify: bool) -> Result<Status> {
     }
     let place = merged.join(MERGED_FILE);
     if place.is_file() {
-        let merged: Merged = read_json(&place)?;
+        let merged = Merged::read(merged)?;
         let as_now = merged.tiles.iter().filter(|tile| {
             let job = jobs.get(&tile.files.tile);
             job.is_some_and(|job| crate::merge::digest(job) == tile.made_from)

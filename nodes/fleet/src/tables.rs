@@ -7,7 +7,7 @@ use std::path::{Path, PathBuf};
 
 use lattice_core::voxels::file::{MapColumns, MapContents, max_voxels_of};
 
-use crate::files::{at, digest_of, read_json, write_json};
+use crate::files::{at, digest_of, write_manifest};
 use crate::part::{MapInfo, PartInfo, Source, VERSION, write_tile};
 use crate::rows::{self, MapOfTiles};
 use crate::{Result, files};
@@ -124,11 +124,12 @@ impl Tables {
             |(tile, rows): &(_, _)| write_tile(folder.path(), *tile, rows, map.labels.is_some());
         let info = PartInfo {
             version: VERSION,
+            digest: String::new(),
             source,
             map: MapInfo::of(map, origin),
             tiles: tiles.iter().map(write).collect::<Result<_>>()?,
         };
-        write_json(&folder.path().join(PART_FILE), &info)?;
+        write_manifest(&folder.path().join(PART_FILE), &info)?;
         open_to_all(folder.path())?;
         let place = self.parts_folder().join(&name);
         let from = folder.keep();
@@ -161,7 +162,7 @@ impl Tables {
                 .unwrap_or_default()
                 .to_string_lossy()
                 .into_owned();
-            let info: PartInfo = read_json(&path.join(PART_FILE))?;
+            let info = PartInfo::read(&path.join(PART_FILE))?;
             if info.version != VERSION {
                 let version = info.version;
                 return Err(at(

@@ -8,6 +8,7 @@ use lattice_core::cloud::Cloud;
 use lattice_core::lattice::{Lattice, LatticeKind};
 use lattice_core::voxels::file::{MapContents, WriteOptions};
 use lattice_core::voxels::{Payload, VoxelList};
+use lattice_fleet::files::{sealed, unsealed};
 use nalgebra::Vector3;
 use rand::{RngExt, SeedableRng};
 use rand_chacha::ChaCha8Rng;
@@ -140,6 +141,12 @@ pub fn some_table(tables: &Path) -> PathBuf {
     tiles.sort();
     let tile = tiles.into_iter().find(|path| path.is_dir()).unwrap();
     tile.join("voxels.parquet")
+}
+
+/// The text of a manifest that somebody has changed and sealed again.
+pub fn sealed_again(text: &str) -> String {
+    let digest = json(text)["digest"].as_str().unwrap().to_owned();
+    sealed(&unsealed(text, &digest))
 }
 
 /// A program or a Python from the environment; says which test is skipped where there is none.

@@ -8,6 +8,7 @@ mod aligning;
 mod bounds;
 #[cfg(feature = "ballista")]
 mod cluster;
+mod damage;
 mod engines;
 mod fixture;
 mod logs;

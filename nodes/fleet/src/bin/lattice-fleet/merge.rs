@@ -6,7 +6,8 @@ use std::time::Instant;
 use clap::Args;
 use lattice_fleet::Result;
 use lattice_fleet::engine::{Engine, Limits};
-use lattice_fleet::merge::{MergeOptions, merge, read_merged};
+use lattice_fleet::merge::{MergeOptions, merge};
+use lattice_fleet::merged::read_merged;
 use lattice_fleet::tables::Tables;
 
 use crate::table::write_map;

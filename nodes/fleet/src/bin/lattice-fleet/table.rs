@@ -6,7 +6,7 @@ use clap::Args;
 use lattice_core::voxels::file::{MapContents, WriteOptions};
 use lattice_fleet::Result;
 use lattice_fleet::files::{FileId, at, write_whole};
-use lattice_fleet::merge::{MERGED_FILE, read_merged};
+use lattice_fleet::merged::{MERGED_FILE, read_merged};
 use lattice_fleet::part::{PartInfo, Source};
 use lattice_fleet::tables::{PART_FILE, Tables, read_map, read_map_file};
 
@@ -107,7 +107,7 @@ fn read(folder: &Path) -> Result<MapContents> {
     }
     let part = folder.join(PART_FILE);
     if part.is_file() {
-        let info: PartInfo = lattice_fleet::files::read_json(&part)?;
+        let info = PartInfo::read(&part)?;
         return read_map(folder, &info.map, &info.tiles);
     }
     let parts = Tables::open(folder)?.parts()?;
