@@ -95,7 +95,7 @@ fn logs_of(tables: &Tables, merged: &Merged) -> Result<BTreeMap<String, Vec<Part
     }
 }
 
-/// What is read of the report of `lattice calibrate --json`.
+/// The part of the report of `lattice calibrate --json` that is read.
 #[derive(Deserialize)]
 struct Answer {
     verdict: String,

@@ -7,6 +7,7 @@ use std::path::Path;
 use serde::{Deserialize, Serialize};
 use sha2::{Digest, Sha256};
 
+use crate::part::VERSION;
 use crate::{AnyError, Result};
 
 /// Size and digest of a file.
@@ -109,12 +110,24 @@ pub fn write_manifest(path: &Path, value: &impl Serialize) -> Result {
     write_whole(path, |file| Ok(file.write_all(sealed(&text).as_bytes())?))
 }
 
-/// Reads a manifest; fails, with its path, if a byte of it is not as it was written. `digest_of` gives its `digest`.
+/// Reads a manifest; fails, with its path, if it is of another version of the tables or a byte of it is not as it was
+/// written. `digest_of` gives its `digest`.
 pub fn read_manifest<T: serde::de::DeserializeOwned>(
     path: &Path,
     digest_of: impl Fn(&T) -> &str,
 ) -> Result<T> {
+    #[derive(Deserialize)]
+    struct Versioned {
+        version: u32,
+    }
     let text = read_text(path)?;
+    let Versioned { version } = serde_json::from_slice(&text).map_err(|error| at(path, error))?;
+    if version != VERSION {
+        let reason = format!(
+            "version {version} of the tables, not {VERSION}: make them again from logs or maps"
+        );
+        return Err(at(path, reason));
+    }
     let value: T = serde_json::from_slice(&text).map_err(|error| at(path, error))?;
     let text = String::from_utf8(text).map_err(|error| at(path, error))?;
     let digest = digest_of(&value);

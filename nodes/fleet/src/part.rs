@@ -124,7 +124,7 @@ impl PartInfo {
     }
 }
 
-/// What tiles of a manifest say that no tiles of such a map are.
+/// The reason why no map has such tiles, if there is one.
 pub fn contradiction_of<'a>(
     tiles: impl Iterator<Item = &'a TileInfo>,
     map: &MapInfo,

@@ -163,13 +163,6 @@ impl Tables {
                 .to_string_lossy()
                 .into_owned();
             let info = PartInfo::read(&path.join(PART_FILE))?;
-            if info.version != VERSION {
-                let version = info.version;
-                return Err(at(
-                    &path,
-                    format!("version {version} of the tables, not {VERSION}"),
-                ));
-            }
             let expected = info.source.part_name();
             if expected != name {
                 return Err(at(

@@ -90,6 +90,9 @@ fn tampered_and_foreign_folders_are_refused_by_name() {
         ]);
         assert!(said.contains(expected), "{expected}: {said}");
     }
+    fs::write(&file, r#"{"version": 1, "tiles": []}"#).unwrap();
+    let said = refused(["merge", text(&tables)]);
+    assert!(said.contains("version 1 of the tables, not 2"), "{said}");
     fs::write(&file, good).unwrap();
     run(["merge", text(&tables)]);
     let said = refused([
