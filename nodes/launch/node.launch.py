@@ -17,7 +17,7 @@ ARGUMENTS = {
     "use_sim_time": ("false", "true: the time is that on /clock"),
     "rmw": (
         EnvironmentVariable("RMW_IMPLEMENTATION", default_value=""),
-        "rmw_cyclonedds_cpp where built in, or rustdds",
+        "any DDS of ROS: rmw_cyclonedds_cpp, rmw_fastrtps_cpp",
     ),
     "respawn": ("false", "true: a node that ends is started again"),
     "log_level": ("info", "debug to fatal"),

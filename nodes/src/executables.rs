@@ -96,8 +96,8 @@ pub fn answers_help(name: &str, declare: Option<Declare>, args: &RosArgs) -> boo
              [--log-level LEVEL] [--enclave NAME] ...]\n\n\
              Topics and services are in README.md.\n\n\
              Environment: ROS_DOMAIN_ID, ROS_AUTOMATIC_DISCOVERY_RANGE (LOCALHOST or SUBNET),\n\
-             RMW_IMPLEMENTATION (rmw_cyclonedds_cpp where built in, or rustdds), ROS_SECURITY_ENABLE\n\
-             with the others of SROS2 (docs/security.md), RUST_LOG.\n"
+             ROS_STATIC_PEERS, CYCLONEDDS_URI, ROS_SECURITY_ENABLE with the others of SROS2\n\
+             (docs/security.md), RUST_LOG.\n"
         );
         let params = Params::from_values(name, std::iter::empty::<(String, _)>());
         if declare.is_some_and(|declare| declare(&params).is_ok()) {

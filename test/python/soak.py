@@ -1,6 +1,6 @@
 """The nodes in processes of their own, for hours: one log again and again, a new player each time.
 
-    soak.py LATTICE DIRECTORY MINUTES     RMW_IMPLEMENTATION and ROS_DOMAIN_ID as the nodes take them
+    soak.py LATTICE DIRECTORY MINUTES     ROS_DOMAIN_ID as the nodes take it
 
 After each loop every cloud must have been counted, and the map must be that of the loop before, at last
 that of `lattice replay --direct`; then the mapper is reset. Memory, descriptors and threads of each process are written to
@@ -36,8 +36,6 @@ NODES = {
 # Growth of the resident memory that is no leak: pages that an allocator keeps, and buffers.
 FLAT = 1.05
 SLACK_KB = 2048
-# RustDDS never forgets a topic of a participant that it has discovered: so much for each player.
-PER_PLAYER_KB = 60 if os.environ.get("RMW_IMPLEMENTATION") == "rustdds" else 0
 
 SaveMapRequest = ros.ros("lattice_msgs/srv/SaveMap_Request", **ros.ASKED, path=str)
 SaveMapResponse = ros.ros(

@@ -5,5 +5,6 @@ pub mod data;
 pub mod domain;
 pub mod flat;
 pub mod maps;
+pub mod peer;
 pub mod python;
 pub mod random;

@@ -153,11 +153,7 @@ fn init_logging() {
     let _ = env_logger::Builder::from_env(env)
         .format_timestamp(None)
         .format_target(false)
-        // Says what it could not send while it meets other processes.
-        .filter_module("rustdds", log::LevelFilter::Error)
         // Warns of short receive buffers, which matter where something is lost: commands say so then.
         .filter_module("lattice_runtime::shared::status", log::LevelFilter::Error)
-        // Prints an error at every end, of a socket that leaves a group of which it is no member.
-        .filter_module("rustdds::network::udp_listener", log::LevelFilter::Off)
         .try_init();
 }

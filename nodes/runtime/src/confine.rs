@@ -1,5 +1,5 @@
-//! Sockets of a transport kept on the loopback interface: Cyclone and RustDDS bind those that receive to
-//! all addresses, whatever their interfaces are.
+//! Sockets of a transport kept on the loopback interface: Cyclone binds those that receive to all addresses,
+//! whatever its interfaces are.
 
 use std::collections::BTreeSet;
 use std::fs;

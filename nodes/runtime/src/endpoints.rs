@@ -56,17 +56,10 @@ impl Endpoints {
         }
     }
 
-    /// Hands events on until the task is dropped; `renewed` is called for new identities.
-    pub(crate) async fn watch(
-        self: Arc<Self>,
-        mut events: BoxStream<'static, PortEvent>,
-        renewed: impl Fn() + Send,
-    ) {
+    /// Hands events on until the task is dropped.
+    pub(crate) async fn watch(self: Arc<Self>, mut events: BoxStream<'static, PortEvent>) {
         while let Some(event) = events.next().await {
-            match event {
-                PortEvent::Renewed => renewed(),
-                event => self.hear(event),
-            }
+            self.hear(event);
         }
     }
 
@@ -87,9 +80,6 @@ impl Endpoints {
                 return self.neighbours.add(peer, EndpointKind::Reader, &dds_name);
             }
             PortEvent::Lost { peer: lost } => return self.lost(|peer| *peer == lost),
-            PortEvent::ParticipantLost { any } => return self.lost(|peer| peer.is_beside(&any)),
-            PortEvent::AllLost => return self.lost(|_| true),
-            PortEvent::Renewed => return,
         };
         let change = Change { peer, incompatible };
         let mut inner = lock(&self.inner);
@@ -167,7 +157,7 @@ mod tests {
         let peers = Arc::new(Peers::new("/map", "subscriber", log::Level::Info));
         endpoints.register(endpoint, &peers);
         assert_eq!(peers.count(), 1);
-        endpoints.hear(PortEvent::ParticipantLost { any: peer });
+        endpoints.hear(PortEvent::Lost { peer });
         assert_eq!(peers.count(), 0);
     }
 

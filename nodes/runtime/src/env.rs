@@ -15,21 +15,22 @@ const DISCOVERY_RANGE: &str = "ROS_AUTOMATIC_DISCOVERY_RANGE";
 const STATIC_PEERS: &str = "ROS_STATIC_PEERS";
 const IMPLEMENTATION: &str = "RMW_IMPLEMENTATION";
 
-/// The DDS under the nodes.
+/// The transport under the nodes.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum TransportKind {
-    /// RustDDS, always there.
-    RustDds,
-    /// Eclipse Cyclone DDS; only with the feature `cyclone`.
-    Cyclone,
+    /// DDS, by Eclipse Cyclone DDS.
+    Dds,
 }
 
 impl TransportKind {
     /// The transports built in, by their names in `RMW_IMPLEMENTATION`; the first is the default.
-    pub const BUILT_IN: &[(&str, TransportKind)] = &[
-        #[cfg(feature = "cyclone")]
-        ("rmw_cyclonedds_cpp", TransportKind::Cyclone),
-        ("rustdds", TransportKind::RustDds),
+    pub const BUILT_IN: &[(&str, TransportKind)] = &[("rmw_cyclonedds_cpp", TransportKind::Dds)];
+
+    /// Names of other implementations of DDS, which understand ours.
+    const OTHER_DDS: [&str; 3] = [
+        "rmw_fastrtps_cpp",
+        "rmw_fastrtps_dynamic_cpp",
+        "rmw_connextdds",
     ];
 
     /// Name in `RMW_IMPLEMENTATION`.
@@ -54,6 +55,8 @@ pub struct Network {
     pub security: Option<Security>,
     /// Lines for the log.
     pub warnings: Vec<String>,
+    /// The same, of level INFO.
+    pub notes: Vec<String>,
 }
 
 /// A variable has a value that nothing can be made of.
@@ -119,8 +122,9 @@ impl Network {
                 "{DISCOVERY_RANGE} is ignored since {LOCALHOST_ONLY} is 1"
             ));
         }
-        let transport = transport(get(IMPLEMENTATION))?;
-        let static_peers = static_peers(get(STATIC_PEERS), transport, &mut warnings);
+        let mut notes = Vec::new();
+        let transport = transport(get(IMPLEMENTATION), &mut notes)?;
+        let static_peers = static_peers(get(STATIC_PEERS), &mut warnings);
         Ok(Network {
             domain_id,
             localhost_only: localhost_only || local_range,
@@ -128,6 +132,7 @@ impl Network {
             transport,
             security: Security::from_lookup(lookup),
             warnings,
+            notes,
         })
     }
 }
@@ -136,32 +141,27 @@ fn domain_id(value: &str) -> Option<u16> {
     value.trim().parse().ok().filter(|id| *id <= DOMAIN_ID_MAX)
 }
 
-fn transport(name: Option<String>) -> Result<TransportKind, EnvError> {
-    let built_in = TransportKind::BUILT_IN;
-    let found = match &name {
-        None => built_in.first(),
-        Some(name) => built_in.iter().find(|(known, _)| known == name),
+fn transport(name: Option<String>, notes: &mut Vec<String>) -> Result<TransportKind, EnvError> {
+    let Some(name) = name else {
+        return Ok(TransportKind::Dds);
     };
-    let given = name.as_deref().unwrap_or_default();
+    if TransportKind::OTHER_DDS.contains(&&*name) {
+        notes.push(format!(
+            "{IMPLEMENTATION}={name}: DDS is spoken by Eclipse Cyclone DDS, which is built in"
+        ));
+        return Ok(TransportKind::Dds);
+    }
+    let mut built_in = TransportKind::BUILT_IN.iter();
+    let found = built_in.find(|(known, _)| *known == name);
     let kind = found.map(|(_, kind)| *kind);
-    kind.ok_or_else(|| EnvError::not_built_in(given))
+    kind.ok_or_else(|| EnvError::not_built_in(&name))
 }
 
 /// Addresses separated by `;`.
-fn static_peers(
-    value: Option<String>,
-    transport: TransportKind,
-    warnings: &mut Vec<String>,
-) -> Vec<String> {
+fn static_peers(value: Option<String>, warnings: &mut Vec<String>) -> Vec<String> {
     let Some(value) = value else {
         return Vec::new();
     };
-    if transport == TransportKind::RustDds {
-        warnings.push(format!(
-            "{STATIC_PEERS} is ignored: RustDDS finds others by multicast only"
-        ));
-        return Vec::new();
-    }
     let addresses = value.split(';').map(str::trim).filter(|a| !a.is_empty());
     let is_address = |text: &&str| {
         let allowed = |c: char| c.is_ascii_alphanumeric() || ".:-_%[]".contains(c);
@@ -232,28 +232,27 @@ mod tests {
     }
 
     #[test]
-    fn only_transports_that_are_built_in_can_be_chosen() {
+    fn every_dds_of_ros_means_ours_and_others_must_be_built_in() {
         for (name, kind) in TransportKind::BUILT_IN {
-            assert_eq!(read(&[(IMPLEMENTATION, name)]).unwrap().transport, *kind);
+            let network = read(&[(IMPLEMENTATION, name)]).unwrap();
+            assert_eq!((network.transport, network.notes), (*kind, vec![]));
         }
-        let (_, first) = TransportKind::BUILT_IN[0];
-        assert_eq!(read(&[]).unwrap().transport, first);
-        let error = read(&[(IMPLEMENTATION, "rmw_fastrtps_cpp")]).unwrap_err();
-        let words = "\"rmw_fastrtps_cpp\" is not built in; possible are";
+        for name in TransportKind::OTHER_DDS {
+            let network = read(&[(IMPLEMENTATION, name)]).unwrap();
+            assert_eq!(network.transport, TransportKind::Dds);
+            assert!(network.notes[0].contains(name) && network.warnings.is_empty());
+        }
+        assert_eq!(read(&[]).unwrap().transport, TransportKind::Dds);
+        let error = read(&[(IMPLEMENTATION, "rmw_zenoh_cpp")]).unwrap_err();
+        let words = "\"rmw_zenoh_cpp\" is not built in; possible are";
         assert!(error.to_string().contains(words), "{error}");
     }
 
     #[test]
-    fn static_peers_are_for_transports_that_can_look_for_them() {
-        for (name, kind) in TransportKind::BUILT_IN {
-            let peers = (STATIC_PEERS, "10.0.0.1; robot ;<x/>");
-            let network = read(&[(IMPLEMENTATION, name), peers]).unwrap();
-            let used: Vec<String> = match kind {
-                TransportKind::RustDds => vec![],
-                TransportKind::Cyclone => vec!["10.0.0.1".to_owned(), "robot".to_owned()],
-            };
-            assert_eq!((network.static_peers, network.warnings.len()), (used, 1));
-        }
+    fn static_peers_are_addresses() {
+        let network = read(&[(STATIC_PEERS, "10.0.0.1; robot ;<x/>")]).unwrap();
+        assert_eq!(network.static_peers, ["10.0.0.1", "robot"]);
+        assert_eq!(network.warnings.len(), 1);
     }
 
     #[test]

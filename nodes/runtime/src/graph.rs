@@ -152,14 +152,8 @@ impl Graph {
         let _ = self.changed.try_send(());
     }
 
-    /// `wire_id` tells the identity that others know an endpoint by.
-    fn message(
-        &self,
-        participant: EndpointId,
-        gid_bytes: usize,
-        wire_id: impl Fn(EndpointId) -> EndpointId,
-    ) -> ParticipantEntitiesInfo<Gid> {
-        let gid = |id: EndpointId| Gid::new(wire_id(id), gid_bytes);
+    fn message(&self, participant: EndpointId, gid_bytes: usize) -> ParticipantEntitiesInfo<Gid> {
+        let gid = |id: EndpointId| Gid::new(id, gid_bytes);
         let gids = |all: &Endpoints| all.keys().copied().map(gid).collect();
         let node = |entry: &Entry| NodeEntitiesInfo {
             node_namespace: entry.namespace.clone(),
@@ -181,7 +175,7 @@ impl Graph {
             Timer::after(SETTLE_TIME).await;
             let _ = self.changes.try_recv();
             let Some(of) = of.upgrade() else { return };
-            let message = self.message(of.id(), gid_bytes, |id| of.wire_id(id));
+            let message = self.message(of.id(), gid_bytes);
             drop(of);
             if let Err(error) = writer.send(Box::new(move || cdr::to_vec(&message))) {
                 log::debug!("{error}");
@@ -249,7 +243,7 @@ mod tests {
         let all = graph.all().into_iter().map(|of| (of.name, of.node));
         let expected = ["/in", "/out"].map(|name| (name.to_owned(), "/n".to_owned()));
         assert!(all.eq(expected));
-        let message = |gid_bytes| cdr::to_vec(&graph.message(guid(1), gid_bytes, |id| id)).unwrap();
+        let message = |gid_bytes| cdr::to_vec(&graph.message(guid(1), gid_bytes)).unwrap();
         let one = [1, 0, 0, 0];
         let slash = [2, 0, 0, 0, b'/', 0, 0, 0];
         let name = [2, 0, 0, 0, b'n', 0, 0, 0];

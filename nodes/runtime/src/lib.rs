@@ -4,13 +4,10 @@
 
 mod action;
 mod clock;
-#[cfg(feature = "cyclone")]
 #[expect(unsafe_code, reason = "sockets of others are borrowed")]
 mod confine;
-#[cfg(feature = "cyclone")]
 #[expect(unsafe_code, reason = "Cyclone DDS has an interface in C")]
 mod cyclone;
-mod dds;
 mod diagnostics;
 mod endpoints;
 pub mod env;

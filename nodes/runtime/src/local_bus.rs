@@ -138,11 +138,6 @@ impl Topic {
         )
     }
 
-    /// True if this process publishes here.
-    pub(crate) fn has_publishers(&self) -> bool {
-        !lock(&self.inner).publishers.is_empty()
-    }
-
     fn join(
         self: &Arc<Self>,
         claim: impl FnOnce(&mut Inner) -> Result<(), RuntimeError>,

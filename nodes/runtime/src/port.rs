@@ -14,10 +14,13 @@ use super::qos::Qos;
 use super::remote::RemotePublisher;
 
 /// Buffer of a sample that writers share.
-pub(crate) use rustdds::bytes::Bytes;
+pub(crate) use bytes::Bytes;
 
 /// Length of the encapsulation header in front of every CDR sample.
 pub(crate) const ENCAPSULATION_BYTES: usize = 4;
+
+/// Receive buffer asked of every socket, in bytes.
+pub(crate) const RECEIVE_BUFFER_BYTES: usize = 32 << 20;
 
 /// Identity of a reader or writer, the GUID of DDS: twelve bytes name the participant.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, PartialOrd, Ord)]
@@ -53,7 +56,7 @@ pub(crate) enum EndpointKind {
 pub(crate) struct SampleId {
     /// The writer that sent it, or what the sender names in its place.
     pub writer: EndpointId,
-    /// Its number there; not above 0 where the sender does not say.
+    /// Its number there; 0 where the sender does not say.
     pub number: i64,
 }
 
@@ -76,7 +79,6 @@ pub(crate) struct PortTopic<'a> {
     /// Type, such as `sensor_msgs/msg/Imu`.
     pub ros_type: &'a str,
     /// Hash of the type where it may be another than that of our message of this name.
-    #[cfg_attr(not(feature = "cyclone"), expect(dead_code))]
     pub type_hash: Option<&'a str>,
 }
 
@@ -108,28 +110,12 @@ pub(crate) enum PortEvent {
     FoundReader { peer: EndpointId, dds_name: String },
     /// A peer has gone.
     Lost { peer: EndpointId },
-    /// All peers of the participant of this endpoint have gone.
-    ParticipantLost { any: EndpointId },
-    /// All peers have gone; they are found again.
-    AllLost,
-    /// Endpoints of ours have new identities on the wire.
-    Renewed,
 }
 
 /// A participant on a network.
 pub(crate) trait Transport: Send + Sync {
-    /// Identity of the participant. Here it and its endpoints keep their identities for ever.
+    /// Identity of the participant.
     fn id(&self) -> EndpointId;
-
-    /// The identity that the participant, or an endpoint of it, has on the wire now.
-    fn wire_id(&self, id: EndpointId) -> EndpointId {
-        id
-    }
-
-    /// Number of times that the participant was made anew because it no longer worked.
-    fn renewals(&self) -> u64 {
-        0
-    }
 
     /// Participants that security keeps out. Each is a warning in the log; to be asked once a second.
     fn strangers(&self) -> usize {
@@ -153,13 +139,6 @@ pub(crate) trait Transport: Send + Sync {
 
     /// Changes of peers. Only one stream hears them.
     fn events(&self) -> BoxStream<'static, PortEvent>;
-
-    /// True if a writer is matched with the readers of its own participant, which nothing reaches: then a
-    /// reader must not be made before its participant's writers of the topic are known.
-    fn pairs_own_endpoints(&self) -> bool;
-
-    /// A wait for discovery to know all writers made so far.
-    fn writers_known(&self) -> Result<BoxFuture<'static, ()>, RuntimeError>;
 }
 
 /// Reason why a sample was not written.
@@ -176,13 +155,11 @@ pub(crate) trait SampleWriter: Send + Sync {
     /// Its identity.
     fn id(&self) -> EndpointId;
 
-    /// Writes the body of a little-endian CDR sample. `may_wait`: also best-effort samples wait for a full
-    /// send window.
+    /// Writes the body of a little-endian CDR sample, and the request that it answers.
     fn write(
         &self,
         body: Bytes,
         related: Option<SampleId>,
-        may_wait: bool,
     ) -> BoxFuture<'_, Result<(), WriteRefusal>>;
 
     /// Waits until every reliable reader has acknowledged. False: not in time.
@@ -200,10 +177,8 @@ pub(crate) trait SampleReader: Send + Sync {
     /// Bytes of the last sample, encapsulation header first.
     fn bytes(&self) -> MutexGuard<'_, Vec<u8>>;
 
-    /// Samples that the transport says it has missed since the last call, besides gaps in their numbers.
-    fn missed(&self) -> u64 {
-        0
-    }
+    /// Samples that were sent and have not come, or gave way to newer ones, since the last call.
+    fn missed(&self) -> u64;
 }
 
 impl dyn SampleReader + '_ {

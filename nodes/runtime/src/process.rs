@@ -5,7 +5,7 @@ use std::time::Duration;
 
 use lattice_msgs::diagnostic_msgs::DiagnosticArray;
 
-use super::env::{Network, TransportKind};
+use super::env::Network;
 use super::error::RuntimeError;
 use super::logger_services;
 use super::node::Node;
@@ -51,11 +51,12 @@ impl Runtime {
         for warning in &network.warnings {
             log::warn!("{warning}");
         }
+        for note in &network.notes {
+            log::info!("{note}");
+        }
         let name = args.enclave.clone().unwrap_or_else(|| "/".to_owned());
         let secrets = match &network.security {
-            Some(security) => {
-                security.secrets(&name, network.transport == TransportKind::Cyclone)?
-            }
+            Some(security) => security.secrets(&name)?,
             None => None,
         };
         let shared = Shared::start(network, &Enclave { name, secrets })?;

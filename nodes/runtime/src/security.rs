@@ -9,7 +9,7 @@ use thiserror::Error;
 
 use crate::names::{NameError, validate_namespace};
 
-/// True if this build can secure participants, over Cyclone.
+/// True if this build can secure participants.
 pub const BUILT_IN: bool = cfg!(feature = "security");
 
 const ENABLE: &str = "ROS_SECURITY_ENABLE";
@@ -41,7 +41,6 @@ pub struct Security {
 }
 
 /// The enclave of a process.
-#[cfg_attr(not(feature = "cyclone"), expect(dead_code))]
 pub(crate) struct Enclave {
     /// Its name, which is announced.
     pub name: String,
@@ -75,11 +74,6 @@ pub enum SecurityError {
         /// Reason that the system gives.
         error: io::Error,
     },
-    /// RustDDS was chosen.
-    #[error(
-        "{ENABLE} is true, but RustDDS has no security; RMW_IMPLEMENTATION=rmw_cyclonedds_cpp has"
-    )]
-    Transport,
     /// Built without it.
     #[error("{ENABLE} is true, but this program was built without the feature `security`")]
     NotBuiltIn,
@@ -104,17 +98,11 @@ impl Security {
         })
     }
 
-    /// The files for an enclave; without them, or a transport that can use them, an error, or a warning
-    /// where security is not enforced.
-    pub(crate) fn secrets(
-        &self,
-        enclave: &str,
-        over_cyclone: bool,
-    ) -> Result<Option<Secrets>, SecurityError> {
-        let found = match over_cyclone {
-            true if BUILT_IN => self.find(enclave),
-            true => Err(SecurityError::NotBuiltIn),
-            false => Err(SecurityError::Transport),
+    /// The files for an enclave; without them an error, or a warning where security is not enforced.
+    pub(crate) fn secrets(&self, enclave: &str) -> Result<Option<Secrets>, SecurityError> {
+        let found = match BUILT_IN {
+            true => self.find(enclave),
+            false => Err(SecurityError::NotBuiltIn),
         };
         match found {
             Ok(secrets) => Ok(Some(secrets)),
@@ -160,7 +148,6 @@ impl Secrets {
     }
 
     /// The folder that they are in.
-    #[cfg_attr(not(any(feature = "cyclone", test)), expect(dead_code))]
     pub(crate) fn folder(&self) -> &Path {
         self.files[0].parent().unwrap_or(Path::new(""))
     }
@@ -216,14 +203,10 @@ mod tests {
             true => "names no keystore",
             false => "built without the feature `security`",
         };
-        for (over_cyclone, words) in [(false, "RustDDS has no security"), (true, words)] {
-            let error = wish(None, None, true)
-                .secrets("/", over_cyclone)
-                .unwrap_err();
-            assert!(error.to_string().contains(words), "{error}");
-            let open = wish(None, None, false).secrets("/", over_cyclone);
-            assert_eq!(open.unwrap(), None);
-        }
+        let error = wish(None, None, true).secrets("/").unwrap_err();
+        assert!(error.to_string().contains(words), "{error}");
+        let open = wish(None, None, false).secrets("/");
+        assert_eq!(open.unwrap(), None);
     }
 
     #[test]

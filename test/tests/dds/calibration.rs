@@ -8,11 +8,10 @@ use lattice_core::pose::Axes;
 use lattice_test::clouds::{cloud, labelled_cloud};
 use lattice_test::domain::TestDomain;
 use lattice_test::flat::{Flat, headset_cloud, map_cloud};
+use lattice_test::peer::{self, Nodes, params};
 use lattice_test::python::python;
 use nalgebra::{Isometry3, Point3, Quaternion, Translation3, UnitQuaternion, Vector3};
 use serde_json::{Value, json};
-
-use super::peer::{self, Nodes, params};
 
 /// More than `max_cloud_points`.
 const TOO_MANY: usize = 600_000;

@@ -7,10 +7,9 @@ use std::fs;
 use lattice_nodes::headset_cloud::HeadsetReport;
 use lattice_nodes::report;
 use lattice_test::domain::TestDomain;
+use lattice_test::peer::{self, Nodes, params};
 use lattice_test::python::python;
 use serde_json::json;
-
-use super::peer::{self, Nodes, params};
 
 #[test]
 fn a_cyclone_headset_sees_its_mesh_until_that_is_replaced() {

@@ -1,6 +1,7 @@
 //! Losses of a node before its inbox: in its diagnostics while it runs, and alike in its report.
 
 use std::sync::mpsc::channel;
+use std::time::Duration;
 
 use lattice_msgs::RosMessage;
 use lattice_msgs::diagnostic_msgs::DiagnosticArray;
@@ -9,10 +10,11 @@ use lattice_runtime::qos::Qos;
 use lattice_runtime::ros_args::RosArgs;
 use lattice_runtime::{Load, Runtime};
 use lattice_test::domain::TestDomain;
+use lattice_test::peer::Nodes;
 use serde_json::Value;
 
-use super::client::PATIENCE;
-use super::peer::Nodes;
+/// Long enough for a loaded machine; a test that passes does not wait for it.
+const PATIENCE: Duration = Duration::from_secs(60);
 
 #[test]
 fn what_does_not_decode_is_in_diagnostics_and_report() {

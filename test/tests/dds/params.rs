@@ -7,10 +7,9 @@ use lattice_msgs::hash_of;
 use lattice_runtime::logging;
 use lattice_runtime::ros_args::RosArgs;
 use lattice_test::domain::TestDomain;
+use lattice_test::peer::{self, Nodes, params};
 use lattice_test::python::python;
 use serde_json::{Value, json};
-
-use super::peer::{self, Nodes, params};
 
 const NOT_DECLARED: &str = "One or more parameters were not declared before setting";
 

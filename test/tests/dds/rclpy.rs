@@ -1,6 +1,4 @@
 //! Nodes of ours seen by ROS 2 Jazzy: rclpy over the Fast DDS that comes with it.
-//!
-//! Over Cyclone DDS services do not reach it, as those of rmw_cyclonedds do not.
 
 use std::fs;
 use std::time::Duration;
@@ -9,13 +7,11 @@ use lattice_msgs::cdr;
 use lattice_msgs::hash_of;
 use lattice_msgs::std_srvs::{Trigger, TriggerRequest, TriggerResponse};
 use lattice_runtime::Runtime;
-use lattice_runtime::env::{Network, TransportKind};
 use lattice_runtime::ros_args::RosArgs;
 use lattice_test::domain::TestDomain;
+use lattice_test::peer::{self, Nodes, params};
 use lattice_test::python::ros_python;
 use serde_json::{Value, json};
-
-use super::peer::{self, Nodes, params};
 
 const PATIENCE: Duration = Duration::from_secs(60);
 
@@ -51,9 +47,6 @@ fn of_ros(python: &std::path::Path, scenario: &Value) -> Value {
 #[test]
 fn rclpy_reads_and_changes_a_node_and_answers_ours() {
     let Some(python) = ros_python() else { return };
-    if Network::from_env().unwrap().transport != TransportKind::RustDds {
-        return;
-    }
     let domain = TestDomain::take();
     let directory = tempfile::tempdir().unwrap();
     let answered = directory.path().join("answered");

@@ -7,10 +7,9 @@ use std::fs;
 use lattice_nodes::report;
 use lattice_nodes::semantic_cloud::CloudReport;
 use lattice_test::domain::TestDomain;
+use lattice_test::peer::{self, Nodes, params};
 use lattice_test::python::python;
 use serde_json::json;
-
-use super::peer::{self, Nodes, params};
 
 #[test]
 fn a_cyclone_camera_and_segmenter_make_a_map_with_labels() {

@@ -13,10 +13,9 @@ use lattice_nodes::semantic_cloud::CloudReport;
 use lattice_runtime::Runtime;
 use lattice_runtime::ros_args::RosArgs;
 use lattice_test::domain::TestDomain;
+use lattice_test::peer::{self, Nodes, params};
 use lattice_test::python::python;
 use serde_json::{Value, json};
-
-use super::peer::{self, Nodes, params};
 
 #[test]
 fn a_cyclone_camera_gets_labels_of_a_network() {

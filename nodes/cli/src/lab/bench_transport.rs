@@ -7,7 +7,7 @@ use lattice_lab::bench::{self, TransportSetup};
 
 use crate::{CliResult, init_logging};
 
-/// Options of `lattice bench transport`; `RMW_IMPLEMENTATION` chooses the transport.
+/// Options of `lattice bench transport`.
 #[derive(Args)]
 pub struct Transport {
     /// Bytes of points in a message

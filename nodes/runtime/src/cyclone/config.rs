@@ -1,17 +1,19 @@
 //! Configuration of Cyclone from the settings of ROS, with what `CYCLONEDDS_URI` adds.
 
 use crate::env::Network;
+use crate::port::RECEIVE_BUFFER_BYTES;
 
-/// Participants that are looked for on a machine where multicast does not reach them. RustDDS and others
+/// Participants that are looked for on a machine where multicast does not reach them. Others
 /// look for fewer, but answer whoever finds them.
 const MAX_PARTICIPANTS: u32 = 120;
-
-/// Asked of every socket; the kernel may grant less.
-const RECEIVE_BUFFER: &str = "32MiB";
 
 /// Between two announcements of the participant: who was stopped for longer than its lease is known
 /// again so soon.
 const ANNOUNCEMENT_PERIOD: &str = "2s";
+
+/// Time after the match at which a reader asks its writer where it stands. Cyclone's own 10 ms are most of what
+/// a request that overtakes discovery waits.
+const FIRST_QUESTION: &str = "1ms";
 
 /// The text for `dds_create_domain`: fragments separated by commas, of which the later ones win.
 pub(super) fn config(network: &Network, cyclonedds_uri: Option<&str>) -> String {
@@ -33,7 +35,8 @@ pub(super) fn config(network: &Network, cyclonedds_uri: Option<&str>) -> String 
          <ParticipantIndex>auto</ParticipantIndex>\
          <MaxAutoParticipantIndex>{}</MaxAutoParticipantIndex>\
          <SPDPInterval>{ANNOUNCEMENT_PERIOD}</SPDPInterval><Peers>{peers}</Peers></Discovery>\
-         <Internal><SocketReceiveBufferSize max=\"{RECEIVE_BUFFER}\"/></Internal>\
+         <Internal><PreEmptiveAckDelay>{FIRST_QUESTION}</PreEmptiveAckDelay>\
+         <SocketReceiveBufferSize max=\"{RECEIVE_BUFFER_BYTES}B\"/></Internal>\
          </Domain></CycloneDDS>",
         MAX_PARTICIPANTS - 1
     );
@@ -54,9 +57,10 @@ mod tests {
             domain_id: 0,
             localhost_only,
             static_peers: static_peers.iter().map(ToString::to_string).collect(),
-            transport: TransportKind::Cyclone,
+            transport: TransportKind::Dds,
             security: None,
             warnings: vec![],
+            notes: vec![],
         };
         let local = config(&network(true, &[]), None);
         assert!(local.contains("address=\"127.0.0.1\"") && local.contains("Address=\"127.0.0.1\""));

@@ -7,7 +7,7 @@ use std::mem::MaybeUninit;
 use std::ptr;
 use std::sync::{Arc, Mutex, Weak};
 
-use cyclors::{
+use lattice_cyclone_sys::{
     DDS_ALIVE_INSTANCE_STATE, DDS_ANY_STATE, DDS_BUILTIN_TOPIC_DCPSPUBLICATION,
     DDS_BUILTIN_TOPIC_DCPSSUBSCRIPTION, dds_builtintopic_endpoint_t, dds_create_listener,
     dds_create_reader, dds_delete_listener, dds_entity_t, dds_lset_data_available_arg,

@@ -4,7 +4,7 @@ use std::collections::BTreeMap;
 use std::ffi::CString;
 use std::sync::Mutex;
 
-use cyclors::dds_create_domain;
+use lattice_cyclone_sys::dds_create_domain;
 
 use super::config::config;
 use super::entity::Entity;

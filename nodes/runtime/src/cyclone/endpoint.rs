@@ -5,7 +5,7 @@ use std::ffi::c_void;
 use std::ptr;
 use std::sync::{Arc, Mutex};
 
-use cyclors::{
+use lattice_cyclone_sys::{
     dds_builtintopic_endpoint_t, dds_builtintopic_free_endpoint, dds_create_listener,
     dds_delete_listener, dds_entity_t, dds_get_matched_publication_data,
     dds_get_matched_publications, dds_get_matched_subscription_data, dds_get_matched_subscriptions,

@@ -2,7 +2,7 @@
 
 use std::ffi::CStr;
 
-use cyclors::{dds_delete, dds_entity_t, dds_get_guid, dds_guid_t, dds_strretcode};
+use lattice_cyclone_sys::{dds_delete, dds_entity_t, dds_get_guid, dds_guid_t, dds_strretcode};
 
 use crate::port::EndpointId;
 

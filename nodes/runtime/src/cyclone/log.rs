@@ -8,7 +8,7 @@ use std::slice;
 use std::sync::{Mutex, Once};
 use std::time::{Duration, Instant};
 
-use cyclors::{
+use lattice_cyclone_sys::{
     DDS_LC_ERROR, DDS_LC_FATAL, DDS_LC_WARNING, dds_entity_t, dds_log_data_t, dds_set_log_sink,
 };
 use log::Level;

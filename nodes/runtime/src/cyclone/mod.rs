@@ -1,10 +1,9 @@
-//! The transport over Eclipse Cyclone DDS, whose C interface is the crate `cyclors`. All unsafe code of
-//! the project is here and in `confine`.
+//! The transport over Eclipse Cyclone DDS, whose C interface is the crate `lattice_cyclone_sys`. All unsafe
+//! Rust of the project is here and in `confine`.
 //!
-//! Endpoints are of "blob" topics: any type name, samples as serialised bytes.
+//! Topics are of any type name, samples are serialised bytes.
 
 mod arrivals;
-mod blob;
 mod config;
 mod discovery;
 mod domain;

@@ -4,14 +4,12 @@ use std::ffi::CString;
 use std::ptr;
 use std::sync::Arc;
 
-use cyclors::dds_create_participant;
 use futures::StreamExt;
-use futures::future::BoxFuture;
 use futures::stream::BoxStream;
+use lattice_cyclone_sys::{dds_create_participant, lattice_topic};
 use lattice_msgs::{dds_type_name, hash_of};
 use smol::channel::{Receiver, Sender, unbounded};
 
-use super::blob;
 use super::discovery::Discovery;
 use super::domain::Domain;
 use super::endpoint::{Description, Side};
@@ -78,7 +76,9 @@ impl Cyclone {
     fn topic(&self, name: &str, dds_type: &str) -> Result<Entity, String> {
         let text = |text: &str| CString::new(text).map_err(|_| "a name has a zero byte".to_owned());
         let (name, dds_type) = (text(name)?, text(dds_type)?);
-        blob::topic(&self.participant, &name, &dds_type)
+        let parent = self.participant.handle();
+        // SAFETY: a handle, and strings that end with 0 and are copied.
+        explained(|| unsafe { lattice_topic(parent, name.as_ptr(), dds_type.as_ptr()) })
     }
 
     /// Topic, QoS and description of an endpoint to be made.
@@ -144,16 +144,8 @@ impl Transport for Cyclone {
         self.events.clone().boxed()
     }
 
-    fn writers_known(&self) -> Result<BoxFuture<'static, ()>, RuntimeError> {
-        Ok(Box::pin(std::future::ready(())))
-    }
-
     fn strangers(&self) -> usize {
         self.discovery.strangers()
-    }
-
-    fn pairs_own_endpoints(&self) -> bool {
-        false
     }
 }
 

@@ -3,14 +3,13 @@
 use std::ffi::CString;
 use std::ptr;
 
-use cyclors::{
-    dds_create_qos, dds_delete_qos, dds_durability_kind_DDS_DURABILITY_TRANSIENT_LOCAL,
-    dds_durability_kind_DDS_DURABILITY_VOLATILE, dds_free, dds_history_kind_DDS_HISTORY_KEEP_LAST,
-    dds_ignorelocal_kind_DDS_IGNORELOCAL_PARTICIPANT, dds_qget_durability, dds_qget_reliability,
+use lattice_cyclone_sys::{
+    DDS_DURABILITY_TRANSIENT_LOCAL, DDS_DURABILITY_VOLATILE, DDS_HISTORY_KEEP_LAST,
+    DDS_IGNORELOCAL_PARTICIPANT, DDS_RELIABILITY_BEST_EFFORT, DDS_RELIABILITY_RELIABLE,
+    dds_create_qos, dds_delete_qos, dds_free, dds_qget_durability, dds_qget_reliability,
     dds_qget_userdata, dds_qos_t, dds_qset_durability, dds_qset_durability_service,
     dds_qset_history, dds_qset_ignorelocal, dds_qset_prop, dds_qset_reliability, dds_qset_userdata,
-    dds_qset_writer_data_lifecycle, dds_reliability_kind_DDS_RELIABILITY_BEST_EFFORT,
-    dds_reliability_kind_DDS_RELIABILITY_RELIABLE,
+    dds_qset_writer_data_lifecycle,
 };
 
 use crate::qos::{Durability, Qos, Reliability};
@@ -46,14 +45,14 @@ impl NativeQos {
     pub(super) fn of_endpoint(qos: &Qos, user_data: &str) -> Self {
         let count = |samples: usize| i32::try_from(samples).unwrap_or(i32::MAX).max(1);
         let (depth, kept) = (count(qos.depth), count(qos.kept()));
-        let keep_last = dds_history_kind_DDS_HISTORY_KEEP_LAST;
+        let keep_last = DDS_HISTORY_KEEP_LAST;
         let reliability = match qos.reliability {
-            Reliability::BestEffort => dds_reliability_kind_DDS_RELIABILITY_BEST_EFFORT,
-            Reliability::Reliable => dds_reliability_kind_DDS_RELIABILITY_RELIABLE,
+            Reliability::BestEffort => DDS_RELIABILITY_BEST_EFFORT,
+            Reliability::Reliable => DDS_RELIABILITY_RELIABLE,
         };
         let durability = match qos.durability {
-            Durability::Volatile => dds_durability_kind_DDS_DURABILITY_VOLATILE,
-            Durability::TransientLocal => dds_durability_kind_DDS_DURABILITY_TRANSIENT_LOCAL,
+            Durability::Volatile => DDS_DURABILITY_VOLATILE,
+            Durability::TransientLocal => DDS_DURABILITY_TRANSIENT_LOCAL,
         };
         let native = Self::new();
         native.set_user_data(user_data);
@@ -66,7 +65,7 @@ impl NativeQos {
             let (samples, instances, each) = (UNLIMITED, UNLIMITED, UNLIMITED);
             dds_qset_durability_service(native.0, 0, keep_last, kept, samples, instances, each);
             dds_qset_writer_data_lifecycle(native.0, false);
-            dds_qset_ignorelocal(native.0, dds_ignorelocal_kind_DDS_IGNORELOCAL_PARTICIPANT);
+            dds_qset_ignorelocal(native.0, DDS_IGNORELOCAL_PARTICIPANT);
         }
         native
     }
@@ -122,11 +121,11 @@ pub(super) unsafe fn announced(qos: *const dds_qos_t) -> Option<(Reliability, Du
         dds_qget_reliability(qos, &mut reliability, &mut blocking_ns)
             && dds_qget_durability(qos, &mut durability)
     };
-    let reliability = match reliability == dds_reliability_kind_DDS_RELIABILITY_RELIABLE {
+    let reliability = match reliability == DDS_RELIABILITY_RELIABLE {
         true => Reliability::Reliable,
         false => Reliability::BestEffort,
     };
-    let durability = match durability == dds_durability_kind_DDS_DURABILITY_VOLATILE {
+    let durability = match durability == DDS_DURABILITY_VOLATILE {
         true => Durability::Volatile,
         false => Durability::TransientLocal,
     };

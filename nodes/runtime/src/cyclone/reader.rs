@@ -4,10 +4,11 @@ use std::ptr;
 use std::sync::{Arc, Mutex, MutexGuard};
 use std::task::{Context, Poll};
 
-use cyclors::{dds_create_reader, dds_get_sample_lost_status, dds_sample_lost_status_t};
+use lattice_cyclone_sys::{
+    dds_create_reader, dds_get_sample_lost_status, dds_sample_lost_status_t,
+};
 use smol::channel::Sender;
 
-use super::arrivals::Arrival;
 use super::endpoint::{Description, Endpoint};
 use super::entity::{Entity, check};
 use super::log::explained;
@@ -53,17 +54,22 @@ impl CycloneReader {
     }
 
     fn try_take(&self) -> Option<Result<Origin, String>> {
-        let Arrival { sample, writer } = self.endpoint.arrivals().pop()?;
-        let (bytes, max) = (sample.len(), self.max_bytes);
-        if bytes > max {
+        let taken = self.endpoint.arrivals().pop()?;
+        let (bytes, max) = (taken.bytes(), self.max_bytes);
+        if bytes.len() > max {
+            let bytes = bytes.len();
             let words = format!("{bytes} bytes are more than max_message_bytes = {max}");
             return Some(Err(words));
         }
-        sample.copy_into(&mut lock(&self.buffer));
-        let writer = self.endpoint.writer(&self.reader, writer);
+        let mut buffer = lock(&self.buffer);
+        buffer.clear();
+        buffer.extend_from_slice(bytes);
         Some(Ok(Origin {
-            sample: SampleId { writer, number: 0 },
-            related: None,
+            sample: SampleId {
+                writer: self.endpoint.writer(&self.reader, taken.writer()),
+                number: taken.number(),
+            },
+            related: taken.related(),
         }))
     }
 }
@@ -87,10 +93,7 @@ impl SampleReader for CycloneReader {
     }
 
     fn missed(&self) -> u64 {
-        let mut status = dds_sample_lost_status_t {
-            total_count: 0,
-            total_count_change: 0,
-        };
+        let mut status = dds_sample_lost_status_t::default();
         // SAFETY: writes to `status`.
         let code = unsafe { dds_get_sample_lost_status(self.reader.handle(), &mut status) };
         let lost = check(code).map_or(0, |_| status.total_count_change);

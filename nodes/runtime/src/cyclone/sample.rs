@@ -1,100 +1,66 @@
-//! Samples in Cyclone's serialised form.
+//! Samples as Cyclone holds them.
 
-use std::ptr::{self, NonNull};
+use std::mem::MaybeUninit;
+use std::slice;
 
-use cyclors::{
-    ddsi_serdata, ddsi_serdata_from_ser_iov, ddsi_serdata_kind_SDK_DATA, ddsi_serdata_size,
-    ddsi_serdata_to_ser_ref, ddsi_serdata_to_ser_unref, ddsi_serdata_unref, ddsi_sertype, iovec,
+use lattice_cyclone_sys::{
+    dds_entity_t, dds_instance_handle_t, lattice_identity, lattice_release, lattice_sample,
+    lattice_take,
 };
 
-use crate::port::ENCAPSULATION_BYTES;
+use super::entity::check;
+use crate::port::{EndpointId, SampleId};
 
-/// Samples on the wire are multiples of this, bytes. Cyclone reads so far also where a sample ends before.
-const WORD_BYTES: usize = 4;
-
-/// A reference to a serialised sample, encapsulation header first.
-pub(super) struct Serialised(NonNull<ddsi_serdata>);
+/// A sample that was taken out of a reader.
+pub(super) struct Taken(lattice_sample);
 
 // SAFETY: Cyclone counts references atomically and never changes a sample that is made.
-unsafe impl Send for Serialised {}
+unsafe impl Send for Taken {}
 
-impl Serialised {
-    /// A copy of the body of a little-endian CDR sample, padded with zeros. None: longer than Cyclone
-    /// takes.
-    ///
-    /// # Safety
-    ///
-    /// `sertype` is that of an entity that lives during the call.
-    pub(super) unsafe fn from_body(sertype: *const ddsi_sertype, body: &[u8]) -> Option<Self> {
-        let padding = body.len().wrapping_neg() % WORD_BYTES;
-        let zeros = [0; WORD_BYTES];
-        let zeros = zeros.get(..padding)?;
-        // Little-endian CDR; the last two bits of the options count the padding (XTypes 1.3, 7.6.3.1.2).
-        let header: [u8; ENCAPSULATION_BYTES] = [0, 1, 0, u8::try_from(padding).ok()?];
-        let bytes = ENCAPSULATION_BYTES.checked_add(body.len())?;
-        let bytes = bytes.checked_add(padding)?;
-        if i32::try_from(bytes).is_err() {
-            return None;
-        }
-        let part = |part: &[u8]| iovec {
-            iov_base: part.as_ptr().cast_mut().cast(),
-            iov_len: part.len(),
-        };
-        let parts = [part(&header), part(body), part(zeros)];
-        // SAFETY: the caller says that `sertype` is alive; the parts are read, `bytes` in all, and copied.
-        let made = unsafe {
-            let (count, first) = (parts.len(), parts.as_ptr());
-            ddsi_serdata_from_ser_iov(sertype, ddsi_serdata_kind_SDK_DATA, count, first, bytes)
-        };
-        NonNull::new(made).map(Self)
+impl Taken {
+    /// Its bytes, encapsulation header first.
+    pub(super) fn bytes(&self) -> &[u8] {
+        // SAFETY: `self` holds a reference to the sample, which has so many bytes there.
+        unsafe { slice::from_raw_parts(self.0.bytes, self.0.length) }
     }
 
-    /// Takes over a reference.
-    ///
-    /// # Safety
-    ///
-    /// Null, or a reference to a sample of a blob topic that nobody else gives back.
-    pub(super) unsafe fn from_raw(sample: *mut ddsi_serdata) -> Option<Self> {
-        NonNull::new(sample).map(Self)
+    /// Handle of its writer.
+    pub(super) fn writer(&self) -> dds_instance_handle_t {
+        self.0.writer
     }
 
-    /// The reference, which the caller gives back.
-    pub(super) fn into_raw(self) -> *mut ddsi_serdata {
-        let raw = self.0.as_ptr();
-        std::mem::forget(self);
-        raw
+    /// The number that its writer gave it; 0 where that is not known.
+    pub(super) fn number(&self) -> i64 {
+        self.0.number
     }
 
-    /// Length with the header.
-    pub(super) fn len(&self) -> usize {
-        // SAFETY: `self` holds a reference.
-        unsafe { ddsi_serdata_size(self.0.as_ptr()) as usize }
-    }
-
-    /// Copies the sample, header first, into a buffer that is used again.
-    pub(super) fn copy_into(&self, buffer: &mut Vec<u8>) {
-        buffer.clear();
-        let mut place = iovec {
-            iov_base: ptr::null_mut(),
-            iov_len: 0,
-        };
-        // SAFETY: `self` holds a reference; the place that is given lies in the sample, is as long as
-        // it says, and stays until it is given back, once.
-        unsafe {
-            let sample = self.0.as_ptr();
-            let kept = ddsi_serdata_to_ser_ref(sample, 0, self.len(), &mut place);
-            if !place.iov_base.is_null() {
-                let bytes = std::slice::from_raw_parts(place.iov_base.cast(), place.iov_len);
-                buffer.extend_from_slice(bytes);
-            }
-            ddsi_serdata_to_ser_unref(kept, &place);
-        }
+    /// The request that it answers, where the sender said so.
+    pub(super) fn related(&self) -> Option<SampleId> {
+        let lattice_identity { guid, number } = self.0.related;
+        let writer = EndpointId(guid);
+        (self.0.has_related).then_some(SampleId { writer, number })
     }
 }
 
-impl Drop for Serialised {
+impl Drop for Taken {
     fn drop(&mut self) {
         // SAFETY: gives back the reference that `self` holds, once.
-        unsafe { ddsi_serdata_unref(self.0.as_ptr()) };
+        unsafe { lattice_release(self.0.blob) };
+    }
+}
+
+/// The next sample of a reader.
+pub(super) fn take(reader: dds_entity_t) -> Option<Taken> {
+    let mut sample = MaybeUninit::uninit();
+    // SAFETY: room for one sample.
+    match check(unsafe { lattice_take(reader, sample.as_mut_ptr()) }) {
+        Ok(0) => None,
+        // SAFETY: one was taken, and the reference is ours.
+        Ok(_) => Some(Taken(unsafe { sample.assume_init() })),
+        Err(words) => {
+            // Only a reader that is gone fails; there will be no more samples.
+            log::debug!("Cyclone DDS: {words}");
+            None
+        }
     }
 }

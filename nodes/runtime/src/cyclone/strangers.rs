@@ -7,7 +7,7 @@ use std::ptr;
 use std::sync::Mutex;
 use std::time::{Duration, Instant};
 
-use cyclors::{
+use lattice_cyclone_sys::{
     DDS_BUILTIN_TOPIC_DCPSPARTICIPANT, dds_builtintopic_participant_t, dds_create_reader, dds_free,
     dds_qget_prop,
 };

@@ -4,18 +4,17 @@ use std::ptr;
 use std::sync::Arc;
 use std::time::Duration;
 
-use cyclors::{
-    DDS_RETCODE_TIMEOUT, dds_create_writer, dds_entity_t, dds_get_entity_sertype,
-    dds_wait_for_acks, dds_writecdr, ddsi_sertype,
-};
 use futures::future::BoxFuture;
+use lattice_cyclone_sys::{
+    DDS_RETCODE_TIMEOUT, dds_create_writer, dds_entity_t, dds_wait_for_acks, lattice_identity,
+    lattice_write,
+};
 use smol::channel::Sender;
 
 use super::endpoint::{Description, Endpoint};
 use super::entity::{Entity, check};
 use super::log::explained;
 use super::qos::NativeQos;
-use super::sample::Serialised;
 use crate::port::{Bytes, EndpointId, PortEvent, SampleId, SampleWriter, WriteRefusal};
 
 /// Time between two looks at a full send window, unless all readers acknowledge before.
@@ -52,19 +51,18 @@ impl CycloneWriter {
         &self.endpoint
     }
 
-    fn try_write(&self, body: &[u8]) -> Result<(), WriteRefusal> {
-        let mut sertype: *const ddsi_sertype = ptr::null();
-        // SAFETY: writes a pointer to `sertype`.
-        let code = unsafe { dds_get_entity_sertype(self.writer.handle(), &mut sertype) };
-        let _ = check(code).map_err(WriteRefusal::Failed)?;
-        // SAFETY: the type is that of our writer, which is alive.
-        let sample = unsafe { Serialised::from_body(sertype, body) };
-        let sample = sample.ok_or_else(|| {
-            let bytes = body.len();
-            WriteRefusal::Failed(format!("{bytes} bytes are more than a sample can have"))
-        })?;
-        // SAFETY: Cyclone gives the reference back, also when it fails.
-        match unsafe { dds_writecdr(self.writer.handle(), sample.into_raw()) } {
+    fn try_write(&self, body: &[u8], related: Option<SampleId>) -> Result<(), WriteRefusal> {
+        let identity = related.map(|SampleId { writer, number }| lattice_identity {
+            guid: writer.0,
+            number,
+        });
+        let identity = identity.as_ref().map_or(ptr::null(), ptr::from_ref);
+        // SAFETY: so many bytes, and an identity or null, are read during the call.
+        let code = unsafe {
+            let (bytes, count) = (body.as_ptr(), body.len());
+            lattice_write(self.writer.handle(), bytes, count, identity)
+        };
+        match code {
             DDS_RETCODE_TIMEOUT => Err(WriteRefusal::Full),
             code => check(code).map(drop).map_err(WriteRefusal::Failed),
         }
@@ -80,14 +78,9 @@ impl SampleWriter for CycloneWriter {
         &self,
         body: Bytes,
         related: Option<SampleId>,
-        _may_wait: bool,
     ) -> BoxFuture<'_, Result<(), WriteRefusal>> {
         Box::pin(async move {
-            if related.is_some() {
-                let words = "Cyclone DDS cannot say which request a sample answers";
-                return Err(WriteRefusal::Failed(words.to_owned()));
-            }
-            let written = self.try_write(&body);
+            let written = self.try_write(&body, related);
             if matches!(written, Err(WriteRefusal::Full)) {
                 let writer = self.writer.handle();
                 let _ = smol::unblock(move || wait_for_acks(writer, PATIENCE)).await;

@@ -15,19 +15,16 @@ use env_logger::Logger;
 use file::LogFile;
 use layout::Layout;
 use levels::{Console, Shown};
-use log::{Level, Log, Metadata, Record, SetLoggerError};
+use log::{Log, Metadata, Record, SetLoggerError};
 use plan::Plan;
 use std::{
     cell::Cell,
     sync::{Arc, Mutex, OnceLock},
-    time::{Duration, SystemTime, UNIX_EPOCH},
+    time::{SystemTime, UNIX_EPOCH},
 };
 
 /// Takes every record that passes the log level; the text is the name of the node it is from.
 pub type Sink = Box<dyn Fn(&Record<'_>, &str) + Send + Sync>;
-
-/// Between two errors of RustDDS that are shown.
-const RUSTDDS_PERIOD: Duration = Duration::from_secs(2);
 
 static SINK: OnceLock<Sink> = OnceLock::new();
 
@@ -62,7 +59,6 @@ pub fn init(args: &RosArgs, node_name: &str) -> Result<(), SetLoggerError> {
         layout,
         file,
         node_name: node_name.to_owned(),
-        rustdds: Throttle::new(RUSTDDS_PERIOD),
     };
     log::set_boxed_logger(Box::new(logger))?;
     log::set_max_level(level);
@@ -85,7 +81,6 @@ struct Tee {
     layout: Arc<Layout>,
     file: Option<LogFile>,
     node_name: String,
-    rustdds: Throttle,
 }
 
 impl Log for Tee {
@@ -95,7 +90,7 @@ impl Log for Tee {
 
     fn log(&self, record: &Record<'_>) {
         let console = self.console();
-        if !console.matches(record) || self.is_flood(&console, record) {
+        if !console.matches(record) {
             return;
         }
         if self.to_console {
@@ -122,24 +117,6 @@ impl Tee {
     fn console(&self) -> Arc<Logger> {
         Arc::clone(&lock(&self.console))
     }
-
-    /// True for an error of RustDDS soon after another, unless its warnings are asked for too.
-    fn is_flood(&self, console: &Logger, record: &Record<'_>) -> bool {
-        let target = record.target();
-        let warning = Metadata::builder()
-            .level(Level::Warn)
-            .target(target)
-            .build();
-        if !target.starts_with(plan::RUSTDDS) || console.enabled(&warning) {
-            return false;
-        }
-        match self.rustdds.check() {
-            Some(more @ 1..) => log::warn!("{more} more errors of {}", plan::RUSTDDS),
-            Some(0) => {}
-            None => return true,
-        }
-        false
-    }
 }
 
 fn now_ns() -> u128 {
@@ -161,12 +138,13 @@ fn source<'a>(target: &'a str, node_name: &'a str) -> &'a str {
 mod tests {
     use super::*;
     use env_logger::Builder;
+    use log::Level;
 
     #[test]
     fn records_are_named_after_their_node() {
         assert_eq!(source("lattice_nodes::runtime", "front"), "front");
         assert_eq!(source("lattice_nodes", "front"), "front");
-        assert_eq!(source("rustdds::network", "front"), "front");
+        assert_eq!(source("polling::epoll", "front"), "front");
         assert_eq!(source("lattice_mapper", "front"), "lattice_mapper");
     }
 
@@ -174,10 +152,7 @@ mod tests {
     fn the_sink_gets_what_passes_and_not_its_own_messages() {
         static TEE: OnceLock<Tee> = OnceLock::new();
         static HEARD: Mutex<Vec<String>> = Mutex::new(Vec::new());
-        let console = Builder::new()
-            .filter_level(log::LevelFilter::Info)
-            .filter_module("rustdds", log::LevelFilter::Error)
-            .build();
+        let console = Builder::new().filter_level(log::LevelFilter::Info).build();
         let directory = tempfile::tempdir().unwrap();
         let folder = directory.path().display().to_string();
         let place = |name: &str| (name == "ROS_LOG_DIR").then(|| folder.clone());
@@ -187,7 +162,6 @@ mod tests {
             layout: Arc::new(Layout::new(&|_| None)),
             file: Some(LogFile::open(Some("front"), place).unwrap()),
             node_name: "front".to_owned(),
-            rustdds: Throttle::new(RUSTDDS_PERIOD),
         });
         let heard = |record: &Record<'_>, node: &str| {
             let line = format!("{node}: {}", record.args());
@@ -203,12 +177,6 @@ mod tests {
         send(log, Level::Info, format_args!("one"));
         send(log, Level::Debug, format_args!("two"));
         send(log, Level::Warn, format_args!("three"));
-        let error = Record::builder()
-            .level(Level::Error)
-            .target("rustdds::discovery")
-            .build();
-        assert!(!log.is_flood(&log.console(), &error));
-        assert!(log.is_flood(&log.console(), &error), "the second at once");
         let written = std::fs::read_dir(directory.path()).unwrap().next().unwrap();
         let written = std::fs::read_to_string(written.unwrap().path()).unwrap();
         assert_eq!(written.lines().count(), 4, "{written}");

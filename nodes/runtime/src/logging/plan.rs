@@ -8,20 +8,7 @@ use log::LevelFilter;
 const OURS: &str = "lattice_";
 /// Libraries whose chatter would hide ours: silent unless named by `--log-level` or `RUST_LOG`, and
 /// warnings only with `--log-level debug`.
-const CHATTY: [&str; 6] = [
-    "ros2_client",
-    "mio",
-    "polling",
-    "async_io",
-    "async_std",
-    "cdr_encoding",
-];
-
-/// RustDDS warns of every datagram on loopback; its errors are shown, a few at a time.
-pub(super) const RUSTDDS: &str = "rustdds";
-
-/// Its only error is that a socket cannot leave a group of which it is no member, at every end.
-const RUSTDDS_LISTENER: &str = "rustdds::network::udp_listener";
+const CHATTY: [&str; 2] = ["polling", "async_io"];
 
 /// Settings of the console log, from the arguments and the environment.
 #[derive(Debug, PartialEq, Eq)]
@@ -117,15 +104,12 @@ fn targets(
 
 /// Levels of libraries where ours is `level`.
 fn libraries(level: LevelFilter) -> impl Iterator<Item = (Option<String>, LevelFilter)> {
-    let (chatty_level, rustdds) = match level {
-        LevelFilter::Debug | LevelFilter::Trace => (LevelFilter::Warn, LevelFilter::Warn),
-        level => (LevelFilter::Off, level.min(LevelFilter::Error)),
+    let chatty_level = match level {
+        LevelFilter::Debug | LevelFilter::Trace => LevelFilter::Warn,
+        _ => LevelFilter::Off,
     };
-    let chatty = CHATTY.map(|name| (name, chatty_level));
-    let all = chatty
-        .into_iter()
-        .chain([(RUSTDDS, rustdds), (RUSTDDS_LISTENER, chatty_level)]);
-    all.map(|(name, level)| (Some(name.to_owned()), level))
+    let all = CHATTY.into_iter();
+    all.map(move |name| (Some(name.to_owned()), chatty_level))
 }
 
 #[cfg(test)]
@@ -158,21 +142,16 @@ mod tests {
         for (rules, level, target, shown) in [
             ("", Info, "lattice_nodes::runtime", true),
             ("", Debug, "lattice_nodes::runtime", false),
-            ("", Error, "rustdds::rtps", true),
-            ("", Error, "rustdds::network::udp_listener", false),
-            ("", Warn, "rustdds::network", false),
-            ("", Error, "mio::poll", false),
-            ("warn", Error, "rustdds", true),
-            ("debug", Warn, "rustdds::network", true),
-            ("debug", Info, "rustdds", false),
-            ("fatal", Warn, "rustdds", false),
+            ("", Error, "polling::epoll", false),
+            ("debug", Warn, "polling::epoll", true),
+            ("debug", Info, "polling::epoll", false),
             ("warn debug", Debug, "lattice_nodes", true),
             ("debug warn", Info, "lattice_nodes", false),
             ("warn unset", Info, "lattice_nodes", true),
             ("mapper:=debug", Debug, "lattice_nodes::mapper", true),
             ("robot.mapper:=debug", Debug, "mapper", true),
             ("other:=debug", Debug, "lattice_nodes::mapper", false),
-            ("rustdds:=debug", Debug, "rustdds::network", true),
+            ("polling:=debug", Debug, "polling::epoll", true),
         ] {
             let found = shows(&plan(rules, ("", "")), level, target);
             assert_eq!(found, shown, "{rules}: {level} of {target}");

@@ -291,7 +291,7 @@ impl Shared {
                 }
                 WhenFull::Drop => PATIENCE.saturating_sub(start.elapsed()),
             };
-            let write = writer.write(body.clone(), related, may_wait);
+            let write = writer.write(body.clone(), related);
             let result = match select(write, Timer::after(left)).await {
                 Either::Left((result, _)) => result,
                 Either::Right(_) if may_wait => {
@@ -358,12 +358,7 @@ mod tests {
             EndpointId([7; 16])
         }
 
-        fn write(
-            &self,
-            _: Bytes,
-            _: Option<SampleId>,
-            _: bool,
-        ) -> BoxFuture<'_, Result<(), WriteRefusal>> {
+        fn write(&self, _: Bytes, _: Option<SampleId>) -> BoxFuture<'_, Result<(), WriteRefusal>> {
             Box::pin(smol::future::pending())
         }
 

@@ -19,7 +19,6 @@ use crate::outbox::Outbox;
 use crate::peers::Peers;
 use crate::port::{EndpointId, Origin, SampleReader};
 use crate::qos::Qos;
-use crate::subscription::Gaps;
 
 /// A client may ask before its reply reader is known here; a reply sent then would be lost.
 const WAIT_FOR_CLIENT: Duration = Duration::from_secs(1);
@@ -67,7 +66,6 @@ impl Serving {
     ) {
         let mut pending = FuturesUnordered::new();
         let mut ended = None;
-        let mut gaps = Gaps::default();
         while ended.is_none() || !pending.is_empty() {
             let takes = ended.is_none() && pending.len() < self.max_pending;
             let take = async {
@@ -93,7 +91,7 @@ impl Serving {
             };
             let outcome = match or(end, or(answered, take)).await {
                 Step::Take(sample) => {
-                    self.count_lost(&sample, &mut gaps);
+                    self.count_lost();
                     self.ask::<S>(sample, &mut handler)
                         .map(|asked| pending.push(self.answer(asked)))
                 }
@@ -125,12 +123,9 @@ impl Serving {
         }
     }
 
-    /// Counts the requests between this one of a client and the one before.
-    fn count_lost(&self, sample: &Result<Origin, String>, gaps: &mut Gaps) {
-        let gap = sample
-            .as_ref()
-            .map_or(0, |origin| gaps.before(origin.sample));
-        let lost = gap.saturating_add(self.requests.missed());
+    /// Counts the requests that were lost since the last one.
+    fn count_lost(&self) {
+        let lost = self.requests.missed();
         if lost > 0 {
             self.unanswered.lost.fetch_add(lost, Relaxed);
             self.warn(&format!(

@@ -3,11 +3,9 @@
 //! rmw_fastrtps sends the bare message and names the request in the inline QoS (the "Enhanced" mapping
 //! of DDS-RPC 1.0); rmw_cyclonedds puts a header of 16 bytes in front of it.
 
+use crate::port::{Bytes, ENCAPSULATION_BYTES, EndpointId, Origin, SampleId};
 use lattice_msgs::RosMessage;
 use lattice_msgs::cdr::{self, CdrError};
-use thiserror::Error;
-
-use crate::port::{Bytes, ENCAPSULATION_BYTES, EndpointId, Origin, SampleId};
 
 /// First two bytes of the GUIDs of a vendor.
 const CYCLONE_VENDOR: [u8; 2] = [0x01, 0x10];
@@ -43,40 +41,17 @@ enum Mapping {
     Cyclone,
 }
 
-/// Reason why a request is not read.
-#[derive(Debug, Error)]
-pub(crate) enum RequestError {
-    /// It is no message of its type.
-    #[error(transparent)]
-    Cdr(#[from] CdrError),
-    /// The transport does not show the number that the answer must name.
-    #[error(
-        "clients over Fast DDS cannot be answered over Cyclone DDS, which does not show the numbers of \
-         their requests; RMW_IMPLEMENTATION=rustdds answers both"
-    )]
-    Numberless,
-}
-
 /// Reads a request, its encapsulation header first. The error is that of the likelier mapping.
 pub(crate) fn read_request<Q: RosMessage>(
     bytes: &[u8],
     origin: &Origin,
-) -> Result<(Q, ReplyTo), RequestError> {
-    if origin.sample.number <= 0 && origin.related.is_none() {
-        // The transport does not show numbers: only the form that carries its own can be answered.
-        return match origin.sample.writer.vendor() {
-            CYCLONE_VENDOR | RUSTDDS_VENDOR | [SECURED..=0xff, _] => {
-                Ok(read_as(bytes, origin, Mapping::Cyclone)?)
-            }
-            _ => Err(RequestError::Numberless),
-        };
-    }
+) -> Result<(Q, ReplyTo), CdrError> {
     let (first, second) = match likely_mapping(bytes, origin) {
         Mapping::Enhanced => (Mapping::Enhanced, Mapping::Cyclone),
         Mapping::Cyclone => (Mapping::Cyclone, Mapping::Enhanced),
     };
     let read = read_as(bytes, origin, first);
-    Ok(read.or_else(|error| read_as(bytes, origin, second).map_err(|_| error))?)
+    read.or_else(|error| read_as(bytes, origin, second).map_err(|_| error))
 }
 
 /// The body of a reply, and what the inline QoS has to say.
@@ -139,8 +114,7 @@ pub(crate) fn write_request(
     if !encapsulation.starts_with(&[0, 1]) {
         return None;
     }
-    // Only RustDDS can say what such a server answers to.
-    if (writer.vendor(), server.vendor()) == (RUSTDDS_VENDOR, FASTDDS_VENDOR) {
+    if server.vendor() == FASTDDS_VENDOR {
         let identity = identity_there(server, number);
         let writer = EndpointId(identity);
         return Some(Asked {
@@ -190,6 +164,8 @@ fn likely_mapping(bytes: &[u8], origin: &Origin) -> Mapping {
         RUSTDDS_VENDOR if is_ours => Mapping::Cyclone,
         // ros2-client speaks both; only with the header does it name the request in a client.
         RUSTDDS_VENDOR if origin.related.is_some() => Mapping::Cyclone,
+        // Clients over Fast DDS always name what to answer to.
+        [SECURED..=0xff, _] if origin.related.is_none() => Mapping::Cyclone,
         _ => Mapping::Enhanced,
     }
 }
@@ -324,17 +300,16 @@ mod tests {
     }
 
     #[test]
-    fn without_numbers_only_requests_that_carry_their_own_are_read() {
-        let bytes = [&[0, 1, 0, 0][..], &[3; 16], &[1]].concat();
-        let read = |vendor| {
-            let mut origin = origin(vendor, None);
-            origin.sample.number = 0;
-            read_request::<SetBoolRequest>(&bytes, &origin)
-        };
-        for vendor in [CYCLONE_VENDOR, RUSTDDS_VENDOR, [0x9c, 0x0f]] {
-            assert_eq!(read(vendor).unwrap().1, ReplyTo::Cyclone([3; 16]));
-        }
-        assert!(read([0x01, 0x0f]).is_err());
+    fn requests_of_secured_clients_have_a_header_unless_they_name_what_to_answer_to() {
+        let secured = [0x9c, 0x0f];
+        let headed = [&[0, 1, 0, 0][..], &[3; 16], &[1]].concat();
+        let read = read_request::<SetBoolRequest>(&headed, &origin(secured, None));
+        assert_eq!(read.unwrap().1, ReplyTo::Cyclone([3; 16]));
+        let (writer, number) = (EndpointId([9; 16]), 4);
+        let related = SampleId { writer, number };
+        let bare = [0, 1, 0, 0, 1];
+        let read = read_request::<SetBoolRequest>(&bare, &origin(secured, Some(related)));
+        assert_eq!(read.unwrap().1, ReplyTo::Enhanced(related));
     }
 
     #[test]

@@ -1,9 +1,8 @@
 //! The graph of all nodes, of which other participants publish their parts.
 
-use std::sync::{Arc, Weak};
+use std::sync::Arc;
 
 use super::Shared;
-use super::readers::begin_wait;
 use crate::endpoints::Endpoints;
 use crate::graph::{TOPIC, gid_bytes};
 use crate::neighbours::GraphEndpoint;
@@ -24,30 +23,17 @@ impl Shared {
         if let Some(open) = lock(&self.open).as_mut()
             && open.graph_of_others.is_none()
         {
-            let shared = Arc::downgrade(self);
-            open.graph_of_others = self.io.spawn(async move {
-                if let Some((reader, endpoints)) = reader(shared).await {
-                    listen(reader, endpoints).await;
+            open.graph_of_others = match open.transport.reader(TOPIC, &PARTS, MAX_PART_BYTES) {
+                Ok(reader) => self.io.spawn(listen(reader, Arc::clone(&self.endpoints))),
+                Err(error) => {
+                    log::warn!("nodes elsewhere have no names: {error}");
+                    None
                 }
-            });
+            };
         }
         let mut all = self.graph.all();
         all.extend(self.endpoints.neighbours.all());
         all
-    }
-}
-
-/// A reader that does not meet the writer of this process.
-async fn reader(shared: Weak<Shared>) -> Option<(Box<dyn SampleReader>, Arc<Endpoints>)> {
-    let (_, wait) = begin_wait(&shared)?;
-    wait.await;
-    let shared = shared.upgrade()?;
-    match shared.reader(TOPIC, &PARTS, MAX_PART_BYTES) {
-        Ok(reader) => Some((reader, Arc::clone(&shared.endpoints))),
-        Err(error) => {
-            log::warn!("nodes elsewhere have no names: {error}");
-            None
-        }
     }
 }
 

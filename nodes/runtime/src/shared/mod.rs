@@ -3,31 +3,25 @@
 mod calling;
 mod listening;
 mod publishing;
-mod readers;
 mod serving;
 mod status;
 mod subscribing;
 
 use std::collections::BTreeMap;
-use std::sync::atomic::{AtomicI64, AtomicU64, Ordering::Relaxed};
+use std::sync::atomic::{AtomicI64, Ordering::Relaxed};
 use std::sync::{Arc, Mutex, Weak};
 use std::thread::JoinHandle;
 use std::time::{Duration, Instant};
 
-use futures::future::BoxFuture;
 use lattice_msgs::rosgraph_msgs;
 use smol::Task;
 use smol::channel::Sender;
 
 pub use self::calling::{CallError, Client};
 use self::status::ReceiveBuffer;
-#[cfg(feature = "cyclone")]
 use super::cyclone::Cyclone;
-use super::dds::Dds;
 use super::diagnostics::Tasks;
 use super::endpoints::Endpoints;
-#[cfg(not(feature = "cyclone"))]
-use super::env::EnvError;
 use super::env::{Network, TransportKind};
 use super::error::RuntimeError;
 use super::graph::{self, Graph, NodeId};
@@ -40,7 +34,7 @@ use super::remote::RemotePublisher;
 use super::security::Enclave;
 use super::service::{Answers, LocalServices, Server, Unanswered};
 use super::shutdown::Shutdown;
-use super::subscription::{Command, Intake, Load, Sample, Stats, Subscription};
+use super::subscription::{Intake, Load, Sample, Stats, Subscription};
 use super::sync::{lock, wait_for};
 use super::task_thread::TaskThread;
 
@@ -72,9 +66,6 @@ pub(crate) struct Shared {
     services: LocalServices,
     endpoints: Arc<Endpoints>,
     pub graph: Arc<Graph>,
-    /// Held while a writer is made, or a reader that a writer must not meet.
-    writer_order: Mutex<()>,
-    writers_made: AtomicU64,
     open: Mutex<Option<Open>>,
 }
 
@@ -96,11 +87,10 @@ impl Shared {
         let shutdown = Shutdown::default();
         let io = TaskThread::start("io", shutdown.clone())?;
         let publishing = TaskThread::start("publisher", shutdown.clone())?;
-        let transport = join(network, enclave, &shutdown)?;
+        let transport = join(network, enclave)?;
         let endpoints = Arc::new(Endpoints::default());
         let graph = Graph::new();
-        let renewed = Arc::clone(&graph);
-        let watch = Arc::clone(&endpoints).watch(transport.events(), move || renewed.note_change());
+        let watch = Arc::clone(&endpoints).watch(transport.events());
         let watch = io.spawn(watch);
         let shared = Arc::new(Self {
             bus: LocalBus::default(),
@@ -115,8 +105,6 @@ impl Shared {
             services: LocalServices::default(),
             endpoints,
             graph,
-            writer_order: Mutex::default(),
-            writers_made: AtomicU64::new(0),
             open: Mutex::new(Some(Open {
                 transport,
                 _watch: watch,
@@ -228,35 +216,16 @@ impl Shared {
         all.filter_map(Weak::upgrade).collect()
     }
 
-    /// True if readers must be closed while a writer of their topic is made.
-    fn pairs_own_endpoints(&self) -> bool {
-        let open = lock(&self.open);
-        open.as_ref()
-            .is_some_and(|open| open.transport.pairs_own_endpoints())
-    }
-
-    /// Number of times that the participant was made anew.
-    pub(crate) fn renewals(&self) -> u64 {
-        let open = lock(&self.open);
-        open.as_ref().map_or(0, |open| open.transport.renewals())
-    }
-
     /// Participants that security keeps out.
     fn strangers(&self) -> usize {
         let open = lock(&self.open);
         open.as_ref().map_or(0, |open| open.transport.strangers())
     }
 
-    /// A wait for discovery to know all writers made so far. `None` after shutdown.
-    fn writers_known(&self) -> Option<BoxFuture<'static, ()>> {
-        let open = lock(&self.open);
-        open.as_ref()?.transport.writers_known().ok()
-    }
-
     /// Gives handlers the messages that wait in this process. Not from a thread of the runtime.
     pub(crate) fn work_off(&self, deadline: Instant) {
         let orders: Vec<_> = (self.intakes().into_iter())
-            .filter_map(|intake| Some((intake.order(Command::WorkOff)?, intake)))
+            .filter_map(|intake| Some((intake.work_off()?, intake)))
             .collect();
         for (order, intake) in orders {
             if !wait_for(&order, deadline) {
@@ -301,20 +270,9 @@ impl Shared {
 }
 
 /// The participant of the process, over the transport that the environment names.
-fn join(
-    network: &Network,
-    #[cfg_attr(not(feature = "cyclone"), expect(unused_variables))] enclave: &Enclave,
-    shutdown: &Shutdown,
-) -> Result<Arc<dyn Transport>, RuntimeError> {
+fn join(network: &Network, enclave: &Enclave) -> Result<Arc<dyn Transport>, RuntimeError> {
     match network.transport {
-        TransportKind::RustDds => {
-            let (domain, localhost_only) = (network.domain_id, network.localhost_only);
-            Ok(Arc::new(Dds::join(domain, localhost_only, shutdown)?))
-        }
-        #[cfg(feature = "cyclone")]
-        TransportKind::Cyclone => Ok(Arc::new(Cyclone::join(network, enclave)?)),
-        #[cfg(not(feature = "cyclone"))]
-        TransportKind::Cyclone => Err(EnvError::not_built_in("rmw_cyclonedds_cpp").into()),
+        TransportKind::Dds => Ok(Arc::new(Cyclone::join(network, enclave)?)),
     }
 }
 

@@ -70,8 +70,7 @@ impl Shared {
             ros_type,
             type_hash,
         };
-        let make = || self.outbox(port_topic, qos, when_full);
-        let writer = self.with_readers_closed(topic, make)?;
+        let writer = self.outbox(port_topic, qos, when_full)?;
         let id = writer.id();
         let parts = Arc::new(PublisherParts {
             writer,

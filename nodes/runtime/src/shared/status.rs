@@ -4,9 +4,11 @@ use std::sync::atomic::Ordering::Relaxed;
 
 use lattice_msgs::diagnostic_msgs::DiagnosticStatus;
 
+use socket2::{Domain, Socket, Type};
+
 use super::Shared;
-use crate::dds::effective_receive_buffer;
 use crate::diagnostics::{Level, status};
+use crate::port::RECEIVE_BUFFER_BYTES;
 use crate::sync::lock;
 
 /// Below this, bursts of large messages are lost; twice the largest message is needed.
@@ -21,7 +23,7 @@ pub(crate) struct ReceiveBuffer {
 impl ReceiveBuffer {
     pub(crate) fn probe() -> Self {
         Self {
-            bytes: effective_receive_buffer(),
+            bytes: granted_receive_buffer(RECEIVE_BUFFER_BYTES),
         }
     }
 
@@ -39,6 +41,14 @@ impl ReceiveBuffer {
             );
         }
     }
+}
+
+/// Receive buffer in bytes that the kernel grants a socket which asks for so many. `None`: not known.
+fn granted_receive_buffer(bytes: usize) -> Option<usize> {
+    let socket = Socket::new(Domain::IPV4, Type::DGRAM, None).ok()?;
+    // The kernel grants what it may without an error.
+    socket.set_recv_buffer_size(bytes).ok()?;
+    socket.recv_buffer_size().ok()
 }
 
 const QOS: &str = "QoS does not match";
@@ -62,10 +72,6 @@ impl Shared {
         let bytes = bytes.map_or_else(|| "unknown".to_owned(), |bytes| bytes.to_string());
         let mut values = vec![
             ("socket_receive_buffer_bytes".to_owned(), bytes),
-            (
-                "participant_renewals".to_owned(),
-                self.renewals().to_string(),
-            ),
             (
                 "participants_kept_out".to_owned(),
                 self.strangers().to_string(),

@@ -2,8 +2,8 @@
 
 use std::any::Any;
 use std::convert::Infallible;
-use std::sync::atomic::{AtomicBool, AtomicU64};
-use std::sync::{Arc, Mutex};
+use std::sync::Arc;
+use std::sync::atomic::AtomicU64;
 
 use lattice_msgs::RosMessage;
 use smol::channel::{Sender, bounded, unbounded};
@@ -12,7 +12,9 @@ use super::{Shared, closed};
 use crate::error::RuntimeError;
 use crate::graph::NodeId;
 use crate::local_bus::{AnyMessage, LocalEndpoint, Topic};
+use crate::names;
 use crate::peers::Peers;
+use crate::port::{EndpointKind, PortTopic};
 use crate::qos::{Durability, Qos};
 use crate::subscription::{
     Intake, Load, Running, Sample, Source, Stats, Subscription, spawn_reader,
@@ -93,21 +95,27 @@ impl Shared {
         let (place, lost) = (self.bus.topic(topic), Arc::clone(&stats.lost));
         let latched = qos.durability == Durability::TransientLocal;
         let place = join(&place, &peers, sender.clone(), lost, latched)?;
-        let (commands, orders) = unbounded();
+        let dds_name = names::dds_topic(topic);
+        let port_topic = PortTopic {
+            name: topic,
+            dds_name: &dds_name,
+            ros_type: type_name,
+            type_hash: None,
+        };
+        let reader = self.reader(port_topic, qos, max_bytes)?;
+        let id = reader.id();
+        let (orders, given) = unbounded();
         let intake = Arc::new(Intake {
-            node,
             topic: topic.to_owned(),
             type_name: type_name.to_owned(),
-            qos: *qos,
-            max_bytes,
-            peers,
+            peers: Arc::clone(&peers),
             stats: Arc::clone(&stats),
-            commands,
-            is_open: AtomicBool::new(false),
-            graph: Mutex::default(),
+            orders,
+            _graph: (self.graph).join(node, EndpointKind::Reader, (id, &dds_name)),
         });
         let source = Source {
-            commands: orders,
+            reader,
+            orders: given,
             local,
             _local: place,
             _sender: sender,
@@ -131,7 +139,7 @@ impl Shared {
             open.intakes.retain(|intake| intake.strong_count() > 0);
             open.intakes.push(Arc::downgrade(&intake));
         }
-        self.open_intake(&intake)?;
+        self.endpoints.register(id, &peers);
         Ok(Subscription {
             intake,
             _running: running,

@@ -3,8 +3,8 @@
 mod intake;
 mod source;
 
-pub(crate) use intake::{Command, Intake};
-pub(crate) use source::{Gaps, Source};
+pub(crate) use intake::Intake;
+pub(crate) use source::Source;
 
 use std::convert::Infallible;
 use std::sync::atomic::{AtomicU64, Ordering::Relaxed};
@@ -54,7 +54,7 @@ pub(crate) struct Stats {
     peers: Arc<Peers>,
     received: AtomicU64,
     pub undecodable: AtomicU64,
-    /// Messages that gave way to newer ones, or that a writer numbered and we never saw.
+    /// Messages that gave way to newer ones, or that were sent and never came.
     pub lost: Arc<AtomicU64>,
     warning: Throttle,
 }
@@ -86,7 +86,7 @@ impl Subscription {
         self.stats().peers.on_joined(Box::new(callback));
     }
 
-    /// Messages that were sent and did not get here: gaps in the numbers of a publisher.
+    /// Messages that were sent and did not get here, or gave way to newer ones.
     pub fn lost(&self) -> u64 {
         self.stats().lost.load(Relaxed)
     }

@@ -13,7 +13,7 @@ use std::sync::mpsc::channel;
 
 use lattice_msgs::std_msgs::String as RosString;
 use lattice_nodes::executables;
-use lattice_runtime::env::{Network, TransportKind};
+use lattice_runtime::env::Network;
 use lattice_runtime::ros_args::RosArgs;
 use lattice_runtime::security::{self, Security};
 use lattice_runtime::{Load, Runtime, RuntimeError, lock};
@@ -44,7 +44,6 @@ fn runtime(
     security: Option<Security>,
 ) -> Result<Runtime, RuntimeError> {
     let network = Network {
-        transport: TransportKind::Cyclone,
         security,
         ..domain.transport()
     };

@@ -131,7 +131,7 @@ macro_rules! wait_for_match {
 
 mod delivery;
 mod process;
-mod renewal;
+mod stalled;
 
 /// Waits until `reached` is true, asked on a timer of the runtime.
 fn wait_until(runtime: &Runtime, mut reached: impl FnMut() -> bool + Send + 'static) {

@@ -185,12 +185,12 @@ pub const RULES: &[(&str, &str, Rule)] = &[
     (
         "docs/security.md",
         "export",
-        NotHere("needs --features security; .ci/cyclone"),
+        NotHere("needs --features security; .ci/dds"),
     ),
     (
         "docs/security.md",
         "lattice node",
-        NotHere("needs --features security; .ci/cyclone"),
+        NotHere("needs --features security; .ci/dds"),
     ),
     ("docs/security.md", "xml=", Script),
     ("docs/tables.md", "lattice run", Serves("", "the map is at")),

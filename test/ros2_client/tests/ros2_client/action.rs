@@ -15,7 +15,7 @@ use ros2_client::action_msgs::{CancelGoalResponseEnum, GoalStatusEnum};
 use ros2_client::builtin_interfaces::Time;
 use ros2_client::{ActionClient, ActionTypeName, Name, Node, ServiceMapping};
 
-use super::client::{Foreign, PATIENCE, insist, mappings, peer, reliable};
+use super::client::{Foreign, MAPPINGS, PATIENCE, insist, peer, reliable};
 
 const LIMITS: ActionLimits = ActionLimits {
     max_live: 2,
@@ -131,7 +131,7 @@ async fn talk(peer: &Node, client: &Client, goals: &Goals) {
 
 #[test]
 fn goals_go_their_way_with_clients_of_both_rmw() {
-    for &mapping in mappings() {
+    for &mapping in &MAPPINGS {
         let domain = TestDomain::take();
         let args = RosArgs::parse(["--ros-args".to_owned()]).unwrap();
         let runtime = Runtime::with_transport("mapper", args, &domain.transport()).unwrap();

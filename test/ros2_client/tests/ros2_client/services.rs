@@ -15,11 +15,11 @@ use lattice_runtime::qos::Qos;
 use lattice_runtime::ros_args::RosArgs;
 use lattice_runtime::{Load, Runtime};
 use lattice_test::domain::TestDomain;
+use lattice_test::peer::{Nodes, params};
 use ros2_client::qos::History;
 use ros2_client::{Message, Name, Node, NodeEvent, ServiceMapping, ServiceTypeName};
 
-use super::client::{Foreign, PATIENCE, insist, mappings, peer, reliable};
-use super::peer::{Nodes, params};
+use super::client::{Foreign, MAPPINGS, PATIENCE, insist, peer, reliable};
 
 const TRIGGER: (&str, &str) = ("std_srvs", "Trigger");
 
@@ -58,7 +58,7 @@ fn clients_of_octomap_server_are_answered() {
     let domain = TestDomain::take();
     let mapper = ("lattice_mapper", params("octomap_services:=true"));
     let nodes = Nodes::start(&domain, &[mapper]);
-    for mapping in mappings() {
+    for mapping in &MAPPINGS {
         let mut peer = peer(&domain);
         for service in ["clear_bbox", "clear_bbx"] {
             let (name, of) = (
@@ -90,7 +90,7 @@ fn a_trigger_answers_clients_of_both_rmw() {
         })
         .unwrap();
     assert_eq!(server.name(), "/mapper/reset");
-    for (i, &mapping) in mappings().iter().enumerate() {
+    for (i, &mapping) in MAPPINGS.iter().enumerate() {
         // Two clients of one participant would see each other's replies.
         let mut peer = peer(&domain);
         let request = Foreign(TriggerRequest::default());
@@ -122,13 +122,7 @@ fn an_answer_given_at_the_end_reaches_its_client() {
     let mut peer = peer(&domain);
     let client = std::thread::spawn(move || {
         let request = Foreign(TriggerRequest::default());
-        call(
-            &mut peer,
-            mappings()[0],
-            "/mapper/save_map",
-            TRIGGER,
-            request,
-        )
+        call(&mut peer, MAPPINGS[0], "/mapper/save_map", TRIGGER, request)
     });
     let saved = TriggerResponse {
         success: true,
@@ -184,7 +178,7 @@ fn answered_and_lost(requests: usize) -> (usize, usize) {
     let qos = || reliable().history(History::KeepLast { depth });
     let client = peer
         .create_client::<Foreign<TriggerRequest>, Foreign<TriggerResponse>>(
-            mappings()[0],
+            MAPPINGS[0],
             &name,
             &type_name,
             qos(),
@@ -239,7 +233,7 @@ fn parameters_are_served_to_clients_of_both_rmw() {
     let domain = TestDomain::take();
     let runtime = runtime(&domain, &["--ros-args", "-p", "max_message_bytes:=5000"]);
     let type_name = ("rcl_interfaces", "GetParameters");
-    for &mapping in mappings() {
+    for &mapping in &MAPPINGS {
         let mut peer = peer(&domain);
         let request = Foreign(GetParametersRequest {
             names: vec!["max_message_bytes".to_owned(), "none".to_owned()],

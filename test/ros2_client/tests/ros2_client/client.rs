@@ -2,7 +2,6 @@
 
 use std::time::Duration;
 
-use lattice_runtime::env::{Network, TransportKind};
 use lattice_test::domain::TestDomain;
 use ros2_client::qos::WhenFull;
 use ros2_client::{Context, Message, Node, NodeName, NodeOptions, QosProfile, ServiceMapping};
@@ -40,13 +39,8 @@ pub fn reliable() -> QosProfile {
     QosProfile::publisher_default().reliability_reliable(WhenFull::Fail)
 }
 
-/// Forms of requests that the transport under test can answer.
-pub fn mappings() -> &'static [ServiceMapping] {
-    match Network::from_env().unwrap().transport {
-        TransportKind::RustDds => &[ServiceMapping::Enhanced, ServiceMapping::Cyclone],
-        TransportKind::Cyclone => &[ServiceMapping::Cyclone],
-    }
-}
+/// Forms of requests.
+pub const MAPPINGS: [ServiceMapping; 2] = [ServiceMapping::Enhanced, ServiceMapping::Cyclone];
 
 /// Repeats a call until it is answered. The first sample of a RustDDS writer is history to a volatile
 /// reader of Cyclone, since its heartbeat comes after it.

@@ -7,9 +7,10 @@ use lattice_nodes::executables;
 use lattice_nodes::start::Finish;
 use lattice_runtime::Runtime;
 use lattice_runtime::ros_args::RosArgs;
-use lattice_test::domain::TestDomain;
-use lattice_test::python::script;
 use serde_json::Value;
+
+use crate::domain::TestDomain;
+use crate::python::script;
 
 /// Nodes at work, in the order in which data flows.
 pub struct Nodes(Vec<(Runtime, Finish)>);
@@ -28,6 +29,7 @@ impl Nodes {
         Self(nodes.iter().map(start).collect())
     }
 
+    /// Ends them, the first one first.
     pub fn finish(self) {
         for (runtime, finish) in self.0 {
             finish();

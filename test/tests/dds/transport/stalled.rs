@@ -1,4 +1,4 @@
-//! Processes that are stopped for a while, as by Ctrl-Z or a debugger.
+//! A peer that was stopped for longer than its lease, as by Ctrl-Z or a debugger.
 
 use std::process::Command;
 use std::sync::mpsc::channel;
@@ -7,25 +7,12 @@ use std::time::{Duration, Instant};
 
 use lattice_msgs::std_msgs::String as RosString;
 use lattice_runtime::Load;
-use lattice_runtime::env::{Network, TransportKind};
 use lattice_runtime::qos::Qos;
 use lattice_test::domain::TestDomain;
 use lattice_test::python::{python, script};
 
 use super::{PATIENCE, assert_heard, hear, runtime, text, wait_until};
 use crate::conformance::Echo;
-
-#[test]
-fn a_process_that_was_stopped_hears_and_is_heard_again() {
-    if Network::from_env().unwrap().transport != TransportKind::RustDds {
-        // Cyclone's participant goes on, and nobody joins again.
-        return;
-    }
-    // Long enough for every thread of it to be interrupted.
-    let transport = ("rustdds", TransportKind::RustDds);
-    let start = |domain: &TestDomain| Echo::start(domain, transport);
-    stop_and_go(start, Duration::from_secs(1));
-}
 
 #[test]
 fn a_cyclone_peer_that_stalled_beyond_its_lease_hears_and_is_heard_again() {

@@ -1,0 +1,202 @@
+//! Compiles the files of Cyclone DDS in `sources.sha256`, with the changes below, and `c/blob.c`.
+
+use std::env;
+use std::error::Error;
+use std::fs;
+use std::path::{Path, PathBuf};
+
+use sha2::{Digest, Sha256};
+
+/// Digests of the files that are compiled or included, in the form of `sha256sum`.
+const SOURCES: &str = include_str!("sources.sha256");
+
+/// A change of a copy of one file: pieces of it, each of which stands there once, and what takes their place.
+struct Change {
+    file: &'static str,
+    pieces: &'static [(&'static str, &'static str)],
+}
+
+const CHANGES: [Change; 4] = [
+    // A reply names its request in the inline QoS, which is where clients over Fast DDS look for it.
+    Change {
+        file: "core/ddsi/src/ddsi_transmit.c",
+        pieces: &[
+            (
+                "  if (ddsi_xmsg_addpar_sentinel_ifparam (*pmsg) > 0)",
+                "  lattice_blob_add_inline_qos (*pmsg, serdata);\n  if (ddsi_xmsg_addpar_sentinel_ifparam (*pmsg) > 0)",
+            ),
+            (
+                "    rc = ddsi_xmsg_addpar_sentinel_ifparam (*pmsg);",
+                "    lattice_blob_add_inline_qos (*pmsg, serdata);\n    rc = ddsi_xmsg_addpar_sentinel_ifparam (*pmsg);",
+            ),
+        ],
+    },
+    // A request that overtakes discovery is no history, whatever the vendor of its writer.
+    Change {
+        file: "core/ddsi/src/ddsi_endpoint_match.c",
+        pieces: &[(
+            "    else if (ddsi_vendor_is_eclipse (pwr->c.vendor))\n",
+            "    else if (ddsi_vendor_is_eclipse (pwr->c.vendor) || lattice_is_of_service (pwr->c.xqos))\n",
+        )],
+    },
+    // Fast DDS answers a reader that asks where its writer stands at once only if it asks for number 0.
+    Change {
+        file: "core/ddsi/src/ddsi_acknack.c",
+        pieces: &[(
+            "  an->readerSNState.bitmap_base = ddsi_to_seqno (1);",
+            "  an->readerSNState.bitmap_base = ddsi_to_seqno (lattice_first_asked_for (pwr->c.vendor.id));",
+        )],
+    },
+    // Freed before its last use: mended in 11.0.1 in the same way.
+    Change {
+        file: "core/ddsi/src/ddsi_wraddrset.c",
+        pieces: &[
+            (
+                "    costmap_free (wm);\n    cover_free (covered);\n",
+                "    costmap_free (wm);\n",
+            ),
+            (
+                "    ddsrt_free (chosen);\n  }\n",
+                "    ddsrt_free (chosen);\n    cover_free (covered);\n  }\n",
+            ),
+        ],
+    },
+];
+
+/// Folders of headers, and those that security adds.
+const INCLUDES: [&str; 9] = [
+    "core/cdr/include",
+    "core/ddsi/include",
+    "core/ddsi/src",
+    "core/ddsc/include",
+    "core/ddsc/src",
+    "ddsrt/include",
+    "ddsrt/src",
+    "security/api/include",
+    "security/core/include",
+];
+const SECURITY_INCLUDES: [&str; 5] = [
+    "security/openssl/include",
+    "security/builtin_plugins/include",
+    "security/builtin_plugins/access_control/src",
+    "security/builtin_plugins/authentication/src",
+    "security/builtin_plugins/cryptographic/src",
+];
+
+/// The plugins of security, which are linked in, and the functions that are looked up in them by name.
+const PLUGINS: [(&str, &str); 4] = [
+    (
+        "PLUGINS",
+        "dds_security_ac,dds_security_auth,dds_security_crypto",
+    ),
+    (
+        "PLUGIN_SYMBOLS_dds_security_ac",
+        "init_access_control,finalize_access_control",
+    ),
+    (
+        "PLUGIN_SYMBOLS_dds_security_auth",
+        "init_authentication,finalize_authentication",
+    ),
+    (
+        "PLUGIN_SYMBOLS_dds_security_crypto",
+        "init_crypto,finalize_crypto",
+    ),
+];
+
+fn main() -> Result<(), Box<dyn Error>> {
+    for file in ["build.rs", "sources.sha256", "c"] {
+        println!("cargo::rerun-if-changed={file}");
+    }
+    let root = cyclonedds_src::source_dir().join("src");
+    let os = env::var("CARGO_CFG_TARGET_OS")?;
+    let security = env::var_os("CARGO_FEATURE_SECURITY").is_some();
+    let mut build = cc::Build::new();
+    // Whatever the profile: unoptimised it is too slow for a sensor, and nobody debugs it here.
+    build
+        .opt_level(2)
+        .debug(false)
+        .define("NDEBUG", None)
+        .std("gnu2x");
+    build.flag("-fvisibility=hidden").include("c");
+    for folder in INCLUDES {
+        build.include(root.join(folder));
+    }
+    if security {
+        build.define("LATTICE_DDS_SECURITY", None);
+        for folder in SECURITY_INCLUDES {
+            build.include(root.join(folder));
+        }
+        for (name, value) in PLUGINS {
+            build.define(name, value);
+        }
+    }
+    let mut cyclone = build.clone();
+    cyclone.warnings(false).flag("-w");
+    for line in SOURCES.lines() {
+        let (digest, file) = line
+            .split_once("  ")
+            .ok_or("sources.sha256: no digest and file")?;
+        let text = checked(&root.join(file), digest)?;
+        if file.ends_with(".c") && is_wanted(file, &os, security) {
+            cyclone.file(match CHANGES.iter().find(|change| change.file == file) {
+                Some(change) => changed(change, text)?,
+                None => root.join(file),
+            });
+        }
+    }
+    build
+        .warnings(true)
+        .warnings_into_errors(true)
+        .file("c/blob.c")
+        .try_compile("lattice_blob")?;
+    cyclone.try_compile("lattice_ddsc")?;
+    if security {
+        println!("cargo::rustc-link-lib=ssl");
+        println!("cargo::rustc-link-lib=crypto");
+    }
+    Ok(())
+}
+
+/// The bytes of a file; fails unless they are those that its digest is of.
+fn checked(path: &Path, digest: &str) -> Result<Vec<u8>, Box<dyn Error>> {
+    let text = fs::read(path).map_err(|error| format!("{}: {error}", path.display()))?;
+    let found: String = Sha256::digest(&text)
+        .iter()
+        .map(|byte| format!("{byte:02x}"))
+        .collect();
+    match found == digest {
+        true => Ok(text),
+        false => Err(format!(
+            "{} is another file than the one in sources.sha256",
+            path.display()
+        )
+        .into()),
+    }
+}
+
+/// True for a file that belongs to the parts that are built.
+fn is_wanted(file: &str, os: &str, security: bool) -> bool {
+    let of_security =
+        file.starts_with("security/") || file.starts_with("core/ddsi/src/ddsi_security_");
+    let of_macos = file.contains("/darwin/");
+    let of_others = file.contains("/netstat/linux/") || file.ends_with("time/posix/time.c");
+    match os {
+        "macos" => !of_others && (security || !of_security),
+        _ => !of_macos && (security || !of_security),
+    }
+}
+
+/// The path of a changed copy.
+fn changed(change: &Change, text: Vec<u8>) -> Result<PathBuf, Box<dyn Error>> {
+    let mut text = format!("#include \"blob.h\"\n{}", String::from_utf8(text)?);
+    for (from, to) in change.pieces {
+        if text.matches(from).count() != 1 {
+            return Err(format!("{}: not once {from:?}", change.file).into());
+        }
+        text = text.replace(from, to);
+    }
+    let folder = PathBuf::from(env::var_os("OUT_DIR").ok_or("no OUT_DIR")?);
+    let path = folder.join(change.file.replace('/', "_"));
+    fs::write(&path, text)?;
+    Ok(path)
+}

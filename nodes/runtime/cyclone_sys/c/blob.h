@@ -1,0 +1,53 @@
+/* Topics of serialised bytes under any type name, for the ROS 2 runtime. */
+#ifndef LATTICE_BLOB_H
+#define LATTICE_BLOB_H
+
+#include <stdbool.h>
+#include <stddef.h>
+#include <stdint.h>
+
+#include "dds/dds.h"
+
+struct ddsi_serdata;
+struct ddsi_xmsg;
+
+/* One sample among all: the GUID of its writer, or what the sender names in its place, and its number there. */
+struct lattice_identity {
+  uint8_t guid[16];
+  int64_t number;
+};
+
+/* A sample that was taken. Its bytes, encapsulation header first, live until lattice_release. */
+struct lattice_sample {
+  struct ddsi_serdata *blob;
+  const uint8_t *bytes;
+  size_t length;
+  dds_instance_handle_t writer;
+  int64_t number; /* 0: not known, as inside a process */
+  bool has_related;
+  struct lattice_identity related;
+};
+
+/* Makes a topic; a negative number is an error. */
+dds_entity_t lattice_topic (dds_entity_t participant, const char *name, const char *type_name);
+
+/* Writes the body of a little-endian CDR sample, and the request that it answers, if there is one. */
+dds_return_t lattice_write (dds_entity_t writer, const uint8_t *body, size_t length,
+                            const struct lattice_identity *related);
+
+/* Takes the next sample with data: 1, or 0 if there is none; a negative number is an error. */
+dds_return_t lattice_take (dds_entity_t reader, struct lattice_sample *sample);
+
+/* Gives back a sample. */
+void lattice_release (struct ddsi_serdata *blob);
+
+/* Called by Cyclone before the sentinel of the inline QoS of a message. */
+void lattice_blob_add_inline_qos (struct ddsi_xmsg *message, const struct ddsi_serdata *data);
+
+/* True for requests and replies of ROS 2. */
+bool lattice_is_of_service (const struct dds_qos *qos);
+
+/* The number that a reader asks a writer of a vendor for before it knows what there is. */
+uint64_t lattice_first_asked_for (const uint8_t vendor[2]);
+
+#endif
