@@ -8,8 +8,6 @@ use std::os::unix::fs::PermissionsExt;
 const DOMAINS: u16 = 101;
 
 /// A domain that no other replay or test on this machine uses while this lives, and that `ROS_DOMAIN_ID` does not name.
-///
-/// Without multicast RustDDS looks for the first twelve participants of a domain on loopback only.
 pub struct LoopbackDomain {
     id: u16,
     _lock: File,

@@ -6,6 +6,7 @@ mod conformance;
 mod cyclone;
 mod headset;
 mod losses;
+mod octomap;
 mod params;
 mod rclpy;
 mod rgbd;

@@ -29,10 +29,7 @@ const EDGES: [(&str, &str); 10] = [
         "lattice_test",
         "lattice_bag lattice_core lattice_lab lattice_msgs lattice_nodes lattice_runtime",
     ),
-    (
-        "lattice_test_ros2_client",
-        "lattice_msgs lattice_runtime lattice_test",
-    ),
+    ("lattice_test_ros2_client", "lattice_msgs lattice_runtime"),
 ];
 
 /// Crates that a robot's build is spared: bags, pictures, plots, meshes.

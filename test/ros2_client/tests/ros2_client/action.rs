@@ -9,13 +9,12 @@ use lattice_msgs::calibration::{
 };
 use lattice_runtime::ros_args::RosArgs;
 use lattice_runtime::{ActionLimits, GoalHandle, Runtime};
-use lattice_test::domain::TestDomain;
 use ros2_client::action::{ActionClientQosPolicies, GoalId};
 use ros2_client::action_msgs::{CancelGoalResponseEnum, GoalStatusEnum};
 use ros2_client::builtin_interfaces::Time;
 use ros2_client::{ActionClient, ActionTypeName, Name, Node, ServiceMapping};
 
-use super::client::{Foreign, MAPPINGS, PATIENCE, insist, peer, reliable};
+use super::client::{Domain, Foreign, MAPPINGS, PATIENCE, peer, reliable};
 
 const LIMITS: ActionLimits = ActionLimits {
     max_live: 2,
@@ -70,7 +69,7 @@ async fn talk(peer: &Node, client: &Client, goals: &Goals) {
     client.cancel_client().wait_for_service(peer).await;
     client.result_client().wait_for_service(peer).await;
 
-    let rejected = insist(async || client.async_send_goal(goal("rejected")).await.unwrap());
+    let rejected = async { client.async_send_goal(goal("rejected")).await.unwrap() };
     let (_, response) = rejected.await;
     assert!(!response.accepted);
 
@@ -95,7 +94,7 @@ async fn talk(peer: &Node, client: &Client, goals: &Goals) {
         smol::Timer::after(Duration::from_millis(100)).await;
         handle.succeed(result("found"));
     });
-    let ended = insist(async || client.async_request_result(id).await.unwrap());
+    let ended = async { client.async_request_result(id).await.unwrap() };
     let (status, found) = ended.await;
     assert_eq!(
         (status, &*found.0.message),
@@ -109,7 +108,7 @@ async fn talk(peer: &Node, client: &Client, goals: &Goals) {
     let (_, response) = client.async_send_goal(goal("a")).await.unwrap();
     assert!(!response.accepted, "at most {} at work", LIMITS.max_live);
     let cancel = async || client.async_cancel_goal(first, Time::ZERO).await.unwrap();
-    let answer = insist(cancel).await;
+    let answer = cancel().await;
     assert!(matches!(answer.return_code, CancelGoalResponseEnum::None));
     let ids: Vec<_> = answer.goals_canceling.iter().map(|g| g.goal_id).collect();
     assert!(ids == [first]);
@@ -132,9 +131,9 @@ async fn talk(peer: &Node, client: &Client, goals: &Goals) {
 #[test]
 fn goals_go_their_way_with_clients_of_both_rmw() {
     for &mapping in &MAPPINGS {
-        let domain = TestDomain::take();
+        let domain = Domain::take();
         let args = RosArgs::parse(["--ros-args".to_owned()]).unwrap();
-        let runtime = Runtime::with_transport("mapper", args, &domain.transport()).unwrap();
+        let runtime = Runtime::with_transport("mapper", args, &domain.network()).unwrap();
         let (sender, goals) = channel();
         let accept = move |goal: CalibrateGoal, handle| {
             let accepted = goal.session == "a";

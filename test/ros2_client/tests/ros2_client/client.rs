@@ -2,7 +2,8 @@
 
 use std::time::Duration;
 
-use lattice_test::domain::TestDomain;
+use lattice_runtime::LoopbackDomain;
+use lattice_runtime::env::Network;
 use ros2_client::qos::WhenFull;
 use ros2_client::{Context, Message, Node, NodeName, NodeOptions, QosProfile, ServiceMapping};
 use rustdds::DomainParticipantBuilder;
@@ -12,6 +13,23 @@ use serde::{Deserialize, Serialize};
 /// Long enough for a loaded machine; a test that passes does not wait for it.
 pub const PATIENCE: Duration = Duration::from_secs(60);
 
+/// A domain on loopback that no other test uses while this lives.
+pub struct Domain(LoopbackDomain);
+
+impl Domain {
+    pub fn take() -> Self {
+        Self(LoopbackDomain::take().unwrap())
+    }
+
+    pub fn network(&self) -> Network {
+        Network {
+            domain_id: self.0.id(),
+            localhost_only: true,
+            ..Network::from_env().unwrap()
+        }
+    }
+}
+
 /// Gives one of our messages to ros2-client.
 #[derive(Clone, Debug, Serialize, Deserialize)]
 #[serde(transparent)]
@@ -20,8 +38,8 @@ pub struct Foreign<M>(pub M);
 impl<M: Serialize + DeserializeOwned> Message for Foreign<M> {}
 
 /// A node of ros2-client with its spinner running.
-pub fn peer(domain: &TestDomain) -> Node {
-    let participant = DomainParticipantBuilder::new(domain.id())
+pub fn peer(domain: &Domain) -> Node {
+    let participant = DomainParticipantBuilder::new(domain.0.id())
         .with_only_networks([std::net::Ipv4Addr::LOCALHOST])
         .build()
         .unwrap();
@@ -41,17 +59,3 @@ pub fn reliable() -> QosProfile {
 
 /// Forms of requests.
 pub const MAPPINGS: [ServiceMapping; 2] = [ServiceMapping::Enhanced, ServiceMapping::Cyclone];
-
-/// Repeats a call until it is answered. The first sample of a RustDDS writer is history to a volatile
-/// reader of Cyclone, since its heartbeat comes after it.
-pub async fn insist<T>(call: impl AsyncFn() -> T) -> T {
-    loop {
-        let late = async {
-            smol::Timer::after(Duration::from_secs(2)).await;
-            None
-        };
-        if let Some(answer) = smol::future::or(async { Some(call().await) }, late).await {
-            return answer;
-        }
-    }
-}
