@@ -11,10 +11,11 @@ pub fn python() -> Option<PathBuf> {
     named("LATTICE_PYTHON", "requirements.txt")
 }
 
-/// The interpreter that `LATTICE_ROS_PYTHON` names, one with `test/python/requirements-ros.txt`
-/// installed, which has rclpy; else as [`python`].
-pub fn ros_python() -> Option<PathBuf> {
-    named("LATTICE_ROS_PYTHON", "requirements-ros.txt")
+/// The interpreters that `LATTICE_ROS_PYTHON` names, separated by colons: each has the rclpy of one distribution,
+/// such as `test/python/requirements-jazzy.txt` installs. None: as of [`python`].
+pub fn ros_pythons() -> Vec<PathBuf> {
+    let all = named("LATTICE_ROS_PYTHON", "requirements-jazzy.txt");
+    all.map_or_else(Vec::new, |all| std::env::split_paths(&all).collect())
 }
 
 fn named(variable: &str, requirements: &str) -> Option<PathBuf> {

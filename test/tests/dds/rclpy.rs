@@ -1,6 +1,7 @@
-//! Nodes of ours seen by ROS 2 Jazzy: rclpy over the Fast DDS that comes with it.
+//! Nodes of ours seen by ROS 2 Jazzy and Kilted: rclpy over the Fast DDS that comes with each.
 
 use std::fs;
+use std::path::Path;
 use std::time::Duration;
 
 use lattice_msgs::cdr;
@@ -10,7 +11,7 @@ use lattice_runtime::Runtime;
 use lattice_runtime::ros_args::RosArgs;
 use lattice_test::domain::TestDomain;
 use lattice_test::peer::{self, Nodes, params};
-use lattice_test::python::ros_python;
+use lattice_test::python::ros_pythons;
 use serde_json::{Value, json};
 
 const PATIENCE: Duration = Duration::from_secs(60);
@@ -37,7 +38,7 @@ fn answers(domain: &TestDomain) -> Vec<usize> {
     lengths
 }
 
-fn of_ros(python: &std::path::Path, scenario: &Value) -> Value {
+fn of_ros(python: &Path, scenario: &Value) -> Value {
     let directory = tempfile::tempdir().unwrap();
     let file = directory.path().join("scenario.json");
     fs::write(&file, scenario.to_string()).unwrap();
@@ -46,7 +47,13 @@ fn of_ros(python: &std::path::Path, scenario: &Value) -> Value {
 
 #[test]
 fn rclpy_reads_and_changes_a_node_and_answers_ours() {
-    let Some(python) = ros_python() else { return };
+    for python in ros_pythons() {
+        reads_changes_and_answers(&python);
+    }
+}
+
+fn reads_changes_and_answers(python: &Path) {
+    println!("{}", python.display());
     let domain = TestDomain::take();
     let directory = tempfile::tempdir().unwrap();
     let answered = directory.path().join("answered");
@@ -63,7 +70,7 @@ fn rclpy_reads_and_changes_a_node_and_answers_ours() {
     let mapper = params("map_dir:=/tmp");
     let nodes = Nodes::start(&domain, &[("lattice_mapper", mapper)]);
     let found = std::thread::scope(|scope| {
-        let found = scope.spawn(|| of_ros(&python, &scenario));
+        let found = scope.spawn(|| of_ros(python, &scenario));
         let lengths = answers(&domain);
         fs::write(&answered, "").unwrap();
         let expected = [[10; CALLS], [5000; CALLS]].concat();
