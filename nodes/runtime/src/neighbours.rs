@@ -80,16 +80,15 @@ impl Neighbours {
         known.nodes.retain(|id, _| !gone(id));
     }
 
-    /// Takes a message of `ros_discovery_info`, whose identities have 16 or 24 bytes. A participant speaks
-    /// for its own endpoints alone.
-    pub(crate) fn hear(&self, message: &[u8], gid_bytes: usize) -> Result<(), CdrError> {
-        match gid_bytes {
-            16 => self.keep(cdr::from_slice::<ParticipantEntitiesInfo<[u8; 16]>>(
-                message,
-            )?),
-            _ => self.keep(cdr::from_slice::<ParticipantEntitiesInfo<[u8; 24]>>(
-                message,
-            )?),
+    /// Takes a message of `ros_discovery_info`, whose identities have 24 bytes up to Humble and 16 since: of one
+    /// length it is none of the other. A participant speaks for its own endpoints alone.
+    pub(crate) fn hear(&self, message: &[u8]) -> Result<(), CdrError> {
+        match cdr::from_slice::<ParticipantEntitiesInfo<[u8; 16]>>(message) {
+            Ok(message) => self.keep(message),
+            Err(error) => match cdr::from_slice::<ParticipantEntitiesInfo<[u8; 24]>>(message) {
+                Ok(message) => self.keep(message),
+                Err(_) => return Err(error),
+            },
         }
         Ok(())
     }
@@ -137,6 +136,10 @@ mod tests {
     const WRITER: EndpointId = EndpointId([7; 16]);
 
     fn message(participant: u8, endpoint: [u8; 16]) -> Vec<u8> {
+        of_identities([participant; 16], endpoint)
+    }
+
+    fn of_identities<G: serde::Serialize>(participant: G, endpoint: G) -> Vec<u8> {
         let node = NodeEntitiesInfo {
             node_namespace: "/robot".to_owned(),
             node_name: "mapper".to_owned(),
@@ -144,7 +147,7 @@ mod tests {
             writer_gid_seq: vec![endpoint],
         };
         cdr::to_vec(&ParticipantEntitiesInfo {
-            gid: [participant; 16],
+            gid: participant,
             node_entities_info_seq: vec![node],
         })
         .unwrap()
@@ -155,17 +158,20 @@ mod tests {
         let all = Neighbours::default();
         all.add(WRITER, EndpointKind::Writer, "rt/map");
         assert_eq!(all.all()[0].node, "07".repeat(16));
-        all.hear(&message(9, WRITER.0), 16).unwrap();
+        all.hear(&message(9, WRITER.0)).unwrap();
         assert_eq!(all.all()[0].node, "07".repeat(16), "said by another");
-        all.hear(&message(7, WRITER.0), 16).unwrap();
+        all.hear(&message(7, WRITER.0)).unwrap();
         let expected = GraphEndpoint {
             role: GraphRole::Publisher,
             name: "/map".to_owned(),
             node: "/robot/mapper".to_owned(),
         };
-        assert_eq!(all.all(), [expected]);
-        all.hear(&message(7, [8; 16]), 16).unwrap();
+        assert_eq!(all.all(), [expected.clone()]);
+        all.hear(&message(7, [8; 16])).unwrap();
         assert_eq!(all.all()[0].node, "07".repeat(16), "no longer its own");
+        // As Humble says it.
+        all.hear(&of_identities([7_u8; 24], [7; 24])).unwrap();
+        assert_eq!(all.all(), [expected]);
         all.remove(|id| *id == WRITER);
         assert!(all.all().is_empty());
     }
@@ -175,7 +181,7 @@ mod tests {
         let all = Neighbours::default();
         let whole = message(7, WRITER.0);
         for length in 0..whole.len() {
-            assert!(all.hear(&whole[..length], 16).is_err(), "{length}");
+            assert!(all.hear(&whole[..length]).is_err(), "{length}");
         }
         for i in 0..=MAX_ENDPOINTS as u128 {
             all.add(EndpointId(i.to_le_bytes()), EndpointKind::Reader, "rt/a");

@@ -4,7 +4,7 @@ use std::sync::Arc;
 
 use super::Shared;
 use crate::endpoints::Endpoints;
-use crate::graph::{TOPIC, gid_bytes};
+use crate::graph::TOPIC;
 use crate::neighbours::GraphEndpoint;
 use crate::port::SampleReader;
 use crate::qos::Qos;
@@ -38,11 +38,10 @@ impl Shared {
 }
 
 async fn listen(reader: Box<dyn SampleReader>, endpoints: Arc<Endpoints>) {
-    let gid_bytes = gid_bytes();
     loop {
         let heard = match reader.next().await {
             Ok(_) => {
-                let heard = endpoints.neighbours.hear(&reader.bytes(), gid_bytes);
+                let heard = endpoints.neighbours.hear(&reader.bytes());
                 heard.map_err(|error| error.to_string())
             }
             Err(error) => Err(error),
