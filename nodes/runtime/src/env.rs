@@ -47,6 +47,8 @@ pub struct Network {
     pub domain_id: u16,
     /// True where nothing may leave this machine.
     pub localhost_only: bool,
+    /// True where no other process is to be found, and none finds this one.
+    pub discovery_off: bool,
     /// Addresses of machines where participants are looked for besides multicast.
     pub static_peers: Vec<String>,
     /// The DDS to use.
@@ -124,10 +126,19 @@ impl Network {
         }
         let mut notes = Vec::new();
         let transport = transport(get(IMPLEMENTATION), &mut notes)?;
-        let static_peers = static_peers(get(STATIC_PEERS), &mut warnings);
+        let discovery_off = range.as_deref() == Some("OFF") && !localhost_only;
+        let peers = get(STATIC_PEERS);
+        if discovery_off && peers.is_some() {
+            warnings.push(format!(
+                "{STATIC_PEERS} is ignored since {DISCOVERY_RANGE} is OFF"
+            ));
+        }
+        let peers = peers.filter(|_| !discovery_off);
+        let static_peers = static_peers(peers, &mut warnings);
         Ok(Network {
             domain_id,
             localhost_only: localhost_only || local_range,
+            discovery_off,
             static_peers,
             transport,
             security: Security::from_lookup(lookup),
@@ -246,6 +257,19 @@ mod tests {
         let error = read(&[(IMPLEMENTATION, "rmw_zenoh_cpp")]).unwrap_err();
         let words = "\"rmw_zenoh_cpp\" is not built in; possible are";
         assert!(error.to_string().contains(words), "{error}");
+    }
+
+    #[test]
+    fn off_is_off_whatever_peers_are_named() {
+        let off = (DISCOVERY_RANGE, "OFF");
+        let network = read(&[off, (STATIC_PEERS, "10.0.0.1")]).unwrap();
+        assert!(network.discovery_off && network.localhost_only);
+        assert_eq!((network.static_peers, network.warnings.len()), (vec![], 1));
+        assert!(
+            !read(&[(DISCOVERY_RANGE, "LOCALHOST")])
+                .unwrap()
+                .discovery_off
+        );
     }
 
     #[test]

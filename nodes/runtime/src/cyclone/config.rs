@@ -1,5 +1,8 @@
 //! Configuration of Cyclone from the settings of ROS, with what `CYCLONEDDS_URI` adds.
 
+use std::process;
+use std::time::{SystemTime, UNIX_EPOCH};
+
 use crate::env::Network;
 use crate::port::RECEIVE_BUFFER_BYTES;
 
@@ -17,22 +20,29 @@ const FIRST_QUESTION: &str = "1ms";
 
 /// The text for `dds_create_domain`: fragments separated by commas, of which the later ones win.
 pub(super) fn config(network: &Network, cyclonedds_uri: Option<&str>) -> String {
-    let (general, mut peers) = match network.localhost_only {
-        true => (
+    let general = match network.localhost_only {
+        true => {
             "<General><Interfaces><NetworkInterface address=\"127.0.0.1\" multicast=\"false\"/>\
-             </Interfaces><AllowMulticast>false</AllowMulticast></General>",
-            vec!["127.0.0.1"],
-        ),
-        false => ("", Vec::new()),
+             </Interfaces><AllowMulticast>false</AllowMulticast></General>"
+        }
+        false => "",
     };
-    peers.extend(network.static_peers.iter().map(String::as_str));
+    let mut peers: Vec<&str> = network.static_peers.iter().map(String::as_str).collect();
+    if network.localhost_only && !network.discovery_off {
+        peers.push("127.0.0.1");
+    }
     let peers: String = peers
         .iter()
         .map(|peer| format!("<Peer Address=\"{peer}\"/>"))
         .collect();
+    // Without an index the ports are any, and whoever comes upon them has another tag.
+    let (index, tag) = match network.discovery_off {
+        true => ("none", format!("<Tag>{}</Tag>", own_tag())),
+        false => ("auto", String::new()),
+    };
     let ours = format!(
         "<CycloneDDS><Domain id=\"any\">{general}<Discovery>\
-         <ParticipantIndex>auto</ParticipantIndex>\
+         <ParticipantIndex>{index}</ParticipantIndex>{tag}\
          <MaxAutoParticipantIndex>{}</MaxAutoParticipantIndex>\
          <SPDPInterval>{ANNOUNCEMENT_PERIOD}</SPDPInterval><Peers>{peers}</Peers></Discovery>\
          <Internal><PreEmptiveAckDelay>{FIRST_QUESTION}</PreEmptiveAckDelay>\
@@ -46,6 +56,13 @@ pub(super) fn config(network: &Network, cyclonedds_uri: Option<&str>) -> String 
     }
 }
 
+/// A tag of discovery that no other process has.
+fn own_tag() -> String {
+    let since_1970 = SystemTime::now().duration_since(UNIX_EPOCH);
+    let nanoseconds = since_1970.unwrap_or_default().as_nanos();
+    format!("lattice_{}_{nanoseconds}", process::id())
+}
+
 #[cfg(test)]
 mod tests {
     use super::*;
@@ -56,6 +73,7 @@ mod tests {
         let network = |localhost_only, static_peers: &[&str]| Network {
             domain_id: 0,
             localhost_only,
+            discovery_off: false,
             static_peers: static_peers.iter().map(ToString::to_string).collect(),
             transport: TransportKind::Dds,
             security: None,
@@ -67,5 +85,12 @@ mod tests {
         let subnet = config(&network(false, &["10.0.0.7"]), Some("file:///robot.xml"));
         assert!(!subnet.contains("127.0.0.1") && subnet.contains("Address=\"10.0.0.7\""));
         assert!(subnet.ends_with("</CycloneDDS>,file:///robot.xml"));
+        let off = Network {
+            discovery_off: true,
+            ..network(true, &[])
+        };
+        let off = config(&off, None);
+        assert!(off.contains("<ParticipantIndex>none<") && off.contains("<Tag>lattice_"));
+        assert!(!off.contains("<Peer "));
     }
 }

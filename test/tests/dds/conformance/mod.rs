@@ -3,6 +3,7 @@
 //! The ends are in processes of their own where one is killed or stopped: an [`Echo`] is this test program
 //! once more, as the test `echo`.
 
+mod apart;
 mod crowd;
 mod fastdds;
 mod matching;
@@ -58,14 +59,24 @@ pub struct Echo(pub Child);
 
 impl Echo {
     pub fn start(domain: &TestDomain, transport: Transport) -> Self {
+        Self::start_with(domain, transport, |_| {})
+    }
+
+    /// The same with a change of its command.
+    fn start_with(
+        domain: &TestDomain,
+        transport: Transport,
+        change: impl FnOnce(&mut Command),
+    ) -> Self {
         let program = std::env::current_exe().unwrap();
-        let child = Command::new(program)
+        let mut command = Command::new(program);
+        command
             .args(["--exact", "conformance::echo", "--ignored", "--nocapture"])
             .env(DOMAIN, domain.id().to_string())
             .env("RMW_IMPLEMENTATION", transport.0)
-            .stdout(Stdio::null())
-            .spawn();
-        Self(child.unwrap())
+            .stdout(Stdio::null());
+        change(&mut command);
+        Self(command.spawn().unwrap())
     }
 
     pub fn signal(&self, name: &str) {
@@ -121,7 +132,10 @@ struct Talk {
 
 impl Talk {
     fn start(domain: &TestDomain, transport: Transport) -> Self {
-        let runtime = runtime(domain, transport, "talk");
+        Self::with(runtime(domain, transport, "talk"))
+    }
+
+    fn with(runtime: Runtime) -> Self {
         let node = runtime.node("talk").unwrap();
         let publisher = node.publisher("/heard", QOS).unwrap();
         let (sender, heard) = channel();
