@@ -16,7 +16,7 @@ struct Change {
     pieces: &'static [(&'static str, &'static str)],
 }
 
-const CHANGES: [Change; 4] = [
+const CHANGES: [Change; 5] = [
     // A reply names its request in the inline QoS, which is where clients over Fast DDS look for it.
     Change {
         file: "core/ddsi/src/ddsi_transmit.c",
@@ -45,6 +45,14 @@ const CHANGES: [Change; 4] = [
         pieces: &[(
             "  an->readerSNState.bitmap_base = ddsi_to_seqno (1);",
             "  an->readerSNState.bitmap_base = ddsi_to_seqno (lattice_first_asked_for (pwr->c.vendor.id));",
+        )],
+    },
+    // Who forges participants fills no memory.
+    Change {
+        file: "core/ddsi/src/ddsi_discovery_spdp.c",
+        pieces: &[(
+            "    return (pgik_result == PGIKR_KNOWN_BUT_INTERESTING) ? HSR_INTERESTING : HSR_NOT_INTERESTING;\n",
+            "    return (pgik_result == PGIKR_KNOWN_BUT_INTERESTING) ? HSR_INTERESTING : HSR_NOT_INTERESTING;\n  if (lattice_is_crowded (gv))\n    return HSR_NOT_INTERESTING;\n",
         )],
     },
     // Freed before its last use: mended in 11.0.1 in the same way.

@@ -4,6 +4,7 @@
 //! once more, as the test `echo`.
 
 mod apart;
+mod attacks;
 mod crowd;
 mod fastdds;
 mod matching;
@@ -118,6 +119,9 @@ fn echo() {
     };
     let _heard = node
         .subscribe::<RosString>("/heard", QOS, Load::Small, say_again)
+        .unwrap();
+    let _served = node
+        .service_trigger("~/reset", || (true, String::new()))
         .unwrap();
     runtime.spin().unwrap();
 }
