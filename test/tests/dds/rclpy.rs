@@ -77,6 +77,7 @@ fn rclpy_reads_and_changes_a_node_and_answers_ours() {
     assert_eq!(values["lattice"], "fcc");
     assert_eq!(found["read_only"].as_object().unwrap().len(), values.len());
     assert_eq!(found["read_only"]["lattice"], true);
+    assert_eq!(found["not_loaded"], json!([]));
     let set = &found["set"];
     assert_eq!(set["max_cloud_points"], Value::Null);
     assert_eq!(
