@@ -15,6 +15,7 @@ os.environ["RMW_IMPLEMENTATION"] = "rmw_fastrtps_cpp"
 os.environ["ROS_AUTOMATIC_DISCOVERY_RANGE"] = "LOCALHOST"
 
 import rclpy
+import yaml
 from rcl_interfaces.msg import ParameterEvent
 from rcl_interfaces.srv import GetLoggerLevels
 from rclpy.node import Node
@@ -80,6 +81,20 @@ class Peer(Node):
         values = dict(zip(names, map(parameter_value_to_python, values)))
         return values, {one.name: one.read_only for one in described.descriptors}
 
+    def load(self, values, file):
+        """Loads values as `ros2 param dump` writes them; the reasons of those that are refused."""
+        tree = {}
+        for name, value in values.items():
+            *sections, last = name.split(".")
+            place = tree
+            for section in sections:
+                place = place.setdefault(section, {})
+            place[last] = value.tolist() if hasattr(value, "tolist") else value
+        file.write_text(yaml.dump({f"/{self.of}": {"ros__parameters": tree}}))
+        results = self.wait(self.client.load_parameter_file(str(file)), "load").results
+        assert len(results) == len(values)
+        return [one.reason for one in results if not one.successful]
+
 
 def main():
     faulthandler.dump_traceback_later(4 * PATIENCE_S, exit=True)
@@ -88,6 +103,7 @@ def main():
     peer = Peer(scenario["node"])
     said = {}
     said["values"], said["read_only"] = peer.parameters()
+    said["not_loaded"] = peer.load(said["values"], Path(sys.argv[1]).with_name("dump.yaml"))
     # A message that overtakes discovery is lost: it is not latched.
     peer.until(lambda: peer.set("max_cloud_points", 100) or peer.events, "no event")
     peer.events.clear()

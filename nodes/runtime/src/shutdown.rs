@@ -2,11 +2,12 @@
 
 use std::sync::atomic::{AtomicBool, Ordering};
 use std::sync::{Arc, LazyLock, Mutex};
-use std::time::Duration;
+use std::time::{Duration, Instant};
 
 use signal_hook::consts::{SIGINT, SIGTERM};
 use signal_hook::flag::register_conditional_default;
 use signal_hook::iterator::{Handle, Signals};
+use signal_hook::low_level::emulate_default_handler;
 
 use smol::Timer;
 use smol::future::{block_on, or};
@@ -29,6 +30,18 @@ struct Inner {
 struct State {
     requested: bool,
     failed: Option<&'static str>,
+    /// Files that are being written.
+    writing: usize,
+}
+
+/// A file that is being written, which a second signal does not interrupt while this lives.
+pub struct Writing(Shutdown);
+
+impl Drop for Writing {
+    fn drop(&mut self) {
+        let mut state = lock(&self.0.inner.state);
+        state.writing = state.writing.saturating_sub(1);
+    }
 }
 
 impl Shutdown {
@@ -62,6 +75,17 @@ impl Shutdown {
         self.inner.changed.until(check).await;
     }
 
+    /// Begins to write a file that a second signal is not to interrupt.
+    pub fn writing(&self) -> Writing {
+        let mut state = lock(&self.inner.state);
+        state.writing = state.writing.saturating_add(1);
+        Writing(self.clone())
+    }
+
+    fn is_writing(&self) -> bool {
+        lock(&self.inner.state).writing > 0
+    }
+
     /// Asks to end because a thread cannot go on.
     pub(crate) fn fail(&self, thread: &'static str) {
         lock(&self.inner.state).failed.get_or_insert(thread);
@@ -88,13 +112,53 @@ static AT_ONCE: LazyLock<Option<Arc<AtomicBool>>> = LazyLock::new(|| {
 
 const SIGNALS: [i32; 2] = [SIGINT, SIGTERM];
 
+/// Time after the first signal in which a second one is taken for the same: `ros2 launch` without a
+/// terminal sends two.
+const SAME_REQUEST: Duration = Duration::from_secs(3);
+
 fn set_at_once(value: bool) {
     if let Some(at_once) = AT_ONCE.as_ref() {
         at_once.store(value, Ordering::Relaxed);
     }
 }
 
-/// Turns SIGINT and SIGTERM into a request while it lives; a second signal ends the process at once.
+/// Signals that a watch has had.
+#[derive(Default)]
+struct Had {
+    first: Option<Instant>,
+    second: bool,
+}
+
+/// Effect of a signal.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+enum Effect {
+    /// The process is to end in good order.
+    Request,
+    /// None: it ends already.
+    Wait,
+    /// The process ends at once.
+    Kill,
+}
+
+impl Had {
+    fn take(&mut self, now: Instant, is_writing: bool) -> Effect {
+        let Some(first) = self.first else {
+            self.first = Some(now);
+            return Effect::Request;
+        };
+        let is_same = now.saturating_duration_since(first) < SAME_REQUEST;
+        match !self.second && (is_same || is_writing) {
+            true => {
+                self.second = true;
+                Effect::Wait
+            }
+            false => Effect::Kill,
+        }
+    }
+}
+
+/// Turns SIGINT and SIGTERM into a request while it lives. A third signal ends the process at once, and
+/// so does a second one that comes late and interrupts no [`Writing`].
 pub(crate) struct SignalWatch {
     handle: Handle,
     thread: Option<std::thread::JoinHandle<()>>,
@@ -109,10 +173,22 @@ impl SignalWatch {
         let thread = std::thread::Builder::new()
             .name("signals".to_owned())
             .spawn(move || {
+                let mut had = Had::default();
                 for signal in signals.forever() {
-                    log::info!("signal {signal}: shutting down");
-                    set_at_once(true);
-                    shutdown.request();
+                    // The log comes last: it may block.
+                    match had.take(Instant::now(), shutdown.is_writing()) {
+                        Effect::Request => {
+                            shutdown.request();
+                            log::info!("signal {signal}: shutting down");
+                        }
+                        Effect::Wait => {
+                            set_at_once(true);
+                            log::info!(
+                                "signal {signal}: shutting down already; the next one ends at once"
+                            );
+                        }
+                        Effect::Kill => drop(emulate_default_handler(signal)),
+                    }
                 }
             })?;
         *watches = watches.saturating_add(1);
@@ -140,6 +216,10 @@ impl Drop for SignalWatch {
 
 #[cfg(test)]
 mod tests {
+    use std::io::{BufRead, BufReader, Write};
+    use std::os::unix::process::ExitStatusExt;
+    use std::process::{Command, ExitStatus, Stdio};
+
     use super::*;
 
     #[test]
@@ -155,21 +235,105 @@ mod tests {
     }
 
     #[test]
+    fn a_second_signal_ends_nothing_if_it_is_soon_or_a_file_is_being_written() {
+        let start = Instant::now();
+        let after = |seconds| start + Duration::from_secs_f64(seconds);
+        let effects = |second: (f64, bool), third: (f64, bool)| {
+            let mut had = Had::default();
+            [(0.0, false), second, third].map(|(at, writing)| had.take(after(at), writing))
+        };
+        let [request, wait, kill] = [Effect::Request, Effect::Wait, Effect::Kill];
+        assert_eq!(effects((0.0, false), (0.0, true)), [request, wait, kill]);
+        assert_eq!(effects((2.9, false), (60.0, true)), [request, wait, kill]);
+        assert_eq!(effects((3.1, false), (3.1, false)), [request, kill, kill]);
+        assert_eq!(effects((9.0, true), (9.1, true)), [request, wait, kill]);
+
+        let shutdown = Shutdown::default();
+        let files = [shutdown.writing(), shutdown.clone().writing()];
+        for file in files {
+            assert!(shutdown.is_writing());
+            drop(file);
+        }
+        assert!(!shutdown.is_writing());
+    }
+
+    /// A process that counts how often it has been signalled, and ends with its input.
+    #[test]
+    #[ignore = "started by the next test in a process of its own"]
+    fn child() {
+        log::set_logger(&ToStdout).unwrap();
+        log::set_max_level(log::LevelFilter::Info);
+        let shutdown = Shutdown::default();
+        let _watch = SignalWatch::start(shutdown.clone()).unwrap();
+        log::info!("ready");
+        shutdown.wait();
+        let _ = std::io::stdin().read_line(&mut String::new()).unwrap();
+    }
+
+    struct ToStdout;
+
+    impl log::Log for ToStdout {
+        fn enabled(&self, _: &log::Metadata<'_>) -> bool {
+            true
+        }
+
+        fn log(&self, record: &log::Record<'_>) {
+            let mut stdout = std::io::stdout();
+            writeln!(stdout, "{}", record.args()).unwrap();
+            stdout.flush().unwrap();
+        }
+
+        fn flush(&self) {}
+    }
+
+    /// Sends so many signals to a process, each when the one before has been taken note of.
+    fn signalled(signals: usize) -> ExitStatus {
+        let mut child = Command::new(std::env::current_exe().unwrap())
+            .args(["--exact", "shutdown::tests::child"])
+            .args(["--ignored", "--nocapture"])
+            .stdin(Stdio::piped())
+            .stdout(Stdio::piped())
+            .spawn()
+            .unwrap();
+        let mut lines = BufReader::new(child.stdout.take().unwrap()).lines();
+        let mut until = |text| {
+            let mut lines = lines.by_ref().map(Result::unwrap);
+            assert!(lines.any(|line| line.contains(text)), "{text}");
+        };
+        until("ready");
+        let id = child.id().to_string();
+        for signal in 0..signals {
+            let kill = Command::new("kill").args(["-INT", &id]).status().unwrap();
+            assert!(kill.success());
+            match signal {
+                0 => until("shutting down"),
+                1 => until("shutting down already"),
+                _ => {}
+            }
+        }
+        if signals == 2 {
+            drop(child.stdin.take());
+        }
+        child.wait().unwrap()
+    }
+
+    #[test]
+    fn the_third_signal_kills_and_not_the_second() {
+        assert!(signalled(2).success());
+        assert_eq!(signalled(3).signal(), Some(SIGINT));
+    }
+
+    #[test]
     fn a_signal_is_a_request() {
         let shutdown = Shutdown::default();
         let watch = SignalWatch::start(shutdown.clone()).unwrap();
+        let at_once = AT_ONCE.as_ref().unwrap();
         signal_hook::low_level::raise(SIGTERM).unwrap();
         shutdown.wait();
-        let at_once = AT_ONCE.as_ref().unwrap();
-        assert!(
-            at_once.load(Ordering::Relaxed),
-            "a second one ends the process"
-        );
+        assert!(!at_once.load(Ordering::Relaxed), "the second one waits");
         drop(watch);
+        assert!(at_once.load(Ordering::Relaxed), "nobody watches");
         let _again = SignalWatch::start(Shutdown::default()).unwrap();
-        assert!(
-            !at_once.load(Ordering::Relaxed),
-            "until someone else watches"
-        );
+        assert!(!at_once.load(Ordering::Relaxed), "someone else does");
     }
 }

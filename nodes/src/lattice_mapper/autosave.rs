@@ -4,6 +4,7 @@ use std::io::ErrorKind;
 use std::thread::{self, JoinHandle};
 use std::time::Duration;
 
+use lattice_runtime::Shutdown;
 use lattice_runtime::params::{ParamError, Params};
 
 use super::LatticeMapper;
@@ -47,6 +48,7 @@ pub(super) struct Autosave {
     writing: Option<(JoinHandle<Result<(), Refusal>>, State)>,
     /// Reason for which the last save failed.
     failed: Option<String>,
+    shutdown: Shutdown,
 }
 
 impl Autosave {
@@ -56,6 +58,7 @@ impl Autosave {
         maps: &MapFolder,
         machine: &mut LatticeMapper,
         max_voxels: usize,
+        shutdown: Shutdown,
     ) -> Result<Self, NodeError> {
         if options.resume {
             resume(maps, &options.file, machine, max_voxels)?;
@@ -67,6 +70,7 @@ impl Autosave {
             saved: machine.state(),
             writing: None,
             failed: None,
+            shutdown,
         })
     }
 
@@ -78,7 +82,12 @@ impl Autosave {
             return;
         }
         let (maps, file, contents) = (self.maps.clone(), self.file.clone(), machine.contents());
-        let write = move || maps.write(&file, &contents);
+        let writing = self.shutdown.writing();
+        let write = move || {
+            let result = maps.write(&file, &contents);
+            drop(writing);
+            result
+        };
         match thread::Builder::new()
             .name("autosave".to_owned())
             .spawn(write)
@@ -90,6 +99,7 @@ impl Autosave {
 
     /// Saves what is not saved yet, and waits for that.
     pub(super) fn finish(&mut self, machine: &LatticeMapper) {
+        let _writing = self.shutdown.writing();
         self.wait();
         self.save(machine);
         self.wait();
@@ -200,6 +210,7 @@ mod tests {
             &maps,
             &mut machine,
             1000,
+            Shutdown::default(),
         )?;
         Ok((machine, autosave))
     }

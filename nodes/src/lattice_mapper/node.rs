@@ -54,7 +54,13 @@ pub fn start(runtime: &Runtime, name: &str) -> Result<Finish, NodeError> {
     let max_voxels = Arc::new(AtomicUsize::new(old.voxel_limit()));
     let mut machine = LatticeMapper::new(settings.mapper, epoch())?;
     let (output, requests) = MapOutput::open(&node)?;
-    let autosave = Autosave::start(settings.autosave, &maps, &mut machine, old.voxel_limit())?;
+    let autosave = Autosave::start(
+        settings.autosave,
+        &maps,
+        &mut machine,
+        old.voxel_limit(),
+        runtime.shutdown_handle(),
+    )?;
     let autosave_period = autosave.period;
     let mut shell = Shell {
         machine,

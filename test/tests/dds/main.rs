@@ -1,6 +1,7 @@
 //! Nodes and runtime over real DDS, against foreign peers.
 #![allow(clippy::unwrap_used)]
 
+mod actions;
 mod calibration;
 mod conformance;
 mod cyclone;

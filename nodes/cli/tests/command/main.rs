@@ -22,6 +22,7 @@ mod player;
 mod point_files;
 mod record;
 mod respawn;
+mod signals;
 mod streams;
 mod viewer;
 mod viewer_foreign;

@@ -108,6 +108,9 @@ impl Params {
     pub(crate) fn set(&self, wanted: Vec<(String, Option<ParamValue>)>) -> Result<(), Refusal> {
         let mut changes = lock(&self.changes);
         let values = lock(&self.state).check(wanted)?;
+        if values.is_empty() {
+            return Ok(());
+        }
         if !changes.is_open {
             let reason = "the node is not at work yet, or no more";
             return Err(Refusal::Other(reason.to_owned()));
@@ -172,35 +175,37 @@ impl Changes {
 }
 
 impl State {
-    /// The values, if each by itself may be set; in the order of rclcpp's checks.
+    /// The values to be set, if each by itself may be; in the order of rclcpp's checks. A fixed parameter
+    /// may be given the value that it has.
     fn check(&self, wanted: Vec<(String, Option<ParamValue>)>) -> Result<Values, Refusal> {
         let refuse = |reason: String| Err(Refusal::Other(reason));
         if wanted.is_empty() {
             return refuse("parameter list cannot be empty".to_owned());
         }
-        for (name, _) in &wanted {
-            match self.declared.get(name).map(|declared| declared.fixed()) {
-                None => return Err(Refusal::NotDeclared(name.chars().take(256).collect())),
-                Some(Some(why)) => {
+        let mut to_change = Vec::new();
+        for (name, value) in wanted {
+            let Some(declared) = self.declared.get(&name) else {
+                return Err(Refusal::NotDeclared(name.chars().take(256).collect()));
+            };
+            let value = value.map(|value| of_yaml(value, &declared.value));
+            match declared.fixed() {
+                // `ros2 param load` sets all that `ros2 param dump` has written.
+                Some(_) if value.as_ref() == Some(&declared.value) => {}
+                Some(why) => {
                     return refuse(format!(
                         "parameter '{name}' cannot be set because it is read-only: {why}"
                     ));
                 }
-                Some(None) => {}
+                None => to_change.push((name, value)),
             }
         }
-        if wanted.iter().any(|(_, value)| value.is_none()) {
+        if to_change.iter().any(|(_, value)| value.is_none()) {
             return refuse("cannot undeclare a statically typed parameter".to_owned());
         }
         let mut values = Values::new();
-        for (name, value) in wanted {
+        for (name, value) in to_change {
             let (Some(value), Some(declared)) = (value, self.declared.get(&name)) else {
                 continue;
-            };
-            // An empty list has no type where YAML gives it.
-            let value = match declared.value.is_array() && value.is_empty_list() {
-                true => declared.value.emptied(),
-                false => value,
             };
             if value.type_code() != declared.value.type_code() {
                 let [is, would] = [&declared.value, &value].map(ParamValue::ros_type_name);
@@ -222,6 +227,27 @@ impl State {
             values.insert(name, value);
         }
         Ok(values)
+    }
+}
+
+/// A value that a tool has read from YAML, by the value that is set now.
+///
+/// `ros2 param load` reads each value twice: an empty list has no type, the text `off` becomes a bool, and the
+/// number `1e-06` a text.
+fn of_yaml(value: ParamValue, now: &ParamValue) -> ParamValue {
+    let is_same = match (now, &value) {
+        (ParamValue::String(text), ParamValue::Bool(yes)) => {
+            let names = if *yes { ["on", "yes"] } else { ["off", "no"] };
+            names.contains(&&**text)
+        }
+        (ParamValue::String(text), ParamValue::I64(number)) => *text == number.to_string(),
+        (ParamValue::F64(number), ParamValue::String(text)) => text.parse() == Ok(*number),
+        _ => false,
+    };
+    match is_same {
+        true => now.clone(),
+        false if now.is_array() && value.is_empty_list() => now.emptied(),
+        false => value,
     }
 }
 

@@ -78,7 +78,7 @@ struct Open {
     readers: Vec<(Sender<()>, JoinHandle<()>)>,
     servers: Vec<Server>,
     unanswered: Vec<Weak<Unanswered>>,
-    graph: Option<Task<()>>,
+    graph: Option<(Task<()>, Arc<Outbox>)>,
     graph_of_others: Option<Task<()>>,
 }
 
@@ -126,7 +126,8 @@ impl Shared {
         if let Some(open) = lock(&self.open).as_mut() {
             let graph = Arc::clone(&self.graph);
             let transport = Arc::downgrade(&open.transport);
-            open.graph = self.io.spawn(graph.publish(transport, outbox));
+            let publish = graph.publish(transport, Arc::clone(&outbox));
+            open.graph = self.io.spawn(publish).map(|task| (task, outbox));
         }
         Ok(())
     }
@@ -256,11 +257,22 @@ impl Shared {
         }
         let publishers = open.publishers.iter().filter_map(Weak::upgrade);
         let writers = publishers.map(|publisher| Arc::clone(&publisher.writer));
+        let writers: Vec<_> = answers.into_iter().chain(writers).collect();
         let deadline = deadline();
-        for writer in answers.into_iter().chain(writers) {
+        for writer in &writers {
             if !writer.flush(deadline.saturating_duration_since(Instant::now())) {
                 log::warn!("{}: not everything was delivered", writer.topic());
             }
+        }
+        // The nodes go while all their endpoints are there, these go next, the participant last.
+        if let Some((task, graph)) = open.graph {
+            drop(task);
+            if !self.graph.leave(open.transport.id(), &graph) {
+                log::debug!("{}: not everyone has acknowledged the end", graph.topic());
+            }
+            graph.close();
+        }
+        for writer in writers {
             writer.close();
         }
         self.publishing.stop();

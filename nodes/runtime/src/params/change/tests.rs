@@ -167,3 +167,37 @@ fn nothing_is_set_before_the_node_is_ready_nor_against_the_second_who_is_asked()
         "the clock stands"
     );
 }
+
+#[test]
+fn a_fixed_parameter_may_be_given_the_value_that_it_has() {
+    let (params, options, told) = node();
+    told.try_recv().unwrap();
+    set(&params, &[("frame", "map")]).unwrap();
+    assert!(options.try_recv().is_err() && told.try_recv().is_err());
+    set(&params, &[("frame", "map"), ("count", "4")]).unwrap();
+    assert_eq!(options.try_recv().unwrap().2, 4);
+    let changed: Vec<_> = told.try_recv().unwrap().1.into_keys().collect();
+    assert_eq!(changed, ["count"]);
+    assert!(set(&params, &[("frame", "odom"), ("count", "5")]).is_err());
+    assert!(set(&params, &[("frame", "")]).is_err());
+}
+
+#[test]
+fn values_come_back_as_yaml_has_them() {
+    let text = |text: &str| ParamValue::String(text.to_owned());
+    for (now, value) in [
+        (text("off"), ParamValue::Bool(false)),
+        (text("on"), ParamValue::Bool(true)),
+        (text("5"), ParamValue::I64(5)),
+        (ParamValue::F64(1e-6), text("1e-06")),
+    ] {
+        assert_eq!(of_yaml(value.clone(), &now), now, "{value:?}");
+    }
+    for (now, value) in [
+        (text("off"), ParamValue::Bool(true)),
+        (text("05"), ParamValue::I64(5)),
+        (ParamValue::F64(1e-6), text("2e-06")),
+    ] {
+        assert_eq!(of_yaml(value.clone(), &now), value);
+    }
+}
