@@ -4,6 +4,7 @@
 mod calibration;
 mod conformance;
 mod cyclone;
+mod fresh_clients;
 mod headset;
 mod losses;
 mod octomap;
