@@ -29,6 +29,12 @@ const CHANGES: [Change; 5] = [
                 "    rc = ddsi_xmsg_addpar_sentinel_ifparam (*pmsg);",
                 "    lattice_blob_add_inline_qos (*pmsg, serdata);\n    rc = ddsi_xmsg_addpar_sentinel_ifparam (*pmsg);",
             ),
+            // Of a sample in fragments, Fast DDS takes it from the fragment that comes first, which is another one where
+            // the first is lost: the client would then drop a reply that it has acknowledged.
+            (
+                "  ddsi_xmsg_serdata (*pmsg, serdata, fragstart, fraglen, wr);\n",
+                "  if (fragnum > 0)\n  {\n    lattice_blob_add_inline_qos (*pmsg, serdata);\n    if (ddsi_xmsg_addpar_sentinel_ifparam (*pmsg) > 0)\n    {\n      ddcmn = ddsi_xmsg_submsg_from_marker (*pmsg, sm_marker);\n      ddcmn->smhdr.flags |= DDSI_DATAFRAG_FLAG_INLINE_QOS;\n    }\n  }\n  ddsi_xmsg_serdata (*pmsg, serdata, fragstart, fraglen, wr);\n",
+            ),
         ],
     },
     // A request that overtakes discovery is no history, whatever the vendor of its writer.

@@ -5,6 +5,7 @@ mod actions;
 mod calibration;
 mod conformance;
 mod cyclone;
+mod fresh_clients;
 mod headset;
 mod losses;
 mod octomap;
