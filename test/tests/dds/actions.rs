@@ -1,5 +1,6 @@
 //! An action server of the runtime, asked by an action client of rclpy over Fast DDS.
 
+use std::path::Path;
 use std::sync::mpsc::channel;
 use std::time::Duration;
 
@@ -10,7 +11,7 @@ use lattice_runtime::ros_args::RosArgs;
 use lattice_runtime::{ActionLimits, GoalHandle, Runtime};
 use lattice_test::domain::TestDomain;
 use lattice_test::peer;
-use lattice_test::python::ros_python;
+use lattice_test::python::ros_pythons;
 use serde::{Deserialize, Serialize};
 use serde_json::json;
 
@@ -126,7 +127,12 @@ fn work(order: i32, goal: GoalHandle<Fibonacci>) {
 
 #[test]
 fn rclpy_has_goals_reached_rejected_and_canceled() {
-    let Some(python) = ros_python() else { return };
+    for python in ros_pythons() {
+        has_goals_reached_rejected_and_canceled(&python);
+    }
+}
+
+fn has_goals_reached_rejected_and_canceled(python: &Path) {
     let domain = TestDomain::take();
     let args = RosArgs::parse(["--ros-args".to_owned()]).unwrap();
     let runtime = Runtime::with_transport("server", args, &domain.transport()).unwrap();
@@ -146,7 +152,7 @@ fn rclpy_has_goals_reached_rejected_and_canceled() {
     let file = directory.path().join("scenario.json");
     let scenario = json!({"domain": domain.id(), "goals": GOALS, "endless": ENDLESS});
     std::fs::write(&file, scenario.to_string()).unwrap();
-    let found = peer::run(&python, "action_peer.py", &[&file]);
+    let found = peer::run(python, "action_peer.py", &[&file]);
     drop(server);
     drop(runtime);
     worker.join().unwrap();

@@ -272,7 +272,6 @@ fn fresh_clients_of_fast_dds_are_answered() {
 }
 
 #[test]
-#[ignore = "calls are lost at 5 % loss of datagrams: not mended yet"]
 fn fresh_clients_of_fast_dds_are_answered_despite_loss() {
     asked_by_rclpy(10, LOSS);
 }
@@ -283,7 +282,6 @@ fn our_fresh_clients_are_answered_by_fast_dds() {
 }
 
 #[test]
-#[ignore = "calls are lost at 5 % loss of datagrams: not mended yet"]
 fn our_fresh_clients_are_answered_by_fast_dds_despite_loss() {
     answered_by_rclpy(20, LOSS);
 }

@@ -1,6 +1,7 @@
 //! Nodes that are ended by signals, as a terminal and `ros2 launch` send them.
 
 use std::io::{BufRead, BufReader, Write, stderr};
+use std::path::Path;
 use std::process::{Command, Stdio};
 use std::time::{Duration, Instant};
 
@@ -20,13 +21,19 @@ const PEER: &str = concat!(
 
 #[test]
 fn a_peer_over_fast_dds_lists_no_node_that_was_interrupted() {
-    let Some(python) = std::env::var_os("LATTICE_ROS_PYTHON") else {
+    let Some(pythons) = std::env::var_os("LATTICE_ROS_PYTHON") else {
         let _ = writeln!(
             stderr(),
             "SKIPPED: LATTICE_ROS_PYTHON names no python with rclpy"
         );
         return;
     };
+    for python in std::env::split_paths(&pythons) {
+        lists_no_node_that_was_interrupted(&python);
+    }
+}
+
+fn lists_no_node_that_was_interrupted(python: &Path) {
     let domain = LoopbackDomain::take().unwrap();
     let mut peer = Command::new(python)
         .args([PEER, &domain.id().to_string(), "lattice_mapper"])

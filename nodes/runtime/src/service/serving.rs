@@ -20,8 +20,9 @@ use crate::peers::Peers;
 use crate::port::{EndpointId, Origin, SampleReader};
 use crate::qos::Qos;
 
-/// A client may ask before its reply reader is known here; a reply sent then would be lost.
-const WAIT_FOR_CLIENT: Duration = Duration::from_secs(1);
+/// A client may ask before its reply reader is known here; a reply sent then would be lost. Fast DDS repairs a lost
+/// announcement after 3 s; who is unknown for as long as the lease of ROS 2 has gone.
+const WAIT_FOR_CLIENT: Duration = Duration::from_secs(10);
 
 /// A server at work.
 pub(crate) struct Serving {
