@@ -166,7 +166,7 @@ mod tests {
             name: "/map".to_owned(),
             node: "/robot/mapper".to_owned(),
         };
-        assert_eq!(all.all(), [expected.clone()]);
+        assert_eq!(all.all(), std::slice::from_ref(&expected));
         all.hear(&message(7, [8; 16])).unwrap();
         assert_eq!(all.all()[0].node, "07".repeat(16), "no longer its own");
         // As Humble says it.

@@ -9,6 +9,7 @@ mod losses;
 mod octomap;
 mod params;
 mod rclpy;
+mod rclpy_clients;
 mod rgbd;
 mod security;
 #[cfg(feature = "onnx")]

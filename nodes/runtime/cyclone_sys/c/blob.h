@@ -8,6 +8,7 @@
 
 #include "dds/dds.h"
 
+struct ddsi_domaingv;
 struct ddsi_serdata;
 struct ddsi_xmsg;
 
@@ -46,6 +47,10 @@ void lattice_blob_add_inline_qos (struct ddsi_xmsg *message, const struct ddsi_s
 
 /* True for requests and replies of ROS 2. */
 bool lattice_is_of_service (const struct dds_qos *qos);
+
+/* Makes room for a participant that is new, where there are very many: any of those without a topic goes. False: there is
+   none of that kind. */
+bool lattice_make_room (struct ddsi_domaingv *domain, int64_t now);
 
 /* The number that a reader asks a writer of a vendor for before it knows what there is. */
 uint64_t lattice_first_asked_for (const uint8_t vendor[2]);
