@@ -108,7 +108,7 @@ impl Forged {
     pub fn flood(&self, datagrams: impl Iterator<Item = Vec<u8>>) {
         for (number, datagram) in datagrams.enumerate() {
             self.send(&datagram);
-            if number % BURST == 0 {
+            if number.is_multiple_of(BURST) {
                 self.drain();
             }
         }
@@ -123,7 +123,7 @@ impl Forged {
         for number in first..first + count {
             let prefix = prefix(self.vendor, number);
             self.send_discovery(&self.participant(prefix));
-            if number as usize % BURST != 0 {
+            if !(number as usize).is_multiple_of(BURST) {
                 continue;
             }
             let (start, mut answer) = (Instant::now(), [0; 1 << 16]);
@@ -139,7 +139,7 @@ impl Forged {
     /// Waits until the victim has read all that was sent to its port.
     fn drain(&self) {
         let start = Instant::now();
-        while waiting(self.user) > 0 {
+        while waiting(self.user) != Some(0) {
             assert!(start.elapsed() < PATIENCE, "port {} is not read", self.user);
             std::thread::yield_now();
         }
@@ -340,15 +340,15 @@ fn submessages(datagram: &[u8]) -> impl Iterator<Item = (u8, &[u8])> {
     })
 }
 
-/// Bytes that wait in the socket on a port of the loopback interface.
-fn waiting(port: u16) -> u64 {
+/// Bytes that wait in the socket on a port of the loopback interface. None: the kernel's table, which changes while it
+/// is read, does not have it.
+fn waiting(port: u16) -> Option<u64> {
     let table = fs::read_to_string("/proc/net/udp").unwrap();
     let end = format!(":{port:04X}");
     let line = table.lines().find_map(|line| {
         let fields: Vec<_> = line.split_whitespace().collect();
         fields.get(1)?.ends_with(&end).then_some(fields)
     });
-    let line = line.unwrap_or_else(|| panic!("nobody is at port {port}"));
-    let (_, received) = line[4].split_once(':').unwrap();
-    u64::from_str_radix(received, 16).unwrap()
+    let (_, received) = line?[4].split_once(':')?;
+    u64::from_str_radix(received, 16).ok()
 }
