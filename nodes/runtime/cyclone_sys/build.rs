@@ -1,4 +1,4 @@
-//! Compiles the files of Cyclone DDS in `sources.sha256`, with the changes below, and `c/blob.c`.
+//! Compiles the files of Cyclone DDS in `sources.sha256`, with the changes below, and the files in `c/`.
 
 use std::env;
 use std::error::Error;
@@ -53,12 +53,12 @@ const CHANGES: [Change; 5] = [
             "  an->readerSNState.bitmap_base = ddsi_to_seqno (lattice_first_asked_for (pwr->c.vendor.id));",
         )],
     },
-    // Who forges participants fills no memory.
+    // Forged participants are no end of memory.
     Change {
         file: "core/ddsi/src/ddsi_discovery_spdp.c",
         pieces: &[(
-            "    return (pgik_result == PGIKR_KNOWN_BUT_INTERESTING) ? HSR_INTERESTING : HSR_NOT_INTERESTING;\n",
-            "    return (pgik_result == PGIKR_KNOWN_BUT_INTERESTING) ? HSR_INTERESTING : HSR_NOT_INTERESTING;\n  if (lattice_is_crowded (gv))\n    return HSR_NOT_INTERESTING;\n",
+            "  const bool is_secure = ((datap->builtin_endpoint_set & ",
+            "  if (!lattice_make_room (gv, timestamp.v))\n    return HSR_NOT_INTERESTING;\n\n  const bool is_secure = ((datap->builtin_endpoint_set & ",
         )],
     },
     // Freed before its last use: mended in 11.0.1 in the same way.
@@ -161,7 +161,7 @@ fn main() -> Result<(), Box<dyn Error>> {
     build
         .warnings(true)
         .warnings_into_errors(true)
-        .file("c/blob.c")
+        .files(["c/blob.c", "c/participants.c"])
         .try_compile("lattice_blob")?;
     cyclone.try_compile("lattice_ddsc")?;
     if security {

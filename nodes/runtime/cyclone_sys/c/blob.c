@@ -4,13 +4,10 @@
 #include <string.h>
 
 #include "dds/ddsc/dds_internal_api.h"
-#include "dds/ddsi/ddsi_domaingv.h"
-#include "dds/ddsi/ddsi_log.h"
 #include "dds/ddsi/ddsi_radmin.h"
 #include "dds/ddsi/ddsi_serdata.h"
 #include "dds/ddsi/ddsi_sertype.h"
 #include "dds/ddsrt/endian.h"
-#include "ddsi__entity_index.h"
 #include "ddsi__protocol.h"
 #include "ddsi__vendor.h"
 #include "ddsi__xmsg.h"
@@ -24,9 +21,6 @@
 /* Parameters of the inline QoS that name the request of a reply (DDS-RPC 1.0, 7.8.2), and Fast DDS's own from before. */
 #define PID_RELATED_SAMPLE_IDENTITY 0x0083u
 #define PID_FASTDDS_RELATED_SAMPLE_IDENTITY 0x800fu
-
-/* Participants of others in a domain, at most. Ports are for 120 on a machine; each that is forged costs 1 kB. */
-#define MAX_PARTICIPANTS 1024u
 
 /* GUID and sequence number. */
 #define IDENTITY_BYTES 24u
@@ -438,19 +432,6 @@ bool lattice_is_of_service (const struct dds_qos *qos)
   if (!(qos->present & DDSI_QP_TOPIC_NAME) || qos->topic_name == NULL)
     return false;
   return strncmp (qos->topic_name, "rq/", 3) == 0 || strncmp (qos->topic_name, "rr/", 3) == 0;
-}
-
-bool lattice_is_crowded (const struct ddsi_domaingv *gv)
-{
-  struct ddsi_entity_enum_proxy_participant all;
-  uint32_t count = 0;
-  ddsi_entidx_enum_proxy_participant_init (&all, gv->entity_index);
-  while (count < MAX_PARTICIPANTS && ddsi_entidx_enum_proxy_participant_next (&all) != NULL)
-    count++;
-  ddsi_entidx_enum_proxy_participant_fini (&all);
-  if (count == MAX_PARTICIPANTS)
-    GVWARNING ("%"PRIu32" participants of others are known: more are not met until some have gone\n", count);
-  return count == MAX_PARTICIPANTS;
 }
 
 uint64_t lattice_first_asked_for (const uint8_t vendor[2])

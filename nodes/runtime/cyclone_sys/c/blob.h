@@ -48,8 +48,9 @@ void lattice_blob_add_inline_qos (struct ddsi_xmsg *message, const struct ddsi_s
 /* True for requests and replies of ROS 2. */
 bool lattice_is_of_service (const struct dds_qos *qos);
 
-/* True if a domain knows as many participants of others as it may. */
-bool lattice_is_crowded (const struct ddsi_domaingv *gv);
+/* Makes room for a participant that is new, where there are very many: any of those without a topic goes. False: there is
+   none of that kind. */
+bool lattice_make_room (struct ddsi_domaingv *domain, int64_t now);
 
 /* The number that a reader asks a writer of a vendor for before it knows what there is. */
 uint64_t lattice_first_asked_for (const uint8_t vendor[2]);

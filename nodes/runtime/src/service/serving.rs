@@ -1,7 +1,8 @@
 //! The task of a server: takes requests, and sends each answer when its client can hear it.
 
-use std::sync::Arc;
+use std::collections::BTreeSet;
 use std::sync::atomic::Ordering::Relaxed;
+use std::sync::{Arc, Mutex};
 use std::time::Duration;
 
 use futures::StreamExt;
@@ -19,10 +20,14 @@ use crate::outbox::Outbox;
 use crate::peers::Peers;
 use crate::port::{EndpointId, Origin, SampleReader};
 use crate::qos::Qos;
+use crate::sync::lock;
 
 /// A client may ask before its reply reader is known here; a reply sent then would be lost. Fast DDS repairs a lost
-/// announcement after 3 s; who is unknown for as long as the lease of ROS 2 has gone.
-const WAIT_FOR_CLIENT: Duration = Duration::from_secs(10);
+/// announcement after 3 s.
+const WAIT_FOR_CLIENT: Duration = Duration::from_secs(5);
+
+/// Clients of which it is remembered that no reply reader came.
+const MAX_ABSENT: usize = 4096;
 
 /// A server at work.
 pub(crate) struct Serving {
@@ -33,6 +38,9 @@ pub(crate) struct Serving {
     pub replies: Arc<Outbox>,
     /// The other ends of the replies.
     pub readers: Arc<Peers>,
+    /// Clients whose reply reader did not come in time. Their further requests do not wait for it, nor others
+    /// behind them.
+    pub absent: Mutex<BTreeSet<EndpointId>>,
     pub ending: Receiver<Sender<()>>,
     /// Requests that wait for their answers at a time, at most.
     pub max_pending: usize,
@@ -177,13 +185,25 @@ impl Serving {
     }
 
     async fn wait_for_reader(&self, client: &EndpointId) {
+        let patience = match lock(&self.absent).contains(client) {
+            true => Duration::ZERO,
+            false => WAIT_FOR_CLIENT,
+        };
         let known = async {
             self.readers.known(|reader| reader.is_beside(client)).await;
+            true
         };
         let timeout = async {
-            Timer::after(WAIT_FOR_CLIENT).await;
+            Timer::after(patience).await;
+            false
         };
-        or(known, timeout).await;
+        let is_known = or(known, timeout).await;
+        let mut absent = lock(&self.absent);
+        if is_known {
+            absent.remove(client);
+        } else if absent.len() < MAX_ABSENT {
+            absent.insert(*client);
+        }
     }
 }
 

@@ -1,7 +1,7 @@
 //! Servers of the process.
 
 use std::sync::atomic::AtomicU64;
-use std::sync::{Arc, Weak};
+use std::sync::{Arc, Mutex, Weak};
 use std::time::Duration;
 
 use lattice_msgs::{RosMessage, RosService};
@@ -77,6 +77,7 @@ impl Shared {
             local: self.services.add(name, S::TYPE),
             replies,
             readers,
+            absent: Mutex::default(),
             ending,
             max_pending: max_pending.max(1),
             warning: Throttle::new(WARNING_PERIOD),

@@ -10,7 +10,7 @@ use lattice_runtime::env::{Network, TransportKind};
 use lattice_runtime::ros_args::RosArgs;
 use lattice_test::domain::TestDomain;
 
-use super::{DOMAIN, Echo, PATIENCE, Talk};
+use super::{DOMAIN, Echo, PATIENCE, Talk, program};
 
 const RANGE: &str = "ROS_AUTOMATIC_DISCOVERY_RANGE";
 
@@ -25,9 +25,9 @@ fn who_is_off_is_found_by_nobody() {
     let transport = TransportKind::BUILT_IN[0];
     let domain = TestDomain::take();
     let _off = [(); 2].map(|()| {
-        Echo::start_with(&domain, transport, |echo| {
-            echo.env(RANGE, "OFF");
-        })
+        let mut off = Command::new(program());
+        off.env(RANGE, "OFF");
+        Echo::start_by(off, &domain, transport)
     });
     let talk = Talk::start(&domain, transport);
     let _echo = Echo::start(&domain, transport);
@@ -66,10 +66,9 @@ impl Machines {
 
     /// A test of this program on one of the machines.
     fn run(&self, machine: usize, domain: &TestDomain, test: &str, range: &str) -> Command {
-        let program = std::env::current_exe().unwrap();
         let mut command = Command::new("ip");
         command.args(["netns", "exec", &self.0[machine]]);
-        command.arg(program).args(["--exact", test, "--ignored"]);
+        command.arg(program()).args(["--exact", test, "--ignored"]);
         command.env(DOMAIN, domain.id().to_string());
         command.env("LATTICE_TEST_MULTICAST", "1").env(RANGE, range);
         command.stdout(Stdio::null());

@@ -7,10 +7,12 @@ mod apart;
 mod attacks;
 mod crowd;
 mod fastdds;
+mod forged;
 mod matching;
 mod recovery;
 mod services;
 
+use std::path::PathBuf;
 use std::process::{Child, Command, Stdio};
 use std::sync::mpsc::{Receiver, RecvTimeoutError, channel};
 use std::time::{Duration, Instant};
@@ -19,7 +21,7 @@ use lattice_msgs::std_msgs::String as RosString;
 use lattice_runtime::env::{Network, TransportKind};
 use lattice_runtime::qos::Qos;
 use lattice_runtime::ros_args::RosArgs;
-use lattice_runtime::{Load, Publisher, Runtime, Subscription};
+use lattice_runtime::{Load, Node, Publisher, Runtime, Subscription};
 use lattice_test::domain::{TestDomain, localhost_only};
 
 /// Long enough for a loaded machine; a test that passes does not wait for it.
@@ -55,29 +57,30 @@ fn runtime(domain: &TestDomain, transport: Transport, name: &str) -> Runtime {
     Runtime::with_transport(name, args, &network).unwrap()
 }
 
-/// A process that says again on `/said` what it hears on `/heard`, and has a latched `/map`.
+/// A process that says again on `/said` what it hears on `/heard`, has a latched `/map` and a service `~/reset`.
 pub struct Echo(pub Child);
 
 impl Echo {
     pub fn start(domain: &TestDomain, transport: Transport) -> Self {
-        Self::start_with(domain, transport, |_| {})
+        Self::start_by(Command::new(program()), domain, transport)
     }
 
-    /// The same with a change of its command.
-    fn start_with(
-        domain: &TestDomain,
-        transport: Transport,
-        change: impl FnOnce(&mut Command),
-    ) -> Self {
-        let program = std::env::current_exe().unwrap();
-        let mut command = Command::new(program);
-        command
+    /// In an address space of so many kB.
+    pub fn start_within(domain: &TestDomain, transport: Transport, kb: usize) -> Self {
+        let mut shell = Command::new("sh");
+        let limited = format!("ulimit -v {kb} && exec \"$0\" \"$@\"");
+        shell.args(["-c", &limited]).arg(program());
+        Self::start_by(shell, domain, transport)
+    }
+
+    fn start_by(mut command: Command, domain: &TestDomain, transport: Transport) -> Self {
+        let child = command
             .args(["--exact", "conformance::echo", "--ignored", "--nocapture"])
             .env(DOMAIN, domain.id().to_string())
             .env("RMW_IMPLEMENTATION", transport.0)
-            .stdout(Stdio::null());
-        change(&mut command);
-        Self(command.spawn().unwrap())
+            .stdout(Stdio::null())
+            .spawn();
+        Self(child.unwrap())
     }
 
     pub fn signal(&self, name: &str) {
@@ -85,6 +88,11 @@ impl Echo {
         let done = Command::new("kill").args(["-s", name, &id]).status();
         assert!(done.unwrap().success());
     }
+}
+
+/// This test program.
+fn program() -> PathBuf {
+    std::env::current_exe().unwrap()
 }
 
 impl Drop for Echo {
@@ -130,6 +138,7 @@ fn echo() {
 struct Talk {
     publisher: Publisher<RosString>,
     heard: Receiver<String>,
+    node: Node,
     _subscription: Subscription,
     _runtime: Runtime,
 }
@@ -150,6 +159,7 @@ impl Talk {
         Self {
             publisher,
             heard,
+            node,
             _subscription: subscription,
             _runtime: runtime,
         }
@@ -172,6 +182,23 @@ impl Talk {
                 }
             }
             assert!(start.elapsed() < within, "{word} was not heard again");
+        }
+    }
+
+    /// Says a word once; it has to come back. Returns how many others came back before.
+    #[track_caller]
+    fn once(&self, word: &str, within: Duration) -> usize {
+        let data = word.to_owned();
+        self.publisher.publish(RosString { data }).unwrap();
+        let end = Instant::now() + within;
+        let mut others = 0;
+        loop {
+            let left = end.saturating_duration_since(Instant::now());
+            match self.heard.recv_timeout(left) {
+                Ok(heard) if heard == word => return others,
+                Ok(_) => others += 1,
+                Err(error) => panic!("{word} was not heard again: {error}"),
+            }
         }
     }
 }
