@@ -45,9 +45,9 @@ class Peer(Node):
         self.centers += 1
 
     def on_event(self, event):
-        if event.changed_parameters:
-            names = [one.name for one in event.changed_parameters]
-            self.events.append([event.node, names])
+        changed = {one.name: parameter_value_to_python(one.value) for one in event.changed_parameters}
+        if changed:
+            self.events.append([event.node, changed])
 
     def answer(self, answer, length):
         self.asked += 1
@@ -106,10 +106,10 @@ def main():
     said["not_loaded"] = peer.load(said["values"], Path(sys.argv[1]).with_name("dump.yaml"))
     # A message that overtakes discovery is lost: it is not latched.
     peer.until(lambda: peer.set("max_cloud_points", 100) or peer.events, "no event")
-    peer.events.clear()
     said["set"] = {name: peer.set(name, value) for name, value in scenario["set"].items()}
-    peer.until(lambda: len(peer.events) >= scenario["changes"], "no event")
-    said["events"] = peer.events
+    # Those before are of other values.
+    event = [f"/{peer.of}", scenario["event"]]
+    peer.until(lambda: event in peer.events, "no event")
     wanted, type_hash = scenario["type"]
     fields = {"type_name": wanted, "type_hash": type_hash, "include_type_sources": True}
     answer = peer.call(GetTypeDescription, "get_type_description", **fields)

@@ -186,10 +186,13 @@ fn print(bag: &str, report: &RecorderReport) {
     println!("{messages} messages, {megabytes:.1} MB, {seconds:.1} s in {bag}");
 }
 
-/// `rosbag2_2026_05_31-08_07_09`, in UTC.
+/// `rosbag2_2026_05_31-08_07_09`, in UTC; with `_1` and so on if another began in that second.
 fn default_folder() -> PathBuf {
     let now = SystemTime::now().duration_since(UNIX_EPOCH);
-    folder_of(now.unwrap_or_default().as_secs())
+    let folder = folder_of(now.unwrap_or_default().as_secs());
+    let numbered = (1..100).map(|number| PathBuf::from(format!("{}_{number}", folder.display())));
+    let mut all = std::iter::once(folder.clone()).chain(numbered);
+    all.find(|path| !path.exists()).unwrap_or(folder)
 }
 
 fn folder_of(seconds: u64) -> PathBuf {

@@ -39,9 +39,10 @@ const STEP: i64 = 4;
 /// A process under attack, and its honest peer.
 struct Scene {
     transport: Transport,
-    domain: TestDomain,
     echo: Echo,
     talk: Talk,
+    // Free for others only when those above have ended.
+    domain: TestDomain,
     said: usize,
     /// Messages besides that came back.
     others: usize,
