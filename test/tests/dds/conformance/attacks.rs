@@ -3,6 +3,7 @@
 //! The victim is an [`Echo`] with an address space of 1 GiB.
 
 use std::fs;
+use std::net::UdpSocket;
 
 use lattice_msgs::cdr;
 use lattice_msgs::std_srvs::{Trigger, TriggerRequest, TriggerResponse};
@@ -51,6 +52,11 @@ struct Scene {
 impl Scene {
     fn start(transport: Transport) -> Self {
         let domain = TestDomain::take();
+        // Who had the domain before may be ending still.
+        let port = 7400 + 250 * domain.id() + 10;
+        while UdpSocket::bind(("0.0.0.0", port)).is_err() {
+            std::thread::yield_now();
+        }
         let echo = Echo::start_within(&domain, transport, 1 << 20);
         // The victim is first in the domain, which gives it its ports.
         let first = Forged::new(&domain, CYCLONE);
