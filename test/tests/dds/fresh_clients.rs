@@ -290,8 +290,7 @@ fn our_fresh_clients_are_answered_by_fast_dds_despite_loss() {
 #[test]
 #[ignore = "takes minutes"]
 fn two_hundred_fresh_clients_of_fast_dds_are_answered() {
-    for loss in [0, LOSS] {
-        asked_by_rclpy(200, loss);
-        answered_by_rclpy(100, loss);
-    }
+    asked_by_rclpy(200, 0);
+    answered_by_rclpy(100, 0);
+    asked_by_rclpy(200, LOSS);
 }
