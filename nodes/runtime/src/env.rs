@@ -51,7 +51,7 @@ pub struct Network {
     pub discovery_off: bool,
     /// Addresses of machines where participants are looked for besides multicast.
     pub static_peers: Vec<String>,
-    /// The DDS to use.
+    /// The transport to use.
     pub transport: TransportKind,
     /// DDS Security, where it is switched on.
     pub security: Option<Security>,

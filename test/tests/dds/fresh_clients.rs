@@ -90,7 +90,7 @@ impl Loss {
         }
     }
 
-    /// What was lost of what processes that ended sent. Panics if that is far from the share.
+    /// Loss counted by the processes that have ended. Panics if it is far from the share.
     fn check(&self) {
         if self.percent == 0 {
             return;

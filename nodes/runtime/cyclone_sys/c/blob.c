@@ -311,7 +311,7 @@ static void free_samples (const struct ddsi_sertype *type, void **samples, size_
   (void) op;
 }
 
-/* What there is besides the name is the same for all. */
+/* Types differ in nothing but their names. */
 
 static bool equal_types (const struct ddsi_sertype *one, const struct ddsi_sertype *other)
 {

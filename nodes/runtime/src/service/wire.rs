@@ -3,9 +3,10 @@
 //! rmw_fastrtps sends the bare message and names the request in the inline QoS (the "Enhanced" mapping
 //! of DDS-RPC 1.0); rmw_cyclonedds puts a header of 16 bytes in front of it.
 
-use crate::port::{Bytes, ENCAPSULATION_BYTES, EndpointId, Origin, SampleId};
 use lattice_msgs::RosMessage;
 use lattice_msgs::cdr::{self, CdrError};
+
+use crate::port::{Bytes, ENCAPSULATION_BYTES, EndpointId, Origin, SampleId};
 
 /// First two bytes of the GUIDs of a vendor.
 const CYCLONE_VENDOR: [u8; 2] = [0x01, 0x10];

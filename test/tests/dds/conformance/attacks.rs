@@ -1,4 +1,4 @@
-//! What a stranger on the network sends costs a process of ours no memory and keeps no honest peer from it.
+//! Datagrams of a stranger cost a process of ours no memory and keep no honest peer from it.
 //!
 //! The victim is an [`Echo`] with an address space of 1 GiB.
 

@@ -1,4 +1,4 @@
-/* What Cyclone DDS finds on the system; in its own build cmake writes this. */
+/* Properties of the system, which cmake finds in Cyclone's own build. */
 #ifndef DDS_CONFIG_H
 #define DDS_CONFIG_H
 
