@@ -6,6 +6,7 @@ use std::sync::LazyLock;
 
 use hmac_sha256::Hash;
 
+use crate::builtin_interfaces::Time;
 use crate::interface::Schema;
 use crate::type_description_interfaces::{
     Field, FieldType, IndividualTypeDescription, TypeDescription,
@@ -56,33 +57,78 @@ pub fn type_description(ros_type: &str, definition: &str) -> Option<TypeDescript
     })
 }
 
-/// Type hash of a message of this crate, or of a part of a service or an action.
+/// Type hash of a message or service of this crate, or of a part of an action.
 pub fn hash_of(ros_type: &str) -> Option<&'static str> {
     known(ros_type).map(|(hash, _)| hash)
 }
 
 /// Schema of a message of this crate, or of a part of a service or an action.
 pub fn schema_of(ros_type: &str) -> Option<&'static Schema> {
-    known(ros_type).map(|(_, schema)| schema)
+    known(ros_type).and_then(|(_, schema)| schema)
 }
 
-fn known(ros_type: &str) -> Option<(&'static str, &'static Schema)> {
+fn known(ros_type: &str) -> Option<(&'static str, Option<&'static Schema>)> {
     static HASHES: LazyLock<Hashes> = LazyLock::new(|| {
         let mut hashes = Hashes::default();
         visit_messages(&mut hashes);
+        hashes.add_services();
         hashes
     });
     let found = HASHES.0.get(ros_type);
     found.map(|(hash, schema)| (hash.as_str(), *schema))
 }
 
+/// Hashes by type name. A service has no schema of its own.
 #[derive(Default)]
-struct Hashes(HashMap<&'static str, (String, &'static Schema)>);
+struct Hashes(HashMap<&'static str, (String, Option<&'static Schema>)>);
+
+impl Hashes {
+    /// Adds the services whose requests and responses are here.
+    fn add_services(&mut self) {
+        let schema = |name: &str| self.0.get(name)?.1;
+        let service = |request: &&'static str| {
+            let name = request.strip_suffix("_Request")?;
+            let parts = (schema(request)?, schema(&format!("{name}_Response"))?);
+            Some((name, (service_hash(name, parts)?, None)))
+        };
+        let services: Vec<_> = self.0.keys().filter_map(service).collect();
+        self.0.extend(services);
+    }
+}
+
+/// Type hash of a service: rosidl describes it as a message of its request, its response and an event of both.
+fn service_hash(
+    service: &str,
+    (request, response): (&'static Schema, &'static Schema),
+) -> Option<String> {
+    let (_, name) = service.rsplit_once('/')?;
+    let mut definition = format!(
+        "{name}_Request request_message\n{name}_Response response_message\n{name}_Event event_message\n"
+    );
+    let event = format!(
+        "service_msgs/ServiceEventInfo info\n{name}_Request[<=1] request\n{name}_Response[<=1] response\n"
+    );
+    for (name, text) in [
+        (&*format!("{service}_Event"), &*event),
+        ("service_msgs/ServiceEventInfo", SERVICE_EVENT_INFO),
+        ("builtin_interfaces/Time", Time::SCHEMA.text),
+        (request.type_name, &*request.definition()),
+        (response.type_name, &*response.definition()),
+    ] {
+        definition += &format!("====\nMSG: {name}\n{text}\n");
+    }
+    type_hash(service, &definition)
+}
+
+/// Fields of service_msgs/msg/ServiceEventInfo.
+const SERVICE_EVENT_INFO: &str =
+    "uint8 event_type\nbuiltin_interfaces/Time stamp\nchar[16] client_gid\nint64 sequence_number\n";
 
 impl MessageVisitor for Hashes {
     fn visit<M: RosMessage>(&mut self) {
         let hash = type_hash(M::TYPE, &M::definition());
-        self.0.extend(hash.map(|hash| (M::TYPE, (hash, M::SCHEMA))));
+        self.0
+            .extend(hash.map(|hash| (M::TYPE, (hash, Some(M::SCHEMA)))));
     }
 }
 
@@ -247,6 +293,14 @@ mod tests {
             (
                 "std_srvs/srv/Trigger_Request",
                 "d010825374ce8918e72bfd826c82603e60f45419e932ea976f807b74a863a199",
+            ),
+            (
+                "std_srvs/srv/Trigger",
+                "eeff2cd6fa5ad9d27cdf4dec64818317839b62f212a91e6b5304b634b2062c5f",
+            ),
+            (
+                "lattice_msgs/action/Calibrate_SendGoal",
+                "03108507d6de7fa3aa4c8ae3e8d06a3ca5b9abefe6d1d3367d609f80e4950b10",
             ),
             (
                 "lattice_msgs/action/Calibrate_SendGoal_Request",
