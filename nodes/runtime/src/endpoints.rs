@@ -7,10 +7,9 @@ use std::sync::{Arc, Mutex, Weak};
 use futures::StreamExt;
 use futures::stream::BoxStream;
 
-use super::names;
-use super::neighbours::Neighbours;
+use super::neighbours::{GraphRole, Neighbours};
 use super::peers::Peers;
-use super::port::{EndpointId, EndpointKind, PortEvent};
+use super::port::{EndpointId, PortEvent};
 use super::remote::RemotePublisher;
 use super::sync::lock;
 
@@ -71,14 +70,21 @@ impl Endpoints {
                 peer,
                 policy,
             } => (endpoint, peer, Some(policy)),
-            PortEvent::Found { peer, publisher } => {
-                let dds_name = names::dds_topic(&publisher.topic);
-                self.neighbours.add(peer, EndpointKind::Writer, &dds_name);
+            PortEvent::Found {
+                peer,
+                publisher,
+                node,
+            } => {
+                let (role, topic) = (GraphRole::Publisher, &publisher.topic);
+                self.neighbours.add(peer, role, topic, node);
                 return self.remotes.add(peer, *publisher);
             }
-            PortEvent::FoundReader { peer, dds_name } => {
-                return self.neighbours.add(peer, EndpointKind::Reader, &dds_name);
-            }
+            PortEvent::FoundOther {
+                peer,
+                role,
+                name,
+                node,
+            } => return self.neighbours.add(peer, role, &name, node),
             PortEvent::Lost { peer: lost } => return self.lost(|peer| *peer == lost),
         };
         let change = Change { peer, incompatible };

@@ -20,11 +20,21 @@ const IMPLEMENTATION: &str = "RMW_IMPLEMENTATION";
 pub enum TransportKind {
     /// DDS, by Eclipse Cyclone DDS.
     Dds,
+    /// Zenoh, by the conventions of rmw_zenoh.
+    #[cfg(feature = "zenoh")]
+    Zenoh,
 }
+
+/// Name of the transport over Zenoh, built in or not.
+const ZENOH: &str = "rmw_zenoh_cpp";
 
 impl TransportKind {
     /// The transports built in, by their names in `RMW_IMPLEMENTATION`; the first is the default.
-    pub const BUILT_IN: &[(&str, TransportKind)] = &[("rmw_cyclonedds_cpp", TransportKind::Dds)];
+    pub const BUILT_IN: &[(&str, TransportKind)] = &[
+        ("rmw_cyclonedds_cpp", TransportKind::Dds),
+        #[cfg(feature = "zenoh")]
+        (ZENOH, TransportKind::Zenoh),
+    ];
 
     /// Names of other implementations of DDS, which understand ours.
     const OTHER_DDS: [&str; 3] = [
@@ -69,13 +79,15 @@ pub enum EnvError {
     Domain(String),
     /// `RMW_IMPLEMENTATION` names a transport that is not built in.
     #[error(
-        "RMW_IMPLEMENTATION={given:?} is not built in; possible are {possible}, or leave it unset"
+        "RMW_IMPLEMENTATION={given:?} is not built in; possible are {possible}, or leave it unset{remedy}"
     )]
     Transport {
         /// The name given.
         given: String,
         /// Names of those built in.
         possible: String,
+        /// Words on how to build it, where that is known.
+        remedy: &'static str,
     },
 }
 
@@ -88,6 +100,10 @@ impl EnvError {
         Self::Transport {
             given: given.to_owned(),
             possible: names.join(" and "),
+            remedy: match given {
+                ZENOH => "; for Zenoh build with `cargo build --features zenoh`",
+                _ => "",
+            },
         }
     }
 }
@@ -254,9 +270,16 @@ mod tests {
             assert!(network.notes[0].contains(name) && network.warnings.is_empty());
         }
         assert_eq!(read(&[]).unwrap().transport, TransportKind::Dds);
-        let error = read(&[(IMPLEMENTATION, "rmw_zenoh_cpp")]).unwrap_err();
-        let words = "\"rmw_zenoh_cpp\" is not built in; possible are";
+        let error = read(&[(IMPLEMENTATION, "rmw_other")]).unwrap_err();
+        let words = "\"rmw_other\" is not built in; possible are";
         assert!(error.to_string().contains(words), "{error}");
+        if let Err(error) = read(&[(IMPLEMENTATION, ZENOH)]) {
+            assert!(error.to_string().contains("--features zenoh"), "{error}");
+        }
+        assert_eq!(
+            read(&[(IMPLEMENTATION, ZENOH)]).is_ok(),
+            cfg!(feature = "zenoh")
+        );
     }
 
     #[test]

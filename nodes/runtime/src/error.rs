@@ -20,7 +20,13 @@ pub enum RuntimeError {
         /// In the words of the transport.
         reason: String,
     },
-    /// No DDS endpoint.
+    /// No Zenoh session.
+    #[error("cannot open the Zenoh session: {reason}")]
+    Session {
+        /// In words.
+        reason: String,
+    },
+    /// No endpoint.
     #[error("{topic}: cannot create the {endpoint}: {reason}")]
     Endpoint {
         /// Resolved topic or service.

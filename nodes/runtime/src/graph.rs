@@ -7,25 +7,20 @@ use std::collections::BTreeMap;
 use std::sync::{Arc, Mutex, Weak};
 use std::time::Duration;
 
+use lattice_msgs::cdr;
 use lattice_msgs::rmw_dds_common::{NodeEntitiesInfo, ParticipantEntitiesInfo};
-use lattice_msgs::{RosMessage, cdr};
 use serde::ser::{Serialize, SerializeTuple, Serializer};
 use smol::Timer;
 use smol::channel::{Receiver, Sender, bounded};
 
 use super::names;
-use super::neighbours::{GraphEndpoint, role};
+use super::neighbours::{GraphEndpoint, GraphRole};
 use super::outbox::Outbox;
-use super::port::{EndpointId, EndpointKind, PortTopic, Transport};
+use super::port::{EndpointId, EndpointKind, PortNode, Transport};
 use super::sync::lock;
 
-/// DDS topic, whose name is not mangled.
-pub(crate) const TOPIC: PortTopic<'static> = PortTopic {
-    name: "ros_discovery_info",
-    dds_name: "ros_discovery_info",
-    ros_type: <ParticipantEntitiesInfo as RosMessage>::TYPE,
-    type_hash: None,
-};
+/// Topic of the messages that name the nodes of a process.
+pub(crate) const TOPIC: &str = "ros_discovery_info";
 
 /// Time between a change and the message that names it.
 const SETTLE_TIME: Duration = Duration::from_millis(50);
@@ -52,8 +47,11 @@ struct Entry {
     writers: Endpoints,
 }
 
-/// Names in DDS, by identity.
-type Endpoints = BTreeMap<EndpointId, String>;
+/// Role and full name of each that has one in the graph of nodes, by identity.
+type Endpoints = BTreeMap<EndpointId, Option<InGraph>>;
+
+/// Role of an endpoint, and the full name of its topic or service.
+pub(crate) type InGraph = (GraphRole, String);
 
 /// Text of a second node of the same name in a process; it begins as that of rcl.
 fn same_name(namespace: &str, name: &str) -> String {
@@ -105,14 +103,27 @@ impl Graph {
         id
     }
 
+    /// Namespace and name of a node.
+    pub(crate) fn node(&self, id: NodeId) -> PortNode {
+        let nodes = lock(&self.nodes);
+        let node = nodes.get(id.0);
+        let text = |of: fn(&Entry) -> &String| node.map(of).cloned().unwrap_or_default();
+        PortNode {
+            number: id.0,
+            namespace: text(|node| &node.namespace),
+            name: text(|node| &node.name),
+        }
+    }
+
     /// Adds an endpoint to a node.
     pub(crate) fn join(
         self: &Arc<Self>,
         node: NodeId,
         kind: EndpointKind,
-        (guid, dds_name): (EndpointId, &str),
+        guid: EndpointId,
+        of: Option<InGraph>,
     ) -> NodeEndpoint {
-        self.edit(node, kind, |all| _ = all.insert(guid, dds_name.to_owned()));
+        self.edit(node, kind, |all| _ = all.insert(guid, of));
         NodeEndpoint {
             graph: Arc::clone(self),
             node,
@@ -136,13 +147,11 @@ impl Graph {
         let mut all = Vec::new();
         for entry in lock(&self.nodes).iter() {
             let node = names::fully_qualified(&entry.name, &entry.namespace);
-            let readers = entry.readers.values();
-            let readers = readers.filter_map(|name| role(EndpointKind::Reader, name));
-            let writers = entry.writers.values();
-            let writers = writers.filter_map(|name| role(EndpointKind::Writer, name));
-            all.extend(readers.chain(writers).map(|(role, name)| GraphEndpoint {
+            let endpoints = entry.readers.values().chain(entry.writers.values());
+            let in_graph = endpoints.flatten().cloned();
+            all.extend(in_graph.map(|(role, name)| GraphEndpoint {
                 role,
-                name: name.to_owned(),
+                name,
                 node: node.clone(),
             }));
         }
@@ -252,8 +261,13 @@ mod tests {
         let guid = |byte| EndpointId([byte; 16]);
         let graph = Graph::new();
         let node = graph.add_node("/", "n");
-        let reader = graph.join(node, EndpointKind::Reader, (guid(2), "rt/in"));
-        let writer = graph.join(node, EndpointKind::Writer, (guid(3), "rt/out"));
+        let of = |role, name: &str| Some((role, name.to_owned()));
+        let (input, output) = (
+            of(GraphRole::Subscriber, "/in"),
+            of(GraphRole::Publisher, "/out"),
+        );
+        let reader = graph.join(node, EndpointKind::Reader, guid(2), input);
+        let writer = graph.join(node, EndpointKind::Writer, guid(3), output);
         let all = graph.all().into_iter().map(|of| (of.name, of.node));
         let expected = ["/in", "/out"].map(|name| (name.to_owned(), "/n".to_owned()));
         assert!(all.eq(expected));

@@ -3,6 +3,7 @@
 #![deny(unsafe_code)]
 
 mod action;
+mod arrivals;
 mod clock;
 #[expect(unsafe_code, reason = "sockets of others are borrowed")]
 mod confine;
@@ -33,6 +34,8 @@ mod process;
 mod publisher;
 pub mod qos;
 mod remote;
+#[cfg(feature = "zenoh")]
+mod rmw_zenoh;
 pub mod ros_args;
 mod rosout;
 pub mod security;

@@ -7,7 +7,7 @@ use lattice_msgs::cdr::{self, CdrError};
 use lattice_msgs::rmw_dds_common::{NodeEntitiesInfo, ParticipantEntitiesInfo};
 
 use super::names;
-use super::port::{EndpointId, EndpointKind};
+use super::port::EndpointId;
 use super::sync::lock;
 
 /// Endpoints that are remembered, at most.
@@ -38,20 +38,6 @@ pub struct GraphEndpoint {
     pub node: String,
 }
 
-/// Role and full ROS name of an endpoint of DDS; none of clients, replies and what is not of ROS.
-pub(crate) fn role(kind: EndpointKind, dds_name: &str) -> Option<(GraphRole, &str)> {
-    let (prefix, name) = dds_name.split_at_checked(2)?;
-    if !name.starts_with('/') || dds_name.len() > MAX_NAME_BYTES {
-        return None;
-    }
-    match (kind, prefix) {
-        (EndpointKind::Writer, "rt") => Some((GraphRole::Publisher, name)),
-        (EndpointKind::Reader, "rt") => Some((GraphRole::Subscriber, name)),
-        (EndpointKind::Reader, "rq") => Some((GraphRole::Server, name.strip_suffix("Request")?)),
-        _ => None,
-    }
-}
-
 /// Endpoints in other processes, by identity.
 #[derive(Default)]
 pub(crate) struct Neighbours(Mutex<Known>);
@@ -59,17 +45,22 @@ pub(crate) struct Neighbours(Mutex<Known>);
 #[derive(Default)]
 struct Known {
     endpoints: BTreeMap<EndpointId, (GraphRole, String)>,
+    /// Full names of the nodes of endpoints.
     nodes: BTreeMap<EndpointId, String>,
 }
 
 impl Neighbours {
     /// An endpoint has been found, or tells of itself again.
-    pub(crate) fn add(&self, id: EndpointId, kind: EndpointKind, dds_name: &str) {
-        let endpoints = &mut lock(&self.0).endpoints;
-        if let Some((role, name)) = role(kind, dds_name)
-            && (endpoints.len() < MAX_ENDPOINTS || endpoints.contains_key(&id))
+    pub(crate) fn add(&self, id: EndpointId, role: GraphRole, name: &str, node: Option<String>) {
+        let known = &mut *lock(&self.0);
+        if name.len() > MAX_NAME_BYTES
+            || (known.endpoints.len() >= MAX_ENDPOINTS && !known.endpoints.contains_key(&id))
         {
-            endpoints.insert(id, (role, name.to_owned()));
+            return;
+        }
+        known.endpoints.insert(id, (role, name.to_owned()));
+        if let Some(node) = node.filter(|node| node.len() <= MAX_NAME_BYTES) {
+            known.nodes.insert(id, node);
         }
     }
 
@@ -156,7 +147,7 @@ mod tests {
     #[test]
     fn endpoints_are_of_the_nodes_that_their_participant_names() {
         let all = Neighbours::default();
-        all.add(WRITER, EndpointKind::Writer, "rt/map");
+        all.add(WRITER, GraphRole::Publisher, "/map", None);
         assert_eq!(all.all()[0].node, "07".repeat(16));
         all.hear(&message(9, WRITER.0)).unwrap();
         assert_eq!(all.all()[0].node, "07".repeat(16), "said by another");
@@ -183,27 +174,17 @@ mod tests {
         for length in 0..whole.len() {
             assert!(all.hear(&whole[..length]).is_err(), "{length}");
         }
+        let long = "x".repeat(MAX_NAME_BYTES + 1);
+        all.add(WRITER, GraphRole::Publisher, &long, None);
+        assert!(all.all().is_empty());
         for i in 0..=MAX_ENDPOINTS as u128 {
-            all.add(EndpointId(i.to_le_bytes()), EndpointKind::Reader, "rt/a");
+            all.add(
+                EndpointId(i.to_le_bytes()),
+                GraphRole::Subscriber,
+                "/a",
+                None,
+            );
         }
         assert_eq!(all.all().len(), MAX_ENDPOINTS);
-    }
-
-    #[test]
-    fn roles_are_those_of_topics_and_servers() {
-        use EndpointKind::{Reader, Writer};
-        let server = Some((GraphRole::Server, "/a/call"));
-        assert_eq!(role(Reader, "rq/a/callRequest"), server);
-        let long = format!("rt/{}", "x".repeat(MAX_NAME_BYTES));
-        for (kind, name) in [
-            (Writer, "rq/a/callRequest"),
-            (Reader, "rr/a/callReply"),
-            (Reader, "rq/a/call"),
-            (Writer, "ros_discovery_info"),
-            (Writer, "r\u{e4}/a"),
-            (Writer, &long),
-        ] {
-            assert_eq!(role(kind, name), None, "{name}");
-        }
     }
 }

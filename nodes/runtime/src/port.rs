@@ -1,4 +1,4 @@
-//! The port of the transport: everything that the runtime asks of DDS, in terms of no implementation.
+//! The port of the transport: everything that the runtime asks of the network, in terms of no implementation.
 
 use std::borrow::Cow;
 use std::future::poll_fn;
@@ -10,6 +10,7 @@ use futures::future::BoxFuture;
 use futures::stream::BoxStream;
 
 use super::error::RuntimeError;
+use super::neighbours::GraphRole;
 use super::qos::Qos;
 use super::remote::RemotePublisher;
 
@@ -22,7 +23,7 @@ pub(crate) const ENCAPSULATION_BYTES: usize = 4;
 /// Receive buffer asked of every socket, in bytes.
 pub(crate) const RECEIVE_BUFFER_BYTES: usize = 32 << 20;
 
-/// Identity of a reader or writer, the GUID of DDS: twelve bytes name the participant.
+/// Identity of an endpoint: on DDS its GUID, of which twelve bytes name the participant; on Zenoh its gid.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, PartialOrd, Ord)]
 pub(crate) struct EndpointId(pub [u8; 16]);
 
@@ -69,17 +70,81 @@ pub(crate) struct Origin {
     pub related: Option<SampleId>,
 }
 
+/// A node of this process.
+#[derive(Clone, Debug)]
+#[cfg_attr(not(feature = "zenoh"), expect(dead_code, reason = "DDS has no nodes"))]
+pub(crate) struct PortNode {
+    /// Its number in the process.
+    pub number: usize,
+    /// Namespace, such as `/` or `/robot`.
+    pub namespace: String,
+    /// Name in it.
+    pub name: String,
+}
+
 /// Topic of an endpoint.
 #[derive(Clone, Copy, Debug)]
+#[cfg_attr(not(feature = "zenoh"), expect(dead_code, reason = "DDS has no nodes"))]
 pub(crate) struct PortTopic<'a> {
-    /// Name in ROS, for messages.
+    /// Node of the endpoint.
+    pub node: &'a PortNode,
+    /// Full name.
     pub name: &'a str,
-    /// Name in DDS.
-    pub dds_name: &'a str,
     /// Type, such as `sensor_msgs/msg/Imu`.
     pub ros_type: &'a str,
     /// Hash of the type where it may be another than that of our message of this name.
     pub type_hash: Option<&'a str>,
+}
+
+/// Service of a server or client.
+#[derive(Clone, Copy, Debug)]
+#[cfg_attr(not(feature = "zenoh"), expect(dead_code, reason = "DDS has no nodes"))]
+pub(crate) struct PortService<'a> {
+    /// Node of the endpoint.
+    pub node: &'a PortNode,
+    /// Full name.
+    pub name: &'a str,
+    /// Type, such as `std_srvs/srv/Trigger`.
+    pub ros_type: &'a str,
+    /// Type of the request.
+    pub request: &'a str,
+    /// Type of the response.
+    pub response: &'a str,
+}
+
+/// Form of requests and replies.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub(crate) enum ServiceForm {
+    /// Samples of two topics, in the form of the rmw of the peer. A reply is lost to a client whose reader is
+    /// not matched yet.
+    Topics,
+    /// Bare messages; the transport names the request and finds the way back.
+    Queries,
+}
+
+/// Both ends of a server.
+pub(crate) struct ServerEnds {
+    pub form: ServiceForm,
+    pub requests: Box<dyn SampleReader>,
+    /// Each reply names its request.
+    pub replies: Arc<dyn SampleWriter>,
+}
+
+/// Both ends of a client.
+pub(crate) struct ClientEnds {
+    pub form: ServiceForm,
+    /// A request names itself where the form is [`ServiceForm::Queries`].
+    pub requests: Arc<dyn SampleWriter>,
+    pub answers: Box<dyn SampleReader>,
+}
+
+/// Qualities of both ends of a server or client.
+#[derive(Clone, Copy, Debug)]
+pub(crate) struct ServiceQos {
+    pub reader: Qos,
+    pub writer: Qos,
+    /// Longest sample that is taken, encapsulation header included.
+    pub max_bytes: usize,
 }
 
 /// Policies of a peer that does not go with ours, by their names in rclcpp and in words for the operator.
@@ -105,9 +170,17 @@ pub(crate) enum PortEvent {
     Found {
         peer: EndpointId,
         publisher: Box<RemotePublisher>,
+        /// Its node, where it names one.
+        node: Option<String>,
     },
-    /// There is a reader, on any topic of DDS.
-    FoundReader { peer: EndpointId, dds_name: String },
+    /// There is a subscription or a server.
+    FoundOther {
+        peer: EndpointId,
+        role: GraphRole,
+        name: String,
+        /// Its node, where it names one.
+        node: Option<String>,
+    },
     /// A peer has gone.
     Lost { peer: EndpointId },
 }
@@ -120,6 +193,21 @@ pub(crate) trait Transport: Send + Sync {
     /// Participants that security keeps out. Each is a warning in the log; to be asked once a second.
     fn strangers(&self) -> usize {
         0
+    }
+
+    /// Announces a node. Where nodes are announced by messages instead, see [`Transport::graph_writer`].
+    fn add_node(&self, _: &PortNode) -> Result<(), RuntimeError> {
+        Ok(())
+    }
+
+    /// Writer of the messages that name the nodes of a process. `None`: every endpoint names its node itself.
+    fn graph_writer(&self) -> Option<Result<Arc<dyn SampleWriter>, RuntimeError>> {
+        None
+    }
+
+    /// Reader of these messages of other processes.
+    fn graph_reader(&self) -> Option<Result<Box<dyn SampleReader>, RuntimeError>> {
+        None
     }
 
     /// Makes a writer.
@@ -136,6 +224,20 @@ pub(crate) trait Transport: Send + Sync {
         qos: &Qos,
         max_bytes: usize,
     ) -> Result<Box<dyn SampleReader>, RuntimeError>;
+
+    /// Makes both ends of a server.
+    fn server(
+        &self,
+        service: PortService<'_>,
+        qos: &ServiceQos,
+    ) -> Result<ServerEnds, RuntimeError>;
+
+    /// Makes both ends of a client.
+    fn client(
+        &self,
+        service: PortService<'_>,
+        qos: &ServiceQos,
+    ) -> Result<ClientEnds, RuntimeError>;
 
     /// Changes of peers. Only one stream hears them.
     fn events(&self) -> BoxStream<'static, PortEvent>;
@@ -155,7 +257,7 @@ pub(crate) trait SampleWriter: Send + Sync {
     /// Its identity.
     fn id(&self) -> EndpointId;
 
-    /// Writes the body of a little-endian CDR sample, and the request that it answers.
+    /// Writes the body of a little-endian CDR sample, and the request that it answers or is.
     fn write(
         &self,
         body: Bytes,

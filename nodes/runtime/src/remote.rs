@@ -28,14 +28,26 @@ impl RemotePublisher {
         (reliability, durability): (Reliability, Durability),
     ) -> Option<Self> {
         let topic = dds_name.strip_prefix("rt")?;
-        let lengths = [dds_name.len(), dds_type.len()];
+        let hash = announced_hash(user_data);
+        Self::on(topic, dds_type, hash.as_deref(), (reliability, durability))
+    }
+
+    /// A publisher on a full topic name; none if that or the type is none.
+    pub(crate) fn on(
+        topic: &str,
+        dds_type: &str,
+        hash: Option<&str>,
+        (reliability, durability): (Reliability, Durability),
+    ) -> Option<Self> {
+        let lengths = [topic.len(), dds_type.len()];
         if !topic.starts_with('/') || lengths.into_iter().any(|bytes| bytes > MAX_NAME_BYTES) {
             return None;
         }
+        let hash = hash.filter(|hash| is_type_hash(hash));
         Some(Self {
             topic: topic.to_owned(),
             type_name: ros_type(dds_type)?,
-            type_hash: announced_hash(user_data),
+            type_hash: hash.map(str::to_owned),
             reliability,
             durability,
         })

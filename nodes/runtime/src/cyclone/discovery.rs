@@ -17,6 +17,7 @@ use smol::channel::Sender;
 
 use super::endpoint::{Description, Endpoint, Side};
 use super::entity::{Entity, endpoint_id};
+use super::names::role;
 use super::qos::{announced, user_data};
 use super::strangers::Strangers;
 use crate::port::{DURABILITY_CONFLICT, EndpointId, PortEvent, RELIABILITY_CONFLICT};
@@ -116,13 +117,16 @@ impl Discovery {
         });
     }
 
-    /// Tells of a reader.
+    /// Tells of a subscription or server.
     fn found_reader(&self, other: &Other<'_>) {
-        if let Ok(dds_name) = other.name.to_str().map(str::to_owned) {
-            let peer = other.id;
-            let _ = self
-                .events
-                .try_send(PortEvent::FoundReader { peer, dds_name });
+        let name = other.name.to_str().ok();
+        if let Some((role, name)) = name.and_then(|name| role(Side::Reader, name)) {
+            let _ = self.events.try_send(PortEvent::FoundOther {
+                peer: other.id,
+                role,
+                name: name.to_owned(),
+                node: None,
+            });
         }
     }
 
@@ -137,7 +141,12 @@ impl Discovery {
             .unwrap_or((Reliability::Reliable, Durability::Volatile));
         if let Some(found) = RemotePublisher::of((name, type_name), &other.user_data, qos) {
             let (peer, publisher) = (other.id, Box::new(found));
-            let _ = self.events.try_send(PortEvent::Found { peer, publisher });
+            let node = None;
+            let _ = self.events.try_send(PortEvent::Found {
+                peer,
+                publisher,
+                node,
+            });
         }
     }
 

@@ -15,8 +15,9 @@ use lattice_cyclone_sys::{
 };
 use smol::channel::Sender;
 
-use super::arrivals::Arrivals;
 use super::entity::{Entity, check, endpoint_id};
+use super::sample::{Taken, take};
+use crate::arrivals::Arrivals;
 use crate::port::{EndpointId, PortEvent};
 use crate::qos::Qos;
 use crate::sync::lock;
@@ -47,7 +48,7 @@ pub(super) struct Endpoint {
     events: Sender<PortEvent>,
     /// By the handles that Cyclone gives them.
     peers: Mutex<BTreeMap<dds_instance_handle_t, EndpointId>>,
-    arrivals: Arrivals,
+    arrivals: Arrivals<Taken>,
 }
 
 /// Function of Cyclone that describes a matched peer.
@@ -82,7 +83,7 @@ impl Endpoint {
         };
         this.add_first(entity, list, describe);
         if side == Side::Reader {
-            this.arrivals.take_from(entity.handle());
+            this.arrivals.take_from(|| take(entity.handle()));
         }
         Ok(this)
     }
@@ -92,7 +93,7 @@ impl Endpoint {
     }
 
     /// Samples that have come, of a reader.
-    pub(super) fn arrivals(&self) -> &Arrivals {
+    pub(super) fn arrivals(&self) -> &Arrivals<Taken> {
         &self.arrivals
     }
 
@@ -214,6 +215,6 @@ unsafe extern "C" fn on_writer(
 unsafe extern "C" fn on_data(reader: dds_entity_t, this: *mut c_void) {
     // SAFETY: see above.
     if let Some(endpoint) = unsafe { this.cast::<Endpoint>().as_ref() } {
-        endpoint.arrivals.take_from(reader);
+        endpoint.arrivals.take_from(|| take(reader));
     }
 }

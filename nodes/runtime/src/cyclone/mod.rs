@@ -3,13 +3,13 @@
 //!
 //! Topics are of any type name, samples are serialised bytes.
 
-mod arrivals;
 mod config;
 mod discovery;
 mod domain;
 mod endpoint;
 mod entity;
 mod log;
+mod names;
 mod participant;
 mod qos;
 mod reader;

@@ -7,7 +7,8 @@ use std::sync::Arc;
 use futures::StreamExt;
 use futures::stream::BoxStream;
 use lattice_cyclone_sys::{dds_create_participant, lattice_topic};
-use lattice_msgs::{dds_type_name, hash_of};
+use lattice_msgs::rmw_dds_common::ParticipantEntitiesInfo;
+use lattice_msgs::{RosMessage, dds_type_name, hash_of};
 use smol::channel::{Receiver, Sender, unbounded};
 
 use super::discovery::Discovery;
@@ -15,16 +16,48 @@ use super::domain::Domain;
 use super::endpoint::{Description, Side};
 use super::entity::Entity;
 use super::log::explained;
+use super::names;
 use super::qos::NativeQos;
 use super::reader::CycloneReader;
 use super::security::properties;
 use super::writer::CycloneWriter;
 use crate::env::Network;
 use crate::error::RuntimeError;
-use crate::port::{EndpointId, PortEvent, PortTopic, SampleReader, SampleWriter, Transport};
+use crate::graph;
+use crate::port::{
+    ClientEnds, EndpointId, PortEvent, PortService, PortTopic, SampleReader, SampleWriter,
+    ServerEnds, ServiceForm, ServiceQos, Transport,
+};
 use crate::qos::Qos;
 use crate::remote::is_type_hash;
 use crate::security::{Enclave, SecurityError};
+
+/// Longest message of `ros_discovery_info` that is taken.
+const MAX_GRAPH_BYTES: usize = 1 << 20;
+
+/// Messages of so many participants on `ros_discovery_info` wait for a late joiner.
+const GRAPH_READER: Qos = Qos::latched(100);
+/// The last message of a participant holds all its nodes.
+const GRAPH_WRITER: Qos = Qos::latched(1);
+
+/// Topic in DDS of an endpoint.
+#[derive(Clone, Copy)]
+struct DdsTopic<'a> {
+    /// Topic or service in ROS, for messages.
+    name: &'a str,
+    dds_name: &'a str,
+    ros_type: &'a str,
+    /// Hash of the type where it may be another than that of our message of this name.
+    type_hash: Option<&'a str>,
+}
+
+/// Its name is not mangled.
+const GRAPH: DdsTopic<'static> = DdsTopic {
+    name: graph::TOPIC,
+    dds_name: graph::TOPIC,
+    ros_type: <ParticipantEntitiesInfo as RosMessage>::TYPE,
+    type_hash: None,
+};
 
 /// The Cyclone participant of a process.
 pub(crate) struct Cyclone {
@@ -84,7 +117,7 @@ impl Cyclone {
     /// Topic, QoS and description of an endpoint to be made.
     fn prepare(
         &self,
-        of: PortTopic<'_>,
+        of: DdsTopic<'_>,
         qos: &Qos,
         side: Side,
     ) -> Result<(Entity, NativeQos, Description), RuntimeError> {
@@ -103,10 +136,56 @@ impl Cyclone {
         let native = NativeQos::of_endpoint(qos, &user_data(of));
         Ok((topic, native, description))
     }
+
+    fn dds_writer(
+        &self,
+        of: DdsTopic<'_>,
+        qos: &Qos,
+    ) -> Result<Arc<dyn SampleWriter>, RuntimeError> {
+        let (topic, native, description) = self.prepare(of, qos, Side::Writer)?;
+        let (parent, events) = (&self.participant, self.sender.clone());
+        let writer = CycloneWriter::new(parent, topic, &native, description, events);
+        let writer = writer.map_err(|reason| failed(of, Side::Writer, reason))?;
+        self.discovery.announce(parent, writer.endpoint());
+        Ok(Arc::new(writer))
+    }
+
+    fn dds_reader(
+        &self,
+        of: DdsTopic<'_>,
+        qos: &Qos,
+        max_bytes: usize,
+    ) -> Result<Box<dyn SampleReader>, RuntimeError> {
+        let (topic, native, description) = self.prepare(of, qos, Side::Reader)?;
+        let (parent, events) = (&self.participant, self.sender.clone());
+        let reader = CycloneReader::new(parent, topic, &native, max_bytes, description, events);
+        let reader = reader.map_err(|reason| failed(of, Side::Reader, reason))?;
+        self.discovery.announce(parent, reader.endpoint());
+        Ok(Box::new(reader))
+    }
+}
+
+fn topic<'a>(of: PortTopic<'a>, dds_name: &'a str) -> DdsTopic<'a> {
+    DdsTopic {
+        name: of.name,
+        dds_name,
+        ros_type: of.ros_type,
+        type_hash: of.type_hash,
+    }
+}
+
+/// Topic of the requests or replies of a service.
+fn part<'a>(of: PortService<'a>, dds_name: &'a str, ros_type: &'a str) -> DdsTopic<'a> {
+    DdsTopic {
+        name: of.name,
+        dds_name,
+        ros_type,
+        type_hash: None,
+    }
 }
 
 /// USER_DATA of an endpoint, as rmw_dds_common reads it; nothing where the type's hash is unknown.
-fn user_data(of: PortTopic<'_>) -> String {
+fn user_data(of: DdsTopic<'_>) -> String {
     let hash = of.type_hash.filter(|text| is_type_hash(text));
     let hash = hash.or_else(|| hash_of(of.ros_type));
     hash.map_or_else(String::new, |hash| format!("typehash={hash};"))
@@ -117,13 +196,16 @@ impl Transport for Cyclone {
         self.id
     }
 
+    fn graph_writer(&self) -> Option<Result<Arc<dyn SampleWriter>, RuntimeError>> {
+        Some(self.dds_writer(GRAPH, &GRAPH_WRITER))
+    }
+
+    fn graph_reader(&self) -> Option<Result<Box<dyn SampleReader>, RuntimeError>> {
+        Some(self.dds_reader(GRAPH, &GRAPH_READER, MAX_GRAPH_BYTES))
+    }
+
     fn writer(&self, of: PortTopic<'_>, qos: &Qos) -> Result<Arc<dyn SampleWriter>, RuntimeError> {
-        let (topic, native, description) = self.prepare(of, qos, Side::Writer)?;
-        let (parent, events) = (&self.participant, self.sender.clone());
-        let writer = CycloneWriter::new(parent, topic, &native, description, events);
-        let writer = writer.map_err(|reason| failed(of, Side::Writer, reason))?;
-        self.discovery.announce(parent, writer.endpoint());
-        Ok(Arc::new(writer))
+        self.dds_writer(topic(of, &names::topic(of.name)), qos)
     }
 
     fn reader(
@@ -132,12 +214,29 @@ impl Transport for Cyclone {
         qos: &Qos,
         max_bytes: usize,
     ) -> Result<Box<dyn SampleReader>, RuntimeError> {
-        let (topic, native, description) = self.prepare(of, qos, Side::Reader)?;
-        let (parent, events) = (&self.participant, self.sender.clone());
-        let reader = CycloneReader::new(parent, topic, &native, max_bytes, description, events);
-        let reader = reader.map_err(|reason| failed(of, Side::Reader, reason))?;
-        self.discovery.announce(parent, reader.endpoint());
-        Ok(Box::new(reader))
+        self.dds_reader(topic(of, &names::topic(of.name)), qos, max_bytes)
+    }
+
+    fn server(&self, of: PortService<'_>, qos: &ServiceQos) -> Result<ServerEnds, RuntimeError> {
+        let (requests, replies) = (names::request(of.name), names::reply(of.name));
+        let requests = part(of, &requests, of.request);
+        let requests = self.dds_reader(requests, &qos.reader, qos.max_bytes)?;
+        Ok(ServerEnds {
+            form: ServiceForm::Topics,
+            requests,
+            replies: self.dds_writer(part(of, &replies, of.response), &qos.writer)?,
+        })
+    }
+
+    fn client(&self, of: PortService<'_>, qos: &ServiceQos) -> Result<ClientEnds, RuntimeError> {
+        let (requests, answers) = (names::request(of.name), names::reply(of.name));
+        let answers = part(of, &answers, of.response);
+        let answers = self.dds_reader(answers, &qos.reader, qos.max_bytes)?;
+        Ok(ClientEnds {
+            form: ServiceForm::Topics,
+            requests: self.dds_writer(part(of, &requests, of.request), &qos.writer)?,
+            answers,
+        })
     }
 
     fn events(&self) -> BoxStream<'static, PortEvent> {
@@ -149,7 +248,7 @@ impl Transport for Cyclone {
     }
 }
 
-fn failed(of: PortTopic<'_>, side: Side, reason: String) -> RuntimeError {
+fn failed(of: DdsTopic<'_>, side: Side, reason: String) -> RuntimeError {
     RuntimeError::Endpoint {
         topic: of.name.to_owned(),
         endpoint: match side {

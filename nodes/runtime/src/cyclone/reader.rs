@@ -13,6 +13,7 @@ use super::endpoint::{Description, Endpoint};
 use super::entity::{Entity, check};
 use super::log::explained;
 use super::qos::NativeQos;
+use super::sample::Taken;
 use crate::port::{EndpointId, Origin, PortEvent, SampleId, SampleReader};
 use crate::sync::lock;
 
@@ -53,24 +54,23 @@ impl CycloneReader {
         &self.endpoint
     }
 
-    fn try_take(&self) -> Option<Result<Origin, String>> {
-        let taken = self.endpoint.arrivals().pop()?;
+    fn keep(&self, taken: &Taken) -> Result<Origin, String> {
         let (bytes, max) = (taken.bytes(), self.max_bytes);
         if bytes.len() > max {
             let bytes = bytes.len();
             let words = format!("{bytes} bytes are more than max_message_bytes = {max}");
-            return Some(Err(words));
+            return Err(words);
         }
         let mut buffer = lock(&self.buffer);
         buffer.clear();
         buffer.extend_from_slice(bytes);
-        Some(Ok(Origin {
+        Ok(Origin {
             sample: SampleId {
                 writer: self.endpoint.writer(&self.reader, taken.writer()),
                 number: taken.number(),
             },
             related: taken.related(),
-        }))
+        })
     }
 }
 
@@ -80,12 +80,8 @@ impl SampleReader for CycloneReader {
     }
 
     fn poll_next(&self, context: &mut Context<'_>) -> Poll<Result<Origin, String>> {
-        if let Some(sample) = self.try_take() {
-            return Poll::Ready(sample);
-        }
-        self.endpoint.arrivals().register(context.waker());
-        // Something may have arrived before the waker was in place.
-        self.try_take().map_or(Poll::Pending, Poll::Ready)
+        let next = self.endpoint.arrivals().poll_next(context);
+        next.map(|taken| self.keep(&taken))
     }
 
     fn bytes(&self) -> MutexGuard<'_, Vec<u8>> {

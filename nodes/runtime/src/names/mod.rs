@@ -190,21 +190,6 @@ fn validate_unexpanded(name: &str) -> Result<(), NameError> {
     Ok(())
 }
 
-/// The DDS topic of a ROS topic: `/points` is `rt/points`.
-pub(crate) fn dds_topic(full_name: &str) -> String {
-    format!("rt{full_name}")
-}
-
-/// The DDS topic of a service's requests: `/reset` is `rq/resetRequest`.
-pub(crate) fn dds_request(full_name: &str) -> String {
-    format!("rq{full_name}Request")
-}
-
-/// The DDS topic of a service's replies: `/reset` is `rr/resetReply`.
-pub(crate) fn dds_reply(full_name: &str) -> String {
-    format!("rr{full_name}Reply")
-}
-
 fn is_word(byte: u8) -> bool {
     byte.is_ascii_alphanumeric() || byte == b'_'
 }

@@ -84,13 +84,6 @@ fn the_first_rule_that_matches_counts_and_both_sides_are_expanded() {
 }
 
 #[test]
-fn dds_names_carry_the_ros_prefixes() {
-    assert_eq!(dds_topic("/robot/points"), "rt/robot/points");
-    assert_eq!(dds_request("/mapper/reset"), "rq/mapper/resetRequest");
-    assert_eq!(dds_reply("/mapper/reset"), "rr/mapper/resetReply");
-}
-
-#[test]
 fn long_and_odd_arguments_stay_readable() {
     assert_eq!(shown("a\nb"), "a\\nb");
     assert_eq!(shown(&"x".repeat(1000)).chars().count(), 161);

@@ -60,7 +60,7 @@ impl Node {
             DEFAULT_MAX_MESSAGE_BYTES,
             1..=u32::MAX as usize,
         )?;
-        let id = shared.graph.add_node(&namespace, &name);
+        let id = shared.add_node(&namespace, &name)?;
         let clock = Clock::default();
         let topic = names::resolve(NameKind::Topic, "/clock", &name, &namespace, &args.remaps)?;
         follow_use_sim_time(shared, id, topic, &params, &clock)?;

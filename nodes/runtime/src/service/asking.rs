@@ -1,4 +1,4 @@
-//! The calls of one client over DDS: who has asked, and which answer is whose.
+//! The calls of one client over the network: who has asked, and which answer is whose.
 
 use std::collections::BTreeMap;
 use std::sync::atomic::{AtomicI64, Ordering::Relaxed};
@@ -9,7 +9,7 @@ use smol::channel::{Sender, bounded};
 use super::wire::{Header, read_answer, write_request};
 use crate::outbox::Outbox;
 use crate::peers::Peers;
-use crate::port::{Origin, SampleReader};
+use crate::port::{Origin, SampleReader, ServiceForm};
 use crate::sync::lock;
 
 /// Calls that wait for answers.
@@ -39,8 +39,9 @@ impl Waiting {
     }
 }
 
-/// Asks over DDS.
+/// Asks over the network.
 pub(crate) struct Asking {
+    pub form: ServiceForm,
     pub requests: Arc<Outbox>,
     /// The other ends of the requests.
     pub servers: Arc<Peers>,
@@ -54,9 +55,11 @@ impl Asking {
     /// Asks once a server is known, and waits for the answer.
     pub(crate) async fn call(&self, request: &[u8]) -> Result<Vec<u8>, String> {
         let server = self.servers.known(|_| true).await;
-        self.answerers.known(|_| true).await;
+        if self.form == ServiceForm::Topics {
+            self.answerers.known(|_| true).await;
+        }
         let number = self.next.fetch_add(1, Relaxed);
-        let asked = write_request(request, &self.requests.id(), &server, number);
+        let asked = write_request(self.form, request, &self.requests.id(), &server, number);
         let asked = asked.ok_or("the request is no CDR of this order")?;
         let (sender, answer) = bounded(1);
         lock(&self.waiting.0).insert(asked.identity, sender);

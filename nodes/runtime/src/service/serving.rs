@@ -18,7 +18,7 @@ use super::{Reply, Unanswered};
 use crate::logging::Throttle;
 use crate::outbox::Outbox;
 use crate::peers::Peers;
-use crate::port::{EndpointId, Origin, SampleReader};
+use crate::port::{EndpointId, Origin, SampleReader, ServiceForm};
 use crate::qos::Qos;
 use crate::sync::lock;
 
@@ -31,6 +31,7 @@ const MAX_ABSENT: usize = 4096;
 
 /// A server at work.
 pub(crate) struct Serving {
+    pub form: ServiceForm,
     pub unanswered: Arc<Unanswered>,
     pub requests: Box<dyn SampleReader>,
     /// Those of this process.
@@ -156,8 +157,9 @@ impl Serving {
         handler: &mut impl FnMut(S::Request, Reply<S::Response>),
     ) -> Result<Asked<S::Response>, String> {
         let origin = sample?;
-        let (request, reply_to) = read_request::<S::Request>(&self.requests.bytes(), &origin)
-            .map_err(|e| e.to_string())?;
+        let (request, reply_to) =
+            read_request::<S::Request>(self.form, &self.requests.bytes(), &origin)
+                .map_err(|e| e.to_string())?;
         let (reply, answered) = Reply::channel();
         handler(request, reply);
         let id = origin.sample.writer;
@@ -178,7 +180,9 @@ impl Serving {
             }
         };
         let (body, related) = write_reply(&reply?, &reply_to).map_err(|e| e.to_string())?;
-        self.wait_for_reader(&id).await;
+        if self.form == ServiceForm::Topics {
+            self.wait_for_reader(&id).await;
+        }
         self.replies
             .send_body(body, related)
             .map_err(|e| e.to_string())

@@ -1,12 +1,12 @@
-//! Requests and replies on DDS: each rmw has its own form, recognised by the vendor of the peer.
+//! Requests and replies on the wire. On DDS each rmw has its own form, recognised by the vendor of the peer.
 //!
 //! rmw_fastrtps sends the bare message and names the request in the inline QoS (the "Enhanced" mapping
-//! of DDS-RPC 1.0); rmw_cyclonedds puts a header of 16 bytes in front of it.
+//! of DDS-RPC 1.0); rmw_cyclonedds puts a header of 16 bytes in front of it. On Zenoh the message is bare.
 
 use lattice_msgs::RosMessage;
 use lattice_msgs::cdr::{self, CdrError};
 
-use crate::port::{Bytes, ENCAPSULATION_BYTES, EndpointId, Origin, SampleId};
+use crate::port::{Bytes, ENCAPSULATION_BYTES, EndpointId, Origin, SampleId, ServiceForm};
 
 /// First two bytes of the GUIDs of a vendor.
 const CYCLONE_VENDOR: [u8; 2] = [0x01, 0x10];
@@ -44,9 +44,13 @@ enum Mapping {
 
 /// Reads a request, its encapsulation header first. The error is that of the likelier mapping.
 pub(crate) fn read_request<Q: RosMessage>(
+    form: ServiceForm,
     bytes: &[u8],
     origin: &Origin,
 ) -> Result<(Q, ReplyTo), CdrError> {
+    if form == ServiceForm::Queries {
+        return read_as(bytes, origin, Mapping::Enhanced);
+    }
     let (first, second) = match likely_mapping(bytes, origin) {
         Mapping::Enhanced => (Mapping::Enhanced, Mapping::Cyclone),
         Mapping::Cyclone => (Mapping::Cyclone, Mapping::Enhanced),
@@ -106,6 +110,7 @@ pub(crate) struct Asked {
 
 /// Writes a request to a server. `None`: it is no little-endian CDR.
 pub(crate) fn write_request(
+    form: ServiceForm,
     message: &[u8],
     writer: &EndpointId,
     server: &EndpointId,
@@ -114,6 +119,16 @@ pub(crate) fn write_request(
     let (encapsulation, body) = message.split_first_chunk::<ENCAPSULATION_BYTES>()?;
     if !encapsulation.starts_with(&[0, 1]) {
         return None;
+    }
+    if form == ServiceForm::Queries {
+        // Comes back as it is.
+        let identity = header(writer, number);
+        let writer = EndpointId(identity);
+        return Some(Asked {
+            identity,
+            body: Bytes::copy_from_slice(body),
+            related: Some(SampleId { writer, number }),
+        });
     }
     if server.vendor() == FASTDDS_VENDOR {
         let identity = identity_there(server, number);
@@ -213,6 +228,7 @@ mod tests {
     use lattice_msgs::std_srvs::{SetBoolRequest, TriggerResponse};
 
     use super::*;
+    use crate::port::ServiceForm::{Queries, Topics};
 
     fn origin(vendor: [u8; 2], related: Option<SampleId>) -> Origin {
         let mut guid = [7; 16];
@@ -235,7 +251,8 @@ mod tests {
         };
         let bytes = cdr::to_vec(&SetBoolRequest { data: true }).unwrap();
         let (request, to) =
-            read_request::<SetBoolRequest>(&bytes, &origin([0x01, 0x0f], Some(related))).unwrap();
+            read_request::<SetBoolRequest>(Topics, &bytes, &origin([0x01, 0x0f], Some(related)))
+                .unwrap();
         assert!(request.data);
         let expected = SampleId {
             writer: reader,
@@ -251,7 +268,7 @@ mod tests {
         let header: [u8; 16] = std::array::from_fn(|i| i as u8);
         let little = [&[0, 1, 0, 0][..], &header, &[1]].concat();
         let (request, to) =
-            read_request::<SetBoolRequest>(&little, &origin(CYCLONE_VENDOR, None)).unwrap();
+            read_request::<SetBoolRequest>(Topics, &little, &origin(CYCLONE_VENDOR, None)).unwrap();
         assert!(request.data);
         assert_eq!(to, ReplyTo::Cyclone(header));
         let reply = TriggerResponse {
@@ -263,7 +280,8 @@ mod tests {
         assert_eq!(body[16..], cdr::to_vec(&reply).unwrap()[4..]);
 
         let big = [&[0, 0, 0, 0][..], &header, &[1]].concat();
-        let (_, to) = read_request::<SetBoolRequest>(&big, &origin(CYCLONE_VENDOR, None)).unwrap();
+        let (_, to) =
+            read_request::<SetBoolRequest>(Topics, &big, &origin(CYCLONE_VENDOR, None)).unwrap();
         let swapped = [7, 6, 5, 4, 3, 2, 1, 0, 15, 14, 13, 12, 11, 10, 9, 8];
         assert_eq!(to, ReplyTo::Cyclone(swapped));
     }
@@ -273,16 +291,16 @@ mod tests {
         let request = cdr::to_vec(&SetBoolRequest { data: true }).unwrap();
         let origin = origin(RUSTDDS_VENDOR, None);
         let writer = origin.sample.writer;
-        let asked = write_request(&request, &writer, &writer, 3).unwrap();
+        let asked = write_request(Topics, &request, &writer, &writer, 3).unwrap();
         let sent = [&[0, 1, 0, 0], &asked.body[..]].concat();
-        let (read, to) = read_request::<SetBoolRequest>(&sent, &origin).unwrap();
+        let (read, to) = read_request::<SetBoolRequest>(Topics, &sent, &origin).unwrap();
         assert!(read.data && asked.related.is_none());
         let (answer, _) = write_reply(&TriggerResponse::default(), &to).unwrap();
         let answer = [&[0, 1, 0, 0], &answer[..]].concat();
         let expected = cdr::to_vec(&TriggerResponse::default()).unwrap();
         let read = read_answer(&answer, &origin);
         assert_eq!(read, Some((asked.identity, expected)));
-        assert!(write_request(&[0, 0, 0, 0, 1], &writer, &writer, 3).is_none());
+        assert!(write_request(Topics, &[0, 0, 0, 0, 1], &writer, &writer, 3).is_none());
     }
 
     #[test]
@@ -290,7 +308,7 @@ mod tests {
         let request = cdr::to_vec(&SetBoolRequest { data: true }).unwrap();
         let ours = origin(RUSTDDS_VENDOR, None).sample.writer;
         let server = origin(FASTDDS_VENDOR, None).sample.writer;
-        let asked = write_request(&request, &ours, &server, 0x0403_0201).unwrap();
+        let asked = write_request(Topics, &request, &ours, &server, 0x0403_0201).unwrap();
         assert_eq!(asked.body[..], request[4..]);
         let named = asked.related.unwrap().writer;
         assert_eq!(named.0[..12], server.0[..12]);
@@ -304,12 +322,12 @@ mod tests {
     fn requests_of_secured_clients_have_a_header_unless_they_name_what_to_answer_to() {
         let secured = [0x9c, 0x0f];
         let headed = [&[0, 1, 0, 0][..], &[3; 16], &[1]].concat();
-        let read = read_request::<SetBoolRequest>(&headed, &origin(secured, None));
+        let read = read_request::<SetBoolRequest>(Topics, &headed, &origin(secured, None));
         assert_eq!(read.unwrap().1, ReplyTo::Cyclone([3; 16]));
         let (writer, number) = (EndpointId([9; 16]), 4);
         let related = SampleId { writer, number };
         let bare = [0, 1, 0, 0, 1];
-        let read = read_request::<SetBoolRequest>(&bare, &origin(secured, Some(related)));
+        let read = read_request::<SetBoolRequest>(Topics, &bare, &origin(secured, Some(related)));
         assert_eq!(read.unwrap().1, ReplyTo::Enhanced(related));
     }
 
@@ -318,14 +336,32 @@ mod tests {
         let header = [3; 16];
         let cyclone = [&[0, 1, 0, 0][..], &header, &[1]].concat();
         let unknown_vendor = origin([0x77, 0x77], None);
-        let (_, to) = read_request::<SetBoolRequest>(&cyclone, &unknown_vendor).unwrap();
+        let (_, to) = read_request::<SetBoolRequest>(Topics, &cyclone, &unknown_vendor).unwrap();
         assert_eq!(to, ReplyTo::Cyclone(header));
         for bytes in [
             &[][..],
             &[0, 1, 0, 0],
             &[0, 1, 0, 0, 5, 5, 5, 5, 5, 5, 5, 5, 5],
         ] {
-            assert!(read_request::<SetBoolRequest>(bytes, &unknown_vendor).is_err());
+            assert!(read_request::<SetBoolRequest>(Topics, bytes, &unknown_vendor).is_err());
         }
+    }
+
+    #[test]
+    fn queries_are_bare_whatever_their_first_bytes() {
+        let request = cdr::to_vec(&SetBoolRequest { data: true }).unwrap();
+        let origin = origin(CYCLONE_VENDOR, None);
+        let writer = origin.sample.writer;
+        let asked = write_request(Queries, &request, &writer, &writer, 3).unwrap();
+        assert_eq!(asked.body[..], request[4..]);
+        let (read, to) = read_request::<SetBoolRequest>(Queries, &request, &origin).unwrap();
+        assert!(read.data);
+        assert_eq!(to, ReplyTo::Enhanced(origin.sample));
+        let answer = Origin {
+            related: asked.related,
+            ..origin
+        };
+        let read = read_answer(&request, &answer);
+        assert_eq!(read, Some((asked.identity, request)));
     }
 }

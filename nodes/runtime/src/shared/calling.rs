@@ -13,16 +13,19 @@ use thiserror::Error;
 use super::{Shared, closed};
 use crate::error::RuntimeError;
 use crate::graph::{NodeEndpoint, NodeId};
-use crate::names;
 use crate::outbox::WhenFull;
 use crate::peers::Peers;
-use crate::port::{EndpointKind, PortTopic};
+use crate::port::{ClientEnds, EndpointKind, PortService, ServiceQos};
 use crate::qos::Qos;
 use crate::service::{Asking, LocalCall, Waiting};
 use crate::sync::lock;
 
-/// Longest answer that is taken.
-const MAX_ANSWER_BYTES: usize = 4 << 20;
+/// Answers are longer than requests.
+const QOS: ServiceQos = ServiceQos {
+    reader: Qos::SERVICES,
+    writer: Qos::SERVICES,
+    max_bytes: 4 << 20,
+};
 
 /// Reason why a call has no answer.
 #[derive(Debug, Error)]
@@ -78,8 +81,8 @@ impl Client {
         &self.0.name
     }
 
-    /// Asks with little-endian CDR, encapsulation header first; the answer is CDR too. Over Cyclone
-    /// DDS servers over rmw_fastrtps are not reached. A call that is dropped is over.
+    /// Asks with little-endian CDR, encapsulation header first; the answer is CDR too. A call that is
+    /// dropped is over.
     pub fn call(
         &self,
         request: Vec<u8>,
@@ -165,22 +168,23 @@ impl Shared {
 
     fn remote(&self, client: &Inner) -> Result<Remote, RuntimeError> {
         let name = &client.name;
-        let topic = |dds_name, ros_type| PortTopic {
+        let service = PortService {
+            node: &self.graph.node(client.node),
             name,
-            dds_name,
-            ros_type,
-            type_hash: None,
+            ros_type: client.service,
+            request: client.request,
+            response: client.response,
         };
-        let dds_answers = names::dds_reply(name);
-        let answers = topic(dds_answers.as_str(), client.response);
-        let answers = self.reader(answers, &Qos::SERVICES, MAX_ANSWER_BYTES)?;
-        let dds_requests = names::dds_request(name);
-        let requests = topic(dds_requests.as_str(), client.request);
-        let requests = self.outbox(requests, &Qos::SERVICES, WhenFull::Drop)?;
+        let ClientEnds {
+            form,
+            requests,
+            answers,
+        } = self.transport(name, |transport| transport.client(service, &QOS))?;
+        let requests = self.outbox_of(name, requests, WhenFull::Drop)?;
         let (reader, writer) = (EndpointKind::Reader, EndpointKind::Writer);
         let graph = [
-            (self.graph).join(client.node, reader, (answers.id(), &dds_answers)),
-            (self.graph).join(client.node, writer, (requests.id(), &dds_requests)),
+            (self.graph).join(client.node, reader, answers.id(), None),
+            (self.graph).join(client.node, writer, requests.id(), None),
         ];
         let [servers, answerers] = ["server", "answer writer"]
             .map(|kind| Arc::new(Peers::new(name, kind, log::Level::Debug)));
@@ -192,6 +196,7 @@ impl Shared {
         let next = AtomicI64::new(1);
         Ok(Remote {
             asking: Asking {
+                form,
                 requests,
                 servers,
                 answerers,

@@ -7,14 +7,7 @@ use crate::endpoints::Endpoints;
 use crate::graph::TOPIC;
 use crate::neighbours::GraphEndpoint;
 use crate::port::SampleReader;
-use crate::qos::Qos;
 use crate::sync::lock;
-
-/// Longest part of a participant that is taken.
-const MAX_PART_BYTES: usize = 1 << 20;
-
-/// The parts of many participants, which late joiners get.
-const PARTS: Qos = Qos::latched(100);
 
 impl Shared {
     /// Publishers, subscriptions and servers that are known by now, of all processes. The first call begins
@@ -23,9 +16,10 @@ impl Shared {
         if let Some(open) = lock(&self.open).as_mut()
             && open.graph_of_others.is_none()
         {
-            open.graph_of_others = match open.transport.reader(TOPIC, &PARTS, MAX_PART_BYTES) {
-                Ok(reader) => self.io.spawn(listen(reader, Arc::clone(&self.endpoints))),
-                Err(error) => {
+            open.graph_of_others = match open.transport.graph_reader() {
+                None => None,
+                Some(Ok(reader)) => self.io.spawn(listen(reader, Arc::clone(&self.endpoints))),
+                Some(Err(error)) => {
                     log::warn!("nodes elsewhere have no names: {error}");
                     None
                 }
@@ -47,7 +41,7 @@ async fn listen(reader: Box<dyn SampleReader>, endpoints: Arc<Endpoints>) {
             Err(error) => Err(error),
         };
         if let Err(error) = heard {
-            log::debug!("{}: {error}", TOPIC.name);
+            log::debug!("{TOPIC}: {error}");
         }
     }
 }

@@ -27,10 +27,12 @@ use super::error::RuntimeError;
 use super::graph::{self, Graph, NodeId};
 use super::local_bus::LocalBus;
 use super::outbox::{Outbox, WhenFull};
-use super::port::{PortTopic, SampleReader, Transport};
+use super::port::{PortTopic, SampleReader, SampleWriter, Transport};
 use super::publisher::PublisherParts;
 use super::qos::Qos;
 use super::remote::RemotePublisher;
+#[cfg(feature = "zenoh")]
+use super::rmw_zenoh::Zenoh;
 use super::security::Enclave;
 use super::service::{Answers, LocalServices, Server, Unanswered};
 use super::shutdown::Shutdown;
@@ -121,8 +123,15 @@ impl Shared {
         Ok(shared)
     }
 
+    /// Publishes which nodes there are, unless their endpoints name them.
     fn publish_graph(&self) -> Result<(), RuntimeError> {
-        let outbox = self.outbox(graph::TOPIC, &Qos::latched(1), WhenFull::Wait)?;
+        let writer = lock(&self.open)
+            .as_ref()
+            .and_then(|open| open.transport.graph_writer());
+        let Some(writer) = writer.transpose()? else {
+            return Ok(());
+        };
+        let outbox = self.outbox_of(graph::TOPIC, writer, WhenFull::Wait)?;
         if let Some(open) = lock(&self.open).as_mut() {
             let graph = Arc::clone(&self.graph);
             let transport = Arc::downgrade(&open.transport);
@@ -130,6 +139,15 @@ impl Shared {
             open.graph = self.io.spawn(publish).map(|task| (task, outbox));
         }
         Ok(())
+    }
+
+    /// Adds a node; it stays until the process ends.
+    pub(crate) fn add_node(&self, namespace: &str, name: &str) -> Result<NodeId, RuntimeError> {
+        let id = self.graph.add_node(namespace, name);
+        if let Some(open) = lock(&self.open).as_ref() {
+            open.transport.add_node(&self.graph.node(id))?;
+        }
+        Ok(id)
     }
 
     /// Keeps servers until shutdown.
@@ -146,14 +164,31 @@ impl Shared {
         qos: &Qos,
         when_full: WhenFull,
     ) -> Result<Arc<Outbox>, RuntimeError> {
-        let name = topic.name;
-        let guard = lock(&self.open);
-        let open = guard.as_ref().ok_or_else(|| closed(name))?;
-        let writer = open.transport.writer(topic, qos)?;
+        let writer = self.transport(topic.name, |transport| transport.writer(topic, qos))?;
+        self.outbox_of(topic.name, writer, when_full)
+    }
+
+    fn outbox_of(
+        &self,
+        name: &str,
+        writer: Arc<dyn SampleWriter>,
+        when_full: WhenFull,
+    ) -> Result<Arc<Outbox>, RuntimeError> {
         let (outbox, task) = Outbox::new(name, writer, when_full, QUEUE_MESSAGES, QUEUE_BYTES);
         let task = self.publishing.spawn(task);
         task.ok_or_else(|| closed(name))?.detach();
         Ok(Arc::new(outbox))
+    }
+
+    /// What `make` makes of the transport, for the topic or service `name`.
+    fn transport<T>(
+        &self,
+        name: &str,
+        make: impl FnOnce(&dyn Transport) -> Result<T, RuntimeError>,
+    ) -> Result<T, RuntimeError> {
+        let guard = lock(&self.open);
+        let open = guard.as_ref().ok_or_else(|| closed(name))?;
+        make(&*open.transport)
     }
 
     /// A reader of samples up to `max_bytes`.
@@ -163,9 +198,9 @@ impl Shared {
         qos: &Qos,
         max_bytes: usize,
     ) -> Result<Box<dyn SampleReader>, RuntimeError> {
-        let guard = lock(&self.open);
-        let open = guard.as_ref().ok_or_else(|| closed(topic.name))?;
-        open.transport.reader(topic, qos, max_bytes)
+        self.transport(topic.name, |transport| {
+            transport.reader(topic, qos, max_bytes)
+        })
     }
 
     /// The time on `topic`, subscribed to at the first call.
@@ -281,10 +316,12 @@ impl Shared {
     }
 }
 
-/// The participant of the process, over the transport that the environment names.
+/// The participant or session of the process, over the transport that the environment names.
 fn join(network: &Network, enclave: &Enclave) -> Result<Arc<dyn Transport>, RuntimeError> {
     match network.transport {
         TransportKind::Dds => Ok(Arc::new(Cyclone::join(network, enclave)?)),
+        #[cfg(feature = "zenoh")]
+        TransportKind::Zenoh => Ok(Arc::new(Zenoh::open(network, enclave)?)),
     }
 }
 

@@ -9,7 +9,7 @@ use super::Shared;
 use crate::error::RuntimeError;
 use crate::graph::NodeId;
 use crate::local_bus::LocalEndpoint;
-use crate::names;
+use crate::neighbours::GraphRole;
 use crate::outbox::WhenFull;
 use crate::peers::Peers;
 use crate::port::{EndpointKind, PortTopic};
@@ -63,22 +63,22 @@ impl Shared {
     ) -> Result<Arc<PublisherParts>, RuntimeError> {
         let peers = Arc::new(Peers::new(topic, "subscriber", log::Level::Info));
         let local = join(&peers)?;
-        let dds_name = names::dds_topic(topic);
         let port_topic = PortTopic {
+            node: &self.graph.node(node),
             name: topic,
-            dds_name: &dds_name,
             ros_type,
             type_hash,
         };
         let writer = self.outbox(port_topic, qos, when_full)?;
         let id = writer.id();
+        let of = Some((GraphRole::Publisher, topic.to_owned()));
         let parts = Arc::new(PublisherParts {
             writer,
             peers: Arc::clone(&peers),
             local,
             latch: (qos.kept() > 0).then(|| Mutex::new(Latch::new(qos))),
             shutdown: self.shutdown.clone(),
-            _graph: (self.graph).join(node, EndpointKind::Writer, (id, &dds_name)),
+            _graph: (self.graph).join(node, EndpointKind::Writer, id, of),
         });
         if let Some(open) = lock(&self.open).as_mut() {
             open.publishers.retain(|p| p.strong_count() > 0);

@@ -11,16 +11,20 @@ use super::{Shared, closed};
 use crate::error::RuntimeError;
 use crate::graph::NodeId;
 use crate::logging::Throttle;
-use crate::names;
+use crate::neighbours::GraphRole;
 use crate::outbox::WhenFull;
 use crate::peers::Peers;
-use crate::port::{EndpointKind, PortTopic};
+use crate::port::{EndpointKind, PortService, ServerEnds, ServiceQos};
 use crate::qos::Qos;
 use crate::service::{Reply, Server, Serving, Unanswered};
 use crate::sync::lock;
 
 /// Requests are short.
-const MAX_REQUEST_BYTES: usize = 1 << 20;
+const QOS: ServiceQos = ServiceQos {
+    reader: Qos::REQUESTS,
+    writer: Qos::SERVICES,
+    max_bytes: 1 << 20,
+};
 
 /// Between two warnings of unreadable requests.
 const WARNING_PERIOD: Duration = Duration::from_secs(5);
@@ -35,27 +39,25 @@ impl Shared {
         handler: impl FnMut(S::Request, Reply<S::Response>) + Send + 'static,
     ) -> Result<Server, RuntimeError> {
         let clients = Arc::new(Peers::new(name, "client", log::Level::Debug));
-        let dds_requests = names::dds_request(name);
-        let topic = PortTopic {
-            name,
-            dds_name: &dds_requests,
-            ros_type: S::Request::TYPE,
-            type_hash: None,
-        };
-        let requests = self.reader(topic, &Qos::REQUESTS, MAX_REQUEST_BYTES)?;
         let readers = Arc::new(Peers::new(name, "reply reader", log::Level::Debug));
-        let dds_replies = names::dds_reply(name);
-        let topic = PortTopic {
+        let service = PortService {
+            node: &self.graph.node(node),
             name,
-            dds_name: &dds_replies,
-            ros_type: S::Response::TYPE,
-            type_hash: None,
+            ros_type: S::TYPE,
+            request: S::Request::TYPE,
+            response: S::Response::TYPE,
         };
-        let replies = self.outbox(topic, &Qos::SERVICES, WhenFull::Drop)?;
+        let ServerEnds {
+            form,
+            requests,
+            replies,
+        } = self.transport(name, |transport| transport.server(service, &QOS))?;
+        let replies = self.outbox_of(name, replies, WhenFull::Drop)?;
         let (reader, writer) = (EndpointKind::Reader, EndpointKind::Writer);
+        let of = Some((GraphRole::Server, name.to_owned()));
         let graph = [
-            (self.graph).join(node, reader, (requests.id(), &dds_requests)),
-            (self.graph).join(node, writer, (replies.id(), &dds_replies)),
+            (self.graph).join(node, reader, requests.id(), of),
+            (self.graph).join(node, writer, replies.id(), None),
         ];
         self.endpoints.register(requests.id(), &clients);
         self.endpoints.register(replies.id(), &readers);
@@ -72,6 +74,7 @@ impl Shared {
             open.unanswered.push(Arc::downgrade(&unanswered));
         }
         let serving = Serving {
+            form,
             unanswered,
             requests,
             local: self.services.add(name, S::TYPE),

@@ -12,7 +12,7 @@ use super::{Shared, closed};
 use crate::error::RuntimeError;
 use crate::graph::NodeId;
 use crate::local_bus::{AnyMessage, LocalEndpoint, Topic};
-use crate::names;
+use crate::neighbours::GraphRole;
 use crate::peers::Peers;
 use crate::port::{EndpointKind, PortTopic};
 use crate::qos::{Durability, Qos};
@@ -95,15 +95,15 @@ impl Shared {
         let (place, lost) = (self.bus.topic(topic), Arc::clone(&stats.lost));
         let latched = qos.durability == Durability::TransientLocal;
         let place = join(&place, &peers, sender.clone(), lost, latched)?;
-        let dds_name = names::dds_topic(topic);
         let port_topic = PortTopic {
+            node: &self.graph.node(node),
             name: topic,
-            dds_name: &dds_name,
             ros_type: type_name,
             type_hash: None,
         };
         let reader = self.reader(port_topic, qos, max_bytes)?;
         let id = reader.id();
+        let of = Some((GraphRole::Subscriber, topic.to_owned()));
         let (orders, given) = unbounded();
         let intake = Arc::new(Intake {
             topic: topic.to_owned(),
@@ -111,7 +111,7 @@ impl Shared {
             peers: Arc::clone(&peers),
             stats: Arc::clone(&stats),
             orders,
-            _graph: (self.graph).join(node, EndpointKind::Reader, (id, &dds_name)),
+            _graph: (self.graph).join(node, EndpointKind::Reader, id, of),
         });
         let source = Source {
             reader,

@@ -1,28 +1,27 @@
 //! Samples of a reader that wait for its task: the last of them, as its history says.
 
 use std::collections::VecDeque;
+use std::iter;
 use std::sync::Mutex;
 use std::sync::atomic::{AtomicU64, Ordering::Relaxed};
-use std::task::Waker;
+use std::task::{Context, Poll};
 
 use futures::task::AtomicWaker;
-use lattice_cyclone_sys::dds_entity_t;
 
-use super::sample::{Taken, take};
-use crate::sync::lock;
+use super::sync::lock;
 
-/// Samples that were taken out of Cyclone as they came. Cyclone's own history would overwrite what nobody
+/// Samples that were taken out of the transport as they came. Its own history would overwrite what nobody
 /// takes without a word; here it is counted.
-pub(super) struct Arrivals {
+pub(crate) struct Arrivals<T> {
     depth: usize,
-    waiting: Mutex<VecDeque<Taken>>,
+    waiting: Mutex<VecDeque<T>>,
     overwritten: AtomicU64,
     waker: AtomicWaker,
 }
 
-impl Arrivals {
+impl<T> Arrivals<T> {
     /// For a history of the last `depth` samples.
-    pub(super) fn new(depth: usize) -> Self {
+    pub(crate) fn new(depth: usize) -> Self {
         Self {
             depth: depth.max(1),
             waiting: Mutex::default(),
@@ -31,10 +30,10 @@ impl Arrivals {
         }
     }
 
-    /// Takes what the reader has, and wakes the task that waits for it.
-    pub(super) fn take_from(&self, reader: dds_entity_t) {
+    /// Takes what `next` gives until it gives no more, and wakes the task that waits for it.
+    pub(crate) fn take_from(&self, next: impl FnMut() -> Option<T>) {
         let mut waiting = lock(&self.waiting);
-        while let Some(sample) = take(reader) {
+        for sample in iter::from_fn(next) {
             if waiting.len() >= self.depth {
                 let _ = waiting.pop_front();
                 let _ = self.overwritten.fetch_add(1, Relaxed);
@@ -46,17 +45,22 @@ impl Arrivals {
     }
 
     /// The oldest sample that waits.
-    pub(super) fn pop(&self) -> Option<Taken> {
+    fn pop(&self) -> Option<T> {
         lock(&self.waiting).pop_front()
     }
 
     /// Samples that gave way to newer ones since the last call.
-    pub(super) fn overwritten(&self) -> u64 {
+    pub(crate) fn overwritten(&self) -> u64 {
         self.overwritten.swap(0, Relaxed)
     }
 
-    /// Has the next arrival wake a task.
-    pub(super) fn register(&self, waker: &Waker) {
-        self.waker.register(waker);
+    /// The oldest sample that waits, or the task is woken when the next comes.
+    pub(crate) fn poll_next(&self, context: &mut Context<'_>) -> Poll<T> {
+        if let Some(sample) = self.pop() {
+            return Poll::Ready(sample);
+        }
+        self.waker.register(context.waker());
+        // Something may have arrived before the waker was in place.
+        self.pop().map_or(Poll::Pending, Poll::Ready)
     }
 }

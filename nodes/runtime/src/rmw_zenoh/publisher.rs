@@ -1,0 +1,188 @@
+//! Publishers: samples go out one after the other, by threads that may wait for a full link.
+
+use std::sync::Arc;
+use std::sync::Mutex;
+use std::sync::atomic::{AtomicI64, Ordering::Relaxed};
+use std::time::{Duration, Instant};
+
+use futures::future::{BoxFuture, Either, select};
+use smol::{Task, Timer, block_on};
+use zenoh::Wait;
+use zenoh::bytes::ZBytes;
+use zenoh::liveliness::LivelinessToken;
+use zenoh::pubsub::Publisher;
+use zenoh::qos::CongestionControl;
+use zenoh::sample::Locality;
+use zenoh_ext::{AdvancedPublisher, AdvancedPublisherBuilderExt, CacheConfig, MissDetectionConfig};
+
+use super::attachment::attachment;
+use super::graph::Place;
+use crate::port::{Bytes, EndpointId, SampleId, SampleWriter, WriteRefusal};
+use crate::qos::{Durability, Qos, Reliability};
+use crate::sync::lock;
+
+/// Encapsulation header of little-endian CDR.
+const LITTLE_ENDIAN: [u8; 4] = [0, 1, 0, 0];
+
+/// Between two notes of the last number, by which subscribers find out what they miss; that of rmw_zenoh.
+const HEARTBEAT: Duration = Duration::from_millis(500);
+
+/// A publisher with or without a cache for late joiners.
+enum Sender {
+    Plain(Publisher<'static>),
+    Cached(AdvancedPublisher<'static>),
+}
+
+impl Sender {
+    fn put(&self, payload: ZBytes, attachment: ZBytes) -> zenoh::Result<()> {
+        match self {
+            Self::Plain(publisher) => publisher.put(payload).attachment(attachment).wait(),
+            Self::Cached(publisher) => publisher.put(payload).attachment(attachment).wait(),
+        }
+    }
+}
+
+/// Writes samples of one topic.
+pub(super) struct ZenohPublisher {
+    id: EndpointId,
+    sender: Arc<Sender>,
+    next: AtomicI64,
+    queue: InTurn,
+    // In this order: the token goes before the publisher.
+    _token: LivelinessToken,
+    _place: Place,
+}
+
+impl ZenohPublisher {
+    pub(super) fn new(
+        session: &zenoh::Session,
+        (id, key): (EndpointId, String),
+        qos: &Qos,
+        announce: impl FnOnce() -> zenoh::Result<(LivelinessToken, Place)>,
+    ) -> zenoh::Result<Self> {
+        // Local subscriptions get theirs without the network.
+        let builder = session
+            .declare_publisher(key)
+            .allowed_destination(Locality::Remote)
+            .congestion_control(congestion_control(qos));
+        let sender = match qos.durability {
+            Durability::Volatile => Sender::Plain(builder.wait()?),
+            Durability::TransientLocal => {
+                let cache = CacheConfig::default().max_samples(qos.kept());
+                let cached = builder.cache(cache).publisher_detection();
+                Sender::Cached(match qos.reliability {
+                    Reliability::BestEffort => cached.wait()?,
+                    Reliability::Reliable => {
+                        let misses = MissDetectionConfig::default().sporadic_heartbeat(HEARTBEAT);
+                        cached.sample_miss_detection(misses).wait()?
+                    }
+                })
+            }
+        };
+        let (token, place) = announce()?;
+        Ok(Self {
+            id,
+            sender: Arc::new(sender),
+            next: AtomicI64::new(1),
+            queue: InTurn::default(),
+            _token: token,
+            _place: place,
+        })
+    }
+}
+
+/// What is reliable waits for a link that is full: rmw_zenoh does so if all history is kept, and else drops.
+pub(super) fn congestion_control(qos: &Qos) -> CongestionControl {
+    match qos.reliability {
+        Reliability::Reliable => CongestionControl::Block,
+        Reliability::BestEffort => CongestionControl::Drop,
+    }
+}
+
+/// A body behind its encapsulation header, without a copy.
+pub(super) fn payload(body: Bytes) -> ZBytes {
+    let mut payload = ZBytes::writer();
+    payload.append(ZBytes::from(LITTLE_ENDIAN.to_vec()));
+    payload.append(ZBytes::from(body));
+    payload.finish()
+}
+
+impl SampleWriter for ZenohPublisher {
+    fn id(&self) -> EndpointId {
+        self.id
+    }
+
+    fn write(&self, body: Bytes, _: Option<SampleId>) -> BoxFuture<'_, Result<(), WriteRefusal>> {
+        self.queue.write(body, move |body| {
+            let sample = SampleId {
+                writer: self.id,
+                number: self.next.fetch_add(1, Relaxed),
+            };
+            let (sender, attachment) = (Arc::clone(&self.sender), attachment(sample));
+            move || sender.put(payload(body), attachment)
+        })
+    }
+
+    fn wait_for_acknowledgments(&self, patience: Duration) -> bool {
+        self.queue.wait(patience)
+    }
+}
+
+/// Hands samples to Zenoh one after the other, on threads where waiting holds up nobody.
+#[derive(Default)]
+pub(super) struct InTurn(Mutex<Option<Running>>);
+
+/// A sample that is handed over.
+struct Running {
+    body: Bytes,
+    task: Task<zenoh::Result<()>>,
+}
+
+impl InTurn {
+    /// Hands over a body by what `prepare` makes of it. A future that is dropped does not end what it began: the
+    /// same body again waits for that.
+    pub(super) fn write<'a, F>(
+        &'a self,
+        body: Bytes,
+        prepare: impl FnOnce(Bytes) -> F + Send + 'a,
+    ) -> BoxFuture<'a, Result<(), WriteRefusal>>
+    where
+        F: FnOnce() -> zenoh::Result<()> + Send + 'static,
+    {
+        Box::pin(async move {
+            let is_again = lock(&self.0).as_ref().is_some_and(|running| {
+                (running.body.as_ptr(), running.body.len()) == (body.as_ptr(), body.len())
+            });
+            if !is_again {
+                // Its own fate is not that of this sample.
+                let _ = self.finished().await;
+                let task = smol::unblock(prepare(body.clone()));
+                *lock(&self.0) = Some(Running { body, task });
+            }
+            let written = self.finished().await;
+            written.map_err(|error| WriteRefusal::Failed(error.to_string()))
+        })
+    }
+
+    /// Completes when nothing is under way.
+    async fn finished(&self) -> zenoh::Result<()> {
+        std::future::poll_fn(|context| {
+            let mut running = lock(&self.0);
+            let Some(Running { task, .. }) = running.as_mut() else {
+                return std::task::Poll::Ready(Ok(()));
+            };
+            let result = std::task::ready!(std::pin::Pin::new(task).poll(context));
+            *running = None;
+            std::task::Poll::Ready(result)
+        })
+        .await
+    }
+
+    /// Waits until nothing is under way. False: not in time.
+    pub(super) fn wait(&self, patience: Duration) -> bool {
+        let finished = std::pin::pin!(self.finished());
+        let end = Instant::now().checked_add(patience);
+        let late = end.map_or_else(Timer::never, Timer::at);
+        matches!(block_on(select(finished, late)), Either::Left(_))
+    }
+}

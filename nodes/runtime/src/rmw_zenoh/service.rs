@@ -1,0 +1,269 @@
+//! Services: a server is a queryable, a call a query that carries the request.
+
+use std::collections::VecDeque;
+use std::sync::atomic::{AtomicU64, Ordering::Relaxed};
+use std::sync::{Arc, Mutex, MutexGuard};
+use std::task::{Context, Poll};
+use std::time::Duration;
+
+use futures::future::BoxFuture;
+use zenoh::Wait;
+use zenoh::liveliness::LivelinessToken;
+use zenoh::query::{ConsolidationMode, Query, QueryTarget, Queryable};
+use zenoh::sample::Locality;
+
+use super::attachment::{attachment, read};
+use super::graph::Place;
+use super::publisher::{InTurn, payload};
+use super::subscriber::Inbox;
+use crate::port::{
+    Bytes, ClientEnds, EndpointId, Origin, SampleId, SampleReader, SampleWriter, ServerEnds,
+    ServiceForm, ServiceQos, WriteRefusal,
+};
+use crate::sync::lock;
+
+/// Longest time that a server has to answer, that of rmw_zenoh; callers have their own.
+const QUERY_TIMEOUT: Duration = Duration::from_secs(600);
+
+/// Requests that wait for their replies, at most; of more, the oldest are given up.
+const MAX_PENDING: usize = 4096;
+
+/// Liveliness token and place in the graph; both go with the endpoint.
+type Announced = (LivelinessToken, Place);
+
+/// A server of a key.
+struct Server {
+    id: EndpointId,
+    key: String,
+    inbox: Arc<Inbox>,
+    pending: Arc<Pending>,
+    queue: InTurn,
+    _announced: Announced,
+    _queryable: Queryable<()>,
+}
+
+/// Queries whose reply is still to come.
+#[derive(Default)]
+struct Pending {
+    queries: Mutex<VecDeque<(SampleId, Query)>>,
+    given_up: AtomicU64,
+}
+
+impl Pending {
+    fn add(&self, request: SampleId, query: Query) {
+        let mut queries = lock(&self.queries);
+        if queries.len() >= MAX_PENDING {
+            let _ = queries.pop_front();
+            let _ = self.given_up.fetch_add(1, Relaxed);
+        }
+        queries.push_back((request, query));
+    }
+
+    fn take(&self, request: &SampleId) -> Option<Query> {
+        let mut queries = lock(&self.queries);
+        let place = queries.iter().position(|(known, _)| known == request)?;
+        queries.remove(place).map(|(_, query)| query)
+    }
+}
+
+/// Identity of the second end of an endpoint that has one token.
+fn other_end(id: EndpointId) -> EndpointId {
+    EndpointId(id.0.map(|byte| !byte))
+}
+
+/// Both ends of a server.
+pub(super) fn serve(
+    session: &zenoh::Session,
+    (id, key): (EndpointId, String),
+    qos: &ServiceQos,
+    announce: impl FnOnce() -> zenoh::Result<Announced>,
+) -> zenoh::Result<ServerEnds> {
+    let inbox = Inbox::new(qos.reader.depth, qos.max_bytes);
+    let pending = Arc::new(Pending::default());
+    let (to, asked) = (Arc::clone(&inbox), Arc::clone(&pending));
+    let queryable = session
+        .declare_queryable(&key)
+        // It answers whatever is asked of its key.
+        .complete(true)
+        .allowed_origin(Locality::Remote)
+        .callback(move |query| ask(query, &to, &asked))
+        .wait()?;
+    let server = Arc::new(Server {
+        id,
+        key,
+        inbox,
+        pending,
+        queue: InTurn::default(),
+        _announced: announce()?,
+        _queryable: queryable,
+    });
+    Ok(ServerEnds {
+        form: ServiceForm::Queries,
+        requests: Box::new(Requests(Arc::clone(&server))),
+        replies: Arc::new(Replies(server)),
+    })
+}
+
+fn ask(query: Query, inbox: &Inbox, pending: &Pending) {
+    let payload = query.payload().cloned().unwrap_or_default();
+    let origin = read(query.attachment()).map(|sample| Origin {
+        sample,
+        related: None,
+    });
+    if let Ok(origin) = &origin {
+        pending.add(origin.sample, query);
+    }
+    inbox.push(payload, origin);
+}
+
+struct Requests(Arc<Server>);
+
+impl SampleReader for Requests {
+    fn id(&self) -> EndpointId {
+        self.0.id
+    }
+
+    fn poll_next(&self, context: &mut Context<'_>) -> Poll<Result<Origin, String>> {
+        self.0.inbox.poll_next(context)
+    }
+
+    fn bytes(&self) -> MutexGuard<'_, Vec<u8>> {
+        self.0.inbox.bytes()
+    }
+
+    fn missed(&self) -> u64 {
+        let given_up = self.0.pending.given_up.swap(0, Relaxed);
+        given_up.saturating_add(self.0.inbox.overwritten())
+    }
+}
+
+struct Replies(Arc<Server>);
+
+impl SampleWriter for Replies {
+    fn id(&self) -> EndpointId {
+        other_end(self.0.id)
+    }
+
+    fn write(
+        &self,
+        body: Bytes,
+        related: Option<SampleId>,
+    ) -> BoxFuture<'_, Result<(), WriteRefusal>> {
+        let found = related.and_then(|request| Some((request, self.0.pending.take(&request)?)));
+        let key = self.0.key.clone();
+        self.0.queue.write(body, move |body| {
+            move || match found {
+                Some((request, query)) => query
+                    .reply(key, payload(body))
+                    .attachment(attachment(request))
+                    .wait(),
+                None => Err("the request is no longer known".into()),
+            }
+        })
+    }
+
+    fn wait_for_acknowledgments(&self, patience: Duration) -> bool {
+        self.0.queue.wait(patience)
+    }
+}
+
+/// A client of a key.
+struct Client {
+    id: EndpointId,
+    session: zenoh::Session,
+    key: String,
+    inbox: Arc<Inbox>,
+    queue: InTurn,
+    _announced: Announced,
+}
+
+/// Both ends of a client.
+pub(super) fn call(
+    session: &zenoh::Session,
+    (id, key): (EndpointId, String),
+    qos: &ServiceQos,
+    announce: impl FnOnce() -> zenoh::Result<Announced>,
+) -> zenoh::Result<ClientEnds> {
+    let client = Arc::new(Client {
+        id,
+        session: session.clone(),
+        key,
+        inbox: Inbox::new(qos.reader.depth, qos.max_bytes),
+        queue: InTurn::default(),
+        _announced: announce()?,
+    });
+    Ok(ClientEnds {
+        form: ServiceForm::Queries,
+        requests: Arc::new(Calls(Arc::clone(&client))),
+        answers: Box::new(Answers(client)),
+    })
+}
+
+struct Calls(Arc<Client>);
+
+impl SampleWriter for Calls {
+    fn id(&self) -> EndpointId {
+        self.0.id
+    }
+
+    fn write(
+        &self,
+        body: Bytes,
+        related: Option<SampleId>,
+    ) -> BoxFuture<'_, Result<(), WriteRefusal>> {
+        let client = Arc::clone(&self.0);
+        self.0.queue.write(body, move |body| {
+            let request = SampleId {
+                writer: client.id,
+                number: related.map_or(0, |request| request.number),
+            };
+            let to = Arc::clone(&client.inbox);
+            // An error of Zenoh is no answer; the call ends by time.
+            let hear = move |reply: zenoh::query::Reply| {
+                if let Ok(sample) = reply.into_result() {
+                    let origin = Origin {
+                        sample: request,
+                        related,
+                    };
+                    to.push(sample.payload().clone(), Ok(origin));
+                }
+            };
+            move || {
+                client
+                    .session
+                    .get(&client.key)
+                    .payload(payload(body))
+                    .attachment(attachment(request))
+                    .target(QueryTarget::AllComplete)
+                    .consolidation(ConsolidationMode::None)
+                    .timeout(QUERY_TIMEOUT)
+                    .callback(hear)
+                    .wait()
+            }
+        })
+    }
+
+    fn wait_for_acknowledgments(&self, patience: Duration) -> bool {
+        self.0.queue.wait(patience)
+    }
+}
+
+struct Answers(Arc<Client>);
+
+impl SampleReader for Answers {
+    fn id(&self) -> EndpointId {
+        other_end(self.0.id)
+    }
+
+    fn poll_next(&self, context: &mut Context<'_>) -> Poll<Result<Origin, String>> {
+        self.0.inbox.poll_next(context)
+    }
+
+    fn bytes(&self) -> MutexGuard<'_, Vec<u8>> {
+        self.0.inbox.bytes()
+    }
+
+    fn missed(&self) -> u64 {
+        self.0.inbox.overwritten()
+    }
+}
