@@ -6,6 +6,7 @@ use std::process::{Command, Stdio};
 use lattice_nodes::executables;
 use lattice_nodes::start::Finish;
 use lattice_runtime::Runtime;
+use lattice_runtime::env::Network;
 use lattice_runtime::ros_args::RosArgs;
 use serde_json::Value;
 
@@ -18,11 +19,16 @@ pub struct Nodes(Vec<(Runtime, Finish)>);
 impl Nodes {
     /// Starts nodes with their parameters, each with a participant of its own.
     pub fn start(domain: &TestDomain, nodes: &[(&str, Vec<String>)]) -> Self {
+        Self::start_on(&domain.transport(), nodes)
+    }
+
+    /// The same on a network.
+    pub fn start_on(network: &Network, nodes: &[(&str, Vec<String>)]) -> Self {
         let start = |(name, params): &(&str, Vec<String>)| {
             let params = params.iter().flat_map(|param| ["-p", param]);
             let args = ["--ros-args"].into_iter().chain(params).map(str::to_owned);
             let args = RosArgs::parse(args).unwrap();
-            let runtime = Runtime::with_transport(name, args, &domain.transport()).unwrap();
+            let runtime = Runtime::with_transport(name, args, network).unwrap();
             let finish = executables::find(name).unwrap()(&runtime, name).unwrap();
             (runtime, finish)
         };

@@ -18,6 +18,12 @@ pub fn ros_pythons() -> Vec<PathBuf> {
     all.map_or_else(Vec::new, |all| std::env::split_paths(&all).collect())
 }
 
+/// The interpreter that `LATTICE_ZENOH_PYTHON` names, one with `test/python/requirements-zenoh.txt` installed. None: as
+/// of [`python`].
+pub fn zenoh_python() -> Option<PathBuf> {
+    named("LATTICE_ZENOH_PYTHON", "requirements-zenoh.txt")
+}
+
 fn named(variable: &str, requirements: &str) -> Option<PathBuf> {
     let Some(python) = std::env::var_os(variable) else {
         let test = std::thread::current().name().unwrap_or_default().to_owned();

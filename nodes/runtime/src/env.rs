@@ -14,6 +14,9 @@ const LOCALHOST_ONLY: &str = "ROS_LOCALHOST_ONLY";
 const DISCOVERY_RANGE: &str = "ROS_AUTOMATIC_DISCOVERY_RANGE";
 const STATIC_PEERS: &str = "ROS_STATIC_PEERS";
 const IMPLEMENTATION: &str = "RMW_IMPLEMENTATION";
+pub(crate) const ZENOH_SESSION_CONFIG: &str = "ZENOH_SESSION_CONFIG_URI";
+pub(crate) const ZENOH_OVERRIDE: &str = "ZENOH_CONFIG_OVERRIDE";
+pub(crate) const ZENOH_CHECK_ATTEMPTS: &str = "ZENOH_ROUTER_CHECK_ATTEMPTS";
 
 /// The transport under the nodes.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
@@ -65,10 +68,23 @@ pub struct Network {
     pub transport: TransportKind,
     /// DDS Security, where it is switched on.
     pub security: Option<Security>,
+    /// Settings of the session on Zenoh.
+    pub zenoh: ZenohSettings,
     /// Lines for the log.
     pub warnings: Vec<String>,
     /// The same, of level INFO.
     pub notes: Vec<String>,
+}
+
+/// Variables of rmw_zenoh, as they are given.
+#[derive(Clone, Debug, Default, PartialEq, Eq)]
+pub struct ZenohSettings {
+    /// `ZENOH_SESSION_CONFIG_URI`: a file of Zenoh.
+    pub session_config: Option<String>,
+    /// `ZENOH_CONFIG_OVERRIDE`: `KEY=VALUE` for each setting, separated by `;`.
+    pub overrides: Option<String>,
+    /// `ZENOH_ROUTER_CHECK_ATTEMPTS`.
+    pub router_check: Option<String>,
 }
 
 /// A variable has a value that nothing can be made of.
@@ -157,6 +173,11 @@ impl Network {
             discovery_off,
             static_peers,
             transport,
+            zenoh: ZenohSettings {
+                session_config: get(ZENOH_SESSION_CONFIG),
+                overrides: get(ZENOH_OVERRIDE),
+                router_check: get(ZENOH_CHECK_ATTEMPTS),
+            },
             security: Security::from_lookup(lookup),
             warnings,
             notes,

@@ -5,11 +5,10 @@ use std::time::Duration;
 
 use zenoh::Config;
 
-use crate::env::Network;
-
-const SESSION_CONFIG: &str = "ZENOH_SESSION_CONFIG_URI";
-const OVERRIDE: &str = "ZENOH_CONFIG_OVERRIDE";
-const CHECK_ATTEMPTS: &str = "ZENOH_ROUTER_CHECK_ATTEMPTS";
+use crate::env::{
+    Network, ZENOH_CHECK_ATTEMPTS as CHECK_ATTEMPTS, ZENOH_OVERRIDE as OVERRIDE,
+    ZENOH_SESSION_CONFIG as SESSION_CONFIG,
+};
 
 /// Between two looks for a router.
 pub(super) const CHECK_PERIOD: Duration = Duration::from_secs(1);
@@ -53,17 +52,15 @@ pub(super) enum RouterCheck {
     Skipped,
 }
 
-/// Configuration that the environment `get` asks for; an empty variable counts as unset.
-pub(super) fn config(
-    network: &Network,
-    get: impl Fn(&str) -> Option<String>,
-) -> Result<(Config, RouterCheck), String> {
-    let get = |name| get(name).filter(|value| !value.trim().is_empty());
-    let mut config = match get(SESSION_CONFIG) {
+/// Configuration that the network asks for.
+pub(super) fn config(network: &Network) -> Result<(Config, RouterCheck), String> {
+    let given = &network.zenoh;
+    let mut config = match &given.session_config {
         Some(path) => from_file(path.trim())?,
         None => Config::from_json5(DEFAULT).map_err(|error| error.to_string())?,
     };
-    for pair in get(OVERRIDE).iter().flat_map(|pairs| pairs.split(';')) {
+    let overrides = given.overrides.as_deref().unwrap_or_default();
+    for pair in overrides.split(';') {
         if !pair.trim().is_empty() {
             insert(&mut config, pair)?;
         }
@@ -78,7 +75,7 @@ pub(super) fn config(
             insert(&mut config, pair)?;
         }
     }
-    let check = match get(CHECK_ATTEMPTS) {
+    let check = match &given.router_check {
         _ if network.discovery_off => RouterCheck::Skipped,
         None => RouterCheck::Attempts(1),
         Some(text) => match text.trim().parse::<i64>() {
@@ -134,14 +131,23 @@ pub(super) fn warnings(network: &Network) -> Vec<&'static str> {
 #[cfg(test)]
 mod tests {
     use super::*;
+    use crate::env::ZenohSettings;
 
-    fn read(variables: &[(&str, &str)]) -> Result<(Config, RouterCheck), String> {
-        let mut network = Network::from_env().unwrap();
-        network.discovery_off = false;
-        config(&network, |name| {
-            let found = variables.iter().find(|(key, _)| *key == name);
-            found.map(|(_, value)| (*value).to_owned())
-        })
+    fn network(variable: &str, value: &str) -> Network {
+        let given = |name| (name == variable).then(|| value.to_owned());
+        Network {
+            discovery_off: false,
+            zenoh: ZenohSettings {
+                session_config: given(SESSION_CONFIG),
+                overrides: given(OVERRIDE),
+                router_check: given(CHECK_ATTEMPTS),
+            },
+            ..Network::from_env().unwrap()
+        }
+    }
+
+    fn read(variable: &str, value: &str) -> Result<(Config, RouterCheck), String> {
+        config(&network(variable, value))
     }
 
     fn value(config: &Config, key: &str) -> String {
@@ -150,7 +156,7 @@ mod tests {
 
     #[test]
     fn the_default_is_that_of_rmw_zenoh() {
-        let (config, check) = read(&[]).unwrap();
+        let (config, check) = read("", "").unwrap();
         assert_eq!(check, RouterCheck::Attempts(1));
         for (key, expected) in [
             ("mode", "\"peer\""),
@@ -166,11 +172,11 @@ mod tests {
     #[test]
     fn overrides_are_applied_in_turn_and_wrong_ones_are_named() {
         let given = "mode=\"client\"; scouting/multicast/enabled=true;;";
-        let (config, _) = read(&[(OVERRIDE, given)]).unwrap();
+        let (config, _) = read(OVERRIDE, given).unwrap();
         assert_eq!(value(&config, "mode"), "\"client\"");
         assert_eq!(value(&config, "scouting/multicast/enabled"), "true");
         for wrong in ["mode", "mode=\"cook\"", "no/such/key=1"] {
-            let error = read(&[(OVERRIDE, wrong)]).unwrap_err();
+            let error = read(OVERRIDE, wrong).unwrap_err();
             assert!(error.contains(OVERRIDE) && error.contains(wrong), "{error}");
         }
     }
@@ -182,10 +188,10 @@ mod tests {
         std::fs::write(path("a.json5"), "{ mode: \"client\" }").unwrap();
         std::fs::write(path("b.json5"), "{ mode: ").unwrap();
         std::fs::write(path("c.txt"), "{}").unwrap();
-        let (config, _) = read(&[(SESSION_CONFIG, &path("a.json5"))]).unwrap();
+        let (config, _) = read(SESSION_CONFIG, &path("a.json5")).unwrap();
         assert_eq!(value(&config, "mode"), "\"client\"");
         for name in ["b.json5", "c.txt", "none.json5"] {
-            let error = read(&[(SESSION_CONFIG, &path(name))]).unwrap_err();
+            let error = read(SESSION_CONFIG, &path(name)).unwrap_err();
             assert!(error.contains(name), "{error}");
         }
     }
@@ -197,17 +203,19 @@ mod tests {
             ("-1", RouterCheck::Skipped),
             ("3", RouterCheck::Attempts(3)),
         ] {
-            assert_eq!(read(&[(CHECK_ATTEMPTS, text)]).unwrap().1, expected);
+            assert_eq!(read(CHECK_ATTEMPTS, text).unwrap().1, expected);
         }
-        let error = read(&[(CHECK_ATTEMPTS, "many")]).unwrap_err();
+        let error = read(CHECK_ATTEMPTS, "many").unwrap_err();
         assert!(error.contains("many"), "{error}");
     }
 
     #[test]
     fn off_reaches_nobody() {
-        let mut network = Network::from_env().unwrap();
-        network.discovery_off = true;
-        let (config, check) = config(&network, |_| None).unwrap();
+        let network = Network {
+            discovery_off: true,
+            ..network("", "")
+        };
+        let (config, check) = config(&network).unwrap();
         assert_eq!(check, RouterCheck::Skipped);
         for key in ["connect/endpoints", "listen/endpoints"] {
             assert_eq!(value(&config, key), "[]");

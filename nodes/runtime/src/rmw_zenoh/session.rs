@@ -64,8 +64,7 @@ impl Zenoh {
         for warning in config::warnings(network) {
             log::warn!("{warning}");
         }
-        let get = |name: &str| Some(std::env::var_os(name)?.to_string_lossy().into_owned());
-        let (config, check) = config::config(network, get).map_err(failed)?;
+        let (config, check) = config::config(network).map_err(failed)?;
         let session = zenoh::open(config).wait();
         let session = session.map_err(|error| failed(error.to_string()))?;
         wait_for_router(&session, check);

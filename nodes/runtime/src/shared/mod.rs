@@ -99,7 +99,7 @@ impl Shared {
             shutdown,
             io,
             tasks: Arc::default(),
-            receive_buffer: ReceiveBuffer::probe(),
+            receive_buffer: ReceiveBuffer::probe(network.transport),
             losses: Mutex::default(),
             sim_time: Mutex::default(),
             publishing,

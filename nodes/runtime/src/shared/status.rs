@@ -8,6 +8,7 @@ use socket2::{Domain, Socket, Type};
 
 use super::Shared;
 use crate::diagnostics::{Level, status};
+use crate::env::TransportKind;
 use crate::port::RECEIVE_BUFFER_BYTES;
 use crate::sync::lock;
 
@@ -21,10 +22,14 @@ pub(crate) struct ReceiveBuffer {
 }
 
 impl ReceiveBuffer {
-    pub(crate) fn probe() -> Self {
-        Self {
-            bytes: granted_receive_buffer(RECEIVE_BUFFER_BYTES),
-        }
+    pub(crate) fn probe(transport: TransportKind) -> Self {
+        let bytes = match transport {
+            TransportKind::Dds => granted_receive_buffer(RECEIVE_BUFFER_BYTES),
+            // TCP waits for its reader.
+            #[cfg(feature = "zenoh")]
+            TransportKind::Zenoh => None,
+        };
+        Self { bytes }
     }
 
     fn is_short(self) -> bool {
