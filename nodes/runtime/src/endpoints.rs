@@ -7,10 +7,10 @@ use std::sync::{Arc, Mutex, Weak};
 use futures::StreamExt;
 use futures::stream::BoxStream;
 
-use super::neighbours::{GraphRole, Neighbours};
+use super::neighbours::Neighbours;
 use super::peers::Peers;
 use super::port::{EndpointId, PortEvent};
-use super::remote::RemotePublisher;
+use super::remote::{GraphRole, RemotePublisher};
 use super::sync::lock;
 
 /// Events of endpoints that are not registered yet, kept at most.

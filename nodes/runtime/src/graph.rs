@@ -14,13 +14,11 @@ use smol::Timer;
 use smol::channel::{Receiver, Sender, bounded};
 
 use super::names;
-use super::neighbours::{GraphEndpoint, GraphRole};
+use super::neighbours::GraphEndpoint;
 use super::outbox::Outbox;
 use super::port::{EndpointId, EndpointKind, PortNode, Transport};
+use super::remote::GraphRole;
 use super::sync::lock;
-
-/// Topic of the messages that name the nodes of a process.
-pub(crate) const TOPIC: &str = "ros_discovery_info";
 
 /// Time between a change and the message that names it.
 const SETTLE_TIME: Duration = Duration::from_millis(50);

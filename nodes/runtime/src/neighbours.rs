@@ -8,6 +8,7 @@ use lattice_msgs::rmw_dds_common::{NodeEntitiesInfo, ParticipantEntitiesInfo};
 
 use super::names;
 use super::port::EndpointId;
+use super::remote::GraphRole;
 use super::sync::lock;
 
 /// Endpoints that are remembered, at most.
@@ -15,17 +16,6 @@ const MAX_ENDPOINTS: usize = 8192;
 
 /// Longest name of a topic, service or node, bytes.
 const MAX_NAME_BYTES: usize = 512;
-
-/// Role of an endpoint in the graph of nodes.
-#[derive(Clone, Copy, Debug, PartialEq, Eq, PartialOrd, Ord)]
-pub enum GraphRole {
-    /// Publishes a topic.
-    Publisher,
-    /// Subscribes to a topic.
-    Subscriber,
-    /// Answers calls of a service.
-    Server,
-}
 
 /// A publisher, subscription or server in the graph of nodes.
 #[derive(Clone, Debug, PartialEq, Eq, PartialOrd, Ord)]

@@ -10,15 +10,17 @@ use futures::future::BoxFuture;
 use futures::stream::BoxStream;
 
 use super::error::RuntimeError;
-use super::neighbours::GraphRole;
 use super::qos::Qos;
-use super::remote::RemotePublisher;
+use super::remote::{GraphRole, RemotePublisher};
 
 /// Buffer of a sample that writers share.
 pub(crate) use bytes::Bytes;
 
 /// Length of the encapsulation header in front of every CDR sample.
 pub(crate) const ENCAPSULATION_BYTES: usize = 4;
+
+/// Topic of the messages that name the nodes of a process, on DDS.
+pub(crate) const GRAPH_TOPIC: &str = "ros_discovery_info";
 
 /// Receive buffer asked of every socket, in bytes.
 pub(crate) const RECEIVE_BUFFER_BYTES: usize = 32 << 20;

@@ -1,9 +1,20 @@
-//! Publishers in other processes, as discovery tells of them.
+//! Endpoints in other processes, as discovery tells of them.
 
 use super::qos::{Durability, Reliability};
 
 /// Longest name of a topic or type, bytes.
 const MAX_NAME_BYTES: usize = 512;
+
+/// Role of an endpoint in the graph of nodes.
+#[derive(Clone, Copy, Debug, PartialEq, Eq, PartialOrd, Ord)]
+pub enum GraphRole {
+    /// Publishes a topic.
+    Publisher,
+    /// Subscribes to a topic.
+    Subscriber,
+    /// Answers calls of a service.
+    Server,
+}
 
 /// A publisher in another process.
 #[derive(Clone, Debug, PartialEq, Eq)]

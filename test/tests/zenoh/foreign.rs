@@ -36,7 +36,10 @@ fn a_peer_by_the_book_hears_and_is_heard_and_its_rubbish_is_counted() {
     });
     let _reset = node.service_trigger("~/reset", || (true, "done".to_owned()));
     let (subscription, heard) = hear::<RosString>(&node, "/heard", Qos::reliable(10));
-    let mut peer = Peer::start(&python, &["meet", &site.endpoint, &site.domain.id().to_string()]);
+    let mut peer = Peer::start(
+        &python,
+        &["meet", &site.endpoint, &site.domain.id().to_string()],
+    );
     joined.recv_timeout(PATIENCE).unwrap();
     for i in 0..3 {
         chatter.publish(text(i)).unwrap();
@@ -54,14 +57,32 @@ fn a_peer_by_the_book_hears_and_is_heard_and_its_rubbish_is_counted() {
         success: true,
         message: "peer".to_owned(),
     };
-    assert_eq!(cdr::from_slice::<TriggerResponse>(&answer).unwrap(), expected);
+    assert_eq!(
+        cdr::from_slice::<TriggerResponse>(&answer).unwrap(),
+        expected
+    );
 
     let found: Value = serde_json::from_str(&peer.line()).unwrap();
-    let string = ["std_msgs::msg::dds_::String_", hash_of(RosString::TYPE).unwrap()];
-    let trigger = ["std_srvs::srv::dds_::Trigger_", hash_of(Trigger::TYPE).unwrap()];
-    assert_eq!(found["latched_token"], token("/latched_by_ours", string, ":1:,1:,:,:,,"));
-    assert_eq!(found["chatter_token"], token("/chatter", string, "::,7:,:,:,,"));
-    assert_eq!(found["service_token"], token("/ours/reset", trigger, "::,10:,:,:,,"));
+    let string = [
+        "std_msgs::msg::dds_::String_",
+        hash_of(RosString::TYPE).unwrap(),
+    ];
+    let trigger = [
+        "std_srvs::srv::dds_::Trigger_",
+        hash_of(Trigger::TYPE).unwrap(),
+    ];
+    assert_eq!(
+        found["latched_token"],
+        token("/latched_by_ours", string, ":1:,1:,:,:,,")
+    );
+    assert_eq!(
+        found["chatter_token"],
+        token("/chatter", string, "::,7:,:,:,,")
+    );
+    assert_eq!(
+        found["service_token"],
+        token("/ours/reset", trigger, "::,10:,:,:,,")
+    );
     // Number of the sample, and whether its gid is that of the token. Nothing is sent before there is a subscriber.
     assert_eq!(found["latched"], json!(["kept", 1, true]));
     let chatter = json!([["0", 1, true], ["1", 2, true], ["2", 3, true]]);
@@ -71,7 +92,10 @@ fn a_peer_by_the_book_hears_and_is_heard_and_its_rubbish_is_counted() {
         message: "done".to_owned(),
     };
     let hex = |bytes: Vec<u8>| bytes.iter().map(|b| format!("{b:02x}")).collect::<String>();
-    assert_eq!(found["reply"], json!([hex(cdr::to_vec(&reply).unwrap()), 7, true]));
+    assert_eq!(
+        found["reply"],
+        json!([hex(cdr::to_vec(&reply).unwrap()), 7, true])
+    );
     assert_eq!(found["asked"], json!([1, true, hex(request)]));
     assert_eq!(found["rubbish_replies"], json!([0, 0]));
 
@@ -86,7 +110,10 @@ fn a_peer_by_the_book_hears_and_is_heard_and_its_rubbish_is_counted() {
         of_peer(GraphRole::Subscriber, "/chatter"),
         of_peer(GraphRole::Server, "/peer/trigger"),
     ] {
-        assert!(graph.contains(&endpoint), "{endpoint:?} is not in {graph:?}");
+        assert!(
+            graph.contains(&endpoint),
+            "{endpoint:?} is not in {graph:?}"
+        );
     }
     let publisher = RemotePublisher {
         topic: "/latched_by_peer".to_owned(),

@@ -31,7 +31,11 @@ fn peers_meet_at_an_endpoint_that_is_named() {
 #[test]
 fn peers_meet_by_multicast_where_it_is_switched_on() {
     // A group of this test's own.
-    let port = free_endpoint().rsplit(':').next().map(str::to_owned).unwrap();
+    let port = free_endpoint()
+        .rsplit(':')
+        .next()
+        .map(str::to_owned)
+        .unwrap();
     let scouting = format!(
         "connect/endpoints=[];scouting/multicast/enabled=true;scouting/multicast/interface=\"lo\";\
          scouting/multicast/address=\"224.0.0.224:{port}\""

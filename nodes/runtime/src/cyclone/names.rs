@@ -1,7 +1,7 @@
 //! Names of topics and services in DDS, as all rmws mangle them.
 
 use super::endpoint::Side;
-use crate::neighbours::GraphRole;
+use crate::remote::GraphRole;
 
 /// Role and full name of an endpoint in ROS; none of clients, replies and what is not of ROS.
 pub(super) fn role(side: Side, dds_name: &str) -> Option<(GraphRole, &str)> {

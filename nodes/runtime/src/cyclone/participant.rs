@@ -23,10 +23,9 @@ use super::security::properties;
 use super::writer::CycloneWriter;
 use crate::env::Network;
 use crate::error::RuntimeError;
-use crate::graph;
 use crate::port::{
-    ClientEnds, EndpointId, PortEvent, PortService, PortTopic, SampleReader, SampleWriter,
-    ServerEnds, ServiceForm, ServiceQos, Transport,
+    ClientEnds, EndpointId, GRAPH_TOPIC, PortEvent, PortService, PortTopic, SampleReader,
+    SampleWriter, ServerEnds, ServiceForm, ServiceQos, Transport,
 };
 use crate::qos::Qos;
 use crate::remote::is_type_hash;
@@ -53,8 +52,8 @@ struct DdsTopic<'a> {
 
 /// Its name is not mangled.
 const GRAPH: DdsTopic<'static> = DdsTopic {
-    name: graph::TOPIC,
-    dds_name: graph::TOPIC,
+    name: GRAPH_TOPIC,
+    dds_name: GRAPH_TOPIC,
     ros_type: <ParticipantEntitiesInfo as RosMessage>::TYPE,
     type_hash: None,
 };

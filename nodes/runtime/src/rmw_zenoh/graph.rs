@@ -9,9 +9,8 @@ use smol::channel::Sender;
 
 use super::keys::{ANY_HASH, Channel, Kind, Token, gid, read_token};
 use crate::logging::Throttle;
-use crate::neighbours::GraphRole;
 use crate::port::{EndpointId, PortEvent};
-use crate::remote::RemotePublisher;
+use crate::remote::{GraphRole, RemotePublisher};
 use crate::sync::lock;
 
 /// Endpoints of other sessions that are remembered, at most.

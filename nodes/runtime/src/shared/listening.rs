@@ -4,9 +4,8 @@ use std::sync::Arc;
 
 use super::Shared;
 use crate::endpoints::Endpoints;
-use crate::graph::TOPIC;
 use crate::neighbours::GraphEndpoint;
-use crate::port::SampleReader;
+use crate::port::{GRAPH_TOPIC, SampleReader};
 use crate::sync::lock;
 
 impl Shared {
@@ -41,7 +40,7 @@ async fn listen(reader: Box<dyn SampleReader>, endpoints: Arc<Endpoints>) {
             Err(error) => Err(error),
         };
         if let Err(error) = heard {
-            log::debug!("{TOPIC}: {error}");
+            log::debug!("{GRAPH_TOPIC}: {error}");
         }
     }
 }

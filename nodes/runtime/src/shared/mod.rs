@@ -24,10 +24,10 @@ use super::diagnostics::Tasks;
 use super::endpoints::Endpoints;
 use super::env::{Network, TransportKind};
 use super::error::RuntimeError;
-use super::graph::{self, Graph, NodeId};
+use super::graph::{Graph, NodeId};
 use super::local_bus::LocalBus;
 use super::outbox::{Outbox, WhenFull};
-use super::port::{PortTopic, SampleReader, SampleWriter, Transport};
+use super::port::{GRAPH_TOPIC, PortTopic, SampleReader, SampleWriter, Transport};
 use super::publisher::PublisherParts;
 use super::qos::Qos;
 use super::remote::RemotePublisher;
@@ -131,7 +131,7 @@ impl Shared {
         let Some(writer) = writer.transpose()? else {
             return Ok(());
         };
-        let outbox = self.outbox_of(graph::TOPIC, writer, WhenFull::Wait)?;
+        let outbox = self.outbox_of(GRAPH_TOPIC, writer, WhenFull::Wait)?;
         if let Some(open) = lock(&self.open).as_mut() {
             let graph = Arc::clone(&self.graph);
             let transport = Arc::downgrade(&open.transport);

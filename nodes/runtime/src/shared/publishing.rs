@@ -9,12 +9,12 @@ use super::Shared;
 use crate::error::RuntimeError;
 use crate::graph::NodeId;
 use crate::local_bus::LocalEndpoint;
-use crate::neighbours::GraphRole;
 use crate::outbox::WhenFull;
 use crate::peers::Peers;
 use crate::port::{EndpointKind, PortTopic};
 use crate::publisher::{Latch, Publisher, PublisherParts, RawPublisher};
 use crate::qos::Qos;
+use crate::remote::GraphRole;
 use crate::sync::lock;
 
 impl Shared {

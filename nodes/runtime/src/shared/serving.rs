@@ -11,11 +11,11 @@ use super::{Shared, closed};
 use crate::error::RuntimeError;
 use crate::graph::NodeId;
 use crate::logging::Throttle;
-use crate::neighbours::GraphRole;
 use crate::outbox::WhenFull;
 use crate::peers::Peers;
 use crate::port::{EndpointKind, PortService, ServerEnds, ServiceQos};
 use crate::qos::Qos;
+use crate::remote::GraphRole;
 use crate::service::{Reply, Server, Serving, Unanswered};
 use crate::sync::lock;
 

@@ -12,10 +12,10 @@ use super::{Shared, closed};
 use crate::error::RuntimeError;
 use crate::graph::NodeId;
 use crate::local_bus::{AnyMessage, LocalEndpoint, Topic};
-use crate::neighbours::GraphRole;
 use crate::peers::Peers;
 use crate::port::{EndpointKind, PortTopic};
 use crate::qos::{Durability, Qos};
+use crate::remote::GraphRole;
 use crate::subscription::{
     Intake, Load, Running, Sample, Source, Stats, Subscription, spawn_reader,
 };
