@@ -67,6 +67,7 @@ fn own_tag() -> String {
 mod tests {
     use super::*;
     use crate::env::TransportKind;
+    use crate::env::ZenohSettings;
 
     #[test]
     fn the_environment_decides_on_interfaces_and_peers() {
@@ -77,6 +78,7 @@ mod tests {
             static_peers: static_peers.iter().map(ToString::to_string).collect(),
             transport: TransportKind::Dds,
             security: None,
+            zenoh: ZenohSettings::default(),
             warnings: vec![],
             notes: vec![],
         };

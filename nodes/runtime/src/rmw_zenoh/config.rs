@@ -5,6 +5,7 @@ use std::time::Duration;
 
 use zenoh::Config;
 
+use super::session::words;
 use crate::env::{
     Network, ZENOH_CHECK_ATTEMPTS as CHECK_ATTEMPTS, ZENOH_OVERRIDE as OVERRIDE,
     ZENOH_SESSION_CONFIG as SESSION_CONFIG,
@@ -57,7 +58,7 @@ pub(super) fn config(network: &Network) -> Result<(Config, RouterCheck), String>
     let given = &network.zenoh;
     let mut config = match &given.session_config {
         Some(path) => from_file(path.trim())?,
-        None => Config::from_json5(DEFAULT).map_err(|error| error.to_string())?,
+        None => Config::from_json5(DEFAULT).map_err(words)?,
     };
     let overrides = given.overrides.as_deref().unwrap_or_default();
     for pair in overrides.split(';') {
@@ -93,9 +94,8 @@ fn from_file(path: &str) -> Result<Config, String> {
         .extension()
         .and_then(|ending| ending.to_str());
     match ending {
-        Some("json5" | "json" | "yaml" | "yml") => {
-            Config::from_file(path).map_err(|error| format!("{SESSION_CONFIG}={path}: {error}"))
-        }
+        Some("json5" | "json" | "yaml" | "yml") => Config::from_file(path)
+            .map_err(|error| format!("{SESSION_CONFIG}={path}: {}", words(error))),
         _ => Err(format!(
             "{SESSION_CONFIG}={path:?} does not end in .json5, .json, .yaml or .yml"
         )),
@@ -107,7 +107,7 @@ fn insert(config: &mut Config, pair: &str) -> Result<(), String> {
         .split_once('=')
         .ok_or_else(|| format!("{OVERRIDE}: {pair:?} is not KEY=VALUE"))?;
     let inserted = config.insert_json5(key.trim(), value.trim());
-    inserted.map_err(|error| format!("{OVERRIDE}: {}: {error}", pair.trim()))
+    inserted.map_err(|error| format!("{OVERRIDE}: {}: {}", pair.trim(), words(error)))
 }
 
 /// Lines for the log: settings of DDS that do not hold here.

@@ -17,6 +17,7 @@ use zenoh_ext::{AdvancedPublisher, AdvancedPublisherBuilderExt, CacheConfig, Mis
 
 use super::attachment::attachment;
 use super::graph::Place;
+use super::session::words;
 use crate::port::{Bytes, EndpointId, SampleId, SampleWriter, WriteRefusal};
 use crate::qos::{Durability, Qos, Reliability};
 use crate::sync::lock;
@@ -160,7 +161,7 @@ impl InTurn {
                 *lock(&self.0) = Some(Running { body, task });
             }
             let written = self.finished().await;
-            written.map_err(|error| WriteRefusal::Failed(error.to_string()))
+            written.map_err(|error| WriteRefusal::Failed(words(error)))
         })
     }
 

@@ -66,9 +66,9 @@ impl Zenoh {
         }
         let (config, check) = config::config(network).map_err(failed)?;
         let session = zenoh::open(config).wait();
-        let session = session.map_err(|error| failed(error.to_string()))?;
+        let session = session.map_err(|error| failed(words(error)))?;
         wait_for_router(&session, check);
-        Self::on(session, network.domain_id, &enclave.name).map_err(|e| failed(e.to_string()))
+        Self::on(session, network.domain_id, &enclave.name).map_err(|error| failed(words(error)))
     }
 
     fn on(session: zenoh::Session, domain: u16, enclave: &str) -> zenoh::Result<Self> {
@@ -136,7 +136,7 @@ fn wait_for_router(session: &zenoh::Session, check: RouterCheck) {
         }
         if attempt == attempts {
             log::warn!(
-                "no Zenoh router is reached after {attempts} attempts (ZENOH_ROUTER_CHECK_ATTEMPTS). Nodes of \
+                "no Zenoh router is reached (looked for {attempts} times, ZENOH_ROUTER_CHECK_ATTEMPTS). Nodes of \
                  other processes are not found before one runs: `ros2 run rmw_zenoh_cpp rmw_zenohd` or `zenohd`; \
                  or set ZENOH_CONFIG_OVERRIDE='scouting/multicast/enabled=true' for all nodes"
             );
@@ -187,8 +187,15 @@ fn failed(name: &str, endpoint: &'static str, reason: impl ToString) -> RuntimeE
     RuntimeError::Endpoint {
         topic: name.to_owned(),
         endpoint,
-        reason: reason.to_string(),
+        reason: words(reason),
     }
+}
+
+/// Words of an error of Zenoh, without the places in its code.
+pub(super) fn words(error: impl ToString) -> String {
+    let text = error.to_string();
+    let words = text.split(" at /").next().unwrap_or_default();
+    words.trim_end().to_owned()
 }
 
 impl Transport for Zenoh {
@@ -200,7 +207,7 @@ impl Transport for Zenoh {
         let token = self.names.node_token(node);
         let token = self.session.liveliness().declare_token(token).wait();
         let token = token.map_err(|error| RuntimeError::Session {
-            reason: format!("node {}: {error}", node.name),
+            reason: format!("node {}: {}", node.name, words(error)),
         })?;
         lock(&self.nodes).push(token);
         Ok(())
