@@ -5,10 +5,12 @@
 """
 
 import json
+import os
 import struct
 import sys
 import threading
 import time
+import traceback
 
 import xxhash
 import zenoh
@@ -116,7 +118,7 @@ class Peer:
         def found():
             for key in self.tokens:
                 parts = key.split("/")
-                if parts[5] == kind and parts[8] == "ours" and parts[9:10] == [name.replace("/", "%")]:
+                if parts[5:6] == [kind] and parts[8:10] == ["ours", name.replace("/", "%")]:
                     return key
             return None
 
@@ -249,4 +251,9 @@ def main(role, endpoint, domain="0"):
         meet(endpoint, int(domain))
 
 
-main(*sys.argv[1:])
+try:
+    main(*sys.argv[1:])
+except BaseException:
+    traceback.print_exc()
+    # The threads of a session that is open would go on.
+    os._exit(1)
