@@ -41,6 +41,11 @@ pub const RULES: &[(&str, &str, Rule)] = &[
         NotHere("needs colcon; .ci/run lists the packages"),
     ),
     ("*", "ros2", NotHere("needs ROS 2")),
+    (
+        "*",
+        "RMW_IMPLEMENTATION=rmw_zenoh_cpp",
+        NotHere("a feature of the build; .ci/zenoh"),
+    ),
     ("*", "test/peers/", NotHere("needs the peers")),
     (
         "*",
