@@ -16,7 +16,7 @@ struct Change {
     pieces: &'static [(&'static str, &'static str)],
 }
 
-const CHANGES: [Change; 5] = [
+const CHANGES: [Change; 7] = [
     // A reply names its request in the inline QoS, which is where clients over Fast DDS look for it.
     Change {
         file: "core/ddsi/src/ddsi_transmit.c",
@@ -40,10 +40,17 @@ const CHANGES: [Change; 5] = [
     // A request that overtakes discovery is no history, whatever the vendor of its writer.
     Change {
         file: "core/ddsi/src/ddsi_endpoint_match.c",
-        pieces: &[(
-            "    else if (ddsi_vendor_is_eclipse (pwr->c.vendor))\n",
-            "    else if (ddsi_vendor_is_eclipse (pwr->c.vendor) || lattice_is_of_service (pwr->c.xqos))\n",
-        )],
+        pieces: &[
+            (
+                "    else if (ddsi_vendor_is_eclipse (pwr->c.vendor))\n",
+                "    else if (ddsi_vendor_is_eclipse (pwr->c.vendor) || lattice_is_of_service (pwr->c.xqos))\n",
+            ),
+            // What a reader that goes has not acknowledged is counted.
+            (
+                "      wr->num_reliable_readers -= m->is_reliable;\n      wr->num_readers_requesting_keyhash -= prd->requests_keyhash ? 1 : 0;\n      ddsi_rebuild_writer_addrset (wr);\n      ddsi_remove_acked_messages (wr, &whcst, &deferred_free_list);\n",
+                "      wr->num_reliable_readers -= m->is_reliable;\n      wr->num_readers_requesting_keyhash -= prd->requests_keyhash ? 1 : 0;\n      lattice_reader_left (wr, m->is_reliable, m->seq);\n      ddsi_rebuild_writer_addrset (wr);\n      ddsi_remove_acked_messages (wr, &whcst, &deferred_free_list);\n",
+            ),
+        ],
     },
     // Fast DDS answers a reader that asks where its writer stands at once only if it asks for number 0.
     Change {
@@ -59,6 +66,22 @@ const CHANGES: [Change; 5] = [
         pieces: &[(
             "  const bool is_secure = ((datap->builtin_endpoint_set & ",
             "  if (!lattice_make_room (gv, timestamp.v))\n    return HSR_NOT_INTERESTING;\n\n  const bool is_secure = ((datap->builtin_endpoint_set & ",
+        )],
+    },
+    // Samples are taken as they come, and those that give way to newer ones are counted there: here none does.
+    Change {
+        file: "core/ddsc/src/dds_rhc_default.c",
+        pieces: &[(
+            "  rhc->history_depth = (qos->history.kind == DDS_HISTORY_KEEP_LAST) ?",
+            "  rhc->history_depth = (qos->history.kind == DDS_HISTORY_KEEP_LAST && !lattice_is_blob_type (rhc->type)) ?",
+        )],
+    },
+    // A player keeps what is not acknowledged, within bytes, whatever depth was recorded.
+    Change {
+        file: "core/ddsc/src/dds_whc.c",
+        pieces: &[(
+            "  wrinfo->hdepth = (qos->history.kind == DDS_HISTORY_KEEP_ALL) ?",
+            "  wrinfo->hdepth = (qos->history.kind == DDS_HISTORY_KEEP_ALL || lattice_keeps_unacknowledged ()) ?",
         )],
     },
     // Freed before its last use: mended in 11.0.1 in the same way.
@@ -161,7 +184,7 @@ fn main() -> Result<(), Box<dyn Error>> {
     build
         .warnings(true)
         .warnings_into_errors(true)
-        .files(["c/blob.c", "c/participants.c"])
+        .files(["c/blob.c", "c/participants.c", "c/writer.c"])
         .try_compile("lattice_blob")?;
     cyclone.try_compile("lattice_ddsc")?;
     if security {

@@ -19,6 +19,7 @@ mod odd;
 mod pages;
 mod paper;
 mod player;
+mod player_services;
 mod point_files;
 mod record;
 mod respawn;

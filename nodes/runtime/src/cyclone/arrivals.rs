@@ -2,22 +2,29 @@
 
 use std::collections::VecDeque;
 use std::sync::Mutex;
-use std::sync::atomic::{AtomicU64, Ordering::Relaxed};
+use std::sync::atomic::Ordering::Relaxed;
 use std::task::Waker;
 
 use futures::task::AtomicWaker;
-use lattice_cyclone_sys::dds_entity_t;
+use lattice_cyclone_sys::{dds_entity_t, dds_instance_handle_t};
 
+use super::gaps::Gaps;
 use super::sample::{Taken, take};
+use crate::port::{EndpointId, ReaderLosses};
 use crate::sync::lock;
 
-/// Samples that were taken out of Cyclone as they came. Cyclone's own history would overwrite what nobody
-/// takes without a word; here it is counted.
+/// Samples that were taken out of Cyclone as they came, and what is missing among them.
 pub(super) struct Arrivals {
     depth: usize,
-    waiting: Mutex<VecDeque<Taken>>,
-    overwritten: AtomicU64,
+    inner: Mutex<Inner>,
+    losses: ReaderLosses,
     waker: AtomicWaker,
+}
+
+#[derive(Default)]
+struct Inner {
+    waiting: VecDeque<Taken>,
+    gaps: Gaps,
 }
 
 impl Arrivals {
@@ -25,34 +32,44 @@ impl Arrivals {
     pub(super) fn new(depth: usize) -> Self {
         Self {
             depth: depth.max(1),
-            waiting: Mutex::default(),
-            overwritten: AtomicU64::new(0),
+            inner: Mutex::default(),
+            losses: ReaderLosses::default(),
             waker: AtomicWaker::new(),
         }
     }
 
-    /// Takes what the reader has, and wakes the task that waits for it.
-    pub(super) fn take_from(&self, reader: dds_entity_t) {
-        let mut waiting = lock(&self.waiting);
+    /// Takes what the reader has, and wakes the task that waits for it. `writer` gives the GUID to a handle.
+    pub(super) fn take_from(
+        &self,
+        reader: dds_entity_t,
+        writer: impl Fn(dds_instance_handle_t) -> Option<EndpointId>,
+    ) {
+        let mut inner = lock(&self.inner);
+        let Inner { waiting, gaps } = &mut *inner;
         while let Some(sample) = take(reader) {
+            let (handle, number) = (sample.writer(), sample.number());
+            if let Some(writer) = writer(handle).filter(|_| number > 0) {
+                let missing = gaps.note(writer, handle, number);
+                self.losses.on_network.fetch_add(missing, Relaxed);
+            }
             if waiting.len() >= self.depth {
                 let _ = waiting.pop_front();
-                let _ = self.overwritten.fetch_add(1, Relaxed);
+                self.losses.overrun.fetch_add(1, Relaxed);
             }
             waiting.push_back(sample);
         }
-        drop(waiting);
+        drop(inner);
         self.waker.wake();
     }
 
     /// The oldest sample that waits.
     pub(super) fn pop(&self) -> Option<Taken> {
-        lock(&self.waiting).pop_front()
+        lock(&self.inner).waiting.pop_front()
     }
 
-    /// Samples that gave way to newer ones since the last call.
-    pub(super) fn overwritten(&self) -> u64 {
-        self.overwritten.swap(0, Relaxed)
+    /// Samples that will not come out of here.
+    pub(super) fn losses(&self) -> &ReaderLosses {
+        &self.losses
     }
 
     /// Has the next arrival wake a task.

@@ -9,6 +9,7 @@ mod discovery;
 mod domain;
 mod endpoint;
 mod entity;
+mod gaps;
 mod log;
 mod participant;
 mod qos;

@@ -117,10 +117,15 @@ impl Transport for Cyclone {
         self.id
     }
 
-    fn writer(&self, of: PortTopic<'_>, qos: &Qos) -> Result<Arc<dyn SampleWriter>, RuntimeError> {
+    fn writer(
+        &self,
+        of: PortTopic<'_>,
+        qos: &Qos,
+        keeps: bool,
+    ) -> Result<Arc<dyn SampleWriter>, RuntimeError> {
         let (topic, native, description) = self.prepare(of, qos, Side::Writer)?;
         let (parent, events) = (&self.participant, self.sender.clone());
-        let writer = CycloneWriter::new(parent, topic, &native, description, events);
+        let writer = CycloneWriter::new(parent, topic, (&native, keeps), description, events);
         let writer = writer.map_err(|reason| failed(of, Side::Writer, reason))?;
         self.discovery.announce(parent, writer.endpoint());
         Ok(Arc::new(writer))

@@ -29,7 +29,7 @@ use super::local_bus::LocalBus;
 use super::outbox::{Outbox, WhenFull};
 use super::port::{PortTopic, SampleReader, Transport};
 use super::publisher::PublisherParts;
-use super::qos::Qos;
+use super::qos::{Qos, Reliability};
 use super::remote::RemotePublisher;
 use super::security::Enclave;
 use super::service::{Answers, LocalServices, Server, Unanswered};
@@ -122,7 +122,7 @@ impl Shared {
     }
 
     fn publish_graph(&self) -> Result<(), RuntimeError> {
-        let outbox = self.outbox(graph::TOPIC, &Qos::latched(1), WhenFull::Wait)?;
+        let outbox = self.outbox(graph::TOPIC, &Qos::latched(1), WhenFull::Drop)?;
         if let Some(open) = lock(&self.open).as_mut() {
             let graph = Arc::clone(&self.graph);
             let transport = Arc::downgrade(&open.transport);
@@ -149,7 +149,8 @@ impl Shared {
         let name = topic.name;
         let guard = lock(&self.open);
         let open = guard.as_ref().ok_or_else(|| closed(name))?;
-        let writer = open.transport.writer(topic, qos)?;
+        let keeps = when_full == WhenFull::Wait && qos.reliability == Reliability::Reliable;
+        let writer = open.transport.writer(topic, qos, keeps)?;
         let (outbox, task) = Outbox::new(name, writer, when_full, QUEUE_MESSAGES, QUEUE_BYTES);
         let task = self.publishing.spawn(task);
         task.ok_or_else(|| closed(name))?.detach();
