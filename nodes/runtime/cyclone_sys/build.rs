@@ -16,7 +16,7 @@ struct Change {
     pieces: &'static [(&'static str, &'static str)],
 }
 
-const CHANGES: [Change; 7] = [
+const CHANGES: [Change; 8] = [
     // A reply names its request in the inline QoS, which is where clients over Fast DDS look for it.
     Change {
         file: "core/ddsi/src/ddsi_transmit.c",
@@ -40,17 +40,10 @@ const CHANGES: [Change; 7] = [
     // A request that overtakes discovery is no history, whatever the vendor of its writer.
     Change {
         file: "core/ddsi/src/ddsi_endpoint_match.c",
-        pieces: &[
-            (
-                "    else if (ddsi_vendor_is_eclipse (pwr->c.vendor))\n",
-                "    else if (ddsi_vendor_is_eclipse (pwr->c.vendor) || lattice_is_of_service (pwr->c.xqos))\n",
-            ),
-            // What a reader that goes has not acknowledged is counted.
-            (
-                "      wr->num_reliable_readers -= m->is_reliable;\n      wr->num_readers_requesting_keyhash -= prd->requests_keyhash ? 1 : 0;\n      ddsi_rebuild_writer_addrset (wr);\n      ddsi_remove_acked_messages (wr, &whcst, &deferred_free_list);\n",
-                "      wr->num_reliable_readers -= m->is_reliable;\n      wr->num_readers_requesting_keyhash -= prd->requests_keyhash ? 1 : 0;\n      lattice_reader_left (wr, m->is_reliable, m->seq);\n      ddsi_rebuild_writer_addrset (wr);\n      ddsi_remove_acked_messages (wr, &whcst, &deferred_free_list);\n",
-            ),
-        ],
+        pieces: &[(
+            "    else if (ddsi_vendor_is_eclipse (pwr->c.vendor))\n",
+            "    else if (ddsi_vendor_is_eclipse (pwr->c.vendor) || lattice_is_of_service (pwr->c.xqos))\n",
+        )],
     },
     // Fast DDS answers a reader that asks where its writer stands at once only if it asks for number 0.
     Change {
@@ -66,6 +59,14 @@ const CHANGES: [Change; 7] = [
         pieces: &[(
             "  const bool is_secure = ((datap->builtin_endpoint_set & ",
             "  if (!lattice_make_room (gv, timestamp.v))\n    return HSR_NOT_INTERESTING;\n\n  const bool is_secure = ((datap->builtin_endpoint_set & ",
+        )],
+    },
+    // What a reader that goes has not acknowledged is counted.
+    Change {
+        file: "core/ddsi/src/ddsi_proxy_endpoint.c",
+        pieces: &[(
+            "        m_wr->seq = DDSI_MAX_SEQ_NUMBER;\n        ddsrt_avl_augment_update",
+            "        lattice_reader_left (wr, m_wr->seq);\n        m_wr->seq = DDSI_MAX_SEQ_NUMBER;\n        ddsrt_avl_augment_update",
         )],
     },
     // Samples are taken as they come, and those that give way to newer ones are counted there: here none does.

@@ -28,6 +28,7 @@ mod streams;
 mod viewer;
 mod viewer_foreign;
 mod viewer_headset;
+mod viewer_hostile;
 mod viewer_layout;
 mod viewer_page;
 mod viewer_planning;

@@ -17,11 +17,12 @@ use lattice_runtime::env::Network;
 use lattice_runtime::qos::Qos;
 use lattice_runtime::ros_args::RosArgs;
 use lattice_runtime::{Load, LoopbackDomain, Node, Runtime, Subscription};
+use serde_json::{Value, json};
 use wait_timeout::ChildExt;
 
 use crate::PATIENCE;
 use crate::nodes::simulated;
-use crate::record::play;
+use crate::record::{expect, play, signal, start};
 
 /// Longest that a call may take.
 const ANSWERED: Duration = Duration::from_millis(100);
@@ -38,6 +39,11 @@ struct Asked {
 
 impl Asked {
     fn start(domain: &LoopbackDomain, log: &str, parameters: &[&str]) -> Self {
+        Self::of(domain, play(domain, log, parameters))
+    }
+
+    /// Who asks a player that is started.
+    fn of(domain: &LoopbackDomain, mut player: Child) -> Self {
         let network = Network {
             domain_id: domain.id(),
             localhost_only: true,
@@ -45,7 +51,6 @@ impl Asked {
         };
         let runtime = Runtime::with_transport("asking", RosArgs::default(), &network).unwrap();
         let node = runtime.node("asking").unwrap();
-        let mut player = play(domain, log, parameters);
         let lines = BufReader::new(player.stderr.take().unwrap()).lines();
         let (say, said) = channel();
         thread::spawn(move || {
@@ -205,4 +210,75 @@ fn services_are_answered_while_others_are_waited_for() {
     asked.until_said("playing");
     asked.ask("waiting for an answer", false);
     asked.stop();
+}
+
+/// Status, last line and report of a player whose recorder is stopped by a signal, if any, once the log plays.
+fn played_to(stop: Option<&str>, strict: bool) -> (bool, String, Value) {
+    let directory = tempfile::tempdir().unwrap();
+    let domain = LoopbackDomain::take().unwrap();
+    let log = simulated(directory.path(), "mcap", "2");
+    let bag = directory.path().join("recorded").display().to_string();
+    let report = directory.path().join("report");
+    let report_file = format!("report_file:={}", report.display());
+    let strict = format!("strict:={strict}");
+    let player = play(
+        &domain,
+        &log,
+        &[
+            "qos./left/points.reliability:=reliable",
+            "wait_for_subscribers:=['/left/points']",
+            "start_paused:=true",
+            &strict,
+            &report_file,
+        ],
+    );
+    let mut recorder = start(&domain, &["record", "-o", &bag, "/left/points"]);
+    expect(&mut recorder, &["recording /left/points"]);
+    let asked = Asked::of(&domain, player);
+    asked.until_said("playing");
+    assert!(
+        asked
+            .call::<PlayNext>("play_next", &PlayNextRequest::default())
+            .success
+    );
+    if let Some(stop) = stop {
+        signal(&recorder, stop);
+    }
+    let _ = asked.call::<Resume>("resume", &ResumeRequest::default());
+    let mut asked = asked;
+    let status = asked.player.wait_timeout(PATIENCE).unwrap().unwrap();
+    let lines: Vec<String> = asked.said.iter().collect();
+    let last = lines.iter().rfind(|line| line.contains("messages played"));
+    let last = last.unwrap().clone();
+    signal(&recorder, "-CONT");
+    signal(&recorder, "-INT");
+    recorder.wait().unwrap();
+    let report = std::fs::read_to_string(&report).unwrap();
+    (
+        status.success(),
+        last,
+        serde_json::from_str(&report).unwrap(),
+    )
+}
+
+#[test]
+fn what_a_player_does_not_deliver_is_in_its_last_line_and_its_status() {
+    let (success, last, report) = played_to(None, true);
+    assert!(success && last.ends_with(" ms late"), "{last}");
+    assert_eq!(
+        (&report["failed"], &report["unacknowledged"]),
+        (&json!(0), &json!(0))
+    );
+    for strict in [false, true] {
+        // It is taken for gone after its lease of 10 s.
+        let (success, last, report) = played_to(Some("-STOP"), strict);
+        let unacknowledged = report["unacknowledged"].as_u64().unwrap();
+        let messages = report["messages"].as_u64().unwrap();
+        assert!((20..=messages).contains(&unacknowledged), "{report}");
+        assert!(
+            last.contains(&format!(" {unacknowledged} not acknowledged")),
+            "{last}"
+        );
+        assert_eq!(success, !strict, "{last}");
+    }
 }

@@ -74,8 +74,9 @@ bool lattice_is_blob_type (const struct ddsi_sertype *type);
 /* True while a writer is made that overwrites no sample that is not acknowledged. */
 bool lattice_keeps_unacknowledged (void);
 
-/* Called by Cyclone when a writer loses a reader, which has acknowledged all up to a number. */
-void lattice_reader_left (const struct ddsi_writer *writer, bool is_reliable, uint64_t acknowledged);
+/* Called by Cyclone when a writer loses a reader, which has acknowledged all up to a number: all there will ever be, if it is
+   best effort. */
+void lattice_reader_left (const struct ddsi_writer *writer, uint64_t acknowledged);
 
 /* The number that a reader asks a writer of a vendor for before it knows what there is. */
 uint64_t lattice_first_asked_for (const uint8_t vendor[2]);

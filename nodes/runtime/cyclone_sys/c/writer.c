@@ -56,11 +56,11 @@ void lattice_on_reader_left (void (*callback) (void *, uint64_t))
   reader_left = callback;
 }
 
-void lattice_reader_left (const struct ddsi_writer *writer, bool is_reliable, uint64_t acknowledged)
+void lattice_reader_left (const struct ddsi_writer *writer, uint64_t acknowledged)
 {
   /* Writers of Cyclone's own have no entity of the application. */
   const struct dds_entity *entity = writer->status_cb_entity;
-  if (!is_reliable || entity == NULL || reader_left == NULL || acknowledged >= writer->seq)
+  if (entity == NULL || reader_left == NULL || acknowledged >= writer->seq)
     return;
   void *owner = entity->m_listener.on_publication_matched_arg;
   if (owner != NULL && lattice_is_blob_type (writer->type))
