@@ -62,7 +62,17 @@ impl MapLosses {
 
     /// Messages lost on the way or at the inbox.
     pub fn count(&self) -> u64 {
-        self.at_inbox.load(Ordering::Relaxed) + self.before.lost()
+        self.inbox_full() + self.on_network()
+    }
+
+    /// Messages that found the inbox, or the queue before it, full.
+    pub fn inbox_full(&self) -> u64 {
+        self.at_inbox.load(Ordering::Relaxed) + self.before.overrun()
+    }
+
+    /// Messages that were sent and did not come.
+    pub fn on_network(&self) -> u64 {
+        self.before.on_network()
     }
 
     /// Messages that are none.

@@ -16,7 +16,7 @@ struct Change {
     pieces: &'static [(&'static str, &'static str)],
 }
 
-const CHANGES: [Change; 5] = [
+const CHANGES: [Change; 8] = [
     // A reply names its request in the inline QoS, which is where clients over Fast DDS look for it.
     Change {
         file: "core/ddsi/src/ddsi_transmit.c",
@@ -59,6 +59,30 @@ const CHANGES: [Change; 5] = [
         pieces: &[(
             "  const bool is_secure = ((datap->builtin_endpoint_set & ",
             "  if (!lattice_make_room (gv, timestamp.v))\n    return HSR_NOT_INTERESTING;\n\n  const bool is_secure = ((datap->builtin_endpoint_set & ",
+        )],
+    },
+    // What a reader that goes has not acknowledged is counted.
+    Change {
+        file: "core/ddsi/src/ddsi_proxy_endpoint.c",
+        pieces: &[(
+            "        m_wr->seq = DDSI_MAX_SEQ_NUMBER;\n        ddsrt_avl_augment_update",
+            "        lattice_reader_left (wr, m_wr->seq);\n        m_wr->seq = DDSI_MAX_SEQ_NUMBER;\n        ddsrt_avl_augment_update",
+        )],
+    },
+    // Samples are taken as they come, and those that give way to newer ones are counted there: here none does.
+    Change {
+        file: "core/ddsc/src/dds_rhc_default.c",
+        pieces: &[(
+            "  rhc->history_depth = (qos->history.kind == DDS_HISTORY_KEEP_LAST) ?",
+            "  rhc->history_depth = (qos->history.kind == DDS_HISTORY_KEEP_LAST && !lattice_is_blob_type (rhc->type)) ?",
+        )],
+    },
+    // A player keeps what is not acknowledged, within bytes, whatever depth was recorded.
+    Change {
+        file: "core/ddsc/src/dds_whc.c",
+        pieces: &[(
+            "  wrinfo->hdepth = (qos->history.kind == DDS_HISTORY_KEEP_ALL) ?",
+            "  wrinfo->hdepth = (qos->history.kind == DDS_HISTORY_KEEP_ALL || lattice_keeps_unacknowledged ()) ?",
         )],
     },
     // Freed before its last use: mended in 11.0.1 in the same way.
@@ -161,7 +185,7 @@ fn main() -> Result<(), Box<dyn Error>> {
     build
         .warnings(true)
         .warnings_into_errors(true)
-        .files(["c/blob.c", "c/participants.c"])
+        .files(["c/blob.c", "c/participants.c", "c/writer.c"])
         .try_compile("lattice_blob")?;
     cyclone.try_compile("lattice_ddsc")?;
     if security {

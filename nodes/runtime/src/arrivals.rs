@@ -3,11 +3,12 @@
 use std::collections::VecDeque;
 use std::iter;
 use std::sync::Mutex;
-use std::sync::atomic::{AtomicU64, Ordering::Relaxed};
+use std::sync::atomic::Ordering::Relaxed;
 use std::task::{Context, Poll};
 
 use futures::task::AtomicWaker;
 
+use super::port::ReaderLosses;
 use super::sync::lock;
 
 /// Samples that were taken out of the transport as they came. Its own history would overwrite what nobody
@@ -15,7 +16,7 @@ use super::sync::lock;
 pub(crate) struct Arrivals<T> {
     depth: usize,
     waiting: Mutex<VecDeque<T>>,
-    overwritten: AtomicU64,
+    losses: ReaderLosses,
     waker: AtomicWaker,
 }
 
@@ -25,7 +26,7 @@ impl<T> Arrivals<T> {
         Self {
             depth: depth.max(1),
             waiting: Mutex::default(),
-            overwritten: AtomicU64::new(0),
+            losses: ReaderLosses::default(),
             waker: AtomicWaker::new(),
         }
     }
@@ -36,7 +37,7 @@ impl<T> Arrivals<T> {
         for sample in iter::from_fn(next) {
             if waiting.len() >= self.depth {
                 let _ = waiting.pop_front();
-                let _ = self.overwritten.fetch_add(1, Relaxed);
+                self.losses.overrun.fetch_add(1, Relaxed);
             }
             waiting.push_back(sample);
         }
@@ -49,9 +50,9 @@ impl<T> Arrivals<T> {
         lock(&self.waiting).pop_front()
     }
 
-    /// Samples that gave way to newer ones since the last call.
-    pub(crate) fn overwritten(&self) -> u64 {
-        self.overwritten.swap(0, Relaxed)
+    /// Samples that will not come out of here.
+    pub(crate) fn losses(&self) -> &ReaderLosses {
+        &self.losses
     }
 
     /// The oldest sample that waits, or the task is woken when the next comes.

@@ -2,6 +2,7 @@
 
 use std::borrow::Cow;
 use std::future::poll_fn;
+use std::sync::atomic::AtomicU64;
 use std::sync::{Arc, MutexGuard};
 use std::task::{Context, Poll};
 use std::time::Duration;
@@ -187,6 +188,9 @@ pub(crate) enum PortEvent {
     Lost { peer: EndpointId },
 }
 
+/// Bytes of samples that are not acknowledged, of a writer that keeps them: 5 s of a lidar that sends 12 MB in each.
+pub(crate) const UNACKNOWLEDGED_BYTES: usize = 64 << 20;
+
 /// A participant on a network.
 pub(crate) trait Transport: Send + Sync {
     /// Identity of the participant.
@@ -212,11 +216,13 @@ pub(crate) trait Transport: Send + Sync {
         None
     }
 
-    /// Makes a writer.
+    /// Makes a writer. One that `keeps` overwrites no sample that a reliable reader has not acknowledged, however
+    /// many there are, within [`UNACKNOWLEDGED_BYTES`].
     fn writer(
         &self,
         topic: PortTopic<'_>,
         qos: &Qos,
+        keeps: bool,
     ) -> Result<Arc<dyn SampleWriter>, RuntimeError>;
 
     /// Makes a reader that refuses samples longer than `max_bytes`, header included.
@@ -266,8 +272,24 @@ pub(crate) trait SampleWriter: Send + Sync {
         related: Option<SampleId>,
     ) -> BoxFuture<'_, Result<(), WriteRefusal>>;
 
+    /// Samples that reliable readers had not acknowledged when they left, and those that are not acknowledged yet.
+    /// None where the transport does not tell.
+    fn unacknowledged(&self) -> u64 {
+        0
+    }
+
     /// Waits until every reliable reader has acknowledged. False: not in time.
     fn wait_for_acknowledgments(&self, patience: Duration) -> bool;
+}
+
+/// Samples that a reader does not have.
+#[derive(Clone, Debug, Default)]
+pub(crate) struct ReaderLosses {
+    /// Sent by a writer that was heard before and after them, and not received: lost by the network, or given up by the
+    /// writer.
+    pub on_network: Arc<AtomicU64>,
+    /// Received, and displaced by newer ones before they were taken.
+    pub overrun: Arc<AtomicU64>,
 }
 
 /// The receiving end of a topic.
@@ -281,8 +303,8 @@ pub(crate) trait SampleReader: Send + Sync {
     /// Bytes of the last sample, encapsulation header first.
     fn bytes(&self) -> MutexGuard<'_, Vec<u8>>;
 
-    /// Samples that were sent and have not come, or gave way to newer ones, since the last call.
-    fn missed(&self) -> u64;
+    /// Counters of the samples that are not had; clones share them.
+    fn losses(&self) -> ReaderLosses;
 }
 
 impl dyn SampleReader + '_ {

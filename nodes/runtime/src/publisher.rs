@@ -157,6 +157,17 @@ impl RawPublisher {
         let shutdown = &self.parts.shutdown;
         self.parts.writer.send_body_within(body, patience, shutdown)
     }
+
+    /// Messages handed to DDS that reliable subscribers have not acknowledged, or had not when they left.
+    pub fn unacknowledged(&self) -> u64 {
+        self.parts.writer.unacknowledged()
+    }
+
+    /// Waits until the queue has room for a message of so many bytes. False: not in time. Not to be called from a
+    /// handler, callback or timer.
+    pub fn has_room_within(&self, bytes: usize, patience: Duration) -> bool {
+        self.parts.writer.has_room_within(bytes, patience)
+    }
 }
 
 macro_rules! shared_by_publishers {

@@ -9,13 +9,17 @@ use lattice_msgs::rosbag2_interfaces::{
     PlayNext, PlayNextResponse, PlayResponse, Resume, Seek, SeekResponse, SetRate, SetRateResponse,
     Stop, TogglePaused,
 };
-use lattice_runtime::{Node, RuntimeError, Server};
+use lattice_runtime::{Node, Reply, RuntimeError, Server};
 
 use super::playback::Playback;
+use super::steps::Steps;
 use crate::start::NodeError;
 
-/// A change of the playback, or a question; obeyed between two messages.
+/// A change of the playback, or a question; obeyed between two messages, and while one waits. Publishes nothing.
 pub(super) type Control = Box<dyn FnOnce(&mut Playback) + Send>;
+
+/// Calls of a service that wait: one of `~/burst` that plays, and one that is refused meanwhile.
+const MAX_PENDING: usize = 2;
 
 /// Servers of the controls, and what was asked of them.
 pub(super) struct Controls {
@@ -43,11 +47,17 @@ impl Controls {
             serve::<SetRate>(to, "~/set_rate", |playback, request| SetRateResponse {
                 success: playback.set_rate(request.rate),
             })?,
-            serve::<PlayNext>(to, "~/play_next", |playback, _| PlayNextResponse {
-                success: playback.play_next(),
+            serve_later::<PlayNext>(to, "~/play_next", |playback, _, reply| {
+                playback.play_steps(Steps::new(Some(1), |played| {
+                    let success = played > 0;
+                    reply.send(PlayNextResponse { success });
+                }));
             })?,
-            serve::<Burst>(to, "~/burst", |playback, request| BurstResponse {
-                actually_burst: playback.burst(request.num_messages),
+            serve_later::<Burst>(to, "~/burst", |playback, request, reply| {
+                let wanted = Some(request.num_messages).filter(|wanted| *wanted > 0);
+                playback.play_steps(Steps::new(wanted, |actually_burst| {
+                    reply.send(BurstResponse { actually_burst });
+                }));
             })?,
             serve::<Play>(to, "~/play", |playback, request| PlayResponse {
                 success: playback.play_part(&request),
@@ -68,13 +78,6 @@ impl Controls {
         self.sender.clone()
     }
 
-    /// Answers what waits at the end.
-    pub(super) fn obey_all(&self, playback: &mut Playback) {
-        while let Some(control) = self.next(Duration::ZERO) {
-            control(playback);
-        }
-    }
-
     /// The next one, waited for at most so long.
     pub(super) fn next(&self, patience: Duration) -> Option<Control> {
         self.waiting.recv_timeout(patience).ok()
@@ -86,12 +89,21 @@ fn serve<S: RosService + 'static>(
     name: &str,
     obey: impl Fn(&mut Playback, S::Request) -> S::Response + Copy + Send + 'static,
 ) -> Result<Server, RuntimeError> {
+    let obey = move |playback: &mut Playback, request, reply: Reply<S::Response>| {
+        reply.send(obey(playback, request));
+    };
+    serve_later::<S>((node, sender), name, obey)
+}
+
+/// Serves what is answered by the one who obeys, at once or later.
+fn serve_later<S: RosService + 'static>(
+    (node, sender): (&Node, &Sender<Control>),
+    name: &str,
+    obey: impl Fn(&mut Playback, S::Request, Reply<S::Response>) + Copy + Send + 'static,
+) -> Result<Server, RuntimeError> {
     let sender = sender.clone();
-    node.service_later::<S>(name, move |request, reply| {
-        // No more than one of each service waits.
-        let _ = sender.send(Box::new(move |playback| {
-            reply.send(obey(playback, request))
-        }));
+    node.service_concurrent::<S>(name, MAX_PENDING, move |request, reply| {
+        let _ = sender.send(Box::new(move |playback| obey(playback, request, reply)));
     })
 }
 

@@ -9,6 +9,7 @@ use rustix::termios::{LocalModes, OptionalActions, Termios, tcgetattr, tcgetpgrp
 
 use super::controls::Control;
 use super::playback::Playback;
+use super::steps::Steps;
 
 /// Change of the rate by a key.
 const RATE_STEP: f64 = 1.1;
@@ -75,9 +76,7 @@ impl Keys {
             (2, b'A') => return Some(|playback| turn(playback, RATE_STEP)),
             (2, b'B') => return Some(|playback| turn(playback, 1.0 / RATE_STEP)),
             (2, b'C') => {
-                return Some(|playback| {
-                    playback.play_next();
-                });
+                return Some(|playback| playback.play_steps(Steps::new(Some(1), drop)));
             }
             (0, b' ') => return Some(Playback::toggle),
             _ => {}

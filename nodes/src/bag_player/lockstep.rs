@@ -2,12 +2,13 @@
 
 use std::collections::BTreeMap;
 use std::sync::{Arc, Condvar, Mutex, MutexGuard, PoisonError};
+use std::thread;
 use std::time::{Duration, Instant};
 
 use lattice_runtime::qos::{Durability, Qos, Reliability};
-use lattice_runtime::{Load, Node, RemotePublisher, Shutdown, Subscription};
+use lattice_runtime::{Load, Node, RemotePublisher, Subscription};
 
-use super::playback::NAP;
+use super::playback::SLICE;
 use crate::start::NodeError;
 
 /// Answers that a subscription holds.
@@ -49,19 +50,24 @@ impl Awaited {
         }
     }
 
-    /// Waits until nothing is awaited; false after this time or at the end of the process.
-    fn wait(&self, patience: Duration, shutdown: &Shutdown) -> bool {
+    /// Waits until nothing is awaited; false after this time or once `go_on`, which is asked on the way, says so.
+    fn wait(&self, patience: Duration, go_on: &mut dyn FnMut() -> bool) -> bool {
         let deadline = Instant::now() + patience;
-        let mut stamp = self.lock();
-        while stamp.is_some() {
+        loop {
+            let stamp = self.lock();
             let left = deadline.saturating_duration_since(Instant::now());
-            if left.is_zero() || shutdown.is_requested() {
+            if stamp.is_none() {
+                return true;
+            }
+            let woken = self.answered.wait_timeout(stamp, left.min(SLICE));
+            let answered = woken.unwrap_or_else(PoisonError::into_inner).0.is_none();
+            if answered {
+                return true;
+            }
+            if left.is_zero() || !go_on() {
                 return false;
             }
-            let woken = self.answered.wait_timeout(stamp, left.min(NAP));
-            stamp = woken.unwrap_or_else(PoisonError::into_inner).0;
         }
-        true
     }
 }
 
@@ -75,7 +81,7 @@ impl Lockstep {
         played: &[String],
         node: &Node,
         patience: Duration,
-        shutdown: &Shutdown,
+        go_on: &mut dyn FnMut() -> bool,
     ) -> Result<Self, NodeError> {
         let mut lockstep = Self::default();
         let refused = |problem: String| node.params().invalid("lockstep", problem);
@@ -87,7 +93,7 @@ impl Lockstep {
             let Some(index) = played.iter().position(|name| name == topic) else {
                 return Err(refused(format!("'{topic}' is not played")).into());
             };
-            let Some(publisher) = publisher_of(&answers, node, patience, shutdown) else {
+            let Some(publisher) = publisher_of(&answers, node, patience, go_on) else {
                 let seconds = patience.as_secs();
                 let problem = format!("no publisher on '{answers}' after {seconds} s");
                 return Err(refused(format!("{problem} (`wait_timeout_s`)")).into());
@@ -118,7 +124,7 @@ impl Lockstep {
         topic: usize,
         next: &[u8],
         patience: Duration,
-        shutdown: &Shutdown,
+        go_on: &mut dyn FnMut() -> bool,
     ) {
         let Some(pair) = self.0.get_mut(&topic) else {
             return;
@@ -127,8 +133,8 @@ impl Lockstep {
             true => Duration::ZERO,
             false => patience,
         };
-        let answered = pair.awaited.wait(patience, shutdown);
-        if !answered && !pair.given_up && !shutdown.is_requested() {
+        let answered = pair.awaited.wait(patience, go_on);
+        if !answered && !pair.given_up && go_on() {
             let seconds = patience.as_secs_f64();
             log::warn!(
                 "{}: no answer within {seconds} s (`max_wait_s`); not waited for until one comes",
@@ -140,9 +146,9 @@ impl Lockstep {
     }
 
     /// Waits for the answers to the last messages.
-    pub(super) fn finish(&self, patience: Duration, shutdown: &Shutdown) {
+    pub(super) fn finish(&self, patience: Duration, go_on: &mut dyn FnMut() -> bool) {
         for pair in self.0.values().filter(|pair| !pair.given_up) {
-            if !pair.awaited.wait(patience, shutdown) {
+            if !pair.awaited.wait(patience, go_on) {
                 log::warn!("{}: the last message was not answered", pair.answers);
             }
         }
@@ -154,16 +160,16 @@ fn publisher_of(
     topic: &str,
     node: &Node,
     patience: Duration,
-    shutdown: &Shutdown,
+    go_on: &mut dyn FnMut() -> bool,
 ) -> Option<RemotePublisher> {
     let deadline = Instant::now() + patience;
     loop {
         let mut all = node.remote_publishers().into_iter();
         let found = all.find(|publisher| publisher.topic == topic);
-        if found.is_some() || Instant::now() >= deadline || shutdown.is_requested() {
+        if found.is_some() || Instant::now() >= deadline || !go_on() {
             return found;
         }
-        shutdown.wait_timeout(NAP);
+        thread::sleep(SLICE);
     }
 }
 
@@ -205,9 +211,10 @@ mod tests {
 
     #[test]
     fn only_the_answer_of_the_same_stamp_ends_the_wait() {
-        let (awaited, shutdown) = (Awaited::default(), Shutdown::default());
+        let awaited = Awaited::default();
+        let (mut always, mut never) = (|| true, || false);
         assert!(
-            awaited.wait(Duration::ZERO, &shutdown),
+            awaited.wait(Duration::ZERO, &mut always),
             "nothing is awaited"
         );
         *awaited.lock() = stamp_of(&LITTLE);
@@ -215,14 +222,13 @@ mod tests {
         other[7] = 8;
         awaited.answer(&other);
         awaited.answer(&[]);
-        assert!(!awaited.wait(Duration::ZERO, &shutdown));
+        assert!(!awaited.wait(Duration::ZERO, &mut always));
         std::thread::scope(|scope| {
-            let waiting = scope.spawn(|| awaited.wait(Duration::from_secs(600), &shutdown));
+            let waiting = scope.spawn(|| awaited.wait(Duration::from_secs(600), &mut always));
             awaited.answer(&BIG);
             assert!(waiting.join().unwrap());
         });
         *awaited.lock() = stamp_of(&LITTLE);
-        shutdown.request();
-        assert!(!awaited.wait(Duration::from_secs(600), &shutdown));
+        assert!(!awaited.wait(Duration::from_secs(600), &mut never));
     }
 }

@@ -6,8 +6,11 @@ mod lockstep;
 mod parameters;
 mod playback;
 mod playhead;
+mod steps;
+mod waiting;
 
 use std::path::PathBuf;
+use std::rc::Rc;
 use std::sync::Arc;
 
 use serde::Serialize;
@@ -32,8 +35,11 @@ pub use parameters::declare;
 /// Name of the executable and of the node unless it is remapped.
 pub const NAME: &str = "bag_player";
 
-/// Largest depth of a publisher whose recorder kept all samples.
-const MAX_DEPTH: u64 = 1000;
+/// Largest depth of a publisher, as of parameters. A reliable one keeps what is not acknowledged, within 64 MiB, whatever
+/// its depth.
+const MAX_DEPTH: u64 = 10_000;
+/// Most messages for late joiners: those of `/rosout`, the deepest of ROS's own. They stay in memory.
+const MAX_KEPT: u64 = 1000;
 
 /// The end of a player.
 #[derive(Clone, Debug, Default, PartialEq, Eq, Serialize)]
@@ -42,6 +48,8 @@ pub struct PlayerReport {
     pub messages: u64,
     /// Messages that a publisher did not take: a subscriber has not acknowledged those before.
     pub failed: u64,
+    /// Messages that reliable subscribers had not acknowledged when they left, or at the end.
+    pub unacknowledged: u64,
     /// Latest that a message was after its time, in ms.
     pub latest_ms: u64,
     /// True if all reliable readers acknowledged everything in time.
@@ -68,6 +76,7 @@ pub fn run(arguments: impl IntoIterator<Item = String>) -> Result<(), NodeError>
         max_wait,
         start_paused,
         keyboard,
+        strict,
         report_file,
     } = Settings::from_params(params)?;
     if bag.is_empty() {
@@ -77,7 +86,11 @@ pub fn run(arguments: impl IntoIterator<Item = String>) -> Result<(), NodeError>
     let span_ns = (reader.start_ns().unwrap_or(0), reader.end_ns().unwrap_or(0));
     let has_clock = player.clock_hz.is_some();
     let player = Player::new(reader, player)?;
+    let controls = Rc::new(Controls::serve(&node)?);
     let mut playback = Playback {
+        controls: Rc::clone(&controls),
+        steps: None,
+        ended: false,
         topics: open_topics(&node, &player)?,
         clock: match has_clock {
             true => Some(node.publisher("/clock", Qos::CLOCK_PLAYER)?),
@@ -97,7 +110,6 @@ pub fn run(arguments: impl IntoIterator<Item = String>) -> Result<(), NodeError>
         report: PlayerReport::default(),
     };
     check_topics(params, |_| false)?;
-    let controls = Controls::serve(&node)?;
     let _keyboard = match keyboard {
         true => Keyboard::start(controls.sender()),
         false => None,
@@ -126,17 +138,32 @@ pub fn run(arguments: impl IntoIterator<Item = String>) -> Result<(), NodeError>
     playback.start_lockstep(&lockstep, &node, wait)?;
     if !(waited.is_empty() && lockstep.is_empty()) {
         // We know them; they may need a moment to know us.
-        playback.shutdown.wait_timeout(settle);
+        playback.settle(settle);
     }
     log::info!("playing {bag}");
-    let result = playback.play(&controls);
-    controls.obey_all(&mut playback);
+    let result = playback.play();
     playback.flush();
     report::write(&report_file, &playback.report, &node.diagnostics())?;
     // Sends the last answers, for which the servers must still be there.
     drop(runtime);
     drop(controls);
-    result
+    result?;
+    match playback.report.losses() {
+        Some(losses) if strict => Err(format!("{losses} (`strict`)").into()),
+        _ => Ok(()),
+    }
+}
+
+impl PlayerReport {
+    /// Words for what was not delivered, if anything.
+    fn losses(&self) -> Option<String> {
+        let (failed, unacknowledged) = (self.failed, self.unacknowledged);
+        (failed > 0 || unacknowledged > 0).then(|| {
+            format!(
+                "{failed} skipped for subscribers that do not acknowledge, {unacknowledged} not acknowledged"
+            )
+        })
+    }
 }
 
 /// A publisher for each topic, with the QoS that was recorded unless a parameter says otherwise.
@@ -183,6 +210,11 @@ fn offered(topic: &TopicInfo) -> Qos {
         false => depths.max().unwrap_or(10),
     };
     let least = if is_static { STATIC_DEPTH } else { 1 };
+    let most = if latched { MAX_KEPT } else { MAX_DEPTH };
+    if depth > most {
+        let name = &topic.name;
+        log::info!("{name}: recorded with a depth of {depth}, published with {most}");
+    }
     Qos {
         reliability: match is_static || recorded.iter().all(|qos| qos.reliable) {
             true => Reliability::Reliable,
@@ -192,7 +224,7 @@ fn offered(topic: &TopicInfo) -> Qos {
             true => Durability::TransientLocal,
             false => Durability::Volatile,
         },
-        depth: depth.clamp(least, MAX_DEPTH) as usize,
+        depth: depth.clamp(least, most) as usize,
         kept: None,
     }
 }

@@ -22,6 +22,7 @@ const ABOUT: &[About] = about! {
     "settle_s" fixed(START): "How long to wait for them to know us.";
     "start_paused" fixed(START): "Whether the log is held until a call of ~/resume or the space bar.";
     "keyboard" fixed(START): "Whether keys of the terminal are taken: space pauses, arrows step and change the rate.";
+    "strict" fixed(START): "Whether the exit status is 1 if messages were skipped or not acknowledged.";
     "max_wait_s": "How long a subscriber that does not acknowledge is waited for; then its topic's messages are skipped and counted until it does. The same for an answer of lockstep.";
 };
 
@@ -38,6 +39,7 @@ pub(super) struct Settings {
     pub max_wait: Duration,
     pub start_paused: bool,
     pub keyboard: bool,
+    pub strict: bool,
     pub report_file: String,
 }
 
@@ -53,9 +55,10 @@ impl Settings {
             lockstep: params.string_array("lockstep", &[])?,
             wait: seconds(params, "wait_timeout_s", 30.0)?,
             settle: seconds(params, "settle_s", 0.5)?,
-            max_wait: seconds(params, "max_wait_s", 2.0)?,
+            max_wait: seconds(params, "max_wait_s", 10.0)?,
             start_paused: params.bool("start_paused", false)?,
             keyboard: params.bool("keyboard", true)?,
+            strict: params.bool("strict", false)?,
             report_file: report::file(params)?,
         })
     }

@@ -1,6 +1,8 @@
-//! Playback against the clock: what is due is published, and controls are obeyed between two messages.
+//! Playback against the clock: what is due is published, and controls are obeyed between two messages and in every wait.
 
-use std::sync::{Arc, mpsc};
+use std::mem;
+use std::rc::Rc;
+use std::sync::Arc;
 use std::time::{Duration, Instant};
 
 use lattice_bag::{Player, Step};
@@ -9,18 +11,15 @@ use lattice_msgs::rosbag2_interfaces::PlayRequest;
 use lattice_msgs::rosgraph_msgs::Clock;
 use lattice_runtime::logging::Throttle;
 use lattice_runtime::params::{ParamValue, Params};
-use lattice_runtime::{Diagnostics, Level, Node, Publisher, RawPublisher, Shutdown};
+use lattice_runtime::{Diagnostics, Level, Publisher, RawPublisher, Shutdown};
 
 use super::PlayerReport;
 use super::controls::Controls;
 use super::lockstep::Lockstep;
 use super::playhead::Playhead;
+use super::steps::Steps;
 use crate::start::NodeError;
 
-/// Time that what is queued at the end has to reach its readers.
-const FLUSH_TIME: Duration = Duration::from_secs(20);
-/// The same after a signal.
-const HURRIED_FLUSH_TIME: Duration = Duration::from_secs(2);
 /// A player that is later than this goes on from there: what it missed would come in one burst, too fast
 /// for those who listen.
 const MOST_LATE: Duration = Duration::from_secs(1);
@@ -28,6 +27,9 @@ const MOST_LATE: Duration = Duration::from_secs(1);
 pub(super) const STATE_PERIOD: Duration = Duration::from_millis(500);
 /// Longest sleep between two looks at the shutdown flag, and between two times on `/clock` while held.
 pub(super) const NAP: Duration = Duration::from_millis(100);
+
+/// Longest part of a wait after which controls are obeyed: a call is answered within 100 ms.
+pub(super) const SLICE: Duration = Duration::from_millis(20);
 
 /// The part of a delay by which all that follows is late too.
 fn not_made_up(late: Duration) -> Duration {
@@ -41,6 +43,9 @@ fn not_made_up(late: Duration) -> Duration {
 /// A log being played.
 pub(super) struct Playback {
     pub player: Player,
+    pub controls: Rc<Controls>,
+    /// Messages that a call wants played while the log is held.
+    pub steps: Option<Steps>,
     /// First and last time of the log.
     pub span_ns: (i64, i64),
     pub topics: Vec<RawPublisher>,
@@ -54,6 +59,8 @@ pub(super) struct Playback {
     pub head: Playhead,
     /// True after a call of `stop`.
     pub stopped: bool,
+    /// True once nothing more is played.
+    pub ended: bool,
     pub shutdown: Shutdown,
     /// Those of the node, for its rate to be read.
     pub params: Arc<Params>,
@@ -64,43 +71,8 @@ pub(super) struct Playback {
 }
 
 impl Playback {
-    /// Waits until each of these topics has a subscriber, or goes on without after the time.
-    pub(super) fn wait_for(&self, names: &[String], timeout: Duration) {
-        let deadline = Instant::now() + timeout;
-        for (publisher, topic) in self.topics.iter().zip(self.player.topics()) {
-            if !names.contains(&topic.info.name) {
-                continue;
-            }
-            let (joined, join) = mpsc::channel();
-            publisher.on_subscriber_joined(move || {
-                let _ = joined.send(());
-            });
-            while publisher.subscriber_count() == 0 && !self.shutdown.is_requested() {
-                let left = deadline.saturating_duration_since(Instant::now());
-                if left.is_zero() {
-                    log::warn!("{}: nobody listens, playing all the same", topic.info.name);
-                    break;
-                }
-                let _ = join.recv_timeout(left.min(NAP));
-            }
-        }
-    }
-
-    /// Begins with the lockstep of pairs of topics.
-    pub(super) fn start_lockstep(
-        &mut self,
-        pairs: &[String],
-        node: &Node,
-        timeout: Duration,
-    ) -> Result<(), NodeError> {
-        let topics = self.player.topics().iter();
-        let played: Vec<String> = topics.map(|topic| topic.info.name.clone()).collect();
-        self.lockstep = Lockstep::start(pairs, &played, node, timeout, &self.shutdown)?;
-        Ok(())
-    }
-
     /// Plays to the end, a call of `stop` or a signal.
-    pub(super) fn play(&mut self, controls: &Controls) -> Result<(), NodeError> {
+    pub(super) fn play(&mut self) -> Result<(), NodeError> {
         self.head.restart();
         let mut percent = 0;
         while !self.shutdown.is_requested() && !self.stopped {
@@ -111,9 +83,18 @@ impl Playback {
             let left_ns = due_ns.saturating_sub(self.head.now_ns());
             let left = Duration::from_nanos(u64::try_from(left_ns).unwrap_or(0));
             let is_held = self.head.is_held();
-            if let Some(control) = controls.next(if is_held { NAP } else { left.min(NAP) }) {
+            let patience = match (is_held, self.steps.is_some()) {
+                (true, true) => Duration::ZERO,
+                (true, false) => NAP,
+                (false, _) => left.min(NAP),
+            };
+            if let Some(control) = self.controls.next(patience) {
                 control(self);
                 self.diagnose();
+                continue;
+            }
+            if let Some(steps) = self.steps.take() {
+                self.take_step(steps);
                 continue;
             }
             if is_held {
@@ -133,6 +114,15 @@ impl Playback {
             self.tell_progress(&mut percent);
         }
         Ok(())
+    }
+
+    /// Obeys the controls that wait; false once the log is to end.
+    pub(super) fn obey(&mut self) -> bool {
+        let controls = Rc::clone(&self.controls);
+        while let Some(control) = controls.next(Duration::ZERO) {
+            control(self);
+        }
+        !self.shutdown.is_requested() && !self.stopped
     }
 
     /// Takes one step; false at the end.
@@ -219,32 +209,30 @@ impl Playback {
         found
     }
 
-    /// Plays the next messages of a log that is held, all for 0; how many there were.
-    pub(super) fn burst(&mut self, messages: u64) -> u64 {
-        let mut played = 0;
-        while (messages == 0 || played < messages)
-            && !self.shutdown.is_requested()
-            && self.play_next()
-        {
-            played += 1;
+    /// Plays the next messages of a log that is held. Their call is answered at once where it is not, at the end of
+    /// the log, and while such a call is obeyed.
+    pub(super) fn play_steps(&mut self, steps: Steps) {
+        if !self.head.is_held() || self.ended || self.steps.is_some() {
+            steps.end();
+        } else {
+            self.steps = Some(steps);
         }
-        played
     }
 
-    /// Plays the next message at once, if the log is held; false where it is not, and at the end.
-    pub(super) fn play_next(&mut self) -> bool {
+    /// Plays the next message at once, if the log is still held.
+    fn take_step(&mut self, steps: Steps) {
         if !self.head.is_held() {
-            return false;
+            return steps.end();
         }
         match self.player.skip_to_next(self.head.now_ns()) {
             Ok(Some((topic, data))) => {
+                self.steps = steps.played();
                 self.publish(topic, data);
-                true
             }
-            Ok(None) => false,
+            Ok(None) => steps.end(),
             Err(error) => {
                 log::error!("{error}");
-                false
+                steps.end();
             }
         }
     }
@@ -266,15 +254,28 @@ impl Playback {
         let (begin_ns, end_ns) = self.span_ns;
         let now_ns = self.player.bag_time_ns(self.head.now_ns());
         let paused = self.head.is_held();
-        let message = if paused { "paused" } else { "playing" };
+        let state = if paused { "paused" } else { "playing" };
+        let failed = self.report.failed;
+        let (level, message) = match failed {
+            0 => (Level::Ok, state.to_owned()),
+            _ => (Level::Warn, format!("{state}, {failed} messages skipped")),
+        };
         let values = [
             ("begin_ns", begin_ns.to_string()),
             ("end_ns", end_ns.to_string()),
             ("now_ns", now_ns.to_string()),
             ("rate", self.player.rate().to_string()),
             ("paused", paused.to_string()),
+            ("failed", failed.to_string()),
+            ("unacknowledged", self.unacknowledged().to_string()),
         ];
-        self.diagnostics.set("log", Level::Ok, message, values);
+        self.diagnostics.set("log", level, message, values);
+    }
+
+    /// Messages that reliable subscribers have not acknowledged, or had not when they left.
+    pub(super) fn unacknowledged(&self) -> u64 {
+        let each = self.topics.iter().map(RawPublisher::unacknowledged);
+        each.fold(0, u64::saturating_add)
     }
 
     fn publish_clock(&self, now_ns: i64) {
@@ -291,20 +292,17 @@ impl Playback {
     /// waited for once.
     fn publish(&mut self, topic: usize, data: Vec<u8>) {
         let begin = Instant::now();
-        let shutdown = &self.shutdown;
-        self.lockstep.before(topic, &data, self.most_wait, shutdown);
+        let (mut lockstep, patience) = (mem::take(&mut self.lockstep), self.most_wait);
+        lockstep.before(topic, &data, patience, &mut || self.obey());
+        self.lockstep = lockstep;
         self.head.stand(begin.elapsed());
+        self.wait_for_room(topic, data.len());
         let (Some(publisher), Some(stuck)) = (self.topics.get(topic), self.stuck.get_mut(topic))
         else {
             return;
         };
         self.report.messages += 1;
-        let patience = if *stuck {
-            Duration::ZERO
-        } else {
-            self.most_wait
-        };
-        let published = publisher.publish_within(data, patience);
+        let published = publisher.publish_within(data, Duration::ZERO);
         if let Err(error) = &published {
             self.report.failed += 1;
             if !*stuck {
@@ -314,29 +312,6 @@ impl Playback {
             log::info!("{}: goes on", publisher.topic());
         }
         *stuck = published.is_err();
-    }
-
-    /// Gives readers time to have everything.
-    pub(super) fn flush(&mut self) {
-        let patience = match self.shutdown.is_requested() {
-            true => HURRIED_FLUSH_TIME,
-            false => FLUSH_TIME,
-        };
-        self.lockstep.finish(patience, &self.shutdown);
-        let deadline = Instant::now() + patience;
-        self.report.acknowledged = true;
-        for publisher in &self.topics {
-            let left = deadline.saturating_duration_since(Instant::now());
-            if !publisher.flush(left) {
-                self.report.acknowledged = false;
-                log::warn!("{}: not everything was acknowledged", publisher.topic());
-            }
-        }
-        log::info!(
-            "{} messages played, at most {} ms late",
-            self.report.messages,
-            self.report.latest_ms
-        );
     }
 }
 

@@ -69,10 +69,16 @@ pub struct TransformerCounts {
 pub struct TransformerReport {
     /// Everything counted by the state machine.
     pub counts: TransformerCounts,
-    /// Clouds that were sent and lost on the way, or that found the inbox full.
+    /// Clouds that found the inbox, or the queue before it, full.
     pub clouds_inbox_full: u64,
-    /// Poses and transforms that found the inbox full.
+    /// Clouds that were sent and did not come.
+    #[serde(default)]
+    pub clouds_lost_on_network: u64,
+    /// Poses and transforms that found the inbox, or the queue before it, full.
     pub poses_inbox_full: u64,
+    /// Poses and transforms that were sent and did not come.
+    #[serde(default)]
+    pub poses_lost_on_network: u64,
     /// Samples that did not decode.
     pub undecodable: u64,
     /// Clouds that could not be given to the publisher.
@@ -147,6 +153,7 @@ impl TransformerReport {
             ("queue_full", counts.clouds_queue_full),
             ("time_jump", counts.clouds_time_jump),
             ("inbox_full", self.clouds_inbox_full),
+            ("lost_on_network", self.clouds_lost_on_network),
             ("undecodable", self.undecodable),
             ("not_published", self.clouds_not_published),
         ];

@@ -264,8 +264,15 @@ impl Shell {
     fn report(&self) -> TransformerReport {
         TransformerReport {
             counts: self.machine.counts().clone(),
-            clouds_inbox_full: self.lost.load(Ordering::Relaxed) + self.lost_clouds.lost(),
-            poses_inbox_full: self.lost_poses.load(Ordering::Relaxed),
+            clouds_inbox_full: self.lost.load(Ordering::Relaxed) + self.lost_clouds.overrun(),
+            clouds_lost_on_network: self.lost_clouds.on_network(),
+            poses_inbox_full: self.lost_poses.load(Ordering::Relaxed)
+                + self
+                    .losses
+                    .overrun()
+                    .saturating_sub(self.lost_clouds.overrun()),
+            poses_lost_on_network: (self.losses.on_network())
+                .saturating_sub(self.lost_clouds.on_network()),
             undecodable: self.losses.undecodable(),
             clouds_not_published: self.outputs.points.dropped(),
             refusals: self.machine.refusals().all().to_vec(),

@@ -270,7 +270,8 @@ impl Shell {
 
     fn report(&mut self) -> MapperReport {
         MapperReport {
-            clouds_inbox_full: self.clouds_lost(),
+            clouds_inbox_full: self.clouds_inbox_full(),
+            clouds_lost_on_network: self.clouds.on_network(),
             undecodable: self.inputs.undecodable(),
             updates_not_published: self.output.updates_lost(),
             chunks_not_published: self.output.chunks_lost(),
@@ -278,9 +279,9 @@ impl Shell {
         }
     }
 
-    /// Clouds lost on the way or at the inbox.
-    fn clouds_lost(&self) -> u64 {
-        self.lost.load(Ordering::Relaxed) + self.clouds.lost()
+    /// Clouds that found the inbox, or the queue before it, full.
+    fn clouds_inbox_full(&self) -> u64 {
+        self.lost.load(Ordering::Relaxed) + self.clouds.overrun()
     }
 
     fn diagnose(&mut self) {
@@ -289,7 +290,8 @@ impl Shell {
         if counts.points_mapped > 0 || voxels > 0 {
             self.unmapped = None;
         }
-        let lost = self.clouds_lost();
+        let (inbox_full, on_network) = (self.clouds_inbox_full(), self.clouds.on_network());
+        let lost = inbox_full + on_network;
         let updates = self.output.updates_lost();
         let not_published = updates + self.output.chunks_lost();
         let refused =
@@ -321,7 +323,8 @@ impl Shell {
         let mut values = report::key_values(counts);
         let distortion = self.machine.distortion();
         values.extend([
-            ("clouds_inbox_full".into(), lost.to_string()),
+            ("clouds_inbox_full".into(), inbox_full.to_string()),
+            ("clouds_lost_on_network".into(), on_network.to_string()),
             ("undecodable".into(), self.inputs.undecodable().to_string()),
             ("updates_not_published".into(), updates.to_string()),
             (

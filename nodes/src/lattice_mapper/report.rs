@@ -15,8 +15,11 @@ pub struct MapperReport {
     pub cell_volume_m3: f64,
     /// Everything counted by the state machine.
     pub counts: MapperCounts,
-    /// Clouds that were sent and lost on the way, or that found the inbox full.
+    /// Clouds that found the inbox, or the queue before it, full.
     pub clouds_inbox_full: u64,
+    /// Clouds that were sent and did not come.
+    #[serde(default)]
+    pub clouds_lost_on_network: u64,
     /// Samples that did not decode.
     pub undecodable: u64,
     /// Updates that the publisher did not take or could not send; a keyframe followed.
@@ -72,6 +75,7 @@ impl MapperReport {
             cell_volume_m3: lattice.cell_volume_m3(),
             counts,
             clouds_inbox_full: 0,
+            clouds_lost_on_network: 0,
             undecodable: 0,
             updates_not_published: 0,
             chunks_not_published: 0,

@@ -195,7 +195,12 @@ impl Shell {
         }
         for (robot, input) in self.robots.iter().zip(&self.inputs) {
             let losses = input.losses();
-            values.push((format!("{robot}_inbox_full"), losses.count().to_string()));
+            for (key, count) in [
+                ("inbox_full", losses.inbox_full()),
+                ("lost_on_network", losses.on_network()),
+            ] {
+                values.push((format!("{robot}_{key}"), count.to_string()));
+            }
             values.push((
                 format!("{robot}_undecodable"),
                 losses.undecodable().to_string(),

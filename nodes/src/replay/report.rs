@@ -81,7 +81,9 @@ impl RunReport {
     pub fn losses(&self) -> Vec<String> {
         let mut lines = Vec::new();
         let counts = &self.transformer.counts;
-        let refused = self.transformer.clouds_inbox_full + self.transformer.undecodable;
+        let refused = self.transformer.clouds_inbox_full
+            + self.transformer.clouds_lost_on_network
+            + self.transformer.undecodable;
         let arrived = counts.clouds_in + refused;
         let missing = self.clouds_in_log.saturating_sub(arrived);
         if missing > 0 {
@@ -111,6 +113,10 @@ impl RunReport {
         if poses > 0 {
             lines.push(format!("{poses} poses and transforms: inbox_full"));
         }
+        let poses = self.transformer.poses_lost_on_network;
+        if poses > 0 {
+            lines.push(format!("{poses} poses and transforms: lost_on_network"));
+        }
         for LatticeReport { map, .. } in &self.lattices {
             let (name, mapped, out) = (&map.lattice, &map.counts, counts.clouds_out);
             let lost = out.saturating_sub(mapped.clouds_in);
@@ -130,11 +136,9 @@ impl RunReport {
             let jump = "of another time than those before";
             add("clouds", mapped.clouds_stamp_jump, jump);
             add("clouds", mapped.clouds_no_viewpoint, blind);
-            add(
-                "clouds",
-                map.clouds_inbox_full,
-                "lost on the way or inbox full",
-            );
+            add("clouds", map.clouds_inbox_full, "inbox full");
+            let on_network = map.clouds_lost_on_network;
+            add("clouds", on_network, "lost on the network");
             add("samples", map.undecodable, "undecodable");
             add("points", mapped.points_not_finite, "not finite");
             add(
@@ -248,15 +252,22 @@ mod tests {
         assert!(report().losses().is_empty());
         assert!(report().to_string().contains("dropped: none"));
         type Change = (&'static str, fn(&mut RunReport) -> &mut u64);
-        let changes: [Change; 10] = [
+        let changes: [Change; 13] = [
             ("reach the transformer", |r| &mut r.clouds_in_log),
             ("pose_gap", |r| &mut r.transformer.counts.clouds_pose_gap),
             ("inbox_full", |r| &mut r.transformer.clouds_inbox_full),
             ("poses and", |r| &mut r.transformer.poses_inbox_full),
+            ("lost_on_network", |r| {
+                &mut r.transformer.clouds_lost_on_network
+            }),
+            ("lost_on_network", |r| {
+                &mut r.transformer.poses_lost_on_network
+            }),
             ("undecodable", |r| &mut r.transformer.undecodable),
             ("reach the fcc", |r| &mut r.transformer.counts.clouds_out),
             ("malformed", |r| &mut map(r).counts.clouds_malformed),
             ("inbox full", |r| &mut map(r).clouds_inbox_full),
+            ("on the network", |r| &mut map(r).clouds_lost_on_network),
             ("max_voxels", |r| &mut map(r).counts.points_list_full),
             ("of keys", |r| &mut map(r).counts.points_out_of_range),
         ];

@@ -357,7 +357,8 @@ impl Shell {
 
     fn diagnose(&self) {
         let counts = self.machine.counts();
-        let lost = self.lost.load(Ordering::Relaxed) + self.losses.lost();
+        let inbox_full = self.lost.load(Ordering::Relaxed) + self.losses.overrun();
+        let on_network = self.losses.on_network();
         let last = self.machine.last_result();
         let (level, message) = if self.machine.map_voxels() == 0 {
             (Level::Warn, "no map yet".to_owned())
@@ -370,7 +371,8 @@ impl Shell {
         };
         let mut values = report::key_values(counts);
         values.extend([
-            ("inbox_full".into(), lost.to_string()),
+            ("inbox_full".into(), inbox_full.to_string()),
+            ("lost_on_network".into(), on_network.to_string()),
             ("undecodable".into(), self.losses.undecodable().to_string()),
             ("map_voxels".into(), self.machine.map_voxels().to_string()),
             (

@@ -1,7 +1,8 @@
 //! One connection: its request, then nothing more or a WebSocket.
 
 use std::io;
-use std::net::TcpStream;
+use std::net::{IpAddr, TcpStream};
+use std::rc::Rc;
 use std::sync::Arc;
 use std::time::{Duration, Instant};
 
@@ -10,7 +11,7 @@ use async_tungstenite::tungstenite::protocol::frame::coding::CloseCode;
 use async_tungstenite::tungstenite::protocol::{CloseFrame, Role, WebSocketConfig};
 use async_tungstenite::tungstenite::{self, Message};
 use futures::stream::FuturesUnordered;
-use futures::{AsyncReadExt, AsyncWriteExt, StreamExt};
+use futures::{AsyncReadExt, AsyncWriteExt, SinkExt, StreamExt};
 use smol::channel::Receiver;
 use smol::future::{or, pending, poll_once, yield_now};
 use smol::{Async, Timer};
@@ -23,11 +24,13 @@ use super::inputs::{Input, InputRefusal};
 use super::offer::{MAX_MESSAGE_BYTES, MESSAGE_HEAD_BYTES};
 use super::outbox::Outgoing;
 use super::protocol::message_data;
+use super::room::Room;
+use super::stream::{ClientStream, Progress};
 
 /// Time for a request to come.
 const HEAD_TIME: Duration = Duration::from_secs(5);
-/// Time for one message, or one file, to be taken.
-const SEND_TIME: Duration = Duration::from_secs(20);
+/// Time for a file of the page, or a refusal, to be taken.
+const ANSWER_TIME: Duration = Duration::from_secs(20);
 /// Time for the reason of an end to be taken.
 const LAST_TIME: Duration = Duration::from_secs(1);
 /// Bytes that the kernel keeps until a client takes them.
@@ -35,16 +38,38 @@ const SEND_BUFFER_BYTES: usize = 512 << 10;
 
 type Stream = Async<TcpStream>;
 
+/// Room for connections that are no client; clients have [`Hub`]'s.
+#[derive(Default)]
+pub struct Rooms {
+    /// Those whose request has not come.
+    asking: Rc<Room>,
+    /// Those that are answered.
+    answered: Rc<Room>,
+}
+
 /// Serves a connection to its end.
-pub async fn serve(stream: TcpStream, gate: Arc<Gate>, hub: Arc<Hub>) -> io::Result<()> {
+pub async fn serve(
+    stream: TcpStream,
+    from: IpAddr,
+    gate: Arc<Gate>,
+    hub: Arc<Hub>,
+    rooms: &Rooms,
+) -> io::Result<()> {
     rustix::net::sockopt::set_socket_send_buffer_size(&stream, SEND_BUFFER_BYTES)?;
     stream.set_nodelay(true)?;
     let mut stream = Async::new(stream)?;
-    let head = within(HEAD_TIME, read_head(&mut stream)).await?;
+    let asking = rooms.asking.enter(from);
+    hub.count_displaced(rooms.asking.take_displaced());
+    let head = within(HEAD_TIME, read_head(&mut stream));
+    let head = asking.served(head).await?;
+    drop(asking);
     let answer = match head.map(|head| gate.decide(&head)) {
         Ok(Decision::Upgrade(head)) => match hub.enter() {
             Some((id, woken)) => {
-                let done = talk(stream, head, id, woken, &hub).await;
+                let done = talk(ClientStream::new(stream), head, id, woken, &hub).await;
+                if matches!(&done, Err(error) if error.kind() == io::ErrorKind::TimedOut) {
+                    hub.count_stalled();
+                }
                 hub.leave(id);
                 return done;
             }
@@ -56,8 +81,13 @@ pub async fn serve(stream: TcpStream, gate: Arc<Gate>, hub: Arc<Hub>) -> io::Res
             Response::bad_request()
         }
     };
-    within(SEND_TIME, stream.write_all(&answer.bytes())).await?;
-    within(SEND_TIME, stream.close()).await
+    let answered = rooms.answered.enter(from);
+    hub.count_displaced(rooms.answered.take_displaced());
+    let answer = async {
+        stream.write_all(&answer.bytes()).await?;
+        stream.close().await
+    };
+    answered.served(within(ANSWER_TIME, answer)).await
 }
 
 async fn read_head(stream: &mut Stream) -> io::Result<Result<Head, HeadError>> {
@@ -83,13 +113,14 @@ async fn read_head(stream: &mut Stream) -> io::Result<Result<Head, HeadError>> {
 
 /// Sends what waits and takes what comes until either side ends it.
 async fn talk(
-    mut stream: Stream,
+    mut stream: ClientStream,
     head: String,
     id: u64,
     woken: Receiver<()>,
     hub: &Hub,
 ) -> io::Result<()> {
-    within(SEND_TIME, stream.write_all(head.as_bytes())).await?;
+    let progress = stream.progress();
+    progress.sent(stream.write_all(head.as_bytes())).await?;
     let offer = hub.offer_of_bridge();
     let longest = Some(offer.max_message_bytes());
     let config = WebSocketConfig::default()
@@ -105,7 +136,7 @@ async fn talk(
             Some(come) => Event::Come(come),
             None => match hub.next(id) {
                 Some(next) => {
-                    send(&mut socket, next).await?;
+                    send(&mut socket, &progress, next).await?;
                     continue;
                 }
                 None => {
@@ -149,6 +180,12 @@ async fn talk(
             Event::Come(Some(Ok(Message::Text(text)))) => desk.text(&text),
             Event::Come(Some(Ok(Message::Binary(bytes)))) => desk.data(&bytes),
             Event::Come(Some(Ok(Message::Close(_))) | None) => return Ok(()),
+            // Before more is read, or a client that pings without end would fill the memory with answers.
+            Event::Come(Some(Ok(Message::Ping(_)))) => {
+                let answer = async { socket.flush().await.map_err(io::Error::other) };
+                progress.sent(answer).await?;
+                Step::Done
+            }
             Event::Come(Some(Ok(_))) => Step::Done,
             Event::Come(Some(Err(error))) => {
                 if matches!(error, tungstenite::Error::Capacity(_)) {
@@ -209,7 +246,7 @@ fn take(hub: &Hub, id: u64, flow: &mut Flow, input: Input) -> Option<InputRefusa
 }
 
 /// Tells why the connection ends: what comes next of it cannot be told from the rest of the message.
-async fn too_long(socket: &mut WebSocketStream<Stream>, hub: &Hub) {
+async fn too_long(socket: &mut WebSocketStream<ClientStream>, hub: &Hub) {
     let has_headset = hub.offer_of_bridge().stream_bytes_per_s > 0;
     if let Some(bridge) = hub.bridge().filter(|_| has_headset) {
         bridge.inputs().refused(InputRefusal::TooLong);
@@ -234,17 +271,21 @@ async fn too_long(socket: &mut WebSocketStream<Stream>, hub: &Hub) {
 }
 
 /// Sends one message; an error after the last.
-async fn send(socket: &mut WebSocketStream<Stream>, next: Outgoing) -> io::Result<()> {
+async fn send(
+    socket: &mut WebSocketStream<ClientStream>,
+    progress: &Progress,
+    next: Outgoing,
+) -> io::Result<()> {
     let message = match next {
         Outgoing::Text(text) => Message::Text(text.into()),
         Outgoing::Binary(bytes) => Message::Binary(bytes.into()),
         Outgoing::Data(id, entry) => {
             Message::Binary(message_data(id, entry.stamp_ns, &entry.cdr).into())
         }
-        Outgoing::Close => return Err(io::Error::other("too many answers wait")),
+        Outgoing::Close => return Err(io::ErrorKind::TimedOut.into()),
     };
     let sent = async { socket.send(message).await.map_err(io::Error::other) };
-    within(SEND_TIME, sent).await
+    progress.sent(sent).await
 }
 
 async fn within<T>(limit: Duration, work: impl Future<Output = io::Result<T>>) -> io::Result<T> {

@@ -7,11 +7,11 @@ use std::time::{SystemTime, UNIX_EPOCH};
 use lattice_msgs::RosMessage;
 use lattice_msgs::lattice::{LatticeMap, LatticeMapUpdate};
 use lattice_runtime::lock;
-use serde::Serialize;
 use smol::channel::{Receiver, bounded};
 
 use super::bridge::Bridge;
 use super::client::Client;
+use super::counts::HubCounts;
 use super::graph::ConnectionGraph;
 use super::inputs::InputRefusal;
 use super::map_stream::{Entry, MapStream};
@@ -51,23 +51,6 @@ struct Channel {
     last: Option<Entry>,
     /// Subscriptions so far.
     joined: u64,
-}
-
-/// Counters of the server.
-#[derive(Clone, Copy, Debug, Default, Serialize)]
-pub struct HubCounts {
-    /// Clients that were let in.
-    pub clients_in: u64,
-    /// Clients refused since all places were taken.
-    pub clients_refused: u64,
-    /// Messages given to clients.
-    pub messages_out: u64,
-    /// Their bytes.
-    pub bytes_out: u64,
-    /// Messages that gave way to newer ones.
-    pub messages_dropped: u64,
-    /// Times that a client was too slow for the map and got it anew.
-    pub maps_restarted: u64,
 }
 
 /// Wish for a channel.
@@ -218,6 +201,16 @@ impl Hub {
             messages_dropped: inner.counts.messages_dropped + waiting,
             ..inner.counts
         }
+    }
+
+    /// Counts a client that was closed since it took too little.
+    pub fn count_stalled(&self) {
+        lock(&self.inner).counts.clients_stalled += 1;
+    }
+
+    /// Counts connections that gave way to newer ones.
+    pub fn count_displaced(&self, connections: u64) {
+        lock(&self.inner).counts.connections_displaced += connections;
     }
 
     /// Lets a client in; `None` if all places are taken. The receiver wakes it.

@@ -6,6 +6,7 @@
 mod bridge;
 mod client;
 mod connection;
+mod counts;
 mod desk;
 mod fixed;
 mod flow;
@@ -21,17 +22,20 @@ mod options;
 mod outbox;
 mod parameters;
 mod protocol;
+mod room;
 mod server;
 mod sources;
+mod stream;
 mod thin;
 mod watched;
 
 pub use bridge::Bridge;
+pub use counts::HubCounts;
 pub use desk::{Ask, Desk, Step};
 pub use fixed::{serve, serve_labelled};
 pub use graph::ConnectionGraph;
 pub use http::{Decision, Gate, Head};
-pub use hub::{Demand, Hub, HubCounts};
+pub use hub::{Demand, Hub};
 pub use inputs::{Input, InputCounts, InputRefusal, Inputs};
 pub use map_source::{MapSource, News};
 pub use map_stream::{Cursor, Entry, MapStream, Next};
@@ -42,6 +46,8 @@ pub use parameters::declare;
 pub use protocol::{AdvertisedService, ClientChannel, SUBPROTOCOLS, Value, Wish};
 pub use server::Server;
 
+#[cfg(test)]
+mod hostile_tests;
 #[cfg(test)]
 mod pause_tests;
 #[cfg(test)]

@@ -10,7 +10,8 @@ use lattice_msgs::tf2_msgs::TFMessage;
 use serde::Serialize;
 
 use super::bridge::{HandOver, HeadsetTopics, NodeBridge};
-use super::hub::{Hub, HubCounts};
+use super::counts::HubCounts;
+use super::hub::Hub;
 use super::inputs::{Input, InputCounts, Inputs, Waiting};
 use super::map_source::{MapSource, News};
 use super::map_stream::MapStream;

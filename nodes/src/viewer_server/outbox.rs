@@ -7,6 +7,8 @@ use super::map_stream::{Cursor, Entry, MapStream, Next};
 
 /// Most control messages that wait; a client that lets more come is no client.
 const MAX_CONTROL: usize = 256;
+/// Most bytes of them. One message always fits, however long.
+const MAX_CONTROL_BYTES: usize = 8 << 20;
 /// Most bytes that wait on one channel besides the map.
 const MAX_RING_BYTES: usize = 8 << 20;
 
@@ -41,10 +43,22 @@ pub enum Outgoing {
     Close,
 }
 
+impl Outgoing {
+    fn bytes(&self) -> usize {
+        match self {
+            Self::Text(text) => text.len(),
+            Self::Binary(bytes) => bytes.len(),
+            Self::Data(_, entry) => entry.bytes(),
+            Self::Close => 0,
+        }
+    }
+}
+
 /// Messages of one client.
 #[derive(Debug, Default)]
 pub struct Outbox {
     control: VecDeque<Outgoing>,
+    control_bytes: usize,
     overflown: bool,
     /// Channel and class by subscription.
     subscriptions: BTreeMap<u32, (u32, Class)>,
@@ -65,8 +79,11 @@ impl Outbox {
 
     /// Adds a control message of either kind.
     pub fn answer(&mut self, message: Outgoing) {
-        self.overflown |= self.control.len() >= MAX_CONTROL;
+        let bytes = self.control_bytes.saturating_add(message.bytes());
+        self.overflown |= self.control.len() >= MAX_CONTROL
+            || bytes > MAX_CONTROL_BYTES && !self.control.is_empty();
         if !self.overflown {
+            self.control_bytes = bytes;
             self.control.push_back(message);
         }
     }
@@ -122,9 +139,11 @@ impl Outbox {
     /// The next message. Control goes first, then the map and the others take turns.
     pub fn next(&mut self, stream: &mut MapStream) -> Option<Outgoing> {
         if self.overflown {
+            self.control.clear();
             return Some(Outgoing::Close);
         }
         if let Some(message) = self.control.pop_front() {
+            self.control_bytes = self.control_bytes.saturating_sub(message.bytes());
             return Some(message);
         }
         self.maps_turn = !self.maps_turn;

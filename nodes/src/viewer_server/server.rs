@@ -1,9 +1,9 @@
 //! The thread that takes connections, and its end.
 
 use std::io;
-use std::net::{SocketAddr, TcpListener, TcpStream};
+use std::net::{IpAddr, SocketAddr, TcpListener, TcpStream};
+use std::rc::Rc;
 use std::sync::Arc;
-use std::sync::atomic::{AtomicUsize, Ordering};
 use std::thread::JoinHandle;
 use std::time::{Duration, Instant};
 
@@ -11,12 +11,9 @@ use lattice_runtime::logging::Throttle;
 use smol::channel::{Sender, bounded};
 use smol::{Async, LocalExecutor, Timer};
 
-use super::connection;
+use super::connection::{self, Rooms};
 use super::http::Gate;
 use super::hub::Hub;
-
-/// Most connections, those of requests for files included.
-const MAX_CONNECTIONS: usize = 64;
 
 /// Time for clients to take the last messages.
 const LAST_TIME: Duration = Duration::from_secs(1);
@@ -88,10 +85,10 @@ async fn accept(
     gate: Arc<Gate>,
     hub: Arc<Hub>,
 ) {
-    let open = Arc::new(AtomicUsize::new(0));
+    let rooms = Rc::new(Rooms::default());
     let warnings = Throttle::new(Duration::from_secs(5));
     loop {
-        let stream = match accepted(&listener).await {
+        let (stream, from) = match accepted(&listener).await {
             Ok(stream) => stream,
             Err(error) => {
                 // As when there are no descriptors: it may pass.
@@ -102,24 +99,18 @@ async fn accept(
                 continue;
             }
         };
-        if open.load(Ordering::Relaxed) >= MAX_CONNECTIONS {
-            log::debug!("a connection was refused: {MAX_CONNECTIONS} are open");
-            continue;
-        }
-        open.fetch_add(1, Ordering::Relaxed);
-        let (gate, hub, open) = (Arc::clone(&gate), Arc::clone(&hub), Arc::clone(&open));
+        let (gate, hub, rooms) = (Arc::clone(&gate), Arc::clone(&hub), Rc::clone(&rooms));
         executor
             .spawn(async move {
-                if let Err(error) = connection::serve(stream, gate, hub).await {
+                if let Err(error) = connection::serve(stream, from, gate, hub, &rooms).await {
                     log::debug!("a connection ended: {error}");
                 }
-                open.fetch_sub(1, Ordering::Relaxed);
             })
             .detach();
     }
 }
 
-async fn accepted(listener: &Async<TcpListener>) -> io::Result<TcpStream> {
-    let (stream, _) = listener.accept().await?;
-    stream.into_inner()
+async fn accepted(listener: &Async<TcpListener>) -> io::Result<(TcpStream, IpAddr)> {
+    let (stream, from) = listener.accept().await?;
+    Ok((stream.into_inner()?, from.ip()))
 }

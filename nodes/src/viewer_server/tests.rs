@@ -87,7 +87,7 @@ proptest! {
     }
 }
 
-fn server(max_clients: usize, gate: Gate) -> (Server, Arc<Hub>) {
+pub(super) fn server(max_clients: usize, gate: Gate) -> (Server, Arc<Hub>) {
     let hub = Arc::new(Hub::new(max_clients));
     hub.channel::<LatticeMap>("/map", Class::Map, false);
     hub.channel::<TFMessage>("/tf", Class::Newest { depth: 2 }, false);
@@ -106,7 +106,10 @@ fn answer(server: &Server, request: &[u8]) -> String {
     text.split(' ').nth(1).unwrap_or_default().to_owned()
 }
 
-fn connect(server: &Server, protocol: &str) -> Result<(WebSocket<TcpStream>, Response), String> {
+pub(super) fn connect(
+    server: &Server,
+    protocol: &str,
+) -> Result<(WebSocket<TcpStream>, Response), String> {
     let stream = TcpStream::connect(server.address()).unwrap();
     let mut request = format!("ws://{}", server.address())
         .into_client_request()
@@ -118,7 +121,7 @@ fn connect(server: &Server, protocol: &str) -> Result<(WebSocket<TcpStream>, Res
     client(request, stream).map_err(|error| format!("{error:?}"))
 }
 
-fn text(socket: &mut WebSocket<TcpStream>) -> serde_json::Value {
+pub(super) fn text(socket: &mut WebSocket<TcpStream>) -> serde_json::Value {
     loop {
         match socket.read().unwrap() {
             Message::Text(text) => return serde_json::from_str(&text).unwrap(),
@@ -128,7 +131,7 @@ fn text(socket: &mut WebSocket<TcpStream>) -> serde_json::Value {
     }
 }
 
-fn data(socket: &mut WebSocket<TcpStream>) -> (u32, Vec<u8>) {
+pub(super) fn data(socket: &mut WebSocket<TcpStream>) -> (u32, Vec<u8>) {
     loop {
         if let Message::Binary(bytes) = socket.read().unwrap() {
             assert_eq!(bytes[0], 1);

@@ -59,9 +59,12 @@ pub struct MarkerReport {
     pub published_bytes: u64,
     /// Arrays that the publisher did not take or could not send.
     pub arrays_not_published: u64,
-    /// Chunks of the map that were sent and lost on the way, or that found the inbox full.
+    /// Chunks of the map that found the inbox, or the queue before it, full.
     #[serde(default)]
     pub inbox_full: u64,
+    /// Chunks of the map that were sent and did not come.
+    #[serde(default)]
+    pub lost_on_network: u64,
     /// Samples that did not decode.
     #[serde(default)]
     pub undecodable: u64,

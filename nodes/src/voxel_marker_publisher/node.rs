@@ -154,7 +154,9 @@ impl Shell {
         let mut values = report::key_values(counts);
         let losses = self.input.losses();
         let (undecodable, arrays) = (losses.undecodable(), self.markers.dropped());
-        values.push(("inbox_full".into(), losses.count().to_string()));
+        values.push(("inbox_full".into(), losses.inbox_full().to_string()));
+        let on_network = losses.on_network();
+        values.push(("lost_on_network".into(), on_network.to_string()));
         values.push(("undecodable".into(), undecodable.to_string()));
         values.push(("arrays_not_published".into(), arrays.to_string()));
         let differences = self.machine.map_differences();
@@ -180,7 +182,8 @@ impl Shell {
             marker_bytes: self.machine.take_bytes(),
             published_bytes: self.markers.sent_bytes(),
             arrays_not_published: self.markers.dropped(),
-            inbox_full: self.input.losses().count(),
+            inbox_full: self.input.losses().inbox_full(),
+            lost_on_network: self.input.losses().on_network(),
             undecodable: self.input.losses().undecodable(),
         };
         if let Err(error) = report::write(&self.report_file, &report, &self.diagnostics) {

@@ -51,7 +51,7 @@ impl Drop for Running {
 }
 
 /// Loss of datagrams at both ends, in percent.
-struct Loss {
+pub struct Loss {
     percent: u32,
     library: PathBuf,
     report: PathBuf,
@@ -60,7 +60,7 @@ struct Loss {
 
 impl Loss {
     /// None, with a line on standard error, where there is no C compiler to build the interposer.
-    fn new(percent: u32) -> Option<Self> {
+    pub fn new(percent: u32) -> Option<Self> {
         let directory = tempfile::tempdir().unwrap();
         let library = directory.path().join("lossy.so");
         let source = Path::new(env!("CARGO_MANIFEST_DIR")).join("peers/lossy.c");
@@ -81,7 +81,7 @@ impl Loss {
         })
     }
 
-    fn on(&self, command: &mut Command) {
+    pub fn on(&self, command: &mut Command) {
         if self.percent > 0 {
             command
                 .env("LD_PRELOAD", &self.library)
@@ -91,7 +91,7 @@ impl Loss {
     }
 
     /// Loss counted by the processes that have ended. Panics if it is far from the share.
-    fn check(&self) {
+    pub fn check(&self) {
         if self.percent == 0 {
             return;
         }

@@ -8,6 +8,8 @@ mod cyclone;
 mod fresh_clients;
 mod headset;
 mod losses;
+mod machines;
+mod network;
 mod octomap;
 mod params;
 mod rclpy;

@@ -10,6 +10,7 @@ use lattice_runtime::LoopbackDomain;
 use serde_json::json;
 
 use crate::browser::{chromium, devtools::Page};
+use crate::record::signal;
 use crate::text;
 
 /// A process that serves a page.
@@ -77,6 +78,12 @@ impl Viewer {
     /// The server's process.
     pub fn process(&self) -> u32 {
         self.process.id()
+    }
+
+    /// Ends it in good order.
+    pub fn end(mut self) {
+        signal(&self.process, "-TERM");
+        assert!(self.process.wait().unwrap().success());
     }
 
     fn port(&self) -> u16 {

@@ -336,6 +336,11 @@ static const struct ddsi_sertype_ops sertype_ops = {
   .hash = hash_type,
 };
 
+bool lattice_is_blob_type (const struct ddsi_sertype *type)
+{
+  return type->ops == &sertype_ops;
+}
+
 dds_entity_t lattice_topic (dds_entity_t participant, const char *name, const char *type_name)
 {
   struct ddsi_sertype *type = calloc (1, sizeof (*type));
@@ -456,7 +461,6 @@ AT (dds_publication_matched_status_t, last_subscription_handle, 16);
 _Static_assert (sizeof (dds_subscription_matched_status_t) == 24, "dds_subscription_matched_status_t");
 AT (dds_subscription_matched_status_t, current_count_change, 12);
 AT (dds_subscription_matched_status_t, last_publication_handle, 16);
-AT (dds_sample_lost_status_t, total_count_change, 4);
 AT (dds_log_data_t, priority, 0);
 AT (dds_log_data_t, message, 32);
 AT (dds_log_data_t, size, 40);

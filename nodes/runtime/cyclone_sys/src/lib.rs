@@ -91,13 +91,6 @@ pub struct dds_subscription_matched_status_t {
 }
 
 #[repr(C)]
-#[derive(Clone, Copy, Debug, Default)]
-pub struct dds_sample_lost_status_t {
-    pub total_count: u32,
-    pub total_count_change: i32,
-}
-
-#[repr(C)]
 #[derive(Clone, Copy, Debug)]
 pub struct dds_log_data_t {
     pub priority: u32,
@@ -175,6 +168,15 @@ unsafe extern "C" {
         length: usize,
         related: *const lattice_identity,
     ) -> dds_return_t;
+    pub fn lattice_writer(
+        participant: dds_entity_t,
+        topic: dds_entity_t,
+        qos: *const dds_qos_t,
+        keep: bool,
+    ) -> dds_entity_t;
+    pub fn lattice_is_full(writer: dds_entity_t, length: usize, most: usize) -> bool;
+    pub fn lattice_unacknowledged(writer: dds_entity_t) -> u64;
+    pub fn lattice_on_reader_left(callback: Option<unsafe extern "C" fn(*mut c_void, u64)>);
     pub fn lattice_take(reader: dds_entity_t, sample: *mut lattice_sample) -> dds_return_t;
     pub fn lattice_release(blob: *mut ddsi_serdata);
 
@@ -185,12 +187,6 @@ unsafe extern "C" {
         listener: *const dds_listener_t,
     ) -> dds_entity_t;
     pub fn dds_create_reader(
-        parent: dds_entity_t,
-        topic: dds_entity_t,
-        qos: *const dds_qos_t,
-        listener: *const dds_listener_t,
-    ) -> dds_entity_t;
-    pub fn dds_create_writer(
         parent: dds_entity_t,
         topic: dds_entity_t,
         qos: *const dds_qos_t,
@@ -216,10 +212,6 @@ unsafe extern "C" {
         count: i32,
     ) -> dds_return_t;
     pub fn dds_wait_for_acks(writer: dds_entity_t, patience_ns: dds_duration_t) -> dds_return_t;
-    pub fn dds_get_sample_lost_status(
-        reader: dds_entity_t,
-        status: *mut dds_sample_lost_status_t,
-    ) -> dds_return_t;
 
     pub fn dds_get_matched_publications(
         reader: dds_entity_t,

@@ -3,6 +3,7 @@
 use std::collections::BTreeMap;
 use std::ffi::c_void;
 use std::ptr;
+use std::sync::atomic::{AtomicU64, Ordering::Relaxed};
 use std::sync::{Arc, Mutex};
 
 use lattice_cyclone_sys::{
@@ -11,11 +12,12 @@ use lattice_cyclone_sys::{
     dds_get_matched_publications, dds_get_matched_subscription_data, dds_get_matched_subscriptions,
     dds_instance_handle_t, dds_lset_data_available_arg, dds_lset_publication_matched_arg,
     dds_lset_subscription_matched_arg, dds_publication_matched_status_t, dds_set_listener,
-    dds_subscription_matched_status_t,
+    dds_subscription_matched_status_t, lattice_on_reader_left,
 };
 use smol::channel::Sender;
 
 use super::entity::{Entity, check, endpoint_id};
+use super::gaps::Gaps;
 use super::sample::{Taken, take};
 use crate::arrivals::Arrivals;
 use crate::port::{EndpointId, PortEvent};
@@ -49,6 +51,10 @@ pub(super) struct Endpoint {
     /// By the handles that Cyclone gives them.
     peers: Mutex<BTreeMap<dds_instance_handle_t, EndpointId>>,
     arrivals: Arrivals<Taken>,
+    /// Numbers of the samples that have come.
+    gaps: Mutex<Gaps>,
+    /// Samples that readers which have left had not acknowledged.
+    unacknowledged: AtomicU64,
 }
 
 /// Function of Cyclone that describes a matched peer.
@@ -75,6 +81,8 @@ impl Endpoint {
             description,
             events,
             peers: Mutex::default(),
+            gaps: Mutex::default(),
+            unacknowledged: AtomicU64::new(0),
         });
         this.listen(entity)?;
         let (list, describe) = match side {
@@ -83,7 +91,7 @@ impl Endpoint {
         };
         this.add_first(entity, list, describe);
         if side == Side::Reader {
-            this.arrivals.take_from(|| take(entity.handle()));
+            this.take_from(entity.handle());
         }
         Ok(this)
     }
@@ -97,13 +105,33 @@ impl Endpoint {
         &self.arrivals
     }
 
-    /// GUID of the writer of a sample; zeros if it has gone.
-    pub(super) fn writer(&self, reader: &Entity, handle: dds_instance_handle_t) -> EndpointId {
-        if let Some(known) = lock(&self.peers).get(&handle) {
-            return *known;
-        }
-        let found = guid(reader.handle(), handle, WRITERS);
-        found.unwrap_or(EndpointId([0; 16]))
+    /// Samples that readers which have left had not acknowledged, of a writer.
+    pub(super) fn unacknowledged(&self) -> u64 {
+        self.unacknowledged.load(Relaxed)
+    }
+
+    /// GUID of the writer of a sample; none if it has gone.
+    pub(super) fn writer(
+        &self,
+        reader: dds_entity_t,
+        handle: dds_instance_handle_t,
+    ) -> Option<EndpointId> {
+        let known = lock(&self.peers).get(&handle).copied();
+        known.or_else(|| guid(reader, handle, WRITERS))
+    }
+
+    fn take_from(&self, reader: dds_entity_t) {
+        let mut gaps = lock(&self.gaps);
+        self.arrivals.take_from(|| {
+            let sample = take(reader)?;
+            let (handle, number) = (sample.writer(), sample.number());
+            if let Some(writer) = self.writer(reader, handle).filter(|_| number > 0) {
+                let missing = gaps.note(writer, handle, number);
+                let losses = self.arrivals.losses();
+                losses.on_network.fetch_add(missing, Relaxed);
+            }
+            Some(sample)
+        });
     }
 
     fn listen(self: &Arc<Self>, entity: &Entity) -> Result<(), String> {
@@ -114,6 +142,7 @@ impl Endpoint {
             let listener = dds_create_listener(ptr::null_mut());
             let _ = match self.description.side {
                 Side::Writer => {
+                    lattice_on_reader_left(Some(on_reader_left));
                     dds_lset_publication_matched_arg(listener, Some(on_reader), this, true)
                 }
                 Side::Reader => {
@@ -212,9 +241,19 @@ unsafe extern "C" fn on_writer(
 /// # Safety
 ///
 /// As of [`on_reader`].
+unsafe extern "C" fn on_reader_left(this: *mut c_void, unacknowledged: u64) {
+    // SAFETY: see above.
+    if let Some(endpoint) = unsafe { this.cast::<Endpoint>().as_ref() } {
+        endpoint.unacknowledged.fetch_add(unacknowledged, Relaxed);
+    }
+}
+
+/// # Safety
+///
+/// As of [`on_reader`].
 unsafe extern "C" fn on_data(reader: dds_entity_t, this: *mut c_void) {
     // SAFETY: see above.
     if let Some(endpoint) = unsafe { this.cast::<Endpoint>().as_ref() } {
-        endpoint.arrivals.take_from(|| take(reader));
+        endpoint.take_from(reader);
     }
 }

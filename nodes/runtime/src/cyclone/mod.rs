@@ -8,6 +8,7 @@ mod discovery;
 mod domain;
 mod endpoint;
 mod entity;
+mod gaps;
 mod log;
 mod names;
 mod participant;

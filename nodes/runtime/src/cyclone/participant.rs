@@ -140,10 +140,11 @@ impl Cyclone {
         &self,
         of: DdsTopic<'_>,
         qos: &Qos,
+        keeps: bool,
     ) -> Result<Arc<dyn SampleWriter>, RuntimeError> {
         let (topic, native, description) = self.prepare(of, qos, Side::Writer)?;
         let (parent, events) = (&self.participant, self.sender.clone());
-        let writer = CycloneWriter::new(parent, topic, &native, description, events);
+        let writer = CycloneWriter::new(parent, topic, (&native, keeps), description, events);
         let writer = writer.map_err(|reason| failed(of, Side::Writer, reason))?;
         self.discovery.announce(parent, writer.endpoint());
         Ok(Arc::new(writer))
@@ -196,15 +197,20 @@ impl Transport for Cyclone {
     }
 
     fn graph_writer(&self) -> Option<Result<Arc<dyn SampleWriter>, RuntimeError>> {
-        Some(self.dds_writer(GRAPH, &GRAPH_WRITER))
+        Some(self.dds_writer(GRAPH, &GRAPH_WRITER, false))
     }
 
     fn graph_reader(&self) -> Option<Result<Box<dyn SampleReader>, RuntimeError>> {
         Some(self.dds_reader(GRAPH, &GRAPH_READER, MAX_GRAPH_BYTES))
     }
 
-    fn writer(&self, of: PortTopic<'_>, qos: &Qos) -> Result<Arc<dyn SampleWriter>, RuntimeError> {
-        self.dds_writer(topic(of, &names::topic(of.name)), qos)
+    fn writer(
+        &self,
+        of: PortTopic<'_>,
+        qos: &Qos,
+        keeps: bool,
+    ) -> Result<Arc<dyn SampleWriter>, RuntimeError> {
+        self.dds_writer(topic(of, &names::topic(of.name)), qos, keeps)
     }
 
     fn reader(
@@ -223,7 +229,7 @@ impl Transport for Cyclone {
         Ok(ServerEnds {
             form: ServiceForm::Topics,
             requests,
-            replies: self.dds_writer(part(of, &replies, of.response), &qos.writer)?,
+            replies: self.dds_writer(part(of, &replies, of.response), &qos.writer, false)?,
         })
     }
 
@@ -233,7 +239,7 @@ impl Transport for Cyclone {
         let answers = self.dds_reader(answers, &qos.reader, qos.max_bytes)?;
         Ok(ClientEnds {
             form: ServiceForm::Topics,
-            requests: self.dds_writer(part(of, &requests, of.request), &qos.writer)?,
+            requests: self.dds_writer(part(of, &requests, of.request), &qos.writer, false)?,
             answers,
         })
     }

@@ -4,17 +4,15 @@ use std::ptr;
 use std::sync::{Arc, Mutex, MutexGuard};
 use std::task::{Context, Poll};
 
-use lattice_cyclone_sys::{
-    dds_create_reader, dds_get_sample_lost_status, dds_sample_lost_status_t,
-};
+use lattice_cyclone_sys::dds_create_reader;
 use smol::channel::Sender;
 
 use super::endpoint::{Description, Endpoint};
-use super::entity::{Entity, check};
+use super::entity::Entity;
 use super::log::explained;
 use super::qos::NativeQos;
 use super::sample::Taken;
-use crate::port::{EndpointId, Origin, PortEvent, SampleId, SampleReader};
+use crate::port::{EndpointId, Origin, PortEvent, ReaderLosses, SampleId, SampleReader};
 use crate::sync::lock;
 
 /// Takes samples of one topic.
@@ -64,9 +62,10 @@ impl CycloneReader {
         let mut buffer = lock(&self.buffer);
         buffer.clear();
         buffer.extend_from_slice(bytes);
+        let writer = self.endpoint.writer(self.reader.handle(), taken.writer());
         Ok(Origin {
             sample: SampleId {
-                writer: self.endpoint.writer(&self.reader, taken.writer()),
+                writer: writer.unwrap_or(EndpointId([0; 16])),
                 number: taken.number(),
             },
             related: taken.related(),
@@ -88,12 +87,7 @@ impl SampleReader for CycloneReader {
         lock(&self.buffer)
     }
 
-    fn missed(&self) -> u64 {
-        let mut status = dds_sample_lost_status_t::default();
-        // SAFETY: writes to `status`.
-        let code = unsafe { dds_get_sample_lost_status(self.reader.handle(), &mut status) };
-        let lost = check(code).map_or(0, |_| status.total_count_change);
-        let lost = u64::try_from(lost).unwrap_or(0);
-        lost.saturating_add(self.endpoint.arrivals().overwritten())
+    fn losses(&self) -> ReaderLosses {
+        self.endpoint.arrivals().losses().clone()
     }
 }

@@ -6,8 +6,8 @@ use std::time::Duration;
 
 use futures::future::BoxFuture;
 use lattice_cyclone_sys::{
-    DDS_RETCODE_TIMEOUT, dds_create_writer, dds_entity_t, dds_wait_for_acks, lattice_identity,
-    lattice_write,
+    DDS_RETCODE_TIMEOUT, dds_entity_t, dds_wait_for_acks, lattice_identity, lattice_is_full,
+    lattice_unacknowledged, lattice_write, lattice_writer,
 };
 use smol::channel::Sender;
 
@@ -15,7 +15,9 @@ use super::endpoint::{Description, Endpoint};
 use super::entity::{Entity, check};
 use super::log::explained;
 use super::qos::NativeQos;
-use crate::port::{Bytes, EndpointId, PortEvent, SampleId, SampleWriter, WriteRefusal};
+use crate::port::{
+    Bytes, EndpointId, PortEvent, SampleId, SampleWriter, UNACKNOWLEDGED_BYTES, WriteRefusal,
+};
 
 /// Time between two looks at a full send window, unless all readers acknowledge before.
 const PATIENCE: Duration = Duration::from_millis(100);
@@ -26,24 +28,26 @@ pub(super) struct CycloneWriter {
     writer: Entity,
     _topic: Entity,
     endpoint: Arc<Endpoint>,
+    keeps: bool,
 }
 
 impl CycloneWriter {
     pub(super) fn new(
         participant: &Entity,
         topic: Entity,
-        qos: &NativeQos,
+        (qos, keeps): (&NativeQos, bool),
         description: Description,
         events: Sender<PortEvent>,
     ) -> Result<Self, String> {
         let (parent, of) = (participant.handle(), topic.handle());
-        // SAFETY: handles, and a QoS that is alive and copied; no listener.
-        let make = || unsafe { dds_create_writer(parent, of, qos.as_ptr(), ptr::null()) };
+        // SAFETY: handles, and a QoS that is alive and copied.
+        let make = || unsafe { lattice_writer(parent, of, qos.as_ptr(), keeps) };
         let writer = explained(make)?;
         Ok(Self {
             endpoint: Endpoint::watch(&writer, description, events)?,
             writer,
             _topic: topic,
+            keeps,
         })
     }
 
@@ -52,6 +56,11 @@ impl CycloneWriter {
     }
 
     fn try_write(&self, body: &[u8], related: Option<SampleId>) -> Result<(), WriteRefusal> {
+        let writer = self.writer.handle();
+        // SAFETY: a handle and numbers.
+        if self.keeps && unsafe { lattice_is_full(writer, body.len(), UNACKNOWLEDGED_BYTES) } {
+            return Err(WriteRefusal::Full);
+        }
         let identity = related.map(|SampleId { writer, number }| lattice_identity {
             guid: writer.0,
             number,
@@ -60,7 +69,7 @@ impl CycloneWriter {
         // SAFETY: so many bytes, and an identity or null, are read during the call.
         let code = unsafe {
             let (bytes, count) = (body.as_ptr(), body.len());
-            lattice_write(self.writer.handle(), bytes, count, identity)
+            lattice_write(writer, bytes, count, identity)
         };
         match code {
             DDS_RETCODE_TIMEOUT => Err(WriteRefusal::Full),
@@ -87,6 +96,12 @@ impl SampleWriter for CycloneWriter {
             }
             written
         })
+    }
+
+    fn unacknowledged(&self) -> u64 {
+        // SAFETY: a handle.
+        let waiting = unsafe { lattice_unacknowledged(self.writer.handle()) };
+        self.endpoint.unacknowledged().saturating_add(waiting)
     }
 
     fn wait_for_acknowledgments(&self, patience: Duration) -> bool {

@@ -52,6 +52,15 @@ impl Budget {
         self.freed.until(taken).await
     }
 
+    /// Completes when `bytes` fit and `has_place`, asked each time that bytes were given back, or closed.
+    pub(crate) async fn room(&self, bytes: usize, has_place: impl Fn() -> bool) {
+        let fits = || {
+            let state = lock(&self.state);
+            (state.closed || state.fits(bytes, self.limit) && has_place()).then_some(())
+        };
+        self.freed.until(fits).await;
+    }
+
     /// Gives `bytes` back.
     pub(crate) fn give_back(&self, bytes: usize) {
         let mut state = lock(&self.state);

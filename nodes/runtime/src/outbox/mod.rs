@@ -4,6 +4,8 @@
 //! a writer that waits holds up nobody but its own queue.
 
 mod budget;
+#[cfg(test)]
+mod tests;
 
 use std::cell::Cell;
 use std::sync::atomic::{AtomicBool, AtomicU64, AtomicUsize, Ordering::Relaxed};
@@ -14,7 +16,7 @@ use futures::future::{Either, select};
 use lattice_msgs::cdr::CdrError;
 use smol::Timer;
 use smol::channel::{Receiver, Sender, TrySendError, bounded};
-use smol::future::or;
+use smol::future::{or, yield_now};
 
 use self::budget::Budget;
 use crate::error::PublishError;
@@ -28,6 +30,9 @@ const PATIENCE: Duration = Duration::from_secs(1);
 
 /// The same, after a sample was dropped: a peer that hangs must not slow down the others.
 const PATIENCE_WITH_STUCK_PEER: Duration = Duration::from_millis(20);
+
+/// After so many samples in a row, a queue that never empties lets the others of its thread have a turn.
+const JOBS_PER_TURN: u32 = 16;
 
 /// Between two warnings of dropped messages.
 const WARNING_PERIOD: Duration = Duration::from_secs(5);
@@ -133,6 +138,12 @@ impl Outbox {
         self.shared.sent_bytes.load(Relaxed)
     }
 
+    /// Samples handed to DDS that reliable readers have not acknowledged, or had not when they left.
+    pub(crate) fn unacknowledged(&self) -> u64 {
+        let writer = self.shared.writer();
+        writer.map_or(0, |writer| writer.unacknowledged())
+    }
+
     /// Queues a sample that is serialized later. Its size is taken to be that of the one before.
     pub(crate) fn send(&self, serialize: Serialize) -> Result<(), PublishError> {
         let bytes = self.shared.last_bytes.load(Relaxed);
@@ -184,6 +195,22 @@ impl Outbox {
             self.shared.budget.give_back(reserved);
         }
         outcome
+    }
+
+    /// Waits until a sample of so many bytes finds room in the queue. False: not in time.
+    pub(crate) fn has_room_within(&self, bytes: usize, patience: Duration) -> bool {
+        let room = async {
+            self.shared
+                .budget
+                .room(bytes, || !self.jobs.is_full())
+                .await;
+            true
+        };
+        let late = async {
+            Timer::after(patience).await;
+            false
+        };
+        smol::block_on(or(room, late))
     }
 
     /// Waits until the queue is empty and every reliable reader has acknowledged. False: not in time.
@@ -324,7 +351,12 @@ impl Shared {
 }
 
 async fn serve(shared: Arc<Shared>, queue: Receiver<Job>) {
+    let mut turn: u32 = 0;
     while let Ok(job) = queue.recv().await {
+        turn = turn.wrapping_add(1);
+        if turn.is_multiple_of(JOBS_PER_TURN) {
+            yield_now().await;
+        }
         match job {
             Job::Sample {
                 content,
@@ -341,51 +373,5 @@ async fn serve(shared: Arc<Shared>, queue: Receiver<Job>) {
                 let _ = done.try_send(());
             }
         }
-    }
-}
-
-#[cfg(test)]
-mod tests {
-    use futures::future::BoxFuture;
-
-    use super::*;
-
-    /// A writer whose reader is stuck.
-    struct Stuck;
-
-    impl SampleWriter for Stuck {
-        fn id(&self) -> EndpointId {
-            EndpointId([7; 16])
-        }
-
-        fn write(&self, _: Bytes, _: Option<SampleId>) -> BoxFuture<'_, Result<(), WriteRefusal>> {
-            Box::pin(smol::future::pending())
-        }
-
-        fn wait_for_acknowledgments(&self, _: Duration) -> bool {
-            false
-        }
-    }
-
-    #[test]
-    fn who_waits_for_a_full_queue_goes_on_in_time_and_at_the_end() {
-        let (outbox, _task) =
-            Outbox::new("/chatter", Arc::new(Stuck), WhenFull::Wait, 1, usize::MAX);
-        let (shutdown, long) = (Shutdown::default(), Duration::from_secs(600));
-        let body = Bytes::from_static(b"body");
-        let send = |patience, shutdown| outbox.send_body_within(body.clone(), patience, shutdown);
-        send(long, &shutdown).unwrap();
-        for dropped in 1..=2 {
-            let refused = send(Duration::from_millis(1), &shutdown);
-            let full =
-                matches!(refused, Err(PublishError::QueueFull { dropped: n, .. }) if n == dropped);
-            assert!(full, "{refused:?}");
-        }
-        std::thread::scope(|scope| {
-            let waiting = scope.spawn(|| send(long, &shutdown));
-            shutdown.request();
-            let result = waiting.join().unwrap();
-            assert!(matches!(result, Err(PublishError::Closed { .. })));
-        });
     }
 }

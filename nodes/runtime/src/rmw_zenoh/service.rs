@@ -1,7 +1,7 @@
 //! Services: a server is a queryable, a call a query that carries the request.
 
 use std::collections::VecDeque;
-use std::sync::atomic::{AtomicU64, Ordering::Relaxed};
+use std::sync::atomic::Ordering::Relaxed;
 use std::sync::{Arc, Mutex, MutexGuard};
 use std::task::{Context, Poll};
 use std::time::Duration;
@@ -17,8 +17,8 @@ use super::graph::Place;
 use super::publisher::{InTurn, payload};
 use super::subscriber::Inbox;
 use crate::port::{
-    Bytes, ClientEnds, EndpointId, Origin, SampleId, SampleReader, SampleWriter, ServerEnds,
-    ServiceForm, ServiceQos, WriteRefusal,
+    Bytes, ClientEnds, EndpointId, Origin, ReaderLosses, SampleId, SampleReader, SampleWriter,
+    ServerEnds, ServiceForm, ServiceQos, WriteRefusal,
 };
 use crate::sync::lock;
 
@@ -46,17 +46,18 @@ struct Server {
 #[derive(Default)]
 struct Pending {
     queries: Mutex<VecDeque<(SampleId, Query)>>,
-    given_up: AtomicU64,
 }
 
 impl Pending {
-    fn add(&self, request: SampleId, query: Query) {
+    /// Keeps a query. True: another gave way to it.
+    fn add(&self, request: SampleId, query: Query) -> bool {
         let mut queries = lock(&self.queries);
-        if queries.len() >= MAX_PENDING {
+        let full = queries.len() >= MAX_PENDING;
+        if full {
             let _ = queries.pop_front();
-            let _ = self.given_up.fetch_add(1, Relaxed);
         }
         queries.push_back((request, query));
+        full
     }
 
     fn take(&self, request: &SampleId) -> Option<Query> {
@@ -110,8 +111,10 @@ fn ask(query: Query, inbox: &Inbox, pending: &Pending) {
         sample,
         related: None,
     });
-    if let Ok(origin) = &origin {
-        pending.add(origin.sample, query);
+    if let Ok(origin) = &origin
+        && pending.add(origin.sample, query)
+    {
+        inbox.losses().overrun.fetch_add(1, Relaxed);
     }
     inbox.push(payload, origin);
 }
@@ -131,9 +134,8 @@ impl SampleReader for Requests {
         self.0.inbox.bytes()
     }
 
-    fn missed(&self) -> u64 {
-        let given_up = self.0.pending.given_up.swap(0, Relaxed);
-        given_up.saturating_add(self.0.inbox.overwritten())
+    fn losses(&self) -> ReaderLosses {
+        self.0.inbox.losses().clone()
     }
 }
 
@@ -263,7 +265,7 @@ impl SampleReader for Answers {
         self.0.inbox.bytes()
     }
 
-    fn missed(&self) -> u64 {
-        self.0.inbox.overwritten()
+    fn losses(&self) -> ReaderLosses {
+        self.0.inbox.losses().clone()
     }
 }

@@ -213,7 +213,13 @@ impl Transport for Zenoh {
         Ok(())
     }
 
-    fn writer(&self, of: PortTopic<'_>, qos: &Qos) -> Result<Arc<dyn SampleWriter>, RuntimeError> {
+    /// Zenoh waits for reliable subscribers whether the writer keeps its samples or not.
+    fn writer(
+        &self,
+        of: PortTopic<'_>,
+        qos: &Qos,
+        _keeps: bool,
+    ) -> Result<Arc<dyn SampleWriter>, RuntimeError> {
         const WHAT: &str = "publisher";
         let channel = hashed(of.name, of.ros_type, of.type_hash, WHAT)?;
         let made = self.prepare(of.node, Kind::Publisher, channel, qos);

@@ -2,7 +2,7 @@
 
 use std::collections::BTreeMap;
 use std::iter;
-use std::sync::atomic::{AtomicU64, Ordering::Relaxed};
+use std::sync::atomic::Ordering::Relaxed;
 use std::sync::{Arc, Mutex, MutexGuard};
 use std::task::{Context, Poll};
 use std::time::Duration;
@@ -17,7 +17,7 @@ use zenoh_ext::{AdvancedSubscriber, AdvancedSubscriberBuilderExt, HistoryConfig,
 use super::attachment::read;
 use super::graph::{Graph, Place};
 use crate::arrivals::Arrivals;
-use crate::port::{EndpointId, Origin, SampleId, SampleReader};
+use crate::port::{EndpointId, Origin, ReaderLosses, SampleId, SampleReader};
 use crate::qos::{Durability, Qos, Reliability};
 use crate::sync::lock;
 
@@ -76,8 +76,9 @@ impl Inbox {
         lock(&self.buffer)
     }
 
-    pub(super) fn overwritten(&self) -> u64 {
-        self.arrivals.overwritten()
+    /// Samples that are not had.
+    pub(super) fn losses(&self) -> &ReaderLosses {
+        self.arrivals.losses()
     }
 }
 
@@ -85,11 +86,11 @@ impl Inbox {
 #[derive(Default)]
 struct Numbers {
     last: Mutex<BTreeMap<EndpointId, i64>>,
-    missed: AtomicU64,
 }
 
 impl Numbers {
-    fn note(&self, sample: &SampleId) {
+    /// Samples that are missing before this one.
+    fn note(&self, sample: &SampleId) -> u64 {
         let mut last = lock(&self.last);
         if last.len() >= MAX_PUBLISHERS && !last.contains_key(&sample.writer) {
             // Who is known by then is followed anew.
@@ -98,12 +99,12 @@ impl Numbers {
         let number = sample.number;
         let known = last.entry(sample.writer).or_insert(number);
         // Older ones are those of a cache.
-        if number > *known {
-            let gap = number.saturating_sub(*known).saturating_sub(1);
-            let gap = u64::try_from(gap).unwrap_or(0);
-            let _ = self.missed.fetch_add(gap, Relaxed);
-            *known = number;
+        if number <= *known {
+            return 0;
         }
+        let gap = number.saturating_sub(*known).saturating_sub(1);
+        *known = number;
+        u64::try_from(gap).unwrap_or(0)
     }
 }
 
@@ -111,7 +112,6 @@ impl Numbers {
 pub(super) struct ZenohSubscription {
     id: EndpointId,
     inbox: Arc<Inbox>,
-    numbers: Arc<Numbers>,
     // In this order: the token goes before the subscription.
     _token: LivelinessToken,
     _place: Place,
@@ -135,11 +135,11 @@ impl ZenohSubscription {
         announce: impl FnOnce() -> zenoh::Result<(LivelinessToken, Place)>,
     ) -> zenoh::Result<Self> {
         let inbox = Inbox::new(qos.depth, max_bytes);
-        let numbers = Arc::new(Numbers::default());
-        let (to, gaps, graph) = (Arc::clone(&inbox), Arc::clone(&numbers), Arc::clone(graph));
+        let numbers = Numbers::default();
+        let (to, graph) = (Arc::clone(&inbox), Arc::clone(graph));
         let take = move |sample: Sample| {
             if sample.kind() == SampleKind::Put {
-                take(&sample, &to, &gaps, &graph);
+                take(&sample, &to, &numbers, &graph);
             }
         };
         let builder = session
@@ -168,7 +168,6 @@ impl ZenohSubscription {
         Ok(Self {
             id,
             inbox,
-            numbers,
             _token: token,
             _place: place,
             _receiver: receiver,
@@ -181,7 +180,8 @@ fn take(sample: &Sample, inbox: &Inbox, numbers: &Numbers, graph: &Graph) {
         // A cache of this process answers too.
         Ok(sample) if graph.is_ours(&sample.writer) => return,
         Ok(sample) => {
-            numbers.note(&sample);
+            let missing = numbers.note(&sample);
+            inbox.losses().on_network.fetch_add(missing, Relaxed);
             Ok(Origin {
                 sample,
                 related: None,
@@ -205,9 +205,8 @@ impl SampleReader for ZenohSubscription {
         self.inbox.bytes()
     }
 
-    fn missed(&self) -> u64 {
-        let gaps = self.numbers.missed.swap(0, Relaxed);
-        gaps.saturating_add(self.inbox.overwritten())
+    fn losses(&self) -> ReaderLosses {
+        self.inbox.losses().clone()
     }
 }
 
@@ -222,12 +221,11 @@ mod tests {
             numbers.note(&SampleId {
                 writer: EndpointId([writer; 16]),
                 number,
-            });
+            })
         };
-        for (writer, number) in [(1, 5), (2, 1), (1, 6), (2, 2), (1, 3), (1, 4), (1, 9)] {
-            note(writer, number);
-        }
-        assert_eq!(numbers.missed.load(Relaxed), 2);
+        let heard = [(1, 5), (2, 1), (1, 6), (2, 2), (1, 3), (1, 4), (1, 9)];
+        let missing = heard.map(|(writer, number)| note(writer, number));
+        assert_eq!(missing, [0, 0, 0, 0, 0, 0, 2]);
         note(3, i64::MIN);
         note(3, i64::MAX);
     }

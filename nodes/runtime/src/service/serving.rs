@@ -135,7 +135,7 @@ impl Serving {
 
     /// Counts the requests that were lost since the last one.
     fn count_lost(&self) {
-        let lost = self.requests.missed();
+        let lost = self.requests.losses().overrun.swap(0, Relaxed);
         if lost > 0 {
             self.unanswered.lost.fetch_add(lost, Relaxed);
             self.warn(&format!(

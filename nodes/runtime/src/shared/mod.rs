@@ -29,7 +29,7 @@ use super::local_bus::LocalBus;
 use super::outbox::{Outbox, WhenFull};
 use super::port::{GRAPH_TOPIC, PortTopic, SampleReader, SampleWriter, Transport};
 use super::publisher::PublisherParts;
-use super::qos::Qos;
+use super::qos::{Qos, Reliability};
 use super::remote::RemotePublisher;
 #[cfg(feature = "zenoh")]
 use super::rmw_zenoh::Zenoh;
@@ -131,7 +131,7 @@ impl Shared {
         let Some(writer) = writer.transpose()? else {
             return Ok(());
         };
-        let outbox = self.outbox_of(GRAPH_TOPIC, writer, WhenFull::Wait)?;
+        let outbox = self.outbox_of(GRAPH_TOPIC, writer, WhenFull::Drop)?;
         if let Some(open) = lock(&self.open).as_mut() {
             let graph = Arc::clone(&self.graph);
             let transport = Arc::downgrade(&open.transport);
@@ -164,7 +164,8 @@ impl Shared {
         qos: &Qos,
         when_full: WhenFull,
     ) -> Result<Arc<Outbox>, RuntimeError> {
-        let writer = self.transport(topic.name, |transport| transport.writer(topic, qos))?;
+        let keeps = when_full == WhenFull::Wait && qos.reliability == Reliability::Reliable;
+        let writer = self.transport(topic.name, |transport| transport.writer(topic, qos, keeps))?;
         self.outbox_of(topic.name, writer, when_full)
     }
 

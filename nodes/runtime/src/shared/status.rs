@@ -9,7 +9,7 @@ use socket2::{Domain, Socket, Type};
 use super::Shared;
 use crate::diagnostics::{Level, status};
 use crate::env::TransportKind;
-use crate::port::RECEIVE_BUFFER_BYTES;
+use crate::port::{RECEIVE_BUFFER_BYTES, ReaderLosses};
 use crate::sync::lock;
 
 /// Below this, bursts of large messages are lost; twice the largest message is needed.
@@ -137,7 +137,13 @@ impl Shared {
             let (topic, stats) = (&intake.topic, &intake.stats);
             let undecodable = stats.undecodable.load(Relaxed);
             add(topic, "undecodable", undecodable, "undecodable samples");
-            add(topic, "lost", stats.lost.load(Relaxed), "messages lost");
+            let ReaderLosses {
+                on_network,
+                overrun,
+            } = &stats.losses;
+            let on_network = on_network.load(Relaxed);
+            add(topic, "lost_on_network", on_network, "messages lost");
+            add(topic, "overrun", overrun.load(Relaxed), "messages lost");
             let incompatible = intake.peers.incompatible_count() as u64;
             add(topic, "incompatible_publishers", incompatible, QOS);
         }

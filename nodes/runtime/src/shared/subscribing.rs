@@ -87,14 +87,6 @@ impl Shared {
         mut handler: impl FnMut(Sample<'_, M>, &Arc<Stats>) + Send + 'static,
     ) -> Result<Subscription, RuntimeError> {
         let peers = Arc::new(Peers::new(topic, "publisher", log::Level::Info));
-        let stats = Arc::new(Stats::new(Arc::clone(&peers)));
-        let (sender, local) = bounded(qos.depth.max(match load {
-            Load::Small => LOCAL_SMALL_MESSAGES,
-            Load::Large => LOCAL_LARGE_MESSAGES,
-        }));
-        let (place, lost) = (self.bus.topic(topic), Arc::clone(&stats.lost));
-        let latched = qos.durability == Durability::TransientLocal;
-        let place = join(&place, &peers, sender.clone(), lost, latched)?;
         let port_topic = PortTopic {
             node: &self.graph.node(node),
             name: topic,
@@ -102,6 +94,14 @@ impl Shared {
             type_hash: None,
         };
         let reader = self.reader(port_topic, qos, max_bytes)?;
+        let stats = Arc::new(Stats::new(Arc::clone(&peers), reader.losses()));
+        let (sender, local) = bounded(qos.depth.max(match load {
+            Load::Small => LOCAL_SMALL_MESSAGES,
+            Load::Large => LOCAL_LARGE_MESSAGES,
+        }));
+        let (place, overrun) = (self.bus.topic(topic), Arc::clone(&stats.losses.overrun));
+        let latched = qos.durability == Durability::TransientLocal;
+        let place = join(&place, &peers, sender.clone(), overrun, latched)?;
         let id = reader.id();
         let of = Some((GraphRole::Subscriber, topic.to_owned()));
         let (orders, given) = unbounded();

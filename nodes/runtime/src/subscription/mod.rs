@@ -19,6 +19,7 @@ use smol::channel::{Sender, bounded};
 use super::error::RuntimeError;
 use super::logging::Throttle;
 use super::peers::Peers;
+use super::port::ReaderLosses;
 use super::shutdown::Shutdown;
 use super::sync::lock;
 use super::task_thread::guarded;
@@ -54,8 +55,8 @@ pub(crate) struct Stats {
     peers: Arc<Peers>,
     received: AtomicU64,
     pub undecodable: AtomicU64,
-    /// Messages that gave way to newer ones, or that were sent and never came.
-    pub lost: Arc<AtomicU64>,
+    /// Messages of either kind that are not had, those of this process included.
+    pub losses: ReaderLosses,
     warning: Throttle,
 }
 
@@ -88,7 +89,17 @@ impl Subscription {
 
     /// Messages that were sent and did not get here, or gave way to newer ones.
     pub fn lost(&self) -> u64 {
-        self.stats().lost.load(Relaxed)
+        self.stats().lost()
+    }
+
+    /// Those of [`Subscription::lost`] that were sent and did not get here.
+    pub fn lost_on_network(&self) -> u64 {
+        self.stats().losses.on_network.load(Relaxed)
+    }
+
+    /// Those of [`Subscription::lost`] that came, and gave way to newer ones before the handler had them.
+    pub fn overrun(&self) -> u64 {
+        self.stats().losses.overrun.load(Relaxed)
     }
 
     /// Samples that were no message of this type, or too long, and were left out.
@@ -110,27 +121,48 @@ impl Losses {
 
     /// Sum of [`Subscription::lost`].
     pub fn lost(&self) -> u64 {
-        let stats = lock(&self.0);
-        stats.iter().map(|stats| stats.lost.load(Relaxed)).sum()
+        self.sum(Stats::lost)
+    }
+
+    /// Sum of [`Subscription::lost_on_network`].
+    pub fn on_network(&self) -> u64 {
+        self.sum(|stats| stats.losses.on_network.load(Relaxed))
+    }
+
+    /// Sum of [`Subscription::overrun`].
+    pub fn overrun(&self) -> u64 {
+        self.sum(|stats| stats.losses.overrun.load(Relaxed))
     }
 
     /// Sum of [`Subscription::undecodable`].
     pub fn undecodable(&self) -> u64 {
-        let stats = lock(&self.0);
-        let of = |stats: &Arc<Stats>| stats.undecodable.load(Relaxed);
-        stats.iter().map(of).sum()
+        self.sum(|stats| stats.undecodable.load(Relaxed))
+    }
+
+    fn sum(&self, of: impl Fn(&Stats) -> u64) -> u64 {
+        lock(&self.0).iter().map(|stats| of(stats)).sum()
     }
 }
 
 impl Stats {
-    pub(crate) fn new(peers: Arc<Peers>) -> Self {
+    pub(crate) fn new(peers: Arc<Peers>, losses: ReaderLosses) -> Self {
         Self {
             peers,
             received: AtomicU64::new(0),
             undecodable: AtomicU64::new(0),
-            lost: Arc::default(),
+            losses,
             warning: Throttle::new(WARNING_PERIOD),
         }
+    }
+
+    fn lost(&self) -> u64 {
+        let ReaderLosses {
+            on_network,
+            overrun,
+        } = &self.losses;
+        on_network
+            .load(Relaxed)
+            .saturating_add(overrun.load(Relaxed))
     }
 
     /// Decodes a sample and counts what comes of it.

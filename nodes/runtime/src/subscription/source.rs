@@ -2,7 +2,6 @@
 
 use std::any::Any;
 use std::sync::Arc;
-use std::sync::atomic::Ordering::Relaxed;
 
 use smol::channel::{Receiver, Sender};
 use smol::future::or;
@@ -41,7 +40,6 @@ impl Source {
             match self.next(turn.is_multiple_of(2)).await {
                 Heard::Local(message) => give_shared(message, &mut handler),
                 Heard::Remote(Ok(())) => {
-                    self.stats.lost.fetch_add(self.reader.missed(), Relaxed);
                     handler(Sample::Cdr(&mut self.reader.bytes()));
                 }
                 Heard::Remote(Err(why)) => self.stats.not_decodable(&why),

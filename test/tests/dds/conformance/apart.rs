@@ -1,7 +1,6 @@
 //! Processes that are to stay apart: with `OFF` from everybody, with `LOCALHOST` from other machines, which are
 //! network namespaces here.
 
-use std::io::{Write, stderr};
 use std::process::{Child, Command, Stdio};
 use std::time::Duration;
 
@@ -11,6 +10,7 @@ use lattice_runtime::ros_args::RosArgs;
 use lattice_test::domain::TestDomain;
 
 use super::{DOMAIN, Echo, PATIENCE, Talk, program};
+use crate::machines::Machines;
 
 const RANGE: &str = "ROS_AUTOMATIC_DISCOVERY_RANGE";
 
@@ -37,57 +37,18 @@ fn who_is_off_is_found_by_nobody() {
     assert_eq!(talk.publisher.subscriber_count(), 1);
 }
 
-/// Two namespaces with a cable between them; the first has 10.79.0.1, the second 10.79.0.2.
-struct Machines([String; 2]);
-
-impl Machines {
-    /// None, with a line on standard error, where that is not permitted.
-    fn new(domain: &TestDomain) -> Option<Self> {
-        let names = ["a", "b"].map(|name| format!("lattice{}{name}", domain.id()));
-        let this = Self(names);
-        let [a, b] = &this.0;
-        let steps = [
-            format!("netns add {a}"),
-            format!("netns add {b}"),
-            format!("link add veth0 netns {a} type veth peer name veth0 netns {b}"),
-            format!("-n {a} addr add 10.79.0.1/24 dev veth0"),
-            format!("-n {b} addr add 10.79.0.2/24 dev veth0"),
-            format!("-n {a} link set lo up"),
-            format!("-n {b} link set lo up"),
-            format!("-n {a} link set veth0 up"),
-            format!("-n {b} link set veth0 up"),
-        ];
-        let made = steps.iter().all(|step| ip(step));
-        if !made {
-            let _ = writeln!(stderr(), "SKIPPED: no network namespaces");
-        }
-        made.then_some(this)
-    }
-
-    /// A test of this program on one of the machines.
-    fn run(&self, machine: usize, domain: &TestDomain, test: &str, range: &str) -> Command {
-        let mut command = Command::new("ip");
-        command.args(["netns", "exec", &self.0[machine]]);
-        command.arg(program()).args(["--exact", test, "--ignored"]);
-        command.env(DOMAIN, domain.id().to_string());
-        command.env("LATTICE_TEST_MULTICAST", "1").env(RANGE, range);
-        command.stdout(Stdio::null());
-        command
-    }
-}
-
-impl Drop for Machines {
-    fn drop(&mut self) {
-        for name in &self.0 {
-            ip(&format!("netns del {name}"));
-        }
-    }
-}
-
-fn ip(arguments: &str) -> bool {
-    let mut command = Command::new("ip");
-    command.args(arguments.split(' ')).stderr(Stdio::null());
-    command.status().is_ok_and(|status| status.success())
+/// A test of this program on one of the machines.
+fn end_on(
+    machines: &Machines,
+    machine: usize,
+    domain: &TestDomain,
+    test: &str,
+    range: &str,
+) -> Command {
+    let mut command = machines.run(machine, test);
+    command.env(DOMAIN, domain.id().to_string());
+    command.env(RANGE, range).stdout(Stdio::null());
+    command
 }
 
 struct Running(Child);
@@ -106,12 +67,12 @@ fn other_machines_are_met_on_the_subnet_and_not_on_localhost() {
         return;
     };
     for (range, expected) in [("SUBNET", "heard"), ("LOCALHOST", "alone")] {
-        let mut echo = machines.run(1, &domain, "conformance::echo", "SUBNET");
+        let mut echo = end_on(&machines, 1, &domain, "conformance::echo", "SUBNET");
         // Told where the other machine is: nothing that reaches its ports may count there.
         let echo = echo.env("ROS_STATIC_PEERS", "10.79.0.1").spawn();
         let _echo = Running(echo.unwrap());
         let test = "conformance::apart::hears_an_echo";
-        let mut ours = machines.run(0, &domain, test, range);
+        let mut ours = end_on(&machines, 0, &domain, test, range);
         let status = ours.env(EXPECTED, expected).status().unwrap();
         assert!(status.success(), "{range}");
     }

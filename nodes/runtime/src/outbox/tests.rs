@@ -1,0 +1,47 @@
+//! Queues in front of writers.
+
+use futures::future::BoxFuture;
+
+use super::*;
+
+/// A writer whose reader is stuck.
+struct Stuck;
+
+impl SampleWriter for Stuck {
+    fn id(&self) -> EndpointId {
+        EndpointId([7; 16])
+    }
+
+    fn write(&self, _: Bytes, _: Option<SampleId>) -> BoxFuture<'_, Result<(), WriteRefusal>> {
+        Box::pin(smol::future::pending())
+    }
+
+    fn unacknowledged(&self) -> u64 {
+        0
+    }
+
+    fn wait_for_acknowledgments(&self, _: Duration) -> bool {
+        false
+    }
+}
+
+#[test]
+fn who_waits_for_a_full_queue_goes_on_in_time_and_at_the_end() {
+    let (outbox, _task) = Outbox::new("/chatter", Arc::new(Stuck), WhenFull::Wait, 1, usize::MAX);
+    let (shutdown, long) = (Shutdown::default(), Duration::from_secs(600));
+    let body = Bytes::from_static(b"body");
+    let send = |patience, shutdown| outbox.send_body_within(body.clone(), patience, shutdown);
+    send(long, &shutdown).unwrap();
+    for dropped in 1..=2 {
+        let refused = send(Duration::from_millis(1), &shutdown);
+        let full =
+            matches!(refused, Err(PublishError::QueueFull { dropped: n, .. }) if n == dropped);
+        assert!(full, "{refused:?}");
+    }
+    std::thread::scope(|scope| {
+        let waiting = scope.spawn(|| send(long, &shutdown));
+        shutdown.request();
+        let result = waiting.join().unwrap();
+        assert!(matches!(result, Err(PublishError::Closed { .. })));
+    });
+}

@@ -1,0 +1,159 @@
+//! Room for connections that are no client yet: bounded in all, and for each address.
+
+use std::cell::RefCell;
+use std::collections::{BTreeMap, VecDeque};
+use std::io;
+use std::net::{IpAddr, Ipv6Addr};
+use std::rc::Rc;
+
+use smol::channel::{Receiver, Sender, bounded};
+use smol::future::or;
+
+/// Most connections in a room.
+pub const MAX_CONNECTIONS: usize = 64;
+/// Most of them from one address: two pages, each with the six connections that browsers open, and a few more.
+pub const MAX_PER_ADDRESS: usize = 16;
+
+/// A room. Who comes when it is full takes the place of the oldest connection of the address that has most.
+#[derive(Default)]
+pub struct Room(RefCell<Places>);
+
+#[derive(Default)]
+struct Places {
+    /// In the order in which they came.
+    taken: VecDeque<Place>,
+    next: u64,
+    displaced: u64,
+}
+
+struct Place {
+    id: u64,
+    address: IpAddr,
+    /// Ends the connection once it is dropped.
+    _keep: Sender<()>,
+}
+
+/// A connection in a room, which it leaves when dropped.
+pub struct Guest {
+    room: Rc<Room>,
+    id: u64,
+    displaced: Receiver<()>,
+}
+
+impl Room {
+    /// Takes a place, of another one where there is none.
+    pub fn enter(self: &Rc<Self>, from: IpAddr) -> Guest {
+        let mut places = self.0.borrow_mut();
+        let address = network(from);
+        let mut counts = BTreeMap::<IpAddr, usize>::new();
+        for place in &places.taken {
+            *counts.entry(place.address).or_default() += 1;
+        }
+        let most = counts.iter().max_by_key(|(_, count)| **count);
+        let full = match counts.get(&address) {
+            Some(count) if *count >= MAX_PER_ADDRESS => Some(address),
+            _ if places.taken.len() >= MAX_CONNECTIONS => most.map(|(address, _)| *address),
+            _ => None,
+        };
+        if let Some(full) = full
+            && let Some(oldest) = places.taken.iter().position(|of| of.address == full)
+        {
+            places.taken.remove(oldest);
+            places.displaced += 1;
+        }
+        let (keep, displaced) = bounded(1);
+        let id = places.next;
+        places.next += 1;
+        places.taken.push_back(Place {
+            id,
+            address,
+            _keep: keep,
+        });
+        let room = Rc::clone(self);
+        Guest {
+            room,
+            id,
+            displaced,
+        }
+    }
+
+    /// Connections that gave way to newer ones since the last call.
+    pub fn take_displaced(&self) -> u64 {
+        std::mem::take(&mut self.0.borrow_mut().displaced)
+    }
+}
+
+impl Guest {
+    /// Does the work while the connection has its place.
+    pub async fn served<T>(&self, work: impl Future<Output = io::Result<T>>) -> io::Result<T> {
+        let displaced = async {
+            let _ = self.displaced.recv().await;
+            Err(io::ErrorKind::ConnectionAborted.into())
+        };
+        or(work, displaced).await
+    }
+}
+
+impl Drop for Guest {
+    fn drop(&mut self) {
+        let taken = &mut self.room.0.borrow_mut().taken;
+        taken.retain(|place| place.id != self.id);
+    }
+}
+
+/// An IPv4 address, or the first half of an IPv6 address, of which a host has as many as it likes.
+fn network(address: IpAddr) -> IpAddr {
+    match address.to_canonical() {
+        IpAddr::V4(address) => address.into(),
+        IpAddr::V6(address) => Ipv6Addr::from_bits(address.to_bits() >> 64 << 64).into(),
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    fn is_displaced(guest: &Guest) -> bool {
+        guest.displaced.is_closed()
+    }
+
+    #[test]
+    fn the_oldest_of_an_address_that_has_too_many_gives_way() {
+        let room = Rc::new(Room::default());
+        let from = |last: u8| room.enter(IpAddr::from([10, 0, 0, last]));
+        let (quiet, many) = (from(1), [(); MAX_PER_ADDRESS].map(|()| from(2)));
+        assert!(!many.iter().any(is_displaced));
+        let _more = [from(2), from(2)];
+        assert_eq!(many.iter().filter(|guest| is_displaced(guest)).count(), 2);
+        assert!(is_displaced(&many[0]) && is_displaced(&many[1]) && !is_displaced(&quiet));
+        assert_eq!((room.take_displaced(), room.take_displaced()), (2, 0));
+        drop(many);
+        // Those who have left are no burden.
+        let again = [(); MAX_PER_ADDRESS - 2].map(|()| from(2));
+        assert!(!again.iter().any(is_displaced) && !is_displaced(&quiet));
+    }
+
+    #[test]
+    fn in_a_full_room_the_address_with_most_gives_way() {
+        let room = Rc::new(Room::default());
+        let from = |last: u8| room.enter(IpAddr::from([10, 0, 0, last]));
+        let greedy = [(); MAX_PER_ADDRESS].map(|()| from(0));
+        let single: Vec<Guest> = (1..=48).map(from).collect();
+        assert_eq!(single.len() + greedy.len(), MAX_CONNECTIONS);
+        let last = from(200);
+        assert!(is_displaced(&greedy[0]) && !is_displaced(&greedy[1]));
+        assert!(!single.iter().any(is_displaced) && !is_displaced(&last));
+    }
+
+    #[test]
+    fn a_host_has_one_room_for_all_its_addresses() {
+        let room = Rc::new(Room::default());
+        let first = room.enter("2001:db8::1".parse().unwrap());
+        let many: Vec<Guest> = (2..18_u16)
+            .map(|last| room.enter(format!("2001:db8::{last}").parse().unwrap()))
+            .collect();
+        assert!(is_displaced(&first) && !many.iter().any(is_displaced));
+        let mapped: IpAddr = "::ffff:10.0.0.1".parse().unwrap();
+        assert_eq!(network(mapped), IpAddr::from([10, 0, 0, 1]));
+    }
+}
