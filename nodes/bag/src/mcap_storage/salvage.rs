@@ -17,6 +17,10 @@ use crate::{MAX_MESSAGE_BYTES, sniff::ZSTD_MAGIC};
 const WINDOW_BYTES: u64 = 1 << 20;
 /// Head of a message record: opcode, length, channel, sequence and two times, then the CDR header.
 const MESSAGE_HEAD_BYTES: usize = 9 + 22 + 4;
+/// Head of a chunk up to its times: opcode, length, first and last log time.
+const CHUNK_SPAN_BYTES: usize = 9 + 16;
+/// Log times that a bag takes, ns since the Unix epoch.
+const ALL_TIMES: (u64, u64) = (0, i64::MAX as u64);
 /// Longest record of a schema or channel that is looked for, bytes.
 const MAX_DEFINITION_BYTES: u64 = 1 << 20;
 /// Highest representation identifier of CDR (DDS-XTypes 1.3, table 60).
@@ -96,7 +100,7 @@ fn any_head(head: &[u8], left: u64) -> Option<Head> {
 }
 
 /// Head of a message of a known channel, with a CDR header or that of a zstd frame.
-fn message_head<V>(head: &[u8], left: u64, channels: &BTreeMap<u16, V>) -> Option<Head> {
+fn message_head<V>(head: &[u8], left: u64, known: &Known<'_, V>) -> Option<Head> {
     let found = any_head(head, left).filter(|found| found.opcode == op::MESSAGE)?;
     let shortest = MESSAGE_HEAD_BYTES as u64 - RECORD_HEADER_BYTES;
     let channel = u16::try_from(number(head, 9, 2)?).ok()?;
@@ -104,8 +108,8 @@ fn message_head<V>(head: &[u8], left: u64, channels: &BTreeMap<u16, V>) -> Optio
     let data = head.get(31..MESSAGE_HEAD_BYTES)?;
     let is_cdr = matches!(data, [0, ..=MAX_REPRESENTATION, ..]);
     let is_message = (shortest..=MAX_MESSAGE_BYTES + 22).contains(&found.len)
-        && channels.contains_key(&channel)
-        && i64::try_from(log_time).is_ok()
+        && known.channels.contains_key(&channel)
+        && (known.span.0..=known.span.1).contains(&log_time)
         && (is_cdr || data.starts_with(ZSTD_MAGIC));
     is_message.then_some(found)
 }
@@ -153,15 +157,39 @@ fn is_name(name: &str) -> bool {
 /// Blocks of the messages between two bytes of the file, whose checksum is wrong or which have none.
 ///
 /// A message counts if its head is plausible and a plausible record, or nothing that could be a message,
-/// follows it.
+/// follows it. In a chunk its time lies within that of the chunk, unless none does.
 pub(super) fn messages<V>(
     file: &mut File,
     (start, end): (u64, u64),
     channels: &BTreeMap<u16, V>,
 ) -> io::Result<Vec<Block>> {
     let mut window = Window::new(file, end);
+    let span = chunk_span(window.at(start, CHUNK_SPAN_BYTES)?);
+    let of = |span| Known { channels, span };
+    let found = runs(&mut window, start, &of(span.unwrap_or(ALL_TIMES)))?;
+    match span {
+        Some(_) if found.is_empty() => runs(&mut window, start, &of(ALL_TIMES)),
+        _ => Ok(found),
+    }
+}
+
+/// First and last log time of a chunk, by its head.
+fn chunk_span(head: &[u8]) -> Option<(u64, u64)> {
+    let span = (number(head, 9, 8)?, number(head, 17, 8)?);
+    (head.first() == Some(&op::CHUNK) && span.0 <= span.1).then_some(span)
+}
+
+/// What messages of a stretch have in common.
+struct Known<'a, V> {
+    channels: &'a BTreeMap<u16, V>,
+    /// First and last log time, ns.
+    span: (u64, u64),
+}
+
+fn runs<V>(window: &mut Window<'_>, start: u64, known: &Known<'_, V>) -> io::Result<Vec<Block>> {
+    let end = window.end;
     let mut runs = Runs::default();
-    let mut next = next_message(&mut window, start, channels)?;
+    let mut next = next_message(window, start, known)?;
     while let Some((at, head)) = next {
         let behind = at + head.bytes();
         let follows = window.at(behind, RECORD_HEADER_BYTES as usize)?;
@@ -169,14 +197,14 @@ pub(super) fn messages<V>(
         // A length that is too large hides the message behind.
         let inside = match is_followed {
             true => None,
-            false => next_message(&mut window, at + 1, channels)?.filter(|(at, _)| *at < behind),
+            false => next_message(window, at + 1, known)?.filter(|(at, _)| *at < behind),
         };
         next = match inside {
             Some(inside) => Some(inside),
             None => {
                 let head_bytes = window.at(at, MESSAGE_HEAD_BYTES)?;
                 runs.add(at, head.bytes(), head_bytes);
-                next_message(&mut window, behind, channels)?
+                next_message(window, behind, known)?
             }
         };
     }
@@ -187,11 +215,11 @@ pub(super) fn messages<V>(
 fn next_message<V>(
     window: &mut Window<'_>,
     from: u64,
-    channels: &BTreeMap<u16, V>,
+    known: &Known<'_, V>,
 ) -> io::Result<Option<(u64, Head)>> {
     for at in from..window.end {
         let left = window.end - at;
-        if let Some(head) = message_head(window.at(at, MESSAGE_HEAD_BYTES)?, left, channels) {
+        if let Some(head) = message_head(window.at(at, MESSAGE_HEAD_BYTES)?, left, known) {
             return Ok(Some((at, head)));
         }
     }

@@ -64,12 +64,16 @@ pub(super) fn salvage(
     file_bytes: u64,
 ) -> Salvaged {
     let select = |order: &str| format!("{KEY_COLUMNS} FROM messages NOT INDEXED ORDER BY id {order}");
-    let (mut keys, whole) = scan(connection, &select("ASC"), key);
+    let (keys, whole) = scan(connection, &select("ASC"), key);
+    let (mut keys, ascend) = ascending(keys);
+    let whole = whole && ascend;
     let mut ends = whole;
     if !whole {
         let first = keys.last().map_or(i64::MIN, |last| last.id);
-        let (behind, _) = scan(connection, &select("DESC"), key);
+        let (mut behind, _) = scan(connection, &select("DESC"), key);
         ends = !behind.is_empty();
+        behind.reverse();
+        let (behind, _) = ascending(behind);
         keys.extend(behind.into_iter().filter(|key| key.id > first));
     }
     keys.sort_unstable_by_key(|key| key.id);
@@ -99,6 +103,25 @@ pub(super) fn salvage(
     keys.sort_unstable();
     salvaged.keys = keys;
     salvaged
+}
+
+/// The keys without those whose row id is out of order, which nobody finds by it; and whether there were none.
+fn ascending(keys: Vec<Key>) -> (Vec<Key>, bool) {
+    let count = keys.len();
+    let mut ordered: Vec<Key> = Vec::with_capacity(count);
+    for key in keys {
+        // Where two contradict each other, the one that fits what precedes both stays.
+        if ordered.last().is_some_and(|last| last.id >= key.id) {
+            let before = ordered.iter().rev().nth(1).map_or(i64::MIN, |key| key.id);
+            if key.id <= before {
+                continue;
+            }
+            ordered.pop();
+        }
+        ordered.push(key);
+    }
+    let all = ordered.len() == count;
+    (ordered, all)
 }
 
 /// Asks for the rows that the scans did not find: those that the index lists, and between the first and the
