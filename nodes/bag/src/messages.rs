@@ -135,9 +135,7 @@ impl Messages {
 
     /// True for the error by which a cut file ends, where that is no error; the reader has warned of it.
     fn is_passed_cut(&self, error: &BagError) -> bool {
-        self.past_cut
-            && !self.filter.past_damage
-            && matches!(error, BagError::Truncated { .. })
+        self.past_cut && !self.filter.past_damage && matches!(error, BagError::Truncated { .. })
     }
 
     fn take_first(&mut self) -> Option<Result<BagMessage, BagError>> {

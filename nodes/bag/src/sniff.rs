@@ -90,7 +90,9 @@ fn is_unknown(head: &[u8]) -> bool {
     let kinds = [MCAP_MAGIC, SQLITE_MAGIC, ZSTD_MAGIC].into_iter();
     let is_kind = |magic: &[u8]| head.starts_with(magic) || magic.starts_with(head);
     !kinds.chain(FOREIGN.iter().map(|f| f.0)).any(is_kind)
-        && !head.iter().all(|b| b.is_ascii_graphic() || b.is_ascii_whitespace())
+        && !head
+            .iter()
+            .all(|b| b.is_ascii_graphic() || b.is_ascii_whitespace())
 }
 
 fn identify_bytes(head: &[u8]) -> Result<FileKind, (String, &'static str)> {

@@ -135,7 +135,12 @@ mod tests {
         let link = folder.path().join("link.onnx");
         std::os::unix::fs::symlink(&fifo, &link).unwrap();
         // Each would wait, or never end.
-        for path in [fifo.as_path(), link.as_path(), Path::new("/dev/zero"), folder.path()] {
+        for path in [
+            fifo.as_path(),
+            link.as_path(),
+            Path::new("/dev/zero"),
+            folder.path(),
+        ] {
             let error = read(path).unwrap_err().to_string();
             assert!(error.contains("not a regular file"), "{error}");
         }

@@ -10,8 +10,8 @@ use super::options::input_size;
 use super::{SegmenterOptions, read_network_by};
 use crate::compute::ComputeLimits;
 use crate::{options, report};
-use lattice_runtime::{Shutdown, about};
 use lattice_runtime::params::{About, ParamError, Params};
+use lattice_runtime::{Shutdown, about};
 
 const MODEL: &str = "the network is made at the start";
 const ABOUT: &[About] = about! {
@@ -62,7 +62,9 @@ fn within<T: Send + 'static>(
             }
             Err(RecvTimeoutError::Timeout) if begin.elapsed() > most => {
                 let seconds = most.as_secs_f64();
-                return Err(format!("it is not ready after {seconds} s: take a smaller one"));
+                return Err(format!(
+                    "it is not ready after {seconds} s: take a smaller one"
+                ));
             }
             Err(RecvTimeoutError::Timeout) => {}
         }

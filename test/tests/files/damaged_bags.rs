@@ -93,7 +93,12 @@ fn read(bag: &Path) -> Vec<Message> {
     };
     let message = |message: lattice_bag::BagMessage| {
         let name = reader.topics()[message.topic].name.clone();
-        (name, message.log_time_ns, message.data.len(), hash(&message.data))
+        (
+            name,
+            message.log_time_ns,
+            message.data.len(),
+            hash(&message.data),
+        )
     };
     let messages = reader.messages(&ReadOptions::default()).unwrap();
     messages.map(|found| message(found.unwrap())).collect()
@@ -140,7 +145,11 @@ fn compare(storage: Storage, damages: usize) {
             .args([&MESSAGES.to_string(), bag.join(&name).to_str().unwrap()])
             .output()
             .unwrap();
-        assert!(peer.status.success(), "{}", String::from_utf8_lossy(&peer.stderr));
+        assert!(
+            peer.status.success(),
+            "{}",
+            String::from_utf8_lossy(&peer.stderr)
+        );
         let by_peer: Vec<Message> = serde_json::from_slice(&peer.stdout).unwrap();
         let by_peer = by_peer.iter().filter(|m| written.contains(m)).count();
         let recovered = recover(&bag, &out);
@@ -157,7 +166,10 @@ fn compare(storage: Storage, damages: usize) {
         };
         let altered: Vec<_> = found.iter().filter(|m| !written.contains(m)).collect();
         if storage == Storage::Mcap {
-            assert!(altered.iter().all(|m| is_unchecked(m)), "{shown} {altered:?}");
+            assert!(
+                altered.iter().all(|m| is_unchecked(m)),
+                "{shown} {altered:?}"
+            );
         }
         let times: BTreeSet<_> = found.iter().map(|m| m.1).collect();
         let missing = written.iter().filter(|m| !times.contains(&m.1)).count() as u64;

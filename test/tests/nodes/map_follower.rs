@@ -1,10 +1,10 @@
 //! Those who follow a map: deltas, keyframes, late joining, gaps, hostile input.
 
 use lattice_core::lattice::LatticeKind;
+use lattice_msgs::builtin_interfaces::Time;
 use lattice_msgs::lattice::{LatticeMap, LatticeMapUpdate};
 use lattice_nodes::lattice_mapper::{LatticeMapper, MapperOptions};
 use lattice_nodes::map_follower::{Followed, MapFollower};
-use lattice_msgs::builtin_interfaces::Time;
 use lattice_test::clouds::cloud;
 use lattice_test::maps::{self, follow_keyframe, follow_update, insert};
 use proptest::prelude::*;

@@ -61,10 +61,7 @@ impl<'a> Window<'a> {
             self.bytes.clear();
             self.start = at;
             let most = WINDOW_BYTES.max(count as u64).min(left);
-            self.file
-                .by_ref()
-                .take(most)
-                .read_to_end(&mut self.bytes)?;
+            self.file.by_ref().take(most).read_to_end(&mut self.bytes)?;
         }
         let found = has(self).and_then(|range| self.bytes.get(range));
         Ok(found.unwrap_or_default())
@@ -239,9 +236,8 @@ impl Runs {
         let (Some(channel), Some(log_time)) = (channel, number(head, 15, 8)) else {
             return;
         };
-        let goes_on = |(block, _): &(Block, _)| {
-            block.offset + block.len == at && block.len < RUN_BYTES
-        };
+        let goes_on =
+            |(block, _): &(Block, _)| block.offset + block.len == at && block.len < RUN_BYTES;
         if !self.open.as_ref().is_some_and(goes_on) {
             self.end();
         }

@@ -16,8 +16,8 @@ use tempfile::TempPath;
 use super::{
     McapFile,
     contents::Block,
-    salvage,
     records::{Cause, Place, RecordError, parse_message, visit_chunk, visit_records},
+    salvage,
 };
 use crate::{
     BagError,
@@ -128,7 +128,8 @@ impl McapStream {
         let mut waiting_bytes = self.waiting_bytes;
         let mut take = |place, opcode, body: &[u8]| {
             if opcode == op::MESSAGE
-                && let Some(message) = wanted(place, body, topic_of, filter, (number, block.unchecked))?
+                && let Some(message) =
+                    wanted(place, body, topic_of, filter, (number, block.unchecked))?
             {
                 waiting_bytes = waiting_bytes.saturating_add(message.bytes());
                 if waiting_bytes > MAX_WAITING_BYTES {

@@ -63,7 +63,9 @@ pub(super) fn connect(path: &Path, access: Access) -> Result<Connection, BagErro
         Access::Strict | Access::Cut => "ON",
     };
     connection
-        .execute_batch(&format!("PRAGMA cell_size_check = {check}; PRAGMA mmap_size = 0;"))
+        .execute_batch(&format!(
+            "PRAGMA cell_size_check = {check}; PRAGMA mmap_size = 0;"
+        ))
         .map_err(wrong)?;
     Ok(connection)
 }

@@ -5,8 +5,8 @@ mod salvage;
 mod stream;
 
 use std::{
-    fs,
     collections::{BTreeMap, BTreeSet},
+    fs,
     path::{Path, PathBuf},
     sync::{Arc, OnceLock},
 };
@@ -133,10 +133,12 @@ impl SqliteFile {
                 remedy: "give the .db3 file of a rosbag2 bag",
             });
         }
-        let definitions = self.definitions(connection, &tables).unwrap_or_else(|error| {
-            log::warn!("{error}; its topics are taken without definitions");
-            BTreeMap::new()
-        });
+        let definitions = self
+            .definitions(connection, &tables)
+            .unwrap_or_else(|error| {
+                log::warn!("{error}; its topics are taken without definitions");
+                BTreeMap::new()
+            });
         let wrong = |e| BagError::sqlite(&self.path, "table topics", e);
         let columns =
             names(connection, "SELECT name FROM pragma_table_info('topics')").map_err(wrong)?;
@@ -189,7 +191,9 @@ impl SqliteFile {
         self.topic_of = Arc::new(topic_of);
         let indexed = "SELECT l.name FROM pragma_index_list('messages') AS l, pragma_index_info(l.name) AS i \
                        WHERE i.seqno = 0 AND i.name = 'timestamp'";
-        self.time_index = names(connection, indexed).ok().and_then(|found| found.into_iter().next());
+        self.time_index = names(connection, indexed)
+            .ok()
+            .and_then(|found| found.into_iter().next());
         Ok(())
     }
 

@@ -63,7 +63,8 @@ pub(super) fn salvage(
     time_index: Option<&str>,
     file_bytes: u64,
 ) -> Salvaged {
-    let select = |order: &str| format!("{KEY_COLUMNS} FROM messages NOT INDEXED ORDER BY id {order}");
+    let select =
+        |order: &str| format!("{KEY_COLUMNS} FROM messages NOT INDEXED ORDER BY id {order}");
     let (keys, whole) = scan(connection, &select("ASC"), key);
     let (mut keys, ascend) = ascending(keys);
     let whole = whole && ascend;
@@ -82,8 +83,9 @@ pub(super) fn salvage(
     let mut listed = Vec::new();
     if let Some(index) = time_index {
         let index = index.replace('"', "\"\"");
-        let select =
-            |order: &str| format!("SELECT id FROM messages INDEXED BY \"{index}\" ORDER BY timestamp {order}");
+        let select = |order: &str| {
+            format!("SELECT id FROM messages INDEXED BY \"{index}\" ORDER BY timestamp {order}")
+        };
         let id = |row: &rusqlite::Row<'_>| row.get::<_, i64>(0);
         let (ids, whole) = scan(connection, &select("ASC"), id);
         listed = ids;
@@ -98,7 +100,13 @@ pub(super) fn salvage(
         ends,
         ..Salvaged::default()
     };
-    let found = fill(connection, &keys, &listed, (whole, file_bytes), &mut salvaged);
+    let found = fill(
+        connection,
+        &keys,
+        &listed,
+        (whole, file_bytes),
+        &mut salvaged,
+    );
     keys.extend(found);
     keys.sort_unstable();
     salvaged.keys = keys;
@@ -155,7 +163,11 @@ fn fill(
     // Rows count from one; those of a file that goes on from another may begin higher.
     let known = keys.iter().map(|key| key.id).chain(listed.iter().copied());
     let lowest = known.clone().min().unwrap_or(1);
-    let first = if (1..=most).contains(&lowest) { 1 } else { lowest };
+    let first = if (1..=most).contains(&lowest) {
+        1
+    } else {
+        lowest
+    };
     let end = first.saturating_add(most);
     let last = match salvaged.ends {
         true => known.filter(|id| *id < end).max().unwrap_or(first),

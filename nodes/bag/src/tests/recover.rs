@@ -29,10 +29,12 @@ fn messages_of_a_damaged_chunk_are_taken_unchecked() {
 
 /// Only messages that are marked differ, which are those of one chunk: no more than three here.
 fn check_unchecked(recovered: &Recovered, sound: &[BagMessage], written: &[BagMessage]) {
-    let [Unchecked {
-        topic,
-        log_times_ns,
-    }] = &recovered.unchecked[..]
+    let [
+        Unchecked {
+            topic,
+            log_times_ns,
+        },
+    ] = &recovered.unchecked[..]
     else {
         panic!("{recovered:?}")
     };

@@ -50,7 +50,11 @@ fn on_a_full_disk_and_at_a_kill_the_old_file_stays_and_nothing_else() {
             let output = confined(full, &command);
             let errors = String::from_utf8_lossy(&output.stderr);
             assert!(!output.status.success(), "{command:?}: {errors}");
-            assert_eq!(output.status.code(), Some(1), "{command:?} {full}: {errors}");
+            assert_eq!(
+                output.status.code(),
+                Some(1),
+                "{command:?} {full}: {errors}"
+            );
             assert!(errors.contains(&out), "{errors}");
             assert_eq!(fs::read_to_string(&out).unwrap(), "old", "{command:?}");
             assert_eq!(fs::read_dir(&folder).unwrap().count(), 1, "{command:?}");
@@ -256,21 +260,33 @@ fn a_cut_log_is_replayed_up_to_the_cut_and_recovered() {
         let cut = json(&["replay", "--direct", log, "--params", PARAMS]);
         assert!(cut["clouds_in_log"].as_u64() > Some(1), "{cut}");
         let told = cut["cuts"][0].as_str().unwrap();
-        assert!(told.contains("truncated") && told.contains("messages precede it"), "{told}");
+        assert!(
+            told.contains("truncated") && told.contains("messages precede it"),
+            "{told}"
+        );
     }
     let recovered = json(&["bag", "recover", &log, "--out", &out]);
     let messages = recovered["messages"].as_u64().unwrap();
     assert!(messages > 10, "{recovered}");
-    assert_eq!((recovered["claimed"].as_u64(), recovered["lost"].as_u64()), (all, Some(all.unwrap() - messages)));
+    assert_eq!(
+        (recovered["claimed"].as_u64(), recovered["lost"].as_u64()),
+        (all, Some(all.unwrap() - messages))
+    );
     let told = recovered["told"][0].as_str().unwrap();
-    assert!(told.contains("truncated") && !told.contains("bag recover"), "{told}");
+    assert!(
+        told.contains("truncated") && !told.contains("bag recover"),
+        "{told}"
+    );
     let report = json(&["replay", "--direct", &out, "--params", PARAMS]);
     assert!(report["clouds_in_log"].as_u64() > Some(1), "{report}");
     assert_eq!(report["cuts"].as_array().map(Vec::len), Some(0));
     // Without metadata nobody knows how many there were.
     fs::remove_file(directory.path().join("log/metadata.yaml")).unwrap();
     let said = text(&["bag", "recover", &log, "--out", &at("again")]);
-    assert!(said.contains("unknown how many are lost") && !said.contains("0 lost"), "{said}");
+    assert!(
+        said.contains("unknown how many are lost") && !said.contains("0 lost"),
+        "{said}"
+    );
     // Of nothing that can be read no log is made.
     fs::write(&file, &whole[..200]).unwrap();
     let nothing = lattice(&["bag", "recover", &log, "--out", &at("nothing")]);

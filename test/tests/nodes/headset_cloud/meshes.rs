@@ -166,7 +166,11 @@ fn a_session_begins_whatever_its_clock_says() {
     }
     // What arrives late of any of them is refused, also with the newest stamp.
     for session in ["of 2038", "of 2026", "of 1970"] {
-        assert!(machine.on_mesh(&Arc::new(of(session, year_2038_ns + 1))).is_empty());
+        assert!(
+            machine
+                .on_mesh(&Arc::new(of(session, year_2038_ns + 1)))
+                .is_empty()
+        );
     }
     assert_eq!(machine.counts().dropped["mesh_other_session"], 3);
     // Within the session the clock may be set too.
